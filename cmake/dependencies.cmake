@@ -1,0 +1,43 @@
+# Packages the build stands on. Each optional part names what is missing and how to go on without it.
+find_package(Threads REQUIRED)
+find_library(SDM_LIBM m)
+
+if(SDM_OPENMP)
+  find_package(OpenMP COMPONENTS C)
+  if(NOT OpenMP_C_FOUND)
+    message(FATAL_ERROR "OpenMP not found: install libgomp (gcc) or libomp-dev (clang), or configure with -DSDM_OPENMP=OFF")
+  endif()
+endif()
+
+find_package(PkgConfig)
+find_package(ZLIB)
+if(NOT ZLIB_FOUND)
+  message(FATAL_ERROR "zlib not found: install zlib1g-dev")
+endif()
+
+if(SDM_CONFIG)
+  if(PKG_CONFIG_FOUND)
+    pkg_check_modules(YAML IMPORTED_TARGET yaml-0.1)
+  endif()
+  if(NOT YAML_FOUND)
+    message(FATAL_ERROR "libyaml not found: install libyaml-dev and pkg-config, or configure with -DSDM_CONFIG=OFF (runtime only)")
+  endif()
+endif()
+
+if(SDM_VDB)
+  # Debian keeps FindOpenVDB.cmake in a folder of its own
+  list(APPEND CMAKE_MODULE_PATH "/usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB")
+  find_package(OpenVDB QUIET COMPONENTS openvdb)
+  if(NOT OpenVDB_FOUND)
+    message(FATAL_ERROR "OpenVDB not found: install libopenvdb-dev, or configure with -DSDM_VDB=OFF (no .vdb files)")
+  endif()
+endif()
+
+if(SDM_TESTS)
+  if(PKG_CONFIG_FOUND)
+    pkg_check_modules(CMOCKA IMPORTED_TARGET cmocka)
+  endif()
+  if(NOT CMOCKA_FOUND)
+    message(FATAL_ERROR "cmocka not found: install libcmocka-dev, or configure with -DSDM_TESTS=OFF")
+  endif()
+endif()

@@ -1,0 +1,228 @@
+/* Whole-file reading and atomic writing. */
+#include "sdm/file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "sdm/memory.h"
+
+sdm_status sdm_file_read(const char *path, size_t max_bytes, uint8_t **data, size_t *size, sdm_error *err)
+{
+    *data = NULL;
+    *size = 0;
+    const int fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (fd < 0) return sdm_fail(err, SDM_E_IO, "%s: cannot open: %s", path, strerror(errno));
+    sdm_status s = SDM_OK;
+    uint8_t *block = NULL;
+    struct stat st;
+    size_t n = 0;
+    if (fstat(fd, &st)) {
+        s = sdm_fail(err, SDM_E_IO, "%s: cannot read its size: %s", path, strerror(errno));
+        goto done;
+    }
+    if (!S_ISREG(st.st_mode)) {
+        s = sdm_fail(err, SDM_E_IO, "%s: not a regular file", path);
+        goto done;
+    }
+    n = (size_t)st.st_size;
+    if (n > max_bytes) {
+        s = sdm_fail(err, SDM_E_FORMAT, "%s: %zu bytes, more than the %zu allowed for a file of this kind", path, n, max_bytes);
+        goto done;
+    }
+    if ((s = SDM_ALLOC(&block, n + 1, path, err))) goto done;
+    for (size_t at = 0; at < n;) {
+        const ssize_t got = read(fd, block + at, n - at);
+        if (got < 0 && errno == EINTR) continue;
+        if (got < 0) {
+            s = sdm_fail(err, SDM_E_IO, "%s: cannot read: %s", path, strerror(errno));
+            goto done;
+        }
+        if (got == 0) {
+            s = sdm_fail(err, SDM_E_IO, "%s: ended after %zu of %zu bytes", path, at, n);
+            goto done;
+        }
+        at += (size_t)got;
+    }
+done:
+    close(fd);
+    if (s) {
+        sdm_free(block);
+        return s;
+    }
+    *data = block;
+    *size = n;
+    return SDM_OK;
+}
+
+#define BUFFER_BYTES 65536u
+
+struct sdm_outfile {
+    char *path, *temp;
+    int fd;
+    size_t filled;
+    uint8_t buffer[BUFFER_BYTES];
+};
+
+static char *with_suffix(const char *path, const char *suffix)
+{
+    const size_t n = strlen(path), m = strlen(suffix);
+    char *out = malloc(n + m + 1);
+    if (!out) return NULL;
+    memcpy(out, path, n);
+    memcpy(out + n, suffix, m + 1);
+    return out;
+}
+
+sdm_status sdm_outfile_open(const char *path, sdm_outfile **out, sdm_error *err)
+{
+    *out = NULL;
+    sdm_outfile *f = NULL;
+    const sdm_status s = SDM_ALLOC(&f, 1, "output buffer", err);
+    if (s) return s;
+    f->fd = -1;
+    char suffix[48];
+    snprintf(suffix, sizeof suffix, ".%ld.tmp", (long)getpid());
+    f->path = with_suffix(path, "");
+    f->temp = with_suffix(path, suffix);
+    if (!f->path || !f->temp) {
+        sdm_outfile_discard(&f);
+        return sdm_fail(err, SDM_E_NOMEM, "%s: no memory for its name", path);
+    }
+    struct stat st;
+    if (!stat(path, &st) && S_ISDIR(st.st_mode)) {
+        sdm_outfile_discard(&f);
+        return sdm_fail(err, SDM_E_IO, "%s: cannot write: it is a folder", path);
+    }
+    f->fd = open(f->temp, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    if (f->fd < 0) {
+        const int code = errno;
+        sdm_outfile_discard(&f);
+        return sdm_fail(err, SDM_E_IO, "%s: cannot write: %s", path, strerror(code));
+    }
+    *out = f;
+    return SDM_OK;
+}
+
+const char *sdm_outfile_temp_path(const sdm_outfile *f) { return f->temp; }
+
+static sdm_status flush(sdm_outfile *f, sdm_error *err)
+{
+    for (size_t at = 0; at < f->filled;) {
+        const ssize_t put = write(f->fd, f->buffer + at, f->filled - at);
+        if (put < 0 && errno == EINTR) continue;
+        if (put < 0) return sdm_fail(err, SDM_E_IO, "%s: cannot write: %s", f->path, strerror(errno));
+        at += (size_t)put;
+    }
+    f->filled = 0;
+    return SDM_OK;
+}
+
+sdm_status sdm_outfile_write(sdm_outfile *f, const void *data, size_t size, sdm_error *err)
+{
+    const uint8_t *p = data;
+    while (size) {
+        if (f->filled == BUFFER_BYTES) {
+            const sdm_status s = flush(f, err);
+            if (s) return s;
+        }
+        size_t n = BUFFER_BYTES - f->filled;
+        if (n > size) n = size;
+        memcpy(f->buffer + f->filled, p, n);
+        f->filled += n, p += n, size -= n;
+    }
+    return SDM_OK;
+}
+
+sdm_status sdm_outfile_printf(sdm_outfile *f, sdm_error *err, const char *fmt, ...)
+{
+    va_list args, again;
+    va_start(args, fmt);
+    va_copy(again, args);
+    const int n = vsnprintf(NULL, 0, fmt, args);
+    va_end(args);
+    char *text = n < 0 ? NULL : malloc((size_t)n + 1);
+    if (text) vsnprintf(text, (size_t)n + 1, fmt, again);
+    va_end(again);
+    if (!text) return sdm_fail(err, SDM_E_NOMEM, "%s: no memory for a line", f->path);
+    const sdm_status s = sdm_outfile_write(f, text, (size_t)n, err);
+    free(text);
+    return s;
+}
+
+// makes the rename itself durable; file systems that cannot sync a folder are not an error
+static void sync_folder(const char *path)
+{
+    char *folder = with_suffix(path, "");
+    if (!folder) return;
+    char *slash = strrchr(folder, '/');
+    if (slash) slash[slash == folder] = '\0';
+    const int fd = open(slash ? folder : ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd >= 0) {
+        fsync(fd);
+        close(fd);
+    }
+    free(folder);
+}
+
+sdm_status sdm_outfile_commit(sdm_outfile **pf, sdm_error *err)
+{
+    sdm_outfile *f = *pf;
+    sdm_status s = flush(f, err);
+    // a library may have replaced the temporary file by name: sync what has that name now
+    if (!s) {
+        const int fd = open(f->temp, O_RDWR | O_CLOEXEC);
+        if (fd < 0 || fsync(fd)) s = sdm_fail(err, SDM_E_IO, "%s: cannot bring to disk: %s", f->path, strerror(errno));
+        if (fd >= 0) close(fd);
+    }
+    const int closed = close(f->fd);
+    f->fd = -1;
+    if (!s && closed) s = sdm_fail(err, SDM_E_IO, "%s: cannot close: %s", f->path, strerror(errno));
+    if (!s && rename(f->temp, f->path)) s = sdm_fail(err, SDM_E_IO, "%s: cannot rename into place: %s", f->path, strerror(errno));
+    if (s) {
+        sdm_outfile_discard(pf);
+        return s;
+    }
+    sync_folder(f->path);
+    free(f->path);
+    free(f->temp);
+    sdm_free(f);
+    *pf = NULL;
+    return SDM_OK;
+}
+
+void sdm_outfile_discard(sdm_outfile **pf)
+{
+    sdm_outfile *f = *pf;
+    if (!f) return;
+    if (f->fd >= 0) close(f->fd);
+    if (f->temp) unlink(f->temp);
+    free(f->path);
+    free(f->temp);
+    sdm_free(f);
+    *pf = NULL;
+}
+
+sdm_status sdm_make_folder(const char *path, sdm_error *err)
+{
+    char *name = with_suffix(path, "");
+    if (!name) return sdm_fail(err, SDM_E_NOMEM, "%s: no memory for its name", path);
+    sdm_status s = SDM_OK;
+    for (char *at = name + 1; !s; at++) {
+        if (*at && *at != '/') continue;
+        const char end = *at;
+        *at = '\0';
+        struct stat st;
+        if (mkdir(name, 0777) && (errno != EEXIST || stat(name, &st) || !S_ISDIR(st.st_mode)))
+            s = sdm_fail(err, SDM_E_IO, "%s: cannot make the folder: %s", name, strerror(errno));
+        *at = end;
+        if (!end) break;
+    }
+    free(name);
+    return s;
+}

@@ -1,0 +1,58 @@
+/* The regular grid: checks and coordinates. */
+#include "sdm/grid.h"
+
+#include <math.h>
+
+sdm_grid sdm_grid_centred(const int64_t n[3], double spacing, const double centre[3])
+{
+    sdm_grid g = {.dir = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    for (int a = 0; a < 3; a++) {
+        g.n[a] = n[a];
+        g.spacing[a] = spacing;
+        g.origin[a] = centre[a] - 0.5 * (double)(n[a] - 1) * spacing;
+    }
+    return g;
+}
+
+sdm_status sdm_grid_check(const sdm_grid *g, sdm_error *err)
+{
+    static const char axis[] = "xyz";
+    for (int a = 0; a < 3; a++) {
+        if (g->n[a] < 1 || g->n[a] > 1 << 20)
+            return sdm_fail(err, SDM_E_ARG, "grid size along %c is %lld, need 1 to 1048576", axis[a], (long long)g->n[a]);
+        if (!(g->spacing[a] > 0) || !isfinite(g->spacing[a]))
+            return sdm_fail(err, SDM_E_ARG, "grid spacing along %c is %g mm, need a positive number", axis[a], g->spacing[a]);
+        if (!isfinite(g->origin[a]))
+            return sdm_fail(err, SDM_E_ARG, "grid origin along %c is %g mm, need a finite number", axis[a], g->origin[a]);
+    }
+    // 2^60 floats cannot be addressed: three factors of at most 2^20 do not overflow int64
+    if ((uint64_t)(g->n[0] * g->n[1] * g->n[2]) > SIZE_MAX / sizeof(double) / 4)
+        return sdm_fail(err, SDM_E_ARG, "grid of %lld x %lld x %lld voxels is more than memory can hold", (long long)g->n[0],
+                        (long long)g->n[1], (long long)g->n[2]);
+    for (int a = 0; a < 3; a++) {
+        for (int b = 0; b < 3; b++) {
+            double dot = 0;
+            for (int k = 0; k < 3; k++) dot += g->dir[3 * k + a] * g->dir[3 * k + b];
+            if (!(fabs(dot - (a == b)) <= 1e-6))
+                return sdm_fail(err, SDM_E_ARG, "grid direction is not orthonormal: columns %d and %d have the product %g", a, b, dot);
+        }
+    }
+    return SDM_OK;
+}
+
+size_t sdm_grid_count(const sdm_grid *g) { return (size_t)g->n[0] * (size_t)g->n[1] * (size_t)g->n[2]; }
+
+void sdm_grid_world(const sdm_grid *g, const double index[3], double world[3])
+{
+    for (int a = 0; a < 3; a++) {
+        world[a] = g->origin[a];
+        for (int b = 0; b < 3; b++) world[a] += g->dir[3 * a + b] * g->spacing[b] * index[b];
+    }
+}
+
+void sdm_grid_index(const sdm_grid *g, const double world[3], double index[3])
+{
+    const double d[3] = {world[0] - g->origin[0], world[1] - g->origin[1], world[2] - g->origin[2]};
+    for (int b = 0; b < 3; b++)
+        index[b] = (g->dir[b] * d[0] + g->dir[3 + b] * d[1] + g->dir[6 + b] * d[2]) / g->spacing[b];
+}

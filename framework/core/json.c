@@ -1,0 +1,76 @@
+/* JSON writer. */
+#include <math.h>
+#include <string.h>
+
+#include "sdm/text.h"
+
+static void quoted(sdm_text *t, const char *s)
+{
+    sdm_text_add(t, "\"");
+    for (; *s; s++) {
+        const unsigned char c = (unsigned char)*s;
+        if (c == '"' || c == '\\') sdm_text_add(t, "\\%c", c);
+        else if (c == '\n') sdm_text_add(t, "\\n");
+        else if (c < 0x20) sdm_text_add(t, "\\u%04x", c);
+        else sdm_text_add(t, "%c", c);
+    }
+    sdm_text_add(t, "\"");
+}
+
+static void begin(sdm_json *j, const char *key)
+{
+    if (j->needs_comma[j->depth]) sdm_text_add(&j->text, ", ");
+    j->needs_comma[j->depth] = true;
+    if (!key) return;
+    quoted(&j->text, key);
+    sdm_text_add(&j->text, ": ");
+}
+
+void sdm_json_open(sdm_json *j, const char *key, char bracket)
+{
+    begin(j, key);
+    sdm_text_add(&j->text, "%c", bracket);
+    if (j->depth + 1 == (int)(sizeof j->needs_comma / sizeof *j->needs_comma)) {
+        j->text.failed = true;
+        return;
+    }
+    j->needs_comma[++j->depth] = false;
+}
+
+void sdm_json_close(sdm_json *j, char bracket)
+{
+    sdm_text_add(&j->text, "%c", bracket);
+    if (j->depth) j->depth--;
+}
+
+void sdm_json_real(sdm_json *j, const char *key, double v)
+{
+    char buf[32];
+    begin(j, key);
+    sdm_text_add(&j->text, "%s", isfinite(v) ? sdm_format_real(v, buf) : "null");
+}
+
+void sdm_json_int(sdm_json *j, const char *key, int64_t v)
+{
+    begin(j, key);
+    sdm_text_add(&j->text, "%lld", (long long)v);
+}
+
+void sdm_json_bool(sdm_json *j, const char *key, bool v)
+{
+    begin(j, key);
+    sdm_text_add(&j->text, v ? "true" : "false");
+}
+
+void sdm_json_text(sdm_json *j, const char *key, const char *v)
+{
+    begin(j, key);
+    quoted(&j->text, v);
+}
+
+void sdm_json_dispose(sdm_json *j)
+{
+    if (!j) return;
+    sdm_text_dispose(&j->text);
+    *j = (sdm_json){0};
+}

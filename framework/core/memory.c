@@ -1,0 +1,48 @@
+/* Checked, aligned memory with a trap for tests. */
+#include "sdm/memory.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define ALIGNMENT 64u
+
+static unsigned long fail_after; // 0: off; only tests set it
+
+void sdm_alloc_fail_after(unsigned long n) { fail_after = n; }
+
+sdm_status sdm_mul(size_t a, size_t b, size_t *out, sdm_error *err)
+{
+    if (b && a > SIZE_MAX / b) return sdm_fail(err, SDM_E_NOMEM, "%zu times %zu bytes is more than memory can hold", a, b);
+    *out = a * b;
+    return SDM_OK;
+}
+
+sdm_status sdm_alloc(void **out, size_t count, size_t size, const char *what, sdm_error *err)
+{
+    *out = NULL;
+    size_t bytes = 0;
+    if (sdm_mul(count, size, &bytes, NULL) || bytes > SIZE_MAX - ALIGNMENT)
+        return sdm_fail(err, SDM_E_NOMEM, "%s: %zu elements of %zu bytes are more than memory can hold", what, count, size);
+    bytes = (bytes + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
+    if (!bytes) bytes = ALIGNMENT;
+    void *block = NULL;
+    if (!(fail_after && --fail_after == 0)) block = aligned_alloc(ALIGNMENT, bytes);
+    if (!block) return sdm_fail(err, SDM_E_NOMEM, "%s: no memory for %zu bytes", what, bytes);
+    memset(block, 0, bytes);
+    *out = block;
+    return SDM_OK;
+}
+
+sdm_status sdm_grow(void **block, size_t old_count, size_t new_count, size_t size, const char *what, sdm_error *err)
+{
+    void *bigger;
+    const sdm_status s = sdm_alloc(&bigger, new_count, size, what, err);
+    if (s) return s;
+    const size_t kept = old_count < new_count ? old_count : new_count;
+    if (*block && kept) memcpy(bigger, *block, kept * size);
+    sdm_free(*block);
+    *block = bigger;
+    return SDM_OK;
+}
+
+void sdm_free(void *block) { free(block); }

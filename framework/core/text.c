@@ -1,0 +1,117 @@
+/* Growing text, numbers without the locale, nearest names. */
+#include "sdm/text.h"
+
+#include <locale.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+void sdm_text_dispose(sdm_text *t)
+{
+    if (!t) return;
+    free(t->data);
+    *t = (sdm_text){0};
+}
+
+void sdm_text_add(sdm_text *t, const char *fmt, ...)
+{
+    if (t->failed) return;
+    va_list args, again;
+    va_start(args, fmt);
+    va_copy(again, args);
+    const int n = vsnprintf(NULL, 0, fmt, args);
+    va_end(args);
+    if (n < 0) t->failed = true;
+    const size_t need = t->size + (n < 0 ? 0 : (size_t)n) + 1;
+    if (!t->failed && need > t->capacity) {
+        const size_t capacity = need < 256 ? 256 : need * 2;
+        char *bigger = realloc(t->data, capacity);
+        if (bigger) t->data = bigger, t->capacity = capacity;
+        t->failed = !bigger;
+    }
+    if (!t->failed) {
+        vsnprintf(t->data + t->size, t->capacity - t->size, fmt, again);
+        t->size += (size_t)n;
+    }
+    va_end(again);
+}
+
+// strtod follows the locale of the process; a private "C" locale would need newlocale, so the decimal point is put in by hand
+bool sdm_parse_real(const char *s, double *out)
+{
+    char buf[512];
+    const size_t n = strlen(s);
+    if (n == 0 || n >= sizeof buf || strspn(s, "0123456789+-.eE") != n) return false;
+    const char point = localeconv()->decimal_point[0];
+    for (size_t i = 0; i <= n; i++) buf[i] = s[i] == '.' ? point : s[i];
+    char *end;
+    const double v = strtod(buf, &end);
+    if (*end || !isfinite(v)) return false;
+    *out = v;
+    return true;
+}
+
+bool sdm_parse_int(const char *s, int64_t *out)
+{
+    const bool negative = *s == '-';
+    if (*s == '-' || *s == '+') s++;
+    if (!*s) return false;
+    uint64_t v = 0;
+    const uint64_t limit = negative ? (uint64_t)INT64_MAX + 1 : (uint64_t)INT64_MAX;
+    for (; *s; s++) {
+        if (*s < '0' || *s > '9') return false;
+        const uint64_t digit = (uint64_t)(*s - '0');
+        if (v > (limit - digit) / 10) return false;
+        v = v * 10 + digit;
+    }
+    *out = negative ? (v == (uint64_t)INT64_MAX + 1 ? INT64_MIN : -(int64_t)v) : (int64_t)v;
+    return true;
+}
+
+const char *sdm_format_real(double v, char buf[32])
+{
+    const char point = localeconv()->decimal_point[0];
+    for (int digits = 1; digits <= 17; digits++) {
+        snprintf(buf, 32, "%.*g", digits, v);
+        if (strtod(buf, NULL) == v) break;
+    }
+    for (char *p = buf; *p; p++)
+        if (*p == point) *p = '.';
+    return buf;
+}
+
+#define WORD_MAX 64
+
+static int smaller(int a, int b) { return a < b ? a : b; }
+
+// optimal string alignment: insertions, deletions, replacements, swaps of neighbours
+static int distance(const char *a, const char *b)
+{
+    const int n = (int)strnlen(a, WORD_MAX), m = (int)strnlen(b, WORD_MAX);
+    int row[3][WORD_MAX + 1];
+    for (int j = 0; j <= m; j++) row[0][j] = j;
+    for (int i = 1; i <= n; i++) {
+        int *now = row[i % 3];
+        const int *last = row[(i - 1) % 3], *before = row[(i + 1) % 3];
+        now[0] = i;
+        for (int j = 1; j <= m; j++) {
+            now[j] = smaller(smaller(last[j] + 1, now[j - 1] + 1), last[j - 1] + (a[i - 1] != b[j - 1]));
+            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) now[j] = smaller(now[j], before[j - 2] + 1);
+        }
+    }
+    return row[n % 3][m];
+}
+
+const char *sdm_nearest_name(const char *word, const char *const *names, size_t n)
+{
+    const int length = (int)strnlen(word, WORD_MAX);
+    int best = length <= 2 ? 2 : length / 3 + 2; // as near as this at least, exclusive
+    const char *nearest = NULL;
+    for (size_t i = 0; i < n; i++) {
+        const int d = distance(word, names[i]);
+        if (d < best) best = d, nearest = names[i];
+    }
+    return nearest;
+}

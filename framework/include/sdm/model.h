@@ -1,0 +1,72 @@
+/* A trained network and its file: everything needed to use it without the plug-in or the config. */
+#ifndef SDM_MODEL_H
+#define SDM_MODEL_H
+
+#include "sdm/grid.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define SDM_MODEL_NAME_MAX 64
+
+/* A shape parameter as the network was trained on it. */
+typedef struct sdm_model_param {
+    char name[SDM_MODEL_NAME_MAX], unit[16];
+    double min, max, def;
+} sdm_model_param;
+
+/* Held-out figures measured at the end of training (fresh random shapes, exact distances as truth). */
+typedef struct sdm_accuracy {
+    int64_t samples;
+    double mse_mm2, rmse_mm, mae_mm, max_abs_mm;
+    double rmse_near_mm;   /* where |distance| <= 0.4 mm */
+    double q50_mm, q90_mm, q99_mm; /* quantiles over the shapes of the RMSE of one map */
+} sdm_accuracy;
+
+/* What a model says about itself. Texts are NUL-terminated and owned by the model. */
+typedef struct sdm_model_info {
+    char shape[SDM_MODEL_NAME_MAX];
+    char kind[16];          /* "pod" */
+    char version[16];       /* of the program that trained it */
+    size_t n_params;
+    const sdm_model_param *params;
+    size_t n_options;       /* options of the shape, as text, for the exact engine */
+    const char *const *option_names, *const *option_values;
+    sdm_grid grid;
+    sdm_accuracy accuracy;
+    uint64_t seed;
+    double train_seconds;
+    int64_t train_samples;  /* exact maps seen */
+    uint64_t checksum;      /* of the whole file */
+    size_t file_bytes, weight_bytes;
+    const char *config;     /* resolved config, YAML */
+} sdm_model_info;
+
+/* Immutable once opened: any number of threads may use one model. */
+typedef struct sdm_model sdm_model;
+
+/* Reads and checks a model file: every size against the file's length before anything is allocated, every checksum.
+   SDM_E_IO; SDM_E_FORMAT: not a model, damaged, truncated, or of a newer version. */
+SDM_API sdm_status sdm_model_open(const char *path, sdm_model **out, sdm_error *err);
+SDM_API void sdm_model_free(sdm_model *m);
+SDM_API const sdm_model_info *sdm_model_get_info(const sdm_model *m);
+
+/* Bytes of scratch memory that one call of sdm_model_forward needs for a batch of n. */
+SDM_API size_t sdm_model_scratch_bytes(const sdm_model *m, size_t n);
+
+/* values[n][nz][ny][nx] = the maps at params[n][n_params], mm, written; no checks of the parameters, no allocation.
+   scratch: sdm_model_scratch_bytes(m, n), 64-byte aligned. One thread. [any thread] */
+SDM_API void sdm_model_forward(const sdm_model *m, const double *params, size_t n, float *values, void *scratch);
+
+/* Bytes of scratch memory for sdm_model_jacobian. */
+SDM_API size_t sdm_model_jacobian_scratch_bytes(const sdm_model *m);
+
+/* The map and its derivatives by forward mode: values[nz][ny][nx], jacobian[n_params][nz][ny][nx] (mm per unit of the
+   parameter). One thread, no allocation. [any thread] */
+SDM_API void sdm_model_jacobian(const sdm_model *m, const double *params, float *values, float *jacobian, void *scratch);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,91 @@
+/* The `pod` network: polynomials and an MLP give the coefficients of local bases of the map.
+
+     x   = parameters scaled to [-1, 1]
+     phi = products of normalised Legendre polynomials of total degree <= degree        (polynomial chaos; Xiu and Karniadakis 2002)
+     h   = MLP(products of total degree 1 .. input_degree)
+     z   = [phi, h]                                        "latent", n_latent numbers
+     c   = head z                                          coefficients of all blocks
+     map = mean + basis_b c_b in each block b of voxels    (proper orthogonal decomposition; POD-NN, Hesthaven and Ubbiali 2018)
+
+   Letters: P parameters, F terms of phi, I inputs of the MLP, W width, L = F + W latent, K coefficients, V_b voxels and k_b rank of block b. */
+#ifndef SDM_POD_H
+#define SDM_POD_H
+
+#include <stdbool.h>
+
+#include "sdm/grid.h"
+#include "sdm/model.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define SDM_POD_MAX_DEPTH 16
+#define SDM_POD_MAX_PARAMS 64
+
+/* Number of products of total degree <= degree in n variables; SIZE_MAX when it does not fit. */
+SDM_API size_t sdm_poly_count(size_t n, size_t degree);
+
+/* exponents[sdm_poly_count(n, degree)][n], ordered by total degree, so that lower degrees are a prefix; entry 0 is the constant. */
+SDM_API void sdm_poly_table(size_t n, size_t degree, uint8_t *exponents);
+
+/* phi[n_terms] at x[n] in [-1, 1]; dphi[n][n_terms] = d phi / d x when not NULL. Normalised: mean square 1 under the uniform law.
+   degree: the largest exponent in the table. */
+SDM_API void sdm_poly_eval(const uint8_t *exponents, size_t n_terms, size_t n, size_t degree, const double *x, float *phi, float *dphi);
+
+/* Activation: y = f(x) and, when dy is not NULL, dy = f'(x), for n values. kind: 0 SiLU, 1 tanh, 2 ReLU. y may be x. */
+SDM_API void sdm_activate(int kind, size_t n, const float *x, float *y, float *dy);
+
+/* A block of voxels: first voxel and size along x, y, z; its place in the arrays that hold all blocks one after another. */
+typedef struct sdm_pod_block {
+    uint32_t at[3], size[3];
+    uint32_t rank;
+    uint32_t coefficient; /* first of its coefficients in c[K] */
+    uint64_t voxel;       /* first of its voxels in block order */
+} sdm_pod_block;
+
+/* What a pod network is made of, beside its weights. */
+typedef struct sdm_pod_arch {
+    size_t n_params, degree, input_degree, depth, width;
+    size_t block; /* edge of a block, voxels */
+    int activation;
+    size_t n_terms, n_inputs, n_latent;
+    size_t n_coefficients, n_voxels, n_blocks;
+} sdm_pod_arch;
+
+/* Number of blocks of edge `block` in a grid, and the blocks (rank and coefficient 0), x fastest. */
+SDM_API size_t sdm_pod_block_count(const sdm_grid *grid, size_t block);
+SDM_API void sdm_pod_blocks(const sdm_grid *grid, size_t block, sdm_pod_block *blocks);
+
+/* Copies between map order [nz][ny][nx] and block order (x fastest within a block). */
+SDM_API void sdm_pod_gather(const sdm_grid *grid, const sdm_pod_block *blocks, size_t n_blocks, const float *map, float *blocked);
+SDM_API void sdm_pod_scatter(const sdm_grid *grid, const sdm_pod_block *blocks, size_t n_blocks, const float *blocked, float *map);
+
+/* Weights as the trainer has them, row-major float32. */
+typedef struct sdm_pod_weights {
+    const float *layer[SDM_POD_MAX_DEPTH]; /* [W][I or W] */
+    const float *bias[SDM_POD_MAX_DEPTH];  /* [W] */
+    const float *head;                     /* [K][L] */
+    const float *mean;                     /* [n_voxels], block order */
+    const float *basis;                    /* for each block [k_b][V_b], one after another */
+} sdm_pod_weights;
+
+/* Everything a model file is made from. `info` gives names, ranges, grid, accuracy, provenance. */
+typedef struct sdm_pod_spec {
+    const sdm_model_info *info;
+    sdm_pod_arch arch;
+    const sdm_pod_block *blocks;
+    sdm_pod_weights weights;
+    bool half; /* head and basis in half precision */
+} sdm_pod_spec;
+
+/* Builds a model file in memory (sdm_free()); write it with sdm_container_write(). */
+SDM_API sdm_status sdm_model_build(const sdm_pod_spec *spec, uint8_t **bytes, size_t *size, sdm_error *err);
+
+/* Opens a model file that is in memory; the bytes are copied. `name` stands for the file in messages. */
+SDM_API sdm_status sdm_model_open_memory(const char *name, const uint8_t *bytes, size_t size, sdm_model **out, sdm_error *err);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

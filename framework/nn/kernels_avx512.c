@@ -1,0 +1,11 @@
+/* Kernels for AVX-512. */
+#include <immintrin.h>
+#include <stdint.h>
+
+#define TABLE sdm_kernels_avx512
+#define ISA "avx512"
+#define VW 16
+#define MR 12
+#define LOAD_HALF
+static inline __m512 load_half(const uint16_t *p) { return _mm512_cvtph_ps(_mm256_loadu_si256((const __m256i *)(const void *)p)); }
+#include "kernels_simd.h"

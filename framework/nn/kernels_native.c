@@ -1,0 +1,158 @@
+/* Choice of the instruction set, the blocked matrix product, packing and half precision. */
+#include <math.h>
+#include <pthread.h>
+#include <string.h>
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+#include "kernels_table.h"
+#include "sdm/kernels.h"
+
+static const kernel_table *chosen;
+static pthread_once_t once = PTHREAD_ONCE_INIT;
+
+static void choose(void)
+{
+    chosen = &sdm_kernels_generic;
+#if defined(__x86_64__)
+    __builtin_cpu_init();
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("f16c"))
+        chosen = &sdm_kernels_avx2;
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq"))
+        chosen = &sdm_kernels_avx512;
+#endif
+}
+
+static const kernel_table *kernels(void)
+{
+    pthread_once(&once, choose);
+    return chosen;
+}
+
+const char *sdm_kernels_name(void) { return kernels()->name; }
+
+// blocks of the product: A block KC x MC and B block KC x NC stay in the second-level cache (sums are cut at KC: part of the result)
+enum { MC = 96, NC = 128, KC = 256 };
+
+static size_t least(size_t a, size_t b) { return a < b ? a : b; }
+
+// packed[panels][k][width] from a view, zero beyond `count`
+static void pack(size_t count, size_t k, const float *data, size_t along, size_t deep, size_t width, float *packed)
+{
+    for (size_t i0 = 0; i0 < count; i0 += width, packed += k * width) {
+        const size_t n = least(width, count - i0);
+        if (n < width) memset(packed, 0, k * width * sizeof *packed);
+        const float *src = data + i0 * along;
+        if (along == 1) {
+            for (size_t p = 0; p < k; p++) memcpy(packed + p * width, src + p * deep, n * sizeof *src);
+        } else {
+            for (size_t i = 0; i < n; i++)
+                for (size_t p = 0; p < k; p++) packed[p * width + i] = src[i * along + p * deep];
+        }
+    }
+}
+
+// one MC x NC block of c over all of K
+static void gemm_block(const kernel_table *t, size_t m, size_t n, size_t k, sdm_view a, sdm_view b, bool add, float *c, size_t ldc)
+{
+    _Alignas(64) float pa[MC * KC], pb[NC * KC], edge[12 * 32];
+    for (size_t k0 = 0; k0 < k || k0 == 0; k0 += KC) {
+        const size_t kc = least(KC, k - k0);
+        const int keep = add || k0 > 0;
+        pack(m, kc, a.data + k0 * a.col, a.row, a.col, t->mr, pa);
+        pack(n, kc, b.data + k0 * b.row, b.col, b.row, t->nr, pb);
+        for (size_t j = 0; j < n; j += t->nr) {
+            const size_t nj = least(t->nr, n - j);
+            for (size_t i = 0; i < m; i += t->mr) {
+                const size_t mi = least(t->mr, m - i);
+                float *at = c + i * ldc + j;
+                if (mi == t->mr && nj == t->nr) {
+                    t->micro(kc, pa + i * kc, pb + j * kc, at, ldc, keep);
+                    continue;
+                }
+                // an incomplete tile goes through a full one
+                if (keep)
+                    for (size_t r = 0; r < mi; r++) memcpy(edge + r * t->nr, at + r * ldc, nj * sizeof *at);
+                t->micro(kc, pa + i * kc, pb + j * kc, edge, t->nr, keep);
+                for (size_t r = 0; r < mi; r++) memcpy(at + r * ldc, edge + r * t->nr, nj * sizeof *at);
+            }
+        }
+        if (k == 0) break;
+    }
+}
+
+void sdm_gemm(size_t m, size_t n, size_t k, sdm_view a, sdm_view b, bool add, float *c, size_t ldc, int n_threads)
+{
+    const kernel_table *t = kernels();
+    const long rows = (long)((m + MC - 1) / MC), cols = (long)((n + NC - 1) / NC);
+    if (rows * cols < 2) n_threads = 1;
+#ifdef _OPENMP
+    if (n_threads == 0) n_threads = omp_get_max_threads();
+#pragma omp parallel for schedule(dynamic) num_threads(n_threads) if (n_threads > 1)
+#else
+    (void)n_threads;
+#endif
+    for (long tile = 0; tile < rows * cols; tile++) {
+        const size_t i = (size_t)(tile % rows) * MC, j = (size_t)(tile / rows) * NC;
+        const sdm_view at = {a.data + i * a.row, a.row, a.col}, bt = {b.data + j * b.col, b.row, b.col};
+        gemm_block(t, least(MC, m - i), least(NC, n - j), k, at, bt, add, c + i * ldc + j, ldc);
+    }
+}
+
+size_t sdm_tiled_count(size_t outputs, size_t k) { return (outputs + SDM_TILE - 1) / SDM_TILE * SDM_TILE * k; }
+
+void sdm_tiled_pack_f32(size_t outputs, size_t k, sdm_view w, float *tiled)
+{
+    for (size_t o = 0; o < (outputs + SDM_TILE - 1) / SDM_TILE * SDM_TILE; o++)
+        for (size_t i = 0; i < k; i++)
+            tiled[(o / SDM_TILE * k + i) * SDM_TILE + o % SDM_TILE] = o < outputs ? w.data[o * w.row + i * w.col] : 0.0f;
+}
+
+void sdm_tiled_pack_f16(size_t outputs, size_t k, sdm_view w, uint16_t *tiled)
+{
+    for (size_t o = 0; o < (outputs + SDM_TILE - 1) / SDM_TILE * SDM_TILE; o++)
+        for (size_t i = 0; i < k; i++)
+            tiled[(o / SDM_TILE * k + i) * SDM_TILE + o % SDM_TILE] =
+                o < outputs ? sdm_half_from_float(w.data[o * w.row + i * w.col]) : (uint16_t)0;
+}
+
+void sdm_tile_f32(size_t batch, size_t k, const float *w, const float *x, size_t ldx, float *y, size_t ldy)
+{
+    kernels()->tile_f32(batch, k, w, x, ldx, y, ldy);
+}
+
+void sdm_tile_f16(size_t batch, size_t k, const uint16_t *w, const float *x, size_t ldx, float *y, size_t ldy, float *scratch)
+{
+    const kernel_table *t = kernels();
+    if (batch == 1) {
+        t->tile_f16(k, w, x, y);
+        return;
+    }
+    t->expand_f16(k * SDM_TILE, w, scratch);
+    t->tile_f32(batch, k, scratch, x, ldx, y, ldy);
+}
+
+void sdm_exp(size_t n, const float *x, float *y) { kernels()->exp(n, x, y); }
+
+uint16_t sdm_half_from_float(float v)
+{
+    uint32_t bits;
+    memcpy(&bits, &v, sizeof bits);
+    const uint16_t sign = (uint16_t)(bits >> 16 & 0x8000u);
+    const float a = fabsf(v);
+    if (!(a < 65520.0f)) return (uint16_t)(sign | (a != a ? 0x7e00u : 0x7c00u));
+    if (a < 0x1p-14f) return (uint16_t)(sign | (uint16_t)lrintf(a * 0x1p24f)); // subnormal: multiples of 2^-24, nearest even
+    memcpy(&bits, &a, sizeof bits);
+    bits += 0xfffu + (bits >> 13 & 1); // nearest even at bit 13
+    return (uint16_t)(sign | (uint16_t)((bits >> 13) - (112u << 10)));
+}
+
+float sdm_half_to_float(uint16_t h)
+{
+    const uint32_t exponent = h >> 10 & 31u, mantissa = h & 1023u;
+    float v = exponent == 31 ? (mantissa ? NAN : INFINITY)
+              : exponent     ? ldexpf((float)(1024u + mantissa), (int)exponent - 25)
+                             : ldexpf((float)mantissa, -24);
+    return h & 0x8000u ? -v : v;
+}

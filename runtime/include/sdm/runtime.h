@@ -1,0 +1,61 @@
+/* The runtime: a model opened once, maps generated into the caller's memory from any number of threads. */
+#ifndef SDM_RUNTIME_H
+#define SDM_RUNTIME_H
+
+#include "sdm/exact.h"
+#include "sdm/model.h"
+#include "sdm/registry.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* What happens to parameters outside the range the network was trained on. They are never answered in silence. */
+typedef enum sdm_range_policy {
+    SDM_RANGE_REFUSE = 0, /* SDM_E_RANGE */
+    SDM_RANGE_CLAMP,      /* moved to the nearest allowed value, flagged in the result */
+    SDM_RANGE_EXACT       /* computed by the exact engine from the shape, flagged in the result; needs an instance */
+} sdm_range_policy;
+
+typedef enum sdm_source { SDM_SOURCE_NETWORK = 0, SDM_SOURCE_EXACT = 1 } sdm_source;
+
+/* How one map was made. */
+typedef struct sdm_result {
+    sdm_source source;
+    bool clamped;      /* a parameter was moved */
+    double error_mm;   /* RMSE to expect: held-out RMSE of the network; 0 for the exact engine */
+} sdm_result;
+
+typedef struct sdm_generate_opts {
+    sdm_range_policy policy;
+    const sdm_instance *exact_shape; /* for SDM_RANGE_EXACT: sdm_runtime_instance() or the caller's; else NULL */
+    int n_threads;                   /* 0: the OpenMP default; same bits for every value */
+} sdm_generate_opts;
+
+/* One map: values[nz][ny][nx], mm, negative inside, written at the voxels of the model's grid. params[n_params] in the model's order.
+   opts, result may be NULL. SDM_E_RANGE names the parameter, its value and the range (NaN and infinities always fail).
+   [any thread] */
+SDM_API sdm_status sdm_generate(const sdm_model *m, const double *params, const sdm_generate_opts *opts, float *values,
+                                sdm_result *result, sdm_error *err);
+
+/* A batch: params[n][n_params] -> values[n][nz][ny][nx], results[n] (may be NULL). All or nothing: parameters of all are checked
+   before the first is computed; the message says which one failed. [any thread] */
+SDM_API sdm_status sdm_generate_batch(const sdm_model *m, const double *params, size_t n, const sdm_generate_opts *opts,
+                                      float *values, sdm_result *results, sdm_error *err);
+
+/* Map and derivatives: jacobian[n_params][nz][ny][nx], mm per unit. Network only: out-of-range parameters are refused or clamped. */
+SDM_API sdm_status sdm_generate_jacobian(const sdm_model *m, const double *params, const sdm_generate_opts *opts, float *values,
+                                         float *jacobian, sdm_result *result, sdm_error *err);
+
+/* The shape the model was trained on, with its options, from a registry that knows it; checks that the parameters agree.
+   SDM_E_PLUGIN when the registry does not have it. */
+SDM_API sdm_status sdm_runtime_instance(const sdm_model *m, const sdm_registry *r, sdm_instance **out, sdm_error *err);
+
+/* Exact map of a shape at p: mesh, engine, map, in one call. report may be NULL. [any thread] */
+SDM_API sdm_status sdm_exact_shape_map(const sdm_instance *shape, const double *p, const sdm_exact_opts *opts,
+                                       const sdm_grid *grid, float *values, sdm_exact_report *report, sdm_error *err);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,139 @@
+/* Dense kernels against plain loops in double; the same bits for any number of threads. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "sdm/kernels.h"
+#include "sdm/memory.h"
+#include "sdm/rng.h"
+
+static float *random_floats(size_t n, uint64_t stream)
+{
+    float *v;
+    assert_int_equal(SDM_ALLOC(&v, n, "test", NULL), SDM_OK);
+    for (size_t i = 0; i < n; i++) v[i] = (float)(sdm_rng_uniform(3, stream, i) - 0.5);
+    return v;
+}
+
+static void check_product(size_t m, size_t n, size_t k, bool ta, bool tb, bool add)
+{
+    float *a = random_floats(m * k, 1), *b = random_floats(k * n, 2), *c = random_floats(m * n, 3), *old = random_floats(m * n, 3);
+    const sdm_view va = ta ? (sdm_view){a, 1, m} : (sdm_view){a, k, 1}, vb = tb ? (sdm_view){b, 1, k} : (sdm_view){b, n, 1};
+    sdm_gemm(m, n, k, va, vb, add, c, n, 2);
+    for (size_t i = 0; i < m; i++) {
+        for (size_t j = 0; j < n; j++) {
+            double s = add ? old[i * n + j] : 0;
+            for (size_t p = 0; p < k; p++) s += (double)va.data[i * va.row + p * va.col] * vb.data[p * vb.row + j * vb.col];
+            assert_true(fabs(s - c[i * n + j]) <= 1e-6 * sqrt((double)k) + 1e-6);
+        }
+    }
+    sdm_free(a);
+    sdm_free(b);
+    sdm_free(c);
+    sdm_free(old);
+}
+
+static void product(void **state)
+{
+    (void)state;
+    const size_t sizes[][3] = {{1, 1, 1}, {7, 5, 3}, {6, 16, 256}, {97, 129, 257}, {200, 33, 520}, {12, 32, 600}, {1, 300, 40}, {5, 4, 0}};
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
+        for (int mode = 0; mode < 8; mode++) check_product(sizes[i][0], sizes[i][1], sizes[i][2], mode & 1, mode & 2, mode & 4);
+}
+
+static void same_bits_for_threads(void **state)
+{
+    (void)state;
+    const size_t m = 300, n = 280, k = 700;
+    float *a = random_floats(m * k, 1), *b = random_floats(k * n, 2), *c1 = random_floats(m * n, 3), *c = random_floats(m * n, 3);
+    sdm_gemm(m, n, k, (sdm_view){a, k, 1}, (sdm_view){b, n, 1}, false, c1, n, 1);
+    for (int threads = 2; threads <= 5; threads++) {
+        sdm_gemm(m, n, k, (sdm_view){a, k, 1}, (sdm_view){b, n, 1}, false, c, n, threads);
+        assert_memory_equal(c, c1, m * n * sizeof *c);
+    }
+    sdm_free(a);
+    sdm_free(b);
+    sdm_free(c1);
+    sdm_free(c);
+}
+
+static void half_precision(void **state)
+{
+    (void)state;
+    for (unsigned h = 0; h < 65536; h++) { // every finite half survives the way to float and back
+        if ((h >> 10 & 31) == 31) continue;
+        assert_int_equal(sdm_half_from_float(sdm_half_to_float((uint16_t)h)), h);
+    }
+    assert_int_equal(sdm_half_from_float(1.0f), 0x3c00);
+    assert_int_equal(sdm_half_from_float(1.0f + 0x1p-11f), 0x3c00);            // tie to even
+    assert_int_equal(sdm_half_from_float(1.0f + 0x1p-11f + 0x1p-20f), 0x3c01);
+    assert_int_equal(sdm_half_from_float(65504.0f), 0x7bff);
+    assert_int_equal(sdm_half_from_float(-70000.0f), 0xfc00);
+    assert_int_equal(sdm_half_from_float(INFINITY), 0x7c00);
+    assert_int_equal(sdm_half_from_float(NAN) & 0x7c00, 0x7c00);
+    assert_true(isnan(sdm_half_to_float(0x7e00)) && isinf(sdm_half_to_float(0x7c00)));
+}
+
+static void tiles(void **state)
+{
+    (void)state;
+    enum { OUTPUTS = 150, K = 37, ROWS = 7 };
+    float *w = random_floats(OUTPUTS * K, 1), *x = random_floats(ROWS * K, 2);
+    float *tiled, *y, *scratch;
+    uint16_t *half;
+    const size_t count = sdm_tiled_count(OUTPUTS, K);
+    assert_int_equal(count, 192 * K);
+    assert_int_equal(SDM_ALLOC(&tiled, count, "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&half, count, "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&y, ROWS * 192, "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&scratch, K * SDM_TILE, "t", NULL), SDM_OK);
+    sdm_tiled_pack_f32(OUTPUTS, K, (sdm_view){w, K, 1}, tiled);
+    sdm_tiled_pack_f16(OUTPUTS, K, (sdm_view){w, K, 1}, half);
+    for (int use_half = 0; use_half < 2; use_half++) {
+        for (size_t rows = 1; rows <= ROWS; rows++) {
+            for (size_t o = 0; o < 192; o += SDM_TILE) {
+                if (use_half) sdm_tile_f16(rows, K, half + o * K, x, K, y + o, 192, scratch);
+                else sdm_tile_f32(rows, K, tiled + o * K, x, K, y + o, 192);
+            }
+            for (size_t r = 0; r < rows; r++) {
+                for (size_t o = 0; o < 192; o++) {
+                    double s = 0;
+                    for (size_t i = 0; i < K && o < OUTPUTS; i++)
+                        s += (double)x[r * K + i] * (use_half ? sdm_half_to_float(sdm_half_from_float(w[o * K + i])) : w[o * K + i]);
+                    assert_true(fabs(s - y[r * 192 + o]) < 1e-5);
+                }
+            }
+        }
+    }
+    sdm_free(w);
+    sdm_free(x);
+    sdm_free(tiled);
+    sdm_free(half);
+    sdm_free(y);
+    sdm_free(scratch);
+}
+
+static void exponential(void **state)
+{
+    (void)state;
+    float x[1001], y[1001];
+    for (int i = 0; i < 1001; i++) x[i] = -86.0f + 0.1713f * (float)i;
+    sdm_exp(1001, x, y);
+    for (int i = 0; i < 1001; i++) assert_true(fabs((double)y[i] / exp((double)x[i]) - 1) < 2e-7);
+    const float far[3] = {-1e9f, 1e9f, 0};
+    sdm_exp(3, far, y);
+    assert_true(y[0] >= 0 && y[0] < 1e-37f && isfinite(y[1]) && y[1] > 1e38f && y[2] == 1);
+    assert_true(strlen(sdm_kernels_name()) > 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(product), cmocka_unit_test(same_bits_for_threads), cmocka_unit_test(half_precision),
+                                       cmocka_unit_test(tiles), cmocka_unit_test(exponential)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,179 @@
+/* Checkpoints: what a run needs to go on with the same bits. Maps and bases are made again from the config and the seed (they are the same
+   bits); weights, moments, averages, counters and the metrics are kept. */
+#include <stdio.h>
+#include <string.h>
+
+#include "sdm/container.h"
+#include "sdm/file.h"
+#include "sdm/memory.h"
+#include "sdm/text.h"
+#include "trainer.h"
+
+// numbers of the "checkpoint" section, in this order
+typedef struct state {
+    double seconds, phase_started, last_evaluation, fit_end, loss, heldout_mse;
+    int64_t phase, step, phase_step, n_taken, n_weights;
+} state;
+
+static void checkpoint_path(const trainer *t, char *path, size_t size) { snprintf(path, size, "%s/checkpoint.sdm", t->folder); }
+
+static parameters *weights_of(trainer *t, int64_t phase) { return phase == SDM_PHASE_FIT ? &t->fit : &t->refine; }
+
+sdm_status checkpoint_write(trainer *t, sdm_error *err)
+{
+    char path[SDM_PATH_TEXT_MAX + 32];
+    checkpoint_path(t, path, sizeof path);
+    const parameters *p = weights_of(t, t->phase);
+    const state now = {.seconds = trainer_seconds(t), .phase_started = t->phase_started, .last_evaluation = t->last_evaluation,
+                       .fit_end = t->fit_end, .loss = t->loss, .heldout_mse = t->heldout_mse, .phase = t->phase, .step = t->step,
+                       .phase_step = t->phase_step, .n_taken = (int64_t)t->data.n_taken, .n_weights = (int64_t)p->n};
+    sdm_text config = {0};
+    sdm_config_dump(t->config, &config);
+    if (config.failed) {
+        sdm_text_dispose(&config);
+        return sdm_fail(err, SDM_E_NOMEM, "no memory for a checkpoint");
+    }
+    const sdm_section sections[] = {{"meta", "kind=checkpoint\n", 16},
+                                    {"config", config.data, config.size},
+                                    {"checkpoint", &now, sizeof now},
+                                    {"metrics", t->metrics->data, t->metrics->size},
+                                    {"weights", p->w, p->n * sizeof *p->w},
+                                    {"moment1", p->m, p->n * sizeof *p->m},
+                                    {"moment2", p->v, p->n * sizeof *p->v},
+                                    {"average", p->average, p->n * sizeof *p->average}};
+    uint8_t *bytes = NULL;
+    size_t size = 0;
+    sdm_status s = sdm_container_build(sections, sizeof sections / sizeof *sections, &bytes, &size, err);
+    if (!s) s = sdm_container_write(path, bytes, size, err);
+    sdm_free(bytes);
+    sdm_text_dispose(&config);
+    t->last_checkpoint = trainer_seconds(t);
+    return s;
+}
+
+typedef struct opened {
+    uint8_t *bytes;
+    sdm_section sections[SDM_CONTAINER_MAX_SECTIONS];
+    char names[SDM_CONTAINER_MAX_SECTIONS][24];
+    size_t n;
+} opened;
+
+static const sdm_section *find(const opened *o, const char *name)
+{
+    for (size_t i = 0; i < o->n; i++)
+        if (strcmp(o->names[i], name) == 0) return &o->sections[i];
+    return NULL;
+}
+
+static sdm_status open_checkpoint(const trainer *t, opened *o, bool *found, sdm_error *err)
+{
+    char path[SDM_PATH_TEXT_MAX + 32];
+    checkpoint_path(t, path, sizeof path);
+    FILE *f = fopen(path, "rb");
+    *found = f != NULL;
+    if (!f) return SDM_OK;
+    fclose(f);
+    size_t size = 0;
+    uint64_t checksum = 0;
+    sdm_status s = sdm_file_read(path, (size_t)64 << 30, &o->bytes, &size, err);
+    if (s) return s;
+    s = sdm_container_parse(o->bytes, size, o->sections, o->names, &o->n, &checksum, err);
+    const sdm_section *c = s ? NULL : find(o, "checkpoint");
+    if (!s && (!c || c->size != sizeof(state) || !find(o, "config") || !find(o, "metrics") || !find(o, "weights") || !find(o, "moment1") ||
+               !find(o, "moment2") || !find(o, "average")))
+        s = sdm_fail(err, SDM_E_FORMAT, "not a checkpoint of this version");
+    if (s) {
+        sdm_free(o->bytes);
+        o->bytes = NULL;
+        return sdm_fail_in(err, s, "%s", path);
+    }
+    return SDM_OK;
+}
+
+// what may differ between a run and its continuation: how long, where to, how many threads
+static void neutral(sdm_config *c)
+{
+    c->train.minutes = 1;
+    c->train.steps = c->train.samples = 0;
+    c->train.evaluate_seconds = c->train.checkpoint_seconds = 1;
+    c->output.folder[0] = '\0';
+    c->file[0] = '\0';
+    c->threads = c->data.workers = 0;
+}
+
+static sdm_status same_config(const trainer *t, const sdm_section *stored, sdm_error *err)
+{
+    sdm_config *old = NULL, *now = NULL;
+    sdm_text a = {0}, b = {0};
+    sdm_status s = SDM_ALLOC(&old, 1, "config", err);
+    if (!s) s = SDM_ALLOC(&now, 1, "config", err);
+    if (!s) s = sdm_config_parse("checkpoint", stored->data, stored->size, NULL, 0, old, err);
+    if (!s) {
+        *now = *t->config;
+        const bool same_budget_kind = (now->train.minutes > 0) == (old->train.minutes > 0);
+        neutral(old);
+        neutral(now);
+        sdm_config_dump(old, &a);
+        sdm_config_dump(now, &b);
+        if (a.failed || b.failed) s = sdm_fail(err, SDM_E_NOMEM, "no memory to compare configs");
+        else if (!same_budget_kind || strcmp(a.data, b.data) != 0)
+            s = sdm_fail(err, SDM_E_CONFIG,
+                         "%s: the config differs from that of the checkpoint in more than the length of the budget, output and threads: train "
+                         "into another folder, or without --resume",
+                         t->folder);
+    }
+    sdm_text_dispose(&a);
+    sdm_text_dispose(&b);
+    sdm_free(old);
+    sdm_free(now);
+    return s;
+}
+
+sdm_status checkpoint_read(trainer *t, bool *found, sdm_error *err)
+{
+    opened o = {0};
+    sdm_status s = open_checkpoint(t, &o, found, err);
+    if (s || !*found) return s;
+    s = same_config(t, find(&o, "config"), err);
+    if (!s) {
+        state then;
+        memcpy(&then, find(&o, "checkpoint")->data, sizeof then);
+        if (then.phase != SDM_PHASE_FIT && then.phase != SDM_PHASE_REFINE)
+            s = sdm_fail(err, SDM_E_FORMAT, "%s/checkpoint.sdm: unknown phase %lld", t->folder, (long long)then.phase);
+        t->phase = (sdm_phase)then.phase;
+        t->started -= then.seconds;
+        t->phase_started = then.phase_started;
+        t->last_evaluation = then.last_evaluation;
+        t->fit_end = then.fit_end;
+        t->loss = then.loss;
+        t->heldout_mse = then.heldout_mse;
+        t->step = then.step;
+        t->phase_step = then.phase_step;
+        t->data.n_taken = (size_t)then.n_taken; // wanted; the caller makes them again
+        const sdm_section *metrics = find(&o, "metrics");
+        if (!s && metrics->size) sdm_text_add(t->metrics, "%.*s", (int)metrics->size, (const char *)metrics->data);
+    }
+    sdm_free(o.bytes);
+    return s;
+}
+
+sdm_status checkpoint_weights(trainer *t, sdm_error *err)
+{
+    opened o = {0};
+    bool found;
+    sdm_status s = open_checkpoint(t, &o, &found, err);
+    if (s) return s;
+    if (!found) return sdm_fail(err, SDM_E_IO, "%s/checkpoint.sdm: it has gone", t->folder);
+    parameters *p = weights_of(t, t->phase);
+    const struct { const char *name; float *to; } arrays[] = {
+        {"weights", p->w}, {"moment1", p->m}, {"moment2", p->v}, {"average", p->average}};
+    for (int i = 0; i < 4 && !s; i++) {
+        const sdm_section *section = find(&o, arrays[i].name);
+        if (section->size != p->n * sizeof(float))
+            s = sdm_fail(err, SDM_E_FORMAT, "%s/checkpoint.sdm: %zu bytes of %s, the network has %zu", t->folder, section->size,
+                         arrays[i].name, p->n * sizeof(float));
+        else memcpy(arrays[i].to, section->data, section->size);
+    }
+    sdm_free(o.bytes);
+    return s;
+}

@@ -1,0 +1,204 @@
+/* Model file with its measured accuracy, resolved config, loss curve. */
+#include "export_model.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "mlp.h"
+#include "sdm/container.h"
+#include "sdm/file.h"
+#include "sdm/image.h"
+#include "sdm/memory.h"
+#include "sdm/text.h"
+
+#define NEAR_MM 0.4f
+
+static int ascending(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return x < y ? -1 : x > y;
+}
+
+// nearest-rank quantile of sorted values
+static double quantile(const double *sorted, size_t n, double q)
+{
+    size_t i = (size_t)ceil(q * (double)n);
+    return sorted[i ? i - 1 : 0];
+}
+
+// errors of the model file on the held-out maps
+static sdm_status measure(const trainer *t, const sdm_model *m, sdm_accuracy *out, sdm_error *err)
+{
+    const dataset *d = &t->data;
+    float *map = NULL, *blocked = NULL;
+    void *scratch = NULL;
+    double *each = NULL;
+    sdm_status s = SDM_ALLOC(&map, d->n_voxels, "evaluation", err);
+    if (!s) s = SDM_ALLOC(&blocked, d->n_voxels, "evaluation", err);
+    if (!s) s = sdm_alloc(&scratch, sdm_model_scratch_bytes(m, 1), 1, "evaluation", err);
+    if (!s) s = SDM_ALLOC(&each, d->n_holdout, "evaluation", err);
+    double square = 0, absolute = 0, near = 0, largest = 0;
+    size_t n_near = 0;
+    for (size_t i = 0; i < d->n_holdout && !s; i++) {
+        sdm_model_forward(m, d->holdout_params + i * d->n_params, 1, map, scratch);
+        sdm_pod_gather(d->grid, t->blocks, d->n_blocks, map, blocked);
+        const float *truth = d->holdout + i * d->n_voxels;
+        double here = 0;
+        for (size_t v = 0; v < d->n_voxels; v++) {
+            const double e = (double)blocked[v] - truth[v];
+            here += e * e;
+            absolute += fabs(e);
+            if (fabs(e) > largest) largest = fabs(e);
+            if (fabsf(truth[v]) <= NEAR_MM) near += e * e, n_near++;
+        }
+        square += here;
+        each[i] = sqrt(here / (double)d->n_voxels);
+    }
+    if (!s) {
+        const double n = (double)d->n_holdout * (double)d->n_voxels;
+        qsort(each, d->n_holdout, sizeof *each, ascending);
+        *out = (sdm_accuracy){.samples = (int64_t)d->n_holdout, .mse_mm2 = square / n, .rmse_mm = sqrt(square / n), .mae_mm = absolute / n,
+                              .max_abs_mm = largest, .rmse_near_mm = n_near ? sqrt(near / (double)n_near) : 0,
+                              .q50_mm = quantile(each, d->n_holdout, 0.5), .q90_mm = quantile(each, d->n_holdout, 0.9),
+                              .q99_mm = quantile(each, d->n_holdout, 0.99)};
+    }
+    sdm_free(each);
+    sdm_free(scratch);
+    sdm_free(blocked);
+    sdm_free(map);
+    return s;
+}
+
+// every option of the shape as text, so that the model needs no config
+typedef struct option_texts {
+    const char *names[SDM_MAX_OPTIONS], *values[SDM_MAX_OPTIONS];
+    char numbers[SDM_MAX_OPTIONS][32];
+    size_t n;
+} option_texts;
+
+static void collect_options(const trainer *t, option_texts *o)
+{
+    const sdm_shape *shape = sdm_instance_shape(t->shape);
+    const sdm_option_value *v = sdm_instance_options(t->shape);
+    for (uint32_t i = 0; i < shape->n_options && o->n < SDM_MAX_OPTIONS; i++) {
+        const sdm_option *option = &shape->options[i];
+        const bool text = option->type == SDM_OPTION_CHOICE || option->type == SDM_OPTION_FILE;
+        o->names[o->n] = option->name;
+        o->values[o->n] = text ? (v[i].text ? v[i].text : "") : sdm_format_real(v[i].number, o->numbers[o->n]);
+        o->n++;
+    }
+}
+
+static sdm_status write_text(const trainer *t, const char *name, const sdm_text *text, sdm_error *err)
+{
+    char path[SDM_PATH_TEXT_MAX + 32];
+    snprintf(path, sizeof path, "%s/%s", t->folder, name);
+    sdm_outfile *f;
+    sdm_status s = sdm_outfile_open(path, &f, err);
+    if (s) return s;
+    s = sdm_outfile_write(f, text->data ? text->data : "", text->size, err);
+    if (!s) return sdm_outfile_commit(&f, err);
+    sdm_outfile_discard(&f);
+    return s;
+}
+
+// number behind `key` in one line of metrics
+static double number(const char *line, const char *key)
+{
+    const char *at = strstr(line, key);
+    return at ? strtod(at + strlen(key), NULL) : NAN;
+}
+
+// loss and held-out error against the step, from the lines of metrics.jsonl
+static sdm_status write_curve(const trainer *t, sdm_error *err)
+{
+    double *step = NULL, *loss = NULL, *heldout = NULL;
+    size_t lines = 0, n = 0;
+    for (const char *p = t->metrics->data; p && *p; p++) lines += *p == '\n';
+    sdm_status s = SDM_ALLOC(&step, lines, "loss curve", err);
+    if (!s) s = SDM_ALLOC(&loss, lines, "loss curve", err);
+    if (!s) s = SDM_ALLOC(&heldout, lines, "loss curve", err);
+    if (!s) {
+        for (const char *p = t->metrics->data; p && *p; p = strchr(p, '\n') + 1) {
+            step[n] = number(p, "\"step\": ");
+            loss[n] = number(p, "\"loss_mm2\": ");
+            heldout[n++] = number(p, "\"heldout_mse_mm2\": ");
+        }
+        char path[SDM_PATH_TEXT_MAX + 32];
+        snprintf(path, sizeof path, "%s/loss.png", t->folder);
+        const sdm_curve curves[] = {{"training", step, loss, n}, {"held out", step, heldout, n}};
+        s = sdm_picture_plot(path, "Mean square error", "step", "mm^2", true, curves, 2, err);
+    }
+    sdm_free(heldout);
+    sdm_free(loss);
+    sdm_free(step);
+    return s;
+}
+
+static void describe(const trainer *t, const sdm_text *config, option_texts *options, sdm_model_param *params, sdm_model_info *info)
+{
+    size_t n;
+    const sdm_param *p = sdm_instance_params(t->shape, &n);
+    for (size_t i = 0; i < n; i++) {
+        snprintf(params[i].name, sizeof params[i].name, "%s", p[i].name);
+        snprintf(params[i].unit, sizeof params[i].unit, "%s", p[i].unit);
+        params[i].min = t->data.min[i];
+        params[i].max = t->data.max[i];
+        params[i].def = fmin(fmax(p[i].def, params[i].min), params[i].max);
+    }
+    collect_options(t, options);
+    *info = (sdm_model_info){.n_params = n, .params = params, .n_options = options->n, .option_names = options->names,
+                             .option_values = options->values, .grid = t->config->grid, .seed = t->config->seed,
+                             .train_samples = (int64_t)(t->data.n_static + t->data.n_taken), .config = config->data};
+    // in step mode the file is the same bits in every run
+    info->train_seconds = trainer_by_time(t) ? trainer_seconds(t) : 0;
+    snprintf(info->shape, sizeof info->shape, "%s", sdm_instance_shape(t->shape)->name);
+}
+
+sdm_status export_model(trainer *t, sdm_train_report *report, sdm_error *err)
+{
+    sdm_text config = {0};
+    option_texts options = {0};
+    sdm_model_param params[SDM_POD_MAX_PARAMS] = {{{0}, {0}, 0, 0, 0}};
+    sdm_model_info info;
+    sdm_model *model = NULL;
+    uint8_t *bytes = NULL;
+    size_t size = 0;
+    char path[SDM_PATH_TEXT_MAX + 32];
+    snprintf(path, sizeof path, "%s/model.sdm", t->folder);
+    sdm_config_dump(t->config, &config);
+    if (config.failed) return sdm_fail(err, SDM_E_NOMEM, "no memory for the resolved config");
+    describe(t, &config, &options, params, &info);
+
+    const float *w = t->refine.average;
+    sdm_pod_spec spec = {.info = &info, .arch = t->arch, .blocks = t->blocks, .half = t->config->network.weights == SDM_WEIGHT_F16,
+                         .weights = {.head = w + t->head_at, .mean = w + t->mean_at, .basis = w + t->basis_at}};
+    for (size_t l = 0; l < t->arch.depth; l++) {
+        spec.weights.layer[l] = mlp_layer(&t->arch, w, l);
+        spec.weights.bias[l] = mlp_bias(&t->arch, w, l);
+    }
+    // build once to measure, once more with the figures in it
+    sdm_status s = sdm_model_build(&spec, &bytes, &size, err);
+    if (!s) s = sdm_model_open_memory(path, bytes, size, &model, err);
+    if (!s) s = measure(t, model, &t->accuracy, err);
+    sdm_model_free(model);
+    sdm_free(bytes);
+    bytes = NULL;
+    info.accuracy = t->accuracy;
+    t->heldout_mse = t->accuracy.mse_mm2;
+    if (!s) s = trainer_metric(t, 0, err);
+    if (!s) s = sdm_model_build(&spec, &bytes, &size, err);
+    if (!s) s = write_text(t, "config.yaml", &config, err);
+    if (!s) s = write_curve(t, err);
+    if (!s) s = sdm_container_write(path, bytes, size, err);
+    sdm_free(bytes);
+    sdm_text_dispose(&config);
+    if (!s && report) {
+        *report = (sdm_train_report){.accuracy = t->accuracy, .steps = t->step, .samples = info.train_samples,
+                                     .seconds = trainer_seconds(t)};
+        snprintf(report->model_path, sizeof report->model_path, "%.*s", (int)sizeof report->model_path - 1, path);
+    }
+    return s;
+}

@@ -1,0 +1,11 @@
+/* From the trained weights to the files of a run: model, resolved config, loss curve. */
+#ifndef SDM_TRAINER_EXPORT_H
+#define SDM_TRAINER_EXPORT_H
+
+#include "trainer.h"
+
+/* Builds the model from the averaged weights, measures it on the held-out maps as the runtime will run it, writes model.sdm, config.yaml and
+   loss.png into the folder and fills the report (may be NULL). */
+sdm_status export_model(trainer *t, sdm_train_report *report, sdm_error *err);
+
+#endif

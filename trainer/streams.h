@@ -1,0 +1,7 @@
+/* Streams of random numbers: one for each purpose, so that none disturbs another. */
+#ifndef SDM_STREAMS_H
+#define SDM_STREAMS_H
+
+enum { STREAM_TRAIN = 100, STREAM_HOLDOUT = 200, STREAM_BATCH = 300, STREAM_INIT = 400, STREAM_BASES = 500 };
+
+#endif

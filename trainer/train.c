@@ -1,0 +1,347 @@
+/* A training run from config to model file. */
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+#include "export_model.h"
+#include "mlp.h"
+#include "sdm/file.h"
+#include "sdm/memory.h"
+#include "sdm/rng.h"
+#include "sdm/text.h"
+#include "streams.h"
+#include "trainer.h"
+
+static double monotonic(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+double trainer_seconds(const trainer *t) { return monotonic() - t->started; }
+
+bool trainer_by_time(const trainer *t) { return t->config->train.minutes > 0; }
+
+int64_t trainer_steps(const trainer *t)
+{
+    const sdm_config *c = t->config;
+    return c->train.steps > 0 ? c->train.steps : (c->train.samples + c->train.batch - 1) / c->train.batch;
+}
+
+int64_t trainer_fit_steps(const trainer *t)
+{
+    const int64_t n = (int64_t)((1 - t->config->train.refine) * (double)trainer_steps(t) + 0.5);
+    return n > 0 ? n : 1;
+}
+
+int trainer_threads(const trainer *t)
+{
+    if (!t->producer) return t->n_threads;
+    const int workers = t->config->data.workers > 0 ? t->config->data.workers : (t->n_threads > 1 ? t->n_threads / 2 : 1);
+    return workers < t->n_threads ? t->n_threads - workers : 1;
+}
+
+void trainer_report(trainer *t, double fraction, double samples_per_second, bool now)
+{
+    const double seconds = trainer_seconds(t);
+    if (!t->hooks.progress || (!now && seconds - t->last_report < 0.1)) return;
+    t->last_report = seconds;
+    const double all = trainer_by_time(t) ? t->config->train.minutes * 60 : fraction > 0 ? seconds / fraction : NAN;
+    const sdm_progress p = {.phase = t->phase, .fraction = fraction < 1 ? fraction : 1, .step = t->step,
+                            .samples = (int64_t)(t->data.n_static + t->data.n_taken), .loss = t->loss,
+                            .heldout_rmse_mm = sqrt(t->heldout_mse), .samples_per_second = samples_per_second, .seconds = seconds,
+                            .seconds_left = all > seconds ? all - seconds : 0};
+    t->hooks.progress(t->hooks.user, &p);
+}
+
+void trainer_message(trainer *t, const char *fmt, ...)
+{
+    if (!t->hooks.message) return;
+    char line[1024];
+    va_list args;
+    va_start(args, fmt);
+    vsnprintf(line, sizeof line, fmt, args);
+    va_end(args);
+    t->hooks.message(t->hooks.user, line);
+}
+
+bool trainer_cancelled(const trainer *t) { return t->hooks.cancelled && t->hooks.cancelled(t->hooks.user); }
+
+// writes all lines so far: the file is complete at any moment, and after a resume it has no line twice
+static sdm_status write_metrics(const trainer *t, sdm_error *err)
+{
+    char path[SDM_PATH_TEXT_MAX + 32];
+    snprintf(path, sizeof path, "%s/metrics.jsonl", t->folder);
+    sdm_outfile *f;
+    sdm_status s = sdm_outfile_open(path, &f, err);
+    if (s) return s;
+    s = sdm_outfile_write(f, t->metrics->data ? t->metrics->data : "", t->metrics->size, err);
+    if (!s) return sdm_outfile_commit(&f, err);
+    sdm_outfile_discard(&f);
+    return s;
+}
+
+sdm_status trainer_metric(trainer *t, double rate, sdm_error *err)
+{
+    static const char *const phases[] = {"data", "bases", "fit", "refine", "evaluate"};
+    sdm_json j = {0};
+    sdm_json_open(&j, NULL, '{');
+    sdm_json_text(&j, "phase", phases[t->phase]);
+    sdm_json_int(&j, "step", t->step);
+    sdm_json_int(&j, "maps", (int64_t)(t->data.n_static + t->data.n_taken));
+    sdm_json_real(&j, "loss_mm2", t->loss);
+    sdm_json_real(&j, "heldout_mse_mm2", t->heldout_mse);
+    sdm_json_real(&j, "learning_rate", rate);
+    if (trainer_by_time(t)) sdm_json_real(&j, "seconds", trainer_seconds(t)); // else the file is the same bits in every run
+    sdm_json_close(&j, '}');
+    if (!j.text.failed) sdm_text_add(t->metrics, "%s\n", j.text.data);
+    const bool failed = j.text.failed || t->metrics->failed;
+    sdm_json_dispose(&j);
+    return failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the metrics") : write_metrics(t, err);
+}
+
+sdm_status trainer_take_samples(trainer *t, size_t wanted, sdm_error *err)
+{
+    enum { GROUP = 32 };
+    if (!t->producer) return SDM_OK;
+    dataset *d = &t->data;
+    const size_t all = d->n_start + d->n_online;
+    size_t until;
+    if (trainer_by_time(t)) {
+        const size_t ready = producer_ready(t->producer);
+        if (ready < GROUP && d->n_taken + ready < all) return SDM_OK;
+        until = d->n_taken + ready;
+    } else {
+        until = wanted >= all ? all : d->n_start + (wanted - d->n_start) / GROUP * GROUP;
+    }
+    while (d->n_taken < until) {
+        size_t slots[GROUP], n = until - d->n_taken < GROUP ? until - d->n_taken : GROUP;
+        for (size_t i = 0; i < n; i++) slots[i] = dataset_slot(d, d->n_taken + i);
+        sdm_status s = producer_take(t->producer, d->n_taken + n, err);
+        if (!s) s = bases_project(t, slots, n, err);
+        if (s) return s;
+    }
+    if (d->n_taken == all) {
+        producer_stop(t->producer);
+        t->producer = NULL;
+    }
+    return SDM_OK;
+}
+
+sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape, double *min, double *max, sdm_error *err)
+{
+    size_t n;
+    const sdm_param *params = sdm_instance_params(shape, &n);
+    char where[1200];
+    for (size_t i = 0; i < n; i++) min[i] = params[i].min, max[i] = params[i].max;
+    for (size_t r = 0; r < config->shape.n_ranges; r++) {
+        const sdm_config_range *range = &config->shape.ranges[r];
+        const int i = sdm_instance_param_index(shape, range->name);
+        sdm_config_where(config, range->mark, where);
+        if (i < 0) {
+            const char *names[SDM_MAX_PARAMS];
+            for (size_t k = 0; k < n && k < SDM_MAX_PARAMS; k++) names[k] = params[k].name;
+            const char *near = sdm_nearest_name(range->name, names, n < SDM_MAX_PARAMS ? n : SDM_MAX_PARAMS);
+            return sdm_fail(err, SDM_E_CONFIG, "%s: shape '%s' has no parameter '%s'%s%s%s", where, sdm_instance_shape(shape)->name,
+                            range->name, near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
+        }
+        if (!(range->min >= params[i].min && range->max <= params[i].max && range->min < range->max))
+            return sdm_fail(err, SDM_E_CONFIG, "%s: range [%g, %g] of '%s' must lie within [%g, %g] of shape '%s'", where, range->min,
+                            range->max, range->name, params[i].min, params[i].max, sdm_instance_shape(shape)->name);
+        min[i] = range->min, max[i] = range->max;
+    }
+    return SDM_OK;
+}
+
+// the largest degree that the number of maps can determine
+static size_t affordable(size_t n_params, size_t degree, size_t terms)
+{
+    while (degree > 0 && sdm_poly_count(n_params, degree) > terms) degree--;
+    return degree;
+}
+
+static sdm_status set_up(trainer *t, sdm_error *err)
+{
+    const sdm_config *c = t->config;
+    sdm_pod_arch *a = &t->arch;
+    dataset *d = &t->data;
+    sdm_instance_params(t->shape, &d->n_params);
+    if (d->n_params > SDM_POD_MAX_PARAMS)
+        return sdm_fail(err, SDM_E_UNSUPPORTED, "%zu parameters, at most %d can be trained", d->n_params, SDM_POD_MAX_PARAMS);
+    sdm_status s = sdm_train_ranges(c, t->shape, d->min, d->max, err);
+    if (s) return s;
+    d->shape = t->shape;
+    d->grid = &c->grid;
+    d->seed = c->seed;
+    d->n_voxels = sdm_grid_count(&c->grid);
+    a->block = (size_t)c->network.block;
+    a->n_params = d->n_params;
+    a->n_voxels = d->n_voxels;
+    a->n_blocks = d->n_blocks = sdm_pod_block_count(&c->grid, a->block);
+    if ((s = SDM_ALLOC(&t->blocks, a->n_blocks, "blocks", err))) return s;
+    sdm_pod_blocks(&c->grid, a->block, t->blocks);
+    d->blocks = t->blocks;
+    if ((s = dataset_create(d, c, err))) return s;
+
+    a->degree = affordable(a->n_params, (size_t)c->network.degree, (d->n_static + d->n_start) / 4 + 1);
+    if (a->degree < (size_t)c->network.degree)
+        trainer_message(t, "network.degree lowered from %d to %zu: %zu maps before training cannot determine more terms",
+                        c->network.degree, a->degree, d->n_static + d->n_start);
+    a->input_degree = affordable(a->n_params, (size_t)c->network.input_degree, 1024);
+    if (a->input_degree < 1) a->input_degree = 1;
+    if (a->input_degree < (size_t)c->network.input_degree)
+        trainer_message(t, "network.input_degree lowered from %d to %zu: more than 1023 inputs", c->network.input_degree, a->input_degree);
+    a->depth = (size_t)c->network.depth;
+    a->width = (size_t)c->network.width;
+    a->activation = (int)c->network.activation;
+    a->n_terms = sdm_poly_count(a->n_params, a->degree);
+    a->n_inputs = sdm_poly_count(a->n_params, a->input_degree) - 1;
+    a->n_latent = a->n_terms + (a->depth ? a->width : 0);
+    t->n_poly = a->n_terms > a->n_inputs + 1 ? a->n_terms : a->n_inputs + 1;
+    if ((s = SDM_ALLOC(&t->exponents, t->n_poly * a->n_params, "polynomials", err))) return s;
+    sdm_poly_table(a->n_params, a->degree > a->input_degree ? a->degree : a->input_degree, t->exponents);
+    return SDM_OK;
+}
+
+static void report_fill(void *user, size_t done, size_t all)
+{
+    trainer *t = user;
+    // the share of the data in the whole is not known: the clock tells it in time mode
+    const double f = trainer_by_time(t) ? trainer_seconds(t) / (t->config->train.minutes * 60) : 0.0;
+    t->data.n_taken = done > t->data.n_holdout + t->data.n_static ? done - t->data.n_holdout - t->data.n_static : 0;
+    trainer_report(t, f, (double)done / (trainer_seconds(t) + 1e-9), done == all);
+}
+
+static sdm_status start_fit(trainer *t, sdm_error *err)
+{
+    const sdm_pod_arch *a = &t->arch;
+    const size_t mlp = mlp_count(a);
+    const sdm_status s = parameters_create(&t->fit, mlp + t->n_modes * a->width, err);
+    if (s) return s;
+    mlp_init(a, t->config->seed, t->fit.w);
+    for (size_t i = mlp; i < t->fit.n; i++)
+        t->fit.w[i] = (float)(0.3 / sqrt((double)a->width) * sdm_rng_normal(t->config->seed, STREAM_INIT, i));
+    memcpy(t->fit.average, t->fit.w, t->fit.n * sizeof *t->fit.w);
+    return SDM_OK;
+}
+
+static bool cancelled(void *user) { return trainer_cancelled(user); }
+
+static sdm_status start_producer(trainer *t, sdm_error *err)
+{
+    const dataset *d = &t->data;
+    if (d->n_taken >= d->n_start + d->n_online) return SDM_OK;
+    const int workers = t->config->data.workers > 0 ? t->config->data.workers : (t->n_threads > 1 ? t->n_threads / 2 : 1);
+    return producer_start(&t->data, d->n_taken, workers, &t->producer, err);
+}
+
+// the samples that a resumed run had taken, made again
+static sdm_status retake(trainer *t, size_t n_taken, sdm_error *err)
+{
+    while (t->producer && t->data.n_taken < n_taken) {
+        size_t slots[32], n = n_taken - t->data.n_taken < 32 ? n_taken - t->data.n_taken : 32;
+        for (size_t i = 0; i < n; i++) slots[i] = dataset_slot(&t->data, t->data.n_taken + i);
+        sdm_status s = producer_take(t->producer, t->data.n_taken + n, err);
+        if (!s) s = bases_project(t, slots, n, err);
+        if (!s && trainer_cancelled(t)) s = sdm_fail(err, SDM_E_CANCELLED, "stopped on request; the checkpoint is as it was");
+        if (s) return s;
+        trainer_report(t, 0, 0, false);
+    }
+    return SDM_OK;
+}
+
+static void enter(trainer *t, sdm_phase phase)
+{
+    t->phase = phase;
+    t->phase_step = 0;
+    t->phase_started = trainer_seconds(t);
+}
+
+static sdm_status run(trainer *t, bool resume, sdm_error *err)
+{
+    bool found = false;
+    sdm_phase from = SDM_PHASE_FIT;
+    size_t n_taken = 0;
+    sdm_status s = set_up(t, err);
+    if (!s && resume) {
+        s = checkpoint_read(t, &found, err);
+        if (!s && !found) trainer_message(t, "no checkpoint in %s: training starts from the beginning", t->folder);
+        if (found) from = t->phase, n_taken = t->data.n_taken;
+    }
+    const double resumed_seconds = trainer_seconds(t);
+    t->phase = SDM_PHASE_DATA;
+    if (!s) s = dataset_fill(&t->data, t->n_threads, report_fill, cancelled, t, err);
+    t->phase = SDM_PHASE_BASES;
+    trainer_report(t, trainer_by_time(t) ? trainer_seconds(t) / (t->config->train.minutes * 60) : 0, 0, true);
+    if (!s) s = bases_make(t, err);
+    if (!s) trainer_message(t, "%zu maps; %zu local functions in %zu blocks; bases and %zu modes leave %.2g mm^2 on held-out shapes",
+                            t->data.n_static + t->data.n_start, t->arch.n_coefficients, t->arch.n_blocks, t->n_modes, t->holdout_floor);
+    if (!s) s = start_fit(t, err);
+    if (!s) s = start_producer(t, err);
+    if (!s && found) s = retake(t, n_taken, err);
+    if (s) return s;
+
+    if (found) {
+        t->started += trainer_seconds(t) - resumed_seconds; // making the data again does not count
+        t->phase = from;
+    } else {
+        enter(t, SDM_PHASE_FIT);
+        const double total = t->config->train.minutes * 60;
+        t->fit_end = t->phase_started + (total - t->phase_started) * (1 - t->config->train.refine);
+        if (trainer_by_time(t) && t->phase_started > total / 2)
+            trainer_message(t, "making the data took %.0f s of a budget of %.0f s: lower data.start or raise train.minutes",
+                            t->phase_started, total);
+    }
+    t->last_checkpoint = trainer_seconds(t);
+    if (t->phase == SDM_PHASE_FIT) {
+        if (found) s = checkpoint_weights(t, err);
+        if (!s) s = fit_run(t, err);
+        if (!s) s = refine_start(t, err);
+        if (!s) s = refine_evaluate(t, t->refine.w, &t->heldout_mse, err);
+        if (s) return s;
+        enter(t, SDM_PHASE_REFINE);
+        if ((s = trainer_metric(t, 0, err))) return s;
+    } else {
+        s = refine_start(t, err);
+        if (!s) s = checkpoint_weights(t, err);
+    }
+    if (!s) s = refine_run(t, err);
+    return s;
+}
+
+sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const char *folder, bool resume,
+                     const sdm_train_hooks *hooks, sdm_train_report *report, sdm_error *err)
+{
+    sdm_text metrics = {0};
+    trainer t = {.config = config, .shape = shape, .folder = folder, .started = monotonic(), .loss = NAN, .heldout_mse = NAN,
+                 .metrics = &metrics};
+    if (hooks) t.hooks = *hooks;
+    t.n_threads = config->threads;
+#ifdef _OPENMP
+    if (t.n_threads == 0) t.n_threads = omp_get_max_threads();
+#else
+    t.n_threads = 1;
+#endif
+    sdm_status s = sdm_make_folder(folder, err);
+    if (!s) s = run(&t, resume, err);
+    producer_stop(t.producer);
+    t.producer = NULL;
+    t.phase = SDM_PHASE_EVALUATE;
+    trainer_report(&t, 1, 0, true);
+    if (!s) s = export_model(&t, report, err);
+    if (!s) s = write_metrics(&t, err);
+    parameters_dispose(&t.fit);
+    parameters_dispose(&t.refine);
+    bases_dispose(&t);
+    dataset_dispose(&t.data);
+    sdm_free(t.blocks);
+    sdm_free(t.exponents);
+    sdm_text_dispose(&metrics);
+    return s;
+}

@@ -1,0 +1,101 @@
+/* The state of a training run, shared by its phases. Letters as in sdm/pod.h; R global modes, N slots of the pool. */
+#ifndef SDM_TRAINER_H
+#define SDM_TRAINER_H
+
+#include <time.h>
+
+#include "dataset.h"
+#include "optimiser.h"
+#include "sdm/pod.h"
+#include "sdm/train.h"
+
+typedef struct trainer {
+    const sdm_config *config;
+    const sdm_instance *shape;
+    const char *folder;
+    sdm_train_hooks hooks;
+    int n_threads;
+
+    sdm_pod_arch arch;
+    sdm_pod_block *blocks;
+    uint8_t *exponents;       /* [max(F, 1 + I)][P] */
+    size_t n_poly;            /* max(F, 1 + I) */
+    dataset data;
+    producer *producer;       /* NULL when no online sample is left to make */
+
+    /* spectral start (bases.c) */
+    float *mean;              /* [n_voxels], block order */
+    float *basis;             /* for each block [k_b][V_b] */
+    float *deviation;         /* [K] root mean square of each coefficient */
+    size_t n_modes;           /* R */
+    float *modes;             /* [R][K] orthonormal rows */
+    float *poly;              /* [R][F] least squares on the polynomials */
+    float *phi;               /* [N][n_poly] products at every slot */
+    float *target;            /* [N][R] what the polynomials leave, divided by target_scale */
+    float target_scale;       /* mm sqrt(voxel) */
+    float *holdout_phi;       /* [H][n_poly] */
+    float *holdout_target;    /* [H][R] */
+    double holdout_floor;     /* mean square error that the bases and modes leave on the held-out maps, mm^2 */
+
+    parameters fit;           /* MLP, then readout[R][W] */
+    parameters refine;        /* MLP, head[K][L], mean[n_voxels], basis */
+    size_t head_at, mean_at, basis_at; /* within refine */
+
+    /* progress */
+    sdm_phase phase;
+    int64_t step, phase_step; /* of all; of this phase */
+    double started;           /* monotonic seconds, moved back by the time before a resume */
+    double phase_started;     /* seconds since `started` when the phase began */
+    double last_report, last_checkpoint, last_evaluation;
+    double loss, heldout_mse;
+    double fit_end;           /* seconds since `started` at which the fit ends, in time mode */
+    sdm_accuracy accuracy;
+    struct sdm_text *metrics; /* lines since the run began, written to metrics.jsonl */
+} trainer;
+
+/* seconds since the run began */
+double trainer_seconds(const trainer *t);
+
+/* True in time mode; otherwise steps in all are trainer_steps(). */
+bool trainer_by_time(const trainer *t);
+int64_t trainer_steps(const trainer *t);
+int64_t trainer_fit_steps(const trainer *t);
+
+/* Progress callback (not more than 10 times a second unless `now`). */
+void trainer_report(trainer *t, double fraction, double samples_per_second, bool now);
+void trainer_message(trainer *t, const char *fmt, ...) SDM_PRINTF(2, 3);
+bool trainer_cancelled(const trainer *t);
+
+/* Threads for the optimiser: those that the producer leaves. */
+int trainer_threads(const trainer *t);
+
+/* One line into metrics.jsonl. */
+sdm_status trainer_metric(trainer *t, double rate, sdm_error *err);
+
+/* Products of polynomials at parameters p -> phi[n_poly]. */
+void trainer_phi(const trainer *t, const double *p, float *phi);
+
+/* bases.c: mean, local bases, global modes, polynomials; targets of everything in the pool. */
+sdm_status bases_make(trainer *t, sdm_error *err);
+/* phi and target of n slots. */
+sdm_status bases_project(trainer *t, const size_t *slots, size_t n, sdm_error *err);
+void bases_dispose(trainer *t);
+
+/* fit.c: the MLP on the global modes, then the head by least squares on all local coefficients. */
+sdm_status fit_run(trainer *t, sdm_error *err);
+
+/* refine.c: everything end to end on maps. */
+sdm_status refine_start(trainer *t, sdm_error *err); /* head by least squares; weights of the phase */
+sdm_status refine_run(trainer *t, sdm_error *err);
+/* Mean square error (mm^2) of weights w on the held-out maps. */
+sdm_status refine_evaluate(trainer *t, const float *w, double *mse, sdm_error *err);
+
+/* Takes new samples of the producer into the pool: `wanted` in step mode (waits), what is there in time mode. */
+sdm_status trainer_take_samples(trainer *t, size_t wanted, sdm_error *err);
+
+/* checkpoint.c */
+sdm_status checkpoint_write(trainer *t, sdm_error *err);
+sdm_status checkpoint_read(trainer *t, bool *found, sdm_error *err);       /* before the data: config, sample count, phase, time */
+sdm_status checkpoint_weights(trainer *t, sdm_error *err);                 /* after the bases */
+
+#endif

@@ -137,6 +137,19 @@ static sdm_status write_curve(const trainer *t, sdm_error *err)
     return s;
 }
 
+// the resolved config without what depends on the machine: the model is the same bits for any number of threads
+static sdm_status dump_config(const trainer *t, sdm_text *out, sdm_error *err)
+{
+    sdm_config *c = NULL;
+    sdm_status s = SDM_ALLOC(&c, 1, "resolved config", err);
+    if (s) return s;
+    *c = *t->config;
+    c->threads = c->data.workers = 0;
+    sdm_config_dump(c, out);
+    sdm_free(c);
+    return out->failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the resolved config") : SDM_OK;
+}
+
 static void describe(const trainer *t, const sdm_text *config, option_texts *options, sdm_model_param *params, sdm_model_info *info)
 {
     size_t n;
@@ -168,8 +181,11 @@ sdm_status export_model(trainer *t, sdm_train_report *report, sdm_error *err)
     size_t size = 0;
     char path[SDM_PATH_TEXT_MAX + 32];
     snprintf(path, sizeof path, "%s/model.sdm", t->folder);
-    sdm_config_dump(t->config, &config);
-    if (config.failed) return sdm_fail(err, SDM_E_NOMEM, "no memory for the resolved config");
+    sdm_status s = dump_config(t, &config, err);
+    if (s) {
+        sdm_text_dispose(&config);
+        return s;
+    }
     describe(t, &config, &options, params, &info);
 
     const float *w = t->refine.average;
@@ -180,7 +196,7 @@ sdm_status export_model(trainer *t, sdm_train_report *report, sdm_error *err)
         spec.weights.bias[l] = mlp_bias(&t->arch, w, l);
     }
     // build once to measure, once more with the figures in it
-    sdm_status s = sdm_model_build(&spec, &bytes, &size, err);
+    s = sdm_model_build(&spec, &bytes, &size, err);
     if (!s) s = sdm_model_open_memory(path, bytes, size, &model, err);
     if (!s) s = measure(t, model, &t->accuracy, err);
     sdm_model_free(model);

@@ -107,7 +107,8 @@ static void step(trainer *t, fit_batch *b, size_t batch, double rate)
 static double fraction_of_phase(const trainer *t)
 {
     if (!trainer_by_time(t)) return (double)t->phase_step / (double)trainer_fit_steps(t);
-    return (trainer_seconds(t) - t->phase_started) / (t->fit_end - t->phase_started);
+    const double length = t->fit_end - t->phase_started;
+    return length > 0 ? (trainer_seconds(t) - t->phase_started) / length : 1;
 }
 
 sdm_status fit_run(trainer *t, sdm_error *err)

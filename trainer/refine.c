@@ -377,7 +377,8 @@ sdm_status refine_start(trainer *t, sdm_error *err)
 static double fraction_of_phase(const trainer *t, double end)
 {
     if (!trainer_by_time(t)) return (double)t->phase_step / (double)(trainer_steps(t) - trainer_fit_steps(t));
-    return (trainer_seconds(t) - t->phase_started) / (end - t->phase_started);
+    const double length = end - t->phase_started;
+    return length > 0 ? (trainer_seconds(t) - t->phase_started) / length : 1;
 }
 
 sdm_status refine_run(trainer *t, sdm_error *err)

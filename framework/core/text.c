@@ -73,6 +73,10 @@ bool sdm_parse_int(const char *s, int64_t *out)
 const char *sdm_format_real(double v, char buf[32])
 {
     const char point = localeconv()->decimal_point[0];
+    if (fabs(v) < 1e15 && v == floor(v)) { // 20, not 2e+01
+        snprintf(buf, 32, "%.0f", v);
+        return buf;
+    }
     for (int digits = 1; digits <= 17; digits++) {
         snprintf(buf, 32, "%.*g", digits, v);
         if (strtod(buf, NULL) == v) break;

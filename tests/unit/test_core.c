@@ -128,6 +128,8 @@ static void numbers_and_names(void **state)
         assert_true(sdm_parse_real(sdm_format_real(x, buf), &v) && v == x);
     }
     assert_string_equal(sdm_format_real(0.2, buf), "0.2");
+    assert_string_equal(sdm_format_real(20, buf), "20");
+    assert_string_equal(sdm_format_real(-3000, buf), "-3000");
     const char *const names[] = {"depth", "width", "rank"};
     assert_string_equal(sdm_nearest_name("dpeth", names, 3), "depth");
     assert_string_equal(sdm_nearest_name("withd", names, 3), "width");

@@ -1,0 +1,392 @@
+/* The pod network against plain double arithmetic, its derivatives against differences, its file against damage. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "sdm/container.h"
+#include "sdm/memory.h"
+#include "sdm/pod.h"
+#include "sdm/rng.h"
+
+enum { P = 3, DEPTH = 2, WIDTH = 70, DEGREE = 3, INPUT_DEGREE = 2, BLOCK = 4 };
+
+// a small random network, kept in plain arrays
+typedef struct toy {
+    sdm_model_param params[P];
+    sdm_model_info info;
+    sdm_pod_spec spec;
+    sdm_pod_block blocks[64];
+    float *memory, *layer[DEPTH], *bias[DEPTH], *head, *mean, *basis;
+} toy;
+
+static void make(toy *t, bool half, int activation)
+{
+    *t = (toy){0};
+    for (int i = 0; i < P; i++) {
+        snprintf(t->params[i].name, sizeof t->params[i].name, "p%d", i);
+        snprintf(t->params[i].unit, sizeof t->params[i].unit, "mm");
+        t->params[i].min = -1.0 - i, t->params[i].max = 2.0 + i, t->params[i].def = 0.5;
+    }
+    static const char *const names[] = {"edge", "ear"}, *const values[] = {"0.3", "left"};
+    t->info = (sdm_model_info){.n_params = P, .params = t->params, .n_options = 2, .option_names = names, .option_values = values,
+                               .grid = sdm_grid_centred((const int64_t[]){9, 7, 5}, 0.2, (const double[]){1, 2, 3}), .seed = 77,
+                               .train_seconds = 1.25, .train_samples = 1234, .config = "seed: 77\n"};
+    t->info.accuracy = (sdm_accuracy){100, 1e-5, 0.003, 0.002, 0.1, 0.005, 0.001, 0.002, 0.003};
+    snprintf(t->info.shape, sizeof t->info.shape, "toy");
+    sdm_pod_arch *a = &t->spec.arch;
+    *a = (sdm_pod_arch){.n_params = P, .degree = DEGREE, .input_degree = INPUT_DEGREE, .depth = DEPTH, .width = WIDTH, .block = BLOCK,
+                        .activation = activation, .n_terms = sdm_poly_count(P, DEGREE), .n_inputs = sdm_poly_count(P, INPUT_DEGREE) - 1,
+                        .n_voxels = 9 * 7 * 5, .n_blocks = sdm_pod_block_count(&t->info.grid, BLOCK)};
+    a->n_latent = a->n_terms + WIDTH;
+    sdm_pod_blocks(&t->info.grid, BLOCK, t->blocks);
+    size_t basis = 0;
+    for (size_t b = 0; b < a->n_blocks; b++) {
+        sdm_pod_block *k = &t->blocks[b];
+        const uint32_t voxels = k->size[0] * k->size[1] * k->size[2];
+        k->rank = b == 2 ? 0 : (uint32_t)(b % 5 + 1) < voxels ? (uint32_t)(b % 5 + 1) : voxels; // one block is only its mean
+        k->coefficient = (uint32_t)a->n_coefficients;
+        a->n_coefficients += k->rank;
+        basis += voxels * k->rank;
+    }
+    const size_t n = WIDTH * a->n_inputs + WIDTH * WIDTH + 2 * WIDTH + a->n_coefficients * a->n_latent + a->n_voxels + basis;
+    assert_int_equal(SDM_ALLOC(&t->memory, n, "toy", NULL), SDM_OK);
+    for (size_t i = 0; i < n; i++) t->memory[i] = (float)(0.3 * sdm_rng_normal(11, 1, i));
+    float *at = t->memory;
+    for (int l = 0; l < DEPTH; l++) {
+        t->layer[l] = at, at += WIDTH * (l ? WIDTH : a->n_inputs);
+        t->bias[l] = at, at += WIDTH;
+        t->spec.weights.layer[l] = t->layer[l], t->spec.weights.bias[l] = t->bias[l];
+    }
+    t->spec.weights.head = t->head = at, at += a->n_coefficients * a->n_latent;
+    t->spec.weights.mean = t->mean = at, at += a->n_voxels;
+    t->spec.weights.basis = t->basis = at;
+    t->spec.info = &t->info;
+    t->spec.blocks = t->blocks;
+    t->spec.half = half;
+}
+
+static sdm_model *open_toy(const toy *t)
+{
+    uint8_t *bytes;
+    size_t size;
+    sdm_model *m;
+    assert_int_equal(sdm_model_build(&t->spec, &bytes, &size, NULL), SDM_OK);
+    assert_int_equal(sdm_model_open_memory("toy", bytes, size, &m, NULL), SDM_OK);
+    sdm_free(bytes);
+    return m;
+}
+
+// normalised Legendre polynomials in closed form
+static double legendre(int n, double x)
+{
+    switch (n) {
+    case 0: return 1;
+    case 1: return sqrt(3) * x;
+    case 2: return sqrt(5) * 0.5 * (3 * x * x - 1);
+    default: return sqrt(7) * 0.5 * (5 * x * x * x - 3 * x);
+    }
+}
+
+static double activate(int kind, double x) { return kind == 0 ? x / (1 + exp(-x)) : kind == 1 ? tanh(x) : x > 0 ? x : 0; }
+
+// the definition of the network in sdm/pod.h, in double, without tiles
+static void reference(const toy *t, const double *p, double *map)
+{
+    const sdm_pod_arch *a = &t->spec.arch;
+    uint8_t exponents[64 * P];
+    sdm_poly_table(P, DEGREE, exponents);
+    double z[64 + WIDTH], h[WIDTH], next[WIDTH];
+    for (size_t f = 0; f < a->n_terms; f++) {
+        z[f] = 1;
+        for (int i = 0; i < P; i++)
+            z[f] *= legendre(exponents[f * P + (size_t)i], 2 * (p[i] - t->params[i].min) / (t->params[i].max - t->params[i].min) - 1);
+    }
+    for (int l = 0; l < DEPTH; l++) {
+        const size_t k = l ? WIDTH : a->n_inputs;
+        for (size_t o = 0; o < WIDTH; o++) {
+            double s = t->bias[l][o];
+            for (size_t i = 0; i < k; i++) s += t->layer[l][o * k + i] * (l ? h[i] : z[1 + i]);
+            next[o] = activate(a->activation, s);
+        }
+        memcpy(h, next, sizeof h);
+    }
+    memcpy(z + a->n_terms, h, sizeof h);
+    const float *basis = t->basis;
+    for (size_t b = 0; b < a->n_blocks; b++) {
+        const sdm_pod_block *k = &t->blocks[b];
+        const size_t voxels = (size_t)k->size[0] * k->size[1] * k->size[2];
+        for (size_t v = 0; v < voxels; v++) {
+            const size_t x = k->at[0] + v % k->size[0], y = k->at[1] + v / k->size[0] % k->size[1],
+                         zz = k->at[2] + v / k->size[0] / k->size[1];
+            double s = t->mean[k->voxel + v];
+            for (size_t r = 0; r < k->rank; r++) {
+                double c = 0;
+                for (size_t i = 0; i < a->n_latent; i++) c += t->head[(k->coefficient + r) * a->n_latent + i] * z[i];
+                s += c * basis[r * voxels + v];
+            }
+            map[(zz * 7 + y) * 9 + x] = s;
+        }
+        basis += voxels * k->rank;
+    }
+}
+
+static void random_params(uint64_t index, double *p)
+{
+    for (int i = 0; i < P; i++) p[i] = -1.0 - i + (3.0 + 2 * i) * sdm_rng_uniform(5, 5, index * P + (uint64_t)i);
+}
+
+static void polynomials(void **state)
+{
+    (void)state;
+    assert_int_equal(sdm_poly_count(4, 6), 210);
+    assert_int_equal(sdm_poly_count(4, 8), 495);
+    assert_true(sdm_poly_count(64, 64) == SIZE_MAX);
+    uint8_t e[35 * 4];
+    sdm_poly_table(4, 3, e);
+    int last = 0;
+    for (int i = 0; i < 35; i++) {
+        const int total = e[4 * i] + e[4 * i + 1] + e[4 * i + 2] + e[4 * i + 3];
+        assert_true(total >= last && total <= 3);
+        last = total;
+        for (int j = 0; j < i; j++) assert_memory_not_equal(e + 4 * i, e + 4 * j, 4);
+    }
+    // values against closed forms, slopes against differences
+    const double x[4] = {0.3, -0.7, 0.9, -1};
+    float phi[35], dphi[4 * 35], high[35], low[35];
+    sdm_poly_eval(e, 35, 4, 3, x, phi, dphi);
+    for (int i = 0; i < 35; i++) {
+        double product = 1;
+        for (int d = 0; d < 4; d++) product *= legendre(e[4 * i + d], x[d]);
+        assert_true(fabs(product - phi[i]) < 1e-5);
+    }
+    for (int d = 0; d < 4; d++) {
+        double up[4], down[4];
+        memcpy(up, x, sizeof x), memcpy(down, x, sizeof x);
+        up[d] += 1e-3, down[d] -= 1e-3;
+        sdm_poly_eval(e, 35, 4, 3, up, high, NULL);
+        sdm_poly_eval(e, 35, 4, 3, down, low, NULL);
+        for (int i = 0; i < 35; i++) assert_true(fabs(dphi[d * 35 + i] - (high[i] - low[i]) / 2e-3) < 2e-2);
+    }
+}
+
+static void forward_is_the_definition(void **state)
+{
+    (void)state;
+    for (int mode = 0; mode < 6; mode++) {
+        toy t;
+        make(&t, mode & 1, mode / 2);
+        sdm_model *m = open_toy(&t);
+        enum { N = 19 };
+        double p[N * P], truth[315];
+        float *maps, single[315];
+        void *scratch;
+        assert_int_equal(SDM_ALLOC(&maps, N * 315, "maps", NULL), 0);
+        assert_int_equal(sdm_alloc(&scratch, sdm_model_scratch_bytes(m, N), 1, "scratch", NULL), 0);
+        for (uint64_t i = 0; i < N; i++) random_params(i, p + i * P);
+        sdm_model_forward(m, p, N, maps, scratch);
+        for (size_t i = 0; i < N; i++) {
+            reference(&t, p + i * P, truth);
+            double size = 0;
+            for (int v = 0; v < 315; v++) size = fmax(size, fabs(truth[v]));
+            for (int v = 0; v < 315; v++) assert_true(fabs(truth[v] - maps[i * 315 + (size_t)v]) < (mode & 1 ? 4e-3 : 1e-5) * size);
+            sdm_model_forward(m, p + i * P, 1, single, scratch);
+            for (int v = 0; v < 315; v++) assert_true(fabs((double)single[v] - maps[i * 315 + (size_t)v]) < 1e-5 * size);
+        }
+        sdm_free(scratch);
+        sdm_free(maps);
+        sdm_model_free(m);
+        sdm_free(t.memory);
+    }
+}
+
+static void jacobian_is_the_slope(void **state)
+{
+    (void)state;
+    for (int activation = 0; activation < 2; activation++) { // ReLU has no slope at its kinks
+        toy t;
+        make(&t, false, activation);
+        sdm_model *m = open_toy(&t);
+        void *scratch, *forward;
+        float map[315], value[315], jacobian[P * 315];
+        double p[P], up[315], down[315];
+        assert_int_equal(sdm_alloc(&scratch, sdm_model_jacobian_scratch_bytes(m), 1, "scratch", NULL), 0);
+        assert_int_equal(sdm_alloc(&forward, sdm_model_scratch_bytes(m, 1), 1, "scratch", NULL), 0);
+        for (uint64_t trial = 0; trial < 5; trial++) {
+            random_params(trial, p);
+            sdm_model_jacobian(m, p, value, jacobian, scratch);
+            sdm_model_forward(m, p, 1, map, forward);
+            for (int v = 0; v < 315; v++) assert_true(fabsf(map[v] - value[v]) < 1e-4f);
+            for (int i = 0; i < P; i++) { // central differences of the double definition
+                const double h = 1e-5, at = p[i];
+                p[i] = at + h, reference(&t, p, up);
+                p[i] = at - h, reference(&t, p, down);
+                p[i] = at;
+                for (int v = 0; v < 315; v++) {
+                    const double slope = (up[v] - down[v]) / (2 * h);
+                    assert_true(fabs(slope - jacobian[i * 315 + v]) < 1e-4 * (10 + fabs(slope)));
+                }
+            }
+        }
+        sdm_free(scratch);
+        sdm_free(forward);
+        sdm_model_free(m);
+        sdm_free(t.memory);
+    }
+}
+
+static void file_keeps_everything(void **state)
+{
+    (void)state;
+    toy t;
+    make(&t, true, 0);
+    uint8_t *bytes;
+    size_t size;
+    sdm_model *m;
+    sdm_error e;
+    assert_int_equal(sdm_model_build(&t.spec, &bytes, &size, &e), SDM_OK);
+    char path[] = "model_XXXXXX";
+    close(mkstemp(path));
+    assert_int_equal(sdm_container_write(path, bytes, size, &e), SDM_OK);
+    assert_int_equal(sdm_model_open(path, &m, &e), SDM_OK);
+    const sdm_model_info *i = sdm_model_get_info(m);
+    assert_string_equal(i->shape, "toy");
+    assert_string_equal(i->kind, "pod");
+    assert_string_equal(i->version, SDM_VERSION_TEXT);
+    assert_string_equal(i->config, "seed: 77\n");
+    assert_int_equal(i->n_params, P);
+    assert_string_equal(i->params[2].name, "p2");
+    assert_true(i->params[2].min == -3 && i->params[2].max == 4 && i->params[2].def == 0.5);
+    assert_int_equal(i->n_options, 2);
+    assert_string_equal(i->option_names[1], "ear");
+    assert_string_equal(i->option_values[1], "left");
+    assert_memory_equal(&i->grid, &t.info.grid, sizeof i->grid);
+    assert_memory_equal(&i->accuracy, &t.info.accuracy, sizeof i->accuracy);
+    assert_true(i->seed == 77 && i->train_seconds == 1.25 && i->train_samples == 1234 && i->file_bytes == size);
+    sdm_model_free(m);
+    remove(path);
+    assert_int_equal(sdm_model_open(path, &m, &e), SDM_E_IO);
+    assert_null(m);
+    sdm_free(bytes);
+    sdm_free(t.memory);
+}
+
+static void expect_refused(const uint8_t *bytes, size_t size, const char *what, size_t at)
+{
+    sdm_model *m = NULL;
+    sdm_error e = {0};
+    const sdm_status s = sdm_model_open_memory("damaged", bytes, size, &m, &e);
+    if (s != SDM_E_FORMAT) fail_msg("%s at %zu gives status %d", what, at, s);
+    assert_null(m);
+    assert_memory_equal(e.text, "damaged: ", 9);
+}
+
+static void damage_is_refused(void **state)
+{
+    (void)state;
+    toy t;
+    make(&t, true, 0);
+    uint8_t *bytes;
+    size_t size;
+    assert_int_equal(sdm_model_build(&t.spec, &bytes, &size, NULL), SDM_OK);
+    const size_t header = 24 + 7 * 48 + 8;
+    // cut off at every byte of the header and a sample of the rest
+    for (size_t n = 0; n < size; n += n < header + 64 ? 1 : 97) expect_refused(bytes, n, "truncation", n);
+    expect_refused(bytes, size - 1, "truncation", size - 1);
+    // every bit of the header, a sample of the rest, gaps and trailer included
+    for (size_t i = 0; i < size; i += i < header + 64 || i > size - 10 ? 1 : 61)
+        for (int bit = 0; bit < 8; bit++) {
+            bytes[i] ^= (uint8_t)(1 << bit);
+            expect_refused(bytes, size, "flipped bit", i);
+            bytes[i] ^= (uint8_t)(1 << bit);
+        }
+    // bytes behind the end
+    uint8_t *longer;
+    assert_int_equal(SDM_ALLOC(&longer, size + 64, "longer", NULL), 0);
+    memcpy(longer, bytes, size);
+    expect_refused(longer, size + 64, "longer", size);
+    sdm_free(longer);
+    // a newer version says so
+    sdm_error e;
+    sdm_model *m;
+    bytes[8] = 2;
+    assert_int_equal(sdm_model_open_memory("new", bytes, size, &m, &e), SDM_E_FORMAT);
+    assert_non_null(strstr(e.text, "newer"));
+    sdm_free(bytes);
+    sdm_free(t.memory);
+}
+
+// valid checksums around hostile sizes
+static void hostile_sections(void **state)
+{
+    (void)state;
+    static const char meta[] = "kind=pod\nversion=0.1.0\nshape=x\ngrid.size=1048576 1048576 1048576\n";
+    const sdm_section sections[] = {{"meta", meta, sizeof meta - 1}, {"config", "", 0}, {"pod.ranks", "", 0}};
+    uint8_t *bytes;
+    size_t size;
+    assert_int_equal(sdm_container_build(sections, 3, &bytes, &size, NULL), SDM_OK);
+    expect_refused(bytes, size, "hostile", 0);
+    sdm_free(bytes);
+    sdm_error e;
+    assert_int_equal(sdm_container_build(sections, 0, &bytes, &size, &e), SDM_E_INTERNAL);
+    const sdm_section long_name = {"a name of more than twenty-three bytes", "", 0};
+    assert_int_equal(sdm_container_build(&long_name, 1, &bytes, &size, &e), SDM_E_INTERNAL);
+    static const char checkpoint[] = "kind=checkpoint\n";
+    const sdm_section parts[] = {{"meta", checkpoint, sizeof checkpoint - 1}, {"checkpoint", "", 0}};
+    sdm_model *m;
+    assert_int_equal(sdm_container_build(parts, 2, &bytes, &size, NULL), SDM_OK);
+    assert_int_equal(sdm_model_open_memory("c", bytes, size, &m, &e), SDM_E_FORMAT);
+    assert_non_null(strstr(e.text, "--resume"));
+    sdm_free(bytes);
+}
+
+static void every_allocation_may_fail(void **state)
+{
+    (void)state;
+    toy t;
+    make(&t, false, 0);
+    uint8_t *bytes = NULL;
+    size_t size = 0;
+    sdm_error e;
+    sdm_status s = SDM_E_NOMEM;
+    unsigned long n = 1;
+    for (; s; n++) { // build
+        sdm_alloc_fail_after(n);
+        s = sdm_model_build(&t.spec, &bytes, &size, &e);
+        if (s) assert_int_equal(s, SDM_E_NOMEM);
+        assert_true(n < 100);
+    }
+    sdm_alloc_fail_after(0);
+    assert_true(n > 4);
+    sdm_model *m = NULL;
+    s = SDM_E_NOMEM;
+    for (n = 1; s; n++) { // open
+        sdm_alloc_fail_after(n);
+        s = sdm_model_open_memory("toy", bytes, size, &m, &e);
+        if (s) assert_int_equal(s, SDM_E_NOMEM);
+        assert_true(n < 100);
+    }
+    sdm_alloc_fail_after(0);
+    assert_true(n > 6);
+    sdm_model_free(m);
+    sdm_model_free(NULL);
+    sdm_free(bytes);
+    sdm_free(t.memory);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(polynomials), cmocka_unit_test(forward_is_the_definition), cmocka_unit_test(jacobian_is_the_slope),
+        cmocka_unit_test(file_keeps_everything), cmocka_unit_test(damage_is_refused), cmocka_unit_test(hostile_sections),
+        cmocka_unit_test(every_allocation_may_fail),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,260 @@
+/* Training end to end on small grids: accuracy, the same bits for any number of threads, resume, cancellation, mistakes. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "sdm/builtin_shapes.h"
+#include "sdm/checksum.h"
+#include "sdm/file.h"
+#include "sdm/memory.h"
+#include "sdm/train.h"
+
+static sdm_registry *registry;
+static sdm_instance *capsule;
+static char folder[] = "trainer_XXXXXX";
+
+static const char base[] = "shape: {name: capsule}\n"
+                           "grid: {size: [20, 18, 16], spacing: 0.8}\n"
+                           "network: {depth: 2, width: 24, rank: 6, block: 8, modes: 32, degree: 3, input_degree: 3}\n"
+                           "data: {static: 3, start: 150, online: 100, holdout: 20, memory_gb: 0.5}\n"
+                           "train: {steps: 1200, batch: 32, refine: 0.5, refine_batch: 8, average: 0.99}\n";
+
+static void read_config(sdm_config *c, const char *const *overrides, size_t n)
+{
+    sdm_error e = {0};
+    if (sdm_config_parse("test.yaml", base, sizeof base - 1, overrides, n, c, &e)) fail_msg("%s", e.text);
+}
+
+static uint64_t hash_of(const char *name)
+{
+    char path[128];
+    uint8_t *data;
+    size_t size;
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    assert_int_equal(sdm_file_read(path, 1 << 30, &data, &size, NULL), SDM_OK);
+    const uint64_t h = sdm_crc64(0, data, size);
+    sdm_free(data);
+    return h;
+}
+
+static bool exists(const char *name)
+{
+    char path[128];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    return access(path, F_OK) == 0;
+}
+
+static void clean(void)
+{
+    static const char *const names[] = {"model.sdm", "checkpoint.sdm", "metrics.jsonl", "config.yaml", "loss.png"};
+    char path[128];
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        snprintf(path, sizeof path, "%s/%s", folder, names[i]);
+        remove(path);
+    }
+}
+
+static void trains(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_error e = {0};
+    sdm_train_report r;
+    read_config(&c, NULL, 0);
+    if (sdm_train(&c, capsule, folder, false, NULL, &r, &e)) fail_msg("%s", e.text);
+    // far below what the mean map alone leaves (about 1 mm), and what the model says is what it does
+    assert_true(r.accuracy.rmse_mm > 0 && r.accuracy.rmse_mm < 0.03);
+    assert_true(r.accuracy.q50_mm <= r.accuracy.q90_mm && r.accuracy.q90_mm <= r.accuracy.q99_mm);
+    assert_int_equal(r.steps, 1200);
+    assert_int_equal(r.samples, 9 + 150 + 100);
+    assert_true(exists("model.sdm") && exists("config.yaml") && exists("metrics.jsonl") && exists("loss.png"));
+
+    sdm_model *m;
+    assert_int_equal(sdm_model_open(r.model_path, &m, &e), SDM_OK);
+    const sdm_model_info *info = sdm_model_get_info(m);
+    assert_true(info->accuracy.rmse_mm == r.accuracy.rmse_mm);
+    assert_string_equal(info->shape, "capsule");
+    // an independent look: fresh shapes through the exact engine
+    const size_t n = sdm_grid_count(&c.grid);
+    float *map, *truth;
+    void *scratch;
+    assert_int_equal(SDM_ALLOC(&map, n, "map", NULL), 0);
+    assert_int_equal(SDM_ALLOC(&truth, n, "truth", NULL), 0);
+    assert_int_equal(sdm_alloc(&scratch, sdm_model_scratch_bytes(m, 1), 1, "scratch", NULL), 0);
+    double sum = 0;
+    for (uint64_t i = 0; i < 10; i++) {
+        double lo[8], hi[8], p[8];
+        sdm_mesh mesh = {0};
+        sdm_exact *exact;
+        assert_int_equal(sdm_train_ranges(&c, capsule, lo, hi, &e), SDM_OK);
+        sdm_sample_params(99, 12345, i, lo, hi, info->n_params, p);
+        assert_int_equal(sdm_instance_mesh(capsule, p, &mesh, &e), SDM_OK);
+        assert_int_equal(sdm_exact_create(&mesh, NULL, &exact, &e), SDM_OK);
+        assert_int_equal(sdm_exact_map(exact, &c.grid, truth, &e), SDM_OK);
+        sdm_model_forward(m, p, 1, map, scratch);
+        for (size_t v = 0; v < n; v++) sum += ((double)map[v] - truth[v]) * ((double)map[v] - truth[v]);
+        sdm_exact_free(exact);
+        sdm_mesh_dispose(&mesh);
+    }
+    assert_true(sqrt(sum / 10 / (double)n) < 2 * r.accuracy.rmse_mm);
+    sdm_free(map);
+    sdm_free(truth);
+    sdm_free(scratch);
+    sdm_model_free(m);
+}
+
+static void same_bits_for_threads(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_error e = {0};
+    uint64_t model[3], metrics[3];
+    for (int threads = 1; threads <= 3; threads++) {
+        read_config(&c, (const char *const[]){"train.steps=600"}, 1);
+        clean();
+        // the number of threads is no part of the result, so it must not be part of the stored config either
+        c.threads = 0;
+        c.data.workers = threads;
+        sdm_config run = c;
+        run.threads = threads;
+        run.data.workers = threads;
+        if (sdm_train(&run, capsule, folder, false, NULL, NULL, &e)) fail_msg("%s", e.text);
+        model[threads - 1] = hash_of("model.sdm");
+        metrics[threads - 1] = hash_of("metrics.jsonl");
+    }
+    assert_true(model[0] == model[1] && model[1] == model[2]);
+    assert_true(metrics[0] == metrics[1] && metrics[1] == metrics[2]);
+}
+
+typedef struct watch {
+    int64_t stop_at;
+    int64_t step;
+    int reports;
+} watch;
+
+static void watch_progress(void *user, const sdm_progress *p)
+{
+    watch *w = user;
+    w->step = p->step;
+    w->reports++;
+}
+
+static int64_t calls, stop_after;
+
+static bool stop(void *user)
+{
+    (void)user;
+    return ++calls > stop_after;
+}
+
+static void resume_is_bit_exact(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_error e = {0};
+    read_config(&c, (const char *const[]){"train.steps=600"}, 1);
+    clean();
+    if (sdm_train(&c, capsule, folder, false, NULL, NULL, &e)) fail_msg("%s", e.text);
+    const uint64_t whole = hash_of("model.sdm"), metrics = hash_of("metrics.jsonl");
+    // stopped while making data, in the fit, in the refinement
+    const int64_t stops[] = {20, 400, 700};
+    for (size_t i = 0; i < 3; i++) {
+        clean();
+        calls = 0, stop_after = stops[i];
+        watch w = {0};
+        const sdm_train_hooks hooks = {.cancelled = stop, .progress = watch_progress, .user = &w};
+        assert_int_equal(sdm_train(&c, capsule, folder, false, &hooks, NULL, &e), SDM_E_CANCELLED);
+        assert_false(exists("model.sdm"));
+        assert_true(exists("checkpoint.sdm") == (i > 0));
+        if (sdm_train(&c, capsule, folder, true, NULL, NULL, &e)) fail_msg("%s", e.text);
+        assert_true(hash_of("model.sdm") == whole);
+        assert_true(hash_of("metrics.jsonl") == metrics);
+        assert_true(w.reports > 0);
+    }
+    // another config is refused
+    sdm_config other;
+    read_config(&other, (const char *const[]){"train.steps=600", "network.rank=5"}, 2);
+    assert_int_equal(sdm_train(&other, capsule, folder, true, NULL, NULL, &e), SDM_E_CONFIG);
+}
+
+static void polynomials_alone(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_error e = {0};
+    sdm_train_report r;
+    clean();
+    read_config(&c, (const char *const[]){"network.depth=0", "train.steps=50", "network.weights=f32", "data.static=[2,4]", "data.online=0",
+                                          "train.loss=huber", "train.near_weight=2"}, 7);
+    if (sdm_train(&c, capsule, folder, false, NULL, &r, &e)) fail_msg("%s", e.text);
+    assert_true(r.accuracy.rmse_mm < 0.1);
+}
+
+// more random samples than fit into the pool: the oldest are replaced
+static void small_pool(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_error e = {0};
+    sdm_train_report r;
+    clean();
+    read_config(&c, (const char *const[]){"train.steps=300", "data.memory_gb=0.0025", "data.start=60", "data.online=500", "data.static=2"}, 5);
+    if (sdm_train(&c, capsule, folder, false, NULL, &r, &e)) fail_msg("%s", e.text);
+    assert_int_equal(r.samples, 4 + 560);
+    assert_true(r.accuracy.rmse_mm < 0.1);
+}
+
+static void mistakes(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_error e = {0};
+    clean();
+    read_config(&c, (const char *const[]){"data.static=[2,2,2,2,2]"}, 1);
+    assert_int_equal(sdm_train(&c, capsule, folder, false, NULL, NULL, &e), SDM_E_CONFIG);
+    assert_non_null(strstr(e.text, "data.static"));
+    read_config(&c, (const char *const[]){"data.memory_gb=0.001"}, 1);
+    assert_int_equal(sdm_train(&c, capsule, folder, false, NULL, NULL, &e), SDM_E_CONFIG);
+    assert_non_null(strstr(e.text, "data.memory_gb"));
+    read_config(&c, (const char *const[]){"shape.ranges.radios=[1,2]"}, 1);
+    assert_int_equal(sdm_train(&c, capsule, folder, false, NULL, NULL, &e), SDM_E_CONFIG);
+    assert_non_null(strstr(e.text, "did you mean 'radius'"));
+    read_config(&c, (const char *const[]){"shape.ranges.radius=[1e-9,1e9]"}, 1);
+    assert_int_equal(sdm_train(&c, capsule, folder, false, NULL, NULL, &e), SDM_E_CONFIG);
+    read_config(&c, NULL, 0);
+    assert_int_equal(sdm_train(&c, capsule, "/proc/no/such/folder", false, NULL, NULL, &e), SDM_E_IO);
+    read_config(&c, (const char *const[]){"train.learning_rate=1", "train.steps=2000"}, 2);
+    assert_false(exists("model.sdm"));
+}
+
+static int set_up(void **state)
+{
+    (void)state;
+    if (!mkdtemp(folder) || sdm_registry_create(&registry, NULL) || sdm_builtin_shapes_add(registry, NULL)) return 1;
+    return sdm_instance_create(sdm_registry_find(registry, "capsule", NULL), NULL, 0, NULL, &capsule, NULL) != SDM_OK;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    clean();
+    sdm_instance_free(capsule);
+    sdm_registry_free(registry);
+    return rmdir(folder); // nothing else was left behind
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(trains), cmocka_unit_test(same_bits_for_threads),
+                                       cmocka_unit_test(resume_is_bit_exact), cmocka_unit_test(polynomials_alone),
+                                       cmocka_unit_test(small_pool), cmocka_unit_test(mistakes)};
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -1,0 +1,118 @@
+/* Reads a configuration: the file, then the overrides, then the rules that span several keys. */
+#include "sdm/config.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "schema.h"
+#include "sdm/file.h"
+#include "sdm/memory.h"
+
+/* "dir/cochlea.yaml" -> "runs/cochlea"; bytes that a text must not hold become '_'. */
+static void default_folder(const char *file, char *out, size_t size)
+{
+    const char *slash = strrchr(file, '/'), *base = slash ? slash + 1 : file, *dot = strrchr(base, '.');
+    size_t length = dot && dot != base ? (size_t)(dot - base) : strlen(base);
+    if (length > 200) length = 200;
+    snprintf(out, size, "runs/%.*s", (int)length, length ? base : "config");
+    if (!length) snprintf(out, size, "runs/config");
+    for (size_t n = strlen(out), bad; (bad = sdm_tree_printable(out, n)) < n;) out[bad] = '_';
+}
+
+/* One "key=value". Mistakes are recorded; another status only when nothing can go on. */
+static sdm_status apply_override(sdm_reader *r, const char *text, int number, sdm_error *err)
+{
+    const sdm_mark mark = {.override = number};
+    const char *equals = strchr(text, '=');
+    size_t names = 1;
+    if (!equals || equals == text) {
+        sdm_mistakes_add(r->mistakes, mark, "not of the form key=value");
+        return SDM_OK;
+    }
+    const size_t length = (size_t)(equals - text);
+    for (size_t i = 0; i < length; i++) names += text[i] == '.';
+    if (length >= SDM_TREE_PATH_BYTES || names > SDM_TREE_PATH_NAMES) {
+        sdm_mistakes_add(r->mistakes, mark, "unknown key");
+        return SDM_OK;
+    }
+    sdm_tree tree = {0};
+    sdm_status s = sdm_tree_parse(&tree, equals + 1, strlen(equals + 1), number, r->mistakes, err);
+    if (!s) s = sdm_tree_wrap(&tree, text, length, number, err);
+    if (!s) {
+        sdm_fields_read(r, tree.root);
+        sdm_config_settle_override(r, number);
+    }
+    sdm_tree_dispose(&tree);
+    return s == SDM_E_CONFIG ? SDM_OK : s;
+}
+
+/* Mistakes of the YAML itself end here: after them every key would seem to be missing. */
+static sdm_status read_all(sdm_reader *r, const char *text, size_t size, const char *const *overrides,
+                           size_t n_overrides, sdm_error *err)
+{
+    sdm_tree tree = {0};
+    sdm_mark top = {.line = 1, .column = 1};
+    sdm_status s = sdm_tree_parse(&tree, text, size, 0, r->mistakes, err);
+    if (!s) sdm_fields_read(r, tree.root);
+    const bool is_keyed = !tree.root || tree.root->kind == SDM_TREE_MAP || sdm_tree_is_empty(tree.root);
+    sdm_tree_dispose(&tree);
+    if (s == SDM_E_CONFIG || (!s && !is_keyed)) return sdm_mistakes_report(r->mistakes, err);
+
+    for (size_t i = 0; i < n_overrides && !s; i++) s = apply_override(r, overrides[i], (int)i + 1, err);
+    if (s) return s;
+    sdm_config_finish(r, top);
+    return sdm_mistakes_report(r->mistakes, err);
+}
+
+sdm_status sdm_config_parse(const char *name, const char *text, size_t size, const char *const *overrides,
+                            size_t n_overrides, sdm_config *out, sdm_error *err)
+{
+    if (!name || !out || (!text && size) || (!overrides && n_overrides) || n_overrides > 10000)
+        return sdm_fail(err, SDM_E_ARG,
+                        "a configuration needs a name, a text, a place for the result and at most 10000 "
+                        "overrides");
+    for (size_t i = 0; i < n_overrides; i++)
+        if (!overrides[i]) return sdm_fail(err, SDM_E_ARG, "override %zu is NULL", i + 1);
+    if (strlen(name) >= sizeof out->file)
+        return sdm_fail(err, SDM_E_ARG, "a file name of %zu bytes, at most %zu are allowed", strlen(name),
+                        sizeof out->file - 1);
+
+    memset(out, 0, sizeof *out);
+    snprintf(out->file, sizeof out->file, "%s", name);
+    default_folder(name, out->output.folder, sizeof out->output.folder);
+    sdm_mistakes mistakes = {.file = name, .overrides = overrides};
+    sdm_reader r = {.config = out, .mistakes = &mistakes};
+    r.sections = sdm_config_sections(&r.n_sections);
+    sdm_fields_set_defaults(&r);
+    sdm_status s = read_all(&r, text ? text : "", size, overrides, n_overrides, err);
+    if (s) memset(out, 0, sizeof *out);
+    return s;
+}
+
+sdm_status sdm_config_read(const char *path, const char *const *overrides, size_t n_overrides, sdm_config *out,
+                           sdm_error *err)
+{
+    uint8_t *data = NULL;
+    size_t size = 0;
+    if (!path || !out) return sdm_fail(err, SDM_E_ARG, "a configuration needs a path and a place for the result");
+    sdm_status s = sdm_file_read(path, SDM_TREE_BYTES_MAX, &data, &size, err);
+    if (s == SDM_E_FORMAT)
+        return sdm_fail(err, SDM_E_CONFIG, "%s:1:1: more than %zu bytes; a configuration is smaller", path,
+                        SDM_TREE_BYTES_MAX);
+    if (s) return s;
+    s = sdm_config_parse(path, (const char *)data, size, overrides, n_overrides, out, err);
+    sdm_free(data);
+    return s;
+}
+
+const char *sdm_config_where(const sdm_config *c, sdm_mark mark, char *buf)
+{
+    enum { SIZE = 1200 };
+    if (mark.override > 0)
+        snprintf(buf, SIZE, "key=value argument %d", mark.override);
+    else if (mark.line > 0)
+        snprintf(buf, SIZE, "%s:%d:%d", c->file, mark.line, mark.column);
+    else
+        snprintf(buf, SIZE, "%s", c->file);
+    return buf;
+}

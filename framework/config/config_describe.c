@@ -1,0 +1,160 @@
+/* Writes a configuration as YAML and the table of all keys. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "schema.h"
+
+const char *sdm_field_type_name(const sdm_field *f)
+{
+    static const char *const NAMES[] = {"integer", "integer", "integer", "number", "name", "text", "special"};
+    return f->shown_type ? f->shown_type : NAMES[f->type];
+}
+
+const char *sdm_format_plain(double v, char buf[32])
+{
+    if (!(fabs(v) < 1e9) || v != nearbyint(v)) return sdm_format_real(v, buf);
+    snprintf(buf, 32, "%.0f", v);
+    return buf;
+}
+
+static void join_choices(const char *choices, char *buf, size_t size)
+{
+    char name[SDM_NAME_MAX];
+    size_t used = 0;
+    buf[0] = 0;
+    for (int i = 0; used < size && sdm_choice_name(choices, i, name); i++)
+        used += (size_t)snprintf(buf + used, size - used, "%s%s", i ? ", " : "", name);
+}
+
+const char *sdm_field_range(const sdm_field *f, char *buf, size_t size)
+{
+    char a[32], b[32];
+    if (f->shown_range)
+        snprintf(buf, size, "%s", f->shown_range);
+    else if (f->type == SDM_FIELD_CHOICE)
+        join_choices(f->choices, buf, size);
+    else if (f->type == SDM_FIELD_UINT64)
+        snprintf(buf, size, "0 .. %llu", (unsigned long long)UINT64_MAX);
+    else if (f->type == SDM_FIELD_TEXT)
+        snprintf(buf, size, "1 .. %.0f bytes", f->max);
+    else if (f->type == SDM_FIELD_REAL)
+        snprintf(buf, size, "%s .. %s", sdm_format_plain(f->min, a), sdm_format_plain(f->max, b));
+    else
+        snprintf(buf, size, "%lld .. %lld", (long long)f->min, (long long)f->max);
+    return buf;
+}
+
+void sdm_dump_text(const char *text, sdm_text *out)
+{
+    sdm_text_add(out, "\"");
+    for (const char *p = text; *p;) {
+        size_t plain = strcspn(p, "\"\\");
+        sdm_text_add(out, "%.*s", (int)plain, p);
+        p += plain;
+        if (*p) sdm_text_add(out, "\\%c", *p++);
+    }
+    sdm_text_add(out, "\"");
+}
+
+void sdm_field_dump(const sdm_config *c, const sdm_field *f, sdm_text *out)
+{
+    const char *at = (const char *)c + f->offset;
+    char buf[SDM_NAME_MAX];
+    switch (f->type) {
+    case SDM_FIELD_INT:
+        sdm_text_add(out, "%d", *(const int *)at);
+        break;
+    case SDM_FIELD_INT64:
+        sdm_text_add(out, "%lld", (long long)*(const int64_t *)at);
+        break;
+    case SDM_FIELD_UINT64:
+        sdm_text_add(out, "%llu", (unsigned long long)*(const uint64_t *)at);
+        break;
+    case SDM_FIELD_REAL:
+        sdm_text_add(out, "%s", sdm_format_plain(*(const double *)at, buf));
+        break;
+    case SDM_FIELD_CHOICE:
+        if (sdm_choice_name(f->choices, *(const int *)at, buf)) sdm_text_add(out, "%s", buf);
+        break;
+    case SDM_FIELD_TEXT:
+        sdm_dump_text(at, out);
+        break;
+    case SDM_FIELD_SPECIAL:
+        f->dump(c, out);
+        break;
+    }
+}
+
+void sdm_config_dump(const sdm_config *c, sdm_text *out)
+{
+    size_t n = 0;
+    const sdm_section *sections = sdm_config_sections(&n);
+    sdm_text_add(out, "# every key with its value; reads back to the same configuration\n");
+    for (size_t s = 0; s < n; s++) {
+        bool nested = *sections[s].name != 0;
+        if (nested) sdm_text_add(out, "%s:\n", sections[s].name);
+        for (size_t k = 0; k < sections[s].n_fields; k++) {
+            const sdm_field *f = &sections[s].fields[k];
+            if (f->type == SDM_FIELD_SPECIAL && !f->dump) continue;
+            sdm_text_add(out, "%s%s: ", nested ? "  " : "", f->key);
+            sdm_field_dump(c, f, out);
+            sdm_text_add(out, "\n");
+        }
+    }
+}
+
+enum { COLUMNS = 6, CELL = 400 };
+typedef char table_row[COLUMNS][CELL];
+
+static void fill_row(const sdm_section *section, const sdm_field *f, bool markdown, table_row row)
+{
+    const char *quote = markdown ? "`" : "";
+    const char *def = f->shown_def ? f->shown_def : f->def ? f->def : "required";
+    snprintf(row[0], CELL, "%s%s%s%s%s", quote, section->name, *section->name ? "." : "", f->key, quote);
+    snprintf(row[1], CELL, "%s", sdm_field_type_name(f));
+    sdm_field_range(f, row[2], CELL);
+    snprintf(row[3], CELL, "%s", def);
+    snprintf(row[4], CELL, "%s", f->unit);
+    snprintf(row[5], CELL, "%s", f->help);
+}
+
+static void print_row(table_row row, const int width[COLUMNS], bool markdown, sdm_text *out)
+{
+    for (int i = 0; i < COLUMNS; i++) {
+        if (markdown)
+            sdm_text_add(out, "%s%s |", i ? " " : "| ", row[i]);
+        else
+            sdm_text_add(out, "%-*s%s", i + 1 < COLUMNS ? width[i] : 0, row[i], i + 1 < COLUMNS ? "  " : "");
+    }
+    sdm_text_add(out, "\n");
+}
+
+void sdm_config_describe(bool markdown, sdm_text *out)
+{
+    static const char *const HEAD[COLUMNS] = {"Key", "Type", "Range", "Default", "Unit", "Meaning"};
+    size_t n = 0;
+    const sdm_section *sections = sdm_config_sections(&n);
+    table_row row;
+    int width[COLUMNS];
+
+    // a first pass for the widths of the aligned text
+    for (int i = 0; i < COLUMNS; i++) width[i] = (int)strlen(HEAD[i]);
+    for (size_t s = 0; s < n; s++) {
+        for (size_t k = 0; k < sections[s].n_fields; k++) {
+            fill_row(&sections[s], &sections[s].fields[k], markdown, row);
+            for (int i = 0; i < COLUMNS; i++)
+                if ((int)strlen(row[i]) > width[i]) width[i] = (int)strlen(row[i]);
+        }
+    }
+
+    for (int i = 0; i < COLUMNS; i++) snprintf(row[i], CELL, "%s", HEAD[i]);
+    print_row(row, width, markdown, out);
+    if (markdown) sdm_text_add(out, "|---|---|---|---|---|---|\n");
+    for (size_t s = 0; s < n; s++) {
+        for (size_t k = 0; k < sections[s].n_fields; k++) {
+            fill_row(&sections[s], &sections[s].fields[k], markdown, row);
+            print_row(row, width, markdown, out);
+        }
+    }
+}

@@ -1,0 +1,81 @@
+/* Collects mistakes in a configuration and prints them, one line each, ordered by position. */
+#include "mistakes.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+/* The file comes before the arguments; within one place the order of discovery counts, so this is a strict "less". */
+static bool is_before(sdm_mark a, sdm_mark b)
+{
+    if (a.override != b.override) return a.override < b.override;
+    if (a.override > 0) return false;
+    return a.line != b.line ? a.line < b.line : a.column < b.column;
+}
+
+void sdm_mistakes_add(sdm_mistakes *m, sdm_mark mark, const char *fmt, ...)
+{
+    size_t kept = m->count < SDM_MISTAKES_SHOWN ? m->count : SDM_MISTAKES_SHOWN;
+    size_t at = kept;
+    m->count++;
+    while (at > 0 && is_before(mark, m->first[at - 1].mark)) at--;
+    if (at == SDM_MISTAKES_SHOWN) return;
+
+    // make room; the last one falls out of a full list
+    size_t moved = (kept < SDM_MISTAKES_SHOWN ? kept : SDM_MISTAKES_SHOWN - 1) - at;
+    memmove(&m->first[at + 1], &m->first[at], moved * sizeof m->first[0]);
+    m->first[at].mark = mark;
+    va_list args;
+    va_start(args, fmt);
+    vsnprintf(m->first[at].text, sizeof m->first[at].text, fmt, args);
+    va_end(args);
+}
+
+static int print_line(const sdm_mistakes *m, const sdm_mistake *one, char *out, size_t size)
+{
+    char buf[SDM_QUOTE_MAX];
+    if (one->mark.override > 0)
+        return snprintf(out, size, "argument '%s': %s", sdm_quote(m->overrides[one->mark.override - 1], buf),
+                        one->text);
+    return snprintf(out, size, "%s:%d:%d: %s", m->file, one->mark.line, one->mark.column, one->text);
+}
+
+sdm_status sdm_mistakes_report(const sdm_mistakes *m, sdm_error *err)
+{
+    enum { TAIL = 32 }; /* "... and N more" */
+    char text[SDM_ERROR_TEXT_MAX];
+    size_t used = 0, shown = 0;
+    if (m->count == 0) return SDM_OK;
+
+    // whole lines only, so that nothing is cut in the middle
+    text[0] = 0;
+    for (; shown < m->count && shown < SDM_MISTAKES_SHOWN; shown++) {
+        char line[SDM_PATH_TEXT_MAX + SDM_MISTAKE_TEXT_MAX + SDM_QUOTE_MAX];
+        int n = print_line(m, &m->first[shown], line, sizeof line);
+        size_t length = n < 0 ? 0 : (size_t)n < sizeof line ? (size_t)n : sizeof line - 1;
+        if (used + length + 1 + TAIL >= sizeof text) break;
+        if (used) text[used++] = '\n';
+        memcpy(text + used, line, length);
+        used += length;
+        text[used] = 0;
+    }
+    if (shown < m->count) snprintf(text + used, sizeof text - used, "\n... and %zu more", m->count - shown);
+    return sdm_fail(err, SDM_E_CONFIG, "%s", text);
+}
+
+const char *sdm_quote(const char *text, char buf[SDM_QUOTE_MAX])
+{
+    enum { SHOWN = 60 };
+    size_t length = strlen(text), n = length;
+    if (n > SHOWN) {
+        // do not cut a UTF-8 sequence
+        n = SHOWN;
+        while (n > 0 && ((unsigned char)text[n] & 0xC0) == 0x80) n--;
+    }
+    for (size_t i = 0; i < n; i++) {
+        unsigned char c = (unsigned char)text[i];
+        buf[i] = c < 0x20 || c == 0x7F ? '?' : (char)c;
+    }
+    strcpy(buf + n, n < length ? "..." : "");
+    return buf;
+}

@@ -1,0 +1,67 @@
+/* Numbers as bytes in a file, of either byte order, independent of the machine's own. */
+#ifndef SDM_IO_BYTES_H
+#define SDM_IO_BYTES_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "sdm/file.h"
+
+static inline uint64_t sdm_get_uint(const uint8_t *p, size_t size, bool big)
+{
+    uint64_t v = 0;
+    for (size_t i = 0; i < size; i++) v = v << 8 | p[big ? i : size - 1 - i];
+    return v;
+}
+
+static inline float sdm_get_f32(const uint8_t *p, bool big)
+{
+    const uint32_t bits = (uint32_t)sdm_get_uint(p, 4, big);
+    float v;
+    memcpy(&v, &bits, sizeof v);
+    return v;
+}
+
+static inline double sdm_get_f64(const uint8_t *p, bool big)
+{
+    const uint64_t bits = sdm_get_uint(p, 8, big);
+    double v;
+    memcpy(&v, &bits, sizeof v);
+    return v;
+}
+
+/* Little endian: every file this project writes, except PNG. */
+static inline void sdm_put_uint(uint8_t *p, size_t size, uint64_t v)
+{
+    for (size_t i = 0; i < size; i++) p[i] = (uint8_t)(v >> 8 * i);
+}
+
+static inline void sdm_put_f32(uint8_t *p, float v)
+{
+    uint32_t bits;
+    memcpy(&bits, &v, sizeof bits);
+    sdm_put_uint(p, 4, bits);
+}
+
+static inline void sdm_put_f64(uint8_t *p, double v)
+{
+    uint64_t bits;
+    memcpy(&bits, &v, sizeof bits);
+    sdm_put_uint(p, 8, bits);
+}
+
+/* True when `path` ends with `ext` (".ply"), upper or lower case. */
+static inline bool sdm_has_ext(const char *path, const char *ext)
+{
+    const size_t n = strlen(path), m = strlen(ext);
+    if (n <= m) return false;
+    for (size_t i = 0; i < m; i++) {
+        const char c = path[n - m + i];
+        if ((c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c) != ext[i]) return false;
+    }
+    return true;
+}
+
+#endif

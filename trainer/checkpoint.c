@@ -15,7 +15,7 @@ typedef struct state {
     int64_t phase, step, phase_step, n_taken, n_weights;
 } state;
 
-static void checkpoint_path(const trainer *t, char *path, size_t size) { snprintf(path, size, "%s/checkpoint.sdm", t->folder); }
+static void checkpoint_path(const trainer *t, char *path, size_t size) { snprintf(path, size, "%s/checkpoint.sdmc", t->folder); }
 
 static parameters *weights_of(trainer *t, int64_t phase) { return phase == SDM_PHASE_FIT ? &t->fit : &t->refine; }
 
@@ -139,7 +139,7 @@ sdm_status checkpoint_read(trainer *t, bool *found, sdm_error *err)
         state then;
         memcpy(&then, find(&o, "checkpoint")->data, sizeof then);
         if (then.phase != SDM_PHASE_FIT && then.phase != SDM_PHASE_REFINE)
-            s = sdm_fail(err, SDM_E_FORMAT, "%s/checkpoint.sdm: unknown phase %lld", t->folder, (long long)then.phase);
+            s = sdm_fail(err, SDM_E_FORMAT, "%s/checkpoint.sdmc: unknown phase %lld", t->folder, (long long)then.phase);
         t->phase = (sdm_phase)then.phase;
         t->started -= then.seconds;
         t->phase_started = then.phase_started;
@@ -163,14 +163,14 @@ sdm_status checkpoint_weights(trainer *t, sdm_error *err)
     bool found;
     sdm_status s = open_checkpoint(t, &o, &found, err);
     if (s) return s;
-    if (!found) return sdm_fail(err, SDM_E_IO, "%s/checkpoint.sdm: it has gone", t->folder);
+    if (!found) return sdm_fail(err, SDM_E_IO, "%s/checkpoint.sdmc: it has gone", t->folder);
     parameters *p = weights_of(t, t->phase);
     const struct { const char *name; float *to; } arrays[] = {
         {"weights", p->w}, {"moment1", p->m}, {"moment2", p->v}, {"average", p->average}};
     for (int i = 0; i < 4 && !s; i++) {
         const sdm_section *section = find(&o, arrays[i].name);
         if (section->size != p->n * sizeof(float))
-            s = sdm_fail(err, SDM_E_FORMAT, "%s/checkpoint.sdm: %zu bytes of %s, the network has %zu", t->folder, section->size,
+            s = sdm_fail(err, SDM_E_FORMAT, "%s/checkpoint.sdmc: %zu bytes of %s, the network has %zu", t->folder, section->size,
                          arrays[i].name, p->n * sizeof(float));
         else memcpy(arrays[i].to, section->data, section->size);
     }

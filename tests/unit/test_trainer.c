@@ -54,7 +54,7 @@ static bool exists(const char *name)
 
 static void clean(void)
 {
-    static const char *const names[] = {"model.sdm", "checkpoint.sdm", "metrics.jsonl", "config.yaml", "loss.png"};
+    static const char *const names[] = {"model.sdm", "checkpoint.sdmc", "metrics.jsonl", "config.yaml", "loss.png"};
     char path[128];
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         snprintf(path, sizeof path, "%s/%s", folder, names[i]);
@@ -173,7 +173,7 @@ static void resume_is_bit_exact(void **state)
         const sdm_train_hooks hooks = {.cancelled = stop, .progress = watch_progress, .user = &w};
         assert_int_equal(sdm_train(&c, capsule, folder, false, &hooks, NULL, &e), SDM_E_CANCELLED);
         assert_false(exists("model.sdm"));
-        assert_true(exists("checkpoint.sdm") == (i > 0));
+        assert_true(exists("checkpoint.sdmc") == (i > 0));
         if (sdm_train(&c, capsule, folder, true, NULL, NULL, &e)) fail_msg("%s", e.text);
         assert_true(hash_of("model.sdm") == whole);
         assert_true(hash_of("metrics.jsonl") == metrics);

@@ -1,0 +1,263 @@
+/* Maps from a model: range policy, batches over threads, the way to the exact engine. */
+#include "sdm/runtime.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "sdm/memory.h"
+
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+// maps of one slice of a batch: fixed, so that how a map is computed does not depend on the number of threads
+#define SLICE 16u
+
+static int thread_count(int wanted, size_t most)
+{
+#ifdef _OPENMP
+    const int n = wanted > 0 ? wanted : omp_get_max_threads();
+    return (size_t)n < most ? n : (int)most;
+#else
+    (void)wanted;
+    (void)most;
+    return 1;
+#endif
+}
+
+static int thread_index(void)
+{
+#ifdef _OPENMP
+    return omp_get_thread_num();
+#else
+    return 0;
+#endif
+}
+
+static sdm_generate_opts options_or_default(const sdm_generate_opts *opts)
+{
+    return opts ? *opts : (sdm_generate_opts){.policy = SDM_RANGE_REFUSE};
+}
+
+static sdm_status check_options(const sdm_model *m, const sdm_generate_opts *o, sdm_error *err)
+{
+    if (o->n_threads < 0) return sdm_fail(err, SDM_E_ARG, "%d threads, need 0 (all) or more", o->n_threads);
+    if (o->policy != SDM_RANGE_REFUSE && o->policy != SDM_RANGE_CLAMP && o->policy != SDM_RANGE_EXACT)
+        return sdm_fail(err, SDM_E_ARG, "range policy %d is unknown", (int)o->policy);
+    if (o->policy != SDM_RANGE_EXACT) return SDM_OK;
+    if (!o->exact_shape)
+        return sdm_fail(err, SDM_E_ARG, "the exact policy needs an instance of the shape (sdm_runtime_instance())");
+    size_t n;
+    sdm_instance_params(o->exact_shape, &n);
+    const sdm_model_info *info = sdm_model_get_info(m);
+    if (n != info->n_params)
+        return sdm_fail(err, SDM_E_ARG, "the model has %zu parameters, the shape for the exact policy %zu",
+                        info->n_params, n);
+    return SDM_OK;
+}
+
+static sdm_status refuse(const sdm_model_param *p, double value, sdm_error *err)
+{
+    return sdm_fail(err, SDM_E_RANGE, "%s = %.9g %s, need %.9g to %.9g%s", p->name, value, p->unit, p->min, p->max,
+                    isfinite(value) ? " (the range the network was trained on); other policies: clamp, exact" : "");
+}
+
+// checks params[n_params], writes what the network is to be asked for to used[] (may be NULL) and how to *result
+static sdm_status check_params(const sdm_model *m, const double *params, const sdm_generate_opts *o, double *used,
+                               sdm_result *result, sdm_error *err)
+{
+    const sdm_model_info *info = sdm_model_get_info(m);
+    *result = (sdm_result){.source = SDM_SOURCE_NETWORK, .error_mm = info->accuracy.rmse_mm};
+    for (size_t i = 0; i < info->n_params; i++) {
+        const sdm_model_param *p = &info->params[i];
+        const double x = params[i], near = x < p->min ? p->min : x > p->max ? p->max : x;
+        if (!isfinite(x) || (x != near && o->policy == SDM_RANGE_REFUSE)) return refuse(p, x, err);
+        if (x != near && o->policy == SDM_RANGE_CLAMP) result->clamped = true;
+        if (x != near && o->policy == SDM_RANGE_EXACT) result->source = SDM_SOURCE_EXACT;
+        if (used) used[i] = near;
+    }
+    if (result->source == SDM_SOURCE_NETWORK) return SDM_OK;
+    result->error_mm = 0.0;
+    return sdm_instance_check(o->exact_shape, params, err);
+}
+
+// the network's maps of one slice, in runs between those of the exact engine
+static void forward_slice(const sdm_model *m, const double *used, const sdm_result *results, size_t n, float *values,
+                          void *scratch)
+{
+    const sdm_model_info *info = sdm_model_get_info(m);
+    const size_t voxels = sdm_grid_count(&info->grid);
+    for (size_t first = 0; first < n;) {
+        size_t last = first;
+        while (last < n && results[last].source == SDM_SOURCE_NETWORK) last++;
+        if (last > first)
+            sdm_model_forward(m, used + first * info->n_params, last - first, values + first * voxels, scratch);
+        first = last + 1;
+    }
+}
+
+static sdm_status forward_batch(const sdm_model *m, const double *used, const sdm_result *results, size_t n, int wanted,
+                                float *values, sdm_error *err)
+{
+    const sdm_model_info *info = sdm_model_get_info(m);
+    const size_t voxels = sdm_grid_count(&info->grid), slices = (n + SLICE - 1) / SLICE;
+    const int threads = thread_count(wanted, slices);
+    const size_t bytes = (sdm_model_scratch_bytes(m, n < SLICE ? n : SLICE) + 63) / 64 * 64;
+    uint8_t *scratch = NULL;
+    size_t total;
+    sdm_status s = sdm_mul(bytes, (size_t)threads, &total, err);
+    if (!s) s = SDM_ALLOC(&scratch, total, "memory of the network", err);
+    if (s) return s;
+#pragma omp parallel for schedule(dynamic) num_threads(threads) if (threads > 1)
+    for (size_t k = 0; k < slices; k++) {
+        const size_t first = k * SLICE, count = n - first < SLICE ? n - first : SLICE;
+        forward_slice(m, used + first * info->n_params, results + first, count, values + first * voxels,
+                      scratch + (size_t)thread_index() * bytes);
+    }
+    sdm_free(scratch);
+    return SDM_OK;
+}
+
+static sdm_status in_map(sdm_status s, size_t n, size_t i, sdm_error *err)
+{
+    return s && n > 1 ? sdm_fail_in(err, s, "map %zu of %zu", i, n) : s;
+}
+
+// checks all, then computes all: results[n] and used[n][n_params] are working memory here
+static sdm_status generate_all(const sdm_model *m, const double *params, size_t n, const sdm_generate_opts *o,
+                               float *values, sdm_result *results, double *used, sdm_error *err)
+{
+    const sdm_model_info *info = sdm_model_get_info(m);
+    const size_t p = info->n_params, voxels = sdm_grid_count(&info->grid);
+    bool network = false;
+    for (size_t i = 0; i < n; i++) {
+        const sdm_status s = check_params(m, params + i * p, o, used + i * p, &results[i], err);
+        if (s) return in_map(s, n, i, err);
+        network = network || results[i].source == SDM_SOURCE_NETWORK;
+    }
+    sdm_status s = network ? forward_batch(m, used, results, n, o->n_threads, values, err) : SDM_OK;
+    const sdm_exact_opts exact = {.n_threads = o->n_threads};
+    for (size_t i = 0; i < n && !s; i++)
+        if (results[i].source == SDM_SOURCE_EXACT)
+            s = in_map(sdm_exact_shape_map(o->exact_shape, params + i * p, &exact, &info->grid, values + i * voxels,
+                                           NULL, err),
+                       n, i, err);
+    return s;
+}
+
+sdm_status sdm_generate_batch(const sdm_model *m, const double *params, size_t n, const sdm_generate_opts *opts,
+                              float *values, sdm_result *results, sdm_error *err)
+{
+    if (!m || (n && (!params || !values)))
+        return sdm_fail(err, SDM_E_ARG, "generate: model, parameters and values are needed");
+    const sdm_generate_opts o = options_or_default(opts);
+    sdm_status s = check_options(m, &o, err);
+    if (s || !n) return s;
+    const sdm_model_info *info = sdm_model_get_info(m);
+    size_t count;
+    if ((s = sdm_mul(n, sdm_grid_count(&info->grid), &count, err))) return s;
+    if ((s = sdm_mul(n, info->n_params, &count, err))) return s;
+    double *used = NULL;
+    sdm_result *found = NULL;
+    s = SDM_ALLOC(&used, count, "parameters of a batch", err);
+    if (!s) s = SDM_ALLOC(&found, n, "results of a batch", err);
+    if (!s) s = generate_all(m, params, n, &o, values, found, used, err);
+    if (!s && results) memcpy(results, found, n * sizeof *found);
+    sdm_free(found);
+    sdm_free(used);
+    return s;
+}
+
+sdm_status sdm_generate(const sdm_model *m, const double *params, const sdm_generate_opts *opts, float *values,
+                        sdm_result *result, sdm_error *err)
+{
+    return sdm_generate_batch(m, params, 1, opts, values, result, err);
+}
+
+sdm_status sdm_generate_jacobian(const sdm_model *m, const double *params, const sdm_generate_opts *opts, float *values,
+                                 float *jacobian, sdm_result *result, sdm_error *err)
+{
+    if (!m || !params || !values || !jacobian)
+        return sdm_fail(err, SDM_E_ARG, "generate: model, parameters, values and jacobian are needed");
+    const sdm_generate_opts o = options_or_default(opts);
+    if (o.policy == SDM_RANGE_EXACT)
+        return sdm_fail(err, SDM_E_UNSUPPORTED,
+                        "derivatives come from the network alone; choose the policy refuse or clamp");
+    sdm_status s = check_options(m, &o, err);
+    double *used = NULL;
+    uint8_t *scratch = NULL;
+    sdm_result found;
+    if (!s) s = SDM_ALLOC(&used, sdm_model_get_info(m)->n_params, "parameters", err);
+    if (!s) s = check_params(m, params, &o, used, &found, err);
+    if (!s) s = SDM_ALLOC(&scratch, sdm_model_jacobian_scratch_bytes(m), "memory of the network", err);
+    if (!s) {
+        sdm_model_jacobian(m, used, values, jacobian, scratch);
+        if (result) *result = found;
+    }
+    sdm_free(scratch);
+    sdm_free(used);
+    return s;
+}
+
+static sdm_status check_agreement(const sdm_model_info *info, const sdm_instance *shape, sdm_error *err)
+{
+    size_t n;
+    const sdm_param *p = sdm_instance_params(shape, &n);
+    if (n != info->n_params)
+        return sdm_fail(err, SDM_E_PLUGIN, "shape '%s' has %zu parameters, the model was trained on %zu", info->shape,
+                        n, info->n_params);
+    for (size_t i = 0; i < n; i++) {
+        if (strcmp(p[i].name, info->params[i].name) != 0)
+            return sdm_fail(err, SDM_E_PLUGIN, "parameter %zu of shape '%s' is '%s', the model was trained on '%s'",
+                            i + 1, info->shape, p[i].name, info->params[i].name);
+        if (strcmp(p[i].unit ? p[i].unit : "", info->params[i].unit) != 0)
+            return sdm_fail(err, SDM_E_PLUGIN,
+                            "parameter '%s' of shape '%s' has unit '%s', the model was trained with '%s'", p[i].name,
+                            info->shape, p[i].unit ? p[i].unit : "", info->params[i].unit);
+    }
+    return SDM_OK;
+}
+
+sdm_status sdm_runtime_instance(const sdm_model *m, const sdm_registry *r, sdm_instance **out, sdm_error *err)
+{
+    if (!out) return sdm_fail(err, SDM_E_ARG, "instance: a place for it is needed");
+    *out = NULL;
+    if (!m || !r) return sdm_fail(err, SDM_E_ARG, "instance: model and registry are needed");
+    const sdm_model_info *info = sdm_model_get_info(m);
+    const sdm_shape *shape = sdm_registry_find(r, info->shape, NULL);
+    if (!shape)
+        return sdm_fail(err, SDM_E_PLUGIN,
+                        "the model was trained on shape '%s', which is not known here; load its plug-in", info->shape);
+    sdm_named_text *options = NULL;
+    sdm_status s = SDM_ALLOC(&options, info->n_options, "options", err);
+    if (s) return s;
+    for (size_t i = 0; i < info->n_options; i++)
+        options[i] = (sdm_named_text){.name = info->option_names[i], .value = info->option_values[i]};
+    sdm_instance *made = NULL;
+    s = sdm_instance_create(shape, options, info->n_options, NULL, &made, err);
+    if (!s) s = check_agreement(info, made, err);
+    sdm_free(options);
+    if (s)
+        sdm_instance_free(made);
+    else
+        *out = made;
+    return s;
+}
+
+sdm_status sdm_exact_shape_map(const sdm_instance *shape, const double *p, const sdm_exact_opts *opts,
+                               const sdm_grid *grid, float *values, sdm_exact_report *report, sdm_error *err)
+{
+    if (!shape || !p || !grid || !values)
+        return sdm_fail(err, SDM_E_ARG, "exact map: shape, parameters, grid and values are needed");
+    sdm_status s = sdm_grid_check(grid, err);
+    if (s) return s;
+    sdm_mesh mesh = {0};
+    sdm_exact *engine = NULL;
+    s = sdm_instance_mesh(shape, p, &mesh, err);
+    if (!s) s = sdm_exact_create(&mesh, opts, &engine, err);
+    if (!s) s = sdm_exact_map(engine, grid, values, err);
+    if (!s && report) *report = *sdm_exact_get_report(engine);
+    sdm_exact_free(engine);
+    sdm_mesh_dispose(&mesh);
+    return s;
+}

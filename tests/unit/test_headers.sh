@@ -1,0 +1,49 @@
+#!/bin/sh
+# test_headers.sh SOURCE_FOLDER VERSION CC CXX: every public header compiles alone, twice included, as C11 and as C++17, and the
+# version in sdm/export.h is that of the build.
+set -eu
+root=$1 version=$2 cc=$3 cxx=$4
+work=$(mktemp -d "${TMPDIR:-/tmp}/test_headers.XXXXXX")
+trap 'rm -rf "$work"' EXIT
+
+compile() { # compile HEADER INCLUDE_FOLDER...
+    include=$1
+    shift
+    flags="-Wall -Wextra -Wpedantic -Werror -fsyntax-only"
+    for folder; do flags="$flags -I$folder"; done
+    printf '#include "%s"\n#include "%s"\nint only_line;\n' "$include" "$include" >"$work/alone.c"
+    cp "$work/alone.c" "$work/alone.cc"
+    $cc -std=c11 -Wstrict-prototypes $flags "$work/alone.c" && $cxx -std=c++17 $flags "$work/alone.cc"
+}
+
+count=0
+for header in "$root"/*/include/sdm/*.h; do
+    folder=${header%/sdm/*}
+    name=sdm/${header##*/}
+    compile "$name" "$folder" "$root/framework/include" || { echo "$header does not compile alone"; exit 1; }
+    # whatever has functions must be callable from C++
+    if grep -q '^SDM_API' "$header" && ! grep -q '^extern "C" {' "$header"; then
+        echo "$header has functions and no extern \"C\""
+        exit 1
+    fi
+    count=$((count + 1))
+done
+[ "$count" -ge 15 ] || { echo "only $count headers found in $root"; exit 1; }
+
+# a plug-in's header stands on nothing but the C library
+mkdir -p "$work/alone/sdm"
+cp "$root/framework/include/sdm/shape.h" "$work/alone/sdm/"
+compile sdm/shape.h "$work/alone" || { echo "sdm/shape.h needs other headers"; exit 1; }
+
+# the test itself: a header that leans on another one's includes is found
+mkdir -p "$work/bad/sdm"
+echo 'size_t leans_on_stddef(void);' >"$work/bad/sdm/bad.h"
+if compile sdm/bad.h "$work/bad" 2>"$work/said"; then
+    echo "a header that does not compile alone went through"
+    exit 1
+fi
+
+printf '#include "sdm/export.h"\nsaid SDM_VERSION_TEXT SDM_VERSION_MAJOR.SDM_VERSION_MINOR.SDM_VERSION_PATCH\n' >"$work/version.c"
+said=$($cc -E -P -I"$root/framework/include" "$work/version.c" | grep '^said' | tr -d ' "')
+[ "$said" = "said$version$version" ] || { echo "sdm/export.h says $said, the build $version"; exit 1; }
+echo "$count headers compile alone; version $version"

@@ -1,0 +1,411 @@
+/* The runtime with a model whose maps are known in closed form: a ball of radius + 0.1 bulge, exact in the network's own terms. */
+#include <math.h>
+#include <pthread.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "sdm/memory.h"
+#include "sdm/pod.h"
+#include "sdm/rng.h"
+#include "sdm/runtime.h"
+
+enum { N = 17, VOXELS = N * N * N, RINGS = 48, SECTORS = 96 };
+
+static double ball(const double *p) { return p[0] + 0.1 * p[1]; }
+
+// ---- the shape: a fine sphere, allowed in a wider range than the network knows
+
+static int mesh_ball(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
+                     sdm_mesh_out *out)
+{
+    (void)self;
+    const double r = ball(p) * options[0].number, pi = acos(-1.0);
+    const int failed = host->reserve(host, out, 2 + (RINGS - 1) * SECTORS, 2 * (RINGS - 1) * SECTORS);
+    if (failed) return failed;
+    double *v = out->vert;
+    for (int i = 1; i < RINGS; i++)
+        for (int j = 0; j < SECTORS; j++, v += 3) {
+            const double a = pi * i / RINGS, b = 2 * pi * j / SECTORS;
+            v[0] = r * sin(a) * cos(b), v[1] = r * sin(a) * sin(b), v[2] = r * cos(a);
+        }
+    const uint32_t top = (RINGS - 1) * SECTORS, bottom = top + 1;
+    v[0] = v[1] = v[3] = v[4] = 0, v[2] = r, v[5] = -r;
+    uint32_t *t = out->tri;
+    for (uint32_t j = 0; j < SECTORS; j++) {
+        const uint32_t k = (j + 1) % SECTORS, last = (RINGS - 2) * SECTORS;
+        const uint32_t ends[] = {top, j, k, bottom, last + k, last + j};
+        memcpy(t, ends, sizeof ends);
+        t += 6;
+        for (uint32_t i = 0; i + 2 < RINGS; i++, t += 6) {
+            const uint32_t a = i * SECTORS + j, b = i * SECTORS + k,
+                           quad[] = {a, a + SECTORS, b, b, a + SECTORS, b + SECTORS};
+            memcpy(t, quad, sizeof quad);
+        }
+    }
+    return 0;
+}
+
+static const sdm_param shape_params[] = {{"radius", "mm", 0.5, 1.9, 1.2, "radius"},
+                                         {"bulge", "", -2, 2, 0, "tenths of a mm more"}};
+static const sdm_option shape_options[] = {{"scale", SDM_OPTION_REAL, "", 0.1, 10, 1, NULL, "factor of the radius"}};
+static const sdm_shape ball_shape = {.abi = SDM_SHAPE_ABI,
+                                     .size = sizeof(sdm_shape),
+                                     .name = "ball",
+                                     .summary = "a ball",
+                                     .params = shape_params,
+                                     .n_params = 2,
+                                     .options = shape_options,
+                                     .n_options = 1,
+                                     .mesh = mesh_ball};
+
+// ---- the model: mean |x| - 1.25, one constant basis function a block, coefficients linear in the parameters
+
+static sdm_model *model_of(const char *second_name)
+{
+    sdm_model_param params[2] = {{"radius", "mm", 1.0, 1.5, 1.2}, {"", "", -1, 1, 0}};
+    snprintf(params[1].name, sizeof params[1].name, "%s", second_name);
+    const char *const names[] = {"scale"}, *const option_values[] = {"1"};
+    sdm_model_info info = {.shape = "ball",
+                           .n_params = 2,
+                           .params = params,
+                           .n_options = 1,
+                           .option_names = names,
+                           .option_values = option_values,
+                           .grid = sdm_grid_centred((const int64_t[]){N, N, N}, 0.25, (const double[]){0, 0, 0}),
+                           .accuracy = {.samples = 10, .rmse_mm = 0.0125},
+                           .config = "shape: ball\n"};
+    static sdm_pod_block blocks[VOXELS];
+    sdm_pod_spec spec = {.info = &info, .blocks = blocks};
+    spec.arch = (sdm_pod_arch){.n_params = 2,
+                               .degree = 1,
+                               .input_degree = 1,
+                               .depth = 1,
+                               .width = 8,
+                               .block = 8,
+                               .n_terms = sdm_poly_count(2, 1),
+                               .n_inputs = sdm_poly_count(2, 1) - 1,
+                               .n_voxels = VOXELS,
+                               .n_blocks = sdm_pod_block_count(&info.grid, 8)};
+    spec.arch.n_latent = spec.arch.n_terms + spec.arch.width;
+    spec.arch.n_coefficients = spec.arch.n_blocks;
+    sdm_pod_blocks(&info.grid, 8, blocks);
+    for (uint32_t b = 0; b < spec.arch.n_blocks; b++) blocks[b].rank = 1, blocks[b].coefficient = b;
+    // phi of the two parameters alone, to find which term is which and how it is scaled
+    uint8_t table[6];
+    float phi[3];
+    sdm_poly_table(2, 1, table);
+    sdm_poly_eval(table, 3, 2, 1, (const double[]){1, 1}, phi, NULL);
+    static float head[64 * 16], map[VOXELS], mean[VOXELS], basis[VOXELS], zero[64];
+    assert_true(spec.arch.n_blocks <= 64 && spec.arch.n_latent <= 16);
+    memset(head, 0, sizeof head);
+    for (size_t b = 0; b < spec.arch.n_blocks; b++)
+        for (size_t t = 0; t < 3; t++)
+            head[b * spec.arch.n_latent + t] = table[2 * t] ? -0.25f / phi[t] : table[2 * t + 1] ? -0.1f / phi[t] : 0;
+    for (int i = 0; i < VOXELS; i++) {
+        double x[3];
+        sdm_grid_world(&info.grid, (const double[]){i % N, i / N % N, i / N / N}, x);
+        map[i] = (float)(sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]) - 1.25);
+        basis[i] = 1;
+    }
+    sdm_pod_gather(&info.grid, blocks, spec.arch.n_blocks, map, mean);
+    spec.weights = (sdm_pod_weights){.layer = {zero}, .bias = {zero}, .head = head, .mean = mean, .basis = basis};
+    uint8_t *bytes = NULL;
+    size_t size;
+    sdm_error err;
+    sdm_model *m = NULL;
+    if (sdm_model_build(&spec, &bytes, &size, &err)) fail_msg("%s", err.text);
+    if (sdm_model_open_memory("ball", bytes, size, &m, &err)) fail_msg("%s", err.text);
+    sdm_free(bytes);
+    return m;
+}
+
+typedef struct scene {
+    sdm_model *model;
+    sdm_registry *registry;
+    sdm_instance *shape;
+} scene;
+
+static int open_scene(void **state)
+{
+    static scene s;
+    sdm_error err;
+    s.model = model_of("bulge");
+    if (sdm_registry_create(&s.registry, &err) || sdm_registry_add(s.registry, &ball_shape, "test", &err) ||
+        sdm_runtime_instance(s.model, s.registry, &s.shape, &err)) {
+        fprintf(stderr, "%s\n", err.text);
+        return -1;
+    }
+    *state = &s;
+    return 0;
+}
+
+static int close_scene(void **state)
+{
+    scene *s = *state;
+    sdm_instance_free(s->shape);
+    sdm_registry_free(s->registry);
+    sdm_model_free(s->model);
+    return 0;
+}
+
+// largest difference from |x| - r
+static double error_of(const float *values, double r)
+{
+    const sdm_grid g = sdm_grid_centred((const int64_t[]){N, N, N}, 0.25, (const double[]){0, 0, 0});
+    double worst = 0;
+    for (int i = 0; i < VOXELS; i++) {
+        double x[3];
+        sdm_grid_world(&g, (const double[]){i % N, i / N % N, i / N / N}, x);
+        worst = fmax(worst, fabs(sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]) - r - (double)values[i]));
+    }
+    return worst;
+}
+
+static void test_generate(void **state)
+{
+    const scene *s = *state;
+    static float values[VOXELS];
+    sdm_result result;
+    sdm_error err;
+    const double p[] = {1.37, -0.6};
+    assert_int_equal(sdm_generate(s->model, p, NULL, values, &result, &err), SDM_OK);
+    assert_true(error_of(values, ball(p)) < 1e-5);
+    assert_int_equal(result.source, SDM_SOURCE_NETWORK);
+    assert_false(result.clamped);
+    assert_true(result.error_mm == 0.0125);
+    assert_int_equal(sdm_generate(s->model, p, NULL, values, NULL, NULL), SDM_OK);
+}
+
+static void test_policies(void **state)
+{
+    const scene *s = *state;
+    static float values[VOXELS];
+    sdm_result result;
+    sdm_error err;
+    const double p[] = {1.7, 0.5}, edge[] = {1.5, 0.5}, wild[] = {2.1, 0.5};
+    assert_int_equal(sdm_generate(s->model, p, NULL, values, &result, &err), SDM_E_RANGE);
+    assert_non_null(strstr(err.text, "radius = 1.7 mm, need 1 to 1.5"));
+    const sdm_generate_opts clamp = {.policy = SDM_RANGE_CLAMP},
+                            exact = {.policy = SDM_RANGE_EXACT, .exact_shape = s->shape};
+    assert_int_equal(sdm_generate(s->model, p, &clamp, values, &result, &err), SDM_OK);
+    assert_true(result.clamped && result.source == SDM_SOURCE_NETWORK);
+    assert_true(error_of(values, ball(edge)) < 1e-5);
+    // the exact engine on a sphere of flat triangles: within its sagitta, r (1 - cos(pi / 48)) at the most
+    assert_int_equal(sdm_generate(s->model, p, &exact, values, &result, &err), SDM_OK);
+    assert_true(!result.clamped && result.source == SDM_SOURCE_EXACT && result.error_mm == 0);
+    assert_true(error_of(values, ball(p)) < 0.005);
+    assert_int_equal(sdm_generate(s->model, edge, &exact, values, &result, &err), SDM_OK);
+    assert_int_equal(result.source, SDM_SOURCE_NETWORK);
+    // outside of what the shape itself allows
+    assert_int_equal(sdm_generate(s->model, wild, &exact, values, &result, &err), SDM_E_RANGE);
+    for (int policy = SDM_RANGE_REFUSE; policy <= SDM_RANGE_EXACT; policy++) {
+        const sdm_generate_opts o = {.policy = (sdm_range_policy)policy, .exact_shape = s->shape};
+        const double bad[] = {NAN, INFINITY, -INFINITY};
+        for (int i = 0; i < 3; i++) {
+            const double q[] = {1.2, bad[i]};
+            assert_int_equal(sdm_generate(s->model, q, &o, values, &result, &err), SDM_E_RANGE);
+            assert_non_null(strstr(err.text, "bulge = "));
+        }
+    }
+}
+
+enum { BATCH = 53 };
+
+static void batch_params(double *p)
+{
+    for (uint64_t i = 0; i < BATCH; i++) {
+        p[2 * i] = 1.0 + 0.5 * sdm_rng_uniform(7, 0, i);
+        p[2 * i + 1] = -1 + 2 * sdm_rng_uniform(7, 1, i);
+    }
+}
+
+// the same bits for every number of threads, network and exact maps mixed, and every map in its place
+static void test_batch(void **state)
+{
+    const scene *s = *state;
+    double p[2 * BATCH];
+    batch_params(p);
+    p[2 * 5] = 1.6, p[2 * 16] = 0.9, p[2 * 52] = 1.55;
+    const size_t bytes = (size_t)BATCH * VOXELS * sizeof(float);
+    float *first = malloc(bytes), *again = malloc(bytes);
+    assert_true(first && again);
+    sdm_result results[BATCH];
+    sdm_error err;
+    for (int threads = 1; threads <= 4; threads++) {
+        const sdm_generate_opts o = {.policy = SDM_RANGE_EXACT, .exact_shape = s->shape, .n_threads = threads};
+        memset(again, 0xff, bytes);
+        if (sdm_generate_batch(s->model, p, BATCH, &o, threads == 1 ? first : again, results, &err))
+            fail_msg("%s", err.text);
+        if (threads > 1) assert_memory_equal(first, again, bytes);
+        for (int i = 0; i < BATCH; i++) {
+            const bool far = i == 5 || i == 16 || i == 52;
+            assert_int_equal(results[i].source, far ? SDM_SOURCE_EXACT : SDM_SOURCE_NETWORK);
+            assert_true(error_of(first + (size_t)i * VOXELS, ball(p + 2 * i)) < (far ? 0.005 : 1e-5));
+        }
+    }
+    // all or nothing: one bad map is named and nothing is written
+    memset(again, 0, bytes);
+    p[2 * 40 + 1] = 5;
+    assert_int_equal(sdm_generate_batch(s->model, p, BATCH, NULL, again, results, &err), SDM_E_RANGE);
+    assert_non_null(strstr(err.text, "map 5 of 53: radius"));
+    p[2 * 5] = p[2 * 16] = p[2 * 52] = 1.2;
+    assert_int_equal(sdm_generate_batch(s->model, p, BATCH, NULL, again, results, &err), SDM_E_RANGE);
+    assert_non_null(strstr(err.text, "map 40 of 53: bulge"));
+    for (size_t i = 0; i < bytes / sizeof *again; i++) assert_true(again[i] == 0);
+    assert_int_equal(sdm_generate_batch(s->model, NULL, 0, NULL, NULL, NULL, &err), SDM_OK);
+    free(first);
+    free(again);
+}
+
+// every allocation of a call may fail; the call says so and loses nothing (the sanitizer build sees leaks)
+static void test_short_memory(void **state)
+{
+    const scene *s = *state;
+    static float values[VOXELS], jacobian[2 * VOXELS];
+    const double p[] = {1.2, 0};
+    sdm_error err;
+    unsigned long n = 1;
+    for (;; n++) {
+        sdm_alloc_fail_after(n);
+        const sdm_status t = sdm_generate(s->model, p, NULL, values, NULL, &err);
+        sdm_alloc_fail_after(0);
+        if (!t) break;
+        assert_int_equal(t, SDM_E_NOMEM);
+    }
+    assert_true(n > 1 && n < 20);
+    for (n = 1;; n++) {
+        sdm_alloc_fail_after(n);
+        const sdm_status t = sdm_generate_jacobian(s->model, p, NULL, values, jacobian, NULL, &err);
+        sdm_alloc_fail_after(0);
+        if (!t) break;
+        assert_int_equal(t, SDM_E_NOMEM);
+    }
+    assert_true(n > 1 && n < 20);
+}
+
+typedef struct caller {
+    const sdm_model *model;
+    float values[VOXELS];
+    sdm_status status;
+} caller;
+
+static void *call(void *data)
+{
+    caller *c = data;
+    double p[2 * BATCH];
+    batch_params(p);
+    for (int i = 0; i < BATCH && !c->status; i++)
+        c->status = sdm_generate(c->model, p + 2 * i, NULL, c->values, NULL, NULL);
+    return NULL;
+}
+
+static void test_many_callers(void **state)
+{
+    const scene *s = *state;
+    static caller callers[4];
+    pthread_t threads[4];
+    for (int i = 0; i < 4; i++) {
+        callers[i] = (caller){.model = s->model};
+        assert_int_equal(pthread_create(&threads[i], NULL, call, &callers[i]), 0);
+    }
+    for (int i = 0; i < 4; i++) assert_int_equal(pthread_join(threads[i], NULL), 0);
+    for (int i = 0; i < 4; i++) {
+        assert_int_equal(callers[i].status, SDM_OK);
+        assert_memory_equal(callers[i].values, callers[0].values, sizeof callers[0].values);
+    }
+}
+
+static void test_jacobian(void **state)
+{
+    const scene *s = *state;
+    static float values[VOXELS], jacobian[2 * VOXELS];
+    sdm_result result;
+    sdm_error err;
+    const double p[] = {1.1, 0.4}, far[] = {1.7, 0.4}, edge[] = {1.5, 0.4};
+    assert_int_equal(sdm_generate_jacobian(s->model, p, NULL, values, jacobian, &result, &err), SDM_OK);
+    assert_true(error_of(values, ball(p)) < 1e-5);
+    for (int i = 0; i < VOXELS; i++)
+        assert_true(fabs((double)jacobian[i] + 1) < 1e-5 && fabs((double)jacobian[VOXELS + i] + 0.1) < 1e-5);
+    assert_int_equal(sdm_generate_jacobian(s->model, far, NULL, values, jacobian, &result, &err), SDM_E_RANGE);
+    const sdm_generate_opts clamp = {.policy = SDM_RANGE_CLAMP},
+                            exact = {.policy = SDM_RANGE_EXACT, .exact_shape = s->shape};
+    assert_int_equal(sdm_generate_jacobian(s->model, far, &clamp, values, jacobian, &result, &err), SDM_OK);
+    assert_true(result.clamped && error_of(values, ball(edge)) < 1e-5);
+    assert_int_equal(sdm_generate_jacobian(s->model, p, &exact, values, jacobian, &result, &err), SDM_E_UNSUPPORTED);
+}
+
+static void test_instance(void **state)
+{
+    const scene *s = *state;
+    sdm_error err;
+    sdm_instance *made = (sdm_instance *)state;
+    assert_string_equal(sdm_instance_shape(s->shape)->name, "ball");
+    assert_true(sdm_instance_options(s->shape)[0].number == 1);
+    sdm_registry *empty = NULL;
+    assert_int_equal(sdm_registry_create(&empty, &err), SDM_OK);
+    assert_int_equal(sdm_runtime_instance(s->model, empty, &made, &err), SDM_E_PLUGIN);
+    assert_null(made);
+    assert_non_null(strstr(err.text, "'ball'"));
+    sdm_registry_free(empty);
+    sdm_model *other = model_of("swelling");
+    assert_int_equal(sdm_runtime_instance(other, s->registry, &made, &err), SDM_E_PLUGIN);
+    assert_non_null(strstr(err.text, "'swelling'"));
+    assert_null(made);
+    sdm_model_free(other);
+}
+
+static void test_exact_shape_map(void **state)
+{
+    const scene *s = *state;
+    static float values[VOXELS];
+    sdm_exact_report report;
+    sdm_error err;
+    sdm_grid g = sdm_model_get_info(s->model)->grid;
+    const double p[] = {1.0, -1.5}, wrong[] = {5, 0};
+    assert_int_equal(sdm_exact_shape_map(s->shape, p, NULL, &g, values, &report, &err), SDM_OK);
+    assert_true(error_of(values, ball(p)) < 0.005);
+    assert_int_equal(report.audit.n_tri, 2 * (RINGS - 1) * SECTORS);
+    assert_true(report.audit.manifold && !report.turned);
+    assert_int_equal(sdm_exact_shape_map(s->shape, wrong, NULL, &g, values, NULL, &err), SDM_E_RANGE);
+    g.spacing[1] = 0;
+    assert_int_equal(sdm_exact_shape_map(s->shape, p, NULL, &g, values, NULL, &err), SDM_E_ARG);
+}
+
+static void test_misuse(void **state)
+{
+    const scene *s = *state;
+    static float values[VOXELS];
+    const double p[] = {1.2, 0};
+    sdm_error err;
+    sdm_instance *made;
+    assert_int_equal(sdm_generate(NULL, p, NULL, values, NULL, &err), SDM_E_ARG);
+    assert_int_equal(sdm_generate(s->model, NULL, NULL, values, NULL, &err), SDM_E_ARG);
+    assert_int_equal(sdm_generate(s->model, p, NULL, NULL, NULL, &err), SDM_E_ARG);
+    assert_int_equal(sdm_generate(s->model, p, &(sdm_generate_opts){.n_threads = -1}, values, NULL, &err), SDM_E_ARG);
+    assert_int_equal(sdm_generate(s->model, p, &(sdm_generate_opts){.policy = (sdm_range_policy)9}, values, NULL, &err),
+                     SDM_E_ARG);
+    assert_int_equal(sdm_generate(s->model, p, &(sdm_generate_opts){.policy = SDM_RANGE_EXACT}, values, NULL, &err),
+                     SDM_E_ARG);
+    assert_int_equal(sdm_generate_batch(s->model, p, SIZE_MAX / 8, NULL, values, NULL, &err), SDM_E_NOMEM);
+    assert_int_equal(sdm_generate_jacobian(s->model, p, NULL, values, NULL, NULL, &err), SDM_E_ARG);
+    assert_int_equal(sdm_runtime_instance(NULL, s->registry, &made, &err), SDM_E_ARG);
+    assert_int_equal(sdm_runtime_instance(s->model, s->registry, NULL, &err), SDM_E_ARG);
+    assert_int_equal(sdm_exact_shape_map(NULL, p, NULL, NULL, values, NULL, &err), SDM_E_ARG);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_generate), cmocka_unit_test(test_policies),        cmocka_unit_test(test_batch),
+        cmocka_unit_test(test_jacobian), cmocka_unit_test(test_short_memory),    cmocka_unit_test(test_many_callers),
+        cmocka_unit_test(test_instance), cmocka_unit_test(test_exact_shape_map), cmocka_unit_test(test_misuse),
+    };
+    return cmocka_run_group_tests(tests, open_scene, close_scene);
+}

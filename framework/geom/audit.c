@@ -1,0 +1,147 @@
+/* The audit of a mesh: what it is made of and whether it bounds a solid. */
+#include <float.h>
+#include <string.h>
+
+#include "sdm/memory.h"
+#include "survey.h"
+#include "vec3.h"
+
+static sdm_status check_content(const sdm_mesh *m, sdm_error *err)
+{
+    if (!m->n_tri) return sdm_fail(err, SDM_E_MESH, "the mesh has no triangle");
+    for (size_t i = 0; i < 3 * m->n_vert; i++)
+        if (!isfinite(m->vert[i]))
+            return sdm_fail(err, SDM_E_MESH, "vertex %zu has the %c coordinate %g, need a finite number", i / 3,
+                            "xyz"[i % 3], m -> vert[i]);
+    for (size_t i = 0; i < 3 * m->n_tri; i++)
+        if (m->tri[i] >= m->n_vert)
+            return sdm_fail(err, SDM_E_MESH, "triangle %zu names vertex %u of %zu", i / 3, (unsigned)m->tri[i],
+                            m->n_vert);
+    return SDM_OK;
+}
+
+static void measure(const sdm_mesh *m, sdm_audit *a)
+{
+    for (int c = 0; c < 3; c++) {
+        a->min[c] = INFINITY;
+        a->max[c] = -INFINITY;
+    }
+    for (size_t i = 0; i < 3 * m->n_tri; i++) {
+        const double *v = &m->vert[3 * (size_t)m->tri[i]];
+        for (int c = 0; c < 3; c++) {
+            a->min[c] = fmin(a->min[c], v[c]);
+            a->max[c] = fmax(a->max[c], v[c]);
+        }
+    }
+    // relative to the middle: a far origin must not cost digits
+    const double mid[3] = {0.5 * (a->min[0] + a->max[0]), 0.5 * (a->min[1] + a->max[1]), 0.5 * (a->min[2] + a->max[2])};
+    for (size_t t = 0; t < m->n_tri; t++) {
+        double p[3][3], ab[3], ac[3], n[3];
+        for (int k = 0; k < 3; k++) v3_sub(&m->vert[3 * (size_t)m->tri[3 * t + (size_t)k]], mid, p[k]);
+        v3_sub(p[1], p[0], ab);
+        v3_sub(p[2], p[0], ac);
+        v3_cross(ab, ac, n);
+        a->volume += v3_dot(p[0], n) / 6;
+        a->area += 0.5 * v3_norm(n);
+    }
+}
+
+static bool repeats_vertex(const uint32_t *t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
+
+static void count_duplicates(const sdm_topology *topo, sdm_audit *a)
+{
+    // triangles that share their three corners share an edge: look along the list of their first edge only
+    for (size_t t = 0; t < topo->n_tri; t++) {
+        const uint32_t *v = &topo->tri[3 * t];
+        if (repeats_vertex(v)) continue;
+        for (uint32_t h = topo->edges[topo->edge[3 * t]].first; h != SDM_NONE; h = topo->next[h]) {
+            const uint32_t *o = &topo->tri[h / 3 * 3];
+            if (h / 3 >= t) continue;
+            int shared = 0;
+            for (int k = 0; k < 3; k++) shared += v[k] == o[0] || v[k] == o[1] || v[k] == o[2];
+            if (shared < 3) continue;
+            a->duplicate++;
+            break;
+        }
+    }
+}
+
+static void count_edges(const sdm_topology *topo, sdm_audit *a)
+{
+    bool balanced = true;
+    for (size_t i = 0; i < topo->n_edges; i++) {
+        const sdm_edge *e = &topo->edges[i];
+        const uint32_t n = e->n_up + e->n_down;
+        a->boundary_edges += n == 1;
+        a->nonmanifold_edges += n >= 3;
+        a->misoriented_edges += n == 2 && e->n_up != 1;
+        balanced = balanced && e->n_up == e->n_down;
+    }
+    a->closed = balanced && topo->n_edges > 0;
+    a->manifold = a->closed && !a->nonmanifold_edges;
+    a->inverted = a->closed && a->volume < 0;
+}
+
+static sdm_status count_components(const sdm_topology *topo, sdm_audit *a, sdm_error *err)
+{
+    uint32_t *parent;
+    const sdm_status s = SDM_ALLOC(&parent, topo->n_tri, "components", err);
+    if (s) return s;
+    for (size_t t = 0; t < topo->n_tri; t++) parent[t] = (uint32_t)t;
+    for (size_t i = 0; i < topo->n_edges; i++)
+        for (uint32_t h = topo->edges[i].first; topo->next[h] != SDM_NONE; h = topo->next[h])
+            sdm_forest_join(parent, h / 3, topo->next[h] / 3);
+    for (size_t t = 0; t < topo->n_tri; t++) a->components += parent[t] == t && !repeats_vertex(&topo->tri[3 * t]);
+    sdm_free(parent);
+    return SDM_OK;
+}
+
+static void build_frames(const sdm_mesh *m, sdm_survey *s)
+{
+    for (size_t t = 0; t < m->n_tri; t++) {
+        const uint32_t *v = &m->tri[3 * t];
+        sdm_frame *f = &s->frames[t];
+        sdm_frame_build(&m->vert[3 * (size_t)v[0]], &m->vert[3 * (size_t)v[1]], &m->vert[3 * (size_t)v[2]], f);
+        s->audit.degenerate +=
+            repeats_vertex(&s->topo.tri[3 * t]) || !(sdm_frame_height(f) > 8 * DBL_EPSILON * f->half[0]);
+    }
+}
+
+sdm_status sdm_survey_build(const sdm_mesh *m, sdm_survey *s, sdm_error *err)
+{
+    sdm_audit *a = &s->audit;
+    sdm_status st = check_content(m, err);
+    if (!st) st = sdm_topology_build(m, &s->topo, err);
+    if (!st) st = sdm_bvh_build(m, &s->tree, err);
+    if (!st) st = SDM_ALLOC(&s->frames, m->n_tri, "frames of triangles", err);
+    if (st) return st;
+    a->n_vert = m->n_vert;
+    a->n_tri = m->n_tri;
+    measure(m, a);
+    build_frames(m, s);
+    count_edges(&s->topo, a);
+    count_duplicates(&s->topo, a);
+    st = count_components(&s->topo, a, err);
+    if (!st) st = sdm_contacts_find(m, &s->topo, &s->tree, s->frames, &s->contacts, err);
+    a->self_intersections = s->contacts.crossing_pairs;
+    return st;
+}
+
+void sdm_survey_dispose(sdm_survey *s)
+{
+    sdm_topology_dispose(&s->topo);
+    sdm_bvh_dispose(&s->tree);
+    sdm_contacts_dispose(&s->contacts);
+    sdm_free(s->frames);
+    *s = (sdm_survey){0};
+}
+
+sdm_status sdm_mesh_audit(const sdm_mesh *m, sdm_audit *out, sdm_error *err)
+{
+    if (!m || !out) return sdm_fail(err, SDM_E_ARG, "audit without a mesh or a place for the result");
+    sdm_survey s = {0};
+    const sdm_status st = sdm_survey_build(m, &s, err);
+    if (!st) *out = s.audit;
+    sdm_survey_dispose(&s);
+    return st;
+}

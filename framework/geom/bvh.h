@@ -1,0 +1,45 @@
+/* Bounding volume hierarchy over the triangles of a mesh: a flat array of boxes, a few triangles a leaf. */
+#ifndef SDM_GEOM_BVH_H
+#define SDM_GEOM_BVH_H
+
+#include "sdm/mesh.h"
+
+/* Deepest tree that can be built: what a traversal's stack must hold. */
+#define SDM_BVH_DEPTH 128
+
+/* count > 0: a leaf of order[first .. first + count). count == 0: children are nodes first and first + 1. */
+typedef struct sdm_bvh_node {
+    double lo[3], hi[3];
+    uint32_t first, count;
+} sdm_bvh_node;
+
+/* "Slot": place of a triangle in the tree's order; order[slot] is its index in the mesh. */
+typedef struct sdm_bvh {
+    sdm_bvh_node *node;
+    uint32_t *order;
+    double (*box)[6]; /* [slot] lo, hi of the triangle */
+    size_t n_node, n_tri;
+} sdm_bvh;
+
+/* Binned surface area heuristic, the same tree in every call. *b is zero-initialised; n_tri > 0. */
+sdm_status sdm_bvh_build(const sdm_mesh *m, sdm_bvh *b, sdm_error *err);
+void sdm_bvh_dispose(sdm_bvh *b);
+
+/* Calls visit(user, i, j) for every pair of triangles (mesh indices) whose boxes, made larger by `slack`, overlap; stops at the
+   first status that is not SDM_OK and returns it. */
+sdm_status sdm_bvh_pairs(const sdm_bvh *b, double slack, sdm_status (*visit)(void *user, uint32_t i, uint32_t j),
+                         void *user);
+
+/* Squared distance from p to a box. */
+static inline double sdm_bvh_box_distance2(const sdm_bvh_node *n, const double p[3])
+{
+    double sum = 0;
+    for (int i = 0; i < 3; i++) {
+        const double below = n->lo[i] - p[i], above = p[i] - n->hi[i];
+        const double d = below > above ? below : above;
+        if (d > 0) sum += d * d;
+    }
+    return sum;
+}
+
+#endif

@@ -1,0 +1,21 @@
+/* Distances of all voxels of a grid from a surface. */
+#ifndef SDM_GEOM_GRID_DISTANCE_H
+#define SDM_GEOM_GRID_DISTANCE_H
+
+#include <stdbool.h>
+
+#include "nearest.h"
+#include "sdm/exact.h"
+
+/* values[nz][ny][nx] = unsigned distance. Uses n_threads, memory_limit, cancelled and user of opts. The grid is checked. */
+sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g, const sdm_exact_opts *opts, float *values,
+                             sdm_error *err);
+
+/* 0 or less: the default of OpenMP; 1 without OpenMP. */
+int sdm_thread_count(int n_threads);
+
+/* For tests: the instruction set of the kernels, 0 generic, 1 AVX2, 2 AVX-512, -1 the best one. Not thread safe. Returns the one
+   that will be used. */
+SDM_API int sdm_grid_kernel_select(int level);
+
+#endif

@@ -1,0 +1,325 @@
+/* Meshes that overlap themselves: the exact engine against closed forms of unions, the swept sphere, and dense classified points. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "oracle/exact_meshes.h"
+#include "sdm/exact.h"
+#include "sdm/rng.h"
+
+static const double pi = 3.14159265358979323846;
+
+static double uniform(uint64_t stream, uint64_t i, double lo, double hi)
+{
+    return lo + (hi - lo) * sdm_rng_uniform(11, stream, i);
+}
+
+static sdm_exact *engine(const sdm_mesh *m, const sdm_exact_opts *o)
+{
+    sdm_exact *e = NULL;
+    sdm_error err = {0};
+    if (sdm_exact_create(m, o, &e, &err)) fail_msg("%s", err.text);
+    return e;
+}
+
+static double distance(const double a[3], const double b[3])
+{
+    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
+}
+
+/* Signed distance to the union of two spheres with middles on the x axis at 0 and c. */
+static double two_spheres(const double x[3], double r0, double c, double r1)
+{
+    const double middle[2][3] = {{0, 0, 0}, {c, 0, 0}}, radius[2] = {r0, r1};
+    const double d[2] = {distance(x, middle[0]) - r0, distance(x, middle[1]) - r1};
+    if (d[0] > 0 && d[1] > 0) return fmin(d[0], d[1]);
+    // inside: the nearest point is on a cap, or on the circle where the spheres meet
+    const double cx = (c * c + r0 * r0 - r1 * r1) / (2 * c), cr = sqrt(r0 * r0 - cx * cx);
+    double best = hypot(x[0] - cx, hypot(x[1], x[2]) - cr);
+    for (int i = 0; i < 2; i++) {
+        const double len = distance(x, middle[i]);
+        double foot[3];
+        for (int a = 0; a < 3; a++) foot[a] = middle[i][a] + (x[a] - middle[i][a]) * radius[i] / len;
+        if (distance(foot, middle[1 - i]) >= radius[1 - i]) best = fmin(best, fabs(radius[i] - len));
+    }
+    return -best;
+}
+
+static void test_two_spheres(void **state)
+{
+    (void)state;
+    const size_t n = 48;
+    for (int round = 0; round < 4; round++) {
+        const double c = (double[]){1.0, 1.3, 0.7, 1.6}[round], r1 = (double[]){1.0, 0.8, 0.6, 1.1}[round];
+        sdm_mesh m = {0}, b = {0};
+        mesh_sphere(&m, (const double[3]){0, 0, 0}, 1, n);
+        mesh_sphere(&b, (const double[3]){c, 0, 0}, r1, n + 3);
+        mesh_append(&m, &b);
+        sdm_exact *e = engine(&m, NULL);
+        const sdm_exact_report *r = sdm_exact_get_report(e);
+        assert_true(r->unioned && r->union_error_mm > 0 && r->union_error_mm < 1e-12 &&
+                    r->audit.self_intersections > 20);
+        // facets lie inside the spheres by up to the sagitta; where they cross the circle moves by that over the sine of the angle
+        const double sagitta = 2.2 * 1.1 * (1 - cos(pi / 2 / (double)n));
+        const double cosine = (1 + r1 * r1 - c * c) / (2 * r1), sine = sqrt(1 - cosine * cosine);
+        for (uint64_t i = 0; i < 4000; i++) {
+            double x[3], q[3];
+            uint32_t t;
+            for (uint64_t a = 0; a < 3; a++)
+                x[a] = uniform((uint64_t)round, 3 * i + a, -1.5, 1.5) + (a == 0 ? c / 2 : 0);
+            const double d = sdm_exact_point(e, x, q, NULL, &t), truth = two_spheres(x, 1, c, r1);
+            assert_true(fabs(d - truth) <= 2 * sagitta / sine);
+            assert_true(t < sdm_exact_surface(e)->n_tri);
+            // nothing inside the union is surface
+            assert_true(two_spheres(q, 1, c, r1) > -2 * sagitta / sine);
+        }
+        sdm_exact_free(e);
+        sdm_mesh_dispose(&m);
+        sdm_mesh_dispose(&b);
+    }
+}
+
+/* Union of boxes by brute force: the distance to those points of the faces that no box holds inside. Coplanar faces count. */
+typedef struct box {
+    double lo[3], hi[3];
+} box;
+
+static double union_of_boxes(const double x[3], const box *b, int n)
+{
+    bool in = false;
+    double best = INFINITY;
+    for (int i = 0; i < n; i++) {
+        bool all = true;
+        for (int a = 0; a < 3; a++) all = all && x[a] > b[i].lo[a] && x[a] < b[i].hi[a];
+        in = in || all;
+    }
+    // all coordinates of all boxes cut each face into cells that lie inside another box or not: take each cell as a rectangle
+    for (int i = 0; i < n; i++) {
+        for (int f = 0; f < 6; f++) {
+            const int a = f / 2, u = (a + 1) % 3, v = (a + 2) % 3;
+            const double at = f % 2 ? b[i].hi[a] : b[i].lo[a];
+            double cut[2][16];
+            int count[2] = {0, 0};
+            for (int s = 0; s < 2; s++) {
+                const int k = s ? v : u;
+                for (int j = 0; j < n; j++) {
+                    cut[s][count[s]++] = fmin(fmax(b[j].lo[k], b[i].lo[k]), b[i].hi[k]);
+                    cut[s][count[s]++] = fmin(fmax(b[j].hi[k], b[i].lo[k]), b[i].hi[k]);
+                }
+                for (int p = 0; p < count[s]; p++)
+                    for (int q = p + 1; q < count[s]; q++)
+                        if (cut[s][q] < cut[s][p]) {
+                            const double swap = cut[s][p];
+                            cut[s][p] = cut[s][q];
+                            cut[s][q] = swap;
+                        }
+            }
+            for (int p = 0; p + 1 < count[0]; p++) {
+                for (int q = 0; q + 1 < count[1]; q++) {
+                    if (!(cut[0][p + 1] > cut[0][p]) || !(cut[1][q + 1] > cut[1][q])) continue;
+                    const double mu = 0.5 * (cut[0][p] + cut[0][p + 1]), mv = 0.5 * (cut[1][q] + cut[1][q + 1]);
+                    // surface unless both sides are in some box
+                    bool side[2] = {false, false};
+                    for (int j = 0; j < n; j++) {
+                        if (!(mu > b[j].lo[u] && mu < b[j].hi[u] && mv > b[j].lo[v] && mv < b[j].hi[v])) continue;
+                        side[0] = side[0] || (at > b[j].lo[a] && at <= b[j].hi[a]);
+                        side[1] = side[1] || (at >= b[j].lo[a] && at < b[j].hi[a]);
+                    }
+                    if (side[0] && side[1]) continue;
+                    const double du = fmax(fmax(cut[0][p] - x[u], x[u] - cut[0][p + 1]), 0);
+                    const double dv = fmax(fmax(cut[1][q] - x[v], x[v] - cut[1][q + 1]), 0);
+                    best = fmin(best, sqrt(du * du + dv * dv + (x[a] - at) * (x[a] - at)));
+                }
+            }
+        }
+    }
+    return in ? -best : best;
+}
+
+static void check_boxes(const box *b, int n, uint64_t stream, int unioned)
+{
+    sdm_mesh m = {0}, part = {0};
+    for (int i = 0; i < n; i++) {
+        mesh_box(&part, b[i].lo, b[i].hi);
+        mesh_append(&m, &part);
+    }
+    sdm_exact *e = engine(&m, NULL);
+    if (unioned >= 0) assert_int_equal(sdm_exact_get_report(e)->unioned, unioned);
+    for (uint64_t i = 0; i < 600; i++) {
+        double x[3];
+        for (uint64_t a = 0; a < 3; a++) x[a] = uniform(stream, 3 * i + a, -0.7, 3.2);
+        const double d = sdm_exact_point(e, x, NULL, NULL, NULL), truth = union_of_boxes(x, b, n);
+        if (!(fabs(d - truth) < 1e-12))
+            fail_msg("stream %u: %.17g at %g %g %g, need %.17g", (unsigned)stream, d, x[0], x[1], x[2], truth);
+    }
+    sdm_exact_free(e);
+    sdm_mesh_dispose(&m);
+    sdm_mesh_dispose(&part);
+}
+
+static void test_boxes_with_coplanar_faces(void **state)
+{
+    (void)state;
+    // overlap with shared face planes, touching faces (whole and in part), one in another, the same box twice, along an edge
+    check_boxes((const box[]){{{0, 0, 0}, {1, 1, 1}}, {{0.5, 0, 0}, {1.5, 1, 1}}}, 2, 1, true);
+    check_boxes((const box[]){{{0, 0, 0}, {1, 1, 1}}, {{1, 0, 0}, {2, 1, 1}}}, 2, 2, true);
+    check_boxes((const box[]){{{0, 0, 0}, {1, 1, 1}}, {{1, 0.25, 0.3}, {2, 0.75, 0.6}}}, 2, 3, true);
+    check_boxes((const box[]){{{0, 0, 0}, {2, 2, 2}}, {{0.5, 0.5, 0.5}, {1, 1, 1}}}, 2, 4, true);
+    check_boxes((const box[]){{{0, 0, 0}, {2, 2, 2}}, {{0, 0.5, 0.5}, {1, 1, 2}}}, 2, 5, true);
+    check_boxes((const box[]){{{0, 0, 0}, {1, 1, 1}}, {{0, 0, 0}, {1, 1, 1}}}, 2, 6, true);
+    check_boxes((const box[]){{{0, 0, 0}, {1, 1, 1}}, {{1, 1, 0}, {2, 2, 1}}}, 2, 7, false);
+    check_boxes((const box[]){{{0, 0, 0}, {1, 1, 1}}, {{2, 0, 0}, {3, 1, 1}}}, 2, 8, false);
+}
+
+static void test_random_boxes(void **state)
+{
+    (void)state;
+    for (uint64_t round = 0; round < 40; round++) {
+        box b[4];
+        for (uint64_t i = 0; i < 4; i++) {
+            for (uint64_t a = 0; a < 3; a++) {
+                // coordinates of a coarse lattice: faces coincide often
+                const double lattice = round % 2 ? 0.5 : 1e-3;
+                b[i].lo[a] = floor(uniform(900 + round, 8 * i + a, 0, 1.99) / lattice) * lattice;
+                b[i].hi[a] =
+                    b[i].lo[a] + lattice + floor(uniform(900 + round, 8 * i + 4 + a, 0, 0.99) / lattice) * lattice;
+            }
+        }
+        check_boxes(b, 4, 2000 + round, -1);
+    }
+}
+
+static void test_spiral_against_swept_sphere(void **state)
+{
+    (void)state;
+    for (int round = 0; round < 3; round++) {
+        const spiral s = (spiral[]){
+            {4.4, 0.06, 0.5, 0.4, 9, 0}, {2.2, 0.05, 0.2, -0.7, 13, 0}, {2.2, 0.02, 0.0, 0.0, 14.5, 0}}[round];
+        const double edge = 0.15;
+        sdm_mesh m = {0};
+        mesh_spiral(&m, &s, edge);
+        sdm_exact *e = engine(&m, NULL);
+        const sdm_exact_report *r = sdm_exact_get_report(e);
+        assert_true(r->audit.closed && r->audit.manifold && r->unioned && r->union_error_mm < 1e-11);
+        // facets: chords around the tube, and along it where the outer side of the narrowest turn is coarsest; the radius shrinks by
+        // 0.02 a radian, so the normal section is not quite the swept sphere
+        const double bend = edge / (s.a * exp(-s.b * s.end)), around = edge;
+        const double bound = 1.1 * (1 - cos(around / 2)) + 2.2 * bend * bend / 8 * 1.5 + 0.001;
+        for (uint64_t i = 0; i < 300; i++) {
+            double x[3];
+            for (uint64_t a = 0; a < 3; a++) x[a] = uniform(50 + (uint64_t)round, 3 * i + a, -6, 6) + (a == 2 ? 2 : 0);
+            const double d = sdm_exact_point(e, x, NULL, NULL, NULL), swept = spiral_distance(&s, x);
+            if (swept > 0) assert_true(fabs(d - swept) < bound);
+            if (swept < -bound) assert_true(d < 0);
+            // inside an overlap the swept sphere is a bound only: the true depth is at least as large
+            if (swept < -bound) assert_true(d < swept + bound);
+        }
+        sdm_exact_free(e);
+        sdm_mesh_dispose(&m);
+    }
+}
+
+/* Points spread over every triangle, kept where the place just outside is outside and the place just inside is inside: what is left
+   of the surface in the union. */
+static size_t outer_points(const sdm_mesh *m, size_t n, double **points)
+{
+    *points = malloc(3 * sizeof(double) * m->n_tri * n * n);
+    if (!*points) abort();
+    size_t count = 0;
+    for (size_t t = 0; t < m->n_tri; t++) {
+        const double *v[3];
+        double ab[3], ac[3], normal[3];
+        for (size_t k = 0; k < 3; k++) v[k] = &m->vert[3 * (size_t)m->tri[3 * t + k]];
+        for (int a = 0; a < 3; a++) {
+            ab[a] = v[1][a] - v[0][a];
+            ac[a] = v[2][a] - v[0][a];
+        }
+        for (int a = 0; a < 3; a++) normal[a] = ab[(a + 1) % 3] * ac[(a + 2) % 3] - ab[(a + 2) % 3] * ac[(a + 1) % 3];
+        const double len = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+        for (size_t i = 0; i < n; i++) {
+            for (size_t j = 0; j + i < n; j++) {
+                double *p = *points + 3 * count, off[3], in[3];
+                for (int a = 0; a < 3; a++) {
+                    p[a] =
+                        v[0][a] + ((double)i + 1.0 / 3) / (double)n * ab[a] + ((double)j + 1.0 / 3) / (double)n * ac[a];
+                    off[a] = p[a] + 1e-9 * normal[a] / len;
+                    in[a] = p[a] - 1e-9 * normal[a] / len;
+                }
+                count += sdm_naive_point(m, off) > 0 && sdm_naive_point(m, in) < 0;
+            }
+        }
+    }
+    return count;
+}
+
+static void test_dense_points(void **state)
+{
+    (void)state;
+    const spiral s = {2.0, 0.2, 0.6, 0.3, 9, 0.25};
+    sdm_mesh m = {0};
+    mesh_spiral(&m, &s, 0.6);
+    sdm_exact *e = engine(&m, NULL), *plain = engine(&m, &(sdm_exact_opts){.keep_overlap = true});
+    assert_false(sdm_exact_get_report(plain)->unioned);
+    double *points, longest = 0;
+    const size_t n = 8, count = outer_points(&m, n, &points);
+    for (size_t i = 0; i < 3 * m.n_tri; i++)
+        longest = fmax(longest, distance(&m.vert[3 * m.tri[i]], &m.vert[3 * m.tri[i / 3 * 3 + (i + 1) % 3]]));
+    int deeper = 0;
+    for (uint64_t i = 0; i < 500; i++) {
+        double x[3], best = INFINITY;
+        for (uint64_t a = 0; a < 3; a++) x[a] = uniform(70, 3 * i + a, -3, 3) + (a == 2 ? 1 : 0);
+        for (size_t p = 0; p < count; p++) best = fmin(best, distance(x, points + 3 * p));
+        const double d = sdm_exact_point(e, x, NULL, NULL, NULL), o = sdm_exact_point(plain, x, NULL, NULL, NULL);
+        assert_true(fabs(d) <= best + 1e-8 && fabs(d) >= best - 1.2 * longest / (double)n);
+        assert_true((d < 0) == (sdm_naive_point(&m, x) < 0) && (d < 0) == (o < 0));
+        // outside, inner surface makes no difference
+        if (d > 0) assert_true(fabs(d - o) < 1e-12);
+        deeper += d < o - 1e-6;
+    }
+    assert_true(deeper > 5);
+    free(points);
+    sdm_exact_free(e);
+    sdm_exact_free(plain);
+    sdm_mesh_dispose(&m);
+}
+
+/* Random closed meshes that cross themselves everywhere: a sphere whose vertices are shaken. */
+static void test_shaken_spheres(void **state)
+{
+    (void)state;
+    for (uint64_t round = 0; round < 12; round++) {
+        sdm_mesh m = {0};
+        mesh_sphere(&m, (const double[3]){0, 0, 0}, 1, 5);
+        for (size_t i = 0; i < 3 * m.n_vert; i++) m.vert[i] += uniform(80 + round, i, -0.4, 0.4);
+        sdm_exact *e = engine(&m, NULL);
+        const sdm_exact_report *r = sdm_exact_get_report(e);
+        assert_true(r->sign == SDM_SIGN_CROSSINGS);
+        double *points;
+        const size_t count = outer_points(&m, 24, &points);
+        for (uint64_t i = 0; i < 150; i++) {
+            double x[3], best = INFINITY;
+            for (uint64_t a = 0; a < 3; a++) x[a] = uniform(100 + round, 3 * i + a, -1.5, 1.5);
+            for (size_t p = 0; p < count; p++) best = fmin(best, distance(x, points + 3 * p));
+            const double d = sdm_exact_point(e, x, NULL, NULL, NULL);
+            assert_true((d < 0) == ((sdm_naive_point(&m, x) < 0) != r->turned));
+            if (!r->turned) assert_true(fabs(d) <= best + 1e-8 && fabs(d) >= best - 0.12);
+        }
+        free(points);
+        sdm_exact_free(e);
+        sdm_mesh_dispose(&m);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_two_spheres),  cmocka_unit_test(test_boxes_with_coplanar_faces),
+        cmocka_unit_test(test_random_boxes), cmocka_unit_test(test_spiral_against_swept_sphere),
+        cmocka_unit_test(test_dense_points), cmocka_unit_test(test_shaken_spheres),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

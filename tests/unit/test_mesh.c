@@ -1,0 +1,204 @@
+/* Meshes: storage, and what the audit says of meshes whose answers are known. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "oracle/exact_meshes.h"
+#include "sdm/memory.h"
+
+static const double zero[3] = {0, 0, 0}, one[3] = {1, 1, 1};
+
+static sdm_audit audit_of(const sdm_mesh *m)
+{
+    sdm_audit a;
+    sdm_error err = {0};
+    if (sdm_mesh_audit(m, &a, &err)) fail_msg("%s", err.text);
+    return a;
+}
+
+static void test_storage(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0}, copy = {0};
+    sdm_error err = {0};
+    mesh_box(&m, zero, one);
+    assert_int_equal(sdm_mesh_reserve(&m, 20, 30, &err), SDM_OK);
+    assert_int_equal(m.n_vert, 20);
+    assert_int_equal(m.n_tri, 30);
+    assert_true(m.vert[3 * 7] == 1 && m.vert[3 * 7 + 1] == 1);
+    assert_true(m.vert[3 * 19] == 0 && m.tri[89] == 0);
+    assert_int_equal(sdm_mesh_copy(&m, &copy, &err), SDM_OK);
+    assert_memory_equal(m.vert, copy.vert, 60 * sizeof(double));
+    assert_memory_equal(m.tri, copy.tri, 90 * sizeof(uint32_t));
+    assert_int_equal(sdm_mesh_reserve(&m, 4, 2, &err), SDM_OK);
+    assert_int_equal(m.n_tri, 2);
+    assert_int_equal(sdm_mesh_reserve(&m, (size_t)1 << 40, 1, &err), SDM_E_MESH);
+    assert_non_null(strstr(err.text, "1099511627776"));
+    assert_int_equal(m.n_vert, 4);
+    sdm_alloc_fail_after(1);
+    assert_int_equal(sdm_mesh_reserve(&m, 1000, 1, &err), SDM_E_NOMEM);
+    sdm_alloc_fail_after(0);
+    assert_int_equal(m.n_vert, 4);
+    sdm_mesh_dispose(&m);
+    sdm_mesh_dispose(&m);
+    sdm_mesh_dispose(NULL);
+    sdm_mesh_dispose(&copy);
+}
+
+static void test_box(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0};
+    mesh_box(&m, (const double[3]){-1, 2, 3}, (const double[3]){1, 5, 7});
+    const sdm_audit a = audit_of(&m);
+    assert_true(a.closed && a.manifold && !a.inverted);
+    assert_int_equal(a.n_vert, 8);
+    assert_int_equal(a.n_tri, 12);
+    assert_int_equal(a.components, 1);
+    assert_int_equal(a.degenerate + a.duplicate + a.boundary_edges + a.nonmanifold_edges + a.misoriented_edges +
+                         a.self_intersections,
+                     0);
+    assert_true(fabs(a.volume - 24) < 1e-12 && fabs(a.area - 52) < 1e-12);
+    assert_true(a.min[0] == -1 && a.min[2] == 3 && a.max[1] == 5 && a.max[2] == 7);
+    mesh_flip(&m);
+    const sdm_audit b = audit_of(&m);
+    assert_true(b.closed && b.inverted && fabs(b.volume + 24) < 1e-12);
+    sdm_mesh_dispose(&m);
+}
+
+static void test_flaws(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0};
+    mesh_box(&m, zero, one);
+    // a hole
+    m.n_tri = 11;
+    sdm_audit a = audit_of(&m);
+    assert_true(!a.closed && !a.manifold);
+    assert_int_equal(a.boundary_edges, 3);
+    // one triangle turned: each of its edges has two triangles of one direction
+    m.n_tri = 12;
+    mesh_triangle(&m, 0, m.tri[0], m.tri[2], m.tri[1]);
+    a = audit_of(&m);
+    assert_true(!a.closed);
+    assert_int_equal(a.misoriented_edges, 3);
+    // a copy of a triangle, and one without area
+    mesh_box(&m, zero, one);
+    mesh_make(&m, 8, 14);
+    mesh_triangle(&m, 12, m.tri[1], m.tri[2], m.tri[0]);
+    mesh_triangle(&m, 13, 0, 1, 1);
+    a = audit_of(&m);
+    assert_int_equal(a.duplicate, 1);
+    assert_int_equal(a.degenerate, 1);
+    assert_int_equal(a.nonmanifold_edges, 3);
+    sdm_mesh_dispose(&m);
+}
+
+static void test_soup_is_welded(void **state)
+{
+    (void)state;
+    // the box as loose triangles, as an STL file holds it
+    sdm_mesh box = {0}, soup = {0};
+    mesh_box(&box, zero, one);
+    mesh_make(&soup, 36, 12);
+    for (size_t i = 0; i < 36; i++) {
+        const double *v = &box.vert[3 * box.tri[i]];
+        mesh_vertex(&soup, i, v[0] == 0 && i % 2 ? -0.0 : v[0], v[1], v[2]);
+        soup.tri[i] = (uint32_t)i;
+    }
+    const sdm_audit a = audit_of(&soup);
+    assert_true(a.closed && a.manifold);
+    assert_int_equal(a.components, 1);
+    sdm_mesh_dispose(&box);
+    sdm_mesh_dispose(&soup);
+}
+
+static void test_components_and_crossings(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0}, b = {0};
+    mesh_sphere(&m, zero, 1, 8);
+    mesh_sphere(&b, (const double[3]){3, 0, 0}, 1, 8);
+    mesh_append(&m, &b);
+    sdm_audit a = audit_of(&m);
+    assert_int_equal(a.components, 2);
+    assert_int_equal(a.self_intersections, 0);
+    // two triangles through each other, and their copies far away and tiny: scale and place do not matter
+    for (int i = 0; i < 3; i++) {
+        const double scale = i == 2 ? 1e-9 : 1, at = i == 1 ? 1e6 : 0;
+        mesh_make(&m, 6, 2);
+        const double v[6][3] = {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {0.5, 0.5, -1}, {0.5, 0.5, 1}, {3, 3, 0.25}};
+        for (size_t k = 0; k < 6; k++) mesh_vertex(&m, k, v[k][0] * scale + at, v[k][1] * scale, v[k][2] * scale);
+        mesh_triangle(&m, 0, 0, 1, 2);
+        mesh_triangle(&m, 1, 3, 4, 5);
+        a = audit_of(&m);
+        assert_int_equal(a.self_intersections, 1);
+        assert_false(a.closed);
+    }
+    // the second moved off the first
+    for (size_t k = 3; k < 6; k++) m.vert[3 * k] += 2.5e-9;
+    assert_int_equal(audit_of(&m).self_intersections, 0);
+    sdm_mesh_dispose(&m);
+    sdm_mesh_dispose(&b);
+}
+
+static void test_misuse(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0};
+    sdm_audit a;
+    sdm_error err = {0};
+    assert_int_equal(sdm_mesh_audit(&m, &a, &err), SDM_E_MESH);
+    assert_non_null(strstr(err.text, "no triangle"));
+    assert_int_equal(sdm_mesh_audit(NULL, &a, &err), SDM_E_ARG);
+    mesh_box(&m, zero, one);
+    m.tri[4] = 8;
+    assert_int_equal(sdm_mesh_audit(&m, &a, &err), SDM_E_MESH);
+    assert_string_equal(err.text, "triangle 1 names vertex 8 of 8");
+    m.tri[4] = 0;
+    m.vert[3 * 5 + 1] = NAN;
+    assert_int_equal(sdm_mesh_audit(&m, &a, &err), SDM_E_MESH);
+    assert_non_null(strstr(err.text, "vertex 5 has the y coordinate"));
+    sdm_mesh_dispose(&m);
+}
+
+static void test_memory_is_short(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0}, b = {0};
+    mesh_sphere(&m, zero, 1, 6);
+    mesh_sphere(&b, (const double[3]){1, 0, 0}, 1, 6);
+    mesh_append(&m, &b);
+    sdm_audit a;
+    unsigned long n = 1;
+    for (;; n++) {
+        sdm_error err = {0};
+        sdm_alloc_fail_after(n);
+        const sdm_status s = sdm_mesh_audit(&m, &a, &err);
+        sdm_alloc_fail_after(0);
+        if (!s) break;
+        assert_int_equal(s, SDM_E_NOMEM);
+        assert_true(err.text[0] != 0);
+    }
+    assert_true(n > 5);
+    sdm_mesh_dispose(&m);
+    sdm_mesh_dispose(&b);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_storage),
+        cmocka_unit_test(test_box),
+        cmocka_unit_test(test_flaws),
+        cmocka_unit_test(test_soup_is_welded),
+        cmocka_unit_test(test_components_and_crossings),
+        cmocka_unit_test(test_misuse),
+        cmocka_unit_test(test_memory_is_short),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -196,52 +196,121 @@ struct crease {
     float factor; // for the value and its neighbours across the surface
 };
 
+// what is wrong at a voxel, if anything
+void look_at(openvdb::math::WenoStencil<const Grid> &stencil, const Coord &at, std::vector<crease> &found)
+{
+    stencil.moveTo(at);
+    if (!stencil.zeroCrossing()) return;
+    const float square = stencil.normSqGrad();
+    if (square >= SQUARE_LOW && square <= SQUARE_HIGH) return;
+    const float wanted =
+        square > 1 ? 0.97f * std::sqrt(SQUARE_HIGH / square) : 1.03f * std::sqrt(SQUARE_LOW / std::max(square, 0.1f));
+    found.push_back({at, std::min(std::max(wanted, 0.8f), 1.25f)});
+}
+
 std::vector<crease> find_creases(const Grid &grid)
 {
     std::vector<crease> found;
-    openvdb::math::WenoStencil<Grid> stencil(grid);
-    for (auto v = grid.cbeginValueOn(); v; ++v) {
-        stencil.moveTo(v.getCoord());
-        if (!stencil.zeroCrossing()) continue;
-        const float square = stencil.normSqGrad();
-        if (square >= SQUARE_LOW && square <= SQUARE_HIGH) continue;
-        const float wanted = square > 1 ? 0.97f * std::sqrt(SQUARE_HIGH / square)
-                                        : 1.03f * std::sqrt(SQUARE_LOW / std::max(square, 0.1f));
-        found.push_back({v.getCoord(), std::min(std::max(wanted, 0.8f), 1.25f)});
-    }
+    openvdb::math::WenoStencil<const Grid> stencil(grid);
+    for (auto v = grid.cbeginValueOn(); v; ++v) look_at(stencil, v.getCoord(), found);
     return found;
 }
 
-// scales values at creases until checkLevelSet has nothing to object to (it is asked by the caller, this may end without success)
-void smooth_creases(Grid &grid, bool half, sdm_vdb_report &report)
+// the same among voxels that a sweep has changed, where the stencil (three voxels along each axis) reaches one of them, or that were
+// creases before it
+std::vector<crease> find_creases_near(const Grid &grid, const std::vector<Coord> &changed,
+                                      const std::vector<crease> &before)
+{
+    std::vector<Coord> near;
+    near.reserve(changed.size() * 21 + before.size());
+    for (const crease &f : before) near.push_back(f.at);
+    for (const Coord &c : changed)
+        for (int axis = 0; axis < 3; axis++)
+            for (int step = -3; step <= 3; step++) {
+                near.push_back(c);
+                near.back()[axis] += step;
+            }
+    std::sort(near.begin(), near.end());
+    near.erase(std::unique(near.begin(), near.end()), near.end());
+    std::vector<crease> found;
+    openvdb::math::WenoStencil<const Grid> stencil(grid);
+    Grid::ConstAccessor acc = grid.getConstAccessor();
+    for (const Coord &c : near)
+        if (acc.isValueOn(c)) look_at(stencil, c, found);
+    return found;
+}
+
+// moves a value; the first one seen is kept for the report
+using originals = std::map<Coord, float>;
+
+float limited(float v, float limit, bool half) { return as_stored(std::min(std::max(v, -limit), limit), half); }
+
+// one sweep: values at creases and their neighbours across the surface times the factor asked for, by the one farthest from 1
+std::vector<Coord> scale_creases(Grid::Accessor &acc, const std::vector<crease> &found, float limit, bool half,
+                                 originals &original)
 {
     const Coord around[6] = {Coord(1, 0, 0),  Coord(-1, 0, 0), Coord(0, 1, 0),
                              Coord(0, -1, 0), Coord(0, 0, 1),  Coord(0, 0, -1)};
-    std::map<Coord, float> original;
+    std::map<Coord, float> factors; // in order of coordinates: independent of the order of creases
+    const auto ask = [&](const Coord &c, float factor) {
+        const auto it = factors.emplace(c, factor).first;
+        if (std::fabs(factor - 1) > std::fabs(it->second - 1)) it->second = factor;
+    };
+    for (const crease &f : found) {
+        const bool outside = acc.getValue(f.at) > 0;
+        ask(f.at, f.factor);
+        for (const Coord &d : around) {
+            const Coord c = f.at + d;
+            if ((acc.getValue(c) > 0) != outside && acc.isValueOn(c)) ask(c, f.factor);
+        }
+    }
+    std::vector<Coord> changed;
+    for (const auto &[c, factor] : factors) {
+        const float v = acc.getValue(c);
+        original.emplace(c, v);
+        acc.setValueOnly(c, limited(v * factor, limit, half));
+        changed.push_back(c);
+    }
+    return changed;
+}
+
+// one sweep of diffusion around creases: sheets, gaps and edges thinner than a voxel, which have no gradient on this grid, dissolve
+std::vector<Coord> diffuse_creases(Grid::Accessor &acc, const std::vector<crease> &found, float limit, bool half,
+                                   originals &original)
+{
+    std::map<Coord, float> fresh;
+    for (const crease &f : found)
+        for (int n = 0; n < 27; n++) {
+            const Coord c = f.at + Coord(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+            if (!acc.isValueOn(c)) continue;
+            const float mean = (acc.getValue(c.offsetBy(1, 0, 0)) + acc.getValue(c.offsetBy(-1, 0, 0)) +
+                                acc.getValue(c.offsetBy(0, 1, 0)) + acc.getValue(c.offsetBy(0, -1, 0)) +
+                                acc.getValue(c.offsetBy(0, 0, 1)) + acc.getValue(c.offsetBy(0, 0, -1))) /
+                               6;
+            fresh.emplace(c, 0.5f * (acc.getValue(c) + mean));
+        }
+    std::vector<Coord> changed;
+    for (const auto &[c, v] : fresh) {
+        original.emplace(c, acc.getValue(c));
+        acc.setValueOnly(c, limited(v, limit, half));
+        changed.push_back(c);
+    }
+    return changed;
+}
+
+// mends creases until checkLevelSet has nothing to object to (it is asked by the caller, this may end without success)
+void mend_creases(Grid &grid, bool half, sdm_vdb_report &report)
+{
+    const int ROUNDS = 600;
+    originals original;
     Grid::Accessor acc = grid.getAccessor();
     const float limit = std::nextafter(as_stored(grid.background() * 0.999f, half), 0.0f);
-    for (int sweep = 0; sweep < 100; sweep++) {
-        const std::vector<crease> found = find_creases(grid);
-        if (found.empty()) break;
-        // every voxel once a sweep, by the factor farthest from 1 that is asked for: independent of order
-        std::map<Coord, float> factors;
-        const auto ask = [&](const Coord &c, float factor) {
-            const auto it = factors.emplace(c, factor).first;
-            if (std::fabs(factor - 1) > std::fabs(it->second - 1)) it->second = factor;
-        };
-        for (const crease &f : found) {
-            const bool outside = acc.getValue(f.at) > 0;
-            ask(f.at, f.factor);
-            for (const Coord &d : around) {
-                const Coord c = f.at + d;
-                if ((acc.getValue(c) > 0) != outside && acc.isValueOn(c)) ask(c, f.factor);
-            }
-        }
-        for (const auto &[c, factor] : factors) {
-            const float v = acc.getValue(c);
-            original.emplace(c, v);
-            acc.setValueOnly(c, as_stored(std::min(std::max(v * factor, -limit), limit), half));
-        }
+    std::vector<crease> found = find_creases(grid);
+    for (int round = 0; round < ROUNDS && !found.empty(); round++) {
+        if (round) found = find_creases_near(grid, diffuse_creases(acc, found, limit, half, original), found);
+        const int sweeps = 20 - 7 * round % 20; // changing, so that scaling and diffusion do not go round in a circle
+        for (int sweep = 0; sweep < sweeps && !found.empty(); sweep++)
+            found = find_creases_near(grid, scale_creases(acc, found, limit, half, original), found);
     }
     for (const auto &[c, v] : original) {
         const double change = std::fabs(static_cast<double>(acc.getValue(c)) - static_cast<double>(v));
@@ -374,7 +443,7 @@ Grid::Ptr make_level_set(const sdm_grid &g, const float *values, const sdm_vdb_o
     need(sdm_band_close(&g, values, background, &box.band, err));
     report.cut = box.band.cut;
     Grid::Ptr grid = grid_of(g, box.band, background, false, o.half);
-    smooth_creases(*grid, o.half, report);
+    mend_creases(*grid, o.half, report);
     return grid;
 }
 

@@ -97,7 +97,8 @@ typedef struct sdm_shape {
                     double *velocity);
 
     /* Optional: closed-form signed distance (negative inside, mm) of the ideal shape at x[3]: a test oracle. It may be exact
-       outside only; then it must be a bound inside and say so in `summary` or the documentation. 0 on success. */
+       outside only; then it must be a bound inside and say so in `summary` or the documentation. 0 on success; host->fail()
+       where there is no closed form for the given options. */
     int (*distance)(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p, const double x[3],
                     double *distance);
 } sdm_shape;
@@ -105,6 +106,15 @@ typedef struct sdm_shape {
 /* The one symbol a plug-in's shared object exports: returns shape `index`, NULL behind the last. */
 typedef const sdm_shape *(*sdm_plugin_entry)(uint32_t index);
 #define SDM_PLUGIN_SYMBOL "sdm_plugin_shape"
+
+#if defined(__GNUC__)
+#define SDM_PLUGIN_EXPORT __attribute__((visibility("default")))
+#else
+#define SDM_PLUGIN_EXPORT
+#endif
+
+/* Defined by the plug-in; declared here, so that it is visible whatever the compiler's options are. */
+const sdm_shape *sdm_plugin_shape(uint32_t index) SDM_PLUGIN_EXPORT;
 
 #ifdef __cplusplus
 }

@@ -1,0 +1,137 @@
+/* sdmgen eval: accuracy and speed of a network on fresh random shapes. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "commands.h"
+#include "evaluate.h"
+#include "sdm/config.h"
+#include "sdm/file.h"
+#include "setup.h"
+#include "terminal.h"
+
+enum { DEFAULT_SAMPLES = 100 };
+
+static void print_time(const char *name, double ms, double ms_network, const char *note)
+{
+    if (!isfinite(ms)) return;
+    printf("  %-22s %10.3f ms", name, ms);
+    if (ms != ms_network) printf("  %8.1f x the network", ms / ms_network);
+    printf("%s\n", note);
+}
+
+static void print_table(const char *file, const sdm_model_info *info, const cli_eval *e, const cli_timing *t,
+                        uint64_t seed)
+{
+    printf("%s: %s, %zu parameters, %lld x %lld x %lld voxels\n", file, info->shape, info->n_params,
+           (long long)info->grid.n[0], (long long)info->grid.n[1], (long long)info->grid.n[2]);
+    printf("%zu random shapes it was not trained on (seed %llu), exact distances as truth\n\n", e->n,
+           (unsigned long long)seed);
+    printf("  %-22s %10.3g mm^2\n", "MSE", e->mse_mm2);
+    printf("  %-22s %10.5f mm\n", "RMSE", e->rmse_mm);
+    printf("  %-22s %10.5f mm\n", "RMSE within 0.4 mm", e->rmse_near_mm);
+    printf("  %-22s %10.5f mm\n", "mean absolute error", e->mae_mm);
+    printf("  %-22s %10.5f mm\n", "largest error", e->max_abs_mm);
+    printf("  %-22s %10.5f\n", "Dice", e->dice);
+    printf("  %-22s %10.5f mm\n", "surfaces, mean", e->surface_mean_mm);
+    printf("  %-22s %10.5f mm (largest %.5f)\n", "surfaces, Hausdorff", e->surface_hausdorff_mm,
+           e->surface_hausdorff_max_mm);
+    if (e->n_surface < e->n) printf("  (surfaces: %zu of %zu shapes have both)\n", e->n_surface, e->n);
+    char batch[48], naive[64];
+    snprintf(batch, sizeof batch, "network, batch of %zu", t->batch_size);
+    snprintf(naive, sizeof naive, "  (from %.0f %% of the voxels)", 100 * t->naive_share);
+    printf("\ntime per map on one core\n");
+    print_time("network", t->ms_network, t->ms_network, "");
+    print_time(batch, t->ms_batch, t->ms_network, "");
+    print_time("exact", t->ms_exact, t->ms_network, "");
+    print_time("naive", t->ms_naive, t->ms_network, naive);
+}
+
+static void fill_json(sdm_json *j, const char *file, const sdm_model_info *info, const cli_eval *e, const cli_timing *t,
+                      uint64_t seed, int workers)
+{
+    sdm_json_open(j, NULL, '{');
+    sdm_json_text(j, "model", file);
+    sdm_json_text(j, "shape", info->shape);
+    sdm_json_int(j, "samples", (int64_t)e->n);
+    sdm_json_int(j, "seed", (int64_t)seed);
+    sdm_json_real(j, "mse_mm2", e->mse_mm2);
+    sdm_json_real(j, "rmse_mm", e->rmse_mm);
+    sdm_json_real(j, "mae_mm", e->mae_mm);
+    sdm_json_real(j, "max_abs_mm", e->max_abs_mm);
+    sdm_json_real(j, "rmse_near_mm", e->rmse_near_mm);
+    sdm_json_real(j, "dice", e->dice);
+    sdm_json_real(j, "surface_mean_mm", e->surface_mean_mm);
+    sdm_json_real(j, "surface_hausdorff_mm", e->surface_hausdorff_mm);
+    sdm_json_real(j, "surface_hausdorff_max_mm", e->surface_hausdorff_max_mm);
+    sdm_json_int(j, "surfaces", (int64_t)e->n_surface);
+    sdm_json_int(j, "worst", (int64_t)e->worst);
+    sdm_json_real(j, "worst_mse_mm2", e->sample[e->worst].mse_mm2);
+    sdm_json_real(j, "ms_network", t->ms_network);
+    sdm_json_real(j, "ms_network_batch", t->ms_batch);
+    sdm_json_int(j, "batch", (int64_t)t->batch_size);
+    sdm_json_real(j, "ms_exact", t->ms_exact);
+    sdm_json_real(j, "ms_naive", t->ms_naive);
+    sdm_json_real(j, "naive_share", t->naive_share);
+    sdm_json_real(j, "exact_over_network", t->ms_exact / t->ms_network);
+    sdm_json_real(j, "naive_over_network", t->ms_naive / t->ms_network);
+    sdm_json_int(j, "threads", 1); /* of the times */
+    sdm_json_int(j, "workers", workers);
+    sdm_json_close(j, '}');
+}
+
+static sdm_status write_pictures(const cli_args *args, const sdm_model *m, const sdm_instance *shape, uint64_t seed,
+                                 const cli_eval *e, sdm_error *err)
+{
+    const struct {
+        const char *name;
+        size_t index;
+    } pictures[] = {{"worst", e->worst}, {"median", e->median}};
+    sdm_status s = SDM_OK;
+    for (size_t i = 0; i < 2 && !s; i++) {
+        char path[SDM_PATH_TEXT_MAX];
+        if (snprintf(path, sizeof path, "%s/%s.png", args->pictures, pictures[i].name) >= (int)sizeof path)
+            return sdm_fail(err, SDM_E_ARG, "--pictures '%.100s...': the name is too long", args->pictures);
+        s = cli_picture_compare(m, shape, seed, pictures[i].index, NULL, path, err);
+    }
+    return s;
+}
+
+static sdm_status measure(const cli_args *args, const sdm_model *m, const sdm_instance *shape, sdm_error *err)
+{
+    const uint64_t seed = args->seed < 0 ? 1 : (uint64_t)args->seed;
+    const size_t n = args->samples < 0 ? DEFAULT_SAMPLES : (size_t)args->samples;
+    const sdm_model_info *info = sdm_model_get_info(m);
+    cli_eval e = {0};
+    cli_timing t = {0};
+    sdm_json json = {0};
+    sdm_status s = args->pictures ? sdm_make_folder(args->pictures, err) : SDM_OK;
+    if (!s) s = cli_evaluate(m, shape, seed, n, true, &e, err);
+    if (!s) s = cli_time_maps(m, shape, seed, (size_t)args->naive, &t, err);
+    if (!s && args->pictures) s = write_pictures(args, m, shape, seed, &e, err);
+    if (!s && args->json) {
+        fill_json(&json, args->files.items[0], info, &e, &t, seed, cli_threads(args->threads));
+        s = cli_print_json(&json, err);
+    } else if (!s) {
+        print_table(args->files.items[0], info, &e, &t, seed);
+    }
+    if (!s && !(e.mse_mm2 <= args->max_mse))
+        s = sdm_fail(err, SDM_E_QUALITY, "MSE %.3g mm^2, demanded at most %.3g mm^2", e.mse_mm2, args->max_mse);
+    cli_eval_dispose(&e);
+    return s;
+}
+
+sdm_status cmd_eval(const cli_args *args, sdm_error *err)
+{
+    sdm_registry *registry = NULL;
+    sdm_instance *shape = NULL;
+    sdm_model *model = NULL;
+    sdm_status s = cli_open_registry(args, &registry, err);
+    if (!s) s = sdm_model_open(args->files.items[0], &model, err);
+    if (!s) s = sdm_runtime_instance(model, registry, &shape, err);
+    if (!s) s = measure(args, model, shape, err);
+    sdm_model_free(model);
+    sdm_instance_free(shape);
+    sdm_registry_free(registry);
+    return s;
+}

@@ -1,0 +1,215 @@
+/* sdmgen exact: the exact distance map of a shape or a mesh file. */
+#include <stdio.h>
+#include <string.h>
+
+#include "commands.h"
+#include "output.h"
+#include "progress.h"
+#include "sdm/checksum.h"
+#include "sdm/exact.h"
+#include "sdm/memory.h"
+#include "setup.h"
+#include "terminal.h"
+
+typedef struct job {
+    const cli_args *args;
+    sdm_text params;
+    sdm_mesh mesh;
+    double ms_mesh;
+    sdm_grid grid;
+    sdm_exact_report report;
+    float *values;
+    double ms_build, ms_query;
+} job;
+
+static bool interrupted(void *user)
+{
+    (void)user;
+    return cli_is_interrupted();
+}
+
+static sdm_status mesh_of_shape(job *j, sdm_error *err)
+{
+    sdm_registry *registry = NULL;
+    sdm_instance *shape = NULL;
+    double *values = NULL;
+    size_t n = 0;
+    sdm_status s = cli_open_registry(j->args, &registry, err);
+    if (!s) s = cli_open_shape(registry, j->args->shape, &j->args->options, &shape, err);
+    const sdm_param *params = s ? NULL : sdm_instance_params(shape, &n);
+    if (!s) s = SDM_ALLOC(&values, n, "parameters", err);
+    if (!s) s = cli_read_params(params, n, &j->args->params, values, err);
+    const double start = cli_clock();
+    if (!s) s = sdm_instance_mesh(shape, values, &j->mesh, err);
+    j->ms_mesh = 1e3 * (cli_clock() - start);
+    if (!s) cli_add_params(params, n, values, &j->params);
+    sdm_free(values);
+    sdm_instance_free(shape);
+    sdm_registry_free(registry);
+    return s;
+}
+
+static sdm_status get_mesh(job *j, sdm_error *err)
+{
+    const cli_args *args = j->args;
+    if (!args->shape == !args->mesh)
+        return sdm_fail(err, SDM_E_ARG, "exact: either --shape NAME or --mesh FILE is needed");
+    if (args->mesh && (args->params.n > 0 || args->options.n > 0))
+        return sdm_fail(err, SDM_E_ARG, "exact: -p and -O belong to --shape, a mesh file has no parameters");
+    if (args->outputs.n == 0 && !args->json)
+        return sdm_fail(err, SDM_E_ARG, "exact: an output is needed: -o FILE, or --json");
+    const sdm_status s = cli_check_outputs(&args->outputs, false, err);
+    if (s) return s;
+    return args->mesh ? cli_read_mesh(args->mesh, &j->mesh, err) : mesh_of_shape(j, err);
+}
+
+static sdm_sign_method sign_of(const char *name)
+{
+    for (int m = SDM_SIGN_AUTO; m <= SDM_SIGN_WINDING; m++)
+        if (!strcmp(name, sdm_sign_method_name((sdm_sign_method)m))) return (sdm_sign_method)m;
+    return SDM_SIGN_AUTO;
+}
+
+static sdm_status run_engine(job *j, sdm_error *err)
+{
+    const sdm_exact_opts opts = {.sign = sign_of(j->args->sign),
+                                 .keep_overlap = j->args->keep_overlap,
+                                 .n_threads = (int)j->args->threads,
+                                 .cancelled = interrupted};
+    sdm_exact *engine = NULL;
+    const double start = cli_clock();
+    sdm_status s = sdm_exact_create(&j->mesh, &opts, &engine, err);
+    const double built = cli_clock();
+    if (s) return s;
+    j->report = *sdm_exact_get_report(engine);
+    s = cli_fit_grid(j->args, j->report.audit.min, j->report.audit.max, &j->grid, err);
+    if (!s) s = SDM_ALLOC(&j->values, sdm_grid_count(&j->grid), "distance map", err);
+    const double query = cli_clock();
+    if (!s) s = sdm_exact_map(engine, &j->grid, j->values, err);
+    j->ms_build = 1e3 * (built - start);
+    j->ms_query = 1e3 * (cli_clock() - query);
+    sdm_exact_free(engine);
+    return s;
+}
+
+/* Slice by slice, so that it can be interrupted and shows where it is. */
+static sdm_status run_naive(job *j, sdm_error *err)
+{
+    const double start = cli_clock();
+    sdm_status s = sdm_mesh_audit(&j->mesh, &j->report.audit, err);
+    j->ms_build = 1e3 * (cli_clock() - start);
+    j->report.n_tri_used = j->mesh.n_tri;
+    j->report.sign = SDM_SIGN_WINDING;
+    if (!s) s = cli_fit_grid(j->args, j->report.audit.min, j->report.audit.max, &j->grid, err);
+    if (!s) s = SDM_ALLOC(&j->values, sdm_grid_count(&j->grid), "distance map", err);
+    if (s) return s;
+
+    cli_progress progress;
+    cli_progress_start(&progress);
+    sdm_grid slice = j->grid;
+    slice.n[2] = 1;
+    const size_t stride = (size_t)(j->grid.n[0] * j->grid.n[1]);
+    const double query = cli_clock();
+    for (int64_t k = 0; k < j->grid.n[2] && !s; k++) {
+        sdm_grid_world(&j->grid, (const double[3]){0, 0, (double)k}, slice.origin);
+        s = sdm_naive_map(&j->mesh, &slice, (int)j->args->threads, j->values + (size_t)k * stride, err);
+        if (!s) s = cli_check_interrupt(err);
+        cli_progress_show(&progress, "naive", (double)(k + 1) / (double)j->grid.n[2], NULL);
+    }
+    j->ms_query = 1e3 * (cli_clock() - query);
+    cli_progress_clear(&progress);
+    return s;
+}
+
+static void notice_mesh(const job *j)
+{
+    const sdm_audit *a = &j->report.audit;
+    if (j->report.turned) cli_notice("the mesh was inside out and has been turned");
+    if (a->boundary_edges > 0)
+        cli_notice("the mesh is open: %zu boundary edges; inside is where the winding number is over 1/2",
+                   a->boundary_edges);
+    if (a->nonmanifold_edges > 0) cli_notice("%zu edges with more than two triangles", a->nonmanifold_edges);
+    if (a->misoriented_edges > 0) cli_notice("%zu edges with triangles of opposite orientation", a->misoriented_edges);
+    if (a->degenerate > 0) cli_notice("%zu degenerate triangles", a->degenerate);
+    if (a->duplicate > 0) cli_notice("%zu duplicate triangles", a->duplicate);
+    if (j->report.unioned)
+        cli_notice("the mesh overlaps itself: the union of its %zu triangles is bounded by %zu (error at most %.2g mm)",
+                   a->n_tri, j->report.n_tri_used, j->report.union_error_mm);
+}
+
+static sdm_status write_outputs(const job *j, sdm_error *err)
+{
+    const cli_map map = {.grid = &j->grid,
+                         .values = j->values,
+                         .shape = j->args->mesh ? j->args->mesh : j->args->shape,
+                         .params = j->params.data ? j->params.data : "",
+                         .source = SDM_SOURCE_EXACT,
+                         .error_mm = j->report.union_error_mm,
+                         .origin = j->args->method};
+    sdm_status s = SDM_OK;
+    for (size_t i = 0; i < j->args->outputs.n && !s; i++)
+        s = cli_write_map(j->args->outputs.items[i], &map, j->args, err);
+    return s;
+}
+
+static void value_range(const job *j, float *min, float *max, int64_t *inside)
+{
+    const size_t n = sdm_grid_count(&j->grid);
+    *min = *max = j->values[0];
+    *inside = 0;
+    for (size_t i = 0; i < n; i++) {
+        if (j->values[i] < *min) *min = j->values[i];
+        if (j->values[i] > *max) *max = j->values[i];
+        *inside += j->values[i] < 0;
+    }
+}
+
+static sdm_status print_json(const job *j, sdm_error *err)
+{
+    float min, max;
+    int64_t inside;
+    value_range(j, &min, &max, &inside);
+    const size_t voxels = sdm_grid_count(&j->grid);
+    char hash[32];
+    snprintf(hash, sizeof hash, "%016llx", (unsigned long long)sdm_crc64(0, j->values, voxels * sizeof *j->values));
+    sdm_json json = {0};
+    sdm_json_open(&json, NULL, '{');
+    sdm_json_text(&json, "method", j->args->method);
+    sdm_json_real(&json, "ms_mesh", j->ms_mesh);
+    sdm_json_real(&json, "ms_build", j->ms_build);
+    sdm_json_real(&json, "ms_query", j->ms_query);
+    sdm_json_real(&json, "ms_total", j->ms_build + j->ms_query);
+    sdm_json_int(&json, "voxels", (int64_t)voxels);
+    sdm_json_int(&json, "triangles", (int64_t)j->report.audit.n_tri);
+    sdm_json_int(&json, "triangles_used", (int64_t)j->report.n_tri_used);
+    sdm_json_int(&json, "threads", cli_threads(j->args->threads));
+    sdm_json_text(&json, "sign_method", sdm_sign_method_name(j->report.sign));
+    sdm_json_bool(&json, "union", j->report.unioned);
+    sdm_json_real(&json, "union_error_mm", j->report.union_error_mm);
+    sdm_json_bool(&json, "turned", j->report.turned);
+    sdm_json_bool(&json, "closed", j->report.audit.closed);
+    sdm_json_int(&json, "boundary_edges", (int64_t)j->report.audit.boundary_edges);
+    sdm_json_int(&json, "nonmanifold_edges", (int64_t)j->report.audit.nonmanifold_edges);
+    sdm_json_int(&json, "degenerate", (int64_t)j->report.audit.degenerate);
+    sdm_json_real(&json, "min_mm", (double)min);
+    sdm_json_real(&json, "max_mm", (double)max);
+    sdm_json_int(&json, "inside_voxels", inside);
+    sdm_json_text(&json, "values_crc64", hash);
+    cli_json_grid(&json, "grid", &j->grid);
+    sdm_json_close(&json, '}');
+    return cli_print_json(&json, err);
+}
+
+sdm_status cmd_exact(const cli_args *args, sdm_error *err)
+{
+    job j = {.args = args};
+    sdm_status s = get_mesh(&j, err);
+    if (!s) s = !strcmp(args->method, "naive") ? run_naive(&j, err) : run_engine(&j, err);
+    if (!s) notice_mesh(&j);
+    if (!s) s = write_outputs(&j, err);
+    if (!s && args->json) s = print_json(&j, err);
+    sdm_free(j.values);
+    sdm_mesh_dispose(&j.mesh);
+    sdm_text_dispose(&j.params);
+    return s;
+}

@@ -1,0 +1,163 @@
+/* sdmgen info: what a model, level set or mesh file holds. */
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+
+#include "commands.h"
+#include "report_audit.h"
+#include "sdm/memory.h"
+#include "sdm/model.h"
+#include "sdm/vdb.h"
+#include "setup.h"
+#include "terminal.h"
+
+static bool ends_with(const char *path, const char *suffix)
+{
+    const size_t n = strlen(path), m = strlen(suffix);
+    return n > m && !strcasecmp(path + n - m, suffix);
+}
+
+static void print_model(const char *path, const sdm_model_info *m)
+{
+    const sdm_grid *g = &m->grid;
+    const sdm_accuracy *a = &m->accuracy;
+    printf("%s: network '%s' of shape '%s'\n\n", path, m->kind, m->shape);
+    printf("grid         %lld x %lld x %lld voxels of %g x %g x %g mm, origin %g %g %g (LPS)\n", (long long)g->n[0],
+           (long long)g->n[1], (long long)g->n[2], g->spacing[0], g->spacing[1], g->spacing[2], g->origin[0],
+           g->origin[1], g->origin[2]);
+    for (size_t i = 0; i < m->n_params; i++)
+        printf("%s %-18s %.6g .. %.6g%s%s, default %.6g\n", i ? "            " : "parameters  ", m->params[i].name,
+               m->params[i].min, m->params[i].max, *m->params[i].unit ? " " : "", m->params[i].unit, m->params[i].def);
+    for (size_t i = 0; i < m->n_options; i++)
+        printf("%s %-18s %s\n", i ? "            " : "options     ", m->option_names[i], m->option_values[i]);
+    printf("accuracy     on %lld unseen shapes: MSE %.3g mm^2, RMSE %.5f mm, mean %.5f mm, largest %.5f mm\n",
+           (long long)a->samples, a->mse_mm2, a->rmse_mm, a->mae_mm, a->max_abs_mm);
+    printf("             RMSE within 0.4 mm of the surface %.5f mm\n", a->rmse_near_mm);
+    printf("             RMSE of one map: half below %.5f mm, 90 %% below %.5f mm, 99 %% below %.5f mm\n", a->q50_mm,
+           a->q90_mm, a->q99_mm);
+    printf("training     %.1f s, %lld exact maps, seed %llu, sdmgen %s\n", m->train_seconds,
+           (long long)m->train_samples, (unsigned long long)m->seed, m->version);
+    printf("file         %zu bytes, weights %zu bytes, checksum %016llx\n", m->file_bytes, m->weight_bytes,
+           (unsigned long long)m->checksum);
+}
+
+static void json_accuracy(sdm_json *j, const sdm_accuracy *a)
+{
+    sdm_json_open(j, "accuracy", '{');
+    sdm_json_int(j, "samples", a->samples);
+    sdm_json_real(j, "mse_mm2", a->mse_mm2);
+    sdm_json_real(j, "rmse_mm", a->rmse_mm);
+    sdm_json_real(j, "mae_mm", a->mae_mm);
+    sdm_json_real(j, "max_abs_mm", a->max_abs_mm);
+    sdm_json_real(j, "rmse_near_mm", a->rmse_near_mm);
+    sdm_json_real(j, "q50_mm", a->q50_mm);
+    sdm_json_real(j, "q90_mm", a->q90_mm);
+    sdm_json_real(j, "q99_mm", a->q99_mm);
+    sdm_json_close(j, '}');
+}
+
+static sdm_status json_model(const char *path, const sdm_model_info *m, sdm_error *err)
+{
+    char checksum[32];
+    snprintf(checksum, sizeof checksum, "%016llx", (unsigned long long)m->checksum);
+    sdm_json j = {0};
+    sdm_json_open(&j, NULL, '{');
+    sdm_json_text(&j, "file", path);
+    sdm_json_text(&j, "type", "model");
+    sdm_json_text(&j, "kind", m->kind);
+    sdm_json_text(&j, "shape", m->shape);
+    sdm_json_text(&j, "version", m->version);
+    cli_json_grid(&j, "grid", &m->grid);
+    sdm_json_open(&j, "parameters", '[');
+    for (size_t i = 0; i < m->n_params; i++) {
+        sdm_json_open(&j, NULL, '{');
+        sdm_json_text(&j, "name", m->params[i].name);
+        sdm_json_text(&j, "unit", m->params[i].unit);
+        sdm_json_real(&j, "min", m->params[i].min);
+        sdm_json_real(&j, "max", m->params[i].max);
+        sdm_json_real(&j, "default", m->params[i].def);
+        sdm_json_close(&j, '}');
+    }
+    sdm_json_close(&j, ']');
+    sdm_json_open(&j, "options", '{');
+    for (size_t i = 0; i < m->n_options; i++) sdm_json_text(&j, m->option_names[i], m->option_values[i]);
+    sdm_json_close(&j, '}');
+    json_accuracy(&j, &m->accuracy);
+    sdm_json_int(&j, "seed", (int64_t)m->seed);
+    sdm_json_real(&j, "train_seconds", m->train_seconds);
+    sdm_json_int(&j, "train_samples", m->train_samples);
+    sdm_json_int(&j, "file_bytes", (int64_t)m->file_bytes);
+    sdm_json_int(&j, "weight_bytes", (int64_t)m->weight_bytes);
+    sdm_json_text(&j, "checksum", checksum);
+    sdm_json_text(&j, "config", m->config ? m->config : "");
+    sdm_json_close(&j, '}');
+    return cli_print_json(&j, err);
+}
+
+static sdm_status info_model(const cli_args *args, const char *path, sdm_error *err)
+{
+    sdm_model *model = NULL;
+    sdm_status s = sdm_model_open(path, &model, err);
+    if (s) return s;
+    if (args->json)
+        s = json_model(path, sdm_model_get_info(model), err);
+    else
+        print_model(path, sdm_model_get_info(model));
+    sdm_model_free(model);
+    return s;
+}
+
+static sdm_status info_mesh(const cli_args *args, const char *path, sdm_error *err)
+{
+    sdm_mesh mesh = {0};
+    sdm_audit audit;
+    sdm_status s = cli_read_mesh(path, &mesh, err);
+    if (!s) s = sdm_mesh_audit(&mesh, &audit, err);
+    if (!s && args->json) {
+        sdm_json j = {0};
+        sdm_json_open(&j, NULL, '{');
+        sdm_json_text(&j, "file", path);
+        sdm_json_text(&j, "type", "mesh");
+        cli_json_audit(&j, &audit);
+        sdm_json_close(&j, '}');
+        s = cli_print_json(&j, err);
+    } else if (!s) {
+        printf("%s: triangle mesh\n\n", path);
+        cli_print_audit(&audit);
+    }
+    sdm_mesh_dispose(&mesh);
+    return s;
+}
+
+static sdm_status info_vdb(const cli_args *args, const char *path, sdm_error *err)
+{
+#ifdef SDM_HAVE_VDB
+    char *text = NULL;
+    sdm_status s = sdm_vdb_verify(path, &text, err);
+    if (!s && args->json) {
+        sdm_json j = {0};
+        sdm_json_open(&j, NULL, '{');
+        sdm_json_text(&j, "file", path);
+        sdm_json_text(&j, "type", "vdb");
+        sdm_json_text(&j, "text", text);
+        sdm_json_close(&j, '}');
+        s = cli_print_json(&j, err);
+    } else if (!s) {
+        printf("%s: %s%s", path, text, text[0] && text[strlen(text) - 1] == '\n' ? "" : "\n");
+    }
+    sdm_free(text);
+    return s;
+#else
+    (void)args;
+    return sdm_fail(err, SDM_E_UNSUPPORTED, "%s: built without OpenVDB", path);
+#endif
+}
+
+sdm_status cmd_info(const cli_args *args, sdm_error *err)
+{
+    static const char *const meshes[] = {".ply", ".stl", ".obj", ".off"};
+    const char *path = args->files.items[0];
+    for (size_t i = 0; i < sizeof meshes / sizeof *meshes; i++)
+        if (ends_with(path, meshes[i])) return info_mesh(args, path, err);
+    return ends_with(path, ".vdb") ? info_vdb(args, path, err) : info_model(args, path, err);
+}

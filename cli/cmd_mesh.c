@@ -1,0 +1,60 @@
+/* sdmgen mesh: the surface mesh of a shape. */
+#include <stdio.h>
+
+#include "commands.h"
+#include "output.h"
+#include "report_audit.h"
+#include "sdm/memory.h"
+#include "sdm/meshfile.h"
+#include "setup.h"
+#include "terminal.h"
+
+static sdm_status make_mesh(const cli_args *args, const sdm_registry *registry, sdm_mesh *mesh, sdm_error *err)
+{
+    sdm_instance *shape = NULL;
+    double *values = NULL;
+    size_t n = 0;
+    sdm_status s = cli_open_shape(registry, args->shape, &args->options, &shape, err);
+    const sdm_param *params = s ? NULL : sdm_instance_params(shape, &n);
+    if (!s) s = SDM_ALLOC(&values, n, "parameters", err);
+    if (!s) s = cli_read_params(params, n, &args->params, values, err);
+    if (!s) s = sdm_instance_mesh(shape, values, mesh, err);
+    sdm_free(values);
+    sdm_instance_free(shape);
+    return s;
+}
+
+static sdm_status report(const cli_args *args, const sdm_mesh *mesh, sdm_error *err)
+{
+    sdm_audit audit;
+    if (!args->audit && !args->json) return SDM_OK;
+    const sdm_status s = sdm_mesh_audit(mesh, &audit, err);
+    if (s) return s;
+    if (!args->json) {
+        cli_print_audit(&audit);
+        return SDM_OK;
+    }
+    sdm_json json = {0};
+    sdm_json_open(&json, NULL, '{');
+    sdm_json_text(&json, "shape", args->shape);
+    cli_json_audit(&json, &audit);
+    sdm_json_close(&json, '}');
+    return cli_print_json(&json, err);
+}
+
+sdm_status cmd_mesh(const cli_args *args, sdm_error *err)
+{
+    if (!args->shape) return sdm_fail(err, SDM_E_ARG, "mesh: --shape NAME is needed");
+    if (args->outputs.n == 0 && !args->audit && !args->json)
+        return sdm_fail(err, SDM_E_ARG, "mesh: an output is needed: -o FILE, or --audit");
+    sdm_registry *registry = NULL;
+    sdm_mesh mesh = {0};
+    sdm_status s = cli_check_outputs(&args->outputs, true, err);
+    if (!s) s = cli_open_registry(args, &registry, err);
+    if (!s) s = make_mesh(args, registry, &mesh, err);
+    for (size_t i = 0; i < args->outputs.n && !s; i++) s = sdm_mesh_write(args->outputs.items[i], &mesh, err);
+    if (!s) s = report(args, &mesh, err);
+    sdm_mesh_dispose(&mesh);
+    sdm_registry_free(registry);
+    return s;
+}

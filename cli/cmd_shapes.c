@@ -1,0 +1,207 @@
+/* sdmgen shapes: the known shapes, their parameters and options. */
+#include <stdio.h>
+#include <string.h>
+
+#include "commands.h"
+#include "sdm/memory.h"
+#include "setup.h"
+#include "terminal.h"
+
+static const char *option_type(const sdm_option *o)
+{
+    switch (o->type) {
+    case SDM_OPTION_REAL:
+        return "number";
+    case SDM_OPTION_INT:
+        return "whole number";
+    case SDM_OPTION_CHOICE:
+        return "choice";
+    default:
+        return "file";
+    }
+}
+
+/* Aligned: a column is as wide as its widest cell. */
+enum { COLUMNS = 5, CELL = 96 };
+typedef struct table {
+    char (*cell)[COLUMNS][CELL];
+    size_t n;
+} table;
+
+static sdm_status table_start(table *t, size_t n_rows, sdm_error *err)
+{
+    static const char *const titles[COLUMNS] = {"name", "unit", "range", "default", "meaning"};
+    t->n = 1;
+    const sdm_status s = sdm_alloc((void **)&t->cell, n_rows + 1, sizeof *t->cell, "table", err);
+    for (size_t k = 0; k < COLUMNS && !s; k++) snprintf(t->cell[0][k], CELL, "%s", titles[k]);
+    return s;
+}
+
+static void table_print(table *t, const char *title)
+{
+    int width[COLUMNS] = {0};
+    for (size_t i = 0; i < t->n; i++)
+        for (size_t k = 0; k + 1 < COLUMNS; k++) {
+            const int length = (int)strlen(t->cell[i][k]);
+            if (length > width[k]) width[k] = length;
+        }
+    printf("\n%s:\n", title);
+    for (size_t i = 0; i < t->n; i++) {
+        for (size_t k = 0; k + 1 < COLUMNS; k++) printf("  %-*s", width[k], t->cell[i][k]);
+        printf("  %s\n", t->cell[i][COLUMNS - 1]);
+    }
+    sdm_free(t->cell);
+}
+
+static sdm_status print_params(const sdm_param *params, size_t n, sdm_error *err)
+{
+    table t;
+    const sdm_status s = n > 0 ? table_start(&t, n, err) : SDM_OK;
+    if (s || n == 0) return s;
+    for (size_t i = 0; i < n; i++) {
+        const sdm_param *p = &params[i];
+        char(*row)[CELL] = t.cell[t.n++];
+        snprintf(row[0], CELL, "%s", p->name);
+        snprintf(row[1], CELL, "%s", p->unit ? p->unit : "");
+        snprintf(row[2], CELL, "%.6g .. %.6g", p->min, p->max);
+        snprintf(row[3], CELL, "%.6g", p->def);
+        snprintf(row[4], CELL, "%s", p->help ? p->help : "");
+    }
+    table_print(&t, "parameters");
+    return SDM_OK;
+}
+
+static sdm_status print_options(const sdm_shape *shape, sdm_error *err)
+{
+    table t;
+    const sdm_status s = shape->n_options > 0 ? table_start(&t, shape->n_options, err) : SDM_OK;
+    if (s || shape->n_options == 0) return s;
+    for (uint32_t i = 0; i < shape->n_options; i++) {
+        const sdm_option *o = &shape->options[i];
+        const bool number = o->type == SDM_OPTION_REAL || o->type == SDM_OPTION_INT;
+        char(*row)[CELL] = t.cell[t.n++];
+        snprintf(row[0], CELL, "%s", o->name);
+        snprintf(row[1], CELL, "%s", o->unit ? o->unit : "");
+        if (number)
+            snprintf(row[2], CELL, "%.6g .. %.6g", o->min, o->max);
+        else
+            snprintf(row[2], CELL, "%s", o->type == SDM_OPTION_CHOICE ? o->choices : "file");
+        if (number)
+            snprintf(row[3], CELL, "%.6g", o->def);
+        else if (o->type == SDM_OPTION_CHOICE)
+            snprintf(row[3], CELL, "%.*s", (int)strcspn(o->choices, "|"), o->choices);
+        snprintf(row[4], CELL, "%s", o->help ? o->help : "");
+    }
+    table_print(&t, "options");
+    return SDM_OK;
+}
+
+static void json_params(sdm_json *j, const sdm_param *params, size_t n)
+{
+    sdm_json_open(j, "parameters", '[');
+    for (size_t i = 0; i < n; i++) {
+        sdm_json_open(j, NULL, '{');
+        sdm_json_text(j, "name", params[i].name);
+        sdm_json_text(j, "unit", params[i].unit);
+        sdm_json_real(j, "min", params[i].min);
+        sdm_json_real(j, "max", params[i].max);
+        sdm_json_real(j, "default", params[i].def);
+        sdm_json_text(j, "help", params[i].help ? params[i].help : "");
+        sdm_json_close(j, '}');
+    }
+    sdm_json_close(j, ']');
+}
+
+static void json_options(sdm_json *j, const sdm_shape *shape)
+{
+    sdm_json_open(j, "options", '[');
+    for (uint32_t i = 0; i < shape->n_options; i++) {
+        const sdm_option *o = &shape->options[i];
+        sdm_json_open(j, NULL, '{');
+        sdm_json_text(j, "name", o->name);
+        sdm_json_text(j, "type", option_type(o));
+        sdm_json_text(j, "unit", o->unit ? o->unit : "");
+        if (o->type == SDM_OPTION_REAL || o->type == SDM_OPTION_INT) {
+            sdm_json_real(j, "min", o->min);
+            sdm_json_real(j, "max", o->max);
+            sdm_json_real(j, "default", o->def);
+        }
+        if (o->type == SDM_OPTION_CHOICE) sdm_json_text(j, "choices", o->choices);
+        sdm_json_text(j, "help", o->help ? o->help : "");
+        sdm_json_close(j, '}');
+    }
+    sdm_json_close(j, ']');
+}
+
+/* The parameters of the table, or, for a shape whose parameters come from its data, of the instance that -O makes. */
+static sdm_status show_one(const cli_args *args, const sdm_registry *registry, sdm_error *err)
+{
+    const char *name = args->files.items[0], *near = NULL;
+    const sdm_shape *shape = sdm_registry_find(registry, name, &near);
+    if (!shape && near) return sdm_fail(err, SDM_E_ARG, "unknown shape '%s'; did you mean '%s'?", name, near);
+    if (!shape) return sdm_fail(err, SDM_E_ARG, "unknown shape '%s'; see sdmgen shapes", name);
+    sdm_instance *instance = NULL;
+    if (args->options.n > 0) {
+        const sdm_status s = cli_open_shape(registry, name, &args->options, &instance, err);
+        if (s) return s;
+    }
+    size_t n = shape->n_params;
+    const sdm_param *params = instance ? sdm_instance_params(instance, &n) : shape->params;
+    sdm_status s = SDM_OK;
+    if (args->json) {
+        sdm_json json = {0};
+        sdm_json_open(&json, NULL, '{');
+        sdm_json_text(&json, "name", shape->name);
+        sdm_json_text(&json, "summary", shape->summary ? shape->summary : "");
+        json_params(&json, params, n);
+        json_options(&json, shape);
+        sdm_json_close(&json, '}');
+        s = cli_print_json(&json, err);
+    } else {
+        printf("%s - %s\n", shape->name, shape->summary ? shape->summary : "");
+        s = print_params(params, n, err);
+        if (!s && !instance && shape->describe)
+            printf("\nits parameters come from its data: give them with -O, see the options\n");
+        if (!s) s = print_options(shape, err);
+    }
+    sdm_instance_free(instance);
+    return s;
+}
+
+static sdm_status list_all(const cli_args *args, const sdm_registry *registry, sdm_error *err)
+{
+    const size_t n = sdm_registry_count(registry);
+    if (!args->json) {
+        for (size_t i = 0; i < n; i++) {
+            const sdm_shape *shape = sdm_registry_at(registry, i);
+            printf("%-14s %s\n", shape->name, shape->summary ? shape->summary : "");
+        }
+        return SDM_OK;
+    }
+    sdm_json json = {0};
+    sdm_json_open(&json, NULL, '{');
+    sdm_json_open(&json, "shapes", '[');
+    for (size_t i = 0; i < n; i++) {
+        const sdm_shape *shape = sdm_registry_at(registry, i);
+        sdm_json_open(&json, NULL, '{');
+        sdm_json_text(&json, "name", shape->name);
+        sdm_json_text(&json, "summary", shape->summary ? shape->summary : "");
+        sdm_json_text(&json, "origin", sdm_registry_origin(registry, i));
+        json_params(&json, shape->params, shape->n_params);
+        sdm_json_close(&json, '}');
+    }
+    sdm_json_close(&json, ']');
+    sdm_json_close(&json, '}');
+    return cli_print_json(&json, err);
+}
+
+sdm_status cmd_shapes(const cli_args *args, sdm_error *err)
+{
+    if (args->files.n == 0 && args->options.n > 0)
+        return sdm_fail(err, SDM_E_ARG, "shapes: -O needs the NAME of a shape");
+    sdm_registry *registry = NULL;
+    sdm_status s = cli_open_registry(args, &registry, err);
+    if (!s) s = args->files.n > 0 ? show_one(args, registry, err) : list_all(args, registry, err);
+    sdm_registry_free(registry);
+    return s;
+}

@@ -1,0 +1,95 @@
+/* sdmgen verify: is a model or level set file whole, and as accurate as it says? */
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+
+#include "commands.h"
+#include "evaluate.h"
+#include "sdm/memory.h"
+#include "sdm/vdb.h"
+#include "setup.h"
+#include "terminal.h"
+
+enum { DEFAULT_SAMPLES = 20 };
+#define TOLERANCE 1.25 /* measured RMSE over stated RMSE: room for another draw of shapes */
+
+static sdm_status verify_vdb(const cli_args *args, const char *path, sdm_error *err)
+{
+#ifdef SDM_HAVE_VDB
+    const sdm_status s = sdm_vdb_verify(path, NULL, err);
+    if (s) return s;
+    if (!args->json) {
+        printf("%s: hash and level set are right\n", path);
+        return SDM_OK;
+    }
+    sdm_json j = {0};
+    sdm_json_open(&j, NULL, '{');
+    sdm_json_text(&j, "file", path);
+    sdm_json_text(&j, "type", "vdb");
+    sdm_json_bool(&j, "ok", true);
+    sdm_json_close(&j, '}');
+    return cli_print_json(&j, err);
+#else
+    (void)args;
+    return sdm_fail(err, SDM_E_UNSUPPORTED, "%s: built without OpenVDB", path);
+#endif
+}
+
+static sdm_status report(const cli_args *args, const char *path, const sdm_model_info *info, const cli_eval *e,
+                         sdm_error *err)
+{
+    const double stated = info->accuracy.rmse_mm;
+    const bool good = e->n == 0 || e->rmse_mm <= TOLERANCE * stated;
+    sdm_status s = SDM_OK;
+    if (args->json) {
+        sdm_json j = {0};
+        sdm_json_open(&j, NULL, '{');
+        sdm_json_text(&j, "file", path);
+        sdm_json_text(&j, "type", "model");
+        sdm_json_bool(&j, "ok", good);
+        sdm_json_int(&j, "samples", (int64_t)e->n);
+        sdm_json_real(&j, "stated_rmse_mm", stated);
+        if (e->n > 0) sdm_json_real(&j, "rmse_mm", e->rmse_mm);
+        sdm_json_close(&j, '}');
+        s = cli_print_json(&j, err);
+    } else {
+        printf("%s: every checksum is right\n", path);
+        if (e->n > 0) printf("RMSE %.5f mm on %zu random shapes, stated %.5f mm\n", e->rmse_mm, e->n, stated);
+    }
+    if (!s && !good)
+        s = sdm_fail(err, SDM_E_QUALITY, "%s: RMSE %.5f mm on %zu random shapes, stated %.5f mm: more than 25 %% worse",
+                     path, e->rmse_mm, e->n, stated);
+    return s;
+}
+
+static sdm_status verify_model(const cli_args *args, const char *path, sdm_error *err)
+{
+    sdm_registry *registry = NULL;
+    sdm_instance *shape = NULL;
+    sdm_model *model = NULL;
+    cli_eval e = {0};
+    sdm_status s = cli_open_registry(args, &registry, err);
+    if (!s) s = sdm_model_open(path, &model, err); /* checks every checksum */
+    const sdm_model_info *info = s ? NULL : sdm_model_get_info(model);
+    const bool known = !s && sdm_registry_find(registry, info->shape, NULL);
+    if (!s && known) s = sdm_runtime_instance(model, registry, &shape, err);
+    if (!s && known)
+        s = cli_evaluate(model, shape, args->seed < 0 ? 1 : (uint64_t)args->seed,
+                         args->samples < 0 ? DEFAULT_SAMPLES : (size_t)args->samples, false, &e, err);
+    if (!s && !known)
+        cli_notice("shape '%s' is not known here (--plugin FILE loads it): the accuracy was not measured", info->shape);
+    if (!s) s = report(args, path, info, &e, err);
+    cli_eval_dispose(&e);
+    sdm_model_free(model);
+    sdm_instance_free(shape);
+    sdm_registry_free(registry);
+    return s;
+}
+
+sdm_status cmd_verify(const cli_args *args, sdm_error *err)
+{
+    const char *path = args->files.items[0];
+    const size_t n = strlen(path);
+    if (n > 4 && !strcasecmp(path + n - 4, ".vdb")) return verify_vdb(args, path, err);
+    return verify_model(args, path, err);
+}

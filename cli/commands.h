@@ -1,0 +1,20 @@
+/* The commands of sdmgen, one file each. Each writes results to stdout, notices to stderr, and leaves the message of
+   a failure in *err; the exit code follows from the status. */
+#ifndef CLI_COMMANDS_H
+#define CLI_COMMANDS_H
+
+#include "options.h"
+
+sdm_status cmd_train(const cli_args *args, sdm_error *err);
+sdm_status cmd_generate(const cli_args *args, sdm_error *err);
+sdm_status cmd_exact(const cli_args *args, sdm_error *err);
+sdm_status cmd_mesh(const cli_args *args, sdm_error *err);
+sdm_status cmd_eval(const cli_args *args, sdm_error *err);
+sdm_status cmd_shapes(const cli_args *args, sdm_error *err);
+sdm_status cmd_info(const cli_args *args, sdm_error *err);
+sdm_status cmd_verify(const cli_args *args, sdm_error *err);
+sdm_status cmd_config(const cli_args *args, sdm_error *err);
+sdm_status cmd_bench(const cli_args *args, sdm_error *err);
+sdm_status cmd_help(const cli_args *args, sdm_error *err);
+
+#endif

@@ -1,0 +1,126 @@
+/* Time per map on one core: network, exact engine, naive method. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "evaluate.h"
+#include "sdm/config.h"
+#include "sdm/memory.h"
+#include "terminal.h"
+
+enum { N_NETWORK = 51, N_EXACT = 9, BATCH = 32, N_BATCHES = 3, NAIVE_STEP = 16 };
+
+static int compare_reals(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+double cli_median(double *v, size_t n)
+{
+    qsort(v, n, sizeof *v, compare_reals);
+    return n % 2 ? v[n / 2] : 0.5 * (v[n / 2 - 1] + v[n / 2]);
+}
+
+static sdm_status time_network(const sdm_model *m, uint64_t seed, float *values, cli_timing *out, sdm_error *err)
+{
+    const sdm_generate_opts opts = {.policy = SDM_RANGE_REFUSE, .n_threads = 1};
+    double p[SDM_MAX_PARAMS], ms[N_NETWORK];
+    for (size_t i = 0; i <= N_NETWORK; i++) {
+        cli_eval_params(m, seed, i, p);
+        const double start = cli_clock();
+        const sdm_status s = sdm_generate(m, p, &opts, values, NULL, err);
+        if (s) return s;
+        if (i > 0) ms[i - 1] = 1e3 * (cli_clock() - start); /* the first one warms up */
+    }
+    out->ms_network = cli_median(ms, N_NETWORK);
+    out->n_network = N_NETWORK;
+    return SDM_OK;
+}
+
+static sdm_status time_batch(const sdm_model *m, uint64_t seed, float *values, cli_timing *out, sdm_error *err)
+{
+    const sdm_generate_opts opts = {.policy = SDM_RANGE_REFUSE, .n_threads = 1};
+    const size_t n_params = sdm_model_get_info(m)->n_params;
+    double p[BATCH * SDM_MAX_PARAMS], ms[N_BATCHES];
+    for (size_t i = 0; i < BATCH; i++) cli_eval_params(m, seed, i, p + i * n_params);
+    for (size_t k = 0; k <= N_BATCHES; k++) {
+        const double start = cli_clock();
+        const sdm_status s = sdm_generate_batch(m, p, BATCH, &opts, values, NULL, err);
+        if (s) return s;
+        if (k > 0) ms[k - 1] = 1e3 * (cli_clock() - start) / BATCH;
+    }
+    out->ms_batch = cli_median(ms, N_BATCHES);
+    out->batch_size = BATCH;
+    return SDM_OK;
+}
+
+static sdm_status time_exact(const sdm_model *m, const sdm_instance *shape, uint64_t seed, float *values,
+                             cli_timing *out, sdm_error *err)
+{
+    const sdm_exact_opts opts = {.n_threads = 1};
+    double p[SDM_MAX_PARAMS], ms[N_EXACT];
+    for (size_t i = 0; i <= N_EXACT; i++) {
+        cli_eval_params(m, seed, i, p);
+        const double start = cli_clock();
+        sdm_status s = sdm_exact_shape_map(shape, p, &opts, &sdm_model_get_info(m)->grid, values, NULL, err);
+        if (!s) s = cli_check_interrupt(err);
+        if (s) return s;
+        if (i > 0) ms[i - 1] = 1e3 * (cli_clock() - start);
+    }
+    out->ms_exact = cli_median(ms, N_EXACT);
+    out->n_exact = N_EXACT;
+    return SDM_OK;
+}
+
+sdm_status cli_time_naive(const sdm_mesh *mesh, const sdm_grid *grid, double *ms, double *share, sdm_error *err)
+{
+    /* every voxel costs the same, so a few slices, spread over the box, stand for all */
+    sdm_grid thin = *grid;
+    thin.n[2] = (grid->n[2] + NAIVE_STEP - 1) / NAIVE_STEP;
+    thin.spacing[2] = grid->spacing[2] * (double)grid->n[2] / (double)thin.n[2];
+    float *values = NULL;
+    sdm_status s = SDM_ALLOC(&values, sdm_grid_count(&thin), "map of the naive method", err);
+    if (s) return s;
+    const double start = cli_clock();
+    s = sdm_naive_map(mesh, &thin, 1, values, err);
+    *share = (double)thin.n[2] / (double)grid->n[2];
+    *ms = 1e3 * (cli_clock() - start) / *share;
+    sdm_free(values);
+    return s;
+}
+
+static sdm_status time_naive(const sdm_model *m, const sdm_instance *shape, uint64_t seed, size_t n, cli_timing *out,
+                             sdm_error *err)
+{
+    double p[SDM_MAX_PARAMS], *ms = NULL;
+    sdm_mesh mesh = {0};
+    sdm_status s = SDM_ALLOC(&ms, n, "times", err);
+    for (size_t i = 0; i < n && !s; i++) {
+        cli_eval_params(m, seed, i, p);
+        s = sdm_instance_mesh(shape, p, &mesh, err);
+        if (!s) s = cli_time_naive(&mesh, &sdm_model_get_info(m)->grid, &ms[i], &out->naive_share, err);
+        if (!s) s = cli_check_interrupt(err);
+    }
+    if (!s && n > 0) out->ms_naive = cli_median(ms, n);
+    out->n_naive = n;
+    sdm_mesh_dispose(&mesh);
+    sdm_free(ms);
+    return s;
+}
+
+sdm_status cli_time_maps(const sdm_model *m, const sdm_instance *shape, uint64_t seed, size_t n_naive, cli_timing *out,
+                         sdm_error *err)
+{
+    memset(out, 0, sizeof *out);
+    out->ms_exact = out->ms_naive = out->naive_share = NAN;
+    float *values = NULL;
+    sdm_status s = sdm_alloc((void **)&values, sdm_grid_count(&sdm_model_get_info(m)->grid), BATCH * sizeof *values,
+                             "maps to time", err);
+    if (!s) s = time_network(m, seed, values, out, err);
+    if (!s) s = time_batch(m, seed, values, out, err);
+    if (!s && shape) s = time_exact(m, shape, seed, values, out, err);
+    if (!s && shape) s = time_naive(m, shape, seed, n_naive, out, err);
+    sdm_free(values);
+    return s;
+}

@@ -1,0 +1,67 @@
+/* sdmgen: reads the command line, runs one command, turns its status into an exit code. */
+#include <stdio.h>
+#include <string.h>
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+#include "commands.h"
+#include "help.h"
+#include "terminal.h"
+
+static int print_help(const cli_command *command)
+{
+    sdm_text text = {0};
+    if (command)
+        cli_help_command(command, &text);
+    else
+        cli_help_all(&text);
+    if (text.data) fputs(text.data, stdout);
+    sdm_text_dispose(&text);
+    return CLI_EXIT_DONE;
+}
+
+/* A result that could not be written out is no result. */
+static int flush_results(int code)
+{
+    if (fflush(stdout) == 0 && !ferror(stdout)) return code;
+    fputs("sdmgen: error: cannot write to standard output\n", stderr);
+    return code ? code : CLI_EXIT_FAILED;
+}
+
+static int run_command(const cli_args *args)
+{
+    cli_set_quiet(args->quiet);
+#ifdef _OPENMP
+    if (args->threads > 0) omp_set_num_threads((int)args->threads);
+#endif
+    cli_catch_interrupts();
+    sdm_error err = {0};
+    const sdm_status s = args->command->run(args, &err);
+    if (!s) return CLI_EXIT_DONE;
+    err.status = s;
+    fflush(stdout);
+    return cli_report(&err);
+}
+
+int main(int argc, char **argv)
+{
+    if (argc == 2 && !strcmp(argv[1], "--version")) {
+        puts("sdmgen " SDM_VERSION_TEXT);
+        return flush_results(CLI_EXIT_DONE);
+    }
+    if (argc == 2 && (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h"))) return flush_results(print_help(NULL));
+
+    cli_args args;
+    sdm_error err = {0};
+    const sdm_status s = cli_parse(argc, argv, &args, &err);
+    int code;
+    if (s)
+        code = cli_report(&err);
+    else if (args.help)
+        code = print_help(args.command);
+    else
+        code = run_command(&args);
+    cli_args_dispose(&args);
+    return flush_results(code);
+}

@@ -1,0 +1,137 @@
+/* The tables of commands and options. Everything a user can type is a row here. */
+#include <math.h>
+
+#include "commands.h"
+
+#define AT(field) offsetof(cli_args, field)
+#define ON(c) CLI_ON(c)
+#define ALL (ON(CLI_N_COMMANDS) - 1u)
+#define WITH_SHAPES                                                                                                    \
+    (ON(CLI_TRAIN) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_EVAL) | ON(CLI_SHAPES) |                 \
+     ON(CLI_VERIFY) | ON(CLI_CONFIG) | ON(CLI_BENCH))
+#define REPORTS                                                                                                        \
+    (ON(CLI_TRAIN) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_EVAL) | ON(CLI_SHAPES) | ON(CLI_INFO) |  \
+     ON(CLI_VERIFY) | ON(CLI_BENCH))
+
+const cli_command cli_commands[CLI_N_COMMANDS] = {
+    {"train", "CONFIG [key=value ...]", "train a network on the shape of a configuration",
+     "Reads the YAML configuration, makes exact maps, trains and writes a run folder: config.yaml (resolved),\n"
+     "metrics.jsonl, checkpoint.sdmc, model.sdm, loss.png and slices.png. key=value overrides a key, e.g. "
+     "network.depth=4.\n"
+     "An interrupt (Ctrl-C) writes a checkpoint and stops; a second one stops at once.\n"
+     "A folder that holds a model or a checkpoint is left alone unless --resume or --force is given.",
+     "sdmgen train configs/cochlea.yaml train.minutes=5 --out runs/short", 1, SIZE_MAX, cmd_train},
+    {"generate", "MODEL [-p name=value ...] -o FILE", "make distance maps with a trained network",
+     "Parameters that are not given take the model's default. The output's type follows its name: .vdb (level set),\n"
+     ".nii .nii.gz .nrrd .mha .npy (image), .ply .stl .obj .off (zero surface), .png (three slices).\n"
+     "With --params each row of the file makes one output; its number replaces %d (or %04d) in FILE, or is appended.",
+     "sdmgen generate runs/cochlea/model.sdm -p a=4.2 -p alpha=0.6 -o cochlea.vdb -o cochlea.nii.gz", 1, 1,
+     cmd_generate},
+    {"exact", "--shape NAME | --mesh FILE [-o FILE]", "compute an exact distance map",
+     "Computes the signed distance to a shape or to a mesh file (.ply .stl .obj .off, mm) at every voxel. A surface "
+     "that\n"
+     "overlaps itself is taken as the union of what it encloses. Without grid options the grid is fitted to the mesh:\n"
+     "64 voxels on the longest edge, a margin of a tenth of it around.",
+     "sdmgen exact --shape cochlea -p a=4.2 --size 60,50,50 --spacing 0.2 -o cochlea.nrrd", 0, 0, cmd_exact},
+    {"mesh", "--shape NAME [-p name=value ...] [-o FILE]", "write the surface mesh of a shape", NULL,
+     "sdmgen mesh --shape torus -o torus.ply --audit", 0, 0, cmd_mesh},
+    {"eval", "MODEL", "measure a network on fresh random shapes",
+     "Draws random shapes the training never saw and compares the network with the exact engine: errors of the "
+     "distance,\n"
+     "overlap of the insides (Dice), distances between the zero surfaces, and time per map on one core.",
+     "sdmgen eval runs/cochlea/model.sdm --samples 100 --json", 1, 1, cmd_eval},
+    {"shapes", "[NAME]", "list the shapes, or the parameters and options of one", NULL, "sdmgen shapes cochlea", 0, 1,
+     cmd_shapes},
+    {"info", "FILE", "tell what a model, level set or mesh file holds", NULL, "sdmgen info runs/cochlea/model.sdm", 1,
+     1, cmd_info},
+    {"verify", "FILE", "check a model or level set file",
+     "A model: every checksum, then its accuracy is measured again on random shapes, if its shape is known; exit code "
+     "4 if\n"
+     "the RMSE is more than 25 % above the stated one. A .vdb: the hash of its values, and OpenVDB's checkLevelSet.",
+     "sdmgen verify runs/cochlea/model.sdm --samples 50", 1, 1, cmd_verify},
+    {"config", "[CONFIG] [key=value ...]", "check, print or explain a configuration",
+     "Checks the configuration, the shape's options and the ranges. --dump prints it with every key resolved; --keys\n"
+     "lists every key with type, range, default and meaning.",
+     "sdmgen config configs/cochlea.yaml network.depth=4 --dump", 0, SIZE_MAX, cmd_config},
+    {"bench", "exact | network MODEL", "short measurements of speed, with ratios",
+     "exact: the exact engine on the cochlea, 60 x 50 x 50 voxels of 0.2 mm, against the naive method.\n"
+     "network: one map and a batch of a model on one core, against the exact engine.",
+     "sdmgen bench exact", 1, 2, cmd_bench},
+    {"help", "[COMMAND]", "print this text, the manual page or the bash completion", NULL,
+     "sdmgen help --completion > ~/.local/share/bash-completion/completions/sdmgen", 0, 1, cmd_help},
+};
+
+const cli_option cli_options[] = {
+    /* the shape and its parameters */
+    {"shape", 0, CLI_TEXT, "NAME", NULL, 0, 0, ON(CLI_EXACT) | ON(CLI_MESH), AT(shape), "shape, see `sdmgen shapes`"},
+    {"mesh", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_EXACT), AT(mesh), "mesh file instead of a shape"},
+    {"param", 'p', CLI_LIST, "name=value", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH), AT(params),
+     "value of a shape parameter; may be repeated"},
+    {"option", 'O', CLI_LIST, "name=value", NULL, 0, 0, ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_SHAPES), AT(options),
+     "value of a shape option; may be repeated"},
+    {"params", 0, CLI_TEXT, "FILE.csv", NULL, 0, 0, ON(CLI_GENERATE), AT(rows),
+     "parameters from a table: a header of names, one output per row"},
+
+    /* the grid */
+    {"size", 0, CLI_INT3, "NX,NY,NZ", NULL, 1, 1048576, ON(CLI_EXACT), AT(size), "voxels along x, y, z"},
+    {"spacing", 0, CLI_REAL13, "MM", NULL, 1e-9, 1e9, ON(CLI_EXACT), AT(spacing), "voxel edge, one number or three"},
+    {"origin", 0, CLI_REAL3, "X,Y,Z", NULL, -1e12, 1e12, ON(CLI_EXACT), AT(origin),
+     "centre of the first voxel, LPS mm; default: the grid is centred on the mesh"},
+
+    /* how */
+    {"policy", 0, CLI_CHOICE, NULL, "refuse|clamp|exact", 0, 0, ON(CLI_GENERATE), AT(policy),
+     "parameters outside the trained range: refuse (default), move to the nearest allowed value, or use the exact "
+     "engine"},
+    {"method", 0, CLI_CHOICE, NULL, "exact|naive", 0, 0, ON(CLI_EXACT), AT(method),
+     "exact: the engine (default); naive: every triangle for every voxel, all surface counted"},
+    {"sign", 0, CLI_CHOICE, NULL, "auto|crossings|pseudonormal|winding", 0, 0, ON(CLI_EXACT), AT(sign),
+     "how inside is told from outside (default auto)"},
+    {"keep-overlap", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_EXACT), AT(keep_overlap),
+     "count surface inside the union too"},
+
+    /* the output */
+    {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(outputs),
+     "output: .vdb .nii .nii.gz .nrrd .mha .npy .ply .stl .obj .off .png; may be repeated"},
+    {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_MESH), AT(outputs),
+     "output: .ply .stl .obj .off; may be repeated"},
+    {"audit", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_MESH), AT(audit), "examine the mesh and print what was found"},
+    {"dense", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(dense),
+     ".vdb: the whole map instead of a level set"},
+    {"half", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(half), ".vdb: 16-bit values"},
+    {"band", 0, CLI_REAL, "N", NULL, 3, 100, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(band),
+     ".vdb: half width of the narrow band in voxels (default 3)"},
+    {"out", 0, CLI_TEXT, "DIR", NULL, 0, 0, ON(CLI_TRAIN), AT(out),
+     "run folder (default: output.folder of the configuration, or runs/NAME)"},
+    {"resume", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN), AT(resume), "go on from the folder's checkpoint"},
+    {"force", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN), AT(force), "start anew in a folder that holds a model"},
+
+    /* measuring */
+    {"samples", 0, CLI_INT, "N", NULL, 1, 1000000, ON(CLI_EVAL), AT(samples), "random shapes (default 100)"},
+    {"samples", 0, CLI_INT, "N", NULL, 1, 1000000, ON(CLI_VERIFY), AT(samples), "random shapes (default 20)"},
+    {"naive", 0, CLI_INT, "N", NULL, 0, 1000, ON(CLI_EVAL), AT(naive),
+     "shapes on which the naive method is timed (default 2; 0: not at all)"},
+    {"max-mse", 0, CLI_REAL, "MM2", NULL, 0, 1e12, ON(CLI_EVAL), AT(max_mse),
+     "exit code 4 when the mean squared error is above"},
+    {"pictures", 0, CLI_TEXT, "DIR", NULL, 0, 0, ON(CLI_EVAL), AT(pictures),
+     "write slices of the worst and the median shape: worst.png, median.png"},
+
+    /* texts */
+    {"dump", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_CONFIG), AT(dump), "print the resolved configuration as YAML"},
+    {"keys", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_CONFIG), AT(keys), "list every key (no CONFIG needed)"},
+    {"markdown", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_CONFIG) | ON(CLI_HELP), AT(markdown), "as Markdown"},
+    {"man", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_HELP), AT(man), "the manual page, for man(1)"},
+    {"completion", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_HELP), AT(completion), "the completion script for bash"},
+
+    /* everywhere */
+    {"plugin", 0, CLI_LIST, "FILE", NULL, 0, 0, WITH_SHAPES, AT(plugins),
+     "load shapes from a shared object; may be repeated"},
+    {"threads", 0, CLI_INT, "N", NULL, 0, 1024, ALL & ~ON(CLI_HELP), AT(threads),
+     "threads; 0: all (default). Results are the same for every number"},
+    {"seed", 0, CLI_INT, "N", NULL, 0, 9007199254740992.0,
+     ON(CLI_TRAIN) | ON(CLI_CONFIG) | ON(CLI_EVAL) | ON(CLI_VERIFY) | ON(CLI_BENCH), AT(seed),
+     "seed of the random numbers (default 1; train, config: the configuration's)"},
+    {"json", 0, CLI_FLAG, NULL, NULL, 0, 0, REPORTS, AT(json), "print the result as one line of JSON"},
+    {"quiet", 'q', CLI_FLAG, NULL, NULL, 0, 0, ALL, AT(quiet), "no progress and no notices"},
+    {"help", 'h', CLI_FLAG, NULL, NULL, 0, 0, ALL, AT(help), "print what the command does"},
+};
+const size_t cli_n_options = sizeof cli_options / sizeof *cli_options;

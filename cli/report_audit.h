@@ -1,0 +1,11 @@
+/* A mesh audit as text and as JSON. */
+#ifndef CLI_REPORT_AUDIT_H
+#define CLI_REPORT_AUDIT_H
+
+#include "sdm/mesh.h"
+#include "sdm/text.h"
+
+void cli_print_audit(const sdm_audit *a);
+void cli_json_audit(sdm_json *json, const sdm_audit *a);
+
+#endif

@@ -1,0 +1,132 @@
+/* What the program offers a plug-in during a call. */
+#include <stdio.h>
+#include <string.h>
+
+#include "sdm/file.h"
+#include "sdm/image.h"
+#include "sdm/memory.h"
+#include "sdm/meshfile.h"
+#include "shape_internal.h"
+
+#define DATA_FILE_MAX ((size_t)1 << 32)
+
+/* Memory that lives as long as the call. */
+typedef struct host_block {
+    struct host_block *next;
+    void *data;
+    sdm_mesh mesh;
+} host_block;
+
+static host_call *call_of(const sdm_host *host) { return host->ctx; }
+
+static host_block *new_block(host_call *c)
+{
+    host_block *b = NULL;
+    if (SDM_ALLOC(&b, 1, "plug-in data", &c->err)) return NULL;
+    b->next = c->blocks;
+    c->blocks = b;
+    return b;
+}
+
+static int give(sdm_mesh *m, sdm_mesh_out *out)
+{
+    *out = (sdm_mesh_out){.vert = m->vert, .tri = m->tri, .n_vert = m->n_vert, .n_tri = m->n_tri};
+    return 0;
+}
+
+static int reserve(const sdm_host *host, sdm_mesh_out *out, size_t n_vert, size_t n_tri)
+{
+    host_call *c = call_of(host);
+    sdm_mesh *m = c->mesh;
+    if (!m) {
+        host_block *b = new_block(c);
+        if (!b) return (int)SDM_E_NOMEM;
+        m = &b->mesh;
+    }
+    const sdm_status s = sdm_mesh_reserve(m, n_vert, n_tri, &c->err);
+    return s ? (int)s : give(m, out);
+}
+
+static int fail(const sdm_host *host, const char *text)
+{
+    return (int)sdm_fail(&call_of(host)->err, SDM_E_PLUGIN, "%s", text ? text : "no reason given");
+}
+
+// the files of a shape are read once, in create(): a mesh must not depend on what a file holds at that moment
+static int refuse_file(host_call *c, const char *path)
+{
+    return (int)sdm_fail(&c->err, SDM_E_PLUGIN, "%s: files are read in create() alone", path);
+}
+
+static int read_file(const sdm_host *host, const char *path, const unsigned char **data, size_t *size)
+{
+    host_call *c = call_of(host);
+    if (!c->files) return refuse_file(c, path);
+    host_block *b = new_block(c);
+    if (!b) return (int)SDM_E_NOMEM;
+    uint8_t *bytes = NULL;
+    const sdm_status s = sdm_file_read(path, DATA_FILE_MAX, &bytes, size, &c->err);
+    b->data = bytes;
+    *data = bytes;
+    return (int)s;
+}
+
+static int read_mesh(const sdm_host *host, const char *path, sdm_mesh_out *out)
+{
+    host_call *c = call_of(host);
+    if (!c->files) return refuse_file(c, path);
+    host_block *b = new_block(c);
+    if (!b) return (int)SDM_E_NOMEM;
+    const sdm_status s = sdm_mesh_read(path, &b->mesh, &c->err);
+    return s ? (int)s : give(&b->mesh, out);
+}
+
+static int read_npy(const sdm_host *host, const char *path, const double **values, size_t shape[4], int *n_dim)
+{
+    host_call *c = call_of(host);
+    if (!c->files) return refuse_file(c, path);
+    host_block *b = new_block(c);
+    if (!b) return (int)SDM_E_NOMEM;
+    double *numbers = NULL;
+    const sdm_status s = sdm_npy_read(path, &numbers, shape, n_dim, &c->err);
+    b->data = numbers;
+    *values = numbers;
+    return (int)s;
+}
+
+void sdm_host_call_begin(host_call *c, sdm_mesh *mesh, bool files)
+{
+    // not the error's text, which is long: this runs once a mesh
+    c->host = (sdm_host){.abi = SDM_SHAPE_ABI,
+                         .size = (uint32_t)sizeof(sdm_host),
+                         .ctx = c,
+                         .reserve = reserve,
+                         .fail = fail,
+                         .read_file = read_file,
+                         .read_mesh = read_mesh,
+                         .read_npy = read_npy};
+    c->mesh = mesh;
+    c->files = files;
+    c->blocks = NULL;
+    c->err.status = SDM_OK;
+    c->err.text[0] = '\0';
+}
+
+void sdm_host_call_end(host_call *c)
+{
+    while (c->blocks) {
+        host_block *b = c->blocks;
+        c->blocks = b->next;
+        sdm_free(b->data);
+        sdm_mesh_dispose(&b->mesh);
+        sdm_free(b);
+    }
+}
+
+sdm_status sdm_host_call_failed(const host_call *c, const char *callback, int returned, sdm_status otherwise,
+                                sdm_error *err)
+{
+    if (c->err.status == SDM_OK)
+        return sdm_fail(err, otherwise, "%s() returned %d without a reason", callback, returned);
+    return sdm_fail(err, c->err.status == SDM_E_NOMEM ? SDM_E_NOMEM : otherwise, "%s", c->err.text);
+}

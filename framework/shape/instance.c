@@ -1,0 +1,179 @@
+/* A shape with its options fixed: checks before and after every call of a plug-in. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "sdm/memory.h"
+#include "sdm/text.h"
+#include "shape_internal.h"
+
+static sdm_status run_create(sdm_instance *s, sdm_error *err)
+{
+    if (!s->shape->create) return SDM_OK;
+    host_call call;
+    sdm_host_call_begin(&call, NULL, true);
+    const int failed = s->shape->create(&call.host, s->options, &s->self);
+    sdm_status status = SDM_OK;
+    if (failed) {
+        s->self = NULL;
+        sdm_host_call_failed(&call, "create", failed, SDM_E_PLUGIN, err);
+        status =
+            sdm_fail_in(err, call.err.status == SDM_E_NOMEM ? SDM_E_NOMEM : SDM_E_PLUGIN, "shape '%s'", s->shape->name);
+    }
+    sdm_host_call_end(&call);
+    return status;
+}
+
+static sdm_status run_describe(sdm_instance *s, sdm_error *err)
+{
+    s->params = s->shape->params;
+    s->n_params = s->shape->n_params;
+    if (!s->shape->describe) return SDM_OK;
+    const sdm_param *params = NULL;
+    uint32_t n = 0;
+    s->shape->describe(s->self, &params, &n);
+    char who[96];
+    snprintf(who, sizeof who, "shape '%s', describe()", s->shape->name);
+    const sdm_status status =
+        n ? sdm_shape_check_params(who, params, n, err) : sdm_fail(err, SDM_E_PLUGIN, "%s: no parameters", who);
+    s->params = params;
+    s->n_params = n;
+    return status;
+}
+
+sdm_status sdm_instance_create(const sdm_shape *shape, const sdm_named_text *options, size_t n_options,
+                               const char *base_dir, sdm_instance **out, sdm_error *err)
+{
+    if (!out) return sdm_fail(err, SDM_E_ARG, "no place for the instance");
+    *out = NULL;
+    if (!shape || (n_options && !options))
+        return sdm_fail(err, SDM_E_ARG, "a shape and its options are needed to make an instance");
+    sdm_instance *s = NULL;
+    sdm_status status = SDM_ALLOC(&s, 1, "instance", err);
+    if (status) return status;
+    s->shape = shape;
+    status = SDM_ALLOC(&s->options, shape->n_options, "option values", err);
+    if (!status) status = sdm_shape_parse_options(shape, options, n_options, base_dir, s->options, &s->text, err);
+    if (!status) status = run_create(s, err);
+    if (!status) status = run_describe(s, err);
+    if (status)
+        sdm_instance_free(s);
+    else
+        *out = s;
+    return status;
+}
+
+void sdm_instance_free(sdm_instance *s)
+{
+    if (!s) return;
+    if (s->self && s->shape->destroy) s->shape->destroy(s->self);
+    sdm_free(s->text);
+    sdm_free(s->options);
+    sdm_free(s);
+}
+
+const sdm_shape *sdm_instance_shape(const sdm_instance *s) { return s->shape; }
+
+const sdm_param *sdm_instance_params(const sdm_instance *s, size_t *n)
+{
+    if (n) *n = s->n_params;
+    return s->params;
+}
+
+const sdm_option_value *sdm_instance_options(const sdm_instance *s) { return s->options; }
+
+int sdm_instance_param_index(const sdm_instance *s, const char *name)
+{
+    for (size_t i = 0; name && i < s->n_params; i++)
+        if (strcmp(s->params[i].name, name) == 0) return (int)i;
+    return -1;
+}
+
+sdm_status sdm_instance_check(const sdm_instance *s, const double *p, sdm_error *err)
+{
+    if (!s || !p) return sdm_fail(err, SDM_E_ARG, "an instance and its parameters are needed");
+    for (size_t i = 0; i < s->n_params; i++) {
+        const sdm_param *q = &s->params[i];
+        if (p[i] >= q->min && p[i] <= q->max) continue; // false for NaN
+        char value[32], min[32], max[32];
+        return sdm_fail(err, SDM_E_RANGE, "parameter '%s' of shape '%s' is %s%s%s, need %s .. %s", q->name,
+                        s->shape->name, sdm_format_real(p[i], value), q->unit[0] ? " " : "", q->unit,
+                        sdm_format_real(q->min, min), sdm_format_real(q->max, max));
+    }
+    return SDM_OK;
+}
+
+sdm_status sdm_instance_fail_at(const sdm_instance *s, const double *p, sdm_status status, sdm_error *err)
+{
+    char where[480];
+    size_t n = (size_t)snprintf(where, sizeof where, "shape '%s' at", s->shape->name);
+    for (size_t i = 0; i < s->n_params; i++) {
+        char value[32], word[112];
+        const int length = snprintf(word, sizeof word, " %s=%s", s->params[i].name, sdm_format_real(p[i], value));
+        if (n + (size_t)length + 5 > sizeof where) {
+            memcpy(where + n, " ...", 5);
+            break;
+        }
+        memcpy(where + n, word, (size_t)length + 1);
+        n += (size_t)length;
+    }
+    return sdm_fail_in(err, status, "%s", where);
+}
+
+// what the plug-in wrote, against what it was given room for
+static sdm_status check_mesh(const sdm_mesh *m, const sdm_mesh_out *out, sdm_error *err)
+{
+    if (!out->vert || out->vert != m->vert || out->tri != m->tri || out->n_vert != m->n_vert || out->n_tri != m->n_tri)
+        return sdm_fail(err, SDM_E_PLUGIN,
+                        "mesh() must fill what reserve() gave, and leave sizes and pointers as they are");
+    if (m->n_tri == 0) return sdm_fail(err, SDM_E_PLUGIN, "the mesh has no triangle");
+    for (size_t i = 0; i < 3 * m->n_tri; i++)
+        if (m->tri[i] >= m->n_vert)
+            return sdm_fail(err, SDM_E_PLUGIN, "triangle %zu has vertex %lu, but there are %zu vertices", i / 3,
+                            (unsigned long)m->tri[i], m->n_vert);
+    for (size_t i = 0; i < 3 * m->n_vert; i++)
+        if (!isfinite(m->vert[i]))
+            return sdm_fail(err, SDM_E_PLUGIN, "vertex %zu has a coordinate that is not finite", i / 3);
+    return SDM_OK;
+}
+
+sdm_status sdm_instance_mesh(const sdm_instance *s, const double *p, sdm_mesh *out, sdm_error *err)
+{
+    sdm_status status = sdm_instance_check(s, p, err);
+    if (status) return status;
+    if (!out) return sdm_fail(err, SDM_E_ARG, "no place for the mesh");
+    out->n_vert = out->n_tri = 0;
+    sdm_mesh_out filled = {0};
+    host_call call;
+    sdm_host_call_begin(&call, out, false);
+    const int failed = s->shape->mesh(s->self, &call.host, s->options, p, &filled);
+    status = failed ? sdm_host_call_failed(&call, "mesh", failed, SDM_E_PLUGIN, err) : check_mesh(out, &filled, err);
+    sdm_host_call_end(&call);
+    if (!status) return SDM_OK;
+    out->n_vert = out->n_tri = 0;
+    return sdm_instance_fail_at(s, p, status, err);
+}
+
+sdm_status sdm_instance_distance(const sdm_instance *s, const double *p, const double x[3], double *distance,
+                                 sdm_error *err)
+{
+    sdm_status status = sdm_instance_check(s, p, err);
+    if (status) return status;
+    if (!x || !distance) return sdm_fail(err, SDM_E_ARG, "a point and a place for the distance are needed");
+    if (!s->shape->distance)
+        return sdm_fail(err, SDM_E_UNSUPPORTED, "shape '%s' has no closed-form distance", s->shape->name);
+    if (!isfinite(x[0]) || !isfinite(x[1]) || !isfinite(x[2]))
+        return sdm_fail(err, SDM_E_ARG, "the point is not finite");
+    host_call call;
+    sdm_host_call_begin(&call, NULL, false);
+    double d = NAN;
+    const int failed = s->shape->distance(s->self, &call.host, s->options, p, x, &d);
+    if (failed) // a shape may have a closed form for some of its options only
+        status = sdm_host_call_failed(&call, "distance", failed, SDM_E_UNSUPPORTED, err);
+    else if (!isfinite(d))
+        status = sdm_fail(err, SDM_E_PLUGIN, "distance() gives a number that is not finite");
+    sdm_host_call_end(&call);
+    if (status) return sdm_instance_fail_at(s, p, status, err);
+    *distance = d;
+    return SDM_OK;
+}

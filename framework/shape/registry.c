@@ -1,0 +1,114 @@
+/* The set of known shapes. */
+#include <dlfcn.h>
+#include <string.h>
+
+#include "sdm/memory.h"
+#include "sdm/text.h"
+#include "shape_internal.h"
+
+typedef struct entry {
+    sdm_shape shape;
+    char *origin;
+} entry;
+
+struct sdm_registry {
+    entry **entries; /* pointers, so that a shape keeps its address */
+    size_t count, capacity;
+    void **objects; /* of dlopen() */
+    size_t n_objects;
+};
+
+sdm_status sdm_registry_create(sdm_registry **out, sdm_error *err) { return SDM_ALLOC(out, 1, "shape registry", err); }
+
+void sdm_registry_shrink(sdm_registry *r, size_t count)
+{
+    while (r->count > count) {
+        entry *e = r->entries[--r->count];
+        sdm_free(e->origin);
+        sdm_free(e);
+    }
+}
+
+void sdm_registry_free(sdm_registry *r)
+{
+    if (!r) return;
+    sdm_registry_shrink(r, 0);
+    for (size_t i = r->n_objects; i-- > 0;) dlclose(r->objects[i]);
+    sdm_free(r->objects);
+    sdm_free(r->entries);
+    sdm_free(r);
+}
+
+sdm_status sdm_registry_keep(sdm_registry *r, void *object, sdm_error *err)
+{
+    const sdm_status s =
+        sdm_grow((void **)&r->objects, r->n_objects, r->n_objects + 1, sizeof *r->objects, "plug-ins", err);
+    if (s) return s;
+    r->objects[r->n_objects++] = object;
+    return SDM_OK;
+}
+
+static sdm_status make_room(sdm_registry *r, sdm_error *err)
+{
+    if (r->count < r->capacity) return SDM_OK;
+    const size_t capacity = r->capacity ? 2 * r->capacity : 16;
+    const sdm_status s =
+        sdm_grow((void **)&r->entries, r->capacity, capacity, sizeof *r->entries, "shape registry", err);
+    if (!s) r->capacity = capacity;
+    return s;
+}
+
+sdm_status sdm_registry_add(sdm_registry *r, const sdm_shape *shape, const char *origin, sdm_error *err)
+{
+    if (!r || !shape || !origin)
+        return sdm_fail(err, SDM_E_ARG, "registry, shape and origin are needed to add a shape");
+    sdm_shape checked;
+    sdm_status s = sdm_shape_copy_checked(shape, origin, &checked, err);
+    if (s) return s;
+    for (size_t i = 0; i < r->count; i++)
+        if (strcmp(r->entries[i]->shape.name, checked.name) == 0)
+            return sdm_fail(err, SDM_E_PLUGIN, "%s: shape '%s' is there already (%s)", origin, checked.name,
+                            r->entries[i]->origin);
+
+    s = make_room(r, err);
+    if (s) return s;
+    entry *e = NULL;
+    s = SDM_ALLOC(&e, 1, "shape", err);
+    if (s) return s;
+    s = SDM_ALLOC(&e->origin, strlen(origin) + 1, "origin of a shape", err);
+    if (s) {
+        sdm_free(e);
+        return s;
+    }
+    strcpy(e->origin, origin);
+    e->shape = checked;
+    r->entries[r->count++] = e;
+    return SDM_OK;
+}
+
+size_t sdm_registry_count(const sdm_registry *r) { return r ? r->count : 0; }
+
+const sdm_shape *sdm_registry_at(const sdm_registry *r, size_t index)
+{
+    return r && index < r->count ? &r->entries[index]->shape : NULL;
+}
+
+const char *sdm_registry_origin(const sdm_registry *r, size_t index)
+{
+    return r && index < r->count ? r->entries[index]->origin : NULL;
+}
+
+const sdm_shape *sdm_registry_find(const sdm_registry *r, const char *name, const char **nearest)
+{
+    if (nearest) *nearest = NULL;
+    if (!r || !name) return NULL;
+    for (size_t i = 0; i < r->count; i++)
+        if (strcmp(r->entries[i]->shape.name, name) == 0) return &r->entries[i]->shape;
+    const char **names = NULL;
+    if (nearest && SDM_ALLOC(&names, r->count, "names", NULL) == SDM_OK) {
+        for (size_t i = 0; i < r->count; i++) names[i] = r->entries[i]->shape.name;
+        *nearest = sdm_nearest_name(name, names, r->count);
+    }
+    sdm_free((void *)names);
+    return NULL;
+}

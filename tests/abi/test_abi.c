@@ -1,0 +1,364 @@
+/* The plug-in interface is frozen: layout of version 1, tables of other sizes, and shared objects good and bad. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "sdm/builtin_shapes.h"
+#include "sdm/mesh.h"
+
+#ifndef PLUGIN_FOLDER
+#define PLUGIN_FOLDER "plugins" /* one folder a variant of bad_plugin.c, and good/octahedron.so */
+#endif
+
+/* Version 1 as it was published. Never edit these: a difference to sdm/shape.h must stop the compiler. */
+struct param_v1 {
+    const char *name, *unit;
+    double min, max, def;
+    const char *help;
+};
+struct option_v1 {
+    const char *name;
+    int type;
+    const char *unit;
+    double min, max, def;
+    const char *choices, *help;
+};
+struct option_value_v1 {
+    double number;
+    const char *text;
+};
+struct mesh_out_v1 {
+    double *vert;
+    uint32_t *tri;
+    size_t n_vert, n_tri;
+};
+struct host_v1 {
+    uint32_t abi, size;
+    void *ctx;
+    int (*reserve)(const struct sdm_host *, sdm_mesh_out *, size_t, size_t);
+    int (*fail)(const struct sdm_host *, const char *);
+    int (*read_file)(const struct sdm_host *, const char *, const unsigned char **, size_t *);
+    int (*read_mesh)(const struct sdm_host *, const char *, sdm_mesh_out *);
+    int (*read_npy)(const struct sdm_host *, const char *, const double **, size_t[4], int *);
+};
+struct shape_v1 {
+    uint32_t abi, size;
+    const char *name, *summary;
+    const sdm_param *params;
+    uint32_t n_params;
+    const sdm_option *options;
+    uint32_t n_options;
+    int (*create)(const sdm_host *, const sdm_option_value *, void **);
+    void (*destroy)(void *);
+    void (*describe)(const void *, const sdm_param **, uint32_t *);
+    int (*mesh)(const void *, const sdm_host *, const sdm_option_value *, const double *, sdm_mesh_out *);
+    int (*velocity)(const void *, const sdm_host *, const sdm_option_value *, const double *, size_t, double *);
+    int (*distance)(const void *, const sdm_host *, const sdm_option_value *, const double *, const double[3],
+                    double *);
+};
+
+#define SAME(v1, now, field) _Static_assert(offsetof(struct v1, field) == offsetof(now, field), #field " has moved")
+_Static_assert(SDM_SHAPE_ABI == 1, "a new interface version needs a frozen copy of its own");
+// tables of the plug-in that are read by index cannot grow at all; the others may grow at the end
+_Static_assert(sizeof(struct param_v1) == sizeof(sdm_param), "sdm_param has changed");
+_Static_assert(sizeof(struct option_v1) == sizeof(sdm_option), "sdm_option has changed");
+_Static_assert(sizeof(struct option_value_v1) == sizeof(sdm_option_value), "sdm_option_value has changed");
+_Static_assert(sizeof(struct mesh_out_v1) == sizeof(sdm_mesh_out), "sdm_mesh_out has changed");
+_Static_assert(sizeof(struct host_v1) <= sizeof(sdm_host), "sdm_host has shrunk");
+_Static_assert(sizeof(struct shape_v1) <= sizeof(sdm_shape), "sdm_shape has shrunk");
+SAME(param_v1, sdm_param, unit);
+SAME(param_v1, sdm_param, min);
+SAME(param_v1, sdm_param, max);
+SAME(param_v1, sdm_param, def);
+SAME(param_v1, sdm_param, help);
+SAME(option_v1, sdm_option, type);
+SAME(option_v1, sdm_option, unit);
+SAME(option_v1, sdm_option, min);
+SAME(option_v1, sdm_option, max);
+SAME(option_v1, sdm_option, def);
+SAME(option_v1, sdm_option, choices);
+SAME(option_v1, sdm_option, help);
+SAME(option_value_v1, sdm_option_value, text);
+SAME(mesh_out_v1, sdm_mesh_out, tri);
+SAME(mesh_out_v1, sdm_mesh_out, n_vert);
+SAME(mesh_out_v1, sdm_mesh_out, n_tri);
+SAME(host_v1, sdm_host, abi);
+SAME(host_v1, sdm_host, size);
+SAME(host_v1, sdm_host, ctx);
+SAME(host_v1, sdm_host, reserve);
+SAME(host_v1, sdm_host, fail);
+SAME(host_v1, sdm_host, read_file);
+SAME(host_v1, sdm_host, read_mesh);
+SAME(host_v1, sdm_host, read_npy);
+SAME(shape_v1, sdm_shape, abi);
+SAME(shape_v1, sdm_shape, size);
+SAME(shape_v1, sdm_shape, name);
+SAME(shape_v1, sdm_shape, summary);
+SAME(shape_v1, sdm_shape, params);
+SAME(shape_v1, sdm_shape, n_params);
+SAME(shape_v1, sdm_shape, options);
+SAME(shape_v1, sdm_shape, n_options);
+SAME(shape_v1, sdm_shape, create);
+SAME(shape_v1, sdm_shape, destroy);
+SAME(shape_v1, sdm_shape, describe);
+SAME(shape_v1, sdm_shape, mesh);
+SAME(shape_v1, sdm_shape, velocity);
+SAME(shape_v1, sdm_shape, distance);
+_Static_assert(SDM_OPTION_REAL == 0 && SDM_OPTION_INT == 1 && SDM_OPTION_CHOICE == 2 && SDM_OPTION_FILE == 3,
+               "option types");
+
+static sdm_registry *registry;
+static sdm_error err;
+
+static int set_up(void **state)
+{
+    (void)state;
+    return sdm_registry_create(&registry, NULL) != SDM_OK;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    sdm_registry_free(registry);
+    return 0;
+}
+
+static void has(const char *text)
+{
+    if (!strstr(err.text, text)) fail_msg("'%s' is not in '%s'", text, err.text);
+}
+
+static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
+                sdm_mesh_out *out)
+{
+    (void)self, (void)options;
+    const int failed = host->reserve(host, out, 4, 4);
+    if (failed) return failed;
+    static const uint32_t TRI[12] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+    memcpy(out->tri, TRI, sizeof TRI);
+    for (int i = 0; i < 12; i++) out->vert[i] = 0;
+    for (int k = 0; k < 3; k++) out->vert[3 * (k + 1) + k] = p[0];
+    return 0;
+}
+
+static const sdm_param PARAMS[] = {{"size", "mm", 1, 2, 1.5, "size"}};
+
+static struct shape_v1 table_v1(void)
+{
+    return (struct shape_v1){.abi = 1,
+                             .size = sizeof(struct shape_v1),
+                             .name = "old",
+                             .summary = "test",
+                             .params = PARAMS,
+                             .n_params = 1,
+                             .mesh = mesh};
+}
+
+// a table in a block of exactly its size: reading behind it is seen by the sanitizer
+static sdm_status add_block(const void *bytes, size_t size)
+{
+    void *block = malloc(size);
+    assert_non_null(block);
+    memcpy(block, bytes, size);
+    const sdm_status s = sdm_registry_add(registry, block, "block", &err);
+    free(block);
+    return s;
+}
+
+static void make_mesh_of(const sdm_shape *shape)
+{
+    sdm_instance *s = NULL;
+    sdm_mesh m = {0};
+    const double p = 1.25;
+    assert_int_equal(sdm_instance_create(shape, NULL, 0, NULL, &s, &err), SDM_OK);
+    assert_int_equal(sdm_instance_mesh(s, &p, &m, &err), SDM_OK);
+    assert_true(m.n_tri == 4 && m.vert[3] == 1.25);
+    sdm_mesh_dispose(&m);
+    sdm_instance_free(s);
+}
+
+static void test_table_of_version_1(void **state)
+{
+    (void)state;
+    const struct shape_v1 table = table_v1();
+    assert_int_equal(add_block(&table, sizeof table), SDM_OK);
+    make_mesh_of(sdm_registry_find(registry, "old", NULL));
+}
+
+// a table that ends behind mesh(): the rest counts as absent
+static void test_short_table(void **state)
+{
+    (void)state;
+    struct shape_v1 table = table_v1();
+    const size_t least = offsetof(struct shape_v1, mesh) + sizeof table.mesh;
+    table.size = (uint32_t)least;
+    assert_int_equal(add_block(&table, least), SDM_OK);
+    const sdm_shape *shape = sdm_registry_find(registry, "old", NULL);
+    assert_null(shape->velocity);
+    assert_null(shape->distance);
+    make_mesh_of(shape);
+
+    for (size_t size = 8; size < least; size += 4) {
+        table.size = (uint32_t)size;
+        table.name = "short";
+        assert_int_equal(add_block(&table, size), SDM_E_PLUGIN);
+        has("block: shape table of ");
+        has("set .size = sizeof(sdm_shape)");
+    }
+    table.size = 0;
+    assert_int_equal(add_block(&table, 8), SDM_E_PLUGIN);
+}
+
+// a table of a later version of this interface: what is behind ours is not looked at
+static void test_long_table(void **state)
+{
+    (void)state;
+    struct {
+        struct shape_v1 known;
+        void *later[4];
+    } table = {.known = table_v1(), .later = {&table, &table, &table, &table}};
+    table.known.size = sizeof table;
+    assert_int_equal(add_block(&table, sizeof table), SDM_OK);
+    const sdm_shape *shape = sdm_registry_find(registry, "old", NULL);
+    assert_int_equal(shape->size, sizeof(sdm_shape));
+    make_mesh_of(shape);
+}
+
+static void test_wrong_abi(void **state)
+{
+    (void)state;
+    const uint32_t bad[] = {0, 2, 0x01000000, UINT32_MAX};
+    for (size_t i = 0; i < 4; i++) {
+        const uint32_t lead[2] = {bad[i], sizeof(sdm_shape)}; // nothing behind the two words is touched
+        assert_int_equal(add_block(lead, sizeof lead), SDM_E_PLUGIN);
+        char text[128];
+        snprintf(text, sizeof text, "block: shape table of plug-in interface %u, this program has interface 1",
+                 (unsigned)bad[i]);
+        has(text);
+    }
+    assert_int_equal(sdm_registry_count(registry), 0);
+}
+
+static void load(const char *variant, sdm_status status, const char *text)
+{
+    char path[512];
+    snprintf(path, sizeof path, "%s/%s/plugin.so", PLUGIN_FOLDER, variant);
+    err.text[0] = '\0';
+    const size_t before = sdm_registry_count(registry);
+    assert_int_equal(sdm_registry_load(registry, path, &err), status);
+    has(variant); // the file is named
+    has(text);
+    assert_int_equal(sdm_registry_count(registry), before); // all shapes of a file or none
+}
+
+static void test_bad_objects(void **state)
+{
+    (void)state;
+    assert_int_equal(sdm_builtin_shapes_add(registry, &err), SDM_OK);
+    load("wrong_abi", SDM_E_PLUGIN, "shape table of plug-in interface 2, this program has interface 1");
+    load("no_symbol", SDM_E_PLUGIN, "exports no function sdm_plugin_shape()");
+    load("no_shape", SDM_E_PLUGIN, "has no shape: sdm_plugin_shape(0) gives NULL");
+    load("endless", SDM_E_PLUGIN, "more than 256 shapes");
+    load("taken_name", SDM_E_PLUGIN, "shape 'torus' is there already (built in)");
+    load("second_bad", SDM_E_PLUGIN, "no callback mesh()");
+    load("undefined", SDM_E_PLUGIN, "a_function_that_nobody_has");
+    load("missing", SDM_E_PLUGIN, "No such file or directory");
+    assert_null(sdm_registry_find(registry, "lone", NULL));
+}
+
+static void put(const char *path, const void *bytes, size_t size)
+{
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    assert_int_equal(fwrite(bytes, 1, size, f), size);
+    assert_int_equal(fclose(f), 0);
+}
+
+static void test_not_an_object(void **state)
+{
+    (void)state;
+    static const char TEXT[] = "this is no shared object, however long it may go on to be", ELF[] = "\177ELF\2\1\1";
+    put("test_abi_text.so", TEXT, sizeof TEXT);
+    put("test_abi_cut.so", ELF, sizeof ELF);
+    put("test_abi_empty.so", TEXT, 0);
+    static const char *const FILES[] = {"test_abi_text.so", "test_abi_cut.so", "test_abi_empty.so"};
+    for (size_t i = 0; i < 3; i++) {
+        assert_int_equal(sdm_registry_load(registry, FILES[i], &err), SDM_E_PLUGIN);
+        has("cannot be loaded");
+        has(FILES[i]);
+        remove(FILES[i]);
+    }
+    assert_int_equal(sdm_registry_load(registry, ".", &err), SDM_E_PLUGIN); // a folder
+}
+
+// the example, from a relative path and as a folder of a search path
+static void test_good_object(void **state)
+{
+    (void)state;
+    assert_int_equal(sdm_registry_load_path(registry, ":" PLUGIN_FOLDER "/good:", &err), SDM_OK);
+    assert_int_equal(sdm_registry_count(registry), 1);
+    assert_int_equal(sdm_registry_origin(registry, 0)[0], '/'); // absolute
+    const sdm_shape *shape = sdm_registry_find(registry, "octahedron", NULL);
+    assert_non_null(shape);
+
+    sdm_instance *s = NULL;
+    assert_int_equal(sdm_instance_create(shape, NULL, 0, NULL, &s, &err), SDM_OK);
+    const double p = 3;
+    sdm_mesh m = {0};
+    sdm_audit a;
+    assert_int_equal(sdm_instance_mesh(s, &p, &m, &err), SDM_OK);
+    assert_int_equal(sdm_mesh_audit(&m, &a, &err), SDM_OK);
+    assert_true(a.manifold && !a.inverted && a.self_intersections == 0);
+    assert_true(fabs(a.volume - 4.0 / 3 * 27) < 1e-12); // 4/3 r^3
+    const double AT[][4] = {{0, 0, 0, -1.7320508075688772}, {5, 0, 0, 2}, {0, -3, 0, 0}, {2, 2, 2, 1.7320508075688772},
+                            {-3, 3, 0, 2.1213203435596424}, {1, 1, -1, 0}};
+    for (size_t i = 0; i < sizeof AT / sizeof *AT; i++) {
+        double d = 0;
+        assert_int_equal(sdm_instance_distance(s, &p, AT[i], &d, &err), SDM_OK);
+        assert_true(fabs(d - AT[i][3]) < 1e-12);
+    }
+    double v[18];
+    assert_int_equal(sdm_instance_velocity(s, &p, 6, v, &err), SDM_OK);
+    assert_true(fabs(v[0] - 1) < 1e-8 && fabs(v[3] + 1) < 1e-8 && fabs(v[1]) < 1e-8);
+    sdm_mesh_dispose(&m);
+    sdm_instance_free(s);
+    assert_int_equal(sdm_registry_load_path(registry, PLUGIN_FOLDER "/good", &err), SDM_E_PLUGIN); // a second time
+    has("shape 'octahedron' is there already (/");
+}
+
+// what is loaded first does not depend on the order of the folder; files of other names are passed over
+static void test_folder(void **state)
+{
+    (void)state;
+    mkdir("test_abi_folder", 0777);
+    put("test_abi_folder/b.so", "b", 1);
+    put("test_abi_folder/a.so", "a", 1);
+    put("test_abi_folder/readme.txt", "c", 1);
+    assert_int_equal(sdm_registry_load_path(registry, "test_abi_folder", &err), SDM_E_PLUGIN);
+    has("test_abi_folder/a.so cannot be loaded");
+    remove("test_abi_folder/a.so");
+    remove("test_abi_folder/b.so");
+    assert_int_equal(sdm_registry_load_path(registry, "test_abi_folder", &err), SDM_OK);
+    remove("test_abi_folder/readme.txt");
+    rmdir("test_abi_folder");
+}
+
+int main(void)
+{
+#define WITH_REGISTRY(test) cmocka_unit_test_setup_teardown(test, set_up, tear_down)
+    const struct CMUnitTest tests[] = {
+        WITH_REGISTRY(test_table_of_version_1), WITH_REGISTRY(test_short_table), WITH_REGISTRY(test_long_table),
+        WITH_REGISTRY(test_wrong_abi),          WITH_REGISTRY(test_bad_objects), WITH_REGISTRY(test_not_an_object),
+        WITH_REGISTRY(test_good_object),        WITH_REGISTRY(test_folder),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

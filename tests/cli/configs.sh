@@ -1,0 +1,64 @@
+#!/usr/bin/env bash
+# sdmgen config: the shipped configurations are right; every mistake has its line, with its place.
+. "$(dirname "$0")/common.sh"
+
+for config in "$source_folder"/configs/*.yaml; do
+    expect 0 - sdmgen config "$config"
+    has 'no mistakes$'
+    expect 0 - sdmgen config "$config" --dump
+    cp out resolved.yaml
+    expect 0 - sdmgen config "$config" --dump
+    cmp -s out resolved.yaml || bad "two dumps of $config differ"
+done
+cochlea=$source_folder/configs/cochlea.yaml
+expect 0 - sdmgen config "$cochlea" network.depth=4 --dump
+has '^  depth: 4$'
+expect 0 - sdmgen config "$cochlea" --seed 77 --dump
+has '^seed: 77$'
+expect 0 - sdmgen config --keys
+has 'network\.depth'
+expect 0 - sdmgen config --keys --markdown
+has '^\|.*network\.depth'
+
+# three mistakes: three lines, each with file, line and column, exit code 2
+cat >bad.yaml <<'END'
+shape:
+  name: cochlea
+grid:
+  size: [60, 50, 50]
+  spacing: 0.2
+network:
+  dpeth: 3
+  width: wide
+train:
+  minutes: 5
+  batch: -4
+END
+sdmgen config bad.yaml >out 2>err
+[ $? -eq 2 ] || bad 'three mistakes: wrong exit code'
+[ "$(wc -l <err)" -eq 3 ] || bad "three mistakes need three lines: $(cat err)"
+grep -Eq "^bad\.yaml:7:3: .*dpeth.*did you mean '(network\.)?depth'" err || bad "no line for dpeth: $(cat err)"
+grep -Eq '^bad\.yaml:8:[0-9]+: .*width' err || bad "no line for width: $(cat err)"
+grep -Eq '^bad\.yaml:11:[0-9]+: .*batch' err || bad "no line for batch: $(cat err)"
+sdmgen train bad.yaml --out never >out 2>err
+[ "$?,$(wc -l <err)" = 2,3 ] || bad "train must refuse it in the same way: $(cat err)"
+absent never
+
+expect 2 "^argument 'network.dpth=4': .*did you mean" sdmgen config "$cochlea" network.dpth=4
+expect 2 "unexpected argument 'depth', need key=value" sdmgen config "$cochlea" depth
+expect 1 'missing\.yaml' sdmgen config missing.yaml
+expect 2 'usage: sdmgen config' sdmgen config
+expect 2 'keys stands alone' sdmgen config "$cochlea" --keys
+
+# what only the shape knows
+base='shape: {name: %s}\ngrid: {size: [8, 8, 8], spacing: 1}\ntrain: {steps: 5}\n'
+# shellcheck disable=SC2059 # the format is the file
+printf "$base" cochlae >unknown.yaml
+expect 2 "^unknown\.yaml:1:[0-9]+: .*'cochlae'.*did you mean 'cochlea'" sdmgen config unknown.yaml
+# shellcheck disable=SC2059
+printf "$base" 'cochlea, options: {eer: left}' >option.yaml
+expect 2 "^option\.yaml:1:[0-9]+: .*'eer'" sdmgen config option.yaml
+# shellcheck disable=SC2059
+printf "$base" 'cochlea, ranges: {a: [1, 9]}' >range.yaml
+expect 2 '^range\.yaml:1:[0-9]+: .*a' sdmgen config range.yaml
+finish

@@ -1,0 +1,24 @@
+#!/usr/bin/env bash
+# The installed package: examples/consume is built against it, by CMake and by pkg-config, and uses a trained model.
+# Third argument: the build folder to install from.
+build=$3
+. "$(dirname "$0")/common.sh"
+model=../files-of-train/run/model.sdm
+
+cmake --install "$build" --prefix "$PWD/prefix" >log 2>&1 || bad "install: $(tail -n 3 log)"
+present prefix/bin/sdmgen prefix/share/man/man1/sdmgen.1 prefix/share/bash-completion/completions/sdmgen
+expect 0 - prefix/bin/sdmgen shapes
+expect 0 - prefix/bin/sdmgen info $model
+
+cmake -S "$source_folder/examples/consume" -B by-cmake -DCMAKE_PREFIX_PATH="$PWD/prefix" >log 2>&1 || bad "configure: $(tail -n 5 log)"
+cmake --build by-cmake >log 2>&1 || bad "build: $(tail -n 5 log)"
+expect 0 - by-cmake/consume $model
+has '^cochlea: -?[0-9.]+ mm in the middle voxel'
+expect 1 '^consume: .*missing\.sdm' by-cmake/consume missing.sdm
+
+pc=$(dirname "$(find prefix -name sdmgen.pc)")
+# shellcheck disable=SC2046 # flags are words
+PKG_CONFIG_PATH=$pc cc -std=c11 -Wall -Wextra -Werror -o by-pkg-config "$source_folder/examples/consume/main.c" \
+    $(PKG_CONFIG_PATH=$pc pkg-config --cflags --libs sdmgen) 2>log || bad "pkg-config: $(cat log)"
+expect 0 - env LD_LIBRARY_PATH="$(dirname "$pc")" ./by-pkg-config $model
+finish

@@ -1,0 +1,114 @@
+#!/usr/bin/env bash
+# sdmgen exact: values against closed forms, every output type, bad meshes, no partial files.
+. "$(dirname "$0")/common.sh"
+
+# floats FILE SKIP: the float32 values behind SKIP bytes, one a line
+floats() { od -An -v -t f4 -w4 -j "$2" "$1" | tr -d ' '; }
+
+# a cube of edge 4 around the origin; 7 x 7 x 7 voxels of 1 mm
+cat >cube.off <<'END'
+OFF
+8 12 0
+-2 -2 -2
+2 -2 -2
+2 2 -2
+-2 2 -2
+-2 -2 2
+2 -2 2
+2 2 2
+-2 2 2
+3 0 2 1
+3 0 3 2
+3 4 5 6
+3 4 6 7
+3 0 1 5
+3 0 5 4
+3 1 2 6
+3 1 6 5
+3 2 3 7
+3 2 7 6
+3 3 0 4
+3 3 4 7
+END
+grid=(--size '7,7,7' --spacing 1 --origin '-3,-3,-3')
+for method in exact naive; do
+    expect 0 - sdmgen exact --mesh cube.off "${grid[@]}" --method $method --quiet -o $method.npy --json
+    near "$(json voxels)" 343 0
+    near "$(json triangles)" 12 0
+    near "$(json min_mm)" -2 1e-6
+    near "$(json max_mm)" "$(awk 'BEGIN { print sqrt(3) }')" 1e-6
+    for key in ms_build ms_query ms_total threads sign_method union; do [ -n "$(json $key)" ] || bad "no $key"; done
+    # .npy: the header is a multiple of 64 bytes, 343 values end the file; closed form of a box, z slowest
+    floats $method.npy $(($(wc -c <$method.npy) - 343 * 4)) | awk '
+        { x = (NR - 1) % 7 - 3; y = int((NR - 1) / 7) % 7 - 3; z = int((NR - 1) / 49) - 3
+          a = (x < 0 ? -x : x) - 2; b = (y < 0 ? -y : y) - 2; c = (z < 0 ? -z : z) - 2
+          m = a; if (b > m) m = b; if (c > m) m = c
+          d = m > 0 ? sqrt((a > 0) * a * a + (b > 0) * b * b + (c > 0) * c * c) : m
+          if ($1 - d > 1e-6 || d - $1 > 1e-6) { print "voxel", NR, $1, d; wrong = 1 } }
+        END { exit wrong || NR != 343 }' || bad "$method: values differ from the closed form of a box"
+done
+cmp -s exact.npy naive.npy || echo 'exact and naive differ in the last bits (allowed)'
+
+# the same bits for any number of threads
+expect 0 - sdmgen exact --shape cochlea --size 20,20,20 --spacing 0.5 --json --quiet --threads 1
+one=$(json values_crc64)
+expect 0 - sdmgen exact --shape cochlea --size 20,20,20 --spacing 0.5 --json --quiet --threads 3
+[ "$one" = "$(json values_crc64)" ] || bad 'the values depend on the number of threads'
+near "$(json threads)" 3 0
+
+# the grid that fits the mesh: 64 voxels on the longest edge, nothing of the surface outside
+expect 0 - sdmgen exact --shape torus --json --quiet
+has '"size": \[[0-9]+, [0-9]+, [0-9]+\]'
+out_size=$(sed -n 's/.*"size": \[\([0-9, ]*\)\].*/\1/p' out | tr ',' '\n' | sort -n | tail -n 1)
+near "$out_size" 64 0
+awk -v max="$(json max_mm)" -v min="$(json min_mm)" 'BEGIN { exit !(min < 0 && max > 0) }' || bad 'the fitted grid misses the torus'
+
+# every type of output; names decide
+expect 0 - sdmgen exact --mesh cube.off "${grid[@]}" --quiet -o o.nii -o o.nii.gz -o o.nrrd -o o.mha -o o.ply -o o.stl -o o.obj \
+    -o o.off -o o.png
+present o.nii o.nii.gz o.nrrd o.mha o.ply o.stl o.obj o.off o.png
+expect 0 - sdmgen info o.ply
+has '^closed +yes'
+expect 0 - sdmgen info o.off --json
+near "$(json volume_mm3)" 64 16
+if sdmgen exact --mesh cube.off --quiet -o probe.vdb 2>err; then
+    expect 0 - sdmgen exact --shape torus --quiet -o t.vdb -o t2.vdb --half
+    expect 0 - sdmgen verify t.vdb
+    expect 0 - sdmgen info t.vdb
+    has 'torus'
+    expect 0 - sdmgen exact --shape torus --size 12,12,12 --spacing 3,3,4 --quiet --dense -o d.vdb
+    expect 0 - sdmgen verify d.vdb
+    expect 2 'dense' sdmgen exact --shape torus --size 12,12,12 --spacing 3,3,4 --quiet -o u.vdb
+    absent u.vdb
+    cp t.vdb cut.vdb
+    truncate -s -200 cut.vdb
+    expect 3 'cut\.vdb' sdmgen verify cut.vdb
+else
+    grep -q 'built without OpenVDB' err || bad "a .vdb fails: $(cat err)"
+fi
+
+# mistakes: one line, the right code, no file
+expect 2 'either --shape NAME or --mesh FILE' sdmgen exact -o x.npy
+expect 2 'either --shape NAME or --mesh FILE' sdmgen exact --shape torus --mesh cube.off -o x.npy
+expect 2 'belong to --shape' sdmgen exact --mesh cube.off -p a=1 -o x.npy
+expect 2 'an output is needed' sdmgen exact --shape torus
+expect 2 "output 'x.xyz': its name must end in" sdmgen exact --shape torus -o x.xyz
+expect 5 'nan' sdmgen exact --shape cochlea -p a=nan -o x.npy
+expect 1 'nowhere' sdmgen exact --mesh cube.off -o nowhere/x.npy
+expect 1 'missing\.ply' sdmgen exact --mesh missing.ply -o x.npy
+echo 'ply' >broken.ply
+expect 3 'broken\.ply' sdmgen exact --mesh broken.ply -o x.npy
+head -c 200 o.stl >broken.stl
+expect 3 'broken\.stl' sdmgen exact --mesh broken.stl -o x.npy
+expect 3 'unknown\.txt' bash -c 'cp cube.off unknown.txt; "$0" exact --mesh unknown.txt -o x.npy' "$program"
+sed 's/^2 2 2$/2 2 nan/' cube.off >nan.off
+expect 3 'nan\.off|finite' sdmgen exact --mesh nan.off -o x.npy
+head -n 19 cube.off | sed 's/^8 12 0/8 9 0/' >open.off
+expect 2 'crossings' sdmgen exact --mesh open.off --sign crossings --quiet -o x.npy
+# the sanitizer's allocator ends the program in place of failing
+grep -q __asan_init "$program" ||
+    expect 1 'memory|voxels|bytes' sdmgen exact --mesh cube.off --size 1000000,1000000,1000 --spacing 1 -o x.npy
+absent x.npy x.xyz nowhere
+expect 0 '^sdmgen: the mesh is open: [0-9]+ boundary edges' sdmgen exact --mesh open.off "${grid[@]}" -o open.npy
+expect 0 - sdmgen exact --mesh open.off "${grid[@]}" -o open.npy --quiet
+finish

@@ -1,0 +1,113 @@
+#!/usr/bin/env bash
+# generate, info, eval, verify on a trained model: outputs, parameters, tables of parameters, damaged files.
+. "$(dirname "$0")/common.sh"
+model=../files-of-train/run/model.sdm
+present $model
+
+expect 0 - sdmgen info $model
+has "of shape 'cochlea'"
+has '^parameters +a +2 \.\. 5 mm'
+expect 0 - sdmgen info $model --json
+for key in checksum train_seconds rmse_mm q99_mm weight_bytes; do [ -n "$(json $key)" ] || bad "info: no $key"; done
+
+# outputs
+expect 0 - sdmgen generate $model -p a=4.2 -p alpha=0.6 -o m.nii -o m.nii.gz -o m.nrrd -o m.mha -o m.npy -o m.ply -o m.png --json
+present m.nii m.nii.gz m.nrrd m.mha m.npy m.ply m.png
+near "$(json a)" 4.2 0
+near "$(json maps)" 1 0
+hash=$(json values_crc64)
+[ "$(wc -c <m.npy)" -ge $((16 * 14 * 12 * 4 + 64)) ] || bad 'm.npy is too small'
+expect 0 - sdmgen generate $model -p alpha=0.6 -p a=4.2 --threads 1 --json
+[ "$hash" = "$(json values_crc64)" ] || bad 'the values depend on the number of threads'
+if sdmgen generate $model -o m.vdb --quiet 2>err; then
+    expect 0 - sdmgen verify m.vdb
+    expect 0 - sdmgen info m.vdb
+    for text in cochlea 'a=' mm 'negative inside' LPS network; do has "$text"; done
+    size=$(wc -c <m.vdb)
+    wrong=0
+    for at in $((size / 3)) $((size / 2)) $((size * 2 / 3)); do
+        cp m.vdb flipped.vdb
+        byte=$(od -An -t u1 -j "$at" -N 1 m.vdb)
+        printf "$(printf '\\x%02x' $((byte ^ 4)))" | dd of=flipped.vdb bs=1 seek="$at" conv=notrunc status=none
+        sdmgen verify flipped.vdb >out 2>err
+        [ $? -eq 3 ] && wrong=$((wrong + 1))
+    done
+    [ $wrong -ge 2 ] || bad "flipped bits in a .vdb: only $wrong of 3 found"
+fi
+
+# parameters: named, in range, or by policy; never answered in silence
+expect 5 'a.*(7|range)' sdmgen generate $model -p a=7 -o x.npy
+expect 5 'nan' sdmgen generate $model -p a=nan -o x.npy
+expect 5 'inf' sdmgen generate $model -p a=1e999 --policy clamp -o x.npy
+expect 5 'a' sdmgen generate $model -p a=5.000000000000001 -o x.npy
+expect 2 "unknown parameter 'aa'" sdmgen generate $model -p aa=3 -o x.npy
+expect 2 'is not a number' sdmgen generate $model -p a=3mm -o x.npy
+expect 2 'an output is needed' sdmgen generate $model
+expect 2 'its name must end in' sdmgen generate $model -o x.txt
+expect 1 'nowhere' sdmgen generate $model -o nowhere/x.npy
+expect 1 'missing\.sdm' sdmgen generate missing.sdm -o x.npy
+absent x.npy x.txt nowhere
+expect 0 'moved into it' sdmgen generate $model -p a=7 --policy clamp -o c.npy --json
+near "$(json clamped)" 1 0
+expect 0 - sdmgen generate $model -p a=5 -o five.npy
+cmp -s c.npy five.npy || bad 'clamped differs from the end of the range'
+
+# tables: one output a row, all rows checked first
+printf 'alpha, a\n0.5, 3\n# a comment\n\n0.7,4.5\n' >rows.csv
+expect 0 - sdmgen generate $model --params rows.csv -p b=0.1 -o 'row%02d.npy' -o s.nii.gz --json
+present row01.npy row02.npy s-0001.nii.gz s-0002.nii.gz
+near "$(json maps)" 2 0
+expect 0 - sdmgen generate $model -p a=4.5 -p alpha=0.7 -p b=0.1 -o one.npy
+cmp -s one.npy row02.npy || bad 'row 2 differs from the same parameters one by one'
+printf 'alpha,a\n0.5,3\n0.7,9\n' >range.csv
+expect 5 'range\.csv: row 2: .*a.* 9' sdmgen generate $model --params range.csv -o 'x%d.npy'
+printf 'alpha,aa\n' >header.csv
+expect 3 "header\.csv:1: unknown parameter 'aa'" sdmgen generate $model --params header.csv -o x.npy
+printf 'alpha,a\n1\n' >short.csv
+expect 3 'short\.csv:2: 1 values, the header has 2' sdmgen generate $model --params short.csv -o x.npy
+printf 'alpha,a\n1,three\n' >word.csv
+expect 3 "word\.csv:2: 'three' is not a number" sdmgen generate $model --params word.csv -o x.npy
+printf '' >empty.csv
+expect 3 'empty\.csv: no header' sdmgen generate $model --params empty.csv -o x.npy
+absent x1.npy x2.npy x-0001.npy
+
+# measuring
+expect 0 - sdmgen eval $model --samples 3 --naive 1 --json --quiet --pictures pictures
+for key in mse_mm2 rmse_mm mae_mm max_abs_mm rmse_near_mm dice surface_mean_mm surface_hausdorff_mm ms_network ms_exact ms_naive \
+    threads samples; do
+    awk -v v="$(json $key)" 'BEGIN { exit !(v > 0) }' || bad "eval: $key is $(json $key)"
+done
+mse=$(json mse_mm2)
+near "$(json samples)" 3 0
+awk -v d="$(json dice)" -v m="$(json surface_mean_mm)" -v h="$(json surface_hausdorff_mm)" 'BEGIN { exit !(d <= 1 && m <= h) }' ||
+    bad "eval: dice $(json dice), surfaces $(json surface_mean_mm) $(json surface_hausdorff_mm)"
+present pictures/worst.png pictures/median.png
+expect 0 - sdmgen eval $model --samples 3 --naive 0 --json --quiet --threads 1
+[ "$mse" = "$(json mse_mm2)" ] || bad 'eval depends on the number of threads'
+expect 0 - sdmgen eval $model --samples 2 --naive 0 --quiet
+has '^  RMSE +[0-9.]+ mm$'
+expect 4 'MSE .* demanded at most' sdmgen eval $model --samples 2 --naive 0 --quiet --max-mse 1e-12
+expect 0 - sdmgen bench network $model --json
+awk -v v="$(json ms_network)" 'BEGIN { exit !(v > 0) }' || bad 'bench: no ms_network'
+sdmgen verify $model --quiet --samples 60 >out 2>err
+code=$?
+[ $code -eq 0 ] || [ $code -eq 4 ] || bad "verify: exit code $code: $(cat err)"
+has 'every checksum is right'
+
+# damaged models are never used
+size=$(wc -c <$model)
+for length in 0 1 7 8 40 200 $((size / 2)) $((size - 1)); do
+    head -c "$length" $model >cut.sdm
+    expect 3 'cut\.sdm' sdmgen generate cut.sdm -o x.npy
+done
+for at in 0 9 20 70 $((size / 3)) $((size / 2)) $((size - 1)); do
+    cp $model flipped.sdm
+    byte=$(od -An -t u1 -j "$at" -N 1 $model)
+    printf "$(printf '\\x%02x' $((byte ^ 16)))" | dd of=flipped.sdm bs=1 seek="$at" conv=notrunc status=none
+    expect 3 'flipped\.sdm' sdmgen generate flipped.sdm -o x.npy
+    expect 3 'flipped\.sdm' sdmgen verify flipped.sdm
+done
+(cat $model && echo more) >longer.sdm
+expect 3 'longer\.sdm' sdmgen info longer.sdm
+absent x.npy
+finish

@@ -1,0 +1,53 @@
+#!/usr/bin/env bash
+# sdmgen shapes and sdmgen mesh.
+. "$(dirname "$0")/common.sh"
+
+expect 0 - sdmgen shapes
+for shape in cochlea ellipsoid torus statistical; do has "^$shape "; done
+expect 0 - sdmgen shapes --json
+has '"name": "cochlea".*"name": "alpha", "unit": "mm", "min": 0, "max": 1\.2'
+expect 0 - sdmgen shapes cochlea
+for name in a alpha b phi; do has "^  $name +(mm|rad)? +-?[0-9]"; done
+expect 0 - sdmgen shapes cochlea --json
+has '"options": \['
+expect 2 "unknown shape 'cochlae'; did you mean 'cochlea'\?" sdmgen shapes cochlae
+expect 2 'O needs the NAME' sdmgen shapes -O a=1
+
+expect 0 - sdmgen mesh --shape torus -o t.ply -o t.stl -o t.obj -o t.off --audit
+has '^closed +yes'
+has '^self-intersections +0$'
+present t.ply t.stl t.obj t.off
+expect 0 - sdmgen mesh --shape torus --json
+triangles=$(json triangles)
+volume=$(json volume_mm3)
+for file in t.ply t.stl t.obj t.off; do
+    expect 0 - sdmgen info $file --json
+    near "$(json triangles)" "$triangles" 0
+    near "$(json volume_mm3)" "$volume" 1e-3
+done
+
+# parameters change the mesh; mistakes are named
+expect 0 - sdmgen mesh --shape cochlea -p a=3 -p phi=-0.2 --json
+small=$(json volume_mm3)
+expect 0 - sdmgen mesh --shape cochlea -p a=5 -p phi=-0.2 --json
+awk -v s="$small" -v l="$(json volume_mm3)" 'BEGIN { exit !(l > s && s > 0) }' || bad 'a larger a must give a larger cochlea'
+expect 2 'shape NAME is needed' sdmgen mesh -o t.ply
+expect 2 'an output is needed' sdmgen mesh --shape torus
+expect 2 "unknown parameter 'alhpa'; did you mean 'alpha'\?" sdmgen mesh --shape cochlea -p alhpa=1 -o x.ply
+expect 2 "parameter a: 'wide' is not a number" sdmgen mesh --shape cochlea -p a=wide -o x.ply
+expect 2 "parameter 'a' is given twice" sdmgen mesh --shape cochlea -p a=3 -p a=4 -o x.ply
+expect 2 "'a': need name=value" sdmgen mesh --shape cochlea -p a -o x.ply
+expect 2 'sdmgen: error: .*' sdmgen mesh --shape cochlea -O nonsense=1 -o x.ply
+expect 5 'a.* 9[^0-9].*2.*5' sdmgen mesh --shape cochlea -p a=9 -o x.ply
+expect 5 'a.* nan' sdmgen mesh --shape cochlea -p a=nan -o x.ply
+expect 5 'a' sdmgen mesh --shape cochlea -p a=1e999 -o x.ply
+expect 2 "its name must end in .ply" sdmgen mesh --shape torus -o x.vdb
+expect 2 "is given twice" sdmgen mesh --shape torus -o x.ply -o x.ply
+expect 1 'nowhere' sdmgen mesh --shape torus -o nowhere/x.ply
+absent x.ply x.vdb nowhere
+
+# plug-ins that are none
+echo 'not a library' >false.so
+expect 3 'false\.so' sdmgen shapes --plugin ./false.so
+expect 3 'missing\.so' sdmgen shapes --plugin ./missing.so
+finish

@@ -1,0 +1,43 @@
+#!/usr/bin/env bash
+# sdmgen train: a run folder, its protection, interrupt and resume. The tests of models use the run made here.
+. "$(dirname "$0")/common.sh"
+tiny=$source_folder/tests/cli/tiny.yaml
+
+sdmgen train "$tiny" --out run --json --quiet >out 2>err
+[ $? -eq 0 ] || bad "training failed: $(cat err)"
+[ ! -s err ] || bad "--quiet, but: $(cat err)"
+[ "$(wc -l <out)" -eq 1 ] || bad 'one line of JSON expected'
+present run/config.yaml run/metrics.jsonl run/model.sdm run/loss.png run/slices.png
+[ "$(json model)" = run/model.sdm ] || bad "model: $(json model)"
+awk -v s="$(json seconds)" -v m="$(json mse_mm2)" 'BEGIN { exit !(s > 0 && m > 0 && m < 1) }' || bad "seconds, mse_mm2: $(cat out)"
+
+# a finished run is safe
+before=$(cksum <run/model.sdm)
+expect 2 'run holds a trained model: go on with --resume, start anew with --force' sdmgen train "$tiny" --out run
+expect 2 'exclude each other' sdmgen train "$tiny" --out run --resume --force
+[ "$before" = "$(cksum <run/model.sdm)" ] || bad 'the model has changed'
+
+# an interrupt leaves a checkpoint, --resume goes on
+"$program" train "$tiny" train.steps=1000000000 --out stopped >out 2>err &
+pid=$!
+for _ in $(seq 300); do grep -q 'bases and' err && break || sleep 0.2; done
+sleep 1
+kill -TERM $pid
+wait $pid
+code=$?
+[ $code -eq 130 ] || bad "interrupted: exit code $code: $(cat err)"
+grep -q '^sdmgen: error: interrupted; a checkpoint is in stopped: go on with --resume' err || bad "no such notice: $(cat err)"
+present stopped/checkpoint.sdmc
+absent stopped/model.sdm
+expect 2 'stopped holds the checkpoint of a training' sdmgen train "$tiny" --out stopped
+expect 0 - sdmgen train "$tiny" --out stopped --resume --quiet
+present stopped/model.sdm
+expect 0 - sdmgen info stopped/model.sdm
+
+# mistakes
+expect 2 '^argument .network.dpth=4.: ' sdmgen train "$tiny" network.dpth=4 --out never
+expect 1 'missing.yaml' sdmgen train missing.yaml --out never
+touch file
+expect 1 'file' sdmgen train "$tiny" --out file/run --quiet
+absent never
+finish

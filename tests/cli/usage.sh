@@ -1,0 +1,62 @@
+#!/usr/bin/env bash
+# The command line itself: help, unknown words, bad values, texts made from the table of options.
+. "$(dirname "$0")/common.sh"
+
+expect 0 - sdmgen --version
+has '^sdmgen [0-9]+\.[0-9]+\.[0-9]+$'
+expect 0 - sdmgen --help
+for command in train generate exact mesh eval shapes info verify config bench help; do
+    has "^  $command "
+done
+for command in train generate exact mesh eval shapes info verify config bench help; do
+    expect 0 - sdmgen $command --help
+    has "^usage: sdmgen $command"
+    expect 0 - sdmgen help $command
+    has "^usage: sdmgen $command"
+    expect 2 "^sdmgen: error: $command: unknown option --nonsense; see sdmgen $command --help" sdmgen $command --nonsense
+done
+
+# mistakes: exit code 2 and what was meant
+expect 2 '^sdmgen: error: a command is needed' sdmgen
+expect 2 "unknown command 'trian'; did you mean 'train'\?" sdmgen trian
+expect 2 "unknown command 'xyzzy'; see sdmgen --help" sdmgen xyzzy
+expect 2 "unknown command 'evla'; did you mean 'eval'\?" sdmgen help evla
+expect 2 'unknown option --sampels; did you mean --samples\?' sdmgen eval model.sdm --sampels 3
+expect 2 'unknown option -x' sdmgen exact -x
+expect 2 'usage: sdmgen train CONFIG' sdmgen train
+expect 2 "unexpected argument 'b'" sdmgen info a b
+expect 2 'samples needs a value' sdmgen eval model.sdm --samples
+expect 2 "samples '0': need a whole number in 1 \.\." sdmgen eval model.sdm --samples 0
+expect 2 "samples '1.5': need a whole number" sdmgen eval model.sdm --samples=1.5
+expect 2 "size '1,2': need three whole numbers" sdmgen exact --shape torus --size 1,2
+expect 2 "size '1,2,x'" sdmgen exact --shape torus --size 1,2,x
+expect 2 "spacing 'nan': need one number or three" sdmgen exact --shape torus --spacing nan
+expect 2 "spacing '0'" sdmgen exact --shape torus --spacing 0
+expect 2 "origin '1,2': need three numbers" sdmgen exact --shape torus --origin 1,2
+expect 2 "sign 'guess': need one of auto\|crossings" sdmgen exact --shape torus --sign guess
+expect 2 'quiet=1: --quiet takes no value' sdmgen shapes --quiet=1
+expect 2 'threads: empty value' sdmgen shapes --threads=
+
+# results that cannot be written are a failure
+expect 1 'cannot write to standard output' bash -c '"$0" shapes >/dev/full' "$program"
+
+# texts from the table
+expect 0 - sdmgen help --completion
+cp out completion.bash
+expect 0 - bash -n completion.bash
+expect 0 - bash -c '. ./completion.bash; COMP_WORDS=(sdmgen eval --sam); COMP_CWORD=2; _sdmgen; echo "${COMPREPLY[@]}"'
+has '^--samples$'
+expect 0 - bash -c '. ./completion.bash; COMP_WORDS=(sdmgen exact --sign w); COMP_CWORD=3; _sdmgen; echo "${COMPREPLY[@]}"'
+has '^winding$'
+expect 0 - sdmgen help --man
+has '^\.TH SDMGEN 1'
+has '^\.B "\\-\\-keep\\-overlap"$'
+
+# the reference in the documentation is this text
+expect 0 - sdmgen help --markdown
+cp out reference.md
+sed -n '/^<!-- begin: sdmgen help --markdown -->$/,/^<!-- end -->$/p' "$source_folder/docs/command-line.md" | sed '1d;$d' >documented.md
+cmp -s reference.md documented.md ||
+    bad "docs/command-line.md is not up to date; put in the text of: sdmgen help --markdown"
+
+finish

@@ -34,7 +34,7 @@ if(SDM_VDB)
   list(APPEND CMAKE_MODULE_PATH "/usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB")
   find_package(OpenVDB QUIET COMPONENTS openvdb)
   if(NOT OpenVDB_FOUND)
-    message(FATAL_ERROR "OpenVDB not found: install libopenvdb-dev, or configure with -DSDM_VDB=OFF (no .vdb files)")
+    message(FATAL_ERROR "OpenVDB not found: install libopenvdb-dev and libboost-iostreams-dev, or configure with -DSDM_VDB=OFF (no .vdb files)")
   endif()
 endif()
 

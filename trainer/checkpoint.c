@@ -11,8 +11,8 @@
 
 // numbers of the "checkpoint" section, in this order
 typedef struct state {
-    double seconds, phase_started, last_evaluation, fit_end, loss, heldout_mse;
-    int64_t phase, step, phase_step, n_taken, n_weights;
+    double seconds, phase_started, last_evaluation, loss, heldout_mse;
+    int64_t phase, step, phase_step, n_start, n_taken, n_weights;
 } state;
 
 static void checkpoint_path(const trainer *t, char *path, size_t size) { snprintf(path, size, "%s/checkpoint.sdmc", t->folder); }
@@ -24,9 +24,9 @@ sdm_status checkpoint_write(trainer *t, sdm_error *err)
     char path[SDM_PATH_TEXT_MAX + 32];
     checkpoint_path(t, path, sizeof path);
     const parameters *p = weights_of(t, t->phase);
-    const state now = {.seconds = trainer_seconds(t), .phase_started = t->phase_started, .last_evaluation = t->last_evaluation,
-                       .fit_end = t->fit_end, .loss = t->loss, .heldout_mse = t->heldout_mse, .phase = t->phase, .step = t->step,
-                       .phase_step = t->phase_step, .n_taken = (int64_t)t->data.n_taken, .n_weights = (int64_t)p->n};
+    const state now = {.seconds = trainer_seconds(t), .phase_started = t->phase_started, .last_evaluation = t->last_evaluation, .loss = t->loss,
+                       .heldout_mse = t->heldout_mse, .phase = t->phase, .step = t->step,
+                       .phase_step = t->phase_step, .n_start = (int64_t)t->data.n_start, .n_taken = (int64_t)t->data.n_taken, .n_weights = (int64_t)p->n};
     sdm_text config = {0};
     sdm_config_dump(t->config, &config);
     if (config.failed) {
@@ -144,12 +144,17 @@ sdm_status checkpoint_read(trainer *t, bool *found, sdm_error *err)
         t->started -= then.seconds;
         t->phase_started = then.phase_started;
         t->last_evaluation = then.last_evaluation;
-        t->fit_end = then.fit_end;
         t->loss = then.loss;
         t->heldout_mse = then.heldout_mse;
         t->step = then.step;
         t->phase_step = then.phase_step;
         t->data.n_taken = (size_t)then.n_taken; // wanted; the caller makes them again
+        if (!s && (then.n_start < 0 || (size_t)then.n_start > t->data.n_start))
+            s = sdm_fail(err, SDM_E_FORMAT, "%s/checkpoint.sdmc: %lld maps before training", t->folder, (long long)then.n_start);
+        if (!s) {
+            t->data.n_online += t->data.n_start - (size_t)then.n_start;
+            t->data.n_start = (size_t)then.n_start;
+        }
         const sdm_section *metrics = find(&o, "metrics");
         if (!s && metrics->size) sdm_text_add(t->metrics, "%.*s", (int)metrics->size, (const char *)metrics->data);
     }

@@ -107,14 +107,14 @@ static bool on_caller_thread(void)
 #endif
 }
 
-sdm_status dataset_fill(dataset *d, int n_threads, void (*report)(void *user, size_t done, size_t all), bool (*cancelled)(void *user),
-                        void *user, sdm_error *err)
+sdm_status dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_error *err)
 {
+    enum { FEWEST = 128 }; // random maps that bases are made from in any case
     const size_t all = d->n_holdout + d->n_static + d->n_start;
     size_t done = 0;
     long failed = -1; // lowest failed sample: the message does not depend on scheduling
     sdm_error first = {0};
-    bool stop = false;
+    bool stop = false, enough = false;
 #ifdef _OPENMP
     if (n_threads == 0) n_threads = omp_get_max_threads();
 #pragma omp parallel num_threads(n_threads)
@@ -130,12 +130,16 @@ sdm_status dataset_fill(dataset *d, int n_threads, void (*report)(void *user, si
 #endif
         for (long i = 0; i < (long)all; i++) {
             const size_t at = (size_t)i;
-            bool skip;
+            bool skip, short_of_time;
 #ifdef _OPENMP
 #pragma omp atomic read
 #endif
             skip = stop;
-            if (skip) continue;
+#ifdef _OPENMP
+#pragma omp atomic read
+#endif
+            short_of_time = enough;
+            if (skip || (short_of_time && at >= d->n_holdout + d->n_static + FEWEST)) continue;
             sdm_status s = made;
             if (!s && at < d->n_holdout) {
                 double *p = d->holdout_params + at * d->n_params;
@@ -155,8 +159,9 @@ sdm_status dataset_fill(dataset *d, int n_threads, void (*report)(void *user, si
                 if (s && (failed < 0 || i < failed)) failed = i, first = mine;
                 if (s) stop = true;
                 done++;
-                if (report && on_caller_thread()) report(user, done, all);
-                if (cancelled && !stop && cancelled(user)) {
+                if (hooks->report && on_caller_thread()) hooks->report(hooks->user, done, all);
+                if (hooks->enough && hooks->enough(hooks->user)) enough = true;
+                if (hooks->cancelled && !stop && hooks->cancelled(hooks->user)) {
                     stop = true;
                     failed = (long)all;
                     sdm_fail(&first, SDM_E_CANCELLED, "stopped on request");
@@ -169,6 +174,10 @@ sdm_status dataset_fill(dataset *d, int n_threads, void (*report)(void *user, si
         if (err) *err = first;
         return first.status;
     }
-    d->n_taken = d->n_start;
+    // a map that was made has a scale; those behind the first that was not are made again during training
+    size_t made = 0;
+    while (made < d->n_start && d->scale[d->n_static + made] > 0) made++;
+    d->n_online += d->n_start - made;
+    d->n_taken = d->n_start = made;
     return SDM_OK;
 }

@@ -33,10 +33,16 @@ typedef struct dataset {
 sdm_status dataset_create(dataset *d, const sdm_config *config, sdm_error *err);
 void dataset_dispose(dataset *d);
 
-/* Makes all maps that are needed before training: held-out, static, start. report(user, done, all) is called by one thread now and then;
-   cancelled may be NULL. */
-sdm_status dataset_fill(dataset *d, int n_threads, void (*report)(void *user, size_t done, size_t all), bool (*cancelled)(void *user),
-                        void *user, sdm_error *err);
+/* What is asked of the caller while maps are made; every function may be NULL. */
+typedef struct fill_hooks {
+    void (*report)(void *user, size_t done, size_t all); /* on the calling thread */
+    bool (*cancelled)(void *user);
+    bool (*enough)(void *user); /* true: the rest of the start is left to be made during training (n_start and n_online change) */
+    void *user;
+} fill_hooks;
+
+/* Makes all maps that are needed before training: held-out, static, start. */
+sdm_status dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_error *err);
 
 /* Number of slots that hold a random map. */
 size_t dataset_random_slots(const dataset *d);

@@ -233,6 +233,13 @@ static sdm_status start_fit(trainer *t, sdm_error *err)
 
 static bool cancelled(void *user) { return trainer_cancelled(user); }
 
+// half of a time budget is enough for data; a resumed run makes the data it had
+static bool enough(void *user)
+{
+    const trainer *t = user;
+    return trainer_by_time(t) && trainer_seconds(t) > 0.5 * t->config->train.minutes * 60;
+}
+
 static sdm_status start_producer(trainer *t, sdm_error *err)
 {
     const dataset *d = &t->data;
@@ -276,7 +283,13 @@ static sdm_status run(trainer *t, bool resume, sdm_error *err)
     }
     const double resumed_seconds = trainer_seconds(t);
     t->phase = SDM_PHASE_DATA;
-    if (!s) s = dataset_fill(&t->data, t->n_threads, report_fill, cancelled, t, err);
+    const size_t start = t->data.n_start;
+    const fill_hooks hooks = {.report = report_fill, .cancelled = cancelled, .enough = found ? NULL : enough, .user = t};
+    if (!s) s = dataset_fill(&t->data, t->n_threads, &hooks, err);
+    if (!s && t->data.n_start < start)
+        trainer_message(t, "half of the budget is over after %zu of %zu random maps: training starts with these (lower data.start or raise "
+                           "train.minutes)",
+                        t->data.n_start, start);
     t->phase = SDM_PHASE_BASES;
     trainer_report(t, trainer_by_time(t) ? trainer_seconds(t) / (t->config->train.minutes * 60) : 0, 0, true);
     if (!s) s = bases_make(t, err);
@@ -292,12 +305,9 @@ static sdm_status run(trainer *t, bool resume, sdm_error *err)
         t->phase = from;
     } else {
         enter(t, SDM_PHASE_FIT);
-        const double total = t->config->train.minutes * 60;
-        t->fit_end = t->phase_started + (total - t->phase_started) * (1 - t->config->train.refine);
-        if (trainer_by_time(t) && t->phase_started > total / 2)
-            trainer_message(t, "making the data took %.0f s of a budget of %.0f s: lower data.start or raise train.minutes",
-                            t->phase_started, total);
     }
+    const double total = t->config->train.minutes * 60;
+    t->fit_end = t->phase_started + (total - t->phase_started) * (1 - t->config->train.refine);
     t->last_checkpoint = trainer_seconds(t);
     if (t->phase == SDM_PHASE_FIT) {
         if (found) s = checkpoint_weights(t, err);

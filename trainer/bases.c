@@ -43,8 +43,8 @@ static int by_value(const void *a, const void *b)
 }
 
 // mean and leading eigenvectors of one block over the first n slots
-static sdm_status block_basis(trainer *t, size_t index, size_t n, size_t keep, float *rows, float *covariance, float *vectors,
-                              double *values, sdm_error *err)
+static sdm_status block_basis(trainer *t, size_t index, size_t n, size_t keep, float *rows, float *covariance,
+                              float *vectors, double *values, sdm_error *err)
 {
     const sdm_pod_block *b = &t->blocks[index];
     const size_t voxels = voxels_of(b);
@@ -60,7 +60,8 @@ static sdm_status block_basis(trainer *t, size_t index, size_t n, size_t keep, f
         for (size_t v = 0; v < voxels; v++) rows[i * voxels + v] -= mean[v];
     sdm_gemm(voxels, voxels, n, (sdm_view){rows, 1, voxels}, (sdm_view){rows, voxels, 1}, false, covariance, voxels, 1);
     for (size_t i = 0; i < voxels * voxels; i++) covariance[i] /= (float)n;
-    return leading_eigenvectors(voxels, covariance, keep, t->config->seed, STREAM_BASES + 1 + index, vectors, values, err);
+    return leading_eigenvectors(voxels, covariance, keep, t->config->seed, STREAM_BASES + 1 + index, vectors, values,
+                                err);
 }
 
 // ranks: the functions that explain most over all blocks, at least one in each block
@@ -189,8 +190,10 @@ static sdm_status coefficients(const trainer *t, bool holdout, const size_t *slo
             if (holdout) {
                 for (size_t r = 0; r < n; r++)
                     for (size_t v = 0; v < voxels; v++)
-                        rows[r * voxels + v] = t->data.holdout[r * t->data.n_voxels + b->voxel + v] - t->mean[b->voxel + v];
-            } else load_slots(t, b, slots, n, rows);
+                        rows[r * voxels + v] =
+                            t->data.holdout[r * t->data.n_voxels + b->voxel + v] - t->mean[b->voxel + v];
+            } else
+                load_slots(t, b, slots, n, rows);
             sdm_gemm(n, b->rank, voxels, (sdm_view){rows, voxels, 1}, (sdm_view){basis + basis_at[i], 1, voxels}, false,
                      y + b->coefficient, k, 1);
         }
@@ -210,7 +213,8 @@ void trainer_phi(const trainer *t, const double *p, float *phi)
 }
 
 // target = (c - poly phi) / scale for n rows; c[n][R]
-static sdm_status leave(const trainer *t, size_t n, const float *phi, const float *c, float *const *targets, sdm_error *err)
+static sdm_status leave(const trainer *t, size_t n, const float *phi, const float *c, float *const *targets,
+                        sdm_error *err)
 {
     const size_t r = t->n_modes, f = t->arch.n_terms;
     float *fitted = NULL;
@@ -272,7 +276,8 @@ static sdm_status fit_polynomials(trainer *t, size_t n, const float *c, sdm_erro
     for (size_t i = 0; i < f; i++) a[i * f + i] += 1e-6 * (double)n;
     for (size_t i = 0; i < f * r; i++) b[i] = right[i];
     if (cholesky(f, a)) {
-        s = sdm_fail(err, SDM_E_CONFIG, "%s: %zu maps cannot determine polynomials of %zu terms: lower network.degree or raise data.start",
+        s = sdm_fail(err, SDM_E_CONFIG,
+                     "%s: %zu maps cannot determine polynomials of %zu terms: lower network.degree or raise data.start",
                      t->config->file, n, f);
         goto done;
     }

@@ -15,7 +15,10 @@ typedef struct state {
     int64_t phase, step, phase_step, n_start, n_taken, n_weights;
 } state;
 
-static void checkpoint_path(const trainer *t, char *path, size_t size) { snprintf(path, size, "%s/checkpoint.sdmc", t->folder); }
+static void checkpoint_path(const trainer *t, char *path, size_t size)
+{
+    snprintf(path, size, "%s/checkpoint.sdmc", t->folder);
+}
 
 static parameters *weights_of(trainer *t, int64_t phase) { return phase == SDM_PHASE_FIT ? &t->fit : &t->refine; }
 
@@ -24,23 +27,28 @@ sdm_status checkpoint_write(trainer *t, sdm_error *err)
     char path[SDM_PATH_TEXT_MAX + 32];
     checkpoint_path(t, path, sizeof path);
     const parameters *p = weights_of(t, t->phase);
-    const state now = {.seconds = trainer_seconds(t), .phase_started = t->phase_started, .last_evaluation = t->last_evaluation, .loss = t->loss,
-                       .heldout_mse = t->heldout_mse, .phase = t->phase, .step = t->step,
-                       .phase_step = t->phase_step, .n_start = (int64_t)t->data.n_start, .n_taken = (int64_t)t->data.n_taken, .n_weights = (int64_t)p->n};
+    const state now = {.seconds = trainer_seconds(t),
+                       .phase_started = t->phase_started,
+                       .last_evaluation = t->last_evaluation,
+                       .loss = t->loss,
+                       .heldout_mse = t->heldout_mse,
+                       .phase = t->phase,
+                       .step = t->step,
+                       .phase_step = t->phase_step,
+                       .n_start = (int64_t)t->data.n_start,
+                       .n_taken = (int64_t)t->data.n_taken,
+                       .n_weights = (int64_t)p->n};
     sdm_text config = {0};
     sdm_config_dump(t->config, &config);
     if (config.failed) {
         sdm_text_dispose(&config);
         return sdm_fail(err, SDM_E_NOMEM, "no memory for a checkpoint");
     }
-    const sdm_section sections[] = {{"meta", "kind=checkpoint\n", 16},
-                                    {"config", config.data, config.size},
-                                    {"checkpoint", &now, sizeof now},
-                                    {"metrics", t->metrics->data, t->metrics->size},
-                                    {"weights", p->w, p->n * sizeof *p->w},
-                                    {"moment1", p->m, p->n * sizeof *p->m},
-                                    {"moment2", p->v, p->n * sizeof *p->v},
-                                    {"average", p->average, p->n * sizeof *p->average}};
+    const sdm_section sections[] = {
+        {"meta", "kind=checkpoint\n", 16},      {"config", config.data, config.size},
+        {"checkpoint", &now, sizeof now},       {"metrics", t->metrics->data, t->metrics->size},
+        {"weights", p->w, p->n * sizeof *p->w}, {"moment1", p->m, p->n * sizeof *p->m},
+        {"moment2", p->v, p->n * sizeof *p->v}, {"average", p->average, p->n * sizeof *p->average}};
     uint8_t *bytes = NULL;
     size_t size = 0;
     sdm_status s = sdm_container_build(sections, sizeof sections / sizeof *sections, &bytes, &size, err);
@@ -79,8 +87,8 @@ static sdm_status open_checkpoint(const trainer *t, opened *o, bool *found, sdm_
     if (s) return s;
     s = sdm_container_parse(o->bytes, size, o->sections, o->names, &o->n, &checksum, err);
     const sdm_section *c = s ? NULL : find(o, "checkpoint");
-    if (!s && (!c || c->size != sizeof(state) || !find(o, "config") || !find(o, "metrics") || !find(o, "weights") || !find(o, "moment1") ||
-               !find(o, "moment2") || !find(o, "average")))
+    if (!s && (!c || c->size != sizeof(state) || !find(o, "config") || !find(o, "metrics") || !find(o, "weights") ||
+               !find(o, "moment1") || !find(o, "moment2") || !find(o, "average")))
         s = sdm_fail(err, SDM_E_FORMAT, "not a checkpoint of this version");
     if (s) {
         sdm_free(o->bytes);
@@ -115,10 +123,12 @@ static sdm_status same_config(const trainer *t, const sdm_section *stored, sdm_e
         neutral(now);
         sdm_config_dump(old, &a);
         sdm_config_dump(now, &b);
-        if (a.failed || b.failed) s = sdm_fail(err, SDM_E_NOMEM, "no memory to compare configs");
+        if (a.failed || b.failed)
+            s = sdm_fail(err, SDM_E_NOMEM, "no memory to compare configs");
         else if (!same_budget_kind || strcmp(a.data, b.data) != 0)
             s = sdm_fail(err, SDM_E_CONFIG,
-                         "%s: the config differs from that of the checkpoint in more than the length of the budget, output and threads: train "
+                         "%s: the config differs from that of the checkpoint in more than the length of the budget, "
+                         "output and threads: train "
                          "into another folder, or without --resume",
                          t->folder);
     }
@@ -150,7 +160,8 @@ sdm_status checkpoint_read(trainer *t, bool *found, sdm_error *err)
         t->phase_step = then.phase_step;
         t->data.n_taken = (size_t)then.n_taken; // wanted; the caller makes them again
         if (!s && (then.n_start < 0 || (size_t)then.n_start > t->data.n_start))
-            s = sdm_fail(err, SDM_E_FORMAT, "%s/checkpoint.sdmc: %lld maps before training", t->folder, (long long)then.n_start);
+            s = sdm_fail(err, SDM_E_FORMAT, "%s/checkpoint.sdmc: %lld maps before training", t->folder,
+                         (long long)then.n_start);
         if (!s) {
             t->data.n_online += t->data.n_start - (size_t)then.n_start;
             t->data.n_start = (size_t)then.n_start;
@@ -170,14 +181,17 @@ sdm_status checkpoint_weights(trainer *t, sdm_error *err)
     if (s) return s;
     if (!found) return sdm_fail(err, SDM_E_IO, "%s/checkpoint.sdmc: it has gone", t->folder);
     parameters *p = weights_of(t, t->phase);
-    const struct { const char *name; float *to; } arrays[] = {
-        {"weights", p->w}, {"moment1", p->m}, {"moment2", p->v}, {"average", p->average}};
+    const struct {
+        const char *name;
+        float *to;
+    } arrays[] = {{"weights", p->w}, {"moment1", p->m}, {"moment2", p->v}, {"average", p->average}};
     for (int i = 0; i < 4 && !s; i++) {
         const sdm_section *section = find(&o, arrays[i].name);
         if (section->size != p->n * sizeof(float))
-            s = sdm_fail(err, SDM_E_FORMAT, "%s/checkpoint.sdmc: %zu bytes of %s, the network has %zu", t->folder, section->size,
-                         arrays[i].name, p->n * sizeof(float));
-        else memcpy(arrays[i].to, section->data, section->size);
+            s = sdm_fail(err, SDM_E_FORMAT, "%s/checkpoint.sdmc: %zu bytes of %s, the network has %zu", t->folder,
+                         section->size, arrays[i].name, p->n * sizeof(float));
+        else
+            memcpy(arrays[i].to, section->data, section->size);
     }
     sdm_free(o.bytes);
     return s;

@@ -19,11 +19,14 @@ sdm_status dataset_create(dataset *d, const sdm_config *config, sdm_error *err)
     for (size_t i = 0; i < d->n_params && config->data.n_static_counts; i++) {
         const bool one_for_all = config->data.n_static_counts == 1;
         if (!one_for_all && config->data.n_static_counts != d->n_params)
-            return sdm_fail(err, SDM_E_CONFIG, "%s: data.static has %zu counts, the shape has %zu parameters: give one number or %zu",
+            return sdm_fail(err, SDM_E_CONFIG,
+                            "%s: data.static has %zu counts, the shape has %zu parameters: give one number or %zu",
                             config->file, config->data.n_static_counts, d->n_params, d->n_params);
         d->counts[i] = (size_t)config->data.static_counts[one_for_all ? 0 : i];
-        if (d->n_static > SIZE_MAX / 64 / d->counts[i]) d->n_static = SIZE_MAX / 64;
-        else d->n_static *= d->counts[i];
+        if (d->n_static > SIZE_MAX / 64 / d->counts[i])
+            d->n_static = SIZE_MAX / 64;
+        else
+            d->n_static *= d->counts[i];
     }
     d->n_start = (size_t)config->data.start;
     d->n_online = (size_t)config->data.online;
@@ -34,7 +37,8 @@ sdm_status dataset_create(dataset *d, const sdm_config *config, sdm_error *err)
     const double room = bytes / map_bytes - (double)d->n_static - 2.0 * (double)d->n_holdout;
     if (room < (double)d->n_start || room < 1)
         return sdm_fail(err, SDM_E_CONFIG,
-                        "%s: data.static (%zu maps), data.start (%zu) and data.holdout (%zu) need %.1f GB, data.memory_gb is %g: raise it or "
+                        "%s: data.static (%zu maps), data.start (%zu) and data.holdout (%zu) need %.1f GB, "
+                        "data.memory_gb is %g: raise it or "
                         "make fewer maps",
                         config->file, d->n_static, d->n_start, d->n_holdout,
                         ((double)d->n_static + (double)d->n_start + 2.0 * (double)d->n_holdout) * map_bytes * 1e-9,
@@ -93,7 +97,8 @@ static void static_params(const dataset *d, size_t index, double *p)
     for (size_t i = 0; i < d->n_params; i++) {
         const size_t n = d->counts[i], k = index % n;
         index /= n;
-        p[i] = n == 1 ? 0.5 * (d->min[i] + d->max[i]) : d->min[i] + (d->max[i] - d->min[i]) * (double)k / (double)(n - 1);
+        p[i] =
+            n == 1 ? 0.5 * (d->min[i] + d->max[i]) : d->min[i] + (d->max[i] - d->min[i]) * (double)k / (double)(n - 1);
         if (k + 1 == n && n > 1) p[i] = d->max[i];
     }
 }
@@ -148,8 +153,10 @@ sdm_status dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_
             } else if (!s) {
                 const size_t slot = at - d->n_holdout; // n_start <= n_ring: random sample k lies in slot n_static + k
                 double *p = d->params + slot * d->n_params;
-                if (slot < d->n_static) static_params(d, slot, p);
-                else sdm_sample_params(d->seed, STREAM_TRAIN, slot - d->n_static, d->min, d->max, d->n_params, p);
+                if (slot < d->n_static)
+                    static_params(d, slot, p);
+                else
+                    sdm_sample_params(d->seed, STREAM_TRAIN, slot - d->n_static, d->min, d->max, d->n_params, p);
                 s = workbench_packed_map(&w, d, p, d->maps + slot * d->n_voxels, &d->scale[slot], &mine);
             }
 #ifdef _OPENMP

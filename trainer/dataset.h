@@ -15,17 +15,17 @@ typedef struct dataset {
     size_t n_blocks, n_voxels, n_params;
     double min[SDM_POD_MAX_PARAMS], max[SDM_POD_MAX_PARAMS];
     uint64_t seed;
-    size_t counts[SDM_POD_MAX_PARAMS]; /* points of the static grid along each parameter */
+    size_t counts[SDM_POD_MAX_PARAMS];  /* points of the static grid along each parameter */
     size_t n_static, n_start, n_online; /* samples: static; random before training; random during it */
-    size_t n_ring;                      /* slots for random maps; they replace the oldest when there are more samples than slots */
-    size_t n_slots;                     /* n_static + n_ring */
-    size_t n_taken;                     /* random samples taken into the pool so far */
-    double *params;                     /* [n_slots][P] */
-    int16_t *maps;                      /* [n_slots][n_voxels] */
-    float *scale;                       /* [n_slots] mm per unit */
+    size_t n_ring;  /* slots for random maps; they replace the oldest when there are more samples than slots */
+    size_t n_slots; /* n_static + n_ring */
+    size_t n_taken; /* random samples taken into the pool so far */
+    double *params; /* [n_slots][P] */
+    int16_t *maps;  /* [n_slots][n_voxels] */
+    float *scale;   /* [n_slots] mm per unit */
     size_t n_holdout;
-    double *holdout_params;             /* [n_holdout][P] */
-    float *holdout;                     /* [n_holdout][n_voxels], block order, mm */
+    double *holdout_params; /* [n_holdout][P] */
+    float *holdout;         /* [n_holdout][n_voxels], block order, mm */
 } dataset;
 
 /* Fills the sizes and allocates; grid, blocks, shape, ranges and seed are set by the caller. SDM_E_CONFIG when the pool cannot hold the
@@ -37,7 +37,8 @@ void dataset_dispose(dataset *d);
 typedef struct fill_hooks {
     void (*report)(void *user, size_t done, size_t all); /* on the calling thread */
     bool (*cancelled)(void *user);
-    bool (*enough)(void *user); /* true: the rest of the start is left to be made during training (n_start and n_online change) */
+    bool (*enough)(
+        void *user); /* true: the rest of the start is left to be made during training (n_start and n_online change) */
     void *user;
 } fill_hooks;
 

@@ -59,9 +59,14 @@ static sdm_status measure(const trainer *t, const sdm_model *m, sdm_accuracy *ou
     if (!s) {
         const double n = (double)d->n_holdout * (double)d->n_voxels;
         qsort(each, d->n_holdout, sizeof *each, ascending);
-        *out = (sdm_accuracy){.samples = (int64_t)d->n_holdout, .mse_mm2 = square / n, .rmse_mm = sqrt(square / n), .mae_mm = absolute / n,
-                              .max_abs_mm = largest, .rmse_near_mm = n_near ? sqrt(near / (double)n_near) : 0,
-                              .q50_mm = quantile(each, d->n_holdout, 0.5), .q90_mm = quantile(each, d->n_holdout, 0.9),
+        *out = (sdm_accuracy){.samples = (int64_t)d->n_holdout,
+                              .mse_mm2 = square / n,
+                              .rmse_mm = sqrt(square / n),
+                              .mae_mm = absolute / n,
+                              .max_abs_mm = largest,
+                              .rmse_near_mm = n_near ? sqrt(near / (double)n_near) : 0,
+                              .q50_mm = quantile(each, d->n_holdout, 0.5),
+                              .q90_mm = quantile(each, d->n_holdout, 0.9),
                               .q99_mm = quantile(each, d->n_holdout, 0.99)};
     }
     sdm_free(each);
@@ -150,7 +155,8 @@ static sdm_status dump_config(const trainer *t, sdm_text *out, sdm_error *err)
     return out->failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the resolved config") : SDM_OK;
 }
 
-static void describe(const trainer *t, const sdm_text *config, option_texts *options, sdm_model_param *params, sdm_model_info *info)
+static void describe(const trainer *t, const sdm_text *config, option_texts *options, sdm_model_param *params,
+                     sdm_model_info *info)
 {
     size_t n;
     const sdm_param *p = sdm_instance_params(t->shape, &n);
@@ -162,9 +168,15 @@ static void describe(const trainer *t, const sdm_text *config, option_texts *opt
         params[i].def = fmin(fmax(p[i].def, params[i].min), params[i].max);
     }
     collect_options(t, options);
-    *info = (sdm_model_info){.n_params = n, .params = params, .n_options = options->n, .option_names = options->names,
-                             .option_values = options->values, .grid = t->config->grid, .seed = t->config->seed,
-                             .train_samples = (int64_t)(t->data.n_static + t->data.n_taken), .config = config->data};
+    *info = (sdm_model_info){.n_params = n,
+                             .params = params,
+                             .n_options = options->n,
+                             .option_names = options->names,
+                             .option_values = options->values,
+                             .grid = t->config->grid,
+                             .seed = t->config->seed,
+                             .train_samples = (int64_t)(t->data.n_static + t->data.n_taken),
+                             .config = config->data};
     // in step mode the file is the same bits in every run
     info->train_seconds = trainer_by_time(t) ? trainer_seconds(t) : 0;
     snprintf(info->shape, sizeof info->shape, "%s", sdm_instance_shape(t->shape)->name);
@@ -189,7 +201,10 @@ sdm_status export_model(trainer *t, sdm_train_report *report, sdm_error *err)
     describe(t, &config, &options, params, &info);
 
     const float *w = t->refine.average;
-    sdm_pod_spec spec = {.info = &info, .arch = t->arch, .blocks = t->blocks, .half = t->config->network.weights == SDM_WEIGHT_F16,
+    sdm_pod_spec spec = {.info = &info,
+                         .arch = t->arch,
+                         .blocks = t->blocks,
+                         .half = t->config->network.weights == SDM_WEIGHT_F16,
                          .weights = {.head = w + t->head_at, .mean = w + t->mean_at, .basis = w + t->basis_at}};
     for (size_t l = 0; l < t->arch.depth; l++) {
         spec.weights.layer[l] = mlp_layer(&t->arch, w, l);
@@ -212,8 +227,8 @@ sdm_status export_model(trainer *t, sdm_train_report *report, sdm_error *err)
     sdm_free(bytes);
     sdm_text_dispose(&config);
     if (!s && report) {
-        *report = (sdm_train_report){.accuracy = t->accuracy, .steps = t->step, .samples = info.train_samples,
-                                     .seconds = trainer_seconds(t)};
+        *report = (sdm_train_report){
+            .accuracy = t->accuracy, .steps = t->step, .samples = info.train_samples, .seconds = trainer_seconds(t)};
         snprintf(report->model_path, sizeof report->model_path, "%.*s", (int)sizeof report->model_path - 1, path);
     }
     return s;

@@ -11,10 +11,10 @@
 #include "trainer.h"
 
 typedef struct fit_batch {
-    float *x;        // [B][I]
-    float *target;   // [B][R]
+    float *x;         // [B][I]
+    float *target;    // [B][R]
     float *predicted; // [B][R], then its gradient
-    float *dh;       // [B][W]
+    float *dh;        // [B][W]
     float *workspace;
     float *gradient; // [n]
 } fit_batch;
@@ -46,8 +46,8 @@ static const float *predict(const trainer *t, const float *w, size_t rows, fit_b
 {
     const sdm_pod_arch *a = &t->arch;
     const float *h = mlp_forward(a, w, rows, b->x, b->workspace, trainer_threads(t));
-    sdm_gemm(rows, t->n_modes, a->width, (sdm_view){h, a->width, 1}, (sdm_view){w + mlp_count(a), 1, a->width}, false, b->predicted,
-             t->n_modes, trainer_threads(t));
+    sdm_gemm(rows, t->n_modes, a->width, (sdm_view){h, a->width, 1}, (sdm_view){w + mlp_count(a), 1, a->width}, false,
+             b->predicted, t->n_modes, trainer_threads(t));
     return h;
 }
 
@@ -91,17 +91,18 @@ static void step(trainer *t, fit_batch *b, size_t batch, double rate)
     t->loss = t->holdout_floor + sum * scale * scale / ((double)batch * (double)t->data.n_voxels);
 
     const int threads = trainer_threads(t);
-    sdm_gemm(r, a->width, batch, (sdm_view){b->predicted, 1, r}, (sdm_view){h, a->width, 1}, false, b->gradient + readout, a->width,
-             threads);
-    sdm_gemm(batch, a->width, r, (sdm_view){b->predicted, r, 1}, (sdm_view){t->fit.w + readout, a->width, 1}, false, b->dh, a->width,
-             threads);
+    sdm_gemm(r, a->width, batch, (sdm_view){b->predicted, 1, r}, (sdm_view){h, a->width, 1}, false,
+             b->gradient + readout, a->width, threads);
+    sdm_gemm(batch, a->width, r, (sdm_view){b->predicted, r, 1}, (sdm_view){t->fit.w + readout, a->width, 1}, false,
+             b->dh, a->width, threads);
     mlp_backward(a, t->fit.w, batch, b->x, b->workspace, b->dh, b->gradient, threads);
     adam_update(&t->fit, 0, t->fit.n, b->gradient, adam_begin(rate, t->phase_step + 1), 1);
     if (t->config->train.average > 0) {
         // the average starts with the weights themselves and lengthens its memory
         const double n = (double)t->phase_step + 1, decay = fmin(t->config->train.average, n / (n + 10));
         average_update(&t->fit, decay, 1);
-    } else memcpy(t->fit.average, t->fit.w, t->fit.n * sizeof *t->fit.w);
+    } else
+        memcpy(t->fit.average, t->fit.w, t->fit.n * sizeof *t->fit.w);
 }
 
 static double fraction_of_phase(const trainer *t)
@@ -129,8 +130,9 @@ sdm_status fit_run(trainer *t, sdm_error *err)
         step(t, &b, batch, rate);
         t->step++, t->phase_step++;
         if (!isfinite(t->loss)) {
-            s = sdm_fail(err, SDM_E_CONFIG, "%s: training diverged at step %lld (loss is not a number): lower train.learning_rate", c->file,
-                         (long long)t->step);
+            s = sdm_fail(err, SDM_E_CONFIG,
+                         "%s: training diverged at step %lld (loss is not a number): lower train.learning_rate",
+                         c->file, (long long)t->step);
             break;
         }
         const double now = trainer_seconds(t);
@@ -139,7 +141,8 @@ sdm_status fit_run(trainer *t, sdm_error *err)
             t->last_evaluation = now;
             if ((s = trainer_metric(t, rate, err))) break;
         }
-        const double overall = trainer_by_time(t) ? now / (c->train.minutes * 60) : (double)t->step / (double)trainer_steps(t);
+        const double overall =
+            trainer_by_time(t) ? now / (c->train.minutes * 60) : (double)t->step / (double)trainer_steps(t);
         if (now - last_time > 0.5) {
             trainer_report(t, overall, (double)(t->phase_step - last_step) * (double)batch / (now - last_time), true);
             last_step = t->phase_step, last_time = now;
@@ -147,7 +150,9 @@ sdm_status fit_run(trainer *t, sdm_error *err)
         if (now - t->last_checkpoint > c->train.checkpoint_seconds) s = checkpoint_write(t, err);
         if (!s && trainer_cancelled(t)) {
             s = checkpoint_write(t, err);
-            if (!s) s = sdm_fail(err, SDM_E_CANCELLED, "stopped on request at step %lld, after a checkpoint", (long long)t->step);
+            if (!s)
+                s = sdm_fail(err, SDM_E_CANCELLED, "stopped on request at step %lld, after a checkpoint",
+                             (long long)t->step);
         }
     }
     if (!s) t->heldout_mse = evaluate(t, t->fit.average, &b, batch);

@@ -12,7 +12,7 @@
 // reduces a to tridiagonal form (d diagonal, e sub-diagonal); a becomes the orthogonal transformation, in columns
 static void tridiagonalise(size_t n, double *a, double *d, double *e)
 {
-#define A(i, j) a[(i) * n + (j)]
+#define A(i, j) a[(i)*n + (j)]
     for (size_t i = n - 1; i > 0; i--) {
         double h = 0, scale = 0;
         if (i > 1)
@@ -124,7 +124,8 @@ sdm_status eigen_symmetric(size_t n, double *a, double *values, sdm_error *err)
             a[j * n + i] = t;
         }
     }
-    if (ql(n, values, e, a)) s = sdm_fail(err, SDM_E_INTERNAL, "eigenvalues of a %zu x %zu matrix did not converge", n, n);
+    if (ql(n, values, e, a))
+        s = sdm_fail(err, SDM_E_INTERNAL, "eigenvalues of a %zu x %zu matrix did not converge", n, n);
     sdm_free(e);
     // descending, by selection: n is small beside n^3
     for (size_t i = 0; i < n && !s; i++) {
@@ -152,9 +153,12 @@ size_t cholesky(size_t n, double *a)
             const double *aj = a + j * n;
             double s = ai[j];
             for (size_t k = 0; k < j; k++) s -= ai[k] * aj[k];
-            if (j < i) ai[j] = s / aj[j];
-            else if (s > 0) ai[i] = sqrt(s);
-            else return i + 1;
+            if (j < i)
+                ai[j] = s / aj[j];
+            else if (s > 0)
+                ai[i] = sqrt(s);
+            else
+                return i + 1;
         }
     }
     return 0;
@@ -213,7 +217,8 @@ sdm_status orthonormalise(size_t k, size_t n, float *x, int n_threads, sdm_error
             for (size_t i = 0; i < k * k; i++) l[i] = gram[i];
             for (size_t i = 0; i < k; i++) l[i * k + i] += shift;
             if (!cholesky(k, l)) break;
-            if (shift > 1e6) s = sdm_fail(err, SDM_E_INTERNAL, "%zu rows of %zu numbers cannot be made orthonormal", k, n);
+            if (shift > 1e6)
+                s = sdm_fail(err, SDM_E_INTERNAL, "%zu rows of %zu numbers cannot be made orthonormal", k, n);
         }
         if (s) break;
         invert_lower(k, l, column, gram);
@@ -234,8 +239,8 @@ static void random_rows(size_t count, uint64_t seed, uint64_t stream, float *x)
 
 enum { OVERSAMPLING = 8, ITERATIONS = 6 };
 
-sdm_status leading_eigenvectors(size_t n, const float *c, size_t k, uint64_t seed, uint64_t stream, float *basis, double *values,
-                                sdm_error *err)
+sdm_status leading_eigenvectors(size_t n, const float *c, size_t k, uint64_t seed, uint64_t stream, float *basis,
+                                double *values, sdm_error *err)
 {
     const size_t wide = k + OVERSAMPLING < n ? k + OVERSAMPLING : n;
     float *x = NULL, *y = NULL, *small = NULL;
@@ -257,7 +262,8 @@ sdm_status leading_eigenvectors(size_t n, const float *c, size_t k, uint64_t see
     sdm_gemm(wide, n, n, (sdm_view){x, n, 1}, (sdm_view){c, n, 1}, false, y, n, 1);
     sdm_gemm(wide, wide, n, (sdm_view){y, n, 1}, (sdm_view){x, 1, n}, false, small, wide, 1);
     for (size_t i = 0; i < wide; i++)
-        for (size_t j = 0; j < wide; j++) ritz[i * wide + j] = 0.5 * ((double)small[i * wide + j] + small[j * wide + i]);
+        for (size_t j = 0; j < wide; j++)
+            ritz[i * wide + j] = 0.5 * ((double)small[i * wide + j] + small[j * wide + i]);
     if ((s = eigen_symmetric(wide, ritz, all, err))) goto done;
     for (size_t i = 0; i < wide * wide; i++) small[i] = (float)ritz[i];
     sdm_gemm(k, n, wide, (sdm_view){small, wide, 1}, (sdm_view){x, n, 1}, false, basis, n, 1);
@@ -271,7 +277,8 @@ done:
     return s;
 }
 
-sdm_status leading_space(size_t m, size_t n, const float *y, size_t k, uint64_t seed, int n_threads, float *rows, sdm_error *err)
+sdm_status leading_space(size_t m, size_t n, const float *y, size_t k, uint64_t seed, int n_threads, float *rows,
+                         sdm_error *err)
 {
     float *left = NULL;
     sdm_status s = SDM_ALLOC(&left, k * m, "global modes", err);

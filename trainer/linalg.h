@@ -22,10 +22,11 @@ sdm_status orthonormalise(size_t k, size_t n, float *x, int n_threads, sdm_error
 
 /* The leading eigenvectors of the covariance c[n][n] (symmetric, float): rows of basis[k][n], values[k] descending, by subspace
    iteration from counter-based random rows (Halko, Martinsson and Tropp 2011). One thread. */
-sdm_status leading_eigenvectors(size_t n, const float *c, size_t k, uint64_t seed, uint64_t stream, float *basis, double *values,
-                                sdm_error *err);
+sdm_status leading_eigenvectors(size_t n, const float *c, size_t k, uint64_t seed, uint64_t stream, float *basis,
+                                double *values, sdm_error *err);
 
 /* An orthonormal basis rows[k][n] of the leading right singular space of y[m][n] by randomised subspace iteration. */
-sdm_status leading_space(size_t m, size_t n, const float *y, size_t k, uint64_t seed, int n_threads, float *rows, sdm_error *err);
+sdm_status leading_space(size_t m, size_t n, const float *y, size_t k, uint64_t seed, int n_threads, float *rows,
+                         sdm_error *err);
 
 #endif

@@ -19,7 +19,10 @@ static size_t offset(const sdm_pod_arch *a, size_t l)
 
 size_t mlp_count(const sdm_pod_arch *a) { return offset(a, a->depth); }
 const float *mlp_layer(const sdm_pod_arch *a, const float *weights, size_t l) { return weights + offset(a, l); }
-const float *mlp_bias(const sdm_pod_arch *a, const float *weights, size_t l) { return weights + offset(a, l) + inputs(a, l) * a->width; }
+const float *mlp_bias(const sdm_pod_arch *a, const float *weights, size_t l)
+{
+    return weights + offset(a, l) + inputs(a, l) * a->width;
+}
 
 void mlp_init(const sdm_pod_arch *a, uint64_t seed, float *weights)
 {
@@ -34,7 +37,8 @@ void mlp_init(const sdm_pod_arch *a, uint64_t seed, float *weights)
 size_t mlp_workspace(const sdm_pod_arch *a, size_t batch) { return (2 * a->depth + 2) * batch * a->width; }
 
 // workspace: h[depth][B][W], slope[depth][B][W], delta[2][B][W]
-const float *mlp_forward(const sdm_pod_arch *a, const float *weights, size_t batch, const float *x, float *workspace, int n_threads)
+const float *mlp_forward(const sdm_pod_arch *a, const float *weights, size_t batch, const float *x, float *workspace,
+                         int n_threads)
 {
     const size_t w = a->width, layer = batch * w;
     for (size_t l = 0; l < a->depth; l++) {
@@ -49,8 +53,8 @@ const float *mlp_forward(const sdm_pod_arch *a, const float *weights, size_t bat
     return x;
 }
 
-void mlp_backward(const sdm_pod_arch *a, const float *weights, size_t batch, const float *x, float *workspace, const float *dh,
-                  float *gradient, int n_threads)
+void mlp_backward(const sdm_pod_arch *a, const float *weights, size_t batch, const float *x, float *workspace,
+                  const float *dh, float *gradient, int n_threads)
 {
     const size_t w = a->width, layer = batch * w;
     float *delta[2] = {workspace + 2 * a->depth * layer, workspace + (2 * a->depth + 1) * layer};
@@ -66,7 +70,8 @@ void mlp_backward(const sdm_pod_arch *a, const float *weights, size_t batch, con
         for (size_t i = 0; i < batch; i++)
             for (size_t o = 0; o < w; o++) db[o] += d[i * w + o];
         if (l == 0) break;
-        sdm_gemm(batch, w, w, (sdm_view){d, w, 1}, (sdm_view){mlp_layer(a, weights, l), w, 1}, false, delta[1], w, n_threads);
+        sdm_gemm(batch, w, w, (sdm_view){d, w, 1}, (sdm_view){mlp_layer(a, weights, l), w, 1}, false, delta[1], w,
+                 n_threads);
         float *swap = delta[0];
         delta[0] = delta[1], delta[1] = swap;
     }

@@ -18,11 +18,12 @@ void mlp_init(const sdm_pod_arch *a, uint64_t seed, float *weights);
 size_t mlp_workspace(const sdm_pod_arch *a, size_t batch);
 
 /* x[B][I] -> returns h[B][W] of the last layer, inside the workspace. */
-const float *mlp_forward(const sdm_pod_arch *a, const float *weights, size_t batch, const float *x, float *workspace, int n_threads);
+const float *mlp_forward(const sdm_pod_arch *a, const float *weights, size_t batch, const float *x, float *workspace,
+                         int n_threads);
 
 /* dh[B][W], the gradient of the loss with respect to the last layer's output -> gradient[mlp_count], overwritten. After
    mlp_forward with the same arguments. */
-void mlp_backward(const sdm_pod_arch *a, const float *weights, size_t batch, const float *x, float *workspace, const float *dh,
-                  float *gradient, int n_threads);
+void mlp_backward(const sdm_pod_arch *a, const float *weights, size_t batch, const float *x, float *workspace,
+                  const float *dh, float *gradient, int n_threads);
 
 #endif

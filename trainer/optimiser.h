@@ -17,7 +17,9 @@ sdm_status parameters_create(parameters *p, size_t n, sdm_error *err);
 void parameters_dispose(parameters *p);
 
 /* The corrections of step t = 1, 2, ... */
-typedef struct adam_step { float rate, correct_m, correct_v; } adam_step;
+typedef struct adam_step {
+    float rate, correct_m, correct_v;
+} adam_step;
 adam_step adam_begin(double rate, int64_t t);
 
 /* w -= scale * Adam update, for weights first .. first + n of p with gradient g[n]. One thread. */

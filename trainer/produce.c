@@ -36,7 +36,8 @@ sdm_status workbench_map(workbench *w, const dataset *d, const double *p, float 
     return SDM_OK;
 }
 
-sdm_status workbench_packed_map(workbench *w, const dataset *d, const double *p, int16_t *packed, float *scale, sdm_error *err)
+sdm_status workbench_packed_map(workbench *w, const dataset *d, const double *p, int16_t *packed, float *scale,
+                                sdm_error *err)
 {
     const sdm_status s = workbench_map(w, d, p, w->blocked, err);
     if (s) return s;
@@ -56,13 +57,13 @@ struct producer {
     dataset *d;
     pthread_mutex_t lock;
     pthread_cond_t made, taken;
-    size_t next, end;  // sample to be made next; behind the last one
-    size_t base;       // first sample not taken yet
+    size_t next, end; // sample to be made next; behind the last one
+    size_t base;      // first sample not taken yet
     bool done[WINDOW];
-    double *params;    // [WINDOW][P]
-    int16_t *maps;     // [WINDOW][n_voxels]
+    double *params; // [WINDOW][P]
+    int16_t *maps;  // [WINDOW][n_voxels]
     float scale[WINDOW];
-    sdm_error error;   // of the lowest failed sample
+    sdm_error error; // of the lowest failed sample
     size_t failed;
     bool stop;
     int n_workers;
@@ -84,7 +85,8 @@ static void *work(void *user)
         pthread_mutex_unlock(&p->lock);
         double *params = p->params + place * d->n_params;
         sdm_sample_params(d->seed, STREAM_TRAIN, index, d->min, d->max, d->n_params, params);
-        const sdm_status s = made ? made : workbench_packed_map(&w, d, params, p->maps + place * d->n_voxels, &p->scale[place], &err);
+        const sdm_status s =
+            made ? made : workbench_packed_map(&w, d, params, p->maps + place * d->n_voxels, &p->scale[place], &err);
         pthread_mutex_lock(&p->lock);
         p->done[place] = true;
         if (s && index < p->failed) {
@@ -119,8 +121,10 @@ sdm_status producer_start(dataset *d, size_t first, int n_threads, producer **ou
             break;
         }
     }
-    if (s) producer_stop(p);
-    else *out = p;
+    if (s)
+        producer_stop(p);
+    else
+        *out = p;
     return s;
 }
 

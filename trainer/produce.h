@@ -17,6 +17,7 @@ void workbench_dispose(workbench *w);
 sdm_status workbench_map(workbench *w, const dataset *d, const double *p, float *blocked, sdm_error *err);
 
 /* The same as 16-bit integers with a scale. */
-sdm_status workbench_packed_map(workbench *w, const dataset *d, const double *p, int16_t *packed, float *scale, sdm_error *err);
+sdm_status workbench_packed_map(workbench *w, const dataset *d, const double *p, int16_t *packed, float *scale,
+                                sdm_error *err);
 
 #endif

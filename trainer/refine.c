@@ -13,16 +13,16 @@
 #include "trainer.h"
 
 // Adam steps in units of what a weight typically is: found by trial on the cochlea, within a factor of three of the best
-#define HEAD_STEP 0.05f  // times the deviation of the coefficient
-#define BASIS_STEP 0.3f  // times 1 / sqrt(voxels)
-#define MEAN_STEP 0.05f  // mm
+#define HEAD_STEP 0.05f // times the deviation of the coefficient
+#define BASIS_STEP 0.3f // times 1 / sqrt(voxels)
+#define MEAN_STEP 0.05f // mm
 
 static size_t voxels_of(const sdm_pod_block *b) { return (size_t)b->size[0] * b->size[1] * b->size[2]; }
 
 typedef struct refine_batch {
     size_t rows;
-    float *x, *z, *dz;     // [B][I], [B][L], [B][W]
-    float *c, *dc;         // [B][K]
+    float *x, *z, *dz; // [B][I], [B][L], [B][W]
+    float *c, *dc;     // [B][K]
     float *workspace, *gradient;
     size_t *slots;         // [B]
     double *loss;          // [n_blocks]
@@ -96,14 +96,15 @@ static void latent(const trainer *t, const float *w, refine_batch *b, size_t row
     }
     if (!a->depth) return;
     const float *h = mlp_forward(a, w, rows, b->x, b->workspace, trainer_threads(t));
-    for (size_t i = 0; i < rows; i++) memcpy(b->z + i * a->n_latent + a->n_terms, h + i * a->width, a->width * sizeof *h);
+    for (size_t i = 0; i < rows; i++)
+        memcpy(b->z + i * a->n_latent + a->n_terms, h + i * a->width, a->width * sizeof *h);
 }
 
 static void coefficients(const trainer *t, const float *w, refine_batch *b, size_t rows)
 {
     const sdm_pod_arch *a = &t->arch;
-    sdm_gemm(rows, a->n_coefficients, a->n_latent, (sdm_view){b->z, a->n_latent, 1}, (sdm_view){w + t->head_at, 1, a->n_latent}, false,
-             b->c, a->n_coefficients, trainer_threads(t));
+    sdm_gemm(rows, a->n_coefficients, a->n_latent, (sdm_view){b->z, a->n_latent, 1},
+             (sdm_view){w + t->head_at, 1, a->n_latent}, false, b->c, a->n_coefficients, trainer_threads(t));
 }
 
 // gradient of the loss in one voxel (mean over the batch, not yet over voxels); *sum gets the loss as mean square error
@@ -113,12 +114,14 @@ static float loss_gradient(const sdm_config *c, float predicted, float target, d
     const float weight = fabsf(target) < (float)c->train.near_mm ? 1 + (float)c->train.near_weight : 1;
     *sum += (double)e * e;
     switch (c->train.loss) {
-    case SDM_LOSS_L1: return weight * (e > 0 ? 1.0f : e < 0 ? -1.0f : 0.0f);
+    case SDM_LOSS_L1:
+        return weight * (e > 0 ? 1.0f : e < 0 ? -1.0f : 0.0f);
     case SDM_LOSS_HUBER: {
         const float knee = 0.01f; // mm: square below, linear above
         return weight * (fabsf(e) < knee ? e / knee : e > 0 ? 1.0f : -1.0f);
     }
-    case SDM_LOSS_MSE: break;
+    case SDM_LOSS_MSE:
+        break;
     }
     return weight * 2 * e;
 }
@@ -146,9 +149,11 @@ static void train_block(trainer *t, refine_batch *b, size_t i, adam_step adam)
     memset(mean_gradient, 0, voxels * sizeof *mean_gradient);
     for (size_t r = 0; r < rows; r++)
         for (size_t v = 0; v < voxels; v++) mean_gradient[v] += delta[r * voxels + v];
-    sdm_gemm(rows, k->rank, voxels, (sdm_view){delta, voxels, 1}, (sdm_view){basis, 1, voxels}, false, b->dc + k->coefficient, n_c, 1);
+    sdm_gemm(rows, k->rank, voxels, (sdm_view){delta, voxels, 1}, (sdm_view){basis, 1, voxels}, false,
+             b->dc + k->coefficient, n_c, 1);
     sdm_gemm(k->rank, voxels, rows, (sdm_view){c, 1, n_c}, (sdm_view){delta, voxels, 1}, false, gradient, voxels, 1);
-    adam_update(&t->refine, t->basis_at + b->basis_at[i], k->rank * voxels, gradient, adam, BASIS_STEP / sqrtf((float)voxels));
+    adam_update(&t->refine, t->basis_at + b->basis_at[i], k->rank * voxels, gradient, adam,
+                BASIS_STEP / sqrtf((float)voxels));
     adam_update(&t->refine, t->mean_at + k->voxel, voxels, mean_gradient, adam, MEAN_STEP);
 }
 
@@ -162,7 +167,8 @@ static void train_head(trainer *t, refine_batch *b, adam_step adam)
     for (long at = 0; at < (long)n_c; at += HEAD_ROWS) {
         const size_t first = (size_t)at, rows = n_c - first < HEAD_ROWS ? n_c - first : HEAD_ROWS;
         float *gradient = b->scratch + b->scratch_floats * (size_t)thread_number();
-        sdm_gemm(rows, latents, b->rows, (sdm_view){b->dc + first, 1, n_c}, (sdm_view){b->z, latents, 1}, false, gradient, latents, 1);
+        sdm_gemm(rows, latents, b->rows, (sdm_view){b->dc + first, 1, n_c}, (sdm_view){b->z, latents, 1}, false,
+                 gradient, latents, 1);
         for (size_t i = 0; i < rows; i++)
             adam_update(&t->refine, t->head_at + (first + i) * latents, latents, gradient + i * latents, adam,
                         HEAD_STEP * t->deviation[first + i]);
@@ -224,7 +230,8 @@ sdm_status refine_evaluate(trainer *t, const float *w, double *mse, sdm_error *e
             const sdm_pod_block *k = &t->blocks[i];
             const size_t voxels = voxels_of(k);
             float *predicted = b.scratch + b.scratch_floats * (size_t)thread_number();
-            for (size_t r = 0; r < rows; r++) memcpy(predicted + r * voxels, w + t->mean_at + k->voxel, voxels * sizeof *w);
+            for (size_t r = 0; r < rows; r++)
+                memcpy(predicted + r * voxels, w + t->mean_at + k->voxel, voxels * sizeof *w);
             sdm_gemm(rows, voxels, k->rank, (sdm_view){b.c + k->coefficient, a->n_coefficients, 1},
                      (sdm_view){w + t->basis_at + b.basis_at[i], voxels, 1}, true, predicted, voxels, 1);
             double block_sum = 0;
@@ -253,8 +260,8 @@ typedef struct head_problem {
 } head_problem;
 
 // rows of the head for block i: least squares of its coefficients on z over all slots
-static sdm_status solve_block(const trainer *t, const head_problem *p, const sdm_pod_block *k, const float *basis, float *head,
-                              sdm_error *err)
+static sdm_status solve_block(const trainer *t, const head_problem *p, const sdm_pod_block *k, const float *basis,
+                              float *head, sdm_error *err)
 {
     enum { CHUNK = 1024 };
     const dataset *d = &t->data;
@@ -269,10 +276,12 @@ static sdm_status solve_block(const trainer *t, const head_problem *p, const sdm
         const size_t n = p->n - at < CHUNK ? p->n - at : CHUNK;
         for (size_t i = 0; i < n; i++) {
             const int16_t *from = d->maps + (at + i) * d->n_voxels + k->voxel;
-            for (size_t v = 0; v < voxels; v++) rows[i * voxels + v] = d->scale[at + i] * (float)from[v] - t->mean[k->voxel + v];
+            for (size_t v = 0; v < voxels; v++)
+                rows[i * voxels + v] = d->scale[at + i] * (float)from[v] - t->mean[k->voxel + v];
         }
         sdm_gemm(n, rank, voxels, (sdm_view){rows, voxels, 1}, (sdm_view){basis, 1, voxels}, false, y, rank, 1);
-        sdm_gemm(latents, rank, n, (sdm_view){p->z + at * latents, 1, latents}, (sdm_view){y, rank, 1}, at > 0, right, rank, 1);
+        sdm_gemm(latents, rank, n, (sdm_view){p->z + at * latents, 1, latents}, (sdm_view){y, rank, 1}, at > 0, right,
+                 rank, 1);
     }
     if (!s) {
         for (size_t i = 0; i < latents * rank; i++) solution[i] = right[i];
@@ -310,11 +319,12 @@ static sdm_status problem_create(trainer *t, head_problem *p, sdm_error *err)
     }
     batch_dispose(&b);
     if (!s) {
-        sdm_gemm(latents, latents, p->n, (sdm_view){p->z, 1, latents}, (sdm_view){p->z, latents, 1}, false, gram, latents,
-                 trainer_threads(t));
+        sdm_gemm(latents, latents, p->n, (sdm_view){p->z, 1, latents}, (sdm_view){p->z, latents, 1}, false, gram,
+                 latents, trainer_threads(t));
         // hidden units may depend on each other linearly: a ridge relative to their size, raised until the system is definite
         for (double ridge = 1e-6;; ridge *= 10) {
-            for (size_t i = 0; i < latents * latents; i++) p->factor[i] = 0.5 * ((double)gram[i] + gram[i % latents * latents + i / latents]);
+            for (size_t i = 0; i < latents * latents; i++)
+                p->factor[i] = 0.5 * ((double)gram[i] + gram[i % latents * latents + i / latents]);
             for (size_t i = 0; i < latents; i++) p->factor[i * latents + i] += ridge * (double)p->n;
             if (!cholesky(latents, p->factor)) break;
             if (ridge > 1) {
@@ -385,7 +395,8 @@ sdm_status refine_run(trainer *t, sdm_error *err)
 {
     enum { AVERAGE_EVERY = 8 };
     const sdm_config *c = t->config;
-    const double total = c->train.minutes * 60, end = total - fmin(10, 0.03 * total); // the final evaluation needs the rest
+    const double total = c->train.minutes * 60,
+                 end = total - fmin(10, 0.03 * total); // the final evaluation needs the rest
     if (!(c->train.refine > 0)) return SDM_OK;
     refine_batch b = {0};
     sdm_status s = batch_create(t, (size_t)c->train.refine_batch, &b, err);
@@ -402,7 +413,8 @@ sdm_status refine_run(trainer *t, sdm_error *err)
             average_update(&t->refine, decay, trainer_threads(t));
         }
         if (!isfinite(t->loss)) {
-            s = sdm_fail(err, SDM_E_CONFIG, "%s: training diverged at step %lld (loss is not a number): lower train.refine_rate", c->file,
+            s = sdm_fail(err, SDM_E_CONFIG,
+                         "%s: training diverged at step %lld (loss is not a number): lower train.refine_rate", c->file,
                          (long long)t->step);
             break;
         }
@@ -420,7 +432,9 @@ sdm_status refine_run(trainer *t, sdm_error *err)
         if (now - t->last_checkpoint > c->train.checkpoint_seconds) s = checkpoint_write(t, err);
         if (!s && trainer_cancelled(t)) {
             s = checkpoint_write(t, err);
-            if (!s) s = sdm_fail(err, SDM_E_CANCELLED, "stopped on request at step %lld, after a checkpoint", (long long)t->step);
+            if (!s)
+                s = sdm_fail(err, SDM_E_CANCELLED, "stopped on request at step %lld, after a checkpoint",
+                             (long long)t->step);
         }
     }
     batch_dispose(&b);

@@ -8,7 +8,9 @@
 #define BITS 32
 
 // primitive polynomials and initial direction numbers of Joe and Kuo (2008), dimensions 2 to 16
-static const struct { uint8_t degree, polynomial, m[6]; } joe_kuo[DIMENSIONS - 1] = {
+static const struct {
+    uint8_t degree, polynomial, m[6];
+} joe_kuo[DIMENSIONS - 1] = {
     {1, 0, {1}},
     {2, 1, {1, 3}},
     {3, 1, {1, 3, 1}},
@@ -46,7 +48,8 @@ static uint32_t sobol(uint64_t index, size_t d)
     return out;
 }
 
-void sdm_sample_params(uint64_t seed, uint64_t stream, uint64_t index, const double *min, const double *max, size_t n, double *p)
+void sdm_sample_params(uint64_t seed, uint64_t stream, uint64_t index, const double *min, const double *max, size_t n,
+                       double *p)
 {
     for (size_t d = 0; d < n; d++) {
         double u;

@@ -43,7 +43,8 @@ int64_t trainer_fit_steps(const trainer *t)
 int trainer_threads(const trainer *t)
 {
     if (!t->producer) return t->n_threads;
-    const int workers = t->config->data.workers > 0 ? t->config->data.workers : (t->n_threads > 1 ? t->n_threads / 2 : 1);
+    const int workers =
+        t->config->data.workers > 0 ? t->config->data.workers : (t->n_threads > 1 ? t->n_threads / 2 : 1);
     return workers < t->n_threads ? t->n_threads - workers : 1;
 }
 
@@ -53,9 +54,14 @@ void trainer_report(trainer *t, double fraction, double samples_per_second, bool
     if (!t->hooks.progress || (!now && seconds - t->last_report < 0.1)) return;
     t->last_report = seconds;
     const double all = trainer_by_time(t) ? t->config->train.minutes * 60 : fraction > 0 ? seconds / fraction : NAN;
-    const sdm_progress p = {.phase = t->phase, .fraction = fraction < 1 ? fraction : 1, .step = t->step,
-                            .samples = (int64_t)(t->data.n_static + t->data.n_taken), .loss = t->loss,
-                            .heldout_rmse_mm = sqrt(t->heldout_mse), .samples_per_second = samples_per_second, .seconds = seconds,
+    const sdm_progress p = {.phase = t->phase,
+                            .fraction = fraction < 1 ? fraction : 1,
+                            .step = t->step,
+                            .samples = (int64_t)(t->data.n_static + t->data.n_taken),
+                            .loss = t->loss,
+                            .heldout_rmse_mm = sqrt(t->heldout_mse),
+                            .samples_per_second = samples_per_second,
+                            .seconds = seconds,
                             .seconds_left = all > seconds ? all - seconds : 0};
     t->hooks.progress(t->hooks.user, &p);
 }
@@ -98,7 +104,8 @@ sdm_status trainer_metric(trainer *t, double rate, sdm_error *err)
     sdm_json_real(&j, "loss_mm2", t->loss);
     sdm_json_real(&j, "heldout_mse_mm2", t->heldout_mse);
     sdm_json_real(&j, "learning_rate", rate);
-    if (trainer_by_time(t)) sdm_json_real(&j, "seconds", trainer_seconds(t)); // else the file is the same bits in every run
+    if (trainer_by_time(t))
+        sdm_json_real(&j, "seconds", trainer_seconds(t)); // else the file is the same bits in every run
     sdm_json_close(&j, '}');
     if (!j.text.failed) sdm_text_add(t->metrics, "%s\n", j.text.data);
     const bool failed = j.text.failed || t->metrics->failed;
@@ -134,7 +141,8 @@ sdm_status trainer_take_samples(trainer *t, size_t wanted, sdm_error *err)
     return SDM_OK;
 }
 
-sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape, double *min, double *max, sdm_error *err)
+sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape, double *min, double *max,
+                            sdm_error *err)
 {
     size_t n;
     const sdm_param *params = sdm_instance_params(shape, &n);
@@ -148,12 +156,14 @@ sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape,
             const char *names[SDM_MAX_PARAMS];
             for (size_t k = 0; k < n && k < SDM_MAX_PARAMS; k++) names[k] = params[k].name;
             const char *near = sdm_nearest_name(range->name, names, n < SDM_MAX_PARAMS ? n : SDM_MAX_PARAMS);
-            return sdm_fail(err, SDM_E_CONFIG, "%s: shape '%s' has no parameter '%s'%s%s%s", where, sdm_instance_shape(shape)->name,
-                            range->name, near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
+            return sdm_fail(err, SDM_E_CONFIG, "%s: shape '%s' has no parameter '%s'%s%s%s", where,
+                            sdm_instance_shape(shape)->name, range->name, near ? "; did you mean '" : "",
+                            near ? near : "", near ? "'?" : "");
         }
         if (!(range->min >= params[i].min && range->max <= params[i].max && range->min < range->max))
-            return sdm_fail(err, SDM_E_CONFIG, "%s: range [%g, %g] of '%s' must lie within [%g, %g] of shape '%s'", where, range->min,
-                            range->max, range->name, params[i].min, params[i].max, sdm_instance_shape(shape)->name);
+            return sdm_fail(err, SDM_E_CONFIG, "%s: range [%g, %g] of '%s' must lie within [%g, %g] of shape '%s'",
+                            where, range->min, range->max, range->name, params[i].min, params[i].max,
+                            sdm_instance_shape(shape)->name);
         min[i] = range->min, max[i] = range->max;
     }
     return SDM_OK;
@@ -173,7 +183,8 @@ static sdm_status set_up(trainer *t, sdm_error *err)
     dataset *d = &t->data;
     sdm_instance_params(t->shape, &d->n_params);
     if (d->n_params > SDM_POD_MAX_PARAMS)
-        return sdm_fail(err, SDM_E_UNSUPPORTED, "%zu parameters, at most %d can be trained", d->n_params, SDM_POD_MAX_PARAMS);
+        return sdm_fail(err, SDM_E_UNSUPPORTED, "%zu parameters, at most %d can be trained", d->n_params,
+                        SDM_POD_MAX_PARAMS);
     sdm_status s = sdm_train_ranges(c, t->shape, d->min, d->max, err);
     if (s) return s;
     d->shape = t->shape;
@@ -191,12 +202,14 @@ static sdm_status set_up(trainer *t, sdm_error *err)
 
     a->degree = affordable(a->n_params, (size_t)c->network.degree, (d->n_static + d->n_start) / 4 + 1);
     if (a->degree < (size_t)c->network.degree)
-        trainer_message(t, "network.degree lowered from %d to %zu: %zu maps before training cannot determine more terms",
+        trainer_message(t,
+                        "network.degree lowered from %d to %zu: %zu maps before training cannot determine more terms",
                         c->network.degree, a->degree, d->n_static + d->n_start);
     a->input_degree = affordable(a->n_params, (size_t)c->network.input_degree, 1024);
     if (a->input_degree < 1) a->input_degree = 1;
     if (a->input_degree < (size_t)c->network.input_degree)
-        trainer_message(t, "network.input_degree lowered from %d to %zu: more than 1023 inputs", c->network.input_degree, a->input_degree);
+        trainer_message(t, "network.input_degree lowered from %d to %zu: more than 1023 inputs",
+                        c->network.input_degree, a->input_degree);
     a->depth = (size_t)c->network.depth;
     a->width = (size_t)c->network.width;
     a->activation = (int)c->network.activation;
@@ -244,7 +257,8 @@ static sdm_status start_producer(trainer *t, sdm_error *err)
 {
     const dataset *d = &t->data;
     if (d->n_taken >= d->n_start + d->n_online) return SDM_OK;
-    const int workers = t->config->data.workers > 0 ? t->config->data.workers : (t->n_threads > 1 ? t->n_threads / 2 : 1);
+    const int workers =
+        t->config->data.workers > 0 ? t->config->data.workers : (t->n_threads > 1 ? t->n_threads / 2 : 1);
     return producer_start(&t->data, d->n_taken, workers, &t->producer, err);
 }
 
@@ -256,7 +270,8 @@ static sdm_status retake(trainer *t, size_t n_taken, sdm_error *err)
         for (size_t i = 0; i < n; i++) slots[i] = dataset_slot(&t->data, t->data.n_taken + i);
         sdm_status s = producer_take(t->producer, t->data.n_taken + n, err);
         if (!s) s = bases_project(t, slots, n, err);
-        if (!s && trainer_cancelled(t)) s = sdm_fail(err, SDM_E_CANCELLED, "stopped on request; the checkpoint is as it was");
+        if (!s && trainer_cancelled(t))
+            s = sdm_fail(err, SDM_E_CANCELLED, "stopped on request; the checkpoint is as it was");
         if (s) return s;
         trainer_report(t, 0, 0, false);
     }
@@ -284,17 +299,22 @@ static sdm_status run(trainer *t, bool resume, sdm_error *err)
     const double resumed_seconds = trainer_seconds(t);
     t->phase = SDM_PHASE_DATA;
     const size_t start = t->data.n_start;
-    const fill_hooks hooks = {.report = report_fill, .cancelled = cancelled, .enough = found ? NULL : enough, .user = t};
+    const fill_hooks hooks = {
+        .report = report_fill, .cancelled = cancelled, .enough = found ? NULL : enough, .user = t};
     if (!s) s = dataset_fill(&t->data, t->n_threads, &hooks, err);
     if (!s && t->data.n_start < start)
-        trainer_message(t, "half of the budget is over after %zu of %zu random maps: training starts with these (lower data.start or raise "
-                           "train.minutes)",
+        trainer_message(t,
+                        "half of the budget is over after %zu of %zu random maps: training starts with these (lower "
+                        "data.start or raise "
+                        "train.minutes)",
                         t->data.n_start, start);
     t->phase = SDM_PHASE_BASES;
     trainer_report(t, trainer_by_time(t) ? trainer_seconds(t) / (t->config->train.minutes * 60) : 0, 0, true);
     if (!s) s = bases_make(t, err);
-    if (!s) trainer_message(t, "%zu maps; %zu local functions in %zu blocks; bases and %zu modes leave %.2g mm^2 on held-out shapes",
-                            t->data.n_static + t->data.n_start, t->arch.n_coefficients, t->arch.n_blocks, t->n_modes, t->holdout_floor);
+    if (!s)
+        trainer_message(
+            t, "%zu maps; %zu local functions in %zu blocks; bases and %zu modes leave %.2g mm^2 on held-out shapes",
+            t->data.n_static + t->data.n_start, t->arch.n_coefficients, t->arch.n_blocks, t->n_modes, t->holdout_floor);
     if (!s) s = start_fit(t, err);
     if (!s) s = start_producer(t, err);
     if (!s && found) s = retake(t, n_taken, err);
@@ -329,7 +349,12 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
                      const sdm_train_hooks *hooks, sdm_train_report *report, sdm_error *err)
 {
     sdm_text metrics = {0};
-    trainer t = {.config = config, .shape = shape, .folder = folder, .started = monotonic(), .loss = NAN, .heldout_mse = NAN,
+    trainer t = {.config = config,
+                 .shape = shape,
+                 .folder = folder,
+                 .started = monotonic(),
+                 .loss = NAN,
+                 .heldout_mse = NAN,
                  .metrics = &metrics};
     if (hooks) t.hooks = *hooks;
     t.n_threads = config->threads;

@@ -18,27 +18,27 @@ typedef struct trainer {
 
     sdm_pod_arch arch;
     sdm_pod_block *blocks;
-    uint8_t *exponents;       /* [max(F, 1 + I)][P] */
-    size_t n_poly;            /* max(F, 1 + I) */
+    uint8_t *exponents; /* [max(F, 1 + I)][P] */
+    size_t n_poly;      /* max(F, 1 + I) */
     dataset data;
-    producer *producer;       /* NULL when no online sample is left to make */
+    producer *producer; /* NULL when no online sample is left to make */
 
     /* spectral start (bases.c) */
-    float *mean;              /* [n_voxels], block order */
-    float *basis;             /* for each block [k_b][V_b] */
-    float *deviation;         /* [K] root mean square of each coefficient */
-    size_t n_modes;           /* R */
-    float *modes;             /* [R][K] orthonormal rows */
-    float *poly;              /* [R][F] least squares on the polynomials */
-    float *phi;               /* [N][n_poly] products at every slot */
-    float *target;            /* [N][R] what the polynomials leave, divided by target_scale */
-    float target_scale;       /* mm sqrt(voxel) */
-    float *holdout_phi;       /* [H][n_poly] */
-    float *holdout_target;    /* [H][R] */
-    double holdout_floor;     /* mean square error that the bases and modes leave on the held-out maps, mm^2 */
+    float *mean;           /* [n_voxels], block order */
+    float *basis;          /* for each block [k_b][V_b] */
+    float *deviation;      /* [K] root mean square of each coefficient */
+    size_t n_modes;        /* R */
+    float *modes;          /* [R][K] orthonormal rows */
+    float *poly;           /* [R][F] least squares on the polynomials */
+    float *phi;            /* [N][n_poly] products at every slot */
+    float *target;         /* [N][R] what the polynomials leave, divided by target_scale */
+    float target_scale;    /* mm sqrt(voxel) */
+    float *holdout_phi;    /* [H][n_poly] */
+    float *holdout_target; /* [H][R] */
+    double holdout_floor;  /* mean square error that the bases and modes leave on the held-out maps, mm^2 */
 
-    parameters fit;           /* MLP, then readout[R][W] */
-    parameters refine;        /* MLP, head[K][L], mean[n_voxels], basis */
+    parameters fit;                    /* MLP, then readout[R][W] */
+    parameters refine;                 /* MLP, head[K][L], mean[n_voxels], basis */
     size_t head_at, mean_at, basis_at; /* within refine */
 
     /* progress */
@@ -48,7 +48,7 @@ typedef struct trainer {
     double phase_started;     /* seconds since `started` when the phase began */
     double last_report, last_checkpoint, last_evaluation;
     double loss, heldout_mse;
-    double fit_end;           /* seconds since `started` at which the fit ends, in time mode */
+    double fit_end; /* seconds since `started` at which the fit ends, in time mode */
     sdm_accuracy accuracy;
     struct sdm_text *metrics; /* lines since the run began, written to metrics.jsonl */
 } trainer;
@@ -95,7 +95,8 @@ sdm_status trainer_take_samples(trainer *t, size_t wanted, sdm_error *err);
 
 /* checkpoint.c */
 sdm_status checkpoint_write(trainer *t, sdm_error *err);
-sdm_status checkpoint_read(trainer *t, bool *found, sdm_error *err);       /* before the data: config, sample count, phase, time */
-sdm_status checkpoint_weights(trainer *t, sdm_error *err);                 /* after the bases */
+sdm_status checkpoint_read(trainer *t, bool *found,
+                           sdm_error *err);                /* before the data: config, sample count, phase, time */
+sdm_status checkpoint_weights(trainer *t, sdm_error *err); /* after the bases */
 
 #endif

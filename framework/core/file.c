@@ -32,7 +32,8 @@ sdm_status sdm_file_read(const char *path, size_t max_bytes, uint8_t **data, siz
     }
     n = (size_t)st.st_size;
     if (n > max_bytes) {
-        s = sdm_fail(err, SDM_E_FORMAT, "%s: %zu bytes, more than the %zu allowed for a file of this kind", path, n, max_bytes);
+        s = sdm_fail(err, SDM_E_FORMAT, "%s: %zu bytes, more than the %zu allowed for a file of this kind", path, n,
+                     max_bytes);
         goto done;
     }
     if ((s = SDM_ALLOC(&block, n + 1, path, err))) goto done;
@@ -183,7 +184,8 @@ sdm_status sdm_outfile_commit(sdm_outfile **pf, sdm_error *err)
     const int closed = close(f->fd);
     f->fd = -1;
     if (!s && closed) s = sdm_fail(err, SDM_E_IO, "%s: cannot close: %s", f->path, strerror(errno));
-    if (!s && rename(f->temp, f->path)) s = sdm_fail(err, SDM_E_IO, "%s: cannot rename into place: %s", f->path, strerror(errno));
+    if (!s && rename(f->temp, f->path))
+        s = sdm_fail(err, SDM_E_IO, "%s: cannot rename into place: %s", f->path, strerror(errno));
     if (s) {
         sdm_outfile_discard(pf);
         return s;

@@ -19,22 +19,26 @@ sdm_status sdm_grid_check(const sdm_grid *g, sdm_error *err)
     static const char axis[] = "xyz";
     for (int a = 0; a < 3; a++) {
         if (g->n[a] < 1 || g->n[a] > 1 << 20)
-            return sdm_fail(err, SDM_E_ARG, "grid size along %c is %lld, need 1 to 1048576", axis[a], (long long)g->n[a]);
+            return sdm_fail(err, SDM_E_ARG, "grid size along %c is %lld, need 1 to 1048576", axis[a],
+                            (long long)g->n[a]);
         if (!(g->spacing[a] > 0) || !isfinite(g->spacing[a]))
-            return sdm_fail(err, SDM_E_ARG, "grid spacing along %c is %g mm, need a positive number", axis[a], g->spacing[a]);
+            return sdm_fail(err, SDM_E_ARG, "grid spacing along %c is %g mm, need a positive number", axis[a],
+                            g->spacing[a]);
         if (!isfinite(g->origin[a]))
-            return sdm_fail(err, SDM_E_ARG, "grid origin along %c is %g mm, need a finite number", axis[a], g->origin[a]);
+            return sdm_fail(err, SDM_E_ARG, "grid origin along %c is %g mm, need a finite number", axis[a],
+                            g->origin[a]);
     }
     // 2^60 floats cannot be addressed: three factors of at most 2^20 do not overflow int64
     if ((uint64_t)(g->n[0] * g->n[1] * g->n[2]) > SIZE_MAX / sizeof(double) / 4)
-        return sdm_fail(err, SDM_E_ARG, "grid of %lld x %lld x %lld voxels is more than memory can hold", (long long)g->n[0],
-                        (long long)g->n[1], (long long)g->n[2]);
+        return sdm_fail(err, SDM_E_ARG, "grid of %lld x %lld x %lld voxels is more than memory can hold",
+                        (long long)g->n[0], (long long)g->n[1], (long long)g->n[2]);
     for (int a = 0; a < 3; a++) {
         for (int b = 0; b < 3; b++) {
             double dot = 0;
             for (int k = 0; k < 3; k++) dot += g->dir[3 * k + a] * g->dir[3 * k + b];
             if (!(fabs(dot - (a == b)) <= 1e-6))
-                return sdm_fail(err, SDM_E_ARG, "grid direction is not orthonormal: columns %d and %d have the product %g", a, b, dot);
+                return sdm_fail(err, SDM_E_ARG,
+                                "grid direction is not orthonormal: columns %d and %d have the product %g", a, b, dot);
         }
     }
     return SDM_OK;

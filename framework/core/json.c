@@ -9,10 +9,14 @@ static void quoted(sdm_text *t, const char *s)
     sdm_text_add(t, "\"");
     for (; *s; s++) {
         const unsigned char c = (unsigned char)*s;
-        if (c == '"' || c == '\\') sdm_text_add(t, "\\%c", c);
-        else if (c == '\n') sdm_text_add(t, "\\n");
-        else if (c < 0x20) sdm_text_add(t, "\\u%04x", c);
-        else sdm_text_add(t, "%c", c);
+        if (c == '"' || c == '\\')
+            sdm_text_add(t, "\\%c", c);
+        else if (c == '\n')
+            sdm_text_add(t, "\\n");
+        else if (c < 0x20)
+            sdm_text_add(t, "\\u%04x", c);
+        else
+            sdm_text_add(t, "%c", c);
     }
     sdm_text_add(t, "\"");
 }

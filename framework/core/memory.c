@@ -12,7 +12,8 @@ void sdm_alloc_fail_after(unsigned long n) { fail_after = n; }
 
 sdm_status sdm_mul(size_t a, size_t b, size_t *out, sdm_error *err)
 {
-    if (b && a > SIZE_MAX / b) return sdm_fail(err, SDM_E_NOMEM, "%zu times %zu bytes is more than memory can hold", a, b);
+    if (b && a > SIZE_MAX / b)
+        return sdm_fail(err, SDM_E_NOMEM, "%zu times %zu bytes is more than memory can hold", a, b);
     *out = a * b;
     return SDM_OK;
 }
@@ -22,7 +23,8 @@ sdm_status sdm_alloc(void **out, size_t count, size_t size, const char *what, sd
     *out = NULL;
     size_t bytes = 0;
     if (sdm_mul(count, size, &bytes, NULL) || bytes > SIZE_MAX - ALIGNMENT)
-        return sdm_fail(err, SDM_E_NOMEM, "%s: %zu elements of %zu bytes are more than memory can hold", what, count, size);
+        return sdm_fail(err, SDM_E_NOMEM, "%s: %zu elements of %zu bytes are more than memory can hold", what, count,
+                        size);
     bytes = (bytes + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
     if (!bytes) bytes = ALIGNMENT;
     void *block = NULL;

@@ -40,19 +40,32 @@ sdm_status sdm_fail_in(sdm_error *err, sdm_status status, const char *fmt, ...)
 const char *sdm_status_name(sdm_status status)
 {
     switch (status) {
-    case SDM_OK: return "ok";
-    case SDM_E_ARG: return "argument";
-    case SDM_E_NOMEM: return "memory";
-    case SDM_E_IO: return "input/output";
-    case SDM_E_FORMAT: return "format";
-    case SDM_E_CONFIG: return "config";
-    case SDM_E_MESH: return "mesh";
-    case SDM_E_PLUGIN: return "plug-in";
-    case SDM_E_RANGE: return "range";
-    case SDM_E_UNSUPPORTED: return "unsupported";
-    case SDM_E_CANCELLED: return "cancelled";
-    case SDM_E_QUALITY: return "quality";
-    case SDM_E_INTERNAL: return "internal";
+    case SDM_OK:
+        return "ok";
+    case SDM_E_ARG:
+        return "argument";
+    case SDM_E_NOMEM:
+        return "memory";
+    case SDM_E_IO:
+        return "input/output";
+    case SDM_E_FORMAT:
+        return "format";
+    case SDM_E_CONFIG:
+        return "config";
+    case SDM_E_MESH:
+        return "mesh";
+    case SDM_E_PLUGIN:
+        return "plug-in";
+    case SDM_E_RANGE:
+        return "range";
+    case SDM_E_UNSUPPORTED:
+        return "unsupported";
+    case SDM_E_CANCELLED:
+        return "cancelled";
+    case SDM_E_QUALITY:
+        return "quality";
+    case SDM_E_INTERNAL:
+        return "internal";
     }
     return "unknown";
 }

@@ -41,7 +41,10 @@ static void relu(size_t n, const float *x, float *y, float *dy)
 
 void sdm_activate(int kind, size_t n, const float *x, float *y, float *dy)
 {
-    if (kind == 0) silu(n, x, y, dy);
-    else if (kind == 1) hyperbolic_tangent(n, x, y, dy);
-    else relu(n, x, y, dy);
+    if (kind == 0)
+        silu(n, x, y, dy);
+    else if (kind == 1)
+        hyperbolic_tangent(n, x, y, dy);
+    else
+        relu(n, x, y, dy);
 }

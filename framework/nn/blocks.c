@@ -35,7 +35,8 @@ static size_t row_in_map(const sdm_grid *g, const sdm_pod_block *k, size_t y, si
     return ((k->at[2] + z) * (size_t)g->n[1] + k->at[1] + y) * (size_t)g->n[0] + k->at[0];
 }
 
-void sdm_pod_gather(const sdm_grid *grid, const sdm_pod_block *blocks, size_t n_blocks, const float *map, float *blocked)
+void sdm_pod_gather(const sdm_grid *grid, const sdm_pod_block *blocks, size_t n_blocks, const float *map,
+                    float *blocked)
 {
     for (const sdm_pod_block *k = blocks; k < blocks + n_blocks; k++)
         for (size_t z = 0; z < k->size[2]; z++)
@@ -44,7 +45,8 @@ void sdm_pod_gather(const sdm_grid *grid, const sdm_pod_block *blocks, size_t n_
                        k->size[0] * sizeof *map);
 }
 
-void sdm_pod_scatter(const sdm_grid *grid, const sdm_pod_block *blocks, size_t n_blocks, const float *blocked, float *map)
+void sdm_pod_scatter(const sdm_grid *grid, const sdm_pod_block *blocks, size_t n_blocks, const float *blocked,
+                     float *map)
 {
     for (const sdm_pod_block *k = blocks; k < blocks + n_blocks; k++)
         for (size_t z = 0; z < k->size[2]; z++)

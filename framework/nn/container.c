@@ -35,7 +35,8 @@ sdm_status sdm_container_build(const sdm_section *sections, size_t n, uint8_t **
     for (size_t i = 0; i < n; i++) {
         if (strlen(sections[i].name) >= NAME_BYTES)
             return sdm_fail(err, SDM_E_INTERNAL, "section name '%s' is too long", sections[i].name);
-        if (sections[i].size > SIZE_MAX / 4 - total) return sdm_fail(err, SDM_E_NOMEM, "sections are more than memory can hold");
+        if (sections[i].size > SIZE_MAX / 4 - total)
+            return sdm_fail(err, SDM_E_NOMEM, "sections are more than memory can hold");
         total = round_up(total + sections[i].size);
     }
     total += 8;
@@ -75,19 +76,22 @@ sdm_status sdm_container_write(const char *path, const uint8_t *bytes, size_t si
 }
 
 sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *sections,
-                               char names[SDM_CONTAINER_MAX_SECTIONS][24], size_t *n, uint64_t *checksum, sdm_error *err)
+                               char names[SDM_CONTAINER_MAX_SECTIONS][24], size_t *n, uint64_t *checksum,
+                               sdm_error *err)
 {
     if (size < sizeof magic || memcmp(bytes, magic, sizeof magic))
         return sdm_fail(err, SDM_E_FORMAT, "not a model file (its first bytes are not those of one)");
     if (size < HEADER_BYTES + ENTRY_BYTES + 16) return sdm_fail(err, SDM_E_FORMAT, "truncated: only %zu bytes", size);
     const uint64_t version = get(bytes + 8, 4), count = get(bytes + 12, 4), length = get(bytes + 16, 8);
     if (version > SDM_CONTAINER_VERSION && version < 1000)
-        return sdm_fail(err, SDM_E_FORMAT, "format version %llu is newer than %u, which this program reads: update sdmgen",
+        return sdm_fail(err, SDM_E_FORMAT,
+                        "format version %llu is newer than %u, which this program reads: update sdmgen",
                         (unsigned long long)version, SDM_CONTAINER_VERSION);
-    if (version != SDM_CONTAINER_VERSION) return sdm_fail(err, SDM_E_FORMAT, "damaged: format version %llu", (unsigned long long)version);
+    if (version != SDM_CONTAINER_VERSION)
+        return sdm_fail(err, SDM_E_FORMAT, "damaged: format version %llu", (unsigned long long)version);
     if (length != size)
-        return sdm_fail(err, SDM_E_FORMAT, "%s: %zu bytes, its header says %llu", size < length ? "truncated" : "damaged", size,
-                        (unsigned long long)length);
+        return sdm_fail(err, SDM_E_FORMAT, "%s: %zu bytes, its header says %llu",
+                        size < length ? "truncated" : "damaged", size, (unsigned long long)length);
     if (count < 1 || count > SDM_CONTAINER_MAX_SECTIONS)
         return sdm_fail(err, SDM_E_FORMAT, "damaged: %llu sections", (unsigned long long)count);
     const size_t table_end = HEADER_BYTES + (size_t)count * ENTRY_BYTES;
@@ -101,7 +105,8 @@ sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *s
         const uint8_t *entry = bytes + HEADER_BYTES + i * ENTRY_BYTES;
         const uint64_t at = get(entry + 24, 8), bytes_here = get(entry + 32, 8);
         memcpy(names[i], entry, NAME_BYTES);
-        if (names[i][NAME_BYTES - 1]) return sdm_fail(err, SDM_E_FORMAT, "damaged: the name of section %zu does not end", i);
+        if (names[i][NAME_BYTES - 1])
+            return sdm_fail(err, SDM_E_FORMAT, "damaged: the name of section %zu does not end", i);
         if (at % ALIGN || at < end || at > size - 8 || bytes_here > size - 8 - at)
             return sdm_fail(err, SDM_E_FORMAT, "damaged: section '%s' lies outside the file", names[i]);
         end = at + bytes_here;
@@ -110,7 +115,8 @@ sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *s
         sections[i] = (sdm_section){names[i], bytes + at, (size_t)bytes_here};
     }
     *checksum = get(bytes + size - 8, 8);
-    if (*checksum != sdm_crc64(0, bytes, size - 8)) return sdm_fail(err, SDM_E_FORMAT, "damaged: the checksum of the file is wrong");
+    if (*checksum != sdm_crc64(0, bytes, size - 8))
+        return sdm_fail(err, SDM_E_FORMAT, "damaged: the checksum of the file is wrong");
     *n = (size_t)count;
     return SDM_OK;
 }

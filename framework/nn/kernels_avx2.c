@@ -7,5 +7,8 @@
 #define VW 8
 #define MR 6
 #define LOAD_HALF
-static inline __m256 load_half(const uint16_t *p) { return _mm256_cvtph_ps(_mm_loadu_si128((const __m128i *)(const void *)p)); }
+static inline __m256 load_half(const uint16_t *p)
+{
+    return _mm256_cvtph_ps(_mm_loadu_si128((const __m128i *)(const void *)p));
+}
 #include "kernels_simd.h"

@@ -7,5 +7,8 @@
 #define VW 16
 #define MR 12
 #define LOAD_HALF
-static inline __m512 load_half(const uint16_t *p) { return _mm512_cvtph_ps(_mm256_loadu_si256((const __m256i *)(const void *)p)); }
+static inline __m512 load_half(const uint16_t *p)
+{
+    return _mm512_cvtph_ps(_mm256_loadu_si256((const __m256i *)(const void *)p));
+}
 #include "kernels_simd.h"

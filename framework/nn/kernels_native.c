@@ -54,7 +54,8 @@ static void pack(size_t count, size_t k, const float *data, size_t along, size_t
 }
 
 // one MC x NC block of c over all of K
-static void gemm_block(const kernel_table *t, size_t m, size_t n, size_t k, sdm_view a, sdm_view b, bool add, float *c, size_t ldc)
+static void gemm_block(const kernel_table *t, size_t m, size_t n, size_t k, sdm_view a, sdm_view b, bool add, float *c,
+                       size_t ldc)
 {
     _Alignas(64) float pa[MC * KC], pb[NC * KC], edge[12 * 32];
     for (size_t k0 = 0; k0 < k || k0 == 0; k0 += KC) {
@@ -106,7 +107,8 @@ void sdm_tiled_pack_f32(size_t outputs, size_t k, sdm_view w, float *tiled)
 {
     for (size_t o = 0; o < (outputs + SDM_TILE - 1) / SDM_TILE * SDM_TILE; o++)
         for (size_t i = 0; i < k; i++)
-            tiled[(o / SDM_TILE * k + i) * SDM_TILE + o % SDM_TILE] = o < outputs ? w.data[o * w.row + i * w.col] : 0.0f;
+            tiled[(o / SDM_TILE * k + i) * SDM_TILE + o % SDM_TILE] =
+                o < outputs ? w.data[o * w.row + i * w.col] : 0.0f;
 }
 
 void sdm_tiled_pack_f16(size_t outputs, size_t k, sdm_view w, uint16_t *tiled)
@@ -122,7 +124,8 @@ void sdm_tile_f32(size_t batch, size_t k, const float *w, const float *x, size_t
     kernels()->tile_f32(batch, k, w, x, ldx, y, ldy);
 }
 
-void sdm_tile_f16(size_t batch, size_t k, const uint16_t *w, const float *x, size_t ldx, float *y, size_t ldy, float *scratch)
+void sdm_tile_f16(size_t batch, size_t k, const uint16_t *w, const float *x, size_t ldx, float *y, size_t ldy,
+                  float *scratch)
 {
     const kernel_table *t = kernels();
     if (batch == 1) {
@@ -142,7 +145,8 @@ uint16_t sdm_half_from_float(float v)
     const uint16_t sign = (uint16_t)(bits >> 16 & 0x8000u);
     const float a = fabsf(v);
     if (!(a < 65520.0f)) return (uint16_t)(sign | (a != a ? 0x7e00u : 0x7c00u));
-    if (a < 0x1p-14f) return (uint16_t)(sign | (uint16_t)lrintf(a * 0x1p24f)); // subnormal: multiples of 2^-24, nearest even
+    if (a < 0x1p-14f)
+        return (uint16_t)(sign | (uint16_t)lrintf(a * 0x1p24f)); // subnormal: multiples of 2^-24, nearest even
     memcpy(&bits, &a, sizeof bits);
     bits += 0xfffu + (bits >> 13 & 1); // nearest even at bit 13
     return (uint16_t)(sign | (uint16_t)((bits >> 13) - (112u << 10)));

@@ -35,23 +35,24 @@ static void micro(size_t k, const float *a, const float *b, float *c, size_t ldc
 }
 
 // maps `count` (1..4) rows of x at once: the weights are read once for all of them
-#define TILE_ROWS(count)                                                                                                \
-    static void tile_rows_##count(size_t k, const float *w, const float *x, size_t ldx, float *y, size_t ldy)           \
-    {                                                                                                                   \
-        enum { width = count == 1 ? 8 : 2 }; /* registers of outputs at a time: independent chains hide the latency */  \
-        const size_t step = width * VW <= SDM_TILE ? width * VW : SDM_TILE;                                             \
-        for (size_t o = 0; o < SDM_TILE; o += step) {                                                                   \
-            vec acc[count][width] = {{{0}}};                                                                            \
-            for (size_t p = 0; p < k; p++) {                                                                            \
-                const float *row = w + p * SDM_TILE + o;                                                                \
-                for (int i = 0; i < count; i++) {                                                                       \
-                    const vec s = splat(x[(size_t)i * ldx + p]);                                                        \
-                    for (int j = 0; j < (int)(step / VW); j++) acc[i][j] += s * load(row + j * VW);                     \
-                }                                                                                                       \
-            }                                                                                                           \
-            for (int i = 0; i < count; i++)                                                                             \
-                for (int j = 0; j < (int)(step / VW); j++) store(y + (size_t)i * ldy + o + (size_t)(j * VW), acc[i][j]); \
-        }                                                                                                               \
+#define TILE_ROWS(count)                                                                                               \
+    static void tile_rows_##count(size_t k, const float *w, const float *x, size_t ldx, float *y, size_t ldy)          \
+    {                                                                                                                  \
+        enum { width = count == 1 ? 8 : 2 }; /* registers of outputs at a time: independent chains hide the latency */ \
+        const size_t step = width * VW <= SDM_TILE ? width * VW : SDM_TILE;                                            \
+        for (size_t o = 0; o < SDM_TILE; o += step) {                                                                  \
+            vec acc[count][width] = {{{0}}};                                                                           \
+            for (size_t p = 0; p < k; p++) {                                                                           \
+                const float *row = w + p * SDM_TILE + o;                                                               \
+                for (int i = 0; i < count; i++) {                                                                      \
+                    const vec s = splat(x[(size_t)i * ldx + p]);                                                       \
+                    for (int j = 0; j < (int)(step / VW); j++) acc[i][j] += s * load(row + j * VW);                    \
+                }                                                                                                      \
+            }                                                                                                          \
+            for (int i = 0; i < count; i++)                                                                            \
+                for (int j = 0; j < (int)(step / VW); j++)                                                             \
+                    store(y + (size_t)i * ldy + o + (size_t)(j * VW), acc[i][j]);                                      \
+        }                                                                                                              \
     }
 TILE_ROWS(1)
 TILE_ROWS(2)
@@ -105,7 +106,7 @@ static void expand_f16(size_t n, const uint16_t *h, float *y)
 static inline vec exp_vec(vec x)
 {
     const vec lo = splat(-87.0f), hi = splat(88.0f);
-    const veci below = x < lo, above = x > hi;
+    const veci below = x<lo, above = x> hi;
     vecu bits, b2;
     memcpy(&bits, &x, sizeof x);
     memcpy(&b2, &lo, sizeof lo);
@@ -113,7 +114,8 @@ static inline vec exp_vec(vec x)
     memcpy(&b2, &hi, sizeof hi);
     bits = (bits & ~(vecu)above) | (b2 & (vecu)above);
     memcpy(&x, &bits, sizeof x);
-    const vec shifted = x * 1.44269504088896341f + 12582912.0f, n = shifted - 12582912.0f; // round to the nearest integer
+    const vec shifted = x * 1.44269504088896341f + 12582912.0f,
+              n = shifted - 12582912.0f; // round to the nearest integer
     const vec r = (x - n * 0.693359375f) + n * 2.12194440e-4f;
     vec p = splat(1.9875691500e-4f);
     p = p * r + 1.3981999507e-3f;
@@ -140,5 +142,11 @@ static void exp_all(size_t n, const float *x, float *y)
     memcpy(y + i, rest, (n - i) * sizeof *x);
 }
 
-const kernel_table TABLE = {.name = ISA, .mr = MR, .nr = NR, .micro = micro, .tile_f32 = tile_f32, .tile_f16 = tile_f16,
-                            .expand_f16 = expand_f16, .exp = exp_all};
+const kernel_table TABLE = {.name = ISA,
+                            .mr = MR,
+                            .nr = NR,
+                            .micro = micro,
+                            .tile_f32 = tile_f32,
+                            .tile_f16 = tile_f16,
+                            .expand_f16 = expand_f16,
+                            .exp = exp_all};

@@ -31,7 +31,8 @@ static void meta(const sdm_pod_spec *spec, sdm_text *t)
     const sdm_model_info *i = spec->info;
     const sdm_accuracy *a = &i->accuracy;
     sdm_text_add(t, "kind=pod\nversion=%s\nshape=%s\n", SDM_VERSION_TEXT, i->shape);
-    sdm_text_add(t, "grid.size=%lld %lld %lld\n", (long long)i->grid.n[0], (long long)i->grid.n[1], (long long)i->grid.n[2]);
+    sdm_text_add(t, "grid.size=%lld %lld %lld\n", (long long)i->grid.n[0], (long long)i->grid.n[1],
+                 (long long)i->grid.n[2]);
     reals(t, "grid.origin", i->grid.origin, 3);
     reals(t, "grid.spacing", i->grid.spacing, 3);
     reals(t, "grid.direction", i->grid.dir, 9);
@@ -56,15 +57,17 @@ static void meta(const sdm_pod_spec *spec, sdm_text *t)
     real(t, "train.seconds", i->train_seconds);
     sdm_text_add(t, "train.samples=%lld\n", (long long)i->train_samples);
     const sdm_pod_arch *k = &spec->arch;
-    sdm_text_add(t, "pod.degree=%zu\npod.input_degree=%zu\npod.depth=%zu\npod.width=%zu\npod.activation=%d\npod.half=%d\n", k->degree,
-                 k->input_degree, k->depth, k->width, k->activation, spec->half);
+    sdm_text_add(t,
+                 "pod.degree=%zu\npod.input_degree=%zu\npod.depth=%zu\npod.width=%zu\npod.activation=%d\npod.half=%d\n",
+                 k->degree, k->input_degree, k->depth, k->width, k->activation, spec->half);
     sdm_text_add(t, "pod.block=%zu\n", k->block);
 }
 
 size_t sdm_pod_mlp_floats(const sdm_pod_arch *a)
 {
     size_t n = 0;
-    for (size_t l = 0; l < a->depth; l++) n += sdm_tiled_count(a->width, sdm_pod_layer_inputs(a, l)) + sdm_tiled_count(a->width, 1);
+    for (size_t l = 0; l < a->depth; l++)
+        n += sdm_tiled_count(a->width, sdm_pod_layer_inputs(a, l)) + sdm_tiled_count(a->width, 1);
     return n;
 }
 
@@ -77,8 +80,10 @@ size_t sdm_pod_basis_count(const sdm_pod_block *blocks, size_t n_blocks)
 
 static void pack_matrix(bool half, size_t outputs, size_t k, sdm_view w, void *to, size_t offset)
 {
-    if (half) sdm_tiled_pack_f16(outputs, k, w, (uint16_t *)to + offset);
-    else sdm_tiled_pack_f32(outputs, k, w, (float *)to + offset);
+    if (half)
+        sdm_tiled_pack_f16(outputs, k, w, (uint16_t *)to + offset);
+    else
+        sdm_tiled_pack_f32(outputs, k, w, (float *)to + offset);
 }
 
 static void pack_weights(const sdm_pod_spec *spec, float *mlp, void *head, void *basis)

@@ -17,9 +17,9 @@ struct sdm_model {
     uint8_t *exponents;                    /* [max(F, 1 + I)][P] */
     const float *layer[SDM_POD_MAX_DEPTH]; /* tiled */
     const float *bias[SDM_POD_MAX_DEPTH];
-    const void *head;                      /* tiled, float or half */
-    const void *basis;                     /* tiled, block after block */
-    const float *mean;                     /* block order */
+    const void *head;  /* tiled, float or half */
+    const void *basis; /* tiled, block after block */
+    const float *mean; /* block order */
     size_t max_block_voxels, max_rank;
 };
 
@@ -27,7 +27,13 @@ struct sdm_model {
 size_t sdm_pod_mlp_floats(const sdm_pod_arch *a);
 size_t sdm_pod_basis_count(const sdm_pod_block *blocks, size_t n_blocks);
 
-static inline size_t sdm_pod_block_voxels(const sdm_pod_block *b) { return (size_t)b->size[0] * b->size[1] * b->size[2]; }
-static inline size_t sdm_pod_layer_inputs(const sdm_pod_arch *a, size_t layer) { return layer ? a->width : a->n_inputs; }
+static inline size_t sdm_pod_block_voxels(const sdm_pod_block *b)
+{
+    return (size_t)b->size[0] * b->size[1] * b->size[2];
+}
+static inline size_t sdm_pod_layer_inputs(const sdm_pod_arch *a, size_t layer)
+{
+    return layer ? a->width : a->n_inputs;
+}
 
 #endif

@@ -172,7 +172,8 @@ static sdm_status set_up(const sdm_section *ranks, sdm_model *m, sdm_error *err)
     const size_t terms = sdm_poly_count(a->n_params, a->degree), inputs = sdm_poly_count(a->n_params, a->input_degree);
     a->n_blocks = sdm_pod_block_count(&m->info.grid, a->block);
     if (terms > 1u << 20 || inputs > 1u << 20 || ranks->size / 4 != a->n_blocks || ranks->size % 4)
-        return sdm_fail(err, SDM_E_FORMAT, "damaged: %zu ranks of blocks, the grid has %zu blocks", ranks->size / 4, a->n_blocks);
+        return sdm_fail(err, SDM_E_FORMAT, "damaged: %zu ranks of blocks, the grid has %zu blocks", ranks->size / 4,
+                        a->n_blocks);
     a->n_terms = terms;
     a->n_inputs = inputs - 1;
     a->n_latent = terms + (a->depth ? a->width : 0);
@@ -184,7 +185,8 @@ static sdm_status set_up(const sdm_section *ranks, sdm_model *m, sdm_error *err)
         sdm_pod_block *k = &m->blocks[b];
         k->rank = (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
         const size_t voxels = sdm_pod_block_voxels(k);
-        if (k->rank > voxels) return sdm_fail(err, SDM_E_FORMAT, "damaged: rank %u of a block of %zu voxels", k->rank, voxels);
+        if (k->rank > voxels)
+            return sdm_fail(err, SDM_E_FORMAT, "damaged: rank %u of a block of %zu voxels", k->rank, voxels);
         k->coefficient = (uint32_t)a->n_coefficients;
         a->n_coefficients += k->rank;
         if (voxels > m->max_block_voxels) m->max_block_voxels = voxels;
@@ -210,7 +212,10 @@ static sdm_status bind_weights(const sdm_section *sections, size_t n, sdm_model 
 {
     const sdm_pod_arch *a = &m->arch;
     const size_t weight = m->half ? sizeof(uint16_t) : sizeof(float);
-    const struct { const char *name; size_t size; } need[] = {
+    const struct {
+        const char *name;
+        size_t size;
+    } need[] = {
         {"pod.mlp", sdm_pod_mlp_floats(a) * sizeof(float)},
         {"pod.head", sdm_tiled_count(a->n_coefficients, a->n_latent) * weight},
         {"pod.basis", sdm_pod_basis_count(m->blocks, a->n_blocks) * weight},
@@ -221,7 +226,8 @@ static sdm_status bind_weights(const sdm_section *sections, size_t n, sdm_model 
         const sdm_section *s = find(sections, n, need[i].name);
         if (!s) return sdm_fail(err, SDM_E_FORMAT, "damaged: it has no section '%s'", need[i].name);
         if (s->size != need[i].size)
-            return sdm_fail(err, SDM_E_FORMAT, "damaged: section '%s' has %zu bytes, need %zu", need[i].name, s->size, need[i].size);
+            return sdm_fail(err, SDM_E_FORMAT, "damaged: section '%s' has %zu bytes, need %zu", need[i].name, s->size,
+                            need[i].size);
         data[i] = s->data;
         m->info.weight_bytes += s->size;
     }
@@ -263,8 +269,10 @@ static sdm_status open_bytes(uint8_t *bytes, size_t size, sdm_model **out, sdm_e
     m->info.config = m->config;
     if (!s) s = set_up(ranks, m, err);
     if (!s) s = bind_weights(sections, n, m, err);
-    if (s) sdm_model_free(m);
-    else *out = m;
+    if (s)
+        sdm_model_free(m);
+    else
+        *out = m;
     return s;
 }
 

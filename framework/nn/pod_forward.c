@@ -13,14 +13,14 @@ static size_t smaller(size_t a, size_t b) { return a < b ? a : b; }
 
 // scratch, carved from the caller's block
 typedef struct workspace {
-    float *z;       // [R][L]
-    float *c;       // [R][pad(K)]
-    float *y;       // [R][pad(V_b)]
-    float *expand;  // [max(L, k_b)][T]
-    float *phi;     // [n_poly], all products
-    float *dphi;    // [P][n_poly]
-    float *h, *dh;  // [1 + P][pad(W)], twice: values and tangents of a layer
-    float *slope;   // [pad(W)]
+    float *z;      // [R][L]
+    float *c;      // [R][pad(K)]
+    float *y;      // [R][pad(V_b)]
+    float *expand; // [max(L, k_b)][T]
+    float *phi;    // [n_poly], all products
+    float *dphi;   // [P][n_poly]
+    float *h, *dh; // [1 + P][pad(W)], twice: values and tangents of a layer
+    float *slope;  // [pad(W)]
 } workspace;
 
 static size_t n_poly(const sdm_model *m) { return larger(m->arch.n_terms, 1 + m->arch.n_inputs); }
@@ -28,9 +28,14 @@ static size_t n_poly(const sdm_model *m) { return larger(m->arch.n_terms, 1 + m-
 static size_t carve(const sdm_model *m, size_t rows, void *memory, workspace *w)
 {
     const sdm_pod_arch *a = &m->arch;
-    const size_t sizes[] = {rows * a->n_latent, rows * pad(a->n_coefficients), rows * pad(m->max_block_voxels),
-                            larger(a->n_latent, m->max_rank) * SDM_TILE, n_poly(m), a->n_params * n_poly(m),
-                            (1 + a->n_params) * larger(pad(a->width), a->n_inputs), (1 + a->n_params) * pad(a->width),
+    const size_t sizes[] = {rows * a->n_latent,
+                            rows * pad(a->n_coefficients),
+                            rows * pad(m->max_block_voxels),
+                            larger(a->n_latent, m->max_rank) * SDM_TILE,
+                            n_poly(m),
+                            a->n_params * n_poly(m),
+                            (1 + a->n_params) * larger(pad(a->width), a->n_inputs),
+                            (1 + a->n_params) * pad(a->width),
                             pad(a->width)};
     float **const fields[] = {&w->z, &w->c, &w->y, &w->expand, &w->phi, &w->dphi, &w->h, &w->dh, &w->slope};
     float *at = memory;
@@ -53,7 +58,8 @@ static void latent(const sdm_model *m, const double *p, bool tangents, const wor
         unit[i] = 2 / (q->max - q->min);
         x[i] = (p[i] - q->min) * unit[i] - 1;
     }
-    sdm_poly_eval(m->exponents, total, a->n_params, larger(a->degree, a->input_degree), x, w->phi, tangents ? w->dphi : NULL);
+    sdm_poly_eval(m->exponents, total, a->n_params, larger(a->degree, a->input_degree), x, w->phi,
+                  tangents ? w->dphi : NULL);
     for (size_t r = 1; r < rows; r++)
         for (size_t t = 0; t < total; t++) w->dphi[(r - 1) * total + t] *= (float)unit[r - 1];
 
@@ -83,11 +89,13 @@ static void latent(const sdm_model *m, const double *p, bool tangents, const wor
     for (size_t r = 0; r < rows; r++) memcpy(z + r * a->n_latent + a->n_terms, in + r * width, a->width * sizeof *z);
 }
 
-static void tile(const sdm_model *m, size_t rows, size_t k, const void *weights, size_t offset, const float *x, size_t ldx, float *y,
-                 size_t ldy, float *expand)
+static void tile(const sdm_model *m, size_t rows, size_t k, const void *weights, size_t offset, const float *x,
+                 size_t ldx, float *y, size_t ldy, float *expand)
 {
-    if (m->half) sdm_tile_f16(rows, k, (const uint16_t *)weights + offset, x, ldx, y, ldy, expand);
-    else sdm_tile_f32(rows, k, (const float *)weights + offset, x, ldx, y, ldy);
+    if (m->half)
+        sdm_tile_f16(rows, k, (const uint16_t *)weights + offset, x, ldx, y, ldy, expand);
+    else
+        sdm_tile_f32(rows, k, (const float *)weights + offset, x, ldx, y, ldy);
 }
 
 // block b of row r from y to its map, with the mean added when wanted
@@ -99,7 +107,8 @@ static void place(const sdm_grid *g, const sdm_pod_block *b, const float *y, con
             float *to = map + ((b->at[2] + z) * (size_t)g->n[1] + b->at[1] + v) * (size_t)g->n[0] + b->at[0];
             if (mean)
                 for (size_t x = 0; x < b->size[0]; x++) to[x] = y[from + x] + mean[from + x];
-            else memcpy(to, y + from, b->size[0] * sizeof *to);
+            else
+                memcpy(to, y + from, b->size[0] * sizeof *to);
         }
     }
 }
@@ -115,8 +124,10 @@ static void decode(const sdm_model *m, size_t rows, const workspace *w, size_t w
     for (const sdm_pod_block *b = m->blocks; b < m->blocks + a->n_blocks; b++) {
         const size_t voxels = pad(sdm_pod_block_voxels(b));
         for (size_t o = 0; o < voxels; o += SDM_TILE)
-            tile(m, rows, b->rank, m->basis, offset + o * b->rank, w->c + b->coefficient, ldc, w->y + o, ldy, w->expand);
-        for (size_t r = 0; r < rows; r++) place(&m->info.grid, b, w->y + r * ldy, r < with_mean ? m->mean + b->voxel : NULL, maps[r]);
+            tile(m, rows, b->rank, m->basis, offset + o * b->rank, w->c + b->coefficient, ldc, w->y + o, ldy,
+                 w->expand);
+        for (size_t r = 0; r < rows; r++)
+            place(&m->info.grid, b, w->y + r * ldy, r < with_mean ? m->mean + b->voxel : NULL, maps[r]);
         offset += voxels * b->rank;
     }
 }

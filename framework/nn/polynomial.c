@@ -39,7 +39,8 @@ void sdm_poly_table(size_t n, size_t degree, uint8_t *exponents)
     for (size_t d = 0; d <= degree; d++) exponents = fill(n, 0, d, current, exponents);
 }
 
-void sdm_poly_eval(const uint8_t *exponents, size_t n_terms, size_t n, size_t degree, const double *x, float *phi, float *dphi)
+void sdm_poly_eval(const uint8_t *exponents, size_t n_terms, size_t n, size_t degree, const double *x, float *phi,
+                   float *dphi)
 {
     double value[SDM_POD_MAX_PARAMS][MAX_DEGREE + 1], slope[SDM_POD_MAX_PARAMS][MAX_DEGREE + 1];
     for (size_t v = 0; v < n; v++) {

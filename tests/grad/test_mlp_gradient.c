@@ -76,7 +76,8 @@ static void adam(void **state)
     assert_true(fabs((double)p.average[0] - 1) < 1e-2);
     parameters_dispose(&p);
 
-    assert_true(schedule(0, 0.1) == 0 && fabs(schedule(0.05, 0.1) - 0.5) < 1e-12 && fabs(schedule(0.1, 0.1) - 1) < 1e-12);
+    assert_true(schedule(0, 0.1) == 0 && fabs(schedule(0.05, 0.1) - 0.5) < 1e-12 &&
+                fabs(schedule(0.1, 0.1) - 1) < 1e-12);
     assert_true(fabs(schedule(0.55, 0.1) - 0.5) < 1e-12 && schedule(1, 0.1) < 1e-12 && schedule(2, 0) < 1e-12);
 }
 

@@ -116,12 +116,15 @@ static void numbers_and_names(void **state)
     int64_t i;
     char buf[32];
     assert_true(sdm_parse_real("-1.5e3", &v) && v == -1500);
-    for (const char *const *bad = (const char *const[]){"", "nan", "inf", "1e999", "1x", " 1", "0x10", "1,5", "--1", NULL}; *bad; bad++)
+    for (const char *const *bad =
+             (const char *const[]){"", "nan", "inf", "1e999", "1x", " 1", "0x10", "1,5", "--1", NULL};
+         *bad; bad++)
         assert_false(sdm_parse_real(*bad, &v));
     assert_true(sdm_parse_int("-9223372036854775808", &i) && i == INT64_MIN);
     assert_true(sdm_parse_int("9223372036854775807", &i) && i == INT64_MAX);
-    for (const char *const *bad = (const char *const[]){"", "-", "1.0", "9223372036854775808", "-9223372036854775809", "1 ", NULL}; *bad;
-         bad++)
+    for (const char *const *bad =
+             (const char *const[]){"", "-", "1.0", "9223372036854775808", "-9223372036854775809", "1 ", NULL};
+         *bad; bad++)
         assert_false(sdm_parse_int(*bad, &i));
     for (int k = 0; k < 1000; k++) {
         const double x = sdm_rng_normal(1, 1, (uint64_t)k) * pow(10, k % 40 - 20);
@@ -235,9 +238,15 @@ static void grids(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(status_text), cmocka_unit_test(memory_limits), cmocka_unit_test(philox_known_answers),
-        cmocka_unit_test(random_laws), cmocka_unit_test(crc_known_answer), cmocka_unit_test(numbers_and_names),
-        cmocka_unit_test(json_text), cmocka_unit_test(files), cmocka_unit_test(grids),
+        cmocka_unit_test(status_text),
+        cmocka_unit_test(memory_limits),
+        cmocka_unit_test(philox_known_answers),
+        cmocka_unit_test(random_laws),
+        cmocka_unit_test(crc_known_answer),
+        cmocka_unit_test(numbers_and_names),
+        cmocka_unit_test(json_text),
+        cmocka_unit_test(files),
+        cmocka_unit_test(grids),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -22,13 +22,16 @@ static float *random_floats(size_t n, uint64_t stream)
 
 static void check_product(size_t m, size_t n, size_t k, bool ta, bool tb, bool add)
 {
-    float *a = random_floats(m * k, 1), *b = random_floats(k * n, 2), *c = random_floats(m * n, 3), *old = random_floats(m * n, 3);
-    const sdm_view va = ta ? (sdm_view){a, 1, m} : (sdm_view){a, k, 1}, vb = tb ? (sdm_view){b, 1, k} : (sdm_view){b, n, 1};
+    float *a = random_floats(m * k, 1), *b = random_floats(k * n, 2), *c = random_floats(m * n, 3),
+          *old = random_floats(m * n, 3);
+    const sdm_view va = ta ? (sdm_view){a, 1, m} : (sdm_view){a, k, 1},
+                   vb = tb ? (sdm_view){b, 1, k} : (sdm_view){b, n, 1};
     sdm_gemm(m, n, k, va, vb, add, c, n, 2);
     for (size_t i = 0; i < m; i++) {
         for (size_t j = 0; j < n; j++) {
             double s = add ? old[i * n + j] : 0;
-            for (size_t p = 0; p < k; p++) s += (double)va.data[i * va.row + p * va.col] * vb.data[p * vb.row + j * vb.col];
+            for (size_t p = 0; p < k; p++)
+                s += (double)va.data[i * va.row + p * va.col] * vb.data[p * vb.row + j * vb.col];
             assert_true(fabs(s - c[i * n + j]) <= 1e-6 * sqrt((double)k) + 1e-6);
         }
     }
@@ -41,16 +44,19 @@ static void check_product(size_t m, size_t n, size_t k, bool ta, bool tb, bool a
 static void product(void **state)
 {
     (void)state;
-    const size_t sizes[][3] = {{1, 1, 1}, {7, 5, 3}, {6, 16, 256}, {97, 129, 257}, {200, 33, 520}, {12, 32, 600}, {1, 300, 40}, {5, 4, 0}};
+    const size_t sizes[][3] = {{1, 1, 1},      {7, 5, 3},     {6, 16, 256}, {97, 129, 257},
+                               {200, 33, 520}, {12, 32, 600}, {1, 300, 40}, {5, 4, 0}};
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
-        for (int mode = 0; mode < 8; mode++) check_product(sizes[i][0], sizes[i][1], sizes[i][2], mode & 1, mode & 2, mode & 4);
+        for (int mode = 0; mode < 8; mode++)
+            check_product(sizes[i][0], sizes[i][1], sizes[i][2], mode & 1, mode & 2, mode & 4);
 }
 
 static void same_bits_for_threads(void **state)
 {
     (void)state;
     const size_t m = 300, n = 280, k = 700;
-    float *a = random_floats(m * k, 1), *b = random_floats(k * n, 2), *c1 = random_floats(m * n, 3), *c = random_floats(m * n, 3);
+    float *a = random_floats(m * k, 1), *b = random_floats(k * n, 2), *c1 = random_floats(m * n, 3),
+          *c = random_floats(m * n, 3);
     sdm_gemm(m, n, k, (sdm_view){a, k, 1}, (sdm_view){b, n, 1}, false, c1, n, 1);
     for (int threads = 2; threads <= 5; threads++) {
         sdm_gemm(m, n, k, (sdm_view){a, k, 1}, (sdm_view){b, n, 1}, false, c, n, threads);
@@ -70,7 +76,7 @@ static void half_precision(void **state)
         assert_int_equal(sdm_half_from_float(sdm_half_to_float((uint16_t)h)), h);
     }
     assert_int_equal(sdm_half_from_float(1.0f), 0x3c00);
-    assert_int_equal(sdm_half_from_float(1.0f + 0x1p-11f), 0x3c00);            // tie to even
+    assert_int_equal(sdm_half_from_float(1.0f + 0x1p-11f), 0x3c00); // tie to even
     assert_int_equal(sdm_half_from_float(1.0f + 0x1p-11f + 0x1p-20f), 0x3c01);
     assert_int_equal(sdm_half_from_float(65504.0f), 0x7bff);
     assert_int_equal(sdm_half_from_float(-70000.0f), 0xfc00);
@@ -97,14 +103,17 @@ static void tiles(void **state)
     for (int use_half = 0; use_half < 2; use_half++) {
         for (size_t rows = 1; rows <= ROWS; rows++) {
             for (size_t o = 0; o < 192; o += SDM_TILE) {
-                if (use_half) sdm_tile_f16(rows, K, half + o * K, x, K, y + o, 192, scratch);
-                else sdm_tile_f32(rows, K, tiled + o * K, x, K, y + o, 192);
+                if (use_half)
+                    sdm_tile_f16(rows, K, half + o * K, x, K, y + o, 192, scratch);
+                else
+                    sdm_tile_f32(rows, K, tiled + o * K, x, K, y + o, 192);
             }
             for (size_t r = 0; r < rows; r++) {
                 for (size_t o = 0; o < 192; o++) {
                     double s = 0;
                     for (size_t i = 0; i < K && o < OUTPUTS; i++)
-                        s += (double)x[r * K + i] * (use_half ? sdm_half_to_float(sdm_half_from_float(w[o * K + i])) : w[o * K + i]);
+                        s += (double)x[r * K + i] *
+                             (use_half ? sdm_half_to_float(sdm_half_from_float(w[o * K + i])) : w[o * K + i]);
                     assert_true(fabs(s - y[r * 192 + o]) < 1e-5);
                 }
             }
@@ -133,7 +142,8 @@ static void exponential(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(product), cmocka_unit_test(same_bits_for_threads), cmocka_unit_test(half_precision),
-                                       cmocka_unit_test(tiles), cmocka_unit_test(exponential)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(product), cmocka_unit_test(same_bits_for_threads),
+                                       cmocka_unit_test(half_precision), cmocka_unit_test(tiles),
+                                       cmocka_unit_test(exponential)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

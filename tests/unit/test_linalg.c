@@ -31,7 +31,8 @@ static void eigenvectors(void **state)
             if (i) assert_true(v[i] <= v[i - 1]);
             for (size_t j = 0; j < n; j++) {
                 double applied = 0, dot = 0;
-                for (size_t k = 0; k < n; k++) applied += a0[j * n + k] * a[i * n + k], dot += a[i * n + k] * a[j * n + k];
+                for (size_t k = 0; k < n; k++)
+                    applied += a0[j * n + k] * a[i * n + k], dot += a[i * n + k] * a[j * n + k];
                 assert_true(fabs(applied - v[i] * a[i * n + j]) < 1e-12 * (double)n);
                 assert_true(fabs(dot - (i == j)) < 1e-12 * (double)n);
             }
@@ -152,7 +153,7 @@ static void stratified_samples(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(eigenvectors), cmocka_unit_test(solve), cmocka_unit_test(spaces),
-                                       cmocka_unit_test(stratified_samples)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(eigenvectors), cmocka_unit_test(solve),
+                                       cmocka_unit_test(spaces), cmocka_unit_test(stratified_samples)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

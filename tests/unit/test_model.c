@@ -36,27 +36,45 @@ static void make(toy *t, bool half, int activation)
         t->params[i].min = -1.0 - i, t->params[i].max = 2.0 + i, t->params[i].def = 0.5;
     }
     static const char *const names[] = {"edge", "ear"}, *const values[] = {"0.3", "left"};
-    t->info = (sdm_model_info){.n_params = P, .params = t->params, .n_options = 2, .option_names = names, .option_values = values,
-                               .grid = sdm_grid_centred((const int64_t[]){9, 7, 5}, 0.2, (const double[]){1, 2, 3}), .seed = 77,
-                               .train_seconds = 1.25, .train_samples = 1234, .config = "seed: 77\n"};
+    t->info = (sdm_model_info){.n_params = P,
+                               .params = t->params,
+                               .n_options = 2,
+                               .option_names = names,
+                               .option_values = values,
+                               .grid = sdm_grid_centred((const int64_t[]){9, 7, 5}, 0.2, (const double[]){1, 2, 3}),
+                               .seed = 77,
+                               .train_seconds = 1.25,
+                               .train_samples = 1234,
+                               .config = "seed: 77\n"};
     t->info.accuracy = (sdm_accuracy){100, 1e-5, 0.003, 0.002, 0.1, 0.005, 0.001, 0.002, 0.003};
     snprintf(t->info.shape, sizeof t->info.shape, "toy");
     sdm_pod_arch *a = &t->spec.arch;
-    *a = (sdm_pod_arch){.n_params = P, .degree = DEGREE, .input_degree = INPUT_DEGREE, .depth = DEPTH, .width = WIDTH, .block = BLOCK,
-                        .activation = activation, .n_terms = sdm_poly_count(P, DEGREE), .n_inputs = sdm_poly_count(P, INPUT_DEGREE) - 1,
-                        .n_voxels = 9 * 7 * 5, .n_blocks = sdm_pod_block_count(&t->info.grid, BLOCK)};
+    *a = (sdm_pod_arch){.n_params = P,
+                        .degree = DEGREE,
+                        .input_degree = INPUT_DEGREE,
+                        .depth = DEPTH,
+                        .width = WIDTH,
+                        .block = BLOCK,
+                        .activation = activation,
+                        .n_terms = sdm_poly_count(P, DEGREE),
+                        .n_inputs = sdm_poly_count(P, INPUT_DEGREE) - 1,
+                        .n_voxels = 9 * 7 * 5,
+                        .n_blocks = sdm_pod_block_count(&t->info.grid, BLOCK)};
     a->n_latent = a->n_terms + WIDTH;
     sdm_pod_blocks(&t->info.grid, BLOCK, t->blocks);
     size_t basis = 0;
     for (size_t b = 0; b < a->n_blocks; b++) {
         sdm_pod_block *k = &t->blocks[b];
         const uint32_t voxels = k->size[0] * k->size[1] * k->size[2];
-        k->rank = b == 2 ? 0 : (uint32_t)(b % 5 + 1) < voxels ? (uint32_t)(b % 5 + 1) : voxels; // one block is only its mean
+        k->rank = b == 2                           ? 0
+                  : (uint32_t)(b % 5 + 1) < voxels ? (uint32_t)(b % 5 + 1)
+                                                   : voxels; // one block is only its mean
         k->coefficient = (uint32_t)a->n_coefficients;
         a->n_coefficients += k->rank;
         basis += voxels * k->rank;
     }
-    const size_t n = WIDTH * a->n_inputs + WIDTH * WIDTH + 2 * WIDTH + a->n_coefficients * a->n_latent + a->n_voxels + basis;
+    const size_t n =
+        WIDTH * a->n_inputs + WIDTH * WIDTH + 2 * WIDTH + a->n_coefficients * a->n_latent + a->n_voxels + basis;
     assert_int_equal(SDM_ALLOC(&t->memory, n, "toy", NULL), SDM_OK);
     for (size_t i = 0; i < n; i++) t->memory[i] = (float)(0.3 * sdm_rng_normal(11, 1, i));
     float *at = t->memory;
@@ -88,14 +106,21 @@ static sdm_model *open_toy(const toy *t)
 static double legendre(int n, double x)
 {
     switch (n) {
-    case 0: return 1;
-    case 1: return sqrt(3) * x;
-    case 2: return sqrt(5) * 0.5 * (3 * x * x - 1);
-    default: return sqrt(7) * 0.5 * (5 * x * x * x - 3 * x);
+    case 0:
+        return 1;
+    case 1:
+        return sqrt(3) * x;
+    case 2:
+        return sqrt(5) * 0.5 * (3 * x * x - 1);
+    default:
+        return sqrt(7) * 0.5 * (5 * x * x * x - 3 * x);
     }
 }
 
-static double activate(int kind, double x) { return kind == 0 ? x / (1 + exp(-x)) : kind == 1 ? tanh(x) : x > 0 ? x : 0; }
+static double activate(int kind, double x)
+{
+    return kind == 0 ? x / (1 + exp(-x)) : kind == 1 ? tanh(x) : x > 0 ? x : 0;
+}
 
 // the definition of the network in sdm/pod.h, in double, without tiles
 static void reference(const toy *t, const double *p, double *map)
@@ -107,7 +132,8 @@ static void reference(const toy *t, const double *p, double *map)
     for (size_t f = 0; f < a->n_terms; f++) {
         z[f] = 1;
         for (int i = 0; i < P; i++)
-            z[f] *= legendre(exponents[f * P + (size_t)i], 2 * (p[i] - t->params[i].min) / (t->params[i].max - t->params[i].min) - 1);
+            z[f] *= legendre(exponents[f * P + (size_t)i],
+                             2 * (p[i] - t->params[i].min) / (t->params[i].max - t->params[i].min) - 1);
     }
     for (int l = 0; l < DEPTH; l++) {
         const size_t k = l ? WIDTH : a->n_inputs;
@@ -196,9 +222,11 @@ static void forward_is_the_definition(void **state)
             reference(&t, p + i * P, truth);
             double size = 0;
             for (int v = 0; v < 315; v++) size = fmax(size, fabs(truth[v]));
-            for (int v = 0; v < 315; v++) assert_true(fabs(truth[v] - maps[i * 315 + (size_t)v]) < (mode & 1 ? 4e-3 : 1e-5) * size);
+            for (int v = 0; v < 315; v++)
+                assert_true(fabs(truth[v] - maps[i * 315 + (size_t)v]) < (mode & 1 ? 4e-3 : 1e-5) * size);
             sdm_model_forward(m, p + i * P, 1, single, scratch);
-            for (int v = 0; v < 315; v++) assert_true(fabs((double)single[v] - maps[i * 315 + (size_t)v]) < 1e-5 * size);
+            for (int v = 0; v < 315; v++)
+                assert_true(fabs((double)single[v] - maps[i * 315 + (size_t)v]) < 1e-5 * size);
         }
         sdm_free(scratch);
         sdm_free(maps);
@@ -384,8 +412,12 @@ static void every_allocation_may_fail(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(polynomials), cmocka_unit_test(forward_is_the_definition), cmocka_unit_test(jacobian_is_the_slope),
-        cmocka_unit_test(file_keeps_everything), cmocka_unit_test(damage_is_refused), cmocka_unit_test(hostile_sections),
+        cmocka_unit_test(polynomials),
+        cmocka_unit_test(forward_is_the_definition),
+        cmocka_unit_test(jacobian_is_the_slope),
+        cmocka_unit_test(file_keeps_everything),
+        cmocka_unit_test(damage_is_refused),
+        cmocka_unit_test(hostile_sections),
         cmocka_unit_test(every_allocation_may_fail),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

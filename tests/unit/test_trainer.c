@@ -192,8 +192,10 @@ static void polynomials_alone(void **state)
     sdm_error e = {0};
     sdm_train_report r;
     clean();
-    read_config(&c, (const char *const[]){"network.depth=0", "train.steps=50", "network.weights=f32", "data.static=[2,4]", "data.online=0",
-                                          "train.loss=huber", "train.near_weight=2"}, 7);
+    read_config(&c,
+                (const char *const[]){"network.depth=0", "train.steps=50", "network.weights=f32", "data.static=[2,4]",
+                                      "data.online=0", "train.loss=huber", "train.near_weight=2"},
+                7);
     if (sdm_train(&c, capsule, folder, false, NULL, &r, &e)) fail_msg("%s", e.text);
     assert_true(r.accuracy.rmse_mm < 0.1);
 }
@@ -206,7 +208,10 @@ static void small_pool(void **state)
     sdm_error e = {0};
     sdm_train_report r;
     clean();
-    read_config(&c, (const char *const[]){"train.steps=300", "data.memory_gb=0.0025", "data.start=60", "data.online=500", "data.static=2"}, 5);
+    read_config(&c,
+                (const char *const[]){"train.steps=300", "data.memory_gb=0.0025", "data.start=60", "data.online=500",
+                                      "data.static=2"},
+                5);
     if (sdm_train(&c, capsule, folder, false, NULL, &r, &e)) fail_msg("%s", e.text);
     assert_int_equal(r.samples, 4 + 560);
     assert_true(r.accuracy.rmse_mm < 0.1);
@@ -253,8 +258,11 @@ static int tear_down(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(trains), cmocka_unit_test(same_bits_for_threads),
-                                       cmocka_unit_test(resume_is_bit_exact), cmocka_unit_test(polynomials_alone),
-                                       cmocka_unit_test(small_pool), cmocka_unit_test(mistakes)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(trains),
+                                       cmocka_unit_test(same_bits_for_threads),
+                                       cmocka_unit_test(resume_is_bit_exact),
+                                       cmocka_unit_test(polynomials_alone),
+                                       cmocka_unit_test(small_pool),
+                                       cmocka_unit_test(mistakes)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -18,7 +18,9 @@ extern "C" {
 #define SDM_PATH_TEXT_MAX 1024
 
 /* Where a value came from: line and column from 1, or 0 for a default; override: 1-based number of the key=value argument. */
-typedef struct sdm_mark { int line, column, override; } sdm_mark;
+typedef struct sdm_mark {
+    int line, column, override;
+} sdm_mark;
 
 /* shape.options.NAME: kept as text; its meaning is the shape's (sdm_instance_create()). */
 typedef struct sdm_config_option {
@@ -35,7 +37,11 @@ typedef struct sdm_config_range {
 } sdm_config_range;
 
 typedef enum sdm_network_kind { SDM_NETWORK_POD = 0 } sdm_network_kind;
-typedef enum sdm_activation { SDM_ACTIVATION_SILU = 0, SDM_ACTIVATION_TANH = 1, SDM_ACTIVATION_RELU = 2 } sdm_activation;
+typedef enum sdm_activation {
+    SDM_ACTIVATION_SILU = 0,
+    SDM_ACTIVATION_TANH = 1,
+    SDM_ACTIVATION_RELU = 2
+} sdm_activation;
 typedef enum sdm_loss { SDM_LOSS_MSE = 0, SDM_LOSS_L1 = 1, SDM_LOSS_HUBER = 2 } sdm_loss;
 typedef enum sdm_weight_type { SDM_WEIGHT_F32 = 0, SDM_WEIGHT_F16 = 1 } sdm_weight_type;
 
@@ -52,49 +58,51 @@ typedef struct sdm_config {
     sdm_grid grid; /* grid.size [nx,ny,nz] required; grid.spacing mm (one number or three) required; grid.origin [x,y,z]
                       (first voxel's centre) or grid.centre [x,y,z] (middle of the box, default [0,0,0]), not both */
     struct {
-        sdm_network_kind kind;       /* network.kind: pod */
-        int depth;                   /* hidden layers of the MLP, 0..16, default 3 (0: polynomials only) */
-        int width;                   /* units of a hidden layer, 8..1024, default 128 */
-        int rank;                    /* basis functions per block on average, 1..256, default 24 */
-        int block;                   /* edge of a block in voxels, 2..16, default 8 */
-        int modes;                   /* global modes the coefficients are learned in, 8..2048, default 512 */
-        int degree;                  /* total degree of the polynomial part, 0..12, default 6 */
-        int input_degree;            /* total degree of the products fed to the MLP, 1..8, default 4 */
-        sdm_activation activation;   /* silu, tanh, relu; default silu */
-        sdm_weight_type weights;     /* f32, f16: weights of the decoder in the model file; default f16 */
+        sdm_network_kind kind;     /* network.kind: pod */
+        int depth;                 /* hidden layers of the MLP, 0..16, default 3 (0: polynomials only) */
+        int width;                 /* units of a hidden layer, 8..1024, default 128 */
+        int rank;                  /* basis functions per block on average, 1..256, default 24 */
+        int block;                 /* edge of a block in voxels, 2..16, default 8 */
+        int modes;                 /* global modes the coefficients are learned in, 8..2048, default 512 */
+        int degree;                /* total degree of the polynomial part, 0..12, default 6 */
+        int input_degree;          /* total degree of the products fed to the MLP, 1..8, default 4 */
+        sdm_activation activation; /* silu, tanh, relu; default silu */
+        sdm_weight_type weights;   /* f32, f16: weights of the decoder in the model file; default f16 */
     } network;
     struct {
-        int64_t static_counts[SDM_MAX_PARAMS]; /* data.static: points per parameter, one number for all or a list; default 5 */
-        size_t n_static_counts;                /* 0: data.static absent; 1: one number for all */
-        int64_t online;              /* random shapes drawn while training goes on, 0..10^7, default 4096 */
-        int64_t start;               /* random shapes made before training starts, for the bases, 0..10^6, default 3456 */
-        int64_t holdout;             /* random shapes that are never trained on, 1..10^5, default 100 */
-        double static_share;         /* share of each batch drawn from the static grid, 0..1, default 0.1 */
-        double memory_gb;            /* budget for maps kept in memory, default 6 */
-        int workers;                 /* threads that make online samples; 0: half of the threads, at least 1 */
+        int64_t static_counts
+            [SDM_MAX_PARAMS];   /* data.static: points per parameter, one number for all or a list; default 5 */
+        size_t n_static_counts; /* 0: data.static absent; 1: one number for all */
+        int64_t online;         /* random shapes drawn while training goes on, 0..10^7, default 4096 */
+        int64_t start;          /* random shapes made before training starts, for the bases, 0..10^6, default 3456 */
+        int64_t holdout;        /* random shapes that are never trained on, 1..10^5, default 100 */
+        double static_share;    /* share of each batch drawn from the static grid, 0..1, default 0.1 */
+        double memory_gb;       /* budget for maps kept in memory, default 6 */
+        int workers;            /* threads that make online samples; 0: half of the threads, at least 1 */
     } data;
     struct {
-        double minutes;              /* train.minutes: time budget, data and evaluation included; 0: not limited by time */
-        int64_t steps;               /* optimiser steps in all; 0: not limited by steps */
-        int64_t samples;             /* samples in all (steps * batch); 0: not limited. Exactly one of the three is positive */
-        int batch;                   /* 1..65536, default 256 */
-        double learning_rate;        /* default 3e-3 */
-        double warmup;               /* share of the budget, 0..0.5, default 0.02 */
-        sdm_loss loss;               /* mse, l1, huber; default mse */
-        double near_weight;          /* extra weight of voxels near the surface, 0..100, default 0 */
-        double near_mm;              /* what is near, mm, default 0.4 */
-        double refine;               /* last share of the budget, trained end to end (decoder included), 0..1, default 0.4 */
-        int refine_batch;            /* 1..4096, default 32 */
-        double refine_rate;          /* learning rate there, default 3e-4 */
-        double average;              /* decay of the weight average, 0..0.99999, default 0.998; 0: off */
-        double evaluate_seconds;     /* between evaluations on held-out shapes, default 20 (in step mode: every 500 steps) */
-        double checkpoint_seconds;   /* between checkpoints, default 60 */
+        double minutes;       /* train.minutes: time budget, data and evaluation included; 0: not limited by time */
+        int64_t steps;        /* optimiser steps in all; 0: not limited by steps */
+        int64_t samples;      /* samples in all (steps * batch); 0: not limited. Exactly one of the three is positive */
+        int batch;            /* 1..65536, default 256 */
+        double learning_rate; /* default 3e-3 */
+        double warmup;        /* share of the budget, 0..0.5, default 0.02 */
+        sdm_loss loss;        /* mse, l1, huber; default mse */
+        double near_weight;   /* extra weight of voxels near the surface, 0..100, default 0 */
+        double near_mm;       /* what is near, mm, default 0.4 */
+        double refine;        /* last share of the budget, trained end to end (decoder included), 0..1, default 0.4 */
+        int refine_batch;     /* 1..4096, default 32 */
+        double refine_rate;   /* learning rate there, default 3e-4 */
+        double average;       /* decay of the weight average, 0..0.99999, default 0.998; 0: off */
+        double
+            evaluate_seconds; /* between evaluations on held-out shapes, default 20 (in step mode: every 500 steps) */
+        double checkpoint_seconds; /* between checkpoints, default 60 */
     } train;
     struct {
         char folder[SDM_PATH_TEXT_MAX]; /* output.folder, default runs/NAME with NAME the config's file name */
     } output;
-    uint64_t seed;                   /* default 1 */
-    int threads;                     /* 0: all; default 0 */
+    uint64_t seed; /* default 1 */
+    int threads;   /* 0: all; default 0 */
 } sdm_config;
 
 /* Reads a config (at most 1 MiB, one document, no anchors, aliases or tags, nesting at most 32) and applies the key=value

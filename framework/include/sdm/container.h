@@ -30,7 +30,8 @@ typedef struct sdm_section {
 } sdm_section;
 
 /* Builds the file in memory: *bytes (sdm_free()) and *size. */
-SDM_API sdm_status sdm_container_build(const sdm_section *sections, size_t n, uint8_t **bytes, size_t *size, sdm_error *err);
+SDM_API sdm_status sdm_container_build(const sdm_section *sections, size_t n, uint8_t **bytes, size_t *size,
+                                       sdm_error *err);
 
 /* Writes a built file atomically. */
 SDM_API sdm_status sdm_container_write(const char *path, const uint8_t *bytes, size_t size, sdm_error *err);
@@ -38,7 +39,8 @@ SDM_API sdm_status sdm_container_write(const char *path, const uint8_t *bytes, s
 /* Checks everything (magic, version, sizes, overlaps, checksums) and fills sections[SDM_CONTAINER_MAX_SECTIONS] with pointers into
    `bytes` (whose first byte must be 64-byte aligned). SDM_E_FORMAT says what is wrong. names[] holds the section names. */
 SDM_API sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *sections,
-                                       char names[SDM_CONTAINER_MAX_SECTIONS][24], size_t *n, uint64_t *checksum, sdm_error *err);
+                                       char names[SDM_CONTAINER_MAX_SECTIONS][24], size_t *n, uint64_t *checksum,
+                                       sdm_error *err);
 
 #ifdef __cplusplus
 }

@@ -23,7 +23,8 @@ typedef struct sdm_view {
 
 /* c[M][ldc] = a (M x K) * b (K x N), added to the old c when `add`. Threaded over tiles of c; n_threads 0: the OpenMP default.
    Every element is summed in the order of K in blocks of fixed size. */
-SDM_API void sdm_gemm(size_t m, size_t n, size_t k, sdm_view a, sdm_view b, bool add, float *c, size_t ldc, int n_threads);
+SDM_API void sdm_gemm(size_t m, size_t n, size_t k, sdm_view a, sdm_view b, bool add, float *c, size_t ldc,
+                      int n_threads);
 
 /* Weights of a dense layer in tiles: w[tiles][K][T], float or half. Number of elements for `outputs` outputs. */
 SDM_API size_t sdm_tiled_count(size_t outputs, size_t k);

@@ -30,19 +30,19 @@ SDM_API void sdm_mesh_dispose(sdm_mesh *m);
 /* What an audit finds; counts are of triangles unless said otherwise. */
 typedef struct sdm_audit {
     size_t n_vert, n_tri;
-    size_t degenerate;            /* zero area, or a repeated vertex */
-    size_t duplicate;             /* the same three vertices as an earlier triangle */
-    size_t boundary_edges;        /* edges with one triangle */
-    size_t nonmanifold_edges;     /* edges with three or more */
-    size_t misoriented_edges;     /* edges whose two triangles run along them in the same direction */
-    size_t components;            /* connected by edges */
-    size_t self_intersections;    /* pairs of triangles that cross and share no vertex */
-    double volume;                /* signed, mm^3; negative: the mesh is inside out */
-    double area;                  /* mm^2 */
-    double min[3], max[3];        /* bounding box, mm */
-    bool closed;                  /* no boundary edge, every edge balanced in direction: crossings define the inside */
-    bool manifold;                /* closed, and every edge has two triangles of one orientation */
-    bool inverted;                /* closed, and the volume is negative */
+    size_t degenerate;         /* zero area, or a repeated vertex */
+    size_t duplicate;          /* the same three vertices as an earlier triangle */
+    size_t boundary_edges;     /* edges with one triangle */
+    size_t nonmanifold_edges;  /* edges with three or more */
+    size_t misoriented_edges;  /* edges whose two triangles run along them in the same direction */
+    size_t components;         /* connected by edges */
+    size_t self_intersections; /* pairs of triangles that cross and share no vertex */
+    double volume;             /* signed, mm^3; negative: the mesh is inside out */
+    double area;               /* mm^2 */
+    double min[3], max[3];     /* bounding box, mm */
+    bool closed;               /* no boundary edge, every edge balanced in direction: crossings define the inside */
+    bool manifold;             /* closed, and every edge has two triangles of one orientation */
+    bool inverted;             /* closed, and the volume is negative */
 } sdm_audit;
 
 /* Examines a mesh. SDM_E_MESH: no triangle, an index out of range, a coordinate that is not finite. The result is scale free:

@@ -20,27 +20,27 @@ typedef struct sdm_model_param {
 typedef struct sdm_accuracy {
     int64_t samples;
     double mse_mm2, rmse_mm, mae_mm, max_abs_mm;
-    double rmse_near_mm;   /* where |distance| <= 0.4 mm */
+    double rmse_near_mm;           /* where |distance| <= 0.4 mm */
     double q50_mm, q90_mm, q99_mm; /* quantiles over the shapes of the RMSE of one map */
 } sdm_accuracy;
 
 /* What a model says about itself. Texts are NUL-terminated and owned by the model. */
 typedef struct sdm_model_info {
     char shape[SDM_MODEL_NAME_MAX];
-    char kind[16];          /* "pod" */
-    char version[16];       /* of the program that trained it */
+    char kind[16];    /* "pod" */
+    char version[16]; /* of the program that trained it */
     size_t n_params;
     const sdm_model_param *params;
-    size_t n_options;       /* options of the shape, as text, for the exact engine */
+    size_t n_options; /* options of the shape, as text, for the exact engine */
     const char *const *option_names, *const *option_values;
     sdm_grid grid;
     sdm_accuracy accuracy;
     uint64_t seed;
     double train_seconds;
-    int64_t train_samples;  /* exact maps seen */
-    uint64_t checksum;      /* of the whole file */
+    int64_t train_samples; /* exact maps seen */
+    uint64_t checksum;     /* of the whole file */
     size_t file_bytes, weight_bytes;
-    const char *config;     /* resolved config, YAML */
+    const char *config; /* resolved config, YAML */
 } sdm_model_info;
 
 /* Immutable once opened: any number of threads may use one model. */
@@ -64,7 +64,8 @@ SDM_API size_t sdm_model_jacobian_scratch_bytes(const sdm_model *m);
 
 /* The map and its derivatives by forward mode: values[nz][ny][nx], jacobian[n_params][nz][ny][nx] (mm per unit of the
    parameter). One thread, no allocation. [any thread] */
-SDM_API void sdm_model_jacobian(const sdm_model *m, const double *params, float *values, float *jacobian, void *scratch);
+SDM_API void sdm_model_jacobian(const sdm_model *m, const double *params, float *values, float *jacobian,
+                                void *scratch);
 
 #ifdef __cplusplus
 }

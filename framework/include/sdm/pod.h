@@ -31,7 +31,8 @@ SDM_API void sdm_poly_table(size_t n, size_t degree, uint8_t *exponents);
 
 /* phi[n_terms] at x[n] in [-1, 1]; dphi[n][n_terms] = d phi / d x when not NULL. Normalised: mean square 1 under the uniform law.
    degree: the largest exponent in the table. */
-SDM_API void sdm_poly_eval(const uint8_t *exponents, size_t n_terms, size_t n, size_t degree, const double *x, float *phi, float *dphi);
+SDM_API void sdm_poly_eval(const uint8_t *exponents, size_t n_terms, size_t n, size_t degree, const double *x,
+                           float *phi, float *dphi);
 
 /* Activation: y = f(x) and, when dy is not NULL, dy = f'(x), for n values. kind: 0 SiLU, 1 tanh, 2 ReLU. y may be x. */
 SDM_API void sdm_activate(int kind, size_t n, const float *x, float *y, float *dy);
@@ -58,8 +59,10 @@ SDM_API size_t sdm_pod_block_count(const sdm_grid *grid, size_t block);
 SDM_API void sdm_pod_blocks(const sdm_grid *grid, size_t block, sdm_pod_block *blocks);
 
 /* Copies between map order [nz][ny][nx] and block order (x fastest within a block). */
-SDM_API void sdm_pod_gather(const sdm_grid *grid, const sdm_pod_block *blocks, size_t n_blocks, const float *map, float *blocked);
-SDM_API void sdm_pod_scatter(const sdm_grid *grid, const sdm_pod_block *blocks, size_t n_blocks, const float *blocked, float *map);
+SDM_API void sdm_pod_gather(const sdm_grid *grid, const sdm_pod_block *blocks, size_t n_blocks, const float *map,
+                            float *blocked);
+SDM_API void sdm_pod_scatter(const sdm_grid *grid, const sdm_pod_block *blocks, size_t n_blocks, const float *blocked,
+                             float *map);
 
 /* Weights as the trainer has them, row-major float32. */
 typedef struct sdm_pod_weights {
@@ -83,7 +86,8 @@ typedef struct sdm_pod_spec {
 SDM_API sdm_status sdm_model_build(const sdm_pod_spec *spec, uint8_t **bytes, size_t *size, sdm_error *err);
 
 /* Opens a model file that is in memory; the bytes are copied. `name` stands for the file in messages. */
-SDM_API sdm_status sdm_model_open_memory(const char *name, const uint8_t *bytes, size_t size, sdm_model **out, sdm_error *err);
+SDM_API sdm_status sdm_model_open_memory(const char *name, const uint8_t *bytes, size_t size, sdm_model **out,
+                                         sdm_error *err);
 
 #ifdef __cplusplus
 }

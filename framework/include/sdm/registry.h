@@ -36,7 +36,9 @@ SDM_API const sdm_shape *sdm_registry_find(const sdm_registry *r, const char *na
 /* A shape with its options fixed. Immutable after creation: any number of threads may call it. */
 typedef struct sdm_instance sdm_instance;
 
-typedef struct sdm_named_text { const char *name, *value; } sdm_named_text;
+typedef struct sdm_named_text {
+    const char *name, *value;
+} sdm_named_text;
 
 /* Fixes the options given as text by name; the others take their defaults. base_dir (may be NULL): folder against which relative
    FILE options are resolved. SDM_E_CONFIG: an unknown option (with "did you mean"), a bad value; SDM_E_PLUGIN: create() failed. */
@@ -46,7 +48,7 @@ SDM_API void sdm_instance_free(sdm_instance *s);
 
 SDM_API const sdm_shape *sdm_instance_shape(const sdm_instance *s);
 SDM_API const sdm_param *sdm_instance_params(const sdm_instance *s, size_t *n);
-SDM_API const sdm_option_value *sdm_instance_options(const sdm_instance *s); /* in the order of the shape's table */
+SDM_API const sdm_option_value *sdm_instance_options(const sdm_instance *s);   /* in the order of the shape's table */
 SDM_API int sdm_instance_param_index(const sdm_instance *s, const char *name); /* -1 when unknown */
 
 /* p[n_params]: finite and inside [min, max] of each parameter, else SDM_E_RANGE naming it, its value and range. */
@@ -58,7 +60,8 @@ SDM_API sdm_status sdm_instance_mesh(const sdm_instance *s, const double *p, sdm
 
 /* velocity[n_params][n_vert][3] by the plug-in's callback, or by central differences of the mesh (one-sided at a range's end).
    [any thread] */
-SDM_API sdm_status sdm_instance_velocity(const sdm_instance *s, const double *p, size_t n_vert, double *velocity, sdm_error *err);
+SDM_API sdm_status sdm_instance_velocity(const sdm_instance *s, const double *p, size_t n_vert, double *velocity,
+                                         sdm_error *err);
 
 /* Closed-form distance; SDM_E_UNSUPPORTED when the shape has none. [any thread] */
 SDM_API sdm_status sdm_instance_distance(const sdm_instance *s, const double *p, const double x[3], double *distance,

@@ -34,8 +34,8 @@ typedef struct sdm_option {
     const char *name;
     sdm_option_type type;
     const char *unit;
-    double min, max, def;    /* REAL and INT */
-    const char *choices;     /* CHOICE: "left|right", the first is the default */
+    double min, max, def; /* REAL and INT */
+    const char *choices;  /* CHOICE: "left|right", the first is the default */
     const char *help;
 } sdm_option;
 
@@ -90,17 +90,18 @@ typedef struct sdm_shape {
 
     /* Required: the mesh at parameters p[n_params]. Vertices depend smoothly on p; the number of vertices and triangles
        should not depend on p. 0 on success. */
-    int (*mesh)(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p, sdm_mesh_out *out);
+    int (*mesh)(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
+                sdm_mesh_out *out);
 
     /* Optional: velocity[n_params][n_vert][3] = d(vertex)/d(parameter), for the vertices that mesh() gives at p. */
-    int (*velocity)(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p, size_t n_vert,
-                    double *velocity);
+    int (*velocity)(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
+                    size_t n_vert, double *velocity);
 
     /* Optional: closed-form signed distance (negative inside, mm) of the ideal shape at x[3]: a test oracle. It may be exact
        outside only; then it must be a bound inside and say so in `summary` or the documentation. 0 on success; host->fail()
        where there is no closed form for the given options. */
-    int (*distance)(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p, const double x[3],
-                    double *distance);
+    int (*distance)(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
+                    const double x[3], double *distance);
 } sdm_shape;
 
 /* The one symbol a plug-in's shared object exports: returns shape `index`, NULL behind the last. */

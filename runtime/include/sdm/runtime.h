@@ -22,8 +22,8 @@ typedef enum sdm_source { SDM_SOURCE_NETWORK = 0, SDM_SOURCE_EXACT = 1 } sdm_sou
 /* How one map was made. */
 typedef struct sdm_result {
     sdm_source source;
-    bool clamped;      /* a parameter was moved */
-    double error_mm;   /* RMSE to expect: held-out RMSE of the network; 0 for the exact engine */
+    bool clamped;    /* a parameter was moved */
+    double error_mm; /* RMSE to expect: held-out RMSE of the network; 0 for the exact engine */
 } sdm_result;
 
 typedef struct sdm_generate_opts {
@@ -44,8 +44,8 @@ SDM_API sdm_status sdm_generate_batch(const sdm_model *m, const double *params, 
                                       float *values, sdm_result *results, sdm_error *err);
 
 /* Map and derivatives: jacobian[n_params][nz][ny][nx], mm per unit. Network only: out-of-range parameters are refused or clamped. */
-SDM_API sdm_status sdm_generate_jacobian(const sdm_model *m, const double *params, const sdm_generate_opts *opts, float *values,
-                                         float *jacobian, sdm_result *result, sdm_error *err);
+SDM_API sdm_status sdm_generate_jacobian(const sdm_model *m, const double *params, const sdm_generate_opts *opts,
+                                         float *values, float *jacobian, sdm_result *result, sdm_error *err);
 
 /* The shape the model was trained on, with its options, from a registry that knows it; checks that the parameters agree.
    SDM_E_PLUGIN when the registry does not have it. */

@@ -10,23 +10,27 @@
 extern "C" {
 #endif
 
-typedef struct sdm_named_value { const char *name, *value; } sdm_named_value;
+typedef struct sdm_named_value {
+    const char *name, *value;
+} sdm_named_value;
 
 typedef struct sdm_vdb_opts {
-    double band_voxels;   /* half width of the narrow band in voxels, 3..100; 0: the default 3 */
-    bool dense;           /* the whole map, grid class unset */
-    bool half;            /* values stored as 16-bit floats */
-    const sdm_named_value *metadata; /* string metadata: version, shape, parameters, source, error ...; names once each and
+    double band_voxels; /* half width of the narrow band in voxels, 3..100; 0: the default 3 */
+    bool dense;         /* the whole map, grid class unset */
+    bool half;          /* values stored as 16-bit floats */
+    const sdm_named_value
+        *metadata; /* string metadata: version, shape, parameters, source, error ...; names once each and
                                         not those written here: name, class, creator, file_*, is_*, sdm_* of below */
     size_t n_metadata;
 } sdm_vdb_opts;
 
 typedef struct sdm_vdb_report {
     int64_t active_voxels;
-    bool cut;             /* the surface leaves the grid: the level set is closed at the border of the grid */
-    uint64_t hash;        /* CRC-64 of the values, stored as metadata "sdm_hash" and checked by sdm_vdb_verify() */
-    int64_t adjusted_voxels; /* voxels whose value was changed so that checkLevelSet passes (creases, very thin parts) */
-    double adjusted_mm;   /* largest such change */
+    bool cut;      /* the surface leaves the grid: the level set is closed at the border of the grid */
+    uint64_t hash; /* CRC-64 of the values, stored as metadata "sdm_hash" and checked by sdm_vdb_verify() */
+    int64_t
+        adjusted_voxels; /* voxels whose value was changed so that checkLevelSet passes (creases, very thin parts) */
+    double adjusted_mm;  /* largest such change */
 } sdm_vdb_report;
 
 /* Writes values[nz][ny][nx] as grid `surface`, atomically. A level set has uniform voxels (else SDM_E_ARG, naming --dense), class

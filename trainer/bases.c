@@ -313,7 +313,8 @@ static sdm_status project_holdout(trainer *t, sdm_error *err)
             trainer_phi(t, t->data.holdout_params + i * t->data.n_params, t->holdout_phi + i * t->n_poly);
             targets[i] = t->holdout_target + i * r;
         }
-        t->holdout_floor = energy / ((double)h * (double)t->data.n_voxels);
+        t->holdout_floor =
+            fmax(0, energy / ((double)h * (double)t->data.n_voxels)); // a difference: rounding may pass zero
         s = leave(t, h, t->holdout_phi, c, targets, err);
     }
     sdm_free(targets);

@@ -1,8 +1,12 @@
 /* Checkpoints: what a run needs to go on with the same bits. Maps and bases are made again from the config and the seed (they are the same
    bits); weights, moments, averages, counters and the metrics are kept. */
+#include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
+#include "sdm/checksum.h"
 #include "sdm/container.h"
 #include "sdm/file.h"
 #include "sdm/memory.h"
@@ -12,12 +16,36 @@
 // numbers of the "checkpoint" section, in this order
 typedef struct state {
     double seconds, phase_started, last_evaluation, loss, heldout_mse;
-    int64_t phase, step, phase_step, n_start, n_taken, n_weights;
+    int64_t phase, step, phase_step, n_start, n_taken;
+    uint64_t bases; // fingerprint of mean, bases, modes and ranks: weights mean nothing on others
 } state;
 
 static void checkpoint_path(const trainer *t, char *path, size_t size)
 {
     snprintf(path, size, "%s/checkpoint.sdmc", t->folder);
+}
+
+static uint64_t fingerprint(const trainer *t)
+{
+    const sdm_pod_arch *a = &t->arch;
+    size_t basis = 0;
+    uint64_t crc = 0;
+    for (size_t b = 0; b < a->n_blocks; b++) {
+        const sdm_pod_block *k = &t->blocks[b];
+        basis += (size_t)k->rank * k->size[0] * k->size[1] * k->size[2];
+        crc = sdm_crc64(crc, &k->rank, sizeof k->rank);
+    }
+    crc = sdm_crc64(crc, t->mean, a->n_voxels * sizeof *t->mean);
+    crc = sdm_crc64(crc, t->basis, basis * sizeof *t->basis);
+    return sdm_crc64(crc, t->modes, t->n_modes * a->n_coefficients * sizeof *t->modes);
+}
+
+sdm_status checkpoint_remove(const trainer *t, sdm_error *err)
+{
+    char path[SDM_PATH_TEXT_MAX + 32];
+    checkpoint_path(t, path, sizeof path);
+    if (!unlink(path) || errno == ENOENT) return SDM_OK;
+    return sdm_fail(err, SDM_E_IO, "%s: cannot remove: %s", path, strerror(errno));
 }
 
 static parameters *weights_of(trainer *t, int64_t phase) { return phase == SDM_PHASE_FIT ? &t->fit : &t->refine; }
@@ -37,7 +65,7 @@ sdm_status checkpoint_write(trainer *t, sdm_error *err)
                        .phase_step = t->phase_step,
                        .n_start = (int64_t)t->data.n_start,
                        .n_taken = (int64_t)t->data.n_taken,
-                       .n_weights = (int64_t)p->n};
+                       .bases = fingerprint(t)};
     sdm_text config = {0};
     sdm_config_dump(t->config, &config);
     if (config.failed) {
@@ -79,7 +107,8 @@ static sdm_status open_checkpoint(const trainer *t, opened *o, bool *found, sdm_
     checkpoint_path(t, path, sizeof path);
     FILE *f = fopen(path, "rb");
     *found = f != NULL;
-    if (!f) return SDM_OK;
+    if (!f && errno == ENOENT) return SDM_OK;
+    if (!f) return sdm_fail(err, SDM_E_IO, "%s: cannot open: %s", path, strerror(errno));
     fclose(f);
     size_t size = 0;
     uint64_t checksum = 0;
@@ -148,8 +177,14 @@ sdm_status checkpoint_read(trainer *t, bool *found, sdm_error *err)
     if (!s) {
         state then;
         memcpy(&then, find(&o, "checkpoint")->data, sizeof then);
-        if (then.phase != SDM_PHASE_FIT && then.phase != SDM_PHASE_REFINE)
-            s = sdm_fail(err, SDM_E_FORMAT, "%s/checkpoint.sdmc: unknown phase %lld", t->folder, (long long)then.phase);
+        const dataset *d = &t->data;
+        const bool sound = (then.phase == SDM_PHASE_FIT || then.phase == SDM_PHASE_REFINE) && then.n_start >= 0 &&
+                           (size_t)then.n_start <= d->n_start && then.n_taken >= then.n_start &&
+                           (size_t)then.n_taken <= d->n_start + d->n_online && then.phase_step >= 0 &&
+                           then.step >= then.phase_step && isfinite(then.seconds) && then.phase_started >= 0 &&
+                           then.seconds >= then.phase_started;
+        if (!sound)
+            s = sdm_fail(err, SDM_E_FORMAT, "%s/checkpoint.sdmc: its counters contradict each other", t->folder);
         t->phase = (sdm_phase)then.phase;
         t->started -= then.seconds;
         t->phase_started = then.phase_started;
@@ -159,9 +194,6 @@ sdm_status checkpoint_read(trainer *t, bool *found, sdm_error *err)
         t->step = then.step;
         t->phase_step = then.phase_step;
         t->data.n_taken = (size_t)then.n_taken; // wanted; the caller makes them again
-        if (!s && (then.n_start < 0 || (size_t)then.n_start > t->data.n_start))
-            s = sdm_fail(err, SDM_E_FORMAT, "%s/checkpoint.sdmc: %lld maps before training", t->folder,
-                         (long long)then.n_start);
         if (!s) {
             t->data.n_online += t->data.n_start - (size_t)then.n_start;
             t->data.n_start = (size_t)then.n_start;
@@ -180,6 +212,14 @@ sdm_status checkpoint_weights(trainer *t, sdm_error *err)
     sdm_status s = open_checkpoint(t, &o, &found, err);
     if (s) return s;
     if (!found) return sdm_fail(err, SDM_E_IO, "%s/checkpoint.sdmc: it has gone", t->folder);
+    state then;
+    memcpy(&then, find(&o, "checkpoint")->data, sizeof then);
+    if (then.bases != fingerprint(t))
+        s = sdm_fail(err, SDM_E_CONFIG,
+                     "%s/checkpoint.sdmc: the maps come out otherwise than when it was written (another plug-in, data "
+                     "file or processor): "
+                     "train without --resume",
+                     t->folder);
     parameters *p = weights_of(t, t->phase);
     const struct {
         const char *name;

@@ -2,6 +2,7 @@
 #include "dataset.h"
 
 #include <math.h>
+#include <stdatomic.h>
 #include <string.h>
 #ifdef _OPENMP
 #include <omp.h>
@@ -73,15 +74,15 @@ size_t dataset_slot(const dataset *d, size_t index) { return d->n_static + index
 
 size_t dataset_random_slots(const dataset *d) { return d->n_taken < d->n_ring ? d->n_taken : d->n_ring; }
 
-size_t dataset_draw(const dataset *d, double share, size_t batch, uint64_t step, size_t i)
+size_t dataset_draw(const dataset *d, uint64_t stream, double share, size_t batch, uint64_t step, size_t i)
 {
     const size_t n_random = dataset_random_slots(d);
     bool from_grid = (double)i < share * (double)batch;
     if (!d->n_static) from_grid = false;
     if (!n_random) from_grid = true;
     const uint64_t counter = step * batch + i;
-    if (from_grid) return (size_t)sdm_rng_below(d->seed, STREAM_BATCH, counter, d->n_static);
-    return d->n_static + (size_t)sdm_rng_below(d->seed, STREAM_BATCH, counter, n_random);
+    if (from_grid) return (size_t)sdm_rng_below(d->seed, stream, counter, d->n_static);
+    return d->n_static + (size_t)sdm_rng_below(d->seed, stream, counter, n_random);
 }
 
 void dataset_map(const dataset *d, size_t slot, float *map)
@@ -119,7 +120,7 @@ sdm_status dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_
     size_t done = 0;
     long failed = -1; // lowest failed sample: the message does not depend on scheduling
     sdm_error first = {0};
-    bool stop = false, enough = false;
+    atomic_bool stop = false, enough = false;
 #ifdef _OPENMP
     if (n_threads == 0) n_threads = omp_get_max_threads();
 #pragma omp parallel num_threads(n_threads)
@@ -135,16 +136,7 @@ sdm_status dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_
 #endif
         for (long i = 0; i < (long)all; i++) {
             const size_t at = (size_t)i;
-            bool skip, short_of_time;
-#ifdef _OPENMP
-#pragma omp atomic read
-#endif
-            skip = stop;
-#ifdef _OPENMP
-#pragma omp atomic read
-#endif
-            short_of_time = enough;
-            if (skip || (short_of_time && at >= d->n_holdout + d->n_static + FEWEST)) continue;
+            if (stop || (enough && at >= d->n_holdout + d->n_static + FEWEST)) continue;
             sdm_status s = made;
             if (!s && at < d->n_holdout) {
                 double *p = d->holdout_params + at * d->n_params;

@@ -51,8 +51,8 @@ size_t dataset_random_slots(const dataset *d);
 /* Slot of random sample `index`. */
 size_t dataset_slot(const dataset *d, size_t index);
 
-/* Slot in row `i` of the batch of `step`: counter-based; the first `share` of the rows from the static grid. */
-size_t dataset_draw(const dataset *d, double share, size_t batch, uint64_t step, size_t i);
+/* Slot in row `i` of the batch of `step`: counter-based in `stream`; the first `share` of the rows from the static grid. */
+size_t dataset_draw(const dataset *d, uint64_t stream, double share, size_t batch, uint64_t step, size_t i);
 
 /* map[n_voxels] of a slot, mm, block order. */
 void dataset_map(const dataset *d, size_t slot, float *map);

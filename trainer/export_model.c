@@ -217,6 +217,10 @@ sdm_status export_model(trainer *t, sdm_train_report *report, sdm_error *err)
     sdm_model_free(model);
     sdm_free(bytes);
     bytes = NULL;
+    if (!s && !isfinite(t->accuracy.mse_mm2))
+        s = sdm_fail(err, SDM_E_QUALITY,
+                     "the trained network gives numbers that are not finite: use network.weights=f32 or lower the "
+                     "learning rates");
     info.accuracy = t->accuracy;
     t->heldout_mse = t->accuracy.mse_mm2;
     if (!s) s = trainer_metric(t, 0, err);

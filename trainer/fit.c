@@ -76,7 +76,7 @@ static void step(trainer *t, fit_batch *b, size_t batch, double rate)
     const size_t r = t->n_modes, readout = mlp_count(a);
     const double share = t->config->data.static_share;
     for (size_t i = 0; i < batch; i++) {
-        const size_t slot = dataset_draw(&t->data, share, batch, (uint64_t)t->step, i);
+        const size_t slot = dataset_draw(&t->data, STREAM_FIT, share, batch, (uint64_t)t->step, i);
         memcpy(b->x + i * a->n_inputs, t->phi + slot * t->n_poly + 1, a->n_inputs * sizeof *b->x);
         memcpy(b->target + i * r, t->target + slot * r, r * sizeof *b->target);
     }
@@ -126,6 +126,10 @@ sdm_status fit_run(trainer *t, sdm_error *err)
         const size_t n_random = t->data.n_start + t->data.n_online;
         const double want = (double)t->data.n_start + (double)t->data.n_online * fmin(1, at / 0.75);
         if ((s = trainer_take_samples(t, want < (double)n_random ? (size_t)want : n_random, err))) break;
+        if (trainer_cancelled(t)) {
+            s = trainer_stop(t, err);
+            break;
+        }
         const double rate = c->train.learning_rate * schedule(at, c->train.warmup);
         step(t, &b, batch, rate);
         t->step++, t->phase_step++;
@@ -141,19 +145,12 @@ sdm_status fit_run(trainer *t, sdm_error *err)
             t->last_evaluation = now;
             if ((s = trainer_metric(t, rate, err))) break;
         }
-        const double overall =
-            trainer_by_time(t) ? now / (c->train.minutes * 60) : (double)t->step / (double)trainer_steps(t);
         if (now - last_time > 0.5) {
-            trainer_report(t, overall, (double)(t->phase_step - last_step) * (double)batch / (now - last_time), true);
+            trainer_report(t, trainer_fraction(t),
+                           (double)(t->phase_step - last_step) * (double)batch / (now - last_time), true);
             last_step = t->phase_step, last_time = now;
         }
         if (now - t->last_checkpoint > c->train.checkpoint_seconds) s = checkpoint_write(t, err);
-        if (!s && trainer_cancelled(t)) {
-            s = checkpoint_write(t, err);
-            if (!s)
-                s = sdm_fail(err, SDM_E_CANCELLED, "stopped on request at step %lld, after a checkpoint",
-                             (long long)t->step);
-        }
     }
     if (!s) t->heldout_mse = evaluate(t, t->fit.average, &b, batch);
     fit_dispose(&b);

@@ -10,6 +10,7 @@
 #include "mlp.h"
 #include "sdm/kernels.h"
 #include "sdm/memory.h"
+#include "streams.h"
 #include "trainer.h"
 
 // Adam steps in units of what a weight typically is: found by trial on the cochlea, within a factor of three of the best
@@ -182,7 +183,8 @@ static sdm_status step(trainer *t, refine_batch *b, double rate, sdm_error *err)
     const sdm_status s = SDM_ALLOC(&phi, b->rows, "batch", err);
     if (s) return s;
     for (size_t i = 0; i < b->rows; i++) {
-        b->slots[i] = dataset_draw(&t->data, t->config->data.static_share, b->rows, (uint64_t)t->step, i);
+        b->slots[i] =
+            dataset_draw(&t->data, STREAM_REFINE, t->config->data.static_share, b->rows, (uint64_t)t->step, i);
         phi[i] = t->phi + b->slots[i] * t->n_poly;
     }
     const float *w = t->refine.w;
@@ -391,9 +393,19 @@ static double fraction_of_phase(const trainer *t, double end)
     return length > 0 ? (trainer_seconds(t) - t->phase_started) / length : 1;
 }
 
+// the average of the weights reads and writes all of them: once in a few steps is enough
+enum { AVERAGE_EVERY = 8 };
+
+static void take_average(trainer *t)
+{
+    const double n = (double)t->phase_step / AVERAGE_EVERY;
+    const double decay =
+        t->config->train.average > 0 ? fmin(pow(t->config->train.average, AVERAGE_EVERY), n / (n + 10)) : 0;
+    average_update(&t->refine, decay, trainer_threads(t));
+}
+
 sdm_status refine_run(trainer *t, sdm_error *err)
 {
-    enum { AVERAGE_EVERY = 8 };
     const sdm_config *c = t->config;
     const double total = c->train.minutes * 60,
                  end = total - fmin(10, 0.03 * total); // the final evaluation needs the rest
@@ -404,14 +416,14 @@ sdm_status refine_run(trainer *t, sdm_error *err)
     double last_time = trainer_seconds(t);
     for (double at; !s && (at = fraction_of_phase(t, end)) < 1;) {
         if ((s = trainer_take_samples(t, t->data.n_start + t->data.n_online, err))) break;
+        if (trainer_cancelled(t)) {
+            s = trainer_stop(t, err);
+            break;
+        }
         const double rate = c->train.refine_rate * schedule(at, c->train.warmup);
         if ((s = step(t, &b, rate, err))) break;
         t->step++, t->phase_step++;
-        if (t->phase_step % AVERAGE_EVERY == 0) {
-            const double n = (double)t->phase_step / AVERAGE_EVERY;
-            const double decay = c->train.average > 0 ? fmin(pow(c->train.average, AVERAGE_EVERY), n / (n + 10)) : 0;
-            average_update(&t->refine, decay, trainer_threads(t));
-        }
+        if (t->phase_step % AVERAGE_EVERY == 0) take_average(t);
         if (!isfinite(t->loss)) {
             s = sdm_fail(err, SDM_E_CONFIG,
                          "%s: training diverged at step %lld (loss is not a number): lower train.refine_rate", c->file,
@@ -424,19 +436,14 @@ sdm_status refine_run(trainer *t, sdm_error *err)
             t->last_evaluation = now;
             if ((s = trainer_metric(t, rate, err))) break;
         }
-        const double overall = trainer_by_time(t) ? now / total : (double)t->step / (double)trainer_steps(t);
         if (now - last_time > 0.5) {
-            trainer_report(t, overall, (double)(t->phase_step - last_step) * (double)b.rows / (now - last_time), true);
+            trainer_report(t, trainer_fraction(t),
+                           (double)(t->phase_step - last_step) * (double)b.rows / (now - last_time), true);
             last_step = t->phase_step, last_time = now;
         }
         if (now - t->last_checkpoint > c->train.checkpoint_seconds) s = checkpoint_write(t, err);
-        if (!s && trainer_cancelled(t)) {
-            s = checkpoint_write(t, err);
-            if (!s)
-                s = sdm_fail(err, SDM_E_CANCELLED, "stopped on request at step %lld, after a checkpoint",
-                             (long long)t->step);
-        }
     }
+    if (!s && t->phase_step % AVERAGE_EVERY) take_average(t); // the last steps count too
     batch_dispose(&b);
     return s;
 }

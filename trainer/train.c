@@ -34,6 +34,12 @@ int64_t trainer_steps(const trainer *t)
     return c->train.steps > 0 ? c->train.steps : (c->train.samples + c->train.batch - 1) / c->train.batch;
 }
 
+double trainer_fraction(const trainer *t)
+{
+    if (trainer_by_time(t)) return trainer_seconds(t) / (t->config->train.minutes * 60);
+    return (double)t->step / (double)trainer_steps(t);
+}
+
 int64_t trainer_fit_steps(const trainer *t)
 {
     const int64_t n = (int64_t)((1 - t->config->train.refine) * (double)trainer_steps(t) + 0.5);
@@ -78,6 +84,13 @@ void trainer_message(trainer *t, const char *fmt, ...)
 }
 
 bool trainer_cancelled(const trainer *t) { return t->hooks.cancelled && t->hooks.cancelled(t->hooks.user); }
+
+sdm_status trainer_stop(trainer *t, sdm_error *err)
+{
+    const sdm_status s = checkpoint_write(t, err);
+    if (s) return s;
+    return sdm_fail(err, SDM_E_CANCELLED, "stopped on request at step %lld, after a checkpoint", (long long)t->step);
+}
 
 // writes all lines so far: the file is complete at any moment, and after a resume it has no line twice
 static sdm_status write_metrics(const trainer *t, sdm_error *err)
@@ -133,6 +146,10 @@ sdm_status trainer_take_samples(trainer *t, size_t wanted, sdm_error *err)
         sdm_status s = producer_take(t->producer, d->n_taken + n, err);
         if (!s) s = bases_project(t, slots, n, err);
         if (s) return s;
+        if (d->n_taken < until) { // a long wait: show it, and let it be stopped
+            trainer_report(t, trainer_fraction(t), 0, false);
+            if (trainer_cancelled(t)) return SDM_OK;
+        }
     }
     if (d->n_taken == all) {
         producer_stop(t->producer);
@@ -176,6 +193,28 @@ static size_t affordable(size_t n_params, size_t degree, size_t terms)
     return degree;
 }
 
+// texts that the model file has room for: found out before the training, not after it
+static sdm_status check_texts(const trainer *t, sdm_error *err)
+{
+    enum { VALUE_MAX = 1000 };
+    size_t n;
+    const sdm_param *params = sdm_instance_params(t->shape, &n);
+    for (size_t i = 0; i < n; i++)
+        if (strlen(params[i].name) >= SDM_MODEL_NAME_MAX ||
+            strlen(params[i].unit) >= sizeof((sdm_model_param *)0)->unit || strpbrk(params[i].unit, "\r\n"))
+            return sdm_fail(err, SDM_E_PLUGIN,
+                            "parameter '%.100s' in '%.100s': name or unit is too long for a model file", params[i].name,
+                            params[i].unit);
+    const sdm_shape *shape = sdm_instance_shape(t->shape);
+    const sdm_option_value *values = sdm_instance_options(t->shape);
+    for (uint32_t i = 0; i < shape->n_options; i++)
+        if (values[i].text && (strlen(values[i].text) > VALUE_MAX || strpbrk(values[i].text, "\r\n")))
+            return sdm_fail(err, SDM_E_CONFIG, "%s: shape.options.%s is longer than %d characters or has a line break",
+                            t->config->file, shape->options[i].name, VALUE_MAX);
+    return SDM_OK;
+}
+
+// shape, grid, sizes of the data
 static sdm_status set_up(trainer *t, sdm_error *err)
 {
     const sdm_config *c = t->config;
@@ -185,7 +224,8 @@ static sdm_status set_up(trainer *t, sdm_error *err)
     if (d->n_params > SDM_POD_MAX_PARAMS)
         return sdm_fail(err, SDM_E_UNSUPPORTED, "%zu parameters, at most %d can be trained", d->n_params,
                         SDM_POD_MAX_PARAMS);
-    sdm_status s = sdm_train_ranges(c, t->shape, d->min, d->max, err);
+    sdm_status s = check_texts(t, err);
+    if (!s) s = sdm_train_ranges(c, t->shape, d->min, d->max, err);
     if (s) return s;
     d->shape = t->shape;
     d->grid = &c->grid;
@@ -198,8 +238,15 @@ static sdm_status set_up(trainer *t, sdm_error *err)
     if ((s = SDM_ALLOC(&t->blocks, a->n_blocks, "blocks", err))) return s;
     sdm_pod_blocks(&c->grid, a->block, t->blocks);
     d->blocks = t->blocks;
-    if ((s = dataset_create(d, c, err))) return s;
+    return dataset_create(d, c, err);
+}
 
+// the network that the number of maps made so far can determine
+static sdm_status design(trainer *t, sdm_error *err)
+{
+    const sdm_config *c = t->config;
+    sdm_pod_arch *a = &t->arch;
+    const dataset *d = &t->data;
     a->degree = affordable(a->n_params, (size_t)c->network.degree, (d->n_static + d->n_start) / 4 + 1);
     if (a->degree < (size_t)c->network.degree)
         trainer_message(t,
@@ -217,7 +264,8 @@ static sdm_status set_up(trainer *t, sdm_error *err)
     a->n_inputs = sdm_poly_count(a->n_params, a->input_degree) - 1;
     a->n_latent = a->n_terms + (a->depth ? a->width : 0);
     t->n_poly = a->n_terms > a->n_inputs + 1 ? a->n_terms : a->n_inputs + 1;
-    if ((s = SDM_ALLOC(&t->exponents, t->n_poly * a->n_params, "polynomials", err))) return s;
+    const sdm_status s = SDM_ALLOC(&t->exponents, t->n_poly * a->n_params, "polynomials", err);
+    if (s) return s;
     sdm_poly_table(a->n_params, a->degree > a->input_degree ? a->degree : a->input_degree, t->exponents);
     return SDM_OK;
 }
@@ -310,6 +358,7 @@ static sdm_status run(trainer *t, bool resume, sdm_error *err)
                         t->data.n_start, start);
     t->phase = SDM_PHASE_BASES;
     trainer_report(t, trainer_by_time(t) ? trainer_seconds(t) / (t->config->train.minutes * 60) : 0, 0, true);
+    if (!s) s = design(t, err);
     if (!s) s = bases_make(t, err);
     if (!s)
         trainer_message(
@@ -364,6 +413,7 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     t.n_threads = 1;
 #endif
     sdm_status s = sdm_make_folder(folder, err);
+    if (!s && !resume) s = checkpoint_remove(&t, err); // it would belong to another run
     if (!s) s = run(&t, resume, err);
     producer_stop(t.producer);
     t.producer = NULL;

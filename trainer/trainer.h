@@ -61,10 +61,15 @@ bool trainer_by_time(const trainer *t);
 int64_t trainer_steps(const trainer *t);
 int64_t trainer_fit_steps(const trainer *t);
 
+/* Share of the whole budget that is over. */
+double trainer_fraction(const trainer *t);
+
 /* Progress callback (not more than 10 times a second unless `now`). */
 void trainer_report(trainer *t, double fraction, double samples_per_second, bool now);
 void trainer_message(trainer *t, const char *fmt, ...) SDM_PRINTF(2, 3);
 bool trainer_cancelled(const trainer *t);
+/* Writes a checkpoint and returns SDM_E_CANCELLED (or why the checkpoint failed). */
+sdm_status trainer_stop(trainer *t, sdm_error *err);
 
 /* Threads for the optimiser: those that the producer leaves. */
 int trainer_threads(const trainer *t);
@@ -90,10 +95,12 @@ sdm_status refine_run(trainer *t, sdm_error *err);
 /* Mean square error (mm^2) of weights w on the held-out maps. */
 sdm_status refine_evaluate(trainer *t, const float *w, double *mse, sdm_error *err);
 
-/* Takes new samples of the producer into the pool: `wanted` in step mode (waits), what is there in time mode. */
+/* Takes new samples of the producer into the pool: `wanted` in step mode (waits), what is there in time mode. It returns early when
+   the run is cancelled: ask trainer_cancelled() before the next step. */
 sdm_status trainer_take_samples(trainer *t, size_t wanted, sdm_error *err);
 
 /* checkpoint.c */
+sdm_status checkpoint_remove(const trainer *t, sdm_error *err);
 sdm_status checkpoint_write(trainer *t, sdm_error *err);
 sdm_status checkpoint_read(trainer *t, bool *found,
                            sdm_error *err);                /* before the data: config, sample count, phase, time */

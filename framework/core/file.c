@@ -16,7 +16,7 @@ sdm_status sdm_file_read(const char *path, size_t max_bytes, uint8_t **data, siz
 {
     *data = NULL;
     *size = 0;
-    const int fd = open(path, O_RDONLY | O_CLOEXEC);
+    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); // a FIFO would wait for its writer
     if (fd < 0) return sdm_fail(err, SDM_E_IO, "%s: cannot open: %s", path, strerror(errno));
     sdm_status s = SDM_OK;
     uint8_t *block = NULL;
@@ -212,6 +212,7 @@ void sdm_outfile_discard(sdm_outfile **pf)
 
 sdm_status sdm_make_folder(const char *path, sdm_error *err)
 {
+    if (!*path) return sdm_fail(err, SDM_E_ARG, "the name of a folder is empty");
     char *name = with_suffix(path, "");
     if (!name) return sdm_fail(err, SDM_E_NOMEM, "%s: no memory for its name", path);
     sdm_status s = SDM_OK;

@@ -67,7 +67,7 @@ static void tile_f32(size_t batch, size_t k, const float *w, const float *x, siz
 }
 
 #ifndef LOAD_HALF
-// exact for every finite half and infinity: the exponent is moved by a multiplication, which also makes subnormals right
+// exact for every half: the exponent is moved by a multiplication, which also makes subnormals right
 static inline vec load_half(const uint16_t *p)
 {
     vecu h;
@@ -78,6 +78,8 @@ static inline vec load_half(const uint16_t *p)
     v *= 0x1p112f;
     vecu bits;
     memcpy(&bits, &v, sizeof v);
+    // an exponent of all ones stays one: infinity and NaN
+    bits |= (vecu)((h & 0x7c00u) == 0x7c00u) & 0x7f800000u;
     bits |= sign;
     memcpy(&v, &bits, sizeof v);
     return v;

@@ -193,6 +193,10 @@ static void files(void **state)
     assert_int_equal(sdm_outfile_open("no/such/folder/f", &f, &e), SDM_E_IO);
     assert_int_equal(sdm_outfile_open(folder, &f, &e), SDM_E_IO);
     assert_int_equal(sdm_make_folder(path, &e), SDM_E_IO);
+    assert_int_equal(sdm_make_folder("", &e), SDM_E_ARG);
+    remove(path);
+    assert_int_equal(mkfifo(path, 0600), 0); // would wait for a writer
+    assert_int_equal(sdm_file_read(path, 1, &data, &size, &e), SDM_E_IO);
     remove(path);
     remove(deep);
     snprintf(deep, sizeof deep, "%s/a/b", folder);

@@ -8,6 +8,7 @@
 
 #include <cmocka.h>
 
+#include "kernels_table.h"
 #include "sdm/kernels.h"
 #include "sdm/memory.h"
 #include "sdm/rng.h"
@@ -85,6 +86,37 @@ static void half_precision(void **state)
     assert_true(isnan(sdm_half_to_float(0x7e00)) && isinf(sdm_half_to_float(0x7c00)));
 }
 
+// every instruction set that this machine has, not only the one that is chosen
+static void half_in_every_instruction_set(void **state)
+{
+    (void)state;
+    const kernel_table *tables[3] = {&sdm_kernels_generic};
+    size_t n = 1;
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("f16c"))
+        tables[n++] = &sdm_kernels_avx2;
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq"))
+        tables[n++] = &sdm_kernels_avx512;
+#endif
+    uint16_t *h;
+    float *y;
+    assert_int_equal(SDM_ALLOC(&h, 65536, "h", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&y, 65536, "y", NULL), SDM_OK);
+    for (unsigned i = 0; i < 65536; i++) h[i] = (uint16_t)i;
+    for (size_t t = 0; t < n; t++) {
+        tables[t]->expand_f16(65536, h, y);
+        for (unsigned i = 0; i < 65536; i++) {
+            const float want = sdm_half_to_float((uint16_t)i);
+            if (isnan(want))
+                assert_true(isnan(y[i]));
+            else
+                assert_memory_equal(&y[i], &want, sizeof want);
+        }
+    }
+    sdm_free(h);
+    sdm_free(y);
+}
+
 static void tiles(void **state)
 {
     (void)state;
@@ -142,8 +174,9 @@ static void exponential(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(product), cmocka_unit_test(same_bits_for_threads),
-                                       cmocka_unit_test(half_precision), cmocka_unit_test(tiles),
-                                       cmocka_unit_test(exponential)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(product),        cmocka_unit_test(same_bits_for_threads),
+        cmocka_unit_test(half_precision), cmocka_unit_test(half_in_every_instruction_set),
+        cmocka_unit_test(tiles),          cmocka_unit_test(exponential)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

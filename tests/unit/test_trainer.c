@@ -52,6 +52,19 @@ static bool exists(const char *name)
     return access(path, F_OK) == 0;
 }
 
+static void flip_byte(const char *name, long at)
+{
+    char path[128];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *f = fopen(path, "r+b");
+    assert_non_null(f);
+    fseek(f, at, SEEK_SET);
+    const int old = fgetc(f);
+    fseek(f, at, SEEK_SET);
+    fputc(old ^ 1, f);
+    fclose(f);
+}
+
 static void clean(void)
 {
     static const char *const names[] = {"model.sdm", "checkpoint.sdmc", "metrics.jsonl", "config.yaml", "loss.png"};
@@ -179,10 +192,43 @@ static void resume_is_bit_exact(void **state)
         assert_true(hash_of("metrics.jsonl") == metrics);
         assert_true(w.reports > 0);
     }
+    // a checkpoint with a wrong bit is refused
+    flip_byte("checkpoint.sdmc", 100000);
+    assert_int_equal(sdm_train(&c, capsule, folder, true, NULL, NULL, &e), SDM_E_FORMAT);
+    flip_byte("checkpoint.sdmc", 100000);
     // another config is refused
     sdm_config other;
     read_config(&other, (const char *const[]){"train.steps=600", "network.rank=5"}, 2);
     assert_int_equal(sdm_train(&other, capsule, folder, true, NULL, NULL, &e), SDM_E_CONFIG);
+}
+
+// a run from the beginning does not leave the checkpoint of an older one to be resumed
+static void stale_checkpoint_goes(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_error e = {0};
+    read_config(&c, (const char *const[]){"train.steps=600"}, 1);
+    assert_true(exists("checkpoint.sdmc"));
+    calls = 0, stop_after = 20;
+    watch w = {0};
+    const sdm_train_hooks hooks = {.cancelled = stop, .user = &w};
+    assert_int_equal(sdm_train(&c, capsule, folder, false, &hooks, NULL, &e), SDM_E_CANCELLED);
+    assert_false(exists("checkpoint.sdmc"));
+}
+
+// a time budget that is over before the data is made still gives a model
+static void short_of_time(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_error e = {0};
+    sdm_train_report r;
+    clean();
+    read_config(&c, (const char *const[]){"train.steps=0", "train.minutes=0.01", "data.start=5000", "network.degree=8"},
+                4);
+    if (sdm_train(&c, capsule, folder, false, NULL, &r, &e)) fail_msg("%s", e.text);
+    assert_true(r.accuracy.rmse_mm < 0.2 && r.samples < 5000);
 }
 
 static void polynomials_alone(void **state)
@@ -261,6 +307,8 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(trains),
                                        cmocka_unit_test(same_bits_for_threads),
                                        cmocka_unit_test(resume_is_bit_exact),
+                                       cmocka_unit_test(stale_checkpoint_goes),
+                                       cmocka_unit_test(short_of_time),
                                        cmocka_unit_test(polynomials_alone),
                                        cmocka_unit_test(small_pool),
                                        cmocka_unit_test(mistakes)};

@@ -93,8 +93,7 @@ static void half_in_every_instruction_set(void **state)
     const kernel_table *tables[3] = {&sdm_kernels_generic};
     size_t n = 1;
 #if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("f16c"))
-        tables[n++] = &sdm_kernels_avx2;
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) tables[n++] = &sdm_kernels_avx2;
     if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq"))
         tables[n++] = &sdm_kernels_avx512;
 #endif

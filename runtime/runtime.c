@@ -11,7 +11,7 @@
 #endif
 
 // maps of one slice of a batch: fixed, so that how a map is computed does not depend on the number of threads
-#define SLICE 16u
+#define SLICE 24u
 
 static int thread_count(int wanted, size_t most)
 {

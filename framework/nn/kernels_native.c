@@ -132,8 +132,7 @@ void sdm_tile_f16(size_t batch, size_t k, const uint16_t *w, const float *x, siz
         t->tile_f16(k, w, x, y);
         return;
     }
-    t->expand_f16(k * SDM_TILE, w, scratch);
-    t->tile_f32(batch, k, scratch, x, ldx, y, ldy);
+    t->tile_f16_batch(batch, k, w, x, ldx, y, ldy, scratch);
 }
 
 void sdm_exp(size_t n, const float *x, float *y) { kernels()->exp(n, x, y); }

@@ -104,6 +104,67 @@ static void expand_f16(size_t n, const uint16_t *h, float *y)
     for (size_t i = 0; i < n; i += VW) store(y + i, load_half(h + i));
 }
 
+// panels[T / NR][k][NR] as float from a tile of halves: a panel is read front to back and stays in the first-level cache
+static void expand_panels(size_t k, const uint16_t *w, float *panels)
+{
+    for (size_t p = 0; p < k; p++)
+        for (size_t j = 0; j < SDM_TILE / NR; j++)
+            for (size_t v = 0; v < NV; v++)
+                store(panels + (j * k + p) * NR + v * VW, load_half(w + p * SDM_TILE + j * NR + v * VW));
+}
+
+// `count` rows of x times one panel
+#define PANEL_ROWS(count)                                                                                              \
+    static void panel_rows_##count(size_t k, const float *panel, const float *x, size_t ldx, float *y, size_t ldy)     \
+    {                                                                                                                  \
+        vec acc[count][NV] = {{{0}}};                                                                                  \
+        for (size_t p = 0; p < k; p++, panel += NR) {                                                                  \
+            vec w[NV];                                                                                                 \
+            for (int j = 0; j < NV; j++) w[j] = load(panel + j * VW);                                                  \
+            for (int i = 0; i < count; i++) {                                                                          \
+                const vec s = splat(x[(size_t)i * ldx + p]);                                                           \
+                for (int j = 0; j < NV; j++) acc[i][j] += s * w[j];                                                    \
+            }                                                                                                          \
+        }                                                                                                              \
+        for (int i = 0; i < count; i++)                                                                                \
+            for (int j = 0; j < NV; j++) store(y + (size_t)i * ldy + (size_t)(j * VW), acc[i][j]);                     \
+    }
+PANEL_ROWS(6)
+PANEL_ROWS(5)
+PANEL_ROWS(4)
+PANEL_ROWS(3)
+PANEL_ROWS(2)
+PANEL_ROWS(1)
+
+static void tile_f16_batch(size_t batch, size_t k, const uint16_t *w, const float *x, size_t ldx, float *y, size_t ldy,
+                           float *panels)
+{
+    expand_panels(k, w, panels);
+    for (size_t j = 0; j < SDM_TILE / NR; j++, panels += k * NR, y += NR) {
+        size_t i = 0;
+        for (; i + 6 <= batch; i += 6) panel_rows_6(k, panels, x + i * ldx, ldx, y + i * ldy, ldy);
+        switch (batch - i) {
+        case 5:
+            panel_rows_5(k, panels, x + i * ldx, ldx, y + i * ldy, ldy);
+            break;
+        case 4:
+            panel_rows_4(k, panels, x + i * ldx, ldx, y + i * ldy, ldy);
+            break;
+        case 3:
+            panel_rows_3(k, panels, x + i * ldx, ldx, y + i * ldy, ldy);
+            break;
+        case 2:
+            panel_rows_2(k, panels, x + i * ldx, ldx, y + i * ldy, ldy);
+            break;
+        case 1:
+            panel_rows_1(k, panels, x + i * ldx, ldx, y + i * ldy, ldy);
+            break;
+        default:
+            break;
+        }
+    }
+}
+
 // exp by 2^n times a polynomial of degree 6 on [-ln 2 / 2, ln 2 / 2] (coefficients: Taylor, adjusted by the Cephes library's expf)
 static inline vec exp_vec(vec x)
 {
@@ -151,4 +212,5 @@ const kernel_table TABLE = {.name = ISA,
                             .tile_f32 = tile_f32,
                             .tile_f16 = tile_f16,
                             .expand_f16 = expand_f16,
+                            .tile_f16_batch = tile_f16_batch,
                             .exp = exp_all};

@@ -12,7 +12,10 @@ typedef struct kernel_table {
     void (*micro)(size_t k, const float *a, const float *b, float *c, size_t ldc, int add);
     void (*tile_f32)(size_t batch, size_t k, const float *w, const float *x, size_t ldx, float *y, size_t ldy);
     void (*tile_f16)(size_t k, const uint16_t *w, const float *x, float *y); /* batch of one */
-    void (*expand_f16)(size_t n, const uint16_t *h, float *y);               /* n a multiple of SDM_TILE */
+    /* batch of two or more; panels: k * SDM_TILE floats of scratch */
+    void (*tile_f16_batch)(size_t batch, size_t k, const uint16_t *w, const float *x, size_t ldx, float *y, size_t ldy,
+                           float *panels);
+    void (*expand_f16)(size_t n, const uint16_t *h, float *y); /* n a multiple of SDM_TILE */
     void (*exp)(size_t n, const float *x, float *y);
 } kernel_table;
 

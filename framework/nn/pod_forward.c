@@ -5,7 +5,7 @@
 #include "model_internal.h"
 #include "sdm/kernels.h"
 
-enum { ROWS = 16 };
+enum { ROWS = 24 }; // four times the six rows of the kernels
 
 static size_t pad(size_t n) { return (n + SDM_TILE - 1) / SDM_TILE * SDM_TILE; }
 static size_t larger(size_t a, size_t b) { return a > b ? a : b; }

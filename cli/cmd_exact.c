@@ -121,9 +121,25 @@ static sdm_status run_naive(job *j, sdm_error *err)
     return s;
 }
 
+static void value_range(const job *j, float *min, float *max, int64_t *inside)
+{
+    const size_t n = sdm_grid_count(&j->grid);
+    *min = *max = j->values[0];
+    *inside = 0;
+    for (size_t i = 0; i < n; i++) {
+        if (j->values[i] < *min) *min = j->values[i];
+        if (j->values[i] > *max) *max = j->values[i];
+        *inside += j->values[i] < 0;
+    }
+}
+
 static void notice_mesh(const job *j)
 {
     const sdm_audit *a = &j->report.audit;
+    int64_t inside;
+    float min, max;
+    value_range(j, &min, &max, &inside);
+    if (!inside) cli_notice("no voxel of the grid is inside the surface: is it where the shape is?");
     if (j->report.turned) cli_notice("the mesh was inside out and has been turned");
     if (a->boundary_edges > 0)
         cli_notice("the mesh is open: %zu boundary edges; inside is where the winding number is over 1/2",
@@ -150,18 +166,6 @@ static sdm_status write_outputs(const job *j, sdm_error *err)
     for (size_t i = 0; i < j->args->outputs.n && !s; i++)
         s = cli_write_map(j->args->outputs.items[i], &map, j->args, err);
     return s;
-}
-
-static void value_range(const job *j, float *min, float *max, int64_t *inside)
-{
-    const size_t n = sdm_grid_count(&j->grid);
-    *min = *max = j->values[0];
-    *inside = 0;
-    for (size_t i = 0; i < n; i++) {
-        if (j->values[i] < *min) *min = j->values[i];
-        if (j->values[i] > *max) *max = j->values[i];
-        *inside += j->values[i] < 0;
-    }
 }
 
 static sdm_status print_json(const job *j, sdm_error *err)

@@ -1,4 +1,5 @@
 /* sdmgen generate: distance maps from a trained network. */
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -42,7 +43,30 @@ static void job_dispose(job *j)
     sdm_registry_free(j->registry);
 }
 
-/* Parameters of every row, checked before the first map is made: all or nothing. */
+/* What the policy asks of a row. */
+static sdm_status check_row(const job *j, const double *p, sdm_error *err)
+{
+    const size_t n = j->info->n_params;
+    const sdm_range_policy policy = policy_of(j->args->policy);
+    bool finite = true;
+    for (size_t i = 0; i < n; i++) finite = finite && isfinite(p[i]);
+    if (policy == SDM_RANGE_REFUSE || !finite) return cli_check_range(j->params, n, p, err);
+    if (policy == SDM_RANGE_EXACT && cli_check_range(j->params, n, p, NULL))
+        return sdm_instance_check(j->shape, p, err);
+    return SDM_OK;
+}
+
+/* Every row, before the first map is made: all or nothing. */
+static sdm_status check_rows(const job *j, sdm_error *err)
+{
+    for (size_t i = 0; i < j->n_rows; i++) {
+        const sdm_status s = check_row(j, j->rows + i * j->info->n_params, err);
+        if (s) return j->args->rows ? sdm_fail_in(err, s, "%s: row %zu", j->args->rows, i + 1) : s;
+    }
+    return SDM_OK;
+}
+
+/* Parameters of every row. */
 static sdm_status read_rows(job *j, sdm_error *err)
 {
     const size_t n = j->info->n_params;
@@ -57,10 +81,6 @@ static sdm_status read_rows(job *j, sdm_error *err)
         j->n_rows = 1;
     }
     sdm_free(base);
-    for (size_t i = 0; i < j->n_rows && !s && policy_of(j->args->policy) == SDM_RANGE_REFUSE; i++) {
-        s = cli_check_range(j->params, n, j->rows + i * n, err);
-        if (s && j->args->rows) s = sdm_fail_in(err, s, "%s: row %zu", j->args->rows, i + 1);
-    }
     return s;
 }
 
@@ -78,6 +98,7 @@ static sdm_status prepare(job *j, sdm_error *err)
         s = cli_open_registry(args, &j->registry, err);
         if (!s) s = sdm_runtime_instance(j->model, j->registry, &j->shape, err);
     }
+    if (!s) s = check_rows(j, err);
     if (!s) s = SDM_ALLOC(&j->values, sdm_grid_count(&j->info->grid), "distance map", err);
     return s;
 }
@@ -85,14 +106,19 @@ static sdm_status prepare(job *j, sdm_error *err)
 /* Checks the numbered names of all rows like those of a single map: the last ones too, before the first is made. */
 static sdm_status check_numbered(const job *j, sdm_error *err)
 {
-    char path[SDM_PATH_TEXT_MAX];
-    const char *item = path;
-    const cli_list one = {&item, 1};
-    sdm_status s = SDM_OK;
-    for (size_t i = 0; i < j->args->outputs.n && !s; i++) {
-        s = cli_number_path(j->args->outputs.items[i], j->n_rows, path, sizeof path, err);
-        if (!s) s = cli_check_outputs(&one, false, err);
+    const size_t n = j->args->outputs.n;
+    char *paths = NULL;
+    const char **items = NULL;
+    sdm_status s = SDM_ALLOC(&paths, n * SDM_PATH_TEXT_MAX, "names of the outputs", err);
+    if (!s) s = SDM_ALLOC(&items, n, "names of the outputs", err);
+    for (size_t i = 0; i < n && !s; i++) {
+        items[i] = paths + i * SDM_PATH_TEXT_MAX;
+        s = cli_number_path(j->args->outputs.items[i], j->n_rows, paths + i * SDM_PATH_TEXT_MAX, SDM_PATH_TEXT_MAX,
+                            err);
     }
+    if (!s) s = cli_check_outputs(&(cli_list){items, n}, false, err);
+    sdm_free((void *)items);
+    sdm_free(paths);
     return s;
 }
 

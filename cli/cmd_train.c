@@ -86,16 +86,20 @@ static sdm_status check_folder(const cli_args *args, const char *folder, sdm_err
         const char *name, *what;
     } files[] = {{"model.sdm", "a trained model"}, {"checkpoint.sdmc", "the checkpoint of a training"}};
     if (args->resume && args->force) return sdm_fail(err, SDM_E_ARG, "train: --resume and --force exclude each other");
-    if (args->resume || args->force) return SDM_OK;
+    bool there[2];
     for (size_t i = 0; i < 2; i++) {
         char path[SDM_PATH_TEXT_MAX + 32];
         snprintf(path, sizeof path, "%s/%s", folder, files[i].name);
-        if (!access(path, F_OK))
-            return sdm_fail(err, SDM_E_ARG,
-                            "%s holds %s: go on with --resume, start anew with --force, or choose --out DIR", folder,
-                            files[i].what);
+        there[i] = !access(path, F_OK);
     }
-    return SDM_OK;
+    if (args->force || (!there[0] && !there[1])) return SDM_OK;
+    if (!there[1])
+        return sdm_fail(err, SDM_E_ARG,
+                        "%s holds %s and no checkpoint to go on from: start anew with --force, or choose --out DIR",
+                        folder, files[0].what);
+    if (args->resume) return SDM_OK;
+    return sdm_fail(err, SDM_E_ARG, "%s holds %s: go on with --resume, start anew with --force, or choose --out DIR",
+                    folder, files[there[0] ? 0 : 1].what);
 }
 
 /* Slices exact | network | error at the shape's default parameters, as far as the model was trained on them. */

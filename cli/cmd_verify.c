@@ -16,10 +16,13 @@ enum { DEFAULT_SAMPLES = 20 };
 static sdm_status verify_vdb(const cli_args *args, const char *path, sdm_error *err)
 {
 #ifdef SDM_HAVE_VDB
-    const sdm_status s = sdm_vdb_verify(path, NULL, err);
+    char *text = NULL;
+    const sdm_status s = sdm_vdb_verify(path, &text, err);
     if (s) return s;
+    const bool whole = strstr(text, "whole map") != NULL;
+    sdm_free(text);
     if (!args->json) {
-        printf("%s: hash and level set are right\n", path);
+        printf("%s: %s\n", path, whole ? "hash is right (a whole map, no level set)" : "hash and level set are right");
         return SDM_OK;
     }
     sdm_json j = {0};

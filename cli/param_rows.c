@@ -109,7 +109,9 @@ sdm_status cli_read_rows(const char *path, const sdm_param *params, size_t n, co
     size_t size = 0, total = 0;
     sdm_status s = sdm_file_read(path, MAX_BYTES, &data, &size, err);
     if (s) return s;
-    table t = {.path = path, .at = (char *)data};
+    // spreadsheets put a byte order mark in front
+    const bool marked = size >= 3 && !memcmp(data, "\xef\xbb\xbf", 3);
+    table t = {.path = path, .at = (char *)data + (marked ? 3 : 0)};
     if (strlen((char *)data) != size) s = sdm_fail(err, SDM_E_FORMAT, "%s: not a text file (a zero byte)", path);
     if (!s) s = sdm_mul(count_lines(t.at), n, &total, err);
     if (!s) s = SDM_ALLOC(values, total, "table of parameters", err);

@@ -107,6 +107,9 @@ void cli_catch_interrupts(void)
     sigemptyset(&action.sa_mask);
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
+    // a limit on the size of files is an error of writing like any other, with its message and no file left
+    action.sa_handler = SIG_IGN;
+    sigaction(SIGXFSZ, &action, NULL);
 }
 
 bool cli_is_interrupted(void) { return interrupts != 0; }

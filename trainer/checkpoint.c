@@ -42,10 +42,14 @@ static uint64_t fingerprint(const trainer *t)
 
 sdm_status checkpoint_remove(const trainer *t, sdm_error *err)
 {
+    static const char *const names[] = {"checkpoint.sdmc", "model.sdm"};
     char path[SDM_PATH_TEXT_MAX + 32];
-    checkpoint_path(t, path, sizeof path);
-    if (!unlink(path) || errno == ENOENT) return SDM_OK;
-    return sdm_fail(err, SDM_E_IO, "%s: cannot remove: %s", path, strerror(errno));
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        snprintf(path, sizeof path, "%s/%s", t->folder, names[i]);
+        if (unlink(path) && errno != ENOENT)
+            return sdm_fail(err, SDM_E_IO, "%s: cannot remove: %s", path, strerror(errno));
+    }
+    return SDM_OK;
 }
 
 static parameters *weights_of(trainer *t, int64_t phase) { return phase == SDM_PHASE_FIT ? &t->fit : &t->refine; }

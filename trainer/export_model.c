@@ -155,6 +155,15 @@ static sdm_status dump_config(const trainer *t, sdm_text *out, sdm_error *err)
     return out->failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the resolved config") : SDM_OK;
 }
 
+sdm_status export_config(const trainer *t, sdm_error *err)
+{
+    sdm_text config = {0};
+    sdm_status s = dump_config(t, &config, err);
+    if (!s) s = write_text(t, "config.yaml", &config, err);
+    sdm_text_dispose(&config);
+    return s;
+}
+
 static void describe(const trainer *t, const sdm_text *config, option_texts *options, sdm_model_param *params,
                      sdm_model_info *info)
 {
@@ -225,7 +234,6 @@ sdm_status export_model(trainer *t, sdm_train_report *report, sdm_error *err)
     t->heldout_mse = t->accuracy.mse_mm2;
     if (!s) s = trainer_metric(t, 0, err);
     if (!s) s = sdm_model_build(&spec, &bytes, &size, err);
-    if (!s) s = write_text(t, "config.yaml", &config, err);
     if (!s) s = write_curve(t, err);
     if (!s) s = sdm_container_write(path, bytes, size, err);
     sdm_free(bytes);

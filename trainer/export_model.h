@@ -4,7 +4,10 @@
 
 #include "trainer.h"
 
-/* Builds the model from the averaged weights, measures it on the held-out maps as the runtime will run it, writes model.sdm, config.yaml and
+/* Writes config.yaml, the resolved configuration. */
+sdm_status export_config(const trainer *t, sdm_error *err);
+
+/* Builds the model from the averaged weights, measures it on the held-out maps as the runtime will run it, writes model.sdm and
    loss.png into the folder and fills the report (may be NULL). */
 sdm_status export_model(trainer *t, sdm_train_report *report, sdm_error *err);
 

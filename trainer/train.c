@@ -279,6 +279,19 @@ static void report_fill(void *user, size_t done, size_t all)
     trainer_report(t, f, (double)done / (trainer_seconds(t) + 1e-9), done == all);
 }
 
+// a grid that no held-out shape reaches would give a network of excellent figures and no use
+static sdm_status check_grid(const trainer *t, sdm_error *err)
+{
+    const dataset *d = &t->data;
+    for (size_t i = 0; i < d->n_holdout * d->n_voxels; i++)
+        if (d->holdout[i] < 0) return SDM_OK;
+    return sdm_fail(err, SDM_E_CONFIG,
+                    "%s: no voxel of the grid is inside any of %zu held-out shapes: check grid.centre (or "
+                    "grid.origin), grid.size and "
+                    "grid.spacing",
+                    t->config->file, d->n_holdout);
+}
+
 static sdm_status start_fit(trainer *t, sdm_error *err)
 {
     const sdm_pod_arch *a = &t->arch;
@@ -356,6 +369,7 @@ static sdm_status run(trainer *t, bool resume, sdm_error *err)
                         "data.start or raise "
                         "train.minutes)",
                         t->data.n_start, start);
+    if (!s) s = check_grid(t, err);
     t->phase = SDM_PHASE_BASES;
     trainer_report(t, trainer_by_time(t) ? trainer_seconds(t) / (t->config->train.minutes * 60) : 0, 0, true);
     if (!s) s = design(t, err);
@@ -413,7 +427,8 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     t.n_threads = 1;
 #endif
     sdm_status s = sdm_make_folder(folder, err);
-    if (!s && !resume) s = checkpoint_remove(&t, err); // it would belong to another run
+    if (!s && !resume) s = checkpoint_remove(&t, err); // they would belong to another run
+    if (!s) s = export_config(&t, err);
     if (!s) s = run(&t, resume, err);
     producer_stop(t.producer);
     t.producer = NULL;

@@ -100,6 +100,7 @@ sdm_status refine_evaluate(trainer *t, const float *w, double *mse, sdm_error *e
 sdm_status trainer_take_samples(trainer *t, size_t wanted, sdm_error *err);
 
 /* checkpoint.c */
+/* Removes checkpoint and model of an older run in the same folder. */
 sdm_status checkpoint_remove(const trainer *t, sdm_error *err);
 sdm_status checkpoint_write(trainer *t, sdm_error *err);
 sdm_status checkpoint_read(trainer *t, bool *found,

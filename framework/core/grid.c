@@ -21,11 +21,11 @@ sdm_status sdm_grid_check(const sdm_grid *g, sdm_error *err)
         if (g->n[a] < 1 || g->n[a] > 1 << 20)
             return sdm_fail(err, SDM_E_ARG, "grid size along %c is %lld, need 1 to 1048576", axis[a],
                             (long long)g->n[a]);
-        if (!(g->spacing[a] > 0) || !isfinite(g->spacing[a]))
-            return sdm_fail(err, SDM_E_ARG, "grid spacing along %c is %g mm, need a positive number", axis[a],
-                            g->spacing[a]);
-        if (!isfinite(g->origin[a]))
-            return sdm_fail(err, SDM_E_ARG, "grid origin along %c is %g mm, need a finite number", axis[a],
+        if (!(g->spacing[a] >= 1e-100) || !(g->spacing[a] <= 1e100)) // squares must be numbers too
+            return sdm_fail(err, SDM_E_ARG, "grid spacing along %c is %g mm, need a positive number (1e-100 to 1e100)",
+                            axis[a], g->spacing[a]);
+        if (!(fabs(g->origin[a]) <= 1e100))
+            return sdm_fail(err, SDM_E_ARG, "grid origin along %c is %g mm, need a finite number up to 1e100", axis[a],
                             g->origin[a]);
     }
     // 2^60 floats cannot be addressed: three factors of at most 2^20 do not overflow int64

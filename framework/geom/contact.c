@@ -42,6 +42,12 @@ static const double *corner(const finder *w, uint32_t t, int i)
 static sdm_status add(finder *w, sdm_contact c)
 {
     sdm_contacts *out = w->out;
+    // sheets laid on each other many times over: the number of contacts grows with the square of the layers
+    const size_t most = 64 * w->topo->n_tri + ((size_t)1 << 20);
+    if (out->n == most)
+        return sdm_fail(
+            w->err, SDM_E_MESH,
+            "triangles of the mesh touch or cross each other more than %zu times: remove its duplicate layers", most);
     if (out->n == out->cap) {
         const size_t cap = out->cap ? 2 * out->cap : 256;
         const sdm_status s = sdm_grow((void **)&out->list, out->n, cap, sizeof *out->list, "contacts", w->err);

@@ -124,6 +124,10 @@ static sdm_status prepare(sdm_exact *e, const sdm_mesh *mesh, sdm_error *err)
     if (!s) s = survey_solid(e, err);
     if (!s) s = choose_sign(e, err);
     if (!s) s = make_surface(e, err);
+    if (!s && e->report.sign == SDM_SIGN_PSEUDONORMAL && e->report.unioned)
+        s = sdm_fail(
+            err, SDM_E_ARG,
+            "sign method pseudonormal needs a mesh without surface inside the solid, this one has some; use auto");
     if (!s) s = build_nearest(e, err);
     if (!s && e->report.sign == SDM_SIGN_WINDING) s = sdm_winding_build(&e->solid, &e->survey.tree, &e->winding, err);
     if (!s && e->report.sign == SDM_SIGN_PSEUDONORMAL)

@@ -12,7 +12,8 @@
 
 static int wanted_level = -1;
 
-int sdm_grid_kernel_select(int level)
+// the level to use when `level` is wanted; -1: the best of the machine
+static int usable(int level)
 {
     int best = 0;
 #if defined(__x86_64__) && defined(__GNUC__)
@@ -21,13 +22,18 @@ int sdm_grid_kernel_select(int level)
         __builtin_cpu_supports("avx512dq"))
         best = 2;
 #endif
-    wanted_level = level;
     return level >= 0 && level < best ? level : best;
+}
+
+int sdm_grid_kernel_select(int level)
+{
+    wanted_level = level;
+    return usable(level);
 }
 
 static sdm_grid_kernel *choose_kernel(void)
 {
-    switch (sdm_grid_kernel_select(wanted_level)) {
+    switch (usable(wanted_level)) {
 #if defined(__x86_64__) && defined(__GNUC__)
     case 2:
         return sdm_grid_kernel_avx512;

@@ -23,8 +23,8 @@ static sdm_status fail_here(const body *y, sdm_error *err, const char *what)
 static size_t bytes_left(const body *y)
 {
     if (!y->h.ascii) return (size_t)(y->end - y->at);
-    const size_t in_line = y->line ? strlen(y->line) : 0;
-    return (size_t)(y->scan.end - y->scan.at) + in_line + 1; /* the last word needs no separator */
+    const char *from = y->line && *y->line ? y->line : y->scan.at;
+    return (size_t)(y->scan.end - from) + 1; /* the last word needs no separator */
 }
 
 /* Fewest bytes that a number takes. */

@@ -56,14 +56,16 @@ static sdm_status check_choices(const char *who, const sdm_option *o, sdm_error 
 {
     const char *all = o->choices;
     if (!all || !all[0]) return sdm_fail(err, SDM_E_PLUGIN, "%s: option '%s' has no choices", who, o->name);
+    size_t count = 0;
     for (const char *word = all;;) {
         const size_t n = strcspn(word, "|");
-        bool bad = n == 0 || n > SHAPE_NAME_MAX;
+        bool bad = n == 0 || n > SHAPE_NAME_MAX || ++count > SHAPE_OPTIONS_MAX;
         for (const char *before = all; before < word && !bad; before += strcspn(before, "|") + 1)
             bad = strcspn(before, "|") == n && memcmp(before, word, n) == 0;
         if (bad)
-            return sdm_fail(err, SDM_E_PLUGIN, "%s: option '%s' has an empty, long or repeated choice in '%s'", who,
-                            o->name, all);
+            return sdm_fail(err, SDM_E_PLUGIN,
+                            "%s: option '%s' has an empty, long or repeated choice, or too many, in '%s'", who, o->name,
+                            all);
         if (!word[n]) return SDM_OK;
         word += n + 1;
     }
@@ -136,7 +138,9 @@ sdm_status sdm_shape_copy_checked(const sdm_shape *table, const char *origin, sd
                         "%s: shape table of %u bytes, need at least %zu: set .size = sizeof(sdm_shape)", origin,
                         (unsigned)lead[1], need);
     *out = (sdm_shape){0};
-    memcpy(out, (const void *)table, lead[1] < sizeof *out ? lead[1] : sizeof *out);
+    // a size that ends inside a pointer gives no pointer
+    const size_t whole = lead[1] / sizeof(void *) * sizeof(void *);
+    memcpy(out, (const void *)table, whole < sizeof *out ? whole : sizeof *out);
     out->size = (uint32_t)sizeof *out;
 
     if (!is_name(out->name))

@@ -62,6 +62,20 @@ cmp -s one.npy row02.npy || bad 'row 2 differs from the same parameters one by o
 printf 'alpha,a\n0.5,3\n0.7,9\n' >range.csv
 expect 5 'range\.csv: row 2: .*a.* 9' sdmgen generate $model --params range.csv -o 'x%d.npy'
 printf 'alpha,aa\n' >header.csv
+
+# all or nothing for every policy; names that differ in nothing are refused; a byte order mark is skipped
+printf 'a\n3\nnan\n' >nan.csv
+expect 5 'nan\.csv: row 2: ' sdmgen generate $model --params nan.csv --policy clamp -o 'n%d.npy'
+absent n1.npy n2.npy
+expect 2 'given twice' sdmgen generate $model --params rows.csv -o 'same%d.npy' -o 'same%d.npy'
+absent same1.npy
+printf '\357\273\277a,b\r\n3,0.1\r\n' >bom.csv
+expect 0 - sdmgen generate $model --params bom.csv -o 'bom%d.npy' --quiet
+
+# a limit on the size of files is an error of writing, and nothing is left
+expect 1 'limited\.npy: cannot write' bash -c "ulimit -f 4; '$program' generate $model -o limited.npy"
+absent limited.npy
+
 expect 3 "header\.csv:1: unknown parameter 'aa'" sdmgen generate $model --params header.csv -o x.npy
 printf 'alpha,a\n1\n' >short.csv
 expect 3 'short\.csv:2: 1 values, the header has 2' sdmgen generate $model --params short.csv -o x.npy

@@ -13,7 +13,8 @@ awk -v s="$(json seconds)" -v m="$(json mse_mm2)" 'BEGIN { exit !(s > 0 && m > 0
 
 # a finished run is safe
 before=$(cksum <run/model.sdm)
-expect 2 'run holds a trained model: go on with --resume, start anew with --force' sdmgen train "$tiny" --out run
+expect 2 'run holds a trained model and no checkpoint to go on from' sdmgen train "$tiny" --out run
+expect 2 'run holds a trained model and no checkpoint to go on from' sdmgen train "$tiny" --out run --resume
 expect 2 'exclude each other' sdmgen train "$tiny" --out run --resume --force
 [ "$before" = "$(cksum <run/model.sdm)" ] || bad 'the model has changed'
 
@@ -33,6 +34,10 @@ expect 2 'stopped holds the checkpoint of a training' sdmgen train "$tiny" --out
 expect 0 - sdmgen train "$tiny" --out stopped --resume --quiet
 present stopped/model.sdm
 expect 0 - sdmgen info stopped/model.sdm
+
+# a grid that misses the shape gives no network
+expect 2 'no voxel of the grid is inside any' sdmgen train "$tiny" 'grid.origin=[900,900,900]' --out missed --quiet
+absent missed/model.sdm
 
 # mistakes
 expect 2 '^argument .network.dpth=4.: ' sdmgen train "$tiny" network.dpth=4 --out never

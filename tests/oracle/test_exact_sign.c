@@ -53,6 +53,41 @@ static void test_sides_are_exact(void **state)
     assert_int_equal(sdm_side(u, v, far, NULL), -1); // tie: moved by (e, e^2), to the right of the diagonal
 }
 
+// a ball inside a ball, both facing outwards: the inner surface does not count, and pseudo-normals cannot be asked
+static void test_nested_solid(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0}, part = {0};
+    mesh_sphere(&m, zero, 1, 24);
+    mesh_sphere(&part, zero, 3, 24);
+    mesh_append(&m, &part);
+    sdm_exact *e = engine(&m, NULL);
+    assert_true(sdm_exact_get_report(e)->unioned);
+    assert_true(fabs(sdm_exact_point(e, zero, NULL, NULL, NULL) + 3) < 0.05);
+    sdm_exact_free(e);
+    sdm_error err;
+    const sdm_exact_opts opts = {.sign = SDM_SIGN_PSEUDONORMAL};
+    assert_int_equal(sdm_exact_create(&m, &opts, &e, &err), SDM_E_ARG);
+    sdm_mesh_dispose(&m);
+    sdm_mesh_dispose(&part);
+}
+
+// the same triangle a thousand times: an error in bounded memory
+static void test_layers(void **state)
+{
+    (void)state;
+    enum { LAYERS = 3000 };
+    sdm_mesh m = {0};
+    sdm_audit a;
+    sdm_error err;
+    assert_int_equal(sdm_mesh_reserve(&m, 3, LAYERS, &err), SDM_OK);
+    const double vert[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+    for (int i = 0; i < 9; i++) m.vert[i] = vert[i];
+    for (uint32_t i = 0; i < 3 * LAYERS; i++) m.tri[i] = i % 3;
+    assert_int_equal(sdm_mesh_audit(&m, &a, &err), SDM_E_MESH);
+    sdm_mesh_dispose(&m);
+}
+
 static void test_nested_cavity(void **state)
 {
     (void)state;
@@ -247,6 +282,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_sides_are_exact),
+        cmocka_unit_test(test_nested_solid),
+        cmocka_unit_test(test_layers),
         cmocka_unit_test(test_nested_cavity),
         cmocka_unit_test(test_inside_out),
         cmocka_unit_test(test_open_cup),

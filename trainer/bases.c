@@ -13,13 +13,11 @@
 #include "streams.h"
 #include "trainer.h"
 
-static size_t voxels_of(const sdm_pod_block *b) { return (size_t)b->size[0] * b->size[1] * b->size[2]; }
-
 // rows[n][V_b] of block b for the given slots (NULL: slot i for row i), without the mean
 static void load_slots(const trainer *t, const sdm_pod_block *b, const size_t *slots, size_t n, float *rows)
 {
     const dataset *d = &t->data;
-    const size_t voxels = voxels_of(b);
+    const size_t voxels = sdm_pod_block_voxels(b);
     const float *mean = t->mean + b->voxel;
     for (size_t i = 0; i < n; i++) {
         const size_t slot = slots ? slots[i] : i;
@@ -47,7 +45,7 @@ static sdm_status block_basis(trainer *t, size_t index, size_t n, size_t keep, f
                               float *vectors, double *values, sdm_error *err)
 {
     const sdm_pod_block *b = &t->blocks[index];
-    const size_t voxels = voxels_of(b);
+    const size_t voxels = sdm_pod_block_voxels(b);
     float *mean = t->mean + b->voxel;
     memset(mean, 0, voxels * sizeof *mean);
     load_slots(t, b, NULL, n, rows);
@@ -92,7 +90,7 @@ static sdm_status local_bases(trainer *t, size_t n, sdm_error *err)
     const size_t n_blocks = t->arch.n_blocks, most = 4 * (size_t)t->config->network.rank;
     size_t largest = 0, *keep = NULL;
     for (size_t b = 0; b < n_blocks; b++)
-        if (voxels_of(&t->blocks[b]) > largest) largest = voxels_of(&t->blocks[b]);
+        if (sdm_pod_block_voxels(&t->blocks[b]) > largest) largest = sdm_pod_block_voxels(&t->blocks[b]);
     const size_t stride = most < largest ? most : largest;
     float *vectors = NULL;
     double *values = NULL;
@@ -114,7 +112,7 @@ static sdm_status local_bases(trainer *t, size_t n, sdm_error *err)
 #pragma omp for schedule(dynamic)
 #endif
         for (long b = 0; b < (long)n_blocks; b++) {
-            const size_t at = (size_t)b, voxels = voxels_of(&t->blocks[at]);
+            const size_t at = (size_t)b, voxels = sdm_pod_block_voxels(&t->blocks[at]);
             sdm_status mine_s = made;
             if (!mine_s) {
                 keep[at] = stride < voxels ? stride : voxels;
@@ -137,11 +135,11 @@ static sdm_status local_bases(trainer *t, size_t n, sdm_error *err)
     }
     if (!s) s = choose_ranks(t, keep, values, stride, err);
     size_t count = 0;
-    for (size_t b = 0; b < n_blocks && !s; b++) count += t->blocks[b].rank * voxels_of(&t->blocks[b]);
+    for (size_t b = 0; b < n_blocks && !s; b++) count += t->blocks[b].rank * sdm_pod_block_voxels(&t->blocks[b]);
     if (!s) s = SDM_ALLOC(&t->basis, count, "local bases", err);
     float *to = t->basis;
     for (size_t b = 0; b < n_blocks && !s; b++) {
-        const size_t voxels = voxels_of(&t->blocks[b]), size = t->blocks[b].rank * voxels;
+        const size_t voxels = sdm_pod_block_voxels(&t->blocks[b]), size = t->blocks[b].rank * voxels;
         memcpy(to, vectors + t->blocks[b].voxel * stride, size * sizeof *to);
         to += size;
     }
@@ -162,7 +160,7 @@ static sdm_status coefficients(const trainer *t, bool holdout, const size_t *slo
     if ((s = SDM_ALLOC(&basis_at, t->arch.n_blocks, "local coefficients", err))) return s;
     size_t at = 0;
     for (size_t b = 0; b < t->arch.n_blocks; b++) {
-        const size_t voxels = voxels_of(&t->blocks[b]);
+        const size_t voxels = sdm_pod_block_voxels(&t->blocks[b]);
         if (voxels > largest) largest = voxels;
         basis_at[b] = at;
         at += voxels * t->blocks[b].rank;
@@ -186,7 +184,7 @@ static sdm_status coefficients(const trainer *t, bool holdout, const size_t *slo
         for (long i = 0; i < (long)t->arch.n_blocks; i++) {
             if (made) continue;
             const sdm_pod_block *b = &t->blocks[i];
-            const size_t voxels = voxels_of(b);
+            const size_t voxels = sdm_pod_block_voxels(b);
             if (holdout) {
                 for (size_t r = 0; r < n; r++)
                     for (size_t v = 0; v < voxels; v++)

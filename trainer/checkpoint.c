@@ -32,7 +32,7 @@ static uint64_t fingerprint(const trainer *t)
     uint64_t crc = 0;
     for (size_t b = 0; b < a->n_blocks; b++) {
         const sdm_pod_block *k = &t->blocks[b];
-        basis += (size_t)k->rank * k->size[0] * k->size[1] * k->size[2];
+        basis += k->rank * sdm_pod_block_voxels(k);
         crc = sdm_crc64(crc, &k->rank, sizeof k->rank);
     }
     crc = sdm_crc64(crc, t->mean, a->n_voxels * sizeof *t->mean);

@@ -18,8 +18,6 @@
 #define BASIS_STEP 0.3f // times 1 / sqrt(voxels)
 #define MEAN_STEP 0.05f // mm
 
-static size_t voxels_of(const sdm_pod_block *b) { return (size_t)b->size[0] * b->size[1] * b->size[2]; }
-
 typedef struct refine_batch {
     size_t rows;
     float *x, *z, *dz; // [B][I], [B][L], [B][W]
@@ -58,10 +56,10 @@ static sdm_status batch_create(const trainer *t, size_t rows, refine_batch *b, s
     sdm_status s = SDM_ALLOC(&b->basis_at, a->n_blocks, "batch", err);
     for (size_t i = 0; i < a->n_blocks && !s; i++) {
         const sdm_pod_block *k = &t->blocks[i];
-        if (voxels_of(k) > voxels) voxels = voxels_of(k);
+        if (sdm_pod_block_voxels(k) > voxels) voxels = sdm_pod_block_voxels(k);
         if (k->rank > rank) rank = k->rank;
         b->basis_at[i] = at;
-        at += voxels_of(k) * k->rank;
+        at += sdm_pod_block_voxels(k) * k->rank;
     }
     b->scratch_floats = 2 * rows * voxels + (rank + 1) * voxels;
     if (b->scratch_floats < HEAD_ROWS * a->n_latent) b->scratch_floats = HEAD_ROWS * a->n_latent;
@@ -131,7 +129,7 @@ static float loss_gradient(const sdm_config *c, float predicted, float target, d
 static void train_block(trainer *t, refine_batch *b, size_t i, adam_step adam)
 {
     const sdm_pod_block *k = &t->blocks[i];
-    const size_t voxels = voxels_of(k), rows = b->rows, n_c = t->arch.n_coefficients;
+    const size_t voxels = sdm_pod_block_voxels(k), rows = b->rows, n_c = t->arch.n_coefficients;
     float *predicted = b->scratch + b->scratch_floats * (size_t)thread_number(), *delta = predicted + rows * voxels;
     float *gradient = delta + rows * voxels, *mean_gradient = gradient + k->rank * voxels;
     float *mean = t->refine.w + t->mean_at + k->voxel, *basis = t->refine.w + t->basis_at + b->basis_at[i];
@@ -230,7 +228,7 @@ sdm_status refine_evaluate(trainer *t, const float *w, double *mse, sdm_error *e
 #endif
         for (long i = 0; i < (long)a->n_blocks; i++) {
             const sdm_pod_block *k = &t->blocks[i];
-            const size_t voxels = voxels_of(k);
+            const size_t voxels = sdm_pod_block_voxels(k);
             float *predicted = b.scratch + b.scratch_floats * (size_t)thread_number();
             for (size_t r = 0; r < rows; r++)
                 memcpy(predicted + r * voxels, w + t->mean_at + k->voxel, voxels * sizeof *w);
@@ -267,7 +265,7 @@ static sdm_status solve_block(const trainer *t, const head_problem *p, const sdm
 {
     enum { CHUNK = 1024 };
     const dataset *d = &t->data;
-    const size_t voxels = voxels_of(k), latents = t->arch.n_latent, rank = k->rank;
+    const size_t voxels = sdm_pod_block_voxels(k), latents = t->arch.n_latent, rank = k->rank;
     float *rows = NULL, *y = NULL, *right = NULL;
     double *solution = NULL;
     sdm_status s = SDM_ALLOC(&rows, CHUNK * voxels, "head", err);
@@ -343,7 +341,7 @@ sdm_status refine_start(trainer *t, sdm_error *err)
 {
     const sdm_pod_arch *a = &t->arch;
     size_t basis_count = 0;
-    for (size_t i = 0; i < a->n_blocks; i++) basis_count += voxels_of(&t->blocks[i]) * t->blocks[i].rank;
+    for (size_t i = 0; i < a->n_blocks; i++) basis_count += sdm_pod_block_voxels(&t->blocks[i]) * t->blocks[i].rank;
     t->head_at = mlp_count(a);
     t->mean_at = t->head_at + a->n_coefficients * a->n_latent;
     t->basis_at = t->mean_at + a->n_voxels;

@@ -46,11 +46,17 @@ int64_t trainer_fit_steps(const trainer *t)
     return n > 0 ? n : 1;
 }
 
+// threads that make online samples
+static int worker_count(const trainer *t)
+{
+    if (t->config->data.workers > 0) return t->config->data.workers;
+    return t->n_threads > 1 ? t->n_threads / 2 : 1;
+}
+
 int trainer_threads(const trainer *t)
 {
     if (!t->producer) return t->n_threads;
-    const int workers =
-        t->config->data.workers > 0 ? t->config->data.workers : (t->n_threads > 1 ? t->n_threads / 2 : 1);
+    const int workers = worker_count(t);
     return workers < t->n_threads ? t->n_threads - workers : 1;
 }
 
@@ -318,9 +324,7 @@ static sdm_status start_producer(trainer *t, sdm_error *err)
 {
     const dataset *d = &t->data;
     if (d->n_taken >= d->n_start + d->n_online) return SDM_OK;
-    const int workers =
-        t->config->data.workers > 0 ? t->config->data.workers : (t->n_threads > 1 ? t->n_threads / 2 : 1);
-    return producer_start(&t->data, d->n_taken, workers, &t->producer, err);
+    return producer_start(&t->data, d->n_taken, worker_count(t), &t->producer, err);
 }
 
 // the samples that a resumed run had taken, made again

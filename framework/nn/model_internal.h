@@ -27,10 +27,6 @@ struct sdm_model {
 size_t sdm_pod_mlp_floats(const sdm_pod_arch *a);
 size_t sdm_pod_basis_count(const sdm_pod_block *blocks, size_t n_blocks);
 
-static inline size_t sdm_pod_block_voxels(const sdm_pod_block *b)
-{
-    return (size_t)b->size[0] * b->size[1] * b->size[2];
-}
 static inline size_t sdm_pod_layer_inputs(const sdm_pod_arch *a, size_t layer)
 {
     return layer ? a->width : a->n_inputs;

@@ -282,7 +282,6 @@ static void mistakes(void **state)
     assert_int_equal(sdm_train(&c, capsule, folder, false, NULL, NULL, &e), SDM_E_CONFIG);
     read_config(&c, NULL, 0);
     assert_int_equal(sdm_train(&c, capsule, "/proc/no/such/folder", false, NULL, NULL, &e), SDM_E_IO);
-    read_config(&c, (const char *const[]){"train.learning_rate=1", "train.steps=2000"}, 2);
     assert_false(exists("model.sdm"));
 }
 

@@ -45,6 +45,12 @@ typedef struct sdm_pod_block {
     uint64_t voxel;       /* first of its voxels in block order */
 } sdm_pod_block;
 
+/* Number of voxels V_b of a block. */
+static inline size_t sdm_pod_block_voxels(const sdm_pod_block *b)
+{
+    return (size_t)b->size[0] * b->size[1] * b->size[2];
+}
+
 /* What a pod network is made of, beside its weights. */
 typedef struct sdm_pod_arch {
     size_t n_params, degree, input_degree, depth, width;

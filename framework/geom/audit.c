@@ -20,7 +20,10 @@ static sdm_status check_content(const sdm_mesh *m, sdm_error *err)
     return SDM_OK;
 }
 
-static void measure(const sdm_mesh *m, sdm_audit *a)
+static bool repeats_vertex(const uint32_t *t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
+
+/* Box of the vertices in use. */
+static void find_bounds(const sdm_mesh *m, sdm_audit *a)
 {
     for (int c = 0; c < 3; c++) {
         a->min[c] = INFINITY;
@@ -29,24 +32,22 @@ static void measure(const sdm_mesh *m, sdm_audit *a)
     for (size_t i = 0; i < 3 * m->n_tri; i++) {
         const double *v = &m->vert[3 * (size_t)m->tri[i]];
         for (int c = 0; c < 3; c++) {
-            a->min[c] = fmin(a->min[c], v[c]);
-            a->max[c] = fmax(a->max[c], v[c]);
+            a->min[c] = v[c] < a->min[c] ? v[c] : a->min[c];
+            a->max[c] = v[c] > a->max[c] ? v[c] : a->max[c];
         }
-    }
-    // relative to the middle: a far origin must not cost digits
-    const double mid[3] = {0.5 * (a->min[0] + a->max[0]), 0.5 * (a->min[1] + a->max[1]), 0.5 * (a->min[2] + a->max[2])};
-    for (size_t t = 0; t < m->n_tri; t++) {
-        double p[3][3], ab[3], ac[3], n[3];
-        for (int k = 0; k < 3; k++) v3_sub(&m->vert[3 * (size_t)m->tri[3 * t + (size_t)k]], mid, p[k]);
-        v3_sub(p[1], p[0], ab);
-        v3_sub(p[2], p[0], ac);
-        v3_cross(ab, ac, n);
-        a->volume += v3_dot(p[0], n) / 6;
-        a->area += 0.5 * v3_norm(n);
     }
 }
 
-static bool repeats_vertex(const uint32_t *t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
+static void measure(const sdm_mesh *m, sdm_survey *s)
+{
+    sdm_audit *a = &s->audit;
+    // relative to the middle: a far origin must not cost digits
+    const double mid[3] = {0.5 * (a->min[0] + a->max[0]), 0.5 * (a->min[1] + a->max[1]), 0.5 * (a->min[2] + a->max[2])};
+    sdm_facets_build(m, mid, s->facets, &a->area, &a->volume);
+    for (size_t t = 0; t < m->n_tri; t++)
+        a->degenerate +=
+            repeats_vertex(&s->topo.tri[3 * t]) || !(s->facets[t].height > 4 * DBL_EPSILON * s->facets[t].longest);
+}
 
 static void count_duplicates(const sdm_topology *topo, sdm_audit *a)
 {
@@ -66,6 +67,14 @@ static void count_duplicates(const sdm_topology *topo, sdm_audit *a)
     }
 }
 
+/* Is the volume negative by more than rounding of the coordinates may move it? */
+static bool is_inside_out(const sdm_audit *a)
+{
+    double largest = 0;
+    for (int c = 0; c < 3; c++) largest = fmax(largest, fmax(fabs(a->min[c]), fabs(a->max[c])));
+    return a->volume < -64 * DBL_EPSILON * a->area * largest;
+}
+
 static void count_edges(const sdm_topology *topo, sdm_audit *a)
 {
     bool balanced = true;
@@ -79,7 +88,7 @@ static void count_edges(const sdm_topology *topo, sdm_audit *a)
     }
     a->closed = balanced && topo->n_edges > 0;
     a->manifold = a->closed && !a->nonmanifold_edges;
-    a->inverted = a->closed && a->volume < 0;
+    a->inverted = a->closed && is_inside_out(a);
 }
 
 static sdm_status count_components(const sdm_topology *topo, sdm_audit *a, sdm_error *err)
@@ -96,35 +105,44 @@ static sdm_status count_components(const sdm_topology *topo, sdm_audit *a, sdm_e
     return SDM_OK;
 }
 
-static void build_frames(const sdm_mesh *m, sdm_survey *s)
+/* What is made before contacts are looked for, scratch included: boxes and lists of half the size are usual. */
+static sdm_status take_memory(const sdm_mesh *m, sdm_budget *budget, size_t *scratch, sdm_error *err)
 {
-    for (size_t t = 0; t < m->n_tri; t++) {
-        const uint32_t *v = &m->tri[3 * t];
-        sdm_frame *f = &s->frames[t];
-        sdm_frame_build(&m->vert[3 * (size_t)v[0]], &m->vert[3 * (size_t)v[1]], &m->vert[3 * (size_t)v[2]], f);
-        s->audit.degenerate +=
-            repeats_vertex(&s->topo.tri[3 * t]) || !(sdm_frame_height(f) > 8 * DBL_EPSILON * f->half[0]);
-    }
+    *scratch = 0;
+    size_t bytes = sdm_topology_bytes(m, scratch);
+    bytes += sdm_bvh_bytes(m->n_tri, scratch) + m->n_tri * sizeof(sdm_facet);
+    return sdm_budget_take(budget, bytes + *scratch, err);
 }
 
-sdm_status sdm_survey_build(const sdm_mesh *m, sdm_survey *s, sdm_error *err)
+sdm_status sdm_survey_build(const sdm_mesh *m, sdm_survey *s, sdm_budget *budget, sdm_error *err)
 {
+    size_t scratch = 0;
     sdm_audit *a = &s->audit;
     sdm_status st = check_content(m, err);
+    if (!st) st = take_memory(m, budget, &scratch, err);
     if (!st) st = sdm_topology_build(m, &s->topo, err);
     if (!st) st = sdm_bvh_build(m, &s->tree, err);
-    if (!st) st = SDM_ALLOC(&s->frames, m->n_tri, "frames of triangles", err);
+    if (!st) st = SDM_ALLOC(&s->facets, m->n_tri, "normals of triangles", err);
     if (st) return st;
     a->n_vert = m->n_vert;
     a->n_tri = m->n_tri;
-    measure(m, a);
-    build_frames(m, s);
+    find_bounds(m, a);
+    measure(m, s);
     count_edges(&s->topo, a);
     count_duplicates(&s->topo, a);
     st = count_components(&s->topo, a, err);
-    if (!st) st = sdm_contacts_find(m, &s->topo, &s->tree, s->frames, &s->contacts, err);
+    if (!st) st = sdm_contacts_find(m, &s->topo, &s->tree, s->facets, &s->contacts, budget, err);
+    if (budget) budget->used -= scratch;
     a->self_intersections = s->contacts.crossing_pairs;
     return st;
+}
+
+void sdm_survey_shrink(sdm_survey *s, bool keep_topology)
+{
+    if (!keep_topology) sdm_topology_dispose(&s->topo);
+    sdm_contacts_dispose(&s->contacts);
+    sdm_free(s->facets);
+    s->facets = NULL;
 }
 
 void sdm_survey_dispose(sdm_survey *s)
@@ -132,7 +150,7 @@ void sdm_survey_dispose(sdm_survey *s)
     sdm_topology_dispose(&s->topo);
     sdm_bvh_dispose(&s->tree);
     sdm_contacts_dispose(&s->contacts);
-    sdm_free(s->frames);
+    sdm_free(s->facets);
     *s = (sdm_survey){0};
 }
 
@@ -140,7 +158,7 @@ sdm_status sdm_mesh_audit(const sdm_mesh *m, sdm_audit *out, sdm_error *err)
 {
     if (!m || !out) return sdm_fail(err, SDM_E_ARG, "audit without a mesh or a place for the result");
     sdm_survey s = {0};
-    const sdm_status st = sdm_survey_build(m, &s, err);
+    const sdm_status st = sdm_survey_build(m, &s, NULL, err);
     if (!st) *out = s.audit;
     sdm_survey_dispose(&s);
     return st;

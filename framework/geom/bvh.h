@@ -17,18 +17,15 @@ typedef struct sdm_bvh_node {
 typedef struct sdm_bvh {
     sdm_bvh_node *node;
     uint32_t *order;
-    double (*box)[6]; /* [slot] lo, hi of the triangle */
     size_t n_node, n_tri;
 } sdm_bvh;
 
-/* Binned surface area heuristic, the same tree in every call. *b is zero-initialised; n_tri > 0. */
+/* Bytes that a build takes at most: those that stay; to *scratch is added what is taken in passing. */
+size_t sdm_bvh_bytes(size_t n_tri, size_t *scratch);
+
+/* Splits in the middle of space; the same tree in every call. *b is zero-initialised; n_tri > 0. */
 sdm_status sdm_bvh_build(const sdm_mesh *m, sdm_bvh *b, sdm_error *err);
 void sdm_bvh_dispose(sdm_bvh *b);
-
-/* Calls visit(user, i, j) for every pair of triangles (mesh indices) whose boxes, made larger by `slack`, overlap; stops at the
-   first status that is not SDM_OK and returns it. */
-sdm_status sdm_bvh_pairs(const sdm_bvh *b, double slack, sdm_status (*visit)(void *user, uint32_t i, uint32_t j),
-                         void *user);
 
 /* Squared distance from p to a box. */
 static inline double sdm_bvh_box_distance2(const sdm_bvh_node *n, const double p[3])

@@ -1,25 +1,23 @@
-/* Triangle-triangle intersections of a mesh with itself: pairs from the tree, segments by clipping in the triangle's frame. */
+/* Triangle-triangle intersections of a mesh with itself: pairs that share no vertex from the tree, those that share one from
+   the vertices; segments by clipping in the triangle's frame. */
 #include "contact.h"
 
 #include <float.h>
 #include <string.h>
 
+#include "fan.h"
+#include "pairs.h"
 #include "sdm/memory.h"
 #include "vec3.h"
 
 typedef struct finder {
     const sdm_mesh *mesh;
     const sdm_topology *topo;
-    const sdm_frame *frames;
+    const sdm_facet *facets;
     sdm_contacts *out;
+    sdm_budget *budget;
     sdm_error *err;
 } finder;
-
-double sdm_frame_height(const sdm_frame *f)
-{
-    // 2 area / base: the third corner is (2 half[0] + 2 half[1] e1) in the frame
-    return 2 * f->half[1] * fabs(f->e1y);
-}
 
 void sdm_frame_flatten(const sdm_frame *f, const double x[3], double xy[2])
 {
@@ -50,7 +48,8 @@ static sdm_status add(finder *w, sdm_contact c)
             "triangles of the mesh touch or cross each other more than %zu times: remove its duplicate layers", most);
     if (out->n == out->cap) {
         const size_t cap = out->cap ? 2 * out->cap : 256;
-        const sdm_status s = sdm_grow((void **)&out->list, out->n, cap, sizeof *out->list, "contacts", w->err);
+        sdm_status s = sdm_budget_take(w->budget, (cap - out->cap) * sizeof *out->list, w->err);
+        if (!s) s = sdm_grow((void **)&out->list, out->n, cap, sizeof *out->list, "contacts", w->err);
         if (s) return s;
         out->cap = cap;
     }
@@ -58,26 +57,51 @@ static sdm_status add(finder *w, sdm_contact c)
     return SDM_OK;
 }
 
-/* Distances of the corners of triangle j from the plane of triangle i; what rounding of the coordinates may explain is 0. Returns a
-   mask of the signs that occur: 1 negative, 2 zero, 4 positive. */
-static int plane_distances(const finder *w, uint32_t i, uint32_t j, double d[3], double *moved)
+/* A triangle of a pair. */
+typedef struct side {
+    uint32_t tri;
+    sdm_frame frame;
+    double d[3];  // distances of its corners from the plane of the other; what rounding may explain is 0
+    double moved; // the largest that was made 0
+    int mask;     // signs that occur: 1 negative, 2 zero, 4 positive
+} side;
+
+/* Fills in the distances of s from the plane of `other`. The doubt of that plane grows with the way from its triangle, along the
+   longest edge in its lengths and across in heights. */
+static void plane_distances(const finder *w, side *s, const side *other)
 {
-    const sdm_frame *f = &w->frames[i];
-    const double height = sdm_frame_height(f);
-    int mask = 0;
-    *moved = 0;
+    const sdm_frame *f = &other->frame;
+    const double height = sdm_frame_height(f), per_length = height / (2 * f->half[0]);
+    s->mask = 0;
+    s->moved = 0;
     for (int k = 0; k < 3; k++) {
         double r[3];
-        v3_sub(corner(w, j, k), f->a, r);
-        d[k] = v3_dot(r, f->n);
-        const double reach = fabs(r[0]) + fabs(r[1]) + fabs(r[2]);
-        if (fabs(d[k]) * height <= w->out->tolerance * (height + reach)) {
-            if (fabs(d[k]) > *moved) *moved = fabs(d[k]);
-            d[k] = 0;
+        v3_sub(corner(w, s->tri, k), f->a, r);
+        s->d[k] = v3_dot(r, f->n);
+        const double reach = fabs(v3_dot(r, f->u)) * per_length + fabs(v3_dot(r, f->v)), size = fabs(s->d[k]);
+        if (size * height <= w->out->tolerance * (height + reach)) {
+            s->moved = size > s->moved ? size : s->moved;
+            s->d[k] = 0;
         }
-        mask |= d[k] < 0 ? 1 : d[k] > 0 ? 4 : 2;
+        s->mask |= s->d[k] < 0 ? 1 : s->d[k] > 0 ? 4 : 2;
     }
-    return mask;
+}
+
+/* Does triangle j lie on one side of the plane of i, beyond any doubt? Most pairs end here. */
+static bool clearly_apart(const finder *w, uint32_t i, uint32_t j)
+{
+    const sdm_facet *f = &w->facets[i];
+    const double *a = corner(w, i, 0), tolerance = 4 * w->out->tolerance;
+    int above = 0, below = 0;
+    for (int k = 0; k < 3; k++) {
+        double r[3];
+        v3_sub(corner(w, j, k), a, r);
+        const double d = v3_dot(r, f->n) * f->height;
+        const double doubt = tolerance * (f->height + fabs(r[0]) + fabs(r[1]) + fabs(r[2]));
+        above += d > doubt;
+        below += d < -doubt;
+    }
+    return above == 3 || below == 3;
 }
 
 /* The part of the segment p q that lies on the triangle of frame f (made larger by the tolerance); false when it is not longer
@@ -102,16 +126,17 @@ static bool clip_segment(const sdm_frame *f, double tolerance, double p[2], doub
     return true;
 }
 
-/* Where triangle j, at distances d from the plane of i, meets that plane: two points; false when it touches in one. */
-static bool plane_section(const finder *w, uint32_t j, const double d[3], double p[2][3])
+/* Where triangle s meets the plane of the other: two points; false when it touches in one. */
+static bool plane_section(const finder *w, const side *s, double p[2][3])
 {
+    const double *d = s->d;
     int n = 0;
     for (int k = 0; k < 3 && n < 2; k++)
-        if (d[k] == 0) memcpy(p[n++], corner(w, j, k), sizeof p[0]);
+        if (d[k] == 0) memcpy(p[n++], corner(w, s->tri, k), sizeof p[0]);
     for (int k = 0; k < 3 && n < 2; k++) {
         const int l = (k + 1) % 3;
         if (!((d[k] < 0 && d[l] > 0) || (d[k] > 0 && d[l] < 0))) continue;
-        const double *a = corner(w, j, k), *b = corner(w, j, l);
+        const double *a = corner(w, s->tri, k), *b = corner(w, s->tri, l);
         const double t = d[k] / (d[k] - d[l]);
         for (int c = 0; c < 3; c++) p[n][c] = a[c] + t * (b[c] - a[c]);
         n++;
@@ -119,24 +144,42 @@ static bool plane_section(const finder *w, uint32_t j, const double d[3], double
     return n == 2;
 }
 
-static sdm_status add_section(finder *w, uint32_t i, uint32_t j, const double d[3], bool *met)
+/* Adds what `on` has of the segment in which `other` meets its plane. */
+static sdm_status add_section(finder *w, const side *on, const side *other, bool *met)
 {
     double p[2][3];
-    if (!plane_section(w, j, d, p)) return SDM_OK;
-    sdm_contact c = {.tri = i, .other = j, .kind = SDM_CONTACT_SEGMENT};
-    sdm_frame_flatten(&w->frames[i], p[0], c.p);
-    sdm_frame_flatten(&w->frames[i], p[1], c.q);
-    if (!clip_segment(&w->frames[i], w->out->tolerance, c.p, c.q)) return SDM_OK;
+    if (!plane_section(w, other, p)) return SDM_OK;
+    sdm_contact c = {.tri = on->tri, .other = other->tri, .kind = SDM_CONTACT_TOUCH};
+    if (on->mask == 5 && other->mask == 5) c.kind = SDM_CONTACT_CROSSING;
+    sdm_frame_flatten(&on->frame, p[0], c.p);
+    sdm_frame_flatten(&on->frame, p[1], c.q);
+    if (!clip_segment(&on->frame, w->out->tolerance, c.p, c.q)) return SDM_OK;
     *met = true;
     return add(w, c);
 }
 
-/* True when the coplanar triangle j covers more than a seam of i: some edge separates them otherwise. */
-static bool covers(const finder *w, uint32_t i, uint32_t j)
+/* As both have it: the plane of `other` is in doubt all over `on`, so that no other segment is to be had. */
+static sdm_status add_only_section(finder *w, const side *on, const side *other, bool *met)
 {
-    for (int side = 0; side < 2; side++) {
-        const sdm_frame *f = &w->frames[side ? j : i];
-        const uint32_t other = side ? i : j;
+    sdm_status s = add_section(w, on, other, met);
+    if (s || !*met) return s;
+    sdm_contact c = w->out->list[w->out->n - 1];
+    double x[3];
+    c.tri = other->tri;
+    c.other = on->tri;
+    sdm_frame_lift(&on->frame, c.p, x);
+    sdm_frame_flatten(&other->frame, x, c.p);
+    sdm_frame_lift(&on->frame, c.q, x);
+    sdm_frame_flatten(&other->frame, x, c.q);
+    return add(w, c);
+}
+
+/* True when one of two coplanar triangles covers more than a seam of the other: some edge separates them otherwise. */
+static bool covers(const finder *w, const side *a, const side *b)
+{
+    for (int turn = 0; turn < 2; turn++) {
+        const sdm_frame *f = turn ? &b->frame : &a->frame;
+        const uint32_t other = turn ? a->tri : b->tri;
         double least[3] = {INFINITY, INFINITY, INFINITY};
         for (int k = 0; k < 3; k++) {
             double x[2];
@@ -151,53 +194,69 @@ static bool covers(const finder *w, uint32_t i, uint32_t j)
     return true;
 }
 
-static sdm_status add_coplanar(finder *w, uint32_t i, uint32_t j)
+static sdm_status add_coplanar(finder *w, const side *on, const side *other)
 {
-    const sdm_frame *f = &w->frames[i];
-    sdm_status s = add(w, (sdm_contact){.tri = i, .other = j, .kind = SDM_CONTACT_COPLANAR});
+    sdm_status s = add(w, (sdm_contact){.tri = on->tri, .other = other->tri, .kind = SDM_CONTACT_COPLANAR});
     for (int k = 0; k < 3 && !s; k++) {
-        sdm_contact c = {.tri = i, .other = j, .kind = SDM_CONTACT_SEGMENT};
-        sdm_frame_flatten(f, corner(w, j, k), c.p);
-        sdm_frame_flatten(f, corner(w, j, (k + 1) % 3), c.q);
-        if (clip_segment(f, w->out->tolerance, c.p, c.q)) s = add(w, c);
+        sdm_contact c = {.tri = on->tri, .other = other->tri, .kind = SDM_CONTACT_TOUCH};
+        sdm_frame_flatten(&on->frame, corner(w, other->tri, k), c.p);
+        sdm_frame_flatten(&on->frame, corner(w, other->tri, (k + 1) % 3), c.q);
+        if (clip_segment(&on->frame, w->out->tolerance, c.p, c.q)) s = add(w, c);
     }
     return s;
 }
 
-static sdm_status visit_pair(void *user, uint32_t i, uint32_t j)
+/* Triangles i < j that share so many vertices. */
+static sdm_status meet(finder *w, uint32_t i, uint32_t j, int shared)
 {
-    finder *w = user;
     sdm_contacts *out = w->out;
-    int shared = 0;
-    const uint32_t *a = &w->topo->tri[3 * (size_t)i], *b = &w->topo->tri[3 * (size_t)j];
-    for (int k = 0; k < 3; k++) shared += a[k] == b[0] || a[k] == b[1] || a[k] == b[2];
-    double di[3], dj[3], moved_i, moved_j;
-    const int mask_j = plane_distances(w, i, j, dj, &moved_j);
-    if (mask_j == 1 || mask_j == 4) return SDM_OK;
-    if (shared && (mask_j == 3 || mask_j == 6)) {
+    side a = {.tri = i}, b = {.tri = j};
+    sdm_facet_frame(w->mesh, i, &a.frame);
+    sdm_facet_frame(w->mesh, j, &b.frame);
+    plane_distances(w, &b, &a);
+    if (b.mask == 1 || b.mask == 4) return SDM_OK;
+    if (shared && (b.mask == 3 || b.mask == 6)) {
         // the rest of j lies on one side: i and j meet in what they share unless another corner of j is on the plane as well
-        if ((dj[0] == 0) + (dj[1] == 0) + (dj[2] == 0) == shared) return SDM_OK;
+        if ((b.d[0] == 0) + (b.d[1] == 0) + (b.d[2] == 0) == shared) return SDM_OK;
     }
-    if (!(sdm_frame_height(&w->frames[i]) > out->tolerance) || !(sdm_frame_height(&w->frames[j]) > out->tolerance))
-        return SDM_OK;
-    const int mask_i = plane_distances(w, j, i, di, &moved_i);
-    if (mask_i == 1 || mask_i == 4) return SDM_OK;
+    plane_distances(w, &a, &b);
+    if (a.mask == 1 || a.mask == 4) return SDM_OK;
 
     sdm_status s = SDM_OK;
     bool met = false;
-    if (mask_j == 2 || mask_i == 2) {
-        met = covers(w, i, j);
-        if (met) s = add_coplanar(w, i, j);
-        if (met && !s) s = add_coplanar(w, j, i);
+    if (b.mask == 2 && a.mask == 2) {
+        met = covers(w, &a, &b);
+        if (met) s = add_coplanar(w, &a, &b);
+        if (met && !s) s = add_coplanar(w, &b, &a);
+    } else if (shared < 2 && b.mask == 2) {
+        s = add_only_section(w, &b, &a, &met);
+    } else if (shared < 2 && a.mask == 2) {
+        s = add_only_section(w, &a, &b, &met);
     } else if (shared < 2) {
-        s = add_section(w, i, j, dj, &met);
-        if (!s) s = add_section(w, j, i, di, &met);
+        s = add_section(w, &a, &b, &met);
+        if (!s) s = add_section(w, &b, &a, &met);
     }
     if (met) {
         out->crossing_pairs += !shared;
-        out->error = fmax(out->error, fmax(moved_i, moved_j));
+        out->error = fmax(out->error, fmax(a.moved, b.moved));
     }
     return s;
+}
+
+static bool is_flat(const finder *w, uint32_t t) { return !(w->facets[t].height > w->out->tolerance); }
+
+static sdm_status visit_apart(void *user, uint32_t i, uint32_t j)
+{
+    finder *w = user;
+    if (is_flat(w, i) || is_flat(w, j) || clearly_apart(w, i, j) || clearly_apart(w, j, i)) return SDM_OK;
+    return i < j ? meet(w, i, j, 0) : meet(w, j, i, 0);
+}
+
+static sdm_status visit_neighbours(void *user, uint32_t i, uint32_t j, int shared)
+{
+    finder *w = user;
+    if (is_flat(w, i) || is_flat(w, j)) return SDM_OK;
+    return meet(w, i, j, shared);
 }
 
 static sdm_status sort_contacts(sdm_contacts *c, size_t n_tri, sdm_error *err)
@@ -217,14 +276,19 @@ static sdm_status sort_contacts(sdm_contacts *c, size_t n_tri, sdm_error *err)
     return SDM_OK;
 }
 
-sdm_status sdm_contacts_find(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree, const sdm_frame *frames,
-                             sdm_contacts *c, sdm_error *err)
+sdm_status sdm_contacts_find(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree, const sdm_facet *facets,
+                             sdm_contacts *c, sdm_budget *budget, sdm_error *err)
 {
     double largest = 0;
-    for (size_t i = 0; i < 3 * m->n_vert; i++) largest = fmax(largest, fabs(m->vert[i]));
+    for (size_t i = 0; i < 3 * m->n_vert; i++) largest = fabs(m->vert[i]) > largest ? fabs(m->vert[i]) : largest;
     c->tolerance = 16 * DBL_EPSILON * largest;
-    finder w = {m, topo, frames, c, err};
-    const sdm_status s = sdm_bvh_pairs(tree, c->tolerance, visit_pair, &w);
+    finder w = {m, topo, facets, c, budget, err};
+    sdm_status s = sdm_budget_take(budget, m->n_vert + sdm_pairs_bytes(tree), err);
+    if (!s) s = sdm_fans_visit(m, topo, facets, c->tolerance, visit_neighbours, &w, err);
+    if (!s) s = sdm_pairs_visit(m, topo, tree, c->tolerance, visit_apart, &w, err);
+    if (s) return s;
+    if (budget) budget->used -= m->n_vert + sdm_pairs_bytes(tree);
+    s = sdm_budget_take(budget, (m->n_tri + 1) * sizeof *c->first + c->n * sizeof *c->list, err);
     return s ? s : sort_contacts(c, m->n_tri, err);
 }
 

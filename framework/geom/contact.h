@@ -2,12 +2,14 @@
 #ifndef SDM_GEOM_CONTACT_H
 #define SDM_GEOM_CONTACT_H
 
+#include "budget.h"
 #include "bvh.h"
-#include "point_triangle.h"
+#include "facet.h"
 #include "topology.h"
 
 typedef enum sdm_contact_kind {
-    SDM_CONTACT_SEGMENT, /* `other` meets `tri` along the segment p q */
+    SDM_CONTACT_CROSSING, /* `other` and `tri` pass through each other along the segment p q, no corner on the other's plane */
+    SDM_CONTACT_TOUCH,   /* as before, but some corner lies on the other's plane */
     SDM_CONTACT_COPLANAR /* `other` lies on `tri` and covers a part of it; no segment */
 } sdm_contact_kind;
 
@@ -28,13 +30,10 @@ typedef struct sdm_contacts {
     double error;          /* largest distance by which a vertex was moved onto a plane */
 } sdm_contacts;
 
-/* frames[n_tri]; triangles whose frame is flat or not higher than the tolerance meet nothing. *c is zero-initialised. */
-sdm_status sdm_contacts_find(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree, const sdm_frame *frames,
-                             sdm_contacts *c, sdm_error *err);
+/* facets[n_tri]; triangles that are not higher than the tolerance meet nothing. *c is zero-initialised; budget may be NULL. */
+sdm_status sdm_contacts_find(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree, const sdm_facet *facets,
+                             sdm_contacts *c, sdm_budget *budget, sdm_error *err);
 void sdm_contacts_dispose(sdm_contacts *c);
-
-/* Height of a triangle over its longest edge. */
-double sdm_frame_height(const sdm_frame *f);
 
 /* Position of x in the frame's plane, and back. */
 void sdm_frame_flatten(const sdm_frame *f, const double x[3], double xy[2]);

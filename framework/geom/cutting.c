@@ -153,7 +153,7 @@ static sdm_status start(sdm_cutter *w, const sdm_corner corner[3], const sdm_con
     memcpy(w->corner, corner, 3 * sizeof *corner);
     size_t m = 0;
     for (size_t i = 0; i < n; i++) {
-        if (contacts[i].kind != SDM_CONTACT_SEGMENT) continue;
+        if (contacts[i].kind == SDM_CONTACT_COPLANAR) continue;
         memcpy(w->segment[m], contacts[i].p, 2 * sizeof(double));
         memcpy(w->segment[m++] + 2, contacts[i].q, 2 * sizeof(double));
     }

@@ -5,24 +5,24 @@
 #include <string.h>
 #include <time.h>
 
-#include "crossings.h"
 #include "grid_distance.h"
-#include "pseudonormal.h"
+#include "layers.h"
+#include "parts.h"
 #include "sdm/memory.h"
+#include "sign.h"
 #include "survey.h"
 #include "union_hull.h"
 #include "vec3.h"
-#include "winding.h"
 
 struct sdm_exact {
     sdm_exact_opts opts;
     sdm_exact_report report;
     sdm_mesh solid;      // the mesh as given, turned if it was inside out: the sign comes from it
     sdm_mesh surface;    // what distances are measured to
+    uint32_t *source;    // [surface.n_tri] triangle of the given mesh
     sdm_survey survey;   // of solid
     sdm_nearest nearest; // of surface
-    sdm_winding winding;
-    sdm_pseudonormals normals;
+    sdm_sign sign;
     double rounding; // size of a rounding error of the coordinates
 };
 
@@ -39,99 +39,92 @@ static double now_ms(void)
     return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
 }
 
-static sdm_status choose_sign(sdm_exact *e, sdm_error *err)
-{
-    const sdm_audit *a = &e->report.audit;
-    sdm_sign_method m = e->opts.sign;
-    if (m == SDM_SIGN_AUTO) m = a->closed ? SDM_SIGN_CROSSINGS : SDM_SIGN_WINDING;
-    if (m == SDM_SIGN_CROSSINGS && !a->closed)
-        return sdm_fail(err, SDM_E_ARG,
-                        "sign method crossings needs a closed mesh, this one has %zu boundary edges and %zu edges with "
-                        "triangles of mixed orientation; use winding",
-                        a->boundary_edges, a->misoriented_edges);
-    if (m == SDM_SIGN_PSEUDONORMAL && (!a->manifold || a->self_intersections))
-        return sdm_fail(
-            err, SDM_E_ARG,
-            "sign method pseudonormal needs a manifold mesh without overlap, this one has %zu boundary, %zu "
-            "non-manifold and %zu misoriented edges and %zu intersecting pairs of triangles; use auto",
-            a->boundary_edges, a->nonmanifold_edges, a->misoriented_edges, a->self_intersections);
-    if (m != SDM_SIGN_CROSSINGS && m != SDM_SIGN_PSEUDONORMAL && m != SDM_SIGN_WINDING)
-        return sdm_fail(err, SDM_E_ARG, "unknown sign method %d", (int)m);
-    e->report.sign = m;
-    return SDM_OK;
-}
+static size_t mesh_bytes(const sdm_mesh *m) { return m->n_vert * 3 * sizeof *m->vert + m->n_tri * 3 * sizeof *m->tri; }
 
-static sdm_status survey_solid(sdm_exact *e, sdm_error *err)
+static sdm_status survey_solid(sdm_exact *e, sdm_budget *budget, sdm_error *err)
 {
-    sdm_status s = sdm_survey_build(&e->solid, &e->survey, err);
+    const size_t used = budget->used;
+    sdm_status s = sdm_survey_build(&e->solid, &e->survey, budget, err);
     if (s) return s;
     e->report.audit = e->survey.audit;
-    if (!e->survey.audit.inverted) return SDM_OK;
-    // inside out: turn every triangle; the report keeps what was found
-    for (size_t t = 0; t < e->solid.n_tri; t++) {
-        const uint32_t v = e->solid.tri[3 * t + 1];
-        e->solid.tri[3 * t + 1] = e->solid.tri[3 * t + 2];
-        e->solid.tri[3 * t + 2] = v;
+    if (e->survey.audit.inverted) {
+        // inside out: turn every triangle; the report keeps what was found
+        for (size_t t = 0; t < e->solid.n_tri; t++) {
+            const uint32_t v = e->solid.tri[3 * t + 1];
+            e->solid.tri[3 * t + 1] = e->solid.tri[3 * t + 2];
+            e->solid.tri[3 * t + 2] = v;
+        }
+        e->report.turned = true;
+        sdm_survey_dispose(&e->survey);
+        budget->used = used;
+        s = sdm_survey_build(&e->solid, &e->survey, budget, err);
     }
+    if (!s) s = sdm_parts_turn(&e->solid, &e->survey, &e->report.parts_turned, err);
+    if (s || !e->report.parts_turned) return s;
     sdm_survey_dispose(&e->survey);
-    e->report.turned = true;
-    return sdm_survey_build(&e->solid, &e->survey, err);
+    budget->used = used;
+    return sdm_survey_build(&e->solid, &e->survey, budget, err);
 }
 
-static sdm_status make_surface(sdm_exact *e, sdm_error *err)
+static sdm_status make_surface(sdm_exact *e, sdm_budget *budget, sdm_error *err)
 {
+    const size_t used = budget->used;
     bool changed = false;
     if (e->survey.audit.closed && !e->opts.keep_overlap) {
-        const sdm_status s =
-            sdm_union_hull(&e->solid, &e->survey, &e->surface, &changed, &e->report.union_error_mm, err);
+        const sdm_status s = sdm_union_hull(&e->solid, &e->survey, &e->surface, &e->source, &changed,
+                                            &e->report.union_error_mm, budget, err);
         if (s) return s;
         // sheets that cancel everywhere enclose nothing: distances are to the sheets
         if (changed && !e->surface.n_tri) changed = false;
     }
     e->report.unioned = changed;
-    if (!changed) {
-        e->report.union_error_mm = 0;
-        return sdm_mesh_copy(&e->solid, &e->surface, err);
-    }
-    return SDM_OK;
+    if (changed) return SDM_OK;
+    e->report.union_error_mm = 0;
+    sdm_free(e->source);
+    sdm_mesh_dispose(&e->surface);
+    budget->used = used;
+    sdm_status s = sdm_budget_take(budget, mesh_bytes(&e->solid) + e->solid.n_tri * sizeof *e->source, err);
+    if (!s) s = SDM_ALLOC(&e->source, e->solid.n_tri, "sources of triangles", err);
+    for (size_t t = 0; t < e->solid.n_tri && !s; t++) e->source[t] = (uint32_t)t;
+    return s ? s : sdm_mesh_copy(&e->solid, &e->surface, err);
 }
 
-static sdm_status build_nearest(sdm_exact *e, sdm_error *err)
+/* The tree and the data of the surface, which nothing but the tree of the solid stays beside. */
+static sdm_status build_nearest(sdm_exact *e, sdm_budget *budget, sdm_error *err)
 {
-    if (!e->report.unioned) return sdm_nearest_build(&e->surface, &e->survey.topo, &e->nearest, err);
+    const sdm_mesh *m = &e->surface;
+    const bool keep_topology = !e->report.unioned || e->report.sign != SDM_SIGN_CROSSINGS;
+    sdm_survey_shrink(&e->survey, keep_topology);
+    budget->used = 0;
+    size_t scratch = 0, bytes = mesh_bytes(&e->solid) + mesh_bytes(m) + m->n_tri * sizeof *e->source;
+    bytes += e->survey.tree.n_node * sizeof(sdm_bvh_node) + e->solid.n_tri * sizeof(uint32_t);
+    if (keep_topology) bytes += sdm_topology_bytes(&e->solid, &(size_t){0});
+    if (e->report.unioned) bytes += sdm_topology_bytes(m, &scratch);
+    bytes += sdm_bvh_bytes(m->n_tri, &scratch) + m->n_tri * sizeof(sdm_frame);
+    bytes += sdm_features_bytes(m->n_tri, m->n_vert, &scratch);
+    sdm_status s = sdm_budget_take(budget, bytes + scratch, err);
+    if (s || !e->report.unioned) return s ? s : sdm_nearest_build(m, &e->survey.topo, &e->nearest, err);
     sdm_topology topo = {0};
-    sdm_status s = sdm_topology_build(&e->surface, &topo, err);
-    if (!s) s = sdm_nearest_build(&e->surface, &topo, &e->nearest, err);
+    s = sdm_topology_build(m, &topo, err);
+    if (!s) s = sdm_nearest_build(m, &topo, &e->nearest, err);
     sdm_topology_dispose(&topo);
     return s;
 }
 
-/* Bytes that preparing a mesh takes, from above but for the contacts of triangles that meet. */
-static size_t bytes_needed(const sdm_mesh *m)
-{
-    return m->n_vert * (2 * 3 * sizeof(double) + 64) +
-           m->n_tri * (6 * sizeof(uint32_t) + 3 * sizeof(sdm_edge) + 16 * sizeof(uint32_t) + 3 * sizeof(sdm_bvh_node) +
-                       4 * sizeof(double[6]) + 2 * sizeof(sdm_frame) + sizeof(sdm_lane_triangle));
-}
-
 static sdm_status prepare(sdm_exact *e, const sdm_mesh *mesh, sdm_error *err)
 {
-    const size_t need = bytes_needed(mesh);
-    if (e->opts.memory_limit && need > e->opts.memory_limit)
-        return sdm_fail(err, SDM_E_NOMEM, "the mesh of %zu triangles needs about %zu bytes, memory_limit is %zu",
-                        mesh->n_tri, need, e->opts.memory_limit);
-    sdm_status s = sdm_mesh_copy(mesh, &e->solid, err);
-    if (!s) s = survey_solid(e, err);
-    if (!s) s = choose_sign(e, err);
-    if (!s) s = make_surface(e, err);
+    sdm_budget budget = {.limit = e->opts.memory_limit, .n_tri = mesh->n_tri};
+    sdm_status s = sdm_budget_take(&budget, mesh_bytes(mesh), err);
+    if (!s) s = sdm_mesh_copy(mesh, &e->solid, err);
+    if (!s) s = survey_solid(e, &budget, err);
+    if (!s) s = sdm_sign_choose(&e->report.audit, e->opts.sign, &e->report.sign, err);
+    if (!s) s = make_surface(e, &budget, err);
     if (!s && e->report.sign == SDM_SIGN_PSEUDONORMAL && e->report.unioned)
         s = sdm_fail(
             err, SDM_E_ARG,
             "sign method pseudonormal needs a mesh without surface inside the solid, this one has some; use auto");
-    if (!s) s = build_nearest(e, err);
-    if (!s && e->report.sign == SDM_SIGN_WINDING) s = sdm_winding_build(&e->solid, &e->survey.tree, &e->winding, err);
-    if (!s && e->report.sign == SDM_SIGN_PSEUDONORMAL)
-        s = sdm_pseudonormals_build(&e->surface, &e->survey.topo, &e->normals, err);
+    if (!s) s = build_nearest(e, &budget, err);
+    if (!s) s = sdm_sign_build(&e->solid, &e->survey, &e->nearest, e->report.sign, &e->sign, err);
     if (s) return s;
     double largest = 0;
     for (int a = 0; a < 3; a++)
@@ -165,30 +158,16 @@ void sdm_exact_free(sdm_exact *e)
     if (!e) return;
     sdm_mesh_dispose(&e->solid);
     sdm_mesh_dispose(&e->surface);
+    sdm_free(e->source);
     sdm_survey_dispose(&e->survey);
     sdm_nearest_dispose(&e->nearest);
-    sdm_winding_dispose(&e->winding);
-    sdm_pseudonormals_dispose(&e->normals);
+    sdm_sign_dispose(&e->sign);
     sdm_free(e);
 }
 
 const sdm_exact_report *sdm_exact_get_report(const sdm_exact *e) { return &e->report; }
 const sdm_mesh *sdm_exact_surface(const sdm_exact *e) { return &e->surface; }
-
-/* Is x inside? slot, q, feature: its nearest point. */
-static bool inside(const sdm_exact *e, const double x[3], uint32_t slot, const double q[3], int feature)
-{
-    double r[3];
-    switch (e->report.sign) {
-    case SDM_SIGN_WINDING:
-        return sdm_winding_inside(&e->winding, x);
-    case SDM_SIGN_PSEUDONORMAL:
-        v3_sub(x, q, r);
-        return v3_dot(r, sdm_pseudonormal(&e->normals, &e->survey.topo, e->nearest.tree.order[slot], feature)) < 0;
-    default:
-        return sdm_ray_winding(&e->solid, &e->survey.tree, x, 0, 1, NULL, 0) >= 1;
-    }
-}
+const uint32_t *sdm_exact_source(const sdm_exact *e) { return e->source; }
 
 double sdm_exact_point(const sdm_exact *e, const double x[3], double closest[3], double normal[3], uint32_t *triangle)
 {
@@ -197,9 +176,12 @@ double sdm_exact_point(const sdm_exact *e, const double x[3], double closest[3],
     double q[3] = {NAN, NAN, NAN}, n[3] = {NAN, NAN, NAN};
     double d = NAN;
     if (isfinite(x[0]) && isfinite(x[1]) && isfinite(x[2])) {
-        d = sqrt(sdm_nearest_find(&e->nearest, x, INFINITY, &slot, q, &feature));
-        if (inside(e, x, slot, q, feature)) d = -d;
-        for (int i = 0; i < 3; i++) n[i] = fabs(d) > e->rounding ? (x[i] - q[i]) / d : e->nearest.frames[slot].n[i];
+        (void)sdm_nearest_find(&e->nearest, x, INFINITY, &slot, q, &feature);
+        const bool inside = sdm_sign_inside(&e->sign, x, slot, q, feature);
+        d = sqrt(sdm_nearest_feature(&e->nearest, x, &slot));
+        if (inside) d = -d;
+        (void)sdm_frame_closest(&e->nearest.frames[slot], x, q, &feature);
+        sdm_distance_gradient(&e->nearest, e->rounding, slot, x, q, d, n);
     }
     if (closest) memcpy(closest, q, sizeof q);
     if (normal) memcpy(normal, n, sizeof n);
@@ -207,47 +189,98 @@ double sdm_exact_point(const sdm_exact *e, const double x[3], double closest[3],
     return d;
 }
 
-/* Signs of one row of voxels by asking for every point. */
-static void sign_by_points(const sdm_exact *e, const sdm_grid *g, int64_t j, int64_t k, float *values)
+/* The map, and the slot of the nearest triangle of every voxel where slot is not NULL. */
+static sdm_status fill_map(const sdm_exact *e, const sdm_grid *grid, double band_mm, float *values, uint32_t *slot,
+                           sdm_error *err)
 {
-    for (int64_t i = 0; i < g->n[0]; i++) {
-        const double index[3] = {(double)i, (double)j, (double)k};
-        double x[3], q[3] = {0, 0, 0};
-        uint32_t slot = 0;
-        int feature = SDM_FACE;
-        sdm_grid_world(g, index, x);
-        if (e->report.sign == SDM_SIGN_PSEUDONORMAL)
-            (void)sdm_nearest_find(&e->nearest, x, INFINITY, &slot, q, &feature);
-        if (inside(e, x, slot, q, feature)) values[i] = -values[i];
-    }
-}
-
-static sdm_status set_signs(const sdm_exact *e, const sdm_grid *g, float *values, sdm_error *err)
-{
-    const int n_threads = sdm_thread_count(e->opts.n_threads);
-    (void)n_threads; // without OpenMP
-    const int64_t n_rows = g->n[1] * g->n[2];
-    if (e->report.sign != SDM_SIGN_CROSSINGS) {
-#pragma omp parallel for schedule(dynamic) num_threads(n_threads)
-        for (int64_t r = 0; r < n_rows; r++) sign_by_points(e, g, r % g->n[1], r / g->n[1], values + r * g->n[0]);
-        return SDM_OK;
-    }
-    sdm_rows rows = {0};
-    int32_t *change = NULL;
-    sdm_status s = sdm_rows_build(&e->solid, g, &rows, err);
-    if (!s) s = SDM_ALLOC(&change, (size_t)g->n[0], "row of crossings", err);
-    if (!s)
-        for (int64_t r = 0; r < n_rows; r++) sdm_rows_apply(&rows, (size_t)r, g->n[0], change, values + r * g->n[0]);
-    sdm_free(change);
-    sdm_rows_dispose(&rows);
-    return s;
+    sdm_status s = sdm_grid_check(grid, err);
+    if (!s) s = sdm_grid_distance(&e->nearest, grid, &e->opts, band_mm, values, slot, err);
+    return s ? s : sdm_sign_map(&e->sign, grid, &e->opts, values, err);
 }
 
 sdm_status sdm_exact_map(const sdm_exact *e, const sdm_grid *grid, float *values, sdm_error *err)
 {
     if (!e || !grid || !values)
         return sdm_fail(err, SDM_E_ARG, "map without an engine, a grid or a place for the values");
+    return fill_map(e, grid, INFINITY, values, NULL, err);
+}
+
+sdm_status sdm_exact_sign(const sdm_exact *e, const sdm_grid *grid, float *values, sdm_error *err)
+{
+    if (!e || !grid || !values) return sdm_fail(err, SDM_E_ARG, "signs without an engine, a grid or distances");
+    const sdm_status s = sdm_grid_check(grid, err);
+    return s ? s : sdm_sign_map(&e->sign, grid, &e->opts, values, err);
+}
+
+sdm_status sdm_exact_certify(const sdm_exact *e, const sdm_grid *grid, const float *values, sdm_sign_certificate *out,
+                             sdm_error *err)
+{
+    if (!e || !grid || !values || !out)
+        return sdm_fail(err, SDM_E_ARG, "certificate without an engine, a grid, a map or a place for the result");
+    const sdm_status s = sdm_grid_check(grid, err);
+    if (s) return s;
+    double largest = 0;
+    for (int corner = 0; corner < 8; corner++) {
+        double index[3], x[3];
+        for (int a = 0; a < 3; a++) index[a] = corner >> a & 1 ? (double)(grid->n[a] - 1) : 0;
+        sdm_grid_world(grid, index, x);
+        for (int a = 0; a < 3; a++) largest = fmax(largest, fabs(x[a]));
+    }
+    // roundings of the mesh's coordinates and of the voxels'
+    return sdm_sign_certify(&e->sign, grid, &e->opts, 4 * e->rounding + 16 * DBL_EPSILON * largest, values, out, err);
+}
+
+/* Layers and derivatives: the job says which. Values that nobody wants are needed all the same, for the signs. */
+static sdm_status map_with_layers(const sdm_exact *e, const sdm_grid *grid, sdm_layers_job *job, sdm_error *err)
+{
     sdm_status s = sdm_grid_check(grid, err);
-    if (!s) s = sdm_grid_distance(&e->nearest, grid, &e->opts, values, err);
-    return s ? s : set_signs(e, grid, values, err);
+    if (s) return s;
+    const double band = job->out->band_mm;
+    if (!(band >= 0))
+        return sdm_fail(err, SDM_E_ARG, "narrow band of %g mm, need a positive width or 0 for the whole map", band);
+    const bool layers = sdm_layers_wanted(job);
+    const size_t n_value = job->out->values ? 0 : sdm_grid_count(grid), limit = e->opts.memory_limit;
+    const size_t n_slot = layers ? sdm_grid_count(grid) : 0, n_frame = job->derivative ? e->solid.n_tri : 0;
+    float *own = NULL;
+    uint32_t *slot = NULL;
+    sdm_frame *frames = NULL;
+    const size_t need = n_value * sizeof *own + n_slot * sizeof *slot + n_frame * sizeof *frames;
+    if (limit && need > limit)
+        return sdm_fail(err, SDM_E_NOMEM, "layers of the map need %zu bytes, memory_limit is %zu", need, limit);
+    s = SDM_ALLOC(&own, n_value, "distance map", err);
+    if (!s) s = SDM_ALLOC(&slot, n_slot, "nearest triangles", err);
+    if (!s) s = SDM_ALLOC(&frames, n_frame, "frames of triangles", err);
+    float *values = n_value ? own : job->out->values;
+    if (!s) s = fill_map(e, grid, band > 0 ? band : INFINITY, values, layers ? slot : NULL, err);
+    if (!s && n_frame) sdm_sheets_frames(&e->solid, sdm_thread_count(e->opts.n_threads), frames);
+    const double seam = e->report.unioned ? 2 * e->report.union_error_mm : 0;
+    job->sheets = (sdm_sheets){&e->nearest, &e->solid, frames, e->source, seam};
+    job->rounding = e->rounding;
+    job->opts = &e->opts;
+    job->values = values;
+    job->slot = slot;
+    if (!s && layers) s = sdm_layers_fill(job, grid, err);
+    sdm_free(frames);
+    sdm_free(slot);
+    sdm_free(own);
+    return s;
+}
+
+sdm_status sdm_exact_map_layers(const sdm_exact *e, const sdm_grid *grid, const sdm_exact_layers *layers,
+                                sdm_error *err)
+{
+    if (!e || !grid || !layers) return sdm_fail(err, SDM_E_ARG, "map without an engine, a grid or layers to fill");
+    return map_with_layers(e, grid, &(sdm_layers_job){.out = layers}, err);
+}
+
+sdm_status sdm_exact_map_derivative(const sdm_exact *e, const sdm_grid *grid, const double *velocity, size_t n,
+                                    const sdm_exact_layers *layers, float *derivative, sdm_error *err)
+{
+    if (!e || !grid || !velocity || !n || !derivative)
+        return sdm_fail(err, SDM_E_ARG, "derivative without an engine, a grid, velocities or a place for the result");
+    sdm_layers_job job = {.out = layers ? layers : &(sdm_exact_layers){0},
+                          .velocity = velocity,
+                          .n_velocity = n,
+                          .derivative = derivative};
+    return map_with_layers(e, grid, &job, err);
 }

@@ -2,6 +2,7 @@
 #include "grid_distance.h"
 
 #include <math.h>
+#include <stdatomic.h>
 #include <string.h>
 #ifdef _OPENMP
 #include <omp.h>
@@ -55,158 +56,144 @@ int sdm_thread_count(int n_threads)
 #endif
 }
 
-static size_t bytes_of(size_t cap)
-{
-    return cap * (sizeof(sdm_candidate) + 9 * sizeof(float[8]) + 18 * sizeof(uint32_t));
-}
-
-sdm_status sdm_grid_scratch_reserve(sdm_grid_scratch *s, size_t cap, size_t limit, sdm_error *err)
-{
-    if (cap <= s->cap) return SDM_OK;
-    if (limit && bytes_of(cap) > limit)
-        return sdm_fail(err, SDM_E_NOMEM,
-                        "a block of the map needs %zu bytes of scratch, the limit is %zu a thread; raise memory_limit",
-                        bytes_of(cap), limit);
-    sdm_status st = sdm_grow((void **)&s->candidate, s->cap, cap, sizeof *s->candidate, "candidates", err);
-    if (!st) st = sdm_grow((void **)&s->corner, s->cap, cap, sizeof *s->corner, "candidates", err);
-    if (!st) st = sdm_grow((void **)&s->slot, s->cap, cap, sizeof *s->slot, "candidates", err);
-    if (!st) st = sdm_grow((void **)&s->alive, s->cap, cap, sizeof *s->alive, "candidates", err);
-    for (int c = 0; c < 8 && !st; c++)
-        st = sdm_grow((void **)&s->list[c], s->cap, cap, sizeof *s->list[c], "candidates", err);
-    for (int c = 0; c < 8 && !st; c++)
-        st = sdm_grow((void **)&s->tile_corner[c], s->cap, cap, sizeof *s->tile_corner[c], "candidates", err);
-    for (int k = 0; k < SDM_KINDS && !st; k++)
-        st = sdm_grow((void **)&s->kind[k], s->cap, cap, sizeof *s->kind[k], "candidates", err);
-    if (!st && !s->distance) st = SDM_ALLOC(&s->distance, SDM_GRID_CHUNK, "distances of a tile", err);
-    if (!st) s->cap = cap;
-    return st;
-}
-
-void sdm_grid_scratch_dispose(sdm_grid_scratch *s)
-{
-    sdm_free(s->candidate);
-    sdm_free(s->corner);
-    sdm_free(s->distance);
-    sdm_free(s->slot);
-    sdm_free(s->alive);
-    for (int c = 0; c < 8; c++) {
-        sdm_free(s->list[c]);
-        sdm_free(s->tile_corner[c]);
-    }
-    for (int k = 0; k < SDM_KINDS; k++) sdm_free(s->kind[k]);
-    sdm_free(s->corner_seen);
-    sdm_free(s->edge_seen);
-    *s = (sdm_grid_scratch){0};
-}
-
-/* The tile of 64 voxels that is smallest in space, counting voxels outside a thin grid as lost. */
-static void choose_tile(sdm_grid_job *job)
-{
-    double least = INFINITY;
-    for (int64_t x = 1; x <= 64; x *= 2) {
-        for (int64_t y = 1; x * y <= 64; y *= 2) {
-            const int64_t tile[3] = {x, y, 64 / (x * y)};
-            double used = 1, size = 0;
-            for (int a = 0; a < 3; a++) {
-                const double n = (double)(tile[a] < job->n[a] ? tile[a] : job->n[a]);
-                double step = 0;
-                for (int c = 0; c < 3; c++) step += job->step[a][c] * job->step[a][c];
-                used *= n;
-                size += (n - 1) * (n - 1) * step;
-            }
-            const double cost = (size + 1e-300) * (64 / used) * (64 / used);
-            if (!(cost < least)) continue;
-            least = cost;
-            memcpy(job->tile, tile, sizeof tile);
-        }
-    }
-}
-
 /* Position of voxel `at` (may be fractional) relative to voxel (0, 0, 0). */
 static void offset(const sdm_grid_job *job, const double at[3], double out[3])
 {
     for (int c = 0; c < 3; c++) out[c] = at[0] * job->step[0][c] + at[1] * job->step[1][c] + at[2] * job->step[2][c];
 }
 
-/* Corners of a box of voxel middles, relative to its middle, scaled. */
-static void corners(const sdm_grid_job *job, const int64_t size[3], sdm_points *out)
+static double step_length(const sdm_grid_job *job, int a)
 {
+    const double *d = job->step[a];
+    return sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+}
+
+/* Doubles a box along the axis where it is shortest, first along axes where the grid goes on; returns the axis. */
+static int double_box(const sdm_grid_job *job, int64_t size[3])
+{
+    int best = -1;
+    for (int a = 0; a < 3; a++) {
+        if (size[a] >= job->n[a]) continue;
+        if (best < 0 || (double)size[a] * step_length(job, a) < (double)size[best] * step_length(job, best)) best = a;
+    }
+    if (best < 0) best = 0;
+    size[best] *= 2;
+    return best;
+}
+
+/* Eight parts of `size` voxels, doubled along the axes `along` to `whole`. */
+static void set_parts(const sdm_grid_job *job, const int64_t size[3], const int along[3], const int64_t whole[3],
+                      sdm_grid_parts *q)
+{
+    const double scale = job->features->scale;
+    double radius = 0;
+    for (int a = 0; a < 3; a++) {
+        const double half = 0.5 * (double)(size[a] - 1), length = half * step_length(job, a);
+        q->size[a] = size[a];
+        q->half[a] = (float)(length * scale);
+        for (int c = 0; c < 3; c++) q->axis[a][c] = (float)(half * job->step[a][c] * scale);
+        radius += length * length;
+    }
+    // axes are orthogonal to 1e-6
+    q->radius = (float)(sqrt(radius) * scale * (1 + 1e-5));
+    for (int i = 0; i < 8; i++) {
+        int64_t now[3] = {size[0], size[1], size[2]};
+        double at[3];
+        memset(q->first[i], 0, sizeof q->first[i]);
+        for (int b = 0; b < 3; b++) {
+            if (i >> b & 1) q->first[i][along[b]] += now[along[b]];
+            now[along[b]] *= 2;
+        }
+        for (int a = 0; a < 3; a++) at[a] = (double)q->first[i][a] + 0.5 * (double)(size[a] - whole[a]);
+        offset(job, at, q->middle_mm[i]);
+        for (int c = 0; c < 3; c++) q->middle.x[c][i] = (float)(q->middle_mm[i][c] * scale);
+    }
+}
+
+/* Bound on the error of a linear function at a part's middle: 25 roundings of the largest coordinates, doubled generously. */
+static float error_bound(const sdm_grid_job *job)
+{
+    double reach = 0;
     for (int k = 0; k < 8; k++) {
-        double at[3], x[3];
-        for (int a = 0; a < 3; a++) at[a] = (k >> a & 1 ? 0.5 : -0.5) * (double)(size[a] - 1);
+        double at[3], x[3], d = 0;
+        for (int a = 0; a < 3; a++) at[a] = (double)((k >> a & 1) * job->n_box[a] * job->box[a]);
         offset(job, at, x);
-        for (int c = 0; c < 3; c++) out->x[c][k] = (float)(x[c] * job->surface->scale);
+        for (int c = 0; c < 3; c++) {
+            const double r = job->origin[c] + x[c] - job->features->centre[c];
+            d += r * r;
+        }
+        reach = fmax(reach, sqrt(d));
+    }
+    return (float)(2e-6 * (reach + job->features->radius) * job->features->scale);
+}
+
+static void set_voxels(sdm_grid_job *job, const sdm_grid_parts *in_vector)
+{
+    const int64_t *tile = job->part[SDM_TO_TILES].size;
+    for (int v = 0; v < 8; v++) {
+        for (int i = 0; i < 8; i++) {
+            const int64_t *p = job->part[SDM_TO_VECTORS].first[v], *q = in_vector->first[i];
+            const int64_t index = ((p[2] + q[2]) * tile[1] + p[1] + q[1]) * tile[0] + p[0] + q[0];
+            double at[3], x[3];
+            for (int a = 0; a < 3; a++) at[a] = (double)(p[a] + q[a]) - 0.5 * (double)(tile[a] - 1);
+            offset(job, at, x);
+            job->voxel_in_tile[v][i] = (uint8_t)index;
+            for (int c = 0; c < 3; c++) {
+                job->tile_voxel[c][index] = x[c];
+                job->voxel[v].x[c][i] = (float)(x[c] * job->features->scale);
+            }
+        }
     }
 }
 
 static void fill_tables(sdm_grid_job *job)
 {
-    const double scale = job->surface->scale;
-    int64_t tiles[3];
-    double x[3];
+    // of a voxel, a vector, a tile, a block, a box
+    int64_t size[SDM_GRID_STEPS + 2][3] = {{1, 1, 1}};
+    int along[SDM_GRID_STEPS + 1][3];
+    for (int i = 0; i <= SDM_GRID_STEPS; i++) {
+        memcpy(size[i + 1], size[i], sizeof size[i]);
+        for (int b = 0; b < 3; b++) along[i][b] = double_box(job, size[i + 1]);
+    }
+    for (int i = 0; i < SDM_GRID_STEPS; i++) {
+        const int k = SDM_GRID_STEPS - i;
+        set_parts(job, size[k], along[k], size[k + 1], &job->part[i]);
+    }
+    sdm_grid_parts in_vector;
+    set_parts(job, size[0], along[0], size[1], &in_vector);
+    set_voxels(job, &in_vector);
+    job->aligned = true;
     for (int a = 0; a < 3; a++) {
-        tiles[a] = job->n[a] > job->tile[a] ? 2 : 1;
-        job->block[a] = tiles[a] * job->tile[a];
-        job->n_block[a] = (job->n[a] + job->block[a] - 1) / job->block[a];
+        job->box[a] = size[SDM_GRID_STEPS + 1][a];
+        job->n_box[a] = (job->n[a] + job->box[a] - 1) / job->box[a];
+        for (int c = 0; c < 3; c++) job->aligned &= c == a || job->step[a][c] == 0;
     }
-    corners(job, job->block, &job->block_corner);
-    corners(job, job->tile, &job->tile_corner);
-    job->block_radius = 0;
-    double tile_edges = 0;
-    for (int a = 0; a < 3; a++) {
-        const double *d = job->step[a], step = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-        job->block_radius += 0.5 * (double)(job->block[a] - 1) * step;
-        tile_edges += (double)(job->tile[a] - 1) * step;
-    }
-    job->small_tiles = tile_edges < 2 * job->surface->longest;
-    for (int64_t z = 0; z < tiles[2]; z++) {
-        for (int64_t y = 0; y < tiles[1]; y++) {
-            for (int64_t t = 0; t < tiles[0]; t++) {
-                const int64_t tile[3] = {t, y, z};
-                const int c = job->n_child++;
-                double at[3];
-                for (int a = 0; a < 3; a++) {
-                    job->child_voxel[c][a] = tile[a] * job->tile[a];
-                    at[a] = (double)job->child_voxel[c][a] + 0.5 * (double)(job->tile[a] - job->block[a]);
-                }
-                offset(job, at, job->child[c]);
-                for (int a = 0; a < 3; a++) job->child_shift[c][a] = (float)(job->child[c][a] * scale);
-            }
-        }
-    }
-    for (int c = 0; c < 8; c++)
-        for (int a = 0; a < 3; a++) job->child_middle.x[a][c] = job->child_shift[c < job->n_child ? c : 0][a];
-    for (int i = 0; i < 64; i++) {
-        const int64_t index[3] = {i % job->tile[0], i / job->tile[0] % job->tile[1], i / (job->tile[0] * job->tile[1])};
-        double at[3];
-        for (int a = 0; a < 3; a++) at[a] = (double)index[a] - 0.5 * (double)(job->tile[a] - 1);
-        offset(job, at, x);
-        for (int a = 0; a < 3; a++) job->voxel[a][i] = x[a];
-    }
-    for (int i = 0; i < 8; i++) {
-        for (int a = 0; a < 3; a++) {
-            job->voxel_lane.x[a][i] = (float)(job->voxel[a][i] * scale);
-            job->vector_shift[i][a] = (float)((job->voxel[a][8 * i] - job->voxel[a][0]) * scale);
-        }
-    }
+    job->error = error_bound(job);
+    for (int mask = 0; mask < 256; mask++)
+        for (int i = 0, n = 0; i < 8; i++)
+            if (mask >> i & 1) job->lanes_of[mask][n++] = (uint8_t)i;
 }
 
-sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g, const sdm_exact_opts *opts, float *values,
-                             sdm_error *err)
+sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g, const sdm_exact_opts *opts, double band_mm,
+                             float *values, uint32_t *slot, sdm_error *err)
 {
-    sdm_grid_job job = {.surface = surface, .values = values};
+    sdm_grid_job job = {.surface = surface,
+                        .features = &surface->features,
+                        .values = values,
+                        .slot = slot,
+                        .band = (float)(band_mm * surface->features.scale),
+                        .band_mm = band_mm};
     for (int a = 0; a < 3; a++) {
         job.n[a] = g->n[a];
         job.origin[a] = g->origin[a];
         for (int c = 0; c < 3; c++) job.step[a][c] = g->dir[3 * c + a] * g->spacing[a];
     }
-    choose_tile(&job);
     fill_tables(&job);
     const int n_threads = sdm_thread_count(opts->n_threads);
     job.limit = opts->memory_limit / (size_t)n_threads;
     if (opts->memory_limit && !job.limit) job.limit = 1;
     sdm_grid_kernel *kernel = choose_kernel();
-    const int64_t n_rows = job.n_block[1] * job.n_block[2];
+    const int64_t n_rows = job.n_box[1] * job.n_box[2];
     atomic_int stop = SDM_OK;
     int64_t failed = n_rows;
     sdm_status status = SDM_OK;
@@ -214,14 +201,10 @@ sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g, cons
     {
         sdm_grid_scratch scratch = {0};
         sdm_error local = {0};
-        sdm_status ready = sdm_grid_scratch_reserve(&scratch, 512, job.limit, &local);
-        if (!ready) ready = SDM_ALLOC(&scratch.corner_seen, surface->n_corner, "corners in use", &local);
-        if (!ready) ready = SDM_ALLOC(&scratch.edge_seen, surface->n_edge, "edges in use", &local);
 #pragma omp for schedule(dynamic)
         for (int64_t row = 0; row < n_rows; row++) {
             if (atomic_load(&stop)) continue;
-            sdm_status s = ready;
-            if (!s) s = kernel(&job, &scratch, row % job.n_block[1], row / job.n_block[1], &local);
+            sdm_status s = kernel(&job, &scratch, row % job.n_box[1], row / job.n_box[1], &local);
 #ifdef _OPENMP
             const bool ask = omp_get_thread_num() == 0;
 #else

@@ -7,9 +7,10 @@
 #include "nearest.h"
 #include "sdm/exact.h"
 
-/* values[nz][ny][nx] = unsigned distance. Uses n_threads, memory_limit, cancelled and user of opts. The grid is checked. */
-sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g, const sdm_exact_opts *opts, float *values,
-                             sdm_error *err);
+/* values[nz][ny][nx] = unsigned distance; slot[nz][ny][nx] (may be NULL) = slot of a nearest triangle. Distances from band_mm on become
+   band_mm, their slots SDM_NONE; INFINITY: no band. Uses n_threads, memory_limit, cancelled and user of opts. The grid is checked. */
+sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g, const sdm_exact_opts *opts, double band_mm,
+                             float *values, uint32_t *slot, sdm_error *err);
 
 /* 0 or less: the default of OpenMP; 1 without OpenMP. */
 int sdm_thread_count(int n_threads);

@@ -1,79 +1,94 @@
-/* One distance map as the block kernels see it. A block of voxels is cut into up to 8 tiles of 64 voxels, a tile into 8 vectors of 8
-   voxels. Positions are relative to the middle of the block (or tile), lengths multiplied by sdm_nearest.scale where in float. */
+/* One distance map as the kernels see it. The grid is cut into boxes of 16 x 16 x 16 voxels (for equal spacings), a box into 8 blocks,
+   a block into 8 tiles, a tile into 8 vectors of 8 voxels. Float positions are relative to sdm_features.centre or to the middle of a
+   tile, lengths multiplied by sdm_features.scale. */
 #ifndef SDM_GEOM_GRID_JOB_H
 #define SDM_GEOM_GRID_JOB_H
 
-#include <stdatomic.h>
 #include <stdbool.h>
 
 #include "nearest.h"
 #include "sdm/grid.h"
+#include "surface_features.h"
 
 /* Eight points. */
 typedef struct sdm_points {
     _Alignas(32) float x[3][8];
 } sdm_points;
 
+enum { SDM_TO_BLOCKS, SDM_TO_TILES, SDM_TO_VECTORS, SDM_GRID_STEPS };
+
+/* The eight parts of a box, a block or a tile. */
+typedef struct sdm_grid_parts {
+    sdm_points middle;      /* of each, relative to that of the whole */
+    double middle_mm[8][3]; /* the same in mm */
+    int64_t first[8][3];    /* first voxel of each in the whole */
+    int64_t size[3];        /* voxels of a part */
+    float half[3];          /* half extents of its voxel centres along the axes of the grid */
+    float axis[3][3];       /* the same as vectors: [axis][coordinate] */
+    float radius;           /* half its diagonal */
+} sdm_grid_parts;
+
 typedef struct sdm_grid_job {
     const sdm_nearest *surface;
-    float *values;                    /* [nz][ny][nx] */
-    int64_t n[3];                     /* voxels */
-    int64_t tile[3];                  /* voxels of a tile along each axis, powers of two with the product 64 */
-    int64_t block[3];                 /* voxels of a block: one or two tiles along each axis */
-    int64_t n_block[3];               /* blocks */
-    double origin[3];                 /* of voxel (0, 0, 0), mm */
-    double step[3][3];                /* step[a]: from voxel to voxel along axis a, mm */
-    int n_child;                      /* tiles of a block */
-    int64_t child_voxel[8][3];        /* first voxel of each tile in its block */
-    double child[8][3];               /* middle of each tile relative to the block's, mm */
-    _Alignas(64) double voxel[3][64]; /* voxels of a tile relative to its middle, mm */
-    sdm_points block_corner, child_middle, tile_corner, voxel_lane;
-    float child_shift[8][3], vector_shift[8][3];
-    double block_radius; /* mm, half the edges of the block together */
-    bool
-        small_tiles; /* tiles not larger than the triangles: one feature of a triangle often counts for all of a tile */
-    size_t limit;    /* bytes of scratch a thread may take, 0: no limit */
+    const sdm_features *features;
+    float *values;     /* [nz][ny][nx] */
+    uint32_t *slot;    /* [nz][ny][nx] slot of a nearest triangle, or NULL */
+    int64_t n[3];      /* voxels */
+    int64_t box[3];    /* voxels of a box */
+    int64_t n_box[3];  /* boxes */
+    double origin[3];  /* of voxel (0, 0, 0), mm */
+    double step[3][3]; /* step[a]: from voxel to voxel along axis a, mm */
+    bool aligned;      /* the axes of the grid are x, y, z */
+    float band;        /* distances beyond it become it; INFINITY: none */
+    double band_mm;
+    sdm_grid_parts part[SDM_GRID_STEPS];
+    sdm_points voxel[8];                   /* of each vector, relative to the middle of the tile */
+    uint8_t voxel_in_tile[8][8];           /* [vector][lane] number of the voxel in its tile, x fastest */
+    _Alignas(64) double tile_voxel[3][64]; /* voxels of a tile relative to its middle, mm */
+    uint8_t lanes_of[256][8];              /* the lanes of a mask in order */
+    float error;                           /* bound on the error of a linear function at a part's middle */
+    size_t limit;                          /* bytes of scratch a thread may take, 0: no limit */
 } sdm_grid_job;
 
-/* Linear functions of a triangle as in sdm_lane_triangle, g[3] being the values at the block's middle. */
-typedef struct sdm_candidate {
-    _Alignas(32) float g[4][8];
-} sdm_candidate;
+/* Clusters (numbers of nodes) and the parts that they concern. */
+typedef struct sdm_cluster_list {
+    uint32_t *node;
+    uint8_t *mask;
+    size_t n, cap;
+} sdm_cluster_list;
 
-/* What of a triangle is nearest to every voxel of a tile: the face, one edge, one corner; or it is not the same for all. */
-enum {
-    SDM_KIND_MIXED,
-    SDM_KIND_FACE,
-    SDM_KIND_EDGE_0,
-    SDM_KIND_CORNER_0 = SDM_KIND_EDGE_0 + 3,
-    SDM_KINDS = SDM_KIND_CORNER_0 + 3
-};
+enum { SDM_FACES, SDM_EDGES, SDM_CORNERS, SDM_FEATURE_KINDS };
+
+/* Features by kind. */
+typedef struct sdm_candidates {
+    uint32_t *list[SDM_FEATURE_KINDS];
+    size_t n[SDM_FEATURE_KINDS];
+} sdm_candidates;
 
 /* Scratch of one thread. */
 typedef struct sdm_grid_scratch {
-    sdm_candidate *candidate;   /* [cap] */
-    float (*corner)[8];         /* [cap] squared distances at the block's corners */
-    float (*distance)[8][8];    /* [chunk] squared distances at the voxels of a tile */
-    uint32_t *slot;             /* [cap] */
-    uint32_t *alive;            /* [cap] */
-    uint32_t *list[8];          /* [cap] candidates of each tile */
-    uint32_t *kind[SDM_KINDS];  /* [cap] candidates of one tile by what of them can be nearest */
-    float (*tile_corner[8])[8]; /* [cap] and their squared distances at its corners */
-    size_t cap;
-    uint32_t *corner_seen; /* [n_corner] number of the last tile whose list holds the corner */
-    uint32_t *edge_seen;   /* [n_edge] */
-    uint32_t tile;         /* number of the tile, from 1 */
-    uint64_t count[8]; /* work done: nodes, triangles at block corners, at tile corners, at voxels, in double, blocks */
+    sdm_cluster_list box, block; /* clusters of the box at hand for its blocks, of the block for its tiles */
+    sdm_candidates tile[8];      /* features of the tiles of the block, by number */
+    size_t tile_cap;             /* groups */
+    /* the tile at hand: groups of eight features, their functions relative to its middle */
+    sdm_feature_group *local; /* of a corner g[0] is the corner */
+    uint32_t *number;         /* [8 groups] numbers of the features */
+    uint8_t *thin;            /* [group] lanes of thin faces */
+    float (*distance)[8][8];  /* [group][vector][lane] */
+    uint8_t (*hit)[8];        /* [group][vector] lanes whose region meets the vector */
+    sdm_candidates vector[8]; /* lanes: 8 group + lane */
+    float (*value)[8];        /* squared distances of the candidates of a vector */
+    size_t local_cap;         /* groups */
 } sdm_grid_scratch;
 
-#define SDM_GRID_CHUNK 128u
-
-/* Makes room for `cap` candidates, content kept. */
-sdm_status sdm_grid_scratch_reserve(sdm_grid_scratch *s, size_t cap, size_t limit, sdm_error *err);
+/* Room for `cap` clusters; for the features of a block of `groups` groups; for a tile of `groups` groups. limit: of bytes, 0: none. */
+sdm_status sdm_cluster_list_reserve(sdm_cluster_list *l, size_t cap, sdm_error *err);
+sdm_status sdm_grid_scratch_block(sdm_grid_scratch *s, size_t groups, size_t limit, sdm_error *err);
+sdm_status sdm_grid_scratch_tile(sdm_grid_scratch *s, size_t groups, size_t limit, sdm_error *err);
 void sdm_grid_scratch_dispose(sdm_grid_scratch *s);
 
-/* Unsigned distances of the blocks (0 .. n_block[0], by, bz). The nearest triangles are found in float with a margin for rounding and
-   evaluated in double without contraction: instruction sets differ at most in which of several equally near triangles is taken. */
+/* Unsigned distances of the boxes (0 .. n_box[0], by, bz). The nearest feature is found in float with a margin for rounding and
+   measured in double without contraction: every instruction set gives the same bits. */
 typedef sdm_status sdm_grid_kernel(const sdm_grid_job *job, sdm_grid_scratch *s, int64_t by, int64_t bz,
                                    sdm_error *err);
 sdm_grid_kernel sdm_grid_kernel_generic;

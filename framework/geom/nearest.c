@@ -3,60 +3,27 @@
 
 #include <math.h>
 
+#include "feature_distance.h"
 #include "sdm/memory.h"
-
-static void to_lanes(const sdm_frame *f, double scale, sdm_lane_triangle *l)
-{
-    for (int i = 0; i < 3; i++) {
-        const double u = f->u[i], v = f->v[i];
-        l->g[i][0] = (float)u;
-        l->g[i][1] = (float)-v;
-        l->g[i][2] = (float)(f->e1x * u + f->e1y * v);
-        l->g[i][3] = (float)(f->e1y * u - f->e1x * v);
-        l->g[i][4] = (float)(f->e2x * u + f->e2y * v);
-        l->g[i][5] = (float)(f->e2y * u - f->e2x * v);
-        l->g[i][6] = (float)f->n[i];
-        l->g[i][7] = (float)(f->half[i] * scale);
-        l->a[i] = f->a[i];
-    }
-    const double at_a[8] = {-f->half[0], 0, -f->kt1, -f->kh1, -f->kt2, 0, 0, 0};
-    for (int i = 0; i < 8; i++) l->g[3][i] = (float)(at_a[i] * scale);
-}
 
 sdm_status sdm_nearest_build(const sdm_mesh *m, const sdm_topology *topo, sdm_nearest *n, sdm_error *err)
 {
     sdm_status s = sdm_bvh_build(m, &n->tree, err);
     if (!s) s = SDM_ALLOC(&n->frames, m->n_tri, "frames of triangles", err);
-    if (!s) s = SDM_ALLOC(&n->lanes, m->n_tri, "triangles for the kernels", err);
     if (s) return s;
     for (size_t i = 0; i < m->n_tri; i++) {
         const uint32_t *v = &m->tri[3 * (size_t)n->tree.order[i]];
         sdm_frame_build(&m->vert[3 * (size_t)v[0]], &m->vert[3 * (size_t)v[1]], &m->vert[3 * (size_t)v[2]],
                         &n->frames[i]);
-        n->longest = fmax(n->longest, 2 * n->frames[i].half[0]);
     }
-    int exponent = 0;
-    if (n->longest > 0) (void)frexp(n->longest, &exponent);
-    n->scale = ldexp(1, -exponent);
-    n->n_corner = m->n_vert;
-    n->n_edge = topo->n_edges;
-    for (size_t i = 0; i < m->n_tri; i++) {
-        sdm_lane_triangle *l = &n->lanes[i];
-        const size_t t = n->tree.order[i], turn = (size_t)n->frames[i].rotation;
-        to_lanes(&n->frames[i], n->scale, l);
-        for (size_t k = 0; k < 3; k++) {
-            l->corner[k] = topo->tri[3 * t + (k + turn) % 3];
-            l->edge[k] = topo->edge[3 * t + (k + turn) % 3];
-        }
-    }
-    return SDM_OK;
+    return sdm_features_build(m, topo, n->frames, n->tree.order, &n->features, err);
 }
 
 void sdm_nearest_dispose(sdm_nearest *n)
 {
     sdm_bvh_dispose(&n->tree);
     sdm_free(n->frames);
-    sdm_free(n->lanes);
+    sdm_features_dispose(&n->features);
     *n = (sdm_nearest){0};
 }
 
@@ -100,4 +67,18 @@ double sdm_nearest_find(const sdm_nearest *n, const double x[3], double bound, u
     *slot = best;
     (void)sdm_frame_closest(&n->frames[best], x, q, feature);
     return bound;
+}
+
+double sdm_nearest_feature(const sdm_nearest *n, const double x[3], uint32_t *slot)
+{
+    const sdm_features *f = &n->features;
+    const uint32_t *number = f->of_slot[*slot];
+    double least = INFINITY;
+    for (int i = 0; i < 7; i++) {
+        const double d = sdm_feature_distance2(f, n->frames, number[i], x);
+        if (!(d < least)) continue;
+        least = d;
+        *slot = f->owner[number[i]];
+    }
+    return least;
 }

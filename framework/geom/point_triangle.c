@@ -80,6 +80,12 @@ void sdm_frame_build(const double a[3], const double b[3], const double c[3], sd
     f->flat = flat;
 }
 
+double sdm_frame_height(const sdm_frame *f)
+{
+    // 2 area / base: the third corner is (2 half[0] + 2 half[1] e1) in the frame
+    return 2 * f->half[1] * fabs(f->e1y);
+}
+
 typedef struct position {
     double x, y, z, t[3], h[3];
 } position;
@@ -94,6 +100,12 @@ static position locate(const sdm_frame *f, const double p[3])
                       .z = v3_dot(w, f->n),
                       .t = {x - f->half[0], f->e1x * x + f->e1y * y - f->kt1, f->e2x * x + f->e2y * y - f->kt2},
                       .h = {-y, f->e1y * x - f->e1x * y - f->kh1, f->e2y * x - f->e2x * y}};
+}
+
+int sdm_frame_above(const sdm_frame *f, const double p[3])
+{
+    const position s = locate(f, p);
+    return f->flat == 0 && s.h[0] <= 0 && s.h[1] <= 0 && s.h[2] <= 0 && fabs(s.t[0]) <= f->half[0];
 }
 
 double sdm_frame_distance2(const sdm_frame *f, const double p[3])

@@ -23,6 +23,12 @@ typedef struct sdm_frame {
 
 void sdm_frame_build(const double a[3], const double b[3], const double c[3], sdm_frame *f);
 
+/* Height over the longest edge. */
+double sdm_frame_height(const sdm_frame *f);
+
+/* Does p project into the face? Never for a triangle of no area. */
+int sdm_frame_above(const sdm_frame *f, const double p[3]);
+
 /* Squared distance from p. */
 double sdm_frame_distance2(const sdm_frame *f, const double p[3]);
 

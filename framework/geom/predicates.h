@@ -3,8 +3,8 @@
 #ifndef SDM_GEOM_PREDICATES_H
 #define SDM_GEOM_PREDICATES_H
 
-/* Sign of (v - u) x (p - u) for the point p moved by an infinitely small (e, e^2): never 0 unless u == v, then +1.
-   sdm_side(u, v, p) == -sdm_side(v, u, p) for u != v. *area (may be NULL): the rounded value. */
+/* Sign of (v - u) x (p - u) for the point p moved by an infinitely small (e, e^2): 0 when u == v, never else.
+   sdm_side(u, v, p) == -sdm_side(v, u, p). *area (may be NULL): the rounded value, 0 when u == v. */
 int sdm_side(const double u[2], const double v[2], const double p[2], double *area);
 
 #endif

@@ -2,21 +2,24 @@
 #ifndef SDM_GEOM_SURVEY_H
 #define SDM_GEOM_SURVEY_H
 
+#include "budget.h"
 #include "bvh.h"
 #include "contact.h"
-#include "point_triangle.h"
+#include "facet.h"
 #include "topology.h"
 
 typedef struct sdm_survey {
     sdm_audit audit;
     sdm_topology topo;
     sdm_bvh tree;
-    sdm_frame *frames; /* [n_tri] */
+    sdm_facet *facets; /* [n_tri] */
     sdm_contacts contacts;
 } sdm_survey;
 
-/* *s is zero-initialised; sdm_survey_dispose() frees it, also after an error. Errors as sdm_mesh_audit(). */
-sdm_status sdm_survey_build(const sdm_mesh *m, sdm_survey *s, sdm_error *err);
+/* *s is zero-initialised; sdm_survey_dispose() frees it, also after an error. budget may be NULL. Errors as sdm_mesh_audit(). */
+sdm_status sdm_survey_build(const sdm_mesh *m, sdm_survey *s, sdm_budget *budget, sdm_error *err);
+/* Frees what is not asked for any more once the surface is made; the audit and the tree stay, the topology on demand. */
+void sdm_survey_shrink(sdm_survey *s, bool keep_topology);
 void sdm_survey_dispose(sdm_survey *s);
 
 #endif

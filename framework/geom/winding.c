@@ -1,13 +1,13 @@
-/* Generalised winding numbers: exact solid angles near, dipoles of tree nodes far away. */
+/* Generalised winding numbers of points: boundary and one ray where the boundary is short, else clusters of triangles. */
 #include "winding.h"
 
 #include <math.h>
 
+#include "crossings.h"
 #include "sdm/memory.h"
 #include "vec3.h"
 
-#define FAR 3.0       // a node farther than this many radii is a dipole
-#define DOUBTFUL 0.05 // distance from 1/2 below which the dipoles are not trusted; their error stays under 0.02
+#define SHORT 100 // boundary edges that cost less than the clusters
 
 static const double pi = 3.14159265358979323846;
 
@@ -26,86 +26,135 @@ static double share_of_sphere(const sdm_mesh *m, uint32_t t, const double x[3])
     return det == 0 && den <= 0 ? 0 : atan2(det, den) / (2 * pi);
 }
 
-static void area_vector(const sdm_mesh *m, uint32_t t, double n[3], double middle[3])
+/* Adds a part of the given area to a cluster whose middle is known. */
+static void add_part(sdm_cluster *c, const double middle[3], const double normal[3], double area, double spread)
+{
+    double r[3];
+    v3_sub(middle, c->middle, r);
+    c->spread += spread + area * v3_dot(r, r);
+    for (int i = 0; i < 3; i++) {
+        c->normal[i] += normal[i];
+        c->second[i] += normal[i] * r[i];
+        c->second[3 + i] += 0.5 * (normal[i] * r[(i + 1) % 3] + normal[(i + 1) % 3] * r[i]);
+    }
+}
+
+static void triangle_part(const sdm_mesh *m, uint32_t t, double middle[3], double normal[3], double *area,
+                          double *spread)
 {
     double ab[3], ac[3];
-    const uint32_t *v = &m->tri[3 * (size_t)t];
-    const double *a = &m->vert[3 * (size_t)v[0]], *b = &m->vert[3 * (size_t)v[1]], *c = &m->vert[3 * (size_t)v[2]];
-    v3_sub(b, a, ab);
-    v3_sub(c, a, ac);
-    v3_cross(ab, ac, n);
+    const double *v[3];
+    for (size_t k = 0; k < 3; k++) v[k] = &m->vert[3 * (size_t)m->tri[3 * (size_t)t + k]];
+    v3_sub(v[1], v[0], ab);
+    v3_sub(v[2], v[0], ac);
+    v3_cross(ab, ac, normal);
     for (int i = 0; i < 3; i++) {
-        n[i] *= 0.5;
-        middle[i] = (a[i] + b[i] + c[i]) / 3;
+        normal[i] *= 0.5;
+        middle[i] = v[0][i] + (ab[i] + ac[i]) / 3;
     }
+    *area = v3_norm(normal);
+    *spread = *area / 12 * (v3_dist2(v[0], middle) + v3_dist2(v[1], middle) + v3_dist2(v[2], middle));
 }
 
-/* Sums over the triangles of a node: area, area * middle, area vectors. */
-static void add_up(sdm_winding *w, uint32_t index, double sum[7])
+static void build_cluster(sdm_winding *w, uint32_t index)
 {
     const sdm_bvh_node *n = &w->tree->node[index];
-    for (int i = 0; i < 7; i++) sum[i] = 0;
-    if (n->count) {
-        for (uint32_t i = n->first; i < n->first + n->count; i++) {
-            double normal[3], middle[3];
-            area_vector(w->mesh, w->tree->order[i], normal, middle);
-            const double area = v3_norm(normal);
-            sum[0] += area;
-            for (int k = 0; k < 3; k++) {
-                sum[1 + k] += area * middle[k];
-                sum[4 + k] += normal[k];
-            }
+    sdm_cluster *c = &w->cluster[index];
+    const uint32_t count = n->count ? n->count : 2;
+    double middle[3], normal[3], area, spread, sum[3] = {0, 0, 0};
+    for (uint32_t i = n->first; i < n->first + count; i++) {
+        if (n->count) {
+            triangle_part(w->mesh, w->tree->order[i], middle, normal, &area, &spread);
+        } else {
+            build_cluster(w, i);
+            for (int a = 0; a < 3; a++) middle[a] = w->cluster[i].middle[a];
+            area = w->cluster[i].area;
         }
-    } else {
-        double part[7];
-        for (uint32_t c = n->first; c < n->first + 2; c++) {
-            add_up(w, c, part);
-            for (int i = 0; i < 7; i++) sum[i] += part[i];
-        }
+        c->area += area;
+        for (int a = 0; a < 3; a++) sum[a] += area * middle[a];
     }
-    sdm_dipole *d = &w->dipole[index];
     double far2 = 0;
-    for (int i = 0; i < 3; i++) {
-        d->middle[i] = sum[0] > 0 ? sum[1 + i] / sum[0] : 0.5 * (n->lo[i] + n->hi[i]);
-        d->moment[i] = sum[4 + i];
-        const double reach = fmax(d->middle[i] - n->lo[i], n->hi[i] - d->middle[i]);
+    for (int a = 0; a < 3; a++) {
+        c->middle[a] = c->area > 0 ? sum[a] / c->area : 0.5 * (n->lo[a] + n->hi[a]);
+        const double reach = fmax(c->middle[a] - n->lo[a], n->hi[a] - c->middle[a]);
         far2 += reach * reach;
     }
-    d->radius = sqrt(far2);
+    c->radius = sqrt(far2);
+    for (uint32_t i = n->first; i < n->first + count; i++) {
+        const sdm_cluster *part = n->count ? NULL : &w->cluster[i];
+        if (part) {
+            add_part(c, part->middle, part->normal, part->area, part->spread);
+            for (int k = 0; k < 6; k++) c->second[k] += part->second[k];
+        } else {
+            triangle_part(w->mesh, w->tree->order[i], middle, normal, &area, &spread);
+            add_part(c, middle, normal, area, spread); // a triangle has no second moment with its own normal
+        }
+    }
 }
 
-sdm_status sdm_winding_build(const sdm_mesh *m, const sdm_bvh *tree, sdm_winding *w, sdm_error *err)
+sdm_status sdm_winding_build(const sdm_mesh *m, const sdm_bvh *tree, const sdm_topology *topo, sdm_winding *w,
+                             sdm_error *err)
 {
     w->mesh = m;
     w->tree = tree;
-    const sdm_status s = SDM_ALLOC(&w->dipole, tree->n_node, "dipoles", err);
-    if (s) return s;
-    double sum[7];
-    add_up(w, 0, sum);
-    return SDM_OK;
+    sdm_status s = sdm_boundary_build(m, topo, &w->boundary, err);
+    if (s || w->boundary.n <= SHORT) return s;
+    s = SDM_ALLOC(&w->cluster, tree->n_node, "clusters of triangles", err);
+    if (!s) build_cluster(w, 0);
+    return s;
 }
 
 void sdm_winding_dispose(sdm_winding *w)
 {
-    sdm_free(w->dipole);
+    sdm_boundary_dispose(&w->boundary);
+    sdm_free(w->cluster);
     *w = (sdm_winding){0};
 }
 
-double sdm_winding_number(const sdm_winding *w, const double x[3], bool exact)
+double sdm_winding_sum(const sdm_winding *w, const double x[3])
+{
+    double sum = 0;
+    for (size_t t = 0; t < w->mesh->n_tri; t++) sum += share_of_sphere(w->mesh, (uint32_t)t, x);
+    return sum;
+}
+
+double sdm_winding_number(const sdm_winding *w, const double x[3])
+{
+    if (w->boundary.n >= w->mesh->n_tri / 2) return sdm_winding_sum(w, x);
+    const sdm_strips strips = {&w->boundary, w->mesh->vert, {-1, 0, 0}, {{0, 1, 0}, {0, 0, 1}}, 1};
+    return sdm_ray_winding(w->mesh, w->tree, x, 0, 1, NULL, 0) + sdm_strips_find(&strips, x, &x[1], 0).share;
+}
+
+/* Expansion about the middle of a cluster at r from the point, over 4 pi. */
+static double expansion(const sdm_cluster *c, const double r[3], double distance)
+{
+    const double *m = c->second, d3 = distance * distance * distance;
+    const double trace = m[0] + m[1] + m[2];
+    const double square = m[0] * r[0] * r[0] + m[1] * r[1] * r[1] + m[2] * r[2] * r[2] +
+                          2 * (m[3] * r[0] * r[1] + m[4] * r[1] * r[2] + m[5] * r[2] * r[0]);
+    return (v3_dot(r, c->normal) + trace - 3 * square / (distance * distance)) / (4 * pi * d3);
+}
+
+/* Winding number with clusters whose error is below `tolerance` each; *error: bound on the sum. */
+static double estimate(const sdm_winding *w, const double x[3], double tolerance, double *error)
 {
     uint32_t stack[SDM_BVH_DEPTH];
     int top = 0;
     double sum = 0;
+    *error = 0;
     stack[top++] = 0;
     while (top) {
         const uint32_t index = stack[--top];
         const sdm_bvh_node *n = &w->tree->node[index];
-        const sdm_dipole *d = &w->dipole[index];
+        const sdm_cluster *c = &w->cluster[index];
         double r[3];
-        v3_sub(d->middle, x, r);
-        const double dist = v3_norm(r);
-        if (!exact && dist > FAR * d->radius) {
-            sum += v3_dot(r, d->moment) / (4 * pi * dist * dist * dist);
+        v3_sub(c->middle, x, r);
+        const double distance = v3_norm(r), gap = distance - c->radius;
+        // the third derivatives of 1 / r are at most 6 / r^4
+        const double bound = 3 * c->spread / (4 * pi * gap * gap * gap * gap);
+        if (gap > 0 && bound <= tolerance) {
+            sum += expansion(c, r, distance);
+            *error += bound;
         } else if (n->count) {
             for (uint32_t i = n->first; i < n->first + n->count; i++)
                 sum += share_of_sphere(w->mesh, w->tree->order[i], x);
@@ -119,7 +168,10 @@ double sdm_winding_number(const sdm_winding *w, const double x[3], bool exact)
 
 bool sdm_winding_inside(const sdm_winding *w, const double x[3])
 {
-    const double guess = sdm_winding_number(w, x, false);
-    if (fabs(guess - 0.5) > DOUBTFUL) return guess > 0.5;
-    return sdm_winding_number(w, x, true) > 0.5;
+    double error;
+    for (double tolerance = 2e-3; w->cluster && tolerance > 1e-7; tolerance *= 1e-2) {
+        const double guess = estimate(w, x, tolerance, &error);
+        if (fabs(guess - 0.5) > error + 1e-9) return guess > 0.5;
+    }
+    return sdm_winding_number(w, x) > 0.5;
 }

@@ -1,31 +1,41 @@
-/* Generalised winding numbers (Jacobson et al. 2013): for meshes that are not closed. */
+/* Generalised winding numbers (Jacobson et al. 2013) of points: for meshes that are not closed. */
 #ifndef SDM_GEOM_WINDING_H
 #define SDM_GEOM_WINDING_H
 
 #include <stdbool.h>
 
+#include "boundary.h"
 #include "bvh.h"
 
-/* Sum of the solid angles of a node's triangles seen from far away: a dipole at their middle (Barill et al. 2018). */
-typedef struct sdm_dipole {
-    double middle[3], moment[3]; /* moment: sum of the area vectors */
-    double radius;               /* of a ball around the middle that holds the node */
-} sdm_dipole;
+/* The triangles of a node seen from far away (Barill et al. 2018): Taylor expansion of their solid angle about their middle. */
+typedef struct sdm_cluster {
+    double middle[3];    /* weighted by area */
+    double normal[3];    /* sum of the area vectors */
+    double second[6];    /* sum of area vector x (place - middle), symmetric part: xx, yy, zz, xy, yz, zx */
+    double spread;       /* integral of |place - middle|^2 over the area */
+    double area, radius; /* radius: of a ball around the middle that holds the node */
+} sdm_cluster;
 
 typedef struct sdm_winding {
     const sdm_mesh *mesh;
     const sdm_bvh *tree;
-    sdm_dipole *dipole; /* [n_node] */
+    sdm_boundary boundary;
+    sdm_cluster *cluster; /* [n_node]; NULL where the boundary is short enough to do without */
 } sdm_winding;
 
-/* Mesh and tree must stay as long as *w. *w is zero-initialised; sdm_winding_dispose() frees it. */
-sdm_status sdm_winding_build(const sdm_mesh *m, const sdm_bvh *tree, sdm_winding *w, sdm_error *err);
+/* Mesh and tree must stay as long as *w; topo: of the mesh. *w is zero-initialised; sdm_winding_dispose() frees it. */
+sdm_status sdm_winding_build(const sdm_mesh *m, const sdm_bvh *tree, const sdm_topology *topo, sdm_winding *w,
+                             sdm_error *err);
 void sdm_winding_dispose(sdm_winding *w);
 
-/* Winding number of x; exact: every triangle by itself. */
-double sdm_winding_number(const sdm_winding *w, const double x[3], bool exact);
+/* Winding number of x to rounding: the crossings of one ray and the boundary where that is less work than every triangle. [any
+   thread] */
+double sdm_winding_number(const sdm_winding *w, const double x[3]);
 
-/* Is the winding number above 1/2? Decided without the dipoles where they are too coarse for it. */
+/* The same by every triangle. [any thread] */
+double sdm_winding_sum(const sdm_winding *w, const double x[3]);
+
+/* Is the winding number above 1/2? Clusters decide where the bound on their error allows it. [any thread] */
 bool sdm_winding_inside(const sdm_winding *w, const double x[3]);
 
 #endif

@@ -17,7 +17,10 @@ SDM_API sdm_status sdm_image_write(const char *path, const sdm_grid *grid, const
 
 /* Reads a .npy file (float32/float64, C order, 1 to 4 dimensions) into new memory (sdm_free()). */
 SDM_API sdm_status sdm_npy_read(const char *path, double **values, size_t shape[4], int *n_dim, sdm_error *err);
+/* Write an array of 1 to 4 dimensions atomically, little endian, C order. */
 SDM_API sdm_status sdm_npy_write(const char *path, const float *values, const size_t *shape, int n_dim, sdm_error *err);
+SDM_API sdm_status sdm_npy_write_uint32(const char *path, const uint32_t *values, const size_t *shape, int n_dim,
+                                        sdm_error *err);
 
 /* The iso-surface at `level` by marching cubes (Lorensen and Cline 1987), closed wherever it does not leave the grid, normals towards
    larger values, vertices shared. *cut (may be NULL): true when the surface leaves the grid. *out is zero-initialised; it has no

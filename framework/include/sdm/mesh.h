@@ -42,7 +42,7 @@ typedef struct sdm_audit {
     double min[3], max[3];     /* bounding box, mm */
     bool closed;               /* no boundary edge, every edge balanced in direction: crossings define the inside */
     bool manifold;             /* closed, and every edge has two triangles of one orientation */
-    bool inverted;             /* closed, and the volume is negative */
+    bool inverted;             /* closed, and the volume is negative beyond rounding of the coordinates */
 } sdm_audit;
 
 /* Examines a mesh. SDM_E_MESH: no triangle, an index out of range, a coordinate that is not finite. The result is scale free:

@@ -1,0 +1,65 @@
+/* The threads over tiles of rows. */
+#include "sign_rows.h"
+
+#include <stdatomic.h>
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+#include "grid_distance.h"
+#include "sdm/memory.h"
+
+#define TILE 16   // rows of a tile along both axes
+#define LONG 4096 // boundary edges from which points are faster: every box of voxels asks all of them
+
+bool sdm_sign_fits_rows(sdm_sign_method method, const sdm_boundary *b)
+{
+    return method == SDM_SIGN_CROSSINGS || (method == SDM_SIGN_WINDING && b->n < LONG);
+}
+
+sdm_status sdm_sign_rows_build(const sdm_mesh *m, const sdm_boundary *b, const sdm_grid *g, const int axis[3],
+                               const sdm_exact_opts *opts, sdm_sign_rows *r, sdm_error *err)
+{
+    r->boundary = b;
+    r->grid = g;
+    return sdm_rows_build(m, g, axis, opts->n_threads, opts->memory_limit, &r->rows, err);
+}
+
+static bool cancelled(const sdm_exact_opts *opts)
+{
+#ifdef _OPENMP
+    if (omp_get_thread_num() != 0) return false;
+#endif
+    return opts->cancelled && opts->cancelled(opts->user);
+}
+
+sdm_status sdm_sign_tiles(const sdm_sign_rows *r, int64_t n1, int64_t n2, const sdm_exact_opts *opts,
+                          sdm_sign_visit *visit, void *user, sdm_error *err)
+{
+    const int64_t t1 = (n1 + TILE - 1) / TILE, t2 = (n2 + TILE - 1) / TILE;
+    const int n_threads = sdm_thread_count(opts->n_threads);
+    (void)n_threads; // without OpenMP
+    atomic_int stop = SDM_OK;
+    sdm_status status = SDM_OK;
+#pragma omp parallel num_threads(n_threads)
+    {
+        int32_t *base = NULL;
+        sdm_error local = {0};
+        sdm_status ready = SDM_OK;
+        if (r->boundary) ready = SDM_ALLOC(&base, TILE * TILE * (size_t)r->rows.n[0], "windings of rows", &local);
+#pragma omp for schedule(dynamic)
+        for (int64_t t = 0; t < t1 * t2; t++) {
+            if (atomic_load(&stop)) continue;
+            sdm_status s = ready;
+            const int64_t j = t % t1 * TILE, k = t / t1 * TILE;
+            const sdm_row_tile tile = {j, j + TILE < n1 ? j + TILE : n1, k, k + TILE < n2 ? k + TILE : n2};
+            if (!s && base) sdm_row_base_fill(r->boundary, &r->rows, r->grid, &tile, base);
+            if (!s) visit(user, &tile, base);
+            if (!s && cancelled(opts)) s = sdm_fail(&local, SDM_E_CANCELLED, "map stopped on request");
+            if (!s || atomic_exchange(&stop, 1)) continue;
+            status = sdm_fail(err, s, "%s", local.text);
+        }
+        sdm_free(base);
+    }
+    return status;
+}

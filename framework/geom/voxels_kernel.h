@@ -1,0 +1,188 @@
+/* From the candidates of a vector to the distances of its voxels. Part of the map kernels. */
+#ifndef SDM_GEOM_VOXELS_KERNEL_H
+#define SDM_GEOM_VOXELS_KERNEL_H
+
+#include "feature_distance.h"
+#include "vectors_kernel.h"
+
+/* The candidates of eight voxels: squared distances of the nearest and of the second, lane of the nearest. */
+typedef struct winner8 {
+    v8f first, second;
+    v8i lane;
+} winner8;
+
+static inline void compete(winner8 *w, v8f d, uint32_t lane, float *out)
+{
+    v8_store(out, d);
+    w->second = v8_min(w->second, v8_max(d, w->first));
+    w->lane = v8_select_i(d < w->first, v8_all_i((int32_t)lane), w->lane);
+    w->first = v8_min(d, w->first);
+}
+
+/* Vector j of one feature of a group for all lanes; its function j at p. */
+static inline point8 spread(const sdm_feature_group *k, int j, size_t lane)
+{
+    return p8_all(k->g[j][0][lane], k->g[j][1][lane], k->g[j][2][lane]);
+}
+
+static inline v8f function(const sdm_feature_group *k, int j, size_t lane, point8 p)
+{
+    return p8_linear(spread(k, j, lane), p, v8_all(k->offset[j][lane]));
+}
+
+/* value[]: squared distances of the candidates, INFINITY where a voxel is surely not in the region, -1 for thin faces elsewhere. */
+static winner8 compare(const tile *t, int v, float (*out)[8])
+{
+    const sdm_grid_scratch *s = t->s;
+    const sdm_candidates *in = &s->vector[v];
+    const point8 p = p8_load((const float(*)[8])t->job->voxel[v].x);
+    const v8f error = v8_all(t->error), never = v8_all(INFINITY);
+    winner8 w = {never, never, v8_all_i(0)};
+    for (size_t i = 0; i < in->n[SDM_FACES]; i++) {
+        const uint32_t at = in->list[SDM_FACES][i];
+        const sdm_feature_group *k = &s->local[at / 8];
+        const v8f h = v8_max(function(k, 0, at % 8, p), v8_max(function(k, 1, at % 8, p), function(k, 2, at % 8, p)));
+        const v8f z = function(k, 3, at % 8, p);
+        if (s->thin[at / 8] >> at % 8 & 1)
+            compete(&w, v8_signed(v8_max(h, z) - error, v8_all(-1), never), at, *out++);
+        else
+            compete(&w, v8_signed(h - error, z * z, never), at, *out++);
+    }
+    for (size_t i = 0; i < in->n[SDM_EDGES]; i++) {
+        const uint32_t at = in->list[SDM_EDGES][i];
+        const sdm_feature_group *k = &s->local[at / 8];
+        const v8f along = function(k, 0, at % 8, p);
+        const v8f beside = v8_max(function(k, 1, at % 8, p), function(k, 2, at % 8, p));
+        const v8f beyond = v8_max(v8_abs(along) - v8_all(k->offset[3][at % 8]), beside);
+        const point8 r = p8_sub(p, spread(k, 3, at % 8));
+        compete(&w, v8_signed(beyond - error, p8_dot(r, r) - along * along, never), at, *out++);
+    }
+    for (size_t i = 0; i < in->n[SDM_CORNERS]; i++) {
+        const uint32_t at = in->list[SDM_CORNERS][i];
+        const point8 r = p8_sub(p, spread(&s->local[at / 8], 0, at % 8));
+        compete(&w, p8_dot(r, r), at, *out++);
+    }
+    return w;
+}
+
+/* The nearest of the candidates whose squared distance in float is at most `limit`, in double. */
+static uint32_t settle(const tile *t, int v, int lane, float limit, const double p[3], double *d2)
+{
+    const sdm_grid_scratch *s = t->s;
+    const float(*in_float)[8] = (const float(*)[8])s->value;
+    uint32_t best = SDM_NONE;
+    *d2 = INFINITY;
+    for (int kind = 0; kind < SDM_FEATURE_KINDS; kind++)
+        for (size_t i = 0; i < s->vector[v].n[kind]; i++, in_float++) {
+            if ((*in_float)[lane] > limit) continue;
+            const uint32_t number = s->number[s->vector[v].list[kind][i]];
+            const double d = sdm_feature_distance2(t->job->features, t->job->surface->frames, number, p);
+            if (!(d < *d2)) continue;
+            *d2 = d;
+            best = number;
+        }
+    if (best == SDM_NONE && !(t->job->band_mm < INFINITY)) {
+        // bounds are meant to leave somebody; if they do not, the tree knows
+        uint32_t slot = 0;
+        double q[3];
+        int feature;
+        *d2 = sdm_nearest_find(t->job->surface, p, INFINITY, &slot, q, &feature);
+        for (best = 0; t->job->features->slot[best] != slot; best++) continue;
+    }
+    return best;
+}
+
+/* Squared distances of four points to a feature each; the operations of sdm_feature_distance2(). */
+static inline void measure_four(const sdm_feature *x, const uint32_t number[4], v4d px, v4d py, v4d pz, double out[4])
+{
+    v4d a[4], u[4];
+    for (int i = 0; i < 4; i++) {
+        a[i] = v4_load(x[number[i]].a);
+        u[i] = v4_load(&x[number[i]].u[1]);
+    }
+    // rows of a: ax ay az ux, of u: uy uz length face
+    v4_transpose(a);
+    v4_transpose(u);
+    const v4d wx = px - a[0], wy = py - a[1], wz = pz - a[2];
+    const v4d s = wx * a[3] + wy * u[0] + wz * u[1];
+    const v4d rx = wx - s * a[3], ry = wy - s * u[0], rz = wz - s * u[1];
+    v4_store(out, v4_signed(u[3], s * s, rx * rx + ry * ry + rz * rz));
+}
+
+/* The voxels of a tile. */
+typedef struct voxels {
+    uint32_t number[64]; /* of the nearest feature */
+    _Alignas(32) double d2[64];
+    int n_settled; /* what had to be settled in double */
+    uint8_t settled[64];
+    double settled_d2[64];
+} voxels;
+
+static void choose_features(const tile *t, voxels *x)
+{
+    const sdm_grid_job *job = t->job;
+    // a squared distance d^2 has an error of at most 2 (d + 1) 2 error; two of them, doubled
+    const v8f squared = v8_all(8 * t->error);
+    for (int v = 0; v < 8; v++) {
+        const uint8_t *place = job->voxel_in_tile[v];
+        if (!(t->wanted >> v & 1)) {
+            for (int i = 0; i < 8; i++) x->number[place[i]] = 0;
+            continue;
+        }
+        const winner8 w = compare(t, v, t->s->value);
+        _Alignas(32) float limit[8];
+        v8_store(limit, v8_fma(v8_sqrt(v8_max(w.first, v8_all(0))) + v8_all(1), squared, w.first));
+        const int clear = v8_greater(w.second, v8_load(limit)) & v8_greater(w.first, v8_all(-0.5f));
+        for (int i = 0; i < 8; i++) x->number[place[i]] = t->s->number[w.lane[i]];
+        // NaN (INFINITY - INFINITY) is not clear either
+        for (int open = 0xff & ~clear; open; open &= open - 1) {
+            const int lane = __builtin_ctz((unsigned)open), i = place[lane];
+            double p[3];
+            for (int a = 0; a < 3; a++) p[a] = t->middle[a] + job->tile_voxel[a][i];
+            x->settled[x->n_settled] = (uint8_t)i;
+            x->number[i] =
+                settle(t, v, lane, limit[lane] >= 0 ? limit[lane] : INFINITY, p, &x->settled_d2[x->n_settled]);
+            x->n_settled++;
+        }
+    }
+}
+
+/* Squared distances of the voxels in double. */
+static void measure_voxels(const tile *t, voxels *x)
+{
+    const double(*at)[64] = (const double(*)[64])t->job->tile_voxel;
+    const double *m = t->middle;
+    uint32_t number[64];
+    for (int i = 0; i < 64; i++) number[i] = x->number[i] == SDM_NONE ? 0 : x->number[i];
+    for (int i = 0; i < 64; i += 4)
+        measure_four(t->job->features->exact, &number[i], v4_all(m[0]) + v4_load(&at[0][i]),
+                     v4_all(m[1]) + v4_load(&at[1][i]), v4_all(m[2]) + v4_load(&at[2][i]), &x->d2[i]);
+    for (int i = 0; i < x->n_settled; i++) x->d2[x->settled[i]] = x->settled_d2[i];
+}
+
+static void write_tile(const tile *t, voxels *x)
+{
+    const sdm_grid_job *job = t->job;
+    const int64_t *whole = job->part[SDM_TO_TILES].size;
+    float d[64];
+    for (int i = 0; i < 64; i++) d[i] = (float)sqrt(x->d2[i]);
+    for (int i = 0; i < 64 && job->slot; i++)
+        x->number[i] = x->number[i] == SDM_NONE ? SDM_NONE : job->features->owner[x->number[i]];
+    if (job->band_mm < INFINITY)
+        for (int i = 0; i < 64; i++) {
+            if (d[i] < (float)job->band_mm) continue;
+            d[i] = (float)job->band_mm;
+            x->number[i] = SDM_NONE;
+        }
+    int64_t size[3];
+    for (int a = 0; a < 3; a++) size[a] = job->n[a] - t->first[a] < whole[a] ? job->n[a] - t->first[a] : whole[a];
+    for (int64_t z = 0; z < size[2]; z++)
+        for (int64_t y = 0; y < size[1]; y++) {
+            const int64_t to = ((t->first[2] + z) * job->n[1] + t->first[1] + y) * job->n[0] + t->first[0];
+            const int64_t from = (z * whole[1] + y) * whole[0];
+            memcpy(&job->values[to], &d[from], (size_t)size[0] * sizeof *d);
+            if (job->slot) memcpy(&job->slot[to], &x->number[from], (size_t)size[0] * sizeof *x->number);
+        }
+}
+
+#endif

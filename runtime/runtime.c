@@ -243,21 +243,3 @@ sdm_status sdm_runtime_instance(const sdm_model *m, const sdm_registry *r, sdm_i
         *out = made;
     return s;
 }
-
-sdm_status sdm_exact_shape_map(const sdm_instance *shape, const double *p, const sdm_exact_opts *opts,
-                               const sdm_grid *grid, float *values, sdm_exact_report *report, sdm_error *err)
-{
-    if (!shape || !p || !grid || !values)
-        return sdm_fail(err, SDM_E_ARG, "exact map: shape, parameters, grid and values are needed");
-    sdm_status s = sdm_grid_check(grid, err);
-    if (s) return s;
-    sdm_mesh mesh = {0};
-    sdm_exact *engine = NULL;
-    s = sdm_instance_mesh(shape, p, &mesh, err);
-    if (!s) s = sdm_exact_create(&mesh, opts, &engine, err);
-    if (!s) s = sdm_exact_map(engine, grid, values, err);
-    if (!s && report) *report = *sdm_exact_get_report(engine);
-    sdm_exact_free(engine);
-    sdm_mesh_dispose(&mesh);
-    return s;
-}

@@ -1,4 +1,4 @@
-/* Reading and writing of .npy arrays: format versions 1 to 3, float32 and float64 of both byte orders, C order. */
+/* Reading and writing of .npy arrays in C order. Read: format versions 1 to 3, float32 and float64 of both byte orders. */
 #include "sdm/image.h"
 
 #include <stdio.h>
@@ -190,10 +190,10 @@ sdm_status sdm_npy_read(const char *path, double **values, size_t shape[4], int 
 }
 
 /* Writes the version 1 header, padded so that the values start at a multiple of 64 bytes. */
-static sdm_status write_header(sdm_outfile *f, const size_t *shape, int n_dim, sdm_error *err)
+static sdm_status write_header(sdm_outfile *f, const char *descr, const size_t *shape, int n_dim, sdm_error *err)
 {
     char text[192];
-    int n = snprintf(text, sizeof text, "{'descr': '<f4', 'fortran_order': False, 'shape': (");
+    int n = snprintf(text, sizeof text, "{'descr': '%s', 'fortran_order': False, 'shape': (", descr);
     for (int d = 0; d < n_dim; d++)
         n += snprintf(text + n, sizeof text - (size_t)n, n_dim == 1 ? "%zu," : d ? ", %zu" : "%zu", shape[d]);
     n += snprintf(text + n, sizeof text - (size_t)n, "), }");
@@ -205,21 +205,27 @@ static sdm_status write_header(sdm_outfile *f, const size_t *shape, int n_dim, s
     return s ? s : sdm_outfile_write(f, text, (size_t)n, err);
 }
 
-static sdm_status write_values(sdm_outfile *f, const float *values, size_t count, sdm_error *err)
+static sdm_status write_words(sdm_outfile *f, const uint8_t *words, size_t count, sdm_error *err)
 {
     uint8_t block[4096];
     for (size_t i = 0; i < count;) {
         size_t n = 0;
-        for (; n < sizeof block && i < count; n += 4) sdm_put_f32(block + n, values[i++]);
+        for (; n < sizeof block && i < count; n += 4) {
+            uint32_t word;
+            memcpy(&word, words + 4 * i++, sizeof word);
+            sdm_put_uint(block + n, 4, word);
+        }
         const sdm_status s = sdm_outfile_write(f, block, n, err);
         if (s) return s;
     }
     return SDM_OK;
 }
 
-sdm_status sdm_npy_write(const char *path, const float *values, const size_t *shape, int n_dim, sdm_error *err)
+/* An array of numbers of four bytes. */
+static sdm_status write_array(const char *path, const char *descr, const void *words, const size_t *shape, int n_dim,
+                              sdm_error *err)
 {
-    if (!path || !values || !shape) return sdm_fail(err, SDM_E_ARG, "sdm_npy_write: NULL argument");
+    if (!path || !words || !shape) return sdm_fail(err, SDM_E_ARG, "writing of a .npy file: NULL argument");
     if (n_dim < 1 || n_dim > 4) return sdm_fail(err, SDM_E_ARG, "%s: %d dimensions, need 1 to 4", path, n_dim);
     size_t count = 1;
     sdm_status s = SDM_OK;
@@ -227,9 +233,20 @@ sdm_status sdm_npy_write(const char *path, const float *values, const size_t *sh
     if (s) return sdm_fail(err, SDM_E_ARG, "%s: the product of the dimensions is too large", path);
     sdm_outfile *f = NULL;
     s = sdm_outfile_open(path, &f, err);
-    if (!s) s = write_header(f, shape, n_dim, err);
-    if (!s) s = write_values(f, values, count, err);
+    if (!s) s = write_header(f, descr, shape, n_dim, err);
+    if (!s) s = write_words(f, words, count, err);
     if (!s) return sdm_outfile_commit(&f, err);
     sdm_outfile_discard(&f);
     return s;
+}
+
+sdm_status sdm_npy_write(const char *path, const float *values, const size_t *shape, int n_dim, sdm_error *err)
+{
+    return write_array(path, "<f4", values, shape, n_dim, err);
+}
+
+sdm_status sdm_npy_write_uint32(const char *path, const uint32_t *values, const size_t *shape, int n_dim,
+                                sdm_error *err)
+{
+    return write_array(path, "<u4", values, shape, n_dim, err);
 }

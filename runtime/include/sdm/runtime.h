@@ -55,6 +55,13 @@ SDM_API sdm_status sdm_runtime_instance(const sdm_model *m, const sdm_registry *
 SDM_API sdm_status sdm_exact_shape_map(const sdm_instance *shape, const double *p, const sdm_exact_opts *opts,
                                        const sdm_grid *grid, float *values, sdm_exact_report *report, sdm_error *err);
 
+/* Exact map and its derivatives: jacobian[n_params][nz][ny][nx], mm per unit of the parameter (sdm_exact_map_derivative() says what it
+   is and where there is none), from sdm_instance_velocity(). values, report may be NULL. SDM_E_PLUGIN when the number of vertices
+   depends on the parameters. [any thread] */
+SDM_API sdm_status sdm_exact_shape_jacobian(const sdm_instance *shape, const double *p, const sdm_exact_opts *opts,
+                                            const sdm_grid *grid, float *values, float *jacobian,
+                                            sdm_exact_report *report, sdm_error *err);
+
 #ifdef __cplusplus
 }
 #endif

@@ -1,8 +1,9 @@
-/* sdmgen bench: short measurements of speed, all in one process, with ratios. */
+/* sdmgen bench: measurements of speed, with ratios. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
+#include "bench.h"
 #include "commands.h"
 #include "evaluate.h"
 #include "sdm/config.h"
@@ -10,97 +11,45 @@
 #include "setup.h"
 #include "terminal.h"
 
-enum { REPEATS = 7 };
+enum { N_GRIDS = 3, N_MESHES = 3, N_CASES = N_GRIDS + N_MESHES };
 
-typedef struct exact_times {
-    double ms_build, ms_query, ms_build_all, ms_query_all; /* one core, all threads; medians */
-    double ms_naive, naive_share;
-    size_t voxels, triangles;
-    int threads;
-} exact_times;
-
-static sdm_status time_engine(const sdm_mesh *mesh, const sdm_grid *grid, int threads, float *values, double *build,
-                              double *query, sdm_error *err)
+static sdm_status measure(const cli_args *args, double refine, double scale, bench_case *c, bench_rows *rows,
+                          sdm_error *err)
 {
-    double builds[REPEATS], queries[REPEATS];
-    for (size_t i = 0; i <= REPEATS; i++) {
-        const sdm_exact_opts opts = {.n_threads = threads};
-        sdm_exact *engine = NULL;
-        const double start = cli_clock();
-        sdm_status s = sdm_exact_create(mesh, &opts, &engine, err);
-        if (s) return s;
-        const double built = cli_clock();
-        s = sdm_exact_map(engine, grid, values, err);
-        const double end = cli_clock();
-        sdm_exact_free(engine);
-        if (s) return s;
-        if (i == 0) continue; /* warms up */
-        builds[i - 1] = 1e3 * (built - start);
-        queries[i - 1] = 1e3 * (end - built);
-    }
-    *build = cli_median(builds, REPEATS);
-    *query = cli_median(queries, REPEATS);
-    return SDM_OK;
+    sdm_status s = bench_case_open(args, refine, scale, c, err);
+    if (!s) s = bench_own(c, rows, err);
+    return s ? s : bench_peers(c, args, rows, err);
 }
 
-/* The cochlea at its default parameters on the paper's grid. */
-static sdm_status measure_exact(const cli_args *args, exact_times *t, sdm_error *err)
+/* Voxels of four times, twice and once the edge; then triangles of twice, once and half the edge. */
+static sdm_status bench_exact(const cli_args *args, sdm_error *err)
 {
-    const cli_list none = {0};
-    const sdm_grid grid = sdm_grid_centred((const int64_t[3]){60, 50, 50}, 0.2, (const double[3]){0.5, 0.4, 1.2});
-    sdm_registry *registry = NULL;
-    sdm_instance *shape = NULL;
-    sdm_mesh mesh = {0};
-    double *p = NULL;
-    float *values = NULL;
-    size_t n = 0;
-    sdm_status s = cli_open_registry(args, &registry, err);
-    if (!s) s = cli_open_shape(registry, "cochlea", &none, &shape, err);
-    const sdm_param *params = s ? NULL : sdm_instance_params(shape, &n);
-    if (!s) s = SDM_ALLOC(&p, n, "parameters", err);
-    if (!s) s = cli_read_params(params, n, &none, p, err);
-    if (!s) s = sdm_instance_mesh(shape, p, &mesh, err);
-    if (!s) s = SDM_ALLOC(&values, sdm_grid_count(&grid), "distance map", err);
-    t->voxels = sdm_grid_count(&grid);
-    t->triangles = mesh.n_tri;
-    t->threads = cli_threads(args->threads);
-    if (!s) s = time_engine(&mesh, &grid, 1, values, &t->ms_build, &t->ms_query, err);
-    if (!s) s = time_engine(&mesh, &grid, t->threads, values, &t->ms_build_all, &t->ms_query_all, err);
-    if (!s) s = cli_time_naive(&mesh, &grid, &t->ms_naive, &t->naive_share, err);
-    sdm_free(values);
-    sdm_free(p);
-    sdm_mesh_dispose(&mesh);
-    sdm_instance_free(shape);
-    sdm_registry_free(registry);
+    static const double scale[N_CASES] = {0.25, 0.5, 1, 1, 1, 1}, refine[N_CASES] = {1, 1, 1, 0.5, 1, 2};
+    const size_t n_meshes = args->mesh ? 0 : N_MESHES;
+    const size_t n = args->growth ? N_GRIDS + n_meshes : 1;
+    bench_case *cases = NULL;
+    bench_rows rows[N_CASES] = {{0}};
+    sdm_json j = {0};
+    sdm_status s = SDM_ALLOC(&cases, N_CASES, "cases", err);
+    if (!s && args->growth) sdm_json_open(&j, NULL, '[');
+    for (size_t i = 0; i < n && !s; i++) {
+        s = measure(args, args->growth ? refine[i] : 1, args->growth ? scale[i] : 1, &cases[i], &rows[i], err);
+        if (!s && args->json) bench_json(&j, &cases[i], &rows[i]);
+    }
+    if (!s && args->growth) sdm_json_close(&j, ']');
+    if (!s && args->json)
+        s = cli_print_json(&j, err);
+    else if (!s && args->growth)
+        bench_print_growth(cases, rows, N_GRIDS, n_meshes);
+    else if (!s)
+        bench_print(&cases[0], &rows[0]);
+    sdm_json_dispose(&j);
+    for (size_t i = 0; i < N_CASES && cases; i++) {
+        bench_case_dispose(&cases[i]);
+        sdm_free(rows[i].items);
+    }
+    sdm_free(cases);
     return s;
-}
-
-static sdm_status report_exact(const cli_args *args, const exact_times *t, sdm_error *err)
-{
-    const double one = t->ms_build + t->ms_query, all = t->ms_build_all + t->ms_query_all;
-    if (args->json) {
-        sdm_json j = {0};
-        sdm_json_open(&j, NULL, '{');
-        sdm_json_int(&j, "voxels", (int64_t)t->voxels);
-        sdm_json_int(&j, "triangles", (int64_t)t->triangles);
-        sdm_json_real(&j, "ms_build", t->ms_build);
-        sdm_json_real(&j, "ms_query", t->ms_query);
-        sdm_json_real(&j, "ms_total", one);
-        sdm_json_int(&j, "threads", t->threads);
-        sdm_json_real(&j, "ms_total_threads", all);
-        sdm_json_real(&j, "ms_naive", t->ms_naive);
-        sdm_json_real(&j, "naive_share", t->naive_share);
-        sdm_json_real(&j, "naive_over_exact", t->ms_naive / one);
-        sdm_json_close(&j, '}');
-        return cli_print_json(&j, err);
-    }
-    printf("cochlea, %zu triangles, 60 x 50 x 50 voxels of 0.2 mm\n\n", t->triangles);
-    printf("  exact, one core     %9.2f ms = build %.2f + query %.2f (%.1f ns a voxel)\n", one, t->ms_build,
-           t->ms_query, 1e6 * t->ms_query / (double)t->voxels);
-    printf("  exact, %3d threads  %9.2f ms   %.2f x faster\n", t->threads, all, one / all);
-    printf("  naive, one core     %9.0f ms   %.0f x slower than exact (from %.0f %% of the voxels)\n", t->ms_naive,
-           t->ms_naive / one, 100 * t->naive_share);
-    return SDM_OK;
 }
 
 static sdm_status report_network(const cli_args *args, const cli_timing *t, const sdm_model_info *info, sdm_error *err)
@@ -157,7 +106,5 @@ sdm_status cmd_bench(const cli_args *args, sdm_error *err)
     if (strcmp(what, "exact")) return sdm_fail(err, SDM_E_ARG, "bench: '%s': need exact or network MODEL", what);
     if (args->files.n > 1)
         return sdm_fail(err, SDM_E_ARG, "bench exact: unexpected argument '%s'", args->files.items[1]);
-    exact_times t = {0};
-    const sdm_status s = measure_exact(args, &t, err);
-    return s ? s : report_exact(args, &t, err);
+    return bench_exact(args, err);
 }

@@ -3,11 +3,13 @@
 #include <string.h>
 
 #include "commands.h"
+#include "exact_layers.h"
 #include "output.h"
 #include "progress.h"
 #include "sdm/checksum.h"
 #include "sdm/exact.h"
 #include "sdm/memory.h"
+#include "sdm/methods.h"
 #include "setup.h"
 #include "terminal.h"
 
@@ -19,7 +21,10 @@ typedef struct job {
     sdm_grid grid;
     sdm_exact_report report;
     float *values;
+    cli_layers layers;
     double ms_build, ms_query;
+    sdm_sign_certificate certificate; /* checked: 0 without --certify */
+    double bound_mm;                  /* on the error of the distances to the surface, 0: exact */
 } job;
 
 static bool interrupted(void *user)
@@ -42,6 +47,7 @@ static sdm_status mesh_of_shape(job *j, sdm_error *err)
     const double start = cli_clock();
     if (!s) s = sdm_instance_mesh(shape, values, &j->mesh, err);
     j->ms_mesh = 1e3 * (cli_clock() - start);
+    if (!s) s = cli_layers_velocity(&j->layers, j->args, shape, values, j->mesh.n_vert, err);
     if (!s) cli_add_params(params, n, values, &j->params);
     sdm_free(values);
     sdm_instance_free(shape);
@@ -56,9 +62,13 @@ static sdm_status get_mesh(job *j, sdm_error *err)
         return sdm_fail(err, SDM_E_ARG, "exact: either --shape NAME or --mesh FILE is needed");
     if (args->mesh && (args->params.n > 0 || args->options.n > 0))
         return sdm_fail(err, SDM_E_ARG, "exact: -p and -O belong to --shape, a mesh file has no parameters");
-    if (args->outputs.n == 0 && !args->json)
+    if (args->outputs.n == 0 && !args->json && !cli_layers_wanted(args))
         return sdm_fail(err, SDM_E_ARG, "exact: an output is needed: -o FILE, or --json");
-    const sdm_status s = cli_check_outputs(&args->outputs, false, err);
+    if (args->certify && strcmp(args->method, "exact"))
+        return sdm_fail(err, SDM_E_ARG, "exact: --certify belongs to --method exact, not %s", args->method);
+    if (args->tolerance > 0 && strcmp(args->method, "octree"))
+        return sdm_fail(err, SDM_E_ARG, "exact: --tolerance belongs to --method octree, not %s", args->method);
+    const sdm_status s = cli_layers_check(args, err);
     if (s) return s;
     return args->mesh ? cli_read_mesh(args->mesh, &j->mesh, err) : mesh_of_shape(j, err);
 }
@@ -85,40 +95,57 @@ static sdm_status run_engine(job *j, sdm_error *err)
     s = cli_fit_grid(j->args, j->report.audit.min, j->report.audit.max, &j->grid, err);
     if (!s) s = SDM_ALLOC(&j->values, sdm_grid_count(&j->grid), "distance map", err);
     const double query = cli_clock();
-    if (!s) s = sdm_exact_map(engine, &j->grid, j->values, err);
+    if (!s) s = cli_layers_map(&j->layers, j->args, engine, &j->grid, j->values, err);
     j->ms_build = 1e3 * (built - start);
     j->ms_query = 1e3 * (cli_clock() - query);
+    if (!s && j->args->certify) s = sdm_exact_certify(engine, &j->grid, j->values, &j->certificate, err);
     sdm_exact_free(engine);
     return s;
 }
 
-/* Slice by slice, so that it can be interrupted and shows where it is. */
-static sdm_status run_naive(job *j, sdm_error *err)
+typedef struct watch {
+    cli_progress bar;
+    const char *title;
+} watch;
+
+static void show_progress(void *user, double share)
 {
-    const double start = cli_clock();
-    sdm_status s = sdm_mesh_audit(&j->mesh, &j->report.audit, err);
-    j->ms_build = 1e3 * (cli_clock() - start);
-    j->report.n_tri_used = j->mesh.n_tri;
-    j->report.sign = SDM_SIGN_WINDING;
-    if (!s) s = cli_fit_grid(j->args, j->report.audit.min, j->report.audit.max, &j->grid, err);
+    watch *w = user;
+    cli_progress_show(&w->bar, w->title, share, NULL);
+}
+
+/* Any other method of the table. */
+static sdm_status run_method(job *j, sdm_error *err)
+{
+    const sdm_method *method = sdm_method_find(j->args->method, err);
+    if (!method) return SDM_E_ARG;
+    sdm_audit audit;
+    sdm_status s = sdm_mesh_audit(&j->mesh, &audit, err);
+    if (!s) s = cli_fit_grid(j->args, audit.min, audit.max, &j->grid, err);
     if (!s) s = SDM_ALLOC(&j->values, sdm_grid_count(&j->grid), "distance map", err);
     if (s) return s;
 
-    cli_progress progress;
-    cli_progress_start(&progress);
-    sdm_grid slice = j->grid;
-    slice.n[2] = 1;
-    const size_t stride = (size_t)(j->grid.n[0] * j->grid.n[1]);
-    const double query = cli_clock();
-    for (int64_t k = 0; k < j->grid.n[2] && !s; k++) {
-        sdm_grid_world(&j->grid, (const double[3]){0, 0, (double)k}, slice.origin);
-        s = sdm_naive_map(&j->mesh, &slice, (int)j->args->threads, j->values + (size_t)k * stride, err);
-        if (!s) s = cli_check_interrupt(err);
-        cli_progress_show(&progress, "naive", (double)(k + 1) / (double)j->grid.n[2], NULL);
-    }
-    j->ms_query = 1e3 * (cli_clock() - query);
-    cli_progress_clear(&progress);
-    return s;
+    watch w = {.title = method->name};
+    const sdm_method_opts opts = {.exact = {.sign = sign_of(j->args->sign),
+                                            .keep_overlap = j->args->keep_overlap,
+                                            .n_threads = (int)j->args->threads,
+                                            .cancelled = interrupted,
+                                            .user = &w},
+                                  .max_error_mm = j->args->tolerance,
+                                  .progress = show_progress};
+    sdm_method_report report;
+    cli_progress_start(&w.bar);
+    s = method->map(&j->mesh, &j->grid, &opts, j->values, &report, err);
+    cli_progress_clear(&w.bar);
+    if (s) return s;
+    j->report = report.exact;
+    j->ms_build = report.ms_prepare;
+    j->ms_query = report.ms_map;
+    j->bound_mm = report.error_bound_mm;
+    if (!method->exact)
+        cli_notice("method %s is approximate: the distance is off by at most %g mm (%s)", method->name,
+                   report.error_bound_mm, report.note);
+    return SDM_OK;
 }
 
 static void value_range(const job *j, float *min, float *max, int64_t *inside)
@@ -141,6 +168,7 @@ static void notice_mesh(const job *j)
     value_range(j, &min, &max, &inside);
     if (!inside) cli_notice("no voxel of the grid is inside the surface: is it where the shape is?");
     if (j->report.turned) cli_notice("the mesh was inside out and has been turned");
+    if (j->report.parts_turned) cli_notice("%zu parts were inside out and have been turned", j->report.parts_turned);
     if (a->boundary_edges > 0)
         cli_notice("the mesh is open: %zu boundary edges; inside is where the winding number is over 1/2",
                    a->boundary_edges);
@@ -153,6 +181,23 @@ static void notice_mesh(const job *j)
                    a->n_tri, j->report.n_tri_used, j->report.union_error_mm);
 }
 
+static void notice_signs(const job *j)
+{
+    const sdm_sign_certificate *c = &j->certificate;
+    if (!c->checked) return;
+    if (c->wrong) {
+        const double index[3] = {(double)c->first_wrong[0], (double)c->first_wrong[1], (double)c->first_wrong[2]};
+        double x[3];
+        sdm_grid_world(&j->grid, index, x);
+        cli_notice("signs: %zu of %zu voxels differ from %s, the first at %g, %g, %g mm", c->wrong, c->checked,
+                   c->compared, x[0], x[1], x[2]);
+    } else {
+        cli_notice("signs: %zu of %zu voxels compared with %s, all agree", c->checked, c->voxels, c->compared);
+    }
+    if (c->below_zero)
+        cli_notice("%zu voxels lie in a part of the mesh that is inside out and count as outside", c->below_zero);
+}
+
 static sdm_status write_outputs(const job *j, sdm_error *err)
 {
     const cli_map map = {.grid = &j->grid,
@@ -160,7 +205,7 @@ static sdm_status write_outputs(const job *j, sdm_error *err)
                          .shape = j->args->mesh ? j->args->mesh : j->args->shape,
                          .params = j->params.data ? j->params.data : "",
                          .source = SDM_SOURCE_EXACT,
-                         .error_mm = j->report.union_error_mm,
+                         .error_mm = j->report.union_error_mm + j->bound_mm,
                          .origin = j->args->method};
     sdm_status s = SDM_OK;
     for (size_t i = 0; i < j->args->outputs.n && !s; i++)
@@ -179,6 +224,7 @@ static sdm_status print_json(const job *j, sdm_error *err)
     sdm_json json = {0};
     sdm_json_open(&json, NULL, '{');
     sdm_json_text(&json, "method", j->args->method);
+    sdm_json_real(&json, "error_bound_mm", j->bound_mm);
     sdm_json_real(&json, "ms_mesh", j->ms_mesh);
     sdm_json_real(&json, "ms_build", j->ms_build);
     sdm_json_real(&json, "ms_query", j->ms_query);
@@ -191,6 +237,7 @@ static sdm_status print_json(const job *j, sdm_error *err)
     sdm_json_bool(&json, "union", j->report.unioned);
     sdm_json_real(&json, "union_error_mm", j->report.union_error_mm);
     sdm_json_bool(&json, "turned", j->report.turned);
+    sdm_json_int(&json, "parts_turned", (int64_t)j->report.parts_turned);
     sdm_json_bool(&json, "closed", j->report.audit.closed);
     sdm_json_int(&json, "boundary_edges", (int64_t)j->report.audit.boundary_edges);
     sdm_json_int(&json, "nonmanifold_edges", (int64_t)j->report.audit.nonmanifold_edges);
@@ -198,6 +245,14 @@ static sdm_status print_json(const job *j, sdm_error *err)
     sdm_json_real(&json, "min_mm", (double)min);
     sdm_json_real(&json, "max_mm", (double)max);
     sdm_json_int(&json, "inside_voxels", inside);
+    if (j->certificate.checked) {
+        const sdm_sign_certificate *c = &j->certificate;
+        sdm_json_text(&json, "sign_compared", c->compared);
+        sdm_json_real(&json, "sign_checked", (double)c->checked / (double)c->voxels);
+        sdm_json_real(&json, "sign_agreed", (double)(c->checked - c->wrong) / (double)c->voxels);
+        sdm_json_int(&json, "sign_wrong", (int64_t)c->wrong);
+        sdm_json_int(&json, "below_zero", (int64_t)c->below_zero);
+    }
     sdm_json_text(&json, "values_crc64", hash);
     cli_json_grid(&json, "grid", &j->grid);
     sdm_json_close(&json, '}');
@@ -208,10 +263,13 @@ sdm_status cmd_exact(const cli_args *args, sdm_error *err)
 {
     job j = {.args = args};
     sdm_status s = get_mesh(&j, err);
-    if (!s) s = !strcmp(args->method, "naive") ? run_naive(&j, err) : run_engine(&j, err);
+    if (!s) s = strcmp(args->method, "exact") ? run_method(&j, err) : run_engine(&j, err);
     if (!s) notice_mesh(&j);
+    if (!s) notice_signs(&j);
     if (!s) s = write_outputs(&j, err);
+    if (!s) s = cli_layers_write(&j.layers, args, &j.grid, err);
     if (!s && args->json) s = print_json(&j, err);
+    cli_layers_dispose(&j.layers);
     sdm_free(j.values);
     sdm_mesh_dispose(&j.mesh);
     sdm_text_dispose(&j.params);

@@ -136,7 +136,7 @@ static sdm_status write_row(const job *j, size_t row, const sdm_result *result, 
                          .source = result->source,
                          .clamped = result->clamped,
                          .error_mm = result->error_mm,
-                         .origin = result->source == SDM_SOURCE_EXACT ? "exact engine" : origin};
+                         .origin = result->source == SDM_SOURCE_EXACT ? "exact" : origin};
     for (size_t i = 0; i < j->args->outputs.n && !s; i++) {
         const char *name = j->args->outputs.items[i];
         if (j->args->rows) {

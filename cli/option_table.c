@@ -53,8 +53,12 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "Checks the configuration, the shape's options and the ranges. --dump prints it with every key resolved; --keys\n"
      "lists every key with type, range, default and meaning.",
      "sdmgen config configs/cochlea.yaml network.depth=4 --dump", 0, SIZE_MAX, cmd_config},
-    {"bench", "exact | network MODEL", "short measurements of speed, with ratios",
-     "exact: the exact engine on the cochlea, 60 x 50 x 50 voxels of 0.2 mm, against the naive method.\n"
+    {"bench", "exact | network MODEL", "measurements of speed, with ratios",
+     "exact: time, memory and error of the exact engine, of the other methods (see exact --method) and of other "
+     "programs for\n"
+     "the same map: by default the cochlea on 60 x 50 x 50 voxels of 0.2 mm. One thread each, but for one row. Other "
+     "programs are\n"
+     "sdmgen-peer-NAME beside sdmgen or in libexec/sdmgen; what is missing is said.\n"
      "network: one map and a batch of a model on one core, against the exact engine.",
      "sdmgen bench exact", 1, 2, cmd_bench},
     {"help", "[COMMAND]", "print this text, the manual page or the bash completion", NULL,
@@ -63,37 +67,57 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
 
 const cli_option cli_options[] = {
     /* the shape and its parameters */
-    {"shape", 0, CLI_TEXT, "NAME", NULL, 0, 0, ON(CLI_EXACT) | ON(CLI_MESH), AT(shape), "shape, see `sdmgen shapes`"},
-    {"mesh", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_EXACT), AT(mesh), "mesh file instead of a shape"},
-    {"param", 'p', CLI_LIST, "name=value", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH), AT(params),
-     "value of a shape parameter; may be repeated"},
-    {"option", 'O', CLI_LIST, "name=value", NULL, 0, 0, ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_SHAPES), AT(options),
-     "value of a shape option; may be repeated"},
+    {"shape", 0, CLI_TEXT, "NAME", NULL, 0, 0, ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH), AT(shape),
+     "shape, see `sdmgen shapes`"},
+    {"mesh", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_EXACT) | ON(CLI_BENCH), AT(mesh), "mesh file instead of a shape"},
+    {"param", 'p', CLI_LIST, "name=value", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH),
+     AT(params), "value of a shape parameter; may be repeated"},
+    {"option", 'O', CLI_LIST, "name=value", NULL, 0, 0, ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_SHAPES) | ON(CLI_BENCH),
+     AT(options), "value of a shape option; may be repeated"},
     {"params", 0, CLI_TEXT, "FILE.csv", NULL, 0, 0, ON(CLI_GENERATE), AT(rows),
      "parameters from a table: a header of names, one output per row"},
 
     /* the grid */
-    {"size", 0, CLI_INT3, "NX,NY,NZ", NULL, 1, 1048576, ON(CLI_EXACT), AT(size), "voxels along x, y, z"},
-    {"spacing", 0, CLI_REAL13, "MM", NULL, 1e-9, 1e9, ON(CLI_EXACT), AT(spacing), "voxel edge, one number or three"},
-    {"origin", 0, CLI_REAL3, "X,Y,Z", NULL, -1e12, 1e12, ON(CLI_EXACT), AT(origin),
+    {"size", 0, CLI_INT3, "NX,NY,NZ", NULL, 1, 1048576, ON(CLI_EXACT) | ON(CLI_BENCH), AT(size),
+     "voxels along x, y, z"},
+    {"spacing", 0, CLI_REAL13, "MM", NULL, 1e-9, 1e9, ON(CLI_EXACT) | ON(CLI_BENCH), AT(spacing),
+     "voxel edge, one number or three"},
+    {"origin", 0, CLI_REAL3, "X,Y,Z", NULL, -1e12, 1e12, ON(CLI_EXACT) | ON(CLI_BENCH), AT(origin),
      "centre of the first voxel, LPS mm; default: the grid is centred on the mesh"},
 
     /* how */
     {"policy", 0, CLI_CHOICE, NULL, "refuse|clamp|exact", 0, 0, ON(CLI_GENERATE), AT(policy),
      "parameters outside the trained range: refuse (default), move to the nearest allowed value, or use the exact "
      "engine"},
-    {"method", 0, CLI_CHOICE, NULL, "exact|naive", 0, 0, ON(CLI_EXACT), AT(method),
-     "exact: the engine (default); naive: every triangle for every voxel, all surface counted"},
+    {"method", 0, CLI_CHOICE, NULL, "exact|naive|cells|octree|edt", 0, 0, ON(CLI_EXACT), AT(method),
+     "exact: the engine (default); naive: every triangle for every voxel, all surface counted; cells: uniform cells of "
+     "triangles (exact); octree: adaptive samples, off by at most --tolerance; edt: distance transform, the bound on "
+     "its "
+     "error is printed"},
+    {"narrow", 0, CLI_REAL, "N", NULL, 0.5, 1e6, ON(CLI_EXACT), AT(narrow),
+     "narrow band: only distances below N voxels (the smallest edge), all others become N voxels; cheaper"},
+    {"tolerance", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_EXACT), AT(tolerance),
+     "largest error of the method octree (default: a twentieth of the smallest voxel edge)"},
     {"sign", 0, CLI_CHOICE, NULL, "auto|crossings|pseudonormal|winding", 0, 0, ON(CLI_EXACT), AT(sign),
      "how inside is told from outside (default auto)"},
     {"keep-overlap", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_EXACT), AT(keep_overlap),
      "count surface inside the union too"},
+    {"certify", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_EXACT), AT(certify),
+     "find the sign of every voxel again along other axes and tell where it differs (method exact)"},
 
     /* the output */
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(outputs),
      "output: .vdb .nii .nii.gz .nrrd .mha .npy .ply .stl .obj .off .png; may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_MESH), AT(outputs),
      "output: .ply .stl .obj .off; may be repeated"},
+    {"closest", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(closest),
+     "also write the nearest surface point of every voxel: float32 [z][y][x][3], mm"},
+    {"normal", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(normal),
+     "also write the gradient of the distance, a unit vector: float32 [z][y][x][3]"},
+    {"triangle", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(triangle),
+     "also write the nearest triangle of the mesh, counted from 0: uint32 [z][y][x]"},
+    {"jacobian", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(jacobian),
+     "also write the derivatives by the shape's parameters: float32 [parameter][z][y][x], mm per unit"},
     {"audit", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_MESH), AT(audit), "examine the mesh and print what was found"},
     {"dense", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(dense),
      ".vdb: the whole map instead of a level set"},
@@ -114,6 +138,21 @@ const cli_option cli_options[] = {
      "exit code 4 when the mean squared error is above"},
     {"pictures", 0, CLI_TEXT, "DIR", NULL, 0, 0, ON(CLI_EVAL), AT(pictures),
      "write slices of the worst and the median shape: worst.png, median.png"},
+
+    {"grid", 0, CLI_CHOICE, NULL, "g1|g2", 0, 0, ON(CLI_BENCH), AT(grid),
+     "exact: 60 x 50 x 50 voxels of 0.2 mm (g1, default for the cochlea) or 256 x 256 x 192 of 0.047 mm (g2)"},
+    {"edge", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_BENCH), AT(edge),
+     "exact: mean edge length of the shape's mesh, as -O edge=MM"},
+    {"band", 0, CLI_REAL, "K", NULL, 0.5, 1000, ON(CLI_BENCH), AT(band),
+     "exact: only voxels up to K voxels from the surface count"},
+    {"share", 0, CLI_REAL, "F", NULL, 1e-6, 1, ON(CLI_BENCH), AT(share),
+     "exact: other programs do this share of the voxels, times are scaled (default 1; above a million voxels 0.01)"},
+    {"repeat", 0, CLI_INT, "N", NULL, 1, 1000, ON(CLI_BENCH), AT(repeat),
+     "exact: runs of each, the fastest counts; none is begun after 3 s (default 9)"},
+    {"peers", 0, CLI_TEXT, "DIR", NULL, 0, 0, ON(CLI_BENCH), AT(peers),
+     "exact: folder of the other programs; none: without them"},
+    {"growth", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_BENCH), AT(growth),
+     "exact: how the time grows, over three grids and three meshes"},
 
     /* texts */
     {"dump", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_CONFIG), AT(dump), "print the resolved configuration as YAML"},

@@ -76,14 +76,23 @@ struct cli_args {
     bool resume, force;                   /* train */
     bool dense, half;                     /* .vdb */
     bool keep_overlap, audit;             /* exact, mesh */
+    bool certify;                         /* exact */
+    double narrow;                        /* exact: voxels; 0: not given */
+    double tolerance;                     /* exact; 0: not given */
     bool dump, keys, markdown;            /* config, help */
     bool man, completion;                 /* help */
     const char *out, *rows, *policy;      /* train --out, generate --params, --policy */
     const char *shape, *mesh;             /* exact, mesh */
     const char *sign, *method, *pictures; /* exact, eval */
+    const char *closest, *normal;         /* exact */
+    const char *triangle, *jacobian;      /* exact */
     double band, max_mse, spacing[3], origin[3];
     int64_t size[3], samples, naive;
-    const char **memory; /* behind the lists */
+    const char *grid, *peers; /* bench */
+    double edge, share;       /* bench; 0: not given */
+    int64_t repeat;           /* bench; 0: not given */
+    bool growth;              /* bench */
+    const char **memory;      /* behind the lists */
 };
 
 extern const cli_command cli_commands[CLI_N_COMMANDS];

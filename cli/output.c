@@ -65,6 +65,9 @@ sdm_status cli_check_outputs(const cli_list *outputs, bool meshes_only, sdm_erro
     return s;
 }
 
+/* What made the map, in a word. */
+static const char *made_by(const cli_map *map) { return map->source == SDM_SOURCE_NETWORK ? "network" : map->origin; }
+
 static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args *args, sdm_error *err)
 {
 #ifdef SDM_HAVE_VDB
@@ -74,7 +77,7 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
         {"sdm_version", "sdmgen " SDM_VERSION_TEXT},
         {"sdm_shape", map->shape},
         {"sdm_parameters", map->params},
-        {"sdm_source", map->source == SDM_SOURCE_EXACT ? "exact" : "network"},
+        {"sdm_source", made_by(map)},
         {"sdm_origin", map->origin},
         {"sdm_clamped", map->clamped ? "yes" : "no"},
         {"sdm_error_rmse_mm", error},
@@ -113,7 +116,7 @@ static sdm_status write_surface(const char *path, const cli_map *map, sdm_error 
 static sdm_status write_picture(const char *path, const cli_map *map, sdm_error *err)
 {
     static const float levels[] = {0.0f, 1.0f};
-    const sdm_picture_map column = {map->source == SDM_SOURCE_EXACT ? "exact" : "network", map->values, false};
+    const sdm_picture_map column = {made_by(map), map->values, false};
     return sdm_picture_slices(path, map->grid, &column, 1, levels, 2, err);
 }
 
@@ -125,7 +128,7 @@ sdm_status cli_write_map(const char *path, const cli_map *map, const cli_args *a
         return write_vdb(path, map, args, err);
     case KIND_IMAGE:
         snprintf(text, sizeof text, "sdmgen %s: %s %s, mm, negative inside, %s", SDM_VERSION_TEXT, map->shape,
-                 map->params, map->source == SDM_SOURCE_EXACT ? "exact" : "network");
+                 map->params, made_by(map));
         return sdm_image_write(path, map->grid, map->values, text, err);
     case KIND_SURFACE:
         return write_surface(path, map, err);

@@ -1,0 +1,155 @@
+/* The frame of a peer program: arguments, timing, memory, results. */
+#include "peer.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
+#include "sdm/image.h"
+#include "sdm/meshfile.h"
+#include "sdm/text.h"
+
+namespace
+{
+
+constexpr double enough_s = 3; // no further run after this
+
+double clock_s(clockid_t clock)
+{
+    timespec t{};
+    (void)clock_gettime(clock, &t);
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+/* A line "NAME:  123 kB" of /proc/self/status; -1 when there is none. */
+long status_kb(const char *name)
+{
+    FILE *f = std::fopen("/proc/self/status", "r");
+    char line[256];
+    long kb = -1;
+    while (f && std::fgets(line, sizeof line, f))
+        if (!std::strncmp(line, name, std::strlen(name))) kb = std::strtol(line + std::strlen(name) + 1, nullptr, 10);
+    if (f) std::fclose(f);
+    return kb;
+}
+
+/* Starts a new high-water mark of the resident memory (Linux) and returns what is resident now. */
+long start_peak()
+{
+#ifdef __GLIBC__
+    malloc_trim(0);
+#endif
+    FILE *f = std::fopen("/proc/self/clear_refs", "w");
+    if (!f) return -1;
+    std::fputs("5", f);
+    return std::fclose(f) ? -1 : status_kb("VmRSS");
+}
+
+double real(const char *text)
+{
+    double v = 0;
+    if (!sdm_parse_real(text, &v)) throw std::runtime_error(std::string("not a number: ") + text);
+    return v;
+}
+
+void check(sdm_status s, const sdm_error &err)
+{
+    if (s) throw std::runtime_error(err.text);
+}
+
+void read_job(int argc, char **argv, peer::job &j)
+{
+    if (argc != 15) throw std::runtime_error("arguments: MESH NX NY NZ OX OY OZ SX SY SZ SHARE BAND REPEAT VALUES.npy");
+    sdm_error err{};
+    check(sdm_mesh_read(argv[1], &j.mesh, &err), err);
+    const double zero[3] = {0, 0, 0};
+    int64_t n[3];
+    for (int i = 0; i < 3; i++) n[i] = static_cast<int64_t>(real(argv[2 + i]));
+    j.grid = sdm_grid_centred(n, 1, zero);
+    for (int i = 0; i < 3; i++) {
+        j.grid.origin[i] = real(argv[5 + i]);
+        j.grid.spacing[i] = real(argv[8 + i]);
+    }
+    check(sdm_grid_check(&j.grid, &err), err);
+    j.share = real(argv[11]);
+    j.band = real(argv[12]);
+    j.repeat = static_cast<int>(real(argv[13]));
+}
+
+/* Share of the rows that has_row() takes. */
+double exact_share(const peer::job &j)
+{
+    const int64_t rows = j.grid.n[1] * j.grid.n[2];
+    int64_t done = 0;
+    for (int64_t r = 0; r < rows; r++) done += j.has_row(r);
+    return static_cast<double>(done) / static_cast<double>(rows);
+}
+
+void measure(const char *path, const peer::job &j, const peer::about &a,
+             const std::function<peer::map_function(const peer::job &)> &prepare)
+{
+    std::vector<float> values(sdm_grid_count(&j.grid), std::numeric_limits<float>::quiet_NaN());
+    double prepare_s = HUGE_VAL, map_s = HUGE_VAL;
+    const long before = start_peak();
+    long peak = -1;
+    const double begin = clock_s(CLOCK_MONOTONIC);
+    for (int i = 0; i < std::max(1, j.repeat) && (i == 0 || clock_s(CLOCK_MONOTONIC) - begin < enough_s); i++) {
+        const double start = clock_s(CLOCK_PROCESS_CPUTIME_ID);
+        const peer::map_function map = prepare(j);
+        const double ready = clock_s(CLOCK_PROCESS_CPUTIME_ID);
+        map(values.data());
+        const double end = clock_s(CLOCK_PROCESS_CPUTIME_ID);
+        if (end - start < prepare_s + map_s) {
+            prepare_s = ready - start;
+            map_s = end - ready;
+        }
+        if (i == 0 && before >= 0) peak = std::max(0L, status_kb("VmHWM") - before);
+    }
+    const size_t shape[3] = {static_cast<size_t>(j.grid.n[2]), static_cast<size_t>(j.grid.n[1]),
+                             static_cast<size_t>(j.grid.n[0])};
+    sdm_error err{};
+    check(sdm_npy_write(path, values.data(), shape, 3, &err), err);
+
+    sdm_json out{};
+    sdm_json_open(&out, nullptr, '{');
+    sdm_json_real(&out, "prepare_ms", 1e3 * prepare_s);
+    sdm_json_real(&out, "map_ms", 1e3 * map_s);
+    sdm_json_real(&out, "share", a.whole ? 1 : exact_share(j));
+    sdm_json_int(&out, "peak_kb", peak);
+    sdm_json_bool(&out, "band", a.band);
+    sdm_json_text(&out, "version", a.version.c_str());
+    sdm_json_text(&out, "note", a.note.c_str());
+    sdm_json_close(&out, '}');
+    if (!out.text.failed) std::puts(out.text.data);
+    sdm_json_dispose(&out);
+}
+
+} // namespace
+
+int peer::run(int argc, char **argv, const about &a, const std::function<map_function(const job &)> &prepare)
+{
+    job j;
+    int code = 0;
+    try {
+        read_job(argc, argv, j);
+        measure(argv[14], j, a, prepare);
+    } catch (const std::exception &e) {
+        sdm_json out{};
+        sdm_json_open(&out, nullptr, '{');
+        sdm_json_text(&out, "error", e.what());
+        sdm_json_close(&out, '}');
+        if (!out.text.failed) std::puts(out.text.data);
+        sdm_json_dispose(&out);
+        code = 1;
+    }
+    sdm_mesh_dispose(&j.mesh);
+    return code;
+}

@@ -1,0 +1,90 @@
+"""The frame of a peer program in Python: arguments, mesh, timing, memory, results. The protocol is in peer.h."""
+import json
+import re
+import sys
+import time
+
+try:
+    import numpy as np
+except ImportError:
+    print(json.dumps({"error": "NumPy is missing: install python3-numpy"}))
+    sys.exit(1)
+
+ENOUGH_S = 3  # no further run after this
+
+
+def read_ply(path):
+    """vert[n][3] in double and tri[n][3] of a file as sdmgen writes it: binary, little endian, triangles."""
+    with open(path, "rb") as f:
+        data = f.read()
+    start = data.index(b"end_header\n") + 11
+    header = data[:start].decode("ascii")
+    n_vert, n_tri = (int(re.search(rf"element {what} (\d+)", header).group(1)) for what in ("vertex", "face"))
+    vert = np.frombuffer(data, "<f8", 3 * n_vert, start).reshape(-1, 3)
+    face = np.dtype([("n", "u1"), ("v", "<i4", 3)])
+    return vert, np.frombuffer(data, face, n_tri, start + 24 * n_vert)["v"].astype(np.int64)
+
+
+class Job:
+    def __init__(self, arguments):
+        if len(arguments) != 14:
+            raise ValueError("arguments: MESH NX NY NZ OX OY OZ SX SY SZ SHARE BAND REPEAT VALUES.npy")
+        self.vert, self.tri = read_ply(arguments[0])
+        self.n = [int(a) for a in arguments[1:4]]
+        self.origin = np.array([float(a) for a in arguments[4:7]])
+        self.spacing = np.array([float(a) for a in arguments[7:10]])
+        self.share, self.band = float(arguments[10]), float(arguments[11])
+        self.repeat, self.out = int(arguments[12]), arguments[13]
+        turn = np.arange(self.n[1] * self.n[2]) * 0.6180339887498949
+        self.rows = np.flatnonzero(turn - np.floor(turn) < self.share)
+
+    def points(self):
+        """Voxel centres of the rows of the share, [rows * nx][3]."""
+        x = np.empty((len(self.rows), self.n[0], 3))
+        x[..., 0] = self.origin[0] + self.spacing[0] * np.arange(self.n[0])
+        x[..., 1] = (self.origin[1] + self.spacing[1] * (self.rows % self.n[1]))[:, None]
+        x[..., 2] = (self.origin[2] + self.spacing[2] * (self.rows // self.n[1]))[:, None]
+        return x.reshape(-1, 3)
+
+
+def status_kb(name):
+    with open("/proc/self/status", encoding="ascii") as f:
+        return int(re.search(rf"{name}:\s*(\d+)", f.read()).group(1))
+
+
+def start_peak():
+    """Starts a new high-water mark of the resident memory (Linux) and returns what is resident now."""
+    try:
+        with open("/proc/self/clear_refs", "w", encoding="ascii") as f:
+            f.write("5")
+        return status_kb("VmRSS")
+    except (OSError, AttributeError):
+        return -1
+
+
+def run(version, note, prepare, whole=False, band=False):
+    """prepare(job) returns a function that returns the values: of the rows' voxels, or with `whole` of all, [nz][ny][nx]."""
+    try:
+        job = Job(sys.argv[1:])
+        best, before, peak, begin = None, start_peak(), -1, time.monotonic()
+        for i in range(max(1, job.repeat)):
+            start = time.process_time()
+            compute = prepare(job)
+            ready = time.process_time()
+            values = compute()
+            times = (ready - start, time.process_time() - ready)
+            best = times if best is None else min(best, times, key=sum)
+            if i == 0 and before >= 0:
+                peak = max(0, status_kb("VmHWM") - before)
+            if time.monotonic() - begin > ENOUGH_S:
+                break
+        out = np.full((job.n[1] * job.n[2], job.n[0]), np.nan, np.float32)
+        rows = slice(None) if whole else job.rows
+        out[rows] = np.asarray(values).reshape(-1, job.n[0])
+        np.save(job.out, out.reshape(job.n[2], job.n[1], job.n[0]))
+        share = 1 if whole else len(job.rows) / (job.n[1] * job.n[2])
+        print(json.dumps({"prepare_ms": 1e3 * best[0], "map_ms": 1e3 * best[1], "share": share, "peak_kb": peak,
+                          "band": band, "version": version, "note": note}))
+    except Exception as e:  # whatever a library throws is this peer's result
+        print(json.dumps({"error": f"{type(e).__name__}: {e}"}))
+        sys.exit(1)

@@ -111,4 +111,15 @@ grep -q __asan_init "$program" ||
 absent x.npy x.xyz nowhere
 expect 0 '^sdmgen: the mesh is open: [0-9]+ boundary edges' sdmgen exact --mesh open.off "${grid[@]}" -o open.npy
 expect 0 - sdmgen exact --mesh open.off "${grid[@]}" -o open.npy --quiet
+
+# the certificate of the signs
+expect 0 '343 of 343 voxels compared with crossings along y and z, all agree' sdmgen exact --mesh cube.off "${grid[@]}" --json --certify
+near "$(json sign_checked)" 1 0
+near "$(json sign_agreed)" 1 0
+expect 0 - sdmgen exact --mesh open.off "${grid[@]}" --json --certify --quiet
+[ "$(json sign_compared)" = 'crossings along y and z and the boundary' ] || bad 'what the signs were compared with'
+near "$(json sign_agreed)" 1 0
+expect 0 - sdmgen exact --mesh open.off "${grid[@]}" --json --quiet
+[ -z "$(json sign_checked)" ] || bad 'a certificate nobody asked for'
+expect 2 'certify belongs to --method exact' sdmgen exact --mesh cube.off "${grid[@]}" --json --certify --method naive
 finish

@@ -3,6 +3,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -314,12 +315,139 @@ static void test_shaken_spheres(void **state)
     }
 }
 
+/* Twice the vector of the triangle's area; returns its length. */
+static double area_vector(const double a[3], const double b[3], const double c[3], double n[3])
+{
+    for (int i = 0; i < 3; i++) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3;
+        n[i] = (b[j] - a[j]) * (c[k] - a[k]) - (b[k] - a[k]) * (c[j] - a[j]);
+    }
+    return sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+}
+
+/* Every triangle of the surface lies in the plane and inside of the triangle it comes from and has its orientation; a surface without
+   overlap is the mesh itself. */
+static void check_source(const sdm_mesh *m, const sdm_exact_opts *o)
+{
+    sdm_exact *e = engine(m, o);
+    const sdm_mesh *surface = sdm_exact_surface(e);
+    const uint32_t *source = sdm_exact_source(e);
+    for (size_t t = 0; t < surface->n_tri; t++) {
+        assert_true(source[t] < m->n_tri);
+        if (!sdm_exact_get_report(e)->unioned) assert_int_equal(source[t], t);
+        double v[3][3], part[3][3], normal[3], n[3];
+        for (size_t k = 0; k < 3; k++) {
+            memcpy(v[k], &m->vert[3 * (size_t)m->tri[3 * (size_t)source[t] + k]], sizeof v[k]);
+            memcpy(part[k], &surface->vert[3 * (size_t)surface->tri[3 * t + k]], sizeof part[k]);
+        }
+        const double area = area_vector(v[0], v[1], v[2], normal), size = area_vector(part[0], part[1], part[2], n);
+        const double turned = sdm_exact_get_report(e)->turned ? -1 : 1;
+        assert_true(size > 0 && size <= area * (1 + 1e-9));
+        assert_true(turned * (n[0] * normal[0] + n[1] * normal[1] + n[2] * normal[2]) > 0);
+        for (size_t k = 0; k < 3; k++) {
+            // the corner's shares of the source, by areas, make it up and are not negative
+            double sum[3] = {0, 0, 0};
+            for (size_t i = 0; i < 3; i++) {
+                const double a = area_vector(part[k], v[(i + 1) % 3], v[(i + 2) % 3], n);
+                const double share =
+                    (n[0] * normal[0] + n[1] * normal[1] + n[2] * normal[2]) < 0 ? -a / area : a / area;
+                assert_true(share > -1e-9);
+                for (int c = 0; c < 3; c++) sum[c] += share * v[i][c];
+            }
+            assert_true(distance(sum, part[k]) < 1e-9);
+        }
+    }
+    sdm_exact_free(e);
+}
+
+static void test_source(void **state)
+{
+    (void)state;
+    const spiral s = {2.0, 0.2, 0.6, 0.3, 9, 0.25};
+    sdm_mesh m = {0}, b = {0};
+    mesh_spiral(&m, &s, 0.6);
+    check_source(&m, NULL);
+    check_source(&m, &(sdm_exact_opts){.keep_overlap = true});
+    mesh_flip(&m);
+    check_source(&m, NULL);
+    mesh_sphere(&m, (const double[3]){0, 0, 0}, 1, 9);
+    check_source(&m, NULL);
+    mesh_sphere(&b, (const double[3]){0.7, 0.1, 0.2}, 1, 13);
+    mesh_append(&m, &b);
+    check_source(&m, NULL);
+    sdm_mesh_dispose(&m);
+    sdm_mesh_dispose(&b);
+}
+
+/* Triangles around one vertex that pass through each other: a pyramid of a pentagram, whose neighbouring faces are in order. */
+static void test_fan_that_goes_round_twice(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0};
+    mesh_make(&m, 7, 10);
+    for (size_t i = 0; i < 5; i++) mesh_vertex(&m, i, cos(4 * pi * (double)i / 5), sin(4 * pi * (double)i / 5), 0);
+    mesh_vertex(&m, 5, 0, 0, 1);
+    mesh_vertex(&m, 6, 0, 0, -1);
+    for (size_t i = 0; i < 5; i++) {
+        mesh_triangle(&m, i, i, (i + 1) % 5, 5);
+        mesh_triangle(&m, 5 + i, (i + 1) % 5, i, 6);
+    }
+    sdm_exact *e = engine(&m, NULL);
+    assert_true(sdm_exact_get_report(e)->unioned && sdm_exact_get_report(e)->sign == SDM_SIGN_CROSSINGS);
+    // in the plane z = 0 what is left is the outline of the star; from the middle its notches are nearest
+    double q[3];
+    const double notch = cos(2 * pi / 5) / cos(pi / 5);
+    const double d = sdm_exact_point(e, (const double[3]){0, 0, 0}, q, NULL, NULL);
+    // the valley from the notch (radius `notch`) up to the tip: distance of the middle from that line
+    assert_true(fabs(d + notch / sqrt(1 + notch * notch)) < 1e-12);
+    for (size_t i = 0; i < 3 * sdm_exact_surface(e)->n_vert; i += 3) {
+        const double *v = &sdm_exact_surface(e)->vert[i];
+        assert_true(fabs(v[2]) > 1e-9 || sqrt(v[0] * v[0] + v[1] * v[1]) > notch - 1e-9);
+    }
+    sdm_exact_free(e);
+    sdm_mesh_dispose(&m);
+}
+
+/* Whatever the limit, the engine is made or says what it needs; the limit that suffices is near what it takes. */
+static void test_memory_limit(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0}, b = {0};
+    mesh_sphere(&m, (const double[3]){0, 0, 0}, 1, 12);
+    for (int i = 0; i < 6; i++) {
+        mesh_sphere(&b, (const double[3]){0.01 * i, 0.02 * i, -0.013 * i}, 1, 12);
+        mesh_append(&m, &b);
+    }
+    size_t limit = 10000;
+    int refused = 0;
+    for (;; limit += limit / 16) {
+        sdm_exact *e = NULL;
+        sdm_error err = {0};
+        const sdm_status s = sdm_exact_create(&m, &(sdm_exact_opts){.memory_limit = limit}, &e, &err);
+        sdm_exact_free(e);
+        if (!s) break;
+        char text[32];
+        (void)snprintf(text, sizeof text, "memory_limit is %zu", limit);
+        assert_int_equal(s, SDM_E_NOMEM);
+        assert_null(e);
+        assert_non_null(strstr(err.text, text));
+        refused++;
+    }
+    assert_true(refused > 20);
+    // many triangles meet here: more than meshes without overlap take, but not without measure
+    assert_true(limit > 500 * m.n_tri && limit < 8000 * m.n_tri);
+    sdm_mesh_dispose(&m);
+    sdm_mesh_dispose(&b);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_two_spheres),  cmocka_unit_test(test_boxes_with_coplanar_faces),
         cmocka_unit_test(test_random_boxes), cmocka_unit_test(test_spiral_against_swept_sphere),
         cmocka_unit_test(test_dense_points), cmocka_unit_test(test_shaken_spheres),
+        cmocka_unit_test(test_source),       cmocka_unit_test(test_fan_that_goes_round_twice),
+        cmocka_unit_test(test_memory_limit),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

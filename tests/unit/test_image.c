@@ -461,6 +461,10 @@ static void test_misuse(void **state)
     assert_int_equal(sdm_npy_write("a.npy", v, shape, 2, &err), SDM_E_ARG);
     assert_int_equal(sdm_npy_write("a.npy", v, shape, 0, &err), SDM_E_ARG);
     assert_int_equal(sdm_npy_write("a.npy", v, shape, 5, &err), SDM_E_ARG);
+    const uint32_t u[1] = {1};
+    assert_int_equal(sdm_npy_write_uint32(NULL, u, shape, 1, &err), SDM_E_ARG);
+    assert_int_equal(sdm_npy_write_uint32("a.npy", NULL, shape, 1, &err), SDM_E_ARG);
+    assert_int_equal(sdm_npy_write_uint32("a.npy", u, shape, 5, &err), SDM_E_ARG);
     g.spacing[1] = NAN;
     assert_int_equal(sdm_image_write("a.nii", &g, v, "", &err), SDM_E_ARG);
     /* too large for NIfTI's int16, and nothing may be left behind */

@@ -9,6 +9,7 @@
 
 #include "oracle/exact_meshes.h"
 #include "sdm/memory.h"
+#include "sdm/rng.h"
 
 static const double zero[3] = {0, 0, 0}, one[3] = {1, 1, 1};
 
@@ -98,6 +99,25 @@ static void test_flaws(void **state)
     sdm_mesh_dispose(&m);
 }
 
+/* Both sides of a sheet: the volume is 0, and what rounding makes of it says nothing. */
+static void test_volume_of_rounding(void **state)
+{
+    (void)state;
+    int negative = 0;
+    for (uint64_t i = 0; i < 100; i++) {
+        sdm_mesh m = {0};
+        mesh_make(&m, 3, 2);
+        for (size_t c = 0; c < 9; c++) m.vert[c] = sdm_rng_uniform(5, i, c);
+        mesh_triangle(&m, 0, 0, 1, 2);
+        mesh_triangle(&m, 1, 1, 0, 2);
+        const sdm_audit a = audit_of(&m);
+        assert_true(a.closed && !a.inverted);
+        negative += a.volume < 0;
+        sdm_mesh_dispose(&m);
+    }
+    assert_true(negative > 10);
+}
+
 static void test_soup_is_welded(void **state)
 {
     (void)state;
@@ -144,6 +164,82 @@ static void test_components_and_crossings(void **state)
     assert_int_equal(audit_of(&m).self_intersections, 0);
     sdm_mesh_dispose(&m);
     sdm_mesh_dispose(&b);
+}
+
+/* Does the segment from p to q pass through the triangle v? In general position. */
+static bool passes(const double p[3], const double q[3], const double v[3][3])
+{
+    double side[3], normal[3], h[2];
+    for (int k = 0; k < 3; k++) {
+        // volume of p, q and an edge: on which side of the edge the line passes
+        double a[3], b[3], c[3];
+        for (int i = 0; i < 3; i++) {
+            a[i] = q[i] - p[i];
+            b[i] = v[k][i] - p[i];
+            c[i] = v[(k + 1) % 3][i] - p[i];
+        }
+        side[k] = 0;
+        for (int i = 0; i < 3; i++)
+            side[k] += a[i] * (b[(i + 1) % 3] * c[(i + 2) % 3] - b[(i + 2) % 3] * c[(i + 1) % 3]);
+    }
+    for (int i = 0; i < 3; i++) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3;
+        normal[i] = (v[1][j] - v[0][j]) * (v[2][k] - v[0][k]) - (v[1][k] - v[0][k]) * (v[2][j] - v[0][j]);
+    }
+    for (int e = 0; e < 2; e++) {
+        h[e] = 0;
+        for (int i = 0; i < 3; i++) h[e] += normal[i] * ((e ? q : p)[i] - v[0][i]);
+    }
+    return (side[0] > 0) == (side[1] > 0) && (side[0] > 0) == (side[2] > 0) && (h[0] > 0) != (h[1] > 0);
+}
+
+static bool cross(const double a[3][3], const double b[3][3])
+{
+    bool met = false;
+    for (int k = 0; k < 3; k++) met = met || passes(a[k], a[(k + 1) % 3], b) || passes(b[k], b[(k + 1) % 3], a);
+    return met;
+}
+
+/* Random meshes of triangles, some of which share vertices, against all pairs by brute force; sizes up to 1 : 1000. */
+static void test_crossings_of_random_triangles(void **state)
+{
+    (void)state;
+    size_t total = 0;
+    for (uint64_t round = 0; round < 30; round++) {
+        const size_t n = 20 + 40 * (size_t)(round % 7);
+        sdm_mesh m = {0};
+        mesh_make(&m, 3 * n, n);
+        for (size_t t = 0; t < n; t++) {
+            const double size = 1.5 * pow(10, -3 * sdm_rng_uniform(5, round, 20 * t));
+            for (size_t k = 0; k < 3; k++) {
+                double x[3];
+                for (size_t i = 0; i < 3; i++)
+                    x[i] = 3 * sdm_rng_uniform(5, round, 20 * t + 1 + i) +
+                           size * sdm_rng_uniform(5, round, 20 * t + 4 + 3 * k + i);
+                mesh_vertex(&m, 3 * t + k, x[0], x[1], x[2]);
+            }
+            mesh_triangle(&m, t, 3 * t, 3 * t + 1, 3 * t + 2);
+            // every third takes its first corner from another
+            if (t % 3 == 2) m.tri[3 * t] = m.tri[3 * (size_t)(sdm_rng_uniform(5, round, 20 * t + 15) * (double)t)];
+        }
+        size_t count = 0;
+        for (size_t i = 0; i < n; i++) {
+            for (size_t j = i + 1; j < n; j++) {
+                double a[3][3], b[3][3];
+                bool shared = false;
+                for (size_t k = 0; k < 9; k++) shared = shared || m.tri[3 * i + k / 3] == m.tri[3 * j + k % 3];
+                for (size_t k = 0; k < 3; k++) {
+                    memcpy(a[k], &m.vert[3 * m.tri[3 * i + k]], sizeof a[k]);
+                    memcpy(b[k], &m.vert[3 * m.tri[3 * j + k]], sizeof b[k]);
+                }
+                count += !shared && cross((const double(*)[3])a, (const double(*)[3])b);
+            }
+        }
+        assert_int_equal(audit_of(&m).self_intersections, count);
+        total += count;
+        sdm_mesh_dispose(&m);
+    }
+    assert_true(total > 300);
 }
 
 static void test_misuse(void **state)
@@ -195,8 +291,10 @@ int main(void)
         cmocka_unit_test(test_storage),
         cmocka_unit_test(test_box),
         cmocka_unit_test(test_flaws),
+        cmocka_unit_test(test_volume_of_rounding),
         cmocka_unit_test(test_soup_is_welded),
         cmocka_unit_test(test_components_and_crossings),
+        cmocka_unit_test(test_crossings_of_random_triangles),
         cmocka_unit_test(test_misuse),
         cmocka_unit_test(test_memory_is_short),
     };

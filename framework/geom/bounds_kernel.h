@@ -30,8 +30,8 @@ static inline v8f length8(point8 w, point8 *unit)
 /* A point of the surface near the middle of each part: its distance d, the unit vector g from it to the middle, and what limit8() is
    made of. */
 typedef struct reference8 {
-    _Alignas(32) float d[8], g[3][8], base[8], bend[8];
-    float most, band;
+    _Alignas(32) float d[8], g[3][8], base[8], bend[8], most[8];
+    float band;
 } reference8;
 
 static inline void set_limits(const sdm_grid_job *job, const sdm_grid_parts *q, reference8 *n)
@@ -39,7 +39,15 @@ static inline void set_limits(const sdm_grid_job *job, const sdm_grid_parts *q, 
     const v8f d = v8_load(n->d), r = v8_all(q->radius);
     v8_store(n->base, d + v8_all(4 * job->error) + (d + r) * v8_all(SDM_CULL));
     v8_store(n->bend, r * r / (d + d + v8_all(SDM_TINY)));
-    n->most = 2 * q->radius;
+    // a corner is at most that much farther from the reference than the middle
+    v8f most = r;
+    if (job->aligned) {
+        const point8 g = p8_load((const float(*)[8])n->g);
+        const point8 w = {v8_fma(v8_abs(g.x), d, v8_all(q->half[0])), v8_fma(v8_abs(g.y), d, v8_all(q->half[1])),
+                          v8_fma(v8_abs(g.z), d, v8_all(q->half[2]))};
+        most = v8_min(most, v8_sqrt(p8_dot(w, w)) - d + d * v8_all(SDM_CULL));
+    }
+    v8_store(n->most, most);
     n->band = job->band + q->radius * (1 + SDM_CULL) + 4 * job->error;
 }
 
@@ -61,7 +69,7 @@ typedef struct view8 {
 
 static inline view8 view_all(const reference8 *n, point8 p)
 {
-    return (view8){p, p8_load(n->g), v8_load(n->base), v8_load(n->bend), v8_all(n->most), v8_all(n->band)};
+    return (view8){p, p8_load(n->g), v8_load(n->base), v8_load(n->bend), v8_load(n->most), v8_all(n->band)};
 }
 
 static inline view8 view_one(const reference8 *n, const sdm_points *middle, int i)
@@ -70,7 +78,7 @@ static inline view8 view_one(const reference8 *n, const sdm_points *middle, int 
                    p8_all(n->g[0][i], n->g[1][i], n->g[2][i]),
                    v8_all(n->base[i]),
                    v8_all(n->bend[i]),
-                   v8_all(n->most),
+                   v8_all(n->most[i]),
                    v8_all(n->band)};
 }
 
@@ -78,7 +86,8 @@ static inline view8 view_one(const reference8 *n, const sdm_points *middle, int 
    from the middle its distance is at least d + g . x, that of the reference at most d' + g' . x + |x|^2 / (2 d'). */
 static inline v8f limit8(const sdm_grid_parts *q, bool aligned, const view8 *v, point8 g)
 {
-    return v8_min(v->band, v->base + v8_min(v->most, extent(q, aligned, p8_sub(g, v->g)) + v->bend));
+    return v8_min(v->band,
+                  v->base + v8_min(v->most + extent(q, aligned, g), extent(q, aligned, p8_sub(g, v->g)) + v->bend));
 }
 
 #endif

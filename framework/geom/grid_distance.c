@@ -134,13 +134,17 @@ static void set_voxels(sdm_grid_job *job, const sdm_grid_parts *in_vector)
         for (int i = 0; i < 8; i++) {
             const int64_t *p = job->part[SDM_TO_VECTORS].first[v], *q = in_vector->first[i];
             const int64_t index = ((p[2] + q[2]) * tile[1] + p[1] + q[1]) * tile[0] + p[0] + q[0];
-            double at[3], x[3];
-            for (int a = 0; a < 3; a++) at[a] = (double)(p[a] + q[a]) - 0.5 * (double)(tile[a] - 1);
+            double at[3], from_middle[3], x[3], y[3];
+            for (int a = 0; a < 3; a++) {
+                at[a] = (double)(p[a] + q[a]);
+                from_middle[a] = at[a] - 0.5 * (double)(tile[a] - 1);
+            }
             offset(job, at, x);
+            offset(job, from_middle, y);
             job->voxel_in_tile[v][i] = (uint8_t)index;
             for (int c = 0; c < 3; c++) {
                 job->tile_voxel[c][index] = x[c];
-                job->voxel[v].x[c][i] = (float)(x[c] * job->features->scale);
+                job->voxel[v].x[c][i] = (float)(y[c] * job->features->scale);
             }
         }
     }

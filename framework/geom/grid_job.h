@@ -44,7 +44,7 @@ typedef struct sdm_grid_job {
     sdm_grid_parts part[SDM_GRID_STEPS];
     sdm_points voxel[8];                   /* of each vector, relative to the middle of the tile */
     uint8_t voxel_in_tile[8][8];           /* [vector][lane] number of the voxel in its tile, x fastest */
-    _Alignas(64) double tile_voxel[3][64]; /* voxels of a tile relative to its middle, mm */
+    _Alignas(64) double tile_voxel[3][64]; /* voxels of a tile relative to its first, mm */
     uint8_t lanes_of[256][8];              /* the lanes of a mask in order */
     float error;                           /* bound on the error of a linear function at a part's middle */
     size_t limit;                          /* bytes of scratch a thread may take, 0: no limit */

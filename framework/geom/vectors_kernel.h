@@ -8,7 +8,7 @@ typedef struct tile {
     const sdm_grid_job *job;
     sdm_grid_scratch *s;
     int64_t first[3];                /* voxel */
-    double middle[3];                /* mm */
+    double middle[3], corner[3];     /* mm: of the tile, of its first voxel */
     int wanted;                      /* vectors that begin inside the grid */
     size_t begin[SDM_FEATURE_KINDS]; /* groups of each kind */
     size_t end[SDM_FEATURE_KINDS];

@@ -138,7 +138,7 @@ static void choose_features(const tile *t, voxels *x)
         for (int open = 0xff & ~clear; open; open &= open - 1) {
             const int lane = __builtin_ctz((unsigned)open), i = place[lane];
             double p[3];
-            for (int a = 0; a < 3; a++) p[a] = t->middle[a] + job->tile_voxel[a][i];
+            for (int a = 0; a < 3; a++) p[a] = t->corner[a] + job->tile_voxel[a][i];
             x->settled[x->n_settled] = (uint8_t)i;
             x->number[i] =
                 settle(t, v, lane, limit[lane] >= 0 ? limit[lane] : INFINITY, p, &x->settled_d2[x->n_settled]);
@@ -151,12 +151,12 @@ static void choose_features(const tile *t, voxels *x)
 static void measure_voxels(const tile *t, voxels *x)
 {
     const double(*at)[64] = (const double(*)[64])t->job->tile_voxel;
-    const double *m = t->middle;
+    const double *c = t->corner;
     uint32_t number[64];
     for (int i = 0; i < 64; i++) number[i] = x->number[i] == SDM_NONE ? 0 : x->number[i];
     for (int i = 0; i < 64; i += 4)
-        measure_four(t->job->features->exact, &number[i], v4_all(m[0]) + v4_load(&at[0][i]),
-                     v4_all(m[1]) + v4_load(&at[1][i]), v4_all(m[2]) + v4_load(&at[2][i]), &x->d2[i]);
+        measure_four(t->job->features->exact, &number[i], v4_all(c[0]) + v4_load(&at[0][i]),
+                     v4_all(c[1]) + v4_load(&at[1][i]), v4_all(c[2]) + v4_load(&at[2][i]), &x->d2[i]);
     for (int i = 0; i < x->n_settled; i++) x->d2[x->settled[i]] = x->settled_d2[i];
 }
 

@@ -5,7 +5,7 @@
 #include "grid_job.h"
 #include "lanes.h"
 
-#define SDM_CULL 1e-3f // rounding of bounds, relative: they need not be tight
+#define SDM_CULL 1e-3f // more than two errors of v8_rsqrt(), relative
 #define SDM_TINY 1e-30f
 
 /* Largest change of a linear function with gradient g from the middle of a part to its corners. */
@@ -19,7 +19,7 @@ static inline v8f extent(const sdm_grid_parts *q, bool aligned, point8 g)
     return sum;
 }
 
-/* Length of w (not quite 0); *unit: its direction. Good to SDM_CULL. */
+/* Length of w and its direction (shorter than a unit vector where w is nearly 0), each good to half of SDM_CULL. */
 static inline v8f length8(point8 w, point8 *unit)
 {
     const v8f d2 = p8_dot(w, w) + v8_all(SDM_TINY), inverse = v8_rsqrt(d2);
@@ -47,8 +47,8 @@ static inline void set_limits(const sdm_grid_job *job, const sdm_grid_parts *q, 
                           v8_fma(v8_abs(g.z), d, v8_all(q->half[2]))};
         most = v8_min(most, v8_sqrt(p8_dot(w, w)) - d + d * v8_all(SDM_CULL));
     }
-    v8_store(n->most, most);
-    n->band = job->band + q->radius * (1 + SDM_CULL) + 4 * job->error;
+    v8_store(n->most, v8_max(most, v8_all(0)));
+    n->band = (job->band + q->radius) * (1 + SDM_CULL) + 4 * job->error;
 }
 
 /* p: the middles; at: the points of the surface. */

@@ -11,6 +11,9 @@
 #include "grid_job.h"
 #include "sdm/memory.h"
 
+// in edges: beyond it all features are equally near in single precision
+#define FARTHEST 1e5
+
 static int wanted_level = -1;
 
 // the level to use when `level` is wanted; -1: the best of the machine
@@ -56,6 +59,15 @@ int sdm_thread_count(int n_threads)
 #endif
 }
 
+static bool is_first_thread(void)
+{
+#ifdef _OPENMP
+    return omp_get_thread_num() == 0;
+#else
+    return true;
+#endif
+}
+
 /* Position of voxel `at` (may be fractional) relative to voxel (0, 0, 0). */
 static void offset(const sdm_grid_job *job, const double at[3], double out[3])
 {
@@ -72,11 +84,15 @@ static double step_length(const sdm_grid_job *job, int a)
 static int double_box(const sdm_grid_job *job, int64_t size[3])
 {
     int best = -1;
+    bool best_goes_on = false;
     for (int a = 0; a < 3; a++) {
-        if (size[a] >= job->n[a]) continue;
-        if (best < 0 || (double)size[a] * step_length(job, a) < (double)size[best] * step_length(job, best)) best = a;
+        const bool goes_on = size[a] < job->n[a];
+        const bool shorter =
+            best < 0 || (double)size[a] * step_length(job, a) < (double)size[best] * step_length(job, best);
+        if (goes_on < best_goes_on || (goes_on == best_goes_on && !shorter)) continue;
+        best = a;
+        best_goes_on = goes_on;
     }
-    if (best < 0) best = 0;
     size[best] *= 2;
     return best;
 }
@@ -110,8 +126,8 @@ static void set_parts(const sdm_grid_job *job, const int64_t size[3], const int 
     }
 }
 
-/* Bound on the error of a linear function at a part's middle: 25 roundings of the largest coordinates, doubled generously. */
-static float error_bound(const sdm_grid_job *job)
+/* How far grid and surface reach from the middle of the surface. */
+static double reach_of(const sdm_grid_job *job)
 {
     double reach = 0;
     for (int k = 0; k < 8; k++) {
@@ -124,7 +140,7 @@ static float error_bound(const sdm_grid_job *job)
         }
         reach = fmax(reach, sqrt(d));
     }
-    return (float)(2e-6 * (reach + job->features->radius) * job->features->scale);
+    return (reach + job->features->radius) * job->features->scale;
 }
 
 static void set_voxels(sdm_grid_job *job, const sdm_grid_parts *in_vector)
@@ -172,10 +188,37 @@ static void fill_tables(sdm_grid_job *job)
         job->n_box[a] = (job->n[a] + job->box[a] - 1) / job->box[a];
         for (int c = 0; c < 3; c++) job->aligned &= c == a || job->step[a][c] == 0;
     }
-    job->error = error_bound(job);
+    // a linear function at a part's middle: 17 roundings of the largest coordinates, doubled
+    job->error = (float)(2e-6 * reach_of(job));
     for (int mask = 0; mask < 256; mask++)
         for (int i = 0, n = 0; i < 8; i++)
             if (mask >> i & 1) job->lanes_of[mask][n++] = (uint8_t)i;
+}
+
+/* The same voxel by voxel, for grids so far away that single precision cannot tell the features apart. */
+static sdm_status ask_points(const sdm_grid_job *job, const sdm_grid *g, const sdm_exact_opts *opts, int n_threads,
+                             sdm_error *err)
+{
+    const int64_t n_rows = job->n[1] * job->n[2];
+    atomic_int stop = 0;
+    (void)n_threads; // without OpenMP
+#pragma omp parallel for schedule(dynamic) num_threads(n_threads)
+    for (int64_t row = 0; row < n_rows; row++) {
+        if (is_first_thread() && opts->cancelled && opts->cancelled(opts->user)) atomic_store(&stop, 1);
+        for (int64_t i = 0; i < job->n[0] && !atomic_load(&stop); i++) {
+            const double index[3] = {(double)i, (double)(row % job->n[1]), (double)(row / job->n[1])};
+            double x[3], q[3];
+            uint32_t slot = 0;
+            int feature;
+            sdm_grid_world(g, index, x);
+            (void)sdm_nearest_find(job->surface, x, INFINITY, &slot, q, &feature);
+            const float d = (float)sqrt(sdm_nearest_feature(job->surface, x, &slot));
+            const bool near = d < (float)job->band_mm || !(job->band_mm < INFINITY);
+            job->values[row * job->n[0] + i] = near ? d : (float)job->band_mm;
+            if (job->slot) job->slot[row * job->n[0] + i] = near ? slot : SDM_NONE;
+        }
+    }
+    return atomic_load(&stop) ? sdm_fail(err, SDM_E_CANCELLED, "map stopped on request") : SDM_OK;
 }
 
 sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g, const sdm_exact_opts *opts, double band_mm,
@@ -190,10 +233,11 @@ sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g, cons
     for (int a = 0; a < 3; a++) {
         job.n[a] = g->n[a];
         job.origin[a] = g->origin[a];
-        for (int c = 0; c < 3; c++) job.step[a][c] = g->dir[3 * c + a] * g->spacing[a];
+        for (int c = 0; c < 3; c++) job.step[a][c] = g->n[a] > 1 ? g->dir[3 * c + a] * g->spacing[a] : 0;
     }
     fill_tables(&job);
     const int n_threads = sdm_thread_count(opts->n_threads);
+    if (!(reach_of(&job) < FARTHEST)) return ask_points(&job, g, opts, n_threads, err);
     job.limit = opts->memory_limit / (size_t)n_threads;
     if (opts->memory_limit && !job.limit) job.limit = 1;
     sdm_grid_kernel *kernel = choose_kernel();
@@ -209,12 +253,7 @@ sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g, cons
         for (int64_t row = 0; row < n_rows; row++) {
             if (atomic_load(&stop)) continue;
             sdm_status s = kernel(&job, &scratch, row % job.n_box[1], row / job.n_box[1], &local);
-#ifdef _OPENMP
-            const bool ask = omp_get_thread_num() == 0;
-#else
-            const bool ask = true;
-#endif
-            if (!s && ask && opts->cancelled && opts->cancelled(opts->user))
+            if (!s && is_first_thread() && opts->cancelled && opts->cancelled(opts->user))
                 s = sdm_fail(&local, SDM_E_CANCELLED, "map stopped on request");
             if (!s) continue;
             atomic_store(&stop, 1);

@@ -158,7 +158,9 @@ static void measure(builder *b)
     f->radius = 0.5 * v3_norm(d);
     for (size_t i = 0; i < b->m->n_tri; i++) longest = b->frames[i].half[0] > longest ? b->frames[i].half[0] : longest;
     int exponent = 0;
-    if (longest > 0) (void)frexp(2 * longest, &exponent);
+    // without any edge the whole surface is the measure
+    const double size = longest > 0 ? 2 * longest : f->radius;
+    if (size > 0) (void)frexp(size, &exponent);
     f->scale = ldexp(1, -exponent);
     for (uint32_t slot = 0; slot < b->m->n_tri; slot++) {
         const uint32_t *t = &b->m->tri[3 * (size_t)b->tri_of[slot]];
@@ -305,6 +307,9 @@ sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const
     const size_t n = m->n_tri;
     builder b = {.m = m, .topo = topo, .frames = frames, .f = f, .tri_of = order};
     f->n_cluster = (n + 7) / 8;
+    // every group ends with its cluster
+    if (32 * f->n_cluster + topo->n_edges + m->n_vert + n >= SDM_NONE)
+        return sdm_fail(err, SDM_E_NOMEM, "surface of %zu triangles: too many to number their edges and vertices", n);
     sdm_status s = SDM_ALLOC(&b.slot_of, n, "features", err);
     if (!s) s = SDM_ALLOC(&b.sorted, n, "features", err);
     if (!s) s = SDM_ALLOC(&b.edge, topo->n_edges, "features", err);

@@ -22,7 +22,7 @@ typedef struct sdm_feature_group {
 } sdm_feature_group;
 
 #define SDM_CORNER_EDGES 6
-// where corners are put that are not there: never near, and squares are numbers
+// where corners are put that are not there: farther than anything the kernels see, and squares are numbers
 #define SDM_NOWHERE 1e15f
 
 /* Unit vectors along up to six edges away from each corner (fewer are repeated), and the corners; lanes without one are very far away. */

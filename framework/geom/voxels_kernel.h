@@ -65,6 +65,18 @@ static winner8 compare(const tile *t, int v, float (*out)[8])
     return w;
 }
 
+/* Bounds are meant to leave somebody; should they not, the tree knows. */
+static uint32_t ask_tree(const tile *t, const double p[3], double *d2)
+{
+    const sdm_nearest *n = t->job->surface;
+    uint32_t slot = 0;
+    double q[3];
+    int feature;
+    (void)sdm_nearest_find(n, p, INFINITY, &slot, q, &feature);
+    *d2 = sdm_nearest_feature(n, p, &slot);
+    return n->features.of_slot[slot][0];
+}
+
 /* The nearest of the candidates whose squared distance in float is at most `limit`, in double. */
 static uint32_t settle(const tile *t, int v, int lane, float limit, const double p[3], double *d2)
 {
@@ -81,14 +93,7 @@ static uint32_t settle(const tile *t, int v, int lane, float limit, const double
             *d2 = d;
             best = number;
         }
-    if (best == SDM_NONE && !(t->job->band_mm < INFINITY)) {
-        // bounds are meant to leave somebody; if they do not, the tree knows
-        uint32_t slot = 0;
-        double q[3];
-        int feature;
-        *d2 = sdm_nearest_find(t->job->surface, p, INFINITY, &slot, q, &feature);
-        for (best = 0; t->job->features->slot[best] != slot; best++) continue;
-    }
+    if (best == SDM_NONE && !(t->job->band_mm < INFINITY)) best = ask_tree(t, p, d2);
     return best;
 }
 
@@ -130,7 +135,8 @@ static void choose_features(const tile *t, voxels *x)
             continue;
         }
         const winner8 w = compare(t, v, t->s->value);
-        _Alignas(32) float limit[8];
+        _Alignas(32) float limit[8], first[8];
+        v8_store(first, w.first);
         v8_store(limit, v8_fma(v8_sqrt(v8_max(w.first, v8_all(0))) + v8_all(1), squared, w.first));
         const int clear = v8_greater(w.second, v8_load(limit)) & v8_greater(w.first, v8_all(-0.5f));
         for (int i = 0; i < 8; i++) x->number[place[i]] = t->s->number[w.lane[i]];

@@ -45,6 +45,17 @@ static double tip_error(const sdm_exact *e, const double x[3])
     return (double)(sdm_exact_get_report(e)->union_error_mm * longest / height);
 }
 
+static size_t distinct_vertices(const sdm_mesh *m)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < m->n_vert; i++) {
+        size_t j = 0;
+        while (j < i && memcmp(&m->vert[3 * i], &m->vert[3 * j], 3 * sizeof *m->vert)) j++;
+        n += j == i;
+    }
+    return n;
+}
+
 /* The moved mesh has the moved distances, to `roundings` of the coordinates here and there. */
 static void compare(subject *s, const sdm_mesh *moved, const motion *to, const sdm_exact_opts *opts, double roundings)
 {
@@ -54,13 +65,15 @@ static void compare(subject *s, const sdm_mesh *moved, const motion *to, const s
     const double seams =
         sdm_exact_get_report(here)->union_error_mm * to->factor + sdm_exact_get_report(there)->union_error_mm;
     const bool closed = sdm_exact_get_report(here)->audit.closed;
-    assert_int_equal(closed, sdm_exact_get_report(there)->audit.closed);
+    // vertices nearer to each other than the rounding of where they are moved to become one: what was closed may open
+    const bool welded = distinct_vertices(&s->mesh) != distinct_vertices(moved);
+    if (!welded) assert_int_equal(closed, sdm_exact_get_report(there)->audit.closed);
     // a volume that is rounding has no sign: which side is called inside is chance
     const sdm_audit *audit = &sdm_exact_get_report(here)->audit;
     const bool sided = fabs(audit->volume) > 64 * DBL_EPSILON * audit->area * s->largest;
     // parts that touch each other meet or not by chance of rounding, and only those that do not are turned
     const bool same = sdm_exact_get_report(here)->parts_turned == sdm_exact_get_report(there)->parts_turned;
-    for (int k = 0; k < POINTS && sided && same; k++) {
+    for (int k = 0; k < POINTS && sided && same && !welded; k++) {
         double x[3], y[3], reach = largest;
         random_point(&s->mesh, &s->dice, x);
         move(to, x, y);

@@ -13,10 +13,10 @@ static int write_mesh(uint64_t number)
     sdm_error err = {0};
     const random_family *f = random_mesh(&m, 2027, number);
     dice d = {2028, number, 0};
-    if (f->kind != SURFACE_BOUNDARY) return 0;
-    if (sdm_exact_create(&m, NULL, &e, &err)) {
-        fprintf(stderr, "%s\n", err.text);
-        return 1;
+    if (f->kind != SURFACE_BOUNDARY || sdm_exact_create(&m, NULL, &e, &err)) {
+        sdm_mesh_dispose(&m);
+        if (err.text[0]) fprintf(stderr, "%s\n", err.text);
+        return err.text[0] != 0;
     }
     printf("mesh %zu %zu %d %s\n", m.n_vert, m.n_tri, POINTS, f->name);
     for (size_t v = 0; v < m.n_vert; v++)

@@ -9,9 +9,8 @@ import numpy as np
 try:
     import scipy
     from scipy.ndimage import distance_transform_edt
-    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
-    from vtkmodules.vtkCommonCore import vtkPoints, vtkVersion
-    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkCommonCore import vtkVersion
     from vtkmodules.vtkImagingStencil import vtkImageStencilToImage, vtkPolyDataToImageStencil
 except ImportError as e:
     print(json.dumps({"error": f"SciPy or VTK's Python modules are missing ({e}): install python3-scipy python3-vtk9"}))
@@ -19,13 +18,7 @@ except ImportError as e:
 
 
 def prepare(job):
-    points = vtkPoints()
-    points.SetData(numpy_to_vtk(job.vert, deep=True))
-    cells = vtkCellArray()
-    cells.SetData(3, numpy_to_vtkIdTypeArray(job.tri.reshape(-1), deep=True))
-    mesh = vtkPolyData()
-    mesh.SetPoints(points)
-    mesh.SetPolys(cells)
+    mesh = sdmgen_peer.vtk_mesh(job)
     stencil = vtkPolyDataToImageStencil()
     stencil.SetInputData(mesh)
     stencil.SetOutputOrigin(job.origin)

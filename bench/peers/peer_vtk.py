@@ -7,9 +7,8 @@ import sdmgen_peer
 import numpy as np
 
 try:
-    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
-    from vtkmodules.vtkCommonCore import vtkDoubleArray, vtkPoints, vtkVersion
-    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+    from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+    from vtkmodules.vtkCommonCore import vtkDoubleArray, vtkVersion
     from vtkmodules.vtkFiltersCore import vtkImplicitPolyDataDistance
 except ImportError as e:
     print(json.dumps({"error": f"VTK's Python modules are missing ({e}): install python3-vtk9"}))
@@ -17,13 +16,7 @@ except ImportError as e:
 
 
 def prepare(job):
-    points = vtkPoints()
-    points.SetData(numpy_to_vtk(job.vert, deep=True))  # double, as they are
-    cells = vtkCellArray()
-    cells.SetData(3, numpy_to_vtkIdTypeArray(job.tri.reshape(-1), deep=True))
-    mesh = vtkPolyData()
-    mesh.SetPoints(points)
-    mesh.SetPolys(cells)
+    mesh = sdmgen_peer.vtk_mesh(job)
     distance = vtkImplicitPolyDataDistance()
     distance.SetInput(mesh)
     x = numpy_to_vtk(job.points(), deep=True)

@@ -13,6 +13,21 @@ except ImportError:
 ENOUGH_S = 3  # no further run after this
 
 
+def vtk_mesh(job):
+    """The mesh as vtkPolyData, coordinates in double as they are."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+    points = vtkPoints()
+    points.SetData(numpy_to_vtk(job.vert, deep=True))
+    cells = vtkCellArray()
+    cells.SetData(3, numpy_to_vtkIdTypeArray(job.tri.reshape(-1), deep=True))
+    mesh = vtkPolyData()
+    mesh.SetPoints(points)
+    mesh.SetPolys(cells)
+    return mesh
+
+
 def read_ply(path):
     """vert[n][3] in double and tri[n][3] of a file as sdmgen writes it: binary, little endian, triangles."""
     with open(path, "rb") as f:

@@ -49,11 +49,7 @@ static sdm_status survey_solid(sdm_exact *e, sdm_budget *budget, sdm_error *err)
     e->report.audit = e->survey.audit;
     if (e->survey.audit.inverted) {
         // inside out: turn every triangle; the report keeps what was found
-        for (size_t t = 0; t < e->solid.n_tri; t++) {
-            const uint32_t v = e->solid.tri[3 * t + 1];
-            e->solid.tri[3 * t + 1] = e->solid.tri[3 * t + 2];
-            e->solid.tri[3 * t + 2] = v;
-        }
+        for (size_t t = 0; t < e->solid.n_tri; t++) sdm_triangle_turn(&e->solid, t);
         e->report.turned = true;
         sdm_survey_dispose(&e->survey);
         budget->used = used;

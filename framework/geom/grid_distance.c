@@ -59,13 +59,12 @@ int sdm_thread_count(int n_threads)
 #endif
 }
 
-static bool is_first_thread(void)
+bool sdm_cancelled(const sdm_exact_opts *opts)
 {
 #ifdef _OPENMP
-    return omp_get_thread_num() == 0;
-#else
-    return true;
+    if (omp_get_thread_num() != 0) return false;
 #endif
+    return opts->cancelled && opts->cancelled(opts->user);
 }
 
 /* Position of voxel `at` (may be fractional) relative to voxel (0, 0, 0). */
@@ -166,7 +165,8 @@ static void set_voxels(sdm_grid_job *job, const sdm_grid_parts *in_vector)
     }
 }
 
-static void fill_tables(sdm_grid_job *job)
+/* Returns how far grid and surface reach, see reach_of(). */
+static double fill_tables(sdm_grid_job *job)
 {
     // of a voxel, a vector, a tile, a block, a box
     int64_t size[SDM_GRID_STEPS + 2][3] = {{1, 1, 1}};
@@ -189,10 +189,12 @@ static void fill_tables(sdm_grid_job *job)
         for (int c = 0; c < 3; c++) job->aligned &= c == a || job->step[a][c] == 0;
     }
     // a linear function at a part's middle: 17 roundings of the largest coordinates, doubled
-    job->error = (float)(2e-6 * reach_of(job));
+    const double reach = reach_of(job);
+    job->error = (float)(2e-6 * reach);
     for (int mask = 0; mask < 256; mask++)
         for (int i = 0, n = 0; i < 8; i++)
             if (mask >> i & 1) job->lanes_of[mask][n++] = (uint8_t)i;
+    return reach;
 }
 
 /* The same voxel by voxel, for grids so far away that single precision cannot tell the features apart. */
@@ -204,7 +206,7 @@ static sdm_status ask_points(const sdm_grid_job *job, const sdm_grid *g, const s
     (void)n_threads; // without OpenMP
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (int64_t row = 0; row < n_rows; row++) {
-        if (is_first_thread() && opts->cancelled && opts->cancelled(opts->user)) atomic_store(&stop, 1);
+        if (sdm_cancelled(opts)) atomic_store(&stop, 1);
         for (int64_t i = 0; i < job->n[0] && !atomic_load(&stop); i++) {
             const double index[3] = {(double)i, (double)(row % job->n[1]), (double)(row / job->n[1])};
             double x[3], q[3];
@@ -235,9 +237,9 @@ sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g, cons
         job.origin[a] = g->origin[a];
         for (int c = 0; c < 3; c++) job.step[a][c] = g->n[a] > 1 ? g->dir[3 * c + a] * g->spacing[a] : 0;
     }
-    fill_tables(&job);
+    const double reach = fill_tables(&job);
     const int n_threads = sdm_thread_count(opts->n_threads);
-    if (!(reach_of(&job) < FARTHEST)) return ask_points(&job, g, opts, n_threads, err);
+    if (!(reach < FARTHEST)) return ask_points(&job, g, opts, n_threads, err);
     job.limit = opts->memory_limit / (size_t)n_threads;
     if (opts->memory_limit && !job.limit) job.limit = 1;
     sdm_grid_kernel *kernel = choose_kernel();
@@ -253,8 +255,7 @@ sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g, cons
         for (int64_t row = 0; row < n_rows; row++) {
             if (atomic_load(&stop)) continue;
             sdm_status s = kernel(&job, &scratch, row % job.n_box[1], row / job.n_box[1], &local);
-            if (!s && is_first_thread() && opts->cancelled && opts->cancelled(opts->user))
-                s = sdm_fail(&local, SDM_E_CANCELLED, "map stopped on request");
+            if (!s && sdm_cancelled(opts)) s = sdm_fail(&local, SDM_E_CANCELLED, "map stopped on request");
             if (!s) continue;
             atomic_store(&stop, 1);
 #pragma omp critical(sdm_grid_distance_failed)

@@ -6,10 +6,6 @@
 #include "grid_distance.h"
 #include "vec3.h"
 
-#ifdef _OPENMP
-#include <omp.h>
-#endif
-
 void sdm_distance_gradient(const sdm_nearest *surface, double rounding, uint32_t slot, const double x[3],
                            const double q[3], double d, double n[3])
 {
@@ -54,14 +50,6 @@ static void fill_voxel(const sdm_layers_job *job, const double x[3], size_t voxe
     fill_derivative(job, &g, voxel, n_voxel);
 }
 
-static bool cancelled(const sdm_exact_opts *opts)
-{
-#ifdef _OPENMP
-    if (omp_get_thread_num() != 0) return false;
-#endif
-    return opts->cancelled && opts->cancelled(opts->user);
-}
-
 bool sdm_layers_wanted(const sdm_layers_job *job)
 {
     return job->out->triangle || job->out->closest || job->out->normal || job->derivative;
@@ -76,7 +64,7 @@ sdm_status sdm_layers_fill(const sdm_layers_job *job, const sdm_grid *g, sdm_err
     atomic_bool stop = false;
 #pragma omp parallel for schedule(dynamic, 4) num_threads(n_threads)
     for (int64_t row = 0; row < n_rows; row++) {
-        if (!atomic_load(&stop) && cancelled(job->opts)) atomic_store(&stop, true);
+        if (!atomic_load(&stop) && sdm_cancelled(job->opts)) atomic_store(&stop, true);
         for (int64_t i = 0; i < g->n[0] && !atomic_load(&stop); i++) {
             double x[3];
             sdm_grid_world(g, (const double[3]){(double)i, (double)(row % g->n[1]), (double)(row / g->n[1])}, x);

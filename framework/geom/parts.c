@@ -62,12 +62,8 @@ sdm_status sdm_parts_turn(sdm_mesh *m, const sdm_survey *s, size_t *n_turned, sd
             p->turn = number_before(m, s, p->widest) < 0;
             *n_turned += p->turn;
         }
-        for (size_t t = 0; t < m->n_tri && *n_turned; t++) {
-            if (!parts[root[t]].turn) continue;
-            const uint32_t v = m->tri[3 * t + 1];
-            m->tri[3 * t + 1] = m->tri[3 * t + 2];
-            m->tri[3 * t + 2] = v;
-        }
+        for (size_t t = 0; t < m->n_tri && *n_turned; t++)
+            if (parts[root[t]].turn) sdm_triangle_turn(m, t);
     }
     sdm_free(root);
     sdm_free(parts);

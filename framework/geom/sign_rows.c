@@ -1,13 +1,9 @@
 /* The threads over tiles of rows. */
 #include "sign_rows.h"
 
-#include <stdatomic.h>
-#ifdef _OPENMP
-#include <omp.h>
-#endif
-
 #include "grid_distance.h"
 #include "sdm/memory.h"
+#include <stdatomic.h>
 
 #define TILE 16   // rows of a tile along both axes
 #define LONG 4096 // boundary edges from which points are faster: every box of voxels asks all of them
@@ -23,14 +19,6 @@ sdm_status sdm_sign_rows_build(const sdm_mesh *m, const sdm_boundary *b, const s
     r->boundary = b;
     r->grid = g;
     return sdm_rows_build(m, g, axis, opts->n_threads, opts->memory_limit, &r->rows, err);
-}
-
-static bool cancelled(const sdm_exact_opts *opts)
-{
-#ifdef _OPENMP
-    if (omp_get_thread_num() != 0) return false;
-#endif
-    return opts->cancelled && opts->cancelled(opts->user);
 }
 
 sdm_status sdm_sign_tiles(const sdm_sign_rows *r, int64_t n1, int64_t n2, const sdm_exact_opts *opts,
@@ -55,7 +43,7 @@ sdm_status sdm_sign_tiles(const sdm_sign_rows *r, int64_t n1, int64_t n2, const 
             const sdm_row_tile tile = {j, j + TILE < n1 ? j + TILE : n1, k, k + TILE < n2 ? k + TILE : n2};
             if (!s && base) sdm_row_base_fill(r->boundary, &r->rows, r->grid, &tile, base);
             if (!s) visit(user, &tile, base);
-            if (!s && cancelled(opts)) s = sdm_fail(&local, SDM_E_CANCELLED, "map stopped on request");
+            if (!s && sdm_cancelled(opts)) s = sdm_fail(&local, SDM_E_CANCELLED, "map stopped on request");
             if (!s || atomic_exchange(&stop, 1)) continue;
             status = sdm_fail(err, s, "%s", local.text);
         }

@@ -9,6 +9,7 @@
 
 #include <cmocka.h>
 
+#include "oracle/exact_tools.h"
 #include "sdm/builtin_shapes.h"
 #include "sdm/memory.h"
 #include "sdm/runtime.h"
@@ -26,28 +27,6 @@ static int tear_down(void **state)
     (void)state;
     sdm_registry_free(registry);
     return 0;
-}
-
-static void *room(size_t n, size_t size)
-{
-    void *p = calloc(n, size);
-    if (!p) abort();
-    return p;
-}
-
-static sdm_exact *engine(const sdm_mesh *m, const sdm_exact_opts *o)
-{
-    sdm_exact *e = NULL;
-    sdm_error err = {0};
-    if (sdm_exact_create(m, o, &e, &err)) fail_msg("%s", err.text);
-    return e;
-}
-
-static void position(const sdm_grid *g, size_t i, double x[3])
-{
-    const size_t nx = (size_t)g->n[0], ny = (size_t)g->n[1];
-    const double index[3] = {(double)(i % nx), (double)(i / nx % ny), (double)(i / nx / ny)};
-    sdm_grid_world(g, index, x);
 }
 
 static sdm_instance *make(const sdm_shape *shape, const char *option, const char *value)

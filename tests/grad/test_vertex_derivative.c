@@ -9,34 +9,13 @@
 #include <cmocka.h>
 
 #include "oracle/exact_meshes.h"
+#include "oracle/exact_tools.h"
 #include "sdm/exact.h"
 #include "sdm/rng.h"
 
 #define PI 3.14159265358979323846
 
 static const double ZERO[3] = {0, 0, 0};
-
-static void *room(size_t n, size_t size)
-{
-    void *p = calloc(n, size);
-    if (!p) abort();
-    return p;
-}
-
-static sdm_exact *engine(const sdm_mesh *m, const sdm_exact_opts *o)
-{
-    sdm_exact *e = NULL;
-    sdm_error err = {0};
-    if (sdm_exact_create(m, o, &e, &err)) fail_msg("%s", err.text);
-    return e;
-}
-
-static void position(const sdm_grid *g, size_t i, double x[3])
-{
-    const size_t nx = (size_t)g->n[0], ny = (size_t)g->n[1];
-    const double index[3] = {(double)(i % nx), (double)(i / nx % ny), (double)(i / nx / ny)};
-    sdm_grid_world(g, index, x);
-}
 
 /* ---- motions of whole meshes ---- */
 

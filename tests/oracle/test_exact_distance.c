@@ -9,6 +9,7 @@
 
 #include "../../framework/geom/grid_distance.h"
 #include "oracle/exact_meshes.h"
+#include "oracle/exact_tools.h"
 #include "sdm/exact.h"
 #include "sdm/memory.h"
 #include "sdm/rng.h"
@@ -18,14 +19,6 @@ static const double zero[3] = {0, 0, 0};
 static double uniform(uint64_t stream, uint64_t i, double lo, double hi)
 {
     return lo + (hi - lo) * sdm_rng_uniform(7, stream, i);
-}
-
-static sdm_exact *engine(const sdm_mesh *m, const sdm_exact_opts *o)
-{
-    sdm_exact *e = NULL;
-    sdm_error err = {0};
-    if (sdm_exact_create(m, o, &e, &err)) fail_msg("%s", err.text);
-    return e;
 }
 
 static float *map_of(const sdm_exact *e, const sdm_grid *g)

@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "oracle/exact_meshes.h"
+#include "oracle/exact_tools.h"
 #include "sdm/exact.h"
 #include "sdm/memory.h"
 #include "sdm/rng.h"
@@ -18,21 +19,6 @@ typedef struct layers {
     size_t n;
     sdm_exact_layers l;
 } layers;
-
-static sdm_exact *engine(const sdm_mesh *m, const sdm_exact_opts *o)
-{
-    sdm_exact *e = NULL;
-    sdm_error err = {0};
-    if (sdm_exact_create(m, o, &e, &err)) fail_msg("%s", err.text);
-    return e;
-}
-
-static void *room(size_t n, size_t size)
-{
-    void *p = calloc(n, size);
-    if (!p) abort();
-    return p;
-}
 
 static layers fill(const sdm_exact *e, const sdm_grid *g)
 {
@@ -52,13 +38,6 @@ static void dispose(layers *r)
     free(r->l.closest);
     free(r->l.normal);
     free(r->l.triangle);
-}
-
-static void position(const sdm_grid *g, size_t i, double x[3])
-{
-    const size_t nx = (size_t)g->n[0], ny = (size_t)g->n[1];
-    const double index[3] = {(double)(i % nx), (double)(i / nx % ny), (double)(i / nx / ny)};
-    sdm_grid_world(g, index, x);
 }
 
 /* Distance from one triangle, by the brute force of the library. */

@@ -9,6 +9,7 @@
 
 #include "../../framework/geom/predicates.h"
 #include "oracle/exact_meshes.h"
+#include "oracle/exact_tools.h"
 #include "sdm/exact.h"
 #include "sdm/rng.h"
 
@@ -17,14 +18,6 @@ static const double zero[3] = {0, 0, 0};
 static double uniform(uint64_t stream, uint64_t i, double lo, double hi)
 {
     return lo + (hi - lo) * sdm_rng_uniform(13, stream, i);
-}
-
-static sdm_exact *engine(const sdm_mesh *m, const sdm_exact_opts *o)
-{
-    sdm_exact *e = NULL;
-    sdm_error err = {0};
-    if (sdm_exact_create(m, o, &e, &err)) fail_msg("%s", err.text);
-    return e;
 }
 
 static double norm(const double x[3]) { return sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]); }

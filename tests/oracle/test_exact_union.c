@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "oracle/exact_meshes.h"
+#include "oracle/exact_tools.h"
 #include "sdm/exact.h"
 #include "sdm/rng.h"
 
@@ -17,14 +18,6 @@ static const double pi = 3.14159265358979323846;
 static double uniform(uint64_t stream, uint64_t i, double lo, double hi)
 {
     return lo + (hi - lo) * sdm_rng_uniform(11, stream, i);
-}
-
-static sdm_exact *engine(const sdm_mesh *m, const sdm_exact_opts *o)
-{
-    sdm_exact *e = NULL;
-    sdm_error err = {0};
-    if (sdm_exact_create(m, o, &e, &err)) fail_msg("%s", err.text);
-    return e;
 }
 
 static double distance(const double a[3], const double b[3])

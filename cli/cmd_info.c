@@ -1,10 +1,11 @@
-/* sdmgen info: what a model, level set or mesh file holds. */
+/* sdmgen info: what a model, level set, image or mesh file holds. */
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
 
 #include "commands.h"
 #include "report_audit.h"
+#include "report_image.h"
 #include "sdm/memory.h"
 #include "sdm/model.h"
 #include "sdm/vdb.h"
@@ -129,6 +130,23 @@ static sdm_status info_mesh(const cli_args *args, const char *path, sdm_error *e
     return s;
 }
 
+static sdm_status info_image(const cli_args *args, const char *path, sdm_error *err)
+{
+    sdm_volume volume = {0};
+    sdm_status s = sdm_volume_read(path, &volume, err);
+    if (!s && args->json) {
+        sdm_json j = {0};
+        sdm_json_open(&j, NULL, '{');
+        cli_json_volume(&j, path, &volume);
+        sdm_json_close(&j, '}');
+        s = cli_print_json(&j, err);
+    } else if (!s) {
+        cli_print_volume(path, &volume);
+    }
+    sdm_volume_dispose(&volume);
+    return s;
+}
+
 static sdm_status info_vdb(const cli_args *args, const char *path, sdm_error *err)
 {
 #ifdef SDM_HAVE_VDB
@@ -159,5 +177,6 @@ sdm_status cmd_info(const cli_args *args, sdm_error *err)
     const char *path = args->files.items[0];
     for (size_t i = 0; i < sizeof meshes / sizeof *meshes; i++)
         if (ends_with(path, meshes[i])) return info_mesh(args, path, err);
+    if (sdm_volume_knows(path)) return info_image(args, path, err);
     return ends_with(path, ".vdb") ? info_vdb(args, path, err) : info_model(args, path, err);
 }

@@ -5,7 +5,7 @@
 #include <zlib.h>
 
 #include "bytes.h"
-#include "sdm/image.h"
+#include "voxels.h"
 
 /* Bytes for an open file, through gzip when `zip`. sdm_sink_free() always, sdm_sink_finish() before the file is committed. */
 typedef struct sdm_sink {
@@ -18,18 +18,24 @@ typedef struct sdm_sink {
 /* In place, since it is large; `zip` as wanted from the first byte on. */
 sdm_status sdm_sink_open(sdm_sink *s, sdm_outfile *file, bool zip, sdm_error *err);
 sdm_status sdm_sink_write(sdm_sink *s, const void *data, size_t size, sdm_error *err);
-sdm_status sdm_sink_floats(sdm_sink *s, const float *values, size_t count, sdm_error *err);
+sdm_status sdm_sink_voxels(sdm_sink *s, const void *values, sdm_voxel_type type, size_t count, sdm_error *err);
 sdm_status sdm_sink_finish(sdm_sink *s, sdm_error *err);
 void sdm_sink_free(sdm_sink *s);
 
 /* One line of at most size - 1 bytes: control characters become spaces, a cut does not split a UTF-8 character. */
 void sdm_one_line(const char *text, char *out, size_t size);
 
-/* Writers for an open file and a checked grid; `text` is never NULL. */
-sdm_status sdm_nifti_write(sdm_outfile *f, bool zip, const sdm_grid *g, const float *values, const char *text,
-                           sdm_error *err);
-sdm_status sdm_nrrd_write(sdm_outfile *f, const sdm_grid *g, const float *values, const char *text, sdm_error *err);
-sdm_status sdm_metaimage_write(sdm_outfile *f, const sdm_grid *g, const float *values, const char *text,
-                               sdm_error *err);
+/* An image to be written: values[nz][ny][nx] of the C type of `type`; the grid has been checked, `text` is never NULL. */
+typedef struct sdm_image {
+    const sdm_grid *grid;
+    const void *values;
+    sdm_voxel_type type;
+    const char *text;
+} sdm_image;
+
+/* Writers for an open file. */
+sdm_status sdm_nifti_write(sdm_outfile *f, bool zip, const sdm_image *m, sdm_error *err);
+sdm_status sdm_nrrd_write(sdm_outfile *f, const sdm_image *m, sdm_error *err);
+sdm_status sdm_metaimage_write(sdm_outfile *f, const sdm_image *m, sdm_error *err);
 
 #endif

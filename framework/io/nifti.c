@@ -1,11 +1,10 @@
-/* NIfTI-1 single files (.nii): a 348-byte header, 4 bytes without extensions, float32 values; frame RAS. */
+/* Writing of NIfTI-1 single files (.nii): a 348-byte header, 4 bytes without extensions, the voxels; frame RAS. */
 #include "imageparts.h"
 
 #include <math.h>
 
 #define NIFTI_START 352
 #define NIFTI_SIZE_MAX 32767 /* sizes are int16 */
-#define NIFTI_FLOAT32 16
 #define NIFTI_UNIT_MM 2
 #define NIFTI_SCANNER 1 /* code of both transforms: the world of the scanner */
 
@@ -53,37 +52,39 @@ static void put_transform(uint8_t *h, const sdm_grid *g)
     sdm_put_uint(h + 254, 2, NIFTI_SCANNER); /* sform_code */
 }
 
-static void put_header(uint8_t h[NIFTI_START], const sdm_grid *g, const char *text)
+static void put_header(uint8_t h[NIFTI_START], const sdm_image *m)
 {
+    const sdm_grid *g = m->grid;
+    const sdm_voxel_format *format = &sdm_voxel_formats[m->type];
     memset(h, 0, NIFTI_START);
     sdm_put_uint(h, 4, 348); /* sizeof_hdr */
     h[38] = 'r';             /* regular */
     sdm_put_uint(h + 40, 2, 3);
     for (int i = 0; i < 7; i++) sdm_put_uint(h + 42 + 2 * i, 2, i < 3 ? (uint64_t)g->n[i] : 1); /* dim */
-    sdm_put_uint(h + 70, 2, NIFTI_FLOAT32);
-    sdm_put_uint(h + 72, 2, 32);       /* bitpix */
-    sdm_put_f32(h + 108, NIFTI_START); /* vox_offset */
-    sdm_put_f32(h + 112, 1.0f);        /* scl_slope */
+    sdm_put_uint(h + 70, 2, (uint64_t)format->nifti);
+    sdm_put_uint(h + 72, 2, 8 * format->size); /* bitpix */
+    sdm_put_f32(h + 108, NIFTI_START);         /* vox_offset */
+    sdm_put_f32(h + 112, 1.0f);                /* scl_slope */
     h[123] = NIFTI_UNIT_MM;
-    sdm_one_line(text, (char *)h + 148, 80); /* descrip */
+    sdm_one_line(m->text, (char *)h + 148, 80); /* descrip */
     put_transform(h, g);
     memcpy(h + 344, "n+1", 4); /* magic */
 }
 
-sdm_status sdm_nifti_write(sdm_outfile *f, bool zip, const sdm_grid *g, const float *values, const char *text,
-                           sdm_error *err)
+sdm_status sdm_nifti_write(sdm_outfile *f, bool zip, const sdm_image *m, sdm_error *err)
 {
+    const sdm_grid *g = m->grid;
     for (int i = 0; i < 3; i++)
         if (g->n[i] > NIFTI_SIZE_MAX)
             return sdm_fail(err, SDM_E_UNSUPPORTED, "%lld voxels along axis %d, NIfTI-1 takes %d: write .nrrd or .mha",
                             (long long)g->n[i], i, NIFTI_SIZE_MAX);
     sdm_sink sink;
     uint8_t header[NIFTI_START];
-    put_header(header, g, text);
+    put_header(header, m);
     sdm_status e = sdm_sink_open(&sink, f, zip, err);
     if (e) return e;
     e = sdm_sink_write(&sink, header, sizeof header, err);
-    if (!e) e = sdm_sink_floats(&sink, values, sdm_grid_count(g), err);
+    if (!e) e = sdm_sink_voxels(&sink, m->values, m->type, sdm_grid_count(g), err);
     if (!e) e = sdm_sink_finish(&sink, err);
     sdm_sink_free(&sink);
     return e;

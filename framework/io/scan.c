@@ -1,5 +1,8 @@
 /* Text files line by line and word by word, in place, with line numbers for messages. */
-#include "meshparts.h"
+#include "scan.h"
+
+#include <string.h>
+
 #include "sdm/text.h"
 
 static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\f' || c == '\v' || c == '\0'; }

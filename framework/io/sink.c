@@ -45,14 +45,16 @@ sdm_status sdm_sink_write(sdm_sink *s, const void *data, size_t size, sdm_error 
     return SDM_OK;
 }
 
-sdm_status sdm_sink_floats(sdm_sink *s, const float *values, size_t count, sdm_error *err)
+sdm_status sdm_sink_voxels(sdm_sink *s, const void *values, sdm_voxel_type type, size_t count, sdm_error *err)
 {
     uint8_t block[8192];
+    const size_t size = sdm_voxel_size(type), most = sizeof block / size;
     for (size_t i = 0; i < count;) {
-        size_t n = 0;
-        for (; n < sizeof block && i < count; n += 4) sdm_put_f32(block + n, values[i++]);
-        const sdm_status e = sdm_sink_write(s, block, n, err);
+        const size_t n = count - i < most ? count - i : most;
+        sdm_voxels_encode(values, type, i, n, block);
+        const sdm_status e = sdm_sink_write(s, block, n * size, err);
         if (e) return e;
+        i += n;
     }
     return SDM_OK;
 }

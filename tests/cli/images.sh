@@ -1,0 +1,47 @@
+#!/usr/bin/env bash
+# sdmgen info and verify on images: our own, files made here, and what is not read.
+. "$(dirname "$0")/common.sh"
+
+# a tetrahedron whose faces meet at the origin at right angles
+printf 'OFF\n4 4 0\n0 0 0\n2 0 0\n0 2 0\n0 0 2\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n' >t.off
+expect 0 - sdmgen exact --mesh t.off --size '9,10,11' --spacing 0.5 --origin '-2,-2.25,-2.5' --quiet \
+    -o m.nii -o m.nii.gz -o m.nrrd -o m.mha --json
+deepest=$(json min_mm)
+for file in m.nii m.nii.gz m.nrrd m.mha; do
+    expect 0 - sdmgen info $file
+    has "^$file: image of float32 voxels\$"
+    has '^grid +9 x 10 x 11 voxels \(990\) of 0.5 x 0.5 x 0.5 mm$'
+    has '^origin +-2 -2.25 -2.5 '
+    has 'x along 1 0 0$'
+    expect 0 - sdmgen info $file --json
+    near "$(json min)" "$deepest" 1e-6
+    [ "$(json type)" = image ] && [ "$(json placed)" = true ] && [ "$(json voxel_type)" = float32 ] || bad "$(cat out)"
+    expect 0 - sdmgen verify $file
+    has 'whole: 9 x 10 x 11 float32 voxels'
+done
+expect 0 - sdmgen verify m.nrrd
+has 'the checksum of the compressed data is right'
+expect 0 - sdmgen verify m.mha --json
+[ "$(json ok)" = true ] && [ "$(json checksum)" = false ] || bad "$(cat out)"
+
+# a segmentation of two layers, its axis first, in RAS
+{
+    printf 'NRRD0005\ntype: uchar\ndimension: 4\nspace: RAS\nsizes: 2 1 2 1\nspace directions: none (1,0,0) (0,2,0) (0,0,3)\n'
+    printf 'encoding: raw\nspace origin: (5,6,7)\nSegment0_ID:=a\nSegment0_Name:=first\nSegment1_ID:=b\nSegment1_Name:=second\n\n\001\002\003\004'
+} >s.seg.nrrd
+expect 0 - sdmgen info s.seg.nrrd
+has 'uint8 voxels, 2 layers$'
+has '^origin +-5 -6 7 '
+has "'second' \(b\): value 1 in layer 1"
+has '^values +1 \.\. 4$'
+
+# damaged, not read, not there
+head -c 300 m.nii.gz >cut.nii.gz
+expect 3 'cut\.nii\.gz: the compressed data are cut off' sdmgen info cut.nii.gz
+expect 3 'cut\.nii\.gz' sdmgen verify cut.nii.gz --json
+[ ! -s out ] || bad "a report of a damaged file: $(cat out)"
+sed 's/LOCAL/..\/m.raw/' m.mha >away.mha
+expect 1 'another folder' sdmgen info away.mha
+expect 1 'none\.nrrd: cannot open' sdmgen verify none.nrrd
+
+finish

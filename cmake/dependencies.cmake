@@ -1,11 +1,25 @@
 # Packages the build stands on. Each optional part names what is missing and how to go on without it.
-find_package(Threads REQUIRED)
-find_library(SDM_LIBM m)
+set(SDM_LIBM m)
+find_package(Threads)
+if(SDM_CONFIG AND NOT Threads_FOUND)
+  message(FATAL_ERROR "POSIX threads not found: the trainer needs them; configure with -DSDM_CONFIG=OFF (runtime only)")
+endif()
+if(Threads_FOUND)
+  set(SDM_THREADS Threads::Threads)
+endif()
 
 if(SDM_OPENMP)
   find_package(OpenMP COMPONENTS C)
   if(NOT OpenMP_C_FOUND)
     message(FATAL_ERROR "OpenMP not found: install libgomp (gcc) or libomp-dev (clang), or configure with -DSDM_OPENMP=OFF")
+  endif()
+endif()
+
+if(SDM_DNNL)
+  # the C interface of 3.x is another one
+  find_package(dnnl 2.6 CONFIG QUIET)
+  if(NOT dnnl_FOUND)
+    message(FATAL_ERROR "oneDNN 2.x not found: install libdnnl-dev, or configure with -DSDM_DNNL=OFF (own convolutions only)")
   endif()
 endif()
 
@@ -39,6 +53,9 @@ if(SDM_VDB)
 endif()
 
 if(SDM_TESTS)
+  if(NOT SDM_PLUGINS)
+    message(FATAL_ERROR "the tests load plug-ins: configure with -DSDM_PLUGINS=ON or -DSDM_TESTS=OFF")
+  endif()
   if(PKG_CONFIG_FOUND)
     pkg_check_modules(CMOCKA IMPORTED_TARGET cmocka)
   endif()

@@ -14,6 +14,8 @@ if(SDM_SANITIZE)
 endif()
 if(SDM_OPENMP)
   target_link_libraries(sdm_flags INTERFACE OpenMP::OpenMP_C)
+else()
+  target_compile_options(sdm_flags INTERFACE -Wno-unknown-pragmas)
 endif()
 
 function(sdm_part name)

@@ -1,11 +1,10 @@
 /* CRC-64/XZ, eight bytes a step ("slicing by 8", Kounavis and Berry 2005). */
 #include "sdm/checksum.h"
 
-#include <pthread.h>
-#include <string.h>
+#include "once.h"
 
 static uint64_t table[8][256];
-static pthread_once_t once = PTHREAD_ONCE_INIT;
+static sdm_once once = SDM_ONCE_INIT;
 
 static void fill_table(void)
 {
@@ -20,7 +19,7 @@ static void fill_table(void)
 
 uint64_t sdm_crc64(uint64_t crc, const void *data, size_t size)
 {
-    pthread_once(&once, fill_table);
+    sdm_once_run(&once, fill_table);
     const uint8_t *p = data;
     crc = ~crc;
     for (; size >= 8; size -= 8, p += 8) {

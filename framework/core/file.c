@@ -12,7 +12,7 @@
 
 #include "sdm/memory.h"
 
-sdm_status sdm_file_read(const char *path, size_t max_bytes, uint8_t **data, size_t *size, sdm_error *err)
+sdm_status sdm_file_read(const char *path, uint64_t max_bytes, uint8_t **data, size_t *size, sdm_error *err)
 {
     *data = NULL;
     *size = 0;
@@ -30,12 +30,17 @@ sdm_status sdm_file_read(const char *path, size_t max_bytes, uint8_t **data, siz
         s = sdm_fail(err, SDM_E_IO, "%s: not a regular file", path);
         goto done;
     }
-    n = (size_t)st.st_size;
-    if (n > max_bytes) {
-        s = sdm_fail(err, SDM_E_FORMAT, "%s: %zu bytes, more than the %zu allowed for a file of this kind", path, n,
-                     max_bytes);
+    if ((uint64_t)st.st_size > max_bytes) {
+        s = sdm_fail(err, SDM_E_FORMAT, "%s: %llu bytes, more than the %llu allowed for a file of this kind", path,
+                     (unsigned long long)st.st_size, (unsigned long long)max_bytes);
         goto done;
     }
+    if ((uint64_t)st.st_size >= SIZE_MAX) { // of a machine with 32-bit addresses
+        s = sdm_fail(err, SDM_E_NOMEM, "%s: %llu bytes are more than memory can hold", path,
+                     (unsigned long long)st.st_size);
+        goto done;
+    }
+    n = (size_t)st.st_size;
     if ((s = SDM_ALLOC(&block, n + 1, path, err))) goto done;
     for (size_t at = 0; at < n;) {
         const ssize_t got = read(fd, block + at, n - at);

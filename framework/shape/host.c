@@ -8,7 +8,7 @@
 #include "sdm/meshfile.h"
 #include "shape_internal.h"
 
-#define DATA_FILE_MAX ((size_t)1 << 32)
+#define DATA_FILE_MAX (UINT64_C(1) << 32)
 
 /* Memory that lives as long as the call. */
 typedef struct host_block {

@@ -56,11 +56,13 @@ sdm_status sdm_registry_load(sdm_registry *r, const char *file, sdm_error *err)
     if (!s) s = sdm_registry_keep(r, object, err);
     if (s) {
         sdm_registry_shrink(r, before); // all shapes of a file or none
-        dlclose(object);
+        sdm_object_close(object);
     }
     free(path);
     return s;
 }
+
+void sdm_object_close(void *object) { (void)dlclose(object); }
 
 static int is_object(const struct dirent *e)
 {

@@ -1,5 +1,4 @@
 /* The set of known shapes. */
-#include <dlfcn.h>
 #include <string.h>
 
 #include "sdm/memory.h"
@@ -14,7 +13,7 @@ typedef struct entry {
 struct sdm_registry {
     entry **entries; /* pointers, so that a shape keeps its address */
     size_t count, capacity;
-    void **objects; /* of dlopen() */
+    void **objects; /* of plug-ins */
     size_t n_objects;
 };
 
@@ -33,7 +32,7 @@ void sdm_registry_free(sdm_registry *r)
 {
     if (!r) return;
     sdm_registry_shrink(r, 0);
-    for (size_t i = r->n_objects; i-- > 0;) dlclose(r->objects[i]);
+    for (size_t i = r->n_objects; i-- > 0;) sdm_object_close(r->objects[i]);
     sdm_free(r->objects);
     sdm_free(r->entries);
     sdm_free(r);

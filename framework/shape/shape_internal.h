@@ -20,6 +20,9 @@ sdm_status sdm_shape_check_params(const char *who, const sdm_param *params, uint
 void sdm_registry_shrink(sdm_registry *r, size_t count);
 sdm_status sdm_registry_keep(sdm_registry *r, void *object, sdm_error *err);
 
+/* loader.c, or loader_none.c where there are no shared objects. */
+void sdm_object_close(void *object);
+
 /* options.c: values[n_options], their text in one block *text (sdm_free()). */
 sdm_status sdm_shape_parse_options(const sdm_shape *shape, const sdm_named_text *given, size_t n_given,
                                    const char *base_dir, sdm_option_value *values, char **text, sdm_error *err);

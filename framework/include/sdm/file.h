@@ -12,8 +12,8 @@ extern "C" {
 #endif
 
 /* Reads a regular file of at most max_bytes into a new block (sdm_free()), with one zero byte behind the content.
-   SDM_E_IO when it cannot be read, SDM_E_FORMAT when it is larger. */
-SDM_API sdm_status sdm_file_read(const char *path, size_t max_bytes, uint8_t **data, size_t *size, sdm_error *err);
+   SDM_E_IO when it cannot be read, SDM_E_FORMAT when it is larger, SDM_E_NOMEM when memory cannot hold it. */
+SDM_API sdm_status sdm_file_read(const char *path, uint64_t max_bytes, uint8_t **data, size_t *size, sdm_error *err);
 
 /* A file under construction: nothing appears under its final name before sdm_outfile_commit() succeeds. */
 typedef struct sdm_outfile sdm_outfile;

@@ -21,10 +21,11 @@ SDM_API void sdm_registry_free(sdm_registry *r); /* closes loaded plug-ins: free
    said in messages ("built in" or a file). SDM_E_PLUGIN names what is wrong; another shape of the same name is refused. */
 SDM_API sdm_status sdm_registry_add(sdm_registry *r, const sdm_shape *shape, const char *origin, sdm_error *err);
 
-/* Loads a shared object and adds all its shapes; `file` comes from the command line or the environment, never from a config. */
+/* Loads a shared object and adds all its shapes; `file` comes from the command line or the environment, never from a config.
+   SDM_E_PLUGIN; SDM_E_UNSUPPORTED in a build without shared objects (SDM_PLUGINS=OFF). */
 SDM_API sdm_status sdm_registry_load(sdm_registry *r, const char *file, sdm_error *err);
 
-/* Loads every *.so in the folders of a colon-separated path (value of SDMGEN_PLUGIN_PATH); NULL does nothing. */
+/* Loads every *.so in the folders of a colon-separated path (value of SDMGEN_PLUGIN_PATH); NULL does nothing. Errors as above. */
 SDM_API sdm_status sdm_registry_load_path(sdm_registry *r, const char *path, sdm_error *err);
 
 SDM_API size_t sdm_registry_count(const sdm_registry *r);

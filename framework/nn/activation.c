@@ -39,12 +39,23 @@ static void relu(size_t n, const float *x, float *y, float *dy)
     }
 }
 
+static void leaky_relu(size_t n, const float *x, float *y, float *dy)
+{
+    for (size_t i = 0; i < n; i++) {
+        const float v = x[i], slope = v > 0 ? 1.0f : 0.02f;
+        y[i] = slope * v;
+        if (dy) dy[i] = slope;
+    }
+}
+
 void sdm_activate(int kind, size_t n, const float *x, float *y, float *dy)
 {
     if (kind == 0)
         silu(n, x, y, dy);
     else if (kind == 1)
         hyperbolic_tangent(n, x, y, dy);
-    else
+    else if (kind == 2)
         relu(n, x, y, dy);
+    else
+        leaky_relu(n, x, y, dy);
 }

@@ -87,6 +87,9 @@ sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *s
         return sdm_fail(err, SDM_E_FORMAT,
                         "format version %llu is newer than %u, which this program reads: update sdmgen",
                         (unsigned long long)version, SDM_CONTAINER_VERSION);
+    if (version > 0 && version < SDM_CONTAINER_VERSION)
+        return sdm_fail(err, SDM_E_FORMAT, "format version %llu is from before the first release: train again",
+                        (unsigned long long)version);
     if (version != SDM_CONTAINER_VERSION)
         return sdm_fail(err, SDM_E_FORMAT, "damaged: format version %llu", (unsigned long long)version);
     if (length != size)

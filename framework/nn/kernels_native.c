@@ -1,6 +1,5 @@
 /* Choice of the instruction set, the blocked matrix product, packing and half precision. */
 #include <math.h>
-#include <pthread.h>
 #include <string.h>
 #ifdef _OPENMP
 #include <omp.h>
@@ -9,25 +8,40 @@
 #include "kernels_table.h"
 #include "sdm/kernels.h"
 
-static const kernel_table *chosen;
-static pthread_once_t once = PTHREAD_ONCE_INIT;
+static int wanted_level = -1;
 
-static void choose(void)
+// the level to use when `level` is wanted; what the processor can do is read from memory, where its start-up code puts it
+static int usable(int level)
 {
-    chosen = &sdm_kernels_generic;
+    int best = 0;
 #if defined(__x86_64__)
-    __builtin_cpu_init();
     // every processor with AVX2 has F16C (clang 14 does not know the name)
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) chosen = &sdm_kernels_avx2;
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq"))
-        chosen = &sdm_kernels_avx512;
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) best = 1;
+    if (best && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+        __builtin_cpu_supports("avx512dq"))
+        best = 2;
 #endif
+    return level >= 0 && level < best ? level : best;
+}
+
+int sdm_kernels_select(int level)
+{
+    wanted_level = level;
+    return usable(level);
 }
 
 static const kernel_table *kernels(void)
 {
-    pthread_once(&once, choose);
-    return chosen;
+    switch (usable(wanted_level)) {
+#if defined(__x86_64__)
+    case 2:
+        return &sdm_kernels_avx512;
+    case 1:
+        return &sdm_kernels_avx2;
+#endif
+    default:
+        return &sdm_kernels_generic;
+    }
 }
 
 const char *sdm_kernels_name(void) { return kernels()->name; }
@@ -101,38 +115,41 @@ void sdm_gemm(size_t m, size_t n, size_t k, sdm_view a, sdm_view b, bool add, fl
     }
 }
 
-size_t sdm_tiled_count(size_t outputs, size_t k) { return (outputs + SDM_TILE - 1) / SDM_TILE * SDM_TILE * k; }
-
-void sdm_tiled_pack_f32(size_t outputs, size_t k, sdm_view w, float *tiled)
+void sdm_panel_pack_f32(size_t outputs, size_t k, sdm_view w, float *panels)
 {
-    for (size_t o = 0; o < (outputs + SDM_TILE - 1) / SDM_TILE * SDM_TILE; o++)
+    for (size_t o = 0; o < outputs; o += SDM_PANEL)
         for (size_t i = 0; i < k; i++)
-            tiled[(o / SDM_TILE * k + i) * SDM_TILE + o % SDM_TILE] =
-                o < outputs ? w.data[o * w.row + i * w.col] : 0.0f;
+            for (size_t j = o; j < o + SDM_PANEL; j++) *panels++ = j < outputs ? w.data[j * w.row + i * w.col] : 0.0f;
 }
 
-void sdm_tiled_pack_f16(size_t outputs, size_t k, sdm_view w, uint16_t *tiled)
+void sdm_panel_pack_f16(size_t outputs, size_t k, sdm_view w, uint16_t *panels)
 {
-    for (size_t o = 0; o < (outputs + SDM_TILE - 1) / SDM_TILE * SDM_TILE; o++)
+    for (size_t o = 0; o < outputs; o += SDM_PANEL)
         for (size_t i = 0; i < k; i++)
-            tiled[(o / SDM_TILE * k + i) * SDM_TILE + o % SDM_TILE] =
-                o < outputs ? sdm_half_from_float(w.data[o * w.row + i * w.col]) : (uint16_t)0;
+            for (size_t j = o; j < o + SDM_PANEL; j++)
+                *panels++ = j < outputs ? sdm_half_from_float(w.data[j * w.row + i * w.col]) : (uint16_t)0;
 }
 
-void sdm_tile_f32(size_t batch, size_t k, const float *w, const float *x, size_t ldx, float *y, size_t ldy)
+void sdm_panel_f32(size_t batch, size_t outputs, size_t k, const float *w, const float *x, size_t ldx, float *y,
+                   size_t ldy)
 {
-    kernels()->tile_f32(batch, k, w, x, ldx, y, ldy);
+    kernels()->panel_f32(batch, sdm_panel_outputs(outputs), k, w, x, ldx, y, ldy);
 }
 
-void sdm_tile_f16(size_t batch, size_t k, const uint16_t *w, const float *x, size_t ldx, float *y, size_t ldy,
-                  float *scratch)
+void sdm_panel_f16(size_t batch, size_t outputs, size_t k, const uint16_t *w, const float *x, size_t ldx, float *y,
+                   size_t ldy)
 {
-    const kernel_table *t = kernels();
-    if (batch == 1) {
-        t->tile_f16(k, w, x, y);
-        return;
-    }
-    t->tile_f16_batch(batch, k, w, x, ldx, y, ldy, scratch);
+    kernels()->panel_f16(batch, sdm_panel_outputs(outputs), k, w, x, ldx, y, ldy);
+}
+
+void sdm_panel_back_f32(size_t outputs, size_t k, const float *w, const float *y, float *x)
+{
+    kernels()->back_f32(sdm_panel_outputs(outputs), k, w, y, x);
+}
+
+void sdm_panel_back_f16(size_t outputs, size_t k, const uint16_t *w, const float *y, float *x)
+{
+    kernels()->back_f16(sdm_panel_outputs(outputs), k, w, y, x);
 }
 
 void sdm_exp(size_t n, const float *x, float *y) { kernels()->exp(n, x, y); }

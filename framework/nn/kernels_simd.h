@@ -34,44 +34,15 @@ static void micro(size_t k, const float *a, const float *b, float *c, size_t ldc
         for (int j = 0; j < NV; j++) store(c + (size_t)i * ldc + j * VW, acc[i][j]);
 }
 
-// maps `count` (1..4) rows of x at once: the weights are read once for all of them
-#define TILE_ROWS(count)                                                                                               \
-    static void tile_rows_##count(size_t k, const float *w, const float *x, size_t ldx, float *y, size_t ldy)          \
-    {                                                                                                                  \
-        enum { width = count == 1 ? 8 : 2 }; /* registers of outputs at a time: independent chains hide the latency */ \
-        const size_t step = width * VW <= SDM_TILE ? width * VW : SDM_TILE;                                            \
-        for (size_t o = 0; o < SDM_TILE; o += step) {                                                                  \
-            vec acc[count][width] = {{{0}}};                                                                           \
-            for (size_t p = 0; p < k; p++) {                                                                           \
-                const float *row = w + p * SDM_TILE + o;                                                               \
-                for (int i = 0; i < count; i++) {                                                                      \
-                    const vec s = splat(x[(size_t)i * ldx + p]);                                                       \
-                    for (int j = 0; j < (int)(step / VW); j++) acc[i][j] += s * load(row + j * VW);                    \
-                }                                                                                                      \
-            }                                                                                                          \
-            for (int i = 0; i < count; i++)                                                                            \
-                for (int j = 0; j < (int)(step / VW); j++)                                                             \
-                    store(y + (size_t)i * ldy + o + (size_t)(j * VW), acc[i][j]);                                      \
-        }                                                                                                              \
-    }
-TILE_ROWS(1)
-TILE_ROWS(2)
-TILE_ROWS(4)
-
-static void tile_f32(size_t batch, size_t k, const float *w, const float *x, size_t ldx, float *y, size_t ldy)
-{
-    size_t i = 0;
-    for (; i + 4 <= batch; i += 4) tile_rows_4(k, w, x + i * ldx, ldx, y + i * ldy, ldy);
-    for (; i + 2 <= batch; i += 2) tile_rows_2(k, w, x + i * ldx, ldx, y + i * ldy, ldy);
-    for (; i < batch; i++) tile_rows_1(k, w, x + i * ldx, ldx, y + i * ldy, ldy);
-}
-
 #ifndef LOAD_HALF
+typedef uint16_t vech __attribute__((vector_size(2 * VW)));
+
 // exact for every half: the exponent is moved by a multiplication, which also makes subnormals right
 static inline vec load_half(const uint16_t *p)
 {
-    vecu h;
-    for (int i = 0; i < VW; i++) h[i] = p[i];
+    vech packed;
+    memcpy(&packed, p, sizeof packed);
+    const vecu h = __builtin_convertvector(packed, vecu);
     const vecu sign = (h & 0x8000u) << 16, body = (h & 0x7fffu) << 13;
     vec v;
     memcpy(&v, &body, sizeof v);
@@ -86,84 +57,122 @@ static inline vec load_half(const uint16_t *p)
 }
 #endif
 
-static void tile_f16(size_t k, const uint16_t *w, const float *x, float *y)
-{
-    enum { registers = SDM_TILE / VW, width = registers < 8 ? registers : 8 };
-    for (size_t o = 0; o < SDM_TILE; o += width * VW) {
-        vec acc[width] = {{0}};
-        for (size_t p = 0; p < k; p++) {
-            const vec s = splat(x[p]);
-            for (int j = 0; j < width; j++) acc[j] += s * load_half(w + p * SDM_TILE + o + (size_t)(j * VW));
-        }
-        for (int j = 0; j < width; j++) store(y + o + (size_t)(j * VW), acc[j]);
-    }
-}
+// where register j of the outputs has its weights, in elements from panel o / 16 on
+#define PANEL_AT(j) ((size_t)((j)*VW / SDM_PANEL) * SDM_PANEL * k + (size_t)((j)*VW % SDM_PANEL))
 
-static void expand_f16(size_t n, const uint16_t *h, float *y)
-{
-    for (size_t i = 0; i < n; i += VW) store(y + i, load_half(h + i));
-}
-
-// panels[T / NR][k][NR] as float from a tile of halves: a panel is read front to back and stays in the first-level cache
-static void expand_panels(size_t k, const uint16_t *w, float *panels)
-{
-    for (size_t p = 0; p < k; p++)
-        for (size_t j = 0; j < SDM_TILE / NR; j++)
-            for (size_t v = 0; v < NV; v++)
-                store(panels + (j * k + p) * NR + v * VW, load_half(w + p * SDM_TILE + j * NR + v * VW));
-}
-
-// `count` rows of x times one panel
-#define PANEL_ROWS(count)                                                                                              \
-    static void panel_rows_##count(size_t k, const float *panel, const float *x, size_t ldx, float *y, size_t ldy)     \
+// `rows` rows of x times `n` registers of outputs
+#define PANEL_BLOCK(type, suffix, load_weights, rows, n)                                                               \
+    static void block_##suffix##_##rows##x##n(size_t k, const type *w, const float *x, size_t ldx, float *y,           \
+                                              size_t ldy)                                                              \
     {                                                                                                                  \
-        vec acc[count][NV] = {{{0}}};                                                                                  \
-        for (size_t p = 0; p < k; p++, panel += NR) {                                                                  \
-            vec w[NV];                                                                                                 \
-            for (int j = 0; j < NV; j++) w[j] = load(panel + j * VW);                                                  \
-            for (int i = 0; i < count; i++) {                                                                          \
+        vec acc[rows][n];                                                                                              \
+        for (int i = 0; i < rows; i++)                                                                                 \
+            for (int j = 0; j < n; j++) acc[i][j] = (vec){0};                                                          \
+        for (size_t p = 0; p < k; p++, w += SDM_PANEL) {                                                               \
+            vec weight[n];                                                                                             \
+            for (int j = 0; j < n; j++) weight[j] = load_weights(w + PANEL_AT(j));                                     \
+            for (int i = 0; i < rows; i++) {                                                                           \
                 const vec s = splat(x[(size_t)i * ldx + p]);                                                           \
-                for (int j = 0; j < NV; j++) acc[i][j] += s * w[j];                                                    \
+                for (int j = 0; j < n; j++) acc[i][j] += s * weight[j];                                                \
             }                                                                                                          \
         }                                                                                                              \
-        for (int i = 0; i < count; i++)                                                                                \
-            for (int j = 0; j < NV; j++) store(y + (size_t)i * ldy + (size_t)(j * VW), acc[i][j]);                     \
+        for (int i = 0; i < rows; i++)                                                                                 \
+            for (int j = 0; j < n; j++) store(y + (size_t)i * ldy + (size_t)(j * VW), acc[i][j]);                      \
     }
-PANEL_ROWS(6)
-PANEL_ROWS(5)
-PANEL_ROWS(4)
-PANEL_ROWS(3)
-PANEL_ROWS(2)
-PANEL_ROWS(1)
 
-static void tile_f16_batch(size_t batch, size_t k, const uint16_t *w, const float *x, size_t ldx, float *y, size_t ldy,
-                           float *panels)
-{
-    expand_panels(k, w, panels);
-    for (size_t j = 0; j < SDM_TILE / NR; j++, panels += k * NR, y += NR) {
-        size_t i = 0;
-        for (; i + 6 <= batch; i += 6) panel_rows_6(k, panels, x + i * ldx, ldx, y + i * ldy, ldy);
-        switch (batch - i) {
-        case 5:
-            panel_rows_5(k, panels, x + i * ldx, ldx, y + i * ldy, ldy);
-            break;
-        case 4:
-            panel_rows_4(k, panels, x + i * ldx, ldx, y + i * ldy, ldy);
-            break;
-        case 3:
-            panel_rows_3(k, panels, x + i * ldx, ldx, y + i * ldy, ldy);
-            break;
-        case 2:
-            panel_rows_2(k, panels, x + i * ldx, ldx, y + i * ldy, ldy);
-            break;
-        case 1:
-            panel_rows_1(k, panels, x + i * ldx, ldx, y + i * ldy, ldy);
-            break;
-        default:
-            break;
-        }
+// as many registers at a time as keep the multipliers busy and the sums in registers
+#define PANEL_STEP(suffix, rows, n)                                                                                    \
+    for (; o + n * VW <= outputs; o += n * VW)                                                                         \
+        block_##suffix##_##rows##x##n(k, w + o / SDM_PANEL * SDM_PANEL * k + o % SDM_PANEL, x, ldx, y + o, ldy);
+
+#define PANEL(type, suffix, load_weights)                                                                              \
+    PANEL_BLOCK(type, suffix, load_weights, 1, 8)                                                                      \
+    PANEL_BLOCK(type, suffix, load_weights, 1, 4)                                                                      \
+    PANEL_BLOCK(type, suffix, load_weights, 1, 2)                                                                      \
+    PANEL_BLOCK(type, suffix, load_weights, 1, 1)                                                                      \
+    PANEL_BLOCK(type, suffix, load_weights, 2, 4)                                                                      \
+    PANEL_BLOCK(type, suffix, load_weights, 2, 2)                                                                      \
+    PANEL_BLOCK(type, suffix, load_weights, 2, 1)                                                                      \
+    PANEL_BLOCK(type, suffix, load_weights, 3, 4)                                                                      \
+    PANEL_BLOCK(type, suffix, load_weights, 3, 2)                                                                      \
+    PANEL_BLOCK(type, suffix, load_weights, 3, 1)                                                                      \
+    PANEL_BLOCK(type, suffix, load_weights, 4, 2)                                                                      \
+    PANEL_BLOCK(type, suffix, load_weights, 4, 1)                                                                      \
+    PANEL_BLOCK(type, suffix, load_weights, 5, 2)                                                                      \
+    PANEL_BLOCK(type, suffix, load_weights, 5, 1)                                                                      \
+    PANEL_BLOCK(type, suffix, load_weights, 6, 2)                                                                      \
+    PANEL_BLOCK(type, suffix, load_weights, 6, 1)                                                                      \
+    static void rows_##suffix(size_t rows, size_t outputs, size_t k, const type *w, const float *x, size_t ldx,        \
+                              float *y, size_t ldy)                                                                    \
+    {                                                                                                                  \
+        size_t o = 0;                                                                                                  \
+        switch (rows) {                                                                                                \
+        case 1:                                                                                                        \
+            PANEL_STEP(suffix, 1, 8)                                                                                   \
+            PANEL_STEP(suffix, 1, 4)                                                                                   \
+            PANEL_STEP(suffix, 1, 2)                                                                                   \
+            PANEL_STEP(suffix, 1, 1)                                                                                   \
+            break;                                                                                                     \
+        case 2:                                                                                                        \
+            PANEL_STEP(suffix, 2, 4)                                                                                   \
+            PANEL_STEP(suffix, 2, 2)                                                                                   \
+            PANEL_STEP(suffix, 2, 1)                                                                                   \
+            break;                                                                                                     \
+        case 3:                                                                                                        \
+            PANEL_STEP(suffix, 3, 4)                                                                                   \
+            PANEL_STEP(suffix, 3, 2)                                                                                   \
+            PANEL_STEP(suffix, 3, 1)                                                                                   \
+            break;                                                                                                     \
+        case 4:                                                                                                        \
+            PANEL_STEP(suffix, 4, 2)                                                                                   \
+            PANEL_STEP(suffix, 4, 1)                                                                                   \
+            break;                                                                                                     \
+        case 5:                                                                                                        \
+            PANEL_STEP(suffix, 5, 2)                                                                                   \
+            PANEL_STEP(suffix, 5, 1)                                                                                   \
+            break;                                                                                                     \
+        default:                                                                                                       \
+            PANEL_STEP(suffix, 6, 2)                                                                                   \
+            PANEL_STEP(suffix, 6, 1)                                                                                   \
+            break;                                                                                                     \
+        }                                                                                                              \
+    }                                                                                                                  \
+                                                                                                                       \
+    /* a few panels for all rows, then the next: they stay in the first-level cache */                                 \
+    static void panel_##suffix(size_t batch, size_t outputs, size_t k, const type *w, const float *x, size_t ldx,      \
+                               float *y, size_t ldy)                                                                   \
+    {                                                                                                                  \
+        if (batch <= 6) {                                                                                              \
+            rows_##suffix(batch, outputs, k, w, x, ldx, y, ldy);                                                       \
+            return;                                                                                                    \
+        }                                                                                                              \
+        const size_t some = 2 * VW > SDM_PANEL ? 2 * VW : SDM_PANEL;                                                   \
+        for (size_t o = 0; o < outputs; o += some, w += some * k)                                                      \
+            for (size_t i = 0; i < batch; i += 6)                                                                      \
+                rows_##suffix(batch - i < 6 ? batch - i : 6, outputs - o < some ? outputs - o : some, k, w,            \
+                              x + i * ldx, ldx, y + i * ldy + o, ldy);                                                 \
+    }                                                                                                                  \
+                                                                                                                       \
+    static void back_##suffix(size_t outputs, size_t k, const type *w, const float *y, float *x)                       \
+    {                                                                                                                  \
+        memset(x, 0, k * sizeof *x);                                                                                   \
+        /* four panels at a time: the sum over the lanes is what costs */                                              \
+        for (size_t o = 0; o < outputs; o += 4 * SDM_PANEL, w += 4 * SDM_PANEL * k) {                                  \
+            const size_t n = outputs - o < 4 * SDM_PANEL ? outputs - o : 4 * SDM_PANEL;                                \
+            for (size_t p = 0; p < k; p++) {                                                                           \
+                vec sum = {0};                                                                                         \
+                for (size_t j = 0; j < n; j += VW)                                                                     \
+                    sum += load_weights(w + j / SDM_PANEL * SDM_PANEL * k + p * SDM_PANEL + j % SDM_PANEL) *           \
+                           load(y + o + j);                                                                            \
+                float each[VW], total = 0;                                                                             \
+                store(each, sum);                                                                                      \
+                for (int j = 0; j < VW; j++) total += each[j];                                                         \
+                x[p] += total;                                                                                         \
+            }                                                                                                          \
+        }                                                                                                              \
     }
-}
+PANEL(float, f32, load)
+PANEL(uint16_t, f16, load_half)
 
 // exp by 2^n times a polynomial of degree 6 on [-ln 2 / 2, ln 2 / 2] (coefficients: Taylor, adjusted by the Cephes library's expf)
 static inline vec exp_vec(vec x)
@@ -209,8 +218,8 @@ const kernel_table TABLE = {.name = ISA,
                             .mr = MR,
                             .nr = NR,
                             .micro = micro,
-                            .tile_f32 = tile_f32,
-                            .tile_f16 = tile_f16,
-                            .expand_f16 = expand_f16,
-                            .tile_f16_batch = tile_f16_batch,
+                            .panel_f32 = panel_f32,
+                            .panel_f16 = panel_f16,
+                            .back_f32 = back_f32,
+                            .back_f16 = back_f16,
                             .exp = exp_all};

@@ -10,12 +10,13 @@ typedef struct kernel_table {
     size_t mr, nr; /* rows and columns of the register tile of the matrix product */
     /* c[mr][ldc] (+)= a[k][mr] * b[k][nr], packed */
     void (*micro)(size_t k, const float *a, const float *b, float *c, size_t ldc, int add);
-    void (*tile_f32)(size_t batch, size_t k, const float *w, const float *x, size_t ldx, float *y, size_t ldy);
-    void (*tile_f16)(size_t k, const uint16_t *w, const float *x, float *y); /* batch of one */
-    /* batch of two or more; panels: k * SDM_TILE floats of scratch */
-    void (*tile_f16_batch)(size_t batch, size_t k, const uint16_t *w, const float *x, size_t ldx, float *y, size_t ldy,
-                           float *panels);
-    void (*expand_f16)(size_t n, const uint16_t *h, float *y); /* n a multiple of SDM_TILE */
+    /* sdm_panel_*() and sdm_panel_back_*(); outputs: a multiple of 16 */
+    void (*panel_f32)(size_t batch, size_t outputs, size_t k, const float *w, const float *x, size_t ldx, float *y,
+                      size_t ldy);
+    void (*panel_f16)(size_t batch, size_t outputs, size_t k, const uint16_t *w, const float *x, size_t ldx, float *y,
+                      size_t ldy);
+    void (*back_f32)(size_t outputs, size_t k, const float *w, const float *y, float *x);
+    void (*back_f16)(size_t outputs, size_t k, const uint16_t *w, const float *y, float *x);
     void (*exp)(size_t n, const float *x, float *y);
 } kernel_table;
 
@@ -23,5 +24,9 @@ extern const kernel_table sdm_kernels_generic;
 #if defined(__x86_64__)
 extern const kernel_table sdm_kernels_avx2, sdm_kernels_avx512;
 #endif
+
+/* For tests, before other threads start: 0 baseline of the machine, 1 AVX2, 2 AVX-512, -1 the best there is. What is not there becomes
+   the best; returns the level in use. */
+int sdm_kernels_select(int level);
 
 #endif

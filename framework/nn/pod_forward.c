@@ -1,173 +1,263 @@
-/* The pod network at work: parameters -> latent -> coefficients -> map, with derivatives by forward mode. No allocation.
+/* The pod network at work: latent variables -> coefficients -> map, with derivatives in forward and reverse mode. No allocation.
    Letters as in sdm/pod.h; R rows that go through the decoder together (maps, or a map and its derivatives). */
 #include <string.h>
+#ifdef _OPENMP
+#include <omp.h>
+#endif
 
-#include "model_internal.h"
+#include "pod_internal.h"
 #include "sdm/kernels.h"
 
-enum { ROWS = 24 }; // four times the six rows of the kernels
+enum { ROWS = 12 }; // twice the six rows of the kernels: what they need of a block stays in the second-level cache
 
-static size_t pad(size_t n) { return (n + SDM_TILE - 1) / SDM_TILE * SDM_TILE; }
-static size_t larger(size_t a, size_t b) { return a > b ? a : b; }
 static size_t smaller(size_t a, size_t b) { return a < b ? a : b; }
 
 // scratch, carved from the caller's block
 typedef struct workspace {
-    float *z;      // [R][L]
-    float *c;      // [R][pad(K)]
-    float *y;      // [R][pad(V_b)]
-    float *expand; // [max(L, k_b)][T]
-    float *phi;    // [n_poly], all products
-    float *dphi;   // [P][n_poly]
-    float *h, *dh; // [1 + P][pad(W)], twice: values and tangents of a layer
-    float *slope;  // [pad(W)]
+    pod_latent latent;
+    float *z;                     // [R][L]
+    float *c;                     // [R][padded K]
+    float *y[SDM_POD_MAX_LEVELS]; // [R][padded outputs of a block], for each thread
+    size_t per_thread;
 } workspace;
 
-static size_t n_poly(const sdm_model *m) { return larger(m->arch.n_terms, 1 + m->arch.n_inputs); }
+static size_t padded(size_t floats) { return (floats + 15) / 16 * 16; }
 
-static size_t carve(const sdm_model *m, size_t rows, void *memory, workspace *w)
+static size_t carve(const pod_network *m, size_t rows, size_t directions, int n_threads, float *memory, workspace *w)
 {
     const sdm_pod_arch *a = &m->arch;
-    const size_t sizes[] = {rows * a->n_latent,
-                            rows * pad(a->n_coefficients),
-                            rows * pad(m->max_block_voxels),
-                            larger(a->n_latent, m->max_rank) * SDM_TILE,
-                            n_poly(m),
-                            a->n_params * n_poly(m),
-                            (1 + a->n_params) * larger(pad(a->width), a->n_inputs),
-                            (1 + a->n_params) * pad(a->width),
-                            pad(a->width)};
-    float **const fields[] = {&w->z, &w->c, &w->y, &w->expand, &w->phi, &w->dphi, &w->h, &w->dh, &w->slope};
-    float *at = memory;
-    size_t total = 0;
-    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
-        *fields[i] = memory ? at + total : NULL;
-        total += (sizes[i] + 15) / 16 * 16;
+    size_t total = sdm_pod_latent_carve(m, directions, memory, &w->latent);
+    w->z = memory ? memory + total : NULL;
+    total += padded(rows * a->n_latent);
+    w->c = memory ? memory + total : NULL;
+    total += rows * sdm_panel_outputs(a->n_coefficients);
+    w->per_thread = 0;
+    for (size_t l = 0; l < a->levels.n; l++) {
+        w->y[l] = memory ? memory + total + w->per_thread : NULL;
+        w->per_thread += rows * sdm_panel_outputs(m->max_outputs[l]);
     }
-    return total * sizeof(float);
+    return (total + w->per_thread * (size_t)n_threads) * sizeof(float);
 }
 
-// z[L] at parameters p[P], and dz[P][L] (per unit of each parameter) when `tangents`; dz follows z with stride L
-static void latent(const sdm_model *m, const double *p, bool tangents, const workspace *w, float *z)
+// y[R][ldy] = x[R][ldx] times weights that begin at `at`
+static void product(bool half, size_t rows, size_t outputs, size_t k, const void *weights, size_t at, const float *x,
+                    size_t ldx, float *y, size_t ldy)
 {
-    const sdm_pod_arch *a = &m->arch;
-    const size_t rows = tangents ? 1 + a->n_params : 1, total = n_poly(m);
-    double x[SDM_POD_MAX_PARAMS], unit[SDM_POD_MAX_PARAMS];
-    for (size_t i = 0; i < a->n_params; i++) {
-        const sdm_model_param *q = &m->params[i];
-        unit[i] = 2 / (q->max - q->min);
-        x[i] = (p[i] - q->min) * unit[i] - 1;
-    }
-    sdm_poly_eval(m->exponents, total, a->n_params, larger(a->degree, a->input_degree), x, w->phi,
-                  tangents ? w->dphi : NULL);
-    for (size_t r = 1; r < rows; r++)
-        for (size_t t = 0; t < total; t++) w->dphi[(r - 1) * total + t] *= (float)unit[r - 1];
-
-    for (size_t r = 0; r < rows; r++)
-        memcpy(z + r * a->n_latent, r ? w->dphi + (r - 1) * total : w->phi, a->n_terms * sizeof *z);
-    if (!a->depth) return;
-
-    // the MLP: its input is the products of degree 1 and more; tangents go through the same weights, then times the slope
-    const float *in = w->phi + 1, *din = w->dphi + 1;
-    size_t stride = total, n_in = a->n_inputs;
-    const size_t width = pad(a->width);
-    float *out = w->h, *other = w->dh;
-    for (size_t layer = 0; layer < a->depth; layer++) {
-        for (size_t o = 0; o < width; o += SDM_TILE) {
-            const float *tile = m->layer[layer] + o * n_in;
-            sdm_tile_f32(1, n_in, tile, in, 0, out + o, 0);
-            if (tangents) sdm_tile_f32(a->n_params, n_in, tile, din, stride, out + width + o, width);
-        }
-        for (size_t o = 0; o < a->width; o++) out[o] += m->bias[layer][o];
-        sdm_activate(a->activation, a->width, out, out, w->slope);
-        for (size_t r = 1; r < rows; r++)
-            for (size_t o = 0; o < a->width; o++) out[r * width + o] *= w->slope[o];
-        in = out, din = out + width, stride = width, n_in = a->width;
-        float *swap = out;
-        out = other, other = swap;
-    }
-    for (size_t r = 0; r < rows; r++) memcpy(z + r * a->n_latent + a->n_terms, in + r * width, a->width * sizeof *z);
-}
-
-static void tile(const sdm_model *m, size_t rows, size_t k, const void *weights, size_t offset, const float *x,
-                 size_t ldx, float *y, size_t ldy, float *expand)
-{
-    if (m->half)
-        sdm_tile_f16(rows, k, (const uint16_t *)weights + offset, x, ldx, y, ldy, expand);
+    if (half)
+        sdm_panel_f16(rows, outputs, k, (const uint16_t *)weights + at, x, ldx, y, ldy);
     else
-        sdm_tile_f32(rows, k, (const float *)weights + offset, x, ldx, y, ldy);
+        sdm_panel_f32(rows, outputs, k, (const float *)weights + at, x, ldx, y, ldy);
 }
 
-// block b of row r from y to its map, with the mean added when wanted
-static void place(const sdm_grid *g, const sdm_pod_block *b, const float *y, const float *mean, float *map)
+static void product_back(bool half, size_t outputs, size_t k, const void *weights, size_t at, const float *y, float *x)
 {
-    for (size_t z = 0; z < b->size[2]; z++) {
-        for (size_t v = 0; v < b->size[1]; v++) {
-            const size_t from = (z * b->size[1] + v) * b->size[0];
-            float *to = map + ((b->at[2] + z) * (size_t)g->n[1] + b->at[1] + v) * (size_t)g->n[0] + b->at[0];
-            if (mean)
-                for (size_t x = 0; x < b->size[0]; x++) to[x] = y[from + x] + mean[from + x];
-            else
-                memcpy(to, y + from, b->size[0] * sizeof *to);
+    if (half)
+        sdm_panel_back_f16(outputs, k, (const uint16_t *)weights + at, y, x);
+    else
+        sdm_panel_back_f32(outputs, k, (const float *)weights + at, y, x);
+}
+
+static size_t first_voxel(const sdm_grid *g, const sdm_pod_block *b)
+{
+    return ((size_t)b->at[2] * (size_t)g->n[1] + b->at[1]) * (size_t)g->n[0] + b->at[0];
+}
+
+typedef float row4 __attribute__((vector_size(16), aligned(4)));
+
+// a row of n voxels, with the mean where it is wanted
+static inline void place_row(size_t n, const float *y, const float *mean, float *to)
+{
+    if (n == 4)
+        *(row4 *)to = mean ? *(const row4 *)y + *(const row4 *)mean : *(const row4 *)y;
+    else
+        for (size_t x = 0; x < n; x++) to[x] = mean ? y[x] + mean[x] : y[x];
+}
+
+// a block of the lowest level, rows of n voxels, to its place in the map; the mean is added when wanted
+static inline void place(const sdm_grid *g, const sdm_pod_block *b, size_t n, const float *y, const float *mean,
+                         float *map)
+{
+    const size_t line = (size_t)g->n[0], plane = line * (size_t)g->n[1];
+    float *slab = map + first_voxel(g, b);
+    for (size_t z = 0; z < b->size[2]; z++, slab += plane) {
+        float *to = slab;
+        for (size_t v = 0; v < b->size[1]; v++, y += n, to += line) {
+            place_row(n, y, mean, to);
+            if (mean) mean += n;
         }
     }
 }
 
-// z[R][L] -> maps[R]; the mean is added to the first `with_mean` of them
-static void decode(const sdm_model *m, size_t rows, const workspace *w, size_t with_mean, float *const *maps)
+// what a call of decode() works on
+typedef struct job {
+    const sdm_grid *grid;
+    const pod_network *m;
+    size_t rows, with_mean; // the mean is added to the first `with_mean` rows
+    float *const *maps;
+    const workspace *w;
+} job;
+
+// x[R][ldx]: coefficients of block b of `level`
+static void decode_block(const job *j, size_t b, size_t level, size_t thread, const float *x, size_t ldx)
 {
-    const sdm_pod_arch *a = &m->arch;
-    const size_t ldc = pad(a->n_coefficients), ldy = pad(m->max_block_voxels);
-    for (size_t o = 0; o < ldc; o += SDM_TILE)
-        tile(m, rows, a->n_latent, m->head, o * a->n_latent, w->z, a->n_latent, w->c + o, ldc, w->expand);
-    size_t offset = 0;
-    for (const sdm_pod_block *b = m->blocks; b < m->blocks + a->n_blocks; b++) {
-        const size_t voxels = pad(sdm_pod_block_voxels(b));
-        for (size_t o = 0; o < voxels; o += SDM_TILE)
-            tile(m, rows, b->rank, m->basis, offset + o * b->rank, w->c + b->coefficient, ldc, w->y + o, ldy,
-                 w->expand);
-        for (size_t r = 0; r < rows; r++)
-            place(&m->info.grid, b, w->y + r * ldy, r < with_mean ? m->mean + b->voxel : NULL, maps[r]);
-        offset += voxels * b->rank;
+    const pod_network *m = j->m;
+    const sdm_pod_block *k = &m->blocks[b];
+    const size_t ldy = sdm_panel_outputs(m->max_outputs[level]);
+    float *y = j->w->y[level] + thread * j->w->per_thread;
+    product(m->half, j->rows, m->outputs[b], k->rank, m->basis, m->weights_at[b], x, ldx, y, ldy);
+    if (level > 0) {
+        const uint32_t first = m->blocks[k->child].coefficient;
+        for (size_t i = k->child; i < k->child + k->n_children; i++)
+            decode_block(j, i, level - 1, thread, y + (m->blocks[i].coefficient - first), ldy);
+        return;
+    }
+    for (size_t r = 0; r < j->rows; r++) {
+        const float *mean = r < j->with_mean ? m->mean + k->voxel : NULL;
+        if (k->size[0] == 4)
+            place(j->grid, k, 4, y + r * ldy, mean, j->maps[r]);
+        else
+            place(j->grid, k, k->size[0], y + r * ldy, mean, j->maps[r]);
     }
 }
 
-size_t sdm_model_scratch_bytes(const sdm_model *m, size_t n)
+// z[R][L] -> maps[R]
+static void decode(const job *j, int n_threads)
+{
+    enum { PART = 32 * SDM_PANEL };
+    const pod_network *m = j->m;
+    const sdm_pod_arch *a = &m->arch;
+    const size_t ldc = sdm_panel_outputs(a->n_coefficients), top = a->levels.n - 1;
+    const long parts = (long)((a->n_coefficients + PART - 1) / PART);
+    const long first = (long)a->levels.first[top], end = (long)a->levels.first[top + 1];
+#ifdef _OPENMP
+#pragma omp parallel num_threads(n_threads) if (n_threads > 1)
+#else
+    (void)n_threads;
+#endif
+    {
+        size_t thread = 0;
+#ifdef _OPENMP
+        thread = (size_t)omp_get_thread_num();
+#pragma omp for schedule(static)
+#endif
+        for (long i = 0; i < parts; i++) {
+            const size_t o = (size_t)i * PART;
+            product(m->half, j->rows, smaller(PART, a->n_coefficients - o), a->n_latent, m->head, o * a->n_latent,
+                    j->w->z, a->n_latent, j->w->c + o, ldc);
+        }
+#ifdef _OPENMP
+#pragma omp for schedule(dynamic)
+#endif
+        for (long b = first; b < end; b++)
+            decode_block(j, (size_t)b, top, thread, j->w->c + m->blocks[b].coefficient, ldc);
+    }
+}
+
+size_t sdm_pod_scratch_bytes(const sdm_model *m, size_t n, int n_threads)
 {
     workspace w;
-    return carve(m, smaller(n, ROWS), NULL, &w);
+    return carve(m->network, smaller(n, ROWS), 0, n_threads, NULL, &w);
 }
 
-void sdm_model_forward(const sdm_model *m, const double *params, size_t n, float *values, void *scratch)
+void sdm_pod_forward(const sdm_model *m, const double *params, size_t n, float *values, void *scratch, int n_threads)
 {
+    const pod_network *k = m->network;
     const size_t voxels = sdm_grid_count(&m->info.grid);
     for (size_t at = 0; at < n; at += ROWS) {
         const size_t rows = smaller(ROWS, n - at);
         workspace w;
-        carve(m, smaller(n, ROWS), scratch, &w);
+        carve(k, smaller(n, ROWS), 0, n_threads, scratch, &w);
         float *maps[ROWS];
         for (size_t r = 0; r < rows; r++) {
-            latent(m, params + (at + r) * m->arch.n_params, false, &w, w.z + r * m->arch.n_latent);
+            sdm_pod_latent(m, params + (at + r) * k->arch.n_params, 0, NULL, &w.latent, w.z + r * k->arch.n_latent);
             maps[r] = values + (at + r) * voxels;
         }
-        decode(m, rows, &w, rows, maps);
+        decode(&(job){&m->info.grid, k, rows, rows, maps, &w}, n_threads);
     }
 }
 
-size_t sdm_model_jacobian_scratch_bytes(const sdm_model *m)
+// the map and its derivatives along direction[n][P]
+static void tangents(const sdm_model *m, const double *params, size_t n, const double *direction, float *values,
+                     float *tangent, void *scratch, int n_threads)
 {
+    const pod_network *k = m->network;
+    const size_t voxels = sdm_grid_count(&m->info.grid);
     workspace w;
-    return carve(m, 1 + m->arch.n_params, NULL, &w);
+    carve(k, 1 + n, n, n_threads, scratch, &w);
+    sdm_pod_latent(m, params, n, direction, &w.latent, w.z);
+    float *maps[1 + SDM_POD_MAX_PARAMS] = {values};
+    for (size_t r = 0; r < n; r++) maps[1 + r] = tangent + r * voxels;
+    decode(&(job){&m->info.grid, k, 1 + n, 1, maps, &w}, n_threads);
 }
 
-void sdm_model_jacobian(const sdm_model *m, const double *params, float *values, float *jacobian, void *scratch)
+size_t sdm_pod_jacobian_scratch_bytes(const sdm_model *m, int n_threads)
 {
-    const size_t voxels = sdm_grid_count(&m->info.grid), rows = 1 + m->arch.n_params;
+    const pod_network *k = m->network;
     workspace w;
-    carve(m, rows, scratch, &w);
-    latent(m, params, true, &w, w.z);
-    float *maps[1 + SDM_POD_MAX_PARAMS];
-    maps[0] = values;
-    for (size_t r = 1; r < rows; r++) maps[r] = jacobian + (r - 1) * voxels;
-    decode(m, rows, &w, 1, maps);
+    return carve(k, 1 + k->arch.n_params, k->arch.n_params, n_threads, NULL, &w);
+}
+
+void sdm_pod_jacobian(const sdm_model *m, const double *params, float *values, float *jacobian, void *scratch,
+                      int n_threads)
+{
+    const size_t n = m->info.n_params;
+    double unit[SDM_POD_MAX_PARAMS * SDM_POD_MAX_PARAMS] = {0};
+    for (size_t i = 0; i < n; i++) unit[i * n + i] = 1;
+    tangents(m, params, n, unit, values, jacobian, scratch, n_threads);
+}
+
+size_t sdm_pod_jvp_scratch_bytes(const sdm_model *m, int n_threads)
+{
+    workspace w;
+    return carve(m->network, 2, 1, n_threads, NULL, &w);
+}
+
+void sdm_pod_jvp(const sdm_model *m, const double *params, const double *direction, float *values, float *tangent,
+                 void *scratch, int n_threads)
+{
+    tangents(m, params, 1, direction, values, tangent, scratch, n_threads);
+}
+
+// x[rank] = gradient at the coefficients of block b of `level`
+static void back_block(const pod_network *m, const sdm_grid *g, size_t b, size_t level, const float *adjoint,
+                       const workspace *w, float *x)
+{
+    const sdm_pod_block *k = &m->blocks[b];
+    float *y = w->y[level];
+    memset(y + m->outputs[b], 0, (sdm_panel_outputs(m->outputs[b]) - m->outputs[b]) * sizeof *y);
+    if (level > 0) {
+        const uint32_t first = m->blocks[k->child].coefficient;
+        for (size_t i = k->child; i < k->child + k->n_children; i++)
+            back_block(m, g, i, level - 1, adjoint, w, y + (m->blocks[i].coefficient - first));
+    } else {
+        const size_t line = (size_t)g->n[0];
+        const float *from = adjoint + first_voxel(g, k);
+        float *to = y;
+        for (size_t z = 0; z < k->size[2]; z++, from += line * (size_t)g->n[1])
+            for (size_t v = 0; v < k->size[1]; v++, to += k->size[0])
+                memcpy(to, from + v * line, k->size[0] * sizeof *to);
+    }
+    product_back(m->half, m->outputs[b], k->rank, m->basis, m->weights_at[b], y, x);
+}
+
+size_t sdm_pod_vjp_scratch_bytes(const sdm_model *m)
+{
+    workspace w;
+    return carve(m->network, 2, 0, 1, NULL, &w); // a second row of z: its gradient
+}
+
+void sdm_pod_vjp(const sdm_model *m, const double *params, const float *adjoint, double *gradient, void *scratch)
+{
+    const pod_network *k = m->network;
+    const sdm_pod_arch *a = &k->arch;
+    const size_t top = a->levels.n - 1;
+    workspace w;
+    carve(k, 2, 0, 1, scratch, &w);
+    sdm_pod_latent(m, params, 0, NULL, &w.latent, w.z);
+    for (size_t b = a->levels.first[top]; b < a->levels.first[top + 1]; b++)
+        back_block(k, &m->info.grid, b, top, adjoint, &w, w.c + k->blocks[b].coefficient);
+    memset(w.c + a->n_coefficients, 0, (sdm_panel_outputs(a->n_coefficients) - a->n_coefficients) * sizeof *w.c);
+    float *dz = w.z + a->n_latent;
+    product_back(k->half, a->n_coefficients, a->n_latent, k->head, 0, w.c, dz);
+    sdm_pod_latent_back(m, &w.latent, dz, gradient);
 }

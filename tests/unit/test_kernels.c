@@ -13,6 +13,8 @@
 #include "sdm/memory.h"
 #include "sdm/rng.h"
 
+static int level; // of sdm_kernels_select()
+
 static float *random_floats(size_t n, uint64_t stream)
 {
     float *v;
@@ -99,63 +101,84 @@ static void half_in_every_instruction_set(void **state)
 #endif
     uint16_t *h;
     float *y;
+    const float one = 1;
     assert_int_equal(SDM_ALLOC(&h, 65536, "h", NULL), SDM_OK);
     assert_int_equal(SDM_ALLOC(&y, 65536, "y", NULL), SDM_OK);
     for (unsigned i = 0; i < 65536; i++) h[i] = (uint16_t)i;
     for (size_t t = 0; t < n; t++) {
-        tables[t]->expand_f16(65536, h, y);
+        tables[t]->panel_f16(1, 65536, 1, h, &one, 0, y, 0); // a layer of one input, 1: its weights
         for (unsigned i = 0; i < 65536; i++) {
             const float want = sdm_half_to_float((uint16_t)i);
             if (isnan(want))
                 assert_true(isnan(y[i]));
             else
-                assert_memory_equal(&y[i], &want, sizeof want);
+                assert_true(y[i] == want);
         }
     }
     sdm_free(h);
     sdm_free(y);
 }
 
-static void tiles(void **state)
+// layers of every number of rows and of outputs around the sizes of the kernels, in every instruction set
+static void panels(void **state)
 {
     (void)state;
-    enum { OUTPUTS = 150, K = 37, ROWS = 7 };
-    float *w = random_floats(OUTPUTS * K, 1), *x = random_floats(ROWS * K, 2);
-    float *tiled, *y, *scratch;
+    enum { K = 37, ROWS = 13, MOST = 160 };
+    float *w = random_floats(MOST * K, 1), *x = random_floats(ROWS * K, 2), *back = random_floats(MOST, 3);
+    float *packed, *y, single[MOST], dx[K];
     uint16_t *half;
-    const size_t count = sdm_tiled_count(OUTPUTS, K);
-    assert_int_equal(count, 192 * K);
-    assert_int_equal(SDM_ALLOC(&tiled, count, "t", NULL), SDM_OK);
-    assert_int_equal(SDM_ALLOC(&half, count, "t", NULL), SDM_OK);
-    assert_int_equal(SDM_ALLOC(&y, ROWS * 192, "t", NULL), SDM_OK);
-    assert_int_equal(SDM_ALLOC(&scratch, K * SDM_TILE, "t", NULL), SDM_OK);
-    sdm_tiled_pack_f32(OUTPUTS, K, (sdm_view){w, K, 1}, tiled);
-    sdm_tiled_pack_f16(OUTPUTS, K, (sdm_view){w, K, 1}, half);
-    for (int use_half = 0; use_half < 2; use_half++) {
-        for (size_t rows = 1; rows <= ROWS; rows++) {
-            for (size_t o = 0; o < 192; o += SDM_TILE) {
+    assert_int_equal(SDM_ALLOC(&packed, sdm_panel_count(MOST, K), "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&half, sdm_panel_count(MOST, K), "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&y, ROWS * MOST, "t", NULL), SDM_OK);
+    assert_int_equal(sdm_panel_count(150, K), 160 * K);
+    for (int isa = 0; isa < 3; isa++) {
+        if (sdm_kernels_select(isa) != isa) continue;
+        for (size_t outputs = 1; outputs <= 150; outputs += outputs < 70 ? 1 : 40) {
+            sdm_panel_pack_f32(outputs, K, (sdm_view){w, K, 1}, packed);
+            sdm_panel_pack_f16(outputs, K, (sdm_view){w, K, 1}, half);
+            for (int use_half = 0; use_half < 2; use_half++) {
+                for (size_t rows = 1; rows <= ROWS; rows += rows < 7 ? 1 : 6) {
+                    if (use_half)
+                        sdm_panel_f16(rows, outputs, K, half, x, K, y, MOST);
+                    else
+                        sdm_panel_f32(rows, outputs, K, packed, x, K, y, MOST);
+                    for (size_t r = 0; r < rows; r++) {
+                        for (size_t o = 0; o < outputs; o++) {
+                            double s = 0;
+                            for (size_t i = 0; i < K; i++)
+                                s += (double)x[r * K + i] *
+                                     (use_half ? sdm_half_to_float(sdm_half_from_float(w[o * K + i])) : w[o * K + i]);
+                            assert_true(fabs(s - y[r * MOST + o]) < 1e-5);
+                        }
+                        // the same bits alone
+                        if (use_half)
+                            sdm_panel_f16(1, outputs, K, half, x + r * K, K, single, MOST);
+                        else
+                            sdm_panel_f32(1, outputs, K, packed, x + r * K, K, single, MOST);
+                        assert_memory_equal(single, y + r * MOST, outputs * sizeof *single);
+                    }
+                }
                 if (use_half)
-                    sdm_tile_f16(rows, K, half + o * K, x, K, y + o, 192, scratch);
+                    sdm_panel_back_f16(outputs, K, half, back, dx);
                 else
-                    sdm_tile_f32(rows, K, tiled + o * K, x, K, y + o, 192);
-            }
-            for (size_t r = 0; r < rows; r++) {
-                for (size_t o = 0; o < 192; o++) {
+                    sdm_panel_back_f32(outputs, K, packed, back, dx);
+                for (size_t i = 0; i < K; i++) {
                     double s = 0;
-                    for (size_t i = 0; i < K && o < OUTPUTS; i++)
-                        s += (double)x[r * K + i] *
+                    for (size_t o = 0; o < outputs; o++)
+                        s += (double)back[o] *
                              (use_half ? sdm_half_to_float(sdm_half_from_float(w[o * K + i])) : w[o * K + i]);
-                    assert_true(fabs(s - y[r * 192 + o]) < 1e-5);
+                    assert_true(fabs(s - dx[i]) < 2e-5);
                 }
             }
         }
     }
+    sdm_kernels_select(-1);
     sdm_free(w);
     sdm_free(x);
-    sdm_free(tiled);
+    sdm_free(back);
+    sdm_free(packed);
     sdm_free(half);
     sdm_free(y);
-    sdm_free(scratch);
 }
 
 static void exponential(void **state)
@@ -168,7 +191,21 @@ static void exponential(void **state)
     const float far[3] = {-1e9f, 1e9f, 0};
     sdm_exp(3, far, y);
     assert_true(y[0] >= 0 && y[0] < 1e-37f && isfinite(y[1]) && y[1] > 1e38f && y[2] == 1);
-    assert_true(strlen(sdm_kernels_name()) > 0);
+}
+
+static void names(void **state)
+{
+    (void)state;
+#if defined(__x86_64__)
+    static const char *const name[] = {"sse2", "avx2", "avx512"};
+#elif defined(__aarch64__)
+    static const char *const name[] = {"neon"};
+#else
+    static const char *const name[] = {"generic"};
+#endif
+    const int used = sdm_kernels_select(level);
+    assert_int_equal(used, level);
+    assert_string_equal(sdm_kernels_name(), name[level]);
 }
 
 int main(void)
@@ -176,6 +213,13 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(product),        cmocka_unit_test(same_bits_for_threads),
         cmocka_unit_test(half_precision), cmocka_unit_test(half_in_every_instruction_set),
-        cmocka_unit_test(tiles),          cmocka_unit_test(exponential)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
+        cmocka_unit_test(panels),         cmocka_unit_test(exponential),
+        cmocka_unit_test(names)};
+    // every instruction set that this machine has, not only the one that is chosen
+    int failed = 0;
+    for (level = sdm_kernels_select(-1); level >= 0; level--) {
+        sdm_kernels_select(level);
+        failed += cmocka_run_group_tests(tests, NULL, NULL);
+    }
+    return failed;
 }

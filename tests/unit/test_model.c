@@ -16,14 +16,14 @@
 #include "sdm/pod.h"
 #include "sdm/rng.h"
 
-enum { P = 3, DEPTH = 2, WIDTH = 70, DEGREE = 3, INPUT_DEGREE = 2, BLOCK = 4 };
+enum { P = 3, DEPTH = 2, WIDTH = 70, DEGREE = 3, INPUT_DEGREE = 2, BLOCK = 2, LEVELS = 3 };
 
 // a small random network, kept in plain arrays
 typedef struct toy {
     sdm_model_param params[P];
     sdm_model_info info;
     sdm_pod_spec spec;
-    sdm_pod_block blocks[64];
+    sdm_pod_block blocks[80];
     float *memory, *layer[DEPTH], *bias[DEPTH], *head, *mean, *basis;
 } toy;
 
@@ -59,20 +59,24 @@ static void make(toy *t, bool half, int activation)
                         .n_terms = sdm_poly_count(P, DEGREE),
                         .n_inputs = sdm_poly_count(P, INPUT_DEGREE) - 1,
                         .n_voxels = 9 * 7 * 5,
-                        .n_blocks = sdm_pod_block_count(&t->info.grid, BLOCK)};
+                        .levels = sdm_pod_count(&t->info.grid, BLOCK, LEVELS)};
     a->n_latent = a->n_terms + WIDTH;
-    sdm_pod_blocks(&t->info.grid, BLOCK, t->blocks);
+    const size_t n_blocks = a->levels.first[LEVELS];
+    assert_true(a->levels.n == LEVELS && n_blocks <= 80);
+    sdm_pod_blocks(&t->info.grid, BLOCK, &a->levels, t->blocks);
+    // one block is only its mean; on the levels above nothing may have more functions than outputs
     size_t basis = 0;
-    for (size_t b = 0; b < a->n_blocks; b++) {
+    for (size_t b = 0; b < n_blocks; b++) {
         sdm_pod_block *k = &t->blocks[b];
-        const uint32_t voxels = k->size[0] * k->size[1] * k->size[2];
-        k->rank = b == 2                           ? 0
-                  : (uint32_t)(b % 5 + 1) < voxels ? (uint32_t)(b % 5 + 1)
-                                                   : voxels; // one block is only its mean
-        k->coefficient = (uint32_t)a->n_coefficients;
-        a->n_coefficients += k->rank;
-        basis += voxels * k->rank;
+        uint32_t outputs = k->size[0] * k->size[1] * k->size[2];
+        if (k->n_children) outputs = 0;
+        for (size_t i = k->child; i < k->child + k->n_children; i++) outputs += t->blocks[i].rank;
+        const uint32_t wanted = (uint32_t)(b % 5 + (k->n_children ? 9 : 1));
+        k->rank = b == 2 ? 0 : wanted < outputs ? wanted : outputs;
+        basis += outputs * k->rank;
     }
+    sdm_pod_number(&a->levels, t->blocks);
+    for (size_t b = a->levels.first[LEVELS - 1]; b < n_blocks; b++) a->n_coefficients += t->blocks[b].rank;
     const size_t n =
         WIDTH * a->n_inputs + WIDTH * WIDTH + 2 * WIDTH + a->n_coefficients * a->n_latent + a->n_voxels + basis;
     assert_int_equal(SDM_ALLOC(&t->memory, n, "toy", NULL), SDM_OK);
@@ -145,22 +149,33 @@ static void reference(const toy *t, const double *p, double *map)
         memcpy(h, next, sizeof h);
     }
     memcpy(z + a->n_terms, h, sizeof h);
-    const float *basis = t->basis;
-    for (size_t b = 0; b < a->n_blocks; b++) {
+    // coefficients from the highest level down, then the map
+    const size_t n_blocks = a->levels.first[LEVELS];
+    double c[80][64] = {{0}};
+    const float *matrix[80], *at = t->basis;
+    for (size_t b = 0; b < n_blocks; b++) {
+        matrix[b] = at;
+        at += t->blocks[b].rank * sdm_pod_outputs(t->blocks, b);
+    }
+    for (size_t b = n_blocks; b-- > 0;) {
         const sdm_pod_block *k = &t->blocks[b];
-        const size_t voxels = (size_t)k->size[0] * k->size[1] * k->size[2];
-        for (size_t v = 0; v < voxels; v++) {
+        assert_true(k->rank <= 64);
+        if (b >= a->levels.first[LEVELS - 1])
+            for (size_t r = 0; r < k->rank; r++)
+                for (size_t i = 0; i < a->n_latent; i++)
+                    c[b][r] += t->head[(k->coefficient + r) * a->n_latent + i] * z[i];
+        const size_t outputs = sdm_pod_outputs(t->blocks, b);
+        size_t o = 0;
+        for (size_t i = k->child; i < k->child + k->n_children; i++)
+            for (size_t q = 0; q < t->blocks[i].rank; q++, o++)
+                for (size_t r = 0; r < k->rank; r++) c[i][q] += c[b][r] * matrix[b][r * outputs + o];
+        for (size_t v = 0; v < outputs && !k->n_children; v++) {
             const size_t x = k->at[0] + v % k->size[0], y = k->at[1] + v / k->size[0] % k->size[1],
                          zz = k->at[2] + v / k->size[0] / k->size[1];
             double s = t->mean[k->voxel + v];
-            for (size_t r = 0; r < k->rank; r++) {
-                double c = 0;
-                for (size_t i = 0; i < a->n_latent; i++) c += t->head[(k->coefficient + r) * a->n_latent + i] * z[i];
-                s += c * basis[r * voxels + v];
-            }
+            for (size_t r = 0; r < k->rank; r++) s += c[b][r] * matrix[b][r * outputs + v];
             map[(zz * 7 + y) * 9 + x] = s;
         }
-        basis += voxels * k->rank;
     }
 }
 
@@ -235,6 +250,39 @@ static void forward_is_the_definition(void **state)
     }
 }
 
+// products with the Jacobian from both sides are those with the Jacobian itself
+static void products(const sdm_model *m, const double *p, uint64_t trial, const float *map, const float *jacobian)
+{
+    double direction[P], gradient[P];
+    float value[315], tangent[315], adjoint[315];
+    void *forward, *reverse;
+    assert_int_equal(sdm_alloc(&forward, sdm_model_jvp_scratch_bytes(m), 1, "scratch", NULL), 0);
+    assert_int_equal(sdm_alloc(&reverse, sdm_model_vjp_scratch_bytes(m), 1, "scratch", NULL), 0);
+    for (int i = 0; i < P; i++) direction[i] = sdm_rng_normal(3, trial, (uint64_t)i);
+    for (int v = 0; v < 315; v++) adjoint[v] = (float)sdm_rng_normal(4, trial, (uint64_t)v);
+    sdm_model_jvp(m, p, direction, value, tangent, forward);
+    sdm_model_vjp(m, p, adjoint, gradient, reverse);
+    for (int v = 0; v < 315; v++) {
+        double want = 0, size = 0;
+        for (int i = 0; i < P; i++) {
+            want += direction[i] * jacobian[i * 315 + v];
+            size += fabs(direction[i] * jacobian[i * 315 + v]);
+        }
+        assert_true(fabs(want - tangent[v]) < 1e-5 * (1 + size));
+        assert_true(fabsf(value[v] - map[v]) < 1e-4f);
+    }
+    for (int i = 0; i < P; i++) {
+        double want = 0, size = 0;
+        for (int v = 0; v < 315; v++) {
+            want += (double)adjoint[v] * jacobian[i * 315 + v];
+            size += fabs((double)adjoint[v] * jacobian[i * 315 + v]);
+        }
+        assert_true(fabs(want - gradient[i]) < 1e-5 * (1 + size));
+    }
+    sdm_free(forward);
+    sdm_free(reverse);
+}
+
 static void jacobian_is_the_slope(void **state)
 {
     (void)state;
@@ -262,6 +310,7 @@ static void jacobian_is_the_slope(void **state)
                     assert_true(fabs(slope - jacobian[i * 315 + v]) < 1e-4 * (10 + fabs(slope)));
                 }
             }
+            products(m, p, trial, map, jacobian);
         }
         sdm_free(scratch);
         sdm_free(forward);
@@ -344,9 +393,12 @@ static void damage_is_refused(void **state)
     // a newer version says so
     sdm_error e;
     sdm_model *m;
-    bytes[8] = 2;
+    bytes[8] = SDM_CONTAINER_VERSION + 1;
     assert_int_equal(sdm_model_open_memory("new", bytes, size, &m, &e), SDM_E_FORMAT);
     assert_non_null(strstr(e.text, "newer"));
+    bytes[8] = 1;
+    assert_int_equal(sdm_model_open_memory("old", bytes, size, &m, &e), SDM_E_FORMAT);
+    assert_non_null(strstr(e.text, "before the first release"));
     sdm_free(bytes);
     sdm_free(t.memory);
 }

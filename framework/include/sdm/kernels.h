@@ -1,5 +1,5 @@
 /* Dense linear algebra for networks: portable C, the widest instruction set of the machine chosen at run time.
-   Letters: M, N, K matrix sizes, B batch, T = SDM_TILE outputs of a tile. The same bits for any number of threads. */
+   Letters: M, N, K matrix sizes, B batch. The same bits for any number of threads. */
 #ifndef SDM_KERNELS_H
 #define SDM_KERNELS_H
 
@@ -13,8 +13,6 @@
 extern "C" {
 #endif
 
-#define SDM_TILE 64
-
 /* A matrix in memory: element (i, j) at data[i * row + j * col]. */
 typedef struct sdm_view {
     const float *data;
@@ -26,18 +24,29 @@ typedef struct sdm_view {
 SDM_API void sdm_gemm(size_t m, size_t n, size_t k, sdm_view a, sdm_view b, bool add, float *c, size_t ldc,
                       int n_threads);
 
-/* Weights of a dense layer in tiles: w[tiles][K][T], float or half. Number of elements for `outputs` outputs. */
-SDM_API size_t sdm_tiled_count(size_t outputs, size_t k);
+/* Weights of a dense layer in panels of 16 outputs, the last one filled up with zeros; each panel [K][16], float or half. */
+#define SDM_PANEL 16
 
-/* Packs weight(o, i) = w.data[o * w.row + i * w.col] of `outputs` x k into tiles; the rest of the last tile is zero. */
-SDM_API void sdm_tiled_pack_f32(size_t outputs, size_t k, sdm_view w, float *tiled);
-SDM_API void sdm_tiled_pack_f16(size_t outputs, size_t k, sdm_view w, uint16_t *tiled);
+/* Outputs with those of filling up: y below has room for them in its last row too. */
+static inline size_t sdm_panel_outputs(size_t outputs) { return (outputs + SDM_PANEL - 1) / SDM_PANEL * SDM_PANEL; }
 
-/* One tile: y[B][ldy] (T floats each) = x[B][ldx] (K floats each) times the tile w[K][T]; one thread. scratch: K * T floats, used by
-   the half version from B = 2 on. */
-SDM_API void sdm_tile_f32(size_t batch, size_t k, const float *w, const float *x, size_t ldx, float *y, size_t ldy);
-SDM_API void sdm_tile_f16(size_t batch, size_t k, const uint16_t *w, const float *x, size_t ldx, float *y, size_t ldy,
-                          float *scratch);
+/* Number of elements of the weights of `outputs` x k. */
+static inline size_t sdm_panel_count(size_t outputs, size_t k) { return sdm_panel_outputs(outputs) * k; }
+
+/* Packs weight(o, i) = w.data[o * w.row + i * w.col]. */
+SDM_API void sdm_panel_pack_f32(size_t outputs, size_t k, sdm_view w, float *panels);
+SDM_API void sdm_panel_pack_f16(size_t outputs, size_t k, sdm_view w, uint16_t *panels);
+
+/* y[B][ldy] = x[B][ldx] (K floats each) times the weights; sdm_panel_outputs(outputs) floats of each row are written, row after row
+   overwriting what the one before had behind its outputs. One thread; the same bits for each row whatever B. */
+SDM_API void sdm_panel_f32(size_t batch, size_t outputs, size_t k, const float *w, const float *x, size_t ldx, float *y,
+                           size_t ldy);
+SDM_API void sdm_panel_f16(size_t batch, size_t outputs, size_t k, const uint16_t *w, const float *x, size_t ldx,
+                           float *y, size_t ldy);
+
+/* The transpose: x[K] = the weights times y[sdm_panel_outputs(outputs)], of which those of filling up must be finite. One thread. */
+SDM_API void sdm_panel_back_f32(size_t outputs, size_t k, const float *w, const float *y, float *x);
+SDM_API void sdm_panel_back_f16(size_t outputs, size_t k, const uint16_t *w, const float *y, float *x);
 
 /* Half precision (IEEE 754 binary16), round to nearest even; values beyond its range become infinite. */
 SDM_API uint16_t sdm_half_from_float(float v);

@@ -2,6 +2,8 @@
 #ifndef SDM_MODEL_H
 #define SDM_MODEL_H
 
+#include <stdbool.h>
+
 #include "sdm/grid.h"
 
 #ifdef __cplusplus
@@ -27,7 +29,7 @@ typedef struct sdm_accuracy {
 /* What a model says about itself. Texts are NUL-terminated and owned by the model. */
 typedef struct sdm_model_info {
     char shape[SDM_MODEL_NAME_MAX];
-    char kind[16];    /* "pod" */
+    char kind[16];    /* of network, e.g. "pod" */
     char version[16]; /* of the program that trained it */
     size_t n_params;
     const sdm_model_param *params;
@@ -40,6 +42,7 @@ typedef struct sdm_model_info {
     int64_t train_samples; /* exact maps seen */
     uint64_t checksum;     /* of the whole file */
     size_t file_bytes, weight_bytes;
+    double macs; /* multiply-adds of one map */
     const char *config; /* resolved config, YAML */
 } sdm_model_info;
 
@@ -49,6 +52,9 @@ typedef struct sdm_model sdm_model;
 /* Reads and checks a model file: every size against the file's length before anything is allocated, every checksum.
    SDM_E_IO; SDM_E_FORMAT: not a model, damaged, truncated, or of a newer version. */
 SDM_API sdm_status sdm_model_open(const char *path, sdm_model **out, sdm_error *err);
+/* The same for a file that is in memory; the bytes are copied. `name` stands for the file in messages. */
+SDM_API sdm_status sdm_model_open_memory(const char *name, const uint8_t *bytes, size_t size, sdm_model **out,
+                                         sdm_error *err);
 SDM_API void sdm_model_free(sdm_model *m);
 SDM_API const sdm_model_info *sdm_model_get_info(const sdm_model *m);
 
@@ -66,6 +72,28 @@ SDM_API size_t sdm_model_jacobian_scratch_bytes(const sdm_model *m);
    parameter). One thread, no allocation. [any thread] */
 SDM_API void sdm_model_jacobian(const sdm_model *m, const double *params, float *values, float *jacobian,
                                 void *scratch);
+
+/* The map and its derivative along direction[n_params] (mm per unit of the direction) by forward mode, cheaper than the Jacobian:
+   values[nz][ny][nx], tangent[nz][ny][nx]. One thread, no allocation; scratch as above. [any thread] */
+SDM_API size_t sdm_model_jvp_scratch_bytes(const sdm_model *m);
+SDM_API void sdm_model_jvp(const sdm_model *m, const double *params, const double *direction, float *values,
+                           float *tangent, void *scratch);
+
+/* gradient[n_params] = sum over voxels of adjoint[nz][ny][nx] times d value / d parameter, by reverse mode, at the cost of about one map
+   whatever the number of parameters. One thread, no allocation; scratch as above. [any thread] */
+SDM_API size_t sdm_model_vjp_scratch_bytes(const sdm_model *m);
+SDM_API void sdm_model_vjp(const sdm_model *m, const double *params, const float *adjoint, double *gradient,
+                           void *scratch);
+
+/* True when one map is work enough for several threads: the functions below then share it among n_threads >= 1 threads, with the same
+   bits for any number; otherwise they are those above. */
+SDM_API bool sdm_model_is_threaded(const sdm_model *m);
+SDM_API size_t sdm_model_scratch_bytes_threads(const sdm_model *m, size_t n, int n_threads);
+SDM_API void sdm_model_forward_threads(const sdm_model *m, const double *params, size_t n, float *values, void *scratch,
+                                       int n_threads);
+SDM_API size_t sdm_model_jacobian_scratch_bytes_threads(const sdm_model *m, int n_threads);
+SDM_API void sdm_model_jacobian_threads(const sdm_model *m, const double *params, float *values, float *jacobian,
+                                        void *scratch, int n_threads);
 
 #ifdef __cplusplus
 }

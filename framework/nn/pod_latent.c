@@ -1,0 +1,103 @@
+/* The latent variables of a pod network: polynomials and MLP, with derivatives in forward and reverse mode. */
+#include <string.h>
+
+#include "pod_internal.h"
+#include "sdm/kernels.h"
+
+static size_t larger(size_t a, size_t b) { return a > b ? a : b; }
+static size_t n_poly(const pod_network *m) { return larger(m->arch.n_terms, 1 + m->arch.n_inputs); }
+static size_t row(const pod_network *m) { return larger(sdm_panel_outputs(m->arch.width), n_poly(m)); }
+
+size_t sdm_pod_latent_carve(const pod_network *m, size_t directions, float *memory, pod_latent *w)
+{
+    const sdm_pod_arch *a = &m->arch;
+    const size_t rows = 1 + directions;
+    const size_t sizes[] = {rows * n_poly(m), rows * row(m), rows * row(m), a->depth * sdm_panel_outputs(a->width),
+                            a->n_params * n_poly(m)};
+    float **const fields[] = {&w->phi, &w->h[0], &w->h[1], &w->slope, &w->dphi};
+    size_t total = 0;
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+        *fields[i] = memory ? memory + total : NULL;
+        total += (sizes[i] + 15) / 16 * 16;
+    }
+    return total;
+}
+
+// phi and its derivatives with respect to each parameter, then along the directions
+static void polynomials(const sdm_model *model, const double *p, size_t n_directions, const double *direction,
+                        const pod_latent *w)
+{
+    const pod_network *m = model->network;
+    const sdm_pod_arch *a = &m->arch;
+    const size_t total = n_poly(m);
+    double x[SDM_POD_MAX_PARAMS], unit[SDM_POD_MAX_PARAMS];
+    for (size_t i = 0; i < a->n_params; i++) {
+        const sdm_model_param *q = &model->params[i];
+        unit[i] = 2 / (q->max - q->min);
+        x[i] = (p[i] - q->min) * unit[i] - 1;
+    }
+    sdm_poly_eval(m->exponents, total, a->n_params, larger(a->degree, a->input_degree), x, w->phi, w->dphi);
+    for (size_t i = 0; i < a->n_params; i++)
+        for (size_t t = 0; t < total; t++) w->dphi[i * total + t] *= (float)unit[i];
+    for (size_t d = 0; d < n_directions; d++) {
+        float *to = w->phi + (1 + d) * total;
+        memset(to, 0, total * sizeof *to);
+        for (size_t i = 0; i < a->n_params; i++) {
+            const float f = (float)direction[d * a->n_params + i];
+            if (f == 0) continue;
+            for (size_t t = 0; t < total; t++) to[t] += f * w->dphi[i * total + t];
+        }
+    }
+}
+
+void sdm_pod_latent(const sdm_model *model, const double *p, size_t n_directions, const double *direction,
+                    const pod_latent *w, float *z)
+{
+    const pod_network *m = model->network;
+    const sdm_pod_arch *a = &m->arch;
+    const size_t rows = 1 + n_directions, total = n_poly(m), width = sdm_panel_outputs(a->width);
+    polynomials(model, p, n_directions, direction, w);
+    for (size_t r = 0; r < rows; r++) memcpy(z + r * a->n_latent, w->phi + r * total, a->n_terms * sizeof *z);
+    if (!a->depth) return;
+
+    // the MLP's input is the products of degree 1 and more; derivatives go through the same weights, then times the slope
+    const float *in = w->phi + 1;
+    size_t stride = total;
+    for (size_t layer = 0; layer < a->depth; layer++) {
+        float *out = w->h[layer % 2], *slope = w->slope + layer * width;
+        sdm_panel_f32(rows, a->width, sdm_pod_layer_inputs(a, layer), m->layer[layer], in, stride, out, width);
+        for (size_t o = 0; o < a->width; o++) out[o] += m->bias[layer][o];
+        sdm_activate(a->activation, a->width, out, out, slope);
+        for (size_t r = 1; r < rows; r++)
+            for (size_t o = 0; o < a->width; o++) out[r * width + o] *= slope[o];
+        in = out, stride = width;
+    }
+    for (size_t r = 0; r < rows; r++) memcpy(z + r * a->n_latent + a->n_terms, in + r * width, a->width * sizeof *z);
+}
+
+void sdm_pod_latent_back(const sdm_model *model, const pod_latent *w, const float *dz, double *gradient)
+{
+    const pod_network *m = model->network;
+    const sdm_pod_arch *a = &m->arch;
+    const size_t total = n_poly(m), width = sdm_panel_outputs(a->width);
+    float *dphi = w->phi; // no longer needed
+    memset(dphi, 0, total * sizeof *dphi);
+    if (a->depth) {
+        // the gradient at the outputs of a layer, zero where outputs are rounding
+        float *dh = w->h[0], *below = w->h[1];
+        memcpy(dh, dz + a->n_terms, a->width * sizeof *dh);
+        for (size_t layer = a->depth; layer-- > 0;) {
+            for (size_t o = 0; o < a->width; o++) dh[o] *= w->slope[layer * width + o];
+            memset(dh + a->width, 0, (width - a->width) * sizeof *dh);
+            sdm_panel_back_f32(a->width, sdm_pod_layer_inputs(a, layer), m->layer[layer], dh, below);
+            float *const swap = dh;
+            dh = below, below = swap;
+        }
+        memcpy(dphi + 1, dh, a->n_inputs * sizeof *dphi);
+    }
+    for (size_t t = 0; t < a->n_terms; t++) dphi[t] += dz[t];
+    for (size_t i = 0; i < a->n_params; i++) {
+        gradient[i] = 0;
+        for (size_t t = 0; t < total; t++) gradient[i] += (double)dphi[t] * w->dphi[i * total + t];
+    }
+}

@@ -1,0 +1,66 @@
+/* Max pooling of feature maps: x[C] of layout g -> y[C] of layout h, half the size. */
+#include "operators.h"
+
+// place of the largest value of the window whose first voxel is at x[at], which has w[x], w[y], w[z] voxels
+static size_t largest(const sdm_fmap *g, const float *x, size_t at, const size_t w[3])
+{
+    size_t best = at;
+    for (size_t c = 0; c < w[2]; c++)
+        for (size_t b = 0; b < w[1]; b++)
+            for (size_t a = 0; a < w[0]; a++) {
+                const size_t i = at + c * g->plane + b * g->row + a;
+                if (x[i] > x[best]) best = i;
+            }
+    return best;
+}
+
+// one channel: copies from the largest voxel of each window, or adds back to it
+static void windows(const sdm_fmap *g, const sdm_fmap *h, const float *x, const float *from, float *to, int back)
+{
+    size_t w[3];
+    for (size_t k = 0; k < h->n[2]; k++) {
+        w[2] = 2 * k + 1 < g->n[2] ? 2 : 1;
+        for (size_t j = 0; j < h->n[1]; j++) {
+            w[1] = 2 * j + 1 < g->n[1] ? 2 : 1;
+            for (size_t i = 0; i < h->n[0]; i++) {
+                w[0] = 2 * i + 1 < g->n[0] ? 2 : 1;
+                const size_t small = k * h->plane + j * h->row + i;
+                const size_t large = largest(g, x, 2 * (k * g->plane + j * g->row + i), w);
+                if (back)
+                    to[large] += from[small];
+                else
+                    to[small] = from[large];
+            }
+        }
+    }
+}
+
+void sdm_pool_tangent(const sdm_fmap *g, const sdm_fmap *h, size_t channels, const float *x, const float *dx, float *dy,
+                      int n_threads)
+{
+    (void)n_threads;
+#ifdef _OPENMP
+#pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
+#endif
+    for (long c = 0; c < (long)channels; c++) {
+        float *out = dy + (size_t)c * h->stride;
+        windows(g, h, x + (size_t)c * g->stride, dx + (size_t)c * g->stride, out, 0);
+        sdm_fmap_clear_pads(h, 0, h->count, out);
+    }
+}
+
+void sdm_pool_forward(const sdm_fmap *g, const sdm_fmap *h, size_t channels, const float *x, float *y, int n_threads)
+{
+    sdm_pool_tangent(g, h, channels, x, x, y, n_threads);
+}
+
+void sdm_pool_backward(const sdm_fmap *g, const sdm_fmap *h, size_t channels, const float *x, const float *dy,
+                       float *dx, int n_threads)
+{
+    (void)n_threads;
+#ifdef _OPENMP
+#pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
+#endif
+    for (long c = 0; c < (long)channels; c++)
+        windows(g, h, x + (size_t)c * g->stride, dy + (size_t)c * h->stride, dx + (size_t)c * g->stride, 1);
+}

@@ -1,5 +1,5 @@
-/* The spectral start: local bases by proper orthogonal decomposition in blocks of voxels, global modes of their coefficients,
-   least squares on the polynomials. Linear algebra on maps that are there: no optimiser yet. */
+/* The spectral start: nested local bases by proper orthogonal decomposition in blocks of voxels. Linear algebra on maps that are there: no
+   optimiser yet. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,367 +8,374 @@
 #endif
 
 #include "linalg.h"
+#include "pod_tree.h"
 #include "sdm/kernels.h"
 #include "sdm/memory.h"
 #include "streams.h"
 #include "trainer.h"
 
-// rows[n][V_b] of block b for the given slots (NULL: slot i for row i), without the mean
-static void load_slots(const trainer *t, const sdm_pod_block *b, const size_t *slots, size_t n, float *rows)
+// maps that the bases are made from: more change the error they leave on unseen shapes by a few per cent
+enum { BASES_MAPS = 4096 };
+
+// rows[n][V] of block b of the lowest level for the given slots, or for held-out maps, without the mean
+static void load_rows(const trainer *t, const sdm_pod_block *b, bool holdout, const size_t *slots, size_t n,
+                      float *rows)
 {
     const dataset *d = &t->data;
     const size_t voxels = sdm_pod_block_voxels(b);
     const float *mean = t->mean + b->voxel;
     for (size_t i = 0; i < n; i++) {
-        const size_t slot = slots ? slots[i] : i;
-        const int16_t *from = d->maps + slot * d->n_voxels + b->voxel;
-        const float scale = d->scale[slot];
-        for (size_t v = 0; v < voxels; v++) rows[i * voxels + v] = scale * (float)from[v] - mean[v];
+        if (holdout) {
+            const float *from = d->holdout + slots[i] * d->n_voxels + b->voxel;
+            for (size_t v = 0; v < voxels; v++) rows[i * voxels + v] = from[v] - mean[v];
+        } else {
+            const int16_t *from = d->maps + slots[i] * d->n_voxels + b->voxel;
+            const float scale = d->scale[slots[i]];
+            for (size_t v = 0; v < voxels; v++) rows[i * voxels + v] = scale * (float)from[v] - mean[v];
+        }
     }
 }
 
 typedef struct candidate {
-    double value; // eigenvalue: variance it explains, mm^2
-    uint32_t block, index;
+    double worth; // variance it explains for each weight it costs
+    uint32_t block;
 } candidate;
 
-static int by_value(const void *a, const void *b)
+static int by_worth(const void *a, const void *b)
 {
     const candidate *x = a, *y = b;
-    if (x->value != y->value) return x->value < y->value ? 1 : -1;
-    if (x->block != y->block) return x->block < y->block ? -1 : 1;
-    return x->index < y->index ? -1 : 1;
+    if (x->worth != y->worth) return x->worth < y->worth ? 1 : -1;
+    return x->block < y->block ? -1 : x->block > y->block;
 }
 
-// mean and leading eigenvectors of one block over the first n slots
-static sdm_status block_basis(trainer *t, size_t index, size_t n, size_t keep, float *rows, float *covariance,
-                              float *vectors, double *values, sdm_error *err)
+/* The bases while they are made. A function is worth its weights when the variance it explains, divided by their number (its own and those
+   that give its coefficient), is above `worth`: the same for all levels, so that the error is least for the number of weights. */
+typedef struct spectrum {
+    trainer *t;
+    size_t n, *slots; // maps to learn from
+    size_t keep;      // functions of a block of the lowest level at most
+    float *lowest;    // [n_voxels][keep] eigenvectors of the lowest level, block after block
+    double *values;   // [blocks of the lowest level][keep]
+    double worth;
+    float **basis; // [blocks] [k_b][V_b]
+} spectrum;
+
+// weights that give one coefficient of a function of `level`: an estimate, since the ranks above are not known yet
+static double cost_above(const trainer *t, size_t level)
 {
+    const double rank = t->config->network.rank;
+    if (level + 1 == t->arch.levels.n) return (double)t->arch.n_latent;
+    return level ? 4 * rank : 2.5 * rank;
+}
+
+static sdm_status eigenvectors(const spectrum *m, size_t block, size_t n, const float *rows, size_t stride,
+                               size_t outputs, size_t keep, float *covariance, float *vectors, double *values,
+                               sdm_error *err)
+{
+    sdm_gemm(outputs, outputs, n, (sdm_view){rows, 1, stride}, (sdm_view){rows, stride, 1}, false, covariance, outputs,
+             1);
+    for (size_t i = 0; i < outputs * outputs; i++) covariance[i] /= (float)n;
+    return leading_eigenvectors(outputs, covariance, keep, m->t->config->seed, STREAM_BASES + 1 + block, vectors,
+                                values, err);
+}
+
+static size_t kept(const spectrum *m, size_t outputs) { return m->keep < outputs ? m->keep : outputs; }
+
+// mean and leading eigenvectors of a block of the lowest level
+static sdm_status lowest_block(spectrum *m, size_t index, float *rows, float *covariance, sdm_error *err)
+{
+    trainer *t = m->t;
     const sdm_pod_block *b = &t->blocks[index];
     const size_t voxels = sdm_pod_block_voxels(b);
     float *mean = t->mean + b->voxel;
     memset(mean, 0, voxels * sizeof *mean);
-    load_slots(t, b, NULL, n, rows);
+    load_rows(t, b, false, m->slots, m->n, rows);
     for (size_t v = 0; v < voxels; v++) {
         double sum = 0;
-        for (size_t i = 0; i < n; i++) sum += rows[i * voxels + v];
-        mean[v] = (float)(sum / (double)n);
+        for (size_t i = 0; i < m->n; i++) sum += rows[i * voxels + v];
+        mean[v] = (float)(sum / (double)m->n);
     }
-    for (size_t i = 0; i < n; i++)
+    for (size_t i = 0; i < m->n; i++)
         for (size_t v = 0; v < voxels; v++) rows[i * voxels + v] -= mean[v];
-    sdm_gemm(voxels, voxels, n, (sdm_view){rows, 1, voxels}, (sdm_view){rows, voxels, 1}, false, covariance, voxels, 1);
-    for (size_t i = 0; i < voxels * voxels; i++) covariance[i] /= (float)n;
-    return leading_eigenvectors(voxels, covariance, keep, t->config->seed, STREAM_BASES + 1 + index, vectors, values,
-                                err);
+    return eigenvectors(m, index, m->n, rows, voxels, voxels, kept(m, voxels), covariance,
+                        m->lowest + b->voxel * m->keep, m->values + index * m->keep, err);
 }
 
-// ranks: the functions that explain most over all blocks, at least one in each block
-static sdm_status choose_ranks(trainer *t, const size_t *keep, const double *values, size_t stride, sdm_error *err)
+// ranks of the lowest level: the functions that are worth most, network.rank a block, at least one in each block; sets `worth`
+static sdm_status choose_lowest(spectrum *m, sdm_error *err)
 {
-    const size_t n_blocks = t->arch.n_blocks, wanted = (size_t)t->config->network.rank * n_blocks;
+    trainer *t = m->t;
+    const size_t n_blocks = t->arch.levels.first[1], wanted = (size_t)t->config->network.rank * n_blocks;
     candidate *c = NULL;
     size_t n = 0;
-    const sdm_status s = SDM_ALLOC(&c, n_blocks * stride, "basis candidates", err);
-    if (s) return s;
-    for (size_t b = 0; b < n_blocks; b++) {
+    sdm_status s = SDM_ALLOC(&c, n_blocks * m->keep, "basis candidates", err);
+    for (size_t b = 0; b < n_blocks && !s; b++) {
+        const size_t voxels = sdm_pod_block_voxels(&t->blocks[b]);
         t->blocks[b].rank = 1;
-        for (size_t i = 1; i < keep[b]; i++) c[n++] = (candidate){values[b * stride + i], (uint32_t)b, (uint32_t)i};
+        for (size_t i = 1; i < kept(m, voxels); i++)
+            c[n++] = (candidate){m->values[b * m->keep + i] / ((double)voxels + cost_above(t, 0)), (uint32_t)b};
     }
-    qsort(c, n, sizeof *c, by_value);
-    for (size_t i = 0; i < n && i + n_blocks < wanted; i++) t->blocks[c[i].block].rank++;
+    if (!s) qsort(c, n, sizeof *c, by_worth);
+    for (size_t i = 0; i < n && i + n_blocks < wanted && !s; i++) {
+        t->blocks[c[i].block].rank++;
+        m->worth = c[i].worth;
+    }
     sdm_free(c);
-    t->arch.n_coefficients = 0;
-    for (size_t b = 0; b < n_blocks; b++) {
-        t->blocks[b].coefficient = (uint32_t)t->arch.n_coefficients;
-        t->arch.n_coefficients += t->blocks[b].rank;
+    for (size_t b = 0; b < n_blocks && !s; b++) {
+        const size_t size = t->blocks[b].rank * sdm_pod_block_voxels(&t->blocks[b]);
+        if (!(s = SDM_ALLOC(&m->basis[b], size, "local bases", err)))
+            memcpy(m->basis[b], m->lowest + t->blocks[b].voxel * m->keep, size * sizeof **m->basis);
     }
-    return SDM_OK;
+    return s;
 }
 
-static sdm_status local_bases(trainer *t, size_t n, sdm_error *err)
+// sum of the ranks of the blocks first .. end - 1
+static size_t ranks_of(const trainer *t, size_t first, size_t end)
 {
-    const size_t n_blocks = t->arch.n_blocks, most = 4 * (size_t)t->config->network.rank;
-    size_t largest = 0, *keep = NULL;
-    for (size_t b = 0; b < n_blocks; b++)
-        if (sdm_pod_block_voxels(&t->blocks[b]) > largest) largest = sdm_pod_block_voxels(&t->blocks[b]);
-    const size_t stride = most < largest ? most : largest;
-    float *vectors = NULL;
+    size_t n = 0;
+    for (size_t b = first; b < end; b++) n += t->blocks[b].rank;
+    return n;
+}
+
+// basis of block `index` above the lowest level from below[n][stride], the coefficients of its children
+static sdm_status upper_block(spectrum *m, size_t level, size_t index, const float *below, size_t stride,
+                              sdm_error *err)
+{
+    sdm_pod_block *b = &m->t->blocks[index];
+    const size_t outputs = ranks_of(m->t, b->child, b->child + b->n_children);
+    const size_t most = 16 * (size_t)m->t->config->network.rank, keep = most < outputs ? most : outputs;
+    float *covariance = NULL, *vectors = NULL;
     double *values = NULL;
-    sdm_status s = SDM_ALLOC(&keep, n_blocks, "local bases", err);
-    if (!s) s = SDM_ALLOC(&vectors, t->arch.n_voxels * stride, "local bases", err);
-    if (!s) s = SDM_ALLOC(&values, n_blocks * stride, "local bases", err);
-    long failed = -1;
-    sdm_error first = {0};
+    sdm_status s = SDM_ALLOC(&covariance, outputs * outputs, "local bases", err);
+    if (!s) s = SDM_ALLOC(&vectors, keep * outputs, "local bases", err);
+    if (!s) s = SDM_ALLOC(&values, keep, "local bases", err);
+    if (!s) s = eigenvectors(m, index, m->n, below, stride, outputs, keep, covariance, vectors, values, err);
+    b->rank = 1;
+    while (!s && b->rank < keep && values[b->rank] > m->worth * ((double)outputs + cost_above(m->t, level))) b->rank++;
+    sdm_free(covariance);
+    sdm_free(values);
+    m->basis[index] = vectors;
+    return s;
+}
+
+// to[n][ldt] = coefficients of block b from its outputs from[n][ldf]
+static void project(size_t n, size_t rank, size_t outputs, const float *basis, const float *from, size_t ldf, float *to,
+                    size_t ldt)
+{
+    sdm_gemm(n, rank, outputs, (sdm_view){from, ldf, 1}, (sdm_view){basis, 1, outputs}, false, to, ldt, 1);
+}
+
+// the levels above the lowest, for the blocks below `root`
+static sdm_status upper_levels(spectrum *m, size_t root, sdm_error *err)
+{
+    const trainer *t = m->t;
+    const pod_tree tree = pod_tree_of(&t->arch.levels, t->blocks, root);
+    float *rows = NULL, *below = NULL, *here = NULL;
+    size_t ldb = ranks_of(t, tree.first[0], tree.end[0]), at = 0;
+    sdm_status s = SDM_ALLOC(&rows, m->n * tree.largest, "local bases", err);
+    if (!s) s = SDM_ALLOC(&below, m->n * ldb, "local coefficients", err);
+    if (!s) s = SDM_ALLOC(&here, m->n * ldb, "local coefficients", err);
+    for (size_t b = tree.first[0]; b < tree.end[0] && !s; b++) {
+        const sdm_pod_block *k = &t->blocks[b];
+        const size_t voxels = sdm_pod_block_voxels(k);
+        load_rows(t, k, false, m->slots, m->n, rows);
+        project(m->n, k->rank, voxels, m->basis[b], rows, voxels, below + at, ldb);
+        at += k->rank;
+    }
+    for (size_t level = 1; level < t->arch.levels.n && !s; level++) {
+        size_t child = 0;
+        at = 0;
+        for (size_t b = tree.first[level]; b < tree.end[level] && !s; b++) {
+            s = upper_block(m, level, b, below + child, ldb, err);
+            child += ranks_of(t, t->blocks[b].child, t->blocks[b].child + t->blocks[b].n_children);
+        }
+        const size_t ldh = ranks_of(t, tree.first[level], tree.end[level]);
+        child = 0;
+        for (size_t b = tree.first[level]; b < tree.end[level] && !s; b++) {
+            const sdm_pod_block *k = &t->blocks[b];
+            const size_t outputs = ranks_of(t, k->child, k->child + k->n_children);
+            project(m->n, k->rank, outputs, m->basis[b], below + child, ldb, here + at, ldh);
+            child += outputs, at += k->rank;
+        }
+        float *const swap = below;
+        below = here, here = swap, ldb = ldh;
+    }
+    sdm_free(here);
+    sdm_free(below);
+    sdm_free(rows);
+    return s;
+}
+
+// the first error of a loop over blocks: of the lowest index, so that it does not depend on the threads
+typedef struct first_error {
+    long index;
+    sdm_error err;
+} first_error;
+
+static void note_error(first_error *first, long index, const sdm_error *err)
+{
+#ifdef _OPENMP
+#pragma omp critical(sdm_local_bases)
+#endif
+    if (first->index < 0 || index < first->index) first->index = index, first->err = *err;
+}
+
+static sdm_status first_status(const first_error *first, sdm_error *err)
+{
+    if (first->index < 0) return SDM_OK;
+    if (err) *err = first->err;
+    return first->err.status;
+}
+
+static sdm_status lowest_level(spectrum *m, sdm_error *err)
+{
+    const trainer *t = m->t;
+    const long n_blocks = (long)t->arch.levels.first[1];
+    size_t largest = 0;
+    for (long b = 0; b < n_blocks; b++)
+        if (sdm_pod_block_voxels(&t->blocks[b]) > largest) largest = sdm_pod_block_voxels(&t->blocks[b]);
+    first_error first = {.index = -1};
 #ifdef _OPENMP
 #pragma omp parallel num_threads(t->n_threads)
 #endif
     {
         float *rows = NULL, *covariance = NULL;
         sdm_error mine = {0};
-        sdm_status made = s;
-        if (!made) made = SDM_ALLOC(&rows, n * largest, "local bases", &mine);
-        if (!made) made = SDM_ALLOC(&covariance, largest * largest, "local bases", &mine);
+        sdm_status s = SDM_ALLOC(&rows, m->n * largest, "local bases", &mine);
+        if (!s) s = SDM_ALLOC(&covariance, largest * largest, "local bases", &mine);
 #ifdef _OPENMP
 #pragma omp for schedule(dynamic)
 #endif
-        for (long b = 0; b < (long)n_blocks; b++) {
-            const size_t at = (size_t)b, voxels = sdm_pod_block_voxels(&t->blocks[at]);
-            sdm_status mine_s = made;
-            if (!mine_s) {
-                keep[at] = stride < voxels ? stride : voxels;
-                mine_s = block_basis(t, at, n, keep[at], rows, covariance, vectors + t->blocks[at].voxel * stride,
-                                     values + at * stride, &mine);
-            }
-            if (mine_s) {
-#ifdef _OPENMP
-#pragma omp critical(sdm_local_bases)
-#endif
-                if (failed < 0 || b < failed) failed = b, first = mine;
-            }
-        }
+        for (long b = 0; b < n_blocks; b++)
+            if (s || lowest_block(m, (size_t)b, rows, covariance, &mine)) note_error(&first, b, &mine);
         sdm_free(covariance);
         sdm_free(rows);
     }
-    if (!s && failed >= 0) {
-        s = first.status;
-        if (err) *err = first;
+    return first_status(&first, err);
+}
+
+static sdm_status upper_trees(spectrum *m, sdm_error *err)
+{
+    const sdm_pod_levels *levels = &m->t->arch.levels;
+    const long begin = (long)levels->first[levels->n - 1], end = (long)levels->first[levels->n];
+    first_error first = {.index = -1};
+    if (levels->n == 1) return SDM_OK;
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic) num_threads(m->t->n_threads)
+#endif
+    for (long root = begin; root < end; root++) {
+        sdm_error mine = {0};
+        if (upper_levels(m, (size_t)root, &mine)) note_error(&first, root, &mine);
     }
-    if (!s) s = choose_ranks(t, keep, values, stride, err);
+    return first_status(&first, err);
+}
+
+// numbers blocks, weights and coefficients by the ranks, and gathers the bases
+static sdm_status collect(spectrum *m, sdm_error *err)
+{
+    trainer *t = m->t;
+    const sdm_pod_levels *levels = &t->arch.levels;
+    const size_t n_blocks = levels->first[levels->n];
     size_t count = 0;
-    for (size_t b = 0; b < n_blocks && !s; b++) count += t->blocks[b].rank * sdm_pod_block_voxels(&t->blocks[b]);
-    if (!s) s = SDM_ALLOC(&t->basis, count, "local bases", err);
-    float *to = t->basis;
-    for (size_t b = 0; b < n_blocks && !s; b++) {
-        const size_t voxels = sdm_pod_block_voxels(&t->blocks[b]), size = t->blocks[b].rank * voxels;
-        memcpy(to, vectors + t->blocks[b].voxel * stride, size * sizeof *to);
-        to += size;
+    sdm_pod_number(levels, t->blocks);
+    sdm_status s = SDM_ALLOC(&t->matrix_at, n_blocks + 1, "local bases", err);
+    if (s) return s;
+    for (size_t b = 0; b < n_blocks; b++) {
+        t->matrix_at[b] = count;
+        count += t->blocks[b].rank * sdm_pod_outputs(t->blocks, b);
     }
-    sdm_free(values);
-    sdm_free(vectors);
-    sdm_free(keep);
+    t->matrix_at[n_blocks] = count;
+    t->arch.n_coefficients = ranks_of(t, levels->first[levels->n - 1], n_blocks);
+    if ((s = SDM_ALLOC(&t->basis, count, "local bases", err))) return s;
+    for (size_t b = 0; b < n_blocks; b++)
+        memcpy(t->basis + t->matrix_at[b], m->basis[b], (t->matrix_at[b + 1] - t->matrix_at[b]) * sizeof *t->basis);
+    return SDM_OK;
+}
+
+static sdm_status local_bases(trainer *t, size_t n, sdm_error *err)
+{
+    const size_t n_blocks = t->arch.levels.first[t->arch.levels.n];
+    spectrum m = {.t = t, .n = n < BASES_MAPS ? n : BASES_MAPS, .keep = 4 * (size_t)t->config->network.rank};
+    sdm_status s = SDM_ALLOC(&m.slots, m.n, "local bases", err);
+    if (!s) s = SDM_ALLOC(&m.lowest, t->arch.n_voxels * m.keep, "local bases", err);
+    if (!s) s = SDM_ALLOC(&m.values, t->arch.levels.first[1] * m.keep, "local bases", err);
+    if (!s) s = SDM_ALLOC(&m.basis, n_blocks, "local bases", err);
+    for (size_t i = 0; i < m.n && !s; i++) m.slots[i] = i * n / m.n;
+    if (!s) s = lowest_level(&m, err);
+    if (!s) s = choose_lowest(&m, err);
+    if (!s) s = upper_trees(&m, err);
+    if (!s) s = collect(&m, err);
+    for (size_t b = 0; b < n_blocks && m.basis; b++) sdm_free(m.basis[b]);
+    sdm_free(m.basis);
+    sdm_free(m.values);
+    sdm_free(m.lowest);
+    sdm_free(m.slots);
     return s;
 }
 
-// local coefficients y[n][K] of slots (or of the first n held-out maps when `holdout`)
-static sdm_status coefficients(const trainer *t, bool holdout, const size_t *slots, size_t n, float *y, sdm_error *err)
+// coefficients of `root` and of everything below it: rows `slots[n]` into y[n][K]
+static void climb(const trainer *t, const pod_tree *tree, bool holdout, const size_t *slots, size_t n, float *rows,
+                  float *below, float *here, float *y)
 {
-    const size_t k = t->arch.n_coefficients;
-    sdm_status s = SDM_OK;
-    const float *basis = t->basis;
-    size_t largest = 0;
-    size_t *basis_at = NULL;
-    if ((s = SDM_ALLOC(&basis_at, t->arch.n_blocks, "local coefficients", err))) return s;
-    size_t at = 0;
-    for (size_t b = 0; b < t->arch.n_blocks; b++) {
-        const size_t voxels = sdm_pod_block_voxels(&t->blocks[b]);
-        if (voxels > largest) largest = voxels;
-        basis_at[b] = at;
-        at += voxels * t->blocks[b].rank;
+    const size_t k = t->arch.n_coefficients, top = t->arch.levels.n - 1;
+    size_t ldb = 0;
+    for (size_t level = 0; level <= top; level++) {
+        const uint32_t first = t->blocks[tree->first[level]].coefficient;
+        const size_t ldh = level == top ? k : pod_tree_coefficients(t->blocks, tree, level);
+        float *const to = level == top ? y + first : here;
+        for (size_t b = tree->first[level]; b < tree->end[level]; b++) {
+            const sdm_pod_block *block = &t->blocks[b];
+            const size_t outputs = sdm_pod_outputs(t->blocks, b);
+            const float *from = rows;
+            if (level == 0)
+                load_rows(t, block, holdout, slots, n, rows);
+            else
+                from = below + (t->blocks[block->child].coefficient - t->blocks[tree->first[level - 1]].coefficient);
+            project(n, block->rank, outputs, t->basis + t->matrix_at[b], from, level ? ldb : outputs,
+                    to + (block->coefficient - first), ldh);
+        }
+        float *const swap = below;
+        below = here, here = swap, ldb = ldh;
     }
+}
+
+sdm_status bases_coefficients(const trainer *t, bool holdout, const size_t *slots, size_t n, float *y, sdm_error *err)
+{
+    enum { CHUNK = 256 };
+    const sdm_pod_levels *levels = &t->arch.levels;
+    const long begin = (long)levels->first[levels->n - 1], end = (long)levels->first[levels->n];
+    const size_t most = n < CHUNK ? n : CHUNK;
     bool short_of_memory = false;
 #ifdef _OPENMP
-#pragma omp parallel num_threads(trainer_threads(t))
+#pragma omp parallel for schedule(dynamic) num_threads(trainer_threads(t))
 #endif
-    {
-        float *rows = NULL;
-        const sdm_status made = SDM_ALLOC(&rows, n * largest, "local coefficients", NULL);
-        if (made) {
+    for (long root = begin; root < end; root++) {
+        const pod_tree tree = pod_tree_of(levels, t->blocks, (size_t)root);
+        const size_t widest = pod_tree_coefficients(t->blocks, &tree, 0);
+        float *rows = NULL, *below = NULL, *here = NULL;
+        sdm_status s = SDM_ALLOC(&rows, most * tree.largest, "local coefficients", NULL);
+        if (!s) s = SDM_ALLOC(&below, most * widest, "local coefficients", NULL);
+        if (!s) s = SDM_ALLOC(&here, most * widest, "local coefficients", NULL);
+        for (size_t at = 0; at < n && !s; at += CHUNK)
+            climb(t, &tree, holdout, slots + at, n - at < CHUNK ? n - at : CHUNK, rows, below, here,
+                  y + at * t->arch.n_coefficients);
+        sdm_free(here);
+        sdm_free(below);
+        sdm_free(rows);
+        if (s) {
 #ifdef _OPENMP
 #pragma omp atomic write
 #endif
             short_of_memory = true;
         }
-#ifdef _OPENMP
-#pragma omp for schedule(dynamic)
-#endif
-        for (long i = 0; i < (long)t->arch.n_blocks; i++) {
-            if (made) continue;
-            const sdm_pod_block *b = &t->blocks[i];
-            const size_t voxels = sdm_pod_block_voxels(b);
-            if (holdout) {
-                for (size_t r = 0; r < n; r++)
-                    for (size_t v = 0; v < voxels; v++)
-                        rows[r * voxels + v] =
-                            t->data.holdout[r * t->data.n_voxels + b->voxel + v] - t->mean[b->voxel + v];
-            } else
-                load_slots(t, b, slots, n, rows);
-            sdm_gemm(n, b->rank, voxels, (sdm_view){rows, voxels, 1}, (sdm_view){basis + basis_at[i], 1, voxels}, false,
-                     y + b->coefficient, k, 1);
-        }
-        sdm_free(rows);
     }
-    sdm_free(basis_at);
     return short_of_memory ? sdm_fail(err, SDM_E_NOMEM, "no memory for local coefficients") : SDM_OK;
 }
 
-void trainer_phi(const trainer *t, const double *p, float *phi)
+sdm_status bases_slots(size_t n, size_t **slots, sdm_error *err)
 {
-    double x[SDM_POD_MAX_PARAMS];
-    const dataset *d = &t->data;
-    for (size_t i = 0; i < d->n_params; i++) x[i] = 2 * (p[i] - d->min[i]) / (d->max[i] - d->min[i]) - 1;
-    const size_t degree = t->arch.degree > t->arch.input_degree ? t->arch.degree : t->arch.input_degree;
-    sdm_poly_eval(t->exponents, t->n_poly, d->n_params, degree, x, phi, NULL);
-}
-
-// target = (c - poly phi) / scale for n rows; c[n][R]
-static sdm_status leave(const trainer *t, size_t n, const float *phi, const float *c, float *const *targets,
-                        sdm_error *err)
-{
-    const size_t r = t->n_modes, f = t->arch.n_terms;
-    float *fitted = NULL;
-    const sdm_status s = SDM_ALLOC(&fitted, n * r, "targets", err);
-    if (s) return s;
-    sdm_gemm(n, r, f, (sdm_view){phi, t->n_poly, 1}, (sdm_view){t->poly, 1, f}, false, fitted, r, trainer_threads(t));
-    for (size_t i = 0; i < n; i++)
-        for (size_t j = 0; j < r; j++) targets[i][j] = (c[i * r + j] - fitted[i * r + j]) / t->target_scale;
-    sdm_free(fitted);
-    return SDM_OK;
-}
-
-static void to_modes(const trainer *t, size_t n, const float *y, float *c)
-{
-    const size_t k = t->arch.n_coefficients, r = t->n_modes;
-    sdm_gemm(n, r, k, (sdm_view){y, k, 1}, (sdm_view){t->modes, 1, k}, false, c, r, trainer_threads(t));
-}
-
-sdm_status bases_project(trainer *t, const size_t *slots, size_t n, sdm_error *err)
-{
-    const size_t k = t->arch.n_coefficients, r = t->n_modes;
-    float *y = NULL, *c = NULL, *phi = NULL, **targets = NULL;
-    sdm_status s = SDM_ALLOC(&y, n * k, "projection", err);
-    if (!s) s = SDM_ALLOC(&c, n * r, "projection", err);
-    if (!s) s = SDM_ALLOC(&phi, n * t->n_poly, "projection", err);
-    if (!s) s = SDM_ALLOC(&targets, n, "projection", err);
-    if (!s) s = coefficients(t, false, slots, n, y, err);
-    for (size_t i = 0; i < n && !s; i++) {
-        float *row = t->phi + slots[i] * t->n_poly;
-        trainer_phi(t, t->data.params + slots[i] * t->data.n_params, row);
-        memcpy(phi + i * t->n_poly, row, t->n_poly * sizeof *phi);
-        targets[i] = t->target + slots[i] * r;
-    }
-    if (!s) {
-        to_modes(t, n, y, c);
-        s = leave(t, n, phi, c, targets, err);
-    }
-    sdm_free(targets);
-    sdm_free(phi);
-    sdm_free(c);
-    sdm_free(y);
-    return s;
-}
-
-// least squares of c[n][R] on the polynomials (ridge far below the noise) -> poly[R][F]
-static sdm_status fit_polynomials(trainer *t, size_t n, const float *c, sdm_error *err)
-{
-    const size_t f = t->arch.n_terms, r = t->n_modes;
-    float *gram = NULL, *right = NULL;
-    double *a = NULL, *b = NULL;
-    sdm_status s = SDM_ALLOC(&gram, f * f, "polynomial fit", err);
-    if (!s) s = SDM_ALLOC(&right, f * r, "polynomial fit", err);
-    if (!s) s = SDM_ALLOC(&a, f * f, "polynomial fit", err);
-    if (!s) s = SDM_ALLOC(&b, f * r, "polynomial fit", err);
-    if (s) goto done;
-    sdm_gemm(f, f, n, (sdm_view){t->phi, 1, t->n_poly}, (sdm_view){t->phi, t->n_poly, 1}, false, gram, f, t->n_threads);
-    sdm_gemm(f, r, n, (sdm_view){t->phi, 1, t->n_poly}, (sdm_view){c, r, 1}, false, right, r, t->n_threads);
-    for (size_t i = 0; i < f * f; i++) a[i] = gram[i];
-    for (size_t i = 0; i < f; i++) a[i * f + i] += 1e-6 * (double)n;
-    for (size_t i = 0; i < f * r; i++) b[i] = right[i];
-    if (cholesky(f, a)) {
-        s = sdm_fail(err, SDM_E_CONFIG,
-                     "%s: %zu maps cannot determine polynomials of %zu terms: lower network.degree or raise data.start",
-                     t->config->file, n, f);
-        goto done;
-    }
-    cholesky_solve(f, a, r, b);
-    for (size_t i = 0; i < f; i++)
-        for (size_t j = 0; j < r; j++) t->poly[j * f + i] = (float)b[i * r + j];
-done:
-    sdm_free(b);
-    sdm_free(a);
-    sdm_free(right);
-    sdm_free(gram);
-    return s;
-}
-
-// held-out targets and what the bases cannot represent
-static sdm_status project_holdout(trainer *t, sdm_error *err)
-{
-    const size_t h = t->data.n_holdout, k = t->arch.n_coefficients, r = t->n_modes;
-    float *y = NULL, *c = NULL, **targets = NULL;
-    sdm_status s = SDM_ALLOC(&y, h * k, "held-out targets", err);
-    if (!s) s = SDM_ALLOC(&c, h * r, "held-out targets", err);
-    if (!s) s = SDM_ALLOC(&targets, h, "held-out targets", err);
-    if (!s) s = coefficients(t, true, NULL, h, y, err);
-    if (!s) {
-        to_modes(t, h, y, c);
-        double energy = 0;
-        for (size_t i = 0; i < h; i++) {
-            for (size_t v = 0; v < t->data.n_voxels; v++) {
-                const double e = t->data.holdout[i * t->data.n_voxels + v] - t->mean[v];
-                energy += e * e;
-            }
-            for (size_t j = 0; j < r; j++) energy -= (double)c[i * r + j] * c[i * r + j];
-            trainer_phi(t, t->data.holdout_params + i * t->data.n_params, t->holdout_phi + i * t->n_poly);
-            targets[i] = t->holdout_target + i * r;
-        }
-        t->holdout_floor =
-            fmax(0, energy / ((double)h * (double)t->data.n_voxels)); // a difference: rounding may pass zero
-        s = leave(t, h, t->holdout_phi, c, targets, err);
-    }
-    sdm_free(targets);
-    sdm_free(c);
-    sdm_free(y);
-    return s;
-}
-
-static sdm_status global_modes(trainer *t, size_t n, sdm_error *err)
-{
-    const size_t k = t->arch.n_coefficients;
-    size_t r = (size_t)t->config->network.modes;
-    if (r > n) r = n;
-    if (r > k) r = k;
-    t->n_modes = r;
-    float *y = NULL, *c = NULL, **targets = NULL;
-    sdm_status s = SDM_ALLOC(&y, n * k, "local coefficients", err);
-    if (!s) s = SDM_ALLOC(&c, n * r, "coefficients of the modes", err);
-    if (!s) s = SDM_ALLOC(&targets, n, "targets", err);
-    if (!s) s = SDM_ALLOC(&t->modes, r * k, "global modes", err);
-    if (!s) s = SDM_ALLOC(&t->poly, r * t->arch.n_terms, "polynomials", err);
-    if (!s) s = SDM_ALLOC(&t->deviation, k, "local coefficients", err);
-    if (!s) s = SDM_ALLOC(&t->phi, t->data.n_slots * t->n_poly, "polynomial inputs", err);
-    if (!s) s = SDM_ALLOC(&t->target, t->data.n_slots * r, "targets", err);
-    if (!s) s = SDM_ALLOC(&t->holdout_phi, t->data.n_holdout * t->n_poly, "held-out inputs", err);
-    if (!s) s = SDM_ALLOC(&t->holdout_target, t->data.n_holdout * r, "held-out targets", err);
-    if (!s) s = coefficients(t, false, NULL, n, y, err);
-    for (size_t j = 0; j < k && !s; j++) {
-        double sum = 0;
-        for (size_t i = 0; i < n; i++) sum += (double)y[i * k + j] * y[i * k + j];
-        t->deviation[j] = (float)sqrt(sum / (double)n);
-    }
-    if (!s) s = leading_space(n, k, y, r, t->config->seed, t->n_threads, t->modes, err);
-    if (!s) {
-        to_modes(t, n, y, c);
-        for (size_t i = 0; i < n; i++) {
-            trainer_phi(t, t->data.params + i * t->data.n_params, t->phi + i * t->n_poly);
-            targets[i] = t->target + i * r;
-        }
-        s = fit_polynomials(t, n, c, err);
-    }
-    if (!s) {
-        t->target_scale = 1;
-        s = leave(t, n, t->phi, c, targets, err);
-    }
-    if (!s) {
-        double sum = 0;
-        for (size_t i = 0; i < n * r; i++) sum += (double)t->target[i] * t->target[i];
-        const float scale = (float)sqrt(sum / (double)(n * r));
-        t->target_scale = scale > 0 ? scale : 1;
-        for (size_t i = 0; i < n * r; i++) t->target[i] /= t->target_scale;
-        s = project_holdout(t, err);
-    }
-    sdm_free(targets);
-    sdm_free(c);
-    sdm_free(y);
+    const sdm_status s = SDM_ALLOC(slots, n, "numbers of maps", err);
+    for (size_t i = 0; i < n && !s; i++) (*slots)[i] = i;
     return s;
 }
 
@@ -377,13 +384,14 @@ sdm_status bases_make(trainer *t, sdm_error *err)
     const size_t n = t->data.n_static + t->data.n_start;
     sdm_status s = SDM_ALLOC(&t->mean, t->arch.n_voxels, "mean map", err);
     if (!s) s = local_bases(t, n, err);
-    return s ? s : global_modes(t, n, err);
+    return s ? s : modes_make(t, n, err);
 }
 
 void bases_dispose(trainer *t)
 {
     sdm_free(t->mean);
     sdm_free(t->basis);
+    sdm_free(t->matrix_at);
     sdm_free(t->deviation);
     sdm_free(t->modes);
     sdm_free(t->poly);

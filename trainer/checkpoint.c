@@ -6,38 +6,24 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "kind.h"
 #include "sdm/checksum.h"
 #include "sdm/container.h"
 #include "sdm/file.h"
 #include "sdm/memory.h"
 #include "sdm/text.h"
-#include "trainer.h"
 
 // numbers of the "checkpoint" section, in this order
 typedef struct state {
     double seconds, phase_started, last_evaluation, loss, heldout_mse;
     int64_t phase, step, phase_step, n_start, n_taken;
-    uint64_t bases; // fingerprint of mean, bases, modes and ranks: weights mean nothing on others
+    uint64_t
+        bases; // fingerprint of what the weights depend on (train_kind.fingerprint): they mean nothing on other maps
 } state;
 
 static void checkpoint_path(const trainer *t, char *path, size_t size)
 {
     snprintf(path, size, "%s/checkpoint.sdmc", t->folder);
-}
-
-static uint64_t fingerprint(const trainer *t)
-{
-    const sdm_pod_arch *a = &t->arch;
-    size_t basis = 0;
-    uint64_t crc = 0;
-    for (size_t b = 0; b < a->n_blocks; b++) {
-        const sdm_pod_block *k = &t->blocks[b];
-        basis += k->rank * sdm_pod_block_voxels(k);
-        crc = sdm_crc64(crc, &k->rank, sizeof k->rank);
-    }
-    crc = sdm_crc64(crc, t->mean, a->n_voxels * sizeof *t->mean);
-    crc = sdm_crc64(crc, t->basis, basis * sizeof *t->basis);
-    return sdm_crc64(crc, t->modes, t->n_modes * a->n_coefficients * sizeof *t->modes);
 }
 
 sdm_status checkpoint_remove(const trainer *t, sdm_error *err)
@@ -52,13 +38,11 @@ sdm_status checkpoint_remove(const trainer *t, sdm_error *err)
     return SDM_OK;
 }
 
-static parameters *weights_of(trainer *t, int64_t phase) { return phase == SDM_PHASE_FIT ? &t->fit : &t->refine; }
-
 sdm_status checkpoint_write(trainer *t, sdm_error *err)
 {
     char path[SDM_PATH_TEXT_MAX + 32];
     checkpoint_path(t, path, sizeof path);
-    const parameters *p = weights_of(t, t->phase);
+    const parameters *p = t->kind->weights(t);
     const state now = {.seconds = trainer_seconds(t),
                        .phase_started = t->phase_started,
                        .last_evaluation = t->last_evaluation,
@@ -69,7 +53,7 @@ sdm_status checkpoint_write(trainer *t, sdm_error *err)
                        .phase_step = t->phase_step,
                        .n_start = (int64_t)t->data.n_start,
                        .n_taken = (int64_t)t->data.n_taken,
-                       .bases = fingerprint(t)};
+                       .bases = t->kind->fingerprint(t)};
     sdm_text config = {0};
     sdm_config_dump(t->config, &config);
     if (config.failed) {
@@ -77,13 +61,20 @@ sdm_status checkpoint_write(trainer *t, sdm_error *err)
         return sdm_fail(err, SDM_E_NOMEM, "no memory for a checkpoint");
     }
     const sdm_section sections[] = {
-        {"meta", "kind=checkpoint\n", 16},      {"config", config.data, config.size},
-        {"checkpoint", &now, sizeof now},       {"metrics", t->metrics->data, t->metrics->size},
-        {"weights", p->w, p->n * sizeof *p->w}, {"moment1", p->m, p->n * sizeof *p->m},
-        {"moment2", p->v, p->n * sizeof *p->v}, {"average", p->average, p->n * sizeof *p->average}};
+        {"meta", "kind=checkpoint\n", 16},
+        {"config", config.data, config.size},
+        {"checkpoint", &now, sizeof now},
+        {"metrics", t->metrics->data, t->metrics->size},
+        {"weights", p->w, p->n * sizeof *p->w},
+        {"moment1", p->m, p->n * sizeof *p->m},
+        {"moment2", p->v, p->n * sizeof *p->v},
+        {"average", p->average, p->n * sizeof *p->average},
+        {"points", t->data.plan.point, t->data.plan.n_planned * sizeof *t->data.plan.point},
+        {"errors", t->data.plan.error, t->data.plan.n_planned * sizeof *t->data.plan.error}};
     uint8_t *bytes = NULL;
     size_t size = 0;
-    sdm_status s = sdm_container_build(sections, sizeof sections / sizeof *sections, &bytes, &size, err);
+    const size_t n = sizeof sections / sizeof *sections - (t->data.plan.by_error ? 0 : 2);
+    sdm_status s = sdm_container_build(sections, n, &bytes, &size, err);
     if (!s) s = sdm_container_write(path, bytes, size, err);
     sdm_free(bytes);
     sdm_text_dispose(&config);
@@ -172,6 +163,26 @@ static sdm_status same_config(const trainer *t, const sdm_section *stored, sdm_e
     return s;
 }
 
+// the points of the samples so far and of those planned; data: the counters are read
+static sdm_status read_plan(const trainer *t, const opened *o, sample_plan *p, sdm_error *err)
+{
+    if (!p->by_error) return SDM_OK;
+    const sdm_section *points = find(o, "points"), *errors = find(o, "errors");
+    const size_t n = points ? points->size / sizeof *p->point : 0;
+    bool sound = errors && n >= t->data.n_taken && n <= p->n && points->size == n * sizeof *p->point &&
+                 errors->size == n * sizeof *p->error;
+    if (sound) {
+        memcpy(p->point, points->data, points->size);
+        memcpy(p->error, errors->data, errors->size);
+        for (size_t i = 0; i < n; i++)
+            sound = sound && (i < t->data.n_start ? p->point[i] == i : p->point[i] > p->point[i - 1]);
+    }
+    if (!sound)
+        return sdm_fail(err, SDM_E_FORMAT, "%s/checkpoint.sdmc: its sampling plan contradicts its counters", t->folder);
+    p->n_planned = n;
+    return SDM_OK;
+}
+
 sdm_status checkpoint_read(trainer *t, bool *found, sdm_error *err)
 {
     opened o = {0};
@@ -202,6 +213,7 @@ sdm_status checkpoint_read(trainer *t, bool *found, sdm_error *err)
             t->data.n_online += t->data.n_start - (size_t)then.n_start;
             t->data.n_start = (size_t)then.n_start;
         }
+        if (!s) s = read_plan(t, &o, &t->data.plan, err);
         const sdm_section *metrics = find(&o, "metrics");
         if (!s && metrics->size) sdm_text_add(t->metrics, "%.*s", (int)metrics->size, (const char *)metrics->data);
     }
@@ -218,13 +230,13 @@ sdm_status checkpoint_weights(trainer *t, sdm_error *err)
     if (!found) return sdm_fail(err, SDM_E_IO, "%s/checkpoint.sdmc: it has gone", t->folder);
     state then;
     memcpy(&then, find(&o, "checkpoint")->data, sizeof then);
-    if (then.bases != fingerprint(t))
+    if (then.bases != t->kind->fingerprint(t))
         s = sdm_fail(err, SDM_E_CONFIG,
                      "%s/checkpoint.sdmc: the maps come out otherwise than when it was written (another plug-in, data "
                      "file or processor): "
                      "train without --resume",
                      t->folder);
-    parameters *p = weights_of(t, t->phase);
+    parameters *p = t->kind->weights(t);
     const struct {
         const char *name;
         float *to;

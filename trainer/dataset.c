@@ -57,6 +57,7 @@ sdm_status dataset_create(dataset *d, const sdm_config *config, sdm_error *err)
     if (!s) s = SDM_ALLOC(&d->holdout_params, d->n_holdout * d->n_params, "held-out parameters", err);
     if (!s) s = sdm_mul(d->n_holdout, d->n_voxels, &count, err);
     if (!s) s = SDM_ALLOC(&d->holdout, count, "held-out maps", err);
+    if (!s) s = sample_plan_create(&d->plan, config->data.sampling == SDM_SAMPLING_ERROR, n_random, err);
     return s;
 }
 
@@ -67,7 +68,13 @@ void dataset_dispose(dataset *d)
     sdm_free(d->scale);
     sdm_free(d->holdout_params);
     sdm_free(d->holdout);
+    sample_plan_dispose(&d->plan);
     *d = (dataset){0};
+}
+
+sample_space dataset_space(const dataset *d)
+{
+    return (sample_space){.n_params = d->n_params, .min = d->min, .max = d->max, .seed = d->seed};
 }
 
 size_t dataset_slot(const dataset *d, size_t index) { return d->n_static + index % d->n_ring; }
@@ -178,5 +185,6 @@ sdm_status dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_
     while (made < d->n_start && d->scale[d->n_static + made] > 0) made++;
     d->n_online += d->n_start - made;
     d->n_taken = d->n_start = made;
+    if (d->plan.n_planned == 0) sample_plan_start(&d->plan, made); // else it is that of a checkpoint
     return SDM_OK;
 }

@@ -3,6 +3,7 @@
 #ifndef SDM_DATASET_H
 #define SDM_DATASET_H
 
+#include "sample_plan.h"
 #include "sdm/pod.h"
 #include "sdm/train.h"
 
@@ -17,12 +18,13 @@ typedef struct dataset {
     uint64_t seed;
     size_t counts[SDM_POD_MAX_PARAMS];  /* points of the static grid along each parameter */
     size_t n_static, n_start, n_online; /* samples: static; random before training; random during it */
-    size_t n_ring;  /* slots for random maps; they replace the oldest when there are more samples than slots */
-    size_t n_slots; /* n_static + n_ring */
-    size_t n_taken; /* random samples taken into the pool so far */
-    double *params; /* [n_slots][P] */
-    int16_t *maps;  /* [n_slots][n_voxels] */
-    float *scale;   /* [n_slots] mm per unit */
+    size_t n_ring;    /* slots for random maps; they replace the oldest when there are more samples than slots */
+    size_t n_slots;   /* n_static + n_ring */
+    size_t n_taken;   /* random samples taken into the pool so far */
+    sample_plan plan; /* which point of the Sobol' sequence each random sample is */
+    double *params;   /* [n_slots][P] */
+    int16_t *maps;    /* [n_slots][n_voxels] */
+    float *scale;     /* [n_slots] mm per unit */
     size_t n_holdout;
     double *holdout_params; /* [n_holdout][P] */
     float *holdout;         /* [n_holdout][n_voxels], block order, mm */
@@ -45,6 +47,9 @@ typedef struct fill_hooks {
 /* Makes all maps that are needed before training: held-out, static, start. */
 sdm_status dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_error *err);
 
+/* The space that plan and random samples are of; it points into d. */
+sample_space dataset_space(const dataset *d);
+
 /* Number of slots that hold a random map. */
 size_t dataset_random_slots(const dataset *d);
 
@@ -57,9 +62,13 @@ size_t dataset_draw(const dataset *d, uint64_t stream, double share, size_t batc
 /* map[n_voxels] of a slot, mm, block order. */
 void dataset_map(const dataset *d, size_t slot, float *map);
 
-/* Threads that make random samples from `first` on, in order, while the caller trains. */
+/* Threads that make random samples from `first` on, in order, while the caller trains: those that are planned, and more as the caller
+   allows. */
 typedef struct producer producer;
 sdm_status producer_start(dataset *d, size_t first, int n_threads, producer **out, sdm_error *err);
+
+/* Samples below n_planned may be made: their points are in d->plan. */
+void producer_allow(producer *p, size_t n_planned);
 
 /* Number of finished samples that wait to be taken, without a gap. */
 size_t producer_ready(producer *p);

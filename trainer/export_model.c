@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "mlp.h"
+#include "kind.h"
 #include "sdm/container.h"
 #include "sdm/file.h"
 #include "sdm/image.h"
@@ -28,8 +28,8 @@ static double quantile(const double *sorted, size_t n, double q)
     return sorted[i ? i - 1 : 0];
 }
 
-// errors of the model file on the held-out maps
-static sdm_status measure(const trainer *t, const sdm_model *m, sdm_accuracy *out, sdm_error *err)
+// errors of the model file on the first n held-out maps
+static sdm_status measure(const trainer *t, const sdm_model *m, size_t n, sdm_accuracy *out, sdm_error *err)
 {
     const dataset *d = &t->data;
     float *map = NULL, *blocked = NULL;
@@ -37,12 +37,12 @@ static sdm_status measure(const trainer *t, const sdm_model *m, sdm_accuracy *ou
     double *each = NULL;
     sdm_status s = SDM_ALLOC(&map, d->n_voxels, "evaluation", err);
     if (!s) s = SDM_ALLOC(&blocked, d->n_voxels, "evaluation", err);
-    if (!s) s = sdm_alloc(&scratch, sdm_model_scratch_bytes(m, 1), 1, "evaluation", err);
-    if (!s) s = SDM_ALLOC(&each, d->n_holdout, "evaluation", err);
+    if (!s) s = sdm_alloc(&scratch, sdm_model_scratch_bytes_threads(m, 1, t->n_threads), 1, "evaluation", err);
+    if (!s) s = SDM_ALLOC(&each, n, "evaluation", err);
     double square = 0, absolute = 0, near = 0, largest = 0;
     size_t n_near = 0;
-    for (size_t i = 0; i < d->n_holdout && !s; i++) {
-        sdm_model_forward(m, d->holdout_params + i * d->n_params, 1, map, scratch);
+    for (size_t i = 0; i < n && !s; i++) {
+        sdm_model_forward_threads(m, d->holdout_params + i * d->n_params, 1, map, scratch, t->n_threads);
         sdm_pod_gather(d->grid, t->blocks, d->n_blocks, map, blocked);
         const float *truth = d->holdout + i * d->n_voxels;
         double here = 0;
@@ -57,17 +57,17 @@ static sdm_status measure(const trainer *t, const sdm_model *m, sdm_accuracy *ou
         each[i] = sqrt(here / (double)d->n_voxels);
     }
     if (!s) {
-        const double n = (double)d->n_holdout * (double)d->n_voxels;
-        qsort(each, d->n_holdout, sizeof *each, ascending);
-        *out = (sdm_accuracy){.samples = (int64_t)d->n_holdout,
-                              .mse_mm2 = square / n,
-                              .rmse_mm = sqrt(square / n),
-                              .mae_mm = absolute / n,
+        const double voxels = (double)n * (double)d->n_voxels;
+        qsort(each, n, sizeof *each, ascending);
+        *out = (sdm_accuracy){.samples = (int64_t)n,
+                              .mse_mm2 = square / voxels,
+                              .rmse_mm = sqrt(square / voxels),
+                              .mae_mm = absolute / voxels,
                               .max_abs_mm = largest,
                               .rmse_near_mm = n_near ? sqrt(near / (double)n_near) : 0,
-                              .q50_mm = quantile(each, d->n_holdout, 0.5),
-                              .q90_mm = quantile(each, d->n_holdout, 0.9),
-                              .q99_mm = quantile(each, d->n_holdout, 0.99)};
+                              .q50_mm = quantile(each, n, 0.5),
+                              .q90_mm = quantile(each, n, 0.9),
+                              .q99_mm = quantile(each, n, 0.99)};
     }
     sdm_free(each);
     sdm_free(scratch);
@@ -191,57 +191,87 @@ static void describe(const trainer *t, const sdm_text *config, option_texts *opt
     snprintf(info->shape, sizeof info->shape, "%s", sdm_instance_shape(t->shape)->name);
 }
 
+// what goes into the model file, and what it points to
+typedef struct description {
+    sdm_text config;
+    option_texts options;
+    sdm_model_param params[SDM_POD_MAX_PARAMS];
+    sdm_model_info info;
+} description;
+
+static sdm_status description_create(const trainer *t, description **out, sdm_error *err)
+{
+    description *d = NULL;
+    sdm_status s = SDM_ALLOC(&d, 1, "description of the model", err);
+    if (s) return s;
+    *out = d;
+    if (!(s = dump_config(t, &d->config, err))) describe(t, &d->config, &d->options, d->params, &d->info);
+    return s;
+}
+
+static void description_free(description *d)
+{
+    if (d) sdm_text_dispose(&d->config);
+    sdm_free(d);
+}
+
+// the model as the runtime will see it
+static sdm_status open_model(const trainer *t, const char *path, const description *d, sdm_model **out, sdm_error *err)
+{
+    uint8_t *bytes = NULL;
+    size_t size = 0;
+    sdm_status s = t->kind->build(t, &d->info, &bytes, &size, err);
+    if (!s) s = sdm_model_open_memory(path, bytes, size, out, err);
+    sdm_free(bytes);
+    return s;
+}
+
+sdm_status export_time(trainer *t, double *seconds, sdm_error *err)
+{
+    description *d = NULL;
+    sdm_model *model = NULL;
+    sdm_accuracy one;
+    sdm_status s = description_create(t, &d, err);
+    if (!s) s = open_model(t, "model", d, &model, err);
+    const double start = trainer_seconds(t);
+    if (!s) s = measure(t, model, 1, &one, err);
+    *seconds = (trainer_seconds(t) - start) * (double)t->data.n_holdout;
+    sdm_model_free(model);
+    description_free(d);
+    return s;
+}
+
 sdm_status export_model(trainer *t, sdm_train_report *report, sdm_error *err)
 {
-    sdm_text config = {0};
-    option_texts options = {0};
-    sdm_model_param params[SDM_POD_MAX_PARAMS] = {{{0}, {0}, 0, 0, 0}};
-    sdm_model_info info;
+    description *d = NULL;
     sdm_model *model = NULL;
     uint8_t *bytes = NULL;
     size_t size = 0;
     char path[SDM_PATH_TEXT_MAX + 32];
     snprintf(path, sizeof path, "%s/model.sdm", t->folder);
-    sdm_status s = dump_config(t, &config, err);
-    if (s) {
-        sdm_text_dispose(&config);
-        return s;
-    }
-    describe(t, &config, &options, params, &info);
-
-    const float *w = t->refine.average;
-    sdm_pod_spec spec = {.info = &info,
-                         .arch = t->arch,
-                         .blocks = t->blocks,
-                         .half = t->config->network.weights == SDM_WEIGHT_F16,
-                         .weights = {.head = w + t->head_at, .mean = w + t->mean_at, .basis = w + t->basis_at}};
-    for (size_t l = 0; l < t->arch.depth; l++) {
-        spec.weights.layer[l] = mlp_layer(&t->arch, w, l);
-        spec.weights.bias[l] = mlp_bias(&t->arch, w, l);
-    }
     // build once to measure, once more with the figures in it
-    s = sdm_model_build(&spec, &bytes, &size, err);
-    if (!s) s = sdm_model_open_memory(path, bytes, size, &model, err);
-    if (!s) s = measure(t, model, &t->accuracy, err);
+    sdm_status s = description_create(t, &d, err);
+    if (!s) s = open_model(t, path, d, &model, err);
+    if (!s) s = measure(t, model, t->data.n_holdout, &t->accuracy, err);
     sdm_model_free(model);
-    sdm_free(bytes);
-    bytes = NULL;
     if (!s && !isfinite(t->accuracy.mse_mm2))
         s = sdm_fail(err, SDM_E_QUALITY,
                      "the trained network gives numbers that are not finite: use network.weights=f32 or lower the "
                      "learning rates");
-    info.accuracy = t->accuracy;
-    t->heldout_mse = t->accuracy.mse_mm2;
-    if (!s) s = trainer_metric(t, 0, err);
-    if (!s) s = sdm_model_build(&spec, &bytes, &size, err);
+    if (!s) {
+        d->info.accuracy = t->accuracy;
+        t->heldout_mse = t->accuracy.mse_mm2;
+        s = trainer_metric(t, 0, err);
+    }
+    if (!s) s = t->kind->build(t, &d->info, &bytes, &size, err);
     if (!s) s = write_curve(t, err);
     if (!s) s = sdm_container_write(path, bytes, size, err);
     sdm_free(bytes);
-    sdm_text_dispose(&config);
     if (!s && report) {
         *report = (sdm_train_report){
-            .accuracy = t->accuracy, .steps = t->step, .samples = info.train_samples, .seconds = trainer_seconds(t)};
+            .accuracy = t->accuracy, .steps = t->step, .samples = d->info.train_samples, .seconds = trainer_seconds(t)};
         snprintf(report->model_path, sizeof report->model_path, "%.*s", (int)sizeof report->model_path - 1, path);
     }
+    description_free(d);
     return s;
 }

@@ -11,4 +11,7 @@ sdm_status export_config(const trainer *t, sdm_error *err);
    loss.png into the folder and fills the report (may be NULL). */
 sdm_status export_model(trainer *t, sdm_train_report *report, sdm_error *err);
 
+/* Seconds that export_model() will take, by measuring one map. */
+sdm_status export_time(trainer *t, double *seconds, sdm_error *err);
+
 #endif

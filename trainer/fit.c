@@ -70,6 +70,26 @@ static double evaluate(const trainer *t, const float *w, fit_batch *b, size_t ba
     return t->holdout_floor + sum * scale * scale / ((double)n * (double)t->data.n_voxels);
 }
 
+sdm_status fit_errors(const trainer *t, const size_t *slots, size_t n, double *error, sdm_error *err)
+{
+    const size_t r = t->n_modes, inputs = t->arch.n_inputs;
+    fit_batch b = {0};
+    const sdm_status s = fit_create(t, n, &b, err);
+    for (size_t i = 0; i < n && !s; i++)
+        memcpy(b.x + i * inputs, t->phi + slots[i] * t->n_poly + 1, inputs * sizeof *b.x);
+    if (!s) predict(t, t->fit.average, n, &b);
+    for (size_t i = 0; i < n && !s; i++) {
+        double sum = 0;
+        for (size_t j = 0; j < r; j++) {
+            const double e = (double)b.predicted[i * r + j] - t->target[slots[i] * r + j];
+            sum += e * e;
+        }
+        error[i] = t->target_scale * sqrt(sum / (double)t->data.n_voxels);
+    }
+    fit_dispose(&b);
+    return s;
+}
+
 static void step(trainer *t, fit_batch *b, size_t batch, double rate)
 {
     const sdm_pod_arch *a = &t->arch;

@@ -58,6 +58,7 @@ struct producer {
     pthread_mutex_t lock;
     pthread_cond_t made, taken;
     size_t next, end; // sample to be made next; behind the last one
+    size_t allowed;   // behind the last one whose point is planned
     size_t base;      // first sample not taken yet
     bool done[WINDOW];
     double *params; // [WINDOW][P]
@@ -79,12 +80,14 @@ static void *work(void *user)
     const sdm_status made = workbench_create(&w, d, &err);
     pthread_mutex_lock(&p->lock);
     for (;;) {
-        while (!p->stop && p->next < p->end && p->next >= p->base + WINDOW) pthread_cond_wait(&p->taken, &p->lock);
+        while (!p->stop && p->next < p->end && (p->next >= p->base + WINDOW || p->next >= p->allowed))
+            pthread_cond_wait(&p->taken, &p->lock);
         if (p->stop || p->next >= p->end) break;
         const size_t index = p->next++, place = index % WINDOW;
         pthread_mutex_unlock(&p->lock);
         double *params = p->params + place * d->n_params;
-        sdm_sample_params(d->seed, STREAM_TRAIN, index, d->min, d->max, d->n_params, params);
+        sdm_sample_params(d->seed, STREAM_TRAIN, sample_plan_point(&d->plan, index), d->min, d->max, d->n_params,
+                          params);
         const sdm_status s =
             made ? made : workbench_packed_map(&w, d, params, p->maps + place * d->n_voxels, &p->scale[place], &err);
         pthread_mutex_lock(&p->lock);
@@ -109,6 +112,7 @@ sdm_status producer_start(dataset *d, size_t first, int n_threads, producer **ou
     p->d = d;
     p->next = p->base = first;
     p->end = d->n_start + d->n_online;
+    p->allowed = d->plan.n_planned;
     p->failed = SIZE_MAX;
     pthread_mutex_init(&p->lock, NULL);
     pthread_cond_init(&p->made, NULL);
@@ -126,6 +130,14 @@ sdm_status producer_start(dataset *d, size_t first, int n_threads, producer **ou
     else
         *out = p;
     return s;
+}
+
+void producer_allow(producer *p, size_t n_planned)
+{
+    pthread_mutex_lock(&p->lock);
+    p->allowed = n_planned;
+    pthread_cond_broadcast(&p->taken);
+    pthread_mutex_unlock(&p->lock);
 }
 
 size_t producer_ready(producer *p)

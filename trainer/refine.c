@@ -6,8 +6,9 @@
 #include <omp.h>
 #endif
 
-#include "linalg.h"
+#include "loss.h"
 #include "mlp.h"
+#include "pod_tree.h"
 #include "sdm/kernels.h"
 #include "sdm/memory.h"
 #include "streams.h"
@@ -24,11 +25,9 @@ typedef struct refine_batch {
     float *c, *dc;     // [B][K]
     float *workspace, *gradient;
     size_t *slots;         // [B]
-    double *loss;          // [n_blocks]
-    size_t *basis_at;      // [n_blocks]
+    double *loss;          // [trees]
     size_t scratch_floats; // for each thread
     float *scratch;
-    int n_scratch;
 } refine_batch;
 
 static void batch_dispose(refine_batch *b)
@@ -42,28 +41,38 @@ static void batch_dispose(refine_batch *b)
     sdm_free(b->gradient);
     sdm_free(b->slots);
     sdm_free(b->loss);
-    sdm_free(b->basis_at);
     sdm_free(b->scratch);
 }
 
 enum { HEAD_ROWS = 256 };
 
+static size_t first_tree(const trainer *t) { return t->arch.levels.first[t->arch.levels.n - 1]; }
+static size_t n_trees(const trainer *t) { return t->arch.levels.first[t->arch.levels.n] - first_tree(t); }
+
+// what a tree needs for a batch: voxels and their gradients, coefficients and theirs below the highest level, gradient of a basis
+static size_t tree_floats(const trainer *t, size_t rows, size_t root)
+{
+    const pod_tree tree = pod_tree_of(&t->arch.levels, t->blocks, root);
+    size_t each = tree.voxels, largest = tree.largest;
+    for (size_t level = 0; level + 1 < t->arch.levels.n; level++)
+        each += pod_tree_coefficients(t->blocks, &tree, level);
+    for (size_t level = 0; level < t->arch.levels.n; level++)
+        for (size_t b = tree.first[level]; b < tree.end[level]; b++) {
+            const size_t matrix = t->matrix_at[b + 1] - t->matrix_at[b];
+            if (matrix > largest) largest = matrix;
+        }
+    return 2 * rows * each + largest;
+}
+
 static sdm_status batch_create(const trainer *t, size_t rows, refine_batch *b, sdm_error *err)
 {
     const sdm_pod_arch *a = &t->arch;
-    size_t voxels = 0, rank = 0, at = 0;
-    *b = (refine_batch){.rows = rows, .n_scratch = t->n_threads};
-    sdm_status s = SDM_ALLOC(&b->basis_at, a->n_blocks, "batch", err);
-    for (size_t i = 0; i < a->n_blocks && !s; i++) {
-        const sdm_pod_block *k = &t->blocks[i];
-        if (sdm_pod_block_voxels(k) > voxels) voxels = sdm_pod_block_voxels(k);
-        if (k->rank > rank) rank = k->rank;
-        b->basis_at[i] = at;
-        at += sdm_pod_block_voxels(k) * k->rank;
+    *b = (refine_batch){.rows = rows, .scratch_floats = HEAD_ROWS * a->n_latent};
+    for (size_t i = 0; i < n_trees(t); i++) {
+        const size_t need = tree_floats(t, rows, first_tree(t) + i);
+        if (need > b->scratch_floats) b->scratch_floats = need;
     }
-    b->scratch_floats = 2 * rows * voxels + (rank + 1) * voxels;
-    if (b->scratch_floats < HEAD_ROWS * a->n_latent) b->scratch_floats = HEAD_ROWS * a->n_latent;
-    if (!s) s = SDM_ALLOC(&b->x, rows * a->n_inputs, "batch", err);
+    sdm_status s = SDM_ALLOC(&b->x, rows * a->n_inputs, "batch", err);
     if (!s) s = SDM_ALLOC(&b->z, rows * a->n_latent, "batch", err);
     if (!s) s = SDM_ALLOC(&b->dz, rows * a->width, "batch", err);
     if (!s) s = SDM_ALLOC(&b->c, rows * a->n_coefficients, "batch", err);
@@ -71,8 +80,8 @@ static sdm_status batch_create(const trainer *t, size_t rows, refine_batch *b, s
     if (!s) s = SDM_ALLOC(&b->workspace, mlp_workspace(a, rows), "batch", err);
     if (!s) s = SDM_ALLOC(&b->gradient, mlp_count(a), "batch", err);
     if (!s) s = SDM_ALLOC(&b->slots, rows, "batch", err);
-    if (!s) s = SDM_ALLOC(&b->loss, a->n_blocks, "batch", err);
-    if (!s) s = SDM_ALLOC(&b->scratch, b->scratch_floats * (size_t)b->n_scratch, "batch", err);
+    if (!s) s = SDM_ALLOC(&b->loss, n_trees(t), "batch", err);
+    if (!s) s = SDM_ALLOC(&b->scratch, b->scratch_floats * (size_t)t->n_threads, "batch", err);
     return s;
 }
 
@@ -85,20 +94,6 @@ static int thread_number(void)
 #endif
 }
 
-// z[rows][L] from products phi (one pointer a row) with MLP weights w
-static void latent(const trainer *t, const float *w, refine_batch *b, size_t rows, const float *const *phi)
-{
-    const sdm_pod_arch *a = &t->arch;
-    for (size_t i = 0; i < rows; i++) {
-        memcpy(b->z + i * a->n_latent, phi[i], a->n_terms * sizeof *b->z);
-        memcpy(b->x + i * a->n_inputs, phi[i] + 1, a->n_inputs * sizeof *b->x);
-    }
-    if (!a->depth) return;
-    const float *h = mlp_forward(a, w, rows, b->x, b->workspace, trainer_threads(t));
-    for (size_t i = 0; i < rows; i++)
-        memcpy(b->z + i * a->n_latent + a->n_terms, h + i * a->width, a->width * sizeof *h);
-}
-
 static void coefficients(const trainer *t, const float *w, refine_batch *b, size_t rows)
 {
     const sdm_pod_arch *a = &t->arch;
@@ -106,54 +101,105 @@ static void coefficients(const trainer *t, const float *w, refine_batch *b, size
              (sdm_view){w + t->head_at, 1, a->n_latent}, false, b->c, a->n_coefficients, trainer_threads(t));
 }
 
-// gradient of the loss in one voxel (mean over the batch, not yet over voxels); *sum gets the loss as mean square error
-static float loss_gradient(const sdm_config *c, float predicted, float target, double *sum)
+// a tree's numbers in the scratch memory of a thread
+typedef struct tree_work {
+    pod_tree tree;
+    size_t ld[SDM_POD_MAX_LEVELS];             // numbers in a row of a level
+    float *c[SDM_POD_MAX_LEVELS];              // [B][ld] coefficients
+    float *dc[SDM_POD_MAX_LEVELS];             // [B][ld] gradients at them
+    float *predicted, *delta, *basis_gradient; // [B][voxels], [B][voxels], of one block
+} tree_work;
+
+static tree_work work_on(const trainer *t, const refine_batch *b, size_t root)
 {
-    const float e = predicted - target;
-    const float weight = fabsf(target) < (float)c->train.near_mm ? 1 + (float)c->train.near_weight : 1;
-    *sum += (double)e * e;
-    switch (c->train.loss) {
-    case SDM_LOSS_L1:
-        return weight * (e > 0 ? 1.0f : e < 0 ? -1.0f : 0.0f);
-    case SDM_LOSS_HUBER: {
-        const float knee = 0.01f; // mm: square below, linear above
-        return weight * (fabsf(e) < knee ? e / knee : e > 0 ? 1.0f : -1.0f);
+    tree_work w = {.tree = pod_tree_of(&t->arch.levels, t->blocks, root)};
+    const size_t top = t->arch.levels.n - 1;
+    float *at = b->scratch + b->scratch_floats * (size_t)thread_number();
+    for (size_t level = 0; level < top; level++) {
+        w.ld[level] = pod_tree_coefficients(t->blocks, &w.tree, level);
+        w.c[level] = at, at += b->rows * w.ld[level];
+        w.dc[level] = at, at += b->rows * w.ld[level];
     }
-    case SDM_LOSS_MSE:
-        break;
-    }
-    return weight * 2 * e;
+    w.ld[top] = t->arch.n_coefficients;
+    w.c[top] = b->c + t->blocks[root].coefficient;
+    w.dc[top] = b->dc + t->blocks[root].coefficient;
+    w.predicted = at, at += b->rows * w.tree.voxels;
+    w.delta = at, at += b->rows * w.tree.voxels;
+    w.basis_gradient = at;
+    return w;
 }
 
-// forward, backward and update of block i on the batch
-static void train_block(trainer *t, refine_batch *b, size_t i, adam_step adam)
-{
-    const sdm_pod_block *k = &t->blocks[i];
-    const size_t voxels = sdm_pod_block_voxels(k), rows = b->rows, n_c = t->arch.n_coefficients;
-    float *predicted = b->scratch + b->scratch_floats * (size_t)thread_number(), *delta = predicted + rows * voxels;
-    float *gradient = delta + rows * voxels, *mean_gradient = gradient + k->rank * voxels;
-    float *mean = t->refine.w + t->mean_at + k->voxel, *basis = t->refine.w + t->basis_at + b->basis_at[i];
-    const float *c = b->c + k->coefficient;
+// a block of a level within the tree: place of its coefficients and of its outputs
+typedef struct place {
+    size_t coefficient, output, outputs;
+} place;
 
-    for (size_t r = 0; r < rows; r++) memcpy(predicted + r * voxels, mean, voxels * sizeof *mean);
-    sdm_gemm(rows, voxels, k->rank, (sdm_view){c, n_c, 1}, (sdm_view){basis, voxels, 1}, true, predicted, voxels, 1);
-    double sum = 0;
-    for (size_t r = 0; r < rows; r++) {
-        const int16_t *target = t->data.maps + b->slots[r] * t->data.n_voxels + k->voxel;
-        const float scale = t->data.scale[b->slots[r]];
-        for (size_t v = 0; v < voxels; v++)
-            delta[r * voxels + v] = loss_gradient(t->config, predicted[r * voxels + v], scale * (float)target[v], &sum);
-    }
-    b->loss[i] = sum;
+static place place_of(const trainer *t, const tree_work *w, size_t level, size_t b)
+{
+    const sdm_pod_block *k = &t->blocks[b];
+    const size_t lowest = w->tree.first[0];
+    return (place){k->coefficient - t->blocks[w->tree.first[level]].coefficient,
+                   level ? t->blocks[k->child].coefficient - t->blocks[w->tree.first[level - 1]].coefficient
+                         : (size_t)(k->voxel - t->blocks[lowest].voxel),
+                   sdm_pod_outputs(t->blocks, b)};
+}
+
+// coefficients of the highest level -> predicted[rows][voxels]
+static void tree_forward(const trainer *t, const float *weights, size_t rows, const tree_work *w)
+{
+    const float *mean = weights + t->mean_at + t->blocks[w->tree.first[0]].voxel;
+    for (size_t r = 0; r < rows; r++) memcpy(w->predicted + r * w->tree.voxels, mean, w->tree.voxels * sizeof *mean);
+    for (size_t level = t->arch.levels.n; level-- > 0;)
+        for (size_t b = w->tree.first[level]; b < w->tree.end[level]; b++) {
+            const place p = place_of(t, w, level, b);
+            float *to = level ? w->c[level - 1] : w->predicted;
+            const size_t ldt = level ? w->ld[level - 1] : w->tree.voxels;
+            sdm_gemm(rows, p.outputs, t->blocks[b].rank, (sdm_view){w->c[level] + p.coefficient, w->ld[level], 1},
+                     (sdm_view){weights + t->basis_at + t->matrix_at[b], p.outputs, 1}, level == 0, to + p.output, ldt,
+                     1);
+        }
+}
+
+// gradients from delta[rows][voxels] up to the coefficients of the highest level; bases and mean take their step on the way
+static void tree_backward(trainer *t, size_t rows, const tree_work *w, adam_step adam)
+{
+    const size_t first = t->blocks[w->tree.first[0]].voxel, voxels = w->tree.voxels;
+    for (size_t level = 0; level < t->arch.levels.n; level++)
+        for (size_t b = w->tree.first[level]; b < w->tree.end[level]; b++) {
+            const place p = place_of(t, w, level, b);
+            const size_t rank = t->blocks[b].rank, at = t->basis_at + t->matrix_at[b];
+            const float *from = (level ? w->dc[level - 1] : w->delta) + p.output;
+            const size_t ldf = level ? w->ld[level - 1] : voxels;
+            sdm_gemm(rows, rank, p.outputs, (sdm_view){from, ldf, 1}, (sdm_view){t->refine.w + at, 1, p.outputs}, false,
+                     w->dc[level] + p.coefficient, w->ld[level], 1);
+            sdm_gemm(rank, p.outputs, rows, (sdm_view){w->c[level] + p.coefficient, 1, w->ld[level]},
+                     (sdm_view){from, ldf, 1}, false, w->basis_gradient, p.outputs, 1);
+            adam_update(&t->refine, at, rank * p.outputs, w->basis_gradient, adam,
+                        BASIS_STEP / sqrtf((float)p.outputs));
+        }
+    float *mean_gradient = w->predicted; // no longer needed
     memset(mean_gradient, 0, voxels * sizeof *mean_gradient);
     for (size_t r = 0; r < rows; r++)
-        for (size_t v = 0; v < voxels; v++) mean_gradient[v] += delta[r * voxels + v];
-    sdm_gemm(rows, k->rank, voxels, (sdm_view){delta, voxels, 1}, (sdm_view){basis, 1, voxels}, false,
-             b->dc + k->coefficient, n_c, 1);
-    sdm_gemm(k->rank, voxels, rows, (sdm_view){c, 1, n_c}, (sdm_view){delta, voxels, 1}, false, gradient, voxels, 1);
-    adam_update(&t->refine, t->basis_at + b->basis_at[i], k->rank * voxels, gradient, adam,
-                BASIS_STEP / sqrtf((float)voxels));
-    adam_update(&t->refine, t->mean_at + k->voxel, voxels, mean_gradient, adam, MEAN_STEP);
+        for (size_t v = 0; v < voxels; v++) mean_gradient[v] += w->delta[r * voxels + v];
+    adam_update(&t->refine, t->mean_at + first, voxels, mean_gradient, adam, MEAN_STEP);
+}
+
+// forward, backward and update of a tree on the batch
+static void train_tree(trainer *t, refine_batch *b, size_t i, adam_step adam)
+{
+    const tree_work w = work_on(t, b, first_tree(t) + i);
+    const size_t first = t->blocks[w.tree.first[0]].voxel, voxels = w.tree.voxels;
+    tree_forward(t, t->refine.w, b->rows, &w);
+    double sum = 0;
+    for (size_t r = 0; r < b->rows; r++) {
+        const int16_t *target = t->data.maps + b->slots[r] * t->data.n_voxels + first;
+        const float scale = t->data.scale[b->slots[r]];
+        for (size_t v = 0; v < voxels; v++)
+            w.delta[r * voxels + v] =
+                loss_slope(t->config, w.predicted[r * voxels + v], scale * (float)target[v], &sum);
+    }
+    b->loss[i] = sum;
+    tree_backward(t, b->rows, &w, adam);
 }
 
 static void train_head(trainer *t, refine_batch *b, adam_step adam)
@@ -186,16 +232,16 @@ static sdm_status step(trainer *t, refine_batch *b, double rate, sdm_error *err)
         phi[i] = t->phi + b->slots[i] * t->n_poly;
     }
     const float *w = t->refine.w;
-    latent(t, w, b, b->rows, phi);
+    head_latent(t, w, b->rows, phi, b->x, b->z, b->workspace);
     sdm_free((void *)phi);
     coefficients(t, w, b, b->rows);
     const adam_step adam = adam_begin(rate, t->phase_step + 1);
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic) num_threads(trainer_threads(t))
 #endif
-    for (long i = 0; i < (long)a->n_blocks; i++) train_block(t, b, (size_t)i, adam);
+    for (long i = 0; i < (long)n_trees(t); i++) train_tree(t, b, (size_t)i, adam);
     double sum = 0;
-    for (size_t i = 0; i < a->n_blocks; i++) sum += b->loss[i];
+    for (size_t i = 0; i < n_trees(t); i++) sum += b->loss[i];
     t->loss = sum / ((double)b->rows * (double)t->data.n_voxels);
 
     // the MLP's gradient needs the head as it was in the forward pass
@@ -212,7 +258,6 @@ static sdm_status step(trainer *t, refine_batch *b, double rate, sdm_error *err)
 sdm_status refine_evaluate(trainer *t, const float *w, double *mse, sdm_error *err)
 {
     enum { ROWS = 32 };
-    const sdm_pod_arch *a = &t->arch;
     const dataset *d = &t->data;
     refine_batch b = {0};
     sdm_status s = batch_create(t, ROWS, &b, err);
@@ -221,127 +266,36 @@ sdm_status refine_evaluate(trainer *t, const float *w, double *mse, sdm_error *e
         const size_t rows = d->n_holdout - at < ROWS ? d->n_holdout - at : ROWS;
         const float *phi[ROWS];
         for (size_t i = 0; i < rows; i++) phi[i] = t->holdout_phi + (at + i) * t->n_poly;
-        latent(t, w, &b, rows, phi);
+        head_latent(t, w, rows, phi, b.x, b.z, b.workspace);
         coefficients(t, w, &b, rows);
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic) num_threads(trainer_threads(t))
 #endif
-        for (long i = 0; i < (long)a->n_blocks; i++) {
-            const sdm_pod_block *k = &t->blocks[i];
-            const size_t voxels = sdm_pod_block_voxels(k);
-            float *predicted = b.scratch + b.scratch_floats * (size_t)thread_number();
-            for (size_t r = 0; r < rows; r++)
-                memcpy(predicted + r * voxels, w + t->mean_at + k->voxel, voxels * sizeof *w);
-            sdm_gemm(rows, voxels, k->rank, (sdm_view){b.c + k->coefficient, a->n_coefficients, 1},
-                     (sdm_view){w + t->basis_at + b.basis_at[i], voxels, 1}, true, predicted, voxels, 1);
-            double block_sum = 0;
+        for (long i = 0; i < (long)n_trees(t); i++) {
+            const tree_work work = work_on(t, &b, first_tree(t) + (size_t)i);
+            const size_t voxels = work.tree.voxels;
+            tree_forward(t, w, rows, &work);
+            double tree_sum = 0;
             for (size_t r = 0; r < rows; r++) {
-                const float *truth = d->holdout + (at + r) * d->n_voxels + k->voxel;
+                const float *truth = d->holdout + (at + r) * d->n_voxels + t->blocks[work.tree.first[0]].voxel;
                 for (size_t v = 0; v < voxels; v++) {
-                    const double e = (double)predicted[r * voxels + v] - truth[v];
-                    block_sum += e * e;
+                    const double e = (double)work.predicted[r * voxels + v] - truth[v];
+                    tree_sum += e * e;
                 }
             }
-            b.loss[i] = block_sum;
+            b.loss[i] = tree_sum;
         }
-        for (size_t i = 0; i < a->n_blocks; i++) sum += b.loss[i];
+        for (size_t i = 0; i < n_trees(t); i++) sum += b.loss[i];
     }
     batch_dispose(&b);
     *mse = sum / ((double)d->n_holdout * (double)d->n_voxels);
     return s;
 }
 
-// ---- start: the head by least squares ----
-
-typedef struct head_problem {
-    size_t n;       // rows: filled slots
-    float *z;       // [n][L]
-    double *factor; // Cholesky factor of z^T z
-} head_problem;
-
-// rows of the head for block i: least squares of its coefficients on z over all slots
-static sdm_status solve_block(const trainer *t, const head_problem *p, const sdm_pod_block *k, const float *basis,
-                              float *head, sdm_error *err)
-{
-    enum { CHUNK = 1024 };
-    const dataset *d = &t->data;
-    const size_t voxels = sdm_pod_block_voxels(k), latents = t->arch.n_latent, rank = k->rank;
-    float *rows = NULL, *y = NULL, *right = NULL;
-    double *solution = NULL;
-    sdm_status s = SDM_ALLOC(&rows, CHUNK * voxels, "head", err);
-    if (!s) s = SDM_ALLOC(&y, CHUNK * rank, "head", err);
-    if (!s) s = SDM_ALLOC(&right, latents * rank, "head", err);
-    if (!s) s = SDM_ALLOC(&solution, latents * rank, "head", err);
-    for (size_t at = 0; at < p->n && !s; at += CHUNK) {
-        const size_t n = p->n - at < CHUNK ? p->n - at : CHUNK;
-        for (size_t i = 0; i < n; i++) {
-            const int16_t *from = d->maps + (at + i) * d->n_voxels + k->voxel;
-            for (size_t v = 0; v < voxels; v++)
-                rows[i * voxels + v] = d->scale[at + i] * (float)from[v] - t->mean[k->voxel + v];
-        }
-        sdm_gemm(n, rank, voxels, (sdm_view){rows, voxels, 1}, (sdm_view){basis, 1, voxels}, false, y, rank, 1);
-        sdm_gemm(latents, rank, n, (sdm_view){p->z + at * latents, 1, latents}, (sdm_view){y, rank, 1}, at > 0, right,
-                 rank, 1);
-    }
-    if (!s) {
-        for (size_t i = 0; i < latents * rank; i++) solution[i] = right[i];
-        cholesky_solve(latents, p->factor, rank, solution);
-        for (size_t i = 0; i < latents; i++)
-            for (size_t j = 0; j < rank; j++) head[j * latents + i] = (float)solution[i * rank + j];
-    }
-    sdm_free(solution);
-    sdm_free(right);
-    sdm_free(y);
-    sdm_free(rows);
-    return s;
-}
-
-static sdm_status problem_create(trainer *t, head_problem *p, sdm_error *err)
-{
-    enum { CHUNK = 512 };
-    const sdm_pod_arch *a = &t->arch;
-    const size_t latents = a->n_latent;
-    p->n = t->data.n_static + dataset_random_slots(&t->data);
-    float *gram = NULL;
-    refine_batch b = {0};
-    sdm_status s = SDM_ALLOC(&p->z, p->n * latents, "head", err);
-    if (!s) s = SDM_ALLOC(&gram, latents * latents, "head", err);
-    if (!s) s = SDM_ALLOC(&p->factor, latents * latents, "head", err);
-    if (!s) s = SDM_ALLOC(&b.x, CHUNK * a->n_inputs, "head", err);
-    if (!s) s = SDM_ALLOC(&b.z, CHUNK * latents, "head", err);
-    if (!s) s = SDM_ALLOC(&b.workspace, mlp_workspace(a, CHUNK), "head", err);
-    for (size_t at = 0; at < p->n && !s; at += CHUNK) {
-        const size_t rows = p->n - at < CHUNK ? p->n - at : CHUNK;
-        const float *phi[CHUNK];
-        for (size_t i = 0; i < rows; i++) phi[i] = t->phi + (at + i) * t->n_poly;
-        latent(t, t->refine.w, &b, rows, phi);
-        memcpy(p->z + at * latents, b.z, rows * latents * sizeof *b.z);
-    }
-    batch_dispose(&b);
-    if (!s) {
-        sdm_gemm(latents, latents, p->n, (sdm_view){p->z, 1, latents}, (sdm_view){p->z, latents, 1}, false, gram,
-                 latents, trainer_threads(t));
-        // hidden units may depend on each other linearly: a ridge relative to their size, raised until the system is definite
-        for (double ridge = 1e-6;; ridge *= 10) {
-            for (size_t i = 0; i < latents * latents; i++)
-                p->factor[i] = 0.5 * ((double)gram[i] + gram[i % latents * latents + i / latents]);
-            for (size_t i = 0; i < latents; i++) p->factor[i * latents + i] += ridge * (double)p->n;
-            if (!cholesky(latents, p->factor)) break;
-            if (ridge > 1) {
-                s = sdm_fail(err, SDM_E_INTERNAL, "the head's least squares has no solution");
-                break;
-            }
-        }
-    }
-    sdm_free(gram);
-    return s;
-}
-
 sdm_status refine_start(trainer *t, sdm_error *err)
 {
     const sdm_pod_arch *a = &t->arch;
-    size_t basis_count = 0;
-    for (size_t i = 0; i < a->n_blocks; i++) basis_count += sdm_pod_block_voxels(&t->blocks[i]) * t->blocks[i].rank;
+    const size_t basis_count = t->matrix_at[a->levels.first[a->levels.n]];
     t->head_at = mlp_count(a);
     t->mean_at = t->head_at + a->n_coefficients * a->n_latent;
     t->basis_at = t->mean_at + a->n_voxels;
@@ -350,38 +304,9 @@ sdm_status refine_start(trainer *t, sdm_error *err)
     if (a->depth) memcpy(t->refine.w, t->fit.average, mlp_count(a) * sizeof *t->refine.w);
     memcpy(t->refine.w + t->mean_at, t->mean, a->n_voxels * sizeof *t->mean);
     memcpy(t->refine.w + t->basis_at, t->basis, basis_count * sizeof *t->basis);
-
-    head_problem p = {0};
-    long failed = -1;
-    sdm_error first = {0};
-    refine_batch b = {0};
-    if (!(s = problem_create(t, &p, err))) s = batch_create(t, 1, &b, err); // for basis_at
-    if (!s) {
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic) num_threads(trainer_threads(t))
-#endif
-        for (long i = 0; i < (long)a->n_blocks; i++) {
-            sdm_error mine = {0};
-            const sdm_pod_block *k = &t->blocks[i];
-            const sdm_status one = solve_block(t, &p, k, t->basis + b.basis_at[i],
-                                               t->refine.w + t->head_at + (size_t)k->coefficient * a->n_latent, &mine);
-            if (one) {
-#ifdef _OPENMP
-#pragma omp critical(sdm_refine_start)
-#endif
-                if (failed < 0 || i < failed) failed = i, first = mine;
-            }
-        }
-    }
-    if (!s && failed >= 0) {
-        s = first.status;
-        if (err) *err = first;
-    }
-    batch_dispose(&b);
-    sdm_free(p.factor);
-    sdm_free(p.z);
-    if (!s) memcpy(t->refine.average, t->refine.w, t->refine.n * sizeof *t->refine.w);
-    return s;
+    if ((s = head_solve(t, t->refine.w, t->refine.w + t->head_at, err))) return s;
+    memcpy(t->refine.average, t->refine.w, t->refine.n * sizeof *t->refine.w);
+    return SDM_OK;
 }
 
 static double fraction_of_phase(const trainer *t, double end)

@@ -9,13 +9,10 @@
 #endif
 
 #include "export_model.h"
-#include "mlp.h"
+#include "kind.h"
 #include "sdm/file.h"
 #include "sdm/memory.h"
-#include "sdm/rng.h"
 #include "sdm/text.h"
-#include "streams.h"
-#include "trainer.h"
 
 static double monotonic(void)
 {
@@ -38,12 +35,6 @@ double trainer_fraction(const trainer *t)
 {
     if (trainer_by_time(t)) return trainer_seconds(t) / (t->config->train.minutes * 60);
     return (double)t->step / (double)trainer_steps(t);
-}
-
-int64_t trainer_fit_steps(const trainer *t)
-{
-    const int64_t n = (int64_t)((1 - t->config->train.refine) * (double)trainer_steps(t) + 0.5);
-    return n > 0 ? n : 1;
 }
 
 // threads that make online samples
@@ -132,9 +123,31 @@ sdm_status trainer_metric(trainer *t, double rate, sdm_error *err)
     return failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the metrics") : write_metrics(t, err);
 }
 
+static sdm_status take(trainer *t, const size_t *slots, size_t n, sdm_error *err)
+{
+    return t->kind->take ? t->kind->take(t, slots, n, err) : SDM_OK;
+}
+
+// what the network does not know of n new samples, which it has not trained on, says where more are needed
+static sdm_status plan_ahead(trainer *t, const size_t *slots, size_t n, sdm_error *err)
+{
+    double error[SAMPLE_ROUND];
+    dataset *d = &t->data;
+    if (!d->plan.by_error) return SDM_OK;
+    sdm_status s = SDM_OK;
+    if (t->phase == SDM_PHASE_FIT) {
+        s = t->kind->errors(t, slots, n, error, err);
+        if (!s) sample_plan_observe(&d->plan, d->n_taken - n, n, error);
+    }
+    const sample_space space = dataset_space(d);
+    if (!s) s = sample_plan_extend(&d->plan, &space, d->n_start, d->n_taken, err);
+    producer_allow(t->producer, d->plan.n_planned);
+    return s;
+}
+
 sdm_status trainer_take_samples(trainer *t, size_t wanted, sdm_error *err)
 {
-    enum { GROUP = 32 };
+    enum { GROUP = SAMPLE_ROUND };
     if (!t->producer) return SDM_OK;
     dataset *d = &t->data;
     const size_t all = d->n_start + d->n_online;
@@ -150,7 +163,8 @@ sdm_status trainer_take_samples(trainer *t, size_t wanted, sdm_error *err)
         size_t slots[GROUP], n = until - d->n_taken < GROUP ? until - d->n_taken : GROUP;
         for (size_t i = 0; i < n; i++) slots[i] = dataset_slot(d, d->n_taken + i);
         sdm_status s = producer_take(t->producer, d->n_taken + n, err);
-        if (!s) s = bases_project(t, slots, n, err);
+        if (!s) s = take(t, slots, n, err);
+        if (!s) s = plan_ahead(t, slots, n, err);
         if (s) return s;
         if (d->n_taken < until) { // a long wait: show it, and let it be stopped
             trainer_report(t, trainer_fraction(t), 0, false);
@@ -192,13 +206,6 @@ sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape,
     return SDM_OK;
 }
 
-// the largest degree that the number of maps can determine
-static size_t affordable(size_t n_params, size_t degree, size_t terms)
-{
-    while (degree > 0 && sdm_poly_count(n_params, degree) > terms) degree--;
-    return degree;
-}
-
 // texts that the model file has room for: found out before the training, not after it
 static sdm_status check_texts(const trainer *t, sdm_error *err)
 {
@@ -224,7 +231,6 @@ static sdm_status check_texts(const trainer *t, sdm_error *err)
 static sdm_status set_up(trainer *t, sdm_error *err)
 {
     const sdm_config *c = t->config;
-    sdm_pod_arch *a = &t->arch;
     dataset *d = &t->data;
     sdm_instance_params(t->shape, &d->n_params);
     if (d->n_params > SDM_POD_MAX_PARAMS)
@@ -237,43 +243,15 @@ static sdm_status set_up(trainer *t, sdm_error *err)
     d->grid = &c->grid;
     d->seed = c->seed;
     d->n_voxels = sdm_grid_count(&c->grid);
-    a->block = (size_t)c->network.block;
-    a->n_params = d->n_params;
-    a->n_voxels = d->n_voxels;
-    a->n_blocks = d->n_blocks = sdm_pod_block_count(&c->grid, a->block);
-    if ((s = SDM_ALLOC(&t->blocks, a->n_blocks, "blocks", err))) return s;
-    sdm_pod_blocks(&c->grid, a->block, t->blocks);
+    size_t block = t->kind->block(c);
+    for (int i = 0; i < 3 && !t->kind->block(c); i++)
+        if ((size_t)c->grid.n[i] > block) block = (size_t)c->grid.n[i];
+    t->levels = sdm_pod_count(&c->grid, block, t->kind->levels ? t->kind->levels(c) : 1);
+    d->n_blocks = t->levels.first[1];
+    if ((s = SDM_ALLOC(&t->blocks, t->levels.first[t->levels.n], "blocks", err))) return s;
+    sdm_pod_blocks(&c->grid, block, &t->levels, t->blocks);
     d->blocks = t->blocks;
     return dataset_create(d, c, err);
-}
-
-// the network that the number of maps made so far can determine
-static sdm_status design(trainer *t, sdm_error *err)
-{
-    const sdm_config *c = t->config;
-    sdm_pod_arch *a = &t->arch;
-    const dataset *d = &t->data;
-    a->degree = affordable(a->n_params, (size_t)c->network.degree, (d->n_static + d->n_start) / 4 + 1);
-    if (a->degree < (size_t)c->network.degree)
-        trainer_message(t,
-                        "network.degree lowered from %d to %zu: %zu maps before training cannot determine more terms",
-                        c->network.degree, a->degree, d->n_static + d->n_start);
-    a->input_degree = affordable(a->n_params, (size_t)c->network.input_degree, 1024);
-    if (a->input_degree < 1) a->input_degree = 1;
-    if (a->input_degree < (size_t)c->network.input_degree)
-        trainer_message(t, "network.input_degree lowered from %d to %zu: more than 1023 inputs",
-                        c->network.input_degree, a->input_degree);
-    a->depth = (size_t)c->network.depth;
-    a->width = (size_t)c->network.width;
-    a->activation = (int)c->network.activation;
-    a->n_terms = sdm_poly_count(a->n_params, a->degree);
-    a->n_inputs = sdm_poly_count(a->n_params, a->input_degree) - 1;
-    a->n_latent = a->n_terms + (a->depth ? a->width : 0);
-    t->n_poly = a->n_terms > a->n_inputs + 1 ? a->n_terms : a->n_inputs + 1;
-    const sdm_status s = SDM_ALLOC(&t->exponents, t->n_poly * a->n_params, "polynomials", err);
-    if (s) return s;
-    sdm_poly_table(a->n_params, a->degree > a->input_degree ? a->degree : a->input_degree, t->exponents);
-    return SDM_OK;
 }
 
 static void report_fill(void *user, size_t done, size_t all)
@@ -296,19 +274,6 @@ static sdm_status check_grid(const trainer *t, sdm_error *err)
                     "grid.origin), grid.size and "
                     "grid.spacing",
                     t->config->file, d->n_holdout);
-}
-
-static sdm_status start_fit(trainer *t, sdm_error *err)
-{
-    const sdm_pod_arch *a = &t->arch;
-    const size_t mlp = mlp_count(a);
-    const sdm_status s = parameters_create(&t->fit, mlp + t->n_modes * a->width, err);
-    if (s) return s;
-    mlp_init(a, t->config->seed, t->fit.w);
-    for (size_t i = mlp; i < t->fit.n; i++)
-        t->fit.w[i] = (float)(0.3 / sqrt((double)a->width) * sdm_rng_normal(t->config->seed, STREAM_INIT, i));
-    memcpy(t->fit.average, t->fit.w, t->fit.n * sizeof *t->fit.w);
-    return SDM_OK;
 }
 
 static bool cancelled(void *user) { return trainer_cancelled(user); }
@@ -334,7 +299,7 @@ static sdm_status retake(trainer *t, size_t n_taken, sdm_error *err)
         size_t slots[32], n = n_taken - t->data.n_taken < 32 ? n_taken - t->data.n_taken : 32;
         for (size_t i = 0; i < n; i++) slots[i] = dataset_slot(&t->data, t->data.n_taken + i);
         sdm_status s = producer_take(t->producer, t->data.n_taken + n, err);
-        if (!s) s = bases_project(t, slots, n, err);
+        if (!s) s = take(t, slots, n, err);
         if (!s && trainer_cancelled(t))
             s = sdm_fail(err, SDM_E_CANCELLED, "stopped on request; the checkpoint is as it was");
         if (s) return s;
@@ -343,7 +308,7 @@ static sdm_status retake(trainer *t, size_t n_taken, sdm_error *err)
     return SDM_OK;
 }
 
-static void enter(trainer *t, sdm_phase phase)
+void trainer_enter(trainer *t, sdm_phase phase)
 {
     t->phase = phase;
     t->phase_step = 0;
@@ -376,13 +341,7 @@ static sdm_status run(trainer *t, bool resume, sdm_error *err)
     if (!s) s = check_grid(t, err);
     t->phase = SDM_PHASE_BASES;
     trainer_report(t, trainer_by_time(t) ? trainer_seconds(t) / (t->config->train.minutes * 60) : 0, 0, true);
-    if (!s) s = design(t, err);
-    if (!s) s = bases_make(t, err);
-    if (!s)
-        trainer_message(
-            t, "%zu maps; %zu local functions in %zu blocks; bases and %zu modes leave %.2g mm^2 on held-out shapes",
-            t->data.n_static + t->data.n_start, t->arch.n_coefficients, t->arch.n_blocks, t->n_modes, t->holdout_floor);
-    if (!s) s = start_fit(t, err);
+    if (!s) s = t->kind->begin(t, err);
     if (!s) s = start_producer(t, err);
     if (!s && found) s = retake(t, n_taken, err);
     if (s) return s;
@@ -391,25 +350,10 @@ static sdm_status run(trainer *t, bool resume, sdm_error *err)
         t->started += trainer_seconds(t) - resumed_seconds; // making the data again does not count
         t->phase = from;
     } else {
-        enter(t, SDM_PHASE_FIT);
+        trainer_enter(t, SDM_PHASE_FIT);
     }
-    const double total = t->config->train.minutes * 60;
-    t->fit_end = t->phase_started + (total - t->phase_started) * (1 - t->config->train.refine);
     t->last_checkpoint = trainer_seconds(t);
-    if (t->phase == SDM_PHASE_FIT) {
-        if (found) s = checkpoint_weights(t, err);
-        if (!s) s = fit_run(t, err);
-        if (!s) s = refine_start(t, err);
-        if (!s) s = refine_evaluate(t, t->refine.w, &t->heldout_mse, err);
-        if (s) return s;
-        enter(t, SDM_PHASE_REFINE);
-        if ((s = trainer_metric(t, 0, err))) return s;
-    } else {
-        s = refine_start(t, err);
-        if (!s) s = checkpoint_weights(t, err);
-    }
-    if (!s) s = refine_run(t, err);
-    return s;
+    return t->kind->run(t, found, err);
 }
 
 sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const char *folder, bool resume,
@@ -419,6 +363,7 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     trainer t = {.config = config,
                  .shape = shape,
                  .folder = folder,
+                 .kind = config->network.kind == SDM_NETWORK_POD ? &pod_train : &direct_train,
                  .started = monotonic(),
                  .loss = NAN,
                  .heldout_mse = NAN,
@@ -440,12 +385,9 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     trainer_report(&t, 1, 0, true);
     if (!s) s = export_model(&t, report, err);
     if (!s) s = write_metrics(&t, err);
-    parameters_dispose(&t.fit);
-    parameters_dispose(&t.refine);
-    bases_dispose(&t);
+    t.kind->dispose(&t);
     dataset_dispose(&t.data);
     sdm_free(t.blocks);
-    sdm_free(t.exponents);
     sdm_text_dispose(&metrics);
     return s;
 }

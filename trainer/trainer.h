@@ -1,4 +1,5 @@
-/* The state of a training run, shared by its phases. Letters as in sdm/pod.h; R global modes, N slots of the pool. */
+/* The state of a training run, shared by its phases. Letters as in sdm/pod.h; R global modes, N slots of the pool. What a kind of
+   network does is in kind.h; the fields of the pod network lie here, others have theirs behind `state`. */
 #ifndef SDM_TRAINER_H
 #define SDM_TRAINER_H
 
@@ -9,23 +10,30 @@
 #include "sdm/pod.h"
 #include "sdm/train.h"
 
+typedef struct train_kind train_kind;
+
 typedef struct trainer {
     const sdm_config *config;
     const sdm_instance *shape;
     const char *folder;
     sdm_train_hooks hooks;
     int n_threads;
-
-    sdm_pod_arch arch;
-    sdm_pod_block *blocks;
-    uint8_t *exponents; /* [max(F, 1 + I)][P] */
-    size_t n_poly;      /* max(F, 1 + I) */
+    const train_kind *kind;
+    void *state;           /* of the kind; NULL: pod */
+    sdm_pod_levels levels; /* of the blocks */
+    sdm_pod_block *blocks; /* those of the lowest level give the order in which maps are stored; one block: map order */
     dataset data;
     producer *producer; /* NULL when no online sample is left to make */
 
-    /* spectral start (bases.c) */
+    /* pod network */
+    sdm_pod_arch arch;
+    uint8_t *exponents; /* [max(F, 1 + I)][P] */
+    size_t n_poly;      /* max(F, 1 + I) */
+
+    /* spectral start (bases.c, modes.c) */
     float *mean;           /* [n_voxels], block order */
-    float *basis;          /* for each block [k_b][V_b] */
+    float *basis;          /* for each block of all levels [k_b][V_b] */
+    size_t *matrix_at;     /* [blocks + 1] where that of a block begins */
     float *deviation;      /* [K] root mean square of each coefficient */
     size_t n_modes;        /* R */
     float *modes;          /* [R][K] orthonormal rows */
@@ -64,6 +72,9 @@ int64_t trainer_fit_steps(const trainer *t);
 /* Share of the whole budget that is over. */
 double trainer_fraction(const trainer *t);
 
+/* Begins a phase. */
+void trainer_enter(trainer *t, sdm_phase phase);
+
 /* Progress callback (not more than 10 times a second unless `now`). */
 void trainer_report(trainer *t, double fraction, double samples_per_second, bool now);
 void trainer_message(trainer *t, const char *fmt, ...) SDM_PRINTF(2, 3);
@@ -80,14 +91,30 @@ sdm_status trainer_metric(trainer *t, double rate, sdm_error *err);
 /* Products of polynomials at parameters p -> phi[n_poly]. */
 void trainer_phi(const trainer *t, const double *p, float *phi);
 
-/* bases.c: mean, local bases, global modes, polynomials; targets of everything in the pool. */
+/* bases.c: mean and local bases, then modes_make(). */
 sdm_status bases_make(trainer *t, sdm_error *err);
-/* phi and target of n slots. */
-sdm_status bases_project(trainer *t, const size_t *slots, size_t n, sdm_error *err);
+/* y[n][K]: coefficients of the maps in slots[n], or of held-out maps of those numbers. */
+sdm_status bases_coefficients(const trainer *t, bool holdout, const size_t *slots, size_t n, float *y, sdm_error *err);
+/* 0 .. n - 1; freed with sdm_free(). */
+sdm_status bases_slots(size_t n, size_t **slots, sdm_error *err);
 void bases_dispose(trainer *t);
+
+/* modes.c: global modes and polynomials from the first n slots; targets of everything in the pool. */
+sdm_status modes_make(trainer *t, size_t n, sdm_error *err);
+/* phi and target of n slots. */
+sdm_status modes_project(trainer *t, const size_t *slots, size_t n, sdm_error *err);
 
 /* fit.c: the MLP on the global modes, then the head by least squares on all local coefficients. */
 sdm_status fit_run(trainer *t, sdm_error *err);
+/* error[n]: root mean square error of the modes (mm) of the maps in slots[n], with the averaged weights. */
+sdm_status fit_errors(const trainer *t, const size_t *slots, size_t n, double *error, sdm_error *err);
+
+/* head.c: latent variables z[rows][L] from products phi (one pointer a row) with MLP weights w; x[rows][I] and workspace
+   (mlp_workspace()) are working memory. */
+void head_latent(const trainer *t, const float *w, size_t rows, const float *const *phi, float *x, float *z,
+                 float *workspace);
+/* head[K][L]: least squares of the coefficients of all maps in the pool on their latent variables. */
+sdm_status head_solve(const trainer *t, const float *w, float *head, sdm_error *err);
 
 /* refine.c: everything end to end on maps. */
 sdm_status refine_start(trainer *t, sdm_error *err); /* head by least squares; weights of the phase */

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "config_parse.h"
 #include "schema.h"
 #include "sdm/file.h"
 #include "sdm/memory.h"
@@ -54,6 +55,7 @@ static sdm_status read_all(sdm_reader *r, const char *text, size_t size, const c
     sdm_mark top = {.line = 1, .column = 1};
     sdm_status s = sdm_tree_parse(&tree, text, size, 0, r->mistakes, err);
     if (!s) sdm_fields_read(r, tree.root);
+    r->file_kind = r->config->network.kind;
     const bool is_keyed = !tree.root || tree.root->kind == SDM_TREE_MAP || sdm_tree_is_empty(tree.root);
     sdm_tree_dispose(&tree);
     if (s == SDM_E_CONFIG || (!s && !is_keyed)) return sdm_mistakes_report(r->mistakes, err);
@@ -64,8 +66,8 @@ static sdm_status read_all(sdm_reader *r, const char *text, size_t size, const c
     return sdm_mistakes_report(r->mistakes, err);
 }
 
-sdm_status sdm_config_parse(const char *name, const char *text, size_t size, const char *const *overrides,
-                            size_t n_overrides, sdm_config *out, sdm_error *err)
+sdm_status sdm_config_parse_placed(const char *name, const char *text, size_t size, const char *const *overrides,
+                                   const char *const *places, size_t n_overrides, sdm_config *out, sdm_error *err)
 {
     if (!name || !out || (!text && size) || (!overrides && n_overrides) || n_overrides > 10000)
         return sdm_fail(err, SDM_E_ARG,
@@ -80,13 +82,19 @@ sdm_status sdm_config_parse(const char *name, const char *text, size_t size, con
     memset(out, 0, sizeof *out);
     snprintf(out->file, sizeof out->file, "%s", name);
     default_folder(name, out->output.folder, sizeof out->output.folder);
-    sdm_mistakes mistakes = {.file = name, .overrides = overrides};
-    sdm_reader r = {.config = out, .mistakes = &mistakes};
+    sdm_mistakes mistakes = {.file = name, .overrides = overrides, .places = places};
+    sdm_reader r = {.target = out, .config = out, .mistakes = &mistakes};
     r.sections = sdm_config_sections(&r.n_sections);
     sdm_fields_set_defaults(&r);
     sdm_status s = read_all(&r, text ? text : "", size, overrides, n_overrides, err);
     if (s) memset(out, 0, sizeof *out);
     return s;
+}
+
+sdm_status sdm_config_parse(const char *name, const char *text, size_t size, const char *const *overrides,
+                            size_t n_overrides, sdm_config *out, sdm_error *err)
+{
+    return sdm_config_parse_placed(name, text, size, overrides, NULL, n_overrides, out, err);
 }
 
 sdm_status sdm_config_read(const char *path, const char *const *overrides, size_t n_overrides, sdm_config *out,

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "kinds.h"
 #include "schema.h"
 
 const char *sdm_field_type_name(const sdm_field *f)
@@ -90,13 +91,14 @@ void sdm_config_dump(const sdm_config *c, sdm_text *out)
 {
     size_t n = 0;
     const sdm_section *sections = sdm_config_sections(&n);
-    sdm_text_add(out, "# every key with its value; reads back to the same configuration\n");
+    sdm_text_add(out, "# every key of this kind of network with its value; reads back to the same configuration\n");
     for (size_t s = 0; s < n; s++) {
         bool nested = *sections[s].name != 0;
         if (nested) sdm_text_add(out, "%s:\n", sections[s].name);
         for (size_t k = 0; k < sections[s].n_fields; k++) {
             const sdm_field *f = &sections[s].fields[k];
             if (f->type == SDM_FIELD_SPECIAL && !f->dump) continue;
+            if (!sdm_kind_has(f, (int)c->network.kind)) continue;
             sdm_text_add(out, "%s%s: ", nested ? "  " : "", f->key);
             sdm_field_dump(c, f, out);
             sdm_text_add(out, "\n");
@@ -110,13 +112,17 @@ typedef char table_row[COLUMNS][CELL];
 static void fill_row(const sdm_section *section, const sdm_field *f, bool markdown, table_row row)
 {
     const char *quote = markdown ? "`" : "";
-    const char *def = f->shown_def ? f->shown_def : f->def ? f->def : "required";
+    char names[CELL / 2];
+    const char *def = f->shown_def   ? f->shown_def
+                      : f->kind_defs ? sdm_kind_defaults(f, names, sizeof names)
+                      : f->def       ? f->def
+                                     : "required";
     snprintf(row[0], CELL, "%s%s%s%s%s", quote, section->name, *section->name ? "." : "", f->key, quote);
     snprintf(row[1], CELL, "%s", sdm_field_type_name(f));
     sdm_field_range(f, row[2], CELL);
     snprintf(row[3], CELL, "%s", def);
     snprintf(row[4], CELL, "%s", f->unit);
-    snprintf(row[5], CELL, "%s", f->help);
+    snprintf(row[5], CELL, f->kinds ? "%s; %s only" : "%s", f->help, sdm_kind_names(f, names, sizeof names));
 }
 
 static void print_row(table_row row, const int width[COLUMNS], bool markdown, sdm_text *out)
@@ -132,9 +138,14 @@ static void print_row(table_row row, const int width[COLUMNS], bool markdown, sd
 
 void sdm_config_describe(bool markdown, sdm_text *out)
 {
-    static const char *const HEAD[COLUMNS] = {"Key", "Type", "Range", "Default", "Unit", "Meaning"};
     size_t n = 0;
     const sdm_section *sections = sdm_config_sections(&n);
+    sdm_fields_describe(sections, n, markdown, out);
+}
+
+void sdm_fields_describe(const sdm_section *sections, size_t n, bool markdown, sdm_text *out)
+{
+    static const char *const HEAD[COLUMNS] = {"Key", "Type", "Range", "Default", "Unit", "Meaning"};
     table_row row;
     int width[COLUMNS];
 

@@ -142,7 +142,7 @@ static bool read_choice(sdm_reader *r, const sdm_field *f, const sdm_tree_node *
 
 static bool read_field(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
 {
-    char *at = (char *)r->config + f->offset;
+    char *at = (char *)r->target + f->offset;
     int64_t wide = 0;
     switch (f->type) {
     case SDM_FIELD_INT:
@@ -165,17 +165,21 @@ static bool read_field(sdm_reader *r, const sdm_field *f, const sdm_tree_node *n
     return false;
 }
 
+void sdm_field_set_default(sdm_reader *r, const sdm_field *f, const char *def)
+{
+    const sdm_tree_node node = {.kind = SDM_TREE_SCALAR, .text = def};
+    bool fits = read_field(r, f, &node, f->key);
+    assert(fits);
+    (void)fits;
+}
+
 void sdm_fields_set_defaults(sdm_reader *r)
 {
     for (size_t s = 0; s < r->n_sections; s++) {
         assert(s < SDM_SECTIONS_MAX && r->sections[s].n_fields <= SDM_SECTION_FIELDS_MAX);
         for (size_t k = 0; k < r->sections[s].n_fields; k++) {
             const sdm_field *f = &r->sections[s].fields[k];
-            if (!f->def) continue;
-            const sdm_tree_node node = {.kind = SDM_TREE_SCALAR, .text = f->def};
-            bool fits = read_field(r, f, &node, f->key);
-            assert(fits);
-            (void)fits;
+            if (f->def || f->kind_defs) sdm_field_set_default(r, f, f->kind_defs ? f->kind_defs[0] : f->def);
         }
     }
 }

@@ -23,12 +23,14 @@ struct sdm_reader;
 typedef struct sdm_field {
     const char *key;
     sdm_field_type type;
-    size_t offset; /* in sdm_config; not used by SPECIAL */
+    size_t offset; /* in what is read: sdm_reader.target; not used by SPECIAL */
     double min, max;
     const char *def; /* default as it is written in YAML; NULL: none */
     const char *choices;
     const char *unit, *help;
     const char *shown_type, *shown_range, *shown_def; /* for the description; NULL: derived from the above */
+    unsigned kinds;                                   /* bit k: networks of kind k have the key; 0: all have it */
+    const char *const *kind_defs;                     /* default for each kind of network; NULL: def for all */
     bool (*read)(struct sdm_reader *r, const struct sdm_field *f, const sdm_tree_node *node, const char *path);
     void (*dump)(const sdm_config *c, sdm_text *out); /* the value only; NULL in a SPECIAL row: nothing is written */
 } sdm_field;
@@ -46,18 +48,23 @@ typedef struct sdm_given {
     bool refused;
 } sdm_given;
 
-/* A configuration under construction. */
+/* A configuration, or an element of a list in one, under construction. */
 typedef struct sdm_reader {
-    sdm_config *config;
+    void *target;       /* the struct that the tables describe */
+    sdm_config *config; /* the same where it is a training configuration, else NULL */
     sdm_mistakes *mistakes;
     const sdm_section *sections;
     size_t n_sections;
     sdm_mark section_mark[SDM_SECTIONS_MAX];
     sdm_given given[SDM_SECTIONS_MAX][SDM_SECTION_FIELDS_MAX];
     double centre[3]; /* grid.centre; turned into the origin when everything is read */
+    int file_kind;    /* network.kind before the overrides */
 } sdm_reader;
 
 static inline bool sdm_mark_is_set(sdm_mark m) { return m.line > 0 || m.override > 0; }
+
+/* Sets one field to a default, a text as in YAML. */
+void sdm_field_set_default(sdm_reader *r, const sdm_field *f, const char *def);
 
 /* Sets every field to its default. */
 void sdm_fields_set_defaults(sdm_reader *r);
@@ -82,6 +89,9 @@ const char *sdm_field_type_name(const sdm_field *f);
 
 /* The value of a field as YAML. */
 void sdm_field_dump(const sdm_config *c, const sdm_field *f, sdm_text *out);
+
+/* Appends a table of every key of sections[n]: name, type, range, default, unit, meaning. */
+void sdm_fields_describe(const sdm_section *sections, size_t n, bool markdown, sdm_text *out);
 
 /* sdm_format_real(), but 20 and not 2e+01 for whole numbers of up to nine digits. */
 const char *sdm_format_plain(double v, char buf[32]);

@@ -34,6 +34,8 @@ void sdm_mistakes_add(sdm_mistakes *m, sdm_mark mark, const char *fmt, ...)
 static int print_line(const sdm_mistakes *m, const sdm_mistake *one, char *out, size_t size)
 {
     char buf[SDM_QUOTE_MAX];
+    const char *place = one->mark.override > 0 && m->places ? m->places[one->mark.override - 1] : NULL;
+    if (place) return snprintf(out, size, "%s: %s", place, one->text);
     if (one->mark.override > 0)
         return snprintf(out, size, "argument '%s': %s", sdm_quote(m->overrides[one->mark.override - 1], buf),
                         one->text);

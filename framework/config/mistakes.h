@@ -13,10 +13,12 @@ typedef struct sdm_mistake {
     char text[SDM_MISTAKE_TEXT_MAX];
 } sdm_mistake;
 
-/* `file` and `overrides` belong to the caller and stand in front of the messages. */
+/* `file` and `overrides` belong to the caller and stand in front of the messages; where places[i] says so, override i has its own
+   "file:line:column" instead. */
 typedef struct sdm_mistakes {
     const char *file;
     const char *const *overrides;
+    const char *const *places; /* NULL: none */
     size_t count;
     sdm_mistake first[SDM_MISTAKES_SHOWN]; /* sorted: the file by line and column, then the overrides by number */
 } sdm_mistakes;

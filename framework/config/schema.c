@@ -4,12 +4,15 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "kinds.h"
 #include "special.h"
 
 #define AT(member) offsetof(sdm_config, member)
 #define CHECK_ENUM(type) _Static_assert(sizeof(type) == sizeof(int), "a choice is stored as an int")
 CHECK_ENUM(sdm_network_kind);
 CHECK_ENUM(sdm_activation);
+CHECK_ENUM(sdm_output);
+CHECK_ENUM(sdm_sampling);
 CHECK_ENUM(sdm_loss);
 CHECK_ENUM(sdm_weight_type);
 
@@ -28,10 +31,36 @@ CHECK_ENUM(sdm_weight_type);
         .key = name, .type = SDM_FIELD_CHOICE, .offset = AT(member), .choices = list, .def = def_, .unit = "",         \
         .help = help_                                                                                                  \
     }
+// a key that only some kinds of network have; one whose default depends on the kind
+#define OF_KIND(which, type_, name, member, low, high, def_, unit_, help_)                                             \
+    {                                                                                                                  \
+        .key = name, .type = type_, .offset = AT(member), .min = low, .max = high, .def = def_, .unit = unit_,         \
+        .kinds = which, .help = help_                                                                                  \
+    }
+#define BY_KIND(type_, name, member, low, high, unit_, list, help_)                                                    \
+    {                                                                                                                  \
+        .key = name, .type = type_, .offset = AT(member), .min = low, .max = high, .unit = unit_, .kind_defs = list,   \
+        .help = help_                                                                                                  \
+    }
 #define INT SDM_FIELD_INT
 #define INT64 SDM_FIELD_INT64
 #define REAL SDM_FIELD_REAL
 #define COUNT(table) (sizeof(table) / sizeof((table)[0]))
+
+enum {
+    POD = 1 << SDM_NETWORK_POD,
+    SDMNN = 1 << SDM_NETWORK_SDMNN,
+    DEEPSDF = 1 << SDM_NETWORK_DEEPSDF,
+    IMNET = 1 << SDM_NETWORK_IMNET
+};
+enum { POINTS = DEEPSDF | IMNET };
+
+// defaults of pod, sdmnn, deepsdf and imnet: those of Park et al. 2019 and of Chen and Zhang 2019 for the last two
+static const char *const DEPTH[] = {"3", "4", "8", "5"}, *const WIDTH[] = {"128", "64", "512", "2048"},
+                         *const BLOCK[] = {"4", "2", "4", "4"},
+                         *const ACTIVATION[] = {"silu", "relu", "relu", "leaky_relu"},
+                         *const OUTPUT_TYPE[] = {"linear", "linear", "tanh", "linear"},
+                         *const BATCH[] = {"256", "8", "16", "16"}, *const RATE[] = {"3e-3", "1e-3", "5e-4", "5e-4"};
 
 // clang-format off
 static const sdm_field SHAPE[] = {
@@ -54,16 +83,29 @@ static const sdm_field GRID[] = {
 };
 
 static const sdm_field NETWORK[] = {
-    CHOICE("kind", network.kind, "pod", "pod", "kind of network; pod: bases per block, coefficients by polynomials and an MLP"),
-    ROW("depth", INT, network.depth, 0, 16, "3", "layers", "hidden layers of the MLP; 0: polynomials only"),
-    ROW("width", INT, network.width, 8, 1024, "128", "units", "units of a hidden layer"),
-    ROW("rank", INT, network.rank, 1, 256, "24", "", "basis functions per block on average"),
-    ROW("block", INT, network.block, 2, 16, "8", "voxels", "edge of a block"),
-    ROW("modes", INT, network.modes, 8, 2048, "512", "", "global modes the coefficients are learned in"),
-    ROW("degree", INT, network.degree, 0, 12, "6", "", "total degree of the polynomial part"),
-    ROW("input_degree", INT, network.input_degree, 1, 8, "4", "", "total degree of the products of parameters fed to the MLP"),
-    CHOICE("activation", network.activation, "silu|tanh|relu", "silu", "activation of the hidden layers"),
-    CHOICE("weights", network.weights, "f32|f16", "f16", "type of the decoder's weights in the model file"),
+    CHOICE("kind", network.kind, SDM_KIND_CHOICES, "pod",
+           "pod: bases per block, coefficients by polynomials and an MLP; sdmnn: encoder-decoder of 3-D convolutions; deepsdf, imnet: one distance a point"),
+    BY_KIND(INT, "depth", network.depth, 0, 16, "layers", DEPTH,
+            "hidden layers of the MLP (pod: 0 for polynomials only); levels of sdmnn"),
+    BY_KIND(INT, "width", network.width, 8, 4096, "units", WIDTH,
+            "units of a hidden layer; imnet: of the first, halved from layer to layer"),
+    OF_KIND(POD, INT, "rank", network.rank, 1, 256, "9", "", "basis functions per block of the lowest level on average"),
+    OF_KIND(POD, INT, "levels", network.levels, 1, 8, "3", "levels", "levels of blocks, each of twice the edge of the one below"),
+    {.key = "block", .type = INT, .offset = AT(network.block), .min = 1, .max = 16, .unit = "voxels", .kinds = POD | SDMNN,
+     .kind_defs = BLOCK, .help = "edge of a block of the lowest level, from 2; sdmnn: of a cell of the volume that the dense layers give"},
+    OF_KIND(POD, INT, "modes", network.modes, 8, 2048, "512", "", "global modes the coefficients are learned in"),
+    OF_KIND(POD, INT, "degree", network.degree, 0, 12, "6", "", "total degree of the polynomial part"),
+    OF_KIND(POD, INT, "input_degree", network.input_degree, 1, 8, "4", "",
+            "total degree of the products of parameters fed to the MLP"),
+    OF_KIND(SDMNN, INT, "channels", network.channels, 1, 512, "16", "", "channels of the first level, doubled from level to level"),
+    OF_KIND(SDMNN, REAL, "dropout", network.dropout, 0, 0.9, "0.1", "", "share of units dropped at the two deepest levels while training"),
+    {.key = "skip", .type = INT, .offset = AT(network.skip), .max = 15, .def = "4", .shown_def = "half of the depth", .unit = "",
+     .kinds = DEEPSDF, .help = "hidden layer where the input enters again; 0: none"},
+    {.key = "output", .type = SDM_FIELD_CHOICE, .offset = AT(network.output), .choices = "linear|tanh", .unit = "",
+     .kinds = POINTS, .kind_defs = OUTPUT_TYPE, .help = "what the last layer gives; tanh: bounded by the largest distance of the maps"},
+    {.key = "activation", .type = SDM_FIELD_CHOICE, .offset = AT(network.activation), .choices = "silu|tanh|relu|leaky_relu",
+     .unit = "", .kind_defs = ACTIVATION, .help = "activation of the hidden layers"},
+    CHOICE("weights", network.weights, "f32|f16", "f16", "type of the large weights in the model file"),
 };
 
 static const sdm_field DATA[] = {
@@ -73,6 +115,8 @@ static const sdm_field DATA[] = {
     ROW("online", INT64, data.online, 0, 1e7, "4096", "shapes", "random shapes made while training goes on"),
     ROW("start", INT64, data.start, 0, 1e6, "3456", "shapes", "random shapes made before training starts, for the bases"),
     ROW("holdout", INT64, data.holdout, 1, 1e5, "100", "shapes", "random shapes that are never trained on, for the accuracy"),
+    {.key = "sampling", .type = SDM_FIELD_CHOICE, .offset = AT(data.sampling), .choices = "uniform|error", .def = "uniform", .unit = "",
+     .kinds = POD, .help = "online shapes: evenly over the parameters (Sobol'), or densely where the network errs"},
     ROW("static_share", REAL, data.static_share, 0, 1, "0.1", "", "share of each batch drawn from the static grid"),
     ROW("memory_gb", REAL, data.memory_gb, 0.001, 1e6, "6", "GB", "budget for maps kept in memory"),
     ROW("workers", INT, data.workers, 0, 1024, "0", "threads", "threads that make online samples; 0: half of the threads"),
@@ -82,15 +126,21 @@ static const sdm_field TRAIN[] = {
     ROW("minutes", REAL, train.minutes, 0, 1e6, "0", "min", "budget of time, data and evaluation included; 0: not by time"),
     ROW("steps", INT64, train.steps, 0, 1e12, "0", "steps", "budget of optimiser steps; 0: not by steps"),
     ROW("samples", INT64, train.samples, 0, 1e15, "0", "samples", "budget of samples (steps times batch); 0: not by samples"),
-    ROW("batch", INT, train.batch, 1, 65536, "256", "samples", "samples of a step"),
-    ROW("learning_rate", REAL, train.learning_rate, 1e-9, 1, "3e-3", "", "highest learning rate of the cosine schedule"),
+    BY_KIND(INT, "batch", train.batch, 1, 65536, "samples", BATCH, "maps of a step"),
+    OF_KIND(POINTS, INT, "points", train.points, 8, 1048576, "512", "voxels", "voxels drawn from each map of a step"),
+    BY_KIND(REAL, "learning_rate", train.learning_rate, 1e-9, 1, "", RATE, "highest learning rate of the cosine schedule"),
     ROW("warmup", REAL, train.warmup, 0, 0.5, "0.02", "", "share of the budget in which the learning rate grows"),
-    CHOICE("loss", train.loss, "mse|l1|huber", "mse", "what is made small: squared, absolute or Huber error"),
-    ROW("near_weight", REAL, train.near_weight, 0, 100, "0", "", "extra weight of voxels near the surface"),
+    CHOICE("loss", train.loss, "mse|l1|huber|clamped_l1", "mse",
+           "what is made small: squared, absolute, Huber error, or the absolute error of clamped distances"),
+    ROW("clamp_mm", REAL, train.clamp_mm, 1e-6, 1e6, "0.1", "mm", "clamped_l1: distances beyond count as this"),
+    OF_KIND(SDMNN | POINTS, REAL, "eikonal", train.eikonal, 0, 1000, "0", "",
+            "weight of the squared difference of the slope of the map from 1; 0: off"),
+    ROW("near_weight", REAL, train.near_weight, 0, 100, "0", "",
+        "extra weight of voxels near the surface; deepsdf, imnet: they are drawn so much more often"),
     ROW("near_mm", REAL, train.near_mm, 1e-6, 1e6, "0.4", "mm", "voxels nearer than this count as near"),
-    ROW("refine", REAL, train.refine, 0, 1, "0.4", "", "last share of the budget, trained end to end, decoder included"),
-    ROW("refine_batch", INT, train.refine_batch, 1, 4096, "32", "samples", "samples of a step in that share"),
-    ROW("refine_rate", REAL, train.refine_rate, 1e-9, 1, "3e-4", "", "learning rate in that share"),
+    OF_KIND(POD, REAL, "refine", train.refine, 0, 1, "0.4", "", "last share of the budget, trained end to end, decoder included"),
+    OF_KIND(POD, INT, "refine_batch", train.refine_batch, 1, 4096, "32", "samples", "samples of a step in that share"),
+    OF_KIND(POD, REAL, "refine_rate", train.refine_rate, 1e-9, 1, "3e-4", "", "learning rate in that share"),
     ROW("average", REAL, train.average, 0, 0.99999, "0.998", "", "decay of the average of the weights; 0: no average"),
     ROW("evaluate_seconds", REAL, train.evaluate_seconds, 0.001, 1e6, "20", "s",
         "time between evaluations; every 500 steps when the budget is not a time"),
@@ -216,6 +266,7 @@ void sdm_config_finish(sdm_reader *r, sdm_mark top)
 {
     require(r, "shape", "name", section_place(r, "shape", top), "name: cochlea");
     r->config->shape.mark = sdm_fields_given(r, "shape", "name")->mark;
+    sdm_kinds_settle(r, section_place(r, "network", top));
     finish_grid(r, section_place(r, "grid", top));
     check_budget(r, section_place(r, "train", top));
 }

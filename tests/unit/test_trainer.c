@@ -40,7 +40,9 @@ static uint64_t hash_of(const char *name)
     size_t size;
     snprintf(path, sizeof path, "%s/%s", folder, name);
     assert_int_equal(sdm_file_read(path, 1 << 30, &data, &size, NULL), SDM_OK);
-    const uint64_t h = sdm_crc64(0, data, size);
+    // a file that ends with its own CRC has the same CRC as any other such file: leave the end out
+    assert_true(size > 8);
+    const uint64_t h = sdm_crc64(0, data, size - 8);
     sdm_free(data);
     return h;
 }

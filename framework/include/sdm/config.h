@@ -36,13 +36,21 @@ typedef struct sdm_config_range {
     sdm_mark mark;
 } sdm_config_range;
 
-typedef enum sdm_network_kind { SDM_NETWORK_POD = 0 } sdm_network_kind;
+typedef enum sdm_network_kind {
+    SDM_NETWORK_POD = 0,
+    SDM_NETWORK_SDMNN,
+    SDM_NETWORK_DEEPSDF,
+    SDM_NETWORK_IMNET
+} sdm_network_kind;
 typedef enum sdm_activation {
     SDM_ACTIVATION_SILU = 0,
     SDM_ACTIVATION_TANH = 1,
-    SDM_ACTIVATION_RELU = 2
+    SDM_ACTIVATION_RELU = 2,
+    SDM_ACTIVATION_LEAKY_RELU = 3
 } sdm_activation;
-typedef enum sdm_loss { SDM_LOSS_MSE = 0, SDM_LOSS_L1 = 1, SDM_LOSS_HUBER = 2 } sdm_loss;
+typedef enum sdm_output { SDM_OUTPUT_LINEAR = 0, SDM_OUTPUT_TANH = 1 } sdm_output;
+typedef enum sdm_sampling { SDM_SAMPLING_UNIFORM = 0, SDM_SAMPLING_ERROR = 1 } sdm_sampling;
+typedef enum sdm_loss { SDM_LOSS_MSE = 0, SDM_LOSS_L1 = 1, SDM_LOSS_HUBER = 2, SDM_LOSS_CLAMPED_L1 = 3 } sdm_loss;
 typedef enum sdm_weight_type { SDM_WEIGHT_F32 = 0, SDM_WEIGHT_F16 = 1 } sdm_weight_type;
 
 typedef struct sdm_config {
@@ -58,15 +66,22 @@ typedef struct sdm_config {
     sdm_grid grid; /* grid.size [nx,ny,nz] required; grid.spacing mm (one number or three) required; grid.origin [x,y,z]
                       (first voxel's centre) or grid.centre [x,y,z] (middle of the box, default [0,0,0]), not both */
     struct {
-        sdm_network_kind kind;     /* network.kind: pod */
-        int depth;                 /* hidden layers of the MLP, 0..16, default 3 (0: polynomials only) */
-        int width;                 /* units of a hidden layer, 8..1024, default 128 */
-        int rank;                  /* basis functions per block on average, 1..256, default 24 */
-        int block;                 /* edge of a block in voxels, 2..16, default 8 */
+        sdm_network_kind kind;     /* network.kind: pod, sdmnn, deepsdf, imnet; some keys and defaults depend on it:
+                                      those given below are of pod, the table of keys has all */
+        int depth;                 /* pod: hidden layers of the MLP, 0..16, default 3 (0: polynomials only);
+                                      sdmnn: levels; deepsdf, imnet: hidden layers */
+        int width;                 /* units of a hidden layer, 8..4096, default 128; imnet: of the first one */
+        int rank;                  /* basis functions per block of the lowest level on average, 1..256, default 9 */
+        int levels;                /* levels of blocks, 1..8, default 3 */
+        int block;                 /* edge of a block of the lowest level in voxels, 2..16, default 4 */
         int modes;                 /* global modes the coefficients are learned in, 8..2048, default 512 */
         int degree;                /* total degree of the polynomial part, 0..12, default 6 */
         int input_degree;          /* total degree of the products fed to the MLP, 1..8, default 4 */
-        sdm_activation activation; /* silu, tanh, relu; default silu */
+        int channels;              /* sdmnn: channels of the first level, 1..512 */
+        double dropout;            /* sdmnn: share of units dropped at the two deepest levels, 0..0.9 */
+        int skip;                  /* deepsdf: hidden layer where the input enters again, 0 (none)..15 */
+        sdm_output output;         /* deepsdf, imnet: linear, tanh */
+        sdm_activation activation; /* silu, tanh, relu, leaky_relu (slope 0.02 below 0); default silu */
         sdm_weight_type weights;   /* f32, f16: weights of the decoder in the model file; default f16 */
     } network;
     struct {
@@ -76,6 +91,7 @@ typedef struct sdm_config {
         int64_t online;         /* random shapes drawn while training goes on, 0..10^7, default 4096 */
         int64_t start;          /* random shapes made before training starts, for the bases, 0..10^6, default 3456 */
         int64_t holdout;        /* random shapes that are never trained on, 1..10^5, default 100 */
+        sdm_sampling sampling;  /* pod: online shapes uniform over the parameters, or dense where the network errs */
         double static_share;    /* share of each batch drawn from the static grid, 0..1, default 0.1 */
         double memory_gb;       /* budget for maps kept in memory, default 6 */
         int workers;            /* threads that make online samples; 0: half of the threads, at least 1 */
@@ -85,9 +101,12 @@ typedef struct sdm_config {
         int64_t steps;        /* optimiser steps in all; 0: not limited by steps */
         int64_t samples;      /* samples in all (steps * batch); 0: not limited. Exactly one of the three is positive */
         int batch;            /* 1..65536, default 256 */
+        int points;           /* deepsdf, imnet: voxels drawn from each map of a batch, 8..1048576, default 512 */
         double learning_rate; /* default 3e-3 */
         double warmup;        /* share of the budget, 0..0.5, default 0.02 */
-        sdm_loss loss;        /* mse, l1, huber; default mse */
+        sdm_loss loss;        /* mse, l1, huber, clamped_l1; default mse */
+        double clamp_mm;      /* clamped_l1: distances beyond count as this, default 0.1 */
+        double eikonal;       /* all but pod: weight of (|gradient| - 1)^2, 0..1000, default 0 */
         double near_weight;   /* extra weight of voxels near the surface, 0..100, default 0 */
         double near_mm;       /* what is near, mm, default 0.4 */
         double refine;        /* last share of the budget, trained end to end (decoder included), 0..1, default 0.4 */

@@ -1,0 +1,252 @@
+/* The keys of an experiment: one table for each kind of mapping, and the readers of its lists. */
+#include "experiment_schema.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "overrides.h"
+#include "sdm/memory.h"
+
+#define COUNT(table) (sizeof(table) / sizeof((table)[0]))
+#define ROW(owner, name, kind, member, low, high, def_, unit_, help_)                                                  \
+    {                                                                                                                  \
+        .key = name, .type = kind, .offset = offsetof(owner, member), .min = low, .max = high, .def = def_,            \
+        .unit = unit_, .help = help_                                                                                   \
+    }
+#define TEXT(owner, name, member, bytes, shown, help_)                                                                 \
+    {                                                                                                                  \
+        .key = name, .type = SDM_FIELD_TEXT, .offset = offsetof(owner, member), .max = (bytes)-1, .shown_def = shown,  \
+        .unit = "", .help = help_                                                                                      \
+    }
+#define SPECIAL(name, reader, type_, range_, def_, help_)                                                              \
+    {                                                                                                                  \
+        .key = name, .type = SDM_FIELD_SPECIAL, .read = reader, .shown_type = type_, .shown_range = range_,            \
+        .shown_def = def_, .unit = "", .help = help_                                                                   \
+    }
+
+static const sdm_figure_info FIGURES[SDM_N_FIGURES] = {
+    [SDM_FIGURE_MS] = {"ms", "one map", "ms", "time of one map on one core, files not included"},
+    [SDM_FIGURE_MS_BATCH] = {"ms_batch", "one of a batch", "ms", "time of a map of a batch on one core"},
+    [SDM_FIGURE_SPEEDUP] = {"speedup", "speed-up", "x", "how many times faster one map is than the baseline's"},
+    [SDM_FIGURE_MSE] = {"mse_mm2", "MSE", "mm^2", "mean squared error over all voxels and shapes"},
+    [SDM_FIGURE_RMSE] = {"rmse_mm", "RMSE", "mm", "its root"},
+    [SDM_FIGURE_RMSE_NEAR] = {"rmse_near_mm", "RMSE near", "mm", "the same within 0.4 mm of the surface"},
+    [SDM_FIGURE_MAX] = {"max_abs_mm", "largest error", "mm", "largest error of all voxels and shapes"},
+    [SDM_FIGURE_DICE] = {"dice", "Dice", "", "mean overlap of the insides"},
+    [SDM_FIGURE_SURFACE_MEAN] = {"surface_mean_mm", "surface", "mm", "mean distance between the zero surfaces"},
+    [SDM_FIGURE_SURFACE_MAX] = {"surface_hausdorff_mm", "Hausdorff", "mm",
+                                "largest distance between the zero surfaces, mean over the shapes"},
+    [SDM_FIGURE_TRAIN] = {"train_s", "training", "s", "time of the training"},
+    [SDM_FIGURE_MODEL] = {"model_mb", "model", "MB", "size of the model file"},
+    [SDM_FIGURE_PEAK] = {"peak_mb", "memory", "MB", "peak of the resident memory for one map, the map included"},
+    [SDM_FIGURE_SHAPES] = {"shapes", "shapes", "", "shapes the errors are measured on"},
+};
+
+const sdm_figure_info *sdm_figure_get_info(sdm_figure f) { return (unsigned)f < SDM_N_FIGURES ? &FIGURES[f] : NULL; }
+
+static bool read_set(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
+static bool read_training(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
+static bool read_methods(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
+static bool read_variants(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
+static bool read_references(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
+
+// clang-format off
+#define E sdm_experiment
+static const sdm_field EXPERIMENT[] = {
+    TEXT(E, "title", experiment.title, 256, "the file's name", "what stands above the table"),
+    TEXT(E, "folder", experiment.folder, SDM_PATH_TEXT_MAX, "runs/NAME, after the file", "folder of the results"),
+    ROW(E, "seed", SDM_FIELD_UINT64, experiment.seed, 0, 0, "1", "", "of the random shapes that are measured; training has its own"),
+    ROW(E, "samples", SDM_FIELD_INT64, experiment.samples, 1, 1e6, "100", "shapes", "random shapes the errors of a network are measured on"),
+    ROW(E, "engine_samples", SDM_FIELD_INT64, experiment.engine_samples, 1, 1e6, "5", "shapes", "the same for an engine"),
+    ROW(E, "minutes", SDM_FIELD_REAL, experiment.minutes, 0, 1e6, "0", "min", "no training is begun that would end later than this; 0: no limit"),
+    TEXT(E, "baseline", experiment.baseline, SDM_NAME_MAX, "none", "method that the speed-up refers to"),
+    TEXT(E, "reference", experiment.reference, SDM_NAME_MAX, "reference", "heading of the figures in `reference`"),
+    {.key = "pictures", .type = SDM_FIELD_CHOICE, .offset = offsetof(E, experiment.pictures), .choices = "no|yes", .def = "yes",
+     .unit = "", .help = "draw slices with contours and surfaces of every row"},
+};
+
+static const sdm_field TOP[] = {
+    TEXT(E, "base", base, SDM_NAME_MAX, "none", "training configuration under all rows: the name of a file beside this one"),
+    SPECIAL("shape", read_training, "mapping", "keys of a training", "none", "as in a training configuration, over the base; for every row"),
+    SPECIAL("grid", read_training, "mapping", "keys of a training", "none", "the same"),
+    SPECIAL("network", read_training, "mapping", "keys of a training", "none", "the same"),
+    SPECIAL("data", read_training, "mapping", "keys of a training", "none", "the same"),
+    SPECIAL("train", read_training, "mapping", "keys of a training", "none", "the same"),
+    SPECIAL("seed", read_training, "integer", "0 .. 18446744073709551615", "the base's", "seed of the trainings"),
+    SPECIAL("threads", read_training, "integer", "0 .. 1024", "the base's", "threads of the trainings"),
+    SPECIAL("methods", read_methods, "list", "1 to 64 methods", "required", "what is compared, each with the keys under methods"),
+    SPECIAL("variants", read_variants, "list", "0 to 64 variants", "none", "every method is done once for each of them"),
+    SPECIAL("reference", read_references, "list", "0 to 64 references", "none", "figures of others, shown beside a row's own"),
+};
+
+#define M sdm_experiment_method
+static const sdm_field METHOD[] = {
+    TEXT(M, "name", name, SDM_NAME_MAX, "required", "title of its row"),
+    TEXT(M, "network", network, SDM_NAME_MAX, "none", "kind of a network to train (network.kind)"),
+    TEXT(M, "engine", engine, SDM_NAME_MAX, "none", "method without training: exact, naive, cells, octree, edt, or another program: vtk, cgal, embree, openvdb, itk, scipy"),
+    ROW(M, "samples", SDM_FIELD_INT64, samples, 0, 1e6, "0", "shapes", "shapes its errors are measured on; 0: as the experiment says"),
+    SPECIAL("set", read_set, "mapping", "keys of a training", "none", "keys of the training configuration for this method, e.g. {train.minutes: 4}"),
+};
+
+#define V sdm_experiment_variant
+static const sdm_field VARIANT[] = {
+    TEXT(V, "name", name, SDM_NAME_MAX, "required", "stands behind the method's name"),
+    SPECIAL("set", read_set, "mapping", "keys of a training", "none", "keys of the training configuration in this variant, e.g. {grid.spacing: 0.1}"),
+};
+
+#define R sdm_experiment_reference
+#define FIGURE(name, which, help_) ROW(R, name, SDM_FIELD_REAL, value[which], 0, 1e12, NULL, "", help_)
+static const sdm_field REFERENCE[] = {
+    TEXT(R, "row", row, SDM_EXPERIMENT_TITLE_MAX, "required", "title of the row it belongs to"),
+    TEXT(R, "source", source, 256, "none", "where the figures come from"),
+    FIGURE("ms", SDM_FIGURE_MS, "ms, one map"), FIGURE("ms_batch", SDM_FIGURE_MS_BATCH, "ms, a map of a batch"),
+    FIGURE("speedup", SDM_FIGURE_SPEEDUP, "times faster than the baseline"), FIGURE("mse_mm2", SDM_FIGURE_MSE, "mm^2"),
+    FIGURE("rmse_mm", SDM_FIGURE_RMSE, "mm"), FIGURE("rmse_near_mm", SDM_FIGURE_RMSE_NEAR, "mm"),
+    FIGURE("max_abs_mm", SDM_FIGURE_MAX, "mm"), FIGURE("dice", SDM_FIGURE_DICE, "0 .. 1"),
+    FIGURE("surface_mean_mm", SDM_FIGURE_SURFACE_MEAN, "mm"), FIGURE("surface_hausdorff_mm", SDM_FIGURE_SURFACE_MAX, "mm"),
+    FIGURE("train_s", SDM_FIGURE_TRAIN, "s"), FIGURE("model_mb", SDM_FIGURE_MODEL, "MB"), FIGURE("peak_mb", SDM_FIGURE_PEAK, "MB"),
+    FIGURE("shapes", SDM_FIGURE_SHAPES, "shapes the errors are of"),
+};
+
+/* The first two are of the file, the others of the elements of its lists. */
+enum { N_FILE_SECTIONS = 2 };
+static const sdm_section SECTIONS[] = {
+    {.name = "experiment", .fields = EXPERIMENT, .n_fields = COUNT(EXPERIMENT)},
+    {.name = "", .fields = TOP, .n_fields = COUNT(TOP)},
+    {.name = "methods[]", .fields = METHOD, .n_fields = COUNT(METHOD)},
+    {.name = "variants[]", .fields = VARIANT, .n_fields = COUNT(VARIANT)},
+    {.name = "reference[]", .fields = REFERENCE, .n_fields = COUNT(REFERENCE)},
+};
+// clang-format on
+
+const sdm_section *sdm_experiment_sections(size_t *n)
+{
+    *n = N_FILE_SECTIONS;
+    return SECTIONS;
+}
+
+void sdm_experiment_describe(bool markdown, sdm_text *out)
+{
+    sdm_fields_describe(SECTIONS, COUNT(SECTIONS), markdown, out);
+}
+
+bool sdm_experiment_is_training_key(const char *key, size_t length)
+{
+    static const char *const NAMES[] = {"shape", "grid", "network", "data", "train", "seed", "threads"};
+    size_t first = 0;
+    while (first < length && key[first] != '.') first++;
+    for (size_t i = 0; i < COUNT(NAMES); i++)
+        if (strlen(NAMES[i]) == first && !strncmp(key, NAMES[i], first)) return true;
+    return false;
+}
+
+static bool refuse(sdm_reader *r, const sdm_tree_node *node, const char *path, const char *wanted)
+{
+    char buf[SDM_QUOTE_MAX + 16];
+    sdm_mistakes_add(r->mistakes, node->mark, "%s: needs %s, got %s", path, wanted, sdm_describe_node(node, buf));
+    return false;
+}
+
+/* ---- keys of the training configuration ---- */
+
+static bool add_keys(sdm_reader *r, sdm_overrides *set, const char *prefix, const sdm_tree_node *node, const char *path)
+{
+    if (sdm_tree_is_empty(node)) return true; /* all its keys are commented out */
+    if (node->kind != SDM_TREE_MAP) return refuse(r, node, path, "keys with values");
+    return sdm_overrides_add_tree(set, prefix, node, r->mistakes);
+}
+
+static bool read_set(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
+{
+    const bool is_method = f == &METHOD[COUNT(METHOD) - 1];
+    sdm_overrides *set = is_method ? &((M *)r->target)->set : &((V *)r->target)->set;
+    return add_keys(r, set, "", node, path);
+}
+
+static bool read_training(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
+{
+    E *e = r->target;
+    if (strcmp(f->key, "seed") != 0 && strcmp(f->key, "threads") != 0)
+        return add_keys(r, &e->common, f->key, node, path);
+    if (node->kind != SDM_TREE_SCALAR) return refuse(r, node, path, "an integer");
+    sdm_tree_node one = *node;
+    one.next = NULL;
+    const sdm_tree_node alone = {.kind = SDM_TREE_MAP, .n_children = 1, .first = &one, .last = &one};
+    return sdm_overrides_add_tree(&e->common, "", &alone, r->mistakes);
+}
+
+/* ---- lists ---- */
+
+/* Reads the elements of a list into a new array by the table of `section`, whose first key is required. */
+static bool read_list(sdm_reader *r, const sdm_tree_node *node, const char *path, const sdm_section *section,
+                      void **array, size_t *n, size_t size, void (*begin)(void *element, sdm_mark mark))
+{
+    char wanted[64];
+    bool fits = true;
+    if (node->mark.override > 0) {
+        sdm_mistakes_add(r->mistakes, node->mark, "%s: a list of the file cannot be replaced here", path);
+        return false;
+    }
+    snprintf(wanted, sizeof wanted, "a list of at most %d", SDM_EXPERIMENT_ROWS_MAX);
+    if (node->kind != SDM_TREE_LIST || node->n_children > SDM_EXPERIMENT_ROWS_MAX) return refuse(r, node, path, wanted);
+    if (sdm_alloc(array, node->n_children, size, path, NULL)) {
+        sdm_mistakes_add(r->mistakes, node->mark, "%s: out of memory", path);
+        return false;
+    }
+    const sdm_section alone = {.name = "", .fields = section->fields, .n_fields = section->n_fields};
+    for (const sdm_tree_node *child = node->first; child; child = child->next) {
+        void *element = (char *)*array + size * (*n)++;
+        const size_t before = r->mistakes->count;
+        sdm_reader one = {.target = element, .mistakes = r->mistakes, .sections = &alone, .n_sections = 1};
+        begin(element, child->mark);
+        sdm_fields_set_defaults(&one);
+        sdm_fields_read(&one, child);
+        if (r->mistakes->count == before && !sdm_mark_is_set(one.given[0][0].mark))
+            sdm_mistakes_add(r->mistakes, child->mark, "%s: missing key '%s'", path, section->fields[0].key);
+        fits &= r->mistakes->count == before;
+    }
+    return fits;
+}
+
+static void begin_method(void *element, sdm_mark mark) { ((M *)element)->mark = mark; }
+static void begin_variant(void *element, sdm_mark mark) { ((V *)element)->mark = mark; }
+static void begin_reference(void *element, sdm_mark mark)
+{
+    R *reference = element;
+    reference->mark = mark;
+    for (int i = 0; i < SDM_N_FIGURES; i++) reference->value[i] = NAN;
+}
+
+static bool read_methods(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
+{
+    E *e = r->target;
+    (void)f;
+    bool fits =
+        read_list(r, node, path, &SECTIONS[2], (void **)&e->methods, &e->n_methods, sizeof *e->methods, begin_method);
+    for (size_t i = 0; i < e->n_methods && fits; i++) {
+        M *m = &e->methods[i];
+        if ((*m->network != 0) != (*m->engine != 0)) continue;
+        sdm_mistakes_add(r->mistakes, m->mark, "method '%s' needs %s of the keys network and engine", m->name,
+                         *m->network ? "only one" : "one");
+        fits = false;
+    }
+    return fits;
+}
+
+static bool read_variants(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
+{
+    E *e = r->target;
+    (void)f;
+    return read_list(r, node, path, &SECTIONS[3], (void **)&e->variants, &e->n_variants, sizeof *e->variants,
+                     begin_variant);
+}
+
+static bool read_references(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
+{
+    E *e = r->target;
+    (void)f;
+    return read_list(r, node, path, &SECTIONS[4], (void **)&e->references, &e->n_references, sizeof *e->references,
+                     begin_reference);
+}

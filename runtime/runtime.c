@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "checked.h"
 #include "sdm/memory.h"
 
 #ifdef _OPENMP
@@ -12,6 +13,8 @@
 
 // maps of one slice of a batch: fixed, so that how a map is computed does not depend on the number of threads
 #define SLICE 24u
+// threads that share one map at most
+#define SHARED 256u
 
 static int thread_count(int wanted, size_t most)
 {
@@ -44,14 +47,19 @@ static sdm_status check_options(const sdm_model *m, const sdm_generate_opts *o, 
     if (o->n_threads < 0) return sdm_fail(err, SDM_E_ARG, "%d threads, need 0 (all) or more", o->n_threads);
     if (o->policy != SDM_RANGE_REFUSE && o->policy != SDM_RANGE_CLAMP && o->policy != SDM_RANGE_EXACT)
         return sdm_fail(err, SDM_E_ARG, "range policy %d is unknown", (int)o->policy);
-    if (o->policy != SDM_RANGE_EXACT) return SDM_OK;
+    if (!(o->max_error_mm >= 0) || isinf(o->max_error_mm))
+        return sdm_fail(err, SDM_E_ARG, "largest error %g mm, need a positive number, or 0 for none", o->max_error_mm);
+    if ((unsigned)o->max_error_of > SDM_CHECK_MEAN)
+        return sdm_fail(err, SDM_E_ARG, "figure %d of a check is unknown", (int)o->max_error_of);
+    if (o->policy != SDM_RANGE_EXACT && !sdm_wants_check(o)) return SDM_OK;
     if (!o->exact_shape)
-        return sdm_fail(err, SDM_E_ARG, "the exact policy needs an instance of the shape (sdm_runtime_instance())");
+        return sdm_fail(err, SDM_E_ARG, "%s an instance of the shape (sdm_runtime_instance())",
+                        o->policy == SDM_RANGE_EXACT ? "the exact policy needs" : "checks need");
     size_t n;
     sdm_instance_params(o->exact_shape, &n);
     const sdm_model_info *info = sdm_model_get_info(m);
     if (n != info->n_params)
-        return sdm_fail(err, SDM_E_ARG, "the model has %zu parameters, the shape for the exact policy %zu",
+        return sdm_fail(err, SDM_E_ARG, "the model has %zu parameters, the shape for the exact engine %zu",
                         info->n_params, n);
     return SDM_OK;
 }
@@ -78,12 +86,13 @@ static sdm_status check_params(const sdm_model *m, const double *params, const s
     }
     if (result->source == SDM_SOURCE_NETWORK) return SDM_OK;
     result->error_mm = 0.0;
+    result->reason = SDM_REASON_RANGE;
     return sdm_instance_check(o->exact_shape, params, err);
 }
 
 // the network's maps of one slice, in runs between those of the exact engine
-static void forward_slice(const sdm_model *m, const double *used, const sdm_result *results, size_t n, float *values,
-                          void *scratch)
+static void forward_slice(const sdm_model *m, const double *used, const sdm_result *results, size_t n, int n_threads,
+                          float *values, void *scratch)
 {
     const sdm_model_info *info = sdm_model_get_info(m);
     const size_t voxels = sdm_grid_count(&info->grid);
@@ -91,7 +100,8 @@ static void forward_slice(const sdm_model *m, const double *used, const sdm_resu
         size_t last = first;
         while (last < n && results[last].source == SDM_SOURCE_NETWORK) last++;
         if (last > first)
-            sdm_model_forward(m, used + first * info->n_params, last - first, values + first * voxels, scratch);
+            sdm_model_forward_threads(m, used + first * info->n_params, last - first, values + first * voxels, scratch,
+                                      n_threads);
         first = last + 1;
     }
 }
@@ -101,8 +111,10 @@ static sdm_status forward_batch(const sdm_model *m, const double *used, const sd
 {
     const sdm_model_info *info = sdm_model_get_info(m);
     const size_t voxels = sdm_grid_count(&info->grid), slices = (n + SLICE - 1) / SLICE;
-    const int threads = thread_count(wanted, slices);
-    const size_t bytes = (sdm_model_scratch_bytes(m, n < SLICE ? n : SLICE) + 63) / 64 * 64;
+    // threads take slices, or share the maps of one slice after the other
+    const int all = thread_count(wanted, SHARED), inner = sdm_model_is_threaded(m) ? all : 1;
+    const int threads = inner > 1 ? 1 : thread_count(wanted, slices);
+    const size_t bytes = (sdm_model_scratch_bytes_threads(m, n < SLICE ? n : SLICE, inner) + 63) / 64 * 64;
     uint8_t *scratch = NULL;
     size_t total;
     sdm_status s = sdm_mul(bytes, (size_t)threads, &total, err);
@@ -111,7 +123,7 @@ static sdm_status forward_batch(const sdm_model *m, const double *used, const sd
 #pragma omp parallel for schedule(dynamic) num_threads(threads) if (threads > 1)
     for (size_t k = 0; k < slices; k++) {
         const size_t first = k * SLICE, count = n - first < SLICE ? n - first : SLICE;
-        forward_slice(m, used + first * info->n_params, results + first, count, values + first * voxels,
+        forward_slice(m, used + first * info->n_params, results + first, count, inner, values + first * voxels,
                       scratch + (size_t)thread_index() * bytes);
     }
     sdm_free(scratch);
@@ -142,7 +154,7 @@ static sdm_status generate_all(const sdm_model *m, const double *params, size_t 
             s = in_map(sdm_exact_shape_map(o->exact_shape, params + i * p, &exact, &info->grid, values + i * voxels,
                                            NULL, err),
                        n, i, err);
-    return s;
+    return !s && network && sdm_wants_check(o) ? sdm_check_results(m, used, n, o, values, results, err) : s;
 }
 
 sdm_status sdm_generate_batch(const sdm_model *m, const double *params, size_t n, const sdm_generate_opts *opts,
@@ -162,7 +174,7 @@ sdm_status sdm_generate_batch(const sdm_model *m, const double *params, size_t n
     s = SDM_ALLOC(&used, count, "parameters of a batch", err);
     if (!s) s = SDM_ALLOC(&found, n, "results of a batch", err);
     if (!s) s = generate_all(m, params, n, &o, values, found, used, err);
-    if (!s && results) memcpy(results, found, n * sizeof *found);
+    if ((!s || s == SDM_E_QUALITY) && results) memcpy(results, found, n * sizeof *found);
     sdm_free(found);
     sdm_free(used);
     return s;
@@ -174,27 +186,132 @@ sdm_status sdm_generate(const sdm_model *m, const double *params, const sdm_gene
     return sdm_generate_batch(m, params, 1, opts, values, result, err);
 }
 
+// map and derivatives at checked parameters
+static sdm_status jacobian_at(const sdm_model *m, const double *params, const double *used, const sdm_generate_opts *o,
+                              float *values, float *jacobian, sdm_result *result, sdm_error *err)
+{
+    sdm_status s = SDM_OK;
+    if (result->source == SDM_SOURCE_NETWORK) {
+        const int threads = thread_count(o->n_threads, SHARED);
+        uint8_t *scratch = NULL;
+        s = SDM_ALLOC(&scratch, sdm_model_jacobian_scratch_bytes_threads(m, threads), "memory of the network", err);
+        if (!s) sdm_model_jacobian_threads(m, used, values, jacobian, scratch, threads);
+        sdm_free(scratch);
+        if (!s && sdm_wants_check(o)) s = sdm_check_results(m, used, 1, o, values, result, err);
+    }
+    if (s || result->source == SDM_SOURCE_NETWORK) return s;
+    const sdm_exact_opts exact = {.n_threads = o->n_threads};
+    return sdm_exact_shape_jacobian(o->exact_shape, params, &exact, &sdm_model_get_info(m)->grid, values, jacobian,
+                                    NULL, err);
+}
+
 sdm_status sdm_generate_jacobian(const sdm_model *m, const double *params, const sdm_generate_opts *opts, float *values,
                                  float *jacobian, sdm_result *result, sdm_error *err)
 {
     if (!m || !params || !values || !jacobian)
         return sdm_fail(err, SDM_E_ARG, "generate: model, parameters, values and jacobian are needed");
     const sdm_generate_opts o = options_or_default(opts);
-    if (o.policy == SDM_RANGE_EXACT)
-        return sdm_fail(err, SDM_E_UNSUPPORTED,
-                        "derivatives come from the network alone; choose the policy refuse or clamp");
     sdm_status s = check_options(m, &o, err);
     double *used = NULL;
-    uint8_t *scratch = NULL;
-    sdm_result found;
+    sdm_result found = {0};
     if (!s) s = SDM_ALLOC(&used, sdm_model_get_info(m)->n_params, "parameters", err);
     if (!s) s = check_params(m, params, &o, used, &found, err);
-    if (!s) s = SDM_ALLOC(&scratch, sdm_model_jacobian_scratch_bytes(m), "memory of the network", err);
-    if (!s) {
-        sdm_model_jacobian(m, used, values, jacobian, scratch);
-        if (result) *result = found;
+    if (!s) s = jacobian_at(m, params, used, &o, values, jacobian, &found, err);
+    if ((!s || s == SDM_E_QUALITY) && result) *result = found;
+    sdm_free(used);
+    return s;
+}
+
+// the exact Jacobian into new memory
+static sdm_status exact_jacobian(const sdm_model *m, const double *params, const sdm_generate_opts *o, float *values,
+                                 float **jacobian, sdm_error *err)
+{
+    const sdm_model_info *info = sdm_model_get_info(m);
+    const sdm_exact_opts exact = {.n_threads = o->n_threads};
+    size_t count;
+    sdm_status s = sdm_mul(info->n_params, sdm_grid_count(&info->grid), &count, err);
+    if (!s) s = SDM_ALLOC(jacobian, count, "Jacobian", err);
+    if (!s) s = sdm_exact_shape_jacobian(o->exact_shape, params, &exact, &info->grid, values, *jacobian, NULL, err);
+    return s;
+}
+
+static sdm_status jvp_at(const sdm_model *m, const double *params, const double *used, const double *direction,
+                         const sdm_generate_opts *o, float *values, float *tangent, sdm_result *result, sdm_error *err)
+{
+    sdm_status s = SDM_OK;
+    if (result->source == SDM_SOURCE_NETWORK) {
+        uint8_t *scratch = NULL;
+        s = SDM_ALLOC(&scratch, sdm_model_jvp_scratch_bytes(m), "memory of the network", err);
+        if (!s) sdm_model_jvp(m, used, direction, values, tangent, scratch);
+        sdm_free(scratch);
+        if (!s && sdm_wants_check(o)) s = sdm_check_results(m, used, 1, o, values, result, err);
     }
-    sdm_free(scratch);
+    if (s || result->source == SDM_SOURCE_NETWORK) return s;
+    const sdm_model_info *info = sdm_model_get_info(m);
+    const size_t voxels = sdm_grid_count(&info->grid);
+    float *jacobian = NULL;
+    if (!(s = exact_jacobian(m, params, o, values, &jacobian, err))) {
+        memset(tangent, 0, voxels * sizeof *tangent);
+        for (size_t i = 0; i < info->n_params; i++)
+            for (size_t v = 0; v < voxels; v++) tangent[v] += (float)direction[i] * jacobian[i * voxels + v];
+    }
+    sdm_free(jacobian);
+    return s;
+}
+
+static sdm_status vjp_at(const sdm_model *m, const double *params, const double *used, const float *adjoint,
+                         const sdm_generate_opts *o, double *gradient, const sdm_result *result, sdm_error *err)
+{
+    if (result->source == SDM_SOURCE_NETWORK) {
+        uint8_t *scratch = NULL;
+        const sdm_status s = SDM_ALLOC(&scratch, sdm_model_vjp_scratch_bytes(m), "memory of the network", err);
+        if (!s) sdm_model_vjp(m, used, adjoint, gradient, scratch);
+        sdm_free(scratch);
+        return s;
+    }
+    const sdm_model_info *info = sdm_model_get_info(m);
+    const size_t voxels = sdm_grid_count(&info->grid);
+    float *jacobian = NULL;
+    const sdm_status s = exact_jacobian(m, params, o, NULL, &jacobian, err);
+    for (size_t i = 0; i < info->n_params && !s; i++) {
+        gradient[i] = 0;
+        for (size_t v = 0; v < voxels; v++) gradient[i] += (double)adjoint[v] * jacobian[i * voxels + v];
+    }
+    sdm_free(jacobian);
+    return s;
+}
+
+sdm_status sdm_generate_jvp(const sdm_model *m, const double *params, const double *direction,
+                            const sdm_generate_opts *opts, float *values, float *tangent, sdm_result *result,
+                            sdm_error *err)
+{
+    if (!m || !params || !direction || !values || !tangent)
+        return sdm_fail(err, SDM_E_ARG, "generate: model, parameters, direction, values and tangent are needed");
+    const sdm_generate_opts o = options_or_default(opts);
+    sdm_status s = check_options(m, &o, err);
+    double *used = NULL;
+    sdm_result found = {0};
+    if (!s) s = SDM_ALLOC(&used, sdm_model_get_info(m)->n_params, "parameters", err);
+    if (!s) s = check_params(m, params, &o, used, &found, err);
+    if (!s) s = jvp_at(m, params, used, direction, &o, values, tangent, &found, err);
+    if ((!s || s == SDM_E_QUALITY) && result) *result = found;
+    sdm_free(used);
+    return s;
+}
+
+sdm_status sdm_generate_vjp(const sdm_model *m, const double *params, const float *adjoint,
+                            const sdm_generate_opts *opts, double *gradient, sdm_result *result, sdm_error *err)
+{
+    if (!m || !params || !adjoint || !gradient)
+        return sdm_fail(err, SDM_E_ARG, "generate: model, parameters, adjoint and gradient are needed");
+    const sdm_generate_opts o = options_or_default(opts);
+    sdm_status s = check_options(m, &o, err);
+    double *used = NULL;
+    sdm_result found = {0};
+    if (!s) s = SDM_ALLOC(&used, sdm_model_get_info(m)->n_params, "parameters", err);
+    if (!s) s = check_params(m, params, &o, used, &found, err);
+    if (!s) s = vjp_at(m, params, used, adjoint, &o, gradient, &found, err);
+    if (!s && result) *result = found;
     sdm_free(used);
     return s;
 }

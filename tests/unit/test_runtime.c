@@ -18,6 +18,8 @@
 
 enum { N = 17, VOXELS = N * N * N, RINGS = 48, SECTORS = 96 };
 
+#define UNLUCKY 0.123 // a bulge for which there is no mesh
+
 static double ball(const double *p) { return p[0] + 0.1 * p[1]; }
 
 // ---- the shape: a fine sphere, allowed in a wider range than the network knows
@@ -27,6 +29,7 @@ static int mesh_ball(const void *self, const sdm_host *host, const sdm_option_va
 {
     (void)self;
     const double r = ball(p) * options[0].number, pi = acos(-1.0);
+    if (p[1] == UNLUCKY) return (host->fail)(host, "an unlucky number"); // fail is also a macro of cmocka
     const int failed = host->reserve(host, out, 2 + (RINGS - 1) * SECTORS, 2 * (RINGS - 1) * SECTORS);
     if (failed) return failed;
     double *v = out->vert;
@@ -92,20 +95,21 @@ static sdm_model *model_of(const char *second_name)
                                .n_terms = sdm_poly_count(2, 1),
                                .n_inputs = sdm_poly_count(2, 1) - 1,
                                .n_voxels = VOXELS,
-                               .n_blocks = sdm_pod_block_count(&info.grid, 8)};
+                               .levels = sdm_pod_count(&info.grid, 8, 1)};
+    const size_t n_blocks = spec.arch.levels.first[1];
     spec.arch.n_latent = spec.arch.n_terms + spec.arch.width;
-    spec.arch.n_coefficients = spec.arch.n_blocks;
-    sdm_pod_blocks(&info.grid, 8, blocks);
-    for (uint32_t b = 0; b < spec.arch.n_blocks; b++) blocks[b].rank = 1, blocks[b].coefficient = b;
+    spec.arch.n_coefficients = n_blocks;
+    sdm_pod_blocks(&info.grid, 8, &spec.arch.levels, blocks);
+    for (uint32_t b = 0; b < n_blocks; b++) blocks[b].rank = 1, blocks[b].coefficient = b;
     // phi of the two parameters alone, to find which term is which and how it is scaled
     uint8_t table[6];
     float phi[3];
     sdm_poly_table(2, 1, table);
     sdm_poly_eval(table, 3, 2, 1, (const double[]){1, 1}, phi, NULL);
     static float head[64 * 16], map[VOXELS], mean[VOXELS], basis[VOXELS], zero[64];
-    assert_true(spec.arch.n_blocks <= 64 && spec.arch.n_latent <= 16);
+    assert_true(n_blocks <= 64 && spec.arch.n_latent <= 16);
     memset(head, 0, sizeof head);
-    for (size_t b = 0; b < spec.arch.n_blocks; b++)
+    for (size_t b = 0; b < n_blocks; b++)
         for (size_t t = 0; t < 3; t++)
             head[b * spec.arch.n_latent + t] = table[2 * t] ? -0.25f / phi[t] : table[2 * t + 1] ? -0.1f / phi[t] : 0;
     for (int i = 0; i < VOXELS; i++) {
@@ -114,7 +118,7 @@ static sdm_model *model_of(const char *second_name)
         map[i] = (float)(sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]) - 1.25);
         basis[i] = 1;
     }
-    sdm_pod_gather(&info.grid, blocks, spec.arch.n_blocks, map, mean);
+    sdm_pod_gather(&info.grid, blocks, n_blocks, map, mean);
     spec.weights = (sdm_pod_weights){.layer = {zero}, .bias = {zero}, .head = head, .mean = mean, .basis = basis};
     uint8_t *bytes = NULL;
     size_t size;
@@ -216,6 +220,136 @@ static void test_policies(void **state)
     }
 }
 
+// out of the range by one rounding or by far: never answered in silence
+static void test_ends_of_range(void **state)
+{
+    const scene *s = *state;
+    static float values[VOXELS], at_end[VOXELS], exact_map[VOXELS];
+    sdm_result result;
+    sdm_error err;
+    const double ends[] = {1.0, 1.5}, outside[] = {nextafter(1.0, 0), nextafter(1.5, 2)}, far[] = {-1e300, 1e300};
+    const sdm_generate_opts clamp = {.policy = SDM_RANGE_CLAMP},
+                            exact = {.policy = SDM_RANGE_EXACT, .exact_shape = s->shape};
+    for (int i = 0; i < 2; i++) {
+        const double end[] = {ends[i], 1}, out[] = {outside[i], 1}, away[] = {far[i], 1};
+        assert_int_equal(sdm_generate(s->model, end, NULL, at_end, &result, &err), SDM_OK);
+        assert_true(!result.clamped && result.source == SDM_SOURCE_NETWORK && result.reason == SDM_REASON_NONE);
+        assert_int_equal(sdm_generate(s->model, out, NULL, values, &result, &err), SDM_E_RANGE);
+        assert_int_equal(sdm_generate(s->model, away, NULL, values, &result, &err), SDM_E_RANGE);
+        assert_int_equal(sdm_generate(s->model, out, &clamp, values, &result, &err), SDM_OK);
+        assert_true(result.clamped && result.source == SDM_SOURCE_NETWORK && result.reason == SDM_REASON_NONE);
+        assert_memory_equal(values, at_end, sizeof values);
+        memset(values, 0, sizeof values);
+        assert_int_equal(sdm_generate(s->model, away, &clamp, values, &result, &err), SDM_OK);
+        assert_true(result.clamped);
+        assert_memory_equal(values, at_end, sizeof values);
+        assert_int_equal(sdm_generate(s->model, out, &exact, values, &result, &err), SDM_OK);
+        assert_true(!result.clamped && result.source == SDM_SOURCE_EXACT && result.reason == SDM_REASON_RANGE);
+        const sdm_grid *g = &sdm_model_get_info(s->model)->grid;
+        assert_int_equal(sdm_exact_shape_map(s->shape, out, NULL, g, exact_map, NULL, &err), SDM_OK);
+        assert_memory_equal(values, exact_map, sizeof values);
+        assert_int_equal(sdm_generate(s->model, away, &exact, values, &result, &err), SDM_E_RANGE);
+    }
+}
+
+// how far the flat quads of the unit ball lie below it, at most about
+static double sagitta(void) { return 2 - cos(acos(-1) / 2 / RINGS) - cos(acos(-1) / SECTORS); }
+
+// the network is the ideal ball, the mesh lies in it, so the network's distance is too small
+static void test_checked(void **state)
+{
+    const scene *s = *state;
+    static float values[VOXELS], exact_map[VOXELS];
+    sdm_result result;
+    sdm_error err;
+    const double p[] = {1.3, 0.5};
+    const double most = ball(p) * sagitta();
+    sdm_generate_opts o = {.exact_shape = s->shape, .check = true};
+    assert_int_equal(sdm_generate(s->model, p, &o, values, &result, &err), SDM_OK);
+    assert_true(result.checked && result.source == SDM_SOURCE_NETWORK && result.check.used == SDM_CHECK_POINTS);
+    assert_true(result.check.max_mm < most && result.check.max_mm > 0.5 * most && result.check.bias_mm < 0);
+    assert_true(error_of(values, ball(p)) < 1e-5);
+
+    const sdm_check_stat stats[] = {SDM_CHECK_MAX, SDM_CHECK_Q95, SDM_CHECK_RMSE, SDM_CHECK_MEAN};
+    const sdm_check c = result.check;
+    const double figures[] = {c.max_mm, c.q95_mm, c.rmse_mm, c.mean_mm};
+    assert_int_equal(sdm_exact_shape_map(s->shape, p, NULL, &sdm_model_get_info(s->model)->grid, exact_map, NULL, &err),
+                     SDM_OK);
+    for (int i = 0; i < 4; i++) {
+        o = (sdm_generate_opts){.exact_shape = s->shape, .max_error_mm = 1.001 * figures[i], .max_error_of = stats[i]};
+        assert_int_equal(sdm_generate(s->model, p, &o, values, &result, &err), SDM_OK);
+        assert_true(result.checked && result.reason == SDM_REASON_NONE);
+        // a little too bad: an error with everything written, or the exact map
+        o.max_error_mm = 0.999 * figures[i];
+        memset(values, 0, sizeof values);
+        result = (sdm_result){0};
+        assert_int_equal(sdm_generate(s->model, p, &o, values, &result, &err), SDM_E_QUALITY);
+        assert_non_null(strstr(err.text, sdm_check_stat_name(stats[i])));
+        assert_true(result.checked && result.source == SDM_SOURCE_NETWORK && error_of(values, ball(p)) < 1e-5);
+        assert_memory_equal(&result.check, &c, sizeof c);
+        o.policy = SDM_RANGE_EXACT;
+        assert_int_equal(sdm_generate(s->model, p, &o, values, &result, &err), SDM_OK);
+        assert_true(result.checked && result.source == SDM_SOURCE_EXACT && result.reason == SDM_REASON_ERROR);
+        assert_true(result.error_mm == 0 && result.check.max_mm == c.max_mm);
+        assert_memory_equal(values, exact_map, sizeof values);
+    }
+}
+
+// a surface that is nowhere in the grid gives no figure, and none is not good enough
+static void test_nothing_to_check(void **state)
+{
+    const scene *s = *state;
+    static float values[VOXELS];
+    sdm_result result;
+    sdm_error err;
+    sdm_instance *large = NULL;
+    const double p[] = {1.3, 0.5};
+    const sdm_named_text scale = {"scale", "10"};
+    assert_int_equal(sdm_instance_create(&ball_shape, &scale, 1, NULL, &large, &err), SDM_OK);
+    const sdm_generate_opts o = {.exact_shape = large, .max_error_mm = 1e6};
+    assert_int_equal(sdm_generate(s->model, p, &o, values, &result, &err), SDM_E_QUALITY);
+    assert_true(result.checked && result.check.used == 0 && isnan(result.check.max_mm));
+    sdm_instance_free(large);
+}
+
+// radii near 1 pass the bound, larger ones do not: every map by its own figures, for every number of threads
+static void test_checked_batch(void **state)
+{
+    const scene *s = *state;
+    enum { MAPS = 7 };
+    static float values[MAPS * VOXELS], first[MAPS * VOXELS];
+    const double p[2 * MAPS] = {1.0, -1, 1.5, 1, 1.02, -1, 1.6, 0, 1.49, 1, 1.01, -1, 1.48, 0.9};
+    const sdm_source source[MAPS] = {0, 1, 0, 1, 1, 0, 1};
+    const sdm_reason reason[MAPS] = {0, 2, 0, 1, 2, 0, 2};
+    sdm_result results[MAPS];
+    sdm_error err;
+    const double most = 1.25 * sagitta();
+    sdm_generate_opts o = {.policy = SDM_RANGE_EXACT, .exact_shape = s->shape, .max_error_mm = 0.9 * most};
+    for (o.n_threads = 1; o.n_threads <= 3; o.n_threads++) {
+        if (sdm_generate_batch(s->model, p, MAPS, &o, values, results, &err)) fail_msg("%s", err.text);
+        if (o.n_threads == 1) memcpy(first, values, sizeof first);
+        assert_memory_equal(values, first, sizeof first);
+        for (int i = 0; i < MAPS; i++) {
+            assert_int_equal(results[i].source, source[i]);
+            assert_int_equal(results[i].reason, reason[i]);
+            assert_int_equal(results[i].checked, reason[i] != SDM_REASON_RANGE);
+        }
+        // without the exact engine the first bad one is named, whatever the order of the threads
+        sdm_generate_opts refuse = o;
+        refuse.policy = SDM_RANGE_CLAMP;
+        assert_int_equal(sdm_generate_batch(s->model, p, MAPS, &refuse, values, results, &err), SDM_E_QUALITY);
+        assert_non_null(strstr(err.text, "map 1 of 7: "));
+        for (int i = 0; i < MAPS; i++) assert_true(results[i].checked && results[i].source == SDM_SOURCE_NETWORK);
+        // a check that cannot be made is worse than a bad map, the first of these too
+        double q[2 * MAPS];
+        memcpy(q, p, sizeof q);
+        q[2 * 3 + 1] = q[2 * 5 + 1] = UNLUCKY;
+        assert_int_equal(sdm_generate_batch(s->model, q, MAPS, &refuse, values, results, &err), SDM_E_PLUGIN);
+        assert_non_null(strstr(err.text, "map 3 of 7: "));
+        assert_non_null(strstr(err.text, "an unlucky number"));
+    }
+}
+
 enum { BATCH = 53 };
 
 static void batch_params(double *p)
@@ -280,6 +414,15 @@ static void test_short_memory(void **state)
         assert_int_equal(t, SDM_E_NOMEM);
     }
     assert_true(n > 1 && n < 20);
+    const sdm_generate_opts checked = {.exact_shape = s->shape, .n_threads = 1, .check = true};
+    for (n = 1;; n++) {
+        sdm_alloc_fail_after(n);
+        const sdm_status t = sdm_generate(s->model, p, &checked, values, NULL, &err);
+        sdm_alloc_fail_after(0);
+        if (!t) break;
+        assert_int_equal(t, SDM_E_NOMEM);
+    }
+    assert_true(n > 10 && n < 1000);
     for (n = 1;; n++) {
         sdm_alloc_fail_after(n);
         const sdm_status t = sdm_generate_jacobian(s->model, p, NULL, values, jacobian, NULL, &err);
@@ -338,7 +481,54 @@ static void test_jacobian(void **state)
                             exact = {.policy = SDM_RANGE_EXACT, .exact_shape = s->shape};
     assert_int_equal(sdm_generate_jacobian(s->model, far, &clamp, values, jacobian, &result, &err), SDM_OK);
     assert_true(result.clamped && error_of(values, ball(edge)) < 1e-5);
-    assert_int_equal(sdm_generate_jacobian(s->model, p, &exact, values, jacobian, &result, &err), SDM_E_UNSUPPORTED);
+    // the exact engine's, out of the range or over the bound; a ball of flat triangles
+    static float again[VOXELS];
+    assert_int_equal(sdm_generate_jacobian(s->model, p, &exact, values, jacobian, &result, &err), SDM_OK);
+    assert_int_equal(result.source, SDM_SOURCE_NETWORK);
+    const sdm_generate_opts strict = {.policy = SDM_RANGE_EXACT, .exact_shape = s->shape, .max_error_mm = 1e-6};
+    const double *const at[] = {far, p};
+    for (int k = 0; k < 2; k++) {
+        memset(jacobian, 0, sizeof jacobian);
+        assert_int_equal(sdm_generate_jacobian(s->model, at[k], k ? &strict : &exact, values, jacobian, &result, &err),
+                         SDM_OK);
+        assert_true(result.source == SDM_SOURCE_EXACT && result.reason == (k ? SDM_REASON_ERROR : SDM_REASON_RANGE));
+        assert_int_equal(sdm_generate(s->model, at[k], k ? &strict : &exact, again, NULL, &err), SDM_OK);
+        assert_memory_equal(values, again, sizeof values);
+        for (int i = 0; i < VOXELS; i++)
+            assert_true(fabs((double)jacobian[i] + 1) < 5e-3 && fabs((double)jacobian[VOXELS + i] + 0.1) < 5e-4);
+    }
+    const sdm_generate_opts bound = {.exact_shape = s->shape, .max_error_mm = 1e-6};
+    assert_int_equal(sdm_generate_jacobian(s->model, p, &bound, values, jacobian, &result, &err), SDM_E_QUALITY);
+    assert_true(result.checked);
+}
+
+// products with the Jacobian, which is -1 and -0.1 in every voxel; of the exact engine outside the range
+static void test_products(void **state)
+{
+    const scene *s = *state;
+    static float values[VOXELS], tangent[VOXELS], adjoint[VOXELS];
+    double gradient[2], sum = 0;
+    sdm_result result;
+    sdm_error err;
+    const double p[] = {1.1, 0.4}, far[] = {1.7, 0.4}, direction[] = {0.5, -2};
+    const sdm_generate_opts exact = {.policy = SDM_RANGE_EXACT, .exact_shape = s->shape};
+    for (int i = 0; i < VOXELS; i++) sum += (double)(adjoint[i] = (float)(i % 7) - 2);
+    for (int k = 0; k < 2; k++) {
+        const double *at = k ? far : p, loose = k ? 5e-3 : 1e-5;
+        const sdm_source source = k ? SDM_SOURCE_EXACT : SDM_SOURCE_NETWORK;
+        assert_int_equal(sdm_generate_jvp(s->model, at, direction, &exact, values, tangent, &result, &err), SDM_OK);
+        assert_true(result.source == source && error_of(values, ball(at)) < (k ? 2e-2 : 1e-5));
+        for (int i = 0; i < VOXELS; i++) assert_true(fabs((double)tangent[i] + 0.3) < loose);
+        assert_int_equal(sdm_generate_vjp(s->model, at, adjoint, &exact, gradient, &result, &err), SDM_OK);
+        assert_true(result.source == source);
+        assert_true(fabs(gradient[0] + sum) < loose * sum && fabs(gradient[1] + 0.1 * sum) < loose * sum);
+    }
+    assert_int_equal(sdm_generate_jvp(s->model, far, direction, NULL, values, tangent, &result, &err), SDM_E_RANGE);
+    assert_int_equal(sdm_generate_vjp(s->model, far, adjoint, NULL, gradient, &result, &err), SDM_E_RANGE);
+    const sdm_generate_opts bound = {.exact_shape = s->shape, .max_error_mm = 1e-6};
+    assert_int_equal(sdm_generate_jvp(s->model, p, direction, &bound, values, tangent, &result, &err), SDM_E_QUALITY);
+    assert_int_equal(sdm_generate_jvp(s->model, p, NULL, NULL, values, tangent, &result, &err), SDM_E_ARG);
+    assert_int_equal(sdm_generate_vjp(s->model, p, NULL, NULL, gradient, &result, &err), SDM_E_ARG);
 }
 
 static void test_instance(void **state)
@@ -393,6 +583,15 @@ static void test_misuse(void **state)
                      SDM_E_ARG);
     assert_int_equal(sdm_generate(s->model, p, &(sdm_generate_opts){.policy = SDM_RANGE_EXACT}, values, NULL, &err),
                      SDM_E_ARG);
+    const double bounds[] = {-1, NAN, INFINITY};
+    for (int i = 0; i < 3; i++) {
+        const sdm_generate_opts o = {.exact_shape = s->shape, .max_error_mm = bounds[i]};
+        assert_int_equal(sdm_generate(s->model, p, &o, values, NULL, &err), SDM_E_ARG);
+    }
+    const sdm_generate_opts stat = {.exact_shape = s->shape, .max_error_mm = 1, .max_error_of = (sdm_check_stat)4};
+    assert_int_equal(sdm_generate(s->model, p, &stat, values, NULL, &err), SDM_E_ARG);
+    assert_int_equal(sdm_generate(s->model, p, &(sdm_generate_opts){.check = true}, values, NULL, &err), SDM_E_ARG);
+    assert_non_null(strstr(err.text, "sdm_runtime_instance()"));
     assert_int_equal(sdm_generate_batch(s->model, p, SIZE_MAX / 8, NULL, values, NULL, &err), SDM_E_NOMEM);
     assert_int_equal(sdm_generate_jacobian(s->model, p, NULL, values, NULL, NULL, &err), SDM_E_ARG);
     assert_int_equal(sdm_runtime_instance(NULL, s->registry, &made, &err), SDM_E_ARG);
@@ -403,9 +602,13 @@ static void test_misuse(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_generate), cmocka_unit_test(test_policies),        cmocka_unit_test(test_batch),
-        cmocka_unit_test(test_jacobian), cmocka_unit_test(test_short_memory),    cmocka_unit_test(test_many_callers),
-        cmocka_unit_test(test_instance), cmocka_unit_test(test_exact_shape_map), cmocka_unit_test(test_misuse),
+        cmocka_unit_test(test_generate),        cmocka_unit_test(test_policies),
+        cmocka_unit_test(test_batch),           cmocka_unit_test(test_jacobian),
+        cmocka_unit_test(test_products),        cmocka_unit_test(test_short_memory),
+        cmocka_unit_test(test_many_callers),    cmocka_unit_test(test_instance),
+        cmocka_unit_test(test_exact_shape_map), cmocka_unit_test(test_misuse),
+        cmocka_unit_test(test_ends_of_range),   cmocka_unit_test(test_checked),
+        cmocka_unit_test(test_checked_batch),   cmocka_unit_test(test_nothing_to_check),
     };
     return cmocka_run_group_tests(tests, open_scene, close_scene);
 }

@@ -41,6 +41,18 @@ typedef struct sdm_picture_map {
 SDM_API sdm_status sdm_picture_slices(const char *path, const sdm_grid *grid, const sdm_picture_map *maps,
                                       size_t n_maps, const float *levels, size_t n_levels, sdm_error *err);
 
+/* One surface of a picture. */
+typedef struct sdm_picture_surface {
+    const char *title;
+    const sdm_mesh *mesh;
+    const double *values; /* [n_vert] mm, shown in colours from -max to max of all surfaces; NULL: one plain colour */
+} sdm_picture_surface;
+
+/* PNG: the surfaces side by side, each from +z and obliquely, shaded, to one scale, with a colour bar of `caption` under those that have
+   values. The audit's errors; SDM_E_ARG for other than 1 to 8 surfaces. Atomic. */
+SDM_API sdm_status sdm_picture_surfaces(const char *path, const sdm_picture_surface *surfaces, size_t n,
+                                        const char *caption, sdm_error *err);
+
 /* One curve of a plot. */
 typedef struct sdm_curve {
     const char *title;

@@ -2,9 +2,8 @@
 #ifndef SDM_RUNTIME_H
 #define SDM_RUNTIME_H
 
-#include "sdm/exact.h"
+#include "sdm/check.h"
 #include "sdm/model.h"
-#include "sdm/registry.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -19,33 +18,64 @@ typedef enum sdm_range_policy {
 
 typedef enum sdm_source { SDM_SOURCE_NETWORK = 0, SDM_SOURCE_EXACT = 1 } sdm_source;
 
+/* Why the exact engine made a map. */
+typedef enum sdm_reason {
+    SDM_REASON_NONE = 0,
+    SDM_REASON_RANGE = 1, /* a parameter outside the trained range */
+    SDM_REASON_ERROR = 2  /* the network's map was over max_error_mm */
+} sdm_reason;
+
 /* How one map was made. */
 typedef struct sdm_result {
     sdm_source source;
-    bool clamped;    /* a parameter was moved */
-    double error_mm; /* RMSE to expect: held-out RMSE of the network; 0 for the exact engine */
+    bool clamped;      /* a parameter was moved */
+    double error_mm;   /* RMSE to expect: held-out RMSE of the network; 0 for the exact engine */
+    sdm_reason reason; /* of the exact engine */
+    bool checked;      /* check is filled */
+    sdm_check check;   /* errors found in the network's map, also when it was replaced */
 } sdm_result;
 
+/* Zero-initialise; grows at its end only. */
 typedef struct sdm_generate_opts {
     sdm_range_policy policy;
-    const sdm_instance *exact_shape; /* for SDM_RANGE_EXACT: sdm_runtime_instance() or the caller's; else NULL */
-    int n_threads;                   /* 0: the OpenMP default; same bits for every value */
+    const sdm_instance
+        *exact_shape; /* for SDM_RANGE_EXACT and checks: sdm_runtime_instance() or the caller's; else NULL */
+    int n_threads;    /* 0: the OpenMP default; same bits for every value */
+    bool check;       /* every map of the network is checked: sdm_check_map() */
+    double
+        max_error_mm; /* > 0: checks; a worse map is replaced under SDM_RANGE_EXACT, else SDM_E_QUALITY; 0: no bound */
+    sdm_check_stat max_error_of; /* the figure that max_error_mm bounds */
 } sdm_generate_opts;
 
 /* One map: values[nz][ny][nx], mm, negative inside, written at the voxels of the model's grid. params[n_params] in the model's order.
    opts, result may be NULL. SDM_E_RANGE names the parameter, its value and the range (NaN and infinities always fail).
-   [any thread] */
+   SDM_E_QUALITY: over max_error_mm; values and result are written all the same. [any thread] */
 SDM_API sdm_status sdm_generate(const sdm_model *m, const double *params, const sdm_generate_opts *opts, float *values,
                                 sdm_result *result, sdm_error *err);
 
 /* A batch: params[n][n_params] -> values[n][nz][ny][nx], results[n] (may be NULL). All or nothing: parameters of all are checked
-   before the first is computed; the message says which one failed. [any thread] */
+   before the first is computed; the message says which one failed. SDM_E_QUALITY: all are written, the message names the first
+   that is over max_error_mm. [any thread] */
 SDM_API sdm_status sdm_generate_batch(const sdm_model *m, const double *params, size_t n, const sdm_generate_opts *opts,
                                       float *values, sdm_result *results, sdm_error *err);
 
-/* Map and derivatives: jacobian[n_params][nz][ny][nx], mm per unit. Network only: out-of-range parameters are refused or clamped. */
+/* Map and derivatives: jacobian[n_params][nz][ny][nx], mm per unit; of the network, or by sdm_exact_shape_jacobian() where the exact
+   engine makes the map. At clamped parameters they are the network's at the end of the range. Errors as above, SDM_E_PLUGIN as there.
+   [any thread] */
 SDM_API sdm_status sdm_generate_jacobian(const sdm_model *m, const double *params, const sdm_generate_opts *opts,
                                          float *values, float *jacobian, sdm_result *result, sdm_error *err);
+
+/* Map and derivative along direction[n_params]: tangent[nz][ny][nx] = J direction, mm, cheaper than the Jacobian; otherwise the same.
+   [any thread] */
+SDM_API sdm_status sdm_generate_jvp(const sdm_model *m, const double *params, const double *direction,
+                                    const sdm_generate_opts *opts, float *values, float *tangent, sdm_result *result,
+                                    sdm_error *err);
+
+/* gradient[n_params] = J^T adjoint[nz][ny][nx]: the derivative of any function of the map from its derivative by the voxels, at the cost
+   of about one map. There is no map, so `check` and `max_error_mm` do nothing; otherwise as sdm_generate_jacobian(). [any thread] */
+SDM_API sdm_status sdm_generate_vjp(const sdm_model *m, const double *params, const float *adjoint,
+                                    const sdm_generate_opts *opts, double *gradient, sdm_result *result,
+                                    sdm_error *err);
 
 /* The shape the model was trained on, with its options, from a registry that knows it; checks that the parameters agree.
    SDM_E_PLUGIN when the registry does not have it. */

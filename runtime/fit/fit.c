@@ -1,0 +1,292 @@
+/* The fit from beginning to end. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "check.h"
+#include "evidence.h"
+#include "posterior.h"
+#include "sdm/memory.h"
+#include "search.h"
+
+// the region follows the shape so many times at most
+#define REGIONS_MOST 6
+// voxels at most, before only every second one along each axis is taken
+#define SITES_MOST 2e6
+
+sdm_fit_opts sdm_fit_defaults(void)
+{
+    return (sdm_fit_opts){
+        .image_model = SDM_FIT_PARTIAL_VOLUME,
+        .l_ref = 0.2,
+        .blur = 0.2,
+        .appearance = {.n_inside = 1,
+                       .n_outside = 2,
+                       .inside = {{.weight = 1, .mean = 40, .sd = 170}},
+                       .outside = {{.weight = 0.9, .mean = 1300, .sd = 270}, {.weight = 0.1, .mean = -880, .sd = 150}}},
+        .point_sd = 0.1,
+        .point_dof = 4,
+        .n_turns = 1,
+        .prior_sd = 1,
+        .margin = 1.5,
+        .least_inside = 0.5,
+        .max_iterations = 60,
+        .max_polish_iterations = 0,
+        .eps = 1e-4,
+        .polish_eps = 1e-6,
+    };
+}
+
+void sdm_fit_dispose(sdm_fit_result *r)
+{
+    sdm_free(r->params);
+    sdm_free(r->covariance);
+    sdm_free(r->sd);
+    sdm_free(r->correlation);
+    sdm_free(r->at_bound);
+    sdm_free(r->objective);
+    *r = (sdm_fit_result){0};
+}
+
+static sdm_status make_result(size_t n, sdm_fit_result *out, sdm_error *err)
+{
+    const size_t size = n + 6;
+    out->n_params = n;
+    sdm_status s = SDM_ALLOC(&out->params, n, "result of the fit", err);
+    if (!s) s = SDM_ALLOC(&out->covariance, size * size, "result of the fit", err);
+    if (!s) s = SDM_ALLOC(&out->sd, size, "result of the fit", err);
+    if (!s) s = SDM_ALLOC(&out->correlation, size * size, "result of the fit", err);
+    if (!s) s = SDM_ALLOC(&out->at_bound, n, "result of the fit", err);
+    return s;
+}
+
+static void dispose_problem(fit_problem *p)
+{
+    sdm_fit_maps_dispose(&p->maps);
+    sdm_fit_sites_dispose(&p->sites);
+    sdm_fit_sums_dispose(&p->sums);
+    sdm_fit_sums_dispose(&p->trial);
+    sdm_free(p->objective);
+}
+
+static sdm_status start_params(fit_problem *p, bool *clamped, sdm_error *err)
+{
+    const sdm_fit_source *source = p->source;
+    for (size_t k = 0; k < p->n_params; k++) {
+        const char *name;
+        sdm_fit_bounds(source, k, &p->low[k], &p->high[k], &name);
+        double x;
+        if (p->opts->start_params) {
+            x = p->opts->start_params[k];
+        } else if (source->model) {
+            x = sdm_model_get_info(source->model)->params[k].def;
+        } else {
+            size_t n;
+            x = sdm_instance_params(source->shape, &n)[k].def;
+        }
+        const double near = fmin(fmax(x, p->low[k]), p->high[k]);
+        if (!isfinite(x) || (x != near && source->policy != SDM_RANGE_CLAMP))
+            return sdm_fail(err, SDM_E_RANGE, "start of %s = %.9g, need %.9g to %.9g", name, x, p->low[k], p->high[k]);
+        if (x != near) *clamped = true;
+        p->state.params[k] = near;
+    }
+    return SDM_OK;
+}
+
+static sdm_status begin(fit_problem *p, sdm_fit_result *out, sdm_error *err)
+{
+    const sdm_fit_opts *o = p->opts;
+    const bool share = p->target->kind == SDM_FIT_IMAGE && o->image_model == SDM_FIT_PARTIAL_VOLUME;
+    sdm_status s = start_params(p, &out->start_clamped, err);
+    if (!s) s = sdm_fit_maps_create(p->source, share, o, &p->maps, err);
+    if (s) return s;
+    sdm_pose_matrix(&o->start_pose, p->state.rotation);
+    memcpy(p->state.translation, o->start_pose.translation, sizeof p->state.translation);
+    p->state.look = o->appearance;
+    p->state.blur = fmax(o->blur, p->maps.least_blur);
+    p->state.l_ref = o->l_ref;
+    p->state.point_sd = o->point_sd;
+    p->prior = p->state;
+    const size_t tissues = share ? o->appearance.n_inside + o->appearance.n_outside : 0;
+    s = sdm_fit_sums_create(fit_columns(p->n_params) + tissues, &p->sums, err);
+    if (!s) s = sdm_fit_sums_create(fit_columns(p->n_params) + tissues, &p->trial, err);
+    if (!s) s = sdm_fit_maps_at(&p->maps, p->state.params, err);
+    if (!s) s = sdm_fit_extent(&p->maps, &p->extent, err);
+    memcpy(p->maps_at, p->state.params, sizeof p->maps_at);
+    p->packed_blur = NAN;
+    return s;
+}
+
+// the voxels about the shape where it is now
+static sdm_status follow(fit_problem *p, bool *changed, sdm_error *err)
+{
+    fit_region region = {.radius = 1.5 * p->extent.reach + p->opts->margin,
+                         .follow = &p->maps,
+                         .state = &p->state,
+                         .margin = p->opts->margin};
+    sdm_fit_to_world(&p->state, p->extent.centre, region.centre);
+    sdm_status s = SDM_OK;
+    for (p->stride = 1;; p->stride *= 2) {
+        s = sdm_fit_sites_choose(p->target, p->opts, &region, p->stride, &p->sites, changed, err);
+        if (s || p->target->kind == SDM_FIT_POINTS || (double)p->sites.n <= SITES_MOST) return s;
+    }
+}
+
+// iterates until neither the state nor the region changes
+static sdm_status settle(fit_problem *p, fit_run *run, fit_ended *ended, sdm_error *err)
+{
+    const size_t most = run->max_iterations, before = p->n_iterations;
+    sdm_status s = SDM_OK;
+    for (int round = 0; round < REGIONS_MOST && !s; round++) {
+        bool changed;
+        s = sdm_fit_look(p, err); // maps of the state
+        if (!s) s = follow(p, &changed, err);
+        if (s || (!changed && round > 0)) return s;
+        if (!p->sites.n) return sdm_fail(err, SDM_E_QUALITY, "the shape has left the image: no voxel near it is left");
+        const size_t used = p->n_iterations - before;
+        if (used >= most) {
+            ended->converged = false;
+            return sdm_fit_look(p, err); // samples of the region
+        }
+        run->max_iterations = most - used;
+        s = sdm_fit_iterate(p, run, ended, err);
+    }
+    return s;
+}
+
+static sdm_status climb(fit_problem *p, sdm_fit_result *out, sdm_error *err)
+{
+    const sdm_fit_opts *o = p->opts;
+    const double blur = p->state.blur, from = sdm_fit_seconds();
+    sdm_status s = sdm_fit_search(p, &out->turn, err);
+    out->seconds_search = sdm_fit_seconds() - from;
+    if (s) return s;
+    p->state.blur = blur;
+    p->state.l_ref = o->l_ref;
+    p->state.point_sd = o->point_sd;
+    fit_run run = {.phase = SDM_FIT_MAIN,
+                   .keep_params = o->keep_params,
+                   .keep_pose = o->keep_pose,
+                   .keep_blur = o->keep_blur,
+                   .keep_look = o->keep_appearance,
+                   .max_iterations = o->max_iterations,
+                   .eps = p->source->model ? o->eps : fmin(o->eps, o->polish_eps)};
+    fit_ended ended = {0};
+    s = settle(p, &run, &ended, err);
+    const char *what = p->source->model ? "fit" : "fit with exact maps";
+    if (!s && ended.converged && p->source->model && p->source->shape && o->max_polish_iterations) {
+        p->maps.exact = true;
+        p->maps_at[0] = NAN;
+        run.phase = SDM_FIT_POLISH;
+        run.max_iterations = o->max_polish_iterations;
+        run.eps = o->polish_eps;
+        what = "polish with exact maps";
+        s = settle(p, &run, &ended, err);
+    }
+    out->converged = !s && ended.converged;
+    snprintf(out->reason, sizeof out->reason,
+             out->converged ? "%s: last step %.2g, below %g" : "%s stopped: last step %.2g, not below %g", what,
+             ended.step, run.eps);
+    return s;
+}
+
+static void report(fit_problem *p, sdm_fit_result *out)
+{
+    const fit_state *s = &p->state;
+    for (size_t k = 0; k < p->n_params; k++) {
+        out->params[k] = s->params[k];
+        out->at_bound[k] = s->params[k] <= p->low[k] || s->params[k] >= p->high[k];
+    }
+    sdm_rotation_vector(s->rotation, out->pose.rotation);
+    memcpy(out->pose.translation, s->translation, sizeof out->pose.translation);
+    out->n_exact_outside = p->maps.n_outside;
+    out->n_iterations = p->n_iterations;
+    out->objective = p->objective;
+    p->objective = NULL;
+    out->log_likelihood = p->sums.log_likelihood;
+    out->n_used = p->sites.n;
+    out->n_nan = p->sites.n_nan;
+    out->blur = p->maps.share ? s->blur : 0;
+    out->appearance = s->look;
+    out->point_sd = p->target->kind == SDM_FIT_POINTS ? s->point_sd : 0;
+    out->n_network = p->maps.n_network;
+    out->n_exact = p->maps.n_exact;
+    out->seconds_network = p->maps.seconds_network;
+    out->seconds_exact = p->maps.seconds_exact;
+}
+
+// mean of the mixture
+static double mean_of(const sdm_fit_law *law, size_t n)
+{
+    size_t most = 0;
+    for (size_t i = 1; i < n; i++)
+        if (law[i].weight > law[most].weight) most = i;
+    return law[most].mean;
+}
+
+// reasons not to believe a fit, the plainest first
+static sdm_status judge(const fit_problem *p, const sdm_fit_result *r, sdm_error *err)
+{
+    const sdm_fit_opts *o = p->opts;
+    const sdm_fit_appearance *a = &r->appearance, *b = &o->appearance;
+    if (p->target->kind == SDM_FIT_IMAGE) {
+        const double in = mean_of(a->inside, a->n_inside), out = mean_of(a->outside, a->n_outside);
+        const bool darker = mean_of(b->inside, b->n_inside) < mean_of(b->outside, b->n_outside);
+        if (!(r->evidence > 0))
+            return sdm_fail(err, SDM_E_QUALITY,
+                            "the image shows no such shape near the start: explaining it without one is better by %.3g "
+                            "(log-likelihood per independent voxel); check the start pose, and whether the inside is "
+                            "%s than the outside in this image",
+                            -r->evidence, darker ? "darker" : "brighter");
+        if ((in < out) != darker)
+            return sdm_fail(
+                err, SDM_E_QUALITY,
+                "the contrast is the opposite of the start's: inside %.4g, outside %.4g, but the start says "
+                "that the inside is %s; give laws of this kind of image",
+                in, out, darker ? "darker" : "brighter");
+    }
+    if (!(r->inside_share >= o->least_inside))
+        return sdm_fail(err, SDM_E_QUALITY, "only %.0f %% of the shape lies in the image, need %.0f %% (least_inside)",
+                        100 * r->inside_share, 100 * o->least_inside);
+    if (!r->converged)
+        return sdm_fail(err, SDM_E_QUALITY,
+                        "not converged after %zu iterations (%s); allow more of them, or give a nearer start",
+                        r->n_iterations, r->reason);
+    return SDM_OK;
+}
+
+static sdm_status finish(fit_problem *p, sdm_fit_result *out, sdm_error *err)
+{
+    sdm_status s = sdm_fit_posterior(p, out, err);
+    if (s && s != SDM_E_QUALITY) return s;
+    out->inside_share = sdm_fit_inside_share(p);
+    out->log_likelihood_without = out->evidence = NAN;
+    if (p->target->kind == SDM_FIT_IMAGE) {
+        const sdm_status found = sdm_fit_without_shape(p, &out->log_likelihood_without, err);
+        if (found) return found;
+        const double factor = fmax(out->noise_factor, 1), n = (double)p->sites.n / factor;
+        const double unknowns = (double)(p->n_params + 6);
+        out->evidence = (p->sums.log_likelihood - out->log_likelihood_without) / factor - 0.5 * unknowns * log(n);
+    }
+    report(p, out);
+    return s ? s : judge(p, out, err);
+}
+
+sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target, const sdm_fit_opts *opts,
+                   sdm_fit_result *out, sdm_error *err)
+{
+    if (!out) return sdm_fail(err, SDM_E_ARG, "fit: a place for the result is needed");
+    *out = (sdm_fit_result){0};
+    const double from = sdm_fit_seconds();
+    fit_problem p = {.source = source, .target = target, .opts = opts};
+    sdm_status s = sdm_fit_check_source(source, &p.n_params, err);
+    if (!s) s = sdm_fit_check(target, opts, err);
+    if (!s) s = make_result(p.n_params, out, err);
+    if (!s) s = begin(&p, out, err);
+    if (!s) s = climb(&p, out, err);
+    if (!s) s = finish(&p, out, err);
+    dispose_problem(&p);
+    out->seconds = sdm_fit_seconds() - from;
+    if (s && s != SDM_E_QUALITY) sdm_fit_dispose(out);
+    return s;
+}

@@ -1,0 +1,57 @@
+/* Iterations: from a state to the nearest maximum of the posterior. */
+#ifndef FIT_NEWTON_H
+#define FIT_NEWTON_H
+
+#include "solve.h"
+#include "sums.h"
+
+/* All of one fit. */
+typedef struct fit_problem {
+    const sdm_fit_source *source;
+    const sdm_fit_target *target;
+    const sdm_fit_opts *opts;
+    size_t n_params;
+    double low[FIT_PARAMS_MAX], high[FIT_PARAMS_MAX]; // bounds
+    fit_state prior;                                  // pose the priors are about
+    fit_extent extent;                                // of the shape at the start
+
+    fit_maps maps;
+    double maps_at[FIT_PARAMS_MAX], packed_blur; // what maps holds; NaN: nothing yet
+    fit_sites sites;
+    size_t stride; // every how many voxels of the image are sites
+    fit_laws laws;
+    fit_state state;
+    fit_sums sums, trial; // at the state, and at a state that is tried
+
+    double *objective; // [n_iterations]
+    size_t n_iterations, objective_capacity, n_steps;
+} fit_problem;
+
+/* What an iteration may change, and when it ends. */
+typedef struct fit_run {
+    sdm_fit_phase phase;
+    bool keep_params, keep_pose, keep_blur, keep_look;
+    size_t max_iterations;
+    double eps;
+} fit_run;
+
+typedef struct fit_ended {
+    bool converged;
+    double step; // the last
+} fit_ended;
+
+/* Maps, samples and sums at problem->state. */
+sdm_status sdm_fit_look(fit_problem *p, sdm_error *err);
+
+/* Log prior density, with its derivatives added where gradient and the matrices (may be NULL) are given. */
+double sdm_fit_prior(const fit_problem *p, const fit_state *s, double *gradient, double *complete, double *observed);
+
+/* Adds what nobody knows less than to an information matrix: wide Gaussians where there is no prior. */
+void sdm_fit_add_ignorance(const fit_problem *p, double *a);
+
+sdm_status sdm_fit_iterate(fit_problem *p, const fit_run *run, fit_ended *out, sdm_error *err);
+
+/* state moved by a step in all unknowns. */
+void sdm_fit_move(const fit_problem *p, const fit_state *from, const double *step, fit_state *to);
+
+#endif

@@ -1,0 +1,53 @@
+/* The voxels or points that are looked at, and the field of the shape there. */
+#ifndef FIT_SITES_H
+#define FIT_SITES_H
+
+#include "laws.h"
+#include "maps.h"
+
+/* Fixed number of parts in which sites are worked through: sums do not depend on the number of threads. */
+#define FIT_SLICES 64u
+
+typedef struct fit_sites {
+    size_t n, capacity, n_nan;
+    double *world; // [n][3] mm
+    float *value;  // [n]
+    size_t *voxel; // [n] place in the image
+    double *field; // [n]
+    size_t *slot;  // [n] place in columns, or SIZE_MAX: the field has no derivative that counts
+    size_t n_near, near_capacity, n_columns;
+    float *columns; // [n_near][n_columns]: derivatives of the field by parameters, rotation, translation, blur
+} fit_sites;
+
+/* Where the shape is on its map: middle, farthest inside voxel from there (mm), volume (mm^3). */
+typedef struct fit_extent {
+    double centre[3], reach, volume;
+} fit_extent;
+
+/* Of the distance that maps holds. SDM_E_QUALITY: nothing is inside. */
+sdm_status sdm_fit_extent(const fit_maps *maps, fit_extent *out, sdm_error *err);
+
+/* A region of the world. */
+typedef struct fit_region {
+    double centre[3], radius; // a ball
+    const fit_maps *follow;   // not NULL: also where the distance of the shape is at most margin
+    const fit_state *state;
+    double margin;
+} fit_region;
+
+/* Chooses the voxels of a region (every `stride`-th along each axis), or all points. *changed: they are not those that were there
+   before. SDM_E_FORMAT: an infinite value. */
+sdm_status sdm_fit_sites_choose(const sdm_fit_target *target, const sdm_fit_opts *opts, const fit_region *region,
+                                size_t stride, fit_sites *sites, bool *changed, sdm_error *err);
+void sdm_fit_sites_dispose(fit_sites *s);
+
+/* Field and columns at every site from the packed fields. */
+sdm_status sdm_fit_sites_sample(fit_sites *s, const fit_maps *maps, const fit_laws *laws, const fit_state *state,
+                                sdm_error *err);
+
+/* y = R^T (x - t). */
+void sdm_fit_to_shape(const fit_state *s, const double x[3], double y[3]);
+/* x = R y + t. */
+void sdm_fit_to_world(const fit_state *s, const double y[3], double x[3]);
+
+#endif

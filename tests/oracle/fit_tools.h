@@ -1,0 +1,103 @@
+/* What the tests of the fit begin with: a small ellipsoid, seen in phantoms; cmocka.h comes before. */
+#ifndef SDM_TEST_FIT_TOOLS_H
+#define SDM_TEST_FIT_TOOLS_H
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sdm/builtin_shapes.h"
+#include "sdm/fit.h"
+#include "sdm/phantom.h"
+#include "sdm/rng.h"
+
+static sdm_registry *registry;
+static sdm_instance *ellipsoid;
+
+static const double TRUTH[3] = {2.5, 1.8, 1.3};
+static const sdm_pose POSE = {{0.3, -0.2, 0.4}, {0.4, -0.3, 0.2}};
+
+static int set_up(void **state)
+{
+    (void)state;
+    return sdm_registry_create(&registry, NULL) || sdm_builtin_shapes_add(registry, NULL) ||
+           sdm_instance_create(sdm_registry_find(registry, "ellipsoid", NULL), &(sdm_named_text){"edge", "0.2"}, 1,
+                               NULL, &ellipsoid, NULL);
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    sdm_instance_free(ellipsoid);
+    sdm_registry_free(registry);
+    return 0;
+}
+
+static inline sdm_fit_source exact_source(void)
+{
+    return (sdm_fit_source){.shape = ellipsoid,
+                            .grid = sdm_grid_centred((int64_t[3]){30, 28, 26}, 0.25, (double[3]){0, 0, 0})};
+}
+
+/* Turned against the world, with voxels of three sizes. */
+static inline sdm_grid image_grid(void)
+{
+    sdm_grid g = sdm_grid_centred((int64_t[3]){36, 30, 26}, 0.25, (double[3]){0, 0, 0});
+    const double h[3] = {0.22, 0.25, 0.28}, middle[3] = {17.5, 14.5, 12.5}, centre[3] = {0.3, -0.2, 0.1};
+    double at[3];
+    memcpy(g.spacing, h, sizeof h);
+    sdm_pose_matrix(&(sdm_pose){{0.2, 0.1, -0.3}, {0, 0, 0}}, g.dir);
+    sdm_grid_world(&g, middle, at);
+    for (int k = 0; k < 3; k++) g.origin[k] += centre[k] - at[k];
+    return g;
+}
+
+/* A phantom of the ellipsoid; noise: share of the usual noise and texture. */
+static inline float *phantom(const double *p, const sdm_pose *pose, double noise, uint64_t seed)
+{
+    sdm_error err = {0};
+    const sdm_grid g = image_grid();
+    sdm_phantom_opts o = sdm_phantom_defaults();
+    for (int k = 0; k < 3; k++) o.blur[k] = 0.2;
+    o.inside.sd *= noise, o.outside.sd *= noise, o.noise *= noise;
+    o.texture_mm = 0.2;
+    o.seed = seed;
+    o.supersampling = 6;
+    float *values = calloc(sdm_grid_count(&g), sizeof *values);
+    if (!values) abort();
+    if (sdm_phantom_make(ellipsoid, p, pose, &o, &g, values, NULL, &err)) fail_msg("%s", err.text);
+    return values;
+}
+
+static inline sdm_fit_target image_of(const float *values)
+{
+    return (sdm_fit_target){.kind = SDM_FIT_IMAGE, .grid = image_grid(), .values = values};
+}
+
+static const double START[3] = {2.2, 2.0, 1.5};
+
+/* From some way off the truth. */
+static inline sdm_fit_opts near_start(void)
+{
+    sdm_fit_opts o = sdm_fit_defaults();
+    const sdm_pose off = {{0.1, 0.08, -0.1}, {0.2, 0.2, -0.2}};
+    o.start_params = START;
+    o.start_pose = sdm_pose_compose(&off, &POSE);
+    o.appearance.n_outside = 1;
+    return o;
+}
+
+/* Errors in the order of the covariance: parameters, small turn about the world's axes, translation. */
+static inline void errors(const sdm_fit_result *r, const double *p, const sdm_pose *pose, double *e)
+{
+    double a[9], b[9], m[9] = {0};
+    sdm_pose_matrix(&r->pose, a);
+    sdm_pose_matrix(pose, b);
+    for (int i = 0; i < 9; i++)
+        for (int k = 0; k < 3; k++) m[i] += a[3 * (i / 3) + k] * b[3 * (i % 3) + k];
+    for (size_t k = 0; k < r->n_params; k++) e[k] = r->params[k] - p[k];
+    sdm_rotation_vector(m, e + r->n_params);
+    for (size_t k = 0; k < 3; k++) e[r->n_params + 3 + k] = r->pose.translation[k] - pose->translation[k];
+}
+
+#endif

@@ -1,0 +1,275 @@
+/* Parts of the fit: derivatives against differences, smoothing and interpolation against closed forms, bounds, correlated noise. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "blur.h"
+#include "laws.h"
+#include "newton.h"
+#include "oracle/fit_tools.h"
+#include "sample.h"
+#include "solve.h"
+
+static void *room(size_t n, size_t size)
+{
+    void *p = calloc(n, size);
+    if (!p) abort();
+    return p;
+}
+
+// ---- laws
+
+static fit_laws laws_of(sdm_fit_kind kind, sdm_fit_model model, double dof)
+{
+    sdm_fit_opts o = sdm_fit_defaults();
+    o.image_model = model;
+    o.appearance.n_inside = 2;
+    o.appearance.inside[1] = (sdm_fit_law){.weight = 0.5, .mean = 300, .sd = 100, .dof = dof};
+    o.appearance.outside[0].dof = dof;
+    const fit_state s = {.l_ref = 0.3, .point_sd = 0.2, .look = o.appearance};
+    fit_laws l;
+    sdm_fit_laws_prepare(&o, kind, &s, &l);
+    return l;
+}
+
+static double log_likelihood(const fit_laws *l, double value, double field)
+{
+    fit_response r;
+    sdm_fit_respond(l, value, field, false, &r);
+    return r.log_likelihood;
+}
+
+static void close_to(double found, double wanted, double scale)
+{
+    if (!(fabs(found - wanted) <= 1e-5 * (fabs(wanted) + scale))) fail_msg("%.12g, wanted %.12g", found, wanted);
+}
+
+static void check_score(const fit_laws *l, double value, double field, double h)
+{
+    fit_response r;
+    sdm_fit_respond(l, value, field, true, &r);
+    close_to(r.log_likelihood, log_likelihood(l, value, field), 0);
+    close_to(r.score[0], (log_likelihood(l, value, field + h) - log_likelihood(l, value, field - h)) / (2 * h), 1e-2);
+    for (size_t c = 1; c < l->n_channels; c++) {
+        fit_laws up = *l, down = *l;
+        up.tissue[c - 1].mean += 1e-2, down.tissue[c - 1].mean -= 1e-2;
+        close_to(r.score[c], (log_likelihood(&up, value, field) - log_likelihood(&down, value, field)) / 2e-2, 1e-4);
+    }
+    for (size_t a = 0; a < l->n_channels; a++) assert_true(r.complete[a * (l->n_channels + 1)] >= 0);
+    // observed is complete less what is missing
+    assert_true(r.observed[0] <= r.complete[0]);
+}
+
+static void test_scores(void **state)
+{
+    (void)state;
+    for (int dof = 0; dof < 5; dof += 4) {
+        const fit_laws share = laws_of(SDM_FIT_IMAGE, SDM_FIT_PARTIAL_VOLUME, dof);
+        const fit_laws labels = laws_of(SDM_FIT_IMAGE, SDM_FIT_LABELS, dof);
+        assert_int_equal(share.n_channels, 5);
+        assert_int_equal(labels.n_channels, 1);
+        for (double value = -1500; value < 2500; value += 190) {
+            for (double a = -0.02; a < 1.03; a += 0.061) check_score(&share, value, a, 1e-6);
+            for (double d = -2; d < 2; d += 0.31) check_score(&labels, value, d, 1e-5);
+        }
+    }
+    const fit_laws label = laws_of(SDM_FIT_LABEL, SDM_FIT_LABELS, 0),
+                   points = laws_of(SDM_FIT_POINTS, SDM_FIT_LABELS, 0);
+    for (double d = -2; d < 2; d += 0.31) {
+        for (double u = 0; u <= 1; u += 0.25) check_score(&label, u, d, 1e-5);
+        check_score(&points, 0, d, 1e-5);
+    }
+}
+
+/* Densities integrate to 1, and over what values a voxel may have: mean score 0, mean square = information (one pair of Gaussians). */
+static void test_information(void **state)
+{
+    (void)state;
+    sdm_fit_opts o = sdm_fit_defaults();
+    o.appearance.n_outside = 1;
+    const fit_state s = {.l_ref = 0.3, .point_sd = 0.2, .look = o.appearance};
+    fit_laws l;
+    sdm_fit_laws_prepare(&o, SDM_FIT_IMAGE, &s, &l);
+    for (double a = 0.05; a < 1; a += 0.15) {
+        double all = 0, mean = 0, square = 0, product = 0;
+        fit_response r = {0};
+        for (double v = -3000; v < 5000; v++) {
+            sdm_fit_respond(&l, v, a, true, &r);
+            const double p = exp(r.log_likelihood);
+            all += p, mean += p * r.score[0], square += p * r.score[0] * r.score[0];
+            product += p * r.score[0] * r.score[1];
+        }
+        assert_true(fabs(all - 1) < 1e-6 && fabs(mean) < 1e-6);
+        assert_true(fabs(square / r.complete[0] - 1) < 1e-4);
+        assert_true(fabs(product / r.complete[1] - 1) < 1e-4);
+    }
+}
+
+// ---- fields
+
+static void test_blur(void **state)
+{
+    (void)state;
+    const sdm_grid g = sdm_grid_centred((int64_t[3]){33, 31, 29}, 0.2, (double[3]){0, 0, 0});
+    const size_t n = sdm_grid_count(&g), middle = (size_t)((14 * 31 + 15) * 33 + 16);
+    for (double variance = 0.002; variance < 0.3; variance *= 3) {
+        float *f = room(2 * n, sizeof *f), *spare = room(2 * n, sizeof *f);
+        f[2 * middle] = 1;
+        sdm_fit_blur(&g, 2, variance, 2, &f, &spare);
+        double sum = 0, second[3] = {0, 0, 0};
+        for (size_t i = 0; i < n; i++) {
+            const double at[3] = {(double)(i % 33) - 16, (double)(i / 33 % 31) - 15, (double)(i / 33 / 31) - 14};
+            sum += (double)f[2 * i];
+            for (int a = 0; a < 3; a++) second[a] += (double)f[2 * i] * at[a] * at[a] * 0.04;
+        }
+        assert_true(fabs(sum - 1) < 1e-5);
+        for (int a = 0; a < 3; a++) assert_true(fabs(second[a] / variance - 1) < (variance < 0.2 ? 1e-3 : 3e-2));
+        free(f);
+        free(spare);
+    }
+}
+
+static void test_sample(void **state)
+{
+    (void)state;
+    sdm_grid g = sdm_grid_centred((int64_t[3]){9, 8, 7}, 0.3, (double[3]){0.2, -0.1, 0.4});
+    g.spacing[1] = 0.25;
+    sdm_pose_matrix(&(sdm_pose){{0.3, -0.5, 0.2}, {0, 0, 0}}, g.dir);
+    const size_t n = sdm_grid_count(&g);
+    float *f = room(2 * n, sizeof *f);
+    for (size_t i = 0; i < n; i++) {
+        double x[3];
+        sdm_grid_world(&g, (const double[3]){(double)(i % 9), (double)(i / 9 % 8), (double)(i / 9 / 8)}, x);
+        f[2 * i] = (float)(1 + x[0] - 2 * x[1] + x[0] * x[1] + 0.5 * x[2] * x[2]); // exact for parabolas
+        f[2 * i + 1] = (float)(3 - x[2]);
+    }
+    const fit_field field = {.grid = &g, .packed = f, .n_fields = 2, .distance = true};
+    for (int i = 0; i < 50; i++) {
+        double index[3], x[3], slope[3];
+        float rest;
+        for (uint64_t k = 0; k < 3; k++) index[k] = 1 + (double)(g.n[k] - 3) * sdm_rng_uniform(1, (uint64_t)i, k);
+        sdm_grid_world(&g, index, x);
+        const double v = sdm_fit_sample_all(&field, x, slope, &rest);
+        assert_true(fabs(v - (1 + x[0] - 2 * x[1] + x[0] * x[1] + 0.5 * x[2] * x[2])) < 2e-6);
+        assert_true(fabs(slope[0] - (1 + x[1])) < 2e-5 && fabs(slope[1] - (x[0] - 2)) < 2e-5 &&
+                    fabs(slope[2] - x[2]) < 2e-5);
+        assert_true(fabs((double)rest - (3 - x[2])) < 1e-6);
+    }
+    // beyond the border: the way to it is added
+    double corner[3], out[3], slope[3];
+    float rest;
+    sdm_grid_world(&g, (const double[3]){8, 7, 6}, corner);
+    sdm_grid_world(&g, (const double[3]){8 + 3 / 0.3, 7 + 4 / 0.25, 6}, out);
+    assert_true(fabs(sdm_fit_sample(&field, out) - sdm_fit_sample(&field, corner) - 5) < 1e-5);
+    (void)sdm_fit_sample_all(&field, out, slope, &rest);
+    assert_true(fabs(slope[0] * (out[0] - corner[0]) + slope[1] * (out[1] - corner[1]) +
+                     slope[2] * (out[2] - corner[2]) - 5) < 1e-4);
+    free(f);
+}
+
+// ---- steps
+
+static void test_step(void **state)
+{
+    (void)state;
+    const double a[9] = {4, 1, 0.5, 1, 3, 0.2, 0.5, 0.2, 2}, gradient[3] = {1, -2, 3};
+    fit_limits l = {.least = {-9, -9, -9}, .most = {9, 9, 9}};
+    double step[3], work[18];
+    assert_true(sdm_fit_step(3, a, gradient, 0, &l, step, work));
+    for (int i = 0; i < 3; i++)
+        assert_true(fabs(a[3 * i] * step[0] + a[3 * i + 1] * step[1] + a[3 * i + 2] * step[2] - gradient[i]) < 1e-12);
+    // the third stops at its bound, the rest is best for that; the first is kept
+    l.most[2] = 0.5;
+    l.kept[0] = true;
+    assert_true(sdm_fit_step(3, a, gradient, 0, &l, step, work));
+    assert_true(step[0] == 0 && step[2] == 0.5 && fabs(3 * step[1] + 0.2 * 0.5 - gradient[1]) < 1e-12);
+    const double wrong[4] = {1, 2, 2, 1};
+    assert_false(sdm_fit_step(2, wrong, gradient, 0, &(fit_limits){.least = {-9, -9}, .most = {9, 9}}, step, work));
+}
+
+// ---- the whole gradient against differences of the log-likelihood, for each model
+
+static double posterior_at(fit_problem *p, const fit_state *s)
+{
+    p->state = *s;
+    sdm_error err;
+    if (sdm_fit_look(p, &err)) fail_msg("%s", err.text);
+    return p->sums.log_likelihood + sdm_fit_prior(p, s, NULL, NULL, NULL);
+}
+
+static void check_gradient(sdm_fit_kind kind, sdm_fit_model model)
+{
+    float *v = phantom(TRUTH, &POSE, 0.5, 7);
+    sdm_fit_target t = image_of(v);
+    for (size_t i = 0; kind == SDM_FIT_LABEL && i < sdm_grid_count(&t.grid); i++) v[i] = v[i] < 600;
+    t.kind = kind;
+    sdm_fit_opts o = near_start();
+    o.image_model = model;
+    o.prior_rotation_sd = o.prior_translation_sd = 0.01;
+    const sdm_fit_source source = exact_source();
+    fit_problem p = {.source = &source, .target = &t, .opts = &o, .n_params = 3, .stride = 1, .extent = {.reach = 2.5}};
+    for (int k = 0; k < 3; k++) p.low[k] = 1, p.high[k] = 4;
+    assert_int_equal(
+        sdm_fit_maps_create(&source, kind == SDM_FIT_IMAGE && model == SDM_FIT_PARTIAL_VOLUME, &o, &p.maps, NULL),
+        SDM_OK);
+    fit_state s = {.blur = 0.3, .l_ref = 0.2, .point_sd = 0.1, .look = o.appearance};
+    sdm_pose_matrix(&o.start_pose, s.rotation);
+    memcpy(s.translation, o.start_pose.translation, sizeof s.translation);
+    memcpy(s.params, START, sizeof START);
+    p.prior = p.state = s;
+    p.prior.translation[1] += 0.1;
+    sdm_pose_matrix(&POSE, p.prior.rotation);
+    p.maps_at[0] = p.packed_blur = NAN;
+    const size_t n = fit_columns(3) + (p.maps.share ? 2 : 0);
+    bool changed;
+    assert_int_equal(sdm_fit_sums_create(n, &p.sums, NULL), SDM_OK);
+    const fit_region region = {.centre = {0.3, -0.2, 0.1}, .radius = 9};
+    assert_int_equal(sdm_fit_sites_choose(&t, &o, &region, 1, &p.sites, &changed, NULL), SDM_OK);
+    assert_true(changed && p.sites.n > 5000);
+    (void)posterior_at(&p, &s);
+    double gradient[FIT_UNKNOWNS_MAX];
+    memcpy(gradient, p.sums.gradient, n * sizeof *gradient);
+    (void)sdm_fit_prior(&p, &s, gradient, NULL, NULL);
+    for (size_t k = 0; k < n; k++) {
+        if (k == fit_at_blur(3) && !p.maps.share) continue;
+        // wide enough to average over the creases between the triangles
+        const double h = k >= fit_columns(3) ? 1 : k == fit_at_blur(3) ? 1e-3 : 4e-3;
+        double step[FIT_UNKNOWNS_MAX] = {0}, found[2], size = sqrt(p.sums.complete[k * (n + 1)]);
+        for (int side = 0; side < 2; side++) {
+            fit_state moved;
+            step[k] = side ? h : -h;
+            sdm_fit_move(&p, &s, step, &moved);
+            found[side] = posterior_at(&p, &moved);
+        }
+        const double difference = (found[1] - found[0]) / (2 * h);
+        if (!(fabs(difference - gradient[k]) < 2e-3 * fabs(difference) + 0.1 * size))
+            fail_msg("unknown %zu: %g, differences %g (one sd: %g)", k, gradient[k], difference, size);
+    }
+    sdm_fit_maps_dispose(&p.maps);
+    sdm_fit_sites_dispose(&p.sites);
+    sdm_fit_sums_dispose(&p.sums);
+    free(v);
+}
+
+static void test_gradient(void **state)
+{
+    (void)state;
+    check_gradient(SDM_FIT_IMAGE, SDM_FIT_PARTIAL_VOLUME);
+    check_gradient(SDM_FIT_IMAGE, SDM_FIT_LABELS);
+    check_gradient(SDM_FIT_LABEL, SDM_FIT_LABELS);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_scores), cmocka_unit_test(test_information), cmocka_unit_test(test_blur),
+        cmocka_unit_test(test_sample), cmocka_unit_test(test_step),        cmocka_unit_test(test_gradient),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

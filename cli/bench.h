@@ -1,4 +1,4 @@
-/* sdmgen bench exact: one mesh and grid, a row of figures for every way to make the map. */
+/* sdmgen bench exact: one mesh and grid, a row of figures for every way to make the map; sdmgen bench network: a model. */
 #ifndef CLI_BENCH_H
 #define CLI_BENCH_H
 
@@ -48,6 +48,14 @@ sdm_status bench_own(bench_case *c, bench_rows *rows, sdm_error *err);
 /* Adds a row for every other program. Those that are missing or fail are rows without figures, no error. */
 sdm_status bench_peers(const bench_case *c, const cli_args *args, bench_rows *rows, sdm_error *err);
 
+/* Other programs by name: entry i of their table, NULL beyond its end. */
+const char *bench_peer_name(size_t i);
+
+/* One of them: times, memory and errors into *row, its map into values[nz][ny][nx] (NaN: not done), which may be NULL. A program that
+   is missing or fails is a row without figures, its note says why, no error. */
+sdm_status bench_peer(const bench_case *c, const cli_args *args, const char *name, float *values, bench_row *row,
+                      sdm_error *err);
+
 /* Appends a row, zero but for its name. */
 sdm_status bench_add(bench_rows *rows, const char *name, bench_row **row, sdm_error *err);
 
@@ -64,6 +72,9 @@ void bench_compare(const bench_case *c, const float *values, bench_row *row);
 /* Starts a new high-water mark of the resident memory: returns kB resident now, -1: unknown. Then: MB above it. */
 long bench_peak_start(void);
 double bench_peak_mb(long start);
+
+/* sdmgen bench network MODEL: one map, batches, derivatives and threads, with the share of the machine that is used. */
+sdm_status bench_network(const cli_args *args, sdm_error *err);
 
 /* Tables and JSON. bench_report_growth: three grids, then three meshes. */
 void bench_print(const bench_case *c, const bench_rows *rows);

@@ -2,7 +2,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 
 #include "bench.h"
 #include "sdm/memory.h"
@@ -18,14 +17,6 @@ static bool interrupted(void *user)
     return cli_is_interrupted();
 }
 
-/* Seconds of this thread's processor: other programs on the machine do not count. */
-static double thread_clock(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 /* A method over the whole grid: the fastest of some runs. */
 static sdm_status run_method(const bench_case *c, const sdm_method *m, int threads, float *values, bench_row *row,
                              sdm_method_report *report, sdm_error *err)
@@ -36,9 +27,9 @@ static sdm_status run_method(const bench_case *c, const sdm_method *m, int threa
     double best = INFINITY;
     for (size_t i = 0; i < c->repeat && (i == 0 || cli_clock() - begin < ENOUGH_S); i++) {
         const long before = i == 0 ? bench_peak_start() : -1;
-        const double start = threads == 1 ? thread_clock() : cli_clock();
+        const double start = threads == 1 ? cli_thread_clock() : cli_clock();
         const sdm_status s = m->map(&c->mesh, &c->grid, &opts, values, report, err);
-        const double ms = 1e3 * ((threads == 1 ? thread_clock() : cli_clock()) - start);
+        const double ms = 1e3 * ((threads == 1 ? cli_thread_clock() : cli_clock()) - start);
         if (s) return s;
         if (i == 0) row->peak_mb = bench_peak_mb(before);
         if (!(ms < best)) continue;
@@ -57,7 +48,7 @@ static sdm_status run_naive(const bench_case *c, float *values, bench_row *row, 
     const sdm_grid *g = &c->grid;
     const double share = fmin(c->share, NAIVE_PAIRS / ((double)c->voxels * (double)c->mesh.n_tri));
     int64_t done = 0;
-    const double start = thread_clock();
+    const double start = cli_thread_clock();
     for (int64_t r = 0; r < g->n[1] * g->n[2]; r++) {
         const bool wanted = bench_has_row(share, r);
         for (int64_t i = 0; i < g->n[0]; i++) {
@@ -69,7 +60,7 @@ static sdm_status run_naive(const bench_case *c, float *values, bench_row *row, 
         done += wanted;
     }
     row->share = (double)done / (double)(g->n[1] * g->n[2]);
-    row->ms_map = 1e3 * (thread_clock() - start) / row->share;
+    row->ms_map = 1e3 * (cli_thread_clock() - start) / row->share;
     row->peak_mb = 0;
     row->done = true;
     return SDM_OK;

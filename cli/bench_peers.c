@@ -141,7 +141,8 @@ static char *result_line(char *output)
 }
 
 /* Figures of the JSON line and errors of the values into *row; what goes wrong is its note. */
-static void read_result(const bench_case *c, const char *line, int code, const char *values_path, bench_row *row)
+static void read_result(const bench_case *c, const char *line, int code, const char *values_path, float *out,
+                        bench_row *row)
 {
     char version[64] = "", note[160] = "";
     double kb = -1, *values = NULL;
@@ -174,17 +175,23 @@ static void read_result(const bench_case *c, const char *line, int code, const c
         snprintf(row->note, sizeof row->note, "%.200s", err.text);
     else
         bench_compare(c, single, row);
+    if (!s && out) memcpy(out, single, c->voxels * sizeof *out);
     sdm_free(single);
     sdm_free(values);
 }
 
-static sdm_status measure_peer(const bench_case *c, const char *folder, const char *name, const char *mesh_path,
-                               const char *values_path, bench_row *row, sdm_error *err)
+/* What measuring needs besides the case: where the programs are, files for mesh and values. */
+typedef struct workplace {
+    char folder[MOST_PATH], work[MOST_PATH / 2], mesh_path[MOST_PATH], values_path[MOST_PATH];
+} workplace;
+
+static sdm_status measure_peer(const bench_case *c, const workplace *w, const char *name, float *values, bench_row *row,
+                               sdm_error *err)
 {
     char program[MOST_PATH + 300], number[12][32], *output = NULL;
     sdm_status s = SDM_ALLOC(&output, MOST_OUTPUT, "output of another program", err);
     if (s) return s;
-    snprintf(program, sizeof program, "%s/" PREFIX "%s", folder, name);
+    snprintf(program, sizeof program, "%s/" PREFIX "%s", w->folder, name);
     for (int i = 0; i < 3; i++) {
         snprintf(number[i], sizeof number[i], "%lld", (long long)c->grid.n[i]);
         sdm_format_real(c->grid.origin[i], number[3 + i]);
@@ -193,31 +200,34 @@ static sdm_status measure_peer(const bench_case *c, const char *folder, const ch
     sdm_format_real(c->share, number[9]);
     sdm_format_real(isfinite(c->band_mm) ? c->band_mm : 0, number[10]);
     snprintf(number[11], sizeof number[11], "%zu", c->repeat);
-    char *arguments[N_ARGUMENTS + 1] = {program, (char *)mesh_path};
+    char *arguments[N_ARGUMENTS + 1] = {program, (char *)w->mesh_path};
     for (int i = 0; i < 12; i++) arguments[2 + i] = number[i];
-    arguments[14] = (char *)values_path;
-    (void)unlink(values_path);
+    arguments[14] = (char *)w->values_path;
+    (void)unlink(w->values_path);
     const int code = run_program(arguments, output);
-    read_result(c, result_line(output), code, values_path, row);
+    read_result(c, result_line(output), code, w->values_path, values, row);
     sdm_free(output);
     return cli_check_interrupt(err);
 }
 
-static sdm_status measure_all(const bench_case *c, const char *folder, const char *mesh_path, const char *values_path,
-                              bench_rows *rows, sdm_error *err)
+static void say_missing(size_t k, bench_row *row)
+{
+    const char *packages = k < N_KNOWN ? known[k].packages : "its packages";
+    snprintf(row->note, sizeof row->note, "not built: install %s and configure with -DSDM_PEERS=ON", packages);
+}
+
+static sdm_status measure_all(const bench_case *c, const workplace *w, bench_rows *rows, sdm_error *err)
 {
     bench_row *row = NULL;
     struct dirent **names;
-    const int n = list_peers(folder, &names);
+    const int n = list_peers(w->folder, &names);
     sdm_status s = SDM_OK;
     for (size_t k = 0; k < N_KNOWN && !s; k++) {
         bool found = false;
         for (int i = 0; i < n; i++) found |= !strcmp(names[i]->d_name + strlen(PREFIX), known[k].name);
         s = bench_add(rows, known[k].name, &row, err);
-        if (!s && found) s = measure_peer(c, folder, known[k].name, mesh_path, values_path, row, err);
-        if (!s && !found)
-            snprintf(row->note, sizeof row->note, "not built: install %s and configure with -DSDM_PEERS=ON",
-                     known[k].packages);
+        if (!s && found) s = measure_peer(c, w, known[k].name, NULL, row, err);
+        if (!s && !found) say_missing(k, row);
     }
     for (int i = 0; i < n && !s; i++) {
         const char *name = names[i]->d_name + strlen(PREFIX);
@@ -225,31 +235,73 @@ static sdm_status measure_all(const bench_case *c, const char *folder, const cha
         for (size_t k = 0; k < N_KNOWN; k++) done |= !strcmp(name, known[k].name);
         if (done) continue;
         s = bench_add(rows, name, &row, err);
-        if (!s) s = measure_peer(c, folder, name, mesh_path, values_path, row, err);
+        if (!s) s = measure_peer(c, w, name, NULL, row, err);
     }
     free_names(names, n);
     return s;
 }
 
+static sdm_status open_workplace(const bench_case *c, const char *folder, workplace *w, sdm_error *err)
+{
+    const char *temporary = getenv("TMPDIR");
+    if (folder && !is_folder(folder))
+        return sdm_fail(err, SDM_E_ARG, "--peers '%.200s': no such folder (none: without other programs)", folder);
+    if (folder)
+        snprintf(w->folder, sizeof w->folder, "%s", folder);
+    else
+        find_folder(w->folder);
+    snprintf(w->work, sizeof w->work, "%.1000s/sdmgen-bench-XXXXXX", temporary && *temporary ? temporary : "/tmp");
+    if (!mkdtemp(w->work))
+        return sdm_fail(err, SDM_E_IO, "no folder for temporary files: %s: %s", w->work, strerror(errno));
+    snprintf(w->mesh_path, sizeof w->mesh_path, "%s/mesh.ply", w->work);
+    snprintf(w->values_path, sizeof w->values_path, "%s/values.npy", w->work);
+    return sdm_mesh_write(w->mesh_path, &c->mesh, err);
+}
+
+static void close_workplace(const workplace *w)
+{
+    if (!*w->values_path) return;
+    (void)unlink(w->mesh_path);
+    (void)unlink(w->values_path);
+    (void)rmdir(w->work);
+}
+
 sdm_status bench_peers(const bench_case *c, const cli_args *args, bench_rows *rows, sdm_error *err)
 {
-    char folder[MOST_PATH], work[MOST_PATH / 2], mesh_path[MOST_PATH], values_path[MOST_PATH];
-    const char *temporary = getenv("TMPDIR");
+    workplace w = {.work = ""};
     if (args->peers && !strcmp(args->peers, "none")) return SDM_OK;
-    if (args->peers && !is_folder(args->peers))
-        return sdm_fail(err, SDM_E_ARG, "--peers '%.200s': no such folder (none: without other programs)", args->peers);
-    if (args->peers)
-        snprintf(folder, sizeof folder, "%s", args->peers);
-    else
-        find_folder(folder);
-    snprintf(work, sizeof work, "%.1000s/sdmgen-bench-XXXXXX", temporary && *temporary ? temporary : "/tmp");
-    if (!mkdtemp(work)) return sdm_fail(err, SDM_E_IO, "no folder for temporary files: %s: %s", work, strerror(errno));
-    snprintf(mesh_path, sizeof mesh_path, "%s/mesh.ply", work);
-    snprintf(values_path, sizeof values_path, "%s/values.npy", work);
-    sdm_status s = sdm_mesh_write(mesh_path, &c->mesh, err);
-    if (!s) s = measure_all(c, folder, mesh_path, values_path, rows, err);
-    (void)unlink(mesh_path);
-    (void)unlink(values_path);
-    (void)rmdir(work);
+    sdm_status s = open_workplace(c, args->peers, &w, err);
+    if (!s) s = measure_all(c, &w, rows, err);
+    close_workplace(&w);
+    return s;
+}
+
+/* ---- one of them ---- */
+
+static size_t find_known(const char *name)
+{
+    size_t k = 0;
+    while (k < N_KNOWN && strcmp(known[k].name, name) != 0) k++;
+    return k;
+}
+
+const char *bench_peer_name(size_t i) { return i < N_KNOWN ? known[i].name : NULL; }
+
+sdm_status bench_peer(const bench_case *c, const cli_args *args, const char *name, float *values, bench_row *row,
+                      sdm_error *err)
+{
+    char program[MOST_PATH + 300];
+    workplace w = {.work = ""};
+    if (args->peers && !strcmp(args->peers, "none")) {
+        snprintf(row->note, sizeof row->note, "--peers none: not asked for");
+        return SDM_OK;
+    }
+    sdm_status s = open_workplace(c, args->peers, &w, err);
+    snprintf(program, sizeof program, "%s/" PREFIX "%s", w.folder, name);
+    if (!s && access(program, X_OK) != 0)
+        say_missing(find_known(name), row);
+    else if (!s)
+        s = measure_peer(c, &w, name, values, row, err);
+    close_workplace(&w);
     return s;
 }

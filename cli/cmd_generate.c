@@ -4,10 +4,13 @@
 #include <string.h>
 
 #include "commands.h"
+#include "generate_files.h"
 #include "output.h"
 #include "progress.h"
 #include "sdm/checksum.h"
 #include "sdm/config.h"
+#include "sdm/image.h"
+#include "sdm/map.h"
 #include "sdm/memory.h"
 #include "setup.h"
 #include "terminal.h"
@@ -16,15 +19,16 @@
 typedef struct job {
     const cli_args *args;
     sdm_registry *registry;
-    sdm_instance *shape; /* for --policy exact, else NULL */
+    sdm_instance *shape; /* for the exact engine and checks, else NULL */
     sdm_model *model;
     const sdm_model_info *info;
     sdm_param *params;
     double *rows; /* [n_rows][n_params] */
     size_t n_rows;
-    float *values;
-    double ms; /* of all maps */
-    size_t n_clamped, n_exact;
+    float *values, *gradient, *jacobian; /* [nz][ny][nx], [3][...], [n_params][...]; those not wanted NULL */
+    double ms;                           /* of all maps */
+    size_t n_clamped, n_exact, n_exact_error, n_checked;
+    sdm_check check; /* over all rows: mean, root mean square, largest q95 and max, mean bias */
     uint64_t hash;
 } job;
 
@@ -33,8 +37,17 @@ static sdm_range_policy policy_of(const char *name)
     return !strcmp(name, "clamp") ? SDM_RANGE_CLAMP : !strcmp(name, "exact") ? SDM_RANGE_EXACT : SDM_RANGE_REFUSE;
 }
 
+static sdm_check_stat error_of(const cli_args *args)
+{
+    int stat = SDM_CHECK_MAX;
+    while (stat < SDM_CHECK_MEAN && strcmp(args->error_of, sdm_check_stat_name((sdm_check_stat)stat))) stat++;
+    return (sdm_check_stat)stat;
+}
+
 static void job_dispose(job *j)
 {
+    sdm_free(j->jacobian);
+    sdm_free(j->gradient);
     sdm_free(j->values);
     sdm_free(j->rows);
     sdm_free(j->params);
@@ -84,47 +97,50 @@ static sdm_status read_rows(job *j, sdm_error *err)
     return s;
 }
 
+/* The exact shape, where it is needed. */
+static sdm_status open_shape(job *j, sdm_error *err)
+{
+    const cli_args *args = j->args;
+    const bool checks = args->check || args->max_error > 0;
+    if (!checks && policy_of(args->policy) != SDM_RANGE_EXACT) return SDM_OK;
+    sdm_status s = cli_open_registry(args, &j->registry, err);
+    if (!s) s = sdm_runtime_instance(j->model, j->registry, &j->shape, err);
+    return s && checks ? sdm_fail_in(err, s, "--%s needs the exact shape", args->check ? "check" : "max-error") : s;
+}
+
+static sdm_status make_room(job *j, sdm_error *err)
+{
+    const size_t n = sdm_grid_count(&j->info->grid);
+    size_t count;
+    sdm_status s = SDM_ALLOC(&j->values, n, "distance map", err);
+    if (!s && j->args->gradient) s = SDM_ALLOC(&j->gradient, 3 * n, "gradient", err);
+    if (s || !j->args->jacobian) return s;
+    s = sdm_mul(n, j->info->n_params, &count, err);
+    return s ? s : SDM_ALLOC(&j->jacobian, count, "derivatives", err);
+}
+
 static sdm_status prepare(job *j, sdm_error *err)
 {
     const cli_args *args = j->args;
-    if (args->outputs.n == 0 && !args->json) return sdm_fail(err, SDM_E_ARG, "generate: an output is needed: -o FILE");
+    if (!args->outputs.n && !args->json && !args->gradient && !args->jacobian && !args->check)
+        return sdm_fail(err, SDM_E_ARG, "generate: an output is needed: -o FILE");
     sdm_status s = sdm_model_open(args->files.items[0], &j->model, err);
     if (s) return s;
     j->info = sdm_model_get_info(j->model);
     s = cli_model_params(j->info, &j->params, err);
     if (!s) s = read_rows(j, err);
-    if (!s && !args->rows) s = cli_check_outputs(&args->outputs, false, err);
-    if (!s && policy_of(args->policy) == SDM_RANGE_EXACT) {
-        s = cli_open_registry(args, &j->registry, err);
-        if (!s) s = sdm_runtime_instance(j->model, j->registry, &j->shape, err);
-    }
+    if (!s && !args->rows) s = cli_row_files_check(args, 1, err);
+    if (!s) s = open_shape(j, err);
     if (!s) s = check_rows(j, err);
-    if (!s) s = SDM_ALLOC(&j->values, sdm_grid_count(&j->info->grid), "distance map", err);
-    return s;
+    // the last names too, before the first map is made
+    if (!s && args->rows) s = cli_row_files_check(args, j->n_rows, err);
+    return s ? s : make_room(j, err);
 }
 
-/* Checks the numbered names of all rows like those of a single map: the last ones too, before the first is made. */
-static sdm_status check_numbered(const job *j, sdm_error *err)
+static sdm_status write_maps(const job *j, size_t row, const sdm_result *result, const cli_row_files *files,
+                             sdm_error *err)
 {
-    const size_t n = j->args->outputs.n;
-    char *paths = NULL;
-    const char **items = NULL;
-    sdm_status s = SDM_ALLOC(&paths, n * SDM_PATH_TEXT_MAX, "names of the outputs", err);
-    if (!s) s = SDM_ALLOC(&items, n, "names of the outputs", err);
-    for (size_t i = 0; i < n && !s; i++) {
-        items[i] = paths + i * SDM_PATH_TEXT_MAX;
-        s = cli_number_path(j->args->outputs.items[i], j->n_rows, paths + i * SDM_PATH_TEXT_MAX, SDM_PATH_TEXT_MAX,
-                            err);
-    }
-    if (!s) s = cli_check_outputs(&(cli_list){items, n}, false, err);
-    sdm_free((void *)items);
-    sdm_free(paths);
-    return s;
-}
-
-static sdm_status write_row(const job *j, size_t row, const sdm_result *result, sdm_error *err)
-{
-    char origin[64], path[SDM_PATH_TEXT_MAX];
+    char origin[64];
     snprintf(origin, sizeof origin, "model %016llx", (unsigned long long)j->info->checksum);
     sdm_text params = {0};
     cli_add_params(j->params, j->info->n_params, j->rows + row * j->info->n_params, &params);
@@ -136,36 +152,105 @@ static sdm_status write_row(const job *j, size_t row, const sdm_result *result, 
                          .source = result->source,
                          .clamped = result->clamped,
                          .error_mm = result->error_mm,
-                         .origin = result->source == SDM_SOURCE_EXACT ? "exact" : origin};
-    for (size_t i = 0; i < j->args->outputs.n && !s; i++) {
-        const char *name = j->args->outputs.items[i];
-        if (j->args->rows) {
-            s = cli_number_path(name, row + 1, path, sizeof path, err);
-            name = path;
-        }
-        if (!s) s = cli_write_map(name, &map, j->args, err);
-    }
+                         .origin = result->source == SDM_SOURCE_EXACT ? "exact" : origin,
+                         .reason = result->reason,
+                         .check = result->checked ? &result->check : NULL};
+    for (size_t i = 0; i < j->args->outputs.n && !s; i++) s = cli_write_map(files->list.items[i], &map, j->args, err);
     sdm_text_dispose(&params);
     return s;
 }
 
+static sdm_status write_row(const job *j, size_t row, const sdm_result *result, sdm_error *err)
+{
+    const sdm_grid *g = &j->info->grid;
+    const size_t nx = (size_t)g->n[0], ny = (size_t)g->n[1], nz = (size_t)g->n[2];
+    cli_row_files files = {0};
+    sdm_status s = cli_row_files_name(j->args, row + 1, &files, err);
+    if (!s) s = write_maps(j, row, result, &files, err);
+    if (!s && j->gradient) s = sdm_map_gradient(g, j->values, (int)j->args->threads, j->gradient, err);
+    if (!s && j->gradient) s = sdm_npy_write(files.gradient, j->gradient, (const size_t[]){3, nz, ny, nx}, 4, err);
+    if (!s && j->jacobian)
+        s = sdm_npy_write(files.jacobian, j->jacobian, (const size_t[]){j->info->n_params, nz, ny, nx}, 4, err);
+    cli_row_files_dispose(&files);
+    return s;
+}
+
+static void add_check(job *j, const sdm_check *c)
+{
+    sdm_check *all = &j->check;
+    const double old = (double)j->n_checked++, n = old + 1;
+    all->mean_mm = (old * all->mean_mm + c->mean_mm) / n;
+    all->bias_mm = (old * all->bias_mm + c->bias_mm) / n;
+    all->rmse_mm = sqrt((old * all->rmse_mm * all->rmse_mm + c->rmse_mm * c->rmse_mm) / n);
+    if (!(c->q95_mm <= all->q95_mm)) all->q95_mm = c->q95_mm;
+    if (!(c->max_mm <= all->max_mm)) all->max_mm = c->max_mm;
+    all->used += c->used;
+    all->outside += c->outside;
+}
+
+/* What is to be said of a row: nothing happens in silence. */
+static void notice_row(const job *j, size_t row, const sdm_result *r)
+{
+    if (r->clamped) cli_notice("row %zu: parameters outside the trained range were moved into it", row + 1);
+    if (r->reason == SDM_REASON_RANGE)
+        cli_notice("row %zu: parameters outside the trained range, computed by the exact engine", row + 1);
+    if (r->reason == SDM_REASON_ERROR)
+        cli_notice(
+            "row %zu: error of the network near the surface (%s) %.3g mm, above %g mm: computed by the exact engine",
+            row + 1, j->args->error_of, sdm_check_get(&r->check, error_of(j->args)), j->args->max_error);
+    if (!j->args->check || j->args->json) return;
+    const sdm_check *c = &r->check;
+    if (j->args->rows) printf("row %zu: ", row + 1);
+    if (r->checked)
+        printf("error near the surface: max %.3g, q95 %.3g, RMSE %.3g, mean %.3g, bias %.2g mm (%zu voxels)\n",
+               c->max_mm, c->q95_mm, c->rmse_mm, c->mean_mm, c->bias_mm, c->used);
+    else
+        printf("exact\n");
+}
+
 static sdm_status make_row(job *j, size_t row, sdm_error *err)
 {
-    const sdm_generate_opts opts = {
-        .policy = policy_of(j->args->policy), .exact_shape = j->shape, .n_threads = (int)j->args->threads};
-    const size_t n = j->info->n_params, n_values = sdm_grid_count(&j->info->grid);
+    const cli_args *args = j->args;
+    // rows that the policy refuses have been refused: what is left to the exact engine is a network's map over the bound
+    const sdm_range_policy policy = policy_of(args->policy);
+    const sdm_generate_opts opts = {.policy =
+                                        policy == SDM_RANGE_REFUSE && args->max_error > 0 ? SDM_RANGE_EXACT : policy,
+                                    .exact_shape = j->shape,
+                                    .n_threads = (int)args->threads,
+                                    .check = args->check,
+                                    .max_error_mm = args->max_error,
+                                    .max_error_of = error_of(args)};
+    const double *p = j->rows + row * j->info->n_params;
     sdm_result result = {0};
     const double start = cli_clock();
-    const sdm_status s = sdm_generate(j->model, j->rows + row * n, &opts, j->values, &result, err);
-    if (s) return j->args->rows ? sdm_fail_in(err, s, "%s: row %zu", j->args->rows, row + 1) : s;
+    const sdm_status s = j->jacobian ? sdm_generate_jacobian(j->model, p, &opts, j->values, j->jacobian, &result, err)
+                                     : sdm_generate(j->model, p, &opts, j->values, &result, err);
+    if (s) return args->rows ? sdm_fail_in(err, s, "%s: row %zu", args->rows, row + 1) : s;
     j->ms += 1e3 * (cli_clock() - start);
     j->n_clamped += result.clamped;
     j->n_exact += result.source == SDM_SOURCE_EXACT;
-    j->hash = sdm_crc64(j->hash, j->values, n_values * sizeof *j->values);
-    if (result.clamped) cli_notice("row %zu: parameters outside the trained range were moved into it", row + 1);
-    if (result.source == SDM_SOURCE_EXACT)
-        cli_notice("row %zu: parameters outside the trained range, computed by the exact engine", row + 1);
+    j->n_exact_error += result.reason == SDM_REASON_ERROR;
+    if (result.checked) add_check(j, &result.check);
+    j->hash = sdm_crc64(j->hash, j->values, sdm_grid_count(&j->info->grid) * sizeof *j->values);
+    notice_row(j, row, &result);
     return write_row(j, row, &result, err);
+}
+
+static void report_check(const job *j, sdm_json *json)
+{
+    const sdm_check *c = &j->check;
+    sdm_json_open(json, "check", '{');
+    sdm_json_int(json, "maps", (int64_t)j->n_checked);
+    if (j->n_checked) {
+        sdm_json_real(json, "max_mm", c->max_mm);
+        sdm_json_real(json, "q95_mm", c->q95_mm);
+        sdm_json_real(json, "rmse_mm", c->rmse_mm);
+        sdm_json_real(json, "mean_mm", c->mean_mm);
+        sdm_json_real(json, "bias_mm", c->bias_mm);
+        sdm_json_int(json, "points", (int64_t)c->used);
+        sdm_json_int(json, "outside", (int64_t)c->outside);
+    }
+    sdm_json_close(json, '}');
 }
 
 static sdm_status report(const job *j, sdm_error *err)
@@ -181,6 +266,8 @@ static sdm_status report(const job *j, sdm_error *err)
     sdm_json_int(&json, "threads", cli_threads(j->args->threads));
     sdm_json_int(&json, "clamped", (int64_t)j->n_clamped);
     sdm_json_int(&json, "exact", (int64_t)j->n_exact);
+    sdm_json_int(&json, "exact_by_error", (int64_t)j->n_exact_error);
+    if (j->shape && (j->args->check || j->args->max_error > 0)) report_check(j, &json);
     sdm_json_real(&json, "error_rmse_mm", j->info->accuracy.rmse_mm);
     sdm_json_text(&json, "values_crc64", hash);
     cli_json_grid(&json, "grid", &j->info->grid);
@@ -198,7 +285,6 @@ sdm_status cmd_generate(const cli_args *args, sdm_error *err)
     job j = {.args = args};
     cli_progress progress;
     sdm_status s = prepare(&j, err);
-    if (!s && args->rows) s = check_numbered(&j, err);
     cli_progress_start(&progress);
     for (size_t i = 0; i < j.n_rows && !s; i++) {
         s = make_row(&j, i, err);

@@ -70,6 +70,7 @@ static sdm_status bad_value(const cli_option *o, const char *value, sdm_error *e
     const char *what = o->kind == CLI_INT     ? "a whole number"
                        : o->kind == CLI_INT3  ? "three whole numbers X,Y,Z"
                        : o->kind == CLI_REAL  ? "a number"
+                       : o->kind == CLI_REAL2 ? "two numbers X,Y"
                        : o->kind == CLI_REAL3 ? "three numbers X,Y,Z"
                                               : "one number or three";
     char low[32], high[32];
@@ -96,12 +97,12 @@ static size_t split_numbers(const char *text, bool whole, double out[3])
     return n;
 }
 
-static sdm_status store_three(const cli_option *o, const char *value, void *field, sdm_error *err)
+static sdm_status store_several(const cli_option *o, const char *value, void *field, sdm_error *err)
 {
     double v[3];
-    const size_t n = split_numbers(value, o->kind == CLI_INT3, v);
-    if (n != 3 && !(n == 1 && o->kind == CLI_REAL13)) return bad_value(o, value, err);
-    for (size_t i = 0; i < 3; i++) {
+    const size_t n = split_numbers(value, o->kind == CLI_INT3, v), wanted = o->kind == CLI_REAL2 ? 2 : 3;
+    if (n != wanted && !(n == 1 && o->kind == CLI_REAL13)) return bad_value(o, value, err);
+    for (size_t i = 0; i < wanted; i++) {
         const double x = n == 1 ? v[0] : v[i];
         if (!in_range(o, x)) return bad_value(o, value, err);
         if (o->kind == CLI_INT3)
@@ -142,7 +143,7 @@ static sdm_status store(cli_args *args, const cli_option *o, const char *value, 
         *(double *)field = real;
         return SDM_OK;
     default:
-        return store_three(o, value, field, err);
+        return store_several(o, value, field, err);
     }
 }
 
@@ -175,6 +176,24 @@ static sdm_status take_option(int argc, char **argv, int *i, cli_args *args, sdm
     return store(args, o, value, err);
 }
 
+static void set_phantom_defaults(cli_phantom_args *p)
+{
+    const cli_phantom_args none = {.rotation = {NAN, NAN, NAN},
+                                   .translation = {NAN, NAN, NAN},
+                                   .random_pose = {NAN, NAN},
+                                   .frame = {NAN, NAN, NAN},
+                                   .crop = {NAN, NAN, NAN},
+                                   .inside = {NAN, NAN},
+                                   .outside = {NAN, NAN},
+                                   .air = {NAN, NAN},
+                                   .air_cells = {NAN, NAN, NAN},
+                                   .blur = {NAN, NAN, NAN},
+                                   .texture = NAN,
+                                   .noise = NAN,
+                                   .type = "int16"};
+    *p = none;
+}
+
 static void set_defaults(cli_args *args)
 {
     args->seed = -1;
@@ -185,6 +204,8 @@ static void set_defaults(cli_args *args)
     args->policy = "refuse";
     args->method = "exact";
     args->sign = "auto";
+    args->error_of = "max";
+    set_phantom_defaults(&args->phantom);
 }
 
 static sdm_status make_lists(int argc, cli_args *args, sdm_error *err)

@@ -13,16 +13,33 @@
 #include "sdm/train.h"
 #include "terminal.h"
 
-void cli_eval_params(const sdm_model *m, uint64_t seed, size_t index, double *p)
+static sdm_status make_by_model(const void *user, const double *p, float *values, sdm_error *err)
+{
+    const sdm_generate_opts opts = {.policy = SDM_RANGE_REFUSE, .n_threads = 1};
+    return sdm_generate(user, p, &opts, values, NULL, err);
+}
+
+cli_map_maker cli_maker_of_model(const sdm_model *m, const sdm_instance *shape)
 {
     const sdm_model_info *info = sdm_model_get_info(m);
-    double min[SDM_MAX_PARAMS], max[SDM_MAX_PARAMS];
-    const size_t n = info->n_params < SDM_MAX_PARAMS ? info->n_params : SDM_MAX_PARAMS;
-    for (size_t i = 0; i < n; i++) {
-        min[i] = info->params[i].min;
-        max[i] = info->params[i].max;
+    cli_map_maker maker = {.shape = shape, .grid = info->grid, .make = make_by_model, .user = m};
+    maker.n_params = info->n_params < SDM_MAX_PARAMS ? info->n_params : SDM_MAX_PARAMS;
+    for (size_t i = 0; i < maker.n_params; i++) {
+        maker.min[i] = info->params[i].min;
+        maker.max[i] = info->params[i].max;
     }
-    sdm_sample_params(seed, SDM_STREAM_EVAL, index, min, max, n, p);
+    return maker;
+}
+
+void cli_maker_params(const cli_map_maker *m, uint64_t seed, size_t index, double *p)
+{
+    sdm_sample_params(seed, SDM_STREAM_EVAL, index, m->min, m->max, m->n_params, p);
+}
+
+void cli_eval_params(const sdm_model *m, uint64_t seed, size_t index, double *p)
+{
+    const cli_map_maker maker = cli_maker_of_model(m, NULL);
+    cli_maker_params(&maker, seed, index, p);
 }
 
 static void compare_values(const float *network, const float *exact, size_t n, cli_eval_sample *out)
@@ -85,35 +102,35 @@ static sdm_status compare_surfaces(const sdm_grid *g, const float *network, cons
     return s;
 }
 
-/* Network and exact map at p, on the calling thread alone. */
-static sdm_status both_maps(const sdm_model *m, const sdm_instance *shape, const double *p, float *network,
-                            float *exact, sdm_error *err)
+sdm_status cli_compare_maps(const sdm_grid *g, const float *values, const float *exact, bool surfaces,
+                            cli_eval_sample *out, sdm_error *err)
 {
-    const sdm_generate_opts opts = {.policy = SDM_RANGE_REFUSE, .n_threads = 1};
-    const sdm_exact_opts exact_opts = {.n_threads = 1};
-    const sdm_status s = sdm_generate(m, p, &opts, network, NULL, err);
-    if (s) return s;
-    return sdm_exact_shape_map(shape, p, &exact_opts, &sdm_model_get_info(m)->grid, exact, NULL, err);
+    compare_values(values, exact, sdm_grid_count(g), out);
+    return surfaces ? compare_surfaces(g, values, exact, out, err) : SDM_OK;
 }
 
-static sdm_status one_sample(const sdm_model *m, const sdm_instance *shape, uint64_t seed, size_t index, bool surfaces,
-                             float *maps, cli_eval_sample *out, sdm_error *err)
+/* The map to judge and the exact one at p, on the calling thread alone. */
+static sdm_status both_maps(const cli_map_maker *m, const double *p, float *values, float *exact, sdm_error *err)
 {
-    const sdm_grid *g = &sdm_model_get_info(m)->grid;
-    const size_t n = sdm_grid_count(g);
+    const sdm_exact_opts opts = {.n_threads = 1};
+    const sdm_status s = m->make(m->user, p, values, err);
+    return s ? s : sdm_exact_shape_map(m->shape, p, &opts, &m->grid, exact, NULL, err);
+}
+
+static sdm_status one_sample(const cli_map_maker *m, uint64_t seed, size_t index, bool surfaces, float *maps,
+                             cli_eval_sample *out, sdm_error *err)
+{
+    const size_t n = sdm_grid_count(&m->grid);
     double p[SDM_MAX_PARAMS];
-    cli_eval_params(m, seed, index, p);
-    sdm_status s = both_maps(m, shape, p, maps, maps + n, err);
-    if (s) return s;
-    compare_values(maps, maps + n, n, out);
-    return surfaces ? compare_surfaces(g, maps, maps + n, out, err) : SDM_OK;
+    cli_maker_params(m, seed, index, p);
+    const sdm_status s = both_maps(m, p, maps, maps + n, err);
+    return s ? s : cli_compare_maps(&m->grid, maps, maps + n, surfaces, out, err);
 }
 
 /* ---- all samples ---- */
 
 typedef struct work {
-    const sdm_model *m;
-    const sdm_instance *shape;
+    const cli_map_maker *m;
     uint64_t seed;
     bool surfaces;
     cli_eval *out;
@@ -136,7 +153,7 @@ static void run_sample(work *w, size_t index, float *maps)
 {
     sdm_error err = {0};
     sdm_status s = cli_check_interrupt(&err);
-    if (!s) s = one_sample(w->m, w->shape, w->seed, index, w->surfaces, maps, &w->out->sample[index], &err);
+    if (!s) s = one_sample(w->m, w->seed, index, w->surfaces, maps, &w->out->sample[index], &err);
     if (s) {
         err.status = s;
         keep_first_error(w, index, &err);
@@ -152,7 +169,7 @@ static void run_sample(work *w, size_t index, float *maps)
 
 static void run_samples(work *w)
 {
-    const size_t n_values = sdm_grid_count(&sdm_model_get_info(w->m)->grid);
+    const size_t n_values = sdm_grid_count(&w->m->grid);
     const long n = (long)w->out->n;
 #pragma omp parallel
     {
@@ -193,7 +210,7 @@ static sdm_status rank_samples(cli_eval *e, sdm_error *err)
 }
 
 /* Sums in the order of the index: the same bits whoever computed the samples. */
-static void reduce_samples(cli_eval *e)
+void cli_eval_reduce(cli_eval *e)
 {
     double near_sum = 0;
     size_t n_near = 0;
@@ -222,20 +239,28 @@ sdm_status cli_evaluate(const sdm_model *m, const sdm_instance *shape, uint64_t 
                         cli_eval *out, sdm_error *err)
 {
     memset(out, 0, sizeof *out);
-    if (n == 0) return sdm_fail(err, SDM_E_ARG, "0 samples, need at least 1");
     if (sdm_model_get_info(m)->n_params > SDM_MAX_PARAMS)
         return sdm_fail(err, SDM_E_ARG, "%zu parameters, at most %d can be sampled", sdm_model_get_info(m)->n_params,
                         SDM_MAX_PARAMS);
+    const cli_map_maker maker = cli_maker_of_model(m, shape);
+    return cli_evaluate_maps(&maker, seed, n, surfaces, out, err);
+}
+
+sdm_status cli_evaluate_maps(const cli_map_maker *m, uint64_t seed, size_t n, bool surfaces, cli_eval *out,
+                             sdm_error *err)
+{
+    memset(out, 0, sizeof *out);
+    if (n == 0) return sdm_fail(err, SDM_E_ARG, "0 samples, need at least 1");
     sdm_status s = SDM_ALLOC(&out->sample, n, "figures of the samples", err);
     if (s) return s;
     out->n = n;
-    work w = {.m = m, .shape = shape, .seed = seed, .surfaces = surfaces, .out = out, .failed = n};
+    work w = {.m = m, .seed = seed, .surfaces = surfaces, .out = out, .failed = n};
     cli_progress_start(&w.progress);
     run_samples(&w);
     cli_progress_clear(&w.progress);
     if (w.failed < n) s = sdm_fail(err, w.err.status, "random shape %zu: %s", w.failed, w.err.text);
     if (s == SDM_E_CANCELLED) s = sdm_fail(err, s, "interrupted");
-    if (!s) reduce_samples(out);
+    if (!s) cli_eval_reduce(out);
     if (!s) s = rank_samples(out, err);
     if (s) cli_eval_dispose(out);
     return s;
@@ -252,14 +277,15 @@ sdm_status cli_picture_compare(const sdm_model *m, const sdm_instance *shape, ui
                                const double *p, const char *path, sdm_error *err)
 {
     static const float levels[] = {0.0f, 1.0f};
-    const sdm_grid *g = &sdm_model_get_info(m)->grid;
+    const cli_map_maker maker = cli_maker_of_model(m, shape);
+    const sdm_grid *g = &maker.grid;
     const size_t n = sdm_grid_count(g);
     double sampled[SDM_MAX_PARAMS];
     float *maps = NULL;
     sdm_status s = sdm_alloc((void **)&maps, n, 3 * sizeof *maps, "maps of the picture", err);
     if (s) return s;
-    if (!p) cli_eval_params(m, seed, index, sampled);
-    s = both_maps(m, shape, p ? p : sampled, maps + n, maps, err);
+    if (!p) cli_maker_params(&maker, seed, index, sampled);
+    s = both_maps(&maker, p ? p : sampled, maps + n, maps, err);
     for (size_t i = 0; i < n && !s; i++) maps[2 * n + i] = maps[n + i] - maps[i];
     const sdm_picture_map columns[] = {
         {"exact", maps, false}, {"network", maps + n, false}, {"error", maps + 2 * n, true}};

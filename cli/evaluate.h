@@ -3,6 +3,7 @@
 #define CLI_EVALUATE_H
 
 #include "progress.h"
+#include "sdm/config.h"
 #include "sdm/runtime.h"
 
 /* Stream of the random shapes of eval and verify; training uses other streams. */
@@ -34,7 +35,33 @@ typedef struct cli_eval {
 /* Parameters of random shape `index` within the model's trained ranges; p[n_params]. */
 void cli_eval_params(const sdm_model *m, uint64_t seed, size_t index, double *p);
 
+/* Anything that makes maps of a shape on a grid from parameters in a box; the exact engine makes the truth from the same shape. */
+typedef struct cli_map_maker {
+    const sdm_instance *shape;
+    sdm_grid grid;
+    size_t n_params;
+    double min[SDM_MAX_PARAMS], max[SDM_MAX_PARAMS];
+    /* values[nz][ny][nx] at p[n_params], on the calling thread alone. [any thread] */
+    sdm_status (*make)(const void *user, const double *p, float *values, sdm_error *err);
+    const void *user;
+} cli_map_maker;
+
+/* The model as a maker; it has at most SDM_MAX_PARAMS parameters. */
+cli_map_maker cli_maker_of_model(const sdm_model *m, const sdm_instance *shape);
+
+/* Parameters of random shape `index` within the maker's box; p[n_params]. */
+void cli_maker_params(const cli_map_maker *m, uint64_t seed, size_t index, double *p);
+
+/* Figures of one map against the exact one; surfaces: those of the zero surfaces too. */
+sdm_status cli_compare_maps(const sdm_grid *g, const float *values, const float *exact, bool surfaces,
+                            cli_eval_sample *out, sdm_error *err);
+
+/* Fills the means and largest figures, zero before, from sample[n]. */
+void cli_eval_reduce(cli_eval *e);
+
 /* Evaluates n shapes on all threads; the same bits for any number of them. surfaces: measure the zero surfaces too. */
+sdm_status cli_evaluate_maps(const cli_map_maker *m, uint64_t seed, size_t n, bool surfaces, cli_eval *out,
+                             sdm_error *err);
 sdm_status cli_evaluate(const sdm_model *m, const sdm_instance *shape, uint64_t seed, size_t n, bool surfaces,
                         cli_eval *out, sdm_error *err);
 void cli_eval_dispose(cli_eval *e);
@@ -43,7 +70,7 @@ void cli_eval_dispose(cli_eval *e);
 sdm_status cli_picture_compare(const sdm_model *m, const sdm_instance *shape, uint64_t seed, size_t index,
                                const double *p, const char *path, sdm_error *err);
 
-/* Time per map on one core: medians, ms, files not included. Mesh making and tree building count for the exact engine. */
+/* Time per map on one core, of its processor alone: medians, ms, files not included. Mesh making and tree building count for the exact engine. */
 typedef struct cli_timing {
     double ms_network, ms_batch; /* one map; one map of a batch of batch_size */
     size_t batch_size;

@@ -8,7 +8,9 @@
 #include "sdm/memory.h"
 #include "terminal.h"
 
-enum { N_NETWORK = 51, N_EXACT = 9, BATCH = 32, N_BATCHES = 3, NAIVE_STEP = 16 };
+enum { N_NETWORK = 51, N_LEAST = 3, N_EXACT = 9, BATCH = 32, N_BATCHES = 3, NAIVE_STEP = 16 };
+#define ENOUGH_S 6.0    /* for slow networks: no further map after this, no batch that takes longer */
+#define BATCH_BYTES 2e8 /* largest batch of large maps */
 
 static int compare_reals(const void *a, const void *b)
 {
@@ -26,33 +28,49 @@ static sdm_status time_network(const sdm_model *m, uint64_t seed, float *values,
 {
     const sdm_generate_opts opts = {.policy = SDM_RANGE_REFUSE, .n_threads = 1};
     double p[SDM_MAX_PARAMS], ms[N_NETWORK];
-    for (size_t i = 0; i <= N_NETWORK; i++) {
+    const double begin = cli_clock();
+    size_t n = 0;
+    for (size_t i = 0; i <= N_NETWORK && (n < N_LEAST || cli_clock() - begin < ENOUGH_S); i++) {
         cli_eval_params(m, seed, i, p);
-        const double start = cli_clock();
-        const sdm_status s = sdm_generate(m, p, &opts, values, NULL, err);
+        const double start = cli_thread_clock();
+        sdm_status s = sdm_generate(m, p, &opts, values, NULL, err);
+        if (!s) s = cli_check_interrupt(err);
         if (s) return s;
-        if (i > 0) ms[i - 1] = 1e3 * (cli_clock() - start); /* the first one warms up */
+        if (i > 0) ms[n++] = 1e3 * (cli_thread_clock() - start); /* the first one warms up */
     }
-    out->ms_network = cli_median(ms, N_NETWORK);
-    out->n_network = N_NETWORK;
+    out->ms_network = cli_median(ms, n);
+    out->n_network = n;
     return SDM_OK;
 }
 
-static sdm_status time_batch(const sdm_model *m, uint64_t seed, float *values, cli_timing *out, sdm_error *err)
+/* A batch of the usual size, or a smaller one where maps are large or slow. */
+static size_t batch_size(const sdm_model *m, double ms_network)
+{
+    const double bytes = (double)sdm_grid_count(&sdm_model_get_info(m)->grid) * sizeof(float);
+    return (size_t)fmax(1, fmin(BATCH, fmin(BATCH_BYTES / bytes, 1e3 * ENOUGH_S / ms_network)));
+}
+
+static sdm_status time_batch(const sdm_model *m, uint64_t seed, size_t size, cli_timing *out, sdm_error *err)
 {
     const sdm_generate_opts opts = {.policy = SDM_RANGE_REFUSE, .n_threads = 1};
     const size_t n_params = sdm_model_get_info(m)->n_params;
     double p[BATCH * SDM_MAX_PARAMS], ms[N_BATCHES];
-    for (size_t i = 0; i < BATCH; i++) cli_eval_params(m, seed, i, p + i * n_params);
-    for (size_t k = 0; k <= N_BATCHES; k++) {
-        const double start = cli_clock();
-        const sdm_status s = sdm_generate_batch(m, p, BATCH, &opts, values, NULL, err);
-        if (s) return s;
-        if (k > 0) ms[k - 1] = 1e3 * (cli_clock() - start) / BATCH;
+    const double begin = cli_clock();
+    float *values = NULL;
+    size_t n = 0;
+    sdm_status s = sdm_alloc((void **)&values, sdm_grid_count(&sdm_model_get_info(m)->grid), size * sizeof *values,
+                             "batch of maps to time", err);
+    for (size_t i = 0; i < size; i++) cli_eval_params(m, seed, i, p + i * n_params);
+    for (size_t k = 0; k <= N_BATCHES && !s && (n < 1 || cli_clock() - begin < ENOUGH_S); k++) {
+        const double start = cli_thread_clock();
+        s = sdm_generate_batch(m, p, size, &opts, values, NULL, err);
+        if (!s) s = cli_check_interrupt(err);
+        if (k > 0) ms[n++] = 1e3 * (cli_thread_clock() - start) / (double)size;
     }
-    out->ms_batch = cli_median(ms, N_BATCHES);
-    out->batch_size = BATCH;
-    return SDM_OK;
+    if (!s) out->ms_batch = cli_median(ms, n);
+    out->batch_size = size;
+    sdm_free(values);
+    return s;
 }
 
 static sdm_status time_exact(const sdm_model *m, const sdm_instance *shape, uint64_t seed, float *values,
@@ -62,11 +80,11 @@ static sdm_status time_exact(const sdm_model *m, const sdm_instance *shape, uint
     double p[SDM_MAX_PARAMS], ms[N_EXACT];
     for (size_t i = 0; i <= N_EXACT; i++) {
         cli_eval_params(m, seed, i, p);
-        const double start = cli_clock();
+        const double start = cli_thread_clock();
         sdm_status s = sdm_exact_shape_map(shape, p, &opts, &sdm_model_get_info(m)->grid, values, NULL, err);
         if (!s) s = cli_check_interrupt(err);
         if (s) return s;
-        if (i > 0) ms[i - 1] = 1e3 * (cli_clock() - start);
+        if (i > 0) ms[i - 1] = 1e3 * (cli_thread_clock() - start);
     }
     out->ms_exact = cli_median(ms, N_EXACT);
     out->n_exact = N_EXACT;
@@ -82,10 +100,10 @@ sdm_status cli_time_naive(const sdm_mesh *mesh, const sdm_grid *grid, double *ms
     float *values = NULL;
     sdm_status s = SDM_ALLOC(&values, sdm_grid_count(&thin), "map of the naive method", err);
     if (s) return s;
-    const double start = cli_clock();
+    const double start = cli_thread_clock();
     s = sdm_naive_map(mesh, &thin, 1, values, err);
     *share = (double)thin.n[2] / (double)grid->n[2];
-    *ms = 1e3 * (cli_clock() - start) / *share;
+    *ms = 1e3 * (cli_thread_clock() - start) / *share;
     sdm_free(values);
     return s;
 }
@@ -115,10 +133,9 @@ sdm_status cli_time_maps(const sdm_model *m, const sdm_instance *shape, uint64_t
     memset(out, 0, sizeof *out);
     out->ms_exact = out->ms_naive = out->naive_share = NAN;
     float *values = NULL;
-    sdm_status s = sdm_alloc((void **)&values, sdm_grid_count(&sdm_model_get_info(m)->grid), BATCH * sizeof *values,
-                             "maps to time", err);
+    sdm_status s = SDM_ALLOC(&values, sdm_grid_count(&sdm_model_get_info(m)->grid), "map to time", err);
     if (!s) s = time_network(m, seed, values, out, err);
-    if (!s) s = time_batch(m, seed, values, out, err);
+    if (!s) s = time_batch(m, seed, batch_size(m, out->ms_network), out, err);
     if (!s && shape) s = time_exact(m, shape, seed, values, out, err);
     if (!s && shape) s = time_naive(m, shape, seed, n_naive, out, err);
     sdm_free(values);

@@ -8,10 +8,10 @@
 #define ALL (ON(CLI_N_COMMANDS) - 1u)
 #define WITH_SHAPES                                                                                                    \
     (ON(CLI_TRAIN) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_EVAL) | ON(CLI_SHAPES) |                 \
-     ON(CLI_VERIFY) | ON(CLI_CONFIG) | ON(CLI_BENCH))
+     ON(CLI_VERIFY) | ON(CLI_CONFIG) | ON(CLI_BENCH) | ON(CLI_EXPERIMENT) | ON(CLI_PHANTOM))
 #define REPORTS                                                                                                        \
     (ON(CLI_TRAIN) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_EVAL) | ON(CLI_SHAPES) | ON(CLI_INFO) |  \
-     ON(CLI_VERIFY) | ON(CLI_BENCH))
+     ON(CLI_VERIFY) | ON(CLI_BENCH) | ON(CLI_EXPERIMENT) | ON(CLI_PHANTOM))
 
 const cli_command cli_commands[CLI_N_COMMANDS] = {
     {"train", "CONFIG [key=value ...]", "train a network on the shape of a configuration",
@@ -42,12 +42,13 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "sdmgen eval runs/cochlea/model.sdm --samples 100 --json", 1, 1, cmd_eval},
     {"shapes", "[NAME]", "list the shapes, or the parameters and options of one", NULL, "sdmgen shapes cochlea", 0, 1,
      cmd_shapes},
-    {"info", "FILE", "tell what a model, level set or mesh file holds", NULL, "sdmgen info runs/cochlea/model.sdm", 1,
-     1, cmd_info},
-    {"verify", "FILE", "check a model or level set file",
+    {"info", "FILE", "tell what a model, level set, image or mesh file holds", NULL,
+     "sdmgen info runs/cochlea/model.sdm", 1, 1, cmd_info},
+    {"verify", "FILE", "check a model, level set or image file",
      "A model: every checksum, then its accuracy is measured again on random shapes, if its shape is known; exit code "
      "4 if\n"
-     "the RMSE is more than 25 % above the stated one. A .vdb: the hash of its values, and OpenVDB's checkLevelSet.",
+     "the RMSE is more than 25 % above the stated one. A .vdb: the hash of its values, and OpenVDB's checkLevelSet.\n"
+     "An image (.nii .nrrd .mha ...): that it is whole, and the checksum of gzip or zlib where it is compressed.",
      "sdmgen verify runs/cochlea/model.sdm --samples 50", 1, 1, cmd_verify},
     {"config", "[CONFIG] [key=value ...]", "check, print or explain a configuration",
      "Checks the configuration, the shape's options and the ranges. --dump prints it with every key resolved; --keys\n"
@@ -61,34 +62,61 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "sdmgen-peer-NAME beside sdmgen or in libexec/sdmgen; what is missing is said.\n"
      "network: one map and a batch of a model on one core, against the exact engine.",
      "sdmgen bench exact", 1, 2, cmd_bench},
+    {"experiment", "CONFIG [key=value ...]", "compare methods in one table, beside the figures of others",
+     "Trains the networks of the experiment or loads those that are there, times every method on one core, measures "
+     "the "
+     "errors on\n"
+     "random shapes no network was trained on, draws slices and surfaces, and writes table.md, table.csv, table.json "
+     "and "
+     "log.txt.\n"
+     "key=value overrides a key of the experiment (experiment.samples=20) or of every training (train.minutes=1). A "
+     "row "
+     "that fails\n"
+     "has its reason in the table, the others go on, and the exit code tells. The same command again goes on where it "
+     "stopped.",
+     "sdmgen experiment configs/paper.yaml --out runs/paper", 0, SIZE_MAX, cmd_experiment},
+    {"phantom", "--shape NAME [-p name=value ...] -o FILE", "make a CT-like test image with known truth",
+     "The image of a shape in a given or random pose: partial volume, tissue texture, blur and noise. --label\n"
+     "writes the labels, --truth all that is known of the image. Without grid options the grid is fitted to the\n"
+     "shape, 64 voxels on the longest edge. --rotation and --frame are rotation vectors: axis times angle, in rad.",
+     "sdmgen phantom --shape cochlea --random-params --random-pose 20,1 --spacing 0.2 -o ct.nii.gz --truth truth.json",
+     0, 0, cmd_phantom},
     {"help", "[COMMAND]", "print this text, the manual page or the bash completion", NULL,
      "sdmgen help --completion > ~/.local/share/bash-completion/completions/sdmgen", 0, 1, cmd_help},
 };
 
 const cli_option cli_options[] = {
     /* the shape and its parameters */
-    {"shape", 0, CLI_TEXT, "NAME", NULL, 0, 0, ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH), AT(shape),
-     "shape, see `sdmgen shapes`"},
+    {"shape", 0, CLI_TEXT, "NAME", NULL, 0, 0, ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH) | ON(CLI_PHANTOM),
+     AT(shape), "shape, see `sdmgen shapes`"},
     {"mesh", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_EXACT) | ON(CLI_BENCH), AT(mesh), "mesh file instead of a shape"},
-    {"param", 'p', CLI_LIST, "name=value", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH),
-     AT(params), "value of a shape parameter; may be repeated"},
-    {"option", 'O', CLI_LIST, "name=value", NULL, 0, 0, ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_SHAPES) | ON(CLI_BENCH),
-     AT(options), "value of a shape option; may be repeated"},
+    {"param", 'p', CLI_LIST, "name=value", NULL, 0, 0,
+     ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH) | ON(CLI_PHANTOM), AT(params),
+     "value of a shape parameter; may be repeated"},
+    {"option", 'O', CLI_LIST, "name=value", NULL, 0, 0,
+     ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_SHAPES) | ON(CLI_BENCH) | ON(CLI_PHANTOM), AT(options),
+     "value of a shape option; may be repeated"},
     {"params", 0, CLI_TEXT, "FILE.csv", NULL, 0, 0, ON(CLI_GENERATE), AT(rows),
      "parameters from a table: a header of names, one output per row"},
 
     /* the grid */
-    {"size", 0, CLI_INT3, "NX,NY,NZ", NULL, 1, 1048576, ON(CLI_EXACT) | ON(CLI_BENCH), AT(size),
+    {"size", 0, CLI_INT3, "NX,NY,NZ", NULL, 1, 1048576, ON(CLI_EXACT) | ON(CLI_BENCH) | ON(CLI_PHANTOM), AT(size),
      "voxels along x, y, z"},
-    {"spacing", 0, CLI_REAL13, "MM", NULL, 1e-9, 1e9, ON(CLI_EXACT) | ON(CLI_BENCH), AT(spacing),
+    {"spacing", 0, CLI_REAL13, "MM", NULL, 1e-9, 1e9, ON(CLI_EXACT) | ON(CLI_BENCH) | ON(CLI_PHANTOM), AT(spacing),
      "voxel edge, one number or three"},
-    {"origin", 0, CLI_REAL3, "X,Y,Z", NULL, -1e12, 1e12, ON(CLI_EXACT) | ON(CLI_BENCH), AT(origin),
+    {"origin", 0, CLI_REAL3, "X,Y,Z", NULL, -1e12, 1e12, ON(CLI_EXACT) | ON(CLI_BENCH) | ON(CLI_PHANTOM), AT(origin),
      "centre of the first voxel, LPS mm; default: the grid is centred on the mesh"},
 
     /* how */
     {"policy", 0, CLI_CHOICE, NULL, "refuse|clamp|exact", 0, 0, ON(CLI_GENERATE), AT(policy),
      "parameters outside the trained range: refuse (default), move to the nearest allowed value, or use the exact "
      "engine"},
+    {"check", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE), AT(check),
+     "compare the map with exact distances at 1000 voxels near the surface and print the errors; needs the shape"},
+    {"max-error", 0, CLI_REAL, "MM", NULL, 1e-12, 1e9, ON(CLI_GENERATE), AT(max_error),
+     "check, and have a map that is worse than this made by the exact engine; with --policy clamp: exit code 4"},
+    {"error-of", 0, CLI_CHOICE, NULL, "max|q95|rmse|mean", 0, 0, ON(CLI_GENERATE), AT(error_of),
+     "the figure that --max-error bounds: largest error (default), 95 % quantile, root mean square or mean"},
     {"method", 0, CLI_CHOICE, NULL, "exact|naive|cells|octree|edt", 0, 0, ON(CLI_EXACT), AT(method),
      "exact: the engine (default); naive: every triangle for every voxel, all surface counted; cells: uniform cells of "
      "triangles (exact); octree: adaptive samples, off by at most --tolerance; edt: distance transform, the bound on "
@@ -108,6 +136,8 @@ const cli_option cli_options[] = {
     /* the output */
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(outputs),
      "output: .vdb .nii .nii.gz .nrrd .mha .npy .ply .stl .obj .off .png; may be repeated"},
+    {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_PHANTOM), AT(outputs),
+     "the image: .nii .nii.gz .nrrd .mha .npy; may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_MESH), AT(outputs),
      "output: .ply .stl .obj .off; may be repeated"},
     {"closest", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(closest),
@@ -116,7 +146,9 @@ const cli_option cli_options[] = {
      "also write the gradient of the distance, a unit vector: float32 [z][y][x][3]"},
     {"triangle", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(triangle),
      "also write the nearest triangle of the mesh, counted from 0: uint32 [z][y][x]"},
-    {"jacobian", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(jacobian),
+    {"gradient", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_GENERATE), AT(gradient),
+     "also write the derivatives of the map along x, y, z (LPS): float32 [3][z][y][x]"},
+    {"jacobian", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(jacobian),
      "also write the derivatives by the shape's parameters: float32 [parameter][z][y][x], mm per unit"},
     {"audit", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_MESH), AT(audit), "examine the mesh and print what was found"},
     {"dense", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(dense),
@@ -124,10 +156,13 @@ const cli_option cli_options[] = {
     {"half", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(half), ".vdb: 16-bit values"},
     {"band", 0, CLI_REAL, "N", NULL, 3, 100, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(band),
      ".vdb: half width of the narrow band in voxels (default 3)"},
-    {"out", 0, CLI_TEXT, "DIR", NULL, 0, 0, ON(CLI_TRAIN), AT(out),
-     "run folder (default: output.folder of the configuration, or runs/NAME)"},
+    {"out", 0, CLI_TEXT, "DIR", NULL, 0, 0, ON(CLI_TRAIN) | ON(CLI_EXPERIMENT), AT(out),
+     "run folder (default: what the configuration says, or runs/NAME)"},
     {"resume", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN), AT(resume), "go on from the folder's checkpoint"},
-    {"force", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN), AT(force), "start anew in a folder that holds a model"},
+    {"force", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN) | ON(CLI_EXPERIMENT), AT(force),
+     "start anew in a folder that holds a model"},
+    {"dry-run", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_EXPERIMENT), AT(dry_run),
+     "print what would be done and how long the trainings take"},
 
     /* measuring */
     {"samples", 0, CLI_INT, "N", NULL, 1, 1000000, ON(CLI_EVAL), AT(samples), "random shapes (default 100)"},
@@ -149,15 +184,55 @@ const cli_option cli_options[] = {
      "exact: other programs do this share of the voxels, times are scaled (default 1; above a million voxels 0.01)"},
     {"repeat", 0, CLI_INT, "N", NULL, 1, 1000, ON(CLI_BENCH), AT(repeat),
      "exact: runs of each, the fastest counts; none is begun after 3 s (default 9)"},
-    {"peers", 0, CLI_TEXT, "DIR", NULL, 0, 0, ON(CLI_BENCH), AT(peers),
-     "exact: folder of the other programs; none: without them"},
+    {"peers", 0, CLI_TEXT, "DIR", NULL, 0, 0, ON(CLI_BENCH) | ON(CLI_EXPERIMENT), AT(peers),
+     "folder of the other programs; none: without them"},
     {"growth", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_BENCH), AT(growth),
      "exact: how the time grows, over three grids and three meshes"},
 
+    /* phantoms */
+    {"rotation", 0, CLI_REAL3, "X,Y,Z", NULL, -1000, 1000, ON(CLI_PHANTOM), AT(phantom.rotation),
+     "turn of the shape about the origin of its frame: rotation vector, rad"},
+    {"translation", 0, CLI_REAL3, "X,Y,Z", NULL, -1e12, 1e12, ON(CLI_PHANTOM), AT(phantom.translation),
+     "shift of the shape after the turn, LPS mm"},
+    {"random-pose", 0, CLI_REAL2, "DEG,MM", NULL, 0, 1e12, ON(CLI_PHANTOM), AT(phantom.random_pose),
+     "random turn and shift of at most this, after those given"},
+    {"random-params", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_PHANTOM), AT(phantom.random_params),
+     "parameters without -p are drawn from their ranges"},
+    {"frame", 0, CLI_REAL3, "X,Y,Z", NULL, -1000, 1000, ON(CLI_PHANTOM), AT(phantom.frame),
+     "turn of the axes of the image: rotation vector, rad"},
+    {"crop", 0, CLI_REAL3, "X,Y,Z", NULL, -0.95, 0.95, ON(CLI_PHANTOM), AT(phantom.crop),
+     "cut the grid this share of the shape's extent before its far end, negative: behind its near end (--size: moved)"},
+    {"inside", 0, CLI_REAL2, "MEAN,SD", NULL, -1e6, 1e6, ON(CLI_PHANTOM), AT(phantom.inside),
+     "values inside: mean and texture, HU (default 40,80)"},
+    {"outside", 0, CLI_REAL2, "MEAN,SD", NULL, -1e6, 1e6, ON(CLI_PHANTOM), AT(phantom.outside),
+     "values outside (default 1300,225)"},
+    {"air", 0, CLI_REAL2, "MEAN,SD", NULL, -1e6, 1e6, ON(CLI_PHANTOM), AT(phantom.air),
+     "values in air cells (default -880,0)"},
+    {"air-cells", 0, CLI_REAL3, "SHARE,MM,CLEAR", NULL, 0, 1e6, ON(CLI_PHANTOM), AT(phantom.air_cells),
+     "air cells outside: share of the places taken (0 .. 1), diameter, distance kept from the surface (default: none)"},
+    {"blur", 0, CLI_REAL13, "MM", NULL, 0, 1e9, ON(CLI_PHANTOM), AT(phantom.blur),
+     "standard deviation of the point spread, one number or three (default 0.15)"},
+    {"texture", 0, CLI_REAL, "MM", NULL, 0, 1e9, ON(CLI_PHANTOM), AT(phantom.texture),
+     "smoothness of the tissues' texture (default 0.4; 0: voxel by voxel)"},
+    {"noise", 0, CLI_REAL, "HU", NULL, 0, 1e6, ON(CLI_PHANTOM), AT(phantom.noise),
+     "standard deviation of the noise (default 150)"},
+    {"white-noise", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_PHANTOM), AT(phantom.white_noise),
+     "noise of every voxel by itself (default: as smooth as the blur)"},
+    {"supersample", 0, CLI_INT, "N", NULL, 1, 16, ON(CLI_PHANTOM), AT(phantom.supersample),
+     "sub-voxels along the shortest edge of a voxel (default 3)"},
+    {"type", 0, CLI_CHOICE, NULL, "int16|float32", 0, 0, ON(CLI_PHANTOM), AT(phantom.type),
+     "voxels of the image, rounded to whole HU (default) or not; .npy is float32"},
+    {"label", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_PHANTOM), AT(phantom.label),
+     "also write the labels, 1 inside and 0 outside: .nii .nii.gz .nrrd .mha"},
+    {"truth", 0, CLI_TEXT, "FILE.json", NULL, 0, 0, ON(CLI_PHANTOM), AT(phantom.truth),
+     "also write what the image shows: shape, parameters, pose, grid and all that was chosen"},
+
     /* texts */
     {"dump", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_CONFIG), AT(dump), "print the resolved configuration as YAML"},
-    {"keys", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_CONFIG), AT(keys), "list every key (no CONFIG needed)"},
-    {"markdown", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_CONFIG) | ON(CLI_HELP), AT(markdown), "as Markdown"},
+    {"keys", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_CONFIG) | ON(CLI_EXPERIMENT), AT(keys),
+     "list every key (no CONFIG needed)"},
+    {"markdown", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_CONFIG) | ON(CLI_EXPERIMENT) | ON(CLI_HELP), AT(markdown),
+     "as Markdown"},
     {"man", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_HELP), AT(man), "the manual page, for man(1)"},
     {"completion", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_HELP), AT(completion), "the completion script for bash"},
 
@@ -167,7 +242,7 @@ const cli_option cli_options[] = {
     {"threads", 0, CLI_INT, "N", NULL, 0, 1024, ALL & ~ON(CLI_HELP), AT(threads),
      "threads; 0: all (default). Results are the same for every number"},
     {"seed", 0, CLI_INT, "N", NULL, 0, 9007199254740992.0,
-     ON(CLI_TRAIN) | ON(CLI_CONFIG) | ON(CLI_EVAL) | ON(CLI_VERIFY) | ON(CLI_BENCH), AT(seed),
+     ON(CLI_TRAIN) | ON(CLI_CONFIG) | ON(CLI_EVAL) | ON(CLI_VERIFY) | ON(CLI_BENCH) | ON(CLI_PHANTOM), AT(seed),
      "seed of the random numbers (default 1; train, config: the configuration's)"},
     {"json", 0, CLI_FLAG, NULL, NULL, 0, 0, REPORTS, AT(json), "print the result as one line of JSON"},
     {"quiet", 'q', CLI_FLAG, NULL, NULL, 0, 0, ALL, AT(quiet), "no progress and no notices"},

@@ -29,6 +29,7 @@ typedef enum cli_kind {
     CLI_CHOICE, /* const char *, one of `choices` */
     CLI_LIST,   /* cli_list: may be repeated */
     CLI_INT3,   /* int64_t[3], comma separated */
+    CLI_REAL2,  /* double[2], comma separated */
     CLI_REAL3,  /* double[3], comma separated */
     CLI_REAL13  /* double[3], one number for all or three */
 } cli_kind;
@@ -57,6 +58,8 @@ enum {
     CLI_VERIFY,
     CLI_CONFIG,
     CLI_BENCH,
+    CLI_EXPERIMENT,
+    CLI_PHANTOM,
     CLI_HELP,
     CLI_N_COMMANDS
 };
@@ -65,6 +68,18 @@ typedef struct cli_list {
     const char **items; /* of argv */
     size_t n;
 } cli_list;
+
+/* Options of `phantom`; numbers that were not given are NaN. */
+typedef struct cli_phantom_args {
+    double rotation[3], translation[3], random_pose[2];
+    bool random_params;
+    double frame[3], crop[3];
+    double inside[2], outside[2], air[2], air_cells[3];
+    double blur[3], texture, noise;
+    bool white_noise;
+    int64_t supersample; /* 0: not given */
+    const char *type, *label, *truth;
+} cli_phantom_args;
 
 /* A parsed command line. Numbers that were not given keep the default of the table's help text; seed -1, size[0] 0,
    spacing[0] 0 and origin[0] NaN mean "not given". */
@@ -85,14 +100,19 @@ struct cli_args {
     const char *shape, *mesh;             /* exact, mesh */
     const char *sign, *method, *pictures; /* exact, eval */
     const char *closest, *normal;         /* exact */
-    const char *triangle, *jacobian;      /* exact */
+    const char *triangle, *jacobian;      /* exact; jacobian: generate too */
+    bool check;                           /* generate */
+    double max_error;                     /* generate; 0: not given */
+    const char *error_of, *gradient;      /* generate */
     double band, max_mse, spacing[3], origin[3];
     int64_t size[3], samples, naive;
     const char *grid, *peers; /* bench */
     double edge, share;       /* bench; 0: not given */
     int64_t repeat;           /* bench; 0: not given */
     bool growth;              /* bench */
-    const char **memory;      /* behind the lists */
+    bool dry_run;             /* experiment */
+    cli_phantom_args phantom;
+    const char **memory; /* behind the lists */
 };
 
 extern const cli_command cli_commands[CLI_N_COMMANDS];

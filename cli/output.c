@@ -68,11 +68,19 @@ sdm_status cli_check_outputs(const cli_list *outputs, bool meshes_only, sdm_erro
 /* What made the map, in a word. */
 static const char *made_by(const cli_map *map) { return map->source == SDM_SOURCE_NETWORK ? "network" : map->origin; }
 
+/* The same with what else is to be known about it. */
+static void describe(const cli_map *map, char text[80])
+{
+    static const char *const reasons[] = {"", " (out of the trained range)", " (network over the bound)"};
+    snprintf(text, 80, "%s%s%s", made_by(map), map->clamped ? " (clamped)" : "", reasons[map->reason]);
+}
+
 static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args *args, sdm_error *err)
 {
 #ifdef SDM_HAVE_VDB
-    char error[64], error_number[32];
-    snprintf(error, sizeof error, "%s", sdm_format_real(map->error_mm, error_number));
+    static const char *const reasons[] = {"none", "range", "error"};
+    const sdm_check none = {0}, *check = map->check ? map->check : &none;
+    char error[32], rmse[32], q95[32], max[32];
     const sdm_named_value metadata[] = {
         {"sdm_version", "sdmgen " SDM_VERSION_TEXT},
         {"sdm_shape", map->shape},
@@ -80,13 +88,18 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
         {"sdm_source", made_by(map)},
         {"sdm_origin", map->origin},
         {"sdm_clamped", map->clamped ? "yes" : "no"},
-        {"sdm_error_rmse_mm", error},
+        {"sdm_error_rmse_mm", sdm_format_real(map->error_mm, error)},
+        {"sdm_exact_reason", reasons[map->reason]},
+        {"sdm_check_rmse_mm", sdm_format_real(check->rmse_mm, rmse)},
+        {"sdm_check_q95_mm", sdm_format_real(check->q95_mm, q95)},
+        {"sdm_check_max_mm", sdm_format_real(check->max_mm, max)},
     };
+    const size_t n_metadata = sizeof metadata / sizeof *metadata - (map->check ? 0 : 3);
     const sdm_vdb_opts opts = {.band_voxels = args->band,
                                .dense = args->dense,
                                .half = args->half,
                                .metadata = metadata,
-                               .n_metadata = sizeof metadata / sizeof *metadata};
+                               .n_metadata = n_metadata};
     sdm_vdb_report report = {0};
     const sdm_status s = sdm_vdb_write(path, map->grid, map->values, &opts, &report, err);
     if (!s && report.adjusted_voxels > 0)
@@ -116,19 +129,23 @@ static sdm_status write_surface(const char *path, const cli_map *map, sdm_error 
 static sdm_status write_picture(const char *path, const cli_map *map, sdm_error *err)
 {
     static const float levels[] = {0.0f, 1.0f};
-    const sdm_picture_map column = {made_by(map), map->values, false};
+    char title[80];
+    describe(map, title);
+    const sdm_picture_map column = {title, map->values, false};
     return sdm_picture_slices(path, map->grid, &column, 1, levels, 2, err);
 }
 
 sdm_status cli_write_map(const char *path, const cli_map *map, const cli_args *args, sdm_error *err)
 {
-    char text[400];
+    char text[400], made[80];
     switch (kind_of(path, NULL)) {
     case KIND_VDB:
         return write_vdb(path, map, args, err);
     case KIND_IMAGE:
-        snprintf(text, sizeof text, "sdmgen %s: %s %s, mm, negative inside, %s", SDM_VERSION_TEXT, map->shape,
-                 map->params, made_by(map));
+        // how it was made first: a NIfTI file keeps 79 characters
+        describe(map, made);
+        snprintf(text, sizeof text, "sdmgen %s: %s: %s %s, mm, negative inside", SDM_VERSION_TEXT, made, map->shape,
+                 map->params);
         return sdm_image_write(path, map->grid, map->values, text, err);
     case KIND_SURFACE:
         return write_surface(path, map, err);

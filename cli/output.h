@@ -15,7 +15,9 @@ typedef struct cli_map {
     sdm_source source;
     bool clamped;
     double error_mm;
-    const char *origin; /* the model's checksum, or the method without a network: "exact", "edt" ... */
+    const char *origin;     /* the model's checksum, or the method without a network: "exact", "edt" ... */
+    sdm_reason reason;      /* why the exact engine stood in for the network */
+    const sdm_check *check; /* of the network's map; NULL: not checked */
 } cli_map;
 
 /* Checks, before any work, that the type of each file is known and that the file can be made. SDM_E_ARG, SDM_E_IO. */

@@ -136,10 +136,8 @@ sdm_status cli_check_range(const sdm_param *params, size_t n, const double *valu
         if (values[i] >= p->min && values[i] <= p->max) continue;
         char v[32], low[32], high[32];
         return sdm_fail(err, SDM_E_RANGE, "parameter %s = %s, allowed %s .. %s%s%s", p->name,
-                        isfinite(values[i]) ? sdm_format_real(values[i], v)
-                        : isnan(values[i])  ? "nan"
-                                            : "inf",
-                        sdm_format_real(p->min, low), sdm_format_real(p->max, high), *p->unit ? " " : "", p->unit);
+                        isnan(values[i]) ? "nan" : sdm_format_real(values[i], v), sdm_format_real(p->min, low),
+                        sdm_format_real(p->max, high), *p->unit ? " " : "", p->unit);
     }
     return SDM_OK;
 }

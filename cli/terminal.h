@@ -46,6 +46,8 @@ sdm_status cli_print_json(sdm_json *json, sdm_error *err);
 
 /* Seconds of a clock that only goes forward. */
 double cli_clock(void);
+/* Seconds of this thread's processor: other programs on the machine do not count. */
+double cli_thread_clock(void);
 
 /* Number of threads for --threads N (0: all of OpenMP's). */
 int cli_threads(int64_t asked);

@@ -49,8 +49,9 @@ static void test_defaults(void **state)
     assert_int_equal(config.network.kind, SDM_NETWORK_POD);
     assert_int_equal(config.network.depth, 3);
     assert_int_equal(config.network.width, 128);
-    assert_int_equal(config.network.rank, 24);
-    assert_int_equal(config.network.block, 8);
+    assert_int_equal(config.network.rank, 9);
+    assert_int_equal(config.network.block, 4);
+    assert_int_equal(config.network.levels, 3);
     assert_int_equal(config.network.modes, 512);
     assert_int_equal(config.network.degree, 6);
     assert_int_equal(config.network.input_degree, 4);
@@ -158,6 +159,68 @@ static void test_overrides(void **state)
     expect_ok("grid: {size: [4, 5, 6], spacing: 1}\ntrain: {steps: 10}\n", "shape.name=ball");
 }
 
+// network.kind decides about keys and defaults
+static void test_kinds(void **state)
+{
+    (void)state;
+    expect_ok(BASE "network: {kind: deepsdf}\n", NULL);
+    assert_int_equal(config.network.kind, SDM_NETWORK_DEEPSDF);
+    assert_int_equal(config.network.depth, 8);
+    assert_int_equal(config.network.width, 512);
+    assert_int_equal(config.network.skip, 4);
+    assert_int_equal(config.network.activation, SDM_ACTIVATION_RELU);
+    assert_int_equal(config.network.output, SDM_OUTPUT_TANH);
+    assert_int_equal(config.train.batch, 16);
+    assert_int_equal(config.train.points, 512);
+    assert_true(config.train.learning_rate == 5e-4 && config.train.eikonal == 0 && config.train.clamp_mm == 0.1);
+    expect_ok(BASE "network: {kind: imnet, depth: 3}\n", NULL);
+    assert_int_equal(config.network.depth, 3);
+    assert_int_equal(config.network.width, 2048);
+    assert_int_equal(config.network.activation, SDM_ACTIVATION_LEAKY_RELU);
+    assert_int_equal(config.network.output, SDM_OUTPUT_LINEAR);
+    expect_ok(BASE "network: {kind: sdmnn, channels: 8}\n", NULL);
+    assert_int_equal(config.network.depth, 4);
+    assert_int_equal(config.network.channels, 8);
+    assert_true(config.network.dropout == 0.1 && config.train.batch == 8 && config.train.learning_rate == 1e-3);
+
+    // another kind by an override: keys of the file that it does not have step back, the others stay
+    static const char pod[] = BASE "network: {kind: pod, depth: 2, rank: 7, weights: f32}\ndata: {online: 9}\n";
+    static const char *const to_deepsdf[] = {"network.kind=deepsdf", "network.width=64"};
+    assert_int_equal(parse(pod, to_deepsdf, 2), SDM_OK);
+    assert_int_equal(config.network.depth, 2);
+    assert_int_equal(config.network.skip, 1);
+    assert_true(config.train.learning_rate == 5e-4);
+    assert_int_equal(config.network.width, 64);
+    assert_int_equal(config.network.rank, 9);
+    assert_int_equal(config.network.weights, SDM_WEIGHT_F32);
+    assert_int_equal(config.data.online, 9);
+    expect_ok(pod, "network.kind=pod");
+    assert_int_equal(config.network.depth, 2);
+    assert_int_equal(config.network.rank, 7);
+    static const char *const there_and_back[] = {"network.kind=deepsdf", "network.kind=pod"};
+    assert_int_equal(parse(pod, there_and_back, 2), SDM_OK);
+    assert_int_equal(config.network.rank, 7);
+
+    expect_mistake(BASE "network: {kind: deepsdf, rank: 7}\n", NULL,
+                   "x.yaml:4:26: network.rank: a network of kind deepsdf has no such key, only pod");
+    expect_mistake(BASE, "train.eikonal=1",
+                   "argument 'train.eikonal=1': train.eikonal: a network of kind pod has no such key, only sdmnn, "
+                   "deepsdf, imnet");
+    expect_mistake(BASE "network: {kind: imnet, depth: 0}\n", NULL,
+                   "x.yaml:4:24: network.depth: 0 is out of range (1 .. 16) for a network of kind imnet");
+    expect_mistake(BASE "network: {block: 1}\n", NULL,
+                   "x.yaml:4:11: network.block: 1 is out of range (2 .. 16) for a network of kind pod");
+    expect_mistake(BASE "network: {kind: deepsdf, depth: 3, skip: 3}\n", NULL,
+                   "x.yaml:4:36: network.skip: 3 is out of range (0 .. 2) for a network of kind deepsdf");
+    expect_mistake(BASE "network: {kind: deepsdf, depth: 3, skip: x}\n", NULL,
+                   "x.yaml:4:42: network.skip: needs an integer, got 'x'");
+    expect_ok(BASE "network: {kind: deepsdf, depth: 3}\n", NULL);
+    assert_int_equal(config.network.skip, 1);
+    expect_mistake(BASE, "network.kind=podd",
+                   "argument 'network.kind=podd': network.kind: 'podd' is not one of pod, sdmnn, deepsdf, imnet; did "
+                   "you mean 'pod'?");
+}
+
 static void test_mistakes(void **state)
 {
     static const struct {
@@ -179,8 +242,9 @@ static void test_mistakes(void **state)
         {"network: {depth: }", "x.yaml:4:18: network.depth: needs an integer, got nothing"},
         {"network: 4", "x.yaml:4:10: network: needs keys with values, got '4'"},
         {"network: {activation: silo}",
-         "x.yaml:4:23: network.activation: 'silo' is not one of silu, tanh, relu; did you mean 'silu'?"},
-        {"network: {activation: 1}", "x.yaml:4:23: network.activation: '1' is not one of silu, tanh, relu"},
+         "x.yaml:4:23: network.activation: 'silo' is not one of silu, tanh, relu, leaky_relu; did you mean 'silu'?"},
+        {"network: {activation: 1}", "x.yaml:4:23: network.activation: '1' is not one of silu, tanh, relu, "
+                                     "leaky_relu"},
         {"data: {online: 99999999999999999999}",
          "x.yaml:4:16: data.online: 99999999999999999999 is out of range (0 .. 10000000)"},
         {"data: {static: 5000}", "x.yaml:4:16: data.static: 5000 is out of range (0 .. 1000)"},
@@ -401,11 +465,17 @@ static void test_short_memory(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_defaults),      cmocka_unit_test(test_values),
-        cmocka_unit_test(test_overrides),     cmocka_unit_test(test_mistakes),
-        cmocka_unit_test(test_rules),         cmocka_unit_test(test_override_mistakes),
-        cmocka_unit_test(test_many_mistakes), cmocka_unit_test(test_folder_from_name),
-        cmocka_unit_test(test_locale),        cmocka_unit_test(test_misuse),
+        cmocka_unit_test(test_defaults),
+        cmocka_unit_test(test_values),
+        cmocka_unit_test(test_overrides),
+        cmocka_unit_test(test_kinds),
+        cmocka_unit_test(test_mistakes),
+        cmocka_unit_test(test_rules),
+        cmocka_unit_test(test_override_mistakes),
+        cmocka_unit_test(test_many_mistakes),
+        cmocka_unit_test(test_folder_from_name),
+        cmocka_unit_test(test_locale),
+        cmocka_unit_test(test_misuse),
         cmocka_unit_test(test_short_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

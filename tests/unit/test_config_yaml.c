@@ -171,19 +171,38 @@ static void random_shape(sdm_config *c)
     }
 }
 
+// keys that the kind does not have keep their defaults
+static void random_network(sdm_config *c)
+{
+    const sdm_network_kind kind = (sdm_network_kind)random_int(0, 3);
+    const bool pod = kind == SDM_NETWORK_POD, sdmnn = kind == SDM_NETWORK_SDMNN, points = !pod && !sdmnn;
+    c->network.kind = kind;
+    c->network.depth = (int)random_int(pod ? 0 : 1, sdmnn ? 6 : 16);
+    c->network.width = (int)random_int(8, 4096);
+    c->network.rank = pod ? (int)random_int(1, 256) : 9;
+    c->network.levels = pod ? (int)random_int(1, 8) : 3;
+    c->network.block = pod || sdmnn ? (int)random_int(pod ? 2 : 1, 16) : 4;
+    c->network.modes = pod ? (int)random_int(8, 2048) : 512;
+    c->network.degree = pod ? (int)random_int(0, 12) : 6;
+    c->network.input_degree = pod ? (int)random_int(1, 8) : 4;
+    c->network.channels = sdmnn ? (int)random_int(1, 512) : 16;
+    c->network.dropout = sdmnn ? random_real(0, 0.9) : 0.1;
+    c->network.skip = kind == SDM_NETWORK_DEEPSDF ? (int)random_int(0, c->network.depth - 1) : 4;
+    c->network.output = points ? (sdm_output)random_int(0, 1) : SDM_OUTPUT_LINEAR;
+    c->network.activation = (sdm_activation)random_int(0, 3);
+    c->network.weights = (sdm_weight_type)random_int(0, 1);
+    c->train.points = points ? (int)random_int(8, 1048576) : 512;
+    c->train.eikonal = pod ? 0 : random_real(0, 1000);
+    c->train.refine = pod ? random_real(0, 1) : 0.4;
+    c->train.refine_batch = pod ? (int)random_int(1, 4096) : 32;
+    c->train.refine_rate = pod ? random_real(1e-9, 1) : 3e-4;
+}
+
 static void random_config(sdm_config *c)
 {
     memset(c, 0, sizeof *c);
     random_shape(c);
-    c->network.depth = (int)random_int(0, 16);
-    c->network.width = (int)random_int(8, 1024);
-    c->network.rank = (int)random_int(1, 256);
-    c->network.block = (int)random_int(2, 16);
-    c->network.modes = (int)random_int(8, 2048);
-    c->network.degree = (int)random_int(0, 12);
-    c->network.input_degree = (int)random_int(1, 8);
-    c->network.activation = (sdm_activation)random_int(0, 2);
-    c->network.weights = (sdm_weight_type)random_int(0, 1);
+    random_network(c);
     c->data.n_static_counts = (size_t)random_int(0, 5);
     for (size_t i = 0; i < c->data.n_static_counts; i++) c->data.static_counts[i] = random_int(1, 1000);
     c->data.online = random_int(0, 10000000);
@@ -199,12 +218,10 @@ static void random_config(sdm_config *c)
     c->train.batch = (int)random_int(1, 65536);
     c->train.learning_rate = random_real(1e-9, 1);
     c->train.warmup = random_real(0, 0.5);
-    c->train.loss = (sdm_loss)random_int(0, 2);
+    c->train.loss = (sdm_loss)random_int(0, 3);
+    c->train.clamp_mm = random_real(1e-6, 1e6);
     c->train.near_weight = random_real(0, 100);
     c->train.near_mm = random_real(1e-6, 1e6);
-    c->train.refine = random_real(0, 1);
-    c->train.refine_batch = (int)random_int(1, 4096);
-    c->train.refine_rate = random_real(1e-9, 1);
     c->train.average = random_real(0, 0.99999);
     c->train.evaluate_seconds = random_real(0.001, 1e6);
     c->train.checkpoint_seconds = random_real(0.001, 1e6);

@@ -19,13 +19,13 @@ check() {
     function allow(part, list,   n, p, i) { n = split(list, p, " "); for (i = 1; i <= n; i++) allowed[part, p[i]] = 1 }
     function own(part, list,   n, p, i) { n = split(list, p, " "); for (i = 1; i <= n; i++) owner[p[i] ".h"] = part }
     BEGIN {
-        own("core", "checksum export file grid memory rng status text json")
-        own("config", "config")
+        own("core", "checksum export file grid memory pose rng status text json")
+        own("config", "config experiment")
         own("geom", "mesh exact methods")
-        own("nn", "model pod kernels container")
-        own("io", "image meshfile")
+        own("nn", "model pod point_network sdmnn kernels container")
+        own("io", "image volume meshfile")
         own("shape", "shape registry")
-        own("runtime", "runtime vdb")
+        own("runtime", "check map runtime phantom vdb")
         own("trainer", "train")
         own("shapes", "builtin_shapes")
         allow("core", "core")
@@ -60,6 +60,7 @@ check() {
             else if (!((part, owner[header]) in allowed)) wrong(part " must not include " name " of " owner[header])
         } else if (quoted && (name ~ /\// || !((folder name) in exists || (part_folder name) in exists))) wrong("\"" name "\" is not in the same folder or in that of its part")
         if (name ~ /(immintrin|x86intrin|emmintrin|arm_neon|arm_sve)\.h$/ && !(FILENAME ~ /^framework\// && (base ~ /kernel/ || base == "lanes.h"))) wrong(name " outside of the kernels")
+        if (name ~ /dnnl/ && FILENAME != "framework/nn/sdmnn/conv_kernels_dnnl.c") wrong(name " outside of framework/nn/sdmnn/conv_kernels_dnnl.c")
         if (name ~ /yaml\.h$/ && part != "config") wrong(name " outside of framework/config")
         if (name ~ /^(openvdb|tbb)\// && FILENAME != "runtime/vdb.cc") wrong(name " outside of runtime/vdb.cc")
         if (name ~ /^z(lib|conf)\.h$/ && part != "io") wrong(name " outside of framework/io")
@@ -97,6 +98,7 @@ must_find framework/geom/mesh.c '#include "sdm/meshfile.h"'
 must_find framework/geom/mesh.c '#include "sdm/model.h"'
 must_find framework/nn/blocks.c '#include "sdm/exact.h"'
 must_find framework/nn/blocks.c '  #  include <immintrin.h>'
+must_find framework/nn/blocks.c '#include <oneapi/dnnl/dnnl.h>'
 must_find framework/config/config.c '#include "sdm/registry.h"'
 must_find framework/io/npy.c '#include "sdm/registry.h"'
 must_find framework/io/npy.c '#include <yaml.h>'
@@ -120,4 +122,4 @@ must_find shapes/new.c '#include "sdm/runtime.h"'
 must_find shapes/new.c '#include "sdm/train.h"'
 must_find cli/new.c '#include <dlfcn.h>'
 must_find cli/new.c '#include "sdm/no_such.h"'
-echo "$files files in order; 29 wrong includes found"
+echo "$files files in order; 31 wrong includes found"

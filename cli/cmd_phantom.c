@@ -1,0 +1,154 @@
+/* sdmgen phantom: a test image of a shape, with its labels and the truth. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+
+#include "commands.h"
+#include "phantom.h"
+#include "sdm/file.h"
+#include "sdm/image.h"
+#include "sdm/memory.h"
+#include "sdm/volume.h"
+#include "setup.h"
+#include "terminal.h"
+
+static bool ends_with(const char *path, const char *suffix)
+{
+    const size_t n = strlen(path), k = strlen(suffix);
+    return n > k && !strcasecmp(path + n - k, suffix);
+}
+
+static bool is_volume(const char *path)
+{
+    return ends_with(path, ".nii") || ends_with(path, ".nii.gz") || ends_with(path, ".nrrd") || ends_with(path, ".mha");
+}
+
+/* ---- before any work: files that could not be written ---- */
+
+static sdm_status check_file(const char *option, const char *path, bool known, const char *types, sdm_error *err)
+{
+    if (!known) return sdm_fail(err, SDM_E_ARG, "%s '%s': its name must end in %s", option, path, types);
+    sdm_outfile *trial = NULL; /* the only honest test of "can be written" */
+    const sdm_status s = sdm_outfile_open(path, &trial, err);
+    sdm_outfile_discard(&trial);
+    return s;
+}
+
+static sdm_status check_files(const cli_args *args, sdm_error *err)
+{
+    const char *label = args->phantom.label, *truth = args->phantom.truth;
+    if (args->outputs.n == 0 && !label && !truth && !args->json)
+        return sdm_fail(err, SDM_E_ARG, "phantom: an output is needed: -o FILE, --label, --truth or --json");
+    sdm_status s = SDM_OK;
+    for (size_t i = 0; i < args->outputs.n && !s; i++) {
+        const char *path = args->outputs.items[i];
+        bool twice = (label && !strcmp(path, label)) || (truth && !strcmp(path, truth));
+        for (size_t k = 0; k < i; k++) twice |= !strcmp(path, args->outputs.items[k]);
+        if (twice) return sdm_fail(err, SDM_E_ARG, "output '%s' is given twice", path);
+        s = check_file("output", path, is_volume(path) || ends_with(path, ".npy"), ".nii .nii.gz .nrrd .mha or .npy",
+                       err);
+    }
+    if (!s && label) s = check_file("--label", label, is_volume(label), ".nii .nii.gz .nrrd or .mha", err);
+    if (!s && truth) s = check_file("--truth", truth, ends_with(truth, ".json"), ".json", err);
+    return s;
+}
+
+/* ---- after it ---- */
+
+/* Whole numbers in values[n]'s own range; *clipped counts those that do not fit. */
+static void to_int16(const float *values, size_t n, int16_t *out, size_t *clipped)
+{
+    *clipped = 0;
+    for (size_t i = 0; i < n; i++) {
+        const float v = roundf(values[i]);
+        *clipped += v < INT16_MIN || v > INT16_MAX;
+        out[i] = (int16_t)fminf(fmaxf(v, INT16_MIN), INT16_MAX);
+    }
+}
+
+static sdm_status write_images(const cli_phantom *p, const float *values, const char *text, sdm_error *err)
+{
+    const cli_list *outputs = &p->args->outputs;
+    const bool whole = !strcmp(p->args->phantom.type, "int16");
+    size_t clipped = 0;
+    int16_t *rounded = NULL;
+    sdm_status s = whole ? SDM_ALLOC(&rounded, sdm_grid_count(&p->grid), "image", err) : SDM_OK;
+    if (!s && whole) to_int16(values, sdm_grid_count(&p->grid), rounded, &clipped);
+    if (clipped) cli_notice("%zu values do not fit in int16 and were clipped; --type float32 keeps them", clipped);
+    for (size_t i = 0; i < outputs->n && !s; i++) {
+        const char *path = outputs->items[i];
+        if (ends_with(path, ".npy"))
+            s = sdm_image_write(path, &p->grid, values, text, err);
+        else if (whole)
+            s = sdm_volume_write(path, &p->grid, rounded, SDM_VOXEL_INT16, text, err);
+        else
+            s = sdm_volume_write(path, &p->grid, values, SDM_VOXEL_FLOAT32, text, err);
+    }
+    sdm_free(rounded);
+    return s;
+}
+
+static sdm_status write_text(const char *path, const char *text, sdm_error *err)
+{
+    sdm_outfile *file = NULL;
+    sdm_status s = sdm_outfile_open(path, &file, err);
+    if (!s) s = sdm_outfile_printf(file, err, "%s\n", text);
+    if (!s) return sdm_outfile_commit(&file, err);
+    sdm_outfile_discard(&file);
+    return s;
+}
+
+static sdm_status write_truth(const cli_phantom *p, size_t inside, sdm_error *err)
+{
+    sdm_json json = {0};
+    cli_phantom_truth(p, inside, &json);
+    sdm_status s = json.text.failed ? sdm_fail(err, SDM_E_NOMEM, "the truth: no memory") : SDM_OK;
+    if (!s && p->args->phantom.truth) s = write_text(p->args->phantom.truth, json.text.data, err);
+    if (!s && p->args->json) return cli_print_json(&json, err);
+    sdm_json_dispose(&json);
+    return s;
+}
+
+static sdm_status make_files(const cli_phantom *p, sdm_error *err)
+{
+    const cli_args *args = p->args;
+    const size_t n = sdm_grid_count(&p->grid);
+    float *values = NULL;
+    uint8_t *label = NULL;
+    size_t inside = 0;
+    char text[200];
+    snprintf(text, sizeof text, "sdmgen %s phantom of %s, seed %llu", SDM_VERSION_TEXT, args->shape,
+             (unsigned long long)p->opts.seed);
+    sdm_status s = args->outputs.n ? SDM_ALLOC(&values, n, "image", err) : SDM_OK;
+    if (!s) s = SDM_ALLOC(&label, n, "labels", err);
+    if (!s) s = sdm_phantom_make(p->shape, p->params, &p->pose, &p->opts, &p->grid, values, label, err);
+    for (size_t i = 0; i < n && !s; i++) inside += label[i];
+    if (!s && !inside) cli_notice("no voxel is inside the shape: is the grid where it is?");
+    if (!s && p->cut) cli_notice("the shape leaves the field of view");
+    if (!s && values) s = write_images(p, values, text, err);
+    if (!s && args->phantom.label)
+        s = sdm_volume_write(args->phantom.label, &p->grid, label, SDM_VOXEL_UINT8, text, err);
+    if (!s) s = write_truth(p, inside, err);
+    sdm_free(label);
+    sdm_free(values);
+    return s;
+}
+
+sdm_status cmd_phantom(const cli_args *args, sdm_error *err)
+{
+    if (!args->shape) return sdm_fail(err, SDM_E_ARG, "phantom: --shape NAME is needed");
+    cli_phantom p = {.args = args};
+    sdm_registry *registry = NULL;
+    sdm_instance *shape = NULL;
+    sdm_status s = check_files(args, err);
+    if (!s) s = cli_open_registry(args, &registry, err);
+    if (!s) s = cli_open_shape(registry, args->shape, &args->options, &shape, err);
+    p.shape = shape;
+    if (!s) s = cli_phantom_setup(&p, err);
+    if (!s) s = make_files(&p, err);
+    sdm_free(p.params);
+    sdm_instance_free(shape);
+    sdm_registry_free(registry);
+    return s;
+}

@@ -1,0 +1,95 @@
+/* Rows of an experiment: configuration, shape, ranges and files of each. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "config_shape.h"
+#include "experiment.h"
+#include "sdm/memory.h"
+#include "sdm/train.h"
+
+static void describe_grid(const sdm_grid *g, char *buf, size_t size)
+{
+    const double *h = g->spacing;
+    const int used = snprintf(buf, size, "%lld x %lld x %lld voxels of ", (long long)g->n[0], (long long)g->n[1],
+                              (long long)g->n[2]);
+    const bool same = h[0] == h[1] && h[0] == h[2];
+    snprintf(buf + used, size - (size_t)used, same ? "%.4g mm" : "%.4g x %.4g x %.4g mm", h[0], h[1], h[2]);
+}
+
+sdm_status experiment_job_open(const experiment_run *run, size_t index, experiment_job *job, sdm_error *err)
+{
+    job->index = index;
+    sdm_status s = SDM_ALLOC(&job->config, 1, "configuration", err);
+    if (!s) s = sdm_experiment_config(run->e, index, job->config, err);
+    if (!s && run->args->threads > 0) job->config->threads = (int)run->args->threads;
+    if (!s) s = experiment_path(run, index, "", job->config->output.folder, err);
+    if (!s) s = cli_config_shape(job->config, run->registry, &job->shape, err);
+    if (s) return s;
+    cli_map_maker *m = &job->maker;
+    const sdm_param *params = sdm_instance_params(job->shape, &m->n_params);
+    if (m->n_params > SDM_MAX_PARAMS)
+        return sdm_fail(err, SDM_E_UNSUPPORTED, "%zu parameters, at most %d can be sampled", m->n_params,
+                        SDM_MAX_PARAMS);
+    m->shape = job->shape;
+    m->grid = job->config->grid;
+    describe_grid(&m->grid, run->results[index].grid, sizeof run->results[index].grid);
+    s = sdm_train_ranges(job->config, job->shape, m->min, m->max, err);
+    for (size_t i = 0; i < m->n_params && !s; i++) job->nominal[i] = fmin(m->max[i], fmax(m->min[i], params[i].def));
+    return s;
+}
+
+void experiment_job_close(experiment_job *job)
+{
+    sdm_instance_free(job->shape);
+    sdm_free(job->config);
+    memset(job, 0, sizeof *job);
+}
+
+sdm_status experiment_path(const experiment_run *run, size_t index, const char *name, char path[SDM_PATH_TEXT_MAX],
+                           sdm_error *err)
+{
+    if (snprintf(path, SDM_PATH_TEXT_MAX, "%s/%s%s%s", run->folder, run->e->rows[index].folder, *name ? "/" : "",
+                 name) < SDM_PATH_TEXT_MAX)
+        return SDM_OK;
+    return sdm_fail(err, SDM_E_ARG, "the folder '%.100s...': the name is too long", run->folder);
+}
+
+/* Two configurations give the same network: everything but the place of the files and the number of threads is equal. */
+static bool is_same(const sdm_config *a, const char *name, const char *text)
+{
+    sdm_config *copy = NULL, *other = NULL;
+    sdm_text x = {0}, y = {0};
+    bool same = false;
+    if (!SDM_ALLOC(&copy, 1, "configuration", NULL) && !SDM_ALLOC(&other, 1, "configuration", NULL) &&
+        !sdm_config_parse(name, text, strlen(text), NULL, 0, other, NULL)) {
+        *copy = *a;
+        copy->threads = other->threads;
+        memcpy(copy->output.folder, other->output.folder, sizeof copy->output.folder);
+        sdm_config_dump(copy, &x);
+        sdm_config_dump(other, &y);
+        same = !x.failed && !y.failed && !strcmp(x.data, y.data);
+    }
+    sdm_text_dispose(&x);
+    sdm_text_dispose(&y);
+    sdm_free(copy);
+    sdm_free(other);
+    return same;
+}
+
+experiment_stock experiment_find(const experiment_run *run, const experiment_job *job)
+{
+    char model_path[SDM_PATH_TEXT_MAX], path[SDM_PATH_TEXT_MAX];
+    sdm_model *model = NULL;
+    if (run->args->force || experiment_path(run, job->index, "model.sdm", model_path, NULL)) return STOCK_NONE;
+    const bool has_model = !access(model_path, F_OK);
+    if (has_model && !sdm_model_open(model_path, &model, NULL)) {
+        const bool same = is_same(job->config, model_path, sdm_model_get_info(model)->config);
+        sdm_model_free(model);
+        if (same) return STOCK_MODEL;
+    }
+    if (!experiment_path(run, job->index, "checkpoint.sdmc", path, NULL) && !access(path, F_OK))
+        return STOCK_CHECKPOINT;
+    return has_model ? STOCK_OTHER : STOCK_NONE;
+}

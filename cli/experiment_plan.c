@@ -1,0 +1,92 @@
+/* What an experiment would do: rows, budgets, what is there already. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "experiment.h"
+#include "terminal.h"
+
+typedef struct plan {
+    const char *action;
+    double minutes;
+    char budget[64];
+} plan;
+
+static plan plan_row(const experiment_run *run, const experiment_job *job)
+{
+    const sdm_config *c = job->config;
+    plan p = {.action = "measure"};
+    if (*run->e->rows[job->index].method->engine) return p;
+    switch (experiment_find(run, job)) {
+    case STOCK_MODEL:
+        p.action = "load, measure";
+        return p;
+    case STOCK_CHECKPOINT:
+        p.action = "go on training, measure";
+        break;
+    case STOCK_OTHER:
+        p.action = "train anew, measure";
+        break;
+    default:
+        p.action = "train, measure";
+    }
+    p.minutes = c->train.minutes;
+    if (c->train.minutes > 0)
+        snprintf(p.budget, sizeof p.budget, "%g min", c->train.minutes);
+    else if (c->train.steps > 0)
+        snprintf(p.budget, sizeof p.budget, "%lld steps", (long long)c->train.steps);
+    else
+        snprintf(p.budget, sizeof p.budget, "%lld samples", (long long)c->train.samples);
+    return p;
+}
+
+static void add_row(const experiment_run *run, const experiment_job *job, const plan *p, sdm_json *j)
+{
+    const sdm_experiment_row *row = &run->e->rows[job->index];
+    const char *what = *row->method->engine ? row->method->engine : row->method->network;
+    if (run->args->json) {
+        sdm_json_open(j, NULL, '{');
+        sdm_json_text(j, "method", row->title);
+        sdm_json_text(j, *row->method->engine ? "engine" : "network", what);
+        sdm_json_text(j, "grid", run->results[job->index].grid);
+        sdm_json_text(j, "action", p->action);
+        sdm_json_real(j, "minutes", p->minutes);
+        sdm_json_text(j, "budget", p->budget);
+        sdm_json_int(j, "samples", row->samples);
+        sdm_json_text(j, "folder", job->config->output.folder);
+        sdm_json_close(j, '}');
+    } else {
+        printf("%-28s %-8s %-34s %-24s %-12s samples %-5lld %s\n", row->title, what, run->results[job->index].grid,
+               p->action, p->budget, (long long)row->samples, job->config->output.folder);
+    }
+}
+
+sdm_status experiment_print_plan(const experiment_run *run, sdm_error *err)
+{
+    sdm_json j = {0};
+    double minutes = 0;
+    sdm_status s = SDM_OK;
+    sdm_json_open(&j, NULL, '{');
+    sdm_json_open(&j, "rows", '[');
+    for (size_t i = 0; i < run->e->n_rows && !s; i++) {
+        experiment_job job = {0};
+        s = experiment_job_open(run, i, &job, err);
+        if (!s) {
+            const plan p = plan_row(run, &job);
+            minutes += p.minutes;
+            add_row(run, &job, &p, &j);
+        }
+        experiment_job_close(&job);
+    }
+    sdm_json_close(&j, ']');
+    sdm_json_real(&j, "minutes", minutes);
+    sdm_json_real(&j, "limit", run->e->experiment.minutes);
+    sdm_json_close(&j, '}');
+    if (!s && run->args->json) return cli_print_json(&j, err);
+    sdm_json_dispose(&j);
+    if (s) return s;
+    printf("\ntrainings of %g min in all", minutes);
+    if (run->e->experiment.minutes > 0) printf("; limit %g min", run->e->experiment.minutes);
+    printf("; results in %s\n", run->folder);
+    return SDM_OK;
+}

@@ -1,0 +1,134 @@
+#!/usr/bin/env bash
+# sdmgen experiment: the table in three forms, references, pictures, a second run that loads, rows that fail, mistakes.
+. "$(dirname "$0")/common.sh"
+
+cat >tiny.yaml <<'END'
+experiment: {title: tiny, samples: 4, engine_samples: 2, baseline: naive, reference: paper}
+shape: {name: ellipsoid, options: {edge: 1}, ranges: {rx: [2, 4], ry: [2, 3], rz: [2, 3]}}
+grid: {size: [14, 12, 12], spacing: 0.9}
+network: {depth: 1, width: 16}
+data: {static: 2, online: 32, start: 64, holdout: 4}
+train: {steps: 20, batch: 16}
+methods:
+  - {name: POD, network: pod, set: {network: {rank: 8, modes: 16, degree: 2, input_degree: 2}, train.refine_batch: 8}}
+  - {name: naive, engine: naive}
+  - {name: exact engine, engine: exact}
+  - {name: VTK, engine: vtk}
+reference:
+  - {row: POD, ms: 200, mse_mm2: 6e-3, source: "somebody, table 1"}
+END
+
+# column NAME ROW of table.csv, where no text before it has a comma
+csv() { awk -F, -v name="$1" -v row="\"$2\"" 'NR == 1 { for (i = 1; i <= NF; i++) if ($i == name) c = i } $1 == row { print $c }' "$3/table.csv"; }
+# number of KEY in the row of METHOD of table.json
+json_of() { grep -o "{\"method\": *\"$1\"[^{}]*" "$3/table.json" | sed -n "s/.*\"$2\": *\\([^,}]*\\).*/\\1/p" | head -n 1; }
+# cell of the column whose title begins with NAME, in table.md
+md() { awk -F'|' -v name=" $1" -v row=" $2 " '$2 == " method " { for (i = 2; i <= NF; i++) if (!c && index($i, name) == 1) c = i } $2 == row { gsub(/ /, "", $c); print $c; exit }' "$3/table.md"; }
+
+expect 0 - sdmgen experiment tiny.yaml --dry-run --out never
+has '^POD +pod .*train, measure +20 steps +samples 4 +never/pod$'
+has '^exact engine +exact .*samples 2 '
+has '^trainings of 0 min in all; results in never$'
+expect 0 - sdmgen experiment tiny.yaml --dry-run --json --out never
+[ "$(json minutes)" = 0 ] || bad "minutes of the plan: $(json minutes)"
+absent never
+
+expect 0 - sdmgen experiment tiny.yaml --out run --peers none --quiet
+has '^\| POD \|'
+cmp -s out run/table.md || bad 'stdout is not table.md'
+present run/table.md run/table.csv run/table.json run/log.txt run/pod/model.sdm run/pod/slices.png run/pod/surfaces.png \
+    run/exact-engine/slices.png run/naive/surfaces.png
+absent run/vtk
+
+# the three forms agree, and with what sdmgen eval finds in the same model on the same shapes
+expect 0 - sdmgen eval run/pod/model.sdm --samples 4 --naive 0 --json
+for key in mse_mm2 rmse_mm rmse_near_mm max_abs_mm dice surface_mean_mm surface_hausdorff_mm; do
+    mine=$(csv $key POD run)
+    [ -n "$mine" ] && [ "$mine" = "$(json $key)" ] || bad "$key: '$mine' in table.csv, '$(json $key)' by eval"
+    [ "$mine" = "$(json_of POD $key run)" ] || bad "$key: '$mine' in table.csv, '$(json_of POD $key run)' in table.json"
+done
+awk -v a="$(md MSE POD run)" -v b="$(csv mse_mm2 POD run)" 'BEGIN { exit !(b > 0 && a / b > 0.99 && a / b < 1.01) }' ||
+    bad "MSE: $(md MSE POD run) in table.md, $(csv mse_mm2 POD run) in table.csv"
+[ "$(csv ms naive run)" = "$(json_of naive ms run)" ] || bad 'ms of naive differ'
+near "$(csv speedup naive run)" 1 0
+awk -v s="$(csv speedup POD run)" -v a="$(csv ms naive run)" -v b="$(csv ms POD run)" 'BEGIN { exit !(s > 0 && s * b / a > 0.999999 && s * b / a < 1.000001) }' ||
+    bad "speed-up $(csv speedup POD run)"
+# the naive method is exact on a mesh that does not overlap itself
+awk -v m="$(csv max_abs_mm naive run)" 'BEGIN { exit !(m != "" && m < 1e-5) }' || bad "naive is off by $(csv max_abs_mm naive run)"
+
+# the figures of others stand beside ours, with their source
+[ "$(csv reference_ms POD run)" = 200 ] || bad "reference_ms: $(csv reference_ms POD run)"
+[ "$(csv reference_mse_mm2 POD run)" = 0.006 ] || bad "reference_mse_mm2: $(csv reference_mse_mm2 POD run)"
+grep -q '| MSE, mm^2 | MSE, mm^2 (paper) |' run/table.md || bad 'no column of the paper beside ours'
+grep -q 'paper: somebody, table 1' run/table.md || bad 'no source in table.md'
+grep -q '"reference": *{"ms": *200, *"mse_mm2": *0.006, *"source": *"somebody, table 1"}' run/table.json || bad 'no reference in table.json'
+# what is missing is said
+grep -q '^| VTK (not available) |' run/table.md || bad 'VTK is missing in silence'
+grep -q '"VTK",not available' run/table.csv || bad 'VTK is missing in silence (CSV)'
+
+# the same again: loaded, not trained, the same errors; another configuration: trained again; other shapes to measure: loaded
+before=$(cksum <run/pod/model.sdm)
+mse=$(csv mse_mm2 POD run)
+expect 0 - sdmgen experiment tiny.yaml --dry-run --out run
+has '^POD .*load, measure'
+sdmgen experiment tiny.yaml --out run --peers none --threads 1 >out 2>err || bad "second run: $(cat err)"
+grep -q 'POD: the model in run/pod is loaded, not trained again' err || bad "not loaded: $(cat err)"
+[ "$before" = "$(cksum <run/pod/model.sdm)" ] || bad 'the model has changed'
+[ "$mse" = "$(csv mse_mm2 POD run)" ] && [ "$(csv loaded POD run)" = true ] || bad 'the loaded model measures differently'
+expect 0 - sdmgen experiment tiny.yaml train.steps=21 --dry-run --out run
+has '^POD .*train anew, measure'
+sdmgen experiment tiny.yaml train.steps=21 experiment.pictures=no --out run --peers none >out 2>err || bad "third run: $(cat err)"
+grep -q 'has another configuration and is replaced' err || bad "not said: $(cat err)"
+[ "$before" != "$(cksum <run/pod/model.sdm)" ] || bad 'the model has not changed'
+[ "$(grep -c 'sdmgen experiment' run/log.txt)" -eq 3 ] || bad "log: $(cat run/log.txt)"
+
+# a row that fails: its reason is in the table, the others are done, the exit code tells
+sed 's/^  - {name: naive.*/&\n  - {name: wrong, network: pod, set: {grid.centre: [900, 900, 900], train.steps: 20}}/' tiny.yaml >wrong.yaml
+sdmgen experiment wrong.yaml --out wrong --peers none --json >out 2>err
+code=$?
+[ $code -ne 0 ] || bad 'a failed row, but exit code 0'
+[ "$(wc -l <out)" -eq 1 ] || bad 'not one line of JSON'
+grep -q '^sdmgen: error: 1 of 5 rows failed; the first: .*no voxel of the grid is inside any' err || bad "no summary: $(cat err)"
+grep -q '^| wrong (failed) |' wrong/table.md || bad 'no row that failed'
+grep -q 'wrong: failed: .*no voxel of the grid is inside any' wrong/table.md || bad 'no reason in table.md'
+grep -q '^| exact engine | [0-9.]* |' wrong/table.md || bad 'the row behind it was not done'
+# no training beyond the budget
+sdmgen experiment tiny.yaml train.minutes=3 experiment.minutes=2 --out late --peers none --quiet >out 2>err
+[ $? -eq 4 ] || bad "over the budget: exit code"
+grep -q 'its training takes 3 (experiment.minutes)' late/table.csv || bad 'no reason in table.csv'
+
+# variants
+cat >grids.yaml <<'END'
+shape: {name: ellipsoid, options: {edge: 1}}
+grid: {size: [8, 8, 8], spacing: 2}
+experiment: {engine_samples: 1, pictures: 'no'}
+methods: [{name: octree, engine: octree}]
+variants: [{name: coarse, set: {}}, {name: fine, set: {grid.size: [16, 16, 16], grid.spacing: 1}}]
+END
+expect 0 - sdmgen experiment grids.yaml --out grids --quiet
+grep -q '^| octree, coarse |' grids/table.md && grep -q '^| octree, fine |' grids/table.md || bad 'no rows of the variants'
+grep -q '16 x 16 x 16 voxels of 1 mm' grids/table.csv || bad 'the grid of the variant is not used'
+absent grids/octree-coarse
+
+# mistakes
+printf 'shape: {name: ellipsoid}\ngrid: {size: [4, 4, 4], spacing: 1}\nmethods: [{name: A, engnie: exact}]\n' >bad.yaml
+expect 2 "^bad\.yaml:3:21: unknown key 'engnie'; did you mean 'engine'" sdmgen experiment bad.yaml
+printf 'shape: {name: ellipsoid}\ngrid: {size: [4, 4, 4], spacing: 1}\nmethods:\n  - {name: A, engine: exakt}\n' >engine.yaml
+expect 2 "^engine\.yaml:4:5: engine: 'exakt' is not one of exact, .*vtk.*did you mean 'exact'" sdmgen experiment engine.yaml
+expect 2 "^argument 'train.steeps=4': unknown key 'train.steeps'; did you mean 'train.steps'" sdmgen experiment tiny.yaml train.steeps=4
+expect 2 "unexpected argument 'fast', need key=value" sdmgen experiment tiny.yaml fast
+expect 2 'usage: sdmgen experiment' sdmgen experiment
+expect 1 'missing\.yaml' sdmgen experiment missing.yaml
+expect 2 'keys stands alone' sdmgen experiment tiny.yaml --keys
+
+# the shipped experiments can be done, and the documentation has every key
+for config in "$source_folder"/configs/*.yaml; do
+    grep -q '^methods:' "$config" || continue
+    expect 0 - sdmgen experiment "$config" --dry-run
+    has '^trainings of [0-9]+ min'
+done
+expect 0 - sdmgen experiment --keys --markdown
+cp out keys.md
+sed -n '/^<!-- begin: sdmgen experiment --keys --markdown -->$/,/^<!-- end -->$/p' "$source_folder/docs/experiments.md" | sed '1d;$d' >documented.md
+cmp -s keys.md documented.md || bad 'docs/experiments.md is not up to date; put in the text of: sdmgen experiment --keys --markdown'
+finish

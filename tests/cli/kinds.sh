@@ -1,0 +1,41 @@
+#!/usr/bin/env bash
+# Every kind of network from train to eval: the commands need to know nothing of the kind.
+. "$(dirname "$0")/common.sh"
+cat >base.yaml <<'END'
+shape: {name: capsule}
+grid: {size: [14, 12, 10], spacing: 1.2}
+data: {static: 2, online: 16, start: 24, holdout: 4}
+train: {steps: 20, batch: 4}
+END
+
+for kind in sdmnn deepsdf imnet; do
+    small="network.width=16 network.depth=2"
+    [ $kind = sdmnn ] && small="$small network.channels=4"
+    # shellcheck disable=SC2086 # several words
+    expect 0 - sdmgen train base.yaml network.kind=$kind $small --out $kind --json --quiet
+    model=$kind/model.sdm
+    present $model $kind/loss.png $kind/slices.png $kind/config.yaml
+    expect 0 - sdmgen config $kind/config.yaml
+    expect 0 - sdmgen info $model
+    has "$kind"
+    sdmgen verify $model --quiet --samples 4 >out 2>err
+    code=$? # 4: four shapes may be harder than those held out
+    [ $code -eq 0 ] || [ $code -eq 4 ] || bad "$kind: verify: exit code $code: $(cat err)"
+    has 'every checksum is right'
+    expect 0 - sdmgen generate $model -o $kind.nii -o $kind.png --json --threads 1
+    present $kind.nii $kind.png
+    hash=$(json values_crc64)
+    expect 0 - sdmgen generate $model --json --threads 3
+    [ "$hash" = "$(json values_crc64)" ] || bad "$kind: the values depend on the number of threads"
+    expect 0 - sdmgen eval $model --samples 2 --naive 0 --json --quiet
+    awk -v v="$(json mse_mm2)" 'BEGIN { exit !(v > 0) }' || bad "$kind: eval: mse_mm2 is $(json mse_mm2)"
+    expect 0 - sdmgen bench network $model --json
+    awk -v v="$(json ms_network)" 'BEGIN { exit !(v > 0) }' || bad "$kind: bench: no ms_network"
+    size=$(wc -c <$model)
+    head -c $((size / 2)) $model >cut.sdm
+    expect 3 'cut\.sdm' sdmgen generate cut.sdm -o x.npy
+done
+absent x.npy
+expect 2 "^argument 'network.rank=4': network.rank: a network of kind deepsdf has no such key, only pod" \
+    sdmgen config base.yaml network.kind=deepsdf network.rank=4
+finish

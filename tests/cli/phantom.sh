@@ -1,0 +1,98 @@
+#!/usr/bin/env bash
+# sdmgen phantom: image, labels, truth; mistakes; no partial files.
+. "$(dirname "$0")/common.sh"
+
+# values FILE TYPE: all values of a .npy file, one a line
+values() { tail -c +129 "$1" | od -An -v -t f4 -w4 | tr -d ' '; }
+# is_json FILE: parses, where there is a python3 to say so
+is_json() { ! command -v python3 >/dev/null || python3 -m json.tool "$1" >/dev/null || bad "$1 is not JSON: $(head -c 300 "$1")"; }
+small='--shape ellipsoid --spacing 0.5'
+
+expect 0 - sdmgen phantom $small -p rx=3 -o ct.nii -o ct.nii.gz -o ct.nrrd -o ct.mha -o ct.npy --label label.nrrd \
+    --truth truth.json --json
+present ct.nii ct.nii.gz ct.nrrd ct.mha ct.npy label.nrrd truth.json
+is_json truth.json
+is_json out
+cmp -s out truth.json || bad 'stdout and --truth must agree'
+[ "$(json rx)" = 3 ] || bad "rx is $(json rx)"
+[ "$(json cut)" = false ] || bad 'the grid must hold the shape'
+inside=$(json inside_voxels)
+near "$inside" 603 40 # 4/3 pi 3 3 2 / 0.5^3
+has '"rotation_rad": \[0, 0, 0\], "translation_mm": \[0, 0, 0\]'
+for file in ct.nii ct.nii.gz ct.nrrd ct.mha; do
+    expect 0 - sdmgen info $file
+    has 'int16'
+done
+expect 0 - sdmgen info label.nrrd
+has 'uint8'
+
+# without texture and noise the image is known: 40 in the middle, 1300 at the corner
+quiet_tissue='--inside 40,0 --outside 1300,0 --noise 0'
+expect 0 - sdmgen phantom $small --size 21,21,21 $quiet_tissue -o flat.npy
+near "$(values flat.npy | sed -n 4631p)" 40 0.01
+near "$(values flat.npy | sed -n 1p)" 1300 0.01
+expect 0 - sdmgen phantom $small --size 21,21,21 --inside 7,0 --outside 7,0 --noise 50 --white-noise -o noise.npy
+values noise.npy | awk '{ n++; s += $1; q += ($1 - 7) ^ 2 } END { m = s / n - 7; v = sqrt(q / n); exit !(m < 3 && m > -3 && v > 48 && v < 52) }' ||
+    bad 'white noise of 50 HU'
+
+# the same seed gives the same bits, whatever the threads; another one does not
+expect 0 - sdmgen phantom $small -p rx=3 --threads 1 -o one.npy
+cmp -s one.npy ct.npy || bad 'one thread must give the same image'
+expect 0 - sdmgen phantom $small -p rx=3 --seed 2 -o two.npy
+! cmp -s two.npy ct.npy || bad 'another seed must give another image'
+
+# the pose: rotation and translation put the shape where they say, in a turned image
+expect 0 'leaves the field of view' sdmgen phantom $small $quiet_tissue --rotation 0,0,1.5707963267948966 --translation 100,0,0 \
+    --size 21,3,3 --origin 95,-0.5,-0.5 -o turned.npy
+# along x there are 3 mm of ry to each side of 100: 12 voxels, two of them halves
+values turned.npy | sed -n '85,105p' | awk '{ s += (1300 - $1) / 1260 } END { exit !(s > 11.5 && s < 12.5) }' || bad 'the turned ellipsoid'
+expect 0 - sdmgen phantom $small --frame 0,0,0.5 --json
+has '"direction": \[0\.87758256[0-9]*, -0\.4794255[0-9]*, 0, 0\.4794255'
+expect 0 - sdmgen phantom $small --random-pose 10,2 --random-params -p ry=2 --json
+cp out random.json
+[ "$(json ry)" = 2 ] || bad 'a parameter that is given must stay'
+! grep -q '"rx": 4' out || bad 'rx must be random'
+expect 0 - sdmgen phantom $small --random-pose 10,2 --random-params -p ry=2 --json
+cmp -s out random.json || bad 'the same seed must give the same truth'
+awk -F'[][,]' '{ for (i = 1; i <= NF; i++) if ($i ~ /rotation_rad/) { a = $(i + 1) ^ 2 + $(i + 2) ^ 2 + $(i + 3) ^ 2; exit !(a > 0 && a < 0.1746 ^ 2) } exit 1 }' out ||
+    bad 'a turn of at most 10 degrees'
+
+# a field of view that cuts the shape: of 21 voxels along x from -5 on as many as are below 2 mm; moved when the size is given
+expect 0 'leaves the field of view' sdmgen phantom $small --crop 0.25,0,0 --json
+[ "$(json cut)" = true ] || bad 'the shape must be cut'
+has '"size": \[14, '
+expect 0 'leaves the field of view' sdmgen phantom $small --crop=0,0,-0.5 --size 20,20,20 --json
+has '"size": \[20, 20, 20\]'
+expect 0 - sdmgen phantom $small --size 30,30,30 --air-cells 0.5,1,0.5 --air -900,10 -o air.npy --json
+has '"air_share": 0.5, "air_mm": 1, "air_clear_mm": 0.5'
+values air.npy | awk '$1 < -500 { n++ } END { exit !(n > 100) }' || bad 'no air'
+expect 0 'values do not fit in int16' sdmgen phantom $small --outside 40000,0 -o clipped.nii
+expect 0 - sdmgen phantom $small --outside 40000,0 --type float32 -o unclipped.nii
+expect 0 - sdmgen info unclipped.nii
+has 'float32'
+
+# mistakes are named, before any file is made
+expect 2 'shape NAME is needed' sdmgen phantom -o x.nii
+expect 2 'an output is needed' sdmgen phantom $small
+expect 2 "output 'x.vdb': its name must end in .nii .nii.gz .nrrd .mha or .npy" sdmgen phantom $small -o x.vdb
+expect 2 "label 'x.npy': its name must end in" sdmgen phantom $small -o x.nii --label x.npy
+expect 2 "truth 'x.txt': its name must end in .json" sdmgen phantom $small -o x.nii --truth x.txt
+expect 2 "'x.nii' is given twice" sdmgen phantom $small -o x.nii --label x.nii
+expect 1 'nowhere' sdmgen phantom $small -o x.nii --truth nowhere/x.json
+expect 1 'nowhere' sdmgen phantom $small -o x.nii --label nowhere/x.nii
+expect 2 "inside '40': need two numbers" sdmgen phantom $small -o x.nii --inside 40
+expect 2 "inside '40,1,2': need two numbers" sdmgen phantom $small -o x.nii --inside 40,1,2
+expect 2 'texture of the tissue inside is -1' sdmgen phantom $small -o x.nii --inside 40,-1
+expect 2 "blur '-1': need one number or three" sdmgen phantom $small -o x.nii --blur=-1
+expect 2 'blur along y is 33 mm, need 0 to 32' sdmgen phantom $small -o x.nii --blur 1,33,1
+expect 2 "noise 'nan': need a number" sdmgen phantom $small -o x.nii --noise nan
+expect 2 'share of air cells is 2, need 0 to 1' sdmgen phantom $small -o x.nii --air-cells 2,1,1
+expect 2 'random-pose: a turn of 181 degrees' sdmgen phantom $small -o x.nii --random-pose 181,0
+expect 2 'crop and --origin exclude each other' sdmgen phantom $small -o x.nii --crop 0,0,0.5 --origin 0,0,0
+expect 2 "crop '0,0,1'" sdmgen phantom $small -o x.nii --crop 0,0,1
+expect 2 "type 'float': need one of int16\|float32" sdmgen phantom $small -o x.nii --type float
+expect 5 'rx.* 9' sdmgen phantom $small -p rx=9 -o x.nii --label l.nii --truth t.json
+expect 5 'rx.* nan' sdmgen phantom $small -p rx=nan -o x.nii
+expect 2 "did you mean 'ellipsoid'" sdmgen phantom --shape elipsoid -o x.nii
+absent x.nii x.vdb x.npy x.txt l.nii t.json nowhere
+finish

@@ -2,9 +2,10 @@
 
    cc -O2 -o make_model make_model.c -lm && ./make_model .
 
-   The mean is a rounded blob; the modes are smooth displacements of it (swelling, stretching, bending, pear, twist), made
-   orthonormal, as a principal component analysis of aligned meshes gives them. In place of the synthetic fields put the rows of
-   your own analysis: modes[n_modes][n_vert][3] of length 1, and the standard deviation along each in mm. */
+   The mean is a rounded blob; the modes are smooth displacements of it (swelling, stretching, bending, pear, twist, bending
+   sideways, taper, bulging), made orthonormal, as a principal component analysis of aligned meshes gives them. In place of the
+   synthetic fields put the rows of your own analysis: modes[n_modes][n_vert][3] of length 1, and the standard deviation along
+   each in mm. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -16,7 +17,7 @@
 #define SECTORS 36
 #define N_VERT (RINGS * SECTORS + 2)
 #define N_TRI (2 * RINGS * SECTORS)
-#define N_MODES 5
+#define N_MODES 8
 
 static double mean[N_VERT][3], modes[N_MODES][N_VERT][3], deviations[N_MODES];
 static uint32_t tri[N_TRI][3];
@@ -63,7 +64,8 @@ static void make_modes(void)
     for (int v = 0; v < N_VERT; v++) {
         const double x = mean[v][0] / 3.6, y = mean[v][1] / 2.8, z = mean[v][2] / 2.2;
         const double field[N_MODES][3] = {
-            {x, y, z}, {x, -0.5 * y, -0.5 * z}, {0, 0, x * x}, {0, y * x, z * x}, {0, -z * x, y * x}};
+            {x, y, z},          {x, -0.5 * y, -0.5 * z}, {0, 0, x * x},     {0, y * x, z * x},
+            {0, -z * x, y * x}, {0, x * x, 0},           {x * z, y * z, 0}, {z * z, 0, 0}};
         for (int i = 0; i < N_MODES; i++) memcpy(modes[i][v], field[i], sizeof field[i]);
     }
     // Gram and Schmidt, twice for the sake of rounding

@@ -72,21 +72,22 @@ static sdm_status bad_value(const cli_option *o, const char *value, sdm_error *e
                        : o->kind == CLI_REAL  ? "a number"
                        : o->kind == CLI_REAL2 ? "two numbers X,Y"
                        : o->kind == CLI_REAL3 ? "three numbers X,Y,Z"
+                       : o->kind == CLI_REAL6 ? "six numbers"
                                               : "one number or three";
     char low[32], high[32];
     return sdm_fail(err, SDM_E_ARG, "--%s '%s': need %s in %s .. %s", o->name, value, what,
                     sdm_format_real(o->min, low), sdm_format_real(o->max, high));
 }
 
-/* Splits at commas into at most 3 numbers; returns how many, 0 when one is not a number. */
-static size_t split_numbers(const char *text, bool whole, double out[3])
+/* Splits at commas into at most 6 numbers; returns how many, 0 when one is not a number. */
+static size_t split_numbers(const char *text, bool whole, double out[6])
 {
     size_t n = 0;
     for (const char *at = text; at; n++) {
         const char *comma = strchr(at, ',');
         const size_t length = comma ? (size_t)(comma - at) : strlen(at);
         char word[64];
-        if (n == 3 || length >= sizeof word) return 0;
+        if (n == 6 || length >= sizeof word) return 0;
         memcpy(word, at, length);
         word[length] = '\0';
         int64_t integer = 0;
@@ -99,8 +100,9 @@ static size_t split_numbers(const char *text, bool whole, double out[3])
 
 static sdm_status store_several(const cli_option *o, const char *value, void *field, sdm_error *err)
 {
-    double v[3];
-    const size_t n = split_numbers(value, o->kind == CLI_INT3, v), wanted = o->kind == CLI_REAL2 ? 2 : 3;
+    double v[6];
+    const size_t n = split_numbers(value, o->kind == CLI_INT3, v);
+    const size_t wanted = o->kind == CLI_REAL2 ? 2 : o->kind == CLI_REAL6 ? 6 : 3;
     if (n != wanted && !(n == 1 && o->kind == CLI_REAL13)) return bad_value(o, value, err);
     for (size_t i = 0; i < wanted; i++) {
         const double x = n == 1 ? v[0] : v[i];
@@ -194,6 +196,27 @@ static void set_phantom_defaults(cli_phantom_args *p)
     *p = none;
 }
 
+static void set_fit_defaults(cli_fit_args *f)
+{
+    const cli_fit_args none = {.image_model = "partial",
+                               .start_centre = {NAN, NAN, NAN},
+                               .start_axis = {NAN, NAN, NAN},
+                               .region = {NAN, NAN, NAN, NAN, NAN, NAN},
+                               .inside = {NAN, NAN},
+                               .outside = {NAN, NAN},
+                               .air = {NAN, NAN},
+                               .blur = NAN,
+                               .l_ref = NAN,
+                               .point_sd = NAN,
+                               .margin = NAN,
+                               .least_inside = NAN,
+                               .prior_sd = NAN,
+                               .prior_rotation = NAN,
+                               .prior_translation = NAN,
+                               .eps = NAN};
+    *f = none;
+}
+
 static void set_defaults(cli_args *args)
 {
     args->seed = -1;
@@ -206,11 +229,19 @@ static void set_defaults(cli_args *args)
     args->sign = "auto";
     args->error_of = "max";
     set_phantom_defaults(&args->phantom);
+    set_fit_defaults(&args->fit);
 }
 
 static sdm_status make_lists(int argc, cli_args *args, sdm_error *err)
 {
-    cli_list *lists[] = {&args->files, &args->plugins, &args->params, &args->options, &args->outputs};
+    cli_list *lists[] = {&args->files,
+                         &args->plugins,
+                         &args->params,
+                         &args->options,
+                         &args->outputs,
+                         &args->fit.labels,
+                         &args->fit.reference_labels,
+                         &args->fit.keep};
     const size_t n_lists = sizeof lists / sizeof *lists;
     const sdm_status s = SDM_ALLOC(&args->memory, (size_t)argc * n_lists, "command line", err);
     if (s) return s;

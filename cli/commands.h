@@ -17,6 +17,7 @@ sdm_status cmd_config(const cli_args *args, sdm_error *err);
 sdm_status cmd_bench(const cli_args *args, sdm_error *err);
 sdm_status cmd_experiment(const cli_args *args, sdm_error *err);
 sdm_status cmd_phantom(const cli_args *args, sdm_error *err);
+sdm_status cmd_fit(const cli_args *args, sdm_error *err);
 sdm_status cmd_help(const cli_args *args, sdm_error *err);
 
 #endif

@@ -8,10 +8,10 @@
 #define ALL (ON(CLI_N_COMMANDS) - 1u)
 #define WITH_SHAPES                                                                                                    \
     (ON(CLI_TRAIN) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_EVAL) | ON(CLI_SHAPES) |                 \
-     ON(CLI_VERIFY) | ON(CLI_CONFIG) | ON(CLI_BENCH) | ON(CLI_EXPERIMENT) | ON(CLI_PHANTOM))
+     ON(CLI_VERIFY) | ON(CLI_CONFIG) | ON(CLI_BENCH) | ON(CLI_EXPERIMENT) | ON(CLI_PHANTOM) | ON(CLI_FIT))
 #define REPORTS                                                                                                        \
     (ON(CLI_TRAIN) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_EVAL) | ON(CLI_SHAPES) | ON(CLI_INFO) |  \
-     ON(CLI_VERIFY) | ON(CLI_BENCH) | ON(CLI_EXPERIMENT) | ON(CLI_PHANTOM))
+     ON(CLI_VERIFY) | ON(CLI_BENCH) | ON(CLI_EXPERIMENT) | ON(CLI_PHANTOM) | ON(CLI_FIT))
 
 const cli_command cli_commands[CLI_N_COMMANDS] = {
     {"train", "CONFIG [key=value ...]", "train a network on the shape of a configuration",
@@ -81,20 +81,34 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "shape, 64 voxels on the longest edge. --rotation and --frame are rotation vectors: axis times angle, in rad.",
      "sdmgen phantom --shape cochlea --random-params --random-pose 20,1 --spacing 0.2 -o ct.nii.gz --truth truth.json",
      0, 0, cmd_phantom},
+    {"fit", "MODEL IMAGE | --shape NAME IMAGE", "fit a shape to an image, a label map, a mesh or points",
+     "Finds the shape's parameters and pose, with their uncertainty, by the network of MODEL or (--exact, --shape) "
+     "the\n"
+     "exact engine. IMAGE: a volume (.nii .nii.gz .nrrd .nhdr .mha .mhd); with --label its labels; a mesh (.ply .stl\n"
+     ".obj .off); points (.csv with the header x,y,z, or .npy). Without a start pose the shape begins in the middle, "
+     "and\n"
+     "many rotations are tried. -o writes the fitted shape: .vdb .ply .stl .obj .off in the pose found; .nii .nii.gz\n"
+     ".nrrd .mha .npy distances on the grid of the image; .png its contour over the image; .json the figures.\n"
+     "Exit code 4: the fit failed or is not to be trusted; no file is written unless --force is given.",
+     "sdmgen fit runs/cochlea/model.sdm ct.nii.gz --start-centre 4,-2,7 --start-axis 0,0,1 -o fit.stl -o fit.png", 1, 2,
+     cmd_fit},
     {"help", "[COMMAND]", "print this text, the manual page or the bash completion", NULL,
      "sdmgen help --completion > ~/.local/share/bash-completion/completions/sdmgen", 0, 1, cmd_help},
 };
 
 const cli_option cli_options[] = {
     /* the shape and its parameters */
-    {"shape", 0, CLI_TEXT, "NAME", NULL, 0, 0, ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH) | ON(CLI_PHANTOM),
-     AT(shape), "shape, see `sdmgen shapes`"},
+    {"shape", 0, CLI_TEXT, "NAME", NULL, 0, 0,
+     ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH) | ON(CLI_PHANTOM) | ON(CLI_FIT), AT(shape),
+     "shape, see `sdmgen shapes`"},
     {"mesh", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_EXACT) | ON(CLI_BENCH), AT(mesh), "mesh file instead of a shape"},
     {"param", 'p', CLI_LIST, "name=value", NULL, 0, 0,
      ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH) | ON(CLI_PHANTOM), AT(params),
      "value of a shape parameter; may be repeated"},
+    {"param", 'p', CLI_LIST, "name=value", NULL, 0, 0, ON(CLI_FIT), AT(params),
+     "start value of a shape parameter (default: the shape's); may be repeated"},
     {"option", 'O', CLI_LIST, "name=value", NULL, 0, 0,
-     ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_SHAPES) | ON(CLI_BENCH) | ON(CLI_PHANTOM), AT(options),
+     ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_SHAPES) | ON(CLI_BENCH) | ON(CLI_PHANTOM) | ON(CLI_FIT), AT(options),
      "value of a shape option; may be repeated"},
     {"params", 0, CLI_TEXT, "FILE.csv", NULL, 0, 0, ON(CLI_GENERATE), AT(rows),
      "parameters from a table: a header of names, one output per row"},
@@ -108,7 +122,9 @@ const cli_option cli_options[] = {
      "centre of the first voxel, LPS mm; default: the grid is centred on the mesh"},
 
     /* how */
-    {"policy", 0, CLI_CHOICE, NULL, "refuse|clamp|exact", 0, 0, ON(CLI_GENERATE), AT(policy),
+    {"spacing", 0, CLI_REAL13, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(spacing),
+     "voxel edge of exact maps, in the shape's frame (default: 64 voxels on the longest edge, or the model's grid)"},
+    {"policy", 0, CLI_CHOICE, NULL, "refuse|clamp|exact", 0, 0, ON(CLI_GENERATE) | ON(CLI_FIT), AT(policy),
      "parameters outside the trained range: refuse (default), move to the nearest allowed value, or use the exact "
      "engine"},
     {"check", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE), AT(check),
@@ -140,6 +156,8 @@ const cli_option cli_options[] = {
      "the image: .nii .nii.gz .nrrd .mha .npy; may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_MESH), AT(outputs),
      "output: .ply .stl .obj .off; may be repeated"},
+    {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_FIT), AT(outputs),
+     "output: .vdb .ply .stl .obj .off .nii .nii.gz .nrrd .mha .npy .png .json; may be repeated"},
     {"closest", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(closest),
      "also write the nearest surface point of every voxel: float32 [z][y][x][3], mm"},
     {"normal", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(normal),
@@ -151,16 +169,19 @@ const cli_option cli_options[] = {
     {"jacobian", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(jacobian),
      "also write the derivatives by the shape's parameters: float32 [parameter][z][y][x], mm per unit"},
     {"audit", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_MESH), AT(audit), "examine the mesh and print what was found"},
-    {"dense", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(dense),
+    {"dense", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_FIT), AT(dense),
      ".vdb: the whole map instead of a level set"},
-    {"half", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(half), ".vdb: 16-bit values"},
-    {"band", 0, CLI_REAL, "N", NULL, 3, 100, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(band),
+    {"half", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_FIT), AT(half),
+     ".vdb: 16-bit values"},
+    {"band", 0, CLI_REAL, "N", NULL, 3, 100, ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_FIT), AT(band),
      ".vdb: half width of the narrow band in voxels (default 3)"},
     {"out", 0, CLI_TEXT, "DIR", NULL, 0, 0, ON(CLI_TRAIN) | ON(CLI_EXPERIMENT), AT(out),
      "run folder (default: what the configuration says, or runs/NAME)"},
     {"resume", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN), AT(resume), "go on from the folder's checkpoint"},
     {"force", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN) | ON(CLI_EXPERIMENT), AT(force),
      "start anew in a folder that holds a model"},
+    {"force", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_FIT), AT(force),
+     "write the files of a fit that is not to be trusted, too (the exit code stays 4)"},
     {"dry-run", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_EXPERIMENT), AT(dry_run),
      "print what would be done and how long the trainings take"},
 
@@ -190,10 +211,10 @@ const cli_option cli_options[] = {
      "exact: how the time grows, over three grids and three meshes"},
 
     /* phantoms */
-    {"rotation", 0, CLI_REAL3, "X,Y,Z", NULL, -1000, 1000, ON(CLI_PHANTOM), AT(phantom.rotation),
-     "turn of the shape about the origin of its frame: rotation vector, rad"},
-    {"translation", 0, CLI_REAL3, "X,Y,Z", NULL, -1e12, 1e12, ON(CLI_PHANTOM), AT(phantom.translation),
-     "shift of the shape after the turn, LPS mm"},
+    {"rotation", 0, CLI_REAL3, "X,Y,Z", NULL, -1000, 1000, ON(CLI_PHANTOM) | ON(CLI_FIT), AT(phantom.rotation),
+     "turn of the shape about the origin of its frame: rotation vector, rad (fit: at the start)"},
+    {"translation", 0, CLI_REAL3, "X,Y,Z", NULL, -1e12, 1e12, ON(CLI_PHANTOM) | ON(CLI_FIT), AT(phantom.translation),
+     "shift of the shape after the turn, LPS mm (fit: at the start)"},
     {"random-pose", 0, CLI_REAL2, "DEG,MM", NULL, 0, 1e12, ON(CLI_PHANTOM), AT(phantom.random_pose),
      "random turn and shift of at most this, after those given"},
     {"random-params", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_PHANTOM), AT(phantom.random_params),
@@ -226,6 +247,71 @@ const cli_option cli_options[] = {
      "also write the labels, 1 inside and 0 outside: .nii .nii.gz .nrrd .mha"},
     {"truth", 0, CLI_TEXT, "FILE.json", NULL, 0, 0, ON(CLI_PHANTOM), AT(phantom.truth),
      "also write what the image shows: shape, parameters, pose, grid and all that was chosen"},
+
+    /* fits: what to, from where */
+    {"exact", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_FIT), AT(fit.exact),
+     "exact maps instead of the network's (with MODEL: of its shape)"},
+    {"polish", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_FIT), AT(fit.polish),
+     "a few iterations with exact maps after the network's fit; needs the shape"},
+    {"label", 0, CLI_LIST, "VALUE|NAME", NULL, 0, 0, ON(CLI_FIT), AT(fit.labels),
+     "IMAGE is a label map or a segmentation: fit to the voxels of this value or segment; several are united"},
+    {"ras", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_FIT), AT(fit.ras),
+     "--start-centre, --start-axis, --region, points and meshes are RAS (x to the right, y to the front), as viewers "
+     "show "
+     "them, not LPS"},
+    {"start-centre", 0, CLI_REAL3, "X,Y,Z", NULL, -1e12, 1e12, ON(CLI_FIT), AT(fit.start_centre),
+     "where the middle of the shape is (default: of the labels, points or region; else of the image)"},
+    {"start-axis", 0, CLI_REAL3, "X,Y,Z", NULL, -1e12, 1e12, ON(CLI_FIT), AT(fit.start_axis),
+     "where the z axis of the shape's frame points; turns about it are tried"},
+    {"start-points", 0, CLI_TEXT, "FILE.csv", NULL, 0, 0, ON(CLI_FIT), AT(fit.start_points),
+     "points of the shape and where they are, header shape_x,shape_y,shape_z,x,y,z; three or more, not on one line"},
+    {"turns", 0, CLI_INT, "N", NULL, 1, 4096, ON(CLI_FIT), AT(fit.turns),
+     "rotations tried about the shape's z axis (default 12 with --start-axis, else 1)"},
+    {"turns-sphere", 0, CLI_INT, "N", NULL, 1, 4096, ON(CLI_FIT), AT(fit.turns_sphere),
+     "rotations tried about every axis (default 60 without a start rotation)"},
+    {"region", 0, CLI_REAL6, "X,Y,Z,X,Y,Z", NULL, -1e12, 1e12, ON(CLI_FIT), AT(fit.region),
+     "two corners of a box: nothing outside of it is looked at"},
+    {"margin", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.margin),
+     "voxels farther than this outside of the shape are not looked at (default 1.5)"},
+
+    /* fits: how */
+    {"image-model", 0, CLI_CHOICE, NULL, "partial|labels", 0, 0, ON(CLI_FIT), AT(fit.image_model),
+     "partial volume (default), or tissue labels with a logistic prior"},
+    {"inside", 0, CLI_REAL2, "MEAN,SD", NULL, -1e12, 1e12, ON(CLI_FIT), AT(fit.inside),
+     "values inside at the start: mean, standard deviation (default 40,170: fluid, HU)"},
+    {"outside", 0, CLI_REAL2, "MEAN,SD", NULL, -1e12, 1e12, ON(CLI_FIT), AT(fit.outside),
+     "values outside at the start (default 1300,270: bone, HU)"},
+    {"air", 0, CLI_REAL2, "MEAN,SD", NULL, -1e12, 1e12, ON(CLI_FIT), AT(fit.air),
+     "a second tissue outside (default -880,150; none where --inside or --outside is given)"},
+    {"blur", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.blur),
+     "standard deviation of the point spread at the start (default 0.2)"},
+    {"l-ref", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.l_ref),
+     "scale of the logistic prior of labels (default 0.2)"},
+    {"point-sd", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.point_sd),
+     "standard deviation of points about the surface at the start (default 0.1)"},
+    {"keep", 0, CLI_LIST, "WHAT", NULL, 0, 0, ON(CLI_FIT), AT(fit.keep),
+     "do not estimate: parameters, pose, blur or appearance; may be repeated"},
+    {"prior-sd", 0, CLI_REAL, "F", NULL, 0, 1e9, ON(CLI_FIT), AT(fit.prior_sd),
+     "standard deviation of a parameter before the image is seen, in halves of its range (default 1; 0: no prior)"},
+    {"prior-rotation", 0, CLI_REAL, "RAD", NULL, 0, 1e9, ON(CLI_FIT), AT(fit.prior_rotation),
+     "the same of the rotation about the start (default 0: no prior)"},
+    {"prior-translation", 0, CLI_REAL, "MM", NULL, 0, 1e9, ON(CLI_FIT), AT(fit.prior_translation),
+     "the same of the translation (default 0: no prior)"},
+    {"eps", 0, CLI_REAL, "F", NULL, 1e-12, 1, ON(CLI_FIT), AT(fit.eps),
+     "the fit ends when no unknown changes by more than this share of its range (default 1e-4; exact maps 1e-6)"},
+    {"max-iterations", 0, CLI_INT, "N", NULL, 1, 100000, ON(CLI_FIT), AT(fit.max_iterations),
+     "iterations at most (default 60)"},
+    {"least-inside", 0, CLI_REAL, "F", NULL, 0, 1, ON(CLI_FIT), AT(fit.least_inside),
+     "exit code 4 when less than this share of the fitted shape lies in the image (default 0.5)"},
+
+    /* fits: what comes of it */
+    {"reference", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_FIT), AT(fit.reference),
+     "label map or segmentation to compare with, inside the field of view of the image: Dice, distances of the "
+     "surfaces"},
+    {"reference-label", 0, CLI_LIST, "VALUE|NAME", NULL, 0, 0, ON(CLI_FIT), AT(fit.reference_labels),
+     "its label (default: all segments, or all voxels but 0); several are united"},
+    {"label-out", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_FIT), AT(fit.label_out),
+     "also write the fitted shape as labels on the grid of the image, 1 inside and 0 outside: .nii .nii.gz .nrrd .mha"},
 
     /* texts */
     {"dump", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_CONFIG), AT(dump), "print the resolved configuration as YAML"},

@@ -31,6 +31,7 @@ typedef enum cli_kind {
     CLI_INT3,   /* int64_t[3], comma separated */
     CLI_REAL2,  /* double[2], comma separated */
     CLI_REAL3,  /* double[3], comma separated */
+    CLI_REAL6,  /* double[6], comma separated */
     CLI_REAL13  /* double[3], one number for all or three */
 } cli_kind;
 
@@ -60,6 +61,7 @@ enum {
     CLI_BENCH,
     CLI_EXPERIMENT,
     CLI_PHANTOM,
+    CLI_FIT,
     CLI_HELP,
     CLI_N_COMMANDS
 };
@@ -80,6 +82,18 @@ typedef struct cli_phantom_args {
     int64_t supersample; /* 0: not given */
     const char *type, *label, *truth;
 } cli_phantom_args;
+
+/* Options of `fit`; numbers that were not given are NaN. The start pose is in cli_phantom_args: rotation, translation. */
+typedef struct cli_fit_args {
+    bool exact, polish, ras;
+    cli_list labels, reference_labels, keep;
+    const char *reference, *label_out, *start_points, *image_model;
+    double start_centre[3], start_axis[3], region[6];
+    int64_t turns, turns_sphere, max_iterations; /* 0: not given */
+    double inside[2], outside[2], air[2];
+    double blur, l_ref, point_sd, margin, least_inside;
+    double prior_sd, prior_rotation, prior_translation, eps;
+} cli_fit_args;
 
 /* A parsed command line. Numbers that were not given keep the default of the table's help text; seed -1, size[0] 0,
    spacing[0] 0 and origin[0] NaN mean "not given". */
@@ -112,6 +126,7 @@ struct cli_args {
     bool growth;              /* bench */
     bool dry_run;             /* experiment */
     cli_phantom_args phantom;
+    cli_fit_args fit;
     const char **memory; /* behind the lists */
 };
 

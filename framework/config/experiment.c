@@ -45,7 +45,7 @@ sdm_status sdm_experiment_config(const sdm_experiment *e, size_t row, sdm_config
     char kind_text[SDM_NAME_MAX + 32], kind_place[SDM_PATH_TEXT_MAX + 32];
     if (!e || !out || row >= e->n_rows)
         return sdm_fail(err, SDM_E_ARG, "an experiment's configuration needs a row and a place for the result");
-    const sdm_experiment_method *m = e->rows[row].method;
+    const sdm_experiment_method *m = e->rows[e->rows[row].network_row].method;
     const sdm_experiment_variant *v = e->rows[row].variant;
     /* an engine is not trained, but a training configuration has a budget */
     snprintf(kind_text, sizeof kind_text, "%s%s", *m->engine ? "train.steps=1" : "network.kind=", m->network);

@@ -32,6 +32,28 @@ static void make_row(const sdm_experiment *e, const sdm_experiment_method *m, co
     make_folder(row->title, row->folder);
 }
 
+/* Polishing takes the network of the nearest method before it that fits with one. */
+static void find_networks(sdm_experiment *e, sdm_mark model, sdm_mistakes *mistakes)
+{
+    size_t n_networks = 0;
+    for (size_t i = 0; i < e->n_methods; i++) {
+        sdm_experiment_method *m = &e->methods[i];
+        size_t from = i;
+        n_networks += m->fit == SDM_EXPERIMENT_FIT_NETWORK;
+        if (m->fit == SDM_EXPERIMENT_FIT_POLISH) {
+            while (from > 0 && e->methods[from].fit != SDM_EXPERIMENT_FIT_NETWORK) from--;
+            if (e->methods[from].fit != SDM_EXPERIMENT_FIT_NETWORK)
+                sdm_mistakes_add(mistakes, m->mark, "method '%s' with fit: polish needs one with fit: network before it",
+                                 m->name);
+            strcpy(m->network, e->methods[from].network);
+        }
+        for (size_t row = i; row < e->n_rows; row += e->n_methods) e->rows[row].network_row = row - i + from;
+    }
+    if (*e->fit.model && n_networks != 1)
+        sdm_mistakes_add(mistakes, model,
+                         "fit.model: one model for %zu methods with fit: network, need one such method", n_networks);
+}
+
 static void check_folders(const sdm_experiment *e, sdm_mistakes *m)
 {
     for (size_t i = 0; i < e->n_rows; i++)
@@ -96,6 +118,7 @@ sdm_status sdm_experiment_finish(sdm_experiment *e, sdm_reader *r, sdm_error *er
     for (size_t v = 0; v < n_variants; v++)
         for (size_t i = 0; i < e->n_methods; i++)
             make_row(e, &e->methods[i], e->n_variants ? &e->variants[v] : NULL, &e->rows[e->n_rows++]);
+    find_networks(e, sdm_fields_given(r, "fit", "model")->mark, r->mistakes);
     check_folders(e, r->mistakes);
     attach_references(e, r->mistakes);
     if (*e->experiment.baseline) check_baseline(e, sdm_fields_given(r, "experiment", "baseline")->mark, r->mistakes);

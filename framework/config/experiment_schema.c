@@ -42,6 +42,12 @@ static const sdm_figure_info FIGURES[SDM_N_FIGURES] = {
     [SDM_FIGURE_MODEL] = {"model_mb", "model", "MB", "size of the model file"},
     [SDM_FIGURE_PEAK] = {"peak_mb", "memory", "MB", "peak of the resident memory for one map, the map included"},
     [SDM_FIGURE_SHAPES] = {"shapes", "shapes", "", "shapes the errors are measured on"},
+    [SDM_FIGURE_FITS] = {"fits", "fits converged", "", "fits that converged, of the shapes"},
+    [SDM_FIGURE_FIT] = {"fit_s", "one fit", "s", "mean time of a fit on one core"},
+    [SDM_FIGURE_MAPS_NETWORK] = {"maps_network", "network maps", "", "maps with derivatives by the network, mean of a fit"},
+    [SDM_FIGURE_MAPS_EXACT] = {"maps_exact", "exact maps", "", "maps with derivatives by the exact engine, mean of a fit"},
+    [SDM_FIGURE_WITHIN] = {"within_3sd", "within 3 sd", "",
+                           "share of the estimates within three standard deviations of the truth, all parameters"},
 };
 
 const sdm_figure_info *sdm_figure_get_info(sdm_figure f) { return (unsigned)f < SDM_N_FIGURES ? &FIGURES[f] : NULL; }
@@ -51,6 +57,7 @@ static bool read_training(sdm_reader *r, const sdm_field *f, const sdm_tree_node
 static bool read_methods(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
 static bool read_variants(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
 static bool read_references(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
+static bool read_differences(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
 
 // clang-format off
 #define E sdm_experiment
@@ -65,6 +72,15 @@ static const sdm_field EXPERIMENT[] = {
     TEXT(E, "reference", experiment.reference, SDM_NAME_MAX, "reference", "heading of the figures in `reference`"),
     {.key = "pictures", .type = SDM_FIELD_CHOICE, .offset = offsetof(E, experiment.pictures), .choices = "no|yes", .def = "yes",
      .unit = "", .help = "draw slices with contours and surfaces of every row"},
+};
+
+static const sdm_field FIT[] = {
+    ROW(E, "phantoms", SDM_FIELD_INT64, fit.phantoms, 1, 1e4, "9", "images", "test images of random shapes in random poses that methods with `fit` are measured on"),
+    ROW(E, "off_mm", SDM_FIELD_REAL, fit.off_mm, 0, 1e6, "1", "mm", "how far the start lies from the true place, in a random direction"),
+    ROW(E, "off_deg", SDM_FIELD_REAL, fit.off_deg, 0, 180, "15", "degrees", "how far it is turned, about a random axis"),
+    ROW(E, "voxel", SDM_FIELD_REAL, fit.voxel, 1e-6, 1e6, "0.25", "mm", "edge of a voxel of the images"),
+    ROW(E, "range", SDM_FIELD_REAL, fit.range, 0, 1, "0.8", "", "share of every parameter's range, about its middle, that the shapes are drawn from"),
+    TEXT(E, "model", fit.model, SDM_PATH_TEXT_MAX, "none", "model file to fit with; none: the network is trained"),
 };
 
 static const sdm_field TOP[] = {
@@ -86,6 +102,8 @@ static const sdm_field METHOD[] = {
     TEXT(M, "name", name, SDM_NAME_MAX, "required", "title of its row"),
     TEXT(M, "network", network, SDM_NAME_MAX, "none", "kind of a network to train (network.kind)"),
     TEXT(M, "engine", engine, SDM_NAME_MAX, "none", "method without training: exact, naive, cells, octree, edt, or another program: vtk, cgal, embree, openvdb, itk, scipy"),
+    {.key = "fit", .type = SDM_FIELD_CHOICE, .offset = offsetof(M, fit), .choices = "none|network|polish|exact|naive", .def = "none",
+     .unit = "", .help = "find shapes in images: with the network of this method, with that of the method before it and exact maps at the end, with exact maps; naive: what that would cost"},
     ROW(M, "samples", SDM_FIELD_INT64, samples, 0, 1e6, "0", "shapes", "shapes its errors are measured on; 0: as the experiment says"),
     SPECIAL("set", read_set, "mapping", "keys of a training", "none", "keys of the training configuration for this method, e.g. {train.minutes: 4}"),
 };
@@ -108,12 +126,17 @@ static const sdm_field REFERENCE[] = {
     FIGURE("surface_mean_mm", SDM_FIGURE_SURFACE_MEAN, "mm"), FIGURE("surface_hausdorff_mm", SDM_FIGURE_SURFACE_MAX, "mm"),
     FIGURE("train_s", SDM_FIGURE_TRAIN, "s"), FIGURE("model_mb", SDM_FIGURE_MODEL, "MB"), FIGURE("peak_mb", SDM_FIGURE_PEAK, "MB"),
     FIGURE("shapes", SDM_FIGURE_SHAPES, "shapes the errors are of"),
+    FIGURE("fits", SDM_FIGURE_FITS, "fits that converged"), FIGURE("fit_s", SDM_FIGURE_FIT, "s, one fit"),
+    FIGURE("maps_network", SDM_FIGURE_MAPS_NETWORK, "maps of a fit"), FIGURE("maps_exact", SDM_FIGURE_MAPS_EXACT, "maps of a fit"),
+    FIGURE("within_3sd", SDM_FIGURE_WITHIN, "0 .. 1"),
+    SPECIAL("difference", read_differences, "mapping", "names of parameters", "none", "mean difference of a parameter from the exact fit, e.g. {a: 2e-8}"),
 };
 
-/* The first two are of the file, the others of the elements of its lists. */
-enum { N_FILE_SECTIONS = 2 };
+/* The first are of the file, the others of the elements of its lists. */
+enum { N_FILE_SECTIONS = 3, OF_METHODS = N_FILE_SECTIONS, OF_VARIANTS, OF_REFERENCES };
 static const sdm_section SECTIONS[] = {
     {.name = "experiment", .fields = EXPERIMENT, .n_fields = COUNT(EXPERIMENT)},
+    {.name = "fit", .fields = FIT, .n_fields = COUNT(FIT)},
     {.name = "", .fields = TOP, .n_fields = COUNT(TOP)},
     {.name = "methods[]", .fields = METHOD, .n_fields = COUNT(METHOD)},
     {.name = "variants[]", .fields = VARIANT, .n_fields = COUNT(VARIANT)},
@@ -219,18 +242,41 @@ static void begin_reference(void *element, sdm_mark mark)
     for (int i = 0; i < SDM_N_FIGURES; i++) reference->value[i] = NAN;
 }
 
+static bool refuse_method(sdm_reader *r, const M *m, const char *why)
+{
+    sdm_mistakes_add(r->mistakes, m->mark, "method '%s' %s", m->name, why);
+    return false;
+}
+
+/* What a method of a fit needs besides; an exact or naive one gets its engine. */
+static bool finish_fit(sdm_reader *r, M *m)
+{
+    if (m->fit == SDM_EXPERIMENT_FIT_NETWORK) {
+        if (!*m->network || *m->engine) return refuse_method(r, m, "with fit: network needs the key network, no engine");
+        return true;
+    }
+    if (*m->network || *m->engine)
+        return refuse_method(r, m, "with this fit needs none of the keys network and engine");
+    if (m->fit == SDM_EXPERIMENT_FIT_POLISH && m->set.n > 0)
+        return refuse_method(r, m, "with fit: polish takes the network before it: no key set");
+    if (m->fit != SDM_EXPERIMENT_FIT_POLISH)
+        snprintf(m->engine, sizeof m->engine, m->fit == SDM_EXPERIMENT_FIT_EXACT ? "exact" : "naive");
+    return true;
+}
+
 static bool read_methods(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
 {
     E *e = r->target;
     (void)f;
     bool fits =
-        read_list(r, node, path, &SECTIONS[2], (void **)&e->methods, &e->n_methods, sizeof *e->methods, begin_method);
+        read_list(r, node, path, &SECTIONS[OF_METHODS], (void **)&e->methods, &e->n_methods, sizeof *e->methods, begin_method);
     for (size_t i = 0; i < e->n_methods && fits; i++) {
         M *m = &e->methods[i];
-        if ((*m->network != 0) != (*m->engine != 0)) continue;
-        sdm_mistakes_add(r->mistakes, m->mark, "method '%s' needs %s of the keys network and engine", m->name,
-                         *m->network ? "only one" : "one");
-        fits = false;
+        if (m->fit)
+            fits = finish_fit(r, m);
+        else if ((*m->network != 0) == (*m->engine != 0))
+            fits = refuse_method(r, m, *m->network ? "needs only one of the keys network and engine"
+                                                   : "needs one of the keys network and engine");
     }
     return fits;
 }
@@ -239,7 +285,7 @@ static bool read_variants(sdm_reader *r, const sdm_field *f, const sdm_tree_node
 {
     E *e = r->target;
     (void)f;
-    return read_list(r, node, path, &SECTIONS[3], (void **)&e->variants, &e->n_variants, sizeof *e->variants,
+    return read_list(r, node, path, &SECTIONS[OF_VARIANTS], (void **)&e->variants, &e->n_variants, sizeof *e->variants,
                      begin_variant);
 }
 
@@ -247,6 +293,23 @@ static bool read_references(sdm_reader *r, const sdm_field *f, const sdm_tree_no
 {
     E *e = r->target;
     (void)f;
-    return read_list(r, node, path, &SECTIONS[4], (void **)&e->references, &e->n_references, sizeof *e->references,
+    return read_list(r, node, path, &SECTIONS[OF_REFERENCES], (void **)&e->references, &e->n_references, sizeof *e->references,
                      begin_reference);
+}
+
+/* {NAME: number, ...}; whether the shape has such parameters is not known here. */
+static bool read_differences(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
+{
+    R *reference = r->target;
+    bool fits = true;
+    (void)f;
+    if (node->kind != SDM_TREE_MAP || node->n_children > SDM_MAX_PARAMS)
+        return refuse(r, node, path, "numbers by names of parameters");
+    for (const sdm_tree_node *child = node->first; child; child = child->next) {
+        const size_t i = reference->n_differences++;
+        if (strlen(child->key) >= SDM_NAME_MAX) return refuse(r, child, path, "short names");
+        snprintf(reference->differences[i].name, SDM_NAME_MAX, "%s", child->key);
+        fits &= sdm_read_real(r, child, path, 0, 1e12, &reference->differences[i].value);
+    }
+    return fits;
 }

@@ -5,7 +5,7 @@
 #include "yaml_tree.h"
 
 #define SDM_KEY_PATH_MAX 160
-#define SDM_SECTION_FIELDS_MAX 20
+#define SDM_SECTION_FIELDS_MAX 24
 #define SDM_SECTIONS_MAX 8
 
 typedef enum sdm_field_type {

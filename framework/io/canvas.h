@@ -56,7 +56,8 @@ sdm_status sdm_png_write(const char *path, const sdm_canvas *c, sdm_error *err);
 typedef enum sdm_colour_map {
     SDM_MAP_DISTANCE, /* diverging, orange inside (below 0), blue outside */
     SDM_MAP_ERROR,    /* sequential, dark to light */
-    SDM_MAP_SIGNED    /* diverging, green below 0, magenta above */
+    SDM_MAP_SIGNED,   /* diverging, green below 0, magenta above */
+    SDM_MAP_GREY      /* black to white */
 } sdm_colour_map;
 
 /* Colour of `value` where the map spans low .. high; the diverging maps are white at 0 and take low < 0 < high.

@@ -63,6 +63,10 @@ sdm_colour sdm_map_colour(sdm_colour_map map, double low, double high, double va
         {18, 14, 34}, {82, 28, 104}, {170, 48, 108}, {236, 112, 76}, {252, 234, 176}};
     if (!isfinite(value)) return (sdm_colour){160, 160, 160};
     if (map == SDM_MAP_ERROR) return mix(error, high > low ? (value - low) / (high - low) : 0);
+    if (map == SDM_MAP_GREY) {
+        const uint8_t v = (uint8_t)(255 * fmin(1, fmax(0, (value - low) / (high - low))) + 0.5);
+        return (sdm_colour){v, v, v};
+    }
     const double end = value < 0 ? low : high;
     const sdm_colour(*side)[ANCHORS] = map == SDM_MAP_DISTANCE ? distance : plus_minus;
     return mix(side[value >= 0], fabs(end) > 0 ? value / end : 0);

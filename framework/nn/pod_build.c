@@ -20,11 +20,10 @@ static void describe(const sdm_pod_spec *spec, sdm_text *t)
     sdm_text_add(t, "pod.block=%zu\npod.levels=%zu\n", k->block, k->levels.n);
 }
 
-size_t sdm_pod_mlp_floats(const sdm_pod_arch *a)
+size_t sdm_pod_mlp_count(const sdm_pod_arch *a)
 {
     size_t n = 0;
-    for (size_t l = 0; l < a->depth; l++)
-        n += sdm_panel_count(a->width, sdm_pod_layer_inputs(a, l)) + sdm_panel_count(a->width, 1);
+    for (size_t l = 0; l < a->depth; l++) n += sdm_panel_count(a->width, sdm_pod_layer_inputs(a, l));
     return n;
 }
 
@@ -52,15 +51,15 @@ static void pack_matrix(bool half, size_t outputs, size_t k, sdm_view w, void *t
         sdm_panel_pack_f32(outputs, k, w, (float *)to + offset);
 }
 
-static void pack_weights(const sdm_pod_spec *spec, const size_t *at, float *mlp, void *head, void *basis)
+static void pack_weights(const sdm_pod_spec *spec, const size_t *at, void *mlp, float *bias, void *head, void *basis)
 {
     const sdm_pod_arch *a = &spec->arch;
+    size_t next = 0;
     for (size_t l = 0; l < a->depth; l++) {
         const size_t k = sdm_pod_layer_inputs(a, l);
-        sdm_panel_pack_f32(a->width, k, (sdm_view){spec->weights.layer[l], k, 1}, mlp);
-        mlp += sdm_panel_count(a->width, k);
-        memcpy(mlp, spec->weights.bias[l], a->width * sizeof *mlp);
-        mlp += sdm_panel_count(a->width, 1);
+        pack_matrix(spec->half, a->width, k, (sdm_view){spec->weights.layer[l], k, 1}, mlp, next);
+        next += sdm_panel_count(a->width, k);
+        memcpy(bias + l * a->width, spec->weights.bias[l], a->width * sizeof *bias);
     }
     pack_matrix(spec->half, a->n_coefficients, a->n_latent, (sdm_view){spec->weights.head, a->n_latent, 1}, head, 0);
     const float *from = spec->weights.basis;
@@ -75,24 +74,26 @@ sdm_status sdm_model_build(const sdm_pod_spec *spec, uint8_t **bytes, size_t *si
 {
     const sdm_pod_arch *a = &spec->arch;
     const size_t weight = spec->half ? sizeof(uint16_t) : sizeof(float), n_blocks = a->levels.first[a->levels.n];
-    const size_t mlp_floats = sdm_pod_mlp_floats(a), head_count = sdm_panel_count(a->n_coefficients, a->n_latent);
-    float *mlp = NULL;
+    const size_t mlp_count = sdm_pod_mlp_count(a), head_count = sdm_panel_count(a->n_coefficients, a->n_latent);
+    float *bias = NULL;
     size_t *at = NULL, basis_count = 0;
-    uint8_t *head = NULL, *basis = NULL, *ranks = NULL;
+    uint8_t *mlp = NULL, *head = NULL, *basis = NULL, *ranks = NULL;
     sdm_text text = {0};
     sdm_status s = SDM_ALLOC(&at, n_blocks, "model weights", err);
     if (!s) basis_count = sdm_pod_place_weights(&a->levels, spec->blocks, at);
-    if (!s) s = SDM_ALLOC(&mlp, mlp_floats, "model weights", err);
+    if (!s) s = SDM_ALLOC(&mlp, mlp_count * weight, "model weights", err);
+    if (!s) s = SDM_ALLOC(&bias, a->depth * a->width, "model weights", err);
     if (!s) s = SDM_ALLOC(&head, head_count * weight, "model weights", err);
     if (!s) s = SDM_ALLOC(&basis, basis_count * weight, "model weights", err);
     if (!s) s = SDM_ALLOC(&ranks, n_blocks * 4, "model weights", err);
     if (s) goto done;
-    pack_weights(spec, at, mlp, head, basis);
+    pack_weights(spec, at, mlp, bias, head, basis);
     for (size_t b = 0; b < n_blocks; b++)
         for (int i = 0; i < 4; i++) ranks[4 * b + (size_t)i] = (uint8_t)(spec->blocks[b].rank >> (8 * i));
     describe(spec, &text);
     const sdm_section sections[] = {{"pod.ranks", ranks, n_blocks * 4},
-                                    {"pod.mlp", mlp, mlp_floats * sizeof *mlp},
+                                    {"pod.mlp", mlp, mlp_count * weight},
+                                    {"pod.bias", bias, a->depth * a->width * sizeof *bias},
                                     {"pod.head", head, head_count * weight},
                                     {"pod.basis", basis, basis_count * weight},
                                     {"pod.mean", spec->weights.mean, a->n_voxels * sizeof(float)}};
@@ -102,6 +103,7 @@ done:
     sdm_free(ranks);
     sdm_free(basis);
     sdm_free(head);
+    sdm_free(bias);
     sdm_free(mlp);
     sdm_free(at);
     return s;

@@ -39,24 +39,6 @@ static size_t carve(const pod_network *m, size_t rows, size_t directions, int n_
     return (total + w->per_thread * (size_t)n_threads) * sizeof(float);
 }
 
-// y[R][ldy] = x[R][ldx] times weights that begin at `at`
-static void product(bool half, size_t rows, size_t outputs, size_t k, const void *weights, size_t at, const float *x,
-                    size_t ldx, float *y, size_t ldy)
-{
-    if (half)
-        sdm_panel_f16(rows, outputs, k, (const uint16_t *)weights + at, x, ldx, y, ldy);
-    else
-        sdm_panel_f32(rows, outputs, k, (const float *)weights + at, x, ldx, y, ldy);
-}
-
-static void product_back(bool half, size_t outputs, size_t k, const void *weights, size_t at, const float *y, float *x)
-{
-    if (half)
-        sdm_panel_back_f16(outputs, k, (const uint16_t *)weights + at, y, x);
-    else
-        sdm_panel_back_f32(outputs, k, (const float *)weights + at, y, x);
-}
-
 static size_t first_voxel(const sdm_grid *g, const sdm_pod_block *b)
 {
     return ((size_t)b->at[2] * (size_t)g->n[1] + b->at[1]) * (size_t)g->n[0] + b->at[0];
@@ -104,7 +86,7 @@ static void decode_block(const job *j, size_t b, size_t level, size_t thread, co
     const sdm_pod_block *k = &m->blocks[b];
     const size_t ldy = sdm_panel_outputs(m->max_outputs[level]);
     float *y = j->w->y[level] + thread * j->w->per_thread;
-    product(m->half, j->rows, m->outputs[b], k->rank, m->basis, m->weights_at[b], x, ldx, y, ldy);
+    sdm_pod_product(m->half, j->rows, m->outputs[b], k->rank, m->basis, m->weights_at[b], x, ldx, y, ldy);
     if (level > 0) {
         const uint32_t first = m->blocks[k->child].coefficient;
         for (size_t i = k->child; i < k->child + k->n_children; i++)
@@ -142,8 +124,8 @@ static void decode(const job *j, int n_threads)
 #endif
         for (long i = 0; i < parts; i++) {
             const size_t o = (size_t)i * PART;
-            product(m->half, j->rows, smaller(PART, a->n_coefficients - o), a->n_latent, m->head, o * a->n_latent,
-                    j->w->z, a->n_latent, j->w->c + o, ldc);
+            sdm_pod_product(m->half, j->rows, smaller(PART, a->n_coefficients - o), a->n_latent, m->head,
+                            o * a->n_latent, j->w->z, a->n_latent, j->w->c + o, ldc);
         }
 #ifdef _OPENMP
 #pragma omp for schedule(dynamic)
@@ -237,7 +219,7 @@ static void back_block(const pod_network *m, const sdm_grid *g, size_t b, size_t
             for (size_t v = 0; v < k->size[1]; v++, to += k->size[0])
                 memcpy(to, from + v * line, k->size[0] * sizeof *to);
     }
-    product_back(m->half, m->outputs[b], k->rank, m->basis, m->weights_at[b], y, x);
+    sdm_pod_product_back(m->half, m->outputs[b], k->rank, m->basis, m->weights_at[b], y, x);
 }
 
 size_t sdm_pod_vjp_scratch_bytes(const sdm_model *m)
@@ -258,6 +240,6 @@ void sdm_pod_vjp(const sdm_model *m, const double *params, const float *adjoint,
         back_block(k, &m->info.grid, b, top, adjoint, &w, w.c + k->blocks[b].coefficient);
     memset(w.c + a->n_coefficients, 0, (sdm_panel_outputs(a->n_coefficients) - a->n_coefficients) * sizeof *w.c);
     float *dz = w.z + a->n_latent;
-    product_back(k->half, a->n_coefficients, a->n_latent, k->head, 0, w.c, dz);
+    sdm_pod_product_back(k->half, a->n_coefficients, a->n_latent, k->head, 0, w.c, dz);
     sdm_pod_latent_back(m, &w.latent, dz, gradient);
 }

@@ -9,20 +9,25 @@ typedef struct pod_network {
     sdm_pod_arch arch;
     bool half;
     sdm_pod_block *blocks;
-    uint32_t *outputs;                     /* [blocks] V_b */
-    size_t *weights_at;                    /* [blocks] where the weights of a block begin in basis */
-    uint8_t *exponents;                    /* [max(F, 1 + I)][P] */
-    const float *layer[SDM_POD_MAX_DEPTH]; /* panels (sdm/kernels.h), as the next two */
-    const float *bias[SDM_POD_MAX_DEPTH];
-    const void *head; /* float or half, as the next */
-    const void *
-        basis; /* a block of the highest level, then those below it, depth first: in the order in which they are read */
-    const float *mean; /* block order */
+    uint32_t *outputs;                    /* [blocks] V_b */
+    size_t *weights_at;                   /* [blocks] where the weights of a block begin in basis */
+    uint8_t *exponents;                   /* [max(F, 1 + I)][P] */
+    const float *bias[SDM_POD_MAX_DEPTH]; /* [W] */
+    const float *mean;                    /* block order */
+    /* Panels (sdm/kernels.h), float or half. The basis: a block of the highest level, then those below it, depth first, which is the
+       order in which they are read. */
+    const void *layer[SDM_POD_MAX_DEPTH], *head, *basis;
     size_t max_outputs[SDM_POD_MAX_LEVELS];
 } pod_network;
 
-/* Elements of the sections that hold the weights, for a given architecture. */
-size_t sdm_pod_mlp_floats(const sdm_pod_arch *a);
+/* Number of weights of the layers of the MLP, without the biases. */
+size_t sdm_pod_mlp_count(const sdm_pod_arch *a);
+
+/* y[rows][ldy] = x[rows][ldx] times weights that begin at `at`, as sdm_panel_*(); and the transpose. */
+void sdm_pod_product(bool half, size_t rows, size_t outputs, size_t k, const void *weights, size_t at, const float *x,
+                     size_t ldx, float *y, size_t ldy);
+void sdm_pod_product_back(bool half, size_t outputs, size_t k, const void *weights, size_t at, const float *y,
+                          float *x);
 
 /* at[blocks] = where the weights of each block begin, depth first; returns their number. */
 size_t sdm_pod_place_weights(const sdm_pod_levels *levels, const sdm_pod_block *blocks, size_t *at);

@@ -82,22 +82,22 @@ static sdm_status bind_weights(const sdm_section *sections, size_t n, sdm_model 
         const char *name;
         size_t size;
     } need[] = {
-        {"pod.mlp", sdm_pod_mlp_floats(a) * sizeof(float)},
+        {"pod.mlp", sdm_pod_mlp_count(a) * weight},
         {"pod.head", sdm_panel_count(a->n_coefficients, a->n_latent) * weight},
         {"pod.basis", sdm_pod_place_weights(&a->levels, m->blocks, m->weights_at) * weight},
         {"pod.mean", a->n_voxels * sizeof(float)},
+        {"pod.bias", a->depth * a->width * sizeof(float)},
     };
-    const void *data[4];
-    for (int i = 0; i < 4; i++) {
+    const void *data[5];
+    for (int i = 0; i < 5; i++) {
         data[i] = sdm_model_weights(model, sections, n, need[i].name, need[i].size, err);
         if (!data[i]) return SDM_E_FORMAT;
     }
-    const float *mlp = data[0];
+    const uint8_t *mlp = data[0];
     for (size_t l = 0; l < a->depth; l++) {
         m->layer[l] = mlp;
-        mlp += sdm_panel_count(a->width, sdm_pod_layer_inputs(a, l));
-        m->bias[l] = mlp;
-        mlp += sdm_panel_count(a->width, 1);
+        mlp += sdm_panel_count(a->width, sdm_pod_layer_inputs(a, l)) * weight;
+        m->bias[l] = (const float *)data[4] + l * a->width;
     }
     m->head = data[1];
     m->basis = data[2];

@@ -229,7 +229,7 @@ static sdm_status judge(const fit_problem *p, const sdm_fit_result *r, sdm_error
 {
     const sdm_fit_opts *o = p->opts;
     const sdm_fit_appearance *a = &r->appearance, *b = &o->appearance;
-    if (p->target->kind == SDM_FIT_IMAGE) {
+    if (p->target->kind == SDM_FIT_IMAGE && !p->given_labels) {
         const double in = mean_of(a->inside, a->n_inside), out = mean_of(a->outside, a->n_outside);
         const bool darker = mean_of(b->inside, b->n_inside) < mean_of(b->outside, b->n_outside);
         if (!(r->evidence > 0))
@@ -261,7 +261,7 @@ static sdm_status finish(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     if (s && s != SDM_E_QUALITY) return s;
     out->inside_share = sdm_fit_inside_share(p);
     out->log_likelihood_without = out->evidence = NAN;
-    if (p->target->kind == SDM_FIT_IMAGE) {
+    if (p->target->kind == SDM_FIT_IMAGE && !p->given_labels) {
         const sdm_status found = sdm_fit_without_shape(p, &out->log_likelihood_without, err);
         if (found) return found;
         const double factor = fmax(out->noise_factor, 1), n = (double)p->sites.n / factor;
@@ -272,6 +272,17 @@ static sdm_status finish(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     return s ? s : judge(p, out, err);
 }
 
+// a label map as an image of what is 1 inside and 0 outside: shares, seen through a point spread that is narrow
+static void take_labels(sdm_fit_target *target, sdm_fit_opts *opts)
+{
+    target->kind = SDM_FIT_IMAGE;
+    opts->appearance = (sdm_fit_appearance){.n_inside = 1,
+                                            .n_outside = 1,
+                                            .inside = {{.weight = 1, .mean = 1, .sd = 0.25}},
+                                            .outside = {{.weight = 1, .mean = 0, .sd = 0.25}}};
+    opts->keep_appearance = true;
+}
+
 sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target, const sdm_fit_opts *opts,
                    sdm_fit_result *out, sdm_error *err)
 {
@@ -279,8 +290,15 @@ sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target, c
     *out = (sdm_fit_result){0};
     const double from = sdm_fit_seconds();
     fit_problem p = {.source = source, .target = target, .opts = opts};
+    sdm_fit_target as_image;
+    sdm_fit_opts with_labels;
     sdm_status s = sdm_fit_check_source(source, &p.n_params, err);
     if (!s) s = sdm_fit_check(target, opts, err);
+    if (!s && target->kind == SDM_FIT_LABEL && opts->image_model == SDM_FIT_PARTIAL_VOLUME) {
+        as_image = *target, with_labels = *opts;
+        take_labels(&as_image, &with_labels);
+        p.target = &as_image, p.opts = &with_labels, p.given_labels = true;
+    }
     if (!s) s = make_result(p.n_params, out, err);
     if (!s) s = begin(&p, out, err);
     if (!s) s = climb(&p, out, err);

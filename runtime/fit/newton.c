@@ -11,6 +11,8 @@
 #define STEP_MOST 0.25
 // a gain in log-likelihood too small to tell from rounding: such steps are taken without asking whether they gain
 #define GAIN_LEAST 1e-4
+// a gain that means nothing at all: a thousandth of a standard deviation
+#define GAIN_NONE 1e-6
 #define DAMPING_MOST 1e8
 
 sdm_status sdm_fit_look(fit_problem *p, sdm_error *err)
@@ -204,7 +206,7 @@ static void swap_sums(fit_problem *p)
 /* Where the steps of an iteration stand. */
 typedef struct fit_pace {
     double damping;
-    double shrink; // factor of steps that swing about a crease of the posterior (distances have them), else 1
+    double shrink; // factor of steps about a crease of the posterior (distances have them), else 1
     bool flat;     // the gain of the last step was too small to tell
 } fit_pace;
 
@@ -227,8 +229,8 @@ static sdm_status one_step(fit_problem *p, const fit_run *run, fit_pace *pace, d
         const sdm_status s = sdm_fit_look(p, err);
         const double after = s ? 0 : p->sums.log_likelihood + sdm_fit_prior(p, &p->state, NULL, NULL, NULL);
         if (s) return s;
-        pace->flat = fabs(expected) < GAIN_LEAST;
-        if (after > before || (pace->flat && after > before - GAIN_LEAST)) {
+        pace->flat = fabs(expected) < GAIN_NONE;
+        if (after > before || (fabs(expected) < GAIN_LEAST && after > before - GAIN_LEAST)) {
             *taken = true;
             *damping = *damping > 1e-6 ? *damping / 10 : 0;
             return SDM_OK;
@@ -293,6 +295,7 @@ sdm_status sdm_fit_iterate(fit_problem *p, const fit_run *run, fit_ended *out, s
     const size_t n = p->sums.n_unknowns;
     double step[FIT_UNKNOWNS_MAX], last[FIT_UNKNOWNS_MAX] = {0}, *work = NULL;
     fit_pace pace = {.damping = run->phase == SDM_FIT_SEARCH ? 1e-2 : 1e-4, .shrink = 1};
+    int stuck = 0; // steps that gain nothing and do not become smaller
     *out = (fit_ended){.step = INFINITY};
     sdm_status s = SDM_ALLOC(&work, 3 * n * n, "matrices of the fit", err);
     if (!s) s = sdm_fit_look(p, err);
@@ -306,9 +309,11 @@ sdm_status sdm_fit_iterate(fit_problem *p, const fit_run *run, fit_ended *out, s
             out->converged = out->step <= 1e3 * run->eps;
             break;
         }
-        if (pace.flat && swings(p, step, last)) pace.shrink *= 0.5;
+        const double size = step_size(p, step);
+        stuck = pace.flat && size > 0.8 * out->step ? stuck + 1 : 0;
+        if ((pace.flat && swings(p, step, last)) || stuck == 3) pace.shrink *= 0.5, stuck = 0;
         memcpy(last, step, n * sizeof *last);
-        out->step = step_size(p, step);
+        out->step = size;
         out->converged = out->step <= run->eps;
         s = record(p, run, out->step, err);
     }

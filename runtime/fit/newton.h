@@ -10,6 +10,7 @@ typedef struct fit_problem {
     const sdm_fit_source *source;
     const sdm_fit_target *target;
     const sdm_fit_opts *opts;
+    bool given_labels; // the target is a label map, taken as an image
     size_t n_params;
     double low[FIT_PARAMS_MAX], high[FIT_PARAMS_MAX]; // bounds
     fit_state prior;                                  // pose the priors are about

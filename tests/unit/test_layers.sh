@@ -25,7 +25,7 @@ check() {
         own("nn", "model pod point_network sdmnn kernels container")
         own("io", "image volume meshfile")
         own("shape", "shape registry")
-        own("runtime", "check map runtime phantom vdb")
+        own("runtime", "check fit map phantom runtime vdb")
         own("trainer", "train")
         own("shapes", "builtin_shapes")
         allow("core", "core")

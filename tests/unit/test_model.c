@@ -373,7 +373,7 @@ static void damage_is_refused(void **state)
     uint8_t *bytes;
     size_t size;
     assert_int_equal(sdm_model_build(&t.spec, &bytes, &size, NULL), SDM_OK);
-    const size_t header = 24 + 7 * 48 + 8;
+    const size_t header = 24 + 8 * 48 + 8;
     // cut off at every byte of the header and a sample of the rest
     for (size_t n = 0; n < size; n += n < header + 64 ? 1 : 97) expect_refused(bytes, n, "truncation", n);
     expect_refused(bytes, size - 1, "truncation", size - 1);

@@ -153,6 +153,67 @@ static void test_slices_of_odd_maps(void **state)
         }
 }
 
+/* A bright ball on a dark ground, two contours: three circles of the first, side by side, white within and black far outside. */
+static void test_overlay(void **state)
+{
+    (void)state;
+    sdm_grid g;
+    float *v = ball_map(&g, 3), *w = ball_map(&g, 2), *image = malloc(sdm_grid_count(&g) * sizeof *image);
+    assert_non_null(image);
+    for (size_t i = 0; i < sdm_grid_count(&g); i++) image[i] = v[i] < 0 ? 900 : -100;
+    image[0] = NAN;
+    const sdm_picture_map maps[2] = {{"fitted", v, false}, {"reference", w, true}};
+    assert_int_equal(sdm_picture_overlay("test_picture_w.png", &g, image, maps, 2, "a ball", NULL), SDM_OK);
+    picture p = read_png("test_picture_w.png");
+    int circles = 0, left = -1, yellow = 0;
+    for (int x = 0; x < p.w; x++) {
+        int bottom = -1;
+        for (int y = 0; y < p.h; y++) {
+            const unsigned char *pixel = p.rgb + 3 * ((size_t)y * (size_t)p.w + (size_t)x);
+            yellow += is_colour(pixel, 255, 214, 10);
+            if (!is_colour(pixel, 232, 40, 44)) continue;
+            if (y < p.h - 40) bottom = y; /* below it is the key */
+        }
+        if (bottom >= 0 && left < 0) left = x;
+        if (bottom >= 0 || left < 0) continue;
+        const int width = x - left, middle = left + width / 2;
+        int low = p.h, high = -1;
+        for (int y = 0; y < p.h - 40; y++) {
+            const unsigned char *pixel = p.rgb + 3 * ((size_t)y * (size_t)p.w + (size_t)middle);
+            if (is_colour(pixel, 232, 40, 44)) low = y < low ? y : low, high = y;
+        }
+        const unsigned char *inside = p.rgb + 3 * ((size_t)((low + high) / 2) * (size_t)p.w + (size_t)middle),
+                            *outside = p.rgb + 3 * ((size_t)(high + 8) * (size_t)p.w + (size_t)middle);
+        assert_true(abs(high + 1 - low - width) <= 3);
+        assert_true(width > 6 * 26 && width < 6 * 38); /* 6 mm; the widest axis is 12.5 mm in 340 or 420 pixels */
+        assert_true(is_colour(inside, 255, 255, 255));
+        assert_true(is_colour(outside, 0, 0, 0));
+        circles++;
+        left = -1;
+    }
+    assert_int_equal(circles, 3);
+    assert_true(yellow > 500);
+    free(p.rgb);
+
+    /* an image without values, one value, a single voxel */
+    for (size_t i = 0; i < sdm_grid_count(&g); i++) image[i] = NAN;
+    assert_int_equal(sdm_picture_overlay("test_picture_w.png", &g, image, maps, 1, NULL, NULL), SDM_OK);
+    const sdm_grid one = {.n = {1, 1, 1}, .spacing = {1, 2, 3}, .dir = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    assert_int_equal(sdm_picture_overlay("test_picture_w.png", &one, v, maps, 2, NULL, NULL), SDM_OK);
+
+    const sdm_picture_map none = {"a", NULL, false};
+    assert_int_equal(sdm_picture_overlay(NULL, &g, v, maps, 1, NULL, NULL), SDM_E_ARG);
+    assert_int_equal(sdm_picture_overlay("a.png", NULL, v, maps, 1, NULL, NULL), SDM_E_ARG);
+    assert_int_equal(sdm_picture_overlay("a.png", &g, NULL, maps, 1, NULL, NULL), SDM_E_ARG);
+    assert_int_equal(sdm_picture_overlay("a.png", &g, v, maps, 0, NULL, NULL), SDM_E_ARG);
+    assert_int_equal(sdm_picture_overlay("a.png", &g, v, maps, 5, NULL, NULL), SDM_E_ARG);
+    assert_int_equal(sdm_picture_overlay("a.png", &g, v, &none, 1, NULL, NULL), SDM_E_ARG);
+    assert_int_equal(sdm_picture_overlay("no_such_folder/a.png", &g, v, maps, 1, NULL, NULL), SDM_E_IO);
+    free(image);
+    free(w);
+    free(v);
+}
+
 static void test_plot(void **state)
 {
     (void)state;
@@ -314,9 +375,10 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_png_round_trip), cmocka_unit_test(test_contour_is_subpixel),
         cmocka_unit_test(test_slices),         cmocka_unit_test(test_slices_of_odd_maps),
-        cmocka_unit_test(test_plot),           cmocka_unit_test(test_odd_plots),
-        cmocka_unit_test(test_glyphs),         cmocka_unit_test(test_colours),
-        cmocka_unit_test(test_ticks),          cmocka_unit_test(test_misuse),
+        cmocka_unit_test(test_overlay),        cmocka_unit_test(test_plot),
+        cmocka_unit_test(test_odd_plots),      cmocka_unit_test(test_glyphs),
+        cmocka_unit_test(test_colours),        cmocka_unit_test(test_ticks),
+        cmocka_unit_test(test_misuse),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

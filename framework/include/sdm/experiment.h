@@ -28,6 +28,11 @@ typedef enum sdm_figure {
     SDM_FIGURE_MODEL,
     SDM_FIGURE_PEAK,
     SDM_FIGURE_SHAPES,
+    SDM_FIGURE_FITS,
+    SDM_FIGURE_FIT,
+    SDM_FIGURE_MAPS_NETWORK,
+    SDM_FIGURE_MAPS_EXACT,
+    SDM_FIGURE_WITHIN,
     SDM_N_FIGURES
 } sdm_figure;
 
@@ -52,11 +57,21 @@ typedef struct sdm_overrides {
     size_t n, capacity;
 } sdm_overrides;
 
+/* How a method of a fit finds parameters and pose in the images; SDM_EXPERIMENT_NO_FIT: the method makes maps. */
+typedef enum sdm_experiment_fit {
+    SDM_EXPERIMENT_NO_FIT = 0,
+    SDM_EXPERIMENT_FIT_NETWORK, /* maps of its network */
+    SDM_EXPERIMENT_FIT_POLISH,  /* then exact maps; the network of the FIT_NETWORK before it */
+    SDM_EXPERIMENT_FIT_EXACT,   /* exact maps */
+    SDM_EXPERIMENT_FIT_NAIVE    /* not run: the cost of the exact fit if the naive method made its maps */
+} sdm_experiment_fit;
+
 /* An element of `methods`: either a network to train or an engine that needs no training. */
 typedef struct sdm_experiment_method {
     char name[SDM_NAME_MAX];
     char network[SDM_NAME_MAX]; /* kind of the network; "": an engine */
     char engine[SDM_NAME_MAX];  /* its name, which the configuration cannot check; "": a network */
+    int fit;                    /* sdm_experiment_fit; exact and naive have that engine */
     int64_t samples;            /* shapes its errors are measured on; 0: the experiment's number */
     sdm_overrides set;          /* keys of the training configuration for this method alone */
     sdm_mark mark;
@@ -74,6 +89,11 @@ typedef struct sdm_experiment_reference {
     char row[SDM_EXPERIMENT_TITLE_MAX];
     char source[256];
     double value[SDM_N_FIGURES]; /* NaN: not reported */
+    size_t n_differences;        /* of a fit: mean |difference from the exact fit| of parameters */
+    struct {
+        char name[SDM_NAME_MAX];
+        double value;
+    } differences[SDM_MAX_PARAMS];
     sdm_mark mark;
 } sdm_experiment_reference;
 
@@ -84,6 +104,7 @@ typedef struct sdm_experiment_row {
     const sdm_experiment_method *method;
     const sdm_experiment_variant *variant;     /* NULL: there are none */
     const sdm_experiment_reference *reference; /* NULL: none */
+    size_t network_row;                        /* whose network it takes: its own, but for FIT_POLISH */
     int64_t samples;
 } sdm_experiment_row;
 
@@ -100,6 +121,13 @@ typedef struct sdm_experiment {
         char reference[SDM_NAME_MAX];   /* what the column of others' figures is called, default "reference" */
         int pictures;                   /* 1 (default): pictures are drawn */
     } experiment;
+    struct { /* of the methods with `fit` */
+        int64_t phantoms;              /* images of random shapes, 1..10^4, default 9 */
+        double off_mm, off_deg;        /* of the start from the true pose, default 1 mm and 15 degrees */
+        double voxel;                  /* of the images, mm, default 0.25 */
+        double range;                  /* share of every parameter's range, about its middle, that holds the truths, default 0.8 */
+        char model[SDM_PATH_TEXT_MAX]; /* model to fit with in place of training one; "": none */
+    } fit;
     char base[SDM_PATH_TEXT_MAX]; /* path of the training configuration under all rows; "": there is none */
     char *base_text;              /* its content */
     size_t base_size;

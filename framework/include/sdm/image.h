@@ -41,6 +41,13 @@ typedef struct sdm_picture_map {
 SDM_API sdm_status sdm_picture_slices(const char *path, const sdm_grid *grid, const sdm_picture_map *maps,
                                       size_t n_maps, const float *levels, size_t n_levels, sdm_error *err);
 
+/* PNG: the three orthogonal slices of image[nz][ny][nx], side by side, through the middle of the region where the first map is
+   negative: grey, from the 1st to the 99th percentile of the slices, with the zero contours of maps[n_maps] over it (1 to 4, the
+   first in red, the second in yellow; `error` is not read), their titles, millimetre scales and `title` (may be NULL). Atomic.
+   SDM_E_ARG. [any thread] */
+SDM_API sdm_status sdm_picture_overlay(const char *path, const sdm_grid *grid, const float *image,
+                                       const sdm_picture_map *maps, size_t n_maps, const char *title, sdm_error *err);
+
 /* One surface of a picture. */
 typedef struct sdm_picture_surface {
     const char *title;

@@ -1,0 +1,111 @@
+/* sdmgen fit: parameters and pose of a shape from an image, labels, a mesh or points. */
+#include <stdio.h>
+#include <string.h>
+
+#include "commands.h"
+#include "fit.h"
+#include "progress.h"
+#include "terminal.h"
+
+static bool interrupted(void *user)
+{
+    (void)user;
+    return cli_is_interrupted();
+}
+
+/* One bar over the whole: iterations of all phases that are expected at most. */
+typedef struct watch {
+    cli_progress bar;
+    size_t expected;
+} watch;
+
+static void show(void *user, const sdm_fit_progress *p)
+{
+    static const char *const phases[] = {"search", "fit", "polish"};
+    watch *w = user;
+    char text[80];
+    snprintf(text, sizeof text, "iteration %zu  step %.1e", p->iteration, p->step);
+    cli_progress_show(&w->bar, phases[p->phase], (double)p->iteration / (double)w->expected, text);
+}
+
+static sdm_status read_words(cli_fit *f, sdm_error *err)
+{
+    const cli_args *args = f->args;
+    const bool with_model = args->files.n == 2;
+    if (with_model && args->shape)
+        return sdm_fail(err, SDM_E_ARG, "fit: either MODEL or --shape NAME, not both (files: '%s', '%s')",
+                        args->files.items[0], args->files.items[1]);
+    if (!with_model && !args->shape)
+        return sdm_fail(err, SDM_E_ARG, "fit: a MODEL and an IMAGE are needed, or --shape NAME and an IMAGE");
+    f->model_path = with_model ? args->files.items[0] : NULL;
+    f->path = args->files.items[with_model];
+    return cli_fit_check_files(args, err);
+}
+
+/* A fit of poor quality is no error yet: what is known of it is shown first. */
+static sdm_status run(cli_fit *f, sdm_error *err)
+{
+    const size_t turns = f->opts.turns == SDM_FIT_TURNS_NONE ? 0 : f->opts.n_turns;
+    watch w = {.expected = 6 * turns + 12 + f->opts.max_iterations + f->opts.max_polish_iterations};
+    f->opts.progress = show;
+    f->opts.cancelled = interrupted;
+    f->opts.user = &w;
+    cli_progress_start(&w.bar);
+    const sdm_status s = sdm_fit(&f->source, &f->target, &f->opts, &f->result, &f->doubt);
+    cli_progress_clear(&w.bar);
+    f->found = f->result.objective && f->result.params;
+    f->doubt.status = s;
+    if (!s || s == SDM_E_QUALITY) return SDM_OK;
+    return sdm_fail(err, s, "%s: %s", f->path, f->doubt.text);
+}
+
+static void notice(const cli_fit *f)
+{
+    const sdm_fit_result *r = &f->result;
+    if (f->start_clamped || r->start_clamped) cli_notice("the start was moved into the range of the parameters");
+    if (r->n_exact_outside)
+        cli_notice("%zu maps outside of the network's range were made by the exact engine", r->n_exact_outside);
+    if (r->n_nan) cli_notice("%zu voxels are NaN and were left out", r->n_nan);
+}
+
+static sdm_status report(const cli_fit *f, sdm_error *err)
+{
+    if (!f->args->json) {
+        cli_fit_print(f);
+        return SDM_OK;
+    }
+    sdm_json json = {0};
+    cli_fit_json(f, &json);
+    return cli_print_json(&json, err);
+}
+
+static sdm_status show_result(cli_fit *f, sdm_error *err)
+{
+    const bool files = f->args->outputs.n || f->args->fit.label_out, write = !f->doubt.status || f->args->force;
+    sdm_status s = SDM_OK;
+    if (f->found) {
+        notice(f);
+        s = cli_fit_draw_up(f, err);
+        if (!s) s = cli_fit_compare(f, err);
+        if (!s && write) s = cli_fit_write_files(f, err);
+        if (!s) s = report(f, err);
+    }
+    if (s || !f->doubt.status) return s;
+    return sdm_fail(err, f->doubt.status, "%s: %s%s", f->path, f->doubt.text,
+                    files && f->found && !write ? "; no file was written (--force writes them)" : "");
+}
+
+sdm_status cmd_fit(const cli_args *args, sdm_error *err)
+{
+    cli_fit f = {.args = args};
+    sdm_status s = read_words(&f, err);
+    if (!s) s = cli_fit_open_source(&f, err);
+    if (!s) s = cli_fit_read_options(&f, err);
+    if (!s) s = cli_fit_read_target(&f, err);
+    if (!s) s = cli_fit_read_reference(&f, err);
+    if (!s) s = cli_fit_read_start(&f, err);
+    if (!s) s = run(&f, err);
+    if (!s) s = show_result(&f, err);
+    cli_fit_dispose(&f);
+    return s;
+}

@@ -1,0 +1,78 @@
+/* The result of a fit for people. */
+#include <math.h>
+#include <stdio.h>
+
+#include "fit.h"
+
+static void print_params(const cli_fit *f)
+{
+    const sdm_fit_result *r = &f->result;
+    for (size_t i = 0; i < f->n_params; i++) {
+        const sdm_param *p = &f->params[i];
+        printf("  %-12s %10.5g", p->name, r->params[i]);
+        if (r->sd[i] > 0) printf(" +- %-9.2g", r->sd[i]);
+        printf(" %s%s\n", p->unit,
+               r->at_bound[i] ? "   at the end of its range: the standard deviation says little" : "");
+    }
+}
+
+static void print_vector(const char *name, const double v[3], const double sd[3], const char *unit)
+{
+    printf("  %-12s %10.5g %10.5g %10.5g", name, v[0], v[1], v[2]);
+    if (sd[0] > 0 || sd[1] > 0 || sd[2] > 0) printf(" +- %.2g %.2g %.2g", sd[0], sd[1], sd[2]);
+    printf(" %s\n", unit);
+}
+
+static void print_overlap(const cli_fit *f)
+{
+    const cli_overlap *o = &f->overlap;
+    if (!o->measured) return;
+    printf("%s: Dice %.4f (%zu voxels fitted, %zu labelled)\n", f->own_reference ? "labels" : "reference", o->dice,
+           o->n_fit, o->n_reference);
+    if (o->has_surface)
+        printf("  surfaces     mean %.3g, 95 %% below %.3g, Hausdorff %.3g mm\n", o->mean_mm, o->q95_mm,
+               o->hausdorff_mm);
+}
+
+static void print_law(const char *side, const sdm_fit_law *law)
+{
+    printf("  %-12s %.4g (sd %.3g)", side, law->mean, law->sd);
+}
+
+/* What the image looks like to the fit. */
+static void print_target(const cli_fit *f)
+{
+    const sdm_fit_result *r = &f->result;
+    if (f->target.kind == SDM_FIT_POINTS) {
+        printf("points: %zu, %.3g mm about the surface\n", r->n_used, r->point_sd);
+        return;
+    }
+    printf("%s: %zu voxels near the shape", cli_fit_kind(f), r->n_used);
+    if (r->n_nan) printf(", %zu left out because they are NaN", r->n_nan);
+    printf(", %.0f %% of the shape in the image\n", 100 * r->inside_share);
+    if (f->target.kind != SDM_FIT_IMAGE) return;
+    print_law("inside", &r->appearance.inside[0]);
+    printf("\n");
+    for (size_t i = 0; i < r->appearance.n_outside; i++) {
+        if (r->appearance.outside[i].weight < 1e-3) continue; // not in this image
+        print_law("outside", &r->appearance.outside[i]);
+        printf(r->appearance.n_outside > 1 ? ", share %.2g\n" : "\n", r->appearance.outside[i].weight);
+    }
+    if (r->blur > 0) printf("  point spread %.3g mm\n", r->blur);
+    printf("  evidence     %.4g (log-likelihood over an image without the shape)\n", r->evidence);
+}
+
+void cli_fit_print(const cli_fit *f)
+{
+    const sdm_fit_result *r = &f->result;
+    printf("%s fitted to %s%s\n", f->shape_name, f->path, f->doubt.status ? ": NOT TO BE TRUSTED" : "");
+    print_params(f);
+    print_vector("rotation", r->pose.rotation, r->sd + f->n_params, "rad");
+    print_vector("translation", r->pose.translation, r->sd + f->n_params + 3, "mm");
+    print_overlap(f);
+    print_target(f);
+    printf("%s after %zu iterations (%s)\n", r->converged ? "converged" : "NOT CONVERGED", r->n_iterations, r->reason);
+    printf("  maps         %zu by the network, %zu by the exact engine\n", r->n_network, r->n_exact);
+    printf("  time         %.2f s: maps %.2f s; search of the start %.2f s\n", r->seconds,
+           r->seconds_network + r->seconds_exact, r->seconds_search);
+}

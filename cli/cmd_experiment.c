@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "commands.h"
-#include "experiment.h"
+#include "experiment_fit.h"
 #include "sdm/file.h"
 #include "sdm/memory.h"
 #include "setup.h"
@@ -50,7 +50,8 @@ static void find_speedups(const experiment_run *run)
     for (size_t i = 0; i < run->e->n_rows; i++) {
         experiment_result *r = &run->results[i];
         const experiment_result *base = find_baseline(run, r);
-        if (base) r->figure[SDM_FIGURE_SPEEDUP] = base->figure[SDM_FIGURE_MS] / r->figure[SDM_FIGURE_MS];
+        const sdm_figure time = r->row->method->fit ? SDM_FIGURE_FIT : SDM_FIGURE_MS;
+        if (base) r->figure[SDM_FIGURE_SPEEDUP] = base->figure[time] / r->figure[time];
     }
 }
 
@@ -60,7 +61,9 @@ static sdm_status do_row(const experiment_run *run, size_t index, sdm_error *err
     experiment_result *r = &run->results[index];
     experiment_job job = {0};
     sdm_status s = experiment_job_open(run, index, &job, err);
-    if (!s && *r->row->method->engine)
+    if (!s && r->row->method->fit)
+        s = experiment_fit_row(run, &job, r, err);
+    else if (!s && *r->row->method->engine)
         s = experiment_engine(run, &job, r, err);
     else if (!s)
         s = experiment_network(run, &job, r, err);
@@ -102,6 +105,7 @@ static sdm_status run_rows(const experiment_run *run, sdm_error *err)
         first = s;
         why = one;
     }
+    experiment_fit_finish(run);
     find_speedups(run);
     sdm_text markdown = {0};
     sdm_json json = {0};
@@ -132,6 +136,7 @@ static sdm_status run_experiment(const cli_args *args, const sdm_experiment *e, 
     }
     if (!s && !args->dry_run) s = sdm_make_folder(run.folder, err);
     if (!s) s = args->dry_run ? experiment_print_plan(&run, err) : run_rows(&run, err);
+    for (size_t i = 0; run.results && i < e->n_rows; i++) experiment_fits_free(run.results[i].fits);
     sdm_free(run.results);
     return s;
 }

@@ -14,12 +14,16 @@ typedef enum experiment_state {
     EXPERIMENT_FAILED
 } experiment_state;
 
+/* What a row that fits shapes to images found: experiment_fit.h. */
+typedef struct experiment_fits experiment_fits;
+
 /* What is known of a row. */
 typedef struct experiment_result {
     const sdm_experiment_row *row;
     experiment_state state;
     bool loaded;                  /* the network was there already */
     double figure[SDM_N_FIGURES]; /* NaN: not measured */
+    experiment_fits *fits;        /* NULL: no row of fits */
     char note[512];               /* what was done, or why not; one line */
     char grid[96];                /* "60 x 50 x 50 voxels of 0.2 mm" */
 } experiment_result;
@@ -54,6 +58,10 @@ sdm_status experiment_path(const experiment_run *run, size_t index, const char *
 typedef enum experiment_stock { STOCK_NONE = 0, STOCK_OTHER, STOCK_CHECKPOINT, STOCK_MODEL } experiment_stock;
 experiment_stock experiment_find(const experiment_run *run, const experiment_job *job);
 
+/* Trains the network of a row, goes on, or finds it done: then its model is there. */
+sdm_status experiment_provide(const experiment_run *run, const experiment_job *job, experiment_result *out,
+                              sdm_error *err);
+
 /* Fill the figures of *out and draw; the status is that of the row. */
 sdm_status experiment_network(const experiment_run *run, experiment_job *job, experiment_result *out, sdm_error *err);
 sdm_status experiment_engine(const experiment_run *run, experiment_job *job, experiment_result *out, sdm_error *err);
@@ -70,6 +78,10 @@ void experiment_set_errors(experiment_result *out, const cli_eval *e);
 
 /* table.md, table.csv and table.json in the folder; the first and the last also as texts. */
 sdm_status experiment_write_tables(const experiment_run *run, sdm_text *markdown, sdm_json *json, sdm_error *err);
+
+/* Writes text, NAME in the folder. "..." with quotes doubled. */
+sdm_status experiment_write_file(const experiment_run *run, const char *name, const sdm_text *text, sdm_error *err);
+void experiment_add_csv_text(sdm_text *t, const char *text);
 
 /* What will be done, and how long the trainings take. */
 sdm_status experiment_print_plan(const experiment_run *run, sdm_error *err);

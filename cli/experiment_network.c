@@ -42,7 +42,8 @@ static sdm_status train(const experiment_run *run, const experiment_job *job, bo
 }
 
 /* A checkpoint of another configuration is refused; then training starts anew. */
-static sdm_status provide(const experiment_run *run, const experiment_job *job, experiment_result *out, sdm_error *err)
+sdm_status experiment_provide(const experiment_run *run, const experiment_job *job, experiment_result *out,
+                              sdm_error *err)
 {
     const experiment_stock stock = experiment_find(run, job);
     const char *title = out->row->title;
@@ -114,7 +115,7 @@ sdm_status experiment_network(const experiment_run *run, experiment_job *job, ex
     char path[SDM_PATH_TEXT_MAX];
     sdm_model *model = NULL;
     sdm_status s = experiment_path(run, job->index, "model.sdm", path, err);
-    if (!s) s = provide(run, job, out, err);
+    if (!s) s = experiment_provide(run, job, out, err);
     if (!s) s = sdm_model_open(path, &model, err);
     if (!s) s = measure(run, job, path, model, out, err);
     sdm_model_free(model);

@@ -16,19 +16,25 @@ static plan plan_row(const experiment_run *run, const experiment_job *job)
 {
     const sdm_config *c = job->config;
     plan p = {.action = "measure"};
-    if (*run->e->rows[job->index].method->engine) return p;
+    const sdm_experiment_method *m = run->e->rows[job->index].method;
+    if (m->fit) p.action = m->fit == SDM_EXPERIMENT_FIT_NAIVE ? "time a map" : "fit";
+    if (*m->engine || m->fit == SDM_EXPERIMENT_FIT_POLISH) return p;
+    if (m->fit && *run->e->fit.model) {
+        p.action = "load, fit";
+        return p;
+    }
     switch (experiment_find(run, job)) {
     case STOCK_MODEL:
-        p.action = "load, measure";
+        p.action = m->fit ? "load, fit" : "load, measure";
         return p;
     case STOCK_CHECKPOINT:
-        p.action = "go on training, measure";
+        p.action = m->fit ? "go on training, fit" : "go on training, measure";
         break;
     case STOCK_OTHER:
-        p.action = "train anew, measure";
+        p.action = m->fit ? "train anew, fit" : "train anew, measure";
         break;
     default:
-        p.action = "train, measure";
+        p.action = m->fit ? "train, fit" : "train, measure";
     }
     p.minutes = c->train.minutes;
     if (c->train.minutes > 0)
@@ -43,6 +49,7 @@ static plan plan_row(const experiment_run *run, const experiment_job *job)
 static void add_row(const experiment_run *run, const experiment_job *job, const plan *p, sdm_json *j)
 {
     const sdm_experiment_row *row = &run->e->rows[job->index];
+    const long long samples = row->method->fit ? run->e->fit.phantoms : row->samples;
     const char *what = *row->method->engine ? row->method->engine : row->method->network;
     if (run->args->json) {
         sdm_json_open(j, NULL, '{');
@@ -52,12 +59,12 @@ static void add_row(const experiment_run *run, const experiment_job *job, const 
         sdm_json_text(j, "action", p->action);
         sdm_json_real(j, "minutes", p->minutes);
         sdm_json_text(j, "budget", p->budget);
-        sdm_json_int(j, "samples", row->samples);
+        sdm_json_int(j, row->method->fit ? "phantoms" : "samples", samples);
         sdm_json_text(j, "folder", job->config->output.folder);
         sdm_json_close(j, '}');
     } else {
-        printf("%-28s %-8s %-34s %-24s %-12s samples %-5lld %s\n", row->title, what, run->results[job->index].grid,
-               p->action, p->budget, (long long)row->samples, job->config->output.folder);
+        printf("%-28s %-8s %-34s %-24s %-12s %s %-5lld %s\n", row->title, what, run->results[job->index].grid,
+               p->action, p->budget, row->method->fit ? "phantoms" : "samples", samples, job->config->output.folder);
     }
 }
 

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "experiment.h"
+#include "experiment_fit.h"
 #include "sdm/file.h"
 #include "terminal.h"
 
@@ -107,6 +107,7 @@ static void add_markdown(const experiment_run *run, const columns *c, sdm_text *
     experiment_describe_machine(machine, sizeof machine);
     sdm_text_add(t, "# %s\n\n", run->e->experiment.title);
     add_markdown_table(run, c, t);
+    experiment_fit_markdown(run, t);
     sdm_text_add(t,
                  "\nsdmgen " SDM_VERSION_TEXT "; %s; seed %llu. Times are of one core, errors are from exact maps of "
                  "random shapes that no network was trained on.\n\n",
@@ -128,14 +129,14 @@ static void add_markdown(const experiment_run *run, const columns *c, sdm_text *
     sdm_text_add(t, "\n");
     for (size_t i = 0; i < run->e->n_rows; i++) {
         const sdm_experiment_row *row = run->results[i].row;
-        if (run->results[i].state != EXPERIMENT_DONE) continue;
+        if (run->results[i].state != EXPERIMENT_DONE || row->method->fit) continue;
         sdm_text_add(t, "![slices](%s/slices.png) ![surfaces](%s/surfaces.png)\n", row->folder, row->folder);
     }
 }
 
 /* ---- CSV ---- */
 
-static void add_csv_text(sdm_text *t, const char *text)
+void experiment_add_csv_text(sdm_text *t, const char *text)
 {
     sdm_text_add(t, "\"");
     for (const char *p = text; *p; p++) sdm_text_add(t, *p == '"' ? "\"\"" : "%c", *p);
@@ -154,7 +155,7 @@ static void add_csv(const experiment_run *run, const columns *c, sdm_text *t)
     sdm_text_add(t, ",note,source\n");
     for (size_t i = 0; i < run->e->n_rows; i++) {
         const experiment_result *r = &run->results[i];
-        add_csv_text(t, r->row->title);
+        experiment_add_csv_text(t, r->row->title);
         sdm_text_add(t, ",%s,%s,%lld", state_name(r->state), r->loaded ? "true" : "false", (long long)r->row->samples);
         for (int f = 0; f < SDM_N_FIGURES; f++) {
             const double own = r->figure[f], other = reference_of(r, f);
@@ -162,16 +163,16 @@ static void add_csv(const experiment_run *run, const columns *c, sdm_text *t)
             if (c->reference[f]) sdm_text_add(t, ",%s", isfinite(other) ? sdm_format_real(other, number) : "");
         }
         sdm_text_add(t, ",");
-        add_csv_text(t, r->note);
+        experiment_add_csv_text(t, r->note);
         sdm_text_add(t, ",");
-        add_csv_text(t, r->row->reference ? r->row->reference->source : "");
+        experiment_add_csv_text(t, r->row->reference ? r->row->reference->source : "");
         sdm_text_add(t, "\n");
     }
 }
 
 /* ---- JSON ---- */
 
-static void add_json_row(const experiment_result *r, sdm_json *j)
+static void add_json_row(const experiment_run *run, const experiment_result *r, sdm_json *j)
 {
     const sdm_experiment_reference *reference = r->row->reference;
     sdm_json_open(j, NULL, '{');
@@ -192,6 +193,7 @@ static void add_json_row(const experiment_result *r, sdm_json *j)
         sdm_json_text(j, "source", reference->source);
         sdm_json_close(j, '}');
     }
+    experiment_fit_json(run, r, j);
     sdm_json_text(j, "note", r->note);
     sdm_json_close(j, '}');
 }
@@ -209,12 +211,12 @@ static void add_json(const experiment_run *run, sdm_json *j)
     sdm_json_int(j, "seed", (int64_t)run->e->experiment.seed);
     sdm_json_real(j, "seconds", cli_clock() - run->start);
     sdm_json_open(j, "rows", '[');
-    for (size_t i = 0; i < run->e->n_rows; i++) add_json_row(&run->results[i], j);
+    for (size_t i = 0; i < run->e->n_rows; i++) add_json_row(run, &run->results[i], j);
     sdm_json_close(j, ']');
     sdm_json_close(j, '}');
 }
 
-static sdm_status write_file(const experiment_run *run, const char *name, const sdm_text *text, sdm_error *err)
+sdm_status experiment_write_file(const experiment_run *run, const char *name, const sdm_text *text, sdm_error *err)
 {
     char path[SDM_PATH_TEXT_MAX + 16];
     sdm_outfile *f = NULL;
@@ -234,9 +236,10 @@ sdm_status experiment_write_tables(const experiment_run *run, sdm_text *markdown
     add_markdown(run, &c, markdown);
     add_csv(run, &c, &csv);
     add_json(run, json);
-    sdm_status s = write_file(run, "table.md", markdown, err);
-    if (!s) s = write_file(run, "table.csv", &csv, err);
-    if (!s) s = write_file(run, "table.json", &json->text, err);
+    sdm_status s = experiment_write_file(run, "table.md", markdown, err);
+    if (!s) s = experiment_write_file(run, "table.csv", &csv, err);
+    if (!s) s = experiment_write_file(run, "table.json", &json->text, err);
+    if (!s) s = experiment_fit_write(run, err);
     sdm_text_dispose(&csv);
     return s;
 }

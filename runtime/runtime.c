@@ -112,7 +112,7 @@ static sdm_status forward_batch(const sdm_model *m, const double *used, const sd
     const sdm_model_info *info = sdm_model_get_info(m);
     const size_t voxels = sdm_grid_count(&info->grid), slices = (n + SLICE - 1) / SLICE;
     // threads take slices, or share the maps of one slice after the other
-    const int all = thread_count(wanted, SHARED), inner = sdm_model_is_threaded(m) ? all : 1;
+    const int all = thread_count(wanted, SHARED), inner = n == 1 || sdm_model_is_threaded(m) ? all : 1;
     const int threads = inner > 1 ? 1 : thread_count(wanted, slices);
     const size_t bytes = (sdm_model_scratch_bytes_threads(m, n < SLICE ? n : SLICE, inner) + 63) / 64 * 64;
     uint8_t *scratch = NULL;

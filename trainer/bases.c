@@ -1,6 +1,5 @@
 /* The spectral start: nested local bases by proper orthogonal decomposition in blocks of voxels. Linear algebra on maps that are there: no
    optimiser yet. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #ifdef _OPENMP
@@ -79,7 +78,10 @@ static sdm_status eigenvectors(const spectrum *m, size_t block, size_t n, const 
                                 values, err);
 }
 
-static size_t kept(const spectrum *m, size_t outputs) { return m->keep < outputs ? m->keep : outputs; }
+static size_t least(size_t a, size_t b) { return a < b ? a : b; }
+
+// n maps span n functions at most: more would be rounding
+static size_t kept(const spectrum *m, size_t outputs) { return least(m->keep, least(outputs, m->n)); }
 
 // mean and leading eigenvectors of a block of the lowest level
 static sdm_status lowest_block(spectrum *m, size_t index, float *rows, float *covariance, sdm_error *err)
@@ -143,7 +145,7 @@ static sdm_status upper_block(spectrum *m, size_t level, size_t index, const flo
 {
     sdm_pod_block *b = &m->t->blocks[index];
     const size_t outputs = ranks_of(m->t, b->child, b->child + b->n_children);
-    const size_t most = 16 * (size_t)m->t->config->network.rank, keep = most < outputs ? most : outputs;
+    const size_t keep = least(16 * (size_t)m->t->config->network.rank, least(outputs, m->n));
     float *covariance = NULL, *vectors = NULL;
     double *values = NULL;
     sdm_status s = SDM_ALLOC(&covariance, outputs * outputs, "local bases", err);
@@ -227,6 +229,11 @@ static sdm_status first_status(const first_error *first, sdm_error *err)
     return first->err.status;
 }
 
+static sdm_status stopped(const trainer *t, sdm_error *err)
+{
+    return trainer_cancelled(t) ? sdm_fail(err, SDM_E_CANCELLED, "stopped on request") : SDM_OK;
+}
+
 static sdm_status lowest_level(spectrum *m, sdm_error *err)
 {
     const trainer *t = m->t;
@@ -247,7 +254,8 @@ static sdm_status lowest_level(spectrum *m, sdm_error *err)
 #pragma omp for schedule(dynamic)
 #endif
         for (long b = 0; b < n_blocks; b++)
-            if (s || lowest_block(m, (size_t)b, rows, covariance, &mine)) note_error(&first, b, &mine);
+            if (s || stopped(t, &mine) || lowest_block(m, (size_t)b, rows, covariance, &mine))
+                note_error(&first, b, &mine);
         sdm_free(covariance);
         sdm_free(rows);
     }
@@ -265,7 +273,7 @@ static sdm_status upper_trees(spectrum *m, sdm_error *err)
 #endif
     for (long root = begin; root < end; root++) {
         sdm_error mine = {0};
-        if (upper_levels(m, (size_t)root, &mine)) note_error(&first, root, &mine);
+        if (stopped(m->t, &mine) || upper_levels(m, (size_t)root, &mine)) note_error(&first, root, &mine);
     }
     return first_status(&first, err);
 }

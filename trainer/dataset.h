@@ -76,8 +76,6 @@ size_t producer_ready(producer *p);
 /* Takes finished samples into the pool until it holds `until` of them, waiting for those that are not ready. */
 sdm_status producer_take(producer *p, size_t until, sdm_error *err);
 
-/* True when every sample has been made. */
-bool producer_finished(producer *p);
 void producer_stop(producer *p);
 
 #endif

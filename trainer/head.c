@@ -48,7 +48,7 @@ static sdm_status factorise(const trainer *t, size_t n, const float *z, double *
     if (s) return s;
     sdm_gemm(latents, latents, n, (sdm_view){z, 1, latents}, (sdm_view){z, latents, 1}, false, gram, latents,
              trainer_threads(t));
-    // hidden units may depend on each other linearly: a ridge relative to their size, raised until the system is definite
+    // hidden units may depend on each other linearly: a ridge, raised until the system is definite
     for (double ridge = 1e-6;; ridge *= 10) {
         for (size_t i = 0; i < latents * latents; i++)
             factor[i] = 0.5 * ((double)gram[i] + gram[i % latents * latents + i / latents]);

@@ -97,13 +97,13 @@ static sdm_status run(trainer *t, bool resumed, sdm_error *err)
     if (t->phase == SDM_PHASE_FIT) {
         if (resumed) s = checkpoint_weights(t, err);
         if (!s) s = fit_run(t, err);
-        if (!s) s = refine_start(t, err);
+        if (!s) s = refine_start(t, false, err);
         if (!s) s = refine_evaluate(t, t->refine.w, &t->heldout_mse, err);
         if (s) return s;
         trainer_enter(t, SDM_PHASE_REFINE);
         if ((s = trainer_metric(t, 0, err))) return s;
     } else {
-        s = refine_start(t, err);
+        s = refine_start(t, true, err);
         if (!s) s = checkpoint_weights(t, err);
     }
     if (!s) s = refine_run(t, err);

@@ -149,15 +149,6 @@ size_t producer_ready(producer *p)
     return n;
 }
 
-bool producer_finished(producer *p)
-{
-    pthread_mutex_lock(&p->lock);
-    bool finished = p->next >= p->end;
-    for (size_t i = p->base; i < p->end && finished; i++) finished = p->done[i % WINDOW];
-    pthread_mutex_unlock(&p->lock);
-    return finished;
-}
-
 sdm_status producer_take(producer *p, size_t until, sdm_error *err)
 {
     dataset *d = p->d;

@@ -24,9 +24,10 @@ typedef struct refine_batch {
     float *x, *z, *dz; // [B][I], [B][L], [B][W]
     float *c, *dc;     // [B][K]
     float *workspace, *gradient;
-    size_t *slots;         // [B]
-    double *loss;          // [trees]
-    size_t scratch_floats; // for each thread
+    size_t *slots;      // [B]
+    double *loss;       // [trees]
+    size_t tree_floats; // scratch of a tree; threads with a tree: tree_threads
+    int tree_threads;
     float *scratch;
 } refine_batch;
 
@@ -67,10 +68,11 @@ static size_t tree_floats(const trainer *t, size_t rows, size_t root)
 static sdm_status batch_create(const trainer *t, size_t rows, refine_batch *b, sdm_error *err)
 {
     const sdm_pod_arch *a = &t->arch;
-    *b = (refine_batch){.rows = rows, .scratch_floats = HEAD_ROWS * a->n_latent};
+    *b = (refine_batch){.rows = rows, .tree_threads = (int)n_trees(t)};
+    if (b->tree_threads > t->n_threads) b->tree_threads = t->n_threads;
     for (size_t i = 0; i < n_trees(t); i++) {
         const size_t need = tree_floats(t, rows, first_tree(t) + i);
-        if (need > b->scratch_floats) b->scratch_floats = need;
+        if (need > b->tree_floats) b->tree_floats = need;
     }
     sdm_status s = SDM_ALLOC(&b->x, rows * a->n_inputs, "batch", err);
     if (!s) s = SDM_ALLOC(&b->z, rows * a->n_latent, "batch", err);
@@ -81,8 +83,16 @@ static sdm_status batch_create(const trainer *t, size_t rows, refine_batch *b, s
     if (!s) s = SDM_ALLOC(&b->gradient, mlp_count(a), "batch", err);
     if (!s) s = SDM_ALLOC(&b->slots, rows, "batch", err);
     if (!s) s = SDM_ALLOC(&b->loss, n_trees(t), "batch", err);
-    if (!s) s = SDM_ALLOC(&b->scratch, b->scratch_floats * (size_t)t->n_threads, "batch", err);
+    const size_t trees = b->tree_floats * (size_t)b->tree_threads,
+                 heads = HEAD_ROWS * a->n_latent * (size_t)t->n_threads;
+    if (!s) s = SDM_ALLOC(&b->scratch, trees > heads ? trees : heads, "batch", err);
     return s;
+}
+
+static int tree_threads(const trainer *t, const refine_batch *b)
+{
+    const int n = trainer_threads(t);
+    return n < b->tree_threads ? n : b->tree_threads;
 }
 
 static int thread_number(void)
@@ -114,7 +124,7 @@ static tree_work work_on(const trainer *t, const refine_batch *b, size_t root)
 {
     tree_work w = {.tree = pod_tree_of(&t->arch.levels, t->blocks, root)};
     const size_t top = t->arch.levels.n - 1;
-    float *at = b->scratch + b->scratch_floats * (size_t)thread_number();
+    float *at = b->scratch + b->tree_floats * (size_t)thread_number();
     for (size_t level = 0; level < top; level++) {
         w.ld[level] = pod_tree_coefficients(t->blocks, &w.tree, level);
         w.c[level] = at, at += b->rows * w.ld[level];
@@ -211,7 +221,7 @@ static void train_head(trainer *t, refine_batch *b, adam_step adam)
 #endif
     for (long at = 0; at < (long)n_c; at += HEAD_ROWS) {
         const size_t first = (size_t)at, rows = n_c - first < HEAD_ROWS ? n_c - first : HEAD_ROWS;
-        float *gradient = b->scratch + b->scratch_floats * (size_t)thread_number();
+        float *gradient = b->scratch + HEAD_ROWS * latents * (size_t)thread_number();
         sdm_gemm(rows, latents, b->rows, (sdm_view){b->dc + first, 1, n_c}, (sdm_view){b->z, latents, 1}, false,
                  gradient, latents, 1);
         for (size_t i = 0; i < rows; i++)
@@ -237,7 +247,7 @@ static sdm_status step(trainer *t, refine_batch *b, double rate, sdm_error *err)
     coefficients(t, w, b, b->rows);
     const adam_step adam = adam_begin(rate, t->phase_step + 1);
 #ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic) num_threads(trainer_threads(t))
+#pragma omp parallel for schedule(dynamic) num_threads(tree_threads(t, b))
 #endif
     for (long i = 0; i < (long)n_trees(t); i++) train_tree(t, b, (size_t)i, adam);
     double sum = 0;
@@ -269,7 +279,7 @@ sdm_status refine_evaluate(trainer *t, const float *w, double *mse, sdm_error *e
         head_latent(t, w, rows, phi, b.x, b.z, b.workspace);
         coefficients(t, w, &b, rows);
 #ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic) num_threads(trainer_threads(t))
+#pragma omp parallel for schedule(dynamic) num_threads(tree_threads(t, &b))
 #endif
         for (long i = 0; i < (long)n_trees(t); i++) {
             const tree_work work = work_on(t, &b, first_tree(t) + (size_t)i);
@@ -292,7 +302,7 @@ sdm_status refine_evaluate(trainer *t, const float *w, double *mse, sdm_error *e
     return s;
 }
 
-sdm_status refine_start(trainer *t, sdm_error *err)
+sdm_status refine_start(trainer *t, bool resumed, sdm_error *err)
 {
     const sdm_pod_arch *a = &t->arch;
     const size_t basis_count = t->matrix_at[a->levels.first[a->levels.n]];
@@ -300,7 +310,7 @@ sdm_status refine_start(trainer *t, sdm_error *err)
     t->mean_at = t->head_at + a->n_coefficients * a->n_latent;
     t->basis_at = t->mean_at + a->n_voxels;
     sdm_status s = parameters_create(&t->refine, t->basis_at + basis_count, err);
-    if (s) return s;
+    if (s || resumed) return s;
     if (a->depth) memcpy(t->refine.w, t->fit.average, mlp_count(a) * sizeof *t->refine.w);
     memcpy(t->refine.w + t->mean_at, t->mean, a->n_voxels * sizeof *t->mean);
     memcpy(t->refine.w + t->basis_at, t->basis, basis_count * sizeof *t->basis);

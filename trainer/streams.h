@@ -8,11 +8,11 @@ enum {
     STREAM_FIT = 300,
     STREAM_REFINE = 350,
     STREAM_INIT = 400,
-    STREAM_BASES = 500,
     STREAM_POINTS = 600,
     STREAM_EVALUATE = 650,
     STREAM_DROPOUT = 700,
-    STREAM_PLAN = 750
+    STREAM_PLAN = 750,
+    STREAM_BASES = 1000 // and on: one for each block
 };
 
 #endif

@@ -104,7 +104,7 @@ sdm_status modes_make(trainer *t, size_t n, sdm_error *err);
 /* phi and target of n slots. */
 sdm_status modes_project(trainer *t, const size_t *slots, size_t n, sdm_error *err);
 
-/* fit.c: the MLP on the global modes, then the head by least squares on all local coefficients. */
+/* fit.c: the MLP on the global modes. */
 sdm_status fit_run(trainer *t, sdm_error *err);
 /* error[n]: root mean square error of the modes (mm) of the maps in slots[n], with the averaged weights. */
 sdm_status fit_errors(const trainer *t, const size_t *slots, size_t n, double *error, sdm_error *err);
@@ -117,7 +117,8 @@ void head_latent(const trainer *t, const float *w, size_t rows, const float *con
 sdm_status head_solve(const trainer *t, const float *w, float *head, sdm_error *err);
 
 /* refine.c: everything end to end on maps. */
-sdm_status refine_start(trainer *t, sdm_error *err); /* head by least squares; weights of the phase */
+/* Weights of the phase: what was fitted, and the head by least squares; resumed: without values, which the checkpoint has. */
+sdm_status refine_start(trainer *t, bool resumed, sdm_error *err);
 sdm_status refine_run(trainer *t, sdm_error *err);
 /* Mean square error (mm^2) of weights w on the held-out maps. */
 sdm_status refine_evaluate(trainer *t, const float *w, double *mse, sdm_error *err);

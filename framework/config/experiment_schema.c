@@ -44,8 +44,10 @@ static const sdm_figure_info FIGURES[SDM_N_FIGURES] = {
     [SDM_FIGURE_SHAPES] = {"shapes", "shapes", "", "shapes the errors are measured on"},
     [SDM_FIGURE_FITS] = {"fits", "fits converged", "", "fits that converged, of the shapes"},
     [SDM_FIGURE_FIT] = {"fit_s", "one fit", "s", "mean time of a fit on one core"},
-    [SDM_FIGURE_MAPS_NETWORK] = {"maps_network", "network maps", "", "maps with derivatives by the network, mean of a fit"},
-    [SDM_FIGURE_MAPS_EXACT] = {"maps_exact", "exact maps", "", "maps with derivatives by the exact engine, mean of a fit"},
+    [SDM_FIGURE_MAPS_NETWORK] = {"maps_network", "network maps", "",
+                                 "maps with derivatives by the network, mean of a fit"},
+    [SDM_FIGURE_MAPS_EXACT] = {"maps_exact", "exact maps", "",
+                               "maps with derivatives by the exact engine, mean of a fit"},
     [SDM_FIGURE_WITHIN] = {"within_3sd", "within 3 sd", "",
                            "share of the estimates within three standard deviations of the truth, all parameters"},
 };
@@ -80,6 +82,7 @@ static const sdm_field FIT[] = {
     ROW(E, "off_deg", SDM_FIELD_REAL, fit.off_deg, 0, 180, "15", "degrees", "how far it is turned, about a random axis"),
     ROW(E, "voxel", SDM_FIELD_REAL, fit.voxel, 1e-6, 1e6, "0.25", "mm", "edge of a voxel of the images"),
     ROW(E, "range", SDM_FIELD_REAL, fit.range, 0, 1, "0.8", "", "share of every parameter's range, about its middle, that the shapes are drawn from"),
+    ROW(E, "prior_sd", SDM_FIELD_REAL, fit.prior_sd, 0, 1e6, "1", "", "standard deviation of every parameter before the image is seen, in halves of its range about the middle; 0: nothing is known. Exact fits have the range of the shape itself"),
     TEXT(E, "model", fit.model, SDM_PATH_TEXT_MAX, "none", "model file to fit with; none: the network is trained"),
 };
 
@@ -252,7 +255,8 @@ static bool refuse_method(sdm_reader *r, const M *m, const char *why)
 static bool finish_fit(sdm_reader *r, M *m)
 {
     if (m->fit == SDM_EXPERIMENT_FIT_NETWORK) {
-        if (!*m->network || *m->engine) return refuse_method(r, m, "with fit: network needs the key network, no engine");
+        if (!*m->network || *m->engine)
+            return refuse_method(r, m, "with fit: network needs the key network, no engine");
         return true;
     }
     if (*m->network || *m->engine)
@@ -268,15 +272,16 @@ static bool read_methods(sdm_reader *r, const sdm_field *f, const sdm_tree_node 
 {
     E *e = r->target;
     (void)f;
-    bool fits =
-        read_list(r, node, path, &SECTIONS[OF_METHODS], (void **)&e->methods, &e->n_methods, sizeof *e->methods, begin_method);
+    bool fits = read_list(r, node, path, &SECTIONS[OF_METHODS], (void **)&e->methods, &e->n_methods, sizeof *e->methods,
+                          begin_method);
     for (size_t i = 0; i < e->n_methods && fits; i++) {
         M *m = &e->methods[i];
         if (m->fit)
             fits = finish_fit(r, m);
         else if ((*m->network != 0) == (*m->engine != 0))
-            fits = refuse_method(r, m, *m->network ? "needs only one of the keys network and engine"
-                                                   : "needs one of the keys network and engine");
+            fits = refuse_method(r, m,
+                                 *m->network ? "needs only one of the keys network and engine"
+                                             : "needs one of the keys network and engine");
     }
     return fits;
 }
@@ -293,8 +298,8 @@ static bool read_references(sdm_reader *r, const sdm_field *f, const sdm_tree_no
 {
     E *e = r->target;
     (void)f;
-    return read_list(r, node, path, &SECTIONS[OF_REFERENCES], (void **)&e->references, &e->n_references, sizeof *e->references,
-                     begin_reference);
+    return read_list(r, node, path, &SECTIONS[OF_REFERENCES], (void **)&e->references, &e->n_references,
+                     sizeof *e->references, begin_reference);
 }
 
 /* {NAME: number, ...}; whether the shape has such parameters is not known here. */

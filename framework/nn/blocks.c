@@ -1,4 +1,4 @@
-/* Blocks of voxels in levels and the copies between map order and block order. */
+/* Blocks of voxels in levels and the copy of a map into their order. */
 #include <string.h>
 
 #include "sdm/pod.h"
@@ -100,15 +100,5 @@ void sdm_pod_gather(const sdm_grid *grid, const sdm_pod_block *blocks, size_t n_
         for (size_t z = 0; z < k->size[2]; z++)
             for (size_t y = 0; y < k->size[1]; y++)
                 memcpy(blocked + k->voxel + (z * k->size[1] + y) * k->size[0], map + row_in_map(grid, k, y, z),
-                       k->size[0] * sizeof *map);
-}
-
-void sdm_pod_scatter(const sdm_grid *grid, const sdm_pod_block *blocks, size_t n_blocks, const float *blocked,
-                     float *map)
-{
-    for (const sdm_pod_block *k = blocks; k < blocks + n_blocks; k++)
-        for (size_t z = 0; z < k->size[2]; z++)
-            for (size_t y = 0; y < k->size[1]; y++)
-                memcpy(map + row_in_map(grid, k, y, z), blocked + k->voxel + (z * k->size[1] + y) * k->size[0],
                        k->size[0] * sizeof *map);
 }

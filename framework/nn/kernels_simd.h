@@ -197,7 +197,7 @@ static inline vec exp_vec(vec x)
     p = p * r + 5.0000001201e-1f;
     p = p * r * r + r + 1.0f;
     memcpy(&bits, &shifted, sizeof shifted);
-    const vecu scale = ((bits & 0x3ffu) + (127u - 0u)) << 23; // low bits of `shifted` hold n in two's complement
+    const vecu scale = ((bits & 0x3ffu) + 127u) << 23; // low bits of `shifted` hold n in two's complement
     vec s;
     memcpy(&s, &scale, sizeof s);
     return p * s;

@@ -1,4 +1,5 @@
 /* Opening of a model file: every text and size is checked before it is used. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -44,7 +45,8 @@ static sdm_status read_params(sdm_lines *r, sdm_model *m, sdm_error *err)
         sdm_next_text(r, "param.unit", p->unit, sizeof p->unit);
         sdm_next_reals(r, "param.range", range, 3);
         p->min = range[0], p->max = range[1], p->def = range[2];
-        if (!(p->min < p->max)) r->failed = true;
+        const double unit = 2 / (p->max - p->min); // what the networks scale by
+        if (!(p->min < p->max && unit > 0 && isfinite(unit)) || !p->name[0]) r->failed = true;
     }
     const size_t n = (size_t)sdm_next_int(r, "options", 0, 1024);
     if ((s = SDM_ALLOC(&m->option_names, n, "model options", err))) return s;

@@ -241,5 +241,5 @@ void sdm_pod_vjp(const sdm_model *m, const double *params, const float *adjoint,
     memset(w.c + a->n_coefficients, 0, (sdm_panel_outputs(a->n_coefficients) - a->n_coefficients) * sizeof *w.c);
     float *dz = w.z + a->n_latent;
     sdm_pod_product_back(k->half, a->n_coefficients, a->n_latent, k->head, 0, w.c, dz);
-    sdm_pod_latent_back(m, &w.latent, dz, gradient);
+    sdm_pod_latent_back(m, params, &w.latent, dz, gradient);
 }

@@ -52,8 +52,9 @@ size_t sdm_pod_latent_carve(const pod_network *m, size_t directions, float *memo
 void sdm_pod_latent(const sdm_model *model, const double *p, size_t n_directions, const double *direction,
                     const pod_latent *w, float *z);
 
-/* gradient[P] = (dz / dp)^T dz[L], at the parameters of the last sdm_pod_latent() with this w. */
-void sdm_pod_latent_back(const sdm_model *model, const pod_latent *w, const float *dz, double *gradient);
+/* gradient[P] = (dz / dp)^T dz[L], at the parameters p of the last sdm_pod_latent() with this w. */
+void sdm_pod_latent_back(const sdm_model *model, const double *p, const pod_latent *w, const float *dz,
+                         double *gradient);
 
 /* pod_forward.c */
 size_t sdm_pod_scratch_bytes(const sdm_model *m, size_t n, int n_threads);

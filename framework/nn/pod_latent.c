@@ -40,9 +40,8 @@ size_t sdm_pod_latent_carve(const pod_network *m, size_t directions, float *memo
     return total;
 }
 
-// phi and its derivatives with respect to each parameter, then along the directions
-static void polynomials(const sdm_model *model, const double *p, size_t n_directions, const double *direction,
-                        const pod_latent *w)
+// phi at p, and its derivatives with respect to each parameter when they are wanted
+static void polynomials(const sdm_model *model, const double *p, bool slopes, const pod_latent *w)
 {
     const pod_network *m = model->network;
     const sdm_pod_arch *a = &m->arch;
@@ -53,14 +52,21 @@ static void polynomials(const sdm_model *model, const double *p, size_t n_direct
         unit[i] = 2 / (q->max - q->min);
         x[i] = (p[i] - q->min) * unit[i] - 1;
     }
-    sdm_poly_eval(m->exponents, total, a->n_params, larger(a->degree, a->input_degree), x, w->phi, w->dphi);
-    for (size_t i = 0; i < a->n_params; i++)
+    sdm_poly_eval(m->exponents, total, a->n_params, larger(a->degree, a->input_degree), x, w->phi,
+                  slopes ? w->dphi : NULL);
+    for (size_t i = 0; i < a->n_params && slopes; i++)
         for (size_t t = 0; t < total; t++) w->dphi[i * total + t] *= (float)unit[i];
+}
+
+// derivatives of phi along the directions
+static void along(const pod_network *m, size_t n_directions, const double *direction, const pod_latent *w)
+{
+    const size_t total = n_poly(m), n_params = m->arch.n_params;
     for (size_t d = 0; d < n_directions; d++) {
         float *to = w->phi + (1 + d) * total;
         memset(to, 0, total * sizeof *to);
-        for (size_t i = 0; i < a->n_params; i++) {
-            const float f = (float)direction[d * a->n_params + i];
+        for (size_t i = 0; i < n_params; i++) {
+            const float f = (float)direction[d * n_params + i];
             if (f == 0) continue;
             for (size_t t = 0; t < total; t++) to[t] += f * w->dphi[i * total + t];
         }
@@ -73,7 +79,8 @@ void sdm_pod_latent(const sdm_model *model, const double *p, size_t n_directions
     const pod_network *m = model->network;
     const sdm_pod_arch *a = &m->arch;
     const size_t rows = 1 + n_directions, total = n_poly(m), width = sdm_panel_outputs(a->width);
-    polynomials(model, p, n_directions, direction, w);
+    polynomials(model, p, n_directions > 0, w);
+    along(m, n_directions, direction, w);
     for (size_t r = 0; r < rows; r++) memcpy(z + r * a->n_latent, w->phi + r * total, a->n_terms * sizeof *z);
     if (!a->depth) return;
 
@@ -93,12 +100,14 @@ void sdm_pod_latent(const sdm_model *model, const double *p, size_t n_directions
     for (size_t r = 0; r < rows; r++) memcpy(z + r * a->n_latent + a->n_terms, in + r * width, a->width * sizeof *z);
 }
 
-void sdm_pod_latent_back(const sdm_model *model, const pod_latent *w, const float *dz, double *gradient)
+void sdm_pod_latent_back(const sdm_model *model, const double *p, const pod_latent *w, const float *dz,
+                         double *gradient)
 {
     const pod_network *m = model->network;
     const sdm_pod_arch *a = &m->arch;
     const size_t total = n_poly(m), width = sdm_panel_outputs(a->width);
-    float *dphi = w->phi; // no longer needed
+    polynomials(model, p, true, w);
+    float *dphi = w->phi; // its values are not needed
     memset(dphi, 0, total * sizeof *dphi);
     if (a->depth) {
         // the gradient at the outputs of a layer, zero where outputs are rounding

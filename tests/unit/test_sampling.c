@@ -165,7 +165,7 @@ static const char base[] = "shape: {name: capsule}\n"
                            "grid: {size: [12, 10, 10], spacing: 1.2}\n"
                            "network: {depth: 2, width: 16, rank: 4, modes: 16, degree: 2, input_degree: 2}\n"
                            "data: {static: 0, start: 60, online: 200, holdout: 8, memory_gb: 0.5, sampling: error}\n"
-                           "train: {steps: 300, batch: 16, refine: 0.3, refine_batch: 8, average: 0.99}\n";
+                           "train: {steps: 150, batch: 8, refine: 0.3, refine_batch: 8, average: 0.99}\n";
 
 static void path_of(char *path, size_t size, const char *name) { snprintf(path, size, "%s/%s", folder, name); }
 
@@ -258,7 +258,7 @@ static void resume_is_bit_exact(void **state)
     assert_int_equal(train(NULL, 2, false, NULL), SDM_OK);
     map_of(whole);
     // the question is asked once for each of 68 + 8 maps before training, then about once a step: within the fit, and in the refinement
-    const int64_t stops[] = {150, 220, 330};
+    const int64_t stops[] = {110, 150, 200};
     for (size_t i = 0; i < sizeof stops / sizeof *stops; i++) {
         clean();
         calls = 0, stop_step = stops[i];

@@ -121,11 +121,12 @@ typedef struct sdm_experiment {
         char reference[SDM_NAME_MAX];   /* what the column of others' figures is called, default "reference" */
         int pictures;                   /* 1 (default): pictures are drawn */
     } experiment;
-    struct { /* of the methods with `fit` */
-        int64_t phantoms;              /* images of random shapes, 1..10^4, default 9 */
-        double off_mm, off_deg;        /* of the start from the true pose, default 1 mm and 15 degrees */
-        double voxel;                  /* of the images, mm, default 0.25 */
-        double range;                  /* share of every parameter's range, about its middle, that holds the truths, default 0.8 */
+    struct {                    /* of the methods with `fit` */
+        int64_t phantoms;       /* images of random shapes, 1..10^4, default 9 */
+        double off_mm, off_deg; /* of the start from the true pose, default 1 mm and 15 degrees */
+        double voxel;           /* of the images, mm, default 0.25 */
+        double range;    /* share of every parameter's range, about its middle, that holds the truths, default 0.8 */
+        double prior_sd; /* as in sdm/fit.h, default 1 */
         char model[SDM_PATH_TEXT_MAX]; /* model to fit with in place of training one; "": none */
     } fit;
     char base[SDM_PATH_TEXT_MAX]; /* path of the training configuration under all rows; "": there is none */

@@ -37,8 +37,8 @@ static inline size_t sdm_panel_count(size_t outputs, size_t k) { return sdm_pane
 SDM_API void sdm_panel_pack_f32(size_t outputs, size_t k, sdm_view w, float *panels);
 SDM_API void sdm_panel_pack_f16(size_t outputs, size_t k, sdm_view w, uint16_t *panels);
 
-/* y[B][ldy] = x[B][ldx] (K floats each) times the weights; sdm_panel_outputs(outputs) floats of each row are written, row after row
-   overwriting what the one before had behind its outputs. One thread; the same bits for each row whatever B. */
+/* y[B][ldy] = x[B][ldx] (K floats each) times the weights; sdm_panel_outputs(outputs) floats of each row are written:
+   ldy is at least that when there are several rows. One thread; the same bits for each row whatever B. */
 SDM_API void sdm_panel_f32(size_t batch, size_t outputs, size_t k, const float *w, const float *x, size_t ldx, float *y,
                            size_t ldy);
 SDM_API void sdm_panel_f16(size_t batch, size_t outputs, size_t k, const uint16_t *w, const float *x, size_t ldx,

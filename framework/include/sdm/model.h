@@ -85,8 +85,8 @@ SDM_API size_t sdm_model_vjp_scratch_bytes(const sdm_model *m);
 SDM_API void sdm_model_vjp(const sdm_model *m, const double *params, const float *adjoint, double *gradient,
                            void *scratch);
 
-/* True when one map is work enough for several threads: the functions below then share it among n_threads >= 1 threads, with the same
-   bits for any number; otherwise they are those above. */
+/* The functions below share each map among n_threads >= 1 threads, with the same bits for any number. True: a map is work enough for
+   that; otherwise several maps are better given to a thread each. */
 SDM_API bool sdm_model_is_threaded(const sdm_model *m);
 SDM_API size_t sdm_model_scratch_bytes_threads(const sdm_model *m, size_t n, int n_threads);
 SDM_API void sdm_model_forward_threads(const sdm_model *m, const double *params, size_t n, float *values, void *scratch,

@@ -88,11 +88,9 @@ typedef struct sdm_pod_arch {
     sdm_pod_levels levels;
 } sdm_pod_arch;
 
-/* Copies between map order [nz][ny][nx] and block order (x fastest within a block); blocks of the lowest level. */
+/* A map [nz][ny][nx] in block order (x fastest within a block); blocks of the lowest level. */
 SDM_API void sdm_pod_gather(const sdm_grid *grid, const sdm_pod_block *blocks, size_t n_blocks, const float *map,
                             float *blocked);
-SDM_API void sdm_pod_scatter(const sdm_grid *grid, const sdm_pod_block *blocks, size_t n_blocks, const float *blocked,
-                             float *map);
 
 /* Weights as the trainer has them, row-major float32. */
 typedef struct sdm_pod_weights {

@@ -144,6 +144,57 @@ static void test_references(void **state)
     expect_mistake(SHAPE METHODS "reference: [{ms: 1}]\n", NULL, "dir/x.yaml:7:13: reference: missing key 'row'");
 }
 
+/* Rows of fits: what the keys stand for, whose network is polished, in every variant. */
+static void test_fits(void **state)
+{
+    const char *text = SHAPE "fit: {phantoms: 3, off_deg: 5}\nmethods:\n"
+                             "  - {name: N, network: pod, fit: network, set: {train.batch: 4}}\n"
+                             "  - {name: P, fit: polish}\n"
+                             "  - {name: X, fit: exact}\n"
+                             "  - {name: M, network: deepsdf, fit: network}\n"
+                             "  - {name: Q, fit: polish}\n"
+                             "  - {name: V, fit: naive}\n"
+                             "variants: [{name: a, set: {}}, {name: b, set: {seed: 9}}]\n"
+                             "reference: [{row: 'X, a', difference: {a: 2e-8, phi: 0}}]\n";
+    (void)state;
+    expect_ok(text, NULL);
+    assert_int_equal(e->fit.phantoms, 3);
+    assert_true(e->fit.off_mm == 1 && e->fit.off_deg == 5 && e->fit.voxel == 0.25 && e->fit.range == 0.8);
+    assert_true(e->fit.prior_sd == 1);
+    assert_string_equal(e->fit.model, "");
+    static const size_t networks[] = {0, 0, 2, 3, 3, 5, 6, 6, 8, 9, 9, 11};
+    for (size_t i = 0; i < 12; i++) assert_int_equal(e->rows[i].network_row, networks[i]);
+    assert_string_equal(e->rows[2].method->engine, "exact");
+    assert_string_equal(e->rows[5].method->engine, "naive");
+    assert_string_equal(e->rows[4].method->network, "deepsdf");
+    assert_int_equal(sdm_experiment_config(e, 7, &config, &err), SDM_OK);
+    assert_int_equal(config.train.batch, 4);
+    assert_int_equal(config.seed, 9);
+    const sdm_experiment_reference *r = e->rows[2].reference;
+    assert_int_equal(r->n_differences, 2);
+    assert_string_equal(r->differences[1].name, "phi");
+    assert_true(r->differences[0].value == 2e-8 && r->differences[1].value == 0);
+    expect_ok(SHAPE METHODS, NULL);
+    assert_int_equal(e->fit.phantoms, 9);
+    assert_int_equal(e->rows[1].network_row, 1);
+}
+
+static void test_mistakes_of_fits(void **state)
+{
+    (void)state;
+    expect_mistake(SHAPE "methods: [{name: A, fit: polish}, {name: B, network: pod, fit: network}]\n", NULL,
+                   "dir/x.yaml:4:11: method 'A' with fit: polish needs one with fit: network before it");
+    expect_mistake(SHAPE "methods: [{name: A, network: pod, fit: exact}]\n", NULL,
+                   "dir/x.yaml:4:11: method 'A' with this fit needs none of the keys network and engine");
+    expect_mistake(SHAPE METHODS, "fit.model=m.sdm",
+                   "argument 'fit.model=m.sdm': fit.model: one model for 0 methods with fit: network, need one such "
+                   "method");
+    expect_mistake(SHAPE METHODS "reference: [{row: B, difference: 3}]\n", NULL,
+                   "dir/x.yaml:7:34: difference: needs numbers by names of parameters, got '3'");
+    expect_mistake(SHAPE METHODS "reference: [{row: B, difference: {a: -1}}]\n", NULL,
+                   "dir/x.yaml:7:38: difference: -1 is out of range (0 .. 1000000000000)");
+}
+
 /* Every figure of the table can be given as a reference, under the key it has in the results. */
 static void test_figures_have_keys(void **state)
 {
@@ -244,14 +295,14 @@ static void test_base(void **state)
 
 static void test_shipped_files(void **state)
 {
-    static const char *const files[] = {"paper", "grids"};
+    static const char *const files[] = {"paper", "grids", "paper-fit"};
     (void)state;
-    for (size_t i = 0; i < 2; i++) {
+    for (size_t i = 0; i < 3; i++) {
         char path[1024];
         snprintf(path, sizeof path, SDM_SOURCE_FOLDER "/configs/%s.yaml", files[i]);
         sdm_experiment_free(e);
         if (sdm_experiment_read(path, NULL, 0, &e, &err)) fail_msg("%s", err.text);
-        assert_true(e->n_rows >= 6);
+        assert_true(e->n_rows >= 4);
     }
 }
 

@@ -15,6 +15,7 @@
 #include "sdm/checksum.h"
 #include "sdm/file.h"
 #include "sdm/memory.h"
+#include "sdm/pod.h"
 #include "sdm/train.h"
 
 static sdm_registry *registry;
@@ -265,6 +266,29 @@ static void small_pool(void **state)
     assert_true(r.accuracy.rmse_mm < 0.1);
 }
 
+// n maps span n functions: asked for more, a block has no more
+static void few_maps(void **state)
+{
+    (void)state;
+    enum { MAPS = 8 };
+    sdm_config c;
+    sdm_error e = {0};
+    sdm_train_report r;
+    sdm_model *m;
+    clean();
+    read_config(&c,
+                (const char *const[]){"train.steps=2", "data.static=2", "data.start=4", "data.online=0",
+                                      "network.rank=200", "network.levels=1"},
+                6);
+    if (sdm_train(&c, capsule, folder, false, NULL, &r, &e)) fail_msg("%s", e.text);
+    assert_int_equal(r.samples, MAPS);
+    assert_int_equal(sdm_model_open(r.model_path, &m, &e), SDM_OK);
+    const size_t blocks = sdm_pod_count(&c.grid, (size_t)c.network.block, 1).first[1];
+    const double latent = 24 + 20, voxels = (double)sdm_grid_count(&c.grid), mlp = 24 * (24 + 20); // at most
+    assert_true(sdm_model_get_info(m)->macs <= (double)MAPS * ((double)blocks * latent + voxels) + mlp);
+    sdm_model_free(m);
+}
+
 static void mistakes(void **state)
 {
     (void)state;
@@ -312,6 +336,7 @@ int main(void)
                                        cmocka_unit_test(short_of_time),
                                        cmocka_unit_test(polynomials_alone),
                                        cmocka_unit_test(small_pool),
+                                       cmocka_unit_test(few_maps),
                                        cmocka_unit_test(mistakes)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

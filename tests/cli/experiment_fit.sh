@@ -1,0 +1,125 @@
+#!/usr/bin/env bash
+# sdmgen experiment with fits: every method on the same phantoms, the tables in all forms, a model from elsewhere, mistakes.
+. "$(dirname "$0")/common.sh"
+export OMP_WAIT_POLICY=passive
+
+# fits FILE PHANTOMS PRIOR: an ellipsoid in images of 8 mm
+fits() {
+    cat >"$1" <<END
+experiment: {title: fits, baseline: naive, reference: paper}
+fit: {phantoms: $2, off_mm: 0.5, off_deg: 10, voxel: 0.5, range: 0.6, prior_sd: $3}
+shape: {name: ellipsoid, options: {edge: 0.6}, ranges: {rx: [3.4, 4.2], ry: [2.4, 3], rz: [1.5, 2]}}
+grid: {size: [26, 22, 18], spacing: 0.45}
+network: {depth: 1, width: 16}
+data: {static: 2, online: 32, start: 64, holdout: 4}
+train: {steps: 20, batch: 16}
+methods:
+  - {name: network, network: pod, fit: network, set: {network: {rank: 8, modes: 16, degree: 2, input_degree: 2}, train.refine_batch: 8}}
+  - {name: polished, fit: polish}
+  - {name: exact, fit: exact}
+  - {name: naive, fit: naive}
+reference:
+  - {row: network, fit_s: 3902.1, difference: {rx: 2e-8, rz: 1e-9}, source: "somebody, table 2"}
+END
+}
+
+# cell FILE ROW PARAMETER COLUMN of a table whose texts have no comma; PARAMETER - where the second column is none
+cell() {
+    awk -F, -v row="\"$2\"" -v param="$3" -v name="$4" 'NR == 1 { for (i = 1; i <= NF; i++) if ($i == name) c = i }
+        $1 == row && (param == "-" || $2 == param) { print $c }' "$1"
+}
+holds() { awk "BEGIN { exit !($*) }" || bad "not so: $*"; }
+
+fits tiny.yaml 2 0
+expect 0 - sdmgen experiment tiny.yaml --dry-run --out never
+has '^network +pod .*train, fit +20 steps +phantoms 2 '
+has '^polished +pod .* fit +phantoms 2 '
+has '^naive +naive .* time a map '
+absent never
+
+expect 0 - sdmgen experiment tiny.yaml --out run --quiet --threads 1
+cmp -s out run/table.md || bad 'stdout is not table.md'
+present run/table.csv run/table.json run/parameters.csv run/network/model.sdm run/network/fits.csv run/polished/fits.csv run/exact/fits.csv
+absent run/polished/model.sdm run/naive run/network/slices.png
+grep -q 'slices.png' run/table.md && bad 'table.md shows pictures that are not there'
+t=run/table.csv p=run/parameters.csv
+
+# all converge; who makes the maps; the parts of a mean are its fits
+for row in network polished exact; do
+    [ "$(cell $t $row - fits)" = 2 ] && [ "$(cell $t $row - shapes)" = 2 ] || bad "$row: fits $(cell $t $row - fits)"
+    holds "$(cell $t $row - dice) > 0.94 && $(cell $t $row - fit_s) > 0 && $(cell $t $row - speedup) > 1"
+    near "$(awk -F, 'NR > 1 { s += $3 } END { print s / 2 }' run/$row/fits.csv)" "$(cell $t $row - fit_s)" 1e-5
+done
+holds "$(cell $t network - maps_network) > 3 && $(cell $t network - maps_exact) == 0"
+holds "$(cell $t polished - maps_network) == $(cell $t network - maps_network) && $(cell $t polished - maps_exact) > 0"
+holds "$(cell $t exact - maps_network) == 0 && $(cell $t exact - maps_exact) > $(cell $t polished - maps_exact)"
+
+# the exact engine ends where the polished network does, the network alone near it, and all near the truth
+for name in rx ry rz; do
+    polished=$(cell $p polished $name difference) network=$(cell $p network $name difference) error=$(cell $p exact $name error)
+    holds "\"$polished\" != \"\" && $polished < 1e-5 && $network > 10 * $polished && $network < $error"
+    holds "$error > 0 && $error < 0.15 && $(cell $p exact $name sd) > 0"
+    [ -z "$(cell $p exact $name difference)" ] || bad 'the exact fit differs from itself'
+    # error and share once more, from the fits themselves
+    read -r mean within < <(awk -F, -v name=$name 'NR == 1 { for (i = 1; i <= NF; i++) if ($i == name) c = i; next }
+        { d = $c - $(c - 1); if (d < 0) d = -d; sum += d; n++; in3 += d <= 3 * $(c + 1) } END { print sum / n, in3 / n }' run/network/fits.csv)
+    near "$(cell $p network $name error)" "$mean" 1e-6
+    near "$(cell $p network $name within_3sd)" "$within" 1e-9
+done
+# truths from the middle of the ranges, the same for all
+for row in polished exact; do
+    [ "$(cut -d, -f1,7,11,15 run/$row/fits.csv)" = "$(cut -d, -f1,7,11,15 run/network/fits.csv)" ] || bad "$row has other phantoms"
+done
+awk -F, 'NR > 1 && ($7 < 3.56 || $7 > 4.04 || $11 < 2.52 || $11 > 2.88) { exit 1 }' run/exact/fits.csv || bad 'a truth outside of range: 0.6'
+
+# naive is stated: its maps times those of the exact fits; the speed-up refers to it
+near "$(cell $t naive - fit_s)" "$(awk -v a="$(cell $t naive - ms)" -v b="$(cell $t exact - maps_exact)" 'BEGIN { print a * b / 1000 }')" 1e-3
+near "$(cell $t exact - speedup)" "$(awk -v a="$(cell $t naive - fit_s)" -v b="$(cell $t exact - fit_s)" 'BEGIN { print a / b }')" 0.01
+grep -q "naive: done: not run: the .* maps of a fit of 'exact'" run/table.md || bad 'not said that naive was not run'
+
+# the forms agree; figures of others stand beside
+grep -q '^| polished | rz | mm |' run/table.md || bad 'no table of parameters'
+grep -q "\"name\": *\"rx\", *\"unit\": *\"mm\", *\"difference\": *$(cell $p network rx difference), *\"reference_difference\": *2e-08," run/table.json ||
+    bad 'JSON and parameters.csv differ'
+[ "$(cell $p network rx reference_difference)" = 2e-08 ] && [ -z "$(cell $p network ry reference_difference)" ] || bad 'differences of others'
+[ "$(cell $t network - reference_fit_s)" = 3902.1 ] || bad 'fit_s of others'
+if command -v python3 >/dev/null; then python3 -m json.tool run/table.json >/dev/null || bad 'table.json is not JSON'; fi
+
+# again, with other threads: the network is loaded, everything but the times is the same
+numbers() { cut -d, -f1,2,4- "$1"; }
+expect 0 - sdmgen experiment tiny.yaml --out run2 --quiet --threads 2 fit.model=run/network/model.sdm
+for row in network polished exact; do
+    [ "$(numbers run/$row/fits.csv)" = "$(numbers run2/$row/fits.csv)" ] || bad "$row: other results from the same model"
+done
+cmp -s $p run2/parameters.csv || bad 'parameters.csv differs'
+absent run2/network/model.sdm
+expect 0 - sdmgen experiment tiny.yaml --dry-run fit.model=run/network/model.sdm
+has '^network +pod .*load, fit +phantoms 2 '
+
+# a start far off: fits that fail are counted and told, not averaged
+expect 0 - sdmgen experiment tiny.yaml --out far --quiet fit.off_mm=9 fit.phantoms=1 fit.model=run/network/model.sdm
+[ "$(cell far/table.csv exact - fits)" = 0 ] && [ -z "$(cell far/parameters.csv exact rx error)" ] || bad 'a failed fit was averaged'
+grep -q 'exact: done: .*the first that failed: ' far/table.md || bad 'no reason of a failed fit'
+
+# models that do not fit
+sed 's/rx: \[3.4, 4.2\]/rx: [3.3, 4.2]/' tiny.yaml >wider.yaml
+sdmgen experiment wider.yaml --out wider --quiet fit.model=run/network/model.sdm >out 2>err
+[ $? -eq 2 ] || bad 'a model of a smaller range: exit code'
+grep -q 'model.sdm was trained on rx = 3.4 .. 4.2, the experiment has rx = 3.3 .. 4.2' wider/table.md || bad 'no reason: smaller range'
+grep -q '^| exact |' wider/table.md || bad 'the rows behind were not done'
+
+# mistakes, before anything is done
+wrong() { sed "$1" tiny.yaml >wrong.yaml; expect 2 "$2" sdmgen experiment wrong.yaml --out wrong; }
+wrong '/name: network/d;/^reference:/,$d' "wrong.yaml:9:5: method 'polished' with fit: polish needs one with fit: network before it"
+wrong 's/fit: exact/fit: exakt/' "wrong.yaml:11:24: fit: 'exakt' is not one of none, network, polish, exact, naive; did you mean 'exact'"
+wrong 's/fit: naive/engine: naive, fit: naive/' "wrong.yaml:12:5: method 'naive' with this fit needs none of the keys network and engine"
+wrong 's/network: pod, fit/fit/' "wrong.yaml:9:5: method 'network' with fit: network needs the key network"
+wrong 's/fit: polish/fit: polish, set: {train.steps: 3}/' "wrong.yaml:10:5: method 'polished' with fit: polish takes the network before it"
+wrong 's/phantoms: 2/phantoms: 0/' 'wrong.yaml:2:.*fit.phantoms: 0 is out of range'
+expect 2 'fit.model: one model for 0 methods' sdmgen experiment "$source_folder/configs/grids.yaml" fit.model=x.sdm --dry-run
+absent wrong
+sed 's/{rx: 2e-8/{rq: 2e-8/' tiny.yaml >unknown.yaml
+sdmgen experiment unknown.yaml --out unknown --quiet fit.phantoms=1 fit.model=run/network/model.sdm >out 2>err
+[ $? -eq 2 ] || bad "a difference of an unknown parameter: exit code"
+grep -q "reference: difference: the shape has no parameter 'rq'" unknown/table.md || bad 'no reason: unknown parameter'
+finish

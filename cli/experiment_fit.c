@@ -81,13 +81,14 @@ static sdm_status measure_dice(const sdm_fit_source *source, const sdm_fit_resul
 }
 
 /* A fit that is not to be trusted is a result; its reason is left in *why. */
-static sdm_status fit_one(const experiment_job *job, const sdm_fit_source *source, bool polish, double prior_sd,
+static sdm_status fit_one(const experiment_job *job, const sdm_fit_source *source, bool polish, const sdm_experiment *e,
                           const experiment_phantom *p, experiment_fit *out, sdm_error *why, sdm_error *err)
 {
     const sdm_fit_target target = {.kind = SDM_FIT_IMAGE, .grid = p->grid, .values = p->values};
     sdm_fit_opts opts = sdm_fit_defaults();
     sdm_fit_result r = {0};
-    opts.prior_sd = prior_sd;
+    opts.prior_sd = e->fit.prior_sd;
+    opts.polish_eps = e->fit.eps;
     opts.start_params = p->start;
     opts.start_pose = p->start_pose;
     opts.max_polish_iterations = polish ? opts.max_iterations : 0;
@@ -151,7 +152,7 @@ static sdm_status fit_all(const experiment_run *run, const experiment_job *job, 
         sdm_error doubt = {0};
         cli_progress_show(&bar, out->row->title, (double)i / (double)out->fits->n, NULL);
         s = experiment_phantom_make(run, job, i, &phantom, err);
-        if (!s) s = fit_one(job, source, polish, run->e->fit.prior_sd, &phantom, &out->fits->fit[i], &doubt, err);
+        if (!s) s = fit_one(job, source, polish, run->e, &phantom, &out->fits->fit[i], &doubt, err);
         if (!s && !out->fits->fit[i].converged && !why->status) {
             *why = doubt;
             why->status = SDM_E_QUALITY;

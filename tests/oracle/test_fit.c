@@ -268,10 +268,10 @@ static void test_priors(void **state)
         assert_true(r.sd[3 + k] < 2e-5 && r.sd[6 + k] < 2e-5);
     }
     sdm_fit_dispose(&r);
-    o.prior_sd = 1e-5; // of half of 1 .. 4 about 2.5
+    o.prior_sd = 1e-3; // of half of 1 .. 4 about 2.5
     o.prior_translation_sd = o.prior_rotation_sd = 0;
     r = fit(&t, &o);
-    for (int k = 0; k < 3; k++) assert_true(fabs(r.params[k] - 2.5) < 0.01);
+    for (int k = 0; k < 3; k++) assert_true(fabs(r.params[k] - 2.5) < 0.05);
     sdm_fit_dispose(&r);
     free(v);
 }

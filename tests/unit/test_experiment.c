@@ -349,6 +349,8 @@ int main(void)
         cmocka_unit_test(test_order_of_keys),
         cmocka_unit_test(test_engines_alone),
         cmocka_unit_test(test_references),
+        cmocka_unit_test(test_fits),
+        cmocka_unit_test(test_mistakes_of_fits),
         cmocka_unit_test(test_figures_have_keys),
         cmocka_unit_test(test_mistakes_of_the_experiment),
         cmocka_unit_test(test_mistakes_of_the_training),

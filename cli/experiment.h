@@ -79,8 +79,9 @@ void experiment_set_errors(experiment_result *out, const cli_eval *e);
 /* table.md, table.csv and table.json in the folder; the first and the last also as texts. */
 sdm_status experiment_write_tables(const experiment_run *run, sdm_text *markdown, sdm_json *json, sdm_error *err);
 
-/* Writes text, NAME in the folder. "..." with quotes doubled. */
+/* The parts of tables: a text as NAME in the folder, as a cell in Markdown, in quotes for CSV. */
 sdm_status experiment_write_file(const experiment_run *run, const char *name, const sdm_text *text, sdm_error *err);
+void experiment_add_cell(sdm_text *t, const char *text);
 void experiment_add_csv_text(sdm_text *t, const char *text);
 
 /* What will be done, and how long the trainings take. */

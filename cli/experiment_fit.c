@@ -223,15 +223,14 @@ static sdm_status time_naive(const experiment_run *run, const experiment_job *jo
 
 static void describe(const experiment_run *run, const sdm_model *model, const sdm_error *why, experiment_result *out)
 {
-    static const char *const maps[] = {[SDM_EXPERIMENT_FIT_NETWORK] = "maps by the network",
-                                       [SDM_EXPERIMENT_FIT_POLISH] = "by the network, then exact",
-                                       [SDM_EXPERIMENT_FIT_EXACT] = "exact maps"};
-    char network[64] = "";
-    if (model) snprintf(network, sizeof network, " %s", sdm_model_get_info(model)->kind);
+    char maps[96] = "exact maps";
+    if (model)
+        snprintf(maps, sizeof maps, "maps by the network %s%s", sdm_model_get_info(model)->kind,
+                 out->row->method->fit == SDM_EXPERIMENT_FIT_POLISH ? ", then exact ones" : "");
     snprintf(out->note, sizeof out->note,
-             "%s%s, %s; %lld phantoms with voxels of %g mm, started %g mm and %g degrees off%s%.250s",
-             maps[out->row->method->fit], network, out->grid, (long long)run->e->fit.phantoms, run->e->fit.voxel,
-             run->e->fit.off_mm, run->e->fit.off_deg, why->status ? "; the first that failed: " : "", why->text);
+             "%s, %s; %lld phantoms with voxels of %g mm, started %g mm and %g degrees off%s%.250s", maps, out->grid,
+             (long long)run->e->fit.phantoms, run->e->fit.voxel, run->e->fit.off_mm, run->e->fit.off_deg,
+             why->status ? "; the first that failed: " : "", why->text);
 }
 
 sdm_status experiment_fit_row(const experiment_run *run, experiment_job *job, experiment_result *out, sdm_error *err)

@@ -82,7 +82,7 @@ experiment_spread experiment_fit_spread(const experiment_run *run, const experim
 
 static bool has_fits(const experiment_result *r) { return r->state == EXPERIMENT_DONE && r->fits; }
 
-static void add_cell(sdm_text *t, double v) { sdm_text_add(t, isfinite(v) ? " %.3g |" : " - |", v); }
+static void add_figure(sdm_text *t, double v) { sdm_text_add(t, isfinite(v) ? " %.3g |" : " - |", v); }
 
 void experiment_fit_markdown(const experiment_run *run, sdm_text *t)
 {
@@ -98,8 +98,10 @@ void experiment_fit_markdown(const experiment_run *run, sdm_text *t)
         for (size_t k = 0; has_fits(r) && k < r->fits->n_params; k++) {
             const experiment_spread s = experiment_fit_spread(run, r, k);
             const double cells[] = {s.difference, s.reference, s.error, s.sd, s.within};
-            sdm_text_add(t, "| %s | %s | %s |", r->row->title, r->fits->name[k], r->fits->unit[k]);
-            for (size_t c = 0; c < sizeof cells / sizeof *cells; c++) add_cell(t, cells[c]);
+            sdm_text_add(t, "| ");
+            experiment_add_cell(t, r->row->title);
+            sdm_text_add(t, " | %s | %s |", r->fits->name[k], r->fits->unit[k]);
+            for (size_t c = 0; c < sizeof cells / sizeof *cells; c++) add_figure(t, cells[c]);
             sdm_text_add(t, "\n");
         }
     }

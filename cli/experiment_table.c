@@ -62,7 +62,7 @@ static void add_number(sdm_text *t, double v)
 }
 
 /* A text without what means something in a cell. */
-static void add_cell(sdm_text *t, const char *text)
+void experiment_add_cell(sdm_text *t, const char *text)
 {
     for (const char *p = text; *p; p++) sdm_text_add(t, strchr("|*_`<\\[", *p) ? "\\%c" : "%c", *p);
 }
@@ -90,7 +90,7 @@ static void add_markdown_table(const experiment_run *run, const columns *c, sdm_
     for (size_t i = 0; i < run->e->n_rows; i++) {
         const experiment_result *r = &run->results[i];
         sdm_text_add(t, "| ");
-        add_cell(t, r->row->title);
+        experiment_add_cell(t, r->row->title);
         if (r->state != EXPERIMENT_DONE) sdm_text_add(t, " (%s)", state_name(r->state));
         sdm_text_add(t, " |");
         for (int f = 0; f < SDM_N_FIGURES; f++) {
@@ -116,13 +116,13 @@ static void add_markdown(const experiment_run *run, const columns *c, sdm_text *
         const experiment_result *r = &run->results[i];
         const sdm_experiment_reference *reference = r->row->reference;
         sdm_text_add(t, "- ");
-        add_cell(t, r->row->title);
+        experiment_add_cell(t, r->row->title);
         sdm_text_add(t, ": %s: ", state_name(r->state));
-        add_cell(t, r->note);
+        experiment_add_cell(t, r->note);
         sdm_text_add(t, "\n");
         if (!reference || !*reference->source) continue;
         sdm_text_add(t, "  - %s: ", run->e->experiment.reference);
-        add_cell(t, reference->source);
+        experiment_add_cell(t, reference->source);
         sdm_text_add(t, "\n");
     }
     if (!run->e->experiment.pictures) return;

@@ -295,7 +295,7 @@ sdm_status sdm_fit_iterate(fit_problem *p, const fit_run *run, fit_ended *out, s
     const size_t n = p->sums.n_unknowns;
     double step[FIT_UNKNOWNS_MAX], last[FIT_UNKNOWNS_MAX] = {0}, *work = NULL;
     fit_pace pace = {.damping = run->phase == SDM_FIT_SEARCH ? 1e-2 : 1e-4, .shrink = 1};
-    int stuck = 0; // steps that gain nothing and do not become smaller
+    int stuck = 0; // steps that gain nothing or swing, and do not become smaller
     *out = (fit_ended){.step = INFINITY};
     sdm_status s = SDM_ALLOC(&work, 3 * n * n, "matrices of the fit", err);
     if (!s) s = sdm_fit_look(p, err);
@@ -310,8 +310,9 @@ sdm_status sdm_fit_iterate(fit_problem *p, const fit_run *run, fit_ended *out, s
             break;
         }
         const double size = step_size(p, step);
-        stuck = pace.flat && size > 0.8 * out->step ? stuck + 1 : 0;
-        if ((pace.flat && swings(p, step, last)) || stuck == 3) pace.shrink *= 0.5, stuck = 0;
+        const bool back = swings(p, step, last);
+        stuck = (pace.flat || back) && size > 0.8 * out->step ? stuck + 1 : 0;
+        if ((pace.flat && back) || stuck == 3) pace.shrink *= 0.5, stuck = 0;
         memcpy(last, step, n * sizeof *last);
         out->step = size;
         out->converged = out->step <= run->eps;

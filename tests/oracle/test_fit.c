@@ -268,10 +268,16 @@ static void test_priors(void **state)
         assert_true(r.sd[3 + k] < 2e-5 && r.sd[6 + k] < 2e-5);
     }
     sdm_fit_dispose(&r);
-    o.prior_sd = 1e-3; // of half of 1 .. 4 about 2.5
+    // of half of 1 .. 4: draws the parameters towards 2.5, and they are better known
     o.prior_translation_sd = o.prior_rotation_sd = 0;
+    const sdm_fit_result free_of_it = fit(&t, &o);
+    o.prior_sd = 0.05;
     r = fit(&t, &o);
-    for (int k = 0; k < 3; k++) assert_true(fabs(r.params[k] - 2.5) < 0.05);
+    assert_true(r.params[2] > free_of_it.params[2] + 0.2 * free_of_it.sd[2]);
+    assert_true(r.params[1] > free_of_it.params[1] + 0.2 * free_of_it.sd[1]);
+    for (int k = 0; k < 3; k++) assert_true(r.sd[k] < 0.075 && r.sd[k] < 1.1 * free_of_it.sd[k]);
+    sdm_fit_result other = free_of_it;
+    sdm_fit_dispose(&other);
     sdm_fit_dispose(&r);
     free(v);
 }

@@ -196,16 +196,17 @@ static void test_many_modes(void **state)
 static void test_example(void **state)
 {
     (void)state;
+    enum { MODES = 8 };
     const sdm_named_text given[] = {{"mean", "mean.ply"}, {"modes", "modes.npy"}, {"deviations", "deviations.npy"}};
     sdm_instance *s = NULL;
     if (sdm_instance_create(shape, given, 3, MODEL_FOLDER, &s, &err)) fail_msg("%s", err.text);
     size_t n = 0;
     sdm_instance_params(s, &n);
-    assert_int_equal(n, 5);
+    assert_int_equal(n, MODES);
     sdm_mesh m = {0};
-    for (int corner = 0; corner < 32; corner++) {
-        double p[5];
-        for (int i = 0; i < 5; i++) p[i] = corner >> i & 1 ? 2 : -2;
+    for (int corner = 0; corner < 1 << MODES; corner++) {
+        double p[MODES];
+        for (int i = 0; i < MODES; i++) p[i] = corner >> i & 1 ? 2 : -2;
         sdm_audit a;
         assert_int_equal(sdm_instance_mesh(s, p, &m, &err), SDM_OK);
         assert_int_equal(sdm_mesh_audit(&m, &a, &err), SDM_OK);
@@ -214,10 +215,10 @@ static void test_example(void **state)
         for (int k = 0; k < 3; k++) assert_true(a.max[k] - a.min[k] > 2 && a.max[k] - a.min[k] < 12);
     }
     double *v = NULL;
-    const double zero[5] = {0};
-    assert_int_equal(SDM_ALLOC(&v, 5 * 3 * m.n_vert, "velocities", &err), SDM_OK);
+    const double zero[MODES] = {0};
+    assert_int_equal(SDM_ALLOC(&v, MODES * 3 * m.n_vert, "velocities", &err), SDM_OK);
     assert_int_equal(sdm_instance_velocity(s, zero, m.n_vert, v, &err), SDM_OK);
-    for (size_t i = 0; i < 5; i++)
+    for (size_t i = 0; i < MODES; i++)
         for (size_t j = 0; j <= i; j++) {
             double dot = 0;
             for (size_t k = 0; k < 3 * m.n_vert; k++)

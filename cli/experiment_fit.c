@@ -223,12 +223,12 @@ static sdm_status time_naive(const experiment_run *run, const experiment_job *jo
 
 static void describe(const experiment_run *run, const sdm_model *model, const sdm_error *why, experiment_result *out)
 {
-    char maps[96] = "exact maps";
+    char maps[64] = "exact maps";
     if (model)
         snprintf(maps, sizeof maps, "maps by the network %s%s", sdm_model_get_info(model)->kind,
                  out->row->method->fit == SDM_EXPERIMENT_FIT_POLISH ? ", then exact ones" : "");
     snprintf(out->note, sizeof out->note,
-             "%s, %s; %lld phantoms with voxels of %g mm, started %g mm and %g degrees off%s%.250s", maps, out->grid,
+             "%s, %s; %lld phantoms with voxels of %g mm, started %g mm and %g degrees off%s%.200s", maps, out->grid,
              (long long)run->e->fit.phantoms, run->e->fit.voxel, run->e->fit.off_mm, run->e->fit.off_deg,
              why->status ? "; the first that failed: " : "", why->text);
 }

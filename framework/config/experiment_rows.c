@@ -45,7 +45,8 @@ static void find_networks(sdm_experiment *e, sdm_mark model, sdm_mistakes *mista
             if (e->methods[from].fit != SDM_EXPERIMENT_FIT_NETWORK)
                 sdm_mistakes_add(mistakes, m->mark,
                                  "method '%s' with fit: polish needs one with fit: network before it", m->name);
-            strcpy(m->network, e->methods[from].network);
+            else
+                strcpy(m->network, e->methods[from].network);
         }
         for (size_t row = i; row < e->n_rows; row += e->n_methods) e->rows[row].network_row = row - i + from;
     }

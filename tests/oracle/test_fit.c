@@ -165,7 +165,7 @@ static void test_label_map(void **state)
     if (!(worst(&r) < 0.02)) fail_msg("off by %g", worst(&r));
     assert_true(isnan(r.evidence));
     sdm_fit_dispose(&r);
-    // the logistic prior widens what is curved
+    // the logistic prior draws what is curved inwards
     sdm_fit_opts logistic = o;
     logistic.image_model = SDM_FIT_LABELS;
     logistic.l_ref = 0.05;

@@ -39,7 +39,10 @@ typedef struct sdm_fit_source {
 
 typedef enum sdm_fit_kind {
     SDM_FIT_IMAGE = 0, /* values[nz][ny][nx], any unit */
-    SDM_FIT_LABEL = 1, /* values[nz][ny][nx] are probabilities of inside, 0 .. 1 (a label map: 0 and 1) */
+    SDM_FIT_LABEL =
+        1, /* values[nz][ny][nx] are probabilities of inside, 0 .. 1 (a label map: 0 and 1): taken as shares of voxels
+                           (partial volume), or as labels with the logistic prior, which draws a surface of
+                           mean curvature H inwards by about 3.3 l_ref^2 H */
     SDM_FIT_POINTS = 2 /* points[n_points][3] on the surface, world mm, with outliers */
 } sdm_fit_kind;
 
@@ -88,7 +91,7 @@ typedef struct sdm_fit_progress {
 /* sdm_fit_defaults() fills it; change what differs. */
 typedef struct sdm_fit_opts {
     sdm_fit_model image_model;
-    double l_ref;                  /* mm, > 0: scale of the logistic prior of labels; also of a label map */
+    double l_ref;                  /* mm, > 0: labels: scale of the logistic prior */
     double blur;                   /* mm, > 0: sd of the point spread over the voxel, start value */
     bool keep_blur;                /* true: not estimated */
     sdm_fit_appearance appearance; /* start values */
@@ -142,9 +145,10 @@ typedef struct sdm_fit_result {
     size_t n_exact_outside; /* maps the exact engine made because parameters lay outside of the network's range */
 
     bool converged;
-    char reason[256];              /* why it stopped */
-    size_t n_iterations;           /* of the main phase and the polish */
-    double *objective;             /* [n_iterations] log posterior density after each, without constants */
+    char reason[256];    /* why it stopped */
+    size_t n_iterations; /* of the main phase and the polish */
+    double *objective; /* [n_iterations] log posterior density after each, without constants; those of other voxels (the
+                          region follows the shape) or other sd of tissues do not compare */
     double log_likelihood;         /* of the target at the estimate */
     double log_likelihood_without; /* image: of the same voxels by a mixture that knows no shape; else NaN */
     double

@@ -184,9 +184,10 @@ static sdm_status climb(fit_problem *p, sdm_fit_result *out, sdm_error *err)
         s = settle(p, &run, &ended, err);
     }
     out->converged = !s && ended.converged;
-    snprintf(out->reason, sizeof out->reason,
-             out->converged ? "%s: last step %.2g, below %g" : "%s stopped: last step %.2g, not below %g", what,
-             ended.step, run.eps);
+    const char *text = !out->converged ? "%s stopped: last step %.2g, not below %g"
+                       : ended.rough   ? "%s: last step %.2g, not below %g, but steps gain nothing any more"
+                                       : "%s: last step %.2g, below %g";
+    snprintf(out->reason, sizeof out->reason, text, what, ended.step, run.eps);
     return s;
 }
 

@@ -11,8 +11,8 @@
 #define STEP_MOST 0.25
 // a gain in log-likelihood too small to tell from rounding: such steps are taken without asking whether they gain
 #define GAIN_LEAST 1e-4
-// a gain that means nothing at all: a thousandth of a standard deviation
-#define GAIN_NONE 1e-6
+// so many of them in a row are an end too: creases of the distance keep the steps from becoming smaller
+#define FLAT_MOST 12
 #define DAMPING_MOST 1e8
 
 sdm_status sdm_fit_look(fit_problem *p, sdm_error *err)
@@ -229,8 +229,8 @@ static sdm_status one_step(fit_problem *p, const fit_run *run, fit_pace *pace, d
         const sdm_status s = sdm_fit_look(p, err);
         const double after = s ? 0 : p->sums.log_likelihood + sdm_fit_prior(p, &p->state, NULL, NULL, NULL);
         if (s) return s;
-        pace->flat = fabs(expected) < GAIN_NONE;
-        if (after > before || (fabs(expected) < GAIN_LEAST && after > before - GAIN_LEAST)) {
+        pace->flat = fabs(expected) < GAIN_LEAST;
+        if (after > before || (pace->flat && after > before - GAIN_LEAST)) {
             *taken = true;
             *damping = *damping > 1e-6 ? *damping / 10 : 0;
             return SDM_OK;
@@ -295,6 +295,7 @@ sdm_status sdm_fit_iterate(fit_problem *p, const fit_run *run, fit_ended *out, s
     const size_t n = p->sums.n_unknowns;
     double step[FIT_UNKNOWNS_MAX], last[FIT_UNKNOWNS_MAX] = {0}, *work = NULL;
     fit_pace pace = {.damping = run->phase == SDM_FIT_SEARCH ? 1e-2 : 1e-4, .shrink = 1};
+    int flat = 0;  // steps in a row whose gain is too small to tell
     int stuck = 0; // steps that gain nothing or swing, and do not become smaller
     *out = (fit_ended){.step = INFINITY};
     sdm_status s = SDM_ALLOC(&work, 3 * n * n, "matrices of the fit", err);
@@ -315,7 +316,9 @@ sdm_status sdm_fit_iterate(fit_problem *p, const fit_run *run, fit_ended *out, s
         if ((pace.flat && back) || stuck == 3) pace.shrink *= 0.5, stuck = 0;
         memcpy(last, step, n * sizeof *last);
         out->step = size;
-        out->converged = out->step <= run->eps;
+        flat = pace.flat ? flat + 1 : 0;
+        out->rough = flat == FLAT_MOST && size > run->eps;
+        out->converged = size <= run->eps || out->rough;
         s = record(p, run, out->step, err);
     }
     sdm_free(work);

@@ -38,6 +38,7 @@ typedef struct fit_run {
 
 typedef struct fit_ended {
     bool converged;
+    bool rough;  // not by the size of the steps, but because they gain nothing any more
     double step; // the last
 } fit_ended;
 

@@ -7,8 +7,8 @@
 #include "score.h"
 #include "sdm/memory.h"
 
-// length over which the error of a network's map is alike, in steps of its grid
-#define MODEL_STEPS 2.0
+// edge of the cubes within which the error of a network's map is alike, in steps of its grid
+#define MODEL_STEPS 5.0
 
 // what is known beforehand
 static void add_known(const fit_problem *p, double *a)

@@ -192,11 +192,12 @@ static int estimate(const near_voxels *v, int n_threads, double c[MIDDLE + 1])
     return 2 * width < LAG_MOST ? 2 * width : LAG_MOST;
 }
 
-/* out += sum of c(lag) x_n x_(n+lag)^T over voxels and both halves of the lags. Slices of voxels, added in order. */
-static sdm_status add_products(const near_voxels *v, const float *x, const double *c, int width, int n_threads,
-                               double *out, sdm_error *err)
+/* out += sum of c(lag) root_n root_(n+lag)^T over voxels and both halves of the lags. Slices of voxels, added in order. */
+static sdm_status add_products(const near_voxels *v, const double *c, int width, int n_threads, double *out,
+                               sdm_error *err)
 {
     const size_t n = v->n_unknowns;
+    const float *x = v->root;
     double *parts = NULL;
     const sdm_status s = SDM_ALLOC(&parts, FIT_SLICES * n * n, "covariance of the score", err);
     if (s) return s;
@@ -204,18 +205,19 @@ static sdm_status add_products(const near_voxels *v, const float *x, const doubl
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         for (size_t i = v->n * slice / FIT_SLICES; i < v->n * (slice + 1) / FIT_SLICES; i++) {
-            double around[FIT_UNKNOWNS_MAX] = {0}, *part = parts + slice * n * n;
+            float around[FIT_UNKNOWNS_MAX] = {0};
+            double *part = parts + slice * n * n;
             for (int number = 0; number <= MIDDLE; number++) {
                 int lag[3];
                 lag_of(number, lag);
                 if (c[number] == 0 || lag_size(lag) > width) continue;
                 const size_t j = neighbour(v, i, lag);
                 if (j == SIZE_MAX) continue;
-                const double w = number == MIDDLE ? 0.5 * c[number] : c[number];
-                for (size_t a = 0; a < n; a++) around[a] += w * (double)x[j * n + a];
+                const float w = (float)(number == MIDDLE ? 0.5 * c[number] : c[number]);
+                for (size_t a = 0; a < n; a++) around[a] += w * x[j * n + a];
             }
             for (size_t a = 0; a < n; a++)
-                for (size_t b = 0; b < n; b++) part[a * n + b] += (double)x[i * n + a] * around[b];
+                for (size_t b = 0; b < n; b++) part[a * n + b] += (double)x[i * n + a] * (double)around[b];
         }
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         for (size_t a = 0; a < n; a++)
@@ -268,7 +270,7 @@ static sdm_status add_noise(const fit_problem *p, const near_voxels *v, const do
         }
         out->noise_factor = fmax(sum, c[MIDDLE]);
         memset(out->noise, 0, n * n * sizeof *out->noise);
-        s = add_products(v, v->root, weighted, width, n_threads, out->noise, err);
+        s = add_products(v, weighted, width, n_threads, out->noise, err);
         add_far(p, out->noise_factor, out->noise);
         memcpy(work, out->noise, n * n * sizeof *work);
         sdm_fit_add_ignorance(p, work);
@@ -278,6 +280,34 @@ static sdm_status add_noise(const fit_problem *p, const near_voxels *v, const do
     }
     sdm_free(work);
     return s;
+}
+
+// an error of the map that is the same within cubes of this edge and independent between them
+static sdm_status add_model(const fit_problem *p, const near_voxels *v, double edge, double *out, sdm_error *err)
+{
+    const size_t n = v->n_unknowns;
+    int64_t steps[3], count[3];
+    for (int a = 0; a < 3; a++) {
+        steps[a] = (int64_t)fmax(floor(edge / (p->target->grid.spacing[a] * (double)v->step) + 0.5), 1);
+        count[a] = (v->size[a] - 1) / steps[a] + 1;
+    }
+    const size_t cubes = (size_t)count[0] * (size_t)count[1] * (size_t)count[2];
+    double *sum = NULL;
+    size_t size;
+    sdm_status s = sdm_mul(cubes, n, &size, err);
+    if (!s) s = SDM_ALLOC(&sum, size, "covariance of the score", err);
+    if (s) return s;
+    for (size_t i = 0; i < v->n; i++) {
+        int64_t k[3];
+        for (size_t a = 0; a < 3; a++) k[a] = v->place[3 * i + a] / steps[a];
+        double *of_cube = sum + (size_t)((k[2] * count[1] + k[1]) * count[0] + k[0]) * n;
+        for (size_t a = 0; a < n; a++) of_cube[a] += (double)v->push[i * n + a];
+    }
+    for (size_t cube = 0; cube < cubes; cube++)
+        for (size_t a = 0; a < n; a++)
+            for (size_t b = 0; b < n; b++) out[a * n + b] += sum[cube * n + a] * sum[cube * n + b];
+    sdm_free(sum);
+    return SDM_OK;
 }
 
 static sdm_status of_voxels(const fit_problem *p, double model_mm, fit_scatter *out, sdm_error *err)
@@ -290,19 +320,7 @@ static sdm_status of_voxels(const fit_problem *p, double model_mm, fit_scatter *
         const int width = estimate(&v, n_threads, c);
         s = add_noise(p, &v, c, width, n_threads, out, err);
     }
-    if (!s && model_mm > 0) {
-        for (int number = 0; number <= MIDDLE; number++) {
-            int lag[3];
-            lag_of(number, lag);
-            double square = 0;
-            for (int a = 0; a < 3; a++) {
-                const double way = lag[a] * p->target->grid.spacing[a] * (double)p->stride / model_mm;
-                square += way * way;
-            }
-            c[number] = exp(-0.5 * square);
-        }
-        s = add_products(&v, v.push, c, LAG_MOST, n_threads, out->model, err);
-    }
+    if (!s && model_mm > 0) s = add_model(p, &v, model_mm, out->model, err);
     dispose_near(&v);
     return s;
 }

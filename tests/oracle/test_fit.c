@@ -8,6 +8,7 @@
 #include <cmocka.h>
 
 #include "oracle/fit_tools.h"
+#include "sdm/memory.h"
 
 static sdm_fit_result fit(const sdm_fit_target *t, const sdm_fit_opts *o)
 {
@@ -70,7 +71,7 @@ static void spread(size_t n, bool random, double *rms, size_t *beyond)
         sdm_fit_opts o = near_start();
         for (size_t k = 0; k < 3; k++) {
             p[k] = TRUTH[k] + (random ? 0.6 * sdm_rng_uniform(5, i, k) - 0.3 : 0);
-            start[k] = p[k] + 0.3 * sdm_rng_uniform(6, i, k) - 0.15;
+            start[k] = fmax(p[k] + 0.3 * sdm_rng_uniform(6, i, k) - 0.15, 1.02);
         }
         if (random) pose = sdm_phantom_random_pose(0.5, 0.3, 1000 + i);
         float *v = phantom(p, &pose, 1, 10 + i);
@@ -375,6 +376,30 @@ static void test_refused(void **state)
     assert_int_equal(sdm_fit(&source, &t, &o, NULL, NULL), SDM_E_ARG);
 }
 
+// every now and then memory ends: an error, nothing left behind
+static void test_memory(void **state)
+{
+    (void)state;
+    float *v = phantom(TRUTH, &POSE, 0, 5);
+    const sdm_fit_target t = image_of(v);
+    const sdm_fit_source source = exact_source();
+    const sdm_fit_opts o = near_start();
+    size_t failed = 0;
+    for (unsigned long n = 1; n < 1000; n += n < 30 ? 1 : n / 3) {
+        sdm_fit_result r;
+        sdm_error err = {0};
+        sdm_alloc_fail_after(n);
+        const sdm_status s = sdm_fit(&source, &t, &o, &r, &err);
+        sdm_alloc_fail_after(0);
+        if (s && s != SDM_E_NOMEM) fail_msg("%s: %s", sdm_status_name(s), err.text);
+        failed += s == SDM_E_NOMEM && !r.params && !r.covariance;
+        assert_true(!s || !r.params);
+        sdm_fit_dispose(&r);
+    }
+    assert_true(failed > 30);
+    free(v);
+}
+
 static void test_starts(void **state)
 {
     (void)state;
@@ -422,6 +447,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_label_map), cmocka_unit_test(test_points),  cmocka_unit_test(test_labels_of_image),
         cmocka_unit_test(test_turns),     cmocka_unit_test(test_kept),    cmocka_unit_test(test_priors),
         cmocka_unit_test(test_no_shape),  cmocka_unit_test(test_refused), cmocka_unit_test(test_starts),
+        cmocka_unit_test(test_memory),
     };
     const struct CMUnitTest longer[] = {cmocka_unit_test(test_honest)};
     n_random = argc > 1 ? (size_t)strtoul(argv[1], NULL, 10) : 0;

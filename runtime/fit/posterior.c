@@ -73,7 +73,9 @@ static sdm_status fill(const fit_problem *p, const fit_scatter *scatter, double 
     size_t list[FIT_UNKNOWNS_MAX];
     const size_t m = estimated(p, list);
     double *information = work, *spread = work + n * n, *small = work + 2 * n * n, *covariance = work + 4 * n * n;
-    memcpy(spread, scatter->noise, n * n * sizeof *spread);
+    // residuals about a fit are smaller than those about the truth (MacKinnon and White 1985)
+    const double lost = fmin((double)m / fmax(scatter->effective, 1), 0.5);
+    for (size_t i = 0; i < n * n; i++) spread[i] = scatter->noise[i] / (1 - lost);
     for (size_t i = 0; i < n * n; i++) spread[i] += out->model_error_mm * out->model_error_mm * scatter->model[i];
     add_known(p, spread);
     take(n, spread, m, list, small + n * n);

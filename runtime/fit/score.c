@@ -13,8 +13,11 @@
 #include "sdm/memory.h"
 
 // largest lag along an axis, in steps of the voxels that are used
-#define LAG_MOST 6
+#define LAG_MOST 10
 #define LAGS (2 * LAG_MOST + 1)
+// sums over neighbours begin at every so many voxels, so that there are about as many: of a correlation, of the covariance
+#define PAIRS_OF_LAG 8000
+#define PAIRS 30000000
 
 /* Voxels near the surface, found by their place in a box of the image. */
 typedef struct near_voxels {
@@ -149,7 +152,7 @@ static int lag_size(const int lag[3])
 static double correlation_at(const near_voxels *v, const int lag[3])
 {
     double sum = 0, weight = 0;
-    for (size_t i = 0; i < v->n; i++) {
+    for (size_t i = 0; i < v->n; i += 1 + v->n / PAIRS_OF_LAG) {
         const size_t j = neighbour(v, i, lag);
         if (j == SIZE_MAX) continue;
         const double w = (double)v->weight[i] * (double)v->weight[j];
@@ -170,26 +173,30 @@ static double taper(const int lag[3], int width, bool flat)
     return w;
 }
 
-/* C(lag); the window ends behind the last shell of lags whose sum stands out. Returns its half width. */
+/* C(lag) in c, shell by shell of lags; the window is twice as wide as the last shell before the first whose sum does not stand out.
+   Returns its half width. */
 static int estimate(const near_voxels *v, int n_threads, double c[MIDDLE + 1])
 {
     (void)n_threads; // without OpenMP
-#pragma omp parallel for schedule(dynamic, 16) num_threads(n_threads)
-    for (int number = 0; number <= MIDDLE; number++) {
-        int lag[3];
-        lag_of(number, lag);
-        c[number] = correlation_at(v, lag);
+    int width = LAG_MOST;
+    memset(c, 0, (MIDDLE + 1) * sizeof *c);
+    for (int k = 0; k <= width; k++) {
+#pragma omp parallel for schedule(dynamic, 64) num_threads(n_threads)
+        for (int number = 0; number <= MIDDLE; number++) {
+            int lag[3];
+            lag_of(number, lag);
+            if (lag_size(lag) == k) c[number] = correlation_at(v, lag);
+        }
+        double sum = 0;
+        for (int number = 0; number <= MIDDLE; number++) {
+            int lag[3];
+            lag_of(number, lag);
+            if (lag_size(lag) == k) sum += c[number];
+        }
+        if (width == LAG_MOST && k > 0 && !(sum > 0.05 * c[MIDDLE]))
+            width = 2 * (k - 1) < LAG_MOST ? 2 * (k - 1) : LAG_MOST - 1;
     }
-    double shell[LAG_MOST + 1] = {0};
-    for (int number = 0; number <= MIDDLE; number++) {
-        int lag[3];
-        lag_of(number, lag);
-        shell[lag_size(lag)] += c[number];
-    }
-    int width = 0;
-    for (int k = 1; k <= LAG_MOST; k++)
-        if (shell[k] > 0.05 * c[MIDDLE]) width = k;
-    return 2 * width < LAG_MOST ? 2 * width : LAG_MOST;
+    return width;
 }
 
 /* out += sum of c(lag) root_n root_(n+lag)^T over voxels and both halves of the lags. Slices of voxels, added in order. */
@@ -202,9 +209,11 @@ static sdm_status add_products(const near_voxels *v, const double *c, int width,
     const sdm_status s = SDM_ALLOC(&parts, FIT_SLICES * n * n, "covariance of the score", err);
     if (s) return s;
     (void)n_threads; // without OpenMP
+    const size_t lags = (size_t)pow(2.0 * width + 1, 3) / 2 + 1, step = 1 + v->n * lags / PAIRS, first = v->n / step;
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
-        for (size_t i = v->n * slice / FIT_SLICES; i < v->n * (slice + 1) / FIT_SLICES; i++) {
+        for (size_t turn = first * slice / FIT_SLICES; turn < first * (slice + 1) / FIT_SLICES; turn++) {
+            const size_t i = turn * step;
             float around[FIT_UNKNOWNS_MAX] = {0};
             double *part = parts + slice * n * n;
             for (int number = 0; number <= MIDDLE; number++) {
@@ -222,7 +231,7 @@ static sdm_status add_products(const near_voxels *v, const double *c, int width,
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         for (size_t a = 0; a < n; a++)
             for (size_t b = 0; b < n; b++)
-                out[a * n + b] += parts[slice * n * n + a * n + b] + parts[slice * n * n + b * n + a];
+                out[a * n + b] += (double)step * (parts[slice * n * n + a * n + b] + parts[slice * n * n + b * n + a]);
     sdm_free(parts);
     return SDM_OK;
 }
@@ -310,6 +319,18 @@ static sdm_status add_model(const fit_problem *p, const near_voxels *v, double e
     return SDM_OK;
 }
 
+// number of voxels that count, by their information (Kish 1965), over the noise factor
+static double effective_number(const near_voxels *v, double noise_factor)
+{
+    double sum = 0, square = 0;
+    for (size_t i = 0; i < v->n; i++) {
+        const double w = (double)v->weight[i] * (double)v->weight[i];
+        sum += w;
+        square += w * w;
+    }
+    return square > 0 ? sum * sum / (square * fmax(noise_factor, 1)) : 0;
+}
+
 static sdm_status of_voxels(const fit_problem *p, double model_mm, fit_scatter *out, sdm_error *err)
 {
     near_voxels v;
@@ -319,6 +340,7 @@ static sdm_status of_voxels(const fit_problem *p, double model_mm, fit_scatter *
     if (!s) {
         const int width = estimate(&v, n_threads, c);
         s = add_noise(p, &v, c, width, n_threads, out, err);
+        out->effective = effective_number(&v, out->noise_factor);
     }
     if (!s && model_mm > 0) s = add_model(p, &v, model_mm, out->model, err);
     dispose_near(&v);
@@ -328,7 +350,7 @@ static sdm_status of_voxels(const fit_problem *p, double model_mm, fit_scatter *
 sdm_status sdm_fit_scatter_create(const fit_problem *p, double model_mm, fit_scatter *out, sdm_error *err)
 {
     const size_t n = p->sums.n_unknowns;
-    *out = (fit_scatter){.noise_factor = 1};
+    *out = (fit_scatter){.noise_factor = 1, .effective = (double)p->sites.n};
     sdm_status s = SDM_ALLOC(&out->noise, n * n, "covariance of the score", err);
     if (!s) s = SDM_ALLOC(&out->model, n * n, "covariance of the score", err);
     if (!s && p->target->kind == SDM_FIT_POINTS)

@@ -8,6 +8,7 @@ typedef struct fit_scatter {
     double *noise;       // [n_unknowns][n_unknowns] of the residuals
     double *model;       // [n_unknowns][n_unknowns] of an error of the map of 1 mm (rms)
     double noise_factor; // sum of the correlations of a residual with all others
+    double effective;    // number of independent residuals that the surface is worth
 } fit_scatter;
 
 /* At problem->state, from its sites. model_mm: edge of the cubes within which the error of a network's map is

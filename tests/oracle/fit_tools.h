@@ -87,6 +87,15 @@ static inline sdm_fit_opts near_start(void)
     return o;
 }
 
+static inline sdm_fit_result fit(const sdm_fit_target *t, const sdm_fit_opts *o)
+{
+    const sdm_fit_source source = exact_source();
+    sdm_fit_result r;
+    sdm_error err = {0};
+    if (sdm_fit(&source, t, o, &r, &err)) fail_msg("%s", err.text);
+    return r;
+}
+
 /* Errors in the order of the covariance: parameters, small turn about the world's axes, translation. */
 static inline void errors(const sdm_fit_result *r, const double *p, const sdm_pose *pose, double *e)
 {

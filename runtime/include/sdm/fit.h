@@ -107,7 +107,9 @@ typedef struct sdm_fit_opts {
     bool keep_params;    /* true: pose alone */
     bool keep_pose;      /* true: parameters alone */
 
-    double prior_sd;             /* of each parameter, in units of half of its range about the middle; 0: none */
+    double
+        prior_sd; /* of each parameter, in units of half of its range about the middle; 0: none. Priors meet a likelihood that
+                        counts every voxel as independent: they weigh less than they say, by sdm_fit_result.noise_factor */
     double prior_rotation_sd;    /* rad, about the start pose; 0: none. With turns: about the turn chosen */
     double prior_translation_sd; /* mm, about the start pose; 0: none */
 
@@ -117,8 +119,10 @@ typedef struct sdm_fit_opts {
     double box_min[3], box_max[3];
     double least_inside; /* 0 .. 1: share of the volume of the fitted shape that must lie in the image */
 
-    size_t max_iterations;        /* of the main phase, >= 1 */
-    size_t max_polish_iterations; /* with the exact engine, after a network's fit; 0: none */
+    size_t max_iterations; /* of the main phase, >= 1 */
+    size_t
+        max_polish_iterations; /* with the exact engine, after a network's fit; 0: none, 40 are enough. The distance to a mesh has
+                                     creases: steps that gain nothing any more end a phase too */
     double eps; /* > 0: a phase ends when the largest step is below: share of a parameter's range, rad, share of the
                           shape's size */
     double polish_eps;                                       /* > 0: the same with exact maps */

@@ -128,6 +128,9 @@ static sdm_status choose_lowest(spectrum *m, sdm_error *err)
         if (!(s = SDM_ALLOC(&m->basis[b], size, "local bases", err)))
             memcpy(m->basis[b], m->lowest + t->blocks[b].voxel * m->keep, size * sizeof **m->basis);
     }
+    // on fine grids these are gigabytes, most of them not chosen
+    sdm_free(m->lowest);
+    m->lowest = NULL;
     return s;
 }
 
@@ -295,8 +298,11 @@ static sdm_status collect(spectrum *m, sdm_error *err)
     t->matrix_at[n_blocks] = count;
     t->arch.n_coefficients = ranks_of(t, levels->first[levels->n - 1], n_blocks);
     if ((s = SDM_ALLOC(&t->basis, count, "local bases", err))) return s;
-    for (size_t b = 0; b < n_blocks; b++)
+    for (size_t b = 0; b < n_blocks; b++) {
         memcpy(t->basis + t->matrix_at[b], m->basis[b], (t->matrix_at[b + 1] - t->matrix_at[b]) * sizeof *t->basis);
+        sdm_free(m->basis[b]);
+        m->basis[b] = NULL;
+    }
     return SDM_OK;
 }
 

@@ -186,6 +186,15 @@ sdm_status sdm_generate(const sdm_model *m, const double *params, const sdm_gene
     return sdm_generate_batch(m, params, 1, opts, values, result, err);
 }
 
+// options and parameters of one map: *used[n_params] is what the network is to be asked for (sdm_free(), also after an error)
+static sdm_status prepare(const sdm_model *m, const double *params, const sdm_generate_opts *o, double **used,
+                          sdm_result *found, sdm_error *err)
+{
+    sdm_status s = check_options(m, o, err);
+    if (!s) s = SDM_ALLOC(used, sdm_model_get_info(m)->n_params, "parameters", err);
+    return s ? s : check_params(m, params, o, *used, found, err);
+}
+
 // map and derivatives at checked parameters
 static sdm_status jacobian_at(const sdm_model *m, const double *params, const double *used, const sdm_generate_opts *o,
                               float *values, float *jacobian, sdm_result *result, sdm_error *err)
@@ -211,11 +220,9 @@ sdm_status sdm_generate_jacobian(const sdm_model *m, const double *params, const
     if (!m || !params || !values || !jacobian)
         return sdm_fail(err, SDM_E_ARG, "generate: model, parameters, values and jacobian are needed");
     const sdm_generate_opts o = options_or_default(opts);
-    sdm_status s = check_options(m, &o, err);
     double *used = NULL;
     sdm_result found = {0};
-    if (!s) s = SDM_ALLOC(&used, sdm_model_get_info(m)->n_params, "parameters", err);
-    if (!s) s = check_params(m, params, &o, used, &found, err);
+    sdm_status s = prepare(m, params, &o, &used, &found, err);
     if (!s) s = jacobian_at(m, params, used, &o, values, jacobian, &found, err);
     if ((!s || s == SDM_E_QUALITY) && result) *result = found;
     sdm_free(used);
@@ -248,13 +255,9 @@ static sdm_status jvp_at(const sdm_model *m, const double *params, const double 
     }
     if (s || result->source == SDM_SOURCE_NETWORK) return s;
     const sdm_model_info *info = sdm_model_get_info(m);
-    const size_t voxels = sdm_grid_count(&info->grid);
     float *jacobian = NULL;
-    if (!(s = exact_jacobian(m, params, o, values, &jacobian, err))) {
-        memset(tangent, 0, voxels * sizeof *tangent);
-        for (size_t i = 0; i < info->n_params; i++)
-            for (size_t v = 0; v < voxels; v++) tangent[v] += (float)direction[i] * jacobian[i * voxels + v];
-    }
+    s = exact_jacobian(m, params, o, values, &jacobian, err);
+    if (!s) sdm_jacobian_times(jacobian, info->n_params, sdm_grid_count(&info->grid), direction, tangent);
     sdm_free(jacobian);
     return s;
 }
@@ -270,13 +273,9 @@ static sdm_status vjp_at(const sdm_model *m, const double *params, const double 
         return s;
     }
     const sdm_model_info *info = sdm_model_get_info(m);
-    const size_t voxels = sdm_grid_count(&info->grid);
     float *jacobian = NULL;
     const sdm_status s = exact_jacobian(m, params, o, NULL, &jacobian, err);
-    for (size_t i = 0; i < info->n_params && !s; i++) {
-        gradient[i] = 0;
-        for (size_t v = 0; v < voxels; v++) gradient[i] += (double)adjoint[v] * jacobian[i * voxels + v];
-    }
+    if (!s) sdm_jacobian_transposed_times(jacobian, info->n_params, sdm_grid_count(&info->grid), adjoint, gradient);
     sdm_free(jacobian);
     return s;
 }
@@ -288,11 +287,9 @@ sdm_status sdm_generate_jvp(const sdm_model *m, const double *params, const doub
     if (!m || !params || !direction || !values || !tangent)
         return sdm_fail(err, SDM_E_ARG, "generate: model, parameters, direction, values and tangent are needed");
     const sdm_generate_opts o = options_or_default(opts);
-    sdm_status s = check_options(m, &o, err);
     double *used = NULL;
     sdm_result found = {0};
-    if (!s) s = SDM_ALLOC(&used, sdm_model_get_info(m)->n_params, "parameters", err);
-    if (!s) s = check_params(m, params, &o, used, &found, err);
+    sdm_status s = prepare(m, params, &o, &used, &found, err);
     if (!s) s = jvp_at(m, params, used, direction, &o, values, tangent, &found, err);
     if ((!s || s == SDM_E_QUALITY) && result) *result = found;
     sdm_free(used);
@@ -305,11 +302,9 @@ sdm_status sdm_generate_vjp(const sdm_model *m, const double *params, const floa
     if (!m || !params || !adjoint || !gradient)
         return sdm_fail(err, SDM_E_ARG, "generate: model, parameters, adjoint and gradient are needed");
     const sdm_generate_opts o = options_or_default(opts);
-    sdm_status s = check_options(m, &o, err);
     double *used = NULL;
     sdm_result found = {0};
-    if (!s) s = SDM_ALLOC(&used, sdm_model_get_info(m)->n_params, "parameters", err);
-    if (!s) s = check_params(m, params, &o, used, &found, err);
+    sdm_status s = prepare(m, params, &o, &used, &found, err);
     if (!s) s = vjp_at(m, params, used, adjoint, &o, gradient, &found, err);
     if (!s && result) *result = found;
     sdm_free(used);

@@ -136,7 +136,7 @@ static sdm_status build(const trainer *t, const sdm_model_info *info, uint8_t **
         spec.weights.layer[l] = mlp_layer(&t->arch, w, l);
         spec.weights.bias[l] = mlp_bias(&t->arch, w, l);
     }
-    return sdm_model_build(&spec, bytes, size, err);
+    return sdm_pod_build(&spec, bytes, size, err);
 }
 
 static void dispose(trainer *t)

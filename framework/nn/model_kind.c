@@ -48,12 +48,9 @@ void sdm_model_jvp(const sdm_model *m, const double *params, const double *direc
         m->kind->jvp(m, params, direction, values, tangent, scratch, 1);
         return;
     }
-    const size_t voxels = sdm_grid_count(&m->info.grid);
     float *jacobian = scratch;
     m->kind->jacobian(m, params, values, jacobian, (uint8_t *)scratch + jacobian_bytes(m), 1);
-    memset(tangent, 0, voxels * sizeof *tangent);
-    for (size_t i = 0; i < m->info.n_params; i++)
-        for (size_t v = 0; v < voxels; v++) tangent[v] += (float)direction[i] * jacobian[i * voxels + v];
+    sdm_jacobian_times(jacobian, m->info.n_params, sdm_grid_count(&m->info.grid), direction, tangent);
 }
 
 size_t sdm_model_vjp_scratch_bytes(const sdm_model *m)
@@ -72,10 +69,7 @@ void sdm_model_vjp(const sdm_model *m, const double *params, const float *adjoin
     const size_t voxels = sdm_grid_count(&m->info.grid), bytes = (voxels * sizeof(float) + 63) / 64 * 64;
     float *jacobian = scratch, *values = (float *)(void *)((uint8_t *)scratch + jacobian_bytes(m));
     m->kind->jacobian(m, params, values, jacobian, (uint8_t *)scratch + jacobian_bytes(m) + bytes, 1);
-    for (size_t i = 0; i < m->info.n_params; i++) {
-        gradient[i] = 0;
-        for (size_t v = 0; v < voxels; v++) gradient[i] += (double)adjoint[v] * jacobian[i * voxels + v];
-    }
+    sdm_jacobian_transposed_times(jacobian, m->info.n_params, voxels, adjoint, gradient);
 }
 
 size_t sdm_model_scratch_bytes_threads(const sdm_model *m, size_t n, int n_threads)

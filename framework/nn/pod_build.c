@@ -70,7 +70,7 @@ static void pack_weights(const sdm_pod_spec *spec, const size_t *at, void *mlp, 
     }
 }
 
-sdm_status sdm_model_build(const sdm_pod_spec *spec, uint8_t **bytes, size_t *size, sdm_error *err)
+sdm_status sdm_pod_build(const sdm_pod_spec *spec, uint8_t **bytes, size_t *size, sdm_error *err)
 {
     const sdm_pod_arch *a = &spec->arch;
     const size_t weight = spec->half ? sizeof(uint16_t) : sizeof(float), n_blocks = a->levels.first[a->levels.n];

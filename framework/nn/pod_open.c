@@ -125,8 +125,13 @@ static sdm_status open_network(sdm_model *m, sdm_lines *lines, const sdm_section
     s = read_architecture(lines, m->info.n_params, k, err);
     if (!s) s = set_up(ranks, &m->info.grid, k, err);
     if (!s) s = bind_weights(sections, n, m, err);
-    if (!s) m->info.macs = macs(k);
-    return s;
+    if (s) return s;
+    m->info.macs = macs(k);
+    // every weight is used once in a map: fewer bytes mean that a size above passed the end of size_t
+    if (m->info.macs * (k->half ? sizeof(uint16_t) : sizeof(float)) > (double)m->info.weight_bytes)
+        return sdm_fail(err, SDM_E_FORMAT, "damaged: %zu bytes of weights for %.0f of them", m->info.weight_bytes,
+                        m->info.macs);
+    return SDM_OK;
 }
 
 static void dispose(void *network)

@@ -100,7 +100,7 @@ static sdm_model *open_toy(const toy *t)
     uint8_t *bytes;
     size_t size;
     sdm_model *m;
-    assert_int_equal(sdm_model_build(&t->spec, &bytes, &size, NULL), SDM_OK);
+    assert_int_equal(sdm_pod_build(&t->spec, &bytes, &size, NULL), SDM_OK);
     assert_int_equal(sdm_model_open_memory("toy", bytes, size, &m, NULL), SDM_OK);
     sdm_free(bytes);
     return m;
@@ -327,7 +327,7 @@ static void file_keeps_everything(void **state)
     size_t size;
     sdm_model *m;
     sdm_error e;
-    assert_int_equal(sdm_model_build(&t.spec, &bytes, &size, &e), SDM_OK);
+    assert_int_equal(sdm_pod_build(&t.spec, &bytes, &size, &e), SDM_OK);
     char path[] = "model_XXXXXX";
     close(mkstemp(path));
     assert_int_equal(sdm_container_write(path, bytes, size, &e), SDM_OK);
@@ -371,7 +371,7 @@ static void damage_is_refused(void **state)
     make(&t, true, 0);
     uint8_t *bytes;
     size_t size;
-    assert_int_equal(sdm_model_build(&t.spec, &bytes, &size, NULL), SDM_OK);
+    assert_int_equal(sdm_pod_build(&t.spec, &bytes, &size, NULL), SDM_OK);
     const size_t header = 24 + 8 * 48 + 8;
     // cut off at every byte of the header and a sample of the rest
     for (size_t n = 0; n < size; n += n < header + 64 ? 1 : 97) expect_refused(bytes, n, "truncation", n);
@@ -438,7 +438,7 @@ static void every_allocation_may_fail(void **state)
     unsigned long n = 1;
     for (; s; n++) { // build
         sdm_alloc_fail_after(n);
-        s = sdm_model_build(&t.spec, &bytes, &size, &e);
+        s = sdm_pod_build(&t.spec, &bytes, &size, &e);
         if (s) assert_int_equal(s, SDM_E_NOMEM);
         assert_true(n < 100);
     }

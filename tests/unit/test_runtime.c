@@ -124,7 +124,7 @@ static sdm_model *model_of(const char *second_name)
     size_t size;
     sdm_error err;
     sdm_model *m = NULL;
-    if (sdm_model_build(&spec, &bytes, &size, &err)) fail_msg("%s", err.text);
+    if (sdm_pod_build(&spec, &bytes, &size, &err)) fail_msg("%s", err.text);
     if (sdm_model_open_memory("ball", bytes, size, &m, &err)) fail_msg("%s", err.text);
     sdm_free(bytes);
     return m;

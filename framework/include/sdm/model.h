@@ -42,7 +42,7 @@ typedef struct sdm_model_info {
     int64_t train_samples; /* exact maps seen */
     uint64_t checksum;     /* of the whole file */
     size_t file_bytes, weight_bytes;
-    double macs; /* multiply-adds of one map */
+    double macs;        /* multiply-adds of one map */
     const char *config; /* resolved config, YAML */
 } sdm_model_info;
 
@@ -84,6 +84,12 @@ SDM_API void sdm_model_jvp(const sdm_model *m, const double *params, const doubl
 SDM_API size_t sdm_model_vjp_scratch_bytes(const sdm_model *m);
 SDM_API void sdm_model_vjp(const sdm_model *m, const double *params, const float *adjoint, double *gradient,
                            void *scratch);
+
+/* tangent[n] = J direction[P], and gradient[P] = J^T adjoint[n], for a Jacobian J[P][n] that is there. [any thread] */
+SDM_API void sdm_jacobian_times(const float *jacobian, size_t n_params, size_t n, const double *direction,
+                                float *tangent);
+SDM_API void sdm_jacobian_transposed_times(const float *jacobian, size_t n_params, size_t n, const float *adjoint,
+                                           double *gradient);
 
 /* The functions below share each map among n_threads >= 1 threads, with the same bits for any number. True: a map is work enough for
    that; otherwise several maps are better given to a thread each. */

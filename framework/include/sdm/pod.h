@@ -111,7 +111,7 @@ typedef struct sdm_pod_spec {
 } sdm_pod_spec;
 
 /* Builds a model file in memory (sdm_free()); write it with sdm_container_write(). SDM_E_NOMEM. */
-SDM_API sdm_status sdm_model_build(const sdm_pod_spec *spec, uint8_t **bytes, size_t *size, sdm_error *err);
+SDM_API sdm_status sdm_pod_build(const sdm_pod_spec *spec, uint8_t **bytes, size_t *size, sdm_error *err);
 
 #ifdef __cplusplus
 }

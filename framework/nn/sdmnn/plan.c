@@ -37,7 +37,7 @@ sdm_status sdm_sdmnn_check(const sdm_sdmnn_arch *a, sdm_error *err)
         if (n[i] < 1 || n[i] > 1048576) return sdm_fail(err, SDM_E_ARG, "%zu voxels: need 1 .. 1048576", n[i]);
     // far below the largest size_t, so that nothing below overflows; memory is asked for later
     const double all = 16.0 * ((double)n[0] + 2) * ((double)n[1] + 2) * ((double)n[2] + 2) * ((double)a->channels + 1);
-    if (!(all < 0x1p44))
+    if (!(all < fmin(0x1p44, (double)(SIZE_MAX / 16))))
         return sdm_fail(err, SDM_E_ARG, "%zu x %zu x %zu voxels and %zu channels are too much for one network", n[0],
                         n[1], n[2], a->channels);
     for (size_t l = 0; l < a->depth; l++) {

@@ -1,6 +1,7 @@
 /* The head by least squares: the best linear layer from the latent variables to the coefficients of the highest level. */
 #include <string.h>
 
+#include "coefficients.h"
 #include "linalg.h"
 #include "mlp.h"
 #include "sdm/kernels.h"
@@ -108,7 +109,7 @@ sdm_status head_solve(const trainer *t, const float *w, float *head, sdm_error *
     if (!s) s = all_latent(t, w, n, z, err);
     for (size_t at = 0; at < n && !s; at += CHUNK) {
         const size_t rows = n - at < CHUNK ? n - at : CHUNK;
-        if ((s = bases_coefficients(t, false, slots + at, rows, y, err))) break;
+        if ((s = coefficients_of(t, false, slots + at, rows, y, err))) break;
         sdm_gemm(latents, k, rows, (sdm_view){z + at * latents, 1, latents}, (sdm_view){y, k, 1}, at > 0, right, k,
                  trainer_threads(t));
     }

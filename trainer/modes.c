@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "coefficients.h"
 #include "linalg.h"
 #include "sdm/kernels.h"
 #include "sdm/memory.h"
@@ -45,7 +46,7 @@ sdm_status modes_project(trainer *t, const size_t *slots, size_t n, sdm_error *e
     if (!s) s = SDM_ALLOC(&c, n * r, "projection", err);
     if (!s) s = SDM_ALLOC(&phi, n * t->n_poly, "projection", err);
     if (!s) s = SDM_ALLOC(&targets, n, "projection", err);
-    if (!s) s = bases_coefficients(t, false, slots, n, y, err);
+    if (!s) s = coefficients_of(t, false, slots, n, y, err);
     for (size_t i = 0; i < n && !s; i++) {
         float *row = t->phi + slots[i] * t->n_poly;
         trainer_phi(t, t->data.params + slots[i] * t->data.n_params, row);
@@ -106,7 +107,7 @@ static sdm_status project_holdout(trainer *t, sdm_error *err)
     if (!s) s = SDM_ALLOC(&c, h * r, "held-out targets", err);
     if (!s) s = SDM_ALLOC(&targets, h, "held-out targets", err);
     if (!s) s = bases_slots(h, &slots, err);
-    if (!s) s = bases_coefficients(t, true, slots, h, y, err);
+    if (!s) s = coefficients_of(t, true, slots, h, y, err);
     if (!s) {
         to_modes(t, h, y, c);
         double energy = 0;
@@ -150,7 +151,7 @@ sdm_status modes_make(trainer *t, size_t n, sdm_error *err)
     if (!s) s = SDM_ALLOC(&t->holdout_phi, t->data.n_holdout * t->n_poly, "held-out inputs", err);
     if (!s) s = SDM_ALLOC(&t->holdout_target, t->data.n_holdout * r, "held-out targets", err);
     if (!s) s = bases_slots(n, &slots, err);
-    if (!s) s = bases_coefficients(t, false, slots, n, y, err);
+    if (!s) s = coefficients_of(t, false, slots, n, y, err);
     for (size_t j = 0; j < k && !s; j++) {
         double sum = 0;
         for (size_t i = 0; i < n; i++) sum += (double)y[i * k + j] * y[i * k + j];

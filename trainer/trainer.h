@@ -93,8 +93,6 @@ void trainer_phi(const trainer *t, const double *p, float *phi);
 
 /* bases.c: mean and local bases, then modes_make(). */
 sdm_status bases_make(trainer *t, sdm_error *err);
-/* y[n][K]: coefficients of the maps in slots[n], or of held-out maps of those numbers. */
-sdm_status bases_coefficients(const trainer *t, bool holdout, const size_t *slots, size_t n, float *y, sdm_error *err);
 /* 0 .. n - 1; freed with sdm_free(). */
 sdm_status bases_slots(size_t n, size_t **slots, sdm_error *err);
 void bases_dispose(trainer *t);

@@ -13,8 +13,9 @@
 
 // maps of one slice of a batch: fixed, so that how a map is computed does not depend on the number of threads
 #define SLICE 24u
-// threads that share one map at most
-#define SHARED 256u
+// threads that share one map: at most, and multiply-adds that are worth one more (some 50 us)
+#define SHARED 256
+#define SHARE_MACS 1e6
 
 static int thread_count(int wanted, size_t most)
 {
@@ -26,6 +27,13 @@ static int thread_count(int wanted, size_t most)
     (void)most;
     return 1;
 #endif
+}
+
+// threads for a map that is shared
+static int sharing_threads(const sdm_model *m, int wanted)
+{
+    const double most = fmin(1 + sdm_model_get_info(m)->macs / SHARE_MACS, SHARED);
+    return thread_count(wanted, (size_t)most);
 }
 
 static int thread_index(void)
@@ -112,7 +120,7 @@ static sdm_status forward_batch(const sdm_model *m, const double *used, const sd
     const sdm_model_info *info = sdm_model_get_info(m);
     const size_t voxels = sdm_grid_count(&info->grid), slices = (n + SLICE - 1) / SLICE;
     // threads take slices, or share the maps of one slice after the other
-    const int all = thread_count(wanted, SHARED), inner = n == 1 || sdm_model_is_threaded(m) ? all : 1;
+    const int all = sharing_threads(m, wanted), inner = n == 1 || sdm_model_is_threaded(m) ? all : 1;
     const int threads = inner > 1 ? 1 : thread_count(wanted, slices);
     const size_t bytes = (sdm_model_scratch_bytes_threads(m, n < SLICE ? n : SLICE, inner) + 63) / 64 * 64;
     uint8_t *scratch = NULL;
@@ -201,7 +209,7 @@ static sdm_status jacobian_at(const sdm_model *m, const double *params, const do
 {
     sdm_status s = SDM_OK;
     if (result->source == SDM_SOURCE_NETWORK) {
-        const int threads = thread_count(o->n_threads, SHARED);
+        const int threads = sharing_threads(m, o->n_threads);
         uint8_t *scratch = NULL;
         s = SDM_ALLOC(&scratch, sdm_model_jacobian_scratch_bytes_threads(m, threads), "memory of the network", err);
         if (!s) sdm_model_jacobian_threads(m, used, values, jacobian, scratch, threads);

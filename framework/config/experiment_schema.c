@@ -119,7 +119,11 @@ static const sdm_field VARIANT[] = {
 };
 
 #define R sdm_experiment_reference
-#define FIGURE(name, which, help_) ROW(R, name, SDM_FIELD_REAL, value[which], 0, 1e12, NULL, "", help_)
+#define FIGURE(name, which, help_)                                                                                     \
+    {                                                                                                                  \
+        .key = name, .type = SDM_FIELD_REAL, .offset = offsetof(R, value[which]), .max = 1e12, .shown_def = "none",    \
+        .unit = "", .help = help_                                                                                      \
+    }
 static const sdm_field REFERENCE[] = {
     TEXT(R, "row", row, SDM_EXPERIMENT_TITLE_MAX, "required", "title of the row it belongs to"),
     TEXT(R, "source", source, 256, "none", "where the figures come from"),

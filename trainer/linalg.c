@@ -9,8 +9,24 @@
 #include "sdm/rng.h"
 #include "streams.h"
 
-// reduces a to tridiagonal form (d diagonal, e sub-diagonal); a becomes the orthogonal transformation, in columns
-static void tridiagonalise(size_t n, double *a, double *d, double *e)
+// eight sums side by side: one would wait for itself
+static double dot(size_t n, const double *a, const double *b)
+{
+    double sum[8] = {0}, rest = 0;
+    size_t i = 0;
+    for (; i + 8 <= n; i += 8)
+        for (size_t j = 0; j < 8; j++) sum[j] += a[i + j] * b[i + j];
+    for (; i < n; i++) rest += a[i] * b[i];
+    return ((sum[0] + sum[4]) + (sum[1] + sum[5])) + ((sum[2] + sum[6]) + (sum[3] + sum[7])) + rest;
+}
+
+static void add_scaled(size_t n, double f, const double *x, double *y)
+{
+    for (size_t i = 0; i < n; i++) y[i] += f * x[i];
+}
+
+// reduces a to tridiagonal form (d diagonal, e sub-diagonal); a becomes the orthogonal transformation, in columns; work[n]
+static void tridiagonalise(size_t n, double *a, double *d, double *e, double *work)
 {
 #define A(i, j) a[(i)*n + (j)]
     for (size_t i = n - 1; i > 0; i--) {
@@ -30,13 +46,16 @@ static void tridiagonalise(size_t n, double *a, double *d, double *e)
         e[i] = scale * g0;
         h -= f0 * g0;
         A(i, i - 1) = f0 - g0;
+        // e = (lower triangle, mirrored) times row i, along memory
         double f = 0;
+        memset(e, 0, i * sizeof *e);
         for (size_t j = 0; j < i; j++) {
             A(j, i) = A(i, j) / h;
-            double g = 0;
-            for (size_t k = 0; k <= j; k++) g += A(j, k) * A(i, k);
-            for (size_t k = j + 1; k < i; k++) g += A(k, j) * A(i, k);
-            e[j] = g / h;
+            e[j] += dot(j + 1, &A(j, 0), &A(i, 0));
+            add_scaled(j, A(i, j), &A(j, 0), e);
+        }
+        for (size_t j = 0; j < i; j++) {
+            e[j] /= h;
             f += e[j] * A(i, j);
         }
         const double hh = f / (h + h);
@@ -50,11 +69,9 @@ static void tridiagonalise(size_t n, double *a, double *d, double *e)
     d[0] = e[0] = 0;
     for (size_t i = 0; i < n; i++) {
         if (d[i] != 0) {
-            for (size_t j = 0; j < i; j++) {
-                double g = 0;
-                for (size_t k = 0; k < i; k++) g += A(i, k) * A(k, j);
-                for (size_t k = 0; k < i; k++) A(k, j) -= g * A(k, i);
-            }
+            memset(work, 0, i * sizeof *work);
+            for (size_t k = 0; k < i; k++) add_scaled(i, A(i, k), &A(k, 0), work);
+            for (size_t k = 0; k < i; k++) add_scaled(i, -A(k, i), work, &A(k, 0));
         }
         d[i] = A(i, i);
         A(i, i) = 1;
@@ -114,9 +131,9 @@ static int ql(size_t n, double *d, double *e, double *v)
 sdm_status eigen_symmetric(size_t n, double *a, double *values, sdm_error *err)
 {
     double *e = NULL;
-    sdm_status s = SDM_ALLOC(&e, n, "eigenvalues", err);
+    sdm_status s = SDM_ALLOC(&e, 2 * n, "eigenvalues", err);
     if (s) return s;
-    tridiagonalise(n, a, values, e);
+    tridiagonalise(n, a, values, e, e + n);
     for (size_t i = 0; i < n; i++) {
         for (size_t j = 0; j < i; j++) {
             const double t = a[i * n + j];
@@ -151,8 +168,7 @@ size_t cholesky(size_t n, double *a)
         double *ai = a + i * n;
         for (size_t j = 0; j <= i; j++) {
             const double *aj = a + j * n;
-            double s = ai[j];
-            for (size_t k = 0; k < j; k++) s -= ai[k] * aj[k];
+            const double s = ai[j] - dot(j, ai, aj);
             if (j < i)
                 ai[j] = s / aj[j];
             else if (s > 0)
@@ -188,15 +204,14 @@ static void invert_lower(size_t k, const double *l, double *column, float *inver
     memset(inverse, 0, k * k * sizeof *inverse);
     for (size_t j = 0; j < k; j++) {
         for (size_t i = j; i < k; i++) {
-            double s = i == j;
-            for (size_t p = j; p < i; p++) s -= l[i * k + p] * column[p];
-            column[i] = s / l[i * k + i];
+            column[i] = ((i == j) - dot(i - j, l + i * k + j, column + j)) / l[i * k + i];
             inverse[i * k + j] = (float)column[i];
         }
     }
 }
 
-sdm_status orthonormalise(size_t k, size_t n, float *x, int n_threads, sdm_error *err)
+// rounds: each makes rows that depend on each other a thousand times less so
+static sdm_status orthonormal_rounds(size_t k, size_t n, float *x, int rounds, int n_threads, sdm_error *err)
 {
     float *gram = NULL, *old = NULL;
     double *l = NULL, *column = NULL;
@@ -204,7 +219,7 @@ sdm_status orthonormalise(size_t k, size_t n, float *x, int n_threads, sdm_error
     if (!s) s = SDM_ALLOC(&old, k * n, "orthonormal rows", err);
     if (!s) s = SDM_ALLOC(&l, k * k, "orthonormal rows", err);
     if (!s) s = SDM_ALLOC(&column, k, "orthonormal rows", err);
-    for (int round = 0; round < 4 && !s; round++) {
+    for (int round = 0; round < rounds && !s; round++) {
         // unit rows first: the shift is then relative to each of them
         for (size_t i = 0; i < k; i++) {
             double norm = 0;
@@ -232,6 +247,13 @@ sdm_status orthonormalise(size_t k, size_t n, float *x, int n_threads, sdm_error
     return s;
 }
 
+enum { ROUNDS = 4 };
+
+sdm_status orthonormalise(size_t k, size_t n, float *x, int n_threads, sdm_error *err)
+{
+    return orthonormal_rounds(k, n, x, ROUNDS, n_threads, err);
+}
+
 static void random_rows(size_t count, uint64_t seed, uint64_t stream, float *x)
 {
     for (size_t i = 0; i < count; i++) x[i] = (float)(sdm_rng_uniform(seed, stream, i) - 0.5);
@@ -255,7 +277,7 @@ sdm_status leading_eigenvectors(size_t n, const float *c, size_t k, uint64_t see
     for (int i = 0; i < ITERATIONS && !s; i++) {
         sdm_gemm(wide, n, n, (sdm_view){x, n, 1}, (sdm_view){c, n, 1}, false, y, n, 1);
         memcpy(x, y, wide * n * sizeof *x);
-        s = orthonormalise(wide, n, x, 1, err);
+        s = orthonormal_rounds(wide, n, x, i + 1 < ITERATIONS ? ROUNDS / 2 : ROUNDS, 1, err);
     }
     if (s) goto done;
     // Rayleigh-Ritz: the best vectors within the space
@@ -286,9 +308,9 @@ sdm_status leading_space(size_t m, size_t n, const float *y, size_t k, uint64_t 
     random_rows(k * n, seed, STREAM_BASES, rows);
     for (int i = 0; i < 4 && !s; i++) {
         sdm_gemm(k, m, n, (sdm_view){rows, n, 1}, (sdm_view){y, 1, n}, false, left, m, n_threads);
-        if ((s = orthonormalise(k, m, left, n_threads, err))) break;
+        if ((s = orthonormal_rounds(k, m, left, ROUNDS / 2, n_threads, err))) break;
         sdm_gemm(k, n, m, (sdm_view){left, m, 1}, (sdm_view){y, n, 1}, false, rows, n, n_threads);
-        s = orthonormalise(k, n, rows, n_threads, err);
+        s = orthonormal_rounds(k, n, rows, i + 1 < 4 ? ROUNDS / 2 : ROUNDS, n_threads, err);
     }
     sdm_free(left);
     return s;

@@ -51,19 +51,33 @@ enum { MC = 96, NC = 128, KC = 256 };
 
 static size_t least(size_t a, size_t b) { return a < b ? a : b; }
 
+// one full panel: packed[k][width]; width is a constant where this is inlined
+static inline void pack_panel(size_t width, size_t k, const float *src, size_t along, size_t deep, float *packed)
+{
+    for (size_t p = 0; p < k; p++, src += deep, packed += width)
+        for (size_t i = 0; i < width; i++) packed[i] = src[i * along];
+}
+
 // packed[panels][k][width] from a view, zero beyond `count`
 static void pack(size_t count, size_t k, const float *data, size_t along, size_t deep, size_t width, float *packed)
 {
     for (size_t i0 = 0; i0 < count; i0 += width, packed += k * width) {
         const size_t n = least(width, count - i0);
-        if (n < width) memset(packed, 0, k * width * sizeof *packed);
         const float *src = data + i0 * along;
-        if (along == 1) {
-            for (size_t p = 0; p < k; p++) memcpy(packed + p * width, src + p * deep, n * sizeof *src);
-        } else {
-            for (size_t i = 0; i < n; i++)
-                for (size_t p = 0; p < k; p++) packed[p * width + i] = src[i * along + p * deep];
-        }
+        if (n < width) {
+            memset(packed, 0, k * width * sizeof *packed);
+            for (size_t p = 0; p < k; p++)
+                for (size_t i = 0; i < n; i++) packed[p * width + i] = src[i * along + p * deep];
+        } else if (along == 1 && width == 16)
+            pack_panel(16, k, src, 1, deep, packed);
+        else if (along == 1 && width == 6)
+            pack_panel(6, k, src, 1, deep, packed);
+        else if (width == 16)
+            pack_panel(16, k, src, along, deep, packed);
+        else if (width == 6)
+            pack_panel(6, k, src, along, deep, packed);
+        else
+            pack_panel(width, k, src, along, deep, packed);
     }
 }
 

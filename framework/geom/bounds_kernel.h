@@ -27,59 +27,38 @@ static inline v8f length8(point8 w, point8 *unit)
     return d2 * inverse;
 }
 
-/* A point of the surface near the middle of each part: its distance d, the unit vector g from it to the middle, and what limit8() is
+/* What is known about eight parts: their middles p, a point of the surface near each in direction -g (unit vectors), and what limit8() is
    made of. */
-typedef struct reference8 {
-    _Alignas(32) float d[8], g[3][8], base[8], bend[8], most[8];
-    float band;
-} reference8;
-
-static inline void set_limits(const sdm_grid_job *job, const sdm_grid_parts *q, reference8 *n)
-{
-    const v8f d = v8_load(n->d), r = v8_all(q->radius);
-    v8_store(n->base, d + v8_all(4 * job->error) + (d + r) * v8_all(SDM_CULL));
-    v8_store(n->bend, r * r / (d + d + v8_all(SDM_TINY)));
-    // a corner is at most that much farther from the reference than the middle
-    v8f most = r;
-    if (job->aligned) {
-        const point8 g = p8_load((const float(*)[8])n->g);
-        const point8 w = {v8_fma(v8_abs(g.x), d, v8_all(q->half[0])), v8_fma(v8_abs(g.y), d, v8_all(q->half[1])),
-                          v8_fma(v8_abs(g.z), d, v8_all(q->half[2]))};
-        most = v8_min(most, v8_sqrt(p8_dot(w, w)) - d + d * v8_all(SDM_CULL));
-    }
-    v8_store(n->most, v8_max(most, v8_all(0)));
-    n->band = (job->band + q->radius) * (1 + SDM_CULL) + 4 * job->error;
-}
-
-/* p: the middles; at: the points of the surface. */
-static inline void set_reference(const sdm_grid_job *job, const sdm_grid_parts *q, point8 p, const float at[3][8],
-                                 reference8 *n)
-{
-    point8 g;
-    v8_store(n->d, length8(p8_sub(p, p8_load(at)), &g));
-    p8_store(n->g, g);
-    set_limits(job, q, n);
-}
-
-/* The same for one part after the other, or for eight parts at once. */
 typedef struct view8 {
     point8 p, g;
     v8f base, bend, most, band;
 } view8;
 
-static inline view8 view_all(const reference8 *n, point8 p)
+/* d: distances of the points. */
+static inline view8 view_from(const sdm_grid_job *job, const sdm_grid_parts *q, point8 p, v8f d, point8 g)
 {
-    return (view8){p, p8_load(n->g), v8_load(n->base), v8_load(n->bend), v8_load(n->most), v8_all(n->band)};
+    const v8f r = v8_all(q->radius);
+    // a corner is at most that much farther from the point than the middle
+    v8f most = r;
+    if (job->aligned) {
+        const point8 w = {v8_fma(v8_abs(g.x), d, v8_all(q->half[0])), v8_fma(v8_abs(g.y), d, v8_all(q->half[1])),
+                          v8_fma(v8_abs(g.z), d, v8_all(q->half[2]))};
+        most = v8_min(most, v8_sqrt(p8_dot(w, w)) - d + d * v8_all(SDM_CULL));
+    }
+    return (view8){.p = p,
+                   .g = g,
+                   .base = d + v8_all(4 * job->error) + (d + r) * v8_all(SDM_CULL),
+                   .bend = r * r / (d + d + v8_all(SDM_TINY)),
+                   .most = v8_max(most, v8_all(0)),
+                   .band = v8_all((job->band + q->radius) * (1 + SDM_CULL) + 4 * job->error)};
 }
 
-static inline view8 view_one(const reference8 *n, const sdm_points *middle, int i)
+/* at: the points of the surface. */
+static inline view8 view_of(const sdm_grid_job *job, const sdm_grid_parts *q, point8 p, const float at[3][8])
 {
-    return (view8){p8_all(middle->x[0][i], middle->x[1][i], middle->x[2][i]),
-                   p8_all(n->g[0][i], n->g[1][i], n->g[2][i]),
-                   v8_all(n->base[i]),
-                   v8_all(n->bend[i]),
-                   v8_all(n->most[i]),
-                   v8_all(n->band)};
+    point8 g;
+    const v8f d = length8(p8_sub(p, p8_load(at)), &g);
+    return view_from(job, q, p, d, g);
 }
 
 /* How far something convex must be from the middle of a part, in direction g, to be farther than the reference everywhere in it: at x

@@ -142,24 +142,33 @@ static double reach_of(const sdm_grid_job *job)
     return (reach + job->features->radius) * job->features->scale;
 }
 
+/* Index of a place in a tile or vector, x fastest. */
+static int64_t index_in(const int64_t size[3], const int64_t at[3])
+{
+    return (at[2] * size[1] + at[1]) * size[0] + at[0];
+}
+
 static void set_voxels(sdm_grid_job *job, const sdm_grid_parts *in_vector)
 {
-    const int64_t *tile = job->part[SDM_TO_TILES].size;
+    const sdm_grid_parts *tiles = &job->part[SDM_TO_TILES], *vectors = &job->part[SDM_TO_VECTORS];
     for (int v = 0; v < 8; v++) {
         for (int i = 0; i < 8; i++) {
-            const int64_t *p = job->part[SDM_TO_VECTORS].first[v], *q = in_vector->first[i];
-            const int64_t index = ((p[2] + q[2]) * tile[1] + p[1] + q[1]) * tile[0] + p[0] + q[0];
-            double at[3], from_middle[3], x[3], y[3];
+            int64_t in_tile[3];
+            double at[3], x[3];
             for (int a = 0; a < 3; a++) {
-                at[a] = (double)(p[a] + q[a]);
-                from_middle[a] = at[a] - 0.5 * (double)(tile[a] - 1);
+                in_tile[a] = vectors->first[v][a] + in_vector->first[i][a];
+                at[a] = (double)in_tile[a];
             }
+            const int64_t index = index_in(tiles->size, in_tile);
             offset(job, at, x);
-            offset(job, from_middle, y);
             job->voxel_in_tile[v][i] = (uint8_t)index;
-            for (int c = 0; c < 3; c++) {
-                job->tile_voxel[c][index] = x[c];
-                job->voxel[v].x[c][i] = (float)(y[c] * job->features->scale);
+            for (int c = 0; c < 3; c++) job->tile_voxel[c][index] = x[c];
+            for (int t = 0; t < 8; t++) {
+                for (int c = 0; c < 3; c++) {
+                    const double middle = tiles->middle_mm[t][c] + vectors->middle_mm[v][c];
+                    job->vector[t].x[c][v] = (float)(middle * job->features->scale);
+                    job->voxel[t][v].x[c][i] = (float)((middle + in_vector->middle_mm[i][c]) * job->features->scale);
+                }
             }
         }
     }

@@ -1,6 +1,6 @@
 /* One distance map as the kernels see it. The grid is cut into boxes of 16 x 16 x 16 voxels (for equal spacings), a box into 8 blocks,
-   a block into 8 tiles, a tile into 8 vectors of 8 voxels. Float positions are relative to sdm_features.centre or to the middle of a
-   tile, lengths multiplied by sdm_features.scale. */
+   a block into 8 tiles, a tile into 8 vectors of 8 voxels. Float positions are relative to sdm_features.centre, from the features of a
+   block on to its middle; lengths are multiplied by sdm_features.scale. */
 #ifndef SDM_GEOM_GRID_JOB_H
 #define SDM_GEOM_GRID_JOB_H
 
@@ -42,7 +42,8 @@ typedef struct sdm_grid_job {
     float band;        /* distances beyond it become it; INFINITY: none */
     double band_mm;
     sdm_grid_parts part[SDM_GRID_STEPS];
-    sdm_points voxel[8];                   /* of each vector, relative to the middle of the tile */
+    sdm_points vector[8];                  /* middles of the vectors of each tile, relative to that of the block */
+    sdm_points voxel[8][8];                /* [tile][vector] of each vector, the same */
     uint8_t voxel_in_tile[8][8];           /* [vector][lane] number of the voxel in its tile, x fastest */
     _Alignas(64) double tile_voxel[3][64]; /* voxels of a tile relative to its first, mm */
     uint8_t lanes_of[256][8];              /* the lanes of a mask in order */
@@ -50,41 +51,53 @@ typedef struct sdm_grid_job {
     size_t limit;                          /* bytes of scratch a thread may take, 0: no limit */
 } sdm_grid_job;
 
-/* Clusters (numbers of nodes) and the parts that they concern. */
-typedef struct sdm_cluster_list {
-    uint32_t *node;
-    uint8_t *mask;
-    size_t n, cap;
-} sdm_cluster_list;
+/* A cluster, the tiles that it concerns, and the way from its middle to the block's. */
+typedef struct sdm_cluster_ref {
+    uint32_t node, mask;
+    float shift[3];
+} sdm_cluster_ref;
 
-enum { SDM_FACES, SDM_EDGES, SDM_CORNERS, SDM_FEATURE_KINDS };
+enum { SDM_FACES, SDM_THIN_FACES, SDM_EDGES, SDM_CORNERS, SDM_FEATURE_KINDS };
 
-/* Features by kind. */
+enum { SDM_CLUSTERS }; /* the one kind of what a block has */
+
+/* What concerns a part, kind after kind: nodes of clusters, or places in sdm_grid_scratch.row. Kinds begin at multiples of eight. */
 typedef struct sdm_candidates {
-    uint32_t *list[SDM_FEATURE_KINDS];
-    size_t n[SDM_FEATURE_KINDS];
+    uint32_t *list;
+    size_t begin[SDM_FEATURE_KINDS], end[SDM_FEATURE_KINDS];
 } sdm_candidates;
 
-/* Scratch of one thread. */
+/* A feature as eight vectors see it: how far it is from their middles, in which direction these lie from it. */
+typedef struct sdm_sight {
+    _Alignas(32) float d[8], g[3][8];
+} sdm_sight;
+
+/* Scratch of one thread. hit: the parts that a thing concerns, see list_hits(). */
 typedef struct sdm_grid_scratch {
-    sdm_cluster_list box, block; /* clusters of the box at hand for its blocks, of the block for its tiles */
-    sdm_candidates tile[8];      /* features of the tiles of the block, by number */
-    size_t tile_cap;             /* groups */
-    /* the tile at hand: groups of eight features, their functions relative to its middle */
-    sdm_feature_group *local; /* of a corner g[0] is the corner */
-    uint32_t *number;         /* [8 groups] numbers of the features */
-    uint8_t *thin;            /* [group] lanes of thin faces */
-    float (*distance)[8][8];  /* [group][vector][lane] */
-    uint8_t (*hit)[8];        /* [group][vector] lanes whose region meets the vector */
-    sdm_candidates vector[8]; /* lanes: 8 group + lane */
-    float (*value)[8];        /* squared distances of the candidates of a vector */
-    size_t local_cap;         /* groups */
+    /* clusters of the box at hand */
+    uint32_t *node;
+    uint8_t *node_hit;
+    sdm_candidates block[8];
+    sdm_cluster_ref *cluster; /* of the block at hand */
+    size_t n_cluster, cluster_cap;
+    /* features of the block at hand, relative to its middle; of a corner g[.][3] is the corner */
+    sdm_feature_row *row;
+    uint32_t *number, *from; /* from: place of the feature's cluster in cluster[] */
+    uint8_t *row_hit;
+    sdm_candidates tile[8];
+    size_t row_cap;
+    /* features of the tile at hand, as in its list */
+    sdm_sight *sight;
+    uint8_t *hit;
+    sdm_candidates vector[8];
+    float (*value)[8]; /* squared distances of the candidates of a vector, as in its list */
+    size_t tile_cap;
 } sdm_grid_scratch;
 
-/* Room for `cap` clusters; for the features of a block of `groups` groups; for a tile of `groups` groups. limit: of bytes, 0: none. */
-sdm_status sdm_cluster_list_reserve(sdm_cluster_list *l, size_t cap, sdm_error *err);
-sdm_status sdm_grid_scratch_block(sdm_grid_scratch *s, size_t groups, size_t limit, sdm_error *err);
-sdm_status sdm_grid_scratch_tile(sdm_grid_scratch *s, size_t groups, size_t limit, sdm_error *err);
+/* Room for `cap` clusters of a box, features of a block, of a tile. limit: of bytes, 0: none. */
+sdm_status sdm_grid_scratch_box(sdm_grid_scratch *s, size_t cap, sdm_error *err);
+sdm_status sdm_grid_scratch_block(sdm_grid_scratch *s, size_t cap, size_t limit, sdm_error *err);
+sdm_status sdm_grid_scratch_tile(sdm_grid_scratch *s, size_t cap, size_t limit, sdm_error *err);
 void sdm_grid_scratch_dispose(sdm_grid_scratch *s);
 
 /* Unsigned distances of the boxes (0 .. n_box[0], by, bz). The nearest feature is found in float with a margin for rounding and

@@ -1,4 +1,4 @@
-/* Eight floats or four doubles at once: vector extensions of the compiler, with intrinsics where they say more. */
+/* Eight or four floats or four doubles at once: vector extensions of the compiler, with intrinsics where they say more. */
 #ifndef SDM_GEOM_LANES_H
 #define SDM_GEOM_LANES_H
 
@@ -11,24 +11,31 @@
 
 typedef float v8f __attribute__((vector_size(32)));
 typedef int32_t v8i __attribute__((vector_size(32)));
+typedef float v4f __attribute__((vector_size(16)));
+typedef int32_t v4i __attribute__((vector_size(16)));
 typedef double v4d __attribute__((vector_size(32)));
 typedef int64_t v4l __attribute__((vector_size(32)));
 
 static inline v8f v8_load(const float *p) { return *(const v8f *)(const void *)p; }
 static inline void v8_store(float *p, v8f x) { *(v8f *)(void *)p = x; }
+static inline v8i v8_load_i(const uint32_t *p)
+{
+    v8i x;
+    memcpy(&x, p, sizeof x);
+    return x;
+}
+static inline void v8_store_i(uint32_t *p, v8i x) { memcpy(p, &x, sizeof x); }
 static inline v8f v8_all(float x) { return (v8f){x, x, x, x, x, x, x, x}; }
 static inline v8i v8_all_i(int32_t x) { return (v8i){x, x, x, x, x, x, x, x}; }
 /* x, x + 1, ... */
 static inline v8i v8_from_i(int32_t x) { return v8_all_i(x) + (v8i){0, 1, 2, 3, 4, 5, 6, 7}; }
+static inline v4f f4_load(const float *p) { return *(const v4f *)(const void *)p; }
+static inline void f4_store(float *p, v4f x) { *(v4f *)(void *)p = x; }
+static inline v4f f4_all(float x) { return (v4f){x, x, x, x}; }
+static inline v4f f4_abs(v4f a) { return (v4f)((v4i)a & INT32_MAX); }
 static inline v4d v4_all(double x) { return (v4d){x, x, x, x}; }
 static inline v4d v4_load(const double *p) { return *(const v4d *)(const void *)p; }
 static inline void v4_store(double *p, v4d x) { *(v4d *)(void *)p = x; }
-/* All bits set where bit i of the mask is. */
-static inline v8i v8_lanes(unsigned mask)
-{
-    const v8i bit = {1, 2, 4, 8, 16, 32, 64, 128};
-    return (v8_all_i((int32_t)mask) & bit) == bit;
-}
 
 #if defined(__AVX2__) && defined(__FMA__)
 static inline v8f v8_max(v8f a, v8f b) { return (v8f)_mm256_max_ps((__m256)a, (__m256)b); }
@@ -39,6 +46,7 @@ static inline v8f v8_sqrt(v8f a) { return (v8f)_mm256_sqrt_ps((__m256)a); }
 static inline v8f v8_rsqrt(v8f a) { return (v8f)_mm256_rsqrt_ps((__m256)a); }
 /* a * b + c */
 static inline v8f v8_fma(v8f a, v8f b, v8f c) { return (v8f)_mm256_fmadd_ps((__m256)a, (__m256)b, (__m256)c); }
+static inline v4f f4_fma(v4f a, v4f b, v4f c) { return (v4f)_mm_fmadd_ps((__m128)a, (__m128)b, (__m128)c); }
 /* x where m is set, else y */
 static inline v8f v8_select(v8i m, v8f x, v8f y) { return (v8f)_mm256_blendv_ps((__m256)y, (__m256)x, (__m256)m); }
 static inline v8i v8_select_i(v8i m, v8i x, v8i y)
@@ -52,38 +60,17 @@ static inline int v8_greater(v8f a, v8f b)
 {
     return _mm256_movemask_ps(_mm256_cmp_ps((__m256)a, (__m256)b, _CMP_GT_OQ));
 }
+static inline int f4_greater(v4f a, v4f b) { return _mm_movemask_ps((__m128)(a > b)); }
 /* Turns the sign of a where that of m is set. */
 static inline v8f v8_turn(v8f a, v8f m)
 {
     return (v8f)_mm256_xor_ps((__m256)a, _mm256_and_ps((__m256)m, _mm256_set1_ps(-0.0f)));
-}
-static inline v8f v8_narrow(v4d lo, v4d hi)
-{
-    return (v8f)_mm256_set_m128(_mm256_cvtpd_ps((__m256d)hi), _mm256_cvtpd_ps((__m256d)lo));
 }
 /* Writes the lanes named by order[8] to out[8]. */
 static inline void v8_permute(uint32_t *out, v8i a, const uint8_t *order)
 {
     const __m256i which = _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)(const void *)order));
     _mm256_storeu_si256((__m256i *)(void *)out, _mm256_permutevar8x32_epi32((__m256i)a, which));
-}
-/* r[i][j] and r[j][i] change places. */
-static inline void v8_transpose(v8f r[8])
-{
-    __m256 a[8], b[8];
-    for (int i = 0; i < 8; i += 2) {
-        a[i] = _mm256_unpacklo_ps((__m256)r[i], (__m256)r[i + 1]);
-        a[i + 1] = _mm256_unpackhi_ps((__m256)r[i], (__m256)r[i + 1]);
-    }
-    for (int i = 0; i < 8; i += 4)
-        for (int j = 0; j < 2; j++) {
-            b[i + 2 * j] = _mm256_shuffle_ps(a[i + j], a[i + j + 2], 0x44);
-            b[i + 2 * j + 1] = _mm256_shuffle_ps(a[i + j], a[i + j + 2], 0xee);
-        }
-    for (int i = 0; i < 4; i++) {
-        r[i] = (v8f)_mm256_permute2f128_ps(b[i], b[i + 4], 0x20);
-        r[i + 4] = (v8f)_mm256_permute2f128_ps(b[i], b[i + 4], 0x31);
-    }
 }
 static inline v4d v4_signed(v4d m, v4d x, v4d y) { return (v4d)_mm256_blendv_pd((__m256d)y, (__m256d)x, (__m256d)m); }
 static inline void v4_transpose(v4d r[4])
@@ -110,6 +97,7 @@ static inline v8f v8_sqrt(v8f a)
 }
 static inline v8f v8_rsqrt(v8f a) { return 1 / v8_sqrt(a); }
 static inline v8f v8_fma(v8f a, v8f b, v8f c) { return a * b + c; }
+static inline v4f f4_fma(v4f a, v4f b, v4f c) { return a * b + c; }
 static inline v8f v8_signed(v8f m, v8f x, v8f y) { return v8_select((v8i)m < 0, x, y); }
 static inline int v8_greater(v8f a, v8f b)
 {
@@ -118,22 +106,15 @@ static inline int v8_greater(v8f a, v8f b)
     for (int i = 0; i < 8; i++) bits |= (m[i] & 1) << i;
     return bits;
 }
-static inline v8f v8_turn(v8f a, v8f m) { return (v8f)((v8i)a ^ ((v8i)m & INT32_MIN)); }
-static inline v8f v8_narrow(v4d lo, v4d hi)
+static inline int f4_greater(v4f a, v4f b)
 {
-    return (v8f){(float)lo[0], (float)lo[1], (float)lo[2], (float)lo[3],
-                 (float)hi[0], (float)hi[1], (float)hi[2], (float)hi[3]};
+    const v4i m = a > b;
+    return (m[0] & 1) | (m[1] & 2) | (m[2] & 4) | (m[3] & 8);
 }
+static inline v8f v8_turn(v8f a, v8f m) { return (v8f)((v8i)a ^ ((v8i)m & INT32_MIN)); }
 static inline void v8_permute(uint32_t *out, v8i a, const uint8_t *order)
 {
     for (int i = 0; i < 8; i++) out[i] = (uint32_t)a[order[i]];
-}
-static inline void v8_transpose(v8f r[8])
-{
-    v8f a[8];
-    for (int i = 0; i < 8; i++)
-        for (int j = 0; j < 8; j++) a[i][j] = r[j][i];
-    memcpy(r, a, sizeof a);
 }
 static inline v4d v4_signed(v4d m, v4d x, v4d y)
 {

@@ -16,7 +16,7 @@ sdm_status sdm_nearest_build(const sdm_mesh *m, const sdm_topology *topo, sdm_ne
         sdm_frame_build(&m->vert[3 * (size_t)v[0]], &m->vert[3 * (size_t)v[1]], &m->vert[3 * (size_t)v[2]],
                         &n->frames[i]);
     }
-    return sdm_features_build(m, topo, n->frames, n->tree.order, &n->features, err);
+    return sdm_features_build(m, topo, n->frames, &n->tree, &n->features, err);
 }
 
 void sdm_nearest_dispose(sdm_nearest *n)
@@ -72,13 +72,14 @@ double sdm_nearest_find(const sdm_nearest *n, const double x[3], double bound, u
 double sdm_nearest_feature(const sdm_nearest *n, const double x[3], uint32_t *slot)
 {
     const sdm_features *f = &n->features;
-    const uint32_t *number = f->of_slot[*slot];
+    const uint32_t *more = f->of_slot[*slot], face = *slot;
     double least = INFINITY;
-    for (int i = 0; i < 7; i++) {
-        const double d = sdm_feature_distance2(f, n->frames, number[i], x);
+    for (int i = -1; i < 6; i++) {
+        const uint32_t number = i < 0 ? face : more[i];
+        const double d = sdm_feature_distance2(f, n->frames, number, x);
         if (!(d < least)) continue;
         least = d;
-        *slot = f->owner[number[i]];
+        *slot = f->owner[number];
     }
     return least;
 }

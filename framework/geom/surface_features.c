@@ -4,7 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "clusters.h"
 #include "sdm/memory.h"
 #include "vec3.h"
 
@@ -12,34 +11,32 @@
 #define LOWEST 1e-6
 // a face lower than this share of its length is thin: its angles are too small for float
 #define THIN 0.02f
-
 typedef struct builder {
     const sdm_mesh *m;
     const sdm_topology *topo;
     const sdm_frame *frames;
+    const sdm_bvh *tree;
     sdm_features *f;
-    const uint32_t *tri_of; /* [n_tri] triangle of a slot: the order */
-    uint32_t *slot_of;      /* [n_tri] */
-    uint32_t *sorted;       /* [n_tri] slots by cluster */
-    uint32_t *edge;         /* [n_edges] number of an edge of the topology */
-    uint32_t *corner;       /* [n_vert] number of a corner */
-    uint8_t *count;         /* directions of a corner so far */
-    float (*mid)[4], (*box)[6];
+    uint32_t *slot_of; /* [n_tri] slot of a triangle */
+    uint32_t *edge;    /* [n_edges] number of an edge of the topology */
+    uint32_t *corner;  /* [n_vert] number of a corner */
+    uint8_t *count;    /* [end - corner_base] directions of a corner so far */
+    double middle[3];  /* of the cluster at hand */
+    uint32_t n_group;
 } builder;
 
 static const double *vertex(const builder *b, size_t v) { return &b->m->vert[3 * v]; }
 
 /* Function k of a face or edge: the distance in direction g from `through`. */
-static void set_function(sdm_features *f, sdm_feature_group *group, uint32_t number, int k, const double g[3],
-                         const double through[3])
+static void set_function(const builder *b, uint32_t number, int k, const double g[3], const double through[3])
 {
+    sdm_feature_row *row = &b->f->row[number];
     double sum = 0;
     for (int i = 0; i < 3; i++) {
-        const float x = (float)g[i];
-        f->row[number].g[k][i] = group->g[k][i][number % 8] = x;
-        sum += (double)x * (f->centre[i] - through[i]);
+        row->g[i][k] = (float)g[i];
+        sum += (double)row->g[i][k] * (b->middle[i] - through[i]);
     }
-    group->offset[k][number % 8] = (float)(sum * f->scale);
+    row->offset[k] = (float)(sum * b->f->scale);
 }
 
 /* Outward across edge k of the frame, in the plane. */
@@ -49,111 +46,153 @@ static void across(const sdm_frame *t, int k, double g[3])
     for (int i = 0; i < 3; i++) g[i] = ey[k] * t->u[i] - ex[k] * t->v[i];
 }
 
-static void set_thin(sdm_features *f, uint32_t number, const sdm_frame *t, const double end[3])
+static void set_thin(const builder *b, uint32_t number, const sdm_frame *t, const double end[3])
 {
-    sdm_feature_group *group = &f->face[number / 8];
-    const double low = sdm_frame_height(t);
     double g[3], above[3];
-    f->thin[number / 8] = (uint8_t)(f->thin[number / 8] | 1u << number % 8);
-    set_function(f, group, number, 0, t->u, end);
+    set_function(b, number, 0, t->u, end);
     for (int i = 0; i < 3; i++) g[i] = -t->u[i];
-    set_function(f, group, number, 1, g, t->a);
+    set_function(b, number, 1, g, t->a);
     for (int i = 0; i < 3; i++) g[i] = -t->v[i];
-    set_function(f, group, number, 2, g, t->a);
-    v3_along(t->a, low, t->v, above);
-    set_function(f, group, number, 3, t->v, above);
-    f->row[number].at_anchor[0] = (float)(-2 * t->half[0] * f->scale);
-    f->row[number].at_anchor[2] = (float)(-low * f->scale);
+    set_function(b, number, 2, g, t->a);
+    v3_along(t->a, sdm_frame_height(t), t->v, above);
+    set_function(b, number, 3, t->v, above);
 }
 
-static void add_face(sdm_features *f, uint32_t number, uint32_t slot, const sdm_frame *t)
+static void add_face(const builder *b, uint32_t slot, sdm_cluster_node *node)
 {
-    sdm_feature_group *group = &f->face[number / 8];
-    sdm_feature *x = &f->exact[number];
+    const sdm_frame *t = &b->frames[slot];
+    sdm_feature *x = &b->f->exact[slot];
     const double length = 2 * t->half[0];
     double g[3], end[3];
-    f->slot[number] = f->owner[number] = slot;
+    b->f->owner[slot] = slot;
     memcpy(x->a, t->a, sizeof x->a);
     memcpy(x->u, t->n, sizeof x->u);
     x->face = -1;
     v3_along(t->a, length, t->u, end);
-    if (t->flat != 0) return;
+    if (t->flat != 0) {
+        b->f->row[slot].offset[0] = INFINITY;
+        return;
+    }
     if (sdm_frame_height(t) < (double)THIN * length) {
-        set_thin(f, number, t, end);
+        set_thin(b, slot, t, end);
+        node->thin |= 1u << (slot - node->first);
+        b->f->any_thin = true;
         return;
     }
     for (int k = 0; k < 3; k++) {
         across(t, k, g);
         // edges 0 and 2 pass through a, edge 1 through the end of edge 0
-        set_function(f, group, number, k, g, k == 1 ? end : t->a);
-        if (k == 1) f->row[number].at_anchor[1] = (float)(-v3_dot(g, t->u) * length * f->scale);
+        set_function(b, slot, k, g, k == 1 ? end : t->a);
     }
-    set_function(f, group, number, 3, t->n, t->a);
+    set_function(b, slot, 3, t->n, t->a);
 }
 
-/* The edge from a to b; returns its middle. */
-static void add_segment(sdm_features *f, uint32_t number, const double a[3], const double b[3], double middle[3])
+/* The edge from x to y; returns its middle. */
+static void add_segment(const builder *b, uint32_t number, const double x[3], const double y[3], double middle[3])
 {
-    sdm_feature *x = &f->exact[number];
-    sdm_feature_group *group = &f->edge[(number - f->edge_base) / 8];
+    sdm_features *f = b->f;
+    sdm_feature *exact = &f->exact[number];
+    sdm_feature_row *row = &f->row[number];
     double w[3];
     for (int i = 0; i < 3; i++) {
-        x->a[i] = a[i];
-        w[i] = (b[i] - a[i]) * f->scale;
-        middle[i] = 0.5 * a[i] + 0.5 * b[i];
+        exact->a[i] = x[i];
+        w[i] = (y[i] - x[i]) * f->scale;
+        middle[i] = 0.5 * x[i] + 0.5 * y[i];
     }
     const double length = v3_norm(w);
     for (int i = 0; i < 3; i++) {
-        x->u[i] = length > 0 ? w[i] / length : 0;
-        group->g[3][i][number % 8] = (float)((middle[i] - f->centre[i]) * f->scale);
+        exact->u[i] = length > 0 ? w[i] / length : 0;
+        row->g[i][3] = (float)((middle[i] - b->middle[i]) * f->scale);
     }
-    x->length = length / f->scale;
-    set_function(f, group, number, 0, x->u, middle);
-    group->offset[3][number % 8] = f->row[number].at_anchor[0] = (float)(0.5 * length);
+    exact->length = length / f->scale;
+    set_function(b, number, 0, exact->u, middle);
+    row->offset[3] = (float)(0.5 * length);
 }
 
 /* The conditions of up to two of the faces of an edge; missing ones stay 0 <= 0. */
-static void add_sides(const builder *w, const sdm_edge *e, uint32_t number, const double middle[3])
+static void add_sides(const builder *b, const sdm_edge *e, uint32_t number, const double middle[3])
 {
-    sdm_features *f = w->f;
     int k = 1;
-    for (uint32_t h = e->first; h != SDM_NONE && k < 3; h = w->topo->next[h]) {
-        const sdm_frame *t = &w->frames[w->slot_of[h / 3]];
+    for (uint32_t h = e->first; h != SDM_NONE && k < 3; h = b->topo->next[h]) {
+        const sdm_frame *t = &b->frames[b->slot_of[h / 3]];
         const int i = (int)((h % 3 + 3 - (uint32_t)t->rotation) % 3);
         if (t->flat != 0 || !(sdm_frame_height(t) > LOWEST * 2 * t->half[0])) continue;
         double g[3];
         across(t, i, g);
         for (int c = 0; c < 3; c++) g[c] = -g[c];
-        set_function(f, &f->edge[(number - f->edge_base) / 8], number, k++, g, middle);
+        set_function(b, number, k++, g, middle);
     }
 }
 
-static void add_direction(const builder *w, uint32_t corner, const double u[3], float sign)
+static void add_direction(const builder *b, uint32_t corner, const double u[3], float sign)
 {
-    const uint32_t at = corner - w->f->corner_base;
-    sdm_corner_group *c = &w->f->corner[at / 8];
-    if (w->count[at] == SDM_CORNER_EDGES) return;
+    const uint32_t at = corner - b->f->corner_base;
+    sdm_corner_row *c = &b->f->corner[at];
+    if (b->count[at] == SDM_CORNER_EDGES) return;
     // the first one fills all
-    const int end = w->count[at] ? w->count[at] + 1 : SDM_CORNER_EDGES;
-    for (int k = w->count[at]; k < end; k++)
-        for (int i = 0; i < 3; i++) c->along[k][i][at % 8] = sign * (float)u[i];
-    w->count[at]++;
+    const int end = b->count[at] ? b->count[at] + 1 : SDM_CORNER_EDGES;
+    for (int k = b->count[at]; k < end; k++)
+        for (int i = 0; i < 3; i++) c->along[i][k] = sign * (float)u[i];
+    b->count[at]++;
 }
 
-static void measure(builder *b)
+static void add_corner(const builder *b, uint32_t number, const double x[3])
+{
+    memcpy(b->f->exact[number].a, x, 3 * sizeof *x);
+    for (int i = 0; i < 3; i++)
+        b->f->corner[number - b->f->corner_base].at[i] = (float)((x[i] - b->middle[i]) * b->f->scale);
+}
+
+/* Edges and corners of a triangle that no triangle before it has; a triangle with a repeated vertex is a segment of its own.
+   node: its cluster. */
+static void add_edges_and_corners(const builder *b, uint32_t slot, sdm_cluster_node *node)
 {
     sdm_features *f = b->f;
-    double lo[3] = {INFINITY, INFINITY, INFINITY}, hi[3] = {-INFINITY, -INFINITY, -INFINITY}, d[3], longest = 0;
-    for (size_t i = 0; i < 3 * b->m->n_tri; i++) {
-        const double *v = vertex(b, b->m->tri[i]);
-        for (int a = 0; a < 3; a++) {
-            lo[a] = v[a] < lo[a] ? v[a] : lo[a];
-            hi[a] = v[a] > hi[a] ? v[a] : hi[a];
+    const size_t t = b->tree->order[slot];
+    const uint32_t *v = &b->topo->tri[3 * t];
+    double middle[3];
+    for (int k = 0; k < 3; k++) {
+        if (b->corner[v[k]] == SDM_NONE) {
+            const uint32_t number = b->corner[v[k]] = node->corner_end++;
+            add_corner(b, number, vertex(b, v[k]));
         }
+        f->of_slot[slot][3 + k] = b->corner[v[k]];
+        f->owner[b->corner[v[k]]] = slot;
     }
+    if (b->topo->edge[3 * t] == SDM_NONE) {
+        const sdm_frame *x = &b->frames[slot];
+        const uint32_t number = node->edge_end++;
+        double end[3];
+        v3_along(x->a, 2 * x->half[0], x->u, end);
+        f->owner[number] = slot;
+        for (int k = 0; k < 3; k++) f->of_slot[slot][k] = number;
+        add_segment(b, number, x->a, end, middle);
+        return;
+    }
+    for (int k = 0; k < 3; k++) {
+        const uint32_t i = b->topo->edge[3 * t + (size_t)k];
+        if (b->edge[i] == SDM_NONE) {
+            const sdm_edge *e = &b->topo->edges[i];
+            const uint32_t number = b->edge[i] = node->edge_end++;
+            add_segment(b, number, vertex(b, e->lo), vertex(b, e->hi), middle);
+            add_sides(b, e, number, middle);
+            add_direction(b, b->corner[e->lo], f->exact[number].u, 1);
+            add_direction(b, b->corner[e->hi], f->exact[number].u, -1);
+        }
+        f->of_slot[slot][k] = b->edge[i];
+        f->owner[b->edge[i]] = slot;
+    }
+}
+
+/* Centre, radius and scale. */
+static void measure(const builder *b)
+{
+    sdm_features *f = b->f;
+    const sdm_bvh_node *root = b->tree->node;
+    double d[3], longest = 0;
     for (int a = 0; a < 3; a++) {
-        d[a] = hi[a] - lo[a];
-        f->centre[a] = lo[a] + 0.5 * d[a];
+        d[a] = root->hi[a] - root->lo[a];
+        f->centre[a] = root->lo[a] + 0.5 * d[a];
     }
     f->radius = 0.5 * v3_norm(d);
     for (size_t i = 0; i < b->m->n_tri; i++) longest = b->frames[i].half[0] > longest ? b->frames[i].half[0] : longest;
@@ -162,196 +201,170 @@ static void measure(builder *b)
     const double size = longest > 0 ? 2 * longest : f->radius;
     if (size > 0) (void)frexp(size, &exponent);
     f->scale = ldexp(1, -exponent);
-    for (uint32_t slot = 0; slot < b->m->n_tri; slot++) {
-        const uint32_t *t = &b->m->tri[3 * (size_t)b->tri_of[slot]];
-        float x[3][3];
-        for (int k = 0; k < 3; k++)
-            for (int a = 0; a < 3; a++) x[k][a] = (float)((vertex(b, t[k])[a] - f->centre[a]) * f->scale);
-        for (int a = 0; a < 3; a++) {
-            const float p = x[0][a], q = x[1][a], r = x[2][a];
-            b->mid[slot][a] = (p + q + r) / 3;
-            b->box[slot][a] = p < q ? (p < r ? p : r) : (q < r ? q : r);
-            b->box[slot][3 + a] = p > q ? (p > r ? p : r) : (q > r ? q : r);
-        }
-        b->sorted[slot] = slot;
-        b->slot_of[b->tri_of[slot]] = slot;
-    }
 }
 
-/* Numbers edges and corners as the clusters meet them; a triangle with a repeated vertex is a segment of its own. */
-static void number_features(builder *b)
+/* Boxes, and which nodes are clusters: children come after their parent. */
+static void fill_nodes(const builder *b)
 {
     sdm_features *f = b->f;
-    uint32_t e = 0, c = 0;
-    memset(b->edge, 0xff, b->topo->n_edges * sizeof *b->edge);
-    memset(b->corner, 0xff, b->m->n_vert * sizeof *b->corner);
-    f->edge_base = (uint32_t)(8 * f->n_cluster);
-    for (size_t i = 0; i < f->n_cluster; i++) {
-        f->edge_first[i] = (e + 7) / 8;
-        f->corner_first[i] = (c + 7) / 8;
-        e = 8 * f->edge_first[i];
-        c = 8 * f->corner_first[i];
-        for (size_t at = 8 * i; at < 8 * i + 8 && at < b->m->n_tri; at++) {
-            const size_t t = b->tri_of[b->sorted[at]];
-            e += b->topo->edge[3 * t] == SDM_NONE;
-            for (size_t k = 3 * t; k < 3 * t + 3; k++) {
-                const uint32_t x = b->topo->edge[k], v = b->topo->tri[k];
-                if (x != SDM_NONE && b->edge[x] == SDM_NONE) b->edge[x] = f->edge_base + e++;
-                if (b->corner[v] == SDM_NONE) b->corner[v] = c++;
-            }
+    for (size_t i = b->tree->n_node; i-- > 0;) {
+        const sdm_bvh_node *from = &b->tree->node[i];
+        sdm_cluster_node *node = &f->node[i];
+        node->first = from->first;
+        node->count = from->count;
+        for (int a = 0; a < 3; a++) {
+            node->lo[a] = (float)((from->lo[a] - f->centre[a]) * f->scale);
+            node->hi[a] = (float)((from->hi[a] - f->centre[a]) * f->scale);
         }
+        if (from->count) continue;
+        const sdm_cluster_node *child = &f->node[from->first];
+        if (!child[0].count || !child[1].count || child[0].count + child[1].count > SDM_CLUSTER) continue;
+        node->first = child[0].first;
+        node->count = child[0].count + child[1].count;
     }
-    f->edge_first[f->n_cluster] = (e + 7) / 8;
-    f->corner_first[f->n_cluster] = (c + 7) / 8;
-    f->corner_base = f->edge_base + 8 * f->edge_first[f->n_cluster];
-    f->end = f->corner_base + 8 * f->corner_first[f->n_cluster];
-    for (size_t v = 0; v < b->m->n_vert; v++)
-        if (b->corner[v] != SDM_NONE) b->corner[v] += f->corner_base;
 }
 
-static sdm_status allocate(sdm_features *f, size_t n_tri, sdm_error *err)
+static void fill_cluster(builder *b, uint32_t i)
 {
-    const size_t n_edge = f->edge_first[f->n_cluster], n_corner = f->corner_first[f->n_cluster];
-    sdm_status s = SDM_ALLOC(&f->slot, 8 * f->n_cluster, "features", err);
-    if (!s) s = SDM_ALLOC(&f->face, f->n_cluster, "features", err);
-    if (!s) s = SDM_ALLOC(&f->centroid, f->n_cluster, "features", err);
-    if (!s) s = SDM_ALLOC(&f->thin, f->n_cluster, "features", err);
-    if (!s) s = SDM_ALLOC(&f->edge, n_edge, "features", err);
-    if (!s) s = SDM_ALLOC(&f->corner, n_corner, "features", err);
-    if (!s) s = SDM_ALLOC(&f->exact, f->end, "features", err);
-    if (!s) s = SDM_ALLOC(&f->row, f->corner_base, "features", err);
-    if (!s) s = SDM_ALLOC(&f->of_slot, n_tri, "features", err);
-    if (!s) s = SDM_ALLOC(&f->owner, f->end, "features", err);
-    if (s) return s;
-    // lanes are empty until they are filled
-    memset(f->slot, 0xff, 8 * f->n_cluster * sizeof *f->slot);
-    for (size_t i = 0; i < 8 * f->n_cluster; i++) f->face[i / 8].offset[0][i % 8] = INFINITY;
-    for (size_t i = 0; i < 8 * n_edge; i++) f->edge[i / 8].offset[0][i % 8] = INFINITY;
-    for (size_t i = 0; i < 8 * n_corner; i++) f->corner[i / 8].at[0][i % 8] = SDM_NOWHERE;
-    return SDM_OK;
+    sdm_features *f = b->f;
+    sdm_cluster_node *node = &f->node[i];
+    sdm_cluster_middle(&b->tree->node[i], b->middle);
+    for (uint32_t slot = node->first; slot < node->first + node->count; slot++) {
+        const uint32_t *t = &b->m->tri[3 * (size_t)b->tree->order[slot]];
+        for (int a = 0; a < 3; a++) {
+            const double sum = (vertex(b, t[0])[a] - f->centre[a]) + (vertex(b, t[1])[a] - f->centre[a]) +
+                               (vertex(b, t[2])[a] - f->centre[a]);
+            f->centroid[slot][a] = (float)(sum * f->scale) / 3;
+        }
+        add_face(b, slot, node);
+        add_edges_and_corners(b, slot, node);
+    }
+    node->group = b->n_group;
+    b->n_group += 1 + (node->edge_end - node->edge + 7) / 8;
 }
 
-/* Faces, segments of triangles with a repeated vertex, and who owns what. */
+/* The clusters in the order of the tree. */
 static void fill_clusters(builder *b)
 {
     sdm_features *f = b->f;
-    for (size_t i = 0; i < f->n_cluster; i++) {
-        uint32_t next = f->edge_base + 8 * f->edge_first[i];
-        for (uint32_t number = (uint32_t)(8 * i); number < 8 * i + 8; number++) {
-            const bool empty = number >= b->m->n_tri;
-            const uint32_t slot = b->sorted[empty ? 8 * i : number];
-            for (int a = 0; a < 3; a++) f->centroid[i][a][number % 8] = b->mid[slot][a];
-            if (empty) continue;
-            const size_t t = b->tri_of[slot];
-            const sdm_frame *x = &b->frames[slot];
-            add_face(f, number, slot, x);
-            f->of_slot[slot][0] = number;
-            if (b->topo->edge[3 * t] == SDM_NONE) {
-                double end[3], middle[3];
-                v3_along(x->a, 2 * x->half[0], x->u, end);
-                f->owner[next] = slot;
-                for (int k = 1; k < 4; k++) f->of_slot[slot][k] = next;
-                add_segment(f, next++, x->a, end, middle);
-            }
-            for (size_t k = 3 * t; k < 3 * t + 3; k++) {
-                const uint32_t e = b->topo->edge[k], corner = b->corner[b->topo->tri[k]];
-                f->owner[corner] = slot;
-                f->of_slot[slot][4 + k - 3 * t] = corner;
-                if (e == SDM_NONE) continue;
-                f->of_slot[slot][1 + k - 3 * t] = b->edge[e];
-                f->owner[b->edge[e]] = slot;
-                // numbers of this cluster are given in the same order as above
-                if (b->edge[e] >= next && b->edge[e] < f->edge_base + 8 * f->edge_first[i + 1]) next = b->edge[e] + 1;
+    uint32_t stack[SDM_BVH_DEPTH], edge = f->edge_base, corner = f->corner_base;
+    int top = 0;
+    stack[top++] = 0;
+    while (top) {
+        const uint32_t i = stack[--top];
+        sdm_cluster_node *node = &f->node[i];
+        if (!node->count) {
+            stack[top++] = node->first + 1;
+            stack[top++] = node->first;
+            continue;
+        }
+        node->edge = node->edge_end = edge;
+        node->corner = node->corner_end = corner;
+        fill_cluster(b, i);
+        edge = node->edge_end;
+        corner = node->corner_end;
+    }
+    f->end = corner;
+}
+
+/* Rows from .. to side by side. */
+static void fill_groups(const sdm_features *f, uint32_t from, uint32_t to, sdm_feature_group *out)
+{
+    for (; from < to; from += 8, out++) {
+        for (uint32_t lane = 0; lane < 8; lane++) {
+            out->offset[0][lane] = INFINITY;
+            if (from + lane >= to) continue;
+            const sdm_feature_row *row = &f->row[from + lane];
+            for (int k = 0; k < 4; k++) {
+                for (int a = 0; a < 3; a++) out->g[k][a][lane] = row->g[a][k];
+                out->offset[k][lane] = row->offset[k];
             }
         }
     }
 }
 
-static void fill_edges_and_corners(builder *b)
+static sdm_status add_groups(const builder *b, sdm_error *err)
 {
     sdm_features *f = b->f;
-    for (size_t v = 0; v < b->m->n_vert; v++) {
-        if (b->corner[v] == SDM_NONE) continue;
-        const uint32_t at = b->corner[v] - f->corner_base;
-        memcpy(f->exact[b->corner[v]].a, vertex(b, v), 3 * sizeof(double));
-        for (int i = 0; i < 3; i++)
-            f->corner[at / 8].at[i][at % 8] = (float)((vertex(b, v)[i] - f->centre[i]) * f->scale);
+    const sdm_status s = SDM_ALLOC(&f->group, b->n_group, "features", err);
+    for (size_t i = 0; i < b->tree->n_node && !s; i++) {
+        const sdm_cluster_node *node = &f->node[i];
+        // others are below a cluster
+        if (!node->count || node->edge_end + node->corner_end == 0) continue;
+        fill_groups(f, node->first, node->first + node->count, &f->group[node->group]);
+        fill_groups(f, node->edge, node->edge_end, &f->group[node->group + 1]);
     }
-    for (size_t i = 0; i < b->topo->n_edges; i++) {
-        if (b->edge[i] == SDM_NONE) continue;
-        const sdm_edge *e = &b->topo->edges[i];
-        double middle[3];
-        add_segment(f, b->edge[i], vertex(b, e->lo), vertex(b, e->hi), middle);
-        add_sides(b, e, b->edge[i], middle);
-        const double *u = f->exact[b->edge[i]].u;
-        add_direction(b, b->corner[e->lo], u, 1);
-        add_direction(b, b->corner[e->hi], u, -1);
-    }
+    return s;
+}
+
+static sdm_status allocate(builder *b, sdm_error *err)
+{
+    sdm_features *f = b->f;
+    const size_t n = b->m->n_tri, n_vert = b->m->n_vert;
+    sdm_status s = SDM_ALLOC(&b->slot_of, n, "features", err);
+    if (!s) s = SDM_ALLOC(&b->edge, b->topo->n_edges, "features", err);
+    if (!s) s = SDM_ALLOC(&b->corner, n_vert, "features", err);
+    if (!s) s = SDM_ALLOC(&b->count, n_vert, "features", err);
+    if (!s) s = SDM_ALLOC(&f->node, b->tree->n_node, "features", err);
+    if (!s) s = SDM_ALLOC(&f->centroid, n, "features", err);
+    if (!s) s = SDM_ALLOC(&f->row, f->corner_base, "features", err);
+    if (!s) s = SDM_ALLOC(&f->corner, n_vert, "features", err);
+    if (!s) s = SDM_ALLOC(&f->exact, f->corner_base + n_vert, "features", err);
+    if (!s) s = SDM_ALLOC(&f->of_slot, n, "features", err);
+    if (!s) s = SDM_ALLOC(&f->owner, f->corner_base + n_vert, "features", err);
+    if (s) return s;
+    memset(b->edge, 0xff, b->topo->n_edges * sizeof *b->edge);
+    memset(b->corner, 0xff, n_vert * sizeof *b->corner);
+    return SDM_OK;
 }
 
 size_t sdm_features_bytes(size_t n_tri, size_t n_vert, size_t *scratch)
 {
-    // a cluster that meets few new edges still takes a group of eight
-    const size_t clusters = (n_tri + 7) / 8, edges = 3 * n_tri + 8 * clusters, corners = n_vert + 8 * clusters;
-    *scratch += n_tri * (2 * sizeof(uint32_t) + 10 * sizeof(float)) + 3 * n_tri * sizeof(uint32_t) +
-                n_vert * sizeof(uint32_t) + corners;
-    return clusters * (sizeof(sdm_feature_group) + 2 * sizeof(sdm_cluster_node) + sizeof(float[3][8]) + 48) +
-           edges / 8 * sizeof(sdm_feature_group) + corners / 8 * sizeof(sdm_corner_group) +
-           (8 * clusters + edges + corners) * (sizeof(sdm_feature) + sizeof(uint32_t)) +
-           (8 * clusters + edges) * sizeof(sdm_feature_row) + n_tri * sizeof(uint32_t[7]);
+    // edges: every triangle may have three of its own, or be one
+    const size_t rows = 4 * n_tri;
+    *scratch += n_tri * 4 * sizeof(uint32_t) + n_vert * (sizeof(uint32_t) + 1);
+    // every triangle may be a cluster, whose edges end with a group
+    const size_t groups = 2 * n_tri + rows / 8;
+    return groups * sizeof(sdm_feature_group) +
+           n_tri * (2 * sizeof(sdm_cluster_node) + sizeof(float[3]) + sizeof(uint32_t[6])) +
+           rows * sizeof(sdm_feature_row) + n_vert * sizeof(sdm_corner_row) +
+           (rows + n_vert) * (sizeof(sdm_feature) + sizeof(uint32_t));
 }
 
-sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const sdm_frame *frames,
-                              const uint32_t *order, sdm_features *f, sdm_error *err)
+sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const sdm_frame *frames, const sdm_bvh *tree,
+                              sdm_features *f, sdm_error *err)
 {
     const size_t n = m->n_tri;
-    builder b = {.m = m, .topo = topo, .frames = frames, .f = f, .tri_of = order};
-    f->n_cluster = (n + 7) / 8;
-    // every group ends with its cluster
-    if (32 * f->n_cluster + topo->n_edges + m->n_vert + n >= SDM_NONE)
+    builder b = {.m = m, .topo = topo, .frames = frames, .tree = tree, .f = f};
+    size_t segments = 0;
+    for (size_t t = 0; t < n; t++) segments += topo->edge[3 * t] == SDM_NONE;
+    if (n + segments + topo->n_edges + m->n_vert >= SDM_NONE / 2) // the kernels count in 32 bits with a sign
         return sdm_fail(err, SDM_E_NOMEM, "surface of %zu triangles: too many to number their edges and vertices", n);
-    sdm_status s = SDM_ALLOC(&b.slot_of, n, "features", err);
-    if (!s) s = SDM_ALLOC(&b.sorted, n, "features", err);
-    if (!s) s = SDM_ALLOC(&b.edge, topo->n_edges, "features", err);
-    if (!s) s = SDM_ALLOC(&b.corner, m->n_vert, "features", err);
-    if (!s) s = SDM_ALLOC(&b.mid, n, "features", err);
-    if (!s) s = SDM_ALLOC(&b.box, n, "features", err);
-    if (!s) s = SDM_ALLOC(&f->node, 2 * f->n_cluster, "features", err);
-    if (!s) s = SDM_ALLOC(&f->edge_first, f->n_cluster + 1, "features", err);
-    if (!s) s = SDM_ALLOC(&f->corner_first, f->n_cluster + 1, "features", err);
-    if (s) goto done;
-    measure(&b);
-    f->n_node = sdm_clusters_build(b.mid, b.box, b.sorted, n, f->node);
-    number_features(&b);
-    s = allocate(f, n, err);
-    if (!s) s = SDM_ALLOC(&b.count, f->end - f->corner_base, "features", err);
-    if (s) goto done;
-    fill_clusters(&b);
-    fill_edges_and_corners(&b);
-done:
+    f->edge_base = (uint32_t)n;
+    f->corner_base = (uint32_t)(n + segments + topo->n_edges);
+    sdm_status s = allocate(&b, err);
+    if (!s) {
+        for (uint32_t slot = 0; slot < n; slot++) b.slot_of[tree->order[slot]] = slot;
+        measure(&b);
+        fill_nodes(&b);
+        fill_clusters(&b);
+        s = add_groups(&b, err);
+    }
     sdm_free(b.slot_of);
-    sdm_free(b.sorted);
     sdm_free(b.edge);
     sdm_free(b.corner);
     sdm_free(b.count);
-    sdm_free(b.mid);
-    sdm_free(b.box);
     return s;
 }
 
 void sdm_features_dispose(sdm_features *f)
 {
     sdm_free(f->node);
-    sdm_free(f->slot);
-    sdm_free(f->face);
     sdm_free(f->centroid);
-    sdm_free(f->thin);
-    sdm_free(f->edge_first);
-    sdm_free(f->corner_first);
-    sdm_free(f->edge);
+    sdm_free(f->group);
+    sdm_free(f->row);
     sdm_free(f->corner);
     sdm_free(f->exact);
-    sdm_free(f->row);
     sdm_free(f->of_slot);
     sdm_free(f->owner);
     *f = (sdm_features){0};

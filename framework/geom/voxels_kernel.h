@@ -19,48 +19,39 @@ static inline void compete(winner8 *w, v8f d, uint32_t lane, float *out)
     w->first = v8_min(d, w->first);
 }
 
-/* Vector j of one feature of a group for all lanes; its function j at p. */
-static inline point8 spread(const sdm_feature_group *k, int j, size_t lane)
-{
-    return p8_all(k->g[j][0][lane], k->g[j][1][lane], k->g[j][2][lane]);
-}
-
-static inline v8f function(const sdm_feature_group *k, int j, size_t lane, point8 p)
-{
-    return p8_linear(spread(k, j, lane), p, v8_all(k->offset[j][lane]));
-}
-
 /* value[]: squared distances of the candidates, INFINITY where a voxel is surely not in the region, -1 for thin faces elsewhere. */
-static winner8 compare(const tile *t, int v, float (*out)[8])
+static winner8 compare(const tile *t, int v)
 {
     const sdm_grid_scratch *s = t->s;
     const sdm_candidates *in = &s->vector[v];
-    const point8 p = p8_load((const float(*)[8])t->job->voxel[v].x);
+    const point8 p = p8_load((const float(*)[8])t->job->voxel[t->number][v].x);
     const v8f error = v8_all(t->error), never = v8_all(INFINITY);
     winner8 w = {never, never, v8_all_i(0)};
-    for (size_t i = 0; i < in->n[SDM_FACES]; i++) {
-        const uint32_t at = in->list[SDM_FACES][i];
-        const sdm_feature_group *k = &s->local[at / 8];
-        const v8f h = v8_max(function(k, 0, at % 8, p), v8_max(function(k, 1, at % 8, p), function(k, 2, at % 8, p)));
-        const v8f z = function(k, 3, at % 8, p);
-        if (s->thin[at / 8] >> at % 8 & 1)
-            compete(&w, v8_signed(v8_max(h, z) - error, v8_all(-1), never), at, *out++);
-        else
-            compete(&w, v8_signed(h - error, z * z, never), at, *out++);
+    for (size_t i = in->begin[SDM_FACES]; i < in->end[SDM_FACES]; i++) {
+        const sdm_feature_row *r = &s->row[in->list[i]];
+        const v8f h = v8_max(function8(r, 0, r->offset[0], p),
+                             v8_max(function8(r, 1, r->offset[1], p), function8(r, 2, r->offset[2], p)));
+        const v8f z = function8(r, 3, r->offset[3], p);
+        compete(&w, v8_signed(h - error, z * z, never), in->list[i], s->value[i]);
     }
-    for (size_t i = 0; i < in->n[SDM_EDGES]; i++) {
-        const uint32_t at = in->list[SDM_EDGES][i];
-        const sdm_feature_group *k = &s->local[at / 8];
-        const v8f along = function(k, 0, at % 8, p);
-        const v8f beside = v8_max(function(k, 1, at % 8, p), function(k, 2, at % 8, p));
-        const v8f beyond = v8_max(v8_abs(along) - v8_all(k->offset[3][at % 8]), beside);
-        const point8 r = p8_sub(p, spread(k, 3, at % 8));
-        compete(&w, v8_signed(beyond - error, p8_dot(r, r) - along * along, never), at, *out++);
+    for (size_t i = in->begin[SDM_THIN_FACES]; i < in->end[SDM_THIN_FACES]; i++) {
+        const sdm_feature_row *r = &s->row[in->list[i]];
+        const v8f h = v8_max(v8_max(function8(r, 0, r->offset[0], p), function8(r, 1, r->offset[1], p)),
+                             v8_max(function8(r, 2, r->offset[2], p), function8(r, 3, r->offset[3], p)));
+        compete(&w, v8_signed(h - error, v8_all(-1), never), in->list[i], s->value[i]);
     }
-    for (size_t i = 0; i < in->n[SDM_CORNERS]; i++) {
-        const uint32_t at = in->list[SDM_CORNERS][i];
-        const point8 r = p8_sub(p, spread(&s->local[at / 8], 0, at % 8));
-        compete(&w, p8_dot(r, r), at, *out++);
+    for (size_t i = in->begin[SDM_EDGES]; i < in->end[SDM_EDGES]; i++) {
+        const sdm_feature_row *r = &s->row[in->list[i]];
+        const v8f along = function8(r, 0, r->offset[0], p);
+        const v8f beside = v8_max(function8(r, 1, r->offset[1], p), function8(r, 2, r->offset[2], p));
+        const v8f beyond = v8_max(v8_abs(along) - v8_all(r->offset[3]), beside);
+        const point8 x = p8_sub(p, point_of(r));
+        compete(&w, v8_signed(beyond - error, p8_dot(x, x) - along * along, never), in->list[i], s->value[i]);
+    }
+    for (size_t i = in->begin[SDM_CORNERS]; i < in->end[SDM_CORNERS]; i++) {
+        const sdm_feature_row *r = &s->row[in->list[i]];
+        const point8 x = p8_sub(p, point_of(r));
+        compete(&w, p8_dot(x, x), in->list[i], s->value[i]);
     }
     return w;
 }
@@ -74,20 +65,20 @@ static uint32_t ask_tree(const tile *t, const double p[3], double *d2)
     int feature;
     (void)sdm_nearest_find(n, p, INFINITY, &slot, q, &feature);
     *d2 = sdm_nearest_feature(n, p, &slot);
-    return n->features.of_slot[slot][0];
+    return slot;
 }
 
 /* The nearest of the candidates whose squared distance in float is at most `limit`, in double. */
 static uint32_t settle(const tile *t, int v, int lane, float limit, const double p[3], double *d2)
 {
     const sdm_grid_scratch *s = t->s;
-    const float(*in_float)[8] = (const float(*)[8])s->value;
+    const sdm_candidates *in = &s->vector[v];
     uint32_t best = SDM_NONE;
     *d2 = INFINITY;
     for (int kind = 0; kind < SDM_FEATURE_KINDS; kind++)
-        for (size_t i = 0; i < s->vector[v].n[kind]; i++, in_float++) {
-            if ((*in_float)[lane] > limit) continue;
-            const uint32_t number = s->number[s->vector[v].list[kind][i]];
+        for (size_t i = in->begin[kind]; i < in->end[kind]; i++) {
+            if (s->value[i][lane] > limit) continue;
+            const uint32_t number = s->number[in->list[i]];
             const double d = sdm_feature_distance2(t->job->features, t->job->surface->frames, number, p);
             if (!(d < *d2)) continue;
             *d2 = d;
@@ -134,7 +125,7 @@ static void choose_features(const tile *t, voxels *x)
             for (int i = 0; i < 8; i++) x->number[place[i]] = 0;
             continue;
         }
-        const winner8 w = compare(t, v, t->s->value);
+        const winner8 w = compare(t, v);
         _Alignas(32) float limit[8], first[8];
         v8_store(first, w.first);
         v8_store(limit, v8_fma(v8_sqrt(v8_max(w.first, v8_all(0))) + v8_all(1), squared, w.first));

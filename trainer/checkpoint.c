@@ -26,16 +26,20 @@ static void checkpoint_path(const trainer *t, char *path, size_t size)
     snprintf(path, size, "%s/checkpoint.sdmc", t->folder);
 }
 
-sdm_status checkpoint_remove(const trainer *t, sdm_error *err)
+static sdm_status remove_file(const trainer *t, const char *name, sdm_error *err)
 {
-    static const char *const names[] = {"checkpoint.sdmc", "model.sdm"};
     char path[SDM_PATH_TEXT_MAX + 32];
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        snprintf(path, sizeof path, "%s/%s", t->folder, names[i]);
-        if (unlink(path) && errno != ENOENT)
-            return sdm_fail(err, SDM_E_IO, "%s: cannot remove: %s", path, strerror(errno));
-    }
+    snprintf(path, sizeof path, "%s/%s", t->folder, name);
+    if (unlink(path) && errno != ENOENT) return sdm_fail(err, SDM_E_IO, "%s: cannot remove: %s", path, strerror(errno));
     return SDM_OK;
+}
+
+sdm_status checkpoint_remove(const trainer *t, sdm_error *err) { return remove_file(t, "checkpoint.sdmc", err); }
+
+sdm_status checkpoint_start_anew(const trainer *t, sdm_error *err)
+{
+    const sdm_status s = checkpoint_remove(t, err);
+    return s ? s : remove_file(t, "model.sdm", err);
 }
 
 sdm_status checkpoint_write(trainer *t, sdm_error *err)

@@ -376,7 +376,7 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     t.n_threads = 1;
 #endif
     sdm_status s = sdm_make_folder(folder, err);
-    if (!s && !resume) s = checkpoint_remove(&t, err); // they would belong to another run
+    if (!s && !resume) s = checkpoint_start_anew(&t, err); // they would belong to another run
     if (!s) s = export_config(&t, err);
     if (!s) s = run(&t, resume, err);
     producer_stop(t.producer);
@@ -385,6 +385,7 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     trainer_report(&t, 1, 0, true);
     if (!s) s = export_model(&t, report, err);
     if (!s) s = write_metrics(&t, err);
+    if (!s) s = checkpoint_remove(&t, err);
     t.kind->dispose(&t);
     dataset_dispose(&t.data);
     sdm_free(t.blocks);

@@ -127,6 +127,8 @@ sdm_status trainer_take_samples(trainer *t, size_t wanted, sdm_error *err);
 
 /* checkpoint.c */
 /* Removes checkpoint and model of an older run in the same folder. */
+sdm_status checkpoint_start_anew(const trainer *t, sdm_error *err);
+/* Removes the checkpoint of a run that is finished. */
 sdm_status checkpoint_remove(const trainer *t, sdm_error *err);
 sdm_status checkpoint_write(trainer *t, sdm_error *err);
 sdm_status checkpoint_read(trainer *t, bool *found,

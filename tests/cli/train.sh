@@ -33,6 +33,7 @@ absent stopped/model.sdm
 expect 2 'stopped holds the checkpoint of a training' sdmgen train "$tiny" --out stopped
 expect 0 - sdmgen train "$tiny" --out stopped --resume --quiet
 present stopped/model.sdm
+absent stopped/checkpoint.sdmc
 expect 0 - sdmgen info stopped/model.sdm
 
 # a grid that misses the shape gives no network

@@ -171,6 +171,20 @@ static bool stop(void *user)
     return ++calls > stop_after;
 }
 
+// there is a checkpoint of a run of c
+static void refuses_to_resume(const sdm_config *c)
+{
+    sdm_error e = {0};
+    // a wrong bit
+    flip_byte("checkpoint.sdmc", 100000);
+    assert_int_equal(sdm_train(c, capsule, folder, true, NULL, NULL, &e), SDM_E_FORMAT);
+    flip_byte("checkpoint.sdmc", 100000);
+    // another config
+    sdm_config other;
+    read_config(&other, (const char *const[]){"train.steps=600", "network.rank=5"}, 2);
+    assert_int_equal(sdm_train(&other, capsule, folder, true, NULL, NULL, &e), SDM_E_CONFIG);
+}
+
 static void resume_is_bit_exact(void **state)
 {
     (void)state;
@@ -190,19 +204,14 @@ static void resume_is_bit_exact(void **state)
         assert_int_equal(sdm_train(&c, capsule, folder, false, &hooks, NULL, &e), SDM_E_CANCELLED);
         assert_false(exists("model.sdm"));
         assert_true(exists("checkpoint.sdmc") == (i > 0));
+        if (i == 2) refuses_to_resume(&c);
         if (sdm_train(&c, capsule, folder, true, NULL, NULL, &e)) fail_msg("%s", e.text);
         assert_true(hash_of("model.sdm") == whole);
         assert_true(hash_of("metrics.jsonl") == metrics);
         assert_true(w.reports > 0);
+        // its work is done
+        assert_false(exists("checkpoint.sdmc"));
     }
-    // a checkpoint with a wrong bit is refused
-    flip_byte("checkpoint.sdmc", 100000);
-    assert_int_equal(sdm_train(&c, capsule, folder, true, NULL, NULL, &e), SDM_E_FORMAT);
-    flip_byte("checkpoint.sdmc", 100000);
-    // another config is refused
-    sdm_config other;
-    read_config(&other, (const char *const[]){"train.steps=600", "network.rank=5"}, 2);
-    assert_int_equal(sdm_train(&other, capsule, folder, true, NULL, NULL, &e), SDM_E_CONFIG);
 }
 
 // a run from the beginning does not leave the checkpoint of an older one to be resumed
@@ -212,12 +221,15 @@ static void stale_checkpoint_goes(void **state)
     sdm_config c;
     sdm_error e = {0};
     read_config(&c, (const char *const[]){"train.steps=600"}, 1);
-    assert_true(exists("checkpoint.sdmc"));
-    calls = 0, stop_after = 20;
-    watch w = {0};
-    const sdm_train_hooks hooks = {.cancelled = stop, .user = &w};
-    assert_int_equal(sdm_train(&c, capsule, folder, false, &hooks, NULL, &e), SDM_E_CANCELLED);
-    assert_false(exists("checkpoint.sdmc"));
+    // in the fit, then while making data
+    const int64_t stops[] = {400, 20};
+    for (size_t i = 0; i < 2; i++) {
+        calls = 0, stop_after = stops[i];
+        watch w = {0};
+        const sdm_train_hooks hooks = {.cancelled = stop, .user = &w};
+        assert_int_equal(sdm_train(&c, capsule, folder, false, &hooks, NULL, &e), SDM_E_CANCELLED);
+        assert_true(exists("checkpoint.sdmc") == (i == 0));
+    }
 }
 
 // a time budget that is over before the data is made still gives a model

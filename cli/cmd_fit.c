@@ -65,7 +65,8 @@ static void notice(const cli_fit *f)
     if (f->start_clamped || r->start_clamped) cli_notice("the start was moved into the range of the parameters");
     if (r->n_exact_outside)
         cli_notice("%zu maps outside of the network's range were made by the exact engine", r->n_exact_outside);
-    if (r->n_nan) cli_notice("%zu voxels are NaN and were left out", r->n_nan);
+    if (r->n_nan)
+        cli_notice("%zu voxels are NaN%s and were left out", r->n_nan, r->n_cavity ? " or in wide spaces" : "");
 }
 
 static sdm_status report(const cli_fit *f, sdm_error *err)

@@ -209,6 +209,7 @@ static void set_fit_defaults(cli_fit_args *f)
                                .l_ref = NAN,
                                .point_sd = NAN,
                                .margin = NAN,
+                               .cavity = NAN,
                                .least_inside = NAN,
                                .prior_sd = NAN,
                                .prior_rotation = NAN,

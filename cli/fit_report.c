@@ -48,7 +48,7 @@ static void print_target(const cli_fit *f)
         return;
     }
     printf("%s: %zu voxels near the shape", cli_fit_kind(f), r->n_used);
-    if (r->n_nan) printf(", %zu left out because they are NaN", r->n_nan);
+    if (r->n_nan) printf(", %zu left out because they are NaN%s", r->n_nan, r->n_cavity ? " or in wide spaces" : "");
     printf(", %.0f %% of the shape in the image\n", 100 * r->inside_share);
     if (f->target.kind != SDM_FIT_IMAGE) return;
     print_law("inside", &r->appearance.inside[0]);

@@ -273,6 +273,8 @@ const cli_option cli_options[] = {
      "two corners of a box: nothing outside of it is looked at"},
     {"margin", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.margin),
      "voxels farther than this outside of the shape are not looked at (default 1.5)"},
+    {"cavity", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.cavity),
+     "leave out spaces that look like the inside and hold a ball of this radius: too wide to be the shape"},
 
     /* fits: how */
     {"image-model", 0, CLI_CHOICE, NULL, "partial|labels", 0, 0, ON(CLI_FIT), AT(fit.image_model),

@@ -122,6 +122,7 @@ static sdm_status check_numbers(const sdm_fit_opts *o, sdm_error *err)
                         {"prior_rotation_sd", o->prior_rotation_sd, true},
                         {"prior_translation_sd", o->prior_translation_sd, true},
                         {"margin", o->margin, false},
+                        {"cavity", o->cavity, true},
                         {"least_inside", o->least_inside, true},
                         {"eps", o->eps, false},
                         {"polish_eps", o->polish_eps, false}};

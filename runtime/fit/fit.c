@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "cavity.h"
 #include "check.h"
 #include "evidence.h"
 #include "posterior.h"
@@ -246,6 +247,12 @@ static sdm_status judge(const fit_problem *p, const sdm_fit_result *r, sdm_error
                 "that the inside is %s; give laws of this kind of image",
                 in, out, darker ? "darker" : "brighter");
     }
+    const double widest = sdm_fit_inradius(&p->maps);
+    if (r->n_cavity && !(widest < o->cavity))
+        return sdm_fail(err, SDM_E_QUALITY,
+                        "the fitted shape holds a ball of %.3g mm, but spaces that hold one of %.3g mm were left out "
+                        "(cavity): give a radius above that of the shape",
+                        widest, o->cavity);
     if (!(r->inside_share >= o->least_inside))
         return sdm_fail(err, SDM_E_QUALITY, "only %.0f %% of the shape lies in the image, need %.0f %% (least_inside)",
                         100 * r->inside_share, 100 * o->least_inside);
@@ -300,11 +307,18 @@ sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target, c
         take_labels(&as_image, &with_labels);
         p.target = &as_image, p.opts = &with_labels, p.given_labels = true;
     }
+    float *values = NULL;
+    if (!s && target->kind == SDM_FIT_IMAGE && opts->cavity > 0) {
+        s = sdm_fit_leave_out_cavities(target, opts, &values, &out->n_cavity, err);
+        as_image = *target, as_image.values = values;
+        p.target = &as_image;
+    }
     if (!s) s = make_result(p.n_params, out, err);
     if (!s) s = begin(&p, out, err);
     if (!s) s = climb(&p, out, err);
     if (!s) s = finish(&p, out, err);
     dispose_problem(&p);
+    sdm_free(values);
     out->seconds = sdm_fit_seconds() - from;
     if (s && s != SDM_E_QUALITY) sdm_fit_dispose(out);
     return s;

@@ -55,6 +55,13 @@ sdm_status sdm_fit_extent(const fit_maps *maps, fit_extent *out, sdm_error *err)
     return SDM_OK;
 }
 
+double sdm_fit_inradius(const fit_maps *maps)
+{
+    float least = 0;
+    for (size_t v = 0; v < maps->n_voxels; v++) least = fminf(least, maps->distance[v]);
+    return -(double)least;
+}
+
 static bool in_region(const sdm_fit_opts *o, const fit_region *r, const double x[3])
 {
     for (int k = 0; o->use_box && k < 3; k++)

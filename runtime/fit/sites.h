@@ -27,6 +27,9 @@ typedef struct fit_extent {
 /* Of the distance that maps holds. SDM_E_QUALITY: nothing is inside. */
 sdm_status sdm_fit_extent(const fit_maps *maps, fit_extent *out, sdm_error *err);
 
+/* Radius of the largest ball in the shape whose centre is a voxel of the map, mm. */
+double sdm_fit_inradius(const fit_maps *maps);
+
 /* A region of the world. */
 typedef struct fit_region {
     double centre[3], radius; // a ball

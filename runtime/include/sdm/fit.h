@@ -117,6 +117,10 @@ typedef struct sdm_fit_opts {
                                   follows the shape and is fixed in the end */
     bool use_box;  /* also no voxels outside of the box, in the world */
     double box_min[3], box_max[3];
+    /* mm, >= 0: voxels of an image in spaces that look like the inside (by `appearance` and `blur` as given) and hold a ball of this radius
+       are left out: they are too wide to be the shape. 0: none. It must be larger than the widest ball within the shape, by a quarter of
+       it or so. */
+    double cavity;
     double least_inside; /* 0 .. 1: share of the volume of the fitted shape that must lie in the image */
 
     size_t max_iterations; /* of the main phase, >= 1 */
@@ -160,7 +164,8 @@ typedef struct sdm_fit_result {
                         what its unknowns cost (Schwarz 1978); below 0 the image holds no such shape. Else NaN */
     double inside_share; /* share of the volume of the shape in the image; 1 for points */
 
-    size_t n_used, n_nan; /* voxels or points used; voxels left out because they are NaN */
+    size_t n_used, n_nan; /* voxels or points used; voxels near the shape left out because they are NaN or n_cavity's */
+    size_t n_cavity;      /* voxels of the image left out by sdm_fit_opts.cavity */
     double noise_factor;  /* variance of the score over that of independent residuals (1: independent, as modelled) */
     double
         model_error_mm; /* near the surface, of the maps of the last phase: held-out figure of the network, 0 for exact ones;

@@ -1,0 +1,127 @@
+/* Opening by a ball: the union of all balls of a radius that the space holds (Matheron 1975), through two exact distance transforms, row
+   by row along each axis as lower envelopes of parabolas (Felzenszwalb and Huttenlocher 2012). */
+#include "cavity.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "blur.h"
+#include "laws.h"
+#include "sdm/memory.h"
+
+// one row of squared distances (INFINITY: none yet), h apart; work holds 2 n + 1 numbers, at n places
+static void transform_row(float *f, size_t stride, int64_t n, double h, double *work, int64_t *at)
+{
+    double *from = work, *value = work + n + 1; // where parabola k of the envelope begins; f at its place
+    int64_t count = 0;
+    for (int64_t i = 0; i < n; i++) {
+        const double here = (double)f[(size_t)i * stride];
+        if (isinf(here)) continue;
+        double begin = -INFINITY;
+        while (count > 0) {
+            const int64_t k = at[count - 1];
+            begin = ((here - value[count - 1]) / (h * h) + (double)(i * i - k * k)) / (double)(2 * (i - k));
+            if (begin > from[count - 1]) break;
+            count--;
+            begin = -INFINITY;
+        }
+        at[count] = i, value[count] = here, from[count] = begin;
+        count++;
+    }
+    if (!count) return;
+    int64_t k = 0;
+    for (int64_t i = 0; i < n; i++) {
+        while (k + 1 < count && from[k + 1] < (double)i) k++;
+        const double way = h * (double)(i - at[k]);
+        f[(size_t)i * stride] = (float)(way * way + value[k]);
+    }
+}
+
+// squared distance, mm^2, of every voxel to the nearest that is 0; the others are INFINITY before
+static sdm_status transform(const sdm_grid *g, int n_threads, float *f, sdm_error *err)
+{
+    const size_t step[3] = {1, (size_t)g->n[0], (size_t)(g->n[0] * g->n[1])};
+    const int64_t longest = g->n[0] > g->n[1] ? g->n[0] : g->n[1], room = longest > g->n[2] ? longest : g->n[2];
+    double *work = NULL;
+    int64_t *at = NULL;
+    sdm_status s = SDM_ALLOC(&work, (size_t)n_threads * (size_t)(2 * room + 1), "rows of an image", err);
+    if (!s) s = SDM_ALLOC(&at, (size_t)n_threads * (size_t)room, "rows of an image", err);
+    for (int axis = 0; axis < 3 && !s; axis++) {
+        const int b = (axis + 1) % 3, c = (axis + 2) % 3;
+        const int64_t rows = g->n[b] * g->n[c];
+#pragma omp parallel for schedule(static, 1) num_threads(n_threads)
+        for (int64_t thread = 0; thread < n_threads; thread++)
+            for (int64_t row = rows * thread / n_threads; row < rows * (thread + 1) / n_threads; row++)
+                transform_row(f + (size_t)(row % g->n[b]) * step[b] + (size_t)(row / g->n[b]) * step[c], step[axis],
+                              g->n[axis], g->spacing[axis], work + thread * (2 * room + 1), at + thread * room);
+    }
+    sdm_free(work);
+    sdm_free(at);
+    return s;
+}
+
+static double log_mixture(const sdm_fit_law *law, size_t n, double value)
+{
+    double sum = 0, most = -INFINITY, all = 0;
+    for (size_t i = 0; i < n; i++) all += law[i].weight;
+    for (int pass = 0; pass < 2; pass++)
+        for (size_t i = 0; i < n; i++) {
+            const double r = (value - law[i].mean) / law[i].sd;
+            const double x = log(law[i].weight / (all * law[i].sd)) - 0.5 * r * r;
+            if (pass)
+                sum += exp(x - most);
+            else
+                most = fmax(most, x);
+        }
+    return most + log(sum);
+}
+
+// 0 where the value is likelier outside or not known, INFINITY where it is likelier inside
+static sdm_status find_walls(const sdm_fit_target *t, const sdm_fit_opts *o, int n_threads, float *wall, sdm_error *err)
+{
+    const size_t n = sdm_grid_count(&t->grid);
+    size_t fields;
+    float *packed = NULL, *spare = NULL;
+    sdm_status s = sdm_mul(n, 2, &fields, err); // sdm_fit_blur() leaves the last field out
+    if (!s) s = SDM_ALLOC(&packed, fields, "smoothed image", err);
+    if (!s) s = SDM_ALLOC(&spare, fields, "smoothed image", err);
+    if (!s) {
+        const sdm_fit_appearance *a = &o->appearance;
+        for (size_t i = 0; i < n; i++) packed[2 * i] = isnan(t->values[i]) ? (float)a->outside[0].mean : t->values[i];
+        sdm_fit_blur(&t->grid, 2, o->blur * o->blur, n_threads, &packed, &spare);
+#pragma omp parallel for schedule(static) num_threads(n_threads)
+        for (size_t i = 0; i < n; i++) {
+            const double v = (double)packed[2 * i];
+            const bool inside = log_mixture(a->inside, a->n_inside, v) > log_mixture(a->outside, a->n_outside, v);
+            wall[i] = inside && !isnan(t->values[i]) ? INFINITY : 0;
+        }
+    }
+    sdm_free(packed);
+    sdm_free(spare);
+    return s;
+}
+
+sdm_status sdm_fit_leave_out_cavities(const sdm_fit_target *target, const sdm_fit_opts *opts, float **values,
+                                      size_t *count, sdm_error *err)
+{
+    const size_t n = sdm_grid_count(&target->grid);
+    const int n_threads = sdm_fit_threads(opts->n_threads);
+    const double square = opts->cavity * opts->cavity;
+    float *distance = NULL;
+    *values = NULL;
+    *count = 0;
+    sdm_status s = SDM_ALLOC(&distance, n, "distance to walls", err);
+    if (!s) s = SDM_ALLOC(values, n, "image", err);
+    if (!s) s = find_walls(target, opts, n_threads, distance, err);
+    if (!s) s = transform(&target->grid, n_threads, distance, err);
+    for (size_t i = 0; i < n && !s; i++) distance[i] = (double)distance[i] >= square ? 0 : INFINITY; // centres of balls
+    if (!s) s = transform(&target->grid, n_threads, distance, err);
+    for (size_t i = 0; i < n && !s; i++) {
+        const bool out = (double)distance[i] < square && !isnan(target->values[i]);
+        (*values)[i] = out ? NAN : target->values[i];
+        *count += out;
+    }
+    sdm_free(distance);
+    if (s) sdm_free(*values), *values = NULL;
+    return s;
+}

@@ -60,7 +60,6 @@ static inline int v8_greater(v8f a, v8f b)
 {
     return _mm256_movemask_ps(_mm256_cmp_ps((__m256)a, (__m256)b, _CMP_GT_OQ));
 }
-static inline int f4_greater(v4f a, v4f b) { return _mm_movemask_ps((__m128)(a > b)); }
 /* Turns the sign of a where that of m is set. */
 static inline v8f v8_turn(v8f a, v8f m)
 {
@@ -105,11 +104,6 @@ static inline int v8_greater(v8f a, v8f b)
     int bits = 0;
     for (int i = 0; i < 8; i++) bits |= (m[i] & 1) << i;
     return bits;
-}
-static inline int f4_greater(v4f a, v4f b)
-{
-    const v4i m = a > b;
-    return (m[0] & 1) | (m[1] & 2) | (m[2] & 4) | (m[3] & 8);
 }
 static inline v8f v8_turn(v8f a, v8f m) { return (v8f)((v8i)a ^ ((v8i)m & INT32_MIN)); }
 static inline void v8_permute(uint32_t *out, v8i a, const uint8_t *order)

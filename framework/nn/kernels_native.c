@@ -54,8 +54,12 @@ static size_t least(size_t a, size_t b) { return a < b ? a : b; }
 // one full panel: packed[k][width]; width is a constant where this is inlined
 static inline void pack_panel(size_t width, size_t k, const float *src, size_t along, size_t deep, float *packed)
 {
-    for (size_t p = 0; p < k; p++, src += deep, packed += width)
-        for (size_t i = 0; i < width; i++) packed[i] = src[i * along];
+    for (size_t p = 0; p < k; p++, src += deep, packed += width) {
+        if (along == 1)
+            memcpy(packed, src, width * sizeof *packed);
+        else
+            for (size_t i = 0; i < width; i++) packed[i] = src[i * along];
+    }
 }
 
 // packed[panels][k][width] from a view, zero beyond `count`
@@ -68,11 +72,7 @@ static void pack(size_t count, size_t k, const float *data, size_t along, size_t
             memset(packed, 0, k * width * sizeof *packed);
             for (size_t p = 0; p < k; p++)
                 for (size_t i = 0; i < n; i++) packed[p * width + i] = src[i * along + p * deep];
-        } else if (along == 1 && width == 16)
-            pack_panel(16, k, src, 1, deep, packed);
-        else if (along == 1 && width == 6)
-            pack_panel(6, k, src, 1, deep, packed);
-        else if (width == 16)
+        } else if (width == 16)
             pack_panel(16, k, src, along, deep, packed);
         else if (width == 6)
             pack_panel(6, k, src, along, deep, packed);

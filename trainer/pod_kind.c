@@ -130,7 +130,9 @@ static sdm_status build(const trainer *t, const sdm_model_info *info, uint8_t **
     sdm_pod_spec spec = {.info = info,
                          .arch = t->arch,
                          .blocks = t->blocks,
-                         .half = t->config->network.weights == SDM_WEIGHT_F16,
+                         .type = t->config->network.weights == SDM_WEIGHT_I8    ? SDM_POD_I8
+                                 : t->config->network.weights == SDM_WEIGHT_F16 ? SDM_POD_F16
+                                                                                : SDM_POD_F32,
                          .weights = {.head = w + t->head_at, .mean = w + t->mean_at, .basis = w + t->basis_at}};
     for (size_t l = 0; l < t->arch.depth; l++) {
         spec.weights.layer[l] = mlp_layer(&t->arch, w, l);

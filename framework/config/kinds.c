@@ -66,4 +66,8 @@ void sdm_kinds_settle(sdm_reader *r, sdm_mark place)
     if (kind == SDM_NETWORK_DEEPSDF && !sdm_mark_is_set(sdm_fields_given(r, "network", "skip")->mark))
         r->config->network.skip = r->config->network.depth / 2;
     check_limits(r, place);
+    const sdm_given *g = sdm_fields_given(r, "network", "weights");
+    if (kind != SDM_NETWORK_POD && r->config->network.weights == SDM_WEIGHT_I8 && !g->refused)
+        sdm_mistakes_add(r->mistakes, sdm_mark_is_set(g->mark) ? g->mark : place,
+                         "network.weights: i8 is for a network of kind pod; %s has f16 and f32", chosen);
 }

@@ -60,7 +60,7 @@ static const char *const DEPTH[] = {"3", "4", "8", "5"}, *const WIDTH[] = {"128"
                          *const BLOCK[] = {"4", "2", "4", "4"},
                          *const ACTIVATION[] = {"silu", "relu", "relu", "leaky_relu"},
                          *const OUTPUT_TYPE[] = {"linear", "linear", "tanh", "linear"},
-                         *const BATCH[] = {"256", "8", "16", "16"}, *const RATE[] = {"3e-3", "1e-3", "5e-4", "5e-4"};
+                         *const WEIGHTS[] = {"i8", "f16", "f16", "f16"}, *const BATCH[] = {"256", "8", "16", "16"}, *const RATE[] = {"3e-3", "1e-3", "5e-4", "5e-4"};
 
 // clang-format off
 static const sdm_field SHAPE[] = {
@@ -105,7 +105,8 @@ static const sdm_field NETWORK[] = {
      .kinds = POINTS, .kind_defs = OUTPUT_TYPE, .help = "what the last layer gives; tanh: bounded by the largest distance of the maps"},
     {.key = "activation", .type = SDM_FIELD_CHOICE, .offset = AT(network.activation), .choices = "silu|tanh|relu|leaky_relu",
      .unit = "", .kind_defs = ACTIVATION, .help = "activation of the hidden layers"},
-    CHOICE("weights", network.weights, "f32|f16", "f16", "type of the large weights in the model file"),
+    {.key = "weights", .type = SDM_FIELD_CHOICE, .offset = AT(network.weights), .choices = "f32|f16|i8", .unit = "", .kind_defs = WEIGHTS,
+     .help = "type of the large weights in the model file; i8, pod only: bytes, two for a weight where one is not enough"},
 };
 
 static const sdm_field DATA[] = {

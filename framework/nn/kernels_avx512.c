@@ -11,4 +11,6 @@ static inline __m512 load_half(const uint16_t *p)
 {
     return _mm512_cvtph_ps(_mm256_loadu_si256((const __m256i *)(const void *)p));
 }
+#define LOAD_PAIRS(p) ((veci)_mm512_cvtepi8_epi16(_mm256_loadu_si256((const __m256i *)(const void *)(p))))
+#define MADD(a, b) ((veci)_mm512_madd_epi16((__m512i)(a), (__m512i)(b)))
 #include "kernels_simd.h"

@@ -2,8 +2,14 @@
 #define TABLE sdm_kernels_generic
 #if defined(__x86_64__)
 #define ISA "sse2"
+#include <emmintrin.h>
+#define MADD(a, b) ((veci)_mm_madd_epi16((__m128i)(a), (__m128i)(b)))
 #elif defined(__aarch64__)
 #define ISA "neon"
+#include <arm_neon.h>
+#define MADD(a, b)                                                                                                     \
+    ((veci)vpaddq_s32(vmull_s16(vget_low_s16((int16x8_t)(a)), vget_low_s16((int16x8_t)(b))),                           \
+                      vmull_high_s16((int16x8_t)(a), (int16x8_t)(b))))
 #else
 #define ISA "generic"
 #endif

@@ -18,7 +18,7 @@ static int usable(int level)
     // every processor with AVX2 has F16C (clang 14 does not know the name)
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) best = 1;
     if (best && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
-        __builtin_cpu_supports("avx512dq"))
+        __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw"))
         best = 2;
 #endif
     return level >= 0 && level < best ? level : best;
@@ -164,6 +164,57 @@ void sdm_panel_back_f32(size_t outputs, size_t k, const float *w, const float *y
 void sdm_panel_back_f16(size_t outputs, size_t k, const uint16_t *w, const float *y, float *x)
 {
     kernels()->back_f16(sdm_panel_outputs(outputs), k, w, y, x);
+}
+
+size_t sdm_panel_i8_count(size_t outputs, size_t n_coarse, size_t k)
+{
+    const size_t inputs = sdm_panel_even(n_coarse) + sdm_panel_even(k), most = SIZE_MAX - SDM_PANEL;
+    return outputs > most || k >= SIZE_MAX / 4 || n_coarse > k ||
+                   (inputs && sdm_panel_outputs(outputs) > SIZE_MAX / inputs)
+               ? SIZE_MAX
+               : sdm_panel_outputs(outputs) * inputs;
+}
+
+int sdm_panel_i8_limit(size_t n_coarse, size_t k)
+{
+    const double limit = INT32_MAX / ((double)SDM_COARSE * (double)n_coarse + 128 * (double)(k ? k : 1));
+    return limit > 32767 ? 32767 : limit > 1 ? (int)limit : 1;
+}
+
+// one part, coarse or fine, of a panel from output o on
+static int8_t *pack_part(bool coarse, size_t o, size_t outputs, size_t n, size_t k, const int16_t *w, int8_t *to)
+{
+    for (size_t i = 0; i < n; i += 2)
+        for (size_t j = o; j < o + SDM_PANEL; j++)
+            for (size_t q = i; q < i + 2; q++) {
+                const int16_t v = j < outputs && q < n ? w[j * k + q] : 0, high = (int16_t)((v + 128) >> 8);
+                *to++ = (int8_t)(coarse ? high : v - 256 * high);
+            }
+    return to;
+}
+
+void sdm_panel_pack_i8(size_t outputs, size_t n_coarse, size_t k, const int16_t *w, int8_t *panels)
+{
+    for (size_t o = 0; o < outputs; o += SDM_PANEL) {
+        panels = pack_part(true, o, outputs, n_coarse, k, w, panels);
+        panels = pack_part(false, o, outputs, k, k, w, panels);
+    }
+}
+
+float sdm_quantise(size_t n, const float *y, const float *factor, int limit, int16_t *x)
+{
+    return kernels()->quantise(n, y, factor, limit, x);
+}
+
+void sdm_panel_i8(size_t batch, size_t outputs, size_t n_coarse, size_t k, const int8_t *w, const int16_t *x,
+                  size_t ldx, const float *scale, float *y, size_t ldy)
+{
+    kernels()->panel_i8(batch, sdm_panel_outputs(outputs), n_coarse, k, w, x, ldx, scale, y, ldy);
+}
+
+void sdm_panel_back_i8(size_t outputs, size_t n_coarse, size_t k, const int8_t *w, const float *y, float *x)
+{
+    kernels()->back_i8(sdm_panel_outputs(outputs), n_coarse, k, w, y, x);
 }
 
 void sdm_exp(size_t n, const float *x, float *y) { kernels()->exp(n, x, y); }

@@ -174,6 +174,8 @@ static inline vec load_half(const uint16_t *p)
 PANEL(float, f32, load)
 PANEL(uint16_t, f16, load_half)
 
+#include "kernels_bytes.h"
+
 // exp by 2^n times a polynomial of degree 6 on [-ln 2 / 2, ln 2 / 2] (coefficients: Taylor, adjusted by the Cephes library's expf)
 static inline vec exp_vec(vec x)
 {
@@ -222,4 +224,7 @@ const kernel_table TABLE = {.name = ISA,
                             .panel_f16 = panel_f16,
                             .back_f32 = back_f32,
                             .back_f16 = back_f16,
+                            .panel_i8 = panel_i8,
+                            .back_i8 = back_i8,
+                            .quantise = quantise,
                             .exp = exp_all};

@@ -17,6 +17,11 @@ typedef struct kernel_table {
                       size_t ldy);
     void (*back_f32)(size_t outputs, size_t k, const float *w, const float *y, float *x);
     void (*back_f16)(size_t outputs, size_t k, const uint16_t *w, const float *y, float *x);
+    /* sdm_panel_i8(), sdm_panel_back_i8() and sdm_quantise(); outputs: a multiple of 16 */
+    void (*panel_i8)(size_t batch, size_t outputs, size_t n_coarse, size_t k, const int8_t *w, const int16_t *x,
+                     size_t ldx, const float *scale, float *y, size_t ldy);
+    void (*back_i8)(size_t outputs, size_t n_coarse, size_t k, const int8_t *w, const float *y, float *x);
+    float (*quantise)(size_t n, const float *y, const float *factor, int limit, int16_t *x);
     void (*exp)(size_t n, const float *x, float *y);
 } kernel_table;
 

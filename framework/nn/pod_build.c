@@ -1,7 +1,7 @@
 /* Making of a pod model's file from weights: architecture and panels. */
 #include <string.h>
 
-#include "pod_internal.h"
+#include "pod_quantise.h"
 #include "sdm/kernels.h"
 #include "sdm/memory.h"
 
@@ -15,8 +15,8 @@ static void describe(const sdm_pod_spec *spec, sdm_text *t)
     const sdm_pod_arch *k = &spec->arch;
     sdm_model_describe(spec->info, sdm_kind_pod.name, t);
     sdm_text_add(t,
-                 "pod.degree=%zu\npod.input_degree=%zu\npod.depth=%zu\npod.width=%zu\npod.activation=%d\npod.half=%d\n",
-                 k->degree, k->input_degree, k->depth, k->width, k->activation, spec->half);
+                 "pod.degree=%zu\npod.input_degree=%zu\npod.depth=%zu\npod.width=%zu\npod.activation=%d\npod.type=%d\n",
+                 k->degree, k->input_degree, k->depth, k->width, k->activation, (int)spec->type);
     sdm_text_add(t, "pod.block=%zu\npod.levels=%zu\n", k->block, k->levels.n);
 }
 
@@ -27,84 +27,141 @@ size_t sdm_pod_mlp_count(const sdm_pod_arch *a)
     return n;
 }
 
-static size_t place_block(const sdm_pod_block *blocks, size_t b, size_t next, size_t *at)
+size_t sdm_pod_count_weights(sdm_pod_type type, size_t outputs, size_t n_coarse, size_t k)
+{
+    return type == SDM_POD_I8 ? sdm_panel_i8_count(outputs, n_coarse, k) : sdm_panel_count(outputs, k);
+}
+
+static size_t place_block(sdm_pod_type type, const sdm_pod_block *blocks, const uint32_t *coarse, size_t b, size_t next,
+                          size_t *at)
 {
     at[b] = next;
-    next += sdm_panel_count(sdm_pod_outputs(blocks, b), blocks[b].rank);
-    for (size_t i = 0; i < blocks[b].n_children; i++) next = place_block(blocks, blocks[b].child + i, next, at);
+    next += sdm_pod_count_weights(type, sdm_pod_outputs(blocks, b), coarse ? coarse[b] : 0, blocks[b].rank);
+    for (size_t i = 0; i < blocks[b].n_children; i++)
+        next = place_block(type, blocks, coarse, blocks[b].child + i, next, at);
     return next;
 }
 
-size_t sdm_pod_place_weights(const sdm_pod_levels *levels, const sdm_pod_block *blocks, size_t *at)
+size_t sdm_pod_place_weights(sdm_pod_type type, const sdm_pod_levels *levels, const sdm_pod_block *blocks,
+                             const uint32_t *coarse, size_t *at)
 {
     size_t next = 0;
     for (size_t b = levels->first[levels->n - 1]; b < levels->first[levels->n]; b++)
-        next = place_block(blocks, b, next, at);
+        next = place_block(type, blocks, coarse, b, next, at);
     return next;
 }
 
-static void pack_matrix(bool half, size_t outputs, size_t k, sdm_view w, void *to, size_t offset)
+void sdm_pod_place_coefficients(const sdm_pod_levels *levels, const sdm_pod_block *blocks,
+                                size_t at[SDM_POD_MAX_LEVELS + 1])
 {
-    if (half)
+    at[0] = 0;
+    for (size_t l = 0; l < levels->n; l++) {
+        const sdm_pod_block *last = &blocks[levels->first[l + 1] - 1];
+        at[l + 1] = at[l] + last->coefficient + last->rank;
+    }
+}
+
+static void pack_matrix(sdm_pod_type type, size_t outputs, size_t k, sdm_view w, void *to, size_t offset)
+{
+    if (type == SDM_POD_F16)
         sdm_panel_pack_f16(outputs, k, w, (uint16_t *)to + offset);
     else
         sdm_panel_pack_f32(outputs, k, w, (float *)to + offset);
 }
 
-static void pack_weights(const sdm_pod_spec *spec, const size_t *at, void *mlp, float *bias, void *head, void *basis)
+// integers: NULL but for bytes
+static void pack_weights(const sdm_pod_spec *spec, const pod_integers *integers, const size_t *at, void *mlp,
+                         float *bias, void *head, void *basis)
 {
     const sdm_pod_arch *a = &spec->arch;
+    const size_t n_blocks = a->levels.first[a->levels.n];
     size_t next = 0;
     for (size_t l = 0; l < a->depth; l++) {
         const size_t k = sdm_pod_layer_inputs(a, l);
-        pack_matrix(spec->half, a->width, k, (sdm_view){spec->weights.layer[l], k, 1}, mlp, next);
+        pack_matrix(sdm_pod_mlp_type(spec->type), a->width, k, (sdm_view){spec->weights.layer[l], k, 1}, mlp, next);
         next += sdm_panel_count(a->width, k);
         memcpy(bias + l * a->width, spec->weights.bias[l], a->width * sizeof *bias);
     }
-    pack_matrix(spec->half, a->n_coefficients, a->n_latent, (sdm_view){spec->weights.head, a->n_latent, 1}, head, 0);
-    const float *from = spec->weights.basis;
-    for (size_t b = 0; b < a->levels.first[a->levels.n]; b++) {
+    if (integers)
+        sdm_panel_pack_i8(a->n_coefficients, integers->coarse[n_blocks], a->n_latent, integers->head, head);
+    else
+        pack_matrix(spec->type, a->n_coefficients, a->n_latent, (sdm_view){spec->weights.head, a->n_latent, 1}, head,
+                    0);
+    for (size_t b = 0, from = 0; b < n_blocks; b++) {
         const size_t outputs = sdm_pod_outputs(spec->blocks, b), rank = spec->blocks[b].rank;
-        pack_matrix(spec->half, outputs, rank, (sdm_view){from, 1, outputs}, basis, at[b]);
+        if (integers)
+            sdm_panel_pack_i8(outputs, integers->coarse[b], rank, integers->basis + from, (int8_t *)basis + at[b]);
+        else
+            pack_matrix(spec->type, outputs, rank, (sdm_view){spec->weights.basis + from, 1, outputs}, basis, at[b]);
         from += outputs * rank;
     }
 }
 
-sdm_status sdm_pod_build(const sdm_pod_spec *spec, uint8_t **bytes, size_t *size, sdm_error *err)
+// little-endian numbers of 32 bits
+static void put_numbers(const uint32_t *from, size_t n, uint8_t *to)
+{
+    for (size_t i = 0; i < n; i++)
+        for (int b = 0; b < 4; b++) *to++ = (uint8_t)(from[i] >> (8 * b));
+}
+
+static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, uint8_t **bytes, size_t *size,
+                        sdm_error *err)
 {
     const sdm_pod_arch *a = &spec->arch;
-    const size_t weight = spec->half ? sizeof(uint16_t) : sizeof(float), n_blocks = a->levels.first[a->levels.n];
-    const size_t mlp_count = sdm_pod_mlp_count(a), head_count = sdm_panel_count(a->n_coefficients, a->n_latent);
+    const size_t number = sdm_pod_size(spec->type), n_blocks = a->levels.first[a->levels.n];
+    const size_t mlp_count = sdm_pod_mlp_count(a), mlp_number = sdm_pod_size(sdm_pod_mlp_type(spec->type));
+    const size_t head_count =
+        sdm_pod_count_weights(spec->type, a->n_coefficients, integers ? integers->coarse[n_blocks] : 0, a->n_latent);
     float *bias = NULL;
-    size_t *at = NULL, basis_count = 0;
-    uint8_t *mlp = NULL, *head = NULL, *basis = NULL, *ranks = NULL;
+    size_t *at = NULL, basis_count = 0, all[SDM_POD_MAX_LEVELS + 1];
+    uint8_t *mlp = NULL, *head = NULL, *basis = NULL, *ranks = NULL, *coarse = NULL;
     sdm_text text = {0};
     sdm_status s = SDM_ALLOC(&at, n_blocks, "model weights", err);
-    if (!s) basis_count = sdm_pod_place_weights(&a->levels, spec->blocks, at);
-    if (!s) s = SDM_ALLOC(&mlp, mlp_count * weight, "model weights", err);
+    if (!s)
+        basis_count =
+            sdm_pod_place_weights(spec->type, &a->levels, spec->blocks, integers ? integers->coarse : NULL, at);
+    if (!s) s = SDM_ALLOC(&mlp, mlp_count * mlp_number, "model weights", err);
     if (!s) s = SDM_ALLOC(&bias, a->depth * a->width, "model weights", err);
-    if (!s) s = SDM_ALLOC(&head, head_count * weight, "model weights", err);
-    if (!s) s = SDM_ALLOC(&basis, basis_count * weight, "model weights", err);
+    if (!s) s = SDM_ALLOC(&head, head_count * number, "model weights", err);
+    if (!s) s = SDM_ALLOC(&basis, basis_count * number, "model weights", err);
     if (!s) s = SDM_ALLOC(&ranks, n_blocks * 4, "model weights", err);
+    if (!s) s = SDM_ALLOC(&coarse, (n_blocks + 1) * 4, "model weights", err);
     if (s) goto done;
-    pack_weights(spec, at, mlp, bias, head, basis);
-    for (size_t b = 0; b < n_blocks; b++)
-        for (int i = 0; i < 4; i++) ranks[4 * b + (size_t)i] = (uint8_t)(spec->blocks[b].rank >> (8 * i));
+    pack_weights(spec, integers, at, mlp, bias, head, basis);
+    for (size_t b = 0; b < n_blocks; b++) put_numbers(&spec->blocks[b].rank, 1, ranks + 4 * b);
+    if (integers) put_numbers(integers->coarse, n_blocks + 1, coarse);
+    sdm_pod_place_coefficients(&a->levels, spec->blocks, all);
     describe(spec, &text);
-    const sdm_section sections[] = {{"pod.ranks", ranks, n_blocks * 4},
-                                    {"pod.mlp", mlp, mlp_count * weight},
-                                    {"pod.bias", bias, a->depth * a->width * sizeof *bias},
-                                    {"pod.head", head, head_count * weight},
-                                    {"pod.basis", basis, basis_count * weight},
-                                    {"pod.mean", spec->weights.mean, a->n_voxels * sizeof(float)}};
-    s = sdm_model_pack(spec->info, &text, sections, sizeof sections / sizeof *sections, bytes, size, err);
+    const sdm_section sections[] = {
+        {"pod.ranks", ranks, n_blocks * 4},
+        {"pod.mlp", mlp, mlp_count * mlp_number},
+        {"pod.bias", bias, a->depth * a->width * sizeof *bias},
+        {"pod.head", head, head_count * number},
+        {"pod.basis", basis, basis_count * number},
+        {"pod.mean", spec->weights.mean, a->n_voxels * sizeof(float)},
+        {"pod.coarse", coarse, (n_blocks + 1) * 4},
+        {"pod.order", integers ? integers->order : NULL, a->n_latent * sizeof(uint32_t)},
+        {"pod.factor", integers ? integers->factor : NULL, (all[a->levels.n] + a->n_latent) * sizeof(float)}};
+    const size_t n = sizeof sections / sizeof *sections;
+    s = sdm_model_pack(spec->info, &text, sections, integers ? n : n - 3, bytes, size, err);
 done:
     sdm_text_dispose(&text);
+    sdm_free(coarse);
     sdm_free(ranks);
     sdm_free(basis);
     sdm_free(head);
     sdm_free(bias);
     sdm_free(mlp);
     sdm_free(at);
+    return s;
+}
+
+sdm_status sdm_pod_build(const sdm_pod_spec *spec, uint8_t **bytes, size_t *size, sdm_error *err)
+{
+    if (spec->type != SDM_POD_I8) return build(spec, NULL, bytes, size, err);
+    pod_integers integers;
+    sdm_status s = sdm_pod_quantise(spec, &integers, err);
+    if (!s) s = build(spec, &integers, bytes, size, err);
+    sdm_pod_integers_dispose(&integers);
     return s;
 }

@@ -12,16 +12,34 @@ enum { ROWS = 12 }; // twice the six rows of the kernels: what they need of a bl
 
 static size_t smaller(size_t a, size_t b) { return a < b ? a : b; }
 
+// rows as integers, each with the factor that gives it back
+typedef struct integers {
+    int16_t *x;
+    float *scale; // [R]
+    size_t ld;
+} integers;
+
 // scratch, carved from the caller's block
 typedef struct workspace {
     pod_latent latent;
     float *z;                     // [R][L]
     float *c;                     // [R][padded K]
     float *y[SDM_POD_MAX_LEVELS]; // [R][padded outputs of a block], for each thread
+    // bytes only: inputs of the head, and of the blocks of a level that get theirs together, as integers
+    integers z_integers, x_integers[SDM_POD_MAX_LEVELS]; // [R][padded L]; [R][padded group], for each thread
+    float *sorted; // [padded L, or most inputs of a block] in the order of columns
     size_t per_thread;
 } workspace;
 
 static size_t padded(size_t floats) { return (floats + 15) / 16 * 16; }
+
+// rows of n integers, and one more that is read, from memory[at]; returns their floats
+static size_t carve_integers(size_t rows, size_t n, float *memory, size_t at, integers *to)
+{
+    *to = (integers){.ld = padded(n + 1)};
+    if (memory) to->scale = memory + at, to->x = (int16_t *)(memory + at + padded(rows));
+    return padded(rows) + rows * to->ld / 2;
+}
 
 static size_t carve(const pod_network *m, size_t rows, size_t directions, int n_threads, float *memory, workspace *w)
 {
@@ -31,10 +49,21 @@ static size_t carve(const pod_network *m, size_t rows, size_t directions, int n_
     total += padded(rows * a->n_latent);
     w->c = memory ? memory + total : NULL;
     total += rows * sdm_panel_outputs(a->n_coefficients);
+    if (m->type == SDM_POD_I8) {
+        size_t most = a->n_latent;
+        for (size_t l = 0; l < a->levels.n; l++)
+            if (m->max_group[l] > most) most = m->max_group[l];
+        w->sorted = memory ? memory + total : NULL;
+        total += padded(most + 1);
+        total += padded(carve_integers(rows, a->n_latent, memory, total, &w->z_integers));
+    }
     w->per_thread = 0;
     for (size_t l = 0; l < a->levels.n; l++) {
         w->y[l] = memory ? memory + total + w->per_thread : NULL;
         w->per_thread += rows * sdm_panel_outputs(m->max_outputs[l]);
+        if (m->type == SDM_POD_I8)
+            w->per_thread +=
+                padded(carve_integers(rows, m->max_group[l], memory, total + w->per_thread, &w->x_integers[l]));
     }
     return (total + w->per_thread * (size_t)n_threads) * sizeof(float);
 }
@@ -79,18 +108,59 @@ typedef struct job {
     const workspace *w;
 } job;
 
-// x[R][ldx]: coefficients of block b of `level`
-static void decode_block(const job *j, size_t b, size_t level, size_t thread, const float *x, size_t ldx)
+// what goes into a block: floats, or integers when weights are bytes
+typedef struct input {
+    const float *x; // [R][ld]
+    integers q;     // [R][q.ld]
+    size_t ld;
+} input;
+
+static input input_from(input in, size_t first)
+{
+    if (in.x) in.x += first;
+    if (in.q.x) in.q.x += first;
+    return in;
+}
+
+// n coefficients of `level` from `first` on, c[R][ldc], made ready for their blocks
+static input ready(const job *j, size_t level, size_t first, size_t n, size_t thread, const float *c, size_t ldc)
+{
+    const pod_network *m = j->m;
+    if (m->type != SDM_POD_I8) return (input){.x = c, .ld = ldc};
+    integers q = j->w->x_integers[level];
+    q.x += 2 * thread * j->w->per_thread; // counted in floats
+    q.scale += thread * j->w->per_thread;
+    const float *factor = m->factor + m->coefficients_at[level] + first;
+    for (size_t r = 0; r < j->rows; r++) {
+        q.scale[r] = sdm_quantise(n, c + r * ldc, factor, m->limit[level], q.x + r * q.ld);
+        q.x[r * q.ld + n] = 0; // read beside an odd last one, times zero
+    }
+    return (input){.q = q};
+}
+
+static void block_product(const job *j, size_t b, const input *in, float *y, size_t ldy)
+{
+    const pod_network *m = j->m;
+    if (m->type == SDM_POD_I8)
+        sdm_panel_i8(j->rows, m->outputs[b], m->coarse[b], m->blocks[b].rank,
+                     (const int8_t *)m->basis + m->weights_at[b], in->q.x, in->q.ld, in->q.scale, y, ldy);
+    else
+        sdm_pod_product(m->type, j->rows, m->outputs[b], m->blocks[b].rank, m->basis, m->weights_at[b], in->x, in->ld,
+                        y, ldy);
+}
+
+static void decode_block(const job *j, size_t b, size_t level, size_t thread, input in)
 {
     const pod_network *m = j->m;
     const sdm_pod_block *k = &m->blocks[b];
     const size_t ldy = sdm_panel_outputs(m->max_outputs[level]);
     float *y = j->w->y[level] + thread * j->w->per_thread;
-    sdm_pod_product(m->half, j->rows, m->outputs[b], k->rank, m->basis, m->weights_at[b], x, ldx, y, ldy);
+    block_product(j, b, &in, y, ldy);
     if (level > 0) {
         const uint32_t first = m->blocks[k->child].coefficient;
+        const input below = ready(j, level - 1, first, m->outputs[b], thread, y, ldy);
         for (size_t i = k->child; i < k->child + k->n_children; i++)
-            decode_block(j, i, level - 1, thread, y + (m->blocks[i].coefficient - first), ldy);
+            decode_block(j, i, level - 1, thread, input_from(below, m->blocks[i].coefficient - first));
         return;
     }
     for (size_t r = 0; r < j->rows; r++) {
@@ -99,6 +169,34 @@ static void decode_block(const job *j, size_t b, size_t level, size_t thread, co
             place(j->grid, k, 4, y + r * ldy, mean, j->maps[r]);
         else
             place(j->grid, k, k->size[0], y + r * ldy, mean, j->maps[r]);
+    }
+}
+
+// coefficients `at` to `at` + n of the highest level
+static void head_product(const job *j, size_t at, size_t n, size_t ldc)
+{
+    const pod_network *m = j->m;
+    const size_t latent = m->arch.n_latent, coarse = sdm_pod_head_coarse(m);
+    const size_t weights = sdm_pod_count_weights(m->type, at, coarse, latent);
+    if (m->type == SDM_POD_I8)
+        sdm_panel_i8(j->rows, n, coarse, latent, (const int8_t *)m->head + weights, j->w->z_integers.x,
+                     j->w->z_integers.ld, j->w->z_integers.scale, j->w->c + at, ldc);
+    else
+        sdm_pod_product(m->type, j->rows, n, latent, m->head, weights, j->w->z, latent, j->w->c + at, ldc);
+}
+
+// latent variables in the order of the head's columns, as integers
+static void quantise_latent(const job *j)
+{
+    const pod_network *m = j->m;
+    const size_t latent = m->arch.n_latent;
+    const integers *q = &j->w->z_integers;
+    const float *factor = m->factor + m->coefficients_at[m->arch.levels.n];
+    float *sorted = j->w->sorted;
+    for (size_t r = 0; r < j->rows; r++) {
+        for (size_t i = 0; i < latent; i++) sorted[i] = j->w->z[r * latent + m->order[i]];
+        q->scale[r] = sdm_quantise(latent, sorted, factor, m->limit[m->arch.levels.n], q->x + r * q->ld);
+        q->x[r * q->ld + latent] = 0;
     }
 }
 
@@ -111,6 +209,7 @@ static void decode(const job *j, int n_threads)
     const size_t ldc = sdm_panel_outputs(a->n_coefficients), top = a->levels.n - 1;
     const long parts = (long)((a->n_coefficients + PART - 1) / PART);
     const long first = (long)a->levels.first[top], end = (long)a->levels.first[top + 1];
+    if (m->type == SDM_POD_I8) quantise_latent(j);
 #ifdef _OPENMP
 #pragma omp parallel num_threads(n_threads) if (n_threads > 1)
 #else
@@ -124,14 +223,15 @@ static void decode(const job *j, int n_threads)
 #endif
         for (long i = 0; i < parts; i++) {
             const size_t o = (size_t)i * PART;
-            sdm_pod_product(m->half, j->rows, smaller(PART, a->n_coefficients - o), a->n_latent, m->head,
-                            o * a->n_latent, j->w->z, a->n_latent, j->w->c + o, ldc);
+            head_product(j, o, smaller(PART, a->n_coefficients - o), ldc);
         }
 #ifdef _OPENMP
 #pragma omp for schedule(dynamic)
 #endif
         for (long b = first; b < end; b++)
-            decode_block(j, (size_t)b, top, thread, j->w->c + m->blocks[b].coefficient, ldc);
+            decode_block(j, (size_t)b, top, thread,
+                         ready(j, top, m->blocks[b].coefficient, m->blocks[b].rank, thread,
+                               j->w->c + m->blocks[b].coefficient, ldc));
     }
 }
 
@@ -219,7 +319,14 @@ static void back_block(const pod_network *m, const sdm_grid *g, size_t b, size_t
             for (size_t v = 0; v < k->size[1]; v++, to += k->size[0])
                 memcpy(to, from + v * line, k->size[0] * sizeof *to);
     }
-    sdm_pod_product_back(m->half, m->outputs[b], k->rank, m->basis, m->weights_at[b], y, x);
+    if (m->type == SDM_POD_I8) {
+        const float *factor = m->factor + m->coefficients_at[level] + k->coefficient;
+        sdm_panel_back_i8(m->outputs[b], m->coarse[b], k->rank, (const int8_t *)m->basis + m->weights_at[b], y,
+                          w->sorted);
+        for (size_t i = 0; i < k->rank; i++) x[i] = factor[i] * w->sorted[i];
+    } else {
+        sdm_pod_product_back(m->type, m->outputs[b], k->rank, m->basis, m->weights_at[b], y, x);
+    }
 }
 
 size_t sdm_pod_vjp_scratch_bytes(const sdm_model *m)
@@ -240,6 +347,12 @@ void sdm_pod_vjp(const sdm_model *m, const double *params, const float *adjoint,
         back_block(k, &m->info.grid, b, top, adjoint, &w, w.c + k->blocks[b].coefficient);
     memset(w.c + a->n_coefficients, 0, (sdm_panel_outputs(a->n_coefficients) - a->n_coefficients) * sizeof *w.c);
     float *dz = w.z + a->n_latent;
-    sdm_pod_product_back(k->half, a->n_coefficients, a->n_latent, k->head, 0, w.c, dz);
+    if (k->type == SDM_POD_I8) {
+        const float *factor = k->factor + k->coefficients_at[a->levels.n];
+        sdm_panel_back_i8(a->n_coefficients, sdm_pod_head_coarse(k), a->n_latent, k->head, w.c, w.sorted);
+        for (size_t i = 0; i < a->n_latent; i++) dz[k->order[i]] = factor[i] * w.sorted[i];
+    } else {
+        sdm_pod_product_back(k->type, a->n_coefficients, a->n_latent, k->head, 0, w.c, dz);
+    }
     sdm_pod_latent_back(m, params, &w.latent, dz, gradient);
 }

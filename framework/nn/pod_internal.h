@@ -3,18 +3,29 @@
 #define SDM_POD_INTERNAL_H
 
 #include "model_kind.h"
+#include "sdm/kernels.h"
 #include "sdm/pod.h"
 
 typedef struct pod_network {
     sdm_pod_arch arch;
-    bool half;
+    sdm_pod_type type;
     sdm_pod_block *blocks;
-    uint32_t *outputs;                    /* [blocks] V_b */
-    size_t *weights_at;                   /* [blocks] where the weights of a block begin in basis */
+    uint32_t *outputs;  /* [blocks] V_b */
+    size_t *weights_at; /* [blocks] where the weights of a block begin in basis */
+    size_t coefficients_at[SDM_POD_MAX_LEVELS +
+                           1]; /* where the coefficients of a level begin among all; the last: their number C */
+    size_t max_group
+        [SDM_POD_MAX_LEVELS]; /* most coefficients of a level that are made together: of the highest those of a block, else
+                                             those of all children of a block */
+    /* Bytes only (pod_quantise.h). */
+    uint32_t *coarse;                     /* [blocks + 1] the last: of the head */
+    const uint32_t *order;                /* [L] */
+    const float *factor;                  /* [C + L] */
+    int limit[SDM_POD_MAX_LEVELS + 1];    /* of inputs of a level as integers; the last: of the head */
     uint8_t *exponents;                   /* [max(F, 1 + I)][P] */
     const float *bias[SDM_POD_MAX_DEPTH]; /* [W] */
     const float *mean;                    /* block order */
-    /* Panels (sdm/kernels.h), float or half. The basis: a block of the highest level, then those below it, depth first, which is the
+    /* Panels (sdm/kernels.h), the MLP's half when the others are bytes. The basis: a block of the highest level, then those below it, depth first, which is the
        order in which they are read. */
     const void *layer[SDM_POD_MAX_DEPTH], *head, *basis;
     size_t max_outputs[SDM_POD_MAX_LEVELS];
@@ -23,14 +34,34 @@ typedef struct pod_network {
 /* Number of weights of the layers of the MLP, without the biases. */
 size_t sdm_pod_mlp_count(const sdm_pod_arch *a);
 
-/* y[rows][ldy] = x[rows][ldx] times weights that begin at `at`, as sdm_panel_*(); and the transpose. */
-void sdm_pod_product(bool half, size_t rows, size_t outputs, size_t k, const void *weights, size_t at, const float *x,
-                     size_t ldx, float *y, size_t ldy);
-void sdm_pod_product_back(bool half, size_t outputs, size_t k, const void *weights, size_t at, const float *y,
+/* Bytes of a stored number. */
+static inline size_t sdm_pod_size(sdm_pod_type type) { return type == SDM_POD_F32 ? 4 : type == SDM_POD_F16 ? 2 : 1; }
+
+/* Type of the MLP's weights when those of head and bases are `type`. */
+static inline sdm_pod_type sdm_pod_mlp_type(sdm_pod_type type) { return type == SDM_POD_I8 ? SDM_POD_F16 : type; }
+
+/* y[rows][ldy] = x[rows][ldx] times float or half weights that begin at `at`, as sdm_panel_*(); and the transpose. */
+void sdm_pod_product(sdm_pod_type type, size_t rows, size_t outputs, size_t k, const void *weights, size_t at,
+                     const float *x, size_t ldx, float *y, size_t ldy);
+void sdm_pod_product_back(sdm_pod_type type, size_t outputs, size_t k, const void *weights, size_t at, const float *y,
                           float *x);
 
-/* at[blocks] = where the weights of each block begin, depth first; returns their number. */
-size_t sdm_pod_place_weights(const sdm_pod_levels *levels, const sdm_pod_block *blocks, size_t *at);
+/* Stored numbers of a matrix of `outputs` x k; n_coarse: for bytes. */
+size_t sdm_pod_count_weights(sdm_pod_type type, size_t outputs, size_t n_coarse, size_t k);
+
+/* at[blocks] = where the weights of each block begin, depth first; coarse[blocks]: for bytes. Returns their number. */
+size_t sdm_pod_place_weights(sdm_pod_type type, const sdm_pod_levels *levels, const sdm_pod_block *blocks,
+                             const uint32_t *coarse, size_t *at);
+
+/* at[l] = number of coefficients of the levels below l, after sdm_pod_number(); the last: of all. */
+void sdm_pod_place_coefficients(const sdm_pod_levels *levels, const sdm_pod_block *blocks,
+                                size_t at[SDM_POD_MAX_LEVELS + 1]);
+
+/* Columns of the head with a coarse part; 0 when weights are not bytes. */
+static inline size_t sdm_pod_head_coarse(const pod_network *m)
+{
+    return m->coarse ? m->coarse[m->arch.levels.first[m->arch.levels.n]] : 0;
+}
 
 static inline size_t sdm_pod_layer_inputs(const sdm_pod_arch *a, size_t layer)
 {

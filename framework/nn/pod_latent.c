@@ -8,18 +8,19 @@ static size_t larger(size_t a, size_t b) { return a > b ? a : b; }
 static size_t n_poly(const pod_network *m) { return larger(m->arch.n_terms, 1 + m->arch.n_inputs); }
 static size_t row(const pod_network *m) { return larger(sdm_panel_outputs(m->arch.width), n_poly(m)); }
 
-void sdm_pod_product(bool half, size_t rows, size_t outputs, size_t k, const void *weights, size_t at, const float *x,
-                     size_t ldx, float *y, size_t ldy)
+void sdm_pod_product(sdm_pod_type type, size_t rows, size_t outputs, size_t k, const void *weights, size_t at,
+                     const float *x, size_t ldx, float *y, size_t ldy)
 {
-    if (half)
+    if (type == SDM_POD_F16)
         sdm_panel_f16(rows, outputs, k, (const uint16_t *)weights + at, x, ldx, y, ldy);
     else
         sdm_panel_f32(rows, outputs, k, (const float *)weights + at, x, ldx, y, ldy);
 }
 
-void sdm_pod_product_back(bool half, size_t outputs, size_t k, const void *weights, size_t at, const float *y, float *x)
+void sdm_pod_product_back(sdm_pod_type type, size_t outputs, size_t k, const void *weights, size_t at, const float *y,
+                          float *x)
 {
-    if (half)
+    if (type == SDM_POD_F16)
         sdm_panel_back_f16(outputs, k, (const uint16_t *)weights + at, y, x);
     else
         sdm_panel_back_f32(outputs, k, (const float *)weights + at, y, x);
@@ -89,8 +90,8 @@ void sdm_pod_latent(const sdm_model *model, const double *p, size_t n_directions
     size_t stride = total;
     for (size_t layer = 0; layer < a->depth; layer++) {
         float *out = w->h[layer % 2], *slope = w->slope + layer * width;
-        sdm_pod_product(m->half, rows, a->width, sdm_pod_layer_inputs(a, layer), m->layer[layer], 0, in, stride, out,
-                        width);
+        sdm_pod_product(sdm_pod_mlp_type(m->type), rows, a->width, sdm_pod_layer_inputs(a, layer), m->layer[layer], 0,
+                        in, stride, out, width);
         for (size_t o = 0; o < a->width; o++) out[o] += m->bias[layer][o];
         sdm_activate(a->activation, a->width, out, out, slope);
         for (size_t r = 1; r < rows; r++)
@@ -116,7 +117,8 @@ void sdm_pod_latent_back(const sdm_model *model, const double *p, const pod_late
         for (size_t layer = a->depth; layer-- > 0;) {
             for (size_t o = 0; o < a->width; o++) dh[o] *= w->slope[layer * width + o];
             memset(dh + a->width, 0, (width - a->width) * sizeof *dh);
-            sdm_pod_product_back(m->half, a->width, sdm_pod_layer_inputs(a, layer), m->layer[layer], 0, dh, below);
+            sdm_pod_product_back(sdm_pod_mlp_type(m->type), a->width, sdm_pod_layer_inputs(a, layer), m->layer[layer],
+                                 0, dh, below);
             float *const swap = dh;
             dh = below, below = swap;
         }

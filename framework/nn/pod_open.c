@@ -1,4 +1,6 @@
 /* Opening of a pod model: architecture, blocks and weights, every size checked before it is used. */
+#include <stdint.h>
+
 #include "pod_internal.h"
 #include "sdm/kernels.h"
 #include "sdm/memory.h"
@@ -12,10 +14,15 @@ static sdm_status read_architecture(sdm_lines *lines, size_t n_params, pod_netwo
     a->depth = (size_t)sdm_next_int(lines, "pod.depth", 0, SDM_POD_MAX_DEPTH);
     a->width = (size_t)sdm_next_int(lines, "pod.width", 1, 65536);
     a->activation = (int)sdm_next_int(lines, "pod.activation", 0, 3);
-    m->half = sdm_next_int(lines, "pod.half", 0, 1) != 0;
+    m->type = (sdm_pod_type)sdm_next_int(lines, "pod.type", 0, SDM_POD_I8);
     a->block = (size_t)sdm_next_int(lines, "pod.block", 1, 64);
     a->levels.n = (size_t)sdm_next_int(lines, "pod.levels", 1, SDM_POD_MAX_LEVELS);
     return sdm_lines_check(lines, err);
+}
+
+static uint32_t number(const uint8_t *p)
+{
+    return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
 }
 
 static sdm_status read_ranks(const sdm_section *ranks, pod_network *m, sdm_error *err)
@@ -25,7 +32,7 @@ static sdm_status read_ranks(const sdm_section *ranks, pod_network *m, sdm_error
     const uint8_t *p = ranks->data;
     for (size_t b = 0; b < n_blocks; b++, p += 4) {
         sdm_pod_block *k = &m->blocks[b];
-        k->rank = (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
+        k->rank = number(p);
         if (k->rank > 1u << 20) return sdm_fail(err, SDM_E_FORMAT, "damaged: a block of rank %u", k->rank);
         if (b >= highest) a->n_coefficients += k->rank;
     }
@@ -40,7 +47,11 @@ static sdm_status read_ranks(const sdm_section *ranks, pod_network *m, sdm_error
                                 outputs);
             m->outputs[b] = (uint32_t)outputs;
             if (outputs > m->max_outputs[level]) m->max_outputs[level] = outputs;
+            const size_t group = level + 1 < a->levels.n ? 0 : m->blocks[b].rank;
+            if (group > m->max_group[level]) m->max_group[level] = group;
         }
+    for (size_t level = 0; level + 1 < a->levels.n; level++) m->max_group[level] = m->max_outputs[level + 1];
+    sdm_pod_place_coefficients(&a->levels, m->blocks, m->coefficients_at);
     return SDM_OK;
 }
 
@@ -73,18 +84,57 @@ static sdm_status set_up(const sdm_section *ranks, const sdm_grid *grid, pod_net
     return SDM_OK;
 }
 
+// what bytes have beside their panels
+static sdm_status read_bytes(const sdm_section *sections, size_t n, sdm_model *model, sdm_error *err)
+{
+    pod_network *m = model->network;
+    const sdm_pod_arch *a = &m->arch;
+    const size_t n_blocks = a->levels.first[a->levels.n];
+    const uint8_t *coarse = sdm_model_weights(model, sections, n, "pod.coarse", (n_blocks + 1) * 4, err);
+    if (!coarse) return SDM_E_FORMAT;
+    m->order = sdm_model_weights(model, sections, n, "pod.order", a->n_latent * sizeof *m->order, err);
+    if (!m->order) return SDM_E_FORMAT;
+    m->factor = sdm_model_weights(model, sections, n, "pod.factor",
+                                  (m->coefficients_at[a->levels.n] + a->n_latent) * sizeof *m->factor, err);
+    if (!m->factor) return SDM_E_FORMAT;
+    const sdm_status s = SDM_ALLOC(&m->coarse, n_blocks + 1, "model blocks", err);
+    if (s) return s;
+    for (size_t i = 0; i < a->n_latent; i++)
+        if (m->order[i] >= a->n_latent)
+            return sdm_fail(err, SDM_E_FORMAT, "damaged: latent variable %u of %zu", m->order[i], a->n_latent);
+    for (size_t level = 0; level <= a->levels.n; level++) m->limit[level] = INT16_MAX;
+    for (size_t level = 0; level < a->levels.n; level++)
+        for (size_t b = a->levels.first[level]; b < a->levels.first[level + 1]; b++) {
+            m->coarse[b] = number(coarse + 4 * b);
+            if (m->coarse[b] > m->blocks[b].rank)
+                return sdm_fail(err, SDM_E_FORMAT, "damaged: %u coarse columns of a block of rank %u", m->coarse[b],
+                                m->blocks[b].rank);
+            const int limit = sdm_panel_i8_limit(m->coarse[b], m->blocks[b].rank);
+            if (limit < m->limit[level]) m->limit[level] = limit;
+        }
+    m->coarse[n_blocks] = number(coarse + 4 * n_blocks);
+    if (m->coarse[n_blocks] > a->n_latent)
+        return sdm_fail(err, SDM_E_FORMAT, "damaged: %u coarse columns of %zu", m->coarse[n_blocks], a->n_latent);
+    m->limit[a->levels.n] = sdm_panel_i8_limit(m->coarse[n_blocks], a->n_latent);
+    return SDM_OK;
+}
+
 static sdm_status bind_weights(const sdm_section *sections, size_t n, sdm_model *model, sdm_error *err)
 {
     pod_network *m = model->network;
     const sdm_pod_arch *a = &m->arch;
-    const size_t weight = m->half ? sizeof(uint16_t) : sizeof(float);
+    const size_t weight = sdm_pod_size(m->type), mlp_weight = sdm_pod_size(sdm_pod_mlp_type(m->type));
+    if (m->type == SDM_POD_I8) {
+        const sdm_status s = read_bytes(sections, n, model, err);
+        if (s) return s;
+    }
     const struct {
         const char *name;
         size_t size;
     } need[] = {
-        {"pod.mlp", sdm_pod_mlp_count(a) * weight},
-        {"pod.head", sdm_panel_count(a->n_coefficients, a->n_latent) * weight},
-        {"pod.basis", sdm_pod_place_weights(&a->levels, m->blocks, m->weights_at) * weight},
+        {"pod.mlp", sdm_pod_mlp_count(a) * mlp_weight},
+        {"pod.head", sdm_pod_count_weights(m->type, a->n_coefficients, sdm_pod_head_coarse(m), a->n_latent) * weight},
+        {"pod.basis", sdm_pod_place_weights(m->type, &a->levels, m->blocks, m->coarse, m->weights_at) * weight},
         {"pod.mean", a->n_voxels * sizeof(float)},
         {"pod.bias", a->depth * a->width * sizeof(float)},
     };
@@ -96,7 +146,7 @@ static sdm_status bind_weights(const sdm_section *sections, size_t n, sdm_model 
     const uint8_t *mlp = data[0];
     for (size_t l = 0; l < a->depth; l++) {
         m->layer[l] = mlp;
-        mlp += sdm_panel_count(a->width, sdm_pod_layer_inputs(a, l)) * weight;
+        mlp += sdm_panel_count(a->width, sdm_pod_layer_inputs(a, l)) * mlp_weight;
         m->bias[l] = (const float *)data[4] + l * a->width;
     }
     m->head = data[1];
@@ -128,7 +178,7 @@ static sdm_status open_network(sdm_model *m, sdm_lines *lines, const sdm_section
     if (s) return s;
     m->info.macs = macs(k);
     // every weight is used once in a map: fewer bytes mean that a size above passed the end of size_t
-    if (m->info.macs * (k->half ? sizeof(uint16_t) : sizeof(float)) > (double)m->info.weight_bytes)
+    if (m->info.macs * (double)sdm_pod_size(k->type) > (double)m->info.weight_bytes)
         return sdm_fail(err, SDM_E_FORMAT, "damaged: %zu bytes of weights for %.0f of them", m->info.weight_bytes,
                         m->info.macs);
     return SDM_OK;
@@ -142,6 +192,7 @@ static void dispose(void *network)
     sdm_free(m->outputs);
     sdm_free(m->weights_at);
     sdm_free(m->exponents);
+    sdm_free(m->coarse);
     sdm_free(m);
 }
 

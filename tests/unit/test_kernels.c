@@ -4,6 +4,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -181,6 +182,106 @@ static void panels(void **state)
     sdm_free(y);
 }
 
+// integers: exact, the same bits in every instruction set, also where sums come near the end of theirs
+static void bytes(void **state)
+{
+    (void)state;
+    enum { MOST = 160, ROWS = 13 };
+    int16_t *w, *x;
+    int8_t *packed;
+    float *y, *back, dx[128], scale[ROWS];
+    assert_int_equal(SDM_ALLOC(&w, MOST * 128, "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&x, ROWS * 128, "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&packed, sdm_panel_i8_count(MOST, 128, 128), "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&y, ROWS * MOST, "t", NULL), SDM_OK);
+    back = random_floats(MOST, 3);
+    assert_int_equal(sdm_panel_i8_count(150, 3, 37), 160 * (4 + 38));
+    assert_true(sdm_panel_i8_count(SIZE_MAX / 2, 0, 37) == SIZE_MAX && sdm_panel_i8_count(1, 2, 1) == SIZE_MAX);
+    for (int r = 0; r < ROWS; r++) scale[r] = 0.25f + (float)r;
+    const size_t inputs[][2] = {{0, 1}, {1, 1}, {0, 12}, {1, 11}, {3, 37}, {37, 37}, {126, 127}};
+    for (size_t c = 0; c < sizeof inputs / sizeof *inputs; c++) {
+        const size_t coarse = inputs[c][0], k = inputs[c][1];
+        const int limit = sdm_panel_i8_limit(coarse, k);
+        assert_true(limit > 0 && limit <= 32767);
+        assert_true((double)limit * ((double)coarse * SDM_COARSE + 128.0 * (double)(k - coarse)) < 2147483648.0);
+        for (int isa = 0; isa < 3; isa++) {
+            if (sdm_kernels_select(isa) != isa) continue;
+            for (size_t outputs = 1; outputs <= 150; outputs += outputs < 70 ? 3 : 40) {
+                const bool extreme = outputs % 2 == 0;
+                for (size_t o = 0; o < outputs; o++)
+                    for (size_t i = 0; i < k; i++) {
+                        const int most = i < coarse ? SDM_COARSE : 127;
+                        const double u = 2 * sdm_rng_uniform(1, o, i) - 1;
+                        w[o * k + i] = (int16_t)(extreme ? (o % 4 ? most : -most) : (int)(u * most));
+                    }
+                for (size_t r = 0; r < ROWS; r++)
+                    for (size_t i = 0; i < 128; i++) {
+                        const double u = 2 * sdm_rng_uniform(2, r, i) - 1;
+                        x[r * 128 + i] = (int16_t)(extreme ? (r % 2 ? limit : -limit) : (int)(u * limit));
+                    }
+                sdm_panel_pack_i8(outputs, coarse, k, w, packed);
+                for (size_t rows = 1; rows <= ROWS; rows += rows < 7 ? 1 : 6) {
+                    sdm_panel_i8(rows, outputs, coarse, k, packed, x, 128, scale, y, MOST);
+                    for (size_t r = 0; r < rows; r++)
+                        for (size_t o = 0; o < outputs; o++) {
+                            int64_t s = 0;
+                            for (size_t i = 0; i < k; i++) s += (int64_t)w[o * k + i] * x[r * 128 + i];
+                            assert_true(y[r * MOST + o] == scale[r] * (float)s);
+                        }
+                }
+                sdm_panel_back_i8(outputs, coarse, k, packed, back, dx);
+                for (size_t i = 0; i < k; i++) {
+                    double s = 0, size = 0;
+                    for (size_t o = 0; o < outputs; o++) {
+                        s += (double)back[o] * w[o * k + i];
+                        size += fabs((double)back[o] * w[o * k + i]);
+                    }
+                    assert_true(fabs(s - dx[i]) <= 1e-6 * size);
+                }
+            }
+        }
+    }
+    sdm_kernels_select(-1);
+    sdm_free(w);
+    sdm_free(x);
+    sdm_free(packed);
+    sdm_free(y);
+    sdm_free(back);
+}
+
+static void quantisation(void **state)
+{
+    (void)state;
+    enum { MOST = 70 };
+    float *y = random_floats(MOST, 4), *factor = random_floats(MOST, 5), changed[MOST];
+    int16_t x[MOST + 1];
+    for (size_t n = 0; n <= MOST; n++)
+        for (int limit = 5; limit < 32768; limit += 10920) {
+            double most = 0;
+            x[n] = 77;
+            const float scale = sdm_quantise(n, y, factor, limit, x);
+            for (size_t i = 0; i < n; i++) {
+                most = fmax(most, abs(x[i]));
+                assert_true(fabs((double)x[i] * scale - (double)y[i] * factor[i]) <= 0.5001 * scale);
+            }
+            assert_true(n == 0 ? scale == 0 : most == limit);
+            assert_int_equal(x[n], 77);
+            assert_true(n == 0 || sdm_quantise(n, y, NULL, limit, x) > 0);
+        }
+    for (int i = 0; i < MOST; i++) changed[i] = i % 2 ? 1e-40f : 0;
+    assert_true(sdm_quantise(MOST, changed, NULL, 32767, x) == 0 && x[3] == 0);
+    const float wrong[] = {NAN, -NAN, INFINITY, -INFINITY};
+    for (int k = 0; k < 4; k++)
+        for (int at = 0; at < MOST; at += 23) {
+            memcpy(changed, y, sizeof changed);
+            changed[at] = wrong[k];
+            assert_true(isnan(sdm_quantise(MOST, changed, NULL, 32767, x)));
+            assert_int_equal(x[1], 0);
+        }
+    sdm_free(y);
+    sdm_free(factor);
+}
+
 static void exponential(void **state)
 {
     (void)state;
@@ -213,7 +314,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(product),        cmocka_unit_test(same_bits_for_threads),
         cmocka_unit_test(half_precision), cmocka_unit_test(half_in_every_instruction_set),
-        cmocka_unit_test(panels),         cmocka_unit_test(exponential),
+        cmocka_unit_test(panels),         cmocka_unit_test(bytes),
+        cmocka_unit_test(quantisation),   cmocka_unit_test(exponential),
         cmocka_unit_test(names)};
     // every instruction set that this machine has, not only the one that is chosen
     int failed = 0;

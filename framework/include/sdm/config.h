@@ -51,7 +51,7 @@ typedef enum sdm_activation {
 typedef enum sdm_output { SDM_OUTPUT_LINEAR = 0, SDM_OUTPUT_TANH = 1 } sdm_output;
 typedef enum sdm_sampling { SDM_SAMPLING_UNIFORM = 0, SDM_SAMPLING_ERROR = 1 } sdm_sampling;
 typedef enum sdm_loss { SDM_LOSS_MSE = 0, SDM_LOSS_L1 = 1, SDM_LOSS_HUBER = 2, SDM_LOSS_CLAMPED_L1 = 3 } sdm_loss;
-typedef enum sdm_weight_type { SDM_WEIGHT_F32 = 0, SDM_WEIGHT_F16 = 1 } sdm_weight_type;
+typedef enum sdm_weight_type { SDM_WEIGHT_F32 = 0, SDM_WEIGHT_F16 = 1, SDM_WEIGHT_I8 = 2 } sdm_weight_type;
 
 typedef struct sdm_config {
     char file[SDM_PATH_TEXT_MAX]; /* as given to sdm_config_read() */
@@ -82,7 +82,7 @@ typedef struct sdm_config {
         int skip;                  /* deepsdf: hidden layer where the input enters again, 0 (none)..15 */
         sdm_output output;         /* deepsdf, imnet: linear, tanh */
         sdm_activation activation; /* silu, tanh, relu, leaky_relu (slope 0.02 below 0); default silu */
-        sdm_weight_type weights;   /* f32, f16: weights of the decoder in the model file; default f16 */
+        sdm_weight_type weights;   /* f32, f16, i8 (pod): large weights in the model file; default pod i8, f16 */
     } network;
     struct {
         int64_t static_counts

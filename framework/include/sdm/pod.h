@@ -101,13 +101,16 @@ typedef struct sdm_pod_weights {
     const float *basis;                    /* for each block of all levels [k_b][V_b], one after another */
 } sdm_pod_weights;
 
+/* How weights are stored. Bytes: those of head and bases, with a second byte where one is not enough; of the MLP in half precision. */
+typedef enum sdm_pod_type { SDM_POD_F32 = 0, SDM_POD_F16 = 1, SDM_POD_I8 = 2 } sdm_pod_type;
+
 /* Everything a model file is made from. `info` gives names, ranges, grid, accuracy, provenance. */
 typedef struct sdm_pod_spec {
     const sdm_model_info *info;
     sdm_pod_arch arch;
     const sdm_pod_block *blocks;
     sdm_pod_weights weights;
-    bool half; /* head and basis in half precision */
+    sdm_pod_type type;
 } sdm_pod_spec;
 
 /* Builds a model file in memory (sdm_free()); write it with sdm_container_write(). SDM_E_NOMEM. */

@@ -1,6 +1,7 @@
 /* Keys and defaults by kind of network. */
 #include "kinds.h"
 
+#include <stddef.h>
 #include <stdio.h>
 
 bool sdm_kind_has(const sdm_field *f, int kind) { return !f->kinds || (f->kinds >> kind & 1); }
@@ -48,6 +49,7 @@ static void check_limits(sdm_reader *r, sdm_mark place)
 void sdm_kinds_settle(sdm_reader *r, sdm_mark place)
 {
     const int kind = (int)r->config->network.kind;
+    const bool bytes = kind != SDM_NETWORK_POD && r->config->network.weights == SDM_WEIGHT_I8; // pod only
     char names[200], chosen[SDM_NAME_MAX];
     sdm_choice_name(SDM_KIND_CHOICES, kind, chosen);
     for (size_t s = 0; s < r->n_sections; s++)
@@ -55,7 +57,8 @@ void sdm_kinds_settle(sdm_reader *r, sdm_mark place)
             const sdm_field *f = &r->sections[s].fields[k];
             sdm_given *g = &r->given[s][k];
             if (!f->kinds && !f->kind_defs) continue;
-            if (!sdm_kind_has(f, kind) && kind != r->file_kind && g->mark.override == 0) *g = (sdm_given){0};
+            const bool fits = sdm_kind_has(f, kind) && !(f->offset == offsetof(sdm_config, network.weights) && bytes);
+            if (!fits && kind != r->file_kind && g->mark.override == 0) *g = (sdm_given){0};
             if (!sdm_kind_has(f, kind) && sdm_mark_is_set(g->mark))
                 sdm_mistakes_add(r->mistakes, g->mark, "%s.%s: a network of kind %s has no such key, only %s",
                                  r->sections[s].name, f->key, chosen, sdm_kind_names(f, names, sizeof names));

@@ -172,38 +172,49 @@ static void back_i8(size_t outputs, size_t n_coarse, size_t k, const int8_t *w, 
     }
 }
 
-// eight numbers or fewer of y times their factors
-static inline vec load_some(size_t n, const float *y, const float *factor)
+// what is left of y times their factors, filled up with zeros
+static vec product_of_rest(size_t n, const float *y, const float *factor)
 {
-    if (n >= VW) return factor ? load(y) * load(factor) : load(y);
     float some[VW] = {0};
-    for (size_t i = 0; i < n; i++) some[i] = factor ? y[i] * factor[i] : y[i];
+    for (size_t i = 0; i < n; i++) some[i] = y[i] * factor[i];
     return load(some);
+}
+
+// magnitudes compared as integers: those of NaN and infinity are the largest
+static inline veci larger_magnitude(veci most, vec v)
+{
+    const veci bits = (veci)v & 0x7fffffff, more = bits > most;
+    return (bits & more) | (most & ~more);
+}
+
+typedef uint16_t vec_short __attribute__((vector_size(2 * VW)));
+
+// nearest integers: the last bits of a number near 2^23
+static inline vec_short round_to_short(vec v, float to_integer)
+{
+    return __builtin_convertvector((vecu)(v * to_integer + 12582912.0f), vec_short);
 }
 
 static float quantise(size_t n, const float *y, const float *factor, int limit, int16_t *x)
 {
-    // magnitudes compared as integers: those of NaN and infinity are the largest
-    veci most = {0};
-    for (size_t i = 0; i < n; i += VW) {
-        const veci bits = (veci)load_some(n - i, y + i, factor ? factor + i : NULL) & 0x7fffffff, more = bits > most;
-        most = (bits & more) | (most & ~more);
-    }
+    const size_t whole = n / VW * VW;
+    const vec rest = product_of_rest(n - whole, y + whole, factor + whole);
+    veci most = larger_magnitude((veci){0}, rest);
+    for (size_t i = 0; i < whole; i += VW) most = larger_magnitude(most, load(y + i) * load(factor + i));
     int32_t largest_bits = 0;
     for (int j = 0; j < VW; j++) largest_bits = most[j] > largest_bits ? most[j] : largest_bits;
     float largest;
     memcpy(&largest, &largest_bits, sizeof largest);
     const float to_integer = (float)limit / largest;
-    if (largest_bits >= 0x7f800000 || to_integer > 3e38f) { // not finite, or zero beside what a float can hold
+    if (!(to_integer > 0 && to_integer <= 3e38f)) { // not finite, or zero beside what a float can hold
         memset(x, 0, n * sizeof *x);
         return largest_bits >= 0x7f800000 ? largest - largest : 0;
     }
-    for (size_t i = 0; i < n; i += VW) {
-        // the last bits of a number near 2^23 are its nearest integer
-        const vec v = load_some(n - i, y + i, factor ? factor + i : NULL) * to_integer + 12582912.0f;
-        typedef uint16_t shorts __attribute__((vector_size(2 * VW)));
-        const shorts s = __builtin_convertvector((vecu)v, shorts);
-        memcpy(x + i, &s, (n - i < VW ? n - i : VW) * sizeof *x);
+    for (size_t i = 0; i < whole; i += VW) {
+        const vec_short s = round_to_short(load(y + i) * load(factor + i), to_integer);
+        memcpy(x + i, &s, sizeof s);
     }
+    const vec_short s = round_to_short(rest, to_integer);
+    memcpy(x + whole, &s, (n - whole) * sizeof *x);
     return largest / (float)limit;
 }

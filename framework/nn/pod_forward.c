@@ -8,7 +8,9 @@
 #include "pod_internal.h"
 #include "sdm/kernels.h"
 
-enum { ROWS = 12 }; // twice the six rows of the kernels: what they need of a block stays in the second-level cache
+// rows for which the head is read once, and rows that go through a block of the highest level together: those of the kernels, so that
+// what they need of the block, weights and maps, stays in the second-level cache
+enum { ROWS = 24, GROUP = 6 };
 
 static size_t smaller(size_t a, size_t b) { return a < b ? a : b; }
 
@@ -24,9 +26,9 @@ typedef struct workspace {
     pod_latent latent;
     float *z;                     // [R][L]
     float *c;                     // [R][padded K]
-    float *y[SDM_POD_MAX_LEVELS]; // [R][padded outputs of a block], for each thread
+    float *y[SDM_POD_MAX_LEVELS]; // [G][padded outputs of a block], for each thread; G rows of a group
     // bytes only: inputs of the head, and of the blocks of a level that get theirs together, as integers
-    integers z_integers, x_integers[SDM_POD_MAX_LEVELS]; // [R][padded L]; [R][padded group], for each thread
+    integers z_integers, x_integers[SDM_POD_MAX_LEVELS]; // [R][padded L]; [G][padded group], for each thread
     float *sorted; // [padded L, or most inputs of a block] in the order of columns
     size_t per_thread;
 } workspace;
@@ -41,10 +43,11 @@ static size_t carve_integers(size_t rows, size_t n, float *memory, size_t at, in
     return padded(rows) + rows * to->ld / 2;
 }
 
-static size_t carve(const pod_network *m, size_t rows, size_t directions, int n_threads, float *memory, workspace *w)
+static size_t carve(const pod_network *m, size_t rows, int n_threads, float *memory, workspace *w)
 {
     const sdm_pod_arch *a = &m->arch;
-    size_t total = sdm_pod_latent_carve(m, directions, memory, &w->latent);
+    const size_t group = smaller(rows, GROUP);
+    size_t total = sdm_pod_latent_carve(m, rows, memory, &w->latent);
     w->z = memory ? memory + total : NULL;
     total += padded(rows * a->n_latent);
     w->c = memory ? memory + total : NULL;
@@ -60,10 +63,10 @@ static size_t carve(const pod_network *m, size_t rows, size_t directions, int n_
     w->per_thread = 0;
     for (size_t l = 0; l < a->levels.n; l++) {
         w->y[l] = memory ? memory + total + w->per_thread : NULL;
-        w->per_thread += rows * sdm_panel_outputs(m->max_outputs[l]);
+        w->per_thread += group * sdm_panel_outputs(m->max_outputs[l]);
         if (m->type == SDM_POD_I8)
             w->per_thread +=
-                padded(carve_integers(rows, m->max_group[l], memory, total + w->per_thread, &w->x_integers[l]));
+                padded(carve_integers(group, m->max_group[l], memory, total + w->per_thread, &w->x_integers[l]));
     }
     return (total + w->per_thread * (size_t)n_threads) * sizeof(float);
 }
@@ -99,7 +102,7 @@ static inline void place(const sdm_grid *g, const sdm_pod_block *b, size_t n, co
     }
 }
 
-// what a call of decode() works on
+// what a call of decode() works on, or a group of its rows
 typedef struct job {
     const sdm_grid *grid;
     const pod_network *m;
@@ -107,6 +110,15 @@ typedef struct job {
     float *const *maps;
     const workspace *w;
 } job;
+
+static job group_of(const job *j, size_t first)
+{
+    job g = *j;
+    g.rows = smaller(GROUP, j->rows - first);
+    g.with_mean = j->with_mean > first ? j->with_mean - first : 0;
+    g.maps += first;
+    return g;
+}
 
 // what goes into a block: floats, or integers when weights are bytes
 typedef struct input {
@@ -229,16 +241,19 @@ static void decode(const job *j, int n_threads)
 #pragma omp for schedule(dynamic)
 #endif
         for (long b = first; b < end; b++)
-            decode_block(j, (size_t)b, top, thread,
-                         ready(j, top, m->blocks[b].coefficient, m->blocks[b].rank, thread,
-                               j->w->c + m->blocks[b].coefficient, ldc));
+            for (size_t r = 0; r < j->rows; r += GROUP) {
+                const job g = group_of(j, r);
+                const size_t at = m->blocks[b].coefficient;
+                decode_block(&g, (size_t)b, top, thread,
+                             ready(&g, top, at, m->blocks[b].rank, thread, j->w->c + r * ldc + at, ldc));
+            }
     }
 }
 
 size_t sdm_pod_scratch_bytes(const sdm_model *m, size_t n, int n_threads)
 {
     workspace w;
-    return carve(m->network, smaller(n, ROWS), 0, n_threads, NULL, &w);
+    return carve(m->network, smaller(n, ROWS), n_threads, NULL, &w);
 }
 
 void sdm_pod_forward(const sdm_model *m, const double *params, size_t n, float *values, void *scratch, int n_threads)
@@ -248,12 +263,10 @@ void sdm_pod_forward(const sdm_model *m, const double *params, size_t n, float *
     for (size_t at = 0; at < n; at += ROWS) {
         const size_t rows = smaller(ROWS, n - at);
         workspace w;
-        carve(k, smaller(n, ROWS), 0, n_threads, scratch, &w);
+        carve(k, smaller(n, ROWS), n_threads, scratch, &w);
         float *maps[ROWS];
-        for (size_t r = 0; r < rows; r++) {
-            sdm_pod_latent(m, params + (at + r) * k->arch.n_params, 0, NULL, &w.latent, w.z + r * k->arch.n_latent);
-            maps[r] = values + (at + r) * voxels;
-        }
+        for (size_t r = 0; r < rows; r++) maps[r] = values + (at + r) * voxels;
+        sdm_pod_latent(m, params + at * k->arch.n_params, rows, 0, NULL, &w.latent, w.z);
         decode(&(job){&m->info.grid, k, rows, rows, maps, &w}, n_threads);
     }
 }
@@ -265,8 +278,8 @@ static void tangents(const sdm_model *m, const double *params, size_t n, const d
     const pod_network *k = m->network;
     const size_t voxels = sdm_grid_count(&m->info.grid);
     workspace w;
-    carve(k, 1 + n, n, n_threads, scratch, &w);
-    sdm_pod_latent(m, params, n, direction, &w.latent, w.z);
+    carve(k, 1 + n, n_threads, scratch, &w);
+    sdm_pod_latent(m, params, 1, n, direction, &w.latent, w.z);
     float *maps[1 + SDM_POD_MAX_PARAMS] = {values};
     for (size_t r = 0; r < n; r++) maps[1 + r] = tangent + r * voxels;
     decode(&(job){&m->info.grid, k, 1 + n, 1, maps, &w}, n_threads);
@@ -276,7 +289,7 @@ size_t sdm_pod_jacobian_scratch_bytes(const sdm_model *m, int n_threads)
 {
     const pod_network *k = m->network;
     workspace w;
-    return carve(k, 1 + k->arch.n_params, k->arch.n_params, n_threads, NULL, &w);
+    return carve(k, 1 + k->arch.n_params, n_threads, NULL, &w);
 }
 
 void sdm_pod_jacobian(const sdm_model *m, const double *params, float *values, float *jacobian, void *scratch,
@@ -291,7 +304,7 @@ void sdm_pod_jacobian(const sdm_model *m, const double *params, float *values, f
 size_t sdm_pod_jvp_scratch_bytes(const sdm_model *m, int n_threads)
 {
     workspace w;
-    return carve(m->network, 2, 1, n_threads, NULL, &w);
+    return carve(m->network, 2, n_threads, NULL, &w);
 }
 
 void sdm_pod_jvp(const sdm_model *m, const double *params, const double *direction, float *values, float *tangent,
@@ -332,7 +345,7 @@ static void back_block(const pod_network *m, const sdm_grid *g, size_t b, size_t
 size_t sdm_pod_vjp_scratch_bytes(const sdm_model *m)
 {
     workspace w;
-    return carve(m->network, 2, 0, 1, NULL, &w); // a second row of z: its gradient
+    return carve(m->network, 2, 1, NULL, &w); // a second row of z: its gradient
 }
 
 void sdm_pod_vjp(const sdm_model *m, const double *params, const float *adjoint, double *gradient, void *scratch)
@@ -341,8 +354,8 @@ void sdm_pod_vjp(const sdm_model *m, const double *params, const float *adjoint,
     const sdm_pod_arch *a = &k->arch;
     const size_t top = a->levels.n - 1;
     workspace w;
-    carve(k, 2, 0, 1, scratch, &w);
-    sdm_pod_latent(m, params, 0, NULL, &w.latent, w.z);
+    carve(k, 2, 1, scratch, &w);
+    sdm_pod_latent(m, params, 1, 0, NULL, &w.latent, w.z);
     for (size_t b = a->levels.first[top]; b < a->levels.first[top + 1]; b++)
         back_block(k, &m->info.grid, b, top, adjoint, &w, w.c + k->blocks[b].coefficient);
     memset(w.c + a->n_coefficients, 0, (sdm_panel_outputs(a->n_coefficients) - a->n_coefficients) * sizeof *w.c);

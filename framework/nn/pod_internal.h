@@ -70,17 +70,17 @@ static inline size_t sdm_pod_layer_inputs(const sdm_pod_arch *a, size_t layer)
 
 /* pod_latent.c: parameters to latent variables and back. Letters as in sdm/pod.h; D directions. */
 typedef struct pod_latent {
-    float *phi;   /* [1 + D][n_poly] all products and their derivatives along the directions */
-    float *h[2];  /* [1 + D][padded W] of a layer and of the one before */
+    float *phi;   /* [R][n_poly] all products and their derivatives along the directions */
+    float *h[2];  /* [R][padded W] of a layer and of the one before */
     float *slope; /* [depth][padded W] */
     float *dphi;  /* [P][n_poly] derivatives with respect to each parameter */
 } pod_latent;
 
-/* Sets the pointers into memory[] (NULL: none); returns the floats needed. */
-size_t sdm_pod_latent_carve(const pod_network *m, size_t directions, float *memory, pod_latent *w);
+/* Sets the pointers into memory[] (NULL: none) for R rows of z; returns the floats needed. */
+size_t sdm_pod_latent_carve(const pod_network *m, size_t rows, float *memory, pod_latent *w);
 
-/* z[1 + D][L]: latent variables at p[P] and their derivatives along direction[D][P]. */
-void sdm_pod_latent(const sdm_model *model, const double *p, size_t n_directions, const double *direction,
+/* z[n][L]: latent variables at p[n][P]; of a single point their derivatives along direction[D][P] too, z[1 + D][L]. */
+void sdm_pod_latent(const sdm_model *model, const double *p, size_t n, size_t n_directions, const double *direction,
                     const pod_latent *w, float *z);
 
 /* gradient[P] = (dz / dp)^T dz[L], at the parameters p of the last sdm_pod_latent() with this w. */

@@ -26,10 +26,9 @@ void sdm_pod_product_back(sdm_pod_type type, size_t outputs, size_t k, const voi
         sdm_panel_back_f32(outputs, k, (const float *)weights + at, y, x);
 }
 
-size_t sdm_pod_latent_carve(const pod_network *m, size_t directions, float *memory, pod_latent *w)
+size_t sdm_pod_latent_carve(const pod_network *m, size_t rows, float *memory, pod_latent *w)
 {
     const sdm_pod_arch *a = &m->arch;
-    const size_t rows = 1 + directions;
     const size_t sizes[] = {rows * n_poly(m), rows * row(m), rows * row(m), a->depth * sdm_panel_outputs(a->width),
                             a->n_params * n_poly(m)};
     float **const fields[] = {&w->phi, &w->h[0], &w->h[1], &w->slope, &w->dphi};
@@ -41,8 +40,8 @@ size_t sdm_pod_latent_carve(const pod_network *m, size_t directions, float *memo
     return total;
 }
 
-// phi at p, and its derivatives with respect to each parameter when they are wanted
-static void polynomials(const sdm_model *model, const double *p, bool slopes, const pod_latent *w)
+// phi[n_poly] at p, and its derivatives with respect to each parameter when they are wanted
+static void polynomials(const sdm_model *model, const double *p, bool slopes, const pod_latent *w, float *phi)
 {
     const pod_network *m = model->network;
     const sdm_pod_arch *a = &m->arch;
@@ -53,7 +52,7 @@ static void polynomials(const sdm_model *model, const double *p, bool slopes, co
         unit[i] = 2 / (q->max - q->min);
         x[i] = (p[i] - q->min) * unit[i] - 1;
     }
-    sdm_poly_eval(m->exponents, total, a->n_params, larger(a->degree, a->input_degree), x, w->phi,
+    sdm_poly_eval(m->exponents, total, a->n_params, larger(a->degree, a->input_degree), x, phi,
                   slopes ? w->dphi : NULL);
     for (size_t i = 0; i < a->n_params && slopes; i++)
         for (size_t t = 0; t < total; t++) w->dphi[i * total + t] *= (float)unit[i];
@@ -74,13 +73,13 @@ static void along(const pod_network *m, size_t n_directions, const double *direc
     }
 }
 
-void sdm_pod_latent(const sdm_model *model, const double *p, size_t n_directions, const double *direction,
+void sdm_pod_latent(const sdm_model *model, const double *p, size_t n, size_t n_directions, const double *direction,
                     const pod_latent *w, float *z)
 {
     const pod_network *m = model->network;
     const sdm_pod_arch *a = &m->arch;
-    const size_t rows = 1 + n_directions, total = n_poly(m), width = sdm_panel_outputs(a->width);
-    polynomials(model, p, n_directions > 0, w);
+    const size_t rows = n + n_directions, total = n_poly(m), width = sdm_panel_outputs(a->width);
+    for (size_t r = 0; r < n; r++) polynomials(model, p + r * a->n_params, n_directions > 0, w, w->phi + r * total);
     along(m, n_directions, direction, w);
     for (size_t r = 0; r < rows; r++) memcpy(z + r * a->n_latent, w->phi + r * total, a->n_terms * sizeof *z);
     if (!a->depth) return;
@@ -92,9 +91,11 @@ void sdm_pod_latent(const sdm_model *model, const double *p, size_t n_directions
         float *out = w->h[layer % 2], *slope = w->slope + layer * width;
         sdm_pod_product(sdm_pod_mlp_type(m->type), rows, a->width, sdm_pod_layer_inputs(a, layer), m->layer[layer], 0,
                         in, stride, out, width);
-        for (size_t o = 0; o < a->width; o++) out[o] += m->bias[layer][o];
-        sdm_activate(a->activation, a->width, out, out, slope);
-        for (size_t r = 1; r < rows; r++)
+        for (size_t r = 0; r < n; r++) {
+            for (size_t o = 0; o < a->width; o++) out[r * width + o] += m->bias[layer][o];
+            sdm_activate(a->activation, a->width, out + r * width, out + r * width, slope);
+        }
+        for (size_t r = n; r < rows; r++)
             for (size_t o = 0; o < a->width; o++) out[r * width + o] *= slope[o];
         in = out, stride = width;
     }
@@ -107,7 +108,7 @@ void sdm_pod_latent_back(const sdm_model *model, const double *p, const pod_late
     const pod_network *m = model->network;
     const sdm_pod_arch *a = &m->arch;
     const size_t total = n_poly(m), width = sdm_panel_outputs(a->width);
-    polynomials(model, p, true, w);
+    polynomials(model, p, true, w, w->phi);
     float *dphi = w->phi; // its values are not needed
     memset(dphi, 0, total * sizeof *dphi);
     if (a->depth) {

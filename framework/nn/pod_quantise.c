@@ -175,21 +175,38 @@ static double column_unit(const matrix *m, size_t i)
     return most > 0 ? most : 1;
 }
 
+// what an error of 1 of the scale of each row does to the map
+static double gain_of_rows(const matrix *m)
+{
+    double sum = 0;
+    if (!m->out) return (double)m->outputs;
+    for (size_t o = 0; o < m->outputs; o++) sum += m->out[o].scale * m->out[o].scale * m->out[o].gain;
+    return sum;
+}
+
+static double column_gain(const matrix *m, size_t i)
+{
+    double sum = 0;
+    for (size_t o = 0; o < m->outputs; o++) sum += weight(m, o, i) * weight(m, o, i) * row_gain(m, o);
+    return sum;
+}
+
 // columns to at most 1, then rows, then columns again; the figures of the matrices below are known
 static void find_scales(const matrix *m, size_t n_voxels)
 {
-    double rows = 0;
     for (size_t o = 0; o < m->outputs && m->out; o++) m->out[o].scale = 1;
     for (size_t i = 0; i < m->k; i++) m->in[i].unit = column_unit(m, i);
     for (size_t o = 0; o < m->outputs && m->out; o++) {
         double most = 0;
-        for (size_t i = 0; i < m->k; i++) most = fmax(most, fabs(weight(m, o, i)) / m->in[i].unit);
+        for (size_t i = 0; i < m->k; i++) {
+            const double w = fabs(weight(m, o, i)) / m->in[i].unit;
+            if (w > most) most = w; // not fmax(): GCC 12 for arm64 fails on it here
+        }
         m->out[o].scale = most > 0 ? most : 1;
     }
-    for (size_t o = 0; o < m->outputs; o++) rows += row_scale(m, o) * row_scale(m, o) * row_gain(m, o);
+    const double rows = gain_of_rows(m);
     for (size_t i = 0; i < m->k; i++) {
-        m->in[i].gain = 0;
-        for (size_t o = 0; o < m->outputs; o++) m->in[i].gain += weight(m, o, i) * weight(m, o, i) * row_gain(m, o);
+        m->in[i].gain = column_gain(m, i);
         m->in[i].unit = column_unit(m, i);
         const double step = m->in[i].unit / FINE;
         m->in[i].error = m->in[i].square * step * step / 12 * rows / (double)n_voxels;

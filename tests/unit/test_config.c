@@ -56,7 +56,7 @@ static void test_defaults(void **state)
     assert_int_equal(config.network.degree, 6);
     assert_int_equal(config.network.input_degree, 4);
     assert_int_equal(config.network.activation, SDM_ACTIVATION_SILU);
-    assert_int_equal(config.network.weights, SDM_WEIGHT_F16);
+    assert_int_equal(config.network.weights, SDM_WEIGHT_I8);
     assert_int_equal(config.data.n_static_counts, 1);
     assert_int_equal(config.data.static_counts[0], 5);
     assert_int_equal(config.data.online, 4096);
@@ -200,6 +200,15 @@ static void test_kinds(void **state)
     static const char *const there_and_back[] = {"network.kind=deepsdf", "network.kind=pod"};
     assert_int_equal(parse(pod, there_and_back, 2), SDM_OK);
     assert_int_equal(config.network.rank, 7);
+
+    // bytes are for pod: from the file they step back, too
+    static const char bytes[] = BASE "network: {weights: i8}\n";
+    expect_ok(bytes, "network.kind=sdmnn");
+    assert_int_equal(config.network.weights, SDM_WEIGHT_F16);
+    static const char *const wanted[] = {"network.kind=sdmnn", "network.weights=i8"};
+    assert_int_equal(parse(bytes, wanted, 2), SDM_E_CONFIG);
+    expect_mistake(BASE "network: {kind: imnet, weights: i8}\n", NULL,
+                   "x.yaml:4:24: network.weights: i8 is for a network of kind pod; imnet has f16 and f32");
 
     expect_mistake(BASE "network: {kind: deepsdf, rank: 7}\n", NULL,
                    "x.yaml:4:26: network.rank: a network of kind deepsdf has no such key, only pod");

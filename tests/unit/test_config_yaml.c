@@ -190,7 +190,7 @@ static void random_network(sdm_config *c)
     c->network.skip = kind == SDM_NETWORK_DEEPSDF ? (int)random_int(0, c->network.depth - 1) : 4;
     c->network.output = points ? (sdm_output)random_int(0, 1) : SDM_OUTPUT_LINEAR;
     c->network.activation = (sdm_activation)random_int(0, 3);
-    c->network.weights = (sdm_weight_type)random_int(0, 1);
+    c->network.weights = (sdm_weight_type)random_int(0, pod ? 2 : 1);
     c->train.points = points ? (int)random_int(8, 1048576) : 512;
     c->train.eikonal = pod ? 0 : random_real(0, 1000);
     c->train.refine = pod ? random_real(0, 1) : 0.4;

@@ -253,8 +253,9 @@ static void quantisation(void **state)
 {
     (void)state;
     enum { MOST = 70 };
-    float *y = random_floats(MOST, 4), *factor = random_floats(MOST, 5), changed[MOST];
+    float *y = random_floats(MOST, 4), *factor = random_floats(MOST, 5), changed[MOST], ones[MOST];
     int16_t x[MOST + 1];
+    for (int i = 0; i < MOST; i++) ones[i] = 1;
     for (size_t n = 0; n <= MOST; n++)
         for (int limit = 5; limit < 32768; limit += 10920) {
             double most = 0;
@@ -266,16 +267,15 @@ static void quantisation(void **state)
             }
             assert_true(n == 0 ? scale == 0 : most == limit);
             assert_int_equal(x[n], 77);
-            assert_true(n == 0 || sdm_quantise(n, y, NULL, limit, x) > 0);
         }
     for (int i = 0; i < MOST; i++) changed[i] = i % 2 ? 1e-40f : 0;
-    assert_true(sdm_quantise(MOST, changed, NULL, 32767, x) == 0 && x[3] == 0);
+    assert_true(sdm_quantise(MOST, changed, ones, 32767, x) == 0 && x[3] == 0);
     const float wrong[] = {NAN, -NAN, INFINITY, -INFINITY};
     for (int k = 0; k < 4; k++)
         for (int at = 0; at < MOST; at += 23) {
             memcpy(changed, y, sizeof changed);
             changed[at] = wrong[k];
-            assert_true(isnan(sdm_quantise(MOST, changed, NULL, 32767, x)));
+            assert_true(isnan(sdm_quantise(MOST, changed, ones, 32767, x)));
             assert_int_equal(x[1], 0);
         }
     sdm_free(y);

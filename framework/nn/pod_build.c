@@ -27,40 +27,6 @@ size_t sdm_pod_mlp_count(const sdm_pod_arch *a)
     return n;
 }
 
-size_t sdm_pod_count_weights(sdm_pod_type type, size_t outputs, size_t n_coarse, size_t k)
-{
-    return type == SDM_POD_I8 ? sdm_panel_i8_count(outputs, n_coarse, k) : sdm_panel_count(outputs, k);
-}
-
-static size_t place_block(sdm_pod_type type, const sdm_pod_block *blocks, const uint32_t *coarse, size_t b, size_t next,
-                          size_t *at)
-{
-    at[b] = next;
-    next += sdm_pod_count_weights(type, sdm_pod_outputs(blocks, b), coarse ? coarse[b] : 0, blocks[b].rank);
-    for (size_t i = 0; i < blocks[b].n_children; i++)
-        next = place_block(type, blocks, coarse, blocks[b].child + i, next, at);
-    return next;
-}
-
-size_t sdm_pod_place_weights(sdm_pod_type type, const sdm_pod_levels *levels, const sdm_pod_block *blocks,
-                             const uint32_t *coarse, size_t *at)
-{
-    size_t next = 0;
-    for (size_t b = levels->first[levels->n - 1]; b < levels->first[levels->n]; b++)
-        next = place_block(type, blocks, coarse, b, next, at);
-    return next;
-}
-
-void sdm_pod_place_coefficients(const sdm_pod_levels *levels, const sdm_pod_block *blocks,
-                                size_t at[SDM_POD_MAX_LEVELS + 1])
-{
-    at[0] = 0;
-    for (size_t l = 0; l < levels->n; l++) {
-        const sdm_pod_block *last = &blocks[levels->first[l + 1] - 1];
-        at[l + 1] = at[l] + last->coefficient + last->rank;
-    }
-}
-
 static void pack_matrix(sdm_pod_type type, size_t outputs, size_t k, sdm_view w, void *to, size_t offset)
 {
     if (type == SDM_POD_F16)
@@ -97,6 +63,16 @@ static void pack_weights(const sdm_pod_spec *spec, const pod_integers *integers,
     }
 }
 
+// in the order in which blocks are decoded
+static void pack_mean(const sdm_pod_spec *spec, const pod_leaf *leaves, float *to)
+{
+    for (size_t i = 0; i < spec->arch.levels.first[1]; i++) {
+        const sdm_pod_block *b = &spec->blocks[leaves[i].block];
+        memcpy(to, spec->weights.mean + b->voxel, sdm_pod_block_voxels(b) * sizeof *to);
+        to += sdm_pod_block_voxels(b);
+    }
+}
+
 // little-endian numbers of 32 bits
 static void put_numbers(const uint32_t *from, size_t n, uint8_t *to)
 {
@@ -112,14 +88,20 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
     const size_t mlp_count = sdm_pod_mlp_count(a), mlp_number = sdm_pod_size(sdm_pod_mlp_type(spec->type));
     const size_t head_count =
         sdm_pod_count_weights(spec->type, a->n_coefficients, integers ? integers->coarse[n_blocks] : 0, a->n_latent);
-    float *bias = NULL;
+    pod_slab *slabs = NULL;
+    pod_leaf *leaves = NULL;
+    float *bias = NULL, *mean = NULL;
     size_t *at = NULL, basis_count = 0, all[SDM_POD_MAX_LEVELS + 1];
     uint8_t *mlp = NULL, *head = NULL, *basis = NULL, *ranks = NULL, *coarse = NULL;
     sdm_text text = {0};
     sdm_status s = SDM_ALLOC(&at, n_blocks, "model weights", err);
+    if (!s) s = SDM_ALLOC(&slabs, n_blocks - a->levels.first[a->levels.n - 1], "model weights", err);
+    if (!s) s = SDM_ALLOC(&leaves, a->levels.first[1], "model weights", err);
     if (!s)
-        basis_count =
-            sdm_pod_place_weights(spec->type, &a->levels, spec->blocks, integers ? integers->coarse : NULL, at);
+        basis_count = sdm_pod_place_weights(spec->type, &a->levels, spec->blocks, slabs,
+                                            sdm_pod_slabs(&a->levels, spec->blocks, a->block, slabs, leaves), leaves,
+                                            integers ? integers->coarse : NULL, at);
+    if (!s) s = SDM_ALLOC(&mean, a->n_voxels, "model weights", err);
     if (!s) s = SDM_ALLOC(&mlp, mlp_count * mlp_number, "model weights", err);
     if (!s) s = SDM_ALLOC(&bias, a->depth * a->width, "model weights", err);
     if (!s) s = SDM_ALLOC(&head, head_count * number, "model weights", err);
@@ -128,6 +110,7 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
     if (!s) s = SDM_ALLOC(&coarse, (n_blocks + 1) * 4, "model weights", err);
     if (s) goto done;
     pack_weights(spec, integers, at, mlp, bias, head, basis);
+    pack_mean(spec, leaves, mean);
     for (size_t b = 0; b < n_blocks; b++) put_numbers(&spec->blocks[b].rank, 1, ranks + 4 * b);
     if (integers) put_numbers(integers->coarse, n_blocks + 1, coarse);
     sdm_pod_place_coefficients(&a->levels, spec->blocks, all);
@@ -138,7 +121,7 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
         {"pod.bias", bias, a->depth * a->width * sizeof *bias},
         {"pod.head", head, head_count * number},
         {"pod.basis", basis, basis_count * number},
-        {"pod.mean", spec->weights.mean, a->n_voxels * sizeof(float)},
+        {"pod.mean", mean, a->n_voxels * sizeof(float)},
         {"pod.coarse", coarse, (n_blocks + 1) * 4},
         {"pod.order", integers ? integers->order : NULL, a->n_latent * sizeof(uint32_t)},
         {"pod.factor", integers ? integers->factor : NULL, (all[a->levels.n] + a->n_latent) * sizeof(float)}};
@@ -152,6 +135,9 @@ done:
     sdm_free(head);
     sdm_free(bias);
     sdm_free(mlp);
+    sdm_free(mean);
+    sdm_free(leaves);
+    sdm_free(slabs);
     sdm_free(at);
     return s;
 }

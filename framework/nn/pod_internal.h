@@ -6,29 +6,45 @@
 #include "sdm/kernels.h"
 #include "sdm/pod.h"
 
+/* Blocks of the highest level that lie side by side along x, and all below them: numbers of blocks, first and behind the last. */
+typedef struct pod_slab {
+    uint32_t top, top_end;
+    uint32_t leaf, leaf_end; /* of the lowest level; also their places in pod_network.leaves */
+    uint32_t group,
+        group_end; /* blocks that give the coefficients of the lowest level: above it, or of it where it is the highest */
+    uint32_t coefficient, n_coefficients; /* of the lowest level */
+} pod_slab;
+
+/* A block of the lowest level, and which of its slab's groups it belongs to. */
+typedef struct pod_leaf {
+    uint32_t block, group;
+} pod_leaf;
+
 typedef struct pod_network {
     sdm_pod_arch arch;
     sdm_pod_type type;
     sdm_pod_block *blocks;
+    pod_slab *slabs;
+    size_t n_slabs;
+    pod_leaf *leaves;   /* slab by slab, along x, then y, then z */
     uint32_t *outputs;  /* [blocks] V_b */
     size_t *weights_at; /* [blocks] where the weights of a block begin in basis */
-    size_t coefficients_at[SDM_POD_MAX_LEVELS +
-                           1]; /* where the coefficients of a level begin among all; the last: their number C */
-    size_t max_group
-        [SDM_POD_MAX_LEVELS]; /* most coefficients of a level that are made together: of the highest those of a block, else
-                                             those of all children of a block */
-    /* Bytes only (pod_quantise.h). */
-    uint32_t *coarse;                     /* [blocks + 1] the last: of the head */
-    const uint32_t *order;                /* [L] */
-    const float *factor;                  /* [C + L] */
-    int limit[SDM_POD_MAX_LEVELS + 1];    /* of inputs of a level as integers; the last: of the head */
+    /* Where the coefficients of a level begin among all; the last: their number C. */
+    size_t coefficients_at[SDM_POD_MAX_LEVELS + 1];
+    size_t max_outputs[SDM_POD_MAX_LEVELS];
+    /* Most coefficients of a level that are made together: of the highest those of a block, of the others those of a block's children. */
+    size_t max_group[SDM_POD_MAX_LEVELS];
+    size_t max_slab, max_slab_groups;     /* most coefficients of the lowest level, and groups, of a slab */
     uint8_t *exponents;                   /* [max(F, 1 + I)][P] */
     const float *bias[SDM_POD_MAX_DEPTH]; /* [W] */
-    const float *mean;                    /* block order */
-    /* Panels (sdm/kernels.h), the MLP's half when the others are bytes. The basis: a block of the highest level, then those below it, depth first, which is the
-       order in which they are read. */
+    const float *mean;                    /* [voxels] block after block in the order of `leaves` */
+    /* Panels (sdm/kernels.h), the MLP's half when the others are bytes. The basis in the order in which it is read (sdm_pod_place_weights()). */
     const void *layer[SDM_POD_MAX_DEPTH], *head, *basis;
-    size_t max_outputs[SDM_POD_MAX_LEVELS];
+    /* Bytes only (pod_quantise.h). */
+    uint32_t *coarse;                  /* [blocks + 1] the last: of the head */
+    const uint32_t *order;             /* [L] */
+    const float *factor;               /* [C + L] */
+    int limit[SDM_POD_MAX_LEVELS + 1]; /* of inputs of a level as integers; the last: of the head */
 } pod_network;
 
 /* Number of weights of the layers of the MLP, without the biases. */
@@ -49,9 +65,16 @@ void sdm_pod_product_back(sdm_pod_type type, size_t outputs, size_t k, const voi
 /* Stored numbers of a matrix of `outputs` x k; n_coarse: for bytes. */
 size_t sdm_pod_count_weights(sdm_pod_type type, size_t outputs, size_t n_coarse, size_t k);
 
-/* at[blocks] = where the weights of each block begin, depth first; coarse[blocks]: for bytes. Returns their number. */
+/* Slabs and leaves from blocks that are numbered; slabs[] has room for the blocks of the highest level, leaves[] for those of the lowest.
+   edge: of a block of the lowest level. Returns the number of slabs. */
+size_t sdm_pod_slabs(const sdm_pod_levels *levels, const sdm_pod_block *blocks, size_t edge, pod_slab *slabs,
+                     pod_leaf *leaves);
+
+/* at[blocks] = where the weights of each block begin, slab by slab: the levels above the lowest depth first, then the leaves.
+   coarse[blocks]: for bytes. Returns their number. */
 size_t sdm_pod_place_weights(sdm_pod_type type, const sdm_pod_levels *levels, const sdm_pod_block *blocks,
-                             const uint32_t *coarse, size_t *at);
+                             const pod_slab *slabs, size_t n_slabs, const pod_leaf *leaves, const uint32_t *coarse,
+                             size_t *at);
 
 /* at[l] = number of coefficients of the levels below l, after sdm_pod_number(); the last: of all. */
 void sdm_pod_place_coefficients(const sdm_pod_levels *levels, const sdm_pod_block *blocks,
@@ -86,6 +109,29 @@ void sdm_pod_latent(const sdm_model *model, const double *p, size_t n, size_t n_
 /* gradient[P] = (dz / dp)^T dz[L], at the parameters p of the last sdm_pod_latent() with this w. */
 void sdm_pod_latent_back(const sdm_model *model, const double *p, const pod_latent *w, const float *dz,
                          double *gradient);
+
+/* pod_decode.c: latent variables to maps and back. R rows of z go together: maps, or a map and its derivatives. */
+typedef struct pod_space {
+    float *z;            /* [R][L] */
+    float *c;            /* [R][padded K] coefficients of the highest level */
+    float *sorted;       /* bytes: a row of z, or the inputs of a block, in the order of columns */
+    int16_t *z_integers; /* bytes: [R][ldz] */
+    float *z_scale;      /* bytes: [R] */
+    size_t ldz;
+    float *threads; /* memory of each thread */
+    size_t per_thread;
+} pod_space;
+
+/* Sets the pointers into memory[] (NULL: none); returns the floats needed. */
+size_t sdm_pod_space_carve(const pod_network *m, size_t rows, int n_threads, float *memory, pod_space *w);
+
+/* maps[R] from w->z; the mean map is added to the first `with_mean`. */
+void sdm_pod_decode(const pod_network *m, const sdm_grid *grid, size_t rows, size_t with_mean, float *const *maps,
+                    const pod_space *w, int n_threads);
+
+/* dz[L] = the transpose times adjoint[voxels]. One thread. */
+void sdm_pod_decode_back(const pod_network *m, const sdm_grid *grid, const float *adjoint, const pod_space *w,
+                         float *dz);
 
 /* pod_forward.c */
 size_t sdm_pod_scratch_bytes(const sdm_model *m, size_t n, int n_threads);

@@ -52,6 +52,11 @@ static sdm_status read_ranks(const sdm_section *ranks, pod_network *m, sdm_error
         }
     for (size_t level = 0; level + 1 < a->levels.n; level++) m->max_group[level] = m->max_outputs[level + 1];
     sdm_pod_place_coefficients(&a->levels, m->blocks, m->coefficients_at);
+    m->n_slabs = sdm_pod_slabs(&a->levels, m->blocks, a->block, m->slabs, m->leaves);
+    for (const pod_slab *k = m->slabs; k < m->slabs + m->n_slabs; k++) {
+        if (k->n_coefficients > m->max_slab) m->max_slab = k->n_coefficients;
+        if (k->group_end - k->group > m->max_slab_groups) m->max_slab_groups = k->group_end - k->group;
+    }
     return SDM_OK;
 }
 
@@ -75,6 +80,8 @@ static sdm_status set_up(const sdm_section *ranks, const sdm_grid *grid, pod_net
     if ((s = SDM_ALLOC(&m->blocks, n_blocks, "model blocks", err))) return s;
     if ((s = SDM_ALLOC(&m->outputs, n_blocks, "model blocks", err))) return s;
     if ((s = SDM_ALLOC(&m->weights_at, n_blocks, "model blocks", err))) return s;
+    if ((s = SDM_ALLOC(&m->slabs, n_blocks - a->levels.first[a->levels.n - 1], "model blocks", err))) return s;
+    if ((s = SDM_ALLOC(&m->leaves, a->levels.first[1], "model blocks", err))) return s;
     sdm_pod_blocks(grid, a->block, &a->levels, m->blocks);
     if ((s = read_ranks(ranks, m, err))) return s;
     const size_t poly = inputs > terms ? inputs : terms;
@@ -134,7 +141,9 @@ static sdm_status bind_weights(const sdm_section *sections, size_t n, sdm_model 
     } need[] = {
         {"pod.mlp", sdm_pod_mlp_count(a) * mlp_weight},
         {"pod.head", sdm_pod_count_weights(m->type, a->n_coefficients, sdm_pod_head_coarse(m), a->n_latent) * weight},
-        {"pod.basis", sdm_pod_place_weights(m->type, &a->levels, m->blocks, m->coarse, m->weights_at) * weight},
+        {"pod.basis", sdm_pod_place_weights(m->type, &a->levels, m->blocks, m->slabs, m->n_slabs, m->leaves, m->coarse,
+                                            m->weights_at) *
+                          weight},
         {"pod.mean", a->n_voxels * sizeof(float)},
         {"pod.bias", a->depth * a->width * sizeof(float)},
     };
@@ -193,6 +202,8 @@ static void dispose(void *network)
     sdm_free(m->weights_at);
     sdm_free(m->exponents);
     sdm_free(m->coarse);
+    sdm_free(m->leaves);
+    sdm_free(m->slabs);
     sdm_free(m);
 }
 

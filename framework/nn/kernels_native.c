@@ -1,5 +1,6 @@
 /* Choice of the instruction set, the blocked matrix product, packing and half precision. */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #ifdef _OPENMP
 #include <omp.h>
@@ -175,10 +176,16 @@ size_t sdm_panel_i8_count(size_t outputs, size_t n_coarse, size_t k)
                : sdm_panel_outputs(outputs) * inputs;
 }
 
-int sdm_panel_i8_limit(size_t n_coarse, size_t k)
+int sdm_panel_i8_limit(size_t outputs, size_t k, const int16_t *w)
 {
-    const double limit = INT32_MAX / ((double)SDM_COARSE * (double)n_coarse + 128 * (double)(k ? k : 1));
-    return limit > 32767 ? 32767 : limit > 1 ? (int)limit : 1;
+    int64_t most = 1;
+    for (size_t o = 0; o < outputs; o++) {
+        int64_t sum = 0;
+        for (size_t i = 0; i < k; i++) sum += abs(w[o * k + i]);
+        if (sum > most) most = sum;
+    }
+    const int64_t limit = INT32_MAX / most;
+    return limit > INT16_MAX ? INT16_MAX : limit > 1 ? (int)limit : 1;
 }
 
 // one part, coarse or fine, of a panel from output o on

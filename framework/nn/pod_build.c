@@ -92,7 +92,8 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
     pod_leaf *leaves = NULL;
     float *bias = NULL, *mean = NULL;
     size_t *at = NULL, basis_count = 0, all[SDM_POD_MAX_LEVELS + 1];
-    uint8_t *mlp = NULL, *head = NULL, *basis = NULL, *ranks = NULL, *coarse = NULL;
+    uint8_t *mlp = NULL, *head = NULL, *basis = NULL, *ranks = NULL, *coarse = NULL,
+            limit[4 * (SDM_POD_MAX_LEVELS + 1)];
     sdm_text text = {0};
     sdm_status s = SDM_ALLOC(&at, n_blocks, "model weights", err);
     if (!s) s = SDM_ALLOC(&slabs, n_blocks - a->levels.first[a->levels.n - 1], "model weights", err);
@@ -112,7 +113,10 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
     pack_weights(spec, integers, at, mlp, bias, head, basis);
     pack_mean(spec, leaves, mean);
     for (size_t b = 0; b < n_blocks; b++) put_numbers(&spec->blocks[b].rank, 1, ranks + 4 * b);
-    if (integers) put_numbers(integers->coarse, n_blocks + 1, coarse);
+    if (integers) {
+        put_numbers(integers->coarse, n_blocks + 1, coarse);
+        put_numbers(integers->limit, a->levels.n + 1, limit);
+    }
     sdm_pod_place_coefficients(&a->levels, spec->blocks, all);
     describe(spec, &text);
     const sdm_section sections[] = {
@@ -123,10 +127,11 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
         {"pod.basis", basis, basis_count * number},
         {"pod.mean", mean, a->n_voxels * sizeof(float)},
         {"pod.coarse", coarse, (n_blocks + 1) * 4},
+        {"pod.limit", limit, (a->levels.n + 1) * 4},
         {"pod.order", integers ? integers->order : NULL, a->n_latent * sizeof(uint32_t)},
         {"pod.factor", integers ? integers->factor : NULL, (all[a->levels.n] + a->n_latent) * sizeof(float)}};
     const size_t n = sizeof sections / sizeof *sections;
-    s = sdm_model_pack(spec->info, &text, sections, integers ? n : n - 3, bytes, size, err);
+    s = sdm_model_pack(spec->info, &text, sections, integers ? n : n - 4, bytes, size, err);
 done:
     sdm_text_dispose(&text);
     sdm_free(coarse);

@@ -109,20 +109,23 @@ static sdm_status read_bytes(const sdm_section *sections, size_t n, sdm_model *m
     for (size_t i = 0; i < a->n_latent; i++)
         if (m->order[i] >= a->n_latent)
             return sdm_fail(err, SDM_E_FORMAT, "damaged: latent variable %u of %zu", m->order[i], a->n_latent);
-    for (size_t level = 0; level <= a->levels.n; level++) m->limit[level] = INT16_MAX;
+    const uint8_t *limits = sdm_model_weights(model, sections, n, "pod.limit", (a->levels.n + 1) * 4, err);
+    if (!limits) return SDM_E_FORMAT;
+    for (size_t level = 0; level <= a->levels.n; level++) {
+        const uint32_t limit = number(limits + 4 * level);
+        if (limit < 1 || limit > INT16_MAX) return sdm_fail(err, SDM_E_FORMAT, "damaged: integers up to %u", limit);
+        m->limit[level] = (int)limit;
+    }
     for (size_t level = 0; level < a->levels.n; level++)
         for (size_t b = a->levels.first[level]; b < a->levels.first[level + 1]; b++) {
             m->coarse[b] = number(coarse + 4 * b);
             if (m->coarse[b] > m->blocks[b].rank)
                 return sdm_fail(err, SDM_E_FORMAT, "damaged: %u coarse columns of a block of rank %u", m->coarse[b],
                                 m->blocks[b].rank);
-            const int limit = sdm_panel_i8_limit(m->coarse[b], m->blocks[b].rank);
-            if (limit < m->limit[level]) m->limit[level] = limit;
         }
     m->coarse[n_blocks] = number(coarse + 4 * n_blocks);
     if (m->coarse[n_blocks] > a->n_latent)
         return sdm_fail(err, SDM_E_FORMAT, "damaged: %u coarse columns of %zu", m->coarse[n_blocks], a->n_latent);
-    m->limit[a->levels.n] = sdm_panel_i8_limit(m->coarse[n_blocks], a->n_latent);
     return SDM_OK;
 }
 

@@ -7,7 +7,8 @@
 /* Coefficients of all levels stand one after another, C in number, level l from coefficients_at[l] on. */
 typedef struct pod_integers {
     uint32_t *coarse; /* [blocks + 1] how many of the first columns have a coarse part; the last: of the head */
-    uint32_t *order;  /* [L] latent variable of each column of the head */
+    uint32_t limit[SDM_POD_MAX_LEVELS + 1]; /* largest inputs of the blocks of a level; the last: of the head */
+    uint32_t *order;                        /* [L] latent variable of each column of the head */
     float
         *factor; /* [C + L] what a coefficient is multiplied with before it goes into its block; columns of the head */
     int16_t *head;  /* [K][L] */

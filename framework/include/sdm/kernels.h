@@ -48,18 +48,18 @@ SDM_API void sdm_panel_f16(size_t batch, size_t outputs, size_t k, const uint16_
 SDM_API void sdm_panel_back_f32(size_t outputs, size_t k, const float *w, const float *y, float *x);
 SDM_API void sdm_panel_back_f16(size_t outputs, size_t k, const uint16_t *w, const float *y, float *x);
 
-/* Weights as bytes: the weight of output o and input i is fine[o][i] + 256 coarse[o][i], fine from -128 to 127, coarse from -16 to 16;
+/* Weights as bytes: the weight of output o and input i is fine[o][i] + 256 coarse[o][i], fine from -128 to 127, coarse from -64 to 64;
    only the first n_coarse inputs have a coarse part. In panels of 16 outputs too; in each two neighbouring inputs lie together, first all coarse
    parts, then all fine ones, an odd one filled up with zero. Inputs are integers of 16 bits times a factor for each row, and sums are
    integers of 32 bits: exact, so the same for every instruction set. */
-#define SDM_COARSE 4096
+#define SDM_COARSE 16384
 static inline size_t sdm_panel_even(size_t k) { return k + k % 2; }
 
 /* Bytes of the weights of `outputs` x k; SIZE_MAX when they do not fit. */
 SDM_API size_t sdm_panel_i8_count(size_t outputs, size_t n_coarse, size_t k);
 
-/* Largest magnitude of inputs with which no sum of products passes the end of its integer, at most 32767. */
-SDM_API int sdm_panel_i8_limit(size_t n_coarse, size_t k);
+/* Largest magnitude of inputs with which no sum of their products with w[outputs][k] passes the end of its integer, 1 .. 32767. */
+SDM_API int sdm_panel_i8_limit(size_t outputs, size_t k, const int16_t *w);
 
 /* Packs w[outputs][k], in -128 .. 127 but for the first n_coarse of each row, which are in -SDM_COARSE .. SDM_COARSE. */
 SDM_API void sdm_panel_pack_i8(size_t outputs, size_t n_coarse, size_t k, const int16_t *w, int8_t *panels);

@@ -10,7 +10,7 @@ dual sdm_dual_of(double v) { return (dual){.v = v}; }
 dual sdm_dual_add(dual a, dual b)
 {
     a.v += b.v;
-    for (int i = 0; i < COCHLEA_PARAMS; i++) a.d[i] += b.d[i];
+    for (int i = 0; i < COCHLEA_UNKNOWNS; i++) a.d[i] += b.d[i];
     return a;
 }
 
@@ -19,21 +19,21 @@ dual sdm_dual_sub(dual a, dual b) { return sdm_dual_add(a, sdm_dual_scale(-1, b)
 dual sdm_dual_scale(double s, dual a)
 {
     a.v *= s;
-    for (int i = 0; i < COCHLEA_PARAMS; i++) a.d[i] *= s;
+    for (int i = 0; i < COCHLEA_UNKNOWNS; i++) a.d[i] *= s;
     return a;
 }
 
 dual sdm_dual_mul(dual a, dual b)
 {
     dual r = {.v = a.v * b.v};
-    for (int i = 0; i < COCHLEA_PARAMS; i++) r.d[i] = a.d[i] * b.v + a.v * b.d[i];
+    for (int i = 0; i < COCHLEA_UNKNOWNS; i++) r.d[i] = a.d[i] * b.v + a.v * b.d[i];
     return r;
 }
 
 dual sdm_dual_div(dual a, dual b)
 {
     dual r = {.v = a.v / b.v};
-    for (int i = 0; i < COCHLEA_PARAMS; i++) r.d[i] = (a.d[i] - r.v * b.d[i]) / b.v;
+    for (int i = 0; i < COCHLEA_UNKNOWNS; i++) r.d[i] = (a.d[i] - r.v * b.d[i]) / b.v;
     return r;
 }
 
@@ -55,70 +55,95 @@ static dual dot(const dual a[3], const dual b[3])
     return sdm_dual_add(sdm_dual_add(sdm_dual_mul(a[0], b[0]), sdm_dual_mul(a[1], b[1])), sdm_dual_mul(a[2], b[2]));
 }
 
-// r, dr/dtheta and its derivative
-static void spiral(const double *p, double theta, dual r[3])
+static dual exponential(dual a)
 {
-    dual a = sdm_dual_of(p[COCHLEA_A]), b = sdm_dual_of(p[COCHLEA_B]);
-    a.d[COCHLEA_A] = 1;
-    b.d[COCHLEA_B] = 1;
-    const double e = exp(-p[COCHLEA_B] * theta);
-    r[0] = sdm_dual_mul(a, sdm_dual_apply(b, e, -theta * e));
+    const double e = exp(a.v);
+    return sdm_dual_apply(a, e, e);
+}
+
+static dual cosine(dual a) { return sdm_dual_apply(a, cos(a.v), -sin(a.v)); }
+static dual sine(dual a) { return sdm_dual_apply(a, sin(a.v), cos(a.v)); }
+
+static dual unknown(const double *x, int k)
+{
+    dual u = sdm_dual_of(x[k]);
+    u.d[k] = 1;
+    return u;
+}
+
+// r, dr/dtheta and its derivative
+static void spiral(const double *x, dual theta, dual r[3])
+{
+    const dual b = unknown(x, COCHLEA_B);
+    r[0] = sdm_dual_mul(unknown(x, COCHLEA_A), exponential(sdm_dual_scale(-1, sdm_dual_mul(b, theta))));
     r[1] = sdm_dual_scale(-1, sdm_dual_mul(b, r[0]));
     r[2] = sdm_dual_scale(-1, sdm_dual_mul(b, r[1]));
 }
 
 // Taylor's polynomial of the spiral at theta2 up to the second order, and a cubic term that makes r(0) = p0: C2 at theta2
-static void basal_cubic(const cochlea_model *m, const double *p, double theta, dual r[3])
+static void basal_cubic(const double *x, dual theta, dual r[3])
 {
+    const dual end = unknown(x, COCHLEA_THETA2), end2 = sdm_dual_mul(end, end), h = sdm_dual_sub(theta, end);
     dual s[3];
-    spiral(p, m->theta2, s);
-    const double full = -m->theta2, h = theta - m->theta2;
-    dual start = sdm_dual_add(sdm_dual_add(s[0], sdm_dual_scale(full, s[1])), sdm_dual_scale(full * full / 2, s[2]));
-    const dual k = sdm_dual_scale(1 / (full * full * full), sdm_dual_sub(sdm_dual_of(m->p0), start));
-    r[0] = sdm_dual_add(sdm_dual_add(s[0], sdm_dual_scale(h, s[1])),
-                        sdm_dual_add(sdm_dual_scale(h * h / 2, s[2]), sdm_dual_scale(h * h * h, k)));
-    r[1] = sdm_dual_add(s[1], sdm_dual_add(sdm_dual_scale(h, s[2]), sdm_dual_scale(3 * h * h, k)));
-    r[2] = sdm_dual_add(s[2], sdm_dual_scale(6 * h, k));
+    spiral(x, end, s);
+    const dual half = sdm_dual_scale(0.5, s[2]);
+    const dual start = sdm_dual_add(sdm_dual_sub(s[0], sdm_dual_mul(end, s[1])), sdm_dual_mul(end2, half));
+    const dual k = sdm_dual_div(sdm_dual_sub(start, unknown(x, COCHLEA_P0)), sdm_dual_mul(end2, end));
+    const dual kh = sdm_dual_mul(k, h);
+    r[0] = sdm_dual_add(s[0], sdm_dual_mul(h, sdm_dual_add(s[1], sdm_dual_mul(h, sdm_dual_add(half, kh)))));
+    r[1] = sdm_dual_add(s[1], sdm_dual_mul(h, sdm_dual_add(s[2], sdm_dual_scale(3, kh))));
+    r[2] = sdm_dual_add(s[2], sdm_dual_scale(6, kh));
 }
 
 // z and its first two derivatives: z = c theta + alpha exp(-kappa theta) cos(theta - phi)
-static void height(const cochlea_model *m, const double *p, double theta, dual z[3])
+static void height(const double *x, dual theta, dual z[3])
 {
-    dual alpha = sdm_dual_of(p[COCHLEA_ALPHA]), turned = sdm_dual_of(theta - p[COCHLEA_PHI]);
-    alpha.d[COCHLEA_ALPHA] = 1;
-    turned.d[COCHLEA_PHI] = -1;
-    const double k = m->kappa, co = cos(turned.v), si = sin(turned.v);
-    const dual wave = sdm_dual_scale(exp(-k * theta), alpha);
-    const dual c = sdm_dual_apply(turned, co, -si), s = sdm_dual_apply(turned, si, co);
-    z[0] = sdm_dual_add(sdm_dual_of(m->c * theta), sdm_dual_mul(wave, c));
-    z[1] = sdm_dual_sub(sdm_dual_of(m->c), sdm_dual_mul(wave, sdm_dual_add(sdm_dual_scale(k, c), s)));
-    z[2] = sdm_dual_mul(wave, sdm_dual_add(sdm_dual_scale(k * k - 1, c), sdm_dual_scale(2 * k, s)));
+    const dual rise = unknown(x, COCHLEA_C), k = unknown(x, COCHLEA_KAPPA);
+    const dual turned = sdm_dual_sub(theta, unknown(x, COCHLEA_PHI)), c = cosine(turned), s = sine(turned);
+    const dual decay = exponential(sdm_dual_scale(-1, sdm_dual_mul(k, theta)));
+    const dual wave = sdm_dual_mul(unknown(x, COCHLEA_ALPHA), decay);
+    const dual level = sdm_dual_sub(sdm_dual_mul(k, k), sdm_dual_of(1));
+    z[0] = sdm_dual_add(sdm_dual_mul(rise, theta), sdm_dual_mul(wave, c));
+    z[1] = sdm_dual_sub(rise, sdm_dual_mul(wave, sdm_dual_add(sdm_dual_mul(k, c), s)));
+    z[2] = sdm_dual_mul(wave, sdm_dual_add(sdm_dual_mul(level, c), sdm_dual_scale(2, sdm_dual_mul(k, s))));
 }
 
 // curve[order][3]: position and derivatives with respect to theta
-static void curve_at(const cochlea_model *m, const double *p, double theta, dual curve[3][3])
+static void curve_at(const cochlea_model *m, const double *x, dual theta, dual curve[3][3])
 {
     dual r[3], z[3];
-    if (m->cubic && theta < m->theta2)
-        basal_cubic(m, p, theta, r);
+    if (m->cubic && theta.v < x[COCHLEA_THETA2])
+        basal_cubic(x, theta, r);
     else
-        spiral(p, theta, r);
-    height(m, p, theta, z);
-    const double c = cos(theta), s = sin(theta);
-    const dual level = sdm_dual_sub(r[2], r[0]);
-    curve[0][0] = sdm_dual_scale(c, r[0]);
-    curve[0][1] = sdm_dual_scale(s, r[0]);
-    curve[1][0] = sdm_dual_sub(sdm_dual_scale(c, r[1]), sdm_dual_scale(s, r[0]));
-    curve[1][1] = sdm_dual_add(sdm_dual_scale(s, r[1]), sdm_dual_scale(c, r[0]));
-    curve[2][0] = sdm_dual_sub(sdm_dual_scale(c, level), sdm_dual_scale(2 * s, r[1]));
-    curve[2][1] = sdm_dual_add(sdm_dual_scale(s, level), sdm_dual_scale(2 * c, r[1]));
+        spiral(x, theta, r);
+    height(x, theta, z);
+    const dual c = cosine(theta), s = sine(theta), level = sdm_dual_sub(r[2], r[0]), twice = sdm_dual_scale(2, r[1]);
+    curve[0][0] = sdm_dual_mul(c, r[0]);
+    curve[0][1] = sdm_dual_mul(s, r[0]);
+    curve[1][0] = sdm_dual_sub(sdm_dual_mul(c, r[1]), sdm_dual_mul(s, r[0]));
+    curve[1][1] = sdm_dual_add(sdm_dual_mul(s, r[1]), sdm_dual_mul(c, r[0]));
+    curve[2][0] = sdm_dual_sub(sdm_dual_mul(c, level), sdm_dual_mul(s, twice));
+    curve[2][1] = sdm_dual_add(sdm_dual_mul(s, level), sdm_dual_mul(c, twice));
     for (int k = 0; k < 3; k++) curve[k][2] = z[k];
 }
 
-void sdm_cochlea_section_at(const cochlea_model *m, const double *p, double theta, cochlea_section *out)
+// half axes of the tube
+static void tube_at(const cochlea_model *m, dual theta, dual *wide, dual *high)
 {
+    const double flare = m->flare * exp(-theta.v / m->flare_angle);
+    *wide = sdm_dual_apply(theta, m->radius - m->taper * theta.v + flare, -m->taper - flare / m->flare_angle);
+    *high = *wide;
+    if (!m->ellipse || theta.v >= TURN) return;
+    const double u = theta.v / TURN, rest = 1 - m->ratio;
+    const dual ratio = sdm_dual_apply(theta, m->ratio + rest * u * u * (3 - 2 * u), rest * 6 * u * (1 - u) / TURN);
+    *high = sdm_dual_mul(*wide, ratio);
+}
+
+void sdm_cochlea_section_at(const cochlea_model *m, const double *x, double share, cochlea_section *out)
+{
+    const dual theta = sdm_dual_scale(share, unknown(x, COCHLEA_THETA));
     dual curve[3][3];
-    curve_at(m, p, theta, curve);
+    curve_at(m, x, theta, curve);
     const dual *d1 = curve[1], *d2 = curve[2];
     const dual speed2 = dot(d1, d1), speed = root(speed2);
     const dual level = root(sdm_dual_add(sdm_dual_mul(d1[0], d1[0]), sdm_dual_mul(d1[1], d1[1])));
@@ -136,29 +161,23 @@ void sdm_cochlea_section_at(const cochlea_model *m, const double *p, double thet
     // the part of the second derivative across the tangent, by arc length
     out->bend[0] = sdm_dual_div(dot(d2, out->e1), speed2);
     out->bend[1] = sdm_dual_div(dot(d2, out->e2), speed2);
+    tube_at(m, theta, &out->wide, &out->high);
 }
 
-void sdm_cochlea_centre_at(const cochlea_model *m, const double *p, double theta, double centre[3])
+void sdm_cochlea_centre_at(const cochlea_model *m, const double *x, double theta, double centre[3])
 {
-    double r = p[COCHLEA_A] * exp(-p[COCHLEA_B] * theta);
-    if (m->cubic && theta < m->theta2) {
+    double r = x[COCHLEA_A] * exp(-x[COCHLEA_B] * theta);
+    if (m->cubic && theta < x[COCHLEA_THETA2]) {
         dual basal[3];
-        basal_cubic(m, p, theta, basal);
+        basal_cubic(x, sdm_dual_of(theta), basal);
         r = basal[0].v;
     }
     centre[0] = r * cos(theta);
     centre[1] = r * sin(theta);
-    centre[2] = m->c * theta + p[COCHLEA_ALPHA] * exp(-m->kappa * theta) * cos(theta - p[COCHLEA_PHI]);
+    centre[2] = x[COCHLEA_C] * theta + x[COCHLEA_ALPHA] * exp(-x[COCHLEA_KAPPA] * theta) * cos(theta - x[COCHLEA_PHI]);
 }
 
 double sdm_cochlea_radius_at(const cochlea_model *m, double theta)
 {
     return m->radius - m->taper * theta + m->flare * exp(-theta / m->flare_angle);
-}
-
-double sdm_cochlea_ratio_at(const cochlea_model *m, double theta)
-{
-    if (!m->ellipse || theta >= TURN) return 1;
-    const double u = theta / TURN;
-    return m->ratio + (1 - m->ratio) * u * u * (3 - 2 * u);
 }

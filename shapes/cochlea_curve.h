@@ -4,39 +4,51 @@
 
 #include <stdbool.h>
 
-enum { COCHLEA_A, COCHLEA_ALPHA, COCHLEA_B, COCHLEA_PHI, COCHLEA_PARAMS };
+/* What may be a parameter. The published four, then constants of the anatomy. */
+enum {
+    COCHLEA_A,
+    COCHLEA_ALPHA,
+    COCHLEA_B,
+    COCHLEA_PHI,
+    COCHLEA_C,      /* rise, mm / rad */
+    COCHLEA_KAPPA,  /* decay of the wave, 1 / rad */
+    COCHLEA_THETA,  /* angle of the apical end, rad */
+    COCHLEA_THETA2, /* a cubic start lies below this angle, rad, */
+    COCHLEA_P0,     /* and begins at this radius, mm */
+    COCHLEA_UNKNOWNS
+};
 
-/* A number with its derivatives with respect to the parameters (forward differentiation). */
+/* A number with its derivatives with respect to the unknowns (forward differentiation). */
 typedef struct dual {
-    double v, d[COCHLEA_PARAMS];
+    double v, d[COCHLEA_UNKNOWNS];
 } dual;
 
-/* The constants of the model: options of the shape. */
+/* What is never a parameter. */
 typedef struct cochlea_model {
-    double theta;         /* angle of the apical end, rad */
-    double c, kappa;      /* rise, mm / rad; decay of the wave, 1 / rad */
-    bool cubic;           /* the basal start is a polynomial below theta2, from radius p0 */
-    double theta2, p0;    /* rad, mm */
+    bool cubic;           /* the basal start is a polynomial */
     double radius, taper; /* tube radius = radius - taper theta + flare exp(-theta / flare_angle), mm */
     double flare, flare_angle;
     bool ellipse; /* the section is an ellipse of axis ratio `ratio` at the base, a circle after one turn */
     double ratio;
 } cochlea_model;
 
-/* A cross-section: centre, unit tangent, the axes across it (e1 outwards and level, e2 = tangent x e1), and the curvature
-   vector of the centreline in those axes (1 / mm). */
+/* A cross-section: centre, unit tangent, the axes across it (e1 outwards and level, e2 = tangent x e1), the curvature
+   vector of the centreline in those axes (1 / mm), and the half axes of the tube along them (mm). */
 typedef struct cochlea_section {
-    dual centre[3], tangent[3], e1[3], e2[3], bend[2];
+    dual centre[3], tangent[3], e1[3], e2[3], bend[2], wide, high;
 } cochlea_section;
 
-void sdm_cochlea_section_at(const cochlea_model *m, const double *p, double theta, cochlea_section *out);
+/* x[COCHLEA_UNKNOWNS] are the unknowns. The section at `share` of the apical angle, 0 .. 1. */
+void sdm_cochlea_section_at(const cochlea_model *m, const double *x, double share, cochlea_section *out);
 
-/* Position alone. */
-void sdm_cochlea_centre_at(const cochlea_model *m, const double *p, double theta, double centre[3]);
+/* Position alone, at an angle. */
+void sdm_cochlea_centre_at(const cochlea_model *m, const double *x, double theta, double centre[3]);
 
-/* Tube radius, mm, and the axis ratio of the section; neither depends on the parameters. */
+/* Tube radius at an angle, mm. */
 double sdm_cochlea_radius_at(const cochlea_model *m, double theta);
-double sdm_cochlea_ratio_at(const cochlea_model *m, double theta);
+
+/* Signed distance of a point to the ball of the tube's radius swept along the centreline, mm: exact outside, a bound inside. */
+double sdm_cochlea_distance(const cochlea_model *m, const double *x, const double point[3]);
 
 /* Arithmetic of duals. */
 dual sdm_dual_of(double v);

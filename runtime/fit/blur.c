@@ -54,23 +54,24 @@ static int gaussian(double t, double tap[RADIUS_MAX + 1])
 
 static int64_t clamp(int64_t i, int64_t n) { return i < 0 ? 0 : i < n ? i : n - 1; }
 
-// one line of n voxels that are `step` apart; the last field is not touched
-static void blur_line(const float *in, float *out, int64_t n, size_t step, size_t n_fields, int r, const double *tap)
+// the first fields of one line of n voxels that are `step` apart
+static void blur_line(const float *in, float *out, int64_t n, size_t step, size_t n_blurred, int r, const double *tap)
 {
     for (int64_t i = 0; i < n; i++) {
         float sum[LINE_FIELDS];
         const float *centre = in + (size_t)i * step, w0 = (float)tap[0];
-        for (size_t f = 0; f + 1 < n_fields; f++) sum[f] = w0 * centre[f];
+        for (size_t f = 0; f < n_blurred; f++) sum[f] = w0 * centre[f];
         for (int k = 1; k <= r; k++) {
             const float *a = in + (size_t)clamp(i - k, n) * step, *b = in + (size_t)clamp(i + k, n) * step;
             const float w = (float)tap[k];
-            for (size_t f = 0; f + 1 < n_fields; f++) sum[f] += w * (a[f] + b[f]);
+            for (size_t f = 0; f < n_blurred; f++) sum[f] += w * (a[f] + b[f]);
         }
-        memcpy(out + (size_t)i * step, sum, (n_fields - 1) * sizeof *sum);
+        memcpy(out + (size_t)i * step, sum, n_blurred * sizeof *sum);
     }
 }
 
-void sdm_fit_blur(const sdm_grid *g, size_t n_fields, double variance, int n_threads, float **packed, float **spare)
+void sdm_fit_blur(const sdm_grid *g, size_t n_fields, size_t n_blurred, double variance, int n_threads, float **packed,
+                  float **spare)
 {
     (void)n_threads; // without OpenMP
     const size_t step[3] = {n_fields, n_fields * (size_t)g->n[0], n_fields * (size_t)(g->n[0] * g->n[1])};
@@ -84,7 +85,7 @@ void sdm_fit_blur(const sdm_grid *g, size_t n_fields, double variance, int n_thr
 #pragma omp parallel for schedule(static) num_threads(n_threads)
         for (int64_t line = 0; line < g->n[b] * g->n[c]; line++) {
             const size_t from = (size_t)(line % g->n[b]) * step[b] + (size_t)(line / g->n[b]) * step[c];
-            blur_line(in + from, out + from, g->n[axis], step[axis], n_fields, r, tap);
+            blur_line(in + from, out + from, g->n[axis], step[axis], n_blurred, r, tap);
         }
         *spare = *packed;
         *packed = out;

@@ -1,5 +1,5 @@
 /* Opening by a ball: the union of all balls of a radius that the space holds (Matheron 1975), through two exact distance transforms, row
-   by row along each axis as lower envelopes of parabolas (Felzenszwalb and Huttenlocher 2012). */
+   by row along each axis. */
 #include "cavity.h"
 
 #include <math.h>
@@ -7,56 +7,30 @@
 
 #include "blur.h"
 #include "laws.h"
+#include "sdm/envelope.h"
 #include "sdm/memory.h"
-
-// one row of squared distances (INFINITY: none yet), h apart; work holds 2 n + 1 numbers, at n places
-static void transform_row(float *f, size_t stride, int64_t n, double h, double *work, int64_t *at)
-{
-    double *from = work, *value = work + n + 1; // where parabola k of the envelope begins; f at its place
-    int64_t count = 0;
-    for (int64_t i = 0; i < n; i++) {
-        const double here = (double)f[(size_t)i * stride];
-        if (isinf(here)) continue;
-        double begin = -INFINITY;
-        while (count > 0) {
-            const int64_t k = at[count - 1];
-            begin = ((here - value[count - 1]) / (h * h) + (double)(i * i - k * k)) / (double)(2 * (i - k));
-            if (begin > from[count - 1]) break;
-            count--;
-            begin = -INFINITY;
-        }
-        at[count] = i, value[count] = here, from[count] = begin;
-        count++;
-    }
-    if (!count) return;
-    int64_t k = 0;
-    for (int64_t i = 0; i < n; i++) {
-        while (k + 1 < count && from[k + 1] < (double)i) k++;
-        const double way = h * (double)(i - at[k]);
-        f[(size_t)i * stride] = (float)(way * way + value[k]);
-    }
-}
 
 // squared distance, mm^2, of every voxel to the nearest that is 0; the others are INFINITY before
 static sdm_status transform(const sdm_grid *g, int n_threads, float *f, sdm_error *err)
 {
     const size_t step[3] = {1, (size_t)g->n[0], (size_t)(g->n[0] * g->n[1])};
     const int64_t longest = g->n[0] > g->n[1] ? g->n[0] : g->n[1], room = longest > g->n[2] ? longest : g->n[2];
-    double *work = NULL;
-    int64_t *at = NULL;
-    sdm_status s = SDM_ALLOC(&work, (size_t)n_threads * (size_t)(2 * room + 1), "rows of an image", err);
-    if (!s) s = SDM_ALLOC(&at, (size_t)n_threads * (size_t)room, "rows of an image", err);
+    double *work = NULL; // a row and the scratch of its envelope
+    sdm_status s = SDM_ALLOC(&work, (size_t)n_threads * (size_t)(4 * room), "rows of an image", err);
     for (int axis = 0; axis < 3 && !s; axis++) {
         const int b = (axis + 1) % 3, c = (axis + 2) % 3;
-        const int64_t rows = g->n[b] * g->n[c];
+        const int64_t rows = g->n[b] * g->n[c], n = g->n[axis];
 #pragma omp parallel for schedule(static, 1) num_threads(n_threads)
         for (int64_t thread = 0; thread < n_threads; thread++)
-            for (int64_t row = rows * thread / n_threads; row < rows * (thread + 1) / n_threads; row++)
-                transform_row(f + (size_t)(row % g->n[b]) * step[b] + (size_t)(row / g->n[b]) * step[c], step[axis],
-                              g->n[axis], g->spacing[axis], work + thread * (2 * room + 1), at + thread * room);
+            for (int64_t row = rows * thread / n_threads; row < rows * (thread + 1) / n_threads; row++) {
+                float *at = f + (size_t)(row % g->n[b]) * step[b] + (size_t)(row / g->n[b]) * step[c];
+                double *line = work + 4 * thread * room;
+                for (int64_t i = 0; i < n; i++) line[i] = (double)at[(size_t)i * step[axis]];
+                sdm_lower_envelope(line, n, g->spacing[axis], line + room);
+                for (int64_t i = 0; i < n; i++) at[(size_t)i * step[axis]] = (float)line[i];
+            }
     }
     sdm_free(work);
-    sdm_free(at);
     return s;
 }
 
@@ -80,18 +54,16 @@ static double log_mixture(const sdm_fit_law *law, size_t n, double value)
 static sdm_status find_walls(const sdm_fit_target *t, const sdm_fit_opts *o, int n_threads, float *wall, sdm_error *err)
 {
     const size_t n = sdm_grid_count(&t->grid);
-    size_t fields;
     float *packed = NULL, *spare = NULL;
-    sdm_status s = sdm_mul(n, 2, &fields, err); // sdm_fit_blur() leaves the last field out
-    if (!s) s = SDM_ALLOC(&packed, fields, "smoothed image", err);
-    if (!s) s = SDM_ALLOC(&spare, fields, "smoothed image", err);
+    sdm_status s = SDM_ALLOC(&packed, n, "smoothed image", err);
+    if (!s) s = SDM_ALLOC(&spare, n, "smoothed image", err);
     if (!s) {
         const sdm_fit_appearance *a = &o->appearance;
-        for (size_t i = 0; i < n; i++) packed[2 * i] = isnan(t->values[i]) ? (float)a->outside[0].mean : t->values[i];
-        sdm_fit_blur(&t->grid, 2, o->blur * o->blur, n_threads, &packed, &spare);
+        for (size_t i = 0; i < n; i++) packed[i] = isnan(t->values[i]) ? (float)a->outside[0].mean : t->values[i];
+        sdm_fit_blur(&t->grid, 1, 1, o->blur * o->blur, n_threads, &packed, &spare);
 #pragma omp parallel for schedule(static) num_threads(n_threads)
         for (size_t i = 0; i < n; i++) {
-            const double v = (double)packed[2 * i];
+            const double v = (double)packed[i];
             const bool inside = log_mixture(a->inside, a->n_inside, v) > log_mixture(a->outside, a->n_outside, v);
             wall[i] = inside && !isnan(t->values[i]) ? INFINITY : 0;
         }

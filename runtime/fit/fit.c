@@ -7,13 +7,21 @@
 #include "check.h"
 #include "evidence.h"
 #include "posterior.h"
+#include "score.h"
 #include "sdm/memory.h"
 #include "search.h"
 
-// the region follows the shape so many times at most
-#define REGIONS_MOST 6
+// the region follows the shape, and the priors are weighed, so many times at most
+#define ROUNDS_MOST 8
 // voxels at most, before only every second one along each axis is taken
 #define SITES_MOST 2e6
+// as long as the region and the weights of the priors are not the last, small steps are not worth while
+#define EPS_FIRST 1e-2
+// relative change of the weights that is left
+#define WEIGHT_EPS 1e-3
+#define WEIGHT_ROUGH 0.05
+// a prior against all evidence would feed itself: the worse the fit, the more alike are neighbouring residuals
+#define WEIGHINGS_MOST 4
 
 sdm_fit_opts sdm_fit_defaults(void)
 {
@@ -133,23 +141,47 @@ static sdm_status follow(fit_problem *p, bool *changed, sdm_error *err)
     }
 }
 
-// iterates until neither the state nor the region changes
+// the weights of the priors from the residuals where the fit stands; *change: the largest, relative, 0 where they are left
+static sdm_status weigh_priors(fit_problem *p, double *change, sdm_error *err)
+{
+    double weight[FIT_PARAMS_MAX + 6] = {0};
+    const sdm_status s = sdm_fit_weigh_priors(p, weight, &p->noise_factor, err);
+    if (s) return s;
+    *change = 0;
+    for (size_t k = 0; k < p->n_params + 6; k++) *change = fmax(*change, fabs(weight[k] / p->prior_weight[k] - 1));
+    if (*change > WEIGHT_EPS)
+        memcpy(p->prior_weight, weight, sizeof weight);
+    else
+        *change = 0;
+    if (!sdm_fit_has_prior(p)) *change = 0;
+    return SDM_OK;
+}
+
+// iterates until neither the state nor the region nor the weights of the priors change
 static sdm_status settle(fit_problem *p, fit_run *run, fit_ended *ended, sdm_error *err)
 {
     const size_t most = run->max_iterations, before = p->n_iterations;
+    const double eps = run->eps;
     sdm_status s = SDM_OK;
-    for (int round = 0; round < REGIONS_MOST && !s; round++) {
+    for (int round = 0; round < ROUNDS_MOST && !s; round++) {
         bool changed;
+        double change = 0;
         s = sdm_fit_look(p, err); // maps of the state
         if (!s) s = follow(p, &changed, err);
-        if (s || (!changed && round > 0)) return s;
-        if (!p->sites.n) return sdm_fail(err, SDM_E_QUALITY, "the shape has left the image: no voxel near it is left");
+        if (!s && !p->sites.n)
+            return sdm_fail(err, SDM_E_QUALITY, "the shape has left the image: no voxel near it is left");
+        if (!s && changed) s = sdm_fit_look(p, err); // samples of the region
+        if (!s && round < WEIGHINGS_MOST) s = weigh_priors(p, &change, err);
+        // steps that are rough do not tell small changes of the region and the weights
+        const bool last = ended->rough ? change < WEIGHT_ROUGH : !changed && !(change > 0);
+        if (s || (round > 0 && run->eps <= eps && last)) return s;
         const size_t used = p->n_iterations - before;
         if (used >= most) {
             ended->converged = false;
-            return sdm_fit_look(p, err); // samples of the region
+            return s;
         }
         run->max_iterations = most - used;
+        run->eps = fmax(eps, EPS_FIRST * (round ? fmin(change, 1) : 1));
         s = sdm_fit_iterate(p, run, ended, err);
     }
     return s;
@@ -297,7 +329,8 @@ sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target, c
     if (!out) return sdm_fail(err, SDM_E_ARG, "fit: a place for the result is needed");
     *out = (sdm_fit_result){0};
     const double from = sdm_fit_seconds();
-    fit_problem p = {.source = source, .target = target, .opts = opts};
+    fit_problem p = {.source = source, .target = target, .opts = opts, .noise_factor = 1};
+    for (size_t k = 0; k < FIT_PARAMS_MAX + 6; k++) p.prior_weight[k] = 1;
     sdm_fit_target as_image;
     sdm_fit_opts with_labels;
     sdm_status s = sdm_fit_check_source(source, &p.n_params, err);

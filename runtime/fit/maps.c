@@ -43,7 +43,7 @@ sdm_status sdm_fit_maps_create(const sdm_fit_source *source, bool share, const s
     if (!s) s = SDM_ALLOC(&m->distance, m->n_voxels, "map", err);
     if (!s) s = SDM_ALLOC(&m->jacobian, jacobian, "derivatives of the map", err);
     if (!s) s = SDM_ALLOC(&m->packed, fields, "fields of the map", err);
-    if (!s && share) s = SDM_ALLOC(&m->spare, fields, "fields of the map", err);
+    if (!s) s = SDM_ALLOC(&m->spare, fields, "fields of the map", err);
     if (s) sdm_fit_maps_dispose(m);
     return s;
 }
@@ -141,9 +141,10 @@ void sdm_fit_maps_pack(fit_maps *m, double blur)
         else
             pack_row(m, row);
     }
+    const double drawn = m->share ? m->least_blur : 0, variance = fmax(blur * blur - drawn * drawn, 0);
+    sdm_fit_blur(&m->grid, m->n_fields, m->share ? m->n_fields - 1 : m->n_fields, variance, n_threads, &m->packed,
+                 &m->spare);
     if (m->share) {
-        const double variance = fmax(blur * blur - m->least_blur * m->least_blur, 0);
-        sdm_fit_blur(&m->grid, m->n_fields, variance, n_threads, &m->packed, &m->spare);
         sdm_fit_laplacian(&m->grid, m->n_fields, blur, n_threads, m->packed);
     }
 }

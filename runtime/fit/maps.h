@@ -28,7 +28,8 @@ void sdm_fit_maps_dispose(fit_maps *m);
 /* Distance and jacobian at params. */
 sdm_status sdm_fit_maps_at(fit_maps *m, const double *params, sdm_error *err);
 
-/* The fields of what sdm_fit_maps_at() made; blur in mm, at least least_blur, for shares. */
+/* The fields of what sdm_fit_maps_at() made, seen through a Gaussian of sd blur (mm): for shares at least least_blur, for distances
+   0 or more. */
 void sdm_fit_maps_pack(fit_maps *m, double blur);
 
 /* Seconds of a clock that never goes back. */

@@ -5,15 +5,25 @@
 #include <math.h>
 #include <string.h>
 
+#include "look.h"
+#include "mixing.h"
 #include "sdm/memory.h"
 
 // largest step of one iteration: share of a range, rad, share of the shape's reach
 #define STEP_MOST 0.25
-// a gain in log-likelihood too small to tell from rounding: such steps are taken without asking whether they gain
-#define GAIN_LEAST 1e-4
+// a gain in log-likelihood, of values that are independent, that means nothing (a few hundredths of a standard deviation): steps that
+// promise less, or less than what rounding makes, are taken without asking whether they gain
+#define GAIN_LEAST 1e-3
 // so many of them in a row are an end too: creases of the distance keep the steps from becoming smaller
-#define FLAT_MOST 12
+#define FLAT_MOST 6
 #define DAMPING_MOST 1e8
+// standard deviation of the logistic law of scale 1, pi / sqrt(3)
+#define LOGISTIC_SD 1.8137993642342178
+// with more of it the size of a step says nothing of how far the maximum is
+#define DAMPING_TRUE 0.1
+// steps below which they are accelerated, and the most an acceleration changes an unknown, in its unit
+#define STEP_RUSHED 0.01
+#define RUSH_MOST 0.1
 
 sdm_status sdm_fit_look(fit_problem *p, sdm_error *err)
 {
@@ -29,65 +39,17 @@ sdm_status sdm_fit_look(fit_problem *p, sdm_error *err)
         status = sdm_fail(err, SDM_E_CANCELLED, "fit stopped on request");
     }
     if (status) return status;
-    if (!(p->packed_blur == s->blur)) {
-        sdm_fit_maps_pack(&p->maps, s->blur);
-        p->packed_blur = s->blur;
+    // the logistic law of labels is seen through its own spread: its edge would lie inside of a curved surface
+    const bool labels = !p->maps.share && p->target->kind != SDM_FIT_POINTS;
+    const double blur = labels ? s->l_ref * LOGISTIC_SD : p->maps.share ? s->blur : 0;
+    if (!(p->packed_blur == blur)) {
+        sdm_fit_maps_pack(&p->maps, blur);
+        p->packed_blur = blur;
     }
     sdm_fit_laws_prepare(p->opts, p->target->kind, s, &p->laws);
     status = sdm_fit_sites_sample(&p->sites, &p->maps, &p->laws, s, err);
     if (!status) sdm_fit_sums_fill(&p->sums, &p->sites, &p->laws, p->opts->n_threads);
     return status;
-}
-
-static void add_normal(size_t n, size_t at, double residual, double precision, double *gradient, double *complete,
-                       double *observed)
-{
-    if (gradient) gradient[at] -= precision * residual;
-    if (complete) complete[at * n + at] += precision;
-    if (observed) observed[at * n + at] += precision;
-}
-
-// the turn from the prior's rotation
-static void turned(const fit_problem *p, const fit_state *s, double w[3])
-{
-    double r[9];
-    for (int a = 0; a < 3; a++)
-        for (int b = 0; b < 3; b++) {
-            r[3 * a + b] = 0;
-            for (int k = 0; k < 3; k++) r[3 * a + b] += s->rotation[3 * a + k] * p->prior.rotation[3 * b + k];
-        }
-    sdm_rotation_vector(r, w);
-}
-
-double sdm_fit_prior(const fit_problem *p, const fit_state *s, double *gradient, double *complete, double *observed)
-{
-    const sdm_fit_opts *o = p->opts;
-    const size_t n = p->sums.n_unknowns;
-    double sum = 0;
-    for (size_t k = 0; k < p->n_params && o->prior_sd > 0; k++) {
-        const double sd = 0.5 * o->prior_sd * (p->high[k] - p->low[k]), precision = 1 / (sd * sd);
-        const double residual = s->params[k] - 0.5 * (p->low[k] + p->high[k]);
-        sum -= 0.5 * precision * residual * residual;
-        add_normal(n, k, residual, precision, gradient, complete, observed);
-    }
-    if (o->prior_rotation_sd > 0) {
-        const double precision = 1 / (o->prior_rotation_sd * o->prior_rotation_sd);
-        double w[3];
-        turned(p, s, w);
-        for (size_t k = 0; k < 3; k++) { // J^-T w = w: the gradient by a small turn is along w
-            sum -= 0.5 * precision * w[k] * w[k];
-            add_normal(n, fit_at_rotation(p->n_params) + k, w[k], precision, gradient, complete, observed);
-        }
-    }
-    if (o->prior_translation_sd > 0) {
-        const double precision = 1 / (o->prior_translation_sd * o->prior_translation_sd);
-        for (size_t k = 0; k < 3; k++) {
-            const double residual = s->translation[k] - p->prior.translation[k];
-            sum -= 0.5 * precision * residual * residual;
-            add_normal(n, fit_at_translation(p->n_params) + k, residual, precision, gradient, complete, observed);
-        }
-    }
-    return sum;
 }
 
 void sdm_fit_move(const fit_problem *p, const fit_state *from, const double *step, fit_state *to)
@@ -143,34 +105,8 @@ static double step_size(const fit_problem *p, const double *step)
     return most;
 }
 
-/* Nobody knows less than that nothing is known: a turn of any angle, a parameter of its range, a place within the shape's reach. Where
-   there is no prior this keeps steps along what the data do not determine within bounds; the maximum stays where it is. */
-void sdm_fit_add_ignorance(const fit_problem *p, double *a)
-{
-    const sdm_fit_opts *o = p->opts;
-    const size_t n = p->sums.n_unknowns, m = p->n_params;
-    for (size_t k = 0; k < m && !(o->prior_sd > 0); k++)
-        a[k * (n + 1)] += 12 / ((p->high[k] - p->low[k]) * (p->high[k] - p->low[k]));
-    for (size_t k = 0; k < 3; k++) {
-        if (!(o->prior_rotation_sd > 0)) a[(m + k) * (n + 1)] += 3 / (3.14159265358979324 * 3.14159265358979324);
-        if (!(o->prior_translation_sd > 0)) a[(m + 3 + k) * (n + 1)] += 1 / (p->extent.reach * p->extent.reach);
-    }
-}
-
-// whether a step goes back by more than half of the one before
-static bool swings(const fit_problem *p, const double *step, const double *last)
-{
-    double along = 0, square = 0;
-    for (size_t k = 0; k < p->n_params + 6; k++) {
-        const double unit = k < p->n_params ? p->high[k] - p->low[k] : k < p->n_params + 3 ? 1 : p->extent.reach;
-        along += step[k] * last[k] / (unit * unit);
-        square += last[k] * last[k] / (unit * unit);
-    }
-    return along < -0.25 * square;
-}
-
-static bool find_step(const fit_problem *p, const fit_run *run, double damping, double shrink, bool observed,
-                      double *step, double *work)
+static bool find_step(const fit_problem *p, const fit_run *run, double damping, bool observed, double *step,
+                      double *work)
 {
     const size_t n = p->sums.n_unknowns;
     double gradient[FIT_UNKNOWNS_MAX], *a = work;
@@ -183,7 +119,7 @@ static bool find_step(const fit_problem *p, const fit_run *run, double damping, 
     if (!sdm_fit_step(n, a, gradient, damping, &limits, step, work + n * n)) return false;
     const double size = step_size(p, step);
     const double factor = size > STEP_MOST ? STEP_MOST / size : 1;
-    for (size_t i = 0; i < n; i++) step[i] *= factor * shrink;
+    for (size_t i = 0; i < n; i++) step[i] *= factor;
     return true;
 }
 
@@ -206,62 +142,108 @@ static void swap_sums(fit_problem *p)
 /* Where the steps of an iteration stand. */
 typedef struct fit_pace {
     double damping;
-    double shrink; // factor of steps about a crease of the posterior (distances have them), else 1
-    bool flat;     // the gain of the last step was too small to tell
+    bool flat; // the gain of the last step was too small to tell
 } fit_pace;
+
+// moves by a step; *gained is false where that does not gain, and the state is as before but for its maps
+static sdm_status try_step(fit_problem *p, const double *step, fit_pace *pace, bool *gained, sdm_error *err)
+{
+    const double before = p->sums.log_likelihood + sdm_fit_prior(p, &p->state, NULL, NULL, NULL);
+    const double expected = expected_gain(p, step);
+    const fit_state from = p->state;
+    sdm_fit_move(p, &from, step, &p->state);
+    swap_sums(p);
+    const sdm_status s = sdm_fit_look(p, err);
+    if (s) return s;
+    const double after = p->sums.log_likelihood + sdm_fit_prior(p, &p->state, NULL, NULL, NULL);
+    const double least = fmax(p->sums.rounding, GAIN_LEAST * p->noise_factor);
+    pace->flat = fabs(expected) < least;
+    *gained = after > before || (pace->flat && after > before - 2 * least);
+    if (*gained) return SDM_OK;
+    p->state = from;
+    swap_sums(p);
+    return SDM_OK;
+}
 
 /* One step that gains; *taken is false where none does. */
 static sdm_status one_step(fit_problem *p, const fit_run *run, fit_pace *pace, double *step, double *work, bool *taken,
                            sdm_error *err)
 {
-    const double before = p->sums.log_likelihood + sdm_fit_prior(p, &p->state, NULL, NULL, NULL);
-    const fit_state from = p->state;
     bool observed = true;
     *taken = false;
     for (double *damping = &pace->damping; *damping <= DAMPING_MOST; *damping = fmax(10 * *damping, 1e-3)) {
-        if (observed) observed = find_step(p, run, *damping, pace->shrink, true, step, work);
-        if (!observed && !find_step(p, run, *damping, pace->shrink, false, step, work)) continue;
-        fit_state to;
-        sdm_fit_move(p, &from, step, &to);
-        const double expected = expected_gain(p, step);
-        p->state = to;
-        swap_sums(p);
-        const sdm_status s = sdm_fit_look(p, err);
-        const double after = s ? 0 : p->sums.log_likelihood + sdm_fit_prior(p, &p->state, NULL, NULL, NULL);
+        if (observed) observed = find_step(p, run, *damping, true, step, work);
+        if (!observed && !find_step(p, run, *damping, false, step, work)) continue;
+        const sdm_status s = try_step(p, step, pace, taken, err);
         if (s) return s;
-        pace->flat = fabs(expected) < GAIN_LEAST;
-        if (after > before || (pace->flat && after > before - GAIN_LEAST)) {
-            *taken = true;
+        if (*taken) {
             *damping = *damping > 1e-6 ? *damping / 10 : 0;
             return SDM_OK;
         }
-        p->state = from;
-        swap_sums(p);
         observed = false;
     }
     return sdm_fit_look(p, err); // maps and samples of the state that is kept
 }
 
-// weights, sd and (labels) means of the tissues, sd of points; then the sums with them
-static void update_look(fit_problem *p)
+/* Steps near the maximum: what is left out of the information, and the tissues, which wait for the shape, make them converge linearly,
+   and slowly where tissues overlap. They are accelerated together. */
+typedef struct fit_rush {
+    fit_mixing mixing;
+    size_t n_look;
+    double place[FIT_UNKNOWNS_MAX]; // the way so far, in units
+    double from[FIT_LOOK_MAX];      // numbers of the tissues before they were estimated
+    double to[FIT_MIXING_MAX];      // where an accelerated step leads, tissues last
+} fit_rush;
+
+// what unknowns are measured in
+static double unit_of(const fit_problem *p, size_t i)
 {
-    if (p->target->kind == SDM_FIT_POINTS) {
-        double sum = 0;
-        for (size_t i = 0; i < p->sites.n; i++) {
-            const double r = p->sites.field[i] / p->state.point_sd;
-            sum += (p->opts->point_dof + 1) / (p->opts->point_dof + r * r) * r * r;
-        }
-        p->state.point_sd *= sqrt(fmax(sum / (double)p->sites.n, 1e-6));
-    } else if (p->target->kind == SDM_FIT_IMAGE) {
-        fit_moments m;
-        sdm_fit_sums_moments(&p->sites, &p->laws, p->opts->n_threads, &m);
-        const double step = fabs(p->opts->appearance.inside[0].mean - p->opts->appearance.outside[0].mean);
-        sdm_fit_moments_apply(&p->laws, &m, 1e-3 * step, &p->state.look);
-    } else {
-        return;
+    const size_t n = p->n_params;
+    const sdm_fit_appearance *a = &p->opts->appearance;
+    if (i < n) return p->high[i] - p->low[i];
+    if (i < fit_at_translation(n)) return 1;
+    if (i <= fit_at_blur(n)) return p->extent.reach;
+    return fabs(a->inside[0].mean - a->outside[0].mean);
+}
+
+// replaces a plain step by an accelerated one, within the limits
+static void accelerate(const fit_problem *p, const fit_run *run, fit_rush *r, double *step)
+{
+    const size_t n = p->sums.n_unknowns;
+    double at[FIT_MIXING_MAX];
+    for (size_t i = 0; i < n; i++) {
+        at[i] = r->place[i];
+        r->to[i] = at[i] + step[i] / unit_of(p, i);
     }
-    sdm_fit_laws_prepare(p->opts, p->target->kind, &p->state, &p->laws);
-    sdm_fit_sums_fill(&p->sums, &p->sites, &p->laws, p->opts->n_threads);
+    for (size_t i = 0; i < r->n_look; i++) at[n + i] = r->from[i];
+    (void)sdm_fit_look_numbers(p, r->to + n);
+    sdm_fit_mix(&r->mixing, n + r->n_look, at, r->to, RUSH_MOST);
+    fit_limits limits;
+    set_limits(p, run, &limits);
+    for (size_t i = 0; i < n; i++)
+        step[i] = limits.kept[i] ? 0 : fmin(fmax((r->to[i] - at[i]) * unit_of(p, i), limits.least[i]), limits.most[i]);
+}
+
+/* An accelerated step, or where shrink < 1 that share of the plain one; *size: that of the plain one, how far the maximum is.
+   *taken is false where it does not gain. */
+static sdm_status rush(fit_problem *p, const fit_run *run, fit_rush *r, double shrink, fit_pace *pace, double *step,
+                       double *work, double *size, bool *taken, sdm_error *err)
+{
+    const size_t n = p->sums.n_unknowns;
+    *taken = false;
+    if (!find_step(p, run, 0, true, step, work)) return SDM_OK;
+    *size = step_size(p, step);
+    if (shrink < 1) {
+        r->mixing.count = 0;
+        for (size_t i = 0; i < n; i++) step[i] *= shrink;
+        return try_step(p, step, pace, taken, err);
+    }
+    accelerate(p, run, r, step);
+    const sdm_status s = try_step(p, step, pace, taken, err);
+    if (s || !*taken) return s;
+    for (size_t i = 0; i < n; i++) r->place[i] += step[i] / unit_of(p, i);
+    if (!run->keep_look) sdm_fit_look_set(p, r->to + n);
+    return SDM_OK;
 }
 
 static sdm_status record(fit_problem *p, const fit_run *run, double step, sdm_error *err)
@@ -290,35 +272,55 @@ static sdm_status record(fit_problem *p, const fit_run *run, double step, sdm_er
     return SDM_OK;
 }
 
+/* Creases of the distance keep steps from becoming smaller. Where they promise no gain any more they go to and fro across a crease, and
+   are halved until they end the run. */
+typedef struct fit_end {
+    double least; // the smallest step so far
+    int flat;     // steps that promise no gain, since there was a smaller one
+} fit_end;
+
+static double share_of_step(const fit_end *e) { return e->flat > 1 ? ldexp(1, 1 - e->flat) : 1; }
+
+static bool is_rough(fit_end *e, const fit_pace *pace, double size)
+{
+    if (size < 0.5 * e->least) e->least = size, e->flat = 0;
+    e->flat = pace->flat ? e->flat + 1 : 0;
+    return e->flat >= FLAT_MOST;
+}
+
 sdm_status sdm_fit_iterate(fit_problem *p, const fit_run *run, fit_ended *out, sdm_error *err)
 {
     const size_t n = p->sums.n_unknowns;
-    double step[FIT_UNKNOWNS_MAX], last[FIT_UNKNOWNS_MAX] = {0}, *work = NULL;
-    fit_pace pace = {.damping = run->phase == SDM_FIT_SEARCH ? 1e-2 : 1e-4, .shrink = 1};
-    int flat = 0;  // steps in a row whose gain is too small to tell
-    int stuck = 0; // steps that gain nothing or swing, and do not become smaller
+    double step[FIT_UNKNOWNS_MAX], *work = NULL;
+    fit_rush quick = {0};
+    fit_pace pace = {.damping = run->phase == SDM_FIT_SEARCH ? 1e-2 : 1e-4};
+    fit_end end = {.least = INFINITY};
     *out = (fit_ended){.step = INFINITY};
     sdm_status s = SDM_ALLOC(&work, 3 * n * n, "matrices of the fit", err);
     if (!s) s = sdm_fit_look(p, err);
     for (size_t i = 0; i < run->max_iterations && !s && !out->converged; i++) {
-        if (!run->keep_look) update_look(p);
-        bool taken;
-        s = one_step(p, run, &pace, step, work, &taken, err);
+        quick.n_look = run->keep_look ? 0 : sdm_fit_look_numbers(p, quick.from);
+        if (!run->keep_look) sdm_fit_look_update(p);
+        bool taken = false;
+        double size = INFINITY;
+        if (out->step <= STEP_RUSHED)
+            s = rush(p, run, &quick, share_of_step(&end), &pace, step, work, &size, &taken, err);
+        if (!s && !taken) {
+            quick.mixing.count = 0;
+            s = one_step(p, run, &pace, step, work, &taken, err);
+            // with much damping the size of a step says nothing of how far the maximum is
+            if (taken && (pace.damping <= DAMPING_TRUE || !isfinite(size))) size = step_size(p, step);
+        }
         if (s) break;
         if (!taken) {
             // nowhere to go: a maximum to rounding, or derivatives that do not fit
             out->converged = out->step <= 1e3 * run->eps;
             break;
         }
-        const double size = step_size(p, step);
-        const bool back = swings(p, step, last);
-        stuck = (pace.flat || back) && size > 0.8 * out->step ? stuck + 1 : 0;
-        if ((pace.flat && back) || stuck == 3) pace.shrink *= 0.5, stuck = 0;
-        memcpy(last, step, n * sizeof *last);
         out->step = size;
-        flat = pace.flat ? flat + 1 : 0;
-        out->rough = flat == FLAT_MOST && size > run->eps;
-        out->converged = size <= run->eps || out->rough;
+        out->converged = size <= run->eps && pace.damping <= DAMPING_TRUE;
+        out->rough = !out->converged && is_rough(&end, &pace, size);
+        out->converged = out->converged || out->rough;
         s = record(p, run, out->step, err);
     }
     sdm_free(work);

@@ -14,6 +14,8 @@ typedef struct fit_problem {
     size_t n_params;
     double low[FIT_PARAMS_MAX], high[FIT_PARAMS_MAX]; // bounds
     fit_state prior;                                  // pose the priors are about
+    double prior_weight[FIT_PARAMS_MAX + 6];          // see sdm_fit_weigh_priors()
+    double noise_factor;                              // by which the log-likelihood counts correlated values too often
     fit_extent extent;                                // of the shape at the start
 
     fit_maps maps;
@@ -45,7 +47,10 @@ typedef struct fit_ended {
 /* Maps, samples and sums at problem->state. */
 sdm_status sdm_fit_look(fit_problem *p, sdm_error *err);
 
-/* Log prior density, with its derivatives added where gradient and the matrices (may be NULL) are given. */
+/* Whether there is a prior of anything that is fitted. */
+bool sdm_fit_has_prior(const fit_problem *p);
+
+/* Log prior density times the weights, with its derivatives added where gradient and the matrices (may be NULL) are given. */
 double sdm_fit_prior(const fit_problem *p, const fit_state *s, double *gradient, double *complete, double *observed);
 
 /* Adds what nobody knows less than to an information matrix: wide Gaussians where there is no prior. */

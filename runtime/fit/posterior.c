@@ -73,11 +73,16 @@ static sdm_status fill(const fit_problem *p, const fit_scatter *scatter, double 
     size_t list[FIT_UNKNOWNS_MAX];
     const size_t m = estimated(p, list);
     double *information = work, *spread = work + n * n, *small = work + 2 * n * n, *covariance = work + 4 * n * n;
+    double *prior = work + 5 * n * n;
     // residuals about a fit are smaller than those about the truth (MacKinnon and White 1985)
     const double lost = fmin((double)m / fmax(scatter->effective, 1), 0.5);
     for (size_t i = 0; i < n * n; i++) spread[i] = scatter->noise[i] / (1 - lost);
     for (size_t i = 0; i < n * n; i++) spread[i] += out->model_error_mm * out->model_error_mm * scatter->model[i];
-    add_known(p, spread);
+    // what priors of those weights scatter
+    memset(prior, 0, n * n * sizeof *prior);
+    (void)sdm_fit_prior(p, &p->state, NULL, prior, NULL);
+    for (size_t i = 0; i < size; i++) spread[i * (n + 1)] += p->prior_weight[i] * prior[i * (n + 1)];
+    sdm_fit_add_ignorance(p, spread);
     take(n, spread, m, list, small + n * n);
     bool done = false;
     for (int complete = 0; complete < 2 && !done; complete++) {
@@ -101,6 +106,47 @@ static sdm_status fill(const fit_problem *p, const fit_scatter *scatter, double 
     return SDM_OK;
 }
 
+// ratio[m]: variances by the sandwich over those of the information alone
+static bool variance_ratios(const fit_problem *p, const fit_scatter *scatter, size_t m, const size_t *list,
+                            double *work, double *ratio)
+{
+    const size_t n = p->sums.n_unknowns;
+    double *information = work, *naive = work + n * n, *small = work + 2 * n * n, *covariance = work + 4 * n * n;
+    take(n, scatter->noise, m, list, small + n * n);
+    for (int complete = 0; complete < 2; complete++) {
+        memcpy(information, complete ? p->sums.complete : p->sums.observed, n * n * sizeof *information);
+        sdm_fit_add_ignorance(p, information);
+        take(n, information, m, list, small);
+        if (!sandwich(m, small, small + n * n, covariance, work + 5 * n * n)) continue;
+        if (!sandwich(m, small, small, naive, work + 5 * n * n)) continue;
+        for (size_t i = 0; i < m; i++) ratio[i] = covariance[i * (m + 1)] / naive[i * (m + 1)];
+        return true;
+    }
+    return false;
+}
+
+sdm_status sdm_fit_weigh_priors(const fit_problem *p, double *weight, double *noise_factor, sdm_error *err)
+{
+    const size_t n = p->sums.n_unknowns;
+    size_t list[FIT_UNKNOWNS_MAX];
+    const size_t m = estimated(p, list);
+    fit_scatter scatter;
+    double *work = NULL, ratio[FIT_UNKNOWNS_MAX];
+    sdm_status s = sdm_fit_scatter_create(p, 0, false, &scatter, err);
+    if (s) return s;
+    *noise_factor = fmax(scatter.noise_factor, 1);
+    s = SDM_ALLOC(&work, 7 * n * n, "matrices of the fit", err);
+    if (!s) {
+        const bool known = variance_ratios(p, &scatter, m, list, work, ratio);
+        for (size_t i = 0; i < p->n_params + 6; i++) weight[i] = 1;
+        for (size_t i = 0; i < m; i++)
+            if (list[i] < p->n_params + 6) weight[list[i]] = known ? fmax(ratio[i], 1) : *noise_factor;
+    }
+    sdm_free(work);
+    sdm_fit_scatter_dispose(&scatter);
+    return s;
+}
+
 sdm_status sdm_fit_posterior(const fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
     const size_t n = p->sums.n_unknowns;
@@ -109,7 +155,7 @@ sdm_status sdm_fit_posterior(const fit_problem *p, sdm_fit_result *out, sdm_erro
     const double model_mm = out->model_error_mm > 0 ? MODEL_STEPS * fmax(spacing[0], fmax(spacing[1], spacing[2])) : 0;
     fit_scatter scatter;
     double *work = NULL;
-    sdm_status s = sdm_fit_scatter_create(p, model_mm, &scatter, err);
+    sdm_status s = sdm_fit_scatter_create(p, model_mm, true, &scatter, err);
     if (s) return s;
     s = SDM_ALLOC(&work, 7 * n * n, "matrices of the fit", err);
     out->noise_factor = scatter.noise_factor;

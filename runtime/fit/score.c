@@ -11,11 +11,12 @@
 
 #include "blur.h"
 #include "sdm/memory.h"
+#include "sdm/rng.h"
 
 // largest lag along an axis, in steps of the voxels that are used
 #define LAG_MOST 10
 #define LAGS (2 * LAG_MOST + 1)
-// sums over neighbours begin at every so many voxels, so that there are about as many: of a correlation, of the covariance
+// sums over neighbours begin at some of the voxels, so that there are about as many: of a correlation, of the covariance
 #define PAIRS_OF_LAG 8000
 #define PAIRS 30000000
 
@@ -25,6 +26,7 @@ typedef struct near_voxels {
     int64_t size[3], from[3], step; // the box, in steps
     uint32_t *at;                   // [size] 1 + number of the voxel, or 0
     int32_t *place;                 // [n][3] in the box
+    float *lot;                     // [n] 0 .. 1 at random, of the voxel alone: the lowest begin sums
     float *residual, *weight;       // [n]
     float *root;                    // [n][n_unknowns]
     float *push;                    // [n][n_unknowns] score by an error of the map of 1 mm
@@ -82,6 +84,7 @@ static void fill_near(const fit_problem *p, near_voxels *v)
         }
         v->residual[count] = (float)r.residual;
         v->weight[count] = (float)fabs(r.root[0]);
+        v->lot[count] = (float)sdm_rng_uniform(0, 0, s->voxel[i]);
         int64_t index[3];
         place_of(&p->target->grid, s->voxel[i], index);
         for (int a = 0; a < 3; a++) v->place[3 * count + (size_t)a] = (int32_t)((index[a] - v->from[a]) / v->step);
@@ -95,6 +98,7 @@ static void dispose_near(near_voxels *v)
 {
     sdm_free(v->at);
     sdm_free(v->place);
+    sdm_free(v->lot);
     sdm_free(v->residual);
     sdm_free(v->weight);
     sdm_free(v->root);
@@ -110,6 +114,7 @@ static sdm_status make_near(const fit_problem *p, near_voxels *v, sdm_error *err
     if (!s) s = sdm_mul((size_t)v->size[0] * (size_t)v->size[1], (size_t)v->size[2], &box, err);
     if (!s) s = SDM_ALLOC(&v->at, box, "voxels near the surface", err);
     if (!s) s = SDM_ALLOC(&v->place, 3 * v->n, "voxels near the surface", err);
+    if (!s) s = SDM_ALLOC(&v->lot, v->n, "voxels near the surface", err);
     if (!s) s = SDM_ALLOC(&v->residual, v->n, "voxels near the surface", err);
     if (!s) s = SDM_ALLOC(&v->weight, v->n, "voxels near the surface", err);
     if (!s) s = SDM_ALLOC(&v->root, count, "voxels near the surface", err);
@@ -151,8 +156,10 @@ static int lag_size(const int lag[3])
 // weighted mean of e_n e_(n+lag)
 static double correlation_at(const near_voxels *v, const int lag[3])
 {
+    const float share = (float)PAIRS_OF_LAG / (float)v->n;
     double sum = 0, weight = 0;
-    for (size_t i = 0; i < v->n; i += 1 + v->n / PAIRS_OF_LAG) {
+    for (size_t i = 0; i < v->n; i++) {
+        if (v->lot[i] > share) continue;
         const size_t j = neighbour(v, i, lag);
         if (j == SIZE_MAX) continue;
         const double w = (double)v->weight[i] * (double)v->weight[j];
@@ -187,13 +194,15 @@ static int estimate(const near_voxels *v, int n_threads, double c[MIDDLE + 1])
             lag_of(number, lag);
             if (lag_size(lag) == k) c[number] = correlation_at(v, lag);
         }
-        double sum = 0;
+        double sum = 0, lags = 0;
         for (int number = 0; number <= MIDDLE; number++) {
             int lag[3];
             lag_of(number, lag);
-            if (lag_size(lag) == k) sum += c[number];
+            if (lag_size(lag) == k) sum += c[number], lags++;
         }
-        if (width == LAG_MOST && k > 0 && !(sum > 0.05 * c[MIDDLE]))
+        // standard error of the sum where nothing is correlated (Bartlett 1946)
+        const double error = sqrt(lags / fmin((double)v->n, PAIRS_OF_LAG));
+        if (width == LAG_MOST && k > 0 && !(sum > fmax(0.05, 2 * error) * c[MIDDLE]))
             width = 2 * (k - 1) < LAG_MOST ? 2 * (k - 1) : LAG_MOST - 1;
     }
     return width;
@@ -209,11 +218,14 @@ static sdm_status add_products(const near_voxels *v, const double *c, int width,
     const sdm_status s = SDM_ALLOC(&parts, FIT_SLICES * n * n, "covariance of the score", err);
     if (s) return s;
     (void)n_threads; // without OpenMP
-    const size_t lags = (size_t)pow(2.0 * width + 1, 3) / 2 + 1, step = 1 + v->n * lags / PAIRS, first = v->n / step;
+    const float share = (float)(PAIRS / (pow(2.0 * width + 1, 3) / 2 + 1) / (double)v->n);
+    size_t chosen = 0;
+    for (size_t i = 0; i < v->n; i++) chosen += v->lot[i] <= share;
+    const double scale = (double)v->n / fmax((double)chosen, 1);
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
-        for (size_t turn = first * slice / FIT_SLICES; turn < first * (slice + 1) / FIT_SLICES; turn++) {
-            const size_t i = turn * step;
+        for (size_t i = v->n * slice / FIT_SLICES; i < v->n * (slice + 1) / FIT_SLICES; i++) {
+            if (v->lot[i] > share) continue;
             float around[FIT_UNKNOWNS_MAX] = {0};
             double *part = parts + slice * n * n;
             for (int number = 0; number <= MIDDLE; number++) {
@@ -231,7 +243,7 @@ static sdm_status add_products(const near_voxels *v, const double *c, int width,
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         for (size_t a = 0; a < n; a++)
             for (size_t b = 0; b < n; b++)
-                out[a * n + b] += (double)step * (parts[slice * n * n + a * n + b] + parts[slice * n * n + b * n + a]);
+                out[a * n + b] += scale * (parts[slice * n * n + a * n + b] + parts[slice * n * n + b * n + a]);
     sdm_free(parts);
     return SDM_OK;
 }
@@ -263,29 +275,36 @@ static void add_points(const fit_problem *p, double *out)
     }
 }
 
+// weights of the correlations in a window, and their sum over all lags
+static double weigh_lags(const double *c, int width, bool flat, double *weighted)
+{
+    double sum = c[MIDDLE];
+    for (int number = 0; number <= MIDDLE; number++) {
+        int lag[3];
+        lag_of(number, lag);
+        weighted[number] = c[number] * taper(lag, width, flat);
+        if (number < MIDDLE) sum += 2 * weighted[number];
+    }
+    return fmax(sum, c[MIDDLE]);
+}
+
 static sdm_status add_noise(const fit_problem *p, const near_voxels *v, const double *c, int width, int n_threads,
-                            fit_scatter *out, sdm_error *err)
+                            bool definite, fit_scatter *out, sdm_error *err)
 {
     const size_t n = v->n_unknowns;
     double weighted[MIDDLE + 1], *work = NULL, scale[FIT_UNKNOWNS_MAX];
     sdm_status s = SDM_ALLOC(&work, 2 * n * n, "covariance of the score", err);
     for (int flat = 1; flat >= 0 && !s; flat--) {
-        double sum = c[MIDDLE];
-        for (int number = 0; number <= MIDDLE; number++) {
-            int lag[3];
-            lag_of(number, lag);
-            weighted[number] = c[number] * taper(lag, width, flat);
-            if (number < MIDDLE) sum += 2 * weighted[number];
-        }
-        out->noise_factor = fmax(sum, c[MIDDLE]);
+        const double sum = weigh_lags(c, width, flat, weighted);
+        if (flat) out->noise_factor = sum;
         memset(out->noise, 0, n * n * sizeof *out->noise);
         s = add_products(v, weighted, width, n_threads, out->noise, err);
-        add_far(p, out->noise_factor, out->noise);
+        add_far(p, sum, out->noise);
         memcpy(work, out->noise, n * n * sizeof *work);
         sdm_fit_add_ignorance(p, work);
         for (size_t i = 0; i < n; i++)
             if (!(work[i * (n + 1)] > 0)) work[i * (n + 1)] = 1; // the blur, where there is none
-        if (sdm_fit_factorise(n, work, work + n * n, scale)) break;
+        if (!definite || sdm_fit_factorise(n, work, work + n * n, scale)) break;
     }
     sdm_free(work);
     return s;
@@ -331,7 +350,7 @@ static double effective_number(const near_voxels *v, double noise_factor)
     return square > 0 ? sum * sum / (square * fmax(noise_factor, 1)) : 0;
 }
 
-static sdm_status of_voxels(const fit_problem *p, double model_mm, fit_scatter *out, sdm_error *err)
+static sdm_status of_voxels(const fit_problem *p, double model_mm, bool definite, fit_scatter *out, sdm_error *err)
 {
     near_voxels v;
     sdm_status s = make_near(p, &v, err);
@@ -339,7 +358,7 @@ static sdm_status of_voxels(const fit_problem *p, double model_mm, fit_scatter *
     const int n_threads = sdm_fit_threads(p->opts->n_threads);
     if (!s) {
         const int width = estimate(&v, n_threads, c);
-        s = add_noise(p, &v, c, width, n_threads, out, err);
+        s = add_noise(p, &v, c, width, n_threads, definite, out, err);
         out->effective = effective_number(&v, out->noise_factor);
     }
     if (!s && model_mm > 0) s = add_model(p, &v, model_mm, out->model, err);
@@ -347,7 +366,8 @@ static sdm_status of_voxels(const fit_problem *p, double model_mm, fit_scatter *
     return s;
 }
 
-sdm_status sdm_fit_scatter_create(const fit_problem *p, double model_mm, fit_scatter *out, sdm_error *err)
+sdm_status sdm_fit_scatter_create(const fit_problem *p, double model_mm, bool definite, fit_scatter *out,
+                                  sdm_error *err)
 {
     const size_t n = p->sums.n_unknowns;
     *out = (fit_scatter){.noise_factor = 1, .effective = (double)p->sites.n};
@@ -356,7 +376,7 @@ sdm_status sdm_fit_scatter_create(const fit_problem *p, double model_mm, fit_sca
     if (!s && p->target->kind == SDM_FIT_POINTS)
         add_points(p, out->noise);
     else if (!s && p->sites.n_near)
-        s = of_voxels(p, model_mm, out, err);
+        s = of_voxels(p, model_mm, definite, out, err);
     if (s) sdm_fit_scatter_dispose(out);
     return s;
 }

@@ -12,8 +12,9 @@ typedef struct fit_scatter {
 } fit_scatter;
 
 /* At problem->state, from its sites. model_mm: edge of the cubes within which the error of a network's map is
-   alike; 0: no such error. */
-sdm_status sdm_fit_scatter_create(const fit_problem *p, double model_mm, fit_scatter *out, sdm_error *err);
+   alike; 0: no such error. definite: noise is made positive definite by a narrower window where need be. */
+sdm_status sdm_fit_scatter_create(const fit_problem *p, double model_mm, bool definite, fit_scatter *out,
+                                  sdm_error *err);
 void sdm_fit_scatter_dispose(fit_scatter *s);
 
 #endif

@@ -1,13 +1,18 @@
 /* Sums over slices of sites, added in the order of the slices. */
 #include "sums.h"
 
+#include <float.h>
+#include <math.h>
 #include <string.h>
 
 #include "blur.h"
 #include "sdm/memory.h"
 
-// numbers of one slice: log-likelihood, gradient, two matrices
-static size_t part_size(size_t n) { return 1 + n + 2 * n * n; }
+// neighbouring voxels share the rounding of a voxel of the map, and their scores are alike
+#define ROUNDING (8 * (double)FLT_EPSILON)
+
+// numbers of one slice: log-likelihood, its squared derivatives by the relative rounding of fields, gradient, two matrices
+static size_t part_size(size_t n) { return 2 + n + 2 * n * n; }
 
 sdm_status sdm_fit_sums_create(size_t n_unknowns, fit_sums *out, sdm_error *err)
 {
@@ -53,7 +58,7 @@ static void add_columns(const fit_response *r, const float *column, size_t n_col
 // upper triangles
 static void add_slice(const fit_sites *s, const fit_laws *l, size_t from, size_t to, size_t n, double *part)
 {
-    double *gradient = part + 1, *complete = gradient + n, *observed = complete + n * n;
+    double *gradient = part + 2, *complete = gradient + n, *observed = complete + n * n;
     const size_t nc = s->n_columns;
     memset(part, 0, part_size(n) * sizeof *part);
     for (size_t i = from; i < to; i++) {
@@ -61,6 +66,7 @@ static void add_slice(const fit_sites *s, const fit_laws *l, size_t from, size_t
         const bool near = s->slot[i] != SIZE_MAX;
         sdm_fit_respond(l, (double)s->value[i], s->field[i], near || l->n_channels > 1, &r);
         part[0] += r.log_likelihood;
+        if (near) part[1] += r.score[0] * r.score[0] * s->field[i] * s->field[i];
         if (near) add_columns(&r, s->columns + s->slot[i] * nc, nc, l->n_channels, n, gradient, complete, observed);
         for (size_t a = 1; a < l->n_channels; a++) {
             gradient[nc + a - 1] += r.score[a];
@@ -83,12 +89,13 @@ void sdm_fit_sums_fill(fit_sums *s, const fit_sites *sites, const fit_laws *laws
     for (size_t slice = 1; slice < FIT_SLICES; slice++)
         for (size_t i = 0; i < size; i++) s->parts[i] += s->parts[slice * size + i];
     s->log_likelihood = s->parts[0];
-    memcpy(s->gradient, s->parts + 1, n * sizeof *s->gradient);
+    s->rounding = ROUNDING * sqrt(s->parts[1]);
+    memcpy(s->gradient, s->parts + 2, n * sizeof *s->gradient);
     for (size_t a = 0; a < n; a++)
         for (size_t b = 0; b < n; b++) {
             const size_t upper = a < b ? a * n + b : b * n + a;
-            s->complete[a * n + b] = s->parts[1 + n + upper];
-            s->observed[a * n + b] = s->parts[1 + n + n * n + upper];
+            s->complete[a * n + b] = s->parts[2 + n + upper];
+            s->observed[a * n + b] = s->parts[2 + n + n * n + upper];
         }
 }
 

@@ -156,12 +156,12 @@ static void test_label_map(void **state)
     if (!(worst(&r) < 0.02)) fail_msg("off by %g", worst(&r));
     assert_true(isnan(r.evidence));
     sdm_fit_dispose(&r);
-    // the logistic prior draws what is curved inwards
+    // the logistic law alone would draw the long end inwards, by 0.035 mm
     sdm_fit_opts logistic = o;
     logistic.image_model = SDM_FIT_LABELS;
-    logistic.l_ref = 0.05;
+    logistic.l_ref = 0.1;
     r = fit(&t, &logistic);
-    if (!(worst(&r) < 0.04)) fail_msg("off by %g", worst(&r));
+    if (!(worst(&r) < 0.02)) fail_msg("off by %g", worst(&r));
     assert_true(isnan(r.evidence) && r.blur == 0);
     sdm_fit_dispose(&r);
     v[0] = 2;
@@ -262,13 +262,56 @@ static void test_priors(void **state)
     // of half of 1 .. 4: draws the parameters towards 2.5, and they are better known
     o.prior_translation_sd = o.prior_rotation_sd = 0;
     const sdm_fit_result free_of_it = fit(&t, &o);
-    o.prior_sd = 0.05;
+    o.prior_sd = 0.2;
     r = fit(&t, &o);
     assert_true(r.params[2] > free_of_it.params[2] + 1e-4);
     assert_true(r.params[1] > free_of_it.params[1] + 1e-4);
-    for (int k = 0; k < 3; k++) assert_true(r.sd[k] < 0.075 && r.sd[k] < 1.1 * free_of_it.sd[k]);
+    for (int k = 0; k < 3; k++) assert_true(r.sd[k] < 0.3 && r.sd[k] < 1.1 * free_of_it.sd[k]);
     sdm_fit_result other = free_of_it;
     sdm_fit_dispose(&other);
+    sdm_fit_dispose(&r);
+    free(v);
+}
+
+// noise that is correlated: an estimate and its prior are weighed by their variances, as if it was not
+static void test_prior_weight(void **state)
+{
+    (void)state;
+    float *v = phantom(TRUTH, &POSE, 1, 5);
+    const sdm_fit_target t = image_of(v);
+    sdm_fit_opts o = near_start();
+    o.keep_pose = true;
+    o.start_pose = POSE;
+    o.prior_sd = 0;
+    sdm_fit_result r = fit(&t, &o);
+    const double sd = r.sd[2], found = r.params[2], prior_sd = 10 * sd;
+    assert_true(r.noise_factor > 3);
+    sdm_fit_dispose(&r);
+    o.prior_sd = prior_sd / 1.5; // of half of 1 .. 4
+    r = fit(&t, &o);
+    const double wanted = (2.5 - found) / (1 + prior_sd * prior_sd / (sd * sd)), moved = r.params[2] - found;
+    if (!(moved > 0.6 * wanted && moved < 1.6 * wanted)) fail_msg("moved by %g, wanted %g", moved, wanted);
+    sdm_fit_dispose(&r);
+    free(v);
+}
+
+// two tissues outside that overlap: without acceleration 51 iterations
+static void test_overlapping_tissues(void **state)
+{
+    (void)state;
+    float *v = phantom(TRUTH, &POSE, 0.5, 6);
+    const size_t n = sdm_grid_count(&(sdm_grid){.n = {36, 30, 26}});
+    for (size_t i = 0; i < n; i++)
+        if (v[i] > 900 && sdm_rng_uniform(8, 1, i) < 0.35) v[i] = (float)(700 + 400 * sdm_rng_normal(8, 2, i));
+    const sdm_fit_target t = image_of(v);
+    sdm_fit_opts o = near_start();
+    o.appearance.n_outside = 2;
+    sdm_fit_result r = fit(&t, &o);
+    const sdm_fit_law *second = &r.appearance.outside[1];
+    printf("overlapping tissues: %zu iterations, %s; %g of %g +- %g\n", r.n_iterations, r.reason, second->weight,
+           second->mean, second->sd);
+    if (!(r.n_iterations <= 40)) fail_msg("%zu iterations", r.n_iterations);
+    assert_true(fabs(second->weight - 0.35) < 0.1 && fabs(second->mean - 700) < 100 && fabs(second->sd - 400) < 80);
     sdm_fit_dispose(&r);
     free(v);
 }
@@ -276,9 +319,17 @@ static void test_priors(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_clean),     cmocka_unit_test(test_honest), cmocka_unit_test(test_threads),
-        cmocka_unit_test(test_label_map), cmocka_unit_test(test_points), cmocka_unit_test(test_labels_of_image),
-        cmocka_unit_test(test_turns),     cmocka_unit_test(test_kept),   cmocka_unit_test(test_priors),
+        cmocka_unit_test(test_clean),
+        cmocka_unit_test(test_honest),
+        cmocka_unit_test(test_threads),
+        cmocka_unit_test(test_label_map),
+        cmocka_unit_test(test_points),
+        cmocka_unit_test(test_labels_of_image),
+        cmocka_unit_test(test_turns),
+        cmocka_unit_test(test_kept),
+        cmocka_unit_test(test_priors),
+        cmocka_unit_test(test_prior_weight),
+        cmocka_unit_test(test_overlapping_tissues),
     };
     const struct CMUnitTest longer[] = {cmocka_unit_test(test_honest)};
     n_random = argc > 1 ? (size_t)strtoul(argv[1], NULL, 10) : 0;

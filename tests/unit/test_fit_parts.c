@@ -11,6 +11,7 @@
 
 #include "blur.h"
 #include "laws.h"
+#include "mixing.h"
 #include "newton.h"
 #include "oracle/fit_tools.h"
 #include "sample.h"
@@ -121,7 +122,7 @@ static void test_blur(void **state)
     for (double variance = 0.002; variance < 0.3; variance *= 3) {
         float *f = room(2 * n, sizeof *f), *spare = room(2 * n, sizeof *f);
         f[2 * middle] = 1;
-        sdm_fit_blur(&g, 2, variance, 2, &f, &spare);
+        sdm_fit_blur(&g, 2, 1, variance, 2, &f, &spare);
         double sum = 0, second[3] = {0, 0, 0};
         for (size_t i = 0; i < n; i++) {
             const double at[3] = {(double)(i % 33) - 16, (double)(i / 33 % 31) - 15, (double)(i / 33 / 31) - 14};
@@ -265,11 +266,59 @@ static void test_gradient(void **state)
     check_gradient(SDM_FIT_LABEL, SDM_FIT_LABELS);
 }
 
+// ---- acceleration
+
+// x -> fixed + A (x - fixed), with rates 0.99, 0.9, 0.5, -0.95 along skew directions
+static void affine(const double *x, double *y)
+{
+    static const double RATE[4] = {0.99, 0.9, 0.5, -0.95};
+    for (int i = 0; i < 4; i++) {
+        y[i] = 1 + i + RATE[i] * (x[i] - 1 - i);
+        for (int k = 0; k < i; k++) y[i] += 0.1 * (x[k] - 1 - k);
+    }
+}
+
+static void test_mixing(void **state)
+{
+    (void)state;
+    fit_mixing m = {0};
+    double x[4] = {0.5, 2.5, 2, 4.5}, y[4], off = INFINITY;
+    int steps = 0;
+    for (; steps < 12 && off > 1e-9; steps++) {
+        affine(x, y);
+        sdm_fit_mix(&m, 4, x, y, 100);
+        off = 0;
+        for (int k = 0; k < 4; k++) x[k] = y[k], off = fmax(off, fabs(x[k] - 1 - k));
+    }
+    if (steps > 8) fail_msg("%d steps, off by %g", steps, off); // plain ones: 2,000
+    // no farther from the image than allowed
+    m.count = 0;
+    const double start[4] = {0, 0, 0, 0};
+    memcpy(x, start, sizeof x);
+    for (int i = 0; i < 6; i++) {
+        double image[4];
+        affine(x, image);
+        memcpy(y, image, sizeof y);
+        sdm_fit_mix(&m, 4, x, y, 0.01);
+        for (int k = 0; k < 4; k++) assert_true(fabs(y[k] - image[k]) <= 0.01 * (1 + 1e-12));
+        memcpy(x, y, sizeof x);
+    }
+    // a fixed point stays
+    m.count = 0;
+    const double fixed[4] = {1, 2, 3, 4};
+    for (int i = 0; i < 4; i++) {
+        memcpy(y, fixed, sizeof y);
+        sdm_fit_mix(&m, 4, fixed, y, 1);
+        assert_memory_equal(y, fixed, sizeof y);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_scores), cmocka_unit_test(test_information), cmocka_unit_test(test_blur),
         cmocka_unit_test(test_sample), cmocka_unit_test(test_step),        cmocka_unit_test(test_gradient),
+        cmocka_unit_test(test_mixing),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

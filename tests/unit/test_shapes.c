@@ -256,7 +256,7 @@ static void check_velocity(const char *shape, const char *options, int rounds, d
     size_t n;
     const sdm_param *params = sdm_instance_params(s, &n);
     for (int round = 0; round < rounds; round++) {
-        double p[8];
+        double p[16];
         random_params(s, p);
         for (size_t i = 0; i < n && round < 2; i++) p[i] = round ? params[i].max : params[i].min;
         mesh_at(s, p, &m);
@@ -289,6 +289,8 @@ static void test_velocities(void **state)
     check_velocity("ellipsoid", "edge=0.6 e1=0.7 e2=1.3", 4, 1e-9);
     check_velocity("cochlea", "", 12, 1e-6);
     check_velocity("cochlea", "ear=left start=cubic section=ellipse", 8, 1e-6);
+    check_velocity("cochlea", "free=anatomy", 8, 1e-6);
+    check_velocity("cochlea", "free=anatomy ear=left start=cubic section=ellipse", 8, 2e-5);
 }
 
 /* The layout of the cochlea's mesh, found from its triangles: a pole, rings, a pole. */
@@ -581,6 +583,77 @@ static void test_cochlea_section(void **state)
     sdm_instance_free(s);
 }
 
+// parameters of the anatomy mean what the options of the same names do
+static void test_cochlea_free(void **state)
+{
+    (void)state;
+    static const char *const NAMES[] = {"a", "alpha", "b", "phi", "c", "kappa", "theta", "theta2", "p0"};
+    static const struct {
+        const char *options;
+        size_t n;
+    } CASES[] = {{"", 4}, {"start=cubic", 4}, {"free=anatomy", 7}, {"free=anatomy start=cubic", 9}};
+    for (size_t i = 0; i < 4; i++) {
+        sdm_instance *s = make("cochlea", CASES[i].options);
+        size_t n;
+        const sdm_param *params = sdm_instance_params(s, &n);
+        assert_int_equal(n, CASES[i].n);
+        for (size_t k = 0; k < n; k++) assert_string_equal(params[k].name, NAMES[k]);
+        sdm_instance_free(s);
+    }
+
+    sdm_instance *s = make("cochlea", "free=anatomy start=cubic c=0.17 p0=5");
+    double p[9];
+    default_params(s, p);
+    assert_true(p[4] == 0.17 && p[5] == 0.3 && p[6] == 14.5 && p[8] == 5);
+    sdm_mesh m = {0}, fixed_mesh = {0};
+    sdm_instance *fixed = make("cochlea", "start=cubic c=0.17 p0=5");
+    mesh_at(s, p, &m);
+    mesh_at(fixed, p, &fixed_mesh);
+    assert_int_equal(m.n_vert, fixed_mesh.n_vert);
+    assert_memory_equal(m.vert, fixed_mesh.vert, 3 * m.n_vert * sizeof *m.vert);
+    sdm_instance_free(fixed);
+    for (int i = 0; i < 8; i++) {
+        char options[200];
+        random_params(s, p);
+        snprintf(options, sizeof options, "start=cubic c=%.17g kappa=%.17g theta=%.17g theta2=%.17g p0=%.17g", p[4],
+                 p[5], p[6], p[7], p[8]);
+        fixed = make("cochlea", options);
+        mesh_at(s, p, &m);
+        (void)audit_closed(&m);
+        for (int k = 0; k < 60; k++) {
+            const double x[3] = {random_in(-6, 7), random_in(-6, 6), random_in(-2, 6)};
+            const double d = distance_at(fixed, p, x);
+            assert_true(fabs(distance_at(s, p, x) - d) < 1e-12);
+            const int w = winding(&m, x);
+            if (d < -0.15) assert_true(w >= 1);
+            if (d > 1e-6) assert_int_equal(w, 0);
+        }
+        sdm_instance_free(fixed);
+    }
+    sdm_mesh_dispose(&m);
+    sdm_mesh_dispose(&fixed_mesh);
+    sdm_instance_free(s);
+}
+
+static void refused(const char *options, const char *reason)
+{
+    sdm_named_text given[4];
+    size_t n = 0;
+    char text[200];
+    snprintf(text, sizeof text, "%s", options);
+    for (char *word = strtok(text, " "); word; word = strtok(NULL, " "), n++) {
+        given[n].name = word;
+        given[n].value = strchr(word, '=') + 1;
+        *strchr(word, '=') = 0;
+    }
+    sdm_instance *s = NULL;
+    sdm_error err = {0};
+    assert_int_equal(sdm_instance_create(sdm_registry_find(registry, "cochlea", NULL), given, n, NULL, &s, &err),
+                     SDM_E_PLUGIN);
+    assert_null(s);
+    if (!strstr(err.text, reason)) fail_msg("%s", err.text);
+}
+
 static void test_cochlea_refused(void **state)
 {
     (void)state;
@@ -591,6 +664,9 @@ static void test_cochlea_refused(void **state)
     assert_int_equal(sdm_instance_create(cochlea, thin, 1, NULL, &s, &err), SDM_E_PLUGIN);
     assert_null(s);
     assert_non_null(strstr(err.text, "shape 'cochlea': tube radius -0.34 mm at the apex"));
+    refused("c=0.5 free=anatomy", "c = 0.5, but with free = anatomy it is a parameter: need 0.14 to 0.26");
+    // at the largest angle, not only at the default's
+    refused("taper=0.07 free=anatomy", "tube radius -0.059 mm at the apex");
 
     s = make("cochlea", "section=ellipse");
     double p[4], d;
@@ -617,6 +693,7 @@ int main(void)
         cmocka_unit_test(test_cochlea_ear),
         cmocka_unit_test(test_cochlea_start),
         cmocka_unit_test(test_cochlea_section),
+        cmocka_unit_test(test_cochlea_free),
         cmocka_unit_test(test_cochlea_refused),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -5,6 +5,7 @@
 #include <stdio.h>
 
 #include "edt_seeds.h"
+#include "sdm/envelope.h"
 #include "sdm/memory.h"
 
 /* Lines next to each other that are worked on together, for the cache. */
@@ -83,46 +84,18 @@ static void along_seeds(void *arg, int64_t part, int thread)
     }
 }
 
-/* Lower envelope of the parabolas f[i] + spacing^2 (x - i)^2, at the voxels of the line. site, from, height: scratch. */
-static void envelope(double *f, int64_t n, double spacing, double *site, double *from, double *height)
-{
-    const double square = spacing * spacing;
-    int64_t m = 0;
-    for (int64_t i = 0; i < n; i++) {
-        if (f[i] == INFINITY) continue;
-        const double x = (double)i;
-        double start = -INFINITY;
-        while (m > 0) {
-            // where the new parabola goes below the last one
-            start = 0.5 * (x + site[m - 1] + (f[i] - height[m - 1]) / (square * (x - site[m - 1])));
-            if (start > from[m - 1]) break;
-            m--;
-            start = -INFINITY;
-        }
-        site[m] = x;
-        height[m] = f[i];
-        from[m++] = start;
-    }
-    if (!m) return;
-    for (int64_t i = 0, k = 0; i < n; i++) {
-        while (k + 1 < m && from[k + 1] <= (double)i) k++;
-        const double d = (double)i - site[k];
-        f[i] = height[k] + square * d * d;
-    }
-}
-
 /* Squared distances to seeds of other lines; the last pass of the three keeps the nearest of all directions. */
 static void across_seeds(void *arg, int64_t part, int thread)
 {
     job *j = arg;
-    double *f = scratch(j, thread), *site = f + j->longest, *from = site + j->longest, *height = from + j->longest;
+    double *f = scratch(j, thread), *rest = f + j->longest;
     const int last_axis = j->first == 2 ? 1 : 2;
     int64_t lines, line;
     const int64_t voxel = bundle(j, part, &lines, &line);
     for (int64_t l = 0; l < lines; l++) {
         float *at = j->work + voxel + l, *values = j->run->values + voxel + l;
         for (int64_t i = 0; i < j->n; i++) f[i] = (double)at[i * j->stride];
-        envelope(f, j->n, j->run->grid->spacing[j->axis], site, from, height);
+        sdm_lower_envelope(f, j->n, j->run->grid->spacing[j->axis], rest);
         if (j->axis != last_axis)
             for (int64_t i = 0; i < j->n; i++) at[i * j->stride] = (float)f[i];
         else

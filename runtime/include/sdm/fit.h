@@ -41,8 +41,7 @@ typedef enum sdm_fit_kind {
     SDM_FIT_IMAGE = 0, /* values[nz][ny][nx], any unit */
     SDM_FIT_LABEL =
         1, /* values[nz][ny][nx] are probabilities of inside, 0 .. 1 (a label map: 0 and 1): taken as shares of voxels
-                           (partial volume), or as labels with the logistic prior, which draws a surface of
-                           mean curvature H inwards by about 3.3 l_ref^2 H */
+                           (partial volume), or as labels with the logistic prior */
     SDM_FIT_POINTS = 2 /* points[n_points][3] on the surface, world mm, with outliers */
 } sdm_fit_kind;
 
@@ -108,8 +107,9 @@ typedef struct sdm_fit_opts {
     bool keep_pose;      /* true: parameters alone */
 
     double
-        prior_sd; /* of each parameter, in units of half of its range about the middle; 0: none. Priors meet a likelihood that
-                        counts every voxel as independent: they weigh less than they say, by sdm_fit_result.noise_factor */
+        prior_sd; /* of each parameter, in units of half of its range about the middle; 0: none. 0.5 takes ranges as means and two
+                        standard deviations. Priors weigh what they say beside values that are correlated: the likelihood counts
+                        these as independent, and each prior is multiplied by how much that makes too little of a variance */
     double prior_rotation_sd;    /* rad, about the start pose; 0: none. With turns: about the turn chosen */
     double prior_translation_sd; /* mm, about the start pose; 0: none */
 
@@ -128,7 +128,8 @@ typedef struct sdm_fit_opts {
         max_polish_iterations; /* with the exact engine, after a network's fit; 0: none, 40 are enough. The distance to a mesh has
                                      creases: steps that gain nothing any more end a phase too */
     double eps; /* > 0: a phase ends when the largest step is below: share of a parameter's range, rad, share of the
-                          shape's size */
+                          shape's size; or when steps promise less than rounding makes or a few hundredths of a standard
+                          deviation, and do not become smaller */
     double polish_eps;                                       /* > 0: the same with exact maps */
     int n_threads;                                           /* 0: the OpenMP default; the same bits for every value */
     void (*progress)(void *user, const sdm_fit_progress *p); /* after every iteration; may be NULL */
@@ -156,7 +157,7 @@ typedef struct sdm_fit_result {
     char reason[256];    /* why it stopped */
     size_t n_iterations; /* of the main phase and the polish */
     double *objective; /* [n_iterations] log posterior density after each, without constants; those of other voxels (the
-                          region follows the shape) or other sd of tissues do not compare */
+                          region follows the shape), other weights of priors or other sd of tissues do not compare */
     double log_likelihood;         /* of the target at the estimate */
     double log_likelihood_without; /* image: of the same voxels by a mixture that knows no shape; else NaN */
     double

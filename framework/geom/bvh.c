@@ -6,8 +6,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "sdm/memory.h"
-
 #define LEAF 4u
 #define MIDDLE_DEPTH 64 // below it nodes are halved in their order: bounds the depth of the tree
 
@@ -132,31 +130,23 @@ size_t sdm_bvh_bytes(size_t n_tri, size_t *scratch)
     return n_tri * (2 * sizeof(sdm_bvh_node) + sizeof(uint32_t));
 }
 
-sdm_status sdm_bvh_build(const sdm_mesh *m, sdm_bvh *b, sdm_error *err)
+sdm_status sdm_bvh_build(const sdm_mesh *m, sdm_arena *arena, sdm_bvh *b, sdm_error *err)
 {
+    const sdm_arena_mark before = arena->end[SDM_HIGH];
     builder w = {0};
     b->n_tri = m->n_tri;
-    sdm_status s = SDM_ALLOC(&w.item, m->n_tri, "tree", err);
-    if (!s) s = SDM_ALLOC(&w.spare, m->n_tri, "tree", err);
-    if (!s) s = SDM_ALLOC(&w.part, 2 * m->n_tri, "tree", err);
-    if (!s) s = SDM_ALLOC(&b->order, m->n_tri, "tree", err);
+    sdm_status s = SDM_TAKE(arena, SDM_HIGH, &w.item, m->n_tri, "tree", err);
+    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &w.spare, m->n_tri, "tree", err);
+    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &w.part, 2 * m->n_tri, "tree", err);
+    if (!s) s = SDM_TAKE(arena, SDM_LOW, &b->order, m->n_tri, "tree", err);
     if (s) goto done;
     fill_items(m, w.item);
     w.n_part = 1;
     build_part(&w, 0, 0, m->n_tri, 0);
     b->n_node = w.n_part;
-    s = SDM_ALLOC(&b->node, b->n_node, "tree", err);
+    s = SDM_TAKE(arena, SDM_LOW, &b->node, b->n_node, "tree", err);
     if (!s) fill_nodes(m, &w, b);
 done:
-    sdm_free(w.item);
-    sdm_free(w.spare);
-    sdm_free(w.part);
+    sdm_arena_release(arena, SDM_HIGH, before);
     return s;
-}
-
-void sdm_bvh_dispose(sdm_bvh *b)
-{
-    sdm_free(b->node);
-    sdm_free(b->order);
-    *b = (sdm_bvh){0};
 }

@@ -4,7 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "sdm/memory.h"
 #include "vec3.h"
 
 // a face lower than this share of its length has no reliable direction into it from an edge
@@ -16,6 +15,7 @@ typedef struct builder {
     const sdm_topology *topo;
     const sdm_frame *frames;
     const sdm_bvh *tree;
+    sdm_arena *arena;
     sdm_features *f;
     uint32_t *slot_of; /* [n_tri] slot of a triangle */
     uint32_t *edge;    /* [n_edges] number of an edge of the topology */
@@ -286,7 +286,7 @@ static void fill_groups(const sdm_features *f, uint32_t from, uint32_t to, sdm_f
 static sdm_status add_groups(const builder *b, sdm_error *err)
 {
     sdm_features *f = b->f;
-    const sdm_status s = SDM_ALLOC(&f->group, b->n_group, "features", err);
+    const sdm_status s = SDM_TAKE(b->arena, SDM_LOW, &f->group, b->n_group, "features", err);
     for (size_t i = 0; i < b->tree->n_node && !s; i++) {
         const sdm_cluster_node *node = &f->node[i];
         // others are below a cluster
@@ -301,17 +301,17 @@ static sdm_status allocate(builder *b, sdm_error *err)
 {
     sdm_features *f = b->f;
     const size_t n = b->m->n_tri, n_vert = b->m->n_vert;
-    sdm_status s = SDM_ALLOC(&b->slot_of, n, "features", err);
-    if (!s) s = SDM_ALLOC(&b->edge, b->topo->n_edges, "features", err);
-    if (!s) s = SDM_ALLOC(&b->corner, n_vert, "features", err);
-    if (!s) s = SDM_ALLOC(&b->count, n_vert, "features", err);
-    if (!s) s = SDM_ALLOC(&f->node, b->tree->n_node, "features", err);
-    if (!s) s = SDM_ALLOC(&f->centroid, n, "features", err);
-    if (!s) s = SDM_ALLOC(&f->row, f->corner_base, "features", err);
-    if (!s) s = SDM_ALLOC(&f->corner, n_vert, "features", err);
-    if (!s) s = SDM_ALLOC(&f->exact, f->corner_base + n_vert, "features", err);
-    if (!s) s = SDM_ALLOC(&f->of_slot, n, "features", err);
-    if (!s) s = SDM_ALLOC(&f->owner, f->corner_base + n_vert, "features", err);
+    sdm_status s = SDM_TAKE(b->arena, SDM_HIGH, &b->slot_of, n, "features", err);
+    if (!s) s = SDM_TAKE(b->arena, SDM_HIGH, &b->edge, b->topo->n_edges, "features", err);
+    if (!s) s = SDM_TAKE(b->arena, SDM_HIGH, &b->corner, n_vert, "features", err);
+    if (!s) s = SDM_TAKE(b->arena, SDM_HIGH, &b->count, n_vert, "features", err);
+    if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->node, b->tree->n_node, "features", err);
+    if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->centroid, n, "features", err);
+    if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->row, f->corner_base, "features", err);
+    if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->corner, n_vert, "features", err);
+    if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->exact, f->corner_base + n_vert, "features", err);
+    if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->of_slot, n, "features", err);
+    if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->owner, f->corner_base + n_vert, "features", err);
     if (s) return s;
     memset(b->edge, 0xff, b->topo->n_edges * sizeof *b->edge);
     memset(b->corner, 0xff, n_vert * sizeof *b->corner);
@@ -332,10 +332,11 @@ size_t sdm_features_bytes(size_t n_tri, size_t n_vert, size_t *scratch)
 }
 
 sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const sdm_frame *frames, const sdm_bvh *tree,
-                              sdm_features *f, sdm_error *err)
+                              sdm_arena *arena, sdm_features *f, sdm_error *err)
 {
     const size_t n = m->n_tri;
-    builder b = {.m = m, .topo = topo, .frames = frames, .tree = tree, .f = f};
+    builder b = {.m = m, .topo = topo, .frames = frames, .tree = tree, .arena = arena, .f = f};
+    const sdm_arena_mark before = arena->end[SDM_HIGH];
     size_t segments = 0;
     for (size_t t = 0; t < n; t++) segments += topo->edge[3 * t] == SDM_NONE;
     if (n + segments + topo->n_edges + m->n_vert >= SDM_NONE / 2) // the kernels count in 32 bits with a sign
@@ -350,22 +351,6 @@ sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const
         fill_clusters(&b);
         s = add_groups(&b, err);
     }
-    sdm_free(b.slot_of);
-    sdm_free(b.edge);
-    sdm_free(b.corner);
-    sdm_free(b.count);
+    sdm_arena_release(arena, SDM_HIGH, before);
     return s;
-}
-
-void sdm_features_dispose(sdm_features *f)
-{
-    sdm_free(f->node);
-    sdm_free(f->centroid);
-    sdm_free(f->group);
-    sdm_free(f->row);
-    sdm_free(f->corner);
-    sdm_free(f->exact);
-    sdm_free(f->of_slot);
-    sdm_free(f->owner);
-    *f = (sdm_features){0};
 }

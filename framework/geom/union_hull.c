@@ -16,6 +16,7 @@
 typedef struct hull {
     const sdm_mesh *mesh;
     const sdm_survey *survey;
+    sdm_arena *arena;
     sdm_mesh *out;
     uint32_t *source; // [out->cap_tri]
     sdm_budget *budget;
@@ -114,10 +115,11 @@ static sdm_status add_whole(hull *w, uint32_t t)
 }
 
 /* Removes vertices that no triangle uses. */
-static sdm_status drop_unused(sdm_mesh *m, sdm_error *err)
+static sdm_status drop_unused(sdm_mesh *m, sdm_arena *arena, sdm_error *err)
 {
+    const sdm_arena_mark before = arena->end[SDM_HIGH];
     uint32_t *place;
-    const sdm_status s = SDM_ALLOC(&place, m->n_vert, "vertices in use", err);
+    const sdm_status s = SDM_TAKE(arena, SDM_HIGH, &place, m->n_vert, "vertices in use", err);
     if (s) return s;
     for (size_t i = 0; i < 3 * m->n_tri; i++) place[m->tri[i]] = 1;
     size_t n = 0;
@@ -128,15 +130,16 @@ static sdm_status drop_unused(sdm_mesh *m, sdm_error *err)
     }
     for (size_t i = 0; i < 3 * m->n_tri; i++) m->tri[i] = place[m->tri[i]];
     m->n_vert = n;
-    sdm_free(place);
+    sdm_arena_release(arena, SDM_HIGH, before);
     return SDM_OK;
 }
 
 static sdm_status build(hull *w, bool *changed)
 {
     const sdm_contacts *c = &w->survey->contacts;
+    const sdm_arena_mark before = w->arena->end[SDM_HIGH];
     sdm_cutter cutter = {0};
-    sdm_status s = sdm_sides_build(w->mesh, w->survey, &w->sides, w->err);
+    sdm_status s = sdm_sides_build(w->mesh, w->survey, w->arena, &w->sides, w->err);
     *changed = false;
     for (uint32_t t = 0; t < w->mesh->n_tri && !s; t++) {
         if (sdm_sides_flat(w->survey, t)) continue;
@@ -150,13 +153,14 @@ static sdm_status build(hull *w, bool *changed)
     }
     sdm_cutter_dispose(&cutter);
     sdm_sides_dispose(&w->sides);
+    sdm_arena_release(w->arena, SDM_HIGH, before);
     return s;
 }
 
-sdm_status sdm_union_hull(const sdm_mesh *m, const sdm_survey *s, sdm_mesh *out, uint32_t **source, bool *changed,
-                          double *error_mm, sdm_budget *budget, sdm_error *err)
+sdm_status sdm_union_hull(const sdm_mesh *m, const sdm_survey *s, sdm_arena *arena, sdm_mesh *out, uint32_t **source,
+                          bool *changed, double *error_mm, sdm_budget *budget, sdm_error *err)
 {
-    hull w = {.mesh = m, .survey = s, .out = out, .budget = budget, .err = err, .n_vert = m->n_vert};
+    hull w = {.mesh = m, .survey = s, .arena = arena, .out = out, .budget = budget, .err = err, .n_vert = m->n_vert};
     // the copy, and what the walk over the surface takes in passing
     sdm_status st = sdm_budget_take(budget, bytes_for(m->n_vert, m->n_tri) + m->n_tri * 3 * sizeof(uint32_t), err);
     if (!st) st = sdm_mesh_reserve(out, m->n_vert, m->n_tri, err);
@@ -172,5 +176,5 @@ sdm_status sdm_union_hull(const sdm_mesh *m, const sdm_survey *s, sdm_mesh *out,
     if (!*changed) return SDM_OK;
     // narrow pieces and seams up to the tolerance, vertices moved onto planes, rounding of the new vertices
     *error_mm = 8 * s->contacts.tolerance + 2 * s->contacts.error;
-    return drop_unused(out, err);
+    return drop_unused(out, arena, err);
 }

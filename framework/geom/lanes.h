@@ -7,6 +7,8 @@
 #include <string.h>
 #if defined(__AVX2__) && defined(__FMA__)
 #include <immintrin.h>
+#elif defined(__SSE2__)
+#include <emmintrin.h>
 #endif
 
 typedef float v8f __attribute__((vector_size(32)));
@@ -123,6 +125,30 @@ static inline void v4_transpose(v4d r[4])
     memcpy(r, a, sizeof a);
 }
 #endif
+
+#if defined(__SSE2__)
+/* Rounded to float. */
+static inline v4f f4_round(v4d x)
+{
+    double d[4];
+    memcpy(d, &x, sizeof d);
+    return (v4f)_mm_movelh_ps(_mm_cvtpd_ps(_mm_loadu_pd(d)), _mm_cvtpd_ps(_mm_loadu_pd(d + 2)));
+}
+static inline void f4_transpose(v4f r[4])
+{
+    _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]);
+}
+#else
+static inline v4f f4_round(v4d x) { return __builtin_convertvector(x, v4f); }
+static inline void f4_transpose(v4f r[4])
+{
+    v4f a[4];
+    for (int i = 0; i < 4; i++)
+        for (int j = 0; j < 4; j++) a[i][j] = r[j][i];
+    memcpy(r, a, sizeof a);
+}
+#endif
+static inline v4d v4_from(v4f x) { return __builtin_convertvector(x, v4d); }
 
 /* Eight points or vectors. */
 typedef struct point8 {

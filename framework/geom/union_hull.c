@@ -12,6 +12,10 @@
 #include "cutting.h"
 #include "sdm/memory.h"
 #include "surface_side.h"
+#include "vertex_table.h"
+
+// in tolerances: within it vertices that cuts make are one, the same place as found on two triangles or three
+#define SAME_PLACE 4
 
 typedef struct hull {
     const sdm_mesh *mesh;
@@ -22,6 +26,7 @@ typedef struct hull {
     sdm_budget *budget;
     sdm_error *err;
     sdm_sides sides;
+    sdm_vertex_table seam; // vertices made by cuts
     size_t pieces, kept;  // of the triangle being cut
     size_t n_vert, n_tri; // used in out
 } hull;
@@ -56,6 +61,17 @@ static void add_triangle(hull *w, uint32_t a, uint32_t b, uint32_t c, uint32_t s
     w->source[w->n_tri++] = source;
 }
 
+/* The vertex at xy of the triangle being cut. */
+static sdm_status seam_vertex(hull *w, const double xy[2], uint32_t *v)
+{
+    double x[3];
+    sdm_frame_lift(&w->sides.frame, xy, x);
+    sdm_vertex_table_find(&w->seam, w->out->vert, (uint32_t)w->n_vert, x, v);
+    if (*v < w->n_vert) return SDM_OK;
+    memcpy(&w->out->vert[3 * w->n_vert++], x, sizeof x);
+    return sdm_vertex_table_add(&w->seam, w->out->vert, *v, w->err);
+}
+
 static sdm_status add_piece(void *user, const sdm_corner *c, size_t n)
 {
     hull *w = user;
@@ -67,21 +83,18 @@ static sdm_status add_piece(void *user, const sdm_corner *c, size_t n)
     w->pieces++;
     if (s || !keep) return s;
     w->kept++;
-    // a fan; corners that are vertices of the mesh keep them
+    // a fan; corners that are vertices of the mesh keep them, triangles narrower than the tolerance may vanish
     s = make_room(w, n, n);
     if (s) return s;
     uint32_t first = 0, before = 0;
     for (size_t i = 0; i < n; i++) {
         uint32_t v = c[i].vertex;
-        if (v == SDM_NONE) {
-            v = (uint32_t)w->n_vert++;
-            sdm_frame_lift(&w->sides.frame, c[i].x, &w->out->vert[3 * (size_t)v]);
-        }
+        if (v == SDM_NONE) s = seam_vertex(w, c[i].x, &v);
         if (i == 0) first = v;
-        if (i >= 2) add_triangle(w, first, before, v, w->sides.tri);
+        if (i >= 2 && first != before && before != v && v != first) add_triangle(w, first, before, v, w->sides.tri);
         before = v;
     }
-    return SDM_OK;
+    return s;
 }
 
 /* Cuts triangle t and adds the pieces that stay; *whole: all of them do, so none is added. */
@@ -140,6 +153,7 @@ static sdm_status build(hull *w, bool *changed)
     const sdm_arena_mark before = w->arena->end[SDM_HIGH];
     sdm_cutter cutter = {0};
     sdm_status s = sdm_sides_build(w->mesh, w->survey, w->arena, &w->sides, w->err);
+    w->seam.tolerance = SAME_PLACE * c->tolerance;
     *changed = false;
     for (uint32_t t = 0; t < w->mesh->n_tri && !s; t++) {
         if (sdm_sides_flat(w->survey, t)) continue;
@@ -152,6 +166,7 @@ static sdm_status build(hull *w, bool *changed)
         if (!whole) *changed = true;
     }
     sdm_cutter_dispose(&cutter);
+    sdm_vertex_table_dispose(&w->seam);
     sdm_sides_dispose(&w->sides);
     sdm_arena_release(w->arena, SDM_HIGH, before);
     return s;
@@ -174,7 +189,7 @@ sdm_status sdm_union_hull(const sdm_mesh *m, const sdm_survey *s, sdm_arena *are
     out->n_vert = w.n_vert;
     out->n_tri = w.n_tri;
     if (!*changed) return SDM_OK;
-    // narrow pieces and seams up to the tolerance, vertices moved onto planes, rounding of the new vertices
-    *error_mm = 8 * s->contacts.tolerance + 2 * s->contacts.error;
+    // narrow pieces and seams up to the tolerance, vertices moved onto planes and to others, rounding of the new vertices
+    *error_mm = (8 + 2 * SAME_PLACE) * s->contacts.tolerance + 2 * s->contacts.error;
     return drop_unused(out, arena, err);
 }

@@ -89,6 +89,27 @@ static inline v8f beyond_edge(const sdm_feature_row *r, const float4 *low, v8f a
     return v8_max(v8_abs(along) - v8_all(end), v8_max(function8(r, 1, low->of[1], p), function8(r, 2, low->of[2], p)));
 }
 
+/* x: from the corner to eight points. */
+static inline v8f beyond_corner(const sdm_corner_row *k, point8 x)
+{
+    v8f most = v8_all(-INFINITY);
+    for (int j = 0; j < SDM_CORNER_EDGES; j++)
+        most = v8_max(most, p8_dot(p8_all(k->along[0][j], k->along[1][j], k->along[2][j]), x));
+    return most;
+}
+
+/* The same of parts around the points, less what it changes to their corners. */
+static inline v8f beyond_corner_part(const sdm_grid_parts *q, bool aligned, const sdm_corner_row *k, float error,
+                                     point8 x)
+{
+    _Alignas(32) float reach[8];
+    v8_store(reach, extent(q, aligned, p8_load(k->along)) + v8_all(error));
+    v8f most = v8_all(-INFINITY);
+    for (int j = 0; j < SDM_CORNER_EDGES; j++)
+        most = v8_max(most, p8_linear(p8_all(k->along[0][j], k->along[1][j], k->along[2][j]), x, v8_all(-reach[j])));
+    return most;
+}
+
 /* How far eight points are from a feature, and the unit vectors from it to them. */
 typedef struct sight8 {
     v8f d;

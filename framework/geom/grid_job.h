@@ -80,9 +80,10 @@ typedef struct sdm_grid_scratch {
     sdm_candidates block[8];
     sdm_cluster_ref *cluster; /* of the block at hand */
     size_t n_cluster, cluster_cap;
-    /* features of the block at hand, relative to its middle; of a corner g[.][3] is the corner */
-    sdm_feature_row *row;
+    /* features of the block at hand */
     uint32_t *number, *from; /* from: place of the feature's cluster in cluster[] */
+    size_t block_cap;
+    sdm_feature_row *row; /* relative to its middle; of a corner g[.][3] is the corner */
     uint8_t *row_hit;
     sdm_candidates tile[8];
     size_t row_cap;
@@ -94,9 +95,10 @@ typedef struct sdm_grid_scratch {
     size_t tile_cap;
 } sdm_grid_scratch;
 
-/* Room for `cap` clusters of a box, features of a block, of a tile. limit: of bytes, 0: none. */
+/* Room for `cap` clusters of a box, features of the clusters of a block, of a block, of a tile. limit: of bytes, 0: none. */
 sdm_status sdm_grid_scratch_box(sdm_grid_scratch *s, size_t cap, sdm_error *err);
 sdm_status sdm_grid_scratch_block(sdm_grid_scratch *s, size_t cap, size_t limit, sdm_error *err);
+sdm_status sdm_grid_scratch_rows(sdm_grid_scratch *s, size_t cap, size_t limit, sdm_error *err);
 sdm_status sdm_grid_scratch_tile(sdm_grid_scratch *s, size_t cap, size_t limit, sdm_error *err);
 void sdm_grid_scratch_dispose(sdm_grid_scratch *s);
 

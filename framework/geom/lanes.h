@@ -134,10 +134,7 @@ static inline v4f f4_round(v4d x)
     memcpy(d, &x, sizeof d);
     return (v4f)_mm_movelh_ps(_mm_cvtpd_ps(_mm_loadu_pd(d)), _mm_cvtpd_ps(_mm_loadu_pd(d + 2)));
 }
-static inline void f4_transpose(v4f r[4])
-{
-    _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]);
-}
+static inline void f4_transpose(v4f r[4]) { _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]); }
 #else
 static inline v4f f4_round(v4d x) { return __builtin_convertvector(x, v4f); }
 static inline void f4_transpose(v4f r[4])

@@ -159,7 +159,7 @@ static void hit_corners(const sharing *w, size_t from, size_t to)
 }
 
 /* Features of the tiles of a block from its clusters. v: relative to its middle. */
-static void share_out(const sdm_grid_job *job, sdm_grid_scratch *s, const view8 *v, float error)
+static sdm_status share_out(const sdm_grid_job *job, sdm_grid_scratch *s, const view8 *v, float error, sdm_error *err)
 {
     sharing w = {.job = job,
                  .s = s,
@@ -168,31 +168,22 @@ static void share_out(const sdm_grid_job *job, sdm_grid_scratch *s, const view8 
                  .v = v,
                  .error = error};
     for (int t = 0; t < 8; t++) w.far = fmaxf(w.far, v->base[t] + v->most[t]);
-    size_t n = 0;
-    for (int kind = 0; kind < SDM_FEATURE_KINDS; kind++) {
-        // the hits of a kind begin at a multiple of eight
-        const size_t from = (n + 7) / 8 * 8;
-        n = from;
-        switch (kind) {
-        case SDM_FACES:
-            n = meet_faces(&w, false, from);
-            hit_faces(&w, false, from, n);
-            break;
-        case SDM_THIN_FACES:
-            if (!job->features->any_thin) break;
-            n = meet_faces(&w, true, from);
-            hit_faces(&w, true, from, n);
-            break;
-        case SDM_EDGES:
-            n = meet_edges(&w, from);
-            hit_edges(&w, from, n);
-            break;
-        default:
-            n = meet_corners(&w, from);
-            hit_corners(&w, from, n);
-        }
-        list_hits(job, s->row_hit, NULL, from, n, s->tile, kind);
-    }
+    // the hits of a kind begin at a multiple of eight
+    size_t from[SDM_FEATURE_KINDS], to[SDM_FEATURE_KINDS];
+    to[SDM_FACES] = meet_faces(&w, false, from[SDM_FACES] = 0);
+    to[SDM_THIN_FACES] = from[SDM_THIN_FACES] = (to[SDM_FACES] + 7) / 8 * 8;
+    if (job->features->any_thin) to[SDM_THIN_FACES] = meet_faces(&w, true, from[SDM_THIN_FACES]);
+    to[SDM_EDGES] = meet_edges(&w, from[SDM_EDGES] = (to[SDM_THIN_FACES] + 7) / 8 * 8);
+    to[SDM_CORNERS] = meet_corners(&w, from[SDM_CORNERS] = (to[SDM_EDGES] + 7) / 8 * 8);
+    const sdm_status st = sdm_grid_scratch_rows(s, to[SDM_CORNERS] + 1, job->limit, err);
+    if (st) return st;
+    hit_faces(&w, false, from[SDM_FACES], to[SDM_FACES]);
+    hit_faces(&w, true, from[SDM_THIN_FACES], to[SDM_THIN_FACES]);
+    hit_edges(&w, from[SDM_EDGES], to[SDM_EDGES]);
+    hit_corners(&w, from[SDM_CORNERS], to[SDM_CORNERS]);
+    for (int kind = 0; kind < SDM_FEATURE_KINDS; kind++)
+        list_hits(job, s->row_hit, NULL, from[kind], to[kind], s->tile, kind);
+    return SDM_OK;
 }
 
 #endif

@@ -27,8 +27,8 @@ typedef struct hull {
     sdm_error *err;
     sdm_sides sides;
     sdm_vertex_table seam; // vertices made by cuts
-    size_t pieces, kept;  // of the triangle being cut
-    size_t n_vert, n_tri; // used in out
+    size_t pieces, kept;   // of the triangle being cut
+    size_t n_vert, n_tri;  // used in out
 } hull;
 
 static size_t bytes_for(size_t n_vert, size_t n_tri)

@@ -82,8 +82,10 @@ static void measure_features(const tile *t, point8 p, nearest8 *best)
         offer(best, sight, v8_abs(along) < v8_all(r->offset[3]));
     }
     for (size_t i = in->begin[SDM_CORNERS]; i < in->end[SDM_CORNERS]; i++) {
-        const sight8 sight = see_point(point_of(&s->row[in->list[i]]), p);
-        s->hit[i] = 0xff;
+        const point8 at = point_of(&s->row[in->list[i]]);
+        const sdm_corner_row *k = &job->features->corner[s->number[in->list[i]] - job->features->corner_base];
+        const sight8 sight = see_point(at, p);
+        s->hit[i] = (uint8_t)~v8_greater(beyond_corner_part(q, job->aligned, k, t->error, p8_sub(p, at)), zero);
         put_sight(&s->sight[i], sight);
         offer(best, sight, v8_all_i(-1));
     }

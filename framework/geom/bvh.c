@@ -7,7 +7,8 @@
 #include <string.h>
 
 #define LEAF 4u
-#define MIDDLE_DEPTH 64 // below it nodes are halved in their order: bounds the depth of the tree
+#define FULL ((size_t)8) // small nodes are cut where they leave as many: clusters of the map are full then
+#define MIDDLE_DEPTH 64  // below it nodes are halved in their order: bounds the depth of the tree
 
 /* Middles are in units of the mesh's size: they only choose the splits, float is enough. */
 typedef struct item {
@@ -24,6 +25,19 @@ typedef struct builder {
     part *part;
     size_t n_part;
 } builder;
+
+/* As near to `left` as a multiple of FULL can be, in the order along an axis. */
+static size_t cut_to_full(item *list, size_t n, int axis, size_t left)
+{
+    for (size_t i = 1; i < n; i++) {
+        const item x = list[i];
+        size_t k = i;
+        for (; k > 0 && list[k - 1].middle[axis] > x.middle[axis]; k--) list[k] = list[k - 1];
+        list[k] = x;
+    }
+    const size_t full = (left + FULL / 2) / FULL * FULL;
+    return full < FULL ? FULL : full < n ? full : full - FULL;
+}
 
 /* Reorders list[n] into two parts and returns the size of the first, 0 < size < n. */
 static size_t split(const builder *w, item *list, size_t n, int depth)
@@ -52,6 +66,7 @@ static size_t split(const builder *w, item *list, size_t n, int depth)
         right += !is_left;
     }
     memcpy(list + left, w->spare, right * sizeof *list);
+    if (n > FULL && n <= 4 * FULL) return cut_to_full(list, n, axis, left);
     return left > 0 && left < n ? left : n / 2; // else all middles coincide
 }
 

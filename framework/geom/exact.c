@@ -118,7 +118,7 @@ static sdm_status build_nearest(sdm_exact *e, sdm_budget *budget, sdm_error *err
 }
 
 /* What a closed mesh takes with a few contacts. Guessed too low, arrays are allocated one by one. */
-static size_t usual_bytes(const sdm_mesh *m) { return 1150 * m->n_tri + 300 * m->n_vert; }
+static size_t usual_bytes(const sdm_mesh *m) { return 1080 * m->n_tri + 220 * m->n_vert; }
 
 static sdm_status prepare(sdm_exact *e, const sdm_mesh *mesh, sdm_error *err)
 {

@@ -167,7 +167,7 @@ static sdm_status share_out(const sdm_grid_job *job, sdm_grid_scratch *s, const 
                  .tile = &job->part[SDM_TO_TILES],
                  .v = v,
                  .error = error};
-    for (int t = 0; t < 8; t++) w.far = fmaxf(w.far, v->base[t] + v->most[t]);
+    for (int t = 0; t < 8; t++) w.far = fmaxf(w.far, v->corner[t]);
     // the hits of a kind begin at a multiple of eight
     size_t from[SDM_FEATURE_KINDS], to[SDM_FEATURE_KINDS];
     to[SDM_FACES] = meet_faces(&w, false, from[SDM_FACES] = 0);

@@ -54,6 +54,7 @@ static size_t meet_faces(const sharing *w, bool thin, size_t n)
     for (size_t i = 0; i < w->s->n_cluster; i++) {
         const sdm_cluster_ref *c = &w->s->cluster[i];
         const sdm_cluster_node *node = &f->node[c->node];
+        if (thin && !node->thin) continue;
         const point8 shift = p8_all(c->shift[0], c->shift[1], c->shift[2]);
         const unsigned lanes = faces_met(w, &f->group[node->group], node->thin, shift);
         n = put_features(w, n, node->first, i, thin ? lanes & node->thin : lanes & ~node->thin);

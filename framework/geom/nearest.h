@@ -11,7 +11,7 @@ typedef struct sdm_nearest {
     sdm_features features; /* for many points at once */
 } sdm_nearest;
 
-/* topo: of m. Taken from the low end of the arena. */
+/* topo: of m, n->tree: its tree. The rest is taken from the low end of the arena. */
 sdm_status sdm_nearest_build(const sdm_mesh *m, const sdm_topology *topo, sdm_arena *arena, sdm_nearest *n,
                              sdm_error *err);
 

@@ -79,13 +79,11 @@ static void add_face(const builder *b, uint32_t slot, sdm_cluster_node *node)
         return;
     }
     // outward across the edges; edges 0 and 2 pass through a, edge 1 through the end of edge 0
-    const v4d ex = {1, t->e1x, t->e2x, 0}, ey = {0, t->e1y, t->e2y, 0};
     functions f;
     for (int i = 0; i < 3; i++) {
-        f.g[i] = ey * v4_all(t->u[i]) - ex * v4_all(t->v[i]);
-        f.g[i][3] = t->n[i];
-        f.through[i] = v4_all(t->a[i]);
-        f.through[i][1] = end[i];
+        const double u = t->u[i], v = t->v[i];
+        f.g[i] = (v4d){-v, t->e1y * u - t->e1x * v, t->e2y * u - t->e2x * v, t->n[i]};
+        f.through[i] = (v4d){t->a[i], end[i], t->a[i], t->a[i]};
     }
     set_functions(b, row, &f);
 }

@@ -133,7 +133,10 @@ static void choose_features(const tile *t, voxels *x)
         v8_store(first, w.first);
         v8_store(limit, v8_fma(v8_sqrt(v8_max(w.first, v8_all(0))) + v8_all(1), squared, w.first));
         const int clear = v8_greater(w.second, v8_load(limit)) & v8_greater(w.first, v8_all(-0.5f));
-        for (int i = 0; i < 8; i++) x->number[place[i]] = t->s->number[w.lane[i]];
+        for (int i = 0; i < 8; i++) {
+            const uint32_t number = x->number[place[i]] = t->s->number[w.lane[i]];
+            __builtin_prefetch(&job->features->exact[number]); // for measure_voxels()
+        }
         // NaN (INFINITY - INFINITY) is not clear either
         for (int open = 0xff & ~clear; open; open &= open - 1) {
             const int lane = __builtin_ctz((unsigned)open), i = place[lane];

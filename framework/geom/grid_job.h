@@ -67,11 +67,6 @@ typedef struct sdm_candidates {
     size_t begin[SDM_FEATURE_KINDS], end[SDM_FEATURE_KINDS];
 } sdm_candidates;
 
-/* A feature as eight vectors see it: how far it is from their middles, in which direction these lie from it. */
-typedef struct sdm_sight {
-    _Alignas(32) float d[8], g[3][8];
-} sdm_sight;
-
 /* Scratch of one thread. hit: the parts that a thing concerns, see list_hits(). */
 typedef struct sdm_grid_scratch {
     /* clusters of the box at hand */
@@ -88,7 +83,6 @@ typedef struct sdm_grid_scratch {
     sdm_candidates tile[8];
     size_t row_cap;
     /* features of the tile at hand, as in its list */
-    sdm_sight *sight;
     uint8_t *hit;
     sdm_candidates vector[8];
     float (*value)[8]; /* squared distances of the candidates of a vector, as in its list */

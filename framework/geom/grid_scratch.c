@@ -63,11 +63,9 @@ static void free_rows(sdm_grid_scratch *s)
 
 static void free_tile(sdm_grid_scratch *s)
 {
-    sdm_free(s->sight);
     sdm_free(s->hit);
     sdm_free(s->vector[0].list);
     sdm_free(s->value);
-    s->sight = NULL;
     s->hit = NULL;
     s->vector[0].list = NULL;
     s->value = NULL;
@@ -78,7 +76,7 @@ static size_t bytes(size_t block, size_t rows, size_t tile)
 {
     const size_t lists = 8 * sizeof(uint32_t);
     return block * 2 * sizeof(uint32_t) + rows * (sizeof(sdm_feature_row) + 1 + lists) +
-           tile * (sizeof(sdm_sight) + 1 + lists + sizeof(float[8]));
+           tile * (1 + lists + sizeof(float[8]));
 }
 
 static sdm_status check_limit(size_t need, size_t limit, const char *part, sdm_error *err)
@@ -126,8 +124,7 @@ sdm_status sdm_grid_scratch_tile(sdm_grid_scratch *s, size_t cap, size_t limit, 
     const size_t more = usual(cap, USUAL_TILE);
     if (!limit || bytes(s->block_cap, s->row_cap, more) <= limit) cap = more;
     free_tile(s);
-    st = SDM_ALLOC(&s->sight, cap + LIST_SLACK, "candidates of a tile", err);
-    if (!st) st = SDM_ALLOC(&s->hit, cap + LIST_SLACK, "candidates of a tile", err);
+    st = SDM_ALLOC(&s->hit, cap + LIST_SLACK, "candidates of a tile", err);
     if (!st) st = allocate_candidates(s->vector, cap, err);
     if (!st) st = SDM_ALLOC(&s->value, cap + LIST_SLACK, "candidates of a tile", err);
     if (!st) s->tile_cap = cap;

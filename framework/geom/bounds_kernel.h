@@ -38,12 +38,14 @@ typedef struct view8 {
     point8 p, g;
     v8f corner; /* distance of the point at the farthest corner, rounding included; + extent(h) */
     v8f bend;   /* d' + r^2 / (2 d'), the same; + extent(h - g) */
-    v8f most;   /* for every h; the band included */
+    v8f band;   /* for every h */
 } view8;
 
-/* d: distances of the points. */
-static inline view8 view_from(const sdm_grid_job *job, const sdm_grid_parts *q, point8 p, v8f d, point8 g)
+/* at: the points of the surface. */
+static inline view8 view_of(const sdm_grid_job *job, const sdm_grid_parts *q, point8 p, const float at[3][8])
 {
+    point8 g;
+    const v8f d = length8(p8_sub(p, p8_load(at)), &g);
     const v8f r = v8_all(q->radius);
     // a corner is at most that much farther from the point than the middle
     v8f most = r;
@@ -53,33 +55,17 @@ static inline view8 view_from(const sdm_grid_job *job, const sdm_grid_parts *q, 
         most = v8_min(most, v8_sqrt(p8_dot(w, w)) - d + d * v8_all(SDM_CULL));
     }
     const v8f base = d + v8_all(4 * job->error) + (d + r) * v8_all(SDM_CULL);
-    const v8f corner = base + v8_max(most, v8_all(0)),
-              band = v8_all((job->band + q->radius) * (1 + SDM_CULL) + 4 * job->error);
     return (view8){.p = p,
                    .g = g,
-                   .corner = corner,
+                   .corner = base + v8_max(most, v8_all(0)),
                    .bend = base + r * r / (d + d + v8_all(SDM_TINY)),
-                   .most = v8_min(band, corner + r)};
+                   .band = v8_all((job->band + q->radius) * (1 + SDM_CULL) + 4 * job->error)};
 }
 
-/* at: the points of the surface. */
-static inline view8 view_of(const sdm_grid_job *job, const sdm_grid_parts *q, point8 p, const float at[3][8])
-{
-    point8 g;
-    const v8f d = length8(p8_sub(p, p8_load(at)), &g);
-    return view_from(job, q, p, d, g);
-}
-
-/* How far a feature in direction h must be: the bounds that are quick to find. */
 static inline v8f limit8(const sdm_grid_parts *q, bool aligned, const view8 *v, point8 h)
 {
-    return v8_min(v->most, extent_and(q, aligned, p8_sub(h, v->g), v->bend));
-}
-
-/* The same for a cluster, which many features depend on. */
-static inline v8f close_limit8(const sdm_grid_parts *q, bool aligned, const view8 *v, point8 h)
-{
-    return v8_min(limit8(q, aligned, v, h), extent_and(q, aligned, h, v->corner));
+    return v8_min(v8_min(v->band, extent_and(q, aligned, h, v->corner)),
+                  extent_and(q, aligned, p8_sub(h, v->g), v->bend));
 }
 
 #endif

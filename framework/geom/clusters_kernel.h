@@ -19,7 +19,7 @@ static inline int concerned(const sdm_grid_parts *q, bool aligned, const view8 *
 {
     point8 g;
     const v8f d = length8(from_box(node, v->p), &g);
-    return 0xff & ~v8_greater(d, close_limit8(q, aligned, v, g));
+    return 0xff & ~v8_greater(d, limit8(q, aligned, v, g));
 }
 
 /* Centroids near eight points: squared distance, number of the face, -1 for none. */

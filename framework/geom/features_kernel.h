@@ -110,32 +110,4 @@ static inline v8f beyond_corner_part(const sdm_grid_parts *q, bool aligned, cons
     return most;
 }
 
-/* How far eight points are from a feature, and the unit vectors from it to them. */
-typedef struct sight8 {
-    v8f d;
-    point8 g;
-} sight8;
-
-static inline sight8 see_face(const sdm_feature_row *r, point8 p)
-{
-    const v8f z = function8(r, 3, r->offset[3], p);
-    const point8 n = p8_all(r->g[0][3], r->g[1][3], r->g[2][3]);
-    return (sight8){v8_abs(z), {v8_turn(n.x, z), v8_turn(n.y, z), v8_turn(n.z, z)}};
-}
-
-static inline sight8 see_point(point8 x, point8 p)
-{
-    sight8 s;
-    s.d = length8(p8_sub(p, x), &s.g);
-    return s;
-}
-
-static inline sight8 see_edge(const sdm_feature_row *r, v8f along, point8 p)
-{
-    const point8 w = p8_sub(p, point_of(r));
-    sight8 s;
-    s.d = length8(p8_sub(w, p8_scale(p8_all(r->g[0][0], r->g[1][0], r->g[2][0]), along)), &s.g);
-    return s;
-}
-
 #endif

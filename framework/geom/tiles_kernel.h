@@ -5,12 +5,6 @@
 #include "clusters_kernel.h"
 #include "features_kernel.h"
 
-/* Parts that are not too far from a feature for it to be their nearest. */
-static inline int near_parts(const sdm_grid_parts *q, bool aligned, const view8 *v, sight8 s)
-{
-    return ~v8_greater(s.d, limit8(q, aligned, v, s.g));
-}
-
 /* A block's features as they are shared out to its tiles. */
 typedef struct sharing {
     const sdm_grid_job *job;
@@ -106,7 +100,8 @@ static size_t meet_corners(const sharing *w, size_t n)
     return n;
 }
 
-/* Fills in the rows of the features and the tiles that their regions meet and that are not too far from them. */
+/* Fills in the rows of the features and the tiles that their regions meet. How far they are, their clusters were asked: of those that are
+   left hardly any feature is too far from a tile or vector whose region it meets. */
 static inline void hit_faces(const sharing *w, bool thin, size_t from, size_t to)
 {
     const sdm_grid_scratch *s = w->s;
@@ -117,9 +112,7 @@ static inline void hit_faces(const sharing *w, bool thin, size_t from, size_t to
         const float4 low = lowered(&x, reach_of(w->tile, w->job->aligned, &x, w->error));
         store_row(&s->row[i], x);
         const v8f beyond = thin ? beyond_thin_face(r, &low, w->v->p) : beyond_face(r, &low, w->v->p);
-        unsigned hit = c->mask & ~(unsigned)v8_greater(beyond, v8_all(0));
-        if (!thin) hit &= (unsigned)near_parts(w->tile, w->job->aligned, w->v, see_face(&s->row[i], w->v->p));
-        s->row_hit[i] = (uint8_t)hit;
+        s->row_hit[i] = (uint8_t)(c->mask & ~(unsigned)v8_greater(beyond, v8_all(0)));
     }
 }
 
@@ -135,8 +128,7 @@ static void hit_edges(const sharing *w, size_t from, size_t to)
         store_row(&s->row[i], x);
         const v8f along = function8(r, 0, r->offset[0], w->v->p);
         const v8f beyond = beyond_edge(r, &low, along, r->offset[3] + reach[0], w->v->p);
-        const int near = near_parts(w->tile, w->job->aligned, w->v, see_edge(r, along, w->v->p));
-        s->row_hit[i] = (uint8_t)(c->mask & (unsigned)(near & ~v8_greater(beyond, v8_all(0))));
+        s->row_hit[i] = (uint8_t)(c->mask & ~(unsigned)v8_greater(beyond, v8_all(0)));
     }
 }
 
@@ -147,15 +139,9 @@ static void hit_corners(const sharing *w, size_t from, size_t to)
         const sdm_corner_row *k = &f->corner[w->s->number[i] - f->corner_base];
         const sdm_cluster_ref *c = &w->s->cluster[w->s->from[i]];
         for (int a = 0; a < 3; a++) w->s->row[i].g[a][3] = k->at[a] - c->shift[a];
-        const point8 at = point_of(&w->s->row[i]), from_corner = p8_sub(w->v->p, at), g = p8_load(k->along);
-        _Alignas(32) float reach[8];
-        v8_store(reach, extent(w->tile, w->job->aligned, g) + v8_all(w->error));
-        v8f over = v8_all(-1);
-        for (int j = 0; j < SDM_CORNER_EDGES; j++)
-            over = v8_max(over, p8_linear(p8_all(k->along[0][j], k->along[1][j], k->along[2][j]), from_corner,
-                                          v8_all(-reach[j])));
-        const int near = near_parts(w->tile, w->job->aligned, w->v, see_point(at, w->v->p));
-        w->s->row_hit[i] = (uint8_t)(c->mask & (unsigned)(near & ~v8_greater(over, v8_all(0))));
+        const point8 x = p8_sub(w->v->p, point_of(&w->s->row[i]));
+        const v8f beyond = beyond_corner_part(w->tile, w->job->aligned, k, w->error, x);
+        w->s->row_hit[i] = (uint8_t)(c->mask & ~(unsigned)v8_greater(beyond, v8_all(0)));
     }
 }
 

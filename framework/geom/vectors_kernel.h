@@ -1,6 +1,4 @@
-/* From the features of a tile to the candidates of its vectors: those whose region a vector meets. Part of the map kernels.
-
-   Distances are not asked about: of features so near to the tile hardly any is too far from a vector whose region it meets. */
+/* From the features of a tile to the candidates of its vectors: those whose region a vector meets. Part of the map kernels. */
 #ifndef SDM_GEOM_VECTORS_KERNEL_H
 #define SDM_GEOM_VECTORS_KERNEL_H
 

@@ -10,9 +10,8 @@ typedef struct sharing {
     const sdm_grid_job *job;
     sdm_grid_scratch *s;
     const sdm_grid_parts *block, *tile; /* one of them each */
-    const view8 *v;
+    point8 p;                           /* middles of the tiles, from that of the block */
     float error;
-    float far; /* what is farther from all points of the block is not the nearest of any */
 } sharing;
 
 /* Appends the features of some lanes of a group that begins with `number` behind the first n; returns how many there are then. Without
@@ -32,14 +31,10 @@ static inline v8f least8(const sharing *w, const sdm_feature_group *k, int j, po
 }
 
 /* Lanes of a group of faces whose regions meet the block. */
-static inline unsigned faces_met(const sharing *w, const sdm_feature_group *k, unsigned thin, point8 shift)
+static inline unsigned faces_met(const sharing *w, const sdm_feature_group *k, point8 shift)
 {
     const v8f beside = v8_max(least8(w, k, 0, shift), v8_max(least8(w, k, 1, shift), least8(w, k, 2, shift)));
-    const point8 g = p8_load(k->g[3]);
-    const v8f above = v8_abs(p8_linear(g, shift, v8_load(k->offset[3]))) - extent(w->block, w->job->aligned, g);
-    const unsigned out = (unsigned)v8_greater(beside, v8_all(w->error));
-    const unsigned far = (unsigned)v8_greater(above, v8_all(w->far + w->error)) & ~thin;
-    return 0xff & ~(out | far);
+    return 0xff & ~(unsigned)v8_greater(beside, v8_all(w->error));
 }
 
 static size_t meet_faces(const sharing *w, bool thin, size_t n)
@@ -50,7 +45,7 @@ static size_t meet_faces(const sharing *w, bool thin, size_t n)
         const sdm_cluster_node *node = &f->node[c->node];
         if (thin && !node->thin) continue;
         const point8 shift = p8_all(c->shift[0], c->shift[1], c->shift[2]);
-        const unsigned lanes = faces_met(w, &f->group[node->group], node->thin, shift);
+        const unsigned lanes = faces_met(w, &f->group[node->group], shift);
         n = put_features(w, n, node->first, i, thin ? lanes & node->thin : lanes & ~node->thin);
     }
     return n;
@@ -111,7 +106,7 @@ static inline void hit_faces(const sharing *w, bool thin, size_t from, size_t to
         const row4 x = shift_face(load_row(r), c->shift);
         const float4 low = lowered(&x, reach_of(w->tile, w->job->aligned, &x, w->error));
         store_row(&s->row[i], x);
-        const v8f beyond = thin ? beyond_thin_face(r, &low, w->v->p) : beyond_face(r, &low, w->v->p);
+        const v8f beyond = thin ? beyond_thin_face(r, &low, w->p) : beyond_face(r, &low, w->p);
         s->row_hit[i] = (uint8_t)(c->mask & ~(unsigned)v8_greater(beyond, v8_all(0)));
     }
 }
@@ -126,8 +121,8 @@ static void hit_edges(const sharing *w, size_t from, size_t to)
         const v4f reach = reach_of(w->tile, w->job->aligned, &x, w->error);
         const float4 low = lowered(&x, reach);
         store_row(&s->row[i], x);
-        const v8f along = function8(r, 0, r->offset[0], w->v->p);
-        const v8f beyond = beyond_edge(r, &low, along, r->offset[3] + reach[0], w->v->p);
+        const v8f along = function8(r, 0, r->offset[0], w->p);
+        const v8f beyond = beyond_edge(r, &low, along, r->offset[3] + reach[0], w->p);
         s->row_hit[i] = (uint8_t)(c->mask & ~(unsigned)v8_greater(beyond, v8_all(0)));
     }
 }
@@ -139,22 +134,22 @@ static void hit_corners(const sharing *w, size_t from, size_t to)
         const sdm_corner_row *k = &f->corner[w->s->number[i] - f->corner_base];
         const sdm_cluster_ref *c = &w->s->cluster[w->s->from[i]];
         for (int a = 0; a < 3; a++) w->s->row[i].g[a][3] = k->at[a] - c->shift[a];
-        const point8 x = p8_sub(w->v->p, point_of(&w->s->row[i]));
+        const point8 x = p8_sub(w->p, point_of(&w->s->row[i]));
         const v8f beyond = beyond_corner_part(w->tile, w->job->aligned, k, w->error, x);
         w->s->row_hit[i] = (uint8_t)(c->mask & ~(unsigned)v8_greater(beyond, v8_all(0)));
     }
 }
 
-/* Features of the tiles of a block from its clusters. v: relative to its middle. */
-static sdm_status share_out(const sdm_grid_job *job, sdm_grid_scratch *s, const view8 *v, float error, sdm_error *err)
+/* Features of the tiles of a block from its clusters. */
+static sdm_status share_out(const sdm_grid_job *job, sdm_grid_scratch *s, float error, sdm_error *err)
 {
-    sharing w = {.job = job,
-                 .s = s,
-                 .block = &job->part[SDM_TO_BLOCKS],
-                 .tile = &job->part[SDM_TO_TILES],
-                 .v = v,
-                 .error = error};
-    for (int t = 0; t < 8; t++) w.far = fmaxf(w.far, v->corner[t]);
+    const point8 p = p8_load((const float(*)[8])job->part[SDM_TO_TILES].middle.x);
+    const sharing w = {.job = job,
+                       .s = s,
+                       .block = &job->part[SDM_TO_BLOCKS],
+                       .tile = &job->part[SDM_TO_TILES],
+                       .p = p,
+                       .error = error};
     // the hits of a kind begin at a multiple of eight
     size_t from[SDM_FEATURE_KINDS], to[SDM_FEATURE_KINDS];
     to[SDM_FACES] = meet_faces(&w, false, from[SDM_FACES] = 0);

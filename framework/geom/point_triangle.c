@@ -5,9 +5,6 @@
 
 #include "vec3.h"
 
-// height over length from which two passes leave nothing of one direction in the other
-#define NEEDLE 1e-4
-
 /* Any unit vector perpendicular to the unit vector u. */
 static void perpendicular(const double u[3], double v[3])
 {
@@ -40,7 +37,7 @@ void sdm_frame_build(const double a[3], const double b[3], const double c[3], sd
     double ab[3], ac[3];
     v3_sub(p1, p0, ab);
     v3_sub(p2, p0, ac);
-    const double length = sqrt(rotation == 0 ? l0 : rotation == 1 ? l1 : l2);
+    const double length = v3_norm(ab);
     for (int i = 0; i < 3; i++) {
         f->a[i] = p0[i];
         f->u[i] = length > 0 ? ab[i] / length : i == 0;
@@ -61,8 +58,7 @@ void sdm_frame_build(const double a[3], const double b[3], const double c[3], sd
         perpendicular(f->u, f->v);
     else
         for (int i = 0; i < 3; i++) f->v[i] = w[i] / cy;
-    if (!flat && cy < NEEDLE * length) {
-        // what is left of u in w, a rounding of the length, counts
+    for (int pass = 0; !flat && pass < 1; pass++) {
         const double along = v3_dot(f->v, f->u);
         v3_along(f->v, -along, f->u, f->v);
         const double len = v3_norm(f->v);

@@ -434,6 +434,32 @@ static void test_memory_limit(void **state)
     sdm_mesh_dispose(&b);
 }
 
+/* Where triangles cross, each of them gives the same place: one vertex of the surface. */
+static void test_seam_vertices(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0}, b = {0};
+    mesh_sphere(&m, (const double[3]){0, 0, 0}, 1, 16);
+    mesh_sphere(&b, (const double[3]){0.71, 0.23, -0.17}, 1, 16);
+    mesh_append(&m, &b);
+    sdm_exact *e = NULL;
+    assert_int_equal(sdm_exact_create(&m, NULL, &e, NULL), SDM_OK);
+    assert_true(sdm_exact_get_report(e)->unioned);
+    const sdm_mesh *s = sdm_exact_surface(e);
+    size_t twice = 0;
+    for (size_t i = 0; i < s->n_vert; i++) {
+        for (size_t k = 0; k < i; k++) {
+            double d = 0;
+            for (size_t a = 0; a < 3; a++) d = fmax(d, fabs(s->vert[3 * i + a] - s->vert[3 * k + a]));
+            twice += d < 1e-14;
+        }
+    }
+    assert_int_equal(twice, 0);
+    sdm_exact_free(e);
+    sdm_mesh_dispose(&m);
+    sdm_mesh_dispose(&b);
+}
+
 /* With a limit the engine's arrays are allocated one by one, without one they share a block: the same bits either way, and every
    allocation may fail. */
 static void test_with_and_without_block(void **state)
@@ -471,11 +497,12 @@ static void test_with_and_without_block(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_two_spheres),  cmocka_unit_test(test_boxes_with_coplanar_faces),
-        cmocka_unit_test(test_random_boxes), cmocka_unit_test(test_spiral_against_swept_sphere),
-        cmocka_unit_test(test_dense_points), cmocka_unit_test(test_shaken_spheres),
-        cmocka_unit_test(test_source),       cmocka_unit_test(test_fan_that_goes_round_twice),
-        cmocka_unit_test(test_memory_limit), cmocka_unit_test(test_with_and_without_block),
+        cmocka_unit_test(test_two_spheres),   cmocka_unit_test(test_boxes_with_coplanar_faces),
+        cmocka_unit_test(test_random_boxes),  cmocka_unit_test(test_spiral_against_swept_sphere),
+        cmocka_unit_test(test_dense_points),  cmocka_unit_test(test_shaken_spheres),
+        cmocka_unit_test(test_source),        cmocka_unit_test(test_fan_that_goes_round_twice),
+        cmocka_unit_test(test_memory_limit),  cmocka_unit_test(test_with_and_without_block),
+        cmocka_unit_test(test_seam_vertices),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -8,10 +8,8 @@
 #include "sdm/memory.h"
 
 #define ALIGNMENT ((size_t)64)
-#define MANY_PAGES ((size_t)1 << 20)  // from here on the block is made of large pages,
-#define LARGE_BLOCK ((size_t)4 << 20) // which sdm_alloc() does for blocks of this size
-#define LARGEST_BLOCK                                                                                                  \
-    ((size_t)1 << 28) // beyond it every array has its own: pages are no matter, memory given back early is
+// beyond it every array has its own: there pages are no matter, memory given back early is
+#define LARGEST_BLOCK ((size_t)1 << 28)
 
 /* A block of its own; the array follows. */
 struct sdm_arena_extra {
@@ -22,7 +20,6 @@ sdm_status sdm_arena_reserve(sdm_arena *a, size_t bytes, sdm_error *err)
 {
     if (bytes > LARGEST_BLOCK) return SDM_OK;
     bytes = (bytes + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
-    if (bytes >= MANY_PAGES && bytes < LARGE_BLOCK) bytes = LARGE_BLOCK;
     const sdm_status s = sdm_alloc((void **)&a->block, bytes, 1, "preparation of a mesh", err);
     if (!s) a->end[SDM_HIGH].at = a->touched[SDM_HIGH] = bytes;
     return s;

@@ -1,5 +1,5 @@
 /* Memory of one preparation: a block from whose two ends arrays are taken, freed all at once. Pages cost more than what small structures
-   do with them, so a block of some size is made of large pages, and what is used in passing is used again. */
+   do with them: in one piece the allocator keeps them from one mesh to the next, and what is used in passing is used again. */
 #ifndef SDM_GEOM_ARENA_H
 #define SDM_GEOM_ARENA_H
 

@@ -2,7 +2,6 @@
 #include <float.h>
 #include <string.h>
 
-#include "sdm/memory.h"
 #include "survey.h"
 #include "vec3.h"
 
@@ -91,19 +90,22 @@ static void count_edges(const sdm_topology *topo, sdm_audit *a)
     a->inverted = a->closed && is_inside_out(a);
 }
 
-static sdm_status count_components(const sdm_topology *topo, sdm_audit *a, sdm_error *err)
+static sdm_status count_components(const sdm_topology *topo, sdm_arena *arena, sdm_audit *a, sdm_error *err)
 {
+    const sdm_arena_mark before = arena->end[SDM_HIGH];
     uint32_t *parent;
-    const sdm_status s = SDM_ALLOC(&parent, topo->n_tri, "components", err);
+    const sdm_status s = SDM_TAKE(arena, SDM_HIGH, &parent, topo->n_tri, "components", err);
     if (s) return s;
     for (size_t t = 0; t < topo->n_tri; t++) parent[t] = (uint32_t)t;
     for (size_t i = 0; i < topo->n_edges; i++)
         for (uint32_t h = topo->edges[i].first; topo->next[h] != SDM_NONE; h = topo->next[h])
             sdm_forest_join(parent, h / 3, topo->next[h] / 3);
     for (size_t t = 0; t < topo->n_tri; t++) a->components += parent[t] == t && !repeats_vertex(&topo->tri[3 * t]);
-    sdm_free(parent);
+    sdm_arena_release(arena, SDM_HIGH, before);
     return SDM_OK;
 }
+
+size_t sdm_survey_usual_bytes(const sdm_mesh *m) { return 320 * m->n_tri + 16 * m->n_vert; }
 
 /* What is made before contacts are looked for, scratch included: boxes and lists of half the size are usual. */
 static sdm_status take_memory(const sdm_mesh *m, sdm_budget *budget, size_t *scratch, sdm_error *err)
@@ -114,15 +116,17 @@ static sdm_status take_memory(const sdm_mesh *m, sdm_budget *budget, size_t *scr
     return sdm_budget_take(budget, bytes + *scratch, err);
 }
 
-sdm_status sdm_survey_build(const sdm_mesh *m, sdm_survey *s, sdm_budget *budget, sdm_error *err)
+sdm_status sdm_survey_build(const sdm_mesh *m, sdm_arena *arena, sdm_survey *s, sdm_budget *budget, sdm_error *err)
 {
     size_t scratch = 0;
     sdm_audit *a = &s->audit;
     sdm_status st = check_content(m, err);
     if (!st) st = take_memory(m, budget, &scratch, err);
-    if (!st) st = sdm_topology_build(m, &s->topo, err);
-    if (!st) st = sdm_bvh_build(m, &s->tree, err);
-    if (!st) st = SDM_ALLOC(&s->facets, m->n_tri, "normals of triangles", err);
+    s->start = arena->end[SDM_HIGH];
+    if (!st) st = sdm_topology_build(m, arena, &s->topo, err);
+    s->with_topology = arena->end[SDM_HIGH];
+    if (!st) st = sdm_bvh_build(m, arena, &s->tree, err);
+    if (!st) st = SDM_TAKE(arena, SDM_HIGH, &s->facets, m->n_tri, "normals of triangles", err);
     if (st) return st;
     a->n_vert = m->n_vert;
     a->n_tri = m->n_tri;
@@ -130,36 +134,29 @@ sdm_status sdm_survey_build(const sdm_mesh *m, sdm_survey *s, sdm_budget *budget
     measure(m, s);
     count_edges(&s->topo, a);
     count_duplicates(&s->topo, a);
-    st = count_components(&s->topo, a, err);
-    if (!st) st = sdm_contacts_find(m, &s->topo, &s->tree, s->facets, &s->contacts, budget, err);
+    st = count_components(&s->topo, arena, a, err);
+    if (!st) st = sdm_contacts_find(m, &s->topo, &s->tree, s->facets, arena, &s->contacts, budget, err);
     if (budget) budget->used -= scratch;
     a->self_intersections = s->contacts.crossing_pairs;
     return st;
 }
 
-void sdm_survey_shrink(sdm_survey *s, bool keep_topology)
+void sdm_survey_shrink(sdm_survey *s, sdm_arena *arena, bool keep_topology)
 {
-    if (!keep_topology) sdm_topology_dispose(&s->topo);
-    sdm_contacts_dispose(&s->contacts);
-    sdm_free(s->facets);
+    sdm_arena_release(arena, SDM_HIGH, keep_topology ? s->with_topology : s->start);
+    if (!keep_topology) s->topo = (sdm_topology){0};
+    s->contacts = (sdm_contacts){0};
     s->facets = NULL;
-}
-
-void sdm_survey_dispose(sdm_survey *s)
-{
-    sdm_topology_dispose(&s->topo);
-    sdm_bvh_dispose(&s->tree);
-    sdm_contacts_dispose(&s->contacts);
-    sdm_free(s->facets);
-    *s = (sdm_survey){0};
 }
 
 sdm_status sdm_mesh_audit(const sdm_mesh *m, sdm_audit *out, sdm_error *err)
 {
     if (!m || !out) return sdm_fail(err, SDM_E_ARG, "audit without a mesh or a place for the result");
     sdm_survey s = {0};
-    const sdm_status st = sdm_survey_build(m, &s, NULL, err);
+    sdm_arena arena = {0};
+    sdm_status st = sdm_arena_reserve(&arena, sdm_survey_usual_bytes(m), err);
+    if (!st) st = sdm_survey_build(m, &arena, &s, NULL, err);
     if (!st) *out = s.audit;
-    sdm_survey_dispose(&s);
+    sdm_arena_dispose(&arena);
     return st;
 }

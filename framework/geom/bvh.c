@@ -6,10 +6,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "sdm/memory.h"
-
 #define LEAF 4u
-#define MIDDLE_DEPTH 64 // below it nodes are halved in their order: bounds the depth of the tree
+#define FULL ((size_t)8) // small nodes are cut where they leave as many: clusters of the map are full then
+#define MIDDLE_DEPTH 64  // below it nodes are halved in their order: bounds the depth of the tree
 
 /* Middles are in units of the mesh's size: they only choose the splits, float is enough. */
 typedef struct item {
@@ -26,6 +25,19 @@ typedef struct builder {
     part *part;
     size_t n_part;
 } builder;
+
+/* As near to `left` as a multiple of FULL can be, in the order along an axis. */
+static size_t cut_to_full(item *list, size_t n, int axis, size_t left)
+{
+    for (size_t i = 1; i < n; i++) {
+        const item x = list[i];
+        size_t k = i;
+        for (; k > 0 && list[k - 1].middle[axis] > x.middle[axis]; k--) list[k] = list[k - 1];
+        list[k] = x;
+    }
+    const size_t full = (left + FULL / 2) / FULL * FULL;
+    return full < FULL ? FULL : full < n ? full : full - FULL;
+}
 
 /* Reorders list[n] into two parts and returns the size of the first, 0 < size < n. */
 static size_t split(const builder *w, item *list, size_t n, int depth)
@@ -54,6 +66,7 @@ static size_t split(const builder *w, item *list, size_t n, int depth)
         right += !is_left;
     }
     memcpy(list + left, w->spare, right * sizeof *list);
+    if (n > FULL && n <= 4 * FULL) return cut_to_full(list, n, axis, left);
     return left > 0 && left < n ? left : n / 2; // else all middles coincide
 }
 
@@ -76,6 +89,30 @@ static inline const double *corner(const sdm_mesh *m, size_t t, size_t k)
     return &m->vert[3 * (size_t)m->tri[3 * t + k]];
 }
 
+/* Where middles are measured from, and in what. */
+typedef struct units {
+    double origin[3], scale;
+} units;
+
+static units units_of(const double lo[3], const double hi[3])
+{
+    double size = 0;
+    for (int a = 0; a < 3; a++) size = fmax(size, hi[a] - lo[a]);
+    return (units){{lo[0], lo[1], lo[2]}, size > 0 && 1 / size < INFINITY ? 1 / size : 0};
+}
+
+static inline item item_of(const sdm_mesh *m, const units *u, size_t t)
+{
+    const double *v[3] = {corner(m, t, 0), corner(m, t, 1), corner(m, t, 2)};
+    item it = {.tri = (uint32_t)t};
+    for (int a = 0; a < 3; a++) {
+        const double low = v[0][a] < v[1][a] ? v[0][a] : v[1][a], high = v[0][a] < v[1][a] ? v[1][a] : v[0][a];
+        const double from = v[2][a] < low ? v[2][a] : low, to = v[2][a] > high ? v[2][a] : high;
+        it.middle[a] = (float)(((from - u->origin[a]) + (to - u->origin[a])) * u->scale);
+    }
+    return it;
+}
+
 static void fill_items(const sdm_mesh *m, item *list)
 {
     double lo[3] = {INFINITY, INFINITY, INFINITY}, hi[3] = {-INFINITY, -INFINITY, -INFINITY};
@@ -86,18 +123,8 @@ static void fill_items(const sdm_mesh *m, item *list)
             hi[a] = v[a] > hi[a] ? v[a] : hi[a];
         }
     }
-    double size = 0;
-    for (int a = 0; a < 3; a++) size = fmax(size, hi[a] - lo[a]);
-    const double scale = size > 0 && 1 / size < INFINITY ? 1 / size : 0;
-    for (size_t t = 0; t < m->n_tri; t++) {
-        const double *v[3] = {corner(m, t, 0), corner(m, t, 1), corner(m, t, 2)};
-        for (int a = 0; a < 3; a++) {
-            const double low = v[0][a] < v[1][a] ? v[0][a] : v[1][a], high = v[0][a] < v[1][a] ? v[1][a] : v[0][a];
-            const double from = v[2][a] < low ? v[2][a] : low, to = v[2][a] > high ? v[2][a] : high;
-            list[t].middle[a] = (float)(((from - lo[a]) + (to - lo[a])) * scale);
-        }
-        list[t].tri = (uint32_t)t;
-    }
+    const units u = units_of(lo, hi);
+    for (size_t t = 0; t < m->n_tri; t++) list[t] = item_of(m, &u, t);
 }
 
 static inline void join(double lo[3], double hi[3], const double other_lo[3], const double other_hi[3])
@@ -132,31 +159,97 @@ size_t sdm_bvh_bytes(size_t n_tri, size_t *scratch)
     return n_tri * (2 * sizeof(sdm_bvh_node) + sizeof(uint32_t));
 }
 
-sdm_status sdm_bvh_build(const sdm_mesh *m, sdm_bvh *b, sdm_error *err)
+static sdm_status start(builder *w, size_t n_tri, sdm_arena *arena, sdm_bvh *b, sdm_error *err)
 {
-    builder w = {0};
-    b->n_tri = m->n_tri;
-    sdm_status s = SDM_ALLOC(&w.item, m->n_tri, "tree", err);
-    if (!s) s = SDM_ALLOC(&w.spare, m->n_tri, "tree", err);
-    if (!s) s = SDM_ALLOC(&w.part, 2 * m->n_tri, "tree", err);
-    if (!s) s = SDM_ALLOC(&b->order, m->n_tri, "tree", err);
-    if (s) goto done;
-    fill_items(m, w.item);
-    w.n_part = 1;
-    build_part(&w, 0, 0, m->n_tri, 0);
-    b->n_node = w.n_part;
-    s = SDM_ALLOC(&b->node, b->n_node, "tree", err);
-    if (!s) fill_nodes(m, &w, b);
-done:
-    sdm_free(w.item);
-    sdm_free(w.spare);
-    sdm_free(w.part);
+    b->n_tri = n_tri;
+    w->n_part = 1;
+    sdm_status s = SDM_TAKE(arena, SDM_HIGH, &w->item, n_tri, "tree", err);
+    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &w->spare, n_tri, "tree", err);
+    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &w->part, 2 * n_tri, "tree", err);
+    return s ? s : SDM_TAKE(arena, SDM_LOW, &b->order, n_tri, "tree", err);
+}
+
+static sdm_status finish(const sdm_mesh *m, const builder *w, sdm_arena *arena, sdm_bvh *b, sdm_error *err)
+{
+    b->n_node = w->n_part;
+    const sdm_status s = SDM_TAKE(arena, SDM_LOW, &b->node, b->n_node, "tree", err);
+    if (!s) fill_nodes(m, w, b);
     return s;
 }
 
-void sdm_bvh_dispose(sdm_bvh *b)
+sdm_status sdm_bvh_build(const sdm_mesh *m, sdm_arena *arena, sdm_bvh *b, sdm_error *err)
 {
-    sdm_free(b->node);
-    sdm_free(b->order);
-    *b = (sdm_bvh){0};
+    const sdm_arena_mark before = arena->end[SDM_HIGH];
+    builder w = {0};
+    sdm_status s = start(&w, m->n_tri, arena, b, err);
+    if (!s) {
+        fill_items(m, w.item);
+        build_part(&w, 0, 0, m->n_tri, 0);
+        s = finish(m, &w, arena, b, err);
+    }
+    sdm_arena_release(arena, SDM_HIGH, before);
+    return s;
+}
+
+/* A mesh of pieces of the triangles of another. */
+typedef struct pieces {
+    const sdm_bvh *from;
+    const sdm_mesh *mesh;
+    units units;
+    uint32_t *first;   // [n_tri + 1] the pieces of triangle t of the other mesh are first[t] .. first[t + 1]
+    uint32_t *in_node; // [n_node] pieces below a node
+} pieces;
+
+static void count_pieces(const pieces *p, const uint32_t *source)
+{
+    const sdm_bvh *from = p->from;
+    for (size_t i = 0; i < p->mesh->n_tri; i++) p->first[source[i] + 1]++;
+    for (size_t t = 0; t < from->n_tri; t++) p->first[t + 1] += p->first[t];
+    for (size_t i = from->n_node; i-- > 0;) {
+        const sdm_bvh_node *n = &from->node[i];
+        if (!n->count) p->in_node[i] = p->in_node[n->first] + p->in_node[n->first + 1];
+        for (uint32_t k = n->first; k < n->first + n->count; k++)
+            p->in_node[i] += p->first[from->order[k] + 1] - p->first[from->order[k]];
+    }
+}
+
+/* The part of the tree below node `from`; its pieces come behind the first n of the order. */
+static void derive_part(builder *w, const pieces *p, uint32_t index, uint32_t from, size_t n, int depth)
+{
+    const sdm_bvh_node *node = &p->from->node[from];
+    // a node with pieces on one side only is that side
+    while (!node->count && (!p->in_node[node->first] || !p->in_node[node->first + 1]))
+        node = &p->from->node[node->first + !p->in_node[node->first]];
+    if (!node->count) {
+        const uint32_t child = (uint32_t)w->n_part, left = node->first;
+        w->n_part += 2;
+        w->part[index] = (part){child, 0};
+        derive_part(w, p, child, left, n, depth + 1);
+        derive_part(w, p, child + 1, left + 1, n + p->in_node[left], depth + 1);
+        return;
+    }
+    size_t end = n;
+    for (uint32_t k = node->first; k < node->first + node->count; k++) {
+        const uint32_t t = p->from->order[k];
+        for (uint32_t i = p->first[t]; i < p->first[t + 1]; i++) w->item[end++] = item_of(p->mesh, &p->units, i);
+    }
+    build_part(w, index, n, end - n, depth);
+}
+
+sdm_status sdm_bvh_derive(const sdm_bvh *from, const sdm_mesh *m, const uint32_t *source, sdm_arena *arena, sdm_bvh *b,
+                          sdm_error *err)
+{
+    const sdm_arena_mark before = arena->end[SDM_HIGH];
+    builder w = {0};
+    pieces p = {.from = from, .mesh = m, .units = units_of(from->node->lo, from->node->hi)};
+    sdm_status s = start(&w, m->n_tri, arena, b, err);
+    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &p.first, from->n_tri + 1, "tree", err);
+    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &p.in_node, from->n_node, "tree", err);
+    if (!s) {
+        count_pieces(&p, source);
+        derive_part(&w, &p, 0, 0, 0, 0);
+        s = finish(m, &w, arena, b, err);
+    }
+    sdm_arena_release(arena, SDM_HIGH, before);
+    return s;
 }

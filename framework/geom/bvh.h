@@ -2,6 +2,7 @@
 #ifndef SDM_GEOM_BVH_H
 #define SDM_GEOM_BVH_H
 
+#include "arena.h"
 #include "sdm/mesh.h"
 
 /* Deepest tree that can be built: what a traversal's stack must hold. */
@@ -23,9 +24,12 @@ typedef struct sdm_bvh {
 /* Bytes that a build takes at most: those that stay; to *scratch is added what is taken in passing. */
 size_t sdm_bvh_bytes(size_t n_tri, size_t *scratch);
 
-/* Splits in the middle of space; the same tree in every call. *b is zero-initialised; n_tri > 0. */
-sdm_status sdm_bvh_build(const sdm_mesh *m, sdm_bvh *b, sdm_error *err);
-void sdm_bvh_dispose(sdm_bvh *b);
+/* Splits in the middle of space; the same tree in every call. n_tri > 0. Taken from the low end of the arena. */
+sdm_status sdm_bvh_build(const sdm_mesh *m, sdm_arena *arena, sdm_bvh *b, sdm_error *err);
+/* The same for a mesh made of pieces of the triangles of the mesh of tree `from`, at less cost: piece i is of triangle source[i], which
+   never falls. */
+sdm_status sdm_bvh_derive(const sdm_bvh *from, const sdm_mesh *m, const uint32_t *source, sdm_arena *arena, sdm_bvh *b,
+                          sdm_error *err);
 
 /* Squared distance from p to a box. */
 static inline double sdm_bvh_box_distance2(const sdm_bvh_node *n, const double p[3])

@@ -139,6 +139,8 @@ static float clusters_of_block(const sdm_grid_job *job, const sdm_candidates *in
         const sdm_cluster_node *node = &f->node[c->node];
         double from[3];
         float sum = 0;
+        const char *group = (const char *)&f->group[node->group]; // for share_out()
+        for (size_t k = 0; k < 2 * sizeof(sdm_feature_group); k += 64) __builtin_prefetch(group + k);
         sdm_cluster_middle(&job->surface->tree.node[c->node], from);
         for (int a = 0; a < 3; a++) {
             c->shift[a] = (float)((middle[a] - from[a]) * f->scale);

@@ -15,6 +15,8 @@ typedef struct finder {
     const sdm_topology *topo;
     const sdm_facet *facets;
     sdm_contacts *out;
+    sdm_contact *list; // [cap], as they are found
+    size_t cap;
     sdm_budget *budget;
     sdm_error *err;
 } finder;
@@ -46,14 +48,14 @@ static sdm_status add(finder *w, sdm_contact c)
         return sdm_fail(
             w->err, SDM_E_MESH,
             "triangles of the mesh touch or cross each other more than %zu times: remove its duplicate layers", most);
-    if (out->n == out->cap) {
-        const size_t cap = out->cap ? 2 * out->cap : 256;
-        sdm_status s = sdm_budget_take(w->budget, (cap - out->cap) * sizeof *out->list, w->err);
-        if (!s) s = sdm_grow((void **)&out->list, out->n, cap, sizeof *out->list, "contacts", w->err);
+    if (out->n == w->cap) {
+        const size_t cap = w->cap ? 2 * w->cap : 256;
+        sdm_status s = sdm_budget_take(w->budget, (cap - w->cap) * sizeof *w->list, w->err);
+        if (!s) s = sdm_grow((void **)&w->list, out->n, cap, sizeof *w->list, "contacts", w->err);
         if (s) return s;
-        out->cap = cap;
+        w->cap = cap;
     }
-    out->list[out->n++] = c;
+    w->list[out->n++] = c;
     return SDM_OK;
 }
 
@@ -163,7 +165,7 @@ static sdm_status add_only_section(finder *w, const side *on, const side *other,
 {
     sdm_status s = add_section(w, on, other, met);
     if (s || !*met) return s;
-    sdm_contact c = w->out->list[w->out->n - 1];
+    sdm_contact c = w->list[w->out->n - 1];
     double x[3];
     c.tri = other->tri;
     c.other = on->tri;
@@ -259,42 +261,34 @@ static sdm_status visit_neighbours(void *user, uint32_t i, uint32_t j, int share
     return meet(w, i, j, shared);
 }
 
-static sdm_status sort_contacts(sdm_contacts *c, size_t n_tri, sdm_error *err)
+/* The contacts in the order of their triangles. */
+static sdm_status sort_contacts(const sdm_contact *list, size_t n_tri, sdm_arena *arena, sdm_contacts *c,
+                                sdm_error *err)
 {
-    sdm_contact *sorted = NULL;
-    sdm_status s = SDM_ALLOC(&c->first, n_tri + 1, "contacts", err);
-    if (!s) s = SDM_ALLOC(&sorted, c->n, "contacts", err);
+    sdm_status s = SDM_TAKE(arena, SDM_HIGH, &c->first, n_tri + 1, "contacts", err);
+    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &c->list, c->n, "contacts", err);
     if (s) return s;
-    for (size_t i = 0; i < c->n; i++) c->first[c->list[i].tri + 1]++;
+    for (size_t i = 0; i < c->n; i++) c->first[list[i].tri + 1]++;
     for (size_t t = 0; t < n_tri; t++) c->first[t + 1] += c->first[t];
-    for (size_t i = 0; i < c->n; i++) sorted[c->first[c->list[i].tri]++] = c->list[i];
+    for (size_t i = 0; i < c->n; i++) c->list[c->first[list[i].tri]++] = list[i];
     for (size_t t = n_tri; t > 0; t--) c->first[t] = c->first[t - 1];
     c->first[0] = 0;
-    sdm_free(c->list);
-    c->list = sorted;
-    c->cap = c->n;
     return SDM_OK;
 }
 
 sdm_status sdm_contacts_find(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree, const sdm_facet *facets,
-                             sdm_contacts *c, sdm_budget *budget, sdm_error *err)
+                             sdm_arena *arena, sdm_contacts *c, sdm_budget *budget, sdm_error *err)
 {
     double largest = 0;
     for (size_t i = 0; i < 3 * m->n_vert; i++) largest = fabs(m->vert[i]) > largest ? fabs(m->vert[i]) : largest;
     c->tolerance = 16 * DBL_EPSILON * largest;
-    finder w = {m, topo, facets, c, budget, err};
+    finder w = {.mesh = m, .topo = topo, .facets = facets, .out = c, .budget = budget, .err = err};
     sdm_status s = sdm_budget_take(budget, m->n_vert + sdm_pairs_bytes(tree), err);
-    if (!s) s = sdm_fans_visit(m, topo, facets, c->tolerance, visit_neighbours, &w, err);
-    if (!s) s = sdm_pairs_visit(m, topo, tree, c->tolerance, visit_apart, &w, err);
-    if (s) return s;
-    if (budget) budget->used -= m->n_vert + sdm_pairs_bytes(tree);
-    s = sdm_budget_take(budget, (m->n_tri + 1) * sizeof *c->first + c->n * sizeof *c->list, err);
-    return s ? s : sort_contacts(c, m->n_tri, err);
-}
-
-void sdm_contacts_dispose(sdm_contacts *c)
-{
-    sdm_free(c->list);
-    sdm_free(c->first);
-    *c = (sdm_contacts){0};
+    if (!s) s = sdm_fans_visit(m, topo, facets, c->tolerance, arena, visit_neighbours, &w, err);
+    if (!s) s = sdm_pairs_visit(m, topo, tree, c->tolerance, arena, visit_apart, &w, err);
+    if (!s && budget) budget->used -= m->n_vert + sdm_pairs_bytes(tree);
+    if (!s) s = sdm_budget_take(budget, (m->n_tri + 1) * sizeof *c->first + c->n * sizeof *c->list, err);
+    if (!s) s = sort_contacts(w.list, m->n_tri, arena, c, err);
+    sdm_free(w.list);
+    return s;
 }

@@ -24,16 +24,16 @@ typedef struct sdm_contact {
 typedef struct sdm_contacts {
     sdm_contact *list;
     uint32_t *first;
-    size_t n, cap;
+    size_t n;
     size_t crossing_pairs; /* pairs that share no vertex */
     double tolerance;      /* length below which two things coincide: a few roundings of the coordinates */
     double error;          /* largest distance by which a vertex was moved onto a plane */
 } sdm_contacts;
 
-/* facets[n_tri]; triangles that are not higher than the tolerance meet nothing. *c is zero-initialised; budget may be NULL. */
+/* facets[n_tri]; triangles that are not higher than the tolerance meet nothing. Taken from the high end of the arena. *c is
+   zero-initialised; budget may be NULL. */
 sdm_status sdm_contacts_find(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree, const sdm_facet *facets,
-                             sdm_contacts *c, sdm_budget *budget, sdm_error *err);
-void sdm_contacts_dispose(sdm_contacts *c);
+                             sdm_arena *arena, sdm_contacts *c, sdm_budget *budget, sdm_error *err);
 
 /* Position of x in the frame's plane, and back. */
 void sdm_frame_flatten(const sdm_frame *f, const double x[3], double xy[2]);

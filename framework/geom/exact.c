@@ -17,6 +17,7 @@
 struct sdm_exact {
     sdm_exact_opts opts;
     sdm_exact_report report;
+    sdm_arena arena;     // of the survey and of nearest
     sdm_mesh solid;      // the mesh as given, turned if it was inside out: the sign comes from it
     sdm_mesh surface;    // what distances are measured to
     uint32_t *source;    // [surface.n_tri] triangle of the given mesh
@@ -41,25 +42,33 @@ static double now_ms(void)
 
 static size_t mesh_bytes(const sdm_mesh *m) { return m->n_vert * 3 * sizeof *m->vert + m->n_tri * 3 * sizeof *m->tri; }
 
+static void drop_survey(sdm_exact *e, sdm_arena_mark low, sdm_arena_mark high)
+{
+    sdm_arena_release(&e->arena, SDM_LOW, low);
+    sdm_arena_release(&e->arena, SDM_HIGH, high);
+    e->survey = (sdm_survey){0};
+}
+
 static sdm_status survey_solid(sdm_exact *e, sdm_budget *budget, sdm_error *err)
 {
     const size_t used = budget->used;
-    sdm_status s = sdm_survey_build(&e->solid, &e->survey, budget, err);
+    const sdm_arena_mark low = e->arena.end[SDM_LOW], high = e->arena.end[SDM_HIGH];
+    sdm_status s = sdm_survey_build(&e->solid, &e->arena, &e->survey, budget, err);
     if (s) return s;
     e->report.audit = e->survey.audit;
     if (e->survey.audit.inverted) {
         // inside out: turn every triangle; the report keeps what was found
         for (size_t t = 0; t < e->solid.n_tri; t++) sdm_triangle_turn(&e->solid, t);
         e->report.turned = true;
-        sdm_survey_dispose(&e->survey);
+        drop_survey(e, low, high);
         budget->used = used;
-        s = sdm_survey_build(&e->solid, &e->survey, budget, err);
+        s = sdm_survey_build(&e->solid, &e->arena, &e->survey, budget, err);
     }
     if (!s) s = sdm_parts_turn(&e->solid, &e->survey, &e->report.parts_turned, err);
     if (s || !e->report.parts_turned) return s;
-    sdm_survey_dispose(&e->survey);
+    drop_survey(e, low, high);
     budget->used = used;
-    return sdm_survey_build(&e->solid, &e->survey, budget, err);
+    return sdm_survey_build(&e->solid, &e->arena, &e->survey, budget, err);
 }
 
 static sdm_status make_surface(sdm_exact *e, sdm_budget *budget, sdm_error *err)
@@ -67,7 +76,7 @@ static sdm_status make_surface(sdm_exact *e, sdm_budget *budget, sdm_error *err)
     const size_t used = budget->used;
     bool changed = false;
     if (e->survey.audit.closed && !e->opts.keep_overlap) {
-        const sdm_status s = sdm_union_hull(&e->solid, &e->survey, &e->surface, &e->source, &changed,
+        const sdm_status s = sdm_union_hull(&e->solid, &e->survey, &e->arena, &e->surface, &e->source, &changed,
                                             &e->report.union_error_mm, budget, err);
         if (s) return s;
         // sheets that cancel everywhere enclose nothing: distances are to the sheets
@@ -90,7 +99,7 @@ static sdm_status build_nearest(sdm_exact *e, sdm_budget *budget, sdm_error *err
 {
     const sdm_mesh *m = &e->surface;
     const bool keep_topology = !e->report.unioned || e->report.sign != SDM_SIGN_CROSSINGS;
-    sdm_survey_shrink(&e->survey, keep_topology);
+    sdm_survey_shrink(&e->survey, &e->arena, keep_topology);
     budget->used = 0;
     size_t scratch = 0, bytes = mesh_bytes(&e->solid) + mesh_bytes(m) + m->n_tri * sizeof *e->source;
     bytes += e->survey.tree.n_node * sizeof(sdm_bvh_node) + e->solid.n_tri * sizeof(uint32_t);
@@ -99,19 +108,29 @@ static sdm_status build_nearest(sdm_exact *e, sdm_budget *budget, sdm_error *err
     bytes += sdm_bvh_bytes(m->n_tri, &scratch) + m->n_tri * sizeof(sdm_frame);
     bytes += sdm_features_bytes(m->n_tri, m->n_vert, &scratch);
     sdm_status s = sdm_budget_take(budget, bytes + scratch, err);
-    if (s || !e->report.unioned) return s ? s : sdm_nearest_build(m, &e->survey.topo, &e->nearest, err);
+    if (s) return s;
+    if (!e->report.unioned) {
+        e->nearest.tree = e->survey.tree; // of the same triangles
+        return sdm_nearest_build(m, &e->survey.topo, &e->arena, &e->nearest, err);
+    }
+    const sdm_arena_mark before = e->arena.end[SDM_HIGH];
     sdm_topology topo = {0};
-    s = sdm_topology_build(m, &topo, err);
-    if (!s) s = sdm_nearest_build(m, &topo, &e->nearest, err);
-    sdm_topology_dispose(&topo);
+    s = sdm_bvh_derive(&e->survey.tree, m, e->source, &e->arena, &e->nearest.tree, err);
+    if (!s) s = sdm_topology_build(m, &e->arena, &topo, err);
+    if (!s) s = sdm_nearest_build(m, &topo, &e->arena, &e->nearest, err);
+    sdm_arena_release(&e->arena, SDM_HIGH, before);
     return s;
 }
+
+/* What a closed mesh takes with a few contacts. Guessed too low, arrays are allocated one by one. */
+static size_t usual_bytes(const sdm_mesh *m) { return 1080 * m->n_tri + 220 * m->n_vert; }
 
 static sdm_status prepare(sdm_exact *e, const sdm_mesh *mesh, sdm_error *err)
 {
     sdm_budget budget = {.limit = e->opts.memory_limit, .n_tri = mesh->n_tri};
     sdm_status s = sdm_budget_take(&budget, mesh_bytes(mesh), err);
     if (!s) s = sdm_mesh_copy(mesh, &e->solid, err);
+    if (!s && !budget.limit) s = sdm_arena_reserve(&e->arena, usual_bytes(mesh), err);
     if (!s) s = survey_solid(e, &budget, err);
     if (!s) s = sdm_sign_choose(&e->report.audit, e->opts.sign, &e->report.sign, err);
     if (!s) s = make_surface(e, &budget, err);
@@ -155,9 +174,8 @@ void sdm_exact_free(sdm_exact *e)
     sdm_mesh_dispose(&e->solid);
     sdm_mesh_dispose(&e->surface);
     sdm_free(e->source);
-    sdm_survey_dispose(&e->survey);
-    sdm_nearest_dispose(&e->nearest);
     sdm_sign_dispose(&e->sign);
+    sdm_arena_dispose(&e->arena);
     sdm_free(e);
 }
 

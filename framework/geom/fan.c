@@ -2,7 +2,6 @@
    vertex once, as seen along that direction, its triangles lie side by side: no two of them meet but in what they share. */
 #include "fan.h"
 
-#include "sdm/memory.h"
 #include "vec3.h"
 
 /* Cosine of the largest angle between a normal and their mean, and the least height over longest edge: far from doubt. */
@@ -82,16 +81,17 @@ static sdm_status visit_pairs(const fan *w, const bool *disc, uint32_t v,
 }
 
 sdm_status sdm_fans_visit(const sdm_mesh *m, const sdm_topology *topo, const sdm_facet *facets, double tolerance,
-                          sdm_status (*visit)(void *user, uint32_t i, uint32_t j, int shared), void *user,
-                          sdm_error *err)
+                          sdm_arena *arena, sdm_status (*visit)(void *user, uint32_t i, uint32_t j, int shared),
+                          void *user, sdm_error *err)
 {
+    const sdm_arena_mark before = arena->end[SDM_HIGH];
     const fan w = {m, topo, facets, tolerance / SOUND};
     bool *disc;
-    sdm_status s = SDM_ALLOC(&disc, m->n_vert, "vertices", err);
+    sdm_status s = SDM_TAKE(arena, SDM_HIGH, &disc, m->n_vert, "vertices", err);
     if (s) return s;
     for (uint32_t v = 0; v < m->n_vert; v++) disc[v] = is_disc(&w, v);
     for (uint32_t v = 0; v < m->n_vert && !s; v++)
         if (!disc[v]) s = visit_pairs(&w, disc, v, visit, user);
-    sdm_free(disc);
+    sdm_arena_release(arena, SDM_HIGH, before);
     return s;
 }

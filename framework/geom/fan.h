@@ -9,7 +9,7 @@
    vertex whose triangles make up a disc that is seen from one side without overlap; stops at the first status that is not
    SDM_OK and returns it. Triangles with a repeated vertex are left out. */
 sdm_status sdm_fans_visit(const sdm_mesh *m, const sdm_topology *topo, const sdm_facet *facets, double tolerance,
-                          sdm_status (*visit)(void *user, uint32_t i, uint32_t j, int shared), void *user,
-                          sdm_error *err);
+                          sdm_arena *arena, sdm_status (*visit)(void *user, uint32_t i, uint32_t j, int shared),
+                          void *user, sdm_error *err);
 
 #endif

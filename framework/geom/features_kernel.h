@@ -89,32 +89,25 @@ static inline v8f beyond_edge(const sdm_feature_row *r, const float4 *low, v8f a
     return v8_max(v8_abs(along) - v8_all(end), v8_max(function8(r, 1, low->of[1], p), function8(r, 2, low->of[2], p)));
 }
 
-/* How far eight points are from a feature, and the unit vectors from it to them. */
-typedef struct sight8 {
-    v8f d;
-    point8 g;
-} sight8;
-
-static inline sight8 see_face(const sdm_feature_row *r, point8 p)
+/* x: from the corner to eight points. */
+static inline v8f beyond_corner(const sdm_corner_row *k, point8 x)
 {
-    const v8f z = function8(r, 3, r->offset[3], p);
-    const point8 n = p8_all(r->g[0][3], r->g[1][3], r->g[2][3]);
-    return (sight8){v8_abs(z), {v8_turn(n.x, z), v8_turn(n.y, z), v8_turn(n.z, z)}};
+    v8f most = v8_all(-INFINITY);
+    for (int j = 0; j < SDM_CORNER_EDGES; j++)
+        most = v8_max(most, p8_dot(p8_all(k->along[0][j], k->along[1][j], k->along[2][j]), x));
+    return most;
 }
 
-static inline sight8 see_point(point8 x, point8 p)
+/* The same of parts around the points, less what it changes to their corners. */
+static inline v8f beyond_corner_part(const sdm_grid_parts *q, bool aligned, const sdm_corner_row *k, float error,
+                                     point8 x)
 {
-    sight8 s;
-    s.d = length8(p8_sub(p, x), &s.g);
-    return s;
-}
-
-static inline sight8 see_edge(const sdm_feature_row *r, v8f along, point8 p)
-{
-    const point8 w = p8_sub(p, point_of(r));
-    sight8 s;
-    s.d = length8(p8_sub(w, p8_scale(p8_all(r->g[0][0], r->g[1][0], r->g[2][0]), along)), &s.g);
-    return s;
+    _Alignas(32) float reach[8];
+    v8_store(reach, extent(q, aligned, p8_load(k->along)) + v8_all(error));
+    v8f most = v8_all(-INFINITY);
+    for (int j = 0; j < SDM_CORNER_EDGES; j++)
+        most = v8_max(most, p8_linear(p8_all(k->along[0][j], k->along[1][j], k->along[2][j]), x, v8_all(-reach[j])));
+    return most;
 }
 
 #endif

@@ -67,11 +67,6 @@ typedef struct sdm_candidates {
     size_t begin[SDM_FEATURE_KINDS], end[SDM_FEATURE_KINDS];
 } sdm_candidates;
 
-/* A feature as eight vectors see it: how far it is from their middles, in which direction these lie from it. */
-typedef struct sdm_sight {
-    _Alignas(32) float d[8], g[3][8];
-} sdm_sight;
-
 /* Scratch of one thread. hit: the parts that a thing concerns, see list_hits(). */
 typedef struct sdm_grid_scratch {
     /* clusters of the box at hand */
@@ -80,23 +75,24 @@ typedef struct sdm_grid_scratch {
     sdm_candidates block[8];
     sdm_cluster_ref *cluster; /* of the block at hand */
     size_t n_cluster, cluster_cap;
-    /* features of the block at hand, relative to its middle; of a corner g[.][3] is the corner */
-    sdm_feature_row *row;
+    /* features of the block at hand */
     uint32_t *number, *from; /* from: place of the feature's cluster in cluster[] */
+    size_t block_cap;
+    sdm_feature_row *row; /* relative to its middle; of a corner g[.][3] is the corner */
     uint8_t *row_hit;
     sdm_candidates tile[8];
     size_t row_cap;
     /* features of the tile at hand, as in its list */
-    sdm_sight *sight;
     uint8_t *hit;
     sdm_candidates vector[8];
     float (*value)[8]; /* squared distances of the candidates of a vector, as in its list */
     size_t tile_cap;
 } sdm_grid_scratch;
 
-/* Room for `cap` clusters of a box, features of a block, of a tile. limit: of bytes, 0: none. */
+/* Room for `cap` clusters of a box, features of the clusters of a block, of a block, of a tile. limit: of bytes, 0: none. */
 sdm_status sdm_grid_scratch_box(sdm_grid_scratch *s, size_t cap, sdm_error *err);
 sdm_status sdm_grid_scratch_block(sdm_grid_scratch *s, size_t cap, size_t limit, sdm_error *err);
+sdm_status sdm_grid_scratch_rows(sdm_grid_scratch *s, size_t cap, size_t limit, sdm_error *err);
 sdm_status sdm_grid_scratch_tile(sdm_grid_scratch *s, size_t cap, size_t limit, sdm_error *err);
 void sdm_grid_scratch_dispose(sdm_grid_scratch *s);
 

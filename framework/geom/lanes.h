@@ -7,6 +7,8 @@
 #include <string.h>
 #if defined(__AVX2__) && defined(__FMA__)
 #include <immintrin.h>
+#elif defined(__SSE2__)
+#include <emmintrin.h>
 #endif
 
 typedef float v8f __attribute__((vector_size(32)));
@@ -48,7 +50,6 @@ static inline v8f v8_rsqrt(v8f a) { return (v8f)_mm256_rsqrt_ps((__m256)a); }
 static inline v8f v8_fma(v8f a, v8f b, v8f c) { return (v8f)_mm256_fmadd_ps((__m256)a, (__m256)b, (__m256)c); }
 static inline v4f f4_fma(v4f a, v4f b, v4f c) { return (v4f)_mm_fmadd_ps((__m128)a, (__m128)b, (__m128)c); }
 /* x where m is set, else y */
-static inline v8f v8_select(v8i m, v8f x, v8f y) { return (v8f)_mm256_blendv_ps((__m256)y, (__m256)x, (__m256)m); }
 static inline v8i v8_select_i(v8i m, v8i x, v8i y)
 {
     return (v8i)_mm256_blendv_epi8((__m256i)y, (__m256i)x, (__m256i)m);
@@ -59,11 +60,6 @@ static inline v8f v8_signed(v8f m, v8f x, v8f y) { return (v8f)_mm256_blendv_ps(
 static inline int v8_greater(v8f a, v8f b)
 {
     return _mm256_movemask_ps(_mm256_cmp_ps((__m256)a, (__m256)b, _CMP_GT_OQ));
-}
-/* Turns the sign of a where that of m is set. */
-static inline v8f v8_turn(v8f a, v8f m)
-{
-    return (v8f)_mm256_xor_ps((__m256)a, _mm256_and_ps((__m256)m, _mm256_set1_ps(-0.0f)));
 }
 /* Writes the lanes named by order[8] to out[8]. */
 static inline void v8_permute(uint32_t *out, v8i a, const uint8_t *order)
@@ -105,7 +101,6 @@ static inline int v8_greater(v8f a, v8f b)
     for (int i = 0; i < 8; i++) bits |= (m[i] & 1) << i;
     return bits;
 }
-static inline v8f v8_turn(v8f a, v8f m) { return (v8f)((v8i)a ^ ((v8i)m & INT32_MIN)); }
 static inline void v8_permute(uint32_t *out, v8i a, const uint8_t *order)
 {
     for (int i = 0; i < 8; i++) out[i] = (uint32_t)a[order[i]];
@@ -123,6 +118,27 @@ static inline void v4_transpose(v4d r[4])
     memcpy(r, a, sizeof a);
 }
 #endif
+
+#if defined(__SSE2__)
+/* Rounded to float. */
+static inline v4f f4_round(v4d x)
+{
+    double d[4];
+    memcpy(d, &x, sizeof d);
+    return (v4f)_mm_movelh_ps(_mm_cvtpd_ps(_mm_loadu_pd(d)), _mm_cvtpd_ps(_mm_loadu_pd(d + 2)));
+}
+static inline void f4_transpose(v4f r[4]) { _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]); }
+#else
+static inline v4f f4_round(v4d x) { return __builtin_convertvector(x, v4f); }
+static inline void f4_transpose(v4f r[4])
+{
+    v4f a[4];
+    for (int i = 0; i < 4; i++)
+        for (int j = 0; j < 4; j++) a[i][j] = r[j][i];
+    memcpy(r, a, sizeof a);
+}
+#endif
+static inline v4d v4_from(v4f x) { return __builtin_convertvector(x, v4d); }
 
 /* Eight points or vectors. */
 typedef struct point8 {

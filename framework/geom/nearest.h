@@ -11,9 +11,9 @@ typedef struct sdm_nearest {
     sdm_features features; /* for many points at once */
 } sdm_nearest;
 
-/* topo: of m. *n is zero-initialised; sdm_nearest_dispose() frees it, also after an error. */
-sdm_status sdm_nearest_build(const sdm_mesh *m, const sdm_topology *topo, sdm_nearest *n, sdm_error *err);
-void sdm_nearest_dispose(sdm_nearest *n);
+/* topo: of m, n->tree: its tree. The rest is taken from the low end of the arena. */
+sdm_status sdm_nearest_build(const sdm_mesh *m, const sdm_topology *topo, sdm_arena *arena, sdm_nearest *n,
+                             sdm_error *err);
 
 /* Squared distance from x to the nearest triangle with a squared distance below `bound`; then *slot, q and *feature are set, else
    `bound` is returned and nothing is written. */

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "pair_kernel.h"
-#include "sdm/memory.h"
 
 #define OUTWARDS 0x1p-22f // twice the rounding of a number between 0 and 1, and then some
 
@@ -171,14 +170,16 @@ size_t sdm_pairs_bytes(const sdm_bvh *tree)
 }
 
 sdm_status sdm_pairs_visit(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree, double slack,
-                           sdm_status (*visit)(void *user, uint32_t i, uint32_t j), void *user, sdm_error *err)
+                           sdm_arena *arena, sdm_status (*visit)(void *user, uint32_t i, uint32_t j), void *user,
+                           sdm_error *err)
 {
+    const sdm_arena_mark before = arena->end[SDM_HIGH];
     pairing w = {.tree = tree->node, .visit = visit, .user = user};
     uint32_t *place;
     const size_t n_leaf = (tree->n_node + 1) / 2;
-    sdm_status s = SDM_ALLOC(&place, tree->n_node, "pairs of triangles", err);
-    if (!s) s = SDM_ALLOC(&w.leaves, n_leaf, "pairs of triangles", err);
-    if (!s) s = SDM_ALLOC(&w.nodes, n_leaf, "pairs of triangles", err);
+    sdm_status s = SDM_TAKE(arena, SDM_HIGH, &place, tree->n_node, "pairs of triangles", err);
+    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &w.leaves, n_leaf, "pairs of triangles", err);
+    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &w.nodes, n_leaf, "pairs of triangles", err);
     if (!s) {
         const scaling r = scaling_of(tree->node, slack);
         uint32_t leaves = 0, nodes = 0;
@@ -193,8 +194,6 @@ sdm_status sdm_pairs_visit(const sdm_mesh *m, const sdm_topology *topo, const sd
         w.place = place;
         s = walk(&w);
     }
-    sdm_free(place);
-    sdm_free(w.leaves);
-    sdm_free(w.nodes);
+    sdm_arena_release(arena, SDM_HIGH, before);
     return s;
 }

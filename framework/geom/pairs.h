@@ -11,6 +11,7 @@ size_t sdm_pairs_bytes(const sdm_bvh *tree);
 /* Calls visit(user, i, j) for every pair of triangles (mesh indices) that share no vertex and whose boxes, made larger by
    `slack`, overlap; stops at the first status that is not SDM_OK and returns it. */
 sdm_status sdm_pairs_visit(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree, double slack,
-                           sdm_status (*visit)(void *user, uint32_t i, uint32_t j), void *user, sdm_error *err);
+                           sdm_arena *arena, sdm_status (*visit)(void *user, uint32_t i, uint32_t j), void *user,
+                           sdm_error *err);
 
 #endif

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "sdm/memory.h"
+#include "lanes.h"
 #include "vec3.h"
 
 // a face lower than this share of its length has no reliable direction into it from an edge
@@ -16,6 +16,7 @@ typedef struct builder {
     const sdm_topology *topo;
     const sdm_frame *frames;
     const sdm_bvh *tree;
+    sdm_arena *arena;
     sdm_features *f;
     uint32_t *slot_of; /* [n_tri] slot of a triangle */
     uint32_t *edge;    /* [n_edges] number of an edge of the topology */
@@ -27,113 +28,116 @@ typedef struct builder {
 
 static const double *vertex(const builder *b, size_t v) { return &b->m->vert[3 * v]; }
 
-/* Function k of a face or edge: the distance in direction g from `through`. */
-static void set_function(const builder *b, uint32_t number, int k, const double g[3], const double through[3])
+/* Four linear functions at once: of lane k the gradient, and a point where it is 0. */
+typedef struct functions {
+    v4d g[3], through[3];
+} functions;
+
+static inline void set_functions(const builder *b, sdm_feature_row *row, const functions *f)
 {
-    sdm_feature_row *row = &b->f->row[number];
-    double sum = 0;
+    v4d sum = v4_all(0);
     for (int i = 0; i < 3; i++) {
-        row->g[i][k] = (float)g[i];
-        sum += (double)row->g[i][k] * (b->middle[i] - through[i]);
+        const v4f g = f4_round(f->g[i]);
+        sum += v4_from(g) * (v4_all(b->middle[i]) - f->through[i]);
+        f4_store(row->g[i], g);
     }
-    row->offset[k] = (float)(sum * b->f->scale);
+    f4_store(row->offset, f4_round(sum * v4_all(b->f->scale)));
 }
 
-/* Outward across edge k of the frame, in the plane. */
-static void across(const sdm_frame *t, int k, double g[3])
+/* The distances outward from a rectangle around a face, in its plane. */
+static void set_thin(const builder *b, sdm_feature_row *row, const sdm_frame *t, const double end[3])
 {
-    const double ex[3] = {1, t->e1x, t->e2x}, ey[3] = {0, t->e1y, t->e2y};
-    for (int i = 0; i < 3; i++) g[i] = ey[k] * t->u[i] - ex[k] * t->v[i];
-}
-
-static void set_thin(const builder *b, uint32_t number, const sdm_frame *t, const double end[3])
-{
-    double g[3], above[3];
-    set_function(b, number, 0, t->u, end);
-    for (int i = 0; i < 3; i++) g[i] = -t->u[i];
-    set_function(b, number, 1, g, t->a);
-    for (int i = 0; i < 3; i++) g[i] = -t->v[i];
-    set_function(b, number, 2, g, t->a);
-    v3_along(t->a, sdm_frame_height(t), t->v, above);
-    set_function(b, number, 3, t->v, above);
+    functions f;
+    const double height = sdm_frame_height(t);
+    for (int i = 0; i < 3; i++) {
+        f.g[i] = (v4d){t->u[i], -t->u[i], -t->v[i], t->v[i]};
+        f.through[i] = (v4d){end[i], t->a[i], t->a[i], t->a[i] + height * t->v[i]};
+    }
+    set_functions(b, row, &f);
 }
 
 static void add_face(const builder *b, uint32_t slot, sdm_cluster_node *node)
 {
     const sdm_frame *t = &b->frames[slot];
     sdm_feature *x = &b->f->exact[slot];
+    sdm_feature_row *row = &b->f->row[slot];
     const double length = 2 * t->half[0];
-    double g[3], end[3];
+    double end[3];
     b->f->owner[slot] = slot;
     memcpy(x->a, t->a, sizeof x->a);
     memcpy(x->u, t->n, sizeof x->u);
     x->face = -1;
     v3_along(t->a, length, t->u, end);
     if (t->flat != 0) {
-        b->f->row[slot].offset[0] = INFINITY;
+        row->offset[0] = INFINITY;
         return;
     }
     if (sdm_frame_height(t) < (double)THIN * length) {
-        set_thin(b, slot, t, end);
+        set_thin(b, row, t, end);
         node->thin |= 1u << (slot - node->first);
         b->f->any_thin = true;
         return;
     }
-    for (int k = 0; k < 3; k++) {
-        across(t, k, g);
-        // edges 0 and 2 pass through a, edge 1 through the end of edge 0
-        set_function(b, slot, k, g, k == 1 ? end : t->a);
+    // outward across the edges; edges 0 and 2 pass through a, edge 1 through the end of edge 0
+    functions f;
+    for (int i = 0; i < 3; i++) {
+        const double u = t->u[i], v = t->v[i];
+        f.g[i] = (v4d){-v, t->e1y * u - t->e1x * v, t->e2y * u - t->e2x * v, t->n[i]};
+        f.through[i] = (v4d){t->a[i], end[i], t->a[i], t->a[i]};
     }
-    set_function(b, slot, 3, t->n, t->a);
+    set_functions(b, row, &f);
 }
 
-/* The edge from x to y; returns its middle. */
-static void add_segment(const builder *b, uint32_t number, const double x[3], const double y[3], double middle[3])
+/* Into the faces of an edge, across it: up to two; 0 where there is none. */
+static void find_sides(const builder *b, const sdm_edge *e, double side[2][3])
+{
+    int n = 0;
+    for (uint32_t h = e->first; h != SDM_NONE && n < 2; h = b->topo->next[h]) {
+        const sdm_frame *t = &b->frames[b->slot_of[h / 3]];
+        if (t->flat != 0 || !(sdm_frame_height(t) > LOWEST * 2 * t->half[0])) continue;
+        const int k = (int)((h % 3 + 3 - (uint32_t)t->rotation) % 3);
+        const double ex = k == 0 ? 1 : k == 1 ? t->e1x : t->e2x, ey = k == 0 ? 0 : k == 1 ? t->e1y : t->e2y;
+        for (int i = 0; i < 3; i++) side[n][i] = ex * t->v[i] - ey * t->u[i];
+        n++;
+    }
+}
+
+/* The edge from x to y; e: of the topology, NULL for that of a triangle with a repeated vertex. */
+static void add_segment(const builder *b, uint32_t number, const double x[3], const double y[3], const sdm_edge *e)
 {
     sdm_features *f = b->f;
     sdm_feature *exact = &f->exact[number];
     sdm_feature_row *row = &f->row[number];
-    double w[3];
+    double w[3], side[2][3] = {{0}};
+    functions k;
+    for (int i = 0; i < 3; i++) w[i] = (y[i] - x[i]) * f->scale;
+    const double length = v3_norm(w);
+    if (e) find_sides(b, e, side);
     for (int i = 0; i < 3; i++) {
         exact->a[i] = x[i];
-        w[i] = (y[i] - x[i]) * f->scale;
-        middle[i] = 0.5 * x[i] + 0.5 * y[i];
-    }
-    const double length = v3_norm(w);
-    for (int i = 0; i < 3; i++) {
         exact->u[i] = length > 0 ? w[i] / length : 0;
-        row->g[i][3] = (float)((middle[i] - b->middle[i]) * f->scale);
+        k.g[i] = (v4d){exact->u[i], side[0][i], side[1][i], 0};
+        k.through[i] = v4_all(0.5 * x[i] + 0.5 * y[i]);
     }
     exact->length = length / f->scale;
-    set_function(b, number, 0, exact->u, middle);
+    set_functions(b, row, &k);
+    for (int i = 0; i < 3; i++) row->g[i][3] = (float)((k.through[i][0] - b->middle[i]) * f->scale);
     row->offset[3] = (float)(0.5 * length);
 }
 
-/* The conditions of up to two of the faces of an edge; missing ones stay 0 <= 0. */
-static void add_sides(const builder *b, const sdm_edge *e, uint32_t number, const double middle[3])
-{
-    int k = 1;
-    for (uint32_t h = e->first; h != SDM_NONE && k < 3; h = b->topo->next[h]) {
-        const sdm_frame *t = &b->frames[b->slot_of[h / 3]];
-        const int i = (int)((h % 3 + 3 - (uint32_t)t->rotation) % 3);
-        if (t->flat != 0 || !(sdm_frame_height(t) > LOWEST * 2 * t->half[0])) continue;
-        double g[3];
-        across(t, i, g);
-        for (int c = 0; c < 3; c++) g[c] = -g[c];
-        set_function(b, number, k++, g, middle);
-    }
-}
-
-static void add_direction(const builder *b, uint32_t corner, const double u[3], float sign)
+static void add_direction(const builder *b, uint32_t corner, const double u[3], double sign)
 {
     const uint32_t at = corner - b->f->corner_base;
     sdm_corner_row *c = &b->f->corner[at];
-    if (b->count[at] == SDM_CORNER_EDGES) return;
-    // the first one fills all
-    const int end = b->count[at] ? b->count[at] + 1 : SDM_CORNER_EDGES;
-    for (int k = b->count[at]; k < end; k++)
-        for (int i = 0; i < 3; i++) c->along[i][k] = sign * (float)u[i];
+    const uint8_t k = b->count[at];
+    if (k == SDM_CORNER_EDGES) return;
     b->count[at]++;
+    for (int i = 0; i < 3; i++) {
+        const float g = (float)(sign * u[i]);
+        // the first one fills all
+        if (!k) v8_store(c->along[i], v8_all(g));
+        c->along[i][k] = g;
+    }
 }
 
 static void add_corner(const builder *b, uint32_t number, const double x[3])
@@ -150,7 +154,6 @@ static void add_edges_and_corners(const builder *b, uint32_t slot, sdm_cluster_n
     sdm_features *f = b->f;
     const size_t t = b->tree->order[slot];
     const uint32_t *v = &b->topo->tri[3 * t];
-    double middle[3];
     for (int k = 0; k < 3; k++) {
         if (b->corner[v[k]] == SDM_NONE) {
             const uint32_t number = b->corner[v[k]] = node->corner_end++;
@@ -166,7 +169,7 @@ static void add_edges_and_corners(const builder *b, uint32_t slot, sdm_cluster_n
         v3_along(x->a, 2 * x->half[0], x->u, end);
         f->owner[number] = slot;
         for (int k = 0; k < 3; k++) f->of_slot[slot][k] = number;
-        add_segment(b, number, x->a, end, middle);
+        add_segment(b, number, x->a, end, NULL);
         return;
     }
     for (int k = 0; k < 3; k++) {
@@ -174,8 +177,7 @@ static void add_edges_and_corners(const builder *b, uint32_t slot, sdm_cluster_n
         if (b->edge[i] == SDM_NONE) {
             const sdm_edge *e = &b->topo->edges[i];
             const uint32_t number = b->edge[i] = node->edge_end++;
-            add_segment(b, number, vertex(b, e->lo), vertex(b, e->hi), middle);
-            add_sides(b, e, number, middle);
+            add_segment(b, number, vertex(b, e->lo), vertex(b, e->hi), e);
             add_direction(b, b->corner[e->lo], f->exact[number].u, 1);
             add_direction(b, b->corner[e->hi], f->exact[number].u, -1);
         }
@@ -271,22 +273,25 @@ static void fill_clusters(builder *b)
 static void fill_groups(const sdm_features *f, uint32_t from, uint32_t to, sdm_feature_group *out)
 {
     for (; from < to; from += 8, out++) {
-        for (uint32_t lane = 0; lane < 8; lane++) {
-            out->offset[0][lane] = INFINITY;
-            if (from + lane >= to) continue;
-            const sdm_feature_row *row = &f->row[from + lane];
-            for (int k = 0; k < 4; k++) {
-                for (int a = 0; a < 3; a++) out->g[k][a][lane] = row->g[a][k];
-                out->offset[k][lane] = row->offset[k];
+        const uint32_t last = to - 1; // stands in empty lanes
+        for (uint32_t lane = 0; lane < 8; lane += 4) {
+            const sdm_feature_row *row[4];
+            for (uint32_t i = 0; i < 4; i++) row[i] = &f->row[from + lane + i < to ? from + lane + i : last];
+            for (int a = 0; a < 4; a++) {
+                v4f x[4];
+                for (int i = 0; i < 4; i++) x[i] = f4_load(a < 3 ? row[i]->g[a] : row[i]->offset);
+                f4_transpose(x);
+                for (int k = 0; k < 4; k++) f4_store(a < 3 ? &out->g[k][a][lane] : &out->offset[k][lane], x[k]);
             }
         }
+        for (uint32_t lane = to - from; lane < 8; lane++) out->offset[0][lane] = INFINITY;
     }
 }
 
 static sdm_status add_groups(const builder *b, sdm_error *err)
 {
     sdm_features *f = b->f;
-    const sdm_status s = SDM_ALLOC(&f->group, b->n_group, "features", err);
+    const sdm_status s = SDM_TAKE(b->arena, SDM_LOW, &f->group, b->n_group, "features", err);
     for (size_t i = 0; i < b->tree->n_node && !s; i++) {
         const sdm_cluster_node *node = &f->node[i];
         // others are below a cluster
@@ -301,17 +306,17 @@ static sdm_status allocate(builder *b, sdm_error *err)
 {
     sdm_features *f = b->f;
     const size_t n = b->m->n_tri, n_vert = b->m->n_vert;
-    sdm_status s = SDM_ALLOC(&b->slot_of, n, "features", err);
-    if (!s) s = SDM_ALLOC(&b->edge, b->topo->n_edges, "features", err);
-    if (!s) s = SDM_ALLOC(&b->corner, n_vert, "features", err);
-    if (!s) s = SDM_ALLOC(&b->count, n_vert, "features", err);
-    if (!s) s = SDM_ALLOC(&f->node, b->tree->n_node, "features", err);
-    if (!s) s = SDM_ALLOC(&f->centroid, n, "features", err);
-    if (!s) s = SDM_ALLOC(&f->row, f->corner_base, "features", err);
-    if (!s) s = SDM_ALLOC(&f->corner, n_vert, "features", err);
-    if (!s) s = SDM_ALLOC(&f->exact, f->corner_base + n_vert, "features", err);
-    if (!s) s = SDM_ALLOC(&f->of_slot, n, "features", err);
-    if (!s) s = SDM_ALLOC(&f->owner, f->corner_base + n_vert, "features", err);
+    sdm_status s = SDM_TAKE(b->arena, SDM_HIGH, &b->slot_of, n, "features", err);
+    if (!s) s = SDM_TAKE(b->arena, SDM_HIGH, &b->edge, b->topo->n_edges, "features", err);
+    if (!s) s = SDM_TAKE(b->arena, SDM_HIGH, &b->corner, n_vert, "features", err);
+    if (!s) s = SDM_TAKE(b->arena, SDM_HIGH, &b->count, n_vert, "features", err);
+    if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->node, b->tree->n_node, "features", err);
+    if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->centroid, n, "features", err);
+    if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->row, f->corner_base, "features", err);
+    if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->corner, n_vert, "features", err);
+    if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->exact, f->corner_base + n_vert, "features", err);
+    if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->of_slot, n, "features", err);
+    if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->owner, f->corner_base + n_vert, "features", err);
     if (s) return s;
     memset(b->edge, 0xff, b->topo->n_edges * sizeof *b->edge);
     memset(b->corner, 0xff, n_vert * sizeof *b->corner);
@@ -332,10 +337,11 @@ size_t sdm_features_bytes(size_t n_tri, size_t n_vert, size_t *scratch)
 }
 
 sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const sdm_frame *frames, const sdm_bvh *tree,
-                              sdm_features *f, sdm_error *err)
+                              sdm_arena *arena, sdm_features *f, sdm_error *err)
 {
     const size_t n = m->n_tri;
-    builder b = {.m = m, .topo = topo, .frames = frames, .tree = tree, .f = f};
+    builder b = {.m = m, .topo = topo, .frames = frames, .tree = tree, .arena = arena, .f = f};
+    const sdm_arena_mark before = arena->end[SDM_HIGH];
     size_t segments = 0;
     for (size_t t = 0; t < n; t++) segments += topo->edge[3 * t] == SDM_NONE;
     if (n + segments + topo->n_edges + m->n_vert >= SDM_NONE / 2) // the kernels count in 32 bits with a sign
@@ -350,22 +356,6 @@ sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const
         fill_clusters(&b);
         s = add_groups(&b, err);
     }
-    sdm_free(b.slot_of);
-    sdm_free(b.edge);
-    sdm_free(b.corner);
-    sdm_free(b.count);
+    sdm_arena_release(arena, SDM_HIGH, before);
     return s;
-}
-
-void sdm_features_dispose(sdm_features *f)
-{
-    sdm_free(f->node);
-    sdm_free(f->centroid);
-    sdm_free(f->group);
-    sdm_free(f->row);
-    sdm_free(f->corner);
-    sdm_free(f->exact);
-    sdm_free(f->of_slot);
-    sdm_free(f->owner);
-    *f = (sdm_features){0};
 }

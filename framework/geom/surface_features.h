@@ -80,11 +80,9 @@ static inline void sdm_cluster_middle(const sdm_bvh_node *leaf, double middle[3]
     for (int a = 0; a < 3; a++) middle[a] = leaf->lo[a] + 0.5 * (leaf->hi[a] - leaf->lo[a]);
 }
 
-/* frames[slot]: of triangle tree->order[slot] of m; topo: of m. *f is zero-initialised; sdm_features_dispose() frees
-   it, also after an error. */
+/* frames[slot]: of triangle tree->order[slot] of m; topo: of m. Taken from the low end of the arena. */
 sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const sdm_frame *frames, const sdm_bvh *tree,
-                              sdm_features *f, sdm_error *err);
-void sdm_features_dispose(sdm_features *f);
+                              sdm_arena *arena, sdm_features *f, sdm_error *err);
 
 /* Bytes that a build takes at most: those that stay; to *scratch is added what is taken in passing. */
 size_t sdm_features_bytes(size_t n_tri, size_t n_vert, size_t *scratch);

@@ -43,15 +43,16 @@ static void join_patches(const sdm_survey *s, uint32_t *parent)
     }
 }
 
-sdm_status sdm_sides_build(const sdm_mesh *m, const sdm_survey *survey, sdm_sides *s, sdm_error *err)
+sdm_status sdm_sides_build(const sdm_mesh *m, const sdm_survey *survey, sdm_arena *arena, sdm_sides *s, sdm_error *err)
 {
     s->mesh = m;
     s->survey = survey;
     const sdm_facet *f = survey->facets;
     uint32_t *parent = NULL, *largest = NULL;
-    sdm_status st = SDM_ALLOC(&parent, m->n_tri, "patches", err);
-    if (!st) st = SDM_ALLOC(&largest, m->n_tri, "patches", err);
-    if (!st) st = SDM_ALLOC(&s->outside, m->n_tri, "patches", err);
+    sdm_status st = SDM_TAKE(arena, SDM_HIGH, &s->outside, m->n_tri, "patches", err);
+    const sdm_arena_mark before = arena->end[SDM_HIGH];
+    if (!st) st = SDM_TAKE(arena, SDM_HIGH, &parent, m->n_tri, "patches", err);
+    if (!st) st = SDM_TAKE(arena, SDM_HIGH, &largest, m->n_tri, "patches", err);
     if (!st) {
         join_patches(survey, parent);
         for (uint32_t t = 0; t < m->n_tri; t++) {
@@ -67,14 +68,12 @@ sdm_status sdm_sides_build(const sdm_mesh *m, const sdm_survey *survey, sdm_side
             s->outside[t] = parent[t] == t ? ray(s, l, x, &l, 1) : s->outside[parent[t]];
         }
     }
-    sdm_free(parent);
-    sdm_free(largest);
+    sdm_arena_release(arena, SDM_HIGH, before);
     return st;
 }
 
 void sdm_sides_dispose(sdm_sides *s)
 {
-    sdm_free(s->outside);
     sdm_free(s->skip);
     *s = (sdm_sides){0};
 }

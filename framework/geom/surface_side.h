@@ -24,9 +24,9 @@ typedef struct sdm_sides {
 /* Is the triangle flat, so that its neighbours stand for it? */
 bool sdm_sides_flat(const sdm_survey *s, uint32_t t);
 
-/* One ray for each patch of triangles that meet nothing: the winding number does not change across an edge between two
+/* outside[] is taken from the high end of the arena. One ray for each patch of triangles that meet nothing: the winding number does not change across an edge between two
    of them. */
-sdm_status sdm_sides_build(const sdm_mesh *m, const sdm_survey *survey, sdm_sides *s, sdm_error *err);
+sdm_status sdm_sides_build(const sdm_mesh *m, const sdm_survey *survey, sdm_arena *arena, sdm_sides *s, sdm_error *err);
 void sdm_sides_dispose(sdm_sides *s);
 
 /* Is the triangle, which meets nothing, boundary of the solid? */

@@ -14,12 +14,15 @@ typedef struct sdm_survey {
     sdm_bvh tree;
     sdm_facet *facets; /* [n_tri] */
     sdm_contacts contacts;
+    sdm_arena_mark start, with_topology; /* the arena's high end before and after the topology */
 } sdm_survey;
 
-/* *s is zero-initialised; sdm_survey_dispose() frees it, also after an error. budget may be NULL. Errors as sdm_mesh_audit(). */
-sdm_status sdm_survey_build(const sdm_mesh *m, sdm_survey *s, sdm_budget *budget, sdm_error *err);
-/* Frees what is not asked for any more once the surface is made; the audit and the tree stay, the topology on demand. */
-void sdm_survey_shrink(sdm_survey *s, bool keep_topology);
-void sdm_survey_dispose(sdm_survey *s);
+/* *s is zero-initialised; all of it is in the arena: the tree at the low end, the rest at the high end. budget may be NULL. Errors as
+   sdm_mesh_audit(). */
+sdm_status sdm_survey_build(const sdm_mesh *m, sdm_arena *arena, sdm_survey *s, sdm_budget *budget, sdm_error *err);
+/* What a survey takes on closed meshes with a few contacts. */
+size_t sdm_survey_usual_bytes(const sdm_mesh *m);
+/* Releases what is not asked for any more once the surface is made; the audit and the tree stay, the topology on demand. */
+void sdm_survey_shrink(sdm_survey *s, sdm_arena *arena, bool keep_topology);
 
 #endif

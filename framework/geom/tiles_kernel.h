@@ -5,20 +5,13 @@
 #include "clusters_kernel.h"
 #include "features_kernel.h"
 
-/* Parts that are not too far from a feature for it to be their nearest. */
-static inline int near_parts(const sdm_grid_parts *q, bool aligned, const view8 *v, sight8 s)
-{
-    return ~v8_greater(s.d, limit8(q, aligned, v, s.g));
-}
-
 /* A block's features as they are shared out to its tiles. */
 typedef struct sharing {
     const sdm_grid_job *job;
     sdm_grid_scratch *s;
     const sdm_grid_parts *block, *tile; /* one of them each */
-    const view8 *v;
+    point8 p;                           /* middles of the tiles, from that of the block */
     float error;
-    float far; /* what is farther from all points of the block is not the nearest of any */
 } sharing;
 
 /* Appends the features of some lanes of a group that begins with `number` behind the first n; returns how many there are then. Without
@@ -38,14 +31,10 @@ static inline v8f least8(const sharing *w, const sdm_feature_group *k, int j, po
 }
 
 /* Lanes of a group of faces whose regions meet the block. */
-static inline unsigned faces_met(const sharing *w, const sdm_feature_group *k, unsigned thin, point8 shift)
+static inline unsigned faces_met(const sharing *w, const sdm_feature_group *k, point8 shift)
 {
     const v8f beside = v8_max(least8(w, k, 0, shift), v8_max(least8(w, k, 1, shift), least8(w, k, 2, shift)));
-    const point8 g = p8_load(k->g[3]);
-    const v8f above = v8_abs(p8_linear(g, shift, v8_load(k->offset[3]))) - extent(w->block, w->job->aligned, g);
-    const unsigned out = (unsigned)v8_greater(beside, v8_all(w->error));
-    const unsigned far = (unsigned)v8_greater(above, v8_all(w->far + w->error)) & ~thin;
-    return 0xff & ~(out | far);
+    return 0xff & ~(unsigned)v8_greater(beside, v8_all(w->error));
 }
 
 static size_t meet_faces(const sharing *w, bool thin, size_t n)
@@ -54,8 +43,9 @@ static size_t meet_faces(const sharing *w, bool thin, size_t n)
     for (size_t i = 0; i < w->s->n_cluster; i++) {
         const sdm_cluster_ref *c = &w->s->cluster[i];
         const sdm_cluster_node *node = &f->node[c->node];
+        if (thin && !node->thin) continue;
         const point8 shift = p8_all(c->shift[0], c->shift[1], c->shift[2]);
-        const unsigned lanes = faces_met(w, &f->group[node->group], node->thin, shift);
+        const unsigned lanes = faces_met(w, &f->group[node->group], shift);
         n = put_features(w, n, node->first, i, thin ? lanes & node->thin : lanes & ~node->thin);
     }
     return n;
@@ -105,7 +95,8 @@ static size_t meet_corners(const sharing *w, size_t n)
     return n;
 }
 
-/* Fills in the rows of the features and the tiles that their regions meet and that are not too far from them. */
+/* Fills in the rows of the features and the tiles that their regions meet. How far they are, their clusters were asked: of those that are
+   left hardly any feature is too far from a tile or vector whose region it meets. */
 static inline void hit_faces(const sharing *w, bool thin, size_t from, size_t to)
 {
     const sdm_grid_scratch *s = w->s;
@@ -115,10 +106,8 @@ static inline void hit_faces(const sharing *w, bool thin, size_t from, size_t to
         const row4 x = shift_face(load_row(r), c->shift);
         const float4 low = lowered(&x, reach_of(w->tile, w->job->aligned, &x, w->error));
         store_row(&s->row[i], x);
-        const v8f beyond = thin ? beyond_thin_face(r, &low, w->v->p) : beyond_face(r, &low, w->v->p);
-        unsigned hit = c->mask & ~(unsigned)v8_greater(beyond, v8_all(0));
-        if (!thin) hit &= (unsigned)near_parts(w->tile, w->job->aligned, w->v, see_face(&s->row[i], w->v->p));
-        s->row_hit[i] = (uint8_t)hit;
+        const v8f beyond = thin ? beyond_thin_face(r, &low, w->p) : beyond_face(r, &low, w->p);
+        s->row_hit[i] = (uint8_t)(c->mask & ~(unsigned)v8_greater(beyond, v8_all(0)));
     }
 }
 
@@ -132,10 +121,9 @@ static void hit_edges(const sharing *w, size_t from, size_t to)
         const v4f reach = reach_of(w->tile, w->job->aligned, &x, w->error);
         const float4 low = lowered(&x, reach);
         store_row(&s->row[i], x);
-        const v8f along = function8(r, 0, r->offset[0], w->v->p);
-        const v8f beyond = beyond_edge(r, &low, along, r->offset[3] + reach[0], w->v->p);
-        const int near = near_parts(w->tile, w->job->aligned, w->v, see_edge(r, along, w->v->p));
-        s->row_hit[i] = (uint8_t)(c->mask & (unsigned)(near & ~v8_greater(beyond, v8_all(0))));
+        const v8f along = function8(r, 0, r->offset[0], w->p);
+        const v8f beyond = beyond_edge(r, &low, along, r->offset[3] + reach[0], w->p);
+        s->row_hit[i] = (uint8_t)(c->mask & ~(unsigned)v8_greater(beyond, v8_all(0)));
     }
 }
 
@@ -146,53 +134,38 @@ static void hit_corners(const sharing *w, size_t from, size_t to)
         const sdm_corner_row *k = &f->corner[w->s->number[i] - f->corner_base];
         const sdm_cluster_ref *c = &w->s->cluster[w->s->from[i]];
         for (int a = 0; a < 3; a++) w->s->row[i].g[a][3] = k->at[a] - c->shift[a];
-        const point8 at = point_of(&w->s->row[i]), from_corner = p8_sub(w->v->p, at), g = p8_load(k->along);
-        _Alignas(32) float reach[8];
-        v8_store(reach, extent(w->tile, w->job->aligned, g) + v8_all(w->error));
-        v8f over = v8_all(-1);
-        for (int j = 0; j < SDM_CORNER_EDGES; j++)
-            over = v8_max(over, p8_linear(p8_all(k->along[0][j], k->along[1][j], k->along[2][j]), from_corner,
-                                          v8_all(-reach[j])));
-        const int near = near_parts(w->tile, w->job->aligned, w->v, see_point(at, w->v->p));
-        w->s->row_hit[i] = (uint8_t)(c->mask & (unsigned)(near & ~v8_greater(over, v8_all(0))));
+        const point8 x = p8_sub(w->p, point_of(&w->s->row[i]));
+        const v8f beyond = beyond_corner_part(w->tile, w->job->aligned, k, w->error, x);
+        w->s->row_hit[i] = (uint8_t)(c->mask & ~(unsigned)v8_greater(beyond, v8_all(0)));
     }
 }
 
-/* Features of the tiles of a block from its clusters. v: relative to its middle. */
-static void share_out(const sdm_grid_job *job, sdm_grid_scratch *s, const view8 *v, float error)
+/* Features of the tiles of a block from its clusters. */
+static sdm_status share_out(const sdm_grid_job *job, sdm_grid_scratch *s, float error, sdm_error *err)
 {
-    sharing w = {.job = job,
-                 .s = s,
-                 .block = &job->part[SDM_TO_BLOCKS],
-                 .tile = &job->part[SDM_TO_TILES],
-                 .v = v,
-                 .error = error};
-    for (int t = 0; t < 8; t++) w.far = fmaxf(w.far, v->base[t] + v->most[t]);
-    size_t n = 0;
-    for (int kind = 0; kind < SDM_FEATURE_KINDS; kind++) {
-        // the hits of a kind begin at a multiple of eight
-        const size_t from = (n + 7) / 8 * 8;
-        n = from;
-        switch (kind) {
-        case SDM_FACES:
-            n = meet_faces(&w, false, from);
-            hit_faces(&w, false, from, n);
-            break;
-        case SDM_THIN_FACES:
-            if (!job->features->any_thin) break;
-            n = meet_faces(&w, true, from);
-            hit_faces(&w, true, from, n);
-            break;
-        case SDM_EDGES:
-            n = meet_edges(&w, from);
-            hit_edges(&w, from, n);
-            break;
-        default:
-            n = meet_corners(&w, from);
-            hit_corners(&w, from, n);
-        }
-        list_hits(job, s->row_hit, NULL, from, n, s->tile, kind);
-    }
+    const point8 p = p8_load((const float(*)[8])job->part[SDM_TO_TILES].middle.x);
+    const sharing w = {.job = job,
+                       .s = s,
+                       .block = &job->part[SDM_TO_BLOCKS],
+                       .tile = &job->part[SDM_TO_TILES],
+                       .p = p,
+                       .error = error};
+    // the hits of a kind begin at a multiple of eight
+    size_t from[SDM_FEATURE_KINDS], to[SDM_FEATURE_KINDS];
+    to[SDM_FACES] = meet_faces(&w, false, from[SDM_FACES] = 0);
+    to[SDM_THIN_FACES] = from[SDM_THIN_FACES] = (to[SDM_FACES] + 7) / 8 * 8;
+    if (job->features->any_thin) to[SDM_THIN_FACES] = meet_faces(&w, true, from[SDM_THIN_FACES]);
+    to[SDM_EDGES] = meet_edges(&w, from[SDM_EDGES] = (to[SDM_THIN_FACES] + 7) / 8 * 8);
+    to[SDM_CORNERS] = meet_corners(&w, from[SDM_CORNERS] = (to[SDM_EDGES] + 7) / 8 * 8);
+    const sdm_status st = sdm_grid_scratch_rows(s, to[SDM_CORNERS] + 1, job->limit, err);
+    if (st) return st;
+    hit_faces(&w, false, from[SDM_FACES], to[SDM_FACES]);
+    hit_faces(&w, true, from[SDM_THIN_FACES], to[SDM_THIN_FACES]);
+    hit_edges(&w, from[SDM_EDGES], to[SDM_EDGES]);
+    hit_corners(&w, from[SDM_CORNERS], to[SDM_CORNERS]);
+    for (int kind = 0; kind < SDM_FEATURE_KINDS; kind++)
+        list_hits(job, s->row_hit, NULL, from[kind], to[kind], s->tile, kind);
+    return SDM_OK;
 }
 
 #endif

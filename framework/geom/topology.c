@@ -3,8 +3,6 @@
 
 #include <string.h>
 
-#include "sdm/memory.h"
-
 static size_t table_size(size_t n)
 {
     size_t size = 16;
@@ -28,11 +26,12 @@ static uint64_t bits_of(double x)
     return b;
 }
 
-static sdm_status weld_vertices(const sdm_mesh *m, uint32_t *weld, sdm_error *err)
+static sdm_status weld_vertices(const sdm_mesh *m, sdm_arena *arena, uint32_t *weld, sdm_error *err)
 {
+    const sdm_arena_mark before = arena->end[SDM_LOW];
     const size_t size = table_size(m->n_vert);
     uint32_t *table; // vertex + 1; 0: free
-    const sdm_status s = SDM_ALLOC(&table, size, "vertex table", err);
+    const sdm_status s = SDM_TAKE(arena, SDM_LOW, &table, size, "vertex table", err);
     if (s) return s;
     for (size_t v = 0; v < m->n_vert; v++) {
         const double *p = &m->vert[3 * v];
@@ -51,7 +50,7 @@ static sdm_status weld_vertices(const sdm_mesh *m, uint32_t *weld, sdm_error *er
             }
         }
     }
-    sdm_free(table);
+    sdm_arena_release(arena, SDM_LOW, before);
     return SDM_OK;
 }
 
@@ -150,24 +149,23 @@ static void link_edges(sdm_topology *t)
     }
 }
 
-static sdm_status find_edges(sdm_topology *t, sdm_error *err)
+static sdm_status find_edges(sdm_topology *t, sdm_arena *arena, sdm_error *err)
 {
+    const sdm_arena_mark before = arena->end[SDM_LOW];
     uint32_t *lo = NULL;
     half_edge *list = NULL;
     mark *seen = NULL;
-    sdm_status s = SDM_ALLOC(&lo, t->n_vert + 1, "half-edges", err);
-    if (!s) s = SDM_ALLOC(&list, 3 * t->n_tri, "half-edges", err);
-    if (!s) s = SDM_ALLOC(&seen, t->n_vert, "half-edges", err);
+    sdm_status s = SDM_TAKE(arena, SDM_LOW, &lo, t->n_vert + 1, "half-edges", err);
+    if (!s) s = SDM_TAKE(arena, SDM_LOW, &list, 3 * t->n_tri, "half-edges", err);
+    if (!s) s = SDM_TAKE(arena, SDM_LOW, &seen, t->n_vert, "half-edges", err);
     if (!s) {
         memset(t->edge, 0xff, 3 * t->n_tri * sizeof *t->edge);
         list_half_edges(t, lo, list);
         number_edges(t, lo, list, seen);
-        s = SDM_ALLOC(&t->edges, t->n_edges, "edges", err);
+        s = SDM_TAKE(arena, SDM_HIGH, &t->edges, t->n_edges, "edges", err);
     }
     if (!s) link_edges(t);
-    sdm_free(lo);
-    sdm_free(list);
-    sdm_free(seen);
+    sdm_arena_release(arena, SDM_LOW, before);
     return s;
 }
 
@@ -178,35 +176,23 @@ size_t sdm_topology_bytes(const sdm_mesh *m, size_t *scratch)
     return m->n_vert * 2 * sizeof(uint32_t) + m->n_tri * (12 * sizeof(uint32_t) + 3 * sizeof(sdm_edge));
 }
 
-sdm_status sdm_topology_build(const sdm_mesh *m, sdm_topology *t, sdm_error *err)
+sdm_status sdm_topology_build(const sdm_mesh *m, sdm_arena *arena, sdm_topology *t, sdm_error *err)
 {
     if (m->n_tri > UINT32_MAX / 3 - 1) // half-edges are numbered
         return sdm_fail(err, SDM_E_MESH, "mesh of %zu triangles, at most %u can be prepared", m->n_tri,
                         UINT32_MAX / 3 - 1);
     t->n_vert = m->n_vert;
     t->n_tri = m->n_tri;
-    sdm_status s = SDM_ALLOC(&t->weld, m->n_vert, "welded vertices", err);
-    if (!s) s = SDM_ALLOC(&t->tri, 3 * m->n_tri, "welded triangles", err);
-    if (!s) s = SDM_ALLOC(&t->edge, 3 * m->n_tri, "half-edges", err);
-    if (!s) s = SDM_ALLOC(&t->next, 3 * m->n_tri, "half-edges", err);
-    if (!s) s = SDM_ALLOC(&t->first, m->n_vert + 1, "half-edges", err);
-    if (!s) s = SDM_ALLOC(&t->leaving, 3 * m->n_tri, "half-edges", err);
-    if (!s) s = weld_vertices(m, t->weld, err);
+    sdm_status s = SDM_TAKE(arena, SDM_HIGH, &t->weld, m->n_vert, "welded vertices", err);
+    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &t->tri, 3 * m->n_tri, "welded triangles", err);
+    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &t->edge, 3 * m->n_tri, "half-edges", err);
+    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &t->next, 3 * m->n_tri, "half-edges", err);
+    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &t->first, m->n_vert + 1, "half-edges", err);
+    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &t->leaving, 3 * m->n_tri, "half-edges", err);
+    if (!s) s = weld_vertices(m, arena, t->weld, err);
     if (s) return s;
     for (size_t i = 0; i < 3 * m->n_tri; i++) t->tri[i] = t->weld[m->tri[i]];
-    return find_edges(t, err);
-}
-
-void sdm_topology_dispose(sdm_topology *t)
-{
-    sdm_free(t->weld);
-    sdm_free(t->tri);
-    sdm_free(t->edge);
-    sdm_free(t->next);
-    sdm_free(t->edges);
-    sdm_free(t->first);
-    sdm_free(t->leaving);
-    *t = (sdm_topology){0};
+    return find_edges(t, arena, err);
 }
 
 uint32_t sdm_topology_neighbour(const sdm_topology *t, uint32_t h)

@@ -2,6 +2,7 @@
 #ifndef SDM_GEOM_TOPOLOGY_H
 #define SDM_GEOM_TOPOLOGY_H
 
+#include "arena.h"
 #include "sdm/mesh.h"
 
 #define SDM_NONE UINT32_MAX
@@ -28,9 +29,8 @@ typedef struct sdm_topology {
 /* Bytes that a build takes at most: those that stay; to *scratch is added what is taken in passing. */
 size_t sdm_topology_bytes(const sdm_mesh *m, size_t *scratch);
 
-/* Indices must be in range. *t is zero-initialised; sdm_topology_dispose() frees it, also after an error. */
-sdm_status sdm_topology_build(const sdm_mesh *m, sdm_topology *t, sdm_error *err);
-void sdm_topology_dispose(sdm_topology *t);
+/* Indices must be in range. Taken from the high end of the arena. */
+sdm_status sdm_topology_build(const sdm_mesh *m, sdm_arena *arena, sdm_topology *t, sdm_error *err);
 
 /* The triangle on the other side of half-edge h where exactly two triangles of one orientation meet, else SDM_NONE. */
 uint32_t sdm_topology_neighbour(const sdm_topology *t, uint32_t h);

@@ -12,17 +12,23 @@
 #include "cutting.h"
 #include "sdm/memory.h"
 #include "surface_side.h"
+#include "vertex_table.h"
+
+// in tolerances: within it vertices that cuts make are one, the same place as found on two triangles or three
+#define SAME_PLACE 4
 
 typedef struct hull {
     const sdm_mesh *mesh;
     const sdm_survey *survey;
+    sdm_arena *arena;
     sdm_mesh *out;
     uint32_t *source; // [out->cap_tri]
     sdm_budget *budget;
     sdm_error *err;
     sdm_sides sides;
-    size_t pieces, kept;  // of the triangle being cut
-    size_t n_vert, n_tri; // used in out
+    sdm_vertex_table seam; // vertices made by cuts
+    size_t pieces, kept;   // of the triangle being cut
+    size_t n_vert, n_tri;  // used in out
 } hull;
 
 static size_t bytes_for(size_t n_vert, size_t n_tri)
@@ -55,6 +61,17 @@ static void add_triangle(hull *w, uint32_t a, uint32_t b, uint32_t c, uint32_t s
     w->source[w->n_tri++] = source;
 }
 
+/* The vertex at xy of the triangle being cut. */
+static sdm_status seam_vertex(hull *w, const double xy[2], uint32_t *v)
+{
+    double x[3];
+    sdm_frame_lift(&w->sides.frame, xy, x);
+    sdm_vertex_table_find(&w->seam, w->out->vert, (uint32_t)w->n_vert, x, v);
+    if (*v < w->n_vert) return SDM_OK;
+    memcpy(&w->out->vert[3 * w->n_vert++], x, sizeof x);
+    return sdm_vertex_table_add(&w->seam, w->out->vert, *v, w->err);
+}
+
 static sdm_status add_piece(void *user, const sdm_corner *c, size_t n)
 {
     hull *w = user;
@@ -66,21 +83,18 @@ static sdm_status add_piece(void *user, const sdm_corner *c, size_t n)
     w->pieces++;
     if (s || !keep) return s;
     w->kept++;
-    // a fan; corners that are vertices of the mesh keep them
+    // a fan; corners that are vertices of the mesh keep them, triangles narrower than the tolerance may vanish
     s = make_room(w, n, n);
     if (s) return s;
     uint32_t first = 0, before = 0;
     for (size_t i = 0; i < n; i++) {
         uint32_t v = c[i].vertex;
-        if (v == SDM_NONE) {
-            v = (uint32_t)w->n_vert++;
-            sdm_frame_lift(&w->sides.frame, c[i].x, &w->out->vert[3 * (size_t)v]);
-        }
+        if (v == SDM_NONE) s = seam_vertex(w, c[i].x, &v);
         if (i == 0) first = v;
-        if (i >= 2) add_triangle(w, first, before, v, w->sides.tri);
+        if (i >= 2 && first != before && before != v && v != first) add_triangle(w, first, before, v, w->sides.tri);
         before = v;
     }
-    return SDM_OK;
+    return s;
 }
 
 /* Cuts triangle t and adds the pieces that stay; *whole: all of them do, so none is added. */
@@ -114,10 +128,11 @@ static sdm_status add_whole(hull *w, uint32_t t)
 }
 
 /* Removes vertices that no triangle uses. */
-static sdm_status drop_unused(sdm_mesh *m, sdm_error *err)
+static sdm_status drop_unused(sdm_mesh *m, sdm_arena *arena, sdm_error *err)
 {
+    const sdm_arena_mark before = arena->end[SDM_HIGH];
     uint32_t *place;
-    const sdm_status s = SDM_ALLOC(&place, m->n_vert, "vertices in use", err);
+    const sdm_status s = SDM_TAKE(arena, SDM_HIGH, &place, m->n_vert, "vertices in use", err);
     if (s) return s;
     for (size_t i = 0; i < 3 * m->n_tri; i++) place[m->tri[i]] = 1;
     size_t n = 0;
@@ -128,15 +143,17 @@ static sdm_status drop_unused(sdm_mesh *m, sdm_error *err)
     }
     for (size_t i = 0; i < 3 * m->n_tri; i++) m->tri[i] = place[m->tri[i]];
     m->n_vert = n;
-    sdm_free(place);
+    sdm_arena_release(arena, SDM_HIGH, before);
     return SDM_OK;
 }
 
 static sdm_status build(hull *w, bool *changed)
 {
     const sdm_contacts *c = &w->survey->contacts;
+    const sdm_arena_mark before = w->arena->end[SDM_HIGH];
     sdm_cutter cutter = {0};
-    sdm_status s = sdm_sides_build(w->mesh, w->survey, &w->sides, w->err);
+    sdm_status s = sdm_sides_build(w->mesh, w->survey, w->arena, &w->sides, w->err);
+    w->seam.tolerance = SAME_PLACE * c->tolerance;
     *changed = false;
     for (uint32_t t = 0; t < w->mesh->n_tri && !s; t++) {
         if (sdm_sides_flat(w->survey, t)) continue;
@@ -149,14 +166,16 @@ static sdm_status build(hull *w, bool *changed)
         if (!whole) *changed = true;
     }
     sdm_cutter_dispose(&cutter);
+    sdm_vertex_table_dispose(&w->seam);
     sdm_sides_dispose(&w->sides);
+    sdm_arena_release(w->arena, SDM_HIGH, before);
     return s;
 }
 
-sdm_status sdm_union_hull(const sdm_mesh *m, const sdm_survey *s, sdm_mesh *out, uint32_t **source, bool *changed,
-                          double *error_mm, sdm_budget *budget, sdm_error *err)
+sdm_status sdm_union_hull(const sdm_mesh *m, const sdm_survey *s, sdm_arena *arena, sdm_mesh *out, uint32_t **source,
+                          bool *changed, double *error_mm, sdm_budget *budget, sdm_error *err)
 {
-    hull w = {.mesh = m, .survey = s, .out = out, .budget = budget, .err = err, .n_vert = m->n_vert};
+    hull w = {.mesh = m, .survey = s, .arena = arena, .out = out, .budget = budget, .err = err, .n_vert = m->n_vert};
     // the copy, and what the walk over the surface takes in passing
     sdm_status st = sdm_budget_take(budget, bytes_for(m->n_vert, m->n_tri) + m->n_tri * 3 * sizeof(uint32_t), err);
     if (!st) st = sdm_mesh_reserve(out, m->n_vert, m->n_tri, err);
@@ -170,7 +189,7 @@ sdm_status sdm_union_hull(const sdm_mesh *m, const sdm_survey *s, sdm_mesh *out,
     out->n_vert = w.n_vert;
     out->n_tri = w.n_tri;
     if (!*changed) return SDM_OK;
-    // narrow pieces and seams up to the tolerance, vertices moved onto planes, rounding of the new vertices
-    *error_mm = 8 * s->contacts.tolerance + 2 * s->contacts.error;
-    return drop_unused(out, err);
+    // narrow pieces and seams up to the tolerance, vertices moved onto planes and to others, rounding of the new vertices
+    *error_mm = (8 + 2 * SAME_PLACE) * s->contacts.tolerance + 2 * s->contacts.error;
+    return drop_unused(out, arena, err);
 }

@@ -23,6 +23,7 @@ static inline void compete(winner8 *w, v8f d, uint32_t lane, float *out)
 static winner8 compare(const tile *t, int v)
 {
     const sdm_grid_scratch *s = t->s;
+    const sdm_features *f = t->job->features;
     const sdm_candidates *in = &s->vector[v];
     const point8 p = p8_load((const float(*)[8])t->job->voxel[t->number][v].x);
     const v8f error = v8_all(t->error), never = v8_all(INFINITY);
@@ -51,7 +52,9 @@ static winner8 compare(const tile *t, int v)
     for (size_t i = in->begin[SDM_CORNERS]; i < in->end[SDM_CORNERS]; i++) {
         const sdm_feature_row *r = &s->row[in->list[i]];
         const point8 x = p8_sub(p, point_of(r));
-        compete(&w, p8_dot(x, x), in->list[i], s->value[i]);
+        // without its region the end of an edge would be in doubt as far as the root of the error
+        const v8f over = beyond_corner(&f->corner[s->number[in->list[i]] - f->corner_base], x);
+        compete(&w, v8_signed(over - error, p8_dot(x, x), never), in->list[i], s->value[i]);
     }
     return w;
 }
@@ -130,7 +133,10 @@ static void choose_features(const tile *t, voxels *x)
         v8_store(first, w.first);
         v8_store(limit, v8_fma(v8_sqrt(v8_max(w.first, v8_all(0))) + v8_all(1), squared, w.first));
         const int clear = v8_greater(w.second, v8_load(limit)) & v8_greater(w.first, v8_all(-0.5f));
-        for (int i = 0; i < 8; i++) x->number[place[i]] = t->s->number[w.lane[i]];
+        for (int i = 0; i < 8; i++) {
+            const uint32_t number = x->number[place[i]] = t->s->number[w.lane[i]];
+            __builtin_prefetch(&job->features->exact[number]); // for measure_voxels()
+        }
         // NaN (INFINITY - INFINITY) is not clear either
         for (int open = 0xff & ~clear; open; open &= open - 1) {
             const int lane = __builtin_ctz((unsigned)open), i = place[lane];
@@ -177,7 +183,10 @@ static void write_tile(const tile *t, voxels *x)
         for (int64_t y = 0; y < size[1]; y++) {
             const int64_t to = ((t->first[2] + z) * job->n[1] + t->first[1] + y) * job->n[0] + t->first[0];
             const int64_t from = (z * whole[1] + y) * whole[0];
-            memcpy(&job->values[to], &d[from], (size_t)size[0] * sizeof *d);
+            if (size[0] == 4) // the usual size, so that no function is called
+                memcpy(&job->values[to], &d[from], 4 * sizeof *d);
+            else
+                memcpy(&job->values[to], &d[from], (size_t)size[0] * sizeof *d);
             if (job->slot) memcpy(&job->slot[to], &x->number[from], (size_t)size[0] * sizeof *x->number);
         }
 }

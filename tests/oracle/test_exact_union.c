@@ -11,6 +11,7 @@
 #include "oracle/exact_meshes.h"
 #include "oracle/exact_tools.h"
 #include "sdm/exact.h"
+#include "sdm/memory.h"
 #include "sdm/rng.h"
 
 static const double pi = 3.14159265358979323846;
@@ -433,14 +434,75 @@ static void test_memory_limit(void **state)
     sdm_mesh_dispose(&b);
 }
 
+/* Where triangles cross, each of them gives the same place: one vertex of the surface. */
+static void test_seam_vertices(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0}, b = {0};
+    mesh_sphere(&m, (const double[3]){0, 0, 0}, 1, 16);
+    mesh_sphere(&b, (const double[3]){0.71, 0.23, -0.17}, 1, 16);
+    mesh_append(&m, &b);
+    sdm_exact *e = NULL;
+    assert_int_equal(sdm_exact_create(&m, NULL, &e, NULL), SDM_OK);
+    assert_true(sdm_exact_get_report(e)->unioned);
+    const sdm_mesh *s = sdm_exact_surface(e);
+    size_t twice = 0;
+    for (size_t i = 0; i < s->n_vert; i++) {
+        for (size_t k = 0; k < i; k++) {
+            double d = 0;
+            for (size_t a = 0; a < 3; a++) d = fmax(d, fabs(s->vert[3 * i + a] - s->vert[3 * k + a]));
+            twice += d < 1e-14;
+        }
+    }
+    assert_int_equal(twice, 0);
+    sdm_exact_free(e);
+    sdm_mesh_dispose(&m);
+    sdm_mesh_dispose(&b);
+}
+
+/* With a limit the engine's arrays are allocated one by one, without one they share a block: the same bits either way, and every
+   allocation may fail. */
+static void test_with_and_without_block(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0}, b = {0};
+    mesh_sphere(&m, (const double[3]){0, 0, 0}, 1, 24);
+    mesh_sphere(&b, (const double[3]){0.7, 0.2, -0.1}, 1, 24);
+    mesh_append(&m, &b);
+    const sdm_grid g = sdm_grid_centred((const int64_t[3]){20, 20, 20}, 0.15, (const double[3]){0.3, 0, 0});
+    static float values[2][8000];
+    unsigned long n = 1;
+    for (;; n++) {
+        sdm_exact *e = NULL;
+        sdm_error err = {0};
+        sdm_alloc_fail_after(n);
+        const sdm_status s = sdm_exact_create(&m, &(sdm_exact_opts){.memory_limit = (size_t)1 << 40}, &e, &err);
+        sdm_alloc_fail_after(0);
+        if (!s) assert_int_equal(sdm_exact_map(e, &g, values[0], &err), SDM_OK);
+        sdm_exact_free(e);
+        if (!s) break;
+        assert_int_equal(s, SDM_E_NOMEM);
+        assert_true(err.text[0] != 0);
+    }
+    assert_true(n > 30);
+    sdm_exact *e = NULL;
+    assert_int_equal(sdm_exact_create(&m, NULL, &e, NULL), SDM_OK);
+    assert_int_equal(sdm_exact_map(e, &g, values[1], NULL), SDM_OK);
+    assert_memory_equal(values[0], values[1], sizeof values[0]);
+    sdm_exact_free(e);
+    sdm_mesh_dispose(&m);
+    sdm_mesh_dispose(&b);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_two_spheres),  cmocka_unit_test(test_boxes_with_coplanar_faces),
-        cmocka_unit_test(test_random_boxes), cmocka_unit_test(test_spiral_against_swept_sphere),
-        cmocka_unit_test(test_dense_points), cmocka_unit_test(test_shaken_spheres),
-        cmocka_unit_test(test_source),       cmocka_unit_test(test_fan_that_goes_round_twice),
-        cmocka_unit_test(test_memory_limit),
+        cmocka_unit_test(test_two_spheres),   cmocka_unit_test(test_boxes_with_coplanar_faces),
+        cmocka_unit_test(test_random_boxes),  cmocka_unit_test(test_spiral_against_swept_sphere),
+        cmocka_unit_test(test_dense_points),  cmocka_unit_test(test_shaken_spheres),
+        cmocka_unit_test(test_source),        cmocka_unit_test(test_fan_that_goes_round_twice),
+        cmocka_unit_test(test_memory_limit),  cmocka_unit_test(test_with_and_without_block),
+        cmocka_unit_test(test_seam_vertices),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

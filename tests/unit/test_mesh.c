@@ -280,7 +280,7 @@ static void test_memory_is_short(void **state)
         assert_int_equal(s, SDM_E_NOMEM);
         assert_true(err.text[0] != 0);
     }
-    assert_true(n > 5);
+    assert_true(n > 2);
     sdm_mesh_dispose(&m);
     sdm_mesh_dispose(&b);
 }

@@ -176,8 +176,13 @@ static void back_i8(size_t outputs, size_t n_coarse, size_t k, const int8_t *w, 
 static vec product_of_rest(size_t n, const float *y, const float *factor)
 {
     float some[VW] = {0};
-    for (size_t i = 0; i < n; i++) some[i] = y[i] * factor[i];
+    for (size_t i = 0; i < n; i++) some[i] = factor ? y[i] * factor[i] : y[i];
     return load(some);
+}
+
+static inline vec product_at(size_t i, const float *y, const float *factor)
+{
+    return factor ? load(y + i) * load(factor + i) : load(y + i);
 }
 
 // magnitudes compared as integers: those of NaN and infinity are the largest
@@ -195,12 +200,12 @@ static inline vec_short round_to_short(vec v, float to_integer)
     return __builtin_convertvector((vecu)(v * to_integer + 12582912.0f), vec_short);
 }
 
-static float quantise(size_t n, const float *y, const float *factor, int limit, int16_t *x)
+static inline float quantise_by(size_t n, const float *y, const float *factor, int limit, int16_t *x)
 {
     const size_t whole = n / VW * VW;
-    const vec rest = product_of_rest(n - whole, y + whole, factor + whole);
+    const vec rest = product_of_rest(n - whole, y + whole, factor ? factor + whole : NULL);
     veci most = larger_magnitude((veci){0}, rest);
-    for (size_t i = 0; i < whole; i += VW) most = larger_magnitude(most, load(y + i) * load(factor + i));
+    for (size_t i = 0; i < whole; i += VW) most = larger_magnitude(most, product_at(i, y, factor));
     int32_t largest_bits = 0;
     for (int j = 0; j < VW; j++) largest_bits = most[j] > largest_bits ? most[j] : largest_bits;
     float largest;
@@ -211,10 +216,15 @@ static float quantise(size_t n, const float *y, const float *factor, int limit, 
         return largest_bits >= 0x7f800000 ? largest - largest : 0;
     }
     for (size_t i = 0; i < whole; i += VW) {
-        const vec_short s = round_to_short(load(y + i) * load(factor + i), to_integer);
+        const vec_short s = round_to_short(product_at(i, y, factor), to_integer);
         memcpy(x + i, &s, sizeof s);
     }
     const vec_short s = round_to_short(rest, to_integer);
     memcpy(x + whole, &s, (n - whole) * sizeof *x);
     return largest / (float)limit;
+}
+
+static float quantise(size_t n, const float *y, const float *factor, int limit, int16_t *x)
+{
+    return factor ? quantise_by(n, y, factor, limit, x) : quantise_by(n, y, NULL, limit, x);
 }

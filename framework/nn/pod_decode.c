@@ -27,7 +27,7 @@ typedef struct space {
     float *y[SDM_POD_MAX_LEVELS]; // [G][padded outputs of a block]
     input x[SDM_POD_MAX_LEVELS];  // bytes, above the lowest level: those of blocks that get theirs together
     input leaves;                 // those of all blocks of the lowest level of a slab; scale: [groups][G]
-    float *back;                  // [ld of leaves] gradient there
+    float *back; // [inputs of a slab, or of blocks that get theirs together] gradient there, rests of inputs
 } space;
 
 static float *take(float *memory, size_t *at, size_t floats)
@@ -57,7 +57,10 @@ static size_t carve_thread(const pod_network *m, size_t rows, float *memory, spa
     for (size_t l = 1; l < m->arch.levels.n && is_bytes(m); l++)
         s->x[l] = take_inputs(m, rows, m->max_group[l], rows, memory, &at);
     s->leaves = take_inputs(m, rows, m->max_slab, m->max_slab_groups * rows, memory, &at);
-    s->back = take(memory, &at, s->leaves.ld);
+    size_t most = m->max_slab;
+    for (size_t l = 0; l < m->arch.levels.n; l++)
+        if (m->max_group[l] > most) most = m->max_group[l];
+    s->back = take(memory, &at, most + SDM_PANEL);
     return at;
 }
 
@@ -69,13 +72,13 @@ size_t sdm_pod_space_carve(const pod_network *m, size_t rows, int n_threads, flo
         if (m->max_group[l] > most) most = m->max_group[l];
     *w = (pod_space){.ldz = padded(a->n_latent + 1)};
     w->z = take(memory, &at, rows * a->n_latent);
-    w->c = take(memory, &at, rows * sdm_panel_outputs(a->n_coefficients));
+    w->c = take(memory, &at, (rows + 1) * sdm_panel_outputs(a->n_coefficients)); // and a row for the rest of the first
     w->sorted = take(memory, &at, is_bytes(m) ? most + 1 : 0);
-    w->z_integers = (int16_t *)take(memory, &at, is_bytes(m) ? rows * w->ldz / 2 : 0);
-    w->z_scale = take(memory, &at, is_bytes(m) ? rows : 0);
+    w->z_integers = (int16_t *)take(memory, &at, is_bytes(m) ? (rows + 1) * w->ldz / 2 : 0);
+    w->z_scale = take(memory, &at, is_bytes(m) ? rows + 1 : 0);
     w->threads = memory ? memory + at : NULL;
     space s;
-    w->per_thread = carve_thread(m, smaller(rows, GROUP), NULL, &s);
+    w->per_thread = carve_thread(m, smaller(rows + 1, GROUP), NULL, &s);
     return at + w->per_thread * (size_t)n_threads;
 }
 
@@ -86,6 +89,7 @@ typedef struct job {
     size_t rows, with_mean;
     float *const *maps;
     const pod_slab *slab;
+    size_t rests; // 1: the first row has a row of integers more, behind the last, of what rounding leaves of its inputs
     space s;
 } job;
 
@@ -131,15 +135,39 @@ static input input_from(input in, size_t first)
     return in;
 }
 
+// a row of n numbers as integers x; their factor
+static float quantise_row(size_t n, const float *y, const float *factor, int limit, int16_t *x)
+{
+    x[n] = 0; // read beside an odd last one, times zero
+    return sdm_quantise(n, y, factor, limit, x);
+}
+
+// what x[n], with its factor, leaves of y times factor
+static float quantise_rest(size_t n, const float *y, const float *factor, int limit, const int16_t *x, float scale,
+                           float *work, int16_t *rest)
+{
+    for (size_t i = 0; i < n; i++) work[i] = y[i] * factor[i] - scale * (float)x[i];
+    rest[n] = 0;
+    return sdm_quantise(n, work, NULL, limit, rest);
+}
+
+// y[0] += the row behind the last
+static void add_rest(size_t rows, size_t rests, size_t n, float *y, size_t ldy)
+{
+    for (size_t i = 0; i < n && rests; i++) y[i] += y[rows * ldy + i];
+}
+
 static void block_product(const job *j, size_t b, const input *in, float *y, size_t ldy)
 {
     const pod_network *m = j->m;
-    if (is_bytes(m))
-        sdm_panel_i8(j->rows, m->outputs[b], m->coarse[b], m->blocks[b].rank,
+    if (is_bytes(m)) {
+        sdm_panel_i8(j->rows + j->rests, m->outputs[b], m->coarse[b], m->blocks[b].rank,
                      (const int8_t *)m->basis + m->weights_at[b], in->q, in->ld, in->scale, y, ldy);
-    else
+        add_rest(j->rows, j->rests, m->outputs[b], y, ldy);
+    } else {
         sdm_pod_product(m->type, j->rows, m->outputs[b], m->blocks[b].rank, m->basis, m->weights_at[b], in->x, in->ld,
                         y, ldy);
+    }
 }
 
 // n coefficients of `level` from `first` on, c[G][ldc], as integers
@@ -147,10 +175,11 @@ static void quantise(const job *j, size_t level, size_t first, size_t n, const f
 {
     const pod_network *m = j->m;
     const float *factor = m->factor + m->coefficients_at[level] + first;
-    for (size_t r = 0; r < j->rows; r++) {
-        to->scale[r] = sdm_quantise(n, c + r * ldc, factor, m->limit[level], to->q + r * to->ld);
-        to->q[r * to->ld + n] = 0; // read beside an odd last one, times zero
-    }
+    for (size_t r = 0; r < j->rows; r++)
+        to->scale[r] = quantise_row(n, c + r * ldc, factor, m->limit[level], to->q + r * to->ld);
+    if (j->rests)
+        to->scale[j->rows] =
+            quantise_rest(n, c, factor, m->limit[level], to->q, to->scale[0], j->s.back, to->q + j->rows * to->ld);
 }
 
 // where the coefficients of the lowest level of block `group` of its groups belong
@@ -160,7 +189,7 @@ static input inputs_of_leaves(const job *j, size_t group)
     const sdm_pod_block *g = &m->blocks[group];
     const uint32_t first = m->arch.levels.n > 1 ? m->blocks[g->child].coefficient : g->coefficient;
     input in = input_from(j->s.leaves, first - j->slab->coefficient);
-    if (in.scale) in.scale += (group - j->slab->group) * j->rows;
+    if (in.scale) in.scale += (group - j->slab->group) * (j->rows + j->rests);
     return in;
 }
 
@@ -216,7 +245,7 @@ static void decode_leaves(const job *j)
         const pod_leaf leaf = m->leaves[i];
         const sdm_pod_block *k = &m->blocks[leaf.block];
         input in = input_from(j->s.leaves, k->coefficient - j->slab->coefficient);
-        if (in.scale) in.scale += leaf.group * j->rows;
+        if (in.scale) in.scale += leaf.group * (j->rows + j->rests);
         block_product(j, leaf.block, &in, j->s.y[0], ldy);
         for (size_t r = 0; r < j->rows; r++) {
             const float *y = j->s.y[0] + r * ldy, *add = r < j->with_mean ? mean : NULL;
@@ -238,37 +267,41 @@ static void decode_slab(const job *j, float *c, size_t ldc)
 /* The head. */
 
 // latent variables in the order of the head's columns, as integers
-static void quantise_latent(const pod_network *m, size_t rows, const pod_space *w)
+static void quantise_latent(const pod_network *m, size_t rows, size_t rests, const pod_space *w)
 {
     const size_t latent = m->arch.n_latent, n = m->arch.levels.n;
-    for (size_t r = 0; r < rows; r++) {
+    const float *factor = m->factor + m->coefficients_at[n];
+    for (size_t r = rows; r-- > 0;) { // the first is the last, for its rest
         for (size_t i = 0; i < latent; i++) w->sorted[i] = w->z[r * latent + m->order[i]];
-        w->z_scale[r] =
-            sdm_quantise(latent, w->sorted, m->factor + m->coefficients_at[n], m->limit[n], w->z_integers + r * w->ldz);
-        w->z_integers[r * w->ldz + latent] = 0;
+        w->z_scale[r] = quantise_row(latent, w->sorted, factor, m->limit[n], w->z_integers + r * w->ldz);
     }
+    if (rests)
+        w->z_scale[rows] = quantise_rest(latent, w->sorted, factor, m->limit[n], w->z_integers, w->z_scale[0],
+                                         w->sorted, w->z_integers + rows * w->ldz);
 }
 
 // coefficients `at` to `at` + n of the highest level
-static void head_product(const pod_network *m, size_t rows, size_t at, size_t n, const pod_space *w)
+static void head_product(const pod_network *m, size_t rows, size_t rests, size_t at, size_t n, const pod_space *w)
 {
     const size_t latent = m->arch.n_latent, coarse = sdm_pod_head_coarse(m);
     const size_t weights = sdm_pod_count_weights(m->type, at, coarse, latent);
     const size_t ldc = sdm_panel_outputs(m->arch.n_coefficients);
-    if (is_bytes(m))
-        sdm_panel_i8(rows, n, coarse, latent, (const int8_t *)m->head + weights, w->z_integers, w->ldz, w->z_scale,
-                     w->c + at, ldc);
-    else
+    if (is_bytes(m)) {
+        sdm_panel_i8(rows + rests, n, coarse, latent, (const int8_t *)m->head + weights, w->z_integers, w->ldz,
+                     w->z_scale, w->c + at, ldc);
+        add_rest(rows, rests, n, w->c + at, ldc);
+    } else
         sdm_pod_product(m->type, rows, n, latent, m->head, weights, w->z, latent, w->c + at, ldc);
 }
 
-void sdm_pod_decode(const pod_network *m, const sdm_grid *grid, size_t rows, size_t with_mean, float *const *maps,
-                    const pod_space *w, int n_threads)
+void sdm_pod_decode(const pod_network *m, const sdm_grid *grid, size_t rows, size_t with_mean, bool smooth,
+                    float *const *maps, const pod_space *w, int n_threads)
 {
+    const size_t rests = smooth && is_bytes(m) ? 1 : 0;
     enum { PART = 32 * SDM_PANEL };
     const size_t coefficients = m->arch.n_coefficients, ldc = sdm_panel_outputs(coefficients);
     const long parts = (long)((coefficients + PART - 1) / PART);
-    if (is_bytes(m)) quantise_latent(m, rows, w);
+    if (is_bytes(m)) quantise_latent(m, rows, rests, w);
 #ifdef _OPENMP
 #pragma omp parallel num_threads(n_threads) if (n_threads > 1)
 #else
@@ -283,16 +316,17 @@ void sdm_pod_decode(const pod_network *m, const sdm_grid *grid, size_t rows, siz
 #endif
         for (long i = 0; i < parts; i++) {
             const size_t o = (size_t)i * PART;
-            head_product(m, rows, o, smaller(PART, coefficients - o), w);
+            head_product(m, rows, rests, o, smaller(PART, coefficients - o), w);
         }
-        carve_thread(m, smaller(rows, GROUP), w->threads + thread * w->per_thread, &j.s);
+        carve_thread(m, smaller(rows + 1, GROUP), w->threads + thread * w->per_thread, &j.s);
 #ifdef _OPENMP
 #pragma omp for schedule(dynamic)
 #endif
         for (long i = 0; i < (long)m->n_slabs; i++)
-            for (size_t r = 0; r < rows; r += GROUP) {
+            for (size_t r = 0; r < rows; r += j.rows) {
                 j.slab = &m->slabs[i];
-                j.rows = smaller(GROUP, rows - r);
+                j.rests = r == 0 ? rests : 0;
+                j.rows = smaller(GROUP - j.rests, rows - r);
                 j.with_mean = with_mean > r ? with_mean - r : 0;
                 j.maps = maps + r;
                 decode_slab(&j, w->c + r * ldc, ldc);

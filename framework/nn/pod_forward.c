@@ -36,7 +36,7 @@ void sdm_pod_forward(const sdm_model *m, const double *params, size_t n, float *
         float *maps[ROWS];
         for (size_t r = 0; r < rows; r++) maps[r] = values + (at + r) * voxels;
         sdm_pod_latent(m, params + at * k->arch.n_params, rows, 0, NULL, &w.latent, w.space.z);
-        sdm_pod_decode(k, &m->info.grid, rows, rows, maps, &w.space, n_threads);
+        sdm_pod_decode(k, &m->info.grid, rows, rows, false, maps, &w.space, n_threads);
     }
 }
 
@@ -51,7 +51,7 @@ static void tangents(const sdm_model *m, const double *params, size_t n, const d
     sdm_pod_latent(m, params, 1, n, direction, &w.latent, w.space.z);
     float *maps[1 + SDM_POD_MAX_PARAMS] = {values};
     for (size_t r = 0; r < n; r++) maps[1 + r] = tangent + r * voxels;
-    sdm_pod_decode(k, &m->info.grid, 1 + n, 1, maps, &w.space, n_threads);
+    sdm_pod_decode(k, &m->info.grid, 1 + n, 1, true, maps, &w.space, n_threads);
 }
 
 size_t sdm_pod_jacobian_scratch_bytes(const sdm_model *m, int n_threads)

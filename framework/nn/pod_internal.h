@@ -125,9 +125,10 @@ typedef struct pod_space {
 /* Sets the pointers into memory[] (NULL: none); returns the floats needed. */
 size_t sdm_pod_space_carve(const pod_network *m, size_t rows, int n_threads, float *memory, pod_space *w);
 
-/* maps[R] from w->z; the mean map is added to the first `with_mean`. */
-void sdm_pod_decode(const pod_network *m, const sdm_grid *grid, size_t rows, size_t with_mean, float *const *maps,
-                    const pod_space *w, int n_threads);
+/* maps[R] from w->z; the mean map is added to the first `with_mean`. smooth: bytes do not round the inputs of the first, so that it changes
+   smoothly with the parameters. */
+void sdm_pod_decode(const pod_network *m, const sdm_grid *grid, size_t rows, size_t with_mean, bool smooth,
+                    float *const *maps, const pod_space *w, int n_threads);
 
 /* dz[L] = the transpose times adjoint[voxels]. One thread. */
 void sdm_pod_decode_back(const pod_network *m, const sdm_grid *grid, const float *adjoint, const pod_space *w,

@@ -161,6 +161,8 @@ static sdm_status weigh_priors(fit_problem *p, double *change, sdm_error *err)
 static sdm_status settle(fit_problem *p, fit_run *run, fit_ended *ended, sdm_error *err)
 {
     const size_t most = run->max_iterations, before = p->n_iterations;
+    // without priors only the noise factor is of use, and only where creases bounce steps
+    const int weighings = sdm_fit_has_prior(p) ? WEIGHINGS_MOST : p->maps.exact ? 2 : 0;
     const double eps = run->eps;
     sdm_status s = SDM_OK;
     for (int round = 0; round < ROUNDS_MOST && !s; round++) {
@@ -171,7 +173,7 @@ static sdm_status settle(fit_problem *p, fit_run *run, fit_ended *ended, sdm_err
         if (!s && !p->sites.n)
             return sdm_fail(err, SDM_E_QUALITY, "the shape has left the image: no voxel near it is left");
         if (!s && changed) s = sdm_fit_look(p, err); // samples of the region
-        if (!s && round < WEIGHINGS_MOST) s = weigh_priors(p, &change, err);
+        if (!s && round < weighings) s = weigh_priors(p, &change, err);
         // steps that are rough do not tell small changes of the region and the weights
         const bool last = ended->rough ? change < WEIGHT_ROUGH : !changed && !(change > 0);
         if (s || (round > 0 && run->eps <= eps && last)) return s;

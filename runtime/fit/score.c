@@ -19,6 +19,8 @@
 // sums over neighbours begin at some of the voxels, so that there are about as many: of a correlation, of the covariance
 #define PAIRS_OF_LAG 8000
 #define PAIRS 30000000
+// the part of them that serves where only weights are wanted
+#define ROUGH 0.2
 
 /* Voxels near the surface, found by their place in a box of the image. */
 typedef struct near_voxels {
@@ -27,6 +29,7 @@ typedef struct near_voxels {
     uint32_t *at;                   // [size] 1 + number of the voxel, or 0
     int32_t *place;                 // [n][3] in the box
     float *lot;                     // [n] 0 .. 1 at random, of the voxel alone: the lowest begin sums
+    double effort;                  // part of the pairs that are taken
     float *residual, *weight;       // [n]
     float *root;                    // [n][n_unknowns]
     float *push;                    // [n][n_unknowns] score by an error of the map of 1 mm
@@ -156,7 +159,7 @@ static int lag_size(const int lag[3])
 // weighted mean of e_n e_(n+lag)
 static double correlation_at(const near_voxels *v, const int lag[3])
 {
-    const float share = (float)PAIRS_OF_LAG / (float)v->n;
+    const float share = (float)(v->effort * PAIRS_OF_LAG / (double)v->n);
     double sum = 0, weight = 0;
     for (size_t i = 0; i < v->n; i++) {
         if (v->lot[i] > share) continue;
@@ -201,7 +204,7 @@ static int estimate(const near_voxels *v, int n_threads, double c[MIDDLE + 1])
             if (lag_size(lag) == k) sum += c[number], lags++;
         }
         // standard error of the sum where nothing is correlated (Bartlett 1946)
-        const double error = sqrt(lags / fmin((double)v->n, PAIRS_OF_LAG));
+        const double error = sqrt(lags / fmin((double)v->n, v->effort * PAIRS_OF_LAG));
         if (width == LAG_MOST && k > 0 && !(sum > fmax(0.05, 2 * error) * c[MIDDLE]))
             width = 2 * (k - 1) < LAG_MOST ? 2 * (k - 1) : LAG_MOST - 1;
     }
@@ -218,7 +221,7 @@ static sdm_status add_products(const near_voxels *v, const double *c, int width,
     const sdm_status s = SDM_ALLOC(&parts, FIT_SLICES * n * n, "covariance of the score", err);
     if (s) return s;
     (void)n_threads; // without OpenMP
-    const float share = (float)(PAIRS / (pow(2.0 * width + 1, 3) / 2 + 1) / (double)v->n);
+    const float share = (float)(v->effort * PAIRS / (pow(2.0 * width + 1, 3) / 2 + 1) / (double)v->n);
     size_t chosen = 0;
     for (size_t i = 0; i < v->n; i++) chosen += v->lot[i] <= share;
     const double scale = (double)v->n / fmax((double)chosen, 1);
@@ -356,6 +359,7 @@ static sdm_status of_voxels(const fit_problem *p, double model_mm, bool definite
     sdm_status s = make_near(p, &v, err);
     double c[MIDDLE + 1];
     const int n_threads = sdm_fit_threads(p->opts->n_threads);
+    v.effort = definite ? 1 : ROUGH;
     if (!s) {
         const int width = estimate(&v, n_threads, c);
         s = add_noise(p, &v, c, width, n_threads, definite, out, err);

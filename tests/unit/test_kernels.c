@@ -273,6 +273,9 @@ static void quantisation(void **state)
             }
             assert_true(n == 0 ? scale == 0 : most == limit);
             assert_int_equal(x[n], 77);
+            if (n == 0) continue;
+            const float plain = sdm_quantise(n, y, NULL, limit, x);
+            for (size_t i = 0; i < n; i++) assert_true(fabs((double)x[i] * plain - (double)y[i]) <= 0.5001 * plain);
         }
     for (int i = 0; i < MOST; i++) changed[i] = i % 2 ? 1e-40f : 0;
     assert_true(sdm_quantise(MOST, changed, ones, 32767, x) == 0 && x[3] == 0);

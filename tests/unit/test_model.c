@@ -382,6 +382,38 @@ static void jacobian_of_bytes(void **state)
     for (size_t levels = 1; levels <= 3; levels++) jacobian_of_bytes_with(levels);
 }
 
+// a map that comes with its derivatives changes smoothly with the parameters, else a fit could not end
+static void maps_with_derivatives_are_smooth(void **state)
+{
+    (void)state;
+    for (n_levels = 1; n_levels <= 3; n_levels++) {
+        toy t;
+        make(&t, SDM_POD_I8, 0);
+        sdm_model *m = open_toy(&t);
+        void *scratch;
+        static float map[3][315], jacobian[P * 315], alone[315];
+        double p[P];
+        assert_int_equal(sdm_alloc(&scratch, sdm_model_jacobian_scratch_bytes(m), 1, "scratch", NULL), 0);
+        for (uint64_t trial = 0; trial < 5; trial++) {
+            random_params(trial, p);
+            sdm_model_forward(m, p, 1, alone, scratch);
+            for (int k = 0; k < 3; k++, p[0] += 1e-5) sdm_model_jacobian(m, p, map[k], jacobian, scratch);
+            double rough = 0, size = 0, rounding = 0;
+            for (int v = 0; v < 315; v++) {
+                rough = fmax(rough, fabs((double)map[0][v] - 2.0 * map[1][v] + map[2][v]));
+                rounding = fmax(rounding, fabs((double)map[0][v] - alone[v]));
+                size = fmax(size, fabs(map[1][v]));
+            }
+            assert_true(rough < 5e-6 * size);
+            assert_true(rounding > 0 && rounding < 1e-3 * size); // rounded inputs of the map alone
+        }
+        sdm_free(scratch);
+        sdm_model_free(m);
+        sdm_free(t.memory);
+    }
+    n_levels = 3;
+}
+
 // numbers that are not finite do not become others
 static void bytes_keep_what_is_not_finite(void **state)
 {
@@ -568,6 +600,7 @@ int main(void)
         cmocka_unit_test(jacobian_is_the_slope),
         cmocka_unit_test(jacobian_of_bytes),
         cmocka_unit_test(bytes_keep_what_is_not_finite),
+        cmocka_unit_test(maps_with_derivatives_are_smooth),
         cmocka_unit_test(file_keeps_everything),
         cmocka_unit_test(damage_is_refused),
         cmocka_unit_test(hostile_sections),

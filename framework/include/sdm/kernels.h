@@ -64,7 +64,7 @@ SDM_API int sdm_panel_i8_limit(size_t outputs, size_t k, const int16_t *w);
 /* Packs w[outputs][k], in -128 .. 127 but for the first n_coarse of each row, which are in -SDM_COARSE .. SDM_COARSE. */
 SDM_API void sdm_panel_pack_i8(size_t outputs, size_t n_coarse, size_t k, const int16_t *w, int8_t *panels);
 
-/* x[n] = y[n] factor[n] as integers of at most `limit`, rounded to nearest; returns the factor that gives them back.
+/* x[n] = y[n] factor[n] (factor NULL: 1) as integers of at most `limit`, rounded to nearest; returns the factor that gives them back.
    Not finite numbers make it NaN and x zero. */
 SDM_API float sdm_quantise(size_t n, const float *y, const float *factor, int limit, int16_t *x);
 

@@ -60,7 +60,8 @@ SDM_API sdm_status sdm_generate_batch(const sdm_model *m, const double *params, 
                                       float *values, sdm_result *results, sdm_error *err);
 
 /* Map and derivatives: jacobian[n_params][nz][ny][nx], mm per unit; of the network, or by sdm_exact_shape_jacobian() where the exact
-   engine makes the map. At clamped parameters they are the network's at the end of the range. Errors as above, SDM_E_PLUGIN as there.
+   engine makes the map. At clamped parameters they are the network's at the end of the range.
+   The map changes smoothly with the parameters; where weights are bytes it differs from that of sdm_generate() by rounding (1e-4 mm). Errors as above, SDM_E_PLUGIN as there.
    [any thread] */
 SDM_API sdm_status sdm_generate_jacobian(const sdm_model *m, const double *params, const sdm_generate_opts *opts,
                                          float *values, float *jacobian, sdm_result *result, sdm_error *err);

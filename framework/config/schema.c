@@ -60,7 +60,8 @@ static const char *const DEPTH[] = {"3", "4", "8", "5"}, *const WIDTH[] = {"128"
                          *const BLOCK[] = {"4", "2", "4", "4"},
                          *const ACTIVATION[] = {"silu", "relu", "relu", "leaky_relu"},
                          *const OUTPUT_TYPE[] = {"linear", "linear", "tanh", "linear"},
-                         *const WEIGHTS[] = {"i8", "f16", "f16", "f16"}, *const BATCH[] = {"256", "8", "16", "16"}, *const RATE[] = {"3e-3", "1e-3", "5e-4", "5e-4"};
+                         *const WEIGHTS[] = {"i8", "f16", "f16", "f16"}, *const BATCH[] = {"256", "8", "16", "16"},
+                         *const RATE[] = {"3e-3", "1e-3", "5e-4", "5e-4"};
 
 // clang-format off
 static const sdm_field SHAPE[] = {

@@ -137,14 +137,6 @@ static void panel_i8(size_t batch, size_t outputs, size_t n_coarse, size_t k, co
                        x + i * ldx, ldx, scale + i, y + i * ldy + o, ldy);
 }
 
-static inline float sum_lanes(vec v)
-{
-    float each[VW], total = 0;
-    store(each, v);
-    for (int j = 0; j < VW; j++) total += each[j];
-    return total;
-}
-
 // x[2 * pairs] += factor times the transpose of `pairs` pairs of n outputs
 static void back_pairs(size_t n, size_t pairs, size_t panel, float factor, const int8_t *w, const float *y, float *x)
 {

@@ -17,6 +17,14 @@ static inline vec load(const float *p) { return *(const vec_u *)p; }
 static inline void store(float *p, vec v) { *(vec_u *)p = v; }
 static inline vec splat(float v) { return v - (vec){0}; }
 
+static inline float sum_lanes(vec v)
+{
+    float each[VW], total = 0;
+    store(each, v);
+    for (int j = 0; j < VW; j++) total += each[j];
+    return total;
+}
+
 static void micro(size_t k, const float *a, const float *b, float *c, size_t ldc, int add)
 {
     vec acc[MR][NV];
@@ -164,10 +172,7 @@ static inline vec load_half(const uint16_t *p)
                 for (size_t j = 0; j < n; j += VW)                                                                     \
                     sum += load_weights(w + j / SDM_PANEL * SDM_PANEL * k + p * SDM_PANEL + j % SDM_PANEL) *           \
                            load(y + o + j);                                                                            \
-                float each[VW], total = 0;                                                                             \
-                store(each, sum);                                                                                      \
-                for (int j = 0; j < VW; j++) total += each[j];                                                         \
-                x[p] += total;                                                                                         \
+                x[p] += sum_lanes(sum);                                                                                \
             }                                                                                                          \
         }                                                                                                              \
     }

@@ -30,9 +30,11 @@ typedef struct near_voxels {
     int32_t *place;                 // [n][3] in the box
     float *lot;                     // [n] 0 .. 1 at random, of the voxel alone: the lowest begin sums
     double effort;                  // part of the pairs that are taken
-    float *residual, *weight;       // [n]
-    float *root;                    // [n][n_unknowns]
-    float *push;                    // [n][n_unknowns] score by an error of the map of 1 mm
+    uint32_t *begin;                // [n_begin] voxels where sums of correlations begin
+    size_t n_begin;
+    float *residual, *weight; // [n]
+    float *root;              // [n][n_unknowns]
+    float *push;              // [n][n_unknowns] score by an error of the map of 1 mm
 } near_voxels;
 
 static void place_of(const sdm_grid *g, size_t voxel, int64_t index[3])
@@ -97,8 +99,16 @@ static void fill_near(const fit_problem *p, near_voxels *v)
     }
 }
 
+static void choose_begins(near_voxels *v)
+{
+    const float share = (float)(v->effort * PAIRS_OF_LAG / (double)v->n);
+    for (size_t i = 0; i < v->n; i++)
+        if (!(v->lot[i] > share)) v->begin[v->n_begin++] = (uint32_t)i;
+}
+
 static void dispose_near(near_voxels *v)
 {
+    sdm_free(v->begin);
     sdm_free(v->at);
     sdm_free(v->place);
     sdm_free(v->lot);
@@ -108,9 +118,10 @@ static void dispose_near(near_voxels *v)
     sdm_free(v->push);
 }
 
-static sdm_status make_near(const fit_problem *p, near_voxels *v, sdm_error *err)
+static sdm_status make_near(const fit_problem *p, double effort, near_voxels *v, sdm_error *err)
 {
-    *v = (near_voxels){.n = p->sites.n_near, .n_unknowns = p->sums.n_unknowns, .step = (int64_t)p->stride};
+    *v = (near_voxels){
+        .n = p->sites.n_near, .n_unknowns = p->sums.n_unknowns, .step = (int64_t)p->stride, .effort = effort};
     find_box(p, v);
     size_t count, box;
     sdm_status s = sdm_mul(v->n, v->n_unknowns, &count, err);
@@ -118,11 +129,13 @@ static sdm_status make_near(const fit_problem *p, near_voxels *v, sdm_error *err
     if (!s) s = SDM_ALLOC(&v->at, box, "voxels near the surface", err);
     if (!s) s = SDM_ALLOC(&v->place, 3 * v->n, "voxels near the surface", err);
     if (!s) s = SDM_ALLOC(&v->lot, v->n, "voxels near the surface", err);
+    if (!s) s = SDM_ALLOC(&v->begin, v->n, "voxels near the surface", err);
     if (!s) s = SDM_ALLOC(&v->residual, v->n, "voxels near the surface", err);
     if (!s) s = SDM_ALLOC(&v->weight, v->n, "voxels near the surface", err);
     if (!s) s = SDM_ALLOC(&v->root, count, "voxels near the surface", err);
     if (!s) s = SDM_ALLOC(&v->push, count, "voxels near the surface", err);
     if (!s) fill_near(p, v);
+    if (!s) choose_begins(v);
     return s;
 }
 
@@ -159,11 +172,9 @@ static int lag_size(const int lag[3])
 // weighted mean of e_n e_(n+lag)
 static double correlation_at(const near_voxels *v, const int lag[3])
 {
-    const float share = (float)(v->effort * PAIRS_OF_LAG / (double)v->n);
     double sum = 0, weight = 0;
-    for (size_t i = 0; i < v->n; i++) {
-        if (v->lot[i] > share) continue;
-        const size_t j = neighbour(v, i, lag);
+    for (const uint32_t *first = v->begin; first < v->begin + v->n_begin; first++) {
+        const size_t i = *first, j = neighbour(v, i, lag);
         if (j == SIZE_MAX) continue;
         const double w = (double)v->weight[i] * (double)v->weight[j];
         sum += w * (double)v->residual[i] * (double)v->residual[j];
@@ -356,10 +367,9 @@ static double effective_number(const near_voxels *v, double noise_factor)
 static sdm_status of_voxels(const fit_problem *p, double model_mm, bool definite, fit_scatter *out, sdm_error *err)
 {
     near_voxels v;
-    sdm_status s = make_near(p, &v, err);
+    sdm_status s = make_near(p, definite ? 1 : ROUGH, &v, err);
     double c[MIDDLE + 1];
     const int n_threads = sdm_fit_threads(p->opts->n_threads);
-    v.effort = definite ? 1 : ROUGH;
     if (!s) {
         const int width = estimate(&v, n_threads, c);
         s = add_noise(p, &v, c, width, n_threads, definite, out, err);

@@ -13,4 +13,5 @@ static inline __m512 load_half(const uint16_t *p)
 }
 #define LOAD_PAIRS(p) ((veci)_mm512_cvtepi8_epi16(_mm256_loadu_si256((const __m256i *)(const void *)(p))))
 #define MADD(a, b) ((veci)_mm512_madd_epi16((__m512i)(a), (__m512i)(b)))
+#define STREAM(p, v) _mm512_stream_ps(p, v)
 #include "kernels_simd.h"

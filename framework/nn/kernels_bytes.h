@@ -20,6 +20,14 @@ static inline veci load_pairs(const int8_t *p)
 #define LOAD_PAIRS(p) load_pairs(p)
 #endif
 
+// numbers of 16 bits
+static inline veci load_wide(const int8_t *p)
+{
+    veci v;
+    memcpy(&v, p, sizeof v);
+    return v;
+}
+
 static inline veci splat_pair(const int16_t *p)
 {
     int32_t pair;
@@ -27,49 +35,67 @@ static inline veci splat_pair(const int16_t *p)
     return pair - (veci){0};
 }
 
-enum { PAIRS = 2 * SDM_PANEL }; // bytes of two inputs of a panel
+// outputs in rows of 4, `line` floats apart
+static inline void store_rows(float *y, size_t line, vec v)
+{
+    typedef float row __attribute__((vector_size(16)));
+    row rows[VW / 4];
+    memcpy(rows, &v, sizeof v);
+    for (int i = 0; i < VW / 4; i++) memcpy(y + (size_t)i * line, &rows[i], sizeof *rows);
+}
 
-// where register j of the outputs has its weights, in bytes from panel o / 16 on
-#define BYTES_AT(j) ((size_t)((j)*VW / SDM_PANEL) * panel + (size_t)((j)*VW % SDM_PANEL) * 2)
+enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inputs of a panel
 
-// acc[rows][n] += `pairs` pairs of inputs
-#define BYTES_SUM(rows, n, pairs)                                                                                      \
-    for (size_t p = 0; p < (pairs); p++, w += PAIRS) {                                                                 \
+// where register j of the outputs has its weights of a pair, in bytes from panel o / 16 on
+#define BYTES_AT(j, pair) ((size_t)((j)*VW / SDM_PANEL) * panel + (size_t)((j)*VW % SDM_PANEL) * (pair / SDM_PANEL))
+
+// loops over registers: sums stay in registers only when they are gone before arrays are taken apart
+#if defined(__clang__)
+#define EACH(i, n) _Pragma("clang loop unroll(full)") for (int i = 0; i < (n); i++)
+#else
+#define EACH(i, n) _Pragma("GCC unroll 8") for (int i = 0; i < (n); i++)
+#endif
+
+// acc[rows][n] += `pairs` pairs of inputs, `pair` bytes each
+#define BYTES_SUM(rows, n, pairs, pair, load_pair)                                                                     \
+    for (size_t p = 0; p < (pairs); p++, w += (pair), x += 2) {                                                        \
         veci weight[n];                                                                                                \
-        for (int j = 0; j < n; j++) weight[j] = LOAD_PAIRS(w + BYTES_AT(j));                                           \
-        for (int i = 0; i < rows; i++) {                                                                               \
-            const veci s = splat_pair(x + (size_t)i * ldx + 2 * p);                                                    \
-            for (int j = 0; j < n; j++) acc[i][j] += (vecu)MADD(s, weight[j]);                                         \
+        EACH(j, n) weight[j] = load_pair(w + BYTES_AT(j, pair));                                                       \
+        EACH(i, rows)                                                                                                  \
+        {                                                                                                              \
+            const veci s = splat_pair(x + (size_t)i * ldx);                                                            \
+            EACH(j, n) acc[i][j] += (vecu)MADD(s, weight[j]);                                                          \
         }                                                                                                              \
     }
 
 // `rows` rows of x times `n` registers of outputs
 #define BYTES_BLOCK(rows, n)                                                                                           \
-    static void bytes_##rows##x##n(size_t coarse, size_t fine, const int8_t *w, const int16_t *x, size_t ldx,          \
-                                   const float *scale, float *y, size_t ldy)                                           \
+    static void bytes_##rows##x##n(size_t wide, size_t narrow, const int8_t *w, size_t at, const int16_t *x,           \
+                                   size_t ldx, const float *scale, float *y, size_t ldy, size_t line)                  \
     {                                                                                                                  \
-        const size_t panel = (coarse + fine) * PAIRS;                                                                  \
+        const size_t panel = wide * WIDE + narrow * NARROW;                                                            \
         vecu acc[rows][n];                                                                                             \
-        for (int i = 0; i < rows; i++)                                                                                 \
-            for (int j = 0; j < n; j++) acc[i][j] = (vecu){0};                                                         \
-        if (coarse) {                                                                                                  \
-            BYTES_SUM(rows, n, coarse)                                                                                 \
-            for (int i = 0; i < rows; i++)                                                                             \
-                for (int j = 0; j < n; j++) acc[i][j] <<= 8;                                                           \
-        }                                                                                                              \
-        BYTES_SUM(rows, n, fine)                                                                                       \
-        for (int i = 0; i < rows; i++) {                                                                               \
+        EACH(i, rows)                                                                                                  \
+        EACH(j, n) acc[i][j] = (vecu){0};                                                                              \
+        w += at * WIDE / SDM_PANEL;                                                                                    \
+        BYTES_SUM(rows, n, wide, WIDE, load_wide)                                                                      \
+        w -= at * (WIDE - NARROW) / SDM_PANEL;                                                                         \
+        BYTES_SUM(rows, n, narrow, NARROW, LOAD_PAIRS)                                                                 \
+        EACH(i, rows)                                                                                                  \
+        {                                                                                                              \
             const vec s = splat(scale[i]);                                                                             \
-            for (int j = 0; j < n; j++)                                                                                \
-                store(y + (size_t)i * ldy + (size_t)(j * VW), s * __builtin_convertvector((veci)acc[i][j], vec));      \
+            EACH(j, n)                                                                                                 \
+            store_rows(y + (size_t)i * ldy + (size_t)(j * VW / 4) * line, line,                                        \
+                       s * __builtin_convertvector((veci)acc[i][j], vec));                                             \
         }                                                                                                              \
     }
 
 #define BYTES_STEP(rows, n)                                                                                            \
     for (; o + n * VW <= outputs; o += n * VW)                                                                         \
-        bytes_##rows##x##n(coarse, fine, w + o / SDM_PANEL * (coarse + fine) * PAIRS + o % SDM_PANEL * 2, x, ldx,      \
-                           scale, y + o, ldy);
+        bytes_##rows##x##n(wide, narrow, w + o / SDM_PANEL * panel, o % SDM_PANEL, x, ldx, scale, y + o / 4 * line,    \
+                           ldy, line);
 
+BYTES_BLOCK(1, 8)
 BYTES_BLOCK(1, 4)
 BYTES_BLOCK(1, 2)
 BYTES_BLOCK(1, 1)
@@ -86,12 +112,14 @@ BYTES_BLOCK(5, 1)
 BYTES_BLOCK(6, 2)
 BYTES_BLOCK(6, 1)
 
-static void bytes_rows(size_t rows, size_t outputs, size_t coarse, size_t fine, const int8_t *w, const int16_t *x,
-                       size_t ldx, const float *scale, float *y, size_t ldy)
+static void bytes_rows(size_t rows, size_t outputs, size_t wide, size_t narrow, const int8_t *w, const int16_t *x,
+                       size_t ldx, const float *scale, float *y, size_t ldy, size_t line)
 {
+    const size_t panel = wide * WIDE + narrow * NARROW;
     size_t o = 0;
     switch (rows) {
     case 1:
+        BYTES_STEP(1, 8)
         BYTES_STEP(1, 4)
         BYTES_STEP(1, 2)
         BYTES_STEP(1, 1)
@@ -122,54 +150,49 @@ static void bytes_rows(size_t rows, size_t outputs, size_t coarse, size_t fine, 
 }
 
 // as panel_f32(): a few panels for all rows, then the next
-static void panel_i8(size_t batch, size_t outputs, size_t n_coarse, size_t k, const int8_t *w, const int16_t *x,
-                     size_t ldx, const float *scale, float *y, size_t ldy)
+static void panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w, const int16_t *x,
+                     size_t ldx, const float *scale, float *y, size_t ldy, size_t line)
 {
-    const size_t coarse = (n_coarse + 1) / 2, fine = (k + 1) / 2;
+    const size_t wide = (n_wide + 1) / 2, narrow = (k + 1) / 2 - wide, panel = wide * WIDE + narrow * NARROW;
     if (batch <= 6) {
-        bytes_rows(batch, outputs, coarse, fine, w, x, ldx, scale, y, ldy);
+        bytes_rows(batch, outputs, wide, narrow, w, x, ldx, scale, y, ldy, line);
         return;
     }
     const size_t some = 2 * VW > SDM_PANEL ? 2 * VW : SDM_PANEL;
-    for (size_t o = 0; o < outputs; o += some, w += some / SDM_PANEL * (coarse + fine) * PAIRS)
+    for (size_t o = 0; o < outputs; o += some, w += some / SDM_PANEL * panel)
         for (size_t i = 0; i < batch; i += 6)
-            bytes_rows(batch - i < 6 ? batch - i : 6, outputs - o < some ? outputs - o : some, coarse, fine, w,
-                       x + i * ldx, ldx, scale + i, y + i * ldy + o, ldy);
+            bytes_rows(batch - i < 6 ? batch - i : 6, outputs - o < some ? outputs - o : some, wide, narrow, w,
+                       x + i * ldx, ldx, scale + i, y + i * ldy + o / 4 * line, ldy, line);
 }
 
-// x[2 * pairs] += factor times the transpose of `pairs` pairs of n outputs
-static void back_pairs(size_t n, size_t pairs, size_t panel, float factor, const int8_t *w, const float *y, float *x)
-{
-    for (size_t p = 0; p < pairs; p++, w += PAIRS) {
-        vec a = {0}, b = {0};
-        for (size_t j = 0; j < n; j += VW) {
-            const veci weight = LOAD_PAIRS(w + j / SDM_PANEL * panel + j % SDM_PANEL * 2);
-            const vec at = load(y + j);
-            a += __builtin_convertvector(first_of(weight), vec) * at;
-            b += __builtin_convertvector(second_of(weight), vec) * at;
-        }
-        x[2 * p] += factor * sum_lanes(a);
-        x[2 * p + 1] += factor * sum_lanes(b);
+// x[2 * pairs] += the transpose of `pairs` pairs of n outputs, `pair` bytes each
+#define BACK_PAIRS(name, pair, load_pair)                                                                              \
+    static void name(size_t n, size_t pairs, size_t panel, const int8_t *w, const float *y, float *x)                  \
+    {                                                                                                                  \
+        for (size_t p = 0; p < pairs; p++, w += pair) {                                                                \
+            vec a = {0}, b = {0};                                                                                      \
+            for (size_t j = 0; j < n; j += VW) {                                                                       \
+                const veci weight = load_pair(w + j / SDM_PANEL * panel + j % SDM_PANEL * (pair / SDM_PANEL));         \
+                const vec at = load(y + j);                                                                            \
+                a += __builtin_convertvector(first_of(weight), vec) * at;                                              \
+                b += __builtin_convertvector(second_of(weight), vec) * at;                                             \
+            }                                                                                                          \
+            x[2 * p] += sum_lanes(a);                                                                                  \
+            x[2 * p + 1] += sum_lanes(b);                                                                              \
+        }                                                                                                              \
     }
-}
+BACK_PAIRS(back_wide, WIDE, load_wide)
+BACK_PAIRS(back_narrow, NARROW, LOAD_PAIRS)
 
-static void back_i8(size_t outputs, size_t n_coarse, size_t k, const int8_t *w, const float *y, float *x)
+static void back_i8(size_t outputs, size_t n_wide, size_t k, const int8_t *w, const float *y, float *x)
 {
-    const size_t coarse = (n_coarse + 1) / 2, fine = (k + 1) / 2, panel = (coarse + fine) * PAIRS;
-    memset(x, 0, 2 * fine * sizeof *x);
+    const size_t wide = (n_wide + 1) / 2, narrow = (k + 1) / 2 - wide, panel = wide * WIDE + narrow * NARROW;
+    memset(x, 0, 2 * (wide + narrow) * sizeof *x);
     for (size_t o = 0; o < outputs; o += 4 * SDM_PANEL, w += 4 * panel) {
         const size_t n = outputs - o < 4 * SDM_PANEL ? outputs - o : 4 * SDM_PANEL;
-        back_pairs(n, coarse, panel, 256, w, y + o, x);
-        back_pairs(n, fine, panel, 1, w + coarse * PAIRS, y + o, x);
+        back_wide(n, wide, panel, w, y + o, x);
+        back_narrow(n, narrow, panel, w + wide * WIDE, y + o, x + 2 * wide);
     }
-}
-
-// what is left of y times their factors, filled up with zeros
-static vec product_of_rest(size_t n, const float *y, const float *factor)
-{
-    float some[VW] = {0};
-    for (size_t i = 0; i < n; i++) some[i] = factor ? y[i] * factor[i] : y[i];
-    return load(some);
 }
 
 static inline vec product_at(size_t i, const float *y, const float *factor)
@@ -192,12 +215,13 @@ static inline vec_short round_to_short(vec v, float to_integer)
     return __builtin_convertvector((vecu)(v * to_integer + 12582912.0f), vec_short);
 }
 
+// the last register of n >= VW numbers begins where it ends with them: some are done twice
+static inline size_t last_register(size_t n, size_t i) { return i + VW <= n ? i : n - VW; }
+
 static inline float quantise_by(size_t n, const float *y, const float *factor, int limit, int16_t *x)
 {
-    const size_t whole = n / VW * VW;
-    const vec rest = product_of_rest(n - whole, y + whole, factor ? factor + whole : NULL);
-    veci most = larger_magnitude((veci){0}, rest);
-    for (size_t i = 0; i < whole; i += VW) most = larger_magnitude(most, product_at(i, y, factor));
+    veci most = {0};
+    for (size_t i = 0; i < n; i += VW) most = larger_magnitude(most, product_at(last_register(n, i), y, factor));
     int32_t largest_bits = 0;
     for (int j = 0; j < VW; j++) largest_bits = most[j] > largest_bits ? most[j] : largest_bits;
     float largest;
@@ -207,16 +231,26 @@ static inline float quantise_by(size_t n, const float *y, const float *factor, i
         memset(x, 0, n * sizeof *x);
         return largest_bits >= 0x7f800000 ? largest - largest : 0;
     }
-    for (size_t i = 0; i < whole; i += VW) {
-        const vec_short s = round_to_short(product_at(i, y, factor), to_integer);
-        memcpy(x + i, &s, sizeof s);
+    for (size_t i = 0; i < n; i += VW) {
+        const size_t at = last_register(n, i);
+        const vec_short s = round_to_short(product_at(at, y, factor), to_integer);
+        memcpy(x + at, &s, sizeof s);
     }
-    const vec_short s = round_to_short(rest, to_integer);
-    memcpy(x + whole, &s, (n - whole) * sizeof *x);
     return largest / (float)limit;
+}
+
+static float quantise_few(size_t n, const float *y, const float *factor, int limit, int16_t *x)
+{
+    float some[VW] = {0};
+    int16_t integers[VW];
+    for (size_t i = 0; i < n; i++) some[i] = factor ? y[i] * factor[i] : y[i];
+    const float scale = quantise_by(VW, some, NULL, limit, integers);
+    memcpy(x, integers, n * sizeof *x);
+    return scale;
 }
 
 static float quantise(size_t n, const float *y, const float *factor, int limit, int16_t *x)
 {
+    if (n < VW) return quantise_few(n, y, factor, limit, x);
     return factor ? quantise_by(n, y, factor, limit, x) : quantise_by(n, y, NULL, limit, x);
 }

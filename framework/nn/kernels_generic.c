@@ -3,6 +3,7 @@
 #if defined(__x86_64__)
 #define ISA "sse2"
 #include <emmintrin.h>
+#define STREAM(p, v) _mm_stream_ps(p, v)
 #define MADD(a, b) ((veci)_mm_madd_epi16((__m128i)(a), (__m128i)(b)))
 #elif defined(__aarch64__)
 #define ISA "neon"

@@ -167,10 +167,10 @@ void sdm_panel_back_f16(size_t outputs, size_t k, const uint16_t *w, const float
     kernels()->back_f16(sdm_panel_outputs(outputs), k, w, y, x);
 }
 
-size_t sdm_panel_i8_count(size_t outputs, size_t n_coarse, size_t k)
+size_t sdm_panel_i8_count(size_t outputs, size_t n_wide, size_t k)
 {
-    const size_t inputs = sdm_panel_even(n_coarse) + sdm_panel_even(k), most = SIZE_MAX - SDM_PANEL;
-    return outputs > most || k >= SIZE_MAX / 4 || n_coarse > k ||
+    const size_t inputs = sdm_panel_even(n_wide) + sdm_panel_even(k), most = SIZE_MAX - SDM_PANEL;
+    return outputs > most || k >= SIZE_MAX / 4 || n_wide > k ||
                    (inputs && sdm_panel_outputs(outputs) > SIZE_MAX / inputs)
                ? SIZE_MAX
                : sdm_panel_outputs(outputs) * inputs;
@@ -188,24 +188,18 @@ int sdm_panel_i8_limit(size_t outputs, size_t k, const int16_t *w)
     return limit > INT16_MAX ? INT16_MAX : limit > 1 ? (int)limit : 1;
 }
 
-// one part, coarse or fine, of a panel from output o on
-static int8_t *pack_part(bool coarse, size_t o, size_t outputs, size_t n, size_t k, const int16_t *w, int8_t *to)
+void sdm_panel_pack_i8(size_t outputs, size_t n_wide, size_t k, const int16_t *w, int8_t *panels)
 {
-    for (size_t i = 0; i < n; i += 2)
-        for (size_t j = o; j < o + SDM_PANEL; j++)
-            for (size_t q = i; q < i + 2; q++) {
-                const int16_t v = j < outputs && q < n ? w[j * k + q] : 0, high = (int16_t)((v + 128) >> 8);
-                *to++ = (int8_t)(coarse ? high : v - 256 * high);
-            }
-    return to;
-}
-
-void sdm_panel_pack_i8(size_t outputs, size_t n_coarse, size_t k, const int16_t *w, int8_t *panels)
-{
-    for (size_t o = 0; o < outputs; o += SDM_PANEL) {
-        panels = pack_part(true, o, outputs, n_coarse, k, w, panels);
-        panels = pack_part(false, o, outputs, k, k, w, panels);
-    }
+    const size_t wide = sdm_panel_even(n_wide);
+    for (size_t o = 0; o < outputs; o += SDM_PANEL)
+        for (size_t i = 0; i < k; i += 2)
+            for (size_t j = o; j < o + SDM_PANEL; j++)
+                for (size_t q = i; q < i + 2; q++) {
+                    const int16_t v = j < outputs && q < k ? w[j * k + q] : 0;
+                    const size_t size = i < wide ? 2 : 1; // little-endian: the first byte is all of a narrow one
+                    memcpy(panels, &v, size);
+                    panels += size;
+                }
 }
 
 float sdm_quantise(size_t n, const float *y, const float *factor, int limit, int16_t *x)
@@ -213,15 +207,27 @@ float sdm_quantise(size_t n, const float *y, const float *factor, int limit, int
     return kernels()->quantise(n, y, factor, limit, x);
 }
 
-void sdm_panel_i8(size_t batch, size_t outputs, size_t n_coarse, size_t k, const int8_t *w, const int16_t *x,
-                  size_t ldx, const float *scale, float *y, size_t ldy)
+void sdm_panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w, const int16_t *x, size_t ldx,
+                  const float *scale, float *y, size_t ldy, size_t line)
 {
-    kernels()->panel_i8(batch, sdm_panel_outputs(outputs), n_coarse, k, w, x, ldx, scale, y, ldy);
+    kernels()->panel_i8(batch, sdm_panel_outputs(outputs), n_wide, k, w, x, ldx, scale, y, ldy, line);
 }
 
-void sdm_panel_back_i8(size_t outputs, size_t n_coarse, size_t k, const int8_t *w, const float *y, float *x)
+void sdm_panel_back_i8(size_t outputs, size_t n_wide, size_t k, const int8_t *w, const float *y, float *x)
 {
-    kernels()->back_i8(sdm_panel_outputs(outputs), n_coarse, k, w, y, x);
+    kernels()->back_i8(sdm_panel_outputs(outputs), n_wide, k, w, y, x);
+}
+
+void sdm_put(size_t n, const float *y, const float *mean, float *to, bool stream)
+{
+    kernels()->put(n, y, mean, to, stream);
+}
+
+void sdm_put_end(void)
+{
+#if defined(__x86_64__)
+    __builtin_ia32_sfence();
+#endif
 }
 
 void sdm_exp(size_t n, const float *x, float *y) { kernels()->exp(n, x, y); }

@@ -2,6 +2,7 @@
 #ifndef SDM_KERNELS_TABLE_H
 #define SDM_KERNELS_TABLE_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -18,10 +19,11 @@ typedef struct kernel_table {
     void (*back_f32)(size_t outputs, size_t k, const float *w, const float *y, float *x);
     void (*back_f16)(size_t outputs, size_t k, const uint16_t *w, const float *y, float *x);
     /* sdm_panel_i8(), sdm_panel_back_i8() and sdm_quantise(); outputs: a multiple of 16 */
-    void (*panel_i8)(size_t batch, size_t outputs, size_t n_coarse, size_t k, const int8_t *w, const int16_t *x,
-                     size_t ldx, const float *scale, float *y, size_t ldy);
-    void (*back_i8)(size_t outputs, size_t n_coarse, size_t k, const int8_t *w, const float *y, float *x);
+    void (*panel_i8)(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w, const int16_t *x,
+                     size_t ldx, const float *scale, float *y, size_t ldy, size_t line);
+    void (*back_i8)(size_t outputs, size_t n_wide, size_t k, const int8_t *w, const float *y, float *x);
     float (*quantise)(size_t n, const float *y, const float *factor, int limit, int16_t *x);
+    void (*put)(size_t n, const float *y, const float *mean, float *to, bool stream);
     void (*exp)(size_t n, const float *x, float *y);
 } kernel_table;
 

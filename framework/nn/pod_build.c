@@ -49,27 +49,30 @@ static void pack_weights(const sdm_pod_spec *spec, const pod_integers *integers,
         memcpy(bias + l * a->width, spec->weights.bias[l], a->width * sizeof *bias);
     }
     if (integers)
-        sdm_panel_pack_i8(a->n_coefficients, integers->coarse[n_blocks], a->n_latent, integers->head, head);
+        sdm_panel_pack_i8(a->n_coefficients, integers->wide[n_blocks], a->n_latent, integers->head, head);
     else
         pack_matrix(spec->type, a->n_coefficients, a->n_latent, (sdm_view){spec->weights.head, a->n_latent, 1}, head,
                     0);
     for (size_t b = 0, from = 0; b < n_blocks; b++) {
         const size_t outputs = sdm_pod_outputs(spec->blocks, b), rank = spec->blocks[b].rank;
         if (integers)
-            sdm_panel_pack_i8(outputs, integers->coarse[b], rank, integers->basis + from, (int8_t *)basis + at[b]);
+            sdm_panel_pack_i8(outputs, integers->wide[b], rank, integers->basis + from, (int8_t *)basis + at[b]);
         else
             pack_matrix(spec->type, outputs, rank, (sdm_view){spec->weights.basis + from, 1, outputs}, basis, at[b]);
         from += outputs * rank;
     }
 }
 
-// in the order in which blocks are decoded
-static void pack_mean(const sdm_pod_spec *spec, const pod_leaf *leaves, float *to)
+// [nz][ny][nx]
+static void place_mean(const sdm_pod_spec *spec, float *to)
 {
+    const size_t line = (size_t)spec->info->grid.n[0], plane = line * (size_t)spec->info->grid.n[1];
     for (size_t i = 0; i < spec->arch.levels.first[1]; i++) {
-        const sdm_pod_block *b = &spec->blocks[leaves[i].block];
-        memcpy(to, spec->weights.mean + b->voxel, sdm_pod_block_voxels(b) * sizeof *to);
-        to += sdm_pod_block_voxels(b);
+        const sdm_pod_block *b = &spec->blocks[i];
+        const float *from = spec->weights.mean + b->voxel;
+        for (size_t z = b->at[2]; z < b->at[2] + b->size[2]; z++)
+            for (size_t y = b->at[1]; y < b->at[1] + b->size[1]; y++, from += b->size[0])
+                memcpy(to + z * plane + y * line + b->at[0], from, b->size[0] * sizeof *to);
     }
 }
 
@@ -87,13 +90,12 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
     const size_t number = sdm_pod_size(spec->type), n_blocks = a->levels.first[a->levels.n];
     const size_t mlp_count = sdm_pod_mlp_count(a), mlp_number = sdm_pod_size(sdm_pod_mlp_type(spec->type));
     const size_t head_count =
-        sdm_pod_count_weights(spec->type, a->n_coefficients, integers ? integers->coarse[n_blocks] : 0, a->n_latent);
+        sdm_pod_count_weights(spec->type, a->n_coefficients, integers ? integers->wide[n_blocks] : 0, a->n_latent);
     pod_slab *slabs = NULL;
     pod_leaf *leaves = NULL;
     float *bias = NULL, *mean = NULL;
     size_t *at = NULL, basis_count = 0, all[SDM_POD_MAX_LEVELS + 1];
-    uint8_t *mlp = NULL, *head = NULL, *basis = NULL, *ranks = NULL, *coarse = NULL,
-            limit[4 * (SDM_POD_MAX_LEVELS + 1)];
+    uint8_t *mlp = NULL, *head = NULL, *basis = NULL, *ranks = NULL, *wide = NULL, limit[4 * (SDM_POD_MAX_LEVELS + 1)];
     sdm_text text = {0};
     sdm_status s = SDM_ALLOC(&at, n_blocks, "model weights", err);
     if (!s) s = SDM_ALLOC(&slabs, n_blocks - a->levels.first[a->levels.n - 1], "model weights", err);
@@ -101,20 +103,20 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
     if (!s)
         basis_count = sdm_pod_place_weights(spec->type, &a->levels, spec->blocks, slabs,
                                             sdm_pod_slabs(&a->levels, spec->blocks, a->block, slabs, leaves), leaves,
-                                            integers ? integers->coarse : NULL, at);
+                                            integers ? integers->wide : NULL, at);
     if (!s) s = SDM_ALLOC(&mean, a->n_voxels, "model weights", err);
     if (!s) s = SDM_ALLOC(&mlp, mlp_count * mlp_number, "model weights", err);
     if (!s) s = SDM_ALLOC(&bias, a->depth * a->width, "model weights", err);
     if (!s) s = SDM_ALLOC(&head, head_count * number, "model weights", err);
     if (!s) s = SDM_ALLOC(&basis, basis_count * number, "model weights", err);
     if (!s) s = SDM_ALLOC(&ranks, n_blocks * 4, "model weights", err);
-    if (!s) s = SDM_ALLOC(&coarse, (n_blocks + 1) * 4, "model weights", err);
+    if (!s) s = SDM_ALLOC(&wide, (n_blocks + 1) * 4, "model weights", err);
     if (s) goto done;
     pack_weights(spec, integers, at, mlp, bias, head, basis);
-    pack_mean(spec, leaves, mean);
+    place_mean(spec, mean);
     for (size_t b = 0; b < n_blocks; b++) put_numbers(&spec->blocks[b].rank, 1, ranks + 4 * b);
     if (integers) {
-        put_numbers(integers->coarse, n_blocks + 1, coarse);
+        put_numbers(integers->wide, n_blocks + 1, wide);
         put_numbers(integers->limit, a->levels.n + 1, limit);
     }
     sdm_pod_place_coefficients(&a->levels, spec->blocks, all);
@@ -126,7 +128,7 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
         {"pod.head", head, head_count * number},
         {"pod.basis", basis, basis_count * number},
         {"pod.mean", mean, a->n_voxels * sizeof(float)},
-        {"pod.coarse", coarse, (n_blocks + 1) * 4},
+        {"pod.wide", wide, (n_blocks + 1) * 4},
         {"pod.limit", limit, (a->levels.n + 1) * 4},
         {"pod.order", integers ? integers->order : NULL, a->n_latent * sizeof(uint32_t)},
         {"pod.factor", integers ? integers->factor : NULL, (all[a->levels.n] + a->n_latent) * sizeof(float)}};
@@ -134,7 +136,7 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
     s = sdm_model_pack(spec->info, &text, sections, integers ? n : n - 4, bytes, size, err);
 done:
     sdm_text_dispose(&text);
-    sdm_free(coarse);
+    sdm_free(wide);
     sdm_free(ranks);
     sdm_free(basis);
     sdm_free(head);

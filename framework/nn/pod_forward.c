@@ -4,6 +4,9 @@
 
 enum { ROWS = 24 }; // maps for which the head and the MLP are read once
 
+// bytes of maps from which on they would push weights out of the caches rather than stay there for their reader
+#define STREAMED 4e6
+
 static size_t smaller(size_t a, size_t b) { return a < b ? a : b; }
 
 // scratch, carved from the caller's block
@@ -29,6 +32,7 @@ void sdm_pod_forward(const sdm_model *m, const double *params, size_t n, float *
 {
     const pod_network *k = m->network;
     const size_t voxels = sdm_grid_count(&m->info.grid);
+    const bool stream = (double)n * (double)voxels * sizeof *values > STREAMED;
     workspace w;
     carve(k, smaller(n, ROWS), n_threads, scratch, &w);
     for (size_t at = 0; at < n; at += ROWS) {
@@ -36,7 +40,7 @@ void sdm_pod_forward(const sdm_model *m, const double *params, size_t n, float *
         float *maps[ROWS];
         for (size_t r = 0; r < rows; r++) maps[r] = values + (at + r) * voxels;
         sdm_pod_latent(m, params + at * k->arch.n_params, rows, 0, NULL, &w.latent, w.space.z);
-        sdm_pod_decode(k, &m->info.grid, rows, rows, false, maps, &w.space, n_threads);
+        sdm_pod_decode(k, &m->info.grid, rows, rows, false, stream, maps, &w.space, n_threads);
     }
 }
 
@@ -51,7 +55,7 @@ static void tangents(const sdm_model *m, const double *params, size_t n, const d
     sdm_pod_latent(m, params, 1, n, direction, &w.latent, w.space.z);
     float *maps[1 + SDM_POD_MAX_PARAMS] = {values};
     for (size_t r = 0; r < n; r++) maps[1 + r] = tangent + r * voxels;
-    sdm_pod_decode(k, &m->info.grid, 1 + n, 1, true, maps, &w.space, n_threads);
+    sdm_pod_decode(k, &m->info.grid, 1 + n, 1, true, false, maps, &w.space, n_threads);
 }
 
 size_t sdm_pod_jacobian_scratch_bytes(const sdm_model *m, int n_threads)

@@ -37,11 +37,11 @@ typedef struct pod_network {
     size_t max_slab, max_slab_groups;     /* most coefficients of the lowest level, and groups, of a slab */
     uint8_t *exponents;                   /* [max(F, 1 + I)][P] */
     const float *bias[SDM_POD_MAX_DEPTH]; /* [W] */
-    const float *mean;                    /* [voxels] block after block in the order of `leaves` */
+    const float *mean;                    /* [nz][ny][nx] */
     /* Panels (sdm/kernels.h), the MLP's half when the others are bytes. The basis in the order in which it is read (sdm_pod_place_weights()). */
     const void *layer[SDM_POD_MAX_DEPTH], *head, *basis;
     /* Bytes only (pod_quantise.h). */
-    uint32_t *coarse;                  /* [blocks + 1] the last: of the head */
+    uint32_t *wide;                    /* [blocks + 1] the last: of the head */
     const uint32_t *order;             /* [L] */
     const float *factor;               /* [C + L] */
     int limit[SDM_POD_MAX_LEVELS + 1]; /* of inputs of a level as integers; the last: of the head */
@@ -62,8 +62,8 @@ void sdm_pod_product(sdm_pod_type type, size_t rows, size_t outputs, size_t k, c
 void sdm_pod_product_back(sdm_pod_type type, size_t outputs, size_t k, const void *weights, size_t at, const float *y,
                           float *x);
 
-/* Stored numbers of a matrix of `outputs` x k; n_coarse: for bytes. */
-size_t sdm_pod_count_weights(sdm_pod_type type, size_t outputs, size_t n_coarse, size_t k);
+/* Stored numbers of a matrix of `outputs` x k; n_wide: for bytes. */
+size_t sdm_pod_count_weights(sdm_pod_type type, size_t outputs, size_t n_wide, size_t k);
 
 /* Slabs and leaves from blocks that are numbered; slabs[] has room for the blocks of the highest level, leaves[] for those of the lowest.
    edge: of a block of the lowest level. Returns the number of slabs. */
@@ -71,19 +71,19 @@ size_t sdm_pod_slabs(const sdm_pod_levels *levels, const sdm_pod_block *blocks, 
                      pod_leaf *leaves);
 
 /* at[blocks] = where the weights of each block begin, slab by slab: the levels above the lowest depth first, then the leaves.
-   coarse[blocks]: for bytes. Returns their number. */
+   wide[blocks]: for bytes. Returns their number. */
 size_t sdm_pod_place_weights(sdm_pod_type type, const sdm_pod_levels *levels, const sdm_pod_block *blocks,
-                             const pod_slab *slabs, size_t n_slabs, const pod_leaf *leaves, const uint32_t *coarse,
+                             const pod_slab *slabs, size_t n_slabs, const pod_leaf *leaves, const uint32_t *wide,
                              size_t *at);
 
 /* at[l] = number of coefficients of the levels below l, after sdm_pod_number(); the last: of all. */
 void sdm_pod_place_coefficients(const sdm_pod_levels *levels, const sdm_pod_block *blocks,
                                 size_t at[SDM_POD_MAX_LEVELS + 1]);
 
-/* Columns of the head with a coarse part; 0 when weights are not bytes. */
-static inline size_t sdm_pod_head_coarse(const pod_network *m)
+/* Wide columns of the head; 0 when weights are not bytes. */
+static inline size_t sdm_pod_head_wide(const pod_network *m)
 {
-    return m->coarse ? m->coarse[m->arch.levels.first[m->arch.levels.n]] : 0;
+    return m->wide ? m->wide[m->arch.levels.first[m->arch.levels.n]] : 0;
 }
 
 static inline size_t sdm_pod_layer_inputs(const sdm_pod_arch *a, size_t layer)
@@ -126,11 +126,11 @@ typedef struct pod_space {
 size_t sdm_pod_space_carve(const pod_network *m, size_t rows, int n_threads, float *memory, pod_space *w);
 
 /* maps[R] from w->z; the mean map is added to the first `with_mean`. smooth: bytes do not round the inputs of the first, so that it changes
-   smoothly with the parameters. */
-void sdm_pod_decode(const pod_network *m, const sdm_grid *grid, size_t rows, size_t with_mean, bool smooth,
+   smoothly with the parameters. stream: as sdm_put(). */
+void sdm_pod_decode(const pod_network *m, const sdm_grid *grid, size_t rows, size_t with_mean, bool smooth, bool stream,
                     float *const *maps, const pod_space *w, int n_threads);
 
-/* dz[L] = the transpose times adjoint[voxels]. One thread. */
+/* pod_decode_back.c: dz[L] = the transpose times adjoint[voxels]. One thread. */
 void sdm_pod_decode_back(const pod_network *m, const sdm_grid *grid, const float *adjoint, const pod_space *w,
                          float *dz);
 

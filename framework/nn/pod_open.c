@@ -97,14 +97,14 @@ static sdm_status read_bytes(const sdm_section *sections, size_t n, sdm_model *m
     pod_network *m = model->network;
     const sdm_pod_arch *a = &m->arch;
     const size_t n_blocks = a->levels.first[a->levels.n];
-    const uint8_t *coarse = sdm_model_weights(model, sections, n, "pod.coarse", (n_blocks + 1) * 4, err);
-    if (!coarse) return SDM_E_FORMAT;
+    const uint8_t *wide = sdm_model_weights(model, sections, n, "pod.wide", (n_blocks + 1) * 4, err);
+    if (!wide) return SDM_E_FORMAT;
     m->order = sdm_model_weights(model, sections, n, "pod.order", a->n_latent * sizeof *m->order, err);
     if (!m->order) return SDM_E_FORMAT;
     m->factor = sdm_model_weights(model, sections, n, "pod.factor",
                                   (m->coefficients_at[a->levels.n] + a->n_latent) * sizeof *m->factor, err);
     if (!m->factor) return SDM_E_FORMAT;
-    const sdm_status s = SDM_ALLOC(&m->coarse, n_blocks + 1, "model blocks", err);
+    const sdm_status s = SDM_ALLOC(&m->wide, n_blocks + 1, "model blocks", err);
     if (s) return s;
     for (size_t i = 0; i < a->n_latent; i++)
         if (m->order[i] >= a->n_latent)
@@ -118,14 +118,14 @@ static sdm_status read_bytes(const sdm_section *sections, size_t n, sdm_model *m
     }
     for (size_t level = 0; level < a->levels.n; level++)
         for (size_t b = a->levels.first[level]; b < a->levels.first[level + 1]; b++) {
-            m->coarse[b] = number(coarse + 4 * b);
-            if (m->coarse[b] > m->blocks[b].rank)
-                return sdm_fail(err, SDM_E_FORMAT, "damaged: %u coarse columns of a block of rank %u", m->coarse[b],
+            m->wide[b] = number(wide + 4 * b);
+            if (m->wide[b] > m->blocks[b].rank)
+                return sdm_fail(err, SDM_E_FORMAT, "damaged: %u wide columns of a block of rank %u", m->wide[b],
                                 m->blocks[b].rank);
         }
-    m->coarse[n_blocks] = number(coarse + 4 * n_blocks);
-    if (m->coarse[n_blocks] > a->n_latent)
-        return sdm_fail(err, SDM_E_FORMAT, "damaged: %u coarse columns of %zu", m->coarse[n_blocks], a->n_latent);
+    m->wide[n_blocks] = number(wide + 4 * n_blocks);
+    if (m->wide[n_blocks] > a->n_latent)
+        return sdm_fail(err, SDM_E_FORMAT, "damaged: %u wide columns of %zu", m->wide[n_blocks], a->n_latent);
     return SDM_OK;
 }
 
@@ -143,8 +143,8 @@ static sdm_status bind_weights(const sdm_section *sections, size_t n, sdm_model 
         size_t size;
     } need[] = {
         {"pod.mlp", sdm_pod_mlp_count(a) * mlp_weight},
-        {"pod.head", sdm_pod_count_weights(m->type, a->n_coefficients, sdm_pod_head_coarse(m), a->n_latent) * weight},
-        {"pod.basis", sdm_pod_place_weights(m->type, &a->levels, m->blocks, m->slabs, m->n_slabs, m->leaves, m->coarse,
+        {"pod.head", sdm_pod_count_weights(m->type, a->n_coefficients, sdm_pod_head_wide(m), a->n_latent) * weight},
+        {"pod.basis", sdm_pod_place_weights(m->type, &a->levels, m->blocks, m->slabs, m->n_slabs, m->leaves, m->wide,
                                             m->weights_at) *
                           weight},
         {"pod.mean", a->n_voxels * sizeof(float)},
@@ -204,7 +204,7 @@ static void dispose(void *network)
     sdm_free(m->outputs);
     sdm_free(m->weights_at);
     sdm_free(m->exponents);
-    sdm_free(m->coarse);
+    sdm_free(m->wide);
     sdm_free(m->leaves);
     sdm_free(m->slabs);
     sdm_free(m);

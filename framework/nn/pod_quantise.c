@@ -84,11 +84,17 @@ static group group_at(const survey *s, size_t level, size_t i)
     return (group){level, parent->child, parent->child + parent->n_children};
 }
 
-// the first columns that have an error above `worth` for a byte of the coarse part
-static size_t coarse_columns(const matrix *m, double worth)
+// the first columns, in pairs as they are stored, that have an error above `worth` for a byte more
+static size_t wide_columns(const matrix *m, double worth)
 {
+    const double bytes = 2 * (double)sdm_panel_outputs(m->outputs);
     size_t n = m->k;
-    while (n && m->in[n - 1].error <= worth * (double)sdm_panel_outputs(m->outputs)) n--;
+    while (n) {
+        const size_t first = (n - 1) / 2 * 2;
+        const double error = m->in[first].error + (n - first > 1 ? m->in[n - 1].error : 0);
+        if (error > worth * bytes) break;
+        n = first;
+    }
     return n;
 }
 
@@ -105,36 +111,37 @@ static int by_error(const void *a, const void *b)
 }
 
 // error left in a group when columns worth their byte have two (find_steps())
-static double choose_in_group(const survey *s, group g, double worth, uint32_t *coarse)
+static double choose_in_group(const survey *s, group g, double worth, uint32_t *wide)
 {
     double left = 0, most = 0;
     size_t n = 0;
     for (size_t b = g.first; b < g.end; b++) {
         const matrix m = sdm_pod_block_matrix(s, b, g.level);
-        coarse[b] = (uint32_t)coarse_columns(&m, worth);
-        n += coarse[b];
-        for (size_t i = coarse[b]; i < m.k; i++) left += m.in[i].error, most = fmax(most, m.in[i].error);
+        wide[b] = (uint32_t)wide_columns(&m, worth);
+        n += wide[b];
+        for (size_t i = wide[b]; i < m.k; i++) left += m.in[i].error, most = fmax(most, m.in[i].error);
     }
     return left + (double)n * most / (FINER * FINER);
 }
 
-// the same in all; numbers of coarse columns to coarse[blocks + 1]; head: its columns by error
-static double choose(const survey *s, const ranked *head, double worth, uint32_t *coarse)
+// the same in all; numbers of wide columns to wide[blocks + 1]; head: its columns by error
+static double choose(const survey *s, const ranked *head, double worth, uint32_t *wide)
 {
     const size_t latent = s->spec->arch.n_latent, padded = sdm_panel_outputs(s->spec->arch.n_coefficients);
     double left = 0;
     size_t n = 0;
     while (n < latent && head[n].error > worth * (double)padded) n++;
-    coarse[n_blocks(s)] = (uint32_t)n;
+    n = n < latent ? sdm_panel_even(n) : n;
+    wide[n_blocks(s)] = (uint32_t)n;
     if (n < latent) left += (double)n * head[n].error / (FINER * FINER);
     for (; n < latent; n++) left += head[n].error;
     for (size_t l = 0; l < s->spec->arch.levels.n; l++)
-        for (size_t i = 0; i < n_groups(s, l); i++) left += choose_in_group(s, group_at(s, l, i), worth, coarse);
+        for (size_t i = 0; i < n_groups(s, l); i++) left += choose_in_group(s, group_at(s, l, i), worth, wide);
     return left;
 }
 
 // the largest worth with which the error is tolerable
-static sdm_status choose_coarse(const survey *s, pod_integers *q, sdm_error *err)
+static sdm_status choose_wide(const survey *s, pod_integers *q, sdm_error *err)
 {
     const size_t latent = s->spec->arch.n_latent, c = s->coefficients_at[s->spec->arch.levels.n];
     ranked *head = NULL;
@@ -147,12 +154,12 @@ static sdm_status choose_coarse(const survey *s, pod_integers *q, sdm_error *err
     double low = -100, high = 0; // binary logarithms of worth / most
     while (high - low > 0.01) {
         const double middle = 0.5 * (low + high);
-        if (choose(s, head, most * exp2(middle), q->coarse) <= TOLERATED * s->variance)
+        if (choose(s, head, most * exp2(middle), q->wide) <= TOLERATED * s->variance)
             low = middle;
         else
             high = middle;
     }
-    choose(s, head, most * exp2(low), q->coarse);
+    choose(s, head, most * exp2(low), q->wide);
     for (size_t i = 0; i < latent; i++) q->order[i] = head[i].column;
     sdm_free(head);
     return SDM_OK;
@@ -161,24 +168,24 @@ static sdm_status choose_coarse(const survey *s, pod_integers *q, sdm_error *err
 /* Integers. */
 
 // largest input of a column of one byte, in units of the steps; order[i] (NULL: i) of the columns
-static double largest_input(const matrix *m, const uint32_t *order, size_t n_coarse)
+static double largest_input(const matrix *m, const uint32_t *order, size_t n_wide)
 {
     double most = 0;
-    for (size_t i = n_coarse; i < m->k; i++) {
+    for (size_t i = n_wide; i < m->k; i++) {
         const figures *f = &m->in[order ? order[i] : i];
         most = fmax(most, sqrt(f->square) * f->unit);
     }
     return most;
 }
 
-/* Steps of the columns, of which the first n_coarse have two bytes. Those are as fine as their inputs deserve beside `most`, the largest of
+/* Steps of the columns, of which the first n_wide have two bytes. Those are as fine as their inputs deserve beside `most`, the largest of
    the others with which they are rounded, and no finer: the smaller the step, the coarser the input. */
-static void find_steps(const matrix *m, const uint32_t *order, size_t n_coarse, double most)
+static void find_steps(const matrix *m, const uint32_t *order, size_t n_wide, double most)
 {
     for (size_t i = 0; i < m->k; i++) {
         figures *f = &m->in[order ? order[i] : i];
         const double share = most > 0 ? sqrt(f->square) * f->unit / most : INFINITY;
-        f->step = f->unit / (i < n_coarse ? fmin(fmax(FINER * FINE * share, 2 * FINE), SDM_COARSE) : FINE);
+        f->step = f->unit / (i < n_wide ? fmin(fmax(FINER * FINE * share, 2 * FINE), SDM_WIDE) : FINE);
     }
 }
 
@@ -204,7 +211,7 @@ static void round_block(const survey *s, size_t b, size_t level, double most, po
     const matrix m = sdm_pod_block_matrix(s, b, level);
     int16_t *basis = q->basis + s->basis_at[b];
     float *factor = q->factor + s->coefficients_at[level] + s->spec->blocks[b].coefficient;
-    find_steps(&m, NULL, q->coarse[b], most);
+    find_steps(&m, NULL, q->wide[b], most);
     round_matrix(&m, NULL, basis);
     lower(&q->limit[level], &m, basis);
     for (size_t i = 0; i < m.k; i++) factor[i] = (float)(m.in[i].scale * m.in[i].step);
@@ -213,7 +220,7 @@ static void round_block(const survey *s, size_t b, size_t level, double most, po
 static void round_all(const survey *s, pod_integers *q)
 {
     const sdm_pod_arch *a = &s->spec->arch;
-    const size_t of_head = q->coarse[n_blocks(s)];
+    const size_t of_head = q->wide[n_blocks(s)];
     const matrix head = sdm_pod_head_matrix(s);
     for (size_t l = 0; l <= SDM_POD_MAX_LEVELS; l++) q->limit[l] = INT16_MAX;
     find_steps(&head, q->order, of_head, largest_input(&head, q->order, of_head));
@@ -227,7 +234,7 @@ static void round_all(const survey *s, pod_integers *q)
             double most = 0;
             for (size_t b = g.first; b < g.end; b++) {
                 const matrix m = sdm_pod_block_matrix(s, b, l);
-                most = fmax(most, largest_input(&m, NULL, q->coarse[b]));
+                most = fmax(most, largest_input(&m, NULL, q->wide[b]));
             }
             for (size_t b = g.first; b < g.end; b++) round_block(s, b, l, most, q);
         }
@@ -236,7 +243,7 @@ static void round_all(const survey *s, pod_integers *q)
 static sdm_status allocate(const survey *s, pod_integers *q, sdm_error *err)
 {
     const sdm_pod_arch *a = &s->spec->arch;
-    sdm_status status = SDM_ALLOC(&q->coarse, n_blocks(s) + 1, "weights as bytes", err);
+    sdm_status status = SDM_ALLOC(&q->wide, n_blocks(s) + 1, "weights as bytes", err);
     if (!status) status = SDM_ALLOC(&q->order, a->n_latent, "weights as bytes", err);
     if (!status) status = SDM_ALLOC(&q->factor, s->coefficients_at[a->levels.n] + a->n_latent, "weights as bytes", err);
     if (!status) status = SDM_ALLOC(&q->head, a->n_coefficients * a->n_latent, "weights as bytes", err);
@@ -259,7 +266,7 @@ sdm_status sdm_pod_quantise(const sdm_pod_spec *spec, pod_integers *out, sdm_err
             }
         const matrix head = sdm_pod_head_matrix(&s);
         find_scales(&head, a->n_voxels);
-        status = choose_coarse(&s, out, err);
+        status = choose_wide(&s, out, err);
     }
     if (!status) round_all(&s, out);
     sdm_pod_survey_dispose(&s);
@@ -268,7 +275,7 @@ sdm_status sdm_pod_quantise(const sdm_pod_spec *spec, pod_integers *out, sdm_err
 
 void sdm_pod_integers_dispose(pod_integers *q)
 {
-    sdm_free(q->coarse);
+    sdm_free(q->wide);
     sdm_free(q->order);
     sdm_free(q->factor);
     sdm_free(q->head);

@@ -6,7 +6,7 @@
 
 /* Coefficients of all levels stand one after another, C in number, level l from coefficients_at[l] on. */
 typedef struct pod_integers {
-    uint32_t *coarse; /* [blocks + 1] how many of the first columns have a coarse part; the last: of the head */
+    uint32_t *wide; /* [blocks + 1] how many of the first columns have two bytes; the last: of the head */
     uint32_t limit[SDM_POD_MAX_LEVELS + 1]; /* largest inputs of the blocks of a level; the last: of the head */
     uint32_t *order;                        /* [L] latent variable of each column of the head */
     float

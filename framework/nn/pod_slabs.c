@@ -53,15 +53,15 @@ size_t sdm_pod_slabs(const sdm_pod_levels *levels, const sdm_pod_block *blocks, 
     return n;
 }
 
-size_t sdm_pod_count_weights(sdm_pod_type type, size_t outputs, size_t n_coarse, size_t k)
+size_t sdm_pod_count_weights(sdm_pod_type type, size_t outputs, size_t n_wide, size_t k)
 {
-    return type == SDM_POD_I8 ? sdm_panel_i8_count(outputs, n_coarse, k) : sdm_panel_count(outputs, k);
+    return type == SDM_POD_I8 ? sdm_panel_i8_count(outputs, n_wide, k) : sdm_panel_count(outputs, k);
 }
 
 typedef struct placing {
     sdm_pod_type type;
     const sdm_pod_block *blocks;
-    const uint32_t *coarse;
+    const uint32_t *wide;
     size_t next, *at;
 } placing;
 
@@ -69,7 +69,7 @@ static void place(placing *p, size_t b)
 {
     p->at[b] = p->next;
     p->next +=
-        sdm_pod_count_weights(p->type, sdm_pod_outputs(p->blocks, b), p->coarse ? p->coarse[b] : 0, p->blocks[b].rank);
+        sdm_pod_count_weights(p->type, sdm_pod_outputs(p->blocks, b), p->wide ? p->wide[b] : 0, p->blocks[b].rank);
 }
 
 static void place_upper(placing *p, size_t b, size_t level)
@@ -80,10 +80,10 @@ static void place_upper(placing *p, size_t b, size_t level)
 }
 
 size_t sdm_pod_place_weights(sdm_pod_type type, const sdm_pod_levels *levels, const sdm_pod_block *blocks,
-                             const pod_slab *slabs, size_t n_slabs, const pod_leaf *leaves, const uint32_t *coarse,
+                             const pod_slab *slabs, size_t n_slabs, const pod_leaf *leaves, const uint32_t *wide,
                              size_t *at)
 {
-    placing p = {type, blocks, coarse, 0, at};
+    placing p = {type, blocks, wide, 0, at};
     for (const pod_slab *s = slabs; s < slabs + n_slabs; s++) {
         for (size_t b = s->top; b < s->top_end; b++) place_upper(&p, b, levels->n - 1);
         for (size_t i = s->leaf; i < s->leaf_end; i++) place(&p, leaves[i].block);

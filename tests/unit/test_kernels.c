@@ -181,28 +181,29 @@ static void panels(void **state)
 static void bytes(void **state)
 {
     (void)state;
-    enum { MOST = 160, ROWS = 13 };
+    enum { MOST = 160, ROWS = 13, LINE = 7, APART = MOST / 4 * LINE };
     int16_t *w, *x;
     int8_t *packed;
-    float *y, *back, dx[128], scale[ROWS];
+    float *y, *apart, *back, dx[128], scale[ROWS];
     assert_int_equal(SDM_ALLOC(&w, MOST * 128, "t", NULL), SDM_OK);
     assert_int_equal(SDM_ALLOC(&x, ROWS * 128, "t", NULL), SDM_OK);
     assert_int_equal(SDM_ALLOC(&packed, sdm_panel_i8_count(MOST, 128, 128), "t", NULL), SDM_OK);
     assert_int_equal(SDM_ALLOC(&y, ROWS * MOST, "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&apart, ROWS * APART, "t", NULL), SDM_OK);
     back = random_floats(MOST, 3);
     assert_int_equal(sdm_panel_i8_count(150, 3, 37), 160 * (4 + 38));
     assert_true(sdm_panel_i8_count(SIZE_MAX / 2, 0, 37) == SIZE_MAX && sdm_panel_i8_count(1, 2, 1) == SIZE_MAX);
     for (int r = 0; r < ROWS; r++) scale[r] = 0.25f + (float)r;
     const size_t inputs[][2] = {{0, 1}, {1, 1}, {0, 12}, {1, 11}, {3, 37}, {37, 37}, {126, 127}};
     for (size_t c = 0; c < sizeof inputs / sizeof *inputs; c++) {
-        const size_t coarse = inputs[c][0], k = inputs[c][1];
+        const size_t wide = inputs[c][0], k = inputs[c][1];
         for (int isa = 0; isa < 3; isa++) {
             if (sdm_kernels_select(isa) != isa) continue;
             for (size_t outputs = 1; outputs <= 150; outputs += outputs < 70 ? 3 : 40) {
                 const bool extreme = outputs % 2 == 0;
                 for (size_t o = 0; o < outputs; o++)
                     for (size_t i = 0; i < k; i++) {
-                        const int most = i < coarse ? SDM_COARSE : 127;
+                        const int most = i < wide ? SDM_WIDE : 127;
                         const double u = 2 * sdm_rng_uniform(1, o, i) - 1;
                         w[o * k + i] = (int16_t)(extreme ? (o % 4 ? most : -most) : (int)(u * most));
                     }
@@ -220,17 +221,19 @@ static void bytes(void **state)
                         const double u = 2 * sdm_rng_uniform(2, r, i) - 1;
                         x[r * 128 + i] = (int16_t)(extreme ? (r % 2 ? limit : -limit) : (int)(u * limit));
                     }
-                sdm_panel_pack_i8(outputs, coarse, k, w, packed);
+                sdm_panel_pack_i8(outputs, wide, k, w, packed);
                 for (size_t rows = 1; rows <= ROWS; rows += rows < 7 ? 1 : 6) {
-                    sdm_panel_i8(rows, outputs, coarse, k, packed, x, 128, scale, y, MOST);
+                    sdm_panel_i8(rows, outputs, wide, k, packed, x, 128, scale, y, MOST, SDM_PANEL_ROW);
+                    sdm_panel_i8(rows, outputs, wide, k, packed, x, 128, scale, apart, APART, LINE);
                     for (size_t r = 0; r < rows; r++)
                         for (size_t o = 0; o < outputs; o++) {
                             int64_t s = 0;
                             for (size_t i = 0; i < k; i++) s += (int64_t)w[o * k + i] * x[r * 128 + i];
                             assert_true(y[r * MOST + o] == scale[r] * (float)s);
+                            assert_true(apart[r * APART + o / 4 * LINE + o % 4] == y[r * MOST + o]);
                         }
                 }
-                sdm_panel_back_i8(outputs, coarse, k, packed, back, dx);
+                sdm_panel_back_i8(outputs, wide, k, packed, back, dx);
                 for (size_t i = 0; i < k; i++) {
                     double s = 0, size = 0;
                     for (size_t o = 0; o < outputs; o++) {
@@ -247,7 +250,33 @@ static void bytes(void **state)
     sdm_free(x);
     sdm_free(packed);
     sdm_free(y);
+    sdm_free(apart);
     sdm_free(back);
+}
+
+// sums to addresses of every kind, nothing beside them
+static void put(void **state)
+{
+    (void)state;
+    enum { MOST = 90, SIDE = 17 };
+    float *y = random_floats(MOST, 6), *mean = random_floats(MOST, 7), *memory = random_floats(MOST + 2 * SIDE, 8);
+    y[3] = -0.0f;
+    for (size_t n = 0; n <= MOST; n++)
+        for (size_t offset = 0; offset < 16; offset++)
+            for (int mode = 0; mode < 4; mode++) {
+                float *to = memory + 1 + offset;
+                to[-1] = to[n] = 77;
+                sdm_put(n, y, mode % 2 ? mean : NULL, to, mode / 2);
+                sdm_put_end();
+                for (size_t i = 0; i < n; i++) {
+                    const float want = mode % 2 ? y[i] + mean[i] : y[i];
+                    assert_memory_equal(to + i, &want, sizeof want);
+                }
+                assert_true(to[-1] == 77 && to[n] == 77);
+            }
+    sdm_free(y);
+    sdm_free(mean);
+    sdm_free(memory);
 }
 
 static void quantisation(void **state)
@@ -315,12 +344,16 @@ static void names(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(product),        cmocka_unit_test(same_bits_for_threads),
-        cmocka_unit_test(half_precision), cmocka_unit_test(half_in_every_instruction_set),
-        cmocka_unit_test(panels),         cmocka_unit_test(bytes),
-        cmocka_unit_test(quantisation),   cmocka_unit_test(exponential),
-        cmocka_unit_test(names)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(product),
+                                       cmocka_unit_test(same_bits_for_threads),
+                                       cmocka_unit_test(half_precision),
+                                       cmocka_unit_test(half_in_every_instruction_set),
+                                       cmocka_unit_test(panels),
+                                       cmocka_unit_test(bytes),
+                                       cmocka_unit_test(put),
+                                       cmocka_unit_test(quantisation),
+                                       cmocka_unit_test(exponential),
+                                       cmocka_unit_test(names)};
     // every instruction set that this machine has, not only the one that is chosen
     int failed = 0;
     for (level = sdm_kernels_select(-1); level >= 0; level--) {

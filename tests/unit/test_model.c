@@ -16,9 +16,9 @@
 #include "sdm/pod.h"
 #include "sdm/rng.h"
 
-enum { P = 3, DEPTH = 2, WIDTH = 70, DEGREE = 3, INPUT_DEGREE = 2, BLOCK = 2 };
+enum { P = 3, DEPTH = 2, WIDTH = 70, DEGREE = 3, INPUT_DEGREE = 2 };
 
-static size_t n_levels = 3;
+static size_t n_levels = 3, block = 2;
 
 // a small random network, kept in plain arrays
 typedef struct toy {
@@ -56,16 +56,16 @@ static void make(toy *t, sdm_pod_type type, int activation)
                         .input_degree = INPUT_DEGREE,
                         .depth = DEPTH,
                         .width = WIDTH,
-                        .block = BLOCK,
+                        .block = block,
                         .activation = activation,
                         .n_terms = sdm_poly_count(P, DEGREE),
                         .n_inputs = sdm_poly_count(P, INPUT_DEGREE) - 1,
                         .n_voxels = 9 * 7 * 5,
-                        .levels = sdm_pod_count(&t->info.grid, BLOCK, n_levels)};
+                        .levels = sdm_pod_count(&t->info.grid, block, n_levels)};
     a->n_latent = a->n_terms + WIDTH;
     const size_t n_blocks = a->levels.first[n_levels];
     assert_true(a->levels.n == n_levels && n_blocks <= 80);
-    sdm_pod_blocks(&t->info.grid, BLOCK, &a->levels, t->blocks);
+    sdm_pod_blocks(&t->info.grid, block, &a->levels, t->blocks);
     // one block is only its mean; on the levels above nothing may have more functions than outputs
     size_t basis = 0;
     for (size_t b = 0; b < n_blocks; b++) {
@@ -261,6 +261,40 @@ static void forward_is_the_definition(void **state)
         assert_true(mode % 3 < 2 || (wrong > 0 && wrong < 1.5e-6 * spread));
         sdm_free(scratch);
         sdm_free(maps);
+        sdm_model_free(m);
+        sdm_free(t.memory);
+    }
+}
+
+// so many that they go past the caches into memory, to addresses of every kind: the same bits as one
+static void many_maps(void **state)
+{
+    (void)state;
+    enum { N = 3300, SIDE = 16 };
+    for (int type = 0; type < 3; type++) {
+        toy t;
+        make(&t, (sdm_pod_type)type, 0);
+        sdm_model *m = open_toy(&t);
+        double *p;
+        float *memory, single[315];
+        void *scratch;
+        assert_int_equal(SDM_ALLOC(&p, N * P, "parameters", NULL), 0);
+        assert_int_equal(SDM_ALLOC(&memory, N * 315 + 2 * SIDE, "maps", NULL), 0);
+        assert_int_equal(sdm_alloc(&scratch, sdm_model_scratch_bytes(m, N), 1, "scratch", NULL), 0);
+        for (uint64_t i = 0; i < N; i++) random_params(i, p + i * P);
+        for (size_t offset = 0; offset < 3; offset++) {
+            float *maps = memory + SIDE + offset;
+            for (size_t i = 0; i < N * 315 + 2 * SIDE; i++) memory[i] = 77;
+            sdm_model_forward(m, p, N, maps, scratch);
+            for (size_t i = 0; i < N; i += 37) {
+                sdm_model_forward(m, p + i * P, 1, single, scratch);
+                assert_memory_equal(single, maps + i * 315, sizeof single);
+            }
+            assert_true(maps[-1] == 77 && maps[N * 315] == 77);
+        }
+        sdm_free(scratch);
+        sdm_free(memory);
+        sdm_free(p);
         sdm_model_free(m);
         sdm_free(t.memory);
     }
@@ -597,6 +631,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(polynomials),
         cmocka_unit_test(forward_is_the_definition),
+        cmocka_unit_test(many_maps),
         cmocka_unit_test(jacobian_is_the_slope),
         cmocka_unit_test(jacobian_of_bytes),
         cmocka_unit_test(bytes_keep_what_is_not_finite),
@@ -606,5 +641,7 @@ int main(void)
         cmocka_unit_test(hostile_sections),
         cmocka_unit_test(every_allocation_may_fail),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    int failed = 0;
+    for (block = 2; block <= 4; block += 2) failed += cmocka_run_group_tests(tests, NULL, NULL);
+    return failed;
 }

@@ -48,36 +48,43 @@ SDM_API void sdm_panel_f16(size_t batch, size_t outputs, size_t k, const uint16_
 SDM_API void sdm_panel_back_f32(size_t outputs, size_t k, const float *w, const float *y, float *x);
 SDM_API void sdm_panel_back_f16(size_t outputs, size_t k, const uint16_t *w, const float *y, float *x);
 
-/* Weights as bytes: the weight of output o and input i is fine[o][i] + 256 coarse[o][i], fine from -128 to 127, coarse from -64 to 64;
-   only the first n_coarse inputs have a coarse part. In panels of 16 outputs too; in each two neighbouring inputs lie together, first all coarse
-   parts, then all fine ones, an odd one filled up with zero. Inputs are integers of 16 bits times a factor for each row, and sums are
-   integers of 32 bits: exact, so the same for every instruction set. */
-#define SDM_COARSE 16384
+/* Weights as bytes; the first n_wide inputs have weights of two, -SDM_WIDE .. SDM_WIDE. In panels of 16 outputs too; in each two neighbouring
+   inputs lie together, first the wide ones (an odd number takes the next input in), then the others, an odd one filled up with zero.
+   Inputs are integers of 16 bits times a factor for each row, and sums are integers of 32 bits: exact, so the same for every instruction
+   set. */
+#define SDM_WIDE 16384
 static inline size_t sdm_panel_even(size_t k) { return k + k % 2; }
 
 /* Bytes of the weights of `outputs` x k; SIZE_MAX when they do not fit. */
-SDM_API size_t sdm_panel_i8_count(size_t outputs, size_t n_coarse, size_t k);
+SDM_API size_t sdm_panel_i8_count(size_t outputs, size_t n_wide, size_t k);
 
 /* Largest magnitude of inputs with which no sum of their products with w[outputs][k] passes the end of its integer, 1 .. 32767. */
 SDM_API int sdm_panel_i8_limit(size_t outputs, size_t k, const int16_t *w);
 
-/* Packs w[outputs][k], in -128 .. 127 but for the first n_coarse of each row, which are in -SDM_COARSE .. SDM_COARSE. */
-SDM_API void sdm_panel_pack_i8(size_t outputs, size_t n_coarse, size_t k, const int16_t *w, int8_t *panels);
+/* Packs w[outputs][k], in -128 .. 127 but for the first n_wide of each row, which are in -SDM_WIDE .. SDM_WIDE. */
+SDM_API void sdm_panel_pack_i8(size_t outputs, size_t n_wide, size_t k, const int16_t *w, int8_t *panels);
 
 /* x[n] = y[n] factor[n] (factor NULL: 1) as integers of at most `limit`, rounded to nearest; returns the factor that gives them back.
    Not finite numbers make it NaN and x zero. */
 SDM_API float sdm_quantise(size_t n, const float *y, const float *factor, int limit, int16_t *x);
 
-/* y[B][ldy] = scale[B] times x[B][ldx] times the weights; as sdm_panel_f32(). Of x, sdm_panel_even(k) numbers of each row are read. */
-SDM_API void sdm_panel_i8(size_t batch, size_t outputs, size_t n_coarse, size_t k, const int8_t *w, const int16_t *x,
-                          size_t ldx, const float *scale, float *y, size_t ldy);
+/* y[B][ldy] = scale[B] times x[B][ldx] times the weights; as sdm_panel_f32(), but outputs are written in rows of SDM_PANEL_ROW, `line` floats
+   apart (SDM_PANEL_ROW: one after another). Of x, sdm_panel_even(k) numbers of each row are read. */
+#define SDM_PANEL_ROW 4
+SDM_API void sdm_panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w, const int16_t *x,
+                          size_t ldx, const float *scale, float *y, size_t ldy, size_t line);
 
 /* The transpose, as sdm_panel_back_f32(); x has room for sdm_panel_even(k). */
-SDM_API void sdm_panel_back_i8(size_t outputs, size_t n_coarse, size_t k, const int8_t *w, const float *y, float *x);
+SDM_API void sdm_panel_back_i8(size_t outputs, size_t n_wide, size_t k, const int8_t *w, const float *y, float *x);
 
 /* Half precision (IEEE 754 binary16), round to nearest even; values beyond its range become infinite. */
 SDM_API uint16_t sdm_half_from_float(float v);
 SDM_API float sdm_half_to_float(uint16_t h);
+
+/* to[n] = y[n] + mean[n] (mean NULL: 0). stream: past the caches, for what is large beside them and not read soon; sdm_put_end(), before
+   others read it, in the thread that wrote. One thread; the same bits either way. */
+SDM_API void sdm_put(size_t n, const float *y, const float *mean, float *to, bool stream);
+SDM_API void sdm_put_end(void);
 
 /* exp(x) for n values, relative error below 2e-7, in place allowed. */
 SDM_API void sdm_exp(size_t n, const float *x, float *y);

@@ -111,22 +111,23 @@ static void add_rest(size_t rows, size_t rests, size_t n, float *y, size_t ldy)
     for (size_t i = 0; i < n && rests; i++) y[i] += y[rows * ldy + i];
 }
 
-// y[rows + rests][ldy] from the inputs of block b; of bytes in rows of 4, `line` apart
-static void product(const job *j, size_t b, const input *in, float *y, size_t ldy, size_t line)
+// y[rows + rests][ldy] from the inputs of a block whose weights begin at `at`; of bytes in rows of 4, `line` apart
+static void product(const job *j, size_t outputs, size_t wide, size_t rank, size_t at, const input *in, float *y,
+                    size_t ldy, size_t line)
 {
     const pod_network *m = j->m;
-    const size_t rows = j->rows + j->rests, outputs = m->outputs[b], rank = m->blocks[b].rank;
+    const size_t rows = j->rows + j->rests;
     if (sdm_pod_is_bytes(m))
-        sdm_panel_i8(rows, outputs, m->wide[b], rank, (const int8_t *)m->basis + m->weights_at[b], in->q, in->ld,
-                     in->scale, y, ldy, line);
+        sdm_panel_i8(rows, outputs, wide, rank, (const int8_t *)m->basis + at, in->q, in->ld, in->scale, y, ldy, line);
     else
-        sdm_pod_product(m->type, rows, outputs, rank, m->basis, m->weights_at[b], in->x, in->ld, y, ldy);
+        sdm_pod_product(m->type, rows, outputs, rank, m->basis, at, in->x, in->ld, y, ldy);
 }
 
 static void upper_product(const job *j, size_t b, const input *in, float *y, size_t ldy)
 {
-    product(j, b, in, y, ldy, SDM_PANEL_ROW);
-    add_rest(j->rows, j->rests, j->m->outputs[b], y, ldy);
+    const pod_network *m = j->m;
+    product(j, m->outputs[b], m->wide ? m->wide[b] : 0, m->blocks[b].rank, m->weights_at[b], in, y, ldy, SDM_PANEL_ROW);
+    add_rest(j->rows, j->rests, m->outputs[b], y, ldy);
 }
 
 // n coefficients of `level` from `first` on, c[G][ldc], as integers
@@ -206,24 +207,22 @@ static inline void copy_rows(size_t n, size_t n_rows, const float *y, float *to,
 }
 
 // a block into its line
-static void decode_leaf(const job *j, const pod_leaf *leaf)
+static void decode_leaf(const job *j, const pod_leaf *l)
 {
-    const pod_network *m = j->m;
-    const sdm_pod_block *k = &m->blocks[leaf->block];
-    const size_t n = k->size[0], nx = (size_t)j->grid->n[0], ldy = sdm_panel_outputs(m->max_outputs[0]);
-    float *to = j->s.line + k->at[0], *y = j->s.y[0];
-    input in = input_from(j->s.leaves, k->coefficient - j->slab->coefficient);
-    if (in.scale) in.scale += leaf->group * (j->rows + j->rests);
-    if (sdm_pod_is_bytes(m) && n == SDM_PANEL_ROW) {
-        product(j, leaf->block, &in, to, j->s.ld_line, nx);
+    const size_t n = l->n_x, nx = (size_t)j->grid->n[0], ldy = sdm_panel_outputs(j->m->max_outputs[0]);
+    float *to = j->s.line + l->x, *y = j->s.y[0];
+    input in = input_from(j->s.leaves, l->coefficient);
+    if (in.scale) in.scale += l->group * (j->rows + j->rests);
+    if (sdm_pod_is_bytes(j->m) && n == SDM_PANEL_ROW) {
+        product(j, l->outputs, l->wide, l->rank, l->weights_at, &in, to, j->s.ld_line, nx);
         return;
     }
-    product(j, leaf->block, &in, y, ldy, SDM_PANEL_ROW);
+    product(j, l->outputs, l->wide, l->rank, l->weights_at, &in, y, ldy, SDM_PANEL_ROW);
     for (size_t r = 0; r < j->rows + j->rests; r++, y += ldy, to += j->s.ld_line) {
         if (n == 4)
-            copy_rows(4, m->outputs[leaf->block] / 4, y, to, nx);
+            copy_rows(4, l->outputs / 4, y, to, nx);
         else
-            copy_rows(n, m->outputs[leaf->block] / n, y, to, nx);
+            copy_rows(n, l->outputs / n, y, to, nx);
     }
 }
 
@@ -231,21 +230,20 @@ static void decode_leaf(const job *j, const pod_leaf *leaf)
 static void put_line(const job *j, const sdm_pod_block *k)
 {
     const size_t nx = (size_t)j->grid->n[0], plane = nx * (size_t)j->grid->n[1], n = k->size[1] * nx;
-    const size_t first = sdm_pod_first_voxel(j->grid, k) - k->at[0];
+    size_t at = sdm_pod_first_voxel(j->grid, k) - k->at[0];
     add_rest(j->rows, j->rests, k->size[2] * n, j->s.line, j->s.ld_line);
-    for (size_t r = 0; r < j->rows; r++)
-        for (size_t z = 0; z < k->size[2]; z++) {
-            const float *mean = r < j->with_mean ? j->m->mean + first + z * plane : NULL;
-            sdm_put(n, j->s.line + r * j->s.ld_line + z * n, mean, j->maps[r] + first + z * plane, j->stream);
-        }
+    for (size_t z = 0; z < k->size[2]; z++, at += plane)
+        for (size_t r = 0; r < j->rows; r++)
+            sdm_put(n, j->s.line + r * j->s.ld_line + z * n, r < j->with_mean ? j->m->mean + at : NULL, j->maps[r] + at,
+                    j->stream);
 }
 
 static void decode_leaves(const job *j)
 {
-    for (size_t i = j->slab->leaf; i < j->slab->leaf_end; i++) {
-        const sdm_pod_block *k = &j->m->blocks[j->m->leaves[i].block];
-        decode_leaf(j, &j->m->leaves[i]);
-        if (k->at[0] + k->size[0] == (size_t)j->grid->n[0]) put_line(j, k);
+    const pod_leaf *end = j->m->leaves + j->slab->leaf_end;
+    for (const pod_leaf *l = j->m->leaves + j->slab->leaf; l < end; l++) {
+        decode_leaf(j, l);
+        if (l->x + l->n_x == (size_t)j->grid->n[0]) put_line(j, &j->m->blocks[l->block]);
     }
 }
 

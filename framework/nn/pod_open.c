@@ -164,6 +164,7 @@ static sdm_status bind_weights(const sdm_section *sections, size_t n, sdm_model 
     m->head = data[1];
     m->basis = data[2];
     m->mean = data[3];
+    sdm_pod_describe_leaves(m);
     return SDM_OK;
 }
 

@@ -25,7 +25,8 @@ static void order_leaves(const sdm_pod_levels *levels, const sdm_pod_block *bloc
         for (size_t end = b + n; b < end; b++) {
             const size_t x = blocks[b].at[0] / edge, y = (blocks[b].at[1] - first->at[1]) / edge,
                          z = (blocks[b].at[2] - first->at[2]) / edge;
-            leaves[s->leaf + (z * ny + y) * nx + x] = (pod_leaf){(uint32_t)b, (uint32_t)(g - s->group)};
+            leaves[s->leaf + (z * ny + y) * nx + x] =
+                (pod_leaf){.block = (uint32_t)b, .group = (uint32_t)(g - s->group)};
         }
     }
 }
@@ -89,6 +90,21 @@ size_t sdm_pod_place_weights(sdm_pod_type type, const sdm_pod_levels *levels, co
         for (size_t i = s->leaf; i < s->leaf_end; i++) place(&p, leaves[i].block);
     }
     return p.next;
+}
+
+void sdm_pod_describe_leaves(pod_network *m)
+{
+    for (const pod_slab *s = m->slabs; s < m->slabs + m->n_slabs; s++)
+        for (pod_leaf *l = m->leaves + s->leaf; l < m->leaves + s->leaf_end; l++) {
+            const sdm_pod_block *k = &m->blocks[l->block];
+            l->x = k->at[0];
+            l->n_x = k->size[0];
+            l->coefficient = k->coefficient - s->coefficient;
+            l->rank = k->rank;
+            l->wide = m->wide ? m->wide[l->block] : 0;
+            l->outputs = m->outputs[l->block];
+            l->weights_at = m->weights_at[l->block];
+        }
 }
 
 void sdm_pod_place_coefficients(const sdm_pod_levels *levels, const sdm_pod_block *blocks,

@@ -56,9 +56,19 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inp
 #define EACH(i, n) _Pragma("GCC unroll 8") for (int i = 0; i < (n); i++)
 #endif
 
-// acc[rows][n] += `pairs` pairs of inputs, `pair` bytes each
+// acc[rows][n] += `pairs` pairs of inputs, `pair` bytes each; what there is less of stays in registers, inputs or weights
 #define BYTES_SUM(rows, n, pairs, pair, load_pair)                                                                     \
     for (size_t p = 0; p < (pairs); p++, w += (pair), x += 2) {                                                        \
+        if (rows < n) {                                                                                                \
+            veci input[rows];                                                                                          \
+            EACH(i, rows) input[i] = splat_pair(x + (size_t)i * ldx);                                                  \
+            EACH(j, n)                                                                                                 \
+            {                                                                                                          \
+                const veci weight = load_pair(w + BYTES_AT(j, pair));                                                  \
+                EACH(i, rows) acc[i][j] += (vecu)MADD(input[i], weight);                                               \
+            }                                                                                                          \
+            continue;                                                                                                  \
+        }                                                                                                              \
         veci weight[n];                                                                                                \
         EACH(j, n) weight[j] = load_pair(w + BYTES_AT(j, pair));                                                       \
         EACH(i, rows)                                                                                                  \
@@ -68,7 +78,7 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inp
         }                                                                                                              \
     }
 
-// `rows` rows of x times `n` registers of outputs
+// `rows` rows of x times `n` registers of outputs, from output `at` of a panel on
 #define BYTES_BLOCK(rows, n)                                                                                           \
     static void bytes_##rows##x##n(size_t wide, size_t narrow, const int8_t *w, size_t at, const int16_t *x,           \
                                    size_t ldx, const float *scale, float *y, size_t ldy, size_t line)                  \

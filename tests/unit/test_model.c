@@ -266,6 +266,32 @@ static void forward_is_the_definition(void **state)
     }
 }
 
+// blocks of rows of four whose last panel is not full: what fills it up must not fall into the next map
+static void panels_that_are_not_full(void **state)
+{
+    (void)state;
+    enum { N = 7 };
+    const size_t usual = block, levels = n_levels;
+    block = 5, n_levels = 2;
+    toy t;
+    make(&t, SDM_POD_I8, 0);
+    sdm_model *m = open_toy(&t);
+    double p[N * P];
+    static float maps[N * 315], single[315];
+    void *scratch;
+    assert_int_equal(sdm_alloc(&scratch, sdm_model_scratch_bytes(m, N), 1, "scratch", NULL), 0);
+    for (uint64_t i = 0; i < N; i++) random_params(i, p + i * P);
+    sdm_model_forward(m, p, N, maps, scratch);
+    for (size_t i = 0; i < N; i++) {
+        sdm_model_forward(m, p + i * P, 1, single, scratch);
+        assert_memory_equal(single, maps + i * 315, sizeof single);
+    }
+    sdm_free(scratch);
+    sdm_model_free(m);
+    sdm_free(t.memory);
+    block = usual, n_levels = levels;
+}
+
 // so many that they go past the caches into memory, to addresses of every kind: the same bits as one
 static void many_maps(void **state)
 {
@@ -631,6 +657,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(polynomials),
         cmocka_unit_test(forward_is_the_definition),
+        cmocka_unit_test(panels_that_are_not_full),
         cmocka_unit_test(many_maps),
         cmocka_unit_test(jacobian_is_the_slope),
         cmocka_unit_test(jacobian_of_bytes),

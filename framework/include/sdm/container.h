@@ -1,7 +1,7 @@
 /* The file of models and checkpoints: named sections, 64-byte aligned, a checksum for each and one over the whole. Little-endian:
 
    offset  0  "SDMGEN\r\n"      8 bytes (the line end shows a transfer as text)
-           8  version           u32, 1
+           8  version           u32, SDM_CONTAINER_VERSION
           12  number of sections u32, 1 .. 64
           16  length of the file u64
           24  table             for each section: name[24] (zero-padded), offset u64, size u64, CRC-64 u64

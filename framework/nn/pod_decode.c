@@ -1,5 +1,5 @@
-/* The decoder of a pod network: latent variables -> coefficients -> map, and its transpose. A slab (pod_slabs.c) at a time, so that what
-   it needs stays in the caches and rows of the map are written from end to end. Letters as in sdm/pod.h. */
+/* The decoder of a pod network: latent variables -> coefficients -> map. A slab (pod_slabs.c) at a time, so that what it needs stays in the
+   caches. Letters as in sdm/pod.h. */
 #include <string.h>
 #ifdef _OPENMP
 #include <omp.h>

@@ -26,7 +26,8 @@ sdm_status sdm_mul(size_t a, size_t b, size_t *out, sdm_error *err)
     return SDM_OK;
 }
 
-sdm_status sdm_alloc(void **out, size_t count, size_t size, const char *what, sdm_error *err)
+/* *used: bytes of the block, which may be larger than asked for. */
+static sdm_status allocate(void **out, size_t count, size_t size, size_t *used, const char *what, sdm_error *err)
 {
     *out = NULL;
     size_t bytes = 0;
@@ -44,9 +45,23 @@ sdm_status sdm_alloc(void **out, size_t count, size_t size, const char *what, sd
     if (block && large) (void)madvise(block, bytes, MADV_HUGEPAGE);
 #endif
     if (!block) return sdm_fail(err, SDM_E_NOMEM, "%s: no memory for %zu bytes", what, bytes);
-    memset(block, 0, bytes);
     *out = block;
+    *used = bytes;
     return SDM_OK;
+}
+
+sdm_status sdm_alloc(void **out, size_t count, size_t size, const char *what, sdm_error *err)
+{
+    size_t used = 0;
+    const sdm_status s = allocate(out, count, size, &used, what, err);
+    if (!s) memset(*out, 0, used);
+    return s;
+}
+
+sdm_status sdm_alloc_unset(void **out, size_t count, size_t size, const char *what, sdm_error *err)
+{
+    size_t used;
+    return allocate(out, count, size, &used, what, err);
 }
 
 sdm_status sdm_grow(void **block, size_t old_count, size_t new_count, size_t size, const char *what, sdm_error *err)

@@ -20,8 +20,8 @@ sdm_status sdm_arena_reserve(sdm_arena *a, size_t bytes, sdm_error *err)
 {
     if (bytes > LARGEST_BLOCK) return SDM_OK;
     bytes = (bytes + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
-    const sdm_status s = sdm_alloc((void **)&a->block, bytes, 1, "preparation of a mesh", err);
-    if (!s) a->end[SDM_HIGH].at = a->touched[SDM_HIGH] = bytes;
+    const sdm_status s = sdm_alloc_unset((void **)&a->block, bytes, 1, "preparation of a mesh", err);
+    if (!s) a->end[SDM_HIGH].at = bytes;
     return s;
 }
 
@@ -48,19 +48,8 @@ void sdm_arena_release(sdm_arena *a, int end, sdm_arena_mark mark)
     a->end[end] = mark;
 }
 
-static size_t least(size_t x, size_t y) { return x < y ? x : y; }
-static size_t most(size_t x, size_t y) { return x < y ? y : x; }
-
-/* Clears what has been used before. */
-static void clear(const sdm_arena *a, size_t from, size_t to)
-{
-    const size_t low = least(to, a->touched[SDM_LOW]), high = most(from, a->touched[SDM_HIGH]);
-    if (from < low) memset(a->block + from, 0, low - from);
-    if (high < to) memset(a->block + high, 0, to - high);
-}
-
-sdm_status sdm_arena_take(sdm_arena *a, int end, void **out, size_t count, size_t size, const char *what,
-                          sdm_error *err)
+sdm_status sdm_arena_take_unset(sdm_arena *a, int end, void **out, size_t count, size_t size, const char *what,
+                                sdm_error *err)
 {
     const size_t room = a->end[SDM_HIGH].at - a->end[SDM_LOW].at;
     if (!a->block || count > room / size || (count * size + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT > room) {
@@ -69,7 +58,7 @@ sdm_status sdm_arena_take(sdm_arena *a, int end, void **out, size_t count, size_
             return sdm_fail(err, SDM_E_NOMEM, "%s: %zu elements of %zu bytes are more than memory can hold", what,
                             count, size);
         sdm_arena_extra *x;
-        const sdm_status s = sdm_alloc((void **)&x, sizeof *x + count * size, 1, what, err);
+        const sdm_status s = sdm_alloc_unset((void **)&x, sizeof *x + count * size, 1, what, err);
         if (s) return s;
         x->before = a->end[end].extra;
         a->end[end].extra = x;
@@ -79,10 +68,15 @@ sdm_status sdm_arena_take(sdm_arena *a, int end, void **out, size_t count, size_
     const size_t bytes = (count * size + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
     size_t *at = &a->end[end].at;
     const size_t from = end == SDM_LOW ? *at : *at - bytes;
-    clear(a, from, from + bytes);
     *out = a->block + from;
     *at = end == SDM_LOW ? from + bytes : from;
-    a->touched[SDM_LOW] = most(a->touched[SDM_LOW], a->end[SDM_LOW].at);
-    a->touched[SDM_HIGH] = least(a->touched[SDM_HIGH], a->end[SDM_HIGH].at);
     return SDM_OK;
+}
+
+sdm_status sdm_arena_take(sdm_arena *a, int end, void **out, size_t count, size_t size, const char *what,
+                          sdm_error *err)
+{
+    const sdm_status s = sdm_arena_take_unset(a, end, out, count, size, what, err);
+    if (!s && count) memset(*out, 0, count * size);
+    return s;
 }

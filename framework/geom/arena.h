@@ -22,19 +22,22 @@ typedef struct sdm_arena_mark {
 typedef struct sdm_arena {
     char *block;
     sdm_arena_mark end[2];
-    size_t touched[2]; /* farthest that each end has reached: what is beyond is 0 */
 } sdm_arena;
 
 /* The block, once, for arrays of about so many bytes. */
 sdm_status sdm_arena_reserve(sdm_arena *a, size_t bytes, sdm_error *err);
 void sdm_arena_dispose(sdm_arena *a);
 
-/* As sdm_alloc(), from an end; freed by a release or with the arena. */
+/* As sdm_alloc() or sdm_alloc_unset(), from an end; freed by a release or with the arena. */
 sdm_status sdm_arena_take(sdm_arena *a, int end, void **out, size_t count, size_t size, const char *what,
                           sdm_error *err);
+sdm_status sdm_arena_take_unset(sdm_arena *a, int end, void **out, size_t count, size_t size, const char *what,
+                                sdm_error *err);
 
 #define SDM_TAKE(arena, end, ptr, count, what, err)                                                                    \
     sdm_arena_take((arena), (end), (void **)(ptr), (count), sizeof(**(ptr)), (what), (err))
+#define SDM_TAKE_UNSET(arena, end, ptr, count, what, err)                                                              \
+    sdm_arena_take_unset((arena), (end), (void **)(ptr), (count), sizeof(**(ptr)), (what), (err))
 
 /* Frees what has been taken from that end since it was at `mark`. */
 void sdm_arena_release(sdm_arena *a, int end, sdm_arena_mark mark);

@@ -94,7 +94,7 @@ static sdm_status count_components(const sdm_topology *topo, sdm_arena *arena, s
 {
     const sdm_arena_mark before = arena->end[SDM_HIGH];
     uint32_t *parent;
-    const sdm_status s = SDM_TAKE(arena, SDM_HIGH, &parent, topo->n_tri, "components", err);
+    const sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &parent, topo->n_tri, "components", err);
     if (s) return s;
     for (size_t t = 0; t < topo->n_tri; t++) parent[t] = (uint32_t)t;
     for (size_t i = 0; i < topo->n_edges; i++)

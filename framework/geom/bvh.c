@@ -163,16 +163,16 @@ static sdm_status start(builder *w, size_t n_tri, sdm_arena *arena, sdm_bvh *b, 
 {
     b->n_tri = n_tri;
     w->n_part = 1;
-    sdm_status s = SDM_TAKE(arena, SDM_HIGH, &w->item, n_tri, "tree", err);
-    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &w->spare, n_tri, "tree", err);
-    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &w->part, 2 * n_tri, "tree", err);
-    return s ? s : SDM_TAKE(arena, SDM_LOW, &b->order, n_tri, "tree", err);
+    sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &w->item, n_tri, "tree", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &w->spare, n_tri, "tree", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &w->part, 2 * n_tri, "tree", err);
+    return s ? s : SDM_TAKE_UNSET(arena, SDM_LOW, &b->order, n_tri, "tree", err);
 }
 
 static sdm_status finish(const sdm_mesh *m, const builder *w, sdm_arena *arena, sdm_bvh *b, sdm_error *err)
 {
     b->n_node = w->n_part;
-    const sdm_status s = SDM_TAKE(arena, SDM_LOW, &b->node, b->n_node, "tree", err);
+    const sdm_status s = SDM_TAKE_UNSET(arena, SDM_LOW, &b->node, b->n_node, "tree", err);
     if (!s) fill_nodes(m, w, b);
     return s;
 }

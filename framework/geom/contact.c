@@ -266,7 +266,7 @@ static sdm_status sort_contacts(const sdm_contact *list, size_t n_tri, sdm_arena
                                 sdm_error *err)
 {
     sdm_status s = SDM_TAKE(arena, SDM_HIGH, &c->first, n_tri + 1, "contacts", err);
-    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &c->list, c->n, "contacts", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &c->list, c->n, "contacts", err);
     if (s) return s;
     for (size_t i = 0; i < c->n; i++) c->first[list[i].tri + 1]++;
     for (size_t t = 0; t < n_tri; t++) c->first[t + 1] += c->first[t];

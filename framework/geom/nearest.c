@@ -8,7 +8,7 @@
 sdm_status sdm_nearest_build(const sdm_mesh *m, const sdm_topology *topo, sdm_arena *arena, sdm_nearest *n,
                              sdm_error *err)
 {
-    sdm_status s = SDM_TAKE(arena, SDM_LOW, &n->frames, m->n_tri, "frames of triangles", err);
+    sdm_status s = SDM_TAKE_UNSET(arena, SDM_LOW, &n->frames, m->n_tri, "frames of triangles", err);
     if (s) return s;
     for (size_t i = 0; i < m->n_tri; i++) {
         const uint32_t *v = &m->tri[3 * (size_t)n->tree.order[i]];

@@ -41,14 +41,15 @@ static sdm_status visit_lanes(const pairing *w, uint32_t tri, const leaf *b, int
 static sdm_status pairs_of_leaves(const pairing *w, uint32_t i, uint32_t j)
 {
     const leaf *a = &w->leaves[w->place[i]], *b = &w->leaves[w->place[j]];
+    const int n = (int)w->tree[i].count;
     int mask[4], any = 0;
-    for (int k = 0; k < 4; k++) {
+    for (int k = 0; k < n; k++) {
         mask[k] = box4_overlap_one(&a->box, k, &b->box) & ~vertex4_shared_one(a->vertex, k, b->vertex);
         if (a == b) mask[k] &= 14 << k; // each pair once
         any |= mask[k];
     }
     sdm_status s = SDM_OK;
-    for (int k = 0; any && k < 4 && !s; k++) s = visit_lanes(w, a->tri[k], b, mask[k]);
+    for (int k = 0; any && k < n && !s; k++) s = visit_lanes(w, a->tri[k], b, mask[k]);
     return s;
 }
 
@@ -139,7 +140,9 @@ static void fill_leaf(const sdm_mesh *m, const sdm_topology *topo, const uint32_
         for (int a = 0; a < 3; a++) {
             f->box.lo[a][k] = INFINITY;
             f->box.hi[a][k] = -INFINITY;
+            f->vertex[a][k] = 0;
         }
+        f->tri[k] = 0;
     }
     for (int k = 0; k < (int)count; k++) {
         const size_t t = f->tri[k] = order[k];
@@ -177,9 +180,9 @@ sdm_status sdm_pairs_visit(const sdm_mesh *m, const sdm_topology *topo, const sd
     pairing w = {.tree = tree->node, .visit = visit, .user = user};
     uint32_t *place;
     const size_t n_leaf = (tree->n_node + 1) / 2;
-    sdm_status s = SDM_TAKE(arena, SDM_HIGH, &place, tree->n_node, "pairs of triangles", err);
-    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &w.leaves, n_leaf, "pairs of triangles", err);
-    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &w.nodes, n_leaf, "pairs of triangles", err);
+    sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &place, tree->n_node, "pairs of triangles", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &w.leaves, n_leaf, "pairs of triangles", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &w.nodes, n_leaf, "pairs of triangles", err);
     if (!s) {
         const scaling r = scaling_of(tree->node, slack);
         uint32_t leaves = 0, nodes = 0;

@@ -156,7 +156,7 @@ static sdm_status find_edges(sdm_topology *t, sdm_arena *arena, sdm_error *err)
     half_edge *list = NULL;
     mark *seen = NULL;
     sdm_status s = SDM_TAKE(arena, SDM_LOW, &lo, t->n_vert + 1, "half-edges", err);
-    if (!s) s = SDM_TAKE(arena, SDM_LOW, &list, 3 * t->n_tri, "half-edges", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_LOW, &list, 3 * t->n_tri, "half-edges", err);
     if (!s) s = SDM_TAKE(arena, SDM_LOW, &seen, t->n_vert, "half-edges", err);
     if (!s) {
         memset(t->edge, 0xff, 3 * t->n_tri * sizeof *t->edge);
@@ -183,12 +183,12 @@ sdm_status sdm_topology_build(const sdm_mesh *m, sdm_arena *arena, sdm_topology 
                         UINT32_MAX / 3 - 1);
     t->n_vert = m->n_vert;
     t->n_tri = m->n_tri;
-    sdm_status s = SDM_TAKE(arena, SDM_HIGH, &t->weld, m->n_vert, "welded vertices", err);
-    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &t->tri, 3 * m->n_tri, "welded triangles", err);
-    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &t->edge, 3 * m->n_tri, "half-edges", err);
-    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &t->next, 3 * m->n_tri, "half-edges", err);
+    sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &t->weld, m->n_vert, "welded vertices", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &t->tri, 3 * m->n_tri, "welded triangles", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &t->edge, 3 * m->n_tri, "half-edges", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &t->next, 3 * m->n_tri, "half-edges", err);
     if (!s) s = SDM_TAKE(arena, SDM_HIGH, &t->first, m->n_vert + 1, "half-edges", err);
-    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &t->leaving, 3 * m->n_tri, "half-edges", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &t->leaving, 3 * m->n_tri, "half-edges", err);
     if (!s) s = weld_vertices(m, arena, t->weld, err);
     if (s) return s;
     for (size_t i = 0; i < 3 * m->n_tri; i++) t->tri[i] = t->weld[m->tri[i]];

@@ -8,10 +8,9 @@
 /* From the box of a node to eight points. */
 static inline point8 from_box(const sdm_cluster_node *node, point8 p)
 {
-    const v8f zero = v8_all(0);
-    return (point8){v8_max(p.x - v8_all(node->hi[0]), zero) - v8_max(v8_all(node->lo[0]) - p.x, zero),
-                    v8_max(p.y - v8_all(node->hi[1]), zero) - v8_max(v8_all(node->lo[1]) - p.y, zero),
-                    v8_max(p.z - v8_all(node->hi[2]), zero) - v8_max(v8_all(node->lo[2]) - p.z, zero)};
+    const point8 lo = p8_all(node->lo[0], node->lo[1], node->lo[2]), hi = p8_all(node->hi[0], node->hi[1], node->hi[2]);
+    return (point8){p.x - v8_min(v8_max(p.x, lo.x), hi.x), p.y - v8_min(v8_max(p.y, lo.y), hi.y),
+                    p.z - v8_min(v8_max(p.z, lo.z), hi.z)};
 }
 
 /* Parts in which a node may hold the nearest feature. */
@@ -39,6 +38,12 @@ static inline void offer_centroids(const sdm_features *f, const sdm_cluster_node
     }
 }
 
+static inline void take_centroids(const sdm_features *f, const centroid8 *best, float at[3][8])
+{
+    for (int i = 0; i < 8; i++)
+        for (int a = 0; a < 3 && best->face[i] >= 0; a++) at[a][i] = f->centroid[best->face[i]][a];
+}
+
 /* Puts the centroids nearest to the points p in the place of at[3][8], where they are nearer. */
 static void find_centroids(const sdm_features *f, point8 p, float at[3][8])
 {
@@ -64,8 +69,7 @@ static void find_centroids(const sdm_features *f, point8 p, float at[3][8])
         stack[top++] = node->first + !near;
         stack[top++] = node->first + near;
     }
-    for (int i = 0; i < 8; i++)
-        for (int a = 0; a < 3 && best.face[i] >= 0; a++) at[a][i] = f->centroid[best.face[i]][a];
+    take_centroids(f, &best, at);
 }
 
 /* Clusters of the tree that concern blocks of a box. */
@@ -94,41 +98,34 @@ static sdm_status clusters_of_box(const sdm_grid_job *job, const view8 *v, int w
         s->node[n] = i;
         s->node_hit[n++] = (uint8_t)mask;
     }
-    list_hits(job, s->node_hit, s->node, 0, n, s->block, SDM_CLUSTERS);
+    list_hits(job, s->node_hit, s->node, n, s->block);
     return SDM_OK;
 }
 
-/* Points of the surface near the middles p of the tiles of a block. */
-static void refer_tiles(const sdm_grid_job *job, const sdm_candidates *in, const double middle[3], point8 p,
-                        float at[3][8])
+/* Puts centroids near the middles p of the tiles of a block in the place of at[3][8], where they are nearer. */
+static void refer_tiles(const sdm_features *f, const sdm_cluster_list *in, point8 p, float at[3][8])
 {
-    const sdm_features *f = job->features;
     const point8 w = p8_sub(p, p8_load((const float(*)[8])at));
     centroid8 best = {p8_dot(w, w), v8_all_i(-1)};
-    for (size_t i = 0; i < in->end[SDM_CLUSTERS]; i++) {
+    for (size_t i = 0; i < in->n; i++) {
         const sdm_cluster_node *node = &f->node[in->list[i]];
         const point8 b = from_box(node, p);
         if (v8_greater(p8_dot(b, b), best.d2) != 0xff) offer_centroids(f, node, p, &best);
     }
-    for (int i = 0; i < 8; i++) {
-        if (best.face[i] < 0) continue;
-        double x[3], q[3];
-        int feature;
-        for (int a = 0; a < 3; a++) x[a] = middle[a] + job->part[SDM_TO_TILES].middle_mm[i][a];
-        (void)sdm_frame_closest(&job->surface->frames[best.face[i]], x, q, &feature);
-        for (int a = 0; a < 3; a++) at[a][i] = (float)((q[a] - f->centre[a]) * f->scale);
-    }
+    take_centroids(f, &best, at);
 }
 
 /* Clusters of a block that concern its tiles. middle: of the block, mm. Returns a bound on the distance of their points from those of
    the block. */
-static float clusters_of_block(const sdm_grid_job *job, const sdm_candidates *in, const double middle[3],
+static float clusters_of_block(const sdm_grid_job *job, const sdm_cluster_list *in, const double middle[3],
                                const view8 *v, int wanted, sdm_grid_scratch *s)
 {
     const sdm_features *f = job->features;
     float farthest = 0;
+    double at[3];
     size_t n = 0;
-    for (size_t i = 0; i < in->end[SDM_CLUSTERS]; i++) {
+    for (int a = 0; a < 3; a++) at[a] = (middle[a] - f->centre[a]) * f->scale;
+    for (size_t i = 0; i < in->n; i++) {
         const int mask = wanted & concerned(&job->part[SDM_TO_TILES], job->aligned, v, &f->node[in->list[i]]);
         s->cluster[n] = (sdm_cluster_ref){.node = in->list[i], .mask = (uint32_t)mask};
         n += mask != 0;
@@ -137,13 +134,9 @@ static float clusters_of_block(const sdm_grid_job *job, const sdm_candidates *in
     for (size_t i = 0; i < n; i++) {
         sdm_cluster_ref *c = &s->cluster[i];
         const sdm_cluster_node *node = &f->node[c->node];
-        double from[3];
         float sum = 0;
-        const char *group = (const char *)&f->group[node->group]; // for share_out()
-        for (size_t k = 0; k < 2 * sizeof(sdm_feature_group); k += 64) __builtin_prefetch(group + k);
-        sdm_cluster_middle(&job->surface->tree.node[c->node], from);
         for (int a = 0; a < 3; a++) {
-            c->shift[a] = (float)((middle[a] - from[a]) * f->scale);
+            c->shift[a] = (float)(at[a] - (double)sdm_cluster_middle(node, a));
             const float far = fabsf(c->shift[a]) + (node->hi[a] - node->lo[a]) / 2;
             sum += far * far;
         }

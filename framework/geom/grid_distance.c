@@ -188,8 +188,18 @@ static double fill_tables(sdm_grid_job *job)
         const int k = SDM_GRID_STEPS - i;
         set_parts(job, size[k], along[k], size[k + 1], &job->part[i]);
     }
+    // NaN along an axis of one voxel
+    for (int i = 0; i < SDM_GRID_STEPS; i++)
+        for (int a = 0; a < 3; a++)
+            job->share[i] = fmaxf(job->share[i], job->part[i].half[a] / job->part[SDM_TO_BLOCKS].half[a]);
     sdm_grid_parts in_vector;
     set_parts(job, size[0], along[0], size[1], &in_vector);
+    job->to_voxel = in_vector.middle;
+    job->alike = true;
+    for (int c = 0; c < 3; c++)
+        for (int i = 0; i < 8; i++)
+            job->alike &= job->part[SDM_TO_VECTORS].middle.x[c][i] == 2 * job->to_voxel.x[c][i] &&
+                          job->part[SDM_TO_TILES].middle.x[c][i] == 4 * job->to_voxel.x[c][i];
     set_voxels(job, &in_vector);
     job->aligned = true;
     for (int a = 0; a < 3; a++) {
@@ -202,7 +212,7 @@ static double fill_tables(sdm_grid_job *job)
     job->error = (float)(2e-6 * reach);
     for (int mask = 0; mask < 256; mask++)
         for (int i = 0, n = 0; i < 8; i++)
-            if (mask >> i & 1) job->lanes_of[mask][n++] = (uint8_t)i;
+            if (mask >> i & 1) job->lanes_of[mask][n++] = (uint16_t)i;
     return reach;
 }
 
@@ -260,10 +270,11 @@ sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g, cons
     {
         sdm_grid_scratch scratch = {0};
         sdm_error local = {0};
+        const sdm_status ready = sdm_grid_scratch_start(&scratch, &local);
 #pragma omp for schedule(dynamic)
         for (int64_t row = 0; row < n_rows; row++) {
             if (atomic_load(&stop)) continue;
-            sdm_status s = kernel(&job, &scratch, row % job.n_box[1], row / job.n_box[1], &local);
+            sdm_status s = ready ? ready : kernel(&job, &scratch, row % job.n_box[1], row / job.n_box[1], &local);
             if (!s && sdm_cancelled(opts)) s = sdm_fail(&local, SDM_E_CANCELLED, "map stopped on request");
             if (!s) continue;
             atomic_store(&stop, 1);

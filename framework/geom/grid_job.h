@@ -46,9 +46,13 @@ typedef struct sdm_grid_job {
     sdm_points voxel[8][8];                /* [tile][vector] of each vector, the same */
     uint8_t voxel_in_tile[8][8];           /* [vector][lane] number of the voxel in its tile, x fastest */
     _Alignas(64) double tile_voxel[3][64]; /* voxels of a tile relative to its first, mm */
-    uint8_t lanes_of[256][8];              /* the lanes of a mask in order */
-    float error;                           /* bound on the error of a linear function at a part's middle */
-    size_t limit;                          /* bytes of scratch a thread may take, 0: no limit */
+    sdm_points to_voxel;                   /* from the middle of a vector */
+    bool alike; /* parts of a tile are as those of a vector, but twice as far apart, of a block four times */
+    _Alignas(16) uint16_t lanes_of[256][8]; /* the lanes of a mask in order */
+    float share
+        [SDM_GRID_STEPS]; /* at most that share of what a function changes within a block it changes within a part */
+    float error;          /* bound on the error of a linear function at a part's middle */
+    size_t limit;         /* bytes of scratch a thread may take, 0: no limit */
 } sdm_grid_job;
 
 /* A cluster, the tiles that it concerns, and the way from its middle to the block's. */
@@ -59,41 +63,87 @@ typedef struct sdm_cluster_ref {
 
 enum { SDM_FACES, SDM_THIN_FACES, SDM_EDGES, SDM_CORNERS, SDM_FEATURE_KINDS };
 
-enum { SDM_CLUSTERS }; /* the one kind of what a block has */
+/* A group of features some of which meet the block at hand, as from its middle: a feature in each lane. */
+typedef struct sdm_met_group {
+    _Alignas(64) float at_block[4][8]; /* the functions there */
+    float most_at_tile[4][8];          /* that they are at the middles of tiles that meet the region */
+    float most_at_vector[4][8];        /* the same of vectors */
+    const sdm_feature_group *group;
+    uint32_t number; /* of the first feature */
+    uint32_t mask;   /* tiles that the cluster concerns */
+} sdm_met_group;
 
-/* What concerns a part, kind after kind: nodes of clusters, or places in sdm_grid_scratch.row. Kinds begin at multiples of eight. */
+/* A feature as the parts of a block see it. Its functions are linear: from the middle of a part to those of the eight parts it has they
+   change by the same in all parts of that size. */
+typedef struct sdm_block_feature {
+    _Alignas(64) float to_voxels[4][8]; /* [function]: from the middle of a vector */
+    float at_tiles[4][8];               /* the functions there */
+    const float *most_at_vector;        /* lane of an sdm_met_group */
+    float most[2];                      /* functions 0 and 1 of an edge */
+    float at[3];                        /* corner: relative to the middle of the block */
+    uint32_t number;
+} sdm_block_feature;
+
+/* Features of one kind that are held against the parts of a block together: as many as the fastest cache has room for. */
+enum { SDM_BATCH = 24 };
+
+/* Features of one kind that wait for that. There is room for eight more: one group. */
+typedef struct sdm_pending {
+    sdm_met_group met[SDM_BATCH + 1];
+    uint16_t feature[SDM_BATCH + 8]; /* faces and edges: 8 place in met[] + lane. Lists are written eight at a time */
+    uint32_t corner[SDM_BATCH];      /* or numbers of corners, */
+    uint32_t cluster[SDM_BATCH];     /* and the places of their clusters in sdm_grid_scratch.cluster */
+    size_t groups, n;
+} sdm_pending;
+
+typedef struct sdm_batch {
+    sdm_block_feature feature[SDM_BATCH];
+    _Alignas(64) float at_vectors[SDM_BATCH][4][8][8]; /* [feature][function][tile][vector] the functions there */
+    float to_vectors[SDM_BATCH][4][8];                 /* from the middle of a tile; unused if sdm_grid_job.alike */
+    uint16_t tile[SDM_BATCH * 8 + 8];                  /* 32 feature + tile: which meet */
+    uint16_t vector[SDM_BATCH * 64 + 8]; /* 256 feature + 8 tile + vector, a place in at_vectors: which meet */
+} sdm_batch;
+
+/* The candidates of a vector so far: squared distances of the nearest and the second nearest, number of the nearest. */
+typedef struct sdm_winner {
+    _Alignas(32) float first[8], second[8];
+    uint32_t number[8];
+} sdm_winner;
+
+/* The candidates of the vectors of a block. */
 typedef struct sdm_candidates {
-    uint32_t *list;
-    size_t begin[SDM_FEATURE_KINDS], end[SDM_FEATURE_KINDS];
+    sdm_winner winner[64]; /* [8 tile + vector] */
+    uint32_t last[64];     /* place of the last one in the lists below, SDM_NONE: none */
+    uint32_t *number;      /* of the feature */
+    uint32_t *before;      /* place of the vector's candidate before it */
+    float (*value)[8];     /* squared distances */
+    size_t n, cap;
 } sdm_candidates;
 
-/* Scratch of one thread. hit: the parts that a thing concerns, see list_hits(). */
+/* Clusters that concern a block. */
+typedef struct sdm_cluster_list {
+    uint32_t *list;
+    size_t n;
+} sdm_cluster_list;
+
+/* Scratch of one thread. */
 typedef struct sdm_grid_scratch {
     /* clusters of the box at hand */
     uint32_t *node;
-    uint8_t *node_hit;
-    sdm_candidates block[8];
+    uint8_t *node_hit; /* the blocks that it concerns, see list_hits() */
+    sdm_cluster_list block[8];
     sdm_cluster_ref *cluster; /* of the block at hand */
     size_t n_cluster, cluster_cap;
     /* features of the block at hand */
-    uint32_t *number, *from; /* from: place of the feature's cluster in cluster[] */
-    size_t block_cap;
-    sdm_feature_row *row; /* relative to its middle; of a corner g[.][3] is the corner */
-    uint8_t *row_hit;
-    sdm_candidates tile[8];
-    size_t row_cap;
-    /* features of the tile at hand, as in its list */
-    uint8_t *hit;
-    sdm_candidates vector[8];
-    float (*value)[8]; /* squared distances of the candidates of a vector, as in its list */
-    size_t tile_cap;
+    sdm_pending *pending; /* [SDM_FEATURE_KINDS] */
+    sdm_batch *batch;
+    sdm_candidates *of_vectors;
 } sdm_grid_scratch;
 
-/* Room for `cap` clusters of a box, features of the clusters of a block, of a block, of a tile. limit: of bytes, 0: none. */
+/* What has a fixed size; room for `cap` clusters of a box, for `cap` candidates of the vectors of a block. limit: of bytes, 0: none. */
+sdm_status sdm_grid_scratch_start(sdm_grid_scratch *s, sdm_error *err);
 sdm_status sdm_grid_scratch_box(sdm_grid_scratch *s, size_t cap, sdm_error *err);
-sdm_status sdm_grid_scratch_block(sdm_grid_scratch *s, size_t cap, size_t limit, sdm_error *err);
-sdm_status sdm_grid_scratch_rows(sdm_grid_scratch *s, size_t cap, size_t limit, sdm_error *err);
-sdm_status sdm_grid_scratch_tile(sdm_grid_scratch *s, size_t cap, size_t limit, sdm_error *err);
+sdm_status sdm_grid_scratch_candidates(sdm_grid_scratch *s, size_t cap, size_t limit, sdm_error *err);
 void sdm_grid_scratch_dispose(sdm_grid_scratch *s);
 
 /* Unsigned distances of the boxes (0 .. n_box[0], by, bz). The nearest feature is found in float with a margin for rounding and

@@ -11,8 +11,12 @@
 #include <emmintrin.h>
 #endif
 
+/* For what is compiled anew for every kind of thing: the kind is a constant then. */
+#define SDM_FOR_KIND static inline __attribute__((always_inline))
+
 typedef float v8f __attribute__((vector_size(32)));
 typedef int32_t v8i __attribute__((vector_size(32)));
+typedef uint16_t v8s __attribute__((vector_size(16)));
 typedef float v4f __attribute__((vector_size(16)));
 typedef int32_t v4i __attribute__((vector_size(16)));
 typedef double v4d __attribute__((vector_size(32)));
@@ -29,8 +33,6 @@ static inline v8i v8_load_i(const uint32_t *p)
 static inline void v8_store_i(uint32_t *p, v8i x) { memcpy(p, &x, sizeof x); }
 static inline v8f v8_all(float x) { return (v8f){x, x, x, x, x, x, x, x}; }
 static inline v8i v8_all_i(int32_t x) { return (v8i){x, x, x, x, x, x, x, x}; }
-/* x, x + 1, ... */
-static inline v8i v8_from_i(int32_t x) { return v8_all_i(x) + (v8i){0, 1, 2, 3, 4, 5, 6, 7}; }
 static inline v4f f4_load(const float *p) { return *(const v4f *)(const void *)p; }
 static inline void f4_store(float *p, v4f x) { *(v4f *)(void *)p = x; }
 static inline v4f f4_all(float x) { return (v4f){x, x, x, x}; }
@@ -62,9 +64,9 @@ static inline int v8_greater(v8f a, v8f b)
     return _mm256_movemask_ps(_mm256_cmp_ps((__m256)a, (__m256)b, _CMP_GT_OQ));
 }
 /* Writes the lanes named by order[8] to out[8]. */
-static inline void v8_permute(uint32_t *out, v8i a, const uint8_t *order)
+static inline void v8_permute(uint32_t *out, v8i a, const uint16_t *order)
 {
-    const __m256i which = _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)(const void *)order));
+    const __m256i which = _mm256_cvtepu16_epi32(_mm_load_si128((const __m128i *)(const void *)order));
     _mm256_storeu_si256((__m256i *)(void *)out, _mm256_permutevar8x32_epi32((__m256i)a, which));
 }
 static inline v4d v4_signed(v4d m, v4d x, v4d y) { return (v4d)_mm256_blendv_pd((__m256d)y, (__m256d)x, (__m256d)m); }
@@ -101,7 +103,7 @@ static inline int v8_greater(v8f a, v8f b)
     for (int i = 0; i < 8; i++) bits |= (m[i] & 1) << i;
     return bits;
 }
-static inline void v8_permute(uint32_t *out, v8i a, const uint8_t *order)
+static inline void v8_permute(uint32_t *out, v8i a, const uint16_t *order)
 {
     for (int i = 0; i < 8; i++) out[i] = (uint32_t)a[order[i]];
 }

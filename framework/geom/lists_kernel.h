@@ -1,4 +1,4 @@
-/* From the parts that things concern to the things that concern each part. Part of the map kernels. */
+/* Lists of what concerns what, made from masks. Part of the map kernels. */
 #ifndef SDM_GEOM_LISTS_KERNEL_H
 #define SDM_GEOM_LISTS_KERNEL_H
 
@@ -16,24 +16,35 @@ static inline uint64_t transpose_bits(uint64_t x)
     return x ^ t ^ (t << 28);
 }
 
-/* Makes lists of one kind: for each i of from .. to and each bit k of hit[i], part k gets what[i], or i where `what` is NULL. from is a
-   multiple of eight; hit[] becomes 0 up to the next one. Without branches: who is hit cannot be foreseen. */
-static inline void list_hits(const sdm_grid_job *job, uint8_t *hit, const uint32_t *what, size_t from, size_t to,
-                             sdm_candidates out[8], int kind)
+/* Makes lists: for each i of 0 .. n and each bit k of hit[i], block k gets what[i]; hit[] becomes 0 up to the next multiple of eight.
+   Without branches: who is hit cannot be foreseen. */
+static inline void list_hits(const sdm_grid_job *job, uint8_t *hit, const uint32_t *what, size_t n,
+                             sdm_cluster_list out[8])
 {
-    for (size_t i = to; i % 8; i++) hit[i] = 0;
-    for (int k = 0; k < 8; k++) out[k].begin[kind] = out[k].end[kind] = kind ? (out[k].end[kind - 1] + 7) / 8 * 8 : 0;
-    for (size_t i = from; i < to; i += 8) {
+    for (size_t i = n; i % 8; i++) hit[i] = 0;
+    for (int k = 0; k < 8; k++) out[k].n = 0;
+    for (size_t i = 0; i < n; i += 8) {
         uint64_t bits = 0;
         for (int j = 0; j < 8; j++) bits |= (uint64_t)hit[i + (size_t)j] << 8 * j;
         bits = transpose_bits(bits);
-        const v8i things = what ? v8_load_i(&what[i]) : v8_from_i((int32_t)i);
+        const v8i things = v8_load_i(&what[i]);
         for (int k = 0; k < 8; k++) {
             const unsigned mask = bits >> 8 * k & 0xff;
-            v8_permute(&out[k].list[out[k].end[kind]], things, job->lanes_of[mask]);
-            out[k].end[kind] += (unsigned)__builtin_popcount(mask);
+            v8_permute(&out[k].list[out[k].n], things, job->lanes_of[mask]);
+            out[k].n += (unsigned)__builtin_popcount(mask);
         }
     }
+}
+
+/* Appends base + i for each bit i of mask behind list[n]; returns the new n. */
+static inline size_t put_lanes(const sdm_grid_job *job, uint16_t *list, size_t n, uint32_t base, unsigned mask)
+{
+    const uint16_t b = (uint16_t)base;
+    v8s lanes;
+    memcpy(&lanes, job->lanes_of[mask], sizeof lanes);
+    lanes += (v8s){b, b, b, b, b, b, b, b};
+    memcpy(&list[n], &lanes, sizeof lanes);
+    return n + (unsigned)__builtin_popcount(mask);
 }
 
 #endif

@@ -5,19 +5,6 @@
 
 #include "vec3.h"
 
-/* Any unit vector perpendicular to the unit vector u. */
-static void perpendicular(const double u[3], double v[3])
-{
-    int least = 0;
-    for (int i = 1; i < 3; i++)
-        if (fabs(u[i]) < fabs(u[least])) least = i;
-    double axis[3] = {0, 0, 0};
-    axis[least] = 1;
-    v3_cross(u, axis, v);
-    const double len = v3_norm(v);
-    for (int i = 0; i < 3; i++) v[i] /= len;
-}
-
 /* Unit direction of (dx, dy), or of -x when it has no length; returns the length. */
 static double direction(double dx, double dy, double *ex, double *ey)
 {
@@ -55,7 +42,7 @@ void sdm_frame_build(const double a[3], const double b[3], const double c[3], sd
     // what is left of a needle after two passes may be rounding: below that there is no plane to find
     const int flat = !(cy > 2.3e-16 * length);
     if (flat)
-        perpendicular(f->u, f->v);
+        v3_perpendicular(f->u, f->v);
     else
         for (int i = 0; i < 3; i++) f->v[i] = w[i] / cy;
     for (int pass = 0; !flat && pass < 1; pass++) {

@@ -11,6 +11,13 @@
 #define LOWEST 1e-6
 // a face lower than this share of its length is thin: its angles are too small for float
 #define THIN 0.02f
+#define NO_SIDES 3
+
+/* A face or edge as in its group: [coordinate][k], [k]. */
+typedef struct feature_row {
+    _Alignas(16) float g[3][4], offset[4], most[2];
+} feature_row;
+
 typedef struct builder {
     const sdm_mesh *m;
     const sdm_topology *topo;
@@ -18,12 +25,14 @@ typedef struct builder {
     const sdm_bvh *tree;
     sdm_arena *arena;
     sdm_features *f;
-    uint32_t *slot_of; /* [n_tri] slot of a triangle */
-    uint32_t *edge;    /* [n_edges] number of an edge of the topology */
-    uint32_t *corner;  /* [n_vert] number of a corner */
-    uint8_t *count;    /* [end - corner_base] directions of a corner so far */
-    double middle[3];  /* of the cluster at hand */
-    uint32_t n_group;
+    uint32_t *slot_of;   /* [n_tri] slot of a triangle */
+    uint32_t *edge;      /* [n_edges] number of an edge of the topology */
+    uint32_t *corner;    /* [n_vert] number of a corner */
+    uint8_t *count;      /* [end - corner_base] directions of a corner so far */
+    feature_row *row;    /* [corner_base] */
+    uint8_t *first_side; /* [n_tri] edge of the frame that the first edge of the triangle is, NO_SIDES: has none */
+    double middle[3];    /* of the cluster at hand, mm */
+    uint32_t n_edge, n_corner, n_group; /* so far */
 } builder;
 
 static const double *vertex(const builder *b, size_t v) { return &b->m->vert[3 * v]; }
@@ -33,51 +42,45 @@ typedef struct functions {
     v4d g[3], through[3];
 } functions;
 
-static inline void set_functions(const builder *b, sdm_feature_row *row, const functions *f)
+/* The offsets of a row whose gradients are set; through: as in `functions`. */
+static inline void set_offsets(const builder *b, feature_row *row, const v4d through[3])
 {
     v4d sum = v4_all(0);
-    for (int i = 0; i < 3; i++) {
-        const v4f g = f4_round(f->g[i]);
-        sum += v4_from(g) * (v4_all(b->middle[i]) - f->through[i]);
-        f4_store(row->g[i], g);
-    }
+    for (int i = 0; i < 3; i++) sum += v4_from(f4_load(row->g[i])) * (v4_all(b->middle[i]) - through[i]);
     f4_store(row->offset, f4_round(sum * v4_all(b->f->scale)));
 }
 
-/* The distances outward from a rectangle around a face, in its plane. */
-static void set_thin(const builder *b, sdm_feature_row *row, const sdm_frame *t, const double end[3])
+static inline void set_functions(const builder *b, feature_row *row, const functions *f)
 {
-    functions f;
-    const double height = sdm_frame_height(t);
-    for (int i = 0; i < 3; i++) {
-        f.g[i] = (v4d){t->u[i], -t->u[i], -t->v[i], t->v[i]};
-        f.through[i] = (v4d){end[i], t->a[i], t->a[i], t->a[i] + height * t->v[i]};
-    }
-    set_functions(b, row, &f);
+    for (int i = 0; i < 3; i++) f4_store(row->g[i], f4_round(f->g[i]));
+    set_offsets(b, row, f->through);
 }
 
 static void add_face(const builder *b, uint32_t slot, sdm_cluster_node *node)
 {
     const sdm_frame *t = &b->frames[slot];
     sdm_feature *x = &b->f->exact[slot];
-    sdm_feature_row *row = &b->f->row[slot];
+    feature_row *row = &b->row[slot];
     const double length = 2 * t->half[0];
     double end[3];
     b->f->owner[slot] = slot;
     memcpy(x->a, t->a, sizeof x->a);
     memcpy(x->u, t->n, sizeof x->u);
+    x->length = 0;
     x->face = -1;
+    row->most[0] = row->most[1] = 0;
+    b->first_side[slot] = NO_SIDES;
     v3_along(t->a, length, t->u, end);
     if (t->flat != 0) {
-        row->offset[0] = INFINITY;
+        *row = (feature_row){.offset = {INFINITY}};
         return;
     }
-    if (sdm_frame_height(t) < (double)THIN * length) {
-        set_thin(b, row, t, end);
+    const double height = sdm_frame_height(t);
+    if (height < (double)THIN * length) {
         node->thin |= 1u << (slot - node->first);
         b->f->any_thin = true;
-        return;
     }
+    if (height > LOWEST * length) b->first_side[slot] = (uint8_t)((3 - (uint32_t)t->rotation) % 3);
     // outward across the edges; edges 0 and 2 pass through a, edge 1 through the end of edge 0
     functions f;
     for (int i = 0; i < 3; i++) {
@@ -88,18 +91,19 @@ static void add_face(const builder *b, uint32_t slot, sdm_cluster_node *node)
     set_functions(b, row, &f);
 }
 
-/* Into the faces of an edge, across it: up to two; 0 where there is none. */
-static void find_sides(const builder *b, const sdm_edge *e, double side[2][3])
+/* Gradients 1 to 3 of an edge, which two of its faces have with the other sign; 0 where there is none. Returns how many. */
+static int find_sides(const builder *b, const sdm_edge *e, feature_row *row)
 {
     int n = 0;
     for (uint32_t h = e->first; h != SDM_NONE && n < 2; h = b->topo->next[h]) {
-        const sdm_frame *t = &b->frames[b->slot_of[h / 3]];
-        if (t->flat != 0 || !(sdm_frame_height(t) > LOWEST * 2 * t->half[0])) continue;
-        const int k = (int)((h % 3 + 3 - (uint32_t)t->rotation) % 3);
-        const double ex = k == 0 ? 1 : k == 1 ? t->e1x : t->e2x, ey = k == 0 ? 0 : k == 1 ? t->e1y : t->e2y;
-        for (int i = 0; i < 3; i++) side[n][i] = ex * t->v[i] - ey * t->u[i];
+        const uint32_t slot = b->slot_of[h / 3], first = b->first_side[slot];
+        if (first == NO_SIDES) continue;
+        const feature_row *face = &b->row[slot];
+        for (int i = 0; i < 3; i++) row->g[i][1 + n] = -face->g[i][(h + first) % 3];
+        for (int i = 0; i < 3 && !n; i++) row->g[i][3] = face->g[i][3];
         n++;
     }
+    return n;
 }
 
 /* The edge from x to y; e: of the topology, NULL for that of a triangle with a repeated vertex. */
@@ -107,22 +111,33 @@ static void add_segment(const builder *b, uint32_t number, const double x[3], co
 {
     sdm_features *f = b->f;
     sdm_feature *exact = &f->exact[number];
-    sdm_feature_row *row = &f->row[number];
-    double w[3], side[2][3] = {{0}};
-    functions k;
+    feature_row *row = &b->row[number];
+    double w[3];
+    v4d through[3];
     for (int i = 0; i < 3; i++) w[i] = (y[i] - x[i]) * f->scale;
     const double length = v3_norm(w);
-    if (e) find_sides(b, e, side);
     for (int i = 0; i < 3; i++) {
         exact->a[i] = x[i];
         exact->u[i] = length > 0 ? w[i] / length : 0;
-        k.g[i] = (v4d){exact->u[i], side[0][i], side[1][i], 0};
-        k.through[i] = v4_all(0.5 * x[i] + 0.5 * y[i]);
+        through[i] = v4_all(0.5 * x[i] + 0.5 * y[i]);
+        f4_store(row->g[i], (v4f){(float)exact->u[i], 0, 0, 0});
     }
     exact->length = length / f->scale;
-    set_functions(b, row, &k);
-    for (int i = 0; i < 3; i++) row->g[i][3] = (float)((k.through[i][0] - b->middle[i]) * f->scale);
-    row->offset[3] = (float)(0.5 * length);
+    exact->face = 0;
+    row->most[0] = (float)(0.5 * length);
+    row->most[1] = 0;
+    if (length > 0 && (!e || !find_sides(b, e, row))) {
+        double v[3], n[3];
+        row->most[1] = INFINITY;
+        v3_perpendicular(exact->u, v);
+        v3_cross(exact->u, v, n);
+        for (int i = 0; i < 3; i++) {
+            row->g[i][1] = (float)v[i];
+            row->g[i][3] = (float)n[i];
+        }
+    }
+    set_offsets(b, row, through);
+    if (!(length > 0)) row->offset[0] = INFINITY; // its corners are there
 }
 
 static void add_direction(const builder *b, uint32_t corner, const double u[3], double sign)
@@ -142,7 +157,7 @@ static void add_direction(const builder *b, uint32_t corner, const double u[3], 
 
 static void add_corner(const builder *b, uint32_t number, const double x[3])
 {
-    memcpy(b->f->exact[number].a, x, 3 * sizeof *x);
+    b->f->exact[number] = (sdm_feature){.a = {x[0], x[1], x[2]}};
     for (int i = 0; i < 3; i++)
         b->f->corner[number - b->f->corner_base].at[i] = (float)((x[i] - b->middle[i]) * b->f->scale);
 }
@@ -226,11 +241,9 @@ static void fill_nodes(const builder *b)
     }
 }
 
-static void fill_cluster(builder *b, uint32_t i)
+static void fill_faces(builder *b, sdm_cluster_node *node)
 {
     sdm_features *f = b->f;
-    sdm_cluster_node *node = &f->node[i];
-    sdm_cluster_middle(&b->tree->node[i], b->middle);
     for (uint32_t slot = node->first; slot < node->first + node->count; slot++) {
         const uint32_t *t = &b->m->tri[3 * (size_t)b->tree->order[slot]];
         for (int a = 0; a < 3; a++) {
@@ -239,44 +252,64 @@ static void fill_cluster(builder *b, uint32_t i)
             f->centroid[slot][a] = (float)(sum * f->scale) / 3;
         }
         add_face(b, slot, node);
-        add_edges_and_corners(b, slot, node);
     }
+}
+
+/* Asks the rows of faces of other clusters. */
+static void fill_edges_and_corners(builder *b, sdm_cluster_node *node)
+{
+    node->edge = node->edge_end = b->n_edge;
+    node->corner = node->corner_end = b->n_corner;
+    for (uint32_t slot = node->first; slot < node->first + node->count; slot++) add_edges_and_corners(b, slot, node);
+    b->n_edge = node->edge_end;
+    b->n_corner = node->corner_end;
     node->group = b->n_group;
     b->n_group += 1 + (node->edge_end - node->edge + 7) / 8;
 }
 
+/* The distances outward from a rectangle around each thin face, in its plane, in the place of those across its edges. */
+static void fill_thin_faces(builder *b, sdm_cluster_node *node)
+{
+    for (uint32_t slot = node->first; slot < node->first + node->count; slot++) {
+        if (!(node->thin >> (slot - node->first) & 1)) continue;
+        const sdm_frame *t = &b->frames[slot];
+        const double height = sdm_frame_height(t);
+        functions f;
+        for (int i = 0; i < 3; i++) {
+            f.g[i] = (v4d){t->u[i], -t->u[i], -t->v[i], t->v[i]};
+            f.through[i] = (v4d){t->a[i] + 2 * t->half[0] * t->u[i], t->a[i], t->a[i], t->a[i] + height * t->v[i]};
+        }
+        set_functions(b, &b->row[slot], &f);
+    }
+}
+
 /* The clusters in the order of the tree. */
-static void fill_clusters(builder *b)
+static void visit_clusters(builder *b, void (*visit)(builder *b, sdm_cluster_node *node))
 {
     sdm_features *f = b->f;
-    uint32_t stack[SDM_BVH_DEPTH], edge = f->edge_base, corner = f->corner_base;
+    uint32_t stack[SDM_BVH_DEPTH];
     int top = 0;
     stack[top++] = 0;
     while (top) {
-        const uint32_t i = stack[--top];
-        sdm_cluster_node *node = &f->node[i];
+        sdm_cluster_node *node = &f->node[stack[--top]];
         if (!node->count) {
             stack[top++] = node->first + 1;
             stack[top++] = node->first;
             continue;
         }
-        node->edge = node->edge_end = edge;
-        node->corner = node->corner_end = corner;
-        fill_cluster(b, i);
-        edge = node->edge_end;
-        corner = node->corner_end;
+        for (int a = 0; a < 3; a++) b->middle[a] = f->centre[a] + (double)sdm_cluster_middle(node, a) / f->scale;
+        visit(b, node);
     }
-    f->end = corner;
 }
 
 /* Rows from .. to side by side. */
-static void fill_groups(const sdm_features *f, uint32_t from, uint32_t to, sdm_feature_group *out)
+static void fill_groups(const builder *b, uint32_t from, uint32_t to, sdm_feature_group *out)
 {
     for (; from < to; from += 8, out++) {
         const uint32_t last = to - 1; // stands in empty lanes
         for (uint32_t lane = 0; lane < 8; lane += 4) {
-            const sdm_feature_row *row[4];
-            for (uint32_t i = 0; i < 4; i++) row[i] = &f->row[from + lane + i < to ? from + lane + i : last];
+            const feature_row *row[4];
+            for (uint32_t i = 0; i < 4; i++) row[i] = &b->row[from + lane + i < to ? from + lane + i : last];
             for (int a = 0; a < 4; a++) {
                 v4f x[4];
                 for (int i = 0; i < 4; i++) x[i] = f4_load(a < 3 ? row[i]->g[a] : row[i]->offset);
@@ -284,6 +317,8 @@ static void fill_groups(const sdm_features *f, uint32_t from, uint32_t to, sdm_f
                 for (int k = 0; k < 4; k++) f4_store(a < 3 ? &out->g[k][a][lane] : &out->offset[k][lane], x[k]);
             }
         }
+        for (uint32_t lane = 0; lane < 8; lane++)
+            for (int k = 0; k < 2; k++) out->most[k][lane] = b->row[from + lane < to ? from + lane : last].most[k];
         for (uint32_t lane = to - from; lane < 8; lane++) out->offset[0][lane] = INFINITY;
     }
 }
@@ -291,13 +326,13 @@ static void fill_groups(const sdm_features *f, uint32_t from, uint32_t to, sdm_f
 static sdm_status add_groups(const builder *b, sdm_error *err)
 {
     sdm_features *f = b->f;
-    const sdm_status s = SDM_TAKE(b->arena, SDM_LOW, &f->group, b->n_group, "features", err);
+    const sdm_status s = SDM_TAKE_UNSET(b->arena, SDM_LOW, &f->group, b->n_group, "features", err);
     for (size_t i = 0; i < b->tree->n_node && !s; i++) {
         const sdm_cluster_node *node = &f->node[i];
         // others are below a cluster
         if (!node->count || node->edge_end + node->corner_end == 0) continue;
-        fill_groups(f, node->first, node->first + node->count, &f->group[node->group]);
-        fill_groups(f, node->edge, node->edge_end, &f->group[node->group + 1]);
+        fill_groups(b, node->first, node->first + node->count, &f->group[node->group]);
+        fill_groups(b, node->edge, node->edge_end, &f->group[node->group + 1]);
     }
     return s;
 }
@@ -306,17 +341,18 @@ static sdm_status allocate(builder *b, sdm_error *err)
 {
     sdm_features *f = b->f;
     const size_t n = b->m->n_tri, n_vert = b->m->n_vert;
-    sdm_status s = SDM_TAKE(b->arena, SDM_HIGH, &b->slot_of, n, "features", err);
-    if (!s) s = SDM_TAKE(b->arena, SDM_HIGH, &b->edge, b->topo->n_edges, "features", err);
-    if (!s) s = SDM_TAKE(b->arena, SDM_HIGH, &b->corner, n_vert, "features", err);
+    sdm_status s = SDM_TAKE_UNSET(b->arena, SDM_HIGH, &b->slot_of, n, "features", err);
+    if (!s) s = SDM_TAKE_UNSET(b->arena, SDM_HIGH, &b->edge, b->topo->n_edges, "features", err);
+    if (!s) s = SDM_TAKE_UNSET(b->arena, SDM_HIGH, &b->corner, n_vert, "features", err);
+    if (!s) s = SDM_TAKE_UNSET(b->arena, SDM_HIGH, &b->first_side, n, "features", err);
     if (!s) s = SDM_TAKE(b->arena, SDM_HIGH, &b->count, n_vert, "features", err);
+    if (!s) s = SDM_TAKE_UNSET(b->arena, SDM_HIGH, &b->row, f->corner_base, "features", err);
     if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->node, b->tree->n_node, "features", err);
-    if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->centroid, n, "features", err);
-    if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->row, f->corner_base, "features", err);
+    if (!s) s = SDM_TAKE_UNSET(b->arena, SDM_LOW, &f->centroid, n, "features", err);
     if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->corner, n_vert, "features", err);
-    if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->exact, f->corner_base + n_vert, "features", err);
-    if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->of_slot, n, "features", err);
-    if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->owner, f->corner_base + n_vert, "features", err);
+    if (!s) s = SDM_TAKE_UNSET(b->arena, SDM_LOW, &f->exact, f->corner_base + n_vert, "features", err);
+    if (!s) s = SDM_TAKE_UNSET(b->arena, SDM_LOW, &f->of_slot, n, "features", err);
+    if (!s) s = SDM_TAKE_UNSET(b->arena, SDM_LOW, &f->owner, f->corner_base + n_vert, "features", err);
     if (s) return s;
     memset(b->edge, 0xff, b->topo->n_edges * sizeof *b->edge);
     memset(b->corner, 0xff, n_vert * sizeof *b->corner);
@@ -327,13 +363,12 @@ size_t sdm_features_bytes(size_t n_tri, size_t n_vert, size_t *scratch)
 {
     // edges: every triangle may have three of its own, or be one
     const size_t rows = 4 * n_tri;
-    *scratch += n_tri * 4 * sizeof(uint32_t) + n_vert * (sizeof(uint32_t) + 1);
+    *scratch += rows * sizeof(feature_row) + n_tri * (4 * sizeof(uint32_t) + 1) + n_vert * (sizeof(uint32_t) + 1);
     // every triangle may be a cluster, whose edges end with a group
     const size_t groups = 2 * n_tri + rows / 8;
     return groups * sizeof(sdm_feature_group) +
            n_tri * (2 * sizeof(sdm_cluster_node) + sizeof(float[3]) + sizeof(uint32_t[6])) +
-           rows * sizeof(sdm_feature_row) + n_vert * sizeof(sdm_corner_row) +
-           (rows + n_vert) * (sizeof(sdm_feature) + sizeof(uint32_t));
+           n_vert * sizeof(sdm_corner_row) + (rows + n_vert) * (sizeof(sdm_feature) + sizeof(uint32_t));
 }
 
 sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const sdm_frame *frames, const sdm_bvh *tree,
@@ -353,7 +388,12 @@ sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const
         for (uint32_t slot = 0; slot < n; slot++) b.slot_of[tree->order[slot]] = slot;
         measure(&b);
         fill_nodes(&b);
-        fill_clusters(&b);
+        b.n_edge = f->edge_base;
+        b.n_corner = f->corner_base;
+        visit_clusters(&b, fill_faces);
+        visit_clusters(&b, fill_edges_and_corners);
+        if (f->any_thin) visit_clusters(&b, fill_thin_faces);
+        f->end = b.n_corner;
         s = add_groups(&b, err);
     }
     sdm_arena_release(arena, SDM_HIGH, before);

@@ -15,19 +15,18 @@
 #include "point_triangle.h"
 #include "topology.h"
 
-/* Linear functions of the point p: g[.][k] . p + offset[k].
-   Faces: 0 - 2 the distance outward across each edge, 3 the distance from the plane. A thin face (too narrow for float): 0 - 3 the
-   distances outward from a rectangle around it, in its plane. No face: offset[0] = INFINITY. Edges: 0 along it from its middle, 1 and 2
-   inward across it into two of its faces; g[.][3] is its middle, offset[3] half its length. */
-typedef struct sdm_feature_row {
-    _Alignas(64) float g[3][4]; /* [coordinate][k] */
-    float offset[4];
-} sdm_feature_row;
-
-/* Eight faces or edges of a cluster, one a lane, as in their rows (of an edge's place only the offset). Empty lanes: offset[0] = INFINITY. */
+/* Eight faces or edges of a cluster, one a lane, by linear functions of the point p: g[k] . p + offset[k], and what they are at most in
+   the feature's region.
+   Faces: 0 - 2 the distance outward across each edge, 3 the distance from the plane; most 0. A thin face (too narrow for float): 0 - 3 the
+   distances outward from a rectangle around it, in its plane.
+   Edges: the size of 0, along it from its middle, is at most half its length; 1 and 2 inward across it into two of its faces, at most 0,
+   or INFINITY for 1 where there is no face; 3 the distance from the plane of the first: 1 and 3 are perpendicular, so that their squares
+   sum up to that of the distance.
+   No face, no edge: offset[0] = INFINITY. */
 typedef struct sdm_feature_group {
     _Alignas(64) float g[4][3][8]; /* [k][coordinate] */
     float offset[4][8];
+    float most[2][8]; /* of functions 0 and 1 */
 } sdm_feature_group;
 
 #define SDM_CORNER_EDGES 6
@@ -63,7 +62,6 @@ typedef struct sdm_features {
     sdm_cluster_node *node; /* [nodes of the tree] */
     float (*centroid)[3];   /* [n_tri] of the triangles */
     bool any_thin;          /* there is a thin face */
-    sdm_feature_row *row;   /* [corner_base] */
     sdm_feature_group *group;
     sdm_corner_row *corner; /* [end - corner_base] */
     uint32_t edge_base, corner_base, end;
@@ -74,11 +72,8 @@ typedef struct sdm_features {
     double scale;             /* power of two: the longest edge becomes 0.5 .. 1 */
 } sdm_features;
 
-/* The point that the rows of a cluster are relative to, mm. */
-static inline void sdm_cluster_middle(const sdm_bvh_node *leaf, double middle[3])
-{
-    for (int a = 0; a < 3; a++) middle[a] = leaf->lo[a] + 0.5 * (leaf->hi[a] - leaf->lo[a]);
-}
+/* Coordinate a of the point that the functions of a cluster are relative to. */
+static inline float sdm_cluster_middle(const sdm_cluster_node *c, int a) { return 0.5f * (c->lo[a] + c->hi[a]); }
 
 /* frames[slot]: of triangle tree->order[slot] of m; topo: of m. Taken from the low end of the arena. */
 sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const sdm_frame *frames, const sdm_bvh *tree,

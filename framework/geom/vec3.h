@@ -33,4 +33,17 @@ static inline void v3_along(const double a[3], double t, const double d[3], doub
     for (int i = 0; i < 3; i++) r[i] = a[i] + t * d[i];
 }
 
+/* Any unit vector v perpendicular to the unit vector u. */
+static inline void v3_perpendicular(const double u[3], double v[3])
+{
+    int least = 0;
+    for (int i = 1; i < 3; i++)
+        if (fabs(u[i]) < fabs(u[least])) least = i;
+    double axis[3] = {0, 0, 0};
+    axis[least] = 1;
+    v3_cross(u, axis, v);
+    const double len = v3_norm(v);
+    for (int i = 0; i < 3; i++) v[i] /= len;
+}
+
 #endif

@@ -1,194 +1,148 @@
-/* From the candidates of a vector to the distances of its voxels. Part of the map kernels. */
+/* From the features of a block to the squared distances of its voxels. Part of the map kernels. */
 #ifndef SDM_GEOM_VOXELS_KERNEL_H
 #define SDM_GEOM_VOXELS_KERNEL_H
 
-#include "feature_distance.h"
-#include "vectors_kernel.h"
+#include "batch_kernel.h"
 
-/* The candidates of eight voxels: squared distances of the nearest and of the second, lane of the nearest. */
-typedef struct winner8 {
-    v8f first, second;
-    v8i lane;
-} winner8;
-
-static inline void compete(winner8 *w, v8f d, uint32_t lane, float *out)
+static void start_candidates(sdm_candidates *c)
 {
-    v8_store(out, d);
-    w->second = v8_min(w->second, v8_max(d, w->first));
-    w->lane = v8_select_i(d < w->first, v8_all_i((int32_t)lane), w->lane);
-    w->first = v8_min(d, w->first);
-}
-
-/* value[]: squared distances of the candidates, INFINITY where a voxel is surely not in the region, -1 for thin faces elsewhere. */
-static winner8 compare(const tile *t, int v)
-{
-    const sdm_grid_scratch *s = t->s;
-    const sdm_features *f = t->job->features;
-    const sdm_candidates *in = &s->vector[v];
-    const point8 p = p8_load((const float(*)[8])t->job->voxel[t->number][v].x);
-    const v8f error = v8_all(t->error), never = v8_all(INFINITY);
-    winner8 w = {never, never, v8_all_i(0)};
-    for (size_t i = in->begin[SDM_FACES]; i < in->end[SDM_FACES]; i++) {
-        const sdm_feature_row *r = &s->row[in->list[i]];
-        const v8f h = v8_max(function8(r, 0, r->offset[0], p),
-                             v8_max(function8(r, 1, r->offset[1], p), function8(r, 2, r->offset[2], p)));
-        const v8f z = function8(r, 3, r->offset[3], p);
-        compete(&w, v8_signed(h - error, z * z, never), in->list[i], s->value[i]);
-    }
-    for (size_t i = in->begin[SDM_THIN_FACES]; i < in->end[SDM_THIN_FACES]; i++) {
-        const sdm_feature_row *r = &s->row[in->list[i]];
-        const v8f h = v8_max(v8_max(function8(r, 0, r->offset[0], p), function8(r, 1, r->offset[1], p)),
-                             v8_max(function8(r, 2, r->offset[2], p), function8(r, 3, r->offset[3], p)));
-        compete(&w, v8_signed(h - error, v8_all(-1), never), in->list[i], s->value[i]);
-    }
-    for (size_t i = in->begin[SDM_EDGES]; i < in->end[SDM_EDGES]; i++) {
-        const sdm_feature_row *r = &s->row[in->list[i]];
-        const v8f along = function8(r, 0, r->offset[0], p);
-        const v8f beside = v8_max(function8(r, 1, r->offset[1], p), function8(r, 2, r->offset[2], p));
-        const v8f beyond = v8_max(v8_abs(along) - v8_all(r->offset[3]), beside);
-        const point8 x = p8_sub(p, point_of(r));
-        compete(&w, v8_signed(beyond - error, p8_dot(x, x) - along * along, never), in->list[i], s->value[i]);
-    }
-    for (size_t i = in->begin[SDM_CORNERS]; i < in->end[SDM_CORNERS]; i++) {
-        const sdm_feature_row *r = &s->row[in->list[i]];
-        const point8 x = p8_sub(p, point_of(r));
-        // without its region the end of an edge would be in doubt as far as the root of the error
-        const v8f over = beyond_corner(&f->corner[s->number[in->list[i]] - f->corner_base], x);
-        compete(&w, v8_signed(over - error, p8_dot(x, x), never), in->list[i], s->value[i]);
-    }
-    return w;
-}
-
-/* Bounds are meant to leave somebody; should they not, the tree knows. */
-static uint32_t ask_tree(const tile *t, const double p[3], double *d2)
-{
-    const sdm_nearest *n = t->job->surface;
-    uint32_t slot = 0;
-    double q[3];
-    int feature;
-    (void)sdm_nearest_find(n, p, INFINITY, &slot, q, &feature);
-    *d2 = sdm_nearest_feature(n, p, &slot);
-    return slot;
-}
-
-/* The nearest of the candidates whose squared distance in float is at most `limit`, in double. */
-static uint32_t settle(const tile *t, int v, int lane, float limit, const double p[3], double *d2)
-{
-    const sdm_grid_scratch *s = t->s;
-    const sdm_candidates *in = &s->vector[v];
-    uint32_t best = SDM_NONE;
-    *d2 = INFINITY;
-    for (int kind = 0; kind < SDM_FEATURE_KINDS; kind++)
-        for (size_t i = in->begin[kind]; i < in->end[kind]; i++) {
-            if (s->value[i][lane] > limit) continue;
-            const uint32_t number = s->number[in->list[i]];
-            const double d = sdm_feature_distance2(t->job->features, t->job->surface->frames, number, p);
-            if (!(d < *d2)) continue;
-            *d2 = d;
-            best = number;
-        }
-    if (best == SDM_NONE && !(t->job->band_mm < INFINITY)) best = ask_tree(t, p, d2);
-    return best;
-}
-
-/* Squared distances of four points to a feature each; the operations of sdm_feature_distance2(). */
-static inline void measure_four(const sdm_feature *x, const uint32_t number[4], v4d px, v4d py, v4d pz, double out[4])
-{
-    v4d a[4], u[4];
-    for (int i = 0; i < 4; i++) {
-        a[i] = v4_load(x[number[i]].a);
-        u[i] = v4_load(&x[number[i]].u[1]);
-    }
-    // rows of a: ax ay az ux, of u: uy uz length face
-    v4_transpose(a);
-    v4_transpose(u);
-    const v4d wx = px - a[0], wy = py - a[1], wz = pz - a[2];
-    const v4d s = wx * a[3] + wy * u[0] + wz * u[1];
-    const v4d rx = wx - s * a[3], ry = wy - s * u[0], rz = wz - s * u[1];
-    v4_store(out, v4_signed(u[3], s * s, rx * rx + ry * ry + rz * rz));
-}
-
-/* The voxels of a tile. */
-typedef struct voxels {
-    uint32_t number[64]; /* of the nearest feature */
-    _Alignas(32) double d2[64];
-    int n_settled; /* what had to be settled in double */
-    uint8_t settled[64];
-    double settled_d2[64];
-} voxels;
-
-static void choose_features(const tile *t, voxels *x)
-{
-    const sdm_grid_job *job = t->job;
-    // a squared distance d^2 has an error of at most 2 (d + 1) 2 error; two of them, doubled
-    const v8f squared = v8_all(8 * t->error);
-    for (int v = 0; v < 8; v++) {
-        const uint8_t *place = job->voxel_in_tile[v];
-        if (!(t->wanted >> v & 1)) {
-            for (int i = 0; i < 8; i++) x->number[place[i]] = 0;
-            continue;
-        }
-        const winner8 w = compare(t, v);
-        _Alignas(32) float limit[8], first[8];
-        v8_store(first, w.first);
-        v8_store(limit, v8_fma(v8_sqrt(v8_max(w.first, v8_all(0))) + v8_all(1), squared, w.first));
-        const int clear = v8_greater(w.second, v8_load(limit)) & v8_greater(w.first, v8_all(-0.5f));
-        for (int i = 0; i < 8; i++) {
-            const uint32_t number = x->number[place[i]] = t->s->number[w.lane[i]];
-            __builtin_prefetch(&job->features->exact[number]); // for measure_voxels()
-        }
-        // NaN (INFINITY - INFINITY) is not clear either
-        for (int open = 0xff & ~clear; open; open &= open - 1) {
-            const int lane = __builtin_ctz((unsigned)open), i = place[lane];
-            double p[3];
-            for (int a = 0; a < 3; a++) p[a] = t->corner[a] + job->tile_voxel[a][i];
-            x->settled[x->n_settled] = (uint8_t)i;
-            x->number[i] =
-                settle(t, v, lane, limit[lane] >= 0 ? limit[lane] : INFINITY, p, &x->settled_d2[x->n_settled]);
-            x->n_settled++;
-        }
+    c->n = 0;
+    for (int v = 0; v < 64; v++) {
+        v8_store(c->winner[v].first, v8_all(INFINITY));
+        v8_store(c->winner[v].second, v8_all(INFINITY));
+        v8_store_i(c->winner[v].number, v8_all_i(0));
+        c->last[v] = SDM_NONE;
     }
 }
 
-/* Squared distances of the voxels in double. */
-static void measure_voxels(const tile *t, voxels *x)
+/* One more candidate: feature `number` at squared distances d. */
+SDM_FOR_KIND void compete(sdm_winner *w, uint32_t number, v8f d)
 {
-    const double(*at)[64] = (const double(*)[64])t->job->tile_voxel;
-    const double *c = t->corner;
-    uint32_t number[64];
-    for (int i = 0; i < 64; i++) number[i] = x->number[i] == SDM_NONE ? 0 : x->number[i];
-    for (int i = 0; i < 64; i += 4)
-        measure_four(t->job->features->exact, &number[i], v4_all(c[0]) + v4_load(&at[0][i]),
-                     v4_all(c[1]) + v4_load(&at[1][i]), v4_all(c[2]) + v4_load(&at[2][i]), &x->d2[i]);
-    for (int i = 0; i < x->n_settled; i++) x->d2[x->settled[i]] = x->settled_d2[i];
+    const v8f first = v8_load(w->first);
+    v8_store(w->second, v8_min(v8_load(w->second), v8_max(d, first)));
+    v8_store_i(w->number, v8_select_i(d < first, v8_all_i((int32_t)number), v8_load_i(w->number)));
+    v8_store(w->first, v8_min(d, first));
 }
 
-static void write_tile(const tile *t, voxels *x)
+/* Squared distances of a face or edge: INFINITY where a voxel is surely not in the region, -1 for thin faces elsewhere. at: its functions
+   at the middle of the vector, each 64 floats after the one before. */
+SDM_FOR_KIND v8f distances(int kind, const sdm_block_feature *x, const float *at, v8f error)
 {
-    const sdm_grid_job *job = t->job;
-    const int64_t *whole = job->part[SDM_TO_TILES].size;
-    float d[64];
-    for (int i = 0; i < 64; i++) d[i] = (float)sqrt(x->d2[i]);
-    for (int i = 0; i < 64 && job->slot; i++)
-        x->number[i] = x->number[i] == SDM_NONE ? SDM_NONE : job->features->owner[x->number[i]];
-    if (job->band_mm < INFINITY)
-        for (int i = 0; i < 64; i++) {
-            if (d[i] < (float)job->band_mm) continue;
-            d[i] = (float)job->band_mm;
-            x->number[i] = SDM_NONE;
+    v8f f[4];
+    for (int k = 0; k < 4; k++) f[k] = v8_load(x->to_voxels[k]) + v8_all(at[64 * k]);
+    v8f d = f[3] * f[3], most = f[0];
+    if (kind == SDM_EDGES) {
+        d = v8_fma(f[1], f[1], d);
+        most = v8_abs(f[0]) - v8_all(x->most[0]);
+        f[1] -= v8_all(x->most[1]); // may be INFINITY
+    }
+    most = v8_max(most, v8_max(f[1], f[2]));
+    if (kind == SDM_THIN_FACES) {
+        d = v8_all(-1);
+        most = v8_max(most, f[3]);
+    }
+    return v8_signed(most - error, d, v8_all(INFINITY));
+}
+
+SDM_FOR_KIND v8f corner_distances(const block *b, const sdm_block_feature *x, unsigned v)
+{
+    const sdm_features *f = b->job->features;
+    const point8 p = p8_load((const float(*)[8])b->job->voxel[v / 8][v % 8].x);
+    const point8 from = p8_sub(p, p8_all(x->at[0], x->at[1], x->at[2]));
+    // without its region the end of an edge would be in doubt as far as the root of the error
+    const v8f out = beyond_corner(&f->corner[x->number - f->corner_base], from);
+    return v8_signed(out - v8_all(b->error), p8_dot(from, from), v8_all(INFINITY));
+}
+
+/* Holds the voxels of n vectors against the features of the batch whose region these meet. */
+SDM_FOR_KIND void compare(const block *b, int kind, size_t n)
+{
+    const sdm_batch *batch = b->s->batch;
+    const float *at = &batch->at_vectors[0][0][0][0];
+    sdm_candidates *c = b->s->of_vectors;
+    uint32_t *number = c->number + c->n, *before = c->before + c->n;
+    float(*value)[8] = c->value + c->n;
+    const uint32_t first = (uint32_t)c->n;
+    const v8f error = v8_all(b->error);
+    for (size_t i = 0; i < n; i++) {
+        const uint32_t place = batch->vector[i], v = place % 64;
+        const sdm_block_feature *x = &batch->feature[place / 256];
+        const v8f d = kind == SDM_CORNERS ? corner_distances(b, x, v) : distances(kind, x, at + place, error);
+        compete(&c->winner[v], x->number, d);
+        v8_store(value[i], d);
+        number[i] = x->number;
+        before[i] = c->last[v];
+        c->last[v] = first + (uint32_t)i;
+    }
+    c->n += n;
+}
+
+/* The features of one kind that wait against the voxels. */
+SDM_FOR_KIND sdm_status hold_batch(block *b, int kind, sdm_error *err)
+{
+    sdm_pending *p = &b->s->pending[kind];
+    const size_t n = hit_vectors(b, kind, hit_tiles(b, kind));
+    p->n = p->groups = 0;
+    const sdm_status st = sdm_grid_scratch_candidates(b->s, b->s->of_vectors->n + n, b->job->limit, err);
+    if (!st) compare(b, kind, n);
+    return st;
+}
+
+typedef sdm_status hold_kind(block *b, sdm_error *err);
+static sdm_status hold_faces(block *b, sdm_error *err) { return hold_batch(b, SDM_FACES, err); }
+static sdm_status hold_thin_faces(block *b, sdm_error *err) { return hold_batch(b, SDM_THIN_FACES, err); }
+static sdm_status hold_edges(block *b, sdm_error *err) { return hold_batch(b, SDM_EDGES, err); }
+static sdm_status hold_corners(block *b, sdm_error *err) { return hold_batch(b, SDM_CORNERS, err); }
+static hold_kind *const hold[SDM_FEATURE_KINDS] = {hold_faces, hold_thin_faces, hold_edges, hold_corners};
+
+#define AHEAD 2 // clusters
+
+/* Calls most of a cluster's groups into the cache. */
+static inline void fetch_groups(const sdm_features *f, const sdm_cluster_node *node)
+{
+    const char *group = (const char *)&f->group[node->group];
+    for (size_t k = 0; k < 2 * sizeof(sdm_feature_group); k += 64) __builtin_prefetch(group + k);
+}
+
+static inline bool is_full(const sdm_pending *p) { return p->n > SDM_BATCH - 8; }
+
+/* The features of the block's clusters against its voxels. */
+static sdm_status hold_features(block *b, sdm_error *err)
+{
+    const sdm_features *f = b->job->features;
+    const meeting w = meeting_of(b);
+    sdm_pending *wait = b->s->pending, *faces = &wait[SDM_FACES], *edges = &wait[SDM_EDGES],
+                *corners = &wait[SDM_CORNERS], *thin = &wait[SDM_THIN_FACES];
+    sdm_status st = SDM_OK;
+    for (int kind = 0; kind < SDM_FEATURE_KINDS; kind++) wait[kind].n = wait[kind].groups = 0;
+    start_candidates(b->s->of_vectors);
+    for (size_t i = 0; i < b->s->n_cluster && !st; i++) {
+        const sdm_cluster_ref *c = &b->s->cluster[i];
+        const sdm_cluster_node *node = &f->node[c->node];
+        const sdm_feature_group *group = &f->group[node->group];
+        if (i + AHEAD < b->s->n_cluster) fetch_groups(f, &f->node[b->s->cluster[i + AHEAD].node]);
+        keep_group(b, faces, node->first,
+                   meet_group(&w, SDM_FACES, group, c, &faces->met[faces->groups]) & ~node->thin);
+        if (is_full(faces)) st = hold[SDM_FACES](b, err);
+        if (node->thin) {
+            keep_group(b, thin, node->first,
+                       meet_group(&w, SDM_THIN_FACES, group, c, &thin->met[thin->groups]) & node->thin);
+            if (is_full(thin) && !st) st = hold[SDM_THIN_FACES](b, err);
         }
-    int64_t size[3];
-    for (int a = 0; a < 3; a++) size[a] = job->n[a] - t->first[a] < whole[a] ? job->n[a] - t->first[a] : whole[a];
-    for (int64_t z = 0; z < size[2]; z++)
-        for (int64_t y = 0; y < size[1]; y++) {
-            const int64_t to = ((t->first[2] + z) * job->n[1] + t->first[1] + y) * job->n[0] + t->first[0];
-            const int64_t from = (z * whole[1] + y) * whole[0];
-            if (size[0] == 4) // the usual size, so that no function is called
-                memcpy(&job->values[to], &d[from], 4 * sizeof *d);
-            else
-                memcpy(&job->values[to], &d[from], (size_t)size[0] * sizeof *d);
-            if (job->slot) memcpy(&job->slot[to], &x->number[from], (size_t)size[0] * sizeof *x->number);
+        for (uint32_t number = node->edge; number < node->edge_end && !st; number += 8) {
+            keep_group(b, edges, number, meet_group(&w, SDM_EDGES, ++group, c, &edges->met[edges->groups]));
+            if (is_full(edges)) st = hold[SDM_EDGES](b, err);
         }
+        for (uint32_t number = node->corner; number < node->corner_end && !st; number++) {
+            corners->corner[corners->n] = number;
+            corners->cluster[corners->n] = (uint32_t)i;
+            corners->n += meets_corner(&w, &f->corner[number - f->corner_base], c);
+            if (is_full(corners)) st = hold[SDM_CORNERS](b, err);
+        }
+    }
+    for (int kind = 0; kind < SDM_FEATURE_KINDS && !st; kind++)
+        if (wait[kind].n) st = hold[kind](b, err);
+    return st;
 }
 
 #endif

@@ -1,0 +1,83 @@
+/* From the clusters of a block to the features whose region it meets. Part of the map kernels. */
+#ifndef SDM_GEOM_GROUPS_KERNEL_H
+#define SDM_GEOM_GROUPS_KERNEL_H
+
+#include "clusters_kernel.h"
+#include "features_kernel.h"
+
+/* The block at hand. */
+typedef struct block {
+    const sdm_grid_job *job;
+    sdm_grid_scratch *s;
+    uint8_t wanted[8]; /* vectors of a tile that begin inside the grid */
+    unsigned met;      /* tiles that meet the region of some feature */
+    float error;       /* bound on the error of a function */
+} block;
+
+/* The same for all groups: numbers in all lanes, in a copy, so that no store can change them. */
+typedef struct meeting {
+    point8 half, axis[3]; /* as in sdm_grid_parts */
+    bool aligned;
+    v8f error, tile, vector; /* shares of what changes within the block */
+} meeting;
+
+static inline meeting meeting_of(const block *b)
+{
+    const sdm_grid_job *job = b->job;
+    const sdm_grid_parts *q = &job->part[SDM_TO_BLOCKS];
+    meeting w = {.half = p8_all(q->half[0], q->half[1], q->half[2]),
+                 .aligned = job->aligned,
+                 .error = v8_all(b->error),
+                 .tile = v8_all(job->share[SDM_TO_TILES]),
+                 .vector = v8_all(job->share[SDM_TO_VECTORS])};
+    for (int a = 0; a < 3; a++) w.axis[a] = p8_all(q->axis[a][0], q->axis[a][1], q->axis[a][2]);
+    return w;
+}
+
+/* The largest change of a function with gradient g from the middle of the block to its corners. */
+static inline v8f reach8(const meeting *w, point8 g)
+{
+    if (w->aligned) return v8_fma(v8_abs(g.x), w->half.x, v8_fma(v8_abs(g.y), w->half.y, v8_abs(g.z) * w->half.z));
+    v8f sum = v8_all(0);
+    for (int a = 0; a < 3; a++) sum += v8_abs(p8_dot(g, w->axis[a]));
+    return sum;
+}
+
+/* The features of a group whose regions meet the block: fills in x, and returns their lanes. */
+SDM_FOR_KIND unsigned meet_group(const meeting *w, int kind, const sdm_feature_group *k, const sdm_cluster_ref *c,
+                                 sdm_met_group *x)
+{
+    const point8 shift = p8_all(c->shift[0], c->shift[1], c->shift[2]);
+    v8f beyond = v8_all(-INFINITY);
+    x->group = k;
+    x->mask = c->mask;
+    for (int j = 0; j < 4; j++) {
+        const point8 g = p8_load(k->g[j]);
+        const v8f at = p8_linear(g, shift, v8_load(k->offset[j]));
+        v8_store(x->at_block[j], at);
+        if (j == 3 && kind != SDM_THIN_FACES) break;
+        const v8f reach = reach8(w, g), most = kind == SDM_EDGES && j < 2 ? w->error + v8_load(k->most[j]) : w->error;
+        v8_store(x->most_at_tile[j], v8_fma(reach, w->tile, most));
+        v8_store(x->most_at_vector[j], v8_fma(reach, w->vector, most));
+        beyond = v8_max(beyond, (kind == SDM_EDGES && j == 0 ? v8_abs(at) : at) - (reach + most));
+    }
+    return 0xff & ~(unsigned)v8_greater(beyond, v8_all(0));
+}
+
+/* Keeps the features in some lanes of the group behind the last one. Without branches: who meets the block cannot be foreseen. */
+static inline void keep_group(const block *b, sdm_pending *p, uint32_t number, unsigned lanes)
+{
+    p->met[p->groups].number = number;
+    p->n = put_lanes(b->job, p->feature, p->n, (uint32_t)(8 * p->groups), lanes);
+    p->groups += lanes != 0;
+}
+
+/* Does a corner's region meet the block? */
+static inline bool meets_corner(const meeting *w, const sdm_corner_row *k, const sdm_cluster_ref *c)
+{
+    const point8 g = p8_load(k->along);
+    const v8f at_middle = p8_dot(g, p8_all(c->shift[0] - k->at[0], c->shift[1] - k->at[1], c->shift[2] - k->at[2]));
+    return (v8_greater(at_middle - reach8(w, g), w->error) & ((1 << SDM_CORNER_EDGES) - 1)) == 0;
+}
+
+#endif

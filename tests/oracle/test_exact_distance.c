@@ -412,6 +412,25 @@ static void test_memory_is_short(void **state)
     sdm_mesh_dispose(&b);
 }
 
+/* Faces too low for regions in float, nearest for whole vectors of voxels, by every instruction set. */
+static void test_thin_faces(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0};
+    mesh_box(&m, (const double[3]){0, 0, 0}, (const double[3]){4, 0.05, 1});
+    sdm_exact *e = engine(&m, NULL);
+    const sdm_grid g = sdm_grid_centred((const int64_t[3]){32, 8, 32}, 0.0125, (const double[3]){2, 0.025, 1.1});
+    for (int level = 0; level < 3; level++) {
+        (void)sdm_grid_kernel_select(level);
+        float *map = map_of(e, &g);
+        compare(map, &m, &g, 0);
+        free(map);
+    }
+    (void)sdm_grid_kernel_select(-1);
+    sdm_exact_free(e);
+    sdm_mesh_dispose(&m);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -421,6 +440,7 @@ int main(void)
         cmocka_unit_test(test_threads_and_instruction_sets),
         cmocka_unit_test(test_scale_and_place),
         cmocka_unit_test(test_thin_grids_and_single_voxels),
+        cmocka_unit_test(test_thin_faces),
         cmocka_unit_test(test_lipschitz),
         cmocka_unit_test(test_misuse),
         cmocka_unit_test(test_naive_map_is_naive_points),

@@ -52,6 +52,16 @@ static void memory_limits(void **state)
     assert_int_equal(sdm_alloc(&p, 0, 8, "empty", &e), SDM_OK);
     assert_int_equal((uintptr_t)p % 64, 0);
     sdm_free(p);
+    assert_int_equal(sdm_alloc_unset(&p, SIZE_MAX / 2, 3, "unset block", &e), SDM_E_NOMEM);
+    assert_non_null(strstr(e.text, "unset block"));
+    assert_null(p);
+    sdm_alloc_fail_after(1);
+    assert_int_equal(sdm_alloc_unset(&p, 100, 8, "unset block", &e), SDM_E_NOMEM);
+    sdm_alloc_fail_after(0);
+    assert_int_equal(sdm_alloc_unset(&p, 100, 8, "unset block", &e), SDM_OK);
+    assert_int_equal((uintptr_t)p % 64, 0);
+    memset(p, 1, 800);
+    sdm_free(p);
     double *v;
     assert_int_equal(SDM_ALLOC(&v, 3, "v", &e), SDM_OK);
     assert_true(v[0] == 0 && v[2] == 0);

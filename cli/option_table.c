@@ -300,7 +300,7 @@ const cli_option cli_options[] = {
     {"prior-translation", 0, CLI_REAL, "MM", NULL, 0, 1e9, ON(CLI_FIT), AT(fit.prior_translation),
      "the same of the translation (default 0: no prior)"},
     {"eps", 0, CLI_REAL, "F", NULL, 1e-12, 1, ON(CLI_FIT), AT(fit.eps),
-     "the fit ends when no unknown changes by more than this share of its range (default 1e-4; exact maps 1e-6)"},
+     "the fit ends when no unknown changes by more than this share of its range (default 1e-4; exact maps 3e-6)"},
     {"max-iterations", 0, CLI_INT, "N", NULL, 1, 100000, ON(CLI_FIT), AT(fit.max_iterations),
      "iterations at most (default 60)"},
     {"least-inside", 0, CLI_REAL, "F", NULL, 0, 1, ON(CLI_FIT), AT(fit.least_inside),

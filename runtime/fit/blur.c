@@ -11,8 +11,6 @@
 
 // taps on one side at most: a blur of 16 voxels and its tail
 #define RADIUS_MAX 128
-// a field at most, see FIT_FIELDS_MAX
-#define LINE_FIELDS 80
 
 int sdm_fit_threads(int wanted)
 {
@@ -45,7 +43,7 @@ static int gaussian(double t, double tap[RADIUS_MAX + 1])
             above *= 1e-200, here *= 1e-200, sum *= 1e-200;
         }
     }
-    while (r > 0 && tap[r] < 1e-8 * sum) r--; // below float rounding
+    while (r > 0 && tap[r] < 1e-8 * sum) r--;
     double kept = tap[0];
     for (int k = 1; k <= r; k++) kept += 2 * tap[k];
     for (int k = 0; k <= r; k++) tap[k] /= kept;
@@ -54,45 +52,66 @@ static int gaussian(double t, double tap[RADIUS_MAX + 1])
 
 static int64_t clamp(int64_t i, int64_t n) { return i < 0 ? 0 : i < n ? i : n - 1; }
 
-// the first fields of one line of n voxels that are `step` apart
-static void blur_line(const float *in, float *out, int64_t n, size_t step, size_t n_blurred, int r, const double *tap)
+// out[n] = sum over k of tap[k] times the elements k * step before and after
+static void blur_some(const double *in, double *out, size_t n, size_t step, int r, const double *tap)
 {
-    for (int64_t i = 0; i < n; i++) {
-        float sum[LINE_FIELDS];
-        const float *centre = in + (size_t)i * step, w0 = (float)tap[0];
-        for (size_t f = 0; f < n_blurred; f++) sum[f] = w0 * centre[f];
-        for (int k = 1; k <= r; k++) {
-            const float *a = in + (size_t)clamp(i - k, n) * step, *b = in + (size_t)clamp(i + k, n) * step;
-            const float w = (float)tap[k];
-            for (size_t f = 0; f < n_blurred; f++) sum[f] += w * (a[f] + b[f]);
-        }
-        memcpy(out + (size_t)i * step, sum, n_blurred * sizeof *sum);
+    for (size_t i = 0; i < n; i++) out[i] = tap[0] * in[i];
+    for (int k = 1; k <= r; k++) {
+        const double *a = in - (size_t)k * step, *b = in + (size_t)k * step, w = tap[k];
+        for (size_t i = 0; i < n; i++) out[i] += w * (a[i] + b[i]);
     }
 }
 
-void sdm_fit_blur(const sdm_grid *g, size_t n_fields, size_t n_blurred, double variance, int n_threads, float **packed,
-                  float **spare)
+// voxel i of a line of n voxels that are `step` apart, each of them `width` numbers
+static void blur_at_border(const double *in, double *out, int64_t i, int64_t n, size_t step, size_t width, int r,
+                           const double *tap)
+{
+    double *to = out + (size_t)i * step;
+    const double *centre = in + (size_t)i * step;
+    for (size_t e = 0; e < width; e++) to[e] = tap[0] * centre[e];
+    for (int k = 1; k <= r; k++) {
+        const double *a = in + (size_t)clamp(i - k, n) * step, *b = in + (size_t)clamp(i + k, n) * step;
+        for (size_t e = 0; e < width; e++) to[e] += tap[k] * (a[e] + b[e]);
+    }
+}
+
+// along the first axis: a row
+static void blur_row(const double *in, double *out, int64_t n, size_t n_fields, int r, const double *tap)
+{
+    const int64_t from = r < n ? r : n, to = n - r > from ? n - r : from;
+    for (int64_t i = 0; i < from; i++) blur_at_border(in, out, i, n, n_fields, n_fields, r, tap);
+    const size_t first = (size_t)from * n_fields;
+    if (to > from) blur_some(in + first, out + first, (size_t)(to - from) * n_fields, n_fields, r, tap);
+    for (int64_t i = to; i < n; i++) blur_at_border(in, out, i, n, n_fields, n_fields, r, tap);
+}
+
+void sdm_fit_blur(const sdm_grid *g, size_t n_fields, double variance, int n_threads, double **packed, double **spare)
 {
     (void)n_threads; // without OpenMP
-    const size_t step[3] = {n_fields, n_fields * (size_t)g->n[0], n_fields * (size_t)(g->n[0] * g->n[1])};
+    const size_t row = n_fields * (size_t)g->n[0], step[3] = {n_fields, row, row * (size_t)g->n[1]};
     for (int axis = 0; axis < 3; axis++) {
         double tap[RADIUS_MAX + 1];
         const int r = gaussian(variance / (g->spacing[axis] * g->spacing[axis]), tap);
         if (r == 0) continue;
-        const int b = (axis + 1) % 3, c = (axis + 2) % 3;
-        const float *in = *packed;
-        float *out = *spare;
+        const double *in = *packed;
+        double *out = *spare;
 #pragma omp parallel for schedule(static) num_threads(n_threads)
-        for (int64_t line = 0; line < g->n[b] * g->n[c]; line++) {
-            const size_t from = (size_t)(line % g->n[b]) * step[b] + (size_t)(line / g->n[b]) * step[c];
-            blur_line(in + from, out + from, g->n[axis], step[axis], n_blurred, r, tap);
+        for (int64_t line = 0; line < g->n[1] * g->n[2]; line++) {
+            const int64_t j = line % g->n[1], k = line / g->n[1], at = axis == 1 ? j : k, n = g->n[axis];
+            const size_t start = (size_t)line * row, origin = start - (size_t)at * step[axis];
+            if (axis == 0)
+                blur_row(in + start, out + start, n, n_fields, r, tap);
+            else if (at >= r && at + r < n)
+                blur_some(in + start, out + start, row, step[axis], r, tap);
+            else
+                blur_at_border(in + origin, out + origin, at, n, step[axis], row, r, tap);
         }
         *spare = *packed;
         *packed = out;
     }
 }
 
-void sdm_fit_laplacian(const sdm_grid *g, size_t n_fields, double scale, int n_threads, float *packed)
+void sdm_fit_laplacian(const sdm_grid *g, size_t n_fields, double scale, int n_threads, double *packed)
 {
     (void)n_threads; // without OpenMP
     const size_t step[3] = {n_fields, n_fields * (size_t)g->n[0], n_fields * (size_t)(g->n[0] * g->n[1])};
@@ -100,14 +119,14 @@ void sdm_fit_laplacian(const sdm_grid *g, size_t n_fields, double scale, int n_t
     for (int64_t row = 0; row < g->n[1] * g->n[2]; row++) {
         int64_t index[3] = {0, row % g->n[1], row / g->n[1]};
         for (index[0] = 0; index[0] < g->n[0]; index[0]++) {
-            float *f = packed + (size_t)(row * g->n[0] + index[0]) * n_fields;
+            double *f = packed + (size_t)(row * g->n[0] + index[0]) * n_fields;
             double sum = 0;
             for (int a = 0; a < 3; a++) {
-                const double before = (double)(index[a] > 0 ? f[-(ptrdiff_t)step[a]] : f[0]);
-                const double after = (double)(index[a] + 1 < g->n[a] ? f[step[a]] : f[0]);
-                sum += (before + after - 2 * (double)f[0]) / (g->spacing[a] * g->spacing[a]);
+                const double before = index[a] > 0 ? f[-(ptrdiff_t)step[a]] : f[0];
+                const double after = index[a] + 1 < g->n[a] ? f[step[a]] : f[0];
+                sum += (before + after - 2 * f[0]) / (g->spacing[a] * g->spacing[a]);
             }
-            f[n_fields - 1] = (float)(scale * sum);
+            f[n_fields - 1] = scale * sum;
         }
     }
 }

@@ -7,12 +7,11 @@
 /* Threads to use where `wanted` was asked for (0: the OpenMP default). */
 int sdm_fit_threads(int wanted);
 
-/* The first n_blurred fields of (*packed)[voxels][n_fields] through the discrete Gaussian of this variance (mm^2); the border repeats.
-   *spare, of the same size, may change places with *packed; the other fields are then lost. The same bits for any number of threads. */
-void sdm_fit_blur(const sdm_grid *g, size_t n_fields, size_t n_blurred, double variance, int n_threads, float **packed,
-                  float **spare);
+/* (*packed)[voxels][n_fields] through the discrete Gaussian of this variance (mm^2); the border repeats. *spare, of the same size, may
+   change places with *packed. The same bits for any number of threads. */
+void sdm_fit_blur(const sdm_grid *g, size_t n_fields, double variance, int n_threads, double **packed, double **spare);
 
 /* The last field = scale * Laplacian of the first: the derivative by the sd of the blur, with scale = that sd. */
-void sdm_fit_laplacian(const sdm_grid *g, size_t n_fields, double scale, int n_threads, float *packed);
+void sdm_fit_laplacian(const sdm_grid *g, size_t n_fields, double scale, int n_threads, double *packed);
 
 #endif

@@ -54,16 +54,16 @@ static double log_mixture(const sdm_fit_law *law, size_t n, double value)
 static sdm_status find_walls(const sdm_fit_target *t, const sdm_fit_opts *o, int n_threads, float *wall, sdm_error *err)
 {
     const size_t n = sdm_grid_count(&t->grid);
-    float *packed = NULL, *spare = NULL;
+    double *packed = NULL, *spare = NULL;
     sdm_status s = SDM_ALLOC(&packed, n, "smoothed image", err);
     if (!s) s = SDM_ALLOC(&spare, n, "smoothed image", err);
     if (!s) {
         const sdm_fit_appearance *a = &o->appearance;
-        for (size_t i = 0; i < n; i++) packed[i] = isnan(t->values[i]) ? (float)a->outside[0].mean : t->values[i];
-        sdm_fit_blur(&t->grid, 1, 1, o->blur * o->blur, n_threads, &packed, &spare);
+        for (size_t i = 0; i < n; i++) packed[i] = isnan(t->values[i]) ? a->outside[0].mean : (double)t->values[i];
+        sdm_fit_blur(&t->grid, 1, o->blur * o->blur, n_threads, &packed, &spare);
 #pragma omp parallel for schedule(static) num_threads(n_threads)
         for (size_t i = 0; i < n; i++) {
-            const double v = (double)packed[i];
+            const double v = packed[i];
             const bool inside = log_mixture(a->inside, a->n_inside, v) > log_mixture(a->outside, a->n_outside, v);
             wall[i] = inside && !isnan(t->values[i]) ? INFINITY : 0;
         }

@@ -5,7 +5,9 @@
 
 #include "cavity.h"
 #include "check.h"
+#include "creases.h"
 #include "evidence.h"
+#include "look.h"
 #include "posterior.h"
 #include "score.h"
 #include "sdm/memory.h"
@@ -17,9 +19,12 @@
 #define SITES_MOST 2e6
 // as long as the region and the weights of the priors are not the last, small steps are not worth while
 #define EPS_FIRST 1e-2
+#define EPS_FIRST_AVERAGED 1e-4
 // relative change of the weights that is left
 #define WEIGHT_EPS 1e-3
 #define WEIGHT_ROUGH 0.05
+// so many steps in a row that promise no gain are an end; exact maps have creases, and need not try again
+#define FLAT_MOST 6
 // a prior against all evidence would feed itself: the worse the fit, the more alike are neighbouring residuals
 #define WEIGHINGS_MOST 4
 
@@ -42,7 +47,7 @@ sdm_fit_opts sdm_fit_defaults(void)
         .max_iterations = 60,
         .max_polish_iterations = 0,
         .eps = 1e-4,
-        .polish_eps = 1e-6,
+        .polish_eps = 3e-6,
     };
 }
 
@@ -119,7 +124,7 @@ static sdm_status begin(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     const size_t tissues = share ? o->appearance.n_inside + o->appearance.n_outside : 0;
     s = sdm_fit_sums_create(fit_columns(p->n_params) + tissues, &p->sums, err);
     if (!s) s = sdm_fit_sums_create(fit_columns(p->n_params) + tissues, &p->trial, err);
-    if (!s) s = sdm_fit_maps_at(&p->maps, p->state.params, err);
+    if (!s) s = sdm_fit_maps_at(&p->maps, p->state.params, true, err);
     if (!s) s = sdm_fit_extent(&p->maps, &p->extent, err);
     memcpy(p->maps_at, p->state.params, sizeof p->maps_at);
     p->packed_blur = NAN;
@@ -161,8 +166,9 @@ static sdm_status weigh_priors(fit_problem *p, double *change, sdm_error *err)
 static sdm_status settle(fit_problem *p, fit_run *run, fit_ended *ended, sdm_error *err)
 {
     const size_t most = run->max_iterations, before = p->n_iterations;
-    // without priors only the noise factor is of use, and only where creases bounce steps
-    const int weighings = sdm_fit_has_prior(p) ? WEIGHINGS_MOST : p->maps.exact ? 2 : 0;
+    // without priors only the noise factor is of use
+    const int weighings = sdm_fit_has_prior(p) ? WEIGHINGS_MOST : run->averaged ? 0 : 2;
+    const double first = run->averaged ? EPS_FIRST_AVERAGED : EPS_FIRST;
     const double eps = run->eps;
     sdm_status s = SDM_OK;
     for (int round = 0; round < ROUNDS_MOST && !s; round++) {
@@ -183,10 +189,34 @@ static sdm_status settle(fit_problem *p, fit_run *run, fit_ended *ended, sdm_err
             return s;
         }
         run->max_iterations = most - used;
-        run->eps = fmax(eps, EPS_FIRST * (round ? fmin(change, 1) : 1));
+        run->eps = fmax(eps, first * (round ? fmin(change, 1) : 1));
+        if (run->averaged) {
+            sdm_fit_ways(p, run->way);
+            sdm_fit_look_settle(p);
+        }
         s = sdm_fit_iterate(p, run, ended, err);
     }
     return s;
+}
+
+/* To the maximum with maps of one kind. Its last part goes by averaged derivatives: exact maps have creases, and where the data say little
+   of a parameter the rounding of a network's derivatives makes steps that do not end. */
+static sdm_status approach(fit_problem *p, fit_run *run, fit_ended *ended, sdm_error *err)
+{
+    const sdm_fit_opts *o = p->opts;
+    const bool exact = p->maps.exact, average = !o->keep_params;
+    const size_t max_iterations = run->max_iterations;
+    run->averaged = false;
+    memset(p->absent, 0, sizeof p->absent);
+    run->eps = exact && !average ? o->polish_eps : o->eps;
+    run->flat_most = !average ? 0 : exact ? 1 : FLAT_MOST;
+    sdm_status s = settle(p, run, ended, err);
+    if (s || !ended->converged || !average || !(exact || ended->rough)) return s;
+    run->averaged = true;
+    run->max_iterations = max_iterations;
+    run->eps = exact ? o->polish_eps : o->eps;
+    run->flat_most = 0;
+    return settle(p, run, ended, err);
 }
 
 static sdm_status climb(fit_problem *p, sdm_fit_result *out, sdm_error *err)
@@ -204,25 +234,21 @@ static sdm_status climb(fit_problem *p, sdm_fit_result *out, sdm_error *err)
                    .keep_pose = o->keep_pose,
                    .keep_blur = o->keep_blur,
                    .keep_look = o->keep_appearance,
-                   .max_iterations = o->max_iterations,
-                   .eps = p->source->model ? o->eps : fmin(o->eps, o->polish_eps)};
+                   .max_iterations = o->max_iterations};
     fit_ended ended = {0};
-    s = settle(p, &run, &ended, err);
+    s = approach(p, &run, &ended, err);
     const char *what = p->source->model ? "fit" : "fit with exact maps";
     if (!s && ended.converged && p->source->model && p->source->shape && o->max_polish_iterations) {
         p->maps.exact = true;
         p->maps_at[0] = NAN;
         run.phase = SDM_FIT_POLISH;
         run.max_iterations = o->max_polish_iterations;
-        run.eps = o->polish_eps;
         what = "polish with exact maps";
-        s = settle(p, &run, &ended, err);
+        s = approach(p, &run, &ended, err);
     }
     out->converged = !s && ended.converged;
-    const char *text = !out->converged ? "%s stopped: last step %.2g, not below %g"
-                       : ended.rough   ? "%s: last step %.2g, not below %g, but steps gain nothing any more"
-                                       : "%s: last step %.2g, below %g";
-    snprintf(out->reason, sizeof out->reason, text, what, ended.step, run.eps);
+    snprintf(out->reason, sizeof out->reason, "%s%s: last step %.2g, %sbelow %g", what,
+             out->converged ? "" : " stopped", ended.step, out->converged ? "" : "not ", run.eps);
     return s;
 }
 

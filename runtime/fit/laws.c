@@ -80,14 +80,28 @@ double sdm_fit_log_density(const fit_laws *l, size_t tissue, double value)
 /* What a pair says of a value. */
 typedef struct said {
     double log_p, variance, residual, pull;
-    bool mixed; // the variance depends on the share
+    double mixing; // derivative of the share that the variance has, by the share
 } said;
+
+// share within 0 .. 1, for interpolation overshoots a little: with a continuous derivative, so that scores do not jump
+static double within(double share, double *slope)
+{
+    const double width = 4e-3, side = share < 0.5 ? share : 1 - share;
+    double a = side;
+    *slope = 1;
+    if (side < width) {
+        const double way = fmax(side + width, 0);
+        a = 0.25 * way * way / width;
+        *slope = 0.5 * way / width;
+    }
+    return share < 0.5 ? a : 1 - a;
+}
 
 static said ask(const fit_laws *l, const fit_pair *p, double value, double share)
 {
     const sdm_fit_law *in = &l->tissue[p->in], *out = &l->tissue[p->out];
-    const double a = share > 0 ? fmin(share, 1) : 0; // interpolation overshoots a little
-    said s = {.mixed = a == share};
+    said s;
+    const double a = within(share, &s.mixing);
     s.variance = a * in->sd * in->sd + (1 - a) * out->sd * out->sd;
     s.residual = value - (share * in->mean + (1 - share) * out->mean);
     s.log_p = p->log_weight - 0.5 * log(s.variance) +
@@ -126,7 +140,7 @@ static void respond_share(const fit_laws *l, double value, double share, bool de
         const fit_pair *q = &l->pair[i];
         const sdm_fit_law *in = &l->tissue[q->in], *tissue = &l->tissue[q->out];
         const double step = in->mean - tissue->mean;
-        const double spread = s[i].mixed ? (in->sd * in->sd - tissue->sd * tissue->sd) / s[i].variance : 0;
+        const double spread = s[i].mixing * (in->sd * in->sd - tissue->sd * tissue->sd) / s[i].variance;
         const double pulled = s[i].pull * s[i].residual, by_mean = pulled / s[i].variance;
         const double by_variance = 0.5 * spread * (pulled * s[i].residual / s[i].variance - 1);
         const size_t at[3] = {0, 1 + q->in, 1 + q->out};
@@ -258,7 +272,8 @@ void sdm_fit_moments_add(const fit_laws *l, double value, double field, fit_mome
     }
 }
 
-void sdm_fit_moments_apply(const fit_laws *l, const fit_moments *m, double least_sd, sdm_fit_appearance *look)
+void sdm_fit_moments_apply(const fit_laws *l, const fit_moments *m, const bool *kept, double least_sd,
+                           sdm_fit_appearance *look)
 {
     double sum[2] = {0, 0};
     for (size_t i = 0; i < l->n_tissues; i++) sum[i >= l->n_in] += m->share[i];
@@ -266,7 +281,7 @@ void sdm_fit_moments_apply(const fit_laws *l, const fit_moments *m, double least
         sdm_fit_law *t = i < l->n_in ? &look->inside[i] : &look->outside[i - l->n_in];
         // a tissue that is hardly there keeps its law, so that it can come back
         if (sum[i >= l->n_in] > 0) t->weight = fmax(m->share[i] / sum[i >= l->n_in], 1e-6);
-        if (!(m->n[i] > 10)) continue;
+        if (kept[i]) continue;
         const double moved = l->model == SDM_FIT_LABELS ? m->first[i] / m->count[i] : 0;
         t->mean += moved;
         const double square = m->square[i] - moved * moved * m->count[i];

@@ -55,7 +55,8 @@ typedef struct fit_moments {
 
 void sdm_fit_moments_add(const fit_laws *l, double value, double field, fit_moments *m);
 
-/* Writes what the sums say to look; least_sd keeps laws from collapsing. */
-void sdm_fit_moments_apply(const fit_laws *l, const fit_moments *m, double least_sd, sdm_fit_appearance *look);
+/* Writes what the sums say to look, of tissues that are kept their weights alone; least_sd keeps laws from collapsing. */
+void sdm_fit_moments_apply(const fit_laws *l, const fit_moments *m, const bool *kept, double least_sd,
+                           sdm_fit_appearance *look);
 
 #endif

@@ -3,6 +3,9 @@
 
 #include <math.h>
 
+// fewer say nothing of a law
+#define VALUES_LEAST 10.0
+
 static bool has_means(const fit_problem *p) { return p->opts->image_model == SDM_FIT_LABELS; }
 
 // contrast of the start
@@ -44,6 +47,21 @@ void sdm_fit_look_set(fit_problem *p, const double *x)
     for (size_t i = 0; i < p->laws.n_tissues; i++) tissue(&s->look, i)->weight = p->laws.tissue[i].weight; // sum to 1
 }
 
+void sdm_fit_look_settle(fit_problem *p)
+{
+    if (p->target->kind != SDM_FIT_IMAGE || p->opts->keep_appearance) return;
+    fit_moments m;
+    sdm_fit_appearance start = p->opts->appearance;
+    sdm_fit_sums_moments(&p->sites, &p->laws, p->opts->n_threads, &m);
+    for (size_t i = 0; i < p->laws.n_tissues; i++) {
+        p->absent[i] = !(m.n[i] > fmax(p->noise_factor, VALUES_LEAST));
+        if (!p->absent[i]) continue;
+        sdm_fit_law *t = tissue(&p->state.look, i);
+        t->mean = tissue(&start, i)->mean;
+        t->sd = tissue(&start, i)->sd;
+    }
+}
+
 void sdm_fit_look_update(fit_problem *p)
 {
     if (p->target->kind == SDM_FIT_POINTS) {
@@ -56,7 +74,9 @@ void sdm_fit_look_update(fit_problem *p)
     } else if (p->target->kind == SDM_FIT_IMAGE) {
         fit_moments m;
         sdm_fit_sums_moments(&p->sites, &p->laws, p->opts->n_threads, &m);
-        sdm_fit_moments_apply(&p->laws, &m, 1e-3 * contrast(p), &p->state.look);
+        bool kept[FIT_TISSUES_MAX];
+        for (size_t i = 0; i < p->laws.n_tissues; i++) kept[i] = p->absent[i] || !(m.n[i] > VALUES_LEAST);
+        sdm_fit_moments_apply(&p->laws, &m, kept, 1e-3 * contrast(p), &p->state.look);
     } else {
         return;
     }

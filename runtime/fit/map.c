@@ -21,7 +21,7 @@ static sdm_status map_at(const sdm_fit_source *source, const double *params, int
                   : source->model ? sdm_model_get_info(source->model)->params[k].def
                                   : sdm_instance_params(source->shape, &ignored)[k].def;
     }
-    return s ? s : sdm_fit_maps_at(maps, used, err);
+    return s ? s : sdm_fit_maps_at(maps, used, false, err);
 }
 
 sdm_status sdm_fit_map(const sdm_fit_source *source, const double *params, const sdm_pose *pose, const sdm_grid *grid,

@@ -17,6 +17,11 @@ double sdm_fit_seconds(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
+static size_t fields_of(const fit_maps *m, bool derivatives)
+{
+    return derivatives ? m->n_params + (m->share ? 2 : 1) : 1;
+}
+
 sdm_status sdm_fit_maps_create(const sdm_fit_source *source, bool share, const sdm_fit_opts *opts, fit_maps *out,
                                sdm_error *err)
 {
@@ -35,13 +40,13 @@ sdm_status sdm_fit_maps_create(const sdm_fit_source *source, bool share, const s
         (void)sdm_instance_params(source->shape, &m->n_params);
     }
     m->n_voxels = sdm_grid_count(&m->grid);
-    m->n_fields = m->n_params + (share ? 2 : 1);
     m->least_blur = 0.5 * fmax(m->grid.spacing[0], fmax(m->grid.spacing[1], m->grid.spacing[2]));
     size_t jacobian, fields;
     sdm_status s = sdm_mul(m->n_voxels, m->n_params, &jacobian, err);
-    if (!s) s = sdm_mul(m->n_voxels, m->n_fields, &fields, err);
-    if (!s) s = SDM_ALLOC(&m->distance, m->n_voxels, "map", err);
+    if (!s) s = sdm_mul(m->n_voxels, fields_of(m, true), &fields, err);
+    if (!s) s = SDM_ALLOC(&m->values, m->n_voxels, "map", err);
     if (!s) s = SDM_ALLOC(&m->jacobian, jacobian, "derivatives of the map", err);
+    if (!s) s = SDM_ALLOC(&m->distance, m->n_voxels, "map", err);
     if (!s) s = SDM_ALLOC(&m->packed, fields, "fields of the map", err);
     if (!s) s = SDM_ALLOC(&m->spare, fields, "fields of the map", err);
     if (s) sdm_fit_maps_dispose(m);
@@ -50,8 +55,9 @@ sdm_status sdm_fit_maps_create(const sdm_fit_source *source, bool share, const s
 
 void sdm_fit_maps_dispose(fit_maps *m)
 {
-    sdm_free(m->distance);
+    sdm_free(m->values);
     sdm_free(m->jacobian);
+    sdm_free(m->distance);
     sdm_free(m->packed);
     sdm_free(m->spare);
     *m = (fit_maps){0};
@@ -64,26 +70,33 @@ static bool outside_of_network(const sdm_model_info *info, const double *params)
     return false;
 }
 
-sdm_status sdm_fit_maps_at(fit_maps *m, const double *params, sdm_error *err)
+static sdm_status make_exact(fit_maps *m, const double *params, bool derivatives, sdm_error *err)
+{
+    const sdm_exact_opts o = {.n_threads = m->n_threads, .cancelled = m->cancelled, .user = m->user};
+    const sdm_instance *shape = m->source->shape;
+    if (derivatives) return sdm_exact_shape_jacobian(shape, params, &o, &m->grid, m->values, m->jacobian, NULL, err);
+    return sdm_exact_shape_map(shape, params, &o, &m->grid, m->values, NULL, err);
+}
+
+// always with derivatives: such maps change smoothly with the parameters
+static sdm_status make_by_network(fit_maps *m, const double *params, sdm_error *err)
+{
+    const sdm_generate_opts o = {.policy = SDM_RANGE_REFUSE, .n_threads = m->n_threads};
+    return sdm_generate_jacobian(m->source->model, params, &o, m->values, m->jacobian, NULL, err);
+}
+
+sdm_status sdm_fit_maps_at(fit_maps *m, const double *params, bool derivatives, sdm_error *err)
 {
     if (m->cancelled && m->cancelled(m->user)) return sdm_fail(err, SDM_E_CANCELLED, "fit stopped on request");
-    const sdm_fit_source *source = m->source;
     const double from = sdm_fit_seconds();
-    const bool outside =
-        !m->exact && source->policy == SDM_RANGE_EXACT && outside_of_network(sdm_model_get_info(source->model), params);
-    if (m->exact || outside) {
-        const sdm_exact_opts o = {.n_threads = m->n_threads, .cancelled = m->cancelled, .user = m->user};
-        m->n_exact++;
-        m->n_outside += outside;
-        const sdm_status s =
-            sdm_exact_shape_jacobian(source->shape, params, &o, &m->grid, m->distance, m->jacobian, NULL, err);
-        m->seconds_exact += sdm_fit_seconds() - from;
-        return s;
-    }
-    const sdm_generate_opts o = {.policy = SDM_RANGE_REFUSE, .n_threads = m->n_threads};
-    m->n_network++;
-    const sdm_status s = sdm_generate_jacobian(source->model, params, &o, m->distance, m->jacobian, NULL, err);
-    m->seconds_network += sdm_fit_seconds() - from;
+    const bool outside = !m->exact && m->source->policy == SDM_RANGE_EXACT &&
+                         outside_of_network(sdm_model_get_info(m->source->model), params);
+    const bool exact = m->exact || outside;
+    const sdm_status s = exact ? make_exact(m, params, derivatives, err) : make_by_network(m, params, err);
+    *(exact ? &m->n_exact : &m->n_network) += 1;
+    *(exact ? &m->seconds_exact : &m->seconds_network) += sdm_fit_seconds() - from;
+    m->n_outside += outside;
+    for (size_t v = 0; v < m->n_voxels && !s; v++) m->distance[v] = (double)m->values[v];
     return s;
 }
 
@@ -102,7 +115,10 @@ static double smoothed(const sdm_grid *g, const float *f, size_t v, const int64_
     return sum;
 }
 
-// the edge of sd s0 and its derivatives, packed
+// sd of a Gaussian beyond which nothing of it is left in a double
+#define FAR 8.0
+
+// the edge of sd s0 and, where wanted, its derivatives, packed
 static void draw_row(const fit_maps *m, int64_t row)
 {
     const sdm_grid *g = &m->grid;
@@ -110,12 +126,14 @@ static void draw_row(const fit_maps *m, int64_t row)
     int64_t index[3] = {0, row % g->n[1], row / g->n[1]};
     for (index[0] = 0; index[0] < g->n[0]; index[0]++) {
         const size_t v = (size_t)(row * g->n[0] + index[0]);
-        float *f = m->packed + v * m->n_fields;
-        const double x = smoothed(g, m->distance, v, index, s0) / s0;
-        const double slope = -scale * exp(-0.5 * x * x);
-        f[0] = (float)(0.5 * erfc(x * 0.70710678118654752));
+        double *f = m->packed + v * m->n_fields;
+        const double x = smoothed(g, m->values, v, index, s0) / s0;
+        f[0] = fabs(x) < FAR ? 0.5 * erfc(x * 0.70710678118654752) : x < 0;
+        if (m->n_fields == 1) continue;
+        const double slope = fabs(x) < FAR ? -scale * exp(-0.5 * x * x) : 0;
         for (size_t k = 0; k < m->n_params; k++)
-            f[1 + k] = slope == 0 ? 0 : (float)(slope * smoothed(g, m->jacobian + k * m->n_voxels, v, index, s0));
+            f[1 + k] = slope == 0 ? 0 : slope * smoothed(g, m->jacobian + k * m->n_voxels, v, index, s0);
+        f[1 + m->n_params] = 0;
     }
 }
 
@@ -123,17 +141,18 @@ static void pack_row(const fit_maps *m, int64_t row)
 {
     for (int64_t i = 0; i < m->grid.n[0]; i++) {
         const size_t v = (size_t)(row * m->grid.n[0] + i);
-        float *f = m->packed + v * m->n_fields;
+        double *f = m->packed + v * m->n_fields;
         f[0] = m->distance[v];
-        for (size_t k = 0; k < m->n_params; k++) f[1 + k] = m->jacobian[k * m->n_voxels + v];
+        for (size_t k = 1; k < m->n_fields; k++) f[k] = (double)m->jacobian[(k - 1) * m->n_voxels + v];
     }
 }
 
-void sdm_fit_maps_pack(fit_maps *m, double blur)
+void sdm_fit_maps_pack(fit_maps *m, double blur, bool derivatives)
 {
     const int64_t rows = m->grid.n[1] * m->grid.n[2];
     const int n_threads = sdm_fit_threads(m->n_threads);
     (void)n_threads; // without OpenMP
+    m->n_fields = fields_of(m, derivatives);
 #pragma omp parallel for schedule(static) num_threads(n_threads)
     for (int64_t row = 0; row < rows; row++) {
         if (m->share)
@@ -142,9 +161,6 @@ void sdm_fit_maps_pack(fit_maps *m, double blur)
             pack_row(m, row);
     }
     const double drawn = m->share ? m->least_blur : 0, variance = fmax(blur * blur - drawn * drawn, 0);
-    sdm_fit_blur(&m->grid, m->n_fields, m->share ? m->n_fields - 1 : m->n_fields, variance, n_threads, &m->packed,
-                 &m->spare);
-    if (m->share) {
-        sdm_fit_laplacian(&m->grid, m->n_fields, blur, n_threads, m->packed);
-    }
+    sdm_fit_blur(&m->grid, m->n_fields, variance, n_threads, &m->packed, &m->spare);
+    if (m->share && derivatives) sdm_fit_laplacian(&m->grid, m->n_fields, blur, n_threads, m->packed);
 }

@@ -7,15 +7,18 @@
 typedef struct fit_maps {
     const sdm_fit_source *source;
     sdm_grid grid;
-    size_t n_voxels, n_params, n_fields;
+    size_t n_voxels, n_params;
+    size_t n_fields;   // of packed
     bool share;        // the field is the share of the shape seen through a point spread; else the signed distance
     bool exact;        // ask the exact engine whatever the parameters are
     double least_blur; // mm, what the spacing of the grid can carry
     int n_threads;
     bool (*cancelled)(void *user);
     void *user;
-    float *distance, *jacobian; // [n_voxels], [n_params][n_voxels]
-    float *packed, *spare; // [n_voxels][n_fields]: the field, its derivatives by the parameters and (share) by the blur
+    float *values, *jacobian; // [n_voxels], [n_params][n_voxels]: as maps are made
+    double *distance;         // [n_voxels]: values
+    double *packed,
+        *spare; // [n_voxels][n_fields]: the field, its derivatives by the parameters and (share) by the blur
     size_t n_network, n_exact, n_outside;
     double seconds_network, seconds_exact;
 } fit_maps;
@@ -25,12 +28,12 @@ sdm_status sdm_fit_maps_create(const sdm_fit_source *source, bool share, const s
                                sdm_error *err);
 void sdm_fit_maps_dispose(fit_maps *m);
 
-/* Distance and jacobian at params. */
-sdm_status sdm_fit_maps_at(fit_maps *m, const double *params, sdm_error *err);
+/* Distance and, where `derivatives`, jacobian at params. */
+sdm_status sdm_fit_maps_at(fit_maps *m, const double *params, bool derivatives, sdm_error *err);
 
-/* The fields of what sdm_fit_maps_at() made, seen through a Gaussian of sd blur (mm): for shares at least least_blur, for distances
-   0 or more. */
-void sdm_fit_maps_pack(fit_maps *m, double blur);
+/* The fields of what sdm_fit_maps_at() made, without `derivatives` the first alone, seen through a Gaussian of sd blur (mm): for shares
+   at least least_blur, for distances 0 or more. */
+void sdm_fit_maps_pack(fit_maps *m, double blur, bool derivatives);
 
 /* Seconds of a clock that never goes back. */
 double sdm_fit_seconds(void);

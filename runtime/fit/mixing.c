@@ -45,9 +45,9 @@ static bool find_shares(const fit_mixing *m, size_t n, double *share)
     return true;
 }
 
-void sdm_fit_mix(fit_mixing *m, size_t n, const double *x, double *y, double most)
+void sdm_fit_mix(fit_mixing *m, size_t depth, size_t n, const double *x, double *y, double most)
 {
-    if (m->count == FIT_MIXING_DEPTH + 1) drop_oldest(m, 1);
+    if (m->count > depth) drop_oldest(m, m->count - depth);
     memcpy(m->point[m->count], x, n * sizeof *x);
     memcpy(m->image[m->count++], y, n * sizeof *y);
     if (m->count > 1 && !(norm(m, m->count - 1, n) <= GROWTH_MOST * norm(m, m->count - 2, n)))

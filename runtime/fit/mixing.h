@@ -12,8 +12,8 @@ typedef struct fit_mixing {
     double point[FIT_MIXING_DEPTH + 1][FIT_MIXING_MAX], image[FIT_MIXING_DEPTH + 1][FIT_MIXING_MAX];
 } fit_mixing;
 
-/* x[n]: the point the map was asked at; y[n]: its image, replaced by a guess of the fixed point that differs from it by `most` in no
-   component. n <= FIT_MIXING_MAX. */
-void sdm_fit_mix(fit_mixing *m, size_t n, const double *x, double *y, double most);
+/* x[n]: the point the map was asked at; y[n]: its image, replaced by a guess of the fixed point from up to `depth` pairs before that
+   differs from it by `most` in no component. n <= FIT_MIXING_MAX, depth <= FIT_MIXING_DEPTH. */
+void sdm_fit_mix(fit_mixing *m, size_t depth, size_t n, const double *x, double *y, double most);
 
 #endif

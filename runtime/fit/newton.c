@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "creases.h"
 #include "look.h"
 #include "mixing.h"
 #include "sdm/memory.h"
@@ -14,8 +15,6 @@
 // a gain in log-likelihood, of values that are independent, that means nothing (a few hundredths of a standard deviation): steps that
 // promise less, or less than what rounding makes, are taken without asking whether they gain
 #define GAIN_LEAST 1e-3
-// so many of them in a row are an end too: creases of the distance keep the steps from becoming smaller
-#define FLAT_MOST 6
 #define DAMPING_MOST 1e8
 // standard deviation of the logistic law of scale 1, pi / sqrt(3)
 #define LOGISTIC_SD 1.8137993642342178
@@ -24,6 +23,25 @@
 // steps below which they are accelerated, and the most an acceleration changes an unknown, in its unit
 #define STEP_RUSHED 0.01
 #define RUSH_MOST 0.1
+// and with averaged derivatives, in plain steps
+#define RUSH_AVERAGED 4.0
+
+// the logistic law of labels is seen through its own spread: its edge would lie inside of a curved surface
+static double field_blur(const fit_problem *p)
+{
+    const bool labels = !p->maps.share && p->target->kind != SDM_FIT_POINTS;
+    return labels ? p->state.l_ref * LOGISTIC_SD : p->maps.share ? p->state.blur : 0;
+}
+
+sdm_status sdm_fit_value(fit_problem *p, const double *params, double *log_likelihood, sdm_error *err)
+{
+    p->maps_at[0] = p->packed_blur = NAN;
+    const sdm_status s = sdm_fit_maps_at(&p->maps, params, false, err);
+    if (s) return s;
+    sdm_fit_maps_pack(&p->maps, field_blur(p), false);
+    *log_likelihood = sdm_fit_sums_value(&p->sites, &p->maps, &p->laws, &p->state);
+    return SDM_OK;
+}
 
 sdm_status sdm_fit_look(fit_problem *p, sdm_error *err)
 {
@@ -33,17 +51,15 @@ sdm_status sdm_fit_look(fit_problem *p, sdm_error *err)
     for (size_t k = 0; k < p->n_params; k++) same = same && p->maps_at[k] == s->params[k];
     if (!same) {
         p->packed_blur = p->maps_at[0] = NAN;
-        status = sdm_fit_maps_at(&p->maps, s->params, err);
+        status = sdm_fit_maps_at(&p->maps, s->params, true, err);
         if (!status) memcpy(p->maps_at, s->params, p->n_params * sizeof *s->params);
     } else if (p->maps.cancelled && p->maps.cancelled(p->maps.user)) {
         status = sdm_fail(err, SDM_E_CANCELLED, "fit stopped on request");
     }
     if (status) return status;
-    // the logistic law of labels is seen through its own spread: its edge would lie inside of a curved surface
-    const bool labels = !p->maps.share && p->target->kind != SDM_FIT_POINTS;
-    const double blur = labels ? s->l_ref * LOGISTIC_SD : p->maps.share ? s->blur : 0;
+    const double blur = field_blur(p);
     if (!(p->packed_blur == blur)) {
-        sdm_fit_maps_pack(&p->maps, blur);
+        sdm_fit_maps_pack(&p->maps, blur, true);
         p->packed_blur = blur;
     }
     sdm_fit_laws_prepare(p->opts, p->target->kind, s, &p->laws);
@@ -80,7 +96,10 @@ static void set_limits(const fit_problem *p, const fit_run *run, fit_limits *l)
     const fit_state *s = &p->state;
     for (size_t i = 0; i < p->sums.n_unknowns; i++) {
         l->least[i] = -INFINITY, l->most[i] = INFINITY;
-        l->kept[i] = i < n ? run->keep_params : i < n + 6 ? run->keep_pose : i > n + 6 ? run->keep_look : false;
+        l->kept[i] = i < n       ? run->keep_params
+                     : i < n + 6 ? run->keep_pose
+                     : i > n + 6 ? run->keep_look || fit_mean_stays(p, i)
+                                 : false;
     }
     for (size_t k = 0; k < n; k++) {
         const double most = STEP_MOST * (p->high[k] - p->low[k]);
@@ -142,7 +161,7 @@ static void swap_sums(fit_problem *p)
 /* Where the steps of an iteration stand. */
 typedef struct fit_pace {
     double damping;
-    bool flat; // the gain of the last step was too small to tell
+    int flat; // steps in a row whose gain was too small to tell
 } fit_pace;
 
 // moves by a step; *gained is false where that does not gain, and the state is as before but for its maps
@@ -157,8 +176,9 @@ static sdm_status try_step(fit_problem *p, const double *step, fit_pace *pace, b
     if (s) return s;
     const double after = p->sums.log_likelihood + sdm_fit_prior(p, &p->state, NULL, NULL, NULL);
     const double least = fmax(p->sums.rounding, GAIN_LEAST * p->noise_factor);
-    pace->flat = fabs(expected) < least;
-    *gained = after > before || (pace->flat && after > before - 2 * least);
+    const bool flat = fabs(expected) < least;
+    *gained = after > before || (flat && after > before - 2 * least);
+    pace->flat = flat ? pace->flat + *gained : 0;
     if (*gained) return SDM_OK;
     p->state = from;
     swap_sums(p);
@@ -217,33 +237,53 @@ static void accelerate(const fit_problem *p, const fit_run *run, fit_rush *r, do
     }
     for (size_t i = 0; i < r->n_look; i++) at[n + i] = r->from[i];
     (void)sdm_fit_look_numbers(p, r->to + n);
-    sdm_fit_mix(&r->mixing, n + r->n_look, at, r->to, RUSH_MOST);
+    double largest = 0;
+    for (size_t i = 0; i < n + r->n_look; i++) largest = fmax(largest, fabs(r->to[i] - at[i]));
+    if (run->averaged) // their slope jumps: the last step alone says something, and not for long
+        sdm_fit_mix(&r->mixing, 1, n + r->n_look, at, r->to, fmin(RUSH_MOST, RUSH_AVERAGED * largest));
+    else
+        sdm_fit_mix(&r->mixing, FIT_MIXING_DEPTH, n + r->n_look, at, r->to, RUSH_MOST);
     fit_limits limits;
     set_limits(p, run, &limits);
     for (size_t i = 0; i < n; i++)
         step[i] = limits.kept[i] ? 0 : fmin(fmax((r->to[i] - at[i]) * unit_of(p, i), limits.least[i]), limits.most[i]);
 }
 
-/* An accelerated step, or where shrink < 1 that share of the plain one; *size: that of the plain one, how far the maximum is.
-   *taken is false where it does not gain. */
-static sdm_status rush(fit_problem *p, const fit_run *run, fit_rush *r, double shrink, fit_pace *pace, double *step,
-                       double *work, double *size, bool *taken, sdm_error *err)
+// what a step that was taken means for the next acceleration
+static void rushed(fit_problem *p, const fit_run *run, fit_rush *r, const double *step)
 {
-    const size_t n = p->sums.n_unknowns;
+    for (size_t i = 0; i < p->sums.n_unknowns; i++) r->place[i] += step[i] / unit_of(p, i);
+    if (!run->keep_look) sdm_fit_look_set(p, r->to + p->sums.n_unknowns);
+}
+
+/* An accelerated step; *size: that of the plain one, how far the maximum is. *taken is false where it does not gain. */
+static sdm_status rush(fit_problem *p, const fit_run *run, fit_rush *r, fit_pace *pace, double *step, double *work,
+                       double *size, bool *taken, sdm_error *err)
+{
     *taken = false;
     if (!find_step(p, run, 0, true, step, work)) return SDM_OK;
     *size = step_size(p, step);
-    if (shrink < 1) {
-        r->mixing.count = 0;
-        for (size_t i = 0; i < n; i++) step[i] *= shrink;
-        return try_step(p, step, pace, taken, err);
-    }
     accelerate(p, run, r, step);
     const sdm_status s = try_step(p, step, pace, taken, err);
-    if (s || !*taken) return s;
-    for (size_t i = 0; i < n; i++) r->place[i] += step[i] / unit_of(p, i);
-    if (!run->keep_look) sdm_fit_look_set(p, r->to + n);
-    return SDM_OK;
+    if (!s && *taken) rushed(p, run, r, step);
+    return s;
+}
+
+/* The same by averaged derivatives. Whether it gains is not asked: it may go beyond the kink that is the maximum. */
+static sdm_status average_step(fit_problem *p, const fit_run *run, fit_rush *r, double *step, double *work,
+                               double *size, bool *taken, sdm_error *err)
+{
+    sdm_status s = sdm_fit_average_gradient(p, run->way, err);
+    if (s) return s;
+    *taken = find_step(p, run, 0, true, step, work) || find_step(p, run, 0, false, step, work);
+    if (!*taken) return SDM_OK;
+    *size = step_size(p, step);
+    accelerate(p, run, r, step);
+    const fit_state from = p->state;
+    sdm_fit_move(p, &from, step, &p->state);
+    s = sdm_fit_look(p, err);
+    if (!s) rushed(p, run, r, step);
+    return s;
 }
 
 static sdm_status record(fit_problem *p, const fit_run *run, double step, sdm_error *err)
@@ -272,29 +312,12 @@ static sdm_status record(fit_problem *p, const fit_run *run, double step, sdm_er
     return SDM_OK;
 }
 
-/* Creases of the distance keep steps from becoming smaller. Where they promise no gain any more they go to and fro across a crease, and
-   are halved until they end the run. */
-typedef struct fit_end {
-    double least; // the smallest step so far
-    int flat;     // steps that promise no gain, since there was a smaller one
-} fit_end;
-
-static double share_of_step(const fit_end *e) { return e->flat > 1 ? ldexp(1, 1 - e->flat) : 1; }
-
-static bool is_rough(fit_end *e, const fit_pace *pace, double size)
-{
-    if (size < 0.5 * e->least) e->least = size, e->flat = 0;
-    e->flat = pace->flat ? e->flat + 1 : 0;
-    return e->flat >= FLAT_MOST;
-}
-
 sdm_status sdm_fit_iterate(fit_problem *p, const fit_run *run, fit_ended *out, sdm_error *err)
 {
     const size_t n = p->sums.n_unknowns;
     double step[FIT_UNKNOWNS_MAX], *work = NULL;
     fit_rush quick = {0};
     fit_pace pace = {.damping = run->phase == SDM_FIT_SEARCH ? 1e-2 : 1e-4};
-    fit_end end = {.least = INFINITY};
     *out = (fit_ended){.step = INFINITY};
     sdm_status s = SDM_ALLOC(&work, 3 * n * n, "matrices of the fit", err);
     if (!s) s = sdm_fit_look(p, err);
@@ -303,9 +326,11 @@ sdm_status sdm_fit_iterate(fit_problem *p, const fit_run *run, fit_ended *out, s
         if (!run->keep_look) sdm_fit_look_update(p);
         bool taken = false;
         double size = INFINITY;
-        if (out->step <= STEP_RUSHED)
-            s = rush(p, run, &quick, share_of_step(&end), &pace, step, work, &size, &taken, err);
-        if (!s && !taken) {
+        if (run->averaged)
+            s = average_step(p, run, &quick, step, work, &size, &taken, err);
+        else if (out->step <= STEP_RUSHED)
+            s = rush(p, run, &quick, &pace, step, work, &size, &taken, err);
+        if (!s && !taken && !run->averaged) {
             quick.mixing.count = 0;
             s = one_step(p, run, &pace, step, work, &taken, err);
             // with much damping the size of a step says nothing of how far the maximum is
@@ -318,8 +343,8 @@ sdm_status sdm_fit_iterate(fit_problem *p, const fit_run *run, fit_ended *out, s
             break;
         }
         out->step = size;
-        out->converged = size <= run->eps && pace.damping <= DAMPING_TRUE;
-        out->rough = !out->converged && is_rough(&end, &pace, size);
+        out->converged = size <= run->eps && (run->averaged || pace.damping <= DAMPING_TRUE);
+        out->rough = !out->converged && run->flat_most > 0 && pace.flat >= run->flat_most;
         out->converged = out->converged || out->rough;
         s = record(p, run, out->step, err);
     }

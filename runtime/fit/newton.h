@@ -24,7 +24,9 @@ typedef struct fit_problem {
     size_t stride; // every how many voxels of the image are sites
     fit_laws laws;
     fit_state state;
-    fit_sums sums, trial; // at the state, and at a state that is tried
+    bool
+        absent[FIT_TISSUES_MAX]; // tissues (inside first) with too few values to say anything of their laws, which stay
+    fit_sums sums, trial;        // at the state, and at a state that is tried
 
     double *objective; // [n_iterations]
     size_t n_iterations, objective_capacity, n_steps;
@@ -36,16 +38,28 @@ typedef struct fit_run {
     bool keep_params, keep_pose, keep_blur, keep_look;
     size_t max_iterations;
     double eps;
+    int flat_most;              // so many steps in a row that promise no gain are an end, too; 0: not
+    bool averaged;              // plain steps by averaged derivatives, see creases.h
+    double way[FIT_PARAMS_MAX]; // what they are averaged over
 } fit_run;
 
 typedef struct fit_ended {
     bool converged;
-    bool rough;  // not by the size of the steps, but because they gain nothing any more
+    bool rough;  // not by the size of the steps, but because they promise no gain
     double step; // the last
 } fit_ended;
 
 /* Maps, samples and sums at problem->state. */
 sdm_status sdm_fit_look(fit_problem *p, sdm_error *err);
+
+/* Log-likelihood at problem->state but for its parameters. The next look makes its maps anew. */
+sdm_status sdm_fit_value(fit_problem *p, const double *params, double *log_likelihood, sdm_error *err);
+
+/* Whether unknown i, a mean of a tissue, stays as it is. */
+static inline bool fit_mean_stays(const fit_problem *p, size_t i)
+{
+    return p->opts->keep_appearance || p->absent[i - fit_columns(p->n_params)];
+}
 
 /* Whether there is a prior of anything that is fitted. */
 bool sdm_fit_has_prior(const fit_problem *p);

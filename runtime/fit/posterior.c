@@ -26,7 +26,7 @@ static size_t estimated(const fit_problem *p, size_t *list)
         const size_t n = p->n_params;
         const bool kept = i < n       ? o->keep_params
                           : i < n + 6 ? o->keep_pose
-                          : i > n + 6 ? o->keep_appearance
+                          : i > n + 6 ? fit_mean_stays(p, i)
                                       : o->keep_blur || !p->maps.share;
         if (!kept) list[count++] = i;
     }

@@ -6,19 +6,19 @@
 #include "problem.h"
 
 typedef struct taps {
-    size_t at[3][4];                 // offsets of the voxels along each axis, in voxels of the packed array
-    float weight[3][4], slope[3][4]; // slope: by the index
-    double beyond[3], distance;      // way from the border of the grid to x, mm along its axes
+    size_t at[3][4];                  // offsets of the voxels along each axis, in voxels of the packed array
+    double weight[3][4], slope[3][4]; // slope: by the index
+    double beyond[3], distance;       // way from the border of the grid to x, mm along its axes
 } taps;
 
 // Keys' kernel with a = -1/2, for the part u of the way from the second to the third voxel
-static void keys(double u, float w[4], float d[4])
+static void keys(double u, double w[4], double d[4])
 {
     const double u2 = u * u, u3 = u2 * u;
-    w[0] = (float)(-0.5 * u3 + u2 - 0.5 * u), d[0] = (float)(-1.5 * u2 + 2 * u - 0.5);
-    w[1] = (float)(1.5 * u3 - 2.5 * u2 + 1), d[1] = (float)(4.5 * u2 - 5 * u);
-    w[2] = (float)(-1.5 * u3 + 2 * u2 + 0.5 * u), d[2] = (float)(-4.5 * u2 + 4 * u + 0.5);
-    w[3] = (float)(0.5 * u3 - 0.5 * u2), d[3] = (float)(1.5 * u2 - u);
+    w[0] = -0.5 * u3 + u2 - 0.5 * u, d[0] = -1.5 * u2 + 2 * u - 0.5;
+    w[1] = 1.5 * u3 - 2.5 * u2 + 1, d[1] = 4.5 * u2 - 5 * u;
+    w[2] = -1.5 * u3 + 2 * u2 + 0.5 * u, d[2] = -4.5 * u2 + 4 * u + 0.5;
+    w[3] = 0.5 * u3 - 0.5 * u2, d[3] = 1.5 * u2 - u;
 }
 
 static void find(const sdm_grid *g, const double x[3], taps *t)
@@ -49,31 +49,31 @@ double sdm_fit_sample(const fit_field *f, const double x[3])
     find(f->grid, x, &t);
     double sum = 0;
     for (int k = 0; k < 4; k++) {
-        float plane = 0;
+        double plane = 0;
         for (int j = 0; j < 4; j++) {
-            const float *row = f->packed + (t.at[2][k] + t.at[1][j]) * f->n_fields;
-            float line = 0;
+            const double *row = f->packed + (t.at[2][k] + t.at[1][j]) * f->n_fields;
+            double line = 0;
             for (int i = 0; i < 4; i++) line += t.weight[0][i] * row[t.at[0][i] * f->n_fields];
             plane += t.weight[1][j] * line;
         }
-        sum += (double)(t.weight[2][k] * plane);
+        sum += t.weight[2][k] * plane;
     }
     return f->distance ? sum + t.distance : sum;
 }
 
-double sdm_fit_sample_all(const fit_field *f, const double x[3], double gradient[3], float *rest)
+double sdm_fit_sample_all(const fit_field *f, const double x[3], double gradient[3], double *rest)
 {
     taps t;
     find(f->grid, x, &t);
-    float sum[FIT_FIELDS_MAX] = {0}, slope[3] = {0, 0, 0};
+    double sum[FIT_FIELDS_MAX] = {0}, slope[3] = {0, 0, 0};
     const size_t n = f->n_fields;
     for (int k = 0; k < 4; k++)
         for (int j = 0; j < 4; j++) {
-            const float *row = f->packed + (t.at[2][k] + t.at[1][j]) * n;
-            const float w = t.weight[2][k] * t.weight[1][j];
-            float line = 0, along = 0;
+            const double *row = f->packed + (t.at[2][k] + t.at[1][j]) * n;
+            const double w = t.weight[2][k] * t.weight[1][j];
+            double line = 0, along = 0;
             for (int i = 0; i < 4; i++) {
-                const float *v = row + t.at[0][i] * n, wx = w * t.weight[0][i];
+                const double *v = row + t.at[0][i] * n, wx = w * t.weight[0][i];
                 line += t.weight[0][i] * v[0];
                 along += t.slope[0][i] * v[0];
                 for (size_t q = 1; q < n; q++) sum[q] += wx * v[q];
@@ -85,7 +85,7 @@ double sdm_fit_sample_all(const fit_field *f, const double x[3], double gradient
     for (size_t q = 1; q < n; q++) rest[q - 1] = sum[q];
     double along[3];
     for (int a = 0; a < 3; a++) {
-        along[a] = (double)slope[a] / f->grid->spacing[a];
+        along[a] = slope[a] / f->grid->spacing[a];
         if (f->distance && t.distance > 0) along[a] += t.beyond[a] / t.distance;
     }
     for (int a = 0; a < 3; a++) {

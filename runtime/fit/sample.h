@@ -10,7 +10,7 @@
    values there are those of the border otherwise. */
 typedef struct fit_field {
     const sdm_grid *grid;
-    const float *packed;
+    const double *packed;
     size_t n_fields;
     bool distance;
 } fit_field;
@@ -19,6 +19,6 @@ typedef struct fit_field {
 double sdm_fit_sample(const fit_field *f, const double x[3]);
 
 /* The same with its gradient (frame of the grid, per mm), and the other fields: rest[n_fields - 1]. */
-double sdm_fit_sample_all(const fit_field *f, const double x[3], double gradient[3], float *rest);
+double sdm_fit_sample_all(const fit_field *f, const double x[3], double gradient[3], double *rest);
 
 #endif

@@ -99,9 +99,12 @@ static void fill_near(const fit_problem *p, near_voxels *v)
     }
 }
 
+// the same for a voxel more or less: other voxels would be chosen
+static float stepped(double share) { return (float)exp2(0.25 * floor(4 * log2(share))); }
+
 static void choose_begins(near_voxels *v)
 {
-    const float share = (float)(v->effort * PAIRS_OF_LAG / (double)v->n);
+    const float share = stepped(v->effort * PAIRS_OF_LAG / (double)v->n);
     for (size_t i = 0; i < v->n; i++)
         if (!(v->lot[i] > share)) v->begin[v->n_begin++] = (uint32_t)i;
 }
@@ -232,7 +235,7 @@ static sdm_status add_products(const near_voxels *v, const double *c, int width,
     const sdm_status s = SDM_ALLOC(&parts, FIT_SLICES * n * n, "covariance of the score", err);
     if (s) return s;
     (void)n_threads; // without OpenMP
-    const float share = (float)(v->effort * PAIRS / (pow(2.0 * width + 1, 3) / 2 + 1) / (double)v->n);
+    const float share = stepped(v->effort * PAIRS / (pow(2.0 * width + 1, 3) / 2 + 1) / (double)v->n);
     size_t chosen = 0;
     for (size_t i = 0; i < v->n; i++) chosen += v->lot[i] <= share;
     const double scale = (double)v->n / fmax((double)chosen, 1);

@@ -4,7 +4,6 @@
 #include <math.h>
 
 #include "blur.h"
-#include "sample.h"
 #include "sdm/memory.h"
 
 void sdm_fit_to_shape(const fit_state *s, const double x[3], double y[3])
@@ -57,9 +56,9 @@ sdm_status sdm_fit_extent(const fit_maps *maps, fit_extent *out, sdm_error *err)
 
 double sdm_fit_inradius(const fit_maps *maps)
 {
-    float least = 0;
-    for (size_t v = 0; v < maps->n_voxels; v++) least = fminf(least, maps->distance[v]);
-    return -(double)least;
+    double least = 0;
+    for (size_t v = 0; v < maps->n_voxels; v++) least = fmin(least, maps->distance[v]);
+    return -least;
 }
 
 static bool in_region(const sdm_fit_opts *o, const fit_region *r, const double x[3])
@@ -175,7 +174,7 @@ static void fill_columns(const fit_maps *maps, const fit_field *f, const fit_sta
                          float *columns)
 {
     double y[3], gradient[3], g[3];
-    float rest[FIT_FIELDS_MAX];
+    double rest[FIT_FIELDS_MAX];
     sdm_fit_to_shape(state, x, y);
     (void)sdm_fit_sample_all(f, y, gradient, rest);
     for (int k = 0; k < 3; k++)
@@ -183,21 +182,26 @@ static void fill_columns(const fit_maps *maps, const fit_field *f, const fit_sta
                state->rotation[3 * k + 2] * gradient[2];
     const double d[3] = {x[0] - state->translation[0], x[1] - state->translation[1], x[2] - state->translation[2]};
     const size_t n = maps->n_params;
-    for (size_t k = 0; k < n; k++) columns[k] = rest[k];
+    for (size_t k = 0; k < n; k++) columns[k] = (float)rest[k];
     float *turn = columns + fit_at_rotation(n), *shift = columns + fit_at_translation(n);
     for (int k = 0; k < 3; k++) {
         const int a = (k + 1) % 3, b = (k + 2) % 3;
         turn[k] = (float)(g[a] * d[b] - g[b] * d[a]);
         shift[k] = (float)-g[k];
     }
-    columns[fit_at_blur(n)] = maps->share ? rest[n] : 0;
+    columns[fit_at_blur(n)] = maps->share ? (float)rest[n] : 0;
+}
+
+fit_field sdm_fit_field(const fit_maps *maps)
+{
+    return (fit_field){
+        .grid = &maps->grid, .packed = maps->packed, .n_fields = maps->n_fields, .distance = !maps->share};
 }
 
 sdm_status sdm_fit_sites_sample(fit_sites *s, const fit_maps *maps, const fit_laws *laws, const fit_state *state,
                                 sdm_error *err)
 {
-    const fit_field f = {
-        .grid = &maps->grid, .packed = maps->packed, .n_fields = maps->n_fields, .distance = !maps->share};
+    const fit_field f = sdm_fit_field(maps);
     const int n_threads = sdm_fit_threads(maps->n_threads);
     (void)n_threads; // without OpenMP
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)

@@ -4,6 +4,7 @@
 
 #include "laws.h"
 #include "maps.h"
+#include "sample.h"
 
 /* Fixed number of parts in which sites are worked through: sums do not depend on the number of threads. */
 #define FIT_SLICES 64u
@@ -43,6 +44,9 @@ typedef struct fit_region {
 sdm_status sdm_fit_sites_choose(const sdm_fit_target *target, const sdm_fit_opts *opts, const fit_region *region,
                                 size_t stride, fit_sites *sites, bool *changed, sdm_error *err);
 void sdm_fit_sites_dispose(fit_sites *s);
+
+/* What sdm_fit_maps_pack() made. */
+fit_field sdm_fit_field(const fit_maps *maps);
 
 /* Field and columns at every site from the packed fields. */
 sdm_status sdm_fit_sites_sample(fit_sites *s, const fit_maps *maps, const fit_laws *laws, const fit_state *state,

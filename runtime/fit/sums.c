@@ -99,6 +99,25 @@ void sdm_fit_sums_fill(fit_sums *s, const fit_sites *sites, const fit_laws *laws
         }
 }
 
+double sdm_fit_sums_value(const fit_sites *sites, const fit_maps *maps, const fit_laws *laws, const fit_state *state)
+{
+    const fit_field f = sdm_fit_field(maps);
+    double part[FIT_SLICES] = {0}, sum = 0;
+    const int n_threads = sdm_fit_threads(maps->n_threads);
+    (void)n_threads; // without OpenMP
+#pragma omp parallel for schedule(dynamic) num_threads(n_threads)
+    for (size_t slice = 0; slice < FIT_SLICES; slice++)
+        for (size_t i = sites->n * slice / FIT_SLICES; i < sites->n * (slice + 1) / FIT_SLICES; i++) {
+            double y[3];
+            fit_response r;
+            sdm_fit_to_shape(state, sites->world + 3 * i, y);
+            sdm_fit_respond(laws, (double)sites->value[i], sdm_fit_sample(&f, y), false, &r);
+            part[slice] += r.log_likelihood;
+        }
+    for (size_t slice = 0; slice < FIT_SLICES; slice++) sum += part[slice];
+    return sum;
+}
+
 void sdm_fit_sums_moments(const fit_sites *sites, const fit_laws *laws, int n_threads, fit_moments *out)
 {
     fit_moments part[FIT_SLICES];

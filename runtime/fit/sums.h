@@ -19,6 +19,9 @@ void sdm_fit_sums_dispose(fit_sums *s);
 /* From what sdm_fit_sites_sample() left; the same bits for any number of threads. */
 void sdm_fit_sums_fill(fit_sums *s, const fit_sites *sites, const fit_laws *laws, int n_threads);
 
+/* The log-likelihood alone, at the state whose first field maps hold; what sites hold stays. The same bits for any number of threads. */
+double sdm_fit_sums_value(const fit_sites *sites, const fit_maps *maps, const fit_laws *laws, const fit_state *state);
+
 /* The laws' moments over all sites. */
 void sdm_fit_sums_moments(const fit_sites *sites, const fit_laws *laws, int n_threads, fit_moments *out);
 

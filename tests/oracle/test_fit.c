@@ -49,6 +49,33 @@ static void test_clean(void **state)
     free(v);
 }
 
+// noise, and the creases between triangles: fits from two sides end at the same place all the same
+static void test_one_maximum(void **state)
+{
+    (void)state;
+    double most = 0;
+    for (uint64_t seed = 20; seed < 23; seed++) {
+        float *v = phantom(TRUTH, &POSE, 1, seed);
+        const sdm_fit_target t = image_of(v);
+        sdm_fit_opts o = near_start();
+        sdm_fit_result a = fit(&t, &o);
+        o.start_pose = POSE;
+        o.start_params = (const double[3]){2.6, 1.7, 1.2};
+        sdm_fit_result b = fit(&t, &o);
+        assert_true(a.converged && b.converged);
+        for (int k = 0; k < 3; k++) {
+            most = fmax(most, fabs(a.params[k] - b.params[k]) / 3); // ranges
+            most = fmax(most, fabs(a.pose.rotation[k] - b.pose.rotation[k]));
+            most = fmax(most, fabs(a.pose.translation[k] - b.pose.translation[k]) / 2.5);
+        }
+        sdm_fit_dispose(&a);
+        sdm_fit_dispose(&b);
+        free(v);
+    }
+    printf("two starts end %.2g apart\n", most);
+    assert_true(most < 1e-5);
+}
+
 // n fits to noisy phantoms: of one shape with other noise, or of other shapes in other poses
 static void spread(size_t n, bool random, double *rms, size_t *beyond)
 {
@@ -316,10 +343,30 @@ static void test_overlapping_tissues(void **state)
     free(v);
 }
 
+// a tissue that the image does not hold keeps its law: it does not look for something else to be
+static void test_absent_tissue(void **state)
+{
+    (void)state;
+    float *v = phantom(TRUTH, &POSE, 1, 4);
+    const sdm_fit_target t = image_of(v);
+    sdm_fit_opts o = near_start(), one = near_start();
+    o.appearance.n_outside = 2;
+    const sdm_fit_law *air = &o.appearance.outside[1];
+    sdm_fit_result r = fit(&t, &o), alone = fit(&t, &one);
+    const sdm_fit_law *found = &r.appearance.outside[1];
+    if (!(found->mean == air->mean && fabs(found->sd / air->sd - 1) < 1e-9 && found->weight < 1e-4))
+        fail_msg("%g of %g +- %g", found->weight, found->mean, found->sd);
+    for (int k = 0; k < 3; k++) assert_true(fabs(r.params[k] - alone.params[k]) < 1e-2 * alone.sd[k]);
+    sdm_fit_dispose(&r);
+    sdm_fit_dispose(&alone);
+    free(v);
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_clean),
+        cmocka_unit_test(test_one_maximum),
         cmocka_unit_test(test_honest),
         cmocka_unit_test(test_threads),
         cmocka_unit_test(test_label_map),
@@ -330,6 +377,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_priors),
         cmocka_unit_test(test_prior_weight),
         cmocka_unit_test(test_overlapping_tissues),
+        cmocka_unit_test(test_absent_tissue),
     };
     const struct CMUnitTest longer[] = {cmocka_unit_test(test_honest)};
     n_random = argc > 1 ? (size_t)strtoul(argv[1], NULL, 10) : 0;

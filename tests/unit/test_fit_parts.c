@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "blur.h"
+#include "creases.h"
 #include "laws.h"
 #include "mixing.h"
 #include "newton.h"
@@ -120,14 +121,14 @@ static void test_blur(void **state)
     const sdm_grid g = sdm_grid_centred((int64_t[3]){33, 31, 29}, 0.2, (double[3]){0, 0, 0});
     const size_t n = sdm_grid_count(&g), middle = (size_t)((14 * 31 + 15) * 33 + 16);
     for (double variance = 0.002; variance < 0.3; variance *= 3) {
-        float *f = room(2 * n, sizeof *f), *spare = room(2 * n, sizeof *f);
+        double *f = room(2 * n, sizeof *f), *spare = room(2 * n, sizeof *f);
         f[2 * middle] = 1;
-        sdm_fit_blur(&g, 2, 1, variance, 2, &f, &spare);
+        sdm_fit_blur(&g, 2, variance, 2, &f, &spare);
         double sum = 0, second[3] = {0, 0, 0};
         for (size_t i = 0; i < n; i++) {
             const double at[3] = {(double)(i % 33) - 16, (double)(i / 33 % 31) - 15, (double)(i / 33 / 31) - 14};
-            sum += (double)f[2 * i];
-            for (int a = 0; a < 3; a++) second[a] += (double)f[2 * i] * at[a] * at[a] * 0.04;
+            sum += f[2 * i];
+            for (int a = 0; a < 3; a++) second[a] += f[2 * i] * at[a] * at[a] * 0.04;
         }
         assert_true(fabs(sum - 1) < 1e-5);
         for (int a = 0; a < 3; a++) assert_true(fabs(second[a] / variance - 1) < (variance < 0.2 ? 1e-3 : 3e-2));
@@ -143,28 +144,28 @@ static void test_sample(void **state)
     g.spacing[1] = 0.25;
     sdm_pose_matrix(&(sdm_pose){{0.3, -0.5, 0.2}, {0, 0, 0}}, g.dir);
     const size_t n = sdm_grid_count(&g);
-    float *f = room(2 * n, sizeof *f);
+    double *f = room(2 * n, sizeof *f);
     for (size_t i = 0; i < n; i++) {
         double x[3];
         sdm_grid_world(&g, (const double[3]){(double)(i % 9), (double)(i / 9 % 8), (double)(i / 9 / 8)}, x);
-        f[2 * i] = (float)(1 + x[0] - 2 * x[1] + x[0] * x[1] + 0.5 * x[2] * x[2]); // exact for parabolas
-        f[2 * i + 1] = (float)(3 - x[2]);
+        f[2 * i] = 1 + x[0] - 2 * x[1] + x[0] * x[1] + 0.5 * x[2] * x[2]; // exact for parabolas
+        f[2 * i + 1] = 3 - x[2];
     }
     const fit_field field = {.grid = &g, .packed = f, .n_fields = 2, .distance = true};
     for (int i = 0; i < 50; i++) {
         double index[3], x[3], slope[3];
-        float rest;
+        double rest;
         for (uint64_t k = 0; k < 3; k++) index[k] = 1 + (double)(g.n[k] - 3) * sdm_rng_uniform(1, (uint64_t)i, k);
         sdm_grid_world(&g, index, x);
         const double v = sdm_fit_sample_all(&field, x, slope, &rest);
         assert_true(fabs(v - (1 + x[0] - 2 * x[1] + x[0] * x[1] + 0.5 * x[2] * x[2])) < 2e-6);
         assert_true(fabs(slope[0] - (1 + x[1])) < 2e-5 && fabs(slope[1] - (x[0] - 2)) < 2e-5 &&
                     fabs(slope[2] - x[2]) < 2e-5);
-        assert_true(fabs((double)rest - (3 - x[2])) < 1e-6);
+        assert_true(fabs(rest - (3 - x[2])) < 1e-6);
     }
     // beyond the border: the way to it is added
     double corner[3], out[3], slope[3];
-    float rest;
+    double rest;
     sdm_grid_world(&g, (const double[3]){8, 7, 6}, corner);
     sdm_grid_world(&g, (const double[3]){8 + 3 / 0.3, 7 + 4 / 0.25, 6}, out);
     assert_true(fabs(sdm_fit_sample(&field, out) - sdm_fit_sample(&field, corner) - 5) < 1e-5);
@@ -202,6 +203,32 @@ static double posterior_at(fit_problem *p, const fit_state *s)
     sdm_error err;
     if (sdm_fit_look(p, &err)) fail_msg("%s", err.text);
     return p->sums.log_likelihood + sdm_fit_prior(p, s, NULL, NULL, NULL);
+}
+
+// derivatives by the parameters averaged over a way, on one side at a bound: differences of the log-likelihood
+static void check_average(fit_problem *p, const fit_state *s)
+{
+    double way[FIT_PARAMS_MAX], found[2];
+    (void)posterior_at(p, s);
+    sdm_fit_ways(p, way);
+    p->high[1] = s->params[1];
+    const double by_pose = p->sums.gradient[fit_at_rotation(3)];
+    assert_int_equal(sdm_fit_average_gradient(p, way, NULL), SDM_OK);
+    assert_true(p->sums.gradient[fit_at_rotation(3)] == by_pose);
+    double average[3];
+    memcpy(average, p->sums.gradient, sizeof average);
+    for (size_t k = 0; k < 3; k++) {
+        assert_true(way[k] > 1e-3 && way[k] < 0.03); // of an ellipsoid with voxels of 0.25 mm
+        for (int side = 0; side < 2; side++) {
+            fit_state moved = *s;
+            moved.params[k] = fmin(s->params[k] + (side ? way[k] : -way[k]), p->high[k]);
+            (void)posterior_at(p, &moved);
+            found[side] = p->sums.log_likelihood;
+        }
+        const double difference = (found[1] - found[0]) / (k == 1 ? way[k] : 2 * way[k]);
+        if (!(fabs(difference - average[k]) <= 1e-9 * fabs(difference)))
+            fail_msg("parameter %zu: %.12g, differences %.12g", k, average[k], difference);
+    }
 }
 
 static void check_gradient(sdm_fit_kind kind, sdm_fit_model model)
@@ -252,6 +279,7 @@ static void check_gradient(sdm_fit_kind kind, sdm_fit_model model)
         if (!(fabs(difference - gradient[k]) < 2e-3 * fabs(difference) + 0.1 * size))
             fail_msg("unknown %zu: %g, differences %g (one sd: %g)", k, gradient[k], difference, size);
     }
+    check_average(&p, &s);
     sdm_fit_maps_dispose(&p.maps);
     sdm_fit_sites_dispose(&p.sites);
     sdm_fit_sums_dispose(&p.sums);
@@ -286,7 +314,7 @@ static void test_mixing(void **state)
     int steps = 0;
     for (; steps < 12 && off > 1e-9; steps++) {
         affine(x, y);
-        sdm_fit_mix(&m, 4, x, y, 100);
+        sdm_fit_mix(&m, FIT_MIXING_DEPTH, 4, x, y, 100);
         off = 0;
         for (int k = 0; k < 4; k++) x[k] = y[k], off = fmax(off, fabs(x[k] - 1 - k));
     }
@@ -299,7 +327,7 @@ static void test_mixing(void **state)
         double image[4];
         affine(x, image);
         memcpy(y, image, sizeof y);
-        sdm_fit_mix(&m, 4, x, y, 0.01);
+        sdm_fit_mix(&m, FIT_MIXING_DEPTH, 4, x, y, 0.01);
         for (int k = 0; k < 4; k++) assert_true(fabs(y[k] - image[k]) <= 0.01 * (1 + 1e-12));
         memcpy(x, y, sizeof x);
     }
@@ -308,7 +336,7 @@ static void test_mixing(void **state)
     const double fixed[4] = {1, 2, 3, 4};
     for (int i = 0; i < 4; i++) {
         memcpy(y, fixed, sizeof y);
-        sdm_fit_mix(&m, 4, fixed, y, 1);
+        sdm_fit_mix(&m, FIT_MIXING_DEPTH, 4, fixed, y, 1);
         assert_memory_equal(y, fixed, sizeof y);
     }
 }

@@ -8,7 +8,9 @@
    - labels (Demarcy 2017; Wang et al. 2021): a voxel is inside with probability mu = 1 / (1 + exp(distance / l_ref)), its value
      has the inside or the outside law. Expectation-maximisation; tolerant, but its edge lies where the two laws cross, which in a
      blurred image is not where the surface is.
-   The posterior is maximised by damped Gauss-Newton steps; ranges of parameters are bounds. Its covariance is the sandwich
+   The posterior is maximised by damped Gauss-Newton steps; ranges of parameters are bounds. Exact distances have creases where the
+   nearest face changes, so a fit with exact maps ends by derivatives that are averages over a motion of the surface of 3 % of a voxel
+   of the map (Ermoliev, Norkin and Wets 1995): one place, wherever it comes from. The covariance is the sandwich
    H^-1 J H^-1 (Huber 1967), H the information of the observed values (labels: Louis 1982), J the covariance of the score with the
    spatial correlation of the residuals (Conley 1999), so that correlated noise and a model that is a little wrong widen it. */
 #ifndef SDM_FIT_H
@@ -123,14 +125,11 @@ typedef struct sdm_fit_opts {
     double cavity;
     double least_inside; /* 0 .. 1: share of the volume of the fitted shape that must lie in the image */
 
-    size_t max_iterations; /* of the main phase, >= 1 */
-    size_t
-        max_polish_iterations; /* with the exact engine, after a network's fit; 0: none, 40 are enough. The distance to a mesh has
-                                     creases: steps that gain nothing any more end a phase too */
-    double eps; /* > 0: a phase ends when the largest step is below: share of a parameter's range, rad, share of the
-                          shape's size; or when steps promise less than rounding makes or a few hundredths of a standard
-                          deviation, and do not become smaller */
-    double polish_eps;                                       /* > 0: the same with exact maps */
+    size_t max_iterations;        /* of the main phase, >= 1; as many again for its end by averaged derivatives */
+    size_t max_polish_iterations; /* with the exact engine, after a network's fit, counted as those; 0: none, 40 are enough */
+    double eps; /* > 0: the main phase ends when the largest step is below: share of a parameter's range, rad, share of the shape's
+                          size; with a network where steps promise no gain, too, and then goes on by averaged derivatives */
+    double polish_eps;                                       /* > 0: the same for the end with exact maps */
     int n_threads;                                           /* 0: the OpenMP default; the same bits for every value */
     void (*progress)(void *user, const sdm_fit_progress *p); /* after every iteration; may be NULL */
     bool (*cancelled)(void *user); /* asked now and then; true stops with SDM_E_CANCELLED; may be NULL */

@@ -1,38 +1,11 @@
-/* Opening by a ball: the union of all balls of a radius that the space holds (Matheron 1975), through two exact distance transforms, row
-   by row along each axis. */
+/* Opening by a ball: the union of all balls of a radius that the space holds (Matheron 1975), through two exact distance transforms. */
 #include "cavity.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "blur.h"
-#include "laws.h"
-#include "sdm/envelope.h"
 #include "sdm/memory.h"
-
-// squared distance, mm^2, of every voxel to the nearest that is 0; the others are INFINITY before
-static sdm_status transform(const sdm_grid *g, int n_threads, float *f, sdm_error *err)
-{
-    const size_t step[3] = {1, (size_t)g->n[0], (size_t)(g->n[0] * g->n[1])};
-    const int64_t longest = g->n[0] > g->n[1] ? g->n[0] : g->n[1], room = longest > g->n[2] ? longest : g->n[2];
-    double *work = NULL; // a row and the scratch of its envelope
-    sdm_status s = SDM_ALLOC(&work, (size_t)n_threads * (size_t)(4 * room), "rows of an image", err);
-    for (int axis = 0; axis < 3 && !s; axis++) {
-        const int b = (axis + 1) % 3, c = (axis + 2) % 3;
-        const int64_t rows = g->n[b] * g->n[c], n = g->n[axis];
-#pragma omp parallel for schedule(static, 1) num_threads(n_threads)
-        for (int64_t thread = 0; thread < n_threads; thread++)
-            for (int64_t row = rows * thread / n_threads; row < rows * (thread + 1) / n_threads; row++) {
-                float *at = f + (size_t)(row % g->n[b]) * step[b] + (size_t)(row / g->n[b]) * step[c];
-                double *line = work + 4 * thread * room;
-                for (int64_t i = 0; i < n; i++) line[i] = (double)at[(size_t)i * step[axis]];
-                sdm_lower_envelope(line, n, g->spacing[axis], line + room);
-                for (int64_t i = 0; i < n; i++) at[(size_t)i * step[axis]] = (float)line[i];
-            }
-    }
-    sdm_free(work);
-    return s;
-}
+#include "transform.h"
 
 static double log_mixture(const sdm_fit_law *law, size_t n, double value)
 {
@@ -85,9 +58,9 @@ sdm_status sdm_fit_leave_out_cavities(const sdm_fit_target *target, const sdm_fi
     sdm_status s = SDM_ALLOC(&distance, n, "distance to walls", err);
     if (!s) s = SDM_ALLOC(values, n, "image", err);
     if (!s) s = find_walls(target, opts, n_threads, distance, err);
-    if (!s) s = transform(&target->grid, n_threads, distance, err);
+    if (!s) s = sdm_fit_transform(&target->grid, n_threads, distance, err);
     for (size_t i = 0; i < n && !s; i++) distance[i] = (double)distance[i] >= square ? 0 : INFINITY; // centres of balls
-    if (!s) s = transform(&target->grid, n_threads, distance, err);
+    if (!s) s = sdm_fit_transform(&target->grid, n_threads, distance, err);
     for (size_t i = 0; i < n && !s; i++) {
         const bool out = (double)distance[i] < square && !isnan(target->values[i]);
         (*values)[i] = out ? NAN : target->values[i];

@@ -187,6 +187,14 @@ SDM_API sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *t
                            sdm_fit_result *out, sdm_error *err);
 SDM_API void sdm_fit_dispose(sdm_fit_result *r);
 
+/* Morphological closing of a label map by a ball of this radius (mm, > 0; Matheron 1975), in place: voxels of values[nz][ny][nx] above
+   1/2 are labelled, and those that no ball reaches which touches no labelled voxel become 1. For compartments labelled apart that are
+   one shape: walls between them thinner than about twice the radius are filled, the outside stays but for bays as narrow. Beyond the
+   grid nothing is labelled. SDM_E_ARG: grid or radius. The same for any number of threads (0: the OpenMP default). [any thread, on
+   values of its own] */
+SDM_API sdm_status sdm_fit_close_labels(const sdm_grid *grid, double radius, int n_threads, float *values,
+                                        sdm_error *err);
+
 /* values[nz][ny][nx] = signed distance (mm, negative inside) of the shape at params and pose, at the voxel centres of a grid in the
    world: the map of the source, interpolated. Beyond the source's grid: distance to its border added. [any thread] */
 SDM_API sdm_status sdm_fit_map(const sdm_fit_source *source, const double *params, const sdm_pose *pose,

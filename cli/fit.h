@@ -73,6 +73,9 @@ sdm_status cli_fit_read_start(cli_fit *f, sdm_error *err);
    voxels but 0. SDM_E_ARG: no such label; SDM_E_FORMAT: no voxel has it. */
 sdm_status cli_label_mask(const char *path, const sdm_volume *v, const cli_list *words, float *values, sdm_error *err);
 
+/* Labels of a grid, 1 and 0, closed as --label-close says. */
+sdm_status cli_close_labels(const cli_fit *f, const sdm_grid *grid, float *values, sdm_error *err);
+
 /* The labels to compare with, before the fit; and the comparison after it. */
 sdm_status cli_fit_read_reference(cli_fit *f, sdm_error *err);
 sdm_status cli_fit_compare(cli_fit *f, sdm_error *err);

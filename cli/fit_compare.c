@@ -13,6 +13,8 @@ sdm_status cli_fit_read_reference(cli_fit *f, sdm_error *err)
     const cli_fit_args *a = &f->args->fit;
     if (!a->reference && a->reference_labels.n)
         return sdm_fail(err, SDM_E_ARG, "fit: --reference-label is a label of --reference FILE");
+    if (!a->reference && !a->labels.n && !isnan(a->label_close))
+        return sdm_fail(err, SDM_E_ARG, "fit: --label-close is of labels: give --label or --reference");
     if (!a->reference) {
         f->reference_grid = f->target.grid;
         f->reference = f->mask;
@@ -28,6 +30,7 @@ sdm_status cli_fit_read_reference(cli_fit *f, sdm_error *err)
     f->reference_grid = v.grid;
     if (!s) s = SDM_ALLOC(&f->reference, sdm_grid_count(&v.grid), "labels", err);
     if (!s) s = cli_label_mask(a->reference, &v, &a->reference_labels, f->reference, err);
+    if (!s) s = cli_close_labels(f, &v.grid, f->reference, err);
     sdm_volume_dispose(&v);
     return s;
 }

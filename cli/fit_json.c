@@ -1,4 +1,6 @@
 /* The result of a fit as JSON. */
+#include <math.h>
+
 #include "fit.h"
 #include "setup.h"
 #include "terminal.h"
@@ -92,6 +94,7 @@ static void add_overlap(sdm_json *j, const cli_fit *f)
     if (!o->measured) return;
     sdm_json_open(j, "overlap", '{');
     sdm_json_text(j, "with", f->own_reference ? f->path : f->args->fit.reference);
+    if (!isnan(f->args->fit.label_close)) sdm_json_real(j, "label_close_mm", f->args->fit.label_close);
     sdm_json_real(j, "dice", o->dice);
     sdm_json_int(j, "voxels_fit", (int64_t)o->n_fit);
     sdm_json_int(j, "voxels_reference", (int64_t)o->n_reference);

@@ -70,3 +70,10 @@ sdm_status cli_label_mask(const char *path, const sdm_volume *v, const cli_list 
     if (!inside) return sdm_fail(err, SDM_E_FORMAT, "%s: every voxel is 0: no label", path);
     return SDM_OK;
 }
+
+sdm_status cli_close_labels(const cli_fit *f, const sdm_grid *grid, float *values, sdm_error *err)
+{
+    const double radius = f->args->fit.label_close;
+    if (isnan(radius)) return SDM_OK;
+    return sdm_fit_close_labels(grid, radius, f->opts.n_threads, values, err);
+}

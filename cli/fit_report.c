@@ -27,8 +27,10 @@ static void print_overlap(const cli_fit *f)
 {
     const cli_overlap *o = &f->overlap;
     if (!o->measured) return;
-    printf("%s: Dice %.4f (%zu voxels fitted, %zu labelled)\n", f->own_reference ? "labels" : "reference", o->dice,
+    printf("%s: Dice %.4f (%zu voxels fitted, %zu labelled", f->own_reference ? "labels" : "reference", o->dice,
            o->n_fit, o->n_reference);
+    if (!isnan(f->args->fit.label_close)) printf(", closed by %g mm", f->args->fit.label_close);
+    printf(")\n");
     if (o->has_surface)
         printf("  surfaces     mean %.3g, 95 %% below %.3g, Hausdorff %.3g mm\n", o->mean_mm, o->q95_mm,
                o->hausdorff_mm);

@@ -51,6 +51,7 @@ static sdm_status as_labels(cli_fit *f, sdm_error *err)
 {
     sdm_status s = SDM_ALLOC(&f->mask, sdm_grid_count(&f->image.grid), "labels", err);
     if (!s) s = cli_label_mask(f->path, &f->image, &f->args->fit.labels, f->mask, err);
+    if (!s) s = cli_close_labels(f, &f->image.grid, f->mask, err);
     f->target.kind = SDM_FIT_LABEL;
     f->target.values = f->mask;
     return s;

@@ -255,6 +255,9 @@ const cli_option cli_options[] = {
      "a few iterations with exact maps after the network's fit; needs the shape"},
     {"label", 0, CLI_LIST, "VALUE|NAME", NULL, 0, 0, ON(CLI_FIT), AT(fit.labels),
      "IMAGE is a label map or a segmentation: fit to the voxels of this value or segment; several are united"},
+    {"label-close", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.label_close),
+     "close labels, also those of --reference, by a ball of this radius: walls thinner than twice of it between "
+     "compartments labelled apart are inside, too"},
     {"ras", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_FIT), AT(fit.ras),
      "--start-centre, --start-axis, --region, points and meshes are RAS (x to the right, y to the front), as viewers "
      "show "

@@ -109,6 +109,23 @@ voxels=$(($(wc -c <label.nii) - 352))
 } >two.nii
 expect 0 - sdmgen fit $fit two.nii --label 1 --label 2 --rotation 0,0,0 --spacing 0.5 --json
 near "$(param rx)" "$rx" 0.001
+# a wall of one voxel between two compartments: closed, they are one
+plane=$(sed -n 's/.*"size": \[\([0-9]*\), \([0-9]*\),.*/\1 \2/p' truth.json | awk '{ print $1 * $2 }')
+middle=$((voxels / plane / 2))
+{
+    head -c $((352 + plane * middle)) label.nii
+    head -c "$plane" /dev/zero
+    tail -c +$((353 + plane * (middle + 1))) label.nii
+} >walled.nii
+whole=$(json voxels_reference)
+expect 0 - sdmgen fit $fit walled.nii --label 1 --rotation 0,0,0 --spacing 0.5 --json
+awk -v n="$(json voxels_reference)" -v w="$whole" 'BEGIN { exit !(n < w - 100) }' || bad "wall of $(json voxels_reference) and $whole voxels"
+expect 0 - sdmgen fit $fit walled.nii --label 1 --label-close 0.4 --reference walled.nii --rotation 0,0,0 --spacing 0.5 --json
+near "$(json voxels_reference)" "$whole" 40
+near "$(param rx)" "$rx" 0.06
+[ "$(json label_close_mm)" = 0.4 ] || bad "label_close_mm $(json label_close_mm)"
+expect 2 'label-close is of labels: give --label or --reference' sdmgen fit $fit ct.nii.gz $near_truth --label-close 0.4
+expect 2 'closing by a ball of 1e.08 mm: too wide for voxels of 0.4' sdmgen fit $fit walled.nii --label 1 --label-close 1e8 --rotation 0,0,0
 list() { sed -n "s/.*\"$1\": \[\([^]]*\)\].*/\1/p" truth.json | tr -d ' '; }
 {
     printf 'NRRD0004\ntype: uint8\ndimension: 3\nspace: left-posterior-superior\nsizes: %s\n' "$(list size | tr , ' ')"

@@ -30,9 +30,11 @@ extern "C" {
 typedef struct sdm_fit_source {
     const sdm_model *model; /* maps by the network; NULL: by the exact engine */
     const sdm_instance
-        *shape;    /* for the exact engine; may be NULL with a model (no polish, policy not exact). With a model its
+        *shape; /* for the exact engine; may be NULL with a model (no polish, policy not exact). With a model its
                                   parameters must be those of the model (sdm_runtime_instance()) */
-    sdm_grid grid; /* of exact maps, in the shape's frame, where the shape lies with a margin; unused with a model */
+    /* of exact maps, in the shape's frame, where the shape lies with a margin; unused with a model. Voxels larger than the point spread
+       of the image make deviations along what is weakly determined too small. */
+    sdm_grid grid;
     sdm_range_policy
         policy; /* parameters outside the network's range. Refuse: bounds are that range and a start outside of it is
                                   SDM_E_RANGE; clamp: such a start is moved to the range and said so; exact: bounds are the

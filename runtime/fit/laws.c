@@ -227,11 +227,13 @@ void sdm_fit_respond(const fit_laws *l, double value, double field, bool derivat
     }
 }
 
+// what rounding leaves of a share of 0 or 1: with more, voxels that cross it would make scores jump
+#define FLAT 1e-12
+
 bool sdm_fit_near(const fit_laws *l, double field)
 {
     if (l->kind == SDM_FIT_POINTS) return true;
-    if (l->kind == SDM_FIT_IMAGE && l->model == SDM_FIT_PARTIAL_VOLUME)
-        return fabs(field - 0.5) < 0.5 - 1e-6 || fabs(field - 0.5) > 0.5 + 1e-6;
+    if (l->kind == SDM_FIT_IMAGE && l->model == SDM_FIT_PARTIAL_VOLUME) return fabs(fabs(field - 0.5) - 0.5) > FLAT;
     return fabs(field) < 16 * l->l_ref; // mu (1 - mu) > 1e-7
 }
 

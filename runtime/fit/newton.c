@@ -23,6 +23,8 @@
 // steps below which they are accelerated, and the most an acceleration changes an unknown, in its unit
 #define STEP_RUSHED 0.01
 #define RUSH_MOST 0.1
+// where averaged derivatives are steep, the steps that are taken go to nothing, plain ones only to so many times the end
+#define STEEP_MOST 10.0
 // and with averaged derivatives, in plain steps
 #define RUSH_AVERAGED 4.0
 
@@ -318,6 +320,7 @@ sdm_status sdm_fit_iterate(fit_problem *p, const fit_run *run, fit_ended *out, s
     double step[FIT_UNKNOWNS_MAX], *work = NULL;
     fit_rush quick = {0};
     fit_pace pace = {.damping = run->phase == SDM_FIT_SEARCH ? 1e-2 : 1e-4};
+    double way_before = INFINITY;
     *out = (fit_ended){.step = INFINITY};
     sdm_status s = SDM_ALLOC(&work, 3 * n * n, "matrices of the fit", err);
     if (!s) s = sdm_fit_look(p, err);
@@ -342,8 +345,11 @@ sdm_status sdm_fit_iterate(fit_problem *p, const fit_run *run, fit_ended *out, s
             out->converged = out->step <= 1e3 * run->eps;
             break;
         }
-        out->step = size;
-        out->converged = size <= run->eps && (run->averaged || pace.damping <= DAMPING_TRUE);
+        const double way = step_size(p, step);
+        const bool steep = run->averaged && size <= STEEP_MOST * run->eps && fmax(way, way_before) <= run->eps;
+        way_before = way;
+        out->step = steep ? way : size;
+        out->converged = steep || (size <= run->eps && (run->averaged || pace.damping <= DAMPING_TRUE));
         out->rough = !out->converged && run->flat_most > 0 && pace.flat >= run->flat_most;
         out->converged = out->converged || out->rough;
         s = record(p, run, out->step, err);

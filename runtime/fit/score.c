@@ -44,12 +44,25 @@ static void place_of(const sdm_grid *g, size_t voxel, int64_t index[3])
     index[2] = (int64_t)voxel / g->n[0] / g->n[1];
 }
 
+// whether a voxel's score says anything of the shape; those that hardly do would thin out the others, of which some are taken
+static bool is_near(const fit_problem *p, size_t site)
+{
+    return p->sites.slot[site] != SIZE_MAX && !(p->maps.share && fabs(fabs(p->sites.field[site] - 0.5) - 0.5) <= 1e-6);
+}
+
+static size_t count_near(const fit_problem *p)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < p->sites.n; i++) n += is_near(p, i);
+    return n;
+}
+
 static void find_box(const fit_problem *p, near_voxels *v)
 {
     int64_t to[3] = {0, 0, 0}, index[3];
     for (int a = 0; a < 3; a++) v->from[a] = INT64_MAX;
     for (size_t i = 0; i < p->sites.n; i++) {
-        if (p->sites.slot[i] == SIZE_MAX) continue;
+        if (!is_near(p, i)) continue;
         place_of(&p->target->grid, p->sites.voxel[i], index);
         for (int a = 0; a < 3; a++) {
             if (index[a] < v->from[a]) v->from[a] = index[a];
@@ -73,7 +86,7 @@ static void fill_near(const fit_problem *p, near_voxels *v)
     const size_t nc = s->n_columns, n = v->n_unknowns;
     size_t count = 0;
     for (size_t i = 0; i < s->n; i++) {
-        if (s->slot[i] == SIZE_MAX) continue;
+        if (!is_near(p, i)) continue;
         const float *columns = s->columns + s->slot[i] * nc;
         fit_response r;
         sdm_fit_respond(&p->laws, (double)s->value[i], s->field[i], true, &r);
@@ -124,7 +137,7 @@ static void dispose_near(near_voxels *v)
 static sdm_status make_near(const fit_problem *p, double effort, near_voxels *v, sdm_error *err)
 {
     *v = (near_voxels){
-        .n = p->sites.n_near, .n_unknowns = p->sums.n_unknowns, .step = (int64_t)p->stride, .effort = effort};
+        .n = count_near(p), .n_unknowns = p->sums.n_unknowns, .step = (int64_t)p->stride, .effort = effort};
     find_box(p, v);
     size_t count, box;
     sdm_status s = sdm_mul(v->n, v->n_unknowns, &count, err);
@@ -270,7 +283,7 @@ static void add_far(const fit_problem *p, double factor, double *out)
 {
     const size_t n = p->sums.n_unknowns, nc = p->sites.n_columns;
     for (size_t i = 0; i < p->sites.n && p->laws.n_channels > 1; i++) {
-        if (p->sites.slot[i] != SIZE_MAX) continue;
+        if (is_near(p, i)) continue;
         fit_response r;
         sdm_fit_respond(&p->laws, (double)p->sites.value[i], p->sites.field[i], true, &r);
         for (size_t a = 1; a < p->laws.n_channels; a++)
@@ -392,7 +405,7 @@ sdm_status sdm_fit_scatter_create(const fit_problem *p, double model_mm, bool de
     if (!s) s = SDM_ALLOC(&out->model, n * n, "covariance of the score", err);
     if (!s && p->target->kind == SDM_FIT_POINTS)
         add_points(p, out->noise);
-    else if (!s && p->sites.n_near)
+    else if (!s && count_near(p))
         s = of_voxels(p, model_mm, definite, out, err);
     if (s) sdm_fit_scatter_dispose(out);
     return s;

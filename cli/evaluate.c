@@ -75,7 +75,7 @@ static sdm_status distances_to(const sdm_mesh *from, const sdm_mesh *to, double 
     const sdm_status s = sdm_exact_create(to, &opts, &engine, err);
     if (s) return s;
     for (size_t i = 0; i < from->n_vert; i++) {
-        const double d = fabs(sdm_exact_point(engine, from->vert + 3 * i, NULL, NULL, NULL));
+        const double d = sdm_exact_distance(engine, from->vert + 3 * i);
         *sum += d;
         *largest = fmax(*largest, d);
     }

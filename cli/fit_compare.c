@@ -76,7 +76,7 @@ static sdm_status add_distances(const cli_fit *f, const sdm_mesh *from, const sd
     if (s) return s;
     for (size_t i = 0; i < from->n_vert; i++) {
         const double *x = from->vert + 3 * i;
-        if (is_seen(f, x)) list[(*n)++] = fabs(sdm_exact_point(engine, x, NULL, NULL, NULL));
+        if (is_seen(f, x)) list[(*n)++] = sdm_exact_distance(engine, x);
     }
     sdm_exact_free(engine);
     return SDM_OK;

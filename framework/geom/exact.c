@@ -203,6 +203,16 @@ double sdm_exact_point(const sdm_exact *e, const double x[3], double closest[3],
     return d;
 }
 
+double sdm_exact_distance(const sdm_exact *e, const double x[3])
+{
+    uint32_t slot;
+    int feature;
+    double q[3];
+    if (!isfinite(x[0]) || !isfinite(x[1]) || !isfinite(x[2])) return NAN;
+    (void)sdm_nearest_find(&e->nearest, x, INFINITY, &slot, q, &feature);
+    return sqrt(sdm_nearest_feature(&e->nearest, x, &slot));
+}
+
 /* The map, and the slot of the nearest triangle of every voxel where slot is not NULL. */
 static sdm_status fill_map(const sdm_exact *e, const sdm_grid *grid, double band_mm, float *values, uint32_t *slot,
                            sdm_error *err)

@@ -157,7 +157,8 @@ static void test_box_is_exact(void **state)
             sdm_grid_world(&g, index, x);
             const double d = box_distance(x, lo, hi);
             assert_true(fabs(v[i] - d) <= 1e-15 + fabs(d) * 6e-8);
-            assert_true(fabs(sdm_exact_point(e, x, NULL, NULL, NULL) - d) < 1e-15);
+            const double point = sdm_exact_point(e, x, NULL, NULL, NULL);
+            assert_true(fabs(point - d) < 1e-15 && sdm_exact_distance(e, x) == fabs(point));
         }
         free(v);
     }

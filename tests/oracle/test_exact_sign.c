@@ -244,6 +244,7 @@ static void test_sheets_that_cancel(void **state)
     sdm_exact *e = engine(&m, NULL);
     assert_int_equal(sdm_exact_get_report(e)->audit.duplicate, 1);
     assert_true(fabs(sdm_exact_point(e, (const double[3]){0.2, 0.2, -0.5}, NULL, NULL, NULL) - 0.5) < 1e-15);
+    assert_true(isnan(sdm_exact_distance(e, (const double[3]){0, NAN, 0})));
     assert_true(fabs(sdm_exact_point(e, (const double[3]){0.2, 0.2, 0.5}, NULL, NULL, NULL) - 0.5) < 1e-15);
     sdm_exact_free(e);
     sdm_mesh_dispose(&m);

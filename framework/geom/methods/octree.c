@@ -69,7 +69,7 @@ static double exact_at(const octree *o, work *w, const int64_t origin[3], const 
     double x[3], least = INFINITY;
     place(o, origin, (const double[3]){(double)i[0], (double)i[1], (double)i[2]}, x);
     for (size_t t = 0; t < n && n <= SHORT; t++) least = sdm_lesser(least, sdm_frame_distance2(&o->frames[list[t]], x));
-    w->value[at] = n <= SHORT ? sqrt(least) : fabs(sdm_exact_point(o->run->engine, x, NULL, NULL, NULL));
+    w->value[at] = n <= SHORT ? sqrt(least) : sdm_exact_distance(o->run->engine, x);
     w->state[at] = EXACT;
     w->n_exact++;
     return w->value[at];
@@ -204,7 +204,7 @@ static size_t first_list(const octree *o, const int64_t origin[3], const cell *c
             end);
         radius = sdm_greater(radius, sqrt(v3_dist2(x, end)));
     }
-    const double reach = fabs(sdm_exact_point(o->run->engine, x, NULL, NULL, NULL)) + 2 * radius;
+    const double reach = sdm_exact_distance(o->run->engine, x) + 2 * radius;
     for (size_t t = 0; t < o->run->surface->n_tri; t++) {
         const double far = (reach + o->ball[t][3]) * (1 + 1e-9);
         if (v3_dist2(x, o->ball[t]) <= far * far) list[n++] = (uint32_t)t;

@@ -119,6 +119,10 @@ SDM_API sdm_status sdm_exact_map_derivative(const sdm_exact *e, const sdm_grid *
 SDM_API double sdm_exact_point(const sdm_exact *e, const double x[3], double closest[3], double normal[3],
                                uint32_t *triangle);
 
+/* Distance without its sign, the same bits: on open meshes, where a sign is a sum over the boundary, much cheaper. NaN for a point that is
+   not finite. [any thread] */
+SDM_API double sdm_exact_distance(const sdm_exact *e, const double x[3]);
+
 /* Oracle and "naive" baseline, O(voxels * triangles) in double as VTK's class and the paper do it, without any tree: distance to
    the nearest of all triangles of the mesh as it is, sign by the winding number over all triangles > 1/2. Threaded over voxels. */
 SDM_API sdm_status sdm_naive_map(const sdm_mesh *mesh, const sdm_grid *grid, int n_threads, float *values,

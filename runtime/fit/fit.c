@@ -166,7 +166,7 @@ static sdm_status weigh_priors(fit_problem *p, double *change, sdm_error *err)
 static sdm_status settle(fit_problem *p, fit_run *run, fit_ended *ended, sdm_error *err)
 {
     const size_t most = run->max_iterations, before = p->n_iterations;
-    // without priors only the noise factor is of use
+    // without priors only the noise factor is of use, and by averaged derivatives that of before
     const int weighings = sdm_fit_has_prior(p) ? WEIGHINGS_MOST : run->averaged ? 0 : 2;
     const double first = run->averaged ? EPS_FIRST_AVERAGED : EPS_FIRST;
     const double eps = run->eps;

@@ -17,8 +17,8 @@ typedef struct fit_maps {
     void *user;
     float *values, *jacobian; // [n_voxels], [n_params][n_voxels]: as maps are made
     double *distance;         // [n_voxels]: values
-    double *packed,
-        *spare; // [n_voxels][n_fields]: the field, its derivatives by the parameters and (share) by the blur
+    // [n_voxels][n_fields]: the field, its derivatives by the parameters and (share) by the blur
+    double *packed, *spare;
     size_t n_network, n_exact, n_outside;
     double seconds_network, seconds_exact;
 } fit_maps;

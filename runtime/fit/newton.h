@@ -24,9 +24,8 @@ typedef struct fit_problem {
     size_t stride; // every how many voxels of the image are sites
     fit_laws laws;
     fit_state state;
-    bool
-        absent[FIT_TISSUES_MAX]; // tissues (inside first) with too few values to say anything of their laws, which stay
-    fit_sums sums, trial;        // at the state, and at a state that is tried
+    bool absent[FIT_TISSUES_MAX]; // tissues (inside first) that the image does not hold: sdm_fit_look_settle()
+    fit_sums sums, trial;         // at the state, and at a state that is tried
 
     double *objective; // [n_iterations]
     size_t n_iterations, objective_capacity, n_steps;

@@ -7,7 +7,7 @@
 typedef struct fit_sums {
     size_t n_unknowns; // columns of the field, then means of the tissues
     double log_likelihood;
-    double rounding;             // what the rounding of the fields, which are floats, makes of it
+    double rounding;             // what the rounding of the maps, which are floats, makes of it
     double *gradient;            // [n_unknowns]
     double *complete, *observed; // [n_unknowns][n_unknowns], see fit_response
     double *parts;               // working memory

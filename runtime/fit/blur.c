@@ -3,7 +3,6 @@
 #include "blur.h"
 
 #include <math.h>
-#include <string.h>
 
 #ifdef _OPENMP
 #include <omp.h>

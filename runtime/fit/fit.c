@@ -205,16 +205,17 @@ static sdm_status approach(fit_problem *p, fit_run *run, fit_ended *ended, sdm_e
 {
     const sdm_fit_opts *o = p->opts;
     const bool exact = p->maps.exact, average = !o->keep_params;
+    const double eps = exact ? o->polish_eps : o->eps;
     const size_t max_iterations = run->max_iterations;
     run->averaged = false;
     memset(p->absent, 0, sizeof p->absent);
-    run->eps = exact && !average ? o->polish_eps : o->eps;
+    run->eps = average ? o->eps : eps;
     run->flat_most = !average ? 0 : exact ? 1 : FLAT_MOST;
     sdm_status s = settle(p, run, ended, err);
     if (s || !ended->converged || !average || !(exact || ended->rough)) return s;
     run->averaged = true;
     run->max_iterations = max_iterations;
-    run->eps = exact ? o->polish_eps : o->eps;
+    run->eps = eps;
     run->flat_most = 0;
     return settle(p, run, ended, err);
 }

@@ -42,11 +42,10 @@ sdm_status sdm_fit_map(const sdm_fit_source *source, const double *params, const
 #pragma omp parallel for schedule(static) num_threads(n_threads)
         for (int64_t row = 0; row < grid->n[1] * grid->n[2]; row++)
             for (int64_t i = 0; i < grid->n[0]; i++) {
-                double x[3], y[3];
+                double x[3];
                 sdm_grid_world(grid,
                                (const double[3]){(double)i, (double)(row % grid->n[1]), (double)(row / grid->n[1])}, x);
-                sdm_fit_to_shape(&state, x, y);
-                values[row * grid->n[0] + i] = (float)sdm_fit_sample(&f, y);
+                values[row * grid->n[0] + i] = (float)sdm_fit_field_at(&f, &state, x);
             }
     }
     sdm_fit_maps_dispose(&maps);

@@ -38,7 +38,7 @@ typedef struct fit_run {
     size_t max_iterations;
     double eps;
     int flat_most;              // so many steps in a row that promise no gain are an end, too; 0: not
-    bool averaged;              // plain steps by averaged derivatives, see creases.h
+    bool averaged;              // steps by averaged derivatives, see creases.h
     double way[FIT_PARAMS_MAX]; // what they are averaged over
 } fit_run;
 

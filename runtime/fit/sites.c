@@ -19,6 +19,13 @@ void sdm_fit_to_world(const fit_state *s, const double y[3], double x[3])
                s->translation[k];
 }
 
+double sdm_fit_field_at(const fit_field *f, const fit_state *s, const double x[3])
+{
+    double y[3];
+    sdm_fit_to_shape(s, x, y);
+    return sdm_fit_sample(f, y);
+}
+
 static double distance_between(const double a[3], const double b[3])
 {
     const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
@@ -68,9 +75,7 @@ static bool in_region(const sdm_fit_opts *o, const fit_region *r, const double x
     if (!(distance_between(x, r->centre) <= r->radius)) return false;
     if (!r->follow) return true;
     const fit_field f = {.grid = &r->follow->grid, .packed = r->follow->distance, .n_fields = 1, .distance = true};
-    double y[3];
-    sdm_fit_to_shape(r->state, x, y);
-    return sdm_fit_sample(&f, y) <= r->margin;
+    return sdm_fit_field_at(&f, r->state, x) <= r->margin;
 }
 
 // voxels of the grid around the ball: first and one past the last along each axis, multiples of the stride
@@ -206,11 +211,8 @@ sdm_status sdm_fit_sites_sample(fit_sites *s, const fit_maps *maps, const fit_la
     (void)n_threads; // without OpenMP
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
-        for (size_t i = s->n * slice / FIT_SLICES; i < s->n * (slice + 1) / FIT_SLICES; i++) {
-            double y[3];
-            sdm_fit_to_shape(state, s->world + 3 * i, y);
-            s->field[i] = sdm_fit_sample(&f, y);
-        }
+        for (size_t i = s->n * slice / FIT_SLICES; i < s->n * (slice + 1) / FIT_SLICES; i++)
+            s->field[i] = sdm_fit_field_at(&f, state, s->world + 3 * i);
     s->n_near = 0;
     for (size_t i = 0; i < s->n; i++) s->slot[i] = sdm_fit_near(laws, s->field[i]) ? s->n_near++ : SIZE_MAX;
     s->n_columns = fit_columns(maps->n_params);

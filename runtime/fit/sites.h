@@ -48,6 +48,9 @@ void sdm_fit_sites_dispose(fit_sites *s);
 /* What sdm_fit_maps_pack() made. */
 fit_field sdm_fit_field(const fit_maps *maps);
 
+/* The first field at x of the world, with the shape at the pose of s. */
+double sdm_fit_field_at(const fit_field *f, const fit_state *s, const double x[3]);
+
 /* Field and columns at every site from the packed fields. */
 sdm_status sdm_fit_sites_sample(fit_sites *s, const fit_maps *maps, const fit_laws *laws, const fit_state *state,
                                 sdm_error *err);

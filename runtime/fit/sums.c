@@ -108,10 +108,9 @@ double sdm_fit_sums_value(const fit_sites *sites, const fit_maps *maps, const fi
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         for (size_t i = sites->n * slice / FIT_SLICES; i < sites->n * (slice + 1) / FIT_SLICES; i++) {
-            double y[3];
+            const double field = sdm_fit_field_at(&f, state, sites->world + 3 * i);
             fit_response r;
-            sdm_fit_to_shape(state, sites->world + 3 * i, y);
-            sdm_fit_respond(laws, (double)sites->value[i], sdm_fit_sample(&f, y), false, &r);
+            sdm_fit_respond(laws, (double)sites->value[i], field, false, &r);
             part[slice] += r.log_likelihood;
         }
     for (size_t slice = 0; slice < FIT_SLICES; slice++) sum += part[slice];

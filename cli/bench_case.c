@@ -5,6 +5,7 @@
 
 #include "bench.h"
 #include "sdm/memory.h"
+#include "sdm/threads.h"
 #include "setup.h"
 #include "terminal.h"
 
@@ -105,7 +106,7 @@ sdm_status bench_case_open(const cli_args *args, double refine, double scale, be
         args->band > 0 ? args->band * fmin(c->grid.spacing[0], fmin(c->grid.spacing[1], c->grid.spacing[2])) : INFINITY;
     c->share = args->share > 0 ? args->share : (double)c->voxels > LARGE_MAP ? LARGE_SHARE : 1;
     c->repeat = args->repeat > 0 ? (size_t)args->repeat : 9;
-    c->threads = cli_threads(args->threads);
+    c->threads = sdm_threads((int)args->threads);
     write_title(c, name);
     s = SDM_ALLOC(&c->exact, c->voxels, "distance map", err);
     return s ? s : SDM_ALLOC(&c->winding, c->voxels, "signs by the winding number", err);

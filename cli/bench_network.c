@@ -8,6 +8,7 @@
 #include "sdm/config.h"
 #include "sdm/kernels.h"
 #include "sdm/memory.h"
+#include "sdm/threads.h"
 #include "setup.h"
 #include "terminal.h"
 
@@ -204,7 +205,7 @@ sdm_status bench_network(const cli_args *args, sdm_error *err)
         s = sdm_fail(err, SDM_E_UNSUPPORTED, "%zu parameters, at most %d", info->n_params, SDM_MAX_PARAMS);
     if (!s) s = cli_time_maps(model, shape, seed, 0, &t.maps, err);
     if (!s) s = time_derivatives(model, seed, &t, err);
-    if (!s) s = time_threads(model, seed, cli_threads(args->threads), &t, err);
+    if (!s) s = time_threads(model, seed, sdm_threads((int)args->threads), &t, err);
     if (!s) s = measure_machine(info->weight_bytes, &t, err);
     if (!s && args->json)
         s = print_json(&t, info, err);

@@ -7,6 +7,7 @@
 #include "evaluate.h"
 #include "sdm/config.h"
 #include "sdm/file.h"
+#include "sdm/threads.h"
 #include "setup.h"
 #include "terminal.h"
 
@@ -110,7 +111,7 @@ static sdm_status measure(const cli_args *args, const sdm_model *m, const sdm_in
     if (!s) s = cli_time_maps(m, shape, seed, (size_t)args->naive, &t, err);
     if (!s && args->pictures) s = write_pictures(args, m, shape, seed, &e, err);
     if (!s && args->json) {
-        fill_json(&json, args->files.items[0], info, &e, &t, seed, cli_threads(args->threads));
+        fill_json(&json, args->files.items[0], info, &e, &t, seed, sdm_threads((int)args->threads));
         s = cli_print_json(&json, err);
     } else if (!s) {
         print_table(args->files.items[0], info, &e, &t, seed);

@@ -10,6 +10,7 @@
 #include "sdm/exact.h"
 #include "sdm/memory.h"
 #include "sdm/methods.h"
+#include "sdm/threads.h"
 #include "setup.h"
 #include "terminal.h"
 
@@ -232,7 +233,7 @@ static sdm_status print_json(const job *j, sdm_error *err)
     sdm_json_int(&json, "voxels", (int64_t)voxels);
     sdm_json_int(&json, "triangles", (int64_t)j->report.audit.n_tri);
     sdm_json_int(&json, "triangles_used", (int64_t)j->report.n_tri_used);
-    sdm_json_int(&json, "threads", cli_threads(j->args->threads));
+    sdm_json_int(&json, "threads", sdm_threads((int)j->args->threads));
     sdm_json_text(&json, "sign_method", sdm_sign_method_name(j->report.sign));
     sdm_json_bool(&json, "union", j->report.unioned);
     sdm_json_real(&json, "union_error_mm", j->report.union_error_mm);

@@ -12,6 +12,7 @@
 #include "sdm/image.h"
 #include "sdm/map.h"
 #include "sdm/memory.h"
+#include "sdm/threads.h"
 #include "setup.h"
 #include "terminal.h"
 
@@ -263,7 +264,7 @@ static sdm_status report(const job *j, sdm_error *err)
     sdm_json_text(&json, "model", j->args->files.items[0]);
     sdm_json_int(&json, "maps", (int64_t)j->n_rows);
     sdm_json_real(&json, "ms_per_map", j->ms / (double)j->n_rows);
-    sdm_json_int(&json, "threads", cli_threads(j->args->threads));
+    sdm_json_int(&json, "threads", sdm_threads((int)j->args->threads));
     sdm_json_int(&json, "clamped", (int64_t)j->n_clamped);
     sdm_json_int(&json, "exact", (int64_t)j->n_exact);
     sdm_json_int(&json, "exact_by_error", (int64_t)j->n_exact_error);

@@ -4,12 +4,10 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 #include "sdm/image.h"
 #include "sdm/memory.h"
+#include "sdm/threads.h"
 #include "sdm/train.h"
 #include "terminal.h"
 
@@ -161,10 +159,7 @@ static void run_sample(work *w, size_t index, float *maps)
     size_t done;
 #pragma omp atomic capture
     done = ++w->done;
-#ifdef _OPENMP
-    if (omp_get_thread_num() != 0) return;
-#endif
-    cli_progress_show(&w->progress, "measure", (double)done / (double)w->out->n, NULL);
+    if (sdm_thread() == 0) cli_progress_show(&w->progress, "measure", (double)done / (double)w->out->n, NULL);
 }
 
 static void run_samples(work *w)

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "experiment.h"
+#include "sdm/threads.h"
 #include "terminal.h"
 
 /* Behind "model name :" of the first processor. */
@@ -68,7 +69,7 @@ void experiment_log_start(const experiment_run *run)
     if (gmtime_r(&now, &utc)) strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", &utc);
     experiment_describe_machine(machine, sizeof machine);
     fprintf(f, "%s  sdmgen " SDM_VERSION_TEXT "  %s\n  %d threads, seed %llu, %lld shapes, budget %g min\n", date,
-            machine, cli_threads(run->args->threads), (unsigned long long)run->e->experiment.seed,
+            machine, sdm_threads((int)run->args->threads), (unsigned long long)run->e->experiment.seed,
             (long long)run->e->experiment.samples, run->e->experiment.minutes);
     fprintf(f, "  sdmgen experiment");
     for (size_t i = 0; i < run->args->files.n; i++) fprintf(f, " '%s'", run->args->files.items[i]);

@@ -2,6 +2,7 @@
 #include <math.h>
 
 #include "fit.h"
+#include "sdm/threads.h"
 #include "setup.h"
 #include "terminal.h"
 
@@ -120,7 +121,7 @@ static void add_work(sdm_json *j, const cli_fit *f)
     sdm_json_real(j, "seconds_network", r->seconds_network);
     sdm_json_real(j, "seconds_exact", r->seconds_exact);
     sdm_json_real(j, "seconds_search", r->seconds_search);
-    sdm_json_int(j, "threads", cli_threads(f->args->threads));
+    sdm_json_int(j, "threads", sdm_threads((int)f->args->threads));
 }
 
 void cli_fit_json(const cli_fit *f, sdm_json *j)

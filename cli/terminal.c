@@ -8,9 +8,6 @@
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 static bool quiet_wanted;
 static volatile sig_atomic_t interrupts;
@@ -139,16 +136,6 @@ double cli_thread_clock(void)
     struct timespec t;
     clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-int cli_threads(int64_t asked)
-{
-#ifdef _OPENMP
-    return asked > 0 ? (int)asked : omp_get_max_threads();
-#else
-    (void)asked;
-    return 1;
-#endif
 }
 
 const char *cli_format_count(int64_t n, char buf[32])

@@ -49,9 +49,6 @@ double cli_clock(void);
 /* Seconds of this thread's processor: other programs on the machine do not count. */
 double cli_thread_clock(void);
 
-/* Number of threads for --threads N (0: all of OpenMP's). */
-int cli_threads(int64_t asked);
-
 /* n with its thousands separated by commas; buf has 32 bytes; returns buf. */
 const char *cli_format_count(int64_t n, char buf[32]);
 

@@ -15,7 +15,8 @@ endif()
 if(SDM_OPENMP)
   target_link_libraries(sdm_flags INTERFACE OpenMP::OpenMP_C)
 else()
-  target_compile_options(sdm_flags INTERFACE -Wno-unknown-pragmas)
+  # what is used in pragmas alone is not used
+  target_compile_options(sdm_flags INTERFACE -Wno-unknown-pragmas -Wno-unused-function -Wno-unused-parameter)
 endif()
 
 function(sdm_part name)

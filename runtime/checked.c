@@ -2,10 +2,7 @@
 #include "checked.h"
 
 #include "sdm/memory.h"
-
-#ifdef _OPENMP
-#include <omp.h>
-#endif
+#include "sdm/threads.h"
 
 static bool too_bad(const sdm_generate_opts *o, const sdm_check *c)
 {
@@ -61,10 +58,7 @@ sdm_status sdm_check_results(const sdm_model *m, const double *used, size_t n, c
     const sdm_model_info *info = sdm_model_get_info(m);
     const size_t voxels = sdm_grid_count(&info->grid);
     first_error first = {0};
-    int threads = 1;
-#ifdef _OPENMP
-    threads = o->n_threads ? o->n_threads : omp_get_max_threads();
-#endif
+    const int threads = sdm_threads(o->n_threads);
     const int outer = (size_t)threads < n ? threads : (int)n, inner = outer > 1 ? 1 : threads;
 #pragma omp parallel for schedule(dynamic) num_threads(outer) if (outer > 1)
     for (size_t i = 0; i < n; i++) {

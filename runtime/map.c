@@ -1,9 +1,7 @@
 /* The gradient of a map. */
 #include "sdm/map.h"
 
-#ifdef _OPENMP
-#include <omp.h>
-#endif
+#include "sdm/threads.h"
 
 /* Derivative by the index along an axis of n voxels, `step` apart in memory, at number i. */
 static double difference(const float *at, int64_t i, int64_t n, int64_t step)
@@ -37,9 +35,7 @@ sdm_status sdm_map_gradient(const sdm_grid *grid, const float *values, int n_thr
     const sdm_status s = sdm_grid_check(grid, err);
     if (s) return s;
     const int64_t ny = grid->n[1], rows = ny * grid->n[2];
-#ifdef _OPENMP
-    if (!n_threads) n_threads = omp_get_max_threads();
-#endif
+    n_threads = sdm_threads(n_threads);
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
     for (int64_t r = 0; r < rows; r++) gradient_row(grid, values, r % ny, r / ny, gradient);
     return SDM_OK;

@@ -6,6 +6,7 @@
 #include "phantom_parts.h"
 #include "sdm/memory.h"
 #include "sdm/rng.h"
+#include "sdm/threads.h"
 
 enum { MOST_VOXELS = 64, MOST_SUPERSAMPLING = 16 };
 
@@ -132,7 +133,7 @@ static sdm_status make_values(const sdm_exact *engine, const sdm_pose *pose, con
     static const double white[3];
     const double smooth[3] = {o->texture_mm, o->texture_mm, o->texture_mm};
     const size_t n = sdm_grid_count(grid);
-    const int threads = phantom_threads(o->n_threads);
+    const int threads = sdm_threads(o->n_threads);
     const bool has_texture = o->inside.sd > 0 || o->outside.sd > 0 || (o->air_share > 0 && o->air.sd > 0);
     float *air = NULL, *texture = NULL, *noise = NULL;
     sdm_status s = o->air_share > 0 ? SDM_ALLOC(&air, n, "air cells", err) : SDM_OK;

@@ -4,21 +4,7 @@
 #include "phantom_parts.h"
 #include "sdm/memory.h"
 
-#ifdef _OPENMP
-#include <omp.h>
-#endif
-
 enum { RUN = 64, GROUP = 8 }; // sums at a time: they stay in the first cache, in registers
-
-int phantom_threads(int wanted)
-{
-#ifdef _OPENMP
-    return wanted > 0 ? wanted : omp_get_max_threads();
-#else
-    (void)wanted;
-    return 1;
-#endif
-}
 
 // weights of the Gaussian at -radius .. radius, of sum 1
 static void gaussian(double sigma, size_t radius, double *g)

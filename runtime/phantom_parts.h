@@ -15,7 +15,6 @@ enum {
 };
 
 /* Threads for n_threads of the options. */
-int phantom_threads(int wanted);
 
 /* ---- filters along one axis ---- */
 

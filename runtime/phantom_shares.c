@@ -4,6 +4,7 @@
 
 #include "phantom_parts.h"
 #include "sdm/memory.h"
+#include "sdm/threads.h"
 
 #define BLOCK ((size_t)1 << 24) // sub-voxels worked on at a time
 enum { MOST_SUB = 32 };         // sub-voxels along one edge of a long voxel
@@ -167,7 +168,7 @@ static sdm_status run_blocks(const job *j, float *inside, float *air, sdm_error 
 sdm_status phantom_shares(const sdm_exact *engine, const sdm_pose *pose, const sdm_phantom_opts *o,
                           const sdm_grid *grid, float *inside, float *air, sdm_error *err)
 {
-    job j = {.engine = engine, .o = o, .grid = grid, .threads = phantom_threads(o->n_threads)};
+    job j = {.engine = engine, .o = o, .grid = grid, .threads = sdm_threads(o->n_threads)};
     const size_t bytes = sdm_grid_count(grid) * sizeof *inside;
     memset(inside, 0, bytes);
     if (air) memset(air, 0, bytes);

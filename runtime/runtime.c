@@ -6,10 +6,7 @@
 
 #include "checked.h"
 #include "sdm/memory.h"
-
-#ifdef _OPENMP
-#include <omp.h>
-#endif
+#include "sdm/threads.h"
 
 // maps of one slice of a batch: fixed, so that how a map is computed does not depend on the number of threads
 #define SLICE 24u
@@ -19,14 +16,8 @@
 
 static int thread_count(int wanted, size_t most)
 {
-#ifdef _OPENMP
-    const int n = wanted > 0 ? wanted : omp_get_max_threads();
+    const int n = sdm_threads(wanted);
     return (size_t)n < most ? n : (int)most;
-#else
-    (void)wanted;
-    (void)most;
-    return 1;
-#endif
 }
 
 // threads for a map that is shared
@@ -34,15 +25,6 @@ static int sharing_threads(const sdm_model *m, int wanted)
 {
     const double most = fmin(1 + sdm_model_get_info(m)->macs / SHARE_MACS, SHARED);
     return thread_count(wanted, (size_t)most);
-}
-
-static int thread_index(void)
-{
-#ifdef _OPENMP
-    return omp_get_thread_num();
-#else
-    return 0;
-#endif
 }
 
 static sdm_generate_opts options_or_default(const sdm_generate_opts *opts)
@@ -132,7 +114,7 @@ static sdm_status forward_batch(const sdm_model *m, const double *used, const sd
     for (size_t k = 0; k < slices; k++) {
         const size_t first = k * SLICE, count = n - first < SLICE ? n - first : SLICE;
         forward_slice(m, used + first * info->n_params, results + first, count, inner, values + first * voxels,
-                      scratch + (size_t)thread_index() * bytes);
+                      scratch + (size_t)sdm_thread() * bytes);
     }
     sdm_free(scratch);
     return SDM_OK;

@@ -2,9 +2,6 @@
    optimiser yet. */
 #include <stdlib.h>
 #include <string.h>
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 #include "coefficients.h"
 #include "linalg.h"
@@ -194,9 +191,7 @@ typedef struct first_error {
 
 static void note_error(first_error *first, long index, const sdm_error *err)
 {
-#ifdef _OPENMP
 #pragma omp critical(sdm_local_bases)
-#endif
     if (first->index < 0 || index < first->index) first->index = index, first->err = *err;
 }
 
@@ -220,17 +215,13 @@ static sdm_status lowest_level(spectrum *m, sdm_error *err)
     for (long b = 0; b < n_blocks; b++)
         if (sdm_pod_block_voxels(&t->blocks[b]) > largest) largest = sdm_pod_block_voxels(&t->blocks[b]);
     first_error first = {.index = -1};
-#ifdef _OPENMP
 #pragma omp parallel num_threads(t->n_threads)
-#endif
     {
         float *rows = NULL, *covariance = NULL;
         sdm_error mine = {0};
         sdm_status s = SDM_ALLOC(&rows, m->n * largest, "local bases", &mine);
         if (!s) s = SDM_ALLOC(&covariance, largest * largest, "local bases", &mine);
-#ifdef _OPENMP
 #pragma omp for schedule(dynamic)
-#endif
         for (long b = 0; b < n_blocks; b++)
             if (s || stopped(t, &mine) || lowest_block(m, (size_t)b, rows, covariance, &mine))
                 note_error(&first, b, &mine);
@@ -246,9 +237,7 @@ static sdm_status upper_trees(spectrum *m, sdm_error *err)
     const long begin = (long)levels->first[levels->n - 1], end = (long)levels->first[levels->n];
     first_error first = {.index = -1};
     if (levels->n == 1) return SDM_OK;
-#ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic) num_threads(m->t->n_threads)
-#endif
     for (long root = begin; root < end; root++) {
         sdm_error mine = {0};
         if (stopped(m->t, &mine) || upper_levels(m, (size_t)root, &mine)) note_error(&first, root, &mine);

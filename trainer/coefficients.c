@@ -62,9 +62,7 @@ sdm_status coefficients_of(const trainer *t, bool holdout, const size_t *slots, 
     const long begin = (long)levels->first[levels->n - 1], end = (long)levels->first[levels->n];
     const size_t most = n < CHUNK ? n : CHUNK;
     bool short_of_memory = false;
-#ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic) num_threads(trainer_threads(t))
-#endif
     for (long root = begin; root < end; root++) {
         const pod_tree tree = pod_tree_of(levels, t->blocks, (size_t)root);
         const size_t widest = pod_tree_coefficients(t->blocks, &tree, 0);
@@ -79,9 +77,7 @@ sdm_status coefficients_of(const trainer *t, bool holdout, const size_t *slots, 
         sdm_free(below);
         sdm_free(rows);
         if (s) {
-#ifdef _OPENMP
 #pragma omp atomic write
-#endif
             short_of_memory = true;
         }
     }

@@ -4,13 +4,11 @@
 #include <math.h>
 #include <stdatomic.h>
 #include <string.h>
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 #include "produce.h"
 #include "sdm/memory.h"
 #include "sdm/rng.h"
+#include "sdm/threads.h"
 #include "streams.h"
 
 sdm_status dataset_create(dataset *d, const sdm_config *config, sdm_error *err)
@@ -111,15 +109,6 @@ static void static_params(const dataset *d, size_t index, double *p)
     }
 }
 
-static bool on_caller_thread(void)
-{
-#ifdef _OPENMP
-    return omp_get_thread_num() == 0;
-#else
-    return true;
-#endif
-}
-
 sdm_status dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_error *err)
 {
     enum { FEWEST = 128 }; // random maps that bases are made from in any case
@@ -128,19 +117,13 @@ sdm_status dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_
     long failed = -1; // lowest failed sample: the message does not depend on scheduling
     sdm_error first = {0};
     atomic_bool stop = false, enough = false;
-#ifdef _OPENMP
-    if (n_threads == 0) n_threads = omp_get_max_threads();
+    n_threads = sdm_threads(n_threads);
 #pragma omp parallel num_threads(n_threads)
-#else
-    (void)n_threads;
-#endif
     {
         workbench w = {0};
         sdm_error mine = {0};
         const sdm_status made = workbench_create(&w, d, &mine);
-#ifdef _OPENMP
 #pragma omp for schedule(dynamic)
-#endif
         for (long i = 0; i < (long)all; i++) {
             const size_t at = (size_t)i;
             if (stop || (enough && at >= d->n_holdout + d->n_static + FEWEST)) continue;
@@ -158,14 +141,12 @@ sdm_status dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_
                     sdm_sample_params(d->seed, STREAM_TRAIN, slot - d->n_static, d->min, d->max, d->n_params, p);
                 s = workbench_packed_map(&w, d, p, d->maps + slot * d->n_voxels, &d->scale[slot], &mine);
             }
-#ifdef _OPENMP
 #pragma omp critical(sdm_dataset_fill)
-#endif
             {
                 if (s && (failed < 0 || i < failed)) failed = i, first = mine;
                 if (s) stop = true;
                 done++;
-                if (hooks->report && on_caller_thread()) hooks->report(hooks->user, done, all);
+                if (hooks->report && sdm_thread() == 0) hooks->report(hooks->user, done, all);
                 if (hooks->enough && hooks->enough(hooks->user)) enough = true;
                 if (hooks->cancelled && !stop && hooks->cancelled(hooks->user)) {
                     stop = true;

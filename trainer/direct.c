@@ -66,9 +66,7 @@ static void update(trainer *t, direct *d, double rate)
     enum { SLICE = 16384 };
     const adam_step adam = adam_begin(rate, t->phase_step + 1);
     parameters *p = &d->weights;
-#ifdef _OPENMP
 #pragma omp parallel for schedule(static) num_threads(trainer_threads(t))
-#endif
     for (long at = 0; at < (long)p->n; at += SLICE) {
         const size_t first = (size_t)at, n = p->n - first < SLICE ? p->n - first : SLICE;
         adam_update(p, first, n, d->gradient + first, adam, 1);

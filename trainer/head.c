@@ -70,16 +70,12 @@ static sdm_status solve(const trainer *t, const double *factor, const float *rig
     enum { COLUMNS = 64 };
     const size_t latents = t->arch.n_latent, k = t->arch.n_coefficients;
     bool short_of_memory = false;
-#ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic) num_threads(trainer_threads(t))
-#endif
     for (long first = 0; first < (long)k; first += COLUMNS) {
         const size_t at = (size_t)first, n = k - at < COLUMNS ? k - at : COLUMNS;
         double *x = NULL;
         if (SDM_ALLOC(&x, latents * n, "head", NULL)) {
-#ifdef _OPENMP
 #pragma omp atomic write
-#endif
             short_of_memory = true;
             continue;
         }

@@ -50,9 +50,7 @@ void average_update(parameters *p, double decay, int n_threads)
     enum { SLICE = 16384 };
     const float f = (float)(1 - decay);
     (void)n_threads;
-#ifdef _OPENMP
 #pragma omp parallel for schedule(static) num_threads(n_threads)
-#endif
     for (long at = 0; at < (long)p->n; at += SLICE) {
         const size_t first = (size_t)at, last = first + SLICE < p->n ? first + SLICE : p->n;
         for (size_t i = first; i < last; i++) p->average[i] += f * (p->w[i] - p->average[i]);

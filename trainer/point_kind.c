@@ -98,9 +98,7 @@ static void gather(const trainer *t, point_trainer *p, const direct_batch *b, si
     const dataset *d = &t->data;
     const size_t row = (size_t)t->config->grid.n[0], slice = row * (size_t)t->config->grid.n[1];
     const size_t step[4] = {0, 1, row, slice};
-#ifdef _OPENMP
 #pragma omp parallel for schedule(static) num_threads(trainer_threads(t))
-#endif
     for (size_t i = 0; i < n; i += p->group) {
         const size_t slot = b->slots[(first + i) / each];
         size_t voxel = point_draw(t->config, d, slot, b->step * b->n * each + first + i);

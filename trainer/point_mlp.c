@@ -66,9 +66,7 @@ void point_forward(const sdm_point_arch *a, const float *w, size_t batch, const 
         if (k > before)
             sdm_gemm(batch, width, n_u, (sdm_view){u, n_u, 1}, (sdm_view){w + before, 1, k}, true, h, width, n_threads);
         w += width * (k + 1);
-#ifdef _OPENMP
 #pragma omp parallel for schedule(static) num_threads(n_threads)
-#endif
         for (size_t i = 0; i < batch; i += SLICE) {
             const size_t n = (batch - i < SLICE ? batch - i : SLICE) * width;
             sdm_activate(a->activation, n, h + i * width, h + i * width, p.slope[l] + i * width);
@@ -76,9 +74,7 @@ void point_forward(const sdm_point_arch *a, const float *w, size_t batch, const 
     }
     const size_t last = a->width[a->depth - 1];
     const float *h = p.h[a->depth - 1];
-#ifdef _OPENMP
 #pragma omp parallel for schedule(static) num_threads(n_threads)
-#endif
     for (size_t i = 0; i < batch; i++) {
         float sum = w[last];
         for (size_t o = 0; o < last; o++) sum += w[o] * h[i * last + o];
@@ -121,9 +117,7 @@ void point_backward(const sdm_point_arch *a, const float *w, size_t batch, const
     for (size_t l = a->depth; l-- > 0;) {
         const size_t width = a->width[l], k = sdm_point_inputs(a, l), before = sdm_point_hidden(a, l);
         at -= width * (k + 1);
-#ifdef _OPENMP
 #pragma omp parallel for schedule(static) num_threads(n_threads)
-#endif
         for (size_t i = 0; i < batch; i++)
             for (size_t o = 0; o < width; o++) d[i * width + o] *= p.slope[l][i * width + o];
         layer_gradient(batch, width, d, before, l ? p.h[l - 1] : NULL, k - before, u, gradient + at, n_threads);

@@ -2,15 +2,13 @@
    least squares on all local coefficients. Letters as in sdm/pod.h; B batch. */
 #include <math.h>
 #include <string.h>
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 #include "loss.h"
 #include "mlp.h"
 #include "pod_tree.h"
 #include "sdm/kernels.h"
 #include "sdm/memory.h"
+#include "sdm/threads.h"
 #include "streams.h"
 #include "trainer.h"
 
@@ -95,15 +93,6 @@ static int tree_threads(const trainer *t, const refine_batch *b)
     return n < b->tree_threads ? n : b->tree_threads;
 }
 
-static int thread_number(void)
-{
-#ifdef _OPENMP
-    return omp_get_thread_num();
-#else
-    return 0;
-#endif
-}
-
 static void coefficients(const trainer *t, const float *w, refine_batch *b, size_t rows)
 {
     const sdm_pod_arch *a = &t->arch;
@@ -124,7 +113,7 @@ static tree_work work_on(const trainer *t, const refine_batch *b, size_t root)
 {
     tree_work w = {.tree = pod_tree_of(&t->arch.levels, t->blocks, root)};
     const size_t top = t->arch.levels.n - 1;
-    float *at = b->scratch + b->tree_floats * (size_t)thread_number();
+    float *at = b->scratch + b->tree_floats * (size_t)sdm_thread();
     for (size_t level = 0; level < top; level++) {
         w.ld[level] = pod_tree_coefficients(t->blocks, &w.tree, level);
         w.c[level] = at, at += b->rows * w.ld[level];
@@ -216,12 +205,10 @@ static void train_head(trainer *t, refine_batch *b, adam_step adam)
 {
     const sdm_pod_arch *a = &t->arch;
     const size_t n_c = a->n_coefficients, latents = a->n_latent;
-#ifdef _OPENMP
 #pragma omp parallel for schedule(static) num_threads(trainer_threads(t))
-#endif
     for (long at = 0; at < (long)n_c; at += HEAD_ROWS) {
         const size_t first = (size_t)at, rows = n_c - first < HEAD_ROWS ? n_c - first : HEAD_ROWS;
-        float *gradient = b->scratch + HEAD_ROWS * latents * (size_t)thread_number();
+        float *gradient = b->scratch + HEAD_ROWS * latents * (size_t)sdm_thread();
         sdm_gemm(rows, latents, b->rows, (sdm_view){b->dc + first, 1, n_c}, (sdm_view){b->z, latents, 1}, false,
                  gradient, latents, 1);
         for (size_t i = 0; i < rows; i++)
@@ -246,9 +233,7 @@ static sdm_status step(trainer *t, refine_batch *b, double rate, sdm_error *err)
     sdm_free((void *)phi);
     coefficients(t, w, b, b->rows);
     const adam_step adam = adam_begin(rate, t->phase_step + 1);
-#ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic) num_threads(tree_threads(t, b))
-#endif
     for (long i = 0; i < (long)n_trees(t); i++) train_tree(t, b, (size_t)i, adam);
     double sum = 0;
     for (size_t i = 0; i < n_trees(t); i++) sum += b->loss[i];
@@ -278,9 +263,7 @@ sdm_status refine_evaluate(trainer *t, const float *w, double *mse, sdm_error *e
         for (size_t i = 0; i < rows; i++) phi[i] = t->holdout_phi + (at + i) * t->n_poly;
         head_latent(t, w, rows, phi, b.x, b.z, b.workspace);
         coefficients(t, w, &b, rows);
-#ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic) num_threads(tree_threads(t, &b))
-#endif
         for (long i = 0; i < (long)n_trees(t); i++) {
             const tree_work work = work_on(t, &b, first_tree(t) + (size_t)i);
             const size_t voxels = work.tree.voxels;

@@ -4,15 +4,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 #include "export_model.h"
 #include "kind.h"
 #include "sdm/file.h"
 #include "sdm/memory.h"
 #include "sdm/text.h"
+#include "sdm/threads.h"
 
 static double monotonic(void)
 {
@@ -369,12 +367,7 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
                  .heldout_mse = NAN,
                  .metrics = &metrics};
     if (hooks) t.hooks = *hooks;
-    t.n_threads = config->threads;
-#ifdef _OPENMP
-    if (t.n_threads == 0) t.n_threads = omp_get_max_threads();
-#else
-    t.n_threads = 1;
-#endif
+    t.n_threads = sdm_threads(config->threads);
     sdm_status s = sdm_make_folder(folder, err);
     if (!s && !resume) s = checkpoint_start_anew(&t, err); // they would belong to another run
     if (!s) s = export_config(&t, err);

@@ -4,9 +4,7 @@
 #include <math.h>
 
 #include "sdm/exact.h"
-#ifdef _OPENMP
-#include <omp.h>
-#endif
+#include "sdm/threads.h"
 
 typedef struct vec {
     double x, y, z;
@@ -82,12 +80,8 @@ sdm_status sdm_naive_map(const sdm_mesh *mesh, const sdm_grid *grid, int n_threa
     if (!s) s = sdm_grid_check(grid, err);
     if (s) return s;
     const int64_t n = (int64_t)sdm_grid_count(grid);
-#ifdef _OPENMP
-    if (n_threads <= 0) n_threads = omp_get_max_threads();
+    n_threads = sdm_threads(n_threads);
 #pragma omp parallel for schedule(static) num_threads(n_threads)
-#else
-    (void)n_threads;
-#endif
     for (int64_t i = 0; i < n; i++) {
         const double index[3] = {(double)(i % grid->n[0]), (double)(i / grid->n[0] % grid->n[1]),
                                  (double)(i / grid->n[0] / grid->n[1])};

@@ -9,20 +9,9 @@
 #include "point_internal.h"
 #include "sdm/kernels.h"
 #include "sdm/pod.h"
-#ifdef _OPENMP
-#include <omp.h>
-#endif
+#include "sdm/threads.h"
 
 static size_t pad(size_t n) { return sdm_panel_outputs(n); }
-
-static int thread_number(void)
-{
-#ifdef _OPENMP
-    return omp_get_thread_num();
-#else
-    return 0;
-#endif
-}
 
 // of one map: bias[1 + P][sum of pad(W_l)], the bias of each layer with the parameters in it, and its derivatives by the parameters
 typedef struct map_bias {
@@ -171,14 +160,12 @@ static void map(const sdm_model *m, const double *p, float *values, float *jacob
     const size_t each = carve(k, sets * k->rows, NULL, &none);
     set_bias(m, p, jacobian != NULL, &b);
     (void)n_threads;
-#ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads) if (n_threads > 1)
-#endif
     for (size_t first = 0; first < voxels; first += k->rows) {
         const size_t n = voxels - first < k->rows ? voxels - first : k->rows;
         float q[3 * 192];
         workspace w;
-        carve(k, sets * k->rows, memory + (size_t)thread_number() * each, &w);
+        carve(k, sets * k->rows, memory + (size_t)sdm_thread() * each, &w);
         place(&m->info.grid, &k->arch, first, n, q);
         points(k, &b, n, q, &w, values + first, jacobian ? jacobian + first : NULL, voxels);
     }

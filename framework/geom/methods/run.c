@@ -5,9 +5,7 @@
 
 #include "method.h"
 #include "sdm/memory.h"
-#ifdef _OPENMP
-#include <omp.h>
-#endif
+#include "sdm/threads.h"
 
 static double now_ms(void)
 {
@@ -28,10 +26,7 @@ sdm_status sdm_run_begin_plain(sdm_run *run, const sdm_mesh *mesh, const sdm_gri
     if (opts) run->opts = *opts;
     if (!(run->opts.max_error_mm >= 0 && run->opts.max_error_mm <= 1e100))
         return sdm_fail(err, SDM_E_ARG, "max_error_mm is %g, need a number of 0 or more", run->opts.max_error_mm);
-    run->n_threads = 1;
-#ifdef _OPENMP
-    run->n_threads = run->opts.exact.n_threads > 0 ? run->opts.exact.n_threads : omp_get_max_threads();
-#endif
+    run->n_threads = sdm_threads(run->opts.exact.n_threads);
     run->start = now_ms();
     return sdm_grid_check(grid, err);
 }
@@ -85,10 +80,7 @@ sdm_status sdm_run_parts(const sdm_run *run, int64_t n, void (*part)(void *job, 
     atomic_bool stop = false;
 #pragma omp parallel for schedule(dynamic) num_threads(run->n_threads)
     for (int64_t i = 0; i < n; i++) {
-        int thread = 0;
-#ifdef _OPENMP
-        thread = omp_get_thread_num();
-#endif
+        const int thread = sdm_thread();
         if (atomic_load(&stop)) continue;
         part(job, i, thread);
         if (thread != 0) continue; // callbacks come from the calling thread alone

@@ -2,13 +2,11 @@
 #include "conv.h"
 
 #include <string.h>
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 #include "conv_kernels.h"
 #include "sdm/kernels.h"
 #include "sdm/pod.h"
+#include "sdm/threads.h"
 
 enum {
     GROUP = 32,          // output channels of a unit of work, a multiple of every mr
@@ -33,13 +31,8 @@ static size_t divide_up(size_t a, size_t b) { return (a + b - 1) / b; }
 
 static int threads(int wanted, size_t units)
 {
-#ifdef _OPENMP
-    if (wanted == 0) wanted = omp_get_max_threads();
-    return (size_t)wanted < units ? wanted : (int)units;
-#else
-    (void)wanted, (void)units;
-    return 1;
-#endif
+    const int n = sdm_threads(wanted);
+    return (size_t)n < units ? n : (int)units;
 }
 
 // where the terms channel * taps + tap from k0 on lie, relative to the output's position
@@ -133,9 +126,7 @@ void sdm_conv_apply(const sdm_fmap *g, sdm_conv c, const float *packed, const fl
     const conv_table *t = table();
     const size_t chunks = divide_up(g->count, SDM_CONV_CHUNK), groups = divide_up(c.out, GROUP);
     n_threads = threads(n_threads, chunks * groups);
-#ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads) if (n_threads > 1)
-#endif
     for (long unit = 0; unit < (long)(chunks * groups); unit++) {
         const size_t p0 = (size_t)unit % chunks * SDM_CONV_CHUNK, p1 = least(g->count, p0 + SDM_CONV_CHUNK);
         const size_t o0 = (size_t)unit / chunks * GROUP, o1 = least(c.out, o0 + GROUP);
@@ -154,9 +145,7 @@ static float sum_lanes(const float *v, size_t width)
 void sdm_conv_finish_maps(const sdm_fmap *g, size_t channels, sdm_conv_finish finish, float *y, int n_threads)
 {
     n_threads = threads(n_threads, channels);
-#ifdef _OPENMP
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
-#endif
     for (long o = 0; o < (long)channels; o++) finish_chunk(g, finish, y, (size_t)o, 0, g->count);
 }
 
@@ -228,9 +217,7 @@ void sdm_conv_gradient(const sdm_fmap *g, sdm_conv c, const float *x, const floa
     const size_t panels = few ? 1 : divide_up(c.out, t->mr);
     const size_t units = panels * divide_up(c.in * c.taps, few ? SDM_CONV_TERMS : GRADIENT_TERMS);
     n_threads = threads(n_threads, units);
-#ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads) if (n_threads > 1)
-#endif
     for (long i = 0; i < (long)(units + c.out); i++) {
         const size_t unit = (size_t)i;
         if (unit >= units)

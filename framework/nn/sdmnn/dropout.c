@@ -12,9 +12,7 @@ void sdm_dropout(const sdm_fmap *g, size_t channels, double rate, uint64_t seed,
     const uint32_t below = (uint32_t)(rate * 0x1p32);
     const float scale = (float)(1 / (1 - rate));
     (void)n_threads;
-#ifdef _OPENMP
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
-#endif
     for (long c = 0; c < (long)channels; c++) {
         const uint64_t first = index + (uint64_t)c * draws(g);
         for (size_t i = 0; i < g->count; i += 4) {

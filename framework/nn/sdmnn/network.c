@@ -1,13 +1,11 @@
 /* sdmnn in training: memory, forward pass and gradient of a batch. */
 #include <string.h>
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 #include "operators.h"
 #include "passes.h"
 #include "sdm/memory.h"
 #include "sdm/pod.h"
+#include "sdm/threads.h"
 
 struct sdm_sdmnn {
     sdmnn_plan plan;
@@ -108,16 +106,6 @@ void sdm_sdmnn_set(sdm_sdmnn *net, const float *weights)
     }
 }
 
-static int threads(int wanted)
-{
-#ifdef _OPENMP
-    return wanted ? wanted : omp_get_max_threads();
-#else
-    (void)wanted;
-    return 1;
-#endif
-}
-
 // x[B][P] -> hidden[B][W] with its slope (or NULL) -> volume[B][cells]
 static void dense(sdm_sdmnn *net, size_t batch, const float *x, float *slope, int n_threads)
 {
@@ -142,7 +130,7 @@ static void dense_backward(sdm_sdmnn *net, size_t batch, const float *x, float *
 
 void sdm_sdmnn_forward(sdm_sdmnn *net, const float *x, float *values, int n_threads)
 {
-    n_threads = threads(n_threads);
+    n_threads = sdm_threads(n_threads);
     dense(net, 1, x, NULL, n_threads);
     sdmnn_forward(&net->plan, &net->layers, net->volume, net->block, NULL, NULL, values, n_threads);
 }
@@ -152,7 +140,7 @@ double sdm_sdmnn_gradient(sdm_sdmnn *net, size_t batch, const float *x, sdm_sdmn
 {
     const sdmnn_plan *p = &net->plan;
     double sum = 0;
-    n_threads = threads(n_threads);
+    n_threads = sdm_threads(n_threads);
     memset(gradient, 0, p->n_weights * sizeof *gradient);
     dense(net, batch, x, net->hidden_slope, n_threads);
     for (size_t b = 0; b < batch; b++) {

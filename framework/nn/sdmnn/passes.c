@@ -7,9 +7,7 @@
 static void multiply(const sdm_fmap *g, size_t channels, float *a, const float *b, int n_threads)
 {
     (void)n_threads;
-#ifdef _OPENMP
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
-#endif
     for (long c = 0; c < (long)channels; c++) {
         const size_t at = (size_t)c * g->stride;
         for (size_t i = at; i < at + g->count; i++) a[i] *= b[i];

@@ -39,9 +39,7 @@ void sdm_pool_tangent(const sdm_fmap *g, const sdm_fmap *h, size_t channels, con
                       int n_threads)
 {
     (void)n_threads;
-#ifdef _OPENMP
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
-#endif
     for (long c = 0; c < (long)channels; c++) {
         float *out = dy + (size_t)c * h->stride;
         windows(g, h, x + (size_t)c * g->stride, dx + (size_t)c * g->stride, out, 0);
@@ -58,9 +56,7 @@ void sdm_pool_backward(const sdm_fmap *g, const sdm_fmap *h, size_t channels, co
                        float *dx, int n_threads)
 {
     (void)n_threads;
-#ifdef _OPENMP
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
-#endif
     for (long c = 0; c < (long)channels; c++)
         windows(g, h, x + (size_t)c * g->stride, dy + (size_t)c * h->stride, dx + (size_t)c * g->stride, 1);
 }

@@ -33,9 +33,7 @@ void sdm_upsample_forward(const sdm_fmap *g, const sdm_fmap *h, size_t factor, s
                           float *y, int n_threads)
 {
     (void)n_threads;
-#ifdef _OPENMP
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
-#endif
     for (long c = 0; c < (long)channels; c++)
         upsample(g, h, factor, x + (size_t)c * h->stride, y + (size_t)c * g->stride);
 }
@@ -44,9 +42,7 @@ void sdm_upsample_backward(const sdm_fmap *g, const sdm_fmap *h, size_t factor, 
                            float *dx, int n_threads)
 {
     (void)n_threads;
-#ifdef _OPENMP
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
-#endif
     for (long c = 0; c < (long)channels; c++)
         gather(g, h, factor, dy + (size_t)c * g->stride, dx + (size_t)c * h->stride);
 }

@@ -1,0 +1,20 @@
+/* How many threads a call takes, and which of them one is. */
+#ifndef SDM_THREADS_H
+#define SDM_THREADS_H
+
+#include "sdm/export.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* `wanted` where it is positive, else as many as OpenMP would take; 1 in a build without OpenMP. [any thread] */
+SDM_API int sdm_threads(int wanted);
+
+/* Number of the calling thread in its team, 0 for the one that called the library. [any thread] */
+SDM_API int sdm_thread(void);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -7,17 +7,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include <cmocka.h>
 
 #include "error_model.h"
 #include "sample_plan.h"
-#include "sdm/builtin_shapes.h"
-#include "sdm/file.h"
-#include "sdm/memory.h"
-#include "sdm/train.h"
 #include "streams.h"
+#include "train_tools.h"
 
 static double uniform(size_t i, double low, double high)
 {
@@ -157,27 +153,11 @@ static void nothing_observed(void **state)
     sample_plan_dispose(&p);
 }
 
-static sdm_registry *registry;
-static sdm_instance *capsule;
-static char folder[] = "sampling_XXXXXX";
-
 static const char base[] = "shape: {name: capsule}\n"
                            "grid: {size: [12, 10, 10], spacing: 1.2}\n"
                            "network: {depth: 2, width: 16, rank: 4, modes: 16, degree: 2, input_degree: 2}\n"
                            "data: {static: 0, start: 60, online: 200, holdout: 8, memory_gb: 0.5, sampling: error}\n"
                            "train: {steps: 150, batch: 8, refine: 0.3, refine_batch: 8, average: 0.99}\n";
-
-static void path_of(char *path, size_t size, const char *name) { snprintf(path, size, "%s/%s", folder, name); }
-
-static void clean(void)
-{
-    static const char *const names[] = {"model.sdm", "checkpoint.sdmc", "metrics.jsonl", "config.yaml", "loss.png"};
-    char path[128];
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        path_of(path, sizeof path, names[i]);
-        remove(path);
-    }
-}
 
 static sdm_status train(const char *override, int threads, bool resume, const sdm_train_hooks *hooks)
 {
@@ -193,11 +173,9 @@ static sdm_status train(const char *override, int threads, bool resume, const sd
 
 static sdm_model *trained(void)
 {
-    char path[128];
     sdm_model *m;
     sdm_error e = {0};
-    path_of(path, sizeof path, "model.sdm");
-    if (sdm_model_open(path, &m, &e)) fail_msg("%s", e.text);
+    if (sdm_model_open(in_folder("model.sdm"), &m, &e)) fail_msg("%s", e.text);
     return m;
 }
 
@@ -288,22 +266,6 @@ static void only_for_pod(void **state)
     sdm_error e = {0};
     assert_int_equal(sdm_config_parse("x.yaml", text, sizeof text - 1, NULL, 0, &c, &e), SDM_E_CONFIG);
     assert_non_null(strstr(e.text, "data.sampling"));
-}
-
-static int set_up(void **state)
-{
-    (void)state;
-    if (!mkdtemp(folder) || sdm_registry_create(&registry, NULL) || sdm_builtin_shapes_add(registry, NULL)) return 1;
-    return sdm_instance_create(sdm_registry_find(registry, "capsule", NULL), NULL, 0, NULL, &capsule, NULL) != SDM_OK;
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    clean();
-    sdm_instance_free(capsule);
-    sdm_registry_free(registry);
-    return rmdir(folder);
 }
 
 int main(void)

@@ -7,20 +7,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include <cmocka.h>
 
-#include "sdm/builtin_shapes.h"
-#include "sdm/checksum.h"
-#include "sdm/file.h"
-#include "sdm/memory.h"
 #include "sdm/pod.h"
-#include "sdm/train.h"
-
-static sdm_registry *registry;
-static sdm_instance *capsule;
-static char folder[] = "trainer_XXXXXX";
+#include "train_tools.h"
 
 static const char base[] = "shape: {name: capsule}\n"
                            "grid: {size: [20, 18, 16], spacing: 0.8}\n"
@@ -34,48 +25,15 @@ static void read_config(sdm_config *c, const char *const *overrides, size_t n)
     if (sdm_config_parse("test.yaml", base, sizeof base - 1, overrides, n, c, &e)) fail_msg("%s", e.text);
 }
 
-static uint64_t hash_of(const char *name)
-{
-    char path[128];
-    uint8_t *data;
-    size_t size;
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    assert_int_equal(sdm_file_read(path, 1 << 30, &data, &size, NULL), SDM_OK);
-    // a file that ends with its own CRC has the same CRC as any other such file: leave the end out
-    assert_true(size > 8);
-    const uint64_t h = sdm_crc64(0, data, size - 8);
-    sdm_free(data);
-    return h;
-}
-
-static bool exists(const char *name)
-{
-    char path[128];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    return access(path, F_OK) == 0;
-}
-
 static void flip_byte(const char *name, long at)
 {
-    char path[128];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    FILE *f = fopen(path, "r+b");
+    FILE *f = fopen(in_folder(name), "r+b");
     assert_non_null(f);
     fseek(f, at, SEEK_SET);
     const int old = fgetc(f);
     fseek(f, at, SEEK_SET);
     fputc(old ^ 1, f);
     fclose(f);
-}
-
-static void clean(void)
-{
-    static const char *const names[] = {"model.sdm", "checkpoint.sdmc", "metrics.jsonl", "config.yaml", "loss.png"};
-    char path[128];
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        snprintf(path, sizeof path, "%s/%s", folder, names[i]);
-        remove(path);
-    }
 }
 
 static void trains(void **state)
@@ -321,22 +279,6 @@ static void mistakes(void **state)
     read_config(&c, NULL, 0);
     assert_int_equal(sdm_train(&c, capsule, "/proc/no/such/folder", false, NULL, NULL, &e), SDM_E_IO);
     assert_false(exists("model.sdm"));
-}
-
-static int set_up(void **state)
-{
-    (void)state;
-    if (!mkdtemp(folder) || sdm_registry_create(&registry, NULL) || sdm_builtin_shapes_add(registry, NULL)) return 1;
-    return sdm_instance_create(sdm_registry_find(registry, "capsule", NULL), NULL, 0, NULL, &capsule, NULL) != SDM_OK;
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    clean();
-    sdm_instance_free(capsule);
-    sdm_registry_free(registry);
-    return rmdir(folder); // nothing else was left behind
 }
 
 int main(void)

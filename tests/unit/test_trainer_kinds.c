@@ -7,19 +7,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include <cmocka.h>
 
-#include "sdm/builtin_shapes.h"
-#include "sdm/checksum.h"
-#include "sdm/file.h"
-#include "sdm/memory.h"
-#include "sdm/train.h"
-
-static sdm_registry *registry;
-static sdm_instance *capsule;
-static char folder[] = "kinds_XXXXXX";
+#include "train_tools.h"
 
 static const char base[] = "shape: {name: capsule}\n"
                            "grid: {size: [16, 14, 12], spacing: 1}\n"
@@ -50,36 +41,6 @@ static void read_config(sdm_config *c, const struct kind *kind, const char *cons
     while (n < 6 && kind->overrides[n]) overrides[n] = kind->overrides[n], n++;
     for (size_t i = 0; i < n_more; i++) overrides[n++] = more[i];
     if (sdm_config_parse("test.yaml", base, sizeof base - 1, overrides, n, c, &e)) fail_msg("%s", e.text);
-}
-
-static uint64_t hash_of(const char *name)
-{
-    char path[128];
-    uint8_t *data;
-    size_t size;
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    assert_int_equal(sdm_file_read(path, 1 << 30, &data, &size, NULL), SDM_OK);
-    // a model ends with its own checksum, over which every checksum is the same: leave it out
-    const uint64_t h = sdm_crc64(0, data, size - 8);
-    sdm_free(data);
-    return h;
-}
-
-static bool exists(const char *name)
-{
-    char path[128];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    return access(path, F_OK) == 0;
-}
-
-static void clean(void)
-{
-    static const char *const names[] = {"model.sdm", "checkpoint.sdmc", "metrics.jsonl", "config.yaml", "loss.png"};
-    char path[128];
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        snprintf(path, sizeof path, "%s/%s", folder, names[i]);
-        remove(path);
-    }
 }
 
 static sdm_train_report train(const sdm_config *c)
@@ -210,22 +171,6 @@ static void by_time(void **state)
         assert_true(sdm_model_get_info(m)->train_seconds > 0 && isfinite(r.accuracy.rmse_mm));
         sdm_model_free(m);
     }
-}
-
-static int set_up(void **state)
-{
-    (void)state;
-    if (!mkdtemp(folder) || sdm_registry_create(&registry, NULL) || sdm_builtin_shapes_add(registry, NULL)) return 1;
-    return sdm_instance_create(sdm_registry_find(registry, "capsule", NULL), NULL, 0, NULL, &capsule, NULL) != SDM_OK;
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    clean();
-    sdm_instance_free(capsule);
-    sdm_registry_free(registry);
-    return rmdir(folder); // nothing else was left behind
 }
 
 int main(void)

@@ -6,8 +6,8 @@
 
 #include "config_parse.h"
 #include "schema.h"
-#include "sdm/file.h"
 #include "sdm/memory.h"
+#include "yaml_tree.h"
 
 /* "dir/cochlea.yaml" -> "runs/cochlea"; bytes that a text must not hold become '_'. */
 static void default_folder(const char *file, char *out, size_t size)
@@ -103,10 +103,7 @@ sdm_status sdm_config_read(const char *path, const char *const *overrides, size_
     uint8_t *data = NULL;
     size_t size = 0;
     if (!path || !out) return sdm_fail(err, SDM_E_ARG, "a configuration needs a path and a place for the result");
-    sdm_status s = sdm_file_read(path, SDM_TREE_BYTES_MAX, &data, &size, err);
-    if (s == SDM_E_FORMAT)
-        return sdm_fail(err, SDM_E_CONFIG, "%s:1:1: more than %zu bytes; a configuration is smaller", path,
-                        SDM_TREE_BYTES_MAX);
+    sdm_status s = sdm_tree_read(path, &data, &size, err);
     if (s) return s;
     s = sdm_config_parse(path, (const char *)data, size, overrides, n_overrides, out, err);
     sdm_free(data);

@@ -9,6 +9,7 @@
 #include "overrides.h"
 #include "sdm/file.h"
 #include "sdm/memory.h"
+#include "yaml_tree.h"
 
 void sdm_experiment_free(sdm_experiment *e)
 {
@@ -201,10 +202,7 @@ sdm_status sdm_experiment_read(const char *path, const char *const *overrides, s
     size_t size = 0;
     if (!path || !out) return sdm_fail(err, SDM_E_ARG, "an experiment needs a path and a place for the result");
     *out = NULL;
-    sdm_status s = sdm_file_read(path, SDM_TREE_BYTES_MAX, &data, &size, err);
-    if (s == SDM_E_FORMAT)
-        return sdm_fail(err, SDM_E_CONFIG, "%s:1:1: more than %zu bytes; a configuration is smaller", path,
-                        SDM_TREE_BYTES_MAX);
+    sdm_status s = sdm_tree_read(path, &data, &size, err);
     if (s) return s;
     s = sdm_experiment_parse(path, (const char *)data, size, overrides, n_overrides, out, err);
     sdm_free(data);

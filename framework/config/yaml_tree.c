@@ -5,6 +5,7 @@
 #include <string.h>
 #include <yaml.h>
 
+#include "sdm/file.h"
 #include "sdm/memory.h"
 
 /* An open list or map. */
@@ -348,6 +349,14 @@ static sdm_status allocate(sdm_tree *tree, size_t size, sdm_error *err)
     tree->pool_size = 2 * size + 2 * tree->max_nodes + SDM_TREE_PATH_BYTES + SDM_TREE_PATH_NAMES;
     sdm_status s = SDM_ALLOC(&tree->nodes, tree->max_nodes + SDM_TREE_PATH_NAMES + 1, "YAML nodes", err);
     return s ? s : SDM_ALLOC(&tree->pool, tree->pool_size, "YAML texts", err);
+}
+
+sdm_status sdm_tree_read(const char *path, uint8_t **data, size_t *size, sdm_error *err)
+{
+    const sdm_status s = sdm_file_read(path, SDM_TREE_BYTES_MAX, data, size, err);
+    if (s != SDM_E_FORMAT) return s;
+    return sdm_fail(err, SDM_E_CONFIG, "%s:1:1: more than %zu bytes; a configuration is smaller", path,
+                    SDM_TREE_BYTES_MAX);
 }
 
 sdm_status sdm_tree_parse(sdm_tree *tree, const char *text, size_t size, int override, sdm_mistakes *mistakes,

@@ -31,6 +31,9 @@ typedef struct sdm_tree {
     sdm_tree_node *root; /* NULL: an empty document */
 } sdm_tree;
 
+/* The text of a file, at most SDM_TREE_BYTES_MAX bytes; *data is freed by sdm_free(). SDM_E_IO, SDM_E_CONFIG (too long), SDM_E_NOMEM. */
+sdm_status sdm_tree_read(const char *path, uint8_t **data, size_t *size, sdm_error *err);
+
 /* Reads text[size]. override: number of the key=value argument the text comes from, 0 for the file. Mistakes go to
    *mistakes; repeated keys are among them and only the first one is kept in the tree.
    SDM_E_CONFIG: there is no usable tree, the reason is in *mistakes; SDM_E_NOMEM with *err set. */

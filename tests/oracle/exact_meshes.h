@@ -40,6 +40,29 @@ static inline void mesh_append(sdm_mesh *a, const sdm_mesh *b)
     for (size_t i = 0; i < 3 * b->n_tri; i++) a->tri[3 * nt + i] = b->tri[i] + (uint32_t)nv;
 }
 
+/* Rotation by a quaternion of any length, columns orthonormal to rounding. */
+static inline void quaternion_rotation(const double q[4], double r[9])
+{
+    const double len = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    const double w = q[0] / len, x = q[1] / len, y = q[2] / len, z = q[3] / len;
+    const double m[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - z * w),     2 * (x * z + y * w),
+                         2 * (x * y + z * w),     1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
+                         2 * (x * z - y * w),     2 * (y * z + x * w),     1 - 2 * (x * x + y * y)};
+    for (int i = 0; i < 9; i++) r[i] = m[i];
+}
+
+/* Distance between x and the box between two corners; negative inside of it. */
+static inline double box_distance(const double x[3], const double lo[3], const double hi[3])
+{
+    double out = 0, in = -INFINITY;
+    for (int a = 0; a < 3; a++) {
+        const double d = fmax(lo[a] - x[a], x[a] - hi[a]);
+        if (d > 0) out += d * d;
+        in = fmax(in, d);
+    }
+    return in > 0 ? sqrt(out) : in;
+}
+
 /* Box between two corners, 12 triangles. */
 static inline void mesh_box(sdm_mesh *m, const double lo[3], const double hi[3])
 {

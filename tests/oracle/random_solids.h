@@ -29,17 +29,9 @@ static inline double lattice(dice *d, double lo, double hi)
 
 static inline void rotation(dice *d, double r[9])
 {
-    double q[4], len = 0;
-    for (int i = 0; i < 4; i++) {
-        q[i] = roll(d, -1, 1);
-        len += q[i] * q[i];
-    }
-    for (int i = 0; i < 4; i++) q[i] /= sqrt(len);
-    const double w = q[0], x = q[1], y = q[2], z = q[3];
-    const double m[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - z * w),     2 * (x * z + y * w),
-                         2 * (x * y + z * w),     1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
-                         2 * (x * z - y * w),     2 * (y * z + x * w),     1 - 2 * (x * x + y * y)};
-    memcpy(r, m, sizeof m);
+    double q[4];
+    for (int i = 0; i < 4; i++) q[i] = roll(d, -1, 1);
+    quaternion_rotation(q, r);
 }
 
 static inline void rotate(const double r[9], const double x[3], double y[3])

@@ -49,17 +49,10 @@ static inline void voxel(const sdm_grid *g, size_t i, double x[3])
 /* Rotation by random angles, columns orthonormal to rounding; mirrored: its first column turned round. */
 static inline void rotation(uint64_t seed, bool mirrored, double r[9])
 {
-    double q[4], norm = 0;
-    for (uint64_t k = 0; k < 4; k++) {
-        q[k] = uniform(1, 4 * seed + k, -1, 1);
-        norm += q[k] * q[k];
-    }
-    for (int k = 0; k < 4; k++) q[k] /= sqrt(norm);
-    const double w = q[0], x = q[1], y = q[2], z = q[3];
-    const double m[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
-                         2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-                         2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
-    for (int i = 0; i < 9; i++) r[i] = i % 3 == 0 && mirrored ? -m[i] : m[i];
+    double q[4];
+    for (uint64_t k = 0; k < 4; k++) q[k] = uniform(1, 4 * seed + k, -1, 1);
+    quaternion_rotation(q, r);
+    for (int i = 0; mirrored && i < 9; i += 3) r[i] = -r[i];
 }
 
 /* Winding number by the angles that triangles are seen under; an own formula: the solid angle of three unit vectors by their

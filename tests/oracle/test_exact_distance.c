@@ -68,17 +68,9 @@ static void random_soup(sdm_mesh *m, size_t n, uint64_t seed)
 
 static void rotation(uint64_t seed, double dir[9])
 {
-    double q[4], len = 0;
-    for (uint64_t i = 0; i < 4; i++) {
-        q[i] = uniform(seed, i, -1, 1);
-        len += q[i] * q[i];
-    }
-    for (int i = 0; i < 4; i++) q[i] /= sqrt(len);
-    const double w = q[0], x = q[1], y = q[2], z = q[3];
-    const double r[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - z * w),     2 * (x * z + y * w),
-                         2 * (x * y + z * w),     1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
-                         2 * (x * z - y * w),     2 * (y * z + x * w),     1 - 2 * (x * x + y * y)};
-    memcpy(dir, r, sizeof r);
+    double q[4];
+    for (uint64_t i = 0; i < 4; i++) q[i] = uniform(seed, i, -1, 1);
+    quaternion_rotation(q, dir);
 }
 
 static void test_random_meshes(void **state)
@@ -118,17 +110,6 @@ static void test_random_meshes(void **state)
         sdm_exact_free(e);
         sdm_mesh_dispose(&m);
     }
-}
-
-static double box_distance(const double x[3], const double lo[3], const double hi[3])
-{
-    double out = 0, in = -INFINITY;
-    for (int a = 0; a < 3; a++) {
-        const double d = fmax(lo[a] - x[a], x[a] - hi[a]);
-        if (d > 0) out += d * d;
-        in = fmax(in, d);
-    }
-    return in > 0 ? sqrt(out) : in;
 }
 
 static void test_box_is_exact(void **state)

@@ -94,18 +94,6 @@ static void test_regions_of_a_triangle(void **state)
     }
 }
 
-/* Distance between x and a box; negative inside of it. */
-static double box_distance(const double x[3], const double lo[3], const double hi[3])
-{
-    double out = 0, in = -INFINITY;
-    for (int a = 0; a < 3; a++) {
-        const double d = fmax(lo[a] - x[a], x[a] - hi[a]);
-        if (d > 0) out += d * d;
-        in = fmax(in, d);
-    }
-    return in > 0 ? sqrt(out) : in;
-}
-
 /* Cubes of a lattice, their truth from the full and the empty cells; all numbers are exact. */
 static void test_lattice_of_cubes(void **state)
 {

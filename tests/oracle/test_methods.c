@@ -19,17 +19,9 @@ static double uniform(uint64_t stream, uint64_t i, double lo, double hi)
 
 static void rotation(uint64_t seed, double dir[9])
 {
-    double q[4], len = 0;
-    for (uint64_t i = 0; i < 4; i++) {
-        q[i] = uniform(seed, i, -1, 1);
-        len += q[i] * q[i];
-    }
-    for (int i = 0; i < 4; i++) q[i] /= sqrt(len);
-    const double w = q[0], x = q[1], y = q[2], z = q[3];
-    const double r[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - z * w),     2 * (x * z + y * w),
-                         2 * (x * y + z * w),     1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
-                         2 * (x * z - y * w),     2 * (y * z + x * w),     1 - 2 * (x * x + y * y)};
-    memcpy(dir, r, sizeof r);
+    double q[4];
+    for (uint64_t i = 0; i < 4; i++) q[i] = uniform(seed, i, -1, 1);
+    quaternion_rotation(q, dir);
 }
 
 /* ---- meshes without overlap, about the origin, of size 1 to 2 ---- */

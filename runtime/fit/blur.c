@@ -1,5 +1,5 @@
 /* The discrete Gaussian T(k, t) = exp(-t) I_k(t) (Lindeberg 1990): its variance is t exactly, however narrow, and dT/dt is half the second
-   difference of T. */
+   difference of T. They are a group: T(-t) undoes T(t). */
 #include "blur.h"
 
 #include <math.h>
@@ -21,9 +21,11 @@ int sdm_fit_threads(int wanted)
 #endif
 }
 
-/* T(0..r, t), normalised; returns r. Downward recurrence I_{k-1} = I_{k+1} + 2k/t I_k (Miller 1952). */
-static int gaussian(double t, double tap[RADIUS_MAX + 1])
+/* T(0..r, variance), normalised; returns r. Downward recurrence I_{k-1} = I_{k+1} + 2k/t I_k (Miller 1952). Of a negative variance
+   I_k(-t) = (-1)^k I_k(t). */
+static int gaussian(double variance, double tap[RADIUS_MAX + 1])
 {
+    const double t = fabs(variance);
     if (!(t > 1e-12)) {
         tap[0] = 1;
         return 0;
@@ -43,6 +45,7 @@ static int gaussian(double t, double tap[RADIUS_MAX + 1])
         }
     }
     while (r > 0 && tap[r] < 1e-8 * sum) r--;
+    for (int k = 1; k <= r && variance < 0; k += 2) tap[k] = -tap[k];
     double kept = tap[0];
     for (int k = 1; k <= r; k++) kept += 2 * tap[k];
     for (int k = 0; k <= r; k++) tap[k] /= kept;
@@ -84,13 +87,18 @@ static void blur_row(const double *in, double *out, int64_t n, size_t n_fields, 
     for (int64_t i = to; i < n; i++) blur_at_border(in, out, i, n, n_fields, n_fields, r, tap);
 }
 
-void sdm_fit_blur(const sdm_grid *g, size_t n_fields, double variance, int n_threads, double **packed, double **spare)
+// what cubic B-splines spread along an axis, voxels^2
+#define SPLINE_VARIANCE (1.0 / 3)
+
+void sdm_fit_blur(const sdm_grid *g, size_t n_fields, double variance, bool splines, int n_threads, double **packed,
+                  double **spare)
 {
+    const double less = splines ? SPLINE_VARIANCE : 0;
     (void)n_threads; // without OpenMP
     const size_t row = n_fields * (size_t)g->n[0], step[3] = {n_fields, row, row * (size_t)g->n[1]};
     for (int axis = 0; axis < 3; axis++) {
         double tap[RADIUS_MAX + 1];
-        const int r = gaussian(variance / (g->spacing[axis] * g->spacing[axis]), tap);
+        const int r = gaussian(variance / (g->spacing[axis] * g->spacing[axis]) - less, tap);
         if (r == 0) continue;
         const double *in = *packed;
         double *out = *spare;

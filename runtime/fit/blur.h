@@ -2,14 +2,18 @@
 #ifndef FIT_BLUR_H
 #define FIT_BLUR_H
 
+#include <stdbool.h>
+
 #include "sdm/grid.h"
 
 /* Threads to use where `wanted` was asked for (0: the OpenMP default). */
 int sdm_fit_threads(int wanted);
 
-/* (*packed)[voxels][n_fields] through the discrete Gaussian of this variance (mm^2); the border repeats. *spare, of the same size, may
-   change places with *packed. The same bits for any number of threads. */
-void sdm_fit_blur(const sdm_grid *g, size_t n_fields, double variance, int n_threads, double **packed, double **spare);
+/* (*packed)[voxels][n_fields] through the discrete Gaussian of this variance (mm^2); the border repeats. splines: what comes out are
+   coefficients of cubic B-splines, whose own spread, a third of a voxel^2, is part of the variance. *spare, of the same size, may change
+   places with *packed. The same bits for any number of threads. */
+void sdm_fit_blur(const sdm_grid *g, size_t n_fields, double variance, bool splines, int n_threads, double **packed,
+                  double **spare);
 
 /* The last field = scale * Laplacian of the first: the derivative by the sd of the blur, with scale = that sd. */
 void sdm_fit_laplacian(const sdm_grid *g, size_t n_fields, double scale, int n_threads, double *packed);

@@ -33,7 +33,7 @@ static sdm_status find_walls(const sdm_fit_target *t, const sdm_fit_opts *o, int
     if (!s) {
         const sdm_fit_appearance *a = &o->appearance;
         for (size_t i = 0; i < n; i++) packed[i] = isnan(t->values[i]) ? a->outside[0].mean : (double)t->values[i];
-        sdm_fit_blur(&t->grid, 1, o->blur * o->blur, n_threads, &packed, &spare);
+        sdm_fit_blur(&t->grid, 1, o->blur * o->blur, false, n_threads, &packed, &spare);
 #pragma omp parallel for schedule(static) num_threads(n_threads)
         for (size_t i = 0; i < n; i++) {
             const double v = packed[i];

@@ -1,6 +1,9 @@
 /* The share of the shape seen through a Gaussian point spread G of sd s is a = G * [distance < 0]. On the grid of the map it is made in
-   two steps: an edge of sd s0, half a voxel, drawn by the distance itself, then the discrete Gaussian of variance s^2 - s0^2
-   (Lindeberg 1990), which keeps the variance whatever the grid and whose derivative by the variance is half the discrete Laplacian. */
+   three steps: an edge of sd s0, half a voxel, drawn by the distance itself, the discrete Gaussian (Lindeberg 1990), which keeps its
+   variance whatever the grid and whose derivative by it is half the discrete Laplacian, and between the voxels cubic B-splines, which
+   spread by h^2 / 3 along an axis with voxels of h. The Gaussian has what is left, s^2 - s0^2 - h^2 / 3, and where that is negative undoes
+   as much of the splines. So the share has continuous second derivatives, and without an inverse filter (Unser, Aldroubi and Eden 1993)
+   it is 0 or 1 a few voxels from the surface, and does not ring. */
 #include "maps.h"
 
 #include <math.h>
@@ -161,6 +164,6 @@ void sdm_fit_maps_pack(fit_maps *m, double blur, bool derivatives)
             pack_row(m, row);
     }
     const double drawn = m->share ? m->least_blur : 0, variance = fmax(blur * blur - drawn * drawn, 0);
-    sdm_fit_blur(&m->grid, m->n_fields, variance, n_threads, &m->packed, &m->spare);
+    sdm_fit_blur(&m->grid, m->n_fields, variance, m->share, n_threads, &m->packed, &m->spare);
     if (m->share && derivatives) sdm_fit_laplacian(&m->grid, m->n_fields, blur, n_threads, m->packed);
 }

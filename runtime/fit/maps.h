@@ -17,7 +17,7 @@ typedef struct fit_maps {
     void *user;
     float *values, *jacobian; // [n_voxels], [n_params][n_voxels]: as maps are made
     double *distance;         // [n_voxels]: values
-    // [n_voxels][n_fields]: the field, its derivatives by the parameters and (share) by the blur
+    // [n_voxels][n_fields]: the field, its derivatives by the parameters and (share) by the blur; see fit_field
     double *packed, *spare;
     size_t n_network, n_exact, n_outside;
     double seconds_network, seconds_exact;

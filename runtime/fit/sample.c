@@ -1,4 +1,4 @@
-/* Cubic convolution on 4 x 4 x 4 voxels. */
+/* Piecewise cubic polynomials on 4 x 4 x 4 voxels. */
 #include "sample.h"
 
 #include <math.h>
@@ -21,8 +21,19 @@ static void keys(double u, double w[4], double d[4])
     w[3] = 0.5 * u3 - 0.5 * u2, d[3] = 1.5 * u2 - u;
 }
 
-static void find(const sdm_grid *g, const double x[3], taps *t)
+// cubic B-splines there
+static void spline(double u, double w[4], double d[4])
 {
+    const double v = 1 - u, u2 = u * u, v2 = v * v;
+    w[0] = v2 * v / 6, d[0] = -0.5 * v2;
+    w[1] = 2.0 / 3 - u2 + 0.5 * u2 * u, d[1] = 1.5 * u2 - 2 * u;
+    w[2] = 2.0 / 3 - v2 + 0.5 * v2 * v, d[2] = 2 * v - 1.5 * v2;
+    w[3] = u2 * u / 6, d[3] = 0.5 * u2;
+}
+
+static void find(const fit_field *f, const double x[3], taps *t)
+{
+    const sdm_grid *g = f->grid;
     double index[3];
     sdm_grid_index(g, x, index);
     const size_t step[3] = {1, (size_t)g->n[0], (size_t)g->n[0] * (size_t)g->n[1]};
@@ -33,7 +44,7 @@ static void find(const sdm_grid *g, const double x[3], taps *t)
         beyond2 += t->beyond[a] * t->beyond[a];
         int64_t first = (int64_t)c;
         if (first > g->n[a] - 2 && first > 0) first--;
-        keys(c - (double)first, t->weight[a], t->slope[a]);
+        (f->distance ? keys : spline)(c - (double)first, t->weight[a], t->slope[a]);
         for (int i = 0; i < 4; i++) {
             const int64_t k = first - 1 + i;
             t->at[a][i] = step[a] * (size_t)(k < 0 ? 0 : k < g->n[a] ? k : g->n[a] - 1);
@@ -46,7 +57,7 @@ static void find(const sdm_grid *g, const double x[3], taps *t)
 double sdm_fit_sample(const fit_field *f, const double x[3])
 {
     taps t;
-    find(f->grid, x, &t);
+    find(f, x, &t);
     double sum = 0;
     for (int k = 0; k < 4; k++) {
         double plane = 0;
@@ -64,7 +75,7 @@ double sdm_fit_sample(const fit_field *f, const double x[3])
 double sdm_fit_sample_all(const fit_field *f, const double x[3], double gradient[3], double *rest)
 {
     taps t;
-    find(f->grid, x, &t);
+    find(f, x, &t);
     double sum[FIT_FIELDS_MAX] = {0}, slope[3] = {0, 0, 0};
     const size_t n = f->n_fields;
     for (int k = 0; k < 4; k++)

@@ -6,8 +6,9 @@
 
 #include "sdm/grid.h"
 
-/* packed[voxels][n_fields] on a grid; `distance`: beyond the grid the distance to its border is added to the first field, whose
-   values there are those of the border otherwise. */
+/* packed[voxels][n_fields] on a grid. distance: values, between the voxels by cubic convolution (Keys 1981), which goes through them;
+   beyond the grid the distance to its border is added to the first field. Else coefficients of cubic B-splines, which have continuous
+   second derivatives (steps towards a maximum want a likelihood that is as smooth); beyond the grid the values are those of the border. */
 typedef struct fit_field {
     const sdm_grid *grid;
     const double *packed;
@@ -15,7 +16,7 @@ typedef struct fit_field {
     bool distance;
 } fit_field;
 
-/* First field at x (frame of the grid) by cubic convolution (Keys 1981): continuous with its gradient, exact for parabolas. */
+/* First field at x (frame of the grid): continuous with its gradient. */
 double sdm_fit_sample(const fit_field *f, const double x[3]);
 
 /* The same with its gradient (frame of the grid, per mm), and the other fields: rest[n_fields - 1]. */

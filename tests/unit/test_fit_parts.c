@@ -1,4 +1,4 @@
-/* Parts of the fit: derivatives against differences, smoothing and interpolation against closed forms, bounds, correlated noise. */
+/* Parts of the fit: derivatives against differences, bounds, correlated noise. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -9,21 +9,12 @@
 
 #include <cmocka.h>
 
-#include "blur.h"
 #include "creases.h"
 #include "laws.h"
 #include "mixing.h"
 #include "newton.h"
 #include "oracle/fit_tools.h"
-#include "sample.h"
 #include "solve.h"
-
-static void *room(size_t n, size_t size)
-{
-    void *p = calloc(n, size);
-    if (!p) abort();
-    return p;
-}
 
 // ---- laws
 
@@ -111,68 +102,6 @@ static void test_information(void **state)
         assert_true(fabs(square / r.complete[0] - 1) < 1e-4);
         assert_true(fabs(product / r.complete[1] - 1) < 1e-4);
     }
-}
-
-// ---- fields
-
-static void test_blur(void **state)
-{
-    (void)state;
-    const sdm_grid g = sdm_grid_centred((int64_t[3]){33, 31, 29}, 0.2, (double[3]){0, 0, 0});
-    const size_t n = sdm_grid_count(&g), middle = (size_t)((14 * 31 + 15) * 33 + 16);
-    for (double variance = 0.002; variance < 0.3; variance *= 3) {
-        double *f = room(2 * n, sizeof *f), *spare = room(2 * n, sizeof *f);
-        f[2 * middle] = 1;
-        sdm_fit_blur(&g, 2, variance, 2, &f, &spare);
-        double sum = 0, second[3] = {0, 0, 0};
-        for (size_t i = 0; i < n; i++) {
-            const double at[3] = {(double)(i % 33) - 16, (double)(i / 33 % 31) - 15, (double)(i / 33 / 31) - 14};
-            sum += f[2 * i];
-            for (int a = 0; a < 3; a++) second[a] += f[2 * i] * at[a] * at[a] * 0.04;
-        }
-        assert_true(fabs(sum - 1) < 1e-5);
-        for (int a = 0; a < 3; a++) assert_true(fabs(second[a] / variance - 1) < (variance < 0.2 ? 1e-3 : 3e-2));
-        free(f);
-        free(spare);
-    }
-}
-
-static void test_sample(void **state)
-{
-    (void)state;
-    sdm_grid g = sdm_grid_centred((int64_t[3]){9, 8, 7}, 0.3, (double[3]){0.2, -0.1, 0.4});
-    g.spacing[1] = 0.25;
-    sdm_pose_matrix(&(sdm_pose){{0.3, -0.5, 0.2}, {0, 0, 0}}, g.dir);
-    const size_t n = sdm_grid_count(&g);
-    double *f = room(2 * n, sizeof *f);
-    for (size_t i = 0; i < n; i++) {
-        double x[3];
-        sdm_grid_world(&g, (const double[3]){(double)(i % 9), (double)(i / 9 % 8), (double)(i / 9 / 8)}, x);
-        f[2 * i] = 1 + x[0] - 2 * x[1] + x[0] * x[1] + 0.5 * x[2] * x[2]; // exact for parabolas
-        f[2 * i + 1] = 3 - x[2];
-    }
-    const fit_field field = {.grid = &g, .packed = f, .n_fields = 2, .distance = true};
-    for (int i = 0; i < 50; i++) {
-        double index[3], x[3], slope[3];
-        double rest;
-        for (uint64_t k = 0; k < 3; k++) index[k] = 1 + (double)(g.n[k] - 3) * sdm_rng_uniform(1, (uint64_t)i, k);
-        sdm_grid_world(&g, index, x);
-        const double v = sdm_fit_sample_all(&field, x, slope, &rest);
-        assert_true(fabs(v - (1 + x[0] - 2 * x[1] + x[0] * x[1] + 0.5 * x[2] * x[2])) < 2e-6);
-        assert_true(fabs(slope[0] - (1 + x[1])) < 2e-5 && fabs(slope[1] - (x[0] - 2)) < 2e-5 &&
-                    fabs(slope[2] - x[2]) < 2e-5);
-        assert_true(fabs(rest - (3 - x[2])) < 1e-6);
-    }
-    // beyond the border: the way to it is added
-    double corner[3], out[3], slope[3];
-    double rest;
-    sdm_grid_world(&g, (const double[3]){8, 7, 6}, corner);
-    sdm_grid_world(&g, (const double[3]){8 + 3 / 0.3, 7 + 4 / 0.25, 6}, out);
-    assert_true(fabs(sdm_fit_sample(&field, out) - sdm_fit_sample(&field, corner) - 5) < 1e-5);
-    (void)sdm_fit_sample_all(&field, out, slope, &rest);
-    assert_true(fabs(slope[0] * (out[0] - corner[0]) + slope[1] * (out[1] - corner[1]) +
-                     slope[2] * (out[2] - corner[2]) - 5) < 1e-4);
-    free(f);
 }
 
 // ---- steps
@@ -344,9 +273,8 @@ static void test_mixing(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_scores), cmocka_unit_test(test_information), cmocka_unit_test(test_blur),
-        cmocka_unit_test(test_sample), cmocka_unit_test(test_step),        cmocka_unit_test(test_gradient),
-        cmocka_unit_test(test_mixing),
+        cmocka_unit_test(test_scores),   cmocka_unit_test(test_information), cmocka_unit_test(test_step),
+        cmocka_unit_test(test_gradient), cmocka_unit_test(test_mixing),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -4,22 +4,8 @@
 
 #include <math.h>
 
-#ifdef _OPENMP
-#include <omp.h>
-#endif
-
 // taps on one side at most: a blur of 16 voxels and its tail
 #define RADIUS_MAX 128
-
-int sdm_fit_threads(int wanted)
-{
-#ifdef _OPENMP
-    return wanted > 0 ? wanted : omp_get_max_threads();
-#else
-    (void)wanted;
-    return 1;
-#endif
-}
 
 /* T(0..r, variance), normalised; returns r. Downward recurrence I_{k-1} = I_{k+1} + 2k/t I_k (Miller 1952). Of a negative variance
    I_k(-t) = (-1)^k I_k(t). */

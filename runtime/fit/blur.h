@@ -6,9 +6,6 @@
 
 #include "sdm/grid.h"
 
-/* Threads to use where `wanted` was asked for (0: the OpenMP default). */
-int sdm_fit_threads(int wanted);
-
 /* (*packed)[voxels][n_fields] through the discrete Gaussian of this variance (mm^2); the border repeats. splines: what comes out are
    coefficients of cubic B-splines, whose own spread, a third of a voxel^2, is part of the variance. *spare, of the same size, may change
    places with *packed. The same bits for any number of threads. */

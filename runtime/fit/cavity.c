@@ -5,6 +5,7 @@
 
 #include "blur.h"
 #include "sdm/memory.h"
+#include "sdm/threads.h"
 #include "transform.h"
 
 static double log_mixture(const sdm_fit_law *law, size_t n, double value)
@@ -50,7 +51,7 @@ sdm_status sdm_fit_leave_out_cavities(const sdm_fit_target *target, const sdm_fi
                                       size_t *count, sdm_error *err)
 {
     const size_t n = sdm_grid_count(&target->grid);
-    const int n_threads = sdm_fit_threads(opts->n_threads);
+    const int n_threads = sdm_threads(opts->n_threads);
     const double square = opts->cavity * opts->cavity;
     float *distance = NULL;
     *values = NULL;

@@ -2,9 +2,9 @@
 #include <float.h>
 #include <math.h>
 
-#include "blur.h"
 #include "sdm/fit.h"
 #include "sdm/memory.h"
+#include "sdm/threads.h"
 #include "transform.h"
 
 // the grid with so many voxels on every side that balls beside the labels find room
@@ -48,9 +48,9 @@ sdm_status sdm_fit_close_labels(const sdm_grid *grid, double radius, int n_threa
         for (int64_t i = 0; i < grid->n[0]; i++)
             if (values[row * grid->n[0] + i] > 0.5f) to[i] = 0;
     }
-    s = sdm_fit_transform(&wide, sdm_fit_threads(n_threads), distance, err);
+    s = sdm_fit_transform(&wide, sdm_threads(n_threads), distance, err);
     for (size_t i = 0; i < n && !s; i++) distance[i] = distance[i] > square ? 0 : INFINITY; // centres of balls outside
-    if (!s) s = sdm_fit_transform(&wide, sdm_fit_threads(n_threads), distance, err);
+    if (!s) s = sdm_fit_transform(&wide, sdm_threads(n_threads), distance, err);
     for (int64_t row = 0; row < rows && !s; row++) {
         const float *from = distance + place_of(grid, &wide, by, row);
         for (int64_t i = 0; i < grid->n[0]; i++)

@@ -4,8 +4,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "blur.h"
 #include "sdm/memory.h"
+#include "sdm/threads.h"
 
 #define SAMPLE 20000
 #define ITERATIONS 40
@@ -56,7 +56,7 @@ sdm_status sdm_fit_without_shape(const fit_problem *p, double *log_likelihood, s
     const double step = fabs(l.tissue[0].mean - l.tissue[l.n_in].mean);
     for (size_t i = 0; i < l.n_tissues; i++) l.tissue[i].weight *= 0.5;
     for (int i = 0; i < ITERATIONS; i++) improve(&l, &p->sites, p->sites.n / SAMPLE + 1, 1e-3 * step);
-    const int n_threads = sdm_fit_threads(p->opts->n_threads);
+    const int n_threads = sdm_threads(p->opts->n_threads);
     (void)n_threads; // without OpenMP
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)

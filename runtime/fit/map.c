@@ -1,9 +1,9 @@
 /* Maps of a fitted shape on grids of the world, and its middle. */
 #include <string.h>
 
-#include "blur.h"
 #include "check.h"
 #include "sample.h"
+#include "sdm/threads.h"
 #include "sites.h"
 
 // the map of the source at params (NULL: the defaults)
@@ -38,7 +38,7 @@ sdm_status sdm_fit_map(const sdm_fit_source *source, const double *params, const
         fit_state state;
         sdm_pose_matrix(pose, state.rotation);
         memcpy(state.translation, pose->translation, sizeof state.translation);
-        n_threads = sdm_fit_threads(n_threads);
+        n_threads = sdm_threads(n_threads);
 #pragma omp parallel for schedule(static) num_threads(n_threads)
         for (int64_t row = 0; row < grid->n[1] * grid->n[2]; row++)
             for (int64_t i = 0; i < grid->n[0]; i++) {

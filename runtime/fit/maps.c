@@ -12,6 +12,7 @@
 
 #include "blur.h"
 #include "sdm/memory.h"
+#include "sdm/threads.h"
 
 double sdm_fit_seconds(void)
 {
@@ -153,7 +154,7 @@ static void pack_row(const fit_maps *m, int64_t row)
 void sdm_fit_maps_pack(fit_maps *m, double blur, bool derivatives)
 {
     const int64_t rows = m->grid.n[1] * m->grid.n[2];
-    const int n_threads = sdm_fit_threads(m->n_threads);
+    const int n_threads = sdm_threads(m->n_threads);
     (void)n_threads; // without OpenMP
     m->n_fields = fields_of(m, derivatives);
 #pragma omp parallel for schedule(static) num_threads(n_threads)

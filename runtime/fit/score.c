@@ -9,9 +9,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "blur.h"
 #include "sdm/memory.h"
 #include "sdm/rng.h"
+#include "sdm/threads.h"
 
 // largest lag along an axis, in steps of the voxels that are used
 #define LAG_MOST 10
@@ -385,7 +385,7 @@ static sdm_status of_voxels(const fit_problem *p, double model_mm, bool definite
     near_voxels v;
     sdm_status s = make_near(p, definite ? 1 : ROUGH, &v, err);
     double c[MIDDLE + 1];
-    const int n_threads = sdm_fit_threads(p->opts->n_threads);
+    const int n_threads = sdm_threads(p->opts->n_threads);
     if (!s) {
         const int width = estimate(&v, n_threads, c);
         s = add_noise(p, &v, c, width, n_threads, definite, out, err);

@@ -3,8 +3,8 @@
 
 #include <math.h>
 
-#include "blur.h"
 #include "sdm/memory.h"
+#include "sdm/threads.h"
 
 void sdm_fit_to_shape(const fit_state *s, const double x[3], double y[3])
 {
@@ -207,7 +207,7 @@ sdm_status sdm_fit_sites_sample(fit_sites *s, const fit_maps *maps, const fit_la
                                 sdm_error *err)
 {
     const fit_field f = sdm_fit_field(maps);
-    const int n_threads = sdm_fit_threads(maps->n_threads);
+    const int n_threads = sdm_threads(maps->n_threads);
     (void)n_threads; // without OpenMP
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)

@@ -5,8 +5,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "blur.h"
 #include "sdm/memory.h"
+#include "sdm/threads.h"
 
 // neighbouring voxels share the rounding of a voxel of the map, and their scores are alike
 #define ROUNDING (8 * (double)FLT_EPSILON)
@@ -81,7 +81,7 @@ static void add_slice(const fit_sites *s, const fit_laws *l, size_t from, size_t
 void sdm_fit_sums_fill(fit_sums *s, const fit_sites *sites, const fit_laws *laws, int n_threads)
 {
     const size_t n = s->n_unknowns, size = part_size(n);
-    n_threads = sdm_fit_threads(n_threads);
+    n_threads = sdm_threads(n_threads);
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         add_slice(sites, laws, sites->n * slice / FIT_SLICES, sites->n * (slice + 1) / FIT_SLICES, n,
@@ -103,7 +103,7 @@ double sdm_fit_sums_value(const fit_sites *sites, const fit_maps *maps, const fi
 {
     const fit_field f = sdm_fit_field(maps);
     double part[FIT_SLICES] = {0}, sum = 0;
-    const int n_threads = sdm_fit_threads(maps->n_threads);
+    const int n_threads = sdm_threads(maps->n_threads);
     (void)n_threads; // without OpenMP
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
@@ -121,7 +121,7 @@ void sdm_fit_sums_moments(const fit_sites *sites, const fit_laws *laws, int n_th
 {
     fit_moments part[FIT_SLICES];
     memset(part, 0, sizeof part);
-    n_threads = sdm_fit_threads(n_threads);
+    n_threads = sdm_threads(n_threads);
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         for (size_t i = sites->n * slice / FIT_SLICES; i < sites->n * (slice + 1) / FIT_SLICES; i++)

@@ -13,5 +13,6 @@ static inline __m256 load_half(const uint16_t *p)
 }
 #define LOAD_PAIRS(p) ((veci)_mm256_cvtepi8_epi16(_mm_loadu_si128((const __m128i *)(const void *)(p))))
 #define MADD(a, b) ((veci)_mm256_madd_epi16((__m256i)(a), (__m256i)(b)))
+#define LARGER(a, b) ((veci)_mm256_max_epi32((__m256i)(a), (__m256i)(b)))
 #define STREAM(p, v) _mm256_stream_ps(p, v)
 #include "kernels_simd.h"

@@ -44,6 +44,9 @@ static inline void store_rows(float *y, size_t line, vec v)
     for (int i = 0; i < VW / 4; i++) memcpy(y + (size_t)i * line, &rows[i], sizeof *rows);
 }
 
+// what a pointer has become is not put together anew for each use
+#define STEP(p) __asm__("" : "+r"(p));
+
 enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inputs of a panel
 
 // where register j of the outputs has its weights of a pair, in bytes from panel o / 16 on
@@ -56,54 +59,62 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inp
 #define EACH(i, n) _Pragma("GCC unroll 8") for (int i = 0; i < (n); i++)
 #endif
 
-// acc[rows][n] += `pairs` pairs of inputs, `pair` bytes each; what there is less of stays in registers, inputs or weights
-#define BYTES_SUM(rows, n, pairs, pair, load_pair)                                                                     \
-    for (size_t p = 0; p < (pairs); p++, w += (pair), x += 2) {                                                        \
+// acc[rows][n] `op` the products of a pair of inputs, `pair` bytes; what there is less of stays in registers, inputs or weights
+#define BYTES_PAIR(rows, n, op, pair, load_pair)                                                                       \
+    {                                                                                                                  \
         if (rows < n) {                                                                                                \
             veci input[rows];                                                                                          \
             EACH(i, rows) input[i] = splat_pair(x + (size_t)i * ldx);                                                  \
             EACH(j, n)                                                                                                 \
             {                                                                                                          \
                 const veci weight = load_pair(w + BYTES_AT(j, pair));                                                  \
-                EACH(i, rows) acc[i][j] += (vecu)MADD(input[i], weight);                                               \
+                EACH(i, rows) acc[i][j] op(vecu) MADD(input[i], weight);                                               \
             }                                                                                                          \
-            continue;                                                                                                  \
+        } else {                                                                                                       \
+            veci weight[n];                                                                                            \
+            EACH(j, n) weight[j] = load_pair(w + BYTES_AT(j, pair));                                                   \
+            EACH(i, rows)                                                                                              \
+            {                                                                                                          \
+                const veci s = splat_pair(x + (size_t)i * ldx);                                                        \
+                EACH(j, n) acc[i][j] op(vecu) MADD(s, weight[j]);                                                      \
+            }                                                                                                          \
         }                                                                                                              \
-        veci weight[n];                                                                                                \
-        EACH(j, n) weight[j] = load_pair(w + BYTES_AT(j, pair));                                                       \
-        EACH(i, rows)                                                                                                  \
-        {                                                                                                              \
-            const veci s = splat_pair(x + (size_t)i * ldx);                                                            \
-            EACH(j, n) acc[i][j] += (vecu)MADD(s, weight[j]);                                                          \
-        }                                                                                                              \
+        w += pair, x += 2;                                                                                             \
     }
 
-// `rows` rows of x times `n` registers of outputs, from output `at` of a panel on
+// `rows` rows of x times `n` registers of outputs at a time, from output o on; where that ends
 #define BYTES_BLOCK(rows, n)                                                                                           \
-    static void bytes_##rows##x##n(size_t wide, size_t narrow, const int8_t *w, size_t at, const int16_t *x,           \
-                                   size_t ldx, const float *scale, float *y, size_t ldy, size_t line)                  \
+    static size_t bytes_##rows##x##n(size_t o, size_t outputs, size_t wide, size_t narrow, const int8_t *panels,       \
+                                     const int16_t *inputs, size_t ldx, const float *scale, float *to, size_t ldy,     \
+                                     size_t line)                                                                      \
     {                                                                                                                  \
         const size_t panel = wide * WIDE + narrow * NARROW;                                                            \
-        vecu acc[rows][n];                                                                                             \
-        EACH(i, rows)                                                                                                  \
-        EACH(j, n) acc[i][j] = (vecu){0};                                                                              \
-        w += at * WIDE / SDM_PANEL;                                                                                    \
-        BYTES_SUM(rows, n, wide, WIDE, load_wide)                                                                      \
-        w -= at * (WIDE - NARROW) / SDM_PANEL;                                                                         \
-        BYTES_SUM(rows, n, narrow, NARROW, LOAD_PAIRS)                                                                 \
-        EACH(i, rows)                                                                                                  \
-        {                                                                                                              \
-            const vec s = splat(scale[i]);                                                                             \
-            EACH(j, n)                                                                                                 \
-            store_rows(y + (size_t)i * ldy + (size_t)(j * VW / 4) * line, line,                                        \
-                       s * __builtin_convertvector((veci)acc[i][j], vec));                                             \
+        for (; o + n * VW <= outputs; o += n * VW) {                                                                   \
+            const int8_t *w = panels + o / SDM_PANEL * panel + o % SDM_PANEL * (WIDE / SDM_PANEL);                     \
+            const int16_t *x = inputs;                                                                                 \
+            float *y = to + o / 4 * line;                                                                              \
+            vecu acc[rows][n];                                                                                         \
+            if (wide)                                                                                                  \
+                BYTES_PAIR(rows, n, =, WIDE, load_wide)                                                                \
+            else                                                                                                       \
+                EACH(i, rows) EACH(j, n) acc[i][j] = (vecu){0};                                                        \
+            for (size_t p = 1; p < wide; p++) BYTES_PAIR(rows, n, +=, WIDE, load_wide)                                 \
+            w -= o % SDM_PANEL * ((WIDE - NARROW) / SDM_PANEL);                                                        \
+            UNROLL(2) for (size_t p = 0; p < narrow; p++) BYTES_PAIR(rows, n, +=, NARROW, LOAD_PAIRS)                  \
+            EACH(i, rows)                                                                                              \
+            {                                                                                                          \
+                const vec s = splat(scale[i]);                                                                         \
+                EACH(j, n)                                                                                             \
+                store_rows(y + (size_t)(j * VW / 4) * line, line, s * __builtin_convertvector((veci)acc[i][j], vec));  \
+                y += ldy;                                                                                              \
+                STEP(y)                                                                                                \
+            }                                                                                                          \
         }                                                                                                              \
+        return o;                                                                                                      \
     }
 
 #define BYTES_STEP(rows, n)                                                                                            \
-    for (; o + n * VW <= outputs; o += n * VW)                                                                         \
-        bytes_##rows##x##n(wide, narrow, w + o / SDM_PANEL * panel, o % SDM_PANEL, x, ldx, scale, y + o / 4 * line,    \
-                           ldy, line);
+    o = bytes_##rows##x##n(o, outputs, wide, narrow, w, x, ldx, scale, y, ldy, line);
 
 BYTES_BLOCK(1, 8)
 BYTES_BLOCK(1, 4)
@@ -125,7 +136,6 @@ BYTES_BLOCK(6, 1)
 static void bytes_rows(size_t rows, size_t outputs, size_t wide, size_t narrow, const int8_t *w, const int16_t *x,
                        size_t ldx, const float *scale, float *y, size_t ldy, size_t line)
 {
-    const size_t panel = wide * WIDE + narrow * NARROW;
     size_t o = 0;
     switch (rows) {
     case 1:
@@ -210,11 +220,15 @@ static inline vec product_at(size_t i, const float *y, const float *factor)
     return factor ? load(y + i) * load(factor + i) : load(y + i);
 }
 
+#ifndef LARGER
+#define LARGER(a, b) (((a) & ((a) > (b))) | ((b) & ((a) <= (b))))
+#endif
+
 // magnitudes compared as integers: those of NaN and infinity are the largest
 static inline veci larger_magnitude(veci most, vec v)
 {
-    const veci bits = (veci)v & 0x7fffffff, more = bits > most;
-    return (bits & more) | (most & ~more);
+    const veci bits = (veci)v & 0x7fffffff;
+    return LARGER(bits, most);
 }
 
 typedef uint16_t vec_short __attribute__((vector_size(2 * VW)));
@@ -225,42 +239,63 @@ static inline vec_short round_to_short(vec v, float to_integer)
     return __builtin_convertvector((vecu)(v * to_integer + 12582912.0f), vec_short);
 }
 
-// the last register of n >= VW numbers begins where it ends with them: some are done twice
-static inline size_t last_register(size_t n, size_t i) { return i + VW <= n ? i : n - VW; }
-
-static inline float quantise_by(size_t n, const float *y, const float *factor, int limit, int16_t *x)
+// n >= VW from here on; the last register ends where they do: some are done twice
+static inline float largest_of(size_t n, const float *y, const float *factor)
 {
-    veci most = {0};
-    for (size_t i = 0; i < n; i += VW) most = larger_magnitude(most, product_at(last_register(n, i), y, factor));
-    int32_t largest_bits = 0;
-    for (int j = 0; j < VW; j++) largest_bits = most[j] > largest_bits ? most[j] : largest_bits;
+    const size_t last = n - VW;
+    veci most = larger_magnitude((veci){0}, product_at(last, y, factor));
+    UNROLL(4) for (size_t i = 0; i < last; i += VW) most = larger_magnitude(most, product_at(i, y, factor));
+    int32_t bits = 0;
+    for (int j = 0; j < VW; j++) bits = most[j] > bits ? most[j] : bits;
     float largest;
-    memcpy(&largest, &largest_bits, sizeof largest);
+    memcpy(&largest, &bits, sizeof largest);
+    return largest;
+}
+
+static inline void round_register(const float *y, const float *factor, float to_integer, size_t i, int16_t *x)
+{
+    const vec_short s = round_to_short(product_at(i, y, factor), to_integer);
+    memcpy(x + i, &s, sizeof s);
+}
+
+// returns the factor that gives them back
+static inline float round_row(size_t n, const float *y, const float *factor, float largest, int limit, int16_t *x)
+{
     const float to_integer = (float)limit / largest;
     if (!(to_integer > 0 && to_integer <= 3e38f)) { // not finite, or zero beside what a float can hold
         memset(x, 0, n * sizeof *x);
-        return largest_bits >= 0x7f800000 ? largest - largest : 0;
+        return largest - largest;
     }
-    for (size_t i = 0; i < n; i += VW) {
-        const size_t at = last_register(n, i);
-        const vec_short s = round_to_short(product_at(at, y, factor), to_integer);
-        memcpy(x + at, &s, sizeof s);
-    }
+    const size_t last = n - VW;
+    UNROLL(4) for (size_t i = 0; i < last; i += VW) round_register(y, factor, to_integer, i, x);
+    round_register(y, factor, to_integer, last, x);
     return largest / (float)limit;
 }
 
-static float quantise_few(size_t n, const float *y, const float *factor, int limit, int16_t *x)
+// the largest of all rows first: a row then does not wait for its own
+static inline void quantise_by(size_t rows, size_t n, const float *y, size_t ldy, const float *factor, int limit,
+                               int16_t *x, size_t ldx, float *scale)
+{
+    for (size_t r = 0; r < rows; r++) scale[r] = largest_of(n, y + r * ldy, factor);
+    for (size_t r = 0; r < rows; r++) scale[r] = round_row(n, y + r * ldy, factor, scale[r], limit, x + r * ldx);
+}
+
+static void quantise_few(size_t n, const float *y, const float *factor, int limit, int16_t *x, float *scale)
 {
     float some[VW] = {0};
     int16_t integers[VW];
     for (size_t i = 0; i < n; i++) some[i] = factor ? y[i] * factor[i] : y[i];
-    const float scale = quantise_by(VW, some, NULL, limit, integers);
+    quantise_by(1, VW, some, 0, NULL, limit, integers, 0, scale);
     memcpy(x, integers, n * sizeof *x);
-    return scale;
 }
 
-static float quantise(size_t n, const float *y, const float *factor, int limit, int16_t *x)
+static void quantise(size_t rows, size_t n, const float *y, size_t ldy, const float *factor, int limit, int16_t *x,
+                     size_t ldx, float *scale)
 {
-    if (n < VW) return quantise_few(n, y, factor, limit, x);
-    return factor ? quantise_by(n, y, factor, limit, x) : quantise_by(n, y, NULL, limit, x);
+    if (n < VW)
+        for (size_t r = 0; r < rows; r++) quantise_few(n, y + r * ldy, factor, limit, x + r * ldx, scale + r);
+    else if (factor)
+        quantise_by(rows, n, y, ldy, factor, limit, x, ldx, scale);
+    else
+        quantise_by(rows, n, y, ldy, NULL, limit, x, ldx, scale);
 }

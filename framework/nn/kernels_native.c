@@ -202,9 +202,10 @@ void sdm_panel_pack_i8(size_t outputs, size_t n_wide, size_t k, const int16_t *w
                 }
 }
 
-float sdm_quantise(size_t n, const float *y, const float *factor, int limit, int16_t *x)
+void sdm_quantise(size_t rows, size_t n, const float *y, size_t ldy, const float *factor, int limit, int16_t *x,
+                  size_t ldx, float *scale)
 {
-    return kernels()->quantise(n, y, factor, limit, x);
+    kernels()->quantise(rows, n, y, ldy, factor, limit, x, ldx, scale);
 }
 
 void sdm_panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w, const int16_t *x, size_t ldx,

@@ -13,6 +13,13 @@ typedef float vec_u __attribute__((vector_size(4 * VW), aligned(4)));
 typedef int32_t veci __attribute__((vector_size(4 * VW)));
 typedef uint32_t vecu __attribute__((vector_size(4 * VW)));
 
+#define PRAGMA(text) _Pragma(#text)
+#if defined(__clang__)
+#define UNROLL(n) PRAGMA(clang loop unroll_count(n))
+#else
+#define UNROLL(n) PRAGMA(GCC unroll n)
+#endif
+
 static inline vec load(const float *p) { return *(const vec_u *)p; }
 static inline void store(float *p, vec v) { *(vec_u *)p = v; }
 static inline vec splat(float v) { return v - (vec){0}; }
@@ -226,23 +233,44 @@ static inline vec sum_at(size_t i, const float *y, const float *mean)
     return mean ? load(y + i) + load(mean + i) : load(y + i);
 }
 
+static inline void put_each(size_t i, size_t end, const float *y, const float *mean, float *to)
+{
+    UNROLL(1) for (; i < end; i++) to[i] = mean ? y[i] + mean[i] : y[i];
+}
+
+#ifdef STREAM
+static inline __m128 sum_4(size_t i, const float *y, const float *mean)
+{
+    const __m128 at = _mm_loadu_ps(y + i);
+    return mean ? _mm_add_ps(at, _mm_loadu_ps(mean + i)) : at;
+}
+
+// a quarter of a cache line at a time where it is not filled: an ordinary store would read it first
+static inline void put_past(size_t n, const float *y, const float *mean, float *to)
+{
+    size_t i = -(uintptr_t)to / sizeof *to % 4;
+    if (n < i) i = n;
+    put_each(0, i, y, mean, to);
+    for (; i + 4 <= n && (uintptr_t)(to + i) % (4 * VW); i += 4) _mm_stream_ps(to + i, sum_4(i, y, mean));
+    UNROLL(4) for (const size_t end = i + (n - i) / VW * VW; i < end; i += VW) STREAM(to + i, sum_at(i, y, mean));
+    for (; i + 4 <= n; i += 4) _mm_stream_ps(to + i, sum_4(i, y, mean));
+    put_each(i, n, y, mean, to);
+}
+#endif
+
 static inline void put_by(size_t n, const float *y, const float *mean, float *to, bool stream)
 {
-    size_t i = 0;
 #ifdef STREAM
-    // a quarter of a cache line at a time where it is not filled: an ordinary store would read it first
-#define SUM_4(i) (mean ? _mm_add_ps(_mm_loadu_ps(y + i), _mm_loadu_ps(mean + i)) : _mm_loadu_ps(y + i))
     if (stream) {
-        for (; i < n && (uintptr_t)(to + i) % 16; i++) to[i] = mean ? y[i] + mean[i] : y[i];
-        for (; i + 4 <= n && (uintptr_t)(to + i) % (4 * VW); i += 4) _mm_stream_ps(to + i, SUM_4(i));
-        for (; i + VW <= n; i += VW) STREAM(to + i, sum_at(i, y, mean));
-        for (; i + 4 <= n; i += 4) _mm_stream_ps(to + i, SUM_4(i));
+        put_past(n, y, mean, to);
+        return;
     }
 #else
     (void)stream;
 #endif
-    for (; i + VW <= n; i += VW) store(to + i, sum_at(i, y, mean));
-    for (; i < n; i++) to[i] = mean ? y[i] + mean[i] : y[i];
+    size_t i = 0;
+    UNROLL(4) for (; i + VW <= n; i += VW) store(to + i, sum_at(i, y, mean));
+    put_each(i, n, y, mean, to);
 }
 
 static void put(size_t n, const float *y, const float *mean, float *to, bool stream)

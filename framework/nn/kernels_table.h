@@ -22,7 +22,8 @@ typedef struct kernel_table {
     void (*panel_i8)(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w, const int16_t *x,
                      size_t ldx, const float *scale, float *y, size_t ldy, size_t line);
     void (*back_i8)(size_t outputs, size_t n_wide, size_t k, const int8_t *w, const float *y, float *x);
-    float (*quantise)(size_t n, const float *y, const float *factor, int limit, int16_t *x);
+    void (*quantise)(size_t rows, size_t n, const float *y, size_t ldy, const float *factor, int limit, int16_t *x,
+                     size_t ldx, float *scale);
     void (*put)(size_t n, const float *y, const float *mean, float *to, bool stream);
     void (*exp)(size_t n, const float *x, float *y);
 } kernel_table;

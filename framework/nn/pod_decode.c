@@ -89,20 +89,22 @@ static input input_from(input in, size_t first)
     return in;
 }
 
-// a row of n numbers as integers x; their factor
-static float quantise_row(size_t n, const float *y, const float *factor, int limit, int16_t *x)
+// as sdm_quantise(), and a zero behind each row: it is read beside an odd last input, times zero
+static void quantise_rows(size_t rows, size_t n, const float *y, size_t ldy, const float *factor, int limit, int16_t *x,
+                          size_t ldx, float *scale)
 {
-    x[n] = 0; // read beside an odd last one, times zero
-    return sdm_quantise(n, y, factor, limit, x);
+    sdm_quantise(rows, n, y, ldy, factor, limit, x, ldx, scale);
+    for (size_t r = 0; r < rows; r++) x[r * ldx + n] = 0;
 }
 
 // what x[n], with its factor, leaves of y times factor
 static float quantise_rest(size_t n, const float *y, const float *factor, int limit, const int16_t *x, float scale,
                            float *work, int16_t *rest)
 {
+    float rest_scale;
     for (size_t i = 0; i < n; i++) work[i] = y[i] * factor[i] - scale * (float)x[i];
-    rest[n] = 0;
-    return sdm_quantise(n, work, NULL, limit, rest);
+    quantise_rows(1, n, work, 0, NULL, limit, rest, 0, &rest_scale);
+    return rest_scale;
 }
 
 // y[0] += the row behind the last
@@ -135,8 +137,7 @@ static void quantise(const job *j, size_t level, size_t first, size_t n, const f
 {
     const pod_network *m = j->m;
     const float *factor = m->factor + m->coefficients_at[level] + first;
-    for (size_t r = 0; r < j->rows; r++)
-        to->scale[r] = quantise_row(n, c + r * ldc, factor, m->limit[level], to->q + r * to->ld);
+    quantise_rows(j->rows, n, c, ldc, factor, m->limit[level], to->q, to->ld, to->scale);
     if (j->rests)
         to->scale[j->rows] =
             quantise_rest(n, c, factor, m->limit[level], to->q, to->scale[0], j->s.back, to->q + j->rows * to->ld);
@@ -262,7 +263,7 @@ static void quantise_latent(const pod_network *m, size_t rows, size_t rests, con
     const float *factor = m->factor + m->coefficients_at[n];
     for (size_t r = rows; r-- > 0;) { // the first is the last, for its rest
         for (size_t i = 0; i < latent; i++) w->sorted[i] = w->z[r * latent + m->order[i]];
-        w->z_scale[r] = quantise_row(latent, w->sorted, factor, m->limit[n], w->z_integers + r * w->ldz);
+        quantise_rows(1, latent, w->sorted, 0, factor, m->limit[n], w->z_integers + r * w->ldz, 0, w->z_scale + r);
     }
     if (rests)
         w->z_scale[rows] = quantise_rest(latent, w->sorted, factor, m->limit[n], w->z_integers, w->z_scale[0],

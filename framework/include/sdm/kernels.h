@@ -64,9 +64,10 @@ SDM_API int sdm_panel_i8_limit(size_t outputs, size_t k, const int16_t *w);
 /* Packs w[outputs][k], in -128 .. 127 but for the first n_wide of each row, which are in -SDM_WIDE .. SDM_WIDE. */
 SDM_API void sdm_panel_pack_i8(size_t outputs, size_t n_wide, size_t k, const int16_t *w, int8_t *panels);
 
-/* x[n] = y[n] factor[n] (factor NULL: 1) as integers of at most `limit`, rounded to nearest; returns the factor that gives them back.
-   Not finite numbers make it NaN and x zero. */
-SDM_API float sdm_quantise(size_t n, const float *y, const float *factor, int limit, int16_t *x);
+/* Each row of x[rows][ldx] = that of y[rows][ldy] times factor[n] (NULL: 1) as integers of at most `limit`, rounded to nearest; scale[rows]:
+   what gives them back. Not finite numbers make it NaN and the row of x zero. */
+SDM_API void sdm_quantise(size_t rows, size_t n, const float *y, size_t ldy, const float *factor, int limit, int16_t *x,
+                          size_t ldx, float *scale);
 
 /* y[B][ldy] = scale[B] times x[B][ldx] times the weights; as sdm_panel_f32(), but outputs are written in rows of SDM_PANEL_ROW, `line` floats
    apart (SDM_PANEL_ROW: one after another). Of x, sdm_panel_even(k) numbers of each row are read. */

@@ -185,6 +185,16 @@ static void panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, cons
                        x + i * ldx, ldx, scale + i, y + i * ldy + o / 4 * line, ldy, line);
 }
 
+static void panel_i8_blocks(size_t batch, size_t n, const sdm_panel_block *b, const int8_t *w, const int16_t *x,
+                            size_t ldx, const float *scale, float *y, size_t ldy, size_t line)
+{
+    for (const sdm_panel_block *end = b + n; b < end; b++) {
+        const size_t wide = (b->n_wide + 1) / 2, narrow = (b->k + 1) / 2 - wide;
+        bytes_rows(batch, (b->outputs + SDM_PANEL - 1) / SDM_PANEL * SDM_PANEL, wide, narrow, w + b->weights, x + b->x,
+                   ldx, scale + b->scale, y + b->y, ldy, line);
+    }
+}
+
 // x[2 * pairs] += the transpose of `pairs` pairs of n outputs, `pair` bytes each
 #define BACK_PAIRS(name, pair, load_pair)                                                                              \
     static void name(size_t n, size_t pairs, size_t panel, const int8_t *w, const float *y, float *x)                  \

@@ -214,6 +214,12 @@ void sdm_panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, const i
     kernels()->panel_i8(batch, sdm_panel_outputs(outputs), n_wide, k, w, x, ldx, scale, y, ldy, line);
 }
 
+void sdm_panel_i8_blocks(size_t batch, size_t n, const sdm_panel_block *blocks, const int8_t *w, const int16_t *x,
+                         size_t ldx, const float *scale, float *y, size_t ldy, size_t line)
+{
+    kernels()->panel_i8_blocks(batch, n, blocks, w, x, ldx, scale, y, ldy, line);
+}
+
 void sdm_panel_back_i8(size_t outputs, size_t n_wide, size_t k, const int8_t *w, const float *y, float *x)
 {
     kernels()->back_i8(sdm_panel_outputs(outputs), n_wide, k, w, y, x);

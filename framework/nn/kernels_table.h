@@ -6,6 +6,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "sdm/kernels.h"
+
 typedef struct kernel_table {
     const char *name;
     size_t mr, nr; /* rows and columns of the register tile of the matrix product */
@@ -21,6 +23,8 @@ typedef struct kernel_table {
     /* sdm_panel_i8(), sdm_panel_back_i8() and sdm_quantise(); outputs: a multiple of 16 */
     void (*panel_i8)(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w, const int16_t *x,
                      size_t ldx, const float *scale, float *y, size_t ldy, size_t line);
+    void (*panel_i8_blocks)(size_t batch, size_t n, const sdm_panel_block *blocks, const int8_t *w, const int16_t *x,
+                            size_t ldx, const float *scale, float *y, size_t ldy, size_t line);
     void (*back_i8)(size_t outputs, size_t n_wide, size_t k, const int8_t *w, const float *y, float *x);
     void (*quantise)(size_t rows, size_t n, const float *y, size_t ldy, const float *factor, int limit, int16_t *x,
                      size_t ldx, float *scale);

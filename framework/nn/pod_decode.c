@@ -7,8 +7,6 @@
 
 #include "pod_space.h"
 
-enum { GROUP = 6 }; // rows that go through a slab together: those of the kernels
-
 static size_t smaller(size_t a, size_t b) { return a < b ? a : b; }
 static size_t padded(size_t floats) { return (floats + 15) / 16 * 16; }
 static size_t top_level(const pod_network *m) { return m->arch.levels.n - 1; }
@@ -39,7 +37,7 @@ size_t sdm_pod_carve_thread(const pod_network *m, size_t rows, float *memory, sp
         s->y[l] = take(memory, &at, rows * sdm_panel_outputs(m->max_outputs[l]));
     for (size_t l = 1; l < m->arch.levels.n && sdm_pod_is_bytes(m); l++)
         s->x[l] = take_inputs(m, rows, m->max_group[l], rows, memory, &at);
-    s->leaves = take_inputs(m, rows, m->max_slab, m->max_slab_groups * rows, memory, &at);
+    s->leaves = take_inputs(m, rows, m->max_slab, m->max_slab_groups * SDM_POD_GROUP, memory, &at);
     size_t most = m->max_slab;
     for (size_t l = 0; l < m->arch.levels.n; l++)
         if (m->max_group[l] > most) most = m->max_group[l];
@@ -64,7 +62,7 @@ size_t sdm_pod_space_carve(const pod_network *m, size_t rows, int n_threads, flo
     w->z_scale = take(memory, &at, sdm_pod_is_bytes(m) ? rows + 1 : 0);
     w->threads = memory ? memory + at : NULL;
     space s;
-    w->per_thread = sdm_pod_carve_thread(m, smaller(rows + 1, GROUP), NULL, &s);
+    w->per_thread = sdm_pod_carve_thread(m, smaller(rows + 1, SDM_POD_GROUP), NULL, &s);
     return at + w->per_thread * (size_t)n_threads;
 }
 
@@ -113,14 +111,15 @@ static void add_rest(size_t rows, size_t rests, size_t n, float *y, size_t ldy)
     for (size_t i = 0; i < n && rests; i++) y[i] += y[rows * ldy + i];
 }
 
-// y[rows + rests][ldy] from the inputs of a block whose weights begin at `at`; of bytes in rows of 4, `line` apart
+// y[rows + rests][ldy] from the inputs of a block whose weights begin at `at`
 static void product(const job *j, size_t outputs, size_t wide, size_t rank, size_t at, const input *in, float *y,
-                    size_t ldy, size_t line)
+                    size_t ldy)
 {
     const pod_network *m = j->m;
     const size_t rows = j->rows + j->rests;
     if (sdm_pod_is_bytes(m))
-        sdm_panel_i8(rows, outputs, wide, rank, (const int8_t *)m->basis + at, in->q, in->ld, in->scale, y, ldy, line);
+        sdm_panel_i8(rows, outputs, wide, rank, (const int8_t *)m->basis + at, in->q, in->ld, in->scale, y, ldy,
+                     SDM_PANEL_ROW);
     else
         sdm_pod_product(m->type, rows, outputs, rank, m->basis, at, in->x, in->ld, y, ldy);
 }
@@ -128,7 +127,7 @@ static void product(const job *j, size_t outputs, size_t wide, size_t rank, size
 static void upper_product(const job *j, size_t b, const input *in, float *y, size_t ldy)
 {
     const pod_network *m = j->m;
-    product(j, m->outputs[b], m->wide ? m->wide[b] : 0, m->blocks[b].rank, m->weights_at[b], in, y, ldy, SDM_PANEL_ROW);
+    product(j, m->outputs[b], m->wide ? m->wide[b] : 0, m->blocks[b].rank, m->weights_at[b], in, y, ldy);
     add_rest(j->rows, j->rests, m->outputs[b], y, ldy);
 }
 
@@ -150,7 +149,7 @@ static input inputs_of_leaves(const job *j, size_t group)
     const sdm_pod_block *g = &m->blocks[group];
     const uint32_t first = m->arch.levels.n > 1 ? m->blocks[g->child].coefficient : g->coefficient;
     input in = input_from(j->s.leaves, first - j->slab->coefficient);
-    if (in.scale) in.scale += (group - j->slab->group) * (j->rows + j->rests);
+    if (in.scale) in.scale += (group - j->slab->group) * SDM_POD_GROUP;
     return in;
 }
 
@@ -207,24 +206,36 @@ static inline void copy_rows(size_t n, size_t n_rows, const float *y, float *to,
     for (size_t v = 0; v < n_rows; v++) memcpy(to + v * line, y + v * n, n * sizeof *to);
 }
 
-// a block into its line
-static void decode_leaf(const job *j, const pod_leaf *l)
+// a block into its line by way of its own rows
+static void decode_leaf(const job *j, const sdm_panel_block *p, size_t n_x)
 {
-    const size_t n = l->n_x, nx = (size_t)j->grid->n[0], ldy = sdm_panel_outputs(j->m->max_outputs[0]);
-    float *to = j->s.line + l->x, *y = j->s.y[0];
-    input in = input_from(j->s.leaves, l->coefficient);
-    if (in.scale) in.scale += l->group * (j->rows + j->rests);
-    if (sdm_pod_is_bytes(j->m) && n == SDM_PANEL_ROW) {
-        product(j, l->outputs, l->wide, l->rank, l->weights_at, &in, to, j->s.ld_line, nx);
-        return;
-    }
-    product(j, l->outputs, l->wide, l->rank, l->weights_at, &in, y, ldy, SDM_PANEL_ROW);
+    const size_t nx = (size_t)j->grid->n[0], ldy = sdm_panel_outputs(j->m->max_outputs[0]);
+    float *to = j->s.line + p->y, *y = j->s.y[0];
+    input in = input_from(j->s.leaves, p->x);
+    if (in.scale) in.scale += p->scale;
+    product(j, p->outputs, p->n_wide, p->k, p->weights, &in, y, ldy);
     for (size_t r = 0; r < j->rows + j->rests; r++, y += ldy, to += j->s.ld_line) {
-        if (n == 4)
-            copy_rows(4, l->outputs / 4, y, to, nx);
+        if (n_x == 4)
+            copy_rows(4, p->outputs / 4, y, to, nx);
         else
-            copy_rows(n, l->outputs / n, y, to, nx);
+            copy_rows(n_x, p->outputs / n_x, y, to, nx);
     }
+}
+
+// n blocks side by side along x, from leaves[first] on
+static void decode_line(const job *j, size_t first, size_t n)
+{
+    const pod_network *m = j->m;
+    const sdm_panel_block *p = m->products + first, *end = p + n;
+    const size_t nx = (size_t)j->grid->n[0];
+    if (sdm_pod_is_bytes(m) && m->arch.block == SDM_PANEL_ROW) { // the last may have shorter rows
+        const size_t whole = nx / SDM_PANEL_ROW;
+        const input *in = &j->s.leaves;
+        sdm_panel_i8_blocks(j->rows + j->rests, whole, p, m->basis, in->q, in->ld, in->scale, j->s.line, j->s.ld_line,
+                            nx);
+        p += whole;
+    }
+    for (; p < end; p++) decode_leaf(j, p, smaller(m->arch.block, nx - p->y));
 }
 
 // the line of block k into the maps
@@ -241,10 +252,10 @@ static void put_line(const job *j, const sdm_pod_block *k)
 
 static void decode_leaves(const job *j)
 {
-    const pod_leaf *end = j->m->leaves + j->slab->leaf_end;
-    for (const pod_leaf *l = j->m->leaves + j->slab->leaf; l < end; l++) {
-        decode_leaf(j, l);
-        if (l->x + l->n_x == (size_t)j->grid->n[0]) put_line(j, &j->m->blocks[l->block]);
+    const size_t nx = (size_t)j->grid->n[0], n = (nx + j->m->arch.block - 1) / j->m->arch.block;
+    for (size_t l = j->slab->leaf; l < j->slab->leaf_end; l += n) {
+        decode_line(j, l, n);
+        put_line(j, &j->m->blocks[j->m->leaves[l].block]);
     }
 }
 
@@ -308,7 +319,7 @@ void sdm_pod_decode(const pod_network *m, const sdm_grid *grid, size_t rows, siz
             const size_t o = (size_t)i * PART;
             head_product(m, rows, rests, o, smaller(PART, coefficients - o), w);
         }
-        sdm_pod_carve_thread(m, smaller(rows + 1, GROUP), w->threads + thread * w->per_thread, &j.s);
+        sdm_pod_carve_thread(m, smaller(rows + 1, SDM_POD_GROUP), w->threads + thread * w->per_thread, &j.s);
 #ifdef _OPENMP
 #pragma omp for schedule(dynamic)
 #endif
@@ -316,7 +327,7 @@ void sdm_pod_decode(const pod_network *m, const sdm_grid *grid, size_t rows, siz
             for (size_t r = 0; r < rows; r += j.rows) {
                 j.slab = &m->slabs[i];
                 j.rests = r == 0 ? rests : 0;
-                j.rows = smaller(GROUP - j.rests, rows - r);
+                j.rows = smaller(SDM_POD_GROUP - j.rests, rows - r);
                 j.with_mean = with_mean > r ? with_mean - r : 0;
                 j.maps = maps + r;
                 decode_slab(&j, w->c + r * ldc, ldc);

@@ -15,14 +15,9 @@ typedef struct pod_slab {
     uint32_t coefficient, n_coefficients; /* of the lowest level */
 } pod_slab;
 
-/* A block of the lowest level, and which of its slab's groups it belongs to; the rest, from sdm_pod_describe_leaves(), is what the decoder needs
-   of it, here in the order in which it is read: looked up block by block it would cost a cache miss each. */
+/* A block of the lowest level, and which of its slab's groups it belongs to. */
 typedef struct pod_leaf {
     uint32_t block, group;
-    uint32_t x, n_x;      /* first voxel and size along x */
-    uint32_t coefficient; /* first, among those of its slab */
-    uint32_t rank, wide, outputs;
-    size_t weights_at;
 } pod_leaf;
 
 typedef struct pod_network {
@@ -32,6 +27,8 @@ typedef struct pod_network {
     pod_slab *slabs;
     size_t n_slabs;
     pod_leaf *leaves;   /* slab by slab, along x, then y, then z */
+    /* What the decoder needs of leaves[], in the order in which it is read. x: among the coefficients of a slab, y: along a line of blocks. */
+    sdm_panel_block *products;
     uint32_t *outputs;  /* [blocks] V_b */
     size_t *weights_at; /* [blocks] where the weights of a block begin in basis */
     /* Where the coefficients of a level begin among all; the last: their number C. */
@@ -81,8 +78,10 @@ size_t sdm_pod_place_weights(sdm_pod_type type, const sdm_pod_levels *levels, co
                              const pod_slab *slabs, size_t n_slabs, const pod_leaf *leaves, const uint32_t *wide,
                              size_t *at);
 
-/* The rest of m->leaves from all else. */
+/* m->products from all else. */
 void sdm_pod_describe_leaves(pod_network *m);
+
+enum { SDM_POD_GROUP = 6 }; /* rows that go through a slab together: those of the kernels */
 
 /* at[l] = number of coefficients of the levels below l, after sdm_pod_number(); the last: of all. */
 void sdm_pod_place_coefficients(const sdm_pod_levels *levels, const sdm_pod_block *blocks,

@@ -82,6 +82,7 @@ static sdm_status set_up(const sdm_section *ranks, const sdm_grid *grid, pod_net
     if ((s = SDM_ALLOC(&m->weights_at, n_blocks, "model blocks", err))) return s;
     if ((s = SDM_ALLOC(&m->slabs, n_blocks - a->levels.first[a->levels.n - 1], "model blocks", err))) return s;
     if ((s = SDM_ALLOC(&m->leaves, a->levels.first[1], "model blocks", err))) return s;
+    if ((s = SDM_ALLOC(&m->products, a->levels.first[1], "model blocks", err))) return s;
     sdm_pod_blocks(grid, a->block, &a->levels, m->blocks);
     if ((s = read_ranks(ranks, m, err))) return s;
     const size_t poly = inputs > terms ? inputs : terms;
@@ -207,6 +208,7 @@ static void dispose(void *network)
     sdm_free(m->exponents);
     sdm_free(m->wide);
     sdm_free(m->leaves);
+    sdm_free(m->products);
     sdm_free(m->slabs);
     sdm_free(m);
 }

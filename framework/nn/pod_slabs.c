@@ -95,15 +95,16 @@ size_t sdm_pod_place_weights(sdm_pod_type type, const sdm_pod_levels *levels, co
 void sdm_pod_describe_leaves(pod_network *m)
 {
     for (const pod_slab *s = m->slabs; s < m->slabs + m->n_slabs; s++)
-        for (pod_leaf *l = m->leaves + s->leaf; l < m->leaves + s->leaf_end; l++) {
-            const sdm_pod_block *k = &m->blocks[l->block];
-            l->x = k->at[0];
-            l->n_x = k->size[0];
-            l->coefficient = k->coefficient - s->coefficient;
-            l->rank = k->rank;
-            l->wide = m->wide ? m->wide[l->block] : 0;
-            l->outputs = m->outputs[l->block];
-            l->weights_at = m->weights_at[l->block];
+        for (size_t i = s->leaf; i < s->leaf_end; i++) {
+            const uint32_t b = m->leaves[i].block;
+            const sdm_pod_block *k = &m->blocks[b];
+            m->products[i] = (sdm_panel_block){.weights = m->weights_at[b],
+                                               .outputs = m->outputs[b],
+                                               .n_wide = m->wide ? m->wide[b] : 0,
+                                               .k = k->rank,
+                                               .x = k->coefficient - s->coefficient,
+                                               .scale = m->leaves[i].group * SDM_POD_GROUP,
+                                               .y = k->at[0]};
         }
 }
 

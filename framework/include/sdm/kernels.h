@@ -75,6 +75,17 @@ SDM_API void sdm_quantise(size_t rows, size_t n, const float *y, size_t ldy, con
 SDM_API void sdm_panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w, const int16_t *x,
                           size_t ldx, const float *scale, float *y, size_t ldy, size_t line);
 
+/* One of several matrices: where its panels, inputs, their scales and outputs begin. */
+typedef struct sdm_panel_block {
+    size_t weights;
+    uint32_t outputs, n_wide, k;
+    uint32_t x, scale, y;
+} sdm_panel_block;
+
+/* sdm_panel_i8() for each of n blocks in turn; B: 1 .. 6. */
+SDM_API void sdm_panel_i8_blocks(size_t batch, size_t n, const sdm_panel_block *blocks, const int8_t *w,
+                                 const int16_t *x, size_t ldx, const float *scale, float *y, size_t ldy, size_t line);
+
 /* The transpose, as sdm_panel_back_f32(); x has room for sdm_panel_even(k). */
 SDM_API void sdm_panel_back_i8(size_t outputs, size_t n_wide, size_t k, const int8_t *w, const float *y, float *x);
 

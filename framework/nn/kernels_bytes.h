@@ -100,8 +100,7 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inp
                 EACH(i, rows) EACH(j, n) acc[i][j] = (vecu){0};                                                        \
             for (size_t p = 1; p < wide; p++) BYTES_PAIR(rows, n, +=, WIDE, load_wide)                                 \
             w -= o % SDM_PANEL * ((WIDE - NARROW) / SDM_PANEL);                                                        \
-            UNROLL(2) for (size_t p = 0; p < narrow; p++) BYTES_PAIR(rows, n, +=, NARROW, LOAD_PAIRS)                  \
-            EACH(i, rows)                                                                                              \
+            UNROLL(2) for (size_t p = 0; p < narrow; p++) BYTES_PAIR(rows, n, +=, NARROW, LOAD_PAIRS) EACH(i, rows)    \
             {                                                                                                          \
                 const vec s = splat(scale[i]);                                                                         \
                 EACH(j, n)                                                                                             \
@@ -113,8 +112,7 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inp
         return o;                                                                                                      \
     }
 
-#define BYTES_STEP(rows, n)                                                                                            \
-    o = bytes_##rows##x##n(o, outputs, wide, narrow, w, x, ldx, scale, y, ldy, line);
+#define BYTES_STEP(rows, n) o = bytes_##rows##x##n(o, outputs, wide, narrow, w, x, ldx, scale, y, ldy, line);
 
 BYTES_BLOCK(1, 8)
 BYTES_BLOCK(1, 4)

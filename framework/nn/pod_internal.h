@@ -26,7 +26,7 @@ typedef struct pod_network {
     sdm_pod_block *blocks;
     pod_slab *slabs;
     size_t n_slabs;
-    pod_leaf *leaves;   /* slab by slab, along x, then y, then z */
+    pod_leaf *leaves; /* slab by slab, along x, then y, then z */
     /* What the decoder needs of leaves[], in the order in which it is read. x: among the coefficients of a slab, y: along a line of blocks. */
     sdm_panel_block *products;
     uint32_t *outputs;  /* [blocks] V_b */

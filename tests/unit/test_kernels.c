@@ -279,40 +279,85 @@ static void put(void **state)
     sdm_free(memory);
 }
 
+// several rows, each with its own factor, nothing beside them
 static void quantisation(void **state)
 {
     (void)state;
-    enum { MOST = 70 };
-    float *y = random_floats(MOST, 4), *factor = random_floats(MOST, 5), changed[MOST], ones[MOST];
-    int16_t x[MOST + 1];
+    enum { MOST = 70, ROWS = 3, LDY = 75, LDX = 73 };
+    float *y = random_floats(ROWS * LDY, 4), *factor = random_floats(MOST, 5), changed[MOST], ones[MOST], scale[ROWS];
+    int16_t x[ROWS * LDX + 1];
     for (int i = 0; i < MOST; i++) ones[i] = 1;
-    for (size_t n = 0; n <= MOST; n++)
-        for (int limit = 5; limit < 32768; limit += 10920) {
-            double most = 0;
-            x[n] = 77;
-            const float scale = sdm_quantise(n, y, factor, limit, x);
-            for (size_t i = 0; i < n; i++) {
-                most = fmax(most, abs(x[i]));
-                assert_true(fabs((double)x[i] * scale - (double)y[i] * factor[i]) <= 0.5001 * scale);
+    for (int isa = 0; isa < 3; isa++) {
+        if (sdm_kernels_select(isa) != isa) continue;
+        for (size_t n = 0; n <= MOST; n++)
+            for (int limit = 5; limit < 32768; limit += 10920)
+                for (int plain = 0; plain < 2; plain++) {
+                    for (size_t r = 0; r < ROWS; r++) x[r * LDX + n] = 77;
+                    sdm_quantise(ROWS, n, y, LDY, plain ? NULL : factor, limit, x, LDX, scale);
+                    for (size_t r = 0; r < ROWS; r++) {
+                        double most = 0;
+                        for (size_t i = 0; i < n; i++) {
+                            const int16_t at = x[r * LDX + i];
+                            const double want = (double)y[r * LDY + i] * (plain ? 1 : factor[i]);
+                            most = fmax(most, abs(at));
+                            assert_true(fabs((double)at * scale[r] - want) <= 0.5001 * scale[r]);
+                        }
+                        assert_true(n == 0 ? scale[r] == 0 : most == limit);
+                        assert_int_equal(x[r * LDX + n], 77);
+                    }
+                }
+        for (int i = 0; i < MOST; i++) changed[i] = i % 2 ? 1e-40f : 0;
+        sdm_quantise(1, MOST, changed, 0, ones, 32767, x, 0, scale);
+        assert_true(scale[0] == 0 && x[3] == 0);
+        const float wrong[] = {NAN, -NAN, INFINITY, -INFINITY};
+        for (int k = 0; k < 4; k++)
+            for (int at = 0; at < MOST; at += 23) {
+                memcpy(changed, y, sizeof changed);
+                changed[at] = wrong[k];
+                sdm_quantise(1, MOST, changed, 0, ones, 32767, x, 0, scale);
+                assert_true(isnan(scale[0]));
+                assert_int_equal(x[1], 0);
             }
-            assert_true(n == 0 ? scale == 0 : most == limit);
-            assert_int_equal(x[n], 77);
-            if (n == 0) continue;
-            const float plain = sdm_quantise(n, y, NULL, limit, x);
-            for (size_t i = 0; i < n; i++) assert_true(fabs((double)x[i] * plain - (double)y[i]) <= 0.5001 * plain);
-        }
-    for (int i = 0; i < MOST; i++) changed[i] = i % 2 ? 1e-40f : 0;
-    assert_true(sdm_quantise(MOST, changed, ones, 32767, x) == 0 && x[3] == 0);
-    const float wrong[] = {NAN, -NAN, INFINITY, -INFINITY};
-    for (int k = 0; k < 4; k++)
-        for (int at = 0; at < MOST; at += 23) {
-            memcpy(changed, y, sizeof changed);
-            changed[at] = wrong[k];
-            assert_true(isnan(sdm_quantise(MOST, changed, ones, 32767, x)));
-            assert_int_equal(x[1], 0);
-        }
+    }
+    sdm_kernels_select(-1);
     sdm_free(y);
     sdm_free(factor);
+}
+
+// several matrices in one call are what each is alone
+static void products_of_blocks(void **state)
+{
+    (void)state;
+    enum { N = 4, ROWS = 6, LDX = 64, LDY = 280, LINE = 17, MOST = 4096 };
+    const size_t outputs[N] = {16, 64, 37, 32}, wide[N] = {1, 2, 0, 5}, k[N] = {9, 6, 11, 5};
+    int16_t w[64 * 11], x[ROWS * LDX];
+    int8_t *packed = NULL;
+    float scale[N * ROWS], *y = random_floats(ROWS * LDY, 1), *each = random_floats(ROWS * LDY, 1);
+    assert_int_equal(SDM_ALLOC(&packed, MOST, "weights", NULL), SDM_OK);
+    sdm_panel_block b[N];
+    size_t at = 0;
+    uint32_t input = 0, row = 0;
+    for (uint32_t i = 0; i < N; i++) {
+        for (size_t v = 0; v < outputs[i] * k[i]; v++) w[v] = (int16_t)(255 * sdm_rng_uniform(3, i, v) - 127);
+        b[i] = (sdm_panel_block){at, (uint32_t)outputs[i], (uint32_t)wide[i], (uint32_t)k[i], input, i * ROWS, row};
+        assert_true(at + sdm_panel_i8_count(outputs[i], wide[i], k[i]) <= MOST);
+        sdm_panel_pack_i8(outputs[i], wide[i], k[i], w, packed + at);
+        at += sdm_panel_i8_count(outputs[i], wide[i], k[i]);
+        input += (uint32_t)sdm_panel_even(k[i]);
+        row += 4;
+    }
+    for (size_t i = 0; i < ROWS * LDX; i++) x[i] = (int16_t)(60000 * sdm_rng_uniform(4, 0, i) - 30000);
+    for (size_t i = 0; i < N * ROWS; i++) scale[i] = 0.5f + (float)i;
+    for (size_t rows = 1; rows <= ROWS; rows++) {
+        sdm_panel_i8_blocks(rows, N, b, packed, x, LDX, scale, y, LDY, LINE);
+        for (uint32_t i = 0; i < N; i++)
+            sdm_panel_i8(rows, outputs[i], wide[i], k[i], packed + b[i].weights, x + b[i].x, LDX, scale + b[i].scale,
+                         each + b[i].y, LDY, LINE);
+        assert_memory_equal(y, each, ROWS * LDY * sizeof *y);
+    }
+    sdm_free(packed);
+    sdm_free(y);
+    sdm_free(each);
 }
 
 static void exponential(void **state)
@@ -351,6 +396,7 @@ int main(void)
                                        cmocka_unit_test(panels),
                                        cmocka_unit_test(bytes),
                                        cmocka_unit_test(put),
+                                       cmocka_unit_test(products_of_blocks),
                                        cmocka_unit_test(quantisation),
                                        cmocka_unit_test(exponential),
                                        cmocka_unit_test(names)};

@@ -61,7 +61,7 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inp
 
 // acc[rows][n] `op` the products of a pair of inputs, `pair` bytes; what there is less of stays in registers, inputs or weights
 #define BYTES_PAIR(rows, n, op, pair, load_pair)                                                                       \
-    {                                                                                                                  \
+    do {                                                                                                               \
         if (rows < n) {                                                                                                \
             veci input[rows];                                                                                          \
             EACH(i, rows) input[i] = splat_pair(x + (size_t)i * ldx);                                                  \
@@ -80,7 +80,7 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inp
             }                                                                                                          \
         }                                                                                                              \
         w += pair, x += 2;                                                                                             \
-    }
+    } while (0)
 
 // `rows` rows of x times `n` registers of outputs at a time, from output o on; where that ends
 #define BYTES_BLOCK(rows, n)                                                                                           \
@@ -95,12 +95,13 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inp
             float *y = to + o / 4 * line;                                                                              \
             vecu acc[rows][n];                                                                                         \
             if (wide)                                                                                                  \
-                BYTES_PAIR(rows, n, =, WIDE, load_wide)                                                                \
+                BYTES_PAIR(rows, n, =, WIDE, load_wide);                                                               \
             else                                                                                                       \
                 EACH(i, rows) EACH(j, n) acc[i][j] = (vecu){0};                                                        \
-            for (size_t p = 1; p < wide; p++) BYTES_PAIR(rows, n, +=, WIDE, load_wide)                                 \
+            for (size_t p = 1; p < wide; p++) BYTES_PAIR(rows, n, +=, WIDE, load_wide);                                \
             w -= o % SDM_PANEL * ((WIDE - NARROW) / SDM_PANEL);                                                        \
-            UNROLL(2) for (size_t p = 0; p < narrow; p++) BYTES_PAIR(rows, n, +=, NARROW, LOAD_PAIRS) EACH(i, rows)    \
+            UNROLL(2) for (size_t p = 0; p < narrow; p++) BYTES_PAIR(rows, n, +=, NARROW, LOAD_PAIRS);                 \
+            EACH(i, rows)                                                                                              \
             {                                                                                                          \
                 const vec s = splat(scale[i]);                                                                         \
                 EACH(j, n)                                                                                             \

@@ -76,6 +76,9 @@ sdm_status cli_label_mask(const char *path, const sdm_volume *v, const cli_list 
 /* Labels of a grid, 1 and 0, closed as --label-close says. */
 sdm_status cli_close_labels(const cli_fit *f, const sdm_grid *grid, float *values, sdm_error *err);
 
+/* Longest edge of a voxel of the maps, mm. */
+double cli_fit_map_voxel(const cli_fit *f);
+
 /* The labels to compare with, before the fit; and the comparison after it. */
 sdm_status cli_fit_read_reference(cli_fit *f, sdm_error *err);
 sdm_status cli_fit_compare(cli_fit *f, sdm_error *err);

@@ -85,6 +85,7 @@ static void add_target(sdm_json *j, const cli_fit *f)
     sdm_json_text(j, "image_model", f->args->fit.image_model);
     sdm_json_real(j, "evidence", r->evidence);
     if (r->blur > 0) sdm_json_real(j, "blur_mm", r->blur);
+    sdm_json_real(j, "map_voxel_mm", cli_fit_map_voxel(f));
     add_laws(j, "inside", r->appearance.inside, r->appearance.n_inside);
     add_laws(j, "outside", r->appearance.outside, r->appearance.n_outside);
 }

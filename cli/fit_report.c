@@ -41,6 +41,19 @@ static void print_law(const char *side, const sdm_fit_law *law)
     printf("  %-12s %.4g (sd %.3g)", side, law->mean, law->sd);
 }
 
+// maps with voxels of more point spreads make what is weakly determined look surer than it is
+#define SPREADS_MOST 1.5
+
+static void print_spread(const cli_fit *f)
+{
+    const double blur = f->result.blur, voxel = cli_fit_map_voxel(f);
+    printf("  point spread %.3g mm\n", blur);
+    if (f->opts.keep_params || !(voxel > SPREADS_MOST * blur)) return;
+    printf("  maps of %.3g mm are coarse beside it: standard deviations may be too small; %s--spacing %.2g makes finer "
+           "ones\n",
+           voxel, f->source.model ? "--exact " : "", blur);
+}
+
 /* What the image looks like to the fit. */
 static void print_target(const cli_fit *f)
 {
@@ -60,7 +73,7 @@ static void print_target(const cli_fit *f)
         print_law("outside", &r->appearance.outside[i]);
         printf(r->appearance.n_outside > 1 ? ", share %.2g\n" : "\n", r->appearance.outside[i].weight);
     }
-    if (r->blur > 0) printf("  point spread %.3g mm\n", r->blur);
+    if (r->blur > 0) print_spread(f);
     printf("  evidence     %.4g (log-likelihood over an image without the shape)\n", r->evidence);
 }
 

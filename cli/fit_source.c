@@ -89,6 +89,12 @@ static sdm_status exact_grid(cli_fit *f, sdm_error *err)
     return s ? s : cli_fit_grid(f->args, min, max, &f->source.grid, err);
 }
 
+double cli_fit_map_voxel(const cli_fit *f)
+{
+    const double *h = f->source.model ? sdm_model_get_info(f->source.model)->grid.spacing : f->source.grid.spacing;
+    return fmax(h[0], fmax(h[1], h[2]));
+}
+
 /* What the policy asks of the start. */
 static sdm_status check_start(cli_fit *f, sdm_error *err)
 {

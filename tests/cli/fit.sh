@@ -50,6 +50,7 @@ near "$(pose rotation_rad 3)" 0.3 0.15
 awk -v d="$(json dice)" 'BEGIN { exit !(d > 0.97 && d <= 1) }' || bad "Dice $(json dice)"
 awk -v m="$(json surface_mean_mm)" -v q="$(json surface_q95_mm)" -v h="$(json surface_hausdorff_mm)" \
     'BEGIN { exit !(m > 0 && m < q && q < h && h < 0.4) }' || bad 'distances of the surfaces'
+[ "$(json map_voxel_mm)" = 0.35 ] || bad "maps of $(json map_voxel_mm) mm"
 [ "$(json maps_network)" = 0 ] && [ "$(json maps_exact)" -gt 3 ] || bad 'maps must be exact'
 present ${vdb#-o } fit.stl fit.ply fit.nii.gz fit.nrrd fit.npy fit.png fit.json fitted.nrrd
 for file in fit.nii.gz fit.nrrd fitted.nrrd; do
@@ -79,6 +80,10 @@ has '^ellipsoid fitted to ct.nii.gz$'
 has 'rx +3\.[0-9]+ \+- 0\.0'
 has 'reference: Dice 0.9'
 has 'converged after'
+has 'maps of 0.35 mm are coarse beside it.*; --spacing 0.1[0-9]* makes'
+expect 0 - sdmgen fit $fit ct.nii.gz $near_truth --blur 0.3 --keep blur
+has 'point spread 0.3 mm'
+! grep -q 'are coarse' out || bad 'maps of 0.35 mm are fine beside a point spread of 0.3 mm'
 
 # other starts: axis and turns, pairs of points, nothing at all; RAS coordinates
 expect 0 - sdmgen fit $fit ct.nii.gz --start-centre=-20,30,10 --start-axis=0.2,-0.1,1 --ras --turns 4 --spacing 0.5 --json

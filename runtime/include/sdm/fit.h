@@ -32,8 +32,8 @@ typedef struct sdm_fit_source {
     const sdm_instance
         *shape; /* for the exact engine; may be NULL with a model (no polish, policy not exact). With a model its
                                   parameters must be those of the model (sdm_runtime_instance()) */
-    /* of exact maps, in the shape's frame, where the shape lies with a margin; unused with a model. Voxels larger than the point spread
-       of the image make deviations along what is weakly determined too small. */
+    /* of exact maps, in the shape's frame, where the shape lies with a margin; unused with a model. Voxels larger than 1.5 of the
+       point spread of the image make deviations along what is weakly determined too small. */
     sdm_grid grid;
     sdm_range_policy
         policy; /* parameters outside the network's range. Refuse: bounds are that range and a start outside of it is

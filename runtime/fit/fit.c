@@ -241,6 +241,7 @@ static sdm_status climb(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     const char *what = p->source->model ? "fit" : "fit with exact maps";
     if (!s && ended.converged && p->source->model && p->source->shape && o->max_polish_iterations) {
         p->maps.exact = true;
+        p->state.look = o->appearance; // the network's errors may have become a tissue
         p->maps_at[0] = NAN;
         run.phase = SDM_FIT_POLISH;
         run.max_iterations = o->max_polish_iterations;

@@ -210,6 +210,7 @@ static void set_fit_defaults(cli_fit_args *f)
                                .point_sd = NAN,
                                .margin = NAN,
                                .cavity = NAN,
+                               .tissue_places = NAN,
                                .label_close = NAN,
                                .least_inside = NAN,
                                .prior_sd = NAN,

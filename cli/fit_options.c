@@ -73,6 +73,7 @@ sdm_status cli_fit_read_options(cli_fit *f, sdm_error *err)
     set(a->point_sd, &o->point_sd);
     set(a->margin, &o->margin);
     set(a->cavity, &o->cavity);
+    set(a->tissue_places, &o->tissue_mm);
     set(a->least_inside, &o->least_inside);
     set(a->prior_sd, &o->prior_sd);
     set(a->prior_rotation, &o->prior_rotation_sd);

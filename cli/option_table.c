@@ -288,6 +288,8 @@ const cli_option cli_options[] = {
      "values outside at the start (default 1300,270: bone, HU)"},
     {"air", 0, CLI_REAL2, "MEAN,SD", NULL, -1e12, 1e12, ON(CLI_FIT), AT(fit.air),
      "a second tissue outside (default -880,150; none where --inside or --outside is given)"},
+    {"tissue-places", 0, CLI_REAL, "MM", NULL, 0, 1e9, ON(CLI_FIT), AT(fit.tissue_places),
+     "shares of the tissues outside vary in space, over about this length; 0: the same everywhere (default 1)"},
     {"blur", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.blur),
      "standard deviation of the point spread at the start (default 0.2)"},
     {"l-ref", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.l_ref),

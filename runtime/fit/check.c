@@ -123,6 +123,7 @@ static sdm_status check_numbers(const sdm_fit_opts *o, sdm_error *err)
                         {"prior_translation_sd", o->prior_translation_sd, true},
                         {"margin", o->margin, false},
                         {"cavity", o->cavity, true},
+                        {"tissue_mm", o->tissue_mm, true},
                         {"least_inside", o->least_inside, true},
                         {"eps", o->eps, false},
                         {"polish_eps", o->polish_eps, false}};

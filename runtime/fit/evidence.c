@@ -11,11 +11,14 @@
 #define ITERATIONS 40
 
 // log density of the mixture at a value; p: the probabilities of the tissues
-static double ask(const fit_laws *l, double value, double *p)
+static double ask(const fit_laws *l, double value, const float *place, double *p)
 {
-    double most = -INFINITY, sum = 0;
+    double most = -INFINITY, sum = 0, outside = 0;
+    for (size_t i = l->n_in; i < l->n_tissues; i++) outside += l->tissue[i].weight;
     for (size_t i = 0; i < l->n_tissues; i++) {
-        p[i] = log(l->tissue[i].weight) + sdm_fit_log_density(l, i, value);
+        const bool local = place && i >= l->n_in;
+        p[i] = (local ? log(outside) + (double)place[i - l->n_in] : log(l->tissue[i].weight)) +
+               sdm_fit_log_density(l, i, value);
         most = fmax(most, p[i]);
     }
     for (size_t i = 0; i < l->n_tissues; i++) sum += p[i] = exp(p[i] - most);
@@ -28,7 +31,7 @@ static void improve(fit_laws *l, const fit_sites *s, size_t step, double least_s
     double n[FIT_TISSUES_MAX] = {0}, count[FIT_TISSUES_MAX] = {0}, first[FIT_TISSUES_MAX] = {0},
            square[FIT_TISSUES_MAX] = {0}, p[FIT_TISSUES_MAX], all = 0;
     for (size_t i = 0; i < s->n; i += step) {
-        (void)ask(l, (double)s->value[i], p);
+        (void)ask(l, (double)s->value[i], fit_place(s, i), p);
         all++;
         for (size_t k = 0; k < l->n_tissues; k++) {
             const sdm_fit_law *t = &l->tissue[k];
@@ -62,7 +65,7 @@ sdm_status sdm_fit_without_shape(const fit_problem *p, double *log_likelihood, s
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         for (size_t i = p->sites.n * slice / FIT_SLICES; i < p->sites.n * (slice + 1) / FIT_SLICES; i++) {
             double ignored[FIT_TISSUES_MAX];
-            parts[slice] += ask(&l, (double)p->sites.value[i], ignored);
+            parts[slice] += ask(&l, (double)p->sites.value[i], fit_place(&p->sites, i), ignored);
         }
     *log_likelihood = 0;
     for (size_t slice = 0; slice < FIT_SLICES; slice++) *log_likelihood += parts[slice];

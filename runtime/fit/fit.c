@@ -8,6 +8,7 @@
 #include "creases.h"
 #include "evidence.h"
 #include "look.h"
+#include "places.h"
 #include "posterior.h"
 #include "score.h"
 #include "sdm/memory.h"
@@ -38,6 +39,7 @@ sdm_fit_opts sdm_fit_defaults(void)
                        .n_outside = 2,
                        .inside = {{.weight = 1, .mean = 40, .sd = 170}},
                        .outside = {{.weight = 0.9, .mean = 1300, .sd = 270}, {.weight = 0.1, .mean = -880, .sd = 150}}},
+        .tissue_mm = 1,
         .point_sd = 0.1,
         .point_dof = 4,
         .n_turns = 1,
@@ -179,6 +181,7 @@ static sdm_status settle(fit_problem *p, fit_run *run, fit_ended *ended, sdm_err
         if (!s && !p->sites.n)
             return sdm_fail(err, SDM_E_QUALITY, "the shape has left the image: no voxel near it is left");
         if (!s && changed) s = sdm_fit_look(p, err); // samples of the region
+        if (!s && changed) s = sdm_fit_places_update(p, err);
         if (!s && round < weighings) s = weigh_priors(p, &change, err);
         // steps that are rough do not tell small changes of the region and the weights
         const bool last = ended->rough ? change < WEIGHT_ROUGH : !changed && !(change > 0);
@@ -195,6 +198,7 @@ static sdm_status settle(fit_problem *p, fit_run *run, fit_ended *ended, sdm_err
             sdm_fit_look_settle(p);
         }
         s = sdm_fit_iterate(p, run, ended, err);
+        p->places = true; // tissues that are there by now
     }
     return s;
 }
@@ -207,7 +211,7 @@ static sdm_status approach(fit_problem *p, fit_run *run, fit_ended *ended, sdm_e
     const bool exact = p->maps.exact, average = !o->keep_params;
     const double eps = exact ? o->polish_eps : o->eps;
     const size_t max_iterations = run->max_iterations;
-    run->averaged = false;
+    run->averaged = p->places = false;
     memset(p->absent, 0, sizeof p->absent);
     run->eps = average ? o->eps : eps;
     run->flat_most = !average ? 0 : exact ? 1 : FLAT_MOST;

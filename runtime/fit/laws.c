@@ -47,6 +47,7 @@ void sdm_fit_laws_prepare(const sdm_fit_opts *opts, sdm_fit_kind kind, const fit
     for (size_t i = 0; i < l->n_tissues; i++) {
         l->tissue[i].weight /= sum[i >= l->n_in];
         l->log_constant[i] = law_constant(l->tissue[i].dof);
+        if (i >= l->n_in) l->log_outside[i - l->n_in] = (float)log(l->tissue[i].weight);
     }
     if (l->model != SDM_FIT_PARTIAL_VOLUME) return;
     l->n_channels = 1 + l->n_tissues;
@@ -55,7 +56,7 @@ void sdm_fit_laws_prepare(const sdm_fit_opts *opts, sdm_fit_kind kind, const fit
             const double dof = pair_dof(l->tissue[j].dof, l->tissue[k].dof);
             l->pair[l->n_pairs++] = (fit_pair){.in = j,
                                                .out = k,
-                                               .log_weight = log(l->tissue[j].weight * l->tissue[k].weight),
+                                               .log_weight = log(l->tissue[j].weight),
                                                .dof = dof,
                                                .constant = law_constant(dof),
                                                .information = dof > 0 ? (dof + 1) / (dof + 3) : 1};
@@ -97,14 +98,14 @@ static double within(double share, double *slope)
     return share < 0.5 ? a : 1 - a;
 }
 
-static said ask(const fit_laws *l, const fit_pair *p, double value, double share)
+static said ask(const fit_laws *l, const fit_pair *p, double value, const float *place, double share)
 {
     const sdm_fit_law *in = &l->tissue[p->in], *out = &l->tissue[p->out];
     said s;
     const double a = within(share, &s.mixing);
     s.variance = a * in->sd * in->sd + (1 - a) * out->sd * out->sd;
     s.residual = value - (share * in->mean + (1 - share) * out->mean);
-    s.log_p = p->log_weight - 0.5 * log(s.variance) +
+    s.log_p = p->log_weight + (double)(place ? place : l->log_outside)[p->out - l->n_in] - 0.5 * log(s.variance) +
               log_law(p->constant, p->dof, s.residual * s.residual / s.variance, &s.pull);
     return s;
 }
@@ -119,12 +120,13 @@ static double normalise(double *log_p, size_t n)
     return most + log(sum);
 }
 
-static void respond_share(const fit_laws *l, double value, double share, bool derivatives, fit_response *out)
+static void respond_share(const fit_laws *l, double value, const float *place, double share, bool derivatives,
+                          fit_response *out)
 {
     said s[SDM_FIT_LAWS * SDM_FIT_LAWS];
     double p[SDM_FIT_LAWS * SDM_FIT_LAWS];
     for (size_t i = 0; i < l->n_pairs; i++) {
-        s[i] = ask(l, &l->pair[i], value, share);
+        s[i] = ask(l, &l->pair[i], value, place, share);
         p[i] = s[i].log_p;
     }
     out->log_likelihood = normalise(p, l->n_pairs);
@@ -211,7 +213,8 @@ static void respond_point(const fit_laws *l, double distance, fit_response *out)
     out->residual = pull * r / sqrt(information);
 }
 
-void sdm_fit_respond(const fit_laws *l, double value, double field, bool derivatives, fit_response *out)
+void sdm_fit_respond(const fit_laws *l, double value, const float *place, double field, bool derivatives,
+                     fit_response *out)
 {
     if (l->kind == SDM_FIT_POINTS) {
         respond_point(l, field, out);
@@ -223,7 +226,7 @@ void sdm_fit_respond(const fit_laws *l, double value, double field, bool derivat
         const double u = posterior(l, value, field, &out->log_likelihood);
         if (derivatives) respond_label(l, u, field, u * (1 - u), out);
     } else {
-        respond_share(l, value, field, derivatives, out);
+        respond_share(l, value, place, field, derivatives, out);
     }
 }
 
@@ -237,9 +240,19 @@ bool sdm_fit_near(const fit_laws *l, double field)
     return fabs(field) < 16 * l->l_ref; // mu (1 - mu) > 1e-7
 }
 
+void sdm_fit_outside(const fit_laws *l, double value, const float *place, double field, double *part)
+{
+    double p[SDM_FIT_LAWS * SDM_FIT_LAWS];
+    for (size_t i = 0; i < l->n_pairs; i++) p[i] = ask(l, &l->pair[i], value, place, field).log_p;
+    (void)normalise(p, l->n_pairs);
+    const double outside = 1 - (field > 0 ? fmin(field, 1) : 0);
+    memset(part, 0, (l->n_tissues - l->n_in) * sizeof *part);
+    for (size_t i = 0; i < l->n_pairs; i++) part[l->pair[i].out - l->n_in] += p[i] * outside;
+}
+
 /* Labels: expectation-maximisation. Partial volume: estimating equations with about the same zero; voxels count as the share of the
    tissue in them says, for squares as its eighth power: those that hold little else. */
-void sdm_fit_moments_add(const fit_laws *l, double value, double field, fit_moments *m)
+void sdm_fit_moments_add(const fit_laws *l, double value, const float *place, double field, fit_moments *m)
 {
     if (l->model == SDM_FIT_LABELS) {
         double log_f[2], p[FIT_TISSUES_MAX], ignored;
@@ -259,7 +272,7 @@ void sdm_fit_moments_add(const fit_laws *l, double value, double field, fit_mome
     }
     double p[SDM_FIT_LAWS * SDM_FIT_LAWS];
     said s[SDM_FIT_LAWS * SDM_FIT_LAWS];
-    for (size_t i = 0; i < l->n_pairs; i++) s[i] = ask(l, &l->pair[i], value, field), p[i] = s[i].log_p;
+    for (size_t i = 0; i < l->n_pairs; i++) s[i] = ask(l, &l->pair[i], value, place, field), p[i] = s[i].log_p;
     (void)normalise(p, l->n_pairs);
     const double a = field > 0 ? fmin(field, 1) : 0;
     for (size_t i = 0; i < l->n_pairs; i++) {

@@ -31,13 +31,16 @@ typedef struct fit_laws {
     size_t n_in, n_tissues, n_channels, n_pairs;
     sdm_fit_law tissue[FIT_TISSUES_MAX];  // inside first; weights sum to 1 on either side
     double log_constant[FIT_TISSUES_MAX]; // of a law with sd 1
+    float log_outside[SDM_FIT_LAWS];      // log weights of the tissues outside
     fit_pair pair[SDM_FIT_LAWS * SDM_FIT_LAWS];
 } fit_laws;
 
 void sdm_fit_laws_prepare(const sdm_fit_opts *opts, sdm_fit_kind kind, const fit_state *state, fit_laws *out);
 
-/* All of *out where `derivatives`, the log-likelihood alone otherwise. */
-void sdm_fit_respond(const fit_laws *l, double value, double field, bool derivatives, fit_response *out);
+/* All of *out where `derivatives`, the log-likelihood alone otherwise. place[n_tissues - n_in]: log weights of the tissues outside at the
+   place of the value (shares of a partial volume alone); NULL: those of the laws. */
+void sdm_fit_respond(const fit_laws *l, double value, const float *place, double field, bool derivatives,
+                     fit_response *out);
 
 /* False where the field is so far from the surface that no derivative by it counts. */
 bool sdm_fit_near(const fit_laws *l, double field);
@@ -53,7 +56,10 @@ typedef struct fit_moments {
     double square[FIT_TISSUES_MAX];
 } fit_moments;
 
-void sdm_fit_moments_add(const fit_laws *l, double value, double field, fit_moments *m);
+void sdm_fit_moments_add(const fit_laws *l, double value, const float *place, double field, fit_moments *m);
+
+/* part[n_tissues - n_in]: how much of a voxel each tissue outside probably has; together what is not the shape. */
+void sdm_fit_outside(const fit_laws *l, double value, const float *place, double field, double *part);
 
 /* Writes what the sums say to look, of tissues that are kept their weights alone; least_sd keeps laws from collapsing. */
 void sdm_fit_moments_apply(const fit_laws *l, const fit_moments *m, const bool *kept, double least_sd,

@@ -3,6 +3,8 @@
 
 #include <math.h>
 
+#include "places.h"
+
 // fewer say nothing of a law
 #define VALUES_LEAST 10.0
 
@@ -62,8 +64,10 @@ void sdm_fit_look_settle(fit_problem *p)
     }
 }
 
-void sdm_fit_look_update(fit_problem *p)
+sdm_status sdm_fit_look_update(fit_problem *p, sdm_error *err)
 {
+    const sdm_status s = sdm_fit_places_update(p, err);
+    if (s) return s;
     if (p->target->kind == SDM_FIT_POINTS) {
         double sum = 0;
         for (size_t i = 0; i < p->sites.n; i++) {
@@ -78,8 +82,9 @@ void sdm_fit_look_update(fit_problem *p)
         for (size_t i = 0; i < p->laws.n_tissues; i++) kept[i] = p->absent[i] || !(m.n[i] > VALUES_LEAST);
         sdm_fit_moments_apply(&p->laws, &m, kept, 1e-3 * contrast(p), &p->state.look);
     } else {
-        return;
+        return SDM_OK;
     }
     sdm_fit_laws_prepare(p->opts, p->target->kind, &p->state, &p->laws);
     sdm_fit_sums_fill(&p->sums, &p->sites, &p->laws, p->opts->n_threads);
+    return SDM_OK;
 }

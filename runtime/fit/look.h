@@ -16,6 +16,6 @@ void sdm_fit_look_set(fit_problem *p, const double *x);
 void sdm_fit_look_settle(fit_problem *p);
 
 /* One step of the estimation in problem->state, and laws and sums with it. */
-void sdm_fit_look_update(fit_problem *p);
+sdm_status sdm_fit_look_update(fit_problem *p, sdm_error *err);
 
 #endif

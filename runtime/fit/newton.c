@@ -326,7 +326,8 @@ sdm_status sdm_fit_iterate(fit_problem *p, const fit_run *run, fit_ended *out, s
     if (!s) s = sdm_fit_look(p, err);
     for (size_t i = 0; i < run->max_iterations && !s && !out->converged; i++) {
         quick.n_look = run->keep_look ? 0 : sdm_fit_look_numbers(p, quick.from);
-        if (!run->keep_look) sdm_fit_look_update(p);
+        if (!run->keep_look) s = sdm_fit_look_update(p, err);
+        if (s) break;
         bool taken = false;
         double size = INFINITY;
         if (run->averaged)

@@ -25,6 +25,7 @@ typedef struct fit_problem {
     fit_laws laws;
     fit_state state;
     bool absent[FIT_TISSUES_MAX]; // tissues (inside first) that the image does not hold: sdm_fit_look_settle()
+    bool places;                  // tissues outside may have places: sdm_fit_places_update()
     fit_sums sums, trial;         // at the state, and at a state that is tried
 
     double *objective; // [n_iterations]

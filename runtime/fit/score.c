@@ -89,7 +89,7 @@ static void fill_near(const fit_problem *p, near_voxels *v)
         if (!is_near(p, i)) continue;
         const float *columns = s->columns + s->slot[i] * nc;
         fit_response r;
-        sdm_fit_respond(&p->laws, (double)s->value[i], s->field[i], true, &r);
+        sdm_fit_respond(&p->laws, (double)s->value[i], fit_place(s, i), s->field[i], true, &r);
         float *root = v->root + count * n, *push = v->push + count * n;
         const double slope = field_slope(p, columns);
         for (size_t a = 0; a < nc; a++) {
@@ -285,7 +285,7 @@ static void add_far(const fit_problem *p, double factor, double *out)
     for (size_t i = 0; i < p->sites.n && p->laws.n_channels > 1; i++) {
         if (is_near(p, i)) continue;
         fit_response r;
-        sdm_fit_respond(&p->laws, (double)p->sites.value[i], p->sites.field[i], true, &r);
+        sdm_fit_respond(&p->laws, (double)p->sites.value[i], fit_place(&p->sites, i), p->sites.field[i], true, &r);
         for (size_t a = 1; a < p->laws.n_channels; a++)
             for (size_t b = 1; b < p->laws.n_channels; b++)
                 out[(nc + a - 1) * n + nc + b - 1] += factor * r.root[a] * r.root[b];
@@ -298,7 +298,7 @@ static void add_points(const fit_problem *p, double *out)
     const size_t n = p->sums.n_unknowns;
     for (size_t i = 0; i < p->sites.n; i++) {
         fit_response r;
-        sdm_fit_respond(&p->laws, 0, p->sites.field[i], true, &r);
+        sdm_fit_respond(&p->laws, 0, NULL, p->sites.field[i], true, &r);
         const float *c = p->sites.columns + p->sites.slot[i] * n;
         for (size_t a = 0; a < n; a++)
             for (size_t b = 0; b < n; b++) out[a * n + b] += r.score[0] * r.score[0] * (double)c[a] * (double)c[b];

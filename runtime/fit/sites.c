@@ -160,6 +160,7 @@ sdm_status sdm_fit_sites_choose(const sdm_fit_target *target, const sdm_fit_opts
         s = choose_voxels(target, opts, region, stride, sites, &differ, err);
     }
     *changed = differ || sites->n != before;
+    if (*changed) sites->n_outside = 0;
     return s;
 }
 
@@ -170,6 +171,7 @@ void sdm_fit_sites_dispose(fit_sites *s)
     sdm_free(s->voxel);
     sdm_free(s->field);
     sdm_free(s->slot);
+    sdm_free(s->place);
     sdm_free(s->columns);
     *s = (fit_sites){0};
 }

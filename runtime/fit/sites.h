@@ -11,11 +11,13 @@
 
 typedef struct fit_sites {
     size_t n, capacity, n_nan;
-    double *world; // [n][3] mm
-    float *value;  // [n]
-    size_t *voxel; // [n] place in the image
-    double *field; // [n]
-    size_t *slot;  // [n] place in columns, or SIZE_MAX: the field has no derivative that counts
+    double *world;                    // [n][3] mm
+    float *value;                     // [n]
+    size_t *voxel;                    // [n] place in the image
+    double *field;                    // [n]
+    float *place;                     // [n][n_outside] log weights of the tissues outside, see sdm_fit_places_update()
+    size_t n_outside, place_capacity; // n_outside 0: the same weights everywhere
+    size_t *slot;                     // [n] place in columns, or SIZE_MAX: the field has no derivative that counts
     size_t n_near, near_capacity, n_columns;
     float *columns; // [n_near][n_columns]: derivatives of the field by parameters, rotation, translation, blur
 } fit_sites;
@@ -44,6 +46,11 @@ typedef struct fit_region {
 sdm_status sdm_fit_sites_choose(const sdm_fit_target *target, const sdm_fit_opts *opts, const fit_region *region,
                                 size_t stride, fit_sites *sites, bool *changed, sdm_error *err);
 void sdm_fit_sites_dispose(fit_sites *s);
+
+static inline const float *fit_place(const fit_sites *s, size_t i)
+{
+    return s->n_outside ? s->place + i * s->n_outside : NULL;
+}
 
 /* What sdm_fit_maps_pack() made. */
 fit_field sdm_fit_field(const fit_maps *maps);

@@ -64,7 +64,7 @@ static void add_slice(const fit_sites *s, const fit_laws *l, size_t from, size_t
     for (size_t i = from; i < to; i++) {
         fit_response r;
         const bool near = s->slot[i] != SIZE_MAX;
-        sdm_fit_respond(l, (double)s->value[i], s->field[i], near || l->n_channels > 1, &r);
+        sdm_fit_respond(l, (double)s->value[i], fit_place(s, i), s->field[i], near || l->n_channels > 1, &r);
         part[0] += r.log_likelihood;
         if (near) part[1] += r.score[0] * r.score[0] * s->field[i] * s->field[i];
         if (near) add_columns(&r, s->columns + s->slot[i] * nc, nc, l->n_channels, n, gradient, complete, observed);
@@ -110,7 +110,7 @@ double sdm_fit_sums_value(const fit_sites *sites, const fit_maps *maps, const fi
         for (size_t i = sites->n * slice / FIT_SLICES; i < sites->n * (slice + 1) / FIT_SLICES; i++) {
             const double field = sdm_fit_field_at(&f, state, sites->world + 3 * i);
             fit_response r;
-            sdm_fit_respond(laws, (double)sites->value[i], field, false, &r);
+            sdm_fit_respond(laws, (double)sites->value[i], fit_place(sites, i), field, false, &r);
             part[slice] += r.log_likelihood;
         }
     for (size_t slice = 0; slice < FIT_SLICES; slice++) sum += part[slice];
@@ -125,7 +125,7 @@ void sdm_fit_sums_moments(const fit_sites *sites, const fit_laws *laws, int n_th
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         for (size_t i = sites->n * slice / FIT_SLICES; i < sites->n * (slice + 1) / FIT_SLICES; i++)
-            sdm_fit_moments_add(laws, (double)sites->value[i], sites->field[i], &part[slice]);
+            sdm_fit_moments_add(laws, (double)sites->value[i], fit_place(sites, i), sites->field[i], &part[slice]);
     *out = part[0];
     for (size_t slice = 1; slice < FIT_SLICES; slice++)
         for (size_t i = 0; i < FIT_TISSUES_MAX; i++) {

@@ -34,7 +34,7 @@ static fit_laws laws_of(sdm_fit_kind kind, sdm_fit_model model, double dof)
 static double log_likelihood(const fit_laws *l, double value, double field)
 {
     fit_response r;
-    sdm_fit_respond(l, value, field, false, &r);
+    sdm_fit_respond(l, value, NULL, field, false, &r);
     return r.log_likelihood;
 }
 
@@ -46,7 +46,7 @@ static void close_to(double found, double wanted, double scale)
 static void check_score(const fit_laws *l, double value, double field, double h)
 {
     fit_response r;
-    sdm_fit_respond(l, value, field, true, &r);
+    sdm_fit_respond(l, value, NULL, field, true, &r);
     close_to(r.log_likelihood, log_likelihood(l, value, field), 0);
     close_to(r.score[0], (log_likelihood(l, value, field + h) - log_likelihood(l, value, field - h)) / (2 * h), 1e-2);
     for (size_t c = 1; c < l->n_channels; c++) {
@@ -93,7 +93,7 @@ static void test_information(void **state)
         double all = 0, mean = 0, square = 0, product = 0;
         fit_response r = {0};
         for (double v = -3000; v < 5000; v++) {
-            sdm_fit_respond(&l, v, a, true, &r);
+            sdm_fit_respond(&l, v, NULL, a, true, &r);
             const double p = exp(r.log_likelihood);
             all += p, mean += p * r.score[0], square += p * r.score[0] * r.score[0];
             product += p * r.score[0] * r.score[1];

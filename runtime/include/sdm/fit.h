@@ -99,8 +99,11 @@ typedef struct sdm_fit_opts {
     bool keep_blur;                /* true: not estimated */
     sdm_fit_appearance appearance; /* start values */
     bool keep_appearance;          /* true: not estimated */
-    double point_sd;               /* mm, > 0: sd of points about the surface; start value unless keep_appearance */
-    double point_dof;              /* > 0: degrees of freedom of Student's t of points; small: tolerant of outliers */
+    /* mm, >= 0: tissues lie in places. Where the image holds two or more outside, partial volume: their weights vary in space (Sanjay-Gopal
+       and Hebert 1998), each the tissue's part of what is about a place, seen through a Gaussian of this sd. 0: the same everywhere */
+    double tissue_mm;
+    double point_sd;  /* mm, > 0: sd of points about the surface; start value unless keep_appearance */
+    double point_dof; /* > 0: degrees of freedom of Student's t of points; small: tolerant of outliers */
 
     const double *start_params; /* [n]; NULL: the defaults of the shape */
     sdm_pose start_pose;

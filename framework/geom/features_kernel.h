@@ -4,39 +4,27 @@
 
 #include "bounds_kernel.h"
 
+SDM_FOR_KIND int functions_of(int kind) { return kind == SDM_CORNERS ? SDM_FUNCTIONS : 4; }
+
+/* From the lane of a feature in the first of rows of eight floats, `rows` of them for a function of the group, to its function k. */
+SDM_FOR_KIND int place_of(int kind, int k, int rows)
+{
+    return kind == SDM_CORNERS ? 8 * rows * (k % 3) + SDM_CORNER_LANES * (k / 3) : 8 * rows * k;
+}
+
 /* The functions of a feature at eight points. */
 typedef struct functions8 {
-    v8f f[4];
+    v8f f[SDM_FUNCTIONS];
 } functions8;
 
-/* How far the worst of them is beyond what is most in the region of a face or edge: at most 0 inside. most: of one feature, eight floats
-   from function to function. */
+/* How far the worst of them is beyond what is most in the feature's region: at most 0 inside. most: of one feature, in its lane of a row for
+   each function of the group. */
 SDM_FOR_KIND v8f beyond(int kind, const functions8 *x, const float *most)
 {
-    const v8f first = kind == SDM_EDGES ? v8_abs(x->f[0]) : x->f[0];
-    const v8f all = v8_max(first - v8_all(most[0]), v8_max(x->f[1] - v8_all(most[8]), x->f[2] - v8_all(most[16])));
-    return kind == SDM_THIN_FACES ? v8_max(all, x->f[3] - v8_all(most[24])) : all;
-}
-
-/* How far eight points are beyond the region of a corner; x: from it to them. */
-static inline v8f beyond_corner(const sdm_corner_row *k, point8 x)
-{
-    v8f most = v8_all(-INFINITY);
-    for (int j = 0; j < SDM_CORNER_EDGES; j++)
-        most = v8_max(most, p8_dot(p8_all(k->along[0][j], k->along[1][j], k->along[2][j]), x));
-    return most;
-}
-
-/* The same of parts around the points, less what it changes to their corners. */
-static inline v8f beyond_corner_part(const sdm_grid_parts *q, bool aligned, const sdm_corner_row *k, float error,
-                                     point8 x)
-{
-    _Alignas(32) float reach[8];
-    v8_store(reach, extent(q, aligned, p8_load(k->along)) + v8_all(error));
-    v8f most = v8_all(-INFINITY);
-    for (int j = 0; j < SDM_CORNER_EDGES; j++)
-        most = v8_max(most, p8_linear(p8_all(k->along[0][j], k->along[1][j], k->along[2][j]), x, v8_all(-reach[j])));
-    return most;
+    v8f all = (kind == SDM_EDGES ? v8_abs(x->f[0]) : x->f[0]) - v8_all(most[0]);
+    for (int k = 1; k < functions_of(kind) && (k < 3 || kind == SDM_THIN_FACES || kind == SDM_CORNERS); k++)
+        all = v8_max(all, x->f[k] - v8_all(most[place_of(kind, k, 1)]));
+    return all;
 }
 
 #endif

@@ -63,24 +63,28 @@ typedef struct sdm_cluster_ref {
 
 enum { SDM_FACES, SDM_THIN_FACES, SDM_EDGES, SDM_CORNERS, SDM_FEATURE_KINDS };
 
+#define SDM_FUNCTIONS 6 /* of a corner; others have four */
+#define SDM_FLOATS(x) (sizeof(x) / sizeof(float))
+
 /* A group of features some of which meet the block at hand, as from its middle: a feature in each lane. */
 typedef struct sdm_met_group {
     _Alignas(64) float at_block[4][8]; /* the functions there */
     float most_at_tile[4][8];          /* that they are at the middles of tiles that meet the region */
     float most_at_vector[4][8];        /* the same of vectors */
     const sdm_feature_group *group;
+    const sdm_cluster_ref *cluster;
     uint32_t number; /* of the first feature */
-    uint32_t mask;   /* tiles that the cluster concerns */
 } sdm_met_group;
 
 /* A feature as the parts of a block see it. Its functions are linear: from the middle of a part to those of the eight parts it has they
    change by the same in all parts of that size. */
 typedef struct sdm_block_feature {
-    _Alignas(64) float to_voxels[4][8]; /* [function]: from the middle of a vector */
-    float at_tiles[4][8];               /* the functions there */
-    const float *most_at_vector;        /* lane of an sdm_met_group */
-    float most[2];                      /* functions 0 and 1 of an edge */
-    float at[3];                        /* corner: relative to the middle of the block */
+    _Alignas(64) float to_voxels[SDM_FUNCTIONS][8]; /* from the middle of a vector */
+    float at_tiles[SDM_FUNCTIONS][8];               /* the functions there */
+    float to_vectors[SDM_FUNCTIONS][8];             /* from the middle of a tile; unused if sdm_grid_job.alike */
+    const float *most_at_vector;                    /* lane of an sdm_met_group */
+    float most[2];                                  /* functions 0 and 1 of an edge */
+    float from[3];                                  /* corner: from it to the middle of the block */
     uint32_t number;
 } sdm_block_feature;
 
@@ -90,33 +94,38 @@ enum { SDM_BATCH = 24 };
 /* Features of one kind that wait for that. There is room for eight more: one group. */
 typedef struct sdm_pending {
     sdm_met_group met[SDM_BATCH + 1];
-    uint16_t feature[SDM_BATCH + 8]; /* faces and edges: 8 place in met[] + lane. Lists are written eight at a time */
-    uint32_t corner[SDM_BATCH];      /* or numbers of corners, */
-    uint32_t cluster[SDM_BATCH];     /* and the places of their clusters in sdm_grid_scratch.cluster */
+    uint16_t feature[SDM_BATCH + 8]; /* place in met[] of its first float, counted in floats. Lists are written eight at a time */
     size_t groups, n;
 } sdm_pending;
 
+/* A feature of a batch and a tile that meets its region. */
+typedef struct sdm_tile_pair {
+    uint16_t feature; /* place in sdm_batch.feature[], counted in floats */
+    uint16_t vector;  /* the tile's first in the block */
+} sdm_tile_pair;
+
 typedef struct sdm_batch {
     sdm_block_feature feature[SDM_BATCH];
-    _Alignas(64) float at_vectors[SDM_BATCH][4][8][8]; /* [feature][function][tile][vector] the functions there */
-    float to_vectors[SDM_BATCH][4][8];                 /* from the middle of a tile; unused if sdm_grid_job.alike */
-    uint16_t tile[SDM_BATCH * 8 + 8];                  /* 32 feature + tile: which meet */
-    uint16_t vector[SDM_BATCH * 64 + 8]; /* 256 feature + 8 tile + vector, a place in at_vectors: which meet */
+    _Alignas(64) float at_vectors[SDM_BATCH * 8][8][8]; /* [pair][function][vector]: the functions there */
+    sdm_tile_pair pair[SDM_BATCH * 8];
+    uint16_t tile[SDM_BATCH * 8 + 8];    /* which meet: place of its first float in feature[] + tile */
+    uint16_t vector[SDM_BATCH * 64 + 8]; /* which meet: place of its first float in at_vectors[] */
 } sdm_batch;
 
-/* The candidates of a vector so far: squared distances of the nearest and the second nearest, number of the nearest. */
-typedef struct sdm_winner {
-    _Alignas(32) float first[8], second[8];
-    uint32_t number[8];
-} sdm_winner;
+/* A candidate of a vector. */
+typedef struct sdm_candidate {
+    uint32_t number; /* of the feature */
+    uint32_t before; /* place of the vector's candidate before it, SDM_NONE: none */
+} sdm_candidate;
 
-/* The candidates of the vectors of a block. */
+/* The candidates of the vectors of a block so far, vectors as [8 tile + vector]: squared distances of the nearest and the second nearest
+   to its voxels, number of the nearest. */
 typedef struct sdm_candidates {
-    sdm_winner winner[64]; /* [8 tile + vector] */
-    uint32_t last[64];     /* place of the last one in the lists below, SDM_NONE: none */
-    uint32_t *number;      /* of the feature */
-    uint32_t *before;      /* place of the vector's candidate before it */
-    float (*value)[8];     /* squared distances */
+    _Alignas(64) float first[64][8], second[64][8];
+    uint32_t number[64][8];
+    uint32_t last[64];   /* place of the last one in the lists below, SDM_NONE: none */
+    sdm_candidate *list;
+    float (*value)[8]; /* squared distances */
     size_t n, cap;
 } sdm_candidates;
 

@@ -50,8 +50,8 @@ SDM_FOR_KIND unsigned meet_group(const meeting *w, int kind, const sdm_feature_g
     const point8 shift = p8_all(c->shift[0], c->shift[1], c->shift[2]);
     v8f beyond = v8_all(-INFINITY);
     x->group = k;
-    x->mask = c->mask;
-    for (int j = 0; j < 4; j++) {
+    x->cluster = c;
+    for (int j = 0; j < (kind == SDM_CORNERS ? 3 : 4); j++) {
         const point8 g = p8_load(k->g[j]);
         const v8f at = p8_linear(g, shift, v8_load(k->offset[j]));
         v8_store(x->at_block[j], at);
@@ -61,23 +61,16 @@ SDM_FOR_KIND unsigned meet_group(const meeting *w, int kind, const sdm_feature_g
         v8_store(x->most_at_vector[j], v8_fma(reach, w->vector, most));
         beyond = v8_max(beyond, (kind == SDM_EDGES && j == 0 ? v8_abs(at) : at) - (reach + most));
     }
-    return 0xff & ~(unsigned)v8_greater(beyond, v8_all(0));
+    const unsigned lanes = 0xff & ~(unsigned)v8_greater(beyond, v8_all(0));
+    return kind == SDM_CORNERS ? lanes & lanes >> SDM_CORNER_LANES : lanes;
 }
 
 /* Keeps the features in some lanes of the group behind the last one. Without branches: who meets the block cannot be foreseen. */
 static inline void keep_group(const block *b, sdm_pending *p, uint32_t number, unsigned lanes)
 {
     p->met[p->groups].number = number;
-    p->n = put_lanes(b->job, p->feature, p->n, (uint32_t)(8 * p->groups), lanes);
+    p->n = put_lanes(b->job, p->feature, p->n, (uint32_t)(p->groups * SDM_FLOATS(sdm_met_group)), lanes);
     p->groups += lanes != 0;
-}
-
-/* Does a corner's region meet the block? */
-static inline bool meets_corner(const meeting *w, const sdm_corner_row *k, const sdm_cluster_ref *c)
-{
-    const point8 g = p8_load(k->along);
-    const v8f at_middle = p8_dot(g, p8_all(c->shift[0] - k->at[0], c->shift[1] - k->at[1], c->shift[2] - k->at[2]));
-    return (v8_greater(at_middle - reach8(w, g), w->error) & ((1 << SDM_CORNER_EDGES) - 1)) == 0;
 }
 
 #endif

@@ -12,11 +12,19 @@
 // a face lower than this share of its length is thin: its angles are too small for float
 #define THIN 0.02f
 #define NO_SIDES 3
+#define CORNER_EDGES 6
 
 /* A face or edge as in its group: [coordinate][k], [k]. */
 typedef struct feature_row {
     _Alignas(16) float g[3][4], offset[4], most[2];
 } feature_row;
+
+/* A corner and unit vectors along up to six edges away from it (fewer are repeated). */
+typedef struct corner_row {
+    _Alignas(32) float along[3][8]; /* [coordinate][edge] */
+    float at[3];
+    uint32_t n; /* edges so far */
+} corner_row;
 
 typedef struct builder {
     const sdm_mesh *m;
@@ -28,7 +36,7 @@ typedef struct builder {
     uint32_t *slot_of;   /* [n_tri] slot of a triangle */
     uint32_t *edge;      /* [n_edges] number of an edge of the topology */
     uint32_t *corner;    /* [n_vert] number of a corner */
-    uint8_t *count;      /* [end - corner_base] directions of a corner so far */
+    corner_row *along;   /* [end - corner_base] */
     feature_row *row;    /* [corner_base] */
     uint8_t *first_side; /* [n_tri] edge of the frame that the first edge of the triangle is, NO_SIDES: has none */
     double middle[3];    /* of the cluster at hand, mm */
@@ -142,11 +150,10 @@ static void add_segment(const builder *b, uint32_t number, const double x[3], co
 
 static void add_direction(const builder *b, uint32_t corner, const double u[3], double sign)
 {
-    const uint32_t at = corner - b->f->corner_base;
-    sdm_corner_row *c = &b->f->corner[at];
-    const uint8_t k = b->count[at];
-    if (k == SDM_CORNER_EDGES) return;
-    b->count[at]++;
+    corner_row *c = &b->along[corner - b->f->corner_base];
+    const uint32_t k = c->n;
+    if (k == CORNER_EDGES) return;
+    c->n++;
     for (int i = 0; i < 3; i++) {
         const float g = (float)(sign * u[i]);
         // the first one fills all
@@ -158,8 +165,9 @@ static void add_direction(const builder *b, uint32_t corner, const double u[3], 
 static void add_corner(const builder *b, uint32_t number, const double x[3])
 {
     b->f->exact[number] = (sdm_feature){.a = {x[0], x[1], x[2]}};
-    for (int i = 0; i < 3; i++)
-        b->f->corner[number - b->f->corner_base].at[i] = (float)((x[i] - b->middle[i]) * b->f->scale);
+    corner_row *c = &b->along[number - b->f->corner_base];
+    *c = (corner_row){.n = 0}; // without edges it is in nobody's way
+    for (int i = 0; i < 3; i++) c->at[i] = (float)((x[i] - b->middle[i]) * b->f->scale);
 }
 
 /* Edges and corners of a triangle that no triangle before it has; a triangle with a repeated vertex is a segment of its own.
@@ -265,6 +273,7 @@ static void fill_edges_and_corners(builder *b, sdm_cluster_node *node)
     b->n_corner = node->corner_end;
     node->group = b->n_group;
     b->n_group += 1 + (node->edge_end - node->edge + 7) / 8;
+    b->n_group += (node->corner_end - node->corner + SDM_CORNER_LANES - 1) / SDM_CORNER_LANES;
 }
 
 /* The distances outward from a rectangle around each thin face, in its plane, in the place of those across its edges. */
@@ -323,6 +332,29 @@ static void fill_groups(const builder *b, uint32_t from, uint32_t to, sdm_featur
     }
 }
 
+/* The same of corners. */
+static void fill_corner_groups(const builder *b, uint32_t from, uint32_t to, sdm_feature_group *out)
+{
+    for (; from < to; from += SDM_CORNER_LANES, out++) {
+        memset(out, 0, sizeof *out);
+        for (uint32_t lane = 0; lane < SDM_CORNER_LANES; lane++) {
+            if (from + lane >= to) {
+                out->offset[0][lane] = INFINITY;
+                continue;
+            }
+            const corner_row *c = &b->along[from + lane - b->f->corner_base];
+            for (uint32_t k = 0; k < CORNER_EDGES; k++) {
+                const uint32_t i = k % 3, at = lane + k / 3 * SDM_CORNER_LANES;
+                for (int a = 0; a < 3; a++) {
+                    out->g[i][a][at] = c->along[a][k];
+                    out->offset[i][at] -= c->along[a][k] * c->at[a];
+                    out->g[3][a][at] = c->at[a];
+                }
+            }
+        }
+    }
+}
+
 static sdm_status add_groups(const builder *b, sdm_error *err)
 {
     sdm_features *f = b->f;
@@ -332,7 +364,9 @@ static sdm_status add_groups(const builder *b, sdm_error *err)
         // others are below a cluster
         if (!node->count || node->edge_end + node->corner_end == 0) continue;
         fill_groups(b, node->first, node->first + node->count, &f->group[node->group]);
-        fill_groups(b, node->edge, node->edge_end, &f->group[node->group + 1]);
+        sdm_feature_group *edges = &f->group[node->group + 1];
+        fill_groups(b, node->edge, node->edge_end, edges);
+        fill_corner_groups(b, node->corner, node->corner_end, edges + (node->edge_end - node->edge + 7) / 8);
     }
     return s;
 }
@@ -345,11 +379,10 @@ static sdm_status allocate(builder *b, sdm_error *err)
     if (!s) s = SDM_TAKE_UNSET(b->arena, SDM_HIGH, &b->edge, b->topo->n_edges, "features", err);
     if (!s) s = SDM_TAKE_UNSET(b->arena, SDM_HIGH, &b->corner, n_vert, "features", err);
     if (!s) s = SDM_TAKE_UNSET(b->arena, SDM_HIGH, &b->first_side, n, "features", err);
-    if (!s) s = SDM_TAKE(b->arena, SDM_HIGH, &b->count, n_vert, "features", err);
+    if (!s) s = SDM_TAKE_UNSET(b->arena, SDM_HIGH, &b->along, n_vert, "features", err);
     if (!s) s = SDM_TAKE_UNSET(b->arena, SDM_HIGH, &b->row, f->corner_base, "features", err);
     if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->node, b->tree->n_node, "features", err);
     if (!s) s = SDM_TAKE_UNSET(b->arena, SDM_LOW, &f->centroid, n, "features", err);
-    if (!s) s = SDM_TAKE(b->arena, SDM_LOW, &f->corner, n_vert, "features", err);
     if (!s) s = SDM_TAKE_UNSET(b->arena, SDM_LOW, &f->exact, f->corner_base + n_vert, "features", err);
     if (!s) s = SDM_TAKE_UNSET(b->arena, SDM_LOW, &f->of_slot, n, "features", err);
     if (!s) s = SDM_TAKE_UNSET(b->arena, SDM_LOW, &f->owner, f->corner_base + n_vert, "features", err);
@@ -363,12 +396,13 @@ size_t sdm_features_bytes(size_t n_tri, size_t n_vert, size_t *scratch)
 {
     // edges: every triangle may have three of its own, or be one
     const size_t rows = 4 * n_tri;
-    *scratch += rows * sizeof(feature_row) + n_tri * (4 * sizeof(uint32_t) + 1) + n_vert * (sizeof(uint32_t) + 1);
-    // every triangle may be a cluster, whose edges end with a group
-    const size_t groups = 2 * n_tri + rows / 8;
+    *scratch += rows * sizeof(feature_row) + n_tri * (4 * sizeof(uint32_t) + 1) +
+                n_vert * (sizeof(uint32_t) + sizeof(corner_row));
+    // every triangle may be a cluster, whose edges and corners end with a group
+    const size_t groups = 3 * n_tri + rows / 8 + n_vert / SDM_CORNER_LANES;
     return groups * sizeof(sdm_feature_group) +
            n_tri * (2 * sizeof(sdm_cluster_node) + sizeof(float[3]) + sizeof(uint32_t[6])) +
-           n_vert * sizeof(sdm_corner_row) + (rows + n_vert) * (sizeof(sdm_feature) + sizeof(uint32_t));
+           (rows + n_vert) * (sizeof(sdm_feature) + sizeof(uint32_t));
 }
 
 sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const sdm_frame *frames, const sdm_bvh *tree,

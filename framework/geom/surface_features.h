@@ -15,28 +15,23 @@
 #include "point_triangle.h"
 #include "topology.h"
 
-/* Eight faces or edges of a cluster, one a lane, by linear functions of the point p: g[k] . p + offset[k], and what they are at most in
-   the feature's region.
+/* Eight faces or edges or four corners of a cluster, in lanes, by linear functions of the point p: g[k] . p + offset[k], and what they are
+   at most in the feature's region.
    Faces: 0 - 2 the distance outward across each edge, 3 the distance from the plane; most 0. A thin face (too narrow for float): 0 - 3 the
    distances outward from a rectangle around it, in its plane.
    Edges: the size of 0, along it from its middle, is at most half its length; 1 and 2 inward across it into two of its faces, at most 0,
    or INFINITY for 1 where there is no face; 3 the distance from the plane of the first: 1 and 3 are perpendicular, so that their squares
    sum up to that of the distance.
-   No face, no edge: offset[0] = INFINITY. */
+   Corners: 0 - 2 the way along edges away from it, at most 0: three edges in its lane, three in the fourth lane from there (fewer are
+   repeated); g[3] is the corner itself.
+   Nothing in the lane: offset[0] = INFINITY. */
 typedef struct sdm_feature_group {
     _Alignas(64) float g[4][3][8]; /* [k][coordinate] */
     float offset[4][8];
     float most[2][8]; /* of functions 0 and 1 */
 } sdm_feature_group;
 
-#define SDM_CORNER_EDGES 6
-
-/* A corner and unit vectors along up to six edges away from it (fewer are repeated). */
-typedef struct sdm_corner_row {
-    _Alignas(64) float at[3];
-    float unused[5];
-    float along[3][8]; /* [coordinate][edge] */
-} sdm_corner_row;
+#define SDM_CORNER_LANES 4
 
 /* A feature in double, mm: its anchor a, a point of it, and a unit vector u: normal of the face (face = -1, else 0), along the edge
    (which ends at a + length u), 0 for a corner. */
@@ -53,7 +48,7 @@ typedef struct sdm_cluster_node {
     float lo[3], hi[3];
     uint32_t first, count;
     uint32_t edge, edge_end, corner, corner_end;
-    uint32_t group; /* of its faces; those of its edges follow */
+    uint32_t group; /* of its faces; those of its edges follow, then those of its corners */
     uint32_t thin;  /* bit i: face first + i is thin */
 } sdm_cluster_node;
 
@@ -63,7 +58,6 @@ typedef struct sdm_features {
     float (*centroid)[3];   /* [n_tri] of the triangles */
     bool any_thin;          /* there is a thin face */
     sdm_feature_group *group;
-    sdm_corner_row *corner; /* [end - corner_base] */
     uint32_t edge_base, corner_base, end;
     sdm_feature *exact;       /* [end] */
     uint32_t (*of_slot)[6];   /* [n_tri] edges and corners of a triangle */

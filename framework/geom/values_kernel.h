@@ -33,12 +33,12 @@ static uint32_t settle(const tile *t, unsigned v, int lane, float limit, const d
     const sdm_candidates *c = t->s->of_vectors;
     uint32_t best = SDM_NONE;
     *d2 = INFINITY;
-    for (uint32_t i = c->last[v]; i != SDM_NONE; i = c->before[i]) {
+    for (uint32_t i = c->last[v]; i != SDM_NONE; i = c->list[i].before) {
         if (c->value[i][lane] > limit) continue;
-        const double d = sdm_feature_distance2(t->job->features, t->job->surface->frames, c->number[i], p);
+        const double d = sdm_feature_distance2(t->job->features, t->job->surface->frames, c->list[i].number, p);
         if (!(d < *d2 || (d == *d2 && d < INFINITY))) continue; // of several the first
         *d2 = d;
-        best = c->number[i];
+        best = c->list[i].number;
     }
     if (best == SDM_NONE && !(t->job->band_mm < INFINITY)) best = ask_tree(t, p, d2);
     return best;
@@ -82,13 +82,13 @@ static void choose_features(const tile *t, voxels *x)
             continue;
         }
         const unsigned at = 8 * t->number + (unsigned)v;
-        const sdm_winner *w = &t->s->of_vectors->winner[at];
-        const v8f first = v8_load(w->first);
+        const sdm_candidates *c = t->s->of_vectors;
+        const v8f first = v8_load(c->first[at]);
         _Alignas(32) float limit[8];
         v8_store(limit, v8_fma(v8_sqrt(v8_max(first, v8_all(0))) + v8_all(1), squared, first));
-        const int clear = v8_greater(v8_load(w->second), v8_load(limit)) & v8_greater(first, v8_all(-0.5f));
+        const int clear = v8_greater(v8_load(c->second[at]), v8_load(limit)) & v8_greater(first, v8_all(-0.5f));
         for (int i = 0; i < 8; i++) {
-            const uint32_t number = x->number[place[i]] = w->number[i];
+            const uint32_t number = x->number[place[i]] = c->number[at][i];
             __builtin_prefetch(&job->features->exact[number]); // for measure_voxels()
         }
         // NaN (INFINITY - INFINITY) is not clear either

@@ -8,28 +8,29 @@ static void start_candidates(sdm_candidates *c)
 {
     c->n = 0;
     for (int v = 0; v < 64; v++) {
-        v8_store(c->winner[v].first, v8_all(INFINITY));
-        v8_store(c->winner[v].second, v8_all(INFINITY));
-        v8_store_i(c->winner[v].number, v8_all_i(0));
+        v8_store(c->first[v], v8_all(INFINITY));
+        v8_store(c->second[v], v8_all(INFINITY));
+        v8_store_i(c->number[v], v8_all_i(0));
         c->last[v] = SDM_NONE;
     }
 }
 
-/* One more candidate: feature `number` at squared distances d. */
-SDM_FOR_KIND void compete(sdm_winner *w, uint32_t number, v8f d)
+/* One more candidate of a vector: feature `number` at squared distances d. */
+SDM_FOR_KIND void compete(sdm_candidates *c, unsigned v, v8i number, v8f d)
 {
-    const v8f first = v8_load(w->first);
-    v8_store(w->second, v8_min(v8_load(w->second), v8_max(d, first)));
-    v8_store_i(w->number, v8_select_i(d < first, v8_all_i((int32_t)number), v8_load_i(w->number)));
-    v8_store(w->first, v8_min(d, first));
+    const v8f first = v8_load(c->first[v]);
+    v8_store(c->second[v], v8_min(v8_load(c->second[v]), v8_max(d, first)));
+    v8_store_i(c->number[v], v8_select_i(d < first, number, v8_load_i(c->number[v])));
+    v8_store(c->first[v], v8_min(d, first));
 }
 
-/* Squared distances of a face or edge: INFINITY where a voxel is surely not in the region, -1 for thin faces elsewhere. at: its functions
-   at the middle of the vector, each 64 floats after the one before. */
-SDM_FOR_KIND v8f distances(int kind, const sdm_block_feature *x, const float *at, v8f error)
+/* Squared distances of a feature: INFINITY where a voxel is surely not in the region, -1 for thin faces elsewhere. at: its functions at the
+   middle of the vector, each eight floats after the one before; v: the vector. */
+SDM_FOR_KIND v8f distances(const sdm_grid_job *job, int kind, const sdm_block_feature *x, const float *at, unsigned v,
+                           v8f error)
 {
-    v8f f[4];
-    for (int k = 0; k < 4; k++) f[k] = v8_load(x->to_voxels[k]) + v8_all(at[64 * k]);
+    v8f f[SDM_FUNCTIONS];
+    for (int k = 0; k < functions_of(kind); k++) f[k] = v8_load(x->to_voxels[k]) + v8_all(at[8 * k]);
     v8f d = f[3] * f[3], most = f[0];
     if (kind == SDM_EDGES) {
         d = v8_fma(f[1], f[1], d);
@@ -41,37 +42,36 @@ SDM_FOR_KIND v8f distances(int kind, const sdm_block_feature *x, const float *at
         d = v8_all(-1);
         most = v8_max(most, f[3]);
     }
+    if (kind == SDM_CORNERS) {
+        // without its region the end of an edge would be in doubt as far as the root of the error
+        const point8 from = p8_add(p8_load((const float(*)[8])job->voxel[v / 8][v % 8].x),
+                                   p8_all(x->from[0], x->from[1], x->from[2]));
+        d = p8_dot(from, from);
+        most = v8_max(v8_max(most, f[3]), v8_max(f[4], f[5]));
+    }
     return v8_signed(most - error, d, v8_all(INFINITY));
-}
-
-SDM_FOR_KIND v8f corner_distances(const block *b, const sdm_block_feature *x, unsigned v)
-{
-    const sdm_features *f = b->job->features;
-    const point8 p = p8_load((const float(*)[8])b->job->voxel[v / 8][v % 8].x);
-    const point8 from = p8_sub(p, p8_all(x->at[0], x->at[1], x->at[2]));
-    // without its region the end of an edge would be in doubt as far as the root of the error
-    const v8f out = beyond_corner(&f->corner[x->number - f->corner_base], from);
-    return v8_signed(out - v8_all(b->error), p8_dot(from, from), v8_all(INFINITY));
 }
 
 /* Holds the voxels of n vectors against the features of the batch whose region these meet. */
 SDM_FOR_KIND void compare(const block *b, int kind, size_t n)
 {
     const sdm_batch *batch = b->s->batch;
-    const float *at = &batch->at_vectors[0][0][0][0];
     sdm_candidates *c = b->s->of_vectors;
-    uint32_t *number = c->number + c->n, *before = c->before + c->n;
+    sdm_candidate *list = c->list + c->n;
     float(*value)[8] = c->value + c->n;
     const uint32_t first = (uint32_t)c->n;
     const v8f error = v8_all(b->error);
     for (size_t i = 0; i < n; i++) {
-        const uint32_t place = batch->vector[i], v = place % 64;
-        const sdm_block_feature *x = &batch->feature[place / 256];
-        const v8f d = kind == SDM_CORNERS ? corner_distances(b, x, v) : distances(kind, x, at + place, error);
-        compete(&c->winner[v], x->number, d);
+        const uint32_t place = batch->vector[i];
+        const sdm_tile_pair *pair = &batch->pair[place / SDM_FLOATS(batch->at_vectors[0])];
+        const sdm_block_feature *x =
+            (const sdm_block_feature *)(const void *)((const float *)batch->feature + pair->feature);
+        const unsigned v = pair->vector + place % 8;
+        const uint32_t number = x->number;
+        const v8f d = distances(b->job, kind, x, &batch->at_vectors[0][0][0] + place, v, error);
+        compete(c, v, v8_all_i((int32_t)number), d);
         v8_store(value[i], d);
-        number[i] = x->number;
-        before[i] = c->last[v];
+        list[i] = (sdm_candidate){number, c->last[v]};
         c->last[v] = first + (uint32_t)i;
     }
     c->n += n;
@@ -133,10 +133,8 @@ static sdm_status hold_features(block *b, sdm_error *err)
             keep_group(b, edges, number, meet_group(&w, SDM_EDGES, ++group, c, &edges->met[edges->groups]));
             if (is_full(edges)) st = hold[SDM_EDGES](b, err);
         }
-        for (uint32_t number = node->corner; number < node->corner_end && !st; number++) {
-            corners->corner[corners->n] = number;
-            corners->cluster[corners->n] = (uint32_t)i;
-            corners->n += meets_corner(&w, &f->corner[number - f->corner_base], c);
+        for (uint32_t number = node->corner; number < node->corner_end && !st; number += SDM_CORNER_LANES) {
+            keep_group(b, corners, number, meet_group(&w, SDM_CORNERS, ++group, c, &corners->met[corners->groups]));
             if (is_full(corners)) st = hold[SDM_CORNERS](b, err);
         }
     }

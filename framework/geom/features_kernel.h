@@ -24,6 +24,7 @@ SDM_FOR_KIND v8f beyond(int kind, const functions8 *x, const float *most)
     v8f all = (kind == SDM_EDGES ? v8_abs(x->f[0]) : x->f[0]) - v8_all(most[0]);
     for (int k = 1; k < functions_of(kind) && (k < 3 || kind == SDM_THIN_FACES || kind == SDM_CORNERS); k++)
         all = v8_max(all, x->f[k] - v8_all(most[place_of(kind, k, 1)]));
+    if (kind == SDM_EDGES) all = v8_max(all, x->f[1] + x->f[2] - v8_all(most[24]));
     return all;
 }
 

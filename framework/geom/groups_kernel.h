@@ -16,8 +16,8 @@ typedef struct block {
 
 /* The same for all groups: numbers in all lanes, in a copy, so that no store can change them. */
 typedef struct meeting {
-    point8 half, axis[3]; /* as in sdm_grid_parts */
-    bool aligned;
+    point8 axis[3]; /* as in sdm_grid_parts */
+    v8f half;       /* half extents of a cube along x, y, z */
     v8f error, tile, vector; /* shares of what changes within the block */
 } meeting;
 
@@ -25,8 +25,7 @@ static inline meeting meeting_of(const block *b)
 {
     const sdm_grid_job *job = b->job;
     const sdm_grid_parts *q = &job->part[SDM_TO_BLOCKS];
-    meeting w = {.half = p8_all(q->half[0], q->half[1], q->half[2]),
-                 .aligned = job->aligned,
+    meeting w = {.half = v8_all(q->half[0]),
                  .error = v8_all(b->error),
                  .tile = v8_all(job->share[SDM_TO_TILES]),
                  .vector = v8_all(job->share[SDM_TO_VECTORS])};
@@ -34,32 +33,44 @@ static inline meeting meeting_of(const block *b)
     return w;
 }
 
-/* The largest change of a function with gradient g from the middle of the block to its corners. */
-static inline v8f reach8(const meeting *w, point8 g)
+/* The largest change of a function with gradient g from the middle of the block to its corners. sum: of the sizes of its coordinates. */
+SDM_FOR_KIND v8f reach8(const meeting *w, bool cube, point8 g, const float sum[8])
 {
-    if (w->aligned) return v8_fma(v8_abs(g.x), w->half.x, v8_fma(v8_abs(g.y), w->half.y, v8_abs(g.z) * w->half.z));
-    v8f sum = v8_all(0);
-    for (int a = 0; a < 3; a++) sum += v8_abs(p8_dot(g, w->axis[a]));
-    return sum;
+    if (cube) return v8_load(sum) * w->half;
+    v8f reach = v8_all(0);
+    for (int a = 0; a < 3; a++) reach += v8_abs(p8_dot(g, w->axis[a]));
+    return reach;
+}
+
+/* Fills in what a function is at most at the middles of parts that meet the region, `most` in it; returns the same for the block. */
+static inline v8f set_most(const meeting *w, v8f reach, v8f most, sdm_met_group *x, int row)
+{
+    v8_store(x->most_at_tile[row], v8_fma(reach, w->tile, most));
+    v8_store(x->most_at_vector[row], v8_fma(reach, w->vector, most));
+    return reach + most;
 }
 
 /* The features of a group whose regions meet the block: fills in x, and returns their lanes. */
-SDM_FOR_KIND unsigned meet_group(const meeting *w, int kind, const sdm_feature_group *k, const sdm_cluster_ref *c,
-                                 sdm_met_group *x)
+SDM_FOR_KIND unsigned meet_group(const meeting *w, bool cube, int kind, const sdm_feature_group *k,
+                                 const sdm_cluster_ref *c, sdm_met_group *x)
 {
     const point8 shift = p8_all(c->shift[0], c->shift[1], c->shift[2]);
-    v8f beyond = v8_all(-INFINITY);
+    v8f at[4], beyond = v8_all(-INFINITY);
     x->group = k;
     x->cluster = c;
     for (int j = 0; j < (kind == SDM_CORNERS ? 3 : 4); j++) {
         const point8 g = p8_load(k->g[j]);
-        const v8f at = p8_linear(g, shift, v8_load(k->offset[j]));
-        v8_store(x->at_block[j], at);
+        at[j] = p8_linear(g, shift, v8_load(k->offset[j]));
+        v8_store(x->at_block[j], at[j]);
         if (j == 3 && kind != SDM_THIN_FACES) break;
-        const v8f reach = reach8(w, g), most = kind == SDM_EDGES && j < 2 ? w->error + v8_load(k->most[j]) : w->error;
-        v8_store(x->most_at_tile[j], v8_fma(reach, w->tile, most));
-        v8_store(x->most_at_vector[j], v8_fma(reach, w->vector, most));
-        beyond = v8_max(beyond, (kind == SDM_EDGES && j == 0 ? v8_abs(at) : at) - (reach + most));
+        const v8f most = kind == SDM_EDGES && j < 2 ? w->error + v8_load(k->most[j]) : w->error;
+        const v8f size = kind == SDM_EDGES && j == 0 ? v8_abs(at[j]) : at[j];
+        beyond = v8_max(beyond, size - set_most(w, reach8(w, cube, g, k->sum[j]), most, x, j));
+    }
+    if (kind == SDM_EDGES) {
+        const point8 g = p8_add(p8_load(k->g[1]), p8_load(k->g[2]));
+        const v8f most = w->error + w->error + v8_load(k->most[1]);
+        beyond = v8_max(beyond, at[1] + at[2] - set_most(w, reach8(w, cube, g, k->sum[3]), most, x, 3));
     }
     const unsigned lanes = 0xff & ~(unsigned)v8_greater(beyond, v8_all(0));
     return kind == SDM_CORNERS ? lanes & lanes >> SDM_CORNER_LANES : lanes;

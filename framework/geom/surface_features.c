@@ -311,8 +311,18 @@ static void visit_clusters(builder *b, void (*visit)(builder *b, sdm_cluster_nod
     }
 }
 
+static void fill_sums(sdm_feature_group *out, bool edges)
+{
+    for (int k = 0; k < 4; k++) {
+        v8f sum = v8_all(0);
+        for (int a = 0; a < 3; a++)
+            sum += v8_abs(edges && k == 3 ? v8_load(out->g[1][a]) + v8_load(out->g[2][a]) : v8_load(out->g[k][a]));
+        v8_store(out->sum[k], sum);
+    }
+}
+
 /* Rows from .. to side by side. */
-static void fill_groups(const builder *b, uint32_t from, uint32_t to, sdm_feature_group *out)
+static void fill_groups(const builder *b, uint32_t from, uint32_t to, bool edges, sdm_feature_group *out)
 {
     for (; from < to; from += 8, out++) {
         const uint32_t last = to - 1; // stands in empty lanes
@@ -329,6 +339,7 @@ static void fill_groups(const builder *b, uint32_t from, uint32_t to, sdm_featur
         for (uint32_t lane = 0; lane < 8; lane++)
             for (int k = 0; k < 2; k++) out->most[k][lane] = b->row[from + lane < to ? from + lane : last].most[k];
         for (uint32_t lane = to - from; lane < 8; lane++) out->offset[0][lane] = INFINITY;
+        fill_sums(out, edges);
     }
 }
 
@@ -352,6 +363,7 @@ static void fill_corner_groups(const builder *b, uint32_t from, uint32_t to, sdm
                 }
             }
         }
+        fill_sums(out, false);
     }
 }
 
@@ -363,9 +375,9 @@ static sdm_status add_groups(const builder *b, sdm_error *err)
         const sdm_cluster_node *node = &f->node[i];
         // others are below a cluster
         if (!node->count || node->edge_end + node->corner_end == 0) continue;
-        fill_groups(b, node->first, node->first + node->count, &f->group[node->group]);
+        fill_groups(b, node->first, node->first + node->count, false, &f->group[node->group]);
         sdm_feature_group *edges = &f->group[node->group + 1];
-        fill_groups(b, node->edge, node->edge_end, edges);
+        fill_groups(b, node->edge, node->edge_end, true, edges);
         fill_corner_groups(b, node->corner, node->corner_end, edges + (node->edge_end - node->edge + 7) / 8);
     }
     return s;

@@ -21,7 +21,7 @@
    distances outward from a rectangle around it, in its plane.
    Edges: the size of 0, along it from its middle, is at most half its length; 1 and 2 inward across it into two of its faces, at most 0,
    or INFINITY for 1 where there is no face; 3 the distance from the plane of the first: 1 and 3 are perpendicular, so that their squares
-   sum up to that of the distance.
+   sum up to that of the distance. 1 + 2 is at most 0, too: that leaves out an edge as seen from where its faces form a valley.
    Corners: 0 - 2 the way along edges away from it, at most 0: three edges in its lane, three in the fourth lane from there (fewer are
    repeated); g[3] is the corner itself.
    Nothing in the lane: offset[0] = INFINITY. */
@@ -29,6 +29,7 @@ typedef struct sdm_feature_group {
     _Alignas(64) float g[4][3][8]; /* [k][coordinate] */
     float offset[4][8];
     float most[2][8]; /* of functions 0 and 1 */
+    float sum[4][8];  /* of the sizes of the coordinates of g[k]; 3 of an edge: of g[1] + g[2] */
 } sdm_feature_group;
 
 #define SDM_CORNER_LANES 4

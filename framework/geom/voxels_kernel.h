@@ -106,8 +106,8 @@ static inline void fetch_groups(const sdm_features *f, const sdm_cluster_node *n
 
 static inline bool is_full(const sdm_pending *p) { return p->n > SDM_BATCH - 8; }
 
-/* The features of the block's clusters against its voxels. */
-static sdm_status hold_features(block *b, sdm_error *err)
+/* The features of the block's clusters against its voxels. cube: it is one, along x, y, z. */
+SDM_FOR_KIND sdm_status hold_clusters(block *b, bool cube, sdm_error *err)
 {
     const sdm_features *f = b->job->features;
     const meeting w = meeting_of(b);
@@ -122,25 +122,32 @@ static sdm_status hold_features(block *b, sdm_error *err)
         const sdm_feature_group *group = &f->group[node->group];
         if (i + AHEAD < b->s->n_cluster) fetch_groups(f, &f->node[b->s->cluster[i + AHEAD].node]);
         keep_group(b, faces, node->first,
-                   meet_group(&w, SDM_FACES, group, c, &faces->met[faces->groups]) & ~node->thin);
+                   meet_group(&w, cube, SDM_FACES, group, c, &faces->met[faces->groups]) & ~node->thin);
         if (is_full(faces)) st = hold[SDM_FACES](b, err);
         if (node->thin) {
             keep_group(b, thin, node->first,
-                       meet_group(&w, SDM_THIN_FACES, group, c, &thin->met[thin->groups]) & node->thin);
+                       meet_group(&w, cube, SDM_THIN_FACES, group, c, &thin->met[thin->groups]) & node->thin);
             if (is_full(thin) && !st) st = hold[SDM_THIN_FACES](b, err);
         }
         for (uint32_t number = node->edge; number < node->edge_end && !st; number += 8) {
-            keep_group(b, edges, number, meet_group(&w, SDM_EDGES, ++group, c, &edges->met[edges->groups]));
+            keep_group(b, edges, number, meet_group(&w, cube, SDM_EDGES, ++group, c, &edges->met[edges->groups]));
             if (is_full(edges)) st = hold[SDM_EDGES](b, err);
         }
         for (uint32_t number = node->corner; number < node->corner_end && !st; number += SDM_CORNER_LANES) {
-            keep_group(b, corners, number, meet_group(&w, SDM_CORNERS, ++group, c, &corners->met[corners->groups]));
+            keep_group(b, corners, number, meet_group(&w, cube, SDM_CORNERS, ++group, c, &corners->met[corners->groups]));
             if (is_full(corners)) st = hold[SDM_CORNERS](b, err);
         }
     }
     for (int kind = 0; kind < SDM_FEATURE_KINDS && !st; kind++)
         if (wait[kind].n) st = hold[kind](b, err);
     return st;
+}
+
+static sdm_status hold_features(block *b, sdm_error *err)
+{
+    const float *half = b->job->part[SDM_TO_BLOCKS].half;
+    const bool cube = b->job->aligned && half[0] == half[1] && half[0] == half[2];
+    return cube ? hold_clusters(b, true, err) : hold_clusters(b, false, err);
 }
 
 #endif

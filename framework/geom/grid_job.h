@@ -116,6 +116,7 @@ typedef struct sdm_batch {
 typedef struct sdm_candidate {
     uint32_t number; /* of the feature */
     uint32_t before; /* place of the vector's candidate before it, SDM_NONE: none */
+    uint32_t voxels; /* bits of those that it may be nearest to, by what was known then */
 } sdm_candidate;
 
 /* The candidates of the vectors of a block so far, vectors as [8 tile + vector]: squared distances of the nearest and the second nearest
@@ -123,9 +124,9 @@ typedef struct sdm_candidate {
 typedef struct sdm_candidates {
     _Alignas(64) float first[64][8], second[64][8];
     uint32_t number[64][8];
-    uint32_t last[64];   /* place of the last one in the lists below, SDM_NONE: none */
+    uint32_t last[64]; /* place of the last one in the list below, SDM_NONE: none */
+    uint32_t open[64]; /* bits of voxels that thin faces leave in doubt */
     sdm_candidate *list;
-    float (*value)[8]; /* squared distances */
     size_t n, cap;
 } sdm_candidates;
 

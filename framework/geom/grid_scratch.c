@@ -47,7 +47,7 @@ sdm_status sdm_grid_scratch_start(sdm_grid_scratch *s, sdm_error *err)
 static size_t bytes_of(size_t candidates)
 {
     return SDM_FEATURE_KINDS * sizeof(sdm_pending) + sizeof(sdm_batch) + sizeof(sdm_candidates) +
-           candidates * (sizeof(sdm_candidate) + sizeof(float[8]));
+           candidates * sizeof(sdm_candidate);
 }
 
 static sdm_status more_room(void **list, size_t n, size_t cap, size_t size, sdm_error *err)
@@ -73,7 +73,6 @@ sdm_status sdm_grid_scratch_candidates(sdm_grid_scratch *s, size_t cap, size_t l
     if (!limit || bytes_of(more) <= limit) cap = more;
     c->cap = 0;
     sdm_status st = more_room((void **)&c->list, c->n, cap, sizeof *c->list, err);
-    if (!st) st = more_room((void **)&c->value, c->n, cap, sizeof *c->value, err);
     if (!st) c->cap = cap;
     return st;
 }
@@ -82,7 +81,6 @@ static void free_candidates(sdm_candidates *c)
 {
     if (!c) return;
     sdm_free(c->list);
-    sdm_free(c->value);
     sdm_free(c);
 }
 

@@ -27,14 +27,14 @@ static uint32_t ask_tree(const tile *t, const double p[3], double *d2)
     return slot;
 }
 
-/* The nearest of the candidates whose squared distance in float is at most `limit`, in double. */
-static uint32_t settle(const tile *t, unsigned v, int lane, float limit, const double p[3], double *d2)
+/* The nearest of the candidates of a voxel, in double. */
+static uint32_t settle(const tile *t, unsigned v, int lane, const double p[3], double *d2)
 {
     const sdm_candidates *c = t->s->of_vectors;
     uint32_t best = SDM_NONE;
     *d2 = INFINITY;
     for (uint32_t i = c->last[v]; i != SDM_NONE; i = c->list[i].before) {
-        if (c->value[i][lane] > limit) continue;
+        if (!(c->list[i].voxels >> lane & 1)) continue;
         const double d = sdm_feature_distance2(t->job->features, t->job->surface->frames, c->list[i].number, p);
         if (!(d < *d2 || (d == *d2 && d < INFINITY))) continue; // of several the first
         *d2 = d;
@@ -73,8 +73,7 @@ typedef struct voxels {
 static void choose_features(const tile *t, voxels *x)
 {
     const sdm_grid_job *job = t->job;
-    // a squared distance d^2 has an error of at most 2 (d + 1) 2 error; two of them, doubled
-    const v8f squared = v8_all(8 * t->error);
+    const v8f doubt = v8_all(doubt_of(t->error));
     for (int v = 0; v < 8; v++) {
         const uint8_t *place = job->voxel_in_tile[v];
         if (!(t->wanted >> v & 1)) {
@@ -84,9 +83,8 @@ static void choose_features(const tile *t, voxels *x)
         const unsigned at = 8 * t->number + (unsigned)v;
         const sdm_candidates *c = t->s->of_vectors;
         const v8f first = v8_load(c->first[at]);
-        _Alignas(32) float limit[8];
-        v8_store(limit, v8_fma(v8_sqrt(v8_max(first, v8_all(0))) + v8_all(1), squared, first));
-        const int clear = v8_greater(v8_load(c->second[at]), v8_load(limit)) & v8_greater(first, v8_all(-0.5f));
+        const v8f limit = v8_fma(v8_sqrt(first) + v8_all(1), doubt, first);
+        const int clear = v8_greater(v8_load(c->second[at]), limit) & (int)~c->open[at];
         for (int i = 0; i < 8; i++) {
             const uint32_t number = x->number[place[i]] = c->number[at][i];
             __builtin_prefetch(&job->features->exact[number]); // for measure_voxels()
@@ -97,8 +95,7 @@ static void choose_features(const tile *t, voxels *x)
             double p[3];
             for (int a = 0; a < 3; a++) p[a] = t->corner[a] + job->tile_voxel[a][i];
             x->settled[x->n_settled] = (uint8_t)i;
-            x->number[i] =
-                settle(t, at, lane, limit[lane] >= 0 ? limit[lane] : INFINITY, p, &x->settled_d2[x->n_settled]);
+            x->number[i] = settle(t, at, lane, p, &x->settled_d2[x->n_settled]);
             x->n_settled++;
         }
     }

@@ -12,20 +12,26 @@ static void start_candidates(sdm_candidates *c)
         v8_store(c->second[v], v8_all(INFINITY));
         v8_store_i(c->number[v], v8_all_i(0));
         c->last[v] = SDM_NONE;
+        c->open[v] = 0;
     }
 }
 
-/* One more candidate of a vector: feature `number` at squared distances d. */
-SDM_FOR_KIND void compete(sdm_candidates *c, unsigned v, v8i number, v8f d)
+/* The bound on the error of a squared distance d^2 is 2 (d + 1) 2 error, of two of them, doubled, this times (d + 1). */
+static inline float doubt_of(float error) { return 8 * error; }
+
+/* One more candidate of a vector: feature `number` at squared distances d. Returns the voxels that it may be nearest to. doubt: more than
+   two of them may differ by where their order is open, as it may be for d^2 = 0; and for others as a share of them. */
+SDM_FOR_KIND unsigned compete(sdm_candidates *c, unsigned v, v8i number, v8f d, v8f doubt, v8f share)
 {
-    const v8f first = v8_load(c->first[v]);
+    const v8f first = v8_load(c->first[v]), nearest = v8_min(d, first);
     v8_store(c->second[v], v8_min(v8_load(c->second[v]), v8_max(d, first)));
     v8_store_i(c->number[v], v8_select_i(d < first, number, v8_load_i(c->number[v])));
-    v8_store(c->first[v], v8_min(d, first));
+    v8_store(c->first[v], nearest);
+    return (unsigned)v8_greater(v8_fma(nearest, share, doubt), d);
 }
 
-/* Squared distances of a feature: INFINITY where a voxel is surely not in the region, -1 for thin faces elsewhere. at: its functions at the
-   middle of the vector, each eight floats after the one before; v: the vector. */
+/* Squared distances of a feature: INFINITY where a voxel is surely not in the region. at: its functions at the middle of the vector, each
+   eight floats after the one before; v: the vector. */
 SDM_FOR_KIND v8f distances(const sdm_grid_job *job, int kind, const sdm_block_feature *x, const float *at, unsigned v,
                            v8f error)
 {
@@ -38,10 +44,7 @@ SDM_FOR_KIND v8f distances(const sdm_grid_job *job, int kind, const sdm_block_fe
         f[1] -= v8_all(x->most[1]); // may be INFINITY
     }
     most = v8_max(most, v8_max(f[1], f[2]));
-    if (kind == SDM_THIN_FACES) {
-        d = v8_all(-1);
-        most = v8_max(most, f[3]);
-    }
+    if (kind == SDM_THIN_FACES) most = v8_max(most, f[3]);
     if (kind == SDM_CORNERS) {
         // without its region the end of an edge would be in doubt as far as the root of the error
         const point8 from = p8_add(p8_load((const float(*)[8])job->voxel[v / 8][v % 8].x),
@@ -57,24 +60,28 @@ SDM_FOR_KIND void compare(const block *b, int kind, size_t n)
 {
     const sdm_batch *batch = b->s->batch;
     sdm_candidates *c = b->s->of_vectors;
-    sdm_candidate *list = c->list + c->n;
-    float(*value)[8] = c->value + c->n;
-    const uint32_t first = (uint32_t)c->n;
-    const v8f error = v8_all(b->error);
+    const v8f error = v8_all(b->error), doubt = v8_all(2 * doubt_of(b->error)), share = v8_all(1 + doubt_of(b->error));
+    uint32_t end = (uint32_t)c->n;
     for (size_t i = 0; i < n; i++) {
         const uint32_t place = batch->vector[i];
         const sdm_tile_pair *pair = &batch->pair[place / SDM_FLOATS(batch->at_vectors[0])];
         const sdm_block_feature *x =
             (const sdm_block_feature *)(const void *)((const float *)batch->feature + pair->feature);
         const unsigned v = pair->vector + place % 8;
-        const uint32_t number = x->number;
+        const uint32_t number = x->number, before = c->last[v];
         const v8f d = distances(b->job, kind, x, &batch->at_vectors[0][0][0] + place, v, error);
-        compete(c, v, v8_all_i((int32_t)number), d);
-        v8_store(value[i], d);
-        list[i] = (sdm_candidate){number, c->last[v]};
-        c->last[v] = first + (uint32_t)i;
+        unsigned may;
+        if (kind == SDM_THIN_FACES)
+            c->open[v] |= may = (unsigned)v8_greater(v8_all(INFINITY), d); // how far it is float cannot tell
+        else
+            may = compete(c, v, v8_all_i((int32_t)number), d, doubt, share);
+        // without branches: who it is cannot be foreseen
+        c->list[end] = (sdm_candidate){number, before, may};
+        const uint32_t keep = (may + 0xff) >> 8;
+        c->last[v] = before ^ ((before ^ end) & -keep);
+        end += keep;
     }
-    c->n += n;
+    c->n = end;
 }
 
 /* The features of one kind that wait against the voxels. */

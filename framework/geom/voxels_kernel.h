@@ -102,15 +102,6 @@ static sdm_status hold_edges(block *b, sdm_error *err) { return hold_batch(b, SD
 static sdm_status hold_corners(block *b, sdm_error *err) { return hold_batch(b, SDM_CORNERS, err); }
 static hold_kind *const hold[SDM_FEATURE_KINDS] = {hold_faces, hold_thin_faces, hold_edges, hold_corners};
 
-#define AHEAD 2 // clusters
-
-/* Calls most of a cluster's groups into the cache. */
-static inline void fetch_groups(const sdm_features *f, const sdm_cluster_node *node)
-{
-    const char *group = (const char *)&f->group[node->group];
-    for (size_t k = 0; k < 2 * sizeof(sdm_feature_group); k += 64) __builtin_prefetch(group + k);
-}
-
 static inline bool is_full(const sdm_pending *p) { return p->n > SDM_BATCH - 8; }
 
 /* The features of the block's clusters against its voxels. cube: it is one, along x, y, z. */
@@ -127,7 +118,6 @@ SDM_FOR_KIND sdm_status hold_clusters(block *b, bool cube, sdm_error *err)
         const sdm_cluster_ref *c = &b->s->cluster[i];
         const sdm_cluster_node *node = &f->node[c->node];
         const sdm_feature_group *group = &f->group[node->group];
-        if (i + AHEAD < b->s->n_cluster) fetch_groups(f, &f->node[b->s->cluster[i + AHEAD].node]);
         keep_group(b, faces, node->first,
                    meet_group(&w, cube, SDM_FACES, group, c, &faces->met[faces->groups]) & ~node->thin);
         if (is_full(faces)) st = hold[SDM_FACES](b, err);

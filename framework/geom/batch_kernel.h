@@ -4,47 +4,57 @@
 
 #include "groups_kernel.h"
 
-/* Functions of the feature in a lane of a group at the middles of the tiles, and what they change by from there on. Returns the tiles that
-   meet its region. How far it is its cluster was asked: of those that are left hardly any is too far from a tile or vector. */
-SDM_FOR_KIND unsigned place_feature(const sdm_grid_job *job, int kind, point8 to_voxel, const sdm_met_group *m,
-                                    uint32_t lane, sdm_block_feature *x)
+/* Functions of the feature in a lane of a group at the middles of the tiles, and what they change by from there on. */
+SDM_FOR_KIND functions8 place_feature(const sdm_grid_job *job, int kind, point8 to_voxel, const sdm_met_group *m,
+                                      uint32_t lane, sdm_block_feature *x)
 {
     const float *g = &m->group->g[0][0][lane], *at = &m->at_block[0][lane];
     functions8 tile;
     x->number = m->number + lane;
-    x->most_at_vector = &m->most_at_vector[0][lane];
+    x->sum = &m->sum[0][lane];
     for (int k = 0; k < 2 && kind == SDM_EDGES; k++) x->most[k] = m->group->most[k][lane];
     for (int a = 0; a < 3 && kind == SDM_CORNERS; a++) x->from[a] = m->cluster->shift[a] - m->group->g[3][a][lane];
     for (int k = 0; k < functions_of(kind); k++) {
         const float *own = g + place_of(kind, k, 3);
-        const point8 gradient = p8_all(own[0], own[8], own[16]);
-        const v8f step = p8_dot(gradient, to_voxel), at_block = v8_all(at[place_of(kind, k, 1)]);
+        const v8f step = p8_dot(p8_all(own[0], own[8], own[16]), to_voxel);
         v8_store(x->to_voxels[k], step);
-        tile.f[k] = v8_fma(step, v8_all(4), at_block);
-        if (!job->alike) {
-            const point8 vectors = p8_load((const float(*)[8])job->part[SDM_TO_VECTORS].middle.x);
-            v8_store(x->to_vectors[k], p8_dot(gradient, vectors));
-            tile.f[k] = p8_linear(gradient, p8_load((const float(*)[8])job->part[SDM_TO_TILES].middle.x), at_block);
-        }
-        v8_store(x->at_tiles[k], tile.f[k]);
+        tile.f[k] = v8_fma(step, v8_all(4), v8_all(at[place_of(kind, k, 1)]));
     }
-    return m->cluster->mask & ~(unsigned)v8_greater(beyond(kind, &tile, &m->most_at_tile[0][lane]), v8_all(0));
+    if (!job->alike) {
+        const point8 vectors = p8_load((const float(*)[8])job->part[SDM_TO_VECTORS].middle.x);
+        const point8 tiles = p8_load((const float(*)[8])job->part[SDM_TO_TILES].middle.x);
+        for (int k = 0; k < functions_of(kind); k++) {
+            const float *own = g + place_of(kind, k, 3);
+            const point8 gradient = p8_all(own[0], own[8], own[16]);
+            v8_store(x->to_vectors[k], p8_dot(gradient, vectors));
+            tile.f[k] = p8_linear(gradient, tiles, v8_all(at[place_of(kind, k, 1)]));
+        }
+    }
+    for (int k = 0; k < functions_of(kind); k++) v8_store(x->at_tiles[k], tile.f[k]);
+    return tile;
 }
 
-/* Takes the features that wait into the batch and lists the tiles that they meet; returns how many. */
+/* Takes the features that wait into the batch and lists the tiles that meet their regions; returns how many. How far a feature is its cluster
+   was asked: of those that are left hardly any is too far from a tile or vector. */
 SDM_FOR_KIND size_t hit_tiles(block *b, int kind)
 {
+    const sdm_grid_job *job = b->job;
     const sdm_pending *p = &b->s->pending[kind];
+    const size_t n_feature = p->n;
+    const point8 to_voxel = p8_load((const float(*)[8])job->to_voxel.x);
+    const v8f less = v8_all(-b->half[SDM_TO_TILES]), error = v8_all(b->error);
     sdm_batch *batch = b->s->batch;
-    const point8 to_voxel = p8_load((const float(*)[8])b->job->to_voxel.x);
     unsigned met = 0;
     size_t n = 0;
-    for (size_t i = 0; i < p->n; i++) {
+    for (size_t i = 0; i < n_feature; i++) {
         const uint32_t lane = p->feature[i] % 8;
         const sdm_met_group *m = (const sdm_met_group *)(const void *)((const float *)p->met + (p->feature[i] - lane));
-        const unsigned mask = place_feature(b->job, kind, to_voxel, m, lane, &batch->feature[i]);
+        sdm_block_feature *x = &batch->feature[i];
+        const functions8 f = place_feature(job, kind, to_voxel, m, lane, x);
+        const unsigned mask =
+            m->cluster->mask & ~(unsigned)v8_greater(beyond(kind, &f, &m->sum[0][lane], less, x->most), error);
         met |= mask;
-        n = put_lanes(b->job, batch->tile, n, (uint32_t)(i * SDM_FLOATS(sdm_block_feature)), mask);
+        n = put_lanes(job, batch->tile, n, (uint32_t)(i * SDM_FLOATS(sdm_block_feature)), mask);
     }
     b->met |= met;
     return n;
@@ -55,7 +65,8 @@ SDM_FOR_KIND size_t hit_vectors(const block *b, int kind, size_t n_tile)
 {
     const sdm_grid_job *job = b->job;
     const bool alike = job->alike;
-    const v8f factor = v8_all(alike ? 2 : 1);
+    const v8f factor = v8_all(alike ? 2 : 1), error = v8_all(b->error);
+    const v8f less = v8_all(-b->half[SDM_TO_VECTORS]);
     sdm_batch *batch = b->s->batch;
     size_t n = 0;
     for (size_t i = 0; i < n_tile; i++) {
@@ -68,7 +79,7 @@ SDM_FOR_KIND size_t hit_vectors(const block *b, int kind, size_t n_tile)
             v8_store(batch->at_vectors[i][k], f.f[k]);
         }
         batch->pair[i] = (sdm_tile_pair){(uint16_t)place, (uint16_t)(8 * t)};
-        const unsigned mask = ~(unsigned)v8_greater(beyond(kind, &f, x->most_at_vector), v8_all(0));
+        const unsigned mask = ~(unsigned)v8_greater(beyond(kind, &f, x->sum, less, x->most), error);
         n = put_lanes(job, batch->vector, n, (uint32_t)(i * SDM_FLOATS(batch->at_vectors[0])), mask & b->wanted[t]);
     }
     return n;

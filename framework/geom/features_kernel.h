@@ -17,15 +17,21 @@ typedef struct functions8 {
     v8f f[SDM_FUNCTIONS];
 } functions8;
 
-/* How far the worst of them is beyond what is most in the feature's region: at most 0 inside. most: of one feature, in its lane of a row for
-   each function of the group. */
-SDM_FOR_KIND v8f beyond(int kind, const functions8 *x, const float *most)
+/* How far the worst of a feature's functions at the middles of parts is beyond what is most in its region, less what it changes within the
+   part: at most the error of a function where the part meets the region. sum: as in a group, in the feature's lane; less: half extents of the
+   part with the other sign. */
+SDM_FOR_KIND v8f beyond(int kind, const functions8 *x, const float *sum, v8f less, const float most[2])
 {
-    v8f all = (kind == SDM_EDGES ? v8_abs(x->f[0]) : x->f[0]) - v8_all(most[0]);
-    for (int k = 1; k < functions_of(kind) && (k < 3 || kind == SDM_THIN_FACES || kind == SDM_CORNERS); k++)
-        all = v8_max(all, x->f[k] - v8_all(most[place_of(kind, k, 1)]));
-    if (kind == SDM_EDGES) all = v8_max(all, x->f[1] + x->f[2] - v8_all(most[24]));
-    return all;
+    v8f all = x->f[0];
+    for (int k = 0; k < functions_of(kind) && (k < 3 || kind == SDM_THIN_FACES || kind == SDM_CORNERS); k++) {
+        v8f f = kind == SDM_EDGES && k == 0 ? v8_abs(x->f[0]) : x->f[k];
+        if (kind == SDM_EDGES && k < 2) f -= v8_all(most[k]);
+        f = v8_fma(less, v8_all(sum[place_of(kind, k, 1)]), f);
+        all = k ? v8_max(all, f) : f;
+    }
+    if (kind != SDM_EDGES) return all;
+    const v8f mean = (x->f[1] + x->f[2]) * v8_all(0.5f) - v8_all(most[1]);
+    return v8_max(all, v8_fma(less, v8_all(sum[24]), mean));
 }
 
 #endif

@@ -69,8 +69,8 @@ enum { SDM_FACES, SDM_THIN_FACES, SDM_EDGES, SDM_CORNERS, SDM_FEATURE_KINDS };
 /* A group of features some of which meet the block at hand, as from its middle: a feature in each lane. */
 typedef struct sdm_met_group {
     _Alignas(64) float at_block[4][8]; /* the functions there */
-    float most_at_tile[4][8];          /* that they are at the middles of tiles that meet the region */
-    float most_at_vector[4][8];        /* the same of vectors */
+    float own_sum[4][8];
+    const float (*sum)[8]; /* the group's, or the own one */
     const sdm_feature_group *group;
     const sdm_cluster_ref *cluster;
     uint32_t number; /* of the first feature */
@@ -82,7 +82,7 @@ typedef struct sdm_block_feature {
     _Alignas(64) float to_voxels[SDM_FUNCTIONS][8]; /* from the middle of a vector */
     float at_tiles[SDM_FUNCTIONS][8];               /* the functions there */
     float to_vectors[SDM_FUNCTIONS][8];             /* from the middle of a tile; unused if sdm_grid_job.alike */
-    const float *most_at_vector;                    /* lane of an sdm_met_group */
+    const float *sum;                               /* lane of sdm_met_group.sum */
     float most[2];                                  /* functions 0 and 1 of an edge */
     float from[3];                                  /* corner: from it to the middle of the block */
     uint32_t number;

@@ -316,7 +316,7 @@ static void fill_sums(sdm_feature_group *out, bool edges)
     for (int k = 0; k < 4; k++) {
         v8f sum = v8_all(0);
         for (int a = 0; a < 3; a++)
-            sum += v8_abs(edges && k == 3 ? v8_load(out->g[1][a]) + v8_load(out->g[2][a]) : v8_load(out->g[k][a]));
+            sum += v8_abs(edges && k == 3 ? (v8_load(out->g[1][a]) + v8_load(out->g[2][a])) / 2 : v8_load(out->g[k][a]));
         v8_store(out->sum[k], sum);
     }
 }

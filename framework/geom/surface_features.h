@@ -29,7 +29,7 @@ typedef struct sdm_feature_group {
     _Alignas(64) float g[4][3][8]; /* [k][coordinate] */
     float offset[4][8];
     float most[2][8]; /* of functions 0 and 1 */
-    float sum[4][8];  /* of the sizes of the coordinates of g[k]; 3 of an edge: of g[1] + g[2] */
+    float sum[4][8];  /* of the sizes of the coordinates of g[k]; 3 of an edge: of (g[1] + g[2]) / 2 */
 } sdm_feature_group;
 
 #define SDM_CORNER_LANES 4

@@ -142,9 +142,7 @@ SDM_FOR_KIND sdm_status hold_clusters(block *b, bool cube, sdm_error *err)
 
 static sdm_status hold_features(block *b, sdm_error *err)
 {
-    const float *half = b->job->part[SDM_TO_BLOCKS].half;
-    const bool cube = b->job->aligned && half[0] == half[1] && half[0] == half[2];
-    return cube ? hold_clusters(b, true, err) : hold_clusters(b, false, err);
+    return is_cube(b->job) ? hold_clusters(b, true, err) : hold_clusters(b, false, err);
 }
 
 #endif

@@ -34,8 +34,8 @@ SDM_FOR_KIND functions8 place_feature(const sdm_grid_job *job, int kind, point8 
     return tile;
 }
 
-/* Takes the features that wait into the batch and lists the tiles that meet their regions; returns how many. How far a feature is its cluster
-   was asked: of those that are left hardly any is too far from a tile or vector. */
+/* Takes the features that wait into the batch and lists the tiles that meet their regions; returns how many. How far a feature is
+   its cluster was asked: of those that are left hardly any is too far from a tile. */
 SDM_FOR_KIND size_t hit_tiles(block *b, int kind)
 {
     const sdm_grid_job *job = b->job;
@@ -79,7 +79,9 @@ SDM_FOR_KIND size_t hit_vectors(const block *b, int kind, size_t n_tile)
             v8_store(batch->at_vectors[i][k], f.f[k]);
         }
         batch->pair[i] = (sdm_tile_pair){(uint16_t)place, (uint16_t)(8 * t)};
-        const unsigned mask = ~(unsigned)v8_greater(beyond(kind, &f, x->sum, less, x->most), error);
+        v8f out = beyond(kind, &f, x->sum, less, x->most);
+        if (kind == SDM_FACES || kind == SDM_EDGES) out = v8_max(out, v8_abs(f.f[3]) - v8_load(b->far[t]));
+        const unsigned mask = ~(unsigned)v8_greater(out, error);
         n = put_lanes(job, batch->vector, n, (uint32_t)(i * SDM_FLOATS(batch->at_vectors[0])), mask & b->wanted[t]);
     }
     return n;

@@ -12,6 +12,7 @@ typedef struct block {
     uint8_t wanted[8]; /* vectors of a tile that begin inside the grid */
     unsigned met;      /* tiles that meet the region of some feature */
     float error;       /* bound on the error of a function */
+    _Alignas(32) float far[8][8]; /* [tile][vector]: no plane or line farther from its middle has the nearest point of a voxel of it */
     float half[SDM_GRID_STEPS]; /* half extents of it, its tiles and its vectors, as if they were cubes along x, y, z, see own_sums() */
 } block;
 

@@ -94,7 +94,8 @@ enum { SDM_BATCH = 24 };
 /* Features of one kind that wait for that. There is room for eight more: one group. */
 typedef struct sdm_pending {
     sdm_met_group met[SDM_BATCH + 1];
-    uint16_t feature[SDM_BATCH + 8]; /* place in met[] of its first float, counted in floats. Lists are written eight at a time */
+    uint16_t feature[SDM_BATCH +
+                     8]; /* place in met[] of its first float, counted in floats. Lists are written eight at a time */
     size_t groups, n;
 } sdm_pending;
 

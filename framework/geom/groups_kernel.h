@@ -12,8 +12,10 @@ typedef struct block {
     uint8_t wanted[8]; /* vectors of a tile that begin inside the grid */
     unsigned met;      /* tiles that meet the region of some feature */
     float error;       /* bound on the error of a function */
-    _Alignas(32) float far[8][8]; /* [tile][vector]: no plane or line farther from its middle has the nearest point of a voxel of it */
-    float half[SDM_GRID_STEPS]; /* half extents of it, its tiles and its vectors, as if they were cubes along x, y, z, see own_sums() */
+    _Alignas(32) float far2
+        [8][8]; /* [tile][vector]: what is farther from its middle, squared, is the nearest of none of its voxels */
+    float half
+        [SDM_GRID_STEPS]; /* half extents of it, its tiles and its vectors, as if they were cubes along x, y, z, see own_sums() */
 } block;
 
 static inline bool is_cube(const sdm_grid_job *job)
@@ -28,8 +30,7 @@ static void own_sums(const block *b, int kind, const sdm_feature_group *k, float
     const sdm_grid_parts *q = &b->job->part[SDM_TO_BLOCKS];
     for (int j = 0; j < 4; j++) {
         point8 g = p8_load(k->g[j]);
-        if (kind == SDM_EDGES && j == 3)
-            g = p8_scale(p8_add(p8_load(k->g[1]), p8_load(k->g[2])), v8_all(0.5f));
+        if (kind == SDM_EDGES && j == 3) g = p8_scale(p8_add(p8_load(k->g[1]), p8_load(k->g[2])), v8_all(0.5f));
         v8_store(out[j], extent(q, b->job->aligned, g));
     }
 }

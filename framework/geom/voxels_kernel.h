@@ -47,8 +47,8 @@ SDM_FOR_KIND v8f distances(const sdm_grid_job *job, int kind, const sdm_block_fe
     if (kind == SDM_THIN_FACES) most = v8_max(most, f[3]);
     if (kind == SDM_CORNERS) {
         // without its region the end of an edge would be in doubt as far as the root of the error
-        const point8 from = p8_add(p8_load((const float(*)[8])job->voxel[v / 8][v % 8].x),
-                                   p8_all(x->from[0], x->from[1], x->from[2]));
+        const point8 from =
+            p8_add(p8_load((const float(*)[8])job->voxel[v / 8][v % 8].x), p8_all(x->from[0], x->from[1], x->from[2]));
         d = p8_dot(from, from);
         most = v8_max(v8_max(most, f[3]), v8_max(f[4], f[5]));
     }
@@ -131,7 +131,8 @@ SDM_FOR_KIND sdm_status hold_clusters(block *b, bool cube, sdm_error *err)
             if (is_full(edges)) st = hold[SDM_EDGES](b, err);
         }
         for (uint32_t number = node->corner; number < node->corner_end && !st; number += SDM_CORNER_LANES) {
-            keep_group(b, corners, number, meet_group(&w, cube, SDM_CORNERS, ++group, c, &corners->met[corners->groups]));
+            keep_group(b, corners, number,
+                       meet_group(&w, cube, SDM_CORNERS, ++group, c, &corners->met[corners->groups]));
             if (is_full(corners)) st = hold[SDM_CORNERS](b, err);
         }
     }

@@ -75,11 +75,8 @@ SDM_FOR_KIND void compare(const block *b, int kind, size_t n)
             c->open[v] |= may = (unsigned)v8_greater(v8_all(INFINITY), d); // how far it is float cannot tell
         else
             may = compete(c, v, v8_all_i((int32_t)number), d, doubt, share);
-        // without branches: who it is cannot be foreseen
         c->list[end] = (sdm_candidate){number, before, may};
-        const uint32_t keep = (may + 0xff) >> 8;
-        c->last[v] = before ^ ((before ^ end) & -keep);
-        end += keep;
+        c->last[v] = end++;
     }
     c->n = end;
 }

@@ -35,9 +35,11 @@ int sdm_grid_kernel_select(int level)
     return usable(level);
 }
 
+int sdm_grid_kernel_level(void) { return usable(wanted_level); }
+
 static sdm_grid_kernel *choose_kernel(void)
 {
-    switch (usable(wanted_level)) {
+    switch (sdm_grid_kernel_level()) {
 #if defined(__x86_64__) && defined(__GNUC__)
     case 2:
         return sdm_grid_kernel_avx512;

@@ -21,5 +21,7 @@ bool sdm_cancelled(const sdm_exact_opts *opts);
 /* For tests: the instruction set of the kernels, 0 generic, 1 AVX2, 2 AVX-512, -1 the best one. Not thread safe. Returns the one
    that will be used. */
 SDM_API int sdm_grid_kernel_select(int level);
+/* The one that will be used. */
+int sdm_grid_kernel_level(void);
 
 #endif

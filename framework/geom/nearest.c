@@ -8,14 +8,8 @@
 sdm_status sdm_nearest_build(const sdm_mesh *m, const sdm_topology *topo, sdm_arena *arena, sdm_nearest *n,
                              sdm_error *err)
 {
-    sdm_status s = SDM_TAKE_UNSET(arena, SDM_LOW, &n->frames, m->n_tri, "frames of triangles", err);
-    if (s) return s;
-    for (size_t i = 0; i < m->n_tri; i++) {
-        const uint32_t *v = &m->tri[3 * (size_t)n->tree.order[i]];
-        sdm_frame_build(&m->vert[3 * (size_t)v[0]], &m->vert[3 * (size_t)v[1]], &m->vert[3 * (size_t)v[2]],
-                        &n->frames[i]);
-    }
-    return sdm_features_build(m, topo, n->frames, &n->tree, arena, &n->features, err);
+    const sdm_status s = SDM_TAKE_UNSET(arena, SDM_LOW, &n->frames, m->n_tri, "frames of triangles", err);
+    return s ? s : sdm_features_build(m, topo, &n->tree, arena, n->frames, &n->features, err);
 }
 
 double sdm_nearest_find(const sdm_nearest *n, const double x[3], double bound, uint32_t *slot, double q[3],

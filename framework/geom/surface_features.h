@@ -70,9 +70,9 @@ typedef struct sdm_features {
 /* Coordinate a of the point that the functions of a cluster are relative to. */
 static inline float sdm_cluster_middle(const sdm_cluster_node *c, int a) { return 0.5f * (c->lo[a] + c->hi[a]); }
 
-/* frames[slot]: of triangle tree->order[slot] of m; topo: of m. Taken from the low end of the arena. */
-sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const sdm_frame *frames, const sdm_bvh *tree,
-                              sdm_arena *arena, sdm_features *f, sdm_error *err);
+/* Fills frames[slot], too: of triangle tree->order[slot] of m; topo: of m. Taken from the low end of the arena. */
+sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree, sdm_arena *arena,
+                              sdm_frame *frames, sdm_features *f, sdm_error *err);
 
 /* Bytes that a build takes at most: those that stay; to *scratch is added what is taken in passing. */
 size_t sdm_features_bytes(size_t n_tri, size_t n_vert, size_t *scratch);

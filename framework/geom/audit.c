@@ -21,22 +21,6 @@ static sdm_status check_content(const sdm_mesh *m, sdm_error *err)
 
 static bool repeats_vertex(const uint32_t *t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
-/* Box of the vertices in use. */
-static void find_bounds(const sdm_mesh *m, sdm_audit *a)
-{
-    for (int c = 0; c < 3; c++) {
-        a->min[c] = INFINITY;
-        a->max[c] = -INFINITY;
-    }
-    for (size_t i = 0; i < 3 * m->n_tri; i++) {
-        const double *v = &m->vert[3 * (size_t)m->tri[i]];
-        for (int c = 0; c < 3; c++) {
-            a->min[c] = v[c] < a->min[c] ? v[c] : a->min[c];
-            a->max[c] = v[c] > a->max[c] ? v[c] : a->max[c];
-        }
-    }
-}
-
 static void measure(const sdm_mesh *m, sdm_survey *s)
 {
     sdm_audit *a = &s->audit;
@@ -126,11 +110,12 @@ sdm_status sdm_survey_build(const sdm_mesh *m, sdm_arena *arena, sdm_survey *s, 
     if (!st) st = sdm_topology_build(m, arena, &s->topo, err);
     s->with_topology = arena->end[SDM_HIGH];
     if (!st) st = sdm_bvh_build(m, arena, &s->tree, err);
-    if (!st) st = SDM_TAKE(arena, SDM_HIGH, &s->facets, m->n_tri, "normals of triangles", err);
+    if (!st) st = SDM_TAKE_UNSET(arena, SDM_HIGH, &s->facets, m->n_tri, "normals of triangles", err);
     if (st) return st;
     a->n_vert = m->n_vert;
     a->n_tri = m->n_tri;
-    find_bounds(m, a);
+    memcpy(a->min, s->tree.node->lo, sizeof a->min);
+    memcpy(a->max, s->tree.node->hi, sizeof a->max);
     measure(m, s);
     count_edges(&s->topo, a);
     count_duplicates(&s->topo, a);

@@ -6,15 +6,21 @@
 #include <math.h>
 #include <string.h>
 
+#include "two_lanes_kernel.h"
+
 #define LEAF 4u
-#define FULL ((size_t)8) // small nodes are cut where they leave as many: clusters of the map are full then
-#define MIDDLE_DEPTH 64  // below it nodes are halved in their order: bounds the depth of the tree
+#define FULL ((size_t)8)         // small nodes are cut where they leave as many: clusters of the map are full then
+#define MOST_SORTED ((size_t)32) // nodes of so many are cut there
+#define MIDDLE_DEPTH 64          // below it nodes are halved in their order: bounds the depth of the tree
 
 /* Middles are in units of the mesh's size: they only choose the splits, float is enough. */
 typedef struct item {
     float middle[3];
     uint32_t tri;
 } item;
+
+typedef int32_t i32x4 __attribute__((vector_size(16)));
+typedef float f32x4 __attribute__((vector_size(16)));
 
 typedef struct part {
     uint32_t first, count; // as in sdm_bvh_node
@@ -26,30 +32,60 @@ typedef struct builder {
     size_t n_part;
 } builder;
 
+/* Sorts list[n], n <= MOST_SORTED, along an axis: each goes to the place that as many are before. No branch depends on what is compared. */
+static void sort(item *list, size_t n, int axis)
+{
+    i32x4 key[MOST_SORTED / 4];
+    item copy[MOST_SORTED];
+    memcpy(copy, list, n * sizeof *list);
+    // numbers of at least 0 are in the order of their bits; the last five make all different
+    for (size_t i = 0; i < n; i++) {
+        uint32_t bits;
+        memcpy(&bits, &list[i].middle[axis], sizeof bits);
+        key[i / 4][i % 4] = (int32_t)((bits & ~31u) | (uint32_t)i);
+    }
+    for (size_t i = n; i % 4; i++) key[i / 4][i % 4] = INT32_MAX;
+    for (size_t i = 0; i < n; i++) {
+        const int32_t own = key[i / 4][i % 4];
+        const i32x4 all = {own, own, own, own};
+        i32x4 before = {0, 0, 0, 0};
+        for (size_t j = 0; j < (n + 3) / 4; j++) before -= key[j] < all;
+        list[before[0] + before[1] + before[2] + before[3]] = copy[i];
+    }
+}
+
 /* As near to `left` as a multiple of FULL can be, in the order along an axis. */
 static size_t cut_to_full(item *list, size_t n, int axis, size_t left)
 {
-    for (size_t i = 1; i < n; i++) {
-        const item x = list[i];
-        size_t k = i;
-        for (; k > 0 && list[k - 1].middle[axis] > x.middle[axis]; k--) list[k] = list[k - 1];
-        list[k] = x;
-    }
+    sort(list, n, axis);
     const size_t full = (left + FULL / 2) / FULL * FULL;
     return full < FULL ? FULL : full < n ? full : full - FULL;
+}
+
+/* Its middle; the last lane means nothing. */
+static inline f32x4 item_bits(const item *x)
+{
+    f32x4 bits;
+    memcpy(&bits, x, sizeof bits);
+    return bits;
+}
+
+/* x where a < b, else y */
+static inline f32x4 select_less(f32x4 a, f32x4 b, f32x4 x, f32x4 y)
+{
+    const i32x4 m = a < b;
+    return (f32x4)((m & (i32x4)x) | (~m & (i32x4)y));
 }
 
 /* Reorders list[n] into two parts and returns the size of the first, 0 < size < n. */
 static size_t split(const builder *w, item *list, size_t n, int depth)
 {
-    if (depth >= MIDDLE_DEPTH) return n / 2;
-    float lo[3] = {INFINITY, INFINITY, INFINITY}, hi[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (size_t i = 0; i < n; i++) {
-        for (int a = 0; a < 3; a++) {
-            const float x = list[i].middle[a];
-            lo[a] = x < lo[a] ? x : lo[a];
-            hi[a] = x > hi[a] ? x : hi[a];
-        }
+    if (n <= FULL || depth >= MIDDLE_DEPTH) return n / 2;
+    f32x4 lo = item_bits(list), hi = lo;
+    for (size_t i = 1; i < n; i++) {
+        const f32x4 x = item_bits(&list[i]);
+        lo = select_less(x, lo, x, lo);
+        hi = select_less(hi, x, x, hi);
     }
     int axis = 0;
     for (int a = 1; a < 3; a++)
@@ -66,7 +102,7 @@ static size_t split(const builder *w, item *list, size_t n, int depth)
         right += !is_left;
     }
     memcpy(list + left, w->spare, right * sizeof *list);
-    if (n > FULL && n <= 4 * FULL) return cut_to_full(list, n, axis, left);
+    if (n <= MOST_SORTED) return cut_to_full(list, n, axis, left);
     return left > 0 && left < n ? left : n / 2; // else all middles coincide
 }
 
@@ -113,26 +149,18 @@ static inline item item_of(const sdm_mesh *m, const units *u, size_t t)
     return it;
 }
 
-static void fill_items(const sdm_mesh *m, item *list)
-{
-    double lo[3] = {INFINITY, INFINITY, INFINITY}, hi[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (size_t i = 0; i < 3 * m->n_tri; i++) {
-        const double *v = &m->vert[3 * (size_t)m->tri[i]];
-        for (int a = 0; a < 3; a++) {
-            lo[a] = v[a] < lo[a] ? v[a] : lo[a];
-            hi[a] = v[a] > hi[a] ? v[a] : hi[a];
-        }
-    }
-    const units u = units_of(lo, hi);
-    for (size_t t = 0; t < m->n_tri; t++) list[t] = item_of(m, &u, t);
-}
+/* A box: x and y in lanes. */
+typedef struct box {
+    v2d lo, hi;
+    double lo_z, hi_z;
+} box;
 
-static inline void join(double lo[3], double hi[3], const double other_lo[3], const double other_hi[3])
+static inline void join(box *b, const double lo[3], const double hi[3])
 {
-    for (int a = 0; a < 3; a++) {
-        lo[a] = other_lo[a] < lo[a] ? other_lo[a] : lo[a];
-        hi[a] = other_hi[a] > hi[a] ? other_hi[a] : hi[a];
-    }
+    b->lo = d2_lesser(d2_load(lo), b->lo);
+    b->hi = d2_greater(d2_load(hi), b->hi);
+    b->lo_z = lo[2] < b->lo_z ? lo[2] : b->lo_z;
+    b->hi_z = hi[2] > b->hi_z ? hi[2] : b->hi_z;
 }
 
 /* Boxes from the leaves up: children come after their parent. */
@@ -141,15 +169,11 @@ static void fill_nodes(const sdm_mesh *m, const builder *w, sdm_bvh *b)
     for (size_t i = 0; i < b->n_tri; i++) b->order[i] = w->item[i].tri;
     for (size_t i = b->n_node; i-- > 0;) {
         const part p = w->part[i];
-        sdm_bvh_node n = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}, p.first, p.count};
-        for (uint32_t c = p.first; !p.count && c < p.first + 2; c++) join(n.lo, n.hi, b->node[c].lo, b->node[c].hi);
-        for (uint32_t k = p.first; k < p.first + p.count; k++) {
-            for (size_t c = 0; c < 3; c++) {
-                const double *v = corner(m, b->order[k], c);
-                join(n.lo, n.hi, v, v);
-            }
-        }
-        b->node[i] = n;
+        box x = {d2_all(INFINITY), d2_all(-INFINITY), INFINITY, -INFINITY};
+        for (uint32_t c = p.first; !p.count && c < p.first + 2; c++) join(&x, b->node[c].lo, b->node[c].hi);
+        for (uint32_t k = p.first; k < p.first + p.count; k++)
+            for (size_t c = 0; c < 3; c++) join(&x, corner(m, b->order[k], c), corner(m, b->order[k], c));
+        b->node[i] = (sdm_bvh_node){{x.lo[0], x.lo[1], x.lo_z}, {x.hi[0], x.hi[1], x.hi_z}, p.first, p.count};
     }
 }
 
@@ -183,7 +207,11 @@ sdm_status sdm_bvh_build(const sdm_mesh *m, sdm_arena *arena, sdm_bvh *b, sdm_er
     builder w = {0};
     sdm_status s = start(&w, m->n_tri, arena, b, err);
     if (!s) {
-        fill_items(m, w.item);
+        box x = {d2_all(INFINITY), d2_all(-INFINITY), INFINITY, -INFINITY};
+        for (size_t t = 0; t < m->n_tri; t++)
+            for (size_t c = 0; c < 3; c++) join(&x, corner(m, t, c), corner(m, t, c));
+        const units u = units_of((double[3]){x.lo[0], x.lo[1], x.lo_z}, (double[3]){x.hi[0], x.hi[1], x.hi_z});
+        for (size_t t = 0; t < m->n_tri; t++) w.item[t] = item_of(m, &u, t);
         build_part(&w, 0, 0, m->n_tri, 0);
         s = finish(m, &w, arena, b, err);
     }
@@ -231,8 +259,9 @@ static void derive_part(builder *w, const pieces *p, uint32_t index, uint32_t fr
     size_t end = n;
     for (uint32_t k = node->first; k < node->first + node->count; k++) {
         const uint32_t t = p->from->order[k];
-        for (uint32_t i = p->first[t]; i < p->first[t + 1]; i++) w->item[end++] = item_of(p->mesh, &p->units, i);
+        for (uint32_t i = p->first[t]; i < p->first[t + 1]; i++) w->item[end++].tri = i;
     }
+    for (size_t i = n; i < end && end - n > LEAF; i++) w->item[i] = item_of(p->mesh, &p->units, w->item[i].tri);
     build_part(w, index, n, end - n, depth);
 }
 

@@ -10,6 +10,8 @@
 #include "sdm/memory.h"
 #include "vec3.h"
 
+#define KEPT 256u // frames of triangles at hand: those that meet others are asked for again and again
+
 typedef struct finder {
     const sdm_mesh *mesh;
     const sdm_topology *topo;
@@ -17,6 +19,8 @@ typedef struct finder {
     sdm_contacts *out;
     sdm_contact *list; // [cap], as they are found
     size_t cap;
+    sdm_frame *frame; // [KEPT] of triangles frame_of[KEPT], at the place t % KEPT
+    uint32_t *frame_of;
     sdm_budget *budget;
     sdm_error *err;
 } finder;
@@ -57,6 +61,14 @@ static sdm_status add(finder *w, sdm_contact c)
     }
     w->list[out->n++] = c;
     return SDM_OK;
+}
+
+static void find_frame(const finder *w, uint32_t t, sdm_frame *f)
+{
+    sdm_frame *kept = &w->frame[t % KEPT];
+    if (w->frame_of[t % KEPT] != t) sdm_facet_frame(w->mesh, t, kept);
+    w->frame_of[t % KEPT] = t;
+    *f = *kept;
 }
 
 /* A triangle of a pair. */
@@ -213,8 +225,8 @@ static sdm_status meet(finder *w, uint32_t i, uint32_t j, int shared)
 {
     sdm_contacts *out = w->out;
     side a = {.tri = i}, b = {.tri = j};
-    sdm_facet_frame(w->mesh, i, &a.frame);
-    sdm_facet_frame(w->mesh, j, &b.frame);
+    find_frame(w, i, &a.frame);
+    find_frame(w, j, &b.frame);
     plane_distances(w, &b, &a);
     if (b.mask == 1 || b.mask == 4) return SDM_OK;
     if (shared && (b.mask == 3 || b.mask == 6)) {
@@ -283,10 +295,17 @@ sdm_status sdm_contacts_find(const sdm_mesh *m, const sdm_topology *topo, const 
     for (size_t i = 0; i < 3 * m->n_vert; i++) largest = fabs(m->vert[i]) > largest ? fabs(m->vert[i]) : largest;
     c->tolerance = 16 * DBL_EPSILON * largest;
     finder w = {.mesh = m, .topo = topo, .facets = facets, .out = c, .budget = budget, .err = err};
-    sdm_status s = sdm_budget_take(budget, m->n_vert + sdm_pairs_bytes(tree), err);
+    const sdm_arena_mark before = arena->end[SDM_HIGH];
+    const size_t fans = sdm_fans_bytes(m->n_vert), pairs = sdm_pairs_bytes(m->n_vert, tree);
+    const size_t scratch = (fans > pairs ? fans : pairs) + KEPT * (sizeof *w.frame + sizeof *w.frame_of);
+    sdm_status s = sdm_budget_take(budget, scratch, err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &w.frame, KEPT, "frames of triangles", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &w.frame_of, KEPT, "frames of triangles", err);
+    if (!s) memset(w.frame_of, 0xff, KEPT * sizeof *w.frame_of);
     if (!s) s = sdm_fans_visit(m, topo, facets, c->tolerance, arena, visit_neighbours, &w, err);
     if (!s) s = sdm_pairs_visit(m, topo, tree, c->tolerance, arena, visit_apart, &w, err);
-    if (!s && budget) budget->used -= m->n_vert + sdm_pairs_bytes(tree);
+    sdm_arena_release(arena, SDM_HIGH, before);
+    if (!s && budget) budget->used -= scratch;
     if (!s) s = sdm_budget_take(budget, (m->n_tri + 1) * sizeof *c->first + c->n * sizeof *c->list, err);
     if (!s) s = sort_contacts(w.list, m->n_tri, arena, c, err);
     sdm_free(w.list);

@@ -5,6 +5,9 @@
 #include "facet.h"
 #include "topology.h"
 
+/* Bytes that a visit takes in passing where vertices that make up no disc are few. */
+size_t sdm_fans_bytes(size_t n_vert);
+
 /* Calls visit(user, i, j, shared) for the pairs i < j of triangles with 1, 2 or 3 common vertices, but for those around a
    vertex whose triangles make up a disc that is seen from one side without overlap; stops at the first status that is not
    SDM_OK and returns it. Triangles with a repeated vertex are left out. */

@@ -1,4 +1,4 @@
-/* Four boxes or four triangles at once: which overlap, which share a vertex. Masks have bit k for lane k. */
+/* Eight boxes of whole numbers at once: which overlap another. Masks have bit k for lane k. */
 #ifndef SDM_GEOM_PAIR_KERNEL_H
 #define SDM_GEOM_PAIR_KERNEL_H
 
@@ -7,76 +7,46 @@
 #include <emmintrin.h>
 #endif
 
-typedef struct sdm_box4 {
-    float lo[3][4], hi[3][4];
-} sdm_box4;
+typedef int16_t sdm_i16x8 __attribute__((vector_size(16)));
 
+/* Eight boxes, or one in all lanes. */
+typedef struct sdm_box8 {
+    sdm_i16x8 lo[3], hi[3];
+} sdm_box8;
+
+static inline sdm_i16x8 i16x8_all(int16_t x) { return (sdm_i16x8){x, x, x, x, x, x, x, x}; }
+
+/* A box and a half-empty register of its bounds: lo in 0 - 2, hi in 4 - 6. */
+static inline void box8_all(sdm_i16x8 bounds, sdm_box8 *b)
+{
 #if defined(__SSE2__)
-
-/* Lanes of a that do not lie apart from the same lanes of b. */
-static inline int box4_overlap(const sdm_box4 *a, const sdm_box4 *b)
-{
-    __m128 apart = _mm_setzero_ps();
-    for (int i = 0; i < 3; i++) {
-        apart = _mm_or_ps(apart, _mm_cmpgt_ps(_mm_load_ps(a->lo[i]), _mm_load_ps(b->hi[i])));
-        apart = _mm_or_ps(apart, _mm_cmpgt_ps(_mm_load_ps(b->lo[i]), _mm_load_ps(a->hi[i])));
-    }
-    return 15 & ~_mm_movemask_ps(apart);
-}
-
-/* Lanes of b that overlap lane k of a. */
-static inline int box4_overlap_one(const sdm_box4 *a, int k, const sdm_box4 *b)
-{
-    __m128 apart = _mm_setzero_ps();
-    for (int i = 0; i < 3; i++) {
-        apart = _mm_or_ps(apart, _mm_cmpgt_ps(_mm_set1_ps(a->lo[i][k]), _mm_load_ps(b->hi[i])));
-        apart = _mm_or_ps(apart, _mm_cmpgt_ps(_mm_load_ps(b->lo[i]), _mm_set1_ps(a->hi[i][k])));
-    }
-    return 15 & ~_mm_movemask_ps(apart);
-}
-
-/* Lanes of the triangles b that have a vertex of the triangle in lane k of a. */
-static inline int vertex4_shared_one(const uint32_t a[3][4], int k, const uint32_t b[3][4])
-{
-    __m128i shared = _mm_setzero_si128();
-    for (int i = 0; i < 3; i++) {
-        const __m128i v = _mm_set1_epi32((int)a[i][k]);
-        for (int j = 0; j < 3; j++)
-            shared = _mm_or_si128(shared, _mm_cmpeq_epi32(v, _mm_load_si128((const __m128i *)(const void *)b[j])));
-    }
-    return _mm_movemask_ps(_mm_castsi128_ps(shared));
-}
-
+    const __m128i x = (__m128i)bounds;
+#define SDM_ALL_LOW(i) (sdm_i16x8) _mm_shuffle_epi32(_mm_shufflelo_epi16(x, 0x55 * (i)), 0)
+#define SDM_ALL_HIGH(i) (sdm_i16x8) _mm_shuffle_epi32(_mm_shufflehi_epi16(x, 0x55 * (i)), 0xaa)
+    b->lo[0] = SDM_ALL_LOW(0), b->lo[1] = SDM_ALL_LOW(1), b->lo[2] = SDM_ALL_LOW(2);
+    b->hi[0] = SDM_ALL_HIGH(0), b->hi[1] = SDM_ALL_HIGH(1), b->hi[2] = SDM_ALL_HIGH(2);
+#undef SDM_ALL_LOW
+#undef SDM_ALL_HIGH
 #else
-
-static inline int box4_overlap_lane(const sdm_box4 *a, int k, const sdm_box4 *b, int l)
-{
-    int apart = 0;
-    for (int i = 0; i < 3; i++) apart |= (a->lo[i][k] > b->hi[i][l]) | (b->lo[i][l] > a->hi[i][k]);
-    return !apart;
-}
-
-static inline int box4_overlap(const sdm_box4 *a, const sdm_box4 *b)
-{
-    int mask = 0;
-    for (int l = 0; l < 4; l++) mask |= box4_overlap_lane(a, l, b, l) << l;
-    return mask;
-}
-
-static inline int box4_overlap_one(const sdm_box4 *a, int k, const sdm_box4 *b)
-{
-    int mask = 0;
-    for (int l = 0; l < 4; l++) mask |= box4_overlap_lane(a, k, b, l) << l;
-    return mask;
-}
-
-static inline int vertex4_shared_one(const uint32_t a[3][4], int k, const uint32_t b[3][4])
-{
-    int mask = 0;
-    for (int l = 0; l < 4; l++)
-        for (int i = 0; i < 3; i++) mask |= ((a[i][k] == b[0][l]) | (a[i][k] == b[1][l]) | (a[i][k] == b[2][l])) << l;
-    return mask;
-}
-
+    for (int i = 0; i < 3; i++) {
+        b->lo[i] = i16x8_all(bounds[i]);
+        b->hi[i] = i16x8_all(bounds[4 + i]);
+    }
 #endif
+}
+
+/* Lanes in which a and b do not lie apart. */
+static inline unsigned box8_overlap(const sdm_box8 *a, const sdm_box8 *b)
+{
+    sdm_i16x8 apart = i16x8_all(0);
+    for (int i = 0; i < 3; i++) apart |= (sdm_i16x8)(a->lo[i] > b->hi[i]) | (sdm_i16x8)(b->lo[i] > a->hi[i]);
+#if defined(__SSE2__)
+    return 255u & ~(unsigned)_mm_movemask_epi8(_mm_packs_epi16((__m128i)apart, (__m128i)apart));
+#else
+    unsigned mask = 0;
+    for (unsigned l = 0; l < 8; l++) mask |= (apart[l] ? 0u : 1u) << l;
+    return mask;
+#endif
+}
+
 #endif

@@ -1,4 +1,5 @@
-/* Pairs of triangles by walking a tree against itself. Boxes are floats in units of the mesh's size, rounded outwards. */
+/* Pairs of triangles by boxes of eight, of eight of these and so on, in the order of the tree. Boxes are whole numbers of which STEPS are
+   the mesh's size, rounded outwards. */
 #include "pairs.h"
 
 #include <math.h>
@@ -6,170 +7,211 @@
 
 #include "pair_kernel.h"
 
-#define OUTWARDS 0x1p-22f // twice the rounding of a number between 0 and 1, and then some
+#define STEPS 65000    // within 16 bits, with room to round outwards
+#define MOST_LEVELS 11 // of 8 to the power of a level: 32 bits
 
-/* The triangles of a leaf; lanes without a triangle overlap nothing. */
-typedef struct leaf {
-    sdm_box4 box;
-    uint32_t vertex[3][4], tri[4];
-} leaf;
-
-/* A node: for an inner one the boxes of its children in lanes 0 1 0 1 and in lanes 0 0 1 1. */
-typedef struct node {
-    sdm_box4 alternating, doubled;
-} node;
+/* Up to eight triangles under one node of the tree; lanes without one overlap nothing. */
+typedef struct block {
+    sdm_box8 box;
+    sdm_i16x8 bounds[8], all; // of each, and of all of them
+    uint32_t tri[8], corner[8][3];
+    uint32_t count;
+} block;
 
 typedef struct pairing {
-    const sdm_bvh_node *tree;
-    const uint32_t *place; // [node] in leaves or nodes
-    leaf *leaves;
-    node *nodes;
+    block *blocks;
+    // of the blocks: lane c of element i of level k is the box of element 8 i + c of the level before
+    sdm_box8 *level[MOST_LEVELS];
+    size_t n_block;
+    int n_level;
+    sdm_box8 around; // the block at hand, in all lanes
+    uint8_t *has;    // [n_vert] bit k: triangle k of the block at hand has the vertex
     sdm_status (*visit)(void *user, uint32_t i, uint32_t j);
     void *user;
 } pairing;
 
-static sdm_status visit_lanes(const pairing *w, uint32_t tri, const leaf *b, int mask)
+static inline uint8_t *has_corner(const pairing *w, const block *b, size_t lane, int c)
 {
-    for (int l = 0; mask >> l; l++) {
-        if (!(mask >> l & 1)) continue;
-        const sdm_status s = w->visit(w->user, tri, b->tri[l]);
-        if (s) return s;
+    return &w->has[b->corner[lane][c]];
+}
+
+/* Triangles of blocks i <= j; those of i are marked. */
+static sdm_status pairs_of_blocks(const pairing *w, size_t i, size_t j)
+{
+    const block *a = &w->blocks[i], *b = &w->blocks[j];
+    unsigned lanes = i == j ? (1u << b->count) - 1 : box8_overlap(&b->box, &w->around);
+    for (; lanes; lanes &= lanes - 1) {
+        const size_t l = (size_t)__builtin_ctz(lanes);
+        const unsigned shared = *has_corner(w, b, l, 0) | *has_corner(w, b, l, 1) | *has_corner(w, b, l, 2);
+        sdm_box8 one;
+        box8_all(b->bounds[l], &one);
+        unsigned mask = box8_overlap(&a->box, &one) & ~shared;
+        if (i == j) mask &= (1u << l) - 1; // each pair once
+        for (; mask; mask &= mask - 1) {
+            const sdm_status s = w->visit(w->user, a->tri[__builtin_ctz(mask)], b->tri[l]);
+            if (s) return s;
+        }
     }
     return SDM_OK;
 }
 
-static sdm_status pairs_of_leaves(const pairing *w, uint32_t i, uint32_t j)
+/* Pairs of a block with itself and with those behind it. */
+static sdm_status pairs_of_block(pairing *w, size_t i)
 {
-    const leaf *a = &w->leaves[w->place[i]], *b = &w->leaves[w->place[j]];
-    const int n = (int)w->tree[i].count;
-    int mask[4], any = 0;
-    for (int k = 0; k < n; k++) {
-        mask[k] = box4_overlap_one(&a->box, k, &b->box) & ~vertex4_shared_one(a->vertex, k, b->vertex);
-        if (a == b) mask[k] &= 14 << k; // each pair once
-        any |= mask[k];
-    }
+    struct {
+        size_t at;
+        int level;
+    } stack[8 * MOST_LEVELS];
+    const block *b = &w->blocks[i];
     sdm_status s = SDM_OK;
-    for (int k = 0; any && k < n && !s; k++) s = visit_lanes(w, a->tri[k], b, mask[k]);
+    box8_all(b->all, &w->around);
+    for (size_t l = 0; l < b->count; l++)
+        for (int c = 0; c < 3; c++) *has_corner(w, b, l, c) |= (uint8_t)(1u << l);
+    int top = 0;
+    stack[top].at = 0;
+    stack[top++].level = w->n_level - 1;
+    while (top && !s) {
+        const size_t at = stack[--top].at;
+        const int level = stack[top].level;
+        if (level < 0) {
+            s = pairs_of_blocks(w, i, at);
+            continue;
+        }
+        unsigned mask = box8_overlap(&w->level[level][at], &w->around);
+        const size_t first = i >> 3 * level;
+        if (8 * at < first) mask &= 255u << (first - 8 * at);
+        // the last one first, so that the first one comes out first
+        while (mask) {
+            const unsigned lane = 31u - (unsigned)__builtin_clz(mask);
+            mask ^= 1u << lane;
+            stack[top].at = 8 * at + lane;
+            stack[top++].level = level - 1;
+        }
+    }
+    for (size_t l = 0; l < b->count; l++)
+        for (int c = 0; c < 3; c++) *has_corner(w, b, l, c) = 0;
     return s;
 }
 
-/* Nodes whose boxes overlap; i == j: the pairs within a node. */
-typedef struct node_pair {
-    uint32_t i, j;
-} node_pair;
-
-/* A pair waits with at most three others of each of the levels above it. */
-#define STACK (3 * 2 * SDM_BVH_DEPTH + 4)
-
-/* Opens a pair that is not of two leaves; returns the new top. Without branches on what overlaps: it cannot be foreseen. */
-static int open_pair(const pairing *w, node_pair p, node_pair *stack, int top)
-{
-    const sdm_bvh_node *a = &w->tree[p.i], *b = &w->tree[p.j];
-    if (p.i == p.j) {
-        const node *n = &w->nodes[w->place[p.i]];
-        stack[top] = (node_pair){a->first, a->first + 1};
-        top += box4_overlap(&n->doubled, &n->alternating) >> 1 & 1;
-        stack[top++] = (node_pair){a->first + 1, a->first + 1};
-        stack[top++] = (node_pair){a->first, a->first};
-    } else if (!a->count && !b->count) {
-        const int mask = box4_overlap(&w->nodes[w->place[p.i]].doubled, &w->nodes[w->place[p.j]].alternating);
-        for (uint32_t l = 0; l < 4; l++) {
-            stack[top] = (node_pair){a->first + l / 2, b->first + l % 2};
-            top += mask >> l & 1;
-        }
-    } else {
-        // the leaf's triangles against the children of the other
-        const uint32_t flat = a->count ? p.i : p.j, inner = a->count ? p.j : p.i;
-        const leaf *f = &w->leaves[w->place[flat]];
-        const sdm_box4 *children = &w->nodes[w->place[inner]].alternating;
-        const int mask = box4_overlap_one(&f->box, 0, children) | box4_overlap_one(&f->box, 1, children) |
-                         box4_overlap_one(&f->box, 2, children) | box4_overlap_one(&f->box, 3, children);
-        for (uint32_t l = 0; l < 2; l++) {
-            stack[top] = (node_pair){flat, w->tree[inner].first + l};
-            top += mask >> l & 1;
-        }
-    }
-    return top;
-}
-
-static sdm_status walk(const pairing *w)
-{
-    node_pair stack[STACK];
-    int top = 0;
-    stack[top++] = (node_pair){0, 0};
-    while (top) {
-        const node_pair p = stack[--top];
-        if (w->tree[p.i].count && w->tree[p.j].count) {
-            const sdm_status s = pairs_of_leaves(w, p.i, p.j);
-            if (s) return s;
-        } else {
-            top = open_pair(w, p, stack, top);
-        }
-    }
-    return SDM_OK;
-}
-
-/* From the mesh to boxes in floats. */
+/* From the mesh to boxes in whole numbers. */
 typedef struct scaling {
     double origin[3], scale;
-    float margin;
+    int margin;
 } scaling;
 
 static scaling scaling_of(const sdm_bvh_node *root, double slack)
 {
     double size = 0;
-    for (int a = 0; a < 3; a++) size = fmax(size, root->hi[a] - root->lo[a]);
-    scaling r = {.scale = size > 0 && 1 / size < INFINITY ? 1 / size : 0};
-    memcpy(r.origin, root->lo, sizeof r.origin);
-    r.margin = (float)(slack * r.scale) + OUTWARDS;
+    for (int a = 0; a < 3; a++) size = fmax(size, root->hi[a] - root->lo[a] + 2 * slack);
+    scaling r = {.scale = size > 0 && STEPS / size < INFINITY ? STEPS / size : 0};
+    for (int a = 0; a < 3; a++) r.origin[a] = root->lo[a] - slack;
+    r.margin = 1 + (int)(slack * r.scale);
     return r;
 }
 
-static void set_lane(sdm_box4 *box, int lane, const scaling *r, const double lo[3], const double hi[3])
+static sdm_i16x8 bounds_of(const scaling *r, const double lo[3], const double hi[3])
+{
+    sdm_i16x8 x = i16x8_all(0);
+    for (int a = 0; a < 3; a++) {
+        x[a] = (int16_t)((int)((lo[a] - r->origin[a]) * r->scale) - STEPS / 2 - r->margin);
+        x[4 + a] = (int16_t)((int)((hi[a] - r->origin[a]) * r->scale) - STEPS / 2 + 1 + r->margin);
+    }
+    return x;
+}
+
+static void set_lane(sdm_box8 *box, size_t lane, sdm_i16x8 bounds)
 {
     for (int a = 0; a < 3; a++) {
-        box->lo[a][lane] = (float)((lo[a] - r->origin[a]) * r->scale) - r->margin;
-        box->hi[a][lane] = (float)((hi[a] - r->origin[a]) * r->scale) + r->margin;
+        box->lo[a][lane] = bounds[a];
+        box->hi[a][lane] = bounds[4 + a];
     }
 }
 
-static void fill_leaf(const sdm_mesh *m, const sdm_topology *topo, const uint32_t *order, uint32_t count,
-                      const scaling *r, leaf *f)
+static void clear_lane(sdm_box8 *box, size_t lane)
 {
-    for (int k = (int)count; k < 4; k++) {
-        for (int a = 0; a < 3; a++) {
-            f->box.lo[a][k] = INFINITY;
-            f->box.hi[a][k] = -INFINITY;
-            f->vertex[a][k] = 0;
-        }
-        f->tri[k] = 0;
+    for (int a = 0; a < 3; a++) {
+        box->lo[a][lane] = INT16_MAX;
+        box->hi[a][lane] = INT16_MIN;
     }
-    for (int k = 0; k < (int)count; k++) {
-        const size_t t = f->tri[k] = order[k];
+}
+
+static void fill_block(const sdm_mesh *m, const sdm_topology *topo, const uint32_t *order, uint32_t count,
+                       const scaling *r, block *b)
+{
+    b->count = count;
+    for (size_t k = count; k < 8; k++) clear_lane(&b->box, k);
+    for (size_t k = 0; k < count; k++) {
+        const size_t t = b->tri[k] = order[k];
         double lo[3], hi[3];
         for (size_t c = 0; c < 3; c++) {
             const double *x = &m->vert[3 * (size_t)m->tri[3 * t + c]];
-            f->vertex[c][k] = topo->tri[3 * t + c];
+            b->corner[k][c] = topo->tri[3 * t + c];
             for (int a = 0; a < 3; a++) {
                 lo[a] = c == 0 || x[a] < lo[a] ? x[a] : lo[a];
                 hi[a] = c == 0 || x[a] > hi[a] ? x[a] : hi[a];
             }
         }
-        set_lane(&f->box, k, r, lo, hi);
+        b->bounds[k] = bounds_of(r, lo, hi);
+        set_lane(&b->box, k, b->bounds[k]);
     }
 }
 
-static void fill_node(const sdm_bvh_node *child, const scaling *r, node *n)
+/* Triangles below a node where they are a block, 0: its children are looked at. */
+static uint32_t block_size(const sdm_bvh_node *node, const sdm_bvh_node *n)
 {
-    for (int l = 0; l < 4; l++) {
-        set_lane(&n->alternating, l, r, child[l % 2].lo, child[l % 2].hi);
-        set_lane(&n->doubled, l, r, child[l / 2].lo, child[l / 2].hi);
+    if (n->count) return n->count;
+    const sdm_bvh_node *c = &node[n->first];
+    return c[0].count && c[1].count && c[0].count + c[1].count <= 8 ? c[0].count + c[1].count : 0;
+}
+
+/* Blocks in the order of the tree and their boxes. */
+static void fill_blocks(pairing *w, const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree, double slack)
+{
+    const scaling r = scaling_of(tree->node, slack);
+    uint32_t stack[SDM_BVH_DEPTH];
+    int top = 0;
+    stack[top++] = 0;
+    while (top) {
+        const sdm_bvh_node *n = &tree->node[stack[--top]];
+        const uint32_t count = block_size(tree->node, n);
+        if (!count) {
+            stack[top++] = n->first + 1;
+            stack[top++] = n->first;
+            continue;
+        }
+        const uint32_t first = n->count ? n->first : tree->node[n->first].first;
+        block *b = &w->blocks[w->n_block];
+        fill_block(m, topo, tree->order + first, count, &r, b);
+        b->all = bounds_of(&r, n->lo, n->hi);
+        set_lane(&w->level[0][w->n_block / 8], w->n_block % 8, b->all);
+        w->n_block++;
     }
 }
 
-size_t sdm_pairs_bytes(const sdm_bvh *tree)
+/* The boxes of n elements are in level k: that of each eight in the next. */
+static void fill_level(const pairing *w, int k, size_t n)
 {
-    return tree->n_node * sizeof(uint32_t) + (tree->n_node + 1) / 2 * (sizeof(leaf) + sizeof(node));
+    for (; n % 8; n++) clear_lane(&w->level[k][n / 8], n % 8);
+    for (size_t i = 0; i < n / 8 && k + 1 < w->n_level; i++) {
+        const sdm_box8 *from = &w->level[k][i];
+        sdm_box8 *to = &w->level[k + 1][i / 8];
+        clear_lane(to, i % 8);
+        for (int a = 0; a < 3; a++) {
+            for (int l = 0; l < 8; l++) {
+                if (from->lo[a][l] < to->lo[a][i % 8]) to->lo[a][i % 8] = from->lo[a][l];
+                if (from->hi[a][l] > to->hi[a][i % 8]) to->hi[a][i % 8] = from->hi[a][l];
+            }
+        }
+    }
+}
+
+/* Nodes of which some may be blocks. */
+static size_t most_blocks(const sdm_bvh *tree) { return (tree->n_node + 1) / 2; }
+
+size_t sdm_pairs_bytes(size_t n_vert, const sdm_bvh *tree)
+{
+    const size_t n = most_blocks(tree);
+    return n_vert + n * sizeof(block) + (n / 7 + MOST_LEVELS) * sizeof(sdm_box8);
 }
 
 sdm_status sdm_pairs_visit(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree, double slack,
@@ -177,26 +219,20 @@ sdm_status sdm_pairs_visit(const sdm_mesh *m, const sdm_topology *topo, const sd
                            sdm_error *err)
 {
     const sdm_arena_mark before = arena->end[SDM_HIGH];
-    pairing w = {.tree = tree->node, .visit = visit, .user = user};
-    uint32_t *place;
-    const size_t n_leaf = (tree->n_node + 1) / 2;
-    sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &place, tree->n_node, "pairs of triangles", err);
-    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &w.leaves, n_leaf, "pairs of triangles", err);
-    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &w.nodes, n_leaf, "pairs of triangles", err);
+    pairing w = {.visit = visit, .user = user};
+    size_t n = most_blocks(tree);
+    sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &w.blocks, n, "pairs of triangles", err);
+    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &w.has, m->n_vert, "pairs of triangles", err);
+    do {
+        n = (n + 7) / 8;
+        if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &w.level[w.n_level++], n, "pairs of triangles", err);
+    } while (!s && n > 1);
     if (!s) {
-        const scaling r = scaling_of(tree->node, slack);
-        uint32_t leaves = 0, nodes = 0;
-        for (size_t i = 0; i < tree->n_node; i++) {
-            const sdm_bvh_node *n = &tree->node[i];
-            place[i] = n->count ? leaves++ : nodes++;
-            if (n->count)
-                fill_leaf(m, topo, tree->order + n->first, n->count, &r, &w.leaves[place[i]]);
-            else
-                fill_node(&tree->node[n->first], &r, &w.nodes[place[i]]);
-        }
-        w.place = place;
-        s = walk(&w);
+        fill_blocks(&w, m, topo, tree, slack);
+        n = w.n_block;
+        for (int k = 0; k < w.n_level; k++, n = (n + 7) / 8) fill_level(&w, k, n);
     }
+    for (size_t i = 0; i < w.n_block && !s; i++) s = pairs_of_block(&w, i);
     sdm_arena_release(arena, SDM_HIGH, before);
     return s;
 }

@@ -6,7 +6,7 @@
 #include "topology.h"
 
 /* Bytes that a visit takes in passing. */
-size_t sdm_pairs_bytes(const sdm_bvh *tree);
+size_t sdm_pairs_bytes(size_t n_vert, const sdm_bvh *tree);
 
 /* Calls visit(user, i, j) for every pair of triangles (mesh indices) that share no vertex and whose boxes, made larger by
    `slack`, overlap; stops at the first status that is not SDM_OK and returns it. */

@@ -35,7 +35,9 @@ static sdm_status weld_vertices(const sdm_mesh *m, sdm_arena *arena, uint32_t *w
     if (s) return s;
     for (size_t v = 0; v < m->n_vert; v++) {
         const double *p = &m->vert[3 * v];
-        size_t slot = mix(bits_of(p[0]) + mix(bits_of(p[1]) + mix(bits_of(p[2])))) & (size - 1);
+        // odd factors: coordinates of a grid must not meet
+        const uint64_t x = bits_of(p[0]), y = bits_of(p[1]), z = bits_of(p[2]);
+        size_t slot = mix(x + y * 0x9e3779b97f4a7c15u + z * 0xd1b54a32d192ed03u) & (size - 1);
         for (;; slot = (slot + 1) & (size - 1)) {
             const uint32_t u = table[slot] - 1;
             if (u == SDM_NONE) {
@@ -59,94 +61,61 @@ static bool repeats_vertex(const uint32_t *t) { return t[0] == t[1] || t[1] == t
 static inline uint32_t lower(uint32_t a, uint32_t b) { return a < b ? a : b; }
 static inline uint32_t higher(uint32_t a, uint32_t b) { return a < b ? b : a; }
 
-/* Turns counts[v + 1] into the starts of lists. */
-static void counts_to_starts(uint32_t *first, size_t n)
-{
-    for (size_t i = 0; i < n; i++) first[i + 1] += first[i];
-}
-
-/* After filling, first[v] is the end of list v: back to the starts. */
-static void ends_to_starts(uint32_t *first, size_t n)
-{
-    memmove(first + 1, first, n * sizeof *first);
-    first[0] = 0;
-}
-
 /* A half-edge in the list of the lower of its vertices. */
 typedef struct half_edge {
-    uint32_t hi, index;
+    uint32_t hi;
+    uint32_t index; // 2 * half-edge + whether it runs upwards
 } half_edge;
 
-/* The half-edges of each vertex: those that leave it, and those of which it is the lower end (starts: lo). By counting. */
-static void list_half_edges(sdm_topology *t, uint32_t *lo, half_edge *list)
+/* The half-edges of which a vertex is the lower end, rising: list[lo[v] .. lo[v + 1]). By counting. */
+static void list_half_edges(const sdm_topology *t, uint32_t *lo, half_edge *list)
 {
+    // counts, then starts, two places ahead: filling moves each start to the place of the one before
+    uint32_t *count = lo + 2;
     for (size_t i = 0; i < t->n_tri; i++) {
         const uint32_t *v = &t->tri[3 * i];
         if (repeats_vertex(v)) continue;
-        for (int k = 0; k < 3; k++) {
-            t->first[v[k] + 1]++;
-            lo[lower(v[k], v[(k + 1) % 3]) + 1]++;
-        }
+        count[lower(v[0], v[1])]++;
+        count[lower(v[1], v[2])]++;
+        count[lower(v[2], v[0])]++;
     }
-    counts_to_starts(t->first, t->n_vert);
-    counts_to_starts(lo, t->n_vert);
+    for (size_t v = 1; v < t->n_vert; v++) count[v] += count[v - 1];
+    uint32_t *next = lo + 1;
     for (size_t i = 0; i < t->n_tri; i++) {
         const uint32_t *v = &t->tri[3 * i];
         if (repeats_vertex(v)) continue;
-        for (int k = 0; k < 3; k++) {
-            const uint32_t h = (uint32_t)(3 * i) + (uint32_t)k, to = v[(k + 1) % 3];
-            t->leaving[t->first[v[k]]++] = h;
-            list[lo[lower(v[k], to)]++] = (half_edge){higher(v[k], to), h};
+        for (uint32_t k = 0; k < 3; k++) {
+            const uint32_t h = (uint32_t)(3 * i) + k, from = v[k], to = v[(k + 1) % 3];
+            list[next[lower(from, to)]++] = (half_edge){higher(from, to), 2 * h + (from < to)};
         }
     }
-    ends_to_starts(t->first, t->n_vert);
-    ends_to_starts(lo, t->n_vert);
 }
 
-/* While the edges of vertex lo are numbered: the number of its edge to each other vertex; valid where `lo` is that vertex
-   + 1. */
+/* While the edges of vertex lo are made: its edge to each other vertex; valid where `lo` is that vertex + 1. */
 typedef struct mark {
     uint32_t lo, edge;
 } mark;
 
-static void number_edges(sdm_topology *t, const uint32_t *lo, const half_edge *list, mark *seen)
+static void make_edges(sdm_topology *t, const uint32_t *lo, const half_edge *list, mark *seen)
 {
     uint32_t n = 0;
     for (uint32_t v = 0; v < t->n_vert; v++) {
         for (uint32_t i = lo[v]; i < lo[v + 1]; i++) {
             // without branches: every second half-edge is the first of its edge
-            mark *m = &seen[list[i].hi];
+            const half_edge x = list[i];
+            const uint32_t h = x.index / 2, is_up = x.index % 2;
+            mark *m = &seen[x.hi];
             const bool is_new = m->lo != v + 1;
-            const uint32_t edge = is_new ? n : m->edge;
+            const uint32_t edge = is_new ? n : m->edge, keep = is_new - 1u;
             *m = (mark){v + 1, edge};
-            t->edge[list[i].index] = edge;
             n += is_new;
+            sdm_edge *e = &t->edges[edge];
+            t->edge[h] = edge;
+            t->next[h] = e->first | ~keep;
+            *e = (sdm_edge){v, x.hi, (e->n_up & keep) + is_up, (e->n_down & keep) + !is_up, h};
         }
     }
     t->n_edges = n;
-}
-
-static void link_edges(sdm_topology *t)
-{
-    for (size_t i = 0; i < t->n_edges; i++) t->edges[i].first = SDM_NONE;
-    for (size_t i = 0; i < t->n_tri; i++) {
-        const uint32_t *v = &t->tri[3 * i];
-        for (int k = 0; k < 3; k++) {
-            const size_t h = 3 * i + (size_t)k;
-            if (t->edge[h] == SDM_NONE) {
-                t->next[h] = SDM_NONE;
-                continue;
-            }
-            const uint32_t from = v[k], to = v[(k + 1) % 3];
-            sdm_edge *e = &t->edges[t->edge[h]];
-            e->lo = lower(from, to);
-            e->hi = higher(from, to);
-            e->n_up += from < to;
-            e->n_down += from > to;
-            t->next[h] = e->first;
-            e->first = (uint32_t)h;
-        }
-    }
 }
 
 static sdm_status find_edges(sdm_topology *t, sdm_arena *arena, sdm_error *err)
@@ -155,16 +124,13 @@ static sdm_status find_edges(sdm_topology *t, sdm_arena *arena, sdm_error *err)
     uint32_t *lo = NULL;
     half_edge *list = NULL;
     mark *seen = NULL;
-    sdm_status s = SDM_TAKE(arena, SDM_LOW, &lo, t->n_vert + 1, "half-edges", err);
+    sdm_status s = SDM_TAKE(arena, SDM_LOW, &lo, t->n_vert + 2, "half-edges", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_LOW, &list, 3 * t->n_tri, "half-edges", err);
     if (!s) s = SDM_TAKE(arena, SDM_LOW, &seen, t->n_vert, "half-edges", err);
     if (!s) {
-        memset(t->edge, 0xff, 3 * t->n_tri * sizeof *t->edge);
         list_half_edges(t, lo, list);
-        number_edges(t, lo, list, seen);
-        s = SDM_TAKE(arena, SDM_HIGH, &t->edges, t->n_edges, "edges", err);
+        make_edges(t, lo, list, seen);
     }
-    if (!s) link_edges(t);
     sdm_arena_release(arena, SDM_LOW, before);
     return s;
 }
@@ -173,25 +139,29 @@ size_t sdm_topology_bytes(const sdm_mesh *m, size_t *scratch)
 {
     *scratch += table_size(m->n_vert) * sizeof(uint32_t) + m->n_vert * (sizeof(mark) + sizeof(uint32_t)) +
                 3 * m->n_tri * sizeof(half_edge);
-    return m->n_vert * 2 * sizeof(uint32_t) + m->n_tri * (12 * sizeof(uint32_t) + 3 * sizeof(sdm_edge));
+    return m->n_vert * sizeof(uint32_t) + m->n_tri * (9 * sizeof(uint32_t) + 3 * sizeof(sdm_edge));
 }
 
 sdm_status sdm_topology_build(const sdm_mesh *m, sdm_arena *arena, sdm_topology *t, sdm_error *err)
 {
-    if (m->n_tri > UINT32_MAX / 3 - 1) // half-edges are numbered
+    if (m->n_tri > UINT32_MAX / 6 - 1) // half-edges are numbered, with a bit for their direction
         return sdm_fail(err, SDM_E_MESH, "mesh of %zu triangles, at most %u can be prepared", m->n_tri,
-                        UINT32_MAX / 3 - 1);
+                        UINT32_MAX / 6 - 1);
     t->n_vert = m->n_vert;
     t->n_tri = m->n_tri;
     sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &t->weld, m->n_vert, "welded vertices", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &t->tri, 3 * m->n_tri, "welded triangles", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &t->edge, 3 * m->n_tri, "half-edges", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &t->next, 3 * m->n_tri, "half-edges", err);
-    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &t->first, m->n_vert + 1, "half-edges", err);
-    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &t->leaving, 3 * m->n_tri, "half-edges", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &t->edges, 3 * m->n_tri, "edges", err);
     if (!s) s = weld_vertices(m, arena, t->weld, err);
     if (s) return s;
-    for (size_t i = 0; i < 3 * m->n_tri; i++) t->tri[i] = t->weld[m->tri[i]];
+    for (size_t i = 0; i < m->n_tri; i++) {
+        uint32_t *v = &t->tri[3 * i];
+        for (size_t k = 0; k < 3; k++) v[k] = t->weld[m->tri[3 * i + k]];
+        if (repeats_vertex(v)) memset(&t->edge[3 * i], 0xff, 3 * sizeof *v);
+        if (repeats_vertex(v)) memset(&t->next[3 * i], 0xff, 3 * sizeof *v);
+    }
     return find_edges(t, arena, err);
 }
 

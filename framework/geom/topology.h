@@ -21,8 +21,6 @@ typedef struct sdm_topology {
     uint32_t *edge;  /* [n_tri][3] edge of a half-edge, SDM_NONE for triangles with a repeated vertex */
     uint32_t *next;  /* [n_tri][3] next half-edge of the same edge, SDM_NONE at the end */
     sdm_edge *edges; /* [n_edges] */
-    uint32_t *first; /* [n_vert + 1] the half-edges that leave vertex v are leaving[first[v] .. first[v + 1]), rising */
-    uint32_t *leaving;
     size_t n_vert, n_tri, n_edges;
 } sdm_topology;
 

@@ -2,53 +2,45 @@
 #include "vertex_table.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "sdm/memory.h"
 
 #define CELL 1024.0 // in tolerances: so large that hardly a vertex is near a side
 
-static uint64_t mix(uint64_t x)
+/* Cells are numbered towards zero: the one at zero is twice as wide. */
+typedef struct cell {
+    int64_t x[3];
+} cell;
+
+static cell cell_of(const sdm_vertex_table *t, const double x[3], double shift)
 {
-    // finaliser of splitmix64
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-    return x ^ (x >> 31);
+    const double size = CELL * t->tolerance;
+    return (cell){
+        {(int64_t)((x[0] + shift) / size), (int64_t)((x[1] + shift) / size), (int64_t)((x[2] + shift) / size)}};
 }
 
-static size_t place_of(const sdm_vertex_table *t, const double cell[3])
+static size_t place_of(const sdm_vertex_table *t, const cell *c)
 {
-    uint64_t h = 0;
-    for (int a = 0; a < 3; a++) {
-        uint64_t bits;
-        const double c = cell[a] + 0.0; // -0 counts as 0
-        memcpy(&bits, &c, sizeof bits);
-        h = mix(bits + h);
-    }
-    return h & (t->size - 1);
+    // finaliser of splitmix64 after odd factors
+    uint64_t h = (uint64_t)c->x[0] + (uint64_t)c->x[1] * 0x9e3779b97f4a7c15u + (uint64_t)c->x[2] * 0xd1b54a32d192ed03u;
+    h = (h ^ (h >> 30)) * 0xbf58476d1ce4e5b9u;
+    h = (h ^ (h >> 27)) * 0x94d049bb133111ebu;
+    return (h ^ (h >> 31)) & (t->size - 1);
 }
-
-static double cell_of(const sdm_vertex_table *t, double x) { return floor(x / (CELL * t->tolerance)); }
 
 void sdm_vertex_table_find(const sdm_vertex_table *t, const double *vert, uint32_t n_vert, const double x[3],
                            uint32_t *v)
 {
-    double low[3], high[3];
     *v = n_vert;
     if (!t->size) return;
-    for (int a = 0; a < 3; a++) {
-        low[a] = cell_of(t, x[a] - t->tolerance);
-        high[a] = cell_of(t, x[a] + t->tolerance);
-    }
-    for (int side = 0; side < 8; side++) {
-        double cell[3];
-        int again = 0;
-        for (int a = 0; a < 3; a++) {
-            cell[a] = side >> a & 1 ? high[a] : low[a];
-            again |= (side >> a & 1) && high[a] == low[a];
-        }
-        if (again) continue;
-        for (size_t i = place_of(t, cell); t->place[i]; i = (i + 1) & (t->size - 1)) {
+    const cell low = cell_of(t, x, -t->tolerance), high = cell_of(t, x, t->tolerance);
+    // axes along which the vertex is near a side; all combinations of them
+    unsigned near = 0, side = 0;
+    for (int a = 0; a < 3; a++) near |= (unsigned)(low.x[a] != high.x[a]) << a;
+    do {
+        cell c;
+        for (int a = 0; a < 3; a++) c.x[a] = side >> a & 1 ? high.x[a] : low.x[a];
+        for (size_t i = place_of(t, &c); t->place[i]; i = (i + 1) & (t->size - 1)) {
             const uint32_t u = t->place[i] - 1;
             const double *y = &vert[3 * (size_t)u];
             if (u >= n_vert || !(fabs(y[0] - x[0]) <= t->tolerance && fabs(y[1] - x[1]) <= t->tolerance &&
@@ -57,14 +49,14 @@ void sdm_vertex_table_find(const sdm_vertex_table *t, const double *vert, uint32
             *v = u;
             return;
         }
-    }
+        side = (side - near) & near;
+    } while (side);
 }
 
 static void put(sdm_vertex_table *t, const double *vert, uint32_t v)
 {
-    double cell[3];
-    for (int a = 0; a < 3; a++) cell[a] = cell_of(t, vert[3 * (size_t)v + (size_t)a]);
-    size_t i = place_of(t, cell);
+    const cell c = cell_of(t, &vert[3 * (size_t)v], 0);
+    size_t i = place_of(t, &c);
     while (t->place[i]) i = (i + 1) & (t->size - 1);
     t->place[i] = v + 1;
     t->n++;

@@ -398,8 +398,11 @@ static void test_memory_is_short(void **state)
 static void test_thin_faces(void **state)
 {
     (void)state;
-    sdm_mesh m = {0};
+    sdm_mesh m = {0}, b = {0};
     mesh_box(&m, (const double[3]){0, 0, 0}, (const double[3]){4, 0.05, 1});
+    // half way up the voxels above a thin face lie below a wide one, too, that is hardly farther
+    mesh_box(&b, (const double[3]){-1, -1, 1.2}, (const double[3]){5, 1, 1.5});
+    mesh_append(&m, &b);
     sdm_exact *e = engine(&m, NULL);
     const sdm_grid g = sdm_grid_centred((const int64_t[3]){32, 8, 32}, 0.0125, (const double[3]){2, 0.025, 1.1});
     for (int level = 0; level < 3; level++) {
@@ -411,6 +414,7 @@ static void test_thin_faces(void **state)
     (void)sdm_grid_kernel_select(-1);
     sdm_exact_free(e);
     sdm_mesh_dispose(&m);
+    sdm_mesh_dispose(&b);
 }
 
 int main(void)

@@ -9,6 +9,7 @@
 #include "layers.h"
 #include "parts.h"
 #include "sdm/memory.h"
+#include "sdm/threads.h"
 #include "sign.h"
 #include "survey.h"
 #include "union_hull.h"
@@ -276,7 +277,7 @@ static sdm_status map_with_layers(const sdm_exact *e, const sdm_grid *grid, sdm_
     if (!s) s = SDM_ALLOC(&frames, n_frame, "frames of triangles", err);
     float *values = n_value ? own : job->out->values;
     if (!s) s = fill_map(e, grid, band > 0 ? band : INFINITY, values, layers ? slot : NULL, err);
-    if (!s && n_frame) sdm_sheets_frames(&e->solid, sdm_thread_count(e->opts.n_threads), frames);
+    if (!s && n_frame) sdm_sheets_frames(&e->solid, sdm_threads(e->opts.n_threads), frames);
     const double seam = e->report.unioned ? 2 * e->report.union_error_mm : 0;
     job->sheets = (sdm_sheets){&e->nearest, &e->solid, frames, e->source, seam};
     job->rounding = e->rounding;

@@ -4,12 +4,10 @@
 #include <math.h>
 #include <stdatomic.h>
 #include <string.h>
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 #include "grid_job.h"
 #include "sdm/memory.h"
+#include "sdm/threads.h"
 
 // in edges: beyond it all features are equally near in single precision
 #define FARTHEST 1e5
@@ -51,22 +49,9 @@ static sdm_grid_kernel *choose_kernel(void)
     }
 }
 
-int sdm_thread_count(int n_threads)
-{
-#ifdef _OPENMP
-    return n_threads > 0 ? n_threads : omp_get_max_threads();
-#else
-    (void)n_threads;
-    return 1;
-#endif
-}
-
 bool sdm_cancelled(const sdm_exact_opts *opts)
 {
-#ifdef _OPENMP
-    if (omp_get_thread_num() != 0) return false;
-#endif
-    return opts->cancelled && opts->cancelled(opts->user);
+    return sdm_thread() == 0 && opts->cancelled && opts->cancelled(opts->user);
 }
 
 /* Position of voxel `at` (may be fractional) relative to voxel (0, 0, 0). */
@@ -259,7 +244,7 @@ sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g, cons
         for (int c = 0; c < 3; c++) job.step[a][c] = g->n[a] > 1 ? g->dir[3 * c + a] * g->spacing[a] : 0;
     }
     const double reach = fill_tables(&job);
-    const int n_threads = sdm_thread_count(opts->n_threads);
+    const int n_threads = sdm_threads(opts->n_threads);
     if (!(reach < FARTHEST)) return ask_points(&job, g, opts, n_threads, err);
     job.limit = opts->memory_limit / (size_t)n_threads;
     if (opts->memory_limit && !job.limit) job.limit = 1;

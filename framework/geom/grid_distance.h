@@ -12,9 +12,6 @@
 sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g, const sdm_exact_opts *opts, double band_mm,
                              float *values, uint32_t *slot, sdm_error *err);
 
-/* 0 or less: the default of OpenMP; 1 without OpenMP. */
-int sdm_thread_count(int n_threads);
-
 /* Asks the caller whether to stop; for all threads of a loop, but only the first one asks. */
 bool sdm_cancelled(const sdm_exact_opts *opts);
 

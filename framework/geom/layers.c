@@ -4,6 +4,7 @@
 #include <stdatomic.h>
 
 #include "grid_distance.h"
+#include "sdm/threads.h"
 #include "vec3.h"
 
 void sdm_distance_gradient(const sdm_nearest *surface, double rounding, uint32_t slot, const double x[3],
@@ -57,7 +58,7 @@ bool sdm_layers_wanted(const sdm_layers_job *job)
 
 sdm_status sdm_layers_fill(const sdm_layers_job *job, const sdm_grid *g, sdm_error *err)
 {
-    const int n_threads = sdm_thread_count(job->opts->n_threads);
+    const int n_threads = sdm_threads(job->opts->n_threads);
     (void)n_threads; // without OpenMP
     const int64_t n_rows = g->n[1] * g->n[2];
     const size_t n_voxel = sdm_grid_count(g);

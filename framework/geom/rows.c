@@ -5,13 +5,11 @@
 #include <float.h>
 #include <math.h>
 #include <string.h>
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 #include "grid_distance.h"
 #include "line_triangle.h"
 #include "sdm/memory.h"
+#include "sdm/threads.h"
 
 #define SLICE 1024 // triangles of one piece of work
 
@@ -170,11 +168,7 @@ static sdm_status collect(const sdm_mesh *m, const sdm_rows *r, int n_threads, c
     (void)n_threads; // without OpenMP
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads) if (n_slice > 1)
     for (int64_t slice = 0; slice < n_slice; slice++) {
-#ifdef _OPENMP
-        collector *own = &c[omp_get_thread_num()];
-#else
-        collector *own = c;
-#endif
+        collector *own = &c[sdm_thread()];
         sdm_error local = {0};
         sdm_status s = SDM_OK;
         const size_t end = ((size_t)slice + 1) * SLICE;
@@ -226,7 +220,7 @@ static sdm_status sort_rows(const collector *c, int n_collector, size_t n_row, i
 sdm_status sdm_rows_build(const sdm_mesh *m, const sdm_grid *g, const int axis[3], int n_threads, size_t memory_limit,
                           sdm_rows *r, sdm_error *err)
 {
-    n_threads = sdm_thread_count(n_threads);
+    n_threads = sdm_threads(n_threads);
     double inverse[9];
     const double det = invert(g->dir, inverse);
     const bool even = (axis[0] + 1) % 3 == axis[1];

@@ -3,6 +3,7 @@
 
 #include "grid_distance.h"
 #include "sdm/memory.h"
+#include "sdm/threads.h"
 #include <stdatomic.h>
 
 #define TILE 16   // rows of a tile along both axes
@@ -25,7 +26,7 @@ sdm_status sdm_sign_tiles(const sdm_sign_rows *r, int64_t n1, int64_t n2, const 
                           sdm_sign_visit *visit, void *user, sdm_error *err)
 {
     const int64_t t1 = (n1 + TILE - 1) / TILE, t2 = (n2 + TILE - 1) / TILE;
-    const int n_threads = sdm_thread_count(opts->n_threads);
+    const int n_threads = sdm_threads(opts->n_threads);
     (void)n_threads; // without OpenMP
     atomic_int stop = SDM_OK;
     sdm_status status = SDM_OK;

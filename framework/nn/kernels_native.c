@@ -2,12 +2,10 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 #include "kernels_table.h"
 #include "sdm/kernels.h"
+#include "sdm/threads.h"
 
 static int wanted_level = -1;
 
@@ -117,12 +115,8 @@ void sdm_gemm(size_t m, size_t n, size_t k, sdm_view a, sdm_view b, bool add, fl
     const kernel_table *t = kernels();
     const long rows = (long)((m + MC - 1) / MC), cols = (long)((n + NC - 1) / NC);
     if (rows * cols < 2) n_threads = 1;
-#ifdef _OPENMP
-    if (n_threads == 0) n_threads = omp_get_max_threads();
+    n_threads = sdm_threads(n_threads);
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads) if (n_threads > 1)
-#else
-    (void)n_threads;
-#endif
     for (long tile = 0; tile < rows * cols; tile++) {
         const size_t i = (size_t)(tile % rows) * MC, j = (size_t)(tile / rows) * NC;
         const sdm_view at = {a.data + i * a.row, a.row, a.col}, bt = {b.data + j * b.col, b.row, b.col};

@@ -1,11 +1,9 @@
 /* The decoder of a pod network: latent variables -> coefficients -> map. A slab (pod_slabs.c) at a time, so that what it needs stays in the
    caches. Letters as in sdm/pod.h. */
 #include <string.h>
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 #include "pod_space.h"
+#include "sdm/threads.h"
 
 static size_t smaller(size_t a, size_t b) { return a < b ? a : b; }
 static size_t padded(size_t floats) { return (floats + 15) / 16 * 16; }
@@ -303,26 +301,17 @@ void sdm_pod_decode(const pod_network *m, const sdm_grid *grid, size_t rows, siz
     const size_t coefficients = m->arch.n_coefficients, ldc = sdm_panel_outputs(coefficients);
     const long parts = (long)((coefficients + PART - 1) / PART);
     if (sdm_pod_is_bytes(m)) quantise_latent(m, rows, rests, w);
-#ifdef _OPENMP
 #pragma omp parallel num_threads(n_threads) if (n_threads > 1)
-#else
-    (void)n_threads;
-#endif
     {
-        size_t thread = 0;
         job j = {.m = m, .grid = grid, .stream = stream};
-#ifdef _OPENMP
-        thread = (size_t)omp_get_thread_num();
 #pragma omp for schedule(static)
-#endif
         for (long i = 0; i < parts; i++) {
             const size_t o = (size_t)i * PART;
             head_product(m, rows, rests, o, smaller(PART, coefficients - o), w);
         }
-        sdm_pod_carve_thread(m, smaller(rows + 1, SDM_POD_GROUP), w->threads + thread * w->per_thread, &j.s);
-#ifdef _OPENMP
+        sdm_pod_carve_thread(m, smaller(rows + 1, SDM_POD_GROUP), w->threads + (size_t)sdm_thread() * w->per_thread,
+                             &j.s);
 #pragma omp for schedule(dynamic)
-#endif
         for (long i = 0; i < (long)m->n_slabs; i++)
             for (size_t r = 0; r < rows; r += j.rows) {
                 j.slab = &m->slabs[i];

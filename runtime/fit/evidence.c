@@ -1,4 +1,5 @@
-/* The mixture without a shape by expectation-maximisation (Dempster, Laird and Rubin 1977) on a sample of the voxels. */
+/* The mixture without a shape by expectation-maximisation (Dempster, Laird and Rubin 1977) on a sample of the voxels. Where tissues
+   outside have places, they have them without the shape, too. */
 #include "evidence.h"
 
 #include <math.h>

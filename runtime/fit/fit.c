@@ -193,10 +193,8 @@ static sdm_status settle(fit_problem *p, fit_run *run, fit_ended *ended, sdm_err
         }
         run->max_iterations = most - used;
         run->eps = fmax(eps, first * (round ? fmin(change, 1) : 1));
-        if (run->averaged) {
-            sdm_fit_ways(p, run->way);
-            sdm_fit_look_settle(p);
-        }
+        if (run->averaged) sdm_fit_ways(p, run->way);
+        if (run->averaged || round > 0) sdm_fit_look_settle(p);
         s = sdm_fit_iterate(p, run, ended, err);
         p->places = true; // tissues that are there by now
     }

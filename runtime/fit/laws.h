@@ -20,8 +20,9 @@ typedef struct fit_response {
 
 /* Values of the constants of a law pair, made once for a look. */
 typedef struct fit_pair {
-    size_t in, out; // tissues, counted inside first
-    double log_weight, dof, constant, information;
+    size_t in, out;    // tissues, counted inside first
+    double log_weight; // of the tissue inside
+    double dof, constant, information;
 } fit_pair;
 
 typedef struct fit_laws {

@@ -47,6 +47,7 @@ sdm_status sdm_fit_sites_choose(const sdm_fit_target *target, const sdm_fit_opts
                                 size_t stride, fit_sites *sites, bool *changed, sdm_error *err);
 void sdm_fit_sites_dispose(fit_sites *s);
 
+/* Of site i, for sdm_fit_respond(). */
 static inline const float *fit_place(const fit_sites *s, size_t i)
 {
     return s->n_outside ? s->place + i * s->n_outside : NULL;

@@ -68,6 +68,9 @@ static void test_refused(void **state)
     o.l_ref = NAN;
     refused(SDM_E_ARG, "l_ref", &t, &o);
     o = near_start();
+    o.tissue_mm = -1;
+    refused(SDM_E_ARG, "tissue_mm", &t, &o);
+    o = near_start();
     o.appearance.inside[0].sd = 0;
     refused(SDM_E_ARG, "sd of law 0 inside", &t, &o);
     o = near_start();

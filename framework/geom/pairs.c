@@ -1,5 +1,5 @@
-/* Pairs of triangles by boxes of eight, of eight of these and so on, in the order of the tree. Boxes are whole numbers of which STEPS are
-   the mesh's size, rounded outwards. */
+/* Pairs of triangles by boxes of eight, of eight of these and so on, in the order of the tree. Boxes are floats in units of the mesh's
+   size, rounded outwards. */
 #include "pairs.h"
 
 #include <math.h>
@@ -7,13 +7,12 @@
 
 #include "pair_kernel.h"
 
-#define STEPS 65000    // within 16 bits, with room to round outwards
-#define MOST_LEVELS 11 // of 8 to the power of a level: 32 bits
+#define OUTWARDS 0x1p-22f // twice the rounding of a number between 0 and 1, and then some
+#define MOST_LEVELS 11    // of 8 to the power of a level: 32 bits
 
 /* Up to eight triangles under one node of the tree; lanes without one overlap nothing. */
 typedef struct block {
     sdm_box8 box;
-    sdm_i16x8 bounds[8], all; // of each, and of all of them
     uint32_t tri[8], corner[8][3];
     uint32_t count;
 } block;
@@ -24,8 +23,7 @@ typedef struct pairing {
     sdm_box8 *level[MOST_LEVELS];
     size_t n_block;
     int n_level;
-    sdm_box8 around; // the block at hand, in all lanes
-    uint8_t *has;    // [n_vert] bit k: triangle k of the block at hand has the vertex
+    uint8_t *has; // [n_vert] bit k: triangle k of the block at hand has the vertex
     sdm_status (*visit)(void *user, uint32_t i, uint32_t j);
     void *user;
 } pairing;
@@ -39,13 +37,11 @@ static inline uint8_t *has_corner(const pairing *w, const block *b, size_t lane,
 static sdm_status pairs_of_blocks(const pairing *w, size_t i, size_t j)
 {
     const block *a = &w->blocks[i], *b = &w->blocks[j];
-    unsigned lanes = i == j ? (1u << b->count) - 1 : box8_overlap(&b->box, &w->around);
+    unsigned lanes = i == j ? (1u << b->count) - 1 : box8_overlap(&b->box, &w->level[0][i / 8], i % 8);
     for (; lanes; lanes &= lanes - 1) {
         const size_t l = (size_t)__builtin_ctz(lanes);
         const unsigned shared = *has_corner(w, b, l, 0) | *has_corner(w, b, l, 1) | *has_corner(w, b, l, 2);
-        sdm_box8 one;
-        box8_all(b->bounds[l], &one);
-        unsigned mask = box8_overlap(&a->box, &one) & ~shared;
+        unsigned mask = box8_overlap(&a->box, &b->box, l) & ~shared;
         if (i == j) mask &= (1u << l) - 1; // each pair once
         for (; mask; mask &= mask - 1) {
             const sdm_status s = w->visit(w->user, a->tri[__builtin_ctz(mask)], b->tri[l]);
@@ -56,7 +52,7 @@ static sdm_status pairs_of_blocks(const pairing *w, size_t i, size_t j)
 }
 
 /* Pairs of a block with itself and with those behind it. */
-static sdm_status pairs_of_block(pairing *w, size_t i)
+static sdm_status pairs_of_block(const pairing *w, size_t i)
 {
     struct {
         size_t at;
@@ -64,7 +60,6 @@ static sdm_status pairs_of_block(pairing *w, size_t i)
     } stack[8 * MOST_LEVELS];
     const block *b = &w->blocks[i];
     sdm_status s = SDM_OK;
-    box8_all(b->all, &w->around);
     for (size_t l = 0; l < b->count; l++)
         for (int c = 0; c < 3; c++) *has_corner(w, b, l, c) |= (uint8_t)(1u << l);
     int top = 0;
@@ -77,7 +72,7 @@ static sdm_status pairs_of_block(pairing *w, size_t i)
             s = pairs_of_blocks(w, i, at);
             continue;
         }
-        unsigned mask = box8_overlap(&w->level[level][at], &w->around);
+        unsigned mask = box8_overlap(&w->level[level][at], &w->level[0][i / 8], i % 8);
         const size_t first = i >> 3 * level;
         if (8 * at < first) mask &= 255u << (first - 8 * at);
         // the last one first, so that the first one comes out first
@@ -93,45 +88,35 @@ static sdm_status pairs_of_block(pairing *w, size_t i)
     return s;
 }
 
-/* From the mesh to boxes in whole numbers. */
+/* From the mesh to boxes in floats. */
 typedef struct scaling {
     double origin[3], scale;
-    int margin;
+    float margin;
 } scaling;
 
 static scaling scaling_of(const sdm_bvh_node *root, double slack)
 {
     double size = 0;
-    for (int a = 0; a < 3; a++) size = fmax(size, root->hi[a] - root->lo[a] + 2 * slack);
-    scaling r = {.scale = size > 0 && STEPS / size < INFINITY ? STEPS / size : 0};
-    for (int a = 0; a < 3; a++) r.origin[a] = root->lo[a] - slack;
-    r.margin = 1 + (int)(slack * r.scale);
+    for (int a = 0; a < 3; a++) size = fmax(size, root->hi[a] - root->lo[a]);
+    scaling r = {.scale = size > 0 && 1 / size < INFINITY ? 1 / size : 0};
+    memcpy(r.origin, root->lo, sizeof r.origin);
+    r.margin = (float)(slack * r.scale) + OUTWARDS;
     return r;
 }
 
-static sdm_i16x8 bounds_of(const scaling *r, const double lo[3], const double hi[3])
-{
-    sdm_i16x8 x = i16x8_all(0);
-    for (int a = 0; a < 3; a++) {
-        x[a] = (int16_t)((int)((lo[a] - r->origin[a]) * r->scale) - STEPS / 2 - r->margin);
-        x[4 + a] = (int16_t)((int)((hi[a] - r->origin[a]) * r->scale) - STEPS / 2 + 1 + r->margin);
-    }
-    return x;
-}
-
-static void set_lane(sdm_box8 *box, size_t lane, sdm_i16x8 bounds)
+static void set_lane(sdm_box8 *box, size_t lane, const scaling *r, const double lo[3], const double hi[3])
 {
     for (int a = 0; a < 3; a++) {
-        box->lo[a][lane] = bounds[a];
-        box->hi[a][lane] = bounds[4 + a];
+        box->lo[a][lane] = (float)((lo[a] - r->origin[a]) * r->scale) - r->margin;
+        box->hi[a][lane] = (float)((hi[a] - r->origin[a]) * r->scale) + r->margin;
     }
 }
 
 static void clear_lane(sdm_box8 *box, size_t lane)
 {
     for (int a = 0; a < 3; a++) {
-        box->lo[a][lane] = INT16_MAX;
-        box->hi[a][lane] = INT16_MIN;
+        box->lo[a][lane] = INFINITY;
+        box->hi[a][lane] = -INFINITY;
     }
 }
 
@@ -151,8 +136,7 @@ static void fill_block(const sdm_mesh *m, const sdm_topology *topo, const uint32
                 hi[a] = c == 0 || x[a] > hi[a] ? x[a] : hi[a];
             }
         }
-        b->bounds[k] = bounds_of(r, lo, hi);
-        set_lane(&b->box, k, b->bounds[k]);
+        set_lane(&b->box, k, r, lo, hi);
     }
 }
 
@@ -180,10 +164,8 @@ static void fill_blocks(pairing *w, const sdm_mesh *m, const sdm_topology *topo,
             continue;
         }
         const uint32_t first = n->count ? n->first : tree->node[n->first].first;
-        block *b = &w->blocks[w->n_block];
-        fill_block(m, topo, tree->order + first, count, &r, b);
-        b->all = bounds_of(&r, n->lo, n->hi);
-        set_lane(&w->level[0][w->n_block / 8], w->n_block % 8, b->all);
+        fill_block(m, topo, tree->order + first, count, &r, &w->blocks[w->n_block]);
+        set_lane(&w->level[0][w->n_block / 8], w->n_block % 8, &r, n->lo, n->hi);
         w->n_block++;
     }
 }
@@ -198,8 +180,8 @@ static void fill_level(const pairing *w, int k, size_t n)
         clear_lane(to, i % 8);
         for (int a = 0; a < 3; a++) {
             for (int l = 0; l < 8; l++) {
-                if (from->lo[a][l] < to->lo[a][i % 8]) to->lo[a][i % 8] = from->lo[a][l];
-                if (from->hi[a][l] > to->hi[a][i % 8]) to->hi[a][i % 8] = from->hi[a][l];
+                to->lo[a][i % 8] = fminf(to->lo[a][i % 8], from->lo[a][l]);
+                to->hi[a][i % 8] = fmaxf(to->hi[a][i % 8], from->hi[a][l]);
             }
         }
     }

@@ -49,9 +49,10 @@ static void print_spread(const cli_fit *f)
     const double blur = f->result.blur, voxel = cli_fit_map_voxel(f);
     printf("  point spread %.3g mm\n", blur);
     if (f->opts.keep_params || !(voxel > SPREADS_MOST * blur)) return;
-    printf("  maps of %.3g mm are coarse beside it: standard deviations may be too small; %s--spacing %.2g makes finer "
-           "ones\n",
-           voxel, f->source.model ? "--exact " : "", blur);
+    printf(
+        "  maps of %.3g mm are coarse beside it: standard deviations may be too small; a fit with %s--spacing %.2g has "
+        "finer ones\n",
+        voxel, f->source.model ? "--exact " : "", blur);
 }
 
 /* What the image looks like to the fit. */

@@ -142,7 +142,7 @@ static sdm_status follow(fit_problem *p, bool *changed, sdm_error *err)
                          .margin = p->opts->margin};
     sdm_fit_to_world(&p->state, p->extent.centre, region.centre);
     sdm_status s = SDM_OK;
-    for (p->stride = 1;; p->stride *= 2) {
+    for (;; p->stride *= 2) { // from that of before on: whether voxels are others is asked of those
         s = sdm_fit_sites_choose(p->target, p->opts, &region, p->stride, &p->sites, changed, err);
         if (s || p->target->kind == SDM_FIT_POINTS || (double)p->sites.n <= SITES_MOST) return s;
     }
@@ -210,6 +210,8 @@ static sdm_status approach(fit_problem *p, fit_run *run, fit_ended *ended, sdm_e
     const double eps = exact ? o->polish_eps : o->eps;
     const size_t max_iterations = run->max_iterations;
     run->averaged = p->places = false;
+    p->sites.n_outside = 0;
+    p->stride = 1;
     memset(p->absent, 0, sizeof p->absent);
     run->eps = average ? o->eps : eps;
     run->flat_most = !average ? 0 : exact ? 1 : FLAT_MOST;

@@ -13,6 +13,8 @@
 // cells to a standard deviation of the Gaussian, and along an axis at most
 #define CELLS 2.0
 #define CELLS_MOST 96.0
+// ... of the Gaussian in cells at least: a narrower one than the splines between them would have to undo these
+#define CELLS_LEAST 0.6
 // so many standard deviations from the voxels nothing is left of them
 #define BEYOND 4.0
 // steps of expectation-maximisation to one step of the shape
@@ -24,6 +26,7 @@
 
 typedef struct cells {
     sdm_grid grid;
+    double sd; // of the Gaussian, mm
     size_t n_tissues;
     double known;                  // what the weights that are the same everywhere count, in units of the packed sums
     double *packed, *spare, *part; // [cells][n_tissues], the same, [sites][n_tissues]
@@ -66,10 +69,10 @@ static void dispose(cells *c)
 
 static sdm_status create(const fit_problem *p, cells *c, sdm_error *err)
 {
-    const double sd = p->opts->tissue_mm;
-    *c = (cells){.grid = grid_about(&p->sites, sd), .n_tissues = p->sites.n_outside};
+    *c = (cells){.grid = grid_about(&p->sites, p->opts->tissue_mm), .n_tissues = p->sites.n_outside};
+    c->sd = fmax(p->opts->tissue_mm, CELLS_LEAST * c->grid.spacing[0]);
     // as much as one independent value in the middle of the Gaussian
-    c->known = p->noise_factor * pow(c->grid.spacing[0] / sd, 3) / pow(TWO_PI, 1.5);
+    c->known = p->noise_factor * pow(c->grid.spacing[0] / c->sd, 3) / pow(TWO_PI, 1.5);
     const size_t n = sdm_grid_count(&c->grid) * c->n_tissues;
     sdm_status s = SDM_ALLOC(&c->packed, n, "places of tissues", err);
     if (!s) s = SDM_ALLOC(&c->spare, n, "places of tissues", err);
@@ -93,7 +96,7 @@ static void improve(fit_problem *p, cells *c)
         double *to = c->packed + cell_at(&c->grid, s->world + 3 * i) * n;
         for (size_t k = 0; k < n; k++) to[k] += c->part[i * n + k];
     }
-    sdm_fit_blur(&c->grid, n, p->opts->tissue_mm * p->opts->tissue_mm, true, n_threads, &c->packed, &c->spare);
+    sdm_fit_blur(&c->grid, n, c->sd * c->sd, true, n_threads, &c->packed, &c->spare);
     const fit_field f = {.grid = &c->grid, .packed = c->packed, .n_fields = n};
 #pragma omp parallel for schedule(static) num_threads(n_threads)
     for (size_t i = 0; i < s->n; i++) {

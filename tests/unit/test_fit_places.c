@@ -107,6 +107,28 @@ static void test_weights(void **state)
     free(v);
 }
 
+// places far smaller than the cells that the image is cut into
+static void test_small_places(void **state)
+{
+    (void)state;
+    float *v = two_sides(6);
+    const sdm_fit_target t = image_of(v);
+    sdm_fit_opts o = options();
+    const sdm_fit_source source = exact_source();
+    o.tissue_mm = 0.02;
+    fit_problem p = {.target = &t, .opts = &o};
+    stand(&p, &source);
+    assert_int_equal(sdm_fit_places_update(&p, NULL), SDM_OK);
+    assert_int_equal(p.sites.n_outside, 2);
+    for (size_t i = 0; i < p.sites.n; i++) {
+        const double bone = exp((double)p.sites.place[2 * i]), dark = exp((double)p.sites.place[2 * i + 1]);
+        assert_true(fabs(bone + dark - 1) < 1e-5);
+    }
+    assert_true(isfinite(p.sums.log_likelihood));
+    leave(&p);
+    free(v);
+}
+
 // not wanted, not yet, or no second tissue to speak of
 static void test_none(void **state)
 {
@@ -157,6 +179,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_weights),
+        cmocka_unit_test(test_small_places),
         cmocka_unit_test(test_none),
         cmocka_unit_test(test_fit),
     };

@@ -161,9 +161,10 @@ typedef struct sdm_fit_result {
     char reason[256];    /* why it stopped */
     size_t n_iterations; /* of the main phase and the polish */
     double *objective; /* [n_iterations] log posterior density after each, without constants; those of other voxels (the
-                          region follows the shape), other weights of priors or other sd of tissues do not compare */
+                          region follows the shape), other weights of priors, other sd or places of tissues do not compare */
     double log_likelihood;         /* of the target at the estimate */
-    double log_likelihood_without; /* image: of the same voxels by a mixture that knows no shape; else NaN */
+    /* image: of the same voxels by a mixture that knows no shape, tissues outside in the same places; else NaN */
+    double log_likelihood_without;
     double
         evidence; /* image: how much better the shape explains it: gain in log-likelihood over correlated voxels, less
                         what its unknowns cost (Schwarz 1978); below 0 the image holds no such shape. Else NaN */

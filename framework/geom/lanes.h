@@ -1,4 +1,4 @@
-/* Eight or four floats or four doubles at once: vector extensions of the compiler, with intrinsics where they say more. */
+/* Eight floats or four doubles at once: vector extensions of the compiler, with intrinsics where they say more. */
 #ifndef SDM_GEOM_LANES_H
 #define SDM_GEOM_LANES_H
 
@@ -7,8 +7,6 @@
 #include <string.h>
 #if defined(__AVX2__) && defined(__FMA__)
 #include <immintrin.h>
-#elif defined(__SSE2__)
-#include <emmintrin.h>
 #endif
 
 /* For what is compiled anew for every kind of thing: the kind is a constant then. */
@@ -17,8 +15,6 @@
 typedef float v8f __attribute__((vector_size(32)));
 typedef int32_t v8i __attribute__((vector_size(32)));
 typedef uint16_t v8s __attribute__((vector_size(16)));
-typedef float v4f __attribute__((vector_size(16)));
-typedef int32_t v4i __attribute__((vector_size(16)));
 typedef double v4d __attribute__((vector_size(32)));
 typedef int64_t v4l __attribute__((vector_size(32)));
 
@@ -33,10 +29,6 @@ static inline v8i v8_load_i(const uint32_t *p)
 static inline void v8_store_i(uint32_t *p, v8i x) { memcpy(p, &x, sizeof x); }
 static inline v8f v8_all(float x) { return (v8f){x, x, x, x, x, x, x, x}; }
 static inline v8i v8_all_i(int32_t x) { return (v8i){x, x, x, x, x, x, x, x}; }
-static inline v4f f4_load(const float *p) { return *(const v4f *)(const void *)p; }
-static inline void f4_store(float *p, v4f x) { *(v4f *)(void *)p = x; }
-static inline v4f f4_all(float x) { return (v4f){x, x, x, x}; }
-static inline v4f f4_abs(v4f a) { return (v4f)((v4i)a & INT32_MAX); }
 static inline v4d v4_all(double x) { return (v4d){x, x, x, x}; }
 static inline v4d v4_load(const double *p) { return *(const v4d *)(const void *)p; }
 static inline void v4_store(double *p, v4d x) { *(v4d *)(void *)p = x; }
@@ -50,7 +42,6 @@ static inline v8f v8_sqrt(v8f a) { return (v8f)_mm256_sqrt_ps((__m256)a); }
 static inline v8f v8_rsqrt(v8f a) { return (v8f)_mm256_rsqrt_ps((__m256)a); }
 /* a * b + c */
 static inline v8f v8_fma(v8f a, v8f b, v8f c) { return (v8f)_mm256_fmadd_ps((__m256)a, (__m256)b, (__m256)c); }
-static inline v4f f4_fma(v4f a, v4f b, v4f c) { return (v4f)_mm_fmadd_ps((__m128)a, (__m128)b, (__m128)c); }
 /* x where m is set, else y */
 static inline v8i v8_select_i(v8i m, v8i x, v8i y)
 {
@@ -94,7 +85,6 @@ static inline v8f v8_sqrt(v8f a)
 }
 static inline v8f v8_rsqrt(v8f a) { return 1 / v8_sqrt(a); }
 static inline v8f v8_fma(v8f a, v8f b, v8f c) { return a * b + c; }
-static inline v4f f4_fma(v4f a, v4f b, v4f c) { return a * b + c; }
 static inline v8f v8_signed(v8f m, v8f x, v8f y) { return v8_select((v8i)m < 0, x, y); }
 static inline int v8_greater(v8f a, v8f b)
 {
@@ -120,27 +110,6 @@ static inline void v4_transpose(v4d r[4])
     memcpy(r, a, sizeof a);
 }
 #endif
-
-#if defined(__SSE2__)
-/* Rounded to float. */
-static inline v4f f4_round(v4d x)
-{
-    double d[4];
-    memcpy(d, &x, sizeof d);
-    return (v4f)_mm_movelh_ps(_mm_cvtpd_ps(_mm_loadu_pd(d)), _mm_cvtpd_ps(_mm_loadu_pd(d + 2)));
-}
-static inline void f4_transpose(v4f r[4]) { _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]); }
-#else
-static inline v4f f4_round(v4d x) { return __builtin_convertvector(x, v4f); }
-static inline void f4_transpose(v4f r[4])
-{
-    v4f a[4];
-    for (int i = 0; i < 4; i++)
-        for (int j = 0; j < 4; j++) a[i][j] = r[j][i];
-    memcpy(r, a, sizeof a);
-}
-#endif
-static inline v4d v4_from(v4f x) { return __builtin_convertvector(x, v4d); }
 
 /* Eight points or vectors. */
 typedef struct point8 {

@@ -100,7 +100,8 @@ static scaling scaling_of(const sdm_bvh_node *root, double slack)
     for (int a = 0; a < 3; a++) size = fmax(size, root->hi[a] - root->lo[a]);
     scaling r = {.scale = size > 0 && 1 / size < INFINITY ? 1 / size : 0};
     memcpy(r.origin, root->lo, sizeof r.origin);
-    r.margin = (float)(slack * r.scale) + OUTWARDS;
+    // coordinates are 0 .. 1: more than 1 overlaps all the same, and infinite boxes would overlap lanes without a triangle
+    r.margin = (float)fmin(slack * r.scale, 1) + OUTWARDS;
     return r;
 }
 

@@ -105,6 +105,10 @@ sed 's/^2 2 2$/2 2 nan/' cube.off >nan.off
 expect 3 'nan\.off|finite' sdmgen exact --mesh nan.off -o x.npy
 head -n 19 cube.off | sed 's/^8 12 0/8 9 0/' >open.off
 expect 2 'crossings' sdmgen exact --mesh open.off --sign crossings --quiet -o x.npy
+# all of it in x = 1, and next to nothing wide
+awk 'BEGIN { for (i = 0; i < 120; i++) printf "v 1 %de-57 %de-57\n", i * 37 % 101, i * 53 % 97
+             for (i = 1; i < 120; i += 3) print "f", i, i + 1, i + 2 }' >thin.obj
+expect 0 - sdmgen exact --mesh thin.obj --size 4,4,4 --spacing 1 --origin 0,0,0 --quiet -o thin.npy
 # the sanitizer's allocator ends the program in place of failing
 grep -q __asan_init "$program" ||
     expect 1 'memory|voxels|bytes' sdmgen exact --mesh cube.off --size 1000000,1000000,1000 --spacing 1 -o x.npy

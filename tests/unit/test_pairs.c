@@ -85,6 +85,30 @@ static void test_all_pairs(void **state)
     }
 }
 
+// a mesh that is nothing beside its place: the slack is more than it is wide by any factor, up to infinity in single precision
+static void test_thin(void **state)
+{
+    (void)state;
+    for (double scale = 1e-10; scale >= 1e-300; scale *= 1e-10) {
+        const size_t n = 43;
+        sdm_mesh m = {0};
+        mesh_make(&m, 3 * n, n);
+        for (size_t i = 0; i < 3 * n; i++) {
+            mesh_vertex(&m, i, 1, scale * sdm_rng_uniform(8, 0, i), scale * sdm_rng_uniform(8, 1, i));
+            m.tri[i] = (uint32_t)i;
+        }
+        visits v = {.seen = calloc(n, n), .n_tri = n};
+        if (!v.seen) abort();
+        visit_pairs(&m, 16 * DBL_EPSILON, &v);
+        for (size_t i = 0; i < n; i++)
+            for (size_t j = i; j < n; j++) {
+                if (!apart(&m, i, j, 16 * DBL_EPSILON)) assert_int_equal(v.seen[i * n + j], i != j);
+            }
+        free(v.seen);
+        sdm_mesh_dispose(&m);
+    }
+}
+
 // a part far away does not make pairs of all that is near
 static void test_far_part(void **state)
 {
@@ -107,6 +131,7 @@ static void test_far_part(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_all_pairs), cmocka_unit_test(test_far_part)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_all_pairs), cmocka_unit_test(test_thin),
+                                       cmocka_unit_test(test_far_part)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

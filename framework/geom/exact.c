@@ -184,13 +184,16 @@ const sdm_exact_report *sdm_exact_get_report(const sdm_exact *e) { return &e->re
 const sdm_mesh *sdm_exact_surface(const sdm_exact *e) { return &e->surface; }
 const uint32_t *sdm_exact_source(const sdm_exact *e) { return e->source; }
 
+/* Squares of the coordinates must be numbers, too. */
+static bool is_point(const double x[3]) { return fabs(x[0]) <= 1e150 && fabs(x[1]) <= 1e150 && fabs(x[2]) <= 1e150; }
+
 double sdm_exact_point(const sdm_exact *e, const double x[3], double closest[3], double normal[3], uint32_t *triangle)
 {
     uint32_t slot = 0;
     int feature = SDM_FACE;
     double q[3] = {NAN, NAN, NAN}, n[3] = {NAN, NAN, NAN};
     double d = NAN;
-    if (isfinite(x[0]) && isfinite(x[1]) && isfinite(x[2])) {
+    if (is_point(x)) {
         (void)sdm_nearest_find(&e->nearest, x, INFINITY, &slot, q, &feature);
         const bool inside = sdm_sign_inside(&e->sign, x, slot, q, feature);
         d = sqrt(sdm_nearest_feature(&e->nearest, x, &slot));
@@ -206,10 +209,10 @@ double sdm_exact_point(const sdm_exact *e, const double x[3], double closest[3],
 
 double sdm_exact_distance(const sdm_exact *e, const double x[3])
 {
-    uint32_t slot;
+    uint32_t slot = 0;
     int feature;
     double q[3];
-    if (!isfinite(x[0]) || !isfinite(x[1]) || !isfinite(x[2])) return NAN;
+    if (!is_point(x)) return NAN;
     (void)sdm_nearest_find(&e->nearest, x, INFINITY, &slot, q, &feature);
     return sqrt(sdm_nearest_feature(&e->nearest, x, &slot));
 }

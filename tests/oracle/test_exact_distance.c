@@ -1,4 +1,5 @@
 /* Distances of the exact engine against brute force and closed forms: values, grids, threads, scales, misuse. */
+#include <float.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -341,9 +342,17 @@ static void test_misuse(void **state)
     assert_int_equal(sdm_exact_map(e, &g, v, &err), SDM_E_ARG);
     assert_int_equal(sdm_naive_map(&m, &g, 1, v, &err), SDM_E_ARG);
     assert_int_equal(sdm_naive_map(NULL, &g, 1, v, &err), SDM_E_ARG);
-    const double bad[3] = {0, NAN, 0};
-    double q[3];
-    assert_true(isnan(sdm_exact_point(e, bad, q, NULL, NULL)) && isnan(q[0]));
+    const double bad[3] = {0, NAN, 0}, odd[5] = {NAN, INFINITY, -1e151, 1e200, DBL_MAX};
+    double q[3], normal[3];
+    for (int i = 0; i < 15; i++) {
+        const double x[3] = {i % 3 == 0 ? odd[i / 3] : 1, i % 3 == 1 ? odd[i / 3] : 2, i % 3 == 2 ? odd[i / 3] : 3};
+        assert_true(isnan(sdm_exact_point(e, x, q, normal, NULL)) && isnan(q[0]) && isnan(normal[0]));
+        assert_true(isnan(sdm_exact_distance(e, x)));
+    }
+    for (double far = 1e10; far < 1e150; far *= 1e10) {
+        const double x[3] = {0.5, -far, 0.5}, d = sdm_exact_point(e, x, q, normal, NULL);
+        assert_true(fabs(d / far - 1) < 1e-9 && d == sdm_exact_distance(e, x) && q[1] == 0 && normal[1] < -1 + 1e-9);
+    }
     assert_true(isnan(sdm_naive_point(&m, bad)));
     assert_string_equal(sdm_sign_method_name(SDM_SIGN_CROSSINGS), "crossings");
     assert_string_equal(sdm_sign_method_name((sdm_sign_method)77), "unknown");

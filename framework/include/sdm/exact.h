@@ -115,12 +115,13 @@ SDM_API sdm_status sdm_exact_map_derivative(const sdm_exact *e, const sdm_grid *
 
 /* Signed distance at one point; every pointer may be NULL. closest[3]: nearest surface point; normal[3]: unit vector along
    the gradient of the signed distance (the outward normal of the nearest triangle where the point lies on the surface);
-   triangle: index in sdm_exact_surface(). NaN for a point that is not finite. [any thread] */
+   triangle: index in sdm_exact_surface(). NaN, triangle without meaning, for a point with a coordinate that is not finite or beyond
+   +-1e150. [any thread] */
 SDM_API double sdm_exact_point(const sdm_exact *e, const double x[3], double closest[3], double normal[3],
                                uint32_t *triangle);
 
-/* Distance without its sign, the same bits: on open meshes, where a sign is a sum over the boundary, much cheaper. NaN for a point that is
-   not finite. [any thread] */
+/* Distance without its sign, the same bits: on open meshes, where a sign is a sum over the boundary, much cheaper. NaN as above.
+   [any thread] */
 SDM_API double sdm_exact_distance(const sdm_exact *e, const double x[3]);
 
 /* Oracle and "naive" baseline, O(voxels * triangles) in double as VTK's class and the paper do it, without any tree: distance to

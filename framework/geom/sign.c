@@ -14,12 +14,14 @@ sdm_status sdm_sign_choose(const sdm_audit *a, sdm_sign_method wanted, sdm_sign_
                         "sign method crossings needs a closed mesh, this one has %zu boundary edges and %zu edges with "
                         "triangles of mixed orientation; use winding",
                         a->boundary_edges, a->misoriented_edges);
-    if (m == SDM_SIGN_PSEUDONORMAL && (!a->manifold || a->self_intersections))
+    // beside a triangle without area an edge knows one of its faces only
+    if (m == SDM_SIGN_PSEUDONORMAL && (!a->manifold || a->self_intersections || a->degenerate))
         return sdm_fail(
             err, SDM_E_ARG,
             "sign method pseudonormal needs a manifold mesh without overlap, this one has %zu boundary, %zu "
-            "non-manifold and %zu misoriented edges and %zu intersecting pairs of triangles; use auto",
-            a->boundary_edges, a->nonmanifold_edges, a->misoriented_edges, a->self_intersections);
+            "non-manifold and %zu misoriented edges, %zu intersecting pairs of triangles and %zu triangles without "
+            "area; use auto",
+            a->boundary_edges, a->nonmanifold_edges, a->misoriented_edges, a->self_intersections, a->degenerate);
     if (m != SDM_SIGN_CROSSINGS && m != SDM_SIGN_PSEUDONORMAL && m != SDM_SIGN_WINDING)
         return sdm_fail(err, SDM_E_ARG, "unknown sign method %d", (int)m);
     *method = m;

@@ -199,6 +199,29 @@ static void test_pseudonormal_refuses_overlap(void **state)
     sdm_mesh_dispose(&b);
 }
 
+/* A prism with a vertex in the middle of an edge that only one of the faces there has, a triangle without area between them. */
+static void test_pseudonormal_refuses_degenerate(void **state)
+{
+    (void)state;
+    static const double vert[7][3] = {{0, 0, 0},     {0, 0, 2},     {1, 0, 0}, {1, 0, 2},
+                                      {0.5, 0.9, 0}, {0.5, 0.9, 2}, {0, 0, 1}};
+    static const uint8_t tri[10][3] = {{0, 2, 6}, {6, 2, 3}, {6, 3, 1}, {0, 1, 5}, {0, 5, 4},
+                                       {2, 4, 5}, {2, 5, 3}, {0, 4, 2}, {1, 3, 5}, {0, 6, 1}};
+    sdm_mesh m = {0};
+    mesh_make(&m, 7, 10);
+    for (size_t v = 0; v < 7; v++) mesh_vertex(&m, v, vert[v][0], vert[v][1], vert[v][2]);
+    for (size_t t = 0; t < 10; t++) mesh_triangle(&m, t, tri[t][0], tri[t][1], tri[t][2]);
+    sdm_exact *e = NULL;
+    sdm_error err = {0};
+    assert_int_equal(sdm_exact_create(&m, &(sdm_exact_opts){.sign = SDM_SIGN_PSEUDONORMAL}, &e, &err), SDM_E_ARG);
+    assert_non_null(strstr(err.text, " 1 triangles without area"));
+    // what is used in its place
+    e = engine(&m, NULL);
+    assert_true(sdm_exact_get_report(e)->audit.manifold && sdm_exact_get_report(e)->sign == SDM_SIGN_CROSSINGS);
+    sdm_exact_free(e);
+    sdm_mesh_dispose(&m);
+}
+
 static void test_moebius_strip(void **state)
 {
     (void)state;
@@ -282,6 +305,7 @@ int main(void)
         cmocka_unit_test(test_inside_out),
         cmocka_unit_test(test_open_cup),
         cmocka_unit_test(test_pseudonormal_refuses_overlap),
+        cmocka_unit_test(test_pseudonormal_refuses_degenerate),
         cmocka_unit_test(test_moebius_strip),
         cmocka_unit_test(test_sheets_that_cancel),
         cmocka_unit_test(test_methods_agree),

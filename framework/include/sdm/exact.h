@@ -26,7 +26,8 @@ extern "C" {
 typedef enum sdm_sign_method {
     SDM_SIGN_AUTO = 0,  /* crossings on closed meshes, winding otherwise */
     SDM_SIGN_CROSSINGS, /* signed crossings along a ray: the integer winding number; closed meshes only */
-    SDM_SIGN_PSEUDONORMAL, /* angle-weighted pseudo-normal (Baerentzen and Aanaes 2005); manifold meshes without overlap only */
+    SDM_SIGN_PSEUDONORMAL, /* angle-weighted pseudo-normal (Baerentzen and Aanaes 2005); only manifold meshes without overlap and
+                              without degenerate triangles */
     SDM_SIGN_WINDING /* generalised winding number > 1/2 (Jacobson et al. 2013); any mesh */
 } sdm_sign_method;
 

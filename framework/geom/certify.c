@@ -28,8 +28,9 @@ static void compare_row(job *c, size_t row, const int64_t start[3], const int32_
             const float d = c->values[line * c->n[0] + at[0]];
             const int32_t winding = u.winding + (base ? base[at[axis]] : 0);
             const size_t byte = (size_t)line * c->pitch + (size_t)(at[0] / 8);
-            if ((d < 0) != (winding >= 1) && fabs((double)d) > c->rounding) c->wrong[byte] |= (uint8_t)(1 << at[0] % 8);
-            if (winding < 0 && fabs((double)d) > c->rounding) c->below[byte] |= (uint8_t)(1 << at[0] % 8);
+            if (fabs((double)d) <= c->rounding) continue;
+            if (isnan(d) || (d < 0) != (winding >= 1)) c->wrong[byte] |= (uint8_t)(1 << at[0] % 8);
+            if (winding < 0) c->below[byte] |= (uint8_t)(1 << at[0] % 8);
         }
     }
 }
@@ -80,8 +81,9 @@ static size_t by_sums(job *c, const sdm_sign *s, const sdm_grid *g, size_t n)
         double x[3];
         sdm_grid_world(g, index, x);
         const double w = sdm_winding_sum(&s->winding, x);
-        if (fabs((double)c->values[voxel]) <= c->rounding) continue;
-        if ((c->values[voxel] < 0) != (w > 0.5)) mark(c->wrong, c, voxel);
+        const float d = c->values[voxel];
+        if (fabs((double)d) <= c->rounding) continue;
+        if (isnan(d) || (d < 0) != (w > 0.5)) mark(c->wrong, c, voxel);
         if (w < -0.5) mark(c->below, c, voxel);
     }
     return n_sample;
@@ -106,7 +108,8 @@ static void count(const job *c, const sdm_sign *s, const sdm_grid *g, sdm_sign_c
             for (unsigned b = 0; (wrong | below) >> b; b++) {
                 const int64_t at[3] = {(int64_t)(8 * byte + b), line % c->n[1], line / c->n[1]};
                 out->below_zero += below >> b & 1;
-                if (!(wrong >> b & 1) || undecided(s, g, at)) continue;
+                if (!(wrong >> b & 1)) continue;
+                if (!isnan(c->values[line * c->n[0] + at[0]]) && undecided(s, g, at)) continue;
                 if (!out->wrong++) memcpy(out->first_wrong, at, sizeof at);
             }
         }

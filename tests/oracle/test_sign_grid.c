@@ -91,6 +91,16 @@ static void test_certificate(void **state)
             assert_int_equal(c.wrong, k + 1);
         }
         assert_true(c.first_wrong[0] == 20 && c.first_wrong[1] == 17 && c.first_wrong[2] == 3);
+        for (size_t k = 0; k < 3; k++) v[places[k]] = -v[places[k]];
+        // not a number: outside, within the solid, within the cavity
+        const size_t nan_places[] = {5 + 21 * (4 + 18), 16 + 21 * (8 + 18 * 9), 10 + 21 * (8 + 18 * 9)};
+        for (size_t k = 0; k < 3; k++) {
+            assert_true((v[nan_places[k]] < 0) == (k == 1));
+            v[nan_places[k]] = NAN;
+            assert_int_equal(sdm_exact_certify(e, &g, v, &c, &err), SDM_OK);
+            assert_true(c.wrong == k + 1 && c.below_zero == 0);
+        }
+        assert_true(c.first_wrong[0] == 5 && c.first_wrong[1] == 4 && c.first_wrong[2] == 1);
         assert_int_equal(sdm_exact_certify(NULL, &g, v, &c, &err), SDM_E_ARG);
         assert_int_equal(sdm_exact_certify(e, NULL, v, &c, &err), SDM_E_ARG);
         assert_int_equal(sdm_exact_certify(e, &g, NULL, &c, &err), SDM_E_ARG);

@@ -85,7 +85,7 @@ typedef struct sdm_sign_certificate {
 
 /* Finds the signs of a map made by sdm_exact_map(e, grid) again in ways independent of it and compares: signed crossings along the
    other axes of the grid, on an open mesh together with its boundary, or sums of solid angles at a sample of the voxels. Voxels on
-   the surface to rounding, and those with a winding number of 1/2 to 1e-9, count as right. Threads and errors as
+   the surface to rounding, and those with a winding number of 1/2 to 1e-9, count as right, NaN as wrong. Threads and errors as
    sdm_exact_map(). */
 SDM_API sdm_status sdm_exact_certify(const sdm_exact *e, const sdm_grid *grid, const float *values,
                                      sdm_sign_certificate *out, sdm_error *err);

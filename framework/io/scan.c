@@ -7,9 +7,12 @@
 
 static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\f' || c == '\v' || c == '\0'; }
 
+size_t sdm_scan_mark(const char *text, size_t size) { return size >= 3 && !memcmp(text, "\xEF\xBB\xBF", 3) ? 3 : 0; }
+
 /* Cuts one line off the text; false at its end. */
 static bool cut_line(sdm_scan *s, char **line)
 {
+    if (s->lines == 0) s->at += sdm_scan_mark(s->at, (size_t)(s->end - s->at));
     if (s->at >= s->end) return false;
     s->line = ++s->lines;
     *line = s->at;

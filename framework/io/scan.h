@@ -20,6 +20,9 @@ typedef struct sdm_scan {
     bool continues; /* a backslash at the end of a line joins it with the next */
 } sdm_scan;
 
+/* Bytes of the byte order mark that UTF-8 text may begin with; the first line is read without it. */
+SDM_API size_t sdm_scan_mark(const char *text, size_t size);
+
 /* Next line with something on it, NULL at the end of the text. */
 SDM_API char *sdm_scan_line(sdm_scan *s);
 

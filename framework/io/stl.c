@@ -71,6 +71,17 @@ static sdm_status read_facets(sdm_builder *b, weld *w, const uint8_t *data, size
     return SDM_OK;
 }
 
+static char lower(char c) { return c >= 'A' && c <= 'Z' ? (char)(c - 'A' + 'a') : c; }
+
+/* Is "solid" the first word of the text, in upper or lower case? */
+static bool begins_with_solid(const char *text, size_t size)
+{
+    size_t at = sdm_scan_mark(text, size), n = 0;
+    while (at < size && (text[at] == ' ' || (text[at] >= '\t' && text[at] <= '\r'))) at++;
+    while (n < 5 && at + n < size && lower(text[at + n]) == "solid"[n]) n++;
+    return n == 5;
+}
+
 static sdm_status read_ascii(sdm_builder *b, weld *w, uint8_t *data, size_t size, sdm_error *err)
 {
     sdm_scan s = {.at = (char *)data, .end = (char *)data + size, .path = b->path};
@@ -78,7 +89,8 @@ static sdm_status read_ascii(sdm_builder *b, weld *w, uint8_t *data, size_t size
     int n = -1; /* corners of the open facet; -1: none is open */
     bool ended = false;
     for (char *line; (line = sdm_scan_line(&s)) != NULL;) {
-        const char *word = sdm_scan_word(&line);
+        char *word = sdm_scan_word(&line);
+        for (char *c = word; *c; c++) *c = lower(*c);
         sdm_status e = SDM_OK;
         double x[3];
         if (strcmp(word, "vertex") == 0) {
@@ -111,7 +123,7 @@ sdm_status sdm_stl_read(sdm_builder *b, uint8_t *data, size_t size, sdm_error *e
     /* "solid" may open a binary header too: the length decides */
     const uint64_t n = size >= STL_HEADER ? sdm_get_uint(data + 80, 4, false) : 0;
     const bool binary = size >= STL_HEADER && n * STL_FACET == size - STL_HEADER;
-    const bool ascii = !binary && size >= 5 && memcmp(data, "solid", 5) == 0;
+    const bool ascii = !binary && begins_with_solid((const char *)data, size);
     if (!binary && !ascii && size < STL_HEADER)
         return sdm_fail(err, SDM_E_FORMAT, "%s: byte %zu: too short for an STL file", b->path, size);
     if (!binary && !ascii)

@@ -120,15 +120,25 @@ static void test_text_dialects(void **state)
          "  endloop\n endfacet\nfacet normal nan nan nan\nouter loop\nvertex -0.0 0 0\nvertex 1 2 0\nvertex 0 2 0\n"
          "endloop\nendfacet\nfacet normal 0 0 0\nouter loop\nvertex 1 0 0\nvertex 0 0 0\nvertex 0.5 1 -3.25\nendloop\n"
          "endfacet\nendsolid two words\n"},
+        {".stl", "SOLID\nFACET NORMAL 0 0 1\nOUTER LOOP\nVERTEX 0 0 0\nVERTEX 1 0 0\nVERTEX 1 2 0\nENDLOOP\nENDFACET\n"
+                 "Facet Normal 0 0 1\nOuter Loop\nVertex 0 0 0\nVertex 1 2 0\nVertex 0 2 0\nEndLoop\nEndFacet\n"
+                 "FACET NORMAL 0 0 1\nOUTER LOOP\nVERTEX 1 0 0\nVERTEX 0 0 0\nVERTEX 5E-1 1 -3.25\nENDLOOP\nENDFACET\n"
+                 "ENDSOLID\n"},
     };
+    static const char *const before[] = {"", "\xEF\xBB\xBF", "\xEF\xBB\xBF \r\n\n"};
     for (size_t i = 0; i < sizeof file / sizeof *file; i++) {
-        sdm_mesh m = {0};
-        sdm_error err = {0};
-        const sdm_status s = read_text(file[i].ext, file[i].text, &m, &err);
-        if (s) print_error("dialect %zu: %s\n", i, err.text);
-        assert_int_equal(s, SDM_OK);
-        check_pyramid(&m);
-        sdm_mesh_dispose(&m);
+        // as it is, behind a byte order mark of UTF-8, and behind that and blank lines
+        for (int k = 0; k < 3; k++) {
+            sdm_mesh m = {0};
+            sdm_error err = {0};
+            char text[1024];
+            assert_in_range(snprintf(text, sizeof text, "%s%s", before[k], file[i].text), 1, sizeof text - 1);
+            const sdm_status s = read_text(file[i].ext, text, &m, &err);
+            if (s) print_error("dialect %zu %d: %s\n", i, k, err.text);
+            assert_int_equal(s, SDM_OK);
+            check_pyramid(&m);
+            sdm_mesh_dispose(&m);
+        }
     }
 }
 

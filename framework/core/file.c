@@ -4,6 +4,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <stdarg.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -85,6 +86,25 @@ static char *with_suffix(const char *path, const char *suffix)
     return out;
 }
 
+/* Opens a file of its own beside `path`: no other writer of that name, here or elsewhere, has it. */
+static int open_temp(const char *path, char **temp)
+{
+    static atomic_ulong counter;
+    for (;;) {
+        char suffix[64];
+        snprintf(suffix, sizeof suffix, ".%ld.%lu.tmp", (long)getpid(), atomic_fetch_add(&counter, 1));
+        *temp = with_suffix(path, suffix);
+        if (!*temp) errno = ENOMEM;
+        const int fd = *temp ? open(*temp, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666) : -1;
+        if (fd >= 0) return fd;
+        const int code = errno;
+        free(*temp);
+        *temp = NULL;
+        errno = code;
+        if (code != EEXIST) return -1;
+    }
+}
+
 sdm_status sdm_outfile_open(const char *path, sdm_outfile **out, sdm_error *err)
 {
     *out = NULL;
@@ -92,20 +112,18 @@ sdm_status sdm_outfile_open(const char *path, sdm_outfile **out, sdm_error *err)
     const sdm_status s = SDM_ALLOC(&f, 1, "output buffer", err);
     if (s) return s;
     f->fd = -1;
-    char suffix[48];
-    snprintf(suffix, sizeof suffix, ".%ld.tmp", (long)getpid());
     f->path = with_suffix(path, "");
-    f->temp = with_suffix(path, suffix);
-    if (!f->path || !f->temp) {
+    if (!f->path) {
         sdm_outfile_discard(&f);
         return sdm_fail(err, SDM_E_NOMEM, "%s: no memory for its name", path);
     }
     struct stat st;
-    if (!stat(path, &st) && S_ISDIR(st.st_mode)) {
+    if (!stat(path, &st) && !S_ISREG(st.st_mode)) {
         sdm_outfile_discard(&f);
-        return sdm_fail(err, SDM_E_IO, "%s: cannot write: it is a folder", path);
+        return sdm_fail(err, SDM_E_IO, "%s: cannot write: it is a %s", path,
+                        S_ISDIR(st.st_mode) ? "folder" : "device, pipe or socket, which a file would replace");
     }
-    f->fd = open(f->temp, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    f->fd = open_temp(path, &f->temp);
     if (f->fd < 0) {
         const int code = errno;
         sdm_outfile_discard(&f);

@@ -199,6 +199,39 @@ static void files(void **state)
 
     assert_int_equal(sdm_file_read(path, 1, &data, &size, &e), SDM_E_FORMAT);
     assert_int_equal(sdm_file_read("no such file", 1, &data, &size, &e), SDM_E_IO);
+    // two writers of one name: each file is whole, the last to commit stays
+    for (int last = 0; last < 2; last++) {
+        sdm_outfile *two[2];
+        for (int i = 0; i < 2; i++) assert_int_equal(sdm_outfile_open(path, &two[i], &e), SDM_OK);
+        for (int i = 0; i < 200000; i++) {
+            assert_int_equal(sdm_outfile_write(two[0], "a", 1, &e), SDM_OK);
+            if (i % 2) assert_int_equal(sdm_outfile_write(two[1], "b", 1, &e), SDM_OK);
+        }
+        for (int i = 0; i < 2; i++) {
+            const int which = i ? last : !last;
+            assert_int_equal(sdm_outfile_commit(&two[which], &e), SDM_OK);
+            assert_int_equal(sdm_file_read(path, 200000, &data, &size, &e), SDM_OK);
+            assert_int_equal(size, which ? 100000 : 200000);
+            for (size_t k = 0; k < size; k++) assert_int_equal(data[k], "ab"[which]);
+            sdm_free(data);
+        }
+    }
+    // a link that waits under the next temporary name is not followed
+    assert_int_equal(sdm_outfile_open(path, &f, &e), SDM_OK);
+    unsigned long pid, number;
+    assert_int_equal(sscanf(sdm_outfile_temp_path(f) + strlen(path), ".%lu.%lu.tmp", &pid, &number), 2);
+    assert_int_equal(pid, getpid());
+    sdm_outfile_discard(&f);
+    snprintf(temp, sizeof temp, "%s.%lu.%lu.tmp", path, pid, number + 1);
+    assert_int_equal(symlink("f", temp), 0);
+    assert_int_equal(sdm_outfile_open(path, &f, &e), SDM_OK);
+    assert_string_not_equal(sdm_outfile_temp_path(f), temp);
+    sdm_outfile_discard(&f);
+    assert_int_equal(sdm_file_read(path, 200000, &data, &size, &e), SDM_OK);
+    assert_int_equal(size, 100000);
+    sdm_free(data);
+    assert_int_equal(remove(temp), 0);
+
     assert_int_equal(sdm_file_read(folder, 1, &data, &size, &e), SDM_E_IO);
     assert_int_equal(sdm_outfile_open("no/such/folder/f", &f, &e), SDM_E_IO);
     assert_int_equal(sdm_outfile_open(folder, &f, &e), SDM_E_IO);
@@ -209,6 +242,8 @@ static void files(void **state)
     assert_int_equal(sdm_file_read(path, 1, &data, &size, &e), SDM_E_IO);
     remove(path);
     remove(deep);
+    assert_int_equal(sdm_outfile_open(path, &f, &e), SDM_E_IO); // would take its place
+    assert_non_null(strstr(e.text, "pipe"));
     snprintf(deep, sizeof deep, "%s/a/b", folder);
     remove(deep);
     snprintf(deep, sizeof deep, "%s/a", folder);

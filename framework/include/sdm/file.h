@@ -18,7 +18,8 @@ SDM_API sdm_status sdm_file_read(const char *path, uint64_t max_bytes, uint8_t *
 /* A file under construction: nothing appears under its final name before sdm_outfile_commit() succeeds. */
 typedef struct sdm_outfile sdm_outfile;
 
-/* Opens a temporary file beside `path`. SDM_E_IO when the folder cannot be written. */
+/* Opens a temporary file beside `path`, of its own for every call, also of one path. SDM_E_IO when the folder cannot be written, and
+   when `path` is neither a regular file (or a link to one: the link is replaced) nor new. */
 SDM_API sdm_status sdm_outfile_open(const char *path, sdm_outfile **out, sdm_error *err);
 
 /* Name of the temporary file, for libraries that write by name; valid until commit or discard. */

@@ -5,10 +5,15 @@
 #include <omp.h>
 #endif
 
+/* So many on a small machine, too: tests ask for more than it has. */
+#define MOST 64
+
 int sdm_threads(int wanted)
 {
 #ifdef _OPENMP
-    return wanted > 0 ? wanted : omp_get_max_threads();
+    const int n = wanted > 0 ? wanted : omp_get_max_threads(), twice = 2 * omp_get_num_procs();
+    const int most = twice > MOST ? twice : MOST;
+    return n < most ? n : most;
 #else
     (void)wanted;
     return 1;

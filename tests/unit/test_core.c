@@ -1,4 +1,5 @@
 /* Core: status, memory, random numbers, checksums, files, text, grids. */
+#include <limits.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -18,6 +19,7 @@
 #include "sdm/memory.h"
 #include "sdm/rng.h"
 #include "sdm/text.h"
+#include "sdm/threads.h"
 
 static void status_text(void **state)
 {
@@ -197,8 +199,6 @@ static void files(void **state)
     assert_string_equal((char *)data, "42");
     sdm_free(data);
 
-    assert_int_equal(sdm_file_read(path, 1, &data, &size, &e), SDM_E_FORMAT);
-    assert_int_equal(sdm_file_read("no such file", 1, &data, &size, &e), SDM_E_IO);
     // two writers of one name: each file is whole, the last to commit stays
     for (int last = 0; last < 2; last++) {
         sdm_outfile *two[2];
@@ -232,6 +232,8 @@ static void files(void **state)
     sdm_free(data);
     assert_int_equal(remove(temp), 0);
 
+    assert_int_equal(sdm_file_read(path, 1, &data, &size, &e), SDM_E_FORMAT);
+    assert_int_equal(sdm_file_read("no such file", 1, &data, &size, &e), SDM_E_IO);
     assert_int_equal(sdm_file_read(folder, 1, &data, &size, &e), SDM_E_IO);
     assert_int_equal(sdm_outfile_open("no/such/folder/f", &f, &e), SDM_E_IO);
     assert_int_equal(sdm_outfile_open(folder, &f, &e), SDM_E_IO);
@@ -240,15 +242,27 @@ static void files(void **state)
     remove(path);
     assert_int_equal(mkfifo(path, 0600), 0); // would wait for a writer
     assert_int_equal(sdm_file_read(path, 1, &data, &size, &e), SDM_E_IO);
-    remove(path);
-    remove(deep);
     assert_int_equal(sdm_outfile_open(path, &f, &e), SDM_E_IO); // would take its place
     assert_non_null(strstr(e.text, "pipe"));
+    remove(path);
+    remove(deep);
     snprintf(deep, sizeof deep, "%s/a/b", folder);
     remove(deep);
     snprintf(deep, sizeof deep, "%s/a", folder);
     remove(deep);
     assert_int_equal(remove(folder), 0); // nothing was left behind
+}
+
+static void numbers_of_threads(void **state)
+{
+    (void)state;
+    const int most = sdm_threads(1000000);
+    assert_true(most == 1 || most >= 64); // 1 without OpenMP
+    assert_true(most <= 64 || most <= 2 * sysconf(_SC_NPROCESSORS_CONF));
+    assert_int_equal(sdm_threads(INT_MAX), most);
+    assert_int_equal(sdm_threads(3), most == 1 ? 1 : 3);
+    assert_in_range(sdm_threads(0), 1, most);
+    assert_int_equal(sdm_thread(), 0);
 }
 
 static void grids(void **state)
@@ -295,6 +309,7 @@ int main(void)
         cmocka_unit_test(numbers_and_names),
         cmocka_unit_test(json_text),
         cmocka_unit_test(files),
+        cmocka_unit_test(numbers_of_threads),
         cmocka_unit_test(grids),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -22,13 +22,13 @@ static sdm_status by_callback(const sdm_instance *s, const double *p, size_t n_v
     return status ? sdm_instance_fail_at(s, p, status, err) : SDM_OK;
 }
 
-// adds weight * vertices at p with parameter k moved by h
-static sdm_status add_moved(const sdm_instance *s, const double *p, size_t k, double h, double weight, size_t n_vert,
-                            sdm_mesh *mesh, double *sum, sdm_error *err)
+// adds weight * vertices at p with parameter k at `place`
+static sdm_status add_moved(const sdm_instance *s, const double *p, size_t k, double place, double weight,
+                            size_t n_vert, sdm_mesh *mesh, double *sum, sdm_error *err)
 {
     double moved[SHAPE_PARAMS_MAX];
     memcpy(moved, p, s->n_params * sizeof *moved);
-    moved[k] += h;
+    moved[k] = place;
     const sdm_status status = sdm_instance_mesh(s, moved, mesh, err);
     if (status) return status;
     if (mesh->n_vert != n_vert)
@@ -40,7 +40,8 @@ static sdm_status add_moved(const sdm_instance *s, const double *p, size_t k, do
     return SDM_OK;
 }
 
-// of second order in both forms: (f(h) - f(-h)) / 2h inside, (-3 f(0) + 4 f(h) - f(2h)) / 2h at an end of the range
+// of second order in both forms: from places on both sides, at an end of the range from here and two places on one side; weights are
+// those of the steps as they are rounded
 static sdm_status by_differences(const sdm_instance *s, const double *p, size_t n_vert, double *velocity,
                                  sdm_error *err)
 {
@@ -48,16 +49,22 @@ static sdm_status by_differences(const sdm_instance *s, const double *p, size_t 
     sdm_status status = SDM_OK;
     for (size_t k = 0; k < s->n_params && !status; k++) {
         const sdm_param *q = &s->params[k];
-        double h = STEP_SHARE * (q->max - q->min), *v = velocity + 3 * n_vert * k;
-        memset(v, 0, 3 * n_vert * sizeof *v);
-        if (p[k] - h >= q->min && p[k] + h <= q->max) {
-            status = add_moved(s, p, k, -h, -0.5 / h, n_vert, &mesh, v, err);
-            if (!status) status = add_moved(s, p, k, h, 0.5 / h, n_vert, &mesh, v, err);
-            continue;
+        const double step = STEP_SHARE * (q->max - q->min), h = p[k] + step > q->max ? -step : step;
+        double *v = velocity + 3 * n_vert * k, place[3] = {p[k] - h, p[k] + h, p[k] + 2 * h}, weight[3];
+        const bool within = place[0] >= q->min && place[0] <= q->max;
+        if (within) {
+            weight[1] = 1 / (place[1] - place[0]);
+            weight[0] = -weight[1];
+        } else {
+            const double a = place[1] - p[k], b = place[2] - p[k];
+            place[0] = p[k];
+            weight[0] = -(a + b) / (a * b);
+            weight[1] = b / (a * (b - a));
+            weight[2] = -a / (b * (b - a));
         }
-        if (p[k] + h > q->max) h = -h;
-        const double moves[3] = {0, h, 2 * h}, weights[3] = {-1.5 / h, 2 / h, -0.5 / h};
-        for (int i = 0; i < 3 && !status; i++) status = add_moved(s, p, k, moves[i], weights[i], n_vert, &mesh, v, err);
+        memset(v, 0, 3 * n_vert * sizeof *v);
+        for (int i = 0; i < (within ? 2 : 3) && !status; i++)
+            status = add_moved(s, p, k, place[i], weight[i], n_vert, &mesh, v, err);
     }
     sdm_mesh_dispose(&mesh);
     return status;

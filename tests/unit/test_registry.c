@@ -497,6 +497,37 @@ static void test_velocity(void **state)
     sdm_instance_free(s);
 }
 
+static int mesh_of_year(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
+                        sdm_mesh_out *out)
+{
+    (void)self, (void)options;
+    const int failed = host->reserve(host, out, 3, 1);
+    if (failed) return failed;
+    for (uint32_t i = 0; i < 9; i++) out->vert[i] = i * (p[0] - 1e6);
+    for (uint32_t i = 0; i < 3; i++) out->tri[i] = i;
+    return 0;
+}
+
+// steps that are rounded, beside a parameter of many digits: weights are those of the steps taken
+static void test_velocity_of_year(void **state)
+{
+    (void)state;
+    static const sdm_param year[] = {{"year", "", 1e6, 1e6 + 1, 1e6 + 0.5, ""}};
+    sdm_shape shape = GOOD;
+    shape.params = year;
+    shape.n_params = 1;
+    shape.mesh = mesh_of_year;
+    sdm_instance *s = NULL;
+    assert_int_equal(instance_of(&shape, NULL, NULL, NULL, &s), SDM_OK);
+    const double at[] = {1e6 + 0.3, 1e6, 1e6 + 1, 1e6 + 1e-6};
+    for (size_t i = 0; i < 4; i++) {
+        double v[9];
+        assert_int_equal(sdm_instance_velocity(s, &at[i], 3, v, &err), SDM_OK);
+        for (int k = 0; k < 9; k++) assert_true(fabs(v[k] - k) < 1e-9);
+    }
+    sdm_instance_free(s);
+}
+
 static int create_fails(const sdm_host *host, const sdm_option_value *options, void **self)
 {
     (void)self;
@@ -595,6 +626,7 @@ int main(void)
         cmocka_unit_test(test_mesh),
         cmocka_unit_test(test_distance),
         cmocka_unit_test(test_velocity),
+        cmocka_unit_test(test_velocity_of_year),
         cmocka_unit_test(test_create),
         WITH_REGISTRY(test_memory),
     };

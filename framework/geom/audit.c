@@ -32,22 +32,28 @@ static void measure(const sdm_mesh *m, sdm_survey *s)
             repeats_vertex(&s->topo.tri[3 * t]) || !(s->facets[t].height > 4 * DBL_EPSILON * s->facets[t].longest);
 }
 
-static void count_duplicates(const sdm_topology *topo, sdm_audit *a)
+/* The vertex across half-edge h. */
+static uint32_t vertex_across(const sdm_topology *topo, uint32_t h) { return topo->tri[h % 3 ? h - 1 : h + 2]; }
+
+/* Triangles that share their three vertices share an edge and the vertex across; counted at the first of its edges. */
+static sdm_status count_duplicates(const sdm_topology *topo, sdm_arena *arena, sdm_audit *a, sdm_error *err)
 {
-    // triangles that share their three corners share an edge: look along the list of their first edge only
-    for (size_t t = 0; t < topo->n_tri; t++) {
-        const uint32_t *v = &topo->tri[3 * t];
-        if (repeats_vertex(v)) continue;
-        for (uint32_t h = topo->edges[topo->edge[3 * t]].first; h != SDM_NONE; h = topo->next[h]) {
-            const uint32_t *o = &topo->tri[h / 3 * 3];
-            if (h / 3 >= t) continue;
-            int shared = 0;
-            for (int k = 0; k < 3; k++) shared += v[k] == o[0] || v[k] == o[1] || v[k] == o[2];
-            if (shared < 3) continue;
-            a->duplicate++;
-            break;
-        }
+    const sdm_arena_mark before = arena->end[SDM_HIGH];
+    uint32_t *first; // triangle of the edge at hand across which the vertex lies
+    const sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &first, topo->n_vert, "vertices", err);
+    if (s) return s;
+    for (size_t i = 0; i < topo->n_edges; i++) {
+        const uint32_t begin = topo->edges[i].first, second = topo->next[begin];
+        if (second == SDM_NONE) continue;
+        // most edges have two triangles, which differ
+        if (topo->next[second] == SDM_NONE && vertex_across(topo, begin) != vertex_across(topo, second)) continue;
+        // half-edges fall along the list
+        for (uint32_t h = begin; h != SDM_NONE; h = topo->next[h]) first[vertex_across(topo, h)] = h / 3;
+        for (uint32_t h = begin; h != SDM_NONE; h = topo->next[h])
+            a->duplicate += h % 3 == 0 && first[vertex_across(topo, h)] < h / 3;
     }
+    sdm_arena_release(arena, SDM_HIGH, before);
+    return SDM_OK;
 }
 
 /* Is the volume negative by more than rounding of the coordinates may move it? */
@@ -118,8 +124,8 @@ sdm_status sdm_survey_build(const sdm_mesh *m, sdm_arena *arena, sdm_survey *s, 
     memcpy(a->max, s->tree.node->hi, sizeof a->max);
     measure(m, s);
     count_edges(&s->topo, a);
-    count_duplicates(&s->topo, a);
-    st = count_components(&s->topo, arena, a, err);
+    st = count_duplicates(&s->topo, arena, a, err);
+    if (!st) st = count_components(&s->topo, arena, a, err);
     if (!st) st = sdm_contacts_find(m, &s->topo, &s->tree, s->facets, arena, &s->contacts, budget, err);
     if (budget) budget->used -= scratch;
     a->self_intersections = s->contacts.crossing_pairs;

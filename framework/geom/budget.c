@@ -1,7 +1,9 @@
-/* Counting memory against a limit. */
+/* Counting memory against a limit, and asking the caller. */
 #include "budget.h"
 
 #include <stdint.h>
+
+#include "grid_distance.h"
 
 sdm_status sdm_budget_take(sdm_budget *b, size_t bytes, sdm_error *err)
 {
@@ -12,4 +14,10 @@ sdm_status sdm_budget_take(sdm_budget *b, size_t bytes, sdm_error *err)
                     "the mesh of %zu triangles needs at least %zu bytes to prepare, memory_limit is %zu; raise it or "
                     "use a coarser mesh",
                     b->n_tri, b->used, b->limit);
+}
+
+sdm_status sdm_budget_ask(const sdm_budget *b, sdm_error *err)
+{
+    if (!b || !b->opts->cancelled || !sdm_cancelled(b->opts)) return SDM_OK;
+    return sdm_fail(err, SDM_E_CANCELLED, "preparation of the mesh stopped on request");
 }

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "grid_distance.h"
 #include "sdm/memory.h"
 #include "sdm/rng.h"
 #include "sign.h"
@@ -68,14 +69,16 @@ static void mark(uint8_t *bits, const job *c, int64_t voxel)
     bits[(size_t)line * c->pitch + (size_t)(i / 8)] |= (uint8_t)(1 << i % 8);
 }
 
-/* Sums over all triangles, at voxels drawn evenly; returns how many. */
-static size_t by_sums(job *c, const sdm_sign *s, const sdm_grid *g, size_t n)
+/* Sums over all triangles, at voxels drawn evenly; *n: voxels of the map, then how many were drawn. */
+static sdm_status by_sums(job *c, const sdm_sign *s, const sdm_grid *g, const sdm_exact_opts *opts, size_t *n,
+                          sdm_error *err)
 {
-    size_t n_sample = 20000000 / s->solid->n_tri + 100;
-    if (n_sample > n) n_sample = n;
+    const size_t n_voxel = *n, most = 20000000 / s->solid->n_tri + 100, n_sample = most < n_voxel ? most : n_voxel;
+    *n = n_sample;
     for (size_t i = 0; i < n_sample; i++) {
-        const double place = ((double)i + sdm_rng_uniform(1, 1, i)) * ((double)n / (double)n_sample);
-        const int64_t voxel = place < (double)n ? (int64_t)place : (int64_t)n - 1;
+        if (sdm_cancelled(opts)) return sdm_fail(err, SDM_E_CANCELLED, "certificate stopped on request");
+        const double place = ((double)i + sdm_rng_uniform(1, 1, i)) * ((double)n_voxel / (double)n_sample);
+        const int64_t voxel = place < (double)n_voxel ? (int64_t)place : (int64_t)n_voxel - 1;
         const double index[3] = {(double)(voxel % g->n[0]), (double)(voxel / g->n[0] % g->n[1]),
                                  (double)(voxel / g->n[0] / g->n[1])};
         double x[3];
@@ -86,7 +89,7 @@ static size_t by_sums(job *c, const sdm_sign *s, const sdm_grid *g, size_t n)
         if (isnan(d) || (d < 0) != (w > 0.5)) mark(c->wrong, c, voxel);
         if (w < -0.5) mark(c->below, c, voxel);
     }
-    return n_sample;
+    return SDM_OK;
 }
 
 /* A winding number that is 1/2 to rounding has no sign: open meshes only. */
@@ -134,7 +137,8 @@ sdm_status sdm_sign_certify(const sdm_sign *s, const sdm_grid *g, const sdm_exac
     sdm_status st = SDM_ALLOC(&c.wrong, n_byte, "compared signs", err);
     if (!st) st = SDM_ALLOC(&c.below, n_byte, "compared signs", err);
     for (int a = three ? 0 : 1; a < 3 && by_rows && !st; a++) st = along_axis(&c, s, g, axes[a], opts, err);
-    if (!st) out->checked = by_rows ? n : by_sums(&c, s, g, n);
+    out->checked = n;
+    if (!st && !by_rows) st = by_sums(&c, s, g, opts, &out->checked, err);
     out->compared = !by_rows ? "sums of solid angles"
                     : three  ? "crossings along x, y and z"
                     : closed ? "crossings along y and z"

@@ -302,8 +302,8 @@ sdm_status sdm_contacts_find(const sdm_mesh *m, const sdm_topology *topo, const 
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &w.frame, KEPT, "frames of triangles", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &w.frame_of, KEPT, "frames of triangles", err);
     if (!s) memset(w.frame_of, 0xff, KEPT * sizeof *w.frame_of);
-    if (!s) s = sdm_fans_visit(m, topo, facets, c->tolerance, arena, visit_neighbours, &w, err);
-    if (!s) s = sdm_pairs_visit(m, topo, tree, c->tolerance, arena, visit_apart, &w, err);
+    if (!s) s = sdm_fans_visit(m, topo, facets, c->tolerance, arena, visit_neighbours, &w, budget, err);
+    if (!s) s = sdm_pairs_visit(m, topo, tree, c->tolerance, arena, visit_apart, &w, budget, err);
     sdm_arena_release(arena, SDM_HIGH, before);
     if (!s && budget) budget->used -= scratch;
     if (!s) s = sdm_budget_take(budget, (m->n_tri + 1) * sizeof *c->first + c->n * sizeof *c->list, err);

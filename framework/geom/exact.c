@@ -128,7 +128,7 @@ static size_t usual_bytes(const sdm_mesh *m) { return 1080 * m->n_tri + 220 * m-
 
 static sdm_status prepare(sdm_exact *e, const sdm_mesh *mesh, sdm_error *err)
 {
-    sdm_budget budget = {.limit = e->opts.memory_limit, .n_tri = mesh->n_tri};
+    sdm_budget budget = {.limit = e->opts.memory_limit, .n_tri = mesh->n_tri, .opts = &e->opts};
     sdm_status s = sdm_budget_take(&budget, mesh_bytes(mesh), err);
     if (!s) s = sdm_mesh_copy(mesh, &e->solid, err);
     if (!s && !budget.limit) s = sdm_arena_reserve(&e->arena, usual_bytes(mesh), err);

@@ -4,9 +4,11 @@
 
 #include "vec3.h"
 
-/* Cosine of the largest angle between a normal and their mean, and the least height over longest edge: far from doubt. */
+/* Cosine of the largest angle between a normal and their mean, far from doubt. */
 #define AGREE 0.25
-#define SOUND 1e-3
+/* Least height in tolerances: a normal is then sure to some 1e-3, however long the triangle. More is not asked of the shape, so that
+   the needles around the middle of a round face are a disc, how many there may be. */
+#define SOUND 1e3
 
 typedef struct fan {
     const sdm_mesh *mesh;
@@ -33,7 +35,7 @@ static void sum_normals(const fan *w, around *list)
     for (size_t i = 0; i < t->n_tri; i++) {
         if (t->edge[3 * i] == SDM_NONE) continue;
         const sdm_facet *f = &w->facets[i];
-        const bool is_sound = f->height > SOUND * f->longest && f->height > w->least;
+        const bool is_sound = f->height > w->least;
         for (size_t k = 0; k < 3; k++) {
             around *a = &list[t->tri[3 * i + k]];
             v3_along(a->mean, 1, f->n, a->mean);
@@ -101,10 +103,13 @@ static sdm_status list_corners(const fan *w, const around *list, sdm_arena *aren
 
 /* Pairs around v, each at the first of the vertices it shares; none when a shared vertex is one of a disc. */
 static sdm_status visit_pairs(const fan *w, const around *list, const corners *c, uint32_t v,
-                              sdm_status (*visit)(void *user, uint32_t i, uint32_t j, int shared), void *user)
+                              sdm_status (*visit)(void *user, uint32_t i, uint32_t j, int shared), void *user,
+                              const sdm_budget *budget, sdm_error *err)
 {
     const sdm_topology *t = w->topo;
     for (uint32_t i = c->first[v]; i < c->first[v + 1]; i++) {
+        const sdm_status stop = sdm_budget_ask(budget, err);
+        if (stop) return stop;
         for (uint32_t j = i + 1; j < c->first[v + 1]; j++) {
             const uint32_t p = c->at[i] / 3, q = c->at[j] / 3;
             const uint32_t *a = &t->tri[3 * (size_t)p], *b = &t->tri[3 * (size_t)q];
@@ -126,10 +131,10 @@ size_t sdm_fans_bytes(size_t n_vert) { return n_vert * (sizeof(around) + sizeof(
 
 sdm_status sdm_fans_visit(const sdm_mesh *m, const sdm_topology *topo, const sdm_facet *facets, double tolerance,
                           sdm_arena *arena, sdm_status (*visit)(void *user, uint32_t i, uint32_t j, int shared),
-                          void *user, sdm_error *err)
+                          void *user, const sdm_budget *budget, sdm_error *err)
 {
     const sdm_arena_mark before = arena->end[SDM_HIGH];
-    const fan w = {m, topo, facets, tolerance / SOUND};
+    const fan w = {m, topo, facets, SOUND * tolerance};
     around *list;
     corners c = {0};
     sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &list, m->n_vert, "vertices", err);
@@ -144,7 +149,7 @@ sdm_status sdm_fans_visit(const sdm_mesh *m, const sdm_topology *topo, const sdm
     }
     if (any) s = list_corners(&w, list, arena, &c, err);
     for (uint32_t v = 0; v < m->n_vert && any && !s; v++)
-        if (!list[v].is_disc) s = visit_pairs(&w, list, &c, v, visit, user);
+        if (!list[v].is_disc) s = visit_pairs(&w, list, &c, v, visit, user, budget, err);
     sdm_arena_release(arena, SDM_HIGH, before);
     return s;
 }

@@ -199,7 +199,7 @@ size_t sdm_pairs_bytes(size_t n_vert, const sdm_bvh *tree)
 
 sdm_status sdm_pairs_visit(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree, double slack,
                            sdm_arena *arena, sdm_status (*visit)(void *user, uint32_t i, uint32_t j), void *user,
-                           sdm_error *err)
+                           const sdm_budget *budget, sdm_error *err)
 {
     const sdm_arena_mark before = arena->end[SDM_HIGH];
     pairing w = {.visit = visit, .user = user};
@@ -215,7 +215,10 @@ sdm_status sdm_pairs_visit(const sdm_mesh *m, const sdm_topology *topo, const sd
         n = w.n_block;
         for (int k = 0; k < w.n_level; k++, n = (n + 7) / 8) fill_level(&w, k, n);
     }
-    for (size_t i = 0; i < w.n_block && !s; i++) s = pairs_of_block(&w, i);
+    for (size_t i = 0; i < w.n_block && !s; i++) {
+        s = sdm_budget_ask(budget, err);
+        if (!s) s = pairs_of_block(&w, i);
+    }
     sdm_arena_release(arena, SDM_HIGH, before);
     return s;
 }

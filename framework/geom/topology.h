@@ -11,7 +11,7 @@
 typedef struct sdm_edge {
     uint32_t lo, hi;
     uint32_t n_up, n_down;
-    uint32_t first; /* half-edge 3 * triangle + corner; the others follow through next[] */
+    uint32_t first; /* half-edge 3 * triangle + corner; the others follow through next[], falling */
 } sdm_edge;
 
 /* Half-edge h = 3 t + i runs from corner i to corner (i + 1) % 3 of triangle t. Triangles with a repeated vertex have none. */

@@ -158,10 +158,12 @@ static sdm_status build(hull *w, bool *changed)
     for (uint32_t t = 0; t < w->mesh->n_tri && !s; t++) {
         if (sdm_sides_flat(w->survey, t)) continue;
         bool whole = false;
-        if (c->first[t] != c->first[t + 1])
-            s = cut(w, &cutter, t, &whole);
-        else
+        if (c->first[t] != c->first[t + 1]) {
+            s = sdm_budget_ask(w->budget, w->err);
+            if (!s) s = cut(w, &cutter, t, &whole);
+        } else {
             whole = sdm_sides_keep_whole(&w->sides, t);
+        }
         if (!s && whole) s = add_whole(w, t);
         if (!whole) *changed = true;
     }

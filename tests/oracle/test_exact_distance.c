@@ -307,10 +307,29 @@ static void test_lipschitz(void **state)
     sdm_mesh_dispose(&m);
 }
 
-static bool stop_now(void *user)
+static bool stop_later(void *user) { return ++*(int *)user >= 0; }
+
+/* Every question in the preparation of a mesh that needs a union may stop it. */
+static void test_preparation_stops(void **state)
 {
-    ++*(int *)user;
-    return true;
+    (void)state;
+    sdm_mesh m = {0}, b = {0};
+    mesh_sphere(&m, zero, 1, 6);
+    mesh_sphere(&b, (const double[3]){1, 0.1, 0}, 1, 6);
+    mesh_append(&m, &b);
+    sdm_exact *e = NULL;
+    for (int n = 1; !e; n++) {
+        int asked = -n;
+        sdm_error err = {0};
+        const sdm_status s = sdm_exact_create(&m, &(sdm_exact_opts){.cancelled = stop_later, .user = &asked}, &e, &err);
+        assert_int_equal(s, asked < 0 ? SDM_OK : SDM_E_CANCELLED);
+        assert_true(asked <= 0 && (s == SDM_OK) == (e != NULL));
+        if (s) assert_string_equal(err.text, "preparation of the mesh stopped on request");
+        if (e) assert_true(n > 50);
+    }
+    sdm_exact_free(e);
+    sdm_mesh_dispose(&m);
+    sdm_mesh_dispose(&b);
 }
 
 static void test_misuse(void **state)
@@ -331,12 +350,14 @@ static void test_misuse(void **state)
     mesh_box(&m, zero, (const double[3]){1, 1, 1});
     assert_int_equal(sdm_exact_create(&m, &(sdm_exact_opts){.sign = (sdm_sign_method)9}, &e, &err), SDM_E_ARG);
     assert_int_equal(sdm_exact_create(&m, &(sdm_exact_opts){.memory_limit = 100}, &e, &err), SDM_E_NOMEM);
-    int asked = 0;
-    e = engine(&m, &(sdm_exact_opts){.n_threads = 1, .cancelled = stop_now, .user = &asked});
+    int asked = -1000; // before it stops
+    e = engine(&m, &(sdm_exact_opts){.n_threads = 1, .cancelled = stop_later, .user = &asked});
+    assert_true(asked > -1000 && asked < -900);
+    asked = -1;
     sdm_grid g = sdm_grid_centred((const int64_t[3]){30, 30, 30}, 0.1, zero);
     float *v = malloc(sdm_grid_count(&g) * sizeof *v);
     assert_int_equal(sdm_exact_map(e, &g, v, &err), SDM_E_CANCELLED);
-    assert_int_equal(asked, 1);
+    assert_int_equal(asked, 0);
     assert_int_equal(sdm_exact_map(e, NULL, v, &err), SDM_E_ARG);
     g.spacing[1] = NAN;
     assert_int_equal(sdm_exact_map(e, &g, v, &err), SDM_E_ARG);
@@ -437,6 +458,7 @@ int main(void)
         cmocka_unit_test(test_thin_grids_and_single_voxels),
         cmocka_unit_test(test_thin_faces),
         cmocka_unit_test(test_lipschitz),
+        cmocka_unit_test(test_preparation_stops),
         cmocka_unit_test(test_misuse),
         cmocka_unit_test(test_naive_map_is_naive_points),
         cmocka_unit_test(test_memory_is_short),

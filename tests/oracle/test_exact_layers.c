@@ -277,6 +277,7 @@ static void test_misuse(void **state)
     // asked in the map, then in the layers: never stopped, stopped at the first question and at the last
     int patience = INT_MAX;
     e = engine(&m, &(sdm_exact_opts){.n_threads = 1, .cancelled = stop_late, .user = &patience});
+    asked = 0;
     assert_int_equal(sdm_exact_map(e, &g, values, &err), SDM_OK);
     const int of_map = asked;
     asked = 0;

@@ -152,11 +152,7 @@ static void test_open_mesh_beyond_the_grid(void **state)
     sdm_mesh_dispose(&m);
 }
 
-static bool at_once(void *user)
-{
-    ++*(int *)user;
-    return true;
-}
+static bool stop_later(void *user) { return ++*(int *)user >= 0; }
 
 static void test_cancelled(void **state)
 {
@@ -164,14 +160,44 @@ static void test_cancelled(void **state)
     sdm_mesh m = {0};
     open_mesh(0, &m);
     sdm_exact *e = NULL;
-    int asked = 0;
-    const sdm_exact_opts o = {.n_threads = 1, .cancelled = at_once, .user = &asked};
+    int asked = -1000000; // before it stops
+    const sdm_exact_opts o = {.n_threads = 1, .cancelled = stop_later, .user = &asked};
     sdm_error err = {0};
     assert_int_equal(sdm_exact_create(&m, &o, &e, &err), SDM_OK);
+    asked = -1;
     const sdm_grid g = sdm_grid_centred((const int64_t[3]){8, 40, 40}, 0.05, zero);
     float *v = calloc(sdm_grid_count(&g), sizeof *v);
     assert_int_equal(sdm_exact_sign(e, &g, v, &err), SDM_E_CANCELLED);
-    assert_int_equal(asked, 1);
+    assert_int_equal(asked, 0);
+    free(v);
+    sdm_exact_free(e);
+    sdm_mesh_dispose(&m);
+}
+
+/* A boundary so long that signs are certified by sums over all triangles. */
+static void test_by_sums(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0};
+    mesh_sphere(&m, zero, 1, 20);
+    shatter(&m);
+    int asked = -1000000;
+    const sdm_exact_opts o = {.n_threads = 1, .cancelled = stop_later, .user = &asked};
+    sdm_exact *e = NULL;
+    sdm_error err = {0};
+    sdm_sign_certificate c;
+    assert_int_equal(sdm_exact_create(&m, &o, &e, &err), SDM_OK);
+    const sdm_grid g = sdm_grid_centred((const int64_t[3]){3, 4, 5}, 0.5, zero);
+    float *v = map(e, &g);
+    for (int bad = 0; bad < 2; bad++) {
+        assert_int_equal(sdm_exact_certify(e, &g, v, &c, &err), SDM_OK);
+        assert_string_equal(c.compared, "sums of solid angles");
+        assert_true(c.checked == 60 && c.wrong == (size_t)bad && c.first_wrong[2] == (bad ? 0 : -1));
+        v[0] = NAN;
+    }
+    asked = -1;
+    assert_int_equal(sdm_exact_certify(e, &g, v, &c, &err), SDM_E_CANCELLED);
+    assert_int_equal(asked, 0);
     free(v);
     sdm_exact_free(e);
     sdm_mesh_dispose(&m);
@@ -183,6 +209,7 @@ int main(void)
         cmocka_unit_test(test_open_meshes),
         cmocka_unit_test(test_open_mesh_beyond_the_grid),
         cmocka_unit_test(test_cancelled),
+        cmocka_unit_test(test_by_sums),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

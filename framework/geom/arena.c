@@ -14,6 +14,7 @@
 /* A block of its own; the array follows. */
 struct sdm_arena_extra {
     _Alignas(64) sdm_arena_extra *before;
+    size_t bytes;
 };
 
 sdm_status sdm_arena_reserve(sdm_arena *a, size_t bytes, sdm_error *err)
@@ -32,6 +33,14 @@ static void free_extra(sdm_arena_mark *end, const sdm_arena_extra *until)
         end->extra = x->before;
         sdm_free(x);
     }
+}
+
+size_t sdm_arena_extra_bytes(const sdm_arena *a)
+{
+    size_t bytes = 0;
+    for (int end = SDM_LOW; end <= SDM_HIGH; end++)
+        for (const sdm_arena_extra *x = a->end[end].extra; x; x = x->before) bytes += x->bytes;
+    return bytes;
 }
 
 void sdm_arena_dispose(sdm_arena *a)
@@ -61,6 +70,7 @@ sdm_status sdm_arena_take_unset(sdm_arena *a, int end, void **out, size_t count,
         const sdm_status s = sdm_alloc_unset((void **)&x, sizeof *x + count * size, 1, what, err);
         if (s) return s;
         x->before = a->end[end].extra;
+        x->bytes = sizeof *x + count * size;
         a->end[end].extra = x;
         *out = x + 1;
         return SDM_OK;

@@ -39,6 +39,9 @@ sdm_status sdm_arena_take_unset(sdm_arena *a, int end, void **out, size_t count,
 #define SDM_TAKE_UNSET(arena, end, ptr, count, what, err)                                                              \
     sdm_arena_take_unset((arena), (end), (void **)(ptr), (count), sizeof(**(ptr)), (what), (err))
 
+/* Bytes in blocks of their own: all that is taken where there is no block. */
+size_t sdm_arena_extra_bytes(const sdm_arena *a);
+
 /* Frees what has been taken from that end since it was at `mark`. */
 void sdm_arena_release(sdm_arena *a, int end, sdm_arena_mark mark);
 

@@ -19,15 +19,16 @@ typedef struct job {
     size_t pitch;
 } job;
 
-static void compare_row(job *c, size_t row, const int64_t start[3], const int32_t *base)
+static void compare_row(job *c, size_t row, const int64_t start[3], int64_t i0, int64_t i1, const int32_t *base)
 {
     const int axis = c->rows->rows.axis[0];
     int64_t at[3] = {start[0], start[1], start[2]};
     for (sdm_run u = sdm_runs(&c->rows->rows, row); sdm_run_next(&u);) {
-        for (at[axis] = u.begin; at[axis] < u.end; at[axis]++) {
+        int64_t end;
+        for (sdm_run_cut(&u, i0, i1, &at[axis], &end); at[axis] < end; at[axis]++) {
             const int64_t line = at[2] * c->n[1] + at[1];
             const float d = c->values[line * c->n[0] + at[0]];
-            const int32_t winding = u.winding + (base ? base[at[axis]] : 0);
+            const int32_t winding = u.winding + (base ? base[at[axis] - i0] : 0);
             const size_t byte = (size_t)line * c->pitch + (size_t)(at[0] / 8);
             if (fabs((double)d) <= c->rounding) continue;
             if (isnan(d) || (d < 0) != (winding >= 1)) c->wrong[byte] |= (uint8_t)(1 << at[0] % 8);
@@ -45,8 +46,8 @@ static void compare_tile(void *user, const sdm_row_tile *t, const int32_t *base)
             int64_t start[3] = {0, 0, 0};
             start[r->axis[1]] = j;
             start[r->axis[2]] = k;
-            compare_row(c, (size_t)(k * r->n[1] + j), start, base);
-            if (base) base += r->n[0];
+            compare_row(c, (size_t)(k * r->n[1] + j), start, t->i0, t->i1, base);
+            if (base) base += t->i1 - t->i0;
         }
     }
 }
@@ -131,12 +132,14 @@ sdm_status sdm_sign_certify(const sdm_sign *s, const sdm_grid *g, const sdm_exac
     job c = {.values = values, .n = g->n, .rounding = rounding, .pitch = (size_t)((g->n[0] + 15) / 16) * 2};
     const size_t n_byte = (size_t)(g->n[1] * g->n[2]) * c.pitch;
     *out = (sdm_sign_certificate){.method = s->method, .first_wrong = {-1, -1, -1}, .voxels = n};
-    if (opts->memory_limit && 2 * n_byte > opts->memory_limit)
-        return sdm_fail(err, SDM_E_NOMEM, "the certificate needs %zu bytes, memory_limit is %zu", 2 * n_byte,
+    if (opts->memory_limit && 2 * n_byte >= opts->memory_limit)
+        return sdm_fail(err, SDM_E_NOMEM, "the certificate needs %zu bytes, memory_limit leaves %zu", 2 * n_byte,
                         opts->memory_limit);
+    sdm_exact_opts beside = *opts; // what is compared with
+    if (beside.memory_limit) beside.memory_limit -= 2 * n_byte;
     sdm_status st = SDM_ALLOC(&c.wrong, n_byte, "compared signs", err);
     if (!st) st = SDM_ALLOC(&c.below, n_byte, "compared signs", err);
-    for (int a = three ? 0 : 1; a < 3 && by_rows && !st; a++) st = along_axis(&c, s, g, axes[a], opts, err);
+    for (int a = three ? 0 : 1; a < 3 && by_rows && !st; a++) st = along_axis(&c, s, g, axes[a], &beside, err);
     out->checked = n;
     if (!st && !by_rows) st = by_sums(&c, s, g, opts, &out->checked, err);
     out->compared = !by_rows ? "sums of solid angles"

@@ -26,6 +26,7 @@ struct sdm_exact {
     sdm_nearest nearest; // of surface
     sdm_sign sign;
     double rounding; // size of a rounding error of the coordinates
+    size_t held;     // with a memory limit: bytes of all this
 };
 
 const char *sdm_sign_method_name(sdm_sign_method m)
@@ -42,6 +43,21 @@ static double now_ms(void)
 }
 
 static size_t mesh_bytes(const sdm_mesh *m) { return m->n_vert * 3 * sizeof *m->vert + m->n_tri * 3 * sizeof *m->tri; }
+
+/* The options with what the memory limit leaves beside the engine and `more` bytes. */
+static sdm_exact_opts opts_beside(const sdm_exact *e, size_t more)
+{
+    sdm_exact_opts o = e->opts;
+    const size_t taken = more < SIZE_MAX - e->held ? e->held + more : SIZE_MAX;
+    if (o.memory_limit) o.memory_limit = taken < o.memory_limit ? o.memory_limit - taken : 1; // 0 would be none
+    return o;
+}
+
+/* With room that is not used. */
+static size_t mesh_room(const sdm_mesh *m)
+{
+    return m->cap_vert * 3 * sizeof *m->vert + m->cap_tri * 3 * sizeof *m->tri;
+}
 
 static void drop_survey(sdm_exact *e, sdm_arena_mark low, sdm_arena_mark high)
 {
@@ -102,7 +118,7 @@ static sdm_status build_nearest(sdm_exact *e, sdm_budget *budget, sdm_error *err
     const bool keep_topology = !e->report.unioned || e->report.sign != SDM_SIGN_CROSSINGS;
     sdm_survey_shrink(&e->survey, &e->arena, keep_topology);
     budget->used = 0;
-    size_t scratch = 0, bytes = mesh_bytes(&e->solid) + mesh_bytes(m) + m->n_tri * sizeof *e->source;
+    size_t scratch = 0, bytes = mesh_bytes(&e->solid) + mesh_room(m) + m->cap_tri * sizeof *e->source;
     bytes += e->survey.tree.n_node * sizeof(sdm_bvh_node) + e->solid.n_tri * sizeof(uint32_t);
     if (keep_topology) bytes += sdm_topology_bytes(&e->solid, &(size_t){0});
     if (e->report.unioned) bytes += sdm_topology_bytes(m, &scratch);
@@ -142,6 +158,13 @@ static sdm_status prepare(sdm_exact *e, const sdm_mesh *mesh, sdm_error *err)
     if (!s) s = build_nearest(e, &budget, err);
     if (!s) s = sdm_sign_build(&e->solid, &e->survey, &e->nearest, e->report.sign, &e->sign, err);
     if (s) return s;
+    if (budget.limit) {
+        e->held = mesh_bytes(&e->solid) + mesh_room(&e->surface) + e->surface.cap_tri * sizeof *e->source +
+                  sdm_arena_extra_bytes(&e->arena) + sdm_sign_bytes(&e->sign);
+        budget.used = 0;
+        s = sdm_budget_take(&budget, e->held, err);
+        if (s) return s;
+    }
     double largest = 0;
     for (int a = 0; a < 3; a++)
         largest = fmax(largest, fmax(fabs(e->report.audit.min[a]), fabs(e->report.audit.max[a])));
@@ -217,27 +240,29 @@ double sdm_exact_distance(const sdm_exact *e, const double x[3])
     return sqrt(sdm_nearest_feature(&e->nearest, x, &slot));
 }
 
-/* The map, and the slot of the nearest triangle of every voxel where slot is not NULL. */
-static sdm_status fill_map(const sdm_exact *e, const sdm_grid *grid, double band_mm, float *values, uint32_t *slot,
-                           sdm_error *err)
+/* The map, and the slot of the nearest triangle of every voxel where slot is not NULL; `more` bytes are taken beside. */
+static sdm_status fill_map(const sdm_exact *e, const sdm_grid *grid, double band_mm, size_t more, float *values,
+                           uint32_t *slot, sdm_error *err)
 {
+    const sdm_exact_opts opts = opts_beside(e, more);
     sdm_status s = sdm_grid_check(grid, err);
-    if (!s) s = sdm_grid_distance(&e->nearest, grid, &e->opts, band_mm, values, slot, err);
-    return s ? s : sdm_sign_map(&e->sign, grid, &e->opts, values, err);
+    if (!s) s = sdm_grid_distance(&e->nearest, grid, &opts, band_mm, values, slot, err);
+    return s ? s : sdm_sign_map(&e->sign, grid, &opts, values, err);
 }
 
 sdm_status sdm_exact_map(const sdm_exact *e, const sdm_grid *grid, float *values, sdm_error *err)
 {
     if (!e || !grid || !values)
         return sdm_fail(err, SDM_E_ARG, "map without an engine, a grid or a place for the values");
-    return fill_map(e, grid, INFINITY, values, NULL, err);
+    return fill_map(e, grid, INFINITY, 0, values, NULL, err);
 }
 
 sdm_status sdm_exact_sign(const sdm_exact *e, const sdm_grid *grid, float *values, sdm_error *err)
 {
     if (!e || !grid || !values) return sdm_fail(err, SDM_E_ARG, "signs without an engine, a grid or distances");
+    const sdm_exact_opts opts = opts_beside(e, 0);
     const sdm_status s = sdm_grid_check(grid, err);
-    return s ? s : sdm_sign_map(&e->sign, grid, &e->opts, values, err);
+    return s ? s : sdm_sign_map(&e->sign, grid, &opts, values, err);
 }
 
 sdm_status sdm_exact_certify(const sdm_exact *e, const sdm_grid *grid, const float *values, sdm_sign_certificate *out,
@@ -255,7 +280,8 @@ sdm_status sdm_exact_certify(const sdm_exact *e, const sdm_grid *grid, const flo
         for (int a = 0; a < 3; a++) largest = fmax(largest, fabs(x[a]));
     }
     // roundings of the mesh's coordinates and of the voxels'
-    return sdm_sign_certify(&e->sign, grid, &e->opts, 4 * e->rounding + 16 * DBL_EPSILON * largest, values, out, err);
+    const sdm_exact_opts opts = opts_beside(e, 0);
+    return sdm_sign_certify(&e->sign, grid, &opts, 4 * e->rounding + 16 * DBL_EPSILON * largest, values, out, err);
 }
 
 /* Layers and derivatives: the job says which. Values that nobody wants are needed all the same, for the signs. */
@@ -267,19 +293,19 @@ static sdm_status map_with_layers(const sdm_exact *e, const sdm_grid *grid, sdm_
     if (!(band >= 0))
         return sdm_fail(err, SDM_E_ARG, "narrow band of %g mm, need a positive width or 0 for the whole map", band);
     const bool layers = sdm_layers_wanted(job);
-    const size_t n_value = job->out->values ? 0 : sdm_grid_count(grid), limit = e->opts.memory_limit;
+    const size_t n_value = job->out->values ? 0 : sdm_grid_count(grid), limit = opts_beside(e, 0).memory_limit;
     const size_t n_slot = layers ? sdm_grid_count(grid) : 0, n_frame = job->derivative ? e->solid.n_tri : 0;
     float *own = NULL;
     uint32_t *slot = NULL;
     sdm_frame *frames = NULL;
     const size_t need = n_value * sizeof *own + n_slot * sizeof *slot + n_frame * sizeof *frames;
     if (limit && need > limit)
-        return sdm_fail(err, SDM_E_NOMEM, "layers of the map need %zu bytes, memory_limit is %zu", need, limit);
+        return sdm_fail(err, SDM_E_NOMEM, "layers of the map need %zu bytes, memory_limit leaves %zu", need, limit);
     s = SDM_ALLOC(&own, n_value, "distance map", err);
     if (!s) s = SDM_ALLOC(&slot, n_slot, "nearest triangles", err);
     if (!s) s = SDM_ALLOC(&frames, n_frame, "frames of triangles", err);
     float *values = n_value ? own : job->out->values;
-    if (!s) s = fill_map(e, grid, band > 0 ? band : INFINITY, values, layers ? slot : NULL, err);
+    if (!s) s = fill_map(e, grid, band > 0 ? band : INFINITY, need, values, layers ? slot : NULL, err);
     if (!s && n_frame) sdm_sheets_frames(&e->solid, sdm_threads(e->opts.n_threads), frames);
     const double seam = e->report.unioned ? 2 * e->report.union_error_mm : 0;
     job->sheets = (sdm_sheets){&e->nearest, &e->solid, frames, e->source, seam};

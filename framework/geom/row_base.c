@@ -48,11 +48,11 @@ static bool cut_by_strips(const job *t, const box *b)
 
 static void write(const job *t, const box *b, int32_t value)
 {
-    const int64_t n0 = t->rows->n[0], n1 = t->tile->j1 - t->tile->j0;
+    const int64_t n0 = t->tile->i1 - t->tile->i0, n1 = t->tile->j1 - t->tile->j0;
     for (int64_t k = b->lo[2]; k <= b->hi[2]; k++) {
         for (int64_t j = b->lo[1]; j <= b->hi[1]; j++) {
             int32_t *row = t->base + ((k - t->tile->k0) * n1 + j - t->tile->j0) * n0;
-            for (int64_t i = b->lo[0]; i <= b->hi[0]; i++) row[i] = value;
+            for (int64_t i = b->lo[0]; i <= b->hi[0]; i++) row[i - t->tile->i0] = value;
         }
     }
 }
@@ -132,5 +132,5 @@ void sdm_row_base_fill(const sdm_boundary *b, const sdm_rows *rows, const sdm_gr
         length2 += t.strips.d[c] * t.strips.d[c];
     }
     for (int c = 0; c < 3; c++) t.strips.d[c] /= sqrt(length2);
-    settle(&t, (box){{0, tile->j0, tile->k0}, {rows->n[0] - 1, tile->j1 - 1, tile->k1 - 1}}, INFINITY);
+    settle(&t, (box){{tile->i0, tile->j0, tile->k0}, {tile->i1 - 1, tile->j1 - 1, tile->k1 - 1}}, INFINITY);
 }

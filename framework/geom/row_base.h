@@ -7,12 +7,12 @@
 #include "boundary.h"
 #include "rows.h"
 
-/* Rows j0 .. j1 - 1, k0 .. k1 - 1 of a grid. */
+/* Voxels i0 .. i1 - 1 of the rows j0 .. j1 - 1, k0 .. k1 - 1 of a grid. */
 typedef struct sdm_row_tile {
-    int64_t j0, j1, k0, k1;
+    int64_t i0, i1, j0, j1, k0, k1;
 } sdm_row_tile;
 
-/* base[k1 - k0][j1 - j0][n[0]] of a tile of the rows; all of it is written. rows: of the mesh with this boundary and of g. */
+/* base[k1 - k0][j1 - j0][i1 - i0] of a tile of the rows; all of it is written. rows: of the mesh with this boundary and of g. */
 void sdm_row_base_fill(const sdm_boundary *b, const sdm_rows *rows, const sdm_grid *g, const sdm_row_tile *tile,
                        int32_t *base);
 

@@ -232,7 +232,7 @@ sdm_status sdm_rows_build(const sdm_mesh *m, const sdm_grid *g, const int axis[3
     const size_t n_row = (size_t)r->n[1] * (size_t)r->n[2];
     const size_t fixed = (n_row + 2) * sizeof *r->first + 3 * m->n_vert * sizeof *r->across;
     if (n_row >= UINT32_MAX - 1 || (memory_limit && fixed > memory_limit))
-        return sdm_fail(err, SDM_E_NOMEM, "the signs of %zu rows need %zu bytes, memory_limit is %zu", n_row, fixed,
+        return sdm_fail(err, SDM_E_NOMEM, "the signs of %zu rows need %zu bytes, memory_limit leaves %zu", n_row, fixed,
                         memory_limit);
     collector *c = NULL;
     sdm_status s = SDM_ALLOC(&c, (size_t)n_threads, "row crossings", err);
@@ -266,13 +266,15 @@ void sdm_rows_dispose(sdm_rows *r)
     *r = (sdm_rows){0};
 }
 
-void sdm_rows_apply(const sdm_rows *r, size_t row, const int32_t *base, float *values)
+void sdm_rows_apply(const sdm_rows *r, size_t row, int64_t i0, int64_t i1, const int32_t *base, float *values)
 {
     for (sdm_run u = sdm_runs(r, row); sdm_run_next(&u);) {
+        int64_t begin, end;
+        sdm_run_cut(&u, i0, i1, &begin, &end);
         if (base) {
-            for (int64_t i = u.begin; i < u.end; i++) values[i] = u.winding + base[i] >= 1 ? -values[i] : values[i];
+            for (int64_t i = begin; i < end; i++) values[i] = u.winding + base[i - i0] >= 1 ? -values[i] : values[i];
         } else if (u.winding >= 1) {
-            for (int64_t i = u.begin; i < u.end; i++) values[i] = -values[i];
+            for (int64_t i = begin; i < end; i++) values[i] = -values[i];
         }
     }
 }

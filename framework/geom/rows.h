@@ -52,8 +52,15 @@ static inline bool sdm_run_next(sdm_run *u)
     return u->end > 0;
 }
 
-/* Turns the sign of values[n[0]] where the winding number is at least 1. base[n[0]] is added to it; NULL: 0, the mesh is closed.
-   [any thread] */
-void sdm_rows_apply(const sdm_rows *r, size_t row, const int32_t *base, float *values);
+/* Cuts a run to voxels i0 .. i1 - 1 in *begin .. *end - 1. */
+static inline void sdm_run_cut(const sdm_run *u, int64_t i0, int64_t i1, int64_t *begin, int64_t *end)
+{
+    *begin = u->begin > i0 ? u->begin : i0;
+    *end = u->end < i1 ? u->end : i1;
+}
+
+/* Turns the sign of values[n[0]] where the winding number is at least 1, of voxels i0 .. i1 - 1. base[i1 - i0] is added to it; NULL: 0,
+   the mesh is closed. [any thread] */
+void sdm_rows_apply(const sdm_rows *r, size_t row, int64_t i0, int64_t i1, const int32_t *base, float *values);
 
 #endif

@@ -46,6 +46,14 @@ void sdm_sign_dispose(sdm_sign *s)
     sdm_pseudonormals_dispose(&s->normals);
 }
 
+size_t sdm_sign_bytes(const sdm_sign *s)
+{
+    const sdm_topology *t = &s->survey->topo;
+    if (s->method == SDM_SIGN_PSEUDONORMAL) return (t->n_vert + t->n_edges + t->n_tri) * sizeof(double[3]);
+    return 2 * s->winding.boundary.n * sizeof(sdm_chain) +
+           (s->winding.cluster ? s->survey->tree.n_node * sizeof(sdm_cluster) : 0);
+}
+
 bool sdm_sign_inside(const sdm_sign *s, const double x[3], uint32_t slot, const double q[3], int feature)
 {
     double r[3];
@@ -93,8 +101,8 @@ static void flip_tile(void *user, const sdm_row_tile *t, const int32_t *base)
                 sign_by_points(job->sign, job->grid, j, k, values);
                 continue;
             }
-            sdm_rows_apply(&job->rows->rows, (size_t)row, base, values);
-            if (base) base += n0;
+            sdm_rows_apply(&job->rows->rows, (size_t)row, t->i0, t->i1, base, values);
+            if (base) base += t->i1 - t->i0;
         }
     }
 }

@@ -27,6 +27,9 @@ sdm_status sdm_sign_build(const sdm_mesh *solid, const sdm_survey *survey, const
                           sdm_sign_method method, sdm_sign *s, sdm_error *err);
 void sdm_sign_dispose(sdm_sign *s);
 
+/* Bytes that *s has allocated. */
+size_t sdm_sign_bytes(const sdm_sign *s);
+
 /* Is x inside? slot, q, feature: its nearest point, used for pseudo-normals only. [any thread] */
 bool sdm_sign_inside(const sdm_sign *s, const double x[3], uint32_t slot, const double q[3], int feature);
 

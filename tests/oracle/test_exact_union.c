@@ -434,6 +434,37 @@ static void test_memory_limit(void **state)
     sdm_mesh_dispose(&b);
 }
 
+/* The limit is for all together: what fits into it alone does not fit beside the engine. */
+static void test_memory_limit_is_shared(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0};
+    mesh_box(&m, (const double[3]){-1, -1, -1}, (const double[3]){1, 1, 1});
+    sdm_exact *e = NULL;
+    size_t limit = 1000;
+    while (sdm_exact_create(&m, &(sdm_exact_opts){.memory_limit = limit}, &e, NULL)) limit += limit / 16;
+    sdm_exact_free(e);
+    // the certificate takes two bits a voxel, in 16 along x; nothing of the mesh is met here
+    int64_t n = 16;
+    while ((size_t)(n + 1) * (size_t)(n + 1) * ((size_t)n / 16 + 1) * 4 < limit) n++;
+    const sdm_grid g = sdm_grid_centred((const int64_t[3]){n, n, n}, 0.1, (const double[3]){100, 100, 100});
+    float *v = malloc(sdm_grid_count(&g) * sizeof *v);
+    assert_non_null(v);
+    for (size_t i = 0; i < sdm_grid_count(&g); i++) v[i] = 1;
+    for (size_t k = 1; k <= 4; k += 3) {
+        sdm_sign_certificate c;
+        sdm_error err = {0};
+        const sdm_exact_opts o = {.memory_limit = k * limit, .n_threads = 1};
+        assert_int_equal(sdm_exact_create(&m, &o, &e, &err), SDM_OK);
+        assert_int_equal(sdm_exact_sign(e, &g, v, &err), SDM_OK);
+        assert_int_equal(sdm_exact_certify(e, &g, v, &c, &err), k == 1 ? SDM_E_NOMEM : SDM_OK);
+        if (k == 1) assert_non_null(strstr(err.text, "the certificate needs"));
+        sdm_exact_free(e);
+    }
+    free(v);
+    sdm_mesh_dispose(&m);
+}
+
 /* Where triangles cross, each of them gives the same place: one vertex of the surface. */
 static void test_seam_vertices(void **state)
 {
@@ -502,7 +533,7 @@ int main(void)
         cmocka_unit_test(test_dense_points),  cmocka_unit_test(test_shaken_spheres),
         cmocka_unit_test(test_source),        cmocka_unit_test(test_fan_that_goes_round_twice),
         cmocka_unit_test(test_memory_limit),  cmocka_unit_test(test_with_and_without_block),
-        cmocka_unit_test(test_seam_vertices),
+        cmocka_unit_test(test_seam_vertices), cmocka_unit_test(test_memory_limit_is_shared),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,6 @@
 /* Signs of whole grids on open meshes: voxel by voxel against sums of solid angles. */
 #include "oracle/sign_check.h"
+#include "sdm/threads.h"
 
 static bool two_holes(const double c[3]) { return c[0] > 0.7 || (c[1] < -0.5 && c[2] < 0.2); }
 static bool beside(const double c[3]) { return c[0] > 0; }
@@ -174,6 +175,45 @@ static void test_cancelled(void **state)
     sdm_mesh_dispose(&m);
 }
 
+// rows longer than what is settled at once, along x and, in the certificate, along y
+static void test_long_rows(void **state)
+{
+    (void)state;
+    for (int which = 0; which < 2 * N_OPEN; which++) {
+        const int axis = which % 2;
+        sdm_mesh m = {0};
+        open_mesh(which / 2, &m);
+        int64_t n[3] = {1, 1, 2};
+        n[axis] = 1200;
+        sdm_grid g = sdm_grid_centred(n, 0.5, (const double[3]){0.1, 0.2, 0.3});
+        g.spacing[axis] = 0.004;
+        g.origin[axis] = -2.4;
+        check_open(&m, &g, "long rows");
+        sdm_mesh_dispose(&m);
+    }
+}
+
+// what threads take for rows counts
+static void test_memory_limit(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0};
+    open_mesh(0, &m);
+    const sdm_grid g = sdm_grid_centred((const int64_t[3]){5000, 1, 1}, 0.001, zero);
+    float v[5000];
+    for (int i = 0; i < 5000; i++) v[i] = 1;
+    for (int n_threads = 1; n_threads <= 32 && sdm_threads(32) == 32; n_threads += 31) {
+        const sdm_exact_opts o = {.n_threads = n_threads, .memory_limit = (size_t)16 << 20};
+        sdm_exact *e = NULL;
+        sdm_error err = {0};
+        assert_int_equal(sdm_exact_create(&m, &o, &e, &err), SDM_OK);
+        assert_int_equal(sdm_exact_sign(e, &g, v, &err), n_threads == 1 ? SDM_OK : SDM_E_NOMEM);
+        if (n_threads > 1) assert_non_null(strstr(err.text, "33554432 bytes in 32 threads"));
+        sdm_exact_free(e);
+    }
+    sdm_mesh_dispose(&m);
+}
+
 /* A boundary so long that signs are certified by sums over all triangles. */
 static void test_by_sums(void **state)
 {
@@ -206,10 +246,9 @@ static void test_by_sums(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_open_meshes),
-        cmocka_unit_test(test_open_mesh_beyond_the_grid),
-        cmocka_unit_test(test_cancelled),
-        cmocka_unit_test(test_by_sums),
+        cmocka_unit_test(test_open_meshes),  cmocka_unit_test(test_open_mesh_beyond_the_grid),
+        cmocka_unit_test(test_cancelled),    cmocka_unit_test(test_long_rows),
+        cmocka_unit_test(test_memory_limit), cmocka_unit_test(test_by_sums),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -8,10 +8,18 @@
 static sdm_status check_content(const sdm_mesh *m, sdm_error *err)
 {
     if (!m->n_tri) return sdm_fail(err, SDM_E_MESH, "the mesh has no triangle");
-    for (size_t i = 0; i < 3 * m->n_vert; i++)
-        if (!(fabs(m->vert[i]) <= 1e100)) // squares and products of coordinates must be finite too
-            return sdm_fail(err, SDM_E_MESH, "vertex %zu has the %c coordinate %g, need a finite number up to 1e100",
+    // products of four coordinates must be numbers, too, and of three not vanish
+    double largest = 0;
+    for (size_t i = 0; i < 3 * m->n_vert; i++) {
+        const double size = fabs(m->vert[i]);
+        if (!(size <= 1e70))
+            return sdm_fail(err, SDM_E_MESH, "vertex %zu has the %c coordinate %g, need a finite number up to 1e70",
                             i / 3, "xyz"[i % 3], m -> vert[i]);
+        largest = size > largest ? size : largest;
+    }
+    if (largest > 0 && largest < 1e-70)
+        return sdm_fail(err, SDM_E_MESH,
+                        "the largest coordinate of the mesh is %g, need 1e-70 at least: take another unit", largest);
     for (size_t i = 0; i < 3 * m->n_tri; i++)
         if (m->tri[i] >= m->n_vert)
             return sdm_fail(err, SDM_E_MESH, "triangle %zu names vertex %u of %zu", i / 3, (unsigned)m->tri[i],

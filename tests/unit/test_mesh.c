@@ -242,6 +242,37 @@ static void test_crossings_of_random_triangles(void **state)
     assert_true(total > 300);
 }
 
+/* The same counts, and areas and volumes in proportion, at every size that is accepted; inside out is found at every size. */
+static void test_sizes(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0}, b = {0};
+    mesh_sphere(&m, zero, 1, 6);
+    mesh_sphere(&b, (const double[3]){0.7, 0.1, 0.2}, 1, 6);
+    mesh_append(&m, &b);
+    mesh_flip(&m);
+    assert_int_equal(sdm_mesh_copy(&m, &b, NULL), SDM_OK);
+    const sdm_audit one_mm = audit_of(&m);
+    assert_true(one_mm.inverted && one_mm.self_intersections > 10);
+    static const int sizes[] = {-231, -100, 100, 231};
+    for (size_t k = 0; k < 4; k++) {
+        for (size_t i = 0; i < 3 * m.n_vert; i++) b.vert[i] = ldexp(m.vert[i], sizes[k]);
+        const sdm_audit a = audit_of(&b);
+        assert_true(a.inverted && a.self_intersections == one_mm.self_intersections && a.degenerate == 0);
+        assert_true(a.area == ldexp(one_mm.area, 2 * sizes[k]) && a.volume == ldexp(one_mm.volume, 3 * sizes[k]));
+    }
+    static const double refused[] = {1e-300, 1e-110, 1e-71, 1e71, 1e80, 1e100};
+    for (size_t k = 0; k < 6; k++) {
+        sdm_audit a;
+        sdm_error err = {0};
+        for (size_t i = 0; i < 3 * m.n_vert; i++) b.vert[i] = refused[k] * m.vert[i];
+        assert_int_equal(sdm_mesh_audit(&b, &a, &err), SDM_E_MESH);
+        assert_non_null(strstr(err.text, k < 3 ? "1e-70" : "1e70"));
+    }
+    sdm_mesh_dispose(&m);
+    sdm_mesh_dispose(&b);
+}
+
 static void test_misuse(void **state)
 {
     (void)state;
@@ -295,6 +326,7 @@ int main(void)
         cmocka_unit_test(test_soup_is_welded),
         cmocka_unit_test(test_components_and_crossings),
         cmocka_unit_test(test_crossings_of_random_triangles),
+        cmocka_unit_test(test_sizes),
         cmocka_unit_test(test_misuse),
         cmocka_unit_test(test_memory_is_short),
     };

@@ -45,8 +45,8 @@ typedef struct sdm_audit {
     bool inverted;             /* closed, and the volume is negative beyond rounding of the coordinates */
 } sdm_audit;
 
-/* Examines a mesh. SDM_E_MESH: no triangle, an index out of range, a coordinate that is not finite. The result is scale free:
-   no absolute tolerance is used. [any thread] */
+/* Examines a mesh. SDM_E_MESH: no triangle, an index out of range, a coordinate that is not finite or above 1e70, a largest one below
+   1e-70 (all 0 will do). Between these the result is scale free: no absolute tolerance is used. [any thread] */
 SDM_API sdm_status sdm_mesh_audit(const sdm_mesh *m, sdm_audit *out, sdm_error *err);
 
 #ifdef __cplusplus

@@ -27,8 +27,6 @@ static sdm_status check_content(const sdm_mesh *m, sdm_error *err)
     return SDM_OK;
 }
 
-static bool repeats_vertex(const uint32_t *t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
-
 static void measure(const sdm_mesh *m, sdm_survey *s)
 {
     sdm_audit *a = &s->audit;
@@ -37,7 +35,7 @@ static void measure(const sdm_mesh *m, sdm_survey *s)
     sdm_facets_build(m, mid, s->facets, &a->area, &a->volume);
     for (size_t t = 0; t < m->n_tri; t++)
         a->degenerate +=
-            repeats_vertex(&s->topo.tri[3 * t]) || !(s->facets[t].height > 4 * DBL_EPSILON * s->facets[t].longest);
+            sdm_repeats_vertex(&s->topo.tri[3 * t]) || !(s->facets[t].height > 4 * DBL_EPSILON * s->facets[t].longest);
 }
 
 /* The vertex across half-edge h. */
@@ -94,11 +92,8 @@ static sdm_status count_components(const sdm_topology *topo, sdm_arena *arena, s
     uint32_t *parent;
     const sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &parent, topo->n_tri, "components", err);
     if (s) return s;
-    for (size_t t = 0; t < topo->n_tri; t++) parent[t] = (uint32_t)t;
-    for (size_t i = 0; i < topo->n_edges; i++)
-        for (uint32_t h = topo->edges[i].first; topo->next[h] != SDM_NONE; h = topo->next[h])
-            sdm_forest_join(parent, h / 3, topo->next[h] / 3);
-    for (size_t t = 0; t < topo->n_tri; t++) a->components += parent[t] == t && !repeats_vertex(&topo->tri[3 * t]);
+    sdm_topology_parts(topo, parent);
+    for (size_t t = 0; t < topo->n_tri; t++) a->components += parent[t] == t && !sdm_repeats_vertex(&topo->tri[3 * t]);
     sdm_arena_release(arena, SDM_HIGH, before);
     return SDM_OK;
 }

@@ -1,6 +1,8 @@
 /* Integer winding numbers by signed crossings: exact decisions on which triangles a ray meets (line_triangle.h). */
 #include "crossings.h"
 
+#include <math.h>
+
 #include "line_triangle.h"
 
 typedef struct ray {
@@ -51,4 +53,13 @@ int sdm_ray_winding(const sdm_mesh *m, const sdm_bvh *tree, const double p[3], i
             if (reaches(&tree->node[c], &r)) stack[top++] = c;
     }
     return winding;
+}
+
+int sdm_ray_winding_along(const sdm_mesh *m, const sdm_bvh *tree, const double p[3], const double n[3],
+                          const uint32_t *skip, size_t n_skip)
+{
+    int axis = 0;
+    for (int i = 1; i < 3; i++)
+        if (fabs(n[i]) > fabs(n[axis])) axis = i;
+    return sdm_ray_winding(m, tree, p, axis, n[axis] > 0 ? 1 : -1, skip, n_skip);
 }

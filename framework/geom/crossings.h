@@ -10,4 +10,8 @@
 int sdm_ray_winding(const sdm_mesh *m, const sdm_bvh *tree, const double p[3], int axis, int direction,
                     const uint32_t *skip, size_t n_skip);
 
+/* The same of a ray along the axis nearest to the vector n. */
+int sdm_ray_winding_along(const sdm_mesh *m, const sdm_bvh *tree, const double p[3], const double n[3],
+                          const uint32_t *skip, size_t n_skip);
+
 #endif

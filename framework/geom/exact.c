@@ -103,6 +103,7 @@ static sdm_status make_surface(sdm_exact *e, sdm_budget *budget, sdm_error *err)
     if (changed) return SDM_OK;
     e->report.union_error_mm = 0;
     sdm_free(e->source);
+    e->source = NULL;
     sdm_mesh_dispose(&e->surface);
     budget->used = used;
     sdm_status s = sdm_budget_take(budget, mesh_bytes(&e->solid) + e->solid.n_tri * sizeof *e->source, err);

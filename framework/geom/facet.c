@@ -17,6 +17,13 @@ void sdm_facet_frame(const sdm_mesh *m, size_t t, sdm_frame *f)
     sdm_frame_build(&m->vert[3 * (size_t)v[0]], &m->vert[3 * (size_t)v[1]], &m->vert[3 * (size_t)v[2]], f);
 }
 
+void sdm_facet_centre(const sdm_mesh *m, size_t t, double x[3])
+{
+    const uint32_t *v = &m->tri[3 * t];
+    for (size_t i = 0; i < 3; i++)
+        x[i] = (m->vert[3 * (size_t)v[0] + i] + m->vert[3 * (size_t)v[1] + i] + m->vert[3 * (size_t)v[2] + i]) / 3;
+}
+
 void sdm_facets_build(const sdm_mesh *m, const double apex[3], sdm_facet *facet, double *area, double *volume)
 {
     *area = *volume = 0;

@@ -14,6 +14,9 @@ typedef struct sdm_facet {
 /* Frame of triangle t. */
 void sdm_facet_frame(const sdm_mesh *m, size_t t, sdm_frame *f);
 
+/* Mean of the corners of triangle t. */
+void sdm_facet_centre(const sdm_mesh *m, size_t t, double x[3]);
+
 /* facet[n_tri]; *area (mm^2) and *volume (mm^3, signed, of the cones from `apex`) are set. */
 void sdm_facets_build(const sdm_mesh *m, const double apex[3], sdm_facet *facet, double *area, double *volume);
 

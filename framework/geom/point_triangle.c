@@ -41,11 +41,10 @@ void sdm_frame_build(const double a[3], const double b[3], const double c[3], sd
     const double cy = v3_norm(w);
     // what is left of a needle after two passes may be rounding: below that there is no plane to find
     const int flat = !(cy > 2.3e-16 * length);
-    if (flat)
+    if (flat) {
         v3_perpendicular(f->u, f->v);
-    else
+    } else {
         for (int i = 0; i < 3; i++) f->v[i] = w[i] / cy;
-    for (int pass = 0; !flat && pass < 1; pass++) {
         const double along = v3_dot(f->v, f->u);
         v3_along(f->v, -along, f->u, f->v);
         const double len = v3_norm(f->v);

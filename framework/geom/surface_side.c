@@ -16,18 +16,7 @@ static bool meets_nothing(const sdm_survey *s, uint32_t t) { return s->contacts.
 
 static int ray(const sdm_sides *s, uint32_t t, const double x[3], const uint32_t *skip, size_t n_skip)
 {
-    const double *n = s->survey->facets[t].n;
-    int axis = 0;
-    for (int i = 1; i < 3; i++)
-        if (fabs(n[i]) > fabs(n[axis])) axis = i;
-    return sdm_ray_winding(s->mesh, &s->survey->tree, x, axis, n[axis] > 0 ? 1 : -1, skip, n_skip);
-}
-
-static void centre(const sdm_mesh *m, uint32_t t, double x[3])
-{
-    const uint32_t *v = &m->tri[3 * (size_t)t];
-    for (size_t i = 0; i < 3; i++)
-        x[i] = (m->vert[3 * (size_t)v[0] + i] + m->vert[3 * (size_t)v[1] + i] + m->vert[3 * (size_t)v[2] + i]) / 3;
+    return sdm_ray_winding_along(s->mesh, &s->survey->tree, x, s->survey->facets[t].n, skip, n_skip);
 }
 
 /* Joins neighbours that meet nothing: parent[n_tri] becomes a forest of patches. */
@@ -64,7 +53,7 @@ sdm_status sdm_sides_build(const sdm_mesh *m, const sdm_survey *survey, sdm_aren
             if (!meets_nothing(survey, t) || sdm_sides_flat(survey, t)) continue;
             const uint32_t l = largest[t];
             double x[3];
-            if (parent[t] == t) centre(m, l, x);
+            if (parent[t] == t) sdm_facet_centre(m, l, x);
             s->outside[t] = parent[t] == t ? ray(s, l, x, &l, 1) : s->outside[parent[t]];
         }
     }

@@ -3,19 +3,13 @@
 
 #include <string.h>
 
+#include "sdm/rng.h"
+
 static size_t table_size(size_t n)
 {
     size_t size = 16;
     while (size < 2 * n) size *= 2;
     return size;
-}
-
-static uint64_t mix(uint64_t x)
-{
-    // finaliser of splitmix64
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-    return x ^ (x >> 31);
 }
 
 static uint64_t bits_of(double x)
@@ -37,7 +31,7 @@ static sdm_status weld_vertices(const sdm_mesh *m, sdm_arena *arena, uint32_t *w
         const double *p = &m->vert[3 * v];
         // odd factors: coordinates of a grid must not meet
         const uint64_t x = bits_of(p[0]), y = bits_of(p[1]), z = bits_of(p[2]);
-        size_t slot = mix(x + y * 0x9e3779b97f4a7c15u + z * 0xd1b54a32d192ed03u) & (size - 1);
+        size_t slot = sdm_mix64(x + y * 0x9e3779b97f4a7c15u + z * 0xd1b54a32d192ed03u) & (size - 1);
         for (;; slot = (slot + 1) & (size - 1)) {
             const uint32_t u = table[slot] - 1;
             if (u == SDM_NONE) {
@@ -56,8 +50,6 @@ static sdm_status weld_vertices(const sdm_mesh *m, sdm_arena *arena, uint32_t *w
     return SDM_OK;
 }
 
-static bool repeats_vertex(const uint32_t *t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
-
 static inline uint32_t lower(uint32_t a, uint32_t b) { return a < b ? a : b; }
 static inline uint32_t higher(uint32_t a, uint32_t b) { return a < b ? b : a; }
 
@@ -74,7 +66,7 @@ static void list_half_edges(const sdm_topology *t, uint32_t *lo, half_edge *list
     uint32_t *count = lo + 2;
     for (size_t i = 0; i < t->n_tri; i++) {
         const uint32_t *v = &t->tri[3 * i];
-        if (repeats_vertex(v)) continue;
+        if (sdm_repeats_vertex(v)) continue;
         count[lower(v[0], v[1])]++;
         count[lower(v[1], v[2])]++;
         count[lower(v[2], v[0])]++;
@@ -83,7 +75,7 @@ static void list_half_edges(const sdm_topology *t, uint32_t *lo, half_edge *list
     uint32_t *next = lo + 1;
     for (size_t i = 0; i < t->n_tri; i++) {
         const uint32_t *v = &t->tri[3 * i];
-        if (repeats_vertex(v)) continue;
+        if (sdm_repeats_vertex(v)) continue;
         for (uint32_t k = 0; k < 3; k++) {
             const uint32_t h = (uint32_t)(3 * i) + k, from = v[k], to = v[(k + 1) % 3];
             list[next[lower(from, to)]++] = (half_edge){higher(from, to), 2 * h + (from < to)};
@@ -159,8 +151,8 @@ sdm_status sdm_topology_build(const sdm_mesh *m, sdm_arena *arena, sdm_topology 
     for (size_t i = 0; i < m->n_tri; i++) {
         uint32_t *v = &t->tri[3 * i];
         for (size_t k = 0; k < 3; k++) v[k] = t->weld[m->tri[3 * i + k]];
-        if (repeats_vertex(v)) memset(&t->edge[3 * i], 0xff, 3 * sizeof *v);
-        if (repeats_vertex(v)) memset(&t->next[3 * i], 0xff, 3 * sizeof *v);
+        if (sdm_repeats_vertex(v)) memset(&t->edge[3 * i], 0xff, 3 * sizeof *v);
+        if (sdm_repeats_vertex(v)) memset(&t->next[3 * i], 0xff, 3 * sizeof *v);
     }
     return find_edges(t, arena, err);
 }
@@ -171,6 +163,14 @@ uint32_t sdm_topology_neighbour(const sdm_topology *t, uint32_t h)
     const sdm_edge *e = &t->edges[t->edge[h]];
     if (e->n_up != 1 || e->n_down != 1) return SDM_NONE;
     return (e->first == h ? t->next[h] : e->first) / 3;
+}
+
+void sdm_topology_parts(const sdm_topology *t, uint32_t *parent)
+{
+    for (size_t i = 0; i < t->n_tri; i++) parent[i] = (uint32_t)i;
+    for (size_t i = 0; i < t->n_edges; i++)
+        for (uint32_t h = t->edges[i].first; t->next[h] != SDM_NONE; h = t->next[h])
+            sdm_forest_join(parent, h / 3, t->next[h] / 3);
 }
 
 uint32_t sdm_forest_root(uint32_t *parent, uint32_t i)

@@ -33,6 +33,12 @@ sdm_status sdm_topology_build(const sdm_mesh *m, sdm_arena *arena, sdm_topology 
 /* The triangle on the other side of half-edge h where exactly two triangles of one orientation meet, else SDM_NONE. */
 uint32_t sdm_topology_neighbour(const sdm_topology *t, uint32_t h);
 
+/* Is the triangle of these corners none? */
+static inline bool sdm_repeats_vertex(const uint32_t v[3]) { return v[0] == v[1] || v[1] == v[2] || v[2] == v[0]; }
+
+/* parent[n_tri] becomes a union-find forest of the parts that edges connect; their roots are their first triangles. */
+void sdm_topology_parts(const sdm_topology *t, uint32_t *parent);
+
 /* Root of i in a union-find forest; halves paths. */
 uint32_t sdm_forest_root(uint32_t *parent, uint32_t i);
 /* Joins two trees under the smaller root. */

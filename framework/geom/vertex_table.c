@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "sdm/memory.h"
+#include "sdm/rng.h"
 
 #define CELL 1024.0 // in tolerances: so large that hardly a vertex is near a side
 
@@ -21,11 +22,8 @@ static cell cell_of(const sdm_vertex_table *t, const double x[3], double shift)
 
 static size_t place_of(const sdm_vertex_table *t, const cell *c)
 {
-    // finaliser of splitmix64 after odd factors
-    uint64_t h = (uint64_t)c->x[0] + (uint64_t)c->x[1] * 0x9e3779b97f4a7c15u + (uint64_t)c->x[2] * 0xd1b54a32d192ed03u;
-    h = (h ^ (h >> 30)) * 0xbf58476d1ce4e5b9u;
-    h = (h ^ (h >> 27)) * 0x94d049bb133111ebu;
-    return (h ^ (h >> 31)) & (t->size - 1);
+    const uint64_t y = (uint64_t)c->x[1] * 0x9e3779b97f4a7c15u, z = (uint64_t)c->x[2] * 0xd1b54a32d192ed03u;
+    return sdm_mix64((uint64_t)c->x[0] + y + z) & (t->size - 1);
 }
 
 void sdm_vertex_table_find(const sdm_vertex_table *t, const double *vert, uint32_t n_vert, const double x[3],

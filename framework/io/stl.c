@@ -1,6 +1,7 @@
 /* STL meshes: ASCII and binary; triangles without shared vertices, welded again on reading. */
 #include "meshparts.h"
 #include "sdm/memory.h"
+#include "sdm/rng.h"
 
 #include <float.h>
 #include <math.h>
@@ -22,14 +23,6 @@ static sdm_status weld_create(weld *w, size_t n_corner, sdm_error *err)
     return SDM_ALLOC(&w->slot, size, "table of STL vertices", err);
 }
 
-/* Mixes the bits so that neighbouring coordinates spread (finaliser of SplitMix64). */
-static uint64_t mix(uint64_t v)
-{
-    v = (v ^ v >> 30) * 0xBF58476D1CE4E5B9u;
-    v = (v ^ v >> 27) * 0x94D049BB133111EBu;
-    return v ^ v >> 31;
-}
-
 static sdm_status weld_vertex(sdm_builder *b, weld *w, const double raw[3], uint32_t *out, sdm_error *err)
 {
     uint64_t hash = 0;
@@ -38,7 +31,7 @@ static sdm_status weld_vertex(sdm_builder *b, weld *w, const double raw[3], uint
         uint64_t bits;
         x[i] = raw[i] + 0.0; /* -0 and +0 are one place */
         memcpy(&bits, &x[i], sizeof bits);
-        hash = mix(hash + 0x9E3779B97F4A7C15u + bits);
+        hash = sdm_mix64(hash + 0x9E3779B97F4A7C15u + bits);
     }
     size_t at = (size_t)hash & w->mask;
     for (; w->slot[at]; at = (at + 1) & w->mask) {

@@ -23,6 +23,15 @@ SDM_API double sdm_rng_normal(uint64_t seed, uint64_t stream, uint64_t index);
 /* Uniform integer in 0 .. n-1, n > 0 (multiply-shift; bias below 2^-32 n). [any thread] */
 SDM_API uint64_t sdm_rng_below(uint64_t seed, uint64_t stream, uint64_t index, uint64_t n);
 
+/* Finaliser of SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom number generators", 2014): every bit of x is spread over
+   the result, for hash tables. [any thread] */
+static inline uint64_t sdm_mix64(uint64_t x)
+{
+    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+    return x ^ (x >> 31);
+}
+
 #ifdef __cplusplus
 }
 #endif

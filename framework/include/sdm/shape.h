@@ -1,7 +1,7 @@
 /* The shape plug-in ABI. A plug-in needs this header alone: everything it asks of the program comes through `sdm_host`.
 
    A shape is ONE constant table. Callbacks are stateless and re-entrant: the result depends on the arguments only, and many
-   threads call at once. The host checks parameters against their ranges before a call and audits the mesh after it. */
+   threads call at once. The host checks parameters against their ranges before a call, indices and coordinates of the mesh after it. */
 #ifndef SDM_SHAPE_H
 #define SDM_SHAPE_H
 

@@ -82,14 +82,6 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
     return SDM_OK;
 }
 
-static sdm_status fail_interrupted(const char *folder, sdm_error *err)
-{
-    char path[SDM_PATH_TEXT_MAX + 32];
-    snprintf(path, sizeof path, "%s/checkpoint.sdmc", folder);
-    if (access(path, F_OK)) return sdm_fail(err, SDM_E_CANCELLED, "interrupted before the first checkpoint");
-    return sdm_fail(err, SDM_E_CANCELLED, "interrupted; a checkpoint is in %s: go on with --resume", folder);
-}
-
 static sdm_status train(const cli_args *args, const sdm_config *config, const sdm_instance *shape, sdm_error *err)
 {
     const char *folder = config->output.folder;
@@ -99,7 +91,6 @@ static sdm_status train(const cli_args *args, const sdm_config *config, const sd
     cli_progress_start(&progress);
     sdm_status s = sdm_train(config, shape, folder, args->resume, &hooks, &report, err);
     cli_progress_clear(&progress);
-    if (s == SDM_E_CANCELLED) return fail_interrupted(folder, err);
     if (!s) s = write_picture(&report, shape, folder, err);
     return s ? s : print_summary(args, &report, err);
 }

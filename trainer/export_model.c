@@ -96,19 +96,6 @@ static void collect_options(const trainer *t, option_texts *o)
     }
 }
 
-static sdm_status write_text(const trainer *t, const char *name, const sdm_text *text, sdm_error *err)
-{
-    char path[SDM_PATH_TEXT_MAX + 32];
-    snprintf(path, sizeof path, "%s/%s", t->folder, name);
-    sdm_outfile *f;
-    sdm_status s = sdm_outfile_open(path, &f, err);
-    if (s) return s;
-    s = sdm_outfile_write(f, text->data ? text->data : "", text->size, err);
-    if (!s) return sdm_outfile_commit(&f, err);
-    sdm_outfile_discard(&f);
-    return s;
-}
-
 // number behind `key` in one line of metrics
 static double number(const char *line, const char *key)
 {
@@ -155,11 +142,14 @@ static sdm_status dump_config(const trainer *t, sdm_text *out, sdm_error *err)
     return out->failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the resolved config") : SDM_OK;
 }
 
-sdm_status export_config(const trainer *t, sdm_error *err)
+sdm_status export_config(const trainer *t, sdm_outfile **out, sdm_error *err)
 {
+    char path[SDM_PATH_TEXT_MAX + 32];
+    snprintf(path, sizeof path, "%s/config.yaml", t->folder);
     sdm_text config = {0};
     sdm_status s = dump_config(t, &config, err);
-    if (!s) s = write_text(t, "config.yaml", &config, err);
+    if (!s) s = sdm_outfile_open(path, out, err);
+    if (!s) s = sdm_outfile_write(*out, config.data, config.size, err);
     sdm_text_dispose(&config);
     return s;
 }

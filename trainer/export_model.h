@@ -2,10 +2,12 @@
 #ifndef SDM_TRAINER_EXPORT_H
 #define SDM_TRAINER_EXPORT_H
 
+#include "sdm/file.h"
 #include "trainer.h"
 
-/* Writes config.yaml, the resolved configuration. */
-sdm_status export_config(const trainer *t, sdm_error *err);
+/* Writes the resolved configuration to a temporary file: config.yaml when the caller commits it. *out is the caller's after an
+   error, too (sdm_outfile_discard()). */
+sdm_status export_config(const trainer *t, sdm_outfile **out, sdm_error *err);
 
 /* Builds the model from the averaged weights, measures it on the held-out maps as the runtime will run it, writes model.sdm and
    loss.png into the folder and fills the report (may be NULL). */

@@ -84,7 +84,8 @@ sdm_status trainer_stop(trainer *t, sdm_error *err)
 {
     const sdm_status s = checkpoint_write(t, err);
     if (s) return s;
-    return sdm_fail(err, SDM_E_CANCELLED, "stopped on request at step %lld, after a checkpoint", (long long)t->step);
+    return sdm_fail(err, SDM_E_CANCELLED, "stopped on request at step %lld; a checkpoint is in %s: go on with --resume",
+                    (long long)t->step, t->folder);
 }
 
 // writes all lines so far: the file is complete at any moment, and after a resume it has no line twice
@@ -298,8 +299,7 @@ static sdm_status retake(trainer *t, size_t n_taken, sdm_error *err)
         for (size_t i = 0; i < n; i++) slots[i] = dataset_slot(&t->data, t->data.n_taken + i);
         sdm_status s = producer_take(t->producer, t->data.n_taken + n, err);
         if (!s) s = take(t, slots, n, err);
-        if (!s && trainer_cancelled(t))
-            s = sdm_fail(err, SDM_E_CANCELLED, "stopped on request; the checkpoint is as it was");
+        if (!s && trainer_cancelled(t)) s = sdm_fail(err, SDM_E_CANCELLED, "stopped on request");
         if (s) return s;
         trainer_report(t, 0, 0, false);
     }
@@ -313,7 +313,15 @@ void trainer_enter(trainer *t, sdm_phase phase)
     t->phase_started = trainer_seconds(t);
 }
 
-static sdm_status run(trainer *t, bool resume, sdm_error *err)
+// from here on the folder is this run's: checkpoint and model of an older one would contradict its configuration
+static sdm_status take_folder(const trainer *t, bool resume, sdm_outfile **config, sdm_error *err)
+{
+    const sdm_status s = resume ? SDM_OK : checkpoint_start_anew(t, err);
+    return s ? s : sdm_outfile_commit(config, err);
+}
+
+// config: the resolved configuration, under its temporary name until all that can refuse it has been passed
+static sdm_status run(trainer *t, bool resume, sdm_outfile **config, sdm_error *err)
 {
     bool found = false;
     sdm_phase from = SDM_PHASE_FIT;
@@ -342,6 +350,9 @@ static sdm_status run(trainer *t, bool resume, sdm_error *err)
     if (!s) s = t->kind->begin(t, err);
     if (!s) s = start_producer(t, err);
     if (!s && found) s = retake(t, n_taken, err);
+    if (s == SDM_E_CANCELLED)
+        s = sdm_fail(err, s, "stopped on request before the training began: %s is as it was", t->folder);
+    if (!s) s = take_folder(t, resume, config, err);
     if (s) return s;
 
     if (found) {
@@ -368,10 +379,11 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
                  .metrics = &metrics};
     if (hooks) t.hooks = *hooks;
     t.n_threads = sdm_threads(config->threads);
+    sdm_outfile *resolved = NULL;
     sdm_status s = sdm_make_folder(folder, err);
-    if (!s && !resume) s = checkpoint_start_anew(&t, err); // they would belong to another run
-    if (!s) s = export_config(&t, err);
-    if (!s) s = run(&t, resume, err);
+    if (!s) s = export_config(&t, &resolved, err);
+    if (!s) s = run(&t, resume, &resolved, err);
+    sdm_outfile_discard(&resolved);
     producer_stop(t.producer);
     t.producer = NULL;
     t.phase = SDM_PHASE_EVALUATE;

@@ -18,6 +18,23 @@ expect 2 'run holds a trained model and no checkpoint to go on from' sdmgen trai
 expect 2 'exclude each other' sdmgen train "$tiny" --out run --resume --force
 [ "$before" = "$(cksum <run/model.sdm)" ] || bad 'the model has changed'
 
+# --force replaces a run when nothing of the new one can be refused any more, and no sooner
+before=$(cat run/* | cksum)
+expect 2 "range \[0, 100\] of 'a'" sdmgen train "$tiny" --force --out run 'shape.ranges.a=[0,100]' --quiet
+expect 2 'data.memory_gb' sdmgen train "$tiny" --force --out run data.memory_gb=0.001 'grid.size=[60,60,60]' --quiet
+expect 2 'no voxel of the grid is inside any' sdmgen train "$tiny" --force --out run 'grid.centre=[900,0,0]' --quiet
+[ "$before" = "$(cat run/* | cksum)" ] || bad 'a refused --force has changed the run'
+
+# ./run asks before it replaces a model of another configuration
+mkdir -p clone/.ci clone/configs clone/build/release/cli clone/runs
+cp "$source_folder/run" clone
+cp "$tiny" clone/configs/cochlea.yaml
+ln -s "$program" clone/build/release/cli/sdmgen
+echo 'say() { :; }; install_packages() { :; }; build() { :; }' >clone/.ci/setup.sh
+cp -r run clone/runs/cochlea
+expect 1 '^runs/cochlea holds a training with another configuration' bash clone/run
+cmp -s run/model.sdm clone/runs/cochlea/model.sdm || bad './run has replaced a model'
+
 # an interrupt leaves a checkpoint, --resume goes on
 "$program" train "$tiny" train.steps=1000000000 --out stopped >out 2>err &
 pid=$!
@@ -27,7 +44,7 @@ kill -TERM $pid
 wait $pid
 code=$?
 [ $code -eq 130 ] || bad "interrupted: exit code $code: $(cat err)"
-grep -q '^sdmgen: error: interrupted; a checkpoint is in stopped: go on with --resume' err || bad "no such notice: $(cat err)"
+grep -q '^sdmgen: error: stopped on request at step [0-9]*; a checkpoint is in stopped: go on with --resume' err || bad "no such notice: $(cat err)"
 present stopped/checkpoint.sdmc
 absent stopped/model.sdm
 expect 2 'stopped holds the checkpoint of a training' sdmgen train "$tiny" --out stopped

@@ -172,22 +172,53 @@ static void resume_is_bit_exact(void **state)
     }
 }
 
-// a run from the beginning does not leave the checkpoint of an older one to be resumed
-static void stale_checkpoint_goes(void **state)
+enum { IN_FIT = 400, IN_DATA = 20 }; // questions asked until then
+
+static bool old_files;
+
+static bool look(void *user)
+{
+    (void)user;
+    if (++calls == IN_FIT) old_files = exists("model.sdm") || exists("checkpoint.sdmc");
+    return false;
+}
+
+// an older run stays as it is until training begins, and goes then: its checkpoint is not there to be resumed by the new one
+static void older_run_gives_way(void **state)
+{
+    (void)state;
+    sdm_config c, other;
+    sdm_error e = {0};
+    read_config(&c, (const char *const[]){"train.steps=600"}, 1);
+    read_config(&other, (const char *const[]){"train.steps=600", "network.width=16"}, 2);
+    clean();
+    const sdm_train_hooks stopped = {.cancelled = stop};
+    calls = 0, stop_after = IN_FIT;
+    assert_int_equal(sdm_train(&c, capsule, folder, false, &stopped, NULL, &e), SDM_E_CANCELLED);
+    const uint64_t config = hash_of("config.yaml"), checkpoint = hash_of("checkpoint.sdmc");
+    calls = 0, stop_after = IN_DATA;
+    assert_int_equal(sdm_train(&other, capsule, folder, false, &stopped, NULL, &e), SDM_E_CANCELLED);
+    assert_true(hash_of("config.yaml") == config && hash_of("checkpoint.sdmc") == checkpoint);
+    // a checkpoint, then a model
+    const sdm_train_hooks looking = {.cancelled = look};
+    for (int i = 0; i < 2; i++) {
+        calls = 0, old_files = true;
+        if (sdm_train(i ? &c : &other, capsule, folder, false, &looking, NULL, &e)) fail_msg("%s", e.text);
+        assert_false(old_files);
+        assert_true((hash_of("config.yaml") == config) == (i == 1));
+    }
+}
+
+// a folder that cannot be written is found out before the work
+static void no_place_for_files(void **state)
 {
     (void)state;
     sdm_config c;
     sdm_error e = {0};
-    read_config(&c, (const char *const[]){"train.steps=600"}, 1);
-    // in the fit, then while making data
-    const int64_t stops[] = {400, 20};
-    for (size_t i = 0; i < 2; i++) {
-        calls = 0, stop_after = stops[i];
-        watch w = {0};
-        const sdm_train_hooks hooks = {.cancelled = stop, .user = &w};
-        assert_int_equal(sdm_train(&c, capsule, folder, false, &hooks, NULL, &e), SDM_E_CANCELLED);
-        assert_true(exists("checkpoint.sdmc") == (i == 0));
-    }
+    read_config(&c, NULL, 0);
+    calls = 0, stop_after = 0;
+    const sdm_train_hooks hooks = {.cancelled = stop};
+    assert_int_equal(sdm_train(&c, capsule, "/proc", false, &hooks, NULL, &e), SDM_E_IO);
 }
 
 // a time budget that is over before the data is made still gives a model
@@ -286,7 +317,8 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(trains),
                                        cmocka_unit_test(same_bits_for_threads),
                                        cmocka_unit_test(resume_is_bit_exact),
-                                       cmocka_unit_test(stale_checkpoint_goes),
+                                       cmocka_unit_test(older_run_gives_way),
+                                       cmocka_unit_test(no_place_for_files),
                                        cmocka_unit_test(short_of_time),
                                        cmocka_unit_test(polynomials_alone),
                                        cmocka_unit_test(small_pool),

@@ -137,31 +137,62 @@ static void neutral(sdm_config *c)
     c->threads = c->data.workers = 0;
 }
 
+static sdm_status refuse(const trainer *t, const char *what, sdm_error *err)
+{
+    return sdm_fail(err, SDM_E_CONFIG, "%s/checkpoint.sdmc %s: start anew with --force, or choose another folder",
+                    t->folder, what);
+}
+
+// a line as a text for "%.*s": where it begins behind its indent, at most 200 bytes of it
+static int line_at(const char **text)
+{
+    *text += strspn(*text, " ");
+    const size_t n = strcspn(*text, "\n");
+    return n < 200 ? (int)n : 200;
+}
+
+// names the first line in which two dumps of a configuration differ
+static sdm_status refuse_difference(const trainer *t, const char *old, const char *now, sdm_error *err)
+{
+    char what[512];
+    size_t line = 0;
+    for (size_t i = 0; old[i] && old[i] == now[i]; i++)
+        if (old[i] == '\n') line = i + 1;
+    old += line, now += line;
+    const int n_old = line_at(&old), n_now = line_at(&now);
+    snprintf(what, sizeof what, "has '%.*s', this configuration '%.*s'", n_old, old, n_now, now);
+    return refuse(t, what, err);
+}
+
+static sdm_status compare(const trainer *t, sdm_config *old, sdm_config *now, sdm_error *err)
+{
+    sdm_text a = {0}, b = {0};
+    if ((now->train.minutes > 0) != (old->train.minutes > 0))
+        return refuse(t, "and this configuration have budgets of different kinds (minutes; steps or samples)", err);
+    neutral(old);
+    neutral(now);
+    sdm_config_dump(old, &a);
+    sdm_config_dump(now, &b);
+    sdm_status s = SDM_OK;
+    if (a.failed || b.failed)
+        s = sdm_fail(err, SDM_E_NOMEM, "no memory to compare configs");
+    else if (strcmp(a.data, b.data) != 0)
+        s = refuse_difference(t, a.data, b.data, err);
+    sdm_text_dispose(&a);
+    sdm_text_dispose(&b);
+    return s;
+}
+
 static sdm_status same_config(const trainer *t, const sdm_section *stored, sdm_error *err)
 {
     sdm_config *old = NULL, *now = NULL;
-    sdm_text a = {0}, b = {0};
     sdm_status s = SDM_ALLOC(&old, 1, "config", err);
     if (!s) s = SDM_ALLOC(&now, 1, "config", err);
     if (!s) s = sdm_config_parse("checkpoint", stored->data, stored->size, NULL, 0, old, err);
     if (!s) {
         *now = *t->config;
-        const bool same_budget_kind = (now->train.minutes > 0) == (old->train.minutes > 0);
-        neutral(old);
-        neutral(now);
-        sdm_config_dump(old, &a);
-        sdm_config_dump(now, &b);
-        if (a.failed || b.failed)
-            s = sdm_fail(err, SDM_E_NOMEM, "no memory to compare configs");
-        else if (!same_budget_kind || strcmp(a.data, b.data) != 0)
-            s = sdm_fail(err, SDM_E_CONFIG,
-                         "%s: the config differs from that of the checkpoint in more than the length of the budget, "
-                         "output and threads: train "
-                         "into another folder, or without --resume",
-                         t->folder);
+        s = compare(t, old, now, err);
     }
-    sdm_text_dispose(&a);
-    sdm_text_dispose(&b);
     sdm_free(old);
     sdm_free(now);
     return s;

@@ -48,6 +48,11 @@ grep -q '^sdmgen: error: stopped on request at step [0-9]*; a checkpoint is in s
 present stopped/checkpoint.sdmc
 absent stopped/model.sdm
 expect 2 'stopped holds the checkpoint of a training' sdmgen train "$tiny" --out stopped
+before=$(cat stopped/* | cksum)
+expect 2 "^sdmgen: error: stopped/checkpoint.sdmc has 'width: 16', this configuration 'width: 24': " \
+    sdmgen train "$tiny" train.steps=1000000000 --out stopped --resume network.width=24
+expect 2 'budgets of different kinds' sdmgen train "$tiny" --out stopped --resume train.minutes=1
+[ "$before" = "$(cat stopped/* | cksum)" ] || bad 'a refused --resume has changed the run'
 expect 0 - sdmgen train "$tiny" --out stopped --resume --quiet
 present stopped/model.sdm
 absent stopped/checkpoint.sdmc

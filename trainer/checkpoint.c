@@ -164,11 +164,27 @@ static sdm_status refuse_difference(const trainer *t, const char *old, const cha
     return refuse(t, what, err);
 }
 
+// the budget may be another one, but not less than what was trained: the model would not be what its configuration says
+static sdm_status check_budget(const trainer *t, const sdm_config *old, const state *then, sdm_error *err)
+{
+    char what[160];
+    const double minutes = t->config->train.minutes;
+    if ((minutes > 0) != (old->train.minutes > 0))
+        return refuse(t, "and this configuration have budgets of different kinds (minutes; steps or samples)", err);
+    if (trainer_by_time(t) && (minutes >= old->train.minutes || then->seconds <= minutes * 60)) return SDM_OK;
+    if (trainer_by_time(t))
+        snprintf(what, sizeof what, "is at %.3g minutes, this configuration ends at %.3g", then->seconds / 60, minutes);
+    else if (then->step > trainer_steps(t))
+        snprintf(what, sizeof what, "is at step %lld, this configuration ends at %lld", (long long)then->step,
+                 (long long)trainer_steps(t));
+    else
+        return SDM_OK;
+    return refuse(t, what, err);
+}
+
 static sdm_status compare(const trainer *t, sdm_config *old, sdm_config *now, sdm_error *err)
 {
     sdm_text a = {0}, b = {0};
-    if ((now->train.minutes > 0) != (old->train.minutes > 0))
-        return refuse(t, "and this configuration have budgets of different kinds (minutes; steps or samples)", err);
     neutral(old);
     neutral(now);
     sdm_config_dump(old, &a);
@@ -183,12 +199,13 @@ static sdm_status compare(const trainer *t, sdm_config *old, sdm_config *now, sd
     return s;
 }
 
-static sdm_status same_config(const trainer *t, const sdm_section *stored, sdm_error *err)
+static sdm_status same_config(const trainer *t, const sdm_section *stored, const state *then, sdm_error *err)
 {
     sdm_config *old = NULL, *now = NULL;
     sdm_status s = SDM_ALLOC(&old, 1, "config", err);
     if (!s) s = SDM_ALLOC(&now, 1, "config", err);
     if (!s) s = sdm_config_parse("checkpoint", stored->data, stored->size, NULL, 0, old, err);
+    if (!s) s = check_budget(t, old, then, err);
     if (!s) {
         *now = *t->config;
         s = compare(t, old, now, err);
@@ -223,10 +240,10 @@ sdm_status checkpoint_read(trainer *t, bool *found, sdm_error *err)
     opened o = {0};
     sdm_status s = open_checkpoint(t, &o, found, err);
     if (s || !*found) return s;
-    s = same_config(t, find(&o, "config"), err);
+    state then;
+    memcpy(&then, find(&o, "checkpoint")->data, sizeof then);
+    s = same_config(t, find(&o, "config"), &then, err);
     if (!s) {
-        state then;
-        memcpy(&then, find(&o, "checkpoint")->data, sizeof then);
         const dataset *d = &t->data;
         const bool sound = (then.phase == SDM_PHASE_FIT || then.phase == SDM_PHASE_REFINE) && then.n_start >= 0 &&
                            (size_t)then.n_start <= d->n_start && then.n_taken >= then.n_start &&

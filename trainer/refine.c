@@ -304,7 +304,8 @@ sdm_status refine_start(trainer *t, bool resumed, sdm_error *err)
 
 static double fraction_of_phase(const trainer *t, double end)
 {
-    if (!trainer_by_time(t)) return (double)t->phase_step / (double)(trainer_steps(t) - trainer_fit_steps(t));
+    // what is left after the steps of the fit: a resumed run may have another budget than it began with
+    if (!trainer_by_time(t)) return (double)t->phase_step / (double)(trainer_steps(t) - (t->step - t->phase_step));
     const double length = end - t->phase_started;
     return length > 0 ? (trainer_seconds(t) - t->phase_started) / length : 1;
 }

@@ -39,7 +39,7 @@ cmp -s run/model.sdm clone/runs/cochlea/model.sdm || bad './run has replaced a m
 "$program" train "$tiny" train.steps=1000000000 --out stopped >out 2>err &
 pid=$!
 for _ in $(seq 300); do grep -q 'bases and' err && break || sleep 0.2; done
-sleep 1
+for _ in $(seq 300); do [ -s stopped/metrics.jsonl ] && break || sleep 0.2; done
 kill -TERM $pid
 wait $pid
 code=$?
@@ -52,8 +52,14 @@ before=$(cat stopped/* | cksum)
 expect 2 "^sdmgen: error: stopped/checkpoint.sdmc has 'width: 16', this configuration 'width: 24': " \
     sdmgen train "$tiny" train.steps=1000000000 --out stopped --resume network.width=24
 expect 2 'budgets of different kinds' sdmgen train "$tiny" --out stopped --resume train.minutes=1
+# ... with a larger or smaller budget, but not one of less steps than were trained
+expect 2 'is at step [0-9]+, this configuration ends at 60: ' sdmgen train "$tiny" --out stopped --resume
 [ "$before" = "$(cat stopped/* | cksum)" ] || bad 'a refused --resume has changed the run'
-expect 0 - sdmgen train "$tiny" --out stopped --resume --quiet
+steps=$(($(sed 's/.* is at step \([0-9]*\).*/\1/' err) + 20))
+cp stopped/metrics.jsonl before.jsonl
+expect 0 - sdmgen train "$tiny" --out stopped --resume --quiet --json train.steps=$steps
+near "$(json steps)" $steps 0
+cmp -s -n "$(wc -c <before.jsonl)" before.jsonl stopped/metrics.jsonl || bad 'the run was not gone on with'
 present stopped/model.sdm
 absent stopped/checkpoint.sdmc
 expect 0 - sdmgen info stopped/model.sdm

@@ -122,6 +122,7 @@ static void watch_progress(void *user, const sdm_progress *p)
 }
 
 static int64_t calls, stop_after;
+enum { IN_DATA = 20, IN_FIT = 400, IN_REFINEMENT = 700 }; // calls until then, of 600 steps
 
 static bool stop(void *user)
 {
@@ -153,7 +154,7 @@ static void resume_is_bit_exact(void **state)
     if (sdm_train(&c, capsule, folder, false, NULL, NULL, &e)) fail_msg("%s", e.text);
     const uint64_t whole = hash_of("model.sdm"), metrics = hash_of("metrics.jsonl");
     // stopped while making data, in the fit, in the refinement
-    const int64_t stops[] = {20, 400, 700};
+    const int64_t stops[] = {IN_DATA, IN_FIT, IN_REFINEMENT};
     for (size_t i = 0; i < 3; i++) {
         clean();
         calls = 0, stop_after = stops[i];
@@ -172,8 +173,6 @@ static void resume_is_bit_exact(void **state)
     }
 }
 
-enum { IN_FIT = 400, IN_DATA = 20 }; // questions asked until then
-
 static bool old_files;
 
 static bool look(void *user)
@@ -181,6 +180,33 @@ static bool look(void *user)
     (void)user;
     if (++calls == IN_FIT) old_files = exists("model.sdm") || exists("checkpoint.sdmc");
     return false;
+}
+
+// a run may go on with another budget, which it keeps, but not with less than it has trained
+static void resume_with_another_budget(void **state)
+{
+    (void)state;
+    static const char *const budgets[][3] = {// the run, too little, another
+                                             {"train.steps=600", "train.steps=300", "train.steps=540"},
+                                             {"train.steps=600", "train.steps=300", "train.steps=900"},
+                                             {"train.minutes=1000", "train.minutes=0.00001", NULL}};
+    for (size_t i = 0; i < 3; i++) {
+        sdm_config c;
+        sdm_error e = {0};
+        sdm_train_report r;
+        clean();
+        read_config(&c, (const char *const[]){budgets[i][0]}, 1);
+        calls = 0, stop_after = i < 2 ? IN_REFINEMENT : IN_FIT;
+        const sdm_train_hooks hooks = {.cancelled = stop};
+        assert_int_equal(sdm_train(&c, capsule, folder, false, &hooks, NULL, &e), SDM_E_CANCELLED);
+        read_config(&c, (const char *const[]){budgets[i][1]}, 1);
+        assert_int_equal(sdm_train(&c, capsule, folder, true, NULL, NULL, &e), SDM_E_CONFIG);
+        assert_non_null(strstr(e.text, "this configuration ends at"));
+        if (!budgets[i][2]) continue;
+        read_config(&c, (const char *const[]){budgets[i][2]}, 1);
+        if (sdm_train(&c, capsule, folder, true, NULL, &r, &e)) fail_msg("%s", e.text);
+        assert_int_equal(r.steps, c.train.steps);
+    }
 }
 
 // an older run stays as it is until training begins, and goes then: its checkpoint is not there to be resumed by the new one
@@ -317,6 +343,7 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(trains),
                                        cmocka_unit_test(same_bits_for_threads),
                                        cmocka_unit_test(resume_is_bit_exact),
+                                       cmocka_unit_test(resume_with_another_budget),
                                        cmocka_unit_test(older_run_gives_way),
                                        cmocka_unit_test(no_place_for_files),
                                        cmocka_unit_test(short_of_time),

@@ -91,8 +91,10 @@ static sdm_status train(const cli_args *args, const sdm_config *config, const sd
     cli_progress_start(&progress);
     sdm_status s = sdm_train(config, shape, folder, args->resume, &hooks, &report, err);
     cli_progress_clear(&progress);
-    if (!s) s = write_picture(&report, shape, folder, err);
-    return s ? s : print_summary(args, &report, err);
+    if (s) return s;
+    sdm_error picture = {0};
+    if (write_picture(&report, shape, folder, &picture)) cli_notice("%s", picture.text);
+    return print_summary(args, &report, err);
 }
 
 sdm_status cmd_train(const cli_args *args, sdm_error *err)

@@ -254,9 +254,10 @@ sdm_status export_model(trainer *t, sdm_train_report *report, sdm_error *err)
         s = trainer_metric(t, 0, err);
     }
     if (!s) s = t->kind->build(t, &d->info, &bytes, &size, err);
-    if (!s) s = write_curve(t, err);
     if (!s) s = sdm_container_write(path, bytes, size, err);
     sdm_free(bytes);
+    sdm_error picture = {0};
+    if (!s && write_curve(t, &picture)) trainer_message(t, "%s", picture.text); // not worth the network
     if (!s && report) {
         *report = (sdm_train_report){
             .accuracy = t->accuracy, .steps = t->step, .samples = d->info.train_samples, .seconds = trainer_seconds(t)};

@@ -331,7 +331,8 @@ sdm_status refine_run(trainer *t, sdm_error *err)
     sdm_status s = batch_create(t, (size_t)c->train.refine_batch, &b, err);
     int64_t last_step = t->phase_step;
     double last_time = trainer_seconds(t);
-    for (double at; !s && (at = fraction_of_phase(t, end)) < 1;) {
+    double at = fraction_of_phase(t, end);
+    while (!s && at < 1) {
         if ((s = trainer_take_samples(t, t->data.n_start + t->data.n_online, err))) break;
         if (trainer_cancelled(t)) {
             s = trainer_stop(t, err);
@@ -340,7 +341,8 @@ sdm_status refine_run(trainer *t, sdm_error *err)
         const double rate = c->train.refine_rate * schedule(at, c->train.warmup);
         if ((s = step(t, &b, rate, err))) break;
         t->step++, t->phase_step++;
-        if (t->phase_step % AVERAGE_EVERY == 0) take_average(t);
+        at = fraction_of_phase(t, end);
+        if (t->phase_step % AVERAGE_EVERY == 0 || !(at < 1)) take_average(t); // the last steps count too
         if (!isfinite(t->loss)) {
             s = sdm_fail(err, SDM_E_CONFIG,
                          "%s: training diverged at step %lld (loss is not a number): lower train.refine_rate", c->file,
@@ -360,7 +362,6 @@ sdm_status refine_run(trainer *t, sdm_error *err)
         }
         if (now - t->last_checkpoint > c->train.checkpoint_seconds) s = checkpoint_write(t, err);
     }
-    if (!s && t->phase_step % AVERAGE_EVERY) take_average(t); // the last steps count too
     batch_dispose(&b);
     return s;
 }

@@ -365,6 +365,22 @@ static sdm_status run(trainer *t, bool resume, sdm_outfile **config, sdm_error *
     return t->kind->run(t, found, err);
 }
 
+// a network that cannot be written leaves a checkpoint
+static sdm_status finish(trainer *t, sdm_train_report *report, sdm_error *err)
+{
+    const sdm_phase phase = t->phase;
+    const size_t lines = t->metrics->size;
+    t->phase = SDM_PHASE_EVALUATE;
+    trainer_report(t, 1, 0, true);
+    const sdm_status s = export_model(t, report, err);
+    if (!s) return checkpoint_remove(t, err);
+    t->phase = phase;
+    t->metrics->size = lines;
+    if (s != SDM_E_QUALITY && !checkpoint_write(t, NULL))
+        trainer_message(t, "a checkpoint is in %s: go on with --resume", t->folder);
+    return s;
+}
+
 sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const char *folder, bool resume,
                      const sdm_train_hooks *hooks, sdm_train_report *report, sdm_error *err)
 {
@@ -386,11 +402,7 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     sdm_outfile_discard(&resolved);
     producer_stop(t.producer);
     t.producer = NULL;
-    t.phase = SDM_PHASE_EVALUATE;
-    trainer_report(&t, 1, 0, true);
-    if (!s) s = export_model(&t, report, err);
-    if (!s) s = write_metrics(&t, err);
-    if (!s) s = checkpoint_remove(&t, err);
+    if (!s) s = finish(&t, report, err);
     t.kind->dispose(&t);
     dataset_dispose(&t.data);
     sdm_free(t.blocks);

@@ -18,6 +18,13 @@ expect 2 'run holds a trained model and no checkpoint to go on from' sdmgen trai
 expect 2 'exclude each other' sdmgen train "$tiny" --out run --resume --force
 [ "$before" = "$(cksum <run/model.sdm)" ] || bad 'the model has changed'
 
+# pictures that cannot be written do not cost the network
+mkdir -p unpictured/loss.png unpictured/slices.png
+sdmgen train "$tiny" --out unpictured >out 2>err || bad "without pictures: $(cat err)"
+[ "$(grep -c '/\(loss\|slices\).png: cannot write' err)" -eq 2 ] || bad "no word about the pictures: $(cat err)"
+present unpictured/model.sdm
+absent unpictured/checkpoint.sdmc
+
 # --force replaces a run when nothing of the new one can be refused any more, and no sooner
 before=$(cat run/* | cksum)
 expect 2 "range \[0, 100\] of 'a'" sdmgen train "$tiny" --force --out run 'shape.ranges.a=[0,100]' --quiet

@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include <cmocka.h>
 
@@ -209,6 +210,35 @@ static void resume_with_another_budget(void **state)
     }
 }
 
+static bool block_model(void *user)
+{
+    (void)user;
+    if (++calls == IN_FIT) assert_int_equal(mkdir(in_folder("model.sdm"), 0700), 0);
+    return false;
+}
+
+// a network that cannot be written is not lost
+static void model_cannot_be_written(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_error e = {0};
+    read_config(&c, (const char *const[]){"train.steps=595"}, 1);
+    clean();
+    if (sdm_train(&c, capsule, folder, false, NULL, NULL, &e)) fail_msg("%s", e.text);
+    const uint64_t whole = hash_of("model.sdm"), metrics = hash_of("metrics.jsonl");
+    clean();
+    calls = 0;
+    const sdm_train_hooks hooks = {.cancelled = block_model};
+    assert_int_equal(sdm_train(&c, capsule, folder, false, &hooks, NULL, &e), SDM_E_IO);
+    assert_non_null(strstr(e.text, "model.sdm: cannot write"));
+    assert_int_equal(rmdir(in_folder("model.sdm")), 0);
+    calls = 0, stop_after = 2 * IN_DATA + 300; // the data again, but no step
+    const sdm_train_hooks no_step = {.cancelled = stop};
+    if (sdm_train(&c, capsule, folder, true, &no_step, NULL, &e)) fail_msg("%s", e.text);
+    assert_true(hash_of("model.sdm") == whole && hash_of("metrics.jsonl") == metrics);
+}
+
 // an older run stays as it is until training begins, and goes then: its checkpoint is not there to be resumed by the new one
 static void older_run_gives_way(void **state)
 {
@@ -344,6 +374,7 @@ int main(void)
                                        cmocka_unit_test(same_bits_for_threads),
                                        cmocka_unit_test(resume_is_bit_exact),
                                        cmocka_unit_test(resume_with_another_budget),
+                                       cmocka_unit_test(model_cannot_be_written),
                                        cmocka_unit_test(older_run_gives_way),
                                        cmocka_unit_test(no_place_for_files),
                                        cmocka_unit_test(short_of_time),

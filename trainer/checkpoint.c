@@ -6,6 +6,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "export_model.h"
 #include "kind.h"
 #include "sdm/checksum.h"
 #include "sdm/container.h"
@@ -59,11 +60,7 @@ sdm_status checkpoint_write(trainer *t, sdm_error *err)
                        .n_taken = (int64_t)t->data.n_taken,
                        .bases = t->kind->fingerprint(t)};
     sdm_text config = {0};
-    sdm_config_dump(t->config, &config);
-    if (config.failed) {
-        sdm_text_dispose(&config);
-        return sdm_fail(err, SDM_E_NOMEM, "no memory for a checkpoint");
-    }
+    sdm_status s = export_dump(t, &config, err);
     const sdm_section sections[] = {
         {"meta", "kind=checkpoint\n", 16},
         {"config", config.data, config.size},
@@ -78,7 +75,7 @@ sdm_status checkpoint_write(trainer *t, sdm_error *err)
     uint8_t *bytes = NULL;
     size_t size = 0;
     const size_t n = sizeof sections / sizeof *sections - (t->data.plan.by_error ? 0 : 2);
-    sdm_status s = sdm_container_build(sections, n, &bytes, &size, err);
+    if (!s) s = sdm_container_build(sections, n, &bytes, &size, err);
     if (!s) s = sdm_container_write(path, bytes, size, err);
     sdm_free(bytes);
     sdm_text_dispose(&config);

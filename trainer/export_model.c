@@ -129,14 +129,14 @@ static sdm_status write_curve(const trainer *t, sdm_error *err)
     return s;
 }
 
-// the resolved config without what depends on the machine: the model is the same bits for any number of threads
-static sdm_status dump_config(const trainer *t, sdm_text *out, sdm_error *err)
+sdm_status export_dump(const trainer *t, sdm_text *out, sdm_error *err)
 {
     sdm_config *c = NULL;
     sdm_status s = SDM_ALLOC(&c, 1, "resolved config", err);
     if (s) return s;
     *c = *t->config;
     c->threads = c->data.workers = 0;
+    c->output.folder[0] = '\0';
     sdm_config_dump(c, out);
     sdm_free(c);
     return out->failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the resolved config") : SDM_OK;
@@ -147,7 +147,7 @@ sdm_status export_config(const trainer *t, sdm_outfile **out, sdm_error *err)
     char path[SDM_PATH_TEXT_MAX + 32];
     snprintf(path, sizeof path, "%s/config.yaml", t->folder);
     sdm_text config = {0};
-    sdm_status s = dump_config(t, &config, err);
+    sdm_status s = export_dump(t, &config, err);
     if (!s) s = sdm_outfile_open(path, out, err);
     if (!s) s = sdm_outfile_write(*out, config.data, config.size, err);
     sdm_text_dispose(&config);
@@ -195,7 +195,7 @@ static sdm_status description_create(const trainer *t, description **out, sdm_er
     sdm_status s = SDM_ALLOC(&d, 1, "description of the model", err);
     if (s) return s;
     *out = d;
-    if (!(s = dump_config(t, &d->config, err))) describe(t, &d->config, &d->options, d->params, &d->info);
+    if (!(s = export_dump(t, &d->config, err))) describe(t, &d->config, &d->options, d->params, &d->info);
     return s;
 }
 

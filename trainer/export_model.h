@@ -5,7 +5,11 @@
 #include "sdm/file.h"
 #include "trainer.h"
 
-/* Writes the resolved configuration to a temporary file: config.yaml when the caller commits it. *out is the caller's after an
+/* Appends the resolved configuration without what has no part in the result: threads and the name of the folder. The model is the same
+   bits wherever and by however many threads it is trained. */
+sdm_status export_dump(const trainer *t, sdm_text *out, sdm_error *err);
+
+/* Writes this configuration to a temporary file: config.yaml when the caller commits it. *out is the caller's after an
    error, too (sdm_outfile_discard()). */
 sdm_status export_config(const trainer *t, sdm_outfile **out, sdm_error *err);
 

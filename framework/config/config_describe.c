@@ -93,12 +93,15 @@ void sdm_config_dump(const sdm_config *c, sdm_text *out)
     const sdm_section *sections = sdm_config_sections(&n);
     sdm_text_add(out, "# every key of this kind of network with its value; reads back to the same configuration\n");
     for (size_t s = 0; s < n; s++) {
-        bool nested = *sections[s].name != 0;
-        if (nested) sdm_text_add(out, "%s:\n", sections[s].name);
+        const bool nested = *sections[s].name != 0;
+        bool begun = !nested;
         for (size_t k = 0; k < sections[s].n_fields; k++) {
             const sdm_field *f = &sections[s].fields[k];
             if (f->type == SDM_FIELD_SPECIAL && !f->dump) continue;
             if (!sdm_kind_has(f, (int)c->network.kind)) continue;
+            if (f->type == SDM_FIELD_TEXT && !*((const char *)c + f->offset)) continue; // not set
+            if (!begun) sdm_text_add(out, "%s:\n", sections[s].name);
+            begun = true;
             sdm_text_add(out, "%s%s: ", nested ? "  " : "", f->key);
             sdm_field_dump(c, f, out);
             sdm_text_add(out, "\n");

@@ -32,44 +32,52 @@ expect 2 'data.memory_gb' sdmgen train "$tiny" --force --out run data.memory_gb=
 expect 2 'no voxel of the grid is inside any' sdmgen train "$tiny" --force --out run 'grid.centre=[900,0,0]' --quiet
 [ "$before" = "$(cat run/* | cksum)" ] || bad 'a refused --force has changed the run'
 
+# neither the folder's name nor that of the file is part of the result
+cp "$tiny" other.yaml
+expect 0 - sdmgen train other.yaml --out other --quiet
+cmp -s run/model.sdm other/model.sdm || bad 'the bits of a model depend on the name of its folder'
+cmp -s run/config.yaml other/config.yaml || bad 'config.yaml depends on the name of its folder'
+expect 0 - sdmgen config run/config.yaml
+
 # ./run asks before it replaces a model of another configuration
 mkdir -p clone/.ci clone/configs clone/build/release/cli clone/runs
 cp "$source_folder/run" clone
-cp "$tiny" clone/configs/cochlea.yaml
+sed "s/width: 16/width: 24/" "$tiny" >clone/configs/cochlea.yaml
 ln -s "$program" clone/build/release/cli/sdmgen
 echo 'say() { :; }; install_packages() { :; }; build() { :; }' >clone/.ci/setup.sh
 cp -r run clone/runs/cochlea
 expect 1 '^runs/cochlea holds a training with another configuration' bash clone/run
 cmp -s run/model.sdm clone/runs/cochlea/model.sdm || bad './run has replaced a model'
 
-# an interrupt leaves a checkpoint, --resume goes on
-"$program" train "$tiny" train.steps=1000000000 --out stopped >out 2>err &
+# an interrupt leaves a checkpoint, --resume goes on; the name of the folder need not be UTF-8
+stopped=$'st\xf6pped'
+"$program" train "$tiny" train.steps=1000000000 --out "$stopped" >out 2>err &
 pid=$!
 for _ in $(seq 300); do grep -q 'bases and' err && break || sleep 0.2; done
-for _ in $(seq 300); do [ -s stopped/metrics.jsonl ] && break || sleep 0.2; done
+for _ in $(seq 300); do [ -s "$stopped/metrics.jsonl" ] && break || sleep 0.2; done
 kill -TERM $pid
 wait $pid
 code=$?
 [ $code -eq 130 ] || bad "interrupted: exit code $code: $(cat err)"
-grep -q '^sdmgen: error: stopped on request at step [0-9]*; a checkpoint is in stopped: go on with --resume' err || bad "no such notice: $(cat err)"
-present stopped/checkpoint.sdmc
-absent stopped/model.sdm
-expect 2 'stopped holds the checkpoint of a training' sdmgen train "$tiny" --out stopped
-before=$(cat stopped/* | cksum)
-expect 2 "^sdmgen: error: stopped/checkpoint.sdmc has 'width: 16', this configuration 'width: 24': " \
-    sdmgen train "$tiny" train.steps=1000000000 --out stopped --resume network.width=24
-expect 2 'budgets of different kinds' sdmgen train "$tiny" --out stopped --resume train.minutes=1
+grep -q '^sdmgen: error: stopped on request at step [0-9]*; a checkpoint is in st.*pped: go on with --resume' err || bad "no such notice: $(cat err)"
+present "$stopped/checkpoint.sdmc"
+absent "$stopped/model.sdm"
+expect 2 'st.*pped holds the checkpoint of a training' sdmgen train "$tiny" --out "$stopped"
+before=$(cat "$stopped"/* | cksum)
+expect 2 "^sdmgen: error: st.*pped/checkpoint.sdmc has 'width: 16', this configuration 'width: 24': " \
+    sdmgen train "$tiny" train.steps=1000000000 --out "$stopped" --resume network.width=24
+expect 2 'budgets of different kinds' sdmgen train "$tiny" --out "$stopped" --resume train.minutes=1
 # ... with a larger or smaller budget, but not one of less steps than were trained
-expect 2 'is at step [0-9]+, this configuration ends at 60: ' sdmgen train "$tiny" --out stopped --resume
-[ "$before" = "$(cat stopped/* | cksum)" ] || bad 'a refused --resume has changed the run'
+expect 2 'is at step [0-9]+, this configuration ends at 60: ' sdmgen train "$tiny" --out "$stopped" --resume
+[ "$before" = "$(cat "$stopped"/* | cksum)" ] || bad 'a refused --resume has changed the run'
 steps=$(($(sed 's/.* is at step \([0-9]*\).*/\1/' err) + 20))
-cp stopped/metrics.jsonl before.jsonl
-expect 0 - sdmgen train "$tiny" --out stopped --resume --quiet --json train.steps=$steps
+cp "$stopped/metrics.jsonl" before.jsonl
+expect 0 - sdmgen train "$tiny" --out "$stopped" --resume --quiet --json train.steps=$steps
 near "$(json steps)" $steps 0
-cmp -s -n "$(wc -c <before.jsonl)" before.jsonl stopped/metrics.jsonl || bad 'the run was not gone on with'
-present stopped/model.sdm
-absent stopped/checkpoint.sdmc
-expect 0 - sdmgen info stopped/model.sdm
+cmp -s -n "$(wc -c <before.jsonl)" before.jsonl "$stopped/metrics.jsonl" || bad 'the run was not gone on with'
+present "$stopped/model.sdm"
+absent "$stopped/checkpoint.sdmc"
+expect 0 - sdmgen info "$stopped/model.sdm"
 
 # a grid that misses the shape gives no network
 expect 2 'no voxel of the grid is inside any' sdmgen train "$tiny" 'grid.origin=[900,900,900]' --out missed --quiet

@@ -135,7 +135,8 @@ SDM_API sdm_status sdm_config_read(const char *path, const char *const *override
 SDM_API sdm_status sdm_config_parse(const char *name, const char *text, size_t size, const char *const *overrides,
                                     size_t n_overrides, sdm_config *out, sdm_error *err);
 
-/* Appends the resolved config (every key with its value) as YAML that reads back to the same values. */
+/* Appends the resolved config (every key with its value) as YAML that reads back to the same values. A text that is empty is left out:
+   output.folder then reads back as its default. */
 SDM_API void sdm_config_dump(const sdm_config *c, sdm_text *out);
 
 /* Appends a table of every key: name, type, range, default, meaning (for --help and the documentation), as Markdown when

@@ -16,7 +16,7 @@ static sdm_status print_text(sdm_text *text, sdm_error *err)
 }
 
 /* What the configuration alone cannot know: the shape, its options and its ranges. */
-static sdm_status check_shape(const cli_args *args, const sdm_config *c, sdm_error *err)
+static sdm_status check_shape(const cli_args *args, sdm_config *c, sdm_error *err)
 {
     double min[SDM_MAX_PARAMS], max[SDM_MAX_PARAMS];
     sdm_registry *registry = NULL;

@@ -1,7 +1,10 @@
 /* Reads a configuration and creates its shape. */
+#define _XOPEN_SOURCE 700 // realpath()
 #include "config_shape.h"
 
+#include <errno.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "sdm/memory.h"
@@ -34,14 +37,14 @@ sdm_status cli_read_config(const cli_args *args, sdm_config **out, sdm_error *er
     return s;
 }
 
-/* The folder of the configuration: what its relative paths start from. */
-static void folder_of(const char *file, char folder[SDM_PATH_TEXT_MAX])
+/* The folder of the configuration, absolute: what its relative paths start from. */
+static sdm_status folder_of(const char *file, char **out, sdm_error *err)
 {
+    char folder[SDM_PATH_TEXT_MAX] = ".";
     const char *slash = strrchr(file, '/');
-    if (!slash)
-        snprintf(folder, SDM_PATH_TEXT_MAX, ".");
-    else
-        snprintf(folder, SDM_PATH_TEXT_MAX, "%.*s", slash == file ? 1 : (int)(slash - file), file);
+    if (slash) snprintf(folder, sizeof folder, "%.*s", slash == file ? 1 : (int)(slash - file), file);
+    *out = realpath(folder, NULL);
+    return *out ? SDM_OK : sdm_fail(err, SDM_E_IO, "%s: %s", folder, strerror(errno));
 }
 
 /* The place of the option that a message is about: the one it names in quotes, else the shape's name. */
@@ -62,7 +65,25 @@ static sdm_status fail_at(const sdm_config *c, sdm_mark mark, sdm_status s, sdm_
     return sdm_fail_in(err, s, "%s", sdm_config_where(c, mark, where));
 }
 
-sdm_status cli_config_shape(const sdm_config *c, const sdm_registry *r, sdm_instance **out, sdm_error *err)
+/* Keeps the paths that the shape was made with: the configuration then means the same files wherever it is written to. */
+static sdm_status keep_paths(sdm_config *c, const sdm_instance *made, sdm_error *err)
+{
+    const sdm_shape *shape = sdm_instance_shape(made);
+    const sdm_option_value *values = sdm_instance_options(made);
+    for (size_t i = 0; i < c->shape.n_options; i++) {
+        sdm_config_option *given = &c->shape.options[i];
+        for (uint32_t k = 0; k < shape->n_options; k++) {
+            if (shape->options[k].type != SDM_OPTION_FILE || strcmp(shape->options[k].name, given->name)) continue;
+            if (strlen(values[k].text) >= sizeof given->value)
+                return sdm_fail(err, SDM_E_CONFIG, "option '%s': the path %.200s... is longer than %zu bytes",
+                                given->name, values[k].text, sizeof given->value - 1);
+            strcpy(given->value, values[k].text);
+        }
+    }
+    return SDM_OK;
+}
+
+sdm_status cli_config_shape(sdm_config *c, const sdm_registry *r, sdm_instance **out, sdm_error *err)
 {
     const char *near = NULL;
     const sdm_shape *shape = sdm_registry_find(r, c->shape.name, &near);
@@ -74,9 +95,11 @@ sdm_status cli_config_shape(const sdm_config *c, const sdm_registry *r, sdm_inst
     sdm_named_text options[SDM_MAX_OPTIONS];
     for (size_t i = 0; i < c->shape.n_options; i++)
         options[i] = (sdm_named_text){c->shape.options[i].name, c->shape.options[i].value};
-    char folder[SDM_PATH_TEXT_MAX];
-    folder_of(c->file, folder);
-    const sdm_status s = sdm_instance_create(shape, options, c->shape.n_options, folder, out, err);
+    char *folder = NULL;
+    sdm_status s = folder_of(c->file, &folder, err);
+    if (!s) s = sdm_instance_create(shape, options, c->shape.n_options, folder, out, err);
+    free(folder);
+    if (!s) s = keep_paths(c, *out, err);
     if (s == SDM_E_CONFIG) return fail_at(c, mark_of_message(c, err ? err->text : ""), s, err);
     return s;
 }

@@ -10,7 +10,7 @@
    freed with sdm_free(). SDM_E_CONFIG with one line for each mistake. */
 sdm_status cli_read_config(const cli_args *args, sdm_config **out, sdm_error *err);
 
-/* The configured shape with its options; mistakes are given their place in the file. */
-sdm_status cli_config_shape(const sdm_config *c, const sdm_registry *r, sdm_instance **out, sdm_error *err);
+/* The configured shape with its options; mistakes are given their place in the file. Paths of data files in c become absolute. */
+sdm_status cli_config_shape(sdm_config *c, const sdm_registry *r, sdm_instance **out, sdm_error *err);
 
 #endif

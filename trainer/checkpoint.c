@@ -123,9 +123,15 @@ static sdm_status open_checkpoint(const trainer *t, opened *o, bool *found, sdm_
     return SDM_OK;
 }
 
-// what may differ between a run and its continuation: how long, where to, how many threads
-static void neutral(sdm_config *c)
+// what may differ between a run and its continuation: how long, where to and where from, how many threads
+static void neutral(const trainer *t, sdm_config *c)
 {
+    const sdm_shape *shape = sdm_instance_shape(t->shape);
+    for (size_t i = 0; i < c->shape.n_options; i++)
+        for (uint32_t k = 0; k < shape->n_options;
+             k++) // the fingerprint of the maps tells whether data files have changed
+            if (shape->options[k].type == SDM_OPTION_FILE && !strcmp(shape->options[k].name, c->shape.options[i].name))
+                c->shape.options[i].value[0] = '\0';
     c->train.minutes = 1;
     c->train.steps = c->train.samples = 0;
     c->train.evaluate_seconds = c->train.checkpoint_seconds = 1;
@@ -182,8 +188,8 @@ static sdm_status check_budget(const trainer *t, const sdm_config *old, const st
 static sdm_status compare(const trainer *t, sdm_config *old, sdm_config *now, sdm_error *err)
 {
     sdm_text a = {0}, b = {0};
-    neutral(old);
-    neutral(now);
+    neutral(t, old);
+    neutral(t, now);
     sdm_config_dump(old, &a);
     sdm_config_dump(now, &b);
     sdm_status s = SDM_OK;

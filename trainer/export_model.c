@@ -78,8 +78,9 @@ static sdm_status measure(const trainer *t, const sdm_model *m, size_t n, sdm_ac
 
 // every option of the shape as text, so that the model needs no config
 typedef struct option_texts {
-    const char *names[SDM_MAX_OPTIONS], *values[SDM_MAX_OPTIONS];
-    char numbers[SDM_MAX_OPTIONS][32];
+    const char *names[2 * SDM_MAX_OPTIONS], *values[2 * SDM_MAX_OPTIONS];
+    char texts[SDM_MAX_OPTIONS][32];              // of a number, or of the checksum of a file
+    char sums[SDM_MAX_OPTIONS][SDM_NAME_MAX + 8]; // names of checksums
     size_t n;
 } option_texts;
 
@@ -87,12 +88,17 @@ static void collect_options(const trainer *t, option_texts *o)
 {
     const sdm_shape *shape = sdm_instance_shape(t->shape);
     const sdm_option_value *v = sdm_instance_options(t->shape);
-    for (uint32_t i = 0; i < shape->n_options && o->n < SDM_MAX_OPTIONS; i++) {
+    for (uint32_t i = 0; i < shape->n_options && i < SDM_MAX_OPTIONS; i++) {
         const sdm_option *option = &shape->options[i];
         const bool text = option->type == SDM_OPTION_CHOICE || option->type == SDM_OPTION_FILE;
         o->names[o->n] = option->name;
-        o->values[o->n] = text ? (v[i].text ? v[i].text : "") : sdm_format_real(v[i].number, o->numbers[o->n]);
+        o->values[o->n] = text ? (v[i].text ? v[i].text : "") : sdm_format_real(v[i].number, o->texts[i]);
         o->n++;
+        if (!t->file_sums[i]) continue;
+        snprintf(o->sums[i], sizeof o->sums[i], "%s.crc64", option->name);
+        snprintf(o->texts[i], sizeof o->texts[i], "%016llx", (unsigned long long)t->file_sums[i]);
+        o->names[o->n] = o->sums[i];
+        o->values[o->n++] = o->texts[i];
     }
 }
 

@@ -7,6 +7,7 @@
 
 #include "export_model.h"
 #include "kind.h"
+#include "sdm/checksum.h"
 #include "sdm/file.h"
 #include "sdm/memory.h"
 #include "sdm/text.h"
@@ -226,6 +227,17 @@ static sdm_status check_texts(const trainer *t, sdm_error *err)
     return SDM_OK;
 }
 
+// what the data files hold now: the exact engine is not to be used with others later
+static void sum_files(trainer *t)
+{
+    const sdm_shape *shape = sdm_instance_shape(t->shape);
+    const sdm_option_value *values = sdm_instance_options(t->shape);
+    for (uint32_t i = 0; i < shape->n_options && i < SDM_MAX_OPTIONS; i++)
+        if (shape->options[i].type == SDM_OPTION_FILE && values[i].text[0] &&
+            sdm_file_checksum(values[i].text, &t->file_sums[i], NULL))
+            t->file_sums[i] = 0; // a plug-in may take a folder, say
+}
+
 // shape, grid, sizes of the data
 static sdm_status set_up(trainer *t, sdm_error *err)
 {
@@ -238,6 +250,7 @@ static sdm_status set_up(trainer *t, sdm_error *err)
     sdm_status s = check_texts(t, err);
     if (!s) s = sdm_train_ranges(c, t->shape, d->min, d->max, err);
     if (s) return s;
+    sum_files(t);
     d->shape = t->shape;
     d->grid = &c->grid;
     d->seed = c->seed;

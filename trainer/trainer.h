@@ -25,6 +25,8 @@ typedef struct trainer {
     dataset data;
     producer *producer; /* NULL when no online sample is left to make */
 
+    uint64_t file_sums[SDM_MAX_OPTIONS]; /* CRC-64 of the data files of the shape, by option; 0: it names none */
+
     /* pod network */
     sdm_pod_arch arch;
     uint8_t *exponents; /* [max(F, 1 + I)][P] */

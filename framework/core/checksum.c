@@ -2,6 +2,8 @@
 #include "sdm/checksum.h"
 
 #include "once.h"
+#include "sdm/file.h"
+#include "sdm/memory.h"
 
 static uint64_t table[8][256];
 static sdm_once once = SDM_ONCE_INIT;
@@ -32,4 +34,14 @@ uint64_t sdm_crc64(uint64_t crc, const void *data, size_t size)
     }
     while (size--) crc = table[0][(crc ^ *p++) & 255] ^ (crc >> 8);
     return ~crc;
+}
+
+sdm_status sdm_file_checksum(const char *path, uint64_t *crc, sdm_error *err)
+{
+    uint8_t *data;
+    size_t size;
+    const sdm_status s = sdm_file_read(path, UINT64_MAX, &data, &size, err);
+    if (!s) *crc = sdm_crc64(0, data, size);
+    sdm_free(data);
+    return s;
 }

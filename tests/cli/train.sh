@@ -3,6 +3,19 @@
 . "$(dirname "$0")/common.sh"
 tiny=$source_folder/tests/cli/tiny.yaml
 
+# interrupted FOLDER CONFIG [key=value ...]: a training that is stopped when it has made steps
+interrupted() {
+    local folder=$1 pid code
+    shift
+    "$program" train "$@" train.steps=1000000000 --out "$folder" >out 2>err &
+    pid=$!
+    for _ in $(seq 600); do [ -s "$folder/metrics.jsonl" ] && break || sleep 0.1; done
+    kill -TERM $pid
+    wait $pid
+    code=$?
+    [ $code -eq 130 ] || bad "interrupted: exit code $code: $(cat err)"
+}
+
 sdmgen train "$tiny" --out run --json --quiet >out 2>err
 [ $? -eq 0 ] || bad "training failed: $(cat err)"
 [ ! -s err ] || bad "--quiet, but: $(cat err)"
@@ -51,14 +64,7 @@ cmp -s run/model.sdm clone/runs/cochlea/model.sdm || bad './run has replaced a m
 
 # an interrupt leaves a checkpoint, --resume goes on; the name of the folder need not be UTF-8
 stopped=$'st\xf6pped'
-"$program" train "$tiny" train.steps=1000000000 --out "$stopped" >out 2>err &
-pid=$!
-for _ in $(seq 300); do grep -q 'bases and' err && break || sleep 0.2; done
-for _ in $(seq 300); do [ -s "$stopped/metrics.jsonl" ] && break || sleep 0.2; done
-kill -TERM $pid
-wait $pid
-code=$?
-[ $code -eq 130 ] || bad "interrupted: exit code $code: $(cat err)"
+interrupted "$stopped" "$tiny"
 grep -q '^sdmgen: error: stopped on request at step [0-9]*; a checkpoint is in st.*pped: go on with --resume' err || bad "no such notice: $(cat err)"
 present "$stopped/checkpoint.sdmc"
 absent "$stopped/model.sdm"
@@ -78,6 +84,38 @@ cmp -s -n "$(wc -c <before.jsonl)" before.jsonl "$stopped/metrics.jsonl" || bad 
 present "$stopped/model.sdm"
 absent "$stopped/checkpoint.sdmc"
 expect 0 - sdmgen info "$stopped/model.sdm"
+
+# data files: found from every folder, never others in their place, also after the run has moved with them
+mkdir -p project/conf elsewhere
+cp -r "$source_folder"/configs/statistical* project/conf
+small=(grid.size=[16,12,12] grid.spacing=0.8 data.static=2 data.start=96 data.online=32 data.holdout=8
+    network.depth=1 network.width=16 network.rank=6 network.modes=16 train.batch=8)
+interrupted project/data project/conf/statistical.yaml "${small[@]}"
+mv project moved
+run=(sdmgen train moved/conf/statistical.yaml "${small[@]}" --out moved/data --resume --quiet)
+expect 2 'is at step' "${run[@]}" train.steps=1
+steps=$(($(sed 's/.* is at step \([0-9]*\).*/\1/' err) + 20))
+deviations=moved/conf/statistical/deviations.npy
+cp $deviations kept.npy
+{ head -c 128 kept.npy && tail -c 32 kept.npy && tail -c 64 kept.npy | head -c 32; } >$deviations # 5 to 8, 1 to 4
+expect 2 'the maps come out otherwise' "${run[@]}" train.steps=$steps
+cp kept.npy $deviations
+expect 0 - "${run[@]}" train.steps=$steps
+cd elsewhere || exit 1
+expect 0 - sdmgen config ../moved/data/config.yaml
+expect 0 - sdmgen verify ../moved/data/model.sdm --samples 2
+has 'on 2 random shapes'
+expect 0 - sdmgen info ../moved/data/model.sdm
+has '/moved/conf/statistical/mean\.ply$'
+printf 1 >>../$deviations
+expect 3 "/moved/conf/statistical/deviations\.npy: not the data file \('deviations'\) that the model was trained with: " \
+    sdmgen verify ../moved/data/model.sdm
+expect 3 'not the data file' sdmgen generate ../moved/data/model.sdm --max-error 1 -o x.npy
+rm ../$deviations
+expect 1 "the data file of its option 'deviations': .*/moved/conf/statistical/deviations\.npy: cannot open" \
+    sdmgen eval ../moved/data/model.sdm
+expect 0 - sdmgen generate ../moved/data/model.sdm -p m1=1 -o x.npy
+cd ..
 
 # a grid that misses the shape gives no network
 expect 2 'no voxel of the grid is inside any' sdmgen train "$tiny" 'grid.origin=[900,900,900]' --out missed --quiet

@@ -199,6 +199,10 @@ static void files(void **state)
     assert_int_equal(size, 2);
     assert_string_equal((char *)data, "42");
     sdm_free(data);
+    uint64_t crc;
+    assert_int_equal(sdm_file_checksum(path, &crc, &e), SDM_OK);
+    assert_true(crc == sdm_crc64(0, "42", 2));
+    assert_int_equal(sdm_file_checksum(folder, &crc, &e), SDM_E_IO);
 
     // two writers of one name: each file is whole, the last to commit stays
     for (int last = 0; last < 2; last++) {

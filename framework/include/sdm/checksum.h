@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "sdm/export.h"
+#include "sdm/status.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -13,6 +13,9 @@ extern "C" {
 
 /* Checksum of `size` bytes at `data`, going on from `crc` (0 at the start). [any thread] */
 SDM_API uint64_t sdm_crc64(uint64_t crc, const void *data, size_t size);
+
+/* Checksum of the content of a regular file. SDM_E_IO, SDM_E_NOMEM. [any thread] */
+SDM_API sdm_status sdm_file_checksum(const char *path, uint64_t *crc, sdm_error *err);
 
 #ifdef __cplusplus
 }

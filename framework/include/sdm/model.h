@@ -33,7 +33,9 @@ typedef struct sdm_model_info {
     char version[16]; /* of the program that trained it */
     size_t n_params;
     const sdm_model_param *params;
-    size_t n_options; /* options of the shape, as text, for the exact engine */
+    size_t
+        n_options; /* options of the shape, as text, for the exact engine; behind an option NAME that is a file NAME.crc64, the checksum
+                         of its content when the network was trained */
     const char *const *option_names, *const *option_values;
     sdm_grid grid;
     sdm_accuracy accuracy;

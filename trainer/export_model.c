@@ -144,8 +144,12 @@ sdm_status export_dump(const trainer *t, sdm_text *out, sdm_error *err)
     c->threads = c->data.workers = 0;
     c->output.folder[0] = '\0';
     sdm_config_dump(c, out);
+    if (out->failed)
+        s = sdm_fail(err, SDM_E_NOMEM, "no memory for the resolved config");
+    else // one that cannot be read, by a path that is no UTF-8, would make a checkpoint worthless
+        s = sdm_config_parse("config.yaml", out->data, out->size, NULL, 0, c, err);
     sdm_free(c);
-    return out->failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the resolved config") : SDM_OK;
+    return s;
 }
 
 sdm_status export_config(const trainer *t, sdm_outfile **out, sdm_error *err)

@@ -95,6 +95,10 @@ mv project moved
 run=(sdmgen train moved/conf/statistical.yaml "${small[@]}" --out moved/data --resume --quiet)
 expect 2 'is at step' "${run[@]}" train.steps=1
 steps=$(($(sed 's/.* is at step \([0-9]*\).*/\1/' err) + 20))
+cp -r moved $'m\xf6ved'
+expect 2 '^config\.yaml:.*UTF-8' sdmgen train $'m\xf6ved/conf/statistical.yaml' --out never
+absent never/config.yaml
+rm -r never $'m\xf6ved'
 deviations=moved/conf/statistical/deviations.npy
 cp $deviations kept.npy
 { head -c 128 kept.npy && tail -c 32 kept.npy && tail -c 64 kept.npy | head -c 32; } >$deviations # 5 to 8, 1 to 4

@@ -25,32 +25,53 @@ static sdm_status check_agreement(const sdm_model_info *info, const sdm_instance
     return SDM_OK;
 }
 
-// a data file that has changed since the training would make another shape, in silence
-static sdm_status check_file(const sdm_named_text *option, const char *wanted, sdm_error *err)
+// a file of another content would make another shape, in silence
+static sdm_status check_file(const char *path, const char *option, const char *wanted, sdm_error *err)
 {
     uint64_t crc;
     char found[20];
-    const sdm_status s = sdm_file_checksum(option->value, &crc, err);
-    if (s) return sdm_fail_in(err, s, "the exact shape needs the data file of its option '%s'", option->name);
+    const sdm_status s = sdm_file_checksum(path, &crc, err);
+    if (s) return s;
     snprintf(found, sizeof found, "%016llx", (unsigned long long)crc);
     if (!strcmp(found, wanted)) return SDM_OK;
-    return sdm_fail(err, SDM_E_FORMAT,
-                    "%s: not the data file ('%s') that the model was trained with: its CRC-64 is %s, need %s",
-                    option->value, option->name, found, wanted);
+    return sdm_fail(err, SDM_E_FORMAT, "%s: not the file '%s' of the training: its CRC-64 is %s, need %s", path, option,
+                    found, wanted);
+}
+
+typedef struct model_options {
+    sdm_named_text *given;
+    size_t n;
+    char (*beside)[4096]; // paths of data files that lie beside the model
+} model_options;
+
+// where the file of the last option lies now: at its place of the training, or beside the model
+static sdm_status find_file(const sdm_model_info *info, model_options *o, const char *wanted, sdm_error *err)
+{
+    sdm_named_text *file = &o->given[o->n - 1];
+    char *beside = o->beside[o->n - 1];
+    if (!check_file(file->value, file->name, wanted, NULL)) return SDM_OK;
+    const char *slash = strrchr(file->value, '/');
+    if (info->folder) snprintf(beside, sizeof *o->beside, "%s%s", info->folder, slash ? slash + 1 : file->value);
+    if (info->folder && !check_file(beside, file->name, wanted, NULL)) {
+        file->value = beside;
+        return SDM_OK;
+    }
+    const sdm_status s = check_file(file->value, file->name, wanted, err);
+    return sdm_fail_in(err, s, "the exact shape needs the data file '%s', here or beside the model", file->name);
 }
 
 // the options of the shape among those of the model: behind one that is a file there may be its checksum
-static sdm_status read_options(const sdm_model_info *info, sdm_named_text *options, size_t *n, sdm_error *err)
+static sdm_status read_options(const sdm_model_info *info, model_options *o, sdm_error *err)
 {
-    sdm_status s = SDM_OK;
-    *n = 0;
+    sdm_status s = SDM_ALLOC(&o->given, info->n_options, "options", err);
+    if (!s) s = SDM_ALLOC(&o->beside, info->n_options, "paths of data files", err);
     for (size_t i = 0; i < info->n_options && !s; i++) {
         const sdm_named_text one = {.name = info->option_names[i], .value = info->option_values[i]};
         const char *dot = strchr(one.name, '.');
-        if (dot && !strcmp(dot, ".crc64") && *n > 0)
-            s = check_file(&options[*n - 1], one.value, err);
+        if (dot && !strcmp(dot, ".crc64") && o->n > 0)
+            s = find_file(info, o, one.value, err);
         else
-            options[(*n)++] = one;
+            o->given[o->n++] = one;
     }
     return s;
 }
@@ -65,15 +86,13 @@ sdm_status sdm_runtime_instance(const sdm_model *m, const sdm_registry *r, sdm_i
     if (!shape)
         return sdm_fail(err, SDM_E_PLUGIN,
                         "the model was trained on shape '%s', which is not known here; load its plug-in", info->shape);
-    sdm_named_text *options = NULL;
-    size_t n_options;
-    sdm_status s = SDM_ALLOC(&options, info->n_options, "options", err);
-    if (s) return s;
+    model_options options = {0};
     sdm_instance *made = NULL;
-    s = read_options(info, options, &n_options, err);
-    if (!s) s = sdm_instance_create(shape, options, n_options, NULL, &made, err);
+    sdm_status s = read_options(info, &options, err);
+    if (!s) s = sdm_instance_create(shape, options.given, options.n, NULL, &made, err);
     if (!s) s = check_agreement(info, made, err);
-    sdm_free(options);
+    sdm_free(options.beside);
+    sdm_free(options.given);
     if (s)
         sdm_instance_free(made);
     else

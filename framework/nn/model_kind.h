@@ -37,7 +37,7 @@ struct sdm_model {
     sdm_model_info info;
     sdm_model_param *params;
     char **option_names, **option_values;
-    char *config;
+    char *config, *folder;
     uint8_t *file; /* the whole file; weights point into it */
     const sdm_model_kind *kind;
     void *network; /* of the kind */

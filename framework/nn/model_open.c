@@ -173,7 +173,14 @@ sdm_status sdm_model_open(const char *path, sdm_model **out, sdm_error *err)
     sdm_status s = sdm_file_read(path, MODEL_BYTES_MAX, &bytes, &size, err);
     if (s) return s;
     s = open_bytes(bytes, size, out, err);
-    return s ? sdm_fail_in(err, s, "%s", path) : SDM_OK;
+    if (s) return sdm_fail_in(err, s, "%s", path);
+    sdm_model *m = *out;
+    const char *slash = strrchr(path, '/');
+    m->info.folder = m->folder = copy_text(slash ? path : "./", slash ? (size_t)(slash - path) + 1 : 2, err, &s);
+    if (!s) return SDM_OK;
+    sdm_model_free(m);
+    *out = NULL;
+    return s;
 }
 
 void sdm_model_free(sdm_model *m)
@@ -187,6 +194,7 @@ void sdm_model_free(sdm_model *m)
     sdm_free(m->option_values);
     sdm_free(m->params);
     sdm_free(m->config);
+    sdm_free(m->folder);
     if (m->kind) m->kind->dispose(m->network);
     sdm_free(m->file);
     sdm_free(m);

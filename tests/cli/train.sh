@@ -112,13 +112,20 @@ has 'on 2 random shapes'
 expect 0 - sdmgen info ../moved/data/model.sdm
 has '/moved/conf/statistical/mean\.ply$'
 printf 1 >>../$deviations
-expect 3 "/moved/conf/statistical/deviations\.npy: not the data file \('deviations'\) that the model was trained with: " \
+expect 3 "/moved/conf/statistical/deviations\.npy: not the file 'deviations' of the training: " \
     sdmgen verify ../moved/data/model.sdm
-expect 3 'not the data file' sdmgen generate ../moved/data/model.sdm --max-error 1 -o x.npy
+expect 3 'not the file' sdmgen generate ../moved/data/model.sdm --max-error 1 -o x.npy
 rm ../$deviations
-expect 1 "the data file of its option 'deviations': .*/moved/conf/statistical/deviations\.npy: cannot open" \
+expect 1 "the data file 'deviations', here or beside the model: /.*/moved/conf/statistical/deviations\.npy: cannot open" \
     sdmgen eval ../moved/data/model.sdm
 expect 0 - sdmgen generate ../moved/data/model.sdm -p m1=1 -o x.npy
+# beside the model, but not beside the user
+cp ../kept.npy deviations.npy
+expect 1 'cannot open' sdmgen verify ../moved/data/model.sdm
+cp ../kept.npy ../moved/data/deviations.npy
+expect 0 - sdmgen verify ../moved/data/model.sdm --samples 2
+cp ../moved/data/model.sdm .
+expect 0 - sdmgen verify model.sdm --samples 2
 cd ..
 
 # a grid that misses the shape gives no network

@@ -46,6 +46,7 @@ typedef struct sdm_model_info {
     size_t file_bytes, weight_bytes;
     double macs;        /* multiply-adds of one map */
     const char *config; /* resolved config, YAML */
+    const char *folder; /* of the file; NULL: the model was in memory */
 } sdm_model_info;
 
 /* Immutable once opened: any number of threads may use one model. */

@@ -79,8 +79,8 @@ SDM_API sdm_status sdm_generate_vjp(const sdm_model *m, const double *params, co
                                     sdm_error *err);
 
 /* The shape the model was trained on, with its options, from a registry that knows it; checks that the parameters agree. Only what needs
-   the exact shape needs this. SDM_E_PLUGIN when the registry does not have it; SDM_E_IO: a data file is not where it was when the
-   network was trained; SDM_E_FORMAT: it has another content. */
+   the exact shape needs this. SDM_E_PLUGIN when the registry does not have it; SDM_E_IO: a data file is neither where it was when the
+   network was trained nor beside the model; SDM_E_FORMAT: it has another content. */
 SDM_API sdm_status sdm_runtime_instance(const sdm_model *m, const sdm_registry *r, sdm_instance **out, sdm_error *err);
 
 /* Exact map of a shape at p: mesh, engine, map, in one call. report may be NULL. [any thread] */

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "kind.h"
+#include "sdm/checksum.h"
 #include "sdm/container.h"
 #include "sdm/file.h"
 #include "sdm/image.h"
@@ -74,6 +75,44 @@ static sdm_status measure(const trainer *t, const sdm_model *m, size_t n, sdm_ac
     sdm_free(blocked);
     sdm_free(map);
     return s;
+}
+
+// texts that the model file has room for
+static sdm_status check_texts(const trainer *t, sdm_error *err)
+{
+    enum { VALUE_MAX = 1000 };
+    size_t n;
+    const sdm_param *params = sdm_instance_params(t->shape, &n);
+    for (size_t i = 0; i < n; i++)
+        if (strlen(params[i].name) >= SDM_MODEL_NAME_MAX ||
+            strlen(params[i].unit) >= sizeof((sdm_model_param *)0)->unit || strpbrk(params[i].unit, "\r\n"))
+            return sdm_fail(err, SDM_E_PLUGIN,
+                            "parameter '%.100s' in '%.100s': name or unit is too long for a model file", params[i].name,
+                            params[i].unit);
+    const sdm_shape *shape = sdm_instance_shape(t->shape);
+    const sdm_option_value *values = sdm_instance_options(t->shape);
+    for (uint32_t i = 0; i < shape->n_options; i++)
+        if (values[i].text && (strlen(values[i].text) > VALUE_MAX || strpbrk(values[i].text, "\r\n")))
+            return sdm_fail(err, SDM_E_CONFIG, "%s: shape.options.%s is longer than %d characters or has a line break",
+                            t->config->file, shape->options[i].name, VALUE_MAX);
+    return SDM_OK;
+}
+
+// what the data files hold now: the exact engine is not to be used with others later
+static void sum_files(trainer *t)
+{
+    const sdm_shape *shape = sdm_instance_shape(t->shape);
+    const sdm_option_value *values = sdm_instance_options(t->shape);
+    for (uint32_t i = 0; i < shape->n_options && i < SDM_MAX_OPTIONS; i++)
+        if (shape->options[i].type == SDM_OPTION_FILE && values[i].text[0] &&
+            sdm_file_checksum(values[i].text, &t->file_sums[i], NULL))
+            t->file_sums[i] = 0; // a plug-in may take a folder, say
+}
+
+sdm_status export_prepare(trainer *t, sdm_error *err)
+{
+    sum_files(t);
+    return check_texts(t, err);
 }
 
 // every option of the shape as text, so that the model needs no config

@@ -5,6 +5,9 @@
 #include "sdm/file.h"
 #include "trainer.h"
 
+/* Before the training: refuses texts that a model file has no room for, and takes the checksums of the data files. */
+sdm_status export_prepare(trainer *t, sdm_error *err);
+
 /* Appends the resolved configuration without what has no part in the result: threads and the name of the folder. The model is the same
    bits wherever and by however many threads it is trained. */
 sdm_status export_dump(const trainer *t, sdm_text *out, sdm_error *err);

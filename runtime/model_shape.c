@@ -57,7 +57,7 @@ static sdm_status find_file(const sdm_model_info *info, model_options *o, const 
         return SDM_OK;
     }
     const sdm_status s = check_file(file->value, file->name, wanted, err);
-    return sdm_fail_in(err, s, "the exact shape needs the data file '%s', here or beside the model", file->name);
+    return sdm_fail_in(err, s, "data file '%s' of the exact shape, here or beside the model", file->name);
 }
 
 // the options of the shape among those of the model: behind one that is a file there may be its checksum

@@ -116,7 +116,7 @@ expect 3 "/moved/conf/statistical/deviations\.npy: not the file 'deviations' of 
     sdmgen verify ../moved/data/model.sdm
 expect 3 'not the file' sdmgen generate ../moved/data/model.sdm --max-error 1 -o x.npy
 rm ../$deviations
-expect 1 "the data file 'deviations', here or beside the model: /.*/moved/conf/statistical/deviations\.npy: cannot open" \
+expect 1 "data file 'deviations' of the exact shape, here or beside the model: /.*/moved/conf/statistical/deviations\.npy: cannot open" \
     sdmgen eval ../moved/data/model.sdm
 expect 0 - sdmgen generate ../moved/data/model.sdm -p m1=1 -o x.npy
 # beside the model, but not beside the user

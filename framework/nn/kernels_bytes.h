@@ -20,6 +20,11 @@ static inline veci load_pairs(const int8_t *p)
 #define LOAD_PAIRS(p) load_pairs(p)
 #endif
 
+// where there is an instruction for it; left to the compiler it is used in some loops and not in others
+#ifndef FMA
+#define FMA(a, b, c) ((a) * (b) + (c))
+#endif
+
 // numbers of 16 bits
 static inline veci load_wide(const int8_t *p)
 {
@@ -46,6 +51,28 @@ static inline void store_rows(float *y, size_t line, vec v)
 
 // what a pointer has become is not put together anew for each use
 #define STEP(p) __asm__("" : "+r"(p));
+
+#ifndef ROUND_TO_SHORTS
+typedef uint16_t vec_short __attribute__((vector_size(2 * VW)));
+
+// nearest integers of 16 bits: the last bits of a number near 2^23
+static inline vec_short round_to_shorts(vec v) { return __builtin_convertvector((vecu)(v + 12582912.0f), vec_short); }
+#define ROUND_TO_SHORTS(v) round_to_shorts(v)
+#endif
+
+#ifndef SMALLER_OF
+#define SMALLER_OF(a, b) ((vec)(((veci)(a) & ((a) < (b))) | ((veci)(b) & ~((a) < (b)))))
+#define LARGER_OF(a, b) ((vec)(((veci)(a) & ((a) > (b))) | ((veci)(b) & ~((a) > (b)))))
+#endif
+
+static inline void store_shorts(int16_t *x, vec v)
+{
+    const __typeof__(ROUND_TO_SHORTS(v)) s = ROUND_TO_SHORTS(v);
+    memcpy(x, &s, sizeof s);
+}
+
+// to -most .. most, NaN to one of them
+static inline vec clip(vec v, vec most) { return LARGER_OF(SMALLER_OF(v, most), -most); }
 
 enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inputs of a panel
 
@@ -82,17 +109,54 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inp
         w += pair, x += 2;                                                                                             \
     } while (0)
 
+static const float no_mean[8 * VW] = {0};
+
+// acc[rows][n] to what sdm_panel_out asks for, from output o on
+#define BYTES_NUMBERS(rows, n)                                                                                         \
+    {                                                                                                                  \
+        const size_t line = to->line, n_mean = to->n_mean;                                                             \
+        const float *mean = n_mean ? to->mean + o : no_mean;                                                           \
+        float *y = to->y + o / 4 * line;                                                                               \
+        EACH(i, rows)                                                                                                  \
+        {                                                                                                              \
+            const vec s = splat(scale[i]);                                                                             \
+            if ((size_t)i >= n_mean) mean = no_mean;                                                                   \
+            EACH(j, n)                                                                                                 \
+            {                                                                                                          \
+                const vec v = FMA(s, __builtin_convertvector((veci)acc[i][j], vec), load(mean + j * VW));              \
+                store_rows(y + (size_t)(j * VW / 4) * line, line, v);                                                  \
+            }                                                                                                          \
+            y += ld;                                                                                                   \
+            STEP(y)                                                                                                    \
+        }                                                                                                              \
+    }
+#define BYTES_INTEGERS(rows, n)                                                                                        \
+    {                                                                                                                  \
+        const vec most = splat((float)to->limit);                                                                      \
+        const float *factor = to->factor + o;                                                                          \
+        int16_t *q = to->integers + o;                                                                                 \
+        EACH(i, rows)                                                                                                  \
+        {                                                                                                              \
+            const vec s = splat(scale[i]);                                                                             \
+            EACH(j, n)                                                                                                 \
+            {                                                                                                          \
+                const vec v = s * __builtin_convertvector((veci)acc[i][j], vec);                                       \
+                store_shorts(q + j * VW, clip(v * load(factor + j * VW), most));                                       \
+            }                                                                                                          \
+            q += ld;                                                                                                   \
+            STEP(q)                                                                                                    \
+        }                                                                                                              \
+    }
+
 // `rows` rows of x times `n` registers of outputs at a time, from output o on; where that ends
 #define BYTES_BLOCK(rows, n)                                                                                           \
     static size_t bytes_##rows##x##n(size_t o, size_t outputs, size_t wide, size_t narrow, const int8_t *panels,       \
-                                     const int16_t *inputs, size_t ldx, const float *scale, float *to, size_t ldy,     \
-                                     size_t line)                                                                      \
+                                     const int16_t *inputs, size_t ldx, const float *scale, const sdm_panel_out *to)   \
     {                                                                                                                  \
-        const size_t panel = wide * WIDE + narrow * NARROW;                                                            \
+        const size_t panel = wide * WIDE + narrow * NARROW, ld = to->ld;                                               \
         for (; o + n * VW <= outputs; o += n * VW) {                                                                   \
             const int8_t *w = panels + o / SDM_PANEL * panel + o % SDM_PANEL * (WIDE / SDM_PANEL);                     \
             const int16_t *x = inputs;                                                                                 \
-            float *y = to + o / 4 * line;                                                                              \
             vecu acc[rows][n];                                                                                         \
             if (wide)                                                                                                  \
                 BYTES_PAIR(rows, n, =, WIDE, load_wide);                                                               \
@@ -101,19 +165,15 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inp
             for (size_t p = 1; p < wide; p++) BYTES_PAIR(rows, n, +=, WIDE, load_wide);                                \
             w -= o % SDM_PANEL * ((WIDE - NARROW) / SDM_PANEL);                                                        \
             UNROLL(2) for (size_t p = 0; p < narrow; p++) BYTES_PAIR(rows, n, +=, NARROW, LOAD_PAIRS);                 \
-            EACH(i, rows)                                                                                              \
-            {                                                                                                          \
-                const vec s = splat(scale[i]);                                                                         \
-                EACH(j, n)                                                                                             \
-                store_rows(y + (size_t)(j * VW / 4) * line, line, s * __builtin_convertvector((veci)acc[i][j], vec));  \
-                y += ldy;                                                                                              \
-                STEP(y)                                                                                                \
-            }                                                                                                          \
+            if (to->y)                                                                                                 \
+                BYTES_NUMBERS(rows, n)                                                                                 \
+            else                                                                                                       \
+                BYTES_INTEGERS(rows, n)                                                                                \
         }                                                                                                              \
         return o;                                                                                                      \
     }
 
-#define BYTES_STEP(rows, n) o = bytes_##rows##x##n(o, outputs, wide, narrow, w, x, ldx, scale, y, ldy, line);
+#define BYTES_STEP(rows, n) o = bytes_##rows##x##n(o, outputs, wide, narrow, w, x, ldx, scale, to);
 
 BYTES_BLOCK(1, 8)
 BYTES_BLOCK(1, 4)
@@ -133,7 +193,7 @@ BYTES_BLOCK(6, 2)
 BYTES_BLOCK(6, 1)
 
 static void bytes_rows(size_t rows, size_t outputs, size_t wide, size_t narrow, const int8_t *w, const int16_t *x,
-                       size_t ldx, const float *scale, float *y, size_t ldy, size_t line)
+                       size_t ldx, const float *scale, const sdm_panel_out *to)
 {
     size_t o = 0;
     switch (rows) {
@@ -168,29 +228,44 @@ static void bytes_rows(size_t rows, size_t outputs, size_t wide, size_t narrow, 
     }
 }
 
+// outputs from row i and output o on
+static inline sdm_panel_out out_from(const sdm_panel_out *to, size_t i, size_t o)
+{
+    sdm_panel_out at = *to;
+    if (at.y) at.y += i * at.ld + o / 4 * at.line;
+    if (at.integers) at.integers += i * at.ld + o, at.factor += o;
+    if (at.mean) at.mean += o, at.n_mean = at.n_mean > i ? at.n_mean - i : 0;
+    return at;
+}
+
 // as panel_f32(): a few panels for all rows, then the next
 static void panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w, const int16_t *x,
-                     size_t ldx, const float *scale, float *y, size_t ldy, size_t line)
+                     size_t ldx, const float *scale, const sdm_panel_out *to)
 {
     const size_t wide = (n_wide + 1) / 2, narrow = (k + 1) / 2 - wide, panel = wide * WIDE + narrow * NARROW;
     if (batch <= 6) {
-        bytes_rows(batch, outputs, wide, narrow, w, x, ldx, scale, y, ldy, line);
+        bytes_rows(batch, outputs, wide, narrow, w, x, ldx, scale, to);
         return;
     }
     const size_t some = 2 * VW > SDM_PANEL ? 2 * VW : SDM_PANEL;
     for (size_t o = 0; o < outputs; o += some, w += some / SDM_PANEL * panel)
-        for (size_t i = 0; i < batch; i += 6)
+        for (size_t i = 0; i < batch; i += 6) {
+            const sdm_panel_out at = out_from(to, i, o);
             bytes_rows(batch - i < 6 ? batch - i : 6, outputs - o < some ? outputs - o : some, wide, narrow, w,
-                       x + i * ldx, ldx, scale + i, y + i * ldy + o / 4 * line, ldy, line);
+                       x + i * ldx, ldx, scale + i, &at);
+        }
 }
 
 static void panel_i8_blocks(size_t batch, size_t n, const sdm_panel_block *b, const int8_t *w, const int16_t *x,
-                            size_t ldx, const float *scale, float *y, size_t ldy, size_t line)
+                            size_t ldx, const float *scale, const sdm_panel_out *to)
 {
+    sdm_panel_out at = *to;
     for (const sdm_panel_block *end = b + n; b < end; b++) {
         const size_t wide = (b->n_wide + 1) / 2, narrow = (b->k + 1) / 2 - wide;
+        at.y = to->y + b->y;
+        if (at.mean) at.mean = to->mean + b->mean;
         bytes_rows(batch, (b->outputs + SDM_PANEL - 1) / SDM_PANEL * SDM_PANEL, wide, narrow, w + b->weights, x + b->x,
-                   ldx, scale + b->scale, y + b->y, ldy, line);
+                   ldx, scale + b->scale, &at);
     }
 }
 
@@ -240,14 +315,6 @@ static inline veci larger_magnitude(veci most, vec v)
     return LARGER(bits, most);
 }
 
-typedef uint16_t vec_short __attribute__((vector_size(2 * VW)));
-
-// nearest integers: the last bits of a number near 2^23
-static inline vec_short round_to_short(vec v, float to_integer)
-{
-    return __builtin_convertvector((vecu)(v * to_integer + 12582912.0f), vec_short);
-}
-
 // n >= VW from here on; the last register ends where they do: some are done twice
 static inline float largest_of(size_t n, const float *y, const float *factor)
 {
@@ -263,8 +330,7 @@ static inline float largest_of(size_t n, const float *y, const float *factor)
 
 static inline void round_register(const float *y, const float *factor, float to_integer, size_t i, int16_t *x)
 {
-    const vec_short s = round_to_short(product_at(i, y, factor), to_integer);
-    memcpy(x + i, &s, sizeof s);
+    store_shorts(x + i, product_at(i, y, factor) * to_integer);
 }
 
 // returns the factor that gives them back

@@ -11,6 +11,8 @@
 #define MADD(a, b)                                                                                                     \
     ((veci)vpaddq_s32(vmull_s16(vget_low_s16((int16x8_t)(a)), vget_low_s16((int16x8_t)(b))),                           \
                       vmull_high_s16((int16x8_t)(a), (int16x8_t)(b))))
+#define FMA(a, b, c) vfmaq_f32(c, a, b)
+#define ROUND_TO_SHORTS(v) vqmovn_s32(vcvtnq_s32_f32(v))
 #else
 #define ISA "generic"
 #endif

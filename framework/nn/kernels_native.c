@@ -203,15 +203,15 @@ void sdm_quantise(size_t rows, size_t n, const float *y, size_t ldy, const float
 }
 
 void sdm_panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w, const int16_t *x, size_t ldx,
-                  const float *scale, float *y, size_t ldy, size_t line)
+                  const float *scale, const sdm_panel_out *to)
 {
-    kernels()->panel_i8(batch, sdm_panel_outputs(outputs), n_wide, k, w, x, ldx, scale, y, ldy, line);
+    kernels()->panel_i8(batch, sdm_panel_outputs(outputs), n_wide, k, w, x, ldx, scale, to);
 }
 
 void sdm_panel_i8_blocks(size_t batch, size_t n, const sdm_panel_block *blocks, const int8_t *w, const int16_t *x,
-                         size_t ldx, const float *scale, float *y, size_t ldy, size_t line)
+                         size_t ldx, const float *scale, const sdm_panel_out *to)
 {
-    kernels()->panel_i8_blocks(batch, n, blocks, w, x, ldx, scale, y, ldy, line);
+    kernels()->panel_i8_blocks(batch, n, blocks, w, x, ldx, scale, to);
 }
 
 void sdm_panel_back_i8(size_t outputs, size_t n_wide, size_t k, const int8_t *w, const float *y, float *x)
@@ -219,10 +219,7 @@ void sdm_panel_back_i8(size_t outputs, size_t n_wide, size_t k, const int8_t *w,
     kernels()->back_i8(sdm_panel_outputs(outputs), n_wide, k, w, y, x);
 }
 
-void sdm_put(size_t n, const float *y, const float *mean, float *to, bool stream)
-{
-    kernels()->put(n, y, mean, to, stream);
-}
+void sdm_put(size_t n, const float *y, float *to, bool stream) { kernels()->put(n, y, to, stream); }
 
 void sdm_put_end(void)
 {

@@ -228,57 +228,32 @@ static void exp_all(size_t n, const float *x, float *y)
     memcpy(y + i, rest, (n - i) * sizeof *x);
 }
 
-static inline vec sum_at(size_t i, const float *y, const float *mean)
-{
-    return mean ? load(y + i) + load(mean + i) : load(y + i);
-}
-
-static inline void put_each(size_t i, size_t end, const float *y, const float *mean, float *to)
-{
-    UNROLL(1) for (; i < end; i++) to[i] = mean ? y[i] + mean[i] : y[i];
-}
-
 #ifdef STREAM
-static inline __m128 sum_4(size_t i, const float *y, const float *mean)
-{
-    const __m128 at = _mm_loadu_ps(y + i);
-    return mean ? _mm_add_ps(at, _mm_loadu_ps(mean + i)) : at;
-}
-
 // a quarter of a cache line at a time where it is not filled: an ordinary store would read it first
-static inline void put_past(size_t n, const float *y, const float *mean, float *to)
+static inline void put_past(size_t n, const float *y, float *to)
 {
     size_t i = -(uintptr_t)to / sizeof *to % 4;
     if (n < i) i = n;
-    put_each(0, i, y, mean, to);
-    for (; i + 4 <= n && (uintptr_t)(to + i) % (4 * VW); i += 4) _mm_stream_ps(to + i, sum_4(i, y, mean));
-    UNROLL(4) for (const size_t end = i + (n - i) / VW * VW; i < end; i += VW) STREAM(to + i, sum_at(i, y, mean));
-    for (; i + 4 <= n; i += 4) _mm_stream_ps(to + i, sum_4(i, y, mean));
-    put_each(i, n, y, mean, to);
+    memcpy(to, y, i * sizeof *to);
+    for (; i + 4 <= n && (uintptr_t)(to + i) % (4 * VW); i += 4) _mm_stream_ps(to + i, _mm_loadu_ps(y + i));
+    for (; i + 4 * VW <= n; i += 4 * VW) EACH(j, 4) STREAM(to + i + j * VW, load(y + i + j * VW));
+    for (; i + VW <= n; i += VW) STREAM(to + i, load(y + i));
+    for (; i + 4 <= n; i += 4) _mm_stream_ps(to + i, _mm_loadu_ps(y + i));
+    memcpy(to + i, y + i, (n - i) * sizeof *to);
 }
 #endif
 
-static inline void put_by(size_t n, const float *y, const float *mean, float *to, bool stream)
+static void put(size_t n, const float *y, float *to, bool stream)
 {
 #ifdef STREAM
     if (stream) {
-        put_past(n, y, mean, to);
+        put_past(n, y, to);
         return;
     }
 #else
     (void)stream;
 #endif
-    size_t i = 0;
-    UNROLL(4) for (; i + VW <= n; i += VW) store(to + i, sum_at(i, y, mean));
-    put_each(i, n, y, mean, to);
-}
-
-static void put(size_t n, const float *y, const float *mean, float *to, bool stream)
-{
-    if (mean)
-        put_by(n, y, mean, to, stream);
-    else
-        put_by(n, y, NULL, to, stream);
+    memcpy(to, y, n * sizeof *to);
 }
 
 const kernel_table TABLE = {.name = ISA,

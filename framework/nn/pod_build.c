@@ -63,16 +63,14 @@ static void pack_weights(const sdm_pod_spec *spec, const pod_integers *integers,
     }
 }
 
-// [nz][ny][nx]
-static void place_mean(const sdm_pod_spec *spec, float *to)
+// leaf by leaf, each filled up to whole panels
+static void place_mean(const sdm_pod_spec *spec, const pod_leaf *leaves, float *to)
 {
-    const size_t line = (size_t)spec->info->grid.n[0], plane = line * (size_t)spec->info->grid.n[1];
     for (size_t i = 0; i < spec->arch.levels.first[1]; i++) {
-        const sdm_pod_block *b = &spec->blocks[i];
-        const float *from = spec->weights.mean + b->voxel;
-        for (size_t z = b->at[2]; z < b->at[2] + b->size[2]; z++)
-            for (size_t y = b->at[1]; y < b->at[1] + b->size[1]; y++, from += b->size[0])
-                memcpy(to + z * plane + y * line + b->at[0], from, b->size[0] * sizeof *to);
+        const sdm_pod_block *b = &spec->blocks[leaves[i].block];
+        const size_t n = sdm_pod_block_voxels(b);
+        memcpy(to, spec->weights.mean + b->voxel, n * sizeof *to);
+        to += sdm_panel_outputs(n);
     }
 }
 
@@ -91,6 +89,7 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
     const size_t mlp_count = sdm_pod_mlp_count(a), mlp_number = sdm_pod_size(sdm_pod_mlp_type(spec->type));
     const size_t head_count =
         sdm_pod_count_weights(spec->type, a->n_coefficients, integers ? integers->wide[n_blocks] : 0, a->n_latent);
+    const size_t mean_count = sdm_pod_mean_count(&a->levels, spec->blocks);
     pod_slab *slabs = NULL;
     pod_leaf *leaves = NULL;
     float *bias = NULL, *mean = NULL;
@@ -104,7 +103,7 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
         basis_count = sdm_pod_place_weights(spec->type, &a->levels, spec->blocks, slabs,
                                             sdm_pod_slabs(&a->levels, spec->blocks, a->block, slabs, leaves), leaves,
                                             integers ? integers->wide : NULL, at);
-    if (!s) s = SDM_ALLOC(&mean, a->n_voxels, "model weights", err);
+    if (!s) s = SDM_ALLOC(&mean, mean_count, "model weights", err);
     if (!s) s = SDM_ALLOC(&mlp, mlp_count * mlp_number, "model weights", err);
     if (!s) s = SDM_ALLOC(&bias, a->depth * a->width, "model weights", err);
     if (!s) s = SDM_ALLOC(&head, head_count * number, "model weights", err);
@@ -113,7 +112,7 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
     if (!s) s = SDM_ALLOC(&wide, (n_blocks + 1) * 4, "model weights", err);
     if (s) goto done;
     pack_weights(spec, integers, at, mlp, bias, head, basis);
-    place_mean(spec, mean);
+    place_mean(spec, leaves, mean);
     for (size_t b = 0; b < n_blocks; b++) put_numbers(&spec->blocks[b].rank, 1, ranks + 4 * b);
     if (integers) {
         put_numbers(integers->wide, n_blocks + 1, wide);
@@ -127,13 +126,14 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
         {"pod.bias", bias, a->depth * a->width * sizeof *bias},
         {"pod.head", head, head_count * number},
         {"pod.basis", basis, basis_count * number},
-        {"pod.mean", mean, a->n_voxels * sizeof(float)},
+        {"pod.mean", mean, mean_count * sizeof(float)},
         {"pod.wide", wide, (n_blocks + 1) * 4},
         {"pod.limit", limit, (a->levels.n + 1) * 4},
         {"pod.order", integers ? integers->order : NULL, a->n_latent * sizeof(uint32_t)},
-        {"pod.factor", integers ? integers->factor : NULL, (all[a->levels.n] + a->n_latent) * sizeof(float)}};
+        {"pod.factor", integers ? integers->factor : NULL, (all[a->levels.n] + a->n_latent) * sizeof(float)},
+        {"pod.quantum", integers ? integers->quantum : NULL, n_blocks * sizeof(float)}};
     const size_t n = sizeof sections / sizeof *sections;
-    s = sdm_model_pack(spec->info, &text, sections, integers ? n : n - 4, bytes, size, err);
+    s = sdm_model_pack(spec->info, &text, sections, integers ? n : n - 5, bytes, size, err);
 done:
     sdm_text_dispose(&text);
     sdm_free(wide);

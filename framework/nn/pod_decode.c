@@ -69,9 +69,10 @@ typedef struct job {
     const pod_network *m;
     const sdm_grid *grid;
     size_t rows, with_mean;
-    bool stream;
+    bool fixed, stream; // fixed: inputs are integers in units that are the same for all maps
     float *const *maps;
     const pod_slab *slab;
+    const float *z_scale; // bytes: [rows]
     size_t rests; // 1: the first row has a row of integers more, behind the last, of what rounding leaves of its inputs
     space s;
 } job;
@@ -109,24 +110,51 @@ static void add_rest(size_t rows, size_t rests, size_t n, float *y, size_t ldy)
     for (size_t i = 0; i < n && rests; i++) y[i] += y[rows * ldy + i];
 }
 
-// y[rows + rests][ldy] from the inputs of a block whose weights begin at `at`
-static void product(const job *j, size_t outputs, size_t wide, size_t rank, size_t at, const input *in, float *y,
-                    size_t ldy)
+// y[rows + rests][ldy] from the inputs of a block whose weights begin at `at`; mean: of its outputs, or NULL
+static void product(const job *j, size_t outputs, size_t wide, size_t rank, size_t at, const input *in,
+                    const float *mean, float *y, size_t ldy)
 {
     const pod_network *m = j->m;
-    const size_t rows = j->rows + j->rests;
-    if (sdm_pod_is_bytes(m))
-        sdm_panel_i8(rows, outputs, wide, rank, (const int8_t *)m->basis + at, in->q, in->ld, in->scale, y, ldy,
-                     SDM_PANEL_ROW);
-    else
-        sdm_pod_product(m->type, rows, outputs, rank, m->basis, at, in->x, in->ld, y, ldy);
+    const size_t rows = j->rows + j->rests, n_mean = mean ? smaller(j->with_mean, j->rows) : 0;
+    if (sdm_pod_is_bytes(m)) {
+        const sdm_panel_out to = {.y = y, .ld = ldy, .line = SDM_PANEL_ROW, .mean = mean, .n_mean = n_mean};
+        sdm_panel_i8(rows, outputs, wide, rank, (const int8_t *)m->basis + at, in->q, in->ld, in->scale, &to);
+        return;
+    }
+    sdm_pod_product(m->type, rows, outputs, rank, m->basis, at, in->x, in->ld, y, ldy);
+    for (size_t r = 0; r < n_mean; r++)
+        for (size_t i = 0; i < outputs; i++) y[r * ldy + i] += mean[i];
 }
 
 static void upper_product(const job *j, size_t b, const input *in, float *y, size_t ldy)
 {
     const pod_network *m = j->m;
-    product(j, m->outputs[b], m->wide ? m->wide[b] : 0, m->blocks[b].rank, m->weights_at[b], in, y, ldy);
+    product(j, m->outputs[b], m->wide ? m->wide[b] : 0, m->blocks[b].rank, m->weights_at[b], in, NULL, y, ldy);
     add_rest(j->rows, j->rests, m->outputs[b], y, ldy);
+}
+
+// n integers go into block b and its like; a row with a latent variable that is not finite stays one
+static void set_units(const job *j, size_t b, size_t n, const input *to)
+{
+    for (size_t r = 0; r < j->rows; r++) {
+        to->q[r * to->ld + n] = 0; // read beside an odd last input, times zero
+        to->scale[r] = j->m->quantum[b] + (j->z_scale[r] - j->z_scale[r]);
+    }
+}
+
+// upper_product() and quantise() in one, in fixed units
+static void upper_integers(const job *j, size_t b, size_t level, const input *in, const input *to)
+{
+    const pod_network *m = j->m;
+    const sdm_pod_block *k = &m->blocks[b];
+    const sdm_panel_out out = {.integers = to->q,
+                               .ld = to->ld,
+                               .factor =
+                                   m->to_integer + m->coefficients_at[level - 1] + m->blocks[k->child].coefficient,
+                               .limit = m->limit[level - 1]};
+    sdm_panel_i8(j->rows, m->outputs[b], m->wide[b], k->rank, (const int8_t *)m->basis + m->weights_at[b], in->q,
+                 in->ld, in->scale, &out);
+    set_units(j, k->child, m->outputs[b], to);
 }
 
 // n coefficients of `level` from `first` on, c[G][ldc], as integers
@@ -151,48 +179,43 @@ static input inputs_of_leaves(const job *j, size_t group)
     return in;
 }
 
-// levels above the lowest from block b of `level` down to the inputs of its leaves
+// levels above the lowest from block b of `level` down to the inputs of its leaves; filling up goes where the next group will be
 static void decode_upper(const job *j, size_t b, size_t level, const input *in)
 {
     const pod_network *m = j->m;
     const sdm_pod_block *k = &m->blocks[b];
     const uint32_t first = m->blocks[k->child].coefficient;
-    const size_t ldy = sdm_panel_outputs(m->max_outputs[level]);
-    if (level == 1) {
-        const input to = inputs_of_leaves(j, b);
-        if (!sdm_pod_is_bytes(m)) { // filling up goes where the next group will be
-            upper_product(j, b, in, to.x, to.ld);
-            return;
-        }
-        upper_product(j, b, in, j->s.y[1], ldy);
-        quantise(j, 0, first, m->outputs[b], j->s.y[1], ldy, &to);
-        return;
+    const input y = {.x = j->s.y[level], .ld = sdm_panel_outputs(m->max_outputs[level])};
+    const input below = level == 1 ? inputs_of_leaves(j, b) : sdm_pod_is_bytes(m) ? j->s.x[level - 1] : y;
+    if (!sdm_pod_is_bytes(m))
+        upper_product(j, b, in, below.x, below.ld);
+    else if (j->fixed)
+        upper_integers(j, b, level, in, &below);
+    else {
+        upper_product(j, b, in, y.x, y.ld);
+        quantise(j, level - 1, first, m->outputs[b], y.x, y.ld, &below);
     }
-    float *y = j->s.y[level];
-    upper_product(j, b, in, y, ldy);
-    input below = {.x = y, .ld = ldy};
-    if (sdm_pod_is_bytes(m)) below = j->s.x[level - 1], quantise(j, level - 1, first, m->outputs[b], y, ldy, &below);
-    for (size_t i = k->child; i < k->child + k->n_children; i++) {
+    for (size_t i = k->child; i < k->child + k->n_children && level > 1; i++) {
         const input of_child = input_from(below, m->blocks[i].coefficient - first);
         decode_upper(j, i, level - 1, &of_child);
     }
 }
 
-// block b of the highest level from its coefficients c[G][ldc]
-static void decode_top(const job *j, size_t b, float *c, size_t ldc)
+// block b of the highest level from its coefficients
+static void decode_top(const job *j, size_t b, const input *c)
 {
     const pod_network *m = j->m;
     const size_t top = top_level(m), rank = m->blocks[b].rank, first = m->blocks[b].coefficient;
-    if (top == 0) {
-        const input to = inputs_of_leaves(j, b);
-        if (sdm_pod_is_bytes(m)) quantise(j, 0, first, rank, c, ldc, &to);
-        for (size_t r = 0; r < j->rows && !sdm_pod_is_bytes(m); r++)
-            memcpy(to.x + r * to.ld, c + r * ldc, rank * sizeof *c);
-        return;
-    }
-    input in = {.x = c, .ld = ldc};
-    if (sdm_pod_is_bytes(m)) in = j->s.x[top], quantise(j, top, first, rank, c, ldc, &in);
-    decode_upper(j, b, top, &in);
+    const input from = input_from(*c, first), to = top == 0 ? inputs_of_leaves(j, b) : j->s.x[top];
+    if (sdm_pod_is_bytes(m) && !j->fixed)
+        quantise(j, top, first, rank, from.x, from.ld, &to);
+    else if (top == 0 || j->fixed)
+        for (size_t r = 0; r < j->rows; r++) {
+            if (from.x) memcpy(to.x + r * to.ld, from.x + r * from.ld, rank * sizeof *to.x);
+            if (from.q) memcpy(to.q + r * to.ld, from.q + r * from.ld, rank * sizeof *to.q);
+        }
+    if (j->fixed) set_units(j, b, rank, &to);
+    if (top) decode_upper(j, b, top, sdm_pod_is_bytes(m) ? &to : &from);
 }
 
 /* Voxels of blocks of the lowest level that lie side by side along x are gathered before they go into the maps: a map is written in pieces
@@ -211,7 +234,7 @@ static void decode_leaf(const job *j, const sdm_panel_block *p, size_t n_x)
     float *to = j->s.line + p->y, *y = j->s.y[0];
     input in = input_from(j->s.leaves, p->x);
     if (in.scale) in.scale += p->scale;
-    product(j, p->outputs, p->n_wide, p->k, p->weights, &in, y, ldy);
+    product(j, p->outputs, p->n_wide, p->k, p->weights, &in, j->m->mean + p->mean, y, ldy);
     for (size_t r = 0; r < j->rows + j->rests; r++, y += ldy, to += j->s.ld_line) {
         if (n_x == 4)
             copy_rows(4, p->outputs / 4, y, to, nx);
@@ -229,8 +252,9 @@ static void decode_line(const job *j, size_t first, size_t n)
     if (sdm_pod_is_bytes(m) && m->arch.block == SDM_PANEL_ROW) { // the last may have shorter rows
         const size_t whole = nx / SDM_PANEL_ROW;
         const input *in = &j->s.leaves;
-        sdm_panel_i8_blocks(j->rows + j->rests, whole, p, m->basis, in->q, in->ld, in->scale, j->s.line, j->s.ld_line,
-                            nx);
+        const sdm_panel_out to = {
+            .y = j->s.line, .ld = j->s.ld_line, .line = nx, .mean = m->mean, .n_mean = smaller(j->with_mean, j->rows)};
+        sdm_panel_i8_blocks(j->rows + j->rests, whole, p, m->basis, in->q, in->ld, in->scale, &to);
         p += whole;
     }
     for (; p < end; p++) decode_leaf(j, p, smaller(m->arch.block, nx - p->y));
@@ -244,8 +268,7 @@ static void put_line(const job *j, const sdm_pod_block *k)
     add_rest(j->rows, j->rests, k->size[2] * n, j->s.line, j->s.ld_line);
     for (size_t z = 0; z < k->size[2]; z++, at += plane)
         for (size_t r = 0; r < j->rows; r++)
-            sdm_put(n, j->s.line + r * j->s.ld_line + z * n, r < j->with_mean ? j->m->mean + at : NULL, j->maps[r] + at,
-                    j->stream);
+            sdm_put(n, j->s.line + r * j->s.ld_line + z * n, j->maps[r] + at, j->stream);
 }
 
 static void decode_leaves(const job *j)
@@ -257,9 +280,10 @@ static void decode_leaves(const job *j)
     }
 }
 
-static void decode_slab(const job *j, float *c, size_t ldc)
+// c[G][ld]: coefficients of the highest level
+static void decode_slab(const job *j, const input *c)
 {
-    for (size_t b = j->slab->top; b < j->slab->top_end; b++) decode_top(j, b, c + j->m->blocks[b].coefficient, ldc);
+    for (size_t b = j->slab->top; b < j->slab->top_end; b++) decode_top(j, b, c);
     decode_leaves(j);
 }
 
@@ -280,46 +304,58 @@ static void quantise_latent(const pod_network *m, size_t rows, size_t rests, con
 }
 
 // coefficients `at` to `at` + n of the highest level
-static void head_product(const pod_network *m, size_t rows, size_t rests, size_t at, size_t n, const pod_space *w)
+static void head_product(const pod_network *m, size_t rows, size_t rests, bool fixed, size_t at, size_t n,
+                         const pod_space *w)
 {
-    const size_t latent = m->arch.n_latent, wide = sdm_pod_head_wide(m);
+    const size_t latent = m->arch.n_latent, wide = sdm_pod_head_wide(m), top = top_level(m);
     const size_t weights = sdm_pod_count_weights(m->type, at, wide, latent);
     const size_t ldc = sdm_panel_outputs(m->arch.n_coefficients);
-    if (sdm_pod_is_bytes(m)) {
-        sdm_panel_i8(rows + rests, n, wide, latent, (const int8_t *)m->head + weights, w->z_integers, w->ldz,
-                     w->z_scale, w->c + at, ldc, SDM_PANEL_ROW);
-        add_rest(rows, rests, n, w->c + at, ldc);
-    } else
+    if (!sdm_pod_is_bytes(m)) {
         sdm_pod_product(m->type, rows, n, latent, m->head, weights, w->z, latent, w->c + at, ldc);
+        return;
+    }
+    const sdm_panel_out numbers = {.y = w->c + at, .ld = ldc, .line = SDM_PANEL_ROW};
+    const sdm_panel_out integers = {.integers = (int16_t *)w->c + at,
+                                    .ld = 2 * ldc,
+                                    .factor = m->to_integer + m->coefficients_at[top] + at,
+                                    .limit = m->limit[top]};
+    sdm_panel_i8(rows + rests, n, wide, latent, (const int8_t *)m->head + weights, w->z_integers, w->ldz, w->z_scale,
+                 fixed ? &integers : &numbers);
+    add_rest(rows, rests, n, w->c + at, ldc);
 }
 
 void sdm_pod_decode(const pod_network *m, const sdm_grid *grid, size_t rows, size_t with_mean, bool smooth, bool stream,
                     float *const *maps, const pod_space *w, int n_threads)
 {
-    const size_t rests = smooth && sdm_pod_is_bytes(m) ? 1 : 0;
     enum { PART = 32 * SDM_PANEL };
+    const bool fixed = !smooth && sdm_pod_is_bytes(m);
+    const size_t rests = smooth && sdm_pod_is_bytes(m) ? 1 : 0;
     const size_t coefficients = m->arch.n_coefficients, ldc = sdm_panel_outputs(coefficients);
     const long parts = (long)((coefficients + PART - 1) / PART);
     if (sdm_pod_is_bytes(m)) quantise_latent(m, rows, rests, w);
 #pragma omp parallel num_threads(n_threads) if (n_threads > 1)
     {
-        job j = {.m = m, .grid = grid, .stream = stream};
+        job j = {.m = m, .grid = grid, .fixed = fixed, .stream = stream};
 #pragma omp for schedule(static)
         for (long i = 0; i < parts; i++) {
             const size_t o = (size_t)i * PART;
-            head_product(m, rows, rests, o, smaller(PART, coefficients - o), w);
+            head_product(m, rows, rests, fixed, o, smaller(PART, coefficients - o), w);
         }
         sdm_pod_carve_thread(m, smaller(rows + 1, SDM_POD_GROUP), w->threads + (size_t)sdm_thread() * w->per_thread,
                              &j.s);
 #pragma omp for schedule(dynamic)
         for (long i = 0; i < (long)m->n_slabs; i++)
             for (size_t r = 0; r < rows; r += j.rows) {
+                float *from = w->c + r * ldc;
+                const input c = {
+                    .x = fixed ? NULL : from, .q = fixed ? (int16_t *)from : NULL, .ld = fixed ? 2 * ldc : ldc};
                 j.slab = &m->slabs[i];
                 j.rests = r == 0 ? rests : 0;
                 j.rows = smaller(SDM_POD_GROUP - j.rests, rows - r);
                 j.with_mean = with_mean > r ? with_mean - r : 0;
                 j.maps = maps + r;
-                decode_slab(&j, w->c + r * ldc, ldc);
+                j.z_scale = w->z_scale + r;
+                decode_slab(&j, &c);
             }
         if (stream) sdm_put_end();
     }

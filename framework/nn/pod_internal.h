@@ -39,7 +39,7 @@ typedef struct pod_network {
     size_t max_slab, max_slab_groups;     /* most coefficients of the lowest level, and groups, of a slab */
     uint8_t *exponents;                   /* [max(F, 1 + I)][P] */
     const float *bias[SDM_POD_MAX_DEPTH]; /* [W] */
-    const float *mean;                    /* [nz][ny][nx] */
+    const float *mean;                    /* leaf by leaf, each filled up to whole panels */
     /* Panels (sdm/kernels.h), the MLP's half when the others are bytes. The basis in the order in which it is read (sdm_pod_place_weights()). */
     const void *layer[SDM_POD_MAX_DEPTH], *head, *basis;
     /* Bytes only (pod_quantise.h). */
@@ -47,6 +47,8 @@ typedef struct pod_network {
     const uint32_t *order;             /* [L] */
     const float *factor;               /* [C + L] */
     int limit[SDM_POD_MAX_LEVELS + 1]; /* of inputs of a level as integers; the last: of the head */
+    const float *quantum;              /* [blocks] value of 1 of the integers that go into a block */
+    float *to_integer;                 /* [C + SDM_PANEL] factor / quantum */
 } pod_network;
 
 /* Number of weights of the layers of the MLP, without the biases. */
@@ -77,6 +79,9 @@ size_t sdm_pod_slabs(const sdm_pod_levels *levels, const sdm_pod_block *blocks, 
 size_t sdm_pod_place_weights(sdm_pod_type type, const sdm_pod_levels *levels, const sdm_pod_block *blocks,
                              const pod_slab *slabs, size_t n_slabs, const pod_leaf *leaves, const uint32_t *wide,
                              size_t *at);
+
+/* Floats of the mean map, leaf by leaf, each filled up to whole panels. */
+size_t sdm_pod_mean_count(const sdm_pod_levels *levels, const sdm_pod_block *blocks);
 
 /* m->products from all else. */
 void sdm_pod_describe_leaves(pod_network *m);
@@ -119,9 +124,9 @@ void sdm_pod_latent_back(const sdm_model *model, const double *p, const pod_late
 
 /* pod_decode.c: latent variables to maps and back. R rows of z go together: maps, or a map and its derivatives. */
 typedef struct pod_space {
-    float *z;            /* [R][L] */
-    float *c;            /* [R][padded K] coefficients of the highest level */
-    float *sorted;       /* bytes: a row of z, or the inputs of a block, in the order of columns */
+    float *z;      /* [R][L] */
+    float *c;      /* [R][padded K] coefficients of the highest level; or the same as integers, rows as far apart */
+    float *sorted; /* bytes: a row of z, or the inputs of a block, in the order of columns */
     int16_t *z_integers; /* bytes: [R][ldz] */
     float *z_scale;      /* bytes: [R] */
     size_t ldz;
@@ -133,7 +138,8 @@ typedef struct pod_space {
 size_t sdm_pod_space_carve(const pod_network *m, size_t rows, int n_threads, float *memory, pod_space *w);
 
 /* maps[R] from w->z; the mean map is added to the first `with_mean`. smooth: bytes do not round the inputs of the first, so that it changes
-   smoothly with the parameters. stream: as sdm_put(). */
+   smoothly with the parameters, and inputs of any size are as fine; else their units are fixed, for maps within the ranges of the parameters.
+   stream: as sdm_put(). */
 void sdm_pod_decode(const pod_network *m, const sdm_grid *grid, size_t rows, size_t with_mean, bool smooth, bool stream,
                     float *const *maps, const pod_space *w, int n_threads);
 

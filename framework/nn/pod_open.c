@@ -105,7 +105,10 @@ static sdm_status read_bytes(const sdm_section *sections, size_t n, sdm_model *m
     m->factor = sdm_model_weights(model, sections, n, "pod.factor",
                                   (m->coefficients_at[a->levels.n] + a->n_latent) * sizeof *m->factor, err);
     if (!m->factor) return SDM_E_FORMAT;
-    const sdm_status s = SDM_ALLOC(&m->wide, n_blocks + 1, "model blocks", err);
+    m->quantum = sdm_model_weights(model, sections, n, "pod.quantum", n_blocks * sizeof *m->quantum, err);
+    if (!m->quantum) return SDM_E_FORMAT;
+    sdm_status s = SDM_ALLOC(&m->wide, n_blocks + 1, "model blocks", err);
+    if (!s) s = SDM_ALLOC(&m->to_integer, m->coefficients_at[a->levels.n] + SDM_PANEL, "model blocks", err);
     if (s) return s;
     for (size_t i = 0; i < a->n_latent; i++)
         if (m->order[i] >= a->n_latent)
@@ -119,6 +122,9 @@ static sdm_status read_bytes(const sdm_section *sections, size_t n, sdm_model *m
     }
     for (size_t level = 0; level < a->levels.n; level++)
         for (size_t b = a->levels.first[level]; b < a->levels.first[level + 1]; b++) {
+            const size_t at = m->coefficients_at[level] + m->blocks[b].coefficient;
+            for (size_t i = at; i < at + m->blocks[b].rank; i++)
+                m->to_integer[i] = m->quantum[b] > 0 ? m->factor[i] / m->quantum[b] : 0;
             m->wide[b] = number(wide + 4 * b);
             if (m->wide[b] > m->blocks[b].rank)
                 return sdm_fail(err, SDM_E_FORMAT, "damaged: %u wide columns of a block of rank %u", m->wide[b],
@@ -148,7 +154,7 @@ static sdm_status bind_weights(const sdm_section *sections, size_t n, sdm_model 
         {"pod.basis", sdm_pod_place_weights(m->type, &a->levels, m->blocks, m->slabs, m->n_slabs, m->leaves, m->wide,
                                             m->weights_at) *
                           weight},
-        {"pod.mean", a->n_voxels * sizeof(float)},
+        {"pod.mean", sdm_pod_mean_count(&a->levels, m->blocks) * sizeof(float)},
         {"pod.bias", a->depth * a->width * sizeof(float)},
     };
     const void *data[5];
@@ -207,6 +213,7 @@ static void dispose(void *network)
     sdm_free(m->weights_at);
     sdm_free(m->exponents);
     sdm_free(m->wide);
+    sdm_free(m->to_integer);
     sdm_free(m->leaves);
     sdm_free(m->products);
     sdm_free(m->slabs);

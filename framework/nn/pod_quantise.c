@@ -10,7 +10,10 @@
 #include "sdm/kernels.h"
 #include "sdm/memory.h"
 
-enum { FINE = 127, FINER = 8 }; // largest integer of a byte; how much finer than the columns of a byte those of two are
+enum { FINE = 127, FINER = 2 }; // largest integer of a byte; how much finer than the columns of a byte those of two are
+
+// how much larger than in the survey coefficients may become before they are clipped
+#define ROOM 2
 
 // mean square error of the map that rounding may add, of the variance of the maps: small beside what the most accurate networks leave
 #define TOLERATED 5e-7
@@ -240,12 +243,28 @@ static void round_all(const survey *s, pod_integers *q)
         }
 }
 
+// what goes into the blocks of a group in the maps of the survey uses a part of the integers: others may be larger by ROOM
+static void find_quanta(const survey *s, pod_integers *q)
+{
+    for (size_t l = 0; l < s->spec->arch.levels.n; l++)
+        for (size_t i = 0; i < n_groups(s, l); i++) {
+            const group g = group_at(s, l, i);
+            double most = 0;
+            for (size_t b = g.first; b < g.end; b++) {
+                const matrix m = sdm_pod_block_matrix(s, b, l);
+                for (size_t c = 0; c < m.k; c++) most = larger(most, m.in[c].largest * m.in[c].step);
+            }
+            for (size_t b = g.first; b < g.end; b++) q->quantum[b] = (float)(ROOM * most / q->limit[l]);
+        }
+}
+
 static sdm_status allocate(const survey *s, pod_integers *q, sdm_error *err)
 {
     const sdm_pod_arch *a = &s->spec->arch;
     sdm_status status = SDM_ALLOC(&q->wide, n_blocks(s) + 1, "weights as bytes", err);
     if (!status) status = SDM_ALLOC(&q->order, a->n_latent, "weights as bytes", err);
     if (!status) status = SDM_ALLOC(&q->factor, s->coefficients_at[a->levels.n] + a->n_latent, "weights as bytes", err);
+    if (!status) status = SDM_ALLOC(&q->quantum, n_blocks(s), "weights as bytes", err);
     if (!status) status = SDM_ALLOC(&q->head, a->n_coefficients * a->n_latent, "weights as bytes", err);
     if (!status) status = SDM_ALLOC(&q->basis, s->basis_at[n_blocks(s)], "weights as bytes", err);
     return status;
@@ -269,6 +288,7 @@ sdm_status sdm_pod_quantise(const sdm_pod_spec *spec, pod_integers *out, sdm_err
         status = choose_wide(&s, out, err);
     }
     if (!status) round_all(&s, out);
+    if (!status) find_quanta(&s, out);
     sdm_pod_survey_dispose(&s);
     return status;
 }
@@ -278,6 +298,7 @@ void sdm_pod_integers_dispose(pod_integers *q)
     sdm_free(q->wide);
     sdm_free(q->order);
     sdm_free(q->factor);
+    sdm_free(q->quantum);
     sdm_free(q->head);
     sdm_free(q->basis);
     *q = (pod_integers){0};

@@ -11,6 +11,7 @@ typedef struct pod_integers {
     uint32_t *order;                        /* [L] latent variable of each column of the head */
     float
         *factor; /* [C + L] what a coefficient is multiplied with before it goes into its block; columns of the head */
+    float *quantum; /* [blocks] value of 1 of the integers that go into a block */
     int16_t *head;  /* [K][L] */
     int16_t *basis; /* [V_b][k_b], block after block as in sdm_pod_weights.basis */
 } pod_integers;

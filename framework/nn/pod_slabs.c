@@ -92,19 +92,29 @@ size_t sdm_pod_place_weights(sdm_pod_type type, const sdm_pod_levels *levels, co
     return p.next;
 }
 
+size_t sdm_pod_mean_count(const sdm_pod_levels *levels, const sdm_pod_block *blocks)
+{
+    size_t n = 0;
+    for (size_t b = 0; b < levels->first[1]; b++) n += sdm_panel_outputs(sdm_pod_block_voxels(&blocks[b]));
+    return n;
+}
+
 void sdm_pod_describe_leaves(pod_network *m)
 {
+    size_t mean = 0;
     for (const pod_slab *s = m->slabs; s < m->slabs + m->n_slabs; s++)
         for (size_t i = s->leaf; i < s->leaf_end; i++) {
             const uint32_t b = m->leaves[i].block;
             const sdm_pod_block *k = &m->blocks[b];
             m->products[i] = (sdm_panel_block){.weights = m->weights_at[b],
+                                               .mean = mean,
                                                .outputs = m->outputs[b],
                                                .n_wide = m->wide ? m->wide[b] : 0,
                                                .k = k->rank,
                                                .x = k->coefficient - s->coefficient,
                                                .scale = m->leaves[i].group * SDM_POD_GROUP,
                                                .y = k->at[0]};
+            mean += sdm_panel_outputs(m->outputs[b]);
         }
 }
 

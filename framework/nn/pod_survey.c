@@ -1,13 +1,15 @@
-/* Random parameters through the layers of a pod network, before its weights are packed. N samples. */
+/* Random parameters and corners of their ranges through the layers of a pod network, before its weights are packed. N samples; mean squares
+   are over the random ones, the largest magnitudes over all. */
 #include "pod_survey.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "sdm/kernels.h"
 #include "sdm/memory.h"
 #include "sdm/rng.h"
 
-enum { N = 256, STREAM = 0x51 };
+enum { RANDOM = 256, CORNERS = 64, N = RANDOM + CORNERS, STREAM = 0x51 };
 
 matrix sdm_pod_head_matrix(const survey *s)
 {
@@ -35,6 +37,14 @@ matrix sdm_pod_block_matrix(const survey *s, size_t b, size_t level)
     return m;
 }
 
+// sample n in [-1, 1]; of up to six parameters every corner is met
+static double sample_parameter(size_t n, size_t i, size_t n_params)
+{
+    const double x = 2 * sdm_rng_uniform(0, STREAM, n * n_params + i) - 1;
+    if (n < RANDOM) return x;
+    return i < 6 ? (n >> i & 1 ? 1 : -1) : x < 0 ? -1 : 1;
+}
+
 // z[N][L]
 static sdm_status sample_latent(const sdm_pod_spec *spec, float *z, sdm_error *err)
 {
@@ -50,7 +60,7 @@ static sdm_status sample_latent(const sdm_pod_spec *spec, float *z, sdm_error *e
     sdm_poly_table(a->n_params, degree, exponents);
     for (size_t n = 0; n < N; n++) {
         double x[SDM_POD_MAX_PARAMS];
-        for (size_t i = 0; i < a->n_params; i++) x[i] = 2 * sdm_rng_uniform(0, STREAM, n * a->n_params + i) - 1;
+        for (size_t i = 0; i < a->n_params; i++) x[i] = sample_parameter(n, i, a->n_params);
         sdm_poly_eval(exponents, total, a->n_params, degree, x, phi + n * total, NULL);
         memcpy(z + n * a->n_latent, phi + n * total, a->n_terms * sizeof *z);
     }
@@ -73,10 +83,14 @@ done:
     return s;
 }
 
-static void mean_squares(size_t n, const float *x, size_t ldx, figures *f)
+static void observe(size_t n, const float *x, size_t ldx, figures *f)
 {
     for (size_t r = 0; r < N; r++)
-        for (size_t i = 0; i < n; i++) f[i].square += (double)x[r * ldx + i] * x[r * ldx + i] / N;
+        for (size_t i = 0; i < n; i++) {
+            const double v = x[r * ldx + i];
+            if (r < RANDOM) f[i].square += v * v / RANDOM;
+            f[i].largest = larger(f[i].largest, fabs(v));
+        }
 }
 
 // c[N][ldc]: coefficients of block b; y: of each level [N][most outputs of a block there]
@@ -84,13 +98,13 @@ static void sample_block(survey *s, size_t b, size_t level, const float *c, size
 {
     const sdm_pod_block *k = &s->spec->blocks[b];
     const matrix m = sdm_pod_block_matrix(s, b, level);
-    mean_squares(m.k, c, ldc, m.in);
+    observe(m.k, c, ldc, m.in);
     sdm_gemm(N, m.outputs, m.k, (sdm_view){c, ldc, 1}, (sdm_view){m.w, m.col, m.row}, false, y[level], m.outputs, 1);
     for (size_t i = k->child; i < k->child + k->n_children; i++)
         sample_block(s, i, level - 1,
                      y[level] + (s->spec->blocks[i].coefficient - s->spec->blocks[k->child].coefficient), m.outputs, y);
-    for (size_t i = 0; i < N * m.outputs && !level; i++)
-        s->variance += (double)y[0][i] * y[0][i] / N / (double)s->spec->arch.n_voxels;
+    for (size_t i = 0; i < RANDOM * m.outputs && !level; i++)
+        s->variance += (double)y[0][i] * y[0][i] / RANDOM / (double)s->spec->arch.n_voxels;
 }
 
 static sdm_status sample(survey *s, sdm_error *err)
@@ -111,7 +125,7 @@ static sdm_status sample(survey *s, sdm_error *err)
     if (!status) status = sample_latent(s->spec, z, err);
     if (!status) {
         const matrix m = sdm_pod_head_matrix(s);
-        mean_squares(m.k, z, m.k, m.in);
+        observe(m.k, z, m.k, m.in);
         sdm_gemm(N, m.outputs, m.k, (sdm_view){z, m.k, 1}, (sdm_view){m.w, m.col, m.row}, false, c, m.outputs, 1);
         for (size_t b = a->levels.first[top]; b < a->levels.first[top + 1]; b++)
             sample_block(s, b, top, c + s->spec->blocks[b].coefficient, a->n_coefficients, y);

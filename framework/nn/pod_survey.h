@@ -4,14 +4,15 @@
 
 #include "pod_internal.h"
 
-/* Of a coefficient of a block, or of a latent variable; all but `square` are left to sdm_pod_quantise(). */
+/* Of a coefficient of a block, or of a latent variable; all but the first two are left to sdm_pod_quantise(). */
 typedef struct figures {
-    double square; /* mean square */
-    double gain;   /* square of the map that a coefficient of 1 makes */
-    double unit;   /* largest magnitude in its column */
-    double scale;  /* of the row that gives it */
-    double error;  /* mean square error of the map when its column is single bytes */
-    double step;   /* of the integers of its column */
+    double square;  /* mean square */
+    double largest; /* magnitude; NaN when one is not a number */
+    double gain;    /* square of the map that a coefficient of 1 makes */
+    double unit;    /* largest magnitude in its column */
+    double scale;   /* of the row that gives it */
+    double error;   /* mean square error of the map when its column is single bytes */
+    double step;    /* of the integers of its column */
 } figures;
 
 typedef struct survey {
@@ -29,6 +30,8 @@ typedef struct matrix {
     figures *in;  /* [k] */
     figures *out; /* [outputs], NULL: voxels */
 } matrix;
+
+static inline double larger(double a, double b) { return b > a || b != b ? b : a; } // NaN stays
 
 static inline double weight(const matrix *m, size_t o, size_t i) { return m->w[o * m->row + i * m->col]; }
 static inline double row_scale(const matrix *m, size_t o) { return m->out ? m->out[o].scale : 1; }

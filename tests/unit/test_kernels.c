@@ -184,7 +184,8 @@ static void bytes(void **state)
     enum { MOST = 160, ROWS = 13, LINE = 7, APART = MOST / 4 * LINE };
     int16_t *w, *x;
     int8_t *packed;
-    float *y, *apart, *back, dx[128], scale[ROWS];
+    float *y, *apart, *back, dx[128], scale[ROWS], *mean = random_floats(MOST, 8), *factor = random_floats(MOST, 9);
+    static int16_t integers[ROWS * MOST];
     assert_int_equal(SDM_ALLOC(&w, MOST * 128, "t", NULL), SDM_OK);
     assert_int_equal(SDM_ALLOC(&x, ROWS * 128, "t", NULL), SDM_OK);
     assert_int_equal(SDM_ALLOC(&packed, sdm_panel_i8_count(MOST, 128, 128), "t", NULL), SDM_OK);
@@ -223,14 +224,26 @@ static void bytes(void **state)
                     }
                 sdm_panel_pack_i8(outputs, wide, k, w, packed);
                 for (size_t rows = 1; rows <= ROWS; rows += rows < 7 ? 1 : 6) {
-                    sdm_panel_i8(rows, outputs, wide, k, packed, x, 128, scale, y, MOST, SDM_PANEL_ROW);
-                    sdm_panel_i8(rows, outputs, wide, k, packed, x, 128, scale, apart, APART, LINE);
+                    const size_t n_mean = rows / 2;
+                    const sdm_panel_out plain = {.y = y, .ld = MOST, .line = SDM_PANEL_ROW},
+                                        added = {.y = apart, .ld = APART, .line = LINE, .mean = mean, .n_mean = n_mean},
+                                        again = {.integers = integers, .ld = MOST, .factor = factor, .limit = 1234};
+                    for (size_t o = 0; o < outputs; o++) factor[o] = (o % 3 ? 3e-4f : -1e-6f) / (float)k;
+                    sdm_panel_i8(rows, outputs, wide, k, packed, x, 128, scale, &plain);
+                    sdm_panel_i8(rows, outputs, wide, k, packed, x, 128, scale, &added);
+                    sdm_panel_i8(rows, outputs, wide, k, packed, x, 128, scale, &again);
                     for (size_t r = 0; r < rows; r++)
                         for (size_t o = 0; o < outputs; o++) {
                             int64_t s = 0;
                             for (size_t i = 0; i < k; i++) s += (int64_t)w[o * k + i] * x[r * 128 + i];
-                            assert_true(y[r * MOST + o] == scale[r] * (float)s);
-                            assert_true(apart[r * APART + o / 4 * LINE + o % 4] == y[r * MOST + o]);
+                            const float v = scale[r] * (float)s, sum = apart[r * APART + o / 4 * LINE + o % 4];
+                            const float units = fminf(fmaxf(v * factor[o], -1234), 1234);
+                            assert_true(y[r * MOST + o] == v);
+                            if (r < n_mean) // some instruction sets multiply and add without rounding in between
+                                assert_true(fabsf(sum - (v + mean[o])) <= 1.2e-7f * (fabsf(v) + fabsf(mean[o])));
+                            else
+                                assert_true(sum == v);
+                            assert_int_equal(integers[r * MOST + o], lrintf(units));
                         }
                 }
                 sdm_panel_back_i8(outputs, wide, k, packed, back, dx);
@@ -252,30 +265,28 @@ static void bytes(void **state)
     sdm_free(y);
     sdm_free(apart);
     sdm_free(back);
+    sdm_free(mean);
+    sdm_free(factor);
 }
 
-// sums to addresses of every kind, nothing beside them
+// to addresses of every kind, nothing beside them
 static void put(void **state)
 {
     (void)state;
     enum { MOST = 90, SIDE = 17 };
-    float *y = random_floats(MOST, 6), *mean = random_floats(MOST, 7), *memory = random_floats(MOST + 2 * SIDE, 8);
+    float *y = random_floats(MOST, 6), *memory = random_floats(MOST + 2 * SIDE, 8);
     y[3] = -0.0f;
     for (size_t n = 0; n <= MOST; n++)
         for (size_t offset = 0; offset < 16; offset++)
-            for (int mode = 0; mode < 4; mode++) {
+            for (int stream = 0; stream < 2; stream++) {
                 float *to = memory + 1 + offset;
                 to[-1] = to[n] = 77;
-                sdm_put(n, y, mode % 2 ? mean : NULL, to, mode / 2);
+                sdm_put(n, y, to, stream);
                 sdm_put_end();
-                for (size_t i = 0; i < n; i++) {
-                    const float want = mode % 2 ? y[i] + mean[i] : y[i];
-                    assert_memory_equal(to + i, &want, sizeof want);
-                }
+                assert_memory_equal(to, y, n * sizeof *y);
                 assert_true(to[-1] == 77 && to[n] == 77);
             }
     sdm_free(y);
-    sdm_free(mean);
     sdm_free(memory);
 }
 
@@ -333,13 +344,15 @@ static void products_of_blocks(void **state)
     int16_t w[64 * 11], x[ROWS * LDX];
     int8_t *packed = NULL;
     float scale[N * ROWS], *y = random_floats(ROWS * LDY, 1), *each = random_floats(ROWS * LDY, 1);
+    float *mean = random_floats(N * 64, 2);
     assert_int_equal(SDM_ALLOC(&packed, MOST, "weights", NULL), SDM_OK);
     sdm_panel_block b[N];
     size_t at = 0;
     uint32_t input = 0, row = 0;
     for (uint32_t i = 0; i < N; i++) {
         for (size_t v = 0; v < outputs[i] * k[i]; v++) w[v] = (int16_t)(255 * sdm_rng_uniform(3, i, v) - 127);
-        b[i] = (sdm_panel_block){at, (uint32_t)outputs[i], (uint32_t)wide[i], (uint32_t)k[i], input, i * ROWS, row};
+        b[i] = (sdm_panel_block){at,       64 * i, (uint32_t)outputs[i], (uint32_t)wide[i], (uint32_t)k[i], input,
+                                 i * ROWS, row};
         assert_true(at + sdm_panel_i8_count(outputs[i], wide[i], k[i]) <= MOST);
         sdm_panel_pack_i8(outputs[i], wide[i], k[i], w, packed + at);
         at += sdm_panel_i8_count(outputs[i], wide[i], k[i]);
@@ -349,15 +362,19 @@ static void products_of_blocks(void **state)
     for (size_t i = 0; i < ROWS * LDX; i++) x[i] = (int16_t)(60000 * sdm_rng_uniform(4, 0, i) - 30000);
     for (size_t i = 0; i < N * ROWS; i++) scale[i] = 0.5f + (float)i;
     for (size_t rows = 1; rows <= ROWS; rows++) {
-        sdm_panel_i8_blocks(rows, N, b, packed, x, LDX, scale, y, LDY, LINE);
-        for (uint32_t i = 0; i < N; i++)
+        sdm_panel_out to = {.y = y, .ld = LDY, .line = LINE, .mean = mean, .n_mean = rows - 1};
+        sdm_panel_i8_blocks(rows, N, b, packed, x, LDX, scale, &to);
+        for (uint32_t i = 0; i < N; i++) {
+            to.y = each + b[i].y, to.mean = mean + b[i].mean;
             sdm_panel_i8(rows, outputs[i], wide[i], k[i], packed + b[i].weights, x + b[i].x, LDX, scale + b[i].scale,
-                         each + b[i].y, LDY, LINE);
+                         &to);
+        }
         assert_memory_equal(y, each, ROWS * LDY * sizeof *y);
     }
     sdm_free(packed);
     sdm_free(y);
     sdm_free(each);
+    sdm_free(mean);
 }
 
 static void exponential(void **state)

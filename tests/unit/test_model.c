@@ -237,6 +237,8 @@ static void forward_is_the_definition(void **state)
         assert_int_equal(SDM_ALLOC(&maps, N * 315, "maps", NULL), 0);
         assert_int_equal(sdm_alloc(&scratch, sdm_model_scratch_bytes(m, N), 1, "scratch", NULL), 0);
         for (uint64_t i = 0; i < N; i++) random_params(i, p + i * P);
+        for (size_t i = 0; i < 8 * P; i++) // of the ranges every corner, where integers of fixed units are largest
+            p[i] = i / P >> i % P & 1 ? t.params[i % P].max : t.params[i % P].min;
         sdm_model_forward(m, p, N, maps, scratch);
         double wrong = 0, spread = 0;
         for (size_t i = 0; i < N; i++) {
@@ -465,7 +467,7 @@ static void maps_with_derivatives_are_smooth(void **state)
                 size = fmax(size, fabs(map[1][v]));
             }
             assert_true(rough < 5e-6 * size);
-            assert_true(rounding > 0 && rounding < 1e-3 * size); // rounded inputs of the map alone
+            assert_true(rounding > 0 && rounding < 4e-3 * size); // rounded inputs of the map alone
         }
         sdm_free(scratch);
         sdm_model_free(m);

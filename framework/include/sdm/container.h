@@ -20,7 +20,7 @@
 extern "C" {
 #endif
 
-#define SDM_CONTAINER_VERSION 3u
+#define SDM_CONTAINER_VERSION 4u
 #define SDM_CONTAINER_MAX_SECTIONS 64u
 
 typedef struct sdm_section {

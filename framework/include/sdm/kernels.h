@@ -69,22 +69,35 @@ SDM_API void sdm_panel_pack_i8(size_t outputs, size_t n_wide, size_t k, const in
 SDM_API void sdm_quantise(size_t rows, size_t n, const float *y, size_t ldy, const float *factor, int limit, int16_t *x,
                           size_t ldx, float *scale);
 
-/* y[B][ldy] = scale[B] times x[B][ldx] times the weights; as sdm_panel_f32(), but outputs are written in rows of SDM_PANEL_ROW, `line` floats
-   apart (SDM_PANEL_ROW: one after another). Of x, sdm_panel_even(k) numbers of each row are read. */
+/* What becomes of the sums of sdm_panel_i8(), times their scales: numbers, or integers for the next product. */
 #define SDM_PANEL_ROW 4
-SDM_API void sdm_panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w, const int16_t *x,
-                          size_t ldx, const float *scale, float *y, size_t ldy, size_t line);
+typedef struct sdm_panel_out {
+    float *
+        y; /* [B][ld] in rows of SDM_PANEL_ROW, `line` floats apart (SDM_PANEL_ROW: one after another); NULL: integers */
+    int16_t *
+        integers; /* [B][ld] times factor, rounded to nearest; what is beyond -limit .. limit, or NaN, becomes one of these */
+    size_t ld, line;
+    const float *mean; /* added to the first n_mean rows of y */
+    size_t n_mean;
+    const float *factor; /* as many as outputs, filled up */
+    int limit;
+} sdm_panel_out;
 
-/* One of several matrices: where its panels, inputs, their scales and outputs begin. */
+/* to = scale[B] times x[B][ldx] times the weights; as sdm_panel_f32() but for the order of y. Of x, sdm_panel_even(k) numbers of each row
+   are read. */
+SDM_API void sdm_panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w, const int16_t *x,
+                          size_t ldx, const float *scale, const sdm_panel_out *to);
+
+/* One of several matrices: where its panels, inputs, their scales, outputs and their mean begin. */
 typedef struct sdm_panel_block {
-    size_t weights;
+    size_t weights, mean;
     uint32_t outputs, n_wide, k;
     uint32_t x, scale, y;
 } sdm_panel_block;
 
-/* sdm_panel_i8() for each of n blocks in turn; B: 1 .. 6. */
+/* sdm_panel_i8() for each of n blocks in turn, with numbers as outputs; B: 1 .. 6. */
 SDM_API void sdm_panel_i8_blocks(size_t batch, size_t n, const sdm_panel_block *blocks, const int8_t *w,
-                                 const int16_t *x, size_t ldx, const float *scale, float *y, size_t ldy, size_t line);
+                                 const int16_t *x, size_t ldx, const float *scale, const sdm_panel_out *to);
 
 /* The transpose, as sdm_panel_back_f32(); x has room for sdm_panel_even(k). */
 SDM_API void sdm_panel_back_i8(size_t outputs, size_t n_wide, size_t k, const int8_t *w, const float *y, float *x);
@@ -93,9 +106,9 @@ SDM_API void sdm_panel_back_i8(size_t outputs, size_t n_wide, size_t k, const in
 SDM_API uint16_t sdm_half_from_float(float v);
 SDM_API float sdm_half_to_float(uint16_t h);
 
-/* to[n] = y[n] + mean[n] (mean NULL: 0). stream: past the caches, for what is large beside them and not read soon; sdm_put_end(), before
+/* to[n] = y[n]. stream: past the caches, for what is large beside them and not read soon; sdm_put_end(), before
    others read it, in the thread that wrote. One thread; the same bits either way. */
-SDM_API void sdm_put(size_t n, const float *y, const float *mean, float *to, bool stream);
+SDM_API void sdm_put(size_t n, const float *y, float *to, bool stream);
 SDM_API void sdm_put_end(void);
 
 /* exp(x) for n values, relative error below 2e-7, in place allowed. */

@@ -1,5 +1,5 @@
-/* Random parameters and corners of their ranges through the layers of a pod network, before its weights are packed. N samples; mean squares
-   are over the random ones, the largest magnitudes over all. */
+/* Random parameters through the layers of a pod network, before its weights are packed. N samples: mean squares are over those from all of
+   the ranges, the largest magnitudes also over those from their corners and faces, where they are found soonest. */
 #include "pod_survey.h"
 
 #include <math.h>
@@ -9,7 +9,7 @@
 #include "sdm/memory.h"
 #include "sdm/rng.h"
 
-enum { RANDOM = 256, CORNERS = 64, N = RANDOM + CORNERS, STREAM = 0x51 };
+enum { RANDOM = 256, CORNERS = 64, FACES = 256, N = RANDOM + CORNERS + FACES, STREAM = 0x51 };
 
 matrix sdm_pod_head_matrix(const survey *s)
 {
@@ -37,12 +37,13 @@ matrix sdm_pod_block_matrix(const survey *s, size_t b, size_t level)
     return m;
 }
 
-// sample n in [-1, 1]; of up to six parameters every corner is met
+// parameter i of sample n, in [-1, 1]; of up to six parameters every corner is met, on faces about half of them are at an end
 static double sample_parameter(size_t n, size_t i, size_t n_params)
 {
     const double x = 2 * sdm_rng_uniform(0, STREAM, n * n_params + i) - 1;
     if (n < RANDOM) return x;
-    return i < 6 ? (n >> i & 1 ? 1 : -1) : x < 0 ? -1 : 1;
+    if (n < RANDOM + CORNERS && i < 6) return n >> i & 1 ? 1 : -1;
+    return n >= RANDOM + CORNERS && fabs(x) < 0.5 ? 2 * x : x < 0 ? -1 : 1;
 }
 
 // z[N][L]

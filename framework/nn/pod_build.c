@@ -20,13 +20,6 @@ static void describe(const sdm_pod_spec *spec, sdm_text *t)
     sdm_text_add(t, "pod.block=%zu\npod.levels=%zu\n", k->block, k->levels.n);
 }
 
-size_t sdm_pod_mlp_count(const sdm_pod_arch *a)
-{
-    size_t n = 0;
-    for (size_t l = 0; l < a->depth; l++) n += sdm_panel_count(a->width, sdm_pod_layer_inputs(a, l));
-    return n;
-}
-
 static void pack_matrix(sdm_pod_type type, size_t outputs, size_t k, sdm_view w, void *to, size_t offset)
 {
     if (type == SDM_POD_F16)
@@ -41,11 +34,15 @@ static void pack_weights(const sdm_pod_spec *spec, const pod_integers *integers,
 {
     const sdm_pod_arch *a = &spec->arch;
     const size_t n_blocks = a->levels.first[a->levels.n];
-    size_t next = 0;
+    size_t next = 0, of_layer = 0;
     for (size_t l = 0; l < a->depth; l++) {
         const size_t k = sdm_pod_layer_inputs(a, l);
-        pack_matrix(sdm_pod_mlp_type(spec->type), a->width, k, (sdm_view){spec->weights.layer[l], k, 1}, mlp, next);
-        next += sdm_panel_count(a->width, k);
+        if (integers)
+            sdm_panel_pack_i8(a->width, k, k, integers->mlp + of_layer, (int8_t *)mlp + next);
+        else
+            pack_matrix(spec->type, a->width, k, (sdm_view){spec->weights.layer[l], k, 1}, mlp, next);
+        next += sdm_pod_count_layer(spec->type, a, l);
+        of_layer += a->width * k;
         memcpy(bias + l * a->width, spec->weights.bias[l], a->width * sizeof *bias);
     }
     if (integers)
@@ -86,7 +83,7 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
 {
     const sdm_pod_arch *a = &spec->arch;
     const size_t number = sdm_pod_size(spec->type), n_blocks = a->levels.first[a->levels.n];
-    const size_t mlp_count = sdm_pod_mlp_count(a), mlp_number = sdm_pod_size(sdm_pod_mlp_type(spec->type));
+    const size_t mlp_count = sdm_pod_count_mlp(spec->type, a);
     const size_t head_count =
         sdm_pod_count_weights(spec->type, a->n_coefficients, integers ? integers->wide[n_blocks] : 0, a->n_latent);
     const size_t mean_count = sdm_pod_mean_count(&a->levels, spec->blocks);
@@ -94,7 +91,8 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
     pod_leaf *leaves = NULL;
     float *bias = NULL, *mean = NULL;
     size_t *at = NULL, basis_count = 0, all[SDM_POD_MAX_LEVELS + 1];
-    uint8_t *mlp = NULL, *head = NULL, *basis = NULL, *ranks = NULL, *wide = NULL, limit[4 * (SDM_POD_MAX_LEVELS + 1)];
+    uint8_t *mlp = NULL, *head = NULL, *basis = NULL, *ranks = NULL, *wide = NULL,
+            limit[4 * (SDM_POD_MAX_LEVELS + 1 + SDM_POD_MAX_DEPTH)];
     sdm_text text = {0};
     sdm_status s = SDM_ALLOC(&at, n_blocks, "model weights", err);
     if (!s) s = SDM_ALLOC(&slabs, n_blocks - a->levels.first[a->levels.n - 1], "model weights", err);
@@ -104,7 +102,7 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
                                             sdm_pod_slabs(&a->levels, spec->blocks, a->block, slabs, leaves), leaves,
                                             integers ? integers->wide : NULL, at);
     if (!s) s = SDM_ALLOC(&mean, mean_count, "model weights", err);
-    if (!s) s = SDM_ALLOC(&mlp, mlp_count * mlp_number, "model weights", err);
+    if (!s) s = SDM_ALLOC(&mlp, mlp_count * number, "model weights", err);
     if (!s) s = SDM_ALLOC(&bias, a->depth * a->width, "model weights", err);
     if (!s) s = SDM_ALLOC(&head, head_count * number, "model weights", err);
     if (!s) s = SDM_ALLOC(&basis, basis_count * number, "model weights", err);
@@ -117,23 +115,25 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
     if (integers) {
         put_numbers(integers->wide, n_blocks + 1, wide);
         put_numbers(integers->limit, a->levels.n + 1, limit);
+        put_numbers(integers->layer_limit, a->depth, limit + 4 * (a->levels.n + 1));
     }
     sdm_pod_place_coefficients(&a->levels, spec->blocks, all);
     describe(spec, &text);
     const sdm_section sections[] = {
         {"pod.ranks", ranks, n_blocks * 4},
-        {"pod.mlp", mlp, mlp_count * mlp_number},
+        {"pod.mlp", mlp, mlp_count * number},
         {"pod.bias", bias, a->depth * a->width * sizeof *bias},
         {"pod.head", head, head_count * number},
         {"pod.basis", basis, basis_count * number},
         {"pod.mean", mean, mean_count * sizeof(float)},
         {"pod.wide", wide, (n_blocks + 1) * 4},
-        {"pod.limit", limit, (a->levels.n + 1) * 4},
+        {"pod.limit", limit, (a->levels.n + 1 + a->depth) * 4},
+        {"pod.layer_scale", integers ? integers->layer_scale : NULL, a->depth * a->width * sizeof(float)},
         {"pod.order", integers ? integers->order : NULL, a->n_latent * sizeof(uint32_t)},
         {"pod.factor", integers ? integers->factor : NULL, (all[a->levels.n] + a->n_latent) * sizeof(float)},
         {"pod.quantum", integers ? integers->quantum : NULL, n_blocks * sizeof(float)}};
     const size_t n = sizeof sections / sizeof *sections;
-    s = sdm_model_pack(spec->info, &text, sections, integers ? n : n - 5, bytes, size, err);
+    s = sdm_model_pack(spec->info, &text, sections, integers ? n : n - 6, bytes, size, err);
 done:
     sdm_text_dispose(&text);
     sdm_free(wide);

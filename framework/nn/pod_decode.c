@@ -86,24 +86,6 @@ static input input_from(input in, size_t first)
     return in;
 }
 
-// as sdm_quantise(), and a zero behind each row: it is read beside an odd last input, times zero
-static void quantise_rows(size_t rows, size_t n, const float *y, size_t ldy, const float *factor, int limit, int16_t *x,
-                          size_t ldx, float *scale)
-{
-    sdm_quantise(rows, n, y, ldy, factor, limit, x, ldx, scale);
-    for (size_t r = 0; r < rows; r++) x[r * ldx + n] = 0;
-}
-
-// what x[n], with its factor, leaves of y times factor
-static float quantise_rest(size_t n, const float *y, const float *factor, int limit, const int16_t *x, float scale,
-                           float *work, int16_t *rest)
-{
-    float rest_scale;
-    for (size_t i = 0; i < n; i++) work[i] = y[i] * factor[i] - scale * (float)x[i];
-    quantise_rows(1, n, work, 0, NULL, limit, rest, 0, &rest_scale);
-    return rest_scale;
-}
-
 // y[0] += the row behind the last
 static void add_rest(size_t rows, size_t rests, size_t n, float *y, size_t ldy)
 {
@@ -162,10 +144,10 @@ static void quantise(const job *j, size_t level, size_t first, size_t n, const f
 {
     const pod_network *m = j->m;
     const float *factor = m->factor + m->coefficients_at[level] + first;
-    quantise_rows(j->rows, n, c, ldc, factor, m->limit[level], to->q, to->ld, to->scale);
+    sdm_pod_quantise_rows(j->rows, n, c, ldc, factor, m->limit[level], to->q, to->ld, to->scale);
     if (j->rests)
-        to->scale[j->rows] =
-            quantise_rest(n, c, factor, m->limit[level], to->q, to->scale[0], j->s.back, to->q + j->rows * to->ld);
+        to->scale[j->rows] = sdm_pod_quantise_rest(n, c, factor, m->limit[level], to->q, to->scale[0], j->s.back,
+                                                   to->q + j->rows * to->ld);
 }
 
 // where the coefficients of the lowest level of block `group` of its groups belong
@@ -296,11 +278,12 @@ static void quantise_latent(const pod_network *m, size_t rows, size_t rests, con
     const float *factor = m->factor + m->coefficients_at[n];
     for (size_t r = rows; r-- > 0;) { // the first is the last, for its rest
         for (size_t i = 0; i < latent; i++) w->sorted[i] = w->z[r * latent + m->order[i]];
-        quantise_rows(1, latent, w->sorted, 0, factor, m->limit[n], w->z_integers + r * w->ldz, 0, w->z_scale + r);
+        sdm_pod_quantise_rows(1, latent, w->sorted, 0, factor, m->limit[n], w->z_integers + r * w->ldz, 0,
+                              w->z_scale + r);
     }
     if (rests)
-        w->z_scale[rows] = quantise_rest(latent, w->sorted, factor, m->limit[n], w->z_integers, w->z_scale[0],
-                                         w->sorted, w->z_integers + rows * w->ldz);
+        w->z_scale[rows] = sdm_pod_quantise_rest(latent, w->sorted, factor, m->limit[n], w->z_integers, w->z_scale[0],
+                                                 w->sorted, w->z_integers + rows * w->ldz);
 }
 
 // coefficients `at` to `at` + n of the highest level

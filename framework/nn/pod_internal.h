@@ -40,25 +40,21 @@ typedef struct pod_network {
     uint8_t *exponents;                   /* [max(F, 1 + I)][P] */
     const float *bias[SDM_POD_MAX_DEPTH]; /* [W] */
     const float *mean;                    /* leaf by leaf, each filled up to whole panels */
-    /* Panels (sdm/kernels.h), the MLP's half when the others are bytes. The basis in the order in which it is read (sdm_pod_place_weights()). */
+    /* Panels (sdm/kernels.h), the MLP's of two bytes when the others are bytes. The basis in the order in which it is read (sdm_pod_place_weights()). */
     const void *layer[SDM_POD_MAX_DEPTH], *head, *basis;
     /* Bytes only (pod_quantise.h). */
-    uint32_t *wide;                    /* [blocks + 1] the last: of the head */
-    const uint32_t *order;             /* [L] */
-    const float *factor;               /* [C + L] */
-    int limit[SDM_POD_MAX_LEVELS + 1]; /* of inputs of a level as integers; the last: of the head */
-    const float *quantum;              /* [blocks] value of 1 of the integers that go into a block */
-    float *to_integer;                 /* [C + SDM_PANEL] factor / quantum */
+    uint32_t *wide;                              /* [blocks + 1] the last: of the head */
+    const uint32_t *order;                       /* [L] */
+    const float *factor;                         /* [C + L] */
+    int limit[SDM_POD_MAX_LEVELS + 1];           /* of inputs of a level as integers; the last: of the head */
+    const float *quantum;                        /* [blocks] value of 1 of the integers that go into a block */
+    float *to_integer;                           /* [C + SDM_PANEL] factor / quantum */
+    const float *layer_scale[SDM_POD_MAX_DEPTH]; /* [W] */
+    int layer_limit[SDM_POD_MAX_DEPTH];          /* of inputs of a layer as integers */
 } pod_network;
-
-/* Number of weights of the layers of the MLP, without the biases. */
-size_t sdm_pod_mlp_count(const sdm_pod_arch *a);
 
 /* Bytes of a stored number. */
 static inline size_t sdm_pod_size(sdm_pod_type type) { return type == SDM_POD_F32 ? 4 : type == SDM_POD_F16 ? 2 : 1; }
-
-/* Type of the MLP's weights when those of head and bases are `type`. */
-static inline sdm_pod_type sdm_pod_mlp_type(sdm_pod_type type) { return type == SDM_POD_I8 ? SDM_POD_F16 : type; }
 
 /* y[rows][ldy] = x[rows][ldx] times float or half weights that begin at `at`, as sdm_panel_*(); and the transpose. */
 void sdm_pod_product(sdm_pod_type type, size_t rows, size_t outputs, size_t k, const void *weights, size_t at,
@@ -68,6 +64,14 @@ void sdm_pod_product_back(sdm_pod_type type, size_t outputs, size_t k, const voi
 
 /* Stored numbers of a matrix of `outputs` x k; n_wide: for bytes. */
 size_t sdm_pod_count_weights(sdm_pod_type type, size_t outputs, size_t n_wide, size_t k);
+
+/* Stored numbers of a layer of the MLP, and of all. */
+static inline size_t sdm_pod_layer_inputs(const sdm_pod_arch *a, size_t layer)
+{
+    return layer ? a->width : a->n_inputs;
+}
+size_t sdm_pod_count_layer(sdm_pod_type type, const sdm_pod_arch *a, size_t layer);
+size_t sdm_pod_count_mlp(sdm_pod_type type, const sdm_pod_arch *a);
 
 /* Slabs and leaves from blocks that are numbered; slabs[] has room for the blocks of the highest level, leaves[] for those of the lowest.
    edge: of a block of the lowest level. Returns the number of slabs. */
@@ -98,17 +102,24 @@ static inline size_t sdm_pod_head_wide(const pod_network *m)
     return m->wide ? m->wide[m->arch.levels.first[m->arch.levels.n]] : 0;
 }
 
-static inline size_t sdm_pod_layer_inputs(const sdm_pod_arch *a, size_t layer)
-{
-    return layer ? a->width : a->n_inputs;
-}
+/* As sdm_quantise(), and a zero behind each row: it is read beside an odd last input, times zero. */
+void sdm_pod_quantise_rows(size_t rows, size_t n, const float *y, size_t ldy, const float *factor, int limit,
+                           int16_t *x, size_t ldx, float *scale);
+
+/* rest[n] = what x[n], with its scale, leaves of y times factor (NULL: 1); returns its scale. work[n] may be y. */
+float sdm_pod_quantise_rest(size_t n, const float *y, const float *factor, int limit, const int16_t *x, float scale,
+                            float *work, int16_t *rest);
 
 /* pod_latent.c: parameters to latent variables and back. Letters as in sdm/pod.h; D directions. */
 typedef struct pod_latent {
-    float *phi;   /* [R][n_poly] all products and their derivatives along the directions */
-    float *h[2];  /* [R][padded W] of a layer and of the one before */
-    float *slope; /* [depth][padded W] */
-    float *dphi;  /* [P][n_poly] derivatives with respect to each parameter */
+    float *phi; /* [R][n_poly] all products and their derivatives along the directions */
+    float *h
+        [2]; /* [R + 1][padded W] of a layer and of the one before; bytes: the last is what rounding leaves of the first */
+    float *slope;      /* [depth][padded W] */
+    float *dphi;       /* [P][n_poly] derivatives with respect to each parameter */
+    int16_t *integers; /* bytes: [R + 1][ld] inputs of a layer */
+    float *scale;      /* bytes: [R + 1] theirs */
+    size_t ld;
 } pod_latent;
 
 /* Sets the pointers into memory[] (NULL: none) for R rows of z; returns the floats needed. */

@@ -6,7 +6,7 @@
 
 static size_t larger(size_t a, size_t b) { return a > b ? a : b; }
 static size_t n_poly(const pod_network *m) { return larger(m->arch.n_terms, 1 + m->arch.n_inputs); }
-static size_t row(const pod_network *m) { return larger(sdm_panel_outputs(m->arch.width), n_poly(m)); }
+static size_t row(const pod_network *m) { return larger(sdm_panel_outputs(m->arch.width), n_poly(m) + 1); }
 
 void sdm_pod_product(sdm_pod_type type, size_t rows, size_t outputs, size_t k, const void *weights, size_t at,
                      const float *x, size_t ldx, float *y, size_t ldy)
@@ -26,17 +26,39 @@ void sdm_pod_product_back(sdm_pod_type type, size_t outputs, size_t k, const voi
         sdm_panel_back_f32(outputs, k, (const float *)weights + at, y, x);
 }
 
+void sdm_pod_quantise_rows(size_t rows, size_t n, const float *y, size_t ldy, const float *factor, int limit,
+                           int16_t *x, size_t ldx, float *scale)
+{
+    sdm_quantise(rows, n, y, ldy, factor, limit, x, ldx, scale);
+    for (size_t r = 0; r < rows; r++) x[r * ldx + n] = 0;
+}
+
+float sdm_pod_quantise_rest(size_t n, const float *y, const float *factor, int limit, const int16_t *x, float scale,
+                            float *work, int16_t *rest)
+{
+    float rest_scale;
+    for (size_t i = 0; i < n; i++) work[i] = (factor ? y[i] * factor[i] : y[i]) - scale * (float)x[i];
+    sdm_pod_quantise_rows(1, n, work, 0, NULL, limit, rest, 0, &rest_scale);
+    return rest_scale;
+}
+
 size_t sdm_pod_latent_carve(const pod_network *m, size_t rows, float *memory, pod_latent *w)
 {
     const sdm_pod_arch *a = &m->arch;
-    const size_t sizes[] = {rows * n_poly(m), rows * row(m), rows * row(m), a->depth * sdm_panel_outputs(a->width),
-                            a->n_params * n_poly(m)};
-    float **const fields[] = {&w->phi, &w->h[0], &w->h[1], &w->slope, &w->dphi};
+    const bool bytes = m->type == SDM_POD_I8;
+    w->ld = sdm_panel_outputs(row(m) + 1);
+    float *integers;
+    const size_t sizes[] = {rows * n_poly(m),        (rows + 1) * row(m),
+                            (rows + 1) * row(m),     a->depth * sdm_panel_outputs(a->width),
+                            a->n_params * n_poly(m), bytes ? (rows + 1) * w->ld / 2 : 0,
+                            bytes ? rows + 1 : 0};
+    float **const fields[] = {&w->phi, &w->h[0], &w->h[1], &w->slope, &w->dphi, &integers, &w->scale};
     size_t total = 0;
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
         *fields[i] = memory ? memory + total : NULL;
         total += (sizes[i] + 15) / 16 * 16;
     }
+    w->integers = (int16_t *)integers;
     return total;
 }
 
@@ -73,6 +95,28 @@ static void along(const pod_network *m, size_t n_directions, const double *direc
     }
 }
 
+/* out[rows][width] = a layer's products with in[rows][stride], without its bias. smooth: what rounding leaves of the first row is added to
+   it, by way of a row behind the last. `in` may change. */
+static void layer_products(const pod_network *m, size_t layer, size_t rows, bool smooth, float *in, size_t stride,
+                           const pod_latent *w, float *out)
+{
+    const size_t n = sdm_pod_layer_inputs(&m->arch, layer), width = sdm_panel_outputs(m->arch.width);
+    if (m->type != SDM_POD_I8) {
+        sdm_pod_product(m->type, rows, m->arch.width, n, m->layer[layer], 0, in, stride, out, width);
+        return;
+    }
+    const sdm_panel_out to = {.y = out, .ld = width, .line = SDM_PANEL_ROW};
+    const int limit = m->layer_limit[layer];
+    sdm_pod_quantise_rows(rows, n, in, stride, NULL, limit, w->integers, w->ld, w->scale);
+    if (smooth)
+        w->scale[rows] =
+            sdm_pod_quantise_rest(n, in, NULL, limit, w->integers, w->scale[0], in, w->integers + rows * w->ld);
+    sdm_panel_i8(rows + smooth, m->arch.width, n, n, m->layer[layer], w->integers, w->ld, w->scale, &to);
+    for (size_t o = 0; o < width && smooth; o++) out[o] += out[rows * width + o];
+    for (size_t r = 0; r < rows; r++)
+        for (size_t o = 0; o < m->arch.width; o++) out[r * width + o] *= m->layer_scale[layer][o];
+}
+
 void sdm_pod_latent(const sdm_model *model, const double *p, size_t n, size_t n_directions, const double *direction,
                     const pod_latent *w, float *z)
 {
@@ -85,12 +129,11 @@ void sdm_pod_latent(const sdm_model *model, const double *p, size_t n, size_t n_
     if (!a->depth) return;
 
     // the MLP's input is the products of degree 1 and more; derivatives go through the same weights, then times the slope
-    const float *in = w->phi + 1;
+    float *in = w->phi + 1;
     size_t stride = total;
     for (size_t layer = 0; layer < a->depth; layer++) {
         float *out = w->h[layer % 2], *slope = w->slope + layer * width;
-        sdm_pod_product(sdm_pod_mlp_type(m->type), rows, a->width, sdm_pod_layer_inputs(a, layer), m->layer[layer], 0,
-                        in, stride, out, width);
+        layer_products(m, layer, rows, n_directions > 0, in, stride, w, out);
         for (size_t r = 0; r < n; r++) {
             for (size_t o = 0; o < a->width; o++) out[r * width + o] += m->bias[layer][o];
             sdm_activate(a->activation, a->width, out + r * width, out + r * width, slope);
@@ -118,8 +161,12 @@ void sdm_pod_latent_back(const sdm_model *model, const double *p, const pod_late
         for (size_t layer = a->depth; layer-- > 0;) {
             for (size_t o = 0; o < a->width; o++) dh[o] *= w->slope[layer * width + o];
             memset(dh + a->width, 0, (width - a->width) * sizeof *dh);
-            sdm_pod_product_back(sdm_pod_mlp_type(m->type), a->width, sdm_pod_layer_inputs(a, layer), m->layer[layer],
-                                 0, dh, below);
+            const size_t inputs = sdm_pod_layer_inputs(a, layer);
+            if (m->type == SDM_POD_I8) {
+                for (size_t o = 0; o < a->width; o++) dh[o] *= m->layer_scale[layer][o];
+                sdm_panel_back_i8(a->width, inputs, inputs, m->layer[layer], dh, below);
+            } else
+                sdm_pod_product_back(m->type, a->width, inputs, m->layer[layer], 0, dh, below);
             float *const swap = dh;
             dh = below, below = swap;
         }

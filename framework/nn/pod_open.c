@@ -113,13 +113,18 @@ static sdm_status read_bytes(const sdm_section *sections, size_t n, sdm_model *m
     for (size_t i = 0; i < a->n_latent; i++)
         if (m->order[i] >= a->n_latent)
             return sdm_fail(err, SDM_E_FORMAT, "damaged: latent variable %u of %zu", m->order[i], a->n_latent);
-    const uint8_t *limits = sdm_model_weights(model, sections, n, "pod.limit", (a->levels.n + 1) * 4, err);
+    const size_t n_limits = a->levels.n + 1 + a->depth;
+    const uint8_t *limits = sdm_model_weights(model, sections, n, "pod.limit", n_limits * 4, err);
     if (!limits) return SDM_E_FORMAT;
-    for (size_t level = 0; level <= a->levels.n; level++) {
-        const uint32_t limit = number(limits + 4 * level);
+    for (size_t i = 0; i < n_limits; i++) {
+        const uint32_t limit = number(limits + 4 * i);
         if (limit < 1 || limit > INT16_MAX) return sdm_fail(err, SDM_E_FORMAT, "damaged: integers up to %u", limit);
-        m->limit[level] = (int)limit;
+        *(i <= a->levels.n ? &m->limit[i] : &m->layer_limit[i - a->levels.n - 1]) = (int)limit;
     }
+    const float *scale =
+        sdm_model_weights(model, sections, n, "pod.layer_scale", a->depth * a->width * sizeof *scale, err);
+    if (!scale) return SDM_E_FORMAT;
+    for (size_t l = 0; l < a->depth; l++) m->layer_scale[l] = scale + l * a->width;
     for (size_t level = 0; level < a->levels.n; level++)
         for (size_t b = a->levels.first[level]; b < a->levels.first[level + 1]; b++) {
             const size_t at = m->coefficients_at[level] + m->blocks[b].coefficient;
@@ -140,7 +145,7 @@ static sdm_status bind_weights(const sdm_section *sections, size_t n, sdm_model 
 {
     pod_network *m = model->network;
     const sdm_pod_arch *a = &m->arch;
-    const size_t weight = sdm_pod_size(m->type), mlp_weight = sdm_pod_size(sdm_pod_mlp_type(m->type));
+    const size_t weight = sdm_pod_size(m->type);
     if (m->type == SDM_POD_I8) {
         const sdm_status s = read_bytes(sections, n, model, err);
         if (s) return s;
@@ -149,7 +154,7 @@ static sdm_status bind_weights(const sdm_section *sections, size_t n, sdm_model 
         const char *name;
         size_t size;
     } need[] = {
-        {"pod.mlp", sdm_pod_mlp_count(a) * mlp_weight},
+        {"pod.mlp", sdm_pod_count_mlp(m->type, a) * weight},
         {"pod.head", sdm_pod_count_weights(m->type, a->n_coefficients, sdm_pod_head_wide(m), a->n_latent) * weight},
         {"pod.basis", sdm_pod_place_weights(m->type, &a->levels, m->blocks, m->slabs, m->n_slabs, m->leaves, m->wide,
                                             m->weights_at) *
@@ -165,7 +170,7 @@ static sdm_status bind_weights(const sdm_section *sections, size_t n, sdm_model 
     const uint8_t *mlp = data[0];
     for (size_t l = 0; l < a->depth; l++) {
         m->layer[l] = mlp;
-        mlp += sdm_panel_count(a->width, sdm_pod_layer_inputs(a, l)) * mlp_weight;
+        mlp += sdm_pod_count_layer(m->type, a, l) * weight;
         m->bias[l] = (const float *)data[4] + l * a->width;
     }
     m->head = data[1];

@@ -10,7 +10,11 @@
 #include "sdm/kernels.h"
 #include "sdm/memory.h"
 
-enum { FINE = 127, FINER = 2 }; // largest integer of a byte; how much finer than the columns of a byte those of two are
+enum {
+    FINE = 127,
+    FINER = 2,
+    MLP_FINE = 2047
+}; // largest integer of a byte; how much finer than the columns of a byte those of two are
 
 // how much larger than in the survey coefficients may become before they are clipped
 #define ROOM 2
@@ -258,12 +262,36 @@ static void find_quanta(const survey *s, pod_integers *q)
         }
 }
 
+// the MLP is small: all its weights have two bytes, of which they use 12 bits so that inputs may use 13
+static void round_mlp(const sdm_pod_spec *spec, pod_integers *q)
+{
+    const sdm_pod_arch *a = &spec->arch;
+    int16_t *to = q->mlp;
+    for (size_t l = 0; l < a->depth; l++) {
+        const size_t k = sdm_pod_layer_inputs(a, l);
+        for (size_t o = 0; o < a->width; o++) {
+            const float *w = spec->weights.layer[l] + o * k;
+            double most = 0;
+            for (size_t i = 0; i < k; i++) most = larger(most, fabs((double)w[i]));
+            q->layer_scale[l * a->width + o] = (float)(most / MLP_FINE);
+            for (size_t i = 0; i < k; i++)
+                to[o * k + i] = (int16_t)(isfinite(w[i] / most) ? lrint(w[i] / most * MLP_FINE) : 0);
+        }
+        q->layer_limit[l] = (uint32_t)sdm_panel_i8_limit(a->width, k, to);
+        to += a->width * k;
+    }
+}
+
 static sdm_status allocate(const survey *s, pod_integers *q, sdm_error *err)
 {
     const sdm_pod_arch *a = &s->spec->arch;
     sdm_status status = SDM_ALLOC(&q->wide, n_blocks(s) + 1, "weights as bytes", err);
     if (!status) status = SDM_ALLOC(&q->order, a->n_latent, "weights as bytes", err);
     if (!status) status = SDM_ALLOC(&q->factor, s->coefficients_at[a->levels.n] + a->n_latent, "weights as bytes", err);
+    size_t mlp = 0;
+    for (size_t l = 0; l < a->depth; l++) mlp += a->width * sdm_pod_layer_inputs(a, l);
+    if (!status) status = SDM_ALLOC(&q->mlp, mlp, "weights as bytes", err);
+    if (!status) status = SDM_ALLOC(&q->layer_scale, a->depth * a->width, "weights as bytes", err);
     if (!status) status = SDM_ALLOC(&q->quantum, n_blocks(s), "weights as bytes", err);
     if (!status) status = SDM_ALLOC(&q->head, a->n_coefficients * a->n_latent, "weights as bytes", err);
     if (!status) status = SDM_ALLOC(&q->basis, s->basis_at[n_blocks(s)], "weights as bytes", err);
@@ -289,6 +317,7 @@ sdm_status sdm_pod_quantise(const sdm_pod_spec *spec, pod_integers *out, sdm_err
     }
     if (!status) round_all(&s, out);
     if (!status) find_quanta(&s, out);
+    if (!status) round_mlp(spec, out);
     sdm_pod_survey_dispose(&s);
     return status;
 }
@@ -299,6 +328,8 @@ void sdm_pod_integers_dispose(pod_integers *q)
     sdm_free(q->order);
     sdm_free(q->factor);
     sdm_free(q->quantum);
+    sdm_free(q->layer_scale);
+    sdm_free(q->mlp);
     sdm_free(q->head);
     sdm_free(q->basis);
     *q = (pod_integers){0};

@@ -11,9 +11,12 @@ typedef struct pod_integers {
     uint32_t *order;                        /* [L] latent variable of each column of the head */
     float
         *factor; /* [C + L] what a coefficient is multiplied with before it goes into its block; columns of the head */
-    float *quantum; /* [blocks] value of 1 of the integers that go into a block */
-    int16_t *head;  /* [K][L] */
-    int16_t *basis; /* [V_b][k_b], block after block as in sdm_pod_weights.basis */
+    uint32_t layer_limit[SDM_POD_MAX_DEPTH]; /* of inputs of a layer of the MLP */
+    float *layer_scale;                      /* [depth][W] of its rows */
+    int16_t *mlp;                            /* [depth][W][I or W] */
+    float *quantum;                          /* [blocks] value of 1 of the integers that go into a block */
+    int16_t *head;                           /* [K][L] */
+    int16_t *basis;                          /* [V_b][k_b], block after block as in sdm_pod_weights.basis */
 } pod_integers;
 
 /* Integers for the weights of `spec`. Each matrix is rows times integers times columns: the scales of the columns are in `factor`, those of

@@ -59,6 +59,19 @@ size_t sdm_pod_count_weights(sdm_pod_type type, size_t outputs, size_t n_wide, s
     return type == SDM_POD_I8 ? sdm_panel_i8_count(outputs, n_wide, k) : sdm_panel_count(outputs, k);
 }
 
+size_t sdm_pod_count_layer(sdm_pod_type type, const sdm_pod_arch *a, size_t layer)
+{
+    const size_t k = sdm_pod_layer_inputs(a, layer);
+    return sdm_pod_count_weights(type, a->width, k, k);
+}
+
+size_t sdm_pod_count_mlp(sdm_pod_type type, const sdm_pod_arch *a)
+{
+    size_t n = 0;
+    for (size_t l = 0; l < a->depth; l++) n += sdm_pod_count_layer(type, a, l);
+    return n;
+}
+
 typedef struct placing {
     sdm_pod_type type;
     const sdm_pod_block *blocks;

@@ -101,7 +101,8 @@ typedef struct sdm_pod_weights {
     const float *basis;                    /* for each block of all levels [k_b][V_b], one after another */
 } sdm_pod_weights;
 
-/* How weights are stored. Bytes: those of head and bases, with a second byte where one is not enough; of the MLP in half precision. */
+/* How weights are stored. Bytes: with a second byte where one is not enough; maps are for parameters within their ranges, beyond them what
+   becomes too large is clipped. */
 typedef enum sdm_pod_type { SDM_POD_F32 = 0, SDM_POD_F16 = 1, SDM_POD_I8 = 2 } sdm_pod_type;
 
 /* Everything a model file is made from. `info` gives names, ranges, grid, accuracy, provenance. */

@@ -480,16 +480,17 @@ static void maps_with_derivatives_are_smooth(void **state)
 static void bytes_keep_what_is_not_finite(void **state)
 {
     (void)state;
-    for (int which = 0; which < 2; which++) {
+    for (int which = 0; which < 4; which++) {
         toy t;
         make(&t, SDM_POD_I8, 0);
-        (which ? t.basis : t.head)[0] = which ? NAN : INFINITY;
+        if (which < 3) *(float *const[]){t.head, t.basis, t.layer[1]}[which] = which ? NAN : INFINITY;
         sdm_model *m = open_toy(&t);
         void *scratch;
         float map[315];
         double p[P];
         int finite = 0;
         random_params(0, p);
+        if (which == 3) p[1] = NAN;
         assert_int_equal(sdm_alloc(&scratch, sdm_model_scratch_bytes(m, 1), 1, "scratch", NULL), 0);
         sdm_model_forward(m, p, 1, map, scratch);
         for (int v = 0; v < 315; v++) finite += isfinite(map[v]) != 0;

@@ -6,6 +6,8 @@
 
 #include "config_shape.h"
 #include "experiment.h"
+#include "sdm/container.h"
+#include "sdm/file.h"
 #include "sdm/memory.h"
 #include "sdm/train.h"
 
@@ -57,13 +59,13 @@ sdm_status experiment_path(const experiment_run *run, size_t index, const char *
 }
 
 /* Two configurations give the same network: everything but the place of the files and the number of threads is equal. */
-static bool is_same(const sdm_config *a, const char *name, const char *text)
+static bool is_same(const sdm_config *a, const char *name, const char *text, size_t size)
 {
     sdm_config *copy = NULL, *other = NULL;
     sdm_text x = {0}, y = {0};
     bool same = false;
     if (!SDM_ALLOC(&copy, 1, "configuration", NULL) && !SDM_ALLOC(&other, 1, "configuration", NULL) &&
-        !sdm_config_parse(name, text, strlen(text), NULL, 0, other, NULL)) {
+        !sdm_config_parse(name, text, size, NULL, 0, other, NULL)) {
         *copy = *a;
         copy->threads = other->threads;
         memcpy(copy->output.folder, other->output.folder, sizeof copy->output.folder);
@@ -78,18 +80,40 @@ static bool is_same(const sdm_config *a, const char *name, const char *text)
     return same;
 }
 
+static bool is_same_model(const sdm_config *c, const char *path)
+{
+    sdm_model *model = NULL;
+    if (sdm_model_open(path, &model, NULL)) return false;
+    const char *text = sdm_model_get_info(model)->config;
+    const bool same = text && is_same(c, path, text, strlen(text));
+    sdm_model_free(model);
+    return same;
+}
+
+/* The budget too: a training that goes on with another one is not that of this row. */
+static bool is_same_checkpoint(const sdm_config *c, const char *path)
+{
+    sdm_section section[SDM_CONTAINER_MAX_SECTIONS];
+    char name[SDM_CONTAINER_MAX_SECTIONS][24];
+    uint8_t *bytes = NULL;
+    size_t size = 0, n = 0;
+    uint64_t checksum;
+    bool same = false;
+    if (!sdm_file_read(path, (uint64_t)64 << 30, &bytes, &size, NULL) &&
+        !sdm_container_parse(bytes, size, section, name, &n, &checksum, NULL))
+        for (size_t i = 0; i < n; i++)
+            if (!strcmp(name[i], "config")) same = is_same(c, path, section[i].data, section[i].size);
+    sdm_free(bytes);
+    return same;
+}
+
 experiment_stock experiment_find(const experiment_run *run, const experiment_job *job)
 {
-    char model_path[SDM_PATH_TEXT_MAX], path[SDM_PATH_TEXT_MAX];
-    sdm_model *model = NULL;
-    if (run->args->force || experiment_path(run, job->index, "model.sdm", model_path, NULL)) return STOCK_NONE;
-    const bool has_model = !access(model_path, F_OK);
-    if (has_model && !sdm_model_open(model_path, &model, NULL)) {
-        const bool same = is_same(job->config, model_path, sdm_model_get_info(model)->config);
-        sdm_model_free(model);
-        if (same) return STOCK_MODEL;
-    }
-    if (!experiment_path(run, job->index, "checkpoint.sdmc", path, NULL) && !access(path, F_OK))
-        return STOCK_CHECKPOINT;
-    return has_model ? STOCK_OTHER : STOCK_NONE;
+    char model[SDM_PATH_TEXT_MAX], checkpoint[SDM_PATH_TEXT_MAX];
+    if (run->args->force || experiment_path(run, job->index, "model.sdm", model, NULL) ||
+        experiment_path(run, job->index, "checkpoint.sdmc", checkpoint, NULL))
+        return STOCK_NONE;
+    if (is_same_model(job->config, model)) return STOCK_MODEL;
+    if (is_same_checkpoint(job->config, checkpoint)) return STOCK_CHECKPOINT;
+    return access(model, F_OK) && access(checkpoint, F_OK) ? STOCK_NONE : STOCK_OTHER;
 }

@@ -29,11 +29,9 @@ static sdm_status train(const experiment_run *run, const experiment_job *job, bo
     cli_progress progress;
     sdm_train_report report = {0};
     const sdm_train_hooks hooks = cli_train_hooks(&progress);
-    sdm_status s = check_budget(run, job, err);
-    if (s) return s;
     const long before = bench_peak_start();
     cli_progress_start(&progress);
-    s = sdm_train(job->config, job->shape, job->config->output.folder, resume, &hooks, &report, err);
+    const sdm_status s = sdm_train(job->config, job->shape, job->config->output.folder, resume, &hooks, &report, err);
     cli_progress_clear(&progress);
     if (!s)
         experiment_log(run, "%s: trained in %.1f s, peak of the memory %.0f MB", run->e->rows[job->index].title,
@@ -41,7 +39,7 @@ static sdm_status train(const experiment_run *run, const experiment_job *job, bo
     return s;
 }
 
-/* A checkpoint of another configuration is refused; then training starts anew. */
+/* A checkpoint of other maps (another plug-in or data file) is refused; then training starts anew. */
 sdm_status experiment_provide(const experiment_run *run, const experiment_job *job, experiment_result *out,
                               sdm_error *err)
 {
@@ -52,13 +50,15 @@ sdm_status experiment_provide(const experiment_run *run, const experiment_job *j
         experiment_log(run, "%s: the model in %s is loaded, not trained again", title, job->config->output.folder);
         return SDM_OK;
     }
+    sdm_status s = check_budget(run, job, err);
+    if (s) return s;
     if (stock == STOCK_OTHER)
-        experiment_log(run, "%s: the model in %s has another configuration and is replaced", title,
+        experiment_log(run, "%s: the model or checkpoint in %s has another configuration and is replaced", title,
                        job->config->output.folder);
     experiment_log(run, "%s: training%s, %s", title, stock == STOCK_CHECKPOINT ? " goes on" : "", out->grid);
-    sdm_status s = train(run, job, stock == STOCK_CHECKPOINT, err);
+    s = train(run, job, stock == STOCK_CHECKPOINT, err);
     if (s == SDM_E_CONFIG && stock == STOCK_CHECKPOINT) {
-        experiment_log(run, "%s: the checkpoint has another configuration; training starts anew", title);
+        experiment_log(run, "%s: the checkpoint is of other maps; training starts anew", title);
         s = train(run, job, false, err);
     }
     return s;

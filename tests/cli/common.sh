@@ -32,6 +32,19 @@ expect() {
     fi
 }
 
+# stopped_at PATTERN ARGUMENT...: sdmgen gets SIGTERM when its stderr, left in `err`, has the pattern; its exit code is 130.
+stopped_at() {
+    local pattern=$1 pid code
+    shift
+    "$program" "$@" >out 2>err &
+    pid=$!
+    for _ in $(seq 300); do grep -Eq -- "$pattern" err && break || sleep 0.2; done
+    kill -TERM $pid
+    wait $pid
+    code=$?
+    [ $code -eq 130 ] || bad "exit code $code when stopped: $* ($(cat err))"
+}
+
 # has PATTERN: the stdout of the last expect has a line that matches.
 has() { grep -Eq -- "$1" out || bad "no '$1' in: $(head -c 600 out)"; }
 

@@ -47,15 +47,19 @@ static sdm_status open_network(const experiment_run *run, const experiment_job *
                                sdm_model **model, sdm_error *err)
 {
     const char *given = run->e->fit.model;
+    const experiment_result *trained = &run->results[out->row->network_row];
     char path[SDM_PATH_TEXT_MAX];
     sdm_status s = SDM_OK;
     out->loaded = *given != 0;
+    // a model that lies there may be that of another configuration
+    if (!*given && trained != out && trained->state != EXPERIMENT_DONE)
+        return sdm_fail(err, trained->state == EXPERIMENT_MISSING ? SDM_E_UNSUPPORTED : SDM_E_QUALITY,
+                        "its network is that of '%s', which was not done", trained->row->title);
     if (*given)
         snprintf(path, sizeof path, "%s", given);
     else
         s = experiment_path(run, out->row->network_row, "model.sdm", path, err);
-    if (!s && !*given && out->row->method->fit == SDM_EXPERIMENT_FIT_NETWORK)
-        s = experiment_provide(run, job, out, err);
+    if (!s && !*given && trained == out) s = experiment_provide(run, job, out, err);
     if (!s) s = sdm_model_open(path, model, err);
     return s ? s : check_model(job, path, sdm_model_get_info(*model), err);
 }

@@ -96,6 +96,13 @@ absent run2/network/model.sdm
 expect 0 - sdmgen experiment tiny.yaml --dry-run fit.model=run/network/model.sdm
 has '^network +pod .*load, fit +phantoms 2 '
 
+# another configuration over the budget: the network is not trained, and polishing does not take the one of before
+sdmgen experiment tiny.yaml network.width=8 train.minutes=3 experiment.minutes=2 fit.phantoms=1 --out run >out 2>err
+[ $? -eq 4 ] || bad "over the budget: exit code"
+grep -q '^| network (failed) |' run/table.md || bad 'trained over the budget'
+grep -q "polished: failed: its network is that of 'network', which was not done" run/table.md || bad "polished by another network: $(cat run/table.md)"
+! grep -q 'is replaced' err || bad 'said to be replaced, but not trained'
+
 # a start far off: fits that fail are counted and told, not averaged
 expect 0 - sdmgen experiment tiny.yaml --out far --quiet fit.off_mm=9 fit.phantoms=1 fit.model=run/network/model.sdm
 [ "$(cell far/table.csv exact - fits)" = 0 ] && [ -z "$(cell far/parameters.csv exact rx error)" ] || bad 'a failed fit was averaged'

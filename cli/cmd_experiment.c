@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "commands.h"
 #include "experiment_fit.h"
@@ -84,10 +85,19 @@ static sdm_status sum_up(const experiment_run *run, sdm_status first, size_t fai
                          sdm_error *err)
 {
     if (first == SDM_E_CANCELLED)
-        return sdm_fail(err, first, "interrupted; the same command goes on where it stopped (%s)", run->folder);
+        return sdm_fail(err, first, "interrupted; the same command%s goes on where it stopped (%s)",
+                        run->args->force ? " without --force" : "", run->folder);
     if (failed == 0) return SDM_OK;
     return sdm_fail(err, first, "%zu of %zu rows failed; the first: %.*s", failed, run->e->n_rows,
                     (int)strcspn(why->text, "\n"), why->text);
+}
+
+/* An interrupted run leaves the tables of an earlier one as they are: its own have rows that were not done. */
+static bool keeps_tables(const experiment_run *run, sdm_status first)
+{
+    char path[SDM_PATH_TEXT_MAX + 16];
+    snprintf(path, sizeof path, "%s/table.json", run->folder);
+    return first == SDM_E_CANCELLED && !access(path, F_OK);
 }
 
 static sdm_status run_rows(const experiment_run *run, sdm_error *err)
@@ -109,7 +119,7 @@ static sdm_status run_rows(const experiment_run *run, sdm_error *err)
     find_speedups(run);
     sdm_text markdown = {0};
     sdm_json json = {0};
-    sdm_status s = experiment_write_tables(run, &markdown, &json, err);
+    sdm_status s = keeps_tables(run, first) ? SDM_OK : experiment_write_tables(run, &markdown, &json, err);
     if (!s && first != SDM_E_CANCELLED) {
         if (run->args->json)
             puts(json.text.data);

@@ -85,7 +85,7 @@ grep -q 'has another configuration and is replaced' err || bad "not said: $(cat 
 # a checkpoint is gone on from with the same budget alone: with another one the model would not be that of its configuration
 stopped_at 'bases and' experiment tiny.yaml train.steps=1000000000 --out stopped --peers none
 grep -q 'the same command goes on where it stopped' err || bad "not said: $(cat err)"
-present stopped/pod/checkpoint.sdmc
+present stopped/pod/checkpoint.sdmc stopped/table.md
 expect 0 - sdmgen experiment tiny.yaml train.steps=1000000000 --dry-run --out stopped
 has '^POD .*go on training, measure'
 expect 0 - sdmgen experiment tiny.yaml --dry-run --out stopped
@@ -93,6 +93,12 @@ has '^POD .*train anew, measure'
 sdmgen experiment tiny.yaml experiment.pictures=no --out stopped --peers none >out 2>err || bad "after the interrupt: $(cat err)"
 grep -q 'POD: the model or checkpoint in stopped/pod has another configuration and is replaced' err || bad "not said: $(cat err)"
 grep -q '"evaluate", "step": 20,' stopped/pod/metrics.jsonl || bad "not 20 steps: $(tail -n 1 stopped/pod/metrics.jsonl)"
+
+# an interrupt leaves the tables of the run before; --force trained anew what it reached, so without it the rest goes on
+tables=$(cksum stopped/table.*)
+stopped_at 'bases and' experiment tiny.yaml train.steps=1000000000 --out stopped --peers none --force
+grep -q 'the same command without --force goes on where it stopped' err || bad "not said: $(cat err)"
+[ "$tables" = "$(cksum stopped/table.*)" ] || bad "tables of rows that were not done: $(cat stopped/table.md)"
 
 # a row that fails: its reason is in the table, the others are done, the exit code tells
 sed 's/^  - {name: naive.*/&\n  - {name: wrong, network: pod, set: {grid.centre: [900, 900, 900], train.steps: 20}}/' tiny.yaml >wrong.yaml

@@ -1,9 +1,9 @@
 /* sdmgen info: what a model, level set, image or mesh file holds. */
 #include <stdio.h>
 #include <string.h>
-#include <strings.h>
 
 #include "commands.h"
+#include "files.h"
 #include "report_audit.h"
 #include "report_image.h"
 #include "sdm/memory.h"
@@ -11,12 +11,6 @@
 #include "sdm/vdb.h"
 #include "setup.h"
 #include "terminal.h"
-
-static bool ends_with(const char *path, const char *suffix)
-{
-    const size_t n = strlen(path), m = strlen(suffix);
-    return n > m && !strcasecmp(path + n - m, suffix);
-}
 
 static void print_model(const char *path, const sdm_model_info *m)
 {
@@ -176,7 +170,7 @@ sdm_status cmd_info(const cli_args *args, sdm_error *err)
     static const char *const meshes[] = {".ply", ".stl", ".obj", ".off"};
     const char *path = args->files.items[0];
     for (size_t i = 0; i < sizeof meshes / sizeof *meshes; i++)
-        if (ends_with(path, meshes[i])) return info_mesh(args, path, err);
+        if (cli_ends_with(path, meshes[i])) return info_mesh(args, path, err);
     if (sdm_volume_knows(path)) return info_image(args, path, err);
-    return ends_with(path, ".vdb") ? info_vdb(args, path, err) : info_model(args, path, err);
+    return cli_ends_with(path, ".vdb") ? info_vdb(args, path, err) : info_model(args, path, err);
 }

@@ -2,6 +2,7 @@
 #include <stdio.h>
 
 #include "commands.h"
+#include "files.h"
 #include "output.h"
 #include "report_audit.h"
 #include "sdm/memory.h"
@@ -49,7 +50,9 @@ sdm_status cmd_mesh(const cli_args *args, sdm_error *err)
         return sdm_fail(err, SDM_E_ARG, "mesh: an output is needed: -o FILE, or --audit");
     sdm_registry *registry = NULL;
     sdm_mesh mesh = {0};
-    sdm_status s = cli_check_outputs(&args->outputs, true, err);
+    sdm_status s = SDM_OK;
+    for (size_t i = 0; i < args->outputs.n && !s; i++) s = cli_check_type(args->outputs.items[i], true, err);
+    if (!s) s = cli_check_files(args, NULL, err);
     if (!s) s = cli_open_registry(args, &registry, err);
     if (!s) s = make_mesh(args, registry, &mesh, err);
     for (size_t i = 0; i < args->outputs.n && !s; i++) s = sdm_mesh_write(args->outputs.items[i], &mesh, err);

@@ -2,9 +2,9 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <strings.h>
 
 #include "commands.h"
+#include "files.h"
 #include "phantom.h"
 #include "sdm/file.h"
 #include "sdm/image.h"
@@ -13,26 +13,18 @@
 #include "setup.h"
 #include "terminal.h"
 
-static bool ends_with(const char *path, const char *suffix)
-{
-    const size_t n = strlen(path), k = strlen(suffix);
-    return n > k && !strcasecmp(path + n - k, suffix);
-}
-
 static bool is_volume(const char *path)
 {
-    return ends_with(path, ".nii") || ends_with(path, ".nii.gz") || ends_with(path, ".nrrd") || ends_with(path, ".mha");
+    return cli_ends_with(path, ".nii") || cli_ends_with(path, ".nii.gz") || cli_ends_with(path, ".nrrd") ||
+           cli_ends_with(path, ".mha");
 }
 
-/* ---- before any work: files that could not be written ---- */
+/* ---- before any work ---- */
 
-static sdm_status check_file(const char *option, const char *path, bool known, const char *types, sdm_error *err)
+static sdm_status check_type(const char *option, const char *path, bool known, const char *types, sdm_error *err)
 {
-    if (!known) return sdm_fail(err, SDM_E_ARG, "%s '%s': its name must end in %s", option, path, types);
-    sdm_outfile *trial = NULL; /* the only honest test of "can be written" */
-    const sdm_status s = sdm_outfile_open(path, &trial, err);
-    sdm_outfile_discard(&trial);
-    return s;
+    if (known) return SDM_OK;
+    return sdm_fail(err, SDM_E_ARG, "%s '%s': its name must end in %s", option, path, types);
 }
 
 static sdm_status check_files(const cli_args *args, sdm_error *err)
@@ -43,15 +35,12 @@ static sdm_status check_files(const cli_args *args, sdm_error *err)
     sdm_status s = SDM_OK;
     for (size_t i = 0; i < args->outputs.n && !s; i++) {
         const char *path = args->outputs.items[i];
-        bool twice = (label && !strcmp(path, label)) || (truth && !strcmp(path, truth));
-        for (size_t k = 0; k < i; k++) twice |= !strcmp(path, args->outputs.items[k]);
-        if (twice) return sdm_fail(err, SDM_E_ARG, "output '%s' is given twice", path);
-        s = check_file("output", path, is_volume(path) || ends_with(path, ".npy"), ".nii .nii.gz .nrrd .mha or .npy",
-                       err);
+        s = check_type("output", path, is_volume(path) || cli_ends_with(path, ".npy"),
+                       ".nii .nii.gz .nrrd .mha or .npy", err);
     }
-    if (!s && label) s = check_file("--label", label, is_volume(label), ".nii .nii.gz .nrrd or .mha", err);
-    if (!s && truth) s = check_file("--truth", truth, ends_with(truth, ".json"), ".json", err);
-    return s;
+    if (!s && label) s = check_type("--label", label, is_volume(label), ".nii .nii.gz .nrrd or .mha", err);
+    if (!s && truth) s = check_type("--truth", truth, cli_ends_with(truth, ".json"), ".json", err);
+    return s ? s : cli_check_files(args, NULL, err);
 }
 
 /* ---- after it ---- */
@@ -78,7 +67,7 @@ static sdm_status write_images(const cli_phantom *p, const float *values, const 
     if (clipped) cli_notice("%zu values do not fit in int16 and were clipped; --type float32 keeps them", clipped);
     for (size_t i = 0; i < outputs->n && !s; i++) {
         const char *path = outputs->items[i];
-        if (ends_with(path, ".npy"))
+        if (cli_ends_with(path, ".npy"))
             s = sdm_image_write(path, &p->grid, values, text, err);
         else if (whole)
             s = sdm_volume_write(path, &p->grid, rounded, SDM_VOXEL_INT16, text, err);

@@ -1,10 +1,10 @@
 /* sdmgen verify: is a model, level set or image file whole, and as accurate as it says? */
 #include <stdio.h>
 #include <string.h>
-#include <strings.h>
 
 #include "commands.h"
 #include "evaluate.h"
+#include "files.h"
 #include "sdm/memory.h"
 #include "sdm/vdb.h"
 #include "sdm/volume.h"
@@ -118,7 +118,6 @@ static sdm_status verify_model(const cli_args *args, const char *path, sdm_error
 sdm_status cmd_verify(const cli_args *args, sdm_error *err)
 {
     const char *path = args->files.items[0];
-    const size_t n = strlen(path);
-    if (n > 4 && !strcasecmp(path + n - 4, ".vdb")) return verify_vdb(args, path, err);
+    if (cli_ends_with(path, ".vdb")) return verify_vdb(args, path, err);
     return sdm_volume_knows(path) ? verify_image(args, path, err) : verify_model(args, path, err);
 }

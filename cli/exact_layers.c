@@ -2,10 +2,9 @@
 #include "exact_layers.h"
 
 #include <math.h>
-
 #include <string.h>
-#include <strings.h>
 
+#include "files.h"
 #include "output.h"
 #include "sdm/image.h"
 #include "sdm/memory.h"
@@ -27,15 +26,12 @@ bool cli_layers_wanted(const cli_args *args)
 
 sdm_status cli_layers_check(const cli_args *args, sdm_error *err)
 {
-    cli_list all = {.n = args->outputs.n};
-    sdm_status s = SDM_ALLOC(&all.items, all.n + N_LAYERS, "list of outputs", err);
-    for (size_t i = 0; i < args->outputs.n && !s; i++) all.items[i] = args->outputs.items[i];
+    sdm_status s = SDM_OK;
+    for (size_t i = 0; i < args->outputs.n && !s; i++) s = cli_check_type(args->outputs.items[i], false, err);
     for (int i = 0; i < N_LAYERS && !s; i++) {
         const char *path = path_of(args, i);
         if (!path) continue;
-        const size_t length = strlen(path);
-        all.items[all.n++] = path;
-        if (length <= 4 || strcasecmp(path + length - 4, ".npy"))
+        if (!cli_ends_with(path, ".npy"))
             s = sdm_fail(err, SDM_E_ARG, "--%s '%s': its name must end in .npy", names[i], path);
         else if (strcmp(args->method, "exact"))
             s = sdm_fail(err, SDM_E_ARG, "--%s needs --method exact", names[i]);
@@ -44,17 +40,14 @@ sdm_status cli_layers_check(const cli_args *args, sdm_error *err)
         s = sdm_fail(err, SDM_E_ARG, "--narrow needs --method exact");
     const double band = args->band > 0 ? args->band : 3;
     for (size_t i = 0; i < args->outputs.n && !s && args->narrow > 0 && !args->dense; i++) {
-        const char *dot = strrchr(args->outputs.items[i], '.');
-        if (dot && !strcasecmp(dot, ".vdb") && !(args->narrow > band))
+        if (cli_ends_with(args->outputs.items[i], ".vdb") && !(args->narrow > band))
             s = sdm_fail(err, SDM_E_ARG,
                          "--narrow %g is too narrow for a level set with --band %g: give more than that", args->narrow,
                          band);
     }
     if (!s && args->jacobian && !args->shape)
         s = sdm_fail(err, SDM_E_ARG, "--jacobian needs --shape: a mesh file has no parameters");
-    if (!s) s = cli_check_outputs(&all, false, err);
-    sdm_free((void *)all.items);
-    return s;
+    return s ? s : cli_check_files(args, NULL, err);
 }
 
 sdm_status cli_layers_velocity(cli_layers *l, const cli_args *args, const sdm_instance *shape, const double *params,

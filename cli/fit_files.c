@@ -1,65 +1,31 @@
 /* The output files of a fit. */
 #include <stdio.h>
-#include <string.h>
-#include <strings.h>
 
+#include "files.h"
 #include "fit.h"
 #include "output.h"
 #include "sdm/file.h"
 #include "sdm/memory.h"
 #include "setup.h"
 
-static bool ends_with(const char *path, const char *suffix)
-{
-    const size_t n = strlen(path), k = strlen(suffix);
-    return n > k && !strcasecmp(path + n - k, suffix);
-}
-
 /* Types that lie on the grid of the image; the others have the pose of the shape. */
 static bool is_image(const char *path)
 {
-    return ends_with(path, ".nii") || ends_with(path, ".nii.gz") || ends_with(path, ".nrrd") ||
-           ends_with(path, ".mha") || ends_with(path, ".npy");
+    return cli_ends_with(path, ".nii") || cli_ends_with(path, ".nii.gz") || cli_ends_with(path, ".nrrd") ||
+           cli_ends_with(path, ".mha") || cli_ends_with(path, ".npy");
 }
 
 /* ---- before any work ---- */
 
-static sdm_status try_file(const char *path, sdm_error *err)
-{
-    sdm_outfile *trial = NULL; /* the only honest test of "can be written" */
-    const sdm_status s = sdm_outfile_open(path, &trial, err);
-    sdm_outfile_discard(&trial);
-    return s;
-}
-
-static sdm_status check_label_file(const cli_args *args, sdm_error *err)
-{
-    const char *path = args->fit.label_out;
-    if (!path) return SDM_OK;
-    if (!is_image(path) || ends_with(path, ".npy"))
-        return sdm_fail(err, SDM_E_ARG, "--label-out '%s': its name must end in .nii .nii.gz .nrrd or .mha", path);
-    for (size_t i = 0; i < args->outputs.n; i++)
-        if (!strcmp(path, args->outputs.items[i])) return sdm_fail(err, SDM_E_ARG, "output '%s' is given twice", path);
-    return try_file(path, err);
-}
-
 sdm_status cli_fit_check_files(const cli_args *args, sdm_error *err)
 {
-    cli_list others = {0};
-    sdm_status s = SDM_ALLOC(&others.items, args->outputs.n, "names of the outputs", err);
-    for (size_t i = 0; i < args->outputs.n && !s; i++) {
-        const char *path = args->outputs.items[i];
-        for (size_t k = 0; k < i && !s; k++)
-            if (!strcmp(path, args->outputs.items[k])) s = sdm_fail(err, SDM_E_ARG, "output '%s' is given twice", path);
-        if (!s && ends_with(path, ".json"))
-            s = try_file(path, err);
-        else
-            others.items[others.n++] = path;
-    }
-    if (!s) s = cli_check_outputs(&others, false, err);
-    if (!s) s = check_label_file(args, err);
-    sdm_free((void *)others.items);
-    return s;
+    const char *label = args->fit.label_out;
+    sdm_status s = SDM_OK;
+    for (size_t i = 0; i < args->outputs.n && !s; i++)
+        if (!cli_ends_with(args->outputs.items[i], ".json")) s = cli_check_type(args->outputs.items[i], false, err);
+    if (!s && label && (!is_image(label) || cli_ends_with(label, ".npy")))
+        s = sdm_fail(err, SDM_E_ARG, "--label-out '%s': its name must end in .nii .nii.gz .nrrd or .mha", label);
+    return s ? s : cli_check_files(args, NULL, err);
 }
 
 /* ---- after it ---- */
@@ -146,9 +112,9 @@ sdm_status cli_fit_write_files(const cli_fit *f, sdm_error *err)
     for (size_t i = 0; i < outputs->n && !s; i++) {
         const char *path = outputs->items[i];
         if (is_image(path)) continue;
-        if (ends_with(path, ".json"))
+        if (cli_ends_with(path, ".json"))
             s = write_json(f, path, err);
-        else if (ends_with(path, ".png") && f->target.kind != SDM_FIT_POINTS)
+        else if (cli_ends_with(path, ".png") && f->target.kind != SDM_FIT_POINTS)
             s = cli_fit_write_picture(f, path, err);
         else
             s = write_map(&d, path, &f->posed, f->map, err);

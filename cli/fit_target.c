@@ -1,8 +1,8 @@
 /* What a fit is made to: an image, labels, a mesh or points. */
 #include <math.h>
 #include <string.h>
-#include <strings.h>
 
+#include "files.h"
 #include "fit.h"
 #include "sdm/image.h"
 #include "sdm/memory.h"
@@ -11,15 +11,10 @@
 
 enum { POINTS_MOST = 50000 }; /* more vertices of a mesh add time, not knowledge */
 
-static bool ends_with(const char *path, const char *suffix)
-{
-    const size_t n = strlen(path), k = strlen(suffix);
-    return n > k && !strcasecmp(path + n - k, suffix);
-}
-
 static bool is_mesh(const char *path)
 {
-    return ends_with(path, ".ply") || ends_with(path, ".stl") || ends_with(path, ".obj") || ends_with(path, ".off");
+    return cli_ends_with(path, ".ply") || cli_ends_with(path, ".stl") || cli_ends_with(path, ".obj") ||
+           cli_ends_with(path, ".off");
 }
 
 void cli_turn_ras(double *points, size_t n)
@@ -105,9 +100,9 @@ static sdm_status read_vertices(cli_fit *f, sdm_error *err)
 static sdm_status read_points(cli_fit *f, sdm_error *err)
 {
     if (f->args->fit.labels.n) return sdm_fail(err, SDM_E_ARG, "fit: --label is of volumes, %s has no labels", f->path);
-    const sdm_status s = ends_with(f->path, ".csv")   ? read_table(f, err)
-                         : ends_with(f->path, ".npy") ? read_array(f, err)
-                                                      : read_vertices(f, err);
+    const sdm_status s = cli_ends_with(f->path, ".csv")   ? read_table(f, err)
+                         : cli_ends_with(f->path, ".npy") ? read_array(f, err)
+                                                          : read_vertices(f, err);
     if (s) return s;
     for (size_t i = 0; i < 3 * f->target.n_points; i++)
         if (!isfinite(f->points[i]))
@@ -124,7 +119,8 @@ static sdm_status read_points(cli_fit *f, sdm_error *err)
 sdm_status cli_fit_read_target(cli_fit *f, sdm_error *err)
 {
     if (sdm_volume_knows(f->path)) return read_volume(f, err);
-    if (is_mesh(f->path) || ends_with(f->path, ".csv") || ends_with(f->path, ".npy")) return read_points(f, err);
+    if (is_mesh(f->path) || cli_ends_with(f->path, ".csv") || cli_ends_with(f->path, ".npy"))
+        return read_points(f, err);
     return sdm_fail(err, SDM_E_ARG,
                     "fit: image '%s': its name must end in .nii .nii.gz .nrrd .nhdr .mha .mhd (volume), .ply .stl .obj "
                     ".off (mesh), .csv or .npy (points)",

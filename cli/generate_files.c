@@ -1,9 +1,7 @@
 /* From the names on the command line to those of each row. */
 #include "generate_files.h"
 
-#include <string.h>
-#include <strings.h>
-
+#include "files.h"
 #include "output.h"
 #include "sdm/config.h"
 #include "sdm/memory.h"
@@ -38,8 +36,7 @@ void cli_row_files_dispose(cli_row_files *f)
 
 static sdm_status check_array(const char *option, const char *path, sdm_error *err)
 {
-    const size_t length = path ? strlen(path) : 0;
-    if (!path || (length > 4 && !strcasecmp(path + length - 4, ".npy"))) return SDM_OK;
+    if (!path || cli_ends_with(path, ".npy")) return SDM_OK;
     return sdm_fail(err, SDM_E_ARG, "--%s '%s': its name must end in .npy", option, path);
 }
 
@@ -49,7 +46,8 @@ sdm_status cli_row_files_check(const cli_args *args, size_t last, sdm_error *err
     sdm_status s = check_array("gradient", args->gradient, err);
     if (!s) s = check_array("jacobian", args->jacobian, err);
     if (!s) s = cli_row_files_name(args, last, &f, err);
-    if (!s) s = cli_check_outputs(&f.list, false, err);
+    for (size_t i = 0; i < f.list.n && !s; i++) s = cli_check_type(f.list.items[i], false, err);
+    if (!s) s = cli_check_files(args, &f.list, err);
     cli_row_files_dispose(&f);
     return s;
 }

@@ -4,9 +4,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
-#include "sdm/file.h"
+#include "files.h"
 #include "sdm/image.h"
 #include "sdm/meshfile.h"
 #include "sdm/vdb.h"
@@ -24,17 +23,15 @@ enum { N_KINDS = sizeof kinds / sizeof *kinds };
 
 static file_kind kind_of(const char *path, const char **suffix)
 {
-    const size_t length = strlen(path);
     for (size_t i = 0; i < N_KINDS; i++) {
-        const size_t n = strlen(kinds[i].suffix);
-        if (length <= n || strcasecmp(path + length - n, kinds[i].suffix)) continue;
-        if (suffix) *suffix = path + length - n;
+        if (!cli_ends_with(path, kinds[i].suffix)) continue;
+        if (suffix) *suffix = path + strlen(path) - strlen(kinds[i].suffix);
         return kinds[i].kind;
     }
     return KIND_NONE;
 }
 
-static sdm_status check_output(const char *path, bool meshes_only, sdm_error *err)
+sdm_status cli_check_type(const char *path, bool meshes_only, sdm_error *err)
 {
     const file_kind kind = kind_of(path, NULL);
     if (meshes_only && kind != KIND_SURFACE)
@@ -47,22 +44,7 @@ static sdm_status check_output(const char *path, bool meshes_only, sdm_error *er
 #ifndef SDM_HAVE_VDB
     if (kind == KIND_VDB) return sdm_fail(err, SDM_E_UNSUPPORTED, "output '%s': built without OpenVDB", path);
 #endif
-    sdm_outfile *trial = NULL; /* the only honest test of "can be written" */
-    const sdm_status s = sdm_outfile_open(path, &trial, err);
-    sdm_outfile_discard(&trial);
-    return s;
-}
-
-sdm_status cli_check_outputs(const cli_list *outputs, bool meshes_only, sdm_error *err)
-{
-    sdm_status s = SDM_OK;
-    for (size_t i = 0; i < outputs->n && !s; i++) {
-        for (size_t k = 0; k < i && !s; k++)
-            if (!strcmp(outputs->items[i], outputs->items[k]))
-                s = sdm_fail(err, SDM_E_ARG, "output '%s' is given twice", outputs->items[i]);
-        if (!s) s = check_output(outputs->items[i], meshes_only, err);
-    }
-    return s;
+    return SDM_OK;
 }
 
 /* What made the map, in a word. */

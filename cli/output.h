@@ -20,8 +20,8 @@ typedef struct cli_map {
     const sdm_check *check; /* of the network's map; NULL: not checked */
 } cli_map;
 
-/* Checks, before any work, that the type of each file is known and that the file can be made. SDM_E_ARG, SDM_E_IO. */
-sdm_status cli_check_outputs(const cli_list *outputs, bool meshes_only, sdm_error *err);
+/* Checks, before any work, that the type of the file is known by its name. SDM_E_ARG, SDM_E_UNSUPPORTED. */
+sdm_status cli_check_type(const char *path, bool meshes_only, sdm_error *err);
 
 /* Writes the map to `path`. Notices (a surface cut by the grid) go to stderr. */
 sdm_status cli_write_map(const char *path, const cli_map *map, const cli_args *args, sdm_error *err);

@@ -132,6 +132,18 @@ static sdm_status run_rows(const experiment_run *run, sdm_error *err)
     return s ? s : sum_up(run, first, failed, &why, err);
 }
 
+/* Shapes, options and ranges that cannot be are told before anything is done; what else is wrong with a row is its own affair. */
+static sdm_status check_rows(const experiment_run *run, sdm_error *err)
+{
+    for (size_t i = 0; i < run->e->n_rows; i++) {
+        experiment_job job = {0};
+        const sdm_status s = experiment_job_open(run, i, &job, err);
+        experiment_job_close(&job);
+        if (s == SDM_E_CONFIG) return s;
+    }
+    return SDM_OK;
+}
+
 static sdm_status run_experiment(const cli_args *args, const sdm_experiment *e, const sdm_registry *registry,
                                  sdm_error *err)
 {
@@ -144,6 +156,7 @@ static sdm_status run_experiment(const cli_args *args, const sdm_experiment *e, 
         run.results[i].row = &e->rows[i];
         for (int f = 0; f < SDM_N_FIGURES; f++) run.results[i].figure[f] = NAN;
     }
+    if (!s) s = check_rows(&run, err);
     if (!s && !args->dry_run) s = sdm_make_folder(run.folder, err);
     if (!s) s = args->dry_run ? experiment_print_plan(&run, err) : run_rows(&run, err);
     for (size_t i = 0; run.results && i < e->n_rows; i++) experiment_fits_free(run.results[i].fits);

@@ -197,17 +197,6 @@ static void set_figures(experiment_result *out)
 
 /* ---- rows ---- */
 
-/* Every name of a reference's differences is a parameter. */
-static sdm_status check_reference(const experiment_job *job, const experiment_result *out, sdm_error *err)
-{
-    const sdm_experiment_reference *r = out->row->reference;
-    for (size_t i = 0; r && i < r->n_differences; i++)
-        if (sdm_instance_param_index(job->shape, r->differences[i].name) < 0)
-            return sdm_fail(err, SDM_E_CONFIG, "reference: difference: the shape has no parameter '%s'",
-                            r->differences[i].name);
-    return SDM_OK;
-}
-
 static sdm_status time_naive(const experiment_run *run, const experiment_job *job, experiment_result *out,
                              sdm_error *err)
 {
@@ -243,9 +232,8 @@ sdm_status experiment_fit_row(const experiment_run *run, experiment_job *job, ex
     const bool by_network = fit == SDM_EXPERIMENT_FIT_NETWORK || fit == SDM_EXPERIMENT_FIT_POLISH;
     sdm_model *model = NULL;
     sdm_error why = {0};
-    sdm_status s = check_reference(job, out, err);
-    if (s || fit == SDM_EXPERIMENT_FIT_NAIVE) return s ? s : time_naive(run, job, out, err);
-    if (by_network) s = open_network(run, job, out, &model, err);
+    if (fit == SDM_EXPERIMENT_FIT_NAIVE) return time_naive(run, job, out, err);
+    sdm_status s = by_network ? open_network(run, job, out, &model, err) : SDM_OK;
     const sdm_fit_source source = {.model = model, .shape = job->shape, .grid = job->maker.grid};
     if (!s) s = fit_all(run, job, &source, out, &why, err);
     if (!s) set_figures(out);

@@ -20,6 +20,17 @@ static void describe_grid(const sdm_grid *g, char *buf, size_t size)
     snprintf(buf + used, size - (size_t)used, same ? "%.4g mm" : "%.4g x %.4g x %.4g mm", h[0], h[1], h[2]);
 }
 
+/* Every name of a reference's differences is a parameter. */
+static sdm_status check_reference(const experiment_run *run, const experiment_job *job, sdm_error *err)
+{
+    const sdm_experiment_reference *r = run->e->rows[job->index].reference;
+    for (size_t i = 0; r && i < r->n_differences; i++)
+        if (sdm_instance_param_index(job->shape, r->differences[i].name) < 0)
+            return sdm_fail(err, SDM_E_CONFIG, "%s:%d:%d: reference: difference: the shape has no parameter '%s'",
+                            run->e->file, r->mark.line, r->mark.column, r->differences[i].name);
+    return SDM_OK;
+}
+
 sdm_status experiment_job_open(const experiment_run *run, size_t index, experiment_job *job, sdm_error *err)
 {
     job->index = index;
@@ -38,6 +49,7 @@ sdm_status experiment_job_open(const experiment_run *run, size_t index, experime
     m->grid = job->config->grid;
     describe_grid(&m->grid, run->results[index].grid, sizeof run->results[index].grid);
     s = sdm_train_ranges(job->config, job->shape, m->min, m->max, err);
+    if (!s) s = check_reference(run, job, err);
     for (size_t i = 0; i < m->n_params && !s; i++) job->nominal[i] = fmin(m->max[i], fmax(m->min[i], params[i].def));
     return s;
 }

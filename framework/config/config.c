@@ -9,21 +9,16 @@
 #include "sdm/memory.h"
 #include "yaml_tree.h"
 
-/* "dir/cochlea.yaml" -> "runs/cochlea"; bytes that a text must not hold become '_'. */
-static void default_folder(const char *file, char *out, size_t size)
+void sdm_bare_name(const char *file, const char *none, char out[256])
 {
     const char *slash = strrchr(file, '/'), *base = slash ? slash + 1 : file, *dot = strrchr(base, '.');
-    size_t length = dot && dot != base ? (size_t)(dot - base) : strlen(base);
-    if (length > 200) length = 200;
-    snprintf(out, size, "runs/%.*s", (int)length, length ? base : "config");
-    if (!length) snprintf(out, size, "runs/config");
+    const int length = dot && dot != base ? (int)(dot - base) : 200;
+    snprintf(out, 256, "%.*s", length < 200 ? length : 200, *base ? base : none);
     for (size_t n = strlen(out), bad; (bad = sdm_tree_printable(out, n)) < n;) out[bad] = '_';
 }
 
-/* One "key=value". Mistakes are recorded; another status only when nothing can go on. */
-static sdm_status apply_override(sdm_reader *r, const char *text, int number, sdm_error *err)
+sdm_status sdm_config_override(sdm_reader *r, const char *text, sdm_mark mark, sdm_error *err)
 {
-    const sdm_mark mark = {.override = number};
     const char *equals = strchr(text, '=');
     size_t names = 1;
     if (!equals || equals == text) {
@@ -37,11 +32,11 @@ static sdm_status apply_override(sdm_reader *r, const char *text, int number, sd
         return SDM_OK;
     }
     sdm_tree tree = {0};
-    sdm_status s = sdm_tree_parse(&tree, equals + 1, strlen(equals + 1), number, r->mistakes, err);
-    if (!s) s = sdm_tree_wrap(&tree, text, length, number, err);
+    sdm_status s = sdm_tree_parse(&tree, equals + 1, strlen(equals + 1), mark, r->mistakes, err);
+    if (!s) s = sdm_tree_wrap(&tree, text, length, mark, err);
     if (!s) {
         sdm_fields_read(r, tree.root);
-        sdm_config_settle_override(r, number);
+        if (r->config) sdm_config_settle_override(r, mark.override);
     }
     sdm_tree_dispose(&tree);
     return s == SDM_E_CONFIG ? SDM_OK : s;
@@ -49,26 +44,32 @@ static sdm_status apply_override(sdm_reader *r, const char *text, int number, sd
 
 /* Mistakes of the YAML itself end here: after them every key would seem to be missing. */
 static sdm_status read_all(sdm_reader *r, const char *text, size_t size, const char *const *overrides,
-                           size_t n_overrides, sdm_error *err)
+                           const sdm_mark *places, size_t n_overrides, sdm_error *err)
 {
     sdm_tree tree = {0};
     sdm_mark top = {.line = 1, .column = 1};
-    sdm_status s = sdm_tree_parse(&tree, text, size, 0, r->mistakes, err);
+    sdm_status s = sdm_tree_parse(&tree, text, size, (sdm_mark){0}, r->mistakes, err);
     if (!s) sdm_fields_read(r, tree.root);
     r->file_kind = r->config->network.kind;
     const bool is_keyed = !tree.root || tree.root->kind == SDM_TREE_MAP || sdm_tree_is_empty(tree.root);
     sdm_tree_dispose(&tree);
     if (s == SDM_E_CONFIG || (!s && !is_keyed)) return sdm_mistakes_report(r->mistakes, err);
 
-    for (size_t i = 0; i < n_overrides && !s; i++) s = apply_override(r, overrides[i], (int)i + 1, err);
+    for (size_t i = 0; i < n_overrides && !s; i++) {
+        sdm_mark mark = {.source = overrides[i]};
+        if (places && places[i].line > 0) mark = places[i];
+        mark.override = (int)i + 1;
+        s = sdm_config_override(r, overrides[i], mark, err);
+    }
     if (s) return s;
     sdm_config_finish(r, top);
     return sdm_mistakes_report(r->mistakes, err);
 }
 
 sdm_status sdm_config_parse_placed(const char *name, const char *text, size_t size, const char *const *overrides,
-                                   const char *const *places, size_t n_overrides, sdm_config *out, sdm_error *err)
+                                   const sdm_mark *places, size_t n_overrides, sdm_config *out, sdm_error *err)
 {
+    char bare[256];
     if (!name || !out || (!text && size) || (!overrides && n_overrides) || n_overrides > 10000)
         return sdm_fail(err, SDM_E_ARG,
                         "a configuration needs a name, a text, a place for the result and at most 10000 "
@@ -81,12 +82,13 @@ sdm_status sdm_config_parse_placed(const char *name, const char *text, size_t si
 
     memset(out, 0, sizeof *out);
     snprintf(out->file, sizeof out->file, "%s", name);
-    default_folder(name, out->output.folder, sizeof out->output.folder);
-    sdm_mistakes mistakes = {.file = name, .overrides = overrides, .places = places};
+    sdm_bare_name(name, "config", bare);
+    snprintf(out->output.folder, sizeof out->output.folder, "runs/%s", bare);
+    sdm_mistakes mistakes = {.file = name};
     sdm_reader r = {.target = out, .config = out, .mistakes = &mistakes};
     r.sections = sdm_config_sections(&r.n_sections);
     sdm_fields_set_defaults(&r);
-    sdm_status s = read_all(&r, text ? text : "", size, overrides, n_overrides, err);
+    sdm_status s = read_all(&r, text ? text : "", size, overrides, places, n_overrides, err);
     if (s) memset(out, 0, sizeof *out);
     return s;
 }
@@ -112,12 +114,5 @@ sdm_status sdm_config_read(const char *path, const char *const *overrides, size_
 
 const char *sdm_config_where(const sdm_config *c, sdm_mark mark, char *buf)
 {
-    enum { SIZE = 1200 };
-    if (mark.override > 0)
-        snprintf(buf, SIZE, "key=value argument %d", mark.override);
-    else if (mark.line > 0)
-        snprintf(buf, SIZE, "%s:%d:%d", c->file, mark.line, mark.column);
-    else
-        snprintf(buf, SIZE, "%s", c->file);
-    return buf;
+    return sdm_mark_print(mark, c->file, buf, 1200);
 }

@@ -29,13 +29,15 @@ void sdm_experiment_free(sdm_experiment *e)
 /* ---- one row ---- */
 
 /* Texts and places of every list in turn; returns how many. */
-static size_t gather(const sdm_overrides *const lists[], size_t n_lists, const char **texts, const char **places)
+static size_t gather(const sdm_experiment *e, const sdm_overrides *const lists[], size_t n_lists, const char **texts,
+                     sdm_mark *places)
 {
     size_t n = 0;
     for (size_t k = 0; k < n_lists; k++)
         for (size_t i = 0; lists[k] && i < lists[k]->n; i++, n++) {
             texts[n] = lists[k]->items[i].text;
-            places[n] = lists[k]->items[i].place;
+            places[n] = lists[k]->items[i].mark;
+            places[n].source = e->file;
         }
     return n;
 }
@@ -43,15 +45,14 @@ static size_t gather(const sdm_overrides *const lists[], size_t n_lists, const c
 sdm_status sdm_experiment_config(const sdm_experiment *e, size_t row, sdm_config *out, sdm_error *err)
 {
     enum { N_LISTS = 5 };
-    char kind_text[SDM_NAME_MAX + 32], kind_place[SDM_PATH_TEXT_MAX + 32];
+    char kind_text[SDM_NAME_MAX + 32];
     if (!e || !out || row >= e->n_rows)
         return sdm_fail(err, SDM_E_ARG, "an experiment's configuration needs a row and a place for the result");
     const sdm_experiment_method *m = e->rows[e->rows[row].network_row].method;
     const sdm_experiment_variant *v = e->rows[row].variant;
     /* an engine is not trained, but a training configuration has a budget */
     snprintf(kind_text, sizeof kind_text, "%s%s", *m->engine ? "train.steps=1" : "network.kind=", m->network);
-    snprintf(kind_place, sizeof kind_place, "%s:%d:%d", e->file, m->mark.line, m->mark.column);
-    sdm_override kind = {kind_text, kind_place};
+    sdm_override kind = {kind_text, m->mark};
     const sdm_overrides first = {.items = &kind, .n = 1};
     const sdm_overrides *lists[N_LISTS] = {&e->common, &first, &m->set, v ? &v->set : NULL, &e->command_line};
     if (*m->engine) {
@@ -61,51 +62,28 @@ sdm_status sdm_experiment_config(const sdm_experiment *e, size_t row, sdm_config
     size_t n = 0;
     for (int k = 0; k < N_LISTS; k++) n += lists[k] ? lists[k]->n : 0;
     const char **texts = NULL;
-    sdm_status s = SDM_ALLOC(&texts, 2 * n, "overrides", err);
-    if (!s) n = gather(lists, N_LISTS, texts, texts + n);
+    sdm_mark *places = NULL;
+    sdm_status s = SDM_ALLOC(&texts, n, "overrides", err);
+    if (!s) s = SDM_ALLOC(&places, n, "overrides", err);
+    if (!s) n = gather(e, lists, N_LISTS, texts, places);
     if (!s)
-        s = sdm_config_parse_placed(*e->base ? e->base : e->file, e->base_text, e->base_size, texts, texts + n, n, out,
+        s = sdm_config_parse_placed(*e->base ? e->base : e->file, e->base_text, e->base_size, texts, places, n, out,
                                     err);
+    sdm_free(places);
     sdm_free((void *)texts);
     return s;
 }
 
 /* ---- the whole ---- */
 
-/* The name of a file without folders and ending. */
-static void bare_name(const char *file, char out[256])
-{
-    const char *slash = strrchr(file, '/'), *base = slash ? slash + 1 : file, *dot = strrchr(base, '.');
-    size_t length = dot && dot != base ? (size_t)(dot - base) : strlen(base);
-    if (length > 200) length = 200;
-    snprintf(out, 256, "%.*s", (int)length, length ? base : "experiment");
-    for (size_t n = strlen(out), bad; (bad = sdm_tree_printable(out, n)) < n;) out[bad] = '_';
-    if (!*out) snprintf(out, 256, "experiment");
-}
-
-/* One key=value of the command line. */
+/* One key=value of the command line; those of the training wait for the rows. */
 static sdm_status apply(sdm_experiment *e, sdm_reader *r, const char *text, int number, sdm_error *err)
 {
-    const sdm_mark mark = {.override = number};
-    const char *equals = strchr(text, '=');
-    size_t names = 1;
-    if (!equals || equals == text) {
-        sdm_mistakes_add(r->mistakes, mark, "not of the form key=value");
-        return SDM_OK;
-    }
-    const size_t length = (size_t)(equals - text);
-    if (sdm_experiment_is_training_key(text, length)) return sdm_overrides_add(&e->command_line, text, NULL, err);
-    for (size_t i = 0; i < length; i++) names += text[i] == '.';
-    if (length >= SDM_TREE_PATH_BYTES || names > SDM_TREE_PATH_NAMES) {
-        sdm_mistakes_add(r->mistakes, mark, "unknown key");
-        return SDM_OK;
-    }
-    sdm_tree tree = {0};
-    sdm_status s = sdm_tree_parse(&tree, equals + 1, strlen(equals + 1), number, r->mistakes, err);
-    if (!s) s = sdm_tree_wrap(&tree, text, length, number, err);
-    if (!s) sdm_fields_read(r, tree.root);
-    sdm_tree_dispose(&tree);
-    return s == SDM_E_CONFIG ? SDM_OK : s;
+    const sdm_mark mark = {.override = number, .source = text};
+    const size_t length = strcspn(text, "=");
+    if (text[length] && sdm_experiment_is_training_key(text, length))
+        return sdm_overrides_add(&e->command_line, text, mark, err);
+    return sdm_config_override(r, text, mark, err);
 }
 
 /* The base is a file beside the experiment's: its name becomes a path, its text is kept. */
@@ -139,7 +117,7 @@ static sdm_status read_all(sdm_experiment *e, sdm_reader *r, const char *text, s
                            const char *const *overrides, size_t n_overrides, sdm_error *err)
 {
     sdm_tree tree = {0};
-    sdm_status s = sdm_tree_parse(&tree, text, size, 0, r->mistakes, err);
+    sdm_status s = sdm_tree_parse(&tree, text, size, (sdm_mark){0}, r->mistakes, err);
     if (!s) sdm_fields_read(r, tree.root);
     const bool is_keyed = !tree.root || tree.root->kind == SDM_TREE_MAP || sdm_tree_is_empty(tree.root);
     sdm_tree_dispose(&tree);
@@ -177,12 +155,12 @@ sdm_status sdm_experiment_parse(const char *name, const char *text, size_t size,
     sdm_status s = SDM_ALLOC(&e, 1, "experiment", err);
     if (s) return s;
     snprintf(e->file, sizeof e->file, "%s", name);
-    bare_name(name, bare);
+    sdm_bare_name(name, "experiment", bare);
     snprintf(e->experiment.title, sizeof e->experiment.title, "%s", bare);
     snprintf(e->experiment.folder, sizeof e->experiment.folder, "runs/%s", bare);
     strcpy(e->experiment.reference, "reference");
 
-    sdm_mistakes mistakes = {.file = name, .overrides = overrides};
+    sdm_mistakes mistakes = {.file = name};
     sdm_reader r = {.target = e, .mistakes = &mistakes};
     r.sections = sdm_experiment_sections(&r.n_sections);
     sdm_fields_set_defaults(&r);

@@ -173,19 +173,12 @@ bool sdm_experiment_is_training_key(const char *key, size_t length)
     return false;
 }
 
-static bool refuse(sdm_reader *r, const sdm_tree_node *node, const char *path, const char *wanted)
-{
-    char buf[SDM_QUOTE_MAX + 16];
-    sdm_mistakes_add(r->mistakes, node->mark, "%s: needs %s, got %s", path, wanted, sdm_describe_node(node, buf));
-    return false;
-}
-
 /* ---- keys of the training configuration ---- */
 
 static bool add_keys(sdm_reader *r, sdm_overrides *set, const char *prefix, const sdm_tree_node *node, const char *path)
 {
     if (sdm_tree_is_empty(node)) return true; /* all its keys are commented out */
-    if (node->kind != SDM_TREE_MAP) return refuse(r, node, path, "keys with values");
+    if (node->kind != SDM_TREE_MAP) return sdm_refuse_type(r, node, path, "keys with values");
     return sdm_overrides_add_tree(set, prefix, node, r->mistakes);
 }
 
@@ -201,7 +194,7 @@ static bool read_training(sdm_reader *r, const sdm_field *f, const sdm_tree_node
     E *e = r->target;
     if (strcmp(f->key, "seed") != 0 && strcmp(f->key, "threads") != 0)
         return add_keys(r, &e->common, f->key, node, path);
-    if (node->kind != SDM_TREE_SCALAR) return refuse(r, node, path, "an integer");
+    if (node->kind != SDM_TREE_SCALAR) return sdm_refuse_type(r, node, path, "an integer");
     sdm_tree_node one = *node;
     one.next = NULL;
     const sdm_tree_node alone = {.kind = SDM_TREE_MAP, .n_children = 1, .first = &one, .last = &one};
@@ -221,7 +214,8 @@ static bool read_list(sdm_reader *r, const sdm_tree_node *node, const char *path
         return false;
     }
     snprintf(wanted, sizeof wanted, "a list of at most %d", SDM_EXPERIMENT_ROWS_MAX);
-    if (node->kind != SDM_TREE_LIST || node->n_children > SDM_EXPERIMENT_ROWS_MAX) return refuse(r, node, path, wanted);
+    if (node->kind != SDM_TREE_LIST || node->n_children > SDM_EXPERIMENT_ROWS_MAX)
+        return sdm_refuse_type(r, node, path, wanted);
     if (sdm_alloc(array, node->n_children, size, path, NULL)) {
         sdm_mistakes_add(r->mistakes, node->mark, "%s: out of memory", path);
         return false;
@@ -314,10 +308,10 @@ static bool read_differences(sdm_reader *r, const sdm_field *f, const sdm_tree_n
     bool fits = true;
     (void)f;
     if (node->kind != SDM_TREE_MAP || node->n_children > SDM_MAX_PARAMS)
-        return refuse(r, node, path, "numbers by names of parameters");
+        return sdm_refuse_type(r, node, path, "numbers by names of parameters");
     for (const sdm_tree_node *child = node->first; child; child = child->next) {
         const size_t i = reference->n_differences++;
-        if (strlen(child->key) >= SDM_NAME_MAX) return refuse(r, child, path, "short names");
+        if (strlen(child->key) >= SDM_NAME_MAX) return sdm_refuse_type(r, child, path, "short names");
         snprintf(reference->differences[i].name, SDM_NAME_MAX, "%s", child->key);
         fits &= sdm_read_real(r, child, path, 0, 1e12, &reference->differences[i].value);
     }

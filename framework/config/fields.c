@@ -24,7 +24,7 @@ const char *sdm_describe_node(const sdm_tree_node *node, char buf[SDM_QUOTE_MAX 
     return buf;
 }
 
-static bool refuse_type(sdm_reader *r, const sdm_tree_node *node, const char *path, const char *wanted)
+bool sdm_refuse_type(sdm_reader *r, const sdm_tree_node *node, const char *path, const char *wanted)
 {
     char buf[SDM_QUOTE_MAX + 16];
     sdm_mistakes_add(r->mistakes, node->mark, "%s: needs %s, got %s", path, wanted, sdm_describe_node(node, buf));
@@ -36,7 +36,7 @@ bool sdm_read_real(sdm_reader *r, const sdm_tree_node *node, const char *path, d
     char a[32], b[32], quoted[SDM_QUOTE_MAX];
     double v;
     if (node->kind != SDM_TREE_SCALAR || node->quoted || !sdm_parse_real(node->text, &v))
-        return refuse_type(r, node, path, "a finite number");
+        return sdm_refuse_type(r, node, path, "a finite number");
     if (!(v >= min && v <= max)) {
         sdm_mistakes_add(r->mistakes, node->mark, "%s: %s is out of range (%s .. %s)", path,
                          sdm_quote(node->text, quoted), sdm_format_plain(min, a), sdm_format_plain(max, b));
@@ -58,7 +58,7 @@ bool sdm_read_int(sdm_reader *r, const sdm_tree_node *node, const char *path, in
     char quoted[SDM_QUOTE_MAX];
     int64_t v;
     if (node->kind != SDM_TREE_SCALAR || node->quoted || !is_integer(node->text))
-        return refuse_type(r, node, path, "an integer");
+        return sdm_refuse_type(r, node, path, "an integer");
     if (!sdm_parse_int(node->text, &v) || v < min || v > max) {
         sdm_mistakes_add(r->mistakes, node->mark, "%s: %s is out of range (%lld .. %lld)", path,
                          sdm_quote(node->text, quoted), (long long)min, (long long)max);
@@ -72,7 +72,7 @@ static bool read_uint64(sdm_reader *r, const sdm_tree_node *node, const char *pa
 {
     char quoted[SDM_QUOTE_MAX];
     if (node->kind != SDM_TREE_SCALAR || node->quoted || !is_integer(node->text))
-        return refuse_type(r, node, path, "an integer");
+        return sdm_refuse_type(r, node, path, "an integer");
     uint64_t v = 0;
     bool fits = node->text[0] != '-';
     for (const char *p = node->text + (node->text[0] == '+'); fits && *p; p++) {
@@ -91,7 +91,7 @@ static bool read_uint64(sdm_reader *r, const sdm_tree_node *node, const char *pa
 
 bool sdm_read_text(sdm_reader *r, const sdm_tree_node *node, const char *path, size_t max, char *out)
 {
-    if (node->kind != SDM_TREE_SCALAR || node->text[0] == 0) return refuse_type(r, node, path, "a text");
+    if (node->kind != SDM_TREE_SCALAR || node->text[0] == 0) return sdm_refuse_type(r, node, path, "a text");
     size_t length = strlen(node->text);
     if (length > max) {
         sdm_mistakes_add(r->mistakes, node->mark, "%s: a text of %zu bytes, at most %zu are allowed", path, length,
@@ -126,7 +126,7 @@ static bool read_choice(sdm_reader *r, const sdm_field *f, const sdm_tree_node *
     char names[CHOICES_MAX][SDM_NAME_MAX], allowed[SDM_KEY_PATH_MAX], quoted[SDM_QUOTE_MAX];
     const char *list[CHOICES_MAX];
     size_t n = 0;
-    if (node->kind != SDM_TREE_SCALAR || node->text[0] == 0) return refuse_type(r, node, path, "one of its names");
+    if (node->kind != SDM_TREE_SCALAR || node->text[0] == 0) return sdm_refuse_type(r, node, path, "one of its names");
     for (; n < CHOICES_MAX && sdm_choice_name(f->choices, (int)n, names[n]); n++) {
         list[n] = names[n];
         if (strcmp(node->text, names[n]) != 0) continue;
@@ -254,7 +254,7 @@ static void read_section(sdm_reader *r, size_t s, const sdm_tree_node *node)
     // a section whose keys are all commented out
     if (sdm_tree_is_empty(node) && node->mark.override == 0) return;
     if (node->kind != SDM_TREE_MAP) {
-        refuse_type(r, node, r->sections[s].name, "keys with values");
+        sdm_refuse_type(r, node, r->sections[s].name, "keys with values");
         return;
     }
     for (const sdm_tree_node *child = node->first; child; child = child->next) read_key(r, s, child);
@@ -266,7 +266,7 @@ void sdm_fields_read(sdm_reader *r, const sdm_tree_node *root)
     while (*r->sections[top].name) top++;
     if (!root || sdm_tree_is_empty(root)) return;
     if (root->kind != SDM_TREE_MAP) {
-        refuse_type(r, root, "the configuration", "keys with values");
+        sdm_refuse_type(r, root, "the configuration", "keys with values");
         return;
     }
     for (const sdm_tree_node *child = root->first; child; child = child->next) {

@@ -80,6 +80,9 @@ bool sdm_read_real(sdm_reader *r, const sdm_tree_node *node, const char *path, d
 bool sdm_read_int(sdm_reader *r, const sdm_tree_node *node, const char *path, int64_t min, int64_t max, int64_t *out);
 bool sdm_read_text(sdm_reader *r, const sdm_tree_node *node, const char *path, size_t max, char *out);
 
+/* Records "PATH: needs WANTED, got ...". False. */
+bool sdm_refuse_type(sdm_reader *r, const sdm_tree_node *node, const char *path, const char *wanted);
+
 /* "a list", "a mapping", "nothing", "the text 'x'" or "'x'": what stands where something else was wanted. */
 const char *sdm_describe_node(const sdm_tree_node *node, char buf[SDM_QUOTE_MAX + 16]);
 

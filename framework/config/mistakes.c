@@ -31,15 +31,16 @@ void sdm_mistakes_add(sdm_mistakes *m, sdm_mark mark, const char *fmt, ...)
     va_end(args);
 }
 
-static int print_line(const sdm_mistakes *m, const sdm_mistake *one, char *out, size_t size)
+const char *sdm_mark_print(sdm_mark mark, const char *file, char *buf, size_t size)
 {
-    char buf[SDM_QUOTE_MAX];
-    const char *place = one->mark.override > 0 && m->places ? m->places[one->mark.override - 1] : NULL;
-    if (place) return snprintf(out, size, "%s: %s", place, one->text);
-    if (one->mark.override > 0)
-        return snprintf(out, size, "argument '%s': %s", sdm_quote(m->overrides[one->mark.override - 1], buf),
-                        one->text);
-    return snprintf(out, size, "%s:%d:%d: %s", m->file, one->mark.line, one->mark.column, one->text);
+    char quoted[SDM_QUOTE_MAX];
+    if (mark.line > 0)
+        snprintf(buf, size, "%s:%d:%d", mark.source ? mark.source : file, mark.line, mark.column);
+    else if (mark.source)
+        snprintf(buf, size, "argument '%s'", sdm_quote(mark.source, quoted));
+    else
+        snprintf(buf, size, "%s", file);
+    return buf;
 }
 
 sdm_status sdm_mistakes_report(const sdm_mistakes *m, sdm_error *err)
@@ -52,8 +53,10 @@ sdm_status sdm_mistakes_report(const sdm_mistakes *m, sdm_error *err)
     // whole lines only, so that nothing is cut in the middle
     text[0] = 0;
     for (; shown < m->count && shown < SDM_MISTAKES_SHOWN; shown++) {
-        char line[SDM_PATH_TEXT_MAX + SDM_MISTAKE_TEXT_MAX + SDM_QUOTE_MAX];
-        int n = print_line(m, &m->first[shown], line, sizeof line);
+        char place[SDM_PATH_TEXT_MAX + SDM_QUOTE_MAX], line[sizeof place + SDM_MISTAKE_TEXT_MAX];
+        const sdm_mistake *one = &m->first[shown];
+        int n =
+            snprintf(line, sizeof line, "%s: %s", sdm_mark_print(one->mark, m->file, place, sizeof place), one->text);
         size_t length = n < 0 ? 0 : (size_t)n < sizeof line ? (size_t)n : sizeof line - 1;
         if (used + length + 1 + TAIL >= sizeof text) break;
         if (used) text[used++] = '\n';

@@ -13,12 +13,8 @@ typedef struct sdm_mistake {
     char text[SDM_MISTAKE_TEXT_MAX];
 } sdm_mistake;
 
-/* `file` and `overrides` belong to the caller and stand in front of the messages; where places[i] says so, override i has its own
-   "file:line:column" instead. */
 typedef struct sdm_mistakes {
-    const char *file;
-    const char *const *overrides;
-    const char *const *places; /* NULL: none */
+    const char *file; /* of the marks without a source; the caller's */
     size_t count;
     sdm_mistake first[SDM_MISTAKES_SHOWN]; /* sorted: the file by line and column, then the overrides by number */
 } sdm_mistakes;
@@ -27,6 +23,9 @@ void sdm_mistakes_add(sdm_mistakes *m, sdm_mark mark, const char *fmt, ...) SDM_
 
 /* SDM_OK when there are none, else SDM_E_CONFIG with one line for each in err->text. */
 sdm_status sdm_mistakes_report(const sdm_mistakes *m, sdm_error *err);
+
+/* "file:line:column", "argument 'key=value'", or the file alone. Returns buf. */
+const char *sdm_mark_print(sdm_mark mark, const char *file, char *buf, size_t size);
 
 /* `text` made fit for a message: on one line, cut behind 60 bytes. Returns buf. */
 const char *sdm_quote(const char *text, char buf[SDM_QUOTE_MAX]);

@@ -7,41 +7,26 @@
 #include "fields.h"
 #include "sdm/memory.h"
 
-static sdm_status copy_text(const char *text, char **out, sdm_error *err)
+sdm_status sdm_overrides_add(sdm_overrides *o, const char *text, sdm_mark mark, sdm_error *err)
 {
     const size_t size = strlen(text) + 1;
-    const sdm_status s = SDM_ALLOC(out, size, "key=value text", err);
-    if (!s) memcpy(*out, text, size);
-    return s;
-}
-
-sdm_status sdm_overrides_add(sdm_overrides *o, const char *text, const char *place, sdm_error *err)
-{
     sdm_status s = SDM_OK;
     if (o->n == o->capacity) {
         const size_t more = o->capacity ? 2 * o->capacity : 8;
         s = sdm_grow((void **)&o->items, o->capacity, more, sizeof *o->items, "key=value texts", err);
         if (!s) o->capacity = more;
     }
+    char *copy = NULL;
+    if (!s) s = SDM_ALLOC(&copy, size, "key=value text", err);
     if (s) return s;
-    sdm_override *item = &o->items[o->n];
-    s = copy_text(text, &item->text, err);
-    if (!s && place) s = copy_text(place, &item->place, err);
-    if (s) {
-        sdm_free(item->text);
-        *item = (sdm_override){0};
-        return s;
-    }
-    o->n++;
+    memcpy(copy, text, size);
+    o->items[o->n++] = (sdm_override){copy, mark};
     return SDM_OK;
 }
 
 void sdm_overrides_dispose(sdm_overrides *o)
 {
-    for (size_t i = 0; i < o->n; i++) {
-        sdm_free(o->items[i].text);
-        sdm_free(o->items[i].place);
-    }
+    for (size_t i = 0; i < o->n; i++) sdm_free(o->items[i].text);
     sdm_free(o->items);
     *o = (sdm_overrides){0};
 }
@@ -82,7 +67,6 @@ static bool is_printable(const sdm_tree_node *node)
 
 static bool add_leaf(sdm_overrides *o, const char *key, const sdm_tree_node *node, sdm_mistakes *m)
 {
-    char place[SDM_PATH_TEXT_MAX + 32];
     sdm_text text = {0};
     const sdm_mark mark = node->key_mark;
     if (!is_printable(node)) {
@@ -91,8 +75,7 @@ static bool add_leaf(sdm_overrides *o, const char *key, const sdm_tree_node *nod
     }
     sdm_text_add(&text, "%s=", key);
     add_value(node, &text);
-    snprintf(place, sizeof place, "%s:%d:%d", m->file, mark.line, mark.column);
-    const bool done = !text.failed && !sdm_overrides_add(o, text.data, place, NULL);
+    const bool done = !text.failed && !sdm_overrides_add(o, text.data, mark, NULL);
     if (!done) sdm_mistakes_add(m, mark, "%s: out of memory", key);
     sdm_text_dispose(&text);
     return done;

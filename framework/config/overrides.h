@@ -9,8 +9,8 @@
    "grid.spacing=0.2". Lists are leaves. False after a mistake was recorded. */
 bool sdm_overrides_add_tree(sdm_overrides *o, const char *prefix, const sdm_tree_node *node, sdm_mistakes *mistakes);
 
-/* Appends one; place may be NULL. Both are copied. */
-sdm_status sdm_overrides_add(sdm_overrides *o, const char *text, const char *place, sdm_error *err);
+/* Appends one; the text is copied. */
+sdm_status sdm_overrides_add(sdm_overrides *o, const char *text, sdm_mark mark, sdm_error *err);
 
 void sdm_overrides_dispose(sdm_overrides *o);
 

@@ -10,13 +10,6 @@
 #define PLACE_MAX 1e9
 #define STATIC_MAX 1000
 
-static bool refuse(sdm_reader *r, const sdm_tree_node *node, const char *path, const char *wanted)
-{
-    char buf[SDM_QUOTE_MAX + 16];
-    sdm_mistakes_add(r->mistakes, node->mark, "%s: needs %s, got %s", path, wanted, sdm_describe_node(node, buf));
-    return false;
-}
-
 /* [x, y, z], all of them checked. */
 static bool read_three(sdm_reader *r, const sdm_tree_node *node, const char *path, double min, double max,
                        double out[3])
@@ -24,7 +17,8 @@ static bool read_three(sdm_reader *r, const sdm_tree_node *node, const char *pat
     static const char *const AXIS[3] = {"x", "y", "z"};
     double v[3] = {0, 0, 0};
     bool fits = true;
-    if (node->kind != SDM_TREE_LIST || node->n_children != 3) return refuse(r, node, path, "three numbers [x, y, z]");
+    if (node->kind != SDM_TREE_LIST || node->n_children != 3)
+        return sdm_refuse_type(r, node, path, "three numbers [x, y, z]");
     const sdm_tree_node *child = node->first;
     for (int i = 0; i < 3; i++, child = child->next) {
         char name[SDM_KEY_PATH_MAX];
@@ -41,7 +35,8 @@ bool sdm_read_key_size(sdm_reader *r, const sdm_field *f, const sdm_tree_node *n
     int64_t n[3] = {0, 0, 0};
     bool fits = true;
     (void)f;
-    if (node->kind != SDM_TREE_LIST || node->n_children != 3) return refuse(r, node, path, "three integers [x, y, z]");
+    if (node->kind != SDM_TREE_LIST || node->n_children != 3)
+        return sdm_refuse_type(r, node, path, "three integers [x, y, z]");
     const sdm_tree_node *child = node->first;
     for (int i = 0; i < 3; i++, child = child->next) {
         char name[SDM_KEY_PATH_MAX];
@@ -57,7 +52,7 @@ bool sdm_read_key_spacing(sdm_reader *r, const sdm_field *f, const sdm_tree_node
     double *spacing = r->config->grid.spacing;
     (void)f;
     if (node->kind == SDM_TREE_LIST) return read_three(r, node, path, SPACING_MIN, SPACING_MAX, spacing);
-    if (node->kind != SDM_TREE_SCALAR) return refuse(r, node, path, "a number or [x, y, z]");
+    if (node->kind != SDM_TREE_SCALAR) return sdm_refuse_type(r, node, path, "a number or [x, y, z]");
     double v = 0;
     if (!sdm_read_real(r, node, path, SPACING_MIN, SPACING_MAX, &v)) return false;
     for (int i = 0; i < 3; i++) spacing[i] = v;
@@ -122,7 +117,8 @@ static bool read_range(sdm_reader *r, const sdm_tree_node *node, const char *pat
     size_t at = 0;
     if (!read_name(r, node, path, range.name)) return false;
     snprintf(name, sizeof name, "%s.%s", path, range.name);
-    if (node->kind != SDM_TREE_LIST || node->n_children != 2) return refuse(r, node, name, "two numbers [min, max]");
+    if (node->kind != SDM_TREE_LIST || node->n_children != 2)
+        return sdm_refuse_type(r, node, name, "two numbers [min, max]");
     if (!sdm_read_real(r, node->first, name, -PLACE_MAX, PLACE_MAX, &range.min)) return false;
     if (!sdm_read_real(r, node->last, name, -PLACE_MAX, PLACE_MAX, &range.max)) return false;
     if (!(range.min < range.max)) {
@@ -146,7 +142,7 @@ bool sdm_read_key_options(sdm_reader *r, const sdm_field *f, const sdm_tree_node
     bool fits = true;
     (void)f;
     if (sdm_tree_is_empty(node) && node->mark.override == 0) return true;
-    if (node->kind != SDM_TREE_MAP) return refuse(r, node, path, "names with values");
+    if (node->kind != SDM_TREE_MAP) return sdm_refuse_type(r, node, path, "names with values");
     for (const sdm_tree_node *child = node->first; child; child = child->next) fits &= read_option(r, child, path);
     return fits;
 }
@@ -156,7 +152,7 @@ bool sdm_read_key_ranges(sdm_reader *r, const sdm_field *f, const sdm_tree_node 
     bool fits = true;
     (void)f;
     if (sdm_tree_is_empty(node) && node->mark.override == 0) return true;
-    if (node->kind != SDM_TREE_MAP) return refuse(r, node, path, "names with [min, max]");
+    if (node->kind != SDM_TREE_MAP) return sdm_refuse_type(r, node, path, "names with [min, max]");
     for (const sdm_tree_node *child = node->first; child; child = child->next) fits &= read_range(r, child, path);
     return fits;
 }
@@ -173,7 +169,7 @@ bool sdm_read_key_static(sdm_reader *r, const sdm_field *f, const sdm_tree_node 
         n = counts[0] > 0;
     } else {
         if (node->kind != SDM_TREE_LIST || node->n_children < 1 || node->n_children > SDM_MAX_PARAMS)
-            return refuse(r, node, path, "an integer or a list of 1 to 64");
+            return sdm_refuse_type(r, node, path, "an integer or a list of 1 to 64");
         for (const sdm_tree_node *child = node->first; child; child = child->next)
             fits &= sdm_read_int(r, child, path, 1, STATIC_MAX, &counts[n++]);
     }

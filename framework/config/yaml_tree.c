@@ -21,7 +21,7 @@ typedef struct tree_builder {
     sdm_tree *tree;
     sdm_mistakes *mistakes;
     sdm_error *err;
-    int override;
+    sdm_mark override;
     tree_frame stack[SDM_TREE_DEPTH_MAX];
     int depth;
     bool has_document;
@@ -62,43 +62,52 @@ size_t sdm_tree_printable(const char *text, size_t size)
     return size;
 }
 
-/* Encoding and tabs, checked first: libyaml's own words for these do not help, and it takes byte order marks in silence. */
-static bool check_characters(const unsigned char *s, size_t size, int override, sdm_mistakes *mistakes)
+/* Of a text in the file; all of an override has the same. */
+static sdm_mark mark_at(sdm_mark override, int line, int column)
 {
-    sdm_mark mark = {.line = 1, .column = 1, .override = override};
+    return override.override > 0 ? override : (sdm_mark){.line = line, .column = column};
+}
+
+/* Encoding and tabs, checked first: libyaml's own words for these do not help, and it takes byte order marks in silence. */
+static bool check_characters(const unsigned char *s, size_t size, sdm_mark override, sdm_mistakes *mistakes)
+{
+    int line = 1, column = 1;
     bool indent = true;
     if (size >= 2 && ((s[0] == 0xFF && s[1] == 0xFE) || (s[0] == 0xFE && s[1] == 0xFF))) {
-        sdm_mistakes_add(mistakes, mark, "the text is UTF-16; save it as UTF-8");
+        sdm_mistakes_add(mistakes, mark_at(override, line, column), "the text is UTF-16; save it as UTF-8");
         return false;
     }
     for (size_t at = 0, n; at < size; at += n) {
         uint32_t c = 0;
         n = utf8_next(s + at, size - at, &c);
         if (n == 0) {
-            sdm_mistakes_add(mistakes, mark, "byte 0x%02X is not valid UTF-8; save the text as UTF-8", (unsigned)s[at]);
+            sdm_mistakes_add(mistakes, mark_at(override, line, column),
+                             "byte 0x%02X is not valid UTF-8; save the text as UTF-8", (unsigned)s[at]);
             return false;
         }
         if (c == '\n' || c == '\r') {
             if (c == '\r' && at + 1 < size && s[at + 1] == '\n') n = 2;
-            mark.line++;
-            mark.column = 1;
+            line++;
+            column = 1;
             indent = true;
             continue;
         }
         if (c == '\t' && indent) {
-            sdm_mistakes_add(mistakes, mark, "a tab in the indentation; use spaces");
+            sdm_mistakes_add(mistakes, mark_at(override, line, column), "a tab in the indentation; use spaces");
             return false;
         }
         if (c == 0xFEFF) {
-            sdm_mistakes_add(mistakes, mark, "a byte order mark; save the text as UTF-8 without it");
+            sdm_mistakes_add(mistakes, mark_at(override, line, column),
+                             "a byte order mark; save the text as UTF-8 without it");
             return false;
         }
         if (c != '\t' && !is_printable(c)) {
-            sdm_mistakes_add(mistakes, mark, "control character U+%04X; remove it", (unsigned)c);
+            sdm_mistakes_add(mistakes, mark_at(override, line, column), "control character U+%04X; remove it",
+                             (unsigned)c);
             return false;
         }
         if (c != ' ') indent = false;
-        mark.column++;
+        column++;
     }
     return true;
 }
@@ -106,7 +115,7 @@ static bool check_characters(const unsigned char *s, size_t size, int override, 
 static sdm_mark mark_of(const tree_builder *b, yaml_mark_t at)
 {
     // the text has at most 2^20 bytes, so both fit
-    return (sdm_mark){.line = (int)at.line + 1, .column = (int)at.column + 1, .override = b->override};
+    return mark_at(b->override, (int)at.line + 1, (int)at.column + 1);
 }
 
 static sdm_status copy_text(sdm_tree *tree, const char *text, size_t size, const char **out, sdm_error *err)
@@ -193,8 +202,11 @@ static sdm_status take_key(tree_builder *b, tree_frame *f, const char *text, siz
     if (before) {
         char path[SDM_QUOTE_MAX], buf[SDM_QUOTE_MAX];
         full_path(b, f->key, path, sizeof path);
-        sdm_mistakes_add(b->mistakes, mark, "duplicate key '%s' (first at line %d)", sdm_quote(path, buf),
-                         before->key_mark.line);
+        if (before->key_mark.line > 0)
+            sdm_mistakes_add(b->mistakes, mark, "duplicate key '%s' (first at line %d)", sdm_quote(path, buf),
+                             before->key_mark.line);
+        else
+            sdm_mistakes_add(b->mistakes, mark, "duplicate key '%s'", sdm_quote(path, buf));
     }
     return SDM_OK;
 }
@@ -359,10 +371,10 @@ sdm_status sdm_tree_read(const char *path, uint8_t **data, size_t *size, sdm_err
                     SDM_TREE_BYTES_MAX);
 }
 
-sdm_status sdm_tree_parse(sdm_tree *tree, const char *text, size_t size, int override, sdm_mistakes *mistakes,
+sdm_status sdm_tree_parse(sdm_tree *tree, const char *text, size_t size, sdm_mark override, sdm_mistakes *mistakes,
                           sdm_error *err)
 {
-    const sdm_mark top = {.line = 1, .column = 1, .override = override};
+    const sdm_mark top = mark_at(override, 1, 1);
     *tree = (sdm_tree){0};
     if (size > SDM_TREE_BYTES_MAX) {
         sdm_mistakes_add(mistakes, top, "%zu bytes, more than the allowed %zu", size, SDM_TREE_BYTES_MAX);
@@ -380,13 +392,12 @@ sdm_status sdm_tree_parse(sdm_tree *tree, const char *text, size_t size, int ove
     return s;
 }
 
-sdm_status sdm_tree_wrap(sdm_tree *tree, const char *path, size_t length, int override, sdm_error *err)
+sdm_status sdm_tree_wrap(sdm_tree *tree, const char *path, size_t length, sdm_mark override, sdm_error *err)
 {
-    const sdm_mark mark = {.override = override};
     const size_t limit = tree->max_nodes + SDM_TREE_PATH_NAMES + 1;
     if (!tree->root) {
         tree->root = &tree->nodes[tree->n_nodes++];
-        *tree->root = (sdm_tree_node){.kind = SDM_TREE_SCALAR, .text = "", .mark = mark};
+        *tree->root = (sdm_tree_node){.kind = SDM_TREE_SCALAR, .text = "", .mark = override};
     }
     for (size_t end = length + 1; end > 0;) {
         // the last name first: [start, end - 1)
@@ -399,9 +410,9 @@ sdm_status sdm_tree_wrap(sdm_tree *tree, const char *path, size_t length, int ov
             return sdm_fail(err, SDM_E_INTERNAL, "a key of more than %d names", SDM_TREE_PATH_NAMES);
         sdm_tree_node *map = &tree->nodes[tree->n_nodes++];
         *map = (sdm_tree_node){
-            .kind = SDM_TREE_MAP, .mark = mark, .n_children = 1, .first = tree->root, .last = tree->root};
+            .kind = SDM_TREE_MAP, .mark = override, .n_children = 1, .first = tree->root, .last = tree->root};
         tree->root->key = key;
-        tree->root->key_mark = mark;
+        tree->root->key_mark = override;
         tree->root = map;
         end = start;
     }

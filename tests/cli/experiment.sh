@@ -133,6 +133,19 @@ printf 'shape: {name: ellipsoid}\ngrid: {size: [4, 4, 4], spacing: 1}\nmethods: 
 expect 2 "^bad\.yaml:3:21: unknown key 'engnie'; did you mean 'engine'" sdmgen experiment bad.yaml
 printf 'shape: {name: ellipsoid}\ngrid: {size: [4, 4, 4], spacing: 1}\nmethods:\n  - {name: A, engine: exakt}\n' >engine.yaml
 expect 2 "^engine\.yaml:4:5: engine: 'exakt' is not one of exact, .*vtk.*did you mean 'exact'" sdmgen experiment engine.yaml
+cat >ranges.yaml <<'END'
+grid: {size: [8, 8, 8], spacing: 2}
+methods: [{name: octree, engine: octree}, {name: exact, engine: exact, set: {shape.options: {edge: 1}}}]
+shape: {name: ellipsoid,
+        ranges: {rz: [1.5, 20000000]}}
+END
+expect 2 '^ranges\.yaml:4:18: range .* must lie within' sdmgen experiment ranges.yaml --out none
+expect 2 "^argument 'shape\.ranges\.rz=\[2,90000\]': range .* must lie within" sdmgen experiment ranges.yaml 'shape.ranges.rz=[2,90000]' --out none
+sed 's/edge: 1/egde: 1/; s/20000000/2/' ranges.yaml >options.yaml
+expect 2 "^options\.yaml:2:94: .*'egde'" sdmgen experiment options.yaml --out none
+sed 's/ellipsoid/elipsoid/; s/20000000/2/' ranges.yaml >shape.yaml
+expect 2 "^shape\.yaml:3:9: unknown shape 'elipsoid'; did you mean 'ellipsoid'" sdmgen experiment shape.yaml --out none
+absent none
 expect 2 "^argument 'train.steeps=4': unknown key 'train.steeps'; did you mean 'train.steps'" sdmgen experiment tiny.yaml train.steeps=4
 expect 2 "unexpected argument 'fast', need key=value" sdmgen experiment tiny.yaml fast
 expect 2 'usage: sdmgen experiment' sdmgen experiment

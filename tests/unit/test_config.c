@@ -133,7 +133,8 @@ static void test_overrides(void **state)
     assert_true(config.seed == 7 && config.grid.n[2] == 9 && config.grid.origin[0] == -3);
     assert_true(config.shape.ranges[0].min == 2 && config.shape.ranges[0].max == 3);
     assert_int_equal(config.shape.ranges[0].mark.override, 2);
-    assert_string_equal(sdm_config_where(&config, config.shape.ranges[0].mark, where), "key=value argument 2");
+    assert_string_equal(sdm_config_where(&config, config.shape.ranges[0].mark, where),
+                        "argument 'shape.ranges.a=[2,3]'");
     assert_string_equal(sdm_config_where(&config, config.shape.mark, where), "x.yaml:1:9");
     assert_string_equal(sdm_config_where(&config, (sdm_mark){0}, where), "x.yaml");
     assert_int_equal(config.shape.n_options, 2);

@@ -17,9 +17,11 @@ extern "C" {
 #define SDM_NAME_MAX 64
 #define SDM_PATH_TEXT_MAX 1024
 
-/* Where a value came from: line and column from 1, or 0 for a default; override: 1-based number of the key=value argument. */
+/* Where a value came from: line and column from 1, or 0 for a default. override: 1-based number of the key=value argument; then `source`
+   is its text, the caller's and not copied, or the file in which it was said in line and column. */
 typedef struct sdm_mark {
     int line, column, override;
+    const char *source;
 } sdm_mark;
 
 /* shape.options.NAME: kept as text; its meaning is the shape's (sdm_instance_create()). */
@@ -143,7 +145,8 @@ SDM_API void sdm_config_dump(const sdm_config *c, sdm_text *out);
    `markdown`, else as aligned text. */
 SDM_API void sdm_config_describe(bool markdown, sdm_text *out);
 
-/* "file:line:column" of a mark, for messages of those who check what the config cannot know. buf has 1200 bytes. */
+/* "file:line:column" or "argument 'key=value'" of a mark, for messages of those who check what the config cannot know: the texts given to
+   sdm_config_read() must still be there. buf has 1200 bytes. */
 SDM_API const char *sdm_config_where(const sdm_config *c, sdm_mark mark, char *buf);
 
 #ifdef __cplusplus

@@ -46,10 +46,11 @@ typedef struct sdm_figure_info {
 /* Constant; NULL from SDM_N_FIGURES on. [any thread] */
 SDM_API const sdm_figure_info *sdm_figure_get_info(sdm_figure f);
 
-/* A key of the training configuration with its value, "train.minutes=4", and where it was said: "paper.yaml:14:7"; place is NULL for
-   an argument of the command line. */
+/* A key of the training configuration with its value, "train.minutes=4", and where the experiment's file says it; without a line: an
+   argument of the command line. */
 typedef struct sdm_override {
-    char *text, *place;
+    char *text;
+    sdm_mark mark;
 } sdm_override;
 
 typedef struct sdm_overrides {

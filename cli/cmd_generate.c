@@ -33,11 +33,6 @@ typedef struct job {
     uint64_t hash;
 } job;
 
-static sdm_range_policy policy_of(const char *name)
-{
-    return !strcmp(name, "clamp") ? SDM_RANGE_CLAMP : !strcmp(name, "exact") ? SDM_RANGE_EXACT : SDM_RANGE_REFUSE;
-}
-
 static sdm_check_stat error_of(const cli_args *args)
 {
     int stat = SDM_CHECK_MAX;
@@ -61,7 +56,7 @@ static void job_dispose(job *j)
 static sdm_status check_row(const job *j, const double *p, sdm_error *err)
 {
     const size_t n = j->info->n_params;
-    const sdm_range_policy policy = policy_of(j->args->policy);
+    const sdm_range_policy policy = cli_policy(j->args);
     bool finite = true;
     for (size_t i = 0; i < n; i++) finite = finite && isfinite(p[i]);
     if (policy == SDM_RANGE_REFUSE || !finite) return cli_check_range(j->params, n, p, err);
@@ -103,7 +98,7 @@ static sdm_status open_shape(job *j, sdm_error *err)
 {
     const cli_args *args = j->args;
     const bool checks = args->check || args->max_error > 0;
-    if (!checks && policy_of(args->policy) != SDM_RANGE_EXACT) return SDM_OK;
+    if (!checks && cli_policy(args) != SDM_RANGE_EXACT) return SDM_OK;
     sdm_status s = cli_open_registry(args, &j->registry, err);
     if (!s) s = sdm_runtime_instance(j->model, j->registry, &j->shape, err);
     return s && checks ? sdm_fail_in(err, s, "--%s needs the exact shape", args->check ? "check" : "max-error") : s;
@@ -213,7 +208,7 @@ static sdm_status make_row(job *j, size_t row, sdm_error *err)
 {
     const cli_args *args = j->args;
     // rows that the policy refuses have been refused: what is left to the exact engine is a network's map over the bound
-    const sdm_range_policy policy = policy_of(args->policy);
+    const sdm_range_policy policy = cli_policy(args);
     const sdm_generate_opts opts = {.policy =
                                         policy == SDM_RANGE_REFUSE && args->max_error > 0 ? SDM_RANGE_EXACT : policy,
                                     .exact_shape = j->shape,
@@ -221,13 +216,16 @@ static sdm_status make_row(job *j, size_t row, sdm_error *err)
                                     .check = args->check,
                                     .max_error_mm = args->max_error,
                                     .max_error_of = error_of(args)};
-    const double *p = j->rows + row * j->info->n_params;
+    double *p = j->rows + row * j->info->n_params;
     sdm_result result = {0};
     const double start = cli_clock();
     const sdm_status s = j->jacobian ? sdm_generate_jacobian(j->model, p, &opts, j->values, j->jacobian, &result, err)
                                      : sdm_generate(j->model, p, &opts, j->values, &result, err);
     if (s) return args->rows ? sdm_fail_in(err, s, "%s: row %zu", args->rows, row + 1) : s;
     j->ms += 1e3 * (cli_clock() - start);
+    // what is told of the map is what it was made from
+    for (size_t i = 0; i < j->info->n_params && result.clamped; i++)
+        p[i] = fmin(fmax(p[i], j->params[i].min), j->params[i].max);
     j->n_clamped += result.clamped;
     j->n_exact += result.source == SDM_SOURCE_EXACT;
     j->n_exact_error += result.reason == SDM_REASON_ERROR;

@@ -6,11 +6,6 @@
 #include "sdm/memory.h"
 #include "setup.h"
 
-static sdm_range_policy policy_of(const char *name)
-{
-    return !strcmp(name, "clamp") ? SDM_RANGE_CLAMP : !strcmp(name, "exact") ? SDM_RANGE_EXACT : SDM_RANGE_REFUSE;
-}
-
 static sdm_status open_model(cli_fit *f, sdm_error *err)
 {
     const cli_args *args = f->args;
@@ -112,7 +107,7 @@ static sdm_status check_start(cli_fit *f, sdm_error *err)
 
 sdm_status cli_fit_open_source(cli_fit *f, sdm_error *err)
 {
-    f->source.policy = policy_of(f->args->policy);
+    f->source.policy = cli_policy(f->args);
     const bool network = f->model_path && !f->args->fit.exact;
     if (network && f->args->spacing[0] > 0)
         return sdm_fail(err, SDM_E_ARG, "fit: --spacing is of exact maps (--exact, --shape); a model has its own grid");

@@ -73,6 +73,13 @@ sdm_status cli_model_params(const sdm_model_info *info, sdm_param **out, sdm_err
     return SDM_OK;
 }
 
+sdm_range_policy cli_policy(const cli_args *args)
+{
+    return !strcmp(args->policy, "clamp")   ? SDM_RANGE_CLAMP
+           : !strcmp(args->policy, "exact") ? SDM_RANGE_EXACT
+                                            : SDM_RANGE_REFUSE;
+}
+
 /* ---- parameters ---- */
 
 /* A number that may be NaN or infinite (also by overflow), which sdm_parse_real() refuses. */

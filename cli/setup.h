@@ -5,6 +5,7 @@
 #include "options.h"
 #include "sdm/model.h"
 #include "sdm/registry.h"
+#include "sdm/runtime.h"
 
 /* The built-in shapes, those of SDMGEN_PLUGIN_PATH and those of --plugin. Freed with sdm_registry_free(). */
 sdm_status cli_open_registry(const cli_args *args, sdm_registry **out, sdm_error *err);
@@ -15,6 +16,9 @@ sdm_status cli_open_shape(const sdm_registry *r, const char *name, const cli_lis
 
 /* Parameters of a model as a shape's: *out points into `info` and is freed with sdm_free(). */
 sdm_status cli_model_params(const sdm_model_info *info, sdm_param **out, sdm_error *err);
+
+/* Of --policy. */
+sdm_range_policy cli_policy(const cli_args *args);
 
 /* values[n] = the defaults, then the -p name=value words. SDM_E_ARG: an unknown or repeated name, not a number. NaN and
    infinities pass: the range check that follows names them. */

@@ -57,7 +57,7 @@ near "$(json points)" 2000 0
 expect 0 'moved into it' sdmgen generate $model -p a=5.000000000000001 --policy clamp --json -o c.nii -o c.mha -o c.nrrd
 near "$(json clamped)" 1 0
 for file in c.nii c.mha c.nrrd; do
-    head -c 600 $file | tr '\0' '\n' | grep -aq 'network (clamped): cochlea a=5.00' || bad "$file does not say that it is clamped"
+    head -c 600 $file | tr '\0' '\n' | grep -aq 'network (clamped): cochlea a=5 ' || bad "$file does not say that it is clamped"
 done
 for policy in refuse clamp exact; do
     for value in nan inf -inf; do

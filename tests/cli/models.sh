@@ -49,6 +49,7 @@ expect 1 'missing\.sdm' sdmgen generate missing.sdm -o x.npy
 absent x.npy x.txt nowhere
 expect 0 'moved into it' sdmgen generate $model -p a=7 --policy clamp -o c.npy --json
 near "$(json clamped)" 1 0
+near "$(json a)" 5 0 # of the map, not what was asked for
 expect 0 - sdmgen generate $model -p a=5 -o five.npy
 cmp -s c.npy five.npy || bad 'clamped differs from the end of the range'
 

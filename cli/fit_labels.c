@@ -29,15 +29,18 @@ static sdm_status find_label(const char *path, const sdm_volume *v, const char *
                     path, word);
 }
 
-static void add_label(const sdm_volume *v, const label *l, float *mask)
+/* Returns how many voxels have it. */
+static size_t add_label(const sdm_volume *v, const label *l, float *mask)
 {
     const size_t n = sdm_grid_count(&v->grid);
+    size_t found = 0;
     for (size_t layer = 0; layer < v->n_layers; layer++) {
         if (l->layer != v->n_layers && l->layer != layer) continue;
         const float *values = v->values + layer * n;
         for (size_t i = 0; i < n; i++)
-            if (values[i] == l->value) mask[i] = 1;
+            if (values[i] == l->value) mask[i] = 1, found++;
     }
+    return found;
 }
 
 /* Without words: every voxel that is not 0, in any layer. */
@@ -57,11 +60,7 @@ sdm_status cli_label_mask(const char *path, const sdm_volume *v, const cli_list 
         label l;
         const sdm_status s = find_label(path, v, words->items[w], &l, err);
         if (s) return s;
-        size_t before = 0, after = 0;
-        for (size_t i = 0; i < n; i++) before += values[i] > 0;
-        add_label(v, &l, values);
-        for (size_t i = 0; i < n; i++) after += values[i] > 0;
-        if (after == before && w == 0)
+        if (!add_label(v, &l, values))
             return sdm_fail(err, SDM_E_FORMAT, "%s: no voxel has the label '%.100s' (values %g to %g)", path,
                             words->items[w], (double)v->min, (double)v->max);
     }

@@ -57,8 +57,9 @@ static const cli_option *find_letter(const cli_args *args, char letter)
 static bool is_choice(const char *choices, const char *value)
 {
     const size_t length = strlen(value);
+    if (length == 0 || strchr(value, '|')) return false;
     for (const char *at = choices; at; at = strchr(at, '|') ? strchr(at, '|') + 1 : NULL)
-        if (length > 0 && !strncmp(at, value, length) && (at[length] == '|' || at[length] == '\0')) return true;
+        if (!strncmp(at, value, length) && (at[length] == '|' || at[length] == '\0')) return true;
     return false;
 }
 

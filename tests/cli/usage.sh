@@ -34,6 +34,7 @@ expect 2 "spacing 'nan': need one number or three" sdmgen exact --shape torus --
 expect 2 "spacing '0'" sdmgen exact --shape torus --spacing 0
 expect 2 "origin '1,2': need three numbers" sdmgen exact --shape torus --origin 1,2
 expect 2 "sign 'guess': need one of auto\|crossings" sdmgen exact --shape torus --sign guess
+expect 2 "sign 'auto\|crossings': need one of auto\|crossings" sdmgen exact --shape torus --sign 'auto|crossings'
 expect 2 'quiet=1: --quiet takes no value' sdmgen shapes --quiet=1
 expect 2 'threads: empty value' sdmgen shapes --threads=
 

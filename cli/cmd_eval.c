@@ -55,7 +55,7 @@ static void fill_json(sdm_json *j, const char *file, const sdm_model_info *info,
     sdm_json_text(j, "model", file);
     sdm_json_text(j, "shape", info->shape);
     sdm_json_int(j, "samples", (int64_t)e->n);
-    sdm_json_int(j, "seed", (int64_t)seed);
+    sdm_json_uint(j, "seed", seed);
     sdm_json_real(j, "mse_mm2", e->mse_mm2);
     sdm_json_real(j, "rmse_mm", e->rmse_mm);
     sdm_json_real(j, "mae_mm", e->mae_mm);

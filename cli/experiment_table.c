@@ -208,7 +208,7 @@ static void add_json(const experiment_run *run, sdm_json *j)
     sdm_json_text(j, "folder", run->folder);
     sdm_json_text(j, "version", SDM_VERSION_TEXT);
     sdm_json_text(j, "machine", machine);
-    sdm_json_int(j, "seed", (int64_t)run->e->experiment.seed);
+    sdm_json_uint(j, "seed", run->e->experiment.seed);
     sdm_json_real(j, "seconds", cli_clock() - run->start);
     sdm_json_open(j, "rows", '[');
     for (size_t i = 0; i < run->e->n_rows; i++) add_json_row(run, &run->results[i], j);

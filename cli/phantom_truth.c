@@ -74,7 +74,7 @@ static void add_image(sdm_json *j, const sdm_phantom_opts *o)
     sdm_json_real(j, "noise", o->noise);
     sdm_json_bool(j, "noise_is_blurred", o->noise_is_blurred);
     sdm_json_int(j, "supersampling", o->supersampling);
-    sdm_json_int(j, "seed", (int64_t)o->seed);
+    sdm_json_uint(j, "seed", o->seed);
 }
 
 void cli_phantom_truth(const cli_phantom *p, size_t inside, sdm_json *j)

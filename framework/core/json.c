@@ -60,6 +60,12 @@ void sdm_json_int(sdm_json *j, const char *key, int64_t v)
     sdm_text_add(&j->text, "%lld", (long long)v);
 }
 
+void sdm_json_uint(sdm_json *j, const char *key, uint64_t v)
+{
+    begin(j, key);
+    sdm_text_add(&j->text, "%llu", (unsigned long long)v);
+}
+
 void sdm_json_bool(sdm_json *j, const char *key, bool v)
 {
     begin(j, key);

@@ -123,7 +123,8 @@ experiment: {engine_samples: 1, pictures: 'no'}
 methods: [{name: octree, engine: octree}]
 variants: [{name: coarse, set: {}}, {name: fine, set: {grid.size: [16, 16, 16], grid.spacing: 1}}]
 END
-expect 0 - sdmgen experiment grids.yaml --out grids --quiet
+expect 0 - sdmgen experiment grids.yaml experiment.seed=18446744073709551615 --out grids --quiet
+grep -q '"seed": 18446744073709551615,' grids/table.json || bad 'the seed in table.json'
 grep -q '^| octree, coarse |' grids/table.md && grep -q '^| octree, fine |' grids/table.md || bad 'no rows of the variants'
 grep -q '16 x 16 x 16 voxels of 1 mm' grids/table.csv || bad 'the grid of the variant is not used'
 absent grids/octree-coarse

@@ -160,12 +160,14 @@ static void json_text(void **state)
     sdm_json_text(&j, "a", "q\"\\\n\x01");
     sdm_json_open(&j, "b", '[');
     sdm_json_int(&j, NULL, -3);
+    sdm_json_uint(&j, NULL, UINT64_MAX);
     sdm_json_real(&j, NULL, 0.1);
     sdm_json_real(&j, NULL, NAN);
     sdm_json_close(&j, ']');
     sdm_json_bool(&j, "c", true);
     sdm_json_close(&j, '}');
-    assert_string_equal(j.text.data, "{\"a\": \"q\\\"\\\\\\n\\u0001\", \"b\": [-3, 0.1, null], \"c\": true}");
+    assert_string_equal(j.text.data,
+                        "{\"a\": \"q\\\"\\\\\\n\\u0001\", \"b\": [-3, 18446744073709551615, 0.1, null], \"c\": true}");
     sdm_json_dispose(&j);
 }
 

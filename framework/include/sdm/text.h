@@ -35,6 +35,7 @@ SDM_API void sdm_json_open(sdm_json *j, const char *key, char bracket); /* '{' o
 SDM_API void sdm_json_close(sdm_json *j, char bracket);                 /* '}' or ']' */
 SDM_API void sdm_json_real(sdm_json *j, const char *key, double v);
 SDM_API void sdm_json_int(sdm_json *j, const char *key, int64_t v);
+SDM_API void sdm_json_uint(sdm_json *j, const char *key, uint64_t v);
 SDM_API void sdm_json_bool(sdm_json *j, const char *key, bool v);
 SDM_API void sdm_json_text(sdm_json *j, const char *key, const char *v);
 SDM_API void sdm_json_dispose(sdm_json *j);

@@ -78,7 +78,7 @@ static sdm_status json_model(const char *path, const sdm_model_info *m, sdm_erro
     for (size_t i = 0; i < m->n_options; i++) sdm_json_text(&j, m->option_names[i], m->option_values[i]);
     sdm_json_close(&j, '}');
     json_accuracy(&j, &m->accuracy);
-    sdm_json_int(&j, "seed", (int64_t)m->seed);
+    sdm_json_uint(&j, "seed", m->seed);
     sdm_json_real(&j, "train_seconds", m->train_seconds);
     sdm_json_int(&j, "train_samples", m->train_samples);
     sdm_json_int(&j, "file_bytes", (int64_t)m->file_bytes);
@@ -92,7 +92,7 @@ static sdm_status json_model(const char *path, const sdm_model_info *m, sdm_erro
 static sdm_status info_model(const cli_args *args, const char *path, sdm_error *err)
 {
     sdm_model *model = NULL;
-    sdm_status s = sdm_model_open(path, &model, err);
+    sdm_status s = cli_open_model(path, &model, err);
     if (s) return s;
     if (args->json)
         s = json_model(path, sdm_model_get_info(model), err);

@@ -136,10 +136,9 @@ static void json_options(sdm_json *j, const sdm_shape *shape)
 /* The parameters of the table, or, for a shape whose parameters come from its data, of the instance that -O makes. */
 static sdm_status show_one(const cli_args *args, const sdm_registry *registry, sdm_error *err)
 {
-    const char *name = args->files.items[0], *near = NULL;
-    const sdm_shape *shape = sdm_registry_find(registry, name, &near);
-    if (!shape && near) return sdm_fail(err, SDM_E_ARG, "unknown shape '%s'; did you mean '%s'?", name, near);
-    if (!shape) return sdm_fail(err, SDM_E_ARG, "unknown shape '%s'; see sdmgen shapes", name);
+    const char *name = args->files.items[0];
+    const sdm_shape *shape = cli_find_shape(registry, name, err);
+    if (!shape) return SDM_E_ARG;
     sdm_instance *instance = NULL;
     if (args->options.n > 0) {
         const sdm_status s = cli_open_shape(registry, name, &args->options, &instance, err);

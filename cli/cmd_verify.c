@@ -98,7 +98,7 @@ static sdm_status verify_model(const cli_args *args, const char *path, sdm_error
     sdm_model *model = NULL;
     cli_eval e = {0};
     sdm_status s = cli_open_registry(args, &registry, err);
-    if (!s) s = sdm_model_open(path, &model, err); /* checks every checksum */
+    if (!s) s = cli_open_model(path, &model, err); /* checks every checksum */
     const sdm_model_info *info = s ? NULL : sdm_model_get_info(model);
     const bool known = !s && sdm_registry_find(registry, info->shape, NULL);
     if (!s && known) s = sdm_runtime_instance(model, registry, &shape, err);

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "files.h"
 #include "sdm/builtin_shapes.h"
 #include "sdm/memory.h"
 #include "sdm/meshfile.h"
@@ -38,14 +39,21 @@ static sdm_status split_word(const char *word, const char *what, char buf[SDM_ER
     return SDM_OK;
 }
 
-sdm_status cli_open_shape(const sdm_registry *r, const char *name, const cli_list *options, sdm_instance **out,
-                          sdm_error *err)
+const sdm_shape *cli_find_shape(const sdm_registry *r, const char *name, sdm_error *err)
 {
     const char *near = NULL;
     const sdm_shape *shape = sdm_registry_find(r, name, &near);
-    if (!shape && near) return sdm_fail(err, SDM_E_ARG, "unknown shape '%s'; did you mean '%s'?", name, near);
-    if (!shape) return sdm_fail(err, SDM_E_ARG, "unknown shape '%s'; see sdmgen shapes", name);
+    if (!shape)
+        sdm_fail(err, SDM_E_ARG, "unknown shape '%s'%s%s%s", name, near ? "; did you mean '" : "; see sdmgen shapes",
+                 near ? near : "", near ? "'?" : "");
+    return shape;
+}
 
+sdm_status cli_open_shape(const sdm_registry *r, const char *name, const cli_list *options, sdm_instance **out,
+                          sdm_error *err)
+{
+    const sdm_shape *shape = cli_find_shape(r, name, err);
+    if (!shape) return SDM_E_ARG;
     sdm_named_text *named = NULL;
     char(*words)[SDM_ERROR_TEXT_MAX] = NULL;
     sdm_status s = SDM_ALLOC(&named, options->n, "shape options", err);
@@ -60,6 +68,17 @@ sdm_status cli_open_shape(const sdm_registry *r, const char *name, const cli_lis
     sdm_free(words);
     sdm_free(named);
     return s;
+}
+
+sdm_status cli_open_model(const char *path, sdm_model **out, sdm_error *err)
+{
+    sdm_error why = {0};
+    const sdm_status s = sdm_model_open(path, out, &why);
+    if (!s) return s;
+    const bool other = s == SDM_E_FORMAT && !cli_ends_with(path, ".sdm");
+    return sdm_fail(err, s, "%s%s", why.text,
+                    other ? "; by its name it is no level set (.vdb) and no image (.nii .nii.gz .nrrd .nhdr .mha .mhd)"
+                          : "");
 }
 
 sdm_status cli_model_params(const sdm_model_info *info, sdm_param **out, sdm_error *err)

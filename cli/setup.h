@@ -10,9 +10,15 @@
 /* The built-in shapes, those of SDMGEN_PLUGIN_PATH and those of --plugin. Freed with sdm_registry_free(). */
 sdm_status cli_open_registry(const cli_args *args, sdm_registry **out, sdm_error *err);
 
+/* NULL: there is none, SDM_E_ARG in *err with "did you mean". */
+const sdm_shape *cli_find_shape(const sdm_registry *r, const char *name, sdm_error *err);
+
 /* Shape `name` with the -O options of the command line (files relative to the current folder). SDM_E_ARG with "did you mean". */
 sdm_status cli_open_shape(const sdm_registry *r, const char *name, const cli_list *options, sdm_instance **out,
                           sdm_error *err);
+
+/* A model where files of other types could be given, too: what is known is told of a file that is none. */
+sdm_status cli_open_model(const char *path, sdm_model **out, sdm_error *err);
 
 /* Parameters of a model as a shape's: *out points into `info` and is freed with sdm_free(). */
 sdm_status cli_model_params(const sdm_model_info *info, sdm_param **out, sdm_error *err);

@@ -43,5 +43,8 @@ expect 3 'cut\.nii\.gz' sdmgen verify cut.nii.gz --json
 sed 's/LOCAL/..\/m.raw/' m.mha >away.mha
 expect 1 'another folder' sdmgen info away.mha
 expect 1 'none\.nrrd: cannot open' sdmgen verify none.nrrd
-
+expect 0 - sdmgen exact --shape torus -o map.npy
+for command in info verify; do
+    expect 3 'map\.npy: not a model file .*; by its name it is no level set \(\.vdb\) and no image \(\.nii ' sdmgen $command map.npy
+done
 finish

@@ -11,17 +11,11 @@
 #define ENOUGH_S 3.0    /* no further run after this */
 #define NAIVE_PAIRS 3e7 /* voxels times triangles of the naive method: about 2 s */
 
-static bool interrupted(void *user)
-{
-    (void)user;
-    return cli_is_interrupted();
-}
-
 /* A method over the whole grid: the fastest of some runs. */
 static sdm_status run_method(const bench_case *c, const sdm_method *m, int threads, float *values, bench_row *row,
                              sdm_method_report *report, sdm_error *err)
 {
-    const sdm_method_opts opts = {.exact = {.n_threads = threads, .cancelled = interrupted},
+    const sdm_method_opts opts = {.exact = {.n_threads = threads, .cancelled = cli_interrupted},
                                   .band_mm = isfinite(c->band_mm) ? c->band_mm : 0};
     const double begin = cli_clock();
     double best = INFINITY;
@@ -56,7 +50,7 @@ static sdm_status run_naive(const bench_case *c, float *values, bench_row *row, 
             sdm_grid_world(g, (const double[3]){(double)i, (double)(r % g->n[1]), (double)(r / g->n[1])}, x);
             values[r * g->n[0] + i] = wanted ? (float)sdm_naive_point(&c->mesh, x) : NAN;
         }
-        if (wanted && interrupted(NULL)) return cli_check_interrupt(err);
+        if (wanted && cli_is_interrupted()) return cli_check_interrupt(err);
         done += wanted;
     }
     row->share = (double)done / (double)(g->n[1] * g->n[2]);

@@ -28,12 +28,6 @@ typedef struct job {
     double bound_mm;                  /* on the error of the distances to the surface, 0: exact */
 } job;
 
-static bool interrupted(void *user)
-{
-    (void)user;
-    return cli_is_interrupted();
-}
-
 static sdm_status mesh_of_shape(job *j, sdm_error *err)
 {
     sdm_registry *registry = NULL;
@@ -86,7 +80,7 @@ static sdm_status run_engine(job *j, sdm_error *err)
     const sdm_exact_opts opts = {.sign = sign_of(j->args->sign),
                                  .keep_overlap = j->args->keep_overlap,
                                  .n_threads = (int)j->args->threads,
-                                 .cancelled = interrupted};
+                                 .cancelled = cli_interrupted};
     sdm_exact *engine = NULL;
     const double start = cli_clock();
     sdm_status s = sdm_exact_create(&j->mesh, &opts, &engine, err);
@@ -130,7 +124,7 @@ static sdm_status run_method(job *j, sdm_error *err)
     const sdm_method_opts opts = {.exact = {.sign = sign_of(j->args->sign),
                                             .keep_overlap = j->args->keep_overlap,
                                             .n_threads = (int)j->args->threads,
-                                            .cancelled = interrupted,
+                                            .cancelled = cli_interrupted,
                                             .user = &w},
                                   .max_error_mm = j->args->tolerance,
                                   .progress = show_progress};

@@ -7,12 +7,6 @@
 #include "progress.h"
 #include "terminal.h"
 
-static bool interrupted(void *user)
-{
-    (void)user;
-    return cli_is_interrupted();
-}
-
 /* One bar over the whole: iterations of all phases that are expected at most. */
 typedef struct watch {
     cli_progress bar;
@@ -48,7 +42,7 @@ static sdm_status run(cli_fit *f, sdm_error *err)
     const size_t turns = f->opts.turns == SDM_FIT_TURNS_NONE ? 0 : f->opts.n_turns;
     watch w = {.expected = 6 * turns + 12 + f->opts.max_iterations + f->opts.max_polish_iterations};
     f->opts.progress = show;
-    f->opts.cancelled = interrupted;
+    f->opts.cancelled = cli_interrupted;
     f->opts.user = &w;
     cli_progress_start(&w.bar);
     const sdm_status s = sdm_fit(&f->source, &f->target, &f->opts, &f->result, &f->doubt);

@@ -112,6 +112,7 @@ static sdm_status make_files(const cli_phantom *p, sdm_error *err)
     sdm_status s = args->outputs.n ? SDM_ALLOC(&values, n, "image", err) : SDM_OK;
     if (!s) s = SDM_ALLOC(&label, n, "labels", err);
     if (!s) s = sdm_phantom_make(p->shape, p->params, &p->pose, &p->opts, &p->grid, values, label, err);
+    if (!s) s = cli_check_interrupt(err);
     for (size_t i = 0; i < n && !s; i++) inside += label[i];
     if (!s && !inside) cli_notice("no voxel is inside the shape: is the grid where it is?");
     if (!s && p->cut) cli_notice("the shape leaves the field of view");

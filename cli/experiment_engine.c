@@ -38,17 +38,11 @@ typedef struct own_method {
     const experiment_job *job;
 } own_method;
 
-static bool interrupted(void *user)
-{
-    (void)user;
-    return cli_is_interrupted();
-}
-
 /* Mesh, preparation and map, as an application that changes the shape needs them. */
 static sdm_status make_map(const void *user, const double *p, float *values, sdm_error *err)
 {
     const own_method *own = user;
-    const sdm_method_opts opts = {.exact = {.n_threads = 1, .cancelled = interrupted}};
+    const sdm_method_opts opts = {.exact = {.n_threads = 1, .cancelled = cli_interrupted}};
     sdm_mesh mesh = {0};
     sdm_status s = sdm_instance_mesh(own->job->shape, p, &mesh, err);
     if (!s) s = own->method->map(&mesh, &own->job->maker.grid, &opts, values, NULL, err);
@@ -128,7 +122,7 @@ static sdm_status own_row(const experiment_run *run, experiment_job *job, const 
 
 static sdm_status exact_map(const experiment_job *job, float *values, bool *unioned, sdm_error *err)
 {
-    const sdm_exact_opts opts = {.cancelled = interrupted};
+    const sdm_exact_opts opts = {.cancelled = cli_interrupted};
     sdm_exact_report report = {0};
     const sdm_status s = sdm_exact_shape_map(job->shape, job->nominal, &opts, &job->maker.grid, values, &report, err);
     *unioned = report.unioned;

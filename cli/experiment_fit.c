@@ -13,12 +13,6 @@
 /* Shapes whose naive maps are timed. */
 enum { NAIVE_SHAPES = 2 };
 
-static bool interrupted(void *user)
-{
-    (void)user;
-    return cli_is_interrupted();
-}
-
 /* ---- the network ---- */
 
 /* A model from elsewhere knows the shape, wherever phantoms are drawn. */
@@ -97,7 +91,7 @@ static sdm_status fit_one(const experiment_job *job, const sdm_fit_source *sourc
     opts.start_pose = p->start_pose;
     opts.max_polish_iterations = polish ? opts.max_iterations : 0;
     opts.n_threads = 1; // the time is that of one core
-    opts.cancelled = interrupted;
+    opts.cancelled = cli_interrupted;
     const double begin = cli_thread_clock();
     sdm_status s = sdm_fit(source, &target, &opts, &r, why);
     out->seconds = cli_thread_clock() - begin;

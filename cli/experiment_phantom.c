@@ -7,6 +7,7 @@
 #include "sdm/memory.h"
 #include "sdm/phantom.h"
 #include "sdm/rng.h"
+#include "terminal.h"
 
 /* Streams of the seeds of phantoms and of the directions of starts. */
 enum { STREAM_SEED = 910, STREAM_START = 911 };
@@ -89,6 +90,7 @@ sdm_status experiment_phantom_make(const experiment_run *run, const experiment_j
     double min[3], max[3], middle[3];
     opts.seed = seed;
     opts.n_threads = (int)run->args->threads;
+    opts.cancelled = cli_interrupted;
     cli_maker_params(m, e->experiment.seed, index, out->truth);
     for (size_t i = 0; i < m->n_params; i++) {
         out->start[i] = 0.5 * (m->min[i] + m->max[i]);

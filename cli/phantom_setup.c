@@ -5,6 +5,7 @@
 #include "phantom.h"
 #include "sdm/memory.h"
 #include "setup.h"
+#include "terminal.h"
 
 static bool is_given(const cli_list *words, const char *name)
 {
@@ -78,6 +79,7 @@ static void read_options(cli_phantom *p)
     if (a->supersample) p->opts.supersampling = (int)a->supersample;
     p->opts.noise_is_blurred = !a->white_noise;
     p->opts.n_threads = (int)p->args->threads;
+    p->opts.cancelled = cli_interrupted;
     if (p->args->seed >= 0) p->opts.seed = (uint64_t)p->args->seed;
 }
 

@@ -111,6 +111,12 @@ void cli_catch_interrupts(void)
 
 bool cli_is_interrupted(void) { return interrupts != 0; }
 
+bool cli_interrupted(void *user)
+{
+    (void)user;
+    return cli_is_interrupted();
+}
+
 sdm_status cli_check_interrupt(sdm_error *err)
 {
     return interrupts ? sdm_fail(err, SDM_E_CANCELLED, "interrupted") : SDM_OK;

@@ -38,6 +38,8 @@ bool cli_has_terminal(void);
 /* Catches SIGINT and SIGTERM: the first sets a flag, the second ends the program at once with 130. */
 void cli_catch_interrupts(void);
 bool cli_is_interrupted(void);
+/* The same as a hook of the library. */
+bool cli_interrupted(void *user);
 /* SDM_E_CANCELLED when interrupted. */
 sdm_status cli_check_interrupt(sdm_error *err);
 

@@ -80,12 +80,18 @@ static sdm_status check_options(const sdm_phantom_opts *o, const sdm_grid *g, sd
 
 /* ---- the image ---- */
 
+sdm_status phantom_check(const sdm_phantom_opts *o, sdm_error *err)
+{
+    if (!o->cancelled || !o->cancelled(o->user)) return SDM_OK;
+    return sdm_fail(err, SDM_E_CANCELLED, "phantom stopped on request");
+}
+
 static sdm_status make_engine(const sdm_instance *shape, const double *p, const sdm_phantom_opts *o, sdm_exact **out,
                               sdm_error *err)
 {
     size_t n;
     const sdm_param *params = sdm_instance_params(shape, &n);
-    const sdm_exact_opts exact = {.n_threads = o->n_threads};
+    const sdm_exact_opts exact = {.n_threads = o->n_threads, .cancelled = o->cancelled, .user = o->user};
     double *defaults = NULL;
     sdm_mesh mesh = {0};
     sdm_status s = p ? SDM_OK : SDM_ALLOC(&defaults, n, "parameters", err);
@@ -133,16 +139,13 @@ static sdm_status make_values(const sdm_exact *engine, const sdm_pose *pose, con
     static const double white[3];
     const double smooth[3] = {o->texture_mm, o->texture_mm, o->texture_mm};
     const size_t n = sdm_grid_count(grid);
-    const int threads = sdm_threads(o->n_threads);
     const bool has_texture = o->inside.sd > 0 || o->outside.sd > 0 || (o->air_share > 0 && o->air.sd > 0);
     float *air = NULL, *texture = NULL, *noise = NULL;
     sdm_status s = o->air_share > 0 ? SDM_ALLOC(&air, n, "air cells", err) : SDM_OK;
     if (!s) s = phantom_shares(engine, pose, o, grid, values, air, err);
-    if (!s && has_texture)
-        s = phantom_field_make(grid, smooth, o->seed, PHANTOM_STREAM_TEXTURE, threads, &texture, err);
+    if (!s && has_texture) s = phantom_field_make(grid, smooth, o, PHANTOM_STREAM_TEXTURE, &texture, err);
     if (!s && o->noise > 0)
-        s = phantom_field_make(grid, o->noise_is_blurred ? o->blur : white, o->seed, PHANTOM_STREAM_NOISE, threads,
-                               &noise, err);
+        s = phantom_field_make(grid, o->noise_is_blurred ? o->blur : white, o, PHANTOM_STREAM_NOISE, &noise, err);
     if (!s) mix(o, n, air, texture, noise, values);
     sdm_free(noise);
     sdm_free(texture);

@@ -5,6 +5,7 @@
 #include "phantom_parts.h"
 #include "sdm/memory.h"
 #include "sdm/rng.h"
+#include "sdm/threads.h"
 
 // weights of squares that add up to 1: the variance stays that of the white noise
 static void keep_variance(phantom_filter *f)
@@ -31,9 +32,10 @@ static void smooth(const phantom_filter f[3], const size_t size[3], const size_t
             memmove(field + (k * n[1] + j) * n[0], field + k * plane + j * row, n[0] * sizeof *field);
 }
 
-sdm_status phantom_field_make(const sdm_grid *grid, const double sigma[3], uint64_t seed, uint64_t stream, int threads,
+sdm_status phantom_field_make(const sdm_grid *grid, const double sigma[3], const sdm_phantom_opts *o, uint64_t stream,
                               float **out, sdm_error *err)
 {
+    const int threads = sdm_threads(o->n_threads);
     phantom_filter f[3] = {{0}};
     size_t n[3], size[3], count = 1;
     float *field = NULL;
@@ -49,10 +51,16 @@ sdm_status phantom_field_make(const sdm_grid *grid, const double sigma[3], uint6
     if (!s) s = SDM_ALLOC(&field, count, "random field", err);
     if (!s) {
 #pragma omp parallel for num_threads(threads) schedule(static)
-        for (size_t i = 0; i < count; i++) field[i] = (float)sdm_rng_normal(seed, stream, i);
-        smooth(f, size, n, threads, field);
+        for (size_t row = 0; row < size[1] * size[2]; row++) {
+            if (phantom_check(o, NULL)) continue;
+            for (size_t i = row * size[0]; i < (row + 1) * size[0]; i++)
+                field[i] = (float)sdm_rng_normal(o->seed, stream, i);
+        }
+        s = phantom_check(o, err);
     }
+    if (!s) smooth(f, size, n, threads, field);
     for (int a = 0; a < 3; a++) phantom_filter_dispose(&f[a]);
-    *out = field;
+    if (s) sdm_free(field);
+    *out = s ? NULL : field;
     return s;
 }

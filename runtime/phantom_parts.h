@@ -14,7 +14,8 @@ enum {
     PHANTOM_STREAM_POSE
 };
 
-/* Threads for n_threads of the options. */
+/* SDM_E_CANCELLED when the options say so. [any thread] */
+sdm_status phantom_check(const sdm_phantom_opts *o, sdm_error *err);
 
 /* ---- filters along one axis ---- */
 
@@ -38,8 +39,8 @@ void phantom_filter_rows(const phantom_filter *f, float *data, size_t n, size_t 
 
 /* ---- random fields ---- */
 
-/* *out = new field [nz][ny][nx] of mean 0 and variance 1: white noise smoothed with a Gaussian of sigma[3] mm. */
-sdm_status phantom_field_make(const sdm_grid *grid, const double sigma[3], uint64_t seed, uint64_t stream, int threads,
+/* *out = new field [nz][ny][nx] of mean 0 and variance 1: white noise smoothed with a Gaussian of sigma[3] mm; NULL after an error. */
+sdm_status phantom_field_make(const sdm_grid *grid, const double sigma[3], const sdm_phantom_opts *o, uint64_t stream,
                               float **out, sdm_error *err);
 
 /* ---- air cells ---- */

@@ -138,12 +138,15 @@ static sdm_status run_block(const job *j, size_t first, size_t n, float *buffer,
     if (s) return s;
 #pragma omp parallel for num_threads(j->threads) schedule(dynamic)
     for (size_t k = 0; k < n; k++) {
+        if (phantom_check(j->o, NULL)) continue;
         float *d = buffer + k * plane, *b = air ? air_buffer + k * plane : NULL;
         if (b) phantom_balls_plane(&j->balls, &j->fine, first + k, j->edge, b);
         to_shares(j, plane, d, b);
         reduce_plane(j, d);
         if (b) reduce_plane(j, b);
     }
+    const sdm_status stopped = phantom_check(j->o, err);
+    if (stopped) return stopped;
     add_planes(j, buffer, first, n, inside);
     if (air) add_planes(j, air_buffer, first, n, air);
     return SDM_OK;

@@ -94,5 +94,7 @@ expect 2 "type 'float': need one of int16\|float32" sdmgen phantom $small -o x.n
 expect 5 'rx.* 9' sdmgen phantom $small -p rx=9 -o x.nii --label l.nii --truth t.json
 expect 5 'rx.* nan' sdmgen phantom $small -p rx=nan -o x.nii
 expect 2 "did you mean 'ellipsoid'" sdmgen phantom --shape elipsoid -o x.nii
+# a long work is stopped when asked to
+expect 130 'stopped on request|interrupted' timeout --preserve-status -s TERM 1 "$program" phantom --shape ellipsoid --spacing 0.03 --supersample 16 -o x.nii
 absent x.nii x.vdb x.npy x.txt l.nii t.json nowhere
 finish

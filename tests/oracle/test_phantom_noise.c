@@ -240,11 +240,41 @@ static void test_memory(void **state)
     }
 }
 
+// asked `left` times before it stops the work
+static bool stops(void *user)
+{
+    int *left = user;
+    return (*left)-- <= 0;
+}
+
+static void test_cancelled(void **state)
+{
+    (void)state;
+    const sdm_grid g = oblique(4, 5, 6);
+    float v[120];
+    uint8_t label[120];
+    sdm_phantom_opts o = sdm_phantom_defaults();
+    o.air_share = 0.5;
+    o.n_threads = 1;
+    o.cancelled = stops;
+    sdm_status s = SDM_E_CANCELLED;
+    int asked = 0;
+    for (; s; asked++) {
+        sdm_error err;
+        int left = asked;
+        o.user = &left;
+        s = sdm_phantom_make(block, NULL, NULL, &o, &g, v, label, &err);
+        assert_true(asked < 10000 && (!s || s == SDM_E_CANCELLED));
+    }
+    // in both fields row by row, and in the planes of sub-voxels
+    assert_true(asked > 2 * 30 + 18);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_noise),  cmocka_unit_test(test_random_truth), cmocka_unit_test(test_same_bits),
-        cmocka_unit_test(test_memory), cmocka_unit_test(test_misuse),
+        cmocka_unit_test(test_memory), cmocka_unit_test(test_misuse),       cmocka_unit_test(test_cancelled),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

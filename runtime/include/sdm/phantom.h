@@ -38,6 +38,8 @@ typedef struct sdm_phantom_opts {
     int supersampling;     /* 1 .. 16 sub-voxels along the shortest edge of a voxel, more along the longer ones */
     uint64_t seed;         /* of the random fields and the air cells */
     int n_threads;         /* 0: the OpenMP default; the same bits for every value */
+    bool (*cancelled)(void *user); /* asked now and then by any thread; true stops with SDM_E_CANCELLED; may be NULL */
+    void *user;
 } sdm_phantom_opts;
 
 /* As in cone-beam CT of the inner ear: fluid 40, bone 1300, air -880 HU, of sd 170, 270 and 150 HU with the noise of 150 HU; blur

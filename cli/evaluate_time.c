@@ -6,6 +6,7 @@
 #include "evaluate.h"
 #include "sdm/config.h"
 #include "sdm/memory.h"
+#include "sdm/methods.h"
 #include "terminal.h"
 
 enum { N_NETWORK = 51, N_LEAST = 3, N_EXACT = 9, BATCH = 32, N_BATCHES = 3, NAIVE_STEP = 16 };
@@ -97,11 +98,13 @@ sdm_status cli_time_naive(const sdm_mesh *mesh, const sdm_grid *grid, double *ms
     sdm_grid thin = *grid;
     thin.n[2] = (grid->n[2] + NAIVE_STEP - 1) / NAIVE_STEP;
     thin.spacing[2] = grid->spacing[2] * (double)grid->n[2] / (double)thin.n[2];
+    const sdm_method_opts opts = {.exact = {.n_threads = 1, .cancelled = cli_interrupted}};
+    const sdm_method *naive = sdm_method_find("naive", err);
     float *values = NULL;
-    sdm_status s = SDM_ALLOC(&values, sdm_grid_count(&thin), "map of the naive method", err);
+    sdm_status s = naive ? SDM_ALLOC(&values, sdm_grid_count(&thin), "map of the naive method", err) : SDM_E_INTERNAL;
     if (s) return s;
     const double start = cli_thread_clock();
-    s = sdm_naive_map(mesh, &thin, 1, values, err);
+    s = naive->map(mesh, &thin, &opts, values, NULL, err);
     *share = (double)thin.n[2] / (double)grid->n[2];
     *ms = 1e3 * (cli_thread_clock() - start) / *share;
     sdm_free(values);

@@ -86,20 +86,27 @@ static sdm_status apply(sdm_experiment *e, sdm_reader *r, const char *text, int 
     return sdm_config_override(r, text, mark, err);
 }
 
+/* What the file names is meant from its own folder: `name` becomes a path. */
+static bool place_beside(const sdm_experiment *e, char name[SDM_PATH_TEXT_MAX])
+{
+    char path[SDM_PATH_TEXT_MAX];
+    const char *slash = strrchr(e->file, '/');
+    const int folder = slash ? (int)(slash - e->file) + 1 : 0;
+    if (snprintf(path, sizeof path, "%.*s%s", folder, e->file, name) >= (int)sizeof path) return false;
+    strcpy(name, path);
+    return true;
+}
+
 /* The base is a file beside the experiment's: its name becomes a path, its text is kept. */
 static sdm_status read_base(sdm_experiment *e, sdm_reader *r, sdm_error *err)
 {
     const sdm_mark mark = sdm_fields_given(r, "", "base")->mark;
-    char name[SDM_NAME_MAX];
     if (!*e->base || r->mistakes->count > 0) return SDM_OK;
     if (strchr(e->base, '/') || !strcmp(e->base, "..")) {
         sdm_mistakes_add(r->mistakes, mark, "base: '%s' must be the name of a file beside this one", e->base);
         return SDM_OK;
     }
-    snprintf(name, sizeof name, "%.63s", e->base);
-    const char *slash = strrchr(e->file, '/');
-    const int folder = slash ? (int)(slash - e->file) + 1 : 0;
-    if (snprintf(e->base, sizeof e->base, "%.*s%s", folder, e->file, name) >= (int)sizeof e->base) {
+    if (!place_beside(e, e->base)) {
         sdm_mistakes_add(r->mistakes, mark, "base: the path is too long");
         return SDM_OK;
     }
@@ -110,6 +117,14 @@ static sdm_status read_base(sdm_experiment *e, sdm_reader *r, sdm_error *err)
     if (s == SDM_E_NOMEM) return sdm_fail(err, s, "%s", why.text);
     if (s) sdm_mistakes_add(r->mistakes, mark, "base: %.300s", why.text);
     return SDM_OK;
+}
+
+/* A model that the command line names is meant from the working folder, as its other files are. */
+static void place_model(sdm_experiment *e, sdm_reader *r)
+{
+    const sdm_mark mark = sdm_fields_given(r, "fit", "model")->mark;
+    if (!*e->fit.model || *e->fit.model == '/' || mark.override > 0) return;
+    if (!place_beside(e, e->fit.model)) sdm_mistakes_add(r->mistakes, mark, "fit.model: the path is too long");
 }
 
 /* Mistakes of the YAML itself end here, as in a training configuration. */
@@ -124,6 +139,7 @@ static sdm_status read_all(sdm_experiment *e, sdm_reader *r, const char *text, s
     if (s == SDM_E_CONFIG || (!s && !is_keyed)) return sdm_mistakes_report(r->mistakes, err);
     for (size_t i = 0; i < n_overrides && !s; i++) s = apply(e, r, overrides[i], (int)i + 1, err);
     if (!s) s = read_base(e, r, err);
+    if (!s) place_model(e, r);
     if (!s) s = sdm_experiment_finish(e, r, err);
     return s ? s : sdm_mistakes_report(r->mistakes, err);
 }

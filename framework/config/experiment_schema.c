@@ -84,7 +84,7 @@ static const sdm_field FIT[] = {
     ROW(E, "range", SDM_FIELD_REAL, fit.range, 0, 1, "0.8", "", "share of every parameter's range, about its middle, that the shapes are drawn from"),
     ROW(E, "prior_sd", SDM_FIELD_REAL, fit.prior_sd, 0, 1e6, "1", "", "standard deviation of every parameter before the image is seen, in halves of its range about the middle; 0: nothing is known. Exact fits have the range of the shape itself"),
     ROW(E, "eps", SDM_FIELD_REAL, fit.eps, 1e-12, 1e-4, "3e-6", "", "a fit with exact maps ends when the largest step is below: share of a range, rad, share of the size of the shape"),
-    TEXT(E, "model", fit.model, SDM_PATH_TEXT_MAX, "none", "model file to fit with; none: the network is trained"),
+    TEXT(E, "model", fit.model, SDM_PATH_TEXT_MAX, "none", "model file to fit with, in the file from its folder; none: the network is trained"),
 };
 
 static const sdm_field TOP[] = {

@@ -179,6 +179,19 @@ static void test_fits(void **state)
     assert_int_equal(e->rows[1].network_row, 1);
 }
 
+/* A model of the file is meant from its folder, one of the command line from the working folder. */
+static void test_model_of_fits(void **state)
+{
+    const char *text = SHAPE "fit: {model: m.sdm}\nmethods: [{name: N, network: pod, fit: network}]\n";
+    (void)state;
+    expect_ok(text, NULL);
+    assert_string_equal(e->fit.model, "dir/m.sdm");
+    expect_ok(text, "fit.model=n.sdm");
+    assert_string_equal(e->fit.model, "n.sdm");
+    expect_ok(SHAPE "fit: {model: /m.sdm}\nmethods: [{name: N, network: pod, fit: network}]\n", NULL);
+    assert_string_equal(e->fit.model, "/m.sdm");
+}
+
 static void test_mistakes_of_fits(void **state)
 {
     (void)state;
@@ -350,6 +363,7 @@ int main(void)
         cmocka_unit_test(test_engines_alone),
         cmocka_unit_test(test_references),
         cmocka_unit_test(test_fits),
+        cmocka_unit_test(test_model_of_fits),
         cmocka_unit_test(test_mistakes_of_fits),
         cmocka_unit_test(test_figures_have_keys),
         cmocka_unit_test(test_mistakes_of_the_experiment),

@@ -129,7 +129,7 @@ typedef struct sdm_experiment {
         double range;    /* share of every parameter's range, about its middle, that holds the truths, default 0.8 */
         double prior_sd; /* as in sdm/fit.h, default 1 */
         double eps;      /* polish_eps of sdm/fit.h, default 1e-6 */
-        char model[SDM_PATH_TEXT_MAX]; /* model to fit with in place of training one; "": none */
+        char model[SDM_PATH_TEXT_MAX]; /* path of a model to fit with, none is trained; "": none */
     } fit;
     char base[SDM_PATH_TEXT_MAX]; /* path of the training configuration under all rows; "": there is none */
     char *base_text;              /* its content */

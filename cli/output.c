@@ -85,8 +85,9 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
     sdm_vdb_report report = {0};
     const sdm_status s = sdm_vdb_write(path, map->grid, map->values, &opts, &report, err);
     if (!s && report.adjusted_voxels > 0)
-        cli_notice("%s: %lld voxels at creases were adjusted, by at most %.2g mm, to make a valid level set", path,
-                   (long long)report.adjusted_voxels, report.adjusted_mm);
+        cli_notice("%s: %lld voxels at creases were adjusted, by at most %.2g mm, to make a valid level set; none "
+                   "changed sides",
+                   path, (long long)report.adjusted_voxels, report.adjusted_mm);
     if (!s && report.cut) cli_notice("%s: the surface leaves the grid and is cut at its border", path);
     return s;
 #else

@@ -190,127 +190,148 @@ Grid::Ptr grid_of(const sdm_grid &g, const sdm_band &box, float background, bool
 
 // CheckEikonal refuses squared gradients outside [0.5, 1.5]; the margin is for the rounding of the check itself
 const float SQUARE_LOW = 0.52f, SQUARE_HIGH = 1.48f;
+// how far within it a gradient is brought, for what its neighbours ask, and the part of the way at a time
+const float SQUARE_INSET = 0.05f, RELAXATION = 0.7f;
+// a map that is wrong at a larger share of its zero crossings is no distance
+const double CREASES_MOST = 0.5;
+// every so many rounds go by first differences, and from such a round on all of the stencil may change, against cycles
+const int ROUNDS_MOST = 300, PLAIN_EVERY = 6, WIDE_FROM = 24;
+// in voxels: most that a value changes at a time, and least that is left of one that was not smaller
+const float STEP_MOST = 0.25f, SIZE_LEAST = 0.1f;
+// values of less of the squared slope stay
+const float SHARE_LEAST = 1e-3f;
 
-struct crease {
-    Coord at;
-    float factor; // for the value and its neighbours across the surface
-};
+// that of the check: a voxel and three on each side along x, y, z
+using Stencil = openvdb::math::WenoStencil<const Grid>;
+const int STENCIL_SIZE = Stencil::SIZE;
 
-// what is wrong at a voxel, if anything
-void look_at(openvdb::math::WenoStencil<const Grid> &stencil, const Coord &at, std::vector<crease> &found)
+// place of value n of the stencil
+Coord stencil_place(const Coord &at, int n)
 {
-    stencil.moveTo(at);
-    if (!stencil.zeroCrossing()) return;
-    const float square = stencil.normSqGrad();
-    if (square >= SQUARE_LOW && square <= SQUARE_HIGH) return;
-    const float wanted =
-        square > 1 ? 0.97f * std::sqrt(SQUARE_HIGH / square) : 1.03f * std::sqrt(SQUARE_LOW / std::max(square, 0.1f));
-    found.push_back({at, std::min(std::max(wanted, 0.8f), 1.25f)});
+    static const int along[] = {-3, -2, -1, 1, 2, 3};
+    Coord c = at;
+    if (n) c[(n - 1) / 6] += along[(n - 1) % 6];
+    return c;
 }
 
-std::vector<crease> find_creases(const Grid &grid)
+bool on_crease(const Stencil &stencil)
 {
-    std::vector<crease> found;
-    openvdb::math::WenoStencil<const Grid> stencil(grid);
-    for (auto v = grid.cbeginValueOn(); v; ++v) look_at(stencil, v.getCoord(), found);
+    if (!stencil.zeroCrossing()) return false;
+    const float square = stencil.normSqGrad();
+    return !(square >= SQUARE_LOW && square <= SQUARE_HIGH);
+}
+
+// squared gradient by first differences, in voxels: at a zero crossing it never vanishes
+float plain_square(const Stencil &stencil, float voxel)
+{
+    const float here = stencil.getValue(0), side = here > 0 ? 1.0f : -1.0f;
+    float sum = 0;
+    for (const unsigned below : {3u, 9u, 15u}) {
+        const float low = std::min(side * stencil.getValue(below), side * stencil.getValue(below + 1));
+        const float slope = std::max(side * here - low, 0.0f) / voxel;
+        sum += slope * slope;
+    }
+    return sum;
+}
+
+std::vector<Coord> find_creases(const Grid &grid)
+{
+    std::vector<Coord> found;
+    size_t crossings = 0;
+    Stencil stencil(grid);
+    for (auto v = grid.cbeginValueOn(); v; ++v) {
+        stencil.moveTo(v.getCoord());
+        crossings += stencil.zeroCrossing();
+        if (on_crease(stencil)) found.push_back(v.getCoord());
+    }
+    if (static_cast<double>(found.size()) > CREASES_MOST * static_cast<double>(crossings)) found.clear();
     return found;
 }
 
-// the same among voxels that a sweep has changed, where the stencil (three voxels along each axis) reaches one of them, or that were
-// creases before it
-std::vector<crease> find_creases_near(const Grid &grid, const std::vector<Coord> &changed,
-                                      const std::vector<crease> &before)
+// the same where the stencil reaches what was changed: stencils of creases of before
+std::vector<Coord> find_creases_near(const Grid &grid, const std::vector<Coord> &before)
 {
-    std::vector<Coord> near;
-    near.reserve(changed.size() * 21 + before.size());
-    for (const crease &f : before) near.push_back(f.at);
-    for (const Coord &c : changed)
-        for (int axis = 0; axis < 3; axis++)
-            for (int step = -3; step <= 3; step++) {
-                near.push_back(c);
-                near.back()[axis] += step;
-            }
+    std::vector<Coord> near, found;
+    near.reserve(before.size() * STENCIL_SIZE * STENCIL_SIZE);
+    for (const Coord &c : before)
+        for (int n = 0; n < STENCIL_SIZE * STENCIL_SIZE; n++)
+            near.push_back(stencil_place(stencil_place(c, n / STENCIL_SIZE), n % STENCIL_SIZE));
     std::sort(near.begin(), near.end());
     near.erase(std::unique(near.begin(), near.end()), near.end());
-    std::vector<crease> found;
-    openvdb::math::WenoStencil<const Grid> stencil(grid);
+    Stencil stencil(grid);
     Grid::ConstAccessor acc = grid.getConstAccessor();
-    for (const Coord &c : near)
-        if (acc.isValueOn(c)) look_at(stencil, c, found);
+    for (const Coord &c : near) {
+        if (!acc.isValueOn(c)) continue;
+        stencil.moveTo(c);
+        if (on_crease(stencil)) found.push_back(c);
+    }
     return found;
 }
 
-// moves a value; the first one seen is kept for the report
+// the first value seen of each voxel that is changed
 using originals = std::map<Coord, float>;
 
-float limited(float v, float limit, bool half) { return as_stored(std::min(std::max(v, -limit), limit), half); }
+struct sweep_limits {
+    float voxel, most; // mm
+    bool half;
+};
 
-// one sweep: values at creases and their neighbours across the surface times the factor asked for, by the one farthest from 1
-std::vector<Coord> scale_creases(Grid::Accessor &acc, const std::vector<crease> &found, float limit, bool half,
-                                 originals &original)
+float square_at(Stencil &stencil, const Coord &at, bool plain, float voxel)
 {
-    const Coord around[6] = {Coord(1, 0, 0),  Coord(-1, 0, 0), Coord(0, 1, 0),
-                             Coord(0, -1, 0), Coord(0, 0, 1),  Coord(0, 0, -1)};
-    std::map<Coord, float> factors; // in order of coordinates: independent of the order of creases
-    const auto ask = [&](const Coord &c, float factor) {
-        const auto it = factors.emplace(c, factor).first;
-        if (std::fabs(factor - 1) > std::fabs(it->second - 1)) it->second = factor;
-    };
-    for (const crease &f : found) {
-        const bool outside = acc.getValue(f.at) > 0;
-        ask(f.at, f.factor);
-        for (const Coord &d : around) {
-            const Coord c = f.at + d;
-            if ((acc.getValue(c) > 0) != outside && acc.isValueOn(c)) ask(c, f.factor);
-        }
-    }
-    std::vector<Coord> changed;
-    for (const auto &[c, factor] : factors) {
-        const float v = acc.getValue(c);
-        original.emplace(c, v);
-        acc.setValueOnly(c, limited(v * factor, limit, half));
-        changed.push_back(c);
-    }
-    return changed;
+    stencil.moveTo(at);
+    return plain ? plain_square(stencil, voxel) : stencil.normSqGrad();
 }
 
-// one sweep of diffusion around creases: sheets, gaps and edges thinner than a voxel, which have no gradient on this grid, dissolve
-std::vector<Coord> diffuse_creases(Grid::Accessor &acc, const std::vector<crease> &found, float limit, bool half,
-                                   originals &original)
+// derivative of the squared gradient at a voxel by the value of another, times the size of a voxel; away from 0, where signs stay
+float derivative(Grid::Accessor &acc, Stencil &stencil, const Coord &at, const Coord &by, bool plain, float voxel)
 {
-    std::map<Coord, float> fresh;
-    for (const crease &f : found)
-        for (int n = 0; n < 27; n++) {
-            const Coord c = f.at + Coord(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-            if (!acc.isValueOn(c)) continue;
-            const float mean = (acc.getValue(c.offsetBy(1, 0, 0)) + acc.getValue(c.offsetBy(-1, 0, 0)) +
-                                acc.getValue(c.offsetBy(0, 1, 0)) + acc.getValue(c.offsetBy(0, -1, 0)) +
-                                acc.getValue(c.offsetBy(0, 0, 1)) + acc.getValue(c.offsetBy(0, 0, -1))) /
-                               6;
-            fresh.emplace(c, 0.5f * (acc.getValue(c) + mean));
-        }
-    std::vector<Coord> changed;
-    for (const auto &[c, v] : fresh) {
-        original.emplace(c, acc.getValue(c));
-        acc.setValueOnly(c, limited(v, limit, half));
-        changed.push_back(c);
+    const float v = acc.getValue(by), part = std::copysign(1.0f / 1024, v),
+                before = square_at(stencil, at, plain, voxel);
+    acc.setValueOnly(by, v + part * voxel);
+    const float after = square_at(stencil, at, plain, voxel);
+    acc.setValueOnly(by, v);
+    return (after - before) / part;
+}
+
+/* The least change of a voxel and its neighbours, or of the whole stencil, that brings the squared gradient back to where it is
+   allowed, to first order (Kaczmarz 1937). Signs stay, and with them the voxels that are inside. */
+void project(Grid::Accessor &acc, Stencil &stencil, const Coord &at, int round, const sweep_limits &l,
+             originals &original)
+{
+    stencil.moveTo(at);
+    if (!on_crease(stencil)) return; // by what was done beside it
+    const float square = stencil.normSqGrad();
+    const float missing = (square < SQUARE_LOW ? SQUARE_LOW + SQUARE_INSET : SQUARE_HIGH - SQUARE_INSET) - square;
+    float slope[STENCIL_SIZE], sum = 0;
+    for (int n = 0; n < STENCIL_SIZE; n++) {
+        const Coord c = stencil_place(at, n);
+        const bool next = n == 0 || (n - 1) % 6 / 2 == 1, free = acc.isValueOn(c) && (next || round >= WIDE_FROM);
+        slope[n] = free ? derivative(acc, stencil, at, c, round % PLAIN_EVERY == 0, l.voxel) : 0;
+        sum += slope[n] * slope[n];
     }
-    return changed;
+    for (int n = 0; n < STENCIL_SIZE; n++) {
+        if (!(slope[n] * slope[n] > SHARE_LEAST * sum)) continue;
+        const Coord c = stencil_place(at, n);
+        const float v = acc.getValue(c), first = original.emplace(c, v).first->second;
+        const float step = std::min(std::max(RELAXATION * missing * slope[n] / sum, -STEP_MOST), STEP_MOST) * l.voxel;
+        const float least = std::min(std::fabs(first), SIZE_LEAST * l.voxel);
+        const float size = std::min(std::max(first < 0 ? -v - step : v + step, least), l.most);
+        acc.setValueOnly(c, as_stored(first < 0 ? -size : size, l.half));
+    }
 }
 
 // mends creases until checkLevelSet has nothing to object to (it is asked by the caller, this may end without success)
 void mend_creases(Grid &grid, bool half, sdm_vdb_report &report)
 {
-    const int ROUNDS = 600;
     originals original;
     Grid::Accessor acc = grid.getAccessor();
-    const float limit = std::nextafter(as_stored(grid.background() * 0.999f, half), 0.0f);
-    std::vector<crease> found = find_creases(grid);
-    for (int round = 0; round < ROUNDS && !found.empty(); round++) {
-        if (round) found = find_creases_near(grid, diffuse_creases(acc, found, limit, half, original), found);
-        const int sweeps = 20 - 7 * round % 20; // changing, so that scaling and diffusion do not go round in a circle
-        for (int sweep = 0; sweep < sweeps && !found.empty(); sweep++)
-            found = find_creases_near(grid, scale_creases(acc, found, limit, half, original), found);
+    Stencil stencil(grid);
+    const sweep_limits limits = {static_cast<float>(grid.voxelSize()[0]),
+                                 std::nextafter(as_stored(grid.background() * 0.999f, half), 0.0f), half};
+    std::vector<Coord> found = find_creases(grid);
+    for (int round = 1; round <= ROUNDS_MOST && !found.empty(); round++) {
+        for (const Coord &c : found) project(acc, stencil, c, round, limits, original);
+        found = find_creases_near(grid, found);
     }
     for (const auto &[c, v] : original) {
         const double change = std::fabs(static_cast<double>(acc.getValue(c)) - static_cast<double>(v));

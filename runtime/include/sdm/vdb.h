@@ -38,8 +38,9 @@ typedef struct sdm_vdb_report {
    committed (SDM_E_QUALITY when it objects). Frame LPS, mm. report may be NULL. [any thread]
 
    checkLevelSet wants 0.5 <= |grad|^2 <= 1.5 at zero crossings. The differences of an exact distance lie outside in voxels next to a
-   sharp edge or crease, so there, and only there, a value and its neighbours across the surface are scaled together until the check
-   passes: the zero crossings between them stay, others move by less than a quarter of a voxel. All other values are those given.
+   sharp edge or crease, or a part thinner than a voxel, so there, and only there, values are changed, each time by the least that
+   brings a gradient back (Kaczmarz 1937), until the check passes. Every voxel stays on its side of the surface: none of the inside is
+   lost. Zero crossings move by a fraction of a voxel. All other values are those given. SDM_E_QUALITY where no such values are found.
    A surface that leaves the grid is closed at the grid's border (half a voxel beyond the outermost centres), and where the band
    leaves the grid it goes on outside. SDM_E_ARG when nothing is inside.
    The file ends with a checksum of all its bytes, which other readers of OpenVDB files do not see. */

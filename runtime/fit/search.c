@@ -2,7 +2,6 @@
 #include "search.h"
 
 #include <math.h>
-#include <string.h>
 
 // the wide edge: times the given one, but not above a share of the shape's reach
 #define WIDER 3.0
@@ -101,13 +100,13 @@ sdm_status sdm_fit_search(fit_problem *p, size_t *turn, sdm_error *err)
     fit_state chosen = start;
     for (size_t i = 0; i < n && !s && n > 1; i++) {
         turn_start(p, i, &start, &p->state);
+        p->prior = p->state; // each turn is a start of its own
         s = sdm_fit_iterate(p, &run, &ended, err);
-        const double found = s ? best : p->sums.log_likelihood;
+        const double found = s ? best : p->sums.log_likelihood + sdm_fit_prior(p, &p->state, NULL, NULL, NULL);
         if (found > best) best = found, chosen = p->state, *turn = i;
     }
     if (s) return s;
-    if (n > 1)
-        turn_start(p, *turn, &start, &p->state), memcpy(p->prior.rotation, p->state.rotation, sizeof p->prior.rotation);
+    if (n > 1) turn_start(p, *turn, &start, &p->prior);
     p->state = chosen;
     run.keep_params = o->keep_params;
     run.max_iterations = ALL_STEPS;

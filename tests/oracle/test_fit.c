@@ -239,6 +239,16 @@ static void test_turns(void **state)
     assert_true(r.turn == 2 || r.turn == 6); // half a turn is the same ellipsoid
     for (int k = 0; k < 3; k++) assert_true(fabs(r.params[k] - TRUTH[k]) < 5 * r.sd[k]);
     sdm_fit_dispose(&r);
+    // priors are about each turn as it is tried, which moves the origin, too, about a pivot elsewhere
+    o.pivot[0] = 2;
+    o.start_pose = sdm_pose_compose(&POSE, &(sdm_pose){{0, 0, 1.5707963267948966}, {2, -2, 0}}); // keeps the pivot
+    o.prior_rotation_sd = 0.03;
+    o.prior_translation_sd = 0.1;
+    r = fit(&t, &o);
+    assert_int_equal(r.turn, 6);
+    if (!(worst(&r) < 0.1)) fail_msg("off by %g", worst(&r));
+    sdm_fit_dispose(&r);
+    o.pivot[0] = o.prior_rotation_sd = o.prior_translation_sd = 0;
     o.turns = SDM_FIT_TURNS_SPHERE;
     o.n_turns = 40;
     o.start_pose = sdm_pose_compose(&POSE, &(sdm_pose){{1.1, 0.7, -0.8}, {0, 0, 0}});

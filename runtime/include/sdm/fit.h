@@ -117,8 +117,9 @@ typedef struct sdm_fit_opts {
         prior_sd; /* of each parameter, in units of half of its range about the middle; 0: none. 0.5 takes ranges as means and two
                         standard deviations. Priors weigh what they say beside values that are correlated: the likelihood counts
                         these as independent, and each prior is multiplied by how much that makes too little of a variance */
-    double prior_rotation_sd;    /* rad, about the start pose; 0: none. With turns: about the turn chosen */
-    double prior_translation_sd; /* mm, about the start pose; 0: none */
+    double
+        prior_rotation_sd; /* rad, about the start pose; 0: none. With turns: about the start as turned, the turn chosen */
+    double prior_translation_sd; /* mm, about the same; 0: none */
 
     double margin; /* mm, > 0: voxels farther outside of the shape at the start than this are not looked at; the region
                                   follows the shape and is fixed in the end */
@@ -130,9 +131,11 @@ typedef struct sdm_fit_opts {
     double cavity;
     double least_inside; /* 0 .. 1: share of the volume of the fitted shape that must lie in the image */
 
-    size_t max_iterations;        /* of the main phase, >= 1; as many again for its end by averaged derivatives */
-    size_t max_polish_iterations; /* with the exact engine, after a network's fit, counted as those; 0: none, 40 are enough */
-    double eps; /* > 0: the main phase ends when the largest step is below: share of a parameter's range, rad, share of the shape's
+    size_t max_iterations; /* of the main phase, >= 1; as many again for its end by averaged derivatives */
+    size_t
+        max_polish_iterations; /* with the exact engine, after a network's fit, counted as those; 0: none, 40 are enough */
+    double
+        eps; /* > 0: the main phase ends when the largest step is below: share of a parameter's range, rad, share of the shape's
                           size; with a network where steps promise no gain, too, and then goes on by averaged derivatives */
     double polish_eps;                                       /* > 0: the same for the end with exact maps */
     int n_threads;                                           /* 0: the OpenMP default; the same bits for every value */
@@ -162,7 +165,7 @@ typedef struct sdm_fit_result {
     size_t n_iterations; /* of the main phase and the polish */
     double *objective; /* [n_iterations] log posterior density after each, without constants; those of other voxels (the
                           region follows the shape), other weights of priors, other sd or places of tissues do not compare */
-    double log_likelihood;         /* of the target at the estimate */
+    double log_likelihood; /* of the target at the estimate */
     /* image: of the same voxels by a mixture that knows no shape, tissues outside in the same places; else NaN */
     double log_likelihood_without;
     double

@@ -339,7 +339,7 @@ static sdm_status finish(fit_problem *p, sdm_fit_result *out, sdm_error *err)
         const sdm_status found = sdm_fit_without_shape(p, &out->log_likelihood_without, err);
         if (found) return found;
         const double factor = fmax(out->noise_factor, 1), n = (double)p->sites.n / factor;
-        const double unknowns = (double)(p->n_params + 6);
+        const double unknowns = (p->opts->keep_params ? 0 : (double)p->n_params) + (p->opts->keep_pose ? 0 : 6);
         out->evidence = (p->sums.log_likelihood - out->log_likelihood_without) / factor - 0.5 * unknowns * log(n);
     }
     report(p, out);

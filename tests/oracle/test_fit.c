@@ -258,6 +258,14 @@ static void test_turns(void **state)
     free(v);
 }
 
+// evidence: what is kept costs nothing (Schwarz 1978)
+static double unknowns_paid(const sdm_fit_result *r)
+{
+    const double factor = fmax(r->noise_factor, 1);
+    return ((r->log_likelihood - r->log_likelihood_without) / factor - r->evidence) /
+           (0.5 * log((double)r->n_used / factor));
+}
+
 static void test_kept(void **state)
 {
     (void)state;
@@ -269,6 +277,7 @@ static void test_kept(void **state)
     sdm_fit_result r = fit(&t, &o);
     assert_memory_equal(r.params, TRUTH, sizeof TRUTH);
     assert_true(worst(&r) < 4e-3 && r.sd[0] == 0 && r.sd[3] > 0 && r.correlation[1] == 0);
+    assert_true(fabs(unknowns_paid(&r) - 6) < 1e-6);
     sdm_fit_dispose(&r);
     o.keep_params = false;
     o.keep_pose = true;
@@ -276,6 +285,7 @@ static void test_kept(void **state)
     o.start_pose = POSE;
     r = fit(&t, &o);
     assert_true(worst(&r) < 4e-3 && r.sd[0] > 0 && r.sd[3] == 0);
+    assert_true(fabs(unknowns_paid(&r) - 3) < 1e-6);
     sdm_fit_dispose(&r);
     free(v);
 }

@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-// taps on one side at most: a blur of 16 voxels and its tail
+// taps on one side at most: four deviations of the widest Gaussian
 #define RADIUS_MAX 128
 
 /* T(0..r, variance), normalised; returns r. Downward recurrence I_{k-1} = I_{k+1} + 2k/t I_k (Miller 1952). Of a negative variance
@@ -16,8 +16,7 @@ static int gaussian(double variance, double tap[RADIUS_MAX + 1])
         tap[0] = 1;
         return 0;
     }
-    int r = (int)ceil(6 * sqrt(t)) + 4;
-    if (r > RADIUS_MAX) r = RADIUS_MAX;
+    int r = (int)fmin(ceil(6 * sqrt(t)) + 4, RADIUS_MAX);
     double above = 0, here = 1e-290, sum = 0;
     for (int k = r + 12; k >= 0; k--) { // here = I_k up to a factor
         if (k <= r) tap[k] = here;
@@ -36,6 +35,14 @@ static int gaussian(double variance, double tap[RADIUS_MAX + 1])
     for (int k = 1; k <= r; k++) kept += 2 * tap[k];
     for (int k = 0; k <= r; k++) tap[k] /= kept;
     return r;
+}
+
+sdm_status sdm_fit_blur_check(const sdm_grid *g, const char *name, double value, double sd, sdm_error *err)
+{
+    const double voxel = fmin(g->spacing[0], fmin(g->spacing[1], g->spacing[2]));
+    if (sd <= FIT_BLUR_MOST * voxel) return SDM_OK;
+    return sdm_fail(err, SDM_E_ARG, "%s of %g mm spreads over %.3g voxels of %g mm, at most %g: make it smaller", name,
+                    value, sd / voxel, voxel, FIT_BLUR_MOST);
 }
 
 static int64_t clamp(int64_t i, int64_t n) { return i < 0 ? 0 : i < n ? i : n - 1; }

@@ -56,7 +56,8 @@ sdm_status sdm_fit_leave_out_cavities(const sdm_fit_target *target, const sdm_fi
     float *distance = NULL;
     *values = NULL;
     *count = 0;
-    sdm_status s = SDM_ALLOC(&distance, n, "distance to walls", err);
+    sdm_status s = sdm_fit_blur_check(&target->grid, "blur", opts->blur, opts->blur, err);
+    if (!s) s = SDM_ALLOC(&distance, n, "distance to walls", err);
     if (!s) s = SDM_ALLOC(values, n, "image", err);
     if (!s) s = find_walls(target, opts, n_threads, distance, err);
     if (!s) s = sdm_fit_transform(&target->grid, n_threads, distance, err);

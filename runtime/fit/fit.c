@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "blur.h"
 #include "cavity.h"
 #include "check.h"
 #include "creases.h"
@@ -123,6 +124,9 @@ static sdm_status begin(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     p->state.l_ref = o->l_ref;
     p->state.point_sd = o->point_sd;
     p->prior = p->state;
+    s = sdm_fit_blur_check(&p->maps.grid, share ? "blur" : "l_ref", share ? o->blur : o->l_ref, sdm_fit_field_blur(p),
+                           err);
+    if (s) return s;
     const size_t tissues = share ? o->appearance.n_inside + o->appearance.n_outside : 0;
     s = sdm_fit_sums_create(fit_columns(p->n_params) + tissues, &p->sums, err);
     if (!s) s = sdm_fit_sums_create(fit_columns(p->n_params) + tissues, &p->trial, err);

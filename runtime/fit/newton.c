@@ -29,7 +29,7 @@
 #define RUSH_AVERAGED 4.0
 
 // the logistic law of labels is seen through its own spread: its edge would lie inside of a curved surface
-static double field_blur(const fit_problem *p)
+double sdm_fit_field_blur(const fit_problem *p)
 {
     const bool labels = !p->maps.share && p->target->kind != SDM_FIT_POINTS;
     return labels ? p->state.l_ref * LOGISTIC_SD : p->maps.share ? p->state.blur : 0;
@@ -40,7 +40,7 @@ sdm_status sdm_fit_value(fit_problem *p, const double *params, double *log_likel
     p->maps_at[0] = p->packed_blur = NAN;
     const sdm_status s = sdm_fit_maps_at(&p->maps, params, false, err);
     if (s) return s;
-    sdm_fit_maps_pack(&p->maps, field_blur(p), false);
+    sdm_fit_maps_pack(&p->maps, sdm_fit_field_blur(p), false);
     *log_likelihood = sdm_fit_sums_value(&p->sites, &p->maps, &p->laws, &p->state);
     return SDM_OK;
 }
@@ -59,7 +59,7 @@ sdm_status sdm_fit_look(fit_problem *p, sdm_error *err)
         status = sdm_fail(err, SDM_E_CANCELLED, "fit stopped on request");
     }
     if (status) return status;
-    const double blur = field_blur(p);
+    const double blur = sdm_fit_field_blur(p);
     if (!(p->packed_blur == blur)) {
         sdm_fit_maps_pack(&p->maps, blur, true);
         p->packed_blur = blur;

@@ -52,6 +52,9 @@ typedef struct fit_ended {
 /* Maps, samples and sums at problem->state. */
 sdm_status sdm_fit_look(fit_problem *p, sdm_error *err);
 
+/* Sd of the Gaussian that the field is seen through at problem->state, mm. */
+double sdm_fit_field_blur(const fit_problem *p);
+
 /* Log-likelihood at problem->state but for its parameters. The next look makes its maps anew. */
 sdm_status sdm_fit_value(fit_problem *p, const double *params, double *log_likelihood, sdm_error *err);
 

@@ -68,6 +68,15 @@ static void test_refused(void **state)
     o.l_ref = NAN;
     refused(SDM_E_ARG, "l_ref", &t, &o);
     o = near_start();
+    o.blur = 1e9;
+    refused(SDM_E_ARG, "blur of 1e+09 mm spreads over 4e+09 voxels", &t, &o);
+    o.cavity = 3;
+    refused(SDM_E_ARG, "blur of 1e+09 mm spreads over", &t, &o);
+    o = near_start();
+    o.image_model = SDM_FIT_LABELS;
+    o.l_ref = 1e9;
+    refused(SDM_E_ARG, "l_ref of 1e+09 mm spreads over", &t, &o);
+    o = near_start();
     o.tissue_mm = -1;
     refused(SDM_E_ARG, "tissue_mm", &t, &o);
     o = near_start();

@@ -117,6 +117,12 @@ static sdm_status begin(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     sdm_status s = start_params(p, &out->start_clamped, err);
     if (!s) s = sdm_fit_maps_create(p->source, share, o, &p->maps, err);
     if (s) return s;
+    if (share && o->keep_blur && o->blur < p->maps.least_blur)
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "a blur of %g mm is kept, but maps with voxels of %g mm carry one of %g mm or more: take smaller "
+            "voxels for the maps (spacing), or a wider blur",
+            o->blur, 2 * p->maps.least_blur, p->maps.least_blur);
     sdm_pose_matrix(&o->start_pose, p->state.rotation);
     memcpy(p->state.translation, o->start_pose.translation, sizeof p->state.translation);
     p->state.look = o->appearance;

@@ -77,6 +77,10 @@ static void test_refused(void **state)
     o.l_ref = 1e9;
     refused(SDM_E_ARG, "l_ref of 1e+09 mm spreads over", &t, &o);
     o = near_start();
+    o.blur = 0.1;
+    o.keep_blur = true;
+    refused(SDM_E_ARG, "a blur of 0.1 mm is kept, but maps with voxels of 0.25 mm carry one of 0.125 mm", &t, &o);
+    o = near_start();
     o.tissue_mm = -1;
     refused(SDM_E_ARG, "tissue_mm", &t, &o);
     o = near_start();

@@ -313,7 +313,7 @@ static sdm_status judge(const fit_problem *p, const sdm_fit_result *r, sdm_error
         if (!(r->evidence > 0))
             return sdm_fail(err, SDM_E_QUALITY,
                             "the image shows no such shape near the start: explaining it without one is better by %.3g "
-                            "(log-likelihood per independent voxel); check the start pose, and whether the inside is "
+                            "(log-likelihood of independent voxels); check the start pose, and whether the inside is "
                             "%s than the outside in this image",
                             -r->evidence, darker ? "darker" : "brighter");
         if ((in < out) != darker)

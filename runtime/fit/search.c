@@ -70,6 +70,23 @@ static sdm_status choose(fit_problem *p, sdm_error *err)
     return sdm_fit_sites_choose(p->target, o, &region, p->stride, &p->sites, &changed, err);
 }
 
+static sdm_status nothing_near(const fit_problem *p, sdm_error *err)
+{
+    double x[3];
+    sdm_fit_to_world(&p->state, p->extent.centre, x);
+    if (p->sites.n_nan)
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "all %zu voxels of the image near the shape at the start (its middle at %.3g, %.3g, %.3g mm) are NaN "
+            "or were left out as wide spaces: check the start pose, the cavity, and the values of the inside "
+            "and the outside",
+            p->sites.n_nan, x[0], x[1], x[2]);
+    return sdm_fail(err, SDM_E_ARG,
+                    "no voxel of the image lies near the shape at the start (its middle at %.3g, %.3g, %.3g mm): "
+                    "check the start pose, the box and the frame of the image",
+                    x[0], x[1], x[2]);
+}
+
 sdm_status sdm_fit_search(fit_problem *p, size_t *turn, sdm_error *err)
 {
     const sdm_fit_opts *o = p->opts;
@@ -77,11 +94,7 @@ sdm_status sdm_fit_search(fit_problem *p, size_t *turn, sdm_error *err)
     *turn = 0;
     sdm_status s = choose(p, err);
     if (s) return s;
-    if (!p->sites.n)
-        return sdm_fail(err, SDM_E_ARG,
-                        "no voxel of the image lies near the shape at the start (its middle at %.3g, %.3g, %.3g mm): "
-                        "check the start pose, the box and the frame of the image",
-                        p->prior.translation[0], p->prior.translation[1], p->prior.translation[2]);
+    if (!p->sites.n) return nothing_near(p, err);
     start.blur = wide(start.blur, p->extent.reach);
     start.l_ref = wide(start.l_ref, p->extent.reach);
     if (p->target->kind == SDM_FIT_POINTS) start.point_sd = fmax(start.point_sd, 0.1 * p->extent.reach);

@@ -241,6 +241,8 @@ expect 2 "region '1,2,3': need six numbers" sdmgen fit $fit ct.nii.gz --region 1
 expect 2 "label 'fluid': need a whole number" sdmgen fit $fit label.nrrd --label fluid
 expect 2 'label is of volumes' sdmgen fit $fit fit.stl --label 1
 expect 2 'no voxel of the image lies near the shape' sdmgen fit $fit ct.nii.gz --rotation 0,0,0 --start-centre 90,0,0 -o no.stl
+expect 2 'no voxel of the image lies near .*its middle at 90, ' sdmgen fit --shape cochlea ct.nii.gz --rotation 0,0,0 --start-centre 90,0,0 -o no.stl
+expect 2 'all [0-9]+ voxels of the image near the shape .*cavity' sdmgen fit $fit ct.nii.gz $near_truth --inside 600,2000 --outside 9000,10 --cavity 0.5 -o no.stl
 expect 2 "did you mean 'rx'" sdmgen fit $fit ct.nii.gz -p rc=3
 expect 5 'rx = 9, allowed' sdmgen fit $fit ct.nii.gz -p rx=9 -o no.stl
 expect 0 'start was moved into the range' sdmgen fit $fit ct.nii.gz $near_truth -p rx=9 --policy clamp --json

@@ -69,6 +69,7 @@ static sdm_status make_result(size_t n, sdm_fit_result *out, sdm_error *err)
 {
     const size_t size = n + 6;
     out->n_params = n;
+    out->log_likelihood_without = out->evidence = NAN;
     sdm_status s = SDM_ALLOC(&out->params, n, "result of the fit", err);
     if (!s) s = SDM_ALLOC(&out->covariance, size * size, "result of the fit", err);
     if (!s) s = SDM_ALLOC(&out->sd, size, "result of the fit", err);
@@ -344,7 +345,6 @@ static sdm_status finish(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     sdm_status s = sdm_fit_posterior(p, out, err);
     if (s && s != SDM_E_QUALITY) return s;
     out->inside_share = sdm_fit_inside_share(p);
-    out->log_likelihood_without = out->evidence = NAN;
     if (p->target->kind == SDM_FIT_IMAGE && !p->given_labels) {
         const sdm_status found = sdm_fit_without_shape(p, &out->log_likelihood_without, err);
         if (found) return found;
@@ -352,8 +352,7 @@ static sdm_status finish(fit_problem *p, sdm_fit_result *out, sdm_error *err)
         const double unknowns = (p->opts->keep_params ? 0 : (double)p->n_params) + (p->opts->keep_pose ? 0 : 6);
         out->evidence = (p->sums.log_likelihood - out->log_likelihood_without) / factor - 0.5 * unknowns * log(n);
     }
-    report(p, out);
-    return s ? s : judge(p, out, err);
+    return s;
 }
 
 // a label map as an image of what is 1 inside and 0 outside: shares, seen through a point spread that is narrow
@@ -394,6 +393,9 @@ sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target, c
     if (!s) s = begin(&p, out, err);
     if (!s) s = climb(&p, out, err);
     if (!s) s = finish(&p, out, err);
+    if (out->n_params && (!s || s == SDM_E_QUALITY)) report(&p, out);
+    if (!s) s = judge(&p, out, err);
+    if (s && err && !*out->reason) snprintf(out->reason, sizeof out->reason, "%.255s", err->text);
     dispose_problem(&p);
     sdm_free(values);
     out->seconds = sdm_fit_seconds() - from;

@@ -48,6 +48,27 @@ static void test_no_shape(void **state)
     free(v);
 }
 
+// what is known is told: where it stopped, and why
+static void test_known(void **state)
+{
+    (void)state;
+    float *v = phantom(TRUTH, &POSE, 1, 5);
+    const sdm_fit_target t = image_of(v);
+    const sdm_fit_opts o = near_start();
+    sdm_fit_source source = exact_source();
+    source.grid.origin[0] += 50; // the shape is not on its maps
+    sdm_fit_result r;
+    sdm_error err = {0};
+    assert_int_equal(sdm_fit(&source, &t, &o, &r, &err), SDM_E_QUALITY);
+    assert_memory_equal(r.params, START, sizeof START);
+    for (int k = 0; k < 3; k++) assert_true(fabs(r.pose.rotation[k] - o.start_pose.rotation[k]) < 1e-12);
+    assert_memory_equal(r.pose.translation, o.start_pose.translation, sizeof r.pose.translation);
+    assert_true(isnan(r.evidence) && isnan(r.log_likelihood_without) && !r.converged);
+    if (!*r.reason || strncmp(r.reason, err.text, 200) != 0) fail_msg("reason '%s'", r.reason);
+    sdm_fit_dispose(&r);
+    free(v);
+}
+
 static bool stop(void *user) { return --*(int *)user < 0; }
 
 static void test_refused(void **state)
@@ -185,6 +206,7 @@ static void test_starts(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_no_shape), cmocka_unit_test(test_refused),
-                                       cmocka_unit_test(test_starts), cmocka_unit_test(test_memory)};
+                                       cmocka_unit_test(test_known), cmocka_unit_test(test_starts),
+                                       cmocka_unit_test(test_memory)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

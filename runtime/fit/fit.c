@@ -18,7 +18,7 @@
 // the region follows the shape, and the priors are weighed, so many times at most
 #define ROUNDS_MOST 8
 // voxels at most, before only every second one along each axis is taken
-#define SITES_MOST 2e6
+#define SITES_MOST 2000000
 // as long as the region and the weights of the priors are not the last, small steps are not worth while
 #define EPS_FIRST 1e-2
 #define EPS_FIRST_AVERAGED 1e-4
@@ -150,12 +150,13 @@ static sdm_status follow(fit_problem *p, bool *changed, sdm_error *err)
     fit_region region = {.radius = 1.5 * p->extent.reach + p->opts->margin,
                          .follow = &p->maps,
                          .state = &p->state,
-                         .margin = p->opts->margin};
+                         .margin = p->opts->margin,
+                         .most = SITES_MOST};
     sdm_fit_to_world(&p->state, p->extent.centre, region.centre);
     sdm_status s = SDM_OK;
     for (;; p->stride *= 2) { // from that of before on: whether voxels are others is asked of those
         s = sdm_fit_sites_choose(p->target, p->opts, &region, p->stride, &p->sites, changed, err);
-        if (s || p->target->kind == SDM_FIT_POINTS || (double)p->sites.n <= SITES_MOST) return s;
+        if (s || p->target->kind == SDM_FIT_POINTS || p->sites.n <= SITES_MOST) return s;
     }
 }
 

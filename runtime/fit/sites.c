@@ -142,7 +142,7 @@ static sdm_status choose_voxels(const sdm_fit_target *target, const sdm_fit_opts
                         "voxel (%lld, %lld, %lld) of the image is infinite; NaN marks voxels without a value",
                         (long long)i, (long long)j, (long long)k);
                 const sdm_status status = put(s, x, value, voxel, changed, err);
-                if (status) return status;
+                if (status || (region->most && s->n > region->most)) return status;
             }
     return SDM_OK;
 }

@@ -39,6 +39,7 @@ typedef struct fit_region {
     const fit_maps *follow;   // not NULL: also where the distance of the shape is at most margin
     const fit_state *state;
     double margin;
+    size_t most; // voxels wanted at most: beyond them the choice stops, with one more. 0: all
 } fit_region;
 
 /* Chooses the voxels of a region (every `stride`-th along each axis), or all points. *changed: they are not those that were there

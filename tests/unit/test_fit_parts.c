@@ -189,6 +189,12 @@ static void check_gradient(sdm_fit_kind kind, sdm_fit_model model)
     const fit_region region = {.centre = {0.3, -0.2, 0.1}, .radius = 9};
     assert_int_equal(sdm_fit_sites_choose(&t, &o, &region, 1, &p.sites, &changed, NULL), SDM_OK);
     assert_true(changed && p.sites.n > 5000);
+    fit_region few = region;
+    few.most = 1000; // the rest is not gathered
+    assert_int_equal(sdm_fit_sites_choose(&t, &o, &few, 1, &p.sites, &changed, NULL), SDM_OK);
+    assert_true(changed && p.sites.n == 1001);
+    assert_int_equal(sdm_fit_sites_choose(&t, &o, &region, 1, &p.sites, &changed, NULL), SDM_OK);
+    assert_true(changed && p.sites.n > 5000);
     (void)posterior_at(&p, &s);
     double gradient[FIT_UNKNOWNS_MAX];
     memcpy(gradient, p.sums.gradient, n * sizeof *gradient);

@@ -12,7 +12,7 @@ size_t sdm_fit_look_numbers(const fit_problem *p, double *x);
 /* The estimates of problem->state from such numbers. */
 void sdm_fit_look_set(fit_problem *p, const double *x);
 
-/* Tissues that hold less than one independent value are absent from now on: they have the laws of the start, which stay. */
+/* Tissues that hold less than one independent value, or fewer than ten values, are absent from now on: they have the laws of the start, which stay. */
 void sdm_fit_look_settle(fit_problem *p);
 
 /* One step of the estimation in problem->state, and laws and sums with it. */

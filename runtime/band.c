@@ -2,6 +2,7 @@
 #include "band.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "sdm/memory.h"
@@ -89,26 +90,42 @@ static double face_distance(const sdm_grid *g, const float *v, const int64_t ind
 
 static int64_t clamp(int64_t x, int64_t low, int64_t high) { return x < low ? low : x > high ? high : x; }
 
-// min over points b of one face of the box of |p - b| + max(d(b), 0), for p outside the box beyond that face
-static double past_face(const sdm_grid *g, const float *v, const int64_t p[3], int axis, double width)
+// index i of a face's row of n, counted from the one nearest to p outwards, every other one on the other side; -1: beyond the row
+static int64_t outwards(int64_t p, int64_t n, int64_t i)
+{
+    const int64_t from = clamp(p, 0, n - 1), at = i % 2 ? from - (i + 1) / 2 : from + i / 2;
+    return at < n ? at : -1;
+}
+
+// of the i-th index: how far it is from p at least, in voxels
+static double least_away(int64_t p, int64_t n, int64_t i)
+{
+    return (double)llabs(p - clamp(p, 0, n - 1)) + (double)((i + 1) / 2);
+}
+
+// the least of `best` and, over points b of one face of the box, |p - b| + max(d(b), 0), for p outside the box beyond that face
+static double past_face(const sdm_grid *g, const float *v, const int64_t p[3], int axis, double best)
 {
     const double h = g->spacing[0];
     const int a1 = (axis + 1) % 3, a2 = (axis + 2) % 3;
-    const int64_t reach = (int64_t)ceil(width / h) + 1;
+    const int64_t n1 = g->n[a1], n2 = g->n[a2];
     const bool low = p[axis] < 0;
     const double away = low ? -0.5 - (double)p[axis] : (double)(p[axis] - g->n[axis]) + 0.5;
     int64_t b[3];
     b[axis] = low ? 0 : g->n[axis] - 1;
-    double best = width;
-    for (b[a2] = clamp(p[a2] - reach, 0, g->n[a2] - 1); b[a2] <= clamp(p[a2] + reach, 0, g->n[a2] - 1); b[a2]++) {
-        for (b[a1] = clamp(p[a1] - reach, 0, g->n[a1] - 1); b[a1] <= clamp(p[a1] + reach, 0, g->n[a1] - 1); b[a1]++) {
+    for (int64_t i2 = 0; i2 < 2 * n2; i2++) {
+        const double u2 = least_away(p[a2], n2, i2), near2 = fmax(u2 - 0.5, 0.0);
+        if (!(h * sqrt(away * away + near2 * near2) < best)) break; // as are all that follow
+        b[a2] = outwards(p[a2], n2, i2);
+        for (int64_t i1 = 0; i1 < 2 * n1 && b[a2] >= 0; i1++) {
+            const double u1 = least_away(p[a1], n1, i1), near1 = fmax(u1 - 0.5, 0.0);
+            const double nearest = h * sqrt(away * away + near1 * near1 + near2 * near2);
+            if (!(nearest < best)) break;
+            b[a1] = outwards(p[a1], n1, i1);
+            if (b[a1] < 0) continue;
             const double d = face_distance(g, v, b, axis, low ? 1 : -1);
-            double u1 = fabs((double)(p[a1] - b[a1])), u2 = fabs((double)(p[a2] - b[a2]));
-            if (!(d > 0)) { // the voxel's whole face belongs to the solid: nearest point of that square
-                u1 = fmax(u1 - 0.5, 0.0);
-                u2 = fmax(u2 - 0.5, 0.0);
-            }
-            best = fmin(best, h * sqrt(away * away + u1 * u1 + u2 * u2) + d);
+            // 0: the voxel's whole face belongs to the solid, and the nearest point is one of that square
+            best = fmin(best, d > 0 ? h * sqrt(away * away + u1 * u1 + u2 * u2) + d : nearest);
         }
     }
     return best;
@@ -123,7 +140,7 @@ static float outside_value(const sdm_grid *g, const float *v, const int64_t p[3]
     double best = width;
     if (nearest < 4.0 * width)
         for (int a = 0; a < 3; a++)
-            if (p[a] < 0 || p[a] >= g->n[a]) best = fmin(best, past_face(g, v, p, a, width));
+            if (p[a] < 0 || p[a] >= g->n[a]) best = past_face(g, v, p, a, best);
     return (float)best;
 }
 

@@ -400,20 +400,24 @@ static void test_band_beyond_grid(void **state)
     double largest;
     assert_int_equal(compare(&g, v, 0.48, &largest), 0);
     sdm_free(verify());
-    float *back = read_box(&g, 6);
-    double worst = 0;
-    size_t at = 0;
-    for (int32_t k = -6; k < 24; k++)
-        for (int32_t j = -6; j < 24; j++)
-            for (int32_t i = -6; i < 24; i++, at++) {
-                const double index[3] = {(double)i, (double)j, (double)k};
-                double x[3];
-                sdm_grid_world(&g, index, x);
-                const double exact = fmin(sphere(x), 0.48);
-                if (exact > -0.48) worst = fmax(worst, fabs(exact - (double)back[at]));
-            }
-    assert_true(worst < 0.25 * 0.16);
-    free(back);
+    for (int32_t band = 3; band <= 10; band += 7) {
+        (void)write_level_set(&g, v, &(sdm_vdb_opts){.band_voxels = band});
+        const int32_t pad = band + 3;
+        float *back = read_box(&g, pad);
+        double worst = 0;
+        size_t at = 0;
+        for (int32_t k = -pad; k < 18 + pad; k++)
+            for (int32_t j = -pad; j < 18 + pad; j++)
+                for (int32_t i = -pad; i < 18 + pad; i++, at++) {
+                    const double index[3] = {(double)i, (double)j, (double)k};
+                    double x[3];
+                    sdm_grid_world(&g, index, x);
+                    const double exact = fmin(sphere(x), band * 0.16);
+                    if (exact > -band * 0.16) worst = fmax(worst, fabs(exact - (double)back[at]));
+                }
+        assert_true(worst < 0.25 * 0.16);
+        free(back);
+    }
     free(v);
 }
 

@@ -112,11 +112,10 @@ float sdm_pod_quantise_rest(size_t n, const float *y, const float *factor, int l
 
 /* pod_latent.c: parameters to latent variables and back. Letters as in sdm/pod.h; D directions. */
 typedef struct pod_latent {
-    float *phi; /* [R][n_poly] all products and their derivatives along the directions */
-    float *h
-        [2]; /* [R + 1][padded W] of a layer and of the one before; bytes: the last is what rounding leaves of the first */
-    float *slope;      /* [depth][padded W] */
-    float *dphi;       /* [P][n_poly] derivatives with respect to each parameter */
+    float *phi;   /* [R][n_poly] all products and their derivatives along the directions */
+    float *h[2];  /* [R + 1][padded W] of a layer and of the one before; bytes: the last for the rest of the first */
+    float *slope; /* [depth][padded W] */
+    float *dphi;  /* [P][n_poly] derivatives with respect to each parameter */
     int16_t *integers; /* bytes: [R + 1][ld] inputs of a layer */
     float *scale;      /* bytes: [R + 1] theirs */
     size_t ld;

@@ -10,11 +10,8 @@
 #include "sdm/kernels.h"
 #include "sdm/memory.h"
 
-enum {
-    FINE = 127,
-    FINER = 2,
-    MLP_FINE = 2047
-}; // largest integer of a byte; how much finer than the columns of a byte those of two are
+enum { FINE = 127, FINER = 2 }; // largest integer of a byte; how much finer than the columns of a byte those of two are
+enum { MLP_FINE = 2047 };       // largest integer of the MLP
 
 // how much larger than in the survey coefficients may become before they are clipped
 #define ROOM 2

@@ -55,7 +55,7 @@ typedef struct sdm_exact_report {
 typedef struct sdm_exact sdm_exact;
 
 /* Audits the mesh, chooses the sign method, removes inner surface and builds the tree. The mesh is not needed afterwards.
-   opts may be NULL. SDM_E_MESH, SDM_E_NOMEM, SDM_E_ARG (a sign method that does not fit the mesh). */
+   opts may be NULL. SDM_E_MESH, SDM_E_NOMEM, SDM_E_ARG (a sign method that does not fit the mesh), SDM_E_CANCELLED. */
 SDM_API sdm_status sdm_exact_create(const sdm_mesh *mesh, const sdm_exact_opts *opts, sdm_exact **out, sdm_error *err);
 SDM_API void sdm_exact_free(sdm_exact *e);
 SDM_API const sdm_exact_report *sdm_exact_get_report(const sdm_exact *e);

@@ -80,6 +80,7 @@ static bool is_same(const sdm_config *a, const char *name, const char *text, siz
         !sdm_config_parse(name, text, size, NULL, 0, other, NULL)) {
         *copy = *a;
         copy->threads = other->threads;
+        copy->data.workers = other->data.workers;
         memcpy(copy->output.folder, other->output.folder, sizeof copy->output.folder);
         sdm_config_dump(copy, &x);
         sdm_config_dump(other, &y);

@@ -124,18 +124,17 @@ static sdm_status build_nearest(sdm_exact *e, sdm_budget *budget, sdm_error *err
     if (keep_topology) bytes += sdm_topology_bytes(&e->solid, &(size_t){0});
     if (e->report.unioned) bytes += sdm_topology_bytes(m, &scratch);
     bytes += sdm_bvh_bytes(m->n_tri, &scratch) + m->n_tri * sizeof(sdm_frame);
-    bytes += sdm_features_bytes(m->n_tri, m->n_vert, &scratch);
     sdm_status s = sdm_budget_take(budget, bytes + scratch, err);
     if (s) return s;
     if (!e->report.unioned) {
         e->nearest.tree = e->survey.tree; // of the same triangles
-        return sdm_nearest_build(m, &e->survey.topo, &e->arena, &e->nearest, err);
+        return sdm_nearest_build(m, &e->survey.topo, &e->arena, &e->nearest, budget, err);
     }
     const sdm_arena_mark before = e->arena.end[SDM_HIGH];
     sdm_topology topo = {0};
     s = sdm_bvh_derive(&e->survey.tree, m, e->source, &e->arena, &e->nearest.tree, err);
     if (!s) s = sdm_topology_build(m, &e->arena, &topo, err);
-    if (!s) s = sdm_nearest_build(m, &topo, &e->arena, &e->nearest, err);
+    if (!s) s = sdm_nearest_build(m, &topo, &e->arena, &e->nearest, budget, err);
     sdm_arena_release(&e->arena, SDM_HIGH, before);
     return s;
 }

@@ -11,6 +11,7 @@
 
 #include <stdbool.h>
 
+#include "budget.h"
 #include "bvh.h"
 #include "point_triangle.h"
 #include "topology.h"
@@ -70,11 +71,9 @@ typedef struct sdm_features {
 /* Coordinate a of the point that the functions of a cluster are relative to. */
 static inline float sdm_cluster_middle(const sdm_cluster_node *c, int a) { return 0.5f * (c->lo[a] + c->hi[a]); }
 
-/* Fills frames[slot], too: of triangle tree->order[slot] of m; topo: of m. Taken from the low end of the arena. */
+/* Fills frames[slot], too: of triangle tree->order[slot] of m; topo: of m. Taken from the low end of the arena; the budget
+   (may be NULL) is asked before. */
 sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree, sdm_arena *arena,
-                              sdm_frame *frames, sdm_features *f, sdm_error *err);
-
-/* Bytes that a build takes at most: those that stay; to *scratch is added what is taken in passing. */
-size_t sdm_features_bytes(size_t n_tri, size_t n_vert, size_t *scratch);
+                              sdm_frame *frames, sdm_features *f, sdm_budget *budget, sdm_error *err);
 
 #endif

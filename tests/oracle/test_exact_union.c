@@ -430,6 +430,10 @@ static void test_memory_limit(void **state)
     assert_true(refused > 20);
     // many triangles meet here: more than meshes without overlap take, but not without measure
     assert_true(limit > 500 * m.n_tri && limit < 8000 * m.n_tri);
+    mesh_sphere(&b, (const double[3]){0, 0, 0}, 1, 100);
+    sdm_exact *e = NULL;
+    assert_int_equal(sdm_exact_create(&b, &(sdm_exact_opts){.memory_limit = 1600 * b.n_tri}, &e, NULL), SDM_OK);
+    sdm_exact_free(e);
     sdm_mesh_dispose(&m);
     sdm_mesh_dispose(&b);
 }

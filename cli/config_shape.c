@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "sdm/memory.h"
+#include "setup.h"
 
 sdm_status cli_read_config(const cli_args *args, sdm_config **out, sdm_error *err)
 {
@@ -85,13 +86,8 @@ static sdm_status keep_paths(sdm_config *c, const sdm_instance *made, sdm_error 
 
 sdm_status cli_config_shape(sdm_config *c, const sdm_registry *r, sdm_instance **out, sdm_error *err)
 {
-    const char *near = NULL;
-    const sdm_shape *shape = sdm_registry_find(r, c->shape.name, &near);
-    if (!shape) {
-        sdm_fail(err, SDM_E_CONFIG, "unknown shape '%s'%s%s%s", c->shape.name,
-                 near ? "; did you mean '" : "; see sdmgen shapes", near ? near : "", near ? "'?" : "");
-        return fail_at(c, c->shape.mark, SDM_E_CONFIG, err);
-    }
+    const sdm_shape *shape = cli_find_shape(r, c->shape.name, err);
+    if (!shape) return fail_at(c, c->shape.mark, SDM_E_CONFIG, err);
     sdm_named_text options[SDM_MAX_OPTIONS];
     for (size_t i = 0; i < c->shape.n_options; i++)
         options[i] = (sdm_named_text){c->shape.options[i].name, c->shape.options[i].value};

@@ -3,7 +3,7 @@
 
 #include <stdint.h>
 
-#include "grid_distance.h"
+#include "sdm/threads.h"
 
 sdm_status sdm_budget_take(sdm_budget *b, size_t bytes, sdm_error *err)
 {
@@ -16,8 +16,13 @@ sdm_status sdm_budget_take(sdm_budget *b, size_t bytes, sdm_error *err)
                     b->n_tri, b->used, b->limit);
 }
 
+bool sdm_cancelled(const sdm_exact_opts *opts)
+{
+    return sdm_thread() == 0 && opts->cancelled && opts->cancelled(opts->user);
+}
+
 sdm_status sdm_budget_ask(const sdm_budget *b, sdm_error *err)
 {
-    if (!b || !b->opts->cancelled || !sdm_cancelled(b->opts)) return SDM_OK;
+    if (!b || !sdm_cancelled(b->opts)) return SDM_OK;
     return sdm_fail(err, SDM_E_CANCELLED, "preparation of the mesh stopped on request");
 }

@@ -2,6 +2,7 @@
 #ifndef SDM_GEOM_BUDGET_H
 #define SDM_GEOM_BUDGET_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #include "sdm/exact.h"
@@ -17,7 +18,10 @@ typedef struct sdm_budget {
    subtracted from `used` by who gives it back. */
 sdm_status sdm_budget_take(sdm_budget *b, size_t bytes, sdm_error *err);
 
-/* To be asked now and then; SDM_E_CANCELLED when the caller wants the preparation to stop. b may be NULL. */
+/* Asks the caller whether to stop; for all threads of a loop, but only the first one asks. */
+bool sdm_cancelled(const sdm_exact_opts *opts);
+
+/* The same of a preparation, to be asked now and then; SDM_E_CANCELLED when the caller wants the preparation to stop. b may be NULL. */
 sdm_status sdm_budget_ask(const sdm_budget *b, sdm_error *err);
 
 #endif

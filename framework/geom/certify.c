@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "grid_distance.h"
+#include "budget.h"
 #include "sdm/memory.h"
 #include "sdm/rng.h"
 #include "sign.h"

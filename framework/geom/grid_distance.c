@@ -5,6 +5,7 @@
 #include <stdatomic.h>
 #include <string.h>
 
+#include "budget.h"
 #include "grid_job.h"
 #include "sdm/memory.h"
 #include "sdm/threads.h"
@@ -47,11 +48,6 @@ static sdm_grid_kernel *choose_kernel(void)
     default:
         return sdm_grid_kernel_generic;
     }
-}
-
-bool sdm_cancelled(const sdm_exact_opts *opts)
-{
-    return sdm_thread() == 0 && opts->cancelled && opts->cancelled(opts->user);
 }
 
 /* Position of voxel `at` (may be fractional) relative to voxel (0, 0, 0). */

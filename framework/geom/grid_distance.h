@@ -12,9 +12,6 @@
 sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g, const sdm_exact_opts *opts, double band_mm,
                              float *values, uint32_t *slot, sdm_error *err);
 
-/* Asks the caller whether to stop; for all threads of a loop, but only the first one asks. */
-bool sdm_cancelled(const sdm_exact_opts *opts);
-
 /* For tests: the instruction set of the kernels, 0 generic, 1 AVX2, 2 AVX-512, -1 the best one. Not thread safe. Returns the one
    that will be used. */
 SDM_API int sdm_grid_kernel_select(int level);

@@ -3,7 +3,7 @@
 
 #include <stdatomic.h>
 
-#include "grid_distance.h"
+#include "budget.h"
 #include "sdm/threads.h"
 #include "vec3.h"
 

@@ -6,7 +6,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "grid_distance.h"
 #include "line_triangle.h"
 #include "sdm/memory.h"
 #include "sdm/threads.h"

@@ -1,7 +1,7 @@
 /* The threads over tiles of rows. */
 #include "sign_rows.h"
 
-#include "grid_distance.h"
+#include "budget.h"
 #include "sdm/memory.h"
 #include "sdm/threads.h"
 #include <stdatomic.h>

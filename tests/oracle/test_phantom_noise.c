@@ -219,20 +219,32 @@ static void test_misuse(void **state)
     o = plain(), o.n_threads = -1, refused(&o, "threads");
 }
 
+// with air, by one thread
+static sdm_phantom_opts airy(void)
+{
+    sdm_phantom_opts o = sdm_phantom_defaults();
+    o.air_share = 0.5;
+    o.n_threads = 1;
+    return o;
+}
+
+static sdm_status make_small(const sdm_phantom_opts *o, sdm_error *err)
+{
+    const sdm_grid g = oblique(4, 5, 6);
+    float v[120];
+    uint8_t label[120];
+    return sdm_phantom_make(block, NULL, NULL, o, &g, v, label, err);
+}
+
 static void test_memory(void **state)
 {
     (void)state;
     // every allocation that fails is an error and nothing leaks
-    const sdm_grid g = oblique(4, 5, 6);
-    float v[120];
-    uint8_t label[120];
-    sdm_phantom_opts o = sdm_phantom_defaults();
-    o.air_share = 0.5;
-    o.n_threads = 1;
+    const sdm_phantom_opts o = airy();
     for (unsigned long n = 1;; n++) {
         sdm_alloc_fail_after(n);
         sdm_error err;
-        const sdm_status s = sdm_phantom_make(block, NULL, NULL, &o, &g, v, label, &err);
+        const sdm_status s = make_small(&o, &err);
         sdm_alloc_fail_after(0);
         assert_true(n < 2000);
         if (!s) break;
@@ -250,12 +262,7 @@ static bool stops(void *user)
 static void test_cancelled(void **state)
 {
     (void)state;
-    const sdm_grid g = oblique(4, 5, 6);
-    float v[120];
-    uint8_t label[120];
-    sdm_phantom_opts o = sdm_phantom_defaults();
-    o.air_share = 0.5;
-    o.n_threads = 1;
+    sdm_phantom_opts o = airy();
     o.cancelled = stops;
     sdm_status s = SDM_E_CANCELLED;
     int asked = 0;
@@ -263,7 +270,7 @@ static void test_cancelled(void **state)
         sdm_error err;
         int left = asked;
         o.user = &left;
-        s = sdm_phantom_make(block, NULL, NULL, &o, &g, v, label, &err);
+        s = make_small(&o, &err);
         assert_true(asked < 10000 && (!s || s == SDM_E_CANCELLED));
     }
     // in both fields row by row, and in the planes of sub-voxels

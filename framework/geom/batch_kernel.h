@@ -81,14 +81,14 @@ SDM_FOR_KIND size_t hit_vectors(const block *b, int kind, size_t n_tile)
         batch->pair[i] = (sdm_tile_pair){(uint16_t)place, (uint16_t)(8 * t)};
         v8f out = beyond(kind, &f, x->sum, less, x->most);
         if (kind != SDM_THIN_FACES) {
-            v8f d2 = f.f[3] * f.f[3];
+            v8f d2 = v8_mul(f.f[3], f.f[3]);
             if (kind == SDM_EDGES) d2 = v8_fma(f.f[1], f.f[1], d2);
             if (kind == SDM_CORNERS) {
                 const point8 from =
                     p8_add(p8_load((const float(*)[8])job->vector[t].x), p8_all(x->from[0], x->from[1], x->from[2]));
                 d2 = p8_dot(from, from);
             }
-            out = v8_max(out, d2 - v8_load(b->far2[t]));
+            out = v8_max(out, v8_sub(d2, v8_load(b->far2[t])));
         }
         const unsigned mask = ~(unsigned)v8_greater(out, error);
         n = put_lanes(job, batch->vector, n, (uint32_t)(i * SDM_FLOATS(batch->at_vectors[0])), mask & b->wanted[t]);

@@ -14,7 +14,7 @@ static inline v8f extent_and(const sdm_grid_parts *q, bool aligned, point8 g, v8
     if (aligned)
         return v8_fma(v8_abs(g.x), v8_all(q->half[0]),
                       v8_fma(v8_abs(g.y), v8_all(q->half[1]), v8_fma(v8_abs(g.z), v8_all(q->half[2]), c)));
-    for (int a = 0; a < 3; a++) c += v8_abs(p8_dot(g, p8_all(q->axis[a][0], q->axis[a][1], q->axis[a][2])));
+    for (int a = 0; a < 3; a++) c = v8_add(c, v8_abs(p8_dot(g, p8_all(q->axis[a][0], q->axis[a][1], q->axis[a][2]))));
     return c;
 }
 
@@ -26,9 +26,9 @@ static inline v8f extent(const sdm_grid_parts *q, bool aligned, point8 g)
 /* Length of w and its direction (shorter than a unit vector where w is nearly 0), each good to half of SDM_CULL. */
 static inline v8f length8(point8 w, point8 *unit)
 {
-    const v8f d2 = p8_dot(w, w) + v8_all(SDM_TINY), inverse = v8_rsqrt(d2);
+    const v8f d2 = v8_add(p8_dot(w, w), v8_all(SDM_TINY)), inverse = v8_rsqrt(d2);
     *unit = p8_scale(w, inverse);
-    return d2 * inverse;
+    return v8_mul(d2, inverse);
 }
 
 /* What is known about eight parts: their middles p, a point of the surface near each in direction -g (unit vectors), and how far something
@@ -52,13 +52,13 @@ static inline view8 view_of(const sdm_grid_job *job, const sdm_grid_parts *q, po
     if (job->aligned) {
         const point8 w = {v8_fma(v8_abs(g.x), d, v8_all(q->half[0])), v8_fma(v8_abs(g.y), d, v8_all(q->half[1])),
                           v8_fma(v8_abs(g.z), d, v8_all(q->half[2]))};
-        most = v8_min(most, v8_sqrt(p8_dot(w, w)) - d + d * v8_all(SDM_CULL));
+        most = v8_min(most, v8_fma(d, v8_all(SDM_CULL), v8_sub(v8_sqrt(p8_dot(w, w)), d)));
     }
-    const v8f base = d + v8_all(4 * job->error) + (d + r) * v8_all(SDM_CULL);
+    const v8f base = v8_fma(v8_add(d, r), v8_all(SDM_CULL), v8_add(d, v8_all(4 * job->error)));
     return (view8){.p = p,
                    .g = g,
-                   .corner = base + v8_max(most, v8_all(0)),
-                   .bend = base + r * r / (d + d + v8_all(SDM_TINY)),
+                   .corner = v8_add(base, v8_max(most, v8_all(0))),
+                   .bend = v8_add(base, v8_div(v8_mul(r, r), v8_add(v8_add(d, d), v8_all(SDM_TINY)))),
                    .band = v8_all((job->band + q->radius) * (1 + SDM_CULL) + 4 * job->error)};
 }
 

@@ -9,8 +9,9 @@
 static inline point8 from_box(const sdm_cluster_node *node, point8 p)
 {
     const point8 lo = p8_all(node->lo[0], node->lo[1], node->lo[2]), hi = p8_all(node->hi[0], node->hi[1], node->hi[2]);
-    return (point8){p.x - v8_min(v8_max(p.x, lo.x), hi.x), p.y - v8_min(v8_max(p.y, lo.y), hi.y),
-                    p.z - v8_min(v8_max(p.z, lo.z), hi.z)};
+    const point8 nearest = {v8_min(v8_max(p.x, lo.x), hi.x), v8_min(v8_max(p.y, lo.y), hi.y),
+                            v8_min(v8_max(p.z, lo.z), hi.z)};
+    return p8_sub(p, nearest);
 }
 
 /* Parts in which a node may hold the nearest feature. */
@@ -33,22 +34,26 @@ static inline void offer_centroids(const sdm_features *f, const sdm_cluster_node
         const float *c = f->centroid[i];
         const point8 w = p8_sub(p, p8_all(c[0], c[1], c[2]));
         const v8f d2 = p8_dot(w, w);
-        best->face = v8_select_i(d2 < best->d2, v8_all_i((int32_t)i), best->face);
+        best->face = v8_if_less(d2, best->d2, v8_all_i((int32_t)i), best->face);
         best->d2 = v8_min(d2, best->d2);
     }
 }
 
 static inline void take_centroids(const sdm_features *f, const centroid8 *best, float at[3][8])
 {
+    uint32_t face[8];
+    v8_store_i(face, best->face);
     for (int i = 0; i < 8; i++)
-        for (int a = 0; a < 3 && best->face[i] >= 0; a++) at[a][i] = f->centroid[best->face[i]][a];
+        for (int a = 0; a < 3 && face[i] != SDM_NONE; a++) at[a][i] = f->centroid[face[i]][a];
 }
 
 /* Puts the centroids nearest to the points p in the place of at[3][8], where they are nearer. */
 static void find_centroids(const sdm_features *f, point8 p, float at[3][8])
 {
     const point8 w = p8_sub(p, p8_load((const float(*)[8])at));
-    const float middle[3] = {p.x[0] + p.x[7], p.y[0] + p.y[7], p.z[0] + p.z[7]};
+    _Alignas(32) float x[3][8];
+    p8_store(x, p);
+    const float middle[3] = {x[0][0] + x[0][7], x[1][0] + x[1][7], x[2][0] + x[2][7]};
     centroid8 best = {p8_dot(w, w), v8_all_i(-1)};
     uint32_t stack[SDM_BVH_DEPTH];
     int top = 0;

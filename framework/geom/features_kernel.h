@@ -25,12 +25,12 @@ SDM_FOR_KIND v8f beyond(int kind, const functions8 *x, const float *sum, v8f les
     v8f all = x->f[0];
     for (int k = 0; k < functions_of(kind) && (k < 3 || kind == SDM_THIN_FACES || kind == SDM_CORNERS); k++) {
         v8f f = kind == SDM_EDGES && k == 0 ? v8_abs(x->f[0]) : x->f[k];
-        if (kind == SDM_EDGES && k < 2) f -= v8_all(most[k]);
+        if (kind == SDM_EDGES && k < 2) f = v8_sub(f, v8_all(most[k]));
         f = v8_fma(less, v8_all(sum[place_of(kind, k, 1)]), f);
         all = k ? v8_max(all, f) : f;
     }
     if (kind != SDM_EDGES) return all;
-    const v8f mean = (x->f[1] + x->f[2]) * v8_all(0.5f) - v8_all(most[1]);
+    const v8f mean = v8_sub(v8_mul(v8_add(x->f[1], x->f[2]), v8_all(0.5f)), v8_all(most[1]));
     return v8_max(all, v8_fma(less, v8_all(sum[24]), mean));
 }
 

@@ -61,11 +61,11 @@ SDM_FOR_KIND unsigned meet_group(const meeting *w, bool cube, int kind, const sd
         v8_store(x->at_block[j], at[j]);
         if (j == 3 && kind != SDM_THIN_FACES) break;
         v8f f = kind == SDM_EDGES && j == 0 ? v8_abs(at[j]) : at[j];
-        if (kind == SDM_EDGES && j < 2) f -= v8_load(k->most[j]);
+        if (kind == SDM_EDGES && j < 2) f = v8_sub(f, v8_load(k->most[j]));
         beyond = v8_max(beyond, v8_fma(w->less, v8_load(sum[j]), f));
     }
     if (kind == SDM_EDGES) {
-        const v8f mean = (at[1] + at[2]) * v8_all(0.5f) - v8_load(k->most[1]);
+        const v8f mean = v8_sub(v8_mul(v8_add(at[1], at[2]), v8_all(0.5f)), v8_load(k->most[1]));
         beyond = v8_max(beyond, v8_fma(w->less, v8_load(sum[3]), mean));
     }
     const unsigned lanes = 0xff & ~(unsigned)v8_greater(beyond, w->error);

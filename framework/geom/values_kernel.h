@@ -44,6 +44,12 @@ static uint32_t settle(const tile *t, unsigned v, int lane, const double p[3], d
     return best;
 }
 
+/* ax bx + ay by + az bz */
+static inline v4d v4_sum(v4d ax, v4d bx, v4d ay, v4d by, v4d az, v4d bz)
+{
+    return v4_add(v4_add(v4_mul(ax, bx), v4_mul(ay, by)), v4_mul(az, bz));
+}
+
 /* Squared distances of four points to a feature each; the operations of sdm_feature_distance2(). */
 static inline void measure_four(const sdm_feature *x, const uint32_t number[4], v4d px, v4d py, v4d pz, double out[4])
 {
@@ -55,10 +61,10 @@ static inline void measure_four(const sdm_feature *x, const uint32_t number[4], 
     // rows of a: ax ay az ux, of u: uy uz length face
     v4_transpose(a);
     v4_transpose(u);
-    const v4d wx = px - a[0], wy = py - a[1], wz = pz - a[2];
-    const v4d s = wx * a[3] + wy * u[0] + wz * u[1];
-    const v4d rx = wx - s * a[3], ry = wy - s * u[0], rz = wz - s * u[1];
-    v4_store(out, v4_signed(u[3], s * s, rx * rx + ry * ry + rz * rz));
+    const v4d wx = v4_sub(px, a[0]), wy = v4_sub(py, a[1]), wz = v4_sub(pz, a[2]);
+    const v4d s = v4_sum(wx, a[3], wy, u[0], wz, u[1]);
+    const v4d rx = v4_sub(wx, v4_mul(s, a[3])), ry = v4_sub(wy, v4_mul(s, u[0])), rz = v4_sub(wz, v4_mul(s, u[1]));
+    v4_store(out, v4_signed(u[3], v4_mul(s, s), v4_sum(rx, rx, ry, ry, rz, rz)));
 }
 
 /* The voxels of a tile. */
@@ -83,7 +89,7 @@ static void choose_features(const tile *t, voxels *x)
         const unsigned at = 8 * t->number + (unsigned)v;
         const sdm_candidates *c = t->s->of_vectors;
         const v8f first = v8_load(c->first[at]);
-        const v8f limit = v8_fma(v8_sqrt(first) + v8_all(1), doubt, first);
+        const v8f limit = v8_fma(v8_add(v8_sqrt(first), v8_all(1)), doubt, first);
         const int clear = v8_greater(v8_load(c->second[at]), limit) & (int)~c->open[at];
         for (int i = 0; i < 8; i++) {
             const uint32_t number = x->number[place[i]] = c->number[at][i];
@@ -109,8 +115,8 @@ static void measure_voxels(const tile *t, voxels *x)
     uint32_t number[64];
     for (int i = 0; i < 64; i++) number[i] = x->number[i] == SDM_NONE ? 0 : x->number[i];
     for (int i = 0; i < 64; i += 4)
-        measure_four(t->job->features->exact, &number[i], v4_all(c[0]) + v4_load(&at[0][i]),
-                     v4_all(c[1]) + v4_load(&at[1][i]), v4_all(c[2]) + v4_load(&at[2][i]), &x->d2[i]);
+        measure_four(t->job->features->exact, &number[i], v4_add(v4_all(c[0]), v4_load(&at[0][i])),
+                     v4_add(v4_all(c[1]), v4_load(&at[1][i])), v4_add(v4_all(c[2]), v4_load(&at[2][i])), &x->d2[i]);
     for (int i = 0; i < x->n_settled; i++) x->d2[x->settled[i]] = x->settled_d2[i];
 }
 

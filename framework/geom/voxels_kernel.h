@@ -25,7 +25,7 @@ SDM_FOR_KIND unsigned compete(sdm_candidates *c, unsigned v, v8i number, v8f d, 
 {
     const v8f first = v8_load(c->first[v]), nearest = v8_min(d, first);
     v8_store(c->second[v], v8_min(v8_load(c->second[v]), v8_max(d, first)));
-    v8_store_i(c->number[v], v8_select_i(d < first, number, v8_load_i(c->number[v])));
+    v8_store_i(c->number[v], v8_if_less(d, first, number, v8_load_i(c->number[v])));
     v8_store(c->first[v], nearest);
     return (unsigned)v8_greater(v8_fma(nearest, share, doubt), d);
 }
@@ -36,12 +36,12 @@ SDM_FOR_KIND v8f distances(const sdm_grid_job *job, int kind, const sdm_block_fe
                            v8f error)
 {
     v8f f[SDM_FUNCTIONS];
-    for (int k = 0; k < functions_of(kind); k++) f[k] = v8_load(x->to_voxels[k]) + v8_all(at[8 * k]);
-    v8f d = f[3] * f[3], most = f[0];
+    for (int k = 0; k < functions_of(kind); k++) f[k] = v8_add(v8_load(x->to_voxels[k]), v8_all(at[8 * k]));
+    v8f d = v8_mul(f[3], f[3]), most = f[0];
     if (kind == SDM_EDGES) {
         d = v8_fma(f[1], f[1], d);
-        most = v8_abs(f[0]) - v8_all(x->most[0]);
-        f[1] -= v8_all(x->most[1]); // may be INFINITY
+        most = v8_sub(v8_abs(f[0]), v8_all(x->most[0]));
+        f[1] = v8_sub(f[1], v8_all(x->most[1])); // may be INFINITY
     }
     most = v8_max(most, v8_max(f[1], f[2]));
     if (kind == SDM_THIN_FACES) most = v8_max(most, f[3]);
@@ -52,7 +52,7 @@ SDM_FOR_KIND v8f distances(const sdm_grid_job *job, int kind, const sdm_block_fe
         d = p8_dot(from, from);
         most = v8_max(v8_max(most, f[3]), v8_max(f[4], f[5]));
     }
-    return v8_signed(most - error, d, v8_all(INFINITY));
+    return v8_signed(v8_sub(most, error), d, v8_all(INFINITY));
 }
 
 /* Holds the voxels of n vectors against the features of the batch whose region these meet. */

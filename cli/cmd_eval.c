@@ -108,7 +108,7 @@ static sdm_status measure(const cli_args *args, const sdm_model *m, const sdm_in
     sdm_json json = {0};
     sdm_status s = args->pictures ? sdm_make_folder(args->pictures, err) : SDM_OK;
     if (!s) s = cli_evaluate(m, shape, seed, n, true, &e, err);
-    if (!s) s = cli_time_maps(m, shape, seed, (size_t)args->naive, &t, err);
+    if (!s) s = cli_time_maps(m, shape, seed, false, (size_t)args->naive, &t, err);
     if (!s && args->pictures) s = write_pictures(args, m, shape, seed, &e, err);
     if (!s && args->json) {
         fill_json(&json, args->files.items[0], info, &e, &t, seed, sdm_threads((int)args->threads));

@@ -70,7 +70,7 @@ void cli_eval_dispose(cli_eval *e);
 sdm_status cli_picture_compare(const sdm_model *m, const sdm_instance *shape, uint64_t seed, size_t index,
                                const double *p, const char *path, sdm_error *err);
 
-/* Time per map on one core, of its processor alone: medians, ms, files not included. Mesh making and tree building count for the exact engine. */
+/* Time per map on one core, of its processor alone: ms, files not included. Mesh making and tree building count for the exact engine. */
 typedef struct cli_timing {
     double ms_network, ms_batch; /* one map; one map of a batch of batch_size */
     size_t batch_size;
@@ -79,14 +79,17 @@ typedef struct cli_timing {
     size_t n_network, n_exact, n_naive;
 } cli_timing;
 
-/* shape may be NULL: the network alone. */
-sdm_status cli_time_maps(const sdm_model *m, const sdm_instance *shape, uint64_t seed, size_t n_naive, cli_timing *out,
-                         sdm_error *err);
+/* Medians over random shapes; fastest: of one shape again and again, the fastest. shape may be NULL: the network alone. */
+sdm_status cli_time_maps(const sdm_model *m, const sdm_instance *shape, uint64_t seed, bool fastest, size_t n_naive,
+                         cli_timing *out, sdm_error *err);
 
 /* Time of the naive method on one core for the mesh, scaled from a share of the slices. */
 sdm_status cli_time_naive(const sdm_mesh *mesh, const sdm_grid *grid, double *ms, double *share, sdm_error *err);
 
 /* Sorts v[n] and returns its median. */
 double cli_median(double *v, size_t n);
+
+/* The least of v[n]. */
+double cli_least(double *v, size_t n);
 
 #endif

@@ -60,7 +60,10 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "the same map: by default the cochlea on 60 x 50 x 50 voxels of 0.2 mm. One thread each, but for one row. Other "
      "programs are\n"
      "sdmgen-peer-NAME beside sdmgen or in libexec/sdmgen; what is missing is said.\n"
-     "network: one map and a batch of a model on one core, against the exact engine.",
+     "network: one map, a batch and derivatives of a model on one core, against the exact engine, where the shape is "
+     "known and its\n"
+     "data files are there.\n"
+     "Of several runs the fastest counts.",
      "sdmgen bench exact", 1, 2, cmd_bench},
     {"experiment", "CONFIG [key=value ...]", "compare methods in one table, beside the figures of others",
      "Trains the networks of the experiment or loads those that are there, times every method on one core, measures "

@@ -104,6 +104,8 @@ has '^  RMSE +[0-9.]+ mm$'
 expect 4 'MSE .* demanded at most' sdmgen eval $model --samples 2 --naive 0 --quiet --max-mse 1e-12
 expect 0 - sdmgen bench network $model --json
 awk -v v="$(json ms_network)" 'BEGIN { exit !(v > 0) }' || bad 'bench: no ms_network'
+awk -v v="$(json ms_exact)" 'BEGIN { exit !(v > 0) }' || bad 'bench: no ms_exact'
+has '"no_exact": ""'
 sdmgen verify $model --quiet --samples 60 >out 2>err
 code=$?
 [ $code -eq 0 ] || [ $code -eq 4 ] || bad "verify: exit code $code: $(cat err)"

@@ -119,6 +119,12 @@ rm ../$deviations
 expect 1 "data file 'deviations' of the exact shape, here or beside the model: /.*/moved/conf/statistical/deviations\.npy: cannot open" \
     sdmgen eval ../moved/data/model.sdm
 expect 0 - sdmgen generate ../moved/data/model.sdm -p m1=1 -o x.npy
+expect 0 - sdmgen bench network ../moved/data/model.sdm
+has '^  map and Jacobian +[0-9.]+ ms'
+has "^  exact engine +not measured: data file 'deviations' .*: cannot open"
+expect 0 - sdmgen bench network ../moved/data/model.sdm --json
+[ "$(json ms_exact)" = null ] || bad "bench: a time without the exact shape: $(json ms_exact)"
+has '"no_exact": "data file .deviations. .*cannot open'
 # beside the model, but not beside the user
 cp ../kept.npy deviations.npy
 expect 1 'cannot open' sdmgen verify ../moved/data/model.sdm

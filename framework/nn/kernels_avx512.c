@@ -1,9 +1,11 @@
-/* Kernels for AVX-512. */
+/* Kernels for AVX-512; a part of kernels_avx512vnni.c too. */
 #include <immintrin.h>
 #include <stdint.h>
 
+#ifndef TABLE
 #define TABLE sdm_kernels_avx512
 #define ISA "avx512"
+#endif
 #define VW 16
 #define MR 12
 #define LOAD_HALF

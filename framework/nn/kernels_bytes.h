@@ -1,5 +1,6 @@
 /* Kernels for weights as bytes (sdm/kernels.h), a part of kernels_simd.h. A lane of 32 bits holds two neighbouring inputs of one output
-   as integers of 16 bits. From the instruction set: LOAD_PAIRS(p), bytes to such lanes, and MADD(a, b), the two products of each lane added. */
+   as integers of 16 bits. From the instruction set: LOAD_PAIRS(p), bytes to such lanes, MADD(a, b), the two products of each lane added, and
+   ADD_MADD(sum, a, b), where one instruction adds them to a sum. */
 
 // the two inputs of a lane
 static inline veci first_of(veci v) { return (veci)((vecu)v << 16) >> 16; }
@@ -7,6 +8,10 @@ static inline veci second_of(veci v) { return v >> 16; }
 
 #ifndef MADD
 #define MADD(a, b) (first_of(a) * first_of(b) + second_of(a) * second_of(b))
+#endif
+
+#ifndef ADD_MADD
+#define ADD_MADD(sum, a, b) ((sum) + (vecu)MADD(a, b))
 #endif
 
 #ifndef LOAD_PAIRS
@@ -86,8 +91,12 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inp
 #define EACH(i, n) _Pragma("GCC unroll 8") for (int i = 0; i < (n); i++)
 #endif
 
-// acc[rows][n] `op` the products of a pair of inputs, `pair` bytes; what there is less of stays in registers, inputs or weights
-#define BYTES_PAIR(rows, n, op, pair, load_pair)                                                                       \
+// what becomes of products: the first of their sum, or more; a sum waits longer for ADD_MADD, which only many sums at a time hide
+#define SET(many, sum, a, b) sum = (vecu)MADD(a, b)
+#define ADD(many, sum, a, b) sum = (many) ? ADD_MADD(sum, a, b) : (sum) + (vecu)MADD(a, b)
+
+// acc[rows][n] `into` by the products of a pair of inputs, `pair` bytes; what there is less of stays in registers, inputs or weights
+#define BYTES_PAIR(rows, n, into, pair, load_pair)                                                                       \
     do {                                                                                                               \
         if (rows < n) {                                                                                                \
             veci input[rows];                                                                                          \
@@ -95,7 +104,7 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inp
             EACH(j, n)                                                                                                 \
             {                                                                                                          \
                 const veci weight = load_pair(w + BYTES_AT(j, pair));                                                  \
-                EACH(i, rows) acc[i][j] op(vecu) MADD(input[i], weight);                                               \
+                EACH(i, rows) into(rows * n >= 4, acc[i][j], input[i], weight);                                        \
             }                                                                                                          \
         } else {                                                                                                       \
             veci weight[n];                                                                                            \
@@ -103,7 +112,7 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inp
             EACH(i, rows)                                                                                              \
             {                                                                                                          \
                 const veci s = splat_pair(x + (size_t)i * ldx);                                                        \
-                EACH(j, n) acc[i][j] op(vecu) MADD(s, weight[j]);                                                      \
+                EACH(j, n) into(rows * n >= 4, acc[i][j], s, weight[j]);                                               \
             }                                                                                                          \
         }                                                                                                              \
         w += pair, x += 2;                                                                                             \
@@ -159,12 +168,12 @@ static const float no_mean[8 * VW] = {0};
             const int16_t *x = inputs;                                                                                 \
             vecu acc[rows][n];                                                                                         \
             if (wide)                                                                                                  \
-                BYTES_PAIR(rows, n, =, WIDE, load_wide);                                                               \
+                BYTES_PAIR(rows, n, SET, WIDE, load_wide);                                                              \
             else                                                                                                       \
                 EACH(i, rows) EACH(j, n) acc[i][j] = (vecu){0};                                                        \
-            for (size_t p = 1; p < wide; p++) BYTES_PAIR(rows, n, +=, WIDE, load_wide);                                \
+            for (size_t p = 1; p < wide; p++) BYTES_PAIR(rows, n, ADD, WIDE, load_wide);                               \
             w -= o % SDM_PANEL * ((WIDE - NARROW) / SDM_PANEL);                                                        \
-            UNROLL(2) for (size_t p = 0; p < narrow; p++) BYTES_PAIR(rows, n, +=, NARROW, LOAD_PAIRS);                 \
+            UNROLL(2) for (size_t p = 0; p < narrow; p++) BYTES_PAIR(rows, n, ADD, NARROW, LOAD_PAIRS);                \
             if (to->y)                                                                                                 \
                 BYTES_NUMBERS(rows, n)                                                                                 \
             else                                                                                                       \

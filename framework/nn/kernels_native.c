@@ -19,6 +19,7 @@ static int usable(int level)
     if (best && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
         __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw"))
         best = 2;
+    if (best == 2 && __builtin_cpu_supports("avx512vnni")) best = 3;
 #endif
     return level >= 0 && level < best ? level : best;
 }
@@ -33,6 +34,8 @@ static const kernel_table *kernels(void)
 {
     switch (usable(wanted_level)) {
 #if defined(__x86_64__)
+    case 3:
+        return &sdm_kernels_avx512vnni;
     case 2:
         return &sdm_kernels_avx512;
     case 1:

@@ -34,11 +34,12 @@ typedef struct kernel_table {
 
 extern const kernel_table sdm_kernels_generic;
 #if defined(__x86_64__)
-extern const kernel_table sdm_kernels_avx2, sdm_kernels_avx512;
+extern const kernel_table sdm_kernels_avx2, sdm_kernels_avx512, sdm_kernels_avx512vnni;
 #endif
 
-/* For tests, before other threads start: 0 baseline of the machine, 1 AVX2, 2 AVX-512, -1 the best there is. What is not there becomes
-   the best; returns the level in use. */
+/* For tests, before other threads start: 0 baseline of the machine, 1 AVX2, 2 AVX-512, 3 with VNNI, -1 the best there is. What is not
+   there becomes the best; returns the level in use. */
+#define SDM_KERNELS_LEVELS 4
 int sdm_kernels_select(int level);
 
 #endif

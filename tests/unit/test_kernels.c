@@ -99,7 +99,7 @@ static void half_in_every_instruction_set(void **state)
     assert_int_equal(SDM_ALLOC(&h, 65536, "h", NULL), SDM_OK);
     assert_int_equal(SDM_ALLOC(&y, 65536, "y", NULL), SDM_OK);
     for (unsigned i = 0; i < 65536; i++) h[i] = (uint16_t)i;
-    for (int isa = 0; isa < 3; isa++) {
+    for (int isa = 0; isa < SDM_KERNELS_LEVELS; isa++) {
         if (sdm_kernels_select(isa) != isa) continue;
         sdm_panel_f16(1, 65536, 1, h, &one, 0, y, 0); // a layer of one input, 1: its weights
         for (unsigned i = 0; i < 65536; i++) {
@@ -127,7 +127,7 @@ static void panels(void **state)
     assert_int_equal(SDM_ALLOC(&half, sdm_panel_count(MOST, K), "t", NULL), SDM_OK);
     assert_int_equal(SDM_ALLOC(&y, ROWS * MOST, "t", NULL), SDM_OK);
     assert_int_equal(sdm_panel_count(150, K), 160 * K);
-    for (int isa = 0; isa < 3; isa++) {
+    for (int isa = 0; isa < SDM_KERNELS_LEVELS; isa++) {
         if (sdm_kernels_select(isa) != isa) continue;
         for (size_t outputs = 1; outputs <= 150; outputs += outputs < 70 ? 1 : 40) {
             sdm_panel_pack_f32(outputs, K, (sdm_view){w, K, 1}, packed);
@@ -198,7 +198,7 @@ static void bytes(void **state)
     const size_t inputs[][2] = {{0, 1}, {1, 1}, {0, 12}, {1, 11}, {3, 37}, {37, 37}, {126, 127}};
     for (size_t c = 0; c < sizeof inputs / sizeof *inputs; c++) {
         const size_t wide = inputs[c][0], k = inputs[c][1];
-        for (int isa = 0; isa < 3; isa++) {
+        for (int isa = 0; isa < SDM_KERNELS_LEVELS; isa++) {
             if (sdm_kernels_select(isa) != isa) continue;
             for (size_t outputs = 1; outputs <= 150; outputs += outputs < 70 ? 3 : 40) {
                 const bool extreme = outputs % 2 == 0;
@@ -298,7 +298,7 @@ static void quantisation(void **state)
     float *y = random_floats(ROWS * LDY, 4), *factor = random_floats(MOST, 5), changed[MOST], ones[MOST], scale[ROWS];
     int16_t x[ROWS * LDX + 1];
     for (int i = 0; i < MOST; i++) ones[i] = 1;
-    for (int isa = 0; isa < 3; isa++) {
+    for (int isa = 0; isa < SDM_KERNELS_LEVELS; isa++) {
         if (sdm_kernels_select(isa) != isa) continue;
         for (size_t n = 0; n <= MOST; n++)
             for (int limit = 5; limit < 32768; limit += 10920)
@@ -393,7 +393,7 @@ static void names(void **state)
 {
     (void)state;
 #if defined(__x86_64__)
-    static const char *const name[] = {"sse2", "avx2", "avx512"};
+    static const char *const name[] = {"sse2", "avx2", "avx512", "avx512vnni"};
 #elif defined(__aarch64__)
     static const char *const name[] = {"neon"};
 #else

@@ -114,7 +114,7 @@ SDM_API void sdm_put_end(void);
 /* exp(x) for n values, relative error below 2e-7, in place allowed. */
 SDM_API void sdm_exp(size_t n, const float *x, float *y);
 
-/* Name of the instruction set in use: "sse2", "avx2", "avx512", "neon" or "generic". */
+/* Name of the instruction set in use: "sse2", "avx2", "avx512", "avx512vnni", "neon" or "generic". */
 SDM_API const char *sdm_kernels_name(void);
 
 #ifdef __cplusplus

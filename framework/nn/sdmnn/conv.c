@@ -20,7 +20,7 @@ static const conv_table *table(void)
 {
 #if defined(__x86_64__)
     const char *isa = sdm_kernels_name();
-    if (!strcmp(isa, "avx512")) return &sdm_conv_avx512;
+    if (!strncmp(isa, "avx512", 6)) return &sdm_conv_avx512;
     if (!strcmp(isa, "avx2")) return &sdm_conv_avx2;
 #endif
     return &sdm_conv_generic;

@@ -20,6 +20,13 @@ static inline __m128i round_to_shorts(__m256 v)
     const __m256i i = _mm256_cvtps_epi32(v);
     return _mm_packs_epi32(_mm256_castsi256_si128(i), _mm256_extracti128_si256(i, 1));
 }
+#define SUM_LANES(v) sum_lanes(v)
+static inline float sum_lanes(__m256 v)
+{
+    __m128 sum = _mm_add_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps(v, 1));
+    sum = _mm_add_ps(sum, _mm_movehl_ps(sum, sum));
+    return _mm_cvtss_f32(_mm_add_ss(sum, _mm_movehdup_ps(sum)));
+}
 #define SMALLER_OF(a, b) _mm256_min_ps(a, b)
 #define LARGER_OF(a, b) _mm256_max_ps(a, b)
 #define FMA(a, b, c) _mm256_fmadd_ps(a, b, c)

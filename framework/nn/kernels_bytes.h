@@ -84,6 +84,14 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inp
 // where register j of the outputs has its weights of a pair, in bytes from panel o / 16 on
 #define BYTES_AT(j, pair) ((size_t)((j)*VW / SDM_PANEL) * panel + (size_t)((j)*VW % SDM_PANEL) * (pair / SDM_PANEL))
 
+// of a pair of inputs in n registers
+#define BYTES_OF(n, pair) ((n)*VW / SDM_PANEL * (pair))
+
+// weights are asked for so many bytes before they are used, where several rows share them
+#ifndef AHEAD
+#define AHEAD 0
+#endif
+
 // loops over registers: sums stay in registers only when they are gone before arrays are taken apart
 #if defined(__clang__)
 #define EACH(i, n) _Pragma("clang loop unroll(full)") for (int i = 0; i < (n); i++)
@@ -96,7 +104,7 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inp
 #define ADD(many, sum, a, b) sum = (many) ? ADD_MADD(sum, a, b) : (sum) + (vecu)MADD(a, b)
 
 // acc[rows][n] `into` by the products of a pair of inputs, `pair` bytes; what there is less of stays in registers, inputs or weights
-#define BYTES_PAIR(rows, n, into, pair, load_pair)                                                                       \
+#define BYTES_PAIR(rows, n, into, pair, load_pair)                                                                     \
     do {                                                                                                               \
         if (rows < n) {                                                                                                \
             veci input[rows];                                                                                          \
@@ -104,7 +112,7 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inp
             EACH(j, n)                                                                                                 \
             {                                                                                                          \
                 const veci weight = load_pair(w + BYTES_AT(j, pair));                                                  \
-                EACH(i, rows) into(rows * n >= 4, acc[i][j], input[i], weight);                                        \
+                EACH(i, rows) into((rows) * (n) >= 4, acc[i][j], input[i], weight);                                    \
             }                                                                                                          \
         } else {                                                                                                       \
             veci weight[n];                                                                                            \
@@ -112,9 +120,11 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inp
             EACH(i, rows)                                                                                              \
             {                                                                                                          \
                 const veci s = splat_pair(x + (size_t)i * ldx);                                                        \
-                EACH(j, n) into(rows * n >= 4, acc[i][j], s, weight[j]);                                               \
+                EACH(j, n) into((rows) * (n) >= 4, acc[i][j], s, weight[j]);                                           \
             }                                                                                                          \
         }                                                                                                              \
+        if (AHEAD && rows > 1) EACH(l, BYTES_OF(n, pair) / 64) __builtin_prefetch(ahead + 64 * l);                     \
+        ahead += BYTES_OF(n, pair);                                                                                    \
         w += pair, x += 2;                                                                                             \
     } while (0)
 
@@ -129,10 +139,13 @@ static const float no_mean[8 * VW] = {0};
         EACH(i, rows)                                                                                                  \
         {                                                                                                              \
             const vec s = splat(scale[i]);                                                                             \
+            if (i == rows - 1 && i > 0 && to->rest) break;                                                             \
             if ((size_t)i >= n_mean) mean = no_mean;                                                                   \
             EACH(j, n)                                                                                                 \
             {                                                                                                          \
-                const vec v = FMA(s, __builtin_convertvector((veci)acc[i][j], vec), load(mean + j * VW));              \
+                vec v = FMA(s, __builtin_convertvector((veci)acc[i][j], vec), load(mean + j * VW));                    \
+                if (i == 0 && rows > 1 && to->rest)                                                                    \
+                    v = FMA(splat(scale[rows - 1]), __builtin_convertvector((veci)acc[rows - 1][j], vec), v);          \
                 store_rows(y + (size_t)(j * VW / 4) * line, line, v);                                                  \
             }                                                                                                          \
             y += ld;                                                                                                   \
@@ -165,10 +178,11 @@ static const float no_mean[8 * VW] = {0};
         const size_t panel = wide * WIDE + narrow * NARROW, ld = to->ld;                                               \
         for (; o + n * VW <= outputs; o += n * VW) {                                                                   \
             const int8_t *w = panels + o / SDM_PANEL * panel + o % SDM_PANEL * (WIDE / SDM_PANEL);                     \
+            const int8_t *ahead = panels + o / SDM_PANEL * panel + AHEAD;                                              \
             const int16_t *x = inputs;                                                                                 \
             vecu acc[rows][n];                                                                                         \
             if (wide)                                                                                                  \
-                BYTES_PAIR(rows, n, SET, WIDE, load_wide);                                                              \
+                BYTES_PAIR(rows, n, SET, WIDE, load_wide);                                                             \
             else                                                                                                       \
                 EACH(i, rows) EACH(j, n) acc[i][j] = (vecu){0};                                                        \
             for (size_t p = 1; p < wide; p++) BYTES_PAIR(rows, n, ADD, WIDE, load_wide);                               \
@@ -184,7 +198,13 @@ static const float no_mean[8 * VW] = {0};
 
 #define BYTES_STEP(rows, n) o = bytes_##rows##x##n(o, outputs, wide, narrow, w, x, ldx, scale, to);
 
+// eight registers of 16 outputs would be eight panels, more places than the processor reads ahead at a time
+#if VW < 16
 BYTES_BLOCK(1, 8)
+#define BYTES_EIGHT(rows) BYTES_STEP(rows, 8)
+#else
+#define BYTES_EIGHT(rows)
+#endif
 BYTES_BLOCK(1, 4)
 BYTES_BLOCK(1, 2)
 BYTES_BLOCK(1, 1)
@@ -207,7 +227,7 @@ static void bytes_rows(size_t rows, size_t outputs, size_t wide, size_t narrow, 
     size_t o = 0;
     switch (rows) {
     case 1:
-        BYTES_STEP(1, 8)
+        BYTES_EIGHT(1)
         BYTES_STEP(1, 4)
         BYTES_STEP(1, 2)
         BYTES_STEP(1, 1)
@@ -290,8 +310,8 @@ static void panel_i8_blocks(size_t batch, size_t n, const sdm_panel_block *b, co
                 a += __builtin_convertvector(first_of(weight), vec) * at;                                              \
                 b += __builtin_convertvector(second_of(weight), vec) * at;                                             \
             }                                                                                                          \
-            x[2 * p] += sum_lanes(a);                                                                                  \
-            x[2 * p + 1] += sum_lanes(b);                                                                              \
+            x[2 * p] += SUM_LANES(a);                                                                                  \
+            x[2 * p + 1] += SUM_LANES(b);                                                                              \
         }                                                                                                              \
     }
 BACK_PAIRS(back_wide, WIDE, load_wide)
@@ -362,6 +382,51 @@ static inline void quantise_by(size_t rows, size_t n, const float *y, size_t ldy
 {
     for (size_t r = 0; r < rows; r++) scale[r] = largest_of(n, y + r * ldy, factor);
     for (size_t r = 0; r < rows; r++) scale[r] = round_row(n, y + r * ldy, factor, scale[r], limit, x + r * ldx);
+}
+
+static inline vec load_shorts(const int16_t *x)
+{
+    int16_t shorts __attribute__((vector_size(2 * VW)));
+    memcpy(&shorts, x, sizeof shorts);
+    return __builtin_convertvector(__builtin_convertvector(shorts, veci), vec);
+}
+
+static inline void rest_register(const float *y, const float *factor, float to_integer, int limit, size_t i,
+                                 const int16_t *x, int16_t *rest)
+{
+    store_shorts(rest + i, (product_at(i, y, factor) * to_integer - load_shorts(x + i)) * (float)limit);
+}
+
+// what round_row() left, a part of one of its integers: half of what integers may be
+static inline float round_rest(size_t n, const float *y, const float *factor, float largest, int limit,
+                               const int16_t *x, int16_t *rest)
+{
+    const float to_integer = (float)limit / largest;
+    if (!(to_integer > 0 && to_integer <= 3e38f)) {
+        memset(rest, 0, n * sizeof *rest);
+        return largest - largest;
+    }
+    const size_t last = n - VW;
+    UNROLL(4) for (size_t i = 0; i < last; i += VW) rest_register(y, factor, to_integer, limit, i, x, rest);
+    rest_register(y, factor, to_integer, limit, last, x, rest);
+    return largest / (float)limit / (float)limit;
+}
+
+static void quantise_rest(size_t n, const float *y, const float *factor, int limit, int16_t *x, float *scale,
+                          int16_t *rest, float *rest_scale)
+{
+    if (n < VW) {
+        float some[VW] = {0};
+        int16_t integers[2][VW];
+        for (size_t i = 0; i < n; i++) some[i] = factor ? y[i] * factor[i] : y[i];
+        quantise_rest(VW, some, NULL, limit, integers[0], scale, integers[1], rest_scale);
+        memcpy(x, integers[0], n * sizeof *x);
+        memcpy(rest, integers[1], n * sizeof *rest);
+        return;
+    }
+    const float largest = largest_of(n, y, factor);
+    *scale = round_row(n, y, factor, largest, limit, x);
+    *rest_scale = round_rest(n, y, factor, largest, limit, x, rest);
 }
 
 static void quantise_few(size_t n, const float *y, const float *factor, int limit, int16_t *x, float *scale)

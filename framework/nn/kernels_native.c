@@ -205,6 +205,12 @@ void sdm_quantise(size_t rows, size_t n, const float *y, size_t ldy, const float
     kernels()->quantise(rows, n, y, ldy, factor, limit, x, ldx, scale);
 }
 
+void sdm_quantise_rest(size_t n, const float *y, const float *factor, int limit, int16_t *x, float *scale,
+                       int16_t *rest, float *rest_scale)
+{
+    kernels()->quantise_rest(n, y, factor, limit, x, scale, rest, rest_scale);
+}
+
 void sdm_panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w, const int16_t *x, size_t ldx,
                   const float *scale, const sdm_panel_out *to)
 {

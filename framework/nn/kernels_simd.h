@@ -24,6 +24,7 @@ static inline vec load(const float *p) { return *(const vec_u *)p; }
 static inline void store(float *p, vec v) { *(vec_u *)p = v; }
 static inline vec splat(float v) { return v - (vec){0}; }
 
+#ifndef SUM_LANES
 static inline float sum_lanes(vec v)
 {
     float each[VW], total = 0;
@@ -31,6 +32,8 @@ static inline float sum_lanes(vec v)
     for (int j = 0; j < VW; j++) total += each[j];
     return total;
 }
+#define SUM_LANES(v) sum_lanes(v)
+#endif
 
 static void micro(size_t k, const float *a, const float *b, float *c, size_t ldc, int add)
 {
@@ -179,7 +182,7 @@ static inline vec load_half(const uint16_t *p)
                 for (size_t j = 0; j < n; j += VW)                                                                     \
                     sum += load_weights(w + j / SDM_PANEL * SDM_PANEL * k + p * SDM_PANEL + j % SDM_PANEL) *           \
                            load(y + o + j);                                                                            \
-                x[p] += sum_lanes(sum);                                                                                \
+                x[p] += SUM_LANES(sum);                                                                                \
             }                                                                                                          \
         }                                                                                                              \
     }
@@ -268,5 +271,6 @@ const kernel_table TABLE = {.name = ISA,
                             .panel_i8_blocks = panel_i8_blocks,
                             .back_i8 = back_i8,
                             .quantise = quantise,
+                            .quantise_rest = quantise_rest,
                             .put = put,
                             .exp = exp_all};

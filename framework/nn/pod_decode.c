@@ -86,20 +86,15 @@ static input input_from(input in, size_t first)
     return in;
 }
 
-// y[0] += the row behind the last
-static void add_rest(size_t rows, size_t rests, size_t n, float *y, size_t ldy)
-{
-    for (size_t i = 0; i < n && rests; i++) y[i] += y[rows * ldy + i];
-}
-
-// y[rows + rests][ldy] from the inputs of a block whose weights begin at `at`; mean: of its outputs, or NULL
+// y[rows][ldy] from the inputs of a block whose weights begin at `at`; mean: of its outputs, or NULL
 static void product(const job *j, size_t outputs, size_t wide, size_t rank, size_t at, const input *in,
                     const float *mean, float *y, size_t ldy)
 {
     const pod_network *m = j->m;
     const size_t rows = j->rows + j->rests, n_mean = mean ? smaller(j->with_mean, j->rows) : 0;
     if (sdm_pod_is_bytes(m)) {
-        const sdm_panel_out to = {.y = y, .ld = ldy, .line = SDM_PANEL_ROW, .mean = mean, .n_mean = n_mean};
+        const sdm_panel_out to = {
+            .y = y, .ld = ldy, .line = SDM_PANEL_ROW, .mean = mean, .n_mean = n_mean, .rest = j->rests};
         sdm_panel_i8(rows, outputs, wide, rank, (const int8_t *)m->basis + at, in->q, in->ld, in->scale, &to);
         return;
     }
@@ -112,7 +107,6 @@ static void upper_product(const job *j, size_t b, const input *in, float *y, siz
 {
     const pod_network *m = j->m;
     product(j, m->outputs[b], m->wide ? m->wide[b] : 0, m->blocks[b].rank, m->weights_at[b], in, NULL, y, ldy);
-    add_rest(j->rows, j->rests, m->outputs[b], y, ldy);
 }
 
 // n integers go into block b and its like; a row with a latent variable that is not finite stays one
@@ -144,10 +138,12 @@ static void quantise(const job *j, size_t level, size_t first, size_t n, const f
 {
     const pod_network *m = j->m;
     const float *factor = m->factor + m->coefficients_at[level] + first;
-    sdm_pod_quantise_rows(j->rows, n, c, ldc, factor, m->limit[level], to->q, to->ld, to->scale);
+    const int limit = m->limit[level];
     if (j->rests)
-        to->scale[j->rows] = sdm_pod_quantise_rest(n, c, factor, m->limit[level], to->q, to->scale[0], j->s.back,
-                                                   to->q + j->rows * to->ld);
+        sdm_pod_quantise_rest(n, c, factor, limit, to->q, to->scale, to->q + j->rows * to->ld, to->scale + j->rows);
+    const size_t first_row = j->rests;
+    sdm_pod_quantise_rows(j->rows - first_row, n, c + first_row * ldc, ldc, factor, limit, to->q + first_row * to->ld,
+                          to->ld, to->scale + first_row);
 }
 
 // where the coefficients of the lowest level of block `group` of its groups belong
@@ -217,7 +213,7 @@ static void decode_leaf(const job *j, const sdm_panel_block *p, size_t n_x)
     input in = input_from(j->s.leaves, p->x);
     if (in.scale) in.scale += p->scale;
     product(j, p->outputs, p->n_wide, p->k, p->weights, &in, j->m->mean + p->mean, y, ldy);
-    for (size_t r = 0; r < j->rows + j->rests; r++, y += ldy, to += j->s.ld_line) {
+    for (size_t r = 0; r < j->rows; r++, y += ldy, to += j->s.ld_line) {
         if (n_x == 4)
             copy_rows(4, p->outputs / 4, y, to, nx);
         else
@@ -234,8 +230,12 @@ static void decode_line(const job *j, size_t first, size_t n)
     if (sdm_pod_is_bytes(m) && m->arch.block == SDM_PANEL_ROW) { // the last may have shorter rows
         const size_t whole = nx / SDM_PANEL_ROW;
         const input *in = &j->s.leaves;
-        const sdm_panel_out to = {
-            .y = j->s.line, .ld = j->s.ld_line, .line = nx, .mean = m->mean, .n_mean = smaller(j->with_mean, j->rows)};
+        const sdm_panel_out to = {.y = j->s.line,
+                                  .ld = j->s.ld_line,
+                                  .line = nx,
+                                  .mean = m->mean,
+                                  .n_mean = smaller(j->with_mean, j->rows),
+                                  .rest = j->rests};
         sdm_panel_i8_blocks(j->rows + j->rests, whole, p, m->basis, in->q, in->ld, in->scale, &to);
         p += whole;
     }
@@ -247,7 +247,6 @@ static void put_line(const job *j, const sdm_pod_block *k)
 {
     const size_t nx = (size_t)j->grid->n[0], plane = nx * (size_t)j->grid->n[1], n = k->size[1] * nx;
     size_t at = sdm_pod_first_voxel(j->grid, k) - k->at[0];
-    add_rest(j->rows, j->rests, k->size[2] * n, j->s.line, j->s.ld_line);
     for (size_t z = 0; z < k->size[2]; z++, at += plane)
         for (size_t r = 0; r < j->rows; r++)
             sdm_put(n, j->s.line + r * j->s.ld_line + z * n, j->maps[r] + at, j->stream);
@@ -276,14 +275,15 @@ static void quantise_latent(const pod_network *m, size_t rows, size_t rests, con
 {
     const size_t latent = m->arch.n_latent, n = m->arch.levels.n;
     const float *factor = m->factor + m->coefficients_at[n];
-    for (size_t r = rows; r-- > 0;) { // the first is the last, for its rest
+    for (size_t r = 0; r < rows; r++) {
+        int16_t *to = w->z_integers + r * w->ldz;
         for (size_t i = 0; i < latent; i++) w->sorted[i] = w->z[r * latent + m->order[i]];
-        sdm_pod_quantise_rows(1, latent, w->sorted, 0, factor, m->limit[n], w->z_integers + r * w->ldz, 0,
-                              w->z_scale + r);
+        if (r < rests)
+            sdm_pod_quantise_rest(latent, w->sorted, factor, m->limit[n], to, w->z_scale, to + rows * w->ldz,
+                                  w->z_scale + rows);
+        else
+            sdm_pod_quantise_rows(1, latent, w->sorted, 0, factor, m->limit[n], to, 0, w->z_scale + r);
     }
-    if (rests)
-        w->z_scale[rows] = sdm_pod_quantise_rest(latent, w->sorted, factor, m->limit[n], w->z_integers, w->z_scale[0],
-                                                 w->sorted, w->z_integers + rows * w->ldz);
 }
 
 // coefficients `at` to `at` + n of the highest level
@@ -304,7 +304,7 @@ static void head_product(const pod_network *m, size_t rows, size_t rests, bool f
                                     .limit = m->limit[top]};
     sdm_panel_i8(rows + rests, n, wide, latent, (const int8_t *)m->head + weights, w->z_integers, w->ldz, w->z_scale,
                  fixed ? &integers : &numbers);
-    add_rest(rows, rests, n, w->c + at, ldc);
+    for (size_t i = at; i < at + n && rests; i++) w->c[i] += w->c[rows * ldc + i];
 }
 
 void sdm_pod_decode(const pod_network *m, const sdm_grid *grid, size_t rows, size_t with_mean, bool smooth, bool stream,

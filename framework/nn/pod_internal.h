@@ -106,9 +106,9 @@ static inline size_t sdm_pod_head_wide(const pod_network *m)
 void sdm_pod_quantise_rows(size_t rows, size_t n, const float *y, size_t ldy, const float *factor, int limit,
                            int16_t *x, size_t ldx, float *scale);
 
-/* rest[n] = what x[n], with its scale, leaves of y times factor (NULL: 1); returns its scale. work[n] may be y. */
-float sdm_pod_quantise_rest(size_t n, const float *y, const float *factor, int limit, const int16_t *x, float scale,
-                            float *work, int16_t *rest);
+/* As sdm_quantise_rest(), and zeros behind both rows. */
+void sdm_pod_quantise_rest(size_t n, const float *y, const float *factor, int limit, int16_t *x, float *scale,
+                           int16_t *rest, float *rest_scale);
 
 /* pod_latent.c: parameters to latent variables and back. Letters as in sdm/pod.h; D directions. */
 typedef struct pod_latent {

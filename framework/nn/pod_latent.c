@@ -33,13 +33,11 @@ void sdm_pod_quantise_rows(size_t rows, size_t n, const float *y, size_t ldy, co
     for (size_t r = 0; r < rows; r++) x[r * ldx + n] = 0;
 }
 
-float sdm_pod_quantise_rest(size_t n, const float *y, const float *factor, int limit, const int16_t *x, float scale,
-                            float *work, int16_t *rest)
+void sdm_pod_quantise_rest(size_t n, const float *y, const float *factor, int limit, int16_t *x, float *scale,
+                           int16_t *rest, float *rest_scale)
 {
-    float rest_scale;
-    for (size_t i = 0; i < n; i++) work[i] = (factor ? y[i] * factor[i] : y[i]) - scale * (float)x[i];
-    sdm_pod_quantise_rows(1, n, work, 0, NULL, limit, rest, 0, &rest_scale);
-    return rest_scale;
+    sdm_quantise_rest(n, y, factor, limit, x, scale, rest, rest_scale);
+    x[n] = rest[n] = 0;
 }
 
 size_t sdm_pod_latent_carve(const pod_network *m, size_t rows, float *memory, pod_latent *w)
@@ -96,8 +94,8 @@ static void along(const pod_network *m, size_t n_directions, const double *direc
 }
 
 /* out[rows][width] = a layer's products with in[rows][stride], without its bias. smooth: what rounding leaves of the first row is added to
-   it, by way of a row behind the last. `in` may change. */
-static void layer_products(const pod_network *m, size_t layer, size_t rows, bool smooth, float *in, size_t stride,
+   it, by way of a row behind the last. */
+static void layer_products(const pod_network *m, size_t layer, size_t rows, bool smooth, const float *in, size_t stride,
                            const pod_latent *w, float *out)
 {
     const size_t n = sdm_pod_layer_inputs(&m->arch, layer), width = sdm_panel_outputs(m->arch.width);
@@ -109,8 +107,7 @@ static void layer_products(const pod_network *m, size_t layer, size_t rows, bool
     const int limit = m->layer_limit[layer];
     sdm_pod_quantise_rows(rows, n, in, stride, NULL, limit, w->integers, w->ld, w->scale);
     if (smooth)
-        w->scale[rows] =
-            sdm_pod_quantise_rest(n, in, NULL, limit, w->integers, w->scale[0], in, w->integers + rows * w->ld);
+        sdm_pod_quantise_rest(n, in, NULL, limit, w->integers, w->scale, w->integers + rows * w->ld, w->scale + rows);
     sdm_panel_i8(rows + smooth, m->arch.width, n, n, m->layer[layer], w->integers, w->ld, w->scale, &to);
     for (size_t o = 0; o < width && smooth; o++) out[o] += out[rows * width + o];
     for (size_t r = 0; r < rows; r++)

@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "sdm/builtin_shapes.h"
+#include "sdm/rng.h"
 #include "sdm/runtime.h"
 #include "sdm/train.h"
 
@@ -81,6 +82,46 @@ static void agrees_with_the_surface(void **state)
     sdm_model_free(m);
 }
 
+// what sdm/runtime.h says of weights as bytes: the map alone is rounded more coarsely than that with derivatives, derivatives are near those
+// in floats
+static void rounding_is_small(void **state)
+{
+    (void)state;
+    char path[128];
+    sdm_error e = {0};
+    sdm_model *m;
+    snprintf(path, sizeof path, "%s/model.sdm", folder);
+    if (sdm_model_open(path, &m, &e)) fail_msg("%s", e.text);
+    const sdm_model_info *info = sdm_model_get_info(m);
+    const size_t n = sdm_grid_count(&info->grid), n_params = info->n_params;
+    float *map = malloc(n * sizeof *map), *alone = malloc(n * sizeof *alone), *j = malloc(n * n_params * sizeof *j),
+          *adjoint = calloc(n, sizeof *adjoint);
+    assert_true(map && alone && j && adjoint && n_params == 2);
+    for (uint64_t k = 0; k < 20; k++) {
+        double p[2], gradient[2], most[2] = {0}, wrong = 0, size;
+        for (size_t i = 0; i < n_params; i++)
+            p[i] = info->params[i].min + sdm_rng_uniform(9, k, i) * (info->params[i].max - info->params[i].min);
+        if (sdm_generate(m, p, NULL, alone, NULL, &e)) fail_msg("%s", e.text);
+        if (sdm_generate_jacobian(m, p, NULL, map, j, NULL, &e)) fail_msg("%s", e.text);
+        for (size_t v = 0; v < n; v++) wrong = fmax(wrong, fabs((double)map[v] - alone[v]));
+        const double square = distance(map, alone, n, &size);
+        assert_true(square > 0 && square < 3e-4 && wrong < 2e-3);
+        for (size_t i = 0; i < n_params; i++)
+            for (size_t v = 0; v < n; v++) most[i] = fmax(most[i], fabsf(j[i * n + v]));
+        for (size_t v = k; v < n; v += 37) {
+            adjoint[v] = 1;
+            if (sdm_generate_vjp(m, p, adjoint, NULL, gradient, NULL, &e)) fail_msg("%s", e.text);
+            adjoint[v] = 0;
+            for (size_t i = 0; i < n_params; i++) assert_true(fabs(gradient[i] - j[i * n + v]) < 1.5e-3 * most[i]);
+        }
+    }
+    free(adjoint);
+    free(j);
+    free(alone);
+    free(map);
+    sdm_model_free(m);
+}
+
 static int set_up(void **state)
 {
     (void)state;
@@ -104,6 +145,6 @@ static int tear_down(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(agrees_with_the_surface)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(agrees_with_the_surface), cmocka_unit_test(rounding_is_small)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

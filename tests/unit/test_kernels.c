@@ -184,13 +184,15 @@ static void bytes(void **state)
     enum { MOST = 160, ROWS = 13, LINE = 7, APART = MOST / 4 * LINE };
     int16_t *w, *x;
     int8_t *packed;
-    float *y, *apart, *back, dx[128], scale[ROWS], *mean = random_floats(MOST, 8), *factor = random_floats(MOST, 9);
+    float *y, *apart, *with_rest, *back, dx[128], scale[ROWS], *mean = random_floats(MOST, 8),
+                                                               *factor = random_floats(MOST, 9);
     static int16_t integers[ROWS * MOST];
     assert_int_equal(SDM_ALLOC(&w, MOST * 128, "t", NULL), SDM_OK);
     assert_int_equal(SDM_ALLOC(&x, ROWS * 128, "t", NULL), SDM_OK);
     assert_int_equal(SDM_ALLOC(&packed, sdm_panel_i8_count(MOST, 128, 128), "t", NULL), SDM_OK);
     assert_int_equal(SDM_ALLOC(&y, ROWS * MOST, "t", NULL), SDM_OK);
     assert_int_equal(SDM_ALLOC(&apart, ROWS * APART, "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&with_rest, ROWS * MOST, "t", NULL), SDM_OK);
     back = random_floats(MOST, 3);
     assert_int_equal(sdm_panel_i8_count(150, 3, 37), 160 * (4 + 38));
     assert_true(sdm_panel_i8_count(SIZE_MAX / 2, 0, 37) == SIZE_MAX && sdm_panel_i8_count(1, 2, 1) == SIZE_MAX);
@@ -227,11 +229,24 @@ static void bytes(void **state)
                     const size_t n_mean = rows / 2;
                     const sdm_panel_out plain = {.y = y, .ld = MOST, .line = SDM_PANEL_ROW},
                                         added = {.y = apart, .ld = APART, .line = LINE, .mean = mean, .n_mean = n_mean},
-                                        again = {.integers = integers, .ld = MOST, .factor = factor, .limit = 1234};
+                                        again = {.integers = integers, .ld = MOST, .factor = factor, .limit = 1234},
+                                        whole = {.y = with_rest, .ld = MOST, .line = SDM_PANEL_ROW, .rest = true};
                     for (size_t o = 0; o < outputs; o++) factor[o] = (o % 3 ? 3e-4f : -1e-6f) / (float)k;
                     sdm_panel_i8(rows, outputs, wide, k, packed, x, 128, scale, &plain);
                     sdm_panel_i8(rows, outputs, wide, k, packed, x, 128, scale, &added);
                     sdm_panel_i8(rows, outputs, wide, k, packed, x, 128, scale, &again);
+                    if (rows > 1 &&
+                        rows <= 6) { // the last row added to the first, the others as they were, nothing behind
+                        float *const behind = with_rest + (rows - 1) * MOST, *const last = y + (rows - 1) * MOST;
+                        for (int o = 0; o < MOST; o++) behind[o] = 77;
+                        sdm_panel_i8(rows, outputs, wide, k, packed, x, 128, scale, &whole);
+                        for (size_t o = 0; o < outputs; o++)
+                            assert_true(fabsf(with_rest[o] - (y[o] + last[o])) <=
+                                        1.2e-7f * (fabsf(y[o]) + fabsf(last[o])));
+                        for (size_t r = 1; r + 1 < rows; r++)
+                            assert_memory_equal(with_rest + r * MOST, y + r * MOST, outputs * sizeof *y);
+                        for (int o = 0; o < MOST; o++) assert_true(behind[o] == 77);
+                    }
                     for (size_t r = 0; r < rows; r++)
                         for (size_t o = 0; o < outputs; o++) {
                             int64_t s = 0;
@@ -264,6 +279,7 @@ static void bytes(void **state)
     sdm_free(packed);
     sdm_free(y);
     sdm_free(apart);
+    sdm_free(with_rest);
     sdm_free(back);
     sdm_free(mean);
     sdm_free(factor);
@@ -317,9 +333,29 @@ static void quantisation(void **state)
                         assert_int_equal(x[r * LDX + n], 77);
                     }
                 }
+        for (size_t n = 1; n <= MOST; n++) // two rows: as near as floats are; the first is the row alone
+            for (int limit = 1; limit < 32768; limit += 8191)
+                for (int plain = 0; plain < 2; plain++) {
+                    const float *const f = plain ? NULL : factor;
+                    int16_t alone[MOST], rest[MOST + 1];
+                    float s, rest_scale;
+                    x[n] = rest[n] = 77;
+                    sdm_quantise_rest(n, y, f, limit, x, &scale[0], rest, &rest_scale);
+                    sdm_quantise(1, n, y, 0, f, limit, alone, 0, &s);
+                    assert_true(s == scale[0] && x[n] == 77 && rest[n] == 77);
+                    assert_memory_equal(x, alone, n * sizeof *x);
+                    for (size_t i = 0; i < n; i++) {
+                        const double want = (double)y[i] * (plain ? 1 : factor[i]);
+                        const double unit = fmax(0.5001 * rest_scale, 2.5e-7 * limit * scale[0]);
+                        assert_true(abs(rest[i]) <= limit);
+                        assert_true(fabs((double)x[i] * scale[0] + (double)rest[i] * rest_scale - want) <= unit);
+                    }
+                }
         for (int i = 0; i < MOST; i++) changed[i] = i % 2 ? 1e-40f : 0;
         sdm_quantise(1, MOST, changed, 0, ones, 32767, x, 0, scale);
         assert_true(scale[0] == 0 && x[3] == 0);
+        sdm_quantise_rest(MOST, changed, ones, 32767, x, &scale[0], x + LDX, &scale[1]);
+        assert_true(scale[0] == 0 && scale[1] == 0 && x[3] == 0 && x[LDX + 3] == 0);
         const float wrong[] = {NAN, -NAN, INFINITY, -INFINITY};
         for (int k = 0; k < 4; k++)
             for (int at = 0; at < MOST; at += 23) {
@@ -328,6 +364,8 @@ static void quantisation(void **state)
                 sdm_quantise(1, MOST, changed, 0, ones, 32767, x, 0, scale);
                 assert_true(isnan(scale[0]));
                 assert_int_equal(x[1], 0);
+                sdm_quantise_rest(MOST, changed, ones, 32767, x, &scale[0], x + LDX, &scale[1]);
+                assert_true(isnan(scale[0]) && isnan(scale[1]) && x[1] == 0 && x[LDX + 1] == 0);
             }
     }
     sdm_kernels_select(-1);

@@ -11,6 +11,7 @@
 
 #include <cmocka.h>
 
+#include "kernels_table.h"
 #include "sdm/container.h"
 #include "sdm/memory.h"
 #include "sdm/pod.h"
@@ -444,6 +445,53 @@ static void jacobian_of_bytes(void **state)
     for (size_t levels = 1; levels <= 3; levels++) jacobian_of_bytes_with(levels);
 }
 
+// of bytes: against central differences of the map that comes with it, which is smooth, and voxel by voxel against the transpose, which is
+// in floats; the inputs that are rounded are those of the tangents
+static void jacobian_of_bytes_is_the_slope(void **state)
+{
+    (void)state;
+    for (n_levels = 1; n_levels <= 3; n_levels++) {
+        toy t;
+        make(&t, SDM_POD_I8, 0);
+        sdm_model *m = open_toy(&t);
+        void *scratch, *reverse;
+        static float map[4][315], jacobian[P * 315], unused[P * 315], adjoint[315];
+        double p[P], gradient[P];
+        assert_int_equal(sdm_alloc(&scratch, sdm_model_jacobian_scratch_bytes(m), 1, "scratch", NULL), 0);
+        assert_int_equal(sdm_alloc(&reverse, sdm_model_vjp_scratch_bytes(m), 1, "scratch", NULL), 0);
+        for (uint64_t trial = 0; trial < 3; trial++) {
+            double most[P] = {0};
+            random_params(trial, p);
+            sdm_model_jacobian(m, p, map[0], jacobian, scratch);
+            for (int i = 0; i < P; i++)
+                for (int v = 0; v < 315; v++) most[i] = fmax(most[i], fabsf(jacobian[i * 315 + v]));
+            for (int i = 0; i < P; i++) {
+                const double h = 2e-3 * (t.params[i].max - t.params[i].min), at = p[i];
+                for (int k = 0; k < 4; k++) {
+                    p[i] = at + (k < 2 ? k - 2 : k - 1) * h;
+                    sdm_model_jacobian(m, p, map[k], unused, scratch);
+                }
+                p[i] = at;
+                for (int v = 0; v < 315; v++) {
+                    const double slope = (map[0][v] - 8.0 * map[1][v] + 8.0 * map[2][v] - map[3][v]) / (12 * h);
+                    assert_true(fabs(slope - jacobian[i * 315 + v]) < 2e-3 * most[i]);
+                }
+            }
+            for (int v = 0; v < 315; v++) {
+                memset(adjoint, 0, sizeof adjoint);
+                adjoint[v] = 1;
+                sdm_model_vjp(m, p, adjoint, gradient, reverse);
+                for (int i = 0; i < P; i++) assert_true(fabs(gradient[i] - jacobian[i * 315 + v]) < 2e-3 * most[i]);
+            }
+        }
+        sdm_free(reverse);
+        sdm_free(scratch);
+        sdm_model_free(m);
+        sdm_free(t.memory);
+    }
+    n_levels = 3;
+}
+
 // a map that comes with its derivatives changes smoothly with the parameters, else a fit could not end
 static void maps_with_derivatives_are_smooth(void **state)
 {
@@ -664,6 +712,7 @@ int main(void)
         cmocka_unit_test(many_maps),
         cmocka_unit_test(jacobian_is_the_slope),
         cmocka_unit_test(jacobian_of_bytes),
+        cmocka_unit_test(jacobian_of_bytes_is_the_slope),
         cmocka_unit_test(bytes_keep_what_is_not_finite),
         cmocka_unit_test(maps_with_derivatives_are_smooth),
         cmocka_unit_test(file_keeps_everything),
@@ -672,6 +721,10 @@ int main(void)
         cmocka_unit_test(every_allocation_may_fail),
     };
     int failed = 0;
-    for (block = 2; block <= 4; block += 2) failed += cmocka_run_group_tests(tests, NULL, NULL);
+    for (int level = sdm_kernels_select(-1); level >= 0; level--) {
+        sdm_kernels_select(level);
+        for (block = 2; block <= 4; block += 2)
+            failed += cmocka_run_group_tests_name(sdm_kernels_name(), tests, NULL, NULL);
+    }
     return failed;
 }

@@ -69,6 +69,10 @@ SDM_API void sdm_panel_pack_i8(size_t outputs, size_t n_wide, size_t k, const in
 SDM_API void sdm_quantise(size_t rows, size_t n, const float *y, size_t ldy, const float *factor, int limit, int16_t *x,
                           size_t ldx, float *scale);
 
+/* One row, and a second of what rounding leaves of it: x times *scale plus rest times *rest_scale is as near as floats are. */
+SDM_API void sdm_quantise_rest(size_t n, const float *y, const float *factor, int limit, int16_t *x, float *scale,
+                               int16_t *rest, float *rest_scale);
+
 /* What becomes of the sums of sdm_panel_i8(), times their scales: numbers, or integers for the next product. */
 #define SDM_PANEL_ROW 4
 typedef struct sdm_panel_out {
@@ -79,6 +83,8 @@ typedef struct sdm_panel_out {
     size_t ld, line;
     const float *mean; /* added to the first n_mean rows of y */
     size_t n_mean;
+    bool
+        rest; /* of y, B: 2 .. 6: the last row is added to the first, and has no place of its own; see sdm_quantise_rest() */
     const float *factor; /* as many as outputs, filled up */
     int limit;
 } sdm_panel_out;

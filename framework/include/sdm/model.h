@@ -82,8 +82,8 @@ SDM_API size_t sdm_model_jvp_scratch_bytes(const sdm_model *m);
 SDM_API void sdm_model_jvp(const sdm_model *m, const double *params, const double *direction, float *values,
                            float *tangent, void *scratch);
 
-/* gradient[n_params] = sum over voxels of adjoint[nz][ny][nx] times d value / d parameter, by reverse mode, at the cost of about one map
-   whatever the number of parameters. One thread, no allocation; scratch as above. [any thread] */
+/* gradient[n_params] = sum over voxels of adjoint[nz][ny][nx] times d value / d parameter, by reverse mode, at the cost of a few
+   maps whatever the number of parameters. One thread, no allocation; scratch as above. [any thread] */
 SDM_API size_t sdm_model_vjp_scratch_bytes(const sdm_model *m);
 SDM_API void sdm_model_vjp(const sdm_model *m, const double *params, const float *adjoint, double *gradient,
                            void *scratch);

@@ -83,8 +83,8 @@ typedef struct sdm_panel_out {
     size_t ld, line;
     const float *mean; /* added to the first n_mean rows of y */
     size_t n_mean;
-    bool
-        rest; /* of y, B: 2 .. 6: the last row is added to the first, and has no place of its own; see sdm_quantise_rest() */
+    /* of y, B: 2 .. 6: the last row is added to the first, and has no place of its own; see sdm_quantise_rest() */
+    bool rest;
     const float *factor; /* as many as outputs, filled up */
     int limit;
 } sdm_panel_out;

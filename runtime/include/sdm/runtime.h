@@ -62,9 +62,9 @@ SDM_API sdm_status sdm_generate_batch(const sdm_model *m, const double *params, 
 /* Map and derivatives: jacobian[n_params][nz][ny][nx], mm per unit; of the network, or by sdm_exact_shape_jacobian() where the exact
    engine makes the map. At clamped parameters they are the network's at the end of the range. A `pod` network takes less time for it than
    for n_params + 1 calls of sdm_generate().
-   The map changes smoothly with the parameters. Where weights are bytes it differs from that of sdm_generate() by rounding: of cochleas 2e-4 mm
-   (root mean square), 2e-3 mm at most; and rounding adds to a derivative, of the largest one by the same parameter, 2e-4 (root mean
-   square), 1.5e-3 at most. Errors as above, SDM_E_PLUGIN as there. [any thread] */
+   The map changes smoothly with the parameters. Where weights are bytes it differs from that of sdm_generate() by rounding: of
+   cochleas 2e-4 mm (root mean square), 2e-3 mm at most; and rounding adds to a derivative, of the largest one by the same
+   parameter, 2e-4 (root mean square), 1.5e-3 at most. Errors as above, SDM_E_PLUGIN as there. [any thread] */
 SDM_API sdm_status sdm_generate_jacobian(const sdm_model *m, const double *params, const sdm_generate_opts *opts,
                                          float *values, float *jacobian, sdm_result *result, sdm_error *err);
 
@@ -75,7 +75,8 @@ SDM_API sdm_status sdm_generate_jvp(const sdm_model *m, const double *params, co
                                     sdm_error *err);
 
 /* gradient[n_params] = J^T adjoint[nz][ny][nx]: the derivative of any function of the map from its derivative by the voxels, at the cost
-   of a few maps whatever the number of parameters. There is no map, so `check` and `max_error_mm` do nothing; otherwise as sdm_generate_jacobian(). [any thread] */
+   of a few maps whatever the number of parameters. There is no map, so `check` and `max_error_mm` do nothing; otherwise as
+   sdm_generate_jacobian(). [any thread] */
 SDM_API sdm_status sdm_generate_vjp(const sdm_model *m, const double *params, const float *adjoint,
                                     const sdm_generate_opts *opts, double *gradient, sdm_result *result,
                                     sdm_error *err);

@@ -6,6 +6,7 @@
 
 #include "bench.h"
 #include "evaluate.h"
+#include "sdm/clock.h"
 #include "sdm/config.h"
 #include "sdm/kernels.h"
 #include "sdm/memory.h"
@@ -41,10 +42,10 @@ static void run_vjp(work *w) { sdm_model_vjp(w->m, w->p, w->values, w->gradient,
 static sdm_status time_call(work *w, void (*call)(work *), double *ms, sdm_error *err)
 {
     double each[RUNS];
-    const double begin = cli_clock();
+    const double begin = sdm_clock();
     size_t n = 0;
     call(w);
-    while (n < RUNS && (n < LEAST || cli_clock() - begin < ENOUGH_S)) {
+    while (n < RUNS && (n < LEAST || sdm_clock() - begin < ENOUGH_S)) {
         const double start = cli_thread_clock();
         call(w);
         each[n++] = 1e3 * (cli_thread_clock() - start);
@@ -84,12 +85,12 @@ static sdm_status time_threads(const sdm_model *m, uint64_t seed, int threads, n
     double p[SDM_MAX_PARAMS], best = INFINITY;
     float *values = NULL;
     sdm_status s = SDM_ALLOC(&values, sdm_grid_count(&sdm_model_get_info(m)->grid), "map to time", err);
-    const double begin = cli_clock();
+    const double begin = sdm_clock();
     cli_eval_params(m, seed, 0, p);
-    for (size_t i = 0; i < RUNS && !s && (i < LEAST || cli_clock() - begin < ENOUGH_S); i++) {
-        const double start = cli_clock();
+    for (size_t i = 0; i < RUNS && !s && (i < LEAST || sdm_clock() - begin < ENOUGH_S); i++) {
+        const double start = sdm_clock();
         s = sdm_generate(m, p, &opts, values, NULL, err);
-        best = fmin(best, 1e3 * (cli_clock() - start));
+        best = fmin(best, 1e3 * (sdm_clock() - start));
     }
     t->ms_threads = best;
     t->threads = threads;

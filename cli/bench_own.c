@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "bench.h"
+#include "sdm/clock.h"
 #include "sdm/memory.h"
 #include "sdm/methods.h"
 #include "terminal.h"
@@ -17,13 +18,13 @@ static sdm_status run_method(const bench_case *c, const sdm_method *m, int threa
 {
     const sdm_method_opts opts = {.exact = {.n_threads = threads, .cancelled = cli_interrupted},
                                   .band_mm = isfinite(c->band_mm) ? c->band_mm : 0};
-    const double begin = cli_clock();
+    const double begin = sdm_clock();
     double best = INFINITY;
-    for (size_t i = 0; i < c->repeat && (i == 0 || cli_clock() - begin < ENOUGH_S); i++) {
+    for (size_t i = 0; i < c->repeat && (i == 0 || sdm_clock() - begin < ENOUGH_S); i++) {
         const long before = i == 0 ? bench_peak_start() : -1;
-        const double start = threads == 1 ? cli_thread_clock() : cli_clock();
+        const double start = threads == 1 ? cli_thread_clock() : sdm_clock();
         const sdm_status s = m->map(&c->mesh, &c->grid, &opts, values, report, err);
-        const double ms = 1e3 * ((threads == 1 ? cli_thread_clock() : cli_clock()) - start);
+        const double ms = 1e3 * ((threads == 1 ? cli_thread_clock() : sdm_clock()) - start);
         if (s) return s;
         if (i == 0) row->peak_mb = bench_peak_mb(before);
         if (!(ms < best)) continue;

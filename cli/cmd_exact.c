@@ -7,6 +7,7 @@
 #include "output.h"
 #include "progress.h"
 #include "sdm/checksum.h"
+#include "sdm/clock.h"
 #include "sdm/exact.h"
 #include "sdm/memory.h"
 #include "sdm/methods.h"
@@ -39,9 +40,9 @@ static sdm_status mesh_of_shape(job *j, sdm_error *err)
     const sdm_param *params = s ? NULL : sdm_instance_params(shape, &n);
     if (!s) s = SDM_ALLOC(&values, n, "parameters", err);
     if (!s) s = cli_read_params(params, n, &j->args->params, values, err);
-    const double start = cli_clock();
+    const double start = sdm_clock();
     if (!s) s = sdm_instance_mesh(shape, values, &j->mesh, err);
-    j->ms_mesh = 1e3 * (cli_clock() - start);
+    j->ms_mesh = 1e3 * (sdm_clock() - start);
     if (!s) s = cli_layers_velocity(&j->layers, j->args, shape, values, j->mesh.n_vert, err);
     if (!s) cli_add_params(params, n, values, &j->params);
     sdm_free(values);
@@ -82,17 +83,17 @@ static sdm_status run_engine(job *j, sdm_error *err)
                                  .n_threads = (int)j->args->threads,
                                  .cancelled = cli_interrupted};
     sdm_exact *engine = NULL;
-    const double start = cli_clock();
+    const double start = sdm_clock();
     sdm_status s = sdm_exact_create(&j->mesh, &opts, &engine, err);
-    const double built = cli_clock();
+    const double built = sdm_clock();
     if (s) return s;
     j->report = *sdm_exact_get_report(engine);
     s = cli_fit_grid(j->args, j->report.audit.min, j->report.audit.max, &j->grid, err);
     if (!s) s = SDM_ALLOC(&j->values, sdm_grid_count(&j->grid), "distance map", err);
-    const double query = cli_clock();
+    const double query = sdm_clock();
     if (!s) s = cli_layers_map(&j->layers, j->args, engine, &j->grid, j->values, err);
     j->ms_build = 1e3 * (built - start);
-    j->ms_query = 1e3 * (cli_clock() - query);
+    j->ms_query = 1e3 * (sdm_clock() - query);
     if (!s && j->args->certify) s = sdm_exact_certify(engine, &j->grid, j->values, &j->certificate, err);
     sdm_exact_free(engine);
     return s;

@@ -6,6 +6,7 @@
 
 #include "commands.h"
 #include "experiment_fit.h"
+#include "sdm/clock.h"
 #include "sdm/file.h"
 #include "sdm/memory.h"
 #include "setup.h"
@@ -147,7 +148,7 @@ static sdm_status check_rows(const experiment_run *run, sdm_error *err)
 static sdm_status run_experiment(const cli_args *args, const sdm_experiment *e, const sdm_registry *registry,
                                  sdm_error *err)
 {
-    experiment_run run = {.args = args, .e = e, .registry = registry, .start = cli_clock()};
+    experiment_run run = {.args = args, .e = e, .registry = registry, .start = sdm_clock()};
     run.folder = args->out ? args->out : e->experiment.folder;
     if (strlen(run.folder) >= SDM_PATH_TEXT_MAX)
         return sdm_fail(err, SDM_E_ARG, "--out '%.100s...': the name is too long", run.folder);

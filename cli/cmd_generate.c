@@ -8,6 +8,7 @@
 #include "output.h"
 #include "progress.h"
 #include "sdm/checksum.h"
+#include "sdm/clock.h"
 #include "sdm/config.h"
 #include "sdm/image.h"
 #include "sdm/map.h"
@@ -218,11 +219,11 @@ static sdm_status make_row(job *j, size_t row, sdm_error *err)
                                     .max_error_of = error_of(args)};
     double *p = j->rows + row * j->info->n_params;
     sdm_result result = {0};
-    const double start = cli_clock();
+    const double start = sdm_clock();
     const sdm_status s = j->jacobian ? sdm_generate_jacobian(j->model, p, &opts, j->values, j->jacobian, &result, err)
                                      : sdm_generate(j->model, p, &opts, j->values, &result, err);
     if (s) return args->rows ? sdm_fail_in(err, s, "%s: row %zu", args->rows, row + 1) : s;
-    j->ms += 1e3 * (cli_clock() - start);
+    j->ms += 1e3 * (sdm_clock() - start);
     // what is told of the map is what it was made from
     for (size_t i = 0; i < j->info->n_params && result.clamped; i++)
         p[i] = fmin(fmax(p[i], j->params[i].min), j->params[i].max);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "evaluate.h"
+#include "sdm/clock.h"
 #include "sdm/config.h"
 #include "sdm/memory.h"
 #include "sdm/methods.h"
@@ -39,9 +40,9 @@ static sdm_status time_network(const sdm_model *m, uint64_t seed, bool fastest, 
 {
     const sdm_generate_opts opts = {.policy = SDM_RANGE_REFUSE, .n_threads = 1};
     double p[SDM_MAX_PARAMS], ms[N_NETWORK];
-    const double begin = cli_clock();
+    const double begin = sdm_clock();
     size_t n = 0;
-    for (size_t i = 0; i <= N_NETWORK && (n < N_LEAST || cli_clock() - begin < ENOUGH_S); i++) {
+    for (size_t i = 0; i <= N_NETWORK && (n < N_LEAST || sdm_clock() - begin < ENOUGH_S); i++) {
         cli_eval_params(m, seed, fastest ? 0 : i, p);
         const double start = cli_thread_clock();
         sdm_status s = sdm_generate(m, p, &opts, values, NULL, err);
@@ -67,13 +68,13 @@ static sdm_status time_batch(const sdm_model *m, uint64_t seed, bool fastest, si
     const sdm_generate_opts opts = {.policy = SDM_RANGE_REFUSE, .n_threads = 1};
     const size_t n_params = sdm_model_get_info(m)->n_params;
     double p[BATCH * SDM_MAX_PARAMS], ms[N_BATCHES];
-    const double begin = cli_clock();
+    const double begin = sdm_clock();
     float *values = NULL;
     size_t n = 0;
     sdm_status s = sdm_alloc((void **)&values, sdm_grid_count(&sdm_model_get_info(m)->grid), size * sizeof *values,
                              "batch of maps to time", err);
     for (size_t i = 0; i < size; i++) cli_eval_params(m, seed, i, p + i * n_params);
-    for (size_t k = 0; k <= N_BATCHES && !s && (n < 1 || cli_clock() - begin < ENOUGH_S); k++) {
+    for (size_t k = 0; k <= N_BATCHES && !s && (n < 1 || sdm_clock() - begin < ENOUGH_S); k++) {
         const double start = cli_thread_clock();
         s = sdm_generate_batch(m, p, size, &opts, values, NULL, err);
         if (!s) s = cli_check_interrupt(err);

@@ -34,7 +34,7 @@ typedef struct experiment_run {
     const sdm_registry *registry;
     const char *folder;
     experiment_result *results; /* [e->n_rows] */
-    double start;               /* cli_clock() */
+    double start;               /* sdm_clock() */
 } experiment_run;
 
 /* A row's training configuration with its shape, ready to be measured. */

@@ -5,6 +5,7 @@
 
 #include "bench.h"
 #include "experiment.h"
+#include "sdm/clock.h"
 #include "sdm/memory.h"
 #include "sdm/methods.h"
 #include "terminal.h"
@@ -54,9 +55,9 @@ static sdm_status time_method(const experiment_run *run, const experiment_job *j
                               sdm_error *err)
 {
     double p[SDM_MAX_PARAMS], ms[MOST_TIMED];
-    const double begin = cli_clock();
+    const double begin = sdm_clock();
     size_t n = 0;
-    while (n < MOST_TIMED && (n == 0 || cli_clock() - begin < ENOUGH_S)) {
+    while (n < MOST_TIMED && (n == 0 || sdm_clock() - begin < ENOUGH_S)) {
         cli_maker_params(&job->maker, run->e->experiment.seed, n, p);
         const double start = cli_thread_clock();
         sdm_status s = job->maker.make(job->maker.user, p, values, err);

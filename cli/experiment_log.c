@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "experiment.h"
+#include "sdm/clock.h"
 #include "sdm/threads.h"
 #include "terminal.h"
 
@@ -55,7 +56,7 @@ void experiment_log(const experiment_run *run, const char *fmt, ...)
     cli_notice("%s", text);
     FILE *f = open_log(run);
     if (!f) return;
-    fprintf(f, "%9.1f s  %s\n", cli_clock() - run->start, text);
+    fprintf(f, "%9.1f s  %s\n", sdm_clock() - run->start, text);
     fclose(f);
 }
 

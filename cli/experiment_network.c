@@ -5,6 +5,7 @@
 
 #include "bench.h"
 #include "experiment.h"
+#include "sdm/clock.h"
 #include "sdm/memory.h"
 #include "sdm/train.h"
 #include "terminal.h"
@@ -17,7 +18,7 @@
 static sdm_status check_budget(const experiment_run *run, const experiment_job *job, sdm_error *err)
 {
     const double limit = run->e->experiment.minutes, needed = job->config->train.minutes,
-                 used = (cli_clock() - run->start) / 60;
+                 used = (sdm_clock() - run->start) / 60;
     if (!(limit > 0) || used + needed <= limit) return SDM_OK;
     return sdm_fail(err, SDM_E_QUALITY,
                     "not trained: %.3g of %.3g minutes are used, its training takes %.3g (experiment.minutes)", used,

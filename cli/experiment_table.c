@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "experiment_fit.h"
+#include "sdm/clock.h"
 #include "sdm/file.h"
 #include "terminal.h"
 
@@ -209,7 +210,7 @@ static void add_json(const experiment_run *run, sdm_json *j)
     sdm_json_text(j, "version", SDM_VERSION_TEXT);
     sdm_json_text(j, "machine", machine);
     sdm_json_uint(j, "seed", run->e->experiment.seed);
-    sdm_json_real(j, "seconds", cli_clock() - run->start);
+    sdm_json_real(j, "seconds", sdm_clock() - run->start);
     sdm_json_open(j, "rows", '[');
     for (size_t i = 0; i < run->e->n_rows; i++) add_json_row(run, &run->results[i], j);
     sdm_json_close(j, ']');

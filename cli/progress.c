@@ -6,6 +6,7 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include "sdm/clock.h"
 #include "terminal.h"
 
 enum { MIN_CELLS = 6, MAX_CELLS = 24, LINE_MAX_BYTES = 512 };
@@ -15,7 +16,7 @@ void cli_progress_start(cli_progress *p)
     p->terminal = cli_has_terminal();
     p->drawn = false;
     p->interval = p->terminal ? 0.1 : 10.0;
-    p->last = cli_clock() - (p->terminal ? p->interval : 0.0);
+    p->last = sdm_clock() - (p->terminal ? p->interval : 0.0);
 }
 
 static size_t terminal_width(void)
@@ -36,7 +37,7 @@ static void draw_bar(char bar[MAX_CELLS + 1], double fraction, size_t left)
 
 void cli_progress_show(cli_progress *p, const char *title, double fraction, const char *text)
 {
-    const double now = cli_clock();
+    const double now = sdm_clock();
     if (cli_is_quiet() || now - p->last < p->interval) return;
     p->last = now;
     if (!(fraction >= 0)) fraction = 0;

@@ -130,13 +130,6 @@ sdm_status cli_print_json(sdm_json *json, sdm_error *err)
     return failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the JSON text") : SDM_OK;
 }
 
-double cli_clock(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 double cli_thread_clock(void)
 {
     struct timespec t;

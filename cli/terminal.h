@@ -46,8 +46,6 @@ sdm_status cli_check_interrupt(sdm_error *err);
 /* Prints a finished JSON text as one line on stdout and disposes of it. SDM_E_NOMEM. */
 sdm_status cli_print_json(sdm_json *json, sdm_error *err);
 
-/* Seconds of a clock that only goes forward. */
-double cli_clock(void);
 /* Seconds of this thread's processor: other programs on the machine do not count. */
 double cli_thread_clock(void);
 

@@ -7,19 +7,13 @@
 
 #include "export_model.h"
 #include "kind.h"
+#include "sdm/clock.h"
 #include "sdm/file.h"
 #include "sdm/memory.h"
 #include "sdm/text.h"
 #include "sdm/threads.h"
 
-static double monotonic(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
-double trainer_seconds(const trainer *t) { return monotonic() - t->started; }
+double trainer_seconds(const trainer *t) { return sdm_clock() - t->started; }
 
 bool trainer_by_time(const trainer *t) { return t->config->train.minutes > 0; }
 
@@ -368,7 +362,7 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
                  .shape = shape,
                  .folder = folder,
                  .kind = config->network.kind == SDM_NETWORK_POD ? &pod_train : &direct_train,
-                 .started = monotonic(),
+                 .started = sdm_clock(),
                  .loss = NAN,
                  .heldout_mse = NAN,
                  .metrics = &metrics};

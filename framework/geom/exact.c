@@ -3,11 +3,11 @@
 
 #include <float.h>
 #include <string.h>
-#include <time.h>
 
 #include "grid_distance.h"
 #include "layers.h"
 #include "parts.h"
+#include "sdm/clock.h"
 #include "sdm/memory.h"
 #include "sdm/threads.h"
 #include "sign.h"
@@ -33,13 +33,6 @@ const char *sdm_sign_method_name(sdm_sign_method m)
 {
     static const char *const names[] = {"auto", "crossings", "pseudonormal", "winding"};
     return (unsigned)m < sizeof names / sizeof *names ? names[m] : "unknown";
-}
-
-static double now_ms(void)
-{
-    struct timespec t;
-    (void)clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
 }
 
 static size_t mesh_bytes(const sdm_mesh *m) { return m->n_vert * 3 * sizeof *m->vert + m->n_tri * 3 * sizeof *m->tri; }
@@ -177,7 +170,7 @@ sdm_status sdm_exact_create(const sdm_mesh *mesh, const sdm_exact_opts *opts, sd
 {
     if (!mesh || !out) return sdm_fail(err, SDM_E_ARG, "exact engine without a mesh or a place for the result");
     *out = NULL;
-    const double start = now_ms();
+    const double start = sdm_clock();
     sdm_exact *e;
     sdm_status s = SDM_ALLOC(&e, 1, "exact engine", err);
     if (s) return s;
@@ -187,7 +180,7 @@ sdm_status sdm_exact_create(const sdm_mesh *mesh, const sdm_exact_opts *opts, sd
         sdm_exact_free(e);
         return s;
     }
-    e->report.ms_build = now_ms() - start;
+    e->report.ms_build = 1e3 * (sdm_clock() - start);
     *out = e;
     return SDM_OK;
 }

@@ -12,6 +12,7 @@
 #include "places.h"
 #include "posterior.h"
 #include "score.h"
+#include "sdm/clock.h"
 #include "sdm/memory.h"
 #include "search.h"
 
@@ -239,9 +240,9 @@ static sdm_status approach(fit_problem *p, fit_run *run, fit_ended *ended, sdm_e
 static sdm_status climb(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
     const sdm_fit_opts *o = p->opts;
-    const double blur = p->state.blur, from = sdm_fit_seconds();
+    const double blur = p->state.blur, from = sdm_clock();
     sdm_status s = sdm_fit_search(p, &out->turn, err);
-    out->seconds_search = sdm_fit_seconds() - from;
+    out->seconds_search = sdm_clock() - from;
     if (s) return s;
     p->state.blur = blur;
     p->state.l_ref = o->l_ref;
@@ -372,7 +373,7 @@ sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target, c
 {
     if (!out) return sdm_fail(err, SDM_E_ARG, "fit: a place for the result is needed");
     *out = (sdm_fit_result){0};
-    const double from = sdm_fit_seconds();
+    const double from = sdm_clock();
     fit_problem p = {.source = source, .target = target, .opts = opts, .noise_factor = 1};
     for (size_t k = 0; k < FIT_PARAMS_MAX + 6; k++) p.prior_weight[k] = 1;
     sdm_fit_target as_image;
@@ -399,7 +400,7 @@ sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target, c
     if (s && err && !*out->reason) snprintf(out->reason, sizeof out->reason, "%.255s", err->text);
     dispose_problem(&p);
     sdm_free(values);
-    out->seconds = sdm_fit_seconds() - from;
+    out->seconds = sdm_clock() - from;
     if (s && s != SDM_E_QUALITY) sdm_fit_dispose(out);
     return s;
 }

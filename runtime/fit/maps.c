@@ -8,18 +8,11 @@
 
 #include <math.h>
 #include <string.h>
-#include <time.h>
 
 #include "blur.h"
+#include "sdm/clock.h"
 #include "sdm/memory.h"
 #include "sdm/threads.h"
-
-double sdm_fit_seconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 static size_t fields_of(const fit_maps *m, bool derivatives)
 {
@@ -92,13 +85,13 @@ static sdm_status make_by_network(fit_maps *m, const double *params, sdm_error *
 sdm_status sdm_fit_maps_at(fit_maps *m, const double *params, bool derivatives, sdm_error *err)
 {
     if (m->cancelled && m->cancelled(m->user)) return sdm_fail(err, SDM_E_CANCELLED, "fit stopped on request");
-    const double from = sdm_fit_seconds();
+    const double from = sdm_clock();
     const bool outside = !m->exact && m->source->policy == SDM_RANGE_EXACT &&
                          outside_of_network(sdm_model_get_info(m->source->model), params);
     const bool exact = m->exact || outside;
     const sdm_status s = exact ? make_exact(m, params, derivatives, err) : make_by_network(m, params, err);
     *(exact ? &m->n_exact : &m->n_network) += 1;
-    *(exact ? &m->seconds_exact : &m->seconds_network) += sdm_fit_seconds() - from;
+    *(exact ? &m->seconds_exact : &m->seconds_network) += sdm_clock() - from;
     m->n_outside += outside;
     for (size_t v = 0; v < m->n_voxels && !s; v++) m->distance[v] = (double)m->values[v];
     return s;

@@ -35,7 +35,4 @@ sdm_status sdm_fit_maps_at(fit_maps *m, const double *params, bool derivatives, 
    at least least_blur, for distances 0 or more. */
 void sdm_fit_maps_pack(fit_maps *m, double blur, bool derivatives);
 
-/* Seconds of a clock that never goes back. */
-double sdm_fit_seconds(void);
-
 #endif

@@ -19,7 +19,7 @@ check() {
     function allow(part, list,   n, p, i) { n = split(list, p, " "); for (i = 1; i <= n; i++) allowed[part, p[i]] = 1 }
     function own(part, list,   n, p, i) { n = split(list, p, " "); for (i = 1; i <= n; i++) owner[p[i] ".h"] = part }
     BEGIN {
-        own("core", "checksum envelope export file grid json memory pose rng status text threads")
+        own("core", "checksum clock envelope export file grid json memory pose rng status text threads")
         own("config", "config experiment")
         own("geom", "mesh exact methods")
         own("nn", "model pod point_network sdmnn kernels container")

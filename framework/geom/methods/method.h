@@ -19,7 +19,7 @@ typedef struct sdm_run {
     sdm_exact *engine;       /* NULL for "naive" */
     const sdm_mesh *surface; /* of the engine */
     int n_threads;
-    double start; /* ms, of the stage that runs */
+    double start; /* sdm_clock(), of the stage that runs */
 } sdm_run;
 
 /* Checks the arguments, then prepares the surface with the engine. sdm_run_end() follows in every case. */

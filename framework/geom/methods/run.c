@@ -1,18 +1,11 @@
 /* What the methods share. */
 #include <stdatomic.h>
 #include <string.h>
-#include <time.h>
 
 #include "method.h"
+#include "sdm/clock.h"
 #include "sdm/memory.h"
 #include "sdm/threads.h"
-
-static double now_ms(void)
-{
-    struct timespec t;
-    (void)clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
-}
 
 sdm_status sdm_run_begin_plain(sdm_run *run, const sdm_mesh *mesh, const sdm_grid *grid, const sdm_method_opts *opts,
                                float *values, sdm_error *err)
@@ -27,7 +20,7 @@ sdm_status sdm_run_begin_plain(sdm_run *run, const sdm_mesh *mesh, const sdm_gri
     if (!(run->opts.max_error_mm >= 0 && run->opts.max_error_mm <= 1e100))
         return sdm_fail(err, SDM_E_ARG, "max_error_mm is %g, need a number of 0 or more", run->opts.max_error_mm);
     run->n_threads = sdm_threads(run->opts.exact.n_threads);
-    run->start = now_ms();
+    run->start = sdm_clock();
     return sdm_grid_check(grid, err);
 }
 
@@ -45,14 +38,14 @@ sdm_status sdm_run_begin(sdm_run *run, const sdm_mesh *mesh, const sdm_grid *gri
 
 void sdm_run_prepared(sdm_run *run)
 {
-    const double now = now_ms();
-    run->report.ms_prepare += now - run->start;
+    const double now = sdm_clock();
+    run->report.ms_prepare += 1e3 * (now - run->start);
     run->start = now;
 }
 
 sdm_status sdm_run_end(sdm_run *run, sdm_method_report *report, sdm_status s)
 {
-    run->report.ms_map = now_ms() - run->start;
+    run->report.ms_map = 1e3 * (sdm_clock() - run->start);
     sdm_exact_free(run->engine);
     if (!s && report) *report = run->report;
     return s;

@@ -17,11 +17,7 @@ static sdm_grid pose_grid(const sdm_grid *g, const sdm_pose *pose)
     sdm_grid posed = *g;
     double r[9];
     sdm_pose_matrix(pose, r);
-    for (int a = 0; a < 3; a++)
-        for (int b = 0; b < 3; b++) {
-            posed.dir[3 * a + b] = 0;
-            for (int k = 0; k < 3; k++) posed.dir[3 * a + b] += r[3 * a + k] * g->dir[3 * k + b];
-        }
+    sdm_rotation_product(r, g->dir, posed.dir);
     sdm_pose_apply(pose, g->origin, posed.origin);
     return posed;
 }

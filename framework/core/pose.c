@@ -3,11 +3,6 @@
 
 #include <math.h>
 
-// unit quaternion (w, x, y, z)
-typedef struct quaternion {
-    double w, v[3];
-} quaternion;
-
 static double length(const double v[3]) { return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
 static double sinc(double x) { return x == 0 ? 1 : sin(x) / x; }
@@ -77,30 +72,40 @@ sdm_pose sdm_pose_inverse(const sdm_pose *pose)
     return inverse;
 }
 
-static quaternion quaternion_of(const double rotation[3])
+static void quaternion_of(const double rotation[3], double q[4])
 {
     const double half = 0.5 * length(rotation), s = 0.5 * sinc(half);
-    return (quaternion){cos(half), {s * rotation[0], s * rotation[1], s * rotation[2]}};
+    q[0] = cos(half);
+    for (int i = 0; i < 3; i++) q[1 + i] = s * rotation[i];
 }
 
-// the shorter of the two turns that q and -q stand for
-static void vector_of(quaternion q, double rotation[3])
+void sdm_rotation_of_quaternion(const double q[4], double rotation[3])
 {
-    const double sine = length(q.v), sign = q.w < 0 ? -1 : 1;
-    const double scale = sine == 0 ? 2 * sign : 2 * sign * atan2(sine, fabs(q.w)) / sine;
-    for (int i = 0; i < 3; i++) rotation[i] = scale * q.v[i];
+    // the shorter of the two turns that q and -q stand for
+    const double sine = length(q + 1), sign = q[0] < 0 ? -1 : 1;
+    const double scale = sine == 0 ? 2 * sign : 2 * sign * atan2(sine, fabs(q[0])) / sine;
+    for (int i = 0; i < 3; i++) rotation[i] = scale * q[1 + i];
 }
 
 sdm_pose sdm_pose_compose(const sdm_pose *outer, const sdm_pose *inner)
 {
-    const quaternion a = quaternion_of(outer->rotation), b = quaternion_of(inner->rotation);
-    quaternion q = {.w = a.w * b.w - (a.v[0] * b.v[0] + a.v[1] * b.v[1] + a.v[2] * b.v[2])};
-    cross(a.v, b.v, q.v);
-    for (int i = 0; i < 3; i++) q.v[i] += a.w * b.v[i] + b.w * a.v[i];
+    double a[4], b[4], q[4];
+    quaternion_of(outer->rotation, a);
+    quaternion_of(inner->rotation, b);
+    q[0] = a[0] * b[0] - (a[1] * b[1] + a[2] * b[2] + a[3] * b[3]);
+    cross(a + 1, b + 1, q + 1);
+    for (int i = 1; i < 4; i++) q[i] += a[0] * b[i] + b[0] * a[i];
     sdm_pose both;
-    vector_of(q, both.rotation);
+    sdm_rotation_of_quaternion(q, both.rotation);
     sdm_pose_apply(outer, inner->translation, both.translation);
     return both;
+}
+
+void sdm_rotation_product(const double a[9], const double b[9], double out[9])
+{
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            out[3 * i + k] = a[3 * i] * b[k] + a[3 * i + 1] * b[3 + k] + a[3 * i + 2] * b[6 + k];
 }
 
 void sdm_rotation_vector(const double r[9], double rotation[3])
@@ -110,19 +115,22 @@ void sdm_rotation_vector(const double r[9], double rotation[3])
     int k = 0;
     for (int i = 1; i < 3; i++)
         if (r[4 * i] > r[4 * k]) k = i;
-    quaternion q;
+    double q[4];
     if (trace >= r[4 * k]) {
         const double w2 = sqrt(1 + trace);
-        q = (quaternion){0.5 * w2, {0.5 * (r[7] - r[5]) / w2, 0.5 * (r[2] - r[6]) / w2, 0.5 * (r[3] - r[1]) / w2}};
+        q[0] = 0.5 * w2;
+        q[1] = 0.5 * (r[7] - r[5]) / w2;
+        q[2] = 0.5 * (r[2] - r[6]) / w2;
+        q[3] = 0.5 * (r[3] - r[1]) / w2;
     } else {
         const int i = (k + 1) % 3, j = (k + 2) % 3;
         const double v2 = sqrt(1 + 2 * r[4 * k] - trace);
-        q.w = 0.5 * (r[3 * j + i] - r[3 * i + j]) / v2;
-        q.v[k] = 0.5 * v2;
-        q.v[i] = 0.5 * (r[3 * i + k] + r[3 * k + i]) / v2;
-        q.v[j] = 0.5 * (r[3 * j + k] + r[3 * k + j]) / v2;
+        q[0] = 0.5 * (r[3 * j + i] - r[3 * i + j]) / v2;
+        q[1 + k] = 0.5 * v2;
+        q[1 + i] = 0.5 * (r[3 * i + k] + r[3 * k + i]) / v2;
+        q[1 + j] = 0.5 * (r[3 * j + k] + r[3 * k + j]) / v2;
     }
-    vector_of(q, rotation);
+    sdm_rotation_of_quaternion(q, rotation);
 }
 
 // (t - sin t) / t^3: the formula cancels at small angles

@@ -78,12 +78,7 @@ void sdm_fit_move(const fit_problem *p, const fit_state *from, const double *ste
     const sdm_pose turn = {.rotation = {step[n], step[n + 1], step[n + 2]}};
     double r[9];
     sdm_pose_matrix(&turn, r);
-    for (int a = 0; a < 3; a++)
-        for (int b = 0; b < 3; b++) {
-            double sum = 0;
-            for (int k = 0; k < 3; k++) sum += r[3 * a + k] * from->rotation[3 * k + b];
-            to->rotation[3 * a + b] = sum;
-        }
+    sdm_rotation_product(r, from->rotation, to->rotation);
     for (size_t k = 0; k < 3; k++) to->translation[k] += step[fit_at_translation(n) + k];
     to->blur += step[fit_at_blur(n)];
     for (size_t i = 0; fit_columns(n) + i < p->sums.n_unknowns; i++) {

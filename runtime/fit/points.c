@@ -95,9 +95,7 @@ static void horn(double m[3][3], double rotation[3])
         a[i + 1][j + 1] = a[j + 1][i + 1] = m[i][j] + m[j][i];
     }
     largest(a, q);
-    const double length = sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    const double angle = 2 * atan2(length, fabs(q[0])), sign = q[0] < 0 ? -1 : 1;
-    for (int k = 0; k < 3; k++) rotation[k] = length > 0 ? sign * angle * q[k + 1] / length : 0;
+    sdm_rotation_of_quaternion(q, rotation);
 }
 
 sdm_status sdm_fit_pose_from_points(const double *shape, const double *world, size_t n, sdm_pose *out, sdm_error *err)

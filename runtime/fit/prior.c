@@ -14,12 +14,9 @@ static void add_normal(size_t n, size_t at, double residual, double precision, d
 // the turn from the prior's rotation
 static void turned(const fit_problem *p, const fit_state *s, double w[3])
 {
+    const double *q = p->prior.rotation, back[9] = {q[0], q[3], q[6], q[1], q[4], q[7], q[2], q[5], q[8]};
     double r[9];
-    for (int a = 0; a < 3; a++)
-        for (int b = 0; b < 3; b++) {
-            r[3 * a + b] = 0;
-            for (int k = 0; k < 3; k++) r[3 * a + b] += s->rotation[3 * a + k] * p->prior.rotation[3 * b + k];
-        }
+    sdm_rotation_product(s->rotation, back, r);
     sdm_rotation_vector(r, w);
 }
 

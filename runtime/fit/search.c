@@ -21,10 +21,8 @@ static void turn_of(sdm_fit_turns turns, size_t i, size_t n, double rotation[9])
     if (turns == SDM_FIT_TURNS_SPHERE && i > 0) { // the first is no turn
         const double phi = 1.4142135623730951, psi = 1.533751168755204288118041, s = (double)i + 0.5;
         const double t = s / (double)n, d = 2 * PI * s, r = sqrt(t), big = sqrt(1 - t);
-        double q[4] = {big * cos(d / psi), r * sin(d / phi), r * cos(d / phi), big * sin(d / psi)};
-        const double length = sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), sign = q[0] < 0 ? -1 : 1;
-        const double angle = 2 * atan2(length, fabs(q[0]));
-        for (int k = 0; k < 3; k++) pose.rotation[k] = length > 0 ? sign * angle * q[k + 1] / length : 0;
+        const double q[4] = {big * cos(d / psi), r * sin(d / phi), r * cos(d / phi), big * sin(d / psi)};
+        sdm_rotation_of_quaternion(q, pose.rotation);
     }
     sdm_pose_matrix(&pose, rotation);
 }
@@ -36,11 +34,7 @@ static void turn_start(const fit_problem *p, size_t i, const fit_state *start, f
     double q[9], at[3], moved[3];
     turn_of(o->turns, i, o->n_turns, q);
     *out = *start;
-    for (int a = 0; a < 3; a++)
-        for (int b = 0; b < 3; b++) {
-            out->rotation[3 * a + b] = 0;
-            for (int k = 0; k < 3; k++) out->rotation[3 * a + b] += start->rotation[3 * a + k] * q[3 * k + b];
-        }
+    sdm_rotation_product(start->rotation, q, out->rotation);
     sdm_fit_to_world(start, o->pivot, at);
     sdm_fit_to_world(out, o->pivot, moved);
     for (int k = 0; k < 3; k++) out->translation[k] += at[k] - moved[k];

@@ -123,6 +123,42 @@ static void test_vector(void **state)
     assert_near(v, (const double[3]){0, -PI / 2, 0}, 3, 1e-14);
 }
 
+static void test_product(void **state)
+{
+    (void)state;
+    for (size_t a = 0; a < N_ANGLES; a++)
+        for (size_t b = 0; b < N_ANGLES; b++) {
+            const sdm_pose outer = random_pose(a, ANGLES[a]), inner = random_pose(b + 20, ANGLES[b]);
+            const sdm_pose both = sdm_pose_compose(&outer, &inner);
+            double r[9], s[9], expected[9], got[9];
+            sdm_pose_matrix(&outer, r);
+            sdm_pose_matrix(&inner, s);
+            sdm_pose_matrix(&both, expected);
+            sdm_rotation_product(r, s, got);
+            assert_near(got, expected, 9, 1e-13);
+        }
+}
+
+static void test_quaternion(void **state)
+{
+    (void)state;
+    for (size_t a = 0; a < N_ANGLES; a++)
+        for (int sign = -1; sign <= 1; sign += 2) { // q and -q are the same turn
+            double k[3], rotation[3];
+            random_axis(a, k);
+            const double c = sign * cos(0.5 * ANGLES[a]), s = sign * sin(0.5 * ANGLES[a]);
+            const double q[4] = {c, s * k[0], s * k[1], s * k[2]};
+            sdm_rotation_of_quaternion(q, rotation);
+            const double expected[3] = {ANGLES[a] * k[0], ANGLES[a] * k[1], ANGLES[a] * k[2]};
+            if (ANGLES[a] < 3.1) assert_near(rotation, expected, 3, 1e-14); // at pi two vectors are the same turn
+            assert_near((const double[1]){norm(rotation)}, &ANGLES[a], 1, 1e-14);
+        }
+    /* three quarters of a turn: the shorter way */
+    double rotation[3];
+    sdm_rotation_of_quaternion((const double[4]){cos(3 * PI / 4), 0, sin(3 * PI / 4), 0}, rotation);
+    assert_near(rotation, (const double[3]){0, -PI / 2, 0}, 3, 1e-14);
+}
+
 static void test_jacobian(void **state)
 {
     (void)state;
@@ -170,8 +206,9 @@ static void test_misuse(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_apply),    cmocka_unit_test(test_compose), cmocka_unit_test(test_vector),
-        cmocka_unit_test(test_jacobian), cmocka_unit_test(test_misuse),
+        cmocka_unit_test(test_apply),    cmocka_unit_test(test_compose),    cmocka_unit_test(test_vector),
+        cmocka_unit_test(test_product),  cmocka_unit_test(test_quaternion), cmocka_unit_test(test_jacobian),
+        cmocka_unit_test(test_misuse),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

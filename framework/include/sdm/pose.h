@@ -34,6 +34,12 @@ SDM_API sdm_pose sdm_pose_inverse(const sdm_pose *pose);
    of at most pi. */
 SDM_API sdm_pose sdm_pose_compose(const sdm_pose *outer, const sdm_pose *inner);
 
+/* out[9] = a[9] b[9], row-major; out is neither of them. */
+SDM_API void sdm_rotation_product(const double a[9], const double b[9], double out[9]);
+
+/* The rotation vector, of a length of at most pi, of the unit quaternion q = (w, x, y, z). */
+SDM_API void sdm_rotation_of_quaternion(const double q[4], double rotation[3]);
+
 /* The rotation vector, of a length of at most pi, of the rotation matrix r[9] (row-major, orthonormal, determinant +1). */
 SDM_API void sdm_rotation_vector(const double r[9], double rotation[3]);
 

@@ -70,7 +70,7 @@ sdm_status experiment_path(const experiment_run *run, size_t index, const char *
     return sdm_fail(err, SDM_E_ARG, "the folder '%.100s...': the name is too long", run->folder);
 }
 
-/* Two configurations give the same network: everything but the place of the files and the number of threads is equal. */
+/* Two configurations give the same network. */
 static bool is_same(const sdm_config *a, const char *name, const char *text, size_t size)
 {
     sdm_config *copy = NULL, *other = NULL;
@@ -79,9 +79,8 @@ static bool is_same(const sdm_config *a, const char *name, const char *text, siz
     if (!SDM_ALLOC(&copy, 1, "configuration", NULL) && !SDM_ALLOC(&other, 1, "configuration", NULL) &&
         !sdm_config_parse(name, text, size, NULL, 0, other, NULL)) {
         *copy = *a;
-        copy->threads = other->threads;
-        copy->data.workers = other->data.workers;
-        memcpy(copy->output.folder, other->output.folder, sizeof copy->output.folder);
+        sdm_config_strip(copy);
+        sdm_config_strip(other);
         sdm_config_dump(copy, &x);
         sdm_config_dump(other, &y);
         same = !x.failed && !y.failed && !strcmp(x.data, y.data);

@@ -135,9 +135,7 @@ static void neutral(const trainer *t, sdm_config *c)
     c->train.minutes = 1;
     c->train.steps = c->train.samples = 0;
     c->train.evaluate_seconds = c->train.checkpoint_seconds = 1;
-    c->output.folder[0] = '\0';
-    c->file[0] = '\0';
-    c->threads = c->data.workers = 0;
+    sdm_config_strip(c);
 }
 
 static sdm_status refuse(const trainer *t, const char *what, sdm_error *err)

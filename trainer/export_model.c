@@ -180,8 +180,7 @@ sdm_status export_dump(const trainer *t, sdm_text *out, sdm_error *err)
     sdm_status s = SDM_ALLOC(&c, 1, "resolved config", err);
     if (s) return s;
     *c = *t->config;
-    c->threads = c->data.workers = 0;
-    c->output.folder[0] = '\0';
+    sdm_config_strip(c);
     sdm_config_dump(c, out);
     if (out->failed)
         s = sdm_fail(err, SDM_E_NOMEM, "no memory for the resolved config");

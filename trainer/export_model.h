@@ -8,8 +8,8 @@
 /* Before the training: refuses texts that a model file has no room for, and takes the checksums of the data files. */
 sdm_status export_prepare(trainer *t, sdm_error *err);
 
-/* Appends the resolved configuration without what has no part in the result: threads and the name of the folder. The model is the same
-   bits wherever and by however many threads it is trained. */
+/* Appends the resolved configuration, stripped (sdm_config_strip()): the model is the same bits wherever and by however many threads it
+   is trained. */
 sdm_status export_dump(const trainer *t, sdm_text *out, sdm_error *err);
 
 /* Writes this configuration to a temporary file: config.yaml when the caller commits it. *out is the caller's after an

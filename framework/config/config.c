@@ -112,6 +112,12 @@ sdm_status sdm_config_read(const char *path, const char *const *overrides, size_
     return s;
 }
 
+void sdm_config_strip(sdm_config *c)
+{
+    c->threads = c->data.workers = 0;
+    c->file[0] = c->output.folder[0] = '\0';
+}
+
 const char *sdm_config_where(const sdm_config *c, sdm_mark mark, char *buf)
 {
     return sdm_mark_print(mark, c->file, buf, 1200);

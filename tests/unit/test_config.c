@@ -419,6 +419,28 @@ static void test_folder_from_name(void **state)
     }
 }
 
+/* Two configurations of one network, and one of another. */
+static void test_strip(void **state)
+{
+    static const char *const NAMES[] = {"here.yaml", "there/too.yaml", "here.yaml"};
+    static const char *const LINES[] = {"threads: 1\n", "threads: 3\ndata: {workers: 2}\noutput: {folder: x}\n",
+                                        "seed: 2\n"};
+    sdm_text dump[3] = {{0}};
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        char text[256];
+        snprintf(text, sizeof text, BASE "%s", LINES[i]);
+        assert_int_equal(sdm_config_parse(NAMES[i], text, strlen(text), NULL, 0, &config, &err), SDM_OK);
+        sdm_config_strip(&config);
+        sdm_config_dump(&config, &dump[i]);
+        assert_false(dump[i].failed);
+        assert_string_equal(config.file, "");
+    }
+    assert_string_equal(dump[0].data, dump[1].data);
+    assert_string_not_equal(dump[0].data, dump[2].data);
+    for (int i = 0; i < 3; i++) sdm_text_dispose(&dump[i]);
+}
+
 static void test_locale(void **state)
 {
     static const char *const COMMA[] = {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8", "de_DE"};
@@ -484,6 +506,7 @@ int main(void)
         cmocka_unit_test(test_override_mistakes),
         cmocka_unit_test(test_many_mistakes),
         cmocka_unit_test(test_folder_from_name),
+        cmocka_unit_test(test_strip),
         cmocka_unit_test(test_locale),
         cmocka_unit_test(test_misuse),
         cmocka_unit_test(test_short_memory),

@@ -141,6 +141,10 @@ SDM_API sdm_status sdm_config_parse(const char *name, const char *text, size_t s
    output.folder then reads back as its default. */
 SDM_API void sdm_config_dump(const sdm_config *c, sdm_text *out);
 
+/* Empties what has no part in the network: the numbers of threads, the name of the file and that of the folder. Of two that train the same
+   network the rest is the same. */
+SDM_API void sdm_config_strip(sdm_config *c);
+
 /* Appends a table of every key: name, type, range, default, meaning (for --help and the documentation), as Markdown when
    `markdown`, else as aligned text. */
 SDM_API void sdm_config_describe(bool markdown, sdm_text *out);

@@ -61,15 +61,17 @@ static void find_speedups(const experiment_run *run)
 static sdm_status do_row(const experiment_run *run, size_t index, sdm_error *err)
 {
     experiment_result *r = &run->results[index];
-    experiment_job job = {0};
-    sdm_status s = experiment_job_open(run, index, &job, err);
-    if (!s && r->row->method->fit)
-        s = experiment_fit_row(run, &job, r, err);
-    else if (!s && *r->row->method->engine)
-        s = experiment_engine(run, &job, r, err);
-    else if (!s)
-        s = experiment_network(run, &job, r, err);
-    experiment_job_close(&job);
+    experiment_job *job = &run->jobs[index];
+    sdm_status s = job->why.status;
+    if (s)
+        *err = job->why;
+    else if (r->row->method->fit)
+        s = experiment_fit_row(run, job, r, err);
+    else if (*r->row->method->engine)
+        s = experiment_engine(run, job, r, err);
+    else
+        s = experiment_network(run, job, r, err);
+    experiment_job_close(job);
     if (!s || s == SDM_E_CANCELLED) {
         if (!s) r->state = EXPERIMENT_DONE;
         return s;
@@ -134,13 +136,13 @@ static sdm_status run_rows(const experiment_run *run, sdm_error *err)
 }
 
 /* Shapes, options and ranges that cannot be are told before anything is done; what else is wrong with a row is its own affair. */
-static sdm_status check_rows(const experiment_run *run, sdm_error *err)
+static sdm_status open_rows(const experiment_run *run, sdm_error *err)
 {
     for (size_t i = 0; i < run->e->n_rows; i++) {
-        experiment_job job = {0};
-        const sdm_status s = experiment_job_open(run, i, &job, err);
-        experiment_job_close(&job);
-        if (s == SDM_E_CONFIG) return s;
+        const sdm_status s = experiment_job_open(run, i, &run->jobs[i]);
+        if (s != SDM_E_CONFIG) continue;
+        if (err) *err = run->jobs[i].why;
+        return s;
     }
     return SDM_OK;
 }
@@ -157,10 +159,13 @@ static sdm_status run_experiment(const cli_args *args, const sdm_experiment *e, 
         run.results[i].row = &e->rows[i];
         for (int f = 0; f < SDM_N_FIGURES; f++) run.results[i].figure[f] = NAN;
     }
-    if (!s) s = check_rows(&run, err);
+    if (!s) s = SDM_ALLOC(&run.jobs, e->n_rows, "rows", err);
+    if (!s) s = open_rows(&run, err);
     if (!s && !args->dry_run) s = sdm_make_folder(run.folder, err);
     if (!s) s = args->dry_run ? experiment_print_plan(&run, err) : run_rows(&run, err);
     for (size_t i = 0; run.results && i < e->n_rows; i++) experiment_fits_free(run.results[i].fits);
+    for (size_t i = 0; run.jobs && i < e->n_rows; i++) experiment_job_close(&run.jobs[i]);
+    sdm_free(run.jobs);
     sdm_free(run.results);
     return s;
 }

@@ -28,15 +28,6 @@ typedef struct experiment_result {
     char grid[96];                /* "60 x 50 x 50 voxels of 0.2 mm" */
 } experiment_result;
 
-typedef struct experiment_run {
-    const cli_args *args;
-    const sdm_experiment *e;
-    const sdm_registry *registry;
-    const char *folder;
-    experiment_result *results; /* [e->n_rows] */
-    double start;               /* sdm_clock() */
-} experiment_run;
-
 /* A row's training configuration with its shape, ready to be measured. */
 typedef struct experiment_job {
     size_t index;
@@ -44,10 +35,21 @@ typedef struct experiment_job {
     sdm_instance *shape;
     cli_map_maker maker;            /* without `make` until there is a method */
     double nominal[SDM_MAX_PARAMS]; /* the shape's defaults within the ranges: the shape that is drawn */
+    sdm_error why;                  /* status of experiment_job_open(), and its message */
 } experiment_job;
 
-/* *job is zero-initialised; experiment_job_close() frees it in every case. */
-sdm_status experiment_job_open(const experiment_run *run, size_t index, experiment_job *job, sdm_error *err);
+typedef struct experiment_run {
+    const cli_args *args;
+    const sdm_experiment *e;
+    const sdm_registry *registry;
+    const char *folder;
+    experiment_result *results; /* [e->n_rows] */
+    experiment_job *jobs;       /* [e->n_rows] */
+    double start;               /* sdm_clock() */
+} experiment_run;
+
+/* *job is zero-initialised; experiment_job_close() frees it in every case, once or more. The status is that of job->why. */
+sdm_status experiment_job_open(const experiment_run *run, size_t index, experiment_job *job);
 void experiment_job_close(experiment_job *job);
 
 /* Path of something of a row: FOLDER/ROW/NAME. SDM_E_ARG: too long. */

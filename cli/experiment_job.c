@@ -31,7 +31,7 @@ static sdm_status check_reference(const experiment_run *run, const experiment_jo
     return SDM_OK;
 }
 
-sdm_status experiment_job_open(const experiment_run *run, size_t index, experiment_job *job, sdm_error *err)
+static sdm_status open_job(const experiment_run *run, size_t index, experiment_job *job, sdm_error *err)
 {
     job->index = index;
     sdm_status s = SDM_ALLOC(&job->config, 1, "configuration", err);
@@ -52,6 +52,11 @@ sdm_status experiment_job_open(const experiment_run *run, size_t index, experime
     if (!s) s = check_reference(run, job, err);
     for (size_t i = 0; i < m->n_params && !s; i++) job->nominal[i] = fmin(m->max[i], fmax(m->min[i], params[i].def));
     return s;
+}
+
+sdm_status experiment_job_open(const experiment_run *run, size_t index, experiment_job *job)
+{
+    return job->why.status = open_job(run, index, job, &job->why);
 }
 
 void experiment_job_close(experiment_job *job)

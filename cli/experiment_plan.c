@@ -76,14 +76,14 @@ sdm_status experiment_print_plan(const experiment_run *run, sdm_error *err)
     sdm_json_open(&j, NULL, '{');
     sdm_json_open(&j, "rows", '[');
     for (size_t i = 0; i < run->e->n_rows && !s; i++) {
-        experiment_job job = {0};
-        s = experiment_job_open(run, i, &job, err);
-        if (!s) {
-            const plan p = plan_row(run, &job);
-            minutes += p.minutes;
-            add_row(run, &job, &p, &j);
+        const experiment_job *job = &run->jobs[i];
+        if ((s = job->why.status)) {
+            if (err) *err = job->why;
+            break;
         }
-        experiment_job_close(&job);
+        const plan p = plan_row(run, job);
+        minutes += p.minutes;
+        add_row(run, job, &p, &j);
     }
     sdm_json_close(&j, ']');
     sdm_json_real(&j, "minutes", minutes);

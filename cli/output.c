@@ -81,7 +81,8 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
                                .dense = args->dense,
                                .half = args->half,
                                .metadata = metadata,
-                               .n_metadata = n_metadata};
+                               .n_metadata = n_metadata,
+                               .cancelled = cli_interrupted};
     sdm_vdb_report report = {0};
     const sdm_status s = sdm_vdb_write(path, map->grid, map->values, &opts, &report, err);
     if (!s && report.adjusted_voxels > 0)

@@ -4,7 +4,7 @@
 
 #include <stdbool.h>
 
-#include "sdm/grid.h"
+#include "sdm/vdb.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -25,8 +25,10 @@ sdm_status sdm_band_copy(const sdm_grid *grid, const float *values, sdm_band *ou
    Cut surface: the solid is intersected with the box that the voxels fill (half a voxel beyond the outermost centres) as
    max(d, d_box), which is the exact distance away from the rim of the cut. Wherever the band leaves the grid, the box is padded by the
    band and the distance there is min over points b of the box's faces of |p - b| + max(d(b), 0): exact but for the sampling of b.
-   SDM_E_ARG: no surface in the grid. SDM_E_QUALITY: neighbours whose values jump across the band, so not a distance map. */
-sdm_status sdm_band_close(const sdm_grid *grid, const float *values, double width, sdm_band *out, sdm_error *err);
+   SDM_E_ARG: no surface in the grid. SDM_E_QUALITY: neighbours whose values jump across the band, so not a distance map.
+   SDM_E_CANCELLED by opts->cancelled, all that is read of opts. */
+sdm_status sdm_band_close(const sdm_grid *grid, const float *values, double width, const sdm_vdb_opts *opts,
+                          sdm_band *out, sdm_error *err);
 
 void sdm_band_dispose(sdm_band *b);
 

@@ -461,7 +461,7 @@ Grid::Ptr make_level_set(const sdm_grid &g, const float *values, const sdm_vdb_o
     if (!std::isfinite(background))
         need(sdm_fail(err, SDM_E_ARG, "spacing %g mm is too large for the number format", g.spacing[0]));
     owned_band box;
-    need(sdm_band_close(&g, values, background, &box.band, err));
+    need(sdm_band_close(&g, values, background, &o, &box.band, err));
     report.cut = box.band.cut;
     Grid::Ptr grid = grid_of(g, box.band, background, false, o.half);
     mend_creases(*grid, o.half, report);

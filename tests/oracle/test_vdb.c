@@ -526,6 +526,35 @@ static void save(const uint8_t *data, size_t size)
     assert_int_equal(fclose(f), 0);
 }
 
+static bool stop(void *user) { return --*(int *)user < 0; }
+
+// whenever it is asked to stop, it does, and there is no file
+static void test_cancelled(void **state)
+{
+    (void)state;
+    const int64_t n[3] = {30, 28, 26};
+    const double centre[3] = {0, 0, 0};
+    const sdm_grid g = sdm_grid_centred(n, 0.15, centre);
+    float *v = fill(&g, tilted_box); // has creases, and leaves the grid by its band
+    unlink(FILE_NAME);
+    sdm_status s = SDM_E_CANCELLED;
+    int calls = 0;
+    for (; s == SDM_E_CANCELLED && calls < 1000; calls++) {
+        int left = calls;
+        sdm_error err;
+        const sdm_vdb_opts o = {.band_voxels = 12, .cancelled = stop, .user = &left};
+        s = sdm_vdb_write(FILE_NAME, &g, v, &o, NULL, &err);
+        if (s) {
+            assert_int_equal(s, SDM_E_CANCELLED);
+            assert_int_not_equal(access(FILE_NAME, F_OK), 0);
+        }
+    }
+    assert_int_equal(s, SDM_OK);
+    assert_true(calls > 26 + 2 * 12); // in every layer of the padded grid at least
+    sdm_free(verify());
+    free(v);
+}
+
 // every kind of damage is found before the file is parsed
 static void test_damage(void **state)
 {
@@ -579,6 +608,7 @@ int main(void)
         cmocka_unit_test(test_refused),
         cmocka_unit_test(test_gradients),
         cmocka_unit_test(test_unwritable),
+        cmocka_unit_test(test_cancelled),
         cmocka_unit_test(test_damage),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

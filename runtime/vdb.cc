@@ -1,45 +1,26 @@
-/* Level sets through OpenVDB: the only file that knows it, and the only one in C++. No exception leaves it. */
+/* Level sets through OpenVDB, which the files vdb*.cc alone know, and which are the only ones in C++. No exception leaves them. */
 #include "sdm/vdb.h"
-
-#include <openvdb/io/File.h>
-#include <openvdb/openvdb.h>
-#include <openvdb/tools/Diagnostics.h>
 
 #include <algorithm>
 #include <cinttypes>
 #include <cmath>
 #include <cstring>
-#include <map>
 #include <mutex>
 #include <new>
 #include <string>
-#include <vector>
 
 #include "band.h"
-#include "sdm/checksum.h"
-#include "sdm/file.h"
 #include "sdm/memory.h"
 #include "sdm/text.h"
 #include "seal.h"
+#include "vdb_parts.h"
+
+using namespace vdb_parts;
 
 namespace
 {
 
-using Grid = openvdb::FloatGrid;
 using Leaf = Grid::TreeType::LeafNodeType;
-using openvdb::Coord;
-
-const char *const GRID_NAME = "surface";
-
-// a status on its way through C++ code; the text is in the caller's sdm_error
-struct failure {
-    sdm_status status;
-};
-
-void need(sdm_status s)
-{
-    if (s) throw failure{s};
-}
 
 void initialize_once()
 {
@@ -113,8 +94,6 @@ void add_metadata(Grid &grid, const sdm_vdb_opts &o, const sdm_vdb_report &r, sd
 
 // ---- map to grid
 
-float as_stored(float v, bool half) { return half ? openvdb::io::truncateRealToHalf(v) : v; }
-
 // smallest background that can be stored and is not below the band (checkLevelSet divides it by the voxel size)
 float background_value(double band_voxels, double voxel, bool half)
 {
@@ -186,245 +165,7 @@ Grid::Ptr grid_of(const sdm_grid &g, const sdm_band &box, float background, bool
     return grid;
 }
 
-// ---- creases
-
-// CheckEikonal refuses squared gradients outside [0.5, 1.5]; the margin is for the rounding of the check itself
-const float SQUARE_LOW = 0.52f, SQUARE_HIGH = 1.48f;
-// how far within it a gradient is brought, for what its neighbours ask, and the part of the way at a time
-const float SQUARE_INSET = 0.05f, RELAXATION = 0.7f;
-// a map that is wrong at a larger share of its zero crossings is no distance
-const double CREASES_MOST = 0.5;
-// every so many rounds go by first differences, and from such a round on all of the stencil may change, against cycles
-const int ROUNDS_MOST = 300, PLAIN_EVERY = 6, WIDE_FROM = 24;
-// in voxels: most that a value changes at a time, and least that is left of one that was not smaller
-const float STEP_MOST = 0.25f, SIZE_LEAST = 0.1f;
-// values of less of the squared slope stay
-const float SHARE_LEAST = 1e-3f;
-
-// that of the check: a voxel and three on each side along x, y, z
-using Stencil = openvdb::math::WenoStencil<const Grid>;
-const int STENCIL_SIZE = Stencil::SIZE;
-
-// place of value n of the stencil
-Coord stencil_place(const Coord &at, int n)
-{
-    static const int along[] = {-3, -2, -1, 1, 2, 3};
-    Coord c = at;
-    if (n) c[(n - 1) / 6] += along[(n - 1) % 6];
-    return c;
-}
-
-bool on_crease(const Stencil &stencil)
-{
-    if (!stencil.zeroCrossing()) return false;
-    const float square = stencil.normSqGrad();
-    return !(square >= SQUARE_LOW && square <= SQUARE_HIGH);
-}
-
-// squared gradient by first differences, in voxels: at a zero crossing it never vanishes
-float plain_square(const Stencil &stencil, float voxel)
-{
-    const float here = stencil.getValue(0), side = here > 0 ? 1.0f : -1.0f;
-    float sum = 0;
-    for (const unsigned below : {3u, 9u, 15u}) {
-        const float low = std::min(side * stencil.getValue(below), side * stencil.getValue(below + 1));
-        const float slope = std::max(side * here - low, 0.0f) / voxel;
-        sum += slope * slope;
-    }
-    return sum;
-}
-
-std::vector<Coord> find_creases(const Grid &grid)
-{
-    std::vector<Coord> found;
-    size_t crossings = 0;
-    Stencil stencil(grid);
-    for (auto v = grid.cbeginValueOn(); v; ++v) {
-        stencil.moveTo(v.getCoord());
-        crossings += stencil.zeroCrossing();
-        if (on_crease(stencil)) found.push_back(v.getCoord());
-    }
-    if (static_cast<double>(found.size()) > CREASES_MOST * static_cast<double>(crossings)) found.clear();
-    return found;
-}
-
-// the same where the stencil reaches what was changed: stencils of creases of before
-std::vector<Coord> find_creases_near(const Grid &grid, const std::vector<Coord> &before)
-{
-    std::vector<Coord> near, found;
-    near.reserve(before.size() * STENCIL_SIZE * STENCIL_SIZE);
-    for (const Coord &c : before)
-        for (int n = 0; n < STENCIL_SIZE * STENCIL_SIZE; n++)
-            near.push_back(stencil_place(stencil_place(c, n / STENCIL_SIZE), n % STENCIL_SIZE));
-    std::sort(near.begin(), near.end());
-    near.erase(std::unique(near.begin(), near.end()), near.end());
-    Stencil stencil(grid);
-    Grid::ConstAccessor acc = grid.getConstAccessor();
-    for (const Coord &c : near) {
-        if (!acc.isValueOn(c)) continue;
-        stencil.moveTo(c);
-        if (on_crease(stencil)) found.push_back(c);
-    }
-    return found;
-}
-
-// the first value seen of each voxel that is changed
-using originals = std::map<Coord, float>;
-
-struct sweep_limits {
-    float voxel, most; // mm
-    bool half;
-};
-
-float square_at(Stencil &stencil, const Coord &at, bool plain, float voxel)
-{
-    stencil.moveTo(at);
-    return plain ? plain_square(stencil, voxel) : stencil.normSqGrad();
-}
-
-// derivative of the squared gradient at a voxel by the value of another, times the size of a voxel; away from 0, where signs stay
-float derivative(Grid::Accessor &acc, Stencil &stencil, const Coord &at, const Coord &by, bool plain, float voxel)
-{
-    const float v = acc.getValue(by), part = std::copysign(1.0f / 1024, v),
-                before = square_at(stencil, at, plain, voxel);
-    acc.setValueOnly(by, v + part * voxel);
-    const float after = square_at(stencil, at, plain, voxel);
-    acc.setValueOnly(by, v);
-    return (after - before) / part;
-}
-
-/* The least change of a voxel and its neighbours, or of the whole stencil, that brings the squared gradient back to where it is
-   allowed, to first order (Kaczmarz 1937). Signs stay, and with them the voxels that are inside. */
-void project(Grid::Accessor &acc, Stencil &stencil, const Coord &at, int round, const sweep_limits &l,
-             originals &original)
-{
-    stencil.moveTo(at);
-    if (!on_crease(stencil)) return; // by what was done beside it
-    const float square = stencil.normSqGrad();
-    const float missing = (square < SQUARE_LOW ? SQUARE_LOW + SQUARE_INSET : SQUARE_HIGH - SQUARE_INSET) - square;
-    float slope[STENCIL_SIZE], sum = 0;
-    for (int n = 0; n < STENCIL_SIZE; n++) {
-        const Coord c = stencil_place(at, n);
-        const bool next = n == 0 || (n - 1) % 6 / 2 == 1, free = acc.isValueOn(c) && (next || round >= WIDE_FROM);
-        slope[n] = free ? derivative(acc, stencil, at, c, round % PLAIN_EVERY == 0, l.voxel) : 0;
-        sum += slope[n] * slope[n];
-    }
-    for (int n = 0; n < STENCIL_SIZE; n++) {
-        if (!(slope[n] * slope[n] > SHARE_LEAST * sum)) continue;
-        const Coord c = stencil_place(at, n);
-        const float v = acc.getValue(c), first = original.emplace(c, v).first->second;
-        const float step = std::min(std::max(RELAXATION * missing * slope[n] / sum, -STEP_MOST), STEP_MOST) * l.voxel;
-        const float least = std::min(std::fabs(first), SIZE_LEAST * l.voxel);
-        const float size = std::min(std::max(first < 0 ? -v - step : v + step, least), l.most);
-        acc.setValueOnly(c, as_stored(first < 0 ? -size : size, l.half));
-    }
-}
-
-// mends creases until checkLevelSet has nothing to object to (it is asked by the caller, this may end without success)
-void mend_creases(Grid &grid, bool half, sdm_vdb_report &report)
-{
-    originals original;
-    Grid::Accessor acc = grid.getAccessor();
-    Stencil stencil(grid);
-    const sweep_limits limits = {static_cast<float>(grid.voxelSize()[0]),
-                                 std::nextafter(as_stored(grid.background() * 0.999f, half), 0.0f), half};
-    std::vector<Coord> found = find_creases(grid);
-    for (int round = 1; round <= ROUNDS_MOST && !found.empty(); round++) {
-        for (const Coord &c : found) project(acc, stencil, c, round, limits, original);
-        found = find_creases_near(grid, found);
-    }
-    for (const auto &[c, v] : original) {
-        const double change = std::fabs(static_cast<double>(acc.getValue(c)) - static_cast<double>(v));
-        if (change > 0) report.adjusted_voxels++;
-        report.adjusted_mm = std::max(report.adjusted_mm, change);
-    }
-}
-
-// ---- hash
-
-// coordinates, extents and bits of all values in the order of the tree, tiles included
-uint64_t hash_of(const Grid &grid)
-{
-    struct record {
-        int32_t low[3], high[3];
-        uint32_t bits, active;
-    };
-    std::vector<record> piece;
-    uint64_t crc = 0;
-    const auto add = [&](const openvdb::CoordBBox &b, float value, bool active) {
-        record r = {{b.min()[0], b.min()[1], b.min()[2]}, {b.max()[0], b.max()[1], b.max()[2]}, 0, active};
-        std::memcpy(&r.bits, &value, sizeof r.bits);
-        piece.push_back(r);
-        if (piece.size() < 4096) return;
-        crc = sdm_crc64(crc, piece.data(), piece.size() * sizeof piece[0]);
-        piece.clear();
-    };
-    add(openvdb::CoordBBox(Coord(0), Coord(0)), grid.background(), false);
-    for (auto v = grid.cbeginValueAll(); v; ++v) add(v.getBoundingBox(), v.getValue(), v.isValueOn());
-    return sdm_crc64(crc, piece.data(), piece.size() * sizeof piece[0]);
-}
-
-// ---- files
-
-Grid::Ptr read_grid(const char *path, bool *sealed, sdm_error *err)
-{
-    need(sdm_seal_check(path, sealed, err));
-    openvdb::io::File file(path);
-    file.open(false); // whole, not mapped: what was checked is what is used
-    if (!file.hasGrid(GRID_NAME)) need(sdm_fail(err, SDM_E_FORMAT, "%s: has no grid named \"%s\"", path, GRID_NAME));
-    Grid::Ptr grid = openvdb::gridPtrCast<Grid>(file.readGrid(GRID_NAME));
-    if (!grid) need(sdm_fail(err, SDM_E_FORMAT, "%s: grid \"%s\" does not hold 32-bit floats", path, GRID_NAME));
-    return grid;
-}
-
-std::string text_of(const Grid &grid, const char *name)
-{
-    const auto meta = grid.getMetadata<openvdb::StringMetadata>(name);
-    return meta ? meta->value() : std::string();
-}
-
-void check_hash(const Grid &grid, const char *path, sdm_error *err)
-{
-    char hash[32];
-    std::snprintf(hash, sizeof hash, "%016" PRIx64, hash_of(grid));
-    const std::string stored = text_of(grid, "sdm_hash");
-    if (!stored.empty() && stored != hash)
-        need(sdm_fail(err, SDM_E_FORMAT, "%s: damaged: hash of the values is %s, stored is %s", path, hash,
-                      stored.c_str()));
-}
-
-void check_level_set(const Grid &grid, const char *path, sdm_status status, sdm_error *err)
-{
-    std::string said = openvdb::tools::checkLevelSet(grid);
-    for (char &c : said)
-        if (c == '\n') c = ' ';
-    if (!said.empty())
-        need(sdm_fail(err, status,
-                      "%s: not a valid level set: %s(parts thinner than a voxel? use smaller voxels, or --dense)", path,
-                      said.c_str()));
-}
-
-// writes, reads back and compares before the file gets its name
-void write_file(const char *path, const Grid::Ptr &grid, sdm_error *err)
-{
-    struct output {
-        sdm_outfile *file = nullptr;
-        ~output() { sdm_outfile_discard(&file); }
-    } out;
-    need(sdm_outfile_open(path, &out.file, err));
-    const std::string temp = sdm_outfile_temp_path(out.file);
-    {
-        openvdb::io::File file(temp);
-        file.write(openvdb::GridCPtrVec{grid});
-    }
-    need(sdm_seal_append(temp.c_str(), err));
-    bool sealed = false;
-    const Grid::Ptr back = read_grid(temp.c_str(), &sealed, err);
-    if (!sealed || hash_of(*back) != hash_of(*grid))
-        need(sdm_fail(err, SDM_E_IO, "%s: reads back different from what was written", path));
-    if (grid->getGridClass() == openvdb::GRID_LEVEL_SET) check_level_set(*back, path, SDM_E_QUALITY, err);
-    need(sdm_outfile_commit(&out.file, err));
-}
+// ---- from map to level set
 
 struct owned_band {
     sdm_band band = {};
@@ -464,7 +205,7 @@ Grid::Ptr make_level_set(const sdm_grid &g, const float *values, const sdm_vdb_o
     need(sdm_band_close(&g, values, background, &o, &box.band, err));
     report.cut = box.band.cut;
     Grid::Ptr grid = grid_of(g, box.band, background, false, o.half);
-    mend_creases(*grid, o.half, report);
+    mend_creases(*grid, o, report, err);
     return grid;
 }
 
@@ -484,7 +225,17 @@ Grid::Ptr make_dense(const sdm_grid &g, const float *values, const sdm_vdb_opts 
     return grid_of(g, box.band, background, true, o.half);
 }
 
-// ---- description
+// ---- reading
+
+void check_hash(const Grid &grid, const char *path, sdm_error *err)
+{
+    char hash[32];
+    std::snprintf(hash, sizeof hash, "%016" PRIx64, hash_of(grid));
+    const std::string stored = text_of(grid, "sdm_hash");
+    if (!stored.empty() && stored != hash)
+        need(sdm_fail(err, SDM_E_FORMAT, "%s: damaged: hash of the values is %s, stored is %s", path, hash,
+                      stored.c_str()));
+}
 
 std::string numbers(const openvdb::Vec3d &v)
 {
@@ -523,6 +274,11 @@ std::string describe(const Grid &grid, bool sealed)
 
 } // namespace
 
+void vdb_parts::check_cancelled(const sdm_vdb_opts &o, sdm_error *err)
+{
+    if (o.cancelled && o.cancelled(o.user)) need(sdm_fail(err, SDM_E_CANCELLED, "level set stopped on request"));
+}
+
 sdm_status sdm_vdb_write(const char *path, const sdm_grid *grid, const float *values, const sdm_vdb_opts *opts,
                          sdm_vdb_report *report, sdm_error *err)
 {
@@ -535,11 +291,13 @@ sdm_status sdm_vdb_write(const char *path, const sdm_grid *grid, const float *va
         sdm_vdb_report r = {};
         check_options(*grid, o, err);
         Grid::Ptr g = o.dense ? make_dense(*grid, values, o, r, err) : make_level_set(*grid, values, o, r, err);
+        check_cancelled(o, err);
         if (!o.dense) check_level_set(*g, path, SDM_E_QUALITY, err);
         r.active_voxels = static_cast<int64_t>(g->activeVoxelCount());
         r.hash = hash_of(*g);
         add_metadata(*g, o, r, err);
-        write_file(path, g, err);
+        check_cancelled(o, err);
+        write_grid(path, g, err);
         if (report) *report = r;
     });
 }

@@ -10,6 +10,7 @@ static void print_params(const cli_fit *f)
     for (size_t i = 0; i < f->n_params; i++) {
         const sdm_param *p = &f->params[i];
         printf("  %-12s %10.5g", p->name, r->params[i]);
+        if (isnan(r->sd[i])) printf(" +- %-9s", "unknown");
         if (r->sd[i] > 0) printf(" +- %-9.2g", r->sd[i]);
         printf(" %s%s\n", p->unit,
                r->at_bound[i] ? "   at the end of its range: the standard deviation says little" : "");
@@ -19,6 +20,7 @@ static void print_params(const cli_fit *f)
 static void print_vector(const char *name, const double v[3], const double sd[3], const char *unit)
 {
     printf("  %-12s %10.5g %10.5g %10.5g", name, v[0], v[1], v[2]);
+    if (isnan(sd[0])) printf(" +- unknown");
     if (sd[0] > 0 || sd[1] > 0 || sd[2] > 0) printf(" +- %.2g %.2g %.2g", sd[0], sd[1], sd[2]);
     printf(" %s\n", unit);
 }
@@ -65,7 +67,8 @@ static void print_target(const cli_fit *f)
     }
     printf("%s: %zu voxels near the shape", cli_fit_kind(f), r->n_used);
     if (r->n_nan) printf(", %zu left out because they are NaN%s", r->n_nan, r->n_cavity ? " or in wide spaces" : "");
-    printf(", %.0f %% of the shape in the image\n", 100 * r->inside_share);
+    if (!isnan(r->inside_share)) printf(", %.0f %% of the shape in the image", 100 * r->inside_share);
+    printf("\n");
     if (f->target.kind != SDM_FIT_IMAGE) return;
     print_law("inside", &r->appearance.inside[0]);
     printf("\n");
@@ -75,7 +78,8 @@ static void print_target(const cli_fit *f)
         printf(r->appearance.n_outside > 1 ? ", share %.2g\n" : "\n", r->appearance.outside[i].weight);
     }
     if (r->blur > 0) print_spread(f);
-    printf("  evidence     %.4g (log-likelihood over an image without the shape)\n", r->evidence);
+    if (!isnan(r->evidence))
+        printf("  evidence     %.4g (log-likelihood over an image without the shape)\n", r->evidence);
 }
 
 void cli_fit_print(const cli_fit *f)

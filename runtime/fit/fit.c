@@ -71,11 +71,14 @@ static sdm_status make_result(size_t n, sdm_fit_result *out, sdm_error *err)
     const size_t size = n + 6;
     out->n_params = n;
     out->log_likelihood_without = out->evidence = NAN;
+    out->inside_share = out->noise_factor = out->model_error_mm = NAN;
     sdm_status s = SDM_ALLOC(&out->params, n, "result of the fit", err);
     if (!s) s = SDM_ALLOC(&out->covariance, size * size, "result of the fit", err);
     if (!s) s = SDM_ALLOC(&out->sd, size, "result of the fit", err);
     if (!s) s = SDM_ALLOC(&out->correlation, size * size, "result of the fit", err);
     if (!s) s = SDM_ALLOC(&out->at_bound, n, "result of the fit", err);
+    for (size_t i = 0; i < size * size && !s; i++) out->covariance[i] = out->correlation[i] = NAN;
+    for (size_t i = 0; i < size && !s; i++) out->sd[i] = NAN;
     return s;
 }
 

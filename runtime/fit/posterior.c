@@ -93,6 +93,7 @@ static sdm_status fill(const fit_problem *p, const fit_scatter *scatter, double 
     }
     if (!done)
         return sdm_fail(err, SDM_E_QUALITY, "the image does not determine the shape: its information is singular");
+    memset(out->covariance, 0, size * size * sizeof *out->covariance); // of what was kept
     for (size_t i = 0; i < m; i++)
         for (size_t j = 0; j < m; j++)
             if (list[i] < size && list[j] < size)

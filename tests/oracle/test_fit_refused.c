@@ -64,6 +64,9 @@ static void test_known(void **state)
     for (int k = 0; k < 3; k++) assert_true(fabs(r.pose.rotation[k] - o.start_pose.rotation[k]) < 1e-12);
     assert_memory_equal(r.pose.translation, o.start_pose.translation, sizeof r.pose.translation);
     assert_true(isnan(r.evidence) && isnan(r.log_likelihood_without) && !r.converged);
+    for (int k = 0; k < 9; k++) assert_true(isnan(r.sd[k])); // not 0, which would be known for certain
+    for (int k = 0; k < 81; k++) assert_true(isnan(r.covariance[k]) && isnan(r.correlation[k]));
+    assert_true(isnan(r.inside_share) && isnan(r.noise_factor) && isnan(r.model_error_mm));
     if (!*r.reason || strncmp(r.reason, err.text, 200) != 0) fail_msg("reason '%s'", r.reason);
     sdm_fit_dispose(&r);
     free(v);

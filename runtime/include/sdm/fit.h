@@ -153,9 +153,9 @@ typedef struct sdm_fit_result {
     size_t n_params;
     double *params;         /* [n_params] */
     sdm_pose pose;          /* world = R shape + t */
-    double *covariance;     /* [N][N] of the posterior; rows of what was kept are 0 */
-    double *sd;             /* [N] */
-    double *correlation;    /* [N][N]; 0 where sd is 0 */
+    double *covariance;     /* [N][N] of the posterior; rows of what was kept are 0; NaN where the fit did not come so far */
+    double *sd;             /* [N]; NaN as there */
+    double *correlation;    /* [N][N]; 0 where sd is 0, NaN as there */
     bool *at_bound;         /* [n_params] estimate is at an end of its range: its sd says little */
     bool start_clamped;     /* the start was moved to the network's range */
     size_t n_exact_outside; /* maps the exact engine made because parameters lay outside of the network's range */
@@ -171,14 +171,14 @@ typedef struct sdm_fit_result {
     double
         evidence; /* image: how much better the shape explains it: gain in log-likelihood over correlated voxels, less
                         what its unknowns cost (Schwarz 1978); below 0 the image holds no such shape. Else NaN */
-    double inside_share; /* share of the volume of the shape in the image; 1 for points */
+    double inside_share; /* share of the volume of the shape in the image; 1 for points; NaN as sd */
 
     size_t n_used, n_nan; /* voxels or points used; voxels near the shape left out because they are NaN or n_cavity's */
     size_t n_cavity;      /* voxels of the image left out by sdm_fit_opts.cavity */
-    double noise_factor;  /* variance of the score over that of independent residuals (1: independent, as modelled) */
+    double noise_factor;  /* variance of the score over that of independent residuals (1: independent, as modelled); NaN as sd */
     double
         model_error_mm; /* near the surface, of the maps of the last phase: held-out figure of the network, 0 for exact ones;
-                                     its share is in the covariance */
+                                     its share is in the covariance; NaN as sd */
     double blur;        /* partial volume: sd of the point spread, mm; else 0 */
     sdm_fit_appearance appearance; /* at the end */
     double point_sd;               /* points: sd about the surface, mm; else 0 */

@@ -39,6 +39,10 @@ static void add_unknowns(sdm_json *j, const cli_fit *f)
     for (size_t i = 0; i < f->n_params; i++)
         if (r->at_bound[i]) sdm_json_text(j, NULL, f->params[i].name);
     sdm_json_close(j, ']');
+    sdm_json_open(j, "not_determined", '[');
+    for (size_t i = 0; i < f->n_params; i++)
+        if (r->by_prior[i]) sdm_json_text(j, NULL, f->params[i].name);
+    sdm_json_close(j, ']');
     sdm_json_open(j, "pose", '{');
     add_numbers(j, "rotation_rad", r->pose.rotation, 3);
     add_numbers(j, "translation_mm", r->pose.translation, 3);

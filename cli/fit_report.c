@@ -12,8 +12,9 @@ static void print_params(const cli_fit *f)
         printf("  %-12s %10.5g", p->name, r->params[i]);
         if (isnan(r->sd[i])) printf(" +- %-9s", "unknown");
         if (r->sd[i] > 0) printf(" +- %-9.2g", r->sd[i]);
-        printf(" %s%s\n", p->unit,
-               r->at_bound[i] ? "   at the end of its range: the standard deviation says little" : "");
+        printf(" %s%s%s\n", p->unit,
+               r->at_bound[i] ? "   at the end of its range: the standard deviation says little" : "",
+               r->by_prior[i] ? "   not determined: the standard deviation is that of before the fit" : "");
     }
 }
 

@@ -28,6 +28,8 @@
 #define WEIGHT_ROUGH 0.05
 // so many steps in a row that promise no gain are an end; exact maps have creases, and need not try again
 #define FLAT_MOST 6
+// of the deviation before the fit: what is left where the target says next to nothing
+#define BY_PRIOR 0.9
 // a prior against all evidence would feed itself: the worse the fit, the more alike are neighbouring residuals
 #define WEIGHINGS_MOST 4
 
@@ -62,6 +64,7 @@ void sdm_fit_dispose(sdm_fit_result *r)
     sdm_free(r->sd);
     sdm_free(r->correlation);
     sdm_free(r->at_bound);
+    sdm_free(r->by_prior);
     sdm_free(r->objective);
     *r = (sdm_fit_result){0};
 }
@@ -77,6 +80,7 @@ static sdm_status make_result(size_t n, sdm_fit_result *out, sdm_error *err)
     if (!s) s = SDM_ALLOC(&out->sd, size, "result of the fit", err);
     if (!s) s = SDM_ALLOC(&out->correlation, size * size, "result of the fit", err);
     if (!s) s = SDM_ALLOC(&out->at_bound, n, "result of the fit", err);
+    if (!s) s = SDM_ALLOC(&out->by_prior, n, "result of the fit", err);
     for (size_t i = 0; i < size * size && !s; i++) out->covariance[i] = out->correlation[i] = NAN;
     for (size_t i = 0; i < size && !s; i++) out->sd[i] = NAN;
     return s;
@@ -280,6 +284,7 @@ static void report(fit_problem *p, sdm_fit_result *out)
     for (size_t k = 0; k < p->n_params; k++) {
         out->params[k] = s->params[k];
         out->at_bound[k] = s->params[k] <= p->low[k] || s->params[k] >= p->high[k];
+        out->by_prior[k] = out->sd[k] > BY_PRIOR * sdm_fit_prior_sd(p, k);
     }
     sdm_rotation_vector(s->rotation, out->pose.rotation);
     memcpy(out->pose.translation, s->translation, sizeof out->pose.translation);

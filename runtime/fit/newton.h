@@ -67,6 +67,9 @@ static inline bool fit_mean_stays(const fit_problem *p, size_t i)
 /* Whether there is a prior of anything that is fitted. */
 bool sdm_fit_has_prior(const fit_problem *p);
 
+/* Standard deviation of parameter k before the fit: that of its prior, or of any value in its range. */
+double sdm_fit_prior_sd(const fit_problem *p, size_t k);
+
 /* Log prior density times the weights, with its derivatives added where gradient and the matrices (may be NULL) are given. */
 double sdm_fit_prior(const fit_problem *p, const fit_state *s, double *gradient, double *complete, double *observed);
 

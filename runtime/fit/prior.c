@@ -27,6 +27,12 @@ bool sdm_fit_has_prior(const fit_problem *p)
            (!o->keep_pose && (o->prior_rotation_sd > 0 || o->prior_translation_sd > 0));
 }
 
+double sdm_fit_prior_sd(const fit_problem *p, size_t k)
+{
+    const double range = p->high[k] - p->low[k];
+    return p->opts->prior_sd > 0 ? 0.5 * p->opts->prior_sd * range : range / sqrt(12);
+}
+
 double sdm_fit_prior(const fit_problem *p, const fit_state *s, double *gradient, double *complete, double *observed)
 {
     const sdm_fit_opts *o = p->opts;
@@ -34,7 +40,7 @@ double sdm_fit_prior(const fit_problem *p, const fit_state *s, double *gradient,
     const double *weight = p->prior_weight;
     double sum = 0;
     for (size_t k = 0; k < p->n_params && o->prior_sd > 0; k++) {
-        const double sd = 0.5 * o->prior_sd * (p->high[k] - p->low[k]), precision = weight[k] / (sd * sd);
+        const double sd = sdm_fit_prior_sd(p, k), precision = weight[k] / (sd * sd);
         const double residual = s->params[k] - 0.5 * (p->low[k] + p->high[k]);
         sum -= 0.5 * precision * residual * residual;
         add_normal(n, k, residual, precision, gradient, complete, observed);
@@ -67,8 +73,7 @@ void sdm_fit_add_ignorance(const fit_problem *p, double *a)
 {
     const sdm_fit_opts *o = p->opts;
     const size_t n = p->sums.n_unknowns, m = p->n_params;
-    for (size_t k = 0; k < m && !(o->prior_sd > 0); k++)
-        a[k * (n + 1)] += 12 / ((p->high[k] - p->low[k]) * (p->high[k] - p->low[k]));
+    for (size_t k = 0; k < m && !(o->prior_sd > 0); k++) a[k * (n + 1)] += 1 / pow(sdm_fit_prior_sd(p, k), 2);
     for (size_t k = 0; k < 3; k++) {
         if (!(o->prior_rotation_sd > 0)) a[(m + k) * (n + 1)] += 3 / (3.14159265358979324 * 3.14159265358979324);
         if (!(o->prior_translation_sd > 0)) a[(m + 3 + k) * (n + 1)] += 1 / (p->extent.reach * p->extent.reach);

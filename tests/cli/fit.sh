@@ -50,6 +50,7 @@ near "$(pose rotation_rad 3)" 0.3 0.15
 awk -v d="$(json dice)" 'BEGIN { exit !(d > 0.97 && d <= 1) }' || bad "Dice $(json dice)"
 awk -v m="$(json surface_mean_mm)" -v q="$(json surface_q95_mm)" -v h="$(json surface_hausdorff_mm)" \
     'BEGIN { exit !(m > 0 && m < q && q < h && h < 0.4) }' || bad 'distances of the surfaces'
+has '"not_determined": \[\]'
 [ "$(json map_voxel_mm)" = 0.35 ] || bad "maps of $(json map_voxel_mm) mm"
 [ "$(json maps_network)" = 0 ] && [ "$(json maps_exact)" -gt 3 ] || bad 'maps must be exact'
 present ${vdb#-o } fit.stl fit.ply fit.nii.gz fit.nrrd fit.npy fit.png fit.json fitted.nrrd
@@ -95,6 +96,9 @@ expect 0 'no start is given.*20.*-30.*10' sdmgen fit $fit ct.nii.gz --turns-sphe
 awk -v d="$(json evidence)" 'BEGIN { exit !(d > 0) }' || bad "evidence $(json evidence)"
 
 # what is kept is kept
+# a prior that leaves the image nothing to say, about the middle of the ranges
+sdmgen fit $fit ct.nii.gz $near_truth --prior-sd 0.0001 --json >out 2>err
+has '"not_determined": \["rx", "ry", "rz"\]'
 expect 0 - sdmgen fit $fit $truth ct.nii.gz $turned --keep parameters --keep blur --blur 0.3 --spacing 0.5 --json
 [ "$(param rx)" = 3.5 ] && [ "$(json blur_mm)" = 0.3 ] || bad 'kept values changed'
 

@@ -314,9 +314,47 @@ static void test_priors(void **state)
     assert_true(r.params[2] > free_of_it.params[2] + 1e-4);
     assert_true(r.params[1] > free_of_it.params[1] + 1e-4);
     for (int k = 0; k < 3; k++) assert_true(r.sd[k] < 0.3 && r.sd[k] < 1.1 * free_of_it.sd[k]);
+    for (int k = 0; k < 3; k++) assert_false(r.by_prior[k] || free_of_it.by_prior[k]);
     sdm_fit_result other = free_of_it;
     sdm_fit_dispose(&other);
     sdm_fit_dispose(&r);
+    free(v);
+}
+
+// of a parameter without effect nothing is known but what was known before, with a prior and without; of the others it is
+static void test_no_effect(void **state)
+{
+    (void)state;
+    sdm_param params[4] = {{0}};
+    sdm_shape shape = *sdm_instance_shape(ellipsoid);
+    memcpy(params, shape.params, 3 * sizeof *params);
+    params[3] = (sdm_param){.name = "nothing", .unit = "", .min = 1, .max = 3, .def = 1.5, .help = "has no effect"};
+    shape.name = "with_nothing";
+    shape.params = params;
+    shape.n_params = 4;
+    shape.velocity = NULL; // writes those of three
+    sdm_instance *instance = NULL;
+    assert_int_equal(sdm_registry_add(registry, &shape, "test", NULL), SDM_OK);
+    assert_int_equal(sdm_instance_create(sdm_registry_find(registry, "with_nothing", NULL),
+                                         &(sdm_named_text){"edge", "0.2"}, 1, NULL, &instance, NULL),
+                     SDM_OK);
+    float *v = phantom(TRUTH, &POSE, 1, 5);
+    const sdm_fit_target t = image_of(v);
+    sdm_fit_source source = exact_source();
+    source.shape = instance;
+    for (int prior = 0; prior < 2; prior++) {
+        sdm_fit_opts o = near_start();
+        sdm_fit_result r;
+        sdm_error err = {0};
+        o.start_params = (const double[4]){2.4, 1.8, 1.4, 1.5};
+        o.prior_sd = prior;
+        if (sdm_fit(&source, &t, &o, &r, &err)) fail_msg("%s", err.text);
+        for (int k = 0; k < 3; k++) assert_false(r.by_prior[k]);
+        assert_true(r.by_prior[3]);
+        assert_true(fabs(r.sd[3] / (prior ? 1 : 2 / sqrt(12)) - 1) < 0.02);
+        sdm_fit_dispose(&r);
+    }
+    sdm_instance_free(instance);
     free(v);
 }
 
@@ -395,6 +433,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_turns),
         cmocka_unit_test(test_kept),
         cmocka_unit_test(test_priors),
+        cmocka_unit_test(test_no_effect),
         cmocka_unit_test(test_prior_weight),
         cmocka_unit_test(test_overlapping_tissues),
         cmocka_unit_test(test_absent_tissue),

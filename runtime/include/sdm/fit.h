@@ -12,7 +12,8 @@
    nearest face changes, so a fit with exact maps ends by derivatives that are averages over a motion of the surface of 3 % of a voxel
    of the map (Ermoliev, Norkin and Wets 1995): one place, wherever it comes from. The covariance is the sandwich
    H^-1 J H^-1 (Huber 1967), H the information of the observed values (labels: Louis 1982), J the covariance of the score with the
-   spatial correlation of the residuals (Conley 1999), so that correlated noise and a model that is a little wrong widen it. */
+   spatial correlation of the residuals (Conley 1999), freed of what the fit has taken from it, so that correlated noise and a model that is
+   a little wrong widen it. */
 #ifndef SDM_FIT_H
 #define SDM_FIT_H
 
@@ -153,10 +154,11 @@ typedef struct sdm_fit_result {
     size_t n_params;
     double *params;         /* [n_params] */
     sdm_pose pose;          /* world = R shape + t */
-    double *covariance;     /* [N][N] of the posterior; rows of what was kept are 0; NaN where the fit did not come so far */
+    double *covariance;     /* [N][N] of the posterior; rows of what was kept are 0; all NaN where a fit ended before */
     double *sd;             /* [N]; NaN as there */
     double *correlation;    /* [N][N]; 0 where sd is 0, NaN as there */
     bool *at_bound;         /* [n_params] estimate is at an end of its range: its sd says little */
+    bool *by_prior;         /* [n_params] sd is that of the prior or of the range: the target says nothing of it */
     bool start_clamped;     /* the start was moved to the network's range */
     size_t n_exact_outside; /* maps the exact engine made because parameters lay outside of the network's range */
 
@@ -175,7 +177,7 @@ typedef struct sdm_fit_result {
 
     size_t n_used, n_nan; /* voxels or points used; voxels near the shape left out because they are NaN or n_cavity's */
     size_t n_cavity;      /* voxels of the image left out by sdm_fit_opts.cavity */
-    double noise_factor;  /* variance of the score over that of independent residuals (1: independent, as modelled); NaN as sd */
+    double noise_factor;  /* sum of the correlations of a residual with the others (1: independent); NaN as sd */
     double
         model_error_mm; /* near the surface, of the maps of the last phase: held-out figure of the network, 0 for exact ones;
                                      its share is in the covariance; NaN as sd */

@@ -206,8 +206,8 @@ static void test_misuse(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_apply),    cmocka_unit_test(test_compose),    cmocka_unit_test(test_vector),
-        cmocka_unit_test(test_product),  cmocka_unit_test(test_quaternion), cmocka_unit_test(test_jacobian),
+        cmocka_unit_test(test_apply),   cmocka_unit_test(test_compose),    cmocka_unit_test(test_vector),
+        cmocka_unit_test(test_product), cmocka_unit_test(test_quaternion), cmocka_unit_test(test_jacobian),
         cmocka_unit_test(test_misuse),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -22,7 +22,7 @@ typedef struct sdm_vdb_opts {
         *metadata; /* string metadata: version, shape, parameters, source, error ...; names once each and
                                         not those written here: name, class, creator, file_*, is_*, sdm_* of below */
     size_t n_metadata;
-    bool (*cancelled)(void *user); /* asked now and then; true stops with SDM_E_CANCELLED, without a file; may be NULL */
+    bool (*cancelled)(void *user); /* asked now and then; true: SDM_E_CANCELLED and no file; may be NULL */
     void *user;
 } sdm_vdb_opts;
 

@@ -60,8 +60,17 @@ static inline int v4i_bits(v4i m) { return (m[0] & 1) | (m[1] & 2) | (m[2] & 4) 
 static inline v4f v4f_fma(v4f a, v4f b, v4f c) { return a * b + c; }
 #endif
 
-static inline v8f v8_load(const float *p) { return *(const v8f *)(const void *)p; }
-static inline void v8_store(float *p, v8f x) { *(v8f *)(void *)p = x; }
+/* Through the vectors, which may alias floats; the structures of two may not. */
+static inline v8f v8_load(const float *p)
+{
+    const v4f *v = (const v4f *)(const void *)p;
+    return (v8f){v[0], v[1]};
+}
+static inline void v8_store(float *p, v8f x)
+{
+    v4f *v = (v4f *)(void *)p;
+    v[0] = x.low, v[1] = x.high;
+}
 static inline v8f v8_all(float x) { return (v8f){{x, x, x, x}, {x, x, x, x}}; }
 static inline v8f v8_add(v8f a, v8f b) { return (v8f){a.low + b.low, a.high + b.high}; }
 static inline v8f v8_sub(v8f a, v8f b) { return (v8f){a.low - b.low, a.high - b.high}; }
@@ -103,8 +112,16 @@ static inline void v8_permute(uint32_t *out, v8i a, const uint16_t *order)
 }
 
 static inline v4d v4_all(double x) { return (v4d){{x, x}, {x, x}}; }
-static inline v4d v4_load(const double *p) { return *(const v4d *)(const void *)p; }
-static inline void v4_store(double *p, v4d x) { *(v4d *)(void *)p = x; }
+static inline v4d v4_load(const double *p)
+{
+    const v2d *v = (const v2d *)(const void *)p;
+    return (v4d){v[0], v[1]};
+}
+static inline void v4_store(double *p, v4d x)
+{
+    v2d *v = (v2d *)(void *)p;
+    v[0] = x.low, v[1] = x.high;
+}
 static inline v4d v4_add(v4d a, v4d b) { return (v4d){a.low + b.low, a.high + b.high}; }
 static inline v4d v4_sub(v4d a, v4d b) { return (v4d){a.low - b.low, a.high - b.high}; }
 static inline v4d v4_mul(v4d a, v4d b) { return (v4d){a.low * b.low, a.high * b.high}; }

@@ -79,7 +79,7 @@ typedef struct cli_timing {
     size_t n_network, n_exact, n_naive;
 } cli_timing;
 
-/* Medians over random shapes; fastest: of one shape again and again, the fastest. shape may be NULL: the network alone. */
+/* Medians over random shapes; fastest: the fastest, of one shape again and again, a batch of as many shapes, the naive method as ever. shape may be NULL: the network alone. */
 sdm_status cli_time_maps(const sdm_model *m, const sdm_instance *shape, uint64_t seed, bool fastest, size_t n_naive,
                          cli_timing *out, sdm_error *err);
 

@@ -14,7 +14,7 @@ static void print_params(const cli_fit *f)
         if (r->sd[i] > 0) printf(" +- %-9.2g", r->sd[i]);
         printf(" %s%s%s\n", p->unit,
                r->at_bound[i] ? "   at the end of its range: the standard deviation says little" : "",
-               r->by_prior[i] ? "   not determined: the standard deviation is that of before the fit" : "");
+               r->by_prior[i] ? "   not determined: the standard deviation is at least that of before the fit" : "");
     }
 }
 

@@ -128,7 +128,7 @@ sdm_status sdm_band_close(const sdm_grid *g, const float *values, double width, 
     const float low = border_minimum(g, values);
     sdm_faces faces = {0};
     s = reserve(g, (double)low < width ? (int32_t)ceil(width / g->spacing[0]) + 1 : 0, out, err);
-    if (!s) s = sdm_faces_create(g, values, &faces, err);
+    if (!s && out->pad) s = sdm_faces_create(g, values, &faces, err);
     out->cut = low < 0;
     for (int64_t k = 0; k < out->n[2] && !s; k++) {
         if (opts->cancelled && opts->cancelled(opts->user))

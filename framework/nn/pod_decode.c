@@ -36,13 +36,10 @@ size_t sdm_pod_carve_thread(const pod_network *m, size_t rows, float *memory, sp
     for (size_t l = 1; l < m->arch.levels.n && sdm_pod_is_bytes(m); l++)
         s->x[l] = take_inputs(m, rows, m->max_group[l], rows, memory, &at);
     s->leaves = take_inputs(m, rows, m->max_slab, m->max_slab_groups * SDM_POD_GROUP, memory, &at);
-    size_t most = m->max_slab;
-    for (size_t l = 0; l < m->arch.levels.n; l++)
-        if (m->max_group[l] > most) most = m->max_group[l];
     const sdm_pod_block *end = &m->blocks[m->arch.levels.first[1] - 1];
     s->ld_line = padded((m->arch.block * m->arch.block + 3) * (end->at[0] + end->size[0])); // panels write 3 rows more
     s->line = take(memory, &at, rows * s->ld_line);
-    s->back = take(memory, &at, most + SDM_PANEL);
+    s->back = take(memory, &at, m->max_slab + SDM_PANEL);
     return at;
 }
 

@@ -19,7 +19,7 @@ typedef struct space {
     input leaves;                 /* those of all blocks of the lowest level of a slab; scale: [groups][G] */
     float *line; /* [G][ld_line] voxels of blocks of the lowest level side by side along x, [nz][ny][nx] */
     size_t ld_line;
-    float *back; /* [inputs of a slab, or of blocks that get theirs together] gradient there, rests of inputs */
+    float *back; /* [inputs of a slab] gradient there */
 } space;
 
 /* Sets the pointers into memory[] (NULL: none) for G rows; returns the floats needed. */

@@ -95,11 +95,16 @@ static void fill(const fit_problem *p, const fit_scatter *scatter, const double 
             const double c = sandwich(n, influence, spread, i, j);
             out->covariance[i * size + j] = out->covariance[j * size + i] = c;
         }
-    for (size_t i = 0; i < size; i++) out->sd[i] = sqrt(fmax(out->covariance[i * (size + 1)], 0));
+    for (size_t i = 0; i < size; i++) {
+        const double variance = out->covariance[i * (size + 1)];
+        out->sd[i] = variance >= 0 ? sqrt(variance) : NAN; // not 0, which says that it is known
+    }
     for (size_t i = 0; i < size; i++)
         for (size_t j = 0; j < size; j++) {
             const double product = out->sd[i] * out->sd[j];
-            out->correlation[i * size + j] = product > 0 ? i == j ? 1 : out->covariance[i * size + j] / product : 0;
+            double *c = &out->correlation[i * size + j];
+            *c = isnan(product) ? NAN : 0;
+            if (product > 0) *c = i == j ? 1 : out->covariance[i * size + j] / product;
         }
 }
 

@@ -3,7 +3,7 @@
        cov(score) = sum over n and lags of C(lag) root_n root_(n+lag)^T     (Conley 1999, here with the e of one stationary field)
 
    The weight of a lag is 1 in the inner half of a window and falls linearly to its edge (Politis and Romano 1995), or, should the sum not
-   be positive definite so, falls linearly from the middle (Bartlett 1950), where it always is. */
+   be positive definite so, falls linearly from the middle (Bartlett 1950), where it is but for freed correlations far from those found. */
 #include "score.h"
 
 #include <math.h>

@@ -69,7 +69,8 @@ SDM_API void sdm_panel_pack_i8(size_t outputs, size_t n_wide, size_t k, const in
 SDM_API void sdm_quantise(size_t rows, size_t n, const float *y, size_t ldy, const float *factor, int limit, int16_t *x,
                           size_t ldx, float *scale);
 
-/* One row, and a second of what rounding leaves of it: x times *scale plus rest times *rest_scale is as near as floats are. */
+/* One row, and a second of what rounding leaves of it: x times *scale plus rest times *rest_scale is off by
+   at most the largest magnitude / (2 limit^2), and rounding. */
 SDM_API void sdm_quantise_rest(size_t n, const float *y, const float *factor, int limit, int16_t *x, float *scale,
                                int16_t *rest, float *rest_scale);
 

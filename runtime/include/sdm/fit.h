@@ -152,13 +152,13 @@ SDM_API sdm_fit_opts sdm_fit_defaults(void);
    (rad; a small turn, after the pose, about the axes of the world through the origin of the shape), translation (mm). */
 typedef struct sdm_fit_result {
     size_t n_params;
-    double *params;         /* [n_params] */
-    sdm_pose pose;          /* world = R shape + t */
-    double *covariance;     /* [N][N] of the posterior; rows of what was kept are 0; all NaN where a fit ended before */
-    double *sd;             /* [N]; NaN as there */
-    double *correlation;    /* [N][N]; 0 where sd is 0, NaN as there */
-    bool *at_bound;         /* [n_params] estimate is at an end of its range: its sd says little */
-    bool *by_prior;         /* [n_params] sd is that of the prior or of the range: the target says nothing of it */
+    double *params;      /* [n_params] */
+    sdm_pose pose;       /* world = R shape + t */
+    double *covariance;  /* [N][N] of the posterior; rows of what was kept are 0; all NaN where a fit ended before */
+    double *sd;          /* [N]; NaN as there */
+    double *correlation; /* [N][N]; 0 where sd is 0, NaN as there */
+    bool *at_bound;      /* [n_params] estimate is at an end of its range: its sd says little */
+    bool *by_prior; /* [n_params] sd is no less than that of the prior or the range: the target says nothing of it */
     bool start_clamped;     /* the start was moved to the network's range */
     size_t n_exact_outside; /* maps the exact engine made because parameters lay outside of the network's range */
 
@@ -173,15 +173,16 @@ typedef struct sdm_fit_result {
     double
         evidence; /* image: how much better the shape explains it: gain in log-likelihood over correlated voxels, less
                         what its unknowns cost (Schwarz 1978); below 0 the image holds no such shape. Else NaN */
-    double inside_share; /* share of the volume of the shape in the image; 1 for points; NaN as sd */
+    double inside_share; /* share of the volume of the shape in the image; 1 for points; NaN where a fit ended before */
 
     size_t n_used, n_nan; /* voxels or points used; voxels near the shape left out because they are NaN or n_cavity's */
     size_t n_cavity;      /* voxels of the image left out by sdm_fit_opts.cavity */
-    double noise_factor;  /* sum of the correlations of a residual with the others (1: independent); NaN as sd */
     double
-        model_error_mm; /* near the surface, of the maps of the last phase: held-out figure of the network, 0 for exact ones;
-                                     its share is in the covariance; NaN as sd */
-    double blur;        /* partial volume: sd of the point spread, mm; else 0 */
+        noise_factor; /* sum of the correlations of a residual with the others (1: independent); NaN as inside_share */
+    /* near the surface, of the maps of the last phase: held-out figure of the network, 0 for exact ones; its share is in the covariance;
+       NaN as inside_share */
+    double model_error_mm;
+    double blur;                   /* partial volume: sd of the point spread, mm; else 0 */
     sdm_fit_appearance appearance; /* at the end */
     double point_sd;               /* points: sd about the surface, mm; else 0 */
     size_t turn;                   /* the rotation that was chosen, from 0 */

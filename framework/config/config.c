@@ -50,7 +50,7 @@ static sdm_status read_all(sdm_reader *r, const char *text, size_t size, const c
     sdm_mark top = {.line = 1, .column = 1};
     sdm_status s = sdm_tree_parse(&tree, text, size, (sdm_mark){0}, r->mistakes, err);
     if (!s) sdm_fields_read(r, tree.root);
-    r->file_kind = r->config->network.kind;
+    r->file_kind = (int)r->config->network.kind;
     const bool is_keyed = !tree.root || tree.root->kind == SDM_TREE_MAP || sdm_tree_is_empty(tree.root);
     sdm_tree_dispose(&tree);
     if (s == SDM_E_CONFIG || (!s && !is_keyed)) return sdm_mistakes_report(r->mistakes, err);

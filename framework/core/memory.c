@@ -4,6 +4,7 @@
 #endif
 #include "sdm/memory.h"
 
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,9 +15,14 @@
 #define ALIGNMENT 64u
 #define HUGE_PAGE ((size_t)2 << 20)
 
-static unsigned long fail_after; // 0: off; only tests set it
+static atomic_ulong fail_after; // 0: off; only tests set it
 
-void sdm_alloc_fail_after(unsigned long n) { fail_after = n; }
+void sdm_alloc_fail_after(unsigned long n) { atomic_store(&fail_after, n); }
+
+static bool must_fail(void)
+{
+    return atomic_load_explicit(&fail_after, memory_order_relaxed) && atomic_fetch_sub(&fail_after, 1) == 1;
+}
 
 sdm_status sdm_mul(size_t a, size_t b, size_t *out, sdm_error *err)
 {
@@ -40,7 +46,7 @@ static sdm_status allocate(void **out, size_t count, size_t size, size_t *used, 
     // blocks of many pages: large pages spare a third of the time of a first touch
     const bool large = bytes >= 2 * HUGE_PAGE && bytes <= SIZE_MAX - HUGE_PAGE;
     if (large) bytes = (bytes + HUGE_PAGE - 1) / HUGE_PAGE * HUGE_PAGE;
-    if (!(fail_after && --fail_after == 0)) block = aligned_alloc(large ? HUGE_PAGE : ALIGNMENT, bytes);
+    if (!must_fail()) block = aligned_alloc(large ? HUGE_PAGE : ALIGNMENT, bytes);
 #ifdef MADV_HUGEPAGE
     if (block && large) (void)madvise(block, bytes, MADV_HUGEPAGE);
 #endif

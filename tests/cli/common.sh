@@ -36,6 +36,7 @@ expect() {
 stopped_at() {
     local pattern=$1 pid code
     shift
+    : >err # the job opens it too, but perhaps after the first look, which would find the text of the command before
     "$program" "$@" >out 2>err &
     pid=$!
     for _ in $(seq 300); do grep -Eq -- "$pattern" err && break || sleep 0.2; done

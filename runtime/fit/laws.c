@@ -115,7 +115,7 @@ static double normalise(double *log_p, size_t n)
 {
     double most = log_p[0], sum = 0;
     for (size_t i = 1; i < n; i++) most = fmax(most, log_p[i]);
-    for (size_t i = 0; i < n; i++) sum += log_p[i] = exp(log_p[i] - most);
+    for (size_t i = 0; i < n; i++) sum += log_p[i] = log_p[i] == most ? 1 : exp(log_p[i] - most);
     for (size_t i = 0; i < n; i++) log_p[i] /= sum;
     return most + log(sum);
 }

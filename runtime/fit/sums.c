@@ -39,18 +39,16 @@ void sdm_fit_sums_dispose(fit_sums *s)
 static void add_columns(const fit_response *r, const float *column, size_t n_columns, size_t n_channels, size_t n,
                         double *gradient, double *complete, double *observed)
 {
-    const double c = r->complete[0], o = r->observed[0];
+    double d[FIT_COLUMNS_MAX];
+    for (size_t a = 0; a < n_columns; a++) d[a] = (double)column[a];
     for (size_t a = 0; a < n_columns; a++) {
-        const double d = (double)column[a];
-        gradient[a] += r->score[0] * d;
-        const double dc = c * d, dob = o * d;
-        for (size_t b = a; b < n_columns; b++) {
-            complete[a * n + b] += dc * (double)column[b];
-            observed[a * n + b] += dob * (double)column[b];
-        }
+        const double c = r->complete[0] * d[a], o = r->observed[0] * d[a];
+        gradient[a] += r->score[0] * d[a];
+        for (size_t b = a; b < n_columns; b++) complete[a * n + b] += c * d[b];
+        for (size_t b = a; b < n_columns; b++) observed[a * n + b] += o * d[b];
         for (size_t b = 1; b < n_channels; b++) {
-            complete[a * n + n_columns + b - 1] += d * r->complete[b];
-            observed[a * n + n_columns + b - 1] += d * r->observed[b];
+            complete[a * n + n_columns + b - 1] += d[a] * r->complete[b];
+            observed[a * n + n_columns + b - 1] += d[a] * r->observed[b];
         }
     }
 }

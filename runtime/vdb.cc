@@ -94,7 +94,10 @@ void add_metadata(Grid &grid, const sdm_vdb_opts &o, const sdm_vdb_report &r, sd
 
 // ---- map to grid
 
-// smallest background that can be stored and is not below the band (checkLevelSet divides it by the voxel size)
+// most that the size of turned voxels is enlarged, in units of its last place
+const int ROUNDINGS_MOST = 64;
+
+// smallest background that can be stored and is not below the band: checkLevelSet divides it by the voxel size of the transform
 float background_value(double band_voxels, double voxel, bool half)
 {
     float b = static_cast<float>(band_voxels * voxel), stored = as_stored(b, half);
@@ -103,27 +106,40 @@ float background_value(double band_voxels, double voxel, bool half)
     return stored;
 }
 
-openvdb::math::Transform::Ptr transform_of(const sdm_grid &g)
+// OpenVDB multiplies row vectors: row a is axis a, the last row the origin
+openvdb::math::Transform::Ptr linear_transform(const openvdb::Vec3d axis[3], const openvdb::Vec3d &size,
+                                               const double origin[3])
 {
-    // axes a: columns of dir, made orthonormal to the last digit, times the spacing
-    openvdb::Vec3d axis[3];
+    openvdb::Mat4d m = openvdb::Mat4d::identity();
+    for (int a = 0; a < 3; a++)
+        for (int x = 0; x < 3; x++) m(a, x) = axis[a][x] * size[a];
+    for (int x = 0; x < 3; x++) m(3, x) = origin[x];
+    return openvdb::math::Transform::createLinearTransform(m);
+}
+
+// of a level set: with one size for all axes, equal as they are to 1e-6 only
+openvdb::math::Transform::Ptr transform_of(const sdm_grid &g, bool level_set)
+{
+    // axes a: columns of dir, made orthonormal to the last digit
+    openvdb::Vec3d axis[3], size(g.spacing[0], g.spacing[1], g.spacing[2]);
     for (int a = 0; a < 3; a++) {
         axis[a] = openvdb::Vec3d(g.dir[a], g.dir[3 + a], g.dir[6 + a]);
         for (int b = 0; b < a; b++) axis[a] -= axis[b] * axis[a].dot(axis[b]);
         axis[a].normalize();
     }
-    if (axis[0][0] == 1 && axis[1][1] == 1 && axis[2][2] == 1 && g.spacing[0] == g.spacing[1] &&
-        g.spacing[0] == g.spacing[2]) {
-        auto t = openvdb::math::Transform::createLinearTransform(g.spacing[0]);
+    if (level_set) size = openvdb::Vec3d(g.spacing[0]);
+    if (axis[0][0] == 1 && axis[1][1] == 1 && axis[2][2] == 1 && size[0] == size[1] && size[0] == size[2]) {
+        auto t = openvdb::math::Transform::createLinearTransform(size[0]);
         t->postTranslate(openvdb::Vec3d(g.origin[0], g.origin[1], g.origin[2]));
         return t;
     }
-    openvdb::Mat4d m =
-        openvdb::Mat4d::identity(); // OpenVDB multiplies row vectors: row a is axis a, the last row the origin
-    for (int a = 0; a < 3; a++)
-        for (int x = 0; x < 3; x++) m(a, x) = axis[a][x] * g.spacing[a];
-    for (int x = 0; x < 3; x++) m(3, x) = g.origin[x];
-    return openvdb::math::Transform::createLinearTransform(m);
+    auto t = linear_transform(axis, size, g.origin);
+    // whether turned voxels count as uniform hangs on roundings of 1e-15: some next size rounds otherwise
+    for (int i = 0; level_set && i < ROUNDINGS_MOST && !t->hasUniformScale(); i++) {
+        size = openvdb::Vec3d(std::nextafter(size[0], INFINITY));
+        t = linear_transform(axis, size, g.origin);
+    }
+    return t;
 }
 
 // one 8^3 block of the tree from the box; active where |value| < band (everywhere when dense)
@@ -148,11 +164,12 @@ void fill_block(Grid &grid, Grid::Accessor &acc, const sdm_band &box, const Coor
         acc.addTile(1, corner, -background, false); // far inside: no voxel of the block is near the surface
 }
 
-Grid::Ptr grid_of(const sdm_grid &g, const sdm_band &box, float background, bool dense, bool half)
+Grid::Ptr grid_of(const openvdb::math::Transform::Ptr &transform, const sdm_band &box, float background, bool dense,
+                  bool half)
 {
     Grid::Ptr grid = Grid::create(background);
     grid->setName(GRID_NAME);
-    grid->setTransform(transform_of(g));
+    grid->setTransform(transform);
     grid->setGridClass(dense ? openvdb::GRID_UNKNOWN : openvdb::GRID_LEVEL_SET);
     grid->setSaveFloatAsHalf(half);
     Grid::Accessor acc = grid->getAccessor();
@@ -172,6 +189,8 @@ struct owned_band {
     ~owned_band() { sdm_band_dispose(&band); }
 };
 
+double band_of(const sdm_vdb_opts &o) { return o.band_voxels != 0 ? o.band_voxels : 3.0; }
+
 void check_options(const sdm_grid &g, const sdm_vdb_opts &o, sdm_error *err)
 {
     if (o.band_voxels != 0 && !(o.band_voxels >= 3 && o.band_voxels <= 100))
@@ -183,6 +202,8 @@ void check_options(const sdm_grid &g, const sdm_vdb_opts &o, sdm_error *err)
             sdm_fail(err, SDM_E_ARG,
                      "spacing %g x %g x %g mm: a level set needs voxels of one size; write the map itself with --dense",
                      g.spacing[0], g.spacing[1], g.spacing[2]));
+    if (!o.dense && !(band_of(o) * h < (o.half ? 65000.0 : 3e38))) // some room for rounding up
+        need(sdm_fail(err, SDM_E_ARG, "spacing %g mm is too large for the number format", h));
 }
 
 // the half format ends at 65504
@@ -198,13 +219,12 @@ void check_half(const sdm_band &box, sdm_error *err)
 Grid::Ptr make_level_set(const sdm_grid &g, const float *values, const sdm_vdb_opts &o, sdm_vdb_report &report,
                          sdm_error *err)
 {
-    const float background = background_value(o.band_voxels != 0 ? o.band_voxels : 3.0, g.spacing[0], o.half);
-    if (!std::isfinite(background))
-        need(sdm_fail(err, SDM_E_ARG, "spacing %g mm is too large for the number format", g.spacing[0]));
+    const auto transform = transform_of(g, true);
+    const float background = background_value(band_of(o), transform->voxelSize()[0], o.half);
     owned_band box;
     need(sdm_band_close(&g, values, background, &o, &box.band, err));
     report.cut = box.band.cut;
-    Grid::Ptr grid = grid_of(g, box.band, background, false, o.half);
+    Grid::Ptr grid = grid_of(transform, box.band, background, false, o.half);
     mend_creases(*grid, o, report, err);
     return grid;
 }
@@ -222,7 +242,7 @@ Grid::Ptr make_dense(const sdm_grid &g, const float *values, const sdm_vdb_opts 
                                static_cast<int64_t>(i) / g.n[0] / g.n[1]};
         for (int a = 0; a < 3; a++) report.cut = report.cut || (values[i] < 0 && (at[a] == 0 || at[a] == g.n[a] - 1));
     }
-    return grid_of(g, box.band, background, true, o.half);
+    return grid_of(transform_of(g, false), box.band, background, true, o.half);
 }
 
 // ---- reading

@@ -445,6 +445,49 @@ static void test_direction(void **state)
     free(v);
 }
 
+// a ball of four voxels, on turned axes whose spacings differ by a share of `apart`, is a level set
+static void write_turned(double spacing, double apart, const double dir[9])
+{
+    const double centre[3] = {0, 0, 0}, middle[3] = {6, 6, 6};
+    sdm_grid g = sdm_grid_centred((const int64_t[3]){13, 13, 13}, spacing, centre);
+    double x[3];
+    memcpy(g.dir, dir, sizeof g.dir);
+    g.spacing[1] *= 1 + apart;
+    g.spacing[2] *= 1 - apart;
+    sdm_grid_world(&g, middle, x);
+    for (int a = 0; a < 3; a++) g.origin[a] -= x[a];
+    float *v = malloc(sdm_grid_count(&g) * sizeof *v);
+    assert_non_null(v);
+    for (size_t i = 0; i < sdm_grid_count(&g); i++) {
+        const double index[3] = {(double)(i % 13), (double)(i / 13 % 13), (double)(i / 169)};
+        sdm_grid_world(&g, index, x);
+        v[i] = (float)(sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]) - 4 * spacing);
+    }
+    write_level_set(&g, v, NULL);
+    double largest;
+    (void)compare(&g, v, 3 * spacing, &largest);
+    assert_true(largest <= 3.6e-7 * spacing); // the background is the next float
+    sdm_free(verify());
+    free(v);
+}
+
+// what OpenVDB rounds in the size of turned voxels must not make the band too narrow or the voxels unequal
+static void test_turned(void **state)
+{
+    (void)state;
+    static const double swapped[9] = {0, 1, 0, -1, 0, 0, 0, 0, 1}, straight[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    for (int i = 1; i <= 20; i++) {
+        const double a = cos(i), b = sin(i), c = cos(0.7 * i), d = sin(0.7 * i);
+        const double dir[9] = {a, -b * c, b * d, b, a * c, -a * d, 0, d, c};
+        write_turned(0.5, i % 2 ? 0 : 4e-7, dir);
+    }
+    static const double spacings[] = {0.001, 0.002, 0.005, 0.01, 3};
+    for (size_t i = 0; i < sizeof spacings / sizeof *spacings; i++) {
+        write_turned(spacings[i], 0, swapped);
+        write_turned(spacings[i], 4e-7, straight);
+    }
+}
+
 static void refuse(const sdm_grid *g, const float *v, const sdm_vdb_opts *o, sdm_status expected, const char *said)
 {
     sdm_error err;
@@ -473,6 +516,11 @@ static void test_refused(void **state)
            "program itself");
     refuse(&g, v, &(sdm_vdb_opts){.metadata = &(sdm_named_value){NULL, "1"}, .n_metadata = 1}, SDM_E_ARG, "no name");
     refuse(&g, NULL, NULL, SDM_E_ARG, "needed");
+    for (int a = 0; a < 3; a++) g.spacing[a] = 22000;
+    refuse(&g, v, &(sdm_vdb_opts){.half = true}, SDM_E_ARG, "too large for the number format");
+    for (int a = 0; a < 3; a++) g.spacing[a] = 2e38;
+    refuse(&g, v, NULL, SDM_E_ARG, "too large for the number format");
+    g = standard_grid();
     v[777] = 70000.0f;
     refuse(&g, v, &(sdm_vdb_opts){.dense = true, .half = true}, SDM_E_ARG, "65504");
     free(v);
@@ -605,6 +653,7 @@ int main(void)
         cmocka_unit_test(test_all_inside),
         cmocka_unit_test(test_band_beyond_grid),
         cmocka_unit_test(test_direction),
+        cmocka_unit_test(test_turned),
         cmocka_unit_test(test_refused),
         cmocka_unit_test(test_gradients),
         cmocka_unit_test(test_unwritable),

@@ -197,6 +197,9 @@ void check_options(const sdm_grid &g, const sdm_vdb_opts &o, sdm_error *err)
         need(sdm_fail(err, SDM_E_ARG, "band of %g voxels, need 3 to 100", o.band_voxels));
     if (o.n_metadata && !o.metadata) need(sdm_fail(err, SDM_E_ARG, "%zu metadata entries at NULL", o.n_metadata));
     const double h = g.spacing[0];
+    if (!(h * g.spacing[1] * g.spacing[2] > 4e-15)) // below 3e-15 it takes them for nothing
+        need(sdm_fail(err, SDM_E_ARG, "spacing %g x %g x %g mm is too small for OpenVDB, need at least 2e-5 mm", h,
+                      g.spacing[1], g.spacing[2]));
     if (!o.dense && !(std::fabs(g.spacing[1] - h) <= 1e-6 * h && std::fabs(g.spacing[2] - h) <= 1e-6 * h))
         need(
             sdm_fail(err, SDM_E_ARG,
@@ -220,6 +223,10 @@ Grid::Ptr make_level_set(const sdm_grid &g, const float *values, const sdm_vdb_o
                          sdm_error *err)
 {
     const auto transform = transform_of(g, true);
+    if (!transform->hasUniformScale())
+        need(sdm_fail(err, SDM_E_ARG,
+                      "to OpenVDB voxels of %g mm on turned axes are not uniform; write the map itself with --dense",
+                      g.spacing[0]));
     const float background = background_value(band_of(o), transform->voxelSize()[0], o.half);
     owned_band box;
     need(sdm_band_close(&g, values, background, &o, &box.band, err));

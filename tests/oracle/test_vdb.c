@@ -520,6 +520,13 @@ static void test_refused(void **state)
     refuse(&g, v, &(sdm_vdb_opts){.half = true}, SDM_E_ARG, "too large for the number format");
     for (int a = 0; a < 3; a++) g.spacing[a] = 2e38;
     refuse(&g, v, NULL, SDM_E_ARG, "too large for the number format");
+    for (int a = 0; a < 3; a++) g.spacing[a] = 1e-5;
+    refuse(&g, v, NULL, SDM_E_ARG, "too small for OpenVDB");
+    refuse(&g, v, &(sdm_vdb_opts){.dense = true}, SDM_E_ARG, "too small for OpenVDB");
+    for (int a = 0; a < 3; a++) g.spacing[a] = 2e-5;
+    const double c = cos(0.3), s = sin(0.3), dir[9] = {c, -s, 0, s, c, 0, 0, 0, 1};
+    memcpy(g.dir, dir, sizeof g.dir);
+    refuse(&g, v, NULL, SDM_E_ARG, "on turned axes are not uniform");
     g = standard_grid();
     v[777] = 70000.0f;
     refuse(&g, v, &(sdm_vdb_opts){.dense = true, .half = true}, SDM_E_ARG, "65504");

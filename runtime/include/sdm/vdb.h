@@ -44,7 +44,7 @@ typedef struct sdm_vdb_report {
    brings a gradient back (Kaczmarz 1937), until the check passes. Every voxel stays on its side of the surface: none of the inside is
    lost. Zero crossings move by a fraction of a voxel. All other values are those given. SDM_E_QUALITY where no such values are found.
    A surface that leaves the grid is closed at the grid's border (half a voxel beyond the outermost centres), and where the band
-   leaves the grid it goes on outside. SDM_E_ARG when nothing is inside.
+   leaves the grid it goes on outside. SDM_E_ARG when nothing is inside, and for voxels below 2e-5 mm (1e-3 mm on turned axes).
    The file ends with a checksum of all its bytes, which other readers of OpenVDB files do not see. */
 SDM_API sdm_status sdm_vdb_write(const char *path, const sdm_grid *grid, const float *values, const sdm_vdb_opts *opts,
                                  sdm_vdb_report *report, sdm_error *err);

@@ -21,19 +21,42 @@ static const char *option_type(const sdm_option *o)
     }
 }
 
-/* Aligned: a column is as wide as its widest cell. */
-enum { COLUMNS = 5, CELL = 96 };
+/* Aligned: a column is as wide as its widest cell. Texts are those of the shape, of any length. */
+enum { COLUMNS = 5 };
+typedef struct cell {
+    const char *text;
+    int length;
+    char own[48]; /* where the text is not one of the shape */
+} cell;
 typedef struct table {
-    char (*cell)[COLUMNS][CELL];
+    cell (*row)[COLUMNS];
     size_t n;
 } table;
+
+static void put(cell *c, const char *text)
+{
+    c->text = text ? text : "";
+    c->length = (int)strlen(c->text);
+}
+
+static void put_number(cell *c, double value)
+{
+    snprintf(c->own, sizeof c->own, "%.6g", value);
+    put(c, c->own);
+}
+
+static void put_range(cell *c, double min, double max)
+{
+    snprintf(c->own, sizeof c->own, "%.6g .. %.6g", min, max);
+    put(c, c->own);
+}
 
 static sdm_status table_start(table *t, size_t n_rows, sdm_error *err)
 {
     static const char *const titles[COLUMNS] = {"name", "unit", "range", "default", "meaning"};
     t->n = 1;
-    const sdm_status s = sdm_alloc((void **)&t->cell, n_rows + 1, sizeof *t->cell, "table", err);
-    for (size_t k = 0; k < COLUMNS && !s; k++) snprintf(t->cell[0][k], CELL, "%s", titles[k]);
+    const sdm_status s = sdm_alloc((void **)&t->row, n_rows + 1, sizeof *t->row, "table", err);
+    for (size_t k = 0; k < COLUMNS && !s; k++) put(&t->row[0][k], titles[k]);
     return s;
 }
 
@@ -41,16 +64,14 @@ static void table_print(table *t, const char *title)
 {
     int width[COLUMNS] = {0};
     for (size_t i = 0; i < t->n; i++)
-        for (size_t k = 0; k + 1 < COLUMNS; k++) {
-            const int length = (int)strlen(t->cell[i][k]);
-            if (length > width[k]) width[k] = length;
-        }
+        for (size_t k = 0; k + 1 < COLUMNS; k++)
+            if (t->row[i][k].length > width[k]) width[k] = t->row[i][k].length;
     printf("\n%s:\n", title);
     for (size_t i = 0; i < t->n; i++) {
-        for (size_t k = 0; k + 1 < COLUMNS; k++) printf("  %-*s", width[k], t->cell[i][k]);
-        printf("  %s\n", t->cell[i][COLUMNS - 1]);
+        for (size_t k = 0; k + 1 < COLUMNS; k++) printf("  %-*.*s", width[k], t->row[i][k].length, t->row[i][k].text);
+        printf("  %s\n", t->row[i][COLUMNS - 1].text);
     }
-    sdm_free(t->cell);
+    sdm_free(t->row);
 }
 
 static sdm_status print_params(const sdm_param *params, size_t n, sdm_error *err)
@@ -60,12 +81,12 @@ static sdm_status print_params(const sdm_param *params, size_t n, sdm_error *err
     if (s || n == 0) return s;
     for (size_t i = 0; i < n; i++) {
         const sdm_param *p = &params[i];
-        char(*row)[CELL] = t.cell[t.n++];
-        snprintf(row[0], CELL, "%s", p->name);
-        snprintf(row[1], CELL, "%s", p->unit ? p->unit : "");
-        snprintf(row[2], CELL, "%.6g .. %.6g", p->min, p->max);
-        snprintf(row[3], CELL, "%.6g", p->def);
-        snprintf(row[4], CELL, "%s", p->help ? p->help : "");
+        cell *row = t.row[t.n++];
+        put(&row[0], p->name);
+        put(&row[1], p->unit);
+        put_range(&row[2], p->min, p->max);
+        put_number(&row[3], p->def);
+        put(&row[4], p->help);
     }
     table_print(&t, "parameters");
     return SDM_OK;
@@ -78,19 +99,21 @@ static sdm_status print_options(const sdm_shape *shape, sdm_error *err)
     if (s || shape->n_options == 0) return s;
     for (uint32_t i = 0; i < shape->n_options; i++) {
         const sdm_option *o = &shape->options[i];
-        const bool number = o->type == SDM_OPTION_REAL || o->type == SDM_OPTION_INT;
-        char(*row)[CELL] = t.cell[t.n++];
-        snprintf(row[0], CELL, "%s", o->name);
-        snprintf(row[1], CELL, "%s", o->unit ? o->unit : "");
-        if (number)
-            snprintf(row[2], CELL, "%.6g .. %.6g", o->min, o->max);
-        else
-            snprintf(row[2], CELL, "%s", o->type == SDM_OPTION_CHOICE ? o->choices : "file");
-        if (number)
-            snprintf(row[3], CELL, "%.6g", o->def);
-        else if (o->type == SDM_OPTION_CHOICE)
-            snprintf(row[3], CELL, "%.*s", (int)strcspn(o->choices, "|"), o->choices);
-        snprintf(row[4], CELL, "%s", o->help ? o->help : "");
+        cell *row = t.row[t.n++];
+        put(&row[0], o->name);
+        put(&row[1], o->unit);
+        put(&row[3], "");
+        if (o->type == SDM_OPTION_REAL || o->type == SDM_OPTION_INT) {
+            put_range(&row[2], o->min, o->max);
+            put_number(&row[3], o->def);
+        } else if (o->type == SDM_OPTION_CHOICE) {
+            put(&row[2], o->choices);
+            put(&row[3], o->choices);
+            row[3].length = (int)strcspn(o->choices, "|"); // the first is the default
+        } else {
+            put(&row[2], "file");
+        }
+        put(&row[4], o->help);
     }
     table_print(&t, "options");
     return SDM_OK;
@@ -133,7 +156,7 @@ static void json_options(sdm_json *j, const sdm_shape *shape)
     sdm_json_close(j, ']');
 }
 
-/* The parameters of the table, or, for a shape whose parameters come from its data, of the instance that -O makes. */
+/* The parameters of the table, or, for a shape whose parameters depend on its options, of the instance that -O makes. */
 static sdm_status show_one(const cli_args *args, const sdm_registry *registry, sdm_error *err)
 {
     const char *name = args->files.items[0];
@@ -159,8 +182,7 @@ static sdm_status show_one(const cli_args *args, const sdm_registry *registry, s
     } else {
         printf("%s - %s\n", shape->name, shape->summary ? shape->summary : "");
         s = print_params(params, n, err);
-        if (!s && !instance && shape->describe)
-            printf("\nits parameters come from its data: give them with -O, see the options\n");
+        if (!s && !instance && shape->describe) printf("\nits parameters depend on its options: give these with -O\n");
         if (!s) s = print_options(shape, err);
     }
     sdm_instance_free(instance);

@@ -8,9 +8,12 @@ expect 0 - sdmgen shapes --json
 has '"name": "cochlea".*"name": "alpha", "unit": "mm", "min": 0, "max": 1\.2'
 expect 0 - sdmgen shapes cochlea
 for name in a alpha b phi; do has "^  $name +(mm|rad)? +-?[0-9]"; done
+has 'their options are the defaults$' # the whole text, however long
+has '^its parameters depend on its options'
 expect 0 - sdmgen shapes cochlea --json
 has '"options": \['
 expect 2 "unknown shape 'cochlae'; did you mean 'cochlea'\?" sdmgen shapes cochlae
+expect 2 "unknown shape 'cube'; .* --plugin FILE" sdmgen shapes cube
 expect 2 'O needs the NAME' sdmgen shapes -O a=1
 
 expect 0 - sdmgen mesh --shape torus -o t.ply -o t.stl -o t.obj -o t.off --audit

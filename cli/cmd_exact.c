@@ -6,6 +6,7 @@
 #include "exact_layers.h"
 #include "output.h"
 #include "progress.h"
+#include "report_audit.h"
 #include "sdm/checksum.h"
 #include "sdm/clock.h"
 #include "sdm/exact.h"
@@ -165,13 +166,7 @@ static void notice_mesh(const job *j)
     if (!inside) cli_notice("no voxel of the grid is inside the surface: is it where the shape is?");
     if (j->report.turned) cli_notice("the mesh was inside out and has been turned");
     if (j->report.parts_turned) cli_notice("%zu parts were inside out and have been turned", j->report.parts_turned);
-    if (a->boundary_edges > 0)
-        cli_notice("the mesh is open: %zu boundary edges; inside is where the winding number is over 1/2",
-                   a->boundary_edges);
-    if (a->nonmanifold_edges > 0) cli_notice("%zu edges with more than two triangles", a->nonmanifold_edges);
-    if (a->misoriented_edges > 0) cli_notice("%zu edges with triangles of opposite orientation", a->misoriented_edges);
-    if (a->degenerate > 0) cli_notice("%zu degenerate triangles", a->degenerate);
-    if (a->duplicate > 0) cli_notice("%zu duplicate triangles", a->duplicate);
+    cli_notice_audit(a);
     if (j->report.unioned)
         cli_notice("the mesh overlaps itself: the union of its %zu triangles is bounded by %zu (error at most %.2g mm)",
                    a->n_tri, j->report.n_tri_used, j->report.union_error_mm);

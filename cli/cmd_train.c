@@ -7,6 +7,7 @@
 #include "commands.h"
 #include "config_shape.h"
 #include "evaluate.h"
+#include "report_audit.h"
 #include "sdm/memory.h"
 #include "sdm/train.h"
 #include "setup.h"
@@ -82,12 +83,29 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
     return SDM_OK;
 }
 
+/* A new shape's mistakes show in its mesh: said before hours are spent on it. A mesh that fails is left to the training. */
+static void notice_mesh(const sdm_instance *shape)
+{
+    double p[SDM_MAX_PARAMS];
+    size_t n;
+    const sdm_param *params = sdm_instance_params(shape, &n);
+    for (size_t i = 0; i < n && i < SDM_MAX_PARAMS; i++) p[i] = params[i].def;
+    sdm_mesh mesh = {0};
+    sdm_audit audit;
+    if (n <= SDM_MAX_PARAMS && !sdm_instance_mesh(shape, p, &mesh, NULL) && !sdm_mesh_audit(&mesh, &audit, NULL)) {
+        if (audit.inverted) cli_notice("the mesh is inside out and is turned");
+        cli_notice_audit(&audit);
+    }
+    sdm_mesh_dispose(&mesh);
+}
+
 static sdm_status train(const cli_args *args, const sdm_config *config, const sdm_instance *shape, sdm_error *err)
 {
     const char *folder = config->output.folder;
     cli_progress progress;
     const sdm_train_hooks hooks = cli_train_hooks(&progress);
     sdm_train_report report = {0};
+    notice_mesh(shape);
     cli_progress_start(&progress);
     sdm_status s = sdm_train(config, shape, folder, args->resume, &hooks, &report, err);
     cli_progress_clear(&progress);

@@ -122,6 +122,8 @@ static sdm_status write_picture(const char *path, const cli_map *map, sdm_error 
 sdm_status cli_write_map(const char *path, const cli_map *map, const cli_args *args, sdm_error *err)
 {
     char text[400], made[80];
+    const sdm_status s = cli_check_interrupt(err);
+    if (s) return s;
     switch (kind_of(path, NULL)) {
     case KIND_VDB:
         return write_vdb(path, map, args, err);

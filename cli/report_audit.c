@@ -3,6 +3,8 @@
 
 #include <stdio.h>
 
+#include "terminal.h"
+
 void cli_print_audit(const sdm_audit *a)
 {
     printf("vertices             %zu\n", a->n_vert);
@@ -45,4 +47,15 @@ void cli_json_audit(sdm_json *json, const sdm_audit *a)
     sdm_json_open(json, "max", '[');
     for (int i = 0; i < 3; i++) sdm_json_real(json, NULL, a->max[i]);
     sdm_json_close(json, ']');
+}
+
+void cli_notice_audit(const sdm_audit *a)
+{
+    if (a->boundary_edges > 0)
+        cli_notice("the mesh is open: %zu boundary edges; inside is where the winding number is over 1/2",
+                   a->boundary_edges);
+    if (a->nonmanifold_edges > 0) cli_notice("%zu edges with more than two triangles", a->nonmanifold_edges);
+    if (a->misoriented_edges > 0) cli_notice("%zu edges with triangles of opposite orientation", a->misoriented_edges);
+    if (a->degenerate > 0) cli_notice("%zu degenerate triangles", a->degenerate);
+    if (a->duplicate > 0) cli_notice("%zu duplicate triangles", a->duplicate);
 }

@@ -49,6 +49,11 @@ for method in exact naive; do
 done
 cmp -s exact.npy naive.npy || echo 'exact and naive differ in the last bits (allowed)'
 
+# stopped while the first of two files is written: the second is not begun
+stopped_at 'overlaps itself' exact --shape cochlea --size 256,256,256 --spacing 0.05 -o first.nrrd -o second.nrrd
+grep -q '^sdmgen: error: interrupted$' err || bad "not interrupted: $(cat err)"
+absent second.nrrd
+
 # the same bits for any number of threads
 expect 0 - sdmgen exact --shape cochlea --size 20,20,20 --spacing 0.5 --json --quiet --threads 1
 one=$(json values_crc64)

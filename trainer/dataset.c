@@ -37,8 +37,7 @@ sdm_status dataset_create(dataset *d, const sdm_config *config, sdm_error *err)
     if (room < (double)d->n_start || room < 1)
         return sdm_fail(err, SDM_E_CONFIG,
                         "%s: data.static (%zu maps), data.start (%zu) and data.holdout (%zu) need %.1f GB, "
-                        "data.memory_gb is %g: raise it or "
-                        "make fewer maps",
+                        "data.memory_gb is %g: raise it, or make fewer maps or a coarser grid",
                         config->file, d->n_static, d->n_start, d->n_holdout,
                         ((double)d->n_static + (double)d->n_start + 2.0 * (double)d->n_holdout) * map_bytes * 1e-9,
                         config->data.memory_gb);

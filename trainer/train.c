@@ -215,6 +215,7 @@ static sdm_status set_up(trainer *t, sdm_error *err)
     d->grid = &c->grid;
     d->seed = c->seed;
     d->n_voxels = sdm_grid_count(&c->grid);
+    if ((s = dataset_create(d, c, err))) return s; // first: it says what a grid that is too large needs
     size_t block = t->kind->block(c);
     for (int i = 0; i < 3 && !t->kind->block(c); i++)
         if ((size_t)c->grid.n[i] > block) block = (size_t)c->grid.n[i];
@@ -223,7 +224,7 @@ static sdm_status set_up(trainer *t, sdm_error *err)
     if ((s = SDM_ALLOC(&t->blocks, t->levels.first[t->levels.n], "blocks", err))) return s;
     sdm_pod_blocks(&c->grid, block, &t->levels, t->blocks);
     d->blocks = t->blocks;
-    return dataset_create(d, c, err);
+    return SDM_OK;
 }
 
 static void report_fill(void *user, size_t done, size_t all)
@@ -319,7 +320,7 @@ static sdm_status run(trainer *t, bool resume, sdm_outfile **config, sdm_error *
                         t->data.n_start, start);
     if (!s) s = check_grid(t, err);
     t->phase = SDM_PHASE_BASES;
-    trainer_report(t, trainer_by_time(t) ? trainer_seconds(t) / (t->config->train.minutes * 60) : 0, 0, true);
+    if (!s) trainer_report(t, trainer_by_time(t) ? trainer_seconds(t) / (t->config->train.minutes * 60) : 0, 0, true);
     if (!s) s = t->kind->begin(t, err);
     if (!s) s = start_producer(t, err);
     if (!s && found) s = retake(t, n_taken, err);

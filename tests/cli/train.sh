@@ -38,10 +38,22 @@ sdmgen train "$tiny" --out unpictured >out 2>err || bad "without pictures: $(cat
 present unpictured/model.sdm
 absent unpictured/checkpoint.sdmc
 
+# an open mesh of a new shape is told before the training, and one without blemish is not
+faces=$(sed -n 's/^element face //p;/^end_header/q' "$source_folder/configs/statistical/mean.ply")
+sed "s/^element face $faces$/element face $((faces - 1))/" "$source_folder/configs/statistical/mean.ply" | head -n -1 >open.ply
+for mean in "$PWD/open.ply" "$source_folder/configs/statistical/mean.ply"; do
+    sdmgen train "$tiny" "shape={name: statistical, options: {mean: $mean, count: 1,
+        modes: $source_folder/configs/statistical/modes.npy}}" train.steps=1 --force --out modes >out 2>"err-$(basename "$mean")" ||
+        bad "a statistical shape: $(cat err-*)"
+done
+grep -q '^sdmgen: the mesh is open: 3 boundary edges' err-open.ply || bad "no word of the open mesh: $(cat err-open.ply)"
+grep -q 'the mesh' err-mean.ply && bad "a word of a closed mesh: $(cat err-mean.ply)"
+
 # --force replaces a run when nothing of the new one can be refused any more, and no sooner
 before=$(cat run/* | cksum)
 expect 2 "range \[0, 100\] of 'a'" sdmgen train "$tiny" --force --out run 'shape.ranges.a=[0,100]' --quiet
 expect 2 'data.memory_gb' sdmgen train "$tiny" --force --out run data.memory_gb=0.001 'grid.size=[60,60,60]' --quiet
+expect 2 'data.memory_gb is .* a coarser grid' sdmgen train "$tiny" --force --out run 'grid.size=[100000,100000,100000]'
 expect 2 'no voxel of the grid is inside any' sdmgen train "$tiny" --force --out run 'grid.centre=[900,0,0]' --quiet
 [ "$before" = "$(cat run/* | cksum)" ] || bad 'a refused --force has changed the run'
 

@@ -188,16 +188,17 @@ static void add_check(job *j, const sdm_check *c)
 /* What is to be said of a row: nothing happens in silence. */
 static void notice_row(const job *j, size_t row, const sdm_result *r)
 {
-    if (r->clamped) cli_notice("row %zu: parameters outside the trained range were moved into it", row + 1);
+    char where[32] = "";
+    if (j->args->rows) snprintf(where, sizeof where, "row %zu: ", row + 1);
+    if (r->clamped) cli_notice("%sparameters outside the trained range were moved into it", where);
     if (r->reason == SDM_REASON_RANGE)
-        cli_notice("row %zu: parameters outside the trained range, computed by the exact engine", row + 1);
+        cli_notice("%sparameters outside the trained range, computed by the exact engine", where);
     if (r->reason == SDM_REASON_ERROR)
-        cli_notice(
-            "row %zu: error of the network near the surface (%s) %.3g mm, above %g mm: computed by the exact engine",
-            row + 1, j->args->error_of, sdm_check_get(&r->check, error_of(j->args)), j->args->max_error);
+        cli_notice("%serror of the network near the surface (%s) %.3g mm, above %g mm: computed by the exact engine",
+                   where, j->args->error_of, sdm_check_get(&r->check, error_of(j->args)), j->args->max_error);
     if (!j->args->check || j->args->json) return;
     const sdm_check *c = &r->check;
-    if (j->args->rows) printf("row %zu: ", row + 1);
+    fputs(where, stdout);
     if (r->checked)
         printf("error near the surface: max %.3g, q95 %.3g, RMSE %.3g, mean %.3g, bias %.2g mm (%zu voxels)\n",
                c->max_mm, c->q95_mm, c->rmse_mm, c->mean_mm, c->bias_mm, c->used);

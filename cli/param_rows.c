@@ -53,7 +53,9 @@ static char *next_cell(char **line)
 static sdm_status read_header(table *t, const sdm_param *params, size_t n, sdm_error *err)
 {
     char *line = next_line(t);
-    if (!line) return sdm_fail(err, SDM_E_FORMAT, "%s: no header line of parameter names", t->path);
+    if (!line)
+        return sdm_fail(err, SDM_E_FORMAT, "%s: no header line: the first names the columns, such as '%s'", t->path,
+                        params[0].name);
     for (char *cell; (cell = next_cell(&line));) {
         const char *names[MAX_COLUMNS];
         size_t index = n;
@@ -63,12 +65,13 @@ static sdm_status read_header(table *t, const sdm_param *params, size_t n, sdm_e
         }
         if (index == n) {
             const char *near = sdm_nearest_name(cell, names, n < MAX_COLUMNS ? n : MAX_COLUMNS);
-            return sdm_fail(err, SDM_E_FORMAT, "%s:%d: unknown parameter '%.100s'%s%s%s", t->path, t->line, cell,
-                            near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
+            return sdm_fail(err, SDM_E_FORMAT, "%s:%d: unknown column '%.100s'%s%s%s", t->path, t->line, cell,
+                            near ? "; did you mean '" : "; the first is '", near ? near : params[0].name,
+                            near ? "'?" : "'");
         }
         for (size_t i = 0; i < t->n_columns; i++)
             if (t->column[i] == index)
-                return sdm_fail(err, SDM_E_FORMAT, "%s:%d: parameter '%s' has two columns", t->path, t->line, cell);
+                return sdm_fail(err, SDM_E_FORMAT, "%s:%d: column '%s' is there twice", t->path, t->line, cell);
         t->column[t->n_columns++] = index; /* distinct, so at most n <= MAX_COLUMNS */
     }
     return SDM_OK;

@@ -44,7 +44,8 @@ const sdm_shape *cli_find_shape(const sdm_registry *r, const char *name, sdm_err
     const char *near = NULL;
     const sdm_shape *shape = sdm_registry_find(r, name, &near);
     if (!shape)
-        sdm_fail(err, SDM_E_ARG, "unknown shape '%s'%s%s%s", name, near ? "; did you mean '" : "; see sdmgen shapes",
+        sdm_fail(err, SDM_E_ARG, "unknown shape '%s'%s%s%s", name,
+                 near ? "; did you mean '" : "; sdmgen shapes lists those known, --plugin FILE loads others",
                  near ? near : "", near ? "'?" : "");
     return shape;
 }

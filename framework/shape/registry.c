@@ -66,8 +66,8 @@ sdm_status sdm_registry_add(sdm_registry *r, const sdm_shape *shape, const char 
     if (s) return s;
     for (size_t i = 0; i < r->count; i++)
         if (strcmp(r->entries[i]->shape.name, checked.name) == 0)
-            return sdm_fail(err, SDM_E_PLUGIN, "%s: shape '%s' is there already (%s)", origin, checked.name,
-                            r->entries[i]->origin);
+            return sdm_fail(err, SDM_E_PLUGIN, "%s: shape '%s' is there already (%s): choose another name", origin,
+                            checked.name, r->entries[i]->origin);
 
     s = make_room(r, err);
     if (s) return s;

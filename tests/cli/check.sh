@@ -27,7 +27,7 @@ expect 0 - sdmgen generate $model --max-error "$(awk -v m="$mean" 'BEGIN { print
 [ "$hash" = "$(json values_crc64)" ] || bad 'a map within the bound of its mean was replaced'
 origin=$(sed -n 's/.*"origin": \[\([^]]*\)\].*/\1/p' out | tr -d ' ')
 tight=$(awk -v m="$max" 'BEGIN { print 0.99 * m }')
-expect 0 "row 1: error of the network near the surface \(max\) .* above $tight mm: computed by the exact engine" \
+expect 0 "^sdmgen: error of the network near the surface \(max\) .* above $tight mm: computed by the exact engine" \
     sdmgen generate $model --max-error "$tight" --json -o b.nii -o b.mha -o b.nrrd -o b.npy
 near "$(json exact)" 1 0
 near "$(json exact_by_error)" 1 0
@@ -70,7 +70,7 @@ near "$(json clamped)" 1 0
 # within the range of the shape, out of that of the network
 expect 0 - sdmgen train "$source_folder/tests/cli/tiny.yaml" shape.name=torus 'shape.ranges.major=[2.5,3.5]' train.steps=2 --out narrow --quiet
 expect 5 'parameter major = 3\.50000000000000[0-9]+, allowed' sdmgen generate narrow/model.sdm -p major=3.5000000000000004 -o never.npy
-expect 0 'row 1: parameters outside the trained range, computed by the exact engine' \
+expect 0 '^sdmgen: parameters outside the trained range, computed by the exact engine' \
     sdmgen generate narrow/model.sdm -p major=3.5000000000000004 --policy exact --json -o r.nii -o r.mha --check
 near "$(json exact)" 1 0
 near "$(json exact_by_error)" 0 0

@@ -218,6 +218,10 @@ expect 3 'short.nii' sdmgen fit $fit short.nii $near_truth -o no.stl
 expect 3 "label.nrrd: no voxel has the label '7'" sdmgen fit $fit label.nrrd --label 7 -o no.stl
 printf 'x,y,z\n0,0,0\n1,0,0\n' >two.csv
 expect 3 'two.csv: 2 points, need 3' sdmgen fit $fit two.csv -o no.stl
+printf '' >nothing.csv
+expect 3 "nothing.csv: no header line: the first names the columns, such as 'x'" sdmgen fit $fit nothing.csv -o no.stl
+printf 'first,second\n0,0\n' >abc.csv
+expect 3 "abc.csv:1: unknown column 'first'; the first is 'x'" sdmgen fit $fit abc.csv -o no.stl
 printf 'x,y\n0,0\n1,0\n2,2\n' >flat.csv
 expect 3 'flat.csv: z of point 1 is missing' sdmgen fit $fit flat.csv -o no.stl
 printf 'shape_x,shape_y,shape_z,x,y,z\n0,0,0,1,1,1\n0,0,0,2,2,2\n' >same.csv

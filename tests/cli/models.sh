@@ -77,13 +77,13 @@ expect 0 - sdmgen generate $model --params bom.csv -o 'bom%d.npy' --quiet
 expect 1 'limited\.npy: cannot write' bash -c "ulimit -f 4; '$program' generate $model -o limited.npy"
 absent limited.npy
 
-expect 3 "header\.csv:1: unknown parameter 'aa'" sdmgen generate $model --params header.csv -o x.npy
+expect 3 "header\.csv:1: unknown column 'aa'" sdmgen generate $model --params header.csv -o x.npy
 printf 'alpha,a\n1\n' >short.csv
 expect 3 'short\.csv:2: 1 values, the header has 2' sdmgen generate $model --params short.csv -o x.npy
 printf 'alpha,a\n1,three\n' >word.csv
 expect 3 "word\.csv:2: 'three' is not a number" sdmgen generate $model --params word.csv -o x.npy
 printf '' >empty.csv
-expect 3 'empty\.csv: no header' sdmgen generate $model --params empty.csv -o x.npy
+expect 3 "empty\.csv: no header line: the first names the columns, such as 'a'" sdmgen generate $model --params empty.csv -o x.npy
 absent x1.npy x2.npy x-0001.npy
 
 # measuring

@@ -105,12 +105,13 @@ if(NOT said MATCHES "sdmgen ${VERSION}\n" OR NOT said MATCHES "plug-in shape ")
 endif()
 
 # a version that is not there, and a component that does not exist, are refused
-foreach(wanted "9.0" "${VERSION};REQUIRED;COMPONENTS;nonsense")
-  file(WRITE ${WORK}/refused/CMakeLists.txt "cmake_minimum_required(VERSION 3.25)\nproject(x C)\nfind_package(sdmgen ${wanted} REQUIRED)\n")
+foreach(wanted "9.0 REQUIRED" "${VERSION} REQUIRED COMPONENTS nonsense")
+  file(WRITE ${WORK}/refused/CMakeLists.txt "cmake_minimum_required(VERSION 3.25)\nproject(x C)\nfind_package(sdmgen ${wanted})\n")
   execute_process(COMMAND ${CMAKE_COMMAND} -G ${GENERATOR} -S ${WORK}/refused -B ${WORK}/refused/build -DCMAKE_PREFIX_PATH=${prefix}
-                          -DCMAKE_C_COMPILER=${CC} RESULT_VARIABLE code OUTPUT_QUIET ERROR_QUIET)
-  if(code EQUAL 0)
-    message(FATAL_ERROR "find_package(sdmgen ${wanted}) succeeded")
+                          -DCMAKE_C_COMPILER=${CC} RESULT_VARIABLE code OUTPUT_QUIET ERROR_VARIABLE said)
+  string(REGEX REPLACE "[ \n]+" " " said "${said}") # CMake breaks lines
+  if(code EQUAL 0 OR NOT said MATCHES "no component 'nonsense'|requested version \"9.0\"")
+    message(FATAL_ERROR "find_package(sdmgen ${wanted}) gave ${code}: ${said}")
   endif()
 endforeach()
 

@@ -17,8 +17,11 @@ printf '#include <math.h>\n#include <stdio.h>\nint main(int n, char **a) { retur
 here=$PWD
 { (cd "$source_folder" && cmake --preset wasm -B "$here/build") && cmake --build build --parallel 2 &&
     cmake --install build --prefix "$here/prefix"; } >log 2>&1 || bad "build: $(tail -n 5 log)"
-cmake -S "$source_folder/examples/wasm" -B example --toolchain "$source_folder/cmake/wasm32-wasi.cmake" \
-    -DCMAKE_PREFIX_PATH="$here/prefix" -DCMAKE_BUILD_TYPE=Release >log 2>&1 || bad "configure the example: $(tail -n 5 log)"
+# the command that the page shows, in folders of this test
+line=$(grep '^cmake -S examples/wasm -B build/map ' "$source_folder/examples/wasm/README.md")
+line=${line/build\/map/'"$here/example"'}
+line=${line/'$PWD/build/wasm/prefix'/'$here/prefix'}
+(cd "$source_folder" && eval "$line") >log 2>&1 || bad "configure the example: $(tail -n 5 log)"
 cmake --build example >log 2>&1 || bad "build the example: $(tail -n 5 log)"
 present example/map.wasm
 [ "$failures" -eq 0 ] || finish

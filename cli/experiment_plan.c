@@ -46,7 +46,7 @@ static plan plan_row(const experiment_run *run, const experiment_job *job)
     return p;
 }
 
-static void add_row(const experiment_run *run, const experiment_job *job, const plan *p, sdm_json *j)
+static void add_row(const experiment_run *run, const experiment_job *job, const plan *p, int width, sdm_json *j)
 {
     const sdm_experiment_row *row = &run->e->rows[job->index];
     const long long samples = row->method->fit ? run->e->fit.phantoms : row->samples;
@@ -63,7 +63,7 @@ static void add_row(const experiment_run *run, const experiment_job *job, const 
         sdm_json_text(j, "folder", job->config->output.folder);
         sdm_json_close(j, '}');
     } else {
-        printf("%-28s %-8s %-34s %-24s %-12s %s %-5lld %s\n", row->title, what, run->results[job->index].grid,
+        printf("%-*s %-8s %-34s %-24s %-12s %s %-5lld %s\n", width, row->title, what, run->results[job->index].grid,
                p->action, p->budget, row->method->fit ? "phantoms" : "samples", samples, job->config->output.folder);
     }
 }
@@ -72,7 +72,13 @@ sdm_status experiment_print_plan(const experiment_run *run, sdm_error *err)
 {
     sdm_json j = {0};
     double minutes = 0;
+    size_t untimed = 0;
+    int width = 28;
     sdm_status s = SDM_OK;
+    for (size_t i = 0; i < run->e->n_rows; i++) {
+        const int length = (int)strlen(run->e->rows[i].title);
+        if (length > width) width = length;
+    }
     sdm_json_open(&j, NULL, '{');
     sdm_json_open(&j, "rows", '[');
     for (size_t i = 0; i < run->e->n_rows && !s; i++) {
@@ -83,7 +89,8 @@ sdm_status experiment_print_plan(const experiment_run *run, sdm_error *err)
         }
         const plan p = plan_row(run, job);
         minutes += p.minutes;
-        add_row(run, job, &p, &j);
+        untimed += *p.budget && !(p.minutes > 0);
+        add_row(run, job, &p, width, &j);
     }
     sdm_json_close(&j, ']');
     sdm_json_real(&j, "minutes", minutes);
@@ -93,6 +100,7 @@ sdm_status experiment_print_plan(const experiment_run *run, sdm_error *err)
     sdm_json_dispose(&j);
     if (s) return s;
     printf("\ntrainings of %g min in all", minutes);
+    if (untimed) printf(", and %zu by steps or samples, whose time is not known", untimed);
     if (run->e->experiment.minutes > 0) printf("; limit %g min", run->e->experiment.minutes);
     printf("; results in %s\n", run->folder);
     return SDM_OK;

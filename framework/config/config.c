@@ -42,6 +42,18 @@ sdm_status sdm_config_override(sdm_reader *r, const char *text, sdm_mark mark, s
     return s == SDM_E_CONFIG ? SDM_OK : s;
 }
 
+/* An experiment by mistake: every one of its keys would be told, and nothing of what to do. True: refused. */
+static bool refuse_experiment(sdm_mistakes *mistakes, const sdm_tree_node *root)
+{
+    for (const sdm_tree_node *n = root ? root->first : NULL; n; n = n->next) {
+        if (!n->key || strcmp(n->key, "methods") != 0) continue;
+        sdm_mistakes_add(mistakes, n->key_mark,
+                         "methods: this is an experiment, for sdmgen experiment, not a training");
+        return true;
+    }
+    return false;
+}
+
 /* Mistakes of the YAML itself end here: after them every key would seem to be missing. */
 static sdm_status read_all(sdm_reader *r, const char *text, size_t size, const char *const *overrides,
                            const sdm_mark *places, size_t n_overrides, sdm_error *err)
@@ -49,11 +61,12 @@ static sdm_status read_all(sdm_reader *r, const char *text, size_t size, const c
     sdm_tree tree = {0};
     sdm_mark top = {.line = 1, .column = 1};
     sdm_status s = sdm_tree_parse(&tree, text, size, (sdm_mark){0}, r->mistakes, err);
-    if (!s) sdm_fields_read(r, tree.root);
+    const bool other = !s && refuse_experiment(r->mistakes, tree.root);
+    if (!s && !other) sdm_fields_read(r, tree.root);
     r->file_kind = (int)r->config->network.kind;
     const bool is_keyed = !tree.root || tree.root->kind == SDM_TREE_MAP || sdm_tree_is_empty(tree.root);
     sdm_tree_dispose(&tree);
-    if (s == SDM_E_CONFIG || (!s && !is_keyed)) return sdm_mistakes_report(r->mistakes, err);
+    if (s == SDM_E_CONFIG || (!s && (!is_keyed || other))) return sdm_mistakes_report(r->mistakes, err);
 
     for (size_t i = 0; i < n_overrides && !s; i++) {
         sdm_mark mark = {.source = overrides[i]};

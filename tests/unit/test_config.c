@@ -267,6 +267,7 @@ static void test_mistakes(void **state)
         {"data: {memory_gb: 0x10}", "x.yaml:4:19: data.memory_gb: needs a finite number, got '0x10'"},
         {"output: {folder: \"a\\nb\"}", "x.yaml:4:18: output.folder: a line break, tab or control character in a text"},
         {"output: {folder: ''}", "x.yaml:4:18: output.folder: needs a text, got the text ''"},
+        {"methods: [{name: POD}]", "x.yaml:4:1: methods: this is an experiment, for sdmgen experiment, not a training"},
         {"seed: -1", "x.yaml:4:7: seed: -1 is out of range (0 .. 18446744073709551615)"},
         {"seed: 18446744073709551616",
          "x.yaml:4:7: seed: 18446744073709551616 is out of range (0 .. 18446744073709551615)"},

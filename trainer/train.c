@@ -320,7 +320,7 @@ static sdm_status run(trainer *t, bool resume, sdm_outfile **config, sdm_error *
                         t->data.n_start, start);
     if (!s) s = check_grid(t, err);
     t->phase = SDM_PHASE_BASES;
-    if (!s) trainer_report(t, trainer_by_time(t) ? trainer_seconds(t) / (t->config->train.minutes * 60) : 0, 0, true);
+    trainer_report(t, trainer_by_time(t) ? trainer_seconds(t) / (t->config->train.minutes * 60) : 0, 0, true);
     if (!s) s = t->kind->begin(t, err);
     if (!s) s = start_producer(t, err);
     if (!s && found) s = retake(t, n_taken, err);

@@ -247,13 +247,10 @@ static sdm_status approach(fit_problem *p, fit_run *run, fit_ended *ended, sdm_e
 static sdm_status climb(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
     const sdm_fit_opts *o = p->opts;
-    const double blur = p->state.blur, from = sdm_clock();
+    const double from = sdm_clock();
     sdm_status s = sdm_fit_search(p, &out->turn, err);
     out->seconds_search = sdm_clock() - from;
     if (s) return s;
-    p->state.blur = blur;
-    p->state.l_ref = o->l_ref;
-    p->state.point_sd = o->point_sd;
     fit_run run = {.phase = SDM_FIT_MAIN,
                    .keep_params = o->keep_params,
                    .keep_pose = o->keep_pose,

@@ -108,7 +108,7 @@ typedef struct sdm_fit_opts {
 
     const double *start_params; /* [n]; NULL: the defaults of the shape */
     sdm_pose start_pose;
-    sdm_fit_turns turns; /* rotations tried before start_pose's own, about `pivot` */
+    sdm_fit_turns turns; /* rotations tried before start_pose's own, about `pivot`, each with all unknowns */
     size_t n_turns;      /* 1 .. 4096 of them; read with turns */
     double pivot[3];     /* shape's frame, mm: the point the turns keep */
     bool keep_params;    /* true: pose alone */

@@ -3,28 +3,30 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "bench.h"
 #include "commands.h"
-#include "evaluate.h"
-#include "sdm/config.h"
+#include "inputs/setup.h"
+#include "report/terminal.h"
+#include "sdm/internal/config.h"
 #include "sdm/memory.h"
-#include "setup.h"
-#include "terminal.h"
+#include "study/bench.h"
+#include "study/evaluate.h"
 
 enum { N_GRIDS = 3, N_MESHES = 3, N_CASES = N_GRIDS + N_MESHES };
 
-static sdm_status measure(const cli_args *args, double refine, double scale, bench_case *c, bench_rows *rows,
-                          sdm_error *err)
+static sdm_status measure(const cli_args *args, double refine, double scale, bench_case *c,
+                          bench_rows *rows, sdm_error *err)
 {
     sdm_status s = bench_case_open(args, refine, scale, c, err);
     if (!s) s = bench_own(c, rows, err);
     return s ? s : bench_peers(c, args, rows, err);
 }
 
-/* Voxels of four times, twice and once the edge; then triangles of twice, once and half the edge. */
+/* Voxels of four times, twice and once the edge; then triangles of twice, once and half the edge.
+ */
 static sdm_status bench_exact(const cli_args *args, sdm_error *err)
 {
-    static const double scale[N_CASES] = {0.25, 0.5, 1, 1, 1, 1}, refine[N_CASES] = {1, 1, 1, 0.5, 1, 2};
+    static const double scale[N_CASES] = {0.25, 0.5, 1, 1, 1, 1},
+                        refine[N_CASES] = {1, 1, 1, 0.5, 1, 2};
     const size_t n_meshes = args->mesh ? 0 : N_MESHES;
     const size_t n = args->growth ? N_GRIDS + n_meshes : 1;
     bench_case *cases = NULL;
@@ -33,7 +35,8 @@ static sdm_status bench_exact(const cli_args *args, sdm_error *err)
     sdm_status s = SDM_ALLOC(&cases, N_CASES, "cases", err);
     if (!s && args->growth) sdm_json_open(&j, NULL, '[');
     for (size_t i = 0; i < n && !s; i++) {
-        s = measure(args, args->growth ? refine[i] : 1, args->growth ? scale[i] : 1, &cases[i], &rows[i], err);
+        s = measure(args, args->growth ? refine[i] : 1, args->growth ? scale[i] : 1, &cases[i],
+                    &rows[i], err);
         if (!s && args->json) bench_json(&j, &cases[i], &rows[i]);
     }
     if (!s && args->growth) sdm_json_close(&j, ']');
@@ -56,8 +59,10 @@ sdm_status cmd_bench(const cli_args *args, sdm_error *err)
 {
     const char *what = args->files.items[0];
     if (!strcmp(what, "network")) return bench_network(args, err);
-    if (strcmp(what, "exact")) return sdm_fail(err, SDM_E_ARG, "bench: '%s': need exact or network MODEL", what);
+    if (strcmp(what, "exact"))
+        return sdm_fail(err, SDM_E_ARG, "bench: '%s': need exact or network MODEL", what);
     if (args->files.n > 1)
-        return sdm_fail(err, SDM_E_ARG, "bench exact: unexpected argument '%s'", args->files.items[1]);
+        return sdm_fail(err, SDM_E_ARG, "bench exact: unexpected argument '%s'",
+                        args->files.items[1]);
     return bench_exact(args, err);
 }

@@ -2,10 +2,10 @@
 #include <stdio.h>
 
 #include "commands.h"
-#include "config_shape.h"
+#include "inputs/config_shape.h"
+#include "inputs/setup.h"
+#include "sdm/internal/train.h"
 #include "sdm/memory.h"
-#include "sdm/train.h"
-#include "setup.h"
 
 static sdm_status print_text(sdm_text *text, sdm_error *err)
 {
@@ -26,8 +26,8 @@ static sdm_status check_shape(const cli_args *args, sdm_config *c, sdm_error *er
     if (!s) s = cli_config_shape(c, registry, &shape, err);
     if (!s) sdm_instance_params(shape, &n);
     if (!s && n > SDM_MAX_PARAMS)
-        s = sdm_fail(err, SDM_E_CONFIG, "shape '%s' has %zu parameters, at most %d can be trained", c->shape.name, n,
-                     SDM_MAX_PARAMS);
+        s = sdm_fail(err, SDM_E_CONFIG, "shape '%s' has %zu parameters, at most %d can be trained",
+                     c->shape.name, n, SDM_MAX_PARAMS);
     if (!s) s = sdm_train_ranges(c, shape, min, max, err);
     sdm_instance_free(shape);
     sdm_registry_free(registry);
@@ -38,11 +38,13 @@ sdm_status cmd_config(const cli_args *args, sdm_error *err)
 {
     sdm_text text = {0};
     if (args->keys) {
-        if (args->files.n > 0 || args->dump) return sdm_fail(err, SDM_E_ARG, "config: --keys stands alone");
+        if (args->files.n > 0 || args->dump)
+            return sdm_fail(err, SDM_E_ARG, "config: --keys stands alone");
         sdm_config_describe(args->markdown, &text);
         return print_text(&text, err);
     }
-    if (args->files.n == 0) return sdm_fail(err, SDM_E_ARG, "usage: sdmgen config CONFIG [key=value ...], or --keys");
+    if (args->files.n == 0)
+        return sdm_fail(err, SDM_E_ARG, "usage: sdmgen config CONFIG [key=value ...], or --keys");
     sdm_config *config = NULL;
     sdm_status s = cli_read_config(args, &config, err);
     if (!s) s = check_shape(args, config, err);

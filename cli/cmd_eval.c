@@ -4,12 +4,12 @@
 #include <string.h>
 
 #include "commands.h"
-#include "evaluate.h"
-#include "sdm/config.h"
-#include "sdm/file.h"
-#include "sdm/threads.h"
-#include "setup.h"
-#include "terminal.h"
+#include "inputs/setup.h"
+#include "report/terminal.h"
+#include "sdm/internal/config.h"
+#include "sdm/internal/file.h"
+#include "sdm/internal/threads.h"
+#include "study/evaluate.h"
 
 enum { DEFAULT_SAMPLES = 100 };
 
@@ -21,13 +21,13 @@ static void print_time(const char *name, double ms, double ms_network, const cha
     printf("%s\n", note);
 }
 
-static void print_table(const char *file, const sdm_model_info *info, const cli_eval *e, const cli_timing *t,
-                        uint64_t seed)
+static void print_table(const char *file, const sdm_model_info *info, const cli_eval *e,
+                        const cli_timing *t, uint64_t seed)
 {
     printf("%s: %s, %zu parameters, %lld x %lld x %lld voxels\n", file, info->shape, info->n_params,
            (long long)info->grid.n[0], (long long)info->grid.n[1], (long long)info->grid.n[2]);
-    printf("%zu random shapes it was not trained on (seed %llu), exact distances as truth\n\n", e->n,
-           (unsigned long long)seed);
+    printf("%zu random shapes it was not trained on (seed %llu), exact distances as truth\n\n",
+           e->n, (unsigned long long)seed);
     printf("  %-22s %10.3g mm^2\n", "MSE", e->mse_mm2);
     printf("  %-22s %10.5f mm\n", "RMSE", e->rmse_mm);
     printf("  %-22s %10.5f mm\n", "RMSE within 0.4 mm", e->rmse_near_mm);
@@ -37,7 +37,8 @@ static void print_table(const char *file, const sdm_model_info *info, const cli_
     printf("  %-22s %10.5f mm\n", "surfaces, mean", e->surface_mean_mm);
     printf("  %-22s %10.5f mm (largest %.5f)\n", "surfaces, Hausdorff", e->surface_hausdorff_mm,
            e->surface_hausdorff_max_mm);
-    if (e->n_surface < e->n) printf("  (surfaces: %zu of %zu shapes have both)\n", e->n_surface, e->n);
+    if (e->n_surface < e->n)
+        printf("  (surfaces: %zu of %zu shapes have both)\n", e->n_surface, e->n);
     char batch[48], naive[64];
     snprintf(batch, sizeof batch, "network, batch of %zu", t->batch_size);
     snprintf(naive, sizeof naive, "  (from %.0f %% of the voxels)", 100 * t->naive_share);
@@ -48,8 +49,8 @@ static void print_table(const char *file, const sdm_model_info *info, const cli_
     print_time("naive", t->ms_naive, t->ms_network, naive);
 }
 
-static void fill_json(sdm_json *j, const char *file, const sdm_model_info *info, const cli_eval *e, const cli_timing *t,
-                      uint64_t seed, int workers)
+static void fill_json(sdm_json *j, const char *file, const sdm_model_info *info, const cli_eval *e,
+                      const cli_timing *t, uint64_t seed, int workers)
 {
     sdm_json_open(j, NULL, '{');
     sdm_json_text(j, "model", file);
@@ -81,8 +82,9 @@ static void fill_json(sdm_json *j, const char *file, const sdm_model_info *info,
     sdm_json_close(j, '}');
 }
 
-static sdm_status write_pictures(const cli_args *args, const sdm_model *m, const sdm_instance *shape, uint64_t seed,
-                                 const cli_eval *e, sdm_error *err)
+static sdm_status write_pictures(const cli_args *args, const sdm_model *m,
+                                 const sdm_instance *shape, uint64_t seed, const cli_eval *e,
+                                 sdm_error *err)
 {
     const struct {
         const char *name;
@@ -91,14 +93,17 @@ static sdm_status write_pictures(const cli_args *args, const sdm_model *m, const
     sdm_status s = SDM_OK;
     for (size_t i = 0; i < 2 && !s; i++) {
         char path[SDM_PATH_TEXT_MAX];
-        if (snprintf(path, sizeof path, "%s/%s.png", args->pictures, pictures[i].name) >= (int)sizeof path)
-            return sdm_fail(err, SDM_E_ARG, "--pictures '%.100s...': the name is too long", args->pictures);
+        if (snprintf(path, sizeof path, "%s/%s.png", args->pictures, pictures[i].name) >=
+            (int)sizeof path)
+            return sdm_fail(err, SDM_E_ARG, "--pictures '%.100s...': the name is too long",
+                            args->pictures);
         s = cli_picture_compare(m, shape, seed, pictures[i].index, NULL, path, err);
     }
     return s;
 }
 
-static sdm_status measure(const cli_args *args, const sdm_model *m, const sdm_instance *shape, sdm_error *err)
+static sdm_status measure(const cli_args *args, const sdm_model *m, const sdm_instance *shape,
+                          sdm_error *err)
 {
     const uint64_t seed = args->seed < 0 ? 1 : (uint64_t)args->seed;
     const size_t n = args->samples < 0 ? DEFAULT_SAMPLES : (size_t)args->samples;
@@ -117,7 +122,8 @@ static sdm_status measure(const cli_args *args, const sdm_model *m, const sdm_in
         print_table(args->files.items[0], info, &e, &t, seed);
     }
     if (!s && !(e.mse_mm2 <= args->max_mse))
-        s = sdm_fail(err, SDM_E_QUALITY, "MSE %.3g mm^2, demanded at most %.3g mm^2", e.mse_mm2, args->max_mse);
+        s = sdm_fail(err, SDM_E_QUALITY, "MSE %.3g mm^2, demanded at most %.3g mm^2", e.mse_mm2,
+                     args->max_mse);
     cli_eval_dispose(&e);
     return s;
 }

@@ -3,18 +3,18 @@
 #include <string.h>
 
 #include "commands.h"
-#include "exact_layers.h"
-#include "output.h"
-#include "progress.h"
-#include "report_audit.h"
-#include "sdm/checksum.h"
-#include "sdm/clock.h"
+#include "inputs/setup.h"
+#include "report/exact_layers.h"
+#include "report/output.h"
+#include "report/progress.h"
+#include "report/report_audit.h"
+#include "report/terminal.h"
 #include "sdm/exact.h"
+#include "sdm/internal/checksum.h"
+#include "sdm/internal/clock.h"
+#include "sdm/internal/methods.h"
+#include "sdm/internal/threads.h"
 #include "sdm/memory.h"
-#include "sdm/methods.h"
-#include "sdm/threads.h"
-#include "setup.h"
-#include "terminal.h"
 
 typedef struct job {
     const cli_args *args;
@@ -58,13 +58,16 @@ static sdm_status get_mesh(job *j, sdm_error *err)
     if (!args->shape == !args->mesh)
         return sdm_fail(err, SDM_E_ARG, "exact: either --shape NAME or --mesh FILE is needed");
     if (args->mesh && (args->params.n > 0 || args->options.n > 0))
-        return sdm_fail(err, SDM_E_ARG, "exact: -p and -O belong to --shape, a mesh file has no parameters");
+        return sdm_fail(err, SDM_E_ARG,
+                        "exact: -p and -O belong to --shape, a mesh file has no parameters");
     if (args->outputs.n == 0 && !args->json && !cli_layers_wanted(args))
         return sdm_fail(err, SDM_E_ARG, "exact: an output is needed: -o FILE, or --json");
     if (args->certify && strcmp(args->method, "exact"))
-        return sdm_fail(err, SDM_E_ARG, "exact: --certify belongs to --method exact, not %s", args->method);
+        return sdm_fail(err, SDM_E_ARG, "exact: --certify belongs to --method exact, not %s",
+                        args->method);
     if (args->tolerance > 0 && strcmp(args->method, "octree"))
-        return sdm_fail(err, SDM_E_ARG, "exact: --tolerance belongs to --method octree, not %s", args->method);
+        return sdm_fail(err, SDM_E_ARG, "exact: --tolerance belongs to --method octree, not %s",
+                        args->method);
     const sdm_status s = cli_layers_check(args, err);
     if (s) return s;
     return args->mesh ? cli_read_mesh(args->mesh, &j->mesh, err) : mesh_of_shape(j, err);
@@ -95,7 +98,8 @@ static sdm_status run_engine(job *j, sdm_error *err)
     if (!s) s = cli_layers_map(&j->layers, j->args, engine, &j->grid, j->values, err);
     j->ms_build = 1e3 * (built - start);
     j->ms_query = 1e3 * (sdm_clock() - query);
-    if (!s && j->args->certify) s = sdm_exact_certify(engine, &j->grid, j->values, &j->certificate, err);
+    if (!s && j->args->certify)
+        s = sdm_exact_certify(engine, &j->grid, j->values, &j->certificate, err);
     sdm_exact_free(engine);
     return s;
 }
@@ -140,8 +144,8 @@ static sdm_status run_method(job *j, sdm_error *err)
     j->ms_query = report.ms_map;
     j->bound_mm = report.error_bound_mm;
     if (!method->exact)
-        cli_notice("method %s is approximate: the distance is off by at most %g mm (%s)", method->name,
-                   report.error_bound_mm, report.note);
+        cli_notice("method %s is approximate: the distance is off by at most %g mm (%s)",
+                   method->name, report.error_bound_mm, report.note);
     return SDM_OK;
 }
 
@@ -163,12 +167,15 @@ static void notice_mesh(const job *j)
     int64_t inside;
     float min, max;
     value_range(j, &min, &max, &inside);
-    if (!inside) cli_notice("no voxel of the grid is inside the surface: is it where the shape is?");
+    if (!inside)
+        cli_notice("no voxel of the grid is inside the surface: is it where the shape is?");
     if (j->report.turned) cli_notice("the mesh was inside out and has been turned");
-    if (j->report.parts_turned) cli_notice("%zu parts were inside out and have been turned", j->report.parts_turned);
+    if (j->report.parts_turned)
+        cli_notice("%zu parts were inside out and have been turned", j->report.parts_turned);
     cli_notice_audit(a);
     if (j->report.unioned)
-        cli_notice("the mesh overlaps itself: the union of its %zu triangles is bounded by %zu (error at most %.2g mm)",
+        cli_notice("the mesh overlaps itself: the union of its %zu triangles is bounded by %zu "
+                   "(error at most %.2g mm)",
                    a->n_tri, j->report.n_tri_used, j->report.union_error_mm);
 }
 
@@ -177,16 +184,19 @@ static void notice_signs(const job *j)
     const sdm_sign_certificate *c = &j->certificate;
     if (!c->checked) return;
     if (c->wrong) {
-        const double index[3] = {(double)c->first_wrong[0], (double)c->first_wrong[1], (double)c->first_wrong[2]};
+        const double index[3] = {(double)c->first_wrong[0], (double)c->first_wrong[1],
+                                 (double)c->first_wrong[2]};
         double x[3];
         sdm_grid_world(&j->grid, index, x);
-        cli_notice("signs: %zu of %zu voxels differ from %s, the first at %g, %g, %g mm", c->wrong, c->checked,
-                   c->compared, x[0], x[1], x[2]);
+        cli_notice("signs: %zu of %zu voxels differ from %s, the first at %g, %g, %g mm", c->wrong,
+                   c->checked, c->compared, x[0], x[1], x[2]);
     } else {
-        cli_notice("signs: %zu of %zu voxels compared with %s, all agree", c->checked, c->voxels, c->compared);
+        cli_notice("signs: %zu of %zu voxels compared with %s, all agree", c->checked, c->voxels,
+                   c->compared);
     }
     if (c->below_zero)
-        cli_notice("%zu voxels lie in a part of the mesh that is inside out and count as outside", c->below_zero);
+        cli_notice("%zu voxels lie in a part of the mesh that is inside out and count as outside",
+                   c->below_zero);
 }
 
 static sdm_status write_outputs(const job *j, sdm_error *err)
@@ -211,7 +221,8 @@ static sdm_status print_json(const job *j, sdm_error *err)
     value_range(j, &min, &max, &inside);
     const size_t voxels = sdm_grid_count(&j->grid);
     char hash[32];
-    snprintf(hash, sizeof hash, "%016llx", (unsigned long long)sdm_crc64(0, j->values, voxels * sizeof *j->values));
+    snprintf(hash, sizeof hash, "%016llx",
+             (unsigned long long)sdm_crc64(0, j->values, voxels * sizeof *j->values));
     sdm_json json = {0};
     sdm_json_open(&json, NULL, '{');
     sdm_json_text(&json, "method", j->args->method);

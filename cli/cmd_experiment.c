@@ -1,22 +1,24 @@
-/* sdmgen experiment: methods side by side, trained, measured and drawn; one table beside the figures of others. */
+/* sdmgen experiment: methods side by side, trained, measured and drawn; one table beside the
+ * figures of others. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "commands.h"
-#include "experiment_fit.h"
-#include "sdm/clock.h"
-#include "sdm/file.h"
+#include "inputs/setup.h"
+#include "report/terminal.h"
+#include "sdm/internal/clock.h"
+#include "sdm/internal/file.h"
 #include "sdm/memory.h"
-#include "setup.h"
-#include "terminal.h"
+#include "study/experiment_fit.h"
 
 static sdm_status print_keys(bool markdown, sdm_error *err)
 {
     sdm_text text = {0};
     sdm_experiment_describe(markdown, &text);
-    const sdm_status s = text.failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the list of keys") : SDM_OK;
+    const sdm_status s =
+        text.failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the list of keys") : SDM_OK;
     if (!s) fputs(text.data, stdout);
     sdm_text_dispose(&text);
     return s;
@@ -24,11 +26,14 @@ static sdm_status print_keys(bool markdown, sdm_error *err)
 
 static sdm_status read_experiment(const cli_args *args, sdm_experiment **out, sdm_error *err)
 {
-    if (args->files.n == 0) return sdm_fail(err, SDM_E_ARG, "usage: sdmgen experiment CONFIG [key=value ...]");
+    if (args->files.n == 0)
+        return sdm_fail(err, SDM_E_ARG, "usage: sdmgen experiment CONFIG [key=value ...]");
     for (size_t i = 1; i < args->files.n; i++)
         if (!strchr(args->files.items[i], '='))
-            return sdm_fail(err, SDM_E_ARG, "unexpected argument '%.200s', need key=value", args->files.items[i]);
-    sdm_status s = sdm_experiment_read(args->files.items[0], args->files.items + 1, args->files.n - 1, out, err);
+            return sdm_fail(err, SDM_E_ARG, "unexpected argument '%.200s', need key=value",
+                            args->files.items[i]);
+    sdm_status s = sdm_experiment_read(args->files.items[0], args->files.items + 1,
+                                       args->files.n - 1, out, err);
     for (size_t i = 0; !s && i < (*out)->n_methods; i++) {
         const sdm_experiment_method *m = &(*out)->methods[i];
         if (*m->engine) s = experiment_check_engine(m->engine, err);
@@ -79,13 +84,14 @@ static sdm_status do_row(const experiment_run *run, size_t index, sdm_error *err
     r->state = s == SDM_E_UNSUPPORTED ? EXPERIMENT_MISSING : EXPERIMENT_FAILED;
     for (int f = 0; f < SDM_N_FIGURES; f++) r->figure[f] = NAN;
     snprintf(r->note, sizeof r->note, "%.*s", (int)strcspn(err->text, "\n"), err->text);
-    experiment_log(run, "%s: %s: %s", r->row->title, s == SDM_E_UNSUPPORTED ? "not available" : "failed", r->note);
+    experiment_log(run, "%s: %s: %s", r->row->title,
+                   s == SDM_E_UNSUPPORTED ? "not available" : "failed", r->note);
     return s;
 }
 
 /* What went wrong first, after all rows. */
-static sdm_status sum_up(const experiment_run *run, sdm_status first, size_t failed, const sdm_error *why,
-                         sdm_error *err)
+static sdm_status sum_up(const experiment_run *run, sdm_status first, size_t failed,
+                         const sdm_error *why, sdm_error *err)
 {
     if (first == SDM_E_CANCELLED)
         return sdm_fail(err, first, "interrupted; the same command%s goes on where it stopped (%s)",
@@ -95,7 +101,8 @@ static sdm_status sum_up(const experiment_run *run, sdm_status first, size_t fai
                     (int)strcspn(why->text, "\n"), why->text);
 }
 
-/* An interrupted run leaves the tables of an earlier one as they are: its own have rows that were not done. */
+/* An interrupted run leaves the tables of an earlier one as they are: its own have rows that were
+ * not done. */
 static bool keeps_tables(const experiment_run *run, sdm_status first)
 {
     char path[SDM_PATH_TEXT_MAX + 16];
@@ -122,7 +129,8 @@ static sdm_status run_rows(const experiment_run *run, sdm_error *err)
     find_speedups(run);
     sdm_text markdown = {0};
     sdm_json json = {0};
-    sdm_status s = keeps_tables(run, first) ? SDM_OK : experiment_write_tables(run, &markdown, &json, err);
+    sdm_status s =
+        keeps_tables(run, first) ? SDM_OK : experiment_write_tables(run, &markdown, &json, err);
     if (!s && first != SDM_E_CANCELLED) {
         if (run->args->json)
             puts(json.text.data);
@@ -135,7 +143,8 @@ static sdm_status run_rows(const experiment_run *run, sdm_error *err)
     return s ? s : sum_up(run, first, failed, &why, err);
 }
 
-/* Shapes, options and ranges that cannot be are told before anything is done; what else is wrong with a row is its own affair. */
+/* Shapes, options and ranges that cannot be are told before anything is done; what else is wrong
+ * with a row is its own affair. */
 static sdm_status open_rows(const experiment_run *run, sdm_error *err)
 {
     for (size_t i = 0; i < run->e->n_rows; i++) {
@@ -147,8 +156,8 @@ static sdm_status open_rows(const experiment_run *run, sdm_error *err)
     return SDM_OK;
 }
 
-static sdm_status run_experiment(const cli_args *args, const sdm_experiment *e, const sdm_registry *registry,
-                                 sdm_error *err)
+static sdm_status run_experiment(const cli_args *args, const sdm_experiment *e,
+                                 const sdm_registry *registry, sdm_error *err)
 {
     experiment_run run = {.args = args, .e = e, .registry = registry, .start = sdm_clock()};
     run.folder = args->out ? args->out : e->experiment.folder;
@@ -174,7 +183,8 @@ sdm_status cmd_experiment(const cli_args *args, sdm_error *err)
 {
     sdm_experiment *e = NULL;
     sdm_registry *registry = NULL;
-    if (args->keys && args->files.n > 0) return sdm_fail(err, SDM_E_ARG, "experiment: --keys stands alone");
+    if (args->keys && args->files.n > 0)
+        return sdm_fail(err, SDM_E_ARG, "experiment: --keys stands alone");
     if (args->keys) return print_keys(args->markdown, err);
     sdm_status s = read_experiment(args, &e, err);
     if (!s) s = cli_open_registry(args, &registry, err);

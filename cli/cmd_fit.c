@@ -3,9 +3,9 @@
 #include <string.h>
 
 #include "commands.h"
-#include "fit.h"
-#include "progress.h"
-#include "terminal.h"
+#include "fit/fit_command.h"
+#include "report/progress.h"
+#include "report/terminal.h"
 
 /* One bar over the whole: iterations of all phases that are expected at most. */
 typedef struct watch {
@@ -27,10 +27,12 @@ static sdm_status read_words(cli_fit *f, sdm_error *err)
     const cli_args *args = f->args;
     const bool with_model = args->files.n == 2;
     if (with_model && args->shape)
-        return sdm_fail(err, SDM_E_ARG, "fit: either MODEL or --shape NAME, not both (files: '%s', '%s')",
+        return sdm_fail(err, SDM_E_ARG,
+                        "fit: either MODEL or --shape NAME, not both (files: '%s', '%s')",
                         args->files.items[0], args->files.items[1]);
     if (!with_model && !args->shape)
-        return sdm_fail(err, SDM_E_ARG, "fit: a MODEL and an IMAGE are needed, or --shape NAME and an IMAGE");
+        return sdm_fail(err, SDM_E_ARG,
+                        "fit: a MODEL and an IMAGE are needed, or --shape NAME and an IMAGE");
     f->model_path = with_model ? args->files.items[0] : NULL;
     f->path = args->files.items[with_model];
     return cli_fit_check_files(args, err);
@@ -56,11 +58,14 @@ static sdm_status run(cli_fit *f, sdm_error *err)
 static void notice(const cli_fit *f)
 {
     const sdm_fit_result *r = &f->result;
-    if (f->start_clamped || r->start_clamped) cli_notice("the start was moved into the range of the parameters");
+    if (f->start_clamped || r->start_clamped)
+        cli_notice("the start was moved into the range of the parameters");
     if (r->n_exact_outside)
-        cli_notice("%zu maps outside of the network's range were made by the exact engine", r->n_exact_outside);
+        cli_notice("%zu maps outside of the network's range were made by the exact engine",
+                   r->n_exact_outside);
     if (r->n_nan)
-        cli_notice("%zu voxels are NaN%s and were left out", r->n_nan, r->n_cavity ? " or in wide spaces" : "");
+        cli_notice("%zu voxels are NaN%s and were left out", r->n_nan,
+                   r->n_cavity ? " or in wide spaces" : "");
 }
 
 static sdm_status report(const cli_fit *f, sdm_error *err)
@@ -76,7 +81,8 @@ static sdm_status report(const cli_fit *f, sdm_error *err)
 
 static sdm_status show_result(cli_fit *f, sdm_error *err)
 {
-    const bool files = f->args->outputs.n || f->args->fit.label_out, write = !f->doubt.status || f->args->force;
+    const bool files = f->args->outputs.n || f->args->fit.label_out,
+               write = !f->doubt.status || f->args->force;
     sdm_status s = SDM_OK;
     if (f->found) {
         notice(f);
@@ -87,7 +93,8 @@ static sdm_status show_result(cli_fit *f, sdm_error *err)
     }
     if (s || !f->doubt.status) return s;
     return sdm_fail(err, f->doubt.status, "%s: %s%s", f->path, f->doubt.text,
-                    files && f->found && !write ? "; no file was written (--force writes them)" : "");
+                    files && f->found && !write ? "; no file was written (--force writes them)"
+                                                : "");
 }
 
 sdm_status cmd_fit(const cli_args *args, sdm_error *err)

@@ -4,18 +4,18 @@
 #include <string.h>
 
 #include "commands.h"
-#include "generate_files.h"
-#include "output.h"
-#include "progress.h"
-#include "sdm/checksum.h"
-#include "sdm/clock.h"
-#include "sdm/config.h"
+#include "inputs/setup.h"
+#include "report/generate_files.h"
+#include "report/output.h"
+#include "report/progress.h"
+#include "report/terminal.h"
 #include "sdm/image.h"
+#include "sdm/internal/checksum.h"
+#include "sdm/internal/clock.h"
+#include "sdm/internal/config.h"
+#include "sdm/internal/heap.h"
+#include "sdm/internal/threads.h"
 #include "sdm/map.h"
-#include "sdm/memory.h"
-#include "sdm/threads.h"
-#include "setup.h"
-#include "terminal.h"
 
 /* What one call works with. */
 typedef struct job {
@@ -27,8 +27,9 @@ typedef struct job {
     sdm_param *params;
     double *rows; /* [n_rows][n_params] */
     size_t n_rows;
-    float *values, *gradient, *jacobian; /* [nz][ny][nx], [3][...], [n_params][...]; those not wanted NULL */
-    double ms;                           /* of all maps */
+    float *values, *gradient,
+        *jacobian; /* [nz][ny][nx], [3][...], [n_params][...]; those not wanted NULL */
+    double ms;     /* of all maps */
     size_t n_clamped, n_exact, n_exact_error, n_checked;
     sdm_check check; /* over all rows: mean, root mean square, largest q95 and max, mean bias */
     uint64_t hash;
@@ -37,7 +38,9 @@ typedef struct job {
 static sdm_check_stat error_of(const cli_args *args)
 {
     int stat = SDM_CHECK_MAX;
-    while (stat < SDM_CHECK_MEAN && strcmp(args->error_of, sdm_check_stat_name((sdm_check_stat)stat))) stat++;
+    while (stat < SDM_CHECK_MEAN &&
+           strcmp(args->error_of, sdm_check_stat_name((sdm_check_stat)stat)))
+        stat++;
     return (sdm_check_stat)stat;
 }
 
@@ -102,7 +105,9 @@ static sdm_status open_shape(job *j, sdm_error *err)
     if (!checks && cli_policy(args) != SDM_RANGE_EXACT) return SDM_OK;
     sdm_status s = cli_open_registry(args, &j->registry, err);
     if (!s) s = sdm_runtime_instance(j->model, j->registry, &j->shape, err);
-    return s && checks ? sdm_fail_in(err, s, "--%s needs the exact shape", args->check ? "check" : "max-error") : s;
+    return s && checks ? sdm_fail_in(err, s, "--%s needs the exact shape",
+                                     args->check ? "check" : "max-error")
+                       : s;
 }
 
 static sdm_status make_room(job *j, sdm_error *err)
@@ -134,14 +139,15 @@ static sdm_status prepare(job *j, sdm_error *err)
     return s ? s : make_room(j, err);
 }
 
-static sdm_status write_maps(const job *j, size_t row, const sdm_result *result, const cli_row_files *files,
-                             sdm_error *err)
+static sdm_status write_maps(const job *j, size_t row, const sdm_result *result,
+                             const cli_row_files *files, sdm_error *err)
 {
     char origin[64];
     snprintf(origin, sizeof origin, "model %016llx", (unsigned long long)j->info->checksum);
     sdm_text params = {0};
     cli_add_params(j->params, j->info->n_params, j->rows + row * j->info->n_params, &params);
-    sdm_status s = params.failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the metadata") : SDM_OK;
+    sdm_status s =
+        params.failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the metadata") : SDM_OK;
     const cli_map map = {.grid = &j->info->grid,
                          .values = j->values,
                          .shape = j->info->shape,
@@ -152,7 +158,8 @@ static sdm_status write_maps(const job *j, size_t row, const sdm_result *result,
                          .origin = result->source == SDM_SOURCE_EXACT ? "exact" : origin,
                          .reason = result->reason,
                          .check = result->checked ? &result->check : NULL};
-    for (size_t i = 0; i < j->args->outputs.n && !s; i++) s = cli_write_map(files->list.items[i], &map, j->args, err);
+    for (size_t i = 0; i < j->args->outputs.n && !s; i++)
+        s = cli_write_map(files->list.items[i], &map, j->args, err);
     sdm_text_dispose(&params);
     return s;
 }
@@ -164,10 +171,13 @@ static sdm_status write_row(const job *j, size_t row, const sdm_result *result, 
     cli_row_files files = {0};
     sdm_status s = cli_row_files_name(j->args, row + 1, &files, err);
     if (!s) s = write_maps(j, row, result, &files, err);
-    if (!s && j->gradient) s = sdm_map_gradient(g, j->values, (int)j->args->threads, j->gradient, err);
-    if (!s && j->gradient) s = sdm_npy_write(files.gradient, j->gradient, (const size_t[]){3, nz, ny, nx}, 4, err);
+    if (!s && j->gradient)
+        s = sdm_map_gradient(g, j->values, (int)j->args->threads, j->gradient, err);
+    if (!s && j->gradient)
+        s = sdm_npy_write(files.gradient, j->gradient, (const size_t[]){3, nz, ny, nx}, 4, err);
     if (!s && j->jacobian)
-        s = sdm_npy_write(files.jacobian, j->jacobian, (const size_t[]){j->info->n_params, nz, ny, nx}, 4, err);
+        s = sdm_npy_write(files.jacobian, j->jacobian,
+                          (const size_t[]){j->info->n_params, nz, ny, nx}, 4, err);
     cli_row_files_dispose(&files);
     return s;
 }
@@ -194,13 +204,16 @@ static void notice_row(const job *j, size_t row, const sdm_result *r)
     if (r->reason == SDM_REASON_RANGE)
         cli_notice("%sparameters outside the trained range, computed by the exact engine", where);
     if (r->reason == SDM_REASON_ERROR)
-        cli_notice("%serror of the network near the surface (%s) %.3g mm, above %g mm: computed by the exact engine",
-                   where, j->args->error_of, sdm_check_get(&r->check, error_of(j->args)), j->args->max_error);
+        cli_notice("%serror of the network near the surface (%s) %.3g mm, above %g mm: computed by "
+                   "the exact engine",
+                   where, j->args->error_of, sdm_check_get(&r->check, error_of(j->args)),
+                   j->args->max_error);
     if (!j->args->check || j->args->json) return;
     const sdm_check *c = &r->check;
     fputs(where, stdout);
     if (r->checked)
-        printf("error near the surface: max %.3g, q95 %.3g, RMSE %.3g, mean %.3g, bias %.2g mm (%zu voxels)\n",
+        printf("error near the surface: max %.3g, q95 %.3g, RMSE %.3g, mean %.3g, bias %.2g mm "
+               "(%zu voxels)\n",
                c->max_mm, c->q95_mm, c->rmse_mm, c->mean_mm, c->bias_mm, c->used);
     else
         printf("exact\n");
@@ -209,19 +222,21 @@ static void notice_row(const job *j, size_t row, const sdm_result *r)
 static sdm_status make_row(job *j, size_t row, sdm_error *err)
 {
     const cli_args *args = j->args;
-    // rows that the policy refuses have been refused: what is left to the exact engine is a network's map over the bound
+    // rows that the policy refuses have been refused: what is left to the exact engine is a
+    // network's map over the bound
     const sdm_range_policy policy = cli_policy(args);
-    const sdm_generate_opts opts = {.policy =
-                                        policy == SDM_RANGE_REFUSE && args->max_error > 0 ? SDM_RANGE_EXACT : policy,
-                                    .exact_shape = j->shape,
-                                    .n_threads = (int)args->threads,
-                                    .check = args->check,
-                                    .max_error_mm = args->max_error,
-                                    .max_error_of = error_of(args)};
+    const sdm_generate_opts opts = {
+        .policy = policy == SDM_RANGE_REFUSE && args->max_error > 0 ? SDM_RANGE_EXACT : policy,
+        .exact_shape = j->shape,
+        .n_threads = (int)args->threads,
+        .check = args->check,
+        .max_error_mm = args->max_error,
+        .max_error_of = error_of(args)};
     double *p = j->rows + row * j->info->n_params;
     sdm_result result = {0};
     const double start = sdm_clock();
-    const sdm_status s = j->jacobian ? sdm_generate_jacobian(j->model, p, &opts, j->values, j->jacobian, &result, err)
+    const sdm_status s = j->jacobian ? sdm_generate_jacobian(j->model, p, &opts, j->values,
+                                                             j->jacobian, &result, err)
                                      : sdm_generate(j->model, p, &opts, j->values, &result, err);
     if (s) return args->rows ? sdm_fail_in(err, s, "%s: row %zu", args->rows, row + 1) : s;
     j->ms += 1e3 * (sdm_clock() - start);
@@ -274,7 +289,8 @@ static sdm_status report(const job *j, sdm_error *err)
     cli_json_grid(&json, "grid", &j->info->grid);
     if (j->n_rows == 1) {
         sdm_json_open(&json, "parameters", '{');
-        for (size_t i = 0; i < j->info->n_params; i++) sdm_json_real(&json, j->params[i].name, j->rows[i]);
+        for (size_t i = 0; i < j->info->n_params; i++)
+            sdm_json_real(&json, j->params[i].name, j->rows[i]);
         sdm_json_close(&json, '}');
     }
     sdm_json_close(&json, '}');

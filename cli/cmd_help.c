@@ -2,8 +2,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "args/help.h"
 #include "commands.h"
-#include "help.h"
 
 static sdm_status help_on(const char *name, sdm_text *text, sdm_error *err)
 {
@@ -15,7 +15,8 @@ static sdm_status help_on(const char *name, sdm_text *text, sdm_error *err)
         return SDM_OK;
     }
     const char *near = sdm_nearest_name(name, names, CLI_N_COMMANDS);
-    if (near) return sdm_fail(err, SDM_E_ARG, "unknown command '%s'; did you mean '%s'?", name, near);
+    if (near)
+        return sdm_fail(err, SDM_E_ARG, "unknown command '%s'; did you mean '%s'?", name, near);
     return sdm_fail(err, SDM_E_ARG, "unknown command '%s'; see sdmgen --help", name);
 }
 

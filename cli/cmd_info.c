@@ -3,37 +3,41 @@
 #include <string.h>
 
 #include "commands.h"
-#include "files.h"
-#include "report_audit.h"
-#include "report_image.h"
+#include "inputs/setup.h"
+#include "report/files.h"
+#include "report/report_audit.h"
+#include "report/report_image.h"
+#include "report/terminal.h"
 #include "sdm/memory.h"
 #include "sdm/model.h"
 #include "sdm/vdb.h"
-#include "setup.h"
-#include "terminal.h"
 
 static void print_model(const char *path, const sdm_model_info *m)
 {
     const sdm_grid *g = &m->grid;
     const sdm_accuracy *a = &m->accuracy;
     printf("%s: network '%s' of shape '%s'\n\n", path, m->kind, m->shape);
-    printf("grid         %lld x %lld x %lld voxels of %g x %g x %g mm, origin %g %g %g (LPS)\n", (long long)g->n[0],
-           (long long)g->n[1], (long long)g->n[2], g->spacing[0], g->spacing[1], g->spacing[2], g->origin[0],
-           g->origin[1], g->origin[2]);
+    printf("grid         %lld x %lld x %lld voxels of %g x %g x %g mm, origin %g %g %g (LPS)\n",
+           (long long)g->n[0], (long long)g->n[1], (long long)g->n[2], g->spacing[0], g->spacing[1],
+           g->spacing[2], g->origin[0], g->origin[1], g->origin[2]);
     for (size_t i = 0; i < m->n_params; i++)
-        printf("%s %-18s %.6g .. %.6g%s%s, default %.6g\n", i ? "            " : "parameters  ", m->params[i].name,
-               m->params[i].min, m->params[i].max, *m->params[i].unit ? " " : "", m->params[i].unit, m->params[i].def);
+        printf("%s %-18s %.6g .. %.6g%s%s, default %.6g\n", i ? "            " : "parameters  ",
+               m->params[i].name, m->params[i].min, m->params[i].max, *m->params[i].unit ? " " : "",
+               m->params[i].unit, m->params[i].def);
     for (size_t i = 0; i < m->n_options; i++)
-        printf("%s %-18s %s\n", i ? "            " : "options     ", m->option_names[i], m->option_values[i]);
-    printf("accuracy     on %lld unseen shapes: MSE %.3g mm^2, RMSE %.5f mm, mean %.5f mm, largest %.5f mm\n",
+        printf("%s %-18s %s\n", i ? "            " : "options     ", m->option_names[i],
+               m->option_values[i]);
+    printf("accuracy     on %lld unseen shapes: MSE %.3g mm^2, RMSE %.5f mm, mean %.5f mm, largest "
+           "%.5f mm\n",
            (long long)a->samples, a->mse_mm2, a->rmse_mm, a->mae_mm, a->max_abs_mm);
     printf("             RMSE within 0.4 mm of the surface %.5f mm\n", a->rmse_near_mm);
-    printf("             RMSE of one map: half below %.5f mm, 90 %% below %.5f mm, 99 %% below %.5f mm\n", a->q50_mm,
-           a->q90_mm, a->q99_mm);
+    printf("             RMSE of one map: half below %.5f mm, 90 %% below %.5f mm, 99 %% below "
+           "%.5f mm\n",
+           a->q50_mm, a->q90_mm, a->q99_mm);
     printf("training     %.1f s, %lld exact maps, seed %llu, sdmgen %s\n", m->train_seconds,
            (long long)m->train_samples, (unsigned long long)m->seed, m->version);
-    printf("file         %zu bytes, weights %zu bytes, checksum %016llx\n", m->file_bytes, m->weight_bytes,
-           (unsigned long long)m->checksum);
+    printf("file         %zu bytes, weights %zu bytes, checksum %016llx\n", m->file_bytes,
+           m->weight_bytes, (unsigned long long)m->checksum);
 }
 
 static void json_accuracy(sdm_json *j, const sdm_accuracy *a)
@@ -75,7 +79,8 @@ static sdm_status json_model(const char *path, const sdm_model_info *m, sdm_erro
     }
     sdm_json_close(&j, ']');
     sdm_json_open(&j, "options", '{');
-    for (size_t i = 0; i < m->n_options; i++) sdm_json_text(&j, m->option_names[i], m->option_values[i]);
+    for (size_t i = 0; i < m->n_options; i++)
+        sdm_json_text(&j, m->option_names[i], m->option_values[i]);
     sdm_json_close(&j, '}');
     json_accuracy(&j, &m->accuracy);
     sdm_json_uint(&j, "seed", m->seed);

@@ -2,15 +2,16 @@
 #include <stdio.h>
 
 #include "commands.h"
-#include "files.h"
-#include "output.h"
-#include "report_audit.h"
+#include "inputs/setup.h"
+#include "report/files.h"
+#include "report/output.h"
+#include "report/report_audit.h"
+#include "report/terminal.h"
 #include "sdm/memory.h"
 #include "sdm/meshfile.h"
-#include "setup.h"
-#include "terminal.h"
 
-static sdm_status make_mesh(const cli_args *args, const sdm_registry *registry, sdm_mesh *mesh, sdm_error *err)
+static sdm_status make_mesh(const cli_args *args, const sdm_registry *registry, sdm_mesh *mesh,
+                            sdm_error *err)
 {
     sdm_instance *shape = NULL;
     double *values = NULL;
@@ -51,11 +52,13 @@ sdm_status cmd_mesh(const cli_args *args, sdm_error *err)
     sdm_registry *registry = NULL;
     sdm_mesh mesh = {0};
     sdm_status s = SDM_OK;
-    for (size_t i = 0; i < args->outputs.n && !s; i++) s = cli_check_type(args->outputs.items[i], true, err);
+    for (size_t i = 0; i < args->outputs.n && !s; i++)
+        s = cli_check_type(args->outputs.items[i], true, err);
     if (!s) s = cli_check_files(args, NULL, err);
     if (!s) s = cli_open_registry(args, &registry, err);
     if (!s) s = make_mesh(args, registry, &mesh, err);
-    for (size_t i = 0; i < args->outputs.n && !s; i++) s = sdm_mesh_write(args->outputs.items[i], &mesh, err);
+    for (size_t i = 0; i < args->outputs.n && !s; i++)
+        s = sdm_mesh_write(args->outputs.items[i], &mesh, err);
     if (!s) s = report(args, &mesh, err);
     sdm_mesh_dispose(&mesh);
     sdm_registry_free(registry);

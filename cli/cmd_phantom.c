@@ -4,24 +4,25 @@
 #include <string.h>
 
 #include "commands.h"
-#include "files.h"
-#include "phantom.h"
-#include "sdm/file.h"
+#include "inputs/setup.h"
+#include "phantom/phantom_command.h"
+#include "report/files.h"
+#include "report/terminal.h"
 #include "sdm/image.h"
+#include "sdm/internal/file.h"
 #include "sdm/memory.h"
 #include "sdm/volume.h"
-#include "setup.h"
-#include "terminal.h"
 
 static bool is_volume(const char *path)
 {
-    return cli_ends_with(path, ".nii") || cli_ends_with(path, ".nii.gz") || cli_ends_with(path, ".nrrd") ||
-           cli_ends_with(path, ".mha");
+    return cli_ends_with(path, ".nii") || cli_ends_with(path, ".nii.gz") ||
+           cli_ends_with(path, ".nrrd") || cli_ends_with(path, ".mha");
 }
 
 /* ---- before any work ---- */
 
-static sdm_status check_type(const char *option, const char *path, bool known, const char *types, sdm_error *err)
+static sdm_status check_type(const char *option, const char *path, bool known, const char *types,
+                             sdm_error *err)
 {
     if (known) return SDM_OK;
     return sdm_fail(err, SDM_E_ARG, "%s '%s': its name must end in %s", option, path, types);
@@ -31,14 +32,16 @@ static sdm_status check_files(const cli_args *args, sdm_error *err)
 {
     const char *label = args->phantom.label, *truth = args->phantom.truth;
     if (args->outputs.n == 0 && !label && !truth && !args->json)
-        return sdm_fail(err, SDM_E_ARG, "phantom: an output is needed: -o FILE, --label, --truth or --json");
+        return sdm_fail(err, SDM_E_ARG,
+                        "phantom: an output is needed: -o FILE, --label, --truth or --json");
     sdm_status s = SDM_OK;
     for (size_t i = 0; i < args->outputs.n && !s; i++) {
         const char *path = args->outputs.items[i];
         s = check_type("output", path, is_volume(path) || cli_ends_with(path, ".npy"),
                        ".nii .nii.gz .nrrd .mha or .npy", err);
     }
-    if (!s && label) s = check_type("--label", label, is_volume(label), ".nii .nii.gz .nrrd or .mha", err);
+    if (!s && label)
+        s = check_type("--label", label, is_volume(label), ".nii .nii.gz .nrrd or .mha", err);
     if (!s && truth) s = check_type("--truth", truth, cli_ends_with(truth, ".json"), ".json", err);
     return s ? s : cli_check_files(args, NULL, err);
 }
@@ -56,7 +59,8 @@ static void to_int16(const float *values, size_t n, int16_t *out, size_t *clippe
     }
 }
 
-static sdm_status write_images(const cli_phantom *p, const float *values, const char *text, sdm_error *err)
+static sdm_status write_images(const cli_phantom *p, const float *values, const char *text,
+                               sdm_error *err)
 {
     const cli_list *outputs = &p->args->outputs;
     const bool whole = !strcmp(p->args->phantom.type, "int16");
@@ -64,7 +68,9 @@ static sdm_status write_images(const cli_phantom *p, const float *values, const 
     int16_t *rounded = NULL;
     sdm_status s = whole ? SDM_ALLOC(&rounded, sdm_grid_count(&p->grid), "image", err) : SDM_OK;
     if (!s && whole) to_int16(values, sdm_grid_count(&p->grid), rounded, &clipped);
-    if (clipped) cli_notice("%zu values do not fit in int16 and were clipped; --type float32 keeps them", clipped);
+    if (clipped)
+        cli_notice("%zu values do not fit in int16 and were clipped; --type float32 keeps them",
+                   clipped);
     for (size_t i = 0; i < outputs->n && !s; i++) {
         const char *path = outputs->items[i];
         if (cli_ends_with(path, ".npy"))
@@ -111,7 +117,8 @@ static sdm_status make_files(const cli_phantom *p, sdm_error *err)
              (unsigned long long)p->opts.seed);
     sdm_status s = args->outputs.n ? SDM_ALLOC(&values, n, "image", err) : SDM_OK;
     if (!s) s = SDM_ALLOC(&label, n, "labels", err);
-    if (!s) s = sdm_phantom_make(p->shape, p->params, &p->pose, &p->opts, &p->grid, values, label, err);
+    if (!s)
+        s = sdm_phantom_make(p->shape, p->params, &p->pose, &p->opts, &p->grid, values, label, err);
     if (!s) s = cli_check_interrupt(err);
     for (size_t i = 0; i < n && !s; i++) inside += label[i];
     if (!s && !inside) cli_notice("no voxel is inside the shape: is the grid where it is?");

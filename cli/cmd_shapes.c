@@ -3,9 +3,9 @@
 #include <string.h>
 
 #include "commands.h"
+#include "inputs/setup.h"
+#include "report/terminal.h"
 #include "sdm/memory.h"
-#include "setup.h"
-#include "terminal.h"
 
 static const char *option_type(const sdm_option *o)
 {
@@ -68,7 +68,8 @@ static void table_print(table *t, const char *title)
             if (t->row[i][k].length > width[k]) width[k] = t->row[i][k].length;
     printf("\n%s:\n", title);
     for (size_t i = 0; i < t->n; i++) {
-        for (size_t k = 0; k + 1 < COLUMNS; k++) printf("  %-*.*s", width[k], t->row[i][k].length, t->row[i][k].text);
+        for (size_t k = 0; k + 1 < COLUMNS; k++)
+            printf("  %-*.*s", width[k], t->row[i][k].length, t->row[i][k].text);
         printf("  %s\n", t->row[i][COLUMNS - 1].text);
     }
     sdm_free(t->row);
@@ -156,7 +157,8 @@ static void json_options(sdm_json *j, const sdm_shape *shape)
     sdm_json_close(j, ']');
 }
 
-/* The parameters of the table, or, for a shape whose parameters depend on its options, of the instance that -O makes. */
+/* The parameters of the table, or, for a shape whose parameters depend on its options, of the
+ * instance that -O makes. */
 static sdm_status show_one(const cli_args *args, const sdm_registry *registry, sdm_error *err)
 {
     const char *name = args->files.items[0];
@@ -182,7 +184,8 @@ static sdm_status show_one(const cli_args *args, const sdm_registry *registry, s
     } else {
         printf("%s - %s\n", shape->name, shape->summary ? shape->summary : "");
         s = print_params(params, n, err);
-        if (!s && !instance && shape->describe) printf("\nits parameters depend on its options: give these with -O\n");
+        if (!s && !instance && shape->describe)
+            printf("\nits parameters depend on its options: give these with -O\n");
         if (!s) s = print_options(shape, err);
     }
     sdm_instance_free(instance);

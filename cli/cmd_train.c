@@ -5,22 +5,24 @@
 #include <unistd.h>
 
 #include "commands.h"
-#include "config_shape.h"
-#include "evaluate.h"
-#include "report_audit.h"
+#include "inputs/config_shape.h"
+#include "inputs/setup.h"
+#include "report/report_audit.h"
+#include "report/terminal.h"
+#include "report/train_progress.h"
+#include "sdm/internal/train.h"
 #include "sdm/memory.h"
-#include "sdm/train.h"
-#include "setup.h"
-#include "terminal.h"
-#include "train_progress.h"
+#include "study/evaluate.h"
 
 /* A finished model or a checkpoint is never overwritten by mistake. */
 static sdm_status check_folder(const cli_args *args, const char *folder, sdm_error *err)
 {
     static const struct {
         const char *name, *what;
-    } files[] = {{"model.sdm", "a trained model"}, {"checkpoint.sdmc", "the checkpoint of a training"}};
-    if (args->resume && args->force) return sdm_fail(err, SDM_E_ARG, "train: --resume and --force exclude each other");
+    } files[] = {{"model.sdm", "a trained model"},
+                 {"checkpoint.sdmc", "the checkpoint of a training"}};
+    if (args->resume && args->force)
+        return sdm_fail(err, SDM_E_ARG, "train: --resume and --force exclude each other");
     bool there[2];
     for (size_t i = 0; i < 2; i++) {
         char path[SDM_PATH_TEXT_MAX + 32];
@@ -30,16 +32,20 @@ static sdm_status check_folder(const cli_args *args, const char *folder, sdm_err
     if (args->force || (!there[0] && !there[1])) return SDM_OK;
     if (!there[1])
         return sdm_fail(err, SDM_E_ARG,
-                        "%s holds %s and no checkpoint to go on from: start anew with --force, or choose --out DIR",
+                        "%s holds %s and no checkpoint to go on from: start anew with --force, or "
+                        "choose --out DIR",
                         folder, files[0].what);
     if (args->resume) return SDM_OK;
-    return sdm_fail(err, SDM_E_ARG, "%s holds %s: go on with --resume, start anew with --force, or choose --out DIR",
-                    folder, files[there[0] ? 0 : 1].what);
+    return sdm_fail(
+        err, SDM_E_ARG,
+        "%s holds %s: go on with --resume, start anew with --force, or choose --out DIR", folder,
+        files[there[0] ? 0 : 1].what);
 }
 
-/* Slices exact | network | error at the shape's default parameters, as far as the model was trained on them. */
-static sdm_status write_picture(const sdm_train_report *report, const sdm_instance *shape, const char *folder,
-                                sdm_error *err)
+/* Slices exact | network | error at the shape's default parameters, as far as the model was trained
+ * on them. */
+static sdm_status write_picture(const sdm_train_report *report, const sdm_instance *shape,
+                                const char *folder, sdm_error *err)
 {
     char path[SDM_PATH_TEXT_MAX + 32];
     double p[SDM_MAX_PARAMS];
@@ -75,15 +81,17 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
     }
     char steps[32], maps[32];
     printf("%s\n", r->model_path);
-    printf("  trained     %.1f s, %s steps, %s exact maps\n", r->seconds, cli_format_count(r->steps, steps),
-           cli_format_count(r->samples, maps));
-    printf("  held out    %lld shapes: MSE %.3g mm^2, RMSE %.5f mm, within 0.4 mm of the surface %.5f mm, largest %.5f "
+    printf("  trained     %.1f s, %s steps, %s exact maps\n", r->seconds,
+           cli_format_count(r->steps, steps), cli_format_count(r->samples, maps));
+    printf("  held out    %lld shapes: MSE %.3g mm^2, RMSE %.5f mm, within 0.4 mm of the surface "
+           "%.5f mm, largest %.5f "
            "mm\n",
            (long long)a->samples, a->mse_mm2, a->rmse_mm, a->rmse_near_mm, a->max_abs_mm);
     return SDM_OK;
 }
 
-/* A new shape's mistakes show in its mesh: said before hours are spent on it. A mesh that fails is left to the training. */
+/* A new shape's mistakes show in its mesh: said before hours are spent on it. A mesh that fails is
+ * left to the training. */
 static void notice_mesh(const sdm_instance *shape)
 {
     double p[SDM_MAX_PARAMS];
@@ -92,14 +100,16 @@ static void notice_mesh(const sdm_instance *shape)
     for (size_t i = 0; i < n && i < SDM_MAX_PARAMS; i++) p[i] = params[i].def;
     sdm_mesh mesh = {0};
     sdm_audit audit;
-    if (n <= SDM_MAX_PARAMS && !sdm_instance_mesh(shape, p, &mesh, NULL) && !sdm_mesh_audit(&mesh, &audit, NULL)) {
+    if (n <= SDM_MAX_PARAMS && !sdm_instance_mesh(shape, p, &mesh, NULL) &&
+        !sdm_mesh_audit(&mesh, &audit, NULL)) {
         if (audit.inverted) cli_notice("the mesh is inside out and is turned");
         cli_notice_audit(&audit);
     }
     sdm_mesh_dispose(&mesh);
 }
 
-static sdm_status train(const cli_args *args, const sdm_config *config, const sdm_instance *shape, sdm_error *err)
+static sdm_status train(const cli_args *args, const sdm_config *config, const sdm_instance *shape,
+                        sdm_error *err)
 {
     const char *folder = config->output.folder;
     cli_progress progress;

@@ -3,13 +3,13 @@
 #include <string.h>
 
 #include "commands.h"
-#include "evaluate.h"
-#include "files.h"
+#include "inputs/setup.h"
+#include "report/files.h"
+#include "report/terminal.h"
 #include "sdm/memory.h"
 #include "sdm/vdb.h"
 #include "sdm/volume.h"
-#include "setup.h"
-#include "terminal.h"
+#include "study/evaluate.h"
 
 enum { DEFAULT_SAMPLES = 20 };
 #define TOLERANCE 1.25 /* measured RMSE over stated RMSE: room for another draw of shapes */
@@ -23,7 +23,9 @@ static sdm_status verify_vdb(const cli_args *args, const char *path, sdm_error *
     const bool whole = strstr(text, "whole map") != NULL;
     sdm_free(text);
     if (!args->json) {
-        printf("%s: %s\n", path, whole ? "hash is right (a whole map, no level set)" : "hash and level set are right");
+        printf("%s: %s\n", path,
+               whole ? "hash is right (a whole map, no level set)"
+                     : "hash and level set are right");
         return SDM_OK;
     }
     sdm_json j = {0};
@@ -39,7 +41,8 @@ static sdm_status verify_vdb(const cli_args *args, const char *path, sdm_error *
 #endif
 }
 
-/* An image has no hash of ours: all that can be said is whether it reads, and whether gzip or zlib would have noticed a change. */
+/* An image has no hash of ours: all that can be said is whether it reads, and whether gzip or zlib
+ * would have noticed a change. */
 static sdm_status verify_image(const cli_args *args, const char *path, sdm_error *err)
 {
     sdm_volume v = {0};
@@ -54,18 +57,19 @@ static sdm_status verify_image(const cli_args *args, const char *path, sdm_error
         sdm_json_close(&j, '}');
         s = cli_print_json(&j, err);
     } else if (!s) {
-        printf("%s: whole: %lld x %lld x %lld %s voxels, %s\n", path, (long long)v.grid.n[0], (long long)v.grid.n[1],
-               (long long)v.grid.n[2], sdm_voxel_name(v.stored),
+        printf("%s: whole: %lld x %lld x %lld %s voxels, %s\n", path, (long long)v.grid.n[0],
+               (long long)v.grid.n[1], (long long)v.grid.n[2], sdm_voxel_name(v.stored),
                v.checked ? "the checksum of the compressed data is right"
                          : "without a checksum: a changed voxel would go unnoticed");
-        if (v.n_nan > 0 || v.n_inf > 0) printf("%zu values are NaN, %zu infinite\n", v.n_nan, v.n_inf);
+        if (v.n_nan > 0 || v.n_inf > 0)
+            printf("%zu values are NaN, %zu infinite\n", v.n_nan, v.n_inf);
     }
     sdm_volume_dispose(&v);
     return s;
 }
 
-static sdm_status report(const cli_args *args, const char *path, const sdm_model_info *info, const cli_eval *e,
-                         sdm_error *err)
+static sdm_status report(const cli_args *args, const char *path, const sdm_model_info *info,
+                         const cli_eval *e, sdm_error *err)
 {
     const double stated = info->accuracy.rmse_mm;
     const bool good = e->n == 0 || e->rmse_mm <= TOLERANCE * stated;
@@ -83,10 +87,12 @@ static sdm_status report(const cli_args *args, const char *path, const sdm_model
         s = cli_print_json(&j, err);
     } else {
         printf("%s: every checksum is right\n", path);
-        if (e->n > 0) printf("RMSE %.5f mm on %zu random shapes, stated %.5f mm\n", e->rmse_mm, e->n, stated);
+        if (e->n > 0)
+            printf("RMSE %.5f mm on %zu random shapes, stated %.5f mm\n", e->rmse_mm, e->n, stated);
     }
     if (!s && !good)
-        s = sdm_fail(err, SDM_E_QUALITY, "%s: RMSE %.5f mm on %zu random shapes, stated %.5f mm: more than 25 %% worse",
+        s = sdm_fail(err, SDM_E_QUALITY,
+                     "%s: RMSE %.5f mm on %zu random shapes, stated %.5f mm: more than 25 %% worse",
                      path, e->rmse_mm, e->n, stated);
     return s;
 }
@@ -104,9 +110,12 @@ static sdm_status verify_model(const cli_args *args, const char *path, sdm_error
     if (!s && known) s = sdm_runtime_instance(model, registry, &shape, err);
     if (!s && known)
         s = cli_evaluate(model, shape, args->seed < 0 ? 1 : (uint64_t)args->seed,
-                         args->samples < 0 ? DEFAULT_SAMPLES : (size_t)args->samples, false, &e, err);
+                         args->samples < 0 ? DEFAULT_SAMPLES : (size_t)args->samples, false, &e,
+                         err);
     if (!s && !known)
-        cli_notice("shape '%s' is not known here (--plugin FILE loads it): the accuracy was not measured", info->shape);
+        cli_notice(
+            "shape '%s' is not known here (--plugin FILE loads it): the accuracy was not measured",
+            info->shape);
     if (!s) s = report(args, path, info, &e, err);
     cli_eval_dispose(&e);
     sdm_model_free(model);

@@ -1,9 +1,9 @@
-/* The commands of sdmgen, one file each. Each writes results to stdout, notices to stderr, and leaves the message of
-   a failure in *err; the exit code follows from the status. */
+/* The commands of sdmgen, one file each. Each writes results to stdout, notices to stderr, and
+   leaves the message of a failure in *err; the exit code follows from the status. */
 #ifndef CLI_COMMANDS_H
 #define CLI_COMMANDS_H
 
-#include "options.h"
+#include "args/options.h"
 
 sdm_status cmd_train(const cli_args *args, sdm_error *err);
 sdm_status cmd_generate(const cli_args *args, sdm_error *err);

@@ -8,9 +8,9 @@
 #include <omp.h>
 #endif
 
+#include "args/help.h"
 #include "commands.h"
-#include "help.h"
-#include "terminal.h"
+#include "report/terminal.h"
 
 static int print_help(const cli_command *command)
 {
@@ -47,7 +47,8 @@ static int run_command(const cli_args *args)
     return cli_report(&err);
 }
 
-/* Keeps freed memory for the next map: asking the system for every page anew costs a third of preparing a small mesh. */
+/* Keeps freed memory for the next map: asking the system for every page anew costs a third of
+ * preparing a small mesh. */
 static void keep_memory(void)
 {
 #ifdef __GLIBC__
@@ -63,7 +64,8 @@ int main(int argc, char **argv)
         puts("sdmgen " SDM_VERSION_TEXT);
         return flush_results(CLI_EXIT_DONE);
     }
-    if (argc == 2 && (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h"))) return flush_results(print_help(NULL));
+    if (argc == 2 && (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h")))
+        return flush_results(print_help(NULL));
 
     cli_args args;
     sdm_error err = {0};

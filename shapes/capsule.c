@@ -1,4 +1,5 @@
-/* The capsule: all points within a radius of a segment of the z axis. Vertices lie on the surface. */
+/* The capsule: all points within a radius of a segment of the z axis. Vertices lie on the surface.
+ */
 #include <math.h>
 
 #include "lathe.h"
@@ -12,7 +13,8 @@ static const sdm_param PARAMS[N_PARAMS] = {
 };
 
 static const sdm_option OPTIONS[] = {
-    {"edge", SDM_OPTION_REAL, "mm", 0.02, 1.0, 0.30, NULL, "edge length the mesh aims at, at the default parameters"},
+    {"edge", SDM_OPTION_REAL, "mm", 0.02, 1.0, 0.30, NULL,
+     "edge length the mesh aims at, at the default parameters"},
 };
 
 /* Rings of one cap (its pole and the rim not counted), steps of the straight part, sectors. */
@@ -30,7 +32,8 @@ static layout layout_of(const sdm_option_value *options)
     return l;
 }
 
-/* A ring (or pole: i = -1 or n_rings) is at radius * across from the axis and at radius * up + length * along. */
+/* A ring (or pole: i = -1 or n_rings) is at radius * across from the axis and at radius * up +
+ * length * along. */
 typedef struct place {
     double across, up, along;
 } place;
@@ -41,7 +44,8 @@ static place place_of(const layout *l, ptrdiff_t i)
     if (i >= rim0 && i <= rim1) return (place){1, 0, (double)(i - rim0) / (double)l->n_side - 0.5};
     const ptrdiff_t steps = i < rim0 ? rim0 - i : i - rim1; // from the rim
     const double angle = LATHE_PI / 2 * (double)steps / (double)(n_cap + 1);
-    return (place){steps > n_cap ? 0 : cos(angle), i < rim0 ? -sin(angle) : sin(angle), i < rim0 ? -0.5 : 0.5};
+    return (place){steps > n_cap ? 0 : cos(angle), i < rim0 ? -sin(angle) : sin(angle),
+                   i < rim0 ? -0.5 : 0.5};
 }
 
 static double *put(double *at, double x, double y, double z)
@@ -50,7 +54,8 @@ static double *put(double *at, double x, double y, double z)
     return at + 3;
 }
 
-// vert[n_vert][3] = radius * (across, up) + length * along: linear in the parameters, so this gives the derivatives too
+// vert[n_vert][3] = radius * (across, up) + length * along: linear in the parameters, so this gives
+// the derivatives too
 static void write(const layout *l, double radius, double length, double *vert)
 {
     const ptrdiff_t n = (ptrdiff_t)l->n_rings;
@@ -68,21 +73,21 @@ static void write(const layout *l, double radius, double length, double *vert)
     }
 }
 
-static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
-                sdm_mesh_out *out)
+static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                const double *p, sdm_mesh_out *out)
 {
     (void)self;
     const layout l = layout_of(options);
-    const int failed =
-        host->reserve(host, out, sdm_lathe_n_vert(l.n_rings, l.n_sectors), sdm_lathe_n_tri(l.n_rings, l.n_sectors));
+    const int failed = host->reserve(host, out, sdm_lathe_n_vert(l.n_rings, l.n_sectors),
+                                     sdm_lathe_n_tri(l.n_rings, l.n_sectors));
     if (failed) return failed;
     write(&l, p[RADIUS], p[LENGTH], out->vert);
     sdm_lathe_triangles(l.n_rings, l.n_sectors, false, out->tri);
     return 0;
 }
 
-static int velocity(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
-                    size_t n_vert, double *out)
+static int velocity(const void *self, const sdm_host *host, const sdm_option_value *options,
+                    const double *p, size_t n_vert, double *out)
 {
     (void)self, (void)p;
     const layout l = layout_of(options);
@@ -93,8 +98,8 @@ static int velocity(const void *self, const sdm_host *host, const sdm_option_val
     return 0;
 }
 
-static int distance(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
-                    const double x[3], double *out)
+static int distance(const void *self, const sdm_host *host, const sdm_option_value *options,
+                    const double *p, const double x[3], double *out)
 {
     (void)self, (void)host, (void)options;
     *out = hypot(hypot(x[0], x[1]), fmax(fabs(x[2]) - p[LENGTH] / 2, 0)) - p[RADIUS];

@@ -1,26 +1,34 @@
 /* The cochlea: a tube of slowly changing radius about a rising logarithmic spiral.
 
-   A RECONSTRUCTION. The published model names the four parameters and their ranges; its centreline is a logarithmic spiral
-   with a polynomial start and a wave of the basal turn along the modiolus. Rise, wave, tube radius, section and caps are not
-   published in closed form: the formulas here were chosen so that the centreline follows measured cochleae to 0.13 to 0.29 mm.
+   A RECONSTRUCTION. The published model names the four parameters and their ranges; its centreline
+   is a logarithmic spiral with a polynomial start and a wave of the basal turn along the modiolus.
+   Rise, wave, tube radius, section and caps are not published in closed form: the formulas here
+   were chosen so that the centreline follows measured cochleae to 0.13 to 0.29 mm.
 
-       r = a exp(-b theta)    z = c theta + alpha exp(-kappa theta) cos(theta - phi)    R = radius - taper theta + flare exp(-theta / flare_angle)
+       r = a exp(-b theta)    z = c theta + alpha exp(-kappa theta) cos(theta - phi)    R = radius -
+   taper theta + flare exp(-theta / flare_angle)
 
-   Turns touch and overlap: the mesh intersects itself on purpose, and the shape is the union of what the tube encloses.
+   Turns touch and overlap: the mesh intersects itself on purpose, and the shape is the union of
+   what the tube encloses.
 
-   Rings sit at fixed angles theta with a fixed number of sectors, both chosen from the options at the default parameters, so
-   that every vertex is a smooth function of the parameters. With the default options the mesh has 3,420 triangles; its edges
-   are 0.36 +- 0.10 mm at the default parameters and 0.34 +- 0.11 mm over the parameter ranges. Ring vertices lie ON the tube,
-   its polygons are inscribed: between them the mesh is inside of the tube by up to R (1 - cos(pi / sectors)), 0.015 R, and, along
-   the tube, by edge^2 / 8 times the curvature of its wall (outside on the inner side of the bend). The distance is that of a ball of radius R swept along the centreline: the same surface
-   where R changes slowly (to 4 micrometres without flare), and up to 0.013 mm (0.05 mm at a = 2) farther out at the flare.
+   Rings sit at fixed angles theta with a fixed number of sectors, both chosen from the options at
+   the default parameters, so that every vertex is a smooth function of the parameters. With the
+   default options the mesh has 3,420 triangles; its edges are 0.36 +- 0.10 mm at the default
+   parameters and 0.34 +- 0.11 mm over the parameter ranges. Ring vertices lie ON the tube, its
+   polygons are inscribed: between them the mesh is inside of the tube by up to R (1 - cos(pi /
+   sectors)), 0.015 R, and, along the tube, by edge^2 / 8 times the curvature of its wall (outside
+   on the inner side of the bend). The distance is that of a ball of radius R swept along the
+   centreline: the same surface where R changes slowly (to 4 micrometres without flare), and up to
+   0.013 mm (0.05 mm at a = 2) farther out at the flare.
 
-   Near the apex the tube is wider than the bend of its centreline, and the inner parts of neighbouring sections would run
-   backwards: the mesh would be inside out there, and enclose less than the tube does. Each section is therefore cut off where
-   the centreline's centre of curvature lies. Nothing of the shape is lost by it: a point behind that centre is nearer to
-   another part of the centreline, whose section or cap encloses it.
+   Near the apex the tube is wider than the bend of its centreline, and the inner parts of
+   neighbouring sections would run backwards: the mesh would be inside out there, and enclose less
+   than the tube does. Each section is therefore cut off where the centreline's centre of curvature
+   lies. Nothing of the shape is lost by it: a point behind that centre is nearer to another part of
+   the centreline, whose section or cap encloses it.
 
-   With free = anatomy constants that differ between ears are parameters too: for fits to images, where they need not be chosen. */
+   With free = anatomy constants that differ between ears are parameters too: for fits to images,
+   where they need not be chosen. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -31,20 +39,25 @@
 #include "lathe.h"
 #include "sdm/shape.h"
 
-/* The published four; of the anatomy what `free` sets free. The ranges of c, p0 and theta are twice the standard deviation on
-   either side of the defaults: of the height of cochleae (0.4 mm), of their basal diameter (0.4 mm) and of the number of turns
-   (2.2 to 2.9; Erixon, Hogstorp, Wadin and Rask-Andersen 2009). For kappa and theta2 there are no measurements. */
+/* The published four; of the anatomy what `free` sets free. The ranges of c, p0 and theta are twice
+   the standard deviation on either side of the defaults: of the height of cochleae (0.4 mm), of
+   their basal diameter (0.4 mm) and of the number of turns (2.2 to 2.9; Erixon, Hogstorp, Wadin and
+   Rask-Andersen 2009). For kappa and theta2 there are no measurements. */
 static const sdm_param PARAMS[COCHLEA_UNKNOWNS] = {
-    [COCHLEA_A] = {"a", "mm", 2.0, 5.0, 4.4, "scale of the radial component: radius of the centreline at theta = 0"},
-    [COCHLEA_ALPHA] = {"alpha", "mm", 0.0, 1.2, 0.5, "amplitude of the longitudinal wave of the basal turn"},
+    [COCHLEA_A] = {"a", "mm", 2.0, 5.0, 4.4,
+                   "scale of the radial component: radius of the centreline at theta = 0"},
+    [COCHLEA_ALPHA] = {"alpha", "mm", 0.0, 1.2, 0.5,
+                       "amplitude of the longitudinal wave of the basal turn"},
     [COCHLEA_B] = {"b", "", 0.05, 0.25, 0.145, "decay of the spiral per radian"},
-    [COCHLEA_PHI] = {"phi", "rad", -LATHE_PI / 4, LATHE_PI / 4, 0.4, "phase of the longitudinal wave"},
+    [COCHLEA_PHI] = {"phi", "rad", -LATHE_PI / 4, LATHE_PI / 4, 0.4,
+                     "phase of the longitudinal wave"},
     [COCHLEA_C] = {"c", "mm/rad", 0.14, 0.26, 0.20, "rise of the centreline"},
     [COCHLEA_KAPPA] = {"kappa", "1/rad", 0.0, 0.6, 0.3, "decay of the longitudinal wave"},
     [COCHLEA_THETA] = {"theta", "rad", 12.3, 16.7, 14.5, "angle of the apical end"},
     [COCHLEA_THETA2] = {"theta2", "rad", 0.5, LATHE_PI - 0.5, LATHE_PI / 2,
                         "where the polynomial start joins the spiral"},
-    [COCHLEA_P0] = {"p0", "mm", 4.5, 6.1, 5.3, "centreline radius at theta = 0 of the polynomial start"},
+    [COCHLEA_P0] = {"p0", "mm", 4.5, 6.1, 5.3,
+                    "centreline radius at theta = 0 of the polynomial start"},
 };
 
 enum {
@@ -70,18 +83,23 @@ static const sdm_option OPTIONS[N_OPTIONS] = {
     [EDGE] = {"edge", SDM_OPTION_REAL, "mm", 0.05, 1.0, 0.30, NULL,
               "mean edge length the mesh aims at, over the parameter ranges"},
     [EAR] = {"ear", SDM_OPTION_CHOICE, "", 0, 0, 0, "right|left", "left is the mirror image in y"},
-    [THETA] = {"theta", SDM_OPTION_REAL, "rad", 3.0, 25.0, 14.5, NULL, "angle of the apical end (14.5: 2.3 turns)"},
+    [THETA] = {"theta", SDM_OPTION_REAL, "rad", 3.0, 25.0, 14.5, NULL,
+               "angle of the apical end (14.5: 2.3 turns)"},
     [RISE] = {"c", SDM_OPTION_REAL, "mm/rad", 0.02, 1.0, 0.20, NULL, "rise of the centreline"},
-    [KAPPA] = {"kappa", SDM_OPTION_REAL, "1/rad", 0.0, 3.0, 0.3, NULL, "decay of the longitudinal wave"},
+    [KAPPA] = {"kappa", SDM_OPTION_REAL, "1/rad", 0.0, 3.0, 0.3, NULL,
+               "decay of the longitudinal wave"},
     [START] = {"start", SDM_OPTION_CHOICE, "", 0, 0, 0, "spiral|cubic",
                "cubic: a polynomial of radius p0 at theta = 0 below theta2"},
     [THETA2] = {"theta2", SDM_OPTION_REAL, "rad", 0.2, 3.0, LATHE_PI / 2, NULL,
                 "where the polynomial start joins the spiral (C2)"},
     [P0] = {"p0", SDM_OPTION_REAL, "mm", 1.0, 10.0, 5.3, NULL,
             "centreline radius at theta = 0 of the polynomial start"},
-    [RADIUS] = {"radius", SDM_OPTION_REAL, "mm", 0.1, 3.0, 1.11, NULL, "tube radius without taper and flare"},
-    [TAPER] = {"taper", SDM_OPTION_REAL, "mm/rad", 0.0, 0.2, 0.02, NULL, "loss of tube radius per radian"},
-    [FLARE] = {"flare", SDM_OPTION_REAL, "mm", 0.0, 1.0, 0.25, NULL, "widening of the tube at the basal end"},
+    [RADIUS] = {"radius", SDM_OPTION_REAL, "mm", 0.1, 3.0, 1.11, NULL,
+                "tube radius without taper and flare"},
+    [TAPER] = {"taper", SDM_OPTION_REAL, "mm/rad", 0.0, 0.2, 0.02, NULL,
+               "loss of tube radius per radian"},
+    [FLARE] = {"flare", SDM_OPTION_REAL, "mm", 0.0, 1.0, 0.25, NULL,
+               "widening of the tube at the basal end"},
     [FLARE_ANGLE] = {"flare_angle", SDM_OPTION_REAL, "rad", 0.05, 5.0, 0.35, NULL,
                      "angle over which the widening decays by e"},
     [SECTION] = {"section", SDM_OPTION_CHOICE, "", 0, 0, 0, "circle|ellipse",
@@ -89,13 +107,17 @@ static const sdm_option OPTIONS[N_OPTIONS] = {
     [RATIO] = {"ratio", SDM_OPTION_REAL, "", 0.3, 1.0, 0.7, NULL,
                "height over width of the elliptical section at the base"},
     [FREE] = {"free", SDM_OPTION_CHOICE, "", 0, 0, 0, "none|anatomy",
-              "anatomy: c, kappa, theta and, with start = cubic, theta2 and p0 are parameters; their options are the "
+              "anatomy: c, kappa, theta and, with start = cubic, theta2 and p0 are parameters; "
+              "their options are the "
               "defaults"},
 };
 
 /* The option that tells an unknown of the anatomy. */
-static const int OPTION_OF[COCHLEA_UNKNOWNS] = {
-    [COCHLEA_C] = RISE, [COCHLEA_KAPPA] = KAPPA, [COCHLEA_THETA] = THETA, [COCHLEA_THETA2] = THETA2, [COCHLEA_P0] = P0};
+static const int OPTION_OF[COCHLEA_UNKNOWNS] = {[COCHLEA_C] = RISE,
+                                                [COCHLEA_KAPPA] = KAPPA,
+                                                [COCHLEA_THETA] = THETA,
+                                                [COCHLEA_THETA2] = THETA2,
+                                                [COCHLEA_P0] = P0};
 
 typedef struct cochlea {
     cochlea_model model;
@@ -122,7 +144,8 @@ static cochlea_model model_of(const sdm_option_value *o)
 
 static void default_unknowns(const sdm_option_value *o, double *x)
 {
-    for (int k = 0; k < COCHLEA_UNKNOWNS; k++) x[k] = OPTION_OF[k] ? o[OPTION_OF[k]].number : PARAMS[k].def;
+    for (int k = 0; k < COCHLEA_UNKNOWNS; k++)
+        x[k] = OPTION_OF[k] ? o[OPTION_OF[k]].number : PARAMS[k].def;
 }
 
 static void unknowns_at(const cochlea *c, const double *p, double *x)
@@ -138,7 +161,8 @@ static bool is_free(const sdm_option_value *o, int unknown)
     return o[FREE].number > 0 && (o[START].number > 0 || !of_start);
 }
 
-// how far the vertices of a ring move per radian, root mean square over the ring, at the default parameters
+// how far the vertices of a ring move per radian, root mean square over the ring, at the default
+// parameters
 static double ring_speed(const cochlea_model *m, const double *x, double theta)
 {
     cochlea_section s;
@@ -154,7 +178,8 @@ static double ring_speed(const cochlea_model *m, const double *x, double theta)
 
 #define SAMPLES 1024
 
-// way[i]: length travelled up to the share i / SAMPLES of the apical angle (trapezoidal rule); returns the mean circumference of the sections
+// way[i]: length travelled up to the share i / SAMPLES of the apical angle (trapezoidal rule);
+// returns the mean circumference of the sections
 static double measure(const cochlea_model *m, const double *x, double way[SAMPLES + 1])
 {
     const double step = x[COCHLEA_THETA] / SAMPLES;
@@ -174,12 +199,14 @@ static cochlea_ring *cap(size_t n, bool apex, cochlea_ring *r)
 {
     for (size_t i = 1; i <= n; i++) {
         const double up = LATHE_PI / 2 * (double)(apex ? i : n + 1 - i) / (double)(n + 1);
-        *r++ = (cochlea_ring){.share = apex, .shrink = cos(up), .ahead = (apex ? 1 : -1) * sin(up), .whole = true};
+        *r++ = (cochlea_ring){
+            .share = apex, .shrink = cos(up), .ahead = (apex ? 1 : -1) * sin(up), .whole = true};
     }
     return r;
 }
 
-static void place_rings(cochlea *c, size_t n_base, size_t n_tube, size_t n_apex, const double way[SAMPLES + 1])
+static void place_rings(cochlea *c, size_t n_base, size_t n_tube, size_t n_apex,
+                        const double way[SAMPLES + 1])
 {
     cochlea_ring *r = cap(n_base, false, c->rings);
     size_t at = 0;
@@ -211,30 +238,35 @@ static int create(const sdm_host *host, const sdm_option_value *options, void **
     for (int k = 0; k < COCHLEA_UNKNOWNS; k++)
         if (is_free(options, k) && !(x[k] >= PARAMS[k].min && x[k] <= PARAMS[k].max)) {
             char text[160];
-            snprintf(text, sizeof text, "%s = %g, but with free = anatomy it is a parameter: need %g to %g",
+            snprintf(text, sizeof text,
+                     "%s = %g, but with free = anatomy it is a parameter: need %g to %g",
                      PARAMS[k].name, x[k], PARAMS[k].min, PARAMS[k].max);
             return host->fail(host, text);
         }
 
     // the largest angle that may come has the thinnest tube
-    const double end = x[COCHLEA_THETA], farthest = is_free(options, COCHLEA_THETA) ? PARAMS[COCHLEA_THETA].max : end,
+    const double end = x[COCHLEA_THETA],
+                 farthest = is_free(options, COCHLEA_THETA) ? PARAMS[COCHLEA_THETA].max : end,
                  thin = sdm_cochlea_radius_at(&m, farthest);
     if (!(thin >= 0.02)) {
         char text[160];
         snprintf(text, sizeof text,
-                 "tube radius %g mm at the apex, need at least 0.02: lower 'taper' or 'theta', or raise 'radius'",
+                 "tube radius %g mm at the apex, need at least 0.02: lower 'taper' or 'theta', or "
+                 "raise 'radius'",
                  thin);
         return host->fail(host, text);
     }
 
-    // counts depend on the options alone; the factors make the mean over the parameter ranges about `edge`, and triangles a
-    // little longer along the tube, where it is less curved
+    // counts depend on the options alone; the factors make the mean over the parameter ranges about
+    // `edge`, and triangles a little longer along the tube, where it is less curved
     double way[SAMPLES + 1];
     const double edge = options[EDGE].number, round = measure(&m, x, way), quarter = LATHE_PI / 2;
     const size_t n_sectors = sdm_lathe_pieces(round, 1.1 * edge, 6),
                  n_tube = sdm_lathe_pieces(way[SAMPLES], 1.2 * edge, 8);
-    const size_t n_base = sdm_lathe_pieces(quarter * sdm_cochlea_radius_at(&m, 0), 1.2 * edge, 2) - 1;
-    const size_t n_apex = sdm_lathe_pieces(quarter * sdm_cochlea_radius_at(&m, end), 1.2 * edge, 2) - 1;
+    const size_t n_base =
+        sdm_lathe_pieces(quarter * sdm_cochlea_radius_at(&m, 0), 1.2 * edge, 2) - 1;
+    const size_t n_apex =
+        sdm_lathe_pieces(quarter * sdm_cochlea_radius_at(&m, end), 1.2 * edge, 2) - 1;
     const size_t n_rings = n_base + n_tube + 1 + n_apex;
 
     cochlea *c = malloc(sizeof *c + n_rings * sizeof *c->rings);
@@ -272,15 +304,18 @@ static void destroy(void *self)
 // calls put(user, vertex, position with derivatives) for every vertex, in the order of the lathe
 static void vertices(const cochlea *c, const double *p, cochlea_put *put, void *user)
 {
-    const cochlea_ring base = {.share = 0, .ahead = -1, .whole = true}, apex = {.share = 1, .ahead = 1, .whole = true};
+    const cochlea_ring base = {.share = 0, .ahead = -1, .whole = true},
+                       apex = {.share = 1, .ahead = 1, .whole = true};
     const double none[2] = {0, 0};
     double x[COCHLEA_UNKNOWNS];
     unknowns_at(c, p, x);
     sdm_cochlea_ring_at(&c->model, x, &base, 1, none, c->left, 0, put, user);
     for (size_t i = 0; i < c->n_rings; i++)
-        sdm_cochlea_ring_at(&c->model, x, &c->rings[i], c->n_sectors, c->direction + (i % 2 ? 2 * c->n_sectors : 0),
-                            c->left, 1 + i * c->n_sectors, put, user);
-    sdm_cochlea_ring_at(&c->model, x, &apex, 1, none, c->left, 1 + c->n_rings * c->n_sectors, put, user);
+        sdm_cochlea_ring_at(&c->model, x, &c->rings[i], c->n_sectors,
+                            c->direction + (i % 2 ? 2 * c->n_sectors : 0), c->left,
+                            1 + i * c->n_sectors, put, user);
+    sdm_cochlea_ring_at(&c->model, x, &apex, 1, none, c->left, 1 + c->n_rings * c->n_sectors, put,
+                        user);
 }
 
 static void put_position(void *user, size_t vertex, const dual at[3])
@@ -296,13 +331,13 @@ static void describe(const void *self, const sdm_param **params, uint32_t *n_par
     *n_params = c->n_params;
 }
 
-static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
-                sdm_mesh_out *out)
+static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                const double *p, sdm_mesh_out *out)
 {
     (void)options;
     const cochlea *c = self;
-    const int failed =
-        host->reserve(host, out, sdm_lathe_n_vert(c->n_rings, c->n_sectors), sdm_lathe_n_tri(c->n_rings, c->n_sectors));
+    const int failed = host->reserve(host, out, sdm_lathe_n_vert(c->n_rings, c->n_sectors),
+                                     sdm_lathe_n_tri(c->n_rings, c->n_sectors));
     if (failed) return failed;
     vertices(c, p, put_position, out->vert);
     sdm_lathe_triangles(c->n_rings, c->n_sectors, c->left, out->tri);
@@ -319,11 +354,12 @@ static void put_velocity(void *user, size_t vertex, const dual at[3])
 {
     const velocity_out *o = user;
     for (size_t i = 0; i < o->shape->n_params; i++)
-        for (size_t k = 0; k < 3; k++) o->velocity[3 * (i * o->n_vert + vertex) + k] = at[k].d[o->shape->unknown[i]];
+        for (size_t k = 0; k < 3; k++)
+            o->velocity[3 * (i * o->n_vert + vertex) + k] = at[k].d[o->shape->unknown[i]];
 }
 
-static int velocity(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
-                    size_t n_vert, double *velocity_at)
+static int velocity(const void *self, const sdm_host *host, const sdm_option_value *options,
+                    const double *p, size_t n_vert, double *velocity_at)
 {
     (void)options;
     const cochlea *c = self;
@@ -335,12 +371,13 @@ static int velocity(const void *self, const sdm_host *host, const sdm_option_val
 }
 
 // the ball of the tube's radius swept along the centreline
-static int distance(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
-                    const double point[3], double *out)
+static int distance(const void *self, const sdm_host *host, const sdm_option_value *options,
+                    const double *p, const double point[3], double *out)
 {
     (void)options;
     const cochlea *c = self;
-    if (c->model.ellipse) return host->fail(host, "there is no closed form for section = ellipse, only for circle");
+    if (c->model.ellipse)
+        return host->fail(host, "there is no closed form for section = ellipse, only for circle");
     double x[COCHLEA_UNKNOWNS];
     unknowns_at(c, p, x);
     const double at[3] = {point[0], c->left ? -point[1] : point[1], point[2]};
@@ -352,7 +389,8 @@ const sdm_shape sdm_shape_cochlea = {
     .abi = SDM_SHAPE_ABI,
     .size = sizeof(sdm_shape),
     .name = "cochlea",
-    .summary = "human cochlea: a tube about a rising logarithmic spiral (a reconstruction); distance exact outside, a "
+    .summary = "human cochlea: a tube about a rising logarithmic spiral (a reconstruction); "
+               "distance exact outside, a "
                "bound inside",
     .params = PARAMS,
     .n_params = COCHLEA_C,

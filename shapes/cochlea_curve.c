@@ -52,7 +52,8 @@ static dual root(dual a)
 
 static dual dot(const dual a[3], const dual b[3])
 {
-    return sdm_dual_add(sdm_dual_add(sdm_dual_mul(a[0], b[0]), sdm_dual_mul(a[1], b[1])), sdm_dual_mul(a[2], b[2]));
+    return sdm_dual_add(sdm_dual_add(sdm_dual_mul(a[0], b[0]), sdm_dual_mul(a[1], b[1])),
+                        sdm_dual_mul(a[2], b[2]));
 }
 
 static dual exponential(dual a)
@@ -75,22 +76,28 @@ static dual unknown(const double *x, int k)
 static void spiral(const double *x, dual theta, dual r[3])
 {
     const dual b = unknown(x, COCHLEA_B);
-    r[0] = sdm_dual_mul(unknown(x, COCHLEA_A), exponential(sdm_dual_scale(-1, sdm_dual_mul(b, theta))));
+    r[0] = sdm_dual_mul(unknown(x, COCHLEA_A),
+                        exponential(sdm_dual_scale(-1, sdm_dual_mul(b, theta))));
     r[1] = sdm_dual_scale(-1, sdm_dual_mul(b, r[0]));
     r[2] = sdm_dual_scale(-1, sdm_dual_mul(b, r[1]));
 }
 
-// Taylor's polynomial of the spiral at theta2 up to the second order, and a cubic term that makes r(0) = p0: C2 at theta2
+// Taylor's polynomial of the spiral at theta2 up to the second order, and a cubic term that makes
+// r(0) = p0: C2 at theta2
 static void basal_cubic(const double *x, dual theta, dual r[3])
 {
-    const dual end = unknown(x, COCHLEA_THETA2), end2 = sdm_dual_mul(end, end), h = sdm_dual_sub(theta, end);
+    const dual end = unknown(x, COCHLEA_THETA2), end2 = sdm_dual_mul(end, end),
+               h = sdm_dual_sub(theta, end);
     dual s[3];
     spiral(x, end, s);
     const dual half = sdm_dual_scale(0.5, s[2]);
-    const dual start = sdm_dual_add(sdm_dual_sub(s[0], sdm_dual_mul(end, s[1])), sdm_dual_mul(end2, half));
-    const dual k = sdm_dual_div(sdm_dual_sub(start, unknown(x, COCHLEA_P0)), sdm_dual_mul(end2, end));
+    const dual start =
+        sdm_dual_add(sdm_dual_sub(s[0], sdm_dual_mul(end, s[1])), sdm_dual_mul(end2, half));
+    const dual k =
+        sdm_dual_div(sdm_dual_sub(start, unknown(x, COCHLEA_P0)), sdm_dual_mul(end2, end));
     const dual kh = sdm_dual_mul(k, h);
-    r[0] = sdm_dual_add(s[0], sdm_dual_mul(h, sdm_dual_add(s[1], sdm_dual_mul(h, sdm_dual_add(half, kh)))));
+    r[0] = sdm_dual_add(
+        s[0], sdm_dual_mul(h, sdm_dual_add(s[1], sdm_dual_mul(h, sdm_dual_add(half, kh)))));
     r[1] = sdm_dual_add(s[1], sdm_dual_mul(h, sdm_dual_add(s[2], sdm_dual_scale(3, kh))));
     r[2] = sdm_dual_add(s[2], sdm_dual_scale(6, kh));
 }
@@ -99,13 +106,15 @@ static void basal_cubic(const double *x, dual theta, dual r[3])
 static void height(const double *x, dual theta, dual z[3])
 {
     const dual rise = unknown(x, COCHLEA_C), k = unknown(x, COCHLEA_KAPPA);
-    const dual turned = sdm_dual_sub(theta, unknown(x, COCHLEA_PHI)), c = cosine(turned), s = sine(turned);
+    const dual turned = sdm_dual_sub(theta, unknown(x, COCHLEA_PHI)), c = cosine(turned),
+               s = sine(turned);
     const dual decay = exponential(sdm_dual_scale(-1, sdm_dual_mul(k, theta)));
     const dual wave = sdm_dual_mul(unknown(x, COCHLEA_ALPHA), decay);
     const dual level = sdm_dual_sub(sdm_dual_mul(k, k), sdm_dual_of(1));
     z[0] = sdm_dual_add(sdm_dual_mul(rise, theta), sdm_dual_mul(wave, c));
     z[1] = sdm_dual_sub(rise, sdm_dual_mul(wave, sdm_dual_add(sdm_dual_mul(k, c), s)));
-    z[2] = sdm_dual_mul(wave, sdm_dual_add(sdm_dual_mul(level, c), sdm_dual_scale(2, sdm_dual_mul(k, s))));
+    z[2] = sdm_dual_mul(
+        wave, sdm_dual_add(sdm_dual_mul(level, c), sdm_dual_scale(2, sdm_dual_mul(k, s))));
 }
 
 // curve[order][3]: position and derivatives with respect to theta
@@ -117,7 +126,8 @@ static void curve_at(const cochlea_model *m, const double *x, dual theta, dual c
     else
         spiral(x, theta, r);
     height(x, theta, z);
-    const dual c = cosine(theta), s = sine(theta), level = sdm_dual_sub(r[2], r[0]), twice = sdm_dual_scale(2, r[1]);
+    const dual c = cosine(theta), s = sine(theta), level = sdm_dual_sub(r[2], r[0]),
+               twice = sdm_dual_scale(2, r[1]);
     curve[0][0] = sdm_dual_mul(c, r[0]);
     curve[0][1] = sdm_dual_mul(s, r[0]);
     curve[1][0] = sdm_dual_sub(sdm_dual_mul(c, r[1]), sdm_dual_mul(s, r[0]));
@@ -131,15 +141,18 @@ static void curve_at(const cochlea_model *m, const double *x, dual theta, dual c
 static void tube_at(const cochlea_model *m, dual theta, dual *wide, dual *high)
 {
     const double flare = m->flare * exp(-theta.v / m->flare_angle);
-    *wide = sdm_dual_apply(theta, m->radius - m->taper * theta.v + flare, -m->taper - flare / m->flare_angle);
+    *wide = sdm_dual_apply(theta, m->radius - m->taper * theta.v + flare,
+                           -m->taper - flare / m->flare_angle);
     *high = *wide;
     if (!m->ellipse || theta.v >= TURN) return;
     const double u = theta.v / TURN, rest = 1 - m->ratio;
-    const dual ratio = sdm_dual_apply(theta, m->ratio + rest * u * u * (3 - 2 * u), rest * 6 * u * (1 - u) / TURN);
+    const dual ratio =
+        sdm_dual_apply(theta, m->ratio + rest * u * u * (3 - 2 * u), rest * 6 * u * (1 - u) / TURN);
     *high = sdm_dual_mul(*wide, ratio);
 }
 
-void sdm_cochlea_section_at(const cochlea_model *m, const double *x, double share, cochlea_section *out)
+void sdm_cochlea_section_at(const cochlea_model *m, const double *x, double share,
+                            cochlea_section *out)
 {
     const dual theta = sdm_dual_scale(share, unknown(x, COCHLEA_THETA));
     dual curve[3][3];
@@ -147,9 +160,11 @@ void sdm_cochlea_section_at(const cochlea_model *m, const double *x, double shar
     const dual *d1 = curve[1], *d2 = curve[2];
     const dual speed2 = dot(d1, d1), speed = root(speed2);
     const dual level = root(sdm_dual_add(sdm_dual_mul(d1[0], d1[0]), sdm_dual_mul(d1[1], d1[1])));
-    for (int k = 0; k < 3; k++) out->centre[k] = curve[0][k], out->tangent[k] = sdm_dual_div(d1[k], speed);
+    for (int k = 0; k < 3; k++)
+        out->centre[k] = curve[0][k], out->tangent[k] = sdm_dual_div(d1[k], speed);
 
-    // e1 = tangent x z, normalised: a fixed rule, so that vertices are functions of the parameters here and nowhere else
+    // e1 = tangent x z, normalised: a fixed rule, so that vertices are functions of the parameters
+    // here and nowhere else
     const dual *t = out->tangent, *e1 = out->e1;
     out->e1[0] = sdm_dual_div(d1[1], level);
     out->e1[1] = sdm_dual_scale(-1, sdm_dual_div(d1[0], level));
@@ -174,7 +189,8 @@ void sdm_cochlea_centre_at(const cochlea_model *m, const double *x, double theta
     }
     centre[0] = r * cos(theta);
     centre[1] = r * sin(theta);
-    centre[2] = x[COCHLEA_C] * theta + x[COCHLEA_ALPHA] * exp(-x[COCHLEA_KAPPA] * theta) * cos(theta - x[COCHLEA_PHI]);
+    centre[2] = x[COCHLEA_C] * theta +
+                x[COCHLEA_ALPHA] * exp(-x[COCHLEA_KAPPA] * theta) * cos(theta - x[COCHLEA_PHI]);
 }
 
 double sdm_cochlea_radius_at(const cochlea_model *m, double theta)

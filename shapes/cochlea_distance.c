@@ -15,7 +15,8 @@ static double to_ball(const cochlea_model *m, const double *x, const double poin
 }
 
 // golden section search (Kiefer 1953) in [lo, hi], which holds one minimum
-static double lowest(const cochlea_model *m, const double *x, const double point[3], double lo, double hi)
+static double lowest(const cochlea_model *m, const double *x, const double point[3], double lo,
+                     double hi)
 {
     const double golden = 0.61803398874989484820;
     double t1 = hi - golden * (hi - lo), t2 = lo + golden * (hi - lo);

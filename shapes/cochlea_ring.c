@@ -1,18 +1,21 @@
 /* Rings of the cochlea, cut off where sections would run backwards. */
 #include "cochlea_ring.h"
 
-// share of the distance to the centre of curvature from which a section is bent, and width of the bend: C2
+// share of the distance to the centre of curvature from which a section is bent, and width of the
+// bend: C2
 #define CUT_FROM 0.90
 #define CUT_OVER 0.16
 
 // moves a vertex (x along e1, y along e2) that lies at or behind the centre of curvature back to it
 static void cut_off(const dual bend[2], dual *x, dual *y)
 {
-    const dual u = sdm_dual_add(sdm_dual_mul(*x, bend[0]), sdm_dual_mul(*y, bend[1])); // 1: at the centre of curvature
+    const dual u = sdm_dual_add(sdm_dual_mul(*x, bend[0]),
+                                sdm_dual_mul(*y, bend[1])); // 1: at the centre of curvature
     const double w = (u.v - CUT_FROM) / CUT_OVER, end = CUT_FROM + CUT_OVER / 2;
-    const dual kept =
-        w < 1 ? sdm_dual_apply(u, CUT_FROM + CUT_OVER * w * (1 + w * w * (0.5 * w - 1)), 1 - w * w * (3 - 2 * w))
-              : sdm_dual_of(end);
+    const dual kept = w < 1
+                          ? sdm_dual_apply(u, CUT_FROM + CUT_OVER * w * (1 + w * w * (0.5 * w - 1)),
+                                           1 - w * w * (3 - 2 * w))
+                          : sdm_dual_of(end);
     const dual bend2 = sdm_dual_add(sdm_dual_mul(bend[0], bend[0]), sdm_dual_mul(bend[1], bend[1]));
     const dual back = sdm_dual_div(sdm_dual_sub(u, kept), bend2);
     *x = sdm_dual_sub(*x, sdm_dual_mul(back, bend[0]));
@@ -23,18 +26,21 @@ static void cut_vertex(const cochlea_section *s, const dual middle[3], dual x, d
 {
     cut_off(s->bend, &x, &y);
     for (int k = 0; k < 3; k++)
-        at[k] = sdm_dual_add(middle[k], sdm_dual_add(sdm_dual_mul(x, s->e1[k]), sdm_dual_mul(y, s->e2[k])));
+        at[k] = sdm_dual_add(middle[k],
+                             sdm_dual_add(sdm_dual_mul(x, s->e1[k]), sdm_dual_mul(y, s->e2[k])));
 }
 
-void sdm_cochlea_ring_at(const cochlea_model *m, const double *x, const cochlea_ring *r, size_t n_sectors,
-                         const double *direction, bool left, size_t first, cochlea_put *put, void *user)
+void sdm_cochlea_ring_at(const cochlea_model *m, const double *x, const cochlea_ring *r,
+                         size_t n_sectors, const double *direction, bool left, size_t first,
+                         cochlea_put *put, void *user)
 {
     cochlea_section s;
     sdm_cochlea_section_at(m, x, r->share, &s);
     // vertex = middle + cosine * wide + sine * high, but where it is cut off
     dual middle[3], wide[3], high[3], at[3];
     for (int k = 0; k < 3; k++) {
-        middle[k] = sdm_dual_add(s.centre[k], sdm_dual_scale(r->ahead, sdm_dual_mul(s.wide, s.tangent[k])));
+        middle[k] =
+            sdm_dual_add(s.centre[k], sdm_dual_scale(r->ahead, sdm_dual_mul(s.wide, s.tangent[k])));
         wide[k] = sdm_dual_scale(r->shrink, sdm_dual_mul(s.wide, s.e1[k]));
         high[k] = sdm_dual_scale(r->shrink, sdm_dual_mul(s.high, s.e2[k]));
     }
@@ -44,7 +50,8 @@ void sdm_cochlea_ring_at(const cochlea_model *m, const double *x, const cochlea_
             cut_vertex(&s, middle, sdm_dual_scale(co, s.wide), sdm_dual_scale(si, s.high), at);
         else
             for (int k = 0; k < 3; k++)
-                at[k] = sdm_dual_add(middle[k], sdm_dual_add(sdm_dual_scale(co, wide[k]), sdm_dual_scale(si, high[k])));
+                at[k] = sdm_dual_add(middle[k], sdm_dual_add(sdm_dual_scale(co, wide[k]),
+                                                             sdm_dual_scale(si, high[k])));
         if (left) at[1] = sdm_dual_scale(-1, at[1]);
         put(user, first + j, at);
     }

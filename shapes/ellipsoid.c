@@ -1,7 +1,9 @@
-/* The superquadric ellipsoid (Barr 1981): (|x/rx|^(2/e2) + |y/ry|^(2/e2))^(e2/e1) + |z/rz|^(2/e1) = 1.
+/* The superquadric ellipsoid (Barr 1981): (|x/rx|^(2/e2) + |y/ry|^(2/e2))^(e2/e1) + |z/rz|^(2/e1)
+   = 1.
 
-   Exponents 1 give the true ellipsoid, towards 0 a box, towards 2 an octahedron. A vertex is a fixed direction, stretched by
-   the radii: the mesh is linear in the parameters. Vertices lie on the surface. */
+   Exponents 1 give the true ellipsoid, towards 0 a box, towards 2 an octahedron. A vertex is a
+   fixed direction, stretched by the radii: the mesh is linear in the parameters. Vertices lie on
+   the surface. */
 #include <math.h>
 
 #include "lathe.h"
@@ -27,7 +29,8 @@ static const sdm_option OPTIONS[N_OPTIONS] = {
 
 static void counts(const sdm_option_value *options, size_t *n_rings, size_t *n_sectors)
 {
-    const double radius = (PARAMS[RX].def + PARAMS[RY].def + PARAMS[RZ].def) / 3, edge = options[EDGE].number;
+    const double radius = (PARAMS[RX].def + PARAMS[RY].def + PARAMS[RZ].def) / 3,
+                 edge = options[EDGE].number;
     *n_rings = sdm_lathe_pieces(LATHE_PI * radius, edge, 4) - 1;
     *n_sectors = sdm_lathe_pieces(2 * LATHE_PI * radius, edge, 6);
 }
@@ -36,7 +39,8 @@ static void counts(const sdm_option_value *options, size_t *n_rings, size_t *n_s
 static void to_surface(double e1, double e2, double s[3])
 {
     if (e1 == 1 && e2 == 1) return;
-    const double level = pow(pow(fabs(s[0]), 2 / e2) + pow(fabs(s[1]), 2 / e2), e2 / e1) + pow(fabs(s[2]), 2 / e1);
+    const double level =
+        pow(pow(fabs(s[0]), 2 / e2) + pow(fabs(s[1]), 2 / e2), e2 / e1) + pow(fabs(s[2]), 2 / e1);
     const double scale = pow(level, -e1 / 2);
     for (int k = 0; k < 3; k++) s[k] *= scale;
 }
@@ -48,7 +52,8 @@ static void write(const sdm_option_value *options, const double radii[3], double
     counts(options, &n_rings, &n_sectors);
     for (size_t i = 0; i <= n_rings + 1; i++) {
         const size_t n = i == 0 || i == n_rings + 1 ? 1 : n_sectors;
-        const double down = LATHE_PI * (double)i / (double)(n_rings + 1), across = n == 1 ? 0 : sin(down);
+        const double down = LATHE_PI * (double)i / (double)(n_rings + 1),
+                     across = n == 1 ? 0 : sin(down);
         for (size_t j = 0; j < n; j++) {
             const double angle = sdm_lathe_angle(i + 1, j, n_sectors);
             double s[3] = {across * cos(angle), across * sin(angle), -cos(down)};
@@ -58,22 +63,22 @@ static void write(const sdm_option_value *options, const double radii[3], double
     }
 }
 
-static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
-                sdm_mesh_out *out)
+static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                const double *p, sdm_mesh_out *out)
 {
     (void)self;
     size_t n_rings, n_sectors;
     counts(options, &n_rings, &n_sectors);
-    const int failed =
-        host->reserve(host, out, sdm_lathe_n_vert(n_rings, n_sectors), sdm_lathe_n_tri(n_rings, n_sectors));
+    const int failed = host->reserve(host, out, sdm_lathe_n_vert(n_rings, n_sectors),
+                                     sdm_lathe_n_tri(n_rings, n_sectors));
     if (failed) return failed;
     write(options, p, out->vert);
     sdm_lathe_triangles(n_rings, n_sectors, false, out->tri);
     return 0;
 }
 
-static int velocity(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
-                    size_t n_vert, double *out)
+static int velocity(const void *self, const sdm_host *host, const sdm_option_value *options,
+                    const double *p, size_t n_vert, double *out)
 {
     (void)self, (void)p;
     size_t n_rings, n_sectors;
@@ -88,13 +93,15 @@ static int velocity(const void *self, const sdm_host *host, const sdm_option_val
     return 0;
 }
 
-/* Distance of y >= 0 to the ellipsoid of half axes r[0], r[1] >= r[2] (method after Eberly, "Distance from a point to an ellipse, an
-   ellipsoid, or a hyperellipsoid", 2013). The nearest point is r[k]^2 y[k] / (s + r[k]^2 - r[2]^2) for the one root s > 0 of
+/* Distance of y >= 0 to the ellipsoid of half axes r[0], r[1] >= r[2] (method after Eberly,
+   "Distance from a point to an ellipse, an ellipsoid, or a hyperellipsoid", 2013). The nearest
+   point is r[k]^2 y[k] / (s + r[k]^2 - r[2]^2) for the one root s > 0 of
 
        g(s) = sum (r[k] y[k] / (s + r[k]^2 - r[2]^2))^2 - 1,
 
-   which falls. Bisection until no number is left in between cannot fail. Without a root (y[2] = 0, y near the centre) s is 0, and
-   the nearest point leaves the plane of y along the shortest axis. */
+   which falls. Bisection until no number is left in between cannot fail. Without a root (y[2] = 0,
+   y near the centre) s is 0, and the nearest point leaves the plane of y along the shortest axis.
+ */
 static double level(const double r[3], const double y[3], double s)
 {
     double g = -1;
@@ -131,8 +138,8 @@ static double to_ellipsoid(const double r[3], const double y[3])
     return inside < 1 ? -sqrt(d) : sqrt(d);
 }
 
-static int distance(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
-                    const double x[3], double *out)
+static int distance(const void *self, const sdm_host *host, const sdm_option_value *options,
+                    const double *p, const double x[3], double *out)
 {
     (void)self;
     if (options[E1].number != 1 || options[E2].number != 1)
@@ -150,7 +157,8 @@ const sdm_shape sdm_shape_ellipsoid = {
     .abi = SDM_SHAPE_ABI,
     .size = sizeof(sdm_shape),
     .name = "ellipsoid",
-    .summary = "ellipsoid or superquadric along the axes; distance exact for e1 = e2 = 1, none otherwise",
+    .summary =
+        "ellipsoid or superquadric along the axes; distance exact for e1 = e2 = 1, none otherwise",
     .params = PARAMS,
     .n_params = N_PARAMS,
     .options = OPTIONS,

@@ -23,12 +23,14 @@ static uint32_t *put(uint32_t *tri, bool mirrored, size_t a, size_t b, size_t c)
 void sdm_lathe_triangles(size_t n_rings, size_t n_sectors, bool mirrored, uint32_t *tri)
 {
     const size_t last = 1 + (n_rings - 1) * n_sectors, pole = 1 + n_rings * n_sectors;
-    for (size_t j = 0; j < n_sectors; j++) tri = put(tri, mirrored, 0, 1 + (j + 1) % n_sectors, 1 + j);
+    for (size_t j = 0; j < n_sectors; j++)
+        tri = put(tri, mirrored, 0, 1 + (j + 1) % n_sectors, 1 + j);
     for (size_t i = 0; i + 1 < n_rings; i++) {
         const size_t low = 1 + i * n_sectors, high = low + n_sectors;
         for (size_t j = 0; j < n_sectors; j++) {
             const size_t k = (j + 1) % n_sectors;
-            // the diagonal is the short one of the two: vertex j of an odd ring lies between j and j + 1 of an even one
+            // the diagonal is the short one of the two: vertex j of an odd ring lies between j and
+            // j + 1 of an even one
             if (i % 2 == 0) {
                 tri = put(tri, mirrored, low + j, low + k, high + j);
                 tri = put(tri, mirrored, high + j, low + k, high + k);
@@ -38,7 +40,8 @@ void sdm_lathe_triangles(size_t n_rings, size_t n_sectors, bool mirrored, uint32
             }
         }
     }
-    for (size_t j = 0; j < n_sectors; j++) tri = put(tri, mirrored, last + j, last + (j + 1) % n_sectors, pole);
+    for (size_t j = 0; j < n_sectors; j++)
+        tri = put(tri, mirrored, last + j, last + (j + 1) % n_sectors, pole);
 }
 
 size_t sdm_lathe_pieces(double length, double edge, size_t least)

@@ -1,9 +1,11 @@
-/* The statistical shape: a point-distribution model (Cootes, Taylor, Cooper and Graham 1995) from files,
+/* The statistical shape: a point-distribution model (Cootes, Taylor, Cooper and Graham 1995) from
+   files,
 
        vertex = mean + sum over the modes of weight * mode,
 
-   with weights m1, m2 ... in standard deviations. Modes are in mm per standard deviation, or of any length when the standard
-   deviations along them are given beside. Triangles are those of the mean. */
+   with weights m1, m2 ... in standard deviations. Modes are in mm per standard deviation, or of any
+   length when the standard deviations along them are given beside. Triangles are those of the mean.
+ */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -21,10 +23,13 @@ static const sdm_option OPTIONS[N_OPTIONS] = {
     [MODES] = {"modes", SDM_OPTION_FILE, "mm", 0, 0, 0, NULL,
                "the modes (.npy), [modes][vertices][3] or [modes][3 vertices]"},
     [DEVIATIONS] = {"deviations", SDM_OPTION_FILE, "", 0, 0, 0, NULL,
-                    "standard deviations (.npy), [modes], multiplied into the modes; none: modes are in mm per "
+                    "standard deviations (.npy), [modes], multiplied into the modes; none: modes "
+                    "are in mm per "
                     "standard deviation"},
-    [COUNT] = {"count", SDM_OPTION_INT, "", 0, MODES_MAX, 0, NULL, "how many of the modes are used; 0: all"},
-    [LIMIT] = {"limit", SDM_OPTION_REAL, "sd", 0.01, 10, 3, NULL, "range of every weight: -limit .. limit"},
+    [COUNT] = {"count", SDM_OPTION_INT, "", 0, MODES_MAX, 0, NULL,
+               "how many of the modes are used; 0: all"},
+    [LIMIT] = {"limit", SDM_OPTION_REAL, "sd", 0.01, 10, 3, NULL,
+               "range of every weight: -limit .. limit"},
 };
 
 typedef struct model {
@@ -77,11 +82,13 @@ static int read_array(const sdm_host *host, array *a)
 }
 
 // the array must be [modes][vertices][3] or [modes][3 vertices]
-static int check_modes(const sdm_host *host, const array *modes, const char *mean_path, size_t n_vert)
+static int check_modes(const sdm_host *host, const array *modes, const char *mean_path,
+                       size_t n_vert)
 {
     char what[1300];
     if (modes->n_dim != 2 && !(modes->n_dim == 3 && modes->shape[2] == 3)) {
-        snprintf(what, sizeof what, "has %d dimensions, need [modes][vertices][3] or [modes][3 vertices]",
+        snprintf(what, sizeof what,
+                 "has %d dimensions, need [modes][vertices][3] or [modes][3 vertices]",
                  modes->n_dim);
         return fail_about(host, modes->path, what);
     }
@@ -91,8 +98,8 @@ static int check_modes(const sdm_host *host, const array *modes, const char *mea
         return fail_about(host, modes->path, what);
     }
     if (numbers / 3 != n_vert) {
-        snprintf(what, sizeof what, "has modes of %zu vertices, but the mean %.900s has %zu", numbers / 3, mean_path,
-                 n_vert);
+        snprintf(what, sizeof what, "has modes of %zu vertices, but the mean %.900s has %zu",
+                 numbers / 3, mean_path, n_vert);
         return fail_about(host, modes->path, what);
     }
     if (modes->shape[0] == 0) return fail_about(host, modes->path, "has no mode");
@@ -103,13 +110,15 @@ static int check_deviations(const sdm_host *host, const array *deviations, const
 {
     char what[1300];
     if (deviations->n_dim != 1 || deviations->shape[0] != modes->shape[0]) {
-        snprintf(what, sizeof what, "has %zu numbers in %d dimensions, need one for each of the %zu modes of %.900s",
+        snprintf(what, sizeof what,
+                 "has %zu numbers in %d dimensions, need one for each of the %zu modes of %.900s",
                  deviations->shape[0], deviations->n_dim, modes->shape[0], modes->path);
         return fail_about(host, deviations->path, what);
     }
     for (size_t i = 0; i < deviations->shape[0]; i++)
         if (!(deviations->values[i] > 0)) {
-            snprintf(what, sizeof what, "standard deviation %zu is %g, need > 0", i, deviations->values[i]);
+            snprintf(what, sizeof what, "standard deviation %zu is %g, need > 0", i,
+                     deviations->values[i]);
             return fail_about(host, deviations->path, what);
         }
     return 0;
@@ -123,7 +132,8 @@ static size_t count_modes(const sdm_host *host, const array *modes, double asked
     if (n > modes->shape[0])
         snprintf(what, sizeof what, "has %zu modes, count = %zu asks for more", modes->shape[0], n);
     else if (n > MODES_MAX)
-        snprintf(what, sizeof what, "has %zu modes, at most %d can be used: set count", modes->shape[0], MODES_MAX);
+        snprintf(what, sizeof what, "has %zu modes, at most %d can be used: set count",
+                 modes->shape[0], MODES_MAX);
     else
         return n;
     fail_about(host, modes->path, what);
@@ -137,8 +147,8 @@ static void *copy(const void *from, size_t count, size_t size)
     return to;
 }
 
-static int build(const sdm_host *host, const sdm_mesh_out *mean, const array *modes, const array *deviations,
-                 size_t n_modes, double limit, model **out)
+static int build(const sdm_host *host, const sdm_mesh_out *mean, const array *modes,
+                 const array *deviations, size_t n_modes, double limit, model **out)
 {
     model *m = calloc(1, sizeof *m);
     if (!m) return host->fail(host, "out of memory");
@@ -163,8 +173,10 @@ static int build(const sdm_host *host, const sdm_mesh_out *mean, const array *mo
 
 static int create(const sdm_host *host, const sdm_option_value *options, void **self)
 {
-    if (!options[MEAN].text[0]) return host->fail(host, "option 'mean' is missing: the file of the mean mesh");
-    if (!options[MODES].text[0]) return host->fail(host, "option 'modes' is missing: the .npy file of the modes");
+    if (!options[MEAN].text[0])
+        return host->fail(host, "option 'mean' is missing: the file of the mean mesh");
+    if (!options[MODES].text[0])
+        return host->fail(host, "option 'modes' is missing: the .npy file of the modes");
     array modes = {.path = options[MODES].text}, deviations = {.path = options[DEVIATIONS].text};
     sdm_mesh_out mean = {0};
     int failed = host->read_mesh(host, options[MEAN].text, &mean);
@@ -190,8 +202,8 @@ static void describe(const void *self, const sdm_param **params, uint32_t *n_par
     *n_params = (uint32_t)m->n_modes;
 }
 
-static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
-                sdm_mesh_out *out)
+static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                const double *p, sdm_mesh_out *out)
 {
     (void)options;
     const model *m = self;
@@ -205,8 +217,8 @@ static int mesh(const void *self, const sdm_host *host, const sdm_option_value *
     return 0;
 }
 
-static int velocity(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
-                    size_t n_vert, double *out)
+static int velocity(const void *self, const sdm_host *host, const sdm_option_value *options,
+                    const double *p, size_t n_vert, double *out)
 {
     (void)options, (void)p;
     const model *m = self;
@@ -219,7 +231,8 @@ const sdm_shape sdm_shape_statistical = {
     .abi = SDM_SHAPE_ABI,
     .size = sizeof(sdm_shape),
     .name = "statistical",
-    .summary = "point-distribution model from files: mean mesh and modes, parameters m1, m2 ... in standard deviations",
+    .summary = "point-distribution model from files: mean mesh and modes, parameters m1, m2 ... in "
+               "standard deviations",
     .options = OPTIONS,
     .n_options = N_OPTIONS,
     .create = create,

@@ -12,7 +12,8 @@ static const sdm_param PARAMS[N_PARAMS] = {
 };
 
 static const sdm_option OPTIONS[] = {
-    {"edge", SDM_OPTION_REAL, "mm", 0.02, 1.0, 0.30, NULL, "edge length the mesh aims at, at the default parameters"},
+    {"edge", SDM_OPTION_REAL, "mm", 0.02, 1.0, 0.30, NULL,
+     "edge length the mesh aims at, at the default parameters"},
 };
 
 // sectors around the axis and around the tube
@@ -22,8 +23,8 @@ static void counts(const sdm_option_value *options, size_t *n_long, size_t *n_ro
     *n_round = sdm_lathe_pieces(2 * LATHE_PI * PARAMS[MINOR].def, options[0].number, 6);
 }
 
-static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
-                sdm_mesh_out *out)
+static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                const double *p, sdm_mesh_out *out)
 {
     (void)self;
     size_t n_long, n_round;
@@ -36,7 +37,8 @@ static int mesh(const void *self, const sdm_host *host, const sdm_option_value *
     for (size_t i = 0; i < n_long; i++) {
         const double u = 2 * LATHE_PI * (double)i / (double)n_long;
         for (size_t j = 0; j < n_round; j++) {
-            const double v = 2 * LATHE_PI * (double)j / (double)n_round, away = p[MAJOR] + p[MINOR] * cos(v);
+            const double v = 2 * LATHE_PI * (double)j / (double)n_round,
+                         away = p[MAJOR] + p[MINOR] * cos(v);
             *vert++ = away * cos(u);
             *vert++ = away * sin(u);
             *vert++ = p[MINOR] * sin(v);
@@ -50,17 +52,19 @@ static int mesh(const void *self, const sdm_host *host, const sdm_option_value *
     return 0;
 }
 
-static int velocity(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
-                    size_t n_vert, double *out)
+static int velocity(const void *self, const sdm_host *host, const sdm_option_value *options,
+                    const double *p, size_t n_vert, double *out)
 {
     (void)self, (void)p;
     size_t n_long, n_round;
     counts(options, &n_long, &n_round);
-    if (n_vert != n_long * n_round) return host->fail(host, "velocity of another number of vertices");
+    if (n_vert != n_long * n_round)
+        return host->fail(host, "velocity of another number of vertices");
     double *major = out, *minor = out + 3 * n_vert;
     for (size_t i = 0; i < n_long; i++)
         for (size_t j = 0; j < n_round; j++) {
-            const double u = 2 * LATHE_PI * (double)i / (double)n_long, v = 2 * LATHE_PI * (double)j / (double)n_round;
+            const double u = 2 * LATHE_PI * (double)i / (double)n_long,
+                         v = 2 * LATHE_PI * (double)j / (double)n_round;
             *major++ = cos(u), *minor++ = cos(v) * cos(u);
             *major++ = sin(u), *minor++ = cos(v) * sin(u);
             *major++ = 0, *minor++ = sin(v);
@@ -69,8 +73,8 @@ static int velocity(const void *self, const sdm_host *host, const sdm_option_val
 }
 
 // exact everywhere: the ranges keep minor below major
-static int distance(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
-                    const double x[3], double *out)
+static int distance(const void *self, const sdm_host *host, const sdm_option_value *options,
+                    const double *p, const double x[3], double *out)
 {
     (void)self, (void)host, (void)options;
     *out = hypot(hypot(x[0], x[1]) - p[MAJOR], x[2]) - p[MINOR];

@@ -1,5 +1,6 @@
-/* Checkpoints: what a run needs to go on with the same bits. Maps and bases are made again from the config and the seed (they are the same
-   bits); weights, moments, averages, counters and the metrics are kept. */
+/* Checkpoints: what a run needs to go on with the same bits. Maps and bases are made again from the
+   config and the seed (they are the same bits); weights, moments, averages, counters and the
+   metrics are kept. */
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -8,18 +9,18 @@
 
 #include "export_model.h"
 #include "kind.h"
-#include "sdm/checksum.h"
-#include "sdm/container.h"
-#include "sdm/file.h"
+#include "sdm/internal/checksum.h"
+#include "sdm/internal/container.h"
+#include "sdm/internal/file.h"
+#include "sdm/internal/text.h"
 #include "sdm/memory.h"
-#include "sdm/text.h"
 
 // numbers of the "checkpoint" section, in this order
 typedef struct state {
     double seconds, phase_started, last_evaluation, loss, heldout_mse;
     int64_t phase, step, phase_step, n_start, n_taken;
-    uint64_t
-        bases; // fingerprint of what the weights depend on (train_kind.fingerprint): they mean nothing on other maps
+    uint64_t bases; // fingerprint of what the weights depend on (train_kind.fingerprint): they mean
+                    // nothing on other maps
 } state;
 
 static void checkpoint_path(const trainer *t, char *path, size_t size)
@@ -31,11 +32,15 @@ static sdm_status remove_file(const trainer *t, const char *name, sdm_error *err
 {
     char path[SDM_PATH_TEXT_MAX + 32];
     snprintf(path, sizeof path, "%s/%s", t->folder, name);
-    if (unlink(path) && errno != ENOENT) return sdm_fail(err, SDM_E_IO, "%s: cannot remove: %s", path, strerror(errno));
+    if (unlink(path) && errno != ENOENT)
+        return sdm_fail(err, SDM_E_IO, "%s: cannot remove: %s", path, strerror(errno));
     return SDM_OK;
 }
 
-sdm_status checkpoint_remove(const trainer *t, sdm_error *err) { return remove_file(t, "checkpoint.sdmc", err); }
+sdm_status checkpoint_remove(const trainer *t, sdm_error *err)
+{
+    return remove_file(t, "checkpoint.sdmc", err);
+}
 
 sdm_status checkpoint_start_anew(const trainer *t, sdm_error *err)
 {
@@ -112,8 +117,9 @@ static sdm_status open_checkpoint(const trainer *t, opened *o, bool *found, sdm_
     if (s) return s;
     s = sdm_container_parse(o->bytes, size, o->sections, o->names, &o->n, &checksum, err);
     const sdm_section *c = s ? NULL : find(o, "checkpoint");
-    if (!s && (!c || c->size != sizeof(state) || !find(o, "config") || !find(o, "metrics") || !find(o, "weights") ||
-               !find(o, "moment1") || !find(o, "moment2") || !find(o, "average")))
+    if (!s &&
+        (!c || c->size != sizeof(state) || !find(o, "config") || !find(o, "metrics") ||
+         !find(o, "weights") || !find(o, "moment1") || !find(o, "moment2") || !find(o, "average")))
         s = sdm_fail(err, SDM_E_FORMAT, "not a checkpoint of this version");
     if (s) {
         sdm_free(o->bytes);
@@ -123,14 +129,16 @@ static sdm_status open_checkpoint(const trainer *t, opened *o, bool *found, sdm_
     return SDM_OK;
 }
 
-// what may differ between a run and its continuation: how long, where to and where from, how many threads
+// what may differ between a run and its continuation: how long, where to and where from, how many
+// threads
 static void neutral(const trainer *t, sdm_config *c)
 {
     const sdm_shape *shape = sdm_instance_shape(t->shape);
     for (size_t i = 0; i < c->shape.n_options; i++)
         for (uint32_t k = 0; k < shape->n_options;
              k++) // the fingerprint of the maps tells whether data files have changed
-            if (shape->options[k].type == SDM_OPTION_FILE && !strcmp(shape->options[k].name, c->shape.options[i].name))
+            if (shape->options[k].type == SDM_OPTION_FILE &&
+                !strcmp(shape->options[k].name, c->shape.options[i].name))
                 c->shape.options[i].value[0] = '\0';
     c->train.minutes = 1;
     c->train.steps = c->train.samples = 0;
@@ -140,7 +148,8 @@ static void neutral(const trainer *t, sdm_config *c)
 
 static sdm_status refuse(const trainer *t, const char *what, sdm_error *err)
 {
-    return sdm_fail(err, SDM_E_CONFIG, "%s/checkpoint.sdmc %s: start anew with --force, or choose another folder",
+    return sdm_fail(err, SDM_E_CONFIG,
+                    "%s/checkpoint.sdmc %s: start anew with --force, or choose another folder",
                     t->folder, what);
 }
 
@@ -153,7 +162,8 @@ static int line_at(const char **text)
 }
 
 // names the first line in which two dumps of a configuration differ
-static sdm_status refuse_difference(const trainer *t, const char *old, const char *now, sdm_error *err)
+static sdm_status refuse_difference(const trainer *t, const char *old, const char *now,
+                                    sdm_error *err)
 {
     char what[512];
     size_t line = 0;
@@ -165,19 +175,25 @@ static sdm_status refuse_difference(const trainer *t, const char *old, const cha
     return refuse(t, what, err);
 }
 
-// the budget may be another one, but not less than what was trained: the model would not be what its configuration says
-static sdm_status check_budget(const trainer *t, const sdm_config *old, const state *then, sdm_error *err)
+// the budget may be another one, but not less than what was trained: the model would not be what
+// its configuration says
+static sdm_status check_budget(const trainer *t, const sdm_config *old, const state *then,
+                               sdm_error *err)
 {
     char what[160];
     const double minutes = t->config->train.minutes;
     if ((minutes > 0) != (old->train.minutes > 0))
-        return refuse(t, "and this configuration have budgets of different kinds (minutes; steps or samples)", err);
-    if (trainer_by_time(t) && (minutes >= old->train.minutes || then->seconds <= minutes * 60)) return SDM_OK;
+        return refuse(
+            t, "and this configuration have budgets of different kinds (minutes; steps or samples)",
+            err);
+    if (trainer_by_time(t) && (minutes >= old->train.minutes || then->seconds <= minutes * 60))
+        return SDM_OK;
     if (trainer_by_time(t))
-        snprintf(what, sizeof what, "is at %.3g minutes, this configuration ends at %.3g", then->seconds / 60, minutes);
+        snprintf(what, sizeof what, "is at %.3g minutes, this configuration ends at %.3g",
+                 then->seconds / 60, minutes);
     else if (then->step > trainer_steps(t))
-        snprintf(what, sizeof what, "is at step %lld, this configuration ends at %lld", (long long)then->step,
-                 (long long)trainer_steps(t));
+        snprintf(what, sizeof what, "is at step %lld, this configuration ends at %lld",
+                 (long long)then->step, (long long)trainer_steps(t));
     else
         return SDM_OK;
     return refuse(t, what, err);
@@ -200,7 +216,8 @@ static sdm_status compare(const trainer *t, sdm_config *old, sdm_config *now, sd
     return s;
 }
 
-static sdm_status same_config(const trainer *t, const sdm_section *stored, const state *then, sdm_error *err)
+static sdm_status same_config(const trainer *t, const sdm_section *stored, const state *then,
+                              sdm_error *err)
 {
     sdm_config *old = NULL, *now = NULL;
     sdm_status s = SDM_ALLOC(&old, 1, "config", err);
@@ -222,16 +239,19 @@ static sdm_status read_plan(const trainer *t, const opened *o, sample_plan *p, s
     if (!p->by_error) return SDM_OK;
     const sdm_section *points = find(o, "points"), *errors = find(o, "errors");
     const size_t n = points ? points->size / sizeof *p->point : 0;
-    bool sound = errors && n >= t->data.n_taken && n <= p->n && points->size == n * sizeof *p->point &&
-                 errors->size == n * sizeof *p->error;
+    bool sound = errors && n >= t->data.n_taken && n <= p->n &&
+                 points->size == n * sizeof *p->point && errors->size == n * sizeof *p->error;
     if (sound) {
         memcpy(p->point, points->data, points->size);
         memcpy(p->error, errors->data, errors->size);
         for (size_t i = 0; i < n; i++)
-            sound = sound && (i < t->data.n_start ? p->point[i] == i : p->point[i] > p->point[i - 1]);
+            sound =
+                sound && (i < t->data.n_start ? p->point[i] == i : p->point[i] > p->point[i - 1]);
     }
     if (!sound)
-        return sdm_fail(err, SDM_E_FORMAT, "%s/checkpoint.sdmc: its sampling plan contradicts its counters", t->folder);
+        return sdm_fail(err, SDM_E_FORMAT,
+                        "%s/checkpoint.sdmc: its sampling plan contradicts its counters",
+                        t->folder);
     p->n_planned = n;
     return SDM_OK;
 }
@@ -246,13 +266,15 @@ sdm_status checkpoint_read(trainer *t, bool *found, sdm_error *err)
     s = same_config(t, find(&o, "config"), &then, err);
     if (!s) {
         const dataset *d = &t->data;
-        const bool sound = (then.phase == SDM_PHASE_FIT || then.phase == SDM_PHASE_REFINE) && then.n_start >= 0 &&
-                           (size_t)then.n_start <= d->n_start && then.n_taken >= then.n_start &&
-                           (size_t)then.n_taken <= d->n_start + d->n_online && then.phase_step >= 0 &&
-                           then.step >= then.phase_step && isfinite(then.seconds) && then.phase_started >= 0 &&
-                           then.seconds >= then.phase_started;
+        const bool sound =
+            (then.phase == SDM_PHASE_FIT || then.phase == SDM_PHASE_REFINE) && then.n_start >= 0 &&
+            (size_t)then.n_start <= d->n_start && then.n_taken >= then.n_start &&
+            (size_t)then.n_taken <= d->n_start + d->n_online && then.phase_step >= 0 &&
+            then.step >= then.phase_step && isfinite(then.seconds) && then.phase_started >= 0 &&
+            then.seconds >= then.phase_started;
         if (!sound)
-            s = sdm_fail(err, SDM_E_FORMAT, "%s/checkpoint.sdmc: its counters contradict each other", t->folder);
+            s = sdm_fail(err, SDM_E_FORMAT,
+                         "%s/checkpoint.sdmc: its counters contradict each other", t->folder);
         t->phase = (sdm_phase)then.phase;
         t->started -= then.seconds;
         t->phase_started = then.phase_started;
@@ -268,7 +290,8 @@ sdm_status checkpoint_read(trainer *t, bool *found, sdm_error *err)
         }
         if (!s) s = read_plan(t, &o, &t->data.plan, err);
         const sdm_section *metrics = find(&o, "metrics");
-        if (!s && metrics->size) sdm_text_add(t->metrics, "%.*s", (int)metrics->size, (const char *)metrics->data);
+        if (!s && metrics->size)
+            sdm_text_add(t->metrics, "%.*s", (int)metrics->size, (const char *)metrics->data);
     }
     sdm_free(o.bytes);
     return s;
@@ -285,7 +308,8 @@ sdm_status checkpoint_weights(trainer *t, sdm_error *err)
     memcpy(&then, find(&o, "checkpoint")->data, sizeof then);
     if (then.bases != t->kind->fingerprint(t))
         s = sdm_fail(err, SDM_E_CONFIG,
-                     "%s/checkpoint.sdmc: the maps come out otherwise than when it was written (another plug-in, data "
+                     "%s/checkpoint.sdmc: the maps come out otherwise than when it was written "
+                     "(another plug-in, data "
                      "file or processor): "
                      "train without --resume",
                      t->folder);
@@ -297,7 +321,8 @@ sdm_status checkpoint_weights(trainer *t, sdm_error *err)
     for (int i = 0; i < 4 && !s; i++) {
         const sdm_section *section = find(&o, arrays[i].name);
         if (section->size != p->n * sizeof(float))
-            s = sdm_fail(err, SDM_E_FORMAT, "%s/checkpoint.sdmc: %zu bytes of %s, the network has %zu", t->folder,
+            s = sdm_fail(err, SDM_E_FORMAT,
+                         "%s/checkpoint.sdmc: %zu bytes of %s, the network has %zu", t->folder,
                          section->size, arrays[i].name, p->n * sizeof(float));
         else
             memcpy(arrays[i].to, section->data, section->size);

@@ -7,12 +7,13 @@
 #include <string.h>
 
 #include "kind.h"
-#include "sdm/checksum.h"
-#include "sdm/container.h"
-#include "sdm/file.h"
-#include "sdm/image.h"
+#include "sdm/internal/checksum.h"
+#include "sdm/internal/container.h"
+#include "sdm/internal/file.h"
+#include "sdm/internal/model_threads.h"
+#include "sdm/internal/text.h"
 #include "sdm/memory.h"
-#include "sdm/text.h"
+#include "sdm/picture.h"
 
 #define NEAR_MM 0.4f
 
@@ -30,7 +31,8 @@ static double quantile(const double *sorted, size_t n, double q)
 }
 
 // errors of the model file on the first n held-out maps
-static sdm_status measure(const trainer *t, const sdm_model *m, size_t n, sdm_accuracy *out, sdm_error *err)
+static sdm_status measure(const trainer *t, const sdm_model *m, size_t n, sdm_accuracy *out,
+                          sdm_error *err)
 {
     const dataset *d = &t->data;
     float *map = NULL, *blocked = NULL;
@@ -38,12 +40,15 @@ static sdm_status measure(const trainer *t, const sdm_model *m, size_t n, sdm_ac
     double *each = NULL;
     sdm_status s = SDM_ALLOC(&map, d->n_voxels, "evaluation", err);
     if (!s) s = SDM_ALLOC(&blocked, d->n_voxels, "evaluation", err);
-    if (!s) s = sdm_alloc(&scratch, sdm_model_scratch_bytes_threads(m, 1, t->n_threads), 1, "evaluation", err);
+    if (!s)
+        s = sdm_alloc(&scratch, sdm_model_scratch_bytes_threads(m, 1, t->n_threads), 1,
+                      "evaluation", err);
     if (!s) s = SDM_ALLOC(&each, n, "evaluation", err);
     double square = 0, absolute = 0, near = 0, largest = 0;
     size_t n_near = 0;
     for (size_t i = 0; i < n && !s; i++) {
-        sdm_model_forward_threads(m, d->holdout_params + i * d->n_params, 1, map, scratch, t->n_threads);
+        sdm_model_forward_threads(m, d->holdout_params + i * d->n_params, 1, map, scratch,
+                                  t->n_threads);
         sdm_pod_gather(d->grid, t->blocks, d->n_blocks, map, blocked);
         const float *truth = d->holdout + i * d->n_voxels;
         double here = 0;
@@ -85,15 +90,19 @@ static sdm_status check_texts(const trainer *t, sdm_error *err)
     const sdm_param *params = sdm_instance_params(t->shape, &n);
     for (size_t i = 0; i < n; i++)
         if (strlen(params[i].name) >= SDM_MODEL_NAME_MAX ||
-            strlen(params[i].unit) >= sizeof((sdm_model_param *)0)->unit || strpbrk(params[i].unit, "\r\n"))
-            return sdm_fail(err, SDM_E_PLUGIN,
-                            "parameter '%.100s' in '%.100s': name or unit is too long for a model file", params[i].name,
-                            params[i].unit);
+            strlen(params[i].unit) >= sizeof((sdm_model_param *)0)->unit ||
+            strpbrk(params[i].unit, "\r\n"))
+            return sdm_fail(
+                err, SDM_E_PLUGIN,
+                "parameter '%.100s' in '%.100s': name or unit is too long for a model file",
+                params[i].name, params[i].unit);
     const sdm_shape *shape = sdm_instance_shape(t->shape);
     const sdm_option_value *values = sdm_instance_options(t->shape);
     for (uint32_t i = 0; i < shape->n_options; i++)
-        if (values[i].text && (strlen(values[i].text) > VALUE_MAX || strpbrk(values[i].text, "\r\n")))
-            return sdm_fail(err, SDM_E_CONFIG, "%s: shape.options.%s is longer than %d characters or has a line break",
+        if (values[i].text &&
+            (strlen(values[i].text) > VALUE_MAX || strpbrk(values[i].text, "\r\n")))
+            return sdm_fail(err, SDM_E_CONFIG,
+                            "%s: shape.options.%s is longer than %d characters or has a line break",
                             t->config->file, shape->options[i].name, VALUE_MAX);
     return SDM_OK;
 }
@@ -131,7 +140,8 @@ static void collect_options(const trainer *t, option_texts *o)
         const sdm_option *option = &shape->options[i];
         const bool text = option->type == SDM_OPTION_CHOICE || option->type == SDM_OPTION_FILE;
         o->names[o->n] = option->name;
-        o->values[o->n] = text ? (v[i].text ? v[i].text : "") : sdm_format_real(v[i].number, o->texts[i]);
+        o->values[o->n] =
+            text ? (v[i].text ? v[i].text : "") : sdm_format_real(v[i].number, o->texts[i]);
         o->n++;
         if (!t->file_sums[i]) continue;
         snprintf(o->sums[i], sizeof o->sums[i], "%s.crc64", option->name);
@@ -202,8 +212,8 @@ sdm_status export_config(const trainer *t, sdm_outfile **out, sdm_error *err)
     return s;
 }
 
-static void describe(const trainer *t, const sdm_text *config, option_texts *options, sdm_model_param *params,
-                     sdm_model_info *info)
+static void describe(const trainer *t, const sdm_text *config, option_texts *options,
+                     sdm_model_param *params, sdm_model_info *info)
 {
     size_t n;
     const sdm_param *p = sdm_instance_params(t->shape, &n);
@@ -243,7 +253,8 @@ static sdm_status description_create(const trainer *t, description **out, sdm_er
     sdm_status s = SDM_ALLOC(&d, 1, "description of the model", err);
     if (s) return s;
     *out = d;
-    if (!(s = export_dump(t, &d->config, err))) describe(t, &d->config, &d->options, d->params, &d->info);
+    if (!(s = export_dump(t, &d->config, err)))
+        describe(t, &d->config, &d->options, d->params, &d->info);
     return s;
 }
 
@@ -254,7 +265,8 @@ static void description_free(description *d)
 }
 
 // the model as the runtime will see it
-static sdm_status open_model(const trainer *t, const char *path, const description *d, sdm_model **out, sdm_error *err)
+static sdm_status open_model(const trainer *t, const char *path, const description *d,
+                             sdm_model **out, sdm_error *err)
 {
     uint8_t *bytes = NULL;
     size_t size = 0;
@@ -294,7 +306,8 @@ sdm_status export_model(trainer *t, sdm_train_report *report, sdm_error *err)
     sdm_model_free(model);
     if (!s && !isfinite(t->accuracy.mse_mm2))
         s = sdm_fail(err, SDM_E_QUALITY,
-                     "the trained network gives numbers that are not finite: use network.weights=f32 or lower the "
+                     "the trained network gives numbers that are not finite: use "
+                     "network.weights=f32 or lower the "
                      "learning rates");
     if (!s) {
         d->info.accuracy = t->accuracy;
@@ -305,11 +318,15 @@ sdm_status export_model(trainer *t, sdm_train_report *report, sdm_error *err)
     if (!s) s = sdm_container_write(path, bytes, size, err);
     sdm_free(bytes);
     sdm_error picture = {0};
-    if (!s && write_curve(t, &picture)) trainer_message(t, "%s", picture.text); // not worth the network
+    if (!s && write_curve(t, &picture))
+        trainer_message(t, "%s", picture.text); // not worth the network
     if (!s && report) {
-        *report = (sdm_train_report){
-            .accuracy = t->accuracy, .steps = t->step, .samples = d->info.train_samples, .seconds = trainer_seconds(t)};
-        snprintf(report->model_path, sizeof report->model_path, "%.*s", (int)sizeof report->model_path - 1, path);
+        *report = (sdm_train_report){.accuracy = t->accuracy,
+                                     .steps = t->step,
+                                     .samples = d->info.train_samples,
+                                     .seconds = trainer_seconds(t)};
+        snprintf(report->model_path, sizeof report->model_path, "%.*s",
+                 (int)sizeof report->model_path - 1, path);
     }
     description_free(d);
     return s;

@@ -4,10 +4,10 @@
 #include <math.h>
 #include <string.h>
 
-#include "sdm/kernels.h"
+#include "data/streams.h"
+#include "sdm/internal/kernels.h"
+#include "sdm/internal/rng.h"
 #include "sdm/memory.h"
-#include "sdm/rng.h"
-#include "streams.h"
 
 // eight sums side by side: one would wait for itself
 static double dot(size_t n, const double *a, const double *b)
@@ -25,7 +25,8 @@ static void add_scaled(size_t n, double f, const double *x, double *y)
     for (size_t i = 0; i < n; i++) y[i] += f * x[i];
 }
 
-// reduces a to tridiagonal form (d diagonal, e sub-diagonal); a becomes the orthogonal transformation, in columns; work[n]
+// reduces a to tridiagonal form (d diagonal, e sub-diagonal); a becomes the orthogonal
+// transformation, in columns; work[n]
 static void tridiagonalise(size_t n, double *a, double *d, double *e, double *work)
 {
 #define A(i, j) a[(i)*n + (j)]
@@ -142,7 +143,8 @@ sdm_status eigen_symmetric(size_t n, double *a, double *values, sdm_error *err)
         }
     }
     if (ql(n, values, e, a))
-        s = sdm_fail(err, SDM_E_INTERNAL, "eigenvalues of a %zu x %zu matrix did not converge", n, n);
+        s = sdm_fail(err, SDM_E_INTERNAL, "eigenvalues of a %zu x %zu matrix did not converge", n,
+                     n);
     sdm_free(e);
     // descending, by selection: n is small beside n^3
     for (size_t i = 0; i < n && !s; i++) {
@@ -211,7 +213,8 @@ static void invert_lower(size_t k, const double *l, double *column, float *inver
 }
 
 // rounds: each makes rows that depend on each other a thousand times less so
-static sdm_status orthonormal_rounds(size_t k, size_t n, float *x, int rounds, int n_threads, sdm_error *err)
+static sdm_status orthonormal_rounds(size_t k, size_t n, float *x, int rounds, int n_threads,
+                                     sdm_error *err)
 {
     float *gram = NULL, *old = NULL;
     double *l = NULL, *column = NULL;
@@ -228,12 +231,14 @@ static sdm_status orthonormal_rounds(size_t k, size_t n, float *x, int rounds, i
             for (size_t j = 0; j < n; j++) x[i * n + j] *= f;
         }
         sdm_gemm(k, k, n, (sdm_view){x, n, 1}, (sdm_view){x, 1, n}, false, gram, k, n_threads);
-        for (double shift = round < 3 ? 1e-6 * (double)k : 0; !s; shift = shift > 0 ? shift * 100 : 1e-7 * (double)k) {
+        for (double shift = round < 3 ? 1e-6 * (double)k : 0; !s;
+             shift = shift > 0 ? shift * 100 : 1e-7 * (double)k) {
             for (size_t i = 0; i < k * k; i++) l[i] = gram[i];
             for (size_t i = 0; i < k; i++) l[i * k + i] += shift;
             if (!cholesky(k, l)) break;
             if (shift > 1e6)
-                s = sdm_fail(err, SDM_E_INTERNAL, "%zu rows of %zu numbers cannot be made orthonormal", k, n);
+                s = sdm_fail(err, SDM_E_INTERNAL,
+                             "%zu rows of %zu numbers cannot be made orthonormal", k, n);
         }
         if (s) break;
         invert_lower(k, l, column, gram);
@@ -261,8 +266,8 @@ static void random_rows(size_t count, uint64_t seed, uint64_t stream, float *x)
 
 enum { OVERSAMPLING = 8, ITERATIONS = 6 };
 
-sdm_status leading_eigenvectors(size_t n, const float *c, size_t k, uint64_t seed, uint64_t stream, float *basis,
-                                double *values, sdm_error *err)
+sdm_status leading_eigenvectors(size_t n, const float *c, size_t k, uint64_t seed, uint64_t stream,
+                                float *basis, double *values, sdm_error *err)
 {
     const size_t wide = k + OVERSAMPLING < n ? k + OVERSAMPLING : n;
     float *x = NULL, *y = NULL, *small = NULL;
@@ -299,8 +304,8 @@ done:
     return s;
 }
 
-sdm_status leading_space(size_t m, size_t n, const float *y, size_t k, uint64_t seed, int n_threads, float *rows,
-                         sdm_error *err)
+sdm_status leading_space(size_t m, size_t n, const float *y, size_t k, uint64_t seed, int n_threads,
+                         float *rows, sdm_error *err)
 {
     float *left = NULL;
     sdm_status s = SDM_ALLOC(&left, k * m, "global modes", err);

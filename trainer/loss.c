@@ -18,9 +18,11 @@ float loss_slope_drawn(const sdm_config *c, float predicted, float target, doubl
         const float knee = 0.01f; // mm: square below, linear above
         return fabsf(e) < knee ? e / knee : sign(e);
     }
-    case SDM_LOSS_CLAMPED_L1: { // Park et al. 2019, equation 4, but predictions are clamped only where their target is: none gets stuck
+    case SDM_LOSS_CLAMPED_L1: { // Park et al. 2019, equation 4, but predictions are clamped only
+                                // where their target is: none gets stuck
         const float most = (float)c->train.clamp_mm, t = clamp(target, most);
-        return fabsf(t) < most || fabsf(predicted) < most || predicted * t < 0 ? sign(predicted - t) : 0.0f;
+        return fabsf(t) < most || fabsf(predicted) < most || predicted * t < 0 ? sign(predicted - t)
+                                                                               : 0.0f;
     }
     case SDM_LOSS_MSE:
         break;
@@ -30,7 +32,8 @@ float loss_slope_drawn(const sdm_config *c, float predicted, float target, doubl
 
 float loss_slope(const sdm_config *c, float predicted, float target, double *square)
 {
-    const float weight = fabsf(target) < (float)c->train.near_mm ? 1 + (float)c->train.near_weight : 1;
+    const float weight =
+        fabsf(target) < (float)c->train.near_mm ? 1 + (float)c->train.near_weight : 1;
     return weight * loss_slope_drawn(c, predicted, target, square);
 }
 
@@ -54,9 +57,11 @@ double loss_eikonal(const sdm_config *c, const float f[4], float share, float sl
 
 double loss_map(const sdm_config *c, const float *predicted, const float *target, float *slope)
 {
-    const size_t nx = (size_t)c->grid.n[0], ny = (size_t)c->grid.n[1], nz = (size_t)c->grid.n[2], n = nx * ny * nz;
+    const size_t nx = (size_t)c->grid.n[0], ny = (size_t)c->grid.n[1], nz = (size_t)c->grid.n[2],
+                 n = nx * ny * nz;
     double square = 0;
-    for (size_t v = 0; v < n; v++) slope[v] = loss_slope(c, predicted[v], target[v], &square) / (float)n;
+    for (size_t v = 0; v < n; v++)
+        slope[v] = loss_slope(c, predicted[v], target[v], &square) / (float)n;
     if (!(c->train.eikonal > 0) || nx < 2 || ny < 2 || nz < 2) return square;
     const float share = 1.0f / (float)((nx - 1) * (ny - 1) * (nz - 1));
     for (size_t z = 0; z + 1 < nz; z++)

@@ -23,12 +23,14 @@ typedef struct adam_step {
 adam_step adam_begin(double rate, int64_t t);
 
 /* w -= scale * Adam update, for weights first .. first + n of p with gradient g[n]. One thread. */
-void adam_update(parameters *p, size_t first, size_t n, const float *g, adam_step step, float scale);
+void adam_update(parameters *p, size_t first, size_t n, const float *g, adam_step step,
+                 float scale);
 
 /* average += (1 - decay) (w - average) for all weights, in fixed slices. */
 void average_update(parameters *p, double decay, int n_threads);
 
-/* Factor of the learning rate at `fraction` (0..1) of the phase: linear warm-up, then half a cosine down to zero. */
+/* Factor of the learning rate at `fraction` (0..1) of the phase: linear warm-up, then half a cosine
+ * down to zero. */
 double schedule(double fraction, double warmup);
 
 #endif

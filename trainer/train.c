@@ -7,11 +7,11 @@
 
 #include "export_model.h"
 #include "kind.h"
-#include "sdm/clock.h"
-#include "sdm/file.h"
+#include "sdm/internal/clock.h"
+#include "sdm/internal/file.h"
+#include "sdm/internal/text.h"
+#include "sdm/internal/threads.h"
 #include "sdm/memory.h"
-#include "sdm/text.h"
-#include "sdm/threads.h"
 
 double trainer_seconds(const trainer *t) { return sdm_clock() - t->started; }
 
@@ -20,7 +20,8 @@ bool trainer_by_time(const trainer *t) { return t->config->train.minutes > 0; }
 int64_t trainer_steps(const trainer *t)
 {
     const sdm_config *c = t->config;
-    return c->train.steps > 0 ? c->train.steps : (c->train.samples + c->train.batch - 1) / c->train.batch;
+    return c->train.steps > 0 ? c->train.steps
+                              : (c->train.samples + c->train.batch - 1) / c->train.batch;
 }
 
 double trainer_fraction(const trainer *t)
@@ -48,7 +49,9 @@ void trainer_report(trainer *t, double fraction, double samples_per_second, bool
     const double seconds = trainer_seconds(t);
     if (!t->hooks.progress || (!now && seconds - t->last_report < 0.1)) return;
     t->last_report = seconds;
-    const double all = trainer_by_time(t) ? t->config->train.minutes * 60 : fraction > 0 ? seconds / fraction : NAN;
+    const double all = trainer_by_time(t) ? t->config->train.minutes * 60
+                       : fraction > 0     ? seconds / fraction
+                                          : NAN;
     const sdm_progress p = {.phase = t->phase,
                             .fraction = fraction < 1 ? fraction : 1,
                             .step = t->step,
@@ -72,17 +75,22 @@ void trainer_message(trainer *t, const char *fmt, ...)
     t->hooks.message(t->hooks.user, line);
 }
 
-bool trainer_cancelled(const trainer *t) { return t->hooks.cancelled && t->hooks.cancelled(t->hooks.user); }
+bool trainer_cancelled(const trainer *t)
+{
+    return t->hooks.cancelled && t->hooks.cancelled(t->hooks.user);
+}
 
 sdm_status trainer_stop(trainer *t, sdm_error *err)
 {
     const sdm_status s = checkpoint_write(t, err);
     if (s) return s;
-    return sdm_fail(err, SDM_E_CANCELLED, "stopped on request at step %lld; a checkpoint is in %s: go on with --resume",
+    return sdm_fail(err, SDM_E_CANCELLED,
+                    "stopped on request at step %lld; a checkpoint is in %s: go on with --resume",
                     (long long)t->step, t->folder);
 }
 
-// writes all lines so far: the file is complete at any moment, and after a resume it has no line twice
+// writes all lines so far: the file is complete at any moment, and after a resume it has no line
+// twice
 static sdm_status write_metrics(const trainer *t, sdm_error *err)
 {
     char path[SDM_PATH_TEXT_MAX + 32];
@@ -108,7 +116,8 @@ sdm_status trainer_metric(trainer *t, double rate, sdm_error *err)
     sdm_json_real(&j, "heldout_mse_mm2", t->heldout_mse);
     sdm_json_real(&j, "learning_rate", rate);
     if (trainer_by_time(t))
-        sdm_json_real(&j, "seconds", trainer_seconds(t)); // else the file is the same bits in every run
+        sdm_json_real(&j, "seconds",
+                      trainer_seconds(t)); // else the file is the same bits in every run
     sdm_json_close(&j, '}');
     if (!j.text.failed) sdm_text_add(t->metrics, "%s\n", j.text.data);
     const bool failed = j.text.failed || t->metrics->failed;
@@ -121,7 +130,8 @@ static sdm_status take(trainer *t, const size_t *slots, size_t n, sdm_error *err
     return t->kind->take ? t->kind->take(t, slots, n, err) : SDM_OK;
 }
 
-// what the network does not know of n new samples, which it has not trained on, says where more are needed
+// what the network does not know of n new samples, which it has not trained on, says where more are
+// needed
 static sdm_status plan_ahead(trainer *t, const size_t *slots, size_t n, sdm_error *err)
 {
     double error[SAMPLE_ROUND];
@@ -171,8 +181,8 @@ sdm_status trainer_take_samples(trainer *t, size_t wanted, sdm_error *err)
     return SDM_OK;
 }
 
-sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape, double *min, double *max,
-                            sdm_error *err)
+sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape, double *min,
+                            double *max, sdm_error *err)
 {
     size_t n;
     const sdm_param *params = sdm_instance_params(shape, &n);
@@ -185,15 +195,18 @@ sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape,
         if (i < 0) {
             const char *names[SDM_MAX_PARAMS];
             for (size_t k = 0; k < n && k < SDM_MAX_PARAMS; k++) names[k] = params[k].name;
-            const char *near = sdm_nearest_name(range->name, names, n < SDM_MAX_PARAMS ? n : SDM_MAX_PARAMS);
+            const char *near =
+                sdm_nearest_name(range->name, names, n < SDM_MAX_PARAMS ? n : SDM_MAX_PARAMS);
             return sdm_fail(err, SDM_E_CONFIG, "%s: shape '%s' has no parameter '%s'%s%s%s", where,
-                            sdm_instance_shape(shape)->name, range->name, near ? "; did you mean '" : "",
-                            near ? near : "", near ? "'?" : "");
+                            sdm_instance_shape(shape)->name, range->name,
+                            near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
         }
-        if (!(range->min >= params[i].min && range->max <= params[i].max && range->min < range->max))
-            return sdm_fail(err, SDM_E_CONFIG, "%s: range [%g, %g] of '%s' must lie within [%g, %g] of shape '%s'",
-                            where, range->min, range->max, range->name, params[i].min, params[i].max,
-                            sdm_instance_shape(shape)->name);
+        if (!(range->min >= params[i].min && range->max <= params[i].max &&
+              range->min < range->max))
+            return sdm_fail(err, SDM_E_CONFIG,
+                            "%s: range [%g, %g] of '%s' must lie within [%g, %g] of shape '%s'",
+                            where, range->min, range->max, range->name, params[i].min,
+                            params[i].max, sdm_instance_shape(shape)->name);
         min[i] = range->min, max[i] = range->max;
     }
     return SDM_OK;
@@ -206,8 +219,8 @@ static sdm_status set_up(trainer *t, sdm_error *err)
     dataset *d = &t->data;
     sdm_instance_params(t->shape, &d->n_params);
     if (d->n_params > SDM_POD_MAX_PARAMS)
-        return sdm_fail(err, SDM_E_UNSUPPORTED, "%zu parameters, at most %d can be trained", d->n_params,
-                        SDM_POD_MAX_PARAMS);
+        return sdm_fail(err, SDM_E_UNSUPPORTED, "%zu parameters, at most %d can be trained",
+                        d->n_params, SDM_POD_MAX_PARAMS);
     sdm_status s = export_prepare(t, err);
     if (!s) s = sdm_train_ranges(c, t->shape, d->min, d->max, err);
     if (s) return s;
@@ -215,7 +228,8 @@ static sdm_status set_up(trainer *t, sdm_error *err)
     d->grid = &c->grid;
     d->seed = c->seed;
     d->n_voxels = sdm_grid_count(&c->grid);
-    if ((s = dataset_create(d, c, err))) return s; // first: it says what a grid that is too large needs
+    if ((s = dataset_create(d, c, err)))
+        return s; // first: it says what a grid that is too large needs
     size_t block = t->kind->block(c);
     for (int i = 0; i < 3 && !t->kind->block(c); i++)
         if ((size_t)c->grid.n[i] > block) block = (size_t)c->grid.n[i];
@@ -231,8 +245,11 @@ static void report_fill(void *user, size_t done, size_t all)
 {
     trainer *t = user;
     // the share of the data in the whole is not known: the clock tells it in time mode
-    const double f = trainer_by_time(t) ? trainer_seconds(t) / (t->config->train.minutes * 60) : 0.0;
-    t->data.n_taken = done > t->data.n_holdout + t->data.n_static ? done - t->data.n_holdout - t->data.n_static : 0;
+    const double f =
+        trainer_by_time(t) ? trainer_seconds(t) / (t->config->train.minutes * 60) : 0.0;
+    t->data.n_taken = done > t->data.n_holdout + t->data.n_static
+                          ? done - t->data.n_holdout - t->data.n_static
+                          : 0;
     trainer_report(t, f, (double)done / (trainer_seconds(t) + 1e-9), done == all);
 }
 
@@ -242,11 +259,12 @@ static sdm_status check_grid(const trainer *t, sdm_error *err)
     const dataset *d = &t->data;
     for (size_t i = 0; i < d->n_holdout * d->n_voxels; i++)
         if (d->holdout[i] < 0) return SDM_OK;
-    return sdm_fail(err, SDM_E_CONFIG,
-                    "%s: no voxel of the grid is inside any of %zu held-out shapes: check grid.centre (or "
-                    "grid.origin), grid.size and "
-                    "grid.spacing",
-                    t->config->file, d->n_holdout);
+    return sdm_fail(
+        err, SDM_E_CONFIG,
+        "%s: no voxel of the grid is inside any of %zu held-out shapes: check grid.centre (or "
+        "grid.origin), grid.size and "
+        "grid.spacing",
+        t->config->file, d->n_holdout);
 }
 
 static bool cancelled(void *user) { return trainer_cancelled(user); }
@@ -287,14 +305,16 @@ void trainer_enter(trainer *t, sdm_phase phase)
     t->phase_started = trainer_seconds(t);
 }
 
-// from here on the folder is this run's: checkpoint and model of an older one would contradict its configuration
+// from here on the folder is this run's: checkpoint and model of an older one would contradict its
+// configuration
 static sdm_status take_folder(const trainer *t, bool resume, sdm_outfile **config, sdm_error *err)
 {
     const sdm_status s = resume ? SDM_OK : checkpoint_start_anew(t, err);
     return s ? s : sdm_outfile_commit(config, err);
 }
 
-// config: the resolved configuration, under its temporary name until all that can refuse it has been passed
+// config: the resolved configuration, under its temporary name until all that can refuse it has
+// been passed
 static sdm_status run(trainer *t, bool resume, sdm_outfile **config, sdm_error *err)
 {
     bool found = false;
@@ -303,7 +323,9 @@ static sdm_status run(trainer *t, bool resume, sdm_outfile **config, sdm_error *
     sdm_status s = set_up(t, err);
     if (!s && resume) {
         s = checkpoint_read(t, &found, err);
-        if (!s && !found) trainer_message(t, "no checkpoint in %s: training starts from the beginning", t->folder);
+        if (!s && !found)
+            trainer_message(t, "no checkpoint in %s: training starts from the beginning",
+                            t->folder);
         if (found) from = t->phase, n_taken = t->data.n_taken;
     }
     const double resumed_seconds = trainer_seconds(t);
@@ -314,18 +336,21 @@ static sdm_status run(trainer *t, bool resume, sdm_outfile **config, sdm_error *
     if (!s) s = dataset_fill(&t->data, t->n_threads, &hooks, err);
     if (!s && t->data.n_start < start)
         trainer_message(t,
-                        "half of the budget is over after %zu of %zu random maps: training starts with these (lower "
+                        "half of the budget is over after %zu of %zu random maps: training starts "
+                        "with these (lower "
                         "data.start or raise "
                         "train.minutes)",
                         t->data.n_start, start);
     if (!s) s = check_grid(t, err);
     t->phase = SDM_PHASE_BASES;
-    trainer_report(t, trainer_by_time(t) ? trainer_seconds(t) / (t->config->train.minutes * 60) : 0, 0, true);
+    trainer_report(t, trainer_by_time(t) ? trainer_seconds(t) / (t->config->train.minutes * 60) : 0,
+                   0, true);
     if (!s) s = t->kind->begin(t, err);
     if (!s) s = start_producer(t, err);
     if (!s && found) s = retake(t, n_taken, err);
     if (s == SDM_E_CANCELLED)
-        s = sdm_fail(err, s, "stopped on request before the training began: %s is as it was", t->folder);
+        s = sdm_fail(err, s, "stopped on request before the training began: %s is as it was",
+                     t->folder);
     if (!s) s = take_folder(t, resume, config, err);
     if (s) return s;
 
@@ -355,8 +380,9 @@ static sdm_status finish(trainer *t, sdm_train_report *report, sdm_error *err)
     return s;
 }
 
-sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const char *folder, bool resume,
-                     const sdm_train_hooks *hooks, sdm_train_report *report, sdm_error *err)
+sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const char *folder,
+                     bool resume, const sdm_train_hooks *hooks, sdm_train_report *report,
+                     sdm_error *err)
 {
     sdm_text metrics = {0};
     trainer t = {.config = config,

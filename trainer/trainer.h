@@ -1,14 +1,15 @@
-/* The state of a training run, shared by its phases. Letters as in sdm/pod.h; R global modes, N slots of the pool. What a kind of
-   network does is in kind.h; the fields of the pod network lie here, others have theirs behind `state`. */
+/* The state of a training run, shared by its phases. Letters as in sdm/pod.h; R global modes, N
+   slots of the pool. What a kind of network does is in kind.h; the fields of the pod network lie
+   here, others have theirs behind `state`. */
 #ifndef SDM_TRAINER_H
 #define SDM_TRAINER_H
 
 #include <time.h>
 
-#include "dataset.h"
+#include "data/dataset.h"
 #include "optimiser.h"
-#include "sdm/pod.h"
-#include "sdm/train.h"
+#include "sdm/internal/pod.h"
+#include "sdm/internal/train.h"
 
 typedef struct train_kind train_kind;
 
@@ -21,11 +22,13 @@ typedef struct trainer {
     const train_kind *kind;
     void *state;           /* of the kind; NULL: pod */
     sdm_pod_levels levels; /* of the blocks */
-    sdm_pod_block *blocks; /* those of the lowest level give the order in which maps are stored; one block: map order */
+    sdm_pod_block *blocks; /* those of the lowest level give the order in which maps are stored; one
+                              block: map order */
     dataset data;
     producer *producer; /* NULL when no online sample is left to make */
 
-    uint64_t file_sums[SDM_MAX_OPTIONS]; /* CRC-64 of the data files of the shape, by option; 0: it names none */
+    uint64_t file_sums[SDM_MAX_OPTIONS]; /* CRC-64 of the data files of the shape, by option; 0: it
+                                            names none */
 
     /* pod network */
     sdm_pod_arch arch;
@@ -45,7 +48,8 @@ typedef struct trainer {
     float target_scale;    /* mm sqrt(voxel) */
     float *holdout_phi;    /* [H][n_poly] */
     float *holdout_target; /* [H][R] */
-    double holdout_floor;  /* mean square error that the bases and modes leave on the held-out maps, mm^2 */
+    double holdout_floor;  /* mean square error that the bases and modes leave on the held-out maps,
+                              mm^2 */
 
     parameters fit;                    /* MLP, then readout[R][W] */
     parameters refine;                 /* MLP, head[K][L], mean[n_voxels], basis */
@@ -99,32 +103,38 @@ sdm_status bases_make(trainer *t, sdm_error *err);
 sdm_status bases_slots(size_t n, size_t **slots, sdm_error *err);
 void bases_dispose(trainer *t);
 
-/* modes.c: global modes and polynomials from the first n slots; targets of everything in the pool. */
+/* modes.c: global modes and polynomials from the first n slots; targets of everything in the pool.
+ */
 sdm_status modes_make(trainer *t, size_t n, sdm_error *err);
 /* phi and target of n slots. */
 sdm_status modes_project(trainer *t, const size_t *slots, size_t n, sdm_error *err);
 
 /* fit.c: the MLP on the global modes. */
 sdm_status fit_run(trainer *t, sdm_error *err);
-/* error[n]: root mean square error of the modes (mm) of the maps in slots[n], with the averaged weights. */
-sdm_status fit_errors(const trainer *t, const size_t *slots, size_t n, double *error, sdm_error *err);
+/* error[n]: root mean square error of the modes (mm) of the maps in slots[n], with the averaged
+ * weights. */
+sdm_status fit_errors(const trainer *t, const size_t *slots, size_t n, double *error,
+                      sdm_error *err);
 
-/* head.c: latent variables z[rows][L] from products phi (one pointer a row) with MLP weights w; x[rows][I] and workspace
-   (mlp_workspace()) are working memory. */
-void head_latent(const trainer *t, const float *w, size_t rows, const float *const *phi, float *x, float *z,
-                 float *workspace);
-/* head[K][L]: least squares of the coefficients of all maps in the pool on their latent variables. */
+/* head.c: latent variables z[rows][L] from products phi (one pointer a row) with MLP weights w;
+   x[rows][I] and workspace (mlp_workspace()) are working memory. */
+void head_latent(const trainer *t, const float *w, size_t rows, const float *const *phi, float *x,
+                 float *z, float *workspace);
+/* head[K][L]: least squares of the coefficients of all maps in the pool on their latent variables.
+ */
 sdm_status head_solve(const trainer *t, const float *w, float *head, sdm_error *err);
 
 /* refine.c: everything end to end on maps. */
-/* Weights of the phase: what was fitted, and the head by least squares; resumed: without values, which the checkpoint has. */
+/* Weights of the phase: what was fitted, and the head by least squares; resumed: without values,
+ * which the checkpoint has. */
 sdm_status refine_start(trainer *t, bool resumed, sdm_error *err);
 sdm_status refine_run(trainer *t, sdm_error *err);
 /* Mean square error (mm^2) of weights w on the held-out maps. */
 sdm_status refine_evaluate(trainer *t, const float *w, double *mse, sdm_error *err);
 
-/* Takes new samples of the producer into the pool: `wanted` in step mode (waits), what is there in time mode. It returns early when
-   the run is cancelled: ask trainer_cancelled() before the next step. */
+/* Takes new samples of the producer into the pool: `wanted` in step mode (waits), what is there in
+   time mode. It returns early when the run is cancelled: ask trainer_cancelled() before the next
+   step. */
 sdm_status trainer_take_samples(trainer *t, size_t wanted, sdm_error *err);
 
 /* checkpoint.c */
@@ -134,7 +144,7 @@ sdm_status checkpoint_start_anew(const trainer *t, sdm_error *err);
 sdm_status checkpoint_remove(const trainer *t, sdm_error *err);
 sdm_status checkpoint_write(trainer *t, sdm_error *err);
 sdm_status checkpoint_read(trainer *t, bool *found,
-                           sdm_error *err);                /* before the data: config, sample count, phase, time */
+                           sdm_error *err); /* before the data: config, sample count, phase, time */
 sdm_status checkpoint_weights(trainer *t, sdm_error *err); /* after the bases */
 
 #endif

@@ -14,8 +14,8 @@
 #endif
 
 #include "sdm/image.h"
+#include "sdm/internal/text.h"
 #include "sdm/meshfile.h"
-#include "sdm/text.h"
 
 namespace
 {
@@ -36,7 +36,8 @@ long status_kb(const char *name)
     char line[256];
     long kb = -1;
     while (f && std::fgets(line, sizeof line, f))
-        if (!std::strncmp(line, name, std::strlen(name))) kb = std::strtol(line + std::strlen(name) + 1, nullptr, 10);
+        if (!std::strncmp(line, name, std::strlen(name)))
+            kb = std::strtol(line + std::strlen(name) + 1, nullptr, 10);
     if (f) std::fclose(f);
     return kb;
 }
@@ -67,7 +68,9 @@ void check(sdm_status s, const sdm_error &err)
 
 void read_job(int argc, char **argv, peer::job &j)
 {
-    if (argc != 15) throw std::runtime_error("arguments: MESH NX NY NZ OX OY OZ SX SY SZ SHARE BAND REPEAT VALUES.npy");
+    if (argc != 15)
+        throw std::runtime_error(
+            "arguments: MESH NX NY NZ OX OY OZ SX SY SZ SHARE BAND REPEAT VALUES.npy");
     sdm_error err{};
     check(sdm_mesh_read(argv[1], &j.mesh, &err), err);
     const double zero[3] = {0, 0, 0};
@@ -101,7 +104,9 @@ void measure(const char *path, const peer::job &j, const peer::about &a,
     const long before = start_peak();
     long peak = -1;
     const double begin = clock_s(CLOCK_MONOTONIC);
-    for (int i = 0; i < std::max(1, j.repeat) && (i == 0 || clock_s(CLOCK_MONOTONIC) - begin < enough_s); i++) {
+    for (int i = 0;
+         i < std::max(1, j.repeat) && (i == 0 || clock_s(CLOCK_MONOTONIC) - begin < enough_s);
+         i++) {
         const double start = clock_s(CLOCK_PROCESS_CPUTIME_ID);
         const peer::map_function map = prepare(j);
         const double ready = clock_s(CLOCK_PROCESS_CPUTIME_ID);
@@ -134,7 +139,8 @@ void measure(const char *path, const peer::job &j, const peer::about &a,
 
 } // namespace
 
-int peer::run(int argc, char **argv, const about &a, const std::function<map_function(const job &)> &prepare)
+int peer::run(int argc, char **argv, const about &a,
+              const std::function<map_function(const job &)> &prepare)
 {
     job j;
     int code = 0;

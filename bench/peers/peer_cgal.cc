@@ -35,11 +35,15 @@ struct solid {
         namespace pmp = CGAL::Polygon_mesh_processing;
         std::vector<kernel::Point_3> vert(m.n_vert);
         std::vector<std::array<size_t, 3>> tri(m.n_tri);
-        for (size_t i = 0; i < m.n_vert; i++) vert[i] = {m.vert[3 * i], m.vert[3 * i + 1], m.vert[3 * i + 2]};
-        for (size_t i = 0; i < m.n_tri; i++) tri[i] = {m.tri[3 * i], m.tri[3 * i + 1], m.tri[3 * i + 2]};
-        if (!pmp::is_polygon_soup_a_polygon_mesh(tri)) throw std::runtime_error("CGAL: the mesh is not manifold");
+        for (size_t i = 0; i < m.n_vert; i++)
+            vert[i] = {m.vert[3 * i], m.vert[3 * i + 1], m.vert[3 * i + 2]};
+        for (size_t i = 0; i < m.n_tri; i++)
+            tri[i] = {m.tri[3 * i], m.tri[3 * i + 1], m.tri[3 * i + 2]};
+        if (!pmp::is_polygon_soup_a_polygon_mesh(tri))
+            throw std::runtime_error("CGAL: the mesh is not manifold");
         pmp::polygon_soup_to_polygon_mesh(vert, tri, mesh);
-        if (!CGAL::is_closed(mesh)) throw std::runtime_error("CGAL: Side_of_triangle_mesh needs a closed mesh");
+        if (!CGAL::is_closed(mesh))
+            throw std::runtime_error("CGAL: Side_of_triangle_mesh needs a closed mesh");
         boxes = std::make_unique<tree>(faces(mesh).begin(), faces(mesh).end(), mesh);
         boxes->accelerate_distance_queries();
         boxes->build();
@@ -65,6 +69,7 @@ int main(int argc, char **argv)
 {
     peer::about a;
     a.version = "CGAL " CGAL_VERSION_STR;
-    a.note = "AABB tree with accelerate_distance_queries, Side_of_triangle_mesh; all surface counted";
+    a.note =
+        "AABB tree with accelerate_distance_queries, Side_of_triangle_mesh; all surface counted";
     return peer::run(argc, argv, a, prepare);
 }

@@ -1,5 +1,5 @@
-/* Embree: point queries on its tree of boxes, the distance to a triangle in a callback as in Embree's own tutorial, the sign by
-   angle-weighted pseudo-normals (Baerentzen and Aanaes 2005). */
+/* Embree: point queries on its tree of boxes, the distance to a triangle in a callback as in
+   Embree's own tutorial, the sign by angle-weighted pseudo-normals (Baerentzen and Aanaes 2005). */
 #include <embree3/rtcore.h>
 
 #include <array>
@@ -20,7 +20,10 @@ vec operator+(vec a, vec b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 vec operator-(vec a, vec b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 vec operator*(float s, vec a) { return {s * a.x, s * a.y, s * a.z}; }
 float dot(vec a, vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-vec cross(vec a, vec b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
+vec cross(vec a, vec b)
+{
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
 vec unit(vec a)
 {
     const float l = std::sqrt(dot(a, a));
@@ -34,15 +37,16 @@ enum part { corner_0, corner_1, corner_2, edge_01, edge_12, edge_20, face };
 vec nearest(vec p, vec a, vec b, vec c, part &on)
 {
     const vec ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
-    const float d1 = dot(ab, ap), d2 = dot(ac, ap), d3 = dot(ab, bp), d4 = dot(ac, bp), d5 = dot(ab, cp),
-                d6 = dot(ac, cp);
+    const float d1 = dot(ab, ap), d2 = dot(ac, ap), d3 = dot(ab, bp), d4 = dot(ac, bp),
+                d5 = dot(ab, cp), d6 = dot(ac, cp);
     if (d1 <= 0 && d2 <= 0) return on = corner_0, a;
     if (d3 >= 0 && d4 <= d3) return on = corner_1, b;
     if (d6 >= 0 && d5 <= d6) return on = corner_2, c;
     const float vc = d1 * d4 - d3 * d2, vb = d5 * d2 - d1 * d6, va = d3 * d6 - d5 * d4;
     if (vc <= 0 && d1 >= 0 && d3 <= 0) return on = edge_01, a + d1 / (d1 - d3) * ab;
     if (vb <= 0 && d2 >= 0 && d6 <= 0) return on = edge_20, a + d2 / (d2 - d6) * ac;
-    if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) return on = edge_12, b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b);
+    if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0)
+        return on = edge_12, b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b);
     const float s = 1 / (va + vb + vc);
     return on = face, a + vb * s * ab + vc * s * ac;
 }
@@ -58,7 +62,9 @@ void make_normals(triangles &t)
 {
     std::vector<vec> corner(t.vert.size(), vec{0, 0, 0});
     std::unordered_map<uint64_t, vec> edge(2 * t.tri.size());
-    const auto key = [](unsigned a, unsigned b) { return uint64_t{std::min(a, b)} << 32 | std::max(a, b); };
+    const auto key = [](unsigned a, unsigned b) {
+        return uint64_t{std::min(a, b)} << 32 | std::max(a, b);
+    };
     t.normal.resize(t.tri.size());
     for (size_t i = 0; i < t.tri.size(); i++) {
         const auto &v = t.tri[i];
@@ -116,11 +122,14 @@ struct scene {
         for (size_t i = 0; i < m.n_vert; i++)
             t.vert[i] = {static_cast<float>(m.vert[3 * i]), static_cast<float>(m.vert[3 * i + 1]),
                          static_cast<float>(m.vert[3 * i + 2])};
-        for (size_t i = 0; i < m.n_tri; i++) t.tri[i] = {m.tri[3 * i], m.tri[3 * i + 1], m.tri[3 * i + 2]};
+        for (size_t i = 0; i < m.n_tri; i++)
+            t.tri[i] = {m.tri[3 * i], m.tri[3 * i + 1], m.tri[3 * i + 2]};
         make_normals(t);
         RTCGeometry g = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-        void *vert = rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(vec), m.n_vert);
-        void *tri = rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof t.tri[0], m.n_tri);
+        void *vert = rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                             sizeof(vec), m.n_vert);
+        void *tri = rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                            sizeof t.tri[0], m.n_tri);
         if (!vert || !tri) throw std::runtime_error("Embree has no memory for the mesh");
         std::copy(t.vert.begin(), t.vert.end(), static_cast<vec *>(vert));
         std::copy(t.tri.begin(), t.tri.end(), static_cast<std::array<unsigned, 3> *>(tri));
@@ -145,9 +154,11 @@ peer::map_function prepare(const peer::job &j)
         RTCPointQueryContext context;
         rtcInitPointQueryContext(&context);
         vec last{};
-        float bound = INFINITY; // |distance| at the voxel before: a neighbour's is larger by the step at most
+        float bound =
+            INFINITY; // |distance| at the voxel before: a neighbour's is larger by the step at most
         peer::for_voxels(j, values, [&](const double x[3]) {
-            const vec p = {static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2])};
+            const vec p = {static_cast<float>(x[0]), static_cast<float>(x[1]),
+                           static_cast<float>(x[2])};
             const vec step = p - last;
             query q{&s->t, p, {}, RTC_INVALID_GEOMETRY_ID, face, INFINITY};
             float radius = 1.0001f * (bound + std::sqrt(dot(step, step)));
@@ -171,7 +182,8 @@ int main(int argc, char **argv)
 {
     peer::about a;
     a.version = "Embree " RTC_VERSION_STRING;
-    a.note = "float32; point queries started with the bound of the voxel before, pseudo-normals; all surface counted";
+    a.note = "float32; point queries started with the bound of the voxel before, pseudo-normals; "
+             "all surface counted";
     a.band = true;
     return peer::run(argc, argv, a, prepare);
 }

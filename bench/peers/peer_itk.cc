@@ -1,5 +1,5 @@
-/* ITK: the voxels inside by TriangleMeshToBinaryImageFilter, their distance transform by SignedMaurerDistanceMapImageFilter (Maurer, Qi
-   and Raghavan 2003). */
+/* ITK: the voxels inside by TriangleMeshToBinaryImageFilter, their distance transform by
+   SignedMaurerDistanceMapImageFilter (Maurer, Qi and Raghavan 2003). */
 #include <itkImage.h>
 #include <itkMesh.h>
 #include <itkMultiThreaderBase.h>
@@ -53,9 +53,11 @@ peer::map_function prepare(const peer::job &j)
         distance->InsideIsPositiveOff();
         distance->Update();
         // zero at the outermost voxels inside: the surface is half a voxel farther out
-        const float half = static_cast<float>(0.5 * *std::min_element(j.grid.spacing, j.grid.spacing + 3));
+        const float half =
+            static_cast<float>(0.5 * *std::min_element(j.grid.spacing, j.grid.spacing + 3));
         const float *d = distance->GetOutput()->GetBufferPointer();
-        std::transform(d, d + sdm_grid_count(&j.grid), values, [half](float v) { return v - half; });
+        std::transform(d, d + sdm_grid_count(&j.grid), values,
+                       [half](float v) { return v - half; });
     };
 }
 
@@ -66,7 +68,8 @@ int main(int argc, char **argv)
     itk::MultiThreaderBase::SetGlobalMaximumNumberOfThreads(1);
     peer::about a;
     a.version = std::string("ITK ") + itk::Version::GetITKVersion();
-    a.note = "TriangleMeshToBinaryImage (prepare), SignedMaurerDistanceMap less half a voxel: approximate";
+    a.note = "TriangleMeshToBinaryImage (prepare), SignedMaurerDistanceMap less half a voxel: "
+             "approximate";
     a.whole = true;
     return peer::run(argc, argv, a, prepare);
 }

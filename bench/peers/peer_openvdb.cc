@@ -1,4 +1,5 @@
-/* OpenVDB: meshToVolume over a band as wide as the grid needs, or over the narrow band asked for. */
+/* OpenVDB: meshToVolume over a band as wide as the grid needs, or over the narrow band asked for.
+ */
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Dense.h>
 #include <openvdb/tools/MeshToVolume.h>
@@ -35,12 +36,14 @@ struct widths {
     float outside, inside;
 };
 
-/* Outside: the farthest of 5 x 5 x 5 points of the grid from the nearest of some vertices, and a voxel more; a wide band costs much, so
-   no safe bound. Inside: half the least edge of the mesh's box. */
+/* Outside: the farthest of 5 x 5 x 5 points of the grid from the nearest of some vertices, and a
+   voxel more; a wide band costs much, so no safe bound. Inside: half the least edge of the mesh's
+   box. */
 widths widest(const peer::job &j)
 {
     const size_t step = 1 + j.mesh.n_vert / 1000;
-    double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL}, far2 = 0;
+    double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL},
+           far2 = 0;
     for (size_t v = 0; v < 3 * j.mesh.n_vert; v++) {
         low[v % 3] = std::min(low[v % 3], j.mesh.vert[v]);
         high[v % 3] = std::max(high[v % 3], j.mesh.vert[v]);
@@ -51,15 +54,16 @@ widths widest(const peer::job &j)
         for (size_t v = 0; v < j.mesh.n_vert; v += step) {
             double sum = 0;
             for (int i = 0; i < 3; i++) {
-                const double x =
-                    j.grid.origin[i] + j.grid.spacing[i] * 0.25 * at[i] * static_cast<double>(j.grid.n[i] - 1);
+                const double x = j.grid.origin[i] + j.grid.spacing[i] * 0.25 * at[i] *
+                                                        static_cast<double>(j.grid.n[i] - 1);
                 sum += (x - j.mesh.vert[3 * v + i]) * (x - j.mesh.vert[3 * v + i]);
             }
             least = std::min(least, sum);
         }
         far2 = std::max(far2, least);
     }
-    const double edge = std::min({high[0] - low[0], high[1] - low[1], high[2] - low[2]}), h = j.grid.spacing[0];
+    const double edge = std::min({high[0] - low[0], high[1] - low[1], high[2] - low[2]}),
+                 h = j.grid.spacing[0];
     return {static_cast<float>(std::sqrt(far2) / h + 1), static_cast<float>(0.5 * edge / h + 1)};
 }
 
@@ -72,9 +76,11 @@ peer::map_function prepare(const peer::job &j)
     const float narrow = static_cast<float>(j.band / h + 0.5);
     const widths w = j.band > 0 ? widths{narrow, narrow} : widest(j);
     const auto frame = openvdb::math::Transform::createLinearTransform(h);
-    const auto level = openvdb::tools::meshToVolume<openvdb::FloatGrid>(adapter(j), *frame, w.outside, w.inside);
+    const auto level =
+        openvdb::tools::meshToVolume<openvdb::FloatGrid>(adapter(j), *frame, w.outside, w.inside);
     return [level, &j](float *values) {
-        const openvdb::CoordBBox box(0, 0, 0, static_cast<int>(j.grid.n[0]) - 1, static_cast<int>(j.grid.n[1]) - 1,
+        const openvdb::CoordBBox box(0, 0, 0, static_cast<int>(j.grid.n[0]) - 1,
+                                     static_cast<int>(j.grid.n[1]) - 1,
                                      static_cast<int>(j.grid.n[2]) - 1);
         openvdb::tools::Dense<float, openvdb::tools::LayoutXYZ> dense(box, values);
         openvdb::tools::copyToDense(*level, dense, true);
@@ -89,7 +95,8 @@ int main(int argc, char **argv)
     openvdb::initialize();
     peer::about a;
     a.version = std::string("OpenVDB ") + openvdb::getLibraryVersionString();
-    a.note = "meshToVolume; its values near the surface are smoothed; prepare makes the volume, map copies it";
+    a.note = "meshToVolume; its values near the surface are smoothed; prepare makes the volume, "
+             "map copies it";
     a.whole = a.band = true;
     return peer::run(argc, argv, a, prepare);
 }

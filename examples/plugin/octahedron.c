@@ -14,9 +14,10 @@ static const sdm_param PARAMS[N_PARAMS] = {
                 .help = "distance of the corners from the centre"},
 };
 
-/* The mesh at parameters p. Ask for room, write vertices (mm) and triangles (counter-clockwise seen from outside). */
-static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
-                sdm_mesh_out *out)
+/* The mesh at parameters p. Ask for room, write vertices (mm) and triangles (counter-clockwise seen
+ * from outside). */
+static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                const double *p, sdm_mesh_out *out)
 {
     (void)self, (void)options;
     const int failed = host->reserve(host, out, 6, 8);
@@ -37,15 +38,18 @@ static int mesh(const void *self, const sdm_host *host, const sdm_option_value *
     return 0;
 }
 
-/* Optional: the exact distance, negative inside. The tests of a shape compare its mesh with this. */
-static int distance(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
-                    const double x[3], double *out)
+/* Optional: the exact distance, negative inside. The tests of a shape compare its mesh with this.
+ */
+static int distance(const void *self, const sdm_host *host, const sdm_option_value *options,
+                    const double *p, const double x[3], double *out)
 {
     (void)self, (void)host, (void)options;
     double q[3], sum = 0, d2 = 0;
-    for (int k = 0; k < 3; k++) sum += q[k] = fabs(x[k]); // by symmetry in the octant of positive numbers
+    for (int k = 0; k < 3; k++)
+        sum += q[k] = fabs(x[k]); // by symmetry in the octant of positive numbers
 
-    // the foot on the plane of the face; where it leaves the octant, on the edge, then at the corner
+    // the foot on the plane of the face; where it leaves the octant, on the edge, then at the
+    // corner
     double foot[3], rest = sum - p[RADIUS];
     int n = 3, used[3] = {1, 1, 1};
     for (int again = 1; again;) {

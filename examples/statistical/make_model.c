@@ -1,11 +1,13 @@
-/* Writes a synthetic point-distribution model for the shape `statistical`: mean.ply, modes.npy and deviations.npy in a folder.
+/* Writes a synthetic point-distribution model for the shape `statistical`: mean.ply, modes.npy and
+   deviations.npy in a folder.
 
    cc -O2 -o make_model make_model.c -lm && ./make_model .
 
-   The mean is a rounded blob; the modes are smooth displacements of it (swelling, stretching, bending, pear, twist, bending
-   sideways, taper, bulging), made orthonormal, as a principal component analysis of aligned meshes gives them. In place of the
-   synthetic fields put the rows of your own analysis: modes[n_modes][n_vert][3] of length 1, and the standard deviation along
-   each in mm. */
+   The mean is a rounded blob; the modes are smooth displacements of it (swelling, stretching,
+   bending, pear, twist, bending sideways, taper, bulging), made orthonormal, as a principal
+   component analysis of aligned meshes gives them. In place of the synthetic fields put the rows of
+   your own analysis: modes[n_modes][n_vert][3] of length 1, and the standard deviation along each
+   in mm. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -78,7 +80,8 @@ static void make_modes(void)
         const double length = sqrt(dot(i, i));
         for (int v = 0; v < N_VERT; v++)
             for (int k = 0; k < 3; k++) modes[i][v][k] /= length;
-        deviations[i] = 0.25 * pow(0.75, i) * sqrt(N_VERT); // root mean square over the vertices: 0.25 mm and less
+        deviations[i] = 0.25 * pow(0.75, i) *
+                        sqrt(N_VERT); // root mean square over the vertices: 0.25 mm and less
     }
 }
 
@@ -106,23 +109,27 @@ static void finish(FILE *f)
 static void write_ply(const char *folder)
 {
     FILE *f = create(folder, "mean.ply");
-    fprintf(f, "ply\nformat ascii 1.0\nelement vertex %d\nproperty double x\nproperty double y\nproperty double z\n",
+    fprintf(f,
+            "ply\nformat ascii 1.0\nelement vertex %d\nproperty double x\nproperty double "
+            "y\nproperty double z\n",
             N_VERT);
     fprintf(f, "element face %d\nproperty list uchar int vertex_indices\nend_header\n", N_TRI);
-    for (int v = 0; v < N_VERT; v++) fprintf(f, "%.17g %.17g %.17g\n", mean[v][0], mean[v][1], mean[v][2]);
+    for (int v = 0; v < N_VERT; v++)
+        fprintf(f, "%.17g %.17g %.17g\n", mean[v][0], mean[v][1], mean[v][2]);
     for (int t = 0; t < N_TRI; t++)
         fprintf(f, "3 %u %u %u\n", (unsigned)tri[t][0], (unsigned)tri[t][1], (unsigned)tri[t][2]);
     finish(f);
 }
 
 // version 1.0 of the format: a header that fills a multiple of 64 bytes; little-endian machines
-static void write_npy(const char *folder, const char *name, const char *shape, const double *values, size_t count)
+static void write_npy(const char *folder, const char *name, const char *shape, const double *values,
+                      size_t count)
 {
     char header[128];
     memset(header, ' ', sizeof header);
     memcpy(header, "\x93NUMPY\x01\x00\x76\x00", 10);
-    const int n =
-        snprintf(header + 10, sizeof header - 10, "{'descr': '<f8', 'fortran_order': False, 'shape': (%s), }", shape);
+    const int n = snprintf(header + 10, sizeof header - 10,
+                           "{'descr': '<f8', 'fortran_order': False, 'shape': (%s), }", shape);
     header[10 + n] = ' ';
     header[127] = '\n';
     FILE *f = create(folder, name);
@@ -143,6 +150,7 @@ int main(int argc, char **argv)
     write_npy(folder, "modes.npy", shape, modes[0][0], sizeof modes / sizeof(double));
     snprintf(shape, sizeof shape, "%d,", N_MODES);
     write_npy(folder, "deviations.npy", shape, deviations, N_MODES);
-    printf("%s: mean.ply of %d vertices, modes.npy and deviations.npy of %d modes\n", folder, N_VERT, N_MODES);
+    printf("%s: mean.ply of %d vertices, modes.npy and deviations.npy of %d modes\n", folder,
+           N_VERT, N_MODES);
     return 0;
 }

@@ -1,5 +1,5 @@
 /* Reads a configuration: the file, then the overrides, then the rules that span several keys. */
-#include "sdm/config.h"
+#include "sdm/internal/config.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -11,7 +11,8 @@
 
 void sdm_bare_name(const char *file, const char *none, char out[256])
 {
-    const char *slash = strrchr(file, '/'), *base = slash ? slash + 1 : file, *dot = strrchr(base, '.');
+    const char *slash = strrchr(file, '/'), *base = slash ? slash + 1 : file,
+               *dot = strrchr(base, '.');
     const int length = dot && dot != base ? (int)(dot - base) : 200;
     snprintf(out, 256, "%.*s", length < 200 ? length : 200, *base ? base : none);
     for (size_t n = strlen(out), bad; (bad = sdm_tree_printable(out, n)) < n;) out[bad] = '_';
@@ -42,7 +43,8 @@ sdm_status sdm_config_override(sdm_reader *r, const char *text, sdm_mark mark, s
     return s == SDM_E_CONFIG ? SDM_OK : s;
 }
 
-/* An experiment by mistake: every one of its keys would be told, and nothing of what to do. True: refused. */
+/* An experiment by mistake: every one of its keys would be told, and nothing of what to do. True:
+ * refused. */
 static bool refuse_experiment(sdm_mistakes *mistakes, const sdm_tree_node *root)
 {
     for (const sdm_tree_node *n = root ? root->first : NULL; n; n = n->next) {
@@ -55,8 +57,9 @@ static bool refuse_experiment(sdm_mistakes *mistakes, const sdm_tree_node *root)
 }
 
 /* Mistakes of the YAML itself end here: after them every key would seem to be missing. */
-static sdm_status read_all(sdm_reader *r, const char *text, size_t size, const char *const *overrides,
-                           const sdm_mark *places, size_t n_overrides, sdm_error *err)
+static sdm_status read_all(sdm_reader *r, const char *text, size_t size,
+                           const char *const *overrides, const sdm_mark *places, size_t n_overrides,
+                           sdm_error *err)
 {
     sdm_tree tree = {0};
     sdm_mark top = {.line = 1, .column = 1};
@@ -64,9 +67,11 @@ static sdm_status read_all(sdm_reader *r, const char *text, size_t size, const c
     const bool other = !s && refuse_experiment(r->mistakes, tree.root);
     if (!s && !other) sdm_fields_read(r, tree.root);
     r->file_kind = (int)r->config->network.kind;
-    const bool is_keyed = !tree.root || tree.root->kind == SDM_TREE_MAP || sdm_tree_is_empty(tree.root);
+    const bool is_keyed =
+        !tree.root || tree.root->kind == SDM_TREE_MAP || sdm_tree_is_empty(tree.root);
     sdm_tree_dispose(&tree);
-    if (s == SDM_E_CONFIG || (!s && (!is_keyed || other))) return sdm_mistakes_report(r->mistakes, err);
+    if (s == SDM_E_CONFIG || (!s && (!is_keyed || other)))
+        return sdm_mistakes_report(r->mistakes, err);
 
     for (size_t i = 0; i < n_overrides && !s; i++) {
         sdm_mark mark = {.source = overrides[i]};
@@ -79,19 +84,21 @@ static sdm_status read_all(sdm_reader *r, const char *text, size_t size, const c
     return sdm_mistakes_report(r->mistakes, err);
 }
 
-sdm_status sdm_config_parse_placed(const char *name, const char *text, size_t size, const char *const *overrides,
-                                   const sdm_mark *places, size_t n_overrides, sdm_config *out, sdm_error *err)
+sdm_status sdm_config_parse_placed(const char *name, const char *text, size_t size,
+                                   const char *const *overrides, const sdm_mark *places,
+                                   size_t n_overrides, sdm_config *out, sdm_error *err)
 {
     char bare[256];
     if (!name || !out || (!text && size) || (!overrides && n_overrides) || n_overrides > 10000)
-        return sdm_fail(err, SDM_E_ARG,
-                        "a configuration needs a name, a text, a place for the result and at most 10000 "
-                        "overrides");
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "a configuration needs a name, a text, a place for the result and at most 10000 "
+            "overrides");
     for (size_t i = 0; i < n_overrides; i++)
         if (!overrides[i]) return sdm_fail(err, SDM_E_ARG, "override %zu is NULL", i + 1);
     if (strlen(name) >= sizeof out->file)
-        return sdm_fail(err, SDM_E_ARG, "a file name of %zu bytes, at most %zu are allowed", strlen(name),
-                        sizeof out->file - 1);
+        return sdm_fail(err, SDM_E_ARG, "a file name of %zu bytes, at most %zu are allowed",
+                        strlen(name), sizeof out->file - 1);
 
     memset(out, 0, sizeof *out);
     snprintf(out->file, sizeof out->file, "%s", name);
@@ -106,18 +113,20 @@ sdm_status sdm_config_parse_placed(const char *name, const char *text, size_t si
     return s;
 }
 
-sdm_status sdm_config_parse(const char *name, const char *text, size_t size, const char *const *overrides,
-                            size_t n_overrides, sdm_config *out, sdm_error *err)
+sdm_status sdm_config_parse(const char *name, const char *text, size_t size,
+                            const char *const *overrides, size_t n_overrides, sdm_config *out,
+                            sdm_error *err)
 {
     return sdm_config_parse_placed(name, text, size, overrides, NULL, n_overrides, out, err);
 }
 
-sdm_status sdm_config_read(const char *path, const char *const *overrides, size_t n_overrides, sdm_config *out,
-                           sdm_error *err)
+sdm_status sdm_config_read(const char *path, const char *const *overrides, size_t n_overrides,
+                           sdm_config *out, sdm_error *err)
 {
     uint8_t *data = NULL;
     size_t size = 0;
-    if (!path || !out) return sdm_fail(err, SDM_E_ARG, "a configuration needs a path and a place for the result");
+    if (!path || !out)
+        return sdm_fail(err, SDM_E_ARG, "a configuration needs a path and a place for the result");
     sdm_status s = sdm_tree_read(path, &data, &size, err);
     if (s) return s;
     s = sdm_config_parse(path, (const char *)data, size, overrides, n_overrides, out, err);

@@ -8,7 +8,8 @@
 
 const char *sdm_field_type_name(const sdm_field *f)
 {
-    static const char *const NAMES[] = {"integer", "integer", "integer", "number", "name", "text", "special"};
+    static const char *const NAMES[] = {"integer", "integer", "integer", "number",
+                                        "name",    "text",    "special"};
     return f->shown_type ? f->shown_type : NAMES[f->type];
 }
 
@@ -91,7 +92,8 @@ void sdm_config_dump(const sdm_config *c, sdm_text *out)
 {
     size_t n = 0;
     const sdm_section *sections = sdm_config_sections(&n);
-    sdm_text_add(out, "# every key of this kind of network with its value; reads back to the same configuration\n");
+    sdm_text_add(out, "# every key of this kind of network with its value; reads back to the same "
+                      "configuration\n");
     for (size_t s = 0; s < n; s++) {
         const bool nested = *sections[s].name != 0;
         bool begun = !nested;
@@ -120,12 +122,14 @@ static void fill_row(const sdm_section *section, const sdm_field *f, bool markdo
                       : f->kind_defs ? sdm_kind_defaults(f, names, sizeof names)
                       : f->def       ? f->def
                                      : "required";
-    snprintf(row[0], CELL, "%s%s%s%s%s", quote, section->name, *section->name ? "." : "", f->key, quote);
+    snprintf(row[0], CELL, "%s%s%s%s%s", quote, section->name, *section->name ? "." : "", f->key,
+             quote);
     snprintf(row[1], CELL, "%s", sdm_field_type_name(f));
     sdm_field_range(f, row[2], CELL);
     snprintf(row[3], CELL, "%s", def);
     snprintf(row[4], CELL, "%s", f->unit);
-    snprintf(row[5], CELL, f->kinds ? "%s; %s only" : "%s", f->help, sdm_kind_names(f, names, sizeof names));
+    snprintf(row[5], CELL, f->kinds ? "%s; %s only" : "%s", f->help,
+             sdm_kind_names(f, names, sizeof names));
 }
 
 static void print_row(table_row row, const int width[COLUMNS], bool markdown, sdm_text *out)
@@ -134,7 +138,8 @@ static void print_row(table_row row, const int width[COLUMNS], bool markdown, sd
         if (markdown)
             sdm_text_add(out, "%s%s |", i ? " " : "| ", row[i]);
         else
-            sdm_text_add(out, "%-*s%s", i + 1 < COLUMNS ? width[i] : 0, row[i], i + 1 < COLUMNS ? "  " : "");
+            sdm_text_add(out, "%-*s%s", i + 1 < COLUMNS ? width[i] : 0, row[i],
+                         i + 1 < COLUMNS ? "  " : "");
     }
     sdm_text_add(out, "\n");
 }

@@ -1,5 +1,6 @@
-/* Reads an experiment: the file, the overrides, the training configuration under it, and that of every row. */
-#include "sdm/experiment.h"
+/* Reads an experiment: the file, the overrides, the training configuration under it, and that of
+ * every row. */
+#include "sdm/internal/experiment.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -7,7 +8,7 @@
 #include "config_parse.h"
 #include "experiment_schema.h"
 #include "overrides.h"
-#include "sdm/file.h"
+#include "sdm/internal/file.h"
 #include "sdm/memory.h"
 #include "yaml_tree.h"
 
@@ -29,8 +30,8 @@ void sdm_experiment_free(sdm_experiment *e)
 /* ---- one row ---- */
 
 /* Texts and places of every list in turn; returns how many. */
-static size_t gather(const sdm_experiment *e, const sdm_overrides *const lists[], size_t n_lists, const char **texts,
-                     sdm_mark *places)
+static size_t gather(const sdm_experiment *e, const sdm_overrides *const lists[], size_t n_lists,
+                     const char **texts, sdm_mark *places)
 {
     size_t n = 0;
     for (size_t k = 0; k < n_lists; k++)
@@ -42,19 +43,23 @@ static size_t gather(const sdm_experiment *e, const sdm_overrides *const lists[]
     return n;
 }
 
-sdm_status sdm_experiment_config(const sdm_experiment *e, size_t row, sdm_config *out, sdm_error *err)
+sdm_status sdm_experiment_config(const sdm_experiment *e, size_t row, sdm_config *out,
+                                 sdm_error *err)
 {
     enum { N_LISTS = 5 };
     char kind_text[SDM_NAME_MAX + 32];
     if (!e || !out || row >= e->n_rows)
-        return sdm_fail(err, SDM_E_ARG, "an experiment's configuration needs a row and a place for the result");
+        return sdm_fail(err, SDM_E_ARG,
+                        "an experiment's configuration needs a row and a place for the result");
     const sdm_experiment_method *m = e->rows[e->rows[row].network_row].method;
     const sdm_experiment_variant *v = e->rows[row].variant;
     /* an engine is not trained, but a training configuration has a budget */
-    snprintf(kind_text, sizeof kind_text, "%s%s", *m->engine ? "train.steps=1" : "network.kind=", m->network);
+    snprintf(kind_text, sizeof kind_text, "%s%s",
+             *m->engine ? "train.steps=1" : "network.kind=", m->network);
     sdm_override kind = {kind_text, m->mark};
     const sdm_overrides first = {.items = &kind, .n = 1};
-    const sdm_overrides *lists[N_LISTS] = {&e->common, &first, &m->set, v ? &v->set : NULL, &e->command_line};
+    const sdm_overrides *lists[N_LISTS] = {&e->common, &first, &m->set, v ? &v->set : NULL,
+                                           &e->command_line};
     if (*m->engine) {
         lists[0] = &first;
         lists[1] = &e->common;
@@ -67,8 +72,8 @@ sdm_status sdm_experiment_config(const sdm_experiment *e, size_t row, sdm_config
     if (!s) s = SDM_ALLOC(&places, n, "overrides", err);
     if (!s) n = gather(e, lists, N_LISTS, texts, places);
     if (!s)
-        s = sdm_config_parse_placed(*e->base ? e->base : e->file, e->base_text, e->base_size, texts, places, n, out,
-                                    err);
+        s = sdm_config_parse_placed(*e->base ? e->base : e->file, e->base_text, e->base_size, texts,
+                                    places, n, out, err);
     sdm_free(places);
     sdm_free((void *)texts);
     return s;
@@ -77,7 +82,8 @@ sdm_status sdm_experiment_config(const sdm_experiment *e, size_t row, sdm_config
 /* ---- the whole ---- */
 
 /* One key=value of the command line; those of the training wait for the rows. */
-static sdm_status apply(sdm_experiment *e, sdm_reader *r, const char *text, int number, sdm_error *err)
+static sdm_status apply(sdm_experiment *e, sdm_reader *r, const char *text, int number,
+                        sdm_error *err)
 {
     const sdm_mark mark = {.override = number, .source = text};
     const size_t length = strcspn(text, "=");
@@ -92,7 +98,8 @@ static bool place_beside(const sdm_experiment *e, char name[SDM_PATH_TEXT_MAX])
     char path[SDM_PATH_TEXT_MAX];
     const char *slash = strrchr(e->file, '/');
     const int folder = slash ? (int)(slash - e->file) + 1 : 0;
-    if (snprintf(path, sizeof path, "%.*s%s", folder, e->file, name) >= (int)sizeof path) return false;
+    if (snprintf(path, sizeof path, "%.*s%s", folder, e->file, name) >= (int)sizeof path)
+        return false;
     strcpy(name, path);
     return true;
 }
@@ -103,7 +110,8 @@ static sdm_status read_base(sdm_experiment *e, sdm_reader *r, sdm_error *err)
     const sdm_mark mark = sdm_fields_given(r, "", "base")->mark;
     if (!*e->base || r->mistakes->count > 0) return SDM_OK;
     if (strchr(e->base, '/') || !strcmp(e->base, "..")) {
-        sdm_mistakes_add(r->mistakes, mark, "base: '%s' must be the name of a file beside this one", e->base);
+        sdm_mistakes_add(r->mistakes, mark, "base: '%s' must be the name of a file beside this one",
+                         e->base);
         return SDM_OK;
     }
     if (!place_beside(e, e->base)) {
@@ -124,7 +132,8 @@ static void place_model(sdm_experiment *e, sdm_reader *r)
 {
     const sdm_mark mark = sdm_fields_given(r, "fit", "model")->mark;
     if (!*e->fit.model || *e->fit.model == '/' || mark.override > 0) return;
-    if (!place_beside(e, e->fit.model)) sdm_mistakes_add(r->mistakes, mark, "fit.model: the path is too long");
+    if (!place_beside(e, e->fit.model))
+        sdm_mistakes_add(r->mistakes, mark, "fit.model: the path is too long");
 }
 
 /* Mistakes of the YAML itself end here, as in a training configuration. */
@@ -134,7 +143,8 @@ static sdm_status read_all(sdm_experiment *e, sdm_reader *r, const char *text, s
     sdm_tree tree = {0};
     sdm_status s = sdm_tree_parse(&tree, text, size, (sdm_mark){0}, r->mistakes, err);
     if (!s) sdm_fields_read(r, tree.root);
-    const bool is_keyed = !tree.root || tree.root->kind == SDM_TREE_MAP || sdm_tree_is_empty(tree.root);
+    const bool is_keyed =
+        !tree.root || tree.root->kind == SDM_TREE_MAP || sdm_tree_is_empty(tree.root);
     sdm_tree_dispose(&tree);
     if (s == SDM_E_CONFIG || (!s && !is_keyed)) return sdm_mistakes_report(r->mistakes, err);
     for (size_t i = 0; i < n_overrides && !s; i++) s = apply(e, r, overrides[i], (int)i + 1, err);
@@ -154,19 +164,21 @@ static sdm_status check_rows(const sdm_experiment *e, sdm_error *err)
     return s;
 }
 
-sdm_status sdm_experiment_parse(const char *name, const char *text, size_t size, const char *const *overrides,
-                                size_t n_overrides, sdm_experiment **out, sdm_error *err)
+sdm_status sdm_experiment_parse(const char *name, const char *text, size_t size,
+                                const char *const *overrides, size_t n_overrides,
+                                sdm_experiment **out, sdm_error *err)
 {
     char bare[256];
     if (!name || !out || (!text && size) || (!overrides && n_overrides) || n_overrides > 10000)
         return sdm_fail(err, SDM_E_ARG,
-                        "an experiment needs a name, a text, a place for the result and at most 10000 overrides");
+                        "an experiment needs a name, a text, a place for the result and at most "
+                        "10000 overrides");
     *out = NULL;
     for (size_t i = 0; i < n_overrides; i++)
         if (!overrides[i]) return sdm_fail(err, SDM_E_ARG, "override %zu is NULL", i + 1);
     if (strlen(name) >= SDM_PATH_TEXT_MAX)
-        return sdm_fail(err, SDM_E_ARG, "a file name of %zu bytes, at most %d are allowed", strlen(name),
-                        SDM_PATH_TEXT_MAX - 1);
+        return sdm_fail(err, SDM_E_ARG, "a file name of %zu bytes, at most %d are allowed",
+                        strlen(name), SDM_PATH_TEXT_MAX - 1);
     sdm_experiment *e = NULL;
     sdm_status s = SDM_ALLOC(&e, 1, "experiment", err);
     if (s) return s;
@@ -189,12 +201,13 @@ sdm_status sdm_experiment_parse(const char *name, const char *text, size_t size,
     return s;
 }
 
-sdm_status sdm_experiment_read(const char *path, const char *const *overrides, size_t n_overrides, sdm_experiment **out,
-                               sdm_error *err)
+sdm_status sdm_experiment_read(const char *path, const char *const *overrides, size_t n_overrides,
+                               sdm_experiment **out, sdm_error *err)
 {
     uint8_t *data = NULL;
     size_t size = 0;
-    if (!path || !out) return sdm_fail(err, SDM_E_ARG, "an experiment needs a path and a place for the result");
+    if (!path || !out)
+        return sdm_fail(err, SDM_E_ARG, "an experiment needs a path and a place for the result");
     *out = NULL;
     sdm_status s = sdm_tree_read(path, &data, &size, err);
     if (s) return s;

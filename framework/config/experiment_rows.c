@@ -1,4 +1,5 @@
-/* The rows of an experiment's table: methods times variants, with their titles, folders and references. */
+/* The rows of an experiment's table: methods times variants, with their titles, folders and
+ * references. */
 #include <stdio.h>
 #include <string.h>
 
@@ -22,13 +23,16 @@ static void make_folder(const char *title, char folder[SDM_EXPERIMENT_TITLE_MAX]
     folder[n] = 0;
 }
 
-static void make_row(const sdm_experiment *e, const sdm_experiment_method *m, const sdm_experiment_variant *v,
-                     sdm_experiment_row *row)
+static void make_row(const sdm_experiment *e, const sdm_experiment_method *m,
+                     const sdm_experiment_variant *v, sdm_experiment_row *row)
 {
     row->method = m;
     row->variant = v;
-    row->samples = m->samples ? m->samples : *m->engine ? e->experiment.engine_samples : e->experiment.samples;
-    snprintf(row->title, sizeof row->title, v ? "%.*s, %s" : "%.*s", SDM_NAME_MAX - 2, m->name, v ? v->name : "");
+    row->samples = m->samples   ? m->samples
+                   : *m->engine ? e->experiment.engine_samples
+                                : e->experiment.samples;
+    snprintf(row->title, sizeof row->title, v ? "%.*s, %s" : "%.*s", SDM_NAME_MAX - 2, m->name,
+             v ? v->name : "");
     make_folder(row->title, row->folder);
 }
 
@@ -43,16 +47,20 @@ static void find_networks(sdm_experiment *e, sdm_mark model, sdm_mistakes *mista
         if (m->fit == SDM_EXPERIMENT_FIT_POLISH) {
             while (from > 0 && e->methods[from].fit != SDM_EXPERIMENT_FIT_NETWORK) from--;
             if (e->methods[from].fit != SDM_EXPERIMENT_FIT_NETWORK)
-                sdm_mistakes_add(mistakes, m->mark,
-                                 "method '%s' with fit: polish needs one with fit: network before it", m->name);
+                sdm_mistakes_add(
+                    mistakes, m->mark,
+                    "method '%s' with fit: polish needs one with fit: network before it", m->name);
             else
                 strcpy(m->network, e->methods[from].network);
         }
-        for (size_t row = i; row < e->n_rows; row += e->n_methods) e->rows[row].network_row = row - i + from;
+        for (size_t row = i; row < e->n_rows; row += e->n_methods)
+            e->rows[row].network_row = row - i + from;
     }
     if (*e->fit.model && n_networks != 1)
-        sdm_mistakes_add(mistakes, model,
-                         "fit.model: one model for %zu methods with fit: network, need one such method", n_networks);
+        sdm_mistakes_add(
+            mistakes, model,
+            "fit.model: one model for %zu methods with fit: network, need one such method",
+            n_networks);
 }
 
 static void check_folders(const sdm_experiment *e, sdm_mistakes *m)
@@ -63,8 +71,8 @@ static void check_folders(const sdm_experiment *e, sdm_mistakes *m)
             if (strcmp(a->folder, b->folder) != 0) continue;
             const bool variants = a->method == b->method;
             sdm_mistakes_add(m, variants ? b->variant->mark : b->method->mark,
-                             "the names '%s' and '%s' give the same folder '%s'; change one", a->title, b->title,
-                             b->folder);
+                             "the names '%s' and '%s' give the same folder '%s'; change one",
+                             a->title, b->title, b->folder);
             return;
         }
 }
@@ -82,7 +90,8 @@ static void attach_references(sdm_experiment *e, sdm_mistakes *m)
             sdm_mistakes_add(m, r->mark, "reference: there is no row '%s'%s%s%s", r->row,
                              near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
         else if (e->rows[i].reference)
-            sdm_mistakes_add(m, r->mark, "reference: a second one for the row '%s' (first at line %d)", r->row,
+            sdm_mistakes_add(m, r->mark,
+                             "reference: a second one for the row '%s' (first at line %d)", r->row,
                              e->rows[i].reference->mark.line);
         else
             e->rows[i].reference = r;
@@ -103,25 +112,30 @@ static void check_baseline(const sdm_experiment *e, sdm_mark mark, sdm_mistakes 
 
 sdm_status sdm_experiment_finish(sdm_experiment *e, sdm_reader *r, sdm_error *err)
 {
-    const sdm_mark top = {.line = 1, .column = 1}, methods = sdm_fields_given(r, "", "methods")->mark;
+    const sdm_mark top = {.line = 1, .column = 1},
+                   methods = sdm_fields_given(r, "", "methods")->mark;
     const bool refused = sdm_fields_given(r, "", "methods")->refused;
     const size_t n_variants = e->n_variants ? e->n_variants : 1;
     if (e->n_methods == 0 && !refused)
-        sdm_mistakes_add(r->mistakes, sdm_mark_is_set(methods) ? methods : top,
-                         "missing key 'methods': a list of at least one, e.g. - {name: POD, network: pod}");
+        sdm_mistakes_add(
+            r->mistakes, sdm_mark_is_set(methods) ? methods : top,
+            "missing key 'methods': a list of at least one, e.g. - {name: POD, network: pod}");
     if (e->n_methods * n_variants > SDM_EXPERIMENT_ROWS_MAX)
-        sdm_mistakes_add(r->mistakes, methods, "%zu methods in %zu variants are over %d rows", e->n_methods, n_variants,
-                         SDM_EXPERIMENT_ROWS_MAX);
+        sdm_mistakes_add(r->mistakes, methods, "%zu methods in %zu variants are over %d rows",
+                         e->n_methods, n_variants, SDM_EXPERIMENT_ROWS_MAX);
     if (r->mistakes->count > 0) return SDM_OK;
 
-    const sdm_status s = SDM_ALLOC(&e->rows, e->n_methods * n_variants, "rows of the experiment", err);
+    const sdm_status s =
+        SDM_ALLOC(&e->rows, e->n_methods * n_variants, "rows of the experiment", err);
     if (s) return s;
     for (size_t v = 0; v < n_variants; v++)
         for (size_t i = 0; i < e->n_methods; i++)
-            make_row(e, &e->methods[i], e->n_variants ? &e->variants[v] : NULL, &e->rows[e->n_rows++]);
+            make_row(e, &e->methods[i], e->n_variants ? &e->variants[v] : NULL,
+                     &e->rows[e->n_rows++]);
     find_networks(e, sdm_fields_given(r, "fit", "model")->mark, r->mistakes);
     check_folders(e, r->mistakes);
     attach_references(e, r->mistakes);
-    if (*e->experiment.baseline) check_baseline(e, sdm_fields_given(r, "experiment", "baseline")->mark, r->mistakes);
+    if (*e->experiment.baseline)
+        check_baseline(e, sdm_fields_given(r, "experiment", "baseline")->mark, r->mistakes);
     return SDM_OK;
 }

@@ -10,37 +10,43 @@
 #include "sdm/memory.h"
 
 #define COUNT(table) (sizeof(table) / sizeof((table)[0]))
-#define ROW(owner, name, kind, member, low, high, def_, unit_, help_)                                                  \
-    {                                                                                                                  \
-        .key = name, .type = kind, .offset = offsetof(owner, member), .min = low, .max = high, .def = def_,            \
-        .unit = unit_, .help = help_                                                                                   \
+#define ROW(owner, name, kind, member, low, high, def_, unit_, help_)                              \
+    {                                                                                              \
+        .key = name, .type = kind, .offset = offsetof(owner, member), .min = low, .max = high,     \
+        .def = def_, .unit = unit_, .help = help_                                                  \
     }
-#define TEXT(owner, name, member, bytes, shown, help_)                                                                 \
-    {                                                                                                                  \
-        .key = name, .type = SDM_FIELD_TEXT, .offset = offsetof(owner, member), .max = (bytes)-1, .shown_def = shown,  \
-        .unit = "", .help = help_                                                                                      \
+#define TEXT(owner, name, member, bytes, shown, help_)                                             \
+    {                                                                                              \
+        .key = name, .type = SDM_FIELD_TEXT, .offset = offsetof(owner, member), .max = (bytes)-1,  \
+        .shown_def = shown, .unit = "", .help = help_                                              \
     }
-#define SPECIAL(name, reader, type_, range_, def_, help_)                                                              \
-    {                                                                                                                  \
-        .key = name, .type = SDM_FIELD_SPECIAL, .read = reader, .shown_type = type_, .shown_range = range_,            \
-        .shown_def = def_, .unit = "", .help = help_                                                                   \
+#define SPECIAL(name, reader, type_, range_, def_, help_)                                          \
+    {                                                                                              \
+        .key = name, .type = SDM_FIELD_SPECIAL, .read = reader, .shown_type = type_,               \
+        .shown_range = range_, .shown_def = def_, .unit = "", .help = help_                        \
     }
 
 static const sdm_figure_info FIGURES[SDM_N_FIGURES] = {
     [SDM_FIGURE_MS] = {"ms", "one map", "ms", "time of one map on one core, files not included"},
-    [SDM_FIGURE_MS_BATCH] = {"ms_batch", "one of a batch", "ms", "time of a map of a batch on one core"},
-    [SDM_FIGURE_SPEEDUP] = {"speedup", "speed-up", "x", "how many times faster one map is than the baseline's"},
+    [SDM_FIGURE_MS_BATCH] = {"ms_batch", "one of a batch", "ms",
+                             "time of a map of a batch on one core"},
+    [SDM_FIGURE_SPEEDUP] = {"speedup", "speed-up", "x",
+                            "how many times faster one map is than the baseline's"},
     [SDM_FIGURE_MSE] = {"mse_mm2", "MSE", "mm^2", "mean squared error over all voxels and shapes"},
     [SDM_FIGURE_RMSE] = {"rmse_mm", "RMSE", "mm", "its root"},
-    [SDM_FIGURE_RMSE_NEAR] = {"rmse_near_mm", "RMSE near", "mm", "the same within 0.4 mm of the surface"},
-    [SDM_FIGURE_MAX] = {"max_abs_mm", "largest error", "mm", "largest error of all voxels and shapes"},
+    [SDM_FIGURE_RMSE_NEAR] = {"rmse_near_mm", "RMSE near", "mm",
+                              "the same within 0.4 mm of the surface"},
+    [SDM_FIGURE_MAX] = {"max_abs_mm", "largest error", "mm",
+                        "largest error of all voxels and shapes"},
     [SDM_FIGURE_DICE] = {"dice", "Dice", "", "mean overlap of the insides"},
-    [SDM_FIGURE_SURFACE_MEAN] = {"surface_mean_mm", "surface", "mm", "mean distance between the zero surfaces"},
+    [SDM_FIGURE_SURFACE_MEAN] = {"surface_mean_mm", "surface", "mm",
+                                 "mean distance between the zero surfaces"},
     [SDM_FIGURE_SURFACE_MAX] = {"surface_hausdorff_mm", "Hausdorff", "mm",
                                 "largest distance between the zero surfaces, mean over the shapes"},
     [SDM_FIGURE_TRAIN] = {"train_s", "training", "s", "time of the training"},
     [SDM_FIGURE_MODEL] = {"model_mb", "model", "MB", "size of the model file"},
-    [SDM_FIGURE_PEAK] = {"peak_mb", "memory", "MB", "peak of the resident memory for one map, the map included"},
+    [SDM_FIGURE_PEAK] = {"peak_mb", "memory", "MB",
+                         "peak of the resident memory for one map, the map included"},
     [SDM_FIGURE_SHAPES] = {"shapes", "shapes", "", "shapes the errors are measured on"},
     [SDM_FIGURE_FITS] = {"fits", "fits converged", "", "fits that converged, of the shapes"},
     [SDM_FIGURE_FIT] = {"fit_s", "one fit", "s", "mean time of a fit on one core"},
@@ -48,18 +54,28 @@ static const sdm_figure_info FIGURES[SDM_N_FIGURES] = {
                                  "maps with derivatives by the network, mean of a fit"},
     [SDM_FIGURE_MAPS_EXACT] = {"maps_exact", "exact maps", "",
                                "maps with derivatives by the exact engine, mean of a fit"},
-    [SDM_FIGURE_WITHIN] = {"within_3sd", "within 3 sd", "",
-                           "share of the estimates within three standard deviations of the truth, all parameters"},
+    [SDM_FIGURE_WITHIN] =
+        {"within_3sd", "within 3 sd", "",
+         "share of the estimates within three standard deviations of the truth, all parameters"},
 };
 
-const sdm_figure_info *sdm_figure_get_info(sdm_figure f) { return (unsigned)f < SDM_N_FIGURES ? &FIGURES[f] : NULL; }
+const sdm_figure_info *sdm_figure_get_info(sdm_figure f)
+{
+    return (unsigned)f < SDM_N_FIGURES ? &FIGURES[f] : NULL;
+}
 
-static bool read_set(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
-static bool read_training(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
-static bool read_methods(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
-static bool read_variants(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
-static bool read_references(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
-static bool read_differences(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
+static bool read_set(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                     const char *path);
+static bool read_training(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                          const char *path);
+static bool read_methods(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                         const char *path);
+static bool read_variants(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                          const char *path);
+static bool read_references(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                            const char *path);
+static bool read_differences(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                             const char *path);
 
 // clang-format off
 #define E sdm_experiment
@@ -165,7 +181,8 @@ void sdm_experiment_describe(bool markdown, sdm_text *out)
 
 bool sdm_experiment_is_training_key(const char *key, size_t length)
 {
-    static const char *const NAMES[] = {"shape", "grid", "network", "data", "train", "seed", "threads"};
+    static const char *const NAMES[] = {"shape", "grid", "network", "data",
+                                        "train", "seed", "threads"};
     size_t first = 0;
     while (first < length && key[first] != '.') first++;
     for (size_t i = 0; i < COUNT(NAMES); i++)
@@ -175,7 +192,8 @@ bool sdm_experiment_is_training_key(const char *key, size_t length)
 
 /* ---- keys of the training configuration ---- */
 
-static bool add_keys(sdm_reader *r, sdm_overrides *set, const char *prefix, const sdm_tree_node *node, const char *path)
+static bool add_keys(sdm_reader *r, sdm_overrides *set, const char *prefix,
+                     const sdm_tree_node *node, const char *path)
 {
     if (sdm_tree_is_empty(node)) return true; /* all its keys are commented out */
     if (node->kind != SDM_TREE_MAP) return sdm_refuse_type(r, node, path, "keys with values");
@@ -189,7 +207,8 @@ static bool read_set(sdm_reader *r, const sdm_field *f, const sdm_tree_node *nod
     return add_keys(r, set, "", node, path);
 }
 
-static bool read_training(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
+static bool read_training(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                          const char *path)
 {
     E *e = r->target;
     if (strcmp(f->key, "seed") != 0 && strcmp(f->key, "threads") != 0)
@@ -197,20 +216,24 @@ static bool read_training(sdm_reader *r, const sdm_field *f, const sdm_tree_node
     if (node->kind != SDM_TREE_SCALAR) return sdm_refuse_type(r, node, path, "an integer");
     sdm_tree_node one = *node;
     one.next = NULL;
-    const sdm_tree_node alone = {.kind = SDM_TREE_MAP, .n_children = 1, .first = &one, .last = &one};
+    const sdm_tree_node alone = {
+        .kind = SDM_TREE_MAP, .n_children = 1, .first = &one, .last = &one};
     return sdm_overrides_add_tree(&e->common, "", &alone, r->mistakes);
 }
 
 /* ---- lists ---- */
 
-/* Reads the elements of a list into a new array by the table of `section`, whose first key is required. */
-static bool read_list(sdm_reader *r, const sdm_tree_node *node, const char *path, const sdm_section *section,
-                      void **array, size_t *n, size_t size, void (*begin)(void *element, sdm_mark mark))
+/* Reads the elements of a list into a new array by the table of `section`, whose first key is
+ * required. */
+static bool read_list(sdm_reader *r, const sdm_tree_node *node, const char *path,
+                      const sdm_section *section, void **array, size_t *n, size_t size,
+                      void (*begin)(void *element, sdm_mark mark))
 {
     char wanted[64];
     bool fits = true;
     if (node->mark.override > 0) {
-        sdm_mistakes_add(r->mistakes, node->mark, "%s: a list of the file cannot be replaced here", path);
+        sdm_mistakes_add(r->mistakes, node->mark, "%s: a list of the file cannot be replaced here",
+                         path);
         return false;
     }
     snprintf(wanted, sizeof wanted, "a list of at most %d", SDM_EXPERIMENT_ROWS_MAX);
@@ -220,16 +243,19 @@ static bool read_list(sdm_reader *r, const sdm_tree_node *node, const char *path
         sdm_mistakes_add(r->mistakes, node->mark, "%s: out of memory", path);
         return false;
     }
-    const sdm_section alone = {.name = "", .fields = section->fields, .n_fields = section->n_fields};
+    const sdm_section alone = {
+        .name = "", .fields = section->fields, .n_fields = section->n_fields};
     for (const sdm_tree_node *child = node->first; child; child = child->next) {
         void *element = (char *)*array + size * (*n)++;
         const size_t before = r->mistakes->count;
-        sdm_reader one = {.target = element, .mistakes = r->mistakes, .sections = &alone, .n_sections = 1};
+        sdm_reader one = {
+            .target = element, .mistakes = r->mistakes, .sections = &alone, .n_sections = 1};
         begin(element, child->mark);
         sdm_fields_set_defaults(&one);
         sdm_fields_read(&one, child);
         if (r->mistakes->count == before && !sdm_mark_is_set(one.given[0][0].mark))
-            sdm_mistakes_add(r->mistakes, child->mark, "%s: missing key '%s'", path, section->fields[0].key);
+            sdm_mistakes_add(r->mistakes, child->mark, "%s: missing key '%s'", path,
+                             section->fields[0].key);
         fits &= r->mistakes->count == before;
     }
     return fits;
@@ -263,16 +289,18 @@ static bool finish_fit(sdm_reader *r, M *m)
     if (m->fit == SDM_EXPERIMENT_FIT_POLISH && m->set.n > 0)
         return refuse_method(r, m, "with fit: polish takes the network before it: no key set");
     if (m->fit != SDM_EXPERIMENT_FIT_POLISH)
-        snprintf(m->engine, sizeof m->engine, m->fit == SDM_EXPERIMENT_FIT_EXACT ? "exact" : "naive");
+        snprintf(m->engine, sizeof m->engine,
+                 m->fit == SDM_EXPERIMENT_FIT_EXACT ? "exact" : "naive");
     return true;
 }
 
-static bool read_methods(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
+static bool read_methods(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                         const char *path)
 {
     E *e = r->target;
     (void)f;
-    bool fits = read_list(r, node, path, &SECTIONS[OF_METHODS], (void **)&e->methods, &e->n_methods, sizeof *e->methods,
-                          begin_method);
+    bool fits = read_list(r, node, path, &SECTIONS[OF_METHODS], (void **)&e->methods, &e->n_methods,
+                          sizeof *e->methods, begin_method);
     for (size_t i = 0; i < e->n_methods && fits; i++) {
         M *m = &e->methods[i];
         if (m->fit)
@@ -285,24 +313,27 @@ static bool read_methods(sdm_reader *r, const sdm_field *f, const sdm_tree_node 
     return fits;
 }
 
-static bool read_variants(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
+static bool read_variants(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                          const char *path)
 {
     E *e = r->target;
     (void)f;
-    return read_list(r, node, path, &SECTIONS[OF_VARIANTS], (void **)&e->variants, &e->n_variants, sizeof *e->variants,
-                     begin_variant);
+    return read_list(r, node, path, &SECTIONS[OF_VARIANTS], (void **)&e->variants, &e->n_variants,
+                     sizeof *e->variants, begin_variant);
 }
 
-static bool read_references(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
+static bool read_references(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                            const char *path)
 {
     E *e = r->target;
     (void)f;
-    return read_list(r, node, path, &SECTIONS[OF_REFERENCES], (void **)&e->references, &e->n_references,
-                     sizeof *e->references, begin_reference);
+    return read_list(r, node, path, &SECTIONS[OF_REFERENCES], (void **)&e->references,
+                     &e->n_references, sizeof *e->references, begin_reference);
 }
 
 /* {NAME: number, ...}; whether the shape has such parameters is not known here. */
-static bool read_differences(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
+static bool read_differences(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                             const char *path)
 {
     R *reference = r->target;
     bool fits = true;
@@ -311,7 +342,8 @@ static bool read_differences(sdm_reader *r, const sdm_field *f, const sdm_tree_n
         return sdm_refuse_type(r, node, path, "numbers by names of parameters");
     for (const sdm_tree_node *child = node->first; child; child = child->next) {
         const size_t i = reference->n_differences++;
-        if (strlen(child->key) >= SDM_NAME_MAX) return sdm_refuse_type(r, child, path, "short names");
+        if (strlen(child->key) >= SDM_NAME_MAX)
+            return sdm_refuse_type(r, child, path, "short names");
         snprintf(reference->differences[i].name, SDM_NAME_MAX, "%s", child->key);
         fits &= sdm_read_real(r, child, path, 0, 1e12, &reference->differences[i].value);
     }

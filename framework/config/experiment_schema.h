@@ -3,7 +3,7 @@
 #define SDM_EXPERIMENT_SCHEMA_H
 
 #include "fields.h"
-#include "sdm/experiment.h"
+#include "sdm/internal/experiment.h"
 
 const sdm_section *sdm_experiment_sections(size_t *n);
 

@@ -7,8 +7,10 @@
 
 #define CHOICES_MAX 16
 
-/* A default goes through the same reader as a value of a file, so that the tables cannot promise what is refused. */
-static bool read_field(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
+/* A default goes through the same reader as a value of a file, so that the tables cannot promise
+ * what is refused. */
+static bool read_field(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                       const char *path);
 
 const char *sdm_describe_node(const sdm_tree_node *node, char buf[SDM_QUOTE_MAX + 16])
 {
@@ -20,18 +22,21 @@ const char *sdm_describe_node(const sdm_tree_node *node, char buf[SDM_QUOTE_MAX 
     else if (sdm_tree_is_empty(node))
         snprintf(buf, SDM_QUOTE_MAX + 16, "nothing");
     else
-        snprintf(buf, SDM_QUOTE_MAX + 16, "%s'%s'", node->quoted ? "the text " : "", sdm_quote(node->text, quoted));
+        snprintf(buf, SDM_QUOTE_MAX + 16, "%s'%s'", node->quoted ? "the text " : "",
+                 sdm_quote(node->text, quoted));
     return buf;
 }
 
 bool sdm_refuse_type(sdm_reader *r, const sdm_tree_node *node, const char *path, const char *wanted)
 {
     char buf[SDM_QUOTE_MAX + 16];
-    sdm_mistakes_add(r->mistakes, node->mark, "%s: needs %s, got %s", path, wanted, sdm_describe_node(node, buf));
+    sdm_mistakes_add(r->mistakes, node->mark, "%s: needs %s, got %s", path, wanted,
+                     sdm_describe_node(node, buf));
     return false;
 }
 
-bool sdm_read_real(sdm_reader *r, const sdm_tree_node *node, const char *path, double min, double max, double *out)
+bool sdm_read_real(sdm_reader *r, const sdm_tree_node *node, const char *path, double min,
+                   double max, double *out)
 {
     char a[32], b[32], quoted[SDM_QUOTE_MAX];
     double v;
@@ -39,7 +44,8 @@ bool sdm_read_real(sdm_reader *r, const sdm_tree_node *node, const char *path, d
         return sdm_refuse_type(r, node, path, "a finite number");
     if (!(v >= min && v <= max)) {
         sdm_mistakes_add(r->mistakes, node->mark, "%s: %s is out of range (%s .. %s)", path,
-                         sdm_quote(node->text, quoted), sdm_format_plain(min, a), sdm_format_plain(max, b));
+                         sdm_quote(node->text, quoted), sdm_format_plain(min, a),
+                         sdm_format_plain(max, b));
         return false;
     }
     *out = v;
@@ -53,7 +59,8 @@ static bool is_integer(const char *text)
     return text[sign] != 0 && strspn(text + sign, "0123456789") == strlen(text + sign);
 }
 
-bool sdm_read_int(sdm_reader *r, const sdm_tree_node *node, const char *path, int64_t min, int64_t max, int64_t *out)
+bool sdm_read_int(sdm_reader *r, const sdm_tree_node *node, const char *path, int64_t min,
+                  int64_t max, int64_t *out)
 {
     char quoted[SDM_QUOTE_MAX];
     int64_t v;
@@ -89,17 +96,20 @@ static bool read_uint64(sdm_reader *r, const sdm_tree_node *node, const char *pa
     return true;
 }
 
-bool sdm_read_text(sdm_reader *r, const sdm_tree_node *node, const char *path, size_t max, char *out)
+bool sdm_read_text(sdm_reader *r, const sdm_tree_node *node, const char *path, size_t max,
+                   char *out)
 {
-    if (node->kind != SDM_TREE_SCALAR || node->text[0] == 0) return sdm_refuse_type(r, node, path, "a text");
+    if (node->kind != SDM_TREE_SCALAR || node->text[0] == 0)
+        return sdm_refuse_type(r, node, path, "a text");
     size_t length = strlen(node->text);
     if (length > max) {
-        sdm_mistakes_add(r->mistakes, node->mark, "%s: a text of %zu bytes, at most %zu are allowed", path, length,
-                         max);
+        sdm_mistakes_add(r->mistakes, node->mark,
+                         "%s: a text of %zu bytes, at most %zu are allowed", path, length, max);
         return false;
     }
     if (sdm_tree_printable(node->text, length) < length) {
-        sdm_mistakes_add(r->mistakes, node->mark, "%s: a line break, tab or control character in a text", path);
+        sdm_mistakes_add(r->mistakes, node->mark,
+                         "%s: a line break, tab or control character in a text", path);
         return false;
     }
     memcpy(out, node->text, length + 1);
@@ -121,12 +131,14 @@ bool sdm_choice_name(const char *choices, int index, char buf[SDM_NAME_MAX])
     return true;
 }
 
-static bool read_choice(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path, int *out)
+static bool read_choice(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                        const char *path, int *out)
 {
     char names[CHOICES_MAX][SDM_NAME_MAX], allowed[SDM_KEY_PATH_MAX], quoted[SDM_QUOTE_MAX];
     const char *list[CHOICES_MAX];
     size_t n = 0;
-    if (node->kind != SDM_TREE_SCALAR || node->text[0] == 0) return sdm_refuse_type(r, node, path, "one of its names");
+    if (node->kind != SDM_TREE_SCALAR || node->text[0] == 0)
+        return sdm_refuse_type(r, node, path, "one of its names");
     for (; n < CHOICES_MAX && sdm_choice_name(f->choices, (int)n, names[n]); n++) {
         list[n] = names[n];
         if (strcmp(node->text, names[n]) != 0) continue;
@@ -134,13 +146,15 @@ static bool read_choice(sdm_reader *r, const sdm_field *f, const sdm_tree_node *
         return true;
     }
     const char *near = sdm_nearest_name(node->text, list, n);
-    sdm_mistakes_add(r->mistakes, node->mark,
-                     near ? "%s: '%s' is not one of %s; did you mean '%s'?" : "%s: '%s' is not one of %s", path,
-                     sdm_quote(node->text, quoted), sdm_field_range(f, allowed, sizeof allowed), near);
+    sdm_mistakes_add(
+        r->mistakes, node->mark,
+        near ? "%s: '%s' is not one of %s; did you mean '%s'?" : "%s: '%s' is not one of %s", path,
+        sdm_quote(node->text, quoted), sdm_field_range(f, allowed, sizeof allowed), near);
     return false;
 }
 
-static bool read_field(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
+static bool read_field(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                       const char *path)
 {
     char *at = (char *)r->target + f->offset;
     int64_t wide = 0;
@@ -179,7 +193,8 @@ void sdm_fields_set_defaults(sdm_reader *r)
         assert(s < SDM_SECTIONS_MAX && r->sections[s].n_fields <= SDM_SECTION_FIELDS_MAX);
         for (size_t k = 0; k < r->sections[s].n_fields; k++) {
             const sdm_field *f = &r->sections[s].fields[k];
-            if (f->def || f->kind_defs) sdm_field_set_default(r, f, f->kind_defs ? f->kind_defs[0] : f->def);
+            if (f->def || f->kind_defs)
+                sdm_field_set_default(r, f, f->kind_defs ? f->kind_defs[0] : f->def);
         }
     }
 }
@@ -195,9 +210,10 @@ sdm_given *sdm_fields_given(sdm_reader *r, const char *section, const char *key)
     return &r->given[0][0];
 }
 
-/* The nearest key of the same section; else a section that has this very key, for a key on the wrong level. */
-static const char *suggest(const sdm_reader *r, const sdm_section *section, const char *key, bool full,
-                           char buf[SDM_KEY_PATH_MAX])
+/* The nearest key of the same section; else a section that has this very key, for a key on the
+ * wrong level. */
+static const char *suggest(const sdm_reader *r, const sdm_section *section, const char *key,
+                           bool full, char buf[SDM_KEY_PATH_MAX])
 {
     const char *names[SDM_SECTION_FIELDS_MAX + SDM_SECTIONS_MAX];
     size_t n = 0;
@@ -207,7 +223,8 @@ static const char *suggest(const sdm_reader *r, const sdm_section *section, cons
     const char *near = sdm_nearest_name(key, names, n);
     if (near) {
         bool prefix = full && *section->name;
-        snprintf(buf, SDM_KEY_PATH_MAX, "%s%s%s", prefix ? section->name : "", prefix ? "." : "", near);
+        snprintf(buf, SDM_KEY_PATH_MAX, "%s%s%s", prefix ? section->name : "", prefix ? "." : "",
+                 near);
         return buf;
     }
     for (size_t s = 0; s < r->n_sections; s++) {
@@ -227,10 +244,11 @@ static void refuse_key(sdm_reader *r, const sdm_section *section, const sdm_tree
     const char *dot = *section->name ? "." : "", *key = sdm_quote(node->key, quoted);
     const char *near = suggest(r, section, node->key, node->key_mark.override > 0, buf);
     if (near)
-        sdm_mistakes_add(r->mistakes, node->key_mark, "unknown key '%s%s%s'; did you mean '%s'?", section->name, dot,
-                         key, near);
+        sdm_mistakes_add(r->mistakes, node->key_mark, "unknown key '%s%s%s'; did you mean '%s'?",
+                         section->name, dot, key, near);
     else
-        sdm_mistakes_add(r->mistakes, node->key_mark, "unknown key '%s%s%s'", section->name, dot, key);
+        sdm_mistakes_add(r->mistakes, node->key_mark, "unknown key '%s%s%s'", section->name, dot,
+                         key);
 }
 
 static void read_key(sdm_reader *r, size_t s, const sdm_tree_node *node)
@@ -257,7 +275,8 @@ static void read_section(sdm_reader *r, size_t s, const sdm_tree_node *node)
         sdm_refuse_type(r, node, r->sections[s].name, "keys with values");
         return;
     }
-    for (const sdm_tree_node *child = node->first; child; child = child->next) read_key(r, s, child);
+    for (const sdm_tree_node *child = node->first; child; child = child->next)
+        read_key(r, s, child);
 }
 
 void sdm_fields_read(sdm_reader *r, const sdm_tree_node *root)

@@ -28,11 +28,14 @@ typedef struct sdm_field {
     const char *def; /* default as it is written in YAML; NULL: none */
     const char *choices;
     const char *unit, *help;
-    const char *shown_type, *shown_range, *shown_def; /* for the description; NULL: derived from the above */
-    unsigned kinds;                                   /* bit k: networks of kind k have the key; 0: all have it */
-    const char *const *kind_defs;                     /* default for each kind of network; NULL: def for all */
-    bool (*read)(struct sdm_reader *r, const struct sdm_field *f, const sdm_tree_node *node, const char *path);
-    void (*dump)(const sdm_config *c, sdm_text *out); /* the value only; NULL in a SPECIAL row: nothing is written */
+    const char *shown_type, *shown_range,
+        *shown_def;               /* for the description; NULL: derived from the above */
+    unsigned kinds;               /* bit k: networks of kind k have the key; 0: all have it */
+    const char *const *kind_defs; /* default for each kind of network; NULL: def for all */
+    bool (*read)(struct sdm_reader *r, const struct sdm_field *f, const sdm_tree_node *node,
+                 const char *path);
+    void (*dump)(const sdm_config *c,
+                 sdm_text *out); /* the value only; NULL in a SPECIAL row: nothing is written */
 } sdm_field;
 
 /* Keys under one top-level name; the name "" stands for the top level itself. */
@@ -76,14 +79,19 @@ void sdm_fields_read(sdm_reader *r, const sdm_tree_node *root);
 sdm_given *sdm_fields_given(sdm_reader *r, const char *section, const char *key);
 
 /* One value of a list or a scalar. False after a mistake was recorded; *out is then unchanged. */
-bool sdm_read_real(sdm_reader *r, const sdm_tree_node *node, const char *path, double min, double max, double *out);
-bool sdm_read_int(sdm_reader *r, const sdm_tree_node *node, const char *path, int64_t min, int64_t max, int64_t *out);
-bool sdm_read_text(sdm_reader *r, const sdm_tree_node *node, const char *path, size_t max, char *out);
+bool sdm_read_real(sdm_reader *r, const sdm_tree_node *node, const char *path, double min,
+                   double max, double *out);
+bool sdm_read_int(sdm_reader *r, const sdm_tree_node *node, const char *path, int64_t min,
+                  int64_t max, int64_t *out);
+bool sdm_read_text(sdm_reader *r, const sdm_tree_node *node, const char *path, size_t max,
+                   char *out);
 
 /* Records "PATH: needs WANTED, got ...". False. */
-bool sdm_refuse_type(sdm_reader *r, const sdm_tree_node *node, const char *path, const char *wanted);
+bool sdm_refuse_type(sdm_reader *r, const sdm_tree_node *node, const char *path,
+                     const char *wanted);
 
-/* "a list", "a mapping", "nothing", "the text 'x'" or "'x'": what stands where something else was wanted. */
+/* "a list", "a mapping", "nothing", "the text 'x'" or "'x'": what stands where something else was
+ * wanted. */
 const char *sdm_describe_node(const sdm_tree_node *node, char buf[SDM_QUOTE_MAX + 16]);
 
 /* "0 .. 16" of a row, "silu, tanh, relu", or what the row says. Returns buf. */

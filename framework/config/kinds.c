@@ -13,13 +13,19 @@ static const char *list(const sdm_field *f, bool defaults, char *buf, size_t siz
     buf[0] = 0;
     for (int k = 0; used < size && sdm_choice_name(SDM_KIND_CHOICES, k, name); k++)
         if (sdm_kind_has(f, k))
-            used += (size_t)snprintf(buf + used, size - used, "%s%s%s%s", used ? ", " : "", name, defaults ? " " : "",
-                                     defaults ? f->kind_defs[k] : "");
+            used += (size_t)snprintf(buf + used, size - used, "%s%s%s%s", used ? ", " : "", name,
+                                     defaults ? " " : "", defaults ? f->kind_defs[k] : "");
     return buf;
 }
 
-const char *sdm_kind_names(const sdm_field *f, char *buf, size_t size) { return list(f, false, buf, size); }
-const char *sdm_kind_defaults(const sdm_field *f, char *buf, size_t size) { return list(f, true, buf, size); }
+const char *sdm_kind_names(const sdm_field *f, char *buf, size_t size)
+{
+    return list(f, false, buf, size);
+}
+const char *sdm_kind_defaults(const sdm_field *f, char *buf, size_t size)
+{
+    return list(f, true, buf, size);
+}
 
 // narrower ranges than those of the table of keys
 static void check_limits(sdm_reader *r, sdm_mark place)
@@ -41,15 +47,16 @@ static void check_limits(sdm_reader *r, sdm_mark place)
         if (c->network.kind != limits[i].kind || g->refused) continue;
         if (limits[i].value < limits[i].min || limits[i].value > limits[i].max)
             sdm_mistakes_add(r->mistakes, sdm_mark_is_set(g->mark) ? g->mark : place,
-                             "network.%s: %d is out of range (%d .. %d) for a network of kind %s", limits[i].key,
-                             limits[i].value, limits[i].min, limits[i].max, name);
+                             "network.%s: %d is out of range (%d .. %d) for a network of kind %s",
+                             limits[i].key, limits[i].value, limits[i].min, limits[i].max, name);
     }
 }
 
 void sdm_kinds_settle(sdm_reader *r, sdm_mark place)
 {
     const int kind = (int)r->config->network.kind;
-    const bool bytes = kind != SDM_NETWORK_POD && r->config->network.weights == SDM_WEIGHT_I8; // pod only
+    const bool bytes =
+        kind != SDM_NETWORK_POD && r->config->network.weights == SDM_WEIGHT_I8; // pod only
     char names[200], chosen[SDM_NAME_MAX];
     sdm_choice_name(SDM_KIND_CHOICES, kind, chosen);
     for (size_t s = 0; s < r->n_sections; s++)
@@ -57,20 +64,24 @@ void sdm_kinds_settle(sdm_reader *r, sdm_mark place)
             const sdm_field *f = &r->sections[s].fields[k];
             sdm_given *g = &r->given[s][k];
             if (!f->kinds && !f->kind_defs) continue;
-            const bool fits = sdm_kind_has(f, kind) && !(f->offset == offsetof(sdm_config, network.weights) && bytes);
+            const bool fits = sdm_kind_has(f, kind) &&
+                              !(f->offset == offsetof(sdm_config, network.weights) && bytes);
             if (!fits && kind != r->file_kind && g->mark.override == 0) *g = (sdm_given){0};
             if (!sdm_kind_has(f, kind) && sdm_mark_is_set(g->mark))
-                sdm_mistakes_add(r->mistakes, g->mark, "%s.%s: a network of kind %s has no such key, only %s",
-                                 r->sections[s].name, f->key, chosen, sdm_kind_names(f, names, sizeof names));
+                sdm_mistakes_add(
+                    r->mistakes, g->mark, "%s.%s: a network of kind %s has no such key, only %s",
+                    r->sections[s].name, f->key, chosen, sdm_kind_names(f, names, sizeof names));
             if (sdm_mark_is_set(g->mark)) continue;
             sdm_field_set_default(r, f, f->kind_defs ? f->kind_defs[kind] : f->def);
         }
     // Park et al. 2019: halfway
-    if (kind == SDM_NETWORK_DEEPSDF && !sdm_mark_is_set(sdm_fields_given(r, "network", "skip")->mark))
+    if (kind == SDM_NETWORK_DEEPSDF &&
+        !sdm_mark_is_set(sdm_fields_given(r, "network", "skip")->mark))
         r->config->network.skip = r->config->network.depth / 2;
     check_limits(r, place);
     const sdm_given *g = sdm_fields_given(r, "network", "weights");
     if (kind != SDM_NETWORK_POD && r->config->network.weights == SDM_WEIGHT_I8 && !g->refused)
         sdm_mistakes_add(r->mistakes, sdm_mark_is_set(g->mark) ? g->mark : place,
-                         "network.weights: i8 is for a network of kind pod; %s has f16 and f32", chosen);
+                         "network.weights: i8 is for a network of kind pod; %s has f16 and f32",
+                         chosen);
 }

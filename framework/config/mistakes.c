@@ -5,7 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
-/* The file comes before the arguments; within one place the order of discovery counts, so this is a strict "less". */
+/* The file comes before the arguments; within one place the order of discovery counts, so this is a
+ * strict "less". */
 static bool is_before(sdm_mark a, sdm_mark b)
 {
     if (a.override != b.override) return a.override < b.override;
@@ -55,8 +56,8 @@ sdm_status sdm_mistakes_report(const sdm_mistakes *m, sdm_error *err)
     for (; shown < m->count && shown < SDM_MISTAKES_SHOWN; shown++) {
         char place[SDM_PATH_TEXT_MAX + SDM_QUOTE_MAX], line[sizeof place + SDM_MISTAKE_TEXT_MAX];
         const sdm_mistake *one = &m->first[shown];
-        int n =
-            snprintf(line, sizeof line, "%s: %s", sdm_mark_print(one->mark, m->file, place, sizeof place), one->text);
+        int n = snprintf(line, sizeof line, "%s: %s",
+                         sdm_mark_print(one->mark, m->file, place, sizeof place), one->text);
         size_t length = n < 0 ? 0 : (size_t)n < sizeof line ? (size_t)n : sizeof line - 1;
         if (used + length + 1 + TAIL >= sizeof text) break;
         if (used) text[used++] = '\n';
@@ -64,7 +65,8 @@ sdm_status sdm_mistakes_report(const sdm_mistakes *m, sdm_error *err)
         used += length;
         text[used] = 0;
     }
-    if (shown < m->count) snprintf(text + used, sizeof text - used, "\n... and %zu more", m->count - shown);
+    if (shown < m->count)
+        snprintf(text + used, sizeof text - used, "\n... and %zu more", m->count - shown);
     return sdm_fail(err, SDM_E_CONFIG, "%s", text);
 }
 

@@ -1,8 +1,9 @@
-/* The list of mistakes found in a configuration: the first few by position are kept, the rest are counted. */
+/* The list of mistakes found in a configuration: the first few by position are kept, the rest are
+ * counted. */
 #ifndef SDM_MISTAKES_H
 #define SDM_MISTAKES_H
 
-#include "sdm/config.h"
+#include "sdm/internal/config.h"
 
 #define SDM_MISTAKES_SHOWN 20
 #define SDM_MISTAKE_TEXT_MAX 400
@@ -16,7 +17,8 @@ typedef struct sdm_mistake {
 typedef struct sdm_mistakes {
     const char *file; /* of the marks without a source; the caller's */
     size_t count;
-    sdm_mistake first[SDM_MISTAKES_SHOWN]; /* sorted: the file by line and column, then the overrides by number */
+    sdm_mistake first[SDM_MISTAKES_SHOWN]; /* sorted: the file by line and column, then the
+                                              overrides by number */
 } sdm_mistakes;
 
 void sdm_mistakes_add(sdm_mistakes *m, sdm_mark mark, const char *fmt, ...) SDM_PRINTF(3, 4);

@@ -1,11 +1,12 @@
-/* Turns parts of a YAML tree into key=value texts, so that they go the way of overrides of the command line. */
+/* Turns parts of a YAML tree into key=value texts, so that they go the way of overrides of the
+ * command line. */
 #include "overrides.h"
 
 #include <stdio.h>
 #include <string.h>
 
 #include "fields.h"
-#include "sdm/memory.h"
+#include "sdm/internal/heap.h"
 
 sdm_status sdm_overrides_add(sdm_overrides *o, const char *text, sdm_mark mark, sdm_error *err)
 {
@@ -13,7 +14,8 @@ sdm_status sdm_overrides_add(sdm_overrides *o, const char *text, sdm_mark mark, 
     sdm_status s = SDM_OK;
     if (o->n == o->capacity) {
         const size_t more = o->capacity ? 2 * o->capacity : 8;
-        s = sdm_grow((void **)&o->items, o->capacity, more, sizeof *o->items, "key=value texts", err);
+        s = sdm_grow((void **)&o->items, o->capacity, more, sizeof *o->items, "key=value texts",
+                     err);
         if (!s) o->capacity = more;
     }
     char *copy = NULL;
@@ -31,8 +33,9 @@ void sdm_overrides_dispose(sdm_overrides *o)
     *o = (sdm_overrides){0};
 }
 
-/* The value as YAML on one line. A plain scalar means the same alone and within brackets, but for texts with commas or brackets of
-   their own, which are no numbers and keep their meaning in quotes. */
+/* The value as YAML on one line. A plain scalar means the same alone and within brackets, but for
+   texts with commas or brackets of their own, which are no numbers and keep their meaning in
+   quotes. */
 static void add_value(const sdm_tree_node *node, sdm_text *out)
 {
     const bool is_list = node->kind == SDM_TREE_LIST;
@@ -81,15 +84,18 @@ static bool add_leaf(sdm_overrides *o, const char *key, const sdm_tree_node *nod
     return done;
 }
 
-bool sdm_overrides_add_tree(sdm_overrides *o, const char *prefix, const sdm_tree_node *node, sdm_mistakes *mistakes)
+bool sdm_overrides_add_tree(sdm_overrides *o, const char *prefix, const sdm_tree_node *node,
+                            sdm_mistakes *mistakes)
 {
     static const char NAME[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_.";
     bool fits = true;
     for (const sdm_tree_node *child = node->first; child; child = child->next) {
         char key[SDM_KEY_PATH_MAX], quoted[SDM_QUOTE_MAX];
-        const int length = snprintf(key, sizeof key, "%s%s%s", prefix, *prefix ? "." : "", child->key);
+        const int length =
+            snprintf(key, sizeof key, "%s%s%s", prefix, *prefix ? "." : "", child->key);
         if (!*child->key || child->key[strspn(child->key, NAME)] || length >= (int)sizeof key) {
-            sdm_mistakes_add(mistakes, child->key_mark, "'%s' is no key of a training configuration",
+            sdm_mistakes_add(mistakes, child->key_mark,
+                             "'%s' is no key of a training configuration",
                              sdm_quote(child->key, quoted));
             fits = false;
         } else if (child->kind == SDM_TREE_MAP && child->first) {

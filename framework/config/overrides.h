@@ -2,12 +2,14 @@
 #ifndef SDM_OVERRIDES_H
 #define SDM_OVERRIDES_H
 
-#include "sdm/experiment.h"
+#include "sdm/internal/experiment.h"
 #include "yaml_tree.h"
 
-/* Appends "key=value" for every leaf below `node`, keys joined by dots behind `prefix` ("" for none): {grid: {spacing: 0.2}} gives
-   "grid.spacing=0.2". Lists are leaves. False after a mistake was recorded. */
-bool sdm_overrides_add_tree(sdm_overrides *o, const char *prefix, const sdm_tree_node *node, sdm_mistakes *mistakes);
+/* Appends "key=value" for every leaf below `node`, keys joined by dots behind `prefix` ("" for
+   none): {grid: {spacing: 0.2}} gives "grid.spacing=0.2". Lists are leaves. False after a mistake
+   was recorded. */
+bool sdm_overrides_add_tree(sdm_overrides *o, const char *prefix, const sdm_tree_node *node,
+                            sdm_mistakes *mistakes);
 
 /* Appends one; the text is copied. */
 sdm_status sdm_overrides_add(sdm_overrides *o, const char *text, sdm_mark mark, sdm_error *err);

@@ -1,4 +1,5 @@
-/* The keys of the experiment configuration: one table a section, and the rules that span several keys. */
+/* The keys of the experiment configuration: one table a section, and the rules that span several
+ * keys. */
 #include "schema.h"
 
 #include <stddef.h>
@@ -16,31 +17,32 @@ CHECK_ENUM(sdm_sampling);
 CHECK_ENUM(sdm_loss);
 CHECK_ENUM(sdm_weight_type);
 
-#define SPECIAL(name, reader, dumper, type_, range_, def_, unit_, help_)                                               \
-    {                                                                                                                  \
-        .key = name, .type = SDM_FIELD_SPECIAL, .read = reader, .dump = dumper, .shown_type = type_,                   \
-        .shown_range = range_, .shown_def = def_, .unit = unit_, .help = help_                                         \
+#define SPECIAL(name, reader, dumper, type_, range_, def_, unit_, help_)                           \
+    {                                                                                              \
+        .key = name, .type = SDM_FIELD_SPECIAL, .read = reader, .dump = dumper,                    \
+        .shown_type = type_, .shown_range = range_, .shown_def = def_, .unit = unit_,              \
+        .help = help_                                                                              \
     }
-#define ROW(name, kind, member, low, high, def_, unit_, help_)                                                         \
-    {                                                                                                                  \
-        .key = name, .type = kind, .offset = AT(member), .min = low, .max = high, .def = def_, .unit = unit_,          \
-        .help = help_                                                                                                  \
+#define ROW(name, kind, member, low, high, def_, unit_, help_)                                     \
+    {                                                                                              \
+        .key = name, .type = kind, .offset = AT(member), .min = low, .max = high, .def = def_,     \
+        .unit = unit_, .help = help_                                                               \
     }
-#define CHOICE(name, member, list, def_, help_)                                                                        \
-    {                                                                                                                  \
-        .key = name, .type = SDM_FIELD_CHOICE, .offset = AT(member), .choices = list, .def = def_, .unit = "",         \
-        .help = help_                                                                                                  \
+#define CHOICE(name, member, list, def_, help_)                                                    \
+    {                                                                                              \
+        .key = name, .type = SDM_FIELD_CHOICE, .offset = AT(member), .choices = list, .def = def_, \
+        .unit = "", .help = help_                                                                  \
     }
 // a key that only some kinds of network have; one whose default depends on the kind
-#define OF_KIND(which, type_, name, member, low, high, def_, unit_, help_)                                             \
-    {                                                                                                                  \
-        .key = name, .type = type_, .offset = AT(member), .min = low, .max = high, .def = def_, .unit = unit_,         \
-        .kinds = which, .help = help_                                                                                  \
+#define OF_KIND(which, type_, name, member, low, high, def_, unit_, help_)                         \
+    {                                                                                              \
+        .key = name, .type = type_, .offset = AT(member), .min = low, .max = high, .def = def_,    \
+        .unit = unit_, .kinds = which, .help = help_                                               \
     }
-#define BY_KIND(type_, name, member, low, high, unit_, list, help_)                                                    \
-    {                                                                                                                  \
-        .key = name, .type = type_, .offset = AT(member), .min = low, .max = high, .unit = unit_, .kind_defs = list,   \
-        .help = help_                                                                                                  \
+#define BY_KIND(type_, name, member, low, high, unit_, list, help_)                                \
+    {                                                                                              \
+        .key = name, .type = type_, .offset = AT(member), .min = low, .max = high, .unit = unit_,  \
+        .kind_defs = list, .help = help_                                                           \
     }
 #define INT SDM_FIELD_INT
 #define INT64 SDM_FIELD_INT64
@@ -55,13 +57,15 @@ enum {
 };
 enum { POINTS = DEEPSDF | IMNET };
 
-// defaults of pod, sdmnn, deepsdf and imnet: those of Park et al. 2019 and of Chen and Zhang 2019 for the last two
-static const char *const DEPTH[] = {"3", "4", "8", "5"}, *const WIDTH[] = {"128", "64", "512", "2048"},
-                         *const BLOCK[] = {"4", "2", "4", "4"},
-                         *const ACTIVATION[] = {"silu", "relu", "relu", "leaky_relu"},
-                         *const OUTPUT_TYPE[] = {"linear", "linear", "tanh", "linear"},
-                         *const WEIGHTS[] = {"i8", "f16", "f16", "f16"}, *const BATCH[] = {"256", "8", "16", "16"},
-                         *const RATE[] = {"3e-3", "1e-3", "5e-4", "5e-4"};
+// defaults of pod, sdmnn, deepsdf and imnet: those of Park et al. 2019 and of Chen and Zhang 2019
+// for the last two
+static const char *const
+    DEPTH[] = {"3", "4", "8", "5"},
+    *const WIDTH[] = {"128", "64", "512", "2048"}, *const BLOCK[] = {"4", "2", "4", "4"},
+    *const ACTIVATION[] = {"silu", "relu", "relu", "leaky_relu"},
+    *const OUTPUT_TYPE[] = {"linear", "linear", "tanh", "linear"},
+    *const WEIGHTS[] = {"i8", "f16", "f16", "f16"}, *const BATCH[] = {"256", "8", "16", "16"},
+    *const RATE[] = {"3e-3", "1e-3", "5e-4", "5e-4"};
 
 // clang-format off
 static const sdm_field SHAPE[] = {
@@ -176,7 +180,10 @@ const sdm_section *sdm_config_sections(size_t *n)
     return SECTIONS;
 }
 
-static bool by_override(const sdm_given *g, int override) { return g->mark.override == override && !g->refused; }
+static bool by_override(const sdm_given *g, int override)
+{
+    return g->mark.override == override && !g->refused;
+}
 
 static void budgets(sdm_reader *r, sdm_given *given[3], bool positive[3])
 {
@@ -192,8 +199,10 @@ void sdm_config_settle_override(sdm_reader *r, int override)
     sdm_given *given[3], *origin = sdm_fields_given(r, "grid", "origin"),
                          *centre = sdm_fields_given(r, "grid", "centre");
     bool positive[3], replaces = false;
-    if (by_override(origin, override) && centre->mark.override != override) *centre = (sdm_given){0};
-    if (by_override(centre, override) && origin->mark.override != override) *origin = (sdm_given){0};
+    if (by_override(origin, override) && centre->mark.override != override)
+        *centre = (sdm_given){0};
+    if (by_override(centre, override) && origin->mark.override != override)
+        *origin = (sdm_given){0};
 
     // a budget given here takes the place of the others
     budgets(r, given, positive);
@@ -223,14 +232,17 @@ static void check_budget(sdm_reader *r, sdm_mark section)
         if (last < 0 || is_later(given[i]->mark, given[last]->mark)) last = i;
     }
     if (n == 0 && !refused)
-        sdm_mistakes_add(r->mistakes, section,
-                         "missing key: one of train.minutes, train.steps and train.samples must be positive");
+        sdm_mistakes_add(
+            r->mistakes, section,
+            "missing key: one of train.minutes, train.steps and train.samples must be positive");
     if (n > 1)
-        sdm_mistakes_add(r->mistakes, given[last]->mark,
-                         "only one of train.minutes, train.steps and train.samples may be positive, got %d", n);
+        sdm_mistakes_add(
+            r->mistakes, given[last]->mark,
+            "only one of train.minutes, train.steps and train.samples may be positive, got %d", n);
 }
 
-static void require(sdm_reader *r, const char *section, const char *key, sdm_mark mark, const char *example)
+static void require(sdm_reader *r, const char *section, const char *key, sdm_mark mark,
+                    const char *example)
 {
     if (sdm_mark_is_set(sdm_fields_given(r, section, key)->mark)) return;
     sdm_mistakes_add(r->mistakes, mark, "missing key '%s.%s'; e.g. %s", section, key, example);
@@ -239,22 +251,26 @@ static void require(sdm_reader *r, const char *section, const char *key, sdm_mar
 static void finish_grid(sdm_reader *r, sdm_mark section)
 {
     sdm_grid *g = &r->config->grid;
-    sdm_given *origin = sdm_fields_given(r, "grid", "origin"), *centre = sdm_fields_given(r, "grid", "centre");
+    sdm_given *origin = sdm_fields_given(r, "grid", "origin"),
+              *centre = sdm_fields_given(r, "grid", "centre");
     require(r, "grid", "size", section, "size: [60, 50, 50]");
     require(r, "grid", "spacing", section, "spacing: 0.2");
     bool has_origin = sdm_mark_is_set(origin->mark), has_centre = sdm_mark_is_set(centre->mark);
     if (has_origin && has_centre)
-        sdm_mistakes_add(r->mistakes, is_later(origin->mark, centre->mark) ? origin->mark : centre->mark,
+        sdm_mistakes_add(r->mistakes,
+                         is_later(origin->mark, centre->mark) ? origin->mark : centre->mark,
                          "only one of grid.origin and grid.centre may be given");
     for (int i = 0; i < 9; i++) g->dir[i] = i % 4 == 0;
     if (!has_origin)
-        for (int i = 0; i < 3; i++) g->origin[i] = r->centre[i] - 0.5 * (double)(g->n[i] - 1) * g->spacing[i];
+        for (int i = 0; i < 3; i++)
+            g->origin[i] = r->centre[i] - 0.5 * (double)(g->n[i] - 1) * g->spacing[i];
 
     // sizes that were missing or refused are still 0
     sdm_error err;
     if (g->n[0] == 0 || !(g->spacing[0] > 0)) return;
     if (sdm_grid_check(g, &err))
-        sdm_mistakes_add(r->mistakes, sdm_fields_given(r, "grid", "size")->mark, "grid.size: %.200s", err.text);
+        sdm_mistakes_add(r->mistakes, sdm_fields_given(r, "grid", "size")->mark,
+                         "grid.size: %.200s", err.text);
 }
 
 static sdm_mark section_place(const sdm_reader *r, const char *name, sdm_mark top)

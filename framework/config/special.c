@@ -1,4 +1,5 @@
-/* Reads and writes a configuration's values that are more than one number or name: grid, ranges, options, counts. */
+/* Reads and writes a configuration's values that are more than one number or name: grid, ranges,
+ * options, counts. */
 #include "special.h"
 
 #include <stdio.h>
@@ -11,8 +12,8 @@
 #define STATIC_MAX 1000
 
 /* [x, y, z], all of them checked. */
-static bool read_three(sdm_reader *r, const sdm_tree_node *node, const char *path, double min, double max,
-                       double out[3])
+static bool read_three(sdm_reader *r, const sdm_tree_node *node, const char *path, double min,
+                       double max, double out[3])
 {
     static const char *const AXIS[3] = {"x", "y", "z"};
     double v[3] = {0, 0, 0};
@@ -29,7 +30,8 @@ static bool read_three(sdm_reader *r, const sdm_tree_node *node, const char *pat
     return fits;
 }
 
-bool sdm_read_key_size(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
+bool sdm_read_key_size(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                       const char *path)
 {
     static const char *const AXIS[3] = {"x", "y", "z"};
     int64_t n[3] = {0, 0, 0};
@@ -47,43 +49,51 @@ bool sdm_read_key_size(sdm_reader *r, const sdm_field *f, const sdm_tree_node *n
     return fits;
 }
 
-bool sdm_read_key_spacing(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
+bool sdm_read_key_spacing(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                          const char *path)
 {
     double *spacing = r->config->grid.spacing;
     (void)f;
-    if (node->kind == SDM_TREE_LIST) return read_three(r, node, path, SPACING_MIN, SPACING_MAX, spacing);
-    if (node->kind != SDM_TREE_SCALAR) return sdm_refuse_type(r, node, path, "a number or [x, y, z]");
+    if (node->kind == SDM_TREE_LIST)
+        return read_three(r, node, path, SPACING_MIN, SPACING_MAX, spacing);
+    if (node->kind != SDM_TREE_SCALAR)
+        return sdm_refuse_type(r, node, path, "a number or [x, y, z]");
     double v = 0;
     if (!sdm_read_real(r, node, path, SPACING_MIN, SPACING_MAX, &v)) return false;
     for (int i = 0; i < 3; i++) spacing[i] = v;
     return true;
 }
 
-bool sdm_read_key_origin(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
+bool sdm_read_key_origin(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                         const char *path)
 {
     (void)f;
     return read_three(r, node, path, -PLACE_MAX, PLACE_MAX, r->config->grid.origin);
 }
 
-bool sdm_read_key_centre(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
+bool sdm_read_key_centre(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                         const char *path)
 {
     (void)f;
     return read_three(r, node, path, -PLACE_MAX, PLACE_MAX, r->centre);
 }
 
 /* Names of options and parameters, as the plug-in interface has them. */
-static bool read_name(sdm_reader *r, const sdm_tree_node *node, const char *path, char out[SDM_NAME_MAX])
+static bool read_name(sdm_reader *r, const sdm_tree_node *node, const char *path,
+                      char out[SDM_NAME_MAX])
 {
     static const char ALLOWED[] = "abcdefghijklmnopqrstuvwxyz0123456789_";
     char quoted[SDM_QUOTE_MAX];
     size_t length = strlen(node->key);
     if (!(node->key[0] >= 'a' && node->key[0] <= 'z') || strspn(node->key, ALLOWED) != length) {
-        sdm_mistakes_add(r->mistakes, node->key_mark, "%s: '%s' is no name; use a-z, 0-9 and _, first a letter", path,
+        sdm_mistakes_add(r->mistakes, node->key_mark,
+                         "%s: '%s' is no name; use a-z, 0-9 and _, first a letter", path,
                          sdm_quote(node->key, quoted));
         return false;
     }
     if (length >= SDM_NAME_MAX) {
-        sdm_mistakes_add(r->mistakes, node->key_mark, "%s: a name of %zu bytes, at most %d are allowed", path, length,
+        sdm_mistakes_add(r->mistakes, node->key_mark,
+                         "%s: a name of %zu bytes, at most %d are allowed", path, length,
                          SDM_NAME_MAX - 1);
         return false;
     }
@@ -102,7 +112,8 @@ static bool read_option(sdm_reader *r, const sdm_tree_node *node, const char *pa
     sdm_config *c = r->config;
     while (at < c->shape.n_options && strcmp(c->shape.options[at].name, option.name) != 0) at++;
     if (at == SDM_MAX_OPTIONS) {
-        sdm_mistakes_add(r->mistakes, node->key_mark, "%s: more than %d options", path, SDM_MAX_OPTIONS);
+        sdm_mistakes_add(r->mistakes, node->key_mark, "%s: more than %d options", path,
+                         SDM_MAX_OPTIONS);
         return false;
     }
     c->shape.options[at] = option;
@@ -122,14 +133,16 @@ static bool read_range(sdm_reader *r, const sdm_tree_node *node, const char *pat
     if (!sdm_read_real(r, node->first, name, -PLACE_MAX, PLACE_MAX, &range.min)) return false;
     if (!sdm_read_real(r, node->last, name, -PLACE_MAX, PLACE_MAX, &range.max)) return false;
     if (!(range.min < range.max)) {
-        sdm_mistakes_add(r->mistakes, node->mark, "%s: [%s, %s] is empty; the first number is the smaller one", name,
+        sdm_mistakes_add(r->mistakes, node->mark,
+                         "%s: [%s, %s] is empty; the first number is the smaller one", name,
                          sdm_format_plain(range.min, a), sdm_format_plain(range.max, b));
         return false;
     }
     sdm_config *c = r->config;
     while (at < c->shape.n_ranges && strcmp(c->shape.ranges[at].name, range.name) != 0) at++;
     if (at == SDM_MAX_PARAMS) {
-        sdm_mistakes_add(r->mistakes, node->key_mark, "%s: more than %d parameters", path, SDM_MAX_PARAMS);
+        sdm_mistakes_add(r->mistakes, node->key_mark, "%s: more than %d parameters", path,
+                         SDM_MAX_PARAMS);
         return false;
     }
     c->shape.ranges[at] = range;
@@ -137,28 +150,33 @@ static bool read_range(sdm_reader *r, const sdm_tree_node *node, const char *pat
     return true;
 }
 
-bool sdm_read_key_options(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
+bool sdm_read_key_options(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                          const char *path)
 {
     bool fits = true;
     (void)f;
     if (sdm_tree_is_empty(node) && node->mark.override == 0) return true;
     if (node->kind != SDM_TREE_MAP) return sdm_refuse_type(r, node, path, "names with values");
-    for (const sdm_tree_node *child = node->first; child; child = child->next) fits &= read_option(r, child, path);
+    for (const sdm_tree_node *child = node->first; child; child = child->next)
+        fits &= read_option(r, child, path);
     return fits;
 }
 
-bool sdm_read_key_ranges(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
+bool sdm_read_key_ranges(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                         const char *path)
 {
     bool fits = true;
     (void)f;
     if (sdm_tree_is_empty(node) && node->mark.override == 0) return true;
     if (node->kind != SDM_TREE_MAP) return sdm_refuse_type(r, node, path, "names with [min, max]");
-    for (const sdm_tree_node *child = node->first; child; child = child->next) fits &= read_range(r, child, path);
+    for (const sdm_tree_node *child = node->first; child; child = child->next)
+        fits &= read_range(r, child, path);
     return fits;
 }
 
 /* One number for all parameters, a list of one a parameter, or 0 for no static grid at all. */
-bool sdm_read_key_static(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path)
+bool sdm_read_key_static(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                         const char *path)
 {
     int64_t counts[SDM_MAX_PARAMS] = {0};
     size_t n = 0;
@@ -168,7 +186,8 @@ bool sdm_read_key_static(sdm_reader *r, const sdm_field *f, const sdm_tree_node 
         if (!sdm_read_int(r, node, path, 0, STATIC_MAX, &counts[0])) return false;
         n = counts[0] > 0;
     } else {
-        if (node->kind != SDM_TREE_LIST || node->n_children < 1 || node->n_children > SDM_MAX_PARAMS)
+        if (node->kind != SDM_TREE_LIST || node->n_children < 1 ||
+            node->n_children > SDM_MAX_PARAMS)
             return sdm_refuse_type(r, node, path, "an integer or a list of 1 to 64");
         for (const sdm_tree_node *child = node->first; child; child = child->next)
             fits &= sdm_read_int(r, child, path, 1, STATIC_MAX, &counts[n++]);
@@ -182,12 +201,14 @@ bool sdm_read_key_static(sdm_reader *r, const sdm_field *f, const sdm_tree_node 
 static void dump_three(const double v[3], sdm_text *out)
 {
     char a[32], b[32], c[32];
-    sdm_text_add(out, "[%s, %s, %s]", sdm_format_plain(v[0], a), sdm_format_plain(v[1], b), sdm_format_plain(v[2], c));
+    sdm_text_add(out, "[%s, %s, %s]", sdm_format_plain(v[0], a), sdm_format_plain(v[1], b),
+                 sdm_format_plain(v[2], c));
 }
 
 void sdm_dump_key_size(const sdm_config *c, sdm_text *out)
 {
-    sdm_text_add(out, "[%lld, %lld, %lld]", (long long)c->grid.n[0], (long long)c->grid.n[1], (long long)c->grid.n[2]);
+    sdm_text_add(out, "[%lld, %lld, %lld]", (long long)c->grid.n[0], (long long)c->grid.n[1],
+                 (long long)c->grid.n[2]);
 }
 
 void sdm_dump_key_spacing(const sdm_config *c, sdm_text *out) { dump_three(c->grid.spacing, out); }
@@ -210,8 +231,8 @@ void sdm_dump_key_ranges(const sdm_config *c, sdm_text *out)
     sdm_text_add(out, "{");
     for (size_t i = 0; i < c->shape.n_ranges; i++) {
         const sdm_config_range *one = &c->shape.ranges[i];
-        sdm_text_add(out, "%s\n    %s: [%s, %s]", i ? "," : "", one->name, sdm_format_plain(one->min, a),
-                     sdm_format_plain(one->max, b));
+        sdm_text_add(out, "%s\n    %s: [%s, %s]", i ? "," : "", one->name,
+                     sdm_format_plain(one->min, a), sdm_format_plain(one->max, b));
     }
     sdm_text_add(out, "}");
 }
@@ -223,6 +244,7 @@ void sdm_dump_key_static(const sdm_config *c, sdm_text *out)
         sdm_text_add(out, "%lld", n ? (long long)c->data.static_counts[0] : 0LL);
         return;
     }
-    for (size_t i = 0; i < n; i++) sdm_text_add(out, "%s%lld", i ? ", " : "[", (long long)c->data.static_counts[i]);
+    for (size_t i = 0; i < n; i++)
+        sdm_text_add(out, "%s%lld", i ? ", " : "[", (long long)c->data.static_counts[i]);
     sdm_text_add(out, "]");
 }

@@ -4,13 +4,20 @@
 
 #include "fields.h"
 
-bool sdm_read_key_size(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
-bool sdm_read_key_spacing(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
-bool sdm_read_key_origin(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
-bool sdm_read_key_centre(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
-bool sdm_read_key_options(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
-bool sdm_read_key_ranges(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
-bool sdm_read_key_static(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path);
+bool sdm_read_key_size(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                       const char *path);
+bool sdm_read_key_spacing(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                          const char *path);
+bool sdm_read_key_origin(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                         const char *path);
+bool sdm_read_key_centre(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                         const char *path);
+bool sdm_read_key_options(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                          const char *path);
+bool sdm_read_key_ranges(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                         const char *path);
+bool sdm_read_key_static(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
+                         const char *path);
 
 void sdm_dump_key_size(const sdm_config *c, sdm_text *out);
 void sdm_dump_key_spacing(const sdm_config *c, sdm_text *out);

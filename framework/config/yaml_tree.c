@@ -5,7 +5,7 @@
 #include <string.h>
 #include <yaml.h>
 
-#include "sdm/file.h"
+#include "sdm/internal/file.h"
 #include "sdm/memory.h"
 
 /* An open list or map. */
@@ -68,13 +68,16 @@ static sdm_mark mark_at(sdm_mark override, int line, int column)
     return override.override > 0 ? override : (sdm_mark){.line = line, .column = column};
 }
 
-/* Encoding and tabs, checked first: libyaml's own words for these do not help, and it takes byte order marks in silence. */
-static bool check_characters(const unsigned char *s, size_t size, sdm_mark override, sdm_mistakes *mistakes)
+/* Encoding and tabs, checked first: libyaml's own words for these do not help, and it takes byte
+ * order marks in silence. */
+static bool check_characters(const unsigned char *s, size_t size, sdm_mark override,
+                             sdm_mistakes *mistakes)
 {
     int line = 1, column = 1;
     bool indent = true;
     if (size >= 2 && ((s[0] == 0xFF && s[1] == 0xFE) || (s[0] == 0xFE && s[1] == 0xFF))) {
-        sdm_mistakes_add(mistakes, mark_at(override, line, column), "the text is UTF-16; save it as UTF-8");
+        sdm_mistakes_add(mistakes, mark_at(override, line, column),
+                         "the text is UTF-16; save it as UTF-8");
         return false;
     }
     for (size_t at = 0, n; at < size; at += n) {
@@ -82,7 +85,8 @@ static bool check_characters(const unsigned char *s, size_t size, sdm_mark overr
         n = utf8_next(s + at, size - at, &c);
         if (n == 0) {
             sdm_mistakes_add(mistakes, mark_at(override, line, column),
-                             "byte 0x%02X is not valid UTF-8; save the text as UTF-8", (unsigned)s[at]);
+                             "byte 0x%02X is not valid UTF-8; save the text as UTF-8",
+                             (unsigned)s[at]);
             return false;
         }
         if (c == '\n' || c == '\r') {
@@ -93,7 +97,8 @@ static bool check_characters(const unsigned char *s, size_t size, sdm_mark overr
             continue;
         }
         if (c == '\t' && indent) {
-            sdm_mistakes_add(mistakes, mark_at(override, line, column), "a tab in the indentation; use spaces");
+            sdm_mistakes_add(mistakes, mark_at(override, line, column),
+                             "a tab in the indentation; use spaces");
             return false;
         }
         if (c == 0xFEFF) {
@@ -102,8 +107,8 @@ static bool check_characters(const unsigned char *s, size_t size, sdm_mark overr
             return false;
         }
         if (c != '\t' && !is_printable(c)) {
-            sdm_mistakes_add(mistakes, mark_at(override, line, column), "control character U+%04X; remove it",
-                             (unsigned)c);
+            sdm_mistakes_add(mistakes, mark_at(override, line, column),
+                             "control character U+%04X; remove it", (unsigned)c);
             return false;
         }
         if (c != ' ') indent = false;
@@ -118,10 +123,12 @@ static sdm_mark mark_of(const tree_builder *b, yaml_mark_t at)
     return mark_at(b->override, (int)at.line + 1, (int)at.column + 1);
 }
 
-static sdm_status copy_text(sdm_tree *tree, const char *text, size_t size, const char **out, sdm_error *err)
+static sdm_status copy_text(sdm_tree *tree, const char *text, size_t size, const char **out,
+                            sdm_error *err)
 {
     if (size >= tree->pool_size - tree->pool_used)
-        return sdm_fail(err, SDM_E_INTERNAL, "YAML texts need more than %zu bytes", tree->pool_size);
+        return sdm_fail(err, SDM_E_INTERNAL, "YAML texts need more than %zu bytes",
+                        tree->pool_size);
     char *copy = tree->pool + tree->pool_used;
     memcpy(copy, text, size);
     copy[size] = 0;
@@ -134,7 +141,8 @@ static sdm_status add_node(tree_builder *b, sdm_tree_kind kind, sdm_mark mark, s
 {
     sdm_tree *tree = b->tree;
     if (tree->n_nodes == tree->max_nodes) {
-        sdm_mistakes_add(b->mistakes, mark, "more than %d values; a configuration is smaller", SDM_TREE_NODES_MAX);
+        sdm_mistakes_add(b->mistakes, mark, "more than %d values; a configuration is smaller",
+                         SDM_TREE_NODES_MAX);
         return SDM_E_CONFIG;
     }
     *out = &tree->nodes[tree->n_nodes++];
@@ -191,7 +199,8 @@ static void full_path(const tree_builder *b, const char *key, char *out, size_t 
     if (used < size) snprintf(out + used, size - used, "%s", key);
 }
 
-static sdm_status take_key(tree_builder *b, tree_frame *f, const char *text, size_t size, sdm_mark mark)
+static sdm_status take_key(tree_builder *b, tree_frame *f, const char *text, size_t size,
+                           sdm_mark mark)
 {
     sdm_status s = copy_text(b->tree, text, size, &f->key, b->err);
     if (s) return s;
@@ -203,21 +212,24 @@ static sdm_status take_key(tree_builder *b, tree_frame *f, const char *text, siz
         char path[SDM_QUOTE_MAX], buf[SDM_QUOTE_MAX];
         full_path(b, f->key, path, sizeof path);
         if (before->key_mark.line > 0)
-            sdm_mistakes_add(b->mistakes, mark, "duplicate key '%s' (first at line %d)", sdm_quote(path, buf),
-                             before->key_mark.line);
+            sdm_mistakes_add(b->mistakes, mark, "duplicate key '%s' (first at line %d)",
+                             sdm_quote(path, buf), before->key_mark.line);
         else
             sdm_mistakes_add(b->mistakes, mark, "duplicate key '%s'", sdm_quote(path, buf));
     }
     return SDM_OK;
 }
 
-static void check_extras(tree_builder *b, const yaml_char_t *anchor, const yaml_char_t *tag, sdm_mark mark)
+static void check_extras(tree_builder *b, const yaml_char_t *anchor, const yaml_char_t *tag,
+                         sdm_mark mark)
 {
     char buf[SDM_QUOTE_MAX];
     if (anchor)
         sdm_mistakes_add(b->mistakes, mark, "anchor '&%s'; anchors are not allowed",
                          sdm_quote((const char *)anchor, buf));
-    if (tag) sdm_mistakes_add(b->mistakes, mark, "tag '%s'; tags are not allowed", sdm_quote((const char *)tag, buf));
+    if (tag)
+        sdm_mistakes_add(b->mistakes, mark, "tag '%s'; tags are not allowed",
+                         sdm_quote((const char *)tag, buf));
 }
 
 static sdm_status take_scalar(tree_builder *b, const yaml_event_t *e)
@@ -281,7 +293,8 @@ static sdm_status open_document(tree_builder *b, const yaml_event_t *e)
     b->has_document = true;
     if (e->data.document_start.version_directive ||
         e->data.document_start.tag_directives.start != e->data.document_start.tag_directives.end) {
-        sdm_mistakes_add(b->mistakes, mark, "a %%YAML or %%TAG directive; directives are not allowed");
+        sdm_mistakes_add(b->mistakes, mark,
+                         "a %%YAML or %%TAG directive; directives are not allowed");
         return SDM_E_CONFIG;
     }
     return SDM_OK;
@@ -319,23 +332,28 @@ static bool is_tab(const char *text, size_t size, size_t index)
     return at < size && text[at] == '\t';
 }
 
-static sdm_status report_syntax(const tree_builder *b, const yaml_parser_t *parser, const char *text, size_t size)
+static sdm_status report_syntax(const tree_builder *b, const yaml_parser_t *parser,
+                                const char *text, size_t size)
 {
-    if (parser->error == YAML_MEMORY_ERROR) return sdm_fail(b->err, SDM_E_NOMEM, "out of memory while reading YAML");
+    if (parser->error == YAML_MEMORY_ERROR)
+        return sdm_fail(b->err, SDM_E_NOMEM, "out of memory while reading YAML");
     yaml_mark_t at = parser->problem_mark;
     const char *problem = parser->problem ? parser->problem : "unreadable";
     if (is_tab(text, size, at.index))
         sdm_mistakes_add(b->mistakes, mark_of(b, at), "a tab where YAML wants spaces");
     else if (parser->context)
-        sdm_mistakes_add(b->mistakes, mark_of(b, at), "not valid YAML: %s (%s from line %d)", problem, parser->context,
-                         (int)parser->context_mark.line + 1);
+        sdm_mistakes_add(b->mistakes, mark_of(b, at), "not valid YAML: %s (%s from line %d)",
+                         problem, parser->context, (int)parser->context_mark.line + 1);
     else
         sdm_mistakes_add(b->mistakes, mark_of(b, at), "not valid YAML: %s%s", problem,
-                         strstr(problem, "mapping values") ? " (is a space missing behind a ':' near here?)" : "");
+                         strstr(problem, "mapping values")
+                             ? " (is a space missing behind a ':' near here?)"
+                             : "");
     return SDM_E_CONFIG;
 }
 
-/* Event by event, so that depth and size are checked while libyaml has looked ahead by no more than a line's worth. */
+/* Event by event, so that depth and size are checked while libyaml has looked ahead by no more than
+ * a line's worth. */
 static sdm_status build(tree_builder *b, yaml_parser_t *parser, const char *text, size_t size)
 {
     sdm_status s = SDM_OK;
@@ -354,12 +372,13 @@ static sdm_status build(tree_builder *b, yaml_parser_t *parser, const char *text
 
 static sdm_status allocate(sdm_tree *tree, size_t size, sdm_error *err)
 {
-    // a byte makes at most two nodes, and an escape at most 1.5 bytes a byte; both are checked again when used.
-    // The spare room is for sdm_tree_wrap()
+    // a byte makes at most two nodes, and an escape at most 1.5 bytes a byte; both are checked
+    // again when used. The spare room is for sdm_tree_wrap()
     size_t nodes = 2 * size + 2;
     tree->max_nodes = nodes < SDM_TREE_NODES_MAX ? nodes : SDM_TREE_NODES_MAX;
     tree->pool_size = 2 * size + 2 * tree->max_nodes + SDM_TREE_PATH_BYTES + SDM_TREE_PATH_NAMES;
-    sdm_status s = SDM_ALLOC(&tree->nodes, tree->max_nodes + SDM_TREE_PATH_NAMES + 1, "YAML nodes", err);
+    sdm_status s =
+        SDM_ALLOC(&tree->nodes, tree->max_nodes + SDM_TREE_PATH_NAMES + 1, "YAML nodes", err);
     return s ? s : SDM_ALLOC(&tree->pool, tree->pool_size, "YAML texts", err);
 }
 
@@ -367,32 +386,36 @@ sdm_status sdm_tree_read(const char *path, uint8_t **data, size_t *size, sdm_err
 {
     const sdm_status s = sdm_file_read(path, SDM_TREE_BYTES_MAX, data, size, err);
     if (s != SDM_E_FORMAT) return s;
-    return sdm_fail(err, SDM_E_CONFIG, "%s:1:1: more than %zu bytes; a configuration is smaller", path,
-                    SDM_TREE_BYTES_MAX);
+    return sdm_fail(err, SDM_E_CONFIG, "%s:1:1: more than %zu bytes; a configuration is smaller",
+                    path, SDM_TREE_BYTES_MAX);
 }
 
-sdm_status sdm_tree_parse(sdm_tree *tree, const char *text, size_t size, sdm_mark override, sdm_mistakes *mistakes,
-                          sdm_error *err)
+sdm_status sdm_tree_parse(sdm_tree *tree, const char *text, size_t size, sdm_mark override,
+                          sdm_mistakes *mistakes, sdm_error *err)
 {
     const sdm_mark top = mark_at(override, 1, 1);
     *tree = (sdm_tree){0};
     if (size > SDM_TREE_BYTES_MAX) {
-        sdm_mistakes_add(mistakes, top, "%zu bytes, more than the allowed %zu", size, SDM_TREE_BYTES_MAX);
+        sdm_mistakes_add(mistakes, top, "%zu bytes, more than the allowed %zu", size,
+                         SDM_TREE_BYTES_MAX);
         return SDM_E_CONFIG;
     }
-    if (!check_characters((const unsigned char *)text, size, override, mistakes)) return SDM_E_CONFIG;
+    if (!check_characters((const unsigned char *)text, size, override, mistakes))
+        return SDM_E_CONFIG;
     sdm_status s = allocate(tree, size, err);
     if (s) return s;
 
     yaml_parser_t parser;
-    if (!yaml_parser_initialize(&parser)) return sdm_fail(err, SDM_E_NOMEM, "out of memory while reading YAML");
+    if (!yaml_parser_initialize(&parser))
+        return sdm_fail(err, SDM_E_NOMEM, "out of memory while reading YAML");
     tree_builder b = {.tree = tree, .mistakes = mistakes, .err = err, .override = override};
     s = build(&b, &parser, text, size);
     yaml_parser_delete(&parser);
     return s;
 }
 
-sdm_status sdm_tree_wrap(sdm_tree *tree, const char *path, size_t length, sdm_mark override, sdm_error *err)
+sdm_status sdm_tree_wrap(sdm_tree *tree, const char *path, size_t length, sdm_mark override,
+                         sdm_error *err)
 {
     const size_t limit = tree->max_nodes + SDM_TREE_PATH_NAMES + 1;
     if (!tree->root) {
@@ -407,10 +430,14 @@ sdm_status sdm_tree_wrap(sdm_tree *tree, const char *path, size_t length, sdm_ma
         sdm_status s = copy_text(tree, path + start, end - 1 - start, &key, err);
         if (s) return s;
         if (tree->n_nodes == limit)
-            return sdm_fail(err, SDM_E_INTERNAL, "a key of more than %d names", SDM_TREE_PATH_NAMES);
+            return sdm_fail(err, SDM_E_INTERNAL, "a key of more than %d names",
+                            SDM_TREE_PATH_NAMES);
         sdm_tree_node *map = &tree->nodes[tree->n_nodes++];
-        *map = (sdm_tree_node){
-            .kind = SDM_TREE_MAP, .mark = override, .n_children = 1, .first = tree->root, .last = tree->root};
+        *map = (sdm_tree_node){.kind = SDM_TREE_MAP,
+                               .mark = override,
+                               .n_children = 1,
+                               .first = tree->root,
+                               .last = tree->root};
         tree->root->key = key;
         tree->root->key_mark = override;
         tree->root = map;

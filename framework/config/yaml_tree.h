@@ -1,4 +1,5 @@
-/* A YAML document as a small tree with marks. A strict subset: no tags, anchors, aliases or directives, one document. */
+/* A YAML document as a small tree with marks. A strict subset: no tags, anchors, aliases or
+ * directives, one document. */
 #ifndef SDM_YAML_TREE_H
 #define SDM_YAML_TREE_H
 
@@ -31,25 +32,30 @@ typedef struct sdm_tree {
     sdm_tree_node *root; /* NULL: an empty document */
 } sdm_tree;
 
-/* The text of a file, at most SDM_TREE_BYTES_MAX bytes; *data is freed by sdm_free(). SDM_E_IO, SDM_E_CONFIG (too long), SDM_E_NOMEM. */
+/* The text of a file, at most SDM_TREE_BYTES_MAX bytes; *data is freed by sdm_free(). SDM_E_IO,
+ * SDM_E_CONFIG (too long), SDM_E_NOMEM. */
 sdm_status sdm_tree_read(const char *path, uint8_t **data, size_t *size, sdm_error *err);
 
-/* Reads text[size]. override: of the key=value argument the text comes from, for all marks in it; zero for the file. Mistakes go to
-   *mistakes; repeated keys are among them and only the first one is kept in the tree.
-   SDM_E_CONFIG: there is no usable tree, the reason is in *mistakes; SDM_E_NOMEM with *err set. */
-sdm_status sdm_tree_parse(sdm_tree *tree, const char *text, size_t size, sdm_mark override, sdm_mistakes *mistakes,
-                          sdm_error *err);
+/* Reads text[size]. override: of the key=value argument the text comes from, for all marks in it;
+   zero for the file. Mistakes go to *mistakes; repeated keys are among them and only the first one
+   is kept in the tree. SDM_E_CONFIG: there is no usable tree, the reason is in *mistakes;
+   SDM_E_NOMEM with *err set. */
+sdm_status sdm_tree_parse(sdm_tree *tree, const char *text, size_t size, sdm_mark override,
+                          sdm_mistakes *mistakes, sdm_error *err);
 
-/* Puts the root below the dotted key `path[length]`: "a.b" around 4 gives {a: {b: 4}}; an empty document
-   counts as an empty value. Once for a tree; at most SDM_TREE_PATH_BYTES bytes and SDM_TREE_PATH_NAMES names. */
-sdm_status sdm_tree_wrap(sdm_tree *tree, const char *path, size_t length, sdm_mark override, sdm_error *err);
+/* Puts the root below the dotted key `path[length]`: "a.b" around 4 gives {a: {b: 4}}; an empty
+   document counts as an empty value. Once for a tree; at most SDM_TREE_PATH_BYTES bytes and
+   SDM_TREE_PATH_NAMES names. */
+sdm_status sdm_tree_wrap(sdm_tree *tree, const char *path, size_t length, sdm_mark override,
+                         sdm_error *err);
 
 void sdm_tree_dispose(sdm_tree *tree);
 
 /* True for an empty value, as in "key:". */
 bool sdm_tree_is_empty(const sdm_tree_node *node);
 
-/* Offset of the first byte of text[size] that is no printable UTF-8 (tabs and line breaks are not printable), or `size`. */
+/* Offset of the first byte of text[size] that is no printable UTF-8 (tabs and line breaks are not
+ * printable), or `size`. */
 size_t sdm_tree_printable(const char *text, size_t size);
 
 #endif

@@ -1,8 +1,8 @@
 /* CRC-64/XZ, eight bytes a step ("slicing by 8", Kounavis and Berry 2005). */
-#include "sdm/checksum.h"
+#include "sdm/internal/checksum.h"
 
 #include "once.h"
-#include "sdm/file.h"
+#include "sdm/internal/file.h"
 #include "sdm/memory.h"
 
 static uint64_t table[8][256];
@@ -16,7 +16,8 @@ static void fill_table(void)
         table[0][i] = c;
     }
     for (int k = 1; k < 8; k++)
-        for (unsigned i = 0; i < 256; i++) table[k][i] = table[0][table[k - 1][i] & 255] ^ (table[k - 1][i] >> 8);
+        for (unsigned i = 0; i < 256; i++)
+            table[k][i] = table[0][table[k - 1][i] & 255] ^ (table[k - 1][i] >> 8);
 }
 
 uint64_t sdm_crc64(uint64_t crc, const void *data, size_t size)

@@ -1,5 +1,5 @@
 /* Seconds that have gone by. */
-#include "sdm/clock.h"
+#include "sdm/internal/clock.h"
 
 #include <time.h>
 

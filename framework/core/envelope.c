@@ -1,11 +1,12 @@
 /* Lower envelopes of parabolas on a line. */
-#include "sdm/envelope.h"
+#include "sdm/internal/envelope.h"
 
 #include <math.h>
 
 void sdm_lower_envelope(double *f, int64_t n, double spacing, double *scratch)
 {
-    // parabola m of the envelope: its lowest place, its height there, and where it begins to be the lowest
+    // parabola m of the envelope: its lowest place, its height there, and where it begins to be the
+    // lowest
     double *site = scratch, *from = site + n, *height = from + n;
     const double square = spacing * spacing;
     int64_t m = 0;

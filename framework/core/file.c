@@ -1,5 +1,5 @@
 /* Whole-file reading and atomic writing. */
-#include "sdm/file.h"
+#include "sdm/internal/file.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -13,11 +13,13 @@
 
 #include "sdm/memory.h"
 
-sdm_status sdm_file_read(const char *path, uint64_t max_bytes, uint8_t **data, size_t *size, sdm_error *err)
+sdm_status sdm_file_read(const char *path, uint64_t max_bytes, uint8_t **data, size_t *size,
+                         sdm_error *err)
 {
     *data = NULL;
     *size = 0;
-    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); // a FIFO would wait for its writer
+    const int fd =
+        open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); // a FIFO would wait for its writer
     if (fd < 0) return sdm_fail(err, SDM_E_IO, "%s: cannot open: %s", path, strerror(errno));
     sdm_status s = SDM_OK;
     uint8_t *block = NULL;
@@ -32,7 +34,8 @@ sdm_status sdm_file_read(const char *path, uint64_t max_bytes, uint8_t **data, s
         goto done;
     }
     if ((uint64_t)st.st_size > max_bytes) {
-        s = sdm_fail(err, SDM_E_FORMAT, "%s: %llu bytes, more than the %llu allowed for a file of this kind", path,
+        s = sdm_fail(err, SDM_E_FORMAT,
+                     "%s: %llu bytes, more than the %llu allowed for a file of this kind", path,
                      (unsigned long long)st.st_size, (unsigned long long)max_bytes);
         goto done;
     }
@@ -86,13 +89,15 @@ static char *with_suffix(const char *path, const char *suffix)
     return out;
 }
 
-/* Opens a file of its own beside `path`: no other writer of that name, here or elsewhere, has it. */
+/* Opens a file of its own beside `path`: no other writer of that name, here or elsewhere, has it.
+ */
 static int open_temp(const char *path, char **temp)
 {
     static atomic_ulong counter;
     for (;;) {
         char suffix[64];
-        snprintf(suffix, sizeof suffix, ".%ld.%lu.tmp", (long)getpid(), atomic_fetch_add(&counter, 1));
+        snprintf(suffix, sizeof suffix, ".%ld.%lu.tmp", (long)getpid(),
+                 atomic_fetch_add(&counter, 1));
         *temp = with_suffix(path, suffix);
         if (!*temp) errno = ENOMEM;
         const int fd = *temp ? open(*temp, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666) : -1;
@@ -121,7 +126,8 @@ sdm_status sdm_outfile_open(const char *path, sdm_outfile **out, sdm_error *err)
     if (!stat(path, &st) && !S_ISREG(st.st_mode)) {
         sdm_outfile_discard(&f);
         return sdm_fail(err, SDM_E_IO, "%s: cannot write: it is a %s", path,
-                        S_ISDIR(st.st_mode) ? "folder" : "device, pipe or socket, which a file would replace");
+                        S_ISDIR(st.st_mode) ? "folder"
+                                            : "device, pipe or socket, which a file would replace");
     }
     f->fd = open_temp(path, &f->temp);
     if (f->fd < 0) {
@@ -140,7 +146,8 @@ static sdm_status flush(sdm_outfile *f, sdm_error *err)
     for (size_t at = 0; at < f->filled;) {
         const ssize_t put = write(f->fd, f->buffer + at, f->filled - at);
         if (put < 0 && errno == EINTR) continue;
-        if (put < 0) return sdm_fail(err, SDM_E_IO, "%s: cannot write: %s", f->path, strerror(errno));
+        if (put < 0)
+            return sdm_fail(err, SDM_E_IO, "%s: cannot write: %s", f->path, strerror(errno));
         at += (size_t)put;
     }
     f->filled = 0;
@@ -201,7 +208,8 @@ sdm_status sdm_outfile_commit(sdm_outfile **pf, sdm_error *err)
     // a library may have replaced the temporary file by name: sync what has that name now
     if (!s) {
         const int fd = open(f->temp, O_RDWR | O_CLOEXEC);
-        if (fd < 0 || fsync(fd)) s = sdm_fail(err, SDM_E_IO, "%s: cannot bring to disk: %s", f->path, strerror(errno));
+        if (fd < 0 || fsync(fd))
+            s = sdm_fail(err, SDM_E_IO, "%s: cannot bring to disk: %s", f->path, strerror(errno));
         if (fd >= 0) close(fd);
     }
     const int closed = close(f->fd);

@@ -19,32 +19,41 @@ sdm_status sdm_grid_check(const sdm_grid *g, sdm_error *err)
     static const char axis[] = "xyz";
     for (int a = 0; a < 3; a++) {
         if (g->n[a] < 1 || g->n[a] > 1 << 20)
-            return sdm_fail(err, SDM_E_ARG, "grid size along %c is %lld, need 1 to 1048576", axis[a],
-                            (long long)g->n[a]);
+            return sdm_fail(err, SDM_E_ARG, "grid size along %c is %lld, need 1 to 1048576",
+                            axis[a], (long long)g->n[a]);
         if (!(g->spacing[a] >= 1e-100) || !(g->spacing[a] <= 1e100)) // squares must be numbers too
-            return sdm_fail(err, SDM_E_ARG, "grid spacing along %c is %g mm, need a positive number (1e-100 to 1e100)",
-                            axis[a], g->spacing[a]);
+            return sdm_fail(
+                err, SDM_E_ARG,
+                "grid spacing along %c is %g mm, need a positive number (1e-100 to 1e100)", axis[a],
+                g->spacing[a]);
         if (!(fabs(g->origin[a]) <= 1e100))
-            return sdm_fail(err, SDM_E_ARG, "grid origin along %c is %g mm, need a finite number up to 1e100", axis[a],
-                            g->origin[a]);
+            return sdm_fail(err, SDM_E_ARG,
+                            "grid origin along %c is %g mm, need a finite number up to 1e100",
+                            axis[a], g->origin[a]);
     }
     // 2^60 floats cannot be addressed: three factors of at most 2^20 do not overflow int64
     if ((uint64_t)(g->n[0] * g->n[1] * g->n[2]) > SIZE_MAX / sizeof(double) / 4)
-        return sdm_fail(err, SDM_E_ARG, "grid of %lld x %lld x %lld voxels is more than memory can hold",
+        return sdm_fail(err, SDM_E_ARG,
+                        "grid of %lld x %lld x %lld voxels is more than memory can hold",
                         (long long)g->n[0], (long long)g->n[1], (long long)g->n[2]);
     for (int a = 0; a < 3; a++) {
         for (int b = 0; b < 3; b++) {
             double dot = 0;
             for (int k = 0; k < 3; k++) dot += g->dir[3 * k + a] * g->dir[3 * k + b];
             if (!(fabs(dot - (a == b)) <= 1e-6))
-                return sdm_fail(err, SDM_E_ARG,
-                                "grid direction is not orthonormal: columns %d and %d have the product %g", a, b, dot);
+                return sdm_fail(
+                    err, SDM_E_ARG,
+                    "grid direction is not orthonormal: columns %d and %d have the product %g", a,
+                    b, dot);
         }
     }
     return SDM_OK;
 }
 
-size_t sdm_grid_count(const sdm_grid *g) { return (size_t)g->n[0] * (size_t)g->n[1] * (size_t)g->n[2]; }
+size_t sdm_grid_count(const sdm_grid *g)
+{
+    return (size_t)g->n[0] * (size_t)g->n[1] * (size_t)g->n[2];
+}
 
 void sdm_grid_world(const sdm_grid *g, const double index[3], double world[3])
 {

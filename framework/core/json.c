@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "sdm/text.h"
+#include "sdm/internal/text.h"
 
 static void quoted(sdm_text *t, const char *s)
 {

@@ -2,7 +2,7 @@
 #ifdef __linux__
 #define _DEFAULT_SOURCE // madvise
 #endif
-#include "sdm/memory.h"
+#include "sdm/internal/heap.h"
 
 #include <stdatomic.h>
 #include <stdbool.h>
@@ -21,7 +21,8 @@ void sdm_alloc_fail_after(unsigned long n) { atomic_store(&fail_after, n); }
 
 static bool must_fail(void)
 {
-    return atomic_load_explicit(&fail_after, memory_order_relaxed) && atomic_fetch_sub(&fail_after, 1) == 1;
+    return atomic_load_explicit(&fail_after, memory_order_relaxed) &&
+           atomic_fetch_sub(&fail_after, 1) == 1;
 }
 
 sdm_status sdm_mul(size_t a, size_t b, size_t *out, sdm_error *err)
@@ -33,12 +34,14 @@ sdm_status sdm_mul(size_t a, size_t b, size_t *out, sdm_error *err)
 }
 
 /* *used: bytes of the block, which may be larger than asked for. */
-static sdm_status allocate(void **out, size_t count, size_t size, size_t *used, const char *what, sdm_error *err)
+static sdm_status allocate(void **out, size_t count, size_t size, size_t *used, const char *what,
+                           sdm_error *err)
 {
     *out = NULL;
     size_t bytes = 0;
     if (sdm_mul(count, size, &bytes, NULL) || bytes > SIZE_MAX - ALIGNMENT)
-        return sdm_fail(err, SDM_E_NOMEM, "%s: %zu elements of %zu bytes are more than memory can hold", what, count,
+        return sdm_fail(err, SDM_E_NOMEM,
+                        "%s: %zu elements of %zu bytes are more than memory can hold", what, count,
                         size);
     bytes = (bytes + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
     if (!bytes) bytes = ALIGNMENT;
@@ -70,7 +73,8 @@ sdm_status sdm_alloc_unset(void **out, size_t count, size_t size, const char *wh
     return allocate(out, count, size, &used, what, err);
 }
 
-sdm_status sdm_grow(void **block, size_t old_count, size_t new_count, size_t size, const char *what, sdm_error *err)
+sdm_status sdm_grow(void **block, size_t old_count, size_t new_count, size_t size, const char *what,
+                    sdm_error *err)
 {
     void *bigger;
     const sdm_status s = sdm_alloc(&bigger, new_count, size, what, err);

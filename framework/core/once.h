@@ -16,7 +16,10 @@ static inline void sdm_once_run(sdm_once *once, void (*work)(void))
 
 typedef pthread_once_t sdm_once;
 #define SDM_ONCE_INIT PTHREAD_ONCE_INIT
-static inline void sdm_once_run(sdm_once *once, void (*work)(void)) { (void)pthread_once(once, work); }
+static inline void sdm_once_run(sdm_once *once, void (*work)(void))
+{
+    (void)pthread_once(once, work);
+}
 #endif
 
 #endif

@@ -1,5 +1,6 @@
 /* Rigid poses: rotation vectors, matrices and quaternions. */
 #include "sdm/pose.h"
+#include "sdm/internal/rotation.h"
 
 #include <math.h>
 
@@ -9,7 +10,8 @@ static double sinc(double x) { return x == 0 ? 1 : sin(x) / x; }
 
 static void cross(const double a[3], const double b[3], double out[3])
 {
-    for (int i = 0; i < 3; i++) out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
+    for (int i = 0; i < 3; i++)
+        out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
 
 // m = I + a [r]x + b [r]x^2
@@ -30,10 +32,12 @@ sdm_status sdm_pose_check(const sdm_pose *pose, sdm_error *err)
     if (!pose) return sdm_fail(err, SDM_E_ARG, "a pose is needed");
     for (int i = 0; i < 3; i++) {
         if (!(fabs(pose->translation[i]) <= 1e100))
-            return sdm_fail(err, SDM_E_ARG, "translation along %c is %g mm, need a finite number up to 1e100", axis[i],
-                            pose->translation[i]);
+            return sdm_fail(err, SDM_E_ARG,
+                            "translation along %c is %g mm, need a finite number up to 1e100",
+                            axis[i], pose->translation[i]);
         if (!(fabs(pose->rotation[i]) <= 1000))
-            return sdm_fail(err, SDM_E_ARG, "rotation vector along %c is %g rad, need a finite number up to 1000",
+            return sdm_fail(err, SDM_E_ARG,
+                            "rotation vector along %c is %g rad, need a finite number up to 1000",
                             axis[i], pose->rotation[i]);
     }
     return SDM_OK;
@@ -52,7 +56,8 @@ void sdm_pose_apply(const sdm_pose *pose, const double x[3], double world[3])
     double r[9];
     sdm_pose_matrix(pose, r);
     for (int i = 0; i < 3; i++)
-        world[i] = r[3 * i] * v[0] + r[3 * i + 1] * v[1] + r[3 * i + 2] * v[2] + pose->translation[i];
+        world[i] =
+            r[3 * i] * v[0] + r[3 * i + 1] * v[1] + r[3 * i + 2] * v[2] + pose->translation[i];
 }
 
 void sdm_pose_apply_inverse(const sdm_pose *pose, const double world[3], double x[3])

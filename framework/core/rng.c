@@ -1,11 +1,12 @@
 /* Philox4x32-10 (Salmon et al. 2011) and the laws drawn from it. */
-#include "sdm/rng.h"
+#include "sdm/internal/rng.h"
 
 #include <math.h>
 
 void sdm_rng_block(uint64_t seed, uint64_t stream, uint64_t index, uint32_t out[4])
 {
-    uint32_t c[4] = {(uint32_t)index, (uint32_t)(index >> 32), (uint32_t)stream, (uint32_t)(stream >> 32)};
+    uint32_t c[4] = {(uint32_t)index, (uint32_t)(index >> 32), (uint32_t)stream,
+                     (uint32_t)(stream >> 32)};
     uint32_t k0 = (uint32_t)seed, k1 = (uint32_t)(seed >> 32);
     for (int round = 0; round < 10; round++) {
         const uint64_t a = (uint64_t)0xD2511F53u * c[0], b = (uint64_t)0xCD9E8D57u * c[2];
@@ -16,7 +17,10 @@ void sdm_rng_block(uint64_t seed, uint64_t stream, uint64_t index, uint32_t out[
     for (int i = 0; i < 4; i++) out[i] = c[i];
 }
 
-static double unit(uint32_t high, uint32_t low) { return (double)(((uint64_t)high << 32 | low) >> 11) * 0x1p-53; }
+static double unit(uint32_t high, uint32_t low)
+{
+    return (double)(((uint64_t)high << 32 | low) >> 11) * 0x1p-53;
+}
 
 double sdm_rng_uniform(uint64_t seed, uint64_t stream, uint64_t index)
 {

@@ -1,5 +1,5 @@
 /* Growing text, numbers without the locale, nearest names. */
-#include "sdm/text.h"
+#include "sdm/internal/text.h"
 
 #include <locale.h>
 #include <math.h>
@@ -38,7 +38,8 @@ void sdm_text_add(sdm_text *t, const char *fmt, ...)
     va_end(again);
 }
 
-// strtod follows the locale of the process; a private "C" locale would need newlocale, so the decimal point is put in by hand
+// strtod follows the locale of the process; a private "C" locale would need newlocale, so the
+// decimal point is put in by hand
 bool sdm_parse_real(const char *s, double *out)
 {
     char buf[512];
@@ -101,7 +102,8 @@ static int distance(const char *a, const char *b)
         const int *last = row[(i - 1) % 3], *before = row[(i + 1) % 3];
         now[0] = i;
         for (int j = 1; j <= m; j++) {
-            now[j] = smaller(smaller(last[j] + 1, now[j - 1] + 1), last[j - 1] + (a[i - 1] != b[j - 1]));
+            now[j] =
+                smaller(smaller(last[j] + 1, now[j - 1] + 1), last[j - 1] + (a[i - 1] != b[j - 1]));
             if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
                 now[j] = smaller(now[j], before[j - 2] + 1);
         }

@@ -1,5 +1,5 @@
 /* Numbers of threads. */
-#include "sdm/threads.h"
+#include "sdm/internal/threads.h"
 
 #ifdef _OPENMP
 #include <omp.h>

@@ -4,16 +4,16 @@
 #include <float.h>
 #include <string.h>
 
-#include "grid_distance.h"
-#include "layers.h"
-#include "parts.h"
-#include "sdm/clock.h"
+#include "layers/layers.h"
+#include "map/grid_distance.h"
+#include "sdm/internal/clock.h"
+#include "sdm/internal/threads.h"
+#include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
-#include "sdm/threads.h"
-#include "sign.h"
-#include "survey.h"
-#include "union_hull.h"
-#include "vec3.h"
+#include "sign/sign.h"
+#include "solid/parts.h"
+#include "solid/survey.h"
+#include "solid/union_hull.h"
 
 struct sdm_exact {
     sdm_exact_opts opts;
@@ -35,14 +35,18 @@ const char *sdm_sign_method_name(sdm_sign_method m)
     return (unsigned)m < sizeof names / sizeof *names ? names[m] : "unknown";
 }
 
-static size_t mesh_bytes(const sdm_mesh *m) { return m->n_vert * 3 * sizeof *m->vert + m->n_tri * 3 * sizeof *m->tri; }
+static size_t mesh_bytes(const sdm_mesh *m)
+{
+    return m->n_vert * 3 * sizeof *m->vert + m->n_tri * 3 * sizeof *m->tri;
+}
 
 /* The options with what the memory limit leaves beside the engine and `more` bytes. */
 static sdm_exact_opts opts_beside(const sdm_exact *e, size_t more)
 {
     sdm_exact_opts o = e->opts;
     const size_t taken = more < SIZE_MAX - e->held ? e->held + more : SIZE_MAX;
-    if (o.memory_limit) o.memory_limit = taken < o.memory_limit ? o.memory_limit - taken : 1; // 0 would be none
+    if (o.memory_limit)
+        o.memory_limit = taken < o.memory_limit ? o.memory_limit - taken : 1; // 0 would be none
     return o;
 }
 
@@ -86,8 +90,9 @@ static sdm_status make_surface(sdm_exact *e, sdm_budget *budget, sdm_error *err)
     const size_t used = budget->used;
     bool changed = false;
     if (e->survey.audit.closed && !e->opts.keep_overlap) {
-        const sdm_status s = sdm_union_hull(&e->solid, &e->survey, &e->arena, &e->surface, &e->source, &changed,
-                                            &e->report.union_error_mm, budget, err);
+        const sdm_status s =
+            sdm_union_hull(&e->solid, &e->survey, &e->arena, &e->surface, &e->source, &changed,
+                           &e->report.union_error_mm, budget, err);
         if (s) return s;
         // sheets that cancel everywhere enclose nothing: distances are to the sheets
         if (changed && !e->surface.n_tri) changed = false;
@@ -99,7 +104,8 @@ static sdm_status make_surface(sdm_exact *e, sdm_budget *budget, sdm_error *err)
     e->source = NULL;
     sdm_mesh_dispose(&e->surface);
     budget->used = used;
-    sdm_status s = sdm_budget_take(budget, mesh_bytes(&e->solid) + e->solid.n_tri * sizeof *e->source, err);
+    sdm_status s =
+        sdm_budget_take(budget, mesh_bytes(&e->solid) + e->solid.n_tri * sizeof *e->source, err);
     if (!s) s = SDM_ALLOC(&e->source, e->solid.n_tri, "sources of triangles", err);
     for (size_t t = 0; t < e->solid.n_tri && !s; t++) e->source[t] = (uint32_t)t;
     return s ? s : sdm_mesh_copy(&e->solid, &e->surface, err);
@@ -112,7 +118,8 @@ static sdm_status build_nearest(sdm_exact *e, sdm_budget *budget, sdm_error *err
     const bool keep_topology = !e->report.unioned || e->report.sign != SDM_SIGN_CROSSINGS;
     sdm_survey_shrink(&e->survey, &e->arena, keep_topology);
     budget->used = 0;
-    size_t scratch = 0, bytes = mesh_bytes(&e->solid) + mesh_room(m) + m->cap_tri * sizeof *e->source;
+    size_t scratch = 0,
+           bytes = mesh_bytes(&e->solid) + mesh_room(m) + m->cap_tri * sizeof *e->source;
     bytes += e->survey.tree.n_node * sizeof(sdm_bvh_node) + e->solid.n_tri * sizeof(uint32_t);
     if (keep_topology) bytes += sdm_topology_bytes(&e->solid, &(size_t){0});
     if (e->report.unioned) bytes += sdm_topology_bytes(m, &scratch);
@@ -132,7 +139,8 @@ static sdm_status build_nearest(sdm_exact *e, sdm_budget *budget, sdm_error *err
     return s;
 }
 
-/* What a closed mesh takes with a few contacts. Guessed too low, arrays are allocated one by one. */
+/* What a closed mesh takes with a few contacts. Guessed too low, arrays are allocated one by one.
+ */
 static size_t usual_bytes(const sdm_mesh *m) { return 1080 * m->n_tri + 220 * m->n_vert; }
 
 static sdm_status prepare(sdm_exact *e, const sdm_mesh *mesh, sdm_error *err)
@@ -145,15 +153,16 @@ static sdm_status prepare(sdm_exact *e, const sdm_mesh *mesh, sdm_error *err)
     if (!s) s = sdm_sign_choose(&e->report.audit, e->opts.sign, &e->report.sign, err);
     if (!s) s = make_surface(e, &budget, err);
     if (!s && e->report.sign == SDM_SIGN_PSEUDONORMAL && e->report.unioned)
-        s = sdm_fail(
-            err, SDM_E_ARG,
-            "sign method pseudonormal needs a mesh without surface inside the solid, this one has some; use auto");
+        s = sdm_fail(err, SDM_E_ARG,
+                     "sign method pseudonormal needs a mesh without surface inside the solid, this "
+                     "one has some; use auto");
     if (!s) s = build_nearest(e, &budget, err);
     if (!s) s = sdm_sign_build(&e->solid, &e->survey, &e->nearest, e->report.sign, &e->sign, err);
     if (s) return s;
     if (budget.limit) {
-        e->held = mesh_bytes(&e->solid) + mesh_room(&e->surface) + e->surface.cap_tri * sizeof *e->source +
-                  sdm_arena_extra_bytes(&e->arena) + sdm_sign_bytes(&e->sign);
+        e->held = mesh_bytes(&e->solid) + mesh_room(&e->surface) +
+                  e->surface.cap_tri * sizeof *e->source + sdm_arena_extra_bytes(&e->arena) +
+                  sdm_sign_bytes(&e->sign);
         budget.used = 0;
         s = sdm_budget_take(&budget, e->held, err);
         if (s) return s;
@@ -166,9 +175,11 @@ static sdm_status prepare(sdm_exact *e, const sdm_mesh *mesh, sdm_error *err)
     return SDM_OK;
 }
 
-sdm_status sdm_exact_create(const sdm_mesh *mesh, const sdm_exact_opts *opts, sdm_exact **out, sdm_error *err)
+sdm_status sdm_exact_create(const sdm_mesh *mesh, const sdm_exact_opts *opts, sdm_exact **out,
+                            sdm_error *err)
 {
-    if (!mesh || !out) return sdm_fail(err, SDM_E_ARG, "exact engine without a mesh or a place for the result");
+    if (!mesh || !out)
+        return sdm_fail(err, SDM_E_ARG, "exact engine without a mesh or a place for the result");
     *out = NULL;
     const double start = sdm_clock();
     sdm_exact *e;
@@ -201,9 +212,13 @@ const sdm_mesh *sdm_exact_surface(const sdm_exact *e) { return &e->surface; }
 const uint32_t *sdm_exact_source(const sdm_exact *e) { return e->source; }
 
 /* Squares of the coordinates must be numbers, too. */
-static bool is_point(const double x[3]) { return fabs(x[0]) <= 1e150 && fabs(x[1]) <= 1e150 && fabs(x[2]) <= 1e150; }
+static bool is_point(const double x[3])
+{
+    return fabs(x[0]) <= 1e150 && fabs(x[1]) <= 1e150 && fabs(x[2]) <= 1e150;
+}
 
-double sdm_exact_point(const sdm_exact *e, const double x[3], double closest[3], double normal[3], uint32_t *triangle)
+double sdm_exact_point(const sdm_exact *e, const double x[3], double closest[3], double normal[3],
+                       uint32_t *triangle)
 {
     uint32_t slot = 0;
     int feature = SDM_FACE;
@@ -233,9 +248,10 @@ double sdm_exact_distance(const sdm_exact *e, const double x[3])
     return sqrt(sdm_nearest_feature(&e->nearest, x, &slot));
 }
 
-/* The map, and the slot of the nearest triangle of every voxel where slot is not NULL; `more` bytes are taken beside. */
-static sdm_status fill_map(const sdm_exact *e, const sdm_grid *grid, double band_mm, size_t more, float *values,
-                           uint32_t *slot, sdm_error *err)
+/* The map, and the slot of the nearest triangle of every voxel where slot is not NULL; `more` bytes
+ * are taken beside. */
+static sdm_status fill_map(const sdm_exact *e, const sdm_grid *grid, double band_mm, size_t more,
+                           float *values, uint32_t *slot, sdm_error *err)
 {
     const sdm_exact_opts opts = opts_beside(e, more);
     sdm_status s = sdm_grid_check(grid, err);
@@ -252,17 +268,19 @@ sdm_status sdm_exact_map(const sdm_exact *e, const sdm_grid *grid, float *values
 
 sdm_status sdm_exact_sign(const sdm_exact *e, const sdm_grid *grid, float *values, sdm_error *err)
 {
-    if (!e || !grid || !values) return sdm_fail(err, SDM_E_ARG, "signs without an engine, a grid or distances");
+    if (!e || !grid || !values)
+        return sdm_fail(err, SDM_E_ARG, "signs without an engine, a grid or distances");
     const sdm_exact_opts opts = opts_beside(e, 0);
     const sdm_status s = sdm_grid_check(grid, err);
     return s ? s : sdm_sign_map(&e->sign, grid, &opts, values, err);
 }
 
-sdm_status sdm_exact_certify(const sdm_exact *e, const sdm_grid *grid, const float *values, sdm_sign_certificate *out,
-                             sdm_error *err)
+sdm_status sdm_exact_certify(const sdm_exact *e, const sdm_grid *grid, const float *values,
+                             sdm_sign_certificate *out, sdm_error *err)
 {
     if (!e || !grid || !values || !out)
-        return sdm_fail(err, SDM_E_ARG, "certificate without an engine, a grid, a map or a place for the result");
+        return sdm_fail(err, SDM_E_ARG,
+                        "certificate without an engine, a grid, a map or a place for the result");
     const sdm_status s = sdm_grid_check(grid, err);
     if (s) return s;
     double largest = 0;
@@ -274,31 +292,39 @@ sdm_status sdm_exact_certify(const sdm_exact *e, const sdm_grid *grid, const flo
     }
     // roundings of the mesh's coordinates and of the voxels'
     const sdm_exact_opts opts = opts_beside(e, 0);
-    return sdm_sign_certify(&e->sign, grid, &opts, 4 * e->rounding + 16 * DBL_EPSILON * largest, values, out, err);
+    return sdm_sign_certify(&e->sign, grid, &opts, 4 * e->rounding + 16 * DBL_EPSILON * largest,
+                            values, out, err);
 }
 
-/* Layers and derivatives: the job says which. Values that nobody wants are needed all the same, for the signs. */
-static sdm_status map_with_layers(const sdm_exact *e, const sdm_grid *grid, sdm_layers_job *job, sdm_error *err)
+/* Layers and derivatives: the job says which. Values that nobody wants are needed all the same, for
+ * the signs. */
+static sdm_status map_with_layers(const sdm_exact *e, const sdm_grid *grid, sdm_layers_job *job,
+                                  sdm_error *err)
 {
     sdm_status s = sdm_grid_check(grid, err);
     if (s) return s;
     const double band = job->out->band_mm;
     if (!(band >= 0))
-        return sdm_fail(err, SDM_E_ARG, "narrow band of %g mm, need a positive width or 0 for the whole map", band);
+        return sdm_fail(err, SDM_E_ARG,
+                        "narrow band of %g mm, need a positive width or 0 for the whole map", band);
     const bool layers = sdm_layers_wanted(job);
-    const size_t n_value = job->out->values ? 0 : sdm_grid_count(grid), limit = opts_beside(e, 0).memory_limit;
-    const size_t n_slot = layers ? sdm_grid_count(grid) : 0, n_frame = job->derivative ? e->solid.n_tri : 0;
+    const size_t n_value = job->out->values ? 0 : sdm_grid_count(grid),
+                 limit = opts_beside(e, 0).memory_limit;
+    const size_t n_slot = layers ? sdm_grid_count(grid) : 0,
+                 n_frame = job->derivative ? e->solid.n_tri : 0;
     float *own = NULL;
     uint32_t *slot = NULL;
     sdm_frame *frames = NULL;
     const size_t need = n_value * sizeof *own + n_slot * sizeof *slot + n_frame * sizeof *frames;
     if (limit && need > limit)
-        return sdm_fail(err, SDM_E_NOMEM, "layers of the map need %zu bytes, memory_limit leaves %zu", need, limit);
+        return sdm_fail(err, SDM_E_NOMEM,
+                        "layers of the map need %zu bytes, memory_limit leaves %zu", need, limit);
     s = SDM_ALLOC(&own, n_value, "distance map", err);
     if (!s) s = SDM_ALLOC(&slot, n_slot, "nearest triangles", err);
     if (!s) s = SDM_ALLOC(&frames, n_frame, "frames of triangles", err);
     float *values = n_value ? own : job->out->values;
-    if (!s) s = fill_map(e, grid, band > 0 ? band : INFINITY, need, values, layers ? slot : NULL, err);
+    if (!s)
+        s = fill_map(e, grid, band > 0 ? band : INFINITY, need, values, layers ? slot : NULL, err);
     if (!s && n_frame) sdm_sheets_frames(&e->solid, sdm_threads(e->opts.n_threads), frames);
     const double seam = e->report.unioned ? 2 * e->report.union_error_mm : 0;
     job->sheets = (sdm_sheets){&e->nearest, &e->solid, frames, e->source, seam};
@@ -313,18 +339,23 @@ static sdm_status map_with_layers(const sdm_exact *e, const sdm_grid *grid, sdm_
     return s;
 }
 
-sdm_status sdm_exact_map_layers(const sdm_exact *e, const sdm_grid *grid, const sdm_exact_layers *layers,
-                                sdm_error *err)
+sdm_status sdm_exact_map_layers(const sdm_exact *e, const sdm_grid *grid,
+                                const sdm_exact_layers *layers, sdm_error *err)
 {
-    if (!e || !grid || !layers) return sdm_fail(err, SDM_E_ARG, "map without an engine, a grid or layers to fill");
+    if (!e || !grid || !layers)
+        return sdm_fail(err, SDM_E_ARG, "map without an engine, a grid or layers to fill");
     return map_with_layers(e, grid, &(sdm_layers_job){.out = layers}, err);
 }
 
-sdm_status sdm_exact_map_derivative(const sdm_exact *e, const sdm_grid *grid, const double *velocity, size_t n,
-                                    const sdm_exact_layers *layers, float *derivative, sdm_error *err)
+sdm_status sdm_exact_map_derivative(const sdm_exact *e, const sdm_grid *grid,
+                                    const double *velocity, size_t n,
+                                    const sdm_exact_layers *layers, float *derivative,
+                                    sdm_error *err)
 {
     if (!e || !grid || !velocity || !n || !derivative)
-        return sdm_fail(err, SDM_E_ARG, "derivative without an engine, a grid, velocities or a place for the result");
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "derivative without an engine, a grid, velocities or a place for the result");
     sdm_layers_job job = {.out = layers ? layers : &(sdm_exact_layers){0},
                           .velocity = velocity,
                           .n_velocity = n,

@@ -7,7 +7,7 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "sdm/file.h"
+#include "sdm/internal/file.h"
 
 static inline uint64_t sdm_get_uint(const uint8_t *p, size_t size, bool big)
 {

@@ -3,11 +3,17 @@
 
 #include <string.h>
 
-#include "sdm/text.h"
+#include "sdm/internal/text.h"
 
-static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\f' || c == '\v' || c == '\0'; }
+static bool is_blank(char c)
+{
+    return c == ' ' || c == '\t' || c == '\r' || c == '\f' || c == '\v' || c == '\0';
+}
 
-size_t sdm_scan_mark(const char *text, size_t size) { return size >= 3 && !memcmp(text, "\xEF\xBB\xBF", 3) ? 3 : 0; }
+size_t sdm_scan_mark(const char *text, size_t size)
+{
+    return size >= 3 && !memcmp(text, "\xEF\xBB\xBF", 3) ? 3 : 0;
+}
 
 /* Cuts one line off the text; false at its end. */
 static bool cut_line(sdm_scan *s, char **line)
@@ -67,22 +73,26 @@ sdm_status sdm_scan_reals(const sdm_scan *s, char **line, double *out, int n, sd
     for (int i = 0; i < n; i++) {
         const char *word = sdm_scan_word(line);
         if (!word)
-            return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: %d number%s on the line, need %d", s->path, s->line, i,
-                            i == 1 ? "" : "s", n);
+            return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: %d number%s on the line, need %d", s->path,
+                            s->line, i, i == 1 ? "" : "s", n);
         if (!sdm_parse_real(word, &out[i]))
-            return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: '%.40s' is not a finite number", s->path, s->line, word);
+            return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: '%.40s' is not a finite number", s->path,
+                            s->line, word);
     }
     return SDM_OK;
 }
 
-sdm_status sdm_scan_count(const sdm_scan *s, char **line, int64_t limit, const char *what, int64_t *out, sdm_error *err)
+sdm_status sdm_scan_count(const sdm_scan *s, char **line, int64_t limit, const char *what,
+                          int64_t *out, sdm_error *err)
 {
     const char *word = sdm_scan_word(line);
-    if (!word) return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: the %s is missing", s->path, s->line, what);
+    if (!word)
+        return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: the %s is missing", s->path, s->line, what);
     if (!sdm_parse_int(word, out))
-        return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: '%.40s' is not a whole number (%s)", s->path, s->line, word, what);
+        return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: '%.40s' is not a whole number (%s)", s->path,
+                        s->line, word, what);
     if (*out < 0 || *out >= limit)
-        return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: %s %lld is outside 0 .. %lld", s->path, s->line, what,
-                        (long long)*out, (long long)limit - 1);
+        return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: %s %lld is outside 0 .. %lld", s->path, s->line,
+                        what, (long long)*out, (long long)limit - 1);
     return SDM_OK;
 }

@@ -2,8 +2,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "sdm/file.h"
 #include "sdm/image.h"
+#include "sdm/internal/file.h"
 #include "sdm/memory.h"
 #include "sdm/meshfile.h"
 #include "shape_internal.h"
@@ -52,13 +52,15 @@ static int fail(const sdm_host *host, const char *text)
     return (int)sdm_fail(&call_of(host)->err, SDM_E_PLUGIN, "%s", text ? text : "no reason given");
 }
 
-// the files of a shape are read once, in create(): a mesh must not depend on what a file holds at that moment
+// the files of a shape are read once, in create(): a mesh must not depend on what a file holds at
+// that moment
 static int refuse_file(host_call *c, const char *path)
 {
     return (int)sdm_fail(&c->err, SDM_E_PLUGIN, "%s: files are read in create() alone", path);
 }
 
-static int read_file(const sdm_host *host, const char *path, const unsigned char **data, size_t *size)
+static int read_file(const sdm_host *host, const char *path, const unsigned char **data,
+                     size_t *size)
 {
     host_call *c = call_of(host);
     if (!c->files) return refuse_file(c, path);
@@ -81,7 +83,8 @@ static int read_mesh(const sdm_host *host, const char *path, sdm_mesh_out *out)
     return s ? (int)s : give(&b->mesh, out);
 }
 
-static int read_npy(const sdm_host *host, const char *path, const double **values, size_t shape[4], int *n_dim)
+static int read_npy(const sdm_host *host, const char *path, const double **values, size_t shape[4],
+                    int *n_dim)
 {
     host_call *c = call_of(host);
     if (!c->files) return refuse_file(c, path);
@@ -123,8 +126,8 @@ void sdm_host_call_end(host_call *c)
     }
 }
 
-sdm_status sdm_host_call_failed(const host_call *c, const char *callback, int returned, sdm_status otherwise,
-                                sdm_error *err)
+sdm_status sdm_host_call_failed(const host_call *c, const char *callback, int returned,
+                                sdm_status otherwise, sdm_error *err)
 {
     if (c->err.status == SDM_OK)
         return sdm_fail(err, otherwise, "%s() returned %d without a reason", callback, returned);

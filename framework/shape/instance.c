@@ -3,8 +3,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "sdm/internal/text.h"
 #include "sdm/memory.h"
-#include "sdm/text.h"
 #include "shape_internal.h"
 
 static sdm_status run_create(sdm_instance *s, sdm_error *err)
@@ -17,8 +17,8 @@ static sdm_status run_create(sdm_instance *s, sdm_error *err)
     if (failed) {
         s->self = NULL;
         sdm_host_call_failed(&call, "create", failed, SDM_E_PLUGIN, err);
-        status =
-            sdm_fail_in(err, call.err.status == SDM_E_NOMEM ? SDM_E_NOMEM : SDM_E_PLUGIN, "shape '%s'", s->shape->name);
+        status = sdm_fail_in(err, call.err.status == SDM_E_NOMEM ? SDM_E_NOMEM : SDM_E_PLUGIN,
+                             "shape '%s'", s->shape->name);
     }
     sdm_host_call_end(&call);
     return status;
@@ -34,15 +34,16 @@ static sdm_status run_describe(sdm_instance *s, sdm_error *err)
     s->shape->describe(s->self, &params, &n);
     char who[96];
     snprintf(who, sizeof who, "shape '%s', describe()", s->shape->name);
-    const sdm_status status =
-        n ? sdm_shape_check_params(who, params, n, err) : sdm_fail(err, SDM_E_PLUGIN, "%s: no parameters", who);
+    const sdm_status status = n ? sdm_shape_check_params(who, params, n, err)
+                                : sdm_fail(err, SDM_E_PLUGIN, "%s: no parameters", who);
     s->params = params;
     s->n_params = n;
     return status;
 }
 
-sdm_status sdm_instance_create(const sdm_shape *shape, const sdm_named_text *options, size_t n_options,
-                               const char *base_dir, sdm_instance **out, sdm_error *err)
+sdm_status sdm_instance_create(const sdm_shape *shape, const sdm_named_text *options,
+                               size_t n_options, const char *base_dir, sdm_instance **out,
+                               sdm_error *err)
 {
     if (!out) return sdm_fail(err, SDM_E_ARG, "no place for the instance");
     *out = NULL;
@@ -53,7 +54,9 @@ sdm_status sdm_instance_create(const sdm_shape *shape, const sdm_named_text *opt
     if (status) return status;
     s->shape = shape;
     status = SDM_ALLOC(&s->options, shape->n_options, "option values", err);
-    if (!status) status = sdm_shape_parse_options(shape, options, n_options, base_dir, s->options, &s->text, err);
+    if (!status)
+        status =
+            sdm_shape_parse_options(shape, options, n_options, base_dir, s->options, &s->text, err);
     if (!status) status = run_create(s, err);
     if (!status) status = run_describe(s, err);
     if (status)
@@ -96,20 +99,23 @@ sdm_status sdm_instance_check(const sdm_instance *s, const double *p, sdm_error 
         const sdm_param *q = &s->params[i];
         if (p[i] >= q->min && p[i] <= q->max) continue; // false for NaN
         char value[32], min[32], max[32];
-        return sdm_fail(err, SDM_E_RANGE, "parameter '%s' of shape '%s' is %s%s%s, need %s .. %s", q->name,
-                        s->shape->name, sdm_format_real(p[i], value), q->unit[0] ? " " : "", q->unit,
-                        sdm_format_real(q->min, min), sdm_format_real(q->max, max));
+        return sdm_fail(err, SDM_E_RANGE, "parameter '%s' of shape '%s' is %s%s%s, need %s .. %s",
+                        q->name, s->shape->name, sdm_format_real(p[i], value),
+                        q->unit[0] ? " " : "", q->unit, sdm_format_real(q->min, min),
+                        sdm_format_real(q->max, max));
     }
     return SDM_OK;
 }
 
-sdm_status sdm_instance_fail_at(const sdm_instance *s, const double *p, sdm_status status, sdm_error *err)
+sdm_status sdm_instance_fail_at(const sdm_instance *s, const double *p, sdm_status status,
+                                sdm_error *err)
 {
     char where[480];
     size_t n = (size_t)snprintf(where, sizeof where, "shape '%s' at", s->shape->name);
     for (size_t i = 0; i < s->n_params; i++) {
         char value[32], word[112];
-        const int length = snprintf(word, sizeof word, " %s=%s", s->params[i].name, sdm_format_real(p[i], value));
+        const int length =
+            snprintf(word, sizeof word, " %s=%s", s->params[i].name, sdm_format_real(p[i], value));
         if (n + (size_t)length + 5 > sizeof where) {
             memcpy(where + n, " ...", 5);
             break;
@@ -123,17 +129,21 @@ sdm_status sdm_instance_fail_at(const sdm_instance *s, const double *p, sdm_stat
 // what the plug-in wrote, against what it was given room for
 static sdm_status check_mesh(const sdm_mesh *m, const sdm_mesh_out *out, sdm_error *err)
 {
-    if (!out->vert || out->vert != m->vert || out->tri != m->tri || out->n_vert != m->n_vert || out->n_tri != m->n_tri)
-        return sdm_fail(err, SDM_E_PLUGIN,
-                        "mesh() must fill what reserve() gave, and leave sizes and pointers as they are");
+    if (!out->vert || out->vert != m->vert || out->tri != m->tri || out->n_vert != m->n_vert ||
+        out->n_tri != m->n_tri)
+        return sdm_fail(
+            err, SDM_E_PLUGIN,
+            "mesh() must fill what reserve() gave, and leave sizes and pointers as they are");
     if (m->n_tri == 0) return sdm_fail(err, SDM_E_PLUGIN, "the mesh has no triangle");
     for (size_t i = 0; i < 3 * m->n_tri; i++)
         if (m->tri[i] >= m->n_vert)
-            return sdm_fail(err, SDM_E_PLUGIN, "triangle %zu has vertex %lu, but there are %zu vertices", i / 3,
+            return sdm_fail(err, SDM_E_PLUGIN,
+                            "triangle %zu has vertex %lu, but there are %zu vertices", i / 3,
                             (unsigned long)m->tri[i], m->n_vert);
     for (size_t i = 0; i < 3 * m->n_vert; i++)
         if (!isfinite(m->vert[i]))
-            return sdm_fail(err, SDM_E_PLUGIN, "vertex %zu has a coordinate that is not finite", i / 3);
+            return sdm_fail(err, SDM_E_PLUGIN, "vertex %zu has a coordinate that is not finite",
+                            i / 3);
     return SDM_OK;
 }
 
@@ -147,21 +157,24 @@ sdm_status sdm_instance_mesh(const sdm_instance *s, const double *p, sdm_mesh *o
     host_call call;
     sdm_host_call_begin(&call, out, false);
     const int failed = s->shape->mesh(s->self, &call.host, s->options, p, &filled);
-    status = failed ? sdm_host_call_failed(&call, "mesh", failed, SDM_E_PLUGIN, err) : check_mesh(out, &filled, err);
+    status = failed ? sdm_host_call_failed(&call, "mesh", failed, SDM_E_PLUGIN, err)
+                    : check_mesh(out, &filled, err);
     sdm_host_call_end(&call);
     if (!status) return SDM_OK;
     out->n_vert = out->n_tri = 0;
     return sdm_instance_fail_at(s, p, status, err);
 }
 
-sdm_status sdm_instance_distance(const sdm_instance *s, const double *p, const double x[3], double *distance,
-                                 sdm_error *err)
+sdm_status sdm_instance_distance(const sdm_instance *s, const double *p, const double x[3],
+                                 double *distance, sdm_error *err)
 {
     sdm_status status = sdm_instance_check(s, p, err);
     if (status) return status;
-    if (!x || !distance) return sdm_fail(err, SDM_E_ARG, "a point and a place for the distance are needed");
+    if (!x || !distance)
+        return sdm_fail(err, SDM_E_ARG, "a point and a place for the distance are needed");
     if (!s->shape->distance)
-        return sdm_fail(err, SDM_E_UNSUPPORTED, "shape '%s' has no closed-form distance", s->shape->name);
+        return sdm_fail(err, SDM_E_UNSUPPORTED, "shape '%s' has no closed-form distance",
+                        s->shape->name);
     if (!isfinite(x[0]) || !isfinite(x[1]) || !isfinite(x[2]))
         return sdm_fail(err, SDM_E_ARG, "the point is not finite");
     host_call call;

@@ -13,17 +13,20 @@
 
 #define SHAPES_OF_A_FILE_MAX 256
 
-static sdm_status add_all(sdm_registry *r, sdm_plugin_entry plugin_shape, const char *path, sdm_error *err)
+static sdm_status add_all(sdm_registry *r, sdm_plugin_entry plugin_shape, const char *path,
+                          sdm_error *err)
 {
     for (uint32_t i = 0;; i++) {
         const sdm_shape *shape = plugin_shape(i);
         if (!shape && i == 0)
-            return sdm_fail(err, SDM_E_PLUGIN, "%s: has no shape: " SDM_PLUGIN_SYMBOL "(0) gives NULL", path);
+            return sdm_fail(err, SDM_E_PLUGIN,
+                            "%s: has no shape: " SDM_PLUGIN_SYMBOL "(0) gives NULL", path);
         if (!shape) return SDM_OK;
         if (i == SHAPES_OF_A_FILE_MAX)
             return sdm_fail(err, SDM_E_PLUGIN,
-                            "%s: more than %d shapes: " SDM_PLUGIN_SYMBOL "() must give NULL behind the last", path,
-                            SHAPES_OF_A_FILE_MAX);
+                            "%s: more than %d shapes: " SDM_PLUGIN_SYMBOL
+                            "() must give NULL behind the last",
+                            path, SHAPES_OF_A_FILE_MAX);
         const sdm_status s = sdm_registry_add(r, shape, path, err);
         if (s) return s;
     }
@@ -31,7 +34,8 @@ static sdm_status add_all(sdm_registry *r, sdm_plugin_entry plugin_shape, const 
 
 sdm_status sdm_registry_load(sdm_registry *r, const char *file, sdm_error *err)
 {
-    if (!r || !file || !file[0]) return sdm_fail(err, SDM_E_ARG, "registry and file are needed to load a plug-in");
+    if (!r || !file || !file[0])
+        return sdm_fail(err, SDM_E_ARG, "registry and file are needed to load a plug-in");
 
     // an absolute path: a bare name would make dlopen() search the system's library folders
     char *path = realpath(file, NULL);
@@ -39,8 +43,8 @@ sdm_status sdm_registry_load(sdm_registry *r, const char *file, sdm_error *err)
     void *object = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     if (!object) {
         const char *why = dlerror();
-        const sdm_status s =
-            sdm_fail(err, SDM_E_PLUGIN, "plug-in %s cannot be loaded: %s", path, why ? why : "unknown reason");
+        const sdm_status s = sdm_fail(err, SDM_E_PLUGIN, "plug-in %s cannot be loaded: %s", path,
+                                      why ? why : "unknown reason");
         free(path);
         return s;
     }
@@ -95,7 +99,8 @@ sdm_status sdm_registry_load_path(sdm_registry *r, const char *path, sdm_error *
     for (const char *at = path; at && *at;) {
         const size_t n = strcspn(at, ":");
         char folder[PATH_MAX];
-        if (n >= sizeof folder) return sdm_fail(err, SDM_E_PLUGIN, "plug-in path: a folder of %zu characters", n);
+        if (n >= sizeof folder)
+            return sdm_fail(err, SDM_E_PLUGIN, "plug-in path: a folder of %zu characters", n);
         memcpy(folder, at, n);
         folder[n] = '\0';
         if (n) {

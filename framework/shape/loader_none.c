@@ -1,11 +1,14 @@
-/* In place of loader.c where there are no shared objects (SDM_PLUGINS=OFF, WebAssembly): what would load one says so. */
+/* In place of loader.c where there are no shared objects (SDM_PLUGINS=OFF, WebAssembly): what would
+ * load one says so. */
 #include "shape_internal.h"
 
 sdm_status sdm_registry_load(sdm_registry *r, const char *file, sdm_error *err)
 {
-    if (!r || !file || !file[0]) return sdm_fail(err, SDM_E_ARG, "registry and file are needed to load a plug-in");
+    if (!r || !file || !file[0])
+        return sdm_fail(err, SDM_E_ARG, "registry and file are needed to load a plug-in");
     return sdm_fail(err, SDM_E_UNSUPPORTED,
-                    "plug-in %s: built without shared objects (SDM_PLUGINS=OFF); link the shape and add it with "
+                    "plug-in %s: built without shared objects (SDM_PLUGINS=OFF); link the shape "
+                    "and add it with "
                     "sdm_registry_add()",
                     file);
 }

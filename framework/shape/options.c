@@ -2,8 +2,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "sdm/internal/text.h"
 #include "sdm/memory.h"
-#include "sdm/text.h"
 #include "shape_internal.h"
 
 static sdm_status unknown_option(const sdm_shape *shape, const char *name, sdm_error *err)
@@ -12,11 +12,13 @@ static sdm_status unknown_option(const sdm_shape *shape, const char *name, sdm_e
     for (uint32_t i = 0; i < shape->n_options; i++) names[i] = shape->options[i].name;
     const char *near = sdm_nearest_name(name, names, shape->n_options);
     if (near)
-        return sdm_fail(err, SDM_E_CONFIG, "shape '%s' has no option '%s'; did you mean '%s'?", shape->name, name,
-                        near);
+        return sdm_fail(err, SDM_E_CONFIG, "shape '%s' has no option '%s'; did you mean '%s'?",
+                        shape->name, name, near);
     if (!shape->n_options)
-        return sdm_fail(err, SDM_E_CONFIG, "shape '%s' has no option '%s', nor any other", shape->name, name);
-    return sdm_fail(err, SDM_E_CONFIG, "shape '%s' has no option '%s'; 'sdmgen shapes %s' lists them", shape->name,
+        return sdm_fail(err, SDM_E_CONFIG, "shape '%s' has no option '%s', nor any other",
+                        shape->name, name);
+    return sdm_fail(err, SDM_E_CONFIG,
+                    "shape '%s' has no option '%s'; 'sdmgen shapes %s' lists them", shape->name,
                     name, shape->name);
 }
 
@@ -28,47 +30,49 @@ static const char *find_given(const sdm_named_text *given, size_t n, const char 
     return NULL;
 }
 
-static sdm_status check_given(const sdm_shape *shape, const sdm_named_text *given, size_t n, sdm_error *err)
+static sdm_status check_given(const sdm_shape *shape, const sdm_named_text *given, size_t n,
+                              sdm_error *err)
 {
     for (size_t i = 0; i < n; i++) {
         if (!given[i].name || !given[i].value)
-            return sdm_fail(err, SDM_E_ARG, "shape '%s': option %zu without a name or a value", shape->name, i + 1);
+            return sdm_fail(err, SDM_E_ARG, "shape '%s': option %zu without a name or a value",
+                            shape->name, i + 1);
         bool known = false;
         for (uint32_t k = 0; k < shape->n_options; k++)
             known = known || strcmp(shape->options[k].name, given[i].name) == 0;
         if (!known) return unknown_option(shape, given[i].name, err);
         for (size_t j = 0; j < i; j++)
             if (strcmp(given[j].name, given[i].name) == 0)
-                return sdm_fail(err, SDM_E_CONFIG, "shape '%s': option '%s' is given twice", shape->name,
-                                given[i].name);
+                return sdm_fail(err, SDM_E_CONFIG, "shape '%s': option '%s' is given twice",
+                                shape->name, given[i].name);
     }
     return SDM_OK;
 }
 
-static sdm_status parse_number(const sdm_shape *shape, const sdm_option *o, const char *given, sdm_option_value *out,
-                               sdm_error *err)
+static sdm_status parse_number(const sdm_shape *shape, const sdm_option *o, const char *given,
+                               sdm_option_value *out, sdm_error *err)
 {
     double v = 0;
     int64_t whole = 0;
     const bool integer = o->type == SDM_OPTION_INT;
     const bool good = integer ? sdm_parse_int(given, &whole) : sdm_parse_real(given, &v);
     if (!good)
-        return sdm_fail(err, SDM_E_CONFIG, "shape '%s': option '%s' is '%s', need %s", shape->name, o->name, given,
-                        integer ? "an integer" : "a number");
+        return sdm_fail(err, SDM_E_CONFIG, "shape '%s': option '%s' is '%s', need %s", shape->name,
+                        o->name, given, integer ? "an integer" : "a number");
     if (integer) v = (double)whole;
     if (!(v >= o->min && v <= o->max)) {
         char min[32], max[32];
-        return sdm_fail(err, SDM_E_CONFIG, "shape '%s': option '%s' is %s%s%s, need %s .. %s", shape->name, o->name,
-                        given, o->unit[0] ? " " : "", o->unit, sdm_format_real(o->min, min),
-                        sdm_format_real(o->max, max));
+        return sdm_fail(err, SDM_E_CONFIG, "shape '%s': option '%s' is %s%s%s, need %s .. %s",
+                        shape->name, o->name, given, o->unit[0] ? " " : "", o->unit,
+                        sdm_format_real(o->min, min), sdm_format_real(o->max, max));
     }
     out->number = v;
     return SDM_OK;
 }
 
 // `words` is a writable copy of the choices, cut apart here; the value's text points into it
-static sdm_status parse_choice(const sdm_shape *shape, const sdm_option *o, const char *given, char *words,
-                               sdm_option_value *out, sdm_error *err)
+static sdm_status parse_choice(const sdm_shape *shape, const sdm_option *o, const char *given,
+                               char *words, sdm_option_value *out, sdm_error *err)
 {
     const char *names[SHAPE_OPTIONS_MAX];
     size_t n = 0;
@@ -84,15 +88,16 @@ static sdm_status parse_choice(const sdm_shape *shape, const sdm_option *o, cons
         }
     const char *near = sdm_nearest_name(given, names, n);
     if (near)
-        return sdm_fail(err, SDM_E_CONFIG, "shape '%s': option '%s' is '%s'; did you mean '%s'?", shape->name, o->name,
-                        given, near);
-    return sdm_fail(err, SDM_E_CONFIG, "shape '%s': option '%s' is '%s', need one of %s", shape->name, o->name, given,
-                    o->choices);
+        return sdm_fail(err, SDM_E_CONFIG, "shape '%s': option '%s' is '%s'; did you mean '%s'?",
+                        shape->name, o->name, given, near);
+    return sdm_fail(err, SDM_E_CONFIG, "shape '%s': option '%s' is '%s', need one of %s",
+                    shape->name, o->name, given, o->choices);
 }
 
 static bool needs_folder(const sdm_option *o, const char *given, const char *base_dir)
 {
-    return o->type == SDM_OPTION_FILE && given && given[0] && given[0] != '/' && base_dir && base_dir[0];
+    return o->type == SDM_OPTION_FILE && given && given[0] && given[0] != '/' && base_dir &&
+           base_dir[0];
 }
 
 // bytes of text that a value needs
@@ -103,15 +108,17 @@ static size_t text_size(const sdm_option *o, const char *given, const char *base
     return strlen(given) + 1 + (needs_folder(o, given, base_dir) ? strlen(base_dir) + 1 : 0);
 }
 
-sdm_status sdm_shape_parse_options(const sdm_shape *shape, const sdm_named_text *given, size_t n_given,
-                                   const char *base_dir, sdm_option_value *values, char **text, sdm_error *err)
+sdm_status sdm_shape_parse_options(const sdm_shape *shape, const sdm_named_text *given,
+                                   size_t n_given, const char *base_dir, sdm_option_value *values,
+                                   char **text, sdm_error *err)
 {
     *text = NULL;
     sdm_status s = check_given(shape, given, n_given, err);
     if (s) return s;
     size_t size = 0;
     for (uint32_t i = 0; i < shape->n_options; i++)
-        size += text_size(&shape->options[i], find_given(given, n_given, shape->options[i].name), base_dir);
+        size += text_size(&shape->options[i], find_given(given, n_given, shape->options[i].name),
+                          base_dir);
     s = SDM_ALLOC(text, size, "option texts", err);
     if (s) return s;
 
@@ -127,7 +134,8 @@ sdm_status sdm_shape_parse_options(const sdm_shape *shape, const sdm_named_text 
         } else if (o->type == SDM_OPTION_FILE) {
             values[i].number = 0;
             const bool folder = needs_folder(o, value, base_dir);
-            snprintf(at, room, "%s%s%s", folder ? base_dir : "", folder ? "/" : "", value ? value : "");
+            snprintf(at, room, "%s%s%s", folder ? base_dir : "", folder ? "/" : "",
+                     value ? value : "");
         } else if (value) {
             s = parse_number(shape, o, value, &values[i], err);
         }

@@ -1,8 +1,8 @@
 /* The set of known shapes. */
 #include <string.h>
 
-#include "sdm/memory.h"
-#include "sdm/text.h"
+#include "sdm/internal/heap.h"
+#include "sdm/internal/text.h"
 #include "shape_internal.h"
 
 typedef struct entry {
@@ -17,7 +17,10 @@ struct sdm_registry {
     size_t n_objects;
 };
 
-sdm_status sdm_registry_create(sdm_registry **out, sdm_error *err) { return SDM_ALLOC(out, 1, "shape registry", err); }
+sdm_status sdm_registry_create(sdm_registry **out, sdm_error *err)
+{
+    return SDM_ALLOC(out, 1, "shape registry", err);
+}
 
 void sdm_registry_shrink(sdm_registry *r, size_t count)
 {
@@ -40,8 +43,8 @@ void sdm_registry_free(sdm_registry *r)
 
 sdm_status sdm_registry_keep(sdm_registry *r, void *object, sdm_error *err)
 {
-    const sdm_status s =
-        sdm_grow((void **)&r->objects, r->n_objects, r->n_objects + 1, sizeof *r->objects, "plug-ins", err);
+    const sdm_status s = sdm_grow((void **)&r->objects, r->n_objects, r->n_objects + 1,
+                                  sizeof *r->objects, "plug-ins", err);
     if (s) return s;
     r->objects[r->n_objects++] = object;
     return SDM_OK;
@@ -51,13 +54,14 @@ static sdm_status make_room(sdm_registry *r, sdm_error *err)
 {
     if (r->count < r->capacity) return SDM_OK;
     const size_t capacity = r->capacity ? 2 * r->capacity : 16;
-    const sdm_status s =
-        sdm_grow((void **)&r->entries, r->capacity, capacity, sizeof *r->entries, "shape registry", err);
+    const sdm_status s = sdm_grow((void **)&r->entries, r->capacity, capacity, sizeof *r->entries,
+                                  "shape registry", err);
     if (!s) r->capacity = capacity;
     return s;
 }
 
-sdm_status sdm_registry_add(sdm_registry *r, const sdm_shape *shape, const char *origin, sdm_error *err)
+sdm_status sdm_registry_add(sdm_registry *r, const sdm_shape *shape, const char *origin,
+                            sdm_error *err)
 {
     if (!r || !shape || !origin)
         return sdm_fail(err, SDM_E_ARG, "registry, shape and origin are needed to add a shape");
@@ -66,7 +70,8 @@ sdm_status sdm_registry_add(sdm_registry *r, const sdm_shape *shape, const char 
     if (s) return s;
     for (size_t i = 0; i < r->count; i++)
         if (strcmp(r->entries[i]->shape.name, checked.name) == 0)
-            return sdm_fail(err, SDM_E_PLUGIN, "%s: shape '%s' is there already (%s): choose another name", origin,
+            return sdm_fail(err, SDM_E_PLUGIN,
+                            "%s: shape '%s' is there already (%s): choose another name", origin,
                             checked.name, r->entries[i]->origin);
 
     s = make_room(r, err);

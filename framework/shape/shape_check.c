@@ -11,40 +11,48 @@ static bool is_name(const char *s)
     if (!s || !(s[0] >= 'a' && s[0] <= 'z')) return false;
     size_t n = 0;
     for (; s[n] && n <= SHAPE_NAME_MAX; n++)
-        if (!((s[n] >= 'a' && s[n] <= 'z') || (s[n] >= '0' && s[n] <= '9') || s[n] == '_')) return false;
+        if (!((s[n] >= 'a' && s[n] <= 'z') || (s[n] >= '0' && s[n] <= '9') || s[n] == '_'))
+            return false;
     return n <= SHAPE_NAME_MAX;
 }
 
 #define NAME_RULE "names are a small letter, then small letters, digits and _, at most 63 in all"
 
-static sdm_status check_range(const char *who, const char *what, const char *name, double min, double max, double def,
-                              sdm_error *err)
+static sdm_status check_range(const char *who, const char *what, const char *name, double min,
+                              double max, double def, sdm_error *err)
 {
     if (!isfinite(min) || !isfinite(max) || !(min < max))
-        return sdm_fail(err, SDM_E_PLUGIN, "%s: %s '%s' has the range %g .. %g, need finite numbers with min < max",
+        return sdm_fail(err, SDM_E_PLUGIN,
+                        "%s: %s '%s' has the range %g .. %g, need finite numbers with min < max",
                         who, what, name, min, max);
     if (!(def >= min && def <= max))
-        return sdm_fail(err, SDM_E_PLUGIN, "%s: %s '%s' has the default %g outside its range %g .. %g", who, what, name,
-                        def, min, max);
+        return sdm_fail(err, SDM_E_PLUGIN,
+                        "%s: %s '%s' has the default %g outside its range %g .. %g", who, what,
+                        name, def, min, max);
     return SDM_OK;
 }
 
-sdm_status sdm_shape_check_params(const char *who, const sdm_param *params, uint32_t n, sdm_error *err)
+sdm_status sdm_shape_check_params(const char *who, const sdm_param *params, uint32_t n,
+                                  sdm_error *err)
 {
     if (n > SHAPE_PARAMS_MAX)
-        return sdm_fail(err, SDM_E_PLUGIN, "%s: %u parameters, at most %d", who, (unsigned)n, SHAPE_PARAMS_MAX);
-    if (n && !params) return sdm_fail(err, SDM_E_PLUGIN, "%s: %u parameters, but no table of them", who, (unsigned)n);
+        return sdm_fail(err, SDM_E_PLUGIN, "%s: %u parameters, at most %d", who, (unsigned)n,
+                        SHAPE_PARAMS_MAX);
+    if (n && !params)
+        return sdm_fail(err, SDM_E_PLUGIN, "%s: %u parameters, but no table of them", who,
+                        (unsigned)n);
     for (uint32_t i = 0; i < n; i++) {
         const sdm_param *p = &params[i];
         if (!is_name(p->name))
-            return sdm_fail(err, SDM_E_PLUGIN, "%s: parameter %u has the name '%s': " NAME_RULE, who, (unsigned)i + 1,
-                            p->name ? p->name : "(none)");
+            return sdm_fail(err, SDM_E_PLUGIN, "%s: parameter %u has the name '%s': " NAME_RULE,
+                            who, (unsigned)i + 1, p->name ? p->name : "(none)");
         for (uint32_t j = 0; j < i; j++)
             if (strcmp(params[j].name, p->name) == 0)
-                return sdm_fail(err, SDM_E_PLUGIN, "%s: two parameters are named '%s'", who, p->name);
+                return sdm_fail(err, SDM_E_PLUGIN, "%s: two parameters are named '%s'", who,
+                                p->name);
         if (!p->unit || !p->help)
-            return sdm_fail(err, SDM_E_PLUGIN, "%s: parameter '%s' has no %s (\"\" is fine)", who, p->name,
-                            p->unit ? "help" : "unit");
+            return sdm_fail(err, SDM_E_PLUGIN, "%s: parameter '%s' has no %s (\"\" is fine)", who,
+                            p->name, p->unit ? "help" : "unit");
         const sdm_status s = check_range(who, "parameter", p->name, p->min, p->max, p->def, err);
         if (s) return s;
     }
@@ -55,7 +63,8 @@ sdm_status sdm_shape_check_params(const char *who, const sdm_param *params, uint
 static sdm_status check_choices(const char *who, const sdm_option *o, sdm_error *err)
 {
     const char *all = o->choices;
-    if (!all || !all[0]) return sdm_fail(err, SDM_E_PLUGIN, "%s: option '%s' has no choices", who, o->name);
+    if (!all || !all[0])
+        return sdm_fail(err, SDM_E_PLUGIN, "%s: option '%s' has no choices", who, o->name);
     size_t count = 0;
     for (const char *word = all;;) {
         const size_t n = strcspn(word, "|");
@@ -63,9 +72,10 @@ static sdm_status check_choices(const char *who, const sdm_option *o, sdm_error 
         for (const char *before = all; before < word && !bad; before += strcspn(before, "|") + 1)
             bad = strcspn(before, "|") == n && memcmp(before, word, n) == 0;
         if (bad)
-            return sdm_fail(err, SDM_E_PLUGIN,
-                            "%s: option '%s' has an empty, long or repeated choice, or too many, in '%s'", who, o->name,
-                            all);
+            return sdm_fail(
+                err, SDM_E_PLUGIN,
+                "%s: option '%s' has an empty, long or repeated choice, or too many, in '%s'", who,
+                o->name, all);
         if (!word[n]) return SDM_OK;
         word += n + 1;
     }
@@ -76,9 +86,10 @@ static sdm_status check_option(const char *who, const sdm_option *o, sdm_error *
     switch (o->type) {
     case SDM_OPTION_INT:
         if (!(fabs(o->min) <= 1e15 && fabs(o->max) <= 1e15) || o->def != nearbyint(o->def))
-            return sdm_fail(err, SDM_E_PLUGIN,
-                            "%s: option '%s' is an integer, but its range %g .. %g or default %g is none", who, o->name,
-                            o->min, o->max, o->def);
+            return sdm_fail(
+                err, SDM_E_PLUGIN,
+                "%s: option '%s' is an integer, but its range %g .. %g or default %g is none", who,
+                o->name, o->min, o->max, o->def);
         return check_range(who, "option", o->name, o->min, o->max, o->def, err);
     case SDM_OPTION_REAL:
         return check_range(who, "option", o->name, o->min, o->max, o->def, err);
@@ -87,25 +98,30 @@ static sdm_status check_option(const char *who, const sdm_option *o, sdm_error *
     case SDM_OPTION_FILE:
         return SDM_OK;
     }
-    return sdm_fail(err, SDM_E_PLUGIN, "%s: option '%s' has the unknown type %d", who, o->name, (int)o->type);
+    return sdm_fail(err, SDM_E_PLUGIN, "%s: option '%s' has the unknown type %d", who, o->name,
+                    (int)o->type);
 }
 
-static sdm_status check_options(const char *who, const sdm_option *options, uint32_t n, sdm_error *err)
+static sdm_status check_options(const char *who, const sdm_option *options, uint32_t n,
+                                sdm_error *err)
 {
     if (n > SHAPE_OPTIONS_MAX)
-        return sdm_fail(err, SDM_E_PLUGIN, "%s: %u options, at most %d", who, (unsigned)n, SHAPE_OPTIONS_MAX);
-    if (n && !options) return sdm_fail(err, SDM_E_PLUGIN, "%s: %u options, but no table of them", who, (unsigned)n);
+        return sdm_fail(err, SDM_E_PLUGIN, "%s: %u options, at most %d", who, (unsigned)n,
+                        SHAPE_OPTIONS_MAX);
+    if (n && !options)
+        return sdm_fail(err, SDM_E_PLUGIN, "%s: %u options, but no table of them", who,
+                        (unsigned)n);
     for (uint32_t i = 0; i < n; i++) {
         const sdm_option *o = &options[i];
         if (!is_name(o->name))
-            return sdm_fail(err, SDM_E_PLUGIN, "%s: option %u has the name '%s': " NAME_RULE, who, (unsigned)i + 1,
-                            o->name ? o->name : "(none)");
+            return sdm_fail(err, SDM_E_PLUGIN, "%s: option %u has the name '%s': " NAME_RULE, who,
+                            (unsigned)i + 1, o->name ? o->name : "(none)");
         for (uint32_t j = 0; j < i; j++)
             if (strcmp(options[j].name, o->name) == 0)
                 return sdm_fail(err, SDM_E_PLUGIN, "%s: two options are named '%s'", who, o->name);
         if (!o->unit || !o->help)
-            return sdm_fail(err, SDM_E_PLUGIN, "%s: option '%s' has no %s (\"\" is fine)", who, o->name,
-                            o->unit ? "help" : "unit");
+            return sdm_fail(err, SDM_E_PLUGIN, "%s: option '%s' has no %s (\"\" is fine)", who,
+                            o->name, o->unit ? "help" : "unit");
         const sdm_status s = check_option(who, o, err);
         if (s) return s;
     }
@@ -116,27 +132,32 @@ static sdm_status check_callbacks(const char *who, const sdm_shape *t, sdm_error
 {
     if (!t->mesh) return sdm_fail(err, SDM_E_PLUGIN, "%s: no callback mesh()", who);
     if (!t->create != !t->destroy)
-        return sdm_fail(err, SDM_E_PLUGIN, "%s: callback %s() is missing: create() and destroy() go together", who,
+        return sdm_fail(err, SDM_E_PLUGIN,
+                        "%s: callback %s() is missing: create() and destroy() go together", who,
                         t->create ? "destroy" : "create");
-    if (t->describe && !t->create) return sdm_fail(err, SDM_E_PLUGIN, "%s: describe() needs create()", who);
+    if (t->describe && !t->create)
+        return sdm_fail(err, SDM_E_PLUGIN, "%s: describe() needs create()", who);
     return SDM_OK;
 }
 
-sdm_status sdm_shape_copy_checked(const sdm_shape *table, const char *origin, sdm_shape *out, sdm_error *err)
+sdm_status sdm_shape_copy_checked(const sdm_shape *table, const char *origin, sdm_shape *out,
+                                  sdm_error *err)
 {
     // the two leading words alone are sure to be there; the rest is looked at in the copy
     uint32_t lead[2];
     memcpy(lead, table, sizeof lead);
     if (lead[0] != SDM_SHAPE_ABI)
         return sdm_fail(err, SDM_E_PLUGIN,
-                        "%s: shape table of plug-in interface %u, this program has interface %u: build the plug-in "
+                        "%s: shape table of plug-in interface %u, this program has interface %u: "
+                        "build the plug-in "
                         "with the sdm/shape.h of this program",
                         origin, (unsigned)lead[0], SDM_SHAPE_ABI);
     const size_t need = offsetof(sdm_shape, mesh) + sizeof table->mesh;
     if (lead[1] < need)
-        return sdm_fail(err, SDM_E_PLUGIN,
-                        "%s: shape table of %u bytes, need at least %zu: set .size = sizeof(sdm_shape)", origin,
-                        (unsigned)lead[1], need);
+        return sdm_fail(
+            err, SDM_E_PLUGIN,
+            "%s: shape table of %u bytes, need at least %zu: set .size = sizeof(sdm_shape)", origin,
+            (unsigned)lead[1], need);
     *out = (sdm_shape){0};
     // a size that ends inside a pointer gives no pointer
     const size_t whole = lead[1] / sizeof(void *) * sizeof(void *);
@@ -151,7 +172,8 @@ sdm_status sdm_shape_copy_checked(const sdm_shape *table, const char *origin, sd
     if (!out->summary) return sdm_fail(err, SDM_E_PLUGIN, "%s: no summary", who);
     sdm_status s = check_callbacks(who, out, err);
     if (!s) s = sdm_shape_check_params(who, out->params, out->n_params, err);
-    if (!s && !out->n_params && !out->describe) s = sdm_fail(err, SDM_E_PLUGIN, "%s: no parameters", who);
+    if (!s && !out->n_params && !out->describe)
+        s = sdm_fail(err, SDM_E_PLUGIN, "%s: no parameters", who);
     if (!s) s = check_options(who, out->options, out->n_options, err);
     return s;
 }

@@ -5,26 +5,31 @@
 #include "sdm/memory.h"
 #include "shape_internal.h"
 
-/* Truncation and rounding error of a central difference are about equal there, for coordinates of some mm. */
+/* Truncation and rounding error of a central difference are about equal there, for coordinates of
+ * some mm. */
 #define STEP_SHARE 1e-5
 
-static sdm_status by_callback(const sdm_instance *s, const double *p, size_t n_vert, double *velocity, sdm_error *err)
+static sdm_status by_callback(const sdm_instance *s, const double *p, size_t n_vert,
+                              double *velocity, sdm_error *err)
 {
     host_call call;
     sdm_host_call_begin(&call, NULL, false);
     const int failed = s->shape->velocity(s->self, &call.host, s->options, p, n_vert, velocity);
-    sdm_status status = failed ? sdm_host_call_failed(&call, "velocity", failed, SDM_E_PLUGIN, err) : SDM_OK;
+    sdm_status status =
+        failed ? sdm_host_call_failed(&call, "velocity", failed, SDM_E_PLUGIN, err) : SDM_OK;
     sdm_host_call_end(&call);
     for (size_t i = 0; !status && i < 3 * n_vert * s->n_params; i++)
         if (!isfinite(velocity[i]))
-            status = sdm_fail(err, SDM_E_PLUGIN, "velocity of vertex %zu with respect to '%s' is not finite",
+            status = sdm_fail(err, SDM_E_PLUGIN,
+                              "velocity of vertex %zu with respect to '%s' is not finite",
                               i / 3 % n_vert, s->params[i / (3 * n_vert)].name);
     return status ? sdm_instance_fail_at(s, p, status, err) : SDM_OK;
 }
 
 // adds weight * vertices at p with parameter k at `place`
-static sdm_status add_moved(const sdm_instance *s, const double *p, size_t k, double place, double weight,
-                            size_t n_vert, sdm_mesh *mesh, double *sum, sdm_error *err)
+static sdm_status add_moved(const sdm_instance *s, const double *p, size_t k, double place,
+                            double weight, size_t n_vert, sdm_mesh *mesh, double *sum,
+                            sdm_error *err)
 {
     double moved[SHAPE_PARAMS_MAX];
     memcpy(moved, p, s->n_params * sizeof *moved);
@@ -33,24 +38,26 @@ static sdm_status add_moved(const sdm_instance *s, const double *p, size_t k, do
     if (status) return status;
     if (mesh->n_vert != n_vert)
         return sdm_fail(err, SDM_E_PLUGIN,
-                        "shape '%s': the mesh has %zu vertices, velocities of %zu were asked for: the number must not "
+                        "shape '%s': the mesh has %zu vertices, velocities of %zu were asked for: "
+                        "the number must not "
                         "depend on the parameters",
                         s->shape->name, mesh->n_vert, n_vert);
     for (size_t i = 0; i < 3 * n_vert; i++) sum[i] += weight * mesh->vert[i];
     return SDM_OK;
 }
 
-// of second order in both forms: from places on both sides, at an end of the range from here and two places on one side; weights are
-// those of the steps as they are rounded
-static sdm_status by_differences(const sdm_instance *s, const double *p, size_t n_vert, double *velocity,
-                                 sdm_error *err)
+// of second order in both forms: from places on both sides, at an end of the range from here and
+// two places on one side; weights are those of the steps as they are rounded
+static sdm_status by_differences(const sdm_instance *s, const double *p, size_t n_vert,
+                                 double *velocity, sdm_error *err)
 {
     sdm_mesh mesh = {0};
     sdm_status status = SDM_OK;
     for (size_t k = 0; k < s->n_params && !status; k++) {
         const sdm_param *q = &s->params[k];
         const double step = STEP_SHARE * (q->max - q->min), h = p[k] + step > q->max ? -step : step;
-        double *v = velocity + 3 * n_vert * k, place[3] = {p[k] - h, p[k] + h, p[k] + 2 * h}, weight[3];
+        double *v = velocity + 3 * n_vert * k, place[3] = {p[k] - h, p[k] + h, p[k] + 2 * h},
+               weight[3];
         const bool within = place[0] >= q->min && place[0] <= q->max;
         if (within) {
             weight[1] = 1 / (place[1] - place[0]);
@@ -70,12 +77,14 @@ static sdm_status by_differences(const sdm_instance *s, const double *p, size_t 
     return status;
 }
 
-sdm_status sdm_instance_velocity(const sdm_instance *s, const double *p, size_t n_vert, double *velocity,
-                                 sdm_error *err)
+sdm_status sdm_instance_velocity(const sdm_instance *s, const double *p, size_t n_vert,
+                                 double *velocity, sdm_error *err)
 {
     const sdm_status status = sdm_instance_check(s, p, err);
     if (status) return status;
     if (!velocity || n_vert == 0)
-        return sdm_fail(err, SDM_E_ARG, "a place for the velocities of at least one vertex is needed");
-    return s->shape->velocity ? by_callback(s, p, n_vert, velocity, err) : by_differences(s, p, n_vert, velocity, err);
+        return sdm_fail(err, SDM_E_ARG,
+                        "a place for the velocities of at least one vertex is needed");
+    return s->shape->velocity ? by_callback(s, p, n_vert, velocity, err)
+                              : by_differences(s, p, n_vert, velocity, err);
 }

@@ -3,34 +3,38 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "blur.h"
-#include "cavity.h"
-#include "check.h"
-#include "creases.h"
-#include "evidence.h"
-#include "look.h"
-#include "places.h"
-#include "posterior.h"
-#include "score.h"
-#include "sdm/clock.h"
+#include "fit/data/blur.h"
+#include "fit/data/cavity.h"
+#include "fit/solver/averaged_gradient.h"
+#include "fit/solver/tissue_field.h"
+#include "fit/solver/tissues.h"
+#include "fit/start/start_search.h"
+#include "fit/trust/evidence.h"
+#include "fit/trust/posterior.h"
+#include "fit/trust/scores.h"
+#include "fit_check.h"
+#include "sdm/internal/clock.h"
+#include "sdm/internal/rotation.h"
 #include "sdm/memory.h"
-#include "search.h"
 
 // the region follows the shape, and the priors are weighed, so many times at most
 #define ROUNDS_MOST 8
 // voxels at most, before only every second one along each axis is taken
 #define SITES_MOST 2000000
-// as long as the region and the weights of the priors are not the last, small steps are not worth while
+// as long as the region and the weights of the priors are not the last, small steps are not worth
+// while
 #define EPS_FIRST 1e-2
 #define EPS_FIRST_AVERAGED 1e-4
 // relative change of the weights that is left
 #define WEIGHT_EPS 1e-3
 #define WEIGHT_ROUGH 0.05
-// so many steps in a row that promise no gain are an end; exact maps have creases, and need not try again
+// so many steps in a row that promise no gain are an end; exact maps have creases, and need not try
+// again
 #define FLAT_MOST 6
 // of the deviation before the fit: what is left where the target says next to nothing
 #define BY_PRIOR 0.9
-// a prior against all evidence would feed itself: the worse the fit, the more alike are neighbouring residuals
+// a prior against all evidence would feed itself: the worse the fit, the more alike are
+// neighbouring residuals
 #define WEIGHINGS_MOST 4
 
 sdm_fit_opts sdm_fit_defaults(void)
@@ -42,7 +46,8 @@ sdm_fit_opts sdm_fit_defaults(void)
         .appearance = {.n_inside = 1,
                        .n_outside = 2,
                        .inside = {{.weight = 1, .mean = 40, .sd = 170}},
-                       .outside = {{.weight = 0.9, .mean = 1300, .sd = 270}, {.weight = 0.1, .mean = -880, .sd = 150}}},
+                       .outside = {{.weight = 0.9, .mean = 1300, .sd = 270},
+                                   {.weight = 0.1, .mean = -880, .sd = 150}}},
         .tissue_mm = 1,
         .point_sd = 0.1,
         .point_dof = 4,
@@ -112,7 +117,8 @@ static sdm_status start_params(fit_problem *p, bool *clamped, sdm_error *err)
         }
         const double near = fmin(fmax(x, p->low[k]), p->high[k]);
         if (!isfinite(x) || (x != near && source->policy != SDM_RANGE_CLAMP))
-            return sdm_fail(err, SDM_E_RANGE, "start of %s = %.9g, need %.9g to %.9g", name, x, p->low[k], p->high[k]);
+            return sdm_fail(err, SDM_E_RANGE, "start of %s = %.9g, need %.9g to %.9g", name, x,
+                            p->low[k], p->high[k]);
         if (x != near) *clamped = true;
         p->state.params[k] = near;
     }
@@ -127,11 +133,11 @@ static sdm_status begin(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     if (!s) s = sdm_fit_maps_create(p->source, share, o, &p->maps, err);
     if (s) return s;
     if (share && o->keep_blur && o->blur < p->maps.least_blur)
-        return sdm_fail(
-            err, SDM_E_ARG,
-            "a blur of %g mm is kept, but maps with voxels of %g mm carry one of %g mm or more: take smaller "
-            "voxels for the maps (spacing), or a wider blur",
-            o->blur, 2 * p->maps.least_blur, p->maps.least_blur);
+        return sdm_fail(err, SDM_E_ARG,
+                        "a blur of %g mm is kept, but maps with voxels of %g mm carry one of %g mm "
+                        "or more: take smaller "
+                        "voxels for the maps (spacing), or a wider blur",
+                        o->blur, 2 * p->maps.least_blur, p->maps.least_blur);
     sdm_pose_matrix(&o->start_pose, p->state.rotation);
     memcpy(p->state.translation, o->start_pose.translation, sizeof p->state.translation);
     p->state.look = o->appearance;
@@ -139,8 +145,8 @@ static sdm_status begin(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     p->state.l_ref = o->l_ref;
     p->state.point_sd = o->point_sd;
     p->prior = p->state;
-    s = sdm_fit_blur_check(&p->maps.grid, share ? "blur" : "l_ref", share ? o->blur : o->l_ref, sdm_fit_field_blur(p),
-                           err);
+    s = sdm_fit_blur_check(&p->maps.grid, share ? "blur" : "l_ref", share ? o->blur : o->l_ref,
+                           sdm_fit_field_blur(p), err);
     if (s) return s;
     const size_t tissues = share ? o->appearance.n_inside + o->appearance.n_outside : 0;
     s = sdm_fit_sums_create(fit_columns(p->n_params) + tissues, &p->sums, err);
@@ -168,14 +174,16 @@ static sdm_status follow(fit_problem *p, bool *changed, sdm_error *err)
     }
 }
 
-// the weights of the priors from the residuals where the fit stands; *change: the largest, relative, 0 where they are left
+// the weights of the priors from the residuals where the fit stands; *change: the largest,
+// relative, 0 where they are left
 static sdm_status weigh_priors(fit_problem *p, double *change, sdm_error *err)
 {
     double weight[FIT_PARAMS_MAX + 6] = {0};
     const sdm_status s = sdm_fit_weigh_priors(p, weight, &p->noise_factor, err);
     if (s) return s;
     *change = 0;
-    for (size_t k = 0; k < p->n_params + 6; k++) *change = fmax(*change, fabs(weight[k] / p->prior_weight[k] - 1));
+    for (size_t k = 0; k < p->n_params + 6; k++)
+        *change = fmax(*change, fabs(weight[k] / p->prior_weight[k] - 1));
     if (*change > WEIGHT_EPS)
         memcpy(p->prior_weight, weight, sizeof weight);
     else
@@ -199,7 +207,8 @@ static sdm_status settle(fit_problem *p, fit_run *run, fit_ended *ended, sdm_err
         s = sdm_fit_look(p, err); // maps of the state
         if (!s) s = follow(p, &changed, err);
         if (!s && !p->sites.n)
-            return sdm_fail(err, SDM_E_QUALITY, "the shape has left the image: no voxel near it is left");
+            return sdm_fail(err, SDM_E_QUALITY,
+                            "the shape has left the image: no voxel near it is left");
         if (!s && changed) s = sdm_fit_look(p, err); // samples of the region
         if (!s && changed) s = sdm_fit_places_update(p, err);
         if (!s && round < weighings) s = weigh_priors(p, &change, err);
@@ -221,8 +230,9 @@ static sdm_status settle(fit_problem *p, fit_run *run, fit_ended *ended, sdm_err
     return s;
 }
 
-/* To the maximum with maps of one kind. Its last part goes by averaged derivatives: exact maps have creases, and where the data say little
-   of a parameter the rounding of a network's derivatives makes steps that do not end. */
+/* To the maximum with maps of one kind. Its last part goes by averaged derivatives: exact maps have
+   creases, and where the data say little of a parameter the rounding of a network's derivatives
+   makes steps that do not end. */
 static sdm_status approach(fit_problem *p, fit_run *run, fit_ended *ended, sdm_error *err)
 {
     const sdm_fit_opts *o = p->opts;
@@ -320,30 +330,35 @@ static sdm_status judge(const fit_problem *p, const sdm_fit_result *r, sdm_error
         const bool darker = mean_of(b->inside, b->n_inside) < mean_of(b->outside, b->n_outside);
         if (!(r->evidence > 0))
             return sdm_fail(err, SDM_E_QUALITY,
-                            "the image shows no such shape near the start: explaining it without one is better by %.3g "
-                            "(log-likelihood of independent voxels); check the start pose, and whether the inside is "
+                            "the image shows no such shape near the start: explaining it without "
+                            "one is better by %.3g "
+                            "(log-likelihood of independent voxels); check the start pose, and "
+                            "whether the inside is "
                             "%s than the outside in this image",
                             -r->evidence, darker ? "darker" : "brighter");
         if ((in < out) != darker)
-            return sdm_fail(
-                err, SDM_E_QUALITY,
-                "the contrast is the opposite of the start's: inside %.4g, outside %.4g, but the start says "
-                "that the inside is %s; give laws of this kind of image",
-                in, out, darker ? "darker" : "brighter");
+            return sdm_fail(err, SDM_E_QUALITY,
+                            "the contrast is the opposite of the start's: inside %.4g, outside "
+                            "%.4g, but the start says "
+                            "that the inside is %s; give laws of this kind of image",
+                            in, out, darker ? "darker" : "brighter");
     }
     const double widest = sdm_fit_inradius(&p->maps);
     if (r->n_cavity && !(widest < o->cavity))
         return sdm_fail(err, SDM_E_QUALITY,
-                        "the fitted shape holds a ball of %.3g mm, but spaces that hold one of %.3g mm were left out "
+                        "the fitted shape holds a ball of %.3g mm, but spaces that hold one of "
+                        "%.3g mm were left out "
                         "(cavity): give a radius above that of the shape",
                         widest, o->cavity);
     if (!(r->inside_share >= o->least_inside))
-        return sdm_fail(err, SDM_E_QUALITY, "only %.0f %% of the shape lies in the image, need %.0f %% (least_inside)",
+        return sdm_fail(err, SDM_E_QUALITY,
+                        "only %.0f %% of the shape lies in the image, need %.0f %% (least_inside)",
                         100 * r->inside_share, 100 * o->least_inside);
     if (!r->converged)
-        return sdm_fail(err, SDM_E_QUALITY,
-                        "not converged after %zu iterations (%s); allow more of them, or give a nearer start",
-                        r->n_iterations, r->reason);
+        return sdm_fail(
+            err, SDM_E_QUALITY,
+            "not converged after %zu iterations (%s); allow more of them, or give a nearer start",
+            r->n_iterations, r->reason);
     return SDM_OK;
 }
 
@@ -356,13 +371,16 @@ static sdm_status finish(fit_problem *p, sdm_fit_result *out, sdm_error *err)
         const sdm_status found = sdm_fit_without_shape(p, &out->log_likelihood_without, err);
         if (found) return found;
         const double factor = fmax(out->noise_factor, 1), n = (double)p->sites.n / factor;
-        const double unknowns = (p->opts->keep_params ? 0 : (double)p->n_params) + (p->opts->keep_pose ? 0 : 6);
-        out->evidence = (p->sums.log_likelihood - out->log_likelihood_without) / factor - 0.5 * unknowns * log(n);
+        const double unknowns =
+            (p->opts->keep_params ? 0 : (double)p->n_params) + (p->opts->keep_pose ? 0 : 6);
+        out->evidence = (p->sums.log_likelihood - out->log_likelihood_without) / factor -
+                        0.5 * unknowns * log(n);
     }
     return s;
 }
 
-// a label map as an image of what is 1 inside and 0 outside: shares, seen through a point spread that is narrow
+// a label map as an image of what is 1 inside and 0 outside: shares, seen through a point spread
+// that is narrow
 static void take_labels(sdm_fit_target *target, sdm_fit_opts *opts)
 {
     target->kind = SDM_FIT_IMAGE;
@@ -373,8 +391,8 @@ static void take_labels(sdm_fit_target *target, sdm_fit_opts *opts)
     opts->keep_appearance = true;
 }
 
-sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target, const sdm_fit_opts *opts,
-                   sdm_fit_result *out, sdm_error *err)
+sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
+                   const sdm_fit_opts *opts, sdm_fit_result *out, sdm_error *err)
 {
     if (!out) return sdm_fail(err, SDM_E_ARG, "fit: a place for the result is needed");
     *out = (sdm_fit_result){0};

@@ -11,8 +11,8 @@
 
 static const sdm_param PARAMS[] = {{"size", "mm", 1, 2, 1.5, "size"}};
 
-static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
-                sdm_mesh_out *out)
+static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                const double *p, sdm_mesh_out *out)
 {
     (void)self, (void)options, (void)p, (void)out;
     return host->fail(host, "never called");

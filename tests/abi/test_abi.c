@@ -1,4 +1,5 @@
-/* The plug-in interface is frozen: layout of version 1, tables of other sizes, and shared objects good and bad. */
+/* The plug-in interface is frozen: layout of version 1, tables of other sizes, and shared objects
+ * good and bad. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -19,7 +20,8 @@
 #define PLUGIN_FOLDER "plugins" /* one folder a variant of bad_plugin.c, and good/octahedron.so */
 #endif
 
-/* Version 1 as it was published. Never edit these: a difference to sdm/shape.h must stop the compiler. */
+/* Version 1 as it was published. Never edit these: a difference to sdm/shape.h must stop the
+ * compiler. */
 struct param_v1 {
     const char *name, *unit;
     double min, max, def;
@@ -60,18 +62,22 @@ struct shape_v1 {
     int (*create)(const sdm_host *, const sdm_option_value *, void **);
     void (*destroy)(void *);
     void (*describe)(const void *, const sdm_param **, uint32_t *);
-    int (*mesh)(const void *, const sdm_host *, const sdm_option_value *, const double *, sdm_mesh_out *);
-    int (*velocity)(const void *, const sdm_host *, const sdm_option_value *, const double *, size_t, double *);
-    int (*distance)(const void *, const sdm_host *, const sdm_option_value *, const double *, const double[3],
-                    double *);
+    int (*mesh)(const void *, const sdm_host *, const sdm_option_value *, const double *,
+                sdm_mesh_out *);
+    int (*velocity)(const void *, const sdm_host *, const sdm_option_value *, const double *,
+                    size_t, double *);
+    int (*distance)(const void *, const sdm_host *, const sdm_option_value *, const double *,
+                    const double[3], double *);
 };
 
-#define SAME(v1, now, field) _Static_assert(offsetof(struct v1, field) == offsetof(now, field), #field " has moved")
+#define SAME(v1, now, field)                                                                       \
+    _Static_assert(offsetof(struct v1, field) == offsetof(now, field), #field " has moved")
 _Static_assert(SDM_SHAPE_ABI == 1, "a new interface version needs a frozen copy of its own");
 // tables of the plug-in that are read by index cannot grow at all; the others may grow at the end
 _Static_assert(sizeof(struct param_v1) == sizeof(sdm_param), "sdm_param has changed");
 _Static_assert(sizeof(struct option_v1) == sizeof(sdm_option), "sdm_option has changed");
-_Static_assert(sizeof(struct option_value_v1) == sizeof(sdm_option_value), "sdm_option_value has changed");
+_Static_assert(sizeof(struct option_value_v1) == sizeof(sdm_option_value),
+               "sdm_option_value has changed");
 _Static_assert(sizeof(struct mesh_out_v1) == sizeof(sdm_mesh_out), "sdm_mesh_out has changed");
 _Static_assert(sizeof(struct host_v1) <= sizeof(sdm_host), "sdm_host has shrunk");
 _Static_assert(sizeof(struct shape_v1) <= sizeof(sdm_shape), "sdm_shape has shrunk");
@@ -113,7 +119,8 @@ SAME(shape_v1, sdm_shape, describe);
 SAME(shape_v1, sdm_shape, mesh);
 SAME(shape_v1, sdm_shape, velocity);
 SAME(shape_v1, sdm_shape, distance);
-_Static_assert(SDM_OPTION_REAL == 0 && SDM_OPTION_INT == 1 && SDM_OPTION_CHOICE == 2 && SDM_OPTION_FILE == 3,
+_Static_assert(SDM_OPTION_REAL == 0 && SDM_OPTION_INT == 1 && SDM_OPTION_CHOICE == 2 &&
+                   SDM_OPTION_FILE == 3,
                "option types");
 
 static sdm_registry *registry;
@@ -137,8 +144,8 @@ static void has(const char *text)
     if (!strstr(err.text, text)) fail_msg("'%s' is not in '%s'", text, err.text);
 }
 
-static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
-                sdm_mesh_out *out)
+static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                const double *p, sdm_mesh_out *out)
 {
     (void)self, (void)options;
     const int failed = host->reserve(host, out, 4, 4);
@@ -238,10 +245,12 @@ static void test_wrong_abi(void **state)
     (void)state;
     const uint32_t bad[] = {0, 2, 0x01000000, UINT32_MAX};
     for (size_t i = 0; i < 4; i++) {
-        const uint32_t lead[2] = {bad[i], sizeof(sdm_shape)}; // nothing behind the two words is touched
+        const uint32_t lead[2] = {bad[i],
+                                  sizeof(sdm_shape)}; // nothing behind the two words is touched
         assert_int_equal(add_block(lead, sizeof lead), SDM_E_PLUGIN);
         char text[128];
-        snprintf(text, sizeof text, "block: shape table of plug-in interface %u, this program has interface 1",
+        snprintf(text, sizeof text,
+                 "block: shape table of plug-in interface %u, this program has interface 1",
                  (unsigned)bad[i]);
         has(text);
     }
@@ -264,7 +273,8 @@ static void test_bad_objects(void **state)
 {
     (void)state;
     assert_int_equal(sdm_builtin_shapes_add(registry, &err), SDM_OK);
-    load("wrong_abi", SDM_E_PLUGIN, "shape table of plug-in interface 2, this program has interface 1");
+    load("wrong_abi", SDM_E_PLUGIN,
+         "shape table of plug-in interface 2, this program has interface 1");
     load("no_symbol", SDM_E_PLUGIN, "exports no function sdm_plugin_shape()");
     load("no_shape", SDM_E_PLUGIN, "has no shape: sdm_plugin_shape(0) gives NULL");
     load("endless", SDM_E_PLUGIN, "more than 256 shapes");
@@ -286,7 +296,8 @@ static void put(const char *path, const void *bytes, size_t size)
 static void test_not_an_object(void **state)
 {
     (void)state;
-    static const char TEXT[] = "this is no shared object, however long it may go on to be", ELF[] = "\177ELF\2\1\1";
+    static const char TEXT[] = "this is no shared object, however long it may go on to be",
+                      ELF[] = "\177ELF\2\1\1";
     put("test_abi_text.so", TEXT, sizeof TEXT);
     put("test_abi_cut.so", ELF, sizeof ELF);
     put("test_abi_empty.so", TEXT, 0);
@@ -319,8 +330,9 @@ static void test_good_object(void **state)
     assert_int_equal(sdm_mesh_audit(&m, &a, &err), SDM_OK);
     assert_true(a.manifold && !a.inverted && a.self_intersections == 0);
     assert_true(fabs(a.volume - 4.0 / 3 * 27) < 1e-12); // 4/3 r^3
-    const double AT[][4] = {{0, 0, 0, -1.7320508075688772}, {5, 0, 0, 2}, {0, -3, 0, 0}, {2, 2, 2, 1.7320508075688772},
-                            {-3, 3, 0, 2.1213203435596424}, {1, 1, -1, 0}};
+    const double AT[][4] = {
+        {0, 0, 0, -1.7320508075688772}, {5, 0, 0, 2}, {0, -3, 0, 0}, {2, 2, 2, 1.7320508075688772},
+        {-3, 3, 0, 2.1213203435596424}, {1, 1, -1, 0}};
     for (size_t i = 0; i < sizeof AT / sizeof *AT; i++) {
         double d = 0;
         assert_int_equal(sdm_instance_distance(s, &p, AT[i], &d, &err), SDM_OK);
@@ -331,11 +343,13 @@ static void test_good_object(void **state)
     assert_true(fabs(v[0] - 1) < 1e-8 && fabs(v[3] + 1) < 1e-8 && fabs(v[1]) < 1e-8);
     sdm_mesh_dispose(&m);
     sdm_instance_free(s);
-    assert_int_equal(sdm_registry_load_path(registry, PLUGIN_FOLDER "/good", &err), SDM_E_PLUGIN); // a second time
+    assert_int_equal(sdm_registry_load_path(registry, PLUGIN_FOLDER "/good", &err),
+                     SDM_E_PLUGIN); // a second time
     has("shape 'octahedron' is there already (/");
 }
 
-// what is loaded first does not depend on the order of the folder; files of other names are passed over
+// what is loaded first does not depend on the order of the folder; files of other names are passed
+// over
 static void test_folder(void **state)
 {
     (void)state;
@@ -356,8 +370,9 @@ int main(void)
 {
 #define WITH_REGISTRY(test) cmocka_unit_test_setup_teardown(test, set_up, tear_down)
     const struct CMUnitTest tests[] = {
-        WITH_REGISTRY(test_table_of_version_1), WITH_REGISTRY(test_short_table), WITH_REGISTRY(test_long_table),
-        WITH_REGISTRY(test_wrong_abi),          WITH_REGISTRY(test_bad_objects), WITH_REGISTRY(test_not_an_object),
+        WITH_REGISTRY(test_table_of_version_1), WITH_REGISTRY(test_short_table),
+        WITH_REGISTRY(test_long_table),         WITH_REGISTRY(test_wrong_abi),
+        WITH_REGISTRY(test_bad_objects),        WITH_REGISTRY(test_not_an_object),
         WITH_REGISTRY(test_good_object),        WITH_REGISTRY(test_folder),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,11 +1,12 @@
-/* Fuzz target of the configuration: any bytes give a config or a message; what is read is dumped and reads back the same.
-   Parts of the input are separated by the byte 0x01: first the file, then key=value arguments.
-   With SDM_FUZZ_REPLAY it is a program that feeds files or folders of files to the target. */
+/* Fuzz target of the configuration: any bytes give a config or a message; what is read is dumped
+   and reads back the same. Parts of the input are separated by the byte 0x01: first the file, then
+   key=value arguments. With SDM_FUZZ_REPLAY it is a program that feeds files or folders of files to
+   the target. */
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "sdm/config.h"
+#include "sdm/internal/config.h"
 
 enum { OVERRIDES_MAX = 8, INPUT_MAX = 1 << 21 };
 
@@ -54,10 +55,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 
     sdm_error err;
     err.text[0] = 0;
-    const sdm_status s = sdm_config_parse("fuzz.yaml", file, file_size, overrides, n_overrides, &config, &err);
+    const sdm_status s =
+        sdm_config_parse("fuzz.yaml", file, file_size, overrides, n_overrides, &config, &err);
     require(s == SDM_OK || s == SDM_E_CONFIG);
     if (s)
-        require(strncmp(err.text, "fuzz.yaml:", 10) == 0 || strncmp(err.text, "argument '", 10) == 0);
+        require(strncmp(err.text, "fuzz.yaml:", 10) == 0 ||
+                strncmp(err.text, "argument '", 10) == 0);
     else
         check_round_trip();
     free(file);
@@ -88,7 +91,8 @@ static int replay_folder(DIR *folder, const char *path)
     for (const struct dirent *entry; (entry = readdir(folder));) {
         char name[4096];
         if (entry->d_name[0] == '.') continue;
-        if ((size_t)snprintf(name, sizeof name, "%s/%s", path, entry->d_name) >= sizeof name) continue;
+        if ((size_t)snprintf(name, sizeof name, "%s/%s", path, entry->d_name) >= sizeof name)
+            continue;
         n += replay_file(name);
     }
     return n;

@@ -1,4 +1,5 @@
-/* Meshes for the tests and benchmarks of the exact engine: boxes, spheres, and a tube along a spiral that overlaps itself. */
+/* Meshes for the tests and benchmarks of the exact engine: boxes, spheres, and a tube along a
+ * spiral that overlaps itself. */
 #ifndef SDM_TEST_EXACT_MESHES_H
 #define SDM_TEST_EXACT_MESHES_H
 
@@ -28,7 +29,8 @@ static inline void mesh_triangle(sdm_mesh *m, size_t t, size_t a, size_t b, size
 
 static inline void mesh_flip(sdm_mesh *m)
 {
-    for (size_t t = 0; t < m->n_tri; t++) mesh_triangle(m, t, m->tri[3 * t], m->tri[3 * t + 2], m->tri[3 * t + 1]);
+    for (size_t t = 0; t < m->n_tri; t++)
+        mesh_triangle(m, t, m->tri[3 * t], m->tri[3 * t + 2], m->tri[3 * t + 1]);
 }
 
 /* Appends a copy of b. */
@@ -122,7 +124,8 @@ static inline double spiral_centre(const spiral *s, double theta, double c[3], d
     tangent[0] = r * (-s->b * cos(theta) - sin(theta));
     tangent[1] = r * (-s->b * sin(theta) + cos(theta));
     tangent[2] = 0.20 + wave * (-0.3 * cos(theta - s->phi) - sin(theta - s->phi));
-    const double len = sqrt(tangent[0] * tangent[0] + tangent[1] * tangent[1] + tangent[2] * tangent[2]);
+    const double len =
+        sqrt(tangent[0] * tangent[0] + tangent[1] * tangent[1] + tangent[2] * tangent[2]);
     for (int i = 0; i < 3; i++) tangent[i] /= len;
     return len;
 }
@@ -167,8 +170,10 @@ static inline void mesh_spiral(sdm_mesh *m, const spiral *s, double edge)
     double c[3], t[3];
     length[0] = 0;
     for (int i = 0; i < fine; i++)
-        length[i + 1] = length[i] + spiral_centre(s, s->end * (i + 0.5) / fine, c, t) * s->end / fine;
-    const size_t along = (size_t)ceil(length[fine] / edge), around = (size_t)ceil(2 * pi * 1.0 / edge);
+        length[i + 1] =
+            length[i] + spiral_centre(s, s->end * (i + 0.5) / fine, c, t) * s->end / fine;
+    const size_t along = (size_t)ceil(length[fine] / edge),
+                 around = (size_t)ceil(2 * pi * 1.0 / edge);
     const size_t cap = (size_t)ceil(0.5 * pi / edge), rings = along + 1 + 2 * (cap - 1);
     mesh_make(m, rings * around + 2, 2 * rings * around);
     size_t ring = 0;
@@ -178,22 +183,26 @@ static inline void mesh_spiral(sdm_mesh *m, const spiral *s, double edge)
         while (at < fine && length[at] < length[fine] * (double)mid / (double)along) at++;
         const double theta = s->end * at / fine, r = spiral_radius(s, theta);
         (void)spiral_centre(s, theta, c, t);
-        const double bend = i < cap - 1           ? pi / 2 * (1 - (double)(i + 1) / (double)cap)
-                            : i > along + cap - 1 ? pi / 2 * (double)(i - along - cap + 1) / (double)cap
-                                                  : 0;
+        const double bend = i < cap - 1 ? pi / 2 * (1 - (double)(i + 1) / (double)cap)
+                            : i > along + cap - 1
+                                ? pi / 2 * (double)(i - along - cap + 1) / (double)cap
+                                : 0;
         const double shift = (i < cap - 1 ? -r : r) * sin(bend), radius = r * cos(bend);
         const double flat = sqrt(t[0] * t[0] + t[1] * t[1]);
         const double e1[3] = {t[1] / flat, -t[0] / flat, 0};
-        const double e2[3] = {e1[1] * t[2] - e1[2] * t[1], e1[2] * t[0] - e1[0] * t[2], e1[0] * t[1] - e1[1] * t[0]};
+        const double e2[3] = {e1[1] * t[2] - e1[2] * t[1], e1[2] * t[0] - e1[0] * t[2],
+                              e1[0] * t[1] - e1[1] * t[0]};
         for (size_t j = 0; j < around; j++) {
             const double b = 2 * pi * ((double)j + 0.5 * (double)(i % 2)) / (double)around;
             double x[3];
-            for (int k = 0; k < 3; k++) x[k] = c[k] + shift * t[k] + radius * (cos(b) * e1[k] + sin(b) * e2[k]);
+            for (int k = 0; k < 3; k++)
+                x[k] = c[k] + shift * t[k] + radius * (cos(b) * e1[k] + sin(b) * e2[k]);
             mesh_vertex(m, i * around + j, x[0], x[1], x[2]);
         }
     }
     for (size_t end = 0; end < 2; end++) {
-        const double theta = end ? s->end : 0, r = end ? spiral_radius(s, theta) : -spiral_radius(s, theta);
+        const double theta = end ? s->end : 0,
+                     r = end ? spiral_radius(s, theta) : -spiral_radius(s, theta);
         (void)spiral_centre(s, theta, c, t);
         mesh_vertex(m, rings * around + end, c[0] + r * t[0], c[1] + r * t[1], c[2] + r * t[2]);
     }
@@ -202,7 +211,8 @@ static inline void mesh_spiral(sdm_mesh *m, const spiral *s, double edge)
     for (size_t j = 0; j < around; j++) {
         const size_t k = (j + 1) % around;
         mesh_triangle(m, n++, rings * around, k, j);
-        mesh_triangle(m, n++, rings * around + 1, (rings - 1) * around + j, (rings - 1) * around + k);
+        mesh_triangle(m, n++, rings * around + 1, (rings - 1) * around + j,
+                      (rings - 1) * around + k);
         for (size_t i = 0; i + 1 < rings; i++) {
             const size_t a = i * around, b = a + around;
             if (i % 2 == 0) {

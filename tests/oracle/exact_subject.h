@@ -1,4 +1,5 @@
-/* A random mesh with its engine, and what the tests of both ask: truth, tolerances, voxels. Include after cmocka.h. */
+/* A random mesh with its engine, and what the tests of both ask: truth, tolerances, voxels. Include
+ * after cmocka.h. */
 #ifndef SDM_TEST_EXACT_SUBJECT_H
 #define SDM_TEST_EXACT_SUBJECT_H
 
@@ -11,10 +12,12 @@
 
 enum { SUBJECT_SEED = 2026 };
 
-/* Largest error of a distance, in roundings: DBL_EPSILON times the largest coordinate of the mesh and of the point. */
+/* Largest error of a distance, in roundings: DBL_EPSILON times the largest coordinate of the mesh
+ * and of the point. */
 static const double bound = 16;
 
-/* Signs of open meshes are sums of rounded angles: not judged nearer to the surface than this share of its size. */
+/* Signs of open meshes are sums of rounded angles: not judged nearer to the surface than this share
+ * of its size. */
 static const double open_margin = 1e-8;
 
 typedef struct subject {
@@ -27,13 +30,13 @@ typedef struct subject {
     dice dice;
 } subject;
 
-#define CHECK(condition, s, x, ...)                                                                                    \
-    do {                                                                                                               \
-        if (!(condition)) {                                                                                            \
-            print_error("mesh %u, %s, at (%.17g, %.17g, %.17g): ", (unsigned)(s)->number, (s)->family->name, (x)[0],   \
-                        (x)[1], (x)[2]);                                                                               \
-            fail_msg(__VA_ARGS__);                                                                                     \
-        }                                                                                                              \
+#define CHECK(condition, s, x, ...)                                                                \
+    do {                                                                                           \
+        if (!(condition)) {                                                                        \
+            print_error("mesh %u, %s, at (%.17g, %.17g, %.17g): ", (unsigned)(s)->number,          \
+                        (s)->family->name, (x)[0], (x)[1], (x)[2]);                                \
+            fail_msg(__VA_ARGS__);                                                                 \
+        }                                                                                          \
     } while (0)
 
 static inline sdm_exact *engine_of(const subject *s, const sdm_mesh *m, const sdm_exact_opts *opts)
@@ -65,12 +68,14 @@ static inline size_t turn_parts(sdm_mesh *m)
         const point o = point_of(&m->vert[3 * v]);
         for (size_t t = 0; t < m->n_tri; t++)
             if (part[m->tri[3 * t]] == v)
-                volume += dot(minus(corner_of(m, 3 * t), o),
-                              cross(minus(corner_of(m, 3 * t + 1), o), minus(corner_of(m, 3 * t + 2), o)));
+                volume +=
+                    dot(minus(corner_of(m, 3 * t), o), cross(minus(corner_of(m, 3 * t + 1), o),
+                                                             minus(corner_of(m, 3 * t + 2), o)));
         if (!(volume < 0)) continue;
         n++;
         for (size_t t = 0; t < m->n_tri; t++)
-            if (part[m->tri[3 * t]] == v) mesh_triangle(m, t, m->tri[3 * t], m->tri[3 * t + 2], m->tri[3 * t + 1]);
+            if (part[m->tri[3 * t]] == v)
+                mesh_triangle(m, t, m->tri[3 * t], m->tri[3 * t + 2], m->tri[3 * t + 1]);
     }
     free(part);
     return n;
@@ -127,12 +132,13 @@ static inline float *map_of(const subject *s, const sdm_exact *e, const sdm_grid
 {
     sdm_error err = {0};
     float *v = malloc(sdm_grid_count(g) * sizeof *v);
-    if (!v || sdm_exact_map(e, g, v, &err)) fail_msg("mesh %u, %s: %s", (unsigned)s->number, s->family->name, err.text);
+    if (!v || sdm_exact_map(e, g, v, &err))
+        fail_msg("mesh %u, %s: %s", (unsigned)s->number, s->family->name, err.text);
     return v;
 }
 
-/* A grid around or near the mesh. Exact: the positions of all voxels are numbers without rounding. Otherwise voxels on corners of
-   the mesh, or rotated, reflected and with three spacings. */
+/* A grid around or near the mesh. Exact: the positions of all voxels are numbers without rounding.
+   Otherwise voxels on corners of the mesh, or rotated, reflected and with three spacings. */
 static inline sdm_grid random_grid(subject *s, bool *exact)
 {
     dice *d = &s->dice;
@@ -144,7 +150,8 @@ static inline sdm_grid random_grid(subject *s, bool *exact)
     const double unit = ldexp(1, exponent - 4);
     for (int a = 0; a < 3; a++) {
         g.n[a] = 1 + (int64_t)pick(d, 12);
-        g.spacing[a] = kind < 2 ? unit * (double)(1 + pick(d, 4)) : s->size * power_of_ten(d, -2, -0.3);
+        g.spacing[a] =
+            kind < 2 ? unit * (double)(1 + pick(d, 4)) : s->size * power_of_ten(d, -2, -0.3);
         g.origin[a] = corner[a] - g.spacing[a] * (double)pick(d, (size_t)g.n[a]);
         if (kind == 0) g.origin[a] = unit * round(g.origin[a] / unit);
     }

@@ -1,4 +1,5 @@
-/* What the tests of the fit begin with: a small ellipsoid, seen in phantoms; cmocka.h comes before. */
+/* What the tests of the fit begin with: a small ellipsoid, seen in phantoms; cmocka.h comes before.
+ */
 #ifndef SDM_TEST_FIT_TOOLS_H
 #define SDM_TEST_FIT_TOOLS_H
 
@@ -8,8 +9,9 @@
 
 #include "sdm/builtin_shapes.h"
 #include "sdm/fit.h"
+#include "sdm/internal/rng.h"
+#include "sdm/internal/rotation.h"
 #include "sdm/phantom.h"
-#include "sdm/rng.h"
 
 static sdm_registry *registry;
 static sdm_instance *ellipsoid;
@@ -21,8 +23,8 @@ static int set_up(void **state)
 {
     (void)state;
     return sdm_registry_create(&registry, NULL) || sdm_builtin_shapes_add(registry, NULL) ||
-           sdm_instance_create(sdm_registry_find(registry, "ellipsoid", NULL), &(sdm_named_text){"edge", "0.2"}, 1,
-                               NULL, &ellipsoid, NULL);
+           sdm_instance_create(sdm_registry_find(registry, "ellipsoid", NULL),
+                               &(sdm_named_text){"edge", "0.2"}, 1, NULL, &ellipsoid, NULL);
 }
 
 static int tear_down(void **state)
@@ -35,15 +37,17 @@ static int tear_down(void **state)
 
 static inline sdm_fit_source exact_source(void)
 {
-    return (sdm_fit_source){.shape = ellipsoid,
-                            .grid = sdm_grid_centred((int64_t[3]){30, 28, 26}, 0.25, (double[3]){0, 0, 0})};
+    return (sdm_fit_source){
+        .shape = ellipsoid,
+        .grid = sdm_grid_centred((int64_t[3]){30, 28, 26}, 0.25, (double[3]){0, 0, 0})};
 }
 
 /* Turned against the world, with voxels of three sizes. */
 static inline sdm_grid image_grid(void)
 {
     sdm_grid g = sdm_grid_centred((int64_t[3]){36, 30, 26}, 0.25, (double[3]){0, 0, 0});
-    const double h[3] = {0.22, 0.25, 0.28}, middle[3] = {17.5, 14.5, 12.5}, centre[3] = {0.3, -0.2, 0.1};
+    const double h[3] = {0.22, 0.25, 0.28}, middle[3] = {17.5, 14.5, 12.5},
+                 centre[3] = {0.3, -0.2, 0.1};
     double at[3];
     memcpy(g.spacing, h, sizeof h);
     sdm_pose_matrix(&(sdm_pose){{0.2, 0.1, -0.3}, {0, 0, 0}}, g.dir);
@@ -96,7 +100,8 @@ static inline sdm_fit_result fit(const sdm_fit_target *t, const sdm_fit_opts *o)
     return r;
 }
 
-/* Errors in the order of the covariance: parameters, small turn about the world's axes, translation. */
+/* Errors in the order of the covariance: parameters, small turn about the world's axes,
+ * translation. */
 static inline void errors(const sdm_fit_result *r, const double *p, const sdm_pose *pose, double *e)
 {
     double a[9], b[9], m[9] = {0};
@@ -106,7 +111,8 @@ static inline void errors(const sdm_fit_result *r, const double *p, const sdm_po
         for (int k = 0; k < 3; k++) m[i] += a[3 * (i / 3) + k] * b[3 * (i % 3) + k];
     for (size_t k = 0; k < r->n_params; k++) e[k] = r->params[k] - p[k];
     sdm_rotation_vector(m, e + r->n_params);
-    for (size_t k = 0; k < 3; k++) e[r->n_params + 3 + k] = r->pose.translation[k] - pose->translation[k];
+    for (size_t k = 0; k < 3; k++)
+        e[r->n_params + 3 + k] = r->pose.translation[k] - pose->translation[k];
 }
 
 #endif

@@ -12,12 +12,13 @@
 #define PI 3.14159265358979323846
 
 /* A block whose face x = 0 is all a small grid sees of it: inside is x < 0. */
-static inline int block_mesh(const void *self, const sdm_host *host, const sdm_option_value *options, const double *p,
-                             sdm_mesh_out *out)
+static inline int block_mesh(const void *self, const sdm_host *host,
+                             const sdm_option_value *options, const double *p, sdm_mesh_out *out)
 {
     (void)self, (void)options;
-    static const uint32_t tri[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                                        {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+    static const uint32_t tri[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6},
+                                        {0, 1, 4}, {1, 5, 4}, {2, 6, 3}, {3, 6, 7},
+                                        {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
     const int failed = host->reserve(host, out, 8, 12);
     if (failed) return failed;
     for (int i = 0; i < 8; i++) {
@@ -47,7 +48,8 @@ static inline int set_up(void **state)
     const sdm_named_text edge = {"edge", "0.1"};
     if (sdm_registry_create(&registry, NULL) || sdm_builtin_shapes_add(registry, NULL)) return 1;
     return sdm_instance_create(&BLOCK, NULL, 0, NULL, &block, NULL) ||
-           sdm_instance_create(sdm_registry_find(registry, "ellipsoid", NULL), &edge, 1, NULL, &ellipsoid, NULL);
+           sdm_instance_create(sdm_registry_find(registry, "ellipsoid", NULL), &edge, 1, NULL,
+                               &ellipsoid, NULL);
 }
 
 static inline int tear_down(void **state)
@@ -72,15 +74,16 @@ static inline sdm_grid oblique(int64_t nx, int64_t ny, int64_t nz)
     sdm_grid g = {.n = {nx, ny, nz},
                   .spacing = {0.3, 0.2, 0.45},
                   .dir = {ca, -sa * cb, -sa * sb, sa, ca * cb, ca * sb, 0, sb, -cb}};
-    const double middle[3] = {0.5 * (double)(nx - 1), 0.5 * (double)(ny - 1), 0.5 * (double)(nz - 1)};
+    const double middle[3] = {0.5 * (double)(nx - 1), 0.5 * (double)(ny - 1),
+                              0.5 * (double)(nz - 1)};
     double centre[3];
     sdm_grid_world(&g, middle, centre);
     for (int i = 0; i < 3; i++) g.origin[i] = -centre[i];
     return g;
 }
 
-static inline float *make(const sdm_instance *shape, const double *p, const sdm_pose *pose, const sdm_phantom_opts *o,
-                          const sdm_grid *g, uint8_t *label)
+static inline float *make(const sdm_instance *shape, const double *p, const sdm_pose *pose,
+                          const sdm_phantom_opts *o, const sdm_grid *g, uint8_t *label)
 {
     sdm_error err;
     float *v = calloc(sdm_grid_count(g), sizeof *v);
@@ -91,7 +94,8 @@ static inline float *make(const sdm_instance *shape, const double *p, const sdm_
 
 static inline void close_to(const char *what, double got, double expected, double tolerance)
 {
-    if (!(fabs(got - expected) <= tolerance)) fail_msg("%s is %g, expected %g +- %g", what, got, expected, tolerance);
+    if (!(fabs(got - expected) <= tolerance))
+        fail_msg("%s is %g, expected %g +- %g", what, got, expected, tolerance);
 }
 
 #endif

@@ -1,5 +1,5 @@
-/* Random meshes for the tests of the exact engine, and points where engines fail: mesh number i is the same everywhere. Families are
-   listed in random_families[]. */
+/* Random meshes for the tests of the exact engine, and points where engines fail: mesh number i is
+   the same everywhere. Families are listed in random_families[]. */
 #ifndef SDM_TEST_RANDOM_MESHES_H
 #define SDM_TEST_RANDOM_MESHES_H
 
@@ -62,7 +62,8 @@ static inline void random_sheet(sdm_mesh *m, dice *d)
     mesh_make(m, (n + 1) * (n + 1), 4 * n * n);
     for (size_t i = 0; i <= n; i++)
         for (size_t j = 0; j <= n; j++)
-            mesh_vertex(m, i * (n + 1) + j, (double)i / (double)n, (double)j / (double)n, flat ? 0.5 : roll(d, 0, 1));
+            mesh_vertex(m, i * (n + 1) + j, (double)i / (double)n, (double)j / (double)n,
+                        flat ? 0.5 : roll(d, 0, 1));
     for (size_t i = 0; i < n; i++) {
         for (size_t j = 0; j < n; j++) {
             const size_t p = i * (n + 1) + j, q = p + n + 1, t = 4 * (i * n + j);
@@ -147,7 +148,8 @@ static inline void random_moebius(sdm_mesh *m, dice *d)
         const double a = 2 * 3.14159265358979323846 * (double)i / (double)n;
         for (size_t s = 0; s < 2; s++) {
             const double w = s ? width : -width;
-            mesh_vertex(m, 2 * i + s, (1 + w * cos(a / 2)) * cos(a), (1 + w * cos(a / 2)) * sin(a), w * sin(a / 2));
+            mesh_vertex(m, 2 * i + s, (1 + w * cos(a / 2)) * cos(a), (1 + w * cos(a / 2)) * sin(a),
+                        w * sin(a / 2));
         }
         const bool last = i + 1 == n;
         const size_t p = 2 * i, q = last ? 1 : p + 2, r = last ? 0 : p + 3;
@@ -184,7 +186,8 @@ static const random_family random_families[] = {
     {"touch", random_touch, SURFACE_OVERLAP},
     {"spindle", random_spindle, SURFACE_OVERLAP},
     {"copies", random_copies, SURFACE_OVERLAP},
-    {"shaken", random_shaken, SURFACE_CANCELS}, // loops of the shaken surface may enclose places less than no times
+    {"shaken", random_shaken,
+     SURFACE_CANCELS}, // loops of the shaken surface may enclose places less than no times
     {"layers", random_layers, SURFACE_CANCELS},
     {"sheet", random_sheet, SURFACE_CANCELS},
     {"turned part", random_turned_part, SURFACE_CANCELS},
@@ -195,7 +198,8 @@ static const random_family random_families[] = {
 };
 enum { RANDOM_FAMILIES = sizeof random_families / sizeof *random_families };
 
-/* Mesh number `number` of a family, as it is, rotated, moved or scaled, with its triangles shuffled. */
+/* Mesh number `number` of a family, as it is, rotated, moved or scaled, with its triangles
+ * shuffled. */
 static inline const random_family *random_mesh(sdm_mesh *m, uint64_t seed, uint64_t number)
 {
     const random_family *f = &random_families[number % RANDOM_FAMILIES];
@@ -235,8 +239,9 @@ static inline double mesh_bounds(const sdm_mesh *m, double lo[3], double hi[3])
     return largest;
 }
 
-/* A point where engines fail: on corners, edges, faces, their lines and planes; from there nowhere, a little away, along an axis (so
-   that rays along the axes meet needles, edges and corners), far away; with coordinates of several corners; or anywhere around. */
+/* A point where engines fail: on corners, edges, faces, their lines and planes; from there nowhere,
+   a little away, along an axis (so that rays along the axes meet needles, edges and corners), far
+   away; with coordinates of several corners; or anywhere around. */
 static inline void random_point(const sdm_mesh *m, dice *d, double x[3])
 {
     double lo[3], hi[3], size = 0;

@@ -1,12 +1,12 @@
-/* Random solids without overlap for the tests of the exact engine, from the project's counter-based random numbers; and what moves
-   meshes. */
+/* Random solids without overlap for the tests of the exact engine, from the project's counter-based
+   random numbers; and what moves meshes. */
 #ifndef SDM_TEST_RANDOM_SOLIDS_H
 #define SDM_TEST_RANDOM_SOLIDS_H
 
 #include <string.h>
 
 #include "oracle/exact_meshes.h"
-#include "sdm/rng.h"
+#include "sdm/internal/rng.h"
 
 /* A sequence of random numbers. */
 typedef struct dice {
@@ -17,8 +17,14 @@ static inline double roll(dice *d, double lo, double hi)
 {
     return lo + (hi - lo) * sdm_rng_uniform(d->seed, d->stream, d->next++);
 }
-static inline size_t pick(dice *d, size_t n) { return (size_t)sdm_rng_below(d->seed, d->stream, d->next++, n); }
-static inline double power_of_ten(dice *d, double lo, double hi) { return pow(10, roll(d, lo, hi)); }
+static inline size_t pick(dice *d, size_t n)
+{
+    return (size_t)sdm_rng_below(d->seed, d->stream, d->next++, n);
+}
+static inline double power_of_ten(dice *d, double lo, double hi)
+{
+    return pow(10, roll(d, lo, hi));
+}
 
 /* A number in [lo, hi], in half of the calls a multiple of 1/4. */
 static inline double lattice(dice *d, double lo, double hi)
@@ -83,7 +89,8 @@ static inline void random_tetrahedron(sdm_mesh *m, dice *d)
 {
     static const uint8_t face[4][3] = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
     mesh_make(m, 4, 4);
-    for (size_t v = 0; v < 4; v++) mesh_vertex(m, v, roll(d, -1, 1), roll(d, -1, 1), roll(d, -1, 1));
+    for (size_t v = 0; v < 4; v++)
+        mesh_vertex(m, v, roll(d, -1, 1), roll(d, -1, 1), roll(d, -1, 1));
     for (size_t t = 0; t < 4; t++) mesh_triangle(m, t, face[t][0], face[t][1], face[t][2]);
 }
 
@@ -194,8 +201,10 @@ static inline void random_wedge(sdm_mesh *m, dice *d)
 /* Two boxes a little apart, or one that is as thin as the gap. */
 static inline void random_gap(sdm_mesh *m, dice *d)
 {
-    const double gap = power_of_ten(d, -12, -1), lo[3] = {0, 0, 0}, hi[3] = {pick(d, 2) ? 1 : gap, 1, 1};
-    const double from[3] = {hi[0] + gap, pick(d, 2) ? 0 : 0.25, 0}, to[3] = {from[0] + 1, from[1] + 1, 0.75};
+    const double gap = power_of_ten(d, -12, -1), lo[3] = {0, 0, 0},
+                 hi[3] = {pick(d, 2) ? 1 : gap, 1, 1};
+    const double from[3] = {hi[0] + gap, pick(d, 2) ? 0 : 0.25, 0},
+                 to[3] = {from[0] + 1, from[1] + 1, 0.75};
     sdm_mesh part = {0};
     mesh_box(m, lo, hi);
     mesh_box(&part, from, to);
@@ -205,12 +214,14 @@ static inline void random_gap(sdm_mesh *m, dice *d)
 
 static inline void random_solid(sdm_mesh *m, dice *d)
 {
-    static void (*const make[])(sdm_mesh *, dice *) = {random_box,   random_tetrahedron, random_star, random_hull,
-                                                       random_torus, random_prism,       random_wedge};
+    static void (*const make[])(sdm_mesh *, dice *) = {
+        random_box,   random_tetrahedron, random_star, random_hull,
+        random_torus, random_prism,       random_wedge};
     make[pick(d, sizeof make / sizeof *make)](m, d);
     double volume = 0;
     for (size_t t = 0; t < m->n_tri; t++) {
-        const double *a = &m->vert[3 * (size_t)m->tri[3 * t]], *b = &m->vert[3 * (size_t)m->tri[3 * t + 1]],
+        const double *a = &m->vert[3 * (size_t)m->tri[3 * t]],
+                     *b = &m->vert[3 * (size_t)m->tri[3 * t + 1]],
                      *c = &m->vert[3 * (size_t)m->tri[3 * t + 2]];
         volume += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
                   a[2] * (b[0] * c[1] - b[1] * c[0]);
@@ -233,7 +244,8 @@ static inline void random_cavity(sdm_mesh *m, dice *d)
     sdm_mesh_dispose(&part);
 }
 
-/* Cubes of a lattice with all faces between full and empty: edges of four triangles, corners that touch. */
+/* Cubes of a lattice with all faces between full and empty: edges of four triangles, corners that
+ * touch. */
 static inline void random_cubes(sdm_mesh *m, dice *d)
 {
     enum { N = 3 };
@@ -241,7 +253,8 @@ static inline void random_cubes(sdm_mesh *m, dice *d)
     for (int i = 0; i < N * N * N; i++) full[1 + i / 9][1 + i / 3 % 3][1 + i % 3] = pick(d, 5) < 2;
     full[2][2][2] = true;
     mesh_make(m, 64, 0);
-    for (size_t v = 0; v < 64; v++) mesh_vertex(m, v, (double)(v % 4), (double)(v / 4 % 4), (double)(v / 16));
+    for (size_t v = 0; v < 64; v++)
+        mesh_vertex(m, v, (double)(v % 4), (double)(v / 4 % 4), (double)(v / 16));
     const size_t step[3] = {1, 4, 16};
     for (int z = 0; z <= N; z++) {
         for (int y = 0; y <= N; y++) {
@@ -250,8 +263,10 @@ static inline void random_cubes(sdm_mesh *m, dice *d)
                     const bool here = full[z + 1][y + 1][x + 1];
                     const bool before = full[z + (a != 2)][y + (a != 1)][x + (a != 0)];
                     if (here == before) continue;
-                    const size_t u = step[(a + 1) % 3], v = step[(a + 2) % 3], p = (size_t)(x + 4 * y + 16 * z);
-                    const size_t q[4] = {p, p + (before ? u : v), p + u + v, p + (before ? v : u)}, turn = pick(d, 2);
+                    const size_t u = step[(a + 1) % 3], v = step[(a + 2) % 3],
+                                 p = (size_t)(x + 4 * y + 16 * z);
+                    const size_t q[4] = {p, p + (before ? u : v), p + u + v, p + (before ? v : u)},
+                                 turn = pick(d, 2);
                     const size_t t = m->n_tri;
                     mesh_make(m, 64, t + 2);
                     mesh_triangle(m, t, q[turn], q[turn + 1], q[turn + 2]);
@@ -278,7 +293,8 @@ static inline void random_touch(sdm_mesh *m, dice *d)
     sdm_mesh_dispose(&part);
 }
 
-/* A solid whose triangles are split at points inside, on edges, and on corners: slivers, triangles without area, repeated vertices. */
+/* A solid whose triangles are split at points inside, on edges, and on corners: slivers, triangles
+ * without area, repeated vertices. */
 static inline void random_slivers(sdm_mesh *m, dice *d)
 {
     random_solid(m, d);

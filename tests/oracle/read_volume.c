@@ -1,4 +1,5 @@
-/* Reads image files and prints what they hold as plain numbers, two lines a file, for check_volume.py. */
+/* Reads image files and prints what they hold as plain numbers, two lines a file, for
+ * check_volume.py. */
 #include <stdio.h>
 
 #include "sdm/volume.h"
@@ -21,7 +22,8 @@ int main(int argc, char **argv)
         }
         printf(" %s\n", sdm_voxel_name(v.stored));
         const size_t n = sdm_grid_count(g);
-        for (size_t i = 0; i < n; i++) printf("%.9g%c", (double)v.values[i], i + 1 < n ? ' ' : '\n');
+        for (size_t i = 0; i < n; i++)
+            printf("%.9g%c", (double)v.values[i], i + 1 < n ? ' ' : '\n');
         sdm_volume_dispose(&v);
     }
     return 0;

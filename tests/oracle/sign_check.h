@@ -1,4 +1,5 @@
-/* For tests of signs on grids: engines and maps that must succeed, rotated grids, winding numbers by an own formula. */
+/* For tests of signs on grids: engines and maps that must succeed, rotated grids, winding numbers
+ * by an own formula. */
 #ifndef SDM_TEST_SIGN_CHECK_H
 #define SDM_TEST_SIGN_CHECK_H
 
@@ -13,7 +14,7 @@
 
 #include "oracle/exact_meshes.h"
 #include "sdm/exact.h"
-#include "sdm/rng.h"
+#include "sdm/internal/rng.h"
 
 static const double zero[3] = {0, 0, 0};
 
@@ -42,11 +43,13 @@ static inline float *map(const sdm_exact *e, const sdm_grid *g)
 static inline void voxel(const sdm_grid *g, size_t i, double x[3])
 {
     const int64_t v = (int64_t)i;
-    const double index[3] = {(double)(v % g->n[0]), (double)(v / g->n[0] % g->n[1]), (double)(v / g->n[0] / g->n[1])};
+    const double index[3] = {(double)(v % g->n[0]), (double)(v / g->n[0] % g->n[1]),
+                             (double)(v / g->n[0] / g->n[1])};
     sdm_grid_world(g, index, x);
 }
 
-/* Rotation by random angles, columns orthonormal to rounding; mirrored: its first column turned round. */
+/* Rotation by random angles, columns orthonormal to rounding; mirrored: its first column turned
+ * round. */
 static inline void rotation(uint64_t seed, bool mirrored, double r[9])
 {
     double q[4];
@@ -55,8 +58,8 @@ static inline void rotation(uint64_t seed, bool mirrored, double r[9])
     for (int i = 0; mirrored && i < 9; i += 3) r[i] = -r[i];
 }
 
-/* Winding number by the angles that triangles are seen under; an own formula: the solid angle of three unit vectors by their
-   products (Eriksson 1990). */
+/* Winding number by the angles that triangles are seen under; an own formula: the solid angle of
+   three unit vectors by their products (Eriksson 1990). */
 static inline double winding(const sdm_mesh *m, const double x[3])
 {
     double sum = 0;
@@ -87,7 +90,8 @@ static inline void drop_triangles(sdm_mesh *m, bool (*drop)(const double middle[
     size_t n = 0;
     for (size_t t = 0; t < m->n_tri; t++) {
         double c[3] = {0, 0, 0};
-        for (size_t k = 0; k < 9; k++) c[k % 3] += m->vert[3 * (size_t)m->tri[3 * t + k / 3] + k % 3] / 3;
+        for (size_t k = 0; k < 9; k++)
+            c[k % 3] += m->vert[3 * (size_t)m->tri[3 * t + k / 3] + k % 3] / 3;
         if (!drop(c)) mesh_triangle(m, n++, m->tri[3 * t], m->tri[3 * t + 1], m->tri[3 * t + 2]);
     }
     m->n_tri = n;

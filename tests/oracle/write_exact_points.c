@@ -1,5 +1,6 @@
-/* Writes random closed meshes without overlap, points, and their distances by the exact engine as text for check_vtk.py:
-   "mesh V T P", V lines of a vertex, T lines of a triangle, P lines of a point and its signed distance. */
+/* Writes random closed meshes without overlap, points, and their distances by the exact engine as
+   text for check_vtk.py: "mesh V T P", V lines of a vertex, T lines of a triangle, P lines of a
+   point and its signed distance. */
 #include <stdio.h>
 
 #include "oracle/random_meshes.h"
@@ -21,11 +22,13 @@ static int write_mesh(uint64_t number)
     printf("mesh %zu %zu %d %s\n", m.n_vert, m.n_tri, POINTS, f->name);
     for (size_t v = 0; v < m.n_vert; v++)
         printf("%.17g %.17g %.17g\n", m.vert[3 * v], m.vert[3 * v + 1], m.vert[3 * v + 2]);
-    for (size_t t = 0; t < m.n_tri; t++) printf("%u %u %u\n", m.tri[3 * t], m.tri[3 * t + 1], m.tri[3 * t + 2]);
+    for (size_t t = 0; t < m.n_tri; t++)
+        printf("%u %u %u\n", m.tri[3 * t], m.tri[3 * t + 1], m.tri[3 * t + 2]);
     for (int i = 0; i < POINTS; i++) {
         double x[3];
         random_point(&m, &d, x);
-        printf("%.17g %.17g %.17g %.17g\n", x[0], x[1], x[2], sdm_exact_point(e, x, NULL, NULL, NULL));
+        printf("%.17g %.17g %.17g %.17g\n", x[0], x[1], x[2],
+               sdm_exact_point(e, x, NULL, NULL, NULL));
     }
     sdm_exact_free(e);
     sdm_mesh_dispose(&m);

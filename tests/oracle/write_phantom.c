@@ -1,8 +1,9 @@
-/* Writes the asymmetric phantom in every image format into a folder, with its values and geometry, for check_images.py. */
+/* Writes the asymmetric phantom in every image format into a folder, with its values and geometry,
+ * for check_images.py. */
 #include <stdio.h>
 
+#include "io/image_phantom.h"
 #include "sdm/image.h"
-#include "unit/phantom.h"
 
 static int write_one(const char *folder, int mirror)
 {
@@ -19,7 +20,8 @@ static int write_one(const char *folder, int mirror)
             return 1;
         }
     }
-    /* the geometry as plain numbers: sizes, then the 3 x 4 affine map from index to LPS mm, row by row */
+    /* the geometry as plain numbers: sizes, then the 3 x 4 affine map from index to LPS mm, row by
+     * row */
     printf("%d %lld %lld %lld", mirror, (long long)g.n[0], (long long)g.n[1], (long long)g.n[2]);
     for (int r = 0; r < 3; r++) {
         for (int c = 0; c < 3; c++) printf(" %.17g", g.dir[3 * r + c] * g.spacing[c]);

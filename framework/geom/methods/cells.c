@@ -1,5 +1,5 @@
-/* Method "cells": uniform cells with lists of the triangles in them, searched in growing shells around each voxel (the cells of
-   Huang, Li, Crawfis, Li 2001). Exact. */
+/* Method "cells": uniform cells with lists of the triangles in them, searched in growing shells
+   around each voxel (the cells of Huang, Li, Crawfis, Li 2001). Exact. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -18,11 +18,16 @@ typedef struct cells {
     size_t count;
     uint32_t *first; /* [count + 1] */
     uint32_t *list;  /* triangles of each cell */
-    uint64_t *seen;  /* [n_threads * n_tri] number of the last voxel that asked for the triangle, from 1 */
-    uint8_t *empty;  /* [count] cells nearer than this, by the largest index difference, hold no triangle */
+    uint64_t *
+        seen; /* [n_threads * n_tri] number of the last voxel that asked for the triangle, from 1 */
+    uint8_t *empty; /* [count] cells nearer than this, by the largest index difference, hold no
+                       triangle */
 } cells;
 
-static size_t cell_at(const cells *c, const int64_t i[3]) { return (size_t)((i[2] * c->n[1] + i[1]) * c->n[0] + i[0]); }
+static size_t cell_at(const cells *c, const int64_t i[3])
+{
+    return (size_t)((i[2] * c->n[1] + i[1]) * c->n[0] + i[0]);
+}
 
 static int64_t cell_of(const cells *c, int axis, double x)
 {
@@ -66,8 +71,8 @@ static bool passes(const cells *c, const sdm_frame *f, const int64_t i[3])
         along += f->n[a] * (c->lo[a] + ((double)i[a] + 0.5) * c->edge - f->a[a]);
         reach += fabs(f->n[a]) * 0.5 * c->edge;
     }
-    const double size =
-        fabs(c->lo[0]) + fabs(c->lo[1]) + fabs(c->lo[2]) + fabs(c->hi[0]) + fabs(c->hi[1]) + fabs(c->hi[2]);
+    const double size = fabs(c->lo[0]) + fabs(c->lo[1]) + fabs(c->lo[2]) + fabs(c->hi[0]) +
+                        fabs(c->hi[1]) + fabs(c->hi[2]);
     return fabs(along) <= reach + 1e-14 * size;
 }
 
@@ -78,7 +83,8 @@ static void put(cells *c, size_t t)
     for (int a = 0; a < 3; a++) {
         double lo = INFINITY, hi = -INFINITY;
         for (size_t k = 0; k < 3; k++) {
-            const double x = c->run->surface->vert[3 * (size_t)c->run->surface->tri[3 * t + k] + (size_t)a];
+            const double x =
+                c->run->surface->vert[3 * (size_t)c->run->surface->tri[3 * t + k] + (size_t)a];
             lo = sdm_lesser(lo, x);
             hi = sdm_greater(hi, x);
         }
@@ -106,13 +112,15 @@ static sdm_status fill_lists(cells *c, sdm_error *err)
         const uint32_t n = c->first[i];
         c->first[i] = (uint32_t)sum;
         sum += n;
-        if (sum > UINT32_MAX) s = sdm_fail(err, SDM_E_NOMEM, "more than %u triangles in cells", UINT32_MAX);
+        if (sum > UINT32_MAX)
+            s = sdm_fail(err, SDM_E_NOMEM, "more than %u triangles in cells", UINT32_MAX);
     }
     if (!s) s = sdm_run_reserve(c->run, sum, sizeof *c->list, err);
     if (!s) s = SDM_ALLOC(&c->list, sum, "triangles of cells", err);
     if (s) return s;
     for (size_t t = 0; t < c->run->surface->n_tri; t++) put(c, t);
-    memmove(c->first + 1, c->first, c->count * sizeof *c->first); // filling has moved every start to the next one
+    memmove(c->first + 1, c->first,
+            c->count * sizeof *c->first); // filling has moved every start to the next one
     c->first[0] = 0;
     return SDM_OK;
 }
@@ -130,7 +138,8 @@ static uint8_t from_neighbours(const cells *c, const int64_t i[3], int direction
             o[a] = i[a] + direction * d[a];
             within = within && o[a] >= 0 && o[a] < c->n[a];
         }
-        if (within && c->empty[cell_at(c, o)] < least) least = (uint8_t)(c->empty[cell_at(c, o)] + 1);
+        if (within && c->empty[cell_at(c, o)] < least)
+            least = (uint8_t)(c->empty[cell_at(c, o)] + 1);
     }
     return least;
 }
@@ -160,17 +169,20 @@ static double slab2(const cells *c, int axis, int64_t i, double x)
     return d * d;
 }
 
-/* Squared distance from x to anything in shell r and those around it; INFINITY when there are none. */
+/* Squared distance from x to anything in shell r and those around it; INFINITY when there are none.
+ */
 static double beyond2(const cells *c, const int64_t middle[3], const double x[3], int64_t r)
 {
     double out2[3], least = INFINITY;
     for (int a = 0; a < 3; a++) {
-        const double d = sdm_greater(0, sdm_greater(c->lo[a] - x[a], x[a] - (c->lo[a] + (double)c->n[a] * c->edge)));
+        const double d = sdm_greater(
+            0, sdm_greater(c->lo[a] - x[a], x[a] - (c->lo[a] + (double)c->n[a] * c->edge)));
         out2[a] = d * d;
     }
     for (int a = 0; a < 3; a++) {
         const double rest = out2[(a + 1) % 3] + out2[(a + 2) % 3];
-        if (middle[a] + r < c->n[a]) least = sdm_lesser(least, slab2(c, a, middle[a] + r, x[a]) + rest);
+        if (middle[a] + r < c->n[a])
+            least = sdm_lesser(least, slab2(c, a, middle[a] + r, x[a]) + rest);
         if (middle[a] - r >= 0) least = sdm_lesser(least, slab2(c, a, middle[a] - r, x[a]) + rest);
     }
     return least;
@@ -212,8 +224,8 @@ static void search_shell(const cells *c, int64_t r, search *s)
             const double yz2 = z2 + slab2(c, 1, i[1], s->x[1]);
             if (!(yz2 < s->d2)) continue;
             // rows of a face belong to the shell as a whole, others with their ends
-            const bool face =
-                i[2] == middle[2] - r || i[2] == middle[2] + r || i[1] == middle[1] - r || i[1] == middle[1] + r;
+            const bool face = i[2] == middle[2] - r || i[2] == middle[2] + r ||
+                              i[1] == middle[1] - r || i[1] == middle[1] + r;
             for (i[0] = face ? from[0] : middle[0] - r; i[0] <= to[0];) {
                 int64_t step = face || r == 0 ? 1 : 2 * r;
                 if (i[0] >= 0) {
@@ -249,8 +261,8 @@ static void map_row(void *job, int64_t row, int thread)
     }
 }
 
-static sdm_status map(const sdm_mesh *mesh, const sdm_grid *grid, const sdm_method_opts *opts, float *values,
-                      sdm_method_report *report, sdm_error *err)
+static sdm_status map(const sdm_mesh *mesh, const sdm_grid *grid, const sdm_method_opts *opts,
+                      float *values, sdm_method_report *report, sdm_error *err)
 {
     sdm_run run;
     cells c = {.run = &run};
@@ -266,8 +278,9 @@ static sdm_status map(const sdm_mesh *mesh, const sdm_grid *grid, const sdm_meth
     if (!s) s = sdm_run_parts(&run, grid->n[1] * grid->n[2], map_row, &c, 0, 1, err);
     if (!s) s = sdm_run_sign(&run, err);
     if (!s)
-        snprintf(run.report.note, sizeof run.report.note, "%lld x %lld x %lld cells of %.3g mm, %.1f triangles in each",
-                 (long long)c.n[0], (long long)c.n[1], (long long)c.n[2], c.edge,
+        snprintf(run.report.note, sizeof run.report.note,
+                 "%lld x %lld x %lld cells of %.3g mm, %.1f triangles in each", (long long)c.n[0],
+                 (long long)c.n[1], (long long)c.n[2], c.edge,
                  (double)c.first[c.count] / (double)c.count);
     sdm_free(c.frames);
     sdm_free(c.first);
@@ -277,5 +290,6 @@ static sdm_status map(const sdm_mesh *mesh, const sdm_grid *grid, const sdm_meth
     return sdm_run_end(&run, report, s);
 }
 
-const sdm_method sdm_method_cells = {"cells", "uniform cells with lists of triangles, searched in growing shells",
-                                     "Huang, Li, Crawfis, Li 2001", true, map};
+const sdm_method sdm_method_cells = {
+    "cells", "uniform cells with lists of triangles, searched in growing shells",
+    "Huang, Li, Crawfis, Li 2001", true, map};

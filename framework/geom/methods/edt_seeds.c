@@ -1,4 +1,5 @@
-/* Where the lines of the grid cross the surface, and how far the surface can be from these points. */
+/* Where the lines of the grid cross the surface, and how far the surface can be from these points.
+ */
 #include "edt_seeds.h"
 
 #include <math.h>
@@ -27,7 +28,8 @@ static void widen(end p, end *lo, end *hi)
     if (p.across > hi->across) *hi = p;
 }
 
-/* The segment in which the triangle meets the plane up = k; false: it does not. v[corner]: depth, across, up. */
+/* The segment in which the triangle meets the plane up = k; false: it does not. v[corner]: depth,
+ * across, up. */
 static bool slice_at(const double v[3][3], double k, end *lo, end *hi)
 {
     *lo = (end){0, INFINITY};
@@ -66,8 +68,10 @@ static void cross(const double v[3][3], const int64_t n[2], sdm_seeds *s)
         if (!slice_at(v, sdm_greater(least, sdm_lesser((double)k, most)), &lo, &hi)) continue;
         whole_range(lo.across, hi.across, n[0], &j, &j1);
         for (; j <= j1; j++) {
-            const double width = hi.across - lo.across, t = width > 0 ? ((double)j - lo.across) / width : 0;
-            put(s, (size_t)(k * n[0] + j), lo.depth + sdm_greater(0, sdm_lesser(t, 1)) * (hi.depth - lo.depth));
+            const double width = hi.across - lo.across,
+                         t = width > 0 ? ((double)j - lo.across) / width : 0;
+            put(s, (size_t)(k * n[0] + j),
+                lo.depth + sdm_greater(0, sdm_lesser(t, 1)) * (hi.depth - lo.depth));
             if (!(width > 0)) put(s, (size_t)(k * n[0] + j), hi.depth);
         }
     }
@@ -89,7 +93,8 @@ static void cross_all(const sdm_run *run, const double *index, int axis, sdm_see
     }
 }
 
-sdm_status sdm_seeds_build(sdm_run *run, const double *index, int axis, sdm_seeds *s, sdm_error *err)
+sdm_status sdm_seeds_build(sdm_run *run, const double *index, int axis, sdm_seeds *s,
+                           sdm_error *err)
 {
     const int64_t *n = run->grid->n;
     const size_t lines = (size_t)(n[0] * n[1] * n[2] / n[axis]);
@@ -102,14 +107,16 @@ sdm_status sdm_seeds_build(sdm_run *run, const double *index, int axis, sdm_seed
         const uint32_t count = s->first[i];
         s->first[i] = (uint32_t)sum;
         sum += count;
-        if (sum > UINT32_MAX) return sdm_fail(err, SDM_E_NOMEM, "more than %u crossings of grid lines", UINT32_MAX);
+        if (sum > UINT32_MAX)
+            return sdm_fail(err, SDM_E_NOMEM, "more than %u crossings of grid lines", UINT32_MAX);
     }
     s->n = sum;
     st = sdm_run_reserve(run, sum, sizeof *s->at, err);
     if (!st) st = SDM_ALLOC(&s->at, sum, "crossings of grid lines", err);
     if (st) return st;
     cross_all(run, index, axis, s);
-    memmove(s->first + 1, s->first, lines * sizeof *s->first); // filling has moved every start to the next one
+    memmove(s->first + 1, s->first,
+            lines * sizeof *s->first); // filling has moved every start to the next one
     s->first[0] = 0;
     return SDM_OK;
 }
@@ -122,10 +129,12 @@ void sdm_seeds_dispose(sdm_seeds *s)
 }
 
 /* ---- the bound ----
-   Seeds lie on the surface, so the distance to the nearest one is never below the true one, and above it by at most the distance
-   from the true nearest point q to a seed. The surface is cut into pieces smaller than a voxel; the largest distance from a point
-   of a piece to a seed bounds the error. Pieces farther from every voxel than the map's largest value hold no q. The search
-   starts from half a voxel's diagonal and what the middles of the triangles need, so most triangles need few pieces. */
+   Seeds lie on the surface, so the distance to the nearest one is never below the true one, and
+   above it by at most the distance from the true nearest point q to a seed. The surface is cut into
+   pieces smaller than a voxel; the largest distance from a point of a piece to a seed bounds the
+   error. Pieces farther from every voxel than the map's largest value hold no q. The search starts
+   from half a voxel's diagonal and what the middles of the triangles need, so most triangles need
+   few pieces. */
 
 typedef struct bound_job {
     const sdm_run *run;
@@ -176,7 +185,8 @@ static double near_seed2(const bound_job *b, const double p[3])
     return best;
 }
 
-/* Distance from p to a seed, from above: by the lines around p, else by way of the voxel next to p. */
+/* Distance from p to a seed, from above: by the lines around p, else by way of the voxel next to p.
+ */
 static double seed_distance(const bound_job *b, const double p[3])
 {
     const sdm_grid *g = b->run->grid;
@@ -196,7 +206,8 @@ static double outside(const bound_job *b, const double p[3])
 {
     const sdm_grid *g = b->run->grid;
     double d[3];
-    for (int a = 0; a < 3; a++) d[a] = sdm_greater(0, sdm_greater(-p[a], p[a] - (double)(g->n[a] - 1)));
+    for (int a = 0; a < 3; a++)
+        d[a] = sdm_greater(0, sdm_greater(-p[a], p[a] - (double)(g->n[a] - 1)));
     return sqrt(length2(g->spacing, d));
 }
 
@@ -209,7 +220,8 @@ static void measure_piece(const bound_job *b, const double v[3][3], double *foun
     for (int c = 0; c < 3; c++) {
         const double *p = v[c], *q = v[(c + 1) % 3];
         radius2 = sdm_greater(
-            radius2, length2(g->spacing, (const double[3]){p[0] - middle[0], p[1] - middle[1], p[2] - middle[2]}));
+            radius2, length2(g->spacing, (const double[3]){p[0] - middle[0], p[1] - middle[1],
+                                                           p[2] - middle[2]}));
         side2[c] = length2(g->spacing, (const double[3]){p[0] - q[0], p[1] - q[1], p[2] - q[2]});
         if (side2[c] > side2[longest]) longest = c;
     }
@@ -267,17 +279,19 @@ static double first_guess(const bound_job *b)
     return least;
 }
 
-sdm_status sdm_seeds_bound(const sdm_run *run, const double *index, const sdm_seeds seeds[3], const float *map,
-                           double *bound, sdm_error *err)
+sdm_status sdm_seeds_bound(const sdm_run *run, const double *index, const sdm_seeds seeds[3],
+                           const float *map, double *bound, sdm_error *err)
 {
     const sdm_grid *g = run->grid;
     bound_job b = {.run = run, .index = index, .seeds = seeds, .map = map};
     b.piece = 0.25 * sdm_lesser(g->spacing[0], sdm_lesser(g->spacing[1], g->spacing[2]));
-    for (size_t i = 0; i < sdm_grid_count(g); i++) b.farthest = sdm_greater(b.farthest, (double)map[i]);
+    for (size_t i = 0; i < sdm_grid_count(g); i++)
+        b.farthest = sdm_greater(b.farthest, (double)map[i]);
     *bound = INFINITY;
     if (b.farthest == INFINITY) return SDM_OK;
     b.least = first_guess(&b);
-    const int64_t parts = (int64_t)((run->surface->n_tri + TRIANGLES_A_PART - 1) / TRIANGLES_A_PART);
+    const int64_t parts =
+        (int64_t)((run->surface->n_tri + TRIANGLES_A_PART - 1) / TRIANGLES_A_PART);
     sdm_status s = SDM_ALLOC(&b.found, (size_t)parts, "error bounds", err);
     if (!s) s = sdm_run_parts(run, parts, measure_triangles, &b, 9, 10, err);
     if (!s) *bound = 0;

@@ -1,20 +1,22 @@
-/* Method "octree": adaptively sampled distances (Frisken, Perry, Rockwood, Jones 2000) on the lattice of the voxels. A cell is a box of
-   voxels with exact distances at its 8 corners; it is cut in eight until trilinear interpolation from the corners is proved to be
-   within max_error_mm of the distance everywhere in the cell, or no voxel is left between the corners.
+/* Method "octree": adaptively sampled distances (Frisken, Perry, Rockwood, Jones 2000) on the
+   lattice of the voxels. A cell is a box of voxels with exact distances at its 8 corners; it is cut
+   in eight until trilinear interpolation from the corners is proved to be within max_error_mm of
+   the distance everywhere in the cell, or no voxel is left between the corners.
 
-   The proof. A cell has a list of triangles that holds every triangle nearest to a point of the cell. Let d_k be the distances at
-   the corners c_k, I their trilinear interpolation, c the cell's middle and N the triangle nearest to c. The distance d(x, T) to
-   one triangle is a convex function of x, and trilinear weights are a mean over the corners, so
-     above: d(x) <= d(x, N) <= interpolation of d(c_k, N) <= I(x) + max_k (d(c_k, N) - d_k);
-     below: d(x, T) >= L_T(x), the tangent plane of d(., T) at c, hence d(x) >= I(x) + min_T min_k (L_T(c_k) - d_k).
-   A triangle with L_T(c_k) > d(c_k, N) at every corner is nearest nowhere in the cell and leaves the list. */
+   The proof. A cell has a list of triangles that holds every triangle nearest to a point of the
+   cell. Let d_k be the distances at the corners c_k, I their trilinear interpolation, c the cell's
+   middle and N the triangle nearest to c. The distance d(x, T) to one triangle is a convex function
+   of x, and trilinear weights are a mean over the corners, so above: d(x) <= d(x, N) <=
+   interpolation of d(c_k, N) <= I(x) + max_k (d(c_k, N) - d_k); below: d(x, T) >= L_T(x), the
+   tangent plane of d(., T) at c, hence d(x) >= I(x) + min_T min_k (L_T(c_k) - d_k). A triangle with
+   L_T(c_k) > d(c_k, N) at every corner is nearest nowhere in the cell and leaves the list. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "method.h"
+#include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
-#include "vec3.h"
 
 /* Voxels along the edge of a top cell, and how often it can be cut. */
 enum { TOP = 32, DEPTH = 6 };
@@ -52,31 +54,38 @@ typedef struct cell {
     int64_t lo[3], hi[3];
 } cell;
 
-static size_t lattice(int64_t i, int64_t j, int64_t k) { return (size_t)((k * SIDE + j) * SIDE + i); }
+static size_t lattice(int64_t i, int64_t j, int64_t k)
+{
+    return (size_t)((k * SIDE + j) * SIDE + i);
+}
 
 static void place(const octree *o, const int64_t origin[3], const double at[3], double x[3])
 {
-    const double index[3] = {(double)origin[0] + at[0], (double)origin[1] + at[1], (double)origin[2] + at[2]};
+    const double index[3] = {(double)origin[0] + at[0], (double)origin[1] + at[1],
+                             (double)origin[2] + at[2]};
     sdm_grid_world(o->run->grid, index, x);
 }
 
 /* Distance at a lattice point of a cell with this list. */
-static double exact_at(const octree *o, work *w, const int64_t origin[3], const int64_t i[3], const uint32_t *list,
-                       size_t n)
+static double exact_at(const octree *o, work *w, const int64_t origin[3], const int64_t i[3],
+                       const uint32_t *list, size_t n)
 {
     const size_t at = lattice(i[0], i[1], i[2]);
     if (w->state[at] == EXACT) return w->value[at];
     double x[3], least = INFINITY;
     place(o, origin, (const double[3]){(double)i[0], (double)i[1], (double)i[2]}, x);
-    for (size_t t = 0; t < n && n <= SHORT; t++) least = sdm_lesser(least, sdm_frame_distance2(&o->frames[list[t]], x));
+    for (size_t t = 0; t < n && n <= SHORT; t++)
+        least = sdm_lesser(least, sdm_frame_distance2(&o->frames[list[t]], x));
     w->value[at] = n <= SHORT ? sqrt(least) : sdm_exact_distance(o->run->engine, x);
     w->state[at] = EXACT;
     w->n_exact++;
     return w->value[at];
 }
 
-/* Tangents at c of the n listed triangles that can be nearest within radius of c, the nearest first. Returns how many. */
-static size_t tangents(const octree *o, tangent *out, const uint32_t *list, size_t n, const double c[3], double radius)
+/* Tangents at c of the n listed triangles that can be nearest within radius of c, the nearest
+ * first. Returns how many. */
+static size_t tangents(const octree *o, tangent *out, const uint32_t *list, size_t n,
+                       const double c[3], double radius)
 {
     double least = INFINITY;
     size_t nearest = 0, kept = 0;
@@ -100,9 +109,11 @@ static size_t tangents(const octree *o, tangent *out, const uint32_t *list, size
     return kept;
 }
 
-/* Tries to prove the cell; *n becomes the length of the list in `out` for its children. corner[k]: d_k at c_k - c = arm[k]. */
-static bool prove(const octree *o, const double c[3], const double arm[8][3], const double corner[8], const tangent *t,
-                  size_t n_tangents, uint32_t *out, size_t *n)
+/* Tries to prove the cell; *n becomes the length of the list in `out` for its children. corner[k]:
+ * d_k at c_k - c = arm[k]. */
+static bool prove(const octree *o, const double c[3], const double arm[8][3],
+                  const double corner[8], const tangent *t, size_t n_tangents, uint32_t *out,
+                  size_t *n)
 {
     const sdm_frame *nearest = &o->frames[t[0].triangle];
     double above = -INFINITY, below = INFINITY, top[8];
@@ -137,7 +148,9 @@ static void interpolate(work *w, const cell *c, const double corner[8])
                 const int64_t index[3] = {i, j, k};
                 double part[3], sum = 0;
                 for (int a = 0; a < 3; a++)
-                    part[a] = c->hi[a] > c->lo[a] ? (double)(index[a] - c->lo[a]) / (double)(c->hi[a] - c->lo[a]) : 0;
+                    part[a] = c->hi[a] > c->lo[a]
+                                  ? (double)(index[a] - c->lo[a]) / (double)(c->hi[a] - c->lo[a])
+                                  : 0;
                 for (int q = 0; q < 8; q++) {
                     double weight = 1;
                     for (int a = 0; a < 3; a++) weight *= q >> a & 1 ? part[a] : 1 - part[a];
@@ -150,7 +163,8 @@ static void interpolate(work *w, const cell *c, const double corner[8])
     }
 }
 
-static void refine(const octree *o, work *w, const int64_t origin[3], const cell *c, const uint32_t *list, size_t n)
+static void refine(const octree *o, work *w, const int64_t origin[3], const cell *c,
+                   const uint32_t *list, size_t n)
 {
     double middle[3], x[3], arm[8][3], corner[8], radius = 0;
     bool between = false;
@@ -198,10 +212,10 @@ static size_t first_list(const octree *o, const int64_t origin[3], const cell *c
     for (int a = 0; a < 3; a++) middle[a] = 0.5 * (double)c->hi[a];
     place(o, origin, middle, x);
     for (int k = 0; k < 8; k++) {
-        place(
-            o, origin,
-            (const double[3]){k & 1 ? (double)c->hi[0] : 0, k & 2 ? (double)c->hi[1] : 0, k & 4 ? (double)c->hi[2] : 0},
-            end);
+        place(o, origin,
+              (const double[3]){k & 1 ? (double)c->hi[0] : 0, k & 2 ? (double)c->hi[1] : 0,
+                                k & 4 ? (double)c->hi[2] : 0},
+              end);
         radius = sdm_greater(radius, sqrt(v3_dist2(x, end)));
     }
     const double reach = sdm_exact_distance(o->run->engine, x) + 2 * radius;
@@ -217,7 +231,8 @@ static void map_top_cell(void *job, int64_t part, int thread)
     const octree *o = job;
     const sdm_grid *g = o->run->grid;
     work *w = &o->work[thread];
-    const int64_t block[3] = {part % o->n_top[0], part / o->n_top[0] % o->n_top[1], part / (o->n_top[0] * o->n_top[1])};
+    const int64_t block[3] = {part % o->n_top[0], part / o->n_top[0] % o->n_top[1],
+                              part / (o->n_top[0] * o->n_top[1])};
     int64_t origin[3], own[3];
     cell c = {.lo = {0, 0, 0}};
     for (int a = 0; a < 3; a++) {
@@ -231,7 +246,8 @@ static void map_top_cell(void *job, int64_t part, int thread)
     refine(o, w, origin, &c, w->list, first_list(o, origin, &c, w->list));
     for (int64_t k = 0; k < own[2]; k++) {
         for (int64_t j = 0; j < own[1]; j++) {
-            float *out = o->run->values + ((origin[2] + k) * g->n[1] + origin[1] + j) * g->n[0] + origin[0];
+            float *out =
+                o->run->values + ((origin[2] + k) * g->n[1] + origin[1] + j) * g->n[0] + origin[0];
             for (int64_t i = 0; i < own[0]; i++) out[i] = (float)w->value[lattice(i, j, k)];
         }
     }
@@ -242,8 +258,8 @@ static sdm_status prepare(octree *o, sdm_error *err)
     sdm_run *run = o->run;
     const sdm_mesh *m = run->surface;
     const size_t threads = (size_t)run->n_threads,
-                 a_thread =
-                     LATTICE * (sizeof(double) + 1) + m->n_tri * (sizeof(tangent) + (DEPTH + 1) * sizeof(uint32_t));
+                 a_thread = LATTICE * (sizeof(double) + 1) +
+                            m->n_tri * (sizeof(tangent) + (DEPTH + 1) * sizeof(uint32_t));
     sdm_status s = sdm_run_reserve(run, threads, a_thread + sizeof(work), err);
     if (!s) s = sdm_run_reserve(run, m->n_tri, sizeof *o->ball, err);
     if (!s) s = SDM_ALLOC(&o->ball, m->n_tri, "balls around triangles", err);
@@ -259,7 +275,8 @@ static sdm_status prepare(octree *o, sdm_error *err)
         const double *v[3];
         for (size_t k = 0; k < 3; k++) v[k] = &m->vert[3 * (size_t)m->tri[3 * t + k]];
         for (int a = 0; a < 3; a++) o->ball[t][a] = (v[0][a] + v[1][a] + v[2][a]) / 3;
-        for (int k = 0; k < 3; k++) o->ball[t][3] = sdm_greater(o->ball[t][3], sqrt(v3_dist2(v[k], o->ball[t])));
+        for (int k = 0; k < 3; k++)
+            o->ball[t][3] = sdm_greater(o->ball[t][3], sqrt(v3_dist2(v[k], o->ball[t])));
     }
     return s;
 }
@@ -276,8 +293,8 @@ static void dispose(octree *o)
     sdm_free(o->ball);
 }
 
-static sdm_status map(const sdm_mesh *mesh, const sdm_grid *grid, const sdm_method_opts *opts, float *values,
-                      sdm_method_report *report, sdm_error *err)
+static sdm_status map(const sdm_mesh *mesh, const sdm_grid *grid, const sdm_method_opts *opts,
+                      float *values, sdm_method_report *report, sdm_error *err)
 {
     sdm_run run;
     octree o = {.run = &run};
@@ -287,12 +304,14 @@ static sdm_status map(const sdm_mesh *mesh, const sdm_grid *grid, const sdm_meth
     o.frames = frames;
     if (!s) s = prepare(&o, err);
     int64_t parts = 1;
-    for (int a = 0; a < 3 && !s; a++) parts *= o.n_top[a] = grid->n[a] > TOP ? (grid->n[a] - 1 + TOP - 1) / TOP : 1;
+    for (int a = 0; a < 3 && !s; a++)
+        parts *= o.n_top[a] = grid->n[a] > TOP ? (grid->n[a] - 1 + TOP - 1) / TOP : 1;
     if (!s) {
         sdm_run_prepared(&run);
         o.max_error = run.opts.max_error_mm;
         if (!(o.max_error > 0))
-            o.max_error = 0.05 * sdm_lesser(grid->spacing[0], sdm_lesser(grid->spacing[1], grid->spacing[2]));
+            o.max_error =
+                0.05 * sdm_lesser(grid->spacing[0], sdm_lesser(grid->spacing[1], grid->spacing[2]));
         run.report.error_bound_mm = o.max_error;
         s = sdm_run_parts(&run, parts, map_top_cell, &o, 0, 1, err);
     }
@@ -300,12 +319,14 @@ static sdm_status map(const sdm_mesh *mesh, const sdm_grid *grid, const sdm_meth
     size_t exact = 0;
     for (int i = 0; i < run.n_threads && !s; i++) exact += o.work[i].n_exact;
     if (!s)
-        snprintf(run.report.note, sizeof run.report.note, "%zu exact samples for %zu voxels, the others interpolated",
-                 exact, sdm_grid_count(grid));
+        snprintf(run.report.note, sizeof run.report.note,
+                 "%zu exact samples for %zu voxels, the others interpolated", exact,
+                 sdm_grid_count(grid));
     dispose(&o);
     sdm_free(frames);
     return sdm_run_end(&run, report, s);
 }
 
-const sdm_method sdm_method_octree = {"octree", "adaptively sampled distances, interpolated within a proved error",
-                                      "Frisken, Perry, Rockwood, Jones 2000", false, map};
+const sdm_method sdm_method_octree = {
+    "octree", "adaptively sampled distances, interpolated within a proved error",
+    "Frisken, Perry, Rockwood, Jones 2000", false, map};

@@ -1,4 +1,5 @@
-/* The regular grid a map lives on. Everywhere: mm, frame LPS, index (i, j, k) <-> (x, y, z), x fastest: values[nz][ny][nx]. */
+/* The regular grid a map lives on. Everywhere: mm, frame LPS, index (i, j, k) <-> (x, y, z), x
+ * fastest: values[nz][ny][nx]. */
 #ifndef SDM_GRID_H
 #define SDM_GRID_H
 
@@ -11,8 +12,8 @@
 extern "C" {
 #endif
 
-/* world = origin + dir * diag(spacing) * (i, j, k): origin is the CENTRE of voxel (0, 0, 0); dir is row-major and
-   orthonormal (a reflection is allowed). */
+/* world = origin + dir * diag(spacing) * (i, j, k): origin is the CENTRE of voxel (0, 0, 0); dir is
+   row-major and orthonormal (a reflection is allowed). */
 typedef struct sdm_grid {
     int64_t n[3];
     double origin[3];
@@ -23,8 +24,8 @@ typedef struct sdm_grid {
 /* Axis-aligned grid of n voxels of one spacing whose middle is `centre`. */
 SDM_API sdm_grid sdm_grid_centred(const int64_t n[3], double spacing, const double centre[3]);
 
-/* Sizes 1 .. 2^20 with a product that fits, spacing finite and positive, origin finite, dir orthonormal to 1e-6.
-   SDM_E_ARG names the first that is not. */
+/* Sizes 1 .. 2^20 with a product that fits, spacing finite and positive, origin finite, dir
+   orthonormal to 1e-6. SDM_E_ARG names the first that is not. */
 SDM_API sdm_status sdm_grid_check(const sdm_grid *g, sdm_error *err);
 
 /* Number of voxels; the grid must have passed sdm_grid_check(). */

@@ -12,8 +12,8 @@
 extern "C" {
 #endif
 
-/* Zero-initialise; sdm_mesh_dispose() frees. vert[n_vert][3] in mm, tri[n_tri][3] vertex indices, counter-clockwise seen from
-   outside. */
+/* Zero-initialise; sdm_mesh_dispose() frees. vert[n_vert][3] in mm, tri[n_tri][3] vertex indices,
+   counter-clockwise seen from outside. */
 typedef struct sdm_mesh {
     double *vert;
     uint32_t *tri;
@@ -21,8 +21,8 @@ typedef struct sdm_mesh {
     size_t cap_vert, cap_tri;
 } sdm_mesh;
 
-/* Sets n_vert and n_tri and makes room for them; the content is then the caller's to write. Old content is kept as far as it
-   fits. SDM_E_MESH over 2^31 vertices or triangles, SDM_E_NOMEM. */
+/* Sets n_vert and n_tri and makes room for them; the content is then the caller's to write. Old
+   content is kept as far as it fits. SDM_E_MESH over 2^31 vertices or triangles, SDM_E_NOMEM. */
 SDM_API sdm_status sdm_mesh_reserve(sdm_mesh *m, size_t n_vert, size_t n_tri, sdm_error *err);
 SDM_API sdm_status sdm_mesh_copy(const sdm_mesh *from, sdm_mesh *to, sdm_error *err);
 SDM_API void sdm_mesh_dispose(sdm_mesh *m);
@@ -40,13 +40,15 @@ typedef struct sdm_audit {
     double volume;             /* signed, mm^3; negative: the mesh is inside out */
     double area;               /* mm^2 */
     double min[3], max[3];     /* bounding box, mm */
-    bool closed;               /* no boundary edge, every edge balanced in direction: crossings define the inside */
-    bool manifold;             /* closed, and every edge has two triangles of one orientation */
-    bool inverted;             /* closed, and the volume is negative beyond rounding of the coordinates */
+    bool closed; /* no boundary edge, every edge balanced in direction: crossings define the inside
+                  */
+    bool manifold; /* closed, and every edge has two triangles of one orientation */
+    bool inverted; /* closed, and the volume is negative beyond rounding of the coordinates */
 } sdm_audit;
 
-/* Examines a mesh. SDM_E_MESH: no triangle, an index out of range, a coordinate that is not finite or above 1e70, a largest one below
-   1e-70 (all 0 will do). Between these the result is scale free: no absolute tolerance is used. [any thread] */
+/* Examines a mesh. SDM_E_MESH: no triangle, an index out of range, a coordinate that is not finite
+   or above 1e70, a largest one below 1e-70 (all 0 will do). Between these the result is scale free:
+   no absolute tolerance is used. [any thread] */
 SDM_API sdm_status sdm_mesh_audit(const sdm_mesh *m, sdm_audit *out, sdm_error *err);
 
 #ifdef __cplusplus

@@ -18,7 +18,8 @@ typedef struct sdm_model_param {
     double min, max, def;
 } sdm_model_param;
 
-/* Held-out figures measured at the end of training (fresh random shapes, exact distances as truth). */
+/* Held-out figures measured at the end of training (fresh random shapes, exact distances as truth).
+ */
 typedef struct sdm_accuracy {
     int64_t samples;
     double mse_mm2, rmse_mm, mae_mm, max_abs_mm;
@@ -33,9 +34,9 @@ typedef struct sdm_model_info {
     char version[16]; /* of the program that trained it */
     size_t n_params;
     const sdm_model_param *params;
-    size_t
-        n_options; /* options of the shape, as text, for the exact engine; behind an option NAME that is a file NAME.crc64, the checksum
-                         of its content when the network was trained */
+    size_t n_options; /* options of the shape, as text, for the exact engine; behind an option NAME
+                         that is a file NAME.crc64, the checksum of its content when the network was
+                         trained */
     const char *const *option_names, *const *option_values;
     sdm_grid grid;
     sdm_accuracy accuracy;
@@ -52,57 +53,54 @@ typedef struct sdm_model_info {
 /* Immutable once opened: any number of threads may use one model. */
 typedef struct sdm_model sdm_model;
 
-/* Reads and checks a model file: every size against the file's length before anything is allocated, every checksum.
-   SDM_E_IO; SDM_E_FORMAT: not a model, damaged, truncated, or of a newer version. */
+/* Reads and checks a model file: every size against the file's length before anything is allocated,
+   every checksum. SDM_E_IO; SDM_E_FORMAT: not a model, damaged, truncated, or of a newer version.
+ */
 SDM_API sdm_status sdm_model_open(const char *path, sdm_model **out, sdm_error *err);
-/* The same for a file that is in memory; the bytes are copied. `name` stands for the file in messages. */
-SDM_API sdm_status sdm_model_open_memory(const char *name, const uint8_t *bytes, size_t size, sdm_model **out,
-                                         sdm_error *err);
+/* The same for a file that is in memory; the bytes are copied. `name` stands for the file in
+ * messages. */
+SDM_API sdm_status sdm_model_open_memory(const char *name, const uint8_t *bytes, size_t size,
+                                         sdm_model **out, sdm_error *err);
 SDM_API void sdm_model_free(sdm_model *m);
 SDM_API const sdm_model_info *sdm_model_get_info(const sdm_model *m);
 
 /* Bytes of scratch memory that one call of sdm_model_forward needs for a batch of n. */
 SDM_API size_t sdm_model_scratch_bytes(const sdm_model *m, size_t n);
 
-/* values[n][nz][ny][nx] = the maps at params[n][n_params], mm, written; no checks of the parameters, no allocation.
-   scratch: sdm_model_scratch_bytes(m, n), 64-byte aligned. One thread. [any thread] */
-SDM_API void sdm_model_forward(const sdm_model *m, const double *params, size_t n, float *values, void *scratch);
+/* values[n][nz][ny][nx] = the maps at params[n][n_params], mm, written; no checks of the
+   parameters, no allocation. scratch: sdm_model_scratch_bytes(m, n), 64-byte aligned. One thread.
+   [any thread] */
+SDM_API void sdm_model_forward(const sdm_model *m, const double *params, size_t n, float *values,
+                               void *scratch);
 
 /* Bytes of scratch memory for sdm_model_jacobian. */
 SDM_API size_t sdm_model_jacobian_scratch_bytes(const sdm_model *m);
 
-/* The map and its derivatives by forward mode: values[nz][ny][nx], jacobian[n_params][nz][ny][nx] (mm per unit of the
-   parameter). One thread, no allocation. [any thread] */
-SDM_API void sdm_model_jacobian(const sdm_model *m, const double *params, float *values, float *jacobian,
-                                void *scratch);
+/* The map and its derivatives by forward mode: values[nz][ny][nx], jacobian[n_params][nz][ny][nx]
+   (mm per unit of the parameter). One thread, no allocation. [any thread] */
+SDM_API void sdm_model_jacobian(const sdm_model *m, const double *params, float *values,
+                                float *jacobian, void *scratch);
 
-/* The map and its derivative along direction[n_params] (mm per unit of the direction) by forward mode, cheaper than the Jacobian:
-   values[nz][ny][nx], tangent[nz][ny][nx]. One thread, no allocation; scratch as above. [any thread] */
+/* The map and its derivative along direction[n_params] (mm per unit of the direction) by forward
+   mode, cheaper than the Jacobian: values[nz][ny][nx], tangent[nz][ny][nx]. One thread, no
+   allocation; scratch as above. [any thread] */
 SDM_API size_t sdm_model_jvp_scratch_bytes(const sdm_model *m);
-SDM_API void sdm_model_jvp(const sdm_model *m, const double *params, const double *direction, float *values,
-                           float *tangent, void *scratch);
+SDM_API void sdm_model_jvp(const sdm_model *m, const double *params, const double *direction,
+                           float *values, float *tangent, void *scratch);
 
-/* gradient[n_params] = sum over voxels of adjoint[nz][ny][nx] times d value / d parameter, by reverse mode, at the cost of a few
-   maps whatever the number of parameters. One thread, no allocation; scratch as above. [any thread] */
+/* gradient[n_params] = sum over voxels of adjoint[nz][ny][nx] times d value / d parameter, by
+   reverse mode, at the cost of a few maps whatever the number of parameters. One thread, no
+   allocation; scratch as above. [any thread] */
 SDM_API size_t sdm_model_vjp_scratch_bytes(const sdm_model *m);
-SDM_API void sdm_model_vjp(const sdm_model *m, const double *params, const float *adjoint, double *gradient,
-                           void *scratch);
+SDM_API void sdm_model_vjp(const sdm_model *m, const double *params, const float *adjoint,
+                           double *gradient, void *scratch);
 
-/* tangent[n] = J direction[P], and gradient[P] = J^T adjoint[n], for a Jacobian J[P][n] that is there. [any thread] */
-SDM_API void sdm_jacobian_times(const float *jacobian, size_t n_params, size_t n, const double *direction,
-                                float *tangent);
-SDM_API void sdm_jacobian_transposed_times(const float *jacobian, size_t n_params, size_t n, const float *adjoint,
-                                           double *gradient);
-
-/* The functions below share each map among n_threads >= 1 threads, with the same bits for any number. True: a map is work enough for
-   that; otherwise several maps are better given to a thread each. */
-SDM_API bool sdm_model_is_threaded(const sdm_model *m);
-SDM_API size_t sdm_model_scratch_bytes_threads(const sdm_model *m, size_t n, int n_threads);
-SDM_API void sdm_model_forward_threads(const sdm_model *m, const double *params, size_t n, float *values, void *scratch,
-                                       int n_threads);
-SDM_API size_t sdm_model_jacobian_scratch_bytes_threads(const sdm_model *m, int n_threads);
-SDM_API void sdm_model_jacobian_threads(const sdm_model *m, const double *params, float *values, float *jacobian,
-                                        void *scratch, int n_threads);
+/* tangent[n] = J direction[P], and gradient[P] = J^T adjoint[n], for a Jacobian J[P][n] that is
+ * there. [any thread] */
+SDM_API void sdm_jacobian_times(const float *jacobian, size_t n_params, size_t n,
+                                const double *direction, float *tangent);
+SDM_API void sdm_jacobian_transposed_times(const float *jacobian, size_t n_params, size_t n,
+                                           const float *adjoint, double *gradient);
 
 #ifdef __cplusplus
 }

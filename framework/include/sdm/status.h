@@ -27,18 +27,22 @@ typedef enum sdm_status {
 
 #define SDM_ERROR_TEXT_MAX 4096
 
-/* Error message, owned by the caller (on its stack): no lock, no stale text. `text` is one line, except for a
-   configuration, where every mistake has its own line. */
+/* Error message, owned by the caller (on its stack): no lock, no stale text. `text` is one line,
+   except for a configuration, where every mistake has its own line. */
 typedef struct sdm_error {
     sdm_status status;
     char text[SDM_ERROR_TEXT_MAX];
 } sdm_error;
 
-/* Stores status and formatted text in *err (which may be NULL) and returns `status`. Text that does not fit is cut. */
-SDM_API sdm_status sdm_fail(sdm_error *err, sdm_status status, const char *fmt, ...) SDM_PRINTF(3, 4);
+/* Stores status and formatted text in *err (which may be NULL) and returns `status`. Text that does
+ * not fit is cut. */
+SDM_API sdm_status sdm_fail(sdm_error *err, sdm_status status, const char *fmt, ...)
+    SDM_PRINTF(3, 4);
 
-/* Puts "prefix: " before the text of *err and returns its status; for callers that know the file or the shape. */
-SDM_API sdm_status sdm_fail_in(sdm_error *err, sdm_status status, const char *fmt, ...) SDM_PRINTF(3, 4);
+/* Puts "prefix: " before the text of *err and returns its status; for callers that know the file or
+ * the shape. */
+SDM_API sdm_status sdm_fail_in(sdm_error *err, sdm_status status, const char *fmt, ...)
+    SDM_PRINTF(3, 4);
 
 /* Short constant name of a status, e.g. "config"; never NULL. */
 SDM_API const char *sdm_status_name(sdm_status status);

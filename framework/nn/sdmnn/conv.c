@@ -4,9 +4,9 @@
 #include <string.h>
 
 #include "conv_kernels.h"
-#include "sdm/kernels.h"
-#include "sdm/pod.h"
-#include "sdm/threads.h"
+#include "sdm/internal/kernels.h"
+#include "sdm/internal/pod.h"
+#include "sdm/internal/threads.h"
 
 enum {
     GROUP = 32,          // output channels of a unit of work, a multiple of every mr
@@ -40,7 +40,8 @@ static void offsets(const sdm_fmap *g, size_t taps, size_t k0, size_t n, ptrdiff
 {
     ptrdiff_t shift[27] = {0};
     for (int t = 0; t < 27 && taps == 27; t++)
-        shift[t] = (t / 9 - 1) * (ptrdiff_t)g->plane + (t / 3 % 3 - 1) * (ptrdiff_t)g->row + t % 3 - 1;
+        shift[t] =
+            (t / 9 - 1) * (ptrdiff_t)g->plane + (t / 3 % 3 - 1) * (ptrdiff_t)g->row + t % 3 - 1;
     size_t tap = k0 % taps;
     ptrdiff_t channel = (ptrdiff_t)(k0 / taps * g->stride);
     for (size_t i = 0; i < n; i++) {
@@ -67,8 +68,8 @@ void sdm_conv_pack(sdm_conv c, bool transposed, const float *w, float *packed)
             for (size_t k = k0; k < k1; k++) {
                 const size_t i = k / c.taps, tap = k % c.taps;
                 for (size_t o = o0; o < o0 + mr; o++) {
-                    const size_t from =
-                        transposed ? (i * c.in + o) * c.taps + c.taps - 1 - tap : (o * c.in + i) * c.taps + tap;
+                    const size_t from = transposed ? (i * c.in + o) * c.taps + c.taps - 1 - tap
+                                                   : (o * c.in + i) * c.taps + tap;
                     *packed++ = o < to.out ? w[from] : 0.0f;
                 }
             }
@@ -77,18 +78,20 @@ void sdm_conv_pack(sdm_conv c, bool transposed, const float *w, float *packed)
 }
 
 // a tile that reaches beyond the last output channel or position goes through a full one
-static void edge_tile(const conv_table *t, size_t k, const float *a, const float *x, const ptrdiff_t *offset, float *y,
-                      size_t ldy, size_t rows, size_t cols, int add)
+static void edge_tile(const conv_table *t, size_t k, const float *a, const float *x,
+                      const ptrdiff_t *offset, float *y, size_t ldy, size_t rows, size_t cols,
+                      int add)
 {
     float edge[MR_MAX * SDM_CONV_NR_MAX] = {0};
-    for (size_t i = 0; i < rows && add; i++) memcpy(edge + i * t->nr, y + i * ldy, cols * sizeof *y);
+    for (size_t i = 0; i < rows && add; i++)
+        memcpy(edge + i * t->nr, y + i * ldy, cols * sizeof *y);
     t->tile(k, a, x, offset, edge, t->nr, add);
     for (size_t i = 0; i < rows; i++) memcpy(y + i * ldy, edge + i * t->nr, cols * sizeof *y);
 }
 
 // output channels o0 .. o1 (o0 a multiple of mr) at positions p0 .. p1
-static void chunk(const conv_table *t, const sdm_fmap *g, sdm_conv c, const float *packed, const float *x, float *y,
-                  size_t o0, size_t o1, size_t p0, size_t p1)
+static void chunk(const conv_table *t, const sdm_fmap *g, sdm_conv c, const float *packed,
+                  const float *x, float *y, size_t o0, size_t o1, size_t p0, size_t p1)
 {
     const size_t terms = c.in * c.taps, padded = divide_up(c.out, t->mr) * t->mr;
     ptrdiff_t offset[SDM_CONV_TERMS];
@@ -110,25 +113,28 @@ static void chunk(const conv_table *t, const sdm_fmap *g, sdm_conv c, const floa
     }
 }
 
-static void finish_chunk(const sdm_fmap *g, sdm_conv_finish f, float *y, size_t o, size_t p0, size_t p1)
+static void finish_chunk(const sdm_fmap *g, sdm_conv_finish f, float *y, size_t o, size_t p0,
+                         size_t p1)
 {
     float *channel = y + o * g->stride, *slope = f.slope ? f.slope + o * g->stride : NULL;
     if (f.bias)
         for (size_t p = p0; p < p1; p++) channel[p] += f.bias[o];
-    if (f.activation >= 0) sdm_activate(f.activation, p1 - p0, channel + p0, channel + p0, slope ? slope + p0 : NULL);
+    if (f.activation >= 0)
+        sdm_activate(f.activation, p1 - p0, channel + p0, channel + p0, slope ? slope + p0 : NULL);
     sdm_fmap_clear_pads(g, p0, p1, channel);
     if (slope) sdm_fmap_clear_pads(g, p0, p1, slope);
 }
 
-void sdm_conv_apply(const sdm_fmap *g, sdm_conv c, const float *packed, const float *x, sdm_conv_finish finish,
-                    float *y, int n_threads)
+void sdm_conv_apply(const sdm_fmap *g, sdm_conv c, const float *packed, const float *x,
+                    sdm_conv_finish finish, float *y, int n_threads)
 {
     const conv_table *t = table();
     const size_t chunks = divide_up(g->count, SDM_CONV_CHUNK), groups = divide_up(c.out, GROUP);
     n_threads = threads(n_threads, chunks * groups);
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads) if (n_threads > 1)
     for (long unit = 0; unit < (long)(chunks * groups); unit++) {
-        const size_t p0 = (size_t)unit % chunks * SDM_CONV_CHUNK, p1 = least(g->count, p0 + SDM_CONV_CHUNK);
+        const size_t p0 = (size_t)unit % chunks * SDM_CONV_CHUNK,
+                     p1 = least(g->count, p0 + SDM_CONV_CHUNK);
         const size_t o0 = (size_t)unit / chunks * GROUP, o1 = least(c.out, o0 + GROUP);
         chunk(t, g, c, packed, x, y, o0, o1, p0, p1);
         for (size_t o = o0; o < o1; o++) finish_chunk(g, finish, y, o, p0, p1);
@@ -142,7 +148,8 @@ static float sum_lanes(const float *v, size_t width)
     return s;
 }
 
-void sdm_conv_finish_maps(const sdm_fmap *g, size_t channels, sdm_conv_finish finish, float *y, int n_threads)
+void sdm_conv_finish_maps(const sdm_fmap *g, size_t channels, sdm_conv_finish finish, float *y,
+                          int n_threads)
 {
     n_threads = threads(n_threads, channels);
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
@@ -150,37 +157,43 @@ void sdm_conv_finish_maps(const sdm_fmap *g, size_t channels, sdm_conv_finish fi
 }
 
 // dw of output channels o .. o + rows and terms k0 .. k0 + k over all positions
-static void gradient_unit(const conv_table *t, const sdm_fmap *g, sdm_conv c, const float *x, const float *dy,
-                          float *dw, size_t o, size_t k0)
+static void gradient_unit(const conv_table *t, const sdm_fmap *g, sdm_conv c, const float *x,
+                          const float *dy, float *dw, size_t o, size_t k0)
 {
-    const size_t terms = c.in * c.taps, k = least(GRADIENT_TERMS, terms - k0), rows = least(t->mr, c.out - o);
-    const size_t tile = 3 * t->mr * t->width;                      // numbers of one call of dot()
-    const size_t count = divide_up(g->count, t->width) * t->width; // dy is zero beyond the last position
+    const size_t terms = c.in * c.taps, k = least(GRADIENT_TERMS, terms - k0),
+                 rows = least(t->mr, c.out - o);
+    const size_t tile = 3 * t->mr * t->width; // numbers of one call of dot()
+    const size_t count =
+        divide_up(g->count, t->width) * t->width; // dy is zero beyond the last position
     ptrdiff_t offset[GRADIENT_TERMS + 2];
     float sums[(GRADIENT_TERMS / 3) * SDM_CONV_SUMS_MAX], copy[MR_MAX * SDM_CONV_CHUNK];
     memset(sums, 0, divide_up(k, 3) * tile * sizeof *sums);
     offsets(g, c.taps, k0, k, offset);
-    for (size_t i = k; i < k + 2; i++) offset[i] = offset[k - 1]; // a third tap that is not there: computed, not used
+    for (size_t i = k; i < k + 2; i++)
+        offset[i] = offset[k - 1]; // a third tap that is not there: computed, not used
     for (size_t p = 0; p < count; p += SDM_CONV_CHUNK) {
         const size_t n = least(SDM_CONV_CHUNK, count - p);
         const float *d = dy + o * g->stride + p;
         size_t ldy = g->stride;
         if (rows < t->mr) { // channels that are not there are zero
             memset(copy, 0, sizeof copy);
-            for (size_t i = 0; i < rows; i++) memcpy(copy + i * SDM_CONV_CHUNK, d + i * ldy, n * sizeof *d);
+            for (size_t i = 0; i < rows; i++)
+                memcpy(copy + i * SDM_CONV_CHUNK, d + i * ldy, n * sizeof *d);
             d = copy, ldy = SDM_CONV_CHUNK;
         }
         for (size_t i = 0; i < k; i += 3) t->dot(n, d, ldy, x + p, offset + i, sums + i / 3 * tile);
     }
     for (size_t r = 0; r < rows; r++) {
         float *to = dw + (o + r) * terms + k0;
-        for (size_t i = 0; i < k; i++) to[i] += sum_lanes(sums + i / 3 * tile + (r * 3 + i % 3) * t->width, t->width);
+        for (size_t i = 0; i < k; i++)
+            to[i] += sum_lanes(sums + i / 3 * tile + (r * 3 + i % 3) * t->width, t->width);
     }
 }
 
-// The same for few positions, where adding up the registers would be most of the work: a matrix product with the shifted maps copied side by
-// side, for all output channels.
-static void gradient_few(const sdm_fmap *g, sdm_conv c, const float *x, const float *dy, float *dw, size_t k0)
+// The same for few positions, where adding up the registers would be most of the work: a matrix
+// product with the shifted maps copied side by side, for all output channels.
+static void gradient_few(const sdm_fmap *g, sdm_conv c, const float *x, const float *dy, float *dw,
+                         size_t k0)
 {
     const size_t terms = c.in * c.taps, k = least(SDM_CONV_TERMS, terms - k0);
     ptrdiff_t offset[SDM_CONV_TERMS];
@@ -189,7 +202,8 @@ static void gradient_few(const sdm_fmap *g, sdm_conv c, const float *x, const fl
     for (size_t p = 0; p < g->count; p += FEW_CHUNK) {
         const size_t n = least(FEW_CHUNK, g->count - p);
         for (size_t i = 0; i < k; i++) memcpy(columns + i * n, x + p + offset[i], n * sizeof *x);
-        sdm_gemm(c.out, k, n, (sdm_view){dy + p, g->stride, 1}, (sdm_view){columns, 1, n}, true, dw + k0, terms, 1);
+        sdm_gemm(c.out, k, n, (sdm_view){dy + p, g->stride, 1}, (sdm_view){columns, 1, n}, true,
+                 dw + k0, terms, 1);
     }
 }
 
@@ -209,8 +223,8 @@ static float sum_of(size_t n, const float *v)
     return (float)total;
 }
 
-void sdm_conv_gradient(const sdm_fmap *g, sdm_conv c, const float *x, const float *dy, float *dw, float *db,
-                       int n_threads)
+void sdm_conv_gradient(const sdm_fmap *g, sdm_conv c, const float *x, const float *dy, float *dw,
+                       float *db, int n_threads)
 {
     const conv_table *t = table();
     const bool few = g->count <= FEW;
@@ -225,7 +239,8 @@ void sdm_conv_gradient(const sdm_fmap *g, sdm_conv c, const float *x, const floa
         else if (few)
             gradient_few(g, c, x, dy, dw, unit * SDM_CONV_TERMS);
         else
-            gradient_unit(t, g, c, x, dy, dw, unit % panels * t->mr, unit / panels * GRADIENT_TERMS);
+            gradient_unit(t, g, c, x, dy, dw, unit % panels * t->mr,
+                          unit / panels * GRADIENT_TERMS);
     }
 }
 

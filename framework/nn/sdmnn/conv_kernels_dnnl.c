@@ -1,5 +1,6 @@
-/* Convolution by oneDNN 2.x, where that is faster than the native one: 3 x 3 x 3 with many channels on the smaller levels, forward and towards
-   the data. Everything else is native, and so is a call that oneDNN fails. Maps and weights are reordered into its layout and back. */
+/* Convolution by oneDNN 2.x, where that is faster than the native one: 3 x 3 x 3 with many channels
+   on the smaller levels, forward and towards the data. Everything else is native, and so is a call
+   that oneDNN fails. Maps and weights are reordered into its layout and back. */
 #include <oneapi/dnnl/dnnl.h>
 #include <pthread.h>
 #include <string.h>
@@ -16,17 +17,24 @@ static pthread_once_t once = PTHREAD_ONCE_INIT;
 static void start(void)
 {
     if (dnnl_engine_create(&engine, dnnl_cpu, 0) != dnnl_success) engine = NULL;
-    if (engine && dnnl_stream_create(&stream, engine, dnnl_stream_default_flags) != dnnl_success) stream = NULL;
+    if (engine && dnnl_stream_create(&stream, engine, dnnl_stream_default_flags) != dnnl_success)
+        stream = NULL;
 }
 
-// measured on AVX2: below 16 channels and on large maps the way into its layout and back costs more than it gains
+// measured on AVX2: below 16 channels and on large maps the way into its layout and back costs more
+// than it gains
 static bool worth(const sdm_fmap *g, sdm_conv c)
 {
-    return c.taps == 27 && c.in % 16 == 0 && c.out % 16 == 0 && g->n[0] * g->n[1] * g->n[2] <= 32768;
+    return c.taps == 27 && c.in % 16 == 0 && c.out % 16 == 0 &&
+           g->n[0] * g->n[1] * g->n[2] <= 32768;
 }
 
-// behind the native order: the same weights as [outputs][inputs][taps], for the direction of the pass
-static size_t packed_count(sdm_conv c) { return (sdm_conv_packed_count(c) + 15) / 16 * 16 + c.in * c.out * c.taps; }
+// behind the native order: the same weights as [outputs][inputs][taps], for the direction of the
+// pass
+static size_t packed_count(sdm_conv c)
+{
+    return (sdm_conv_packed_count(c) + 15) / 16 * 16 + c.in * c.out * c.taps;
+}
 
 static void pack(sdm_conv c, bool transposed, const float *w, float *packed)
 {
@@ -36,14 +44,16 @@ static void pack(sdm_conv c, bool transposed, const float *w, float *packed)
     if (!transposed) memcpy(packed, w, c.in * c.out * c.taps * sizeof *w);
     for (size_t o = 0; o < to.out && transposed; o++)
         for (size_t i = 0; i < to.in; i++)
-            for (size_t t = 0; t < c.taps; t++) *packed++ = w[(i * c.in + o) * c.taps + c.taps - 1 - t];
+            for (size_t t = 0; t < c.taps; t++)
+                *packed++ = w[(i * c.in + o) * c.taps + c.taps - 1 - t];
 }
 
 // what a call holds; freed whether it succeeds or not
 typedef struct call {
     dnnl_primitive_desc_t plan;
     dnnl_primitive_t convolution;
-    dnnl_memory_t user[3], own[3]; // source, weights, result: as they lie here, and as oneDNN wants them
+    dnnl_memory_t user[3],
+        own[3]; // source, weights, result: as they lie here, and as oneDNN wants them
 } call;
 
 static void dispose(call *k)
@@ -56,13 +66,14 @@ static void dispose(call *k)
     if (k->plan) dnnl_primitive_desc_destroy(k->plan);
 }
 
-static dnnl_status_t reorder(const dnnl_memory_desc_t *from_desc, dnnl_memory_t from, const dnnl_memory_desc_t *to_desc,
-                             dnnl_memory_t to)
+static dnnl_status_t reorder(const dnnl_memory_desc_t *from_desc, dnnl_memory_t from,
+                             const dnnl_memory_desc_t *to_desc, dnnl_memory_t to)
 {
     dnnl_primitive_desc_t plan = NULL;
     dnnl_primitive_t p = NULL;
     const dnnl_exec_arg_t args[2] = {{DNNL_ARG_FROM, from}, {DNNL_ARG_TO, to}};
-    dnnl_status_t s = dnnl_reorder_primitive_desc_create(&plan, from_desc, engine, to_desc, engine, NULL);
+    dnnl_status_t s =
+        dnnl_reorder_primitive_desc_create(&plan, from_desc, engine, to_desc, engine, NULL);
     if (!s) s = dnnl_primitive_create(&p, plan);
     if (!s) s = dnnl_primitive_execute(p, stream, 2, args);
     if (p) dnnl_primitive_destroy(p);
@@ -70,13 +81,15 @@ static dnnl_status_t reorder(const dnnl_memory_desc_t *from_desc, dnnl_memory_t 
     return s;
 }
 
-static dnnl_status_t convolve(const sdm_fmap *g, sdm_conv c, const float *w, const float *x, float *y, call *k)
+static dnnl_status_t convolve(const sdm_fmap *g, sdm_conv c, const float *w, const float *x,
+                              float *y, call *k)
 {
     const dnnl_dim_t in = (dnnl_dim_t)c.in, out = (dnnl_dim_t)c.out;
     const dnnl_dim_t nx = (dnnl_dim_t)g->n[0], ny = (dnnl_dim_t)g->n[1], nz = (dnnl_dim_t)g->n[2];
-    const dnnl_dims_t dims[3] = {{1, in, nz, ny, nx}, {out, in, 3, 3, 3}, {1, out, nz, ny, nx}}, ones = {1, 1, 1};
-    const dnnl_dims_t strides = {(dnnl_dim_t)(g->stride * (c.in + c.out)), (dnnl_dim_t)g->stride, (dnnl_dim_t)g->plane,
-                                 (dnnl_dim_t)g->row, 1};
+    const dnnl_dims_t dims[3] = {{1, in, nz, ny, nx}, {out, in, 3, 3, 3}, {1, out, nz, ny, nx}},
+                      ones = {1, 1, 1};
+    const dnnl_dims_t strides = {(dnnl_dim_t)(g->stride * (c.in + c.out)), (dnnl_dim_t)g->stride,
+                                 (dnnl_dim_t)g->plane, (dnnl_dim_t)g->row, 1};
     union {
         const float *in;
         void *any;
@@ -87,17 +100,19 @@ static dnnl_status_t convolve(const sdm_fmap *g, sdm_conv c, const float *w, con
     for (int i = 0; i < 3 && !s; i++) {
         s = i == 1 ? dnnl_memory_desc_init_by_tag(&here[i], 5, dims[i], dnnl_f32, dnnl_oidhw)
                    : dnnl_memory_desc_init_by_strides(&here[i], 5, dims[i], dnnl_f32, strides);
-        if (!s) s = dnnl_memory_desc_init_by_tag(&any[i], 5, dims[i], dnnl_f32, dnnl_format_tag_any);
+        if (!s)
+            s = dnnl_memory_desc_init_by_tag(&any[i], 5, dims[i], dnnl_f32, dnnl_format_tag_any);
         if (!s) s = dnnl_memory_create(&k->user[i], &here[i], engine, data[i]);
     }
     dnnl_convolution_desc_t d;
     if (!s)
-        s = dnnl_convolution_forward_desc_init(&d, dnnl_forward_inference, dnnl_convolution_direct, &any[0], &any[1],
-                                               NULL, &any[2], ones, ones, ones);
+        s = dnnl_convolution_forward_desc_init(&d, dnnl_forward_inference, dnnl_convolution_direct,
+                                               &any[0], &any[1], NULL, &any[2], ones, ones, ones);
     if (!s) s = dnnl_primitive_desc_create(&k->plan, &d, NULL, engine, NULL);
     if (!s) s = dnnl_primitive_create(&k->convolution, k->plan);
     if (s) return s;
-    static const dnnl_query_t what[3] = {dnnl_query_src_md, dnnl_query_weights_md, dnnl_query_dst_md};
+    static const dnnl_query_t what[3] = {dnnl_query_src_md, dnnl_query_weights_md,
+                                         dnnl_query_dst_md};
     const dnnl_memory_desc_t *wanted[3];
     for (int i = 0; i < 3 && !s; i++) {
         wanted[i] = dnnl_primitive_desc_query_md(k->plan, what[i], 0);
@@ -111,8 +126,8 @@ static dnnl_status_t convolve(const sdm_fmap *g, sdm_conv c, const float *w, con
     return s ? s : dnnl_stream_wait(stream);
 }
 
-static void apply(const sdm_fmap *g, sdm_conv c, const float *packed, const float *x, sdm_conv_finish finish, float *y,
-                  int n_threads)
+static void apply(const sdm_fmap *g, sdm_conv c, const float *packed, const float *x,
+                  sdm_conv_finish finish, float *y, int n_threads)
 {
     pthread_once(&once, start);
     dnnl_status_t s = dnnl_unimplemented;
@@ -136,7 +151,10 @@ static void apply(const sdm_fmap *g, sdm_conv c, const float *packed, const floa
 
 const sdm_conv_backend *sdm_conv_dnnl(void)
 {
-    static const sdm_conv_backend backend = {
-        .name = "onednn", .packed_count = packed_count, .pack = pack, .apply = apply, .gradient = sdm_conv_gradient};
+    static const sdm_conv_backend backend = {.name = "onednn",
+                                             .packed_count = packed_count,
+                                             .pack = pack,
+                                             .apply = apply,
+                                             .gradient = sdm_conv_gradient};
     return &backend;
 }

@@ -1,5 +1,6 @@
-/* The inner loops of the convolution, written once with the compiler's vector types and compiled once for each instruction set. Before
-   inclusion: TABLE (name of the conv_table), ISA (text), VW (numbers in a register), MR (output channels of a tile), NV (registers along x). */
+/* The inner loops of the convolution, written once with the compiler's vector types and compiled
+   once for each instruction set. Before inclusion: TABLE (name of the conv_table), ISA (text), VW
+   (numbers in a register), MR (output channels of a tile), NV (registers along x). */
 #include "conv_kernels.h"
 
 typedef float vec __attribute__((vector_size(4 * VW)));
@@ -9,14 +10,17 @@ static inline vec load(const float *p) { return *(const vec_u *)p; }
 static inline void store(float *p, vec v) { *(vec_u *)p = v; }
 static inline vec splat(float v) { return v - (vec){0}; }
 
-_Static_assert(SDM_CONV_CHUNK % (NV * VW) == 0 && NV * VW <= SDM_CONV_NR_MAX, "a chunk is made of whole tiles");
+_Static_assert(SDM_CONV_CHUNK % (NV * VW) == 0 && NV * VW <= SDM_CONV_NR_MAX,
+               "a chunk is made of whole tiles");
 _Static_assert(3 * MR * VW <= SDM_CONV_SUMS_MAX, "sums of a tile");
 
-static void tile(size_t k, const float *a, const float *x, const ptrdiff_t *offset, float *y, size_t ldy, int add)
+static void tile(size_t k, const float *a, const float *x, const ptrdiff_t *offset, float *y,
+                 size_t ldy, int add)
 {
     vec acc[MR][NV];
     for (int i = 0; i < MR; i++)
-        for (int j = 0; j < NV; j++) acc[i][j] = add ? load(y + (size_t)i * ldy + j * VW) : (vec){0};
+        for (int j = 0; j < NV; j++)
+            acc[i][j] = add ? load(y + (size_t)i * ldy + j * VW) : (vec){0};
     for (size_t p = 0; p < k; p++, a += MR) {
         const float *at = x + offset[p];
         vec in[NV];
@@ -30,7 +34,8 @@ static void tile(size_t k, const float *a, const float *x, const ptrdiff_t *offs
         for (int j = 0; j < NV; j++) store(y + (size_t)i * ldy + j * VW, acc[i][j]);
 }
 
-static void dot(size_t n, const float *dy, size_t ldy, const float *x, const ptrdiff_t *offset, float *sums)
+static void dot(size_t n, const float *dy, size_t ldy, const float *x, const ptrdiff_t *offset,
+                float *sums)
 {
     const float *const tap[3] = {x + offset[0], x + offset[1], x + offset[2]};
     vec acc[MR][3];
@@ -48,4 +53,5 @@ static void dot(size_t n, const float *dy, size_t ldy, const float *x, const ptr
         for (int j = 0; j < 3; j++) store(sums + (i * 3 + j) * VW, acc[i][j]);
 }
 
-const conv_table TABLE = {.name = ISA, .mr = MR, .nr = NV * VW, .width = VW, .tile = tile, .dot = dot};
+const conv_table TABLE = {
+    .name = ISA, .mr = MR, .nr = NV * VW, .width = VW, .tile = tile, .dot = dot};

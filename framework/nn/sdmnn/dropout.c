@@ -1,13 +1,14 @@
-/* Drop-out of feature maps: y[C] and slope[C], in place; four voxels from each block of random bits. */
+/* Drop-out of feature maps: y[C] and slope[C], in place; four voxels from each block of random
+ * bits. */
 #include "operators.h"
-#include "sdm/rng.h"
+#include "sdm/internal/rng.h"
 
 static size_t draws(const sdm_fmap *g) { return (g->count + 3) / 4; }
 
 size_t sdm_dropout_draws(const sdm_fmap *g, size_t channels) { return channels * draws(g); }
 
-void sdm_dropout(const sdm_fmap *g, size_t channels, double rate, uint64_t seed, uint64_t stream, uint64_t index,
-                 float *y, float *slope, int n_threads)
+void sdm_dropout(const sdm_fmap *g, size_t channels, double rate, uint64_t seed, uint64_t stream,
+                 uint64_t index, float *y, float *slope, int n_threads)
 {
     const uint32_t below = (uint32_t)(rate * 0x1p32);
     const float scale = (float)(1 / (1 - rate));

@@ -17,20 +17,25 @@ sdm_fmap sdm_fmap_layout(const size_t n[3])
     return g;
 }
 
-size_t sdm_fmap_floats(const sdm_fmap *g, size_t channels) { return g->lead + channels * g->stride + OVERRUN; }
+size_t sdm_fmap_floats(const sdm_fmap *g, size_t channels)
+{
+    return g->lead + channels * g->stride + OVERRUN;
+}
 
 void sdm_fmap_clear_gaps(const sdm_fmap *g, size_t channels, float *x)
 {
     memset(x - g->lead, 0, g->lead * sizeof *x);
     for (size_t c = 0; c < channels; c++, x += g->stride)
-        memset(x + g->count, 0, (g->stride - g->count + (c + 1 == channels ? OVERRUN : 0)) * sizeof *x);
+        memset(x + g->count, 0,
+               (g->stride - g->count + (c + 1 == channels ? OVERRUN : 0)) * sizeof *x);
 }
 
 void sdm_fmap_clear_pads(const sdm_fmap *g, size_t first, size_t last, float *channel)
 {
     for (size_t r = first / g->row; r * g->row < last; r++) {
         const size_t begin = r * g->row, end = begin + g->row;
-        size_t from = r % (g->n[1] + 1) == g->n[1] ? begin : end - 1; // the whole row, or its last column
+        size_t from =
+            r % (g->n[1] + 1) == g->n[1] ? begin : end - 1; // the whole row, or its last column
         if (from < first) from = first;
         for (size_t i = from; i < end && i < last; i++) channel[i] = 0;
     }
@@ -40,7 +45,8 @@ void sdm_fmap_read(const sdm_fmap *g, const float *map, float *channel)
 {
     for (size_t z = 0; z < g->n[2]; z++)
         for (size_t y = 0; y < g->n[1]; y++)
-            memcpy(channel + z * g->plane + y * g->row, map + (z * g->n[1] + y) * g->n[0], g->n[0] * sizeof *map);
+            memcpy(channel + z * g->plane + y * g->row, map + (z * g->n[1] + y) * g->n[0],
+                   g->n[0] * sizeof *map);
     sdm_fmap_clear_pads(g, 0, g->count, channel);
 }
 
@@ -48,5 +54,6 @@ void sdm_fmap_write(const sdm_fmap *g, const float *channel, float *map)
 {
     for (size_t z = 0; z < g->n[2]; z++)
         for (size_t y = 0; y < g->n[1]; y++)
-            memcpy(map + (z * g->n[1] + y) * g->n[0], channel + z * g->plane + y * g->row, g->n[0] * sizeof *map);
+            memcpy(map + (z * g->n[1] + y) * g->n[0], channel + z * g->plane + y * g->row,
+                   g->n[0] * sizeof *map);
 }

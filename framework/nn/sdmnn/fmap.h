@@ -1,11 +1,13 @@
-/* Feature maps in memory: C channels of nz x ny x nx numbers with zeros around them, so that a 3 x 3 x 3 convolution with "same" padding
-   is a sum over shifts of one flat array.
+/* Feature maps in memory: C channels of nz x ny x nx numbers with zeros around them, so that a 3 x
+   3 x 3 convolution with "same" padding is a sum over shifts of one flat array.
 
      voxel (x, y, z) of channel c   at  c * stride + z * plane + y * row + x
      row = nx + 1, plane = row * (ny + 1)   one zero column and one zero row serve both neighbours
-     lead = row + plane + 1 zeros or more   before the first channel, between channels and after the last
+     lead = row + plane + 1 zeros or more   before the first channel, between channels and after the
+   last
 
-   A pointer to a feature map points to voxel (0, 0, 0) of its first channel. Every operator keeps the zeros zero. */
+   A pointer to a feature map points to voxel (0, 0, 0) of its first channel. Every operator keeps
+   the zeros zero. */
 #ifndef SDM_FMAP_H
 #define SDM_FMAP_H
 
@@ -14,7 +16,8 @@
 typedef struct sdm_fmap {
     size_t n[3]; /* x, y, z */
     size_t row, plane;
-    size_t count;  /* plane * nz: numbers from the first voxel of a channel to the end of its last plane */
+    size_t count;  /* plane * nz: numbers from the first voxel of a channel to the end of its last
+                      plane */
     size_t lead;   /* a multiple of 16 */
     size_t stride; /* between channels, a multiple of 16 */
 } sdm_fmap;

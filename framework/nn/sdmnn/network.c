@@ -3,9 +3,9 @@
 
 #include "operators.h"
 #include "passes.h"
+#include "sdm/internal/pod.h"
+#include "sdm/internal/threads.h"
 #include "sdm/memory.h"
-#include "sdm/pod.h"
-#include "sdm/threads.h"
 
 struct sdm_sdmnn {
     sdmnn_plan plan;
@@ -33,7 +33,8 @@ static sdm_status allocate(sdm_sdmnn *net, sdm_error *err)
     size_t n = 0;
     for (const sdmnn_step *s = p->steps; s < p->steps + p->n_steps; s++) {
         n += packed_count(b, s);
-        if (net->batch && s->op == SDMNN_CONV) n += (b->packed_count(sdm_conv_opposite(s->conv)) + 15) / 16 * 16;
+        if (net->batch && s->op == SDMNN_CONV)
+            n += (b->packed_count(sdm_conv_opposite(s->conv)) + 15) / 16 * 16;
     }
     sdm_status s = SDM_ALLOC(&net->packed, n, "network weights", err);
     if (!s) s = SDM_ALLOC(&net->block, p->floats, "network maps", err);
@@ -50,8 +51,8 @@ static sdm_status allocate(sdm_sdmnn *net, sdm_error *err)
     return s;
 }
 
-sdm_status sdm_sdmnn_create(const sdm_sdmnn_arch *a, size_t batch, const sdm_conv_backend *backend, sdm_sdmnn **out,
-                            sdm_error *err)
+sdm_status sdm_sdmnn_create(const sdm_sdmnn_arch *a, size_t batch, const sdm_conv_backend *backend,
+                            sdm_sdmnn **out, sdm_error *err)
 {
     *out = NULL;
     sdm_sdmnn *net = NULL;
@@ -114,18 +115,21 @@ static void dense(sdm_sdmnn *net, size_t batch, const float *x, float *slope, in
     const float *w1 = net->weights, *w2 = w1 + sdmnn_dense1(p);
     sdm_dense_forward(batch, in, w, w1, w1 + w * in, x, net->hidden, n_threads);
     sdm_activate(p->arch.activation, batch * w, net->hidden, net->hidden, slope);
-    sdm_dense_forward(batch, w, p->cells, w2, w2 + p->cells * w, net->hidden, net->volume, n_threads);
+    sdm_dense_forward(batch, w, p->cells, w2, w2 + p->cells * w, net->hidden, net->volume,
+                      n_threads);
 }
 
-static void dense_backward(sdm_sdmnn *net, size_t batch, const float *x, float *gradient, int n_threads)
+static void dense_backward(sdm_sdmnn *net, size_t batch, const float *x, float *gradient,
+                           int n_threads)
 {
     const sdmnn_plan *p = &net->plan;
     const size_t w = p->arch.width, in = p->arch.n_params, second = sdmnn_dense1(p);
     float *g1 = gradient, *g2 = gradient + second;
-    sdm_dense_backward(batch, w, p->cells, net->weights + second, net->hidden, net->dvolume, g2, g2 + p->cells * w,
-                       net->dhidden, n_threads);
+    sdm_dense_backward(batch, w, p->cells, net->weights + second, net->hidden, net->dvolume, g2,
+                       g2 + p->cells * w, net->dhidden, n_threads);
     for (size_t i = 0; i < batch * w; i++) net->dhidden[i] *= net->hidden_slope[i];
-    sdm_dense_backward(batch, in, w, net->weights, x, net->dhidden, g1, g1 + w * in, NULL, n_threads);
+    sdm_dense_backward(batch, in, w, net->weights, x, net->dhidden, g1, g1 + w * in, NULL,
+                       n_threads);
 }
 
 void sdm_sdmnn_forward(sdm_sdmnn *net, const float *x, float *values, int n_threads)
@@ -135,8 +139,9 @@ void sdm_sdmnn_forward(sdm_sdmnn *net, const float *x, float *values, int n_thre
     sdmnn_forward(&net->plan, &net->layers, net->volume, net->block, NULL, NULL, values, n_threads);
 }
 
-double sdm_sdmnn_gradient(sdm_sdmnn *net, size_t batch, const float *x, sdm_sdmnn_loss loss, void *user, uint64_t seed,
-                          uint64_t stream, uint64_t draw, float *gradient, int n_threads)
+double sdm_sdmnn_gradient(sdm_sdmnn *net, size_t batch, const float *x, sdm_sdmnn_loss loss,
+                          void *user, uint64_t seed, uint64_t stream, uint64_t draw,
+                          float *gradient, int n_threads)
 {
     const sdmnn_plan *p = &net->plan;
     double sum = 0;
@@ -145,11 +150,11 @@ double sdm_sdmnn_gradient(sdm_sdmnn *net, size_t batch, const float *x, sdm_sdmn
     dense(net, batch, x, net->hidden_slope, n_threads);
     for (size_t b = 0; b < batch; b++) {
         const sdmnn_draw numbers = {seed, stream, draw + b};
-        sdmnn_forward(p, &net->layers, net->volume + b * p->cells, net->block, net->slope, &numbers, net->map,
-                      n_threads);
+        sdmnn_forward(p, &net->layers, net->volume + b * p->cells, net->block, net->slope, &numbers,
+                      net->map, n_threads);
         sum += loss(user, b, net->map, net->dmap);
-        sdmnn_backward(p, &net->layers, net->block, net->slope, net->dmap, net->back, net->dvolume + b * p->cells,
-                       gradient, n_threads);
+        sdmnn_backward(p, &net->layers, net->block, net->slope, net->dmap, net->back,
+                       net->dvolume + b * p->cells, gradient, n_threads);
     }
     dense_backward(net, batch, x, gradient, n_threads);
     return sum;

@@ -17,7 +17,8 @@ static void multiply(const sdm_fmap *g, size_t channels, float *a, const float *
 static void enter(const sdmnn_plan *p, const float *volume, float *block, int n_threads)
 {
     sdm_fmap_read(&p->cell, volume, block + p->volume);
-    sdm_upsample_forward(&p->level[0], &p->cell, p->arch.block, 1, block + p->volume, block + p->input, n_threads);
+    sdm_upsample_forward(&p->level[0], &p->cell, p->arch.block, 1, block + p->volume,
+                         block + p->input, n_threads);
 }
 
 // drop-out of the steps before this one comes first
@@ -33,8 +34,8 @@ static uint64_t first_draw(const sdmnn_plan *p, const sdmnn_step *step, uint64_t
     return draw * all + before;
 }
 
-void sdmnn_forward(const sdmnn_plan *p, const sdmnn_layers *w, const float *volume, float *block, float *slope,
-                   const sdmnn_draw *draw, float *map, int n_threads)
+void sdmnn_forward(const sdmnn_plan *p, const sdmnn_layers *w, const float *volume, float *block,
+                   float *slope, const sdmnn_draw *draw, float *map, int n_threads)
 {
     enter(p, volume, block, n_threads);
     for (size_t i = 0; i < p->n_steps; i++) {
@@ -51,15 +52,16 @@ void sdmnn_forward(const sdmnn_plan *p, const sdmnn_layers *w, const float *volu
                                             slope && !s->linear ? slope + s->to : NULL};
             w->backend->apply(g, s->conv, w->packed[i], x, finish, y, n_threads);
             if (s->drop && draw && p->arch.dropout > 0)
-                sdm_dropout(g, s->conv.out, p->arch.dropout, draw->seed, draw->stream, first_draw(p, s, draw->draw), y,
-                            slope + s->to, n_threads);
+                sdm_dropout(g, s->conv.out, p->arch.dropout, draw->seed, draw->stream,
+                            first_draw(p, s, draw->draw), y, slope + s->to, n_threads);
         }
     }
     if (map) sdm_fmap_write(&p->level[0], block + p->output, map);
 }
 
-void sdmnn_tangent(const sdmnn_plan *p, const sdmnn_layers *w, const float *block, const float *slope,
-                   const float *volume, float *tangent, float *map, int n_threads)
+void sdmnn_tangent(const sdmnn_plan *p, const sdmnn_layers *w, const float *block,
+                   const float *slope, const float *volume, float *tangent, float *map,
+                   int n_threads)
 {
     enter(p, volume, tangent, n_threads);
     for (size_t i = 0; i < p->n_steps; i++) {
@@ -72,17 +74,20 @@ void sdmnn_tangent(const sdmnn_plan *p, const sdmnn_layers *w, const float *bloc
         } else if (s->op == SDMNN_UPSAMPLE) {
             sdm_upsample_forward(g, g + 1, 2, s->conv.out, dx, dy, n_threads);
         } else {
-            w->backend->apply(g, s->conv, w->packed[i], dx, (sdm_conv_finish){NULL, -1, NULL}, dy, n_threads);
+            w->backend->apply(g, s->conv, w->packed[i], dx, (sdm_conv_finish){NULL, -1, NULL}, dy,
+                              n_threads);
             if (!s->linear) multiply(g, s->conv.out, dy, slope + s->to, n_threads);
         }
     }
     sdm_fmap_write(&p->level[0], tangent + p->output, map);
 }
 
-// Every place but the maps of the way down is read by one step alone, so its derivative is overwritten; those are read by the merging first
-// (in this order) and by the pooling after it, which adds.
-void sdmnn_backward(const sdmnn_plan *p, const sdmnn_layers *w, const float *block, const float *slope,
-                    const float *map, float *back, float *volume, float *gradient, int n_threads)
+// Every place but the maps of the way down is read by one step alone, so its derivative is
+// overwritten; those are read by the merging first (in this order) and by the pooling after it,
+// which adds.
+void sdmnn_backward(const sdmnn_plan *p, const sdmnn_layers *w, const float *block,
+                    const float *slope, const float *map, float *back, float *volume,
+                    float *gradient, int n_threads)
 {
     sdm_fmap_read(&p->level[0], map, back + p->output);
     for (size_t i = p->n_steps; i-- > 0;) {
@@ -97,11 +102,13 @@ void sdmnn_backward(const sdmnn_plan *p, const sdmnn_layers *w, const float *blo
         } else {
             if (!s->linear) multiply(g, s->conv.out, dy, slope + s->to, n_threads);
             float *dw = gradient ? gradient + s->weights : NULL;
-            if (dw) w->backend->gradient(g, s->conv, x, dy, dw, dw + sdmnn_conv_weights(s), n_threads);
-            w->backend->apply(g, sdm_conv_opposite(s->conv), w->transposed[i], dy, (sdm_conv_finish){NULL, -1, NULL},
-                              dx, n_threads);
+            if (dw)
+                w->backend->gradient(g, s->conv, x, dy, dw, dw + sdmnn_conv_weights(s), n_threads);
+            w->backend->apply(g, sdm_conv_opposite(s->conv), w->transposed[i], dy,
+                              (sdm_conv_finish){NULL, -1, NULL}, dx, n_threads);
         }
     }
-    sdm_upsample_backward(&p->level[0], &p->cell, p->arch.block, 1, back + p->input, back + p->volume, n_threads);
+    sdm_upsample_backward(&p->level[0], &p->cell, p->arch.block, 1, back + p->input,
+                          back + p->volume, n_threads);
     sdm_fmap_write(&p->cell, back + p->volume, volume);
 }

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "sdm/rng.h"
+#include "sdm/internal/rng.h"
 
 static size_t half(size_t n) { return (n + 1) / 2; }
 
@@ -21,31 +21,36 @@ sdm_status sdm_sdmnn_check(const sdm_sdmnn_arch *a, sdm_error *err)
     if (a->n_params < 1 || a->n_params > 65536)
         return sdm_fail(err, SDM_E_ARG, "%zu parameters: need 1 .. 65536", a->n_params);
     if (a->depth < 1 || a->depth > SDM_SDMNN_MAX_DEPTH)
-        return sdm_fail(err, SDM_E_ARG, "depth %zu: sdmnn needs 1 .. %d levels of pooling", a->depth,
-                        SDM_SDMNN_MAX_DEPTH);
+        return sdm_fail(err, SDM_E_ARG, "depth %zu: sdmnn needs 1 .. %d levels of pooling",
+                        a->depth, SDM_SDMNN_MAX_DEPTH);
     if (a->channels < 1 || a->channels > SDM_SDMNN_MAX_CHANNELS)
-        return sdm_fail(err, SDM_E_ARG, "%zu channels: need 1 .. %d", a->channels, SDM_SDMNN_MAX_CHANNELS);
+        return sdm_fail(err, SDM_E_ARG, "%zu channels: need 1 .. %d", a->channels,
+                        SDM_SDMNN_MAX_CHANNELS);
     if (a->width < 1 || a->width > 65536)
         return sdm_fail(err, SDM_E_ARG, "a dense layer of width %zu: need 1 .. 65536", a->width);
-    if (a->block < 1 || a->block > 64) return sdm_fail(err, SDM_E_ARG, "block %zu: need 1 .. 64", a->block);
+    if (a->block < 1 || a->block > 64)
+        return sdm_fail(err, SDM_E_ARG, "block %zu: need 1 .. 64", a->block);
     if (a->activation < 0 || a->activation > 2)
         return sdm_fail(err, SDM_E_ARG, "activation %d: need 0 .. 2", a->activation);
     if (!(a->dropout >= 0 && a->dropout < 1))
         return sdm_fail(err, SDM_E_ARG, "drop-out %g: need 0 or more, below 1", a->dropout);
     size_t n[3] = {a->n[0], a->n[1], a->n[2]};
     for (int i = 0; i < 3; i++)
-        if (n[i] < 1 || n[i] > 1048576) return sdm_fail(err, SDM_E_ARG, "%zu voxels: need 1 .. 1048576", n[i]);
+        if (n[i] < 1 || n[i] > 1048576)
+            return sdm_fail(err, SDM_E_ARG, "%zu voxels: need 1 .. 1048576", n[i]);
     // far below the largest size_t, so that nothing below overflows; memory is asked for later
-    const double all = 16.0 * ((double)n[0] + 2) * ((double)n[1] + 2) * ((double)n[2] + 2) * ((double)a->channels + 1);
+    const double all = 16.0 * ((double)n[0] + 2) * ((double)n[1] + 2) * ((double)n[2] + 2) *
+                       ((double)a->channels + 1);
     if (!(all < fmin(0x1p44, (double)(SIZE_MAX / 16))))
-        return sdm_fail(err, SDM_E_ARG, "%zu x %zu x %zu voxels and %zu channels are too much for one network", n[0],
-                        n[1], n[2], a->channels);
+        return sdm_fail(err, SDM_E_ARG,
+                        "%zu x %zu x %zu voxels and %zu channels are too much for one network",
+                        n[0], n[1], n[2], a->channels);
     for (size_t l = 0; l < a->depth; l++) {
         if (n[0] * n[1] * n[2] == 1)
-            return sdm_fail(
-                err, SDM_E_ARG,
-                "depth %zu: a grid of %zu x %zu x %zu voxels is a single voxel after %zu poolings; use fewer", a->depth,
-                a->n[0], a->n[1], a->n[2], l);
+            return sdm_fail(err, SDM_E_ARG,
+                            "depth %zu: a grid of %zu x %zu x %zu voxels is a single voxel after "
+                            "%zu poolings; use fewer",
+                            a->depth, a->n[0], a->n[1], a->n[2], l);
         for (int i = 0; i < 3; i++) n[i] = half(n[i]);
     }
     return SDM_OK;
@@ -64,15 +69,18 @@ static size_t add_map(sdmnn_plan *p, size_t level, size_t channels)
     return add_buffer(p, &p->level[level], level, channels);
 }
 
-static sdmnn_step *add_step(sdmnn_plan *p, sdmnn_op op, size_t level, size_t from, size_t to, sdm_conv conv)
+static sdmnn_step *add_step(sdmnn_plan *p, sdmnn_op op, size_t level, size_t from, size_t to,
+                            sdm_conv conv)
 {
     sdmnn_step *s = &p->steps[p->n_steps++];
-    *s = (sdmnn_step){.op = op, .level = level, .from = from, .to = to, .conv = conv, .weights = p->n_weights};
+    *s = (sdmnn_step){
+        .op = op, .level = level, .from = from, .to = to, .conv = conv, .weights = p->n_weights};
     if (op == SDMNN_CONV) p->n_weights += sdmnn_conv_weights(s) + conv.out;
     return s;
 }
 
-static void conv3(sdmnn_plan *p, size_t level, size_t from, size_t in, size_t to, size_t out, bool drop)
+static void conv3(sdmnn_plan *p, size_t level, size_t from, size_t in, size_t to, size_t out,
+                  bool drop)
 {
     add_step(p, SDMNN_CONV, level, from, to, (sdm_conv){in, out, 27})->drop = drop;
 }
@@ -109,11 +117,14 @@ void sdmnn_plan_make(const sdm_sdmnn_arch *a, bool keep, sdmnn_plan *p)
     in = merged[a->depth], n_in = channels_of(a, a->depth);
     for (size_t l = a->depth; l-- > 0;) {
         const size_t c = channels_of(a, l);
-        // up-sampling repeats voxels, so the convolution 1 x 1 x 1 gives the same before it with an eighth of the work
+        // up-sampling repeats voxels, so the convolution 1 x 1 x 1 gives the same before it with an
+        // eighth of the work
         const size_t reduced = keep ? add_map(p, l + 1, c) : first[l + 1];
         add_step(p, SDMNN_CONV, l + 1, in, reduced, (sdm_conv){n_in, c, 1});
-        add_step(p, SDMNN_UPSAMPLE, l, reduced, merged[l] + c * p->level[l].stride, (sdm_conv){c, c, 0});
-        const size_t second = keep ? add_map(p, l, c) : first[l], third = keep ? add_map(p, l, c) : merged[l];
+        add_step(p, SDMNN_UPSAMPLE, l, reduced, merged[l] + c * p->level[l].stride,
+                 (sdm_conv){c, c, 0});
+        const size_t second = keep ? add_map(p, l, c) : first[l],
+                     third = keep ? add_map(p, l, c) : merged[l];
         conv3(p, l, merged[l], 2 * c, second, c, false);
         conv3(p, l, second, c, third, c, false);
         in = third, n_in = c;
@@ -125,7 +136,8 @@ void sdmnn_plan_make(const sdm_sdmnn_arch *a, bool keep, sdmnn_plan *p)
 void sdmnn_plan_clear(const sdmnn_plan *p, float *block)
 {
     for (const sdmnn_buffer *b = p->buffers; b < p->buffers + p->n_buffers; b++)
-        sdm_fmap_clear_gaps(b->level < SDMNN_LEVELS ? &p->level[b->level] : &p->cell, b->channels, block + b->place);
+        sdm_fmap_clear_gaps(b->level < SDMNN_LEVELS ? &p->level[b->level] : &p->cell, b->channels,
+                            block + b->place);
 }
 
 size_t sdm_sdmnn_count(const sdm_sdmnn_arch *a)
@@ -141,15 +153,17 @@ double sdm_sdmnn_work(const sdm_sdmnn_arch *a)
     sdmnn_plan_make(a, false, &p);
     double n = (double)a->width * (double)(a->n_params + p.cells);
     for (const sdmnn_step *s = p.steps; s < p.steps + p.n_steps; s++)
-        if (s->op == SDMNN_CONV) n += (double)voxels(&p.level[s->level]) * (double)sdmnn_conv_weights(s);
+        if (s->op == SDMNN_CONV)
+            n += (double)voxels(&p.level[s->level]) * (double)sdmnn_conv_weights(s);
     return n;
 }
 
-static void random_layer(uint64_t seed, uint64_t stream, size_t at, size_t outputs, size_t inputs, double gain,
-                         float *w)
+static void random_layer(uint64_t seed, uint64_t stream, size_t at, size_t outputs, size_t inputs,
+                         double gain, float *w)
 {
     const double sd = sqrt(gain / (double)inputs);
-    for (size_t i = 0; i < outputs * inputs; i++) w[at + i] = (float)(sd * sdm_rng_normal(seed, stream, at + i));
+    for (size_t i = 0; i < outputs * inputs; i++)
+        w[at + i] = (float)(sd * sdm_rng_normal(seed, stream, at + i));
     memset(w + at + outputs * inputs, 0, outputs * sizeof *w);
 }
 
@@ -161,5 +175,6 @@ void sdm_sdmnn_init(const sdm_sdmnn_arch *a, uint64_t seed, uint64_t stream, flo
     random_layer(seed, stream, sdmnn_dense1(&p), p.cells, a->width, 1, weights);
     for (const sdmnn_step *s = p.steps; s < p.steps + p.n_steps; s++)
         if (s->op == SDMNN_CONV)
-            random_layer(seed, stream, s->weights, s->conv.out, s->conv.in * s->conv.taps, s->linear ? 1 : 2, weights);
+            random_layer(seed, stream, s->weights, s->conv.out, s->conv.in * s->conv.taps,
+                         s->linear ? 1 : 2, weights);
 }

@@ -1,7 +1,8 @@
 /* Max pooling of feature maps: x[C] of layout g -> y[C] of layout h, half the size. */
 #include "operators.h"
 
-// place of the largest value of the window whose first voxel is at x[at], which has w[x], w[y], w[z] voxels
+// place of the largest value of the window whose first voxel is at x[at], which has w[x], w[y],
+// w[z] voxels
 static size_t largest(const sdm_fmap *g, const float *x, size_t at, const size_t w[3])
 {
     size_t best = at;
@@ -15,7 +16,8 @@ static size_t largest(const sdm_fmap *g, const float *x, size_t at, const size_t
 }
 
 // one channel: copies from the largest voxel of each window, or adds back to it
-static void windows(const sdm_fmap *g, const sdm_fmap *h, const float *x, const float *from, float *to, int back)
+static void windows(const sdm_fmap *g, const sdm_fmap *h, const float *x, const float *from,
+                    float *to, int back)
 {
     size_t w[3];
     for (size_t k = 0; k < h->n[2]; k++) {
@@ -35,8 +37,8 @@ static void windows(const sdm_fmap *g, const sdm_fmap *h, const float *x, const 
     }
 }
 
-void sdm_pool_tangent(const sdm_fmap *g, const sdm_fmap *h, size_t channels, const float *x, const float *dx, float *dy,
-                      int n_threads)
+void sdm_pool_tangent(const sdm_fmap *g, const sdm_fmap *h, size_t channels, const float *x,
+                      const float *dx, float *dy, int n_threads)
 {
     (void)n_threads;
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
@@ -47,16 +49,18 @@ void sdm_pool_tangent(const sdm_fmap *g, const sdm_fmap *h, size_t channels, con
     }
 }
 
-void sdm_pool_forward(const sdm_fmap *g, const sdm_fmap *h, size_t channels, const float *x, float *y, int n_threads)
+void sdm_pool_forward(const sdm_fmap *g, const sdm_fmap *h, size_t channels, const float *x,
+                      float *y, int n_threads)
 {
     sdm_pool_tangent(g, h, channels, x, x, y, n_threads);
 }
 
-void sdm_pool_backward(const sdm_fmap *g, const sdm_fmap *h, size_t channels, const float *x, const float *dy,
-                       float *dx, int n_threads)
+void sdm_pool_backward(const sdm_fmap *g, const sdm_fmap *h, size_t channels, const float *x,
+                       const float *dy, float *dx, int n_threads)
 {
     (void)n_threads;
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
     for (long c = 0; c < (long)channels; c++)
-        windows(g, h, x + (size_t)c * g->stride, dy + (size_t)c * h->stride, dx + (size_t)c * g->stride, 1);
+        windows(g, h, x + (size_t)c * g->stride, dy + (size_t)c * h->stride,
+                dx + (size_t)c * g->stride, 1);
 }

@@ -1,7 +1,7 @@
 /* Making of an sdmnn model's file from weights. */
 #include <string.h>
 
-#include "sdm/kernels.h"
+#include "sdm/internal/kernels.h"
 #include "sdm/memory.h"
 #include "sdmnn_model.h"
 
@@ -10,8 +10,8 @@ static void describe(const sdm_sdmnn_spec *spec, sdm_text *t)
 {
     const sdm_sdmnn_arch *a = &spec->arch;
     sdm_model_describe(spec->info, "sdmnn", t);
-    sdm_text_add(t, "sdmnn.depth=%zu\nsdmnn.channels=%zu\nsdmnn.width=%zu\nsdmnn.block=%zu\n", a->depth, a->channels,
-                 a->width, a->block);
+    sdm_text_add(t, "sdmnn.depth=%zu\nsdmnn.channels=%zu\nsdmnn.width=%zu\nsdmnn.block=%zu\n",
+                 a->depth, a->channels, a->width, a->block);
     sdm_text_add(t, "sdmnn.activation=%d\nsdmnn.half=%d\n", a->activation, spec->half);
 }
 
@@ -21,7 +21,8 @@ static void put(bool half, const float *w, size_t n, void *to, size_t at)
     for (size_t i = 0; i < n && half; i++) ((uint16_t *)to)[at + i] = sdm_half_from_float(w[i]);
 }
 
-static void fill(const sdm_sdmnn_spec *spec, const sdmnn_plan *p, float *dense, void *volume, void *conv)
+static void fill(const sdm_sdmnn_spec *spec, const sdmnn_plan *p, float *dense, void *volume,
+                 void *conv)
 {
     const size_t width = spec->arch.width, first = sdmnn_dense1(p);
     const float *w2 = spec->weights + first, *b2 = w2 + p->cells * width;
@@ -42,14 +43,16 @@ static void fill(const sdm_sdmnn_spec *spec, const sdmnn_plan *p, float *dense, 
     }
 }
 
-sdm_status sdm_sdmnn_build(const sdm_sdmnn_spec *spec, uint8_t **bytes, size_t *size, sdm_error *err)
+sdm_status sdm_sdmnn_build(const sdm_sdmnn_spec *spec, uint8_t **bytes, size_t *size,
+                           sdm_error *err)
 {
     sdm_status s = sdm_sdmnn_check(&spec->arch, err);
     if (s) return s;
     sdmnn_plan p;
     sdmnn_plan_make(&spec->arch, false, &p);
     const size_t weight = spec->half ? sizeof(uint16_t) : sizeof(float);
-    const size_t n_dense = sdmnn_dense_floats(&p), n_volume = sdm_panel_count(p.cells, spec->arch.width),
+    const size_t n_dense = sdmnn_dense_floats(&p),
+                 n_volume = sdm_panel_count(p.cells, spec->arch.width),
                  n_conv = sdmnn_conv_count(&p);
     float *dense = NULL, *volume = NULL, *conv = NULL; // room for float, used for half too
     sdm_text text = {0};
@@ -62,7 +65,8 @@ sdm_status sdm_sdmnn_build(const sdm_sdmnn_spec *spec, uint8_t **bytes, size_t *
         const sdm_section sections[] = {{"sdmnn.dense", dense, n_dense * sizeof *dense},
                                         {"sdmnn.volume", volume, n_volume * weight},
                                         {"sdmnn.conv", conv, n_conv * weight}};
-        s = sdm_model_pack(spec->info, &text, sections, sizeof sections / sizeof *sections, bytes, size, err);
+        s = sdm_model_pack(spec->info, &text, sections, sizeof sections / sizeof *sections, bytes,
+                           size, err);
     }
     sdm_text_dispose(&text);
     sdm_free(conv);

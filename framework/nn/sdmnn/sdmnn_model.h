@@ -5,7 +5,7 @@
 #ifndef SDM_SDMNN_MODEL_H
 #define SDM_SDMNN_MODEL_H
 
-#include "model_kind.h"
+#include "model/model_kind.h"
 #include "passes.h"
 
 typedef struct sdmnn_model {
@@ -24,23 +24,25 @@ size_t sdmnn_dense_floats(const sdmnn_plan *p);
 /* Weights of the section sdmnn.conv. */
 size_t sdmnn_conv_count(const sdmnn_plan *p);
 
-/* The convolutions in the order of this machine's kernels, for the forward or the backward pass, to `to`, whose places come into
-   packed[SDMNN_STEPS]. layer: room for the largest as float. */
+/* The convolutions in the order of this machine's kernels, for the forward or the backward pass, to
+   `to`, whose places come into packed[SDMNN_STEPS]. layer: room for the largest as float. */
 size_t sdmnn_packed_floats(const sdmnn_plan *p, bool transposed);
 size_t sdmnn_largest_layer(const sdmnn_plan *p);
-void sdmnn_pack_layers(const sdmnn_model *k, bool transposed, float *layer, float *to, const float **packed);
+void sdmnn_pack_layers(const sdmnn_model *k, bool transposed, float *layer, float *to,
+                       const float **packed);
 
 /* Entries of the kind's table (model_kind.h). */
 size_t sdmnn_scratch_bytes(const sdm_model *m, size_t n, int n_threads);
-void sdmnn_model_forward(const sdm_model *m, const double *params, size_t n, float *values, void *scratch,
-                         int n_threads);
+void sdmnn_model_forward(const sdm_model *m, const double *params, size_t n, float *values,
+                         void *scratch, int n_threads);
 size_t sdmnn_jacobian_scratch_bytes(const sdm_model *m, int n_threads);
-void sdmnn_model_jacobian(const sdm_model *m, const double *params, float *values, float *jacobian, void *scratch,
-                          int n_threads);
+void sdmnn_model_jacobian(const sdm_model *m, const double *params, float *values, float *jacobian,
+                          void *scratch, int n_threads);
 size_t sdmnn_jvp_scratch_bytes(const sdm_model *m, int n_threads);
-void sdmnn_model_jvp(const sdm_model *m, const double *params, const double *direction, float *values, float *tangent,
-                     void *scratch, int n_threads);
+void sdmnn_model_jvp(const sdm_model *m, const double *params, const double *direction,
+                     float *values, float *tangent, void *scratch, int n_threads);
 size_t sdmnn_vjp_scratch_bytes(const sdm_model *m);
-void sdmnn_model_vjp(const sdm_model *m, const double *params, const float *adjoint, double *gradient, void *scratch);
+void sdmnn_model_vjp(const sdm_model *m, const double *params, const float *adjoint,
+                     double *gradient, void *scratch);
 
 #endif

@@ -1,5 +1,5 @@
 /* Opening of an sdmnn model: architecture and weights, every size checked before it is used. */
-#include "sdm/kernels.h"
+#include "sdm/internal/kernels.h"
 #include "sdm/memory.h"
 #include "sdmnn_model.h"
 
@@ -19,7 +19,8 @@ size_t sdmnn_conv_count(const sdmnn_plan *p)
     return n;
 }
 
-static sdm_status read_architecture(sdm_model *m, sdm_lines *lines, bool *half, sdm_sdmnn_arch *a, sdm_error *err)
+static sdm_status read_architecture(sdm_model *m, sdm_lines *lines, bool *half, sdm_sdmnn_arch *a,
+                                    sdm_error *err)
 {
     a->n_params = m->info.n_params;
     for (int i = 0; i < 3; i++) a->n[i] = (size_t)m->info.grid.n[i];
@@ -43,7 +44,8 @@ size_t sdmnn_packed_floats(const sdmnn_plan *p, bool transposed)
 {
     size_t n = 0;
     for (const sdmnn_step *s = p->steps; s < p->steps + p->n_steps; s++)
-        if (s->op == SDMNN_CONV) n += (sdm_conv_packed_count(direction(s, transposed)) + 15) / 16 * 16;
+        if (s->op == SDMNN_CONV)
+            n += (sdm_conv_packed_count(direction(s, transposed)) + 15) / 16 * 16;
     return n;
 }
 
@@ -55,7 +57,8 @@ size_t sdmnn_largest_layer(const sdmnn_plan *p)
     return n;
 }
 
-void sdmnn_pack_layers(const sdmnn_model *k, bool transposed, float *layer, float *to, const float **packed)
+void sdmnn_pack_layers(const sdmnn_model *k, bool transposed, float *layer, float *to,
+                       const float **packed)
 {
     const sdmnn_plan *p = &k->plan;
     size_t from = 0;
@@ -63,7 +66,8 @@ void sdmnn_pack_layers(const sdmnn_model *k, bool transposed, float *layer, floa
         const sdmnn_step *s = &p->steps[i];
         if (s->op != SDMNN_CONV) continue;
         const size_t n = sdmnn_conv_weights(s);
-        for (size_t j = 0; j < n && k->half; j++) layer[j] = sdm_half_to_float(((const uint16_t *)k->conv)[from + j]);
+        for (size_t j = 0; j < n && k->half; j++)
+            layer[j] = sdm_half_to_float(((const uint16_t *)k->conv)[from + j]);
         sdm_conv_pack(s->conv, transposed, k->half ? layer : (const float *)k->conv + from, to);
         packed[i] = to;
         to += (sdm_conv_packed_count(direction(s, transposed)) + 15) / 16 * 16;
@@ -71,7 +75,8 @@ void sdmnn_pack_layers(const sdmnn_model *k, bool transposed, float *layer, floa
     }
 }
 
-static sdm_status open_network(sdm_model *m, sdm_lines *lines, const sdm_section *sections, size_t n, sdm_error *err)
+static sdm_status open_network(sdm_model *m, sdm_lines *lines, const sdm_section *sections,
+                               size_t n, sdm_error *err)
 {
     sdmnn_model *k = NULL;
     sdm_sdmnn_arch arch = {0};
@@ -86,9 +91,11 @@ static sdm_status open_network(sdm_model *m, sdm_lines *lines, const sdm_section
     sdmnn_plan_make(&arch, true, &k->kept);
     const sdmnn_plan *p = &k->plan;
     const size_t weight = half ? sizeof(uint16_t) : sizeof(float);
-    const float *dense = sdm_model_weights(m, sections, n, "sdmnn.dense", sdmnn_dense_floats(p) * sizeof(float), err);
+    const float *dense = sdm_model_weights(m, sections, n, "sdmnn.dense",
+                                           sdmnn_dense_floats(p) * sizeof(float), err);
     if (!dense) return SDM_E_FORMAT;
-    k->volume = sdm_model_weights(m, sections, n, "sdmnn.volume", sdm_panel_count(p->cells, arch.width) * weight, err);
+    k->volume = sdm_model_weights(m, sections, n, "sdmnn.volume",
+                                  sdm_panel_count(p->cells, arch.width) * weight, err);
     if (!k->volume) return SDM_E_FORMAT;
     k->conv = sdm_model_weights(m, sections, n, "sdmnn.conv", sdmnn_conv_count(p) * weight, err);
     if (!k->conv) return SDM_E_FORMAT;

@@ -1,8 +1,9 @@
-/* An sdmnn model at work, one map after another: parameters -> map, with derivatives by forward and by reverse mode. No allocation. */
+/* An sdmnn model at work, one map after another: parameters -> map, with derivatives by forward and
+ * by reverse mode. No allocation. */
 #include <string.h>
 
-#include "sdm/kernels.h"
-#include "sdm/pod.h"
+#include "sdm/internal/kernels.h"
+#include "sdm/internal/pod.h"
 #include "sdmnn_model.h"
 
 static size_t up16(size_t n) { return (n + 15) / 16 * 16; }
@@ -37,10 +38,15 @@ static size_t carve(const sdmnn_plan *p, size_t rows, bool reverse, void *memory
     return total * sizeof(float);
 }
 
-static double unit(const sdm_model *m, size_t i) { return 2 / (m->params[i].max - m->params[i].min); }
+static double unit(const sdm_model *m, size_t i)
+{
+    return 2 / (m->params[i].max - m->params[i].min);
+}
 
-// rows: 1; 2 for the derivative along a direction too; 1 + P for those by each parameter (direction NULL)
-static void dense(const sdm_model *m, const double *params, size_t rows, const double *direction, const workspace *w)
+// rows: 1; 2 for the derivative along a direction too; 1 + P for those by each parameter (direction
+// NULL)
+static void dense(const sdm_model *m, const double *params, size_t rows, const double *direction,
+                  const workspace *w)
 {
     const sdmnn_model *k = m->network;
     const sdm_sdmnn_arch *a = &k->plan.arch;
@@ -77,8 +83,8 @@ size_t sdmnn_scratch_bytes(const sdm_model *m, size_t n, int n_threads)
     return carve(&k->plan, 1, false, NULL, &w);
 }
 
-void sdmnn_model_forward(const sdm_model *m, const double *params, size_t n, float *values, void *scratch,
-                         int n_threads)
+void sdmnn_model_forward(const sdm_model *m, const double *params, size_t n, float *values,
+                         void *scratch, int n_threads)
 {
     const sdmnn_model *k = m->network;
     const size_t voxels = sdm_grid_count(&m->info.grid);
@@ -87,7 +93,8 @@ void sdmnn_model_forward(const sdm_model *m, const double *params, size_t n, flo
     sdmnn_plan_clear(&k->plan, w.block);
     for (size_t i = 0; i < n; i++) {
         dense(m, params + i * m->info.n_params, 1, NULL, &w);
-        sdmnn_forward(&k->plan, &k->layers, w.volume, w.block, NULL, NULL, values + i * voxels, n_threads);
+        sdmnn_forward(&k->plan, &k->layers, w.volume, w.block, NULL, NULL, values + i * voxels,
+                      n_threads);
     }
 }
 
@@ -99,8 +106,9 @@ static size_t derivative_bytes(const sdm_model *m, size_t rows, bool reverse)
 }
 
 // the map, then its derivatives in the rows - 1 maps of `derivatives`
-static void forward_mode(const sdm_model *m, const double *params, size_t rows, const double *direction, float *values,
-                         float *derivatives, void *scratch, int n_threads)
+static void forward_mode(const sdm_model *m, const double *params, size_t rows,
+                         const double *direction, float *values, float *derivatives, void *scratch,
+                         int n_threads)
 {
     const sdmnn_model *k = m->network;
     const size_t voxels = sdm_grid_count(&m->info.grid), ld = sdm_panel_outputs(k->kept.cells);
@@ -121,8 +129,8 @@ size_t sdmnn_jacobian_scratch_bytes(const sdm_model *m, int n_threads)
     return derivative_bytes(m, 1 + m->info.n_params, false);
 }
 
-void sdmnn_model_jacobian(const sdm_model *m, const double *params, float *values, float *jacobian, void *scratch,
-                          int n_threads)
+void sdmnn_model_jacobian(const sdm_model *m, const double *params, float *values, float *jacobian,
+                          void *scratch, int n_threads)
 {
     forward_mode(m, params, 1 + m->info.n_params, NULL, values, jacobian, scratch, n_threads);
 }
@@ -133,15 +141,16 @@ size_t sdmnn_jvp_scratch_bytes(const sdm_model *m, int n_threads)
     return derivative_bytes(m, 2, false);
 }
 
-void sdmnn_model_jvp(const sdm_model *m, const double *params, const double *direction, float *values, float *tangent,
-                     void *scratch, int n_threads)
+void sdmnn_model_jvp(const sdm_model *m, const double *params, const double *direction,
+                     float *values, float *tangent, void *scratch, int n_threads)
 {
     forward_mode(m, params, 2, direction, values, tangent, scratch, n_threads);
 }
 
 size_t sdmnn_vjp_scratch_bytes(const sdm_model *m) { return derivative_bytes(m, 2, true); }
 
-void sdmnn_model_vjp(const sdm_model *m, const double *params, const float *adjoint, double *gradient, void *scratch)
+void sdmnn_model_vjp(const sdm_model *m, const double *params, const float *adjoint,
+                     double *gradient, void *scratch)
 {
     const sdmnn_model *k = m->network;
     const sdm_sdmnn_arch *a = &k->kept.arch;
@@ -166,6 +175,7 @@ void sdmnn_model_vjp(const sdm_model *m, const double *params, const float *adjo
     for (size_t i = 0; i < a->n_params; i++) {
         gradient[i] = 0;
         for (size_t o = 0; o < a->width; o++)
-            gradient[i] += unit(m, i) * (double)(k->w1[o * a->n_params + i] * w.activation[o] * dhidden[o]);
+            gradient[i] +=
+                unit(m, i) * (double)(k->w1[o * a->n_params + i] * w.activation[o] * dhidden[o]);
     }
 }

@@ -1,4 +1,5 @@
-/* Up-sampling of feature maps to the nearest: x[C] of layout h -> y[C] of layout g, `factor` times the size. */
+/* Up-sampling of feature maps to the nearest: x[C] of layout h -> y[C] of layout g, `factor` times
+ * the size. */
 #include <string.h>
 
 #include "operators.h"
@@ -29,8 +30,8 @@ static void gather(const sdm_fmap *g, const sdm_fmap *h, size_t factor, const fl
     }
 }
 
-void sdm_upsample_forward(const sdm_fmap *g, const sdm_fmap *h, size_t factor, size_t channels, const float *x,
-                          float *y, int n_threads)
+void sdm_upsample_forward(const sdm_fmap *g, const sdm_fmap *h, size_t factor, size_t channels,
+                          const float *x, float *y, int n_threads)
 {
     (void)n_threads;
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
@@ -38,8 +39,8 @@ void sdm_upsample_forward(const sdm_fmap *g, const sdm_fmap *h, size_t factor, s
         upsample(g, h, factor, x + (size_t)c * h->stride, y + (size_t)c * g->stride);
 }
 
-void sdm_upsample_backward(const sdm_fmap *g, const sdm_fmap *h, size_t factor, size_t channels, const float *dy,
-                           float *dx, int n_threads)
+void sdm_upsample_backward(const sdm_fmap *g, const sdm_fmap *h, size_t factor, size_t channels,
+                           const float *dy, float *dx, int n_threads)
 {
     (void)n_threads;
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)

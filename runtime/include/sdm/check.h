@@ -11,10 +11,11 @@ extern "C" {
 
 #define SDM_CHECK_POINTS 1000
 
-/* Error = value of the map - exact distance, mm, at the voxels nearest to SDM_CHECK_POINTS points that are spread evenly over the
-   true surface: within about half a voxel of it, where the zero surface of the map is decided. No interpolation is
-   involved: an exact map has errors of rounding only. A sample: the largest error of all voxels is a little larger, and a surface
-   of the map where the true one is far away is not seen. NaN when no voxel was used. */
+/* Error = value of the map - exact distance, mm, at the voxels nearest to SDM_CHECK_POINTS points
+   that are spread evenly over the true surface: within about half a voxel of it, where the zero
+   surface of the map is decided. No interpolation is involved: an exact map has errors of rounding
+   only. A sample: the largest error of all voxels is a little larger, and a surface of the map
+   where the true one is far away is not seen. NaN when no voxel was used. */
 typedef struct sdm_check {
     double mean_mm, rmse_mm, q95_mm,
         max_mm;     /* |error|: mean, root mean square, 95 % quantile (nearest rank), largest */
@@ -32,14 +33,16 @@ typedef enum sdm_check_stat {
 } sdm_check_stat;
 
 SDM_API double sdm_check_get(const sdm_check *c, sdm_check_stat stat); /* NaN for an unknown one */
-SDM_API const char *sdm_check_stat_name(sdm_check_stat stat);          /* "max", "q95", "rmse", "mean" */
+SDM_API const char *sdm_check_stat_name(sdm_check_stat stat); /* "max", "q95", "rmse", "mean" */
 
-/* Checks values[nz][ny][nx] against a prepared mesh. The same points for the same surface. SDM_E_ARG, SDM_E_NOMEM. [any thread] */
-SDM_API sdm_status sdm_check_map(const sdm_exact *engine, const sdm_grid *grid, const float *values, sdm_check *out,
-                                 sdm_error *err);
+/* Checks values[nz][ny][nx] against a prepared mesh. The same points for the same surface.
+ * SDM_E_ARG, SDM_E_NOMEM. [any thread] */
+SDM_API sdm_status sdm_check_map(const sdm_exact *engine, const sdm_grid *grid, const float *values,
+                                 sdm_check *out, sdm_error *err);
 
-/* The same for a shape at p[n_params]: makes mesh and engine, which is most of the time and does not depend on the grid.
-   Errors of sdm_instance_mesh() and sdm_exact_create(), too. [any thread] */
+/* The same for a shape at p[n_params]: makes mesh and engine, which is most of the time and does
+   not depend on the grid. Errors of sdm_instance_mesh() and sdm_exact_create(), too. [any thread]
+ */
 SDM_API sdm_status sdm_check_shape(const sdm_instance *shape, const double *p, const sdm_grid *grid,
                                    const float *values, sdm_check *out, sdm_error *err);
 

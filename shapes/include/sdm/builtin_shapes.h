@@ -8,7 +8,8 @@
 extern "C" {
 #endif
 
-/* Adds every built-in shape to a registry, in the order of shapes.def. SDM_E_PLUGIN (a name is taken), SDM_E_NOMEM. */
+/* Adds every built-in shape to a registry, in the order of shapes.def. SDM_E_PLUGIN (a name is
+ * taken), SDM_E_NOMEM. */
 SDM_API sdm_status sdm_builtin_shapes_add(sdm_registry *registry, sdm_error *err);
 
 #ifdef __cplusplus

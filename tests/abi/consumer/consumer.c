@@ -33,12 +33,14 @@ static void demand(int right, const char *what)
 static void octahedron_map(const sdm_grid *grid, float *values, sdm_error *err)
 {
     static double vert[] = {2, 0, 0, -2, 0, 0, 0, 2, 0, 0, -2, 0, 0, 0, 2, 0, 0, -2};
-    static uint32_t tri[] = {0, 2, 4, 2, 1, 4, 1, 3, 4, 3, 0, 4, 2, 0, 5, 1, 2, 5, 3, 1, 5, 0, 3, 5};
+    static uint32_t tri[] = {0, 2, 4, 2, 1, 4, 1, 3, 4, 3, 0, 4,
+                             2, 0, 5, 1, 2, 5, 3, 1, 5, 0, 3, 5};
     const sdm_mesh mesh = {.vert = vert, .tri = tri, .n_vert = 6, .n_tri = 8};
     sdm_exact *engine = NULL;
     need(sdm_exact_create(&mesh, NULL, &engine, err), err);
     need(sdm_exact_map(engine, grid, values, err), err);
-    demand(fabs(sdm_exact_point(engine, (const double[3]){0, 0, 0}, NULL, NULL, NULL) + 2 / sqrt(3.0)) < 1e-12,
+    demand(fabs(sdm_exact_point(engine, (const double[3]){0, 0, 0}, NULL, NULL, NULL) +
+                2 / sqrt(3.0)) < 1e-12,
            "distance at the middle");
     sdm_exact_free(engine);
 }
@@ -71,8 +73,10 @@ static void use_plugin(const char *file, sdm_error *err)
     need(sdm_exact_shape_map(instance, p, NULL, &grid, values, NULL, err), err);
     size_t inside = 0;
     for (size_t i = 0; i < sdm_grid_count(&grid); i++) inside += values[i] < 0;
-    demand(inside > 0 && inside < sdm_grid_count(&grid) && values[0] > 0, "inside of the plug-in's shape");
-    printf("plug-in shape %s: %zu parameters, %zu triangles, %zu voxels inside\n", shape->name, n, mesh.n_tri, inside);
+    demand(inside > 0 && inside < sdm_grid_count(&grid) && values[0] > 0,
+           "inside of the plug-in's shape");
+    printf("plug-in shape %s: %zu parameters, %zu triangles, %zu voxels inside\n", shape->name, n,
+           mesh.n_tri, inside);
     free(values);
     sdm_mesh_dispose(&mesh);
     sdm_instance_free(instance);
@@ -83,7 +87,8 @@ int main(int argc, char **argv)
 {
     if (argc < 2) return 2;
     sdm_error err = {0};
-    const sdm_grid grid = sdm_grid_centred((const int64_t[3]){30, 30, 30}, 0.2, (const double[3]){0.01, 0.02, 0.03});
+    const sdm_grid grid =
+        sdm_grid_centred((const int64_t[3]){30, 30, 30}, 0.2, (const double[3]){0.01, 0.02, 0.03});
     float *values = malloc(sdm_grid_count(&grid) * sizeof *values);
     demand(values != NULL, "memory");
     octahedron_map(&grid, values, &err);

@@ -1,0 +1,313 @@
+/* Parses the command line by the tables of option_table.c. */
+#include "options.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "sdm/memory.h"
+
+bool cli_option_fits(const cli_option *option, size_t command)
+{
+    return (option->commands >> command & 1u) != 0;
+}
+
+static size_t command_index(const cli_args *args) { return (size_t)(args->command - cli_commands); }
+
+static sdm_status unknown_command(const char *word, sdm_error *err)
+{
+    const char *names[CLI_N_COMMANDS];
+    for (size_t i = 0; i < CLI_N_COMMANDS; i++) names[i] = cli_commands[i].name;
+    const char *near = sdm_nearest_name(word, names, CLI_N_COMMANDS);
+    if (near)
+        return sdm_fail(err, SDM_E_ARG, "unknown command '%s'; did you mean '%s'?", word, near);
+    return sdm_fail(err, SDM_E_ARG, "unknown command '%s'; see sdmgen --help", word);
+}
+
+static sdm_status unknown_option(const cli_args *args, const char *word, size_t length,
+                                 sdm_error *err)
+{
+    const char *names[128];
+    size_t n = 0;
+    for (size_t i = 0; i < cli_n_options && n < 128; i++)
+        if (cli_option_fits(&cli_options[i], command_index(args))) names[n++] = cli_options[i].name;
+    char name[64];
+    const size_t cut = length < sizeof name - 1 ? length : sizeof name - 1;
+    memcpy(name, word, cut);
+    name[cut] = '\0';
+    const char *command = args->command->name, *near = sdm_nearest_name(name, names, n);
+    if (near)
+        return sdm_fail(err, SDM_E_ARG, "%s: unknown option --%s; did you mean --%s?", command,
+                        name, near);
+    return sdm_fail(err, SDM_E_ARG, "%s: unknown option --%s; see sdmgen %s --help", command, name,
+                    command);
+}
+
+static const cli_option *find_long(const cli_args *args, const char *name, size_t length)
+{
+    for (size_t i = 0; i < cli_n_options; i++) {
+        const cli_option *o = &cli_options[i];
+        if (cli_option_fits(o, command_index(args)) && strlen(o->name) == length &&
+            !strncmp(o->name, name, length))
+            return o;
+    }
+    return NULL;
+}
+
+static const cli_option *find_letter(const cli_args *args, char letter)
+{
+    for (size_t i = 0; i < cli_n_options; i++)
+        if (cli_options[i].letter == letter &&
+            cli_option_fits(&cli_options[i], command_index(args)))
+            return &cli_options[i];
+    return NULL;
+}
+
+/* ---- values ---- */
+
+static bool is_choice(const char *choices, const char *value)
+{
+    const size_t length = strlen(value);
+    if (length == 0 || strchr(value, '|')) return false;
+    for (const char *at = choices; at; at = strchr(at, '|') ? strchr(at, '|') + 1 : NULL)
+        if (!strncmp(at, value, length) && (at[length] == '|' || at[length] == '\0')) return true;
+    return false;
+}
+
+static bool in_range(const cli_option *o, double v) { return v >= o->min && v <= o->max; }
+
+static sdm_status bad_value(const cli_option *o, const char *value, sdm_error *err)
+{
+    if (o->kind == CLI_CHOICE)
+        return sdm_fail(err, SDM_E_ARG, "--%s '%s': need one of %s", o->name, value, o->choices);
+    const char *what = o->kind == CLI_INT     ? "a whole number"
+                       : o->kind == CLI_INT3  ? "three whole numbers X,Y,Z"
+                       : o->kind == CLI_REAL  ? "a number"
+                       : o->kind == CLI_REAL2 ? "two numbers X,Y"
+                       : o->kind == CLI_REAL3 ? "three numbers X,Y,Z"
+                       : o->kind == CLI_REAL6 ? "six numbers"
+                                              : "one number or three";
+    char low[32], high[32];
+    return sdm_fail(err, SDM_E_ARG, "--%s '%s': need %s in %s .. %s", o->name, value, what,
+                    sdm_format_real(o->min, low), sdm_format_real(o->max, high));
+}
+
+/* Splits at commas into at most 6 numbers; returns how many, 0 when one is not a number. */
+static size_t split_numbers(const char *text, bool whole, double out[6])
+{
+    size_t n = 0;
+    for (const char *at = text; at; n++) {
+        const char *comma = strchr(at, ',');
+        const size_t length = comma ? (size_t)(comma - at) : strlen(at);
+        char word[64];
+        if (n == 6 || length >= sizeof word) return 0;
+        memcpy(word, at, length);
+        word[length] = '\0';
+        int64_t integer = 0;
+        if (whole ? !sdm_parse_int(word, &integer) : !sdm_parse_real(word, &out[n])) return 0;
+        if (whole) out[n] = (double)integer;
+        at = comma ? comma + 1 : NULL;
+    }
+    return n;
+}
+
+static sdm_status store_several(const cli_option *o, const char *value, void *field, sdm_error *err)
+{
+    double v[6];
+    const size_t n = split_numbers(value, o->kind == CLI_INT3, v);
+    const size_t wanted = o->kind == CLI_REAL2 ? 2 : o->kind == CLI_REAL6 ? 6 : 3;
+    if (n != wanted && !(n == 1 && o->kind == CLI_REAL13)) return bad_value(o, value, err);
+    for (size_t i = 0; i < wanted; i++) {
+        const double x = n == 1 ? v[0] : v[i];
+        if (!in_range(o, x)) return bad_value(o, value, err);
+        if (o->kind == CLI_INT3)
+            ((int64_t *)field)[i] = (int64_t)x;
+        else
+            ((double *)field)[i] = x;
+    }
+    return SDM_OK;
+}
+
+static sdm_status store(cli_args *args, const cli_option *o, const char *value, sdm_error *err)
+{
+    void *field = (char *)args + o->offset;
+    int64_t integer = 0;
+    double real = 0;
+    switch (o->kind) {
+    case CLI_FLAG:
+        *(bool *)field = true;
+        return SDM_OK;
+    case CLI_TEXT:
+        *(const char **)field = value;
+        return SDM_OK;
+    case CLI_LIST: {
+        cli_list *list = field;
+        list->items[list->n++] = value;
+        return SDM_OK;
+    }
+    case CLI_CHOICE:
+        if (!is_choice(o->choices, value)) return bad_value(o, value, err);
+        *(const char **)field = value;
+        return SDM_OK;
+    case CLI_INT:
+        if (!sdm_parse_int(value, &integer) || !in_range(o, (double)integer))
+            return bad_value(o, value, err);
+        *(int64_t *)field = integer;
+        return SDM_OK;
+    case CLI_REAL:
+        if (!sdm_parse_real(value, &real) || !in_range(o, real)) return bad_value(o, value, err);
+        *(double *)field = real;
+        return SDM_OK;
+    default:
+        return store_several(o, value, field, err);
+    }
+}
+
+/* ---- the command line ---- */
+
+/* Takes one option at argv[*i], with its value from the same or the next argument. */
+static sdm_status take_option(int argc, char **argv, int *i, cli_args *args, sdm_error *err)
+{
+    const char *word = argv[*i], *value = NULL;
+    const cli_option *o;
+    if (word[1] == '-') {
+        const char *name = word + 2, *equals = strchr(name, '=');
+        const size_t length = equals ? (size_t)(equals - name) : strlen(name);
+        o = find_long(args, name, length);
+        if (!o) return unknown_option(args, name, length, err);
+        if (equals) value = equals + 1;
+    } else {
+        o = find_letter(args, word[1]);
+        if (!o)
+            return sdm_fail(err, SDM_E_ARG, "%s: unknown option -%c; see sdmgen %s --help",
+                            args->command->name, word[1], args->command->name);
+        if (word[2]) value = word + 2;
+    }
+    if (o->kind == CLI_FLAG && value)
+        return sdm_fail(err, SDM_E_ARG, "%s: --%s takes no value", word, o->name);
+    if (o->kind != CLI_FLAG && !value) {
+        if (*i + 1 >= argc) return sdm_fail(err, SDM_E_ARG, "%s needs a value", word);
+        value = argv[++*i];
+    }
+    if (value && !*value) return sdm_fail(err, SDM_E_ARG, "--%s: empty value", o->name);
+    return store(args, o, value, err);
+}
+
+static void set_phantom_defaults(cli_phantom_args *p)
+{
+    const cli_phantom_args none = {.rotation = {NAN, NAN, NAN},
+                                   .translation = {NAN, NAN, NAN},
+                                   .random_pose = {NAN, NAN},
+                                   .frame = {NAN, NAN, NAN},
+                                   .crop = {NAN, NAN, NAN},
+                                   .inside = {NAN, NAN},
+                                   .outside = {NAN, NAN},
+                                   .air = {NAN, NAN},
+                                   .air_cells = {NAN, NAN, NAN},
+                                   .blur = {NAN, NAN, NAN},
+                                   .texture = NAN,
+                                   .noise = NAN,
+                                   .type = "int16"};
+    *p = none;
+}
+
+static void set_fit_defaults(cli_fit_args *f)
+{
+    const cli_fit_args none = {.image_model = "partial",
+                               .start_centre = {NAN, NAN, NAN},
+                               .start_axis = {NAN, NAN, NAN},
+                               .region = {NAN, NAN, NAN, NAN, NAN, NAN},
+                               .inside = {NAN, NAN},
+                               .outside = {NAN, NAN},
+                               .air = {NAN, NAN},
+                               .blur = NAN,
+                               .l_ref = NAN,
+                               .point_sd = NAN,
+                               .margin = NAN,
+                               .cavity = NAN,
+                               .tissue_places = NAN,
+                               .label_close = NAN,
+                               .least_inside = NAN,
+                               .prior_sd = NAN,
+                               .prior_rotation = NAN,
+                               .prior_translation = NAN,
+                               .eps = NAN};
+    *f = none;
+}
+
+static void set_defaults(cli_args *args)
+{
+    args->seed = -1;
+    args->samples = -1;
+    args->naive = 2;
+    args->origin[0] = args->origin[1] = args->origin[2] = NAN;
+    args->max_mse = INFINITY;
+    args->policy = "refuse";
+    args->method = "exact";
+    args->sign = "auto";
+    args->error_of = "max";
+    set_phantom_defaults(&args->phantom);
+    set_fit_defaults(&args->fit);
+}
+
+static sdm_status make_lists(int argc, cli_args *args, sdm_error *err)
+{
+    cli_list *lists[] = {&args->files,
+                         &args->plugins,
+                         &args->params,
+                         &args->options,
+                         &args->outputs,
+                         &args->fit.labels,
+                         &args->fit.reference_labels,
+                         &args->fit.keep};
+    const size_t n_lists = sizeof lists / sizeof *lists;
+    const sdm_status s = SDM_ALLOC(&args->memory, (size_t)argc * n_lists, "command line", err);
+    if (s) return s;
+    for (size_t i = 0; i < n_lists; i++) lists[i]->items = args->memory + i * (size_t)argc;
+    return SDM_OK;
+}
+
+static bool asks_for_help(int argc, char **argv)
+{
+    for (int i = 2; i < argc && strcmp(argv[i], "--"); i++)
+        if (!strcmp(argv[i], "--help") || !strcmp(argv[i], "-h")) return true;
+    return false;
+}
+
+sdm_status cli_parse(int argc, char **argv, cli_args *args, sdm_error *err)
+{
+    memset(args, 0, sizeof *args);
+    set_defaults(args);
+    if (argc < 2) return sdm_fail(err, SDM_E_ARG, "a command is needed; see sdmgen --help");
+    for (size_t i = 0; i < CLI_N_COMMANDS; i++)
+        if (!strcmp(argv[1], cli_commands[i].name)) args->command = &cli_commands[i];
+    if (!args->command) return unknown_command(argv[1], err);
+    if (asks_for_help(argc, argv)) {
+        args->help = true;
+        return SDM_OK;
+    }
+    sdm_status s = make_lists(argc, args, err);
+    bool options_end = false;
+    for (int i = 2; i < argc && !s; i++) {
+        if (!options_end && !strcmp(argv[i], "--"))
+            options_end = true;
+        else if (!options_end && argv[i][0] == '-' && argv[i][1])
+            s = take_option(argc, argv, &i, args, err);
+        else
+            args->files.items[args->files.n++] = argv[i];
+    }
+    if (s) return s;
+
+    const cli_command *c = args->command;
+    if (args->files.n < c->min_files)
+        return sdm_fail(err, SDM_E_ARG, "usage: sdmgen %s %s", c->name, c->synopsis);
+    if (args->files.n > c->max_files)
+        return sdm_fail(err, SDM_E_ARG, "%s: unexpected argument '%s'; usage: sdmgen %s %s",
+                        c->name, args->files.items[c->max_files], c->name, c->synopsis);
+    return SDM_OK;
+}
+
+void cli_args_dispose(cli_args *args)
+{
+    sdm_free((void *)args->memory);
+    memset(args, 0, sizeof *args);
+}

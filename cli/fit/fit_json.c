@@ -1,0 +1,153 @@
+/* The result of a fit as JSON. */
+#include <math.h>
+
+#include "fit_command.h"
+#include "inputs/setup.h"
+#include "report/terminal.h"
+#include "sdm/internal/threads.h"
+
+static void add_numbers(sdm_json *j, const char *key, const double *v, size_t n)
+{
+    sdm_json_open(j, key, '[');
+    for (size_t i = 0; i < n; i++) sdm_json_real(j, NULL, v[i]);
+    sdm_json_close(j, ']');
+}
+
+static void add_named(sdm_json *j, const char *key, const cli_fit *f, const double *v)
+{
+    sdm_json_open(j, key, '{');
+    for (size_t i = 0; i < f->n_params; i++) sdm_json_real(j, f->params[i].name, v[i]);
+    sdm_json_close(j, '}');
+}
+
+/* Rows and columns in the order of "unknowns". */
+static void add_matrix(sdm_json *j, const char *key, const double *m, size_t n)
+{
+    sdm_json_open(j, key, '[');
+    for (size_t i = 0; i < n; i++) add_numbers(j, NULL, m + i * n, n);
+    sdm_json_close(j, ']');
+}
+
+static void add_unknowns(sdm_json *j, const cli_fit *f)
+{
+    static const char *const pose[6] = {"rotation_x",    "rotation_y",    "rotation_z",
+                                        "translation_x", "translation_y", "translation_z"};
+    const sdm_fit_result *r = &f->result;
+    add_named(j, "parameters", f, r->params);
+    add_named(j, "parameters_sd", f, r->sd);
+    sdm_json_open(j, "at_bound", '[');
+    for (size_t i = 0; i < f->n_params; i++)
+        if (r->at_bound[i]) sdm_json_text(j, NULL, f->params[i].name);
+    sdm_json_close(j, ']');
+    sdm_json_open(j, "not_determined", '[');
+    for (size_t i = 0; i < f->n_params; i++)
+        if (r->by_prior[i]) sdm_json_text(j, NULL, f->params[i].name);
+    sdm_json_close(j, ']');
+    sdm_json_open(j, "pose", '{');
+    add_numbers(j, "rotation_rad", r->pose.rotation, 3);
+    add_numbers(j, "translation_mm", r->pose.translation, 3);
+    add_numbers(j, "rotation_sd_rad", r->sd + f->n_params, 3);
+    add_numbers(j, "translation_sd_mm", r->sd + f->n_params + 3, 3);
+    sdm_json_text(j, "meaning",
+                  "world = R x + translation, LPS mm; R turns about the origin of the shape's "
+                  "frame by the rotation "
+                  "vector (axis times angle); sd of the rotation: of a small turn after it about "
+                  "the axes of the world");
+    sdm_json_close(j, '}');
+    sdm_json_open(j, "unknowns", '[');
+    for (size_t i = 0; i < f->n_params; i++) sdm_json_text(j, NULL, f->params[i].name);
+    for (int i = 0; i < 6; i++) sdm_json_text(j, NULL, pose[i]);
+    sdm_json_close(j, ']');
+    add_matrix(j, "correlation", r->correlation, f->n_params + 6);
+    add_matrix(j, "covariance", r->covariance, f->n_params + 6);
+}
+
+static void add_laws(sdm_json *j, const char *key, const sdm_fit_law *law, size_t n)
+{
+    sdm_json_open(j, key, '[');
+    for (size_t i = 0; i < n; i++) {
+        sdm_json_open(j, NULL, '{');
+        sdm_json_real(j, "weight", law[i].weight);
+        sdm_json_real(j, "mean", law[i].mean);
+        sdm_json_real(j, "sd", law[i].sd);
+        sdm_json_close(j, '}');
+    }
+    sdm_json_close(j, ']');
+}
+
+static void add_target(sdm_json *j, const cli_fit *f)
+{
+    const sdm_fit_result *r = &f->result;
+    sdm_json_int(j, "used", (int64_t)r->n_used);
+    sdm_json_int(j, "nan", (int64_t)r->n_nan);
+    sdm_json_int(j, "cavity", (int64_t)r->n_cavity);
+    sdm_json_real(j, "inside_share", r->inside_share);
+    sdm_json_real(j, "noise_factor", r->noise_factor);
+    sdm_json_real(j, "model_error_mm", r->model_error_mm);
+    sdm_json_real(j, "log_likelihood", r->log_likelihood);
+    if (f->target.kind == SDM_FIT_POINTS) sdm_json_real(j, "point_sd_mm", r->point_sd);
+    if (f->target.kind != SDM_FIT_IMAGE) return;
+    sdm_json_text(j, "image_model", f->args->fit.image_model);
+    sdm_json_real(j, "evidence", r->evidence);
+    if (r->blur > 0) sdm_json_real(j, "blur_mm", r->blur);
+    sdm_json_real(j, "map_voxel_mm", cli_fit_map_voxel(f));
+    add_laws(j, "inside", r->appearance.inside, r->appearance.n_inside);
+    add_laws(j, "outside", r->appearance.outside, r->appearance.n_outside);
+}
+
+static void add_overlap(sdm_json *j, const cli_fit *f)
+{
+    const cli_overlap *o = &f->overlap;
+    if (!o->measured) return;
+    sdm_json_open(j, "overlap", '{');
+    sdm_json_text(j, "with", f->own_reference ? f->path : f->args->fit.reference);
+    if (!isnan(f->args->fit.label_close))
+        sdm_json_real(j, "label_close_mm", f->args->fit.label_close);
+    sdm_json_real(j, "dice", o->dice);
+    sdm_json_int(j, "voxels_fit", (int64_t)o->n_fit);
+    sdm_json_int(j, "voxels_reference", (int64_t)o->n_reference);
+    if (o->has_surface) {
+        sdm_json_real(j, "surface_mean_mm", o->mean_mm);
+        sdm_json_real(j, "surface_q95_mm", o->q95_mm);
+        sdm_json_real(j, "surface_hausdorff_mm", o->hausdorff_mm);
+    }
+    sdm_json_close(j, '}');
+}
+
+static void add_work(sdm_json *j, const cli_fit *f)
+{
+    const sdm_fit_result *r = &f->result;
+    sdm_json_int(j, "iterations", (int64_t)r->n_iterations);
+    add_numbers(j, "objective", r->objective, r->n_iterations);
+    sdm_json_bool(j, "start_clamped", f->start_clamped || r->start_clamped);
+    sdm_json_int(j, "turn", (int64_t)r->turn);
+    sdm_json_int(j, "maps_network", (int64_t)r->n_network);
+    sdm_json_int(j, "maps_exact", (int64_t)r->n_exact);
+    sdm_json_int(j, "maps_exact_outside", (int64_t)r->n_exact_outside);
+    sdm_json_real(j, "seconds", r->seconds);
+    sdm_json_real(j, "seconds_network", r->seconds_network);
+    sdm_json_real(j, "seconds_exact", r->seconds_exact);
+    sdm_json_real(j, "seconds_search", r->seconds_search);
+    sdm_json_int(j, "threads", sdm_threads((int)f->args->threads));
+}
+
+void cli_fit_json(const cli_fit *f, sdm_json *j)
+{
+    const sdm_fit_result *r = &f->result;
+    sdm_json_open(j, NULL, '{');
+    sdm_json_text(j, "made_by", "sdmgen " SDM_VERSION_TEXT);
+    sdm_json_text(j, "shape", f->shape_name);
+    if (f->model_path) sdm_json_text(j, "model", f->model_path);
+    sdm_json_text(j, "image", f->path);
+    sdm_json_text(j, "kind", cli_fit_kind(f));
+    sdm_json_bool(j, "trusted", !f->doubt.status);
+    if (f->doubt.status) sdm_json_text(j, "doubt", f->doubt.text);
+    sdm_json_bool(j, "converged", r->converged);
+    sdm_json_text(j, "reason", r->reason);
+    add_unknowns(j, f);
+    add_overlap(j, f);
+    add_target(j, f);
+    add_work(j, f);
+    if (f->target.kind != SDM_FIT_POINTS) cli_json_grid(j, "grid", &f->target.grid);
+    sdm_json_close(j, '}');
+}

@@ -1,0 +1,84 @@
+/* Labels of a label map or a segmentation as a mask. */
+#include <math.h>
+
+#include "fit_command.h"
+#include "sdm/memory.h"
+
+/* What one word stands for: a value in one layer, or in all. */
+typedef struct label {
+    float value;
+    size_t layer; /* n_layers: all */
+} label;
+
+static sdm_status find_label(const char *path, const sdm_volume *v, const char *word, label *out,
+                             sdm_error *err)
+{
+    int64_t value = 0;
+    const sdm_segment *segment = NULL;
+    sdm_error unknown = {0};
+    const sdm_status s =
+        v->n_segments ? sdm_volume_find_segment(v, word, &segment, &unknown) : SDM_E_ARG;
+    if (!s) {
+        *out = (label){(float)segment->value, segment->layer};
+        return SDM_OK;
+    }
+    if (sdm_parse_int(word, &value) && value != 0) {
+        *out = (label){(float)value, v->n_layers};
+        return SDM_OK;
+    }
+    if (v->n_segments) return sdm_fail(err, SDM_E_ARG, "%s: %s", path, unknown.text);
+    return sdm_fail(
+        err, SDM_E_ARG,
+        "%s: label '%.100s': need a whole number other than 0 (the file names no segments)", path,
+        word);
+}
+
+/* Returns how many voxels have it. */
+static size_t add_label(const sdm_volume *v, const label *l, float *mask)
+{
+    const size_t n = sdm_grid_count(&v->grid);
+    size_t found = 0;
+    for (size_t layer = 0; layer < v->n_layers; layer++) {
+        if (l->layer != v->n_layers && l->layer != layer) continue;
+        const float *values = v->values + layer * n;
+        for (size_t i = 0; i < n; i++)
+            if (values[i] == l->value) mask[i] = 1, found++;
+    }
+    return found;
+}
+
+/* Without words: every voxel that is not 0, in any layer. */
+static void add_all(const sdm_volume *v, float *mask)
+{
+    const size_t n = sdm_grid_count(&v->grid);
+    for (size_t i = 0; i < n * v->n_layers; i++)
+        if (v->values[i] > 0 || v->values[i] < 0) mask[i % n] = 1;
+}
+
+sdm_status cli_label_mask(const char *path, const sdm_volume *v, const cli_list *words,
+                          float *values, sdm_error *err)
+{
+    const size_t n = sdm_grid_count(&v->grid);
+    for (size_t i = 0; i < n; i++) values[i] = 0;
+    if (!words->n) add_all(v, values);
+    for (size_t w = 0; w < words->n; w++) {
+        label l;
+        const sdm_status s = find_label(path, v, words->items[w], &l, err);
+        if (s) return s;
+        if (!add_label(v, &l, values))
+            return sdm_fail(err, SDM_E_FORMAT,
+                            "%s: no voxel has the label '%.100s' (values %g to %g)", path,
+                            words->items[w], (double)v->min, (double)v->max);
+    }
+    size_t inside = 0;
+    for (size_t i = 0; i < n; i++) inside += values[i] > 0;
+    if (!inside) return sdm_fail(err, SDM_E_FORMAT, "%s: every voxel is 0: no label", path);
+    return SDM_OK;
+}
+
+sdm_status cli_close_labels(const cli_fit *f, const sdm_grid *grid, float *values, sdm_error *err)
+{
+    const double radius = f->args->fit.label_close;
+    if (isnan(radius)) return SDM_OK;
+    return sdm_fit_close_labels(grid, radius, f->opts.n_threads, values, err);
+}

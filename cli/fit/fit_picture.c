@@ -1,0 +1,90 @@
+/* A picture of a fit: the contour over slices of the image near the shape. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "fit_command.h"
+#include "report/crop.h"
+#include "sdm/memory.h"
+#include "sdm/picture.h"
+
+/* Trilinear; 0 outside of the grid. */
+static double sample(const sdm_grid *g, const float *values, const double world[3])
+{
+    double at[3], sum = 0;
+    sdm_grid_index(g, world, at);
+    for (int corner = 0; corner < 8; corner++) {
+        double weight = 1;
+        int64_t index[3];
+        bool outside = false;
+        for (int a = 0; a < 3; a++) {
+            const double low = floor(at[a]), t = at[a] - low;
+            const bool up = corner >> a & 1;
+            outside |= !(low + up >= 0 && low + up < (double)g->n[a]);
+            index[a] = outside ? 0 : (int64_t)low + up;
+            weight *= up ? t : 1 - t;
+        }
+        if (outside) continue;
+        sum += weight * (double)values[(index[2] * g->n[1] + index[1]) * g->n[0] + index[0]];
+    }
+    return sum;
+}
+
+/* The labels to compare with on the grid of the picture, below 0 inside. */
+static void sample_reference(const cli_fit *f, const sdm_grid *g, float *out)
+{
+    for (int64_t k = 0; k < g->n[2]; k++)
+        for (int64_t j = 0; j < g->n[1]; j++)
+            for (int64_t i = 0; i < g->n[0]; i++) {
+                const double index[3] = {(double)i, (double)j, (double)k};
+                double world[3];
+                sdm_grid_world(g, index, world);
+                *out++ = 0.5f - (float)sample(&f->reference_grid, f->reference, world);
+            }
+}
+
+/* The voxels that are shown: the shape and half of its extent around, within the image. */
+static cli_block choose_block(const cli_fit *f)
+{
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY},
+           longest = 0;
+    for (size_t i = 0; i < 3 * f->surface.n_vert; i++) {
+        low[i % 3] = fmin(low[i % 3], f->surface.vert[i]);
+        high[i % 3] = fmax(high[i % 3], f->surface.vert[i]);
+    }
+    for (int a = 0; a < 3; a++) longest = fmax(longest, high[a] - low[a]);
+    cli_block b = cli_block_of_mesh(&f->target.grid, &f->surface, 0.5 * longest);
+    if (cli_block_is_empty(&b))
+        b = (cli_block){{0, 0, 0}, {f->target.grid.n[0], f->target.grid.n[1], f->target.grid.n[2]}};
+    return b;
+}
+
+sdm_status cli_fit_write_picture(const cli_fit *f, const char *path, sdm_error *err)
+{
+    const cli_block block = choose_block(f);
+    const sdm_grid g = cli_block_grid(&f->target.grid, &block);
+    const size_t n = sdm_grid_count(&g);
+    const bool compared = f->reference && !f->own_reference;
+    float *image = NULL, *map = NULL, *reference = NULL;
+    sdm_status s = SDM_ALLOC(&image, n, "picture", err);
+    if (!s) s = SDM_ALLOC(&map, n, "picture", err);
+    if (!s && compared) s = SDM_ALLOC(&reference, n, "picture", err);
+    if (!s)
+        s = sdm_fit_map(&f->drawn, f->result.params, &f->result.pose, &g, f->opts.n_threads, map,
+                        err);
+    if (!s) {
+        char title[200], fitted[120];
+        const sdm_picture_map maps[2] = {{fitted, map, false}, {"reference", reference, false}};
+        cli_block_copy(&f->target.grid, f->target.values, &block, image);
+        if (compared) sample_reference(f, &g, reference);
+        snprintf(fitted, sizeof fitted, "%s, fitted%s", f->shape_name,
+                 f->doubt.status ? " (not to be trusted)" : "");
+        const char *slash = strrchr(f->path, '/');
+        snprintf(title, sizeof title, "%.150s", slash ? slash + 1 : f->path);
+        s = sdm_picture_overlay(path, &g, image, maps, compared ? 2 : 1, title, err);
+    }
+    sdm_free(reference);
+    sdm_free(map);
+    sdm_free(image);
+    return s;
+}

@@ -1,0 +1,110 @@
+/* The result of a fit for people. */
+#include <math.h>
+#include <stdio.h>
+
+#include "fit_command.h"
+
+static void print_params(const cli_fit *f)
+{
+    const sdm_fit_result *r = &f->result;
+    for (size_t i = 0; i < f->n_params; i++) {
+        const sdm_param *p = &f->params[i];
+        printf("  %-12s %10.5g", p->name, r->params[i]);
+        if (isnan(r->sd[i])) printf(" +- %-9s", "unknown");
+        if (r->sd[i] > 0) printf(" +- %-9.2g", r->sd[i]);
+        printf(" %s%s%s\n", p->unit,
+               r->at_bound[i] ? "   at the end of its range: the standard deviation says little"
+                              : "",
+               r->by_prior[i]
+                   ? "   not determined: the standard deviation is at least that of before the fit"
+                   : "");
+    }
+}
+
+static void print_vector(const char *name, const double v[3], const double sd[3], const char *unit)
+{
+    printf("  %-12s %10.5g %10.5g %10.5g", name, v[0], v[1], v[2]);
+    if (isnan(sd[0])) printf(" +- unknown");
+    if (sd[0] > 0 || sd[1] > 0 || sd[2] > 0) printf(" +- %.2g %.2g %.2g", sd[0], sd[1], sd[2]);
+    printf(" %s\n", unit);
+}
+
+static void print_overlap(const cli_fit *f)
+{
+    const cli_overlap *o = &f->overlap;
+    if (!o->measured) return;
+    printf("%s: Dice %.4f (%zu voxels fitted, %zu labelled",
+           f->own_reference ? "labels" : "reference", o->dice, o->n_fit, o->n_reference);
+    if (!isnan(f->args->fit.label_close)) printf(", closed by %g mm", f->args->fit.label_close);
+    printf(")\n");
+    if (o->has_surface)
+        printf("  surfaces     mean %.3g, 95 %% below %.3g, Hausdorff %.3g mm\n", o->mean_mm,
+               o->q95_mm, o->hausdorff_mm);
+}
+
+static void print_law(const char *side, const sdm_fit_law *law)
+{
+    printf("  %-12s %.4g (sd %.3g)", side, law->mean, law->sd);
+}
+
+// maps with voxels of more point spreads make what is weakly determined look surer than it is
+#define SPREADS_MOST 1.5
+
+static void print_spread(const cli_fit *f)
+{
+    const double blur = f->result.blur, voxel = cli_fit_map_voxel(f);
+    printf("  point spread %.3g mm\n", blur);
+    if (f->opts.keep_params || !(voxel > SPREADS_MOST * blur)) return;
+    printf("  maps of %.3g mm are coarse beside it: standard deviations may be too small; a fit "
+           "with %s--spacing %.2g has "
+           "finer ones\n",
+           voxel, f->source.model ? "--exact " : "", blur);
+}
+
+/* What the image looks like to the fit. */
+static void print_target(const cli_fit *f)
+{
+    const sdm_fit_result *r = &f->result;
+    if (f->target.kind == SDM_FIT_POINTS) {
+        printf("points: %zu, %.3g mm about the surface\n", r->n_used, r->point_sd);
+        return;
+    }
+    printf("%s: %zu voxels near the shape", cli_fit_kind(f), r->n_used);
+    if (r->n_nan)
+        printf(", %zu left out because they are NaN%s", r->n_nan,
+               r->n_cavity ? " or in wide spaces" : "");
+    if (!isnan(r->inside_share))
+        printf(", %.0f %% of the shape in the image", 100 * r->inside_share);
+    printf("\n");
+    if (f->target.kind != SDM_FIT_IMAGE) return;
+    print_law("inside", &r->appearance.inside[0]);
+    printf("\n");
+    for (size_t i = 0; i < r->appearance.n_outside; i++) {
+        if (r->appearance.outside[i].weight < 1e-3) continue; // not in this image
+        print_law("outside", &r->appearance.outside[i]);
+        printf(r->appearance.n_outside > 1 ? ", share %.2g\n" : "\n",
+               r->appearance.outside[i].weight);
+    }
+    if (r->blur > 0) print_spread(f);
+    if (!isnan(r->evidence))
+        printf("  evidence     %.4g (log-likelihood over an image without the shape)\n",
+               r->evidence);
+}
+
+void cli_fit_print(const cli_fit *f)
+{
+    const sdm_fit_result *r = &f->result;
+    printf("%s fitted to %s%s\n", f->shape_name, f->path,
+           f->doubt.status ? ": NOT TO BE TRUSTED" : "");
+    print_params(f);
+    print_vector("rotation", r->pose.rotation, r->sd + f->n_params, "rad");
+    print_vector("translation", r->pose.translation, r->sd + f->n_params + 3, "mm");
+    print_overlap(f);
+    print_target(f);
+    printf("%s after %zu iterations (%s)\n", r->converged ? "converged" : "NOT CONVERGED",
+           r->n_iterations, r->reason);
+    printf("  maps         %zu by the network, %zu by the exact engine\n", r->n_network,
+           r->n_exact);
+    printf("  time         %.2f s: maps %.2f s; search of the start %.2f s\n", r->seconds,
+           r->seconds_network + r->seconds_exact, r->seconds_search);
+}

@@ -1,0 +1,134 @@
+/* Where the maps of a fit come from: a network, the exact engine, or both. */
+#include <math.h>
+#include <string.h>
+
+#include "fit_command.h"
+#include "inputs/setup.h"
+#include "sdm/memory.h"
+
+static sdm_status open_model(cli_fit *f, sdm_error *err)
+{
+    const cli_args *args = f->args;
+    if (args->options.n)
+        return sdm_fail(err, SDM_E_ARG, "fit: -O belongs to --shape, a model states its own");
+    sdm_status s = sdm_model_open(f->model_path, &f->model, err);
+    if (s) return s;
+    const sdm_model_info *info = sdm_model_get_info(f->model);
+    f->shape_name = info->shape;
+    if (args->fit.exact || args->fit.polish || f->source.policy == SDM_RANGE_EXACT) {
+        s = cli_open_registry(args, &f->registry, err);
+        if (!s) s = sdm_runtime_instance(f->model, f->registry, &f->shape, err);
+        if (s)
+            return sdm_fail_in(err, s, "--%s needs the exact shape",
+                               args->fit.exact    ? "exact"
+                               : args->fit.polish ? "polish"
+                                                  : "policy exact");
+    }
+    if (!args->fit.exact) {
+        f->source.model = f->model;
+        f->n_params = info->n_params;
+        return cli_model_params(info, &f->params, err);
+    }
+    return SDM_OK;
+}
+
+static sdm_status open_shape(cli_fit *f, sdm_error *err)
+{
+    sdm_status s = cli_open_registry(f->args, &f->registry, err);
+    if (!s) s = cli_open_shape(f->registry, f->args->shape, &f->args->options, &f->shape, err);
+    if (!s) f->shape_name = f->args->shape;
+    return s;
+}
+
+static sdm_status shape_params(cli_fit *f, sdm_error *err)
+{
+    const sdm_param *params = sdm_instance_params(f->shape, &f->n_params);
+    const sdm_status s = SDM_ALLOC(&f->params, f->n_params, "parameters", err);
+    if (!s) memcpy(f->params, params, f->n_params * sizeof *params);
+    return s;
+}
+
+/* Enlarges the box by that of the shape at p. */
+static sdm_status add_box(const cli_fit *f, const double *p, double min[3], double max[3],
+                          sdm_error *err)
+{
+    sdm_mesh mesh = {0};
+    const sdm_status s = sdm_instance_mesh(f->shape, p, &mesh, err);
+    for (size_t i = 0; i < mesh.n_vert && !s; i++)
+        for (int a = 0; a < 3; a++) {
+            min[a] = fmin(min[a], mesh.vert[3 * i + (size_t)a]);
+            max[a] = fmax(max[a], mesh.vert[3 * i + (size_t)a]);
+        }
+    sdm_mesh_dispose(&mesh);
+    return s;
+}
+
+/* A grid that holds the shape wherever one parameter goes from the start: beyond it the distance is
+ * an estimate. */
+static sdm_status exact_grid(cli_fit *f, sdm_error *err)
+{
+    if (f->model && !(f->args->spacing[0] > 0)) {
+        f->source.grid = sdm_model_get_info(f->model)->grid;
+        return SDM_OK;
+    }
+    double min[3] = {INFINITY, INFINITY, INFINITY}, max[3] = {-INFINITY, -INFINITY, -INFINITY};
+    double *p = NULL;
+    sdm_status s = SDM_ALLOC(&p, f->n_params, "parameters", err);
+    if (!s) memcpy(p, f->start, f->n_params * sizeof *p);
+    if (!s) s = add_box(f, p, min, max, err);
+    for (size_t i = 0; i < f->n_params && !s; i++) {
+        p[i] = f->params[i].min;
+        s = add_box(f, p, min, max, err);
+        p[i] = f->params[i].max;
+        if (!s) s = add_box(f, p, min, max, err);
+        p[i] = f->start[i];
+    }
+    sdm_free(p);
+    return s ? s : cli_fit_grid(f->args, min, max, &f->source.grid, err);
+}
+
+double cli_fit_map_voxel(const cli_fit *f)
+{
+    const double *h = f->source.model ? sdm_model_get_info(f->source.model)->grid.spacing
+                                      : f->source.grid.spacing;
+    return fmax(h[0], fmax(h[1], h[2]));
+}
+
+/* What the policy asks of the start. */
+static sdm_status check_start(cli_fit *f, sdm_error *err)
+{
+    bool finite = true;
+    for (size_t i = 0; i < f->n_params; i++) finite = finite && isfinite(f->start[i]);
+    if (f->source.policy == SDM_RANGE_REFUSE || !finite)
+        return cli_check_range(f->params, f->n_params, f->start, err);
+    if (f->source.policy == SDM_RANGE_EXACT) return sdm_instance_check(f->shape, f->start, err);
+    for (size_t i = 0; i < f->n_params; i++) {
+        const double given = f->start[i];
+        f->start[i] = fmin(fmax(given, f->params[i].min), f->params[i].max);
+        f->start_clamped = f->start_clamped || f->start[i] != given;
+    }
+    return SDM_OK;
+}
+
+sdm_status cli_fit_open_source(cli_fit *f, sdm_error *err)
+{
+    f->source.policy = cli_policy(f->args);
+    const bool network = f->model_path && !f->args->fit.exact;
+    if (network && f->args->spacing[0] > 0)
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "fit: --spacing is of exact maps (--exact, --shape); a model has its own grid");
+    if (!network && f->args->fit.polish)
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "fit: --polish comes after a network's fit; this one is exact from the start");
+    sdm_status s = f->model_path ? open_model(f, err) : open_shape(f, err);
+    if (!s && !f->params) s = shape_params(f, err);
+    if (!s) s = SDM_ALLOC(&f->start, f->n_params, "parameters", err);
+    if (!s) s = cli_read_params(f->params, f->n_params, &f->args->params, f->start, err);
+    if (!s) s = check_start(f, err);
+    if (s) return s;
+    f->source.shape = f->shape;
+    if (!network) s = exact_grid(f, err);
+    return s;
+}

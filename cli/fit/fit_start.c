@@ -1,0 +1,160 @@
+/* Where a fit begins: a pose, and the rotations that are tried. */
+#include <math.h>
+#include <string.h>
+
+#include "fit_command.h"
+#include "inputs/setup.h"
+#include "report/terminal.h"
+#include "sdm/memory.h"
+
+enum { TURNS_ABOUT_AXIS = 12, TURNS_ALL = 60 };
+
+/* The middle of what is to be seen, in the world. */
+static void default_centre(const cli_fit *f, double centre[3])
+{
+    const sdm_grid *g = &f->target.grid;
+    if (f->target.kind == SDM_FIT_POINTS) {
+        const size_t n = f->target.n_points;
+        for (int a = 0; a < 3; a++) centre[a] = 0;
+        for (size_t i = 0; i < 3 * n; i++) centre[i % 3] += f->points[i] / (double)n;
+        return;
+    }
+    double index[3] = {0.5 * (double)(g->n[0] - 1), 0.5 * (double)(g->n[1] - 1),
+                       0.5 * (double)(g->n[2] - 1)};
+    if (f->target.kind == SDM_FIT_LABEL) {
+        double sum[3] = {0, 0, 0}, count = 0;
+        const float *v = f->mask;
+        for (int64_t k = 0; k < g->n[2]; k++)
+            for (int64_t j = 0; j < g->n[1]; j++)
+                for (int64_t i = 0; i < g->n[0]; i++) {
+                    if (!(*v++ > 0)) continue;
+                    sum[0] += (double)i, sum[1] += (double)j, sum[2] += (double)k;
+                    count++;
+                }
+        for (int a = 0; a < 3; a++) index[a] = sum[a] / count;
+    }
+    sdm_grid_world(g, index, centre);
+    if (f->target.kind == SDM_FIT_IMAGE && f->opts.use_box)
+        for (int a = 0; a < 3; a++) centre[a] = 0.5 * (f->opts.box_min[a] + f->opts.box_max[a]);
+}
+
+static void given_point(const cli_fit *f, const double given[3], double out[3])
+{
+    memcpy(out, given, 3 * sizeof *out);
+    if (f->args->fit.ras) cli_turn_ras(out, 1);
+}
+
+/* Pairs of points from a table. */
+static sdm_status from_points(const cli_fit *f, sdm_pose *pose, sdm_error *err)
+{
+    static const sdm_param columns[6] = {{.name = "shape_x"}, {.name = "shape_y"},
+                                         {.name = "shape_z"}, {.name = "x"},
+                                         {.name = "y"},       {.name = "z"}};
+    const double none[6] = {NAN, NAN, NAN, NAN, NAN, NAN};
+    const char *path = f->args->fit.start_points;
+    double *rows = NULL, *shape = NULL, *world = NULL;
+    size_t n = 0;
+    sdm_status s = cli_read_rows(path, columns, 6, none, &rows, &n, err);
+    if (!s) s = SDM_ALLOC(&shape, 3 * n, "points", err);
+    if (!s) s = SDM_ALLOC(&world, 3 * n, "points", err);
+    for (size_t i = 0; i < 6 * n && !s; i++) {
+        if (!isfinite(rows[i]))
+            s = sdm_fail(err, SDM_E_FORMAT, "%s: %s of pair %zu is missing or not finite", path,
+                         columns[i % 6].name, i / 6 + 1);
+        (i % 6 < 3 ? shape : world)[i / 6 * 3 + i % 3] = rows[i];
+    }
+    if (!s && f->args->fit.ras) cli_turn_ras(world, n);
+    if (!s) s = sdm_fit_pose_from_points(shape, world, n, pose, err);
+    if (s == SDM_E_ARG) {
+        s = sdm_fail_in(err, SDM_E_FORMAT, "%s", path);
+        if (err) err->status = s;
+    }
+    sdm_free(world);
+    sdm_free(shape);
+    sdm_free(rows);
+    return s;
+}
+
+static sdm_status check_words(const cli_fit *f, sdm_error *err)
+{
+    const cli_fit_args *a = &f->args->fit;
+    const cli_phantom_args *p = &f->args->phantom;
+    const int turned = !isnan(p->rotation[0]) + !isnan(a->start_axis[0]) + !!a->start_points;
+    const int placed = !isnan(p->translation[0]) + !isnan(a->start_centre[0]) + !!a->start_points;
+    if (turned > 1)
+        return sdm_fail(err, SDM_E_ARG,
+                        "fit: give one of --rotation, --start-axis and --start-points");
+    if (placed > 1)
+        return sdm_fail(err, SDM_E_ARG,
+                        "fit: give one of --translation, --start-centre and --start-points");
+    if (!isnan(a->start_axis[0]) && !isnan(p->translation[0]))
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "fit: --start-axis goes with --start-centre, --rotation with --translation");
+    if (a->turns && a->turns_sphere)
+        return sdm_fail(err, SDM_E_ARG, "fit: give one of --turns and --turns-sphere");
+    return SDM_OK;
+}
+
+/* How many rotations, and about what; a rotation that is given is not doubted. */
+static void read_turns(cli_fit *f, bool has_rotation)
+{
+    const cli_fit_args *a = &f->args->fit;
+    const bool has_axis = !isnan(a->start_axis[0]);
+    memcpy(f->opts.pivot, f->pivot, sizeof f->pivot);
+    if (a->turns || (has_axis && !a->turns_sphere)) {
+        f->opts.turns = SDM_FIT_TURNS_AXIS;
+        f->opts.n_turns = a->turns ? (size_t)a->turns : TURNS_ABOUT_AXIS;
+    } else if (a->turns_sphere || !has_rotation) {
+        f->opts.turns = SDM_FIT_TURNS_SPHERE;
+        f->opts.n_turns = a->turns_sphere ? (size_t)a->turns_sphere : TURNS_ALL;
+    }
+    if (f->opts.keep_pose) f->opts.turns = SDM_FIT_TURNS_NONE;
+}
+
+/* The pose that brings the middle of the shape to `centre`, turned as given. */
+static sdm_status from_centre(cli_fit *f, const double centre[3], sdm_error *err)
+{
+    const cli_phantom_args *p = &f->args->phantom;
+    sdm_pose *pose = &f->opts.start_pose;
+    if (!isnan(f->args->fit.start_axis[0])) {
+        double axis[3];
+        given_point(f, f->args->fit.start_axis, axis);
+        return sdm_fit_pose_from_axis(f->pivot, centre, axis, pose, err);
+    }
+    double moved[3];
+    *pose = (sdm_pose){{0, 0, 0}, {0, 0, 0}};
+    if (!isnan(p->rotation[0])) memcpy(pose->rotation, p->rotation, sizeof pose->rotation);
+    sdm_pose_apply(pose, f->pivot, moved);
+    for (int a = 0; a < 3; a++) pose->translation[a] = centre[a] - moved[a];
+    return SDM_OK;
+}
+
+sdm_status cli_fit_read_start(cli_fit *f, sdm_error *err)
+{
+    const cli_phantom_args *p = &f->args->phantom;
+    const bool has_translation = !isnan(p->translation[0]),
+               has_centre = !isnan(f->args->fit.start_centre[0]);
+    const bool has_points = f->args->fit.start_points;
+    double centre[3];
+    sdm_status s = check_words(f, err);
+    if (!s) s = sdm_fit_centre(&f->source, f->start, f->pivot, err);
+    if (s) return s;
+    read_turns(f, has_points || has_translation || !isnan(p->rotation[0]));
+    if (has_points) return from_points(f, &f->opts.start_pose, err);
+    if (has_translation) {
+        for (int a = 0; a < 3; a++)
+            f->opts.start_pose.rotation[a] = isnan(p->rotation[a]) ? 0 : p->rotation[a];
+        memcpy(f->opts.start_pose.translation, p->translation, sizeof p->translation);
+        return SDM_OK;
+    }
+    if (has_centre)
+        given_point(f, f->args->fit.start_centre, centre);
+    else
+        default_centre(f, centre);
+    if (!has_centre && f->target.kind == SDM_FIT_IMAGE)
+        cli_notice("no start is given: the shape begins in the middle of the %s, %.4g, %.4g, %.4g "
+                   "mm (LPS)",
+                   f->opts.use_box ? "region" : "image", centre[0], centre[1], centre[2]);
+    return from_centre(f, centre, err);
+}

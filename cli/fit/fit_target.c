@@ -1,0 +1,137 @@
+/* What a fit is made to: an image, labels, a mesh or points. */
+#include <math.h>
+#include <string.h>
+
+#include "fit_command.h"
+#include "inputs/setup.h"
+#include "report/files.h"
+#include "report/terminal.h"
+#include "sdm/image.h"
+#include "sdm/memory.h"
+
+enum { POINTS_MOST = 50000 }; /* more vertices of a mesh add time, not knowledge */
+
+static bool is_mesh(const char *path)
+{
+    return cli_ends_with(path, ".ply") || cli_ends_with(path, ".stl") ||
+           cli_ends_with(path, ".obj") || cli_ends_with(path, ".off");
+}
+
+void cli_turn_ras(double *points, size_t n)
+{
+    for (size_t i = 0; i < n; i++) {
+        points[3 * i] = -points[3 * i];
+        points[3 * i + 1] = -points[3 * i + 1];
+    }
+}
+
+/* ---- images ---- */
+
+static sdm_status as_image(cli_fit *f, sdm_error *err)
+{
+    const sdm_volume *v = &f->image;
+    if (v->n_segments)
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "%s is a segmentation of %zu segments: name those of the shape, e.g. --label '%s'",
+            f->path, v->n_segments, v->segments[0].name);
+    if (v->n_layers > 1)
+        return sdm_fail(err, SDM_E_FORMAT, "%s has %zu layers, need one image", f->path,
+                        v->n_layers);
+    if (v->stored <= SDM_VOXEL_INT64 && v->min >= 0 && v->max <= 1)
+        cli_notice("%s holds 0 and 1 alone: for a label map give --label 1", f->path);
+    f->target.kind = SDM_FIT_IMAGE;
+    f->target.values = v->values;
+    return SDM_OK;
+}
+
+static sdm_status as_labels(cli_fit *f, sdm_error *err)
+{
+    sdm_status s = SDM_ALLOC(&f->mask, sdm_grid_count(&f->image.grid), "labels", err);
+    if (!s) s = cli_label_mask(f->path, &f->image, &f->args->fit.labels, f->mask, err);
+    if (!s) s = cli_close_labels(f, &f->image.grid, f->mask, err);
+    f->target.kind = SDM_FIT_LABEL;
+    f->target.values = f->mask;
+    return s;
+}
+
+static sdm_status read_volume(cli_fit *f, sdm_error *err)
+{
+    sdm_status s = sdm_volume_read(f->path, &f->image, err);
+    if (s) return s;
+    if (!f->image.placed) cli_notice("%s names no frame: its axes are taken as they are", f->path);
+    f->target.grid = f->image.grid;
+    return f->args->fit.labels.n ? as_labels(f, err) : as_image(f, err);
+}
+
+/* ---- points ---- */
+
+static sdm_status read_table(cli_fit *f, sdm_error *err)
+{
+    static const sdm_param columns[3] = {{.name = "x"}, {.name = "y"}, {.name = "z"}};
+    const double none[3] = {NAN, NAN, NAN};
+    return cli_read_rows(f->path, columns, 3, none, &f->points, &f->target.n_points, err);
+}
+
+static sdm_status read_array(cli_fit *f, sdm_error *err)
+{
+    size_t shape[4];
+    int n_dim;
+    const sdm_status s = sdm_npy_read(f->path, &f->points, shape, &n_dim, err);
+    if (s) return s;
+    if (n_dim != 2 || shape[1] != 3)
+        return sdm_fail(err, SDM_E_FORMAT,
+                        "%s: need an array of points, [n][3], not of %d dimensions (last: %zu)",
+                        f->path, n_dim, shape[n_dim - 1]);
+    f->target.n_points = shape[0];
+    return SDM_OK;
+}
+
+/* The vertices; of very many every so many-th. */
+static sdm_status read_vertices(cli_fit *f, sdm_error *err)
+{
+    sdm_mesh mesh = {0};
+    sdm_status s = cli_read_mesh(f->path, &mesh, err);
+    if (s) return s;
+    const size_t step = 1 + (mesh.n_vert - 1) / POINTS_MOST,
+                 n = mesh.n_vert ? 1 + (mesh.n_vert - 1) / step : 0;
+    s = SDM_ALLOC(&f->points, 3 * n, "points", err);
+    for (size_t i = 0; i < n && !s; i++)
+        memcpy(f->points + 3 * i, mesh.vert + 3 * i * step, 3 * sizeof *mesh.vert);
+    f->target.n_points = n;
+    sdm_mesh_dispose(&mesh);
+    return s;
+}
+
+static sdm_status read_points(cli_fit *f, sdm_error *err)
+{
+    if (f->args->fit.labels.n)
+        return sdm_fail(err, SDM_E_ARG, "fit: --label is of volumes, %s has no labels", f->path);
+    const sdm_status s = cli_ends_with(f->path, ".csv")   ? read_table(f, err)
+                         : cli_ends_with(f->path, ".npy") ? read_array(f, err)
+                                                          : read_vertices(f, err);
+    if (s) return s;
+    for (size_t i = 0; i < 3 * f->target.n_points; i++)
+        if (!isfinite(f->points[i]))
+            return sdm_fail(err, SDM_E_FORMAT, "%s: %c of point %zu is missing or not finite",
+                            f->path, "xyz"[i % 3], i / 3 + 1);
+    if (f->target.n_points < 3)
+        return sdm_fail(err, SDM_E_FORMAT, "%s: %zu points, need 3 or more", f->path,
+                        f->target.n_points);
+    if (f->args->fit.ras) cli_turn_ras(f->points, f->target.n_points);
+    f->target.kind = SDM_FIT_POINTS;
+    f->target.points = f->points;
+    return SDM_OK;
+}
+
+sdm_status cli_fit_read_target(cli_fit *f, sdm_error *err)
+{
+    if (sdm_volume_knows(f->path)) return read_volume(f, err);
+    if (is_mesh(f->path) || cli_ends_with(f->path, ".csv") || cli_ends_with(f->path, ".npy"))
+        return read_points(f, err);
+    return sdm_fail(err, SDM_E_ARG,
+                    "fit: image '%s': its name must end in .nii .nii.gz .nrrd .nhdr .mha .mhd "
+                    "(volume), .ply .stl .obj "
+                    ".off (mesh), .csv or .npy (points)",
+                    f->path);
+}

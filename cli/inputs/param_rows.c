@@ -1,0 +1,141 @@
+/* Tables of parameters (CSV): a header of names, then one line of numbers for each map. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sdm/internal/file.h"
+#include "sdm/internal/heap.h"
+#include "setup.h"
+
+enum { MAX_COLUMNS = 256, MAX_BYTES = 64 << 20 };
+
+typedef struct table {
+    const char *path;
+    char *at; /* rest of the text */
+    int line;
+    size_t column[MAX_COLUMNS]; /* parameter of each column */
+    size_t n_columns;
+} table;
+
+static char *trim(char *word)
+{
+    word += strspn(word, " \t\r");
+    size_t length = strlen(word);
+    while (length > 0 && strchr(" \t\r", word[length - 1])) word[--length] = '\0';
+    return word;
+}
+
+/* Next line that is not empty and not a comment (#), trimmed; NULL at the end. */
+static char *next_line(table *t)
+{
+    while (*t->at) {
+        char *line = t->at;
+        const size_t length = strcspn(line, "\n");
+        t->at += length + (line[length] == '\n');
+        line[length] = '\0';
+        t->line++;
+        line = trim(line);
+        if (*line && *line != '#') return line;
+    }
+    return NULL;
+}
+
+/* Cuts the next cell off *line; NULL behind the last. */
+static char *next_cell(char **line)
+{
+    if (!*line) return NULL;
+    char *cell = *line, *comma = strchr(cell, ',');
+    *line = comma ? comma + 1 : NULL;
+    if (comma) *comma = '\0';
+    return trim(cell);
+}
+
+static sdm_status read_header(table *t, const sdm_param *params, size_t n, sdm_error *err)
+{
+    char *line = next_line(t);
+    if (!line)
+        return sdm_fail(err, SDM_E_FORMAT,
+                        "%s: no header line: the first names the columns, such as '%s'", t->path,
+                        params[0].name);
+    for (char *cell; (cell = next_cell(&line));) {
+        const char *names[MAX_COLUMNS];
+        size_t index = n;
+        for (size_t i = 0; i < n && i < MAX_COLUMNS; i++) {
+            names[i] = params[i].name;
+            if (!strcmp(cell, params[i].name)) index = i;
+        }
+        if (index == n) {
+            const char *near = sdm_nearest_name(cell, names, n < MAX_COLUMNS ? n : MAX_COLUMNS);
+            return sdm_fail(err, SDM_E_FORMAT, "%s:%d: unknown column '%.100s'%s%s%s", t->path,
+                            t->line, cell, near ? "; did you mean '" : "; the first is '",
+                            near ? near : params[0].name, near ? "'?" : "'");
+        }
+        for (size_t i = 0; i < t->n_columns; i++)
+            if (t->column[i] == index)
+                return sdm_fail(err, SDM_E_FORMAT, "%s:%d: column '%s' is there twice", t->path,
+                                t->line, cell);
+        t->column[t->n_columns++] = index; /* distinct, so at most n <= MAX_COLUMNS */
+    }
+    return SDM_OK;
+}
+
+static sdm_status read_row(table *t, char *line, double *row, sdm_error *err)
+{
+    size_t column = 0;
+    for (char *cell; (cell = next_cell(&line)); column++) {
+        if (column >= t->n_columns)
+            return sdm_fail(err, SDM_E_FORMAT, "%s:%d: more than the header's %zu values", t->path,
+                            t->line, t->n_columns);
+        double *value = &row[t->column[column]];
+        if (sdm_parse_real(cell, value)) continue;
+        char *end = NULL;
+        *value = strtod(
+            cell, &end); /* NaN and infinities are left to the range check, which names them */
+        if (end == cell || *end || isfinite(*value))
+            return sdm_fail(err, SDM_E_FORMAT, "%s:%d: '%.100s' is not a number", t->path, t->line,
+                            cell);
+    }
+    if (column < t->n_columns)
+        return sdm_fail(err, SDM_E_FORMAT, "%s:%d: %zu values, the header has %zu", t->path,
+                        t->line, column, t->n_columns);
+    return SDM_OK;
+}
+
+static size_t count_lines(const char *text)
+{
+    size_t n = 1;
+    for (; *text; text++) n += *text == '\n';
+    return n;
+}
+
+sdm_status cli_read_rows(const char *path, const sdm_param *params, size_t n, const double *base,
+                         double **values, size_t *n_rows, sdm_error *err)
+{
+    if (n > MAX_COLUMNS)
+        return sdm_fail(err, SDM_E_ARG, "%zu parameters, a table has at most %d", n, MAX_COLUMNS);
+    uint8_t *data = NULL;
+    size_t size = 0, total = 0;
+    sdm_status s = sdm_file_read(path, MAX_BYTES, &data, &size, err);
+    if (s) return s;
+    // spreadsheets put a byte order mark in front
+    const bool marked = size >= 3 && !memcmp(data, "\xef\xbb\xbf", 3);
+    table t = {.path = path, .at = (char *)data + (marked ? 3 : 0)};
+    if (strlen((char *)data) != size)
+        s = sdm_fail(err, SDM_E_FORMAT, "%s: not a text file (a zero byte)", path);
+    if (!s) s = sdm_mul(count_lines(t.at), n, &total, err);
+    if (!s) s = SDM_ALLOC(values, total, "table of parameters", err);
+    if (!s) s = read_header(&t, params, n, err);
+    *n_rows = 0;
+    for (char *line; !s && (line = next_line(&t)); (*n_rows)++) {
+        double *row = *values + *n_rows * n;
+        memcpy(row, base, n * sizeof *row);
+        s = read_row(&t, line, row, err);
+    }
+    if (!s && *n_rows == 0) s = sdm_fail(err, SDM_E_FORMAT, "%s: no row behind the header", path);
+    if (s) {
+        sdm_free(*values);
+        *values = NULL;
+    }
+    sdm_free(data);
+    return s;
+}

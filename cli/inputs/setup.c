@@ -1,0 +1,250 @@
+/* Shapes, parameters and grids from the command line. */
+#include "setup.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "report/files.h"
+#include "sdm/builtin_shapes.h"
+#include "sdm/memory.h"
+#include "sdm/meshfile.h"
+
+sdm_status cli_open_registry(const cli_args *args, sdm_registry **out, sdm_error *err)
+{
+    sdm_status s = sdm_registry_create(out, err);
+    if (!s) s = sdm_builtin_shapes_add(*out, err);
+    if (!s) s = sdm_registry_load_path(*out, getenv("SDMGEN_PLUGIN_PATH"), err);
+    for (size_t i = 0; i < args->plugins.n && !s; i++)
+        s = sdm_registry_load(*out, args->plugins.items[i], err);
+    if (s) {
+        sdm_registry_free(*out);
+        *out = NULL;
+    }
+    return s;
+}
+
+/* Splits "name=value"; the copy in buf holds both parts. */
+static sdm_status split_word(const char *word, const char *what, char buf[SDM_ERROR_TEXT_MAX],
+                             const char **name, const char **value, sdm_error *err)
+{
+    const size_t length = strlen(word);
+    const char *equals = strchr(word, '=');
+    if (!equals || equals == word || length >= SDM_ERROR_TEXT_MAX)
+        return sdm_fail(err, SDM_E_ARG, "%s '%.200s': need name=value", what, word);
+    memcpy(buf, word, length + 1);
+    buf[equals - word] = '\0';
+    *name = buf;
+    *value = buf + (equals - word) + 1;
+    return SDM_OK;
+}
+
+const sdm_shape *cli_find_shape(const sdm_registry *r, const char *name, sdm_error *err)
+{
+    const char *near = NULL;
+    const sdm_shape *shape = sdm_registry_find(r, name, &near);
+    if (!shape)
+        sdm_fail(err, SDM_E_ARG, "unknown shape '%s'%s%s%s", name,
+                 near ? "; did you mean '"
+                      : "; sdmgen shapes lists those known, --plugin FILE loads others",
+                 near ? near : "", near ? "'?" : "");
+    return shape;
+}
+
+sdm_status cli_open_shape(const sdm_registry *r, const char *name, const cli_list *options,
+                          sdm_instance **out, sdm_error *err)
+{
+    const sdm_shape *shape = cli_find_shape(r, name, err);
+    if (!shape) return SDM_E_ARG;
+    sdm_named_text *named = NULL;
+    char(*words)[SDM_ERROR_TEXT_MAX] = NULL;
+    sdm_status s = SDM_ALLOC(&named, options->n, "shape options", err);
+    if (!s) s = sdm_alloc((void **)&words, options->n, sizeof *words, "shape options", err);
+    for (size_t i = 0; i < options->n && !s; i++)
+        s = split_word(options->items[i], "-O", words[i], &named[i].name, &named[i].value, err);
+    if (!s) s = sdm_instance_create(shape, named, options->n, NULL, out, err);
+    if (s == SDM_E_CONFIG) { /* no configuration here: the command line is wrong */
+        s = SDM_E_ARG;
+        if (err) err->status = s;
+    }
+    sdm_free(words);
+    sdm_free(named);
+    return s;
+}
+
+sdm_status cli_open_model(const char *path, sdm_model **out, sdm_error *err)
+{
+    sdm_error why = {0};
+    const sdm_status s = sdm_model_open(path, out, &why);
+    if (!s) return s;
+    const bool other = s == SDM_E_FORMAT && !cli_ends_with(path, ".sdm");
+    return sdm_fail(err, s, "%s%s", why.text,
+                    other ? "; by its name it is no level set (.vdb) and no image (.nii .nii.gz "
+                            ".nrrd .nhdr .mha .mhd)"
+                          : "");
+}
+
+sdm_status cli_model_params(const sdm_model_info *info, sdm_param **out, sdm_error *err)
+{
+    const sdm_status s = SDM_ALLOC(out, info->n_params, "parameters", err);
+    if (s) return s;
+    for (size_t i = 0; i < info->n_params; i++) {
+        const sdm_model_param *p = &info->params[i];
+        (*out)[i] = (sdm_param){p->name, p->unit, p->min, p->max, p->def, ""};
+    }
+    return SDM_OK;
+}
+
+sdm_range_policy cli_policy(const cli_args *args)
+{
+    return !strcmp(args->policy, "clamp")   ? SDM_RANGE_CLAMP
+           : !strcmp(args->policy, "exact") ? SDM_RANGE_EXACT
+                                            : SDM_RANGE_REFUSE;
+}
+
+/* ---- parameters ---- */
+
+/* A number that may be NaN or infinite (also by overflow), which sdm_parse_real() refuses. */
+static bool parse_any_real(const char *text, double *out)
+{
+    if (sdm_parse_real(text, out)) return true;
+    const char *at = text + (*text == '-' || *text == '+');
+    const size_t digits = strspn(at, "0123456789.eE+-");
+    char *end = NULL;
+    const double v = strtod(text, &end);
+    if (end == text || *end || isfinite(v)) return false;
+    if (at[digits] && strspn(at, "nNaAiIfFtTyY") != strlen(at)) return false;
+    *out = v;
+    return true;
+}
+
+static sdm_status find_param(const sdm_param *params, size_t n, const char *name, size_t *index,
+                             sdm_error *err)
+{
+    const char *names[SDM_MODEL_NAME_MAX * 4];
+    const size_t limit = sizeof names / sizeof *names;
+    for (size_t i = 0; i < n; i++) {
+        if (i < limit) names[i] = params[i].name;
+        if (strcmp(params[i].name, name)) continue;
+        *index = i;
+        return SDM_OK;
+    }
+    const char *near = sdm_nearest_name(name, names, n < limit ? n : limit);
+    if (near)
+        return sdm_fail(err, SDM_E_ARG, "unknown parameter '%.100s'; did you mean '%s'?", name,
+                        near);
+    return sdm_fail(err, SDM_E_ARG, "unknown parameter '%.100s'", name);
+}
+
+static sdm_status read_param(const sdm_param *params, size_t n, const char *word, bool *seen,
+                             double *values, sdm_error *err)
+{
+    char buf[SDM_ERROR_TEXT_MAX];
+    const char *name = NULL, *value = NULL;
+    size_t index = 0;
+    sdm_status s = split_word(word, "-p", buf, &name, &value, err);
+    if (!s) s = find_param(params, n, name, &index, err);
+    if (s) return s;
+    if (seen[index]) return sdm_fail(err, SDM_E_ARG, "parameter '%s' is given twice", name);
+    seen[index] = true;
+    if (parse_any_real(value, &values[index])) return SDM_OK;
+    return sdm_fail(err, SDM_E_ARG, "parameter %s: '%.100s' is not a number", name, value);
+}
+
+sdm_status cli_read_params(const sdm_param *params, size_t n, const cli_list *given, double *values,
+                           sdm_error *err)
+{
+    bool *seen = NULL;
+    sdm_status s = SDM_ALLOC(&seen, n, "parameters", err);
+    for (size_t i = 0; i < n; i++) values[i] = params[i].def;
+    for (size_t i = 0; i < given->n && !s; i++)
+        s = read_param(params, n, given->items[i], seen, values, err);
+    sdm_free(seen);
+    return s;
+}
+
+sdm_status cli_check_range(const sdm_param *params, size_t n, const double *values, sdm_error *err)
+{
+    for (size_t i = 0; i < n; i++) {
+        const sdm_param *p = &params[i];
+        if (values[i] >= p->min && values[i] <= p->max) continue;
+        char v[32], low[32], high[32];
+        return sdm_fail(err, SDM_E_RANGE, "parameter %s = %s, allowed %s .. %s%s%s", p->name,
+                        isnan(values[i]) ? "nan" : sdm_format_real(values[i], v),
+                        sdm_format_real(p->min, low), sdm_format_real(p->max, high),
+                        *p->unit ? " " : "", p->unit);
+    }
+    return SDM_OK;
+}
+
+void cli_add_params(const sdm_param *params, size_t n, const double *values, sdm_text *out)
+{
+    char buf[32];
+    for (size_t i = 0; i < n; i++)
+        sdm_text_add(out, "%s%s=%s", i ? " " : "", params[i].name, sdm_format_real(values[i], buf));
+}
+
+/* ---- grids ---- */
+
+sdm_status cli_fit_grid(const cli_args *args, const double min[3], const double max[3],
+                        sdm_grid *out, sdm_error *err)
+{
+    const double longest = fmax(max[0] - min[0], fmax(max[1] - min[1], max[2] - min[2]));
+    const double margin = 0.1 * longest;
+    const bool has_size = args->size[0] > 0, has_spacing = args->spacing[0] > 0;
+    double spacing[3];
+    int64_t n[3];
+    for (int i = 0; i < 3; i++)
+        spacing[i] = has_spacing ? args->spacing[i] : (longest + 2 * margin) / 63;
+    if (has_size && !has_spacing) { /* the smallest uniform spacing that covers the box */
+        double need = 0;
+        for (int i = 0; i < 3; i++)
+            need = fmax(need, (max[i] - min[i] + 2 * margin) /
+                                  (double)(args->size[i] > 1 ? args->size[i] - 1 : 1));
+        for (int i = 0; i < 3; i++) spacing[i] = need;
+    }
+    for (int i = 0; i < 3; i++) {
+        const double cells = (max[i] - min[i] + 2 * margin) / spacing[i];
+        if (!has_size && !(cells < 1048576))
+            return sdm_fail(err, SDM_E_ARG,
+                            "spacing %g mm gives over 2^20 voxels on a side of %g mm", spacing[i],
+                            max[i] - min[i]);
+        n[i] = has_size ? args->size[i] : (int64_t)ceil(cells - 1e-9) + 1;
+    }
+    const double centre[3] = {0.5 * (min[0] + max[0]), 0.5 * (min[1] + max[1]),
+                              0.5 * (min[2] + max[2])};
+    *out = sdm_grid_centred(n, spacing[0], centre);
+    for (int i = 0; i < 3; i++) {
+        out->spacing[i] = spacing[i];
+        out->origin[i] = isfinite(args->origin[0])
+                             ? args->origin[i]
+                             : centre[i] - 0.5 * spacing[i] * (double)(n[i] - 1);
+    }
+    return sdm_grid_check(out, err);
+}
+
+sdm_status cli_read_mesh(const char *path, sdm_mesh *out, sdm_error *err)
+{
+    sdm_status s = sdm_mesh_read(path, out, err);
+    if (s == SDM_E_UNSUPPORTED) {
+        s = SDM_E_FORMAT;
+        if (err) err->status = s;
+    }
+    return s;
+}
+
+void cli_json_grid(sdm_json *json, const char *key, const sdm_grid *g)
+{
+    sdm_json_open(json, key, '{');
+    sdm_json_open(json, "size", '[');
+    for (int i = 0; i < 3; i++) sdm_json_int(json, NULL, g->n[i]);
+    sdm_json_close(json, ']');
+    sdm_json_open(json, "spacing", '[');
+    for (int i = 0; i < 3; i++) sdm_json_real(json, NULL, g->spacing[i]);
+    sdm_json_close(json, ']');
+    sdm_json_open(json, "origin", '[');
+    for (int i = 0; i < 3; i++) sdm_json_real(json, NULL, g->origin[i]);
+    sdm_json_close(json, ']');
+    sdm_json_close(json, '}');
+}

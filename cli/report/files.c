@@ -1,0 +1,113 @@
+/* Outputs that would overwrite an input or one another are refused before any work, and so are
+ * those that cannot be made. */
+#include "files.h"
+
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+
+#include "sdm/internal/config.h"
+#include "sdm/internal/file.h"
+#include "sdm/memory.h"
+
+bool cli_ends_with(const char *path, const char *suffix)
+{
+    const size_t n = strlen(path), k = strlen(suffix);
+    return n > k && !strcasecmp(path + n - k, suffix);
+}
+
+/* A file that is there, or the name of a new one in its folder. */
+typedef struct file_id {
+    dev_t device;
+    ino_t number;
+    const char *name; /* "": it is there */
+} file_id;
+
+static bool identify(const char *path, file_id *id)
+{
+    struct stat st;
+    char folder[SDM_PATH_TEXT_MAX] = ".";
+    const char *slash = strrchr(path, '/');
+    id->name = "";
+    if (stat(path, &st)) {
+        const size_t length = slash ? (size_t)(slash - path) + 1 : 0;
+        if (length >= sizeof folder) return false;
+        if (slash) memcpy(folder, path, length), folder[length] = '\0';
+        if (stat(folder, &st)) return false;
+        id->name = slash ? slash + 1 : path;
+    }
+    id->device = st.st_dev;
+    id->number = st.st_ino;
+    return true;
+}
+
+static bool is_same(const char *a, const char *b)
+{
+    file_id x, y;
+    return identify(a, &x) && identify(b, &y) && x.device == y.device && x.number == y.number &&
+           !strcmp(x.name, y.name);
+}
+
+/* All that a command may read, options of the shape such as mesh=FILE among them. */
+static sdm_status find_inputs(const cli_args *args, cli_list *out, sdm_error *err)
+{
+    const char *const single[] = {args->mesh, args->rows, args->fit.reference,
+                                  args->fit.start_points};
+    const size_t n_single = sizeof single / sizeof *single;
+    const sdm_status s =
+        SDM_ALLOC(&out->items, args->files.n + args->options.n + n_single, "names of files", err);
+    if (s) return s;
+    for (size_t i = 0; i < args->files.n; i++) out->items[out->n++] = args->files.items[i];
+    for (size_t i = 0; i < args->options.n; i++) {
+        const char *equals = strchr(args->options.items[i], '=');
+        if (equals) out->items[out->n++] = equals + 1;
+    }
+    for (size_t i = 0; i < n_single; i++)
+        if (single[i]) out->items[out->n++] = single[i];
+    return SDM_OK;
+}
+
+static sdm_status find_outputs(const cli_args *args, cli_list *out, sdm_error *err)
+{
+    const char *const single[] = {args->closest,       args->normal,       args->triangle,
+                                  args->jacobian,      args->gradient,     args->fit.label_out,
+                                  args->phantom.label, args->phantom.truth};
+    const size_t n_single = sizeof single / sizeof *single;
+    const sdm_status s = SDM_ALLOC(&out->items, args->outputs.n + n_single, "names of files", err);
+    if (s) return s;
+    for (size_t i = 0; i < args->outputs.n; i++) out->items[out->n++] = args->outputs.items[i];
+    for (size_t i = 0; i < n_single; i++)
+        if (single[i]) out->items[out->n++] = single[i];
+    return SDM_OK;
+}
+
+static sdm_status check_output(const cli_list *outputs, size_t index, const cli_list *inputs,
+                               sdm_error *err)
+{
+    const char *path = outputs->items[index];
+    for (size_t i = 0; i < inputs->n; i++)
+        if (is_same(path, inputs->items[i]))
+            return sdm_fail(err, SDM_E_ARG,
+                            "output '%s' would overwrite the input '%s': give it another name",
+                            path, inputs->items[i]);
+    for (size_t i = 0; i < index; i++)
+        if (is_same(path, outputs->items[i]))
+            return sdm_fail(err, SDM_E_ARG, "output '%s' is given twice, also as '%s'", path,
+                            outputs->items[i]);
+    sdm_outfile *trial = NULL; /* the only honest test of "can be written" */
+    const sdm_status s = sdm_outfile_open(path, &trial, err);
+    sdm_outfile_discard(&trial);
+    return s;
+}
+
+sdm_status cli_check_files(const cli_args *args, const cli_list *outputs, sdm_error *err)
+{
+    cli_list inputs = {0}, all = {0};
+    sdm_status s = find_inputs(args, &inputs, err);
+    if (!s && !outputs) s = find_outputs(args, &all, err);
+    if (!outputs) outputs = &all;
+    for (size_t i = 0; i < outputs->n && !s; i++) s = check_output(outputs, i, &inputs, err);
+    sdm_free((void *)all.items);
+    sdm_free((void *)inputs.items);
+    return s;
+}

@@ -1,0 +1,192 @@
+/* Output files: their type follows their name. */
+#include "output.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "files.h"
+#include "sdm/image.h"
+#include "sdm/isosurface.h"
+#include "sdm/meshfile.h"
+#include "sdm/picture.h"
+#include "sdm/vdb.h"
+#include "terminal.h"
+
+typedef enum file_kind {
+    KIND_NONE = 0,
+    KIND_VDB,
+    KIND_IMAGE,
+    KIND_SURFACE,
+    KIND_PICTURE
+} file_kind;
+
+static const struct {
+    const char *suffix;
+    file_kind kind;
+} kinds[] = {{".vdb", KIND_VDB},     {".nii", KIND_IMAGE},   {".nii.gz", KIND_IMAGE},
+             {".nrrd", KIND_IMAGE},  {".mha", KIND_IMAGE},   {".npy", KIND_IMAGE},
+             {".ply", KIND_SURFACE}, {".stl", KIND_SURFACE}, {".obj", KIND_SURFACE},
+             {".off", KIND_SURFACE}, {".png", KIND_PICTURE}};
+enum { N_KINDS = sizeof kinds / sizeof *kinds };
+
+static file_kind kind_of(const char *path, const char **suffix)
+{
+    for (size_t i = 0; i < N_KINDS; i++) {
+        if (!cli_ends_with(path, kinds[i].suffix)) continue;
+        if (suffix) *suffix = path + strlen(path) - strlen(kinds[i].suffix);
+        return kinds[i].kind;
+    }
+    return KIND_NONE;
+}
+
+sdm_status cli_check_type(const char *path, bool meshes_only, sdm_error *err)
+{
+    const file_kind kind = kind_of(path, NULL);
+    if (meshes_only && kind != KIND_SURFACE)
+        return sdm_fail(err, SDM_E_ARG, "output '%s': its name must end in .ply .stl .obj or .off",
+                        path);
+    if (kind == KIND_NONE)
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "output '%s': its name must end in .vdb .nii .nii.gz .nrrd .mha .npy .ply .stl "
+            ".obj .off or .png",
+            path);
+#ifndef SDM_HAVE_VDB
+    if (kind == KIND_VDB)
+        return sdm_fail(err, SDM_E_UNSUPPORTED, "output '%s': built without OpenVDB", path);
+#endif
+    return SDM_OK;
+}
+
+/* What made the map, in a word. */
+static const char *made_by(const cli_map *map)
+{
+    return map->source == SDM_SOURCE_NETWORK ? "network" : map->origin;
+}
+
+/* The same with what else is to be known about it. */
+static void describe(const cli_map *map, char text[80])
+{
+    static const char *const reasons[] = {"", " (out of the trained range)",
+                                          " (network over the bound)"};
+    snprintf(text, 80, "%s%s%s", made_by(map), map->clamped ? " (clamped)" : "",
+             reasons[map->reason]);
+}
+
+static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args *args,
+                            sdm_error *err)
+{
+#ifdef SDM_HAVE_VDB
+    static const char *const reasons[] = {"none", "range", "error"};
+    const sdm_check none = {0}, *check = map->check ? map->check : &none;
+    char error[32], rmse[32], q95[32], max[32];
+    const sdm_named_value metadata[] = {
+        {"sdm_version", "sdmgen " SDM_VERSION_TEXT},
+        {"sdm_shape", map->shape},
+        {"sdm_parameters", map->params},
+        {"sdm_source", made_by(map)},
+        {"sdm_origin", map->origin},
+        {"sdm_clamped", map->clamped ? "yes" : "no"},
+        {"sdm_error_rmse_mm", sdm_format_real(map->error_mm, error)},
+        {"sdm_exact_reason", reasons[map->reason]},
+        {"sdm_check_rmse_mm", sdm_format_real(check->rmse_mm, rmse)},
+        {"sdm_check_q95_mm", sdm_format_real(check->q95_mm, q95)},
+        {"sdm_check_max_mm", sdm_format_real(check->max_mm, max)},
+    };
+    const size_t n_metadata = sizeof metadata / sizeof *metadata - (map->check ? 0 : 3);
+    const sdm_vdb_opts opts = {.band_voxels = args->band,
+                               .dense = args->dense,
+                               .half = args->half,
+                               .metadata = metadata,
+                               .n_metadata = n_metadata,
+                               .cancelled = cli_interrupted};
+    sdm_vdb_report report = {0};
+    const sdm_status s = sdm_vdb_write(path, map->grid, map->values, &opts, &report, err);
+    if (!s && report.adjusted_voxels > 0)
+        cli_notice("%s: %lld voxels at creases were adjusted, by at most %.2g mm, to make a valid "
+                   "level set; none "
+                   "changed sides",
+                   path, (long long)report.adjusted_voxels, report.adjusted_mm);
+    if (!s && report.cut)
+        cli_notice("%s: the surface leaves the grid and is cut at its border", path);
+    return s;
+#else
+    (void)map;
+    (void)args;
+    return sdm_fail(err, SDM_E_UNSUPPORTED, "output '%s': built without OpenVDB", path);
+#endif
+}
+
+static sdm_status write_surface(const char *path, const cli_map *map, sdm_error *err)
+{
+    sdm_mesh surface = {0};
+    bool cut = false;
+    sdm_status s = sdm_isosurface(map->grid, map->values, 0.0f, &surface, &cut, err);
+    if (!s && surface.n_tri == 0)
+        s = sdm_fail(err, SDM_E_MESH, "%s: the map has no zero surface", path);
+    if (!s) s = sdm_mesh_write(path, &surface, err);
+    if (!s && cut) cli_notice("%s: the surface leaves the grid and is open at its border", path);
+    sdm_mesh_dispose(&surface);
+    return s;
+}
+
+static sdm_status write_picture(const char *path, const cli_map *map, sdm_error *err)
+{
+    static const float levels[] = {0.0f, 1.0f};
+    char title[80];
+    describe(map, title);
+    const sdm_picture_map column = {title, map->values, false};
+    return sdm_picture_slices(path, map->grid, &column, 1, levels, 2, err);
+}
+
+sdm_status cli_write_map(const char *path, const cli_map *map, const cli_args *args, sdm_error *err)
+{
+    char text[400], made[80];
+    const sdm_status s = cli_check_interrupt(err);
+    if (s) return s;
+    switch (kind_of(path, NULL)) {
+    case KIND_VDB:
+        return write_vdb(path, map, args, err);
+    case KIND_IMAGE:
+        // how it was made first: a NIfTI file keeps 79 characters
+        describe(map, made);
+        snprintf(text, sizeof text, "sdmgen %s: %s: %s %s, mm, negative inside", SDM_VERSION_TEXT,
+                 made, map->shape, map->params);
+        return sdm_image_write(path, map->grid, map->values, text, err);
+    case KIND_SURFACE:
+        return write_surface(path, map, err);
+    case KIND_PICTURE:
+        return write_picture(path, map, err);
+    default:
+        return sdm_fail(err, SDM_E_ARG, "output '%s': unknown type", path);
+    }
+}
+
+/* Length of a %d, %4d or %04d at `at`, with its width; 0 when there is none. */
+static size_t number_mark(const char *at, int *width)
+{
+    if (*at != '%') return 0;
+    size_t digits = strspn(at + 1, "0123456789");
+    if (digits > 2 || at[1 + digits] != 'd') return 0;
+    *width = digits ? atoi(at + 1) : 1;
+    return digits + 2;
+}
+
+sdm_status cli_number_path(const char *path, size_t row, char *buf, size_t size, sdm_error *err)
+{
+    int width = 4, written;
+    const char *mark = path, *suffix = path + strlen(path);
+    size_t length = 0;
+    while ((mark = strchr(mark, '%')) && !(length = number_mark(mark, &width))) mark++;
+    if (mark)
+        written =
+            snprintf(buf, size, "%.*s%0*zu%s", (int)(mark - path), path, width, row, mark + length);
+    else {
+        kind_of(path, &suffix);
+        written = snprintf(buf, size, "%.*s-%04zu%s", (int)(suffix - path), path, row, suffix);
+    }
+    if (written < 0 || (size_t)written >= size)
+        return sdm_fail(err, SDM_E_ARG, "output '%.100s...': the name is too long", path);
+    return SDM_OK;
+}

@@ -1,0 +1,69 @@
+/* What an image file holds, for people and as JSON. */
+#include "report_image.h"
+
+#include <stdio.h>
+
+#include "inputs/setup.h"
+#include "terminal.h"
+
+static void print_grid(const sdm_grid *g)
+{
+    static const char axis[] = "xyz";
+    char count[32];
+    printf("grid         %lld x %lld x %lld voxels (%s) of %g x %g x %g mm\n", (long long)g->n[0],
+           (long long)g->n[1], (long long)g->n[2],
+           cli_format_count((int64_t)sdm_grid_count(g), count), g->spacing[0], g->spacing[1],
+           g->spacing[2]);
+    printf("origin       %g %g %g (LPS, mm)\n", g->origin[0], g->origin[1], g->origin[2]);
+    for (int a = 0; a < 3; a++)
+        printf("%s %c along %g %g %g\n", a ? "            " : "axes        ", axis[a], g->dir[a],
+               g->dir[3 + a], g->dir[6 + a]);
+}
+
+void cli_print_volume(const char *path, const sdm_volume *v)
+{
+    printf("%s: image of %s voxels", path, sdm_voxel_name(v->stored));
+    if (v->n_layers > 1) printf(", %zu layers", v->n_layers);
+    printf("\n\n");
+    print_grid(&v->grid);
+    if (!v->placed)
+        printf(
+            "             the file does not say where it lies: axes and origin are only assumed\n");
+    printf("values       %.9g .. %.9g\n", (double)v->min, (double)v->max);
+    if (v->n_nan > 0 || v->n_inf > 0)
+        printf("             %zu are NaN, %zu infinite\n", v->n_nan, v->n_inf);
+    for (size_t i = 0; i < v->n_segments; i++) {
+        const sdm_segment *s = &v->segments[i];
+        printf("%s '%s' (%s): value %lld in layer %zu\n", i ? "            " : "segments    ",
+               s->name, s->id, (long long)s->value, s->layer);
+    }
+    if (v->text[0]) printf("description  %s\n", v->text);
+}
+
+void cli_json_volume(sdm_json *j, const char *path, const sdm_volume *v)
+{
+    sdm_json_text(j, "file", path);
+    sdm_json_text(j, "type", "image");
+    sdm_json_text(j, "voxel_type", sdm_voxel_name(v->stored));
+    cli_json_grid(j, "grid", &v->grid);
+    sdm_json_open(j, "direction", '[');
+    for (int i = 0; i < 9; i++) sdm_json_real(j, NULL, v->grid.dir[i]);
+    sdm_json_close(j, ']');
+    sdm_json_bool(j, "placed", v->placed);
+    sdm_json_int(j, "layers", (int64_t)v->n_layers);
+    sdm_json_real(j, "min", (double)v->min);
+    sdm_json_real(j, "max", (double)v->max);
+    sdm_json_int(j, "nan", (int64_t)v->n_nan);
+    sdm_json_int(j, "infinite", (int64_t)v->n_inf);
+    sdm_json_open(j, "segments", '[');
+    for (size_t i = 0; i < v->n_segments; i++) {
+        sdm_json_open(j, NULL, '{');
+        sdm_json_text(j, "name", v->segments[i].name);
+        sdm_json_text(j, "id", v->segments[i].id);
+        sdm_json_int(j, "value", v->segments[i].value);
+        sdm_json_int(j, "layer", (int64_t)v->segments[i].layer);
+        sdm_json_close(j, '}');
+    }
+    sdm_json_close(j, ']');
+    sdm_json_text(j, "text", v->text);
+}

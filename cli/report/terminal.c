@@ -1,0 +1,156 @@
+/* Messages, exit codes, interrupts and the clock of the command line. */
+#include "terminal.h"
+
+#include <signal.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+static bool quiet_wanted;
+static volatile sig_atomic_t interrupts;
+
+int cli_exit_code(sdm_status status)
+{
+    switch (status) {
+    case SDM_OK:
+        return CLI_EXIT_DONE;
+    case SDM_E_ARG:
+    case SDM_E_CONFIG:
+        return CLI_EXIT_USAGE;
+    case SDM_E_FORMAT:
+    case SDM_E_MESH:
+    case SDM_E_PLUGIN:
+        return CLI_EXIT_INPUT;
+    case SDM_E_QUALITY:
+        return CLI_EXIT_QUALITY;
+    case SDM_E_RANGE:
+        return CLI_EXIT_RANGE;
+    case SDM_E_CANCELLED:
+        return CLI_EXIT_INTERRUPTED;
+    default:
+        return CLI_EXIT_FAILED;
+    }
+}
+
+void cli_set_quiet(bool quiet) { quiet_wanted = quiet; }
+bool cli_is_quiet(void) { return quiet_wanted; }
+
+bool cli_has_terminal(void)
+{
+    const char *term = getenv("TERM");
+    return isatty(STDERR_FILENO) && term && *term && strcmp(term, "dumb");
+}
+
+bool cli_wants_colour(void)
+{
+    const char *no = getenv("NO_COLOR");
+    return cli_has_terminal() && !(no && *no);
+}
+
+/* A line that says itself where it comes from: "file:line:column: ..." or "argument 'key=value':
+ * ...". */
+static bool has_place(const char *line, size_t length)
+{
+    if (!strncmp(line, "argument '", 10)) return true;
+    for (size_t i = 0; i + 1 < length; i++) {
+        if (line[i] != ':' || line[i + 1] < '0' || line[i + 1] > '9') continue;
+        size_t k = i + 1;
+        while (k < length && line[k] >= '0' && line[k] <= '9') k++;
+        if (k + 1 < length && line[k] == ':' && line[k + 1] >= '0' && line[k + 1] <= '9')
+            return true;
+    }
+    return false;
+}
+
+int cli_report(const sdm_error *err)
+{
+    const bool colour = cli_wants_colour();
+    const char *text = err->text[0] ? err->text : sdm_status_name(err->status);
+    while (*text) {
+        const size_t length = strcspn(text, "\n");
+        if (!(err->status == SDM_E_CONFIG && has_place(text, length)))
+            fprintf(stderr, "%ssdmgen: error: %s", colour ? "\033[31m" : "",
+                    colour ? "\033[0m" : "");
+        fprintf(stderr, "%.*s\n", (int)length, text);
+        text += length + (text[length] == '\n');
+    }
+    return cli_exit_code(err->status);
+}
+
+void cli_notice(const char *fmt, ...)
+{
+    if (quiet_wanted) return;
+    va_list args;
+    va_start(args, fmt);
+    fputs("sdmgen: ", stderr);
+    vfprintf(stderr, fmt, args);
+    fputc('\n', stderr);
+    va_end(args);
+}
+
+static void on_interrupt(int number)
+{
+    (void)number;
+    if (interrupts) _exit(CLI_EXIT_INTERRUPTED);
+    interrupts = 1;
+}
+
+void cli_catch_interrupts(void)
+{
+    struct sigaction action;
+    memset(&action, 0, sizeof action);
+    action.sa_handler = on_interrupt;
+    action.sa_flags = SA_RESTART;
+    sigemptyset(&action.sa_mask);
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    // a limit on the size of files is an error of writing like any other, with its message and no
+    // file left
+    action.sa_handler = SIG_IGN;
+    sigaction(SIGXFSZ, &action, NULL);
+}
+
+bool cli_is_interrupted(void) { return interrupts != 0; }
+
+bool cli_interrupted(void *user)
+{
+    (void)user;
+    return cli_is_interrupted();
+}
+
+sdm_status cli_check_interrupt(sdm_error *err)
+{
+    return interrupts ? sdm_fail(err, SDM_E_CANCELLED, "interrupted") : SDM_OK;
+}
+
+sdm_status cli_print_json(sdm_json *json, sdm_error *err)
+{
+    const bool failed = json->text.failed || !json->text.data;
+    if (!failed) puts(json->text.data);
+    sdm_json_dispose(json);
+    return failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the JSON text") : SDM_OK;
+}
+
+double cli_thread_clock(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+const char *cli_format_count(int64_t n, char buf[32])
+{
+    char digits[32];
+    const int length = snprintf(digits, sizeof digits, "%lld", (long long)n);
+    int out = 0;
+    for (int i = 0; i < length; i++) {
+        buf[out++] = digits[i];
+        const int left = length - 1 - i;
+        if (left > 0 && left % 3 == 0 && digits[i] != '-') buf[out++] = ',';
+    }
+    buf[out] = '\0';
+    return buf;
+}

@@ -1,0 +1,168 @@
+/* Time per map on one core: network, exact engine, naive method. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "evaluate.h"
+#include "report/terminal.h"
+#include "sdm/internal/clock.h"
+#include "sdm/internal/config.h"
+#include "sdm/internal/methods.h"
+#include "sdm/memory.h"
+
+enum { N_NETWORK = 51, N_LEAST = 3, N_EXACT = 9, BATCH = 32, N_BATCHES = 9, NAIVE_STEP = 16 };
+#define ENOUGH_S                                                                                   \
+    6.0 /* for slow networks: no further map after this, no batch that takes longer                \
+         */
+#define BATCH_BYTES 2e8 /* largest batch of large maps */
+
+static int compare_reals(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+double cli_median(double *v, size_t n)
+{
+    qsort(v, n, sizeof *v, compare_reals);
+    return n % 2 ? v[n / 2] : 0.5 * (v[n / 2 - 1] + v[n / 2]);
+}
+
+double cli_least(double *v, size_t n)
+{
+    double least = INFINITY;
+    for (size_t i = 0; i < n; i++) least = fmin(least, v[i]);
+    return least;
+}
+
+static double figure(bool fastest, double *ms, size_t n)
+{
+    return fastest ? cli_least(ms, n) : cli_median(ms, n);
+}
+
+static sdm_status time_network(const sdm_model *m, uint64_t seed, bool fastest, float *values,
+                               cli_timing *out, sdm_error *err)
+{
+    const sdm_generate_opts opts = {.policy = SDM_RANGE_REFUSE, .n_threads = 1};
+    double p[SDM_MAX_PARAMS], ms[N_NETWORK];
+    const double begin = sdm_clock();
+    size_t n = 0;
+    for (size_t i = 0; i <= N_NETWORK && (n < N_LEAST || sdm_clock() - begin < ENOUGH_S); i++) {
+        cli_eval_params(m, seed, fastest ? 0 : i, p);
+        const double start = cli_thread_clock();
+        sdm_status s = sdm_generate(m, p, &opts, values, NULL, err);
+        if (!s) s = cli_check_interrupt(err);
+        if (s) return s;
+        if (i > 0) ms[n++] = 1e3 * (cli_thread_clock() - start); /* the first one warms up */
+    }
+    out->ms_network = figure(fastest, ms, n);
+    out->n_network = n;
+    return SDM_OK;
+}
+
+/* A batch of the usual size, or a smaller one where maps are large or slow. */
+static size_t batch_size(const sdm_model *m, double ms_network)
+{
+    const double bytes = (double)sdm_grid_count(&sdm_model_get_info(m)->grid) * sizeof(float);
+    return (size_t)fmax(1, fmin(BATCH, fmin(BATCH_BYTES / bytes, 1e3 * ENOUGH_S / ms_network)));
+}
+
+static sdm_status time_batch(const sdm_model *m, uint64_t seed, bool fastest, size_t size,
+                             cli_timing *out, sdm_error *err)
+{
+    const sdm_generate_opts opts = {.policy = SDM_RANGE_REFUSE, .n_threads = 1};
+    const size_t n_params = sdm_model_get_info(m)->n_params;
+    double p[BATCH * SDM_MAX_PARAMS], ms[N_BATCHES];
+    const double begin = sdm_clock();
+    float *values = NULL;
+    size_t n = 0;
+    sdm_status s = sdm_alloc((void **)&values, sdm_grid_count(&sdm_model_get_info(m)->grid),
+                             size * sizeof *values, "batch of maps to time", err);
+    for (size_t i = 0; i < size; i++) cli_eval_params(m, seed, i, p + i * n_params);
+    for (size_t k = 0; k <= N_BATCHES && !s && (n < 1 || sdm_clock() - begin < ENOUGH_S); k++) {
+        const double start = cli_thread_clock();
+        s = sdm_generate_batch(m, p, size, &opts, values, NULL, err);
+        if (!s) s = cli_check_interrupt(err);
+        if (k > 0) ms[n++] = 1e3 * (cli_thread_clock() - start) / (double)size;
+    }
+    if (!s) out->ms_batch = figure(fastest, ms, n);
+    out->batch_size = size;
+    sdm_free(values);
+    return s;
+}
+
+static sdm_status time_exact(const sdm_model *m, const sdm_instance *shape, uint64_t seed,
+                             bool fastest, float *values, cli_timing *out, sdm_error *err)
+{
+    const sdm_exact_opts opts = {.n_threads = 1};
+    double p[SDM_MAX_PARAMS], ms[N_EXACT];
+    for (size_t i = 0; i <= N_EXACT; i++) {
+        cli_eval_params(m, seed, fastest ? 0 : i, p);
+        const double start = cli_thread_clock();
+        sdm_status s =
+            sdm_exact_shape_map(shape, p, &opts, &sdm_model_get_info(m)->grid, values, NULL, err);
+        if (!s) s = cli_check_interrupt(err);
+        if (s) return s;
+        if (i > 0) ms[i - 1] = 1e3 * (cli_thread_clock() - start);
+    }
+    out->ms_exact = figure(fastest, ms, N_EXACT);
+    out->n_exact = N_EXACT;
+    return SDM_OK;
+}
+
+sdm_status cli_time_naive(const sdm_mesh *mesh, const sdm_grid *grid, double *ms, double *share,
+                          sdm_error *err)
+{
+    /* every voxel costs the same, so a few slices, spread over the box, stand for all */
+    sdm_grid thin = *grid;
+    thin.n[2] = (grid->n[2] + NAIVE_STEP - 1) / NAIVE_STEP;
+    thin.spacing[2] = grid->spacing[2] * (double)grid->n[2] / (double)thin.n[2];
+    const sdm_method_opts opts = {.exact = {.n_threads = 1, .cancelled = cli_interrupted}};
+    const sdm_method *naive = sdm_method_find("naive", err);
+    float *values = NULL;
+    sdm_status s = naive ? SDM_ALLOC(&values, sdm_grid_count(&thin), "map of the naive method", err)
+                         : SDM_E_INTERNAL;
+    if (s) return s;
+    const double start = cli_thread_clock();
+    s = naive->map(mesh, &thin, &opts, values, NULL, err);
+    *share = (double)thin.n[2] / (double)grid->n[2];
+    *ms = 1e3 * (cli_thread_clock() - start) / *share;
+    sdm_free(values);
+    return s;
+}
+
+static sdm_status time_naive(const sdm_model *m, const sdm_instance *shape, uint64_t seed, size_t n,
+                             cli_timing *out, sdm_error *err)
+{
+    double p[SDM_MAX_PARAMS], *ms = NULL;
+    sdm_mesh mesh = {0};
+    sdm_status s = SDM_ALLOC(&ms, n, "times", err);
+    for (size_t i = 0; i < n && !s; i++) {
+        cli_eval_params(m, seed, i, p);
+        s = sdm_instance_mesh(shape, p, &mesh, err);
+        if (!s)
+            s = cli_time_naive(&mesh, &sdm_model_get_info(m)->grid, &ms[i], &out->naive_share, err);
+        if (!s) s = cli_check_interrupt(err);
+    }
+    if (!s && n > 0) out->ms_naive = cli_median(ms, n);
+    out->n_naive = n;
+    sdm_mesh_dispose(&mesh);
+    sdm_free(ms);
+    return s;
+}
+
+sdm_status cli_time_maps(const sdm_model *m, const sdm_instance *shape, uint64_t seed, bool fastest,
+                         size_t n_naive, cli_timing *out, sdm_error *err)
+{
+    memset(out, 0, sizeof *out);
+    out->ms_exact = out->ms_naive = out->naive_share = NAN;
+    float *values = NULL;
+    sdm_status s =
+        SDM_ALLOC(&values, sdm_grid_count(&sdm_model_get_info(m)->grid), "map to time", err);
+    if (!s) s = time_network(m, seed, fastest, values, out, err);
+    if (!s) s = time_batch(m, seed, fastest, batch_size(m, out->ms_network), out, err);
+    if (!s && shape) s = time_exact(m, shape, seed, fastest, values, out, err);
+    if (!s && shape) s = time_naive(m, shape, seed, n_naive, out, err);
+    sdm_free(values);
+    return s;
+}

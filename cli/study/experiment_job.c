@@ -1,0 +1,143 @@
+/* Rows of an experiment: configuration, shape, ranges and files of each. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "experiment_command.h"
+#include "inputs/config_shape.h"
+#include "sdm/internal/container.h"
+#include "sdm/internal/file.h"
+#include "sdm/internal/train.h"
+#include "sdm/memory.h"
+
+static void describe_grid(const sdm_grid *g, char *buf, size_t size)
+{
+    const double *h = g->spacing;
+    const int used = snprintf(buf, size, "%lld x %lld x %lld voxels of ", (long long)g->n[0],
+                              (long long)g->n[1], (long long)g->n[2]);
+    const bool same = h[0] == h[1] && h[0] == h[2];
+    snprintf(buf + used, size - (size_t)used, same ? "%.4g mm" : "%.4g x %.4g x %.4g mm", h[0],
+             h[1], h[2]);
+}
+
+/* Every name of a reference's differences is a parameter. */
+static sdm_status check_reference(const experiment_run *run, const experiment_job *job,
+                                  sdm_error *err)
+{
+    const sdm_experiment_reference *r = run->e->rows[job->index].reference;
+    for (size_t i = 0; r && i < r->n_differences; i++)
+        if (sdm_instance_param_index(job->shape, r->differences[i].name) < 0)
+            return sdm_fail(err, SDM_E_CONFIG,
+                            "%s:%d:%d: reference: difference: the shape has no parameter '%s'",
+                            run->e->file, r->mark.line, r->mark.column, r->differences[i].name);
+    return SDM_OK;
+}
+
+static sdm_status open_job(const experiment_run *run, size_t index, experiment_job *job,
+                           sdm_error *err)
+{
+    job->index = index;
+    sdm_status s = SDM_ALLOC(&job->config, 1, "configuration", err);
+    if (!s) s = sdm_experiment_config(run->e, index, job->config, err);
+    if (!s && run->args->threads > 0) job->config->threads = (int)run->args->threads;
+    if (!s) s = experiment_path(run, index, "", job->config->output.folder, err);
+    if (!s) s = cli_config_shape(job->config, run->registry, &job->shape, err);
+    if (s) return s;
+    cli_map_maker *m = &job->maker;
+    const sdm_param *params = sdm_instance_params(job->shape, &m->n_params);
+    if (m->n_params > SDM_MAX_PARAMS)
+        return sdm_fail(err, SDM_E_UNSUPPORTED, "%zu parameters, at most %d can be sampled",
+                        m->n_params, SDM_MAX_PARAMS);
+    m->shape = job->shape;
+    m->grid = job->config->grid;
+    describe_grid(&m->grid, run->results[index].grid, sizeof run->results[index].grid);
+    s = sdm_train_ranges(job->config, job->shape, m->min, m->max, err);
+    if (!s) s = check_reference(run, job, err);
+    for (size_t i = 0; i < m->n_params && !s; i++)
+        job->nominal[i] = fmin(m->max[i], fmax(m->min[i], params[i].def));
+    return s;
+}
+
+sdm_status experiment_job_open(const experiment_run *run, size_t index, experiment_job *job)
+{
+    return job->why.status = open_job(run, index, job, &job->why);
+}
+
+void experiment_job_close(experiment_job *job)
+{
+    sdm_instance_free(job->shape);
+    sdm_free(job->config);
+    memset(job, 0, sizeof *job);
+}
+
+sdm_status experiment_path(const experiment_run *run, size_t index, const char *name,
+                           char path[SDM_PATH_TEXT_MAX], sdm_error *err)
+{
+    if (snprintf(path, SDM_PATH_TEXT_MAX, "%s/%s%s%s", run->folder, run->e->rows[index].folder,
+                 *name ? "/" : "", name) < SDM_PATH_TEXT_MAX)
+        return SDM_OK;
+    return sdm_fail(err, SDM_E_ARG, "the folder '%.100s...': the name is too long", run->folder);
+}
+
+/* Two configurations give the same network. */
+static bool is_same(const sdm_config *a, const char *name, const char *text, size_t size)
+{
+    sdm_config *copy = NULL, *other = NULL;
+    sdm_text x = {0}, y = {0};
+    bool same = false;
+    if (!SDM_ALLOC(&copy, 1, "configuration", NULL) &&
+        !SDM_ALLOC(&other, 1, "configuration", NULL) &&
+        !sdm_config_parse(name, text, size, NULL, 0, other, NULL)) {
+        *copy = *a;
+        sdm_config_strip(copy);
+        sdm_config_strip(other);
+        sdm_config_dump(copy, &x);
+        sdm_config_dump(other, &y);
+        same = !x.failed && !y.failed && !strcmp(x.data, y.data);
+    }
+    sdm_text_dispose(&x);
+    sdm_text_dispose(&y);
+    sdm_free(copy);
+    sdm_free(other);
+    return same;
+}
+
+static bool is_same_model(const sdm_config *c, const char *path)
+{
+    sdm_model *model = NULL;
+    if (sdm_model_open(path, &model, NULL)) return false;
+    const char *text = sdm_model_get_info(model)->config;
+    const bool same = text && is_same(c, path, text, strlen(text));
+    sdm_model_free(model);
+    return same;
+}
+
+/* The budget too: a training that goes on with another one is not that of this row. */
+static bool is_same_checkpoint(const sdm_config *c, const char *path)
+{
+    sdm_section section[SDM_CONTAINER_MAX_SECTIONS];
+    char name[SDM_CONTAINER_MAX_SECTIONS][24];
+    uint8_t *bytes = NULL;
+    size_t size = 0, n = 0;
+    uint64_t checksum;
+    bool same = false;
+    if (!sdm_file_read(path, (uint64_t)64 << 30, &bytes, &size, NULL) &&
+        !sdm_container_parse(bytes, size, section, name, &n, &checksum, NULL))
+        for (size_t i = 0; i < n; i++)
+            if (!strcmp(name[i], "config"))
+                same = is_same(c, path, section[i].data, section[i].size);
+    sdm_free(bytes);
+    return same;
+}
+
+experiment_stock experiment_find(const experiment_run *run, const experiment_job *job)
+{
+    char model[SDM_PATH_TEXT_MAX], checkpoint[SDM_PATH_TEXT_MAX];
+    if (run->args->force || experiment_path(run, job->index, "model.sdm", model, NULL) ||
+        experiment_path(run, job->index, "checkpoint.sdmc", checkpoint, NULL))
+        return STOCK_NONE;
+    if (is_same_model(job->config, model)) return STOCK_MODEL;
+    if (is_same_checkpoint(job->config, checkpoint)) return STOCK_CHECKPOINT;
+    return access(model, F_OK) && access(checkpoint, F_OK) ? STOCK_NONE : STOCK_OTHER;
+}

@@ -1,0 +1,121 @@
+/* Phantoms of an experiment: random shapes in random poses, and starts a given distance off. */
+#include <math.h>
+#include <string.h>
+
+#include "experiment_fit.h"
+#include "report/terminal.h"
+#include "sdm/fit.h"
+#include "sdm/internal/rng.h"
+#include "sdm/memory.h"
+#include "sdm/phantom.h"
+
+/* Streams of the seeds of phantoms and of the directions of starts. */
+enum { STREAM_SEED = 910, STREAM_START = 911 };
+#define PLACE_MM 10.0 /* phantoms lie within this of the origin */
+
+static const double PI = 3.14159265358979323846;
+
+static uint64_t seed_of(uint64_t seed, size_t index)
+{
+    uint32_t bits[4];
+    sdm_rng_block(seed, STREAM_SEED, index, bits);
+    return (uint64_t)bits[0] << 32 | bits[1];
+}
+
+/* A vector of the given length in a direction uniform on the sphere. */
+static void random_vector(uint64_t seed, uint64_t first, double length, double v[3])
+{
+    double sum = 0;
+    for (uint64_t i = 0; i < 3; i++) {
+        v[i] = sdm_rng_normal(seed, STREAM_START, first + i);
+        sum += v[i] * v[i];
+    }
+    for (int i = 0; i < 3; i++) v[i] *= length / sqrt(sum);
+}
+
+/* The true pose, turned about the middle of the shape and moved. */
+static sdm_pose start_near(const sdm_experiment *e, uint64_t seed, const sdm_pose *truth,
+                           const double middle[3])
+{
+    sdm_pose off = {{0, 0, 0}, {0, 0, 0}};
+    double shift[3], turned[3];
+    random_vector(seed, 0, e->fit.off_deg * PI / 180, off.rotation);
+    random_vector(seed, 3, e->fit.off_mm, shift);
+    sdm_pose_apply(&off, middle, turned);
+    for (int i = 0; i < 3; i++) off.translation[i] = middle[i] - turned[i] + shift[i];
+    return sdm_pose_compose(&off, truth);
+}
+
+/* The box of the shape where it lies in the world. */
+static sdm_status find_box(const experiment_job *job, const experiment_phantom *p, double min[3],
+                           double max[3], sdm_error *err)
+{
+    sdm_mesh mesh = {0};
+    const sdm_status s = sdm_instance_mesh(job->shape, p->truth, &mesh, err);
+    for (int i = 0; i < 3; i++) min[i] = INFINITY, max[i] = -INFINITY;
+    for (size_t v = 0; v < mesh.n_vert && !s; v++) {
+        double x[3];
+        sdm_pose_apply(&p->pose, mesh.vert + 3 * v, x);
+        for (int i = 0; i < 3; i++) min[i] = fmin(min[i], x[i]), max[i] = fmax(max[i], x[i]);
+    }
+    sdm_mesh_dispose(&mesh);
+    return s;
+}
+
+/* The image holds all that a fit looks at from its start. */
+static sdm_status make_grid(const sdm_experiment *e, const double min[3], const double max[3],
+                            sdm_grid *out, sdm_error *err)
+{
+    const double pad = sdm_fit_defaults().margin + e->fit.off_mm;
+    double middle[3];
+    int64_t n[3];
+    for (int i = 0; i < 3; i++) {
+        const double voxels = ceil((max[i] - min[i] + 2 * pad) / e->fit.voxel);
+        if (!(voxels < 4096))
+            return sdm_fail(
+                err, SDM_E_ARG,
+                "fit.voxel: %g mm makes images of %.3g voxels along %c; use larger ones",
+                e->fit.voxel, voxels, "xyz"[i]);
+        n[i] = 1 + (int64_t)voxels;
+        middle[i] = 0.5 * (min[i] + max[i]);
+    }
+    *out = sdm_grid_centred(n, e->fit.voxel, middle);
+    return sdm_grid_check(out, err);
+}
+
+sdm_status experiment_phantom_make(const experiment_run *run, const experiment_job *job,
+                                   size_t index, experiment_phantom *out, sdm_error *err)
+{
+    const sdm_experiment *e = run->e;
+    const cli_map_maker *m = &job->maker;
+    const uint64_t seed = seed_of(e->experiment.seed, index);
+    sdm_phantom_opts opts = sdm_phantom_defaults();
+    double min[3], max[3], middle[3];
+    opts.seed = seed;
+    opts.n_threads = (int)run->args->threads;
+    opts.cancelled = cli_interrupted;
+    cli_maker_params(m, e->experiment.seed, index, out->truth);
+    for (size_t i = 0; i < m->n_params; i++) {
+        out->start[i] = 0.5 * (m->min[i] + m->max[i]);
+        out->truth[i] = out->start[i] + e->fit.range * (out->truth[i] - out->start[i]);
+    }
+    out->pose = sdm_phantom_random_pose(PI, PLACE_MM, seed);
+    sdm_status s = find_box(job, out, min, max, err);
+    if (s) return s;
+    for (int i = 0; i < 3; i++) middle[i] = 0.5 * (min[i] + max[i]);
+    out->start_pose = start_near(e, seed, &out->pose, middle);
+    s = make_grid(e, min, max, &out->grid, err);
+    if (!s) s = SDM_ALLOC(&out->values, sdm_grid_count(&out->grid), "image", err);
+    if (!s) s = SDM_ALLOC(&out->label, sdm_grid_count(&out->grid), "labels", err);
+    if (!s)
+        s = sdm_phantom_make(job->shape, out->truth, &out->pose, &opts, &out->grid, out->values,
+                             out->label, err);
+    return s;
+}
+
+void experiment_phantom_dispose(experiment_phantom *p)
+{
+    sdm_free(p->values);
+    sdm_free(p->label);
+    memset(p, 0, sizeof *p);
+}

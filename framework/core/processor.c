@@ -1,0 +1,28 @@
+/* Choice of the instruction set. */
+#include "sdm/internal/processor.h"
+
+static int wanted_level = -1;
+
+// The processor's abilities are read from memory, where the start-up code of the compiler's library
+// keeps them: a call costs little.
+int sdm_processor_level(void)
+{
+    int best = SDM_PROCESSOR_BASELINE;
+#if defined(__x86_64__) && defined(__GNUC__)
+    // every processor with AVX2 has F16C, a name that clang 14 does not know
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) best = SDM_PROCESSOR_AVX2;
+    if (best == SDM_PROCESSOR_AVX2 && __builtin_cpu_supports("avx512f") &&
+        __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq") &&
+        __builtin_cpu_supports("avx512bw"))
+        best = SDM_PROCESSOR_AVX512;
+    if (best == SDM_PROCESSOR_AVX512 && __builtin_cpu_supports("avx512vnni"))
+        best = SDM_PROCESSOR_AVX512VNNI;
+#endif
+    return wanted_level >= 0 && wanted_level < best ? wanted_level : best;
+}
+
+int sdm_processor_select(int level)
+{
+    wanted_level = level;
+    return sdm_processor_level();
+}

@@ -1,0 +1,37 @@
+/* Sums of doubles without rounding (Shewchuk 1997): components that do not overlap, smallest first.
+ */
+#ifndef SDM_GEOM_EXPANSION_H
+#define SDM_GEOM_EXPANSION_H
+
+#include <math.h>
+
+/* Adds b to e[n]; returns the new length, at most n + 1. */
+static inline int sdm_expansion_add(double *e, int n, double b)
+{
+    double q = b;
+    int m = 0;
+    for (int i = 0; i < n; i++) {
+        const double sum = q + e[i];
+        const double part = sum - q;
+        const double rest = (q - (sum - part)) + (e[i] - part);
+        q = sum;
+        if (rest != 0) e[m++] = rest;
+    }
+    if (q != 0) e[m++] = q;
+    return m;
+}
+
+/* Adds a * b to e[n]; returns the new length, at most n + 2. */
+static inline int sdm_expansion_add_product(double *e, int n, double a, double b)
+{
+    const double high = a * b;
+    n = sdm_expansion_add(e, n, fma(a, b, -high));
+    return sdm_expansion_add(e, n, high);
+}
+
+static inline int sdm_expansion_sign(const double *e, int n)
+{
+    return n == 0 ? 0 : e[n - 1] > 0 ? 1 : -1;
+}
+
+#endif

@@ -1,0 +1,73 @@
+/* The nearest point of a surface for single points, and the data for many. */
+#include "nearest.h"
+
+#include <math.h>
+
+#include "feature_distance.h"
+
+sdm_status sdm_nearest_build(const sdm_mesh *m, const sdm_topology *topo, sdm_arena *arena,
+                             sdm_nearest *n, sdm_budget *budget, sdm_error *err)
+{
+    const sdm_status s =
+        SDM_TAKE_UNSET(arena, SDM_LOW, &n->frames, m->n_tri, "frames of triangles", err);
+    return s ? s
+             : sdm_features_build(m, topo, &n->tree, arena, n->frames, &n->features, budget, err);
+}
+
+double sdm_nearest_find(const sdm_nearest *n, const double x[3], double bound, uint32_t *slot,
+                        double q[3], int *feature)
+{
+    struct {
+        uint32_t node;
+        double d;
+    } stack[SDM_BVH_DEPTH];
+    const sdm_bvh_node *nodes = n->tree.node;
+    int top = 0;
+    uint32_t best = UINT32_MAX;
+    stack[top].node = 0;
+    stack[top++].d = sdm_bvh_box_distance2(&nodes[0], x);
+    while (top) {
+        top--;
+        if (!(stack[top].d < bound)) continue;
+        const sdm_bvh_node *node = &nodes[stack[top].node];
+        for (uint32_t i = node->first; node->count && i < node->first + node->count; i++) {
+            const double d = sdm_frame_distance2(&n->frames[i], x);
+            if (!(d < bound)) continue;
+            bound = d;
+            best = i;
+        }
+        if (node->count) continue;
+        // the nearer child on top
+        const uint32_t c = node->first;
+        const double d0 = sdm_bvh_box_distance2(&nodes[c], x),
+                     d1 = sdm_bvh_box_distance2(&nodes[c + 1], x);
+        const uint32_t near = d1 < d0;
+        if ((near ? d0 : d1) < bound) {
+            stack[top].node = c + !near;
+            stack[top++].d = near ? d0 : d1;
+        }
+        if ((near ? d1 : d0) < bound) {
+            stack[top].node = c + near;
+            stack[top++].d = near ? d1 : d0;
+        }
+    }
+    if (best == UINT32_MAX) return bound;
+    *slot = best;
+    (void)sdm_frame_closest(&n->frames[best], x, q, feature);
+    return bound;
+}
+
+double sdm_nearest_feature(const sdm_nearest *n, const double x[3], uint32_t *slot)
+{
+    const sdm_features *f = &n->features;
+    const uint32_t *more = f->of_slot[*slot], face = *slot;
+    double least = INFINITY;
+    for (int i = -1; i < 6; i++) {
+        const uint32_t number = i < 0 ? face : more[i];
+        const double d = sdm_feature_distance2(f, n->frames, number, x);
+        if (!(d < least)) continue;
+        least = d;
+        *slot = f->owner[number];
+    }
+    return least;
+}

@@ -1,0 +1,213 @@
+/* The features of a surface and their regions. */
+#include "surface_features.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "feature_groups.h"
+#include "sdm/internal/processor.h"
+#include "sdm/internal/vec3.h"
+
+static const double *vertex(const sdm_feature_builder *b, size_t v) { return &b->m->vert[3 * v]; }
+
+/* Centre, radius and scale. */
+static void measure(const sdm_feature_builder *b)
+{
+    sdm_features *f = b->f;
+    const sdm_bvh_node *root = b->tree->node;
+    double d[3], longest = 0;
+    for (int a = 0; a < 3; a++) {
+        d[a] = root->hi[a] - root->lo[a];
+        f->centre[a] = root->lo[a] + 0.5 * d[a];
+    }
+    f->radius = 0.5 * v3_norm(d);
+    for (size_t t = 0; t < b->m->n_tri; t++) {
+        const uint32_t *v = &b->m->tri[3 * t];
+        for (int k = 0; k < 3; k++) {
+            const double l = v3_dist2(vertex(b, v[k]), vertex(b, v[(k + 1) % 3]));
+            longest = l > longest ? l : longest;
+        }
+    }
+    int exponent = 0;
+    // without any edge the whole surface is the measure
+    const double size = longest > 0 ? sqrt(longest) : f->radius;
+    if (size > 0) (void)frexp(size, &exponent);
+    f->scale = ldexp(1, -exponent);
+}
+
+/* Boxes, and which nodes are clusters: children come after their parent. */
+static void fill_nodes(const sdm_feature_builder *b)
+{
+    sdm_features *f = b->f;
+    for (size_t i = b->tree->n_node; i-- > 0;) {
+        const sdm_bvh_node *from = &b->tree->node[i];
+        sdm_cluster_node *node = &f->node[i];
+        *node = (sdm_cluster_node){.first = from->first, .count = from->count};
+        for (int a = 0; a < 3; a++) {
+            node->lo[a] = (float)((from->lo[a] - f->centre[a]) * f->scale);
+            node->hi[a] = (float)((from->hi[a] - f->centre[a]) * f->scale);
+        }
+        if (from->count) continue;
+        const sdm_cluster_node *child = &f->node[from->first];
+        if (!child[0].count || !child[1].count || child[0].count + child[1].count > SDM_CLUSTER)
+            continue;
+        node->first = child[0].first;
+        node->count = child[0].count + child[1].count;
+    }
+}
+
+/* The clusters in the order of the tree. */
+static size_t list_clusters(const sdm_features *f, sdm_cluster_node **list)
+{
+    uint32_t stack[SDM_BVH_DEPTH];
+    int top = 0;
+    size_t n = 0;
+    stack[top++] = 0;
+    while (top) {
+        sdm_cluster_node *node = &f->node[stack[--top]];
+        if (node->count) {
+            list[n++] = node;
+            continue;
+        }
+        stack[top++] = node->first + 1;
+        stack[top++] = node->first;
+    }
+    return n;
+}
+
+/* What is numbered so far. */
+typedef struct numbers {
+    uint32_t edge, corner, group;
+} numbers;
+
+/* The number of an edge or corner: its own, or the next where it has none yet. */
+static inline uint32_t number_of(uint32_t *own, uint32_t *next, uint32_t *origin, uint32_t from)
+{
+    // without branches: who is the first cannot be foreseen
+    const bool is_new = *own == SDM_NONE;
+    const uint32_t number = is_new ? *next : *own;
+    origin[*next] = from;
+    *next += is_new;
+    return *own = number;
+}
+
+/* Edges and corners of a cluster are those that no cluster before it has; a triangle with a
+ * repeated vertex is a segment of its own. */
+static void number_cluster(const sdm_feature_builder *b, sdm_cluster_node *node, numbers *n)
+{
+    sdm_features *f = b->f;
+    uint32_t *origin = b->origin - f->edge_base, *vertices = b->vertex - f->corner_base;
+    node->edge = n->edge;
+    node->corner = n->corner;
+    for (uint32_t slot = node->first; slot < node->first + node->count; slot++) {
+        const size_t t = b->tree->order[slot];
+        const uint32_t *v = &b->topo->tri[3 * t], *edge = &b->topo->edge[3 * t];
+        uint32_t *of = f->of_slot[slot];
+        f->owner[slot] = slot;
+        for (int k = 0; k < 3; k++) {
+            of[3 + k] = number_of(&b->corner[v[k]], &n->corner, vertices, v[k]);
+            f->owner[of[3 + k]] = slot;
+        }
+        const bool is_segment = edge[0] == SDM_NONE;
+        if (is_segment) origin[n->edge] = (uint32_t)(b->topo->n_edges + t);
+        for (int k = 0; k < 3; k++) {
+            of[k] = is_segment ? n->edge : number_of(&b->edge[edge[k]], &n->edge, origin, edge[k]);
+            f->owner[of[k]] = slot;
+        }
+        n->edge += is_segment;
+    }
+    node->edge_end = n->edge;
+    node->corner_end = n->corner;
+    node->group = n->group;
+    n->group += 1 + (n->edge - node->edge + 7) / 8;
+    n->group += (n->corner - node->corner + SDM_CORNER_LANES - 1) / SDM_CORNER_LANES;
+}
+
+static sdm_feature_groups *choose_kernel(void)
+{
+#if defined(__x86_64__) && defined(__GNUC__)
+    if (sdm_processor_level() >= SDM_PROCESSOR_AVX2) return sdm_feature_groups_avx2;
+#endif
+    return sdm_feature_groups_generic;
+}
+
+static sdm_status fill_clusters(const sdm_feature_builder *b, sdm_arena *arena, sdm_budget *budget,
+                                sdm_error *err)
+{
+    sdm_features *f = b->f;
+    sdm_cluster_node **list;
+    sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &list, b->m->n_tri, "features", err);
+    if (s) return s;
+    const size_t n = list_clusters(f, list);
+    numbers next = {f->edge_base, f->corner_base, 0};
+    for (size_t i = 0; i < n; i++) number_cluster(b, list[i], &next);
+    f->end = next.corner;
+    s = sdm_budget_take(budget, next.group * sizeof *f->group, err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->group, next.group, "features", err);
+    if (s) return s;
+    choose_kernel()(b, list, n);
+    return SDM_OK;
+}
+
+/* All but the groups; the list of clusters is among it. */
+static size_t bytes_of(const sdm_feature_builder *b)
+{
+    const sdm_features *f = b->f;
+    const size_t n = b->m->n_tri, n_vert = b->m->n_vert, n_edge = f->corner_base - f->edge_base;
+    return n * (sizeof *b->narrow + sizeof *f->centroid + sizeof *f->of_slot +
+                sizeof(sdm_cluster_node *)) +
+           n_edge * (sizeof *b->origin + sizeof *b->segment) + b->topo->n_edges * sizeof *b->edge +
+           n_vert * (sizeof *b->vertex + sizeof *b->corner + sizeof *b->along) +
+           b->tree->n_node * sizeof *f->node +
+           (f->corner_base + n_vert) * (sizeof *f->exact + sizeof *f->owner);
+}
+
+static sdm_status allocate(sdm_feature_builder *b, sdm_arena *arena, sdm_budget *budget,
+                           sdm_error *err)
+{
+    sdm_features *f = b->f;
+    const size_t n = b->m->n_tri, n_vert = b->m->n_vert, n_edge = f->corner_base - f->edge_base;
+    sdm_status s = sdm_budget_take(budget, bytes_of(b), err);
+    // one more: the place of the next one is written to
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->origin, n_edge + 1, "features", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->segment, n_edge, "features", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->vertex, n_vert + 1, "features", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->edge, b->topo->n_edges, "features", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->corner, n_vert, "features", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->narrow, n, "features", err);
+    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &b->along, n_vert, "features", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->node, b->tree->n_node, "features", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->centroid, n, "features", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->exact, f->corner_base + n_vert, "features", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->of_slot, n, "features", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->owner, f->corner_base + n_vert, "features", err);
+    if (s) return s;
+    memset(b->edge, 0xff, b->topo->n_edges * sizeof *b->edge);
+    memset(b->corner, 0xff, n_vert * sizeof *b->corner);
+    return SDM_OK;
+}
+
+sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree,
+                              sdm_arena *arena, sdm_frame *frames, sdm_features *f,
+                              sdm_budget *budget, sdm_error *err)
+{
+    const size_t n = m->n_tri;
+    sdm_feature_builder b = {.m = m, .topo = topo, .tree = tree, .frames = frames, .f = f};
+    const sdm_arena_mark before = arena->end[SDM_HIGH];
+    size_t segments = 0;
+    for (size_t t = 0; t < n; t++) segments += topo->edge[3 * t] == SDM_NONE;
+    if (n + segments + topo->n_edges + m->n_vert >=
+        SDM_NONE / 2) // the kernels count in 32 bits with a sign
+        return sdm_fail(err, SDM_E_NOMEM,
+                        "surface of %zu triangles: too many to number their edges and vertices", n);
+    f->edge_base = (uint32_t)n;
+    f->corner_base = (uint32_t)(n + segments + topo->n_edges);
+    sdm_status s = allocate(&b, arena, budget, err);
+    if (!s) {
+        measure(&b);
+        fill_nodes(&b);
+        s = fill_clusters(&b, arena, budget, err);
+    }
+    sdm_arena_release(arena, SDM_HIGH, before);
+    return s;
+}

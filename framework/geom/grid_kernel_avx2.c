@@ -1,3 +1,0 @@
-/* The block kernel for AVX2 with fused multiply-add. */
-#define KERNEL sdm_grid_kernel_avx2
-#include "grid_kernel.inc"

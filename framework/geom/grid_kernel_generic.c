@@ -1,3 +1,0 @@
-/* The block kernel for any processor. */
-#define KERNEL sdm_grid_kernel_generic
-#include "grid_kernel.inc"

@@ -1,0 +1,3 @@
+/* The block kernel for any processor. */
+#define KERNEL sdm_grid_kernel_generic
+#include "map.inc"

@@ -1,0 +1,67 @@
+/* Integer winding numbers by signed crossings: exact decisions on which triangles a ray meets
+ * (line_triangle.h). */
+#include "crossings.h"
+
+#include <math.h>
+
+#include "exactly/line_triangle.h"
+
+typedef struct ray {
+    double p[3]; /* along the ray's axis, then across it */
+    int axis[3], direction;
+} ray;
+
+static int crossing(const sdm_mesh *m, uint32_t t, const ray *r)
+{
+    double v[3][3], area[3];
+    for (int k = 0; k < 3; k++) {
+        const double *x = &m->vert[3 * (size_t)m->tri[3 * (size_t)t + (size_t)k]];
+        for (int a = 0; a < 3; a++) v[k][a] = x[r->axis[a]];
+    }
+    const int orientation = sdm_line_meets((const double(*)[3])v, &r->p[1], area);
+    if (!orientation) return 0;
+    const int after = sdm_line_meets_after((const double(*)[3])v, r->p, orientation, area);
+    return after == r->direction ? orientation * r->direction : 0;
+}
+
+static int reaches(const sdm_bvh_node *n, const ray *r)
+{
+    const int x = r->axis[0], y = r->axis[1], z = r->axis[2];
+    if (r->p[1] < n->lo[y] || r->p[1] > n->hi[y] || r->p[2] < n->lo[z] || r->p[2] > n->hi[z])
+        return 0;
+    return r->direction > 0 ? n->hi[x] >= r->p[0] : n->lo[x] <= r->p[0];
+}
+
+static int skipped(uint32_t t, const uint32_t *skip, size_t n_skip)
+{
+    for (size_t i = 0; i < n_skip; i++)
+        if (skip[i] == t) return 1;
+    return 0;
+}
+
+int sdm_ray_winding(const sdm_mesh *m, const sdm_bvh *tree, const double p[3], int axis,
+                    int direction, const uint32_t *skip, size_t n_skip)
+{
+    const int y = (axis + 1) % 3, z = (axis + 2) % 3;
+    const ray r = {{p[axis], p[y], p[z]}, {axis, y, z}, direction};
+    uint32_t stack[SDM_BVH_DEPTH];
+    int top = 0, winding = 0;
+    if (reaches(&tree->node[0], &r)) stack[top++] = 0;
+    while (top) {
+        const sdm_bvh_node *n = &tree->node[stack[--top]];
+        for (uint32_t i = n->first; n->count && i < n->first + n->count; i++)
+            if (!skipped(tree->order[i], skip, n_skip)) winding += crossing(m, tree->order[i], &r);
+        for (uint32_t c = n->first; !n->count && c < n->first + 2; c++)
+            if (reaches(&tree->node[c], &r)) stack[top++] = c;
+    }
+    return winding;
+}
+
+int sdm_ray_winding_along(const sdm_mesh *m, const sdm_bvh *tree, const double p[3],
+                          const double n[3], const uint32_t *skip, size_t n_skip)
+{
+    int axis = 0;
+    for (int i = 1; i < 3; i++)
+        if (fabs(n[i]) > fabs(n[axis])) axis = i;
+    return sdm_ray_winding(m, tree, p, axis, n[axis] > 0 ? 1 : -1, skip, n_skip);
+}

@@ -1,0 +1,142 @@
+/* Rounded shares of the strips over boxes of voxels: one evaluation where a bound allows it, else
+ * halves of the box. */
+#include "row_base.h"
+
+#include <math.h>
+#include <stdbool.h>
+
+#define COARSE 4e-3 // error of a chain of boundary edges, in turns: one among others
+#define FINE 1e-6
+
+/* Voxels lo .. hi along the three axes of the rows. */
+typedef struct box {
+    int64_t lo[3], hi[3];
+} box;
+
+typedef struct job {
+    sdm_strips strips;
+    const sdm_rows *rows;
+    const sdm_grid *grid;
+    const sdm_row_tile *tile;
+    int32_t *base;
+} job;
+
+/* May the strip of a boundary edge pass between the rows of the box? Never between voxels of one
+ * row. */
+static bool passes(const job *t, const uint32_t vert[2], const box *b)
+{
+    const double *u = &t->rows->across[3 * (size_t)vert[0]],
+                 *v = &t->rows->across[3 * (size_t)vert[1]];
+    double half[3], middle[3];
+    for (int a = 0; a < 3; a++) {
+        const double slack = 1e-6 + 1e-12 * (fabs(u[a]) + fabs(v[a]));
+        half[a] = 0.5 * (double)(b->hi[a] - b->lo[a]) + slack;
+        middle[a] = 0.5 * (double)(b->hi[a] + b->lo[a]);
+        if (u[a] < middle[a] - half[a] && v[a] < middle[a] - half[a]) return false;
+        if (a > 0 && u[a] > middle[a] + half[a] && v[a] > middle[a] + half[a]) return false;
+    }
+    const double dy = v[1] - u[1], dz = v[2] - u[2];
+    const double off = dy * (middle[2] - u[2]) - dz * (middle[1] - u[1]);
+    return !(fabs(off) > (fabs(dy) * half[2] + fabs(dz) * half[1]) * (1 + 1e-9));
+}
+
+static bool cut_by_strips(const job *t, const box *b)
+{
+    if (b->lo[1] == b->hi[1] && b->lo[2] == b->hi[2]) return false;
+    const sdm_boundary *edges = t->strips.boundary;
+    for (size_t i = 0; i + 1 < 2 * edges->n; i++)
+        if (edges->chain[i].n == 1 && passes(t, edges->chain[i].vert, b)) return true;
+    return false;
+}
+
+static void write(const job *t, const box *b, int32_t value)
+{
+    const int64_t n0 = t->tile->i1 - t->tile->i0, n1 = t->tile->j1 - t->tile->j0;
+    for (int64_t k = b->lo[2]; k <= b->hi[2]; k++) {
+        for (int64_t j = b->lo[1]; j <= b->hi[1]; j++) {
+            int32_t *row = t->base + ((k - t->tile->k0) * n1 + j - t->tile->j0) * n0;
+            for (int64_t i = b->lo[0]; i <= b->hi[0]; i++) row[i - t->tile->i0] = value;
+        }
+    }
+}
+
+/* Longest axis of the box from `axis` on; its length in mm. */
+static double longest(const job *t, const box *b, int axis, int *split)
+{
+    double most = -1;
+    for (int a = axis; a < 3; a++) {
+        const double length = (double)(b->hi[a] - b->lo[a]) * t->grid->spacing[t->rows->axis[a]];
+        if (length > most) {
+            most = length;
+            *split = a;
+        }
+    }
+    return most;
+}
+
+/* Writes the base of the whole box if one evaluation at its middle is enough. *reach: how far that
+ * would be enough. */
+static bool settled(const job *t, const box *b, double *reach)
+{
+    double at[3], index[3], x[3], half2 = 0;
+    for (int a = 0; a < 3; a++) {
+        const double half =
+            0.5 * (double)(b->hi[a] - b->lo[a]) * t->grid->spacing[t->rows->axis[a]];
+        at[a] = index[t->rows->axis[a]] = 0.5 * (double)(b->lo[a] + b->hi[a]);
+        half2 += half * half;
+    }
+    // a middle that moves a little changes nothing: directions are orthonormal to 1e-6
+    const double half = sqrt(half2) * (1 + 1e-5);
+    if (half > *reach) return false;
+    sdm_grid_world(t->grid, index, x);
+    sdm_strips_share s = sdm_strips_find(&t->strips, x, &at[1], half2 > 0 ? COARSE : FINE);
+    if (!(half2 > 0) && fabs(fabs(s.share - floor(s.share)) - 0.5) <= s.error + 1e-9)
+        s = sdm_strips_find(&t->strips, x, &at[1], 0);
+    const double whole = floor(s.share + 0.5), room = 0.5 - fabs(s.share - whole) - s.error - 1e-9;
+    *reach = room > 0 ? sdm_strips_reach(&s, room) : 0;
+    if (half2 > 0 && !(*reach > half)) return false;
+    // at exactly 1/2 a voxel is outside
+    write(t, b, (int32_t)(s.share + 0.5 > whole ? whole : whole - 1));
+    return true;
+}
+
+/* hope: a box larger than this around its middle is not worth an evaluation. */
+static void settle(const job *t, box b, double hope)
+{
+    int split = 0;
+    double length;
+    // rows on both sides of a strip are taken apart first: that is needed at every length
+    if (cut_by_strips(t, &b))
+        length = longest(t, &b, 1, &split);
+    else if (settled(t, &b, &hope))
+        return;
+    else
+        length = longest(t, &b, 0, &split);
+    // how far a middle is from trouble changes no faster than the middle moves, about
+    hope += 0.3 * length;
+    box rest = b;
+    b.hi[split] = (b.lo[split] + b.hi[split]) / 2;
+    rest.lo[split] = b.hi[split] + 1;
+    settle(t, b, hope);
+    settle(t, rest, hope);
+}
+
+void sdm_row_base_fill(const sdm_boundary *b, const sdm_rows *rows, const sdm_grid *g,
+                       const sdm_row_tile *tile, int32_t *base)
+{
+    job t = {.strips = {.boundary = b, .across = rows->across, .orientation = rows->orientation},
+             .rows = rows,
+             .grid = g,
+             .tile = tile,
+             .base = base};
+    double length2 = 0;
+    for (int c = 0; c < 3; c++) {
+        for (int k = 0; k < 2; k++)
+            t.strips.step[k][c] = g->dir[3 * c + rows->axis[1 + k]] * g->spacing[rows->axis[1 + k]];
+        t.strips.d[c] = -g->dir[3 * c + rows->axis[0]];
+        length2 += t.strips.d[c] * t.strips.d[c];
+    }
+    for (int c = 0; c < 3; c++) t.strips.d[c] /= sqrt(length2);
+    settle(&t, (box){{tile->i0, tile->j0, tile->k0}, {tile->i1 - 1, tile->j1 - 1, tile->k1 - 1}},
+           INFINITY);
+}

@@ -1,0 +1,82 @@
+/* The threads over tiles of rows. */
+#include "sign_rows.h"
+
+#include "memory/budget.h"
+#include "sdm/internal/heap.h"
+#include "sdm/internal/threads.h"
+#include <stdatomic.h>
+
+#define TILE 16    // rows of a tile along both axes
+#define PIECE 1024 // voxels of them at most on an open mesh: 1 MiB a thread
+#define LONG                                                                                       \
+    4096 // boundary edges from which points are faster: every box of voxels asks all of them
+
+bool sdm_sign_fits_rows(sdm_sign_method method, const sdm_boundary *b)
+{
+    return method == SDM_SIGN_CROSSINGS || (method == SDM_SIGN_WINDING && b->n < LONG);
+}
+
+/* What a thread takes on an open mesh. */
+static size_t base_bytes(const sdm_sign_rows *r)
+{
+    return TILE * TILE * (size_t)r->piece * sizeof(int32_t);
+}
+
+sdm_status sdm_sign_rows_build(const sdm_mesh *m, const sdm_boundary *b, const sdm_grid *g,
+                               const int axis[3], const sdm_exact_opts *opts, sdm_sign_rows *r,
+                               sdm_error *err)
+{
+    const int n_threads = sdm_threads(opts->n_threads);
+    const size_t limit = opts->memory_limit;
+    r->boundary = b;
+    r->grid = g;
+    r->piece = g->n[axis[0]] < PIECE ? g->n[axis[0]] : PIECE;
+    const size_t bytes = b ? (size_t)n_threads * base_bytes(r) : 0;
+    if (limit && bytes >= limit)
+        return sdm_fail(err, SDM_E_NOMEM,
+                        "the signs of an open mesh need %zu bytes in %d threads, memory_limit "
+                        "leaves %zu; raise it or "
+                        "take fewer threads",
+                        bytes, n_threads, limit);
+    return sdm_rows_build(m, g, axis, n_threads, limit ? limit - bytes : 0, &r->rows, err);
+}
+
+sdm_status sdm_sign_tiles(const sdm_sign_rows *r, int64_t n1, int64_t n2,
+                          const sdm_exact_opts *opts, sdm_sign_visit *visit, void *user,
+                          sdm_error *err)
+{
+    const int64_t n0 = r->rows.n[0], t1 = (n1 + TILE - 1) / TILE, t2 = (n2 + TILE - 1) / TILE;
+    const int64_t t0 = r->boundary ? (n0 + r->piece - 1) / r->piece : 1;
+    const int n_threads = sdm_threads(opts->n_threads);
+    (void)n_threads; // without OpenMP
+    atomic_int stop = SDM_OK;
+    sdm_status status = SDM_OK;
+#pragma omp parallel num_threads(n_threads)
+    {
+        int32_t *base = NULL;
+        sdm_error local = {0};
+        sdm_status ready = SDM_OK;
+        if (r->boundary)
+            ready = sdm_alloc_unset((void **)&base, base_bytes(r), 1, "windings of rows", &local);
+#pragma omp for schedule(dynamic)
+        for (int64_t t = 0; t < t0 * t1 * t2; t++) {
+            if (atomic_load(&stop)) continue;
+            sdm_status s = ready;
+            const int64_t i = t % t0 * r->piece, j = t / t0 % t1 * TILE, k = t / t0 / t1 * TILE;
+            const sdm_row_tile tile = {.i0 = i,
+                                       .i1 = t0 > 1 && i + r->piece < n0 ? i + r->piece : n0,
+                                       .j0 = j,
+                                       .j1 = j + TILE < n1 ? j + TILE : n1,
+                                       .k0 = k,
+                                       .k1 = k + TILE < n2 ? k + TILE : n2};
+            if (!s && base) sdm_row_base_fill(r->boundary, &r->rows, r->grid, &tile, base);
+            if (!s) visit(user, &tile, base);
+            if (!s && sdm_cancelled(opts))
+                s = sdm_fail(&local, SDM_E_CANCELLED, "map stopped on request");
+            if (!s || atomic_exchange(&stop, 1)) continue;
+            status = sdm_fail(err, s, "%s", local.text);
+        }
+        sdm_free(base);
+    }
+    return status;
+}

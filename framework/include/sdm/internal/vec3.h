@@ -1,0 +1,52 @@
+/* Three-vectors in double: the few operations that geometry needs. */
+#ifndef SDM_GEOM_VEC3_H
+#define SDM_GEOM_VEC3_H
+
+#include <math.h>
+
+static inline void v3_sub(const double a[3], const double b[3], double r[3])
+{
+    for (int i = 0; i < 3; i++) r[i] = a[i] - b[i];
+}
+
+static inline double v3_dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static inline void v3_cross(const double a[3], const double b[3], double r[3])
+{
+    r[0] = a[1] * b[2] - a[2] * b[1];
+    r[1] = a[2] * b[0] - a[0] * b[2];
+    r[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static inline double v3_norm(const double a[3]) { return sqrt(v3_dot(a, a)); }
+
+static inline double v3_dist2(const double a[3], const double b[3])
+{
+    double d[3];
+    v3_sub(a, b, d);
+    return v3_dot(d, d);
+}
+
+/* r = a + t * d */
+static inline void v3_along(const double a[3], double t, const double d[3], double r[3])
+{
+    for (int i = 0; i < 3; i++) r[i] = a[i] + t * d[i];
+}
+
+/* Any unit vector v perpendicular to the unit vector u. */
+static inline void v3_perpendicular(const double u[3], double v[3])
+{
+    int least = 0;
+    for (int i = 1; i < 3; i++)
+        if (fabs(u[i]) < fabs(u[least])) least = i;
+    double axis[3] = {0, 0, 0};
+    axis[least] = 1;
+    v3_cross(u, axis, v);
+    const double len = v3_norm(v);
+    for (int i = 0; i < 3; i++) v[i] /= len;
+}
+
+#endif

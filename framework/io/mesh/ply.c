@@ -1,0 +1,160 @@
+/* PLY meshes: ASCII and binary of both byte orders; unknown elements and properties are skipped. */
+#include "ply.h"
+#include "sdm/internal/text.h"
+
+#include <math.h>
+
+/* Where the body is being read. */
+typedef struct body {
+    sdm_builder *b;
+    sdm_ply_header h;
+    const uint8_t *start, *at, *end; /* binary */
+    sdm_scan scan;                   /* ASCII */
+    char *line;
+} body;
+
+/* Fails with the place in the file: a line or a byte. */
+static sdm_status fail_here(const body *y, sdm_error *err, const char *what)
+{
+    if (y->h.ascii)
+        return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: %s", y->b->path, y->scan.line, what);
+    return sdm_fail(err, SDM_E_FORMAT, "%s: byte %zu: %s", y->b->path, (size_t)(y->at - y->start),
+                    what);
+}
+
+static size_t bytes_left(const body *y)
+{
+    if (!y->h.ascii) return (size_t)(y->end - y->at);
+    const char *from = y->line && *y->line ? y->line : y->scan.at;
+    return (size_t)(y->scan.end - from) + 1; /* the last word needs no separator */
+}
+
+/* Fewest bytes that a number takes. */
+static size_t least_size(const body *y, sdm_ply_type type)
+{
+    return y->h.ascii ? 2 : sdm_ply_type_size(type);
+}
+
+static double decode(const uint8_t *p, sdm_ply_type type, bool big)
+{
+    const uint64_t v = sdm_get_uint(p, sdm_ply_type_size(type), big);
+    switch (type) {
+    case SDM_PLY_INT8:
+        return (int8_t)v;
+    case SDM_PLY_INT16:
+        return (int16_t)v;
+    case SDM_PLY_INT32:
+        return (int32_t)v;
+    case SDM_PLY_FLOAT32:
+        return (double)sdm_get_f32(p, big);
+    case SDM_PLY_FLOAT64:
+        return sdm_get_f64(p, big);
+    default:
+        return (double)v;
+    }
+}
+
+/* Next number of the body; NULL skips it. */
+static sdm_status next_number(body *y, sdm_ply_type type, double *out, sdm_error *err)
+{
+    if (y->h.ascii) {
+        const char *word = sdm_scan_token(&y->scan, &y->line);
+        if (!word) return fail_here(y, err, "the file ends before its last element");
+        if (out && !sdm_parse_real(word, out)) return fail_here(y, err, "not a finite number");
+        return SDM_OK;
+    }
+    const size_t size = sdm_ply_type_size(type);
+    if (bytes_left(y) < size) return fail_here(y, err, "the file ends before its last element");
+    if (out) *out = decode(y->at, type, y->h.big);
+    if (out && !isfinite(*out)) return fail_here(y, err, "not a finite number");
+    y->at += size;
+    return SDM_OK;
+}
+
+/* A list: the corners of a face, or something to skip. */
+static sdm_status read_list(body *y, const sdm_ply_property *p, sdm_error *err)
+{
+    const bool corners = p->role == SDM_PLY_CORNERS;
+    double n;
+    sdm_status e = next_number(y, p->count_type, &n, err);
+    if (e) return e;
+    if (!(n >= 0) || n != floor(n) || n > (double)(bytes_left(y) / least_size(y, p->type)))
+        return fail_here(y, err, "a list longer than the file");
+    if (corners && n < 3) return fail_here(y, err, "a face of less than three corners");
+    sdm_fan fan = {0};
+    for (size_t i = 0; i < (size_t)n; i++) {
+        double v;
+        e = next_number(y, p->type, corners ? &v : NULL, err);
+        if (e) return e;
+        if (!corners) continue;
+        if (!(v >= 0) || v != floor(v) || v >= (double)y->h.n_vert)
+            return fail_here(y, err, "a vertex index outside the vertices");
+        e = sdm_builder_corner(y->b, &fan, (uint32_t)v, err);
+        if (e) return e;
+    }
+    return SDM_OK;
+}
+
+static sdm_status read_instance(body *y, const sdm_ply_element *element, sdm_error *err)
+{
+    double x[3] = {0};
+    for (size_t i = 0; i < element->n; i++) {
+        const sdm_ply_property *p = &y->h.property[element->first + i];
+        sdm_status e;
+        if (p->count_type != SDM_PLY_NONE)
+            e = read_list(y, p, err);
+        else
+            e = next_number(y, p->type, p->role <= SDM_PLY_Z ? &x[p->role] : NULL, err);
+        if (e) return e;
+    }
+    return element->is_vertex ? sdm_builder_vertex(y->b, x, err) : SDM_OK;
+}
+
+static sdm_status read_element(body *y, const sdm_ply_element *element, sdm_error *err)
+{
+    if (element->n == 0) return SDM_OK; /* nothing in the body, whatever the count says */
+    size_t least = 0;
+    for (size_t i = 0; i < element->n; i++) {
+        const sdm_ply_property *p = &y->h.property[element->first + i];
+        least += least_size(y, p->count_type != SDM_PLY_NONE ? p->count_type : p->type);
+    }
+    if ((uint64_t)element->count > bytes_left(y) / least)
+        return fail_here(y, err, "more elements declared than the file holds");
+    for (int64_t i = 0; i < element->count; i++) {
+        const sdm_status e = read_instance(y, element, err);
+        if (e) return e;
+    }
+    return SDM_OK;
+}
+
+sdm_status sdm_ply_read(sdm_builder *b, uint8_t *data, size_t size, sdm_error *err)
+{
+    body y = {.b = b, .scan = {.at = (char *)data, .end = (char *)data + size, .path = b->path}};
+    sdm_status e = sdm_ply_read_header(&y.scan, &y.h, err);
+    y.start = data;
+    y.at = (const uint8_t *)y.scan.at;
+    y.end = data + size;
+    for (size_t i = 0; i < y.h.n_elements && !e; i++) e = read_element(&y, &y.h.element[i], err);
+    return e;
+}
+
+sdm_status sdm_ply_write(sdm_outfile *f, const sdm_mesh *m, sdm_error *err)
+{
+    sdm_status e = sdm_outfile_printf(
+        f, err,
+        "ply\nformat binary_little_endian 1.0\ncomment unit: mm\nelement vertex %zu\n"
+        "property double x\nproperty double y\nproperty double z\nelement face %zu\n"
+        "property list uchar int vertex_indices\nend_header\n",
+        m->n_vert, m->n_tri);
+    for (size_t i = 0; i < m->n_vert && !e; i++) {
+        uint8_t bytes[24];
+        for (size_t d = 0; d < 3; d++) sdm_put_f64(bytes + 8 * d, m->vert[3 * i + d]);
+        e = sdm_outfile_write(f, bytes, sizeof bytes, err);
+    }
+    for (size_t i = 0; i < m->n_tri && !e; i++) {
+        uint8_t bytes[13] = {3};
+        for (size_t c = 0; c < 3; c++) sdm_put_uint(bytes + 1 + 4 * c, 4, m->tri[3 * i + c]);
+        e = sdm_outfile_write(f, bytes, sizeof bytes, err);
+    }
+    return e;
+}

@@ -1,0 +1,58 @@
+/* What the header of a PLY file says: elements and their properties, in the order of the body. */
+#ifndef SDM_IO_PLY_H
+#define SDM_IO_PLY_H
+
+#include "meshparts.h"
+
+#define SDM_PLY_ELEMENTS 16
+#define SDM_PLY_PROPERTIES 256
+
+typedef enum sdm_ply_type {
+    SDM_PLY_NONE = 0,
+    SDM_PLY_INT8,
+    SDM_PLY_UINT8,
+    SDM_PLY_INT16,
+    SDM_PLY_UINT16,
+    SDM_PLY_INT32,
+    SDM_PLY_UINT32,
+    SDM_PLY_FLOAT32,
+    SDM_PLY_FLOAT64
+} sdm_ply_type;
+
+/* What a property is good for; everything without a role is skipped. */
+typedef enum sdm_ply_role {
+    SDM_PLY_X = 0,
+    SDM_PLY_Y,
+    SDM_PLY_Z,
+    SDM_PLY_CORNERS,
+    SDM_PLY_SKIPPED
+} sdm_ply_role;
+
+typedef struct sdm_ply_property {
+    sdm_ply_type type;
+    sdm_ply_type count_type; /* of a list's length; NONE: a single value */
+    sdm_ply_role role;
+} sdm_ply_property;
+
+typedef struct sdm_ply_element {
+    int64_t count;
+    size_t first, n; /* its properties */
+    bool is_vertex, is_face;
+} sdm_ply_element;
+
+typedef struct sdm_ply_header {
+    bool ascii, big;
+    size_t n_elements, n_properties;
+    int64_t n_vert;
+    sdm_ply_element element[SDM_PLY_ELEMENTS];
+    sdm_ply_property property[SDM_PLY_PROPERTIES];
+} sdm_ply_header;
+
+/* Bytes of a number of this type. */
+size_t sdm_ply_type_size(sdm_ply_type type);
+
+/* Reads the header; s then stands at the first byte of the body. SDM_E_FORMAT, SDM_E_UNSUPPORTED.
+ */
+sdm_status sdm_ply_read_header(sdm_scan *s, sdm_ply_header *h, sdm_error *err);
+
+#endif

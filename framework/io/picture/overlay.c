@@ -1,0 +1,143 @@
+/* Pictures of an image with contours over it: three orthogonal slices side by side. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "sdm/memory.h"
+#include "sdm/picture.h"
+#include "sections.h"
+
+enum {
+    MAPS_MAX = 4,
+    TOP = 46,
+    FOOT = 100, /* grey bar with numbers and caption, then the key of the contours */
+    BAR = 14,
+    RIGHT = 22
+};
+
+static const sdm_colour LINES[MAPS_MAX] = {
+    {232, 40, 44}, {255, 214, 10}, {30, 190, 130}, {190, 110, 230}};
+static const sdm_colour RIM = {20, 20, 26};
+
+typedef struct overlay {
+    const float *image;
+    const sdm_picture_map *maps;
+    size_t n_maps;
+    sdm_sections sections;
+    double low, high; /* values that are black and white */
+} overlay;
+
+static int ascending(const void *a, const void *b)
+{
+    const float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+/* Percentiles 1 and 99 of the three slices: a few bright voxels must not darken the rest. */
+static sdm_status find_window(overlay *o, sdm_error *err)
+{
+    size_t n = 0, used = 0;
+    sdm_slice slice[3];
+    for (int axis = 0; axis < 3; axis++) {
+        slice[axis] = sdm_section_of(&o->sections, o->image, axis);
+        n += (size_t)slice[axis].n[0] * (size_t)slice[axis].n[1];
+    }
+    float *values = NULL;
+    const sdm_status s = SDM_ALLOC(&values, n, "values of a picture", err);
+    if (s) return s;
+    for (int axis = 0; axis < 3; axis++)
+        for (int64_t j = 0; j < slice[axis].n[1]; j++)
+            for (int64_t i = 0; i < slice[axis].n[0]; i++) {
+                const float v =
+                    slice[axis]
+                        .v[(size_t)i * slice[axis].stride[0] + (size_t)j * slice[axis].stride[1]];
+                if (isfinite(v)) values[used++] = v;
+            }
+    qsort(values, used, sizeof *values, ascending);
+    o->low = used ? (double)values[(used - 1) / 100] : 0;
+    o->high = used ? (double)values[used - 1 - (used - 1) / 100] : 0;
+    if (!(o->high > o->low)) o->high = o->low + 1;
+    sdm_free(values);
+    return SDM_OK;
+}
+
+static void draw_panel(sdm_canvas *c, const overlay *o, sdm_box box, int axis)
+{
+    const sdm_slice grey = sdm_section_of(&o->sections, o->image, axis);
+    sdm_panel_colours(c, box, &grey, SDM_MAP_GREY, o->low, o->high);
+    for (size_t m = o->n_maps; m-- > 0;) {
+        const sdm_slice s = sdm_section_of(&o->sections, o->maps[m].values, axis);
+        sdm_panel_contour(c, box, &s, 0, m ? 1.6 : 2, LINES[m], RIM);
+    }
+    sdm_section_draw_frame(c, &o->sections, box, axis, true);
+    if (axis == 0) sdm_panel_scale_bar(c, box, o->sections.pixels);
+}
+
+/* A sample of each line with its title. */
+static void draw_key(sdm_canvas *c, const overlay *o, double x, double y)
+{
+    const sdm_type type = {.size = 10, .colour = SDM_INK};
+    for (size_t m = 0; m < o->n_maps; m++) {
+        const char *title = o->maps[m].title ? o->maps[m].title : "";
+        sdm_canvas_stroke(c, x, y - 4.5, x + 22, y - 4.5, 4.2);
+        sdm_canvas_ink(c, RIM, 0.55);
+        sdm_canvas_stroke(c, x, y - 4.5, x + 22, y - 4.5, 2);
+        sdm_canvas_ink(c, LINES[m], 1);
+        sdm_canvas_text(c, x + 30, y, type, title);
+        x += 30 + sdm_text_width(10, title) + 30;
+    }
+}
+
+static void draw(sdm_canvas *c, const overlay *o, const char *title)
+{
+    const sdm_sections *s = &o->sections;
+    int x = SDM_SECTION_LEFT;
+    if (title)
+        sdm_canvas_text(c, x, TOP - 16, (sdm_type){.size = 13, .bold = true, .colour = SDM_INK},
+                        title);
+    for (int axis = 0; axis < 3; axis++) {
+        draw_panel(c, o, (sdm_box){x, TOP, s->w[axis], s->h[axis]}, axis);
+        x += s->w[axis] + SDM_SECTION_LEFT;
+    }
+    const int foot = c->h - FOOT;
+    draw_key(c, o, SDM_SECTION_LEFT, c->h - 16);
+    sdm_colour_bar(c, (sdm_box){SDM_SECTION_LEFT, foot, 260, BAR}, SDM_MAP_GREY, o->low, o->high,
+                   "value of the image");
+}
+
+static sdm_status check(const char *path, const sdm_grid *grid, const float *image,
+                        const sdm_picture_map *maps, size_t n_maps, sdm_error *err)
+{
+    if (!path || !grid || !image || (n_maps && !maps))
+        return sdm_fail(err, SDM_E_ARG, "sdm_picture_overlay: NULL argument");
+    if (n_maps < 1 || n_maps > MAPS_MAX)
+        return sdm_fail(err, SDM_E_ARG, "%zu maps over an image, need 1 to %d", n_maps, MAPS_MAX);
+    for (size_t m = 0; m < n_maps; m++)
+        if (!maps[m].values)
+            return sdm_fail(err, SDM_E_ARG, "map %zu over the image has no values", m);
+    return sdm_grid_check(grid, err);
+}
+
+sdm_status sdm_picture_overlay(const char *path, const sdm_grid *grid, const float *image,
+                               const sdm_picture_map *maps, size_t n_maps, const char *title,
+                               sdm_error *err)
+{
+    sdm_status s = check(path, grid, image, maps, n_maps, err);
+    if (s) return s;
+    overlay o = {.image = image, .maps = maps, .n_maps = n_maps};
+    sdm_sections_place(&o.sections, grid, maps[0].values);
+    s = find_window(&o, err);
+    if (s) return s;
+    int w = SDM_SECTION_LEFT, tall = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        w += o.sections.w[axis] + (axis < 2 ? SDM_SECTION_LEFT : RIGHT);
+        if (o.sections.h[axis] > tall) tall = o.sections.h[axis];
+    }
+    sdm_canvas c;
+    s = sdm_canvas_create(&c, w < 480 ? 480 : w, TOP + tall + SDM_SECTION_BELOW + FOOT, err);
+    if (s) return s;
+    draw(&c, &o, title);
+    s = sdm_png_write(path, &c, err);
+    sdm_canvas_dispose(&c);
+    return s;
+}

@@ -1,0 +1,239 @@
+/* Line plots: axes, ticks, legend. */
+#include "sdm/picture.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+
+#include "panel.h"
+
+#define WIDTH 960
+#define HEIGHT 600
+#define CURVES_MAX 16
+
+static const sdm_box area = {92, 56, WIDTH - 92 - 32, HEIGHT - 56 - 70};
+static const sdm_colour grid_ink = {228, 230, 234};
+
+/* The window of the plot; y is a decadic logarithm where log_y. */
+typedef struct window {
+    double low[2], high[2];
+    bool log_y;
+} window;
+
+/* One point in the window's coordinates; false when it cannot be drawn. */
+static bool point(const sdm_curve *curve, size_t i, bool log_y, double p[2])
+{
+    p[0] = curve->x[i];
+    p[1] = log_y ? (curve->y[i] > 0 ? log10(curve->y[i]) : NAN) : curve->y[i];
+    return fabs(p[0]) <= FLT_MAX && fabs(p[1]) <= FLT_MAX;
+}
+
+static void find_window(window *w, const sdm_curve *curves, size_t n_curves)
+{
+    for (int d = 0; d < 2; d++) {
+        w->low[d] = INFINITY;
+        w->high[d] = -INFINITY;
+    }
+    for (size_t c = 0; c < n_curves; c++)
+        for (size_t i = 0; i < curves[c].n; i++) {
+            double p[2];
+            if (!point(&curves[c], i, w->log_y, p)) continue;
+            for (int d = 0; d < 2; d++) {
+                w->low[d] = fmin(w->low[d], p[d]);
+                w->high[d] = fmax(w->high[d], p[d]);
+            }
+        }
+    for (int d = 0; d < 2; d++) {
+        if (!(w->low[d] <= w->high[d])) w->low[d] = w->high[d] = 0;
+        const double size = fmax(fabs(w->low[d]), fabs(w->high[d]));
+        double room = d ? 0.05 * (w->high[d] - w->low[d]) : 0;
+        if (!(w->high[d] - w->low[d] > 1e-12 * size)) room = size > 0 ? 0.5 * size : 0.5;
+        w->low[d] -= room;
+        w->high[d] += room;
+    }
+}
+
+static double to_x(const window *w, double v)
+{
+    return area.x + (v - w->low[0]) / (w->high[0] - w->low[0]) * area.w;
+}
+static double to_y(const window *w, double v)
+{
+    return area.y + (1 - (v - w->low[1]) / (w->high[1] - w->low[1])) * area.h;
+}
+
+static void line(sdm_canvas *c, double x0, double y0, double x1, double y1, double width,
+                 sdm_colour colour)
+{
+    sdm_canvas_stroke(c, x0, y0, x1, y1, width);
+    sdm_canvas_ink(c, colour, 1);
+}
+
+static void draw_x_axis(sdm_canvas *c, const window *w)
+{
+    double first, step;
+    char text[32];
+    const sdm_type type = {.size = 10, .align = SDM_CENTRE, .colour = SDM_INK};
+    const int n = sdm_ticks(w->low[0], w->high[0], 8, &first, &step);
+    for (int i = 0; i < n; i++) {
+        const double v = first + i * step, x = floor(to_x(w, v)) + 0.5;
+        line(c, x, area.y, x, area.y + area.h, 1, grid_ink);
+        line(c, x, area.y + area.h, x, area.y + area.h + 5, 1, SDM_INK_LIGHT);
+        sdm_canvas_text(c, x, area.y + area.h + 22, type, sdm_tick_text(v, step, text));
+    }
+}
+
+static void y_tick(sdm_canvas *c, double y, const char *text)
+{
+    y = floor(y) + 0.5;
+    line(c, area.x, y, area.x + area.w, y, 1, grid_ink);
+    line(c, area.x - 5, y, area.x, y, 1, SDM_INK_LIGHT);
+    if (text)
+        sdm_canvas_text(c, area.x - 10, y + 5,
+                        (sdm_type){.size = 10, .align = SDM_RIGHT, .colour = SDM_INK}, text);
+}
+
+/* "10" with a small raised exponent. */
+static void power_of_ten(sdm_canvas *c, double y, int exponent)
+{
+    char text[16];
+    snprintf(text, sizeof text, "%s%d", exponent < 0 ? "\xE2\x88\x92" : "",
+             exponent < 0 ? -exponent : exponent);
+    sdm_type type = {.size = 7, .align = SDM_RIGHT, .colour = SDM_INK};
+    sdm_canvas_text(c, area.x - 10, y - 1, type, text);
+    type.size = 10;
+    sdm_canvas_text(c, area.x - 12 - sdm_text_width(7, text), y + 6, type, "10");
+}
+
+/* Decades, and over a short range 2 and 5 of each. */
+static void draw_log_axis(sdm_canvas *c, const window *w)
+{
+    const double decades = w->high[1] - w->low[1];
+    const int every = (int)ceil(decades / 10), from = (int)floor(w->low[1]);
+    for (int e = from; e <= w->high[1]; e++) {
+        for (int m = 1; m < 10; m++) {
+            const double v = e + log10(m);
+            char text[32];
+            if (v < w->low[1] || v > w->high[1] || (m > 1 && decades > 4)) continue;
+            const bool labelled = decades < 1.6 && (m == 2 || m == 5);
+            snprintf(text, sizeof text, "%g", m * pow(10, e));
+            const double y = to_y(w, v);
+            if (m == 1 && decades >= 1.6) {
+                if (e % every != 0) continue;
+                y_tick(c, y, NULL);
+                power_of_ten(c, floor(y) + 0.5, e);
+            } else if (m == 1 || labelled) {
+                y_tick(c, y, text);
+            } else {
+                line(c, area.x - 3, floor(y) + 0.5, area.x, floor(y) + 0.5, 1, SDM_INK_LIGHT);
+            }
+        }
+    }
+}
+
+static void draw_y_axis(sdm_canvas *c, const window *w)
+{
+    double first, step;
+    char text[32];
+    /* less than a factor of two: decades say nothing */
+    if (w->log_y && w->high[1] - w->low[1] > 0.35) {
+        draw_log_axis(c, w);
+        return;
+    }
+    const double low = w->log_y ? pow(10, w->low[1]) : w->low[1],
+                 high = w->log_y ? pow(10, w->high[1]) : w->high[1];
+    const int n = sdm_ticks(low, high, 7, &first, &step);
+    for (int i = 0; i < n; i++) {
+        const double v = first + i * step;
+        y_tick(c, to_y(w, w->log_y ? log10(v) : v), sdm_tick_text(v, step, text));
+    }
+}
+
+static sdm_colour curve_colour(size_t i)
+{
+    static const sdm_colour known[] = {{0, 105, 180}, {214, 84, 10},  {0, 150, 110}, {190, 60, 130},
+                                       {222, 160, 0}, {80, 165, 220}, {110, 80, 50}, {60, 60, 66}};
+    return known[i % (sizeof known / sizeof *known)];
+}
+
+static void draw_curve(sdm_canvas *c, const window *w, const sdm_curve *curve, sdm_colour colour)
+{
+    double before[2], p[2];
+    bool has_before = false;
+    sdm_canvas_clip(c, area.x, area.y, area.w, area.h);
+    for (size_t i = 0; i < curve->n; i++) {
+        const bool ok = point(curve, i, w->log_y, p);
+        /* a point between two gaps still shows, as a dot */
+        if (ok) {
+            const double *from = has_before ? before : p;
+            sdm_canvas_stroke(c, to_x(w, from[0]), to_y(w, from[1]), to_x(w, p[0]), to_y(w, p[1]),
+                              has_before ? 1.8 : 2.4);
+            before[0] = p[0];
+            before[1] = p[1];
+        }
+        has_before = ok;
+    }
+    sdm_canvas_ink(c, colour, 1);
+    sdm_canvas_unclip(c);
+}
+
+static void draw_legend(sdm_canvas *c, const sdm_curve *curves, size_t n)
+{
+    double widest = 0;
+    int rows = 0;
+    for (size_t i = 0; i < n; i++)
+        if (curves[i].title && curves[i].title[0]) {
+            widest = fmax(widest, sdm_text_width(10, curves[i].title));
+            rows++;
+        }
+    if (!rows) return;
+    const int w = (int)widest + 66, h = 22 * rows + 12, x = area.x + area.w - w - 12;
+    int y = area.y + 12;
+    sdm_canvas_box(c, x, y, w, h, (sdm_colour){255, 255, 255}, 0.88);
+    sdm_canvas_frame(c, x, y, w, h, grid_ink);
+    y += 22;
+    for (size_t i = 0; i < n; i++) {
+        if (!curves[i].title || !curves[i].title[0]) continue;
+        line(c, x + 12, y - 5, x + 42, y - 5, 2.4, curve_colour(i));
+        sdm_canvas_text(c, x + 52, y, (sdm_type){.size = 10, .colour = SDM_INK}, curves[i].title);
+        y += 22;
+    }
+}
+
+static void draw_labels(sdm_canvas *c, const char *title, const char *x_label, const char *y_label)
+{
+    const double middle = area.x + area.w / 2.0;
+    sdm_type type = {.size = 14, .align = SDM_CENTRE, .bold = true, .colour = SDM_INK};
+    if (title) sdm_canvas_text(c, middle, 36, type, title);
+    type.bold = false;
+    type.size = 11;
+    if (x_label) sdm_canvas_text(c, middle, HEIGHT - 18, type, x_label);
+    type.upwards = true;
+    if (y_label) sdm_canvas_text(c, 24, area.y + area.h / 2.0, type, y_label);
+}
+
+sdm_status sdm_picture_plot(const char *path, const char *title, const char *x_label,
+                            const char *y_label, bool log_y, const sdm_curve *curves,
+                            size_t n_curves, sdm_error *err)
+{
+    if (!path || !curves) return sdm_fail(err, SDM_E_ARG, "sdm_picture_plot: NULL argument");
+    if (n_curves < 1 || n_curves > CURVES_MAX)
+        return sdm_fail(err, SDM_E_ARG, "%zu curves in a plot, need 1 to %d", n_curves, CURVES_MAX);
+    for (size_t i = 0; i < n_curves; i++)
+        if (curves[i].n && (!curves[i].x || !curves[i].y))
+            return sdm_fail(err, SDM_E_ARG, "curve %zu has no values", i);
+    window w = {.log_y = log_y};
+    find_window(&w, curves, n_curves);
+    sdm_canvas c;
+    sdm_status e = sdm_canvas_create(&c, WIDTH, HEIGHT, err);
+    if (e) return e;
+    draw_x_axis(&c, &w);
+    draw_y_axis(&c, &w);
+    for (size_t i = 0; i < n_curves; i++) draw_curve(&c, &w, &curves[i], curve_colour(i));
+    sdm_canvas_frame(&c, area.x, area.y, area.w, area.h, SDM_INK_LIGHT);
+    draw_legend(&c, curves, n_curves);
+    draw_labels(&c, title, x_label, y_label);
+    e = sdm_png_write(path, &c, err);
+    sdm_canvas_dispose(&c);
+    return e;
+}

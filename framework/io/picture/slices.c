@@ -1,0 +1,190 @@
+/* Pictures of maps: three orthogonal slices of each, side by side, with contours, scales and
+ * positions. */
+#include "sdm/picture.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#include "sections.h"
+
+#define MAPS_MAX 16
+#define LEVELS_MAX 16
+#define LEFT SDM_SECTION_LEFT
+#define RIGHT 22
+#define TOP 46
+#define GAP 24
+#define BELOW SDM_SECTION_BELOW
+#define BAR 14
+#define FOOT 84 /* colour bars with numbers and captions */
+
+/* Everything that is known before the first pixel. */
+typedef struct layout {
+    const sdm_grid *g;
+    const sdm_picture_map *maps;
+    size_t n_maps;
+    const float *levels;
+    size_t n_levels;
+    sdm_sections sections;
+    sdm_box row[3];         /* panels of the first column; row r is normal to axis r */
+    int column;             /* width of a column */
+    double low[2], high[2]; /* distance and error scale */
+    double unit[2];         /* factor of the printed numbers: 1 for mm, 1000 for micrometres */
+} layout;
+
+/* Range of the finite values of the maps of one kind. */
+static void find_range(layout *l, bool error)
+{
+    double low = INFINITY, high = -INFINITY;
+    for (size_t m = 0; m < l->n_maps; m++) {
+        const size_t n = l->maps[m].error == error ? sdm_grid_count(l->g) : 0;
+        for (size_t i = 0; i < n; i++) {
+            const double v = (double)l->maps[m].values[i];
+            if (!isfinite(v)) continue;
+            low = fmin(low, v);
+            high = fmax(high, v);
+        }
+    }
+    if (!(low <= high)) low = high = 0;
+    if (error && low < 0) {
+        high = fmax(-low, high);
+        low = -high;
+    } else {
+        low = fmin(low, 0);
+        high = fmax(high, 0);
+    }
+    if (!(high - low > 1e-12)) high = low + (error ? 1e-3 : 1);
+    l->low[error] = low;
+    l->high[error] = high;
+    l->unit[error] = error && high < 0.1 ? 1000 : 1;
+}
+
+/* Places of panels and size of the canvas. */
+static void place(layout *l, int *width, int *height)
+{
+    int y = TOP;
+    sdm_sections_place(&l->sections, l->g, l->maps[0].values);
+    l->column = l->sections.widest;
+    for (int r = 0; r < 3; r++) {
+        const int w = l->sections.w[r], h = l->sections.h[r];
+        l->row[r] = (sdm_box){LEFT + (l->column - w) / 2, y, w, h};
+        y += h + BELOW;
+    }
+    *width = LEFT + (int)l->n_maps * (l->column + GAP) - GAP + RIGHT;
+    *height = y + FOOT;
+}
+
+static sdm_colour level_colour(size_t i)
+{
+    static const sdm_colour known[] = {
+        {214, 28, 36}, {255, 214, 10}, {20, 160, 110}, {150, 70, 190}};
+    return known[i % (sizeof known / sizeof *known)];
+}
+
+/* Distances get their own contours; on an error map the contours of the first map show where the
+ * surface is. */
+static void draw_contours(sdm_canvas *c, const layout *l, sdm_box box, const sdm_picture_map *map,
+                          int axis)
+{
+    const sdm_colour white = {255, 255, 255}, dark = {40, 40, 48};
+    const sdm_slice s =
+        sdm_section_of(&l->sections, map->error ? l->maps[0].values : map->values, axis);
+    for (size_t i = l->n_levels; i-- > 0;) {
+        if (map->error)
+            sdm_panel_contour(c, box, &s, (double)l->levels[i], i ? 0.9 : 1.4, white, dark);
+        else
+            sdm_panel_contour(c, box, &s, (double)l->levels[i], i ? 1.6 : 2, level_colour(i),
+                              i ? dark : white);
+    }
+}
+
+static sdm_colour_map map_of(const layout *l, bool error)
+{
+    return !error ? SDM_MAP_DISTANCE : l->low[1] < 0 ? SDM_MAP_SIGNED : SDM_MAP_ERROR;
+}
+
+static void draw_panel(sdm_canvas *c, const layout *l, size_t column, int axis)
+{
+    const sdm_picture_map *map = &l->maps[column];
+    const sdm_slice s = sdm_section_of(&l->sections, map->values, axis);
+    sdm_box box = l->row[axis];
+    box.x += (int)column * (l->column + GAP);
+    sdm_panel_colours(c, box, &s, map_of(l, map->error), l->low[map->error], l->high[map->error]);
+    draw_contours(c, l, box, map, axis);
+    sdm_section_draw_frame(c, &l->sections, box, axis, column == 0);
+    if (column == 0) sdm_panel_scale_bar(c, box, l->sections.pixels);
+}
+
+/* A sample of each contour's line with its level, behind the caption of the distances. */
+static void draw_key(sdm_canvas *c, const layout *l, double x, double y)
+{
+    char text[48];
+    const sdm_type type = {.size = 9, .colour = SDM_INK};
+    double total = 0;
+    for (int pass = 0; pass < 2; pass++) {
+        double at = x - total / 2;
+        for (size_t i = 0; i < l->n_levels; i++) {
+            snprintf(text, sizeof text, "%g mm", (double)l->levels[i]);
+            const double w = sdm_text_width(9, text);
+            if (pass) {
+                sdm_canvas_stroke(c, at, y - 4.5, at + 18, y - 4.5, 4.2);
+                sdm_canvas_ink(c, i ? (sdm_colour){40, 40, 48} : (sdm_colour){255, 255, 255}, 0.55);
+                sdm_canvas_stroke(c, at, y - 4.5, at + 18, y - 4.5, 2);
+                sdm_canvas_ink(c, level_colour(i), 1);
+                sdm_canvas_text(c, at + 25, y, type, text);
+            }
+            at += 25 + w + 18;
+            if (!pass) total += 25 + w + (i + 1 < l->n_levels ? 18 : 0);
+        }
+    }
+}
+
+static void draw_column(sdm_canvas *c, const layout *l, size_t column, int foot)
+{
+    const sdm_picture_map *map = &l->maps[column];
+    const int x = LEFT + (int)column * (l->column + GAP), e = map->error;
+    const sdm_type title = {.size = 13, .align = SDM_CENTRE, .bold = true, .colour = SDM_INK};
+    sdm_canvas_text(c, x + l->column / 2.0, TOP - 16, title, map->title ? map->title : "");
+    for (int axis = 0; axis < 3; axis++) draw_panel(c, l, column, axis);
+    const sdm_box bar = {x + l->column / 10, foot, l->column - 2 * (l->column / 10), BAR};
+    const char *caption = !e               ? "signed distance (mm)"
+                          : l->unit[1] > 1 ? "error (\xC2\xB5m)"
+                                           : "error (mm)";
+    sdm_colour_bar(c, bar, map_of(l, map->error), l->low[e] * l->unit[e], l->high[e] * l->unit[e],
+                   caption);
+    if (!e) draw_key(c, l, x + l->column / 2.0, foot + 72);
+}
+
+static sdm_status check(const char *path, const sdm_grid *grid, const sdm_picture_map *maps,
+                        size_t n_maps, const float *levels, size_t n_levels, sdm_error *err)
+{
+    if (!path || !grid || !maps || (n_levels && !levels))
+        return sdm_fail(err, SDM_E_ARG, "sdm_picture_slices: NULL argument");
+    if (n_maps < 1 || n_maps > MAPS_MAX)
+        return sdm_fail(err, SDM_E_ARG, "%zu maps in a picture, need 1 to %d", n_maps, MAPS_MAX);
+    if (n_levels > LEVELS_MAX)
+        return sdm_fail(err, SDM_E_ARG, "%zu levels in a picture, need 0 to %d", n_levels,
+                        LEVELS_MAX);
+    for (size_t i = 0; i < n_maps; i++)
+        if (!maps[i].values)
+            return sdm_fail(err, SDM_E_ARG, "map %zu of the picture has no values", i);
+    return sdm_grid_check(grid, err);
+}
+
+sdm_status sdm_picture_slices(const char *path, const sdm_grid *grid, const sdm_picture_map *maps,
+                              size_t n_maps, const float *levels, size_t n_levels, sdm_error *err)
+{
+    sdm_status e = check(path, grid, maps, n_maps, levels, n_levels, err);
+    if (e) return e;
+    layout l = {.g = grid, .maps = maps, .n_maps = n_maps, .levels = levels, .n_levels = n_levels};
+    int w, h;
+    find_range(&l, false);
+    find_range(&l, true);
+    place(&l, &w, &h);
+    sdm_canvas c;
+    e = sdm_canvas_create(&c, w, h, err);
+    if (e) return e;
+    for (size_t m = 0; m < n_maps; m++) draw_column(&c, &l, m, h - FOOT);
+    e = sdm_png_write(path, &c, err);
+    sdm_canvas_dispose(&c);
+    return e;
+}

@@ -1,0 +1,287 @@
+/* Pictures of surfaces: orthographic views with a depth buffer, shaded, coloured by a value at each
+ * vertex. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "panel.h"
+#include "sdm/memory.h"
+#include "sdm/picture.h"
+
+enum {
+    SURFACES_MAX = 8,
+    N_VIEWS = 2,
+    FINE = 3, /* samples of a pixel along each side */
+    N_SHADES = 255,
+    MIDDLE = N_SHADES / 2,
+    PANEL = 400, /* pixels of the longer side of the largest view */
+    SIDE = 20,
+    TOP = 46,
+    GAP = 20,
+    BAR = 14,
+    FOOT = 64
+};
+
+/* Unit vectors of the world: to the right, upwards, to the viewer. */
+typedef struct view {
+    const char *name;
+    double axis[3][3];
+} view;
+
+/* From above, and from the front at an elevation of 30 degrees, 30 degrees to the side. */
+static const view VIEWS[N_VIEWS] = {
+    {"from +z", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
+    {"oblique",
+     {{0.86602540378443865, 0.5, 0},
+      {-0.25, 0.43301270189221933, 0.86602540378443865},
+      {0.43301270189221933, -0.75, 0.5}}},
+};
+
+typedef struct scene {
+    const sdm_picture_surface *surfaces;
+    size_t n;
+    double low[N_VIEWS][2],
+        high[N_VIEWS][2];       /* boxes of all surfaces in the planes of the views, mm */
+    double pixels;              /* per mm */
+    double limit;               /* values span -limit .. limit, mm */
+    int width, height[N_VIEWS]; /* of a panel */
+    sdm_colour shade[N_SHADES]; /* of values from -limit to limit */
+} scene;
+
+/* One panel in the making, FINE times as wide and high; depth -INFINITY: nothing there. */
+typedef struct raster {
+    int w, h;
+    double *depth;
+    uint8_t *rgb;
+} raster;
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void measure(scene *s)
+{
+    for (int v = 0; v < N_VIEWS; v++)
+        for (int d = 0; d < 2; d++) {
+            s->low[v][d] = INFINITY;
+            s->high[v][d] = -INFINITY;
+        }
+    for (size_t k = 0; k < s->n; k++) {
+        const sdm_picture_surface *p = &s->surfaces[k];
+        for (size_t i = 0; i < p->mesh->n_vert; i++) {
+            for (int v = 0; v < N_VIEWS; v++)
+                for (int d = 0; d < 2; d++) {
+                    const double at = dot(p->mesh->vert + 3 * i, VIEWS[v].axis[d]);
+                    s->low[v][d] = fmin(s->low[v][d], at);
+                    s->high[v][d] = fmax(s->high[v][d], at);
+                }
+            if (p->values && isfinite(p->values[i])) s->limit = fmax(s->limit, fabs(p->values[i]));
+        }
+    }
+}
+
+static void place(scene *s)
+{
+    double widest = 0, longest = 0;
+    for (int v = 0; v < N_VIEWS; v++) {
+        widest = fmax(widest, s->high[v][0] - s->low[v][0]);
+        for (int d = 0; d < 2; d++) longest = fmax(longest, s->high[v][d] - s->low[v][d]);
+    }
+    if (!(longest > 0)) longest = widest = 1;
+    s->pixels = PANEL / longest;
+    s->width = (int)fmax(220, ceil(widest * s->pixels) + 8);
+    for (int v = 0; v < N_VIEWS; v++)
+        s->height[v] = (int)fmax(40, ceil((s->high[v][1] - s->low[v][1]) * s->pixels) + 40);
+    if (!(s->limit > 0)) s->limit = 1e-3;
+    for (int i = 0; i < N_SHADES; i++)
+        s->shade[i] = sdm_map_colour(SDM_MAP_SIGNED, -1, 1, (double)(i - MIDDLE) / MIDDLE);
+}
+
+/* Sums of the triangles' area vectors: normals of unnormalised length. */
+static void add_normals(const sdm_mesh *m, double *normal)
+{
+    for (size_t t = 0; t < m->n_tri; t++) {
+        const double *a = m->vert + 3 * m->tri[3 * t], *b = m->vert + 3 * m->tri[3 * t + 1],
+                     *c = m->vert + 3 * m->tri[3 * t + 2];
+        const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]},
+                     w[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+        const double cross[3] = {u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2],
+                                 u[0] * w[1] - u[1] * w[0]};
+        for (int k = 0; k < 3; k++)
+            for (int d = 0; d < 3; d++)
+                normal[3 * m->tri[3 * t + (size_t)k] + (size_t)d] += cross[d];
+    }
+}
+
+/* Light from the upper left behind the viewer; backs of triangles are lit as their fronts. */
+static double brightness(const double n[3], const view *v)
+{
+    static const double LIGHT[3] = {-0.4, 0.5, 0.76811};
+    const double length = sqrt(dot(n, n)), front = dot(n, v->axis[2]) < 0 ? -1 : 1;
+    double lit = 0;
+    for (int d = 0; d < 3; d++) lit += LIGHT[d] * dot(n, v->axis[d]);
+    return length > 0 ? 0.42 + 0.58 * fmax(0, front * lit / length) : 0.42;
+}
+
+static sdm_colour colour_of(const scene *s, double value)
+{
+    if (!isfinite(value)) return (sdm_colour){160, 160, 160};
+    return s->shade[(int)lround((fmax(-1, fmin(1, value / s->limit)) + 1) * MIDDLE)];
+}
+
+/* A corner on its way to the raster: place, depth, what is interpolated. */
+typedef struct corner {
+    double x, y, z, value, normal[3];
+} corner;
+
+static void draw_triangle(const scene *s, raster *r, const view *v, const corner c[3], bool plain)
+{
+    const double area =
+        (c[1].x - c[0].x) * (c[2].y - c[0].y) - (c[2].x - c[0].x) * (c[1].y - c[0].y);
+    if (!(fabs(area) > 0)) return;
+    const int x0 = (int)fmax(0, floor(fmin(c[0].x, fmin(c[1].x, c[2].x)))),
+              x1 = (int)fmin(r->w - 1, ceil(fmax(c[0].x, fmax(c[1].x, c[2].x)))),
+              y0 = (int)fmax(0, floor(fmin(c[0].y, fmin(c[1].y, c[2].y)))),
+              y1 = (int)fmin(r->h - 1, ceil(fmax(c[0].y, fmax(c[1].y, c[2].y))));
+    for (int y = y0; y <= y1; y++)
+        for (int x = x0; x <= x1; x++) {
+            const double px = x + 0.5, py = y + 0.5;
+            double b[3];
+            b[1] = ((px - c[0].x) * (c[2].y - c[0].y) - (c[2].x - c[0].x) * (py - c[0].y)) / area;
+            b[2] = ((c[1].x - c[0].x) * (py - c[0].y) - (px - c[0].x) * (c[1].y - c[0].y)) / area;
+            b[0] = 1 - b[1] - b[2];
+            if (!(b[0] >= 0 && b[1] >= 0 && b[2] >= 0)) continue;
+            const size_t at = (size_t)y * (size_t)r->w + (size_t)x;
+            const double z = b[0] * c[0].z + b[1] * c[1].z + b[2] * c[2].z;
+            if (!(z > r->depth[at])) continue;
+            double n[3], value = 0;
+            for (int d = 0; d < 3; d++)
+                n[d] = b[0] * c[0].normal[d] + b[1] * c[1].normal[d] + b[2] * c[2].normal[d];
+            for (int k = 0; k < 3; k++) value += b[k] * c[k].value;
+            const sdm_colour base = plain ? (sdm_colour){214, 208, 196} : colour_of(s, value);
+            const double light = brightness(n, v);
+            r->depth[at] = z;
+            r->rgb[3 * at] = (uint8_t)(base.r * light + 0.5);
+            r->rgb[3 * at + 1] = (uint8_t)(base.g * light + 0.5);
+            r->rgb[3 * at + 2] = (uint8_t)(base.b * light + 0.5);
+        }
+}
+
+static void draw_surface(const scene *s, raster *r, int view_index, const sdm_picture_surface *p,
+                         const double *normal)
+{
+    const view *v = &VIEWS[view_index];
+    const double scale = s->pixels * FINE,
+                 middle[2] = {0.5 * (s->low[view_index][0] + s->high[view_index][0]),
+                              0.5 * (s->low[view_index][1] + s->high[view_index][1])};
+    for (size_t t = 0; t < p->mesh->n_tri; t++) {
+        corner c[3];
+        for (size_t k = 0; k < 3; k++) {
+            const size_t i = p->mesh->tri[3 * t + k];
+            const double *x = p->mesh->vert + 3 * i;
+            c[k].x = 0.5 * r->w + scale * (dot(x, v->axis[0]) - middle[0]);
+            c[k].y = 0.5 * r->h - scale * (dot(x, v->axis[1]) - middle[1]);
+            c[k].z = dot(x, v->axis[2]);
+            c[k].value = p->values ? p->values[i] : 0;
+            memcpy(c[k].normal, normal + 3 * i, sizeof c[k].normal);
+        }
+        draw_triangle(s, r, v, c, !p->values);
+    }
+}
+
+/* Averages the samples of each pixel over the white ground. */
+static void put_raster(sdm_canvas *canvas, const raster *r, int left, int top)
+{
+    for (int y = 0; y < r->h / FINE; y++)
+        for (int x = 0; x < r->w / FINE; x++) {
+            int sum[3] = {0, 0, 0};
+            for (int k = 0; k < FINE * FINE; k++) {
+                const size_t at =
+                    (size_t)(y * FINE + k / FINE) * (size_t)r->w + (size_t)(x * FINE + k % FINE);
+                for (int d = 0; d < 3; d++) sum[d] += r->rgb[3 * at + (size_t)d];
+            }
+            uint8_t *to =
+                canvas->rgb + 3 * ((size_t)(top + y) * (size_t)canvas->w + (size_t)(left + x));
+            for (int d = 0; d < 3; d++)
+                to[d] = (uint8_t)((sum[d] + FINE * FINE / 2) / (FINE * FINE));
+        }
+}
+
+static sdm_status draw_panel(const scene *s, sdm_canvas *canvas, size_t column, int v, int left,
+                             int top, sdm_error *err)
+{
+    const sdm_picture_surface *p = &s->surfaces[column];
+    raster r = {.w = s->width * FINE, .h = s->height[v] * FINE};
+    const size_t n = (size_t)r.w * (size_t)r.h;
+    double *normal = NULL;
+    sdm_status e = SDM_ALLOC(&r.depth, n, "depth of a picture", err);
+    if (!e) e = SDM_ALLOC(&r.rgb, 3 * n, "panel of a picture", err);
+    if (!e) e = SDM_ALLOC(&normal, 3 * p->mesh->n_vert, "normals of a picture", err);
+    if (!e) {
+        for (size_t i = 0; i < n; i++) r.depth[i] = -INFINITY;
+        memset(r.rgb, 255, 3 * n);
+        add_normals(p->mesh, normal);
+        draw_surface(s, &r, v, p, normal);
+        put_raster(canvas, &r, left, top);
+    }
+    sdm_free(r.depth);
+    sdm_free(r.rgb);
+    sdm_free(normal);
+    return e;
+}
+
+static sdm_status draw(const scene *s, sdm_canvas *c, const char *caption, sdm_error *err)
+{
+    const sdm_type title = {.size = 13, .align = SDM_CENTRE, .bold = true, .colour = SDM_INK};
+    const double unit = s->limit < 0.1 ? 1000 : 1;
+    char text[160];
+    sdm_status e = SDM_OK;
+    for (size_t k = 0; k < s->n && !e; k++) {
+        const int left = SIDE + (int)k * (s->width + GAP);
+        int top = TOP;
+        sdm_canvas_text(c, left + s->width / 2.0, TOP - 18, title,
+                        s->surfaces[k].title ? s->surfaces[k].title : "");
+        for (int v = 0; v < N_VIEWS && !e; v++) {
+            e = draw_panel(s, c, k, v, left, top, err);
+            sdm_canvas_text(c, left + 6, top + 14, (sdm_type){.size = 9, .colour = SDM_INK_LIGHT},
+                            VIEWS[v].name);
+            if (k == 0 && v == 0)
+                sdm_panel_scale_bar(c, (sdm_box){left, top, s->width, s->height[v]}, s->pixels);
+            top += s->height[v] + GAP;
+        }
+        if (!s->surfaces[k].values) continue;
+        const sdm_box bar = {left + s->width / 10, c->h - FOOT, s->width - 2 * (s->width / 10),
+                             BAR};
+        snprintf(text, sizeof text, "%.120s (%s)", caption, unit > 1 ? "\xC2\xB5m" : "mm");
+        sdm_colour_bar(c, bar, SDM_MAP_SIGNED, -s->limit * unit, s->limit * unit, text);
+    }
+    return e;
+}
+
+sdm_status sdm_picture_surfaces(const char *path, const sdm_picture_surface *surfaces, size_t n,
+                                const char *caption, sdm_error *err)
+{
+    if (!path || !surfaces || !caption)
+        return sdm_fail(err, SDM_E_ARG, "sdm_picture_surfaces: NULL argument");
+    if (n < 1 || n > SURFACES_MAX)
+        return sdm_fail(err, SDM_E_ARG, "%zu surfaces in a picture, need 1 to %d", n, SURFACES_MAX);
+    for (size_t k = 0; k < n; k++) {
+        if (!surfaces[k].mesh)
+            return sdm_fail(err, SDM_E_ARG, "surface %zu of the picture has no mesh", k);
+        sdm_audit audit; /* indices and coordinates */
+        const sdm_status e = sdm_mesh_audit(surfaces[k].mesh, &audit, err);
+        if (e) return sdm_fail_in(err, e, "surface %zu of the picture", k);
+    }
+    scene s = {.surfaces = surfaces, .n = n};
+    sdm_canvas c;
+    measure(&s);
+    place(&s);
+    const int h = TOP + s.height[0] + GAP + s.height[1] + GAP + FOOT;
+    sdm_status e = sdm_canvas_create(&c, 2 * SIDE + (int)n * (s.width + GAP) - GAP, h, err);
+    if (e) return e;
+    e = draw(&s, &c, caption, err);
+    if (!e) e = sdm_png_write(path, &c, err);
+    sdm_canvas_dispose(&c);
+    return e;
+}

@@ -1,0 +1,479 @@
+/* Kernels for weights as bytes (sdm/kernels.h), a part of kernels_simd.h. A lane of 32 bits holds
+   two neighbouring inputs of one output as integers of 16 bits. From the instruction set:
+   LOAD_PAIRS(p), bytes to such lanes, MADD(a, b), the two products of each lane added, and
+   ADD_MADD(sum, a, b), where one instruction adds them to a sum. */
+
+// the two inputs of a lane
+static inline veci first_of(veci v) { return (veci)((vecu)v << 16) >> 16; }
+static inline veci second_of(veci v) { return v >> 16; }
+
+#ifndef MADD
+#define MADD(a, b) (first_of(a) * first_of(b) + second_of(a) * second_of(b))
+#endif
+
+#ifndef ADD_MADD
+#define ADD_MADD(sum, a, b) ((sum) + (vecu)MADD(a, b))
+#endif
+
+#ifndef LOAD_PAIRS
+static inline veci load_pairs(const int8_t *p)
+{
+    int8_t bytes __attribute__((vector_size(2 * VW)));
+    typedef int16_t shorts __attribute__((vector_size(4 * VW)));
+    memcpy(&bytes, p, sizeof bytes);
+    return (veci) __builtin_convertvector(bytes, shorts);
+}
+#define LOAD_PAIRS(p) load_pairs(p)
+#endif
+
+// where there is an instruction for it; left to the compiler it is used in some loops and not in
+// others
+#ifndef FMA
+#define FMA(a, b, c) ((a) * (b) + (c))
+#endif
+
+// numbers of 16 bits
+static inline veci load_wide(const int8_t *p)
+{
+    veci v;
+    memcpy(&v, p, sizeof v);
+    return v;
+}
+
+static inline veci splat_pair(const int16_t *p)
+{
+    int32_t pair;
+    memcpy(&pair, p, sizeof pair);
+    return pair - (veci){0};
+}
+
+// outputs in rows of 4, `line` floats apart
+static inline void store_rows(float *y, size_t line, vec v)
+{
+    typedef float row __attribute__((vector_size(16)));
+    row rows[VW / 4];
+    memcpy(rows, &v, sizeof v);
+    for (int i = 0; i < VW / 4; i++) memcpy(y + (size_t)i * line, &rows[i], sizeof *rows);
+}
+
+// what a pointer has become is not put together anew for each use
+#define STEP(p) __asm__("" : "+r"(p));
+
+#ifndef ROUND_TO_SHORTS
+typedef uint16_t vec_short __attribute__((vector_size(2 * VW)));
+
+// nearest integers of 16 bits: the last bits of a number near 2^23
+static inline vec_short round_to_shorts(vec v)
+{
+    return __builtin_convertvector((vecu)(v + 12582912.0f), vec_short);
+}
+#define ROUND_TO_SHORTS(v) round_to_shorts(v)
+#endif
+
+#ifndef SMALLER_OF
+#define SMALLER_OF(a, b) ((vec)(((veci)(a) & ((a) < (b))) | ((veci)(b) & ~((a) < (b)))))
+#define LARGER_OF(a, b) ((vec)(((veci)(a) & ((a) > (b))) | ((veci)(b) & ~((a) > (b)))))
+#endif
+
+static inline void store_shorts(int16_t *x, vec v)
+{
+    const __typeof__(ROUND_TO_SHORTS(v)) s = ROUND_TO_SHORTS(v);
+    memcpy(x, &s, sizeof s);
+}
+
+// to -most .. most, NaN to one of them
+static inline vec clip(vec v, vec most) { return LARGER_OF(SMALLER_OF(v, most), -most); }
+
+enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inputs of a panel
+
+// where register j of the outputs has its weights of a pair, in bytes from panel o / 16 on
+#define BYTES_AT(j, pair)                                                                          \
+    ((size_t)((j)*VW / SDM_PANEL) * panel + (size_t)((j)*VW % SDM_PANEL) * (pair / SDM_PANEL))
+
+// of a pair of inputs in n registers
+#define BYTES_OF(n, pair) ((n)*VW / SDM_PANEL * (pair))
+
+// weights are asked for so many bytes before they are used, where several rows share them
+#ifndef AHEAD
+#define AHEAD 0
+#endif
+
+// loops over registers: sums stay in registers only when they are gone before arrays are taken
+// apart
+#if defined(__clang__)
+#define EACH(i, n) _Pragma("clang loop unroll(full)") for (int i = 0; i < (n); i++)
+#else
+#define EACH(i, n) _Pragma("GCC unroll 8") for (int i = 0; i < (n); i++)
+#endif
+
+// what becomes of products: the first of their sum, or more; a sum waits longer for ADD_MADD, which
+// only many sums at a time hide
+#define SET(many, sum, a, b) sum = (vecu)MADD(a, b)
+#define ADD(many, sum, a, b) sum = (many) ? ADD_MADD(sum, a, b) : (sum) + (vecu)MADD(a, b)
+
+// acc[rows][n] `into` by the products of a pair of inputs, `pair` bytes; what there is less of
+// stays in registers, inputs or weights
+#define BYTES_PAIR(rows, n, into, pair, load_pair)                                                 \
+    do {                                                                                           \
+        if (rows < n) {                                                                            \
+            veci input[rows];                                                                      \
+            EACH(i, rows) input[i] = splat_pair(x + (size_t)i * ldx);                              \
+            EACH(j, n)                                                                             \
+            {                                                                                      \
+                const veci weight = load_pair(w + BYTES_AT(j, pair));                              \
+                EACH(i, rows) into((rows) * (n) >= 4, acc[i][j], input[i], weight);                \
+            }                                                                                      \
+        } else {                                                                                   \
+            veci weight[n];                                                                        \
+            EACH(j, n) weight[j] = load_pair(w + BYTES_AT(j, pair));                               \
+            EACH(i, rows)                                                                          \
+            {                                                                                      \
+                const veci s = splat_pair(x + (size_t)i * ldx);                                    \
+                EACH(j, n) into((rows) * (n) >= 4, acc[i][j], s, weight[j]);                       \
+            }                                                                                      \
+        }                                                                                          \
+        if (AHEAD && rows > 1) EACH(l, BYTES_OF(n, pair) / 64) __builtin_prefetch(ahead + 64 * l); \
+        ahead += BYTES_OF(n, pair);                                                                \
+        w += pair, x += 2;                                                                         \
+    } while (0)
+
+static const float no_mean[8 * VW] = {0};
+
+// acc[rows][n] to what sdm_panel_out asks for, from output o on
+#define BYTES_NUMBERS(rows, n)                                                                     \
+    {                                                                                              \
+        const size_t line = to->line, n_mean = to->n_mean;                                         \
+        const float *mean = n_mean ? to->mean + o : no_mean;                                       \
+        float *y = to->y + o / 4 * line;                                                           \
+        EACH(i, rows)                                                                              \
+        {                                                                                          \
+            const vec s = splat(scale[i]);                                                         \
+            if (i == rows - 1 && i > 0 && to->rest) break;                                         \
+            if ((size_t)i >= n_mean) mean = no_mean;                                               \
+            EACH(j, n)                                                                             \
+            {                                                                                      \
+                vec v =                                                                            \
+                    FMA(s, __builtin_convertvector((veci)acc[i][j], vec), load(mean + j * VW));    \
+                if (i == 0 && rows > 1 && to->rest)                                                \
+                    v = FMA(splat(scale[rows - 1]),                                                \
+                            __builtin_convertvector((veci)acc[rows - 1][j], vec), v);              \
+                store_rows(y + (size_t)(j * VW / 4) * line, line, v);                              \
+            }                                                                                      \
+            y += ld;                                                                               \
+            STEP(y)                                                                                \
+        }                                                                                          \
+    }
+#define BYTES_INTEGERS(rows, n)                                                                    \
+    {                                                                                              \
+        const vec most = splat((float)to->limit);                                                  \
+        const float *factor = to->factor + o;                                                      \
+        int16_t *q = to->integers + o;                                                             \
+        EACH(i, rows)                                                                              \
+        {                                                                                          \
+            const vec s = splat(scale[i]);                                                         \
+            EACH(j, n)                                                                             \
+            {                                                                                      \
+                const vec v = s * __builtin_convertvector((veci)acc[i][j], vec);                   \
+                store_shorts(q + j * VW, clip(v * load(factor + j * VW), most));                   \
+            }                                                                                      \
+            q += ld;                                                                               \
+            STEP(q)                                                                                \
+        }                                                                                          \
+    }
+
+// `rows` rows of x times `n` registers of outputs at a time, from output o on; where that ends
+#define BYTES_BLOCK(rows, n)                                                                       \
+    static size_t bytes_##rows##x##n(size_t o, size_t outputs, size_t wide, size_t narrow,         \
+                                     const int8_t *panels, const int16_t *inputs, size_t ldx,      \
+                                     const float *scale, const sdm_panel_out *to)                  \
+    {                                                                                              \
+        const size_t panel = wide * WIDE + narrow * NARROW, ld = to->ld;                           \
+        for (; o + n * VW <= outputs; o += n * VW) {                                               \
+            const int8_t *w = panels + o / SDM_PANEL * panel + o % SDM_PANEL * (WIDE / SDM_PANEL); \
+            const int8_t *ahead = panels + o / SDM_PANEL * panel + AHEAD;                          \
+            const int16_t *x = inputs;                                                             \
+            vecu acc[rows][n];                                                                     \
+            if (wide)                                                                              \
+                BYTES_PAIR(rows, n, SET, WIDE, load_wide);                                         \
+            else                                                                                   \
+                EACH(i, rows) EACH(j, n) acc[i][j] = (vecu){0};                                    \
+            for (size_t p = 1; p < wide; p++) BYTES_PAIR(rows, n, ADD, WIDE, load_wide);           \
+            w -= o % SDM_PANEL * ((WIDE - NARROW) / SDM_PANEL);                                    \
+            UNROLL(2)                                                                              \
+            for (size_t p = 0; p < narrow; p++) BYTES_PAIR(rows, n, ADD, NARROW, LOAD_PAIRS);      \
+            if (to->y)                                                                             \
+                BYTES_NUMBERS(rows, n)                                                             \
+            else                                                                                   \
+                BYTES_INTEGERS(rows, n)                                                            \
+        }                                                                                          \
+        return o;                                                                                  \
+    }
+
+#define BYTES_STEP(rows, n) o = bytes_##rows##x##n(o, outputs, wide, narrow, w, x, ldx, scale, to);
+
+// eight registers of 16 outputs would be eight panels, more places than the processor reads ahead
+// at a time
+#if VW < 16
+BYTES_BLOCK(1, 8)
+#define BYTES_EIGHT(rows) BYTES_STEP(rows, 8)
+#else
+#define BYTES_EIGHT(rows)
+#endif
+BYTES_BLOCK(1, 4)
+BYTES_BLOCK(1, 2)
+BYTES_BLOCK(1, 1)
+BYTES_BLOCK(2, 4)
+BYTES_BLOCK(2, 2)
+BYTES_BLOCK(2, 1)
+BYTES_BLOCK(3, 4)
+BYTES_BLOCK(3, 2)
+BYTES_BLOCK(3, 1)
+BYTES_BLOCK(4, 2)
+BYTES_BLOCK(4, 1)
+BYTES_BLOCK(5, 2)
+BYTES_BLOCK(5, 1)
+BYTES_BLOCK(6, 2)
+BYTES_BLOCK(6, 1)
+
+static void bytes_rows(size_t rows, size_t outputs, size_t wide, size_t narrow, const int8_t *w,
+                       const int16_t *x, size_t ldx, const float *scale, const sdm_panel_out *to)
+{
+    size_t o = 0;
+    switch (rows) {
+    case 1:
+        BYTES_EIGHT(1)
+        BYTES_STEP(1, 4)
+        BYTES_STEP(1, 2)
+        BYTES_STEP(1, 1)
+        break;
+    case 2:
+        BYTES_STEP(2, 4)
+        BYTES_STEP(2, 2)
+        BYTES_STEP(2, 1)
+        break;
+    case 3:
+        BYTES_STEP(3, 4)
+        BYTES_STEP(3, 2)
+        BYTES_STEP(3, 1)
+        break;
+    case 4:
+        BYTES_STEP(4, 2)
+        BYTES_STEP(4, 1)
+        break;
+    case 5:
+        BYTES_STEP(5, 2)
+        BYTES_STEP(5, 1)
+        break;
+    default:
+        BYTES_STEP(6, 2)
+        BYTES_STEP(6, 1)
+        break;
+    }
+}
+
+// outputs from row i and output o on
+static inline sdm_panel_out out_from(const sdm_panel_out *to, size_t i, size_t o)
+{
+    sdm_panel_out at = *to;
+    if (at.y) at.y += i * at.ld + o / 4 * at.line;
+    if (at.integers) at.integers += i * at.ld + o, at.factor += o;
+    if (at.mean) at.mean += o, at.n_mean = at.n_mean > i ? at.n_mean - i : 0;
+    return at;
+}
+
+// as panel_f32(): a few panels for all rows, then the next
+static void panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w,
+                     const int16_t *x, size_t ldx, const float *scale, const sdm_panel_out *to)
+{
+    const size_t wide = (n_wide + 1) / 2, narrow = (k + 1) / 2 - wide,
+                 panel = wide * WIDE + narrow * NARROW;
+    if (batch <= 6) {
+        bytes_rows(batch, outputs, wide, narrow, w, x, ldx, scale, to);
+        return;
+    }
+    const size_t some = 2 * VW > SDM_PANEL ? 2 * VW : SDM_PANEL;
+    for (size_t o = 0; o < outputs; o += some, w += some / SDM_PANEL * panel)
+        for (size_t i = 0; i < batch; i += 6) {
+            const sdm_panel_out at = out_from(to, i, o);
+            bytes_rows(batch - i < 6 ? batch - i : 6, outputs - o < some ? outputs - o : some, wide,
+                       narrow, w, x + i * ldx, ldx, scale + i, &at);
+        }
+}
+
+static void panel_i8_blocks(size_t batch, size_t n, const sdm_panel_block *b, const int8_t *w,
+                            const int16_t *x, size_t ldx, const float *scale,
+                            const sdm_panel_out *to)
+{
+    sdm_panel_out at = *to;
+    for (const sdm_panel_block *end = b + n; b < end; b++) {
+        const size_t wide = (b->n_wide + 1) / 2, narrow = (b->k + 1) / 2 - wide;
+        at.y = to->y + b->y;
+        if (at.mean) at.mean = to->mean + b->mean;
+        bytes_rows(batch, (b->outputs + SDM_PANEL - 1) / SDM_PANEL * SDM_PANEL, wide, narrow,
+                   w + b->weights, x + b->x, ldx, scale + b->scale, &at);
+    }
+}
+
+// x[2 * pairs] += the transpose of `pairs` pairs of n outputs, `pair` bytes each
+#define BACK_PAIRS(name, pair, load_pair)                                                          \
+    static void name(size_t n, size_t pairs, size_t panel, const int8_t *w, const float *y,        \
+                     float *x)                                                                     \
+    {                                                                                              \
+        for (size_t p = 0; p < pairs; p++, w += pair) {                                            \
+            vec a = {0}, b = {0};                                                                  \
+            for (size_t j = 0; j < n; j += VW) {                                                   \
+                const veci weight =                                                                \
+                    load_pair(w + j / SDM_PANEL * panel + j % SDM_PANEL * (pair / SDM_PANEL));     \
+                const vec at = load(y + j);                                                        \
+                a += __builtin_convertvector(first_of(weight), vec) * at;                          \
+                b += __builtin_convertvector(second_of(weight), vec) * at;                         \
+            }                                                                                      \
+            x[2 * p] += SUM_LANES(a);                                                              \
+            x[2 * p + 1] += SUM_LANES(b);                                                          \
+        }                                                                                          \
+    }
+BACK_PAIRS(back_wide, WIDE, load_wide)
+BACK_PAIRS(back_narrow, NARROW, LOAD_PAIRS)
+
+static void back_i8(size_t outputs, size_t n_wide, size_t k, const int8_t *w, const float *y,
+                    float *x)
+{
+    const size_t wide = (n_wide + 1) / 2, narrow = (k + 1) / 2 - wide,
+                 panel = wide * WIDE + narrow * NARROW;
+    memset(x, 0, 2 * (wide + narrow) * sizeof *x);
+    for (size_t o = 0; o < outputs; o += 4 * SDM_PANEL, w += 4 * panel) {
+        const size_t n = outputs - o < 4 * SDM_PANEL ? outputs - o : 4 * SDM_PANEL;
+        back_wide(n, wide, panel, w, y + o, x);
+        back_narrow(n, narrow, panel, w + wide * WIDE, y + o, x + 2 * wide);
+    }
+}
+
+static inline vec product_at(size_t i, const float *y, const float *factor)
+{
+    return factor ? load(y + i) * load(factor + i) : load(y + i);
+}
+
+#ifndef LARGER
+#define LARGER(a, b) (((a) & ((a) > (b))) | ((b) & ((a) <= (b))))
+#endif
+
+// magnitudes compared as integers: those of NaN and infinity are the largest
+static inline veci larger_magnitude(veci most, vec v)
+{
+    const veci bits = (veci)v & 0x7fffffff;
+    return LARGER(bits, most);
+}
+
+// n >= VW from here on; the last register ends where they do: some are done twice
+static inline float largest_of(size_t n, const float *y, const float *factor)
+{
+    const size_t last = n - VW;
+    veci most = larger_magnitude((veci){0}, product_at(last, y, factor));
+    UNROLL(4)
+    for (size_t i = 0; i < last; i += VW) most = larger_magnitude(most, product_at(i, y, factor));
+    int32_t bits = 0;
+    for (int j = 0; j < VW; j++) bits = most[j] > bits ? most[j] : bits;
+    float largest;
+    memcpy(&largest, &bits, sizeof largest);
+    return largest;
+}
+
+static inline void round_register(const float *y, const float *factor, float to_integer, size_t i,
+                                  int16_t *x)
+{
+    store_shorts(x + i, product_at(i, y, factor) * to_integer);
+}
+
+// returns the factor that gives them back
+static inline float round_row(size_t n, const float *y, const float *factor, float largest,
+                              int limit, int16_t *x)
+{
+    const float to_integer = (float)limit / largest;
+    if (!(to_integer > 0 &&
+          to_integer <= 3e38f)) { // not finite, or zero beside what a float can hold
+        memset(x, 0, n * sizeof *x);
+        return largest - largest;
+    }
+    const size_t last = n - VW;
+    UNROLL(4) for (size_t i = 0; i < last; i += VW) round_register(y, factor, to_integer, i, x);
+    round_register(y, factor, to_integer, last, x);
+    return largest / (float)limit;
+}
+
+// the largest of all rows first: a row then does not wait for its own
+static inline void quantise_by(size_t rows, size_t n, const float *y, size_t ldy,
+                               const float *factor, int limit, int16_t *x, size_t ldx, float *scale)
+{
+    for (size_t r = 0; r < rows; r++) scale[r] = largest_of(n, y + r * ldy, factor);
+    for (size_t r = 0; r < rows; r++)
+        scale[r] = round_row(n, y + r * ldy, factor, scale[r], limit, x + r * ldx);
+}
+
+static inline vec load_shorts(const int16_t *x)
+{
+    int16_t shorts __attribute__((vector_size(2 * VW)));
+    memcpy(&shorts, x, sizeof shorts);
+    return __builtin_convertvector(__builtin_convertvector(shorts, veci), vec);
+}
+
+static inline void rest_register(const float *y, const float *factor, float to_integer, int limit,
+                                 size_t i, const int16_t *x, int16_t *rest)
+{
+    store_shorts(rest + i,
+                 (product_at(i, y, factor) * to_integer - load_shorts(x + i)) * (float)limit);
+}
+
+// what round_row() left, a part of one of its integers: half of what integers may be
+static inline float round_rest(size_t n, const float *y, const float *factor, float largest,
+                               int limit, const int16_t *x, int16_t *rest)
+{
+    const float to_integer = (float)limit / largest;
+    if (!(to_integer > 0 && to_integer <= 3e38f)) {
+        memset(rest, 0, n * sizeof *rest);
+        return largest - largest;
+    }
+    const size_t last = n - VW;
+    UNROLL(4)
+    for (size_t i = 0; i < last; i += VW) rest_register(y, factor, to_integer, limit, i, x, rest);
+    rest_register(y, factor, to_integer, limit, last, x, rest);
+    return largest / (float)limit / (float)limit;
+}
+
+static void quantise_rest(size_t n, const float *y, const float *factor, int limit, int16_t *x,
+                          float *scale, int16_t *rest, float *rest_scale)
+{
+    if (n < VW) {
+        float some[VW] = {0};
+        int16_t integers[2][VW];
+        for (size_t i = 0; i < n; i++) some[i] = factor ? y[i] * factor[i] : y[i];
+        quantise_rest(VW, some, NULL, limit, integers[0], scale, integers[1], rest_scale);
+        memcpy(x, integers[0], n * sizeof *x);
+        memcpy(rest, integers[1], n * sizeof *rest);
+        return;
+    }
+    const float largest = largest_of(n, y, factor);
+    *scale = round_row(n, y, factor, largest, limit, x);
+    *rest_scale = round_rest(n, y, factor, largest, limit, x, rest);
+}
+
+static void quantise_few(size_t n, const float *y, const float *factor, int limit, int16_t *x,
+                         float *scale)
+{
+    float some[VW] = {0};
+    int16_t integers[VW];
+    for (size_t i = 0; i < n; i++) some[i] = factor ? y[i] * factor[i] : y[i];
+    quantise_by(1, VW, some, 0, NULL, limit, integers, 0, scale);
+    memcpy(x, integers, n * sizeof *x);
+}
+
+static void quantise(size_t rows, size_t n, const float *y, size_t ldy, const float *factor,
+                     int limit, int16_t *x, size_t ldx, float *scale)
+{
+    if (n < VW)
+        for (size_t r = 0; r < rows; r++)
+            quantise_few(n, y + r * ldy, factor, limit, x + r * ldx, scale + r);
+    else if (factor)
+        quantise_by(rows, n, y, ldy, factor, limit, x, ldx, scale);
+    else
+        quantise_by(rows, n, y, ldy, NULL, limit, x, ldx, scale);
+}

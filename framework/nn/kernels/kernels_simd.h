@@ -1,0 +1,285 @@
+/* The kernels, written once with the compiler's vector types and compiled once for each instruction
+   set. Before inclusion: TABLE (name of the kernel_table), ISA (text), VW (floats in a register),
+   MR (rows of the register tile). */
+#include <string.h>
+
+#include "kernels_table.h"
+#include "sdm/internal/kernels.h"
+
+#define NV 2 /* registers in a row of the register tile */
+#define NR (NV * VW)
+
+typedef float vec __attribute__((vector_size(4 * VW)));
+typedef float vec_u __attribute__((vector_size(4 * VW), aligned(4)));
+typedef int32_t veci __attribute__((vector_size(4 * VW)));
+typedef uint32_t vecu __attribute__((vector_size(4 * VW)));
+
+#define PRAGMA(text) _Pragma(#text)
+#if defined(__clang__)
+#define UNROLL(n) PRAGMA(clang loop unroll_count(n))
+#else
+#define UNROLL(n) PRAGMA(GCC unroll n)
+#endif
+
+static inline vec load(const float *p) { return *(const vec_u *)p; }
+static inline void store(float *p, vec v) { *(vec_u *)p = v; }
+static inline vec splat(float v) { return v - (vec){0}; }
+
+#ifndef SUM_LANES
+static inline float sum_lanes(vec v)
+{
+    float each[VW], total = 0;
+    store(each, v);
+    for (int j = 0; j < VW; j++) total += each[j];
+    return total;
+}
+#define SUM_LANES(v) sum_lanes(v)
+#endif
+
+static void micro(size_t k, const float *a, const float *b, float *c, size_t ldc, int add)
+{
+    vec acc[MR][NV];
+    for (int i = 0; i < MR; i++)
+        for (int j = 0; j < NV; j++)
+            acc[i][j] = add ? load(c + (size_t)i * ldc + j * VW) : (vec){0};
+    for (size_t p = 0; p < k; p++, a += MR, b += NR) {
+        vec row[NV];
+        for (int j = 0; j < NV; j++) row[j] = load(b + j * VW);
+        for (int i = 0; i < MR; i++) {
+            const vec s = splat(a[i]);
+            for (int j = 0; j < NV; j++) acc[i][j] += s * row[j];
+        }
+    }
+    for (int i = 0; i < MR; i++)
+        for (int j = 0; j < NV; j++) store(c + (size_t)i * ldc + j * VW, acc[i][j]);
+}
+
+#ifndef LOAD_HALF
+typedef uint16_t vech __attribute__((vector_size(2 * VW)));
+
+// exact for every half: the exponent is moved by a multiplication, which also makes subnormals
+// right
+static inline vec load_half(const uint16_t *p)
+{
+    vech packed;
+    memcpy(&packed, p, sizeof packed);
+    const vecu h = __builtin_convertvector(packed, vecu);
+    const vecu sign = (h & 0x8000u) << 16, body = (h & 0x7fffu) << 13;
+    vec v;
+    memcpy(&v, &body, sizeof v);
+    v *= 0x1p112f;
+    vecu bits;
+    memcpy(&bits, &v, sizeof v);
+    // an exponent of all ones stays one: infinity and NaN
+    bits |= (vecu)((h & 0x7c00u) == 0x7c00u) & 0x7f800000u;
+    bits |= sign;
+    memcpy(&v, &bits, sizeof v);
+    return v;
+}
+#endif
+
+// where register j of the outputs has its weights, in elements from panel o / 16 on
+#define PANEL_AT(j) ((size_t)((j)*VW / SDM_PANEL) * SDM_PANEL * k + (size_t)((j)*VW % SDM_PANEL))
+
+// `rows` rows of x times `n` registers of outputs
+#define PANEL_BLOCK(type, suffix, load_weights, rows, n)                                           \
+    static void block_##suffix##_##rows##x##n(size_t k, const type *w, const float *x, size_t ldx, \
+                                              float *y, size_t ldy)                                \
+    {                                                                                              \
+        vec acc[rows][n];                                                                          \
+        for (int i = 0; i < rows; i++)                                                             \
+            for (int j = 0; j < n; j++) acc[i][j] = (vec){0};                                      \
+        for (size_t p = 0; p < k; p++, w += SDM_PANEL) {                                           \
+            vec weight[n];                                                                         \
+            for (int j = 0; j < n; j++) weight[j] = load_weights(w + PANEL_AT(j));                 \
+            for (int i = 0; i < rows; i++) {                                                       \
+                const vec s = splat(x[(size_t)i * ldx + p]);                                       \
+                for (int j = 0; j < n; j++) acc[i][j] += s * weight[j];                            \
+            }                                                                                      \
+        }                                                                                          \
+        for (int i = 0; i < rows; i++)                                                             \
+            for (int j = 0; j < n; j++) store(y + (size_t)i * ldy + (size_t)(j * VW), acc[i][j]);  \
+    }
+
+// as many registers at a time as keep the multipliers busy and the sums in registers
+#define PANEL_STEP(suffix, rows, n)                                                                \
+    for (; o + n * VW <= outputs; o += n * VW)                                                     \
+        block_##suffix##_##rows##x##n(k, w + o / SDM_PANEL * SDM_PANEL * k + o % SDM_PANEL, x,     \
+                                      ldx, y + o, ldy);
+
+#define PANEL(type, suffix, load_weights)                                                          \
+    PANEL_BLOCK(type, suffix, load_weights, 1, 8)                                                  \
+    PANEL_BLOCK(type, suffix, load_weights, 1, 4)                                                  \
+    PANEL_BLOCK(type, suffix, load_weights, 1, 2)                                                  \
+    PANEL_BLOCK(type, suffix, load_weights, 1, 1)                                                  \
+    PANEL_BLOCK(type, suffix, load_weights, 2, 4)                                                  \
+    PANEL_BLOCK(type, suffix, load_weights, 2, 2)                                                  \
+    PANEL_BLOCK(type, suffix, load_weights, 2, 1)                                                  \
+    PANEL_BLOCK(type, suffix, load_weights, 3, 4)                                                  \
+    PANEL_BLOCK(type, suffix, load_weights, 3, 2)                                                  \
+    PANEL_BLOCK(type, suffix, load_weights, 3, 1)                                                  \
+    PANEL_BLOCK(type, suffix, load_weights, 4, 2)                                                  \
+    PANEL_BLOCK(type, suffix, load_weights, 4, 1)                                                  \
+    PANEL_BLOCK(type, suffix, load_weights, 5, 2)                                                  \
+    PANEL_BLOCK(type, suffix, load_weights, 5, 1)                                                  \
+    PANEL_BLOCK(type, suffix, load_weights, 6, 2)                                                  \
+    PANEL_BLOCK(type, suffix, load_weights, 6, 1)                                                  \
+    static void rows_##suffix(size_t rows, size_t outputs, size_t k, const type *w,                \
+                              const float *x, size_t ldx, float *y, size_t ldy)                    \
+    {                                                                                              \
+        size_t o = 0;                                                                              \
+        switch (rows) {                                                                            \
+        case 1:                                                                                    \
+            PANEL_STEP(suffix, 1, 8)                                                               \
+            PANEL_STEP(suffix, 1, 4)                                                               \
+            PANEL_STEP(suffix, 1, 2)                                                               \
+            PANEL_STEP(suffix, 1, 1)                                                               \
+            break;                                                                                 \
+        case 2:                                                                                    \
+            PANEL_STEP(suffix, 2, 4)                                                               \
+            PANEL_STEP(suffix, 2, 2)                                                               \
+            PANEL_STEP(suffix, 2, 1)                                                               \
+            break;                                                                                 \
+        case 3:                                                                                    \
+            PANEL_STEP(suffix, 3, 4)                                                               \
+            PANEL_STEP(suffix, 3, 2)                                                               \
+            PANEL_STEP(suffix, 3, 1)                                                               \
+            break;                                                                                 \
+        case 4:                                                                                    \
+            PANEL_STEP(suffix, 4, 2)                                                               \
+            PANEL_STEP(suffix, 4, 1)                                                               \
+            break;                                                                                 \
+        case 5:                                                                                    \
+            PANEL_STEP(suffix, 5, 2)                                                               \
+            PANEL_STEP(suffix, 5, 1)                                                               \
+            break;                                                                                 \
+        default:                                                                                   \
+            PANEL_STEP(suffix, 6, 2)                                                               \
+            PANEL_STEP(suffix, 6, 1)                                                               \
+            break;                                                                                 \
+        }                                                                                          \
+    }                                                                                              \
+                                                                                                   \
+    /* a few panels for all rows, then the next: they stay in the first-level cache */             \
+    static void panel_##suffix(size_t batch, size_t outputs, size_t k, const type *w,              \
+                               const float *x, size_t ldx, float *y, size_t ldy)                   \
+    {                                                                                              \
+        if (batch <= 6) {                                                                          \
+            rows_##suffix(batch, outputs, k, w, x, ldx, y, ldy);                                   \
+            return;                                                                                \
+        }                                                                                          \
+        const size_t some = 2 * VW > SDM_PANEL ? 2 * VW : SDM_PANEL;                               \
+        for (size_t o = 0; o < outputs; o += some, w += some * k)                                  \
+            for (size_t i = 0; i < batch; i += 6)                                                  \
+                rows_##suffix(batch - i < 6 ? batch - i : 6,                                       \
+                              outputs - o < some ? outputs - o : some, k, w, x + i * ldx, ldx,     \
+                              y + i * ldy + o, ldy);                                               \
+    }                                                                                              \
+                                                                                                   \
+    static void back_##suffix(size_t outputs, size_t k, const type *w, const float *y, float *x)   \
+    {                                                                                              \
+        memset(x, 0, k * sizeof *x);                                                               \
+        /* four panels at a time: the sum over the lanes is what costs */                          \
+        for (size_t o = 0; o < outputs; o += 4 * SDM_PANEL, w += 4 * SDM_PANEL * k) {              \
+            const size_t n = outputs - o < 4 * SDM_PANEL ? outputs - o : 4 * SDM_PANEL;            \
+            for (size_t p = 0; p < k; p++) {                                                       \
+                vec sum = {0};                                                                     \
+                for (size_t j = 0; j < n; j += VW)                                                 \
+                    sum += load_weights(w + j / SDM_PANEL * SDM_PANEL * k + p * SDM_PANEL +        \
+                                        j % SDM_PANEL) *                                           \
+                           load(y + o + j);                                                        \
+                x[p] += SUM_LANES(sum);                                                            \
+            }                                                                                      \
+        }                                                                                          \
+    }
+PANEL(float, f32, load)
+PANEL(uint16_t, f16, load_half)
+
+#include "kernels_bytes.h"
+
+// exp by 2^n times a polynomial of degree 6 on [-ln 2 / 2, ln 2 / 2] (coefficients: Taylor,
+// adjusted by the Cephes library's expf)
+static inline vec exp_vec(vec x)
+{
+    const vec lo = splat(-87.0f), hi = splat(88.0f);
+    const veci below = x<lo, above = x> hi;
+    vecu bits, b2;
+    memcpy(&bits, &x, sizeof x);
+    memcpy(&b2, &lo, sizeof lo);
+    bits = (bits & ~(vecu)below) | (b2 & (vecu)below);
+    memcpy(&b2, &hi, sizeof hi);
+    bits = (bits & ~(vecu)above) | (b2 & (vecu)above);
+    memcpy(&x, &bits, sizeof x);
+    const vec shifted = x * 1.44269504088896341f + 12582912.0f,
+              n = shifted - 12582912.0f; // round to the nearest integer
+    const vec r = (x - n * 0.693359375f) + n * 2.12194440e-4f;
+    vec p = splat(1.9875691500e-4f);
+    p = p * r + 1.3981999507e-3f;
+    p = p * r + 8.3334519073e-3f;
+    p = p * r + 4.1665795894e-2f;
+    p = p * r + 1.6666665459e-1f;
+    p = p * r + 5.0000001201e-1f;
+    p = p * r * r + r + 1.0f;
+    memcpy(&bits, &shifted, sizeof shifted);
+    const vecu scale = ((bits & 0x3ffu) + 127u)
+                       << 23; // low bits of `shifted` hold n in two's complement
+    vec s;
+    memcpy(&s, &scale, sizeof s);
+    return p * s;
+}
+
+static void exp_all(size_t n, const float *x, float *y)
+{
+    size_t i = 0;
+    for (; i + VW <= n; i += VW) store(y + i, exp_vec(load(x + i)));
+    if (i == n) return;
+    float rest[VW] = {0};
+    memcpy(rest, x + i, (n - i) * sizeof *x);
+    store(rest, exp_vec(load(rest)));
+    memcpy(y + i, rest, (n - i) * sizeof *x);
+}
+
+#ifdef STREAM
+// a quarter of a cache line at a time where it is not filled: an ordinary store would read it first
+static inline void put_past(size_t n, const float *y, float *to)
+{
+    size_t i = -(uintptr_t)to / sizeof *to % 4;
+    if (n < i) i = n;
+    memcpy(to, y, i * sizeof *to);
+    for (; i + 4 <= n && (uintptr_t)(to + i) % (4 * VW); i += 4)
+        _mm_stream_ps(to + i, _mm_loadu_ps(y + i));
+    for (; i + 4 * VW <= n; i += 4 * VW) EACH(j, 4) STREAM(to + i + j * VW, load(y + i + j * VW));
+    for (; i + VW <= n; i += VW) STREAM(to + i, load(y + i));
+    for (; i + 4 <= n; i += 4) _mm_stream_ps(to + i, _mm_loadu_ps(y + i));
+    memcpy(to + i, y + i, (n - i) * sizeof *to);
+}
+#endif
+
+static void put(size_t n, const float *y, float *to, bool stream)
+{
+#ifdef STREAM
+    if (stream) {
+        put_past(n, y, to);
+        return;
+    }
+#else
+    (void)stream;
+#endif
+    memcpy(to, y, n * sizeof *to);
+}
+
+const kernel_table TABLE = {.name = ISA,
+                            .mr = MR,
+                            .nr = NR,
+                            .micro = micro,
+                            .panel_f32 = panel_f32,
+                            .panel_f16 = panel_f16,
+                            .back_f32 = back_f32,
+                            .back_f16 = back_f16,
+                            .panel_i8 = panel_i8,
+                            .panel_i8_blocks = panel_i8_blocks,
+                            .back_i8 = back_i8,
+                            .quantise = quantise,
+                            .quantise_rest = quantise_rest,
+                            .put = put,
+                            .exp = exp_all};

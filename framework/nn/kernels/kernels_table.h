@@ -1,0 +1,45 @@
+/* What each instruction set provides; filled by kernels_*.c from one source, kernels_simd.h. */
+#ifndef SDM_KERNELS_TABLE_H
+#define SDM_KERNELS_TABLE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "sdm/internal/kernels.h"
+
+typedef struct kernel_table {
+    const char *name;
+    size_t mr, nr; /* rows and columns of the register tile of the matrix product */
+    /* c[mr][ldc] (+)= a[k][mr] * b[k][nr], packed */
+    void (*micro)(size_t k, const float *a, const float *b, float *c, size_t ldc, int add);
+    /* sdm_panel_*() and sdm_panel_back_*(); outputs: a multiple of 16 */
+    void (*panel_f32)(size_t batch, size_t outputs, size_t k, const float *w, const float *x,
+                      size_t ldx, float *y, size_t ldy);
+    void (*panel_f16)(size_t batch, size_t outputs, size_t k, const uint16_t *w, const float *x,
+                      size_t ldx, float *y, size_t ldy);
+    void (*back_f32)(size_t outputs, size_t k, const float *w, const float *y, float *x);
+    void (*back_f16)(size_t outputs, size_t k, const uint16_t *w, const float *y, float *x);
+    /* sdm_panel_i8(), sdm_panel_back_i8(), sdm_quantise() and sdm_quantise_rest(); outputs: a
+     * multiple of 16 */
+    void (*panel_i8)(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w,
+                     const int16_t *x, size_t ldx, const float *scale, const sdm_panel_out *to);
+    void (*panel_i8_blocks)(size_t batch, size_t n, const sdm_panel_block *blocks, const int8_t *w,
+                            const int16_t *x, size_t ldx, const float *scale,
+                            const sdm_panel_out *to);
+    void (*back_i8)(size_t outputs, size_t n_wide, size_t k, const int8_t *w, const float *y,
+                    float *x);
+    void (*quantise)(size_t rows, size_t n, const float *y, size_t ldy, const float *factor,
+                     int limit, int16_t *x, size_t ldx, float *scale);
+    void (*quantise_rest)(size_t n, const float *y, const float *factor, int limit, int16_t *x,
+                          float *scale, int16_t *rest, float *rest_scale);
+    void (*put)(size_t n, const float *y, float *to, bool stream);
+    void (*exp)(size_t n, const float *x, float *y);
+} kernel_table;
+
+extern const kernel_table sdm_kernels_generic;
+#if defined(__x86_64__)
+extern const kernel_table sdm_kernels_avx2, sdm_kernels_avx512, sdm_kernels_avx512vnni;
+#endif
+
+#endif

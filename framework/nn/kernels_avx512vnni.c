@@ -1,5 +1,0 @@
-/* Kernels for AVX-512 with VNNI, which multiplies integers and adds the products in one instruction. */
-#define TABLE sdm_kernels_avx512vnni
-#define ISA "avx512vnni"
-#define ADD_MADD(sum, a, b) ((vecu)_mm512_dpwssd_epi32((__m512i)(sum), (__m512i)(a), (__m512i)(b)))
-#include "kernels_avx512.c"

@@ -1,0 +1,87 @@
+/* The transpose of the decoder of a pod network: from a map to latent variables. A slab at a time,
+   as in pod_decode.c. Letters as in sdm/pod.h. */
+#include <string.h>
+
+#include "pod_space.h"
+
+typedef struct job {
+    const pod_network *m;
+    const sdm_grid *grid;
+    const pod_slab *slab;
+    space s;
+} job;
+
+// x[rank] = gradient at the coefficients of block b, from y at its outputs; y is read beside the
+// last, times zero
+static void block_back(const pod_network *m, size_t b, size_t level, const float *y, float *sorted,
+                       float *x)
+{
+    const sdm_pod_block *k = &m->blocks[b];
+    if (!sdm_pod_is_bytes(m)) {
+        sdm_pod_product_back(m->type, m->outputs[b], k->rank, m->basis, m->weights_at[b], y, x);
+        return;
+    }
+    const float *factor = m->factor + m->coefficients_at[level] + k->coefficient;
+    sdm_panel_back_i8(m->outputs[b], m->wide[b], k->rank,
+                      (const int8_t *)m->basis + m->weights_at[b], y, sorted);
+    for (size_t i = 0; i < k->rank; i++) x[i] = factor[i] * sorted[i];
+}
+
+static void back_leaves(const job *j, const float *adjoint, float *sorted)
+{
+    const pod_network *m = j->m;
+    const size_t line = (size_t)j->grid->n[0], plane = line * (size_t)j->grid->n[1];
+    float *y = j->s.y[0];
+    for (size_t i = j->slab->leaf; i < j->slab->leaf_end; i++) {
+        const size_t b = m->leaves[i].block;
+        const sdm_pod_block *k = &m->blocks[b];
+        const float *from = adjoint + sdm_pod_first_voxel(j->grid, k);
+        float *to = y;
+        for (size_t z = 0; z < k->size[2]; z++, from += plane)
+            for (size_t v = 0; v < k->size[1]; v++, to += k->size[0])
+                memcpy(to, from + v * line, k->size[0] * sizeof *to);
+        memset(to, 0, (sdm_panel_outputs(m->outputs[b]) - m->outputs[b]) * sizeof *to);
+        block_back(m, b, 0, y, sorted, j->s.back + (k->coefficient - j->slab->coefficient));
+    }
+    memset(j->s.back + j->slab->n_coefficients, 0, SDM_PANEL * sizeof *j->s.back);
+}
+
+// x[rank] = gradient at the coefficients of block b of `level`
+static void back_upper(const job *j, size_t b, size_t level, float *sorted, float *x)
+{
+    const pod_network *m = j->m;
+    const sdm_pod_block *k = &m->blocks[b];
+    if (level == 0) {
+        memcpy(x, j->s.back + (k->coefficient - j->slab->coefficient), k->rank * sizeof *x);
+        return;
+    }
+    const uint32_t first = m->blocks[k->child].coefficient;
+    float *y = j->s.y[level];
+    for (size_t i = k->child; i < k->child + k->n_children; i++)
+        back_upper(j, i, level - 1, sorted, y + (m->blocks[i].coefficient - first));
+    memset(y + m->outputs[b], 0, (sdm_panel_outputs(m->outputs[b]) - m->outputs[b]) * sizeof *y);
+    block_back(m, b, level, y, sorted, x);
+}
+
+void sdm_pod_decode_back(const pod_network *m, const sdm_grid *grid, const float *adjoint,
+                         const pod_space *w, float *dz)
+{
+    const size_t coefficients = m->arch.n_coefficients, latent = m->arch.n_latent,
+                 n = m->arch.levels.n;
+    job j = {.m = m, .grid = grid};
+    sdm_pod_carve_thread(m, 1, w->threads, &j.s);
+    for (size_t i = 0; i < m->n_slabs; i++) {
+        j.slab = &m->slabs[i];
+        back_leaves(&j, adjoint, w->sorted);
+        for (size_t b = j.slab->top; b < j.slab->top_end; b++)
+            back_upper(&j, b, n - 1, w->sorted, w->c + m->blocks[b].coefficient);
+    }
+    memset(w->c + coefficients, 0, (sdm_panel_outputs(coefficients) - coefficients) * sizeof *w->c);
+    if (!sdm_pod_is_bytes(m)) {
+        sdm_pod_product_back(m->type, coefficients, latent, m->head, 0, w->c, dz);
+        return;
+    }
+    sdm_panel_back_i8(coefficients, sdm_pod_head_wide(m), latent, m->head, w->c, w->sorted);
+    for (size_t i = 0; i < latent; i++)
+        dz[m->order[i]] = m->factor[m->coefficients_at[n] + i] * w->sorted[i];
+}

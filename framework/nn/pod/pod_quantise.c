@@ -1,0 +1,355 @@
+/* Weights as bytes. How large coefficients become is seen at random parameters; from that follows
+   what the rounding of a column does to the map, and which columns need two bytes. Letters as in
+   sdm/pod.h. */
+#include "pod_quantise.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+#include "pod_survey.h"
+#include "sdm/internal/kernels.h"
+#include "sdm/memory.h"
+
+enum {
+    FINE = 127,
+    FINER = 2
+}; // largest integer of a byte; how much finer than the columns of a byte those of two are
+enum { MLP_FINE = 2047 }; // largest integer of the MLP
+
+// how much larger than in the survey coefficients may become before they are clipped
+#define ROOM 2
+
+// mean square error of the map that rounding may add, of the variance of the maps: small beside
+// what the most accurate networks leave
+#define TOLERATED 5e-7
+
+// largest magnitude in a column, rows scaled; NaN when one is not finite
+static double column_unit(const matrix *m, size_t i)
+{
+    double most = 0;
+    for (size_t o = 0; o < m->outputs; o++) {
+        const double w = fabs(weight(m, o, i)) / row_scale(m, o);
+        if (!isfinite(w)) return NAN;
+        most = fmax(most, w);
+    }
+    return most > 0 ? most : 1;
+}
+
+// what an error of 1 of the scale of each row does to the map
+static double gain_of_rows(const matrix *m)
+{
+    double sum = 0;
+    if (!m->out) return (double)m->outputs;
+    for (size_t o = 0; o < m->outputs; o++)
+        sum += m->out[o].scale * m->out[o].scale * m->out[o].gain;
+    return sum;
+}
+
+static double column_gain(const matrix *m, size_t i)
+{
+    double sum = 0;
+    for (size_t o = 0; o < m->outputs; o++)
+        sum += weight(m, o, i) * weight(m, o, i) * row_gain(m, o);
+    return sum;
+}
+
+// columns to at most 1, then rows, then columns again; the figures of the matrices below are known
+static void find_scales(const matrix *m, size_t n_voxels)
+{
+    for (size_t o = 0; o < m->outputs && m->out; o++) m->out[o].scale = 1;
+    for (size_t i = 0; i < m->k; i++) m->in[i].unit = column_unit(m, i);
+    for (size_t o = 0; o < m->outputs && m->out; o++) {
+        double most = 0;
+        for (size_t i = 0; i < m->k; i++) {
+            const double w = fabs(weight(m, o, i)) / m->in[i].unit;
+            if (w > most) most = w; // not fmax(): GCC 12 for arm64 fails on it here
+        }
+        m->out[o].scale = most > 0 ? most : 1;
+    }
+    const double rows = gain_of_rows(m);
+    for (size_t i = 0; i < m->k; i++) {
+        m->in[i].gain = column_gain(m, i);
+        m->in[i].unit = column_unit(m, i);
+        const double step = m->in[i].unit / FINE;
+        m->in[i].error = m->in[i].square * step * step / 12 * rows / (double)n_voxels;
+    }
+}
+
+// blocks of a level whose inputs are rounded together: one of the highest, else the children of one
+// above
+typedef struct group {
+    size_t level, first, end;
+} group;
+
+static size_t n_groups(const survey *s, size_t level)
+{
+    const sdm_pod_levels *l = &s->spec->arch.levels;
+    return level + 1 < l->n ? l->first[level + 2] - l->first[level + 1]
+                            : l->first[level + 1] - l->first[level];
+}
+
+static group group_at(const survey *s, size_t level, size_t i)
+{
+    const sdm_pod_levels *l = &s->spec->arch.levels;
+    if (level + 1 == l->n) return (group){level, l->first[level] + i, l->first[level] + i + 1};
+    const sdm_pod_block *parent = &s->spec->blocks[l->first[level + 1] + i];
+    return (group){level, parent->child, parent->child + parent->n_children};
+}
+
+// the first columns, in pairs as they are stored, that have an error above `worth` for a byte more
+static size_t wide_columns(const matrix *m, double worth)
+{
+    const double bytes = 2 * (double)sdm_panel_outputs(m->outputs);
+    size_t n = m->k;
+    while (n) {
+        const size_t first = (n - 1) / 2 * 2;
+        const double error = m->in[first].error + (n - first > 1 ? m->in[n - 1].error : 0);
+        if (error > worth * bytes) break;
+        n = first;
+    }
+    return n;
+}
+
+typedef struct ranked {
+    double error;
+    uint32_t column;
+} ranked;
+
+static int by_error(const void *a, const void *b)
+{
+    const ranked *x = a, *y = b;
+    if (x->error != y->error) return x->error > y->error ? -1 : 1;
+    return x->column < y->column ? -1 : 1;
+}
+
+// error left in a group when columns worth their byte have two (find_steps())
+static double choose_in_group(const survey *s, group g, double worth, uint32_t *wide)
+{
+    double left = 0, most = 0;
+    size_t n = 0;
+    for (size_t b = g.first; b < g.end; b++) {
+        const matrix m = sdm_pod_block_matrix(s, b, g.level);
+        wide[b] = (uint32_t)wide_columns(&m, worth);
+        n += wide[b];
+        for (size_t i = wide[b]; i < m.k; i++)
+            left += m.in[i].error, most = fmax(most, m.in[i].error);
+    }
+    return left + (double)n * most / (FINER * FINER);
+}
+
+// the same in all; numbers of wide columns to wide[blocks + 1]; head: its columns by error
+static double choose(const survey *s, const ranked *head, double worth, uint32_t *wide)
+{
+    const size_t latent = s->spec->arch.n_latent,
+                 padded = sdm_panel_outputs(s->spec->arch.n_coefficients);
+    double left = 0;
+    size_t n = 0;
+    while (n < latent && head[n].error > worth * (double)padded) n++;
+    n = n < latent ? sdm_panel_even(n) : n;
+    wide[n_blocks(s)] = (uint32_t)n;
+    if (n < latent) left += (double)n * head[n].error / (FINER * FINER);
+    for (; n < latent; n++) left += head[n].error;
+    for (size_t l = 0; l < s->spec->arch.levels.n; l++)
+        for (size_t i = 0; i < n_groups(s, l); i++)
+            left += choose_in_group(s, group_at(s, l, i), worth, wide);
+    return left;
+}
+
+// the largest worth with which the error is tolerable
+static sdm_status choose_wide(const survey *s, pod_integers *q, sdm_error *err)
+{
+    const size_t latent = s->spec->arch.n_latent, c = s->coefficients_at[s->spec->arch.levels.n];
+    ranked *head = NULL;
+    const sdm_status status = SDM_ALLOC(&head, latent, "weights as bytes", err);
+    if (status) return status;
+    double most = 0;
+    for (size_t i = 0; i < c + latent; i++) most = fmax(most, s->figures[i].error);
+    for (size_t i = 0; i < latent; i++) head[i] = (ranked){s->figures[c + i].error, (uint32_t)i};
+    qsort(head, latent, sizeof *head, by_error);
+    double low = -100, high = 0; // binary logarithms of worth / most
+    while (high - low > 0.01) {
+        const double middle = 0.5 * (low + high);
+        if (choose(s, head, most * exp2(middle), q->wide) <= TOLERATED * s->variance)
+            low = middle;
+        else
+            high = middle;
+    }
+    choose(s, head, most * exp2(low), q->wide);
+    for (size_t i = 0; i < latent; i++) q->order[i] = head[i].column;
+    sdm_free(head);
+    return SDM_OK;
+}
+
+/* Integers. */
+
+// largest input of a column of one byte, in units of the steps; order[i] (NULL: i) of the columns
+static double largest_input(const matrix *m, const uint32_t *order, size_t n_wide)
+{
+    double most = 0;
+    for (size_t i = n_wide; i < m->k; i++) {
+        const figures *f = &m->in[order ? order[i] : i];
+        most = fmax(most, sqrt(f->square) * f->unit);
+    }
+    return most;
+}
+
+/* Steps of the columns, of which the first n_wide have two bytes. Those are as fine as their inputs
+   deserve beside `most`, the largest of the others with which they are rounded, and no finer: the
+   smaller the step, the coarser the input. */
+static void find_steps(const matrix *m, const uint32_t *order, size_t n_wide, double most)
+{
+    for (size_t i = 0; i < m->k; i++) {
+        figures *f = &m->in[order ? order[i] : i];
+        const double share = most > 0 ? sqrt(f->square) * f->unit / most : INFINITY;
+        f->step =
+            f->unit / (i < n_wide ? fmin(fmax(FINER * FINE * share, 2 * FINE), SDM_WIDE) : FINE);
+    }
+}
+
+// to[outputs][k]
+static void round_matrix(const matrix *m, const uint32_t *order, int16_t *to)
+{
+    for (size_t o = 0; o < m->outputs; o++)
+        for (size_t i = 0; i < m->k; i++) {
+            const size_t column = order ? order[i] : i;
+            const double v = weight(m, o, column) / (m->in[column].step * row_scale(m, o));
+            *to++ = (int16_t)(isfinite(v) ? lrint(v) : 0);
+        }
+}
+
+static void lower(uint32_t *limit, const matrix *m, const int16_t *w)
+{
+    const uint32_t here = (uint32_t)sdm_panel_i8_limit(m->outputs, m->k, w);
+    if (here < *limit) *limit = here;
+}
+
+static void round_block(const survey *s, size_t b, size_t level, double most, pod_integers *q)
+{
+    const matrix m = sdm_pod_block_matrix(s, b, level);
+    int16_t *basis = q->basis + s->basis_at[b];
+    float *factor = q->factor + s->coefficients_at[level] + s->spec->blocks[b].coefficient;
+    find_steps(&m, NULL, q->wide[b], most);
+    round_matrix(&m, NULL, basis);
+    lower(&q->limit[level], &m, basis);
+    for (size_t i = 0; i < m.k; i++) factor[i] = (float)(m.in[i].scale * m.in[i].step);
+}
+
+static void round_all(const survey *s, pod_integers *q)
+{
+    const sdm_pod_arch *a = &s->spec->arch;
+    const size_t of_head = q->wide[n_blocks(s)];
+    const matrix head = sdm_pod_head_matrix(s);
+    for (size_t l = 0; l <= SDM_POD_MAX_LEVELS; l++) q->limit[l] = INT16_MAX;
+    find_steps(&head, q->order, of_head, largest_input(&head, q->order, of_head));
+    round_matrix(&head, q->order, q->head);
+    lower(&q->limit[a->levels.n], &head, q->head);
+    for (size_t i = 0; i < a->n_latent; i++)
+        q->factor[s->coefficients_at[a->levels.n] + i] = (float)head.in[q->order[i]].step;
+    for (size_t l = 0; l < a->levels.n; l++)
+        for (size_t i = 0; i < n_groups(s, l); i++) {
+            const group g = group_at(s, l, i);
+            double most = 0;
+            for (size_t b = g.first; b < g.end; b++) {
+                const matrix m = sdm_pod_block_matrix(s, b, l);
+                most = fmax(most, largest_input(&m, NULL, q->wide[b]));
+            }
+            for (size_t b = g.first; b < g.end; b++) round_block(s, b, l, most, q);
+        }
+}
+
+// what goes into the blocks of a group in the maps of the survey uses a part of the integers:
+// others may be larger by ROOM
+static void find_quanta(const survey *s, pod_integers *q)
+{
+    for (size_t l = 0; l < s->spec->arch.levels.n; l++)
+        for (size_t i = 0; i < n_groups(s, l); i++) {
+            const group g = group_at(s, l, i);
+            double most = 0;
+            for (size_t b = g.first; b < g.end; b++) {
+                const matrix m = sdm_pod_block_matrix(s, b, l);
+                for (size_t c = 0; c < m.k; c++)
+                    most = larger(most, m.in[c].largest * m.in[c].step);
+            }
+            for (size_t b = g.first; b < g.end; b++)
+                q->quantum[b] = (float)(ROOM * most / q->limit[l]);
+        }
+}
+
+// the MLP is small: all its weights have two bytes, of which they use 12 bits so that inputs may
+// use 13
+static void round_mlp(const sdm_pod_spec *spec, pod_integers *q)
+{
+    const sdm_pod_arch *a = &spec->arch;
+    int16_t *to = q->mlp;
+    for (size_t l = 0; l < a->depth; l++) {
+        const size_t k = sdm_pod_layer_inputs(a, l);
+        for (size_t o = 0; o < a->width; o++) {
+            const float *w = spec->weights.layer[l] + o * k;
+            double most = 0;
+            for (size_t i = 0; i < k; i++) most = larger(most, fabs((double)w[i]));
+            q->layer_scale[l * a->width + o] = (float)(most / MLP_FINE);
+            for (size_t i = 0; i < k; i++)
+                to[o * k + i] =
+                    (int16_t)(isfinite(w[i] / most) ? lrint(w[i] / most * MLP_FINE) : 0);
+        }
+        q->layer_limit[l] = (uint32_t)sdm_panel_i8_limit(a->width, k, to);
+        to += a->width * k;
+    }
+}
+
+static sdm_status allocate(const survey *s, pod_integers *q, sdm_error *err)
+{
+    const sdm_pod_arch *a = &s->spec->arch;
+    sdm_status status = SDM_ALLOC(&q->wide, n_blocks(s) + 1, "weights as bytes", err);
+    if (!status) status = SDM_ALLOC(&q->order, a->n_latent, "weights as bytes", err);
+    if (!status)
+        status = SDM_ALLOC(&q->factor, s->coefficients_at[a->levels.n] + a->n_latent,
+                           "weights as bytes", err);
+    size_t mlp = 0;
+    for (size_t l = 0; l < a->depth; l++) mlp += a->width * sdm_pod_layer_inputs(a, l);
+    if (!status) status = SDM_ALLOC(&q->mlp, mlp, "weights as bytes", err);
+    if (!status) status = SDM_ALLOC(&q->layer_scale, a->depth * a->width, "weights as bytes", err);
+    if (!status) status = SDM_ALLOC(&q->quantum, n_blocks(s), "weights as bytes", err);
+    if (!status)
+        status = SDM_ALLOC(&q->head, a->n_coefficients * a->n_latent, "weights as bytes", err);
+    if (!status) status = SDM_ALLOC(&q->basis, s->basis_at[n_blocks(s)], "weights as bytes", err);
+    return status;
+}
+
+sdm_status sdm_pod_quantise(const sdm_pod_spec *spec, pod_integers *out, sdm_error *err)
+{
+    const sdm_pod_arch *a = &spec->arch;
+    survey s;
+    *out = (pod_integers){0};
+    sdm_status status = sdm_pod_survey(spec, &s, err);
+    if (!status) status = allocate(&s, out, err);
+    if (!status) {
+        for (size_t l = 0; l < a->levels.n; l++)
+            for (size_t b = a->levels.first[l]; b < a->levels.first[l + 1]; b++) {
+                const matrix m = sdm_pod_block_matrix(&s, b, l);
+                find_scales(&m, a->n_voxels);
+            }
+        const matrix head = sdm_pod_head_matrix(&s);
+        find_scales(&head, a->n_voxels);
+        status = choose_wide(&s, out, err);
+    }
+    if (!status) round_all(&s, out);
+    if (!status) find_quanta(&s, out);
+    if (!status) round_mlp(spec, out);
+    sdm_pod_survey_dispose(&s);
+    return status;
+}
+
+void sdm_pod_integers_dispose(pod_integers *q)
+{
+    sdm_free(q->wide);
+    sdm_free(q->order);
+    sdm_free(q->factor);
+    sdm_free(q->quantum);
+    sdm_free(q->layer_scale);
+    sdm_free(q->mlp);
+    sdm_free(q->head);
+    sdm_free(q->basis);
+    *q = (pod_integers){0};
+}

@@ -1,0 +1,106 @@
+/* Layout of point networks, and making of their model file from weights. */
+#include <string.h>
+
+#include "point_internal.h"
+#include "sdm/internal/kernels.h"
+#include "sdm/memory.h"
+
+size_t sdm_point_count(const sdm_point_arch *a)
+{
+    size_t n = a->width[a->depth - 1] + 1;
+    for (size_t l = 0; l < a->depth; l++) n += a->width[l] * (sdm_point_inputs(a, l) + 1);
+    return n;
+}
+
+size_t sdm_point_macs(const sdm_point_arch *a)
+{
+    size_t n = a->width[a->depth - 1];
+    for (size_t l = 0; l < a->depth; l++) n += a->width[l] * sdm_point_inputs(a, l);
+    return n;
+}
+
+size_t sdm_point_hidden_count(const sdm_point_arch *a, size_t *at)
+{
+    size_t n = 0;
+    for (size_t l = 0; l < a->depth; l++) {
+        if (at) at[l] = n;
+        if (l) n += sdm_panel_count(a->width[l], a->width[l - 1]);
+    }
+    return n;
+}
+
+size_t sdm_point_input_count(const sdm_point_arch *a, size_t *at)
+{
+    size_t n = 0;
+    for (size_t l = 0; l < a->depth; l++) {
+        if (at) at[l] = n;
+        n += a->width[l] * (1 + (sdm_point_enters(a, l) ? a->n_params + 3 : 0));
+    }
+    return n + a->width[a->depth - 1] + 1;
+}
+
+// read back by point_open.c
+static void describe(const sdm_point_spec *spec, sdm_text *t)
+{
+    const sdm_point_arch *a = &spec->arch;
+    sdm_model_describe(spec->info, spec->kind, t);
+    sdm_text_add(t, "point.depth=%zu\n", a->depth);
+    for (size_t l = 0; l < a->depth; l++)
+        sdm_text_add(t, "point.width=%zu\npoint.input=%d\n", a->width[l], sdm_point_enters(a, l));
+    sdm_text_add(t, "point.activation=%d\npoint.tanh=%d\npoint.half=%d\n", a->activation,
+                 a->tanh_output, spec->half);
+    sdm_put_reals(t, "point.centre", a->centre, 3);
+    sdm_put_real(t, "point.radius", a->radius);
+    sdm_put_real(t, "point.scale", a->scale);
+}
+
+static void pack(const sdm_point_spec *spec, void *hidden, float *input)
+{
+    const sdm_point_arch *a = &spec->arch;
+    const float *w = spec->weights;
+    size_t at[SDM_POINT_MAX_DEPTH];
+    sdm_point_hidden_count(a, at);
+    for (size_t l = 0; l < a->depth; l++) {
+        const size_t width = a->width[l], k = sdm_point_inputs(a, l),
+                     before = sdm_point_hidden(a, l);
+        if (l && spec->half)
+            sdm_panel_pack_f16(width, before, (sdm_view){w, k, 1}, (uint16_t *)hidden + at[l]);
+        else if (l)
+            sdm_panel_pack_f32(width, before, (sdm_view){w, k, 1}, (float *)hidden + at[l]);
+        memcpy(input, w + width * k, width * sizeof *input);
+        input += width;
+        for (size_t i = before; i < k; i++)
+            for (size_t o = 0; o < width; o++) *input++ = w[o * k + i];
+        w += width * (k + 1);
+    }
+    memcpy(input, w, (a->width[a->depth - 1] + 1) * sizeof *input);
+}
+
+sdm_status sdm_point_build(const sdm_point_spec *spec, uint8_t **bytes, size_t *size,
+                           sdm_error *err)
+{
+    const size_t weight = spec->half ? sizeof(uint16_t) : sizeof(float);
+    const size_t hidden_bytes = sdm_point_hidden_count(&spec->arch, NULL) * weight;
+    const size_t inputs = sdm_point_input_count(&spec->arch, NULL);
+    if (strcmp(spec->kind, sdm_kind_deepsdf.name) != 0 &&
+        strcmp(spec->kind, sdm_kind_imnet.name) != 0)
+        return sdm_fail(err, SDM_E_ARG, "'%s' is no kind of point network; there are '%s' and '%s'",
+                        spec->kind, sdm_kind_deepsdf.name, sdm_kind_imnet.name);
+    uint8_t *hidden = NULL;
+    float *input = NULL;
+    sdm_text text = {0};
+    sdm_status s = SDM_ALLOC(&hidden, hidden_bytes, "model weights", err);
+    if (!s) s = SDM_ALLOC(&input, inputs, "model weights", err);
+    if (!s) {
+        pack(spec, hidden, input);
+        describe(spec, &text);
+        const sdm_section sections[] = {{"point.hidden", hidden, hidden_bytes},
+                                        {"point.input", input, inputs * sizeof *input}};
+        s = sdm_model_pack(spec->info, &text, sections, sizeof sections / sizeof *sections, bytes,
+                           size, err);
+    }
+    sdm_text_dispose(&text);
+    sdm_free(input);
+    sdm_free(hidden);
+    return s;
+}

@@ -1,0 +1,388 @@
+/* Level sets through OpenVDB, which the files vdb*.cc alone know, and which are the only ones in
+ * C++. No exception leaves them. */
+#include "sdm/vdb.h"
+
+#include <algorithm>
+#include <cinttypes>
+#include <cmath>
+#include <cstring>
+#include <mutex>
+#include <new>
+#include <string>
+
+#include "band.h"
+#include "sdm/internal/text.h"
+#include "sdm/memory.h"
+#include "seal.h"
+#include "vdb_parts.h"
+
+using namespace vdb_parts;
+
+namespace
+{
+
+using Leaf = Grid::TreeType::LeafNodeType;
+
+void initialize_once()
+{
+    static std::once_flag once;
+    std::call_once(once, [] { openvdb::initialize(); });
+}
+
+// runs f and turns whatever it throws into a status
+template <typename F>
+sdm_status guarded(const char *path, sdm_status when_unreadable, sdm_error *err, F f)
+{
+    try {
+        initialize_once();
+        f();
+        return SDM_OK;
+    } catch (const failure &e) {
+        return e.status;
+    } catch (const std::bad_alloc &) {
+        return sdm_fail(err, SDM_E_NOMEM, "%s: no memory for the level set", path);
+    } catch (const openvdb::IoError &e) {
+        return sdm_fail(err, when_unreadable, "%s: %s", path, e.what());
+    } catch (const std::exception &e) {
+        return sdm_fail(err, when_unreadable == SDM_E_IO ? SDM_E_INTERNAL : when_unreadable,
+                        "%s: %s", path, e.what());
+    } catch (...) {
+        return sdm_fail(err, SDM_E_INTERNAL, "%s: unknown exception of OpenVDB", path);
+    }
+}
+
+// ---- metadata
+
+bool starts_with(const std::string &s, const char *prefix)
+{
+    return s.compare(0, std::strlen(prefix), prefix) == 0;
+}
+
+bool is_reserved(const std::string &name)
+{
+    static const char *const names[] = {
+        "name",    "class",    "creator",     "sdm_frame",           "sdm_unit",       "sdm_sign",
+        "sdm_cut", "sdm_hash", SDM_SEAL_MARK, "sdm_adjusted_voxels", "sdm_adjusted_mm"};
+    for (const char *n : names)
+        if (name == n) return true;
+    return starts_with(name, "file_") || starts_with(name, "is_");
+}
+
+void add_text(Grid &grid, const std::string &name, const std::string &value)
+{
+    grid.insertMeta(name, openvdb::StringMetadata(value));
+}
+
+void add_metadata(Grid &grid, const sdm_vdb_opts &o, const sdm_vdb_report &r, sdm_error *err)
+{
+    for (size_t i = 0; i < o.n_metadata; i++) {
+        const char *name = o.metadata[i].name, *value = o.metadata[i].value;
+        if (!name || !*name || !value)
+            need(sdm_fail(err, SDM_E_ARG, "metadata entry %zu has no name or no value", i));
+        if (is_reserved(name) || grid[name])
+            need(sdm_fail(err, SDM_E_ARG, "metadata \"%s\" is %s", name,
+                          is_reserved(name) ? "written by the program itself" : "given twice"));
+        add_text(grid, name, value);
+    }
+    char number[32], hash[32];
+    grid.setCreator("sdmgen " SDM_VERSION_TEXT);
+    add_text(grid, "sdm_frame", "LPS");
+    add_text(grid, "sdm_unit", "mm");
+    add_text(grid, "sdm_sign", "negative inside");
+    add_text(grid, SDM_SEAL_MARK, "a checksum of all bytes follows the data");
+    std::snprintf(hash, sizeof hash, "%016" PRIx64, r.hash);
+    add_text(grid, "sdm_hash", hash);
+    if (r.cut) add_text(grid, "sdm_cut", "the surface leaves the grid and is closed at its border");
+    if (r.adjusted_voxels) {
+        add_text(grid, "sdm_adjusted_voxels", std::to_string(r.adjusted_voxels));
+        add_text(grid, "sdm_adjusted_mm", sdm_format_real(r.adjusted_mm, number));
+    }
+}
+
+// ---- map to grid
+
+// most that the size of turned voxels is enlarged, in units of its last place
+const int ROUNDINGS_MOST = 64;
+
+// smallest background that can be stored and is not below the band: checkLevelSet divides it by the
+// voxel size of the transform
+float background_value(double band_voxels, double voxel, bool half)
+{
+    float b = static_cast<float>(band_voxels * voxel), stored = as_stored(b, half);
+    while (!(static_cast<double>(stored) / voxel >= band_voxels))
+        stored = as_stored(b = std::nextafter(b, INFINITY), half);
+    return stored;
+}
+
+// OpenVDB multiplies row vectors: row a is axis a, the last row the origin
+openvdb::math::Transform::Ptr linear_transform(const openvdb::Vec3d axis[3],
+                                               const openvdb::Vec3d &size, const double origin[3])
+{
+    openvdb::Mat4d m = openvdb::Mat4d::identity();
+    for (int a = 0; a < 3; a++)
+        for (int x = 0; x < 3; x++) m(a, x) = axis[a][x] * size[a];
+    for (int x = 0; x < 3; x++) m(3, x) = origin[x];
+    return openvdb::math::Transform::createLinearTransform(m);
+}
+
+// of a level set: with one size for all axes, equal as they are to 1e-6 only
+openvdb::math::Transform::Ptr transform_of(const sdm_grid &g, bool level_set)
+{
+    // axes a: columns of dir, made orthonormal to the last digit
+    openvdb::Vec3d axis[3], size(g.spacing[0], g.spacing[1], g.spacing[2]);
+    for (int a = 0; a < 3; a++) {
+        axis[a] = openvdb::Vec3d(g.dir[a], g.dir[3 + a], g.dir[6 + a]);
+        for (int b = 0; b < a; b++) axis[a] -= axis[b] * axis[a].dot(axis[b]);
+        axis[a].normalize();
+    }
+    if (level_set) size = openvdb::Vec3d(g.spacing[0]);
+    if (axis[0][0] == 1 && axis[1][1] == 1 && axis[2][2] == 1 && size[0] == size[1] &&
+        size[0] == size[2]) {
+        auto t = openvdb::math::Transform::createLinearTransform(size[0]);
+        t->postTranslate(openvdb::Vec3d(g.origin[0], g.origin[1], g.origin[2]));
+        return t;
+    }
+    auto t = linear_transform(axis, size, g.origin);
+    // whether turned voxels count as uniform hangs on roundings of 1e-15: some next size rounds
+    // otherwise
+    for (int i = 0; level_set && i < ROUNDINGS_MOST && !t->hasUniformScale(); i++) {
+        size = openvdb::Vec3d(std::nextafter(size[0], INFINITY));
+        t = linear_transform(axis, size, g.origin);
+    }
+    return t;
+}
+
+// one 8^3 block of the tree from the box; active where |value| < band (everywhere when dense)
+void fill_block(Grid &grid, Grid::Accessor &acc, const sdm_band &box, const Coord &corner,
+                bool dense, bool half)
+{
+    const float background = grid.background();
+    Leaf leaf(corner, background, false);
+    bool inside = false;
+    for (openvdb::Index32 at = 0; at < Leaf::SIZE; at++) {
+        const Coord c = leaf.offsetToGlobalCoord(at).offsetBy(box.pad);
+        if (c[0] < 0 || c[1] < 0 || c[2] < 0 || c[0] >= box.n[0] || c[1] >= box.n[1] ||
+            c[2] >= box.n[2])
+            continue;
+        const float v = as_stored(box.values[(c[2] * box.n[1] + c[1]) * box.n[0] + c[0]], half);
+        if (dense || std::fabs(v) < background)
+            leaf.setValueOn(at, v);
+        else if (v < 0)
+            leaf.setValueOff(at, -background);
+        inside = inside || v < 0;
+    }
+    if (leaf.onVoxelCount())
+        acc.addLeaf(new Leaf(leaf));
+    else if (inside)
+        acc.addTile(1, corner, -background,
+                    false); // far inside: no voxel of the block is near the surface
+}
+
+Grid::Ptr grid_of(const openvdb::math::Transform::Ptr &transform, const sdm_band &box,
+                  float background, bool dense, bool half)
+{
+    Grid::Ptr grid = Grid::create(background);
+    grid->setName(GRID_NAME);
+    grid->setTransform(transform);
+    grid->setGridClass(dense ? openvdb::GRID_UNKNOWN : openvdb::GRID_LEVEL_SET);
+    grid->setSaveFloatAsHalf(half);
+    Grid::Accessor acc = grid->getAccessor();
+    const int low = -box.pad & ~7, dim = 8;
+    for (int k = low; k < box.n[2] - box.pad; k += dim)
+        for (int j = low; j < box.n[1] - box.pad; j += dim)
+            for (int i = low; i < box.n[0] - box.pad; i += dim)
+                fill_block(*grid, acc, box, Coord(i, j, k), dense, half);
+    if (!dense) grid->tree().prune(); // joins inside tiles
+    return grid;
+}
+
+// ---- from map to level set
+
+struct owned_band {
+    sdm_band band = {};
+    ~owned_band() { sdm_band_dispose(&band); }
+};
+
+double band_of(const sdm_vdb_opts &o) { return o.band_voxels != 0 ? o.band_voxels : 3.0; }
+
+void check_options(const sdm_grid &g, const sdm_vdb_opts &o, sdm_error *err)
+{
+    if (o.band_voxels != 0 && !(o.band_voxels >= 3 && o.band_voxels <= 100))
+        need(sdm_fail(err, SDM_E_ARG, "band of %g voxels, need 3 to 100", o.band_voxels));
+    if (o.n_metadata && !o.metadata)
+        need(sdm_fail(err, SDM_E_ARG, "%zu metadata entries at NULL", o.n_metadata));
+    const double h = g.spacing[0];
+    if (!(h * g.spacing[1] * g.spacing[2] > 4e-15)) // below 3e-15 it takes them for nothing
+        need(sdm_fail(err, SDM_E_ARG,
+                      "spacing %g x %g x %g mm is too small for OpenVDB, need at least 2e-5 mm", h,
+                      g.spacing[1], g.spacing[2]));
+    if (!o.dense &&
+        !(std::fabs(g.spacing[1] - h) <= 1e-6 * h && std::fabs(g.spacing[2] - h) <= 1e-6 * h))
+        need(sdm_fail(err, SDM_E_ARG,
+                      "spacing %g x %g x %g mm: a level set needs voxels of one size; write the "
+                      "map itself with --dense",
+                      g.spacing[0], g.spacing[1], g.spacing[2]));
+    if (!o.dense && !(band_of(o) * h < (o.half ? 65000.0 : 3e38))) // some room for rounding up
+        need(sdm_fail(err, SDM_E_ARG, "spacing %g mm is too large for the number format", h));
+}
+
+// the half format ends at 65504
+void check_half(const sdm_band &box, sdm_error *err)
+{
+    const size_t count = static_cast<size_t>(box.n[0] * box.n[1] * box.n[2]);
+    for (size_t i = 0; i < count; i++)
+        if (!(std::fabs(box.values[i]) <= 65504.0f))
+            need(sdm_fail(err, SDM_E_ARG,
+                          "value %g mm does not fit into 16 bits, need at most 65504",
+                          static_cast<double>(box.values[i])));
+}
+
+Grid::Ptr make_level_set(const sdm_grid &g, const float *values, const sdm_vdb_opts &o,
+                         sdm_vdb_report &report, sdm_error *err)
+{
+    const auto transform = transform_of(g, true);
+    if (!transform->hasUniformScale())
+        need(sdm_fail(err, SDM_E_ARG,
+                      "to OpenVDB voxels of %g mm on turned axes are not uniform; write the map "
+                      "itself with --dense",
+                      g.spacing[0]));
+    const float background = background_value(band_of(o), transform->voxelSize()[0], o.half);
+    owned_band box;
+    need(sdm_band_close(&g, values, background, &o, &box.band, err));
+    report.cut = box.band.cut;
+    Grid::Ptr grid = grid_of(transform, box.band, background, false, o.half);
+    mend_creases(*grid, o, report, err);
+    return grid;
+}
+
+Grid::Ptr make_dense(const sdm_grid &g, const float *values, const sdm_vdb_opts &o,
+                     sdm_vdb_report &report, sdm_error *err)
+{
+    owned_band box;
+    need(sdm_band_copy(&g, values, &box.band, err));
+    if (o.half) check_half(box.band, err);
+    const size_t count = sdm_grid_count(&g);
+    const float background = as_stored(*std::max_element(values, values + count), o.half);
+    for (size_t i = 0; i < count && !report.cut; i++) {
+        const int64_t at[3] = {static_cast<int64_t>(i) % g.n[0],
+                               static_cast<int64_t>(i) / g.n[0] % g.n[1],
+                               static_cast<int64_t>(i) / g.n[0] / g.n[1]};
+        for (int a = 0; a < 3; a++)
+            report.cut = report.cut || (values[i] < 0 && (at[a] == 0 || at[a] == g.n[a] - 1));
+    }
+    return grid_of(transform_of(g, false), box.band, background, true, o.half);
+}
+
+// ---- reading
+
+void check_hash(const Grid &grid, const char *path, sdm_error *err)
+{
+    char hash[32];
+    std::snprintf(hash, sizeof hash, "%016" PRIx64, hash_of(grid));
+    const std::string stored = text_of(grid, "sdm_hash");
+    if (!stored.empty() && stored != hash)
+        need(sdm_fail(err, SDM_E_FORMAT, "%s: damaged: hash of the values is %s, stored is %s",
+                      path, hash, stored.c_str()));
+}
+
+std::string numbers(const openvdb::Vec3d &v)
+{
+    char b[3][32];
+    return std::string(sdm_format_real(v[0], b[0])) + " " + sdm_format_real(v[1], b[1]) + " " +
+           sdm_format_real(v[2], b[2]);
+}
+
+std::string numbers(const Coord &c)
+{
+    return std::to_string(c[0]) + " " + std::to_string(c[1]) + " " + std::to_string(c[2]);
+}
+
+std::string describe(const Grid &grid, bool sealed)
+{
+    const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
+    const bool level_set = grid.getGridClass() == openvdb::GRID_LEVEL_SET;
+    char number[32];
+    std::string t = "grid          " + grid.getName() + "\nclass         " +
+                    (level_set ? "level set" : "not set (whole map)");
+    t += "\nvoxel size    " + numbers(grid.voxelSize()) + " mm\norigin        " +
+         numbers(grid.indexToWorld(Coord(0))) + " mm";
+    t += "\nactive voxels " + std::to_string(grid.activeVoxelCount()) + "\nactive box    " +
+         numbers(box.min()) + " to " + numbers(box.max());
+    t += std::string("\nbackground    ") +
+         sdm_format_real(static_cast<double>(grid.background()), number) + " mm";
+    t += std::string("\nnumbers       ") + (grid.saveFloatAsHalf() ? "16-bit" : "32-bit") +
+         " floats";
+    t += std::string("\nchecksum      ") + (sealed ? "right" : "none in the file") +
+         (text_of(grid, "sdm_hash").empty() ? "" : ", hash right");
+    t += level_set ? "\ncheckLevelSet passed\n" : "\ncheckLevelSet not asked\n";
+    for (auto m = grid.beginMeta(); m != grid.endMeta(); ++m)
+        if (m->second->typeName() == "string" && !starts_with(m->first, "file_") &&
+            m->first != "name" && m->first != "class")
+            t += m->first + ": " + m->second->str() + "\n";
+    return t;
+}
+
+} // namespace
+
+void vdb_parts::check_cancelled(const sdm_vdb_opts &o, sdm_error *err)
+{
+    if (o.cancelled && o.cancelled(o.user))
+        need(sdm_fail(err, SDM_E_CANCELLED, "level set stopped on request"));
+}
+
+sdm_status sdm_vdb_write(const char *path, const sdm_grid *grid, const float *values,
+                         const sdm_vdb_opts *opts, sdm_vdb_report *report, sdm_error *err)
+{
+    if (!path || !*path || !grid || !values)
+        return sdm_fail(err, SDM_E_ARG, "level set: path, grid and values are needed");
+    const sdm_status s = sdm_grid_check(grid, err);
+    if (s) return s;
+    return guarded(path, SDM_E_IO, err, [&] {
+        const sdm_vdb_opts o = opts ? *opts : sdm_vdb_opts();
+        sdm_vdb_report r = {};
+        check_options(*grid, o, err);
+        Grid::Ptr g = o.dense ? make_dense(*grid, values, o, r, err)
+                              : make_level_set(*grid, values, o, r, err);
+        check_cancelled(o, err);
+        if (!o.dense) check_level_set(*g, path, SDM_E_QUALITY, err);
+        r.active_voxels = static_cast<int64_t>(g->activeVoxelCount());
+        r.hash = hash_of(*g);
+        add_metadata(*g, o, r, err);
+        check_cancelled(o, err);
+        write_grid(path, g, err);
+        if (report) *report = r;
+    });
+}
+
+sdm_status sdm_vdb_verify(const char *path, char **text, sdm_error *err)
+{
+    if (text) *text = nullptr;
+    if (!path) return sdm_fail(err, SDM_E_ARG, "level set: a path is needed");
+    return guarded(path, SDM_E_FORMAT, err, [&] {
+        bool sealed = false;
+        const Grid::Ptr grid = read_grid(path, &sealed, err);
+        check_hash(*grid, path, err);
+        if (grid->getGridClass() == openvdb::GRID_LEVEL_SET)
+            check_level_set(*grid, path, SDM_E_FORMAT, err);
+        if (!text) return;
+        const std::string t = describe(*grid, sealed);
+        void *block = nullptr;
+        need(sdm_alloc(&block, t.size() + 1, 1, "description", err));
+        std::memcpy(block, t.c_str(), t.size() + 1);
+        *text = static_cast<char *>(block);
+    });
+}
+
+sdm_status sdm_vdb_sample(const char *path, const int32_t *index, size_t n, float *values,
+                          sdm_error *err)
+{
+    if (!path || (n && (!index || !values)))
+        return sdm_fail(err, SDM_E_ARG, "level set: path, index and values are needed");
+    return guarded(path, SDM_E_FORMAT, err, [&] {
+        bool sealed = false;
+        const Grid::Ptr grid = read_grid(path, &sealed, err);
+        auto acc = grid->getConstAccessor();
+        for (size_t i = 0; i < n; i++)
+            values[i] = acc.getValue(Coord(index[3 * i], index[3 * i + 1], index[3 * i + 2]));
+    });
+}

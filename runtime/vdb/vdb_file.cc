@@ -1,0 +1,93 @@
+/* Files of level sets: written, sealed, read back and checked. */
+#include <openvdb/io/File.h>
+#include <openvdb/tools/Diagnostics.h>
+
+#include <cstring>
+#include <vector>
+
+#include "sdm/internal/checksum.h"
+#include "sdm/internal/file.h"
+#include "seal.h"
+#include "vdb_parts.h"
+
+using namespace vdb_parts;
+
+const char *const vdb_parts::GRID_NAME = "surface";
+
+uint64_t vdb_parts::hash_of(const Grid &grid)
+{
+    struct record {
+        int32_t low[3], high[3];
+        uint32_t bits, active;
+    };
+    std::vector<record> piece;
+    uint64_t crc = 0;
+    const auto add = [&](const openvdb::CoordBBox &b, float value, bool active) {
+        record r = {
+            {b.min()[0], b.min()[1], b.min()[2]}, {b.max()[0], b.max()[1], b.max()[2]}, 0, active};
+        std::memcpy(&r.bits, &value, sizeof r.bits);
+        piece.push_back(r);
+        if (piece.size() < 4096) return;
+        crc = sdm_crc64(crc, piece.data(), piece.size() * sizeof piece[0]);
+        piece.clear();
+    };
+    add(openvdb::CoordBBox(Coord(0), Coord(0)), grid.background(), false);
+    for (auto v = grid.cbeginValueAll(); v; ++v)
+        add(v.getBoundingBox(), v.getValue(), v.isValueOn());
+    return sdm_crc64(crc, piece.data(), piece.size() * sizeof piece[0]);
+}
+
+Grid::Ptr vdb_parts::read_grid(const char *path, bool *sealed, sdm_error *err)
+{
+    need(sdm_seal_check(path, sealed, err));
+    openvdb::io::File file(path);
+    file.open(false); // whole, not mapped: what was checked is what is used
+    if (!file.hasGrid(GRID_NAME))
+        need(sdm_fail(err, SDM_E_FORMAT, "%s: has no grid named \"%s\"", path, GRID_NAME));
+    Grid::Ptr grid = openvdb::gridPtrCast<Grid>(file.readGrid(GRID_NAME));
+    if (!grid)
+        need(sdm_fail(err, SDM_E_FORMAT, "%s: grid \"%s\" does not hold 32-bit floats", path,
+                      GRID_NAME));
+    return grid;
+}
+
+std::string vdb_parts::text_of(const Grid &grid, const char *name)
+{
+    const auto meta = grid.getMetadata<openvdb::StringMetadata>(name);
+    return meta ? meta->value() : std::string();
+}
+
+void vdb_parts::check_level_set(const Grid &grid, const char *path, sdm_status status,
+                                sdm_error *err)
+{
+    std::string said = openvdb::tools::checkLevelSet(grid);
+    for (char &c : said)
+        if (c == '\n') c = ' ';
+    if (!said.empty())
+        need(sdm_fail(err, status,
+                      "%s: not a valid level set: %s(parts thinner than a voxel? use smaller "
+                      "voxels, or --dense)",
+                      path, said.c_str()));
+}
+
+void vdb_parts::write_grid(const char *path, const Grid::Ptr &grid, sdm_error *err)
+{
+    struct output {
+        sdm_outfile *file = nullptr;
+        ~output() { sdm_outfile_discard(&file); }
+    } out;
+    need(sdm_outfile_open(path, &out.file, err));
+    const std::string temp = sdm_outfile_temp_path(out.file);
+    {
+        openvdb::io::File file(temp);
+        file.write(openvdb::GridCPtrVec{grid});
+    }
+    need(sdm_seal_append(temp.c_str(), err));
+    bool sealed = false;
+    const Grid::Ptr back = read_grid(temp.c_str(), &sealed, err);
+    if (!sealed || hash_of(*back) != hash_of(*grid))
+        need(sdm_fail(err, SDM_E_IO, "%s: reads back different from what was written", path));
+    if (grid->getGridClass() == openvdb::GRID_LEVEL_SET)
+        check_level_set(*back, path, SDM_E_QUALITY, err);
+    need(sdm_outfile_commit(&out.file, err));
+}

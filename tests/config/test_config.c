@@ -1,0 +1,569 @@
+/* Configuration: values, defaults, overrides, rules between keys, and the exact wording of
+ * mistakes. */
+#include <locale.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "sdm/internal/config.h"
+#include "sdm/internal/heap.h"
+
+#define BASE "shape: {name: ball}\ngrid: {size: [4, 5, 6], spacing: 1}\ntrain: {steps: 10}\n"
+
+static sdm_config config; /* too large for some stacks */
+static sdm_error err;
+
+static sdm_status parse(const char *text, const char *const *overrides, size_t n)
+{
+    memset(&err, 0, sizeof err);
+    return sdm_config_parse("x.yaml", text, strlen(text), overrides, n, &config, &err);
+}
+
+static void expect_ok(const char *text, const char *override)
+{
+    sdm_status s = parse(text, &override, override != NULL);
+    if (s) fail_msg("%s: %s", override ? override : text, err.text);
+}
+
+static void expect_mistake(const char *text, const char *override, const char *message)
+{
+    assert_int_equal(parse(text, &override, override != NULL), SDM_E_CONFIG);
+    assert_int_equal(err.status, SDM_E_CONFIG);
+    assert_string_equal(err.text, message);
+}
+
+static void test_defaults(void **state)
+{
+    (void)state;
+    expect_ok(BASE, NULL);
+    assert_string_equal(config.file, "x.yaml");
+    assert_string_equal(config.shape.name, "ball");
+    assert_int_equal(config.shape.mark.line, 1);
+    assert_int_equal(config.shape.mark.column, 9);
+    assert_int_equal(config.shape.n_options, 0);
+    assert_int_equal(config.shape.n_ranges, 0);
+    assert_int_equal(config.network.kind, SDM_NETWORK_POD);
+    assert_int_equal(config.network.depth, 3);
+    assert_int_equal(config.network.width, 128);
+    assert_int_equal(config.network.rank, 9);
+    assert_int_equal(config.network.block, 4);
+    assert_int_equal(config.network.levels, 3);
+    assert_int_equal(config.network.modes, 512);
+    assert_int_equal(config.network.degree, 6);
+    assert_int_equal(config.network.input_degree, 4);
+    assert_int_equal(config.network.activation, SDM_ACTIVATION_SILU);
+    assert_int_equal(config.network.weights, SDM_WEIGHT_I8);
+    assert_int_equal(config.data.n_static_counts, 1);
+    assert_int_equal(config.data.static_counts[0], 5);
+    assert_int_equal(config.data.online, 4096);
+    assert_int_equal(config.data.start, 3456);
+    assert_int_equal(config.data.holdout, 100);
+    assert_true(config.data.static_share == 0.1 && config.data.memory_gb == 6);
+    assert_int_equal(config.data.workers, 0);
+    assert_true(config.train.minutes == 0 && config.train.steps == 10 && config.train.samples == 0);
+    assert_int_equal(config.train.batch, 256);
+    assert_true(config.train.learning_rate == 3e-3 && config.train.warmup == 0.02);
+    assert_int_equal(config.train.loss, SDM_LOSS_MSE);
+    assert_true(config.train.near_weight == 0 && config.train.near_mm == 0.4 &&
+                config.train.refine == 0.4);
+    assert_int_equal(config.train.refine_batch, 32);
+    assert_true(config.train.refine_rate == 3e-4 && config.train.average == 0.998);
+    assert_true(config.train.evaluate_seconds == 20 && config.train.checkpoint_seconds == 60);
+    assert_string_equal(config.output.folder, "runs/x");
+    assert_true(config.seed == 1 && config.threads == 0);
+}
+
+static void test_values(void **state)
+{
+    (void)state;
+    expect_ok(
+        "---\r\nshape:\r\n  name: \"cochlea\"\r\n  options: {edge: 0.30, side: left, mean: 'a: "
+        "b.ply'}\r\n"
+        "  ranges:\r\n    a: [2, 5e0]\r\n    phi: [-0.5, .25]\r\n"
+        "grid:\r\n  size: [3, 4, 5]\r\n  spacing: [0.5, 1, 2]\r\n  centre: [1, -2, 1e1]\r\n"
+        "network: {depth: 0, width: +8, activation: relu, weights: f32}\r\ndata: {static: [3, "
+        "4]}\r\n"
+        "train: {minutes: 0, steps: 0, samples: 1000000, learning_rate: 1E-3, loss: huber}\r\n"
+        "output: {folder: 2024/r\xC3\xBCn}\r\nseed: 18446744073709551615\r\nthreads: 2\r\n...\r\n",
+        NULL);
+    assert_string_equal(config.shape.name, "cochlea");
+    assert_int_equal(config.shape.n_options, 3);
+    assert_string_equal(config.shape.options[0].name, "edge");
+    assert_string_equal(config.shape.options[0].value, "0.30");
+    assert_string_equal(config.shape.options[2].value, "a: b.ply");
+    assert_int_equal(config.shape.options[1].mark.line, 4);
+    assert_int_equal(config.shape.n_ranges, 2);
+    assert_true(config.shape.ranges[0].min == 2 && config.shape.ranges[0].max == 5);
+    assert_true(config.shape.ranges[1].min == -0.5 && config.shape.ranges[1].max == 0.25);
+    // the middle of the box is half a box from the first voxel's centre
+    assert_true(config.grid.origin[0] == 0.5 && config.grid.origin[1] == -3.5 &&
+                config.grid.origin[2] == 6);
+    assert_true(config.grid.spacing[2] == 2 && config.grid.n[2] == 5);
+    for (int i = 0; i < 9; i++) assert_true(config.grid.dir[i] == (i == 0 || i == 4 || i == 8));
+    assert_int_equal(config.network.depth, 0);
+    assert_int_equal(config.network.width, 8);
+    assert_int_equal(config.network.activation, SDM_ACTIVATION_RELU);
+    assert_int_equal(config.network.weights, SDM_WEIGHT_F32);
+    assert_int_equal(config.data.n_static_counts, 2);
+    assert_int_equal(config.data.static_counts[1], 4);
+    assert_int_equal(config.train.samples, 1000000);
+    assert_int_equal(config.train.loss, SDM_LOSS_HUBER);
+    assert_true(config.train.learning_rate == 0.001);
+    assert_string_equal(config.output.folder, "2024/r\xC3\xBCn");
+    assert_true(config.seed == UINT64_MAX && config.threads == 2);
+
+    // a section whose keys are all commented out, an explicit origin, no static grid
+    expect_ok("shape: {name: b}\nnetwork:\n  # depth: 3\ngrid: {size: [1, 1, 1], spacing: 1, "
+              "origin: [7, 8, 9]}\n"
+              "train: {minutes: 0.5}\ndata: {static: 0}\n",
+              NULL);
+    assert_true(config.grid.origin[0] == 7 && config.grid.origin[2] == 9);
+    assert_int_equal(config.data.n_static_counts, 0);
+}
+
+static void test_overrides(void **state)
+{
+    static const char *const LIST[] = {
+        "network.depth=4", "shape.ranges.a=[2,3]", "network.depth=5",
+        "seed=7",          "grid.size=[7, 8, 9]",  "shape.options={edge: 0.5, side: left}"};
+    static const char *const BUDGET[] = {"train.minutes=2", "train.samples=64"};
+    static const char *const PLACE[] = {"grid.origin=[1,2,3]", "grid.centre=[0,0,0]"};
+    char where[1200];
+    (void)state;
+    assert_int_equal(parse(BASE, LIST, 6), SDM_OK);
+    assert_int_equal(config.network.depth, 5);
+    assert_true(config.seed == 7 && config.grid.n[2] == 9 && config.grid.origin[0] == -3);
+    assert_true(config.shape.ranges[0].min == 2 && config.shape.ranges[0].max == 3);
+    assert_int_equal(config.shape.ranges[0].mark.override, 2);
+    assert_string_equal(sdm_config_where(&config, config.shape.ranges[0].mark, where),
+                        "argument 'shape.ranges.a=[2,3]'");
+    assert_string_equal(sdm_config_where(&config, config.shape.mark, where), "x.yaml:1:9");
+    assert_string_equal(sdm_config_where(&config, (sdm_mark){0}, where), "x.yaml");
+    assert_int_equal(config.shape.n_options, 2);
+
+    // options merge, an option given twice is replaced
+    expect_ok(
+        "shape: {name: b, options: {edge: 1, side: left}}\ngrid: {size: [4, 5, 6], spacing: 1}\n"
+        "train: {steps: 10}\n",
+        "shape.options.edge=2");
+    assert_int_equal(config.shape.n_options, 2);
+    assert_string_equal(config.shape.options[0].value, "2");
+
+    // a budget replaces the others, the last one stays; so do origin and centre
+    assert_int_equal(parse(BASE, BUDGET, 2), SDM_OK);
+    assert_true(config.train.minutes == 0 && config.train.steps == 0 && config.train.samples == 64);
+    assert_int_equal(parse(BASE, BUDGET, 1), SDM_OK);
+    assert_true(config.train.minutes == 2 && config.train.steps == 0);
+    assert_int_equal(parse(BASE, PLACE, 1), SDM_OK);
+    assert_true(config.grid.origin[0] == 1);
+    assert_int_equal(parse(BASE, PLACE, 2), SDM_OK);
+    assert_true(config.grid.origin[0] == -1.5);
+
+    // what is missing in the file may come from an override
+    expect_ok("grid: {size: [4, 5, 6], spacing: 1}\ntrain: {steps: 10}\n", "shape.name=ball");
+}
+
+// network.kind decides about keys and defaults
+static void test_kinds(void **state)
+{
+    (void)state;
+    expect_ok(BASE "network: {kind: deepsdf}\n", NULL);
+    assert_int_equal(config.network.kind, SDM_NETWORK_DEEPSDF);
+    assert_int_equal(config.network.depth, 8);
+    assert_int_equal(config.network.width, 512);
+    assert_int_equal(config.network.skip, 4);
+    assert_int_equal(config.network.activation, SDM_ACTIVATION_RELU);
+    assert_int_equal(config.network.output, SDM_OUTPUT_TANH);
+    assert_int_equal(config.train.batch, 16);
+    assert_int_equal(config.train.points, 512);
+    assert_true(config.train.learning_rate == 5e-4 && config.train.eikonal == 0 &&
+                config.train.clamp_mm == 0.1);
+    expect_ok(BASE "network: {kind: imnet, depth: 3}\n", NULL);
+    assert_int_equal(config.network.depth, 3);
+    assert_int_equal(config.network.width, 2048);
+    assert_int_equal(config.network.activation, SDM_ACTIVATION_LEAKY_RELU);
+    assert_int_equal(config.network.output, SDM_OUTPUT_LINEAR);
+    expect_ok(BASE "network: {kind: sdmnn, channels: 8}\n", NULL);
+    assert_int_equal(config.network.depth, 4);
+    assert_int_equal(config.network.channels, 8);
+    assert_true(config.network.dropout == 0.1 && config.train.batch == 8 &&
+                config.train.learning_rate == 1e-3);
+
+    // another kind by an override: keys of the file that it does not have step back, the others
+    // stay
+    static const char pod[] =
+        BASE "network: {kind: pod, depth: 2, rank: 7, weights: f32}\ndata: {online: 9}\n";
+    static const char *const to_deepsdf[] = {"network.kind=deepsdf", "network.width=64"};
+    assert_int_equal(parse(pod, to_deepsdf, 2), SDM_OK);
+    assert_int_equal(config.network.depth, 2);
+    assert_int_equal(config.network.skip, 1);
+    assert_true(config.train.learning_rate == 5e-4);
+    assert_int_equal(config.network.width, 64);
+    assert_int_equal(config.network.rank, 9);
+    assert_int_equal(config.network.weights, SDM_WEIGHT_F32);
+    assert_int_equal(config.data.online, 9);
+    expect_ok(pod, "network.kind=pod");
+    assert_int_equal(config.network.depth, 2);
+    assert_int_equal(config.network.rank, 7);
+    static const char *const there_and_back[] = {"network.kind=deepsdf", "network.kind=pod"};
+    assert_int_equal(parse(pod, there_and_back, 2), SDM_OK);
+    assert_int_equal(config.network.rank, 7);
+
+    // bytes are for pod: from the file they step back, too
+    static const char bytes[] = BASE "network: {weights: i8}\n";
+    expect_ok(bytes, "network.kind=sdmnn");
+    assert_int_equal(config.network.weights, SDM_WEIGHT_F16);
+    static const char *const wanted[] = {"network.kind=sdmnn", "network.weights=i8"};
+    assert_int_equal(parse(bytes, wanted, 2), SDM_E_CONFIG);
+    expect_mistake(
+        BASE "network: {kind: imnet, weights: i8}\n", NULL,
+        "x.yaml:4:24: network.weights: i8 is for a network of kind pod; imnet has f16 and f32");
+
+    expect_mistake(
+        BASE "network: {kind: deepsdf, rank: 7}\n", NULL,
+        "x.yaml:4:26: network.rank: a network of kind deepsdf has no such key, only pod");
+    expect_mistake(BASE, "train.eikonal=1",
+                   "argument 'train.eikonal=1': train.eikonal: a network of kind pod has no such "
+                   "key, only sdmnn, "
+                   "deepsdf, imnet");
+    expect_mistake(
+        BASE "network: {kind: imnet, depth: 0}\n", NULL,
+        "x.yaml:4:24: network.depth: 0 is out of range (1 .. 16) for a network of kind imnet");
+    expect_mistake(
+        BASE "network: {block: 1}\n", NULL,
+        "x.yaml:4:11: network.block: 1 is out of range (2 .. 16) for a network of kind pod");
+    expect_mistake(
+        BASE "network: {kind: deepsdf, depth: 3, skip: 3}\n", NULL,
+        "x.yaml:4:36: network.skip: 3 is out of range (0 .. 2) for a network of kind deepsdf");
+    expect_mistake(BASE "network: {kind: deepsdf, depth: 3, skip: x}\n", NULL,
+                   "x.yaml:4:42: network.skip: needs an integer, got 'x'");
+    expect_ok(BASE "network: {kind: deepsdf, depth: 3}\n", NULL);
+    assert_int_equal(config.network.skip, 1);
+    expect_mistake(BASE, "network.kind=podd",
+                   "argument 'network.kind=podd': network.kind: 'podd' is not one of pod, sdmnn, "
+                   "deepsdf, imnet; did "
+                   "you mean 'pod'?");
+}
+
+static void test_mistakes(void **state)
+{
+    static const struct {
+        const char *extra, *message;
+    } CASES[] = {
+        {"network: {dpth: 4}", "x.yaml:4:11: unknown key 'network.dpth'; did you mean 'depth'?"},
+        {"netwrok: 4", "x.yaml:4:1: unknown key 'netwrok'; did you mean 'network'?"},
+        {"depth: 4", "x.yaml:4:1: unknown key 'depth'; did you mean 'network.depth'?"},
+        {"data: {qqqqqq: 4}", "x.yaml:4:8: unknown key 'data.qqqqqq'"},
+        {"network: {depth: 4, depth: 5}",
+         "x.yaml:4:21: duplicate key 'network.depth' (first at line 4)"},
+        {"seed: 1\nseed: 2", "x.yaml:5:1: duplicate key 'seed' (first at line 4)"},
+        {"network: {depth: 99}", "x.yaml:4:18: network.depth: 99 is out of range (0 .. 16)"},
+        {"network: {depth: -1}", "x.yaml:4:18: network.depth: -1 is out of range (0 .. 16)"},
+        {"network: {depth: 4.0}", "x.yaml:4:18: network.depth: needs an integer, got '4.0'"},
+        {"network: {depth: 1e1}", "x.yaml:4:18: network.depth: needs an integer, got '1e1'"},
+        {"network: {depth: \"4\"}",
+         "x.yaml:4:18: network.depth: needs an integer, got the text '4'"},
+        {"network: {depth: [4]}", "x.yaml:4:18: network.depth: needs an integer, got a list of 1"},
+        {"network: {depth: {a: 4}}", "x.yaml:4:18: network.depth: needs an integer, got a mapping"},
+        {"network: {depth: }", "x.yaml:4:18: network.depth: needs an integer, got nothing"},
+        {"network: 4", "x.yaml:4:10: network: needs keys with values, got '4'"},
+        {"network: {activation: silo}", "x.yaml:4:23: network.activation: 'silo' is not one of "
+                                        "silu, tanh, relu, leaky_relu; did you mean 'silu'?"},
+        {"network: {activation: 1}",
+         "x.yaml:4:23: network.activation: '1' is not one of silu, tanh, relu, "
+         "leaky_relu"},
+        {"data: {online: 99999999999999999999}",
+         "x.yaml:4:16: data.online: 99999999999999999999 is out of range (0 .. 10000000)"},
+        {"data: {static: 5000}", "x.yaml:4:16: data.static: 5000 is out of range (0 .. 1000)"},
+        {"data: {static: [3, 0]}", "x.yaml:4:20: data.static: 0 is out of range (1 .. 1000)"},
+        {"data: {static: []}",
+         "x.yaml:4:16: data.static: needs an integer or a list of 1 to 64, got a list of 0"},
+        {"data: {static_share: nan}",
+         "x.yaml:4:22: data.static_share: needs a finite number, got 'nan'"},
+        {"data: {static_share: .inf}",
+         "x.yaml:4:22: data.static_share: needs a finite number, got '.inf'"},
+        {"data: {memory_gb: 1e999}",
+         "x.yaml:4:19: data.memory_gb: needs a finite number, got '1e999'"},
+        {"data: {static_share: 1.5}",
+         "x.yaml:4:22: data.static_share: 1.5 is out of range (0 .. 1)"},
+        {"data: {memory_gb: 0x10}",
+         "x.yaml:4:19: data.memory_gb: needs a finite number, got '0x10'"},
+        {"output: {folder: \"a\\nb\"}",
+         "x.yaml:4:18: output.folder: a line break, tab or control character in a text"},
+        {"output: {folder: ''}", "x.yaml:4:18: output.folder: needs a text, got the text ''"},
+        {"methods: [{name: POD}]",
+         "x.yaml:4:1: methods: this is an experiment, for sdmgen experiment, not a training"},
+        {"seed: -1", "x.yaml:4:7: seed: -1 is out of range (0 .. 18446744073709551615)"},
+        {"seed: 18446744073709551616",
+         "x.yaml:4:7: seed: 18446744073709551616 is out of range (0 .. 18446744073709551615)"},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof CASES / sizeof CASES[0]; i++) {
+        char text[512];
+        snprintf(text, sizeof text, "%s%s\n", BASE, CASES[i].extra);
+        expect_mistake(text, NULL, CASES[i].message);
+    }
+}
+
+static void test_rules(void **state)
+{
+    static const char NAME_GRID[] = "shape: {name: b}\ngrid: {size: [4, 5, 6], spacing: 1}\n";
+    char text[1024];
+    (void)state;
+    snprintf(text, sizeof text, "%strain: {steps: 10,\n  minutes: 3}\n", NAME_GRID);
+    expect_mistake(text, NULL,
+                   "x.yaml:4:3: only one of train.minutes, train.steps and train.samples may be "
+                   "positive, got 2");
+    expect_mistake(NAME_GRID, NULL,
+                   "x.yaml:1:1: missing key: one of train.minutes, train.steps and train.samples "
+                   "must be positive");
+    snprintf(text, sizeof text, "%strain: {steps: -3}\n", NAME_GRID);
+    expect_mistake(text, NULL, "x.yaml:3:16: train.steps: -3 is out of range (0 .. 1000000000000)");
+    expect_mistake(BASE, "train.steps=0",
+                   "x.yaml:3:1: missing key: one of train.minutes, train.steps and train.samples "
+                   "must be positive");
+
+    expect_mistake("", NULL,
+                   "x.yaml:1:1: missing key 'shape.name'; e.g. name: cochlea\n"
+                   "x.yaml:1:1: missing key 'grid.size'; e.g. size: [60, 50, 50]\n"
+                   "x.yaml:1:1: missing key 'grid.spacing'; e.g. spacing: 0.2\n"
+                   "x.yaml:1:1: missing key: one of train.minutes, train.steps and train.samples "
+                   "must be positive");
+    expect_mistake("shape: {name: b}\ngrid: {size: [4, 0, 6.5], spacing: -1, centre: [0, 0], "
+                   "origin: [1, 2, 3]}\n"
+                   "train: {steps: 1}\n",
+                   NULL,
+                   "x.yaml:2:18: grid.size.y: 0 is out of range (1 .. 1048576)\n"
+                   "x.yaml:2:21: grid.size.z: needs an integer, got '6.5'\n"
+                   "x.yaml:2:36: grid.spacing: -1 is out of range (1e-06 .. 1000000)\n"
+                   "x.yaml:2:48: grid.centre: needs three numbers [x, y, z], got a list of 2\n"
+                   "x.yaml:2:56: only one of grid.origin and grid.centre may be given");
+    expect_mistake("shape: {name: b}\ngrid: {size: [1048576, 1048576, 1048576], spacing: "
+                   "1}\ntrain: {steps: 1}\n",
+                   NULL,
+                   "x.yaml:2:8: grid.size: grid of 1048576 x 1048576 x 1048576 voxels is more than "
+                   "memory can hold");
+    expect_mistake(
+        "shape: {name: b, ranges: {a: [2, 2], b: 3, c: [1], C: [1, 2]}, options: {d: [1], e: }}\n"
+        "grid: {size: [4, 5, 6], spacing: 1}\ntrain: {steps: 1}\n",
+        NULL,
+        "x.yaml:1:30: shape.ranges.a: [2, 2] is empty; the first number is the smaller one\n"
+        "x.yaml:1:41: shape.ranges.b: needs two numbers [min, max], got '3'\n"
+        "x.yaml:1:47: shape.ranges.c: needs two numbers [min, max], got a list of 1\n"
+        "x.yaml:1:52: shape.ranges: 'C' is no name; use a-z, 0-9 and _, first a letter\n"
+        "x.yaml:1:77: shape.options.d: needs a text, got a list of 1\n"
+        "x.yaml:1:85: shape.options.e: needs a text, got nothing");
+}
+
+static void test_override_mistakes(void **state)
+{
+    static const struct {
+        const char *override, *message;
+    } CASES[] = {
+        {"network.dpth=4",
+         "argument 'network.dpth=4': unknown key 'network.dpth'; did you mean 'network.depth'?"},
+        {"depth=4", "argument 'depth=4': unknown key 'depth'; did you mean 'network.depth'?"},
+        {"sed=4", "argument 'sed=4': unknown key 'sed'; did you mean 'seed'?"},
+        {"network.depth", "argument 'network.depth': not of the form key=value"},
+        {"=4", "argument '=4': not of the form key=value"},
+        {"network.depth=",
+         "argument 'network.depth=': network.depth: needs an integer, got nothing"},
+        {"network=", "argument 'network=': network: needs keys with values, got nothing"},
+        {"network.depth.x=4",
+         "argument 'network.depth.x=4': network.depth: needs an integer, got a mapping"},
+        {"network.depth=17",
+         "argument 'network.depth=17': network.depth: 17 is out of range (0 .. 16)"},
+        {"a.b.c.d.e.f.g.h.i=4", "argument 'a.b.c.d.e.f.g.h.i=4': unknown key"},
+        {"..=4", "argument '..=4': unknown key ''"},
+        {"shape.ranges.a=[3",
+         "argument 'shape.ranges.a=[3': not valid YAML: did not find expected ',' or ']' (while "
+         "parsing a flow sequence from line 1)"},
+        {"seed=&a 3", "argument 'seed=&a 3': anchor '&a'; anchors are not allowed"},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof CASES / sizeof CASES[0]; i++)
+        expect_mistake(BASE, CASES[i].override, CASES[i].message);
+}
+
+static void test_many_mistakes(void **state)
+{
+    static const char *const LATE[] = {"network.depth=99", "network.width=1"};
+    char text[4096] = BASE, line[64];
+    (void)state;
+    // ordered by position though the kinds are found in another order, the arguments last, 20 and
+    // then a count
+    for (int i = 0; i < 30; i++) {
+        snprintf(line, sizeof line, "unknown%c%d: 3\n", 'a' + i % 26, i);
+        strcat(text, line);
+    }
+    assert_int_equal(parse(text, LATE, 2), SDM_E_CONFIG);
+    size_t lines = 1, last = 0;
+    for (const char *p = err.text; (p = strchr(p, '\n')); p++) {
+        size_t at = 0;
+        if (sscanf(p + 1, "x.yaml:%zu:", &at) == 1) assert_true(at > last);
+        last = at;
+        lines++;
+    }
+    assert_int_equal(lines, 21);
+    assert_non_null(strstr(err.text, "x.yaml:23:1: unknown key"));
+    assert_non_null(strstr(err.text, "\n... and 12 more"));
+
+    // three different mistakes and one in an argument: four lines
+    assert_int_equal(
+        parse("shape: {nam: b}\ngrid: {size: [4, 5], spacing: 1}\ntrain: {steps: x}\n", LATE, 1),
+        SDM_E_CONFIG);
+    assert_string_equal(err.text,
+                        "x.yaml:1:1: missing key 'shape.name'; e.g. name: cochlea\n"
+                        "x.yaml:1:9: unknown key 'shape.nam'; did you mean 'name'?\n"
+                        "x.yaml:2:14: grid.size: needs three integers [x, y, z], got a list of 2\n"
+                        "x.yaml:3:16: train.steps: needs an integer, got 'x'\n"
+                        "argument 'network.depth=99': network.depth: 99 is out of range (0 .. 16)");
+
+    // long values are cut, and long file names do not push a line over the end: whole lines, then
+    // the count
+    char name[SDM_PATH_TEXT_MAX], value[101];
+    memset(name, 'n', sizeof name - 1);
+    name[sizeof name - 1] = 0;
+    memset(value, 'z', sizeof value - 1);
+    value[sizeof value - 1] = 0;
+    snprintf(text, sizeof text, "%sseed: %s\nthreads: x\ndepth: 3\nwidth: 4\nrank: 4\n", BASE,
+             value);
+    assert_int_equal(sdm_config_parse(name, text, strlen(text), NULL, 0, &config, &err),
+                     SDM_E_CONFIG);
+    value[60] = 0;
+    char line_1[1500];
+    snprintf(line_1, sizeof line_1, "%s:4:7: seed: needs an integer, got '%s...'\n", name, value);
+    assert_memory_equal(err.text, line_1, strlen(line_1));
+    assert_string_equal(strstr(err.text, "\n... and "), "\n... and 2 more");
+    for (size_t n = 600; n <= sizeof name; n++) {
+        // wherever the buffer ends, the count is whole
+        size_t more = 0;
+        int end = 0;
+        assert_int_equal(
+            sdm_config_parse(name + sizeof name - n, text, strlen(text), NULL, 0, &config, &err),
+            SDM_E_CONFIG);
+        const char *tail = strrchr(err.text, '\n');
+        if (tail[1] != '.') continue; // all of them fit
+        assert_int_equal(sscanf(tail, " ... and %zu more%n", &more, &end), 1);
+        assert_true(end > 0 && tail[end] == 0 && more >= 1);
+    }
+}
+
+static void test_folder_from_name(void **state)
+{
+    static const char *const NAMES[][2] = {{"a/b/cochlea.yaml", "runs/cochlea"},
+                                           {"my.exp.yml", "runs/my.exp"},
+                                           {"plain", "runs/plain"},
+                                           {".yaml", "runs/.yaml"},
+                                           {"dir/", "runs/config"},
+                                           {"", "runs/config"},
+                                           {"a\nb\xFF.yaml", "runs/a_b_"},
+                                           {"\xC3\xA4.yaml", "runs/\xC3\xA4"}};
+    (void)state;
+    for (size_t i = 0; i < sizeof NAMES / sizeof NAMES[0]; i++) {
+        assert_int_equal(sdm_config_parse(NAMES[i][0], BASE, strlen(BASE), NULL, 0, &config, &err),
+                         SDM_OK);
+        assert_string_equal(config.output.folder, NAMES[i][1]);
+    }
+}
+
+/* Two configurations of one network, and one of another. */
+static void test_strip(void **state)
+{
+    static const char *const NAMES[] = {"here.yaml", "there/too.yaml", "here.yaml"};
+    static const char *const LINES[] = {
+        "threads: 1\n", "threads: 3\ndata: {workers: 2}\noutput: {folder: x}\n", "seed: 2\n"};
+    sdm_text dump[3] = {{0}};
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        char text[256];
+        snprintf(text, sizeof text, BASE "%s", LINES[i]);
+        assert_int_equal(sdm_config_parse(NAMES[i], text, strlen(text), NULL, 0, &config, &err),
+                         SDM_OK);
+        sdm_config_strip(&config);
+        sdm_config_dump(&config, &dump[i]);
+        assert_false(dump[i].failed);
+        assert_string_equal(config.file, "");
+    }
+    assert_string_equal(dump[0].data, dump[1].data);
+    assert_string_not_equal(dump[0].data, dump[2].data);
+    for (int i = 0; i < 3; i++) sdm_text_dispose(&dump[i]);
+}
+
+static void test_locale(void **state)
+{
+    static const char *const COMMA[] = {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8", "de_DE"};
+    (void)state;
+    for (size_t i = 0; i < 4; i++)
+        if (setlocale(LC_ALL, COMMA[i])) break;
+    // with or without such a locale on this machine: a point is a point, a comma is none
+    expect_ok(BASE "data: {static_share: 0.25}\n", NULL);
+    assert_true(config.data.static_share == 0.25);
+    expect_mistake(BASE "data: {static_share: \"0,25\"}\n", NULL,
+                   "x.yaml:4:22: data.static_share: needs a finite number, got the text '0,25'");
+    setlocale(LC_ALL, "C");
+}
+
+static void test_misuse(void **state)
+{
+    static const char *const NOTHING[] = {NULL};
+    char name[SDM_PATH_TEXT_MAX + 1];
+    (void)state;
+    memset(name, 'n', sizeof name - 1);
+    name[sizeof name - 1] = 0;
+    assert_int_equal(sdm_config_parse(NULL, BASE, 3, NULL, 0, &config, &err), SDM_E_ARG);
+    assert_int_equal(sdm_config_parse("x", NULL, 3, NULL, 0, &config, &err), SDM_E_ARG);
+    assert_int_equal(sdm_config_parse("x", BASE, 3, NULL, 1, &config, &err), SDM_E_ARG);
+    assert_int_equal(sdm_config_parse("x", BASE, 3, NOTHING, 1, &config, &err), SDM_E_ARG);
+    assert_int_equal(sdm_config_parse("x", BASE, 3, NULL, 0, NULL, &err), SDM_E_ARG);
+    assert_int_equal(sdm_config_parse(name, BASE, strlen(BASE), NULL, 0, &config, &err), SDM_E_ARG);
+    assert_int_equal(sdm_config_parse("x", "a: [", 4, NULL, 0, &config, NULL), SDM_E_CONFIG);
+    assert_int_equal(sdm_config_parse("x", NULL, 0, NULL, 0, &config, NULL), SDM_E_CONFIG);
+    assert_int_equal(sdm_config_read(NULL, NULL, 0, &config, &err), SDM_E_ARG);
+    assert_int_equal(sdm_config_read("x", NULL, 0, NULL, &err), SDM_E_ARG);
+    assert_int_equal(sdm_config_read("no/such/file.yaml", NULL, 0, &config, &err), SDM_E_IO);
+    assert_non_null(strstr(err.text, "no/such/file.yaml"));
+    assert_int_equal(sdm_config_read(".", NULL, 0, &config, &err), SDM_E_IO);
+}
+
+/* Every allocation that fails is reported as such. */
+static void test_short_memory(void **state)
+{
+    static const char *const LIST[] = {"network.depth=4"};
+    (void)state;
+    sdm_status s = SDM_E_NOMEM;
+    unsigned long n = 1;
+    for (; s == SDM_E_NOMEM && n < 100; n++) {
+        sdm_alloc_fail_after(n);
+        s = parse(BASE, LIST, 1);
+        sdm_alloc_fail_after(0);
+        assert_true(s == SDM_OK || s == SDM_E_NOMEM);
+    }
+    assert_int_equal(s, SDM_OK);
+    assert_true(n > 4);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_defaults),
+        cmocka_unit_test(test_values),
+        cmocka_unit_test(test_overrides),
+        cmocka_unit_test(test_kinds),
+        cmocka_unit_test(test_mistakes),
+        cmocka_unit_test(test_rules),
+        cmocka_unit_test(test_override_mistakes),
+        cmocka_unit_test(test_many_mistakes),
+        cmocka_unit_test(test_folder_from_name),
+        cmocka_unit_test(test_strip),
+        cmocka_unit_test(test_locale),
+        cmocka_unit_test(test_misuse),
+        cmocka_unit_test(test_short_memory),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,328 @@
+/* Core: status, memory, random numbers, checksums, files, text, grids. */
+#include <limits.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "sdm/grid.h"
+#include "sdm/internal/checksum.h"
+#include "sdm/internal/file.h"
+#include "sdm/internal/heap.h"
+#include "sdm/internal/rng.h"
+#include "sdm/internal/text.h"
+#include "sdm/internal/threads.h"
+
+static void status_text(void **state)
+{
+    (void)state;
+    sdm_error e;
+    assert_int_equal(sdm_fail(&e, SDM_E_MESH, "radius %d", 3), SDM_E_MESH);
+    assert_string_equal(e.text, "radius 3");
+    assert_int_equal(sdm_fail_in(&e, SDM_E_IO, "file %s", "a"), SDM_E_IO);
+    assert_string_equal(e.text, "file a: radius 3");
+    assert_int_equal(sdm_fail(NULL, SDM_E_ARG, "unheard"), SDM_E_ARG);
+    // text that does not fit is cut, also with a prefix
+    memset(e.text, 'x', sizeof e.text - 1);
+    e.text[sizeof e.text - 1] = '\0';
+    sdm_fail_in(&e, SDM_E_IO, "prefix");
+    assert_int_equal(strlen(e.text), sizeof e.text - 1);
+    assert_memory_equal(e.text, "prefix: xxx", 11);
+    for (int s = 0; s <= SDM_E_INTERNAL; s++)
+        assert_string_not_equal(sdm_status_name((sdm_status)s), "unknown");
+}
+
+static void memory_limits(void **state)
+{
+    (void)state;
+    sdm_error e;
+    void *p;
+    size_t n;
+    assert_int_equal(sdm_alloc(&p, SIZE_MAX / 2, 3, "block", &e), SDM_E_NOMEM);
+    assert_non_null(strstr(e.text, "block"));
+    assert_null(p);
+    assert_int_equal(sdm_mul(SIZE_MAX, 2, &n, &e), SDM_E_NOMEM);
+    assert_int_equal(sdm_mul(3, 5, &n, &e), SDM_OK);
+    assert_int_equal(n, 15);
+    assert_int_equal(sdm_alloc(&p, 0, 8, "empty", &e), SDM_OK);
+    assert_int_equal((uintptr_t)p % 64, 0);
+    sdm_free(p);
+    assert_int_equal(sdm_alloc_unset(&p, SIZE_MAX / 2, 3, "unset block", &e), SDM_E_NOMEM);
+    assert_non_null(strstr(e.text, "unset block"));
+    assert_null(p);
+    sdm_alloc_fail_after(1);
+    assert_int_equal(sdm_alloc_unset(&p, 100, 8, "unset block", &e), SDM_E_NOMEM);
+    sdm_alloc_fail_after(0);
+    assert_int_equal(sdm_alloc_unset(&p, 100, 8, "unset block", &e), SDM_OK);
+    assert_int_equal((uintptr_t)p % 64, 0);
+    memset(p, 1, 800);
+    sdm_free(p);
+    double *v;
+    assert_int_equal(SDM_ALLOC(&v, 3, "v", &e), SDM_OK);
+    assert_true(v[0] == 0 && v[2] == 0);
+    v[2] = 7;
+    assert_int_equal(sdm_grow((void **)&v, 3, 100, sizeof *v, "v", &e), SDM_OK);
+    assert_true(v[2] == 7 && v[99] == 0);
+    sdm_alloc_fail_after(1);
+    assert_int_equal(sdm_grow((void **)&v, 100, 200, sizeof *v, "v", &e), SDM_E_NOMEM);
+    assert_true(v[2] == 7); // still the caller's
+    sdm_alloc_fail_after(0);
+    sdm_free(v);
+}
+
+// vectors of the authors' known-answer tests for Philox4x32-10
+static void philox_known_answers(void **state)
+{
+    (void)state;
+    assert_true(sdm_mix64(0x9e3779b97f4a7c15u) ==
+                0xe220a8397b1dcdafu); // SplitMix64's first number of seed 0
+    uint32_t r[4];
+    sdm_rng_block(0, 0, 0, r);
+    const uint32_t zeros[4] = {0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8};
+    assert_memory_equal(r, zeros, sizeof r);
+    sdm_rng_block(UINT64_MAX, UINT64_MAX, UINT64_MAX, r);
+    const uint32_t ones[4] = {0x408f276d, 0x41c83b0e, 0xa20bc7c6, 0x6d5451fd};
+    assert_memory_equal(r, ones, sizeof r);
+}
+
+static void random_laws(void **state)
+{
+    (void)state;
+    const int n = 20000;
+    double sum = 0, square = 0, normal = 0, normal2 = 0;
+    int below[7] = {0};
+    for (int i = 0; i < n; i++) {
+        const double u = sdm_rng_uniform(5, 1, (uint64_t)i), z = sdm_rng_normal(5, 2, (uint64_t)i);
+        assert_true(u >= 0 && u < 1);
+        sum += u, square += u * u, normal += z, normal2 += z * z;
+        below[sdm_rng_below(5, 3, (uint64_t)i, 7)]++;
+    }
+    // five standard errors
+    assert_true(fabs(sum / n - 0.5) < 5 * 0.289 / sqrt(n));
+    assert_true(fabs(square / n - 1.0 / 3) < 5 * 0.298 / sqrt(n));
+    assert_true(fabs(normal / n) < 5 / sqrt(n));
+    assert_true(fabs(normal2 / n - 1) < 5 * 1.414 / sqrt(n));
+    for (int i = 0; i < 7; i++) assert_true(fabs(below[i] - n / 7.0) < 5 * sqrt(n / 7.0));
+    assert_true(sdm_rng_below(1, 1, 1, UINT64_C(1) << 40) < UINT64_C(1) << 40);
+}
+
+static void crc_known_answer(void **state)
+{
+    (void)state;
+    assert_true(sdm_crc64(0, "123456789", 9) ==
+                UINT64_C(0x995DC9BBDF1939FA)); // check value of CRC-64/XZ
+    uint8_t data[100];
+    for (int i = 0; i < 100; i++) data[i] = (uint8_t)(i * 37);
+    for (size_t cut = 0; cut <= 100; cut += 9)
+        assert_true(sdm_crc64(sdm_crc64(0, data, cut), data + cut, 100 - cut) ==
+                    sdm_crc64(0, data, 100));
+}
+
+static void numbers_and_names(void **state)
+{
+    (void)state;
+    double v;
+    int64_t i;
+    char buf[32];
+    assert_true(sdm_parse_real("-1.5e3", &v) && v == -1500);
+    for (const char *const *bad = (const char *const[]){"", "nan", "inf", "1e999", "1x", " 1",
+                                                        "0x10", "1,5", "--1", NULL};
+         *bad; bad++)
+        assert_false(sdm_parse_real(*bad, &v));
+    assert_true(sdm_parse_int("-9223372036854775808", &i) && i == INT64_MIN);
+    assert_true(sdm_parse_int("9223372036854775807", &i) && i == INT64_MAX);
+    for (const char *const *bad = (const char *const[]){"", "-", "1.0", "9223372036854775808",
+                                                        "-9223372036854775809", "1 ", NULL};
+         *bad; bad++)
+        assert_false(sdm_parse_int(*bad, &i));
+    for (int k = 0; k < 1000; k++) {
+        const double x = sdm_rng_normal(1, 1, (uint64_t)k) * pow(10, k % 40 - 20);
+        assert_true(sdm_parse_real(sdm_format_real(x, buf), &v) && v == x);
+    }
+    assert_string_equal(sdm_format_real(0.2, buf), "0.2");
+    assert_string_equal(sdm_format_real(20, buf), "20");
+    assert_string_equal(sdm_format_real(-3000, buf), "-3000");
+    const char *const names[] = {"depth", "width", "rank"};
+    assert_string_equal(sdm_nearest_name("dpeth", names, 3), "depth");
+    assert_string_equal(sdm_nearest_name("withd", names, 3), "width");
+    assert_null(sdm_nearest_name("colour", names, 3));
+}
+
+static void json_text(void **state)
+{
+    (void)state;
+    sdm_json j = {0};
+    sdm_json_open(&j, NULL, '{');
+    sdm_json_text(&j, "a", "q\"\\\n\x01");
+    sdm_json_open(&j, "b", '[');
+    sdm_json_int(&j, NULL, -3);
+    sdm_json_uint(&j, NULL, UINT64_MAX);
+    sdm_json_real(&j, NULL, 0.1);
+    sdm_json_real(&j, NULL, NAN);
+    sdm_json_close(&j, ']');
+    sdm_json_bool(&j, "c", true);
+    sdm_json_close(&j, '}');
+    assert_string_equal(j.text.data, "{\"a\": \"q\\\"\\\\\\n\\u0001\", \"b\": [-3, "
+                                     "18446744073709551615, 0.1, null], \"c\": true}");
+    sdm_json_dispose(&j);
+}
+
+static void files(void **state)
+{
+    (void)state;
+    sdm_error e;
+    char folder[] = "core_XXXXXX", path[64], deep[64];
+    assert_non_null(mkdtemp(folder));
+    snprintf(path, sizeof path, "%s/f", folder);
+    snprintf(deep, sizeof deep, "%s/a/b/c", folder);
+    assert_int_equal(sdm_make_folder(deep, &e), SDM_OK);
+    assert_int_equal(sdm_make_folder(deep, &e), SDM_OK);
+
+    // nothing under the final name before commit; the old content survives a discard
+    sdm_outfile *f;
+    assert_int_equal(sdm_outfile_open(path, &f, &e), SDM_OK);
+    assert_int_equal(sdm_outfile_printf(f, &e, "%d", 42), SDM_OK);
+    assert_int_equal(access(path, F_OK), -1);
+    assert_int_equal(sdm_outfile_commit(&f, &e), SDM_OK);
+    assert_null(f);
+    assert_int_equal(sdm_outfile_open(path, &f, &e), SDM_OK);
+    assert_int_equal(sdm_outfile_write(f, "other", 5, &e), SDM_OK);
+    char temp[128];
+    snprintf(temp, sizeof temp, "%s", sdm_outfile_temp_path(f));
+    sdm_outfile_discard(&f);
+    assert_int_equal(access(temp, F_OK), -1);
+    uint8_t *data;
+    size_t size;
+    assert_int_equal(sdm_file_read(path, 100, &data, &size, &e), SDM_OK);
+    assert_int_equal(size, 2);
+    assert_string_equal((char *)data, "42");
+    sdm_free(data);
+    uint64_t crc;
+    assert_int_equal(sdm_file_checksum(path, &crc, &e), SDM_OK);
+    assert_true(crc == sdm_crc64(0, "42", 2));
+    assert_int_equal(sdm_file_checksum(folder, &crc, &e), SDM_E_IO);
+
+    // two writers of one name: each file is whole, the last to commit stays
+    for (int last = 0; last < 2; last++) {
+        sdm_outfile *two[2];
+        for (int i = 0; i < 2; i++) assert_int_equal(sdm_outfile_open(path, &two[i], &e), SDM_OK);
+        for (int i = 0; i < 200000; i++) {
+            assert_int_equal(sdm_outfile_write(two[0], "a", 1, &e), SDM_OK);
+            if (i % 2) assert_int_equal(sdm_outfile_write(two[1], "b", 1, &e), SDM_OK);
+        }
+        for (int i = 0; i < 2; i++) {
+            const int which = i ? last : !last;
+            assert_int_equal(sdm_outfile_commit(&two[which], &e), SDM_OK);
+            assert_int_equal(sdm_file_read(path, 200000, &data, &size, &e), SDM_OK);
+            assert_int_equal(size, which ? 100000 : 200000);
+            for (size_t k = 0; k < size; k++) assert_int_equal(data[k], "ab"[which]);
+            sdm_free(data);
+        }
+    }
+    // a link that waits under the next temporary name is not followed
+    assert_int_equal(sdm_outfile_open(path, &f, &e), SDM_OK);
+    unsigned long pid, number;
+    assert_int_equal(sscanf(sdm_outfile_temp_path(f) + strlen(path), ".%lu.%lu.tmp", &pid, &number),
+                     2);
+    assert_int_equal(pid, getpid());
+    sdm_outfile_discard(&f);
+    snprintf(temp, sizeof temp, "%s.%lu.%lu.tmp", path, pid, number + 1);
+    assert_int_equal(symlink("f", temp), 0);
+    assert_int_equal(sdm_outfile_open(path, &f, &e), SDM_OK);
+    assert_string_not_equal(sdm_outfile_temp_path(f), temp);
+    sdm_outfile_discard(&f);
+    assert_int_equal(sdm_file_read(path, 200000, &data, &size, &e), SDM_OK);
+    assert_int_equal(size, 100000);
+    sdm_free(data);
+    assert_int_equal(remove(temp), 0);
+
+    assert_int_equal(sdm_file_read(path, 1, &data, &size, &e), SDM_E_FORMAT);
+    assert_int_equal(sdm_file_read("no such file", 1, &data, &size, &e), SDM_E_IO);
+    assert_int_equal(sdm_file_read(folder, 1, &data, &size, &e), SDM_E_IO);
+    assert_int_equal(sdm_outfile_open("no/such/folder/f", &f, &e), SDM_E_IO);
+    assert_int_equal(sdm_outfile_open(folder, &f, &e), SDM_E_IO);
+    assert_int_equal(sdm_make_folder(path, &e), SDM_E_IO);
+    assert_int_equal(sdm_make_folder("", &e), SDM_E_ARG);
+    remove(path);
+    assert_int_equal(mkfifo(path, 0600), 0); // would wait for a writer
+    assert_int_equal(sdm_file_read(path, 1, &data, &size, &e), SDM_E_IO);
+    assert_int_equal(sdm_outfile_open(path, &f, &e), SDM_E_IO); // would take its place
+    assert_non_null(strstr(e.text, "pipe"));
+    remove(path);
+    remove(deep);
+    snprintf(deep, sizeof deep, "%s/a/b", folder);
+    remove(deep);
+    snprintf(deep, sizeof deep, "%s/a", folder);
+    remove(deep);
+    assert_int_equal(remove(folder), 0); // nothing was left behind
+}
+
+static void numbers_of_threads(void **state)
+{
+    (void)state;
+    const int most = sdm_threads(1000000);
+    assert_true(most == 1 || most >= 64); // 1 without OpenMP
+    assert_true(most <= 64 || most <= 2 * sysconf(_SC_NPROCESSORS_CONF));
+    assert_int_equal(sdm_threads(INT_MAX), most);
+    assert_int_equal(sdm_threads(3), most == 1 ? 1 : 3);
+    assert_in_range(sdm_threads(0), 1, most);
+    assert_int_equal(sdm_thread(), 0);
+}
+
+static void grids(void **state)
+{
+    (void)state;
+    sdm_error e;
+    const int64_t n[3] = {60, 50, 40};
+    sdm_grid g = sdm_grid_centred(n, 0.2, (const double[]){1, 2, 3});
+    assert_int_equal(sdm_grid_check(&g, &e), SDM_OK);
+    assert_int_equal(sdm_grid_count(&g), 120000);
+    double w[3], i[3];
+    sdm_grid_world(&g, (const double[]){29.5, 24.5, 19.5}, w);
+    assert_true(fabs(w[0] - 1) < 1e-12 && fabs(w[1] - 2) < 1e-12 && fabs(w[2] - 3) < 1e-12);
+    const double c = cos(0.3), s = sin(0.3);
+    memcpy(g.dir, (const double[]){c, -s, 0, s, c, 0, 0, 0, -1}, sizeof g.dir);
+    g.spacing[1] = 0.5;
+    assert_int_equal(sdm_grid_check(&g, &e), SDM_OK);
+    sdm_grid_world(&g, (const double[]){3, 4, 5}, w);
+    sdm_grid_index(&g, w, i);
+    assert_true(fabs(i[0] - 3) < 1e-12 && fabs(i[1] - 4) < 1e-12 && fabs(i[2] - 5) < 1e-12);
+
+    sdm_grid bad = g;
+    bad.n[1] = 0;
+    assert_int_equal(sdm_grid_check(&bad, &e), SDM_E_ARG);
+    assert_non_null(strstr(e.text, "along y"));
+    bad = g, bad.spacing[2] = NAN;
+    assert_int_equal(sdm_grid_check(&bad, &e), SDM_E_ARG);
+    bad = g, bad.origin[0] = INFINITY;
+    assert_int_equal(sdm_grid_check(&bad, &e), SDM_E_ARG);
+    bad = g, bad.dir[0] = 2;
+    assert_int_equal(sdm_grid_check(&bad, &e), SDM_E_ARG);
+    bad = g, bad.n[0] = bad.n[1] = bad.n[2] = 1 << 20;
+    assert_int_equal(sdm_grid_check(&bad, &e), SDM_E_ARG);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(status_text),
+        cmocka_unit_test(memory_limits),
+        cmocka_unit_test(philox_known_answers),
+        cmocka_unit_test(random_laws),
+        cmocka_unit_test(crc_known_answer),
+        cmocka_unit_test(numbers_and_names),
+        cmocka_unit_test(json_text),
+        cmocka_unit_test(files),
+        cmocka_unit_test(numbers_of_threads),
+        cmocka_unit_test(grids),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,419 @@
+/* Pictures: the PNG decoded by a small reader of our own, contours and curves where they belong,
+ * every glyph drawn. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "picture/panel.h"
+#include "png_reader.h"
+#include "sdm/internal/heap.h"
+#include "sdm/internal/rng.h"
+#include "sdm/picture.h"
+
+static bool is_colour(const unsigned char *p, int r, int g, int b)
+{
+    return abs(p[0] - r) < 12 && abs(p[1] - g) < 12 && abs(p[2] - b) < 12;
+}
+
+static void test_png_round_trip(void **state)
+{
+    (void)state;
+    static const int size[][2] = {{1, 1}, {37, 23}, {400, 300}};
+    for (size_t k = 0; k < 3; k++) {
+        sdm_canvas c;
+        assert_int_equal(sdm_canvas_create(&c, size[k][0], size[k][1], NULL), SDM_OK);
+        const size_t n = 3 * (size_t)c.w * (size_t)c.h;
+        /* noise above, a ramp below: every filter has its chance */
+        for (size_t i = 0; i < n; i++)
+            c.rgb[i] = (uint8_t)(i < n / 2 ? sdm_rng_below(1, 0, i, 256) : i / 7);
+        assert_int_equal(sdm_png_write("test_picture_a.png", &c, NULL), SDM_OK);
+        picture p = read_png("test_picture_a.png");
+        assert_true(p.w == c.w && p.h == c.h);
+        assert_memory_equal(p.rgb, c.rgb, n);
+        free(p.rgb);
+        sdm_canvas_dispose(&c);
+    }
+}
+
+/* A circle that misses every voxel centre: each inked pixel is near it, and it is inked all around.
+ */
+static void test_contour_is_subpixel(void **state)
+{
+    (void)state;
+    float v[40 * 30];
+    const double cx = 19.3, cy = 14.6, radius = 9.37, pixels = 10;
+    for (int i = 0; i < 1200; i++) v[i] = (float)(hypot(i % 40 - cx, i / 40 - cy) - radius);
+    const sdm_slice s = {v, {40, 30}, {1, 40}};
+    const sdm_box box = {20, 10, 400, 300};
+    sdm_canvas c;
+    assert_int_equal(sdm_canvas_create(&c, 440, 320, NULL), SDM_OK);
+    sdm_panel_contour(&c, box, &s, 0, 2, (sdm_colour){255, 0, 0}, (sdm_colour){255, 255, 255});
+    bool seen[360] = {false};
+    for (int y = 0; y < c.h; y++)
+        for (int x = 0; x < c.w; x++) {
+            const double dx = x + 0.5 - box.x - (cx + 0.5) * pixels,
+                         dy = box.y + box.h - (y + 0.5) - (cy + 0.5) * pixels;
+            const bool red = c.rgb[3 * (y * c.w + x) + 1] < 128;
+            const double off = fabs(hypot(dx, dy) - radius * pixels);
+            if (red) assert_true(off < 1.4);
+            if (off < 0.4) assert_true(red);
+            if (red) seen[(int)((atan2(dy, dx) + 3.1415926535) / 6.2831853072 * 360) % 360] = true;
+        }
+    for (int i = 0; i < 360; i++) assert_true(seen[i]);
+    sdm_canvas_dispose(&c);
+}
+
+/* A ball in a grid of three spacings: round in all three slices, of one scale, cut through its
+ * middle. */
+static float *ball_map(sdm_grid *g, double radius)
+{
+    *g = (sdm_grid){.n = {40, 28, 25},
+                    .origin = {-5, 2, 7},
+                    .spacing = {0.25, 0.4, 0.5},
+                    .dir = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    float *v = malloc(sdm_grid_count(g) * sizeof *v);
+    assert_non_null(v);
+    for (int i = 0; i < 40 * 28 * 25; i++) {
+        const double index[3] = {i % 40, i / 40 % 28, i / 1120};
+        double x[3];
+        sdm_grid_world(g, index, x);
+        v[i] = (float)(sqrt(x[0] * x[0] + (x[1] - 7) * (x[1] - 7) + (x[2] - 13) * (x[2] - 13)) -
+                       radius);
+    }
+    return v;
+}
+
+static void test_slices(void **state)
+{
+    (void)state;
+    sdm_grid g;
+    float *v = ball_map(&g, 3), *e = malloc(sdm_grid_count(&g) * sizeof *e);
+    const float levels[2] = {0, 1};
+    assert_non_null(e);
+    for (size_t i = 0; i < sdm_grid_count(&g); i++) e[i] = (float)fabs(0.01 * sin((double)i));
+    const sdm_picture_map maps[2] = {{"exact", v, false}, {"error", e, true}};
+    sdm_error err;
+    assert_int_equal(sdm_picture_slices("test_picture_s.png", &g, maps, 1, levels, 2, &err),
+                     SDM_OK);
+    picture p = read_png("test_picture_s.png");
+    int runs = 0, top = -1, left = p.w, right = -1, yellow = 0, first = 0;
+    for (int y = 0; y < p.h; y++) {
+        int n = 0;
+        for (int x = 0; x < p.w; x++) {
+            const unsigned char *pixel = p.rgb + 3 * ((size_t)y * (size_t)p.w + (size_t)x);
+            yellow += is_colour(pixel, 255, 214, 10);
+            if (!is_colour(pixel, 214, 28, 36)) continue;
+            n++;
+            left = x < left ? x : left;
+            right = x > right ? x : right;
+        }
+        if (n && top < 0) top = y;
+        if (n || top < 0) continue;
+        const int height = y - top, width = right - left + 1;
+        if (height > 20) { /* else it is the key */
+            assert_true(abs(height - width) <= 3);
+            if (!runs) first = height;
+            assert_true(abs(height - first) <= 3);
+            runs++;
+        }
+        top = right = -1;
+        left = p.w;
+    }
+    assert_int_equal(runs, 3);
+    assert_true(yellow > 500);
+    /* the widest axis is 12.5 mm in 340 or 420 pixels */
+    assert_true(first > 6 * 26 && first < 6 * 38);
+    assert_true(is_colour(p.rgb, 255, 255, 255));
+    const int one = p.w;
+    free(p.rgb);
+    assert_int_equal(sdm_picture_slices("test_picture_s.png", &g, maps, 2, levels, 1, &err),
+                     SDM_OK);
+    p = read_png("test_picture_s.png");
+    assert_true(p.w > one + 200);
+    free(p.rgb);
+    free(v);
+    free(e);
+}
+
+/* Whatever the values and the grid: a picture comes out. */
+static void test_slices_of_odd_maps(void **state)
+{
+    (void)state;
+    static float v[1000];
+    const float level = 0;
+    const sdm_picture_map maps[2] = {
+        {NULL, v, false},
+        {"a title that is much longer than its column is wide, \xFF\xC3", v, true}};
+    static const int64_t sizes[][3] = {
+        {1, 1, 1}, {1000, 1, 1}, {1, 1, 1000}, {10, 10, 10}, {2, 500, 1}};
+    for (size_t k = 0; k < 5; k++)
+        for (int fill = 0; fill < 4; fill++) {
+            sdm_grid g = {.spacing = {1, 2, 0.01}, .dir = {0.6, -0.8, 0, 0.8, 0.6, 0, 0, 0, -1}};
+            memcpy(g.n, sizes[k], sizeof g.n);
+            for (int i = 0; i < 1000; i++)
+                v[i] = fill == 0 ? 0 : fill == 1 ? NAN : fill == 2 ? -1e30f : (float)(i % 7 - 3);
+            assert_int_equal(sdm_picture_slices("test_picture_o.png", &g, maps, 2, &level, 1, NULL),
+                             SDM_OK);
+            picture p = read_png("test_picture_o.png");
+            free(p.rgb);
+        }
+}
+
+/* A bright ball on a dark ground, two contours: three circles of the first, side by side, white
+ * within and black far outside. */
+static void test_overlay(void **state)
+{
+    (void)state;
+    sdm_grid g;
+    float *v = ball_map(&g, 3), *w = ball_map(&g, 2),
+          *image = malloc(sdm_grid_count(&g) * sizeof *image);
+    assert_non_null(image);
+    for (size_t i = 0; i < sdm_grid_count(&g); i++) image[i] = v[i] < 0 ? 900 : -100;
+    image[0] = NAN;
+    const sdm_picture_map maps[2] = {{"fitted", v, false}, {"reference", w, true}};
+    assert_int_equal(sdm_picture_overlay("test_picture_w.png", &g, image, maps, 2, "a ball", NULL),
+                     SDM_OK);
+    picture p = read_png("test_picture_w.png");
+    int circles = 0, left = -1, yellow = 0;
+    for (int x = 0; x < p.w; x++) {
+        int bottom = -1;
+        for (int y = 0; y < p.h; y++) {
+            const unsigned char *pixel = p.rgb + 3 * ((size_t)y * (size_t)p.w + (size_t)x);
+            yellow += is_colour(pixel, 255, 214, 10);
+            if (!is_colour(pixel, 232, 40, 44)) continue;
+            if (y < p.h - 40) bottom = y; /* below it is the key */
+        }
+        if (bottom >= 0 && left < 0) left = x;
+        if (bottom >= 0 || left < 0) continue;
+        const int width = x - left, middle = left + width / 2;
+        int low = p.h, high = -1;
+        for (int y = 0; y < p.h - 40; y++) {
+            const unsigned char *pixel = p.rgb + 3 * ((size_t)y * (size_t)p.w + (size_t)middle);
+            if (is_colour(pixel, 232, 40, 44)) low = y < low ? y : low, high = y;
+        }
+        const unsigned char *inside = p.rgb + 3 * ((size_t)((low + high) / 2) * (size_t)p.w +
+                                                   (size_t)middle),
+                            *outside =
+                                p.rgb + 3 * ((size_t)(high + 8) * (size_t)p.w + (size_t)middle);
+        assert_true(abs(high + 1 - low - width) <= 3);
+        assert_true(width > 6 * 26 &&
+                    width < 6 * 38); /* 6 mm; the widest axis is 12.5 mm in 340 or 420 pixels */
+        assert_true(is_colour(inside, 255, 255, 255));
+        assert_true(is_colour(outside, 0, 0, 0));
+        circles++;
+        left = -1;
+    }
+    assert_int_equal(circles, 3);
+    assert_true(yellow > 500);
+    free(p.rgb);
+
+    /* an image without values, one value, a single voxel */
+    for (size_t i = 0; i < sdm_grid_count(&g); i++) image[i] = NAN;
+    assert_int_equal(sdm_picture_overlay("test_picture_w.png", &g, image, maps, 1, NULL, NULL),
+                     SDM_OK);
+    const sdm_grid one = {.n = {1, 1, 1}, .spacing = {1, 2, 3}, .dir = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    assert_int_equal(sdm_picture_overlay("test_picture_w.png", &one, v, maps, 2, NULL, NULL),
+                     SDM_OK);
+
+    const sdm_picture_map none = {"a", NULL, false};
+    assert_int_equal(sdm_picture_overlay(NULL, &g, v, maps, 1, NULL, NULL), SDM_E_ARG);
+    assert_int_equal(sdm_picture_overlay("a.png", NULL, v, maps, 1, NULL, NULL), SDM_E_ARG);
+    assert_int_equal(sdm_picture_overlay("a.png", &g, NULL, maps, 1, NULL, NULL), SDM_E_ARG);
+    assert_int_equal(sdm_picture_overlay("a.png", &g, v, maps, 0, NULL, NULL), SDM_E_ARG);
+    assert_int_equal(sdm_picture_overlay("a.png", &g, v, maps, 5, NULL, NULL), SDM_E_ARG);
+    assert_int_equal(sdm_picture_overlay("a.png", &g, v, &none, 1, NULL, NULL), SDM_E_ARG);
+    assert_int_equal(sdm_picture_overlay("no_such_folder/a.png", &g, v, maps, 1, NULL, NULL),
+                     SDM_E_IO);
+    free(image);
+    free(w);
+    free(v);
+}
+
+static void test_plot(void **state)
+{
+    (void)state;
+    double x[101], y[101], z[101];
+    for (int i = 0; i < 101; i++) {
+        x[i] = i;
+        y[i] = pow(10, -i / 25.0);
+        z[i] = i == 50 ? NAN : i == 20 ? -1 : 0.01;
+    }
+    const sdm_curve curves[2] = {{"falling", x, y, 101}, {"", x, z, 101}};
+    assert_int_equal(
+        sdm_picture_plot("test_picture_p.png", "title", "x", "y", true, curves, 2, NULL), SDM_OK);
+    picture p = read_png("test_picture_p.png");
+    /* a straight line on a logarithmic axis: the middle of its pixels is the middle of the plot,
+     * and it is straight */
+    double sx = 0, sy = 0, sxx = 0, syy = 0, sxy = 0, n = 0;
+    for (int row = 130; row < p.h; row++) /* below the legend */
+        for (int col = 0; col < p.w; col++) {
+            if (!is_colour(p.rgb + 3 * ((size_t)row * (size_t)p.w + (size_t)col), 0, 105, 180))
+                continue;
+            n++;
+            sx += col;
+            sy += row;
+            sxx += (double)col * col;
+            syy += (double)row * row;
+            sxy += (double)col * row;
+        }
+    assert_true(n > 400);
+    const double r = (n * sxy - sx * sy) / sqrt((n * sxx - sx * sx) * (n * syy - sy * sy));
+    assert_true(r > 0.9999);
+    free(p.rgb);
+}
+
+static void test_odd_plots(void **state)
+{
+    (void)state;
+    static const double x[4] = {1, 2, INFINITY, 4}, zero[4] = {0}, huge[4] = {1e300, -1e300, 1, 2},
+                        one[1] = {5}, flat[4] = {7, 7, 7, 7};
+    const sdm_curve odd[] = {{"zero", x, zero, 4},
+                             {"huge", x, huge, 4},
+                             {"one", one, one, 1},
+                             {NULL, NULL, NULL, 0},
+                             {"flat", x, flat, 4}};
+    for (size_t i = 0; i < 5; i++)
+        for (int log_y = 0; log_y < 2; log_y++) {
+            assert_int_equal(
+                sdm_picture_plot("test_picture_q.png", NULL, NULL, NULL, log_y, &odd[i], 1, NULL),
+                SDM_OK);
+            picture p = read_png("test_picture_q.png");
+            free(p.rgb);
+        }
+}
+
+static void test_glyphs(void **state)
+{
+    (void)state;
+    sdm_canvas c;
+    assert_int_equal(sdm_canvas_create(&c, 200, 120, NULL), SDM_OK);
+    uint8_t *last = malloc(200 * 120 * 3);
+    assert_non_null(last);
+    for (int code = '!'; code <= '~'; code++) {
+        const char text[2] = {(char)code, 0};
+        memset(c.rgb, 255, 200 * 120 * 3);
+        sdm_canvas_text(&c, 60, 80, (sdm_type){.size = 56}, text);
+        int low = 200, high = -1;
+        for (int i = 0; i < 200 * 120; i++)
+            if (c.rgb[3 * i] < 128) {
+                low = i % 200 < low ? i % 200 : low;
+                high = i % 200 > high ? i % 200 : high;
+            }
+        /* something is there, inside the glyph's width, and not the glyph before */
+        assert_true(high >= low && low > 52 && high < 68 + sdm_text_width(56, text));
+        assert_true(memcmp(last, c.rgb, 200 * 120 * 3) != 0);
+        memcpy(last, c.rgb, 200 * 120 * 3);
+    }
+    assert_true(sdm_text_width(10, "mm\xC2\xB2") > sdm_text_width(10, "mm"));
+    sdm_canvas_text(&c, 1e9, -1e9, (sdm_type){.size = 1e6, .halo = true, .upwards = true},
+                    "far away \xE2\x88");
+    free(last);
+    sdm_canvas_dispose(&c);
+}
+
+static void test_colours(void **state)
+{
+    (void)state;
+    /* lightness rises along the error map, and falls to both sides of zero on the others */
+    int before = -1;
+    for (int i = 0; i <= 100; i++) {
+        const sdm_colour c = sdm_map_colour(SDM_MAP_ERROR, 0, 1, i / 100.0);
+        const int grey = 2 * c.r + 7 * c.g + c.b;
+        assert_true(grey >= before);
+        before = grey;
+    }
+    for (int map = 0; map < 3; map += 2)
+        for (int sign = -1; sign <= 1; sign += 2) {
+            before = 99999;
+            for (int i = 0; i <= 100; i++) {
+                const sdm_colour c = sdm_map_colour(map ? SDM_MAP_SIGNED : SDM_MAP_DISTANCE, -2, 7,
+                                                    sign * (sign < 0 ? 2 : 7) * i / 100.0);
+                const int grey = 2 * c.r + 7 * c.g + c.b;
+                assert_true(grey <= before + 3);
+                before = grey;
+            }
+        }
+    const sdm_colour inside = sdm_map_colour(SDM_MAP_DISTANCE, -1, 5, -1),
+                     outside = sdm_map_colour(SDM_MAP_DISTANCE, -1, 5, 5);
+    assert_true(inside.r > inside.b && outside.b > outside.r);
+    const sdm_colour none = sdm_map_colour(SDM_MAP_ERROR, 0, 1, NAN);
+    assert_true(none.r == none.g && none.g == none.b);
+}
+
+static void test_ticks(void **state)
+{
+    (void)state;
+    for (uint64_t i = 0; i < 500; i++) {
+        const double low = sdm_rng_normal(5, 0, i) * 10,
+                     range = pow(10, 8 * sdm_rng_uniform(5, 1, i) - 4);
+        double first, step;
+        const int n = sdm_ticks(low, low + range, 6, &first, &step);
+        assert_true(n >= 2 && n <= 8);
+        assert_true(first >= low - 1e-6 * range &&
+                    first + (n - 1) * step <= low + range * (1 + 1e-6));
+        const double lead = step / pow(10, floor(log10(step) + 1e-9));
+        assert_true(fabs(lead - 1) < 1e-6 || fabs(lead - 2) < 1e-6 || fabs(lead - 5) < 1e-6);
+    }
+    char text[32];
+    assert_string_equal(sdm_tick_text(0.30000000000000004, 0.1, text), "0.3");
+    assert_string_equal(sdm_tick_text(-1e-17, 0.5, text), "0.0");
+    assert_string_equal(sdm_tick_text(-20, 10, text), "\xE2\x88\x92"
+                                                      "20");
+}
+
+static void test_misuse(void **state)
+{
+    (void)state;
+    sdm_grid g;
+    float *v = ball_map(&g, 3);
+    const float level = 0;
+    const double x[2] = {0, 1};
+    const sdm_picture_map map = {"a", v, false}, none = {"a", NULL, false};
+    const sdm_curve curve = {"a", x, x, 2}, broken = {"a", x, NULL, 2};
+    sdm_error err;
+    assert_int_equal(sdm_picture_slices(NULL, &g, &map, 1, &level, 1, &err), SDM_E_ARG);
+    assert_int_equal(sdm_picture_slices("a.png", NULL, &map, 1, &level, 1, &err), SDM_E_ARG);
+    assert_int_equal(sdm_picture_slices("a.png", &g, NULL, 1, &level, 1, &err), SDM_E_ARG);
+    assert_int_equal(sdm_picture_slices("a.png", &g, &map, 0, &level, 1, &err), SDM_E_ARG);
+    assert_int_equal(sdm_picture_slices("a.png", &g, &map, 17, &level, 1, &err), SDM_E_ARG);
+    assert_int_equal(sdm_picture_slices("a.png", &g, &map, 1, NULL, 1, &err), SDM_E_ARG);
+    assert_int_equal(sdm_picture_slices("a.png", &g, &none, 1, &level, 1, &err), SDM_E_ARG);
+    assert_int_equal(sdm_picture_slices("no_such_folder/a.png", &g, &map, 1, &level, 1, &err),
+                     SDM_E_IO);
+    assert_int_equal(sdm_picture_plot(NULL, "", "", "", false, &curve, 1, &err), SDM_E_ARG);
+    assert_int_equal(sdm_picture_plot("a.png", "", "", "", false, NULL, 1, &err), SDM_E_ARG);
+    assert_int_equal(sdm_picture_plot("a.png", "", "", "", false, &curve, 0, &err), SDM_E_ARG);
+    assert_int_equal(sdm_picture_plot("a.png", "", "", "", false, &broken, 1, &err), SDM_E_ARG);
+    assert_int_equal(sdm_picture_plot("no_such_folder/a.png", "", "", "", false, &curve, 1, &err),
+                     SDM_E_IO);
+    for (unsigned long n = 1; n < 9; n++) {
+        sdm_alloc_fail_after(n);
+        const sdm_status s =
+            sdm_picture_plot("test_picture_none.png", "", "", "", false, &curve, 1, &err);
+        sdm_alloc_fail_after(0);
+        if (s == SDM_OK) break;
+        assert_int_equal(s, SDM_E_NOMEM);
+        assert_null(fopen("test_picture_none.png", "rb"));
+    }
+    remove("test_picture_none.png");
+    free(v);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_png_round_trip), cmocka_unit_test(test_contour_is_subpixel),
+        cmocka_unit_test(test_slices),         cmocka_unit_test(test_slices_of_odd_maps),
+        cmocka_unit_test(test_overlay),        cmocka_unit_test(test_plot),
+        cmocka_unit_test(test_odd_plots),      cmocka_unit_test(test_glyphs),
+        cmocka_unit_test(test_colours),        cmocka_unit_test(test_ticks),
+        cmocka_unit_test(test_misuse),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

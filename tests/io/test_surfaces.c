@@ -1,0 +1,103 @@
+/* Pictures of surfaces: what is in front, colours, scale, misuse. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "png_reader.h"
+#include "sdm/internal/heap.h"
+#include "sdm/picture.h"
+
+/* Adds the square |x|, |y| <= half at height z, counter-clockwise from above. */
+static void add_square(sdm_mesh *m, double *values, double half, double z, double value)
+{
+    sdm_error err;
+    const size_t v = m->n_vert, t = m->n_tri;
+    assert_int_equal(sdm_mesh_reserve(m, v + 4, t + 2, &err), SDM_OK);
+    for (size_t i = 0; i < 4; i++) {
+        m->vert[3 * (v + i)] = i == 1 || i == 2 ? half : -half;
+        m->vert[3 * (v + i) + 1] = i > 1 ? half : -half;
+        m->vert[3 * (v + i) + 2] = z;
+        values[v + i] = value;
+    }
+    const uint32_t k = (uint32_t)v, corners[6] = {k, k + 1, k + 2, k, k + 2, k + 3};
+    memcpy(m->tri + 3 * t, corners, sizeof corners);
+}
+
+/* A small square above a large one: what is nearer hides what is behind in whatever order they
+ * come; colours by sign; to scale. */
+static void test_surfaces(void **state)
+{
+    (void)state;
+    sdm_error err;
+    picture p[2];
+    for (int order = 0; order < 2; order++) {
+        sdm_mesh m = {0};
+        double values[8];
+        for (int k = 0; k < 2; k++)
+            if (k == order)
+                add_square(&m, values, 5, 0, 1);
+            else
+                add_square(&m, values, 2, 1, -1);
+        const sdm_picture_surface s = {"squares", &m, values};
+        if (sdm_picture_surfaces("test_surfaces.png", &s, 1, "distance", &err))
+            fail_msg("%s", err.text);
+        p[order] = read_png("test_surfaces.png");
+        sdm_mesh_dispose(&m);
+    }
+    assert_int_equal(p[0].w, p[1].w);
+    assert_int_equal(p[0].h, p[1].h);
+    assert_memory_equal(p[0].rgb, p[1].rgb, 3 * (size_t)p[0].w * (size_t)p[0].h);
+    /* the oblique view is the widest, 10 mm (cos 30 + sin 30) on 400 pixels; the view from above
+     * comes first */
+    const double pixels = 400 / (10 * (0.5 * sqrt(3) + 0.5)), room = 10 * pixels + 40;
+    double green = 0, magenta = 0;
+    for (int y = 46; y < 46 + room; y++)
+        for (int x = 0; x < p[0].w; x++) {
+            const unsigned char *c = p[0].rgb + 3 * ((size_t)y * (size_t)p[0].w + (size_t)x);
+            green += c[1] > c[0] + 20 && c[1] > c[2] + 10;
+            magenta += c[0] > c[1] + 20 && c[2] > c[1] + 10;
+        }
+    assert_true(fabs(green / (16 * pixels * pixels) - 1) < 0.03);
+    assert_true(fabs(magenta / (84 * pixels * pixels) - 1) < 0.03);
+    free(p[0].rgb);
+    free(p[1].rgb);
+}
+
+static void test_misuse(void **state)
+{
+    (void)state;
+    sdm_error err;
+    sdm_mesh mesh = {0};
+    double values[4];
+    const sdm_picture_surface surface = {"a", &mesh, values}, missing = {"a", NULL, NULL};
+    assert_int_equal(sdm_picture_surfaces("a.png", &surface, 1, "", &err),
+                     SDM_E_MESH); /* no triangle */
+    add_square(&mesh, values, 1, 0, NAN);
+    assert_int_equal(sdm_picture_surfaces("a.png", &surface, 0, "", &err), SDM_E_ARG);
+    assert_int_equal(sdm_picture_surfaces("a.png", &surface, 9, "", &err), SDM_E_ARG);
+    assert_int_equal(sdm_picture_surfaces("a.png", &missing, 1, "", &err), SDM_E_ARG);
+    assert_int_equal(sdm_picture_surfaces("a.png", NULL, 1, "", &err), SDM_E_ARG);
+    assert_int_equal(sdm_picture_surfaces("a.png", &surface, 1, NULL, &err), SDM_E_ARG);
+    assert_int_equal(sdm_picture_surfaces("no_such_folder/a.png", &surface, 1, "", &err), SDM_E_IO);
+    for (unsigned long n = 1; n < 5; n++) {
+        sdm_alloc_fail_after(n);
+        const sdm_status s = sdm_picture_surfaces("test_picture_none.png", &surface, 1, "", &err);
+        sdm_alloc_fail_after(0);
+        assert_int_equal(s, SDM_E_NOMEM);
+    }
+    sdm_mesh_dispose(&mesh);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_surfaces),
+        cmocka_unit_test(test_misuse),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

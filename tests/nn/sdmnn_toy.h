@@ -1,0 +1,69 @@
+/* A small sdmnn network with random weights, and its model. */
+#ifndef TEST_SDMNN_TOY_H
+#define TEST_SDMNN_TOY_H
+
+#include <stdio.h>
+
+#include "sdm/internal/kernels.h"
+#include "sdm/internal/rng.h"
+#include "sdm/internal/sdmnn.h"
+#include "sdm/memory.h"
+
+enum { P = 3, VOXELS = 11 * 6 * 7 };
+
+static const sdm_sdmnn_arch ARCH = {.n_params = P,
+                                    .n = {11, 6, 7},
+                                    .depth = 2,
+                                    .channels = 4,
+                                    .width = 70,
+                                    .block = 3,
+                                    .dropout = 0.2};
+
+typedef struct toy {
+    sdm_model_param params[P];
+    sdm_model_info info;
+    sdm_sdmnn_spec spec;
+    float *weights;
+    size_t n;
+} toy;
+
+static inline void make(toy *t, bool half, int activation)
+{
+    *t = (toy){0};
+    for (int i = 0; i < P; i++) {
+        snprintf(t->params[i].name, sizeof t->params[i].name, "p%d", i);
+        snprintf(t->params[i].unit, sizeof t->params[i].unit, "mm");
+        t->params[i].min = -1.0 - i, t->params[i].max = 2.0 + i, t->params[i].def = 0.5;
+    }
+    t->info = (sdm_model_info){
+        .n_params = P,
+        .params = t->params,
+        .grid = sdm_grid_centred((const int64_t[]){11, 6, 7}, 0.2, (const double[]){1, 2, 3}),
+        .config = "seed: 7\n"};
+    snprintf(t->info.shape, sizeof t->info.shape, "toy");
+    t->spec = (sdm_sdmnn_spec){.info = &t->info, .arch = ARCH, .half = half};
+    t->spec.arch.activation = activation;
+    t->n = sdm_sdmnn_count(&t->spec.arch);
+    assert_int_equal(SDM_ALLOC(&t->weights, t->n, "toy", NULL), SDM_OK);
+    sdm_sdmnn_init(&t->spec.arch, 1, 2, t->weights);
+    for (size_t i = 0; i < t->n; i++) {
+        t->weights[i] += 0.02f * (float)sdm_rng_normal(3, 5, i);
+        if (half)
+            t->weights[i] = sdm_half_to_float(
+                sdm_half_from_float(t->weights[i])); // nothing is lost in the file
+    }
+    t->spec.weights = t->weights;
+}
+
+static inline sdm_model *open_toy(const toy *t)
+{
+    uint8_t *bytes;
+    size_t size;
+    sdm_model *m;
+    assert_int_equal(sdm_sdmnn_build(&t->spec, &bytes, &size, NULL), SDM_OK);
+    assert_int_equal(sdm_model_open_memory("toy", bytes, size, &m, NULL), SDM_OK);
+    sdm_free(bytes);
+    return m;
+}
+
+#endif

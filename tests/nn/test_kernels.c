@@ -1,0 +1,493 @@
+/* Dense kernels against plain loops in double; the same bits for any number of threads. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "sdm/internal/kernels.h"
+#include "sdm/internal/processor.h"
+#include "sdm/internal/rng.h"
+#include "sdm/memory.h"
+
+static int level; // of sdm_processor_select()
+
+static float *random_floats(size_t n, uint64_t stream)
+{
+    float *v;
+    assert_int_equal(SDM_ALLOC(&v, n, "test", NULL), SDM_OK);
+    for (size_t i = 0; i < n; i++) v[i] = (float)(sdm_rng_uniform(3, stream, i) - 0.5);
+    return v;
+}
+
+static void check_product(size_t m, size_t n, size_t k, bool ta, bool tb, bool add)
+{
+    float *a = random_floats(m * k, 1), *b = random_floats(k * n, 2), *c = random_floats(m * n, 3),
+          *old = random_floats(m * n, 3);
+    const sdm_view va = ta ? (sdm_view){a, 1, m} : (sdm_view){a, k, 1},
+                   vb = tb ? (sdm_view){b, 1, k} : (sdm_view){b, n, 1};
+    sdm_gemm(m, n, k, va, vb, add, c, n, 2);
+    for (size_t i = 0; i < m; i++) {
+        for (size_t j = 0; j < n; j++) {
+            double s = add ? old[i * n + j] : 0;
+            for (size_t p = 0; p < k; p++)
+                s += (double)va.data[i * va.row + p * va.col] * vb.data[p * vb.row + j * vb.col];
+            assert_true(fabs(s - c[i * n + j]) <= 1e-6 * sqrt((double)k) + 1e-6);
+        }
+    }
+    sdm_free(a);
+    sdm_free(b);
+    sdm_free(c);
+    sdm_free(old);
+}
+
+static void product(void **state)
+{
+    (void)state;
+    const size_t sizes[][3] = {{1, 1, 1},      {7, 5, 3},     {6, 16, 256}, {97, 129, 257},
+                               {200, 33, 520}, {12, 32, 600}, {1, 300, 40}, {5, 4, 0}};
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
+        for (int mode = 0; mode < 8; mode++)
+            check_product(sizes[i][0], sizes[i][1], sizes[i][2], mode & 1, mode & 2, mode & 4);
+}
+
+static void same_bits_for_threads(void **state)
+{
+    (void)state;
+    const size_t m = 300, n = 280, k = 700;
+    float *a = random_floats(m * k, 1), *b = random_floats(k * n, 2), *c1 = random_floats(m * n, 3),
+          *c = random_floats(m * n, 3);
+    sdm_gemm(m, n, k, (sdm_view){a, k, 1}, (sdm_view){b, n, 1}, false, c1, n, 1);
+    for (int threads = 2; threads <= 5; threads++) {
+        sdm_gemm(m, n, k, (sdm_view){a, k, 1}, (sdm_view){b, n, 1}, false, c, n, threads);
+        assert_memory_equal(c, c1, m * n * sizeof *c);
+    }
+    sdm_free(a);
+    sdm_free(b);
+    sdm_free(c1);
+    sdm_free(c);
+}
+
+static void half_precision(void **state)
+{
+    (void)state;
+    for (unsigned h = 0; h < 65536; h++) { // every finite half survives the way to float and back
+        if ((h >> 10 & 31) == 31) continue;
+        assert_int_equal(sdm_half_from_float(sdm_half_to_float((uint16_t)h)), h);
+    }
+    assert_int_equal(sdm_half_from_float(1.0f), 0x3c00);
+    assert_int_equal(sdm_half_from_float(1.0f + 0x1p-11f), 0x3c00); // tie to even
+    assert_int_equal(sdm_half_from_float(1.0f + 0x1p-11f + 0x1p-20f), 0x3c01);
+    assert_int_equal(sdm_half_from_float(65504.0f), 0x7bff);
+    assert_int_equal(sdm_half_from_float(-70000.0f), 0xfc00);
+    assert_int_equal(sdm_half_from_float(INFINITY), 0x7c00);
+    assert_int_equal(sdm_half_from_float(NAN) & 0x7c00, 0x7c00);
+    assert_true(isnan(sdm_half_to_float(0x7e00)) && isinf(sdm_half_to_float(0x7c00)));
+}
+
+// every instruction set that this machine has, not only the one that is chosen
+static void half_in_every_instruction_set(void **state)
+{
+    (void)state;
+    uint16_t *h;
+    float *y;
+    const float one = 1;
+    assert_int_equal(SDM_ALLOC(&h, 65536, "h", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&y, 65536, "y", NULL), SDM_OK);
+    for (unsigned i = 0; i < 65536; i++) h[i] = (uint16_t)i;
+    for (int isa = 0; isa < SDM_PROCESSOR_LEVELS; isa++) {
+        if (sdm_processor_select(isa) != isa) continue;
+        sdm_panel_f16(1, 65536, 1, h, &one, 0, y, 0); // a layer of one input, 1: its weights
+        for (unsigned i = 0; i < 65536; i++) {
+            const float want = sdm_half_to_float((uint16_t)i);
+            if (isnan(want))
+                assert_true(isnan(y[i]));
+            else
+                assert_true(y[i] == want);
+        }
+    }
+    sdm_processor_select(-1);
+    sdm_free(h);
+    sdm_free(y);
+}
+
+// layers of every number of rows and of outputs around the sizes of the kernels, in every
+// instruction set
+static void panels(void **state)
+{
+    (void)state;
+    enum { K = 37, ROWS = 13, MOST = 160 };
+    float *w = random_floats(MOST * K, 1), *x = random_floats(ROWS * K, 2),
+          *back = random_floats(MOST, 3);
+    float *packed, *y, single[MOST], dx[K];
+    uint16_t *half;
+    assert_int_equal(SDM_ALLOC(&packed, sdm_panel_count(MOST, K), "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&half, sdm_panel_count(MOST, K), "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&y, ROWS * MOST, "t", NULL), SDM_OK);
+    assert_int_equal(sdm_panel_count(150, K), 160 * K);
+    for (int isa = 0; isa < SDM_PROCESSOR_LEVELS; isa++) {
+        if (sdm_processor_select(isa) != isa) continue;
+        for (size_t outputs = 1; outputs <= 150; outputs += outputs < 70 ? 1 : 40) {
+            sdm_panel_pack_f32(outputs, K, (sdm_view){w, K, 1}, packed);
+            sdm_panel_pack_f16(outputs, K, (sdm_view){w, K, 1}, half);
+            for (int use_half = 0; use_half < 2; use_half++) {
+                for (size_t rows = 1; rows <= ROWS; rows += rows < 7 ? 1 : 6) {
+                    if (use_half)
+                        sdm_panel_f16(rows, outputs, K, half, x, K, y, MOST);
+                    else
+                        sdm_panel_f32(rows, outputs, K, packed, x, K, y, MOST);
+                    for (size_t r = 0; r < rows; r++) {
+                        for (size_t o = 0; o < outputs; o++) {
+                            double s = 0;
+                            for (size_t i = 0; i < K; i++)
+                                s +=
+                                    (double)x[r * K + i] *
+                                    (use_half ? sdm_half_to_float(sdm_half_from_float(w[o * K + i]))
+                                              : w[o * K + i]);
+                            assert_true(fabs(s - y[r * MOST + o]) < 1e-5);
+                        }
+                        // the same bits alone
+                        if (use_half)
+                            sdm_panel_f16(1, outputs, K, half, x + r * K, K, single, MOST);
+                        else
+                            sdm_panel_f32(1, outputs, K, packed, x + r * K, K, single, MOST);
+                        assert_memory_equal(single, y + r * MOST, outputs * sizeof *single);
+                    }
+                }
+                if (use_half)
+                    sdm_panel_back_f16(outputs, K, half, back, dx);
+                else
+                    sdm_panel_back_f32(outputs, K, packed, back, dx);
+                for (size_t i = 0; i < K; i++) {
+                    double s = 0;
+                    for (size_t o = 0; o < outputs; o++)
+                        s += (double)back[o] *
+                             (use_half ? sdm_half_to_float(sdm_half_from_float(w[o * K + i]))
+                                       : w[o * K + i]);
+                    assert_true(fabs(s - dx[i]) < 2e-5);
+                }
+            }
+        }
+    }
+    sdm_processor_select(-1);
+    sdm_free(w);
+    sdm_free(x);
+    sdm_free(back);
+    sdm_free(packed);
+    sdm_free(half);
+    sdm_free(y);
+}
+
+// integers: exact, the same bits in every instruction set, also where sums come near the end of
+// theirs
+static void bytes(void **state)
+{
+    (void)state;
+    enum { MOST = 160, ROWS = 13, LINE = 7, APART = MOST / 4 * LINE };
+    int16_t *w, *x;
+    int8_t *packed;
+    float *y, *apart, *with_rest, *back, dx[128], scale[ROWS], *mean = random_floats(MOST, 8),
+                                                               *factor = random_floats(MOST, 9);
+    static int16_t integers[ROWS * MOST];
+    assert_int_equal(SDM_ALLOC(&w, MOST * 128, "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&x, ROWS * 128, "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&packed, sdm_panel_i8_count(MOST, 128, 128), "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&y, ROWS * MOST, "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&apart, ROWS * APART, "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&with_rest, ROWS * MOST, "t", NULL), SDM_OK);
+    back = random_floats(MOST, 3);
+    assert_int_equal(sdm_panel_i8_count(150, 3, 37), 160 * (4 + 38));
+    assert_true(sdm_panel_i8_count(SIZE_MAX / 2, 0, 37) == SIZE_MAX &&
+                sdm_panel_i8_count(1, 2, 1) == SIZE_MAX);
+    for (int r = 0; r < ROWS; r++) scale[r] = 0.25f + (float)r;
+    const size_t inputs[][2] = {{0, 1}, {1, 1}, {0, 12}, {1, 11}, {3, 37}, {37, 37}, {126, 127}};
+    for (size_t c = 0; c < sizeof inputs / sizeof *inputs; c++) {
+        const size_t wide = inputs[c][0], k = inputs[c][1];
+        for (int isa = 0; isa < SDM_PROCESSOR_LEVELS; isa++) {
+            if (sdm_processor_select(isa) != isa) continue;
+            for (size_t outputs = 1; outputs <= 150; outputs += outputs < 70 ? 3 : 40) {
+                const bool extreme = outputs % 2 == 0;
+                for (size_t o = 0; o < outputs; o++)
+                    for (size_t i = 0; i < k; i++) {
+                        const int most = i < wide ? SDM_WIDE : 127;
+                        const double u = 2 * sdm_rng_uniform(1, o, i) - 1;
+                        w[o * k + i] =
+                            (int16_t)(extreme ? (o % 4 ? most : -most) : (int)(u * most));
+                    }
+                const int limit = sdm_panel_i8_limit(outputs, k, w);
+                double most = 0;
+                for (size_t o = 0; o < outputs; o++) {
+                    double sum = 0;
+                    for (size_t i = 0; i < k; i++) sum += abs(w[o * k + i]);
+                    most = fmax(most, sum);
+                }
+                assert_true(limit > 0 && limit * most < 2147483648.0);
+                assert_true(limit == 32767 || (limit + 1) * most >= 2147483647.0);
+                for (size_t r = 0; r < ROWS; r++)
+                    for (size_t i = 0; i < 128; i++) {
+                        const double u = 2 * sdm_rng_uniform(2, r, i) - 1;
+                        x[r * 128 + i] =
+                            (int16_t)(extreme ? (r % 2 ? limit : -limit) : (int)(u * limit));
+                    }
+                sdm_panel_pack_i8(outputs, wide, k, w, packed);
+                for (size_t rows = 1; rows <= ROWS; rows += rows < 7 ? 1 : 6) {
+                    const size_t n_mean = rows / 2;
+                    const sdm_panel_out
+                        plain = {.y = y, .ld = MOST, .line = SDM_PANEL_ROW},
+                        added = {.y = apart,
+                                 .ld = APART,
+                                 .line = LINE,
+                                 .mean = mean,
+                                 .n_mean = n_mean},
+                        again = {.integers = integers, .ld = MOST, .factor = factor, .limit = 1234},
+                        whole = {.y = with_rest, .ld = MOST, .line = SDM_PANEL_ROW, .rest = true};
+                    for (size_t o = 0; o < outputs; o++)
+                        factor[o] = (o % 3 ? 3e-4f : -1e-6f) / (float)k;
+                    sdm_panel_i8(rows, outputs, wide, k, packed, x, 128, scale, &plain);
+                    sdm_panel_i8(rows, outputs, wide, k, packed, x, 128, scale, &added);
+                    sdm_panel_i8(rows, outputs, wide, k, packed, x, 128, scale, &again);
+                    if (rows > 1 && rows <= 6) { // the last row added to the first, the others as
+                                                 // they were, nothing behind
+                        float *const behind = with_rest + (rows - 1) * MOST, *const last =
+                                                                                 y +
+                                                                                 (rows - 1) * MOST;
+                        for (int o = 0; o < MOST; o++) behind[o] = 77;
+                        sdm_panel_i8(rows, outputs, wide, k, packed, x, 128, scale, &whole);
+                        for (size_t o = 0; o < outputs; o++)
+                            assert_true(fabsf(with_rest[o] - (y[o] + last[o])) <=
+                                        1.2e-7f * (fabsf(y[o]) + fabsf(last[o])));
+                        for (size_t r = 1; r + 1 < rows; r++)
+                            assert_memory_equal(with_rest + r * MOST, y + r * MOST,
+                                                outputs * sizeof *y);
+                        for (int o = 0; o < MOST; o++) assert_true(behind[o] == 77);
+                    }
+                    for (size_t r = 0; r < rows; r++)
+                        for (size_t o = 0; o < outputs; o++) {
+                            int64_t s = 0;
+                            for (size_t i = 0; i < k; i++)
+                                s += (int64_t)w[o * k + i] * x[r * 128 + i];
+                            const float v = scale[r] * (float)s,
+                                        sum = apart[r * APART + o / 4 * LINE + o % 4];
+                            const float units = fminf(fmaxf(v * factor[o], -1234), 1234);
+                            assert_true(y[r * MOST + o] == v);
+                            if (r < n_mean) // some instruction sets multiply and add without
+                                            // rounding in between
+                                assert_true(fabsf(sum - (v + mean[o])) <=
+                                            1.2e-7f * (fabsf(v) + fabsf(mean[o])));
+                            else
+                                assert_true(sum == v);
+                            assert_int_equal(integers[r * MOST + o], lrintf(units));
+                        }
+                }
+                sdm_panel_back_i8(outputs, wide, k, packed, back, dx);
+                for (size_t i = 0; i < k; i++) {
+                    double s = 0, size = 0;
+                    for (size_t o = 0; o < outputs; o++) {
+                        s += (double)back[o] * w[o * k + i];
+                        size += fabs((double)back[o] * w[o * k + i]);
+                    }
+                    assert_true(fabs(s - dx[i]) <= 1e-6 * size);
+                }
+            }
+        }
+    }
+    sdm_processor_select(-1);
+    sdm_free(w);
+    sdm_free(x);
+    sdm_free(packed);
+    sdm_free(y);
+    sdm_free(apart);
+    sdm_free(with_rest);
+    sdm_free(back);
+    sdm_free(mean);
+    sdm_free(factor);
+}
+
+// to addresses of every kind, nothing beside them
+static void put(void **state)
+{
+    (void)state;
+    enum { MOST = 90, SIDE = 17 };
+    float *y = random_floats(MOST, 6), *memory = random_floats(MOST + 2 * SIDE, 8);
+    y[3] = -0.0f;
+    for (size_t n = 0; n <= MOST; n++)
+        for (size_t offset = 0; offset < 16; offset++)
+            for (int stream = 0; stream < 2; stream++) {
+                float *to = memory + 1 + offset;
+                to[-1] = to[n] = 77;
+                sdm_put(n, y, to, stream);
+                sdm_put_end();
+                assert_memory_equal(to, y, n * sizeof *y);
+                assert_true(to[-1] == 77 && to[n] == 77);
+            }
+    sdm_free(y);
+    sdm_free(memory);
+}
+
+// several rows, each with its own factor, nothing beside them
+static void quantisation(void **state)
+{
+    (void)state;
+    enum { MOST = 70, ROWS = 3, LDY = 75, LDX = 73 };
+    float *y = random_floats(ROWS * LDY, 4), *factor = random_floats(MOST, 5), changed[MOST],
+          ones[MOST], scale[ROWS];
+    int16_t x[ROWS * LDX + 1];
+    for (int i = 0; i < MOST; i++) ones[i] = 1;
+    for (int isa = 0; isa < SDM_PROCESSOR_LEVELS; isa++) {
+        if (sdm_processor_select(isa) != isa) continue;
+        for (size_t n = 0; n <= MOST; n++)
+            for (int limit = 5; limit < 32768; limit += 10920)
+                for (int plain = 0; plain < 2; plain++) {
+                    for (size_t r = 0; r < ROWS; r++) x[r * LDX + n] = 77;
+                    sdm_quantise(ROWS, n, y, LDY, plain ? NULL : factor, limit, x, LDX, scale);
+                    for (size_t r = 0; r < ROWS; r++) {
+                        double most = 0;
+                        for (size_t i = 0; i < n; i++) {
+                            const int16_t at = x[r * LDX + i];
+                            const double want = (double)y[r * LDY + i] * (plain ? 1 : factor[i]);
+                            most = fmax(most, abs(at));
+                            assert_true(fabs((double)at * scale[r] - want) <= 0.5001 * scale[r]);
+                        }
+                        assert_true(n == 0 ? scale[r] == 0 : most == limit);
+                        assert_int_equal(x[r * LDX + n], 77);
+                    }
+                }
+        for (size_t n = 1; n <= MOST;
+             n++) // two rows: as near as floats are; the first is the row alone
+            for (int limit = 1; limit < 32768; limit += 8191)
+                for (int plain = 0; plain < 2; plain++) {
+                    const float *const f = plain ? NULL : factor;
+                    int16_t alone[MOST], rest[MOST + 1];
+                    float s, rest_scale;
+                    x[n] = rest[n] = 77;
+                    sdm_quantise_rest(n, y, f, limit, x, &scale[0], rest, &rest_scale);
+                    sdm_quantise(1, n, y, 0, f, limit, alone, 0, &s);
+                    assert_true(s == scale[0] && x[n] == 77 && rest[n] == 77);
+                    assert_memory_equal(x, alone, n * sizeof *x);
+                    for (size_t i = 0; i < n; i++) {
+                        const double want = (double)y[i] * (plain ? 1 : factor[i]);
+                        const double unit = fmax(0.5001 * rest_scale, 2.5e-7 * limit * scale[0]);
+                        assert_true(abs(rest[i]) <= limit);
+                        assert_true(fabs((double)x[i] * scale[0] + (double)rest[i] * rest_scale -
+                                         want) <= unit);
+                    }
+                }
+        for (int i = 0; i < MOST; i++) changed[i] = i % 2 ? 1e-40f : 0;
+        sdm_quantise(1, MOST, changed, 0, ones, 32767, x, 0, scale);
+        assert_true(scale[0] == 0 && x[3] == 0);
+        sdm_quantise_rest(MOST, changed, ones, 32767, x, &scale[0], x + LDX, &scale[1]);
+        assert_true(scale[0] == 0 && scale[1] == 0 && x[3] == 0 && x[LDX + 3] == 0);
+        const float wrong[] = {NAN, -NAN, INFINITY, -INFINITY};
+        for (int k = 0; k < 4; k++)
+            for (int at = 0; at < MOST; at += 23) {
+                memcpy(changed, y, sizeof changed);
+                changed[at] = wrong[k];
+                sdm_quantise(1, MOST, changed, 0, ones, 32767, x, 0, scale);
+                assert_true(isnan(scale[0]));
+                assert_int_equal(x[1], 0);
+                sdm_quantise_rest(MOST, changed, ones, 32767, x, &scale[0], x + LDX, &scale[1]);
+                assert_true(isnan(scale[0]) && isnan(scale[1]) && x[1] == 0 && x[LDX + 1] == 0);
+            }
+    }
+    sdm_processor_select(-1);
+    sdm_free(y);
+    sdm_free(factor);
+}
+
+// several matrices in one call are what each is alone
+static void products_of_blocks(void **state)
+{
+    (void)state;
+    enum { N = 4, ROWS = 6, LDX = 64, LDY = 280, LINE = 17, MOST = 4096 };
+    const size_t outputs[N] = {16, 64, 37, 32}, wide[N] = {1, 2, 0, 5}, k[N] = {9, 6, 11, 5};
+    int16_t w[64 * 11], x[ROWS * LDX];
+    int8_t *packed = NULL;
+    float scale[N * ROWS], *y = random_floats(ROWS * LDY, 1), *each = random_floats(ROWS * LDY, 1);
+    float *mean = random_floats(N * 64, 2);
+    assert_int_equal(SDM_ALLOC(&packed, MOST, "weights", NULL), SDM_OK);
+    sdm_panel_block b[N];
+    size_t at = 0;
+    uint32_t input = 0, row = 0;
+    for (uint32_t i = 0; i < N; i++) {
+        for (size_t v = 0; v < outputs[i] * k[i]; v++)
+            w[v] = (int16_t)(255 * sdm_rng_uniform(3, i, v) - 127);
+        b[i] = (sdm_panel_block){
+            at,       64 * i, (uint32_t)outputs[i], (uint32_t)wide[i], (uint32_t)k[i], input,
+            i * ROWS, row};
+        assert_true(at + sdm_panel_i8_count(outputs[i], wide[i], k[i]) <= MOST);
+        sdm_panel_pack_i8(outputs[i], wide[i], k[i], w, packed + at);
+        at += sdm_panel_i8_count(outputs[i], wide[i], k[i]);
+        input += (uint32_t)sdm_panel_even(k[i]);
+        row += 4;
+    }
+    for (size_t i = 0; i < ROWS * LDX; i++)
+        x[i] = (int16_t)(60000 * sdm_rng_uniform(4, 0, i) - 30000);
+    for (size_t i = 0; i < N * ROWS; i++) scale[i] = 0.5f + (float)i;
+    for (size_t rows = 1; rows <= ROWS; rows++) {
+        sdm_panel_out to = {.y = y, .ld = LDY, .line = LINE, .mean = mean, .n_mean = rows - 1};
+        sdm_panel_i8_blocks(rows, N, b, packed, x, LDX, scale, &to);
+        for (uint32_t i = 0; i < N; i++) {
+            to.y = each + b[i].y, to.mean = mean + b[i].mean;
+            sdm_panel_i8(rows, outputs[i], wide[i], k[i], packed + b[i].weights, x + b[i].x, LDX,
+                         scale + b[i].scale, &to);
+        }
+        assert_memory_equal(y, each, ROWS * LDY * sizeof *y);
+    }
+    sdm_free(packed);
+    sdm_free(y);
+    sdm_free(each);
+    sdm_free(mean);
+}
+
+static void exponential(void **state)
+{
+    (void)state;
+    float x[1001], y[1001];
+    for (int i = 0; i < 1001; i++) x[i] = -86.0f + 0.1713f * (float)i;
+    sdm_exp(1001, x, y);
+    for (int i = 0; i < 1001; i++) assert_true(fabs((double)y[i] / exp((double)x[i]) - 1) < 2e-7);
+    const float far[3] = {-1e9f, 1e9f, 0};
+    sdm_exp(3, far, y);
+    assert_true(y[0] >= 0 && y[0] < 1e-37f && isfinite(y[1]) && y[1] > 1e38f && y[2] == 1);
+}
+
+static void names(void **state)
+{
+    (void)state;
+#if defined(__x86_64__)
+    static const char *const name[] = {"sse2", "avx2", "avx512", "avx512vnni"};
+#elif defined(__aarch64__)
+    static const char *const name[] = {"neon"};
+#else
+    static const char *const name[] = {"generic"};
+#endif
+    const int used = sdm_processor_select(level);
+    assert_int_equal(used, level);
+    assert_string_equal(sdm_kernels_name(), name[level]);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(product),
+                                       cmocka_unit_test(same_bits_for_threads),
+                                       cmocka_unit_test(half_precision),
+                                       cmocka_unit_test(half_in_every_instruction_set),
+                                       cmocka_unit_test(panels),
+                                       cmocka_unit_test(bytes),
+                                       cmocka_unit_test(put),
+                                       cmocka_unit_test(products_of_blocks),
+                                       cmocka_unit_test(quantisation),
+                                       cmocka_unit_test(exponential),
+                                       cmocka_unit_test(names)};
+    // every instruction set that this machine has, not only the one that is chosen
+    int failed = 0;
+    for (level = sdm_processor_select(-1); level >= 0; level--) {
+        sdm_processor_select(level);
+        failed += cmocka_run_group_tests(tests, NULL, NULL);
+    }
+    return failed;
+}

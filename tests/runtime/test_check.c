@@ -1,0 +1,268 @@
+/* The check of a map: figures known in closed form, whatever the mesh and the grid. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "oracle/exact_meshes.h"
+#include "oracle/exact_tools.h"
+#include "sdm/builtin_shapes.h"
+#include "sdm/check.h"
+#include "sdm/memory.h"
+#include "sdm/runtime.h"
+
+static const double centre[3] = {0.3, -0.2, 0.1};
+static sdm_registry *registry;
+
+static int set_up(void **state)
+{
+    (void)state;
+    return sdm_registry_create(&registry, NULL) || sdm_builtin_shapes_add(registry, NULL);
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    sdm_registry_free(registry);
+    return 0;
+}
+
+static sdm_check check_of(const sdm_exact *e, const sdm_grid *g, const float *values)
+{
+    sdm_check c;
+    sdm_error err = {0};
+    if (sdm_check_map(e, g, values, &c, &err)) fail_msg("%s", err.text);
+    return c;
+}
+
+// grid about `centre` with uneven voxels, turned about two axes and reflected
+static sdm_grid oblique_grid(int64_t n, double h)
+{
+    const double a = 0.4, b = -0.7;
+    sdm_grid g = {.n = {n, n + 3, n + 5},
+                  .spacing = {h, 0.9 * h, 1.1 * h},
+                  .dir = {cos(a), -sin(a) * cos(b), -sin(a) * sin(b), sin(a), cos(a) * cos(b),
+                          cos(a) * sin(b), 0, sin(b), -cos(b)}};
+    const double middle[3] = {(double)(n - 1) / 2, (double)(n + 2) / 2, (double)(n + 4) / 2};
+    double at[3];
+    sdm_grid_world(&g, middle, at);
+    for (int k = 0; k < 3; k++) g.origin[k] = centre[k] - at[k];
+    return g;
+}
+
+// exact maps have no error; a constant added is every figure
+static void test_exact_and_shifted(void **state)
+{
+    (void)state;
+    const char *const names[] = {"cochlea", "ellipsoid", "torus"};
+    for (size_t k = 0; k < 3; k++) {
+        sdm_error err;
+        sdm_instance *s = NULL;
+        if (sdm_instance_create(sdm_registry_find(registry, names[k], NULL), NULL, 0, NULL, &s,
+                                &err))
+            fail_msg("%s", err.text);
+        size_t n_params;
+        const sdm_param *params = sdm_instance_params(s, &n_params);
+        double p[8];
+        for (size_t i = 0; i < n_params; i++) p[i] = params[i].def;
+        const sdm_grid g = oblique_grid(34, 0.45);
+        const size_t n = sdm_grid_count(&g);
+        float *values = room(n, sizeof *values);
+        sdm_check c;
+        assert_int_equal(sdm_exact_shape_map(s, p, NULL, &g, values, NULL, &err), SDM_OK);
+        assert_int_equal(sdm_check_shape(s, p, &g, values, &c, &err), SDM_OK);
+        assert_int_equal(c.used, SDM_CHECK_POINTS);
+        assert_int_equal(c.outside, 0);
+        assert_true(c.max_mm < 1e-7 && c.rmse_mm <= c.max_mm && c.mean_mm <= c.rmse_mm &&
+                    c.q95_mm <= c.max_mm);
+        for (int sign = -1; sign <= 1; sign += 2) {
+            float *shifted = room(n, sizeof *shifted);
+            for (size_t i = 0; i < n; i++) shifted[i] = (float)((double)values[i] + 0.1 * sign);
+            assert_int_equal(sdm_check_shape(s, p, &g, shifted, &c, &err), SDM_OK);
+            for (int i = SDM_CHECK_MAX; i <= SDM_CHECK_MEAN; i++)
+                assert_true(fabs(sdm_check_get(&c, (sdm_check_stat)i) - 0.1) < 1e-6);
+            assert_true(fabs(c.bias_mm - 0.1 * sign) < 1e-6);
+            free(shifted);
+        }
+        free(values);
+        sdm_instance_free(s);
+    }
+}
+
+// a ball moved by d along an axis: the error on the surface is -d n, n uniform in -1 .. 1
+// (Archimedes), if points are spread by area
+static void test_moved(void **state)
+{
+    (void)state;
+    const double d = 0.01, radius = 4;
+    sdm_mesh m = {0};
+    // rings near the poles are narrow: points chosen by triangle or by vertex would gather there
+    mesh_sphere(&m, centre, radius, 60);
+    sdm_exact *e = engine(&m, NULL);
+    const sdm_grid g = oblique_grid(60, 0.2);
+    sdm_grid moved = g;
+    const size_t n = sdm_grid_count(&g);
+    float *values = room(n, sizeof *values);
+    for (int axis = 0; axis < 3; axis++) {
+        moved.origin[axis] = g.origin[axis] - d;
+        assert_int_equal(sdm_exact_map(e, &moved, values, NULL), SDM_OK);
+        moved.origin[axis] = g.origin[axis];
+        const sdm_check c = check_of(e, &g, values);
+        assert_true(fabs(c.mean_mm / d - 0.5) < 0.02 && fabs(c.rmse_mm / d - sqrt(1.0 / 3)) < 0.02);
+        assert_true(fabs(c.q95_mm / d - 0.95) < 0.02 && c.max_mm / d > 0.98 &&
+                    c.max_mm / d < 1.001);
+        assert_true(fabs(c.bias_mm / d) < 0.03);
+    }
+    free(values);
+    sdm_exact_free(e);
+    sdm_mesh_dispose(&m);
+}
+
+// errors of x on the cube -1 .. 1, of large triangles: |x| is 1 on two faces, uniform in 0 .. 1 on
+// four. A voxel is the nearest one
+static void test_even_in_triangles(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0};
+    mesh_box(&m, (const double[]){-1, -1, -1}, (const double[]){1, 1, 1});
+    sdm_exact *e = engine(&m, NULL);
+    const sdm_grid g =
+        sdm_grid_centred((const int64_t[]){31, 31, 31}, 0.1, (const double[]){0, 0, 0});
+    const size_t n = sdm_grid_count(&g);
+    float *exact = room(n, sizeof *exact), *values = room(n, sizeof *values);
+    assert_int_equal(sdm_exact_map(e, &g, exact, NULL), SDM_OK);
+    for (int axis = 0; axis < 3; axis++) {
+        for (size_t i = 0; i < n; i++) {
+            double x[3];
+            position(&g, i, x);
+            values[i] = (float)((double)exact[i] + x[axis]);
+        }
+        const sdm_check c = check_of(e, &g, values);
+        assert_true(fabs(c.mean_mm - 2.0 / 3) < 0.02 && fabs(c.rmse_mm - sqrt(5.0 / 9)) < 0.02);
+        assert_true(fabs(c.bias_mm) < 0.03 && fabs(c.max_mm - 1) < 1e-6);
+    }
+    free(values);
+    free(exact);
+    sdm_exact_free(e);
+    sdm_mesh_dispose(&m);
+}
+
+// the map of another parameter: a torus of a tube thicker by 0.1 mm
+static void test_wrong_parameter(void **state)
+{
+    (void)state;
+    sdm_error err;
+    sdm_instance *s = NULL;
+    assert_int_equal(
+        sdm_instance_create(sdm_registry_find(registry, "torus", NULL), NULL, 0, NULL, &s, &err),
+        SDM_OK);
+    size_t n_params;
+    const sdm_param *params = sdm_instance_params(s, &n_params);
+    double p[8];
+    for (size_t i = 0; i < n_params; i++) p[i] = params[i].def;
+    assert_int_equal(n_params, 2);
+    const sdm_grid g = oblique_grid(40, 0.35);
+    float *values = room(sdm_grid_count(&g), sizeof *values);
+    assert_int_equal(sdm_exact_shape_map(s, p, NULL, &g, values, NULL, &err), SDM_OK);
+    p[1] += 0.1;
+    sdm_check c;
+    assert_int_equal(sdm_check_shape(s, p, &g, values, &c, &err), SDM_OK);
+    assert_true(fabs(c.mean_mm - 0.1) < 0.01 && fabs(c.bias_mm - 0.1) < 0.01 && c.max_mm < 0.12);
+    free(values);
+    sdm_instance_free(s);
+}
+
+// surface inside of the union does not count, and an inside-out mesh is what the engine makes of it
+static void test_union_and_turned(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0}, b = {0};
+    mesh_box(&m, (const double[]){-3, -2, -2}, (const double[]){1, 2, 2});
+    mesh_box(&b, (const double[]){-1, -1.5, -1.5}, (const double[]){3, 1.5, 1.5});
+    mesh_append(&m, &b);
+    const sdm_grid g = oblique_grid(40, 0.3);
+    float *values = room(sdm_grid_count(&g), sizeof *values);
+    for (int turned = 0; turned < 2; turned++) {
+        sdm_exact *e = engine(&m, NULL);
+        assert_true(sdm_exact_get_report(e)->unioned && sdm_exact_get_report(e)->turned == turned);
+        assert_int_equal(sdm_exact_map(e, &g, values, NULL), SDM_OK);
+        const sdm_check c = check_of(e, &g, values);
+        assert_true(c.used == SDM_CHECK_POINTS && c.max_mm < 1e-6);
+        sdm_exact_free(e);
+        mesh_flip(&m);
+    }
+    free(values);
+    sdm_mesh_dispose(&m);
+    sdm_mesh_dispose(&b);
+}
+
+// points beyond the grid are counted; a number that is none is never good enough
+static void test_beyond_and_nan(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0};
+    mesh_sphere(&m, (const double[]){0, 0, 0}, 2, 60);
+    sdm_exact *e = engine(&m, NULL);
+    sdm_grid g = sdm_grid_centred((const int64_t[]){60, 60, 60}, 0.1, (const double[]){0, 0, 0});
+    g.origin[2] = 0.05; // voxels from the equator on
+    const size_t n = sdm_grid_count(&g);
+    float *values = room(n, sizeof *values);
+    assert_int_equal(sdm_exact_map(e, &g, values, NULL), SDM_OK);
+    sdm_check c = check_of(e, &g, values);
+    assert_int_equal(c.used + c.outside, SDM_CHECK_POINTS);
+    assert_in_range(c.used, SDM_CHECK_POINTS / 2 - 20, SDM_CHECK_POINTS / 2 + 20);
+    assert_true(c.max_mm < 1e-6);
+    for (size_t i = 0; i < n; i += 7) values[i] = NAN;
+    c = check_of(e, &g, values);
+    assert_true(isnan(c.max_mm) && isnan(c.mean_mm) && isnan(c.rmse_mm) && isnan(c.bias_mm));
+    g.origin[2] = 50;
+    c = check_of(e, &g, values);
+    assert_true(c.used == 0 && c.outside == SDM_CHECK_POINTS);
+    for (int i = SDM_CHECK_MAX; i <= SDM_CHECK_MEAN; i++)
+        assert_true(isnan(sdm_check_get(&c, (sdm_check_stat)i)));
+    free(values);
+    sdm_exact_free(e);
+    sdm_mesh_dispose(&m);
+}
+
+static void test_misuse(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0};
+    mesh_sphere(&m, (const double[]){0, 0, 0}, 2, 8);
+    sdm_exact *e = engine(&m, NULL);
+    sdm_grid g = sdm_grid_centred((const int64_t[]){2, 2, 2}, 1, (const double[]){0, 0, 0});
+    const float values[8] = {0};
+    sdm_check c;
+    sdm_error err;
+    assert_int_equal(sdm_check_map(NULL, &g, values, &c, &err), SDM_E_ARG);
+    assert_int_equal(sdm_check_map(e, NULL, values, &c, &err), SDM_E_ARG);
+    assert_int_equal(sdm_check_map(e, &g, NULL, &c, &err), SDM_E_ARG);
+    assert_int_equal(sdm_check_map(e, &g, values, NULL, &err), SDM_E_ARG);
+    assert_int_equal(sdm_check_shape(NULL, &g.origin[0], &g, values, &c, &err), SDM_E_ARG);
+    g.spacing[1] = 0;
+    assert_int_equal(sdm_check_map(e, &g, values, &c, &err), SDM_E_ARG);
+    assert_true(isnan(sdm_check_get(&c, (sdm_check_stat)4)));
+    assert_string_equal(sdm_check_stat_name((sdm_check_stat)4), "unknown");
+    assert_string_equal(sdm_check_stat_name(SDM_CHECK_Q95), "q95");
+    sdm_exact_free(e);
+    sdm_mesh_dispose(&m);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_exact_and_shifted),
+        cmocka_unit_test(test_moved),
+        cmocka_unit_test(test_even_in_triangles),
+        cmocka_unit_test(test_wrong_parameter),
+        cmocka_unit_test(test_union_and_turned),
+        cmocka_unit_test(test_beyond_and_nan),
+        cmocka_unit_test(test_misuse),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -1,0 +1,154 @@
+/* Correlation of residuals: of smooth noise whose law is known, about fits of smooth functions. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "fit/trust/correlation.h"
+#include "sdm/internal/rng.h"
+
+#define PI 3.14159265358979324
+
+enum { NX = 26, NY = 24, NZ = 7, VOXELS = NX * NY * NZ, REACH = 4, UNKNOWNS = 12, FITS = 12 };
+
+// of noise with variance 1
+static double kernel(int k)
+{
+    return exp(-0.5 * k * k) / sqrt(1.7726372048266521);
+} // sum of exp(-k^2)
+
+// white noise through the kernel along each axis
+static void smooth_noise(uint64_t seed, double *e)
+{
+    enum { WX = NX + 2 * REACH, WY = NY + 2 * REACH, WZ = NZ + 2 * REACH };
+    static double a[WX * WY * WZ], b[WX * WY * WZ];
+    const int step[3] = {1, WX, WX * WY}, n[3] = {WX, WY, WZ};
+    for (uint64_t i = 0; i < WX * WY * WZ; i++) a[i] = sdm_rng_normal(seed, 7, i);
+    for (int axis = 0; axis < 3; axis++) {
+        for (int i = 0; i < WX * WY * WZ; i++) {
+            const int at = i / step[axis] % n[axis];
+            b[i] = 0;
+            for (int k = -REACH; k <= REACH; k++)
+                if (at + k >= 0 && at + k < n[axis]) b[i] += kernel(k) * a[i + k * step[axis]];
+        }
+        memcpy(a, b, sizeof a);
+    }
+    for (int i = 0; i < VOXELS; i++)
+        e[i] = a[i % NX + REACH + (i / NX % NY + REACH) * WX + (i / NX / NY + REACH) * WX * WY];
+}
+
+// cosines, which are orthogonal on the voxels; influence: inverse of their products
+static void make_shell(fit_shell *v, double *influence)
+{
+    *v = (fit_shell){.n = VOXELS, .n_unknowns = UNKNOWNS, .size = {NX, NY, NZ}, .step = 1};
+    v->at = calloc(VOXELS, sizeof *v->at);
+    v->place = calloc(3 * VOXELS, sizeof *v->place);
+    v->lot = calloc(VOXELS, sizeof *v->lot);
+    v->residual = calloc(VOXELS, sizeof *v->residual);
+    v->weight = calloc(VOXELS, sizeof *v->weight);
+    v->root = calloc(VOXELS * UNKNOWNS, sizeof *v->root);
+    if (!v->at || !v->place || !v->lot || !v->residual || !v->weight || !v->root) abort();
+    memset(influence, 0, UNKNOWNS * UNKNOWNS * sizeof *influence);
+    for (int i = 0; i < VOXELS; i++) {
+        const int p[3] = {i % NX, i / NX % NY, i / NX / NY};
+        for (int k = 0; k < 3; k++) v->place[3 * i + k] = p[k];
+        v->at[i] = (uint32_t)i + 1;
+        v->lot[i] = (float)sdm_rng_uniform(3, 4, (uint64_t)i);
+        v->weight[i] = 1;
+        for (int a = 0; a < UNKNOWNS; a++)
+            v->root[UNKNOWNS * i + a] = (float)(cos(PI * (p[0] + 0.5) * (a % 4) / NX) *
+                                                cos(PI * (p[1] + 0.5) * (a / 4) / NY));
+    }
+    for (int a = 0; a < UNKNOWNS; a++) {
+        double sum = 0;
+        for (int i = 0; i < VOXELS; i++)
+            sum += (double)v->root[UNKNOWNS * i + a] * (double)v->root[UNKNOWNS * i + a];
+        influence[a * (UNKNOWNS + 1)] = 1 / sum;
+    }
+}
+
+static void free_shell(fit_shell *v)
+{
+    free(v->at);
+    free(v->place);
+    free(v->lot);
+    free(v->residual);
+    free(v->weight);
+    free(v->root);
+}
+
+// what is left of e by a fit of the functions
+static void fit_functions(fit_shell *v, const double *influence, const double *e)
+{
+    double x[UNKNOWNS];
+    for (int a = 0; a < UNKNOWNS; a++) {
+        x[a] = 0;
+        for (int i = 0; i < VOXELS; i++)
+            x[a] += influence[a * (UNKNOWNS + 1)] * (double)v->root[UNKNOWNS * i + a] * e[i];
+    }
+    for (int i = 0; i < VOXELS; i++) {
+        double r = e[i];
+        for (int a = 0; a < UNKNOWNS; a++) r -= (double)v->root[UNKNOWNS * i + a] * x[a];
+        v->residual[i] = (float)r;
+    }
+}
+
+static void test_freed(void **state)
+{
+    (void)state;
+    static double e[VOXELS], influence[UNKNOWNS * UNKNOWNS], c[FIT_LAG_MIDDLE + 1],
+        weighted[FIT_LAG_MIDDLE + 1];
+    double sum = 0, square = 0, before = 0, after = 0, variance = 0;
+    fit_shell v;
+    make_shell(&v, influence);
+    for (int k = -REACH; k <= REACH; k++) sum += kernel(k), square += kernel(k) * kernel(k);
+    const double wanted = pow(sum * sum / square, 3);
+    for (uint64_t seed = 0; seed < FITS; seed++) {
+        int width;
+        smooth_noise(seed, e);
+        fit_functions(&v, influence, e);
+        assert_int_equal(sdm_fit_correlate(&v, 1, 1, c, &width, NULL), SDM_OK);
+        before += sdm_fit_weigh_lags(c, width, true, weighted) / FITS;
+        assert_int_equal(sdm_fit_free_correlation(&v, influence, width, 1, c, NULL), SDM_OK);
+        after += sdm_fit_weigh_lags(c, width, true, weighted) / FITS;
+        variance += c[FIT_LAG_MIDDLE] / FITS;
+    }
+    printf("sum of correlations %.1f: %.1f of residuals, %.1f freed; variance %.3f\n", wanted,
+           before, after, variance);
+    assert_true(before < 0.75 * wanted);
+    assert_true(fabs(after / wanted - 1) < 0.12);
+    assert_true(fabs(variance - 1) < 0.05);
+    free_shell(&v);
+}
+
+// the same bits for any number of threads
+static void test_threads(void **state)
+{
+    (void)state;
+    static double e[VOXELS], influence[UNKNOWNS * UNKNOWNS], c[2][FIT_LAG_MIDDLE + 1];
+    fit_shell v;
+    make_shell(&v, influence);
+    smooth_noise(1, e);
+    fit_functions(&v, influence, e);
+    for (int i = 0; i < 2; i++) {
+        int width;
+        assert_int_equal(sdm_fit_correlate(&v, 0.2, 1 + 2 * i, c[i], &width, NULL), SDM_OK);
+        assert_int_equal(sdm_fit_free_correlation(&v, influence, width, 1 + 2 * i, c[i], NULL),
+                         SDM_OK);
+    }
+    assert_memory_equal(c[0], c[1], sizeof c[0]);
+    free_shell(&v);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_freed),
+                                       cmocka_unit_test(test_threads)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,468 @@
+/* Fits to phantoms with known truth: what is recovered, and how honest the standard deviations are.
+ */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+
+#include <cmocka.h>
+
+#include "oracle/fit_tools.h"
+
+// largest error of parameters (mm), turn (rad) and translation (mm)
+static double worst(const sdm_fit_result *r)
+{
+    double e[9], most = 0;
+    errors(r, TRUTH, &POSE, e);
+    for (int k = 0; k < 9; k++) most = fmax(most, fabs(e[k]));
+    return most;
+}
+
+static void test_clean(void **state)
+{
+    (void)state;
+    float *v = phantom(TRUTH, &POSE, 0, 1);
+    const sdm_fit_target t = image_of(v);
+    const sdm_fit_opts o = near_start();
+    sdm_fit_result r = fit(&t, &o);
+    assert_true(r.converged && r.n_params == 3 && r.n_exact > 3 && r.n_network == 0);
+    if (!(worst(&r) < 4e-3)) fail_msg("off by %g", worst(&r));
+    // the point spread holds the box of the voxel, the means are those of the phantom
+    assert_true(fabs(r.blur - sqrt(0.04 + 0.0625 / 12)) < 0.01);
+    assert_true(fabs(r.appearance.inside[0].mean - 40) < 5 &&
+                fabs(r.appearance.outside[0].mean - 1300) < 5);
+    assert_true(r.evidence > 0 && r.log_likelihood > r.log_likelihood_without &&
+                r.inside_share == 1);
+    assert_true(r.n_iterations > 1 && r.objective[r.n_iterations - 1] < 0);
+    sdm_fit_dispose(&r);
+
+    // another start ends at the same place
+    sdm_fit_opts other = o;
+    other.start_pose = POSE;
+    other.start_params = TRUTH;
+    sdm_fit_result a = fit(&t, &o), b = fit(&t, &other);
+    for (int k = 0; k < 3; k++) {
+        assert_true(fabs(a.params[k] - b.params[k]) < 3e-5);
+        assert_true(fabs(a.pose.rotation[k] - b.pose.rotation[k]) < 3e-5);
+        assert_true(fabs(a.pose.translation[k] - b.pose.translation[k]) < 3e-5);
+    }
+    sdm_fit_dispose(&a);
+    sdm_fit_dispose(&b);
+    free(v);
+}
+
+// noise, and the creases between triangles: fits from two sides end at the same place all the same
+static void test_one_maximum(void **state)
+{
+    (void)state;
+    double most = 0;
+    for (uint64_t seed = 20; seed < 22; seed++) {
+        float *v = phantom(TRUTH, &POSE, 1, seed);
+        const sdm_fit_target t = image_of(v);
+        sdm_fit_opts o = near_start();
+        sdm_fit_result a = fit(&t, &o);
+        o.start_pose = POSE;
+        o.start_params = (const double[3]){2.6, 1.7, 1.2};
+        sdm_fit_result b = fit(&t, &o);
+        assert_true(a.converged && b.converged);
+        for (int k = 0; k < 3; k++) {
+            most = fmax(most, fabs(a.params[k] - b.params[k]) / 3); // ranges
+            most = fmax(most, fabs(a.pose.rotation[k] - b.pose.rotation[k]));
+            most = fmax(most, fabs(a.pose.translation[k] - b.pose.translation[k]) / 2.5);
+        }
+        sdm_fit_dispose(&a);
+        sdm_fit_dispose(&b);
+        free(v);
+    }
+    printf("two starts end %.2g apart\n", most);
+    assert_true(most < 1e-5);
+}
+
+// n fits to noisy phantoms: of one shape with other noise, or of other shapes in other poses
+static void spread(size_t n, bool random, double *rms, size_t *beyond)
+{
+    double square = 0;
+    size_t count = 0;
+    *beyond = 0;
+    for (size_t i = 0; i < n; i++) {
+        double p[3], start[3], e[9];
+        sdm_pose pose = POSE;
+        sdm_fit_opts o = near_start();
+        for (size_t k = 0; k < 3; k++) {
+            p[k] = TRUTH[k] + (random ? 0.6 * sdm_rng_uniform(5, i, k) - 0.3 : 0);
+            start[k] = fmax(p[k] + 0.3 * sdm_rng_uniform(6, i, k) - 0.15, 1.02);
+        }
+        if (random) pose = sdm_phantom_random_pose(0.5, 0.3, 1000 + i);
+        float *v = phantom(p, &pose, 1, 10 + i);
+        const sdm_fit_target t = image_of(v);
+        o.start_params = start;
+        o.start_pose = sdm_pose_compose(&(sdm_pose){{0.05, 0.05, -0.05}, {0.1, 0.1, -0.1}}, &pose);
+        sdm_fit_result r = fit(&t, &o);
+        errors(&r, p, &pose, e);
+        for (size_t k = 0; k < 9; k++) {
+            const double z = e[k] / r.sd[k];
+            square += z * z;
+            count++;
+            if (k < 3 && fabs(z) > 3) (*beyond)++;
+        }
+        sdm_fit_dispose(&r);
+        free(v);
+    }
+    *rms = sqrt(square / (double)count);
+}
+
+static size_t n_random = 0;
+
+static void test_honest(void **state)
+{
+    (void)state;
+    double rms;
+    size_t beyond;
+    spread(n_random ? n_random : 12, n_random > 0, &rms, &beyond);
+    printf("errors over standard deviations: root mean square %.2f; %zu parameters beyond 3\n", rms,
+           beyond);
+    assert_true(rms > 0.6 && rms < 1.5);
+    assert_true((double)beyond <= 0.05 * (double)(n_random ? n_random : 12));
+}
+
+static void test_threads(void **state)
+{
+    (void)state;
+    float *v = phantom(TRUTH, &POSE, 1, 3);
+    const sdm_fit_target t = image_of(v);
+    sdm_fit_opts o = near_start();
+    o.n_threads = 1;
+    sdm_fit_result one = fit(&t, &o);
+    for (int n = 2; n <= 3; n++) {
+        o.n_threads = n;
+        sdm_fit_result r = fit(&t, &o);
+        assert_memory_equal(r.params, one.params, 3 * sizeof *r.params);
+        assert_memory_equal(&r.pose, &one.pose, sizeof r.pose);
+        assert_memory_equal(r.covariance, one.covariance, 81 * sizeof *r.covariance);
+        assert_int_equal(r.n_iterations, one.n_iterations);
+        sdm_fit_dispose(&r);
+    }
+    sdm_fit_dispose(&one);
+    free(v);
+}
+
+static void test_labels_of_image(void **state)
+{
+    (void)state;
+    float *v = phantom(TRUTH, &POSE, 0.3, 3);
+    const sdm_fit_target t = image_of(v);
+    sdm_fit_opts o = near_start();
+    o.image_model = SDM_FIT_LABELS;
+    sdm_fit_result r = fit(&t, &o);
+    // the edge is where the laws cross, not quite where the surface is
+    if (!(worst(&r) < 0.25)) fail_msg("off by %g", worst(&r));
+    assert_true(r.blur == 0 && r.evidence > 0);
+    sdm_fit_dispose(&r);
+    free(v);
+}
+
+static void test_label_map(void **state)
+{
+    (void)state;
+    const sdm_fit_source source = exact_source();
+    const sdm_grid g = image_grid();
+    float *v = calloc(sdm_grid_count(&g), sizeof *v);
+    if (!v) abort();
+    assert_int_equal(sdm_fit_map(&source, TRUTH, &POSE, &g, 1, v, NULL), SDM_OK);
+    // against the closed form; the mesh lies inside
+    for (size_t i = 0; i < sdm_grid_count(&g); i += 37) {
+        const double index[3] = {(double)(i % 36), (double)(i / 36 % 30), (double)(i / 36 / 30)};
+        double x[3], y[3], d;
+        sdm_grid_world(&g, index, x);
+        sdm_pose_apply_inverse(&POSE, x, y);
+        assert_int_equal(sdm_instance_distance(ellipsoid, TRUTH, y, &d, NULL), SDM_OK);
+        if (fabs(d) < 0.8) assert_true(fabs((double)v[i] - d) < 0.02);
+    }
+    for (size_t i = 0; i < sdm_grid_count(&g); i++) v[i] = v[i] < 0;
+    sdm_fit_target t = image_of(v);
+    t.kind = SDM_FIT_LABEL;
+    const sdm_fit_opts o = near_start();
+    sdm_fit_result r = fit(&t, &o);
+    if (!(worst(&r) < 0.02)) fail_msg("off by %g", worst(&r));
+    assert_true(isnan(r.evidence));
+    sdm_fit_dispose(&r);
+    // the logistic law alone would draw the long end inwards, by 0.035 mm
+    sdm_fit_opts logistic = o;
+    logistic.image_model = SDM_FIT_LABELS;
+    logistic.l_ref = 0.1;
+    r = fit(&t, &logistic);
+    if (!(worst(&r) < 0.02)) fail_msg("off by %g", worst(&r));
+    assert_true(isnan(r.evidence) && r.blur == 0);
+    sdm_fit_dispose(&r);
+    v[0] = 2;
+    sdm_error err;
+    assert_int_equal(sdm_fit(&source, &t, &o, &r, &err), SDM_E_FORMAT);
+    assert_non_null(strstr(err.text, "labels from 0 to 2"));
+    free(v);
+}
+
+static void test_points(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0};
+    assert_int_equal(sdm_instance_mesh(ellipsoid, TRUTH, &m, NULL), SDM_OK);
+    double *x = calloc(3 * m.n_vert, sizeof *x);
+    if (!x) abort();
+    for (size_t i = 0; i < m.n_vert; i++) {
+        sdm_pose_apply(&POSE, m.vert + 3 * i, x + 3 * i);
+        const double far = i % 20 == 0 ? 0.8 : 0.01; // some lie off
+        for (size_t k = 0; k < 3; k++) x[3 * i + k] += far * sdm_rng_normal(1, i, k);
+    }
+    const sdm_fit_target t = {.kind = SDM_FIT_POINTS, .points = x, .n_points = m.n_vert};
+    sdm_fit_opts o = near_start();
+    o.point_dof = 2;
+    sdm_fit_result r = fit(&t, &o);
+    if (!(worst(&r) < 0.01)) fail_msg("off by %g", worst(&r));
+    assert_true(r.point_sd > 0.003 && r.point_sd < 0.03 && r.n_used == m.n_vert &&
+                r.inside_share == 1);
+    double e[9];
+    errors(&r, TRUTH, &POSE, e);
+    for (int k = 0; k < 9; k++) assert_true(fabs(e[k]) < 5 * r.sd[k]);
+    sdm_fit_dispose(&r);
+    free(x);
+    sdm_mesh_dispose(&m);
+}
+
+static void test_turns(void **state)
+{
+    (void)state;
+    float *v = phantom(TRUTH, &POSE, 1, 4);
+    const sdm_fit_target t = image_of(v);
+    sdm_fit_opts o = near_start();
+    // a quarter turn off about the shape's z, which no local step finds
+    o.start_pose = sdm_pose_compose(&POSE, &(sdm_pose){{0, 0, 1.5707963267948966}, {0, 0, 0}});
+    o.start_params = TRUTH;
+    o.turns = SDM_FIT_TURNS_AXIS;
+    o.n_turns = 8;
+    sdm_fit_result r = fit(&t, &o);
+    // the turns beside the right one lead there, too; half a turn is the same ellipsoid; a quarter
+    // has the other axes
+    assert_true(r.turn % 4 != 0);
+    for (int k = 0; k < 3; k++) assert_true(fabs(r.params[k] - TRUTH[k]) < 5 * r.sd[k]);
+    sdm_fit_dispose(&r);
+    // priors are about each turn as it is tried, which moves the origin, too, about a pivot
+    // elsewhere
+    o.pivot[0] = 2;
+    o.start_pose = sdm_pose_compose(
+        &POSE, &(sdm_pose){{0, 0, 1.5707963267948966}, {2, -2, 0}}); // keeps the pivot
+    o.prior_rotation_sd = 0.03;
+    o.prior_translation_sd = 0.1;
+    r = fit(&t, &o);
+    assert_int_equal(r.turn, 6);
+    if (!(worst(&r) < 0.1)) fail_msg("off by %g", worst(&r));
+    sdm_fit_dispose(&r);
+    o.pivot[0] = o.prior_rotation_sd = o.prior_translation_sd = 0;
+    o.turns = SDM_FIT_TURNS_SPHERE;
+    o.n_turns = 40;
+    o.start_pose = sdm_pose_compose(&POSE, &(sdm_pose){{1.1, 0.7, -0.8}, {0, 0, 0}});
+    r = fit(&t, &o);
+    // the axes may have changed places: the same ellipsoid
+    for (int k = 0; k < 3; k++) {
+        double nearest = INFINITY;
+        for (int i = 0; i < 3; i++) nearest = fmin(nearest, fabs(r.params[i] - TRUTH[k]) / r.sd[i]);
+        assert_true(nearest < 5);
+    }
+    sdm_fit_dispose(&r);
+    free(v);
+}
+
+// evidence: what is kept costs nothing (Schwarz 1978)
+static double unknowns_paid(const sdm_fit_result *r)
+{
+    const double factor = fmax(r->noise_factor, 1);
+    return ((r->log_likelihood - r->log_likelihood_without) / factor - r->evidence) /
+           (0.5 * log((double)r->n_used / factor));
+}
+
+static void test_kept(void **state)
+{
+    (void)state;
+    float *v = phantom(TRUTH, &POSE, 0, 4);
+    const sdm_fit_target t = image_of(v);
+    sdm_fit_opts o = near_start();
+    o.keep_params = true;
+    o.start_params = TRUTH;
+    sdm_fit_result r = fit(&t, &o);
+    assert_memory_equal(r.params, TRUTH, sizeof TRUTH);
+    assert_true(worst(&r) < 4e-3 && r.sd[0] == 0 && r.sd[3] > 0 && r.correlation[1] == 0);
+    assert_true(fabs(unknowns_paid(&r) - 6) < 1e-6);
+    sdm_fit_dispose(&r);
+    o.keep_params = false;
+    o.keep_pose = true;
+    o.start_params = START;
+    o.start_pose = POSE;
+    r = fit(&t, &o);
+    assert_true(worst(&r) < 4e-3 && r.sd[0] > 0 && r.sd[3] == 0);
+    assert_true(fabs(unknowns_paid(&r) - 3) < 1e-6);
+    sdm_fit_dispose(&r);
+    free(v);
+}
+
+// a strong prior wins over the image, and sd are no larger than it
+static void test_priors(void **state)
+{
+    (void)state;
+    float *v = phantom(TRUTH, &POSE, 1, 5);
+    const sdm_fit_target t = image_of(v);
+    sdm_fit_opts o = near_start();
+    o.prior_translation_sd = 1e-5;
+    o.prior_rotation_sd = 1e-5;
+    sdm_fit_result r = fit(&t, &o);
+    for (int k = 0; k < 3; k++) {
+        assert_true(fabs(r.pose.translation[k] - o.start_pose.translation[k]) < 1e-3);
+        assert_true(fabs(r.pose.rotation[k] - o.start_pose.rotation[k]) < 1e-3);
+        assert_true(r.sd[3 + k] < 2e-5 && r.sd[6 + k] < 2e-5);
+    }
+    sdm_fit_dispose(&r);
+    // of half of 1 .. 4: draws the parameters towards 2.5, and they are better known
+    o.prior_translation_sd = o.prior_rotation_sd = 0;
+    const sdm_fit_result free_of_it = fit(&t, &o);
+    o.prior_sd = 0.2;
+    r = fit(&t, &o);
+    assert_true(r.params[2] > free_of_it.params[2] + 1e-4);
+    assert_true(r.params[1] > free_of_it.params[1] + 1e-4);
+    for (int k = 0; k < 3; k++) assert_true(r.sd[k] < 0.3 && r.sd[k] < 1.1 * free_of_it.sd[k]);
+    for (int k = 0; k < 3; k++) assert_false(r.by_prior[k] || free_of_it.by_prior[k]);
+    sdm_fit_result other = free_of_it;
+    sdm_fit_dispose(&other);
+    sdm_fit_dispose(&r);
+    free(v);
+}
+
+// of a parameter without effect nothing is known but what was known before, with a prior and
+// without; of the others it is
+static void test_no_effect(void **state)
+{
+    (void)state;
+    sdm_param params[4] = {{0}};
+    sdm_shape shape = *sdm_instance_shape(ellipsoid);
+    memcpy(params, shape.params, 3 * sizeof *params);
+    params[3] = (sdm_param){
+        .name = "nothing", .unit = "", .min = 1, .max = 3, .def = 1.5, .help = "has no effect"};
+    shape.name = "with_nothing";
+    shape.params = params;
+    shape.n_params = 4;
+    shape.velocity = NULL; // writes those of three
+    sdm_instance *instance = NULL;
+    assert_int_equal(sdm_registry_add(registry, &shape, "test", NULL), SDM_OK);
+    assert_int_equal(sdm_instance_create(sdm_registry_find(registry, "with_nothing", NULL),
+                                         &(sdm_named_text){"edge", "0.2"}, 1, NULL, &instance,
+                                         NULL),
+                     SDM_OK);
+    float *v = phantom(TRUTH, &POSE, 1, 5);
+    const sdm_fit_target t = image_of(v);
+    sdm_fit_source source = exact_source();
+    source.shape = instance;
+    for (int prior = 0; prior < 2; prior++) {
+        sdm_fit_opts o = near_start();
+        sdm_fit_result r;
+        sdm_error err = {0};
+        o.start_params = (const double[4]){2.4, 1.8, 1.4, 1.5};
+        o.prior_sd = prior;
+        if (sdm_fit(&source, &t, &o, &r, &err)) fail_msg("%s", err.text);
+        for (int k = 0; k < 3; k++) assert_false(r.by_prior[k]);
+        assert_true(r.by_prior[3]);
+        assert_true(fabs(r.sd[3] / (prior ? 1 : 2 / sqrt(12)) - 1) < 0.02);
+        sdm_fit_dispose(&r);
+    }
+    sdm_instance_free(instance);
+    free(v);
+}
+
+// noise that is correlated: an estimate and its prior are weighed by their variances, as if it was
+// not
+static void test_prior_weight(void **state)
+{
+    (void)state;
+    float *v = phantom(TRUTH, &POSE, 1, 5);
+    const sdm_fit_target t = image_of(v);
+    sdm_fit_opts o = near_start();
+    o.keep_pose = true;
+    o.start_pose = POSE;
+    o.prior_sd = 0;
+    sdm_fit_result r = fit(&t, &o);
+    const double sd = r.sd[2], found = r.params[2], prior_sd = 10 * sd;
+    assert_true(r.noise_factor > 3);
+    sdm_fit_dispose(&r);
+    o.prior_sd = prior_sd / 1.5; // of half of 1 .. 4
+    r = fit(&t, &o);
+    const double wanted = (2.5 - found) / (1 + prior_sd * prior_sd / (sd * sd)),
+                 moved = r.params[2] - found;
+    if (!(moved > 0.6 * wanted && moved < 1.6 * wanted))
+        fail_msg("moved by %g, wanted %g", moved, wanted);
+    sdm_fit_dispose(&r);
+    free(v);
+}
+
+// two tissues outside that overlap: without acceleration 51 iterations
+static void test_overlapping_tissues(void **state)
+{
+    (void)state;
+    float *v = phantom(TRUTH, &POSE, 0.5, 6);
+    const size_t n = sdm_grid_count(&(sdm_grid){.n = {36, 30, 26}});
+    for (size_t i = 0; i < n; i++)
+        if (v[i] > 900 && sdm_rng_uniform(8, 1, i) < 0.35)
+            v[i] = (float)(700 + 400 * sdm_rng_normal(8, 2, i));
+    const sdm_fit_target t = image_of(v);
+    sdm_fit_opts o = near_start();
+    o.appearance.n_outside = 2;
+    sdm_fit_result r = fit(&t, &o);
+    const sdm_fit_law *second = &r.appearance.outside[1];
+    printf("overlapping tissues: %zu iterations, %s; %g of %g +- %g\n", r.n_iterations, r.reason,
+           second->weight, second->mean, second->sd);
+    if (!(r.n_iterations <= 40)) fail_msg("%zu iterations", r.n_iterations);
+    assert_true(fabs(second->weight - 0.35) < 0.1 && fabs(second->mean - 700) < 100 &&
+                fabs(second->sd - 400) < 80);
+    sdm_fit_dispose(&r);
+    free(v);
+}
+
+// a tissue that the image does not hold keeps its law: it does not look for something else to be
+static void test_absent_tissue(void **state)
+{
+    (void)state;
+    float *v = phantom(TRUTH, &POSE, 1, 4);
+    const sdm_fit_target t = image_of(v);
+    sdm_fit_opts o = near_start(), one = near_start();
+    o.appearance.n_outside = 2;
+    const sdm_fit_law *air = &o.appearance.outside[1];
+    sdm_fit_result r = fit(&t, &o), alone = fit(&t, &one);
+    const sdm_fit_law *found = &r.appearance.outside[1];
+    if (!(found->mean == air->mean && fabs(found->sd / air->sd - 1) < 1e-9 && found->weight < 1e-4))
+        fail_msg("%g of %g +- %g", found->weight, found->mean, found->sd);
+    for (int k = 0; k < 3; k++)
+        assert_true(fabs(r.params[k] - alone.params[k]) < 1e-2 * alone.sd[k]);
+    sdm_fit_dispose(&r);
+    sdm_fit_dispose(&alone);
+    free(v);
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_clean),
+        cmocka_unit_test(test_one_maximum),
+        cmocka_unit_test(test_honest),
+        cmocka_unit_test(test_threads),
+        cmocka_unit_test(test_label_map),
+        cmocka_unit_test(test_points),
+        cmocka_unit_test(test_labels_of_image),
+        cmocka_unit_test(test_turns),
+        cmocka_unit_test(test_kept),
+        cmocka_unit_test(test_priors),
+        cmocka_unit_test(test_no_effect),
+        cmocka_unit_test(test_prior_weight),
+        cmocka_unit_test(test_overlapping_tissues),
+        cmocka_unit_test(test_absent_tissue),
+    };
+    const struct CMUnitTest longer[] = {cmocka_unit_test(test_honest)};
+    n_random = argc > 1 ? (size_t)strtoul(argv[1], NULL, 10) : 0;
+    return n_random ? cmocka_run_group_tests(longer, set_up, tear_down)
+                    : cmocka_run_group_tests(tests, set_up, tear_down);
+}

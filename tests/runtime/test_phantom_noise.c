@@ -1,0 +1,295 @@
+/* Phantoms: noise and random truth against their laws; the same bits, misuse. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "oracle/phantom_tools.h"
+#include "sdm/internal/heap.h"
+
+typedef struct statistics {
+    double mean, variance, rho[3]; /* correlation of neighbours along x, y, z */
+} statistics;
+
+static statistics measure(const float *v, const sdm_grid *g)
+{
+    const size_t n = sdm_grid_count(g), step[3] = {1, (size_t)g->n[0], (size_t)(g->n[0] * g->n[1])};
+    statistics s = {0};
+    for (size_t i = 0; i < n; i++) s.mean += (double)v[i] / (double)n;
+    for (size_t i = 0; i < n; i++)
+        s.variance += ((double)v[i] - s.mean) * ((double)v[i] - s.mean) / (double)n;
+    for (int a = 0; a < 3; a++) {
+        double sum = 0, count = 0;
+        for (size_t i = 0; i + step[a] < n; i++) {
+            const size_t at = i / step[a] % (size_t)g->n[a];
+            if (at + 1 == (size_t)g->n[a]) continue;
+            sum += ((double)v[i] - s.mean) * ((double)v[i + step[a]] - s.mean);
+            count++;
+        }
+        s.rho[a] = sum / count / s.variance;
+    }
+    return s;
+}
+
+static void test_noise(void **state)
+{
+    (void)state;
+    // nothing but outside
+    const double far[3] = {200, 0, 0};
+    sdm_grid g = sdm_grid_centred((const int64_t[3]){40, 44, 48}, 0.2, far);
+    const double n = (double)sdm_grid_count(&g), h[3] = {0.25, 0.2, 0.3};
+    for (int a = 0; a < 3; a++) g.spacing[a] = h[a];
+
+    sdm_phantom_opts o = plain();
+    o.outside = (sdm_tissue){100, 0};
+    o.noise = 30;
+    float *white = make(block, NULL, NULL, &o, &g, NULL);
+    statistics s = measure(white, &g);
+    close_to("mean", s.mean, 100, 4 * 30 / sqrt(n));
+    close_to("variance", s.variance, 900, 4 * 900 * sqrt(2 / n));
+    for (int a = 0; a < 3; a++) close_to("correlation of white noise", s.rho[a], 0, 4 / sqrt(n));
+
+    // smoothed white noise: exp(-h^2 / (4 sigma^2)) between neighbours, the variance as asked for
+    o.noise_is_blurred = true;
+    const double blur[3] = {0.2, 0.3, 0.25};
+    double independent = n; // about this many numbers count
+    for (int a = 0; a < 3; a++) {
+        o.blur[a] = blur[a];
+        independent *= fmin(1, g.spacing[a] / (2 * sqrt(PI) * blur[a]));
+    }
+    float *smooth = make(block, NULL, NULL, &o, &g, NULL);
+    s = measure(smooth, &g);
+    close_to("mean", s.mean, 100, 4 * 30 / sqrt(independent));
+    close_to("variance", s.variance, 900, 4 * 900 * sqrt(2 / independent));
+    for (int a = 0; a < 3; a++)
+        close_to("correlation of noise", s.rho[a], exp(-0.25 * h[a] * h[a] / (blur[a] * blur[a])),
+                 0.03);
+
+    // texture: another field, the tissue's sd; the variances of texture and noise add
+    o.noise = 0;
+    o.outside.sd = 40;
+    o.texture_mm = 0.3;
+    float *texture = make(block, NULL, NULL, &o, &g, NULL);
+    s = measure(texture, &g);
+    close_to("variance", s.variance, 1600, 0.1 * 1600);
+    for (int a = 0; a < 3; a++)
+        close_to("correlation of texture", s.rho[a], exp(-0.25 * h[a] * h[a] / 0.09), 0.03);
+    double both = 0;
+    for (size_t i = 0; i < (size_t)n; i++)
+        both += ((double)texture[i] - 100) * ((double)smooth[i] - 100) / n;
+    close_to("correlation of texture and noise", both / (30 * 40), 0, 0.06);
+    o.noise = 30;
+    float *sum = make(block, NULL, NULL, &o, &g, NULL);
+    for (size_t i = 0; i < (size_t)n; i++)
+        close_to("sum", (double)sum[i], (double)texture[i] + (double)smooth[i] - 100, 1e-3);
+
+    // both white: still two fields, so their variances add
+    o.texture_mm = 0;
+    o.noise_is_blurred = false;
+    float *two = make(block, NULL, NULL, &o, &g, NULL);
+    s = measure(two, &g);
+    close_to("variance of two fields", s.variance, 2500, 4 * 2500 * sqrt(2 / n));
+
+    // inside has its own texture
+    o = plain();
+    o.inside = (sdm_tissue){-500, 10};
+    o.outside = (sdm_tissue){0, 40};
+    for (int a = 0; a < 3; a++) g.origin[a] -= far[a];
+    g.origin[0] -= 30; // all voxels inside
+    float *inside = make(block, NULL, NULL, &o, &g, NULL);
+    s = measure(inside, &g);
+    close_to("mean inside", s.mean, -500, 4 * 10 / sqrt(n));
+    close_to("variance inside", s.variance, 100, 4 * 100 * sqrt(2 / n));
+    free(inside);
+    free(two);
+    free(sum);
+    free(texture);
+    free(smooth);
+    free(white);
+}
+
+static void test_same_bits(void **state)
+{
+    (void)state;
+    const sdm_pose pose = {.rotation = {0.2, 0.1, 0.4}, .translation = {0.1, 0.2, 0.3}};
+    const sdm_grid g = oblique(21, 33, 15);
+    const size_t n = sdm_grid_count(&g);
+    sdm_phantom_opts o = sdm_phantom_defaults();
+    o.air_share = 0.6;
+    o.n_threads = 1;
+    uint8_t *first = calloc(n, 1), *label = calloc(n, 1);
+    if (!first || !label) abort();
+    float *one = make(ellipsoid, NULL, &pose, &o, &g, first);
+    for (o.n_threads = 0; o.n_threads <= 3; o.n_threads++) {
+        float *v = make(ellipsoid, NULL, &pose, &o, &g, label);
+        assert_memory_equal(v, one, n * sizeof *v);
+        assert_memory_equal(label, first, n);
+        free(v);
+    }
+    o.n_threads = 2;
+    o.seed = 2;
+    float *v = make(ellipsoid, NULL, &pose, &o, &g, label);
+    assert_memory_not_equal(v, one, n * sizeof *v);
+    assert_memory_equal(label, first, n);
+    free(v);
+    free(one);
+    free(label);
+    free(first);
+}
+
+static void test_random_truth(void **state)
+{
+    (void)state;
+    double p[3], again[3], mean[3] = {0}, angle = 0, shift = 0, widest = 0;
+    enum { N = 2000 };
+    for (uint64_t seed = 0; seed < N; seed++) {
+        sdm_phantom_random_params(ellipsoid, seed, p);
+        assert_int_equal(sdm_instance_check(ellipsoid, p, NULL), SDM_OK);
+        for (int i = 0; i < 3; i++) mean[i] += p[i] / N;
+        const sdm_pose pose = sdm_phantom_random_pose(0.5, 2, seed);
+        const double *r = pose.rotation, *t = pose.translation;
+        const double turned = sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
+        const double moved = sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]);
+        assert_true(turned <= 0.5 * (1 + 1e-12) && moved <= 2 * (1 + 1e-12));
+        angle += turned / N;
+        shift += moved / N;
+        widest = fmax(widest, turned);
+    }
+    // means of uniform laws, of the radius in a ball: 3/4; four standard errors
+    close_to("mean rx", mean[0], 3, 4 * 4 / sqrt(12.0 * N));
+    close_to("mean ry", mean[1], 2.5, 4 * 3 / sqrt(12.0 * N));
+    close_to("mean rz", mean[2], 2.5, 4 * 3 / sqrt(12.0 * N));
+    close_to("mean turn", angle, 0.25, 4 * 0.5 / sqrt(12.0 * N));
+    close_to("mean shift", shift, 1.5, 4 * 2 * 0.194 / sqrt((double)N));
+    assert_true(widest > 0.49);
+    sdm_phantom_random_params(ellipsoid, 5, p);
+    sdm_phantom_random_params(ellipsoid, 5, again);
+    assert_memory_equal(p, again, sizeof p);
+    const sdm_pose none = sdm_phantom_random_pose(0, 0, 3);
+    for (int i = 0; i < 3; i++) assert_true(none.rotation[i] == 0 && none.translation[i] == 0);
+}
+
+static void refused(const sdm_phantom_opts *o, const char *word)
+{
+    const sdm_grid g = oblique(4, 5, 6);
+    float v[120];
+    sdm_error err = {0};
+    assert_int_equal(sdm_phantom_make(ellipsoid, NULL, NULL, o, &g, v, NULL, &err), SDM_E_ARG);
+    if (!strstr(err.text, word)) fail_msg("'%s' does not name '%s'", err.text, word);
+}
+
+static void test_misuse(void **state)
+{
+    (void)state;
+    sdm_grid g = oblique(4, 5, 6);
+    float v[120];
+    sdm_error err;
+    assert_int_equal(sdm_phantom_make(NULL, NULL, NULL, NULL, &g, v, NULL, &err), SDM_E_ARG);
+    assert_int_equal(sdm_phantom_make(ellipsoid, NULL, NULL, NULL, NULL, v, NULL, &err), SDM_E_ARG);
+    assert_int_equal(sdm_phantom_make(ellipsoid, NULL, NULL, NULL, &g, NULL, NULL, &err),
+                     SDM_E_ARG);
+    assert_int_equal(
+        sdm_phantom_make(ellipsoid, (const double[3]){4, NAN, 2}, NULL, NULL, &g, v, NULL, &err),
+        SDM_E_RANGE);
+    const sdm_pose nowhere = {.translation = {0, NAN, 0}};
+    assert_int_equal(sdm_phantom_make(ellipsoid, NULL, &nowhere, NULL, &g, v, NULL, &err),
+                     SDM_E_ARG);
+    assert_non_null(strstr(err.text, "translation along y"));
+    g.spacing[1] = NAN;
+    assert_int_equal(sdm_phantom_make(ellipsoid, NULL, NULL, NULL, &g, v, NULL, &err), SDM_E_ARG);
+
+    static const double bad[] = {NAN, INFINITY, -INFINITY, -1};
+    for (size_t i = 0; i < 4; i++) {
+        sdm_phantom_opts o;
+        for (int a = 0; a < 3; a++) o = plain(), o.blur[a] = bad[i], refused(&o, "blur along");
+        o = plain(), o.noise = bad[i], refused(&o, "noise");
+        o = plain(), o.texture_mm = bad[i], refused(&o, "texture");
+        o = plain(), o.outside.sd = bad[i], refused(&o, "outside");
+        if (i < 3) o = plain(), o.inside.mean = bad[i], refused(&o, "inside");
+        if (i < 3) o = plain(), o.air.mean = bad[i], refused(&o, "air");
+        o = plain(), o.air_share = bad[i], refused(&o, "share of air");
+        o = plain(), o.air_share = 0.5, o.air_mm = bad[i], refused(&o, "diameter");
+        o = plain(), o.air_share = 0.5, o.air_mm = 1, o.air_clear_mm = bad[i], refused(&o, "clear");
+    }
+    sdm_phantom_opts o = plain();
+    o.blur[1] = 64.1 * 0.2, refused(&o, "blur along y");
+    o = plain(), o.air_share = 1.5, refused(&o, "share of air");
+    o = plain(), o.air_share = 0.5, o.air_mm = 1e-9, refused(&o, "too small");
+    o = plain(), o.air_share = 0.5, o.air_mm = 1e-3, refused(&o, "larger");
+    o = plain(), o.supersampling = 0, refused(&o, "supersampling");
+    o = plain(), o.supersampling = 17, refused(&o, "supersampling");
+    o = plain(), o.n_threads = -1, refused(&o, "threads");
+}
+
+// with air, by one thread
+static sdm_phantom_opts airy(void)
+{
+    sdm_phantom_opts o = sdm_phantom_defaults();
+    o.air_share = 0.5;
+    o.n_threads = 1;
+    return o;
+}
+
+static sdm_status make_small(const sdm_phantom_opts *o, sdm_error *err)
+{
+    const sdm_grid g = oblique(4, 5, 6);
+    float v[120];
+    uint8_t label[120];
+    return sdm_phantom_make(block, NULL, NULL, o, &g, v, label, err);
+}
+
+static void test_memory(void **state)
+{
+    (void)state;
+    // every allocation that fails is an error and nothing leaks
+    const sdm_phantom_opts o = airy();
+    for (unsigned long n = 1;; n++) {
+        sdm_alloc_fail_after(n);
+        sdm_error err;
+        const sdm_status s = make_small(&o, &err);
+        sdm_alloc_fail_after(0);
+        assert_true(n < 2000);
+        if (!s) break;
+        assert_int_equal(s, SDM_E_NOMEM);
+    }
+}
+
+// asked `left` times before it stops the work
+static bool stops(void *user)
+{
+    int *left = user;
+    return (*left)-- <= 0;
+}
+
+static void test_cancelled(void **state)
+{
+    (void)state;
+    sdm_phantom_opts o = airy();
+    o.cancelled = stops;
+    sdm_status s = SDM_E_CANCELLED;
+    int asked = 0;
+    for (; s; asked++) {
+        sdm_error err;
+        int left = asked;
+        o.user = &left;
+        s = make_small(&o, &err);
+        assert_true(asked < 10000 && (!s || s == SDM_E_CANCELLED));
+    }
+    // in both fields row by row, and in the planes of sub-voxels
+    assert_true(asked > 2 * 30 + 18);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_noise),     cmocka_unit_test(test_random_truth),
+        cmocka_unit_test(test_same_bits), cmocka_unit_test(test_memory),
+        cmocka_unit_test(test_misuse),    cmocka_unit_test(test_cancelled),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

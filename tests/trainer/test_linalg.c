@@ -1,0 +1,165 @@
+/* Eigenvectors, factorisations, orthonormal bases and samples of the trainer against their
+ * definitions. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "linalg.h"
+#include "sdm/internal/rng.h"
+#include "sdm/internal/train.h"
+#include "sdm/memory.h"
+
+static void eigenvectors(void **state)
+{
+    (void)state;
+    const size_t sizes[] = {1, 2, 3, 40};
+    for (size_t t = 0; t < 4; t++) {
+        const size_t n = sizes[t];
+        double *a, *v, *a0;
+        assert_int_equal(SDM_ALLOC(&a, n * n, "a", NULL), 0);
+        assert_int_equal(SDM_ALLOC(&a0, n * n, "a", NULL), 0);
+        assert_int_equal(SDM_ALLOC(&v, n, "v", NULL), 0);
+        for (size_t i = 0; i < n; i++)
+            for (size_t j = 0; j <= i; j++)
+                a0[i * n + j] = a0[j * n + i] = sdm_rng_normal(1, t, i * n + j);
+        memcpy(a, a0, n * n * sizeof *a);
+        assert_int_equal(eigen_symmetric(n, a, v, NULL), 0);
+        for (size_t i = 0; i < n; i++) {
+            if (i) assert_true(v[i] <= v[i - 1]);
+            for (size_t j = 0; j < n; j++) {
+                double applied = 0, dot = 0;
+                for (size_t k = 0; k < n; k++)
+                    applied += a0[j * n + k] * a[i * n + k], dot += a[i * n + k] * a[j * n + k];
+                assert_true(fabs(applied - v[i] * a[i * n + j]) < 1e-12 * (double)n);
+                assert_true(fabs(dot - (i == j)) < 1e-12 * (double)n);
+            }
+        }
+        sdm_free(a);
+        sdm_free(a0);
+        sdm_free(v);
+    }
+    double diagonal[9] = {2, 0, 0, 0, 3, 0, 0, 0, 1}, values[3]; // already diagonal, repeated zeros
+    assert_int_equal(eigen_symmetric(3, diagonal, values, NULL), 0);
+    assert_true(values[0] == 3 && values[1] == 2 && values[2] == 1);
+}
+
+static void solve(void **state)
+{
+    (void)state;
+    enum { N = 20 };
+    double m[N][N], a[N * N], b[2 * N], x[2 * N];
+    for (int i = 0; i < N; i++)
+        for (int j = 0; j < N; j++) m[i][j] = sdm_rng_normal(2, 1, (uint64_t)(i * N + j));
+    for (int i = 0; i < N; i++)
+        for (int j = 0; j < N; j++) {
+            a[i * N + j] = i == j;
+            for (int k = 0; k < N; k++) a[i * N + j] += m[i][k] * m[j][k];
+        }
+    for (int i = 0; i < 2 * N; i++) x[i] = sdm_rng_normal(2, 2, (uint64_t)i);
+    for (int i = 0; i < N; i++)
+        for (int c = 0; c < 2; c++) {
+            b[2 * i + c] = 0;
+            for (int j = 0; j < N; j++) b[2 * i + c] += a[i * N + j] * x[2 * j + c];
+        }
+    assert_int_equal(cholesky(N, a), 0);
+    cholesky_solve(N, a, 2, b);
+    for (int i = 0; i < 2 * N; i++) assert_true(fabs(b[i] - x[i]) < 1e-9);
+    double indefinite[4] = {1, 2, 2, 1};
+    assert_int_equal(cholesky(2, indefinite), 2);
+}
+
+static void spaces(void **state)
+{
+    (void)state;
+    enum { N = 60, K = 12 };
+    // covariance with known eigenvectors: a rotation of a decaying spectrum
+    float *q, *c, *basis;
+    double values[K];
+    assert_int_equal(SDM_ALLOC(&q, N * N, "q", NULL), 0);
+    assert_int_equal(SDM_ALLOC(&c, N * N, "c", NULL), 0);
+    assert_int_equal(SDM_ALLOC(&basis, N * N, "b", NULL), 0);
+    for (size_t i = 0; i < N * N; i++) q[i] = (float)sdm_rng_normal(4, 1, i);
+    assert_int_equal(orthonormalise(N, N, q, 1, NULL), 0);
+    for (size_t i = 0; i < N; i++)
+        for (size_t j = 0; j < N; j++) {
+            double s = 0;
+            for (size_t k = 0; k < N; k++)
+                s += (double)q[k * N + i] * q[k * N + j] * pow(0.6, (double)k);
+            c[i * N + j] = (float)s;
+        }
+    assert_int_equal(leading_eigenvectors(N, c, K, 1, 2, basis, values, NULL), 0);
+    for (size_t k = 0; k < K; k++) {
+        assert_true(fabs(values[k] / pow(0.6, (double)k) - 1) < 1e-3);
+        double along = 0;
+        for (size_t i = 0; i < N; i++) along += (double)basis[k * N + i] * q[k * N + i];
+        assert_true(fabs(fabs(along) - 1) < 1e-3);
+    }
+    // rows with a huge spread of size, one of them zero, span the same space afterwards
+    float *rows, *one, *two;
+    assert_int_equal(SDM_ALLOC(&rows, 8 * N, "r", NULL), 0);
+    for (size_t i = 0; i < 7 * N; i++)
+        rows[i] = (float)(sdm_rng_normal(4, 5, i) * pow(10, (double)(i / N) - 4));
+    assert_int_equal(orthonormalise(7, N, rows, 1, NULL), 0);
+    for (size_t i = 0; i < 7; i++)
+        for (size_t j = 0; j < 7; j++) {
+            double dot = 0;
+            for (size_t k = 0; k < N; k++) dot += (double)rows[i * N + k] * rows[j * N + k];
+            assert_true(fabs(dot - (i == j)) < 1e-5);
+        }
+    // the same bits for any number of threads
+    assert_int_equal(SDM_ALLOC(&one, K * N, "1", NULL), 0);
+    assert_int_equal(SDM_ALLOC(&two, K * N, "2", NULL), 0);
+    assert_int_equal(leading_space(N, N, c, K, 9, 1, one, NULL), 0);
+    assert_int_equal(leading_space(N, N, c, K, 9, 3, two, NULL), 0);
+    assert_memory_equal(one, two, K * N * sizeof *one);
+    sdm_free(q);
+    sdm_free(c);
+    sdm_free(basis);
+    sdm_free(rows);
+    sdm_free(one);
+    sdm_free(two);
+}
+
+// every box of a 2^-d partition holds its share of the first points of a Sobol' sequence, whatever
+// the digital shift
+static void stratified_samples(void **state)
+{
+    (void)state;
+    const double min[4] = {0, 0, 0, 0}, max[4] = {1, 1, 1, 1};
+    int in_box[16] = {0}, in_slice[16][64] = {{0}};
+    const double low[16] = {0}, high[16] = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
+    for (uint64_t i = 0; i < 1024; i++) {
+        double p[16];
+        sdm_sample_params(7, 1, i, min, max, 4, p);
+        in_box[(p[0] >= 0.5) + 2 * (p[1] >= 0.5) + 4 * (p[2] >= 0.5) + 8 * (p[3] >= 0.5)]++;
+        sdm_sample_params(7, 1, i, low, high, 16, p);
+        for (int d = 0; d < 16; d++) in_slice[d][(int)(p[d] * 64)]++;
+    }
+    for (int b = 0; b < 16; b++) assert_int_equal(in_box[b], 64);
+    for (int d = 0; d < 16; d++)
+        for (int s = 0; s < 64; s++) assert_int_equal(in_slice[d][s], 16);
+    // ranges, and many dimensions
+    double wide[20], lo[20], hi[20], sum = 0;
+    for (int d = 0; d < 20; d++) lo[d] = -3, hi[d] = 5;
+    for (uint64_t i = 0; i < 500; i++) {
+        sdm_sample_params(7, 2, i, lo, hi, 20, wide);
+        for (int d = 0; d < 20; d++) {
+            assert_true(wide[d] >= -3 && wide[d] <= 5);
+            sum += wide[d];
+        }
+    }
+    assert_true(fabs(sum / 10000 - 1) < 5 * 8 * 0.289 / 100);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(eigenvectors), cmocka_unit_test(solve),
+                                       cmocka_unit_test(spaces),
+                                       cmocka_unit_test(stratified_samples)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,403 @@
+/* Training end to end on small grids: accuracy, the same bits for any number of threads, resume,
+ * cancellation, mistakes. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include <cmocka.h>
+
+#include "sdm/internal/pod.h"
+#include "train_tools.h"
+
+static const char base[] =
+    "shape: {name: capsule}\n"
+    "grid: {size: [20, 18, 16], spacing: 0.8}\n"
+    "network: {depth: 2, width: 24, rank: 6, block: 8, modes: 32, degree: 3, input_degree: 3}\n"
+    "data: {static: 3, start: 150, online: 100, holdout: 20, memory_gb: 0.5}\n"
+    "train: {steps: 1200, batch: 32, refine: 0.5, refine_batch: 8, average: 0.99}\n";
+
+static void read_config(sdm_config *c, const char *const *overrides, size_t n)
+{
+    sdm_error e = {0};
+    if (sdm_config_parse("test.yaml", base, sizeof base - 1, overrides, n, c, &e))
+        fail_msg("%s", e.text);
+}
+
+static void flip_byte(const char *name, long at)
+{
+    FILE *f = fopen(in_folder(name), "r+b");
+    assert_non_null(f);
+    fseek(f, at, SEEK_SET);
+    const int old = fgetc(f);
+    fseek(f, at, SEEK_SET);
+    fputc(old ^ 1, f);
+    fclose(f);
+}
+
+static void trains(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_error e = {0};
+    sdm_train_report r;
+    read_config(&c, NULL, 0);
+    if (sdm_train(&c, capsule, folder, false, NULL, &r, &e)) fail_msg("%s", e.text);
+    // far below what the mean map alone leaves (about 1 mm), and what the model says is what it
+    // does
+    assert_true(r.accuracy.rmse_mm > 0 && r.accuracy.rmse_mm < 0.03);
+    assert_true(r.accuracy.q50_mm <= r.accuracy.q90_mm && r.accuracy.q90_mm <= r.accuracy.q99_mm);
+    assert_int_equal(r.steps, 1200);
+    assert_int_equal(r.samples, 9 + 150 + 100);
+    assert_true(exists("model.sdm") && exists("config.yaml") && exists("metrics.jsonl") &&
+                exists("loss.png"));
+
+    sdm_model *m;
+    assert_int_equal(sdm_model_open(r.model_path, &m, &e), SDM_OK);
+    const sdm_model_info *info = sdm_model_get_info(m);
+    assert_true(info->accuracy.rmse_mm == r.accuracy.rmse_mm);
+    assert_string_equal(info->shape, "capsule");
+    // an independent look: fresh shapes through the exact engine
+    const size_t n = sdm_grid_count(&c.grid);
+    float *map, *truth;
+    void *scratch;
+    assert_int_equal(SDM_ALLOC(&map, n, "map", NULL), 0);
+    assert_int_equal(SDM_ALLOC(&truth, n, "truth", NULL), 0);
+    assert_int_equal(sdm_alloc(&scratch, sdm_model_scratch_bytes(m, 1), 1, "scratch", NULL), 0);
+    double sum = 0;
+    for (uint64_t i = 0; i < 10; i++) {
+        double lo[8], hi[8], p[8];
+        sdm_mesh mesh = {0};
+        sdm_exact *exact;
+        assert_int_equal(sdm_train_ranges(&c, capsule, lo, hi, &e), SDM_OK);
+        sdm_sample_params(99, 12345, i, lo, hi, info->n_params, p);
+        assert_int_equal(sdm_instance_mesh(capsule, p, &mesh, &e), SDM_OK);
+        assert_int_equal(sdm_exact_create(&mesh, NULL, &exact, &e), SDM_OK);
+        assert_int_equal(sdm_exact_map(exact, &c.grid, truth, &e), SDM_OK);
+        sdm_model_forward(m, p, 1, map, scratch);
+        for (size_t v = 0; v < n; v++)
+            sum += ((double)map[v] - truth[v]) * ((double)map[v] - truth[v]);
+        sdm_exact_free(exact);
+        sdm_mesh_dispose(&mesh);
+    }
+    assert_true(sqrt(sum / 10 / (double)n) < 2 * r.accuracy.rmse_mm);
+    sdm_free(map);
+    sdm_free(truth);
+    sdm_free(scratch);
+    sdm_model_free(m);
+}
+
+static void same_bits_for_threads(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_error e = {0};
+    uint64_t model[3], metrics[3];
+    for (int threads = 1; threads <= 3; threads++) {
+        read_config(&c, (const char *const[]){"train.steps=600"}, 1);
+        clean();
+        // the number of threads is no part of the result, so it must not be part of the stored
+        // config either
+        c.threads = 0;
+        c.data.workers = threads;
+        sdm_config run = c;
+        run.threads = threads;
+        run.data.workers = threads;
+        if (sdm_train(&run, capsule, folder, false, NULL, NULL, &e)) fail_msg("%s", e.text);
+        model[threads - 1] = hash_of("model.sdm");
+        metrics[threads - 1] = hash_of("metrics.jsonl");
+    }
+    assert_true(model[0] == model[1] && model[1] == model[2]);
+    assert_true(metrics[0] == metrics[1] && metrics[1] == metrics[2]);
+}
+
+typedef struct watch {
+    int64_t stop_at;
+    int64_t step;
+    int reports;
+} watch;
+
+static void watch_progress(void *user, const sdm_progress *p)
+{
+    watch *w = user;
+    w->step = p->step;
+    w->reports++;
+}
+
+static int64_t calls, stop_after;
+enum { IN_DATA = 20, IN_FIT = 400, IN_REFINEMENT = 700 }; // calls until then, of 600 steps
+
+static bool stop(void *user)
+{
+    (void)user;
+    return ++calls > stop_after;
+}
+
+// there is a checkpoint of a run of c
+static void refuses_to_resume(const sdm_config *c)
+{
+    sdm_error e = {0};
+    // a wrong bit
+    flip_byte("checkpoint.sdmc", 100000);
+    assert_int_equal(sdm_train(c, capsule, folder, true, NULL, NULL, &e), SDM_E_FORMAT);
+    flip_byte("checkpoint.sdmc", 100000);
+    // another config
+    sdm_config other;
+    read_config(&other, (const char *const[]){"train.steps=600", "network.rank=5"}, 2);
+    assert_int_equal(sdm_train(&other, capsule, folder, true, NULL, NULL, &e), SDM_E_CONFIG);
+}
+
+static void resume_is_bit_exact(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_error e = {0};
+    read_config(&c, (const char *const[]){"train.steps=600"}, 1);
+    clean();
+    if (sdm_train(&c, capsule, folder, false, NULL, NULL, &e)) fail_msg("%s", e.text);
+    const uint64_t whole = hash_of("model.sdm"), metrics = hash_of("metrics.jsonl");
+    // stopped while making data, in the fit, in the refinement
+    const int64_t stops[] = {IN_DATA, IN_FIT, IN_REFINEMENT};
+    for (size_t i = 0; i < 3; i++) {
+        clean();
+        calls = 0, stop_after = stops[i];
+        watch w = {0};
+        const sdm_train_hooks hooks = {.cancelled = stop, .progress = watch_progress, .user = &w};
+        assert_int_equal(sdm_train(&c, capsule, folder, false, &hooks, NULL, &e), SDM_E_CANCELLED);
+        assert_false(exists("model.sdm"));
+        assert_true(exists("checkpoint.sdmc") == (i > 0));
+        if (i == 2) refuses_to_resume(&c);
+        if (sdm_train(&c, capsule, folder, true, NULL, NULL, &e)) fail_msg("%s", e.text);
+        assert_true(hash_of("model.sdm") == whole);
+        assert_true(hash_of("metrics.jsonl") == metrics);
+        assert_true(w.reports > 0);
+        // its work is done
+        assert_false(exists("checkpoint.sdmc"));
+    }
+}
+
+static bool old_files;
+
+static bool look(void *user)
+{
+    (void)user;
+    if (++calls == IN_FIT) old_files = exists("model.sdm") || exists("checkpoint.sdmc");
+    return false;
+}
+
+// a run may go on with another budget, which it keeps, but not with less than it has trained
+static void resume_with_another_budget(void **state)
+{
+    (void)state;
+    static const char *const budgets[][3] = {
+        // the run, too little, another
+        {"train.steps=600", "train.steps=300", "train.steps=540"},
+        {"train.steps=600", "train.steps=300", "train.steps=900"},
+        {"train.minutes=1000", "train.minutes=0.00001", NULL}};
+    for (size_t i = 0; i < 3; i++) {
+        sdm_config c;
+        sdm_error e = {0};
+        sdm_train_report r;
+        clean();
+        read_config(&c, (const char *const[]){budgets[i][0]}, 1);
+        calls = 0, stop_after = i < 2 ? IN_REFINEMENT : IN_FIT;
+        const sdm_train_hooks hooks = {.cancelled = stop};
+        assert_int_equal(sdm_train(&c, capsule, folder, false, &hooks, NULL, &e), SDM_E_CANCELLED);
+        read_config(&c, (const char *const[]){budgets[i][1]}, 1);
+        assert_int_equal(sdm_train(&c, capsule, folder, true, NULL, NULL, &e), SDM_E_CONFIG);
+        assert_non_null(strstr(e.text, "this configuration ends at"));
+        if (!budgets[i][2]) continue;
+        read_config(&c, (const char *const[]){budgets[i][2]}, 1);
+        if (sdm_train(&c, capsule, folder, true, NULL, &r, &e)) fail_msg("%s", e.text);
+        assert_int_equal(r.steps, c.train.steps);
+    }
+}
+
+static bool block_model(void *user)
+{
+    (void)user;
+    if (++calls == IN_FIT) assert_int_equal(mkdir(in_folder("model.sdm"), 0700), 0);
+    return false;
+}
+
+// a network that cannot be written is not lost
+static void model_cannot_be_written(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_error e = {0};
+    read_config(&c, (const char *const[]){"train.steps=595"}, 1);
+    clean();
+    if (sdm_train(&c, capsule, folder, false, NULL, NULL, &e)) fail_msg("%s", e.text);
+    const uint64_t whole = hash_of("model.sdm"), metrics = hash_of("metrics.jsonl");
+    clean();
+    calls = 0;
+    const sdm_train_hooks hooks = {.cancelled = block_model};
+    assert_int_equal(sdm_train(&c, capsule, folder, false, &hooks, NULL, &e), SDM_E_IO);
+    assert_non_null(strstr(e.text, "model.sdm: cannot write"));
+    assert_int_equal(rmdir(in_folder("model.sdm")), 0);
+    calls = 0, stop_after = 2 * IN_DATA + 300; // the data again, but no step
+    const sdm_train_hooks no_step = {.cancelled = stop};
+    if (sdm_train(&c, capsule, folder, true, &no_step, NULL, &e)) fail_msg("%s", e.text);
+    assert_true(hash_of("model.sdm") == whole && hash_of("metrics.jsonl") == metrics);
+}
+
+// an older run stays as it is until training begins, and goes then: its checkpoint is not there to
+// be resumed by the new one
+static void older_run_gives_way(void **state)
+{
+    (void)state;
+    sdm_config c, other;
+    sdm_error e = {0};
+    read_config(&c, (const char *const[]){"train.steps=600"}, 1);
+    read_config(&other, (const char *const[]){"train.steps=600", "network.width=16"}, 2);
+    clean();
+    const sdm_train_hooks stopped = {.cancelled = stop};
+    calls = 0, stop_after = IN_FIT;
+    assert_int_equal(sdm_train(&c, capsule, folder, false, &stopped, NULL, &e), SDM_E_CANCELLED);
+    const uint64_t config = hash_of("config.yaml"), checkpoint = hash_of("checkpoint.sdmc");
+    calls = 0, stop_after = IN_DATA;
+    assert_int_equal(sdm_train(&other, capsule, folder, false, &stopped, NULL, &e),
+                     SDM_E_CANCELLED);
+    assert_true(hash_of("config.yaml") == config && hash_of("checkpoint.sdmc") == checkpoint);
+    // a checkpoint, then a model
+    const sdm_train_hooks looking = {.cancelled = look};
+    for (int i = 0; i < 2; i++) {
+        calls = 0, old_files = true;
+        if (sdm_train(i ? &c : &other, capsule, folder, false, &looking, NULL, &e))
+            fail_msg("%s", e.text);
+        assert_false(old_files);
+        assert_true((hash_of("config.yaml") == config) == (i == 1));
+    }
+}
+
+// a folder that cannot be written is found out before the work
+static void no_place_for_files(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_error e = {0};
+    read_config(&c, NULL, 0);
+    calls = 0, stop_after = 0;
+    const sdm_train_hooks hooks = {.cancelled = stop};
+    assert_int_equal(sdm_train(&c, capsule, "/proc", false, &hooks, NULL, &e), SDM_E_IO);
+}
+
+// a time budget that is over before the data is made still gives a model
+static void short_of_time(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_error e = {0};
+    sdm_train_report r;
+    clean();
+    read_config(&c,
+                (const char *const[]){"train.steps=0", "train.minutes=0.01", "data.start=5000",
+                                      "network.degree=8"},
+                4);
+    if (sdm_train(&c, capsule, folder, false, NULL, &r, &e)) fail_msg("%s", e.text);
+    assert_true(r.accuracy.rmse_mm < 0.2 && r.samples < 5000);
+}
+
+static void polynomials_alone(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_error e = {0};
+    sdm_train_report r;
+    clean();
+    read_config(&c,
+                (const char *const[]){"network.depth=0", "train.steps=50", "network.weights=f32",
+                                      "data.static=[2,4]", "data.online=0", "train.loss=huber",
+                                      "train.near_weight=2"},
+                7);
+    if (sdm_train(&c, capsule, folder, false, NULL, &r, &e)) fail_msg("%s", e.text);
+    assert_true(r.accuracy.rmse_mm < 0.1);
+}
+
+// more random samples than fit into the pool: the oldest are replaced
+static void small_pool(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_error e = {0};
+    sdm_train_report r;
+    clean();
+    read_config(&c,
+                (const char *const[]){"train.steps=300", "data.memory_gb=0.0025", "data.start=60",
+                                      "data.online=500", "data.static=2"},
+                5);
+    if (sdm_train(&c, capsule, folder, false, NULL, &r, &e)) fail_msg("%s", e.text);
+    assert_int_equal(r.samples, 4 + 560);
+    assert_true(r.accuracy.rmse_mm < 0.1);
+}
+
+// n maps span n functions: asked for more, a block has no more
+static void few_maps(void **state)
+{
+    (void)state;
+    enum { MAPS = 8 };
+    sdm_config c;
+    sdm_error e = {0};
+    sdm_train_report r;
+    sdm_model *m;
+    clean();
+    read_config(&c,
+                (const char *const[]){"train.steps=2", "data.static=2", "data.start=4",
+                                      "data.online=0", "network.rank=200", "network.levels=1"},
+                6);
+    if (sdm_train(&c, capsule, folder, false, NULL, &r, &e)) fail_msg("%s", e.text);
+    assert_int_equal(r.samples, MAPS);
+    assert_int_equal(sdm_model_open(r.model_path, &m, &e), SDM_OK);
+    const size_t blocks = sdm_pod_count(&c.grid, (size_t)c.network.block, 1).first[1];
+    const double latent = 24 + 20, voxels = (double)sdm_grid_count(&c.grid),
+                 mlp = 24 * (24 + 20); // at most
+    assert_true(sdm_model_get_info(m)->macs <=
+                (double)MAPS * ((double)blocks * latent + voxels) + mlp);
+    sdm_model_free(m);
+}
+
+static void mistakes(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_error e = {0};
+    clean();
+    read_config(&c, (const char *const[]){"data.static=[2,2,2,2,2]"}, 1);
+    assert_int_equal(sdm_train(&c, capsule, folder, false, NULL, NULL, &e), SDM_E_CONFIG);
+    assert_non_null(strstr(e.text, "data.static"));
+    read_config(&c, (const char *const[]){"data.memory_gb=0.001"}, 1);
+    assert_int_equal(sdm_train(&c, capsule, folder, false, NULL, NULL, &e), SDM_E_CONFIG);
+    assert_non_null(strstr(e.text, "data.memory_gb"));
+    read_config(&c, (const char *const[]){"shape.ranges.radios=[1,2]"}, 1);
+    assert_int_equal(sdm_train(&c, capsule, folder, false, NULL, NULL, &e), SDM_E_CONFIG);
+    assert_non_null(strstr(e.text, "did you mean 'radius'"));
+    read_config(&c, (const char *const[]){"shape.ranges.radius=[1e-9,1e9]"}, 1);
+    assert_int_equal(sdm_train(&c, capsule, folder, false, NULL, NULL, &e), SDM_E_CONFIG);
+    read_config(&c, NULL, 0);
+    assert_int_equal(sdm_train(&c, capsule, "/proc/no/such/folder", false, NULL, NULL, &e),
+                     SDM_E_IO);
+    assert_false(exists("model.sdm"));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(trains),
+                                       cmocka_unit_test(same_bits_for_threads),
+                                       cmocka_unit_test(resume_is_bit_exact),
+                                       cmocka_unit_test(resume_with_another_budget),
+                                       cmocka_unit_test(model_cannot_be_written),
+                                       cmocka_unit_test(older_run_gives_way),
+                                       cmocka_unit_test(no_place_for_files),
+                                       cmocka_unit_test(short_of_time),
+                                       cmocka_unit_test(polynomials_alone),
+                                       cmocka_unit_test(small_pool),
+                                       cmocka_unit_test(few_maps),
+                                       cmocka_unit_test(mistakes)};
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -1,0 +1,70 @@
+/* What the tests of training begin and end with: a capsule to learn, a folder for the run; cmocka.h
+ * comes before. */
+#ifndef SDM_TEST_TRAIN_TOOLS_H
+#define SDM_TEST_TRAIN_TOOLS_H
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include "sdm/builtin_shapes.h"
+#include "sdm/internal/checksum.h"
+#include "sdm/internal/file.h"
+#include "sdm/internal/train.h"
+#include "sdm/memory.h"
+
+static sdm_registry *registry;
+static sdm_instance *capsule;
+static char folder[] = "training_XXXXXX";
+
+/* Name of a file of the run, in a buffer that the next call uses again. */
+static inline const char *in_folder(const char *name)
+{
+    static char path[128];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    return path;
+}
+
+static inline bool exists(const char *name) { return access(in_folder(name), F_OK) == 0; }
+
+static inline uint64_t hash_of(const char *name)
+{
+    uint8_t *data;
+    size_t size;
+    assert_int_equal(sdm_file_read(in_folder(name), 1 << 30, &data, &size, NULL), SDM_OK);
+    // a file that ends with its own checksum has the same checksum as any other such file: leave
+    // the end out
+    assert_true(size > 8);
+    const uint64_t h = sdm_crc64(0, data, size - 8);
+    sdm_free(data);
+    return h;
+}
+
+/* Removes all files that a run leaves. */
+static inline void clean(void)
+{
+    static const char *const names[] = {"model.sdm", "checkpoint.sdmc", "metrics.jsonl",
+                                        "config.yaml", "loss.png"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) remove(in_folder(names[i]));
+}
+
+static inline int set_up(void **state)
+{
+    (void)state;
+    if (!mkdtemp(folder) || sdm_registry_create(&registry, NULL) ||
+        sdm_builtin_shapes_add(registry, NULL))
+        return 1;
+    return sdm_instance_create(sdm_registry_find(registry, "capsule", NULL), NULL, 0, NULL,
+                               &capsule, NULL) != SDM_OK;
+}
+
+static inline int tear_down(void **state)
+{
+    (void)state;
+    clean();
+    sdm_instance_free(capsule);
+    sdm_registry_free(registry);
+    return rmdir(folder); // nothing else was left behind
+}
+
+#endif

@@ -1,0 +1,142 @@
+/* Forward and backward pass of a point network. */
+#include "point_mlp.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "data/streams.h"
+#include "sdm/internal/kernels.h"
+#include "sdm/internal/pod.h"
+#include "sdm/internal/rng.h"
+
+enum { SLICE = 32 }; // points that a thread takes at a time
+
+void point_init(const sdm_point_arch *a, uint64_t seed, float *w)
+{
+    size_t at = 0;
+    for (size_t l = 0; l <= a->depth; l++) {
+        const bool last = l == a->depth;
+        const size_t width = last ? 1 : a->width[l],
+                     k = last ? a->width[l - 1] : sdm_point_inputs(a, l);
+        const double sd = sqrt((last ? 0.1 : 2.0) / (double)k);
+        for (size_t end = at + width * k; at < end; at++)
+            w[at] = (float)(sd * sdm_rng_normal(seed, STREAM_INIT, at));
+        memset(w + at, 0, width * sizeof *w);
+        at += width;
+    }
+}
+
+// workspace: of each layer h[B][W_l] and its slope[B][W_l]; slope[B] of the last;
+// delta[2][B][largest W_l]
+typedef struct places {
+    float *h[SDM_POINT_MAX_DEPTH], *slope[SDM_POINT_MAX_DEPTH], *last, *delta[2];
+    size_t total;
+} places;
+
+static places places_of(const sdm_point_arch *a, size_t batch, float *workspace)
+{
+    places p = {.total = batch};
+    size_t widest = 0;
+    p.last = workspace;
+    for (size_t l = 0; l < a->depth; l++) {
+        p.h[l] = workspace ? workspace + p.total : NULL;
+        p.slope[l] = workspace ? p.h[l] + batch * a->width[l] : NULL;
+        p.total += 2 * batch * a->width[l];
+        if (a->width[l] > widest) widest = a->width[l];
+    }
+    for (int i = 0; i < 2; i++) {
+        p.delta[i] = workspace ? workspace + p.total : NULL;
+        p.total += batch * widest;
+    }
+    return p;
+}
+
+size_t point_workspace(const sdm_point_arch *a, size_t batch)
+{
+    return places_of(a, batch, NULL).total;
+}
+
+void point_forward(const sdm_point_arch *a, const float *w, size_t batch, const float *u,
+                   float *workspace, float *value, int n_threads)
+{
+    const places p = places_of(a, batch, workspace);
+    const size_t n_u = a->n_params + 3;
+    for (size_t l = 0; l < a->depth; l++) {
+        const size_t width = a->width[l], k = sdm_point_inputs(a, l),
+                     before = sdm_point_hidden(a, l);
+        const float *bias = w + width * k;
+        float *h = p.h[l];
+        for (size_t i = 0; i < batch; i++) memcpy(h + i * width, bias, width * sizeof *h);
+        if (before)
+            sdm_gemm(batch, width, before, (sdm_view){p.h[l - 1], before, 1}, (sdm_view){w, 1, k},
+                     true, h, width, n_threads);
+        if (k > before)
+            sdm_gemm(batch, width, n_u, (sdm_view){u, n_u, 1}, (sdm_view){w + before, 1, k}, true,
+                     h, width, n_threads);
+        w += width * (k + 1);
+#pragma omp parallel for schedule(static) num_threads(n_threads)
+        for (size_t i = 0; i < batch; i += SLICE) {
+            const size_t n = (batch - i < SLICE ? batch - i : SLICE) * width;
+            sdm_activate(a->activation, n, h + i * width, h + i * width, p.slope[l] + i * width);
+        }
+    }
+    const size_t last = a->width[a->depth - 1];
+    const float *h = p.h[a->depth - 1];
+#pragma omp parallel for schedule(static) num_threads(n_threads)
+    for (size_t i = 0; i < batch; i++) {
+        float sum = w[last];
+        for (size_t o = 0; o < last; o++) sum += w[o] * h[i * last + o];
+        const float g = a->tanh_output ? tanhf(sum) : sum;
+        value[i] = (float)a->scale * g;
+        p.last[i] = (float)a->scale * (a->tanh_output ? 1 - g * g : 1);
+    }
+    (void)n_threads;
+}
+
+// gradient of one layer: dw[width][k] += d^T [before, u], db[width] += the sum of d
+static void layer_gradient(size_t batch, size_t width, const float *d, size_t before,
+                           const float *h, size_t n_u, const float *u, float *dw, int n_threads)
+{
+    const size_t k = before + n_u;
+    const sdm_view dt = {d, 1, width};
+    if (before)
+        sdm_gemm(width, before, batch, dt, (sdm_view){h, before, 1}, true, dw, k, n_threads);
+    if (n_u)
+        sdm_gemm(width, n_u, batch, dt, (sdm_view){u, n_u, 1}, true, dw + before, k, n_threads);
+    float *db = dw + width * k;
+    for (size_t i = 0; i < batch; i++)
+        for (size_t o = 0; o < width; o++) db[o] += d[i * width + o];
+}
+
+void point_backward(const sdm_point_arch *a, const float *w, size_t batch, const float *u,
+                    float *workspace, const float *slope, float *gradient, int n_threads)
+{
+    places p = places_of(a, batch, workspace);
+    const size_t last = a->width[a->depth - 1];
+    size_t at = sdm_point_count(a) - last - 1; // first weight of the layer behind
+    float *d = p.delta[0], *other = p.delta[1];
+    for (size_t i = 0; i < batch; i++) {
+        const float s = slope[i] * p.last[i];
+        const float *h = p.h[a->depth - 1] + i * last;
+        for (size_t o = 0; o < last; o++) {
+            gradient[at + o] += s * h[o];
+            d[i * last + o] = s * w[at + o];
+        }
+        gradient[at + last] += s;
+    }
+    for (size_t l = a->depth; l-- > 0;) {
+        const size_t width = a->width[l], k = sdm_point_inputs(a, l),
+                     before = sdm_point_hidden(a, l);
+        at -= width * (k + 1);
+#pragma omp parallel for schedule(static) num_threads(n_threads)
+        for (size_t i = 0; i < batch; i++)
+            for (size_t o = 0; o < width; o++) d[i * width + o] *= p.slope[l][i * width + o];
+        layer_gradient(batch, width, d, before, l ? p.h[l - 1] : NULL, k - before, u, gradient + at,
+                       n_threads);
+        if (l == 0) break;
+        sdm_gemm(batch, before, width, (sdm_view){d, width, 1}, (sdm_view){w + at, k, 1}, false,
+                 other, before, n_threads);
+        float *swap = d;
+        d = other, other = swap;
+    }
+}

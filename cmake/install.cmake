@@ -52,11 +52,11 @@ target_include_directories(sdmgen_plugin INTERFACE $<INSTALL_INTERFACE:${CMAKE_I
 target_compile_features(sdmgen_plugin INTERFACE c_std_11)
 install(TARGETS sdmgen_plugin EXPORT sdmgenTargets)
 
-# headers of what the libraries hold: not of the configuration and the trainer, which belong to the program
+# headers for users; those in internal/ are between the parts of the project
 foreach(folder framework runtime shapes)
   if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/include/sdm)
     install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/include/sdm DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h"
-            PATTERN config.h EXCLUDE PATTERN experiment.h EXCLUDE PATTERN vdb.h EXCLUDE)
+            PATTERN internal EXCLUDE PATTERN vdb.h EXCLUDE)
   endif()
 endforeach()
 if(SDM_VDB)

@@ -35,12 +35,17 @@ install_packages() {
     "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing >/dev/null
 }
 
-# build PRESET [TARGET]: configures build/PRESET once and builds it.
-build() {
-    local preset=$1 target=${2:-all} generator=()
+# configure PRESET: makes build/PRESET ready.
+configure() {
+    local preset=$1 generator=()
     [ -f "build/$preset/CMakeCache.txt" ] || generator=(-G Ninja)
     cmake --preset "$preset" "${generator[@]}" >"$(log_of configure "$preset")" 2>&1 || fail_with "$(log_of configure "$preset")"
-    cmake --build --preset "$preset" --target "$target"
+}
+
+# build PRESET [TARGET]: configures build/PRESET and builds it.
+build() {
+    configure "$1"
+    cmake --build --preset "$1" --target "${2:-all}"
 }
 
 log_of() { mkdir -p "build/$2" && echo "build/$2/$1.log"; }

@@ -182,7 +182,7 @@ void sdm_colour_bar(sdm_canvas *c, sdm_box box, sdm_colour_map map, double low, 
     double first, step;
     char text[32];
     const sdm_type type = {.size = 9, .align = SDM_CENTRE, .colour = SDM_INK};
-    const int n = sdm_ticks(low, high, 9, &first, &step);
+    const int n = sdm_ticks(low, high, box.w / 33, &first, &step);
     for (int i = 0; i < n; i++) {
         const double v = first + i * step, x = box.x + (v - low) / (high - low) * box.w;
         sdm_canvas_line(c, x, box.y + box.h + 1, x, box.y + box.h + 5, 1, SDM_INK_LIGHT);

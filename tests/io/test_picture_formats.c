@@ -215,6 +215,7 @@ static void test_refused(void **state)
             snprintf(path, sizeof path, "no_such_folder/%s", known[i]);
             assert_int_equal(sdm_picture_check(path, &err), SDM_OK);
             assert_int_equal(write_picture(kind, path, &err), SDM_E_IO);
+            if (i > 0 && kind < 3) continue; // every picture as PNG, the plot in every format
             for (unsigned long n = 1;; n++) {
                 sdm_alloc_fail_after(n);
                 const sdm_status s = write_picture(kind, known[i], &err);

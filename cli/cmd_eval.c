@@ -9,6 +9,7 @@
 #include "sdm/internal/config.h"
 #include "sdm/internal/file.h"
 #include "sdm/internal/threads.h"
+#include "sdm/picture.h"
 #include "study/evaluate.h"
 
 enum { DEFAULT_SAMPLES = 100 };
@@ -111,7 +112,8 @@ static sdm_status measure(const cli_args *args, const sdm_model *m, const sdm_in
     cli_eval e = {0};
     cli_timing t = {0};
     sdm_json json = {0};
-    sdm_status s = args->pictures ? sdm_make_folder(args->pictures, err) : SDM_OK;
+    sdm_status s = args->pictures ? sdm_picture_check("worst.png", err) : SDM_OK;
+    if (!s && args->pictures) s = sdm_make_folder(args->pictures, err);
     if (!s) s = cli_evaluate(m, shape, seed, n, true, &e, err);
     if (!s) s = cli_time_maps(m, shape, seed, false, (size_t)args->naive, &t, err);
     if (!s && args->pictures) s = write_pictures(args, m, shape, seed, &e, err);

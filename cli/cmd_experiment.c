@@ -11,6 +11,7 @@
 #include "sdm/internal/clock.h"
 #include "sdm/internal/file.h"
 #include "sdm/memory.h"
+#include "sdm/picture.h"
 #include "study/experiment_fit.h"
 
 static sdm_status print_keys(bool markdown, sdm_error *err)
@@ -38,6 +39,11 @@ static sdm_status read_experiment(const cli_args *args, sdm_experiment **out, sd
         const sdm_experiment_method *m = &(*out)->methods[i];
         if (*m->engine) s = experiment_check_engine(m->engine, err);
         if (s) s = sdm_fail_in(err, s, "%s:%d:%d", (*out)->file, m->mark.line, m->mark.column);
+    }
+    sdm_error picture = {0};
+    if (!s && (*out)->experiment.pictures && sdm_picture_check("slices.png", &picture)) {
+        cli_notice("%s", picture.text);
+        (*out)->experiment.pictures = false;
     }
     return s;
 }

@@ -12,6 +12,7 @@
 #include "report/train_progress.h"
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"
+#include "sdm/picture.h"
 #include "study/evaluate.h"
 
 /* A finished model or a checkpoint is never overwritten by mistake. */
@@ -121,7 +122,9 @@ static sdm_status train(const cli_args *args, const sdm_config *config, const sd
     cli_progress_clear(&progress);
     if (s) return s;
     sdm_error picture = {0};
-    if (write_picture(&report, shape, folder, &picture)) cli_notice("%s", picture.text);
+    // without SDM_PICTURE, the notice about loss.png says enough
+    if (!sdm_picture_check("slices.png", NULL) && write_picture(&report, shape, folder, &picture))
+        cli_notice("%s", picture.text);
     return print_summary(args, &report, err);
 }
 

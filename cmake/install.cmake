@@ -1,5 +1,5 @@
-# What is installed: three shared libraries (libsdmgen: libc, libm and OpenMP alone; libsdmgen_image: zlib; libsdmgen_vdb: OpenVDB),
-# the public headers, a CMake package, pkg-config files, configs, documentation.
+# Installs four shared libraries (libsdmgen: libc, libm and OpenMP alone; libsdmgen_image: zlib; libsdmgen_picture: cairo;
+# libsdmgen_vdb: OpenVDB), the public headers, a CMake package, pkg-config files, configs and documentation.
 include(CMakePackageConfigHelpers)
 
 # sdm_library(NAME LANGUAGE PARTS ... LINK ...): target sdmgen_NAME, libsdmgen_NAME.so made of the object files of the parts
@@ -24,6 +24,10 @@ endif()
 if(TARGET sdm_image)
   sdm_library(sdmgen_image C OUTPUT sdmgen_image EXPORT image PARTS sdm_image LINK sdmgen_shared ZLIB::ZLIB ${SDM_LIBM})
   target_link_libraries(sdmgen_image INTERFACE sdmgen_shared)
+endif()
+if(SDM_PICTURE)
+  sdm_library(sdmgen_picture C OUTPUT sdmgen_picture EXPORT picture PARTS sdm_picture LINK sdmgen_shared PkgConfig::CAIRO ${SDM_LIBM})
+  target_link_libraries(sdmgen_picture INTERFACE sdmgen_shared)
 endif()
 if(SDM_VDB)
   sdm_library(sdmgen_vdb CXX OUTPUT sdmgen_vdb EXPORT vdb PARTS sdm_vdb LINK sdmgen_shared OpenVDB::openvdb)
@@ -81,7 +85,10 @@ function(sdm_pkgconfig SDM_PC_NAME SDM_PC_LIBRARY SDM_PC_DESCRIPTION SDM_PC_REQU
 endfunction()
 sdm_pkgconfig(sdmgen sdmgen "${PROJECT_DESCRIPTION}" "")
 if(TARGET sdmgen_image)
-  sdm_pkgconfig(sdmgen-image sdmgen_image "Images and pictures of signed distance maps" sdmgen)
+  sdm_pkgconfig(sdmgen-image sdmgen_image "Image files of signed distance maps" sdmgen)
+endif()
+if(SDM_PICTURE)
+  sdm_pkgconfig(sdmgen-picture sdmgen_picture "Pictures of signed distance maps" sdmgen)
 endif()
 if(SDM_VDB)
   sdm_pkgconfig(sdmgen-vdb sdmgen_vdb "OpenVDB level sets from signed distance maps" sdmgen)

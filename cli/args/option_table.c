@@ -29,8 +29,8 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
     {"generate", "MODEL [-p name=value ...] -o FILE", "make distance maps with a trained network",
      "Parameters that are not given take the model's default. The output's type follows its name: "
      ".vdb (level set),\n"
-     ".nii .nii.gz .nrrd .mha .npy (image), .ply .stl .obj .off (zero surface), .png (three "
-     "slices).\n"
+     ".nii .nii.gz .nrrd .mha .npy (image), .ply .stl .obj .off (zero surface), .png .svg .pdf "
+     "(three slices).\n"
      "With --params each row of the file makes one output; its number replaces %d (or %04d) in "
      "FILE, or is appended.",
      "sdmgen generate runs/cochlea/model.sdm -p a=4.2 -p alpha=0.6 -o cochlea.vdb -o "
@@ -127,8 +127,9 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "and\n"
      "many rotations are tried. -o writes the fitted shape: .vdb .ply .stl .obj .off in the pose "
      "found; .nii .nii.gz\n"
-     ".nrrd .mha .npy distances on the grid of the image; .png its contour over the image; .json "
-     "the figures.\n"
+     ".nrrd .mha .npy distances on the grid of the image; .png .svg .pdf its contour over the "
+     "image; "
+     ".json the figures.\n"
      "Exit code 4: the fit failed or is not to be trusted; no file is written unless --force is "
      "given.",
      "sdmgen fit runs/cochlea/model.sdm ct.nii.gz --start-centre 4,-2,7 --start-axis 0,0,1 -o "
@@ -207,13 +208,15 @@ const cli_option cli_options[] = {
 
     /* the output */
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(outputs),
-     "output: .vdb .nii .nii.gz .nrrd .mha .npy .ply .stl .obj .off .png; may be repeated"},
+     "output: .vdb .nii .nii.gz .nrrd .mha .npy .ply .stl .obj .off .png .svg .pdf; may be "
+     "repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_PHANTOM), AT(outputs),
      "the image: .nii .nii.gz .nrrd .mha .npy; may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_MESH), AT(outputs),
      "output: .ply .stl .obj .off; may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_FIT), AT(outputs),
-     "output: .vdb .ply .stl .obj .off .nii .nii.gz .nrrd .mha .npy .png .json; may be repeated"},
+     "output: .vdb .ply .stl .obj .off .nii .nii.gz .nrrd .mha .npy .png .svg .pdf .json; may "
+     "be repeated"},
     {"closest", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(closest),
      "also write the nearest surface point of every voxel: float32 [z][y][x][3], mm"},
     {"normal", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(normal),

@@ -123,7 +123,7 @@ sdm_status cli_fit_write_files(const cli_fit *f, sdm_error *err)
         if (is_image(path)) continue;
         if (cli_ends_with(path, ".json"))
             s = write_json(f, path, err);
-        else if (cli_ends_with(path, ".png") && f->target.kind != SDM_FIT_POINTS)
+        else if (cli_is_picture(path) && f->target.kind != SDM_FIT_POINTS)
             s = cli_fit_write_picture(f, path, err);
         else
             s = write_map(&d, path, &f->posed, f->map, err);

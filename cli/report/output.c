@@ -27,7 +27,8 @@ static const struct {
 } kinds[] = {{".vdb", KIND_VDB},     {".nii", KIND_IMAGE},   {".nii.gz", KIND_IMAGE},
              {".nrrd", KIND_IMAGE},  {".mha", KIND_IMAGE},   {".npy", KIND_IMAGE},
              {".ply", KIND_SURFACE}, {".stl", KIND_SURFACE}, {".obj", KIND_SURFACE},
-             {".off", KIND_SURFACE}, {".png", KIND_PICTURE}};
+             {".off", KIND_SURFACE}, {".png", KIND_PICTURE}, {".svg", KIND_PICTURE},
+             {".pdf", KIND_PICTURE}};
 enum { N_KINDS = sizeof kinds / sizeof *kinds };
 
 static file_kind kind_of(const char *path, const char **suffix)
@@ -50,14 +51,16 @@ sdm_status cli_check_type(const char *path, bool meshes_only, sdm_error *err)
         return sdm_fail(
             err, SDM_E_ARG,
             "output '%s': its name must end in .vdb .nii .nii.gz .nrrd .mha .npy .ply .stl "
-            ".obj .off or .png",
+            ".obj .off .png .svg or .pdf",
             path);
 #ifndef SDM_HAVE_VDB
     if (kind == KIND_VDB)
         return sdm_fail(err, SDM_E_UNSUPPORTED, "output '%s': built without OpenVDB", path);
 #endif
-    return SDM_OK;
+    return kind == KIND_PICTURE ? sdm_picture_check(path, err) : SDM_OK;
 }
+
+bool cli_is_picture(const char *path) { return kind_of(path, NULL) == KIND_PICTURE; }
 
 /* What made the map, in a word. */
 static const char *made_by(const cli_map *map)

@@ -25,6 +25,9 @@ typedef struct cli_map {
  * SDM_E_UNSUPPORTED. */
 sdm_status cli_check_type(const char *path, bool meshes_only, sdm_error *err);
 
+/* Whether the name is that of a picture: .png .svg .pdf. */
+bool cli_is_picture(const char *path);
+
 /* Writes the map to `path`. Notices (a surface cut by the grid) go to stderr. */
 sdm_status cli_write_map(const char *path, const cli_map *map, const cli_args *args,
                          sdm_error *err);

@@ -34,7 +34,7 @@ expect 0 - sdmgen phantom $shape $truth $turned --spacing 0.4 -o ct.nii.gz --lab
 vdb=
 sdmgen exact $shape -o probe.vdb -q 2>err && vdb='-o fit.vdb' # else built without OpenVDB
 expect 0 - sdmgen fit $fit --exact ct.nii.gz $near_truth --reference label.nrrd $vdb -o fit.stl -o fit.ply \
-    -o fit.nii.gz -o fit.nrrd -o fit.npy -o fit.png -o fit.json --label-out fitted.nrrd --json --threads 1
+    -o fit.nii.gz -o fit.nrrd -o fit.npy -o fit.png -o fit.svg -o fit.pdf -o fit.json --label-out fitted.nrrd --json --threads 1
 cp out first.json
 is_json out
 is_json fit.json
@@ -53,12 +53,14 @@ awk -v m="$(json surface_mean_mm)" -v q="$(json surface_q95_mm)" -v h="$(json su
 has '"not_determined": \[\]'
 [ "$(json map_voxel_mm)" = 0.35 ] || bad "maps of $(json map_voxel_mm) mm"
 [ "$(json maps_network)" = 0 ] && [ "$(json maps_exact)" -gt 3 ] || bad 'maps must be exact'
-present ${vdb#-o } fit.stl fit.ply fit.nii.gz fit.nrrd fit.npy fit.png fit.json fitted.nrrd
+present ${vdb#-o } fit.stl fit.ply fit.nii.gz fit.nrrd fit.npy fit.png fit.svg fit.pdf fit.json fitted.nrrd
 for file in fit.nii.gz fit.nrrd fitted.nrrd; do
     expect 0 - sdmgen info $file
     grep -Fqx "$(sdmgen info ct.nii.gz | grep '^grid')" out || bad "$file is not on the grid of the image"
 done
 [ "$(head -c 8 fit.png | od -An -t x1 | tr -d ' ')" = 89504e470d0a1a0a ] || bad 'fit.png is no PNG'
+[ "$(head -c 4 fit.pdf)" = %PDF ] || bad 'fit.pdf is no PDF'
+grep -q '>ct.nii.gz</text>' fit.svg || bad 'fit.svg has no title'
 expect 0 - sdmgen info fit.stl --json
 near "$(json volume_mm3)" 73.3 4 # 4/3 pi 3.5 2.5 2
 if [ -n "$vdb" ]; then

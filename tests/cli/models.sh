@@ -11,8 +11,8 @@ expect 0 - sdmgen info $model --json
 for key in checksum train_seconds rmse_mm q99_mm weight_bytes; do [ -n "$(json $key)" ] || bad "info: no $key"; done
 
 # outputs
-expect 0 - sdmgen generate $model -p a=4.2 -p alpha=0.6 -o m.nii -o m.nii.gz -o m.nrrd -o m.mha -o m.npy -o m.ply -o m.png --json
-present m.nii m.nii.gz m.nrrd m.mha m.npy m.ply m.png
+expect 0 - sdmgen generate $model -p a=4.2 -p alpha=0.6 -o m.nii -o m.nii.gz -o m.nrrd -o m.mha -o m.npy -o m.ply -o m.png -o m.svg -o m.pdf --json
+present m.nii m.nii.gz m.nrrd m.mha m.npy m.ply m.png m.svg m.pdf
 near "$(json a)" 4.2 0
 near "$(json maps)" 1 0
 hash=$(json values_crc64)

@@ -13,7 +13,7 @@ static const char *phase_name(sdm_phase phase)
         return "data";
     case SDM_PHASE_BASES:
         return "bases";
-    case SDM_PHASE_FIT:
+    case SDM_PHASE_MODE_FIT:
         return "fit";
     case SDM_PHASE_REFINE:
         return "refine";

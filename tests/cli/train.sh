@@ -114,7 +114,7 @@ rm -r never $'m\xf6ved'
 deviations=moved/conf/statistical/deviations.npy
 cp $deviations kept.npy
 { head -c 128 kept.npy && tail -c 32 kept.npy && tail -c 64 kept.npy | head -c 32; } >$deviations # 5 to 8, 1 to 4
-expect 2 'the maps come out otherwise' "${run[@]}" train.steps=$steps
+expect 2 'the maps differ from those it was written with' "${run[@]}" train.steps=$steps
 cp kept.npy $deviations
 expect 0 - "${run[@]}" train.steps=$steps
 cd elsewhere || exit 1

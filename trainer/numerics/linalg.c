@@ -1,15 +1,14 @@
-/* Factorisations of the spectral start. */
+/* Eigenvalues, Cholesky factors and orthonormal bases of dense matrices. */
 #include "linalg.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "data/streams.h"
 #include "sdm/internal/kernels.h"
 #include "sdm/internal/rng.h"
 #include "sdm/memory.h"
 
-// eight sums side by side: one would wait for itself
+/* Dot product in eight partial sums, so that the additions do not wait for each other. */
 static double dot(size_t n, const double *a, const double *b)
 {
     double sum[8] = {0}, rest = 0;
@@ -25,8 +24,9 @@ static void add_scaled(size_t n, double f, const double *x, double *y)
     for (size_t i = 0; i < n; i++) y[i] += f * x[i];
 }
 
-// reduces a to tridiagonal form (d diagonal, e sub-diagonal); a becomes the orthogonal
-// transformation, in columns; work[n]
+/* Reduces the symmetric a to tridiagonal form with Householder reflections: d[n] diagonal, e[n]
+   sub-diagonal (e[0] = 0). a becomes the orthogonal transformation, its columns the basis. work[n]
+   is scratch memory. */
 static void tridiagonalise(size_t n, double *a, double *d, double *e, double *work)
 {
 #define A(i, j) a[(i)*n + (j)]
@@ -47,7 +47,7 @@ static void tridiagonalise(size_t n, double *a, double *d, double *e, double *wo
         e[i] = scale * g0;
         h -= f0 * g0;
         A(i, i - 1) = f0 - g0;
-        // e = (lower triangle, mirrored) times row i, along memory
+        // e = A times row i, reading only the lower triangle, row by row
         double f = 0;
         memset(e, 0, i * sizeof *e);
         for (size_t j = 0; j < i; j++) {
@@ -67,6 +67,7 @@ static void tridiagonalise(size_t n, double *a, double *d, double *e, double *wo
         }
         d[i] = h;
     }
+    // accumulate the reflections
     d[0] = e[0] = 0;
     for (size_t i = 0; i < n; i++) {
         if (d[i] != 0) {
@@ -81,13 +82,16 @@ static void tridiagonalise(size_t n, double *a, double *d, double *e, double *wo
 #undef A
 }
 
-// implicit QL on (d, e); v holds eigenvectors as ROWS here, so that a rotation runs along memory
-static int ql(size_t n, double *d, double *e, double *v)
+/* Implicit QL iteration on d[n], e[n]. The eigenvectors are rows of v (the literature has columns),
+   so that each plane rotation runs along memory. Returns 1 if an eigenvalue needs more than 60
+   iterations. */
+static int ql_iterate(size_t n, double *d, double *e, double *v)
 {
     for (size_t i = 1; i < n; i++) e[i - 1] = e[i];
     e[n - 1] = 0;
     for (size_t l = 0; l < n; l++) {
         for (int iteration = 0;; iteration++) {
+            // split at a negligible sub-diagonal element
             size_t m = l;
             for (; m + 1 < n; m++) {
                 const double dd = fabs(d[m]) + fabs(d[m + 1]);
@@ -95,6 +99,7 @@ static int ql(size_t n, double *d, double *e, double *v)
             }
             if (m == l) break;
             if (iteration == 60) return 1;
+            // implicit shift from the leading 2 x 2 block
             double g = (d[l + 1] - d[l]) / (2 * e[l]), r = hypot(g, 1), s = 1, c = 1, p = 0;
             g = d[m] - d[l] + e[l] / (g + copysign(r, g));
             size_t i = m;
@@ -113,6 +118,7 @@ static int ql(size_t n, double *d, double *e, double *v)
                 p = s * r;
                 d[i + 1] = g + p;
                 g = c * r - b;
+                // rotate two eigenvectors
                 double *low = v + i * n, *high = low + n;
                 for (size_t k = 0; k < n; k++) {
                     f = high[k];
@@ -129,12 +135,13 @@ static int ql(size_t n, double *d, double *e, double *v)
     return 0;
 }
 
-sdm_status eigen_symmetric(size_t n, double *a, double *values, sdm_error *err)
+sdm_status trainer_eigen_symmetric(size_t n, double *a, double *values, sdm_error *err)
 {
     double *e = NULL;
     sdm_status s = SDM_ALLOC(&e, 2 * n, "eigenvalues", err);
     if (s) return s;
     tridiagonalise(n, a, values, e, e + n);
+    // transpose: ql_iterate() expects rows
     for (size_t i = 0; i < n; i++) {
         for (size_t j = 0; j < i; j++) {
             const double t = a[i * n + j];
@@ -142,11 +149,11 @@ sdm_status eigen_symmetric(size_t n, double *a, double *values, sdm_error *err)
             a[j * n + i] = t;
         }
     }
-    if (ql(n, values, e, a))
+    if (ql_iterate(n, values, e, a))
         s = sdm_fail(err, SDM_E_INTERNAL, "eigenvalues of a %zu x %zu matrix did not converge", n,
                      n);
     sdm_free(e);
-    // descending, by selection: n is small beside n^3
+    // sort in descending order; selection sort costs little beside the O(n^3) above
     for (size_t i = 0; i < n && !s; i++) {
         size_t best = i;
         for (size_t j = i + 1; j < n; j++)
@@ -164,7 +171,7 @@ sdm_status eigen_symmetric(size_t n, double *a, double *values, sdm_error *err)
     return s;
 }
 
-size_t cholesky(size_t n, double *a)
+size_t trainer_cholesky(size_t n, double *a)
 {
     for (size_t i = 0; i < n; i++) {
         double *ai = a + i * n;
@@ -182,7 +189,7 @@ size_t cholesky(size_t n, double *a)
     return 0;
 }
 
-void cholesky_solve(size_t n, const double *l, size_t columns, double *b)
+void trainer_cholesky_solve(size_t n, const double *l, size_t columns, double *b)
 {
     for (size_t i = 0; i < n; i++) {
         for (size_t k = 0; k < i; k++) {
@@ -191,6 +198,7 @@ void cholesky_solve(size_t n, const double *l, size_t columns, double *b)
         }
         for (size_t c = 0; c < columns; c++) b[i * columns + c] /= l[i * n + i];
     }
+    // backward substitution with the transposed factor
     for (size_t i = n; i-- > 0;) {
         for (size_t k = i + 1; k < n; k++) {
             const double f = l[k * n + i];
@@ -200,7 +208,8 @@ void cholesky_solve(size_t n, const double *l, size_t columns, double *b)
     }
 }
 
-// rows of the inverse of the lower triangle l, as float, into inverse[k][k]
+/* inverse[k][k] = inverse of the lower triangular l[k][k], as float; column[k] is
+   scratch memory. */
 static void invert_lower(size_t k, const double *l, double *column, float *inverse)
 {
     memset(inverse, 0, k * k * sizeof *inverse);
@@ -212,9 +221,10 @@ static void invert_lower(size_t k, const double *l, double *column, float *inver
     }
 }
 
-// rounds: each makes rows that depend on each other a thousand times less so
-static sdm_status orthonormal_rounds(size_t k, size_t n, float *x, int rounds, int n_threads,
-                                     sdm_error *err)
+/* Cholesky QR, `rounds` times. Each round reduces the linear dependence of the rows (condition
+   number) by a factor of about 1000. */
+static sdm_status orthonormalise_rounds(size_t k, size_t n, float *x, int rounds, int n_threads,
+                                        sdm_error *err)
 {
     float *gram = NULL, *old = NULL;
     double *l = NULL, *column = NULL;
@@ -223,7 +233,7 @@ static sdm_status orthonormal_rounds(size_t k, size_t n, float *x, int rounds, i
     if (!s) s = SDM_ALLOC(&l, k * k, "orthonormal rows", err);
     if (!s) s = SDM_ALLOC(&column, k, "orthonormal rows", err);
     for (int round = 0; round < rounds && !s; round++) {
-        // unit rows first: the shift is then relative to each of them
+        // scale the rows to length 1: the shift below is then relative to each row
         for (size_t i = 0; i < k; i++) {
             double norm = 0;
             for (size_t j = 0; j < n; j++) norm += (double)x[i * n + j] * x[i * n + j];
@@ -231,16 +241,18 @@ static sdm_status orthonormal_rounds(size_t k, size_t n, float *x, int rounds, i
             for (size_t j = 0; j < n; j++) x[i * n + j] *= f;
         }
         sdm_gemm(k, k, n, (sdm_view){x, n, 1}, (sdm_view){x, 1, n}, false, gram, k, n_threads);
+        // Gram matrix + shift * identity, with a shift that grows until the factor exists
         for (double shift = round < 3 ? 1e-6 * (double)k : 0; !s;
              shift = shift > 0 ? shift * 100 : 1e-7 * (double)k) {
             for (size_t i = 0; i < k * k; i++) l[i] = gram[i];
             for (size_t i = 0; i < k; i++) l[i * k + i] += shift;
-            if (!cholesky(k, l)) break;
+            if (!trainer_cholesky(k, l)) break;
             if (shift > 1e6)
                 s = sdm_fail(err, SDM_E_INTERNAL,
                              "%zu rows of %zu numbers cannot be made orthonormal", k, n);
         }
         if (s) break;
+        // rows = inverse factor * rows
         invert_lower(k, l, column, gram);
         memcpy(old, x, k * n * sizeof *x);
         sdm_gemm(k, n, k, (sdm_view){gram, k, 1}, (sdm_view){old, n, 1}, false, x, n, n_threads);
@@ -254,9 +266,9 @@ static sdm_status orthonormal_rounds(size_t k, size_t n, float *x, int rounds, i
 
 enum { ROUNDS = 4 };
 
-sdm_status orthonormalise(size_t k, size_t n, float *x, int n_threads, sdm_error *err)
+sdm_status trainer_orthonormalise(size_t k, size_t n, float *x, int n_threads, sdm_error *err)
 {
-    return orthonormal_rounds(k, n, x, ROUNDS, n_threads, err);
+    return orthonormalise_rounds(k, n, x, ROUNDS, n_threads, err);
 }
 
 static void random_rows(size_t count, uint64_t seed, uint64_t stream, float *x)
@@ -266,8 +278,9 @@ static void random_rows(size_t count, uint64_t seed, uint64_t stream, float *x)
 
 enum { OVERSAMPLING = 8, ITERATIONS = 6 };
 
-sdm_status leading_eigenvectors(size_t n, const float *c, size_t k, uint64_t seed, uint64_t stream,
-                                float *basis, double *values, sdm_error *err)
+sdm_status trainer_leading_eigenvectors(size_t n, const float *c, size_t k, uint64_t seed,
+                                        uint64_t stream, float *basis, double *values,
+                                        sdm_error *err)
 {
     const size_t wide = k + OVERSAMPLING < n ? k + OVERSAMPLING : n;
     float *x = NULL, *y = NULL, *small = NULL;
@@ -278,20 +291,21 @@ sdm_status leading_eigenvectors(size_t n, const float *c, size_t k, uint64_t see
     if (!s) s = SDM_ALLOC(&ritz, wide * wide, "eigenvectors", err);
     if (!s) s = SDM_ALLOC(&all, wide, "eigenvectors", err);
     if (s) goto done;
+    // subspace iteration
     random_rows(wide * n, seed, stream, x);
     for (int i = 0; i < ITERATIONS && !s; i++) {
         sdm_gemm(wide, n, n, (sdm_view){x, n, 1}, (sdm_view){c, n, 1}, false, y, n, 1);
         memcpy(x, y, wide * n * sizeof *x);
-        s = orthonormal_rounds(wide, n, x, i + 1 < ITERATIONS ? ROUNDS / 2 : ROUNDS, 1, err);
+        s = orthonormalise_rounds(wide, n, x, i + 1 < ITERATIONS ? ROUNDS / 2 : ROUNDS, 1, err);
     }
     if (s) goto done;
-    // Rayleigh-Ritz: the best vectors within the space
+    // Rayleigh-Ritz: eigenvectors of the covariance within the subspace
     sdm_gemm(wide, n, n, (sdm_view){x, n, 1}, (sdm_view){c, n, 1}, false, y, n, 1);
     sdm_gemm(wide, wide, n, (sdm_view){y, n, 1}, (sdm_view){x, 1, n}, false, small, wide, 1);
     for (size_t i = 0; i < wide; i++)
         for (size_t j = 0; j < wide; j++)
             ritz[i * wide + j] = 0.5 * ((double)small[i * wide + j] + small[j * wide + i]);
-    if ((s = eigen_symmetric(wide, ritz, all, err))) goto done;
+    if ((s = trainer_eigen_symmetric(wide, ritz, all, err))) goto done;
     for (size_t i = 0; i < wide * wide; i++) small[i] = (float)ritz[i];
     sdm_gemm(k, n, wide, (sdm_view){small, wide, 1}, (sdm_view){x, n, 1}, false, basis, n, 1);
     memcpy(values, all, k * sizeof *values);
@@ -304,18 +318,18 @@ done:
     return s;
 }
 
-sdm_status leading_space(size_t m, size_t n, const float *y, size_t k, uint64_t seed, int n_threads,
-                         float *rows, sdm_error *err)
+sdm_status trainer_leading_space(size_t m, size_t n, const float *y, size_t k, uint64_t seed,
+                                 uint64_t stream, int n_threads, float *rows, sdm_error *err)
 {
     float *left = NULL;
     sdm_status s = SDM_ALLOC(&left, k * m, "global modes", err);
     if (s) return s;
-    random_rows(k * n, seed, STREAM_BASES, rows);
+    random_rows(k * n, seed, stream, rows);
     for (int i = 0; i < 4 && !s; i++) {
         sdm_gemm(k, m, n, (sdm_view){rows, n, 1}, (sdm_view){y, 1, n}, false, left, m, n_threads);
-        if ((s = orthonormal_rounds(k, m, left, ROUNDS / 2, n_threads, err))) break;
+        if ((s = orthonormalise_rounds(k, m, left, ROUNDS / 2, n_threads, err))) break;
         sdm_gemm(k, n, m, (sdm_view){left, m, 1}, (sdm_view){y, n, 1}, false, rows, n, n_threads);
-        s = orthonormal_rounds(k, n, rows, i + 1 < 4 ? ROUNDS / 2 : ROUNDS, n_threads, err);
+        s = orthonormalise_rounds(k, n, rows, i + 1 < 4 ? ROUNDS / 2 : ROUNDS, n_threads, err);
     }
     sdm_free(left);
     return s;

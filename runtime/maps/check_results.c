@@ -1,15 +1,16 @@
-/* Checks of the network's maps, and the exact engine in their place. */
-#include "checked.h"
+/* Checks the maps of a network and replaces those with too large an error by exact maps. */
+#include "check_results.h"
 
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
 
-static bool too_bad(const sdm_generate_opts *o, const sdm_check *c)
+/* NaN counts as too large. */
+static bool error_too_large(const sdm_generate_opts *o, const sdm_check *c)
 {
     return o->max_error_mm > 0 && !(sdm_check_get(c, o->max_error_of) <= o->max_error_mm);
 }
 
-/* One map: its mesh and engine serve the check and, where it is needed, the exact map. */
+/* Checks one map. The same mesh and engine serve the check and, if needed, the exact map. */
 static sdm_status check_one(const sdm_grid *grid, const double *p, const sdm_generate_opts *o,
                             int n_threads, float *values, sdm_result *result, sdm_error *err)
 {
@@ -19,7 +20,7 @@ static sdm_status check_one(const sdm_grid *grid, const double *p, const sdm_gen
     if (!s) s = sdm_exact_create(&mesh, &(sdm_exact_opts){.n_threads = n_threads}, &engine, err);
     if (!s) s = sdm_check_map(engine, grid, values, &result->check, err);
     if (!s) result->checked = true;
-    if (!s && too_bad(o, &result->check)) {
+    if (!s && error_too_large(o, &result->check)) {
         if (o->policy == SDM_RANGE_EXACT) {
             s = sdm_exact_map(engine, grid, values, err);
             result->source = SDM_SOURCE_EXACT;
@@ -38,14 +39,14 @@ static sdm_status check_one(const sdm_grid *grid, const double *p, const sdm_gen
     return s;
 }
 
-/* The error of the lowest index counts, SDM_E_QUALITY behind all others: the same for every number
- * of threads. */
+/* The error to report: that of the lowest index, but any other error before SDM_E_QUALITY. It does
+   not depend on the number of threads. */
 typedef struct first_error {
     size_t index;
     sdm_error err;
 } first_error;
 
-static void keep(first_error *first, size_t i, sdm_status s, const sdm_error *err)
+static void first_error_keep(first_error *first, size_t i, sdm_status s, const sdm_error *err)
 {
     const bool quality = s == SDM_E_QUALITY, kept_quality = first->err.status == SDM_E_QUALITY;
     if (first->err.status && (quality != kept_quality ? quality : i > first->index)) return;
@@ -62,6 +63,7 @@ sdm_status sdm_check_results(const sdm_model *m, const double *used, size_t n,
     const size_t voxels = sdm_grid_count(&info->grid);
     first_error first = {0};
     const int threads = sdm_threads(o->n_threads);
+    // threads work on different maps, or share the single map
     const int outer = (size_t)threads < n ? threads : (int)n, inner = outer > 1 ? 1 : threads;
 #pragma omp parallel for schedule(dynamic) num_threads(outer) if (outer > 1)
     for (size_t i = 0; i < n; i++) {
@@ -71,7 +73,7 @@ sdm_status sdm_check_results(const sdm_model *m, const double *used, size_t n,
                                        values + i * voxels, &results[i], &e);
         if (s) {
 #pragma omp critical(sdm_check_results)
-            keep(&first, i, s, &e);
+            first_error_keep(&first, i, s, &e);
         }
     }
     if (!first.err.status) return SDM_OK;

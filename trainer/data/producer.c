@@ -1,84 +1,44 @@
-/* Making of exact maps: one at a time on a bench, many in the background. */
-#include "produce.h"
+/* Worker threads that compute random training maps in the background. */
+#include "producer.h"
 
-#include <math.h>
 #include <pthread.h>
 #include <string.h>
 
 #include "sdm/memory.h"
 #include "streams.h"
+#include "workbench.h"
 
-sdm_status workbench_create(workbench *w, const dataset *d, sdm_error *err)
-{
-    const sdm_status s = SDM_ALLOC(&w->map, d->n_voxels, "exact map", err);
-    return s ? s : SDM_ALLOC(&w->blocked, d->n_voxels, "exact map", err);
-}
-
-void workbench_dispose(workbench *w)
-{
-    sdm_mesh_dispose(&w->mesh);
-    sdm_free(w->map);
-    sdm_free(w->blocked);
-    *w = (workbench){0};
-}
-
-sdm_status workbench_map(workbench *w, const dataset *d, const double *p, float *blocked,
-                         sdm_error *err)
-{
-    sdm_status s = sdm_instance_mesh(d->shape, p, &w->mesh, err);
-    if (s) return s;
-    const sdm_exact_opts opts = {.n_threads = 1};
-    sdm_exact *exact = NULL;
-    s = sdm_exact_create(&w->mesh, &opts, &exact, err);
-    if (!s) s = sdm_exact_map(exact, d->grid, w->map, err);
-    sdm_exact_free(exact);
-    if (s) return sdm_fail_in(err, s, "shape '%s'", sdm_instance_shape(d->shape)->name);
-    sdm_pod_gather(d->grid, d->blocks, d->n_blocks, w->map, blocked);
-    return SDM_OK;
-}
-
-sdm_status workbench_packed_map(workbench *w, const dataset *d, const double *p, int16_t *packed,
-                                float *scale, sdm_error *err)
-{
-    const sdm_status s = workbench_map(w, d, p, w->blocked, err);
-    if (s) return s;
-    float largest = 0;
-    for (size_t i = 0; i < d->n_voxels; i++) largest = fmaxf(largest, fabsf(w->blocked[i]));
-    if (!(largest > 0)) largest = 1;
-    *scale = largest / 32767.0f;
-    const float inverse = 32767.0f / largest;
-    for (size_t i = 0; i < d->n_voxels; i++) packed[i] = (int16_t)lrintf(w->blocked[i] * inverse);
-    return SDM_OK;
-}
-
-// a window of samples between the workers and the trainer: sample i waits in place i mod WINDOW
+/* Finished samples wait in a window between the workers and the trainer: sample i in place i mod
+   WINDOW. */
 enum { WINDOW = 64, MAX_WORKERS = 256 };
 
 struct producer {
     dataset *d;
     pthread_mutex_t lock;
     pthread_cond_t made, taken;
-    size_t next, end; // sample to be made next; behind the last one
-    size_t allowed;   // behind the last one whose point is planned
-    size_t base;      // first sample not taken yet
+    size_t next, end; // sample to be made next; end of the samples (one past the last)
+    size_t allowed;   // end of the samples whose point is planned
+    size_t base;      // first sample in the window: all before it are in the pool
     bool done[WINDOW];
     double *params; // [WINDOW][P]
     int16_t *maps;  // [WINDOW][n_voxels]
     float scale[WINDOW];
-    sdm_error error; // of the lowest failed sample
-    size_t failed;
+    sdm_error error; // of sample `failed`
+    size_t failed;   // lowest failed sample; SIZE_MAX: none
     bool stop;
     int n_workers;
     pthread_t workers[MAX_WORKERS];
 };
 
-static void *work(void *user)
+/* A worker: computes the next sample as soon as its place in the window is free and its point is
+   planned. */
+static void *worker_run(void *user)
 {
     producer *p = user;
     const dataset *d = p->d;
     workbench w = {0};
     sdm_error err = {0};
-    const sdm_status made = workbench_create(&w, d, &err);
+    const sdm_status made = trainer_workbench_create(&w, d, &err);
     pthread_mutex_lock(&p->lock);
     for (;;) {
         while (!p->stop && p->next < p->end &&
@@ -88,12 +48,12 @@ static void *work(void *user)
         const size_t index = p->next++, place = index % WINDOW;
         pthread_mutex_unlock(&p->lock);
         double *params = p->params + place * d->n_params;
-        sdm_sample_params(d->seed, STREAM_TRAIN, sample_plan_point(&d->plan, index), d->min, d->max,
-                          d->n_params, params);
+        sdm_sample_params(d->seed, STREAM_TRAIN, trainer_sample_plan_point(&d->plan, index), d->min,
+                          d->max, d->n_params, params);
         const sdm_status s =
             made ? made
-                 : workbench_packed_map(&w, d, params, p->maps + place * d->n_voxels,
-                                        &p->scale[place], &err);
+                 : trainer_workbench_packed_map(&w, d, params, p->maps + place * d->n_voxels,
+                                                &p->scale[place], &err);
         pthread_mutex_lock(&p->lock);
         p->done[place] = true;
         if (s && index < p->failed) {
@@ -103,11 +63,12 @@ static void *work(void *user)
         pthread_cond_broadcast(&p->made);
     }
     pthread_mutex_unlock(&p->lock);
-    workbench_dispose(&w);
+    trainer_workbench_dispose(&w);
     return NULL;
 }
 
-sdm_status producer_start(dataset *d, size_t first, int n_threads, producer **out, sdm_error *err)
+sdm_status trainer_producer_start(dataset *d, size_t first, int n_threads, producer **out,
+                                  sdm_error *err)
 {
     *out = NULL;
     producer *p = NULL;
@@ -124,20 +85,20 @@ sdm_status producer_start(dataset *d, size_t first, int n_threads, producer **ou
     s = SDM_ALLOC(&p->params, WINDOW * d->n_params, "sample window", err);
     if (!s) s = SDM_ALLOC(&p->maps, WINDOW * d->n_voxels, "sample window", err);
     for (; !s && p->n_workers < n_threads && p->n_workers < MAX_WORKERS; p->n_workers++) {
-        if (pthread_create(&p->workers[p->n_workers], NULL, work, p)) {
+        if (pthread_create(&p->workers[p->n_workers], NULL, worker_run, p)) {
             if (p->n_workers == 0)
                 s = sdm_fail(err, SDM_E_NOMEM, "cannot start a thread that makes samples");
             break;
         }
     }
     if (s)
-        producer_stop(p);
+        trainer_producer_stop(p);
     else
         *out = p;
     return s;
 }
 
-void producer_allow(producer *p, size_t n_planned)
+void trainer_producer_allow(producer *p, size_t n_planned)
 {
     pthread_mutex_lock(&p->lock);
     p->allowed = n_planned;
@@ -145,7 +106,7 @@ void producer_allow(producer *p, size_t n_planned)
     pthread_mutex_unlock(&p->lock);
 }
 
-size_t producer_ready(producer *p)
+size_t trainer_producer_ready(producer *p)
 {
     pthread_mutex_lock(&p->lock);
     size_t n = 0;
@@ -154,7 +115,7 @@ size_t producer_ready(producer *p)
     return n;
 }
 
-sdm_status producer_take(producer *p, size_t until, sdm_error *err)
+sdm_status trainer_producer_take(producer *p, size_t until, sdm_error *err)
 {
     dataset *d = p->d;
     if (until > p->end) until = p->end;
@@ -168,8 +129,8 @@ sdm_status producer_take(producer *p, size_t until, sdm_error *err)
             if (err) *err = p->error;
             return p->error.status;
         }
-        // the place is the trainer's until `base` moves on
-        const size_t slot = dataset_slot(d, p->base);
+        // workers do not touch this place until `base` moves on
+        const size_t slot = trainer_dataset_slot(d, p->base);
         memcpy(d->params + slot * d->n_params, p->params + place * d->n_params,
                d->n_params * sizeof *d->params);
         memcpy(d->maps + slot * d->n_voxels, p->maps + place * d->n_voxels,
@@ -185,7 +146,7 @@ sdm_status producer_take(producer *p, size_t until, sdm_error *err)
     return SDM_OK;
 }
 
-void producer_stop(producer *p)
+void trainer_producer_stop(producer *p)
 {
     if (!p) return;
     pthread_mutex_lock(&p->lock);

@@ -1,4 +1,4 @@
-/* Model file with its measured accuracy, resolved config, loss curve. */
+/* Writes the model file with its measured accuracy, the configuration and the loss curve. */
 #include "export_model.h"
 
 #include <math.h>
@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "kind.h"
+#include "progress.h"
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/container.h"
 #include "sdm/internal/file.h"
@@ -15,24 +16,25 @@
 #include "sdm/memory.h"
 #include "sdm/picture.h"
 
+/* Voxels within this distance of the surface count for rmse_near_mm. */
 #define NEAR_MM 0.4f
 
-static int ascending(const void *a, const void *b)
+static int compare_doubles(const void *a, const void *b)
 {
     const double x = *(const double *)a, y = *(const double *)b;
     return x < y ? -1 : x > y;
 }
 
-// nearest-rank quantile of sorted values
+/* Nearest-rank quantile of n values in ascending order. */
 static double quantile(const double *sorted, size_t n, double q)
 {
     size_t i = (size_t)ceil(q * (double)n);
     return sorted[i ? i - 1 : 0];
 }
 
-// errors of the model file on the first n held-out maps
-static sdm_status measure(const trainer *t, const sdm_model *m, size_t n, sdm_accuracy *out,
-                          sdm_error *err)
+/* Errors of the model on the first n held-out maps. */
+static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, sdm_accuracy *out,
+                                sdm_error *err)
 {
     const dataset *d = &t->data;
     float *map = NULL, *blocked = NULL;
@@ -46,6 +48,7 @@ static sdm_status measure(const trainer *t, const sdm_model *m, size_t n, sdm_ac
     if (!s) s = SDM_ALLOC(&each, n, "evaluation", err);
     double square = 0, absolute = 0, near = 0, largest = 0;
     size_t n_near = 0;
+    // sum the errors over maps and voxels
     for (size_t i = 0; i < n && !s; i++) {
         sdm_model_forward_threads(m, d->holdout_params + i * d->n_params, 1, map, scratch,
                                   t->n_threads);
@@ -64,7 +67,7 @@ static sdm_status measure(const trainer *t, const sdm_model *m, size_t n, sdm_ac
     }
     if (!s) {
         const double voxels = (double)n * (double)d->n_voxels;
-        qsort(each, n, sizeof *each, ascending);
+        qsort(each, n, sizeof *each, compare_doubles);
         *out = (sdm_accuracy){.samples = (int64_t)n,
                               .mse_mm2 = square / voxels,
                               .rmse_mm = sqrt(square / voxels),
@@ -82,7 +85,7 @@ static sdm_status measure(const trainer *t, const sdm_model *m, size_t n, sdm_ac
     return s;
 }
 
-// texts that the model file has room for
+/* Refuses texts that a model file has no room for. */
 static sdm_status check_texts(const trainer *t, sdm_error *err)
 {
     enum { VALUE_MAX = 1000 };
@@ -107,28 +110,31 @@ static sdm_status check_texts(const trainer *t, sdm_error *err)
     return SDM_OK;
 }
 
-// what the data files hold now: the exact engine is not to be used with others later
-static void sum_files(trainer *t)
+/* Checksums of the data files: the model stores them, so that the exact engine is never used with
+   other files later. */
+static void checksum_files(trainer *t)
 {
     const sdm_shape *shape = sdm_instance_shape(t->shape);
     const sdm_option_value *values = sdm_instance_options(t->shape);
     for (uint32_t i = 0; i < shape->n_options && i < SDM_MAX_OPTIONS; i++)
         if (shape->options[i].type == SDM_OPTION_FILE && values[i].text[0] &&
             sdm_file_checksum(values[i].text, &t->file_sums[i], NULL))
-            t->file_sums[i] = 0; // a plug-in may take a folder, say
+            // unreadable here is no error: a plug-in may accept a folder, for example
+            t->file_sums[i] = 0;
 }
 
-sdm_status export_prepare(trainer *t, sdm_error *err)
+sdm_status trainer_export_prepare(trainer *t, sdm_error *err)
 {
-    sum_files(t);
+    checksum_files(t);
     return check_texts(t, err);
 }
 
-// every option of the shape as text, so that the model needs no config
+/* Every option of the shape as text, so that the model file can be used without the configuration.
+   A file option is followed by an entry NAME.crc64 with its checksum. */
 typedef struct option_texts {
     const char *names[2 * SDM_MAX_OPTIONS], *values[2 * SDM_MAX_OPTIONS];
-    char texts[SDM_MAX_OPTIONS][32];              // of a number, or of the checksum of a file
-    char sums[SDM_MAX_OPTIONS][SDM_NAME_MAX + 8]; // names of checksums
+    char texts[SDM_MAX_OPTIONS][32];              // texts of numbers and of checksums
+    char sums[SDM_MAX_OPTIONS][SDM_NAME_MAX + 8]; // names of the checksum entries
     size_t n;
 } option_texts;
 
@@ -151,15 +157,15 @@ static void collect_options(const trainer *t, option_texts *o)
     }
 }
 
-// number behind `key` in one line of metrics
-static double number(const char *line, const char *key)
+/* Number after `key` in one line of metrics.jsonl; NaN if there is none. */
+static double metric_number(const char *line, const char *key)
 {
     const char *at = strstr(line, key);
     return at ? strtod(at + strlen(key), NULL) : NAN;
 }
 
-// loss and held-out error against the step, from the lines of metrics.jsonl
-static sdm_status write_curve(const trainer *t, sdm_error *err)
+/* loss.png: training loss and held-out error over the steps, from the lines of metrics.jsonl. */
+static sdm_status curve_write(const trainer *t, sdm_error *err)
 {
     double *step = NULL, *loss = NULL, *heldout = NULL;
     size_t lines = 0, n = 0;
@@ -169,9 +175,9 @@ static sdm_status write_curve(const trainer *t, sdm_error *err)
     if (!s) s = SDM_ALLOC(&heldout, lines, "loss curve", err);
     if (!s) {
         for (const char *p = t->metrics->data; p && *p; p = strchr(p, '\n') + 1) {
-            step[n] = number(p, "\"step\": ");
-            loss[n] = number(p, "\"loss_mm2\": ");
-            heldout[n++] = number(p, "\"heldout_mse_mm2\": ");
+            step[n] = metric_number(p, "\"step\": ");
+            loss[n] = metric_number(p, "\"loss_mm2\": ");
+            heldout[n++] = metric_number(p, "\"heldout_mse_mm2\": ");
         }
         char path[SDM_PATH_TEXT_MAX + 32];
         snprintf(path, sizeof path, "%s/loss.png", t->folder);
@@ -184,7 +190,7 @@ static sdm_status write_curve(const trainer *t, sdm_error *err)
     return s;
 }
 
-sdm_status export_dump(const trainer *t, sdm_text *out, sdm_error *err)
+sdm_status trainer_export_dump(const trainer *t, sdm_text *out, sdm_error *err)
 {
     sdm_config *c = NULL;
     sdm_status s = SDM_ALLOC(&c, 1, "resolved config", err);
@@ -194,26 +200,28 @@ sdm_status export_dump(const trainer *t, sdm_text *out, sdm_error *err)
     sdm_config_dump(c, out);
     if (out->failed)
         s = sdm_fail(err, SDM_E_NOMEM, "no memory for the resolved config");
-    else // one that cannot be read, by a path that is no UTF-8, would make a checkpoint worthless
+    else // parse it back: a path that is not UTF-8, for example, would make checkpoints unreadable
         s = sdm_config_parse("config.yaml", out->data, out->size, NULL, 0, c, err);
     sdm_free(c);
     return s;
 }
 
-sdm_status export_config(const trainer *t, sdm_outfile **out, sdm_error *err)
+sdm_status trainer_export_config(const trainer *t, sdm_outfile **out, sdm_error *err)
 {
     char path[SDM_PATH_TEXT_MAX + 32];
     snprintf(path, sizeof path, "%s/config.yaml", t->folder);
     sdm_text config = {0};
-    sdm_status s = export_dump(t, &config, err);
+    sdm_status s = trainer_export_dump(t, &config, err);
     if (!s) s = sdm_outfile_open(path, out, err);
     if (!s) s = sdm_outfile_write(*out, config.data, config.size, err);
     sdm_text_dispose(&config);
     return s;
 }
 
-static void describe(const trainer *t, const sdm_text *config, option_texts *options,
-                     sdm_model_param *params, sdm_model_info *info)
+/* Fills params[P], *options and *info with what the model file says about shape, grid and training.
+   The pointers in *info refer to the other arguments. */
+static void describe_model(const trainer *t, const sdm_text *config, option_texts *options,
+                           sdm_model_param *params, sdm_model_info *info)
 {
     size_t n;
     const sdm_param *p = sdm_instance_params(t->shape, &n);
@@ -234,12 +242,12 @@ static void describe(const trainer *t, const sdm_text *config, option_texts *opt
                              .seed = t->config->seed,
                              .train_samples = (int64_t)(t->data.n_static + t->data.n_taken),
                              .config = config->data};
-    // in step mode the file is the same bits in every run
+    // with a budget of steps the file has the same bits in every run
     info->train_seconds = trainer_by_time(t) ? trainer_seconds(t) : 0;
     snprintf(info->shape, sizeof info->shape, "%s", sdm_instance_shape(t->shape)->name);
 }
 
-// what goes into the model file, and what it points to
+/* The texts and numbers of a model file, and the memory they point to. */
 typedef struct description {
     sdm_text config;
     option_texts options;
@@ -253,8 +261,8 @@ static sdm_status description_create(const trainer *t, description **out, sdm_er
     sdm_status s = SDM_ALLOC(&d, 1, "description of the model", err);
     if (s) return s;
     *out = d;
-    if (!(s = export_dump(t, &d->config, err)))
-        describe(t, &d->config, &d->options, d->params, &d->info);
+    if (!(s = trainer_export_dump(t, &d->config, err)))
+        describe_model(t, &d->config, &d->options, d->params, &d->info);
     return s;
 }
 
@@ -264,8 +272,8 @@ static void description_free(description *d)
     sdm_free(d);
 }
 
-// the model as the runtime will see it
-static sdm_status open_model(const trainer *t, const char *path, const description *d,
+/* Opens the model of the averaged weights from memory, as the runtime would open its file. */
+static sdm_status model_open(const trainer *t, const char *path, const description *d,
                              sdm_model **out, sdm_error *err)
 {
     uint8_t *bytes = NULL;
@@ -276,22 +284,22 @@ static sdm_status open_model(const trainer *t, const char *path, const descripti
     return s;
 }
 
-sdm_status export_time(trainer *t, double *seconds, sdm_error *err)
+sdm_status trainer_export_time(trainer *t, double *seconds, sdm_error *err)
 {
     description *d = NULL;
     sdm_model *model = NULL;
     sdm_accuracy one;
     sdm_status s = description_create(t, &d, err);
-    if (!s) s = open_model(t, "model", d, &model, err);
+    if (!s) s = model_open(t, "model", d, &model, err);
     const double start = trainer_seconds(t);
-    if (!s) s = measure(t, model, 1, &one, err);
+    if (!s) s = measure_model(t, model, 1, &one, err);
     *seconds = (trainer_seconds(t) - start) * (double)t->data.n_holdout;
     sdm_model_free(model);
     description_free(d);
     return s;
 }
 
-sdm_status export_model(trainer *t, sdm_train_report *report, sdm_error *err)
+sdm_status trainer_export_model(trainer *t, sdm_train_report *report, sdm_error *err)
 {
     description *d = NULL;
     sdm_model *model = NULL;
@@ -299,16 +307,17 @@ sdm_status export_model(trainer *t, sdm_train_report *report, sdm_error *err)
     size_t size = 0;
     char path[SDM_PATH_TEXT_MAX + 32];
     snprintf(path, sizeof path, "%s/model.sdm", t->folder);
-    // build once to measure, once more with the figures in it
+    // build a first model and measure it
     sdm_status s = description_create(t, &d, err);
-    if (!s) s = open_model(t, path, d, &model, err);
-    if (!s) s = measure(t, model, t->data.n_holdout, &t->accuracy, err);
+    if (!s) s = model_open(t, path, d, &model, err);
+    if (!s) s = measure_model(t, model, t->data.n_holdout, &t->accuracy, err);
     sdm_model_free(model);
     if (!s && !isfinite(t->accuracy.mse_mm2))
         s = sdm_fail(err, SDM_E_QUALITY,
                      "the trained network gives numbers that are not finite: use "
                      "network.weights=f32 or lower the "
                      "learning rates");
+    // build the final model, which holds its measured accuracy
     if (!s) {
         d->info.accuracy = t->accuracy;
         t->heldout_mse = t->accuracy.mse_mm2;
@@ -318,8 +327,9 @@ sdm_status export_model(trainer *t, sdm_train_report *report, sdm_error *err)
     if (!s) s = sdm_container_write(path, bytes, size, err);
     sdm_free(bytes);
     sdm_error picture = {0};
-    if (!s && write_curve(t, &picture))
-        trainer_message(t, "%s", picture.text); // not worth the network
+    if (!s && curve_write(t, &picture))
+        // a failed picture is no reason to lose the network: a notice only
+        trainer_message(t, "%s", picture.text);
     if (!s && report) {
         *report = (sdm_train_report){.accuracy = t->accuracy,
                                      .steps = t->step,

@@ -1,4 +1,4 @@
-/* Adam, averages, schedule. */
+/* Adam, the average of the weights and the learning rate. */
 #include "optimiser.h"
 
 #include <math.h>
@@ -8,7 +8,7 @@
 #define BETA1 0.9f
 #define BETA2 0.999f
 
-sdm_status parameters_create(parameters *p, size_t n, sdm_error *err)
+sdm_status trainer_parameters_create(parameters *p, size_t n, sdm_error *err)
 {
     *p = (parameters){.n = n};
     sdm_status s = SDM_ALLOC(&p->w, n, "weights", err);
@@ -18,7 +18,7 @@ sdm_status parameters_create(parameters *p, size_t n, sdm_error *err)
     return s;
 }
 
-void parameters_dispose(parameters *p)
+void trainer_parameters_dispose(parameters *p)
 {
     sdm_free(p->w);
     sdm_free(p->m);
@@ -27,14 +27,15 @@ void parameters_dispose(parameters *p)
     *p = (parameters){0};
 }
 
-adam_step adam_begin(double rate, int64_t t)
+adam_step trainer_adam_begin(double rate, int64_t t)
 {
     return (adam_step){.rate = (float)rate,
                        .correct_m = (float)(1 / (1 - pow((double)BETA1, (double)t))),
                        .correct_v = (float)(1 / (1 - pow((double)BETA2, (double)t)))};
 }
 
-void adam_update(parameters *p, size_t first, size_t n, const float *g, adam_step step, float scale)
+void trainer_adam_update(parameters *p, size_t first, size_t n, const float *g, adam_step step,
+                         float scale)
 {
     float *restrict w = p->w + first, *restrict m = p->m + first, *restrict v = p->v + first;
     const float rate = step.rate * scale;
@@ -45,7 +46,7 @@ void adam_update(parameters *p, size_t first, size_t n, const float *g, adam_ste
     }
 }
 
-void average_update(parameters *p, double decay, int n_threads)
+void trainer_average_update(parameters *p, double decay, int n_threads)
 {
     enum { SLICE = 16384 };
     const float f = (float)(1 - decay);
@@ -57,7 +58,7 @@ void average_update(parameters *p, double decay, int n_threads)
     }
 }
 
-double schedule(double fraction, double warmup)
+double trainer_rate_schedule(double fraction, double warmup)
 {
     if (fraction < warmup) return fraction / warmup;
     const double f = (fraction - warmup) / (1 - warmup);

@@ -1,4 +1,5 @@
-# Packages the build stands on. Each optional part names what is missing and how to go on without it.
+# Required packages. If an optional one is missing, the message says how to install it or how to
+# build without it.
 set(SDM_LIBM m)
 find_package(Threads)
 if(SDM_CONFIG AND NOT Threads_FOUND)
@@ -16,7 +17,7 @@ if(SDM_OPENMP)
 endif()
 
 if(SDM_DNNL)
-  # the C interface of 3.x is another one
+  # version 3 has an incompatible C interface
   find_package(dnnl 2.6 CONFIG QUIET)
   if(NOT dnnl_FOUND)
     message(FATAL_ERROR "oneDNN 2.x not found: install libdnnl-dev, or configure with -DSDM_DNNL=OFF (own convolutions only)")
@@ -44,7 +45,7 @@ if(SDM_CONFIG)
 endif()
 
 if(SDM_VDB)
-  # Debian keeps FindOpenVDB.cmake in a folder of its own
+  # Debian installs FindOpenVDB.cmake in a separate folder
   list(APPEND CMAKE_MODULE_PATH "/usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB")
   find_package(OpenVDB QUIET COMPONENTS openvdb)
   if(NOT OpenVDB_FOUND)

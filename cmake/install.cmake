@@ -1,8 +1,10 @@
-# What is installed: three shared libraries (libsdmgen: libc, libm and OpenMP alone; libsdmgen_image: zlib; libsdmgen_vdb: OpenVDB),
-# the public headers, a CMake package, pkg-config files, configs, documentation.
+# Installation: three shared libraries (libsdmgen needs only libc, libm and OpenMP; libsdmgen_image
+# also zlib; libsdmgen_vdb also OpenVDB), public headers, CMake package, pkg-config files,
+# configurations, documentation.
 include(CMakePackageConfigHelpers)
 
-# sdm_library(NAME LANGUAGE PARTS ... LINK ...): target sdmgen_NAME, libsdmgen_NAME.so made of the object files of the parts
+# sdm_library(TARGET LANGUAGE OUTPUT NAME EXPORT NAME PARTS ... LINK ...): shared library
+# libOUTPUT.so from the object files of the parts, exported as sdmgen::EXPORT
 function(sdm_library target language)
   cmake_parse_arguments(LIB "" "OUTPUT;EXPORT" "PARTS;LINK" ${ARGN})
   list(TRANSFORM LIB_PARTS REPLACE "(.+)" "$<TARGET_OBJECTS:\\1>" OUTPUT_VARIABLE objects)
@@ -30,7 +32,7 @@ if(SDM_VDB)
   target_link_libraries(sdmgen_vdb INTERFACE sdmgen_shared)
 endif()
 
-# the same code for linking into one program
+# the same object files as a static library
 if(SDM_STATIC)
   list(TRANSFORM parts REPLACE "(.+)" "$<TARGET_OBJECTS:\\1>" OUTPUT_VARIABLE objects)
   add_library(sdmgen_static STATIC ${objects})
@@ -38,21 +40,23 @@ if(SDM_STATIC)
   target_include_directories(sdmgen_static INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_link_libraries(sdmgen_static INTERFACE m ${CMAKE_DL_LIBS} ${SDM_THREADS} $<$<BOOL:${SDM_OPENMP}>:OpenMP::OpenMP_C>)
   if(CMAKE_SYSTEM_PROCESSOR STREQUAL wasm32)
-    # the linker's stack of 64 KiB is too small for the blocks of the matrix product; placed first, an overflow traps
+    # the linker's default stack of 64 KiB is too small for the blocks of the matrix product; with
+    # the stack first in memory an overflow traps
     target_link_options(sdmgen_static INTERFACE LINKER:-z,stack-size=1048576 LINKER:--stack-first)
     target_link_libraries(sdmgen_static INTERFACE wasi-emulated-getpid)
   endif()
   install(TARGETS sdmgen_static EXPORT sdmgenTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 endif()
 
-# a plug-in needs a header and nothing to link
+# plug-ins need only a header, no library
 add_library(sdmgen_plugin INTERFACE)
 set_target_properties(sdmgen_plugin PROPERTIES EXPORT_NAME plugin)
 target_include_directories(sdmgen_plugin INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 target_compile_features(sdmgen_plugin INTERFACE c_std_11)
 install(TARGETS sdmgen_plugin EXPORT sdmgenTargets)
 
-# headers of what the libraries hold: not of the configuration and the trainer, which belong to the program
+# public headers of the libraries; configuration and trainer belong to the program and are not
+# installed
 foreach(folder framework runtime shapes)
   if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/include/sdm)
     install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/include/sdm DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h"
@@ -70,7 +74,7 @@ configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/sdmgenConfig.cmake.in ${
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/sdmgenConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/sdmgenConfig.cmake ${PROJECT_BINARY_DIR}/sdmgenConfigVersion.cmake DESTINATION ${package})
 
-# sdm_pkgconfig(NAME LIBRARY DESCRIPTION REQUIRES): one pkg-config file a library
+# sdm_pkgconfig(NAME LIBRARY DESCRIPTION REQUIRES): writes and installs one pkg-config file
 cmake_path(SET pkgconfig_folder NORMALIZE "/${CMAKE_INSTALL_LIBDIR}/pkgconfig")
 cmake_path(RELATIVE_PATH pkgconfig_folder BASE_DIRECTORY "/" OUTPUT_VARIABLE pkgconfig_folder)
 file(RELATIVE_PATH SDM_PC_UP "/${pkgconfig_folder}" "/")

@@ -1,4 +1,5 @@
-# How a part of the project becomes a library: sdm_part(NAME SOURCES ... LINK ...).
+# Compiler flags of all targets, and sdm_part(NAME SOURCES ... LINK ... INCLUDE ...): a static
+# library from one part of the project.
 set(SDM_WARNINGS -Wall -Wextra -Wpedantic -Wshadow -Wvla -Wwrite-strings
     $<$<COMPILE_LANGUAGE:C>:-Wconversion -Wstrict-prototypes -Wmissing-prototypes>)
 if(SDM_WERROR)
@@ -15,7 +16,7 @@ endif()
 if(SDM_OPENMP)
   target_link_libraries(sdm_flags INTERFACE OpenMP::OpenMP_C)
 else()
-  # what is used in pragmas alone is not used
+  # without OpenMP, variables and functions that only pragmas use cause warnings
   target_compile_options(sdm_flags INTERFACE -Wno-unknown-pragmas -Wno-unused-function -Wno-unused-parameter)
 endif()
 

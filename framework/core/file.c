@@ -188,7 +188,7 @@ sdm_status sdm_outfile_printf(sdm_outfile *f, sdm_error *err, const char *fmt, .
     return s;
 }
 
-// Makes the rename durable. Not every file system can sync a folder, so errors are ignored.
+/* Makes the rename durable. Not every file system can sync a folder, so errors are ignored. */
 static void folder_sync(const char *path)
 {
     char *folder = path_with_suffix(path, "");

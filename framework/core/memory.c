@@ -15,7 +15,7 @@
 #define ALIGNMENT 64u
 #define HUGE_PAGE ((size_t)2 << 20)
 
-// the allocation that fails, counted from now; 0: none; only set by tests
+/* The allocation that fails, counted from now; 0: none; only set by tests. */
 static atomic_ulong fail_after;
 
 void sdm_alloc_fail_after(unsigned long n) { atomic_store(&fail_after, n); }

@@ -17,7 +17,7 @@ static void vector_cross(const double a[3], const double b[3], double out[3])
         out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
 
-// m = I + a [r]x + b [r]x^2, where [r]x is the matrix of the cross product with r
+/* m = I + a [r]x + b [r]x^2, where [r]x is the matrix of the cross product with r. */
 static void rotation_series(const double r[3], double a, double b, double m[9])
 {
     const double square = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
@@ -142,7 +142,8 @@ void sdm_rotation_vector(const double r[9], double rotation[3])
     sdm_rotation_of_quaternion(q, rotation);
 }
 
-// (t - sin t) / t^3; by its power series below 1 rad, where the formula suffers from cancellation
+/* (t - sin t) / t^3; by its power series below 1 rad, where the formula suffers from
+ * cancellation. */
 static double jacobian_coefficient(double angle)
 {
     const double square = angle * angle;

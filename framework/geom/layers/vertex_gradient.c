@@ -54,8 +54,8 @@ static void barycentric(const sdm_frame *f, const double q[3], double w[3])
     w[(turn + 2) % 3] = third;
 }
 
-// Adds the derivative for the vertices of triangle t, where `part` is the component of the normal
-// assigned to it.
+/* Adds the derivative for the vertices of triangle t, where `part` is the component of the normal
+ * assigned to it. */
 static void gradient_add(const sdm_sheets *s, uint32_t t, const double q[3], const double part[3],
                          sdm_vertex_gradient *out)
 {
@@ -76,8 +76,8 @@ static void crossing_add(const sdm_sheets *s, uint32_t t, crossing *c)
     c->normal[c->n++] = s->frames[t].n;
 }
 
-// Collects the mesh triangles with a piece of surface within `seam` of q; `first` becomes the first
-// entry.
+/* Collects the mesh triangles with a piece of surface within `seam` of q; `first` becomes the first
+ * entry. */
 static void crossing_find(const sdm_sheets *s, uint32_t first, const double q[3], crossing *c)
 {
     const sdm_bvh *tree = &s->surface->tree;
@@ -99,7 +99,7 @@ static void crossing_find(const sdm_sheets *s, uint32_t first, const double q[3]
     }
 }
 
-// Keeps the split in *best if all factors are >= 0 and its remainder is smaller.
+/* Keeps the split in *best if all factors are >= 0 and its remainder is smaller. */
 static void split_try(const crossing *c, const double normal[3], split p, split *best)
 {
     double rest[3] = {normal[0], normal[1], normal[2]};
@@ -139,7 +139,7 @@ static void split_try_three(const crossing *c, const double normal[3], int i, in
             best);
 }
 
-// Finds the smallest number of sheets (1, 2 or 3) whose normals combine to the normal.
+/* Finds the smallest number of sheets (1, 2 or 3) whose normals combine to the normal. */
 static split split_find(const crossing *c, const double normal[3])
 {
     split best = {.error = INFINITY};

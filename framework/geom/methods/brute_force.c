@@ -84,7 +84,7 @@ sdm_status sdm_naive_map(const sdm_mesh *mesh, const sdm_grid *grid, int n_threa
                          sdm_error *err)
 {
     if (!mesh || !grid || !values)
-        return sdm_fail(err, SDM_E_ARG, "map without a mesh, a grid or a place for the values");
+        return sdm_fail(err, SDM_E_ARG, "mesh, grid and values of a map must not be NULL");
     sdm_audit audit;
     sdm_status s = sdm_mesh_audit(mesh, &audit, err);
     if (!s) s = sdm_grid_check(grid, err);

@@ -12,7 +12,7 @@ sdm_status sdm_run_begin_plain(sdm_run *run, const sdm_mesh *mesh, const sdm_gri
 {
     memset(run, 0, sizeof *run);
     if (!mesh || !grid || !values)
-        return sdm_fail(err, SDM_E_ARG, "map without a mesh, a grid or a place for the values");
+        return sdm_fail(err, SDM_E_ARG, "mesh, grid and values of a map must not be NULL");
     run->mesh = mesh;
     run->grid = grid;
     run->values = values;

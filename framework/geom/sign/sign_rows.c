@@ -37,7 +37,7 @@ sdm_status sdm_sign_rows_build(const sdm_mesh *m, const sdm_boundary *b, const s
         return sdm_fail(err, SDM_E_NOMEM,
                         "the signs of an open mesh need %zu bytes in %d threads, memory_limit "
                         "leaves %zu; raise it or "
-                        "take fewer threads",
+                        "use fewer threads",
                         bytes, n_threads, limit);
     return sdm_rows_build(m, g, axis, n_threads, limit ? limit - bytes : 0, &r->rows, err);
 }

@@ -61,8 +61,8 @@ typedef struct sdm_mesh_out {
 typedef struct sdm_host {
     uint32_t abi, size;
     void *ctx;
-    /* Allocates the arrays of *out. Returns 0, or non-zero if memory is short; the callback must
-     * then return this value. */
+    /* Allocates the arrays of *out and sets its sizes; in create() they are valid until it returns.
+     * Returns 0, or non-zero if memory is short; the callback must then return this value. */
     int (*reserve)(const struct sdm_host *host, sdm_mesh_out *out, size_t n_vert, size_t n_tri);
     /* Sets the error message and returns a non-zero value, which the callback must return. `text`
      * is copied. */
@@ -71,8 +71,8 @@ typedef struct sdm_host {
      * Returns 0 or non-zero. */
     int (*read_file)(const struct sdm_host *host, const char *path, const unsigned char **data,
                      size_t *size);
-    /* Reads a mesh file (.ply .stl .obj .off) into *out; calls reserve() itself. Only for create().
-     * Returns 0 or non-zero. */
+    /* Reads a mesh file (.ply .stl .obj .off) into *out; its arrays are valid until the callback
+     * returns. Only for create(). Returns 0 or non-zero. */
     int (*read_mesh)(const struct sdm_host *host, const char *path, sdm_mesh_out *out);
     /* Reads a .npy file of float32 or float64 in C order, at most 4 dimensions. *values (converted
      * to double) is valid until the callback returns; sizes in shape[0 .. *n_dim - 1]. Only for

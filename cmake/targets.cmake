@@ -7,17 +7,20 @@ if(SDM_WERROR)
 endif()
 
 add_library(sdm_flags INTERFACE)
-target_compile_options(sdm_flags INTERFACE ${SDM_WARNINGS} $<$<COMPILE_LANGUAGE:C>:-fno-math-errno -ffp-contract=off>)
+target_compile_options(sdm_flags INTERFACE ${SDM_WARNINGS}
+  $<$<COMPILE_LANGUAGE:C>:-fno-math-errno -ffp-contract=off>)
 target_compile_definitions(sdm_flags INTERFACE _POSIX_C_SOURCE=200809L)
 if(SDM_SANITIZE)
-  target_compile_options(sdm_flags INTERFACE -fsanitize=${SDM_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_compile_options(sdm_flags INTERFACE -fsanitize=${SDM_SANITIZE} -fno-sanitize-recover=all
+    -fno-omit-frame-pointer)
   target_link_options(sdm_flags INTERFACE -fsanitize=${SDM_SANITIZE})
 endif()
 if(SDM_OPENMP)
   target_link_libraries(sdm_flags INTERFACE OpenMP::OpenMP_C)
 else()
   # without OpenMP, variables and functions that only pragmas use cause warnings
-  target_compile_options(sdm_flags INTERFACE -Wno-unknown-pragmas -Wno-unused-function -Wno-unused-parameter)
+  target_compile_options(sdm_flags INTERFACE -Wno-unknown-pragmas -Wno-unused-function
+    -Wno-unused-parameter)
 endif()
 
 function(sdm_part name)

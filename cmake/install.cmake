@@ -1,6 +1,5 @@
-# Installation: three shared libraries (libsdmgen needs only libc, libm and OpenMP; libsdmgen_image
-# also zlib; libsdmgen_vdb also OpenVDB), public headers, CMake package, pkg-config files,
-# configurations, documentation.
+# What is installed: three shared libraries (libsdmgen: libc, libm and OpenMP alone; libsdmgen_image: zlib; libsdmgen_vdb: OpenVDB),
+# the public headers, a CMake package, pkg-config files, configs, documentation.
 include(CMakePackageConfigHelpers)
 
 # sdm_library(TARGET LANGUAGE OUTPUT NAME EXPORT NAME PARTS ... LINK ...): shared library

@@ -233,6 +233,7 @@ static void params_choose(cochlea *c, const sdm_option_value *options)
 
 static int cochlea_create(const sdm_host *host, const sdm_option_value *options, void **self)
 {
+    // values of the unknowns; parameters must lie in their ranges
     const cochlea_model m = model_of(options);
     double x[COCHLEA_UNKNOWNS];
     unknowns_default(options, x);
@@ -273,6 +274,7 @@ static int cochlea_create(const sdm_host *host, const sdm_option_value *options,
         sdm_lathe_pieces(quarter * sdm_cochlea_radius_at(&m, end), 1.2 * edge, 2) - 1;
     const size_t n_rings = n_base + n_tube + 1 + n_apex;
 
+    // the instance
     cochlea *c = malloc(sizeof *c + n_rings * sizeof *c->rings);
     double *direction = malloc(4 * n_sectors * sizeof *direction);
     if (!c || !direction) {

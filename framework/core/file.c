@@ -25,6 +25,7 @@ sdm_status sdm_file_read(const char *path, uint64_t max_bytes, uint8_t **data, s
     uint8_t *block = NULL;
     struct stat st;
     size_t n = 0;
+    // check type and size
     if (fstat(fd, &st)) {
         s = sdm_fail(err, SDM_E_IO, "%s: cannot read its size: %s", path, strerror(errno));
         goto done;
@@ -45,6 +46,7 @@ sdm_status sdm_file_read(const char *path, uint64_t max_bytes, uint8_t **data, s
                      (unsigned long long)st.st_size);
         goto done;
     }
+    // read all bytes; the block has a zero byte at the end
     n = (size_t)st.st_size;
     if ((s = SDM_ALLOC(&block, n + 1, path, err))) goto done;
     for (size_t at = 0; at < n;) {

@@ -49,6 +49,7 @@ sdm_status sdm_registry_load(sdm_registry *r, const char *file, sdm_error *err)
         return s;
     }
 
+    // call the entry function for all shapes of the file
     sdm_plugin_entry plugin_shape = NULL;
     *(void **)&plugin_shape = dlsym(object, SDM_PLUGIN_SYMBOL);
     const size_t before = sdm_registry_count(r);

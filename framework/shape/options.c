@@ -116,6 +116,7 @@ sdm_status sdm_shape_parse_options(const sdm_shape *shape, const sdm_named_text 
     *text = NULL;
     sdm_status s = given_check(shape, given, n_given, err);
     if (s) return s;
+    // one block for all texts
     size_t size = 0;
     for (uint32_t i = 0; i < shape->n_options; i++)
         size += option_text_size(&shape->options[i],
@@ -123,6 +124,7 @@ sdm_status sdm_shape_parse_options(const sdm_shape *shape, const sdm_named_text 
     s = SDM_ALLOC(text, size, "option texts", err);
     if (s) return s;
 
+    // parse the values; missing ones have their defaults
     char *at = *text;
     for (uint32_t i = 0; i < shape->n_options && !s; i++) {
         const sdm_option *o = &shape->options[i];

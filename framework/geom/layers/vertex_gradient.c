@@ -18,12 +18,14 @@
 // triangle
 #define SPLIT_ERROR 1e-6
 
+/* The sheets through one point, the nearest triangle first. */
 typedef struct crossing {
     int n;
     uint32_t tri[SHEETS_MAX]; // numbers in the mesh
     const double *normal[SHEETS_MAX];
 } crossing;
 
+/* normal = sum over i of factor[i] * (normal of sheet[i]) + remainder of length `error`. */
 typedef struct split {
     int n, sheet[3];
     double factor[3], error;

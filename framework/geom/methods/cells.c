@@ -221,6 +221,7 @@ static void search_cell(const cells *c, size_t cell, search *s)
 
 static void search_shell(const cells *c, int64_t r, search *s)
 {
+    // the shell within the cell grid
     const int64_t *middle = s->middle;
     int64_t from[3], to[3], i[3];
     for (int a = 0; a < 3; a++) {

@@ -58,6 +58,8 @@ static void seeds_add(sdm_seeds *s, size_t line, double at)
     if (s->at) s->at[i] = at;
 }
 
+/* Adds the crossings of one triangle with all lines. v as in slice_at(); n: grid sizes along
+ * `across` and `up`. */
 static void seeds_cross_triangle(const double v[3][3], const int64_t n[2], sdm_seeds *s)
 {
     const double least = sdm_lesser(v[0][2], sdm_lesser(v[1][2], v[2][2])),
@@ -142,6 +144,7 @@ void sdm_seeds_dispose(sdm_seeds *s)
  * diagonal, and the value at the centroid of every triangle), so most triangles are accepted with
  * few cuts. */
 
+/* Input and result of the search for the error bound. */
 typedef struct bound_job {
     const sdm_run *run;
     const double *index;

@@ -317,11 +317,13 @@ static sdm_status octree_map(const sdm_mesh *mesh, const sdm_grid *grid,
     if (!s) s = sdm_run_frames(&run, &frames, err);
     o.frames = frames;
     if (!s) s = octree_prepare(&o, err);
+    // one part of the parallel loop per top cell
     int64_t parts = 1;
     for (int a = 0; a < 3 && !s; a++)
         parts *= o.n_top[a] = grid->n[a] > TOP ? (grid->n[a] - 1 + TOP - 1) / TOP : 1;
     if (!s) {
         sdm_run_prepared(&run);
+        // default error: 1/20 of the smallest spacing
         o.max_error = run.opts.max_error_mm;
         if (!(o.max_error > 0))
             o.max_error =
@@ -330,6 +332,7 @@ static sdm_status octree_map(const sdm_mesh *mesh, const sdm_grid *grid,
         s = sdm_run_parts(&run, parts, octree_map_top_cell, &o, 0, 1, err);
     }
     if (!s) s = sdm_run_sign(&run, err);
+    // report
     size_t exact = 0;
     for (int i = 0; i < run.n_threads && !s; i++) exact += o.scratch[i].n_exact;
     if (!s)

@@ -45,6 +45,7 @@ static uint32_t directed_next(const directed_edge *e, size_t n, uint32_t vert, u
 static void chain_build(const sdm_mesh *m, const directed_edge *e, const uint32_t *order,
                         uint32_t n, sdm_chain *at)
 {
+    // the chord
     const directed_edge *first = &e[order[0]], *last = &e[order[n - 1]];
     at->n = n;
     at->vert[0] = first->from;
@@ -52,6 +53,7 @@ static void chain_build(const sdm_mesh *m, const directed_edge *e, const uint32_
     for (size_t k = 0; k < 2; k++)
         memcpy(at->end[k], &m->vert[3 * (size_t)at->vert[k]], sizeof at->end[k]);
     at->weight = first->weight;
+    // length, fan and bounding box of the edges; weight 0 if they are not consecutive
     double lo[3], hi[3];
     for (int a = 0; a < 3; a++) {
         lo[a] = fmin(at->end[0][a], at->end[1][a]);
@@ -73,6 +75,7 @@ static void chain_build(const sdm_mesh *m, const directed_edge *e, const uint32_
             hi[a] = fmax(hi[a], fmax(u[a], v[a]));
         }
     }
+    // bounding sphere, then the two halves
     for (int a = 0; a < 3; a++) at->middle[a] = lo[a] + 0.5 * (hi[a] - lo[a]);
     at->radius = 0.5 * sqrt(v3_dist2(lo, hi));
     if (n == 1) return;
@@ -84,6 +87,7 @@ sdm_status sdm_boundary_build(const sdm_mesh *m, const sdm_topology *topo, sdm_b
                               sdm_error *err)
 {
     size_t n = 0, done = 0;
+    // boundary edges: not used equally often in both directions
     for (size_t i = 0; i < topo->n_edges; i++) n += topo->edges[i].n_up != topo->edges[i].n_down;
     b->n = n;
     if (!n) return SDM_OK;
@@ -92,12 +96,14 @@ sdm_status sdm_boundary_build(const sdm_mesh *m, const sdm_topology *topo, sdm_b
     sdm_status s = SDM_ALLOC(&b->chain, 2 * n - 1, "boundary edges", err);
     if (!s) s = SDM_ALLOC(&e, n, "boundary edges", err);
     if (!s) s = SDM_ALLOC(&order, n, "boundary edges", err);
+    // direct each edge as its surplus triangles use it
     for (size_t i = 0, k = 0; !s && i < topo->n_edges; i++) {
         const sdm_edge *x = &topo->edges[i];
         if (x->n_up > x->n_down) e[k++] = (directed_edge){x->lo, x->hi, x->n_up - x->n_down, 0};
         if (x->n_up < x->n_down) e[k++] = (directed_edge){x->hi, x->lo, x->n_down - x->n_up, 0};
     }
     if (!s) {
+        // order them into loops, then build the tree
         qsort(e, n, sizeof *e, directed_compare);
         for (size_t i = 0; i < n; i++) {
             for (uint32_t k = e[i].used ? SDM_NONE : (uint32_t)i; k != SDM_NONE;
@@ -133,8 +139,8 @@ static bool strip_half_angle(const sdm_strips *s, const sdm_chain *c, const doub
         // vertex other coordinates could give another side
         const double *v = &s->across[3 * (size_t)c->vert[k] + 1], y = v[0] - p[0], z = v[1] - p[1];
         const double inverse = 1 / far[k], cosine = v3_dot(end[k], s->d) * inverse;
-        // simulation of simplicity, as in predicates.h: x is moved infinitesimally along coordinate
-        // 1
+        // x is moved by an infinitesimal amount along coordinate 1 (simulation of simplicity, as in
+        // predicates.h)
         const double shift = y == 0 && z == 0 ? -1e-200 : y;
         for (int i = 0; i < 3; i++) u[k][i] = (shift * s->step[0][i] + z * s->step[1][i]) * inverse;
         v3_along(u[k], -v3_dot(u[k], s->d), s->d, u[k]);
@@ -213,6 +219,7 @@ sdm_strips_winding sdm_strips_evaluate(const sdm_strips *s, const double x[3], c
     while (c < end) {
         double ends[2][3], r[3], z[2], r2 = 0;
         if (c->n > 1) {
+            // several edges: descend unless the chord is accurate enough
             v3_sub(c->middle, x, r);
             const double gap = v3_norm(r) - c->radius;
             if (!chain_is_far(c, r, s->d, gap, tolerance)) {
@@ -222,6 +229,7 @@ sdm_strips_winding sdm_strips_evaluate(const sdm_strips *s, const double x[3], c
             r2 = gap * gap;
             out.error += c->weight * c->fan / (4 * pi * r2);
         }
+        // distance, bound on the gradient, half the solid angle
         v3_sub(c->end[0], x, ends[0]);
         v3_sub(c->end[1], x, ends[1]);
         const double far[2] = {v3_norm(ends[0]), v3_norm(ends[1])};

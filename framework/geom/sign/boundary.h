@@ -60,7 +60,8 @@ typedef struct sdm_strips_winding {
 
 /* Winding number of the strips at x. p[2]: coordinates 1 and 2 of x in the system of s->across.
  * tolerance: largest error of the winding number from one chain replaced by its chord, 0: no chain
- * is replaced. The error is never a whole number: the side of each strip is exact. [any thread] */
+ * is replaced. Errors by whole numbers cannot occur, because the side of x at each strip is exact.
+ * [any thread] */
 sdm_strips_winding sdm_strips_evaluate(const sdm_strips *s, const double x[3], const double p[2],
                                        double tolerance);
 

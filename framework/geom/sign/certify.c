@@ -10,6 +10,7 @@
 #include "sign.h"
 #include "sign_rows.h"
 
+/* The comparison of one map; `rows` is set for each axis in turn. */
 typedef struct certify_job {
     const sdm_sign_rows *rows;
     const float *values;

@@ -105,6 +105,7 @@ static void side_narrow(const side *s, double error, int64_t n, int64_t *from, i
 static sdm_status triangle_rasterise(const double v[3][3], const sdm_rows *r, collector *c,
                                      sdm_error *err)
 {
+    // rows (j, k) within the bounding box
     double ylo, yhi, zlo, zhi, xlo, xhi;
     triangle_range(v, 2, &zlo, &zhi);
     const int64_t k0 = ceil_clamped(zlo, r->n[2]), k1 = floor_clamped(zhi, r->n[2]);
@@ -120,6 +121,7 @@ static sdm_status triangle_rasterise(const double v[3][3], const sdm_rows *r, co
         (v[1][1] - v[0][1]) * (v[2][2] - v[0][2]) - (v[1][2] - v[0][2]) * (v[2][1] - v[0][1]);
     const int sign = area > 0 ? 1 : -1;
     const bool edge_on = !(fabs(area) > 64 * error);
+    // edge functions of the sides, and the plane x(y, z) of the triangle
     const double *a = v[0], *b = v[area > 0 ? 1 : 2], *d = v[area > 0 ? 2 : 1];
     side s[3] = {{b[1], b[2], d[1] - b[1], d[2] - b[2], 0},
                  {d[1], d[2], a[1] - d[1], a[2] - d[2], 0},
@@ -127,6 +129,7 @@ static sdm_status triangle_rasterise(const double v[3][3], const sdm_rows *r, co
     const double slope_b = (b[0] - a[0]) / fabs(area), slope_d = (d[0] - a[0]) / fabs(area);
     const double blur =
         8 * error * (xhi - xlo) / fabs(area) + 8 * DBL_EPSILON * (fabs(a[0]) + (xhi - xlo));
+    // rasterise; only doubtful rows use exact predicates
     for (int64_t k = k0; k <= k1; k++) {
         int64_t from = j0, to = j1;
         for (int i = 0; i < 3; i++) s[i].at = s[i].dy * ((double)k - s[i].z);
@@ -247,6 +250,7 @@ sdm_status sdm_rows_build(const sdm_mesh *m, const sdm_grid *g, const int axis[3
         r->axis[a] = axis[a];
         r->n[a] = g->n[axis[a]];
     }
+    // memory that does not depend on the crossings
     const size_t n_row = (size_t)r->n[1] * (size_t)r->n[2];
     const size_t fixed = (n_row + 2) * sizeof *r->first + 3 * m->n_vert * sizeof *r->across;
     if (n_row >= UINT32_MAX - 1 || (memory_limit && fixed > memory_limit))
@@ -262,6 +266,7 @@ sdm_status sdm_rows_build(const sdm_mesh *m, const sdm_grid *g, const int axis[3
         const size_t bytes = 3 * (sizeof(hit) + sizeof *r->list);
         for (int i = 0; i < n_threads && memory_limit; i++)
             c[i].limit = (memory_limit - fixed) / bytes / (size_t)n_threads + 1;
+            // vertices in index coordinates
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (m->n_vert > SLICE)
         for (size_t v = 0; v < m->n_vert; v++) {
             const double *x = &m->vert[3 * v],

@@ -51,6 +51,7 @@ sdm_status sdm_sign_tiles(const sdm_sign_rows *r, int64_t n1, int64_t n2,
     const int64_t t0 = r->boundary ? (n0 + r->piece - 1) / r->piece : 1;
     const int n_threads = sdm_threads(opts->n_threads);
     (void)n_threads; // unused without OpenMP
+    // one parallel loop over all tiles; the first error stops it
     atomic_int stop = SDM_OK;
     sdm_status status = SDM_OK;
 #pragma omp parallel num_threads(n_threads)
@@ -64,6 +65,7 @@ sdm_status sdm_sign_tiles(const sdm_sign_rows *r, int64_t n1, int64_t n2,
         for (int64_t t = 0; t < t0 * t1 * t2; t++) {
             if (atomic_load(&stop)) continue;
             sdm_status s = ready;
+            // the voxels of tile t
             const int64_t i = t % t0 * r->piece, j = t / t0 % t1 * TILE_ROWS,
                           k = t / t0 / t1 * TILE_ROWS;
             const sdm_row_tile tile = {.i0 = i,
@@ -72,6 +74,7 @@ sdm_status sdm_sign_tiles(const sdm_sign_rows *r, int64_t n1, int64_t n2,
                                        .j1 = j + TILE_ROWS < n1 ? j + TILE_ROWS : n1,
                                        .k0 = k,
                                        .k1 = k + TILE_ROWS < n2 ? k + TILE_ROWS : n2};
+            // winding numbers to add, then the work of the caller
             if (!s && base) sdm_row_base_fill(r->boundary, &r->rows, r->grid, &tile, base);
             if (!s) visit(user, &tile, base);
             if (!s && sdm_cancelled(opts))

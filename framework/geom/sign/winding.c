@@ -8,7 +8,8 @@
 #include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
 
-#define SHORT_BOUNDARY 100 // with up to so many boundary edges the strips are faster than the tree
+// up to this number of boundary edges the strips are faster than the tree of far fields
+#define SHORT_BOUNDARY 100
 
 static const double pi = 3.14159265358979323846;
 

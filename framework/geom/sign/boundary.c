@@ -76,7 +76,7 @@ static void chain_build(const sdm_mesh *m, const directed_edge *e, const uint32_
         }
     }
     // bounding sphere, then the two halves
-    for (int a = 0; a < 3; a++) at->middle[a] = lo[a] + 0.5 * (hi[a] - lo[a]);
+    for (int a = 0; a < 3; a++) at->centre[a] = lo[a] + 0.5 * (hi[a] - lo[a]);
     at->radius = 0.5 * sqrt(v3_dist2(lo, hi));
     if (n == 1) return;
     chain_build(m, e, order, n / 2, at + 1);
@@ -220,7 +220,7 @@ sdm_strips_winding sdm_strips_evaluate(const sdm_strips *s, const double x[3], c
         double ends[2][3], r[3], z[2], r2 = 0;
         if (c->n > 1) {
             // several edges: descend unless the chord is accurate enough
-            v3_sub(c->middle, x, r);
+            v3_sub(c->centre, x, r);
             const double gap = v3_norm(r) - c->radius;
             if (!chain_is_far(c, r, s->d, gap, tolerance)) {
                 c++; // go on with the first child

@@ -21,7 +21,7 @@ typedef struct sdm_chain {
     double weight;
     double length;            /* total length of the edges, mm */
     double fan;               /* area of the fan, mm^2 */
-    double middle[3], radius; /* bounding sphere of the edges */
+    double centre[3], radius; /* bounding sphere of the edges */
 } sdm_chain;
 
 typedef struct sdm_boundary {

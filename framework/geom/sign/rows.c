@@ -266,9 +266,9 @@ sdm_status sdm_rows_build(const sdm_mesh *m, const sdm_grid *g, const int axis[3
         const size_t bytes = 3 * (sizeof(hit) + sizeof *r->list);
         for (int i = 0; i < n_threads && memory_limit; i++)
             c[i].limit = (memory_limit - fixed) / bytes / (size_t)n_threads + 1;
-            // vertices in index coordinates
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (m->n_vert > SLICE)
         for (size_t v = 0; v < m->n_vert; v++) {
+            // vertex in index coordinates
             const double *x = &m->vert[3 * v],
                          d[3] = {x[0] - g->origin[0], x[1] - g->origin[1], x[2] - g->origin[2]};
             for (int a = 0; a < 3; a++) {

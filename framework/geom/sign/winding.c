@@ -28,13 +28,13 @@ static double triangle_winding(const sdm_mesh *m, uint32_t t, const double x[3])
     return det == 0 && den <= 0 ? 0 : atan2(det, den) / (2 * pi);
 }
 
-/* Adds a part (a triangle or a child node) to the far field c, whose `middle` is already known.
- * middle, normal, area, spread: of the part. */
-static void far_field_add(sdm_far_field *c, const double middle[3], const double normal[3],
+/* Adds a part (a triangle or a child node) to the far field c, whose `centroid` is already known.
+ * centroid, normal, area, spread: of the part. */
+static void far_field_add(sdm_far_field *c, const double centroid[3], const double normal[3],
                           double area, double spread)
 {
     double r[3];
-    v3_sub(middle, c->middle, r);
+    v3_sub(centroid, c->centroid, r);
     c->spread += spread + area * v3_dot(r, r);
     for (int i = 0; i < 3; i++) {
         c->normal[i] += normal[i];
@@ -43,7 +43,7 @@ static void far_field_add(sdm_far_field *c, const double middle[3], const double
     }
 }
 
-static void triangle_moments(const sdm_mesh *m, uint32_t t, double middle[3], double normal[3],
+static void triangle_moments(const sdm_mesh *m, uint32_t t, double centroid[3], double normal[3],
                              double *area, double *spread)
 {
     double ab[3], ac[3];
@@ -54,11 +54,11 @@ static void triangle_moments(const sdm_mesh *m, uint32_t t, double middle[3], do
     v3_cross(ab, ac, normal);
     for (int i = 0; i < 3; i++) {
         normal[i] *= 0.5;
-        middle[i] = v[0][i] + (ab[i] + ac[i]) / 3;
+        centroid[i] = v[0][i] + (ab[i] + ac[i]) / 3;
     }
     *area = v3_norm(normal);
-    *spread =
-        *area / 12 * (v3_dist2(v[0], middle) + v3_dist2(v[1], middle) + v3_dist2(v[2], middle));
+    *spread = *area / 12 *
+              (v3_dist2(v[0], centroid) + v3_dist2(v[1], centroid) + v3_dist2(v[2], centroid));
 }
 
 static void far_field_build(sdm_winding *w, uint32_t index)
@@ -66,35 +66,35 @@ static void far_field_build(sdm_winding *w, uint32_t index)
     const sdm_bvh_node *n = &w->tree->node[index];
     sdm_far_field *c = &w->far_field[index];
     const uint32_t count = n->count ? n->count : 2;
-    double middle[3], normal[3], area, spread, sum[3] = {0, 0, 0};
+    double centroid[3], normal[3], area, spread, sum[3] = {0, 0, 0};
     for (uint32_t i = n->first; i < n->first + count; i++) {
         if (n->count) {
-            triangle_moments(w->mesh, w->tree->order[i], middle, normal, &area, &spread);
+            triangle_moments(w->mesh, w->tree->order[i], centroid, normal, &area, &spread);
         } else {
             far_field_build(w, i);
-            for (int a = 0; a < 3; a++) middle[a] = w->far_field[i].middle[a];
+            for (int a = 0; a < 3; a++) centroid[a] = w->far_field[i].centroid[a];
             area = w->far_field[i].area;
         }
         c->area += area;
-        for (int a = 0; a < 3; a++) sum[a] += area * middle[a];
+        for (int a = 0; a < 3; a++) sum[a] += area * centroid[a];
     }
     // centroid and bounding sphere
     double far2 = 0;
     for (int a = 0; a < 3; a++) {
-        c->middle[a] = c->area > 0 ? sum[a] / c->area : 0.5 * (n->lo[a] + n->hi[a]);
-        const double reach = fmax(c->middle[a] - n->lo[a], n->hi[a] - c->middle[a]);
+        c->centroid[a] = c->area > 0 ? sum[a] / c->area : 0.5 * (n->lo[a] + n->hi[a]);
+        const double reach = fmax(c->centroid[a] - n->lo[a], n->hi[a] - c->centroid[a]);
         far2 += reach * reach;
     }
     c->radius = sqrt(far2);
     for (uint32_t i = n->first; i < n->first + count; i++) {
         const sdm_far_field *part = n->count ? NULL : &w->far_field[i];
         if (part) {
-            far_field_add(c, part->middle, part->normal, part->area, part->spread);
+            far_field_add(c, part->centroid, part->normal, part->area, part->spread);
             for (int k = 0; k < 6; k++) c->second[k] += part->second[k];
         } else {
-            triangle_moments(w->mesh, w->tree->order[i], middle, normal, &area, &spread);
+            triangle_moments(w->mesh, w->tree->order[i], centroid, normal, &area, &spread);
             // the moment of a triangle about its own centroid is zero: nothing to add to c->second
-            far_field_add(c, middle, normal, area, spread);
+            far_field_add(c, centroid, normal, area, spread);
         }
     }
 }
@@ -106,7 +106,7 @@ sdm_status sdm_winding_build(const sdm_mesh *m, const sdm_bvh *tree, const sdm_t
     w->tree = tree;
     sdm_status s = sdm_boundary_build(m, topo, &w->boundary, err);
     if (s || w->boundary.n <= SHORT_BOUNDARY) return s;
-    s = SDM_ALLOC(&w->far_field, tree->n_node, "clusters of triangles", err);
+    s = SDM_ALLOC(&w->far_field, tree->n_node, "far fields of triangles", err);
     if (!s) far_field_build(w, 0);
     return s;
 }
@@ -159,7 +159,7 @@ static double winding_estimate(const sdm_winding *w, const double x[3], double t
         const sdm_bvh_node *n = &w->tree->node[index];
         const sdm_far_field *c = &w->far_field[index];
         double r[3];
-        v3_sub(c->middle, x, r);
+        v3_sub(c->centroid, x, r);
         const double distance = v3_norm(r), gap = distance - c->radius;
         // Taylor remainder: the third derivatives of 1 / r are at most 6 / r^4
         const double bound = 3 * c->spread / (4 * pi * gap * gap * gap * gap);

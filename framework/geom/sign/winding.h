@@ -10,12 +10,13 @@
 /* Far-field approximation of the triangles of a tree node (Barill et al. 2018): Taylor expansion of
  * their solid angle around their centroid. */
 typedef struct sdm_far_field {
-    double middle[3]; /* centroid of the area, mm */
-    double normal[3]; /* sum of the area vectors, mm^2 */
-    /* symmetric part of the sum of (area vector) x (position - middle)^T: xx, yy, zz, xy, yz, zx */
+    double centroid[3]; /* centroid of the area, mm */
+    double normal[3];   /* sum of the area vectors, mm^2 */
+    /* symmetric part of the sum of (area vector) x (position - centroid)^T: xx, yy, zz, xy, yz, zx
+     */
     double second[6];
-    double spread; /* integral of abs(position - middle)^2 over the area */
-    /* area, mm^2, and radius (mm) of a bounding sphere around `middle` */
+    double spread; /* integral of abs(position - centroid)^2 over the area */
+    /* area, mm^2, and radius (mm) of a bounding sphere around `centroid` */
     double area, radius;
 } sdm_far_field;
 

@@ -3,6 +3,15 @@
    LOAD_PAIRS(p), bytes to such lanes, MADD(a, b), the two products of each lane added, and
    ADD_MADD(sum, a, b), where one instruction adds them to a sum. */
 
+#ifndef SDM_KERNELS_BYTES_H
+#define SDM_KERNELS_BYTES_H
+
+#include <string.h>
+
+#include "kernels_table.h"
+#include "kernels_vector.h"
+#include "sdm/internal/kernels.h"
+
 // the two inputs of a lane
 static inline veci first_of(veci v) { return (veci)((vecu)v << 16) >> 16; }
 static inline veci second_of(veci v) { return v >> 16; }
@@ -56,8 +65,8 @@ static inline void store_rows(float *y, size_t line, vec v)
     for (int i = 0; i < VW / 4; i++) memcpy(y + (size_t)i * line, &rows[i], sizeof *rows);
 }
 
-// what a pointer has become is not put together anew for each use
-#define STEP(p) __asm__("" : "+r"(p));
+// what a pointer has become is not copy_floats together anew for each use
+#define KEEP_IN_REGISTER(p) __asm__("" : "+r"(p));
 
 #ifndef ROUND_TO_SHORTS
 typedef uint16_t vec_short __attribute__((vector_size(2 * VW)));
@@ -70,9 +79,9 @@ static inline vec_short round_to_shorts(vec v)
 #define ROUND_TO_SHORTS(v) round_to_shorts(v)
 #endif
 
-#ifndef SMALLER_OF
-#define SMALLER_OF(a, b) ((vec)(((veci)(a) & ((a) < (b))) | ((veci)(b) & ~((a) < (b)))))
-#define LARGER_OF(a, b) ((vec)(((veci)(a) & ((a) > (b))) | ((veci)(b) & ~((a) > (b)))))
+#ifndef MIN_VEC
+#define MIN_VEC(a, b) ((vec)(((veci)(a) & ((a) < (b))) | ((veci)(b) & ~((a) < (b)))))
+#define MAX_VEC(a, b) ((vec)(((veci)(a) & ((a) > (b))) | ((veci)(b) & ~((a) > (b)))))
 #endif
 
 static inline void store_shorts(int16_t *x, vec v)
@@ -82,7 +91,7 @@ static inline void store_shorts(int16_t *x, vec v)
 }
 
 // to -most .. most, NaN to one of them
-static inline vec clip(vec v, vec most) { return LARGER_OF(SMALLER_OF(v, most), -most); }
+static inline vec clip(vec v, vec most) { return MAX_VEC(MIN_VEC(v, most), -most); }
 
 enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inputs of a panel
 
@@ -94,22 +103,14 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inp
 #define BYTES_OF(n, pair) ((n)*VW / SDM_PANEL * (pair))
 
 // weights are asked for so many bytes before they are used, where several rows share them
-#ifndef AHEAD
-#define AHEAD 0
-#endif
-
-// loops over registers: sums stay in registers only when they are gone before arrays are taken
-// apart
-#if defined(__clang__)
-#define EACH(i, n) _Pragma("clang loop unroll(full)") for (int i = 0; i < (n); i++)
-#else
-#define EACH(i, n) _Pragma("GCC unroll 8") for (int i = 0; i < (n); i++)
+#ifndef PREFETCH_BYTES
+#define PREFETCH_BYTES 0
 #endif
 
 // what becomes of products: the first of their sum, or more; a sum waits longer for ADD_MADD, which
 // only many sums at a time hide
-#define SET(many, sum, a, b) sum = (vecu)MADD(a, b)
-#define ADD(many, sum, a, b) sum = (many) ? ADD_MADD(sum, a, b) : (sum) + (vecu)MADD(a, b)
+#define BYTES_SET(many, sum, a, b) sum = (vecu)MADD(a, b)
+#define BYTES_ADD(many, sum, a, b) sum = (many) ? ADD_MADD(sum, a, b) : (sum) + (vecu)MADD(a, b)
 
 // acc[rows][n] `into` by the products of a pair of inputs, `pair` bytes; what there is less of
 // stays in registers, inputs or weights
@@ -132,8 +133,9 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inp
                 EACH(j, n) into((rows) * (n) >= 4, acc[i][j], s, weight[j]);                       \
             }                                                                                      \
         }                                                                                          \
-        if (AHEAD && rows > 1) EACH(l, BYTES_OF(n, pair) / 64) __builtin_prefetch(ahead + 64 * l); \
-        ahead += BYTES_OF(n, pair);                                                                \
+        if (PREFETCH_BYTES && rows > 1)                                                            \
+            EACH(l, BYTES_OF(n, pair) / 64) __builtin_prefetch(prefetch + 64 * l);                 \
+        prefetch += BYTES_OF(n, pair);                                                             \
         w += pair, x += 2;                                                                         \
     } while (0)
 
@@ -148,19 +150,19 @@ static const float no_mean[8 * VW] = {0};
         EACH(i, rows)                                                                              \
         {                                                                                          \
             const vec s = splat(scale[i]);                                                         \
-            if (i == rows - 1 && i > 0 && to->rest) break;                                         \
+            if (i == rows - 1 && i > 0 && to->residual) break;                                     \
             if ((size_t)i >= n_mean) mean = no_mean;                                               \
             EACH(j, n)                                                                             \
             {                                                                                      \
                 vec v =                                                                            \
                     FMA(s, __builtin_convertvector((veci)acc[i][j], vec), load(mean + j * VW));    \
-                if (i == 0 && rows > 1 && to->rest)                                                \
+                if (i == 0 && rows > 1 && to->residual)                                            \
                     v = FMA(splat(scale[rows - 1]),                                                \
                             __builtin_convertvector((veci)acc[rows - 1][j], vec), v);              \
                 store_rows(y + (size_t)(j * VW / 4) * line, line, v);                              \
             }                                                                                      \
             y += ld;                                                                               \
-            STEP(y)                                                                                \
+            KEEP_IN_REGISTER(y)                                                                    \
         }                                                                                          \
     }
 #define BYTES_INTEGERS(rows, n)                                                                    \
@@ -177,7 +179,7 @@ static const float no_mean[8 * VW] = {0};
                 store_shorts(q + j * VW, clip(v * load(factor + j * VW), most));                   \
             }                                                                                      \
             q += ld;                                                                               \
-            STEP(q)                                                                                \
+            KEEP_IN_REGISTER(q)                                                                    \
         }                                                                                          \
     }
 
@@ -190,17 +192,18 @@ static const float no_mean[8 * VW] = {0};
         const size_t panel = wide * WIDE + narrow * NARROW, ld = to->ld;                           \
         for (; o + n * VW <= outputs; o += n * VW) {                                               \
             const int8_t *w = panels + o / SDM_PANEL * panel + o % SDM_PANEL * (WIDE / SDM_PANEL); \
-            const int8_t *ahead = panels + o / SDM_PANEL * panel + AHEAD;                          \
+            const int8_t *prefetch = panels + o / SDM_PANEL * panel + PREFETCH_BYTES;              \
             const int16_t *x = inputs;                                                             \
             vecu acc[rows][n];                                                                     \
             if (wide)                                                                              \
-                BYTES_PAIR(rows, n, SET, WIDE, load_wide);                                         \
+                BYTES_PAIR(rows, n, BYTES_SET, WIDE, load_wide);                                   \
             else                                                                                   \
                 EACH(i, rows) EACH(j, n) acc[i][j] = (vecu){0};                                    \
-            for (size_t p = 1; p < wide; p++) BYTES_PAIR(rows, n, ADD, WIDE, load_wide);           \
+            for (size_t p = 1; p < wide; p++) BYTES_PAIR(rows, n, BYTES_ADD, WIDE, load_wide);     \
             w -= o % SDM_PANEL * ((WIDE - NARROW) / SDM_PANEL);                                    \
             UNROLL(2)                                                                              \
-            for (size_t p = 0; p < narrow; p++) BYTES_PAIR(rows, n, ADD, NARROW, LOAD_PAIRS);      \
+            for (size_t p = 0; p < narrow; p++)                                                    \
+                BYTES_PAIR(rows, n, BYTES_ADD, NARROW, LOAD_PAIRS);                                \
             if (to->y)                                                                             \
                 BYTES_NUMBERS(rows, n)                                                             \
             else                                                                                   \
@@ -211,8 +214,8 @@ static const float no_mean[8 * VW] = {0};
 
 #define BYTES_STEP(rows, n) o = bytes_##rows##x##n(o, outputs, wide, narrow, w, x, ldx, scale, to);
 
-// eight registers of 16 outputs would be eight panels, more places than the processor reads ahead
-// at a time
+// eight registers of 16 outputs would be eight panels, more places than the processor reads
+// prefetch at a time
 #if VW < 16
 BYTES_BLOCK(1, 8)
 #define BYTES_EIGHT(rows) BYTES_STEP(rows, 8)
@@ -353,15 +356,15 @@ static inline vec product_at(size_t i, const float *y, const float *factor)
     return factor ? load(y + i) * load(factor + i) : load(y + i);
 }
 
-#ifndef LARGER
-#define LARGER(a, b) (((a) & ((a) > (b))) | ((b) & ((a) <= (b))))
+#ifndef MAX_VECI
+#define MAX_VECI(a, b) (((a) & ((a) > (b))) | ((b) & ((a) <= (b))))
 #endif
 
 // magnitudes compared as integers: those of NaN and infinity are the largest
 static inline veci larger_magnitude(veci most, vec v)
 {
     const veci bits = (veci)v & 0x7fffffff;
-    return LARGER(bits, most);
+    return MAX_VECI(bits, most);
 }
 
 // n >= VW from here on; the last register ends where they do: some are done twice
@@ -401,8 +404,9 @@ static inline float round_row(size_t n, const float *y, const float *factor, flo
 }
 
 // the largest of all rows first: a row then does not wait for its own
-static inline void quantise_by(size_t rows, size_t n, const float *y, size_t ldy,
-                               const float *factor, int limit, int16_t *x, size_t ldx, float *scale)
+static inline void quantise_rows(size_t rows, size_t n, const float *y, size_t ldy,
+                                 const float *factor, int limit, int16_t *x, size_t ldx,
+                                 float *scale)
 {
     for (size_t r = 0; r < rows; r++) scale[r] = largest_of(n, y + r * ldy, factor);
     for (size_t r = 0; r < rows; r++)
@@ -416,53 +420,54 @@ static inline vec load_shorts(const int16_t *x)
     return __builtin_convertvector(__builtin_convertvector(shorts, veci), vec);
 }
 
-static inline void rest_register(const float *y, const float *factor, float to_integer, int limit,
-                                 size_t i, const int16_t *x, int16_t *rest)
+static inline void residual_register(const float *y, const float *factor, float to_integer,
+                                     int limit, size_t i, const int16_t *x, int16_t *residual)
 {
-    store_shorts(rest + i,
+    store_shorts(residual + i,
                  (product_at(i, y, factor) * to_integer - load_shorts(x + i)) * (float)limit);
 }
 
 // what round_row() left, a part of one of its integers: half of what integers may be
-static inline float round_rest(size_t n, const float *y, const float *factor, float largest,
-                               int limit, const int16_t *x, int16_t *rest)
+static inline float round_residual(size_t n, const float *y, const float *factor, float largest,
+                                   int limit, const int16_t *x, int16_t *residual)
 {
     const float to_integer = (float)limit / largest;
     if (!(to_integer > 0 && to_integer <= 3e38f)) {
-        memset(rest, 0, n * sizeof *rest);
+        memset(residual, 0, n * sizeof *residual);
         return largest - largest;
     }
     const size_t last = n - VW;
     UNROLL(4)
-    for (size_t i = 0; i < last; i += VW) rest_register(y, factor, to_integer, limit, i, x, rest);
-    rest_register(y, factor, to_integer, limit, last, x, rest);
+    for (size_t i = 0; i < last; i += VW)
+        residual_register(y, factor, to_integer, limit, i, x, residual);
+    residual_register(y, factor, to_integer, limit, last, x, residual);
     return largest / (float)limit / (float)limit;
 }
 
-static void quantise_rest(size_t n, const float *y, const float *factor, int limit, int16_t *x,
-                          float *scale, int16_t *rest, float *rest_scale)
+static void quantise_residual(size_t n, const float *y, const float *factor, int limit, int16_t *x,
+                              float *scale, int16_t *residual, float *residual_scale)
 {
     if (n < VW) {
         float some[VW] = {0};
         int16_t integers[2][VW];
         for (size_t i = 0; i < n; i++) some[i] = factor ? y[i] * factor[i] : y[i];
-        quantise_rest(VW, some, NULL, limit, integers[0], scale, integers[1], rest_scale);
+        quantise_residual(VW, some, NULL, limit, integers[0], scale, integers[1], residual_scale);
         memcpy(x, integers[0], n * sizeof *x);
-        memcpy(rest, integers[1], n * sizeof *rest);
+        memcpy(residual, integers[1], n * sizeof *residual);
         return;
     }
     const float largest = largest_of(n, y, factor);
     *scale = round_row(n, y, factor, largest, limit, x);
-    *rest_scale = round_rest(n, y, factor, largest, limit, x, rest);
+    *residual_scale = round_residual(n, y, factor, largest, limit, x, residual);
 }
 
-static void quantise_few(size_t n, const float *y, const float *factor, int limit, int16_t *x,
-                         float *scale)
+static void quantise_short(size_t n, const float *y, const float *factor, int limit, int16_t *x,
+                           float *scale)
 {
     float some[VW] = {0};
     int16_t integers[VW];
     for (size_t i = 0; i < n; i++) some[i] = factor ? y[i] * factor[i] : y[i];
-    quantise_by(1, VW, some, 0, NULL, limit, integers, 0, scale);
+    quantise_rows(1, VW, some, 0, NULL, limit, integers, 0, scale);
     memcpy(x, integers, n * sizeof *x);
 }
 
@@ -471,9 +476,11 @@ static void quantise(size_t rows, size_t n, const float *y, size_t ldy, const fl
 {
     if (n < VW)
         for (size_t r = 0; r < rows; r++)
-            quantise_few(n, y + r * ldy, factor, limit, x + r * ldx, scale + r);
+            quantise_short(n, y + r * ldy, factor, limit, x + r * ldx, scale + r);
     else if (factor)
-        quantise_by(rows, n, y, ldy, factor, limit, x, ldx, scale);
+        quantise_rows(rows, n, y, ldy, factor, limit, x, ldx, scale);
     else
-        quantise_by(rows, n, y, ldy, NULL, limit, x, ldx, scale);
+        quantise_rows(rows, n, y, ldy, NULL, limit, x, ldx, scale);
 }
+
+#endif

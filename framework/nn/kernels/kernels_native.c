@@ -31,7 +31,7 @@ const char *sdm_kernels_name(void) { return kernels()->name; }
 // are cut at KC: part of the result)
 enum { MC = 96, NC = 128, KC = 256 };
 
-static size_t least(size_t a, size_t b) { return a < b ? a : b; }
+static size_t min_size(size_t a, size_t b) { return a < b ? a : b; }
 
 // one full panel: packed[k][width]; width is a constant where this is inlined
 static inline void pack_panel(size_t width, size_t k, const float *src, size_t along, size_t deep,
@@ -50,7 +50,7 @@ static void pack(size_t count, size_t k, const float *data, size_t along, size_t
                  float *packed)
 {
     for (size_t i0 = 0; i0 < count; i0 += width, packed += k * width) {
-        const size_t n = least(width, count - i0);
+        const size_t n = min_size(width, count - i0);
         const float *src = data + i0 * along;
         if (n < width) {
             memset(packed, 0, k * width * sizeof *packed);
@@ -71,14 +71,14 @@ static void gemm_block(const kernel_table *t, size_t m, size_t n, size_t k, sdm_
 {
     _Alignas(64) float pa[MC * KC], pb[NC * KC], edge[12 * 32];
     for (size_t k0 = 0; k0 < k || k0 == 0; k0 += KC) {
-        const size_t kc = least(KC, k - k0);
+        const size_t kc = min_size(KC, k - k0);
         const int keep = add || k0 > 0;
         pack(m, kc, a.data + k0 * a.col, a.row, a.col, t->mr, pa);
         pack(n, kc, b.data + k0 * b.row, b.col, b.row, t->nr, pb);
         for (size_t j = 0; j < n; j += t->nr) {
-            const size_t nj = least(t->nr, n - j);
+            const size_t nj = min_size(t->nr, n - j);
             for (size_t i = 0; i < m; i += t->mr) {
-                const size_t mi = least(t->mr, m - i);
+                const size_t mi = min_size(t->mr, m - i);
                 float *at = c + i * ldc + j;
                 if (mi == t->mr && nj == t->nr) {
                     t->micro(kc, pa + i * kc, pb + j * kc, at, ldc, keep);
@@ -109,7 +109,8 @@ void sdm_gemm(size_t m, size_t n, size_t k, sdm_view a, sdm_view b, bool add, fl
         const size_t i = (size_t)(tile % rows) * MC, j = (size_t)(tile / rows) * NC;
         const sdm_view at = {a.data + i * a.row, a.row, a.col},
                        bt = {b.data + j * b.col, b.row, b.col};
-        gemm_block(t, least(MC, m - i), least(NC, n - j), k, at, bt, add, c + i * ldc + j, ldc);
+        gemm_block(t, min_size(MC, m - i), min_size(NC, n - j), k, at, bt, add, c + i * ldc + j,
+                   ldc);
     }
 }
 
@@ -194,10 +195,10 @@ void sdm_quantise(size_t rows, size_t n, const float *y, size_t ldy, const float
     kernels()->quantise(rows, n, y, ldy, factor, limit, x, ldx, scale);
 }
 
-void sdm_quantise_rest(size_t n, const float *y, const float *factor, int limit, int16_t *x,
-                       float *scale, int16_t *rest, float *rest_scale)
+void sdm_quantise_residual(size_t n, const float *y, const float *factor, int limit, int16_t *x,
+                           float *scale, int16_t *residual, float *residual_scale)
 {
-    kernels()->quantise_rest(n, y, factor, limit, x, scale, rest, rest_scale);
+    kernels()->quantise_residual(n, y, factor, limit, x, scale, residual, residual_scale);
 }
 
 void sdm_panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w,
@@ -218,9 +219,12 @@ void sdm_panel_back_i8(size_t outputs, size_t n_wide, size_t k, const int8_t *w,
     kernels()->back_i8(sdm_panel_outputs(outputs), n_wide, k, w, y, x);
 }
 
-void sdm_put(size_t n, const float *y, float *to, bool stream) { kernels()->put(n, y, to, stream); }
+void sdm_copy(size_t n, const float *y, float *to, bool stream)
+{
+    kernels()->copy_floats(n, y, to, stream);
+}
 
-void sdm_put_end(void)
+void sdm_copy_end(void)
 {
 #if defined(__x86_64__)
     __builtin_ia32_sfence();

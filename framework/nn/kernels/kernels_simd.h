@@ -3,38 +3,13 @@
    MR (rows of the register tile). */
 #include <string.h>
 
+#include "kernels_bytes.h"
 #include "kernels_table.h"
+#include "kernels_vector.h"
 #include "sdm/internal/kernels.h"
 
 #define NV 2 /* registers in a row of the register tile */
 #define NR (NV * VW)
-
-typedef float vec __attribute__((vector_size(4 * VW)));
-typedef float vec_u __attribute__((vector_size(4 * VW), aligned(4)));
-typedef int32_t veci __attribute__((vector_size(4 * VW)));
-typedef uint32_t vecu __attribute__((vector_size(4 * VW)));
-
-#define PRAGMA(text) _Pragma(#text)
-#if defined(__clang__)
-#define UNROLL(n) PRAGMA(clang loop unroll_count(n))
-#else
-#define UNROLL(n) PRAGMA(GCC unroll n)
-#endif
-
-static inline vec load(const float *p) { return *(const vec_u *)p; }
-static inline void store(float *p, vec v) { *(vec_u *)p = v; }
-static inline vec splat(float v) { return v - (vec){0}; }
-
-#ifndef SUM_LANES
-static inline float sum_lanes(vec v)
-{
-    float each[VW], total = 0;
-    store(each, v);
-    for (int j = 0; j < VW; j++) total += each[j];
-    return total;
-}
-#define SUM_LANES(v) sum_lanes(v)
-#endif
 
 static void micro(size_t k, const float *a, const float *b, float *c, size_t ldc, int add)
 {
@@ -195,8 +170,6 @@ static inline vec load_half(const uint16_t *p)
 PANEL(float, f32, load)
 PANEL(uint16_t, f16, load_half)
 
-#include "kernels_bytes.h"
-
 // exp by 2^n times a polynomial of degree 6 on [-ln 2 / 2, ln 2 / 2] (coefficients: Taylor,
 // adjusted by the Cephes library's expf)
 static inline vec exp_vec(vec x)
@@ -233,15 +206,15 @@ static void exp_all(size_t n, const float *x, float *y)
     size_t i = 0;
     for (; i + VW <= n; i += VW) store(y + i, exp_vec(load(x + i)));
     if (i == n) return;
-    float rest[VW] = {0};
-    memcpy(rest, x + i, (n - i) * sizeof *x);
-    store(rest, exp_vec(load(rest)));
-    memcpy(y + i, rest, (n - i) * sizeof *x);
+    float tail[VW] = {0};
+    memcpy(tail, x + i, (n - i) * sizeof *x);
+    store(tail, exp_vec(load(tail)));
+    memcpy(y + i, tail, (n - i) * sizeof *x);
 }
 
 #ifdef STREAM
 // a quarter of a cache line at a time where it is not filled: an ordinary store would read it first
-static inline void put_past(size_t n, const float *y, float *to)
+static inline void copy_streaming(size_t n, const float *y, float *to)
 {
     size_t i = -(uintptr_t)to / sizeof *to % 4;
     if (n < i) i = n;
@@ -255,11 +228,11 @@ static inline void put_past(size_t n, const float *y, float *to)
 }
 #endif
 
-static void put(size_t n, const float *y, float *to, bool stream)
+static void copy_floats(size_t n, const float *y, float *to, bool stream)
 {
 #ifdef STREAM
     if (stream) {
-        put_past(n, y, to);
+        copy_streaming(n, y, to);
         return;
     }
 #else
@@ -280,6 +253,6 @@ const kernel_table TABLE = {.name = ISA,
                             .panel_i8_blocks = panel_i8_blocks,
                             .back_i8 = back_i8,
                             .quantise = quantise,
-                            .quantise_rest = quantise_rest,
-                            .put = put,
+                            .quantise_residual = quantise_residual,
+                            .copy_floats = copy_floats,
                             .exp = exp_all};

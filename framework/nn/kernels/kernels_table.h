@@ -20,7 +20,7 @@ typedef struct kernel_table {
                       size_t ldx, float *y, size_t ldy);
     void (*back_f32)(size_t outputs, size_t k, const float *w, const float *y, float *x);
     void (*back_f16)(size_t outputs, size_t k, const uint16_t *w, const float *y, float *x);
-    /* sdm_panel_i8(), sdm_panel_back_i8(), sdm_quantise() and sdm_quantise_rest(); outputs: a
+    /* sdm_panel_i8(), sdm_panel_back_i8(), sdm_quantise() and sdm_quantise_residual(); outputs: a
      * multiple of 16 */
     void (*panel_i8)(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w,
                      const int16_t *x, size_t ldx, const float *scale, const sdm_panel_out *to);
@@ -31,9 +31,9 @@ typedef struct kernel_table {
                     float *x);
     void (*quantise)(size_t rows, size_t n, const float *y, size_t ldy, const float *factor,
                      int limit, int16_t *x, size_t ldx, float *scale);
-    void (*quantise_rest)(size_t n, const float *y, const float *factor, int limit, int16_t *x,
-                          float *scale, int16_t *rest, float *rest_scale);
-    void (*put)(size_t n, const float *y, float *to, bool stream);
+    void (*quantise_residual)(size_t n, const float *y, const float *factor, int limit, int16_t *x,
+                              float *scale, int16_t *residual, float *residual_scale);
+    void (*copy_floats)(size_t n, const float *y, float *to, bool stream);
     void (*exp)(size_t n, const float *x, float *y);
 } kernel_table;
 

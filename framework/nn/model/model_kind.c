@@ -2,18 +2,6 @@
 #include "model_kind.h"
 #include "sdm/internal/model_threads.h"
 
-#include <string.h>
-
-static const sdm_model_kind *const KINDS[] = {&sdm_kind_pod, &sdm_kind_deepsdf, &sdm_kind_imnet,
-                                              &sdm_kind_sdmnn};
-
-const sdm_model_kind *sdm_model_kind_find(const char *name)
-{
-    for (size_t i = 0; i < sizeof KINDS / sizeof *KINDS; i++)
-        if (strcmp(KINDS[i]->name, name) == 0) return KINDS[i];
-    return NULL;
-}
-
 bool sdm_model_is_threaded(const sdm_model *m) { return m->kind->threaded; }
 
 size_t sdm_model_scratch_bytes(const sdm_model *m, size_t n)

@@ -48,9 +48,6 @@ struct sdm_model {
     void *network; /* of the kind */
 };
 
-/* NULL when there is no such kind. */
-const sdm_model_kind *sdm_model_kind_find(const char *name);
-
 /* The section of that name and size; NULL with SDM_E_FORMAT in err. Its data is aligned to 64
  * bytes. Adds the size to weight_bytes. */
 const void *sdm_model_weights(sdm_model *m, const sdm_section *sections, size_t n, const char *name,

@@ -11,7 +11,7 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
 #endif
 
 // read back by pod_open.c
-static void describe(const sdm_pod_spec *spec, sdm_text *t)
+static void description_write(const sdm_pod_spec *spec, sdm_text *t)
 {
     const sdm_pod_arch *k = &spec->arch;
     sdm_model_describe(spec->info, sdm_kind_pod.name, t);
@@ -79,14 +79,14 @@ static void place_mean(const sdm_pod_spec *spec, const pod_leaf *leaves, float *
 }
 
 // little-endian numbers of 32 bits
-static void put_numbers(const uint32_t *from, size_t n, uint8_t *to)
+static void store_u32(const uint32_t *from, size_t n, uint8_t *to)
 {
     for (size_t i = 0; i < n; i++)
         for (int b = 0; b < 4; b++) *to++ = (uint8_t)(from[i] >> (8 * b));
 }
 
-static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, uint8_t **bytes,
-                        size_t *size, sdm_error *err)
+static sdm_status file_build(const sdm_pod_spec *spec, const pod_integers *integers,
+                             uint8_t **bytes, size_t *size, sdm_error *err)
 {
     const sdm_pod_arch *a = &spec->arch;
     const size_t number = sdm_pod_size(spec->type), n_blocks = a->levels.first[a->levels.n];
@@ -120,14 +120,14 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
     if (s) goto done;
     pack_weights(spec, integers, at, mlp, bias, head, basis);
     place_mean(spec, leaves, mean);
-    for (size_t b = 0; b < n_blocks; b++) put_numbers(&spec->blocks[b].rank, 1, ranks + 4 * b);
+    for (size_t b = 0; b < n_blocks; b++) store_u32(&spec->blocks[b].rank, 1, ranks + 4 * b);
     if (integers) {
-        put_numbers(integers->wide, n_blocks + 1, wide);
-        put_numbers(integers->limit, a->levels.n + 1, limit);
-        put_numbers(integers->layer_limit, a->depth, limit + 4 * (a->levels.n + 1));
+        store_u32(integers->wide, n_blocks + 1, wide);
+        store_u32(integers->limit, a->levels.n + 1, limit);
+        store_u32(integers->layer_limit, a->depth, limit + 4 * (a->levels.n + 1));
     }
     sdm_pod_place_coefficients(&a->levels, spec->blocks, all);
-    describe(spec, &text);
+    description_write(spec, &text);
     const sdm_section sections[] = {
         {"pod.ranks", ranks, n_blocks * 4},
         {"pod.mlp", mlp, mlp_count * number},
@@ -162,10 +162,10 @@ done:
 
 sdm_status sdm_pod_build(const sdm_pod_spec *spec, uint8_t **bytes, size_t *size, sdm_error *err)
 {
-    if (spec->type != SDM_POD_I8) return build(spec, NULL, bytes, size, err);
+    if (spec->type != SDM_POD_I8) return file_build(spec, NULL, bytes, size, err);
     pod_integers integers;
     sdm_status s = sdm_pod_quantise(spec, &integers, err);
-    if (!s) s = build(spec, &integers, bytes, size, err);
+    if (!s) s = file_build(spec, &integers, bytes, size, err);
     sdm_pod_integers_dispose(&integers);
     return s;
 }

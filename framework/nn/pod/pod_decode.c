@@ -2,14 +2,14 @@
    time, so that what it needs stays in the caches. Letters as in sdm/pod.h. */
 #include <string.h>
 
-#include "pod_space.h"
+#include "pod_decode_scratch.h"
 #include "sdm/internal/threads.h"
 
-static size_t smaller(size_t a, size_t b) { return a < b ? a : b; }
+static size_t min_size(size_t a, size_t b) { return a < b ? a : b; }
 static size_t padded(size_t floats) { return (floats + 15) / 16 * 16; }
 static size_t top_level(const pod_network *m) { return m->arch.levels.n - 1; }
 
-static float *take(float *memory, size_t *at, size_t floats)
+static float *carve_floats(float *memory, size_t *at, size_t floats)
 {
     float *p = memory ? memory + *at : NULL;
     *at += padded(floats);
@@ -17,57 +17,60 @@ static float *take(float *memory, size_t *at, size_t floats)
 }
 
 // inputs with some to spare, which are read or written beside the last
-static input take_inputs(const pod_network *m, size_t rows, size_t n, size_t scales, float *memory,
-                         size_t *at)
+static input carve_inputs(const pod_network *m, size_t rows, size_t n, size_t scales, float *memory,
+                          size_t *at)
 {
     input in = {.ld = padded(n + SDM_PANEL)};
     if (sdm_pod_is_bytes(m))
-        in.q = (int16_t *)take(memory, at, rows * in.ld / 2), in.scale = take(memory, at, scales);
+        in.q = (int16_t *)carve_floats(memory, at, rows * in.ld / 2),
+        in.scale = carve_floats(memory, at, scales);
     else
-        in.x = take(memory, at, rows * in.ld);
+        in.x = carve_floats(memory, at, rows * in.ld);
     return in;
 }
 
-size_t sdm_pod_carve_thread(const pod_network *m, size_t rows, float *memory, space *s)
+size_t sdm_pod_slab_scratch_carve(const pod_network *m, size_t rows, float *memory, slab_scratch *s)
 {
     size_t at = 0;
-    *s = (space){0};
+    *s = (slab_scratch){0};
     for (size_t l = 0; l < m->arch.levels.n; l++)
-        s->y[l] = take(memory, &at, rows * sdm_panel_outputs(m->max_outputs[l]));
+        s->y[l] = carve_floats(memory, &at, rows * sdm_panel_outputs(m->max_outputs[l]));
     for (size_t l = 1; l < m->arch.levels.n && sdm_pod_is_bytes(m); l++)
-        s->x[l] = take_inputs(m, rows, m->max_group[l], rows, memory, &at);
-    s->leaves = take_inputs(m, rows, m->max_slab, m->max_slab_groups * SDM_POD_GROUP, memory, &at);
+        s->x[l] = carve_inputs(m, rows, m->max_group[l], rows, memory, &at);
+    s->leaves = carve_inputs(m, rows, m->max_slab, m->max_slab_groups * SDM_POD_GROUP, memory, &at);
     const sdm_pod_block *end = &m->blocks[m->arch.levels.first[1] - 1];
     s->ld_line = padded((m->arch.block * m->arch.block + 3) *
                         (end->at[0] + end->size[0])); // panels write 3 rows more
-    s->line = take(memory, &at, rows * s->ld_line);
-    s->back = take(memory, &at, m->max_slab + SDM_PANEL);
+    s->line = carve_floats(memory, &at, rows * s->ld_line);
+    s->back = carve_floats(memory, &at, m->max_slab + SDM_PANEL);
     return at;
 }
 
-size_t sdm_pod_space_carve(const pod_network *m, size_t rows, int n_threads, float *memory,
-                           pod_space *w)
+size_t sdm_pod_scratch_carve(const pod_network *m, size_t rows, int n_threads, float *memory,
+                             pod_scratch *w)
 {
     const sdm_pod_arch *a = &m->arch;
     size_t at = 0, most = a->n_latent;
     for (size_t l = 0; l < a->levels.n; l++)
         if (m->max_group[l] > most) most = m->max_group[l];
-    *w = (pod_space){.ldz = padded(a->n_latent + 1)};
-    w->z = take(memory, &at, rows * a->n_latent);
-    w->c = take(memory, &at,
-                (rows + 1) *
-                    sdm_panel_outputs(a->n_coefficients)); // and a row for the rest of the first
-    w->sorted = take(memory, &at, sdm_pod_is_bytes(m) ? most + 1 : 0);
-    w->z_integers = (int16_t *)take(memory, &at, sdm_pod_is_bytes(m) ? (rows + 1) * w->ldz / 2 : 0);
-    w->z_scale = take(memory, &at, sdm_pod_is_bytes(m) ? rows + 1 : 0);
+    *w = (pod_scratch){.ldz = padded(a->n_latent + 1)};
+    w->z = carve_floats(memory, &at, rows * a->n_latent);
+    w->c = carve_floats(
+        memory, &at,
+        (rows + 1) *
+            sdm_panel_outputs(a->n_coefficients)); // and a row for the residual of the first
+    w->sorted = carve_floats(memory, &at, sdm_pod_is_bytes(m) ? most + 1 : 0);
+    w->z_integers =
+        (int16_t *)carve_floats(memory, &at, sdm_pod_is_bytes(m) ? (rows + 1) * w->ldz / 2 : 0);
+    w->z_scale = carve_floats(memory, &at, sdm_pod_is_bytes(m) ? rows + 1 : 0);
     w->threads = memory ? memory + at : NULL;
-    space s;
-    w->per_thread = sdm_pod_carve_thread(m, smaller(rows + 1, SDM_POD_GROUP), NULL, &s);
+    slab_scratch s;
+    w->per_thread = sdm_pod_slab_scratch_carve(m, min_size(rows + 1, SDM_POD_GROUP), NULL, &s);
     return at + w->per_thread * (size_t)n_threads;
 }
 
 // what a slab is decoded with: G rows of a call of sdm_pod_decode()
-typedef struct job {
+typedef struct slab_task {
     const pod_network *m;
     const sdm_grid *grid;
     size_t rows, with_mean;
@@ -75,10 +78,10 @@ typedef struct job {
     float *const *maps;
     const pod_slab *slab;
     const float *z_scale; // bytes: [rows]
-    size_t rests; // 1: the first row has a row of integers more, behind the last, of what rounding
-                  // leaves of its inputs
-    space s;
-} job;
+    size_t residuals;     // 1: the first row has a row of integers more, behind the last, of what
+                      // rounding leaves of its inputs
+    slab_scratch s;
+} slab_task;
 
 /* Through the blocks. */
 
@@ -91,18 +94,18 @@ static input input_from(input in, size_t first)
 
 // y[rows][ldy] from the inputs of a block whose weights begin at `at`; mean: of its outputs, or
 // NULL
-static void product(const job *j, size_t outputs, size_t wide, size_t rank, size_t at,
-                    const input *in, const float *mean, float *y, size_t ldy)
+static void block_product(const slab_task *j, size_t outputs, size_t wide, size_t rank, size_t at,
+                          const input *in, const float *mean, float *y, size_t ldy)
 {
     const pod_network *m = j->m;
-    const size_t rows = j->rows + j->rests, n_mean = mean ? smaller(j->with_mean, j->rows) : 0;
+    const size_t rows = j->rows + j->residuals, n_mean = mean ? min_size(j->with_mean, j->rows) : 0;
     if (sdm_pod_is_bytes(m)) {
         const sdm_panel_out to = {.y = y,
                                   .ld = ldy,
                                   .line = SDM_PANEL_ROW,
                                   .mean = mean,
                                   .n_mean = n_mean,
-                                  .rest = j->rests};
+                                  .residual = j->residuals};
         sdm_panel_i8(rows, outputs, wide, rank, (const int8_t *)m->basis + at, in->q, in->ld,
                      in->scale, &to);
         return;
@@ -112,16 +115,16 @@ static void product(const job *j, size_t outputs, size_t wide, size_t rank, size
         for (size_t i = 0; i < outputs; i++) y[r * ldy + i] += mean[i];
 }
 
-static void upper_product(const job *j, size_t b, const input *in, float *y, size_t ldy)
+static void upper_product(const slab_task *j, size_t b, const input *in, float *y, size_t ldy)
 {
     const pod_network *m = j->m;
-    product(j, m->outputs[b], m->wide ? m->wide[b] : 0, m->blocks[b].rank, m->weights_at[b], in,
-            NULL, y, ldy);
+    block_product(j, m->outputs[b], m->wide ? m->wide[b] : 0, m->blocks[b].rank, m->weights_at[b],
+                  in, NULL, y, ldy);
 }
 
 // n integers go into block b and its like; a row with a latent variable that is not finite stays
 // one
-static void set_units(const job *j, size_t b, size_t n, const input *to)
+static void quantum_set(const slab_task *j, size_t b, size_t n, const input *to)
 {
     for (size_t r = 0; r < j->rows; r++) {
         to->q[r * to->ld + n] = 0; // read beside an odd last input, times zero
@@ -129,8 +132,9 @@ static void set_units(const job *j, size_t b, size_t n, const input *to)
     }
 }
 
-// upper_product() and quantise() in one, in fixed units
-static void upper_integers(const job *j, size_t b, size_t level, const input *in, const input *to)
+// upper_product() and coefficients_quantise() in one, in fixed units
+static void upper_product_integers(const slab_task *j, size_t b, size_t level, const input *in,
+                                   const input *to)
 {
     const pod_network *m = j->m;
     const sdm_pod_block *k = &m->blocks[b];
@@ -141,26 +145,26 @@ static void upper_integers(const job *j, size_t b, size_t level, const input *in
                                .limit = m->limit[level - 1]};
     sdm_panel_i8(j->rows, m->outputs[b], m->wide[b], k->rank,
                  (const int8_t *)m->basis + m->weights_at[b], in->q, in->ld, in->scale, &out);
-    set_units(j, k->child, m->outputs[b], to);
+    quantum_set(j, k->child, m->outputs[b], to);
 }
 
 // n coefficients of `level` from `first` on, c[G][ldc], as integers
-static void quantise(const job *j, size_t level, size_t first, size_t n, const float *c, size_t ldc,
-                     const input *to)
+static void coefficients_quantise(const slab_task *j, size_t level, size_t first, size_t n,
+                                  const float *c, size_t ldc, const input *to)
 {
     const pod_network *m = j->m;
     const float *factor = m->factor + m->coefficients_at[level] + first;
     const int limit = m->limit[level];
-    if (j->rests)
-        sdm_pod_quantise_rest(n, c, factor, limit, to->q, to->scale, to->q + j->rows * to->ld,
-                              to->scale + j->rows);
-    const size_t first_row = j->rests;
+    if (j->residuals)
+        sdm_pod_quantise_residual(n, c, factor, limit, to->q, to->scale, to->q + j->rows * to->ld,
+                                  to->scale + j->rows);
+    const size_t first_row = j->residuals;
     sdm_pod_quantise_rows(j->rows - first_row, n, c + first_row * ldc, ldc, factor, limit,
                           to->q + first_row * to->ld, to->ld, to->scale + first_row);
 }
 
 // where the coefficients of the lowest level of block `group` of its groups belong
-static input inputs_of_leaves(const job *j, size_t group)
+static input inputs_of_leaves(const slab_task *j, size_t group)
 {
     const pod_network *m = j->m;
     const sdm_pod_block *g = &m->blocks[group];
@@ -172,7 +176,7 @@ static input inputs_of_leaves(const job *j, size_t group)
 
 // levels above the lowest from block b of `level` down to the inputs of its leaves; filling up goes
 // where the next group will be
-static void decode_upper(const job *j, size_t b, size_t level, const input *in)
+static void decode_upper(const slab_task *j, size_t b, size_t level, const input *in)
 {
     const pod_network *m = j->m;
     const sdm_pod_block *k = &m->blocks[b];
@@ -184,10 +188,10 @@ static void decode_upper(const job *j, size_t b, size_t level, const input *in)
     if (!sdm_pod_is_bytes(m))
         upper_product(j, b, in, below.x, below.ld);
     else if (j->fixed)
-        upper_integers(j, b, level, in, &below);
+        upper_product_integers(j, b, level, in, &below);
     else {
         upper_product(j, b, in, y.x, y.ld);
-        quantise(j, level - 1, first, m->outputs[b], y.x, y.ld, &below);
+        coefficients_quantise(j, level - 1, first, m->outputs[b], y.x, y.ld, &below);
     }
     for (size_t i = k->child; i < k->child + k->n_children && level > 1; i++) {
         const input of_child = input_from(below, m->blocks[i].coefficient - first);
@@ -196,19 +200,19 @@ static void decode_upper(const job *j, size_t b, size_t level, const input *in)
 }
 
 // block b of the highest level from its coefficients
-static void decode_top(const job *j, size_t b, const input *c)
+static void decode_top(const slab_task *j, size_t b, const input *c)
 {
     const pod_network *m = j->m;
     const size_t top = top_level(m), rank = m->blocks[b].rank, first = m->blocks[b].coefficient;
     const input from = input_from(*c, first), to = top == 0 ? inputs_of_leaves(j, b) : j->s.x[top];
     if (sdm_pod_is_bytes(m) && !j->fixed)
-        quantise(j, top, first, rank, from.x, from.ld, &to);
+        coefficients_quantise(j, top, first, rank, from.x, from.ld, &to);
     else if (top == 0 || j->fixed)
         for (size_t r = 0; r < j->rows; r++) {
             if (from.x) memcpy(to.x + r * to.ld, from.x + r * from.ld, rank * sizeof *to.x);
             if (from.q) memcpy(to.q + r * to.ld, from.q + r * from.ld, rank * sizeof *to.q);
         }
-    if (j->fixed) set_units(j, b, rank, &to);
+    if (j->fixed) quantum_set(j, b, rank, &to);
     if (top) decode_upper(j, b, top, sdm_pod_is_bytes(m) ? &to : &from);
 }
 
@@ -223,13 +227,13 @@ static inline void copy_rows(size_t n, size_t n_rows, const float *y, float *to,
 }
 
 // a block into its line by way of its own rows
-static void decode_leaf(const job *j, const sdm_panel_block *p, size_t n_x)
+static void decode_leaf(const slab_task *j, const sdm_panel_block *p, size_t n_x)
 {
     const size_t nx = (size_t)j->grid->n[0], ldy = sdm_panel_outputs(j->m->max_outputs[0]);
     float *to = j->s.line + p->y, *y = j->s.y[0];
     input in = input_from(j->s.leaves, p->x);
     if (in.scale) in.scale += p->scale;
-    product(j, p->outputs, p->n_wide, p->k, p->weights, &in, j->m->mean + p->mean, y, ldy);
+    block_product(j, p->outputs, p->n_wide, p->k, p->weights, &in, j->m->mean + p->mean, y, ldy);
     for (size_t r = 0; r < j->rows; r++, y += ldy, to += j->s.ld_line) {
         if (n_x == 4)
             copy_rows(4, p->outputs / 4, y, to, nx);
@@ -239,7 +243,7 @@ static void decode_leaf(const job *j, const sdm_panel_block *p, size_t n_x)
 }
 
 // n blocks side by side along x, from leaves[first] on
-static void decode_line(const job *j, size_t first, size_t n)
+static void decode_line(const slab_task *j, size_t first, size_t n)
 {
     const pod_network *m = j->m;
     const sdm_panel_block *p = m->products + first, *end = p + n;
@@ -251,36 +255,37 @@ static void decode_line(const job *j, size_t first, size_t n)
                                   .ld = j->s.ld_line,
                                   .line = nx,
                                   .mean = m->mean,
-                                  .n_mean = smaller(j->with_mean, j->rows),
-                                  .rest = j->rests};
-        sdm_panel_i8_blocks(j->rows + j->rests, whole, p, m->basis, in->q, in->ld, in->scale, &to);
+                                  .n_mean = min_size(j->with_mean, j->rows),
+                                  .residual = j->residuals};
+        sdm_panel_i8_blocks(j->rows + j->residuals, whole, p, m->basis, in->q, in->ld, in->scale,
+                            &to);
         p += whole;
     }
-    for (; p < end; p++) decode_leaf(j, p, smaller(m->arch.block, nx - p->y));
+    for (; p < end; p++) decode_leaf(j, p, min_size(m->arch.block, nx - p->y));
 }
 
 // the line of block k into the maps
-static void put_line(const job *j, const sdm_pod_block *k)
+static void line_store(const slab_task *j, const sdm_pod_block *k)
 {
     const size_t nx = (size_t)j->grid->n[0], plane = nx * (size_t)j->grid->n[1],
                  n = k->size[1] * nx;
     size_t at = sdm_pod_first_voxel(j->grid, k) - k->at[0];
     for (size_t z = 0; z < k->size[2]; z++, at += plane)
         for (size_t r = 0; r < j->rows; r++)
-            sdm_put(n, j->s.line + r * j->s.ld_line + z * n, j->maps[r] + at, j->stream);
+            sdm_copy(n, j->s.line + r * j->s.ld_line + z * n, j->maps[r] + at, j->stream);
 }
 
-static void decode_leaves(const job *j)
+static void decode_leaves(const slab_task *j)
 {
     const size_t nx = (size_t)j->grid->n[0], n = (nx + j->m->arch.block - 1) / j->m->arch.block;
     for (size_t l = j->slab->leaf; l < j->slab->leaf_end; l += n) {
         decode_line(j, l, n);
-        put_line(j, &j->m->blocks[j->m->leaves[l].block]);
+        line_store(j, &j->m->blocks[j->m->leaves[l].block]);
     }
 }
 
 // c[G][ld]: coefficients of the highest level
-static void decode_slab(const job *j, const input *c)
+static void decode_slab(const slab_task *j, const input *c)
 {
     for (size_t b = j->slab->top; b < j->slab->top_end; b++) decode_top(j, b, c);
     decode_leaves(j);
@@ -289,16 +294,17 @@ static void decode_slab(const job *j, const input *c)
 /* The head. */
 
 // latent variables in the order of the head's columns, as integers
-static void quantise_latent(const pod_network *m, size_t rows, size_t rests, const pod_space *w)
+static void quantise_latent(const pod_network *m, size_t rows, size_t residuals,
+                            const pod_scratch *w)
 {
     const size_t latent = m->arch.n_latent, n = m->arch.levels.n;
     const float *factor = m->factor + m->coefficients_at[n];
     for (size_t r = 0; r < rows; r++) {
         int16_t *to = w->z_integers + r * w->ldz;
         for (size_t i = 0; i < latent; i++) w->sorted[i] = w->z[r * latent + m->order[i]];
-        if (r < rests)
-            sdm_pod_quantise_rest(latent, w->sorted, factor, m->limit[n], to, w->z_scale,
-                                  to + rows * w->ldz, w->z_scale + rows);
+        if (r < residuals)
+            sdm_pod_quantise_residual(latent, w->sorted, factor, m->limit[n], to, w->z_scale,
+                                      to + rows * w->ldz, w->z_scale + rows);
         else
             sdm_pod_quantise_rows(1, latent, w->sorted, 0, factor, m->limit[n], to, 0,
                                   w->z_scale + r);
@@ -306,8 +312,8 @@ static void quantise_latent(const pod_network *m, size_t rows, size_t rests, con
 }
 
 // coefficients `at` to `at` + n of the highest level
-static void head_product(const pod_network *m, size_t rows, size_t rests, bool fixed, size_t at,
-                         size_t n, const pod_space *w)
+static void head_product(const pod_network *m, size_t rows, size_t residuals, bool fixed, size_t at,
+                         size_t n, const pod_scratch *w)
 {
     const size_t latent = m->arch.n_latent, wide = sdm_pod_head_wide(m), top = top_level(m);
     const size_t weights = sdm_pod_count_weights(m->type, at, wide, latent);
@@ -321,30 +327,31 @@ static void head_product(const pod_network *m, size_t rows, size_t rests, bool f
                                     .ld = 2 * ldc,
                                     .factor = m->to_integer + m->coefficients_at[top] + at,
                                     .limit = m->limit[top]};
-    sdm_panel_i8(rows + rests, n, wide, latent, (const int8_t *)m->head + weights, w->z_integers,
-                 w->ldz, w->z_scale, fixed ? &integers : &numbers);
-    for (size_t i = at; i < at + n && rests; i++) w->c[i] += w->c[rows * ldc + i];
+    sdm_panel_i8(rows + residuals, n, wide, latent, (const int8_t *)m->head + weights,
+                 w->z_integers, w->ldz, w->z_scale, fixed ? &integers : &numbers);
+    for (size_t i = at; i < at + n && residuals; i++) w->c[i] += w->c[rows * ldc + i];
 }
 
 void sdm_pod_decode(const pod_network *m, const sdm_grid *grid, size_t rows, size_t with_mean,
-                    bool smooth, bool stream, float *const *maps, const pod_space *w, int n_threads)
+                    bool smooth, bool stream, float *const *maps, const pod_scratch *w,
+                    int n_threads)
 {
     enum { PART = 32 * SDM_PANEL };
     const bool fixed = !smooth && sdm_pod_is_bytes(m);
-    const size_t rests = smooth && sdm_pod_is_bytes(m) ? 1 : 0;
+    const size_t residuals = smooth && sdm_pod_is_bytes(m) ? 1 : 0;
     const size_t coefficients = m->arch.n_coefficients, ldc = sdm_panel_outputs(coefficients);
     const long parts = (long)((coefficients + PART - 1) / PART);
-    if (sdm_pod_is_bytes(m)) quantise_latent(m, rows, rests, w);
+    if (sdm_pod_is_bytes(m)) quantise_latent(m, rows, residuals, w);
 #pragma omp parallel num_threads(n_threads) if (n_threads > 1)
     {
-        job j = {.m = m, .grid = grid, .fixed = fixed, .stream = stream};
+        slab_task j = {.m = m, .grid = grid, .fixed = fixed, .stream = stream};
 #pragma omp for schedule(static)
         for (long i = 0; i < parts; i++) {
             const size_t o = (size_t)i * PART;
-            head_product(m, rows, rests, fixed, o, smaller(PART, coefficients - o), w);
+            head_product(m, rows, residuals, fixed, o, min_size(PART, coefficients - o), w);
         }
-        sdm_pod_carve_thread(m, smaller(rows + 1, SDM_POD_GROUP),
-                             w->threads + (size_t)sdm_thread() * w->per_thread, &j.s);
+        sdm_pod_slab_scratch_carve(m, min_size(rows + 1, SDM_POD_GROUP),
+                                   w->threads + (size_t)sdm_thread() * w->per_thread, &j.s);
 #pragma omp for schedule(dynamic)
         for (long i = 0; i < (long)m->n_slabs; i++)
             for (size_t r = 0; r < rows; r += j.rows) {
@@ -353,13 +360,13 @@ void sdm_pod_decode(const pod_network *m, const sdm_grid *grid, size_t rows, siz
                                  .q = fixed ? (int16_t *)from : NULL,
                                  .ld = fixed ? 2 * ldc : ldc};
                 j.slab = &m->slabs[i];
-                j.rests = r == 0 ? rests : 0;
-                j.rows = smaller(SDM_POD_GROUP - j.rests, rows - r);
+                j.residuals = r == 0 ? residuals : 0;
+                j.rows = min_size(SDM_POD_GROUP - j.residuals, rows - r);
                 j.with_mean = with_mean > r ? with_mean - r : 0;
                 j.maps = maps + r;
                 j.z_scale = w->z_scale + r;
                 decode_slab(&j, &c);
             }
-        if (stream) sdm_put_end();
+        if (stream) sdm_copy_end();
     }
 }

@@ -98,7 +98,7 @@ size_t sdm_pod_place_weights(sdm_pod_type type, const sdm_pod_levels *levels,
 size_t sdm_pod_mean_count(const sdm_pod_levels *levels, const sdm_pod_block *blocks);
 
 /* m->products from all else. */
-void sdm_pod_describe_leaves(pod_network *m);
+void sdm_pod_products_fill(pod_network *m);
 
 enum { SDM_POD_GROUP = 6 }; /* rows that go through a slab together: those of the kernels */
 
@@ -118,17 +118,17 @@ static inline size_t sdm_pod_head_wide(const pod_network *m)
 void sdm_pod_quantise_rows(size_t rows, size_t n, const float *y, size_t ldy, const float *factor,
                            int limit, int16_t *x, size_t ldx, float *scale);
 
-/* As sdm_quantise_rest(), and zeros behind both rows. */
-void sdm_pod_quantise_rest(size_t n, const float *y, const float *factor, int limit, int16_t *x,
-                           float *scale, int16_t *rest, float *rest_scale);
+/* As sdm_quantise_residual(), and zeros behind both rows. */
+void sdm_pod_quantise_residual(size_t n, const float *y, const float *factor, int limit, int16_t *x,
+                               float *scale, int16_t *residual, float *residual_scale);
 
 /* pod_latent.c: parameters to latent variables and back. Letters as in sdm/pod.h; D directions. */
 typedef struct pod_latent {
-    float *phi;  /* [R][n_poly] all products and their derivatives along the directions */
-    float *h[2]; /* [R + 1][padded W] of a layer and of the one before; bytes: the last for the rest
-                    of the first */
-    float *slope;      /* [depth][padded W] */
-    float *dphi;       /* [P][n_poly] derivatives with respect to each parameter */
+    float *phi;   /* [R][n_poly] all products and their derivatives along the directions */
+    float *h[2];  /* [R + 1][padded W] of a layer and of the one before; bytes: the last for the
+                     residual  of the first */
+    float *slope; /* [depth][padded W] */
+    float *dphi;  /* [P][n_poly] derivatives with respect to each parameter */
     int16_t *integers; /* bytes: [R + 1][ld] inputs of a layer */
     float *scale;      /* bytes: [R + 1] theirs */
     size_t ld;
@@ -148,7 +148,7 @@ void sdm_pod_latent_back(const sdm_model *model, const double *p, const pod_late
 
 /* pod_decode.c: latent variables to maps and back. R rows of z go together: maps, or a map and its
  * derivatives. */
-typedef struct pod_space {
+typedef struct pod_scratch {
     float *z; /* [R][L] */
     float *c; /* [R][padded K] coefficients of the highest level; or the same as integers, rows as
                  far apart */
@@ -158,23 +158,23 @@ typedef struct pod_space {
     size_t ldz;
     float *threads; /* memory of each thread */
     size_t per_thread;
-} pod_space;
+} pod_scratch;
 
 /* Sets the pointers into memory[] (NULL: none); returns the floats needed. */
-size_t sdm_pod_space_carve(const pod_network *m, size_t rows, int n_threads, float *memory,
-                           pod_space *w);
+size_t sdm_pod_scratch_carve(const pod_network *m, size_t rows, int n_threads, float *memory,
+                             pod_scratch *w);
 
 /* maps[R] from w->z; the mean map is added to the first `with_mean`. smooth: bytes do not round the
    inputs of the first, so that it changes smoothly with the parameters, and inputs of any size are
    as fine; else their units are fixed, for maps within the ranges of the parameters. stream: as
-   sdm_put(). */
+   sdm_copy(). */
 void sdm_pod_decode(const pod_network *m, const sdm_grid *grid, size_t rows, size_t with_mean,
-                    bool smooth, bool stream, float *const *maps, const pod_space *w,
+                    bool smooth, bool stream, float *const *maps, const pod_scratch *w,
                     int n_threads);
 
 /* pod_decode_back.c: dz[L] = the transpose times adjoint[voxels]. One thread. */
 void sdm_pod_decode_back(const pod_network *m, const sdm_grid *grid, const float *adjoint,
-                         const pod_space *w, float *dz);
+                         const pod_scratch *w, float *dz);
 
 /* pod_forward.c */
 size_t sdm_pod_scratch_bytes(const sdm_model *m, size_t n, int n_threads);

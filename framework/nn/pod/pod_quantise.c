@@ -12,17 +12,17 @@
 #include "sdm/memory.h"
 
 enum {
-    FINE = 127,
-    FINER = 2
+    BYTE_MAX = 127,
+    WIDE_FINER = 2
 }; // largest integer of a byte; how much finer than the columns of a byte those of two are
-enum { MLP_FINE = 2047 }; // largest integer of the MLP
+enum { MLP_WEIGHT_MAX = 2047 }; // largest integer of the MLP
 
-// how much larger than in the survey coefficients may become before they are clipped
-#define ROOM 2
+// how much max_or_nan than in the survey coefficients may become before they are clipped
+#define HEADROOM 2
 
 // mean square error of the map that rounding may add, of the variance of the maps: small beside
 // what the most accurate networks leave
-#define TOLERATED 5e-7
+#define ERROR_SHARE_MAX 5e-7
 
 // largest magnitude in a column, rows scaled; NaN when one is not finite
 static double column_unit(const matrix *m, size_t i)
@@ -54,7 +54,8 @@ static double column_gain(const matrix *m, size_t i)
     return sum;
 }
 
-// columns to at most 1, then rows, then columns again; the figures of the matrices below are known
+// columns to at most 1, then rows, then columns again; the coefficient_stats of the matrices below
+// are known
 static void find_scales(const matrix *m, size_t n_voxels)
 {
     for (size_t o = 0; o < m->outputs && m->out; o++) m->out[o].scale = 1;
@@ -71,7 +72,7 @@ static void find_scales(const matrix *m, size_t n_voxels)
     for (size_t i = 0; i < m->k; i++) {
         m->in[i].gain = column_gain(m, i);
         m->in[i].unit = column_unit(m, i);
-        const double step = m->in[i].unit / FINE;
+        const double step = m->in[i].unit / BYTE_MAX;
         m->in[i].error = m->in[i].square * step * step / 12 * rows / (double)n_voxels;
     }
 }
@@ -97,15 +98,16 @@ static group group_at(const survey *s, size_t level, size_t i)
     return (group){level, parent->child, parent->child + parent->n_children};
 }
 
-// the first columns, in pairs as they are stored, that have an error above `worth` for a byte more
-static size_t wide_columns(const matrix *m, double worth)
+// the first columns, in pairs as they are stored, that have an error above `error_per_byte` for a
+// byte more
+static size_t wide_columns(const matrix *m, double error_per_byte)
 {
     const double bytes = 2 * (double)sdm_panel_outputs(m->outputs);
     size_t n = m->k;
     while (n) {
         const size_t first = (n - 1) / 2 * 2;
         const double error = m->in[first].error + (n - first > 1 ? m->in[n - 1].error : 0);
-        if (error > worth * bytes) break;
+        if (error > error_per_byte * bytes) break;
         n = first;
     }
     return n;
@@ -123,59 +125,60 @@ static int by_error(const void *a, const void *b)
     return x->column < y->column ? -1 : 1;
 }
 
-// error left in a group when columns worth their byte have two (find_steps())
-static double choose_in_group(const survey *s, group g, double worth, uint32_t *wide)
+// error left in a group when columns error_per_byte their byte have two (find_steps())
+static double wide_choose_in_group(const survey *s, group g, double error_per_byte, uint32_t *wide)
 {
     double left = 0, most = 0;
     size_t n = 0;
     for (size_t b = g.first; b < g.end; b++) {
         const matrix m = sdm_pod_block_matrix(s, b, g.level);
-        wide[b] = (uint32_t)wide_columns(&m, worth);
+        wide[b] = (uint32_t)wide_columns(&m, error_per_byte);
         n += wide[b];
         for (size_t i = wide[b]; i < m.k; i++)
             left += m.in[i].error, most = fmax(most, m.in[i].error);
     }
-    return left + (double)n * most / (FINER * FINER);
+    return left + (double)n * most / (WIDE_FINER * WIDE_FINER);
 }
 
 // the same in all; numbers of wide columns to wide[blocks + 1]; head: its columns by error
-static double choose(const survey *s, const ranked *head, double worth, uint32_t *wide)
+static double wide_choose(const survey *s, const ranked *head, double error_per_byte,
+                          uint32_t *wide)
 {
     const size_t latent = s->spec->arch.n_latent,
                  padded = sdm_panel_outputs(s->spec->arch.n_coefficients);
     double left = 0;
     size_t n = 0;
-    while (n < latent && head[n].error > worth * (double)padded) n++;
+    while (n < latent && head[n].error > error_per_byte * (double)padded) n++;
     n = n < latent ? sdm_panel_even(n) : n;
     wide[n_blocks(s)] = (uint32_t)n;
-    if (n < latent) left += (double)n * head[n].error / (FINER * FINER);
+    if (n < latent) left += (double)n * head[n].error / (WIDE_FINER * WIDE_FINER);
     for (; n < latent; n++) left += head[n].error;
     for (size_t l = 0; l < s->spec->arch.levels.n; l++)
         for (size_t i = 0; i < n_groups(s, l); i++)
-            left += choose_in_group(s, group_at(s, l, i), worth, wide);
+            left += wide_choose_in_group(s, group_at(s, l, i), error_per_byte, wide);
     return left;
 }
 
-// the largest worth with which the error is tolerable
-static sdm_status choose_wide(const survey *s, pod_integers *q, sdm_error *err)
+// the largest error_per_byte with which the error is tolerable
+static sdm_status wide_find(const survey *s, pod_integers *q, sdm_error *err)
 {
     const size_t latent = s->spec->arch.n_latent, c = s->coefficients_at[s->spec->arch.levels.n];
     ranked *head = NULL;
     const sdm_status status = SDM_ALLOC(&head, latent, "weights as bytes", err);
     if (status) return status;
     double most = 0;
-    for (size_t i = 0; i < c + latent; i++) most = fmax(most, s->figures[i].error);
-    for (size_t i = 0; i < latent; i++) head[i] = (ranked){s->figures[c + i].error, (uint32_t)i};
+    for (size_t i = 0; i < c + latent; i++) most = fmax(most, s->stats[i].error);
+    for (size_t i = 0; i < latent; i++) head[i] = (ranked){s->stats[c + i].error, (uint32_t)i};
     qsort(head, latent, sizeof *head, by_error);
-    double low = -100, high = 0; // binary logarithms of worth / most
+    double low = -100, high = 0; // binary logarithms of error_per_byte / most
     while (high - low > 0.01) {
         const double middle = 0.5 * (low + high);
-        if (choose(s, head, most * exp2(middle), q->wide) <= TOLERATED * s->variance)
+        if (wide_choose(s, head, most * exp2(middle), q->wide) <= ERROR_SHARE_MAX * s->variance)
             low = middle;
         else
             high = middle;
     }
-    choose(s, head, most * exp2(low), q->wide);
+    wide_choose(s, head, most * exp2(low), q->wide);
     for (size_t i = 0; i < latent; i++) q->order[i] = head[i].column;
     sdm_free(head);
     return SDM_OK;
@@ -188,7 +191,7 @@ static double largest_input(const matrix *m, const uint32_t *order, size_t n_wid
 {
     double most = 0;
     for (size_t i = n_wide; i < m->k; i++) {
-        const figures *f = &m->in[order ? order[i] : i];
+        const coefficient_stats *f = &m->in[order ? order[i] : i];
         most = fmax(most, sqrt(f->square) * f->unit);
     }
     return most;
@@ -200,10 +203,11 @@ static double largest_input(const matrix *m, const uint32_t *order, size_t n_wid
 static void find_steps(const matrix *m, const uint32_t *order, size_t n_wide, double most)
 {
     for (size_t i = 0; i < m->k; i++) {
-        figures *f = &m->in[order ? order[i] : i];
+        coefficient_stats *f = &m->in[order ? order[i] : i];
         const double share = most > 0 ? sqrt(f->square) * f->unit / most : INFINITY;
-        f->step =
-            f->unit / (i < n_wide ? fmin(fmax(FINER * FINE * share, 2 * FINE), SDM_WIDE) : FINE);
+        f->step = f->unit / (i < n_wide
+                                 ? fmin(fmax(WIDE_FINER * BYTE_MAX * share, 2 * BYTE_MAX), SDM_WIDE)
+                                 : BYTE_MAX);
     }
 }
 
@@ -218,7 +222,7 @@ static void round_matrix(const matrix *m, const uint32_t *order, int16_t *to)
         }
 }
 
-static void lower(uint32_t *limit, const matrix *m, const int16_t *w)
+static void limit_lower(uint32_t *limit, const matrix *m, const int16_t *w)
 {
     const uint32_t here = (uint32_t)sdm_panel_i8_limit(m->outputs, m->k, w);
     if (here < *limit) *limit = here;
@@ -231,7 +235,7 @@ static void round_block(const survey *s, size_t b, size_t level, double most, po
     float *factor = q->factor + s->coefficients_at[level] + s->spec->blocks[b].coefficient;
     find_steps(&m, NULL, q->wide[b], most);
     round_matrix(&m, NULL, basis);
-    lower(&q->limit[level], &m, basis);
+    limit_lower(&q->limit[level], &m, basis);
     for (size_t i = 0; i < m.k; i++) factor[i] = (float)(m.in[i].scale * m.in[i].step);
 }
 
@@ -243,7 +247,7 @@ static void round_all(const survey *s, pod_integers *q)
     for (size_t l = 0; l <= SDM_POD_MAX_LEVELS; l++) q->limit[l] = INT16_MAX;
     find_steps(&head, q->order, of_head, largest_input(&head, q->order, of_head));
     round_matrix(&head, q->order, q->head);
-    lower(&q->limit[a->levels.n], &head, q->head);
+    limit_lower(&q->limit[a->levels.n], &head, q->head);
     for (size_t i = 0; i < a->n_latent; i++)
         q->factor[s->coefficients_at[a->levels.n] + i] = (float)head.in[q->order[i]].step;
     for (size_t l = 0; l < a->levels.n; l++)
@@ -259,7 +263,7 @@ static void round_all(const survey *s, pod_integers *q)
 }
 
 // what goes into the blocks of a group in the maps of the survey uses a part of the integers:
-// others may be larger by ROOM
+// others may be max_or_nan by HEADROOM
 static void find_quanta(const survey *s, pod_integers *q)
 {
     for (size_t l = 0; l < s->spec->arch.levels.n; l++)
@@ -269,10 +273,10 @@ static void find_quanta(const survey *s, pod_integers *q)
             for (size_t b = g.first; b < g.end; b++) {
                 const matrix m = sdm_pod_block_matrix(s, b, l);
                 for (size_t c = 0; c < m.k; c++)
-                    most = larger(most, m.in[c].largest * m.in[c].step);
+                    most = max_or_nan(most, m.in[c].largest * m.in[c].step);
             }
             for (size_t b = g.first; b < g.end; b++)
-                q->quantum[b] = (float)(ROOM * most / q->limit[l]);
+                q->quantum[b] = (float)(HEADROOM * most / q->limit[l]);
         }
 }
 
@@ -287,18 +291,18 @@ static void round_mlp(const sdm_pod_spec *spec, pod_integers *q)
         for (size_t o = 0; o < a->width; o++) {
             const float *w = spec->weights.layer[l] + o * k;
             double most = 0;
-            for (size_t i = 0; i < k; i++) most = larger(most, fabs((double)w[i]));
-            q->layer_scale[l * a->width + o] = (float)(most / MLP_FINE);
+            for (size_t i = 0; i < k; i++) most = max_or_nan(most, fabs((double)w[i]));
+            q->layer_scale[l * a->width + o] = (float)(most / MLP_WEIGHT_MAX);
             for (size_t i = 0; i < k; i++)
                 to[o * k + i] =
-                    (int16_t)(isfinite(w[i] / most) ? lrint(w[i] / most * MLP_FINE) : 0);
+                    (int16_t)(isfinite(w[i] / most) ? lrint(w[i] / most * MLP_WEIGHT_MAX) : 0);
         }
         q->layer_limit[l] = (uint32_t)sdm_panel_i8_limit(a->width, k, to);
         to += a->width * k;
     }
 }
 
-static sdm_status allocate(const survey *s, pod_integers *q, sdm_error *err)
+static sdm_status integers_allocate(const survey *s, pod_integers *q, sdm_error *err)
 {
     const sdm_pod_arch *a = &s->spec->arch;
     sdm_status status = SDM_ALLOC(&q->wide, n_blocks(s) + 1, "weights as bytes", err);
@@ -323,7 +327,7 @@ sdm_status sdm_pod_quantise(const sdm_pod_spec *spec, pod_integers *out, sdm_err
     survey s;
     *out = (pod_integers){0};
     sdm_status status = sdm_pod_survey(spec, &s, err);
-    if (!status) status = allocate(&s, out, err);
+    if (!status) status = integers_allocate(&s, out, err);
     if (!status) {
         for (size_t l = 0; l < a->levels.n; l++)
             for (size_t b = a->levels.first[l]; b < a->levels.first[l + 1]; b++) {
@@ -332,7 +336,7 @@ sdm_status sdm_pod_quantise(const sdm_pod_spec *spec, pod_integers *out, sdm_err
             }
         const matrix head = sdm_pod_head_matrix(&s);
         find_scales(&head, a->n_voxels);
-        status = choose_wide(&s, out, err);
+        status = wide_find(&s, out, err);
     }
     if (!status) round_all(&s, out);
     if (!status) find_quanta(&s, out);

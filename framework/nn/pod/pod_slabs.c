@@ -76,36 +76,36 @@ size_t sdm_pod_count_mlp(sdm_pod_type type, const sdm_pod_arch *a)
     return n;
 }
 
-typedef struct placing {
+typedef struct placement {
     sdm_pod_type type;
     const sdm_pod_block *blocks;
     const uint32_t *wide;
     size_t next, *at;
-} placing;
+} placement;
 
-static void place(placing *p, size_t b)
+static void block_place(placement *p, size_t b)
 {
     p->at[b] = p->next;
     p->next += sdm_pod_count_weights(p->type, sdm_pod_outputs(p->blocks, b),
                                      p->wide ? p->wide[b] : 0, p->blocks[b].rank);
 }
 
-static void place_upper(placing *p, size_t b, size_t level)
+static void upper_place(placement *p, size_t b, size_t level)
 {
     if (level == 0) return;
-    place(p, b);
+    block_place(p, b);
     for (size_t i = 0; i < p->blocks[b].n_children; i++)
-        place_upper(p, p->blocks[b].child + i, level - 1);
+        upper_place(p, p->blocks[b].child + i, level - 1);
 }
 
 size_t sdm_pod_place_weights(sdm_pod_type type, const sdm_pod_levels *levels,
                              const sdm_pod_block *blocks, const pod_slab *slabs, size_t n_slabs,
                              const pod_leaf *leaves, const uint32_t *wide, size_t *at)
 {
-    placing p = {type, blocks, wide, 0, at};
+    placement p = {type, blocks, wide, 0, at};
     for (const pod_slab *s = slabs; s < slabs + n_slabs; s++) {
-        for (size_t b = s->top; b < s->top_end; b++) place_upper(&p, b, levels->n - 1);
-        for (size_t i = s->leaf; i < s->leaf_end; i++) place(&p, leaves[i].block);
+        for (size_t b = s->top; b < s->top_end; b++) upper_place(&p, b, levels->n - 1);
+        for (size_t i = s->leaf; i < s->leaf_end; i++) block_place(&p, leaves[i].block);
     }
     return p.next;
 }
@@ -118,7 +118,7 @@ size_t sdm_pod_mean_count(const sdm_pod_levels *levels, const sdm_pod_block *blo
     return n;
 }
 
-void sdm_pod_describe_leaves(pod_network *m)
+void sdm_pod_products_fill(pod_network *m)
 {
     size_t mean = 0;
     for (const pod_slab *s = m->slabs; s < m->slabs + m->n_slabs; s++)

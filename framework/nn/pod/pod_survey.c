@@ -20,8 +20,8 @@ matrix sdm_pod_head_matrix(const survey *s)
                     .k = a->n_latent,
                     .row = a->n_latent,
                     .col = 1,
-                    .in = s->figures + s->coefficients_at[a->levels.n],
-                    .out = s->figures + s->coefficients_at[a->levels.n - 1]};
+                    .in = s->stats + s->coefficients_at[a->levels.n],
+                    .out = s->stats + s->coefficients_at[a->levels.n - 1]};
 }
 
 matrix sdm_pod_block_matrix(const survey *s, size_t b, size_t level)
@@ -33,14 +33,14 @@ matrix sdm_pod_block_matrix(const survey *s, size_t b, size_t level)
                 .k = k->rank,
                 .row = 1,
                 .col = outputs,
-                .in = s->figures + s->coefficients_at[level] + k->coefficient};
+                .in = s->stats + s->coefficients_at[level] + k->coefficient};
     if (level)
-        m.out = s->figures + s->coefficients_at[level - 1] + s->spec->blocks[k->child].coefficient;
+        m.out = s->stats + s->coefficients_at[level - 1] + s->spec->blocks[k->child].coefficient;
     return m;
 }
 
-// parameter i of sample n, in [-1, 1]; of up to six parameters every corner is met, on faces about
-// half of them are at an end
+// parameter i of survey_sample n, in [-1, 1]; of up to six parameters every corner is met, on faces
+// about half of them are at an end
 static double sample_parameter(size_t n, size_t i, size_t n_params)
 {
     const double x = 2 * sdm_rng_uniform(0, STREAM, n * n_params + i) - 1;
@@ -89,27 +89,27 @@ done:
     return s;
 }
 
-static void observe(size_t n, const float *x, size_t ldx, figures *f)
+static void stats_update(size_t n, const float *x, size_t ldx, coefficient_stats *f)
 {
     for (size_t r = 0; r < N; r++)
         for (size_t i = 0; i < n; i++) {
             const double v = x[r * ldx + i];
             if (r < RANDOM) f[i].square += v * v / RANDOM;
-            f[i].largest = larger(f[i].largest, fabs(v));
+            f[i].largest = max_or_nan(f[i].largest, fabs(v));
         }
 }
 
 // c[N][ldc]: coefficients of block b; y: of each level [N][most outputs of a block there]
-static void sample_block(survey *s, size_t b, size_t level, const float *c, size_t ldc,
+static void block_sample(survey *s, size_t b, size_t level, const float *c, size_t ldc,
                          float *const *y)
 {
     const sdm_pod_block *k = &s->spec->blocks[b];
     const matrix m = sdm_pod_block_matrix(s, b, level);
-    observe(m.k, c, ldc, m.in);
+    stats_update(m.k, c, ldc, m.in);
     sdm_gemm(N, m.outputs, m.k, (sdm_view){c, ldc, 1}, (sdm_view){m.w, m.col, m.row}, false,
              y[level], m.outputs, 1);
     for (size_t i = k->child; i < k->child + k->n_children; i++)
-        sample_block(s, i, level - 1,
+        block_sample(s, i, level - 1,
                      y[level] +
                          (s->spec->blocks[i].coefficient - s->spec->blocks[k->child].coefficient),
                      m.outputs, y);
@@ -117,7 +117,7 @@ static void sample_block(survey *s, size_t b, size_t level, const float *c, size
         s->variance += (double)y[0][i] * y[0][i] / RANDOM / (double)s->spec->arch.n_voxels;
 }
 
-static sdm_status sample(survey *s, sdm_error *err)
+static sdm_status survey_sample(survey *s, sdm_error *err)
 {
     const sdm_pod_arch *a = &s->spec->arch;
     const size_t top = a->levels.n - 1;
@@ -135,11 +135,11 @@ static sdm_status sample(survey *s, sdm_error *err)
     if (!status) status = sample_latent(s->spec, z, err);
     if (!status) {
         const matrix m = sdm_pod_head_matrix(s);
-        observe(m.k, z, m.k, m.in);
+        stats_update(m.k, z, m.k, m.in);
         sdm_gemm(N, m.outputs, m.k, (sdm_view){z, m.k, 1}, (sdm_view){m.w, m.col, m.row}, false, c,
                  m.outputs, 1);
         for (size_t b = a->levels.first[top]; b < a->levels.first[top + 1]; b++)
-            sample_block(s, b, top, c + s->spec->blocks[b].coefficient, a->n_coefficients, y);
+            block_sample(s, b, top, c + s->spec->blocks[b].coefficient, a->n_coefficients, y);
     }
     for (size_t l = 0; l < a->levels.n; l++) sdm_free(y[l]);
     sdm_free(c);
@@ -154,18 +154,18 @@ sdm_status sdm_pod_survey(const sdm_pod_spec *spec, survey *s, sdm_error *err)
     sdm_pod_place_coefficients(&a->levels, spec->blocks, s->coefficients_at);
     sdm_status status = SDM_ALLOC(&s->basis_at, n_blocks(s) + 1, "weights as bytes", err);
     if (!status)
-        status = SDM_ALLOC(&s->figures, s->coefficients_at[a->levels.n] + a->n_latent,
+        status = SDM_ALLOC(&s->stats, s->coefficients_at[a->levels.n] + a->n_latent,
                            "weights as bytes", err);
     if (status) return status;
     for (size_t b = 0; b < n_blocks(s); b++)
         s->basis_at[b + 1] =
             s->basis_at[b] + sdm_pod_outputs(spec->blocks, b) * spec->blocks[b].rank;
-    return sample(s, err);
+    return survey_sample(s, err);
 }
 
 void sdm_pod_survey_dispose(survey *s)
 {
-    sdm_free(s->figures);
+    sdm_free(s->stats);
     sdm_free(s->basis_at);
     *s = (survey){0};
 }

@@ -7,7 +7,7 @@
 
 /* Of a coefficient of a block, or of a latent variable; all but the first two are left to
  * sdm_pod_quantise(). */
-typedef struct figures {
+typedef struct coefficient_stats {
     double square;  /* mean square */
     double largest; /* magnitude; NaN when one is not a number */
     double gain;    /* square of the map that a coefficient of 1 makes */
@@ -15,13 +15,13 @@ typedef struct figures {
     double scale;   /* of the row that gives it */
     double error;   /* mean square error of the map when its column is single bytes */
     double step;    /* of the integers of its column */
-} figures;
+} coefficient_stats;
 
 typedef struct survey {
     const sdm_pod_spec *spec;
     size_t *basis_at; /* [blocks] first weight of a block in spec->weights.basis */
     size_t coefficients_at[SDM_POD_MAX_LEVELS + 1]; /* the last: C */
-    figures *figures;                               /* [C + L] */
+    coefficient_stats *stats;                       /* [C + L] */
     double variance;                                /* of the map about its mean */
 } survey;
 
@@ -29,11 +29,11 @@ typedef struct survey {
 typedef struct matrix {
     const float *w;
     size_t outputs, k, row, col;
-    figures *in;  /* [k] */
-    figures *out; /* [outputs], NULL: voxels */
+    coefficient_stats *in;  /* [k] */
+    coefficient_stats *out; /* [outputs], NULL: voxels */
 } matrix;
 
-static inline double larger(double a, double b) { return b > a || b != b ? b : a; } // NaN stays
+static inline double max_or_nan(double a, double b) { return b > a || b != b ? b : a; } // NaN stays
 
 static inline double weight(const matrix *m, size_t o, size_t i)
 {

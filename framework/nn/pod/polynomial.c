@@ -20,7 +20,7 @@ size_t sdm_poly_count(size_t n, size_t degree)
 }
 
 // writes all exponents of exactly `left` in variables v .. n-1
-static uint8_t *fill(size_t n, size_t v, size_t left, uint8_t *current, uint8_t *out)
+static uint8_t *exponents_fill(size_t n, size_t v, size_t left, uint8_t *current, uint8_t *out)
 {
     if (v + 1 == n) {
         current[v] = (uint8_t)left;
@@ -29,7 +29,7 @@ static uint8_t *fill(size_t n, size_t v, size_t left, uint8_t *current, uint8_t 
     }
     for (size_t e = left + 1; e-- > 0;) {
         current[v] = (uint8_t)e;
-        out = fill(n, v + 1, left - e, current, out);
+        out = exponents_fill(n, v + 1, left - e, current, out);
     }
     return out;
 }
@@ -37,7 +37,7 @@ static uint8_t *fill(size_t n, size_t v, size_t left, uint8_t *current, uint8_t 
 void sdm_poly_table(size_t n, size_t degree, uint8_t *exponents)
 {
     uint8_t current[SDM_POD_MAX_PARAMS] = {0};
-    for (size_t d = 0; d <= degree; d++) exponents = fill(n, 0, d, current, exponents);
+    for (size_t d = 0; d <= degree; d++) exponents = exponents_fill(n, 0, d, current, exponents);
 }
 
 void sdm_poly_eval(const uint8_t *exponents, size_t n_terms, size_t n, size_t degree,

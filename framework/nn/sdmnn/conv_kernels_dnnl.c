@@ -14,7 +14,7 @@ static dnnl_engine_t engine;
 static dnnl_stream_t stream;
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 
-static void start(void)
+static void engine_start(void)
 {
     if (dnnl_engine_create(&engine, dnnl_cpu, 0) != dnnl_success) engine = NULL;
     if (engine && dnnl_stream_create(&stream, engine, dnnl_stream_default_flags) != dnnl_success)
@@ -23,7 +23,7 @@ static void start(void)
 
 // measured on AVX2: below 16 channels and on large maps the way into its layout and back costs more
 // than it gains
-static bool worth(const sdm_fmap *g, sdm_conv c)
+static bool onednn_pays(const sdm_fmap *g, sdm_conv c)
 {
     return c.taps == 27 && c.in % 16 == 0 && c.out % 16 == 0 &&
            g->n[0] * g->n[1] * g->n[2] <= 32768;
@@ -56,7 +56,7 @@ typedef struct call {
         own[3]; // source, weights, result: as they lie here, and as oneDNN wants them
 } call;
 
-static void dispose(call *k)
+static void call_destroy(call *k)
 {
     for (int i = 0; i < 3; i++) {
         if (k->own[i]) dnnl_memory_destroy(k->own[i]);
@@ -126,19 +126,19 @@ static dnnl_status_t convolve(const sdm_fmap *g, sdm_conv c, const float *w, con
     return s ? s : dnnl_stream_wait(stream);
 }
 
-static void apply(const sdm_fmap *g, sdm_conv c, const float *packed, const float *x,
-                  sdm_conv_finish finish, float *y, int n_threads)
+static void conv_apply(const sdm_fmap *g, sdm_conv c, const float *packed, const float *x,
+                       sdm_conv_finish finish, float *y, int n_threads)
 {
-    pthread_once(&once, start);
+    pthread_once(&once, engine_start);
     dnnl_status_t s = dnnl_unimplemented;
-    if (stream && worth(g, c)) {
+    if (stream && onednn_pays(g, c)) {
         call k = {0};
 #ifdef _OPENMP
         const int before = omp_get_max_threads(); // oneDNN takes as many as OpenMP gives
         if (n_threads) omp_set_num_threads(n_threads);
 #endif
         s = convolve(g, c, packed + (sdm_conv_packed_count(c) + 15) / 16 * 16, x, y, &k);
-        dispose(&k);
+        call_destroy(&k);
 #ifdef _OPENMP
         omp_set_num_threads(before);
 #endif
@@ -153,8 +153,8 @@ const sdm_conv_backend *sdm_conv_dnnl(void)
 {
     static const sdm_conv_backend backend = {.name = "onednn",
                                              .packed_count = packed_count,
-                                             .pack = pack,
-                                             .apply = apply,
+                                             .pack = weights_pack,
+                                             .apply = conv_apply,
                                              .gradient = sdm_conv_gradient};
     return &backend;
 }

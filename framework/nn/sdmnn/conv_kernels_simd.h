@@ -2,13 +2,7 @@
    once for each instruction set. Before inclusion: TABLE (name of the conv_table), ISA (text), VW
    (numbers in a register), MR (output channels of a tile), NV (registers along x). */
 #include "conv_kernels.h"
-
-typedef float vec __attribute__((vector_size(4 * VW)));
-typedef float vec_u __attribute__((vector_size(4 * VW), aligned(4)));
-
-static inline vec load(const float *p) { return *(const vec_u *)p; }
-static inline void store(float *p, vec v) { *(vec_u *)p = v; }
-static inline vec splat(float v) { return v - (vec){0}; }
+#include "kernels/kernels_vector.h"
 
 _Static_assert(SDM_CONV_CHUNK % (NV * VW) == 0 && NV * VW <= SDM_CONV_NR_MAX,
                "a chunk is made of whole tiles");

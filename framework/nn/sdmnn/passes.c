@@ -4,7 +4,8 @@
 #include "operators.h"
 
 // a *= b for all channels
-static void multiply(const sdm_fmap *g, size_t channels, float *a, const float *b, int n_threads)
+static void maps_multiply(const sdm_fmap *g, size_t channels, float *a, const float *b,
+                          int n_threads)
 {
     (void)n_threads;
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
@@ -14,7 +15,7 @@ static void multiply(const sdm_fmap *g, size_t channels, float *a, const float *
     }
 }
 
-static void enter(const sdmnn_plan *p, const float *volume, float *block, int n_threads)
+static void volume_enter(const sdmnn_plan *p, const float *volume, float *block, int n_threads)
 {
     sdm_fmap_read(&p->cell, volume, block + p->volume);
     sdm_upsample_forward(&p->level[0], &p->cell, p->arch.block, 1, block + p->volume,
@@ -34,10 +35,11 @@ static uint64_t first_draw(const sdmnn_plan *p, const sdmnn_step *step, uint64_t
     return draw * all + before;
 }
 
-void sdmnn_forward(const sdmnn_plan *p, const sdmnn_layers *w, const float *volume, float *block,
-                   float *slope, const sdmnn_draw *draw, float *map, int n_threads)
+void sdm_sdmnn_pass_forward(const sdmnn_plan *p, const sdmnn_layers *w, const float *volume,
+                            float *block, float *slope, const sdmnn_draw *draw, float *map,
+                            int n_threads)
 {
-    enter(p, volume, block, n_threads);
+    volume_enter(p, volume, block, n_threads);
     for (size_t i = 0; i < p->n_steps; i++) {
         const sdmnn_step *s = &p->steps[i];
         const sdm_fmap *g = &p->level[s->level];
@@ -59,11 +61,11 @@ void sdmnn_forward(const sdmnn_plan *p, const sdmnn_layers *w, const float *volu
     if (map) sdm_fmap_write(&p->level[0], block + p->output, map);
 }
 
-void sdmnn_tangent(const sdmnn_plan *p, const sdmnn_layers *w, const float *block,
-                   const float *slope, const float *volume, float *tangent, float *map,
-                   int n_threads)
+void sdm_sdmnn_pass_tangent(const sdmnn_plan *p, const sdmnn_layers *w, const float *block,
+                            const float *slope, const float *volume, float *tangent, float *map,
+                            int n_threads)
 {
-    enter(p, volume, tangent, n_threads);
+    volume_enter(p, volume, tangent, n_threads);
     for (size_t i = 0; i < p->n_steps; i++) {
         const sdmnn_step *s = &p->steps[i];
         const sdm_fmap *g = &p->level[s->level];
@@ -76,7 +78,7 @@ void sdmnn_tangent(const sdmnn_plan *p, const sdmnn_layers *w, const float *bloc
         } else {
             w->backend->apply(g, s->conv, w->packed[i], dx, (sdm_conv_finish){NULL, -1, NULL}, dy,
                               n_threads);
-            if (!s->linear) multiply(g, s->conv.out, dy, slope + s->to, n_threads);
+            if (!s->linear) maps_multiply(g, s->conv.out, dy, slope + s->to, n_threads);
         }
     }
     sdm_fmap_write(&p->level[0], tangent + p->output, map);
@@ -85,9 +87,9 @@ void sdmnn_tangent(const sdmnn_plan *p, const sdmnn_layers *w, const float *bloc
 // Every place but the maps of the way down is read by one step alone, so its derivative is
 // overwritten; those are read by the merging first (in this order) and by the pooling after it,
 // which adds.
-void sdmnn_backward(const sdmnn_plan *p, const sdmnn_layers *w, const float *block,
-                    const float *slope, const float *map, float *back, float *volume,
-                    float *gradient, int n_threads)
+void sdm_sdmnn_pass_backward(const sdmnn_plan *p, const sdmnn_layers *w, const float *block,
+                             const float *slope, const float *map, float *back, float *volume,
+                             float *gradient, int n_threads)
 {
     sdm_fmap_read(&p->level[0], map, back + p->output);
     for (size_t i = p->n_steps; i-- > 0;) {
@@ -100,7 +102,7 @@ void sdmnn_backward(const sdmnn_plan *p, const sdmnn_layers *w, const float *blo
         } else if (s->op == SDMNN_UPSAMPLE) {
             sdm_upsample_backward(g, g + 1, 2, s->conv.out, dy, dx, n_threads);
         } else {
-            if (!s->linear) multiply(g, s->conv.out, dy, slope + s->to, n_threads);
+            if (!s->linear) maps_multiply(g, s->conv.out, dy, slope + s->to, n_threads);
             float *dw = gradient ? gradient + s->weights : NULL;
             if (dw)
                 w->backend->gradient(g, s->conv, x, dy, dw, dw + sdmnn_conv_weights(s), n_threads);

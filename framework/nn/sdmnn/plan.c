@@ -85,7 +85,7 @@ static void conv3(sdmnn_plan *p, size_t level, size_t from, size_t in, size_t to
     add_step(p, SDMNN_CONV, level, from, to, (sdm_conv){in, out, 27})->drop = drop;
 }
 
-void sdmnn_plan_make(const sdm_sdmnn_arch *a, bool keep, sdmnn_plan *p)
+void sdm_sdmnn_plan_make(const sdm_sdmnn_arch *a, bool keep, sdmnn_plan *p)
 {
     memset(p, 0, sizeof *p);
     p->arch = *a;
@@ -133,7 +133,7 @@ void sdmnn_plan_make(const sdm_sdmnn_arch *a, bool keep, sdmnn_plan *p)
     add_step(p, SDMNN_CONV, 0, in, p->output, (sdm_conv){n_in, 1, 1})->linear = true;
 }
 
-void sdmnn_plan_clear(const sdmnn_plan *p, float *block)
+void sdm_sdmnn_plan_clear(const sdmnn_plan *p, float *block)
 {
     for (const sdmnn_buffer *b = p->buffers; b < p->buffers + p->n_buffers; b++)
         sdm_fmap_clear_gaps(b->level < SDMNN_LEVELS ? &p->level[b->level] : &p->cell, b->channels,
@@ -143,14 +143,14 @@ void sdmnn_plan_clear(const sdmnn_plan *p, float *block)
 size_t sdm_sdmnn_count(const sdm_sdmnn_arch *a)
 {
     sdmnn_plan p;
-    sdmnn_plan_make(a, false, &p);
+    sdm_sdmnn_plan_make(a, false, &p);
     return p.n_weights;
 }
 
 double sdm_sdmnn_work(const sdm_sdmnn_arch *a)
 {
     sdmnn_plan p;
-    sdmnn_plan_make(a, false, &p);
+    sdm_sdmnn_plan_make(a, false, &p);
     double n = (double)a->width * (double)(a->n_params + p.cells);
     for (const sdmnn_step *s = p.steps; s < p.steps + p.n_steps; s++)
         if (s->op == SDMNN_CONV)
@@ -170,7 +170,7 @@ static void random_layer(uint64_t seed, uint64_t stream, size_t at, size_t outpu
 void sdm_sdmnn_init(const sdm_sdmnn_arch *a, uint64_t seed, uint64_t stream, float *weights)
 {
     sdmnn_plan p;
-    sdmnn_plan_make(a, false, &p);
+    sdm_sdmnn_plan_make(a, false, &p);
     random_layer(seed, stream, 0, a->width, a->n_params, 2, weights);
     random_layer(seed, stream, sdmnn_dense1(&p), p.cells, a->width, 1, weights);
     for (const sdmnn_step *s = p.steps; s < p.steps + p.n_steps; s++)

@@ -45,10 +45,10 @@ typedef struct sdmnn_plan {
 
 /* keep: every feature map has a place of its own, as gradients and tangents need; otherwise the way
  * up reuses memory of the way down. */
-void sdmnn_plan_make(const sdm_sdmnn_arch *a, bool keep, sdmnn_plan *plan);
+void sdm_sdmnn_plan_make(const sdm_sdmnn_arch *a, bool keep, sdmnn_plan *plan);
 
 /* Zeros around every feature map of a block. */
-void sdmnn_plan_clear(const sdmnn_plan *plan, float *block);
+void sdm_sdmnn_plan_clear(const sdmnn_plan *plan, float *block);
 
 /* Weights of the dense layers: w1[W][P], b1[W], w2[cells][W], b2[cells], at the front of all
  * weights. */

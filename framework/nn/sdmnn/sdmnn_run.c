@@ -14,7 +14,7 @@ typedef struct workspace {
     float *volume;     // [R][sdm_panel_outputs(cells)]
     float *activation; // [W]
     float *block, *slope, *tangent;
-    float *layer, *transposed; // of sdmnn_pack_layers(), for reverse mode
+    float *layer, *transposed; // of sdm_sdmnn_pack_layers(), for reverse mode
 } workspace;
 
 static size_t carve(const sdmnn_plan *p, size_t rows, bool reverse, void *memory, workspace *w)
@@ -26,8 +26,8 @@ static size_t carve(const sdmnn_plan *p, size_t rows, bool reverse, void *memory
                             p->floats,
                             more,
                             more,
-                            reverse ? sdmnn_largest_layer(p) : 0,
-                            reverse ? sdmnn_packed_floats(p, true) : 0};
+                            reverse ? sdm_sdmnn_largest_layer(p) : 0,
+                            reverse ? sdm_sdmnn_packed_floats(p, true) : 0};
     float **const fields[] = {&w->hidden, &w->volume,  &w->activation, &w->block,
                               &w->slope,  &w->tangent, &w->layer,      &w->transposed};
     size_t total = 0;
@@ -75,7 +75,7 @@ static void dense(const sdm_model *m, const double *params, size_t rows, const d
     for (size_t i = 0; i < cells; i++) w->volume[i] += k->b2[i];
 }
 
-size_t sdmnn_scratch_bytes(const sdm_model *m, size_t n, int n_threads)
+size_t sdm_sdmnn_scratch_bytes(const sdm_model *m, size_t n, int n_threads)
 {
     const sdmnn_model *k = m->network;
     workspace w;
@@ -83,18 +83,18 @@ size_t sdmnn_scratch_bytes(const sdm_model *m, size_t n, int n_threads)
     return carve(&k->plan, 1, false, NULL, &w);
 }
 
-void sdmnn_model_forward(const sdm_model *m, const double *params, size_t n, float *values,
-                         void *scratch, int n_threads)
+void sdm_sdmnn_model_forward(const sdm_model *m, const double *params, size_t n, float *values,
+                             void *scratch, int n_threads)
 {
     const sdmnn_model *k = m->network;
     const size_t voxels = sdm_grid_count(&m->info.grid);
     workspace w;
     carve(&k->plan, 1, false, scratch, &w);
-    sdmnn_plan_clear(&k->plan, w.block);
+    sdm_sdmnn_plan_clear(&k->plan, w.block);
     for (size_t i = 0; i < n; i++) {
         dense(m, params + i * m->info.n_params, 1, NULL, &w);
-        sdmnn_forward(&k->plan, &k->layers, w.volume, w.block, NULL, NULL, values + i * voxels,
-                      n_threads);
+        sdm_sdmnn_pass_forward(&k->plan, &k->layers, w.volume, w.block, NULL, NULL,
+                               values + i * voxels, n_threads);
     }
 }
 
@@ -114,60 +114,62 @@ static void forward_mode(const sdm_model *m, const double *params, size_t rows,
     const size_t voxels = sdm_grid_count(&m->info.grid), ld = sdm_panel_outputs(k->kept.cells);
     workspace w;
     carve(&k->kept, rows, false, scratch, &w);
-    sdmnn_plan_clear(&k->kept, w.block);
-    sdmnn_plan_clear(&k->kept, w.tangent);
+    sdm_sdmnn_plan_clear(&k->kept, w.block);
+    sdm_sdmnn_plan_clear(&k->kept, w.tangent);
     dense(m, params, rows, direction, &w);
-    sdmnn_forward(&k->kept, &k->layers, w.volume, w.block, w.slope, NULL, values, n_threads);
+    sdm_sdmnn_pass_forward(&k->kept, &k->layers, w.volume, w.block, w.slope, NULL, values,
+                           n_threads);
     for (size_t r = 1; r < rows; r++)
-        sdmnn_tangent(&k->kept, &k->layers, w.block, w.slope, w.volume + r * ld, w.tangent,
-                      derivatives + (r - 1) * voxels, n_threads);
+        sdm_sdmnn_pass_tangent(&k->kept, &k->layers, w.block, w.slope, w.volume + r * ld, w.tangent,
+                               derivatives + (r - 1) * voxels, n_threads);
 }
 
-size_t sdmnn_jacobian_scratch_bytes(const sdm_model *m, int n_threads)
+size_t sdm_sdmnn_jacobian_scratch_bytes(const sdm_model *m, int n_threads)
 {
     (void)n_threads;
     return derivative_bytes(m, 1 + m->info.n_params, false);
 }
 
-void sdmnn_model_jacobian(const sdm_model *m, const double *params, float *values, float *jacobian,
-                          void *scratch, int n_threads)
+void sdm_sdmnn_model_jacobian(const sdm_model *m, const double *params, float *values,
+                              float *jacobian, void *scratch, int n_threads)
 {
     forward_mode(m, params, 1 + m->info.n_params, NULL, values, jacobian, scratch, n_threads);
 }
 
-size_t sdmnn_jvp_scratch_bytes(const sdm_model *m, int n_threads)
+size_t sdm_sdmnn_jvp_scratch_bytes(const sdm_model *m, int n_threads)
 {
     (void)n_threads;
     return derivative_bytes(m, 2, false);
 }
 
-void sdmnn_model_jvp(const sdm_model *m, const double *params, const double *direction,
-                     float *values, float *tangent, void *scratch, int n_threads)
+void sdm_sdmnn_model_jvp(const sdm_model *m, const double *params, const double *direction,
+                         float *values, float *tangent, void *scratch, int n_threads)
 {
     forward_mode(m, params, 2, direction, values, tangent, scratch, n_threads);
 }
 
-size_t sdmnn_vjp_scratch_bytes(const sdm_model *m) { return derivative_bytes(m, 2, true); }
+size_t sdm_sdmnn_vjp_scratch_bytes(const sdm_model *m) { return derivative_bytes(m, 2, true); }
 
-void sdmnn_model_vjp(const sdm_model *m, const double *params, const float *adjoint,
-                     double *gradient, void *scratch)
+void sdm_sdmnn_model_vjp(const sdm_model *m, const double *params, const float *adjoint,
+                         double *gradient, void *scratch)
 {
     const sdmnn_model *k = m->network;
     const sdm_sdmnn_arch *a = &k->kept.arch;
     const size_t cells = k->kept.cells, ld = sdm_panel_outputs(cells);
     workspace w;
     carve(&k->kept, 2, true, scratch, &w);
-    sdmnn_plan_clear(&k->kept, w.block);
-    sdmnn_plan_clear(&k->kept, w.tangent);
+    sdm_sdmnn_plan_clear(&k->kept, w.block);
+    sdm_sdmnn_plan_clear(&k->kept, w.tangent);
     dense(m, params, 1, NULL, &w);
-    sdmnn_forward(&k->kept, &k->layers, w.volume, w.block, w.slope, NULL, NULL, 1);
+    sdm_sdmnn_pass_forward(&k->kept, &k->layers, w.volume, w.block, w.slope, NULL, NULL, 1);
 
     // the weights of the backward pass are packed anew: a hundredth of its work
     sdmnn_layers layers = k->layers;
-    sdmnn_pack_layers(k, true, w.layer, w.transposed, layers.transposed);
+    sdm_sdmnn_pack_layers(k, true, w.layer, w.transposed, layers.transposed);
     float *dvolume = w.volume + ld, *dhidden = w.hidden + a->width;
     memset(dvolume + cells, 0, (ld - cells) * sizeof *dvolume);
-    sdmnn_backward(&k->kept, &layers, w.block, w.slope, adjoint, w.tangent, dvolume, NULL, 1);
+    sdm_sdmnn_pass_backward(&k->kept, &layers, w.block, w.slope, adjoint, w.tangent, dvolume, NULL,
+                            1);
     if (k->half)
         sdm_panel_back_f16(cells, a->width, k->volume, dvolume, dhidden);
     else

@@ -83,10 +83,10 @@ void sdm_panel_pack_i8(size_t outputs, size_t n_wide, size_t k, const int16_t *w
 void sdm_quantise(size_t rows, size_t n, const float *y, size_t ldy, const float *factor, int limit,
                   int16_t *x, size_t ldx, float *scale);
 
-/* One row, and a second of what rounding leaves of it: x times *scale plus rest times *rest_scale
-   is off by at most the largest magnitude / (2 limit^2), and rounding. */
-void sdm_quantise_rest(size_t n, const float *y, const float *factor, int limit, int16_t *x,
-                       float *scale, int16_t *rest, float *rest_scale);
+/* One row, and a second of what rounding leaves of it: x times *scale plus residual times
+   *residual_scale is off by at most the largest magnitude / (2 limit^2), and rounding. */
+void sdm_quantise_residual(size_t n, const float *y, const float *factor, int limit, int16_t *x,
+                           float *scale, int16_t *residual, float *residual_scale);
 
 /* What becomes of the sums of sdm_panel_i8(), times their scales: numbers, or integers for the next
  * product. */
@@ -100,8 +100,8 @@ typedef struct sdm_panel_out {
     const float *mean; /* added to the first n_mean rows of y */
     size_t n_mean;
     /* of y, B: 2 .. 6: the last row is added to the first, and has no place of its own; see
-     * sdm_quantise_rest() */
-    bool rest;
+     * sdm_quantise_residual() */
+    bool residual;
     const float *factor; /* as many as outputs, filled up */
     int limit;
 } sdm_panel_out;
@@ -132,10 +132,10 @@ uint16_t sdm_half_from_float(float v);
 float sdm_half_to_float(uint16_t h);
 
 /* to[n] = y[n]. stream: past the caches, for what is large beside them and not read soon;
-   sdm_put_end(), before others read it, in the thread that wrote. One thread; the same bits either
+   sdm_copy_end(), before others read it, in the thread that wrote. One thread; the same bits either
    way. */
-void sdm_put(size_t n, const float *y, float *to, bool stream);
-void sdm_put_end(void);
+void sdm_copy(size_t n, const float *y, float *to, bool stream);
+void sdm_copy_end(void);
 
 /* exp(x) for n values, relative error below 2e-7, in place allowed. */
 void sdm_exp(size_t n, const float *x, float *y);

@@ -42,13 +42,13 @@ static inline size_t sdm_point_hidden(const sdm_point_arch *a, size_t l)
 {
     return l ? a->width[l - 1] : 0;
 }
-static inline bool sdm_point_enters(const sdm_point_arch *a, size_t l)
+static inline bool sdm_point_takes_input(const sdm_point_arch *a, size_t l)
 {
     return l == 0 || (a->again >> l & 1);
 }
 static inline size_t sdm_point_inputs(const sdm_point_arch *a, size_t l)
 {
-    return sdm_point_hidden(a, l) + (sdm_point_enters(a, l) ? a->n_params + 3 : 0);
+    return sdm_point_hidden(a, l) + (sdm_point_takes_input(a, l) ? a->n_params + 3 : 0);
 }
 
 /* Number of weights: for each hidden layer W_l[W_l][K_l] (from the layer before, then from the

@@ -24,7 +24,7 @@ static size_t packed_count(const sdm_conv_backend *b, const sdmnn_step *s)
     return s->op == SDMNN_CONV ? (b->packed_count(s->conv) + 15) / 16 * 16 : 0;
 }
 
-static sdm_status allocate(sdm_sdmnn *net, sdm_error *err)
+static sdm_status network_allocate(sdm_sdmnn *net, sdm_error *err)
 {
     sdmnn_plan *p = &net->plan;
     const sdm_conv_backend *b = net->layers.backend;
@@ -59,10 +59,10 @@ sdm_status sdm_sdmnn_create(const sdm_sdmnn_arch *a, size_t batch, const sdm_con
     sdm_status s = sdm_sdmnn_check(a, err);
     if (!s) s = SDM_ALLOC(&net, 1, "network", err);
     if (s) return s;
-    sdmnn_plan_make(a, batch > 0, &net->plan);
+    sdm_sdmnn_plan_make(a, batch > 0, &net->plan);
     net->batch = batch;
     net->layers.backend = backend ? backend : sdm_conv_native();
-    s = allocate(net, err);
+    s = network_allocate(net, err);
     if (s)
         sdm_sdmnn_free(net);
     else
@@ -136,7 +136,8 @@ void sdm_sdmnn_forward(sdm_sdmnn *net, const float *x, float *values, int n_thre
 {
     n_threads = sdm_threads(n_threads);
     dense(net, 1, x, NULL, n_threads);
-    sdmnn_forward(&net->plan, &net->layers, net->volume, net->block, NULL, NULL, values, n_threads);
+    sdm_sdmnn_pass_forward(&net->plan, &net->layers, net->volume, net->block, NULL, NULL, values,
+                           n_threads);
 }
 
 double sdm_sdmnn_gradient(sdm_sdmnn *net, size_t batch, const float *x, sdm_sdmnn_loss loss,
@@ -150,11 +151,11 @@ double sdm_sdmnn_gradient(sdm_sdmnn *net, size_t batch, const float *x, sdm_sdmn
     dense(net, batch, x, net->hidden_slope, n_threads);
     for (size_t b = 0; b < batch; b++) {
         const sdmnn_draw numbers = {seed, stream, draw + b};
-        sdmnn_forward(p, &net->layers, net->volume + b * p->cells, net->block, net->slope, &numbers,
-                      net->map, n_threads);
+        sdm_sdmnn_pass_forward(p, &net->layers, net->volume + b * p->cells, net->block, net->slope,
+                               &numbers, net->map, n_threads);
         sum += loss(user, b, net->map, net->dmap);
-        sdmnn_backward(p, &net->layers, net->block, net->slope, net->dmap, net->back,
-                       net->dvolume + b * p->cells, gradient, n_threads);
+        sdm_sdmnn_pass_backward(p, &net->layers, net->block, net->slope, net->dmap, net->back,
+                                net->dvolume + b * p->cells, gradient, n_threads);
     }
     dense_backward(net, batch, x, gradient, n_threads);
     return sum;

@@ -1,7 +1,7 @@
 /* What decoder and transpose of a pod network share: the memory of a thread. Letters as in
  * sdm/pod.h. */
-#ifndef SDM_POD_SPACE_H
-#define SDM_POD_SPACE_H
+#ifndef SDM_POD_DECODE_SCRATCH_H
+#define SDM_POD_DECODE_SCRATCH_H
 
 #include "pod_internal.h"
 
@@ -14,7 +14,7 @@ typedef struct input {
 } input;
 
 /* Memory of a thread, for G rows. */
-typedef struct space {
+typedef struct slab_scratch {
     float *y[SDM_POD_MAX_LEVELS]; /* [G][padded outputs of a block] */
     input x[SDM_POD_MAX_LEVELS];  /* bytes, above the lowest level: those of blocks that get theirs
                                      together */
@@ -23,10 +23,11 @@ typedef struct space {
                      [nz][ny][nx] */
     size_t ld_line;
     float *back; /* [inputs of a slab] gradient there */
-} space;
+} slab_scratch;
 
 /* Sets the pointers into memory[] (NULL: none) for G rows; returns the floats needed. */
-size_t sdm_pod_carve_thread(const pod_network *m, size_t rows, float *memory, space *s);
+size_t sdm_pod_slab_scratch_carve(const pod_network *m, size_t rows, float *memory,
+                                  slab_scratch *s);
 
 static inline bool sdm_pod_is_bytes(const pod_network *m) { return m->type == SDM_POD_I8; }
 

@@ -36,7 +36,7 @@ static void design(const trainer *t, sdm_point_arch *a)
     for (size_t l = 0; l < a->depth; l++) {
         const size_t width = (size_t)c->network.width >> (imnet ? l : 0);
         a->width[l] = width > 8 ? width : 8;
-        if (l && (imnet || l == (size_t)c->network.skip)) a->again |= 1u << l;
+        if (l && (imnet || l == (size_t)c->network.skip)) a->skip |= 1u << l;
     }
     double middle[3];
     for (int i = 0; i < 3; i++) {

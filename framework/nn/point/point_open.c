@@ -11,7 +11,7 @@ static sdm_status read_architecture(sdm_lines *lines, size_t n_params, point_net
     a->depth = (size_t)sdm_lines_int(lines, "point.depth", 1, SDM_POINT_MAX_DEPTH);
     for (size_t l = 0; l < a->depth; l++) {
         a->width[l] = (size_t)sdm_lines_int(lines, "point.width", 1, SDM_POINT_MAX_WIDTH);
-        if (sdm_lines_int(lines, "point.input", l ? 0 : 1, 1) && l) a->again |= 1u << l;
+        if (sdm_lines_int(lines, "point.input", l ? 0 : 1, 1) && l) a->skip |= 1u << l;
         if (a->width[l] > k->max_width) k->max_width = a->width[l];
     }
     a->activation = (int)sdm_lines_int(lines, "point.activation", 0, 3);

@@ -1,4 +1,4 @@
-/* Kernels for AVX-512; a part of kernels_avx512vnni.c too. */
+/* Kernels for AVX-512; kernels_avx512vnni.c includes this file. */
 #include <immintrin.h>
 #include <stdint.h>
 

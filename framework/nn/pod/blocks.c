@@ -1,9 +1,9 @@
-/* Blocks of voxels in levels and the copy of a map into their order. */
+/* The levels of blocks of a grid, and the copy of a map into block order. */
 #include <string.h>
 
 #include "sdm/internal/pod.h"
 
-// number of blocks of `edge` voxels along each axis; returns their product
+// count[3] = number of blocks of `edge` voxels along each axis; returns their product.
 static size_t blocks_along(const sdm_grid *g, size_t edge, size_t count[3])
 {
     for (int a = 0; a < 3; a++) count[a] = ((size_t)g->n[a] + edge - 1) / edge;
@@ -22,6 +22,7 @@ sdm_pod_levels sdm_pod_count(const sdm_grid *grid, size_t block, size_t levels)
     return l;
 }
 
+// the block at index (x, y, z) among those of its level, cut off at the end of the grid
 static sdm_pod_block block_at(const sdm_grid *g, size_t edge, const size_t index[3])
 {
     sdm_pod_block b = {0};
@@ -36,6 +37,7 @@ static sdm_pod_block block_at(const sdm_grid *g, size_t edge, const size_t index
 void sdm_pod_blocks(const sdm_grid *grid, size_t block, const sdm_pod_levels *levels,
                     sdm_pod_block *blocks)
 {
+    // the highest level, x fastest
     size_t level = levels->n - 1, edge = block << level, count[3];
     const size_t n = blocks_along(grid, edge, count);
     sdm_pod_block *b = blocks + levels->first[level];
@@ -44,7 +46,7 @@ void sdm_pod_blocks(const sdm_grid *grid, size_t block, const sdm_pod_levels *le
             grid, edge,
             (const size_t[]){i % count[0], i / count[0] % count[1], i / count[0] / count[1]});
 
-    // each level from the one above
+    // each level from the one above: the children of each parent that lie inside the grid
     while (level-- > 0) {
         edge /= 2;
         blocks_along(grid, edge, count);
@@ -63,6 +65,7 @@ void sdm_pod_blocks(const sdm_grid *grid, size_t block, const sdm_pod_levels *le
         }
     }
 
+    // offsets in block order
     for (level = 0; level < levels->n; level++) {
         uint64_t voxel = 0;
         for (size_t i = levels->first[level]; i < levels->first[level + 1]; i++) {
@@ -91,7 +94,7 @@ size_t sdm_pod_outputs(const sdm_pod_block *blocks, size_t b)
     return last->coefficient + last->rank - first->coefficient;
 }
 
-// offset of row (y, z) of block k in a map
+// index in a map of the first voxel of row (y, z) of block k
 static size_t row_in_map(const sdm_grid *g, const sdm_pod_block *k, size_t y, size_t z)
 {
     return ((k->at[2] + z) * (size_t)g->n[1] + k->at[1] + y) * (size_t)g->n[0] + k->at[0];

@@ -1,5 +1,5 @@
-/* The transpose of the decoder of a pod network: from a map to latent variables. A slab at a time,
-   as in pod_decode.c. Letters as in sdm/pod.h. */
+/* The transpose of the decoder of a pod network, slab by slab as in pod_decode.c: from the gradient
+   by the voxels to the gradient by the latents. Words and letters as in pod_internal.h. */
 #include <string.h>
 
 #include "pod_decode_scratch.h"
@@ -11,13 +11,13 @@ typedef struct back_task {
     slab_scratch s;
 } back_task;
 
-// x[rank] = gradient at the coefficients of block b, from y at its outputs; y is read beside the
-// last, times zero
+// x[rank] = gradient by the coefficients of block b, from y[padded V_b], the gradient by its
+// outputs; the padding of y is multiplied by zero weights.
 static void block_back(const pod_network *m, size_t b, size_t level, const float *y, float *sorted,
                        float *x)
 {
     const sdm_pod_block *k = &m->blocks[b];
-    if (!sdm_pod_is_bytes(m)) {
+    if (!sdm_pod_is_integer(m)) {
         sdm_pod_product_back(m->type, m->outputs[b], k->rank, m->basis, m->weights_at[b], y, x);
         return;
     }
@@ -27,6 +27,7 @@ static void block_back(const pod_network *m, size_t b, size_t level, const float
     for (size_t i = 0; i < k->rank; i++) x[i] = factor[i] * sorted[i];
 }
 
+// j->s.back = gradient by the coefficients of all leaves of the slab
 static void leaves_back(const back_task *j, const float *adjoint, float *sorted)
 {
     const pod_network *m = j->m;
@@ -35,6 +36,8 @@ static void leaves_back(const back_task *j, const float *adjoint, float *sorted)
     for (size_t i = j->slab->leaf; i < j->slab->leaf_end; i++) {
         const size_t b = m->leaves[i].block;
         const sdm_pod_block *k = &m->blocks[b];
+
+        // the voxels of the leaf, padded
         const float *from = adjoint + sdm_pod_first_voxel(j->grid, k);
         float *to = y;
         for (size_t z = 0; z < k->size[2]; z++, from += plane)
@@ -46,7 +49,7 @@ static void leaves_back(const back_task *j, const float *adjoint, float *sorted)
     memset(j->s.back + j->slab->n_coefficients, 0, SDM_PANEL * sizeof *j->s.back);
 }
 
-// x[rank] = gradient at the coefficients of block b of `level`
+// x[rank] = gradient by the coefficients of block b of `level`, from that of its leaves.
 static void upper_back(const back_task *j, size_t b, size_t level, float *sorted, float *x)
 {
     const pod_network *m = j->m;
@@ -68,6 +71,8 @@ void sdm_pod_decode_back(const pod_network *m, const sdm_grid *grid, const float
 {
     const size_t coefficients = m->arch.n_coefficients, latent = m->arch.n_latent,
                  n = m->arch.levels.n;
+
+    // w->c = gradient by the coefficients of the highest level
     back_task j = {.m = m, .grid = grid};
     sdm_pod_slab_scratch_carve(m, 1, w->threads, &j.s);
     for (size_t i = 0; i < m->n_slabs; i++) {
@@ -76,8 +81,10 @@ void sdm_pod_decode_back(const pod_network *m, const sdm_grid *grid, const float
         for (size_t b = j.slab->top; b < j.slab->top_end; b++)
             upper_back(&j, b, n - 1, w->sorted, w->c + m->blocks[b].coefficient);
     }
+
+    // the transpose of the head
     memset(w->c + coefficients, 0, (sdm_panel_outputs(coefficients) - coefficients) * sizeof *w->c);
-    if (!sdm_pod_is_bytes(m)) {
+    if (!sdm_pod_is_integer(m)) {
         sdm_pod_product_back(m->type, coefficients, latent, m->head, 0, w->c, dz);
         return;
     }

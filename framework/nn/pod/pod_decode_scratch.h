@@ -1,36 +1,35 @@
-/* What decoder and transpose of a pod network share: the memory of a thread. Letters as in
- * sdm/pod.h. */
+/* Scratch memory of a thread for one slab, shared by the decoder and its transpose. Words and
+   letters as in pod_internal.h. */
 #ifndef SDM_POD_DECODE_SCRATCH_H
 #define SDM_POD_DECODE_SCRATCH_H
 
 #include "pod_internal.h"
 
-/* Inputs of blocks: floats x[G][ld], or integers q[G][ld] with a factor for each row. */
+/* Inputs of blocks: floats x[R][ld], or with integer weights q[R][ld] with a scale for each row. */
 typedef struct input {
     float *x;
     int16_t *q;
-    float *scale; /* [G] */
+    float *scale; /* [R] */
     size_t ld;
 } input;
 
-/* Memory of a thread, for G rows. */
+/* For R <= SDM_POD_ROWS rows. */
 typedef struct slab_scratch {
-    float *y[SDM_POD_MAX_LEVELS]; /* [G][padded outputs of a block] */
-    input x[SDM_POD_MAX_LEVELS];  /* bytes, above the lowest level: those of blocks that get theirs
-                                     together */
-    input leaves; /* those of all blocks of the lowest level of a slab; scale: [groups][G] */
-    float *line;  /* [G][ld_line] voxels of blocks of the lowest level side by side along x,
-                     [nz][ny][nx] */
+    float *y[SDM_POD_MAX_LEVELS]; /* [R][padded outputs] of a block of each level */
+    input x[SDM_POD_MAX_LEVELS];  /* integer weights: inputs of a group of each level above 0 */
+    input leaves; /* inputs of all leaves of the slab; scale[groups][SDM_POD_ROWS] */
+    float *line;  /* [R][ld_line] voxels of a line, [z][y][nx] */
     size_t ld_line;
-    float *back; /* [inputs of a slab] gradient there */
+    float *back; /* transpose: [coefficients of level 0 of the slab] gradient by them */
 } slab_scratch;
 
-/* Sets the pointers into memory[] (NULL: none) for G rows; returns the floats needed. */
+/* Sets the pointers of *s into memory[] (NULL: none) for R rows; returns the floats needed. */
 size_t sdm_pod_slab_scratch_carve(const pod_network *m, size_t rows, float *memory,
                                   slab_scratch *s);
 
-static inline bool sdm_pod_is_bytes(const pod_network *m) { return m->type == SDM_POD_I8; }
+static inline bool sdm_pod_is_integer(const pod_network *m) { return m->type == SDM_POD_I8; }
 
+/* Index of the first voxel of a block in a map [nz][ny][nx]. */
 static inline size_t sdm_pod_first_voxel(const sdm_grid *g, const sdm_pod_block *b)
 {
     return ((size_t)b->at[2] * (size_t)g->n[1] + b->at[1]) * (size_t)g->n[0] + b->at[0];

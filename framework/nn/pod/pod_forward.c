@@ -1,16 +1,16 @@
-/* The pod network at work: parameters -> latent variables -> map, with derivatives in forward and
-   reverse mode. No allocation. Letters as in sdm/pod.h. */
+/* Evaluation of a pod network: parameters -> latents -> map, with derivatives in forward and
+   reverse mode. No allocation. */
 #include "pod_internal.h"
 
-enum { ROWS = 24 }; // maps for which the head and the MLP are read once
+enum { MAPS = 24 }; // maps that share one pass over the weights of the MLP and the head
 
-// bytes of maps from which on they would push weights out of the caches rather than stay there for
-// their reader
-#define STREAMED 4e6
+// Bytes of all maps of a call above which they are written past the caches: they would evict the
+// weights, and the reader would not find them in the caches anyway.
+#define STREAM_BYTES_MIN 4e6
 
 static size_t min_size(size_t a, size_t b) { return a < b ? a : b; }
 
-// scratch, carved from the caller's block
+// scratch memory, carved from the caller's block
 typedef struct workspace {
     pod_latent latent;
     pod_scratch decode;
@@ -27,7 +27,7 @@ static size_t carve(const pod_network *m, size_t rows, int n_threads, float *mem
 size_t sdm_pod_scratch_bytes(const sdm_model *m, size_t n, int n_threads)
 {
     workspace w;
-    return carve(m->network, min_size(n, ROWS), n_threads, NULL, &w);
+    return carve(m->network, min_size(n, MAPS), n_threads, NULL, &w);
 }
 
 void sdm_pod_forward(const sdm_model *m, const double *params, size_t n, float *values,
@@ -35,19 +35,19 @@ void sdm_pod_forward(const sdm_model *m, const double *params, size_t n, float *
 {
     const pod_network *k = m->network;
     const size_t voxels = sdm_grid_count(&m->info.grid);
-    const bool stream = (double)n * (double)voxels * sizeof *values > STREAMED;
+    const bool stream = (double)n * (double)voxels * sizeof *values > STREAM_BYTES_MIN;
     workspace w;
-    carve(k, min_size(n, ROWS), n_threads, scratch, &w);
-    for (size_t at = 0; at < n; at += ROWS) {
-        const size_t rows = min_size(ROWS, n - at);
-        float *maps[ROWS];
+    carve(k, min_size(n, MAPS), n_threads, scratch, &w);
+    for (size_t at = 0; at < n; at += MAPS) {
+        const size_t rows = min_size(MAPS, n - at);
+        float *maps[MAPS];
         for (size_t r = 0; r < rows; r++) maps[r] = values + (at + r) * voxels;
         sdm_pod_latent(m, params + at * k->arch.n_params, rows, 0, NULL, &w.latent, w.decode.z);
         sdm_pod_decode(k, &m->info.grid, rows, rows, false, stream, maps, &w.decode, n_threads);
     }
 }
 
-// the map and its derivatives along direction[n][P]
+// values = the map, tangent[n][voxels] = its derivatives along direction[n][P]
 static void forward_mode(const sdm_model *m, const double *params, size_t n,
                          const double *direction, float *values, float *tangent, void *scratch,
                          int n_threads)
@@ -93,7 +93,7 @@ void sdm_pod_jvp(const sdm_model *m, const double *params, const double *directi
 size_t sdm_pod_vjp_scratch_bytes(const sdm_model *m)
 {
     workspace w;
-    return carve(m->network, 2, 1, NULL, &w); // a second row of z: its gradient
+    return carve(m->network, 2, 1, NULL, &w); // the second row of z is the gradient by z
 }
 
 void sdm_pod_vjp(const sdm_model *m, const double *params, const float *adjoint, double *gradient,

@@ -1,15 +1,18 @@
-/* The latent variables of a pod network: polynomials and MLP, with derivatives in forward and
- * reverse mode. */
+/* The latents of a pod network: polynomials and MLP, with derivatives in forward and reverse mode.
+ */
 #include <string.h>
 
 #include "pod_internal.h"
 #include "sdm/internal/kernels.h"
 
 static size_t max_size(size_t a, size_t b) { return a > b ? a : b; }
+// number of polynomials that the latents and the MLP need
 static size_t n_poly(const pod_network *m)
 {
     return max_size(m->arch.n_terms, 1 + m->arch.n_inputs);
 }
+// floats between rows of outputs of a layer; one more than the polynomials, because integer kernels
+// write whole pairs
 static size_t row_floats(const pod_network *m)
 {
     return max_size(sdm_panel_outputs(m->arch.width), n_poly(m) + 1);
@@ -68,7 +71,8 @@ size_t sdm_pod_latent_carve(const pod_network *m, size_t rows, float *memory, po
     return total;
 }
 
-// phi[n_poly] at p, and its derivatives with respect to each parameter when they are wanted
+// phi[n_poly] = the polynomials at p; with `slopes` also w->dphi, their derivatives by each
+// parameter.
 static void polynomials(const sdm_model *model, const double *p, bool slopes, const pod_latent *w,
                         float *phi)
 {
@@ -87,7 +91,7 @@ static void polynomials(const sdm_model *model, const double *p, bool slopes, co
         for (size_t t = 0; t < total; t++) w->dphi[i * total + t] *= (float)unit[i];
 }
 
-// derivatives of phi directional_derivatives the directions
+// Rows 1 .. n_directions of w->phi = the derivatives of the polynomials along direction[][P].
 static void directional_derivatives(const pod_network *m, size_t n_directions,
                                     const double *direction, const pod_latent *w)
 {
@@ -103,9 +107,8 @@ static void directional_derivatives(const pod_network *m, size_t n_directions,
     }
 }
 
-/* out[rows][width] = a layer's products with in[rows][stride], without its bias. smooth: what
-   rounding leaves of the first row_floats is added to it, by way of a row_floats behind the last.
- */
+// out[rows][padded W] = the weights of a layer times in[rows][stride], without the bias. smooth:
+// the residual of the first row is multiplied too, as a row after the last, and added to the first.
 static void layer_products(const pod_network *m, size_t layer, size_t rows, bool smooth,
                            const float *in, size_t stride, const pod_latent *w, float *out)
 {
@@ -142,8 +145,8 @@ void sdm_pod_latent(const sdm_model *model, const double *p, size_t n, size_t n_
         memcpy(z + r * a->n_latent, w->phi + r * total, a->n_terms * sizeof *z);
     if (!a->depth) return;
 
-    // the MLP's input is the products of degree 1 and more; derivatives go through the same
-    // weights, then times the slope
+    // The MLP's inputs are the polynomials of degree 1 and more. Derivatives pass through the same
+    // weights, without bias, and are multiplied by the slope of the activation.
     float *in = w->phi + 1;
     size_t stride = total;
     for (size_t layer = 0; layer < a->depth; layer++) {
@@ -168,10 +171,10 @@ void sdm_pod_latent_back(const sdm_model *model, const double *p, const pod_late
     const sdm_pod_arch *a = &m->arch;
     const size_t total = n_poly(m), width = sdm_panel_outputs(a->width);
     polynomials(model, p, true, w, w->phi);
-    float *dphi = w->phi; // its values are not needed
+    float *dphi = w->phi; // gradient by the polynomials; their values are not needed
     memset(dphi, 0, total * sizeof *dphi);
     if (a->depth) {
-        // the gradient at the outputs of a layer, zero where outputs are rounding
+        // dh[padded W] = gradient by the outputs of a layer, zero in the padding
         float *dh = w->h[0], *below = w->h[1];
         memcpy(dh, dz + a->n_terms, a->width * sizeof *dh);
         for (size_t layer = a->depth; layer-- > 0;) {
@@ -188,6 +191,8 @@ void sdm_pod_latent_back(const sdm_model *model, const double *p, const pod_late
         }
         memcpy(dphi + 1, dh, a->n_inputs * sizeof *dphi);
     }
+
+    // the polynomials that are latents themselves, then the chain rule
     for (size_t t = 0; t < a->n_terms; t++) dphi[t] += dz[t];
     for (size_t i = 0; i < a->n_params; i++) {
         gradient[i] = 0;

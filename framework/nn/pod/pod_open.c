@@ -1,5 +1,5 @@
-/* Opening of a pod model: architecture, blocks and weights, every size checked before it is used.
- */
+/* Opens a pod model: reads architecture, ranks of the blocks and weights, and checks every size
+   before it is used. */
 #include <stdint.h>
 
 #include "pod_internal.h"
@@ -22,11 +22,13 @@ static sdm_status read_architecture(sdm_lines *lines, size_t n_params, pod_netwo
     return sdm_lines_check(lines, err);
 }
 
+// little-endian
 static uint32_t read_u32(const uint8_t *p)
 {
     return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
 }
 
+// Ranks of all blocks, and the sizes and orders that follow from them.
 static sdm_status read_ranks(const sdm_section *ranks, pod_network *m, sdm_error *err)
 {
     sdm_pod_arch *a = &m->arch;
@@ -42,6 +44,8 @@ static sdm_status read_ranks(const sdm_section *ranks, pod_network *m, sdm_error
     }
     if (a->n_coefficients < 1 || a->n_coefficients > 1u << 30)
         return sdm_fail(err, SDM_E_FORMAT, "damaged: %zu coefficients", a->n_coefficients);
+
+    // number of outputs of each block, sizes of groups
     sdm_pod_number(&a->levels, m->blocks);
     for (size_t level = 0; level < a->levels.n; level++)
         for (size_t b = a->levels.first[level]; b < a->levels.first[level + 1]; b++) {
@@ -56,6 +60,8 @@ static sdm_status read_ranks(const sdm_section *ranks, pod_network *m, sdm_error
         }
     for (size_t level = 0; level + 1 < a->levels.n; level++)
         m->max_group[level] = m->max_outputs[level + 1];
+
+    // slabs
     sdm_pod_place_coefficients(&a->levels, m->blocks, m->coefficients_at);
     m->n_slabs = sdm_pod_slabs(&a->levels, m->blocks, a->block, m->slabs, m->leaves);
     for (const pod_slab *k = m->slabs; k < m->slabs + m->n_slabs; k++) {
@@ -66,7 +72,7 @@ static sdm_status read_ranks(const sdm_section *ranks, pod_network *m, sdm_error
     return SDM_OK;
 }
 
-// blocks from grid and ranks; sizes that follow from the architecture
+// Blocks from the grid and their ranks; sizes that follow from the architecture.
 static sdm_status blocks_set_up(const sdm_section *ranks, const sdm_grid *grid, pod_network *m,
                                 sdm_error *err)
 {
@@ -95,6 +101,8 @@ static sdm_status blocks_set_up(const sdm_section *ranks, const sdm_grid *grid, 
     if ((s = SDM_ALLOC(&m->products, a->levels.first[1], "model blocks", err))) return s;
     sdm_pod_blocks(grid, a->block, &a->levels, m->blocks);
     if ((s = read_ranks(ranks, m, err))) return s;
+
+    // one table of polynomials for both degrees
     const size_t poly = inputs > terms ? inputs : terms;
     const size_t degree = a->degree > a->input_degree ? a->degree : a->input_degree;
     if ((s = SDM_ALLOC(&m->exponents, poly * a->n_params, "model polynomials", err))) return s;
@@ -102,9 +110,9 @@ static sdm_status blocks_set_up(const sdm_section *ranks, const sdm_grid *grid, 
     return SDM_OK;
 }
 
-// what bytes have beside their panels
-static sdm_status read_byte_tables(const sdm_section *sections, size_t n, sdm_model *model,
-                                   sdm_error *err)
+// The tables of integer weights: wide inputs, order, factors, quanta, limits, scales of the MLP.
+static sdm_status read_integer_tables(const sdm_section *sections, size_t n, sdm_model *model,
+                                      sdm_error *err)
 {
     pod_network *m = model->network;
     const sdm_pod_arch *a = &m->arch;
@@ -122,6 +130,8 @@ static sdm_status read_byte_tables(const sdm_section *sections, size_t n, sdm_mo
     m->quantum =
         sdm_model_weights(model, sections, n, "pod.quantum", n_blocks * sizeof *m->quantum, err);
     if (!m->quantum) return SDM_E_FORMAT;
+
+    // order and limits
     sdm_status s = SDM_ALLOC(&m->wide, n_blocks + 1, "model blocks", err);
     if (!s)
         s = SDM_ALLOC(&m->to_integer, m->coefficients_at[a->levels.n] + SDM_PANEL, "model blocks",
@@ -144,6 +154,8 @@ static sdm_status read_byte_tables(const sdm_section *sections, size_t n, sdm_mo
                                            a->depth * a->width * sizeof *scale, err);
     if (!scale) return SDM_E_FORMAT;
     for (size_t l = 0; l < a->depth; l++) m->layer_scale[l] = scale + l * a->width;
+
+    // factors in units of the quanta, numbers of wide inputs
     for (size_t level = 0; level < a->levels.n; level++)
         for (size_t b = a->levels.first[level]; b < a->levels.first[level + 1]; b++) {
             const size_t at = m->coefficients_at[level] + m->blocks[b].coefficient;
@@ -161,14 +173,15 @@ static sdm_status read_byte_tables(const sdm_section *sections, size_t n, sdm_mo
     return SDM_OK;
 }
 
+// Points the network to its weights in the file.
 static sdm_status bind_weights(const sdm_section *sections, size_t n, sdm_model *model,
                                sdm_error *err)
 {
     pod_network *m = model->network;
     const sdm_pod_arch *a = &m->arch;
-    const size_t weight = sdm_pod_size(m->type);
+    const size_t weight = sdm_pod_weight_bytes(m->type);
     if (m->type == SDM_POD_I8) {
-        const sdm_status s = read_byte_tables(sections, n, model, err);
+        const sdm_status s = read_integer_tables(sections, n, model, err);
         if (s) return s;
     }
     const struct {
@@ -228,9 +241,10 @@ static sdm_status open_network(sdm_model *m, sdm_lines *lines, const sdm_section
     if (!s) s = bind_weights(sections, n, m, err);
     if (s) return s;
     m->info.macs = count_macs(k);
-    // every weight is used once in a map: fewer bytes mean that a size above passed the end of
-    // size_t
-    if (m->info.macs * (double)sdm_pod_size(k->type) > (double)m->info.weight_bytes)
+    // Each multiply-add of a map uses a weight of its own. Fewer bytes of weights than that mean
+    // that
+    // a computed size has overflowed.
+    if (m->info.macs * (double)sdm_pod_weight_bytes(k->type) > (double)m->info.weight_bytes)
         return sdm_fail(err, SDM_E_FORMAT, "damaged: %zu bytes of weights for %.0f of them",
                         m->info.weight_bytes, m->info.macs);
     return SDM_OK;

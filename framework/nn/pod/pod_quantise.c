@@ -1,6 +1,6 @@
-/* Weights as bytes. How large coefficients become is seen at random parameters; from that follows
-   what the rounding of a column does to the map, and which columns need two bytes. Letters as in
-   sdm/pod.h. */
+/* Integer weights of a pod network. The survey shows how large the inputs of each column are; from
+   that follows the error of the map that rounding the column causes, and which columns must be
+   wide. Words and letters as in pod_internal.h. */
 #include "pod_quantise.h"
 
 #include <math.h>
@@ -11,20 +11,18 @@
 #include "sdm/internal/kernels.h"
 #include "sdm/memory.h"
 
-enum {
-    BYTE_MAX = 127,
-    WIDE_FINER = 2
-}; // largest integer of a byte; how much finer than the columns of a byte those of two are
-enum { MLP_WEIGHT_MAX = 2047 }; // largest integer of the MLP
+enum { BYTE_MAX = 127 };        // largest narrow weight
+enum { WIDE_FINER = 2 };        // error of a wide column <= largest of a narrow one / WIDE_FINER^2
+enum { MLP_WEIGHT_MAX = 2047 }; // largest integer weight of the MLP
 
-// how much max_or_nan than in the survey coefficients may become before they are clipped
+// inputs may become HEADROOM times as large as in the survey before they are clipped
 #define HEADROOM 2
 
-// mean square error of the map that rounding may add, of the variance of the maps: small beside
-// what the most accurate networks leave
+// Rounding may add a mean square error of the map of at most ERROR_SHARE_MAX * variance of the map,
+// which is small beside the error of the most accurate networks.
 #define ERROR_SHARE_MAX 5e-7
 
-// largest magnitude in a column, rows scaled; NaN when one is not finite
+// largest abs(weight / row_scale) in column i, 1 if all are 0; NaN if one is not finite
 static double column_unit(const matrix *m, size_t i)
 {
     double most = 0;
@@ -36,7 +34,7 @@ static double column_unit(const matrix *m, size_t i)
     return most > 0 ? most : 1;
 }
 
-// what an error of 1 of the scale of each row does to the map
+// squared norm of the map for an independent error of 1 * row_scale in each output
 static double gain_of_rows(const matrix *m)
 {
     double sum = 0;
@@ -46,6 +44,7 @@ static double gain_of_rows(const matrix *m)
     return sum;
 }
 
+// squared norm of the map for an input i of 1, taking the outputs as orthogonal
 static double column_gain(const matrix *m, size_t i)
 {
     double sum = 0;
@@ -54,8 +53,9 @@ static double column_gain(const matrix *m, size_t i)
     return sum;
 }
 
-// columns to at most 1, then rows, then columns again; the coefficient_stats of the matrices below
-// are known
+// Sets the row scales and the units, gains and errors of the columns of m: columns are scaled to a
+// largest magnitude of 1, then rows, then columns again. The matrices of the level below come
+// first.
 static void find_scales(const matrix *m, size_t n_voxels)
 {
     for (size_t o = 0; o < m->outputs && m->out; o++) m->out[o].scale = 1;
@@ -68,6 +68,8 @@ static void find_scales(const matrix *m, size_t n_voxels)
         }
         m->out[o].scale = most > 0 ? most : 1;
     }
+
+    // a rounding error is uniform within one step: variance step^2 / 12
     const double rows = gain_of_rows(m);
     for (size_t i = 0; i < m->k; i++) {
         m->in[i].gain = column_gain(m, i);
@@ -77,8 +79,7 @@ static void find_scales(const matrix *m, size_t n_voxels)
     }
 }
 
-// blocks of a level whose inputs are rounded together: one of the highest, else the children of one
-// above
+// a group: the blocks first .. end - 1 of `level`
 typedef struct group {
     size_t level, first, end;
 } group;
@@ -98,8 +99,8 @@ static group group_at(const survey *s, size_t level, size_t i)
     return (group){level, parent->child, parent->child + parent->n_children};
 }
 
-// the first columns, in pairs as they are stored, that have an error above `error_per_byte` for a
-// byte more
+// Number of columns of m to make wide, in pairs as they are stored: up to the last pair whose error
+// exceeds error_per_byte for each byte that making it wide costs.
 static size_t wide_columns(const matrix *m, double error_per_byte)
 {
     const double bytes = 2 * (double)sdm_panel_outputs(m->outputs);
@@ -125,7 +126,9 @@ static int by_error(const void *a, const void *b)
     return x->column < y->column ? -1 : 1;
 }
 
-// error left in a group when columns error_per_byte their byte have two (find_steps())
+// wide[] of the blocks of a group, see wide_columns(). Returns the estimated mean square error of
+// the map from the group: that of the narrow columns, and of the wide ones with the steps of
+// find_steps().
 static double wide_choose_in_group(const survey *s, group g, double error_per_byte, uint32_t *wide)
 {
     double left = 0, most = 0;
@@ -140,7 +143,8 @@ static double wide_choose_in_group(const survey *s, group g, double error_per_by
     return left + (double)n * most / (WIDE_FINER * WIDE_FINER);
 }
 
-// the same in all; numbers of wide columns to wide[blocks + 1]; head: its columns by error
+// wide[blocks + 1] of all blocks and the head; returns the estimated mean square error of the map.
+// head[L]: the columns of the head in descending order of their errors.
 static double wide_choose(const survey *s, const ranked *head, double error_per_byte,
                           uint32_t *wide)
 {
@@ -159,18 +163,19 @@ static double wide_choose(const survey *s, const ranked *head, double error_per_
     return left;
 }
 
-// the largest error_per_byte with which the error is tolerable
+// q->wide and q->order for the largest error_per_byte with which the error of the map is within
+// ERROR_SHARE_MAX * variance, by bisection.
 static sdm_status wide_find(const survey *s, pod_integers *q, sdm_error *err)
 {
     const size_t latent = s->spec->arch.n_latent, c = s->coefficients_at[s->spec->arch.levels.n];
     ranked *head = NULL;
-    const sdm_status status = SDM_ALLOC(&head, latent, "weights as bytes", err);
+    const sdm_status status = SDM_ALLOC(&head, latent, "integer weights", err);
     if (status) return status;
     double most = 0;
     for (size_t i = 0; i < c + latent; i++) most = fmax(most, s->stats[i].error);
     for (size_t i = 0; i < latent; i++) head[i] = (ranked){s->stats[c + i].error, (uint32_t)i};
     qsort(head, latent, sizeof *head, by_error);
-    double low = -100, high = 0; // binary logarithms of error_per_byte / most
+    double low = -100, high = 0; // log2(error_per_byte / most)
     while (high - low > 0.01) {
         const double middle = 0.5 * (low + high);
         if (wide_choose(s, head, most * exp2(middle), q->wide) <= ERROR_SHARE_MAX * s->variance)
@@ -186,7 +191,8 @@ static sdm_status wide_find(const survey *s, pod_integers *q, sdm_error *err)
 
 /* Integers. */
 
-// largest input of a column of one byte, in units of the steps; order[i] (NULL: i) of the columns
+// Largest RMS input of a narrow column times the unit of the column. order[k] (NULL: 0 .. k - 1):
+// order of the columns.
 static double largest_input(const matrix *m, const uint32_t *order, size_t n_wide)
 {
     double most = 0;
@@ -197,9 +203,11 @@ static double largest_input(const matrix *m, const uint32_t *order, size_t n_wid
     return most;
 }
 
-/* Steps of the columns, of which the first n_wide have two bytes. Those are as fine as their inputs
-   deserve beside `most`, the largest of the others with which they are rounded, and no finer: the
-   smaller the step, the coarser the input. */
+// Steps of the columns, of which the first n_wide are wide. A narrow column has unit / BYTE_MAX.
+// The error of a column is proportional to (RMS input * step)^2: a wide step makes it `most` (of
+// largest_input()) / (WIDE_FINER * BYTE_MAX), and no finer, because inputs are multiplied by the
+// step before they are rounded: a smaller step leaves fewer bits to the input. unit / step is
+// clamped to 2 * BYTE_MAX .. SDM_WIDE.
 static void find_steps(const matrix *m, const uint32_t *order, size_t n_wide, double most)
 {
     for (size_t i = 0; i < m->k; i++) {
@@ -211,7 +219,7 @@ static void find_steps(const matrix *m, const uint32_t *order, size_t n_wide, do
     }
 }
 
-// to[outputs][k]
+// to[outputs][k] = weights / (step * row_scale), rounded, columns in `order`; 0 where not finite.
 static void round_matrix(const matrix *m, const uint32_t *order, int16_t *to)
 {
     for (size_t o = 0; o < m->outputs; o++)
@@ -222,6 +230,7 @@ static void round_matrix(const matrix *m, const uint32_t *order, int16_t *to)
         }
 }
 
+// *limit = min(*limit, the limit of the integers w of m)
 static void limit_lower(uint32_t *limit, const matrix *m, const int16_t *w)
 {
     const uint32_t here = (uint32_t)sdm_panel_i8_limit(m->outputs, m->k, w);
@@ -239,6 +248,7 @@ static void round_block(const survey *s, size_t b, size_t level, double most, po
     for (size_t i = 0; i < m.k; i++) factor[i] = (float)(m.in[i].scale * m.in[i].step);
 }
 
+// integers, limits and factors of the head and of all blocks
 static void round_all(const survey *s, pod_integers *q)
 {
     const sdm_pod_arch *a = &s->spec->arch;
@@ -262,8 +272,7 @@ static void round_all(const survey *s, pod_integers *q)
         }
 }
 
-// what goes into the blocks of a group in the maps of the survey uses a part of the integers:
-// others may be max_or_nan by HEADROOM
+// Quanta: the largest input of a group in the survey, times HEADROOM, becomes the limit.
 static void find_quanta(const survey *s, pod_integers *q)
 {
     for (size_t l = 0; l < s->spec->arch.levels.n; l++)
@@ -280,8 +289,8 @@ static void find_quanta(const survey *s, pod_integers *q)
         }
 }
 
-// the MLP is small: all its weights have two bytes, of which they use 12 bits so that inputs may
-// use 13
+// The MLP is small: all its weights are wide. They use only 12 bits with the sign, so that sums of
+// 32 bits leave more bits to the inputs.
 static void round_mlp(const sdm_pod_spec *spec, pod_integers *q)
 {
     const sdm_pod_arch *a = &spec->arch;
@@ -305,19 +314,19 @@ static void round_mlp(const sdm_pod_spec *spec, pod_integers *q)
 static sdm_status integers_allocate(const survey *s, pod_integers *q, sdm_error *err)
 {
     const sdm_pod_arch *a = &s->spec->arch;
-    sdm_status status = SDM_ALLOC(&q->wide, n_blocks(s) + 1, "weights as bytes", err);
-    if (!status) status = SDM_ALLOC(&q->order, a->n_latent, "weights as bytes", err);
+    sdm_status status = SDM_ALLOC(&q->wide, n_blocks(s) + 1, "integer weights", err);
+    if (!status) status = SDM_ALLOC(&q->order, a->n_latent, "integer weights", err);
     if (!status)
         status = SDM_ALLOC(&q->factor, s->coefficients_at[a->levels.n] + a->n_latent,
-                           "weights as bytes", err);
+                           "integer weights", err);
     size_t mlp = 0;
     for (size_t l = 0; l < a->depth; l++) mlp += a->width * sdm_pod_layer_inputs(a, l);
-    if (!status) status = SDM_ALLOC(&q->mlp, mlp, "weights as bytes", err);
-    if (!status) status = SDM_ALLOC(&q->layer_scale, a->depth * a->width, "weights as bytes", err);
-    if (!status) status = SDM_ALLOC(&q->quantum, n_blocks(s), "weights as bytes", err);
+    if (!status) status = SDM_ALLOC(&q->mlp, mlp, "integer weights", err);
+    if (!status) status = SDM_ALLOC(&q->layer_scale, a->depth * a->width, "integer weights", err);
+    if (!status) status = SDM_ALLOC(&q->quantum, n_blocks(s), "integer weights", err);
     if (!status)
-        status = SDM_ALLOC(&q->head, a->n_coefficients * a->n_latent, "weights as bytes", err);
-    if (!status) status = SDM_ALLOC(&q->basis, s->basis_at[n_blocks(s)], "weights as bytes", err);
+        status = SDM_ALLOC(&q->head, a->n_coefficients * a->n_latent, "integer weights", err);
+    if (!status) status = SDM_ALLOC(&q->basis, s->basis_at[n_blocks(s)], "integer weights", err);
     return status;
 }
 

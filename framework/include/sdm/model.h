@@ -29,8 +29,8 @@ typedef struct sdm_accuracy {
     double q50_mm, q90_mm, q99_mm; /* quantiles over the shapes of the RMSE of one map */
 } sdm_accuracy;
 
-/* Description of a model. All pointers stay valid until sdm_model_free(); texts are NUL-terminated.
- */
+/* Description of a model. All pointers stay valid until sdm_model_free(); texts are
+   NUL-terminated. */
 typedef struct sdm_model_info {
     char shape[SDM_MODEL_NAME_MAX];
     char kind[16];    /* kind of network: "pod", "deepsdf", "imnet" or "sdmnn" */

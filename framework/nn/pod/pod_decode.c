@@ -75,7 +75,7 @@ typedef struct slab_task {
     bool fixed, stream; // fixed: integer inputs in units of the quanta
     float *const *maps;
     const pod_slab *slab;
-    const float *z_scale; // bytes: [rows]
+    const float *z_scale; // integer weights: [rows]
     size_t residuals;     // 1: a row of inputs after the last is the residual of the first; else 0
     slab_scratch s;
 } slab_task;
@@ -263,7 +263,7 @@ static void decode_line(const slab_task *j, size_t first, size_t n)
     for (; p < end; p++) decode_leaf(j, p, min_size(m->arch.block, nx - p->y));
 }
 
-// Stores the line that begins with or contains block k in the maps.
+// Stores the line whose first leaf is k in the maps.
 static void line_store(const slab_task *j, const sdm_pod_block *k)
 {
     const size_t nx = (size_t)j->grid->n[0], plane = nx * (size_t)j->grid->n[1],

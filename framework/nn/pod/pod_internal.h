@@ -96,8 +96,8 @@ void sdm_pod_product_back(sdm_pod_type type, size_t outputs, size_t k, const voi
    weights. SIZE_MAX on overflow for integer weights. */
 size_t sdm_pod_count_weights(sdm_pod_type type, size_t outputs, size_t n_wide, size_t k);
 
-/* Number of inputs of a layer of the MLP, and elements of the panels of a layer and of all layers.
- */
+/* Number of inputs of a layer of the MLP, and elements of the panels of a layer and of all
+   layers. */
 static inline size_t sdm_pod_layer_inputs(const sdm_pod_arch *a, size_t layer)
 {
     return layer ? a->width : a->n_inputs;

@@ -1,5 +1,5 @@
-/* The latents of a pod network: polynomials and MLP, with derivatives in forward and reverse mode.
- */
+/* The latents of a pod network: polynomials and MLP, with derivatives in forward and reverse
+   mode. */
 #include <string.h>
 
 #include "pod_internal.h"
@@ -53,13 +53,13 @@ void sdm_pod_quantise_residual(size_t n, const float *y, const float *factor, in
 size_t sdm_pod_latent_carve(const pod_network *m, size_t rows, float *memory, pod_latent *w)
 {
     const sdm_pod_arch *a = &m->arch;
-    const bool bytes = m->type == SDM_POD_I8;
+    const bool integer = m->type == SDM_POD_I8;
     w->ld = sdm_panel_outputs(row_floats(m) + 1);
     float *integers;
     const size_t sizes[] = {rows * n_poly(m),           (rows + 1) * row_floats(m),
                             (rows + 1) * row_floats(m), a->depth * sdm_panel_outputs(a->width),
-                            a->n_params * n_poly(m),    bytes ? (rows + 1) * w->ld / 2 : 0,
-                            bytes ? rows + 1 : 0};
+                            a->n_params * n_poly(m),    integer ? (rows + 1) * w->ld / 2 : 0,
+                            integer ? rows + 1 : 0};
     float **const fields[] = {&w->phi,  &w->h[0],  &w->h[1], &w->slope,
                               &w->dphi, &integers, &w->scale};
     size_t total = 0;

@@ -242,8 +242,7 @@ static sdm_status open_network(sdm_model *m, sdm_lines *lines, const sdm_section
     if (s) return s;
     m->info.macs = count_macs(k);
     // Each multiply-add of a map uses a weight of its own. Fewer bytes of weights than that mean
-    // that
-    // a computed size has overflowed.
+    // that a computed size has overflowed.
     if (m->info.macs * (double)sdm_pod_weight_bytes(k->type) > (double)m->info.weight_bytes)
         return sdm_fail(err, SDM_E_FORMAT, "damaged: %zu bytes of weights for %.0f of them",
                         m->info.weight_bytes, m->info.macs);

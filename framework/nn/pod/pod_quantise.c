@@ -189,7 +189,7 @@ static sdm_status wide_find(const survey *s, pod_integers *q, sdm_error *err)
     return SDM_OK;
 }
 
-/* Integers. */
+/* Rounding to integers. */
 
 // Largest RMS input of a narrow column times the unit of the column. order[k] (NULL: 0 .. k - 1):
 // order of the columns.
@@ -290,7 +290,7 @@ static void find_quanta(const survey *s, pod_integers *q)
 }
 
 // The MLP is small: all its weights are wide. They use only 12 bits with the sign, so that sums of
-// 32 bits leave more bits to the inputs.
+// 32 bits leave about 13 bits to the inputs.
 static void round_mlp(const sdm_pod_spec *spec, pod_integers *q)
 {
     const sdm_pod_arch *a = &spec->arch;

@@ -82,8 +82,8 @@ size_t sdm_panel_i8_count(size_t outputs, size_t n_wide, size_t k);
    32 bits; w[outputs][k]. */
 int sdm_panel_i8_limit(size_t outputs, size_t k, const int16_t *w);
 
-/* panels[sdm_panel_i8_count(outputs, n_wide, k)] = the weights w[outputs][k], in the ranges above.
- */
+/* panels[sdm_panel_i8_count(outputs, n_wide, k)] = the weights w[outputs][k], in the ranges
+   above. */
 void sdm_panel_pack_i8(size_t outputs, size_t n_wide, size_t k, const int16_t *w, int8_t *panels);
 
 /* Quantises rows: with v = y[r][i] * factor[i] (factor[n]; NULL: 1) and m = the largest abs(v) of
@@ -158,8 +158,8 @@ void sdm_copy_end(void);
 /* y[n] = exp(x[n]) with x clamped to -87 .. 88, relative error below 2e-7; y may be x. */
 void sdm_exp(size_t n, const float *x, float *y);
 
-/* Name of the instruction set in use: "sse2", "avx2", "avx512", "avx512vnni", "neon" or "generic".
- */
+/* Name of the instruction set in use: "sse2", "avx2", "avx512", "avx512vnni", "neon" or
+   "generic". */
 const char *sdm_kernels_name(void);
 
 #ifdef __cplusplus

@@ -47,7 +47,7 @@ static inline void pack_panel(size_t width, size_t k, const float *src, size_t a
 
 // All panels: packed[ceil(count / width)][k][width] from data[i * along + p * deep], i < count, p <
 // k; the last panel is padded with zeros.
-static void pack(size_t count, size_t k, const float *data, size_t along, size_t deep, size_t width,
+static void pack_panels(size_t count, size_t k, const float *data, size_t along, size_t deep, size_t width,
                  float *packed)
 {
     for (size_t i0 = 0; i0 < count; i0 += width, packed += k * width) {
@@ -74,8 +74,8 @@ static void gemm_block(const kernel_table *t, size_t m, size_t n, size_t k, sdm_
     for (size_t k0 = 0; k0 < k || k0 == 0; k0 += KC) {
         const size_t kc = min_size(KC, k - k0);
         const int keep = add || k0 > 0; // add to c
-        pack(m, kc, a.data + k0 * a.col, a.row, a.col, t->mr, pa);
-        pack(n, kc, b.data + k0 * b.row, b.col, b.row, t->nr, pb);
+        pack_panels(m, kc, a.data + k0 * a.col, a.row, a.col, t->mr, pa);
+        pack_panels(n, kc, b.data + k0 * b.row, b.col, b.row, t->nr, pb);
         for (size_t j = 0; j < n; j += t->nr) {
             const size_t nj = min_size(t->nr, n - j);
             for (size_t i = 0; i < m; i += t->mr) {

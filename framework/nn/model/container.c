@@ -1,4 +1,4 @@
-/* The section file of models and checkpoints. */
+/* Builds, writes and parses the container: the file format of models and checkpoints. */
 #include "sdm/internal/container.h"
 
 #include <string.h>
@@ -11,6 +11,7 @@ static const char magic[8] = {'S', 'D', 'M', 'G', 'E', 'N', '\r', '\n'};
 
 enum { HEADER_BYTES = 24, ENTRY_BYTES = 48, NAME_BYTES = 24, ALIGN = 64 };
 
+// little-endian integers of 1 to 8 bytes
 static void store_le(uint8_t *p, uint64_t v, int bytes)
 {
     for (int i = 0; i < bytes; i++) p[i] = (uint8_t)(v >> (8 * i));
@@ -32,6 +33,8 @@ sdm_status sdm_container_build(const sdm_section *sections, size_t n, uint8_t **
     if (n < 1 || n > SDM_CONTAINER_MAX_SECTIONS)
         return sdm_fail(err, SDM_E_INTERNAL, "%zu sections, need 1 to %u", n,
                         SDM_CONTAINER_MAX_SECTIONS);
+
+    // length of the file
     const size_t table_end = HEADER_BYTES + n * ENTRY_BYTES;
     size_t total = round_up(table_end + 8);
     for (size_t i = 0; i < n; i++) {
@@ -45,10 +48,14 @@ sdm_status sdm_container_build(const sdm_section *sections, size_t n, uint8_t **
     uint8_t *p = NULL;
     const sdm_status s = SDM_ALLOC(&p, total, "model file", err);
     if (s) return s;
+
+    // header
     memcpy(p, magic, sizeof magic);
     store_le(p + 8, SDM_CONTAINER_VERSION, 4);
     store_le(p + 12, n, 4);
     store_le(p + 16, total, 8);
+
+    // sections and their table
     size_t at = round_up(table_end + 8);
     for (size_t i = 0; i < n; i++) {
         uint8_t *entry = p + HEADER_BYTES + i * ENTRY_BYTES;
@@ -59,6 +66,8 @@ sdm_status sdm_container_build(const sdm_section *sections, size_t n, uint8_t **
         if (sections[i].size) memcpy(p + at, sections[i].data, sections[i].size);
         at = round_up(at + sections[i].size);
     }
+
+    // checksums of the header and of the file
     store_le(p + table_end, sdm_crc64(0, p, table_end), 8);
     store_le(p + total - 8, sdm_crc64(0, p, total - 8), 8);
     *bytes = p;
@@ -81,6 +90,7 @@ sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *s
                                char names[SDM_CONTAINER_MAX_SECTIONS][24], size_t *n,
                                uint64_t *checksum, sdm_error *err)
 {
+    // header
     if (size < sizeof magic || memcmp(bytes, magic, sizeof magic))
         return sdm_fail(err, SDM_E_FORMAT,
                         "not a model file (its first bytes are not those of one)");
@@ -111,7 +121,7 @@ sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *s
     if (load_le(bytes + table_end, 8) != sdm_crc64(0, bytes, table_end))
         return sdm_fail(err, SDM_E_FORMAT, "damaged: the checksum of the header is wrong");
 
-    // sections in order, aligned, behind each other, inside the file
+    // sections: aligned, in ascending order without overlap, inside the file
     uint64_t end = table_end + 8;
     for (size_t i = 0; i < count; i++) {
         const uint8_t *entry = bytes + HEADER_BYTES + i * ENTRY_BYTES;

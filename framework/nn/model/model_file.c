@@ -1,9 +1,10 @@
-/* What the files of all kinds of model have in common: description and config. */
+/* The parts of a model file that all kinds of network share: the start of the description, packing
+   into a container, and looking up sections. */
 #include <string.h>
 
 #include "model_kind.h"
 
-// read back by model_open.c
+// read_description() of model_open.c reads these lines in the same order
 void sdm_model_describe(const sdm_model_info *i, const char *kind, sdm_text *t)
 {
     const sdm_accuracy *a = &i->accuracy;

@@ -1,4 +1,4 @@
-/* Lines of a model's description. */
+/* Writes and reads the lines of a model's description. */
 #include "model_text.h"
 
 #include <stdio.h>
@@ -23,7 +23,7 @@ const char *sdm_lines_value(sdm_lines *r, const char *key)
 {
     const size_t n = strlen(key);
     if (r->failed) return "";
-    snprintf(r->wanted, sizeof r->wanted, "%s", key);
+    snprintf(r->key, sizeof r->key, "%s", key);
     const char *line_end = r->at < r->end ? memchr(r->at, '\n', (size_t)(r->end - r->at)) : NULL;
     r->failed = !line_end || (size_t)(line_end - r->at) < n + 1 || memcmp(r->at, key, n) ||
                 r->at[n] != '=' || (size_t)(line_end - r->at) - n - 1 >= sizeof r->value;
@@ -72,5 +72,5 @@ void sdm_lines_text(sdm_lines *r, const char *key, char *out, size_t size)
 sdm_status sdm_lines_check(const sdm_lines *r, sdm_error *err)
 {
     if (!r->failed) return SDM_OK;
-    return sdm_fail(err, SDM_E_FORMAT, "damaged: the description lacks a valid '%s'", r->wanted);
+    return sdm_fail(err, SDM_E_FORMAT, "damaged: the description lacks a valid '%s'", r->key);
 }

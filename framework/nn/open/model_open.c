@@ -1,4 +1,5 @@
-/* Opening of a model file: every text and size is checked before it is used. */
+/* Opens a model file: finds the kind of network and checks every text and size before it is
+   used. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,6 +11,7 @@
 #define MODEL_BYTES_MAX (UINT64_C(16) << 30)
 #define MODEL_PARAMS_MAX 64
 
+// A new kind of network needs an entry here and a declaration in model_kind.h.
 static const sdm_model_kind *const KINDS[] = {&sdm_kind_pod, &sdm_kind_deepsdf, &sdm_kind_imnet,
                                               &sdm_kind_sdmnn};
 
@@ -20,6 +22,7 @@ static const sdm_model_kind *kind_find(const char *name)
     return NULL;
 }
 
+// A NUL-terminated copy of s[n]; NULL if *status is or becomes an error.
 static char *copy_text(const char *s, size_t n, sdm_error *err, sdm_status *status)
 {
     char *out = NULL;
@@ -42,6 +45,7 @@ static void read_accuracy(sdm_lines *r, sdm_accuracy *a)
     a->q50_mm = q[0], a->q90_mm = q[1], a->q99_mm = q[2];
 }
 
+// parameters and options of the shape
 static sdm_status read_params(sdm_lines *r, sdm_model *m, sdm_error *err)
 {
     m->info.n_params = (size_t)sdm_lines_int(r, "params", 1, MODEL_PARAMS_MAX);
@@ -55,9 +59,11 @@ static sdm_status read_params(sdm_lines *r, sdm_model *m, sdm_error *err)
         sdm_lines_text(r, "param.unit", p->unit, sizeof p->unit);
         sdm_lines_reals(r, "param.range", range, 3);
         p->min = range[0], p->max = range[1], p->def = range[2];
-        const double unit = 2 / (p->max - p->min); // what the networks scale by
+        const double unit = 2 / (p->max - p->min); // factor by which networks scale parameters
         if (!(p->min < p->max && unit > 0 && isfinite(unit)) || !p->name[0]) r->failed = true;
     }
+
+    // options
     const size_t n = (size_t)sdm_lines_int(r, "options", 0, 1024);
     if ((s = SDM_ALLOC(&m->option_names, n, "model options", err))) return s;
     if ((s = SDM_ALLOC(&m->option_values, n, "model options", err))) return s;
@@ -72,7 +78,7 @@ static sdm_status read_params(sdm_lines *r, sdm_model *m, sdm_error *err)
     return s;
 }
 
-// the lines that all kinds have
+// The lines that the descriptions of all kinds begin with.
 static sdm_status read_description(sdm_lines *r, sdm_model *m, sdm_error *err)
 {
     sdm_model_info *i = &m->info;
@@ -80,8 +86,10 @@ static sdm_status read_description(sdm_lines *r, sdm_model *m, sdm_error *err)
     m->kind = kind_find(i->kind);
     if (!m->kind)
         return sdm_fail(err, SDM_E_FORMAT,
-                        "a network of kind '%s', which this version does not know",
+                        "unknown kind of network '%s': damaged, or made by a newer version",
                         r->failed ? "?" : i->kind);
+
+    // provenance and grid
     sdm_lines_text(r, "version", i->version, sizeof i->version);
     sdm_lines_text(r, "shape", i->shape, sizeof i->shape);
     double n[3] = {0};
@@ -93,9 +101,11 @@ static sdm_status read_description(sdm_lines *r, sdm_model *m, sdm_error *err)
         if (!(n[a] >= 1 && n[a] <= 1048576)) r->failed = true;
         i->grid.n[a] = r->failed ? 1 : (int64_t)n[a];
     }
-    sdm_lines_value(r, "unit");
+    sdm_lines_value(r, "unit"); // unit, sign and frame are the same in all files
     sdm_lines_value(r, "sign");
     sdm_lines_value(r, "frame");
+
+    // parameters, options, accuracy, training
     sdm_status s = read_params(r, m, err);
     if (s) return s;
     read_accuracy(r, &i->accuracy);
@@ -109,7 +119,7 @@ static sdm_status read_description(sdm_lines *r, sdm_model *m, sdm_error *err)
     return s;
 }
 
-// takes over `bytes`
+// The model of a file in memory; owns `bytes`, also after an error.
 static sdm_status open_bytes(uint8_t *bytes, size_t size, sdm_model **out, sdm_error *err)
 {
     sdm_model *m = NULL;
@@ -120,6 +130,8 @@ static sdm_status open_bytes(uint8_t *bytes, size_t size, sdm_model **out, sdm_e
     }
     m->file = bytes;
     m->info.file_bytes = size;
+
+    // sections
     sdm_section sections[SDM_CONTAINER_MAX_SECTIONS];
     char names[SDM_CONTAINER_MAX_SECTIONS][24];
     size_t n = 0;
@@ -131,6 +143,8 @@ static sdm_status open_bytes(uint8_t *bytes, size_t size, sdm_model **out, sdm_e
                      "a checkpoint, not a finished model: go on with `sdmgen train --resume`");
     if (!s && (!meta || !config))
         s = sdm_fail(err, SDM_E_FORMAT, "damaged: a section of a model is missing");
+
+    // description and configuration, then what belongs to the kind of network
     sdm_lines lines = {0};
     if (!s) {
         lines.at = meta->data;

@@ -1,11 +1,11 @@
-/* Layout of point networks, and making of their model file from weights. */
+/* Builds the file of a point network from its weights. */
 #include <string.h>
 
 #include "point_internal.h"
 #include "sdm/internal/kernels.h"
 #include "sdm/memory.h"
 
-// read back by point_open.c
+// the text that read_architecture() of point_open.c reads
 static void description_write(const sdm_point_spec *spec, sdm_text *t)
 {
     const sdm_point_arch *a = &spec->arch;
@@ -21,6 +21,7 @@ static void description_write(const sdm_point_spec *spec, sdm_text *t)
     sdm_text_add_real(t, "point.scale", a->scale);
 }
 
+// the sections "point.hidden" and "point.input"
 static void weights_pack(const sdm_point_spec *spec, void *hidden, float *input)
 {
     const sdm_point_arch *a = &spec->arch;

@@ -1,9 +1,10 @@
-/* A point network at work: all voxels of a map, with derivatives by forward mode. No allocation.
+/* Evaluation of a point network at all voxels of a map, with derivatives by forward mode. No
+   allocation. Letters as in sdm/internal/point_network.h.
 
-   What the parameters give to a layer is the same for all points of a map and is added to the bias
-   once: the input enters as its three coordinates. R points go through all layers together. A point
-   with tangents has 1 + P rows: the values of all R points, then, for each parameter, the tangents
-   of all R. */
+   The parameters are the same for all points of a map: their part of W_l u is added to the bias
+   once, so that only the three coordinates q enter at each point. R points pass through all layers
+   together. With derivatives each point has 1 + P rows: first the values of all R points, then for
+   each parameter the tangents of all R points. */
 #include <math.h>
 #include <string.h>
 
@@ -12,21 +13,23 @@
 #include "sdm/internal/pod.h"
 #include "sdm/internal/threads.h"
 
+// rounded up to whole panels
 static size_t pad(size_t n) { return sdm_panel_outputs(n); }
 
-// of one map: bias[1 + P][sum of pad(W_l)], the bias of each layer with the parameters in it, and
-// its derivatives by the parameters
+// Of one map: data[1 + P][stride], set 0: the bias of each layer plus the parameters' part of W_l
+// u; sets 1 .. P: its derivatives by the parameters. Layer l begins at at[l] of a set.
 typedef struct map_bias {
     size_t at[SDM_POINT_MAX_DEPTH], stride;
     float *data;
 } map_bias;
 
-// of one thread
+// scratch memory of one thread
 typedef struct workspace {
     float *h[2];  // [rows][pad(max width)]
-    float *slope; // [R][max width]
+    float *slope; // [R][max width] derivative of the activation
 } workspace;
 
+// sets b->at and b->stride; returns the floats of `sets` sets
 static size_t bias_floats(const point_network *k, size_t sets, map_bias *b)
 {
     b->stride = 0;
@@ -37,6 +40,7 @@ static size_t bias_floats(const point_network *k, size_t sets, map_bias *b)
     return sets * b->stride;
 }
 
+// sets the pointers into memory[] (NULL: none) for `rows` rows; returns the floats needed
 static size_t carve(const point_network *k, size_t rows, float *memory, workspace *w)
 {
     const size_t width = pad(k->max_width);
@@ -50,6 +54,7 @@ static size_t carve(const point_network *k, size_t rows, float *memory, workspac
     return total; // a multiple of 16 floats
 }
 
+// b->data at the parameters p[P]; sets 1 .. P only with `tangents`
 static void bias_set(const sdm_model *m, const double *p, bool tangents, map_bias *b)
 {
     const point_network *k = m->network;
@@ -71,7 +76,7 @@ static void bias_set(const sdm_model *m, const double *p, bool tangents, map_bia
     }
 }
 
-// q[n][3] of the voxels from `first` on
+// q[n][3] = scaled coordinates of the voxels from `first` on
 static void coordinates_fill(const sdm_grid *g, const sdm_point_arch *a, size_t first, size_t n,
                              float *q)
 {
@@ -85,7 +90,7 @@ static void coordinates_fill(const sdm_grid *g, const sdm_point_arch *a, size_t 
     }
 }
 
-// y[n][ldy] = matrix of layer l times x[n][ldx]
+// y[n][ldy] = x[n][ldx] times the matrix of layer l > 0
 static void layer_multiply(const point_network *k, size_t l, size_t n, const float *x, size_t ldx,
                            float *y, size_t ldy)
 {
@@ -97,8 +102,8 @@ static void layer_multiply(const point_network *k, size_t l, size_t n, const flo
         sdm_panel_f32(n, k->arch.width[l], before, (const float *)k->hidden + at, x, ldx, y, ldy);
 }
 
-// y[n][ldy] += bias[width], and coordinates times their columns of the matrix when the input
-// enters; clear: y is not added to
+// y[n][ldy] += bias[width] + columns[3][width]^T q[n][3]; columns NULL: bias only. clear: y is set
+// to zero first.
 static void add_input(size_t n, size_t width, const float *bias, const float *columns,
                       const float *q, bool clear, float *y, size_t ldy)
 {
@@ -126,7 +131,7 @@ static float dot(const float *a, const float *b, size_t n)
     return sum;
 }
 
-// n <= R points at q[n][3] -> values[n], and jacobian[p][n] at stride `voxels` when it is not NULL
+// values[n] at n <= R points q[n][3], and jacobian[P][n], rows `voxels` floats apart, unless NULL.
 static void points_forward(const point_network *k, const map_bias *b, size_t n, const float *q,
                            const workspace *w, float *values, float *jacobian, size_t voxels)
 {
@@ -150,6 +155,8 @@ static void points_forward(const point_network *k, const map_bias *b, size_t n, 
         float *swap = in;
         in = out, out = swap;
     }
+
+    // output layer
     const size_t last = a->width[a->depth - 1];
     for (size_t i = 0; i < n; i++) {
         const float sum = dot(in + i * ld, k->last, last) + k->last[last],
@@ -161,8 +168,7 @@ static void points_forward(const point_network *k, const map_bias *b, size_t n, 
     }
 }
 
-// chunks of R voxels are shared among the threads: which chunk a voxel is in does not depend on
-// their number
+// One map. The threads share chunks of R voxels; the chunks do not depend on the number of threads.
 static void map_forward(const sdm_model *m, const double *p, float *values, float *jacobian,
                         void *scratch, int n_threads)
 {

@@ -1,4 +1,4 @@
-/* TODO */
+/* Sizes of a point network: weights, multiply-adds, and the two sections of its file. */
 #include "point_internal.h"
 #include "sdm/internal/kernels.h"
 

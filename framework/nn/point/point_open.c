@@ -1,4 +1,5 @@
-/* Opening of a model that is a point network: every size checked before it is used. */
+/* Opens a point network: reads architecture and weights, and checks every size before it is
+   used. */
 #include "point_internal.h"
 #include "sdm/internal/kernels.h"
 #include "sdm/memory.h"
@@ -25,8 +26,8 @@ static sdm_status read_architecture(sdm_lines *lines, size_t n_params, point_net
     return sdm_lines_check(lines, err);
 }
 
-// as many points as keep their activations in the second-level cache; a multiple of the rows of the
-// kernels
+// R: number of points whose activations fit in the second-level cache, 48 .. 192 and a multiple of
+// 12, hence of the 6 rows of the kernels.
 static size_t rows_at_once(size_t width)
 {
     const size_t n = 98304 / width / 12 * 12;

@@ -1,4 +1,6 @@
-/* Convolution: packing, loops around the kernels, gradient of the weights. */
+/* Convolution of feature maps: packing of weights, loops around the kernels, gradient by the
+ * weights.
+ */
 #include "conv.h"
 
 #include <string.h>
@@ -11,9 +13,9 @@
 enum {
     GROUP = 32,          // output channels of a unit of work, a multiple of every mr
     GRADIENT_TERMS = 54, // terms of a unit of work of the gradient, a multiple of 3
-    MR_MAX = 8,
-    SMALL_MAX = 256,  // positions of a map that is small
-    SMALL_CHUNK = 128 // positions of it that are taken together
+    MR_MAX = 8,          // largest mr
+    SMALL_MAX = 256,     // largest number of positions of a small feature map
+    SMALL_CHUNK = 128    // positions of a small feature map in one matrix product
 };
 
 static const conv_table *conv_kernels(void)
@@ -35,7 +37,8 @@ static int thread_count(int wanted, size_t units)
     return (size_t)n < units ? n : (int)units;
 }
 
-// where the terms channel * taps + tap from k0 on lie, relative to the output's position
+// offset[n] of the inputs of the terms k0 .. k0 + n - 1 relative to the output's position; term
+// channel * taps + tap.
 static void offsets(const sdm_fmap *g, size_t taps, size_t k0, size_t n, ptrdiff_t *offset)
 {
     ptrdiff_t shift[27] = {0};
@@ -56,7 +59,8 @@ size_t sdm_conv_packed_count(sdm_conv c)
     return divide_up(c.out, mr) * mr * c.in * c.taps;
 }
 
-// [blocks of terms][tiles of output channels][terms][mr], zero beyond the last output channel
+// packed[blocks of SDM_CONV_TERMS terms][tiles of output channels][terms][mr], zero beyond the last
+// output channel
 void sdm_conv_pack(sdm_conv c, bool transposed, const float *w, float *packed)
 {
     const size_t mr = conv_kernels()->mr;
@@ -77,7 +81,7 @@ void sdm_conv_pack(sdm_conv c, bool transposed, const float *w, float *packed)
     }
 }
 
-// a tile that reaches beyond the last output channel or position goes through a full one
+// A tile of rows x cols, cut off by the last output channel or position: computed as a full tile.
 static void edge_tile(const conv_table *t, size_t k, const float *a, const float *x,
                       const ptrdiff_t *offset, float *y, size_t ldy, size_t rows, size_t cols,
                       int add)
@@ -89,7 +93,7 @@ static void edge_tile(const conv_table *t, size_t k, const float *a, const float
     for (size_t i = 0; i < rows; i++) memcpy(y + i * ldy, edge + i * t->nr, cols * sizeof *y);
 }
 
-// output channels o0 .. o1 (o0 a multiple of mr) at positions p0 .. p1
+// Output channels o0 .. o1 - 1 (o0 a multiple of mr) at positions p0 .. p1 - 1.
 static void chunk_convolve(const conv_table *t, const sdm_fmap *g, sdm_conv c, const float *packed,
                            const float *x, float *y, size_t o0, size_t o1, size_t p0, size_t p1)
 {
@@ -113,6 +117,7 @@ static void chunk_convolve(const conv_table *t, const sdm_fmap *g, sdm_conv c, c
     }
 }
 
+// f on channel o at positions p0 .. p1 - 1; clears the padding
 static void finish_chunk(const sdm_fmap *g, sdm_conv_finish f, float *y, size_t o, size_t p0,
                          size_t p1)
 {
@@ -156,26 +161,28 @@ void sdm_conv_finish_maps(const sdm_fmap *g, size_t channels, sdm_conv_finish fi
     for (long o = 0; o < (long)channels; o++) finish_chunk(g, finish, y, (size_t)o, 0, g->count);
 }
 
-// dw of output channels o .. o + rows and terms k0 .. k0 + k over all positions
+// dw of mr output channels from o on and GRADIENT_TERMS terms from k0 on, over all positions.
 static void gradient_unit(const conv_table *t, const sdm_fmap *g, sdm_conv c, const float *x,
                           const float *dy, float *dw, size_t o, size_t k0)
 {
     const size_t terms = c.in * c.taps, k = min_size(GRADIENT_TERMS, terms - k0),
                  rows = min_size(t->mr, c.out - o);
-    const size_t tile = 3 * t->mr * t->width; // numbers of one call of dot()
-    const size_t count =
-        divide_up(g->count, t->width) * t->width; // dy is zero beyond the last position
+    const size_t tile = 3 * t->mr * t->width; // partial sums of one call of dot()
+    // positions, rounded up to whole registers: dy is zero beyond the last one
+    const size_t count = divide_up(g->count, t->width) * t->width;
     ptrdiff_t offset[GRADIENT_TERMS + 2];
     float sums[(GRADIENT_TERMS / 3) * SDM_CONV_SUMS_MAX], copy[MR_MAX * SDM_CONV_CHUNK];
     memset(sums, 0, divide_up(k, 3) * tile * sizeof *sums);
     offsets(g, c.taps, k0, k, offset);
-    for (size_t i = k; i < k + 2; i++)
-        offset[i] = offset[k - 1]; // a third tap that is not there: computed, not used
+    // dot() takes three taps: missing ones at the end are computed and not used
+    for (size_t i = k; i < k + 2; i++) offset[i] = offset[k - 1];
+
+    // partial sums in the lanes of registers
     for (size_t p = 0; p < count; p += SDM_CONV_CHUNK) {
         const size_t n = min_size(SDM_CONV_CHUNK, count - p);
         const float *d = dy + o * g->stride + p;
         size_t ldy = g->stride;
-        if (rows < t->mr) { // channels that are not there are zero
+        if (rows < t->mr) { // missing channels are zero
             memset(copy, 0, sizeof copy);
             for (size_t i = 0; i < rows; i++)
                 memcpy(copy + i * SDM_CONV_CHUNK, d + i * ldy, n * sizeof *d);
@@ -183,6 +190,8 @@ static void gradient_unit(const conv_table *t, const sdm_fmap *g, sdm_conv c, co
         }
         for (size_t i = 0; i < k; i += 3) t->dot(n, d, ldy, x + p, offset + i, sums + i / 3 * tile);
     }
+
+    // sums over the lanes
     for (size_t r = 0; r < rows; r++) {
         float *to = dw + (o + r) * terms + k0;
         for (size_t i = 0; i < k; i++)
@@ -190,8 +199,8 @@ static void gradient_unit(const conv_table *t, const sdm_fmap *g, sdm_conv c, co
     }
 }
 
-// The same for small positions, where adding up the registers would be most of the work: a matrix
-// product with the shifted maps copied side by side, for all output channels.
+// dw of all output channels and SDM_CONV_TERMS terms from k0 on, for small feature maps, where the
+// sums over the lanes would dominate: a matrix product of dy and the shifted inputs.
 static void gradient_small(const sdm_fmap *g, sdm_conv c, const float *x, const float *dy,
                            float *dw, size_t k0)
 {
@@ -207,6 +216,7 @@ static void gradient_small(const sdm_fmap *g, sdm_conv c, const float *x, const 
     }
 }
 
+// sum of v[n], in float over runs of 4096 elements and in double over the runs
 static float sum_of(size_t n, const float *v)
 {
     enum { LANES = 16, RUN = 4096 };

@@ -47,8 +47,8 @@ static inline void pack_panel(size_t width, size_t k, const float *src, size_t a
 
 // All panels: packed[ceil(count / width)][k][width] from data[i * along + p * deep], i < count, p <
 // k; the last panel is padded with zeros.
-static void pack_panels(size_t count, size_t k, const float *data, size_t along, size_t deep, size_t width,
-                 float *packed)
+static void pack_panels(size_t count, size_t k, const float *data, size_t along, size_t deep,
+                        size_t width, float *packed)
 {
     for (size_t i0 = 0; i0 < count; i0 += width, packed += k * width) {
         const size_t n = min_size(width, count - i0);

@@ -38,7 +38,7 @@ static size_t packed_count(sdm_conv c)
     return (sdm_conv_packed_count(c) + 15) / 16 * 16 + c.in * c.out * c.taps;
 }
 
-static void pack(sdm_conv c, bool transposed, const float *w, float *packed)
+static void weights_pack(sdm_conv c, bool transposed, const float *w, float *packed)
 {
     const sdm_conv to = transposed ? sdm_conv_opposite(c) : c;
     sdm_conv_pack(c, transposed, w, packed);

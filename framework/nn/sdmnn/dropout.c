@@ -1,5 +1,4 @@
-/* Drop-out of feature maps: y[C] and slope[C], in place; four voxels from each block of random
- * bits. */
+/* Drop-out of feature maps. Each block of 128 random bits serves four positions of a channel. */
 #include "operators.h"
 #include "sdm/internal/rng.h"
 

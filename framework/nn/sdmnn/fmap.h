@@ -23,8 +23,8 @@ typedef struct sdm_fmap {
 /* Layout for nx x ny x nz voxels. */
 sdm_fmap sdm_fmap_layout(const size_t n[3]);
 
-/* Floats of memory for `channels` channels; the feature map begins `lead` floats after its start.
- */
+/* Floats of memory for `channels` channels; the feature map begins `lead` floats after its
+   start. */
 size_t sdm_fmap_floats(const sdm_fmap *g, size_t channels);
 
 /* Writes zeros before, between and after the channels of x. */

@@ -1,4 +1,4 @@
-/* Forward, tangent and backward pass of sdmnn. */
+/* Forward, tangent and backward pass of sdmnn through the steps of its plan. */
 #include "passes.h"
 
 #include "operators.h"
@@ -15,14 +15,16 @@ static void maps_multiply(const sdm_fmap *g, size_t channels, float *a, const fl
     }
 }
 
-static void volume_enter(const sdmnn_plan *p, const float *volume, float *block, int n_threads)
+// copies the volume to the maps and up-samples it to level 0
+static void volume_enter(const sdmnn_plan *p, const float *volume, float *maps, int n_threads)
 {
-    sdm_fmap_read(&p->cell, volume, block + p->volume);
-    sdm_upsample_forward(&p->level[0], &p->cell, p->arch.block, 1, block + p->volume,
-                         block + p->input, n_threads);
+    sdm_fmap_read(&p->cell, volume, maps + p->volume);
+    sdm_upsample_forward(&p->level[0], &p->cell, p->arch.block, 1, maps + p->volume,
+                         maps + p->input, n_threads);
 }
 
-// drop-out of the steps before this one comes first
+// Index of the first random number of the drop-out of `step`: each draw has a contiguous range, in
+// the order of the steps.
 static uint64_t first_draw(const sdmnn_plan *p, const sdmnn_step *step, uint64_t draw)
 {
     uint64_t before = 0, all = 0;
@@ -36,15 +38,15 @@ static uint64_t first_draw(const sdmnn_plan *p, const sdmnn_step *step, uint64_t
 }
 
 void sdm_sdmnn_pass_forward(const sdmnn_plan *p, const sdmnn_layers *w, const float *volume,
-                            float *block, float *slope, const sdmnn_draw *draw, float *map,
+                            float *maps, float *slope, const sdmnn_draw *draw, float *map,
                             int n_threads)
 {
-    volume_enter(p, volume, block, n_threads);
+    volume_enter(p, volume, maps, n_threads);
     for (size_t i = 0; i < p->n_steps; i++) {
         const sdmnn_step *s = &p->steps[i];
         const sdm_fmap *g = &p->level[s->level];
-        const float *x = block + s->from;
-        float *y = block + s->to;
+        const float *x = maps + s->from;
+        float *y = maps + s->to;
         if (s->op == SDMNN_POOL) {
             sdm_pool_forward(g - 1, g, s->conv.out, x, y, n_threads);
         } else if (s->op == SDMNN_UPSAMPLE) {
@@ -58,10 +60,10 @@ void sdm_sdmnn_pass_forward(const sdmnn_plan *p, const sdmnn_layers *w, const fl
                             first_draw(p, s, draw->draw), y, slope + s->to, n_threads);
         }
     }
-    if (map) sdm_fmap_write(&p->level[0], block + p->output, map);
+    if (map) sdm_fmap_write(&p->level[0], maps + p->output, map);
 }
 
-void sdm_sdmnn_pass_tangent(const sdmnn_plan *p, const sdmnn_layers *w, const float *block,
+void sdm_sdmnn_pass_tangent(const sdmnn_plan *p, const sdmnn_layers *w, const float *maps,
                             const float *slope, const float *volume, float *tangent, float *map,
                             int n_threads)
 {
@@ -72,7 +74,7 @@ void sdm_sdmnn_pass_tangent(const sdmnn_plan *p, const sdmnn_layers *w, const fl
         const float *dx = tangent + s->from;
         float *dy = tangent + s->to;
         if (s->op == SDMNN_POOL) {
-            sdm_pool_tangent(g - 1, g, s->conv.out, block + s->from, dx, dy, n_threads);
+            sdm_pool_tangent(g - 1, g, s->conv.out, maps + s->from, dx, dy, n_threads);
         } else if (s->op == SDMNN_UPSAMPLE) {
             sdm_upsample_forward(g, g + 1, 2, s->conv.out, dx, dy, n_threads);
         } else {
@@ -84,10 +86,10 @@ void sdm_sdmnn_pass_tangent(const sdmnn_plan *p, const sdmnn_layers *w, const fl
     sdm_fmap_write(&p->level[0], tangent + p->output, map);
 }
 
-// Every place but the maps of the way down is read by one step alone, so its derivative is
-// overwritten; those are read by the merging first (in this order) and by the pooling after it,
-// which adds.
-void sdm_sdmnn_pass_backward(const sdmnn_plan *p, const sdmnn_layers *w, const float *block,
+// Each feature map is the input of one step, which overwrites the gradient by it. The results of
+// the way down have two: the merge, whose step comes first in this reverse order and overwrites,
+// and the pooling, which adds.
+void sdm_sdmnn_pass_backward(const sdmnn_plan *p, const sdmnn_layers *w, const float *maps,
                              const float *slope, const float *map, float *back, float *volume,
                              float *gradient, int n_threads)
 {
@@ -95,7 +97,7 @@ void sdm_sdmnn_pass_backward(const sdmnn_plan *p, const sdmnn_layers *w, const f
     for (size_t i = p->n_steps; i-- > 0;) {
         const sdmnn_step *s = &p->steps[i];
         const sdm_fmap *g = &p->level[s->level];
-        const float *x = block + s->from;
+        const float *x = maps + s->from;
         float *dx = back + s->from, *dy = back + s->to;
         if (s->op == SDMNN_POOL) {
             sdm_pool_backward(g - 1, g, s->conv.out, x, dy, dx, n_threads);

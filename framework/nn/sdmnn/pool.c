@@ -1,8 +1,7 @@
-/* Max pooling of feature maps: x[C] of layout g -> y[C] of layout h, half the size. */
+/* Max pooling of feature maps by 2. */
 #include "operators.h"
 
-// place of the largest value of the window whose first voxel is at x[at], which has w[x], w[y],
-// w[z] voxels
+// Index of the maximum of the window of w[0] x w[1] x w[2] voxels whose first voxel is x[at].
 static size_t largest(const sdm_fmap *g, const float *x, size_t at, const size_t w[3])
 {
     size_t best = at;
@@ -15,7 +14,8 @@ static size_t largest(const sdm_fmap *g, const float *x, size_t at, const size_t
     return best;
 }
 
-// one channel: copies from the largest voxel of each window, or adds back to it
+// One channel. For each window with its maximum of x at voxel v: to[window] = from[v], or with
+// `back` to[v] += from[window].
 static void pool_windows(const sdm_fmap *g, const sdm_fmap *h, const float *x, const float *from,
                          float *to, int back)
 {

@@ -1,11 +1,11 @@
-/* Making of an sdmnn model's file from weights. */
+/* Builds the file of an sdmnn model from its weights. */
 #include <string.h>
 
 #include "sdm/internal/kernels.h"
 #include "sdm/memory.h"
 #include "sdmnn_model.h"
 
-// read back by sdmnn_open.c
+// the text that read_architecture() of sdmnn_open.c reads
 static void description_write(const sdm_sdmnn_spec *spec, sdm_text *t)
 {
     const sdm_sdmnn_arch *a = &spec->arch;
@@ -15,6 +15,7 @@ static void description_write(const sdm_sdmnn_spec *spec, sdm_text *t)
     sdm_text_add(t, "sdmnn.activation=%d\nsdmnn.half=%d\n", a->activation, spec->half);
 }
 
+// elements at .. at + n - 1 of `to` = w[n], as halves or floats
 static void weights_store(bool half, const float *w, size_t n, void *to, size_t at)
 {
     if (!half) memcpy((float *)to + at, w, n * sizeof *w);
@@ -54,7 +55,8 @@ sdm_status sdm_sdmnn_build(const sdm_sdmnn_spec *spec, uint8_t **bytes, size_t *
     const size_t n_dense = sdm_sdmnn_dense_floats(&p),
                  n_volume = sdm_panel_count(p.cells, spec->arch.width),
                  n_conv = sdm_sdmnn_conv_count(&p);
-    float *dense = NULL, *volume = NULL, *conv = NULL; // room for float, used for half too
+    float *dense = NULL, *volume = NULL,
+          *conv = NULL; // large enough for floats, also used for halves
     sdm_text text = {0};
     s = SDM_ALLOC(&dense, n_dense, "model weights", err);
     if (!s) s = SDM_ALLOC(&volume, n_volume, "model weights", err);

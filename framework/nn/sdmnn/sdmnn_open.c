@@ -1,4 +1,4 @@
-/* Opening of an sdmnn model: architecture and weights, every size checked before it is used. */
+/* Opens an sdmnn model: reads architecture and weights, and checks every size before it is used. */
 #include "sdm/internal/kernels.h"
 #include "sdm/memory.h"
 #include "sdmnn_model.h"
@@ -33,6 +33,8 @@ static sdm_status open_network(sdm_model *m, sdm_lines *lines, const sdm_section
     k->layers.backend = sdm_conv_native();
     sdm_sdmnn_plan_make(&arch, false, &k->plan);
     sdm_sdmnn_plan_make(&arch, true, &k->kept);
+
+    // sections
     const sdmnn_plan *p = &k->plan;
     const size_t weight = half ? sizeof(uint16_t) : sizeof(float);
     const float *dense = sdm_model_weights(m, sections, n, "sdmnn.dense",
@@ -44,6 +46,8 @@ static sdm_status open_network(sdm_model *m, sdm_lines *lines, const sdm_section
     k->conv =
         sdm_model_weights(m, sections, n, "sdmnn.conv", sdm_sdmnn_conv_count(p) * weight, err);
     if (!k->conv) return SDM_E_FORMAT;
+
+    // parts of the section sdmnn.dense
     k->w1 = dense;
     k->b1 = k->w1 + arch.width * arch.n_params;
     k->b2 = k->b1 + arch.width;
@@ -54,6 +58,8 @@ static sdm_status open_network(sdm_model *m, sdm_lines *lines, const sdm_section
         bias += p->steps[i].conv.out;
     }
     m->info.macs = sdm_sdmnn_work(&arch);
+
+    // pack the convolutions
     float *layer = NULL;
     s = SDM_ALLOC(&k->packed, sdm_sdmnn_packed_floats(p, false), "model weights", err);
     if (!s) s = SDM_ALLOC(&layer, sdm_sdmnn_largest_layer(p), "model weights", err);

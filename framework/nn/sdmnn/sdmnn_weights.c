@@ -1,4 +1,4 @@
-/* TODO */
+/* The weights of an sdmnn model: sizes of its sections, and packing of its convolutions. */
 #include "sdm/internal/kernels.h"
 #include "sdmnn_model.h"
 

@@ -1,5 +1,4 @@
-/* Up-sampling of feature maps to the nearest: x[C] of layout h -> y[C] of layout g, `factor` times
- * the size. */
+/* Nearest-neighbour up-sampling of feature maps, and its transpose. */
 #include <string.h>
 
 #include "operators.h"

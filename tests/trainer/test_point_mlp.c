@@ -23,7 +23,7 @@ static sdm_point_arch arch_of(int activation, bool tanh_output)
     return (sdm_point_arch){.n_params = P,
                             .depth = 3,
                             .width = {11, 9, 7},
-                            .again = 1u << 1 | 1u << 2,
+                            .skip = 1u << 1 | 1u << 2,
                             .activation = activation,
                             .tanh_output = tanh_output,
                             .centre = {1, 2, 3},

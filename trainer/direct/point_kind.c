@@ -40,7 +40,7 @@ static void point_design(const trainer *t, sdm_point_arch *a)
     for (size_t l = 0; l < a->depth; l++) {
         const size_t width = (size_t)c->network.width >> (imnet ? l : 0);
         a->width[l] = width > 8 ? width : 8;
-        if (l && (imnet || l == (size_t)c->network.skip)) a->again |= 1u << l;
+        if (l && (imnet || l == (size_t)c->network.skip)) a->skip |= 1u << l;
     }
     // centre and radius of the inputs: the grid
     double middle[3];

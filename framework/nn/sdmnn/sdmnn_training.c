@@ -1,4 +1,4 @@
-/* sdmnn in training: memory, forward pass and gradient of a batch. */
+/* An sdmnn network in training: memory, forward pass, and gradient of the loss of a batch. */
 #include <string.h>
 
 #include "operators.h"
@@ -13,18 +13,19 @@ struct sdm_sdmnn {
     const float *weights;
     sdmnn_layers layers;
     float *packed;                           /* memory of layers.packed and .transposed */
-    float *block, *slope, *back;             /* of the plan; slope and back for the gradient */
-    float *hidden, *volume;                  /* [B][W], [B][cells] */
-    float *hidden_slope, *dhidden, *dvolume; /* likewise */
-    float *map, *dmap;                       /* [V] */
+    float *maps, *slope, *back;              /* see passes.h; slope and back for the gradient */
+    float *hidden, *volume;                  /* outputs of the dense layers, [B][W], [B][cells] */
+    float *hidden_slope, *dhidden, *dvolume; /* derivative of the activation, gradients */
+    float *map, *dmap;                       /* [V] a map, and the derivative of its loss */
 };
 
+// floats of the packed weights of a step, rounded up to 64 bytes
 static size_t packed_count(const sdm_conv_backend *b, const sdmnn_step *s)
 {
     return s->op == SDMNN_CONV ? (b->packed_count(s->conv) + 15) / 16 * 16 : 0;
 }
 
-static sdm_status allocate(sdm_sdmnn *net, sdm_error *err)
+static sdm_status network_allocate(sdm_sdmnn *net, sdm_error *err)
 {
     sdmnn_plan *p = &net->plan;
     const sdm_conv_backend *b = net->layers.backend;
@@ -36,8 +37,10 @@ static sdm_status allocate(sdm_sdmnn *net, sdm_error *err)
         if (net->batch && s->op == SDMNN_CONV)
             n += (b->packed_count(sdm_conv_opposite(s->conv)) + 15) / 16 * 16;
     }
+
+    // for the forward pass, then for the gradient
     sdm_status s = SDM_ALLOC(&net->packed, n, "network weights", err);
-    if (!s) s = SDM_ALLOC(&net->block, p->floats, "network maps", err);
+    if (!s) s = SDM_ALLOC(&net->maps, p->floats, "network maps", err);
     if (!s) s = SDM_ALLOC(&net->hidden, batch * p->arch.width, "network maps", err);
     if (!s) s = SDM_ALLOC(&net->volume, batch * p->cells, "network maps", err);
     if (s || !net->batch) return s;
@@ -59,14 +62,14 @@ sdm_status sdm_sdmnn_create(const sdm_sdmnn_arch *a, size_t batch, const sdm_con
     sdm_status s = sdm_sdmnn_check(a, err);
     if (!s) s = SDM_ALLOC(&net, 1, "network", err);
     if (s) return s;
-    sdmnn_plan_make(a, batch > 0, &net->plan);
+    sdm_sdmnn_plan_make(a, batch > 0, &net->plan);
     net->batch = batch;
     net->layers.backend = backend ? backend : sdm_conv_native();
-    s = allocate(net, err);
+    s = network_allocate(net, err);
     if (s)
         sdm_sdmnn_free(net);
     else
-        *out = net; // new memory is zero, and so is what lies around the maps
+        *out = net; // SDM_ALLOC() zeroes: the padding of the feature maps needs no clearing
     return s;
 }
 
@@ -74,7 +77,7 @@ void sdm_sdmnn_free(sdm_sdmnn *net)
 {
     if (!net) return;
     sdm_free(net->packed);
-    sdm_free(net->block);
+    sdm_free(net->maps);
     sdm_free(net->slope);
     sdm_free(net->back);
     sdm_free(net->hidden);
@@ -107,7 +110,8 @@ void sdm_sdmnn_set(sdm_sdmnn *net, const float *weights)
     }
 }
 
-// x[B][P] -> hidden[B][W] with its slope (or NULL) -> volume[B][cells]
+// net->volume[B][cells] = the dense layers at x[B][P]; slope[B][W] = derivative of the activation,
+// unless NULL.
 static void dense(sdm_sdmnn *net, size_t batch, const float *x, float *slope, int n_threads)
 {
     const sdmnn_plan *p = &net->plan;
@@ -119,6 +123,7 @@ static void dense(sdm_sdmnn *net, size_t batch, const float *x, float *slope, in
                       n_threads);
 }
 
+// adds to the gradient by the weights of the dense layers, from net->dvolume
 static void dense_backward(sdm_sdmnn *net, size_t batch, const float *x, float *gradient,
                            int n_threads)
 {
@@ -136,7 +141,8 @@ void sdm_sdmnn_forward(sdm_sdmnn *net, const float *x, float *values, int n_thre
 {
     n_threads = sdm_threads(n_threads);
     dense(net, 1, x, NULL, n_threads);
-    sdmnn_forward(&net->plan, &net->layers, net->volume, net->block, NULL, NULL, values, n_threads);
+    sdm_sdmnn_pass_forward(&net->plan, &net->layers, net->volume, net->maps, NULL, NULL, values,
+                           n_threads);
 }
 
 double sdm_sdmnn_gradient(sdm_sdmnn *net, size_t batch, const float *x, sdm_sdmnn_loss loss,
@@ -150,11 +156,11 @@ double sdm_sdmnn_gradient(sdm_sdmnn *net, size_t batch, const float *x, sdm_sdmn
     dense(net, batch, x, net->hidden_slope, n_threads);
     for (size_t b = 0; b < batch; b++) {
         const sdmnn_draw numbers = {seed, stream, draw + b};
-        sdmnn_forward(p, &net->layers, net->volume + b * p->cells, net->block, net->slope, &numbers,
-                      net->map, n_threads);
+        sdm_sdmnn_pass_forward(p, &net->layers, net->volume + b * p->cells, net->maps, net->slope,
+                               &numbers, net->map, n_threads);
         sum += loss(user, b, net->map, net->dmap);
-        sdmnn_backward(p, &net->layers, net->block, net->slope, net->dmap, net->back,
-                       net->dvolume + b * p->cells, gradient, n_threads);
+        sdm_sdmnn_pass_backward(p, &net->layers, net->maps, net->slope, net->dmap, net->back,
+                                net->dvolume + b * p->cells, gradient, n_threads);
     }
     dense_backward(net, batch, x, gradient, n_threads);
     return sum;

@@ -1,15 +1,28 @@
-/* Opening of a model file: every text and size is checked before it is used. */
+/* Opens a model file: finds the kind of network and checks every text and size before it is
+   used. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "model_kind.h"
+#include "model/model_kind.h"
 #include "sdm/internal/file.h"
 #include "sdm/memory.h"
 
 #define MODEL_BYTES_MAX (UINT64_C(16) << 30)
 #define MODEL_PARAMS_MAX 64
 
+// A new kind of network needs an entry here and a declaration in model_kind.h.
+static const sdm_model_kind *const KINDS[] = {&sdm_kind_pod, &sdm_kind_deepsdf, &sdm_kind_imnet,
+                                              &sdm_kind_sdmnn};
+
+static const sdm_model_kind *kind_find(const char *name)
+{
+    for (size_t i = 0; i < sizeof KINDS / sizeof *KINDS; i++)
+        if (strcmp(KINDS[i]->name, name) == 0) return KINDS[i];
+    return NULL;
+}
+
+// A NUL-terminated copy of s[n]; NULL if *status is or becomes an error.
 static char *copy_text(const char *s, size_t n, sdm_error *err, sdm_status *status)
 {
     char *out = NULL;
@@ -21,40 +34,43 @@ static char *copy_text(const char *s, size_t n, sdm_error *err, sdm_status *stat
 
 static void read_accuracy(sdm_lines *r, sdm_accuracy *a)
 {
-    a->samples = sdm_next_int(r, "accuracy.samples", 0, INT64_MAX);
-    a->mse_mm2 = sdm_next_real(r, "accuracy.mse_mm2");
-    a->rmse_mm = sdm_next_real(r, "accuracy.rmse_mm");
-    a->mae_mm = sdm_next_real(r, "accuracy.mae_mm");
-    a->max_abs_mm = sdm_next_real(r, "accuracy.max_abs_mm");
-    a->rmse_near_mm = sdm_next_real(r, "accuracy.rmse_near_mm");
+    a->samples = sdm_lines_int(r, "accuracy.samples", 0, INT64_MAX);
+    a->mse_mm2 = sdm_lines_real(r, "accuracy.mse_mm2");
+    a->rmse_mm = sdm_lines_real(r, "accuracy.rmse_mm");
+    a->mae_mm = sdm_lines_real(r, "accuracy.mae_mm");
+    a->max_abs_mm = sdm_lines_real(r, "accuracy.max_abs_mm");
+    a->rmse_near_mm = sdm_lines_real(r, "accuracy.rmse_near_mm");
     double q[3] = {0};
-    sdm_next_reals(r, "accuracy.quantiles_mm", q, 3);
+    sdm_lines_reals(r, "accuracy.quantiles_mm", q, 3);
     a->q50_mm = q[0], a->q90_mm = q[1], a->q99_mm = q[2];
 }
 
+// parameters and options of the shape
 static sdm_status read_params(sdm_lines *r, sdm_model *m, sdm_error *err)
 {
-    m->info.n_params = (size_t)sdm_next_int(r, "params", 1, MODEL_PARAMS_MAX);
+    m->info.n_params = (size_t)sdm_lines_int(r, "params", 1, MODEL_PARAMS_MAX);
     sdm_status s = SDM_ALLOC(&m->params, m->info.n_params, "model parameters", err);
     if (s) return s;
     m->info.params = m->params;
     for (size_t i = 0; i < m->info.n_params; i++) {
         sdm_model_param *p = &m->params[i];
         double range[3] = {0};
-        sdm_next_text(r, "param.name", p->name, sizeof p->name);
-        sdm_next_text(r, "param.unit", p->unit, sizeof p->unit);
-        sdm_next_reals(r, "param.range", range, 3);
+        sdm_lines_text(r, "param.name", p->name, sizeof p->name);
+        sdm_lines_text(r, "param.unit", p->unit, sizeof p->unit);
+        sdm_lines_reals(r, "param.range", range, 3);
         p->min = range[0], p->max = range[1], p->def = range[2];
-        const double unit = 2 / (p->max - p->min); // what the networks scale by
+        const double unit = 2 / (p->max - p->min); // factor by which networks scale parameters
         if (!(p->min < p->max && unit > 0 && isfinite(unit)) || !p->name[0]) r->failed = true;
     }
-    const size_t n = (size_t)sdm_next_int(r, "options", 0, 1024);
+
+    // options
+    const size_t n = (size_t)sdm_lines_int(r, "options", 0, 1024);
     if ((s = SDM_ALLOC(&m->option_names, n, "model options", err))) return s;
     if ((s = SDM_ALLOC(&m->option_values, n, "model options", err))) return s;
     for (; m->info.n_options < n && !s && !r->failed; m->info.n_options++) {
-        sdm_next(r, "option.name");
+        sdm_lines_value(r, "option.name");
         m->option_names[m->info.n_options] = copy_text(r->value, strlen(r->value), err, &s);
-        sdm_next(r, "option.value");
+        sdm_lines_value(r, "option.value");
         m->option_values[m->info.n_options] = copy_text(r->value, strlen(r->value), err, &s);
     }
     m->info.option_names = (const char *const *)m->option_names;
@@ -62,65 +78,48 @@ static sdm_status read_params(sdm_lines *r, sdm_model *m, sdm_error *err)
     return s;
 }
 
-// the lines that all kinds have
+// The lines that the descriptions of all kinds begin with.
 static sdm_status read_description(sdm_lines *r, sdm_model *m, sdm_error *err)
 {
     sdm_model_info *i = &m->info;
-    sdm_next_text(r, "kind", i->kind, sizeof i->kind);
-    m->kind = sdm_model_kind_find(i->kind);
+    sdm_lines_text(r, "kind", i->kind, sizeof i->kind);
+    m->kind = kind_find(i->kind);
     if (!m->kind)
         return sdm_fail(err, SDM_E_FORMAT,
-                        "a network of kind '%s', which this version does not know",
+                        "unknown kind of network '%s': damaged, or made by a newer version",
                         r->failed ? "?" : i->kind);
-    sdm_next_text(r, "version", i->version, sizeof i->version);
-    sdm_next_text(r, "shape", i->shape, sizeof i->shape);
+
+    // provenance and grid
+    sdm_lines_text(r, "version", i->version, sizeof i->version);
+    sdm_lines_text(r, "shape", i->shape, sizeof i->shape);
     double n[3] = {0};
-    sdm_next_reals(r, "grid.size", n, 3);
-    sdm_next_reals(r, "grid.origin", i->grid.origin, 3);
-    sdm_next_reals(r, "grid.spacing", i->grid.spacing, 3);
-    sdm_next_reals(r, "grid.direction", i->grid.dir, 9);
+    sdm_lines_reals(r, "grid.size", n, 3);
+    sdm_lines_reals(r, "grid.origin", i->grid.origin, 3);
+    sdm_lines_reals(r, "grid.spacing", i->grid.spacing, 3);
+    sdm_lines_reals(r, "grid.direction", i->grid.dir, 9);
     for (int a = 0; a < 3; a++) {
         if (!(n[a] >= 1 && n[a] <= 1048576)) r->failed = true;
         i->grid.n[a] = r->failed ? 1 : (int64_t)n[a];
     }
-    sdm_next(r, "unit");
-    sdm_next(r, "sign");
-    sdm_next(r, "frame");
+    sdm_lines_value(r, "unit"); // unit, sign and frame are the same in all files
+    sdm_lines_value(r, "sign");
+    sdm_lines_value(r, "frame");
+
+    // parameters, options, accuracy, training
     sdm_status s = read_params(r, m, err);
     if (s) return s;
     read_accuracy(r, &i->accuracy);
     char seed[32];
-    sdm_next_text(r, "seed", seed, sizeof seed);
+    sdm_lines_text(r, "seed", seed, sizeof seed);
     i->seed = strtoull(seed, NULL, 10);
-    i->train_seconds = sdm_next_real(r, "train.seconds");
-    i->train_samples = sdm_next_int(r, "train.samples", 0, INT64_MAX);
+    i->train_seconds = sdm_lines_real(r, "train.seconds");
+    i->train_samples = sdm_lines_int(r, "train.samples", 0, INT64_MAX);
     s = sdm_lines_check(r, err);
     if (!s && sdm_grid_check(&i->grid, err)) s = SDM_E_FORMAT;
     return s;
 }
 
-const sdm_section *sdm_section_find(const sdm_section *sections, size_t n, const char *name)
-{
-    for (size_t i = 0; i < n; i++)
-        if (strcmp(sections[i].name, name) == 0) return &sections[i];
-    return NULL;
-}
-
-const void *sdm_model_weights(sdm_model *m, const sdm_section *sections, size_t n, const char *name,
-                              size_t size, sdm_error *err)
-{
-    const sdm_section *s = sdm_section_find(sections, n, name);
-    if (!s)
-        sdm_fail(err, SDM_E_FORMAT, "damaged: it has no section '%s'", name);
-    else if (s->size != size)
-        sdm_fail(err, SDM_E_FORMAT, "damaged: section '%s' has %zu bytes, need %zu", name, s->size,
-                 size);
-    if (!s || s->size != size) return NULL;
-    m->info.weight_bytes += size;
-    return s->data;
-}
-
-// takes over `bytes`
+// The model of a file in memory; owns `bytes`, also after an error.
 static sdm_status open_bytes(uint8_t *bytes, size_t size, sdm_model **out, sdm_error *err)
 {
     sdm_model *m = NULL;
@@ -131,6 +130,8 @@ static sdm_status open_bytes(uint8_t *bytes, size_t size, sdm_model **out, sdm_e
     }
     m->file = bytes;
     m->info.file_bytes = size;
+
+    // sections
     sdm_section sections[SDM_CONTAINER_MAX_SECTIONS];
     char names[SDM_CONTAINER_MAX_SECTIONS][24];
     size_t n = 0;
@@ -142,6 +143,8 @@ static sdm_status open_bytes(uint8_t *bytes, size_t size, sdm_model **out, sdm_e
                      "a checkpoint, not a finished model: go on with `sdmgen train --resume`");
     if (!s && (!meta || !config))
         s = sdm_fail(err, SDM_E_FORMAT, "damaged: a section of a model is missing");
+
+    // description and configuration, then what belongs to the kind of network
     sdm_lines lines = {0};
     if (!s) {
         lines.at = meta->data;

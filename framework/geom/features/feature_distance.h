@@ -1,5 +1,5 @@
 /* Squared distance in double from a point to a feature: every value of a distance map is the root
- * of one of these. */
+   of one of these. */
 #ifndef SDM_GEOM_FEATURE_DISTANCE_H
 #define SDM_GEOM_FEATURE_DISTANCE_H
 

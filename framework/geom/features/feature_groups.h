@@ -21,7 +21,7 @@ typedef struct sdm_feature_builder {
     const sdm_bvh *tree;
     /* output: [slot] */
     sdm_frame *frames;
-    /* output; numbers of features, boxes and groups of clusters are set before the groups */
+    /* output; the numbers of features and the boxes of clusters are set before the groups */
     sdm_features *f;
     /* feature number of each edge of the topology, [topo->n_edges]; SDM_NONE: not yet numbered */
     uint32_t *edge;
@@ -34,8 +34,7 @@ typedef struct sdm_feature_builder {
     uint32_t *vertex;
     /* scratch, see segment_find(), [corner_base - edge_base] */
     uint32_t (*segment)[4];
-    /* scratch: triangles so narrow that the direction from an edge into them is unreliable, [n_tri]
-     */
+    /* scratch: the direction from an edge into this triangle is unreliable, [n_tri] */
     bool *narrow;
     /* scratch, zeroed: edges of each corner, [end - corner_base] */
     sdm_corner_edges *along;

@@ -7,8 +7,8 @@
 #include "sdm/internal/vec3.h"
 #include "simd/lanes_four.h"
 
-/* Four frames, one per lane. Members in the order of sdm_frame: both are read as arrays of doubles.
- */
+/* Four frames, one per lane. Its members have the order of sdm_frame: both are also accessed as
+   arrays of doubles. */
 typedef struct sdm_frame4 {
     d4 a[3], u[3], v[3], n[3], half[3];
     d4 e1x, e1y, kt1, kh1;
@@ -16,7 +16,7 @@ typedef struct sdm_frame4 {
 } sdm_frame4;
 
 /* Sets (ex, ey) to the unit vector along (dx, dy), or to (-1, 0) where that is 0; returns the
- * length. */
+   length. */
 SDM_INLINE d4 direction4(d4 dx, d4 dy, d4 *ex, d4 *ey)
 {
     const d4 len = d4_sqrt(dx * dx + dy * dy);

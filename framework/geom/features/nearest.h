@@ -26,8 +26,9 @@ sdm_status sdm_nearest_build(const sdm_mesh *m, const sdm_topology *topo, sdm_ar
 double sdm_nearest_find(const sdm_nearest *n, const double x[3], double bound, uint32_t *slot,
                         double q[3], int *feature);
 
-/* Squared distance from x to the nearest of the seven features (face, edges, corners) of triangle
- *slot, with the same bits as in a distance map. *slot becomes the owner of this feature. */
+/* Squared distance from x to the nearest of the seven features (face, edges, corners) of the
+   triangle with slot *slot, with the same bits as in a distance map. Sets *slot to the owner of
+   this feature (sdm_features.owner). */
 double sdm_nearest_feature(const sdm_nearest *n, const double x[3], uint32_t *slot);
 
 #endif

@@ -11,8 +11,8 @@
 
 static const double *vertex(const sdm_feature_builder *b, size_t v) { return &b->m->vert[3 * v]; }
 
-/* Sets centre, radius and scale. */
-static void scale_set(const sdm_feature_builder *b)
+/* Sets centre, radius and scale of the features. */
+static void surface_measure(const sdm_feature_builder *b)
 {
     sdm_features *f = b->f;
     const sdm_bvh_node *root = b->tree->node;
@@ -82,9 +82,9 @@ static size_t clusters_list(const sdm_features *f, sdm_cluster_node **list)
 }
 
 /* Next free number of an edge, a corner and a group. */
-typedef struct numbers {
+typedef struct next_numbers {
     uint32_t edge, corner, group;
-} numbers;
+} next_numbers;
 
 /* Returns the feature number *own of an edge or corner; where it is SDM_NONE, takes the number
    *next and stores the edge or vertex in source[number]. Free of branches, because first
@@ -101,11 +101,11 @@ static inline uint32_t number_take(uint32_t *own, uint32_t *next, uint32_t *sour
 /* Numbers the edges and corners of a cluster that no cluster before it contains, and its groups. A
    triangle with a repeated vertex has no edge in the topology: it becomes one edge feature, a
    segment. */
-static void cluster_number(const sdm_feature_builder *b, sdm_cluster_node *node, numbers *n)
+static void cluster_number(const sdm_feature_builder *b, sdm_cluster_node *node, next_numbers *n)
 {
     sdm_features *f = b->f;
     // both indexed by feature numbers
-    uint32_t *source = b->edge_source - f->edge_base, *vertex = b->vertex - f->corner_base;
+    uint32_t *source = b->edge_source - f->edge_base, *vertices = b->vertex - f->corner_base;
     node->edge = n->edge;
     node->corner = n->corner;
     for (uint32_t slot = node->first; slot < node->first + node->count; slot++) {
@@ -115,7 +115,7 @@ static void cluster_number(const sdm_feature_builder *b, sdm_cluster_node *node,
         f->owner[slot] = slot;
         // corners
         for (int k = 0; k < 3; k++) {
-            of[3 + k] = number_take(&b->corner[v[k]], &n->corner, vertex, v[k]);
+            of[3 + k] = number_take(&b->corner[v[k]], &n->corner, vertices, v[k]);
             f->owner[of[3 + k]] = slot;
         }
         // edges
@@ -153,7 +153,7 @@ static sdm_status clusters_fill(const sdm_feature_builder *b, sdm_arena *arena, 
     sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &list, b->m->n_tri, "features", err);
     if (s) return s;
     const size_t n = clusters_list(f, list);
-    numbers next = {f->edge_base, f->corner_base, 0};
+    next_numbers next = {f->edge_base, f->corner_base, 0};
     for (size_t i = 0; i < n; i++) cluster_number(b, list[i], &next);
     f->end = next.corner;
     s = sdm_budget_take(budget, next.group * sizeof *f->group, err);
@@ -220,7 +220,7 @@ sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const
     f->corner_base = (uint32_t)(n + segments + topo->n_edges);
     sdm_status s = builder_allocate(&b, arena, budget, err);
     if (!s) {
-        scale_set(&b);
+        surface_measure(&b);
         nodes_set(&b);
         s = clusters_fill(&b, arena, budget, err);
     }

@@ -20,29 +20,34 @@
 #include "mesh/point_triangle.h"
 #include "mesh/topology.h"
 
-/* Up to eight features of one kind, one per lane (corners: four, two lanes each), by their region
-   functions f[k](p) = g[k] . p + offset[k] with unit gradients. A point of the region satisfies
+/* A group: up to eight features of one kind of a cluster, one in each lane (corners: four, two
+   lanes each), given by their region functions f[k](p) = g[k] . p + offset[k]. Gradients have
+   length 1, or 0 where a function bounds nothing. p lies in the region of a
 
-   face       f[k] <= 0 for k = 0, 1, 2: distance outward across each edge in the plane of the face.
-              f[3] is the distance from that plane.
-   thin face  f[k] <= 0 for k = 0 ... 3: distances outward from a rectangle around the face, in its
+   face       if f[0], f[1], f[2] <= 0: distances outward across each edge, in the face's plane.
+              f[3] is the distance from this plane.
+   thin face  if f[0] ... f[3] <= 0: distances outward from a rectangle around the face, in its
               plane. For faces too narrow for float distances.
-   edge       abs(f[0]) <= most[0]: coordinate along the edge from its midpoint; most[0] is half the
-              length. f[1] <= most[1] and f[2] <= 0: distances inward across the edge into two of
-   its faces; most[1] = 0, or INFINITY for an edge without a usable face. f[3]: distance from the
-   plane of the first face; f[1] and f[3] are perpendicular, so the squared distance from the edge's
-   line is f[1]^2 + f[3]^2. Also (f[1] + f[2]) / 2 <= most[1]: a concave edge has no region, but a
-   block may still pass each half-space test; this one rejects it. corner     f[k] <= 0 for k = 0
-   ... 5: coordinate along an edge away from the corner. Row k of lane i holds f[k] for k < 3, row k
-   - 3 of lane i + SDM_CORNER_LANES the others; fewer than six edges are repeated. g[3] is the
-   position of the corner.
+   edge       if abs(f[0]) <= most[0]: coordinate along the edge from its midpoint; most[0] is
+              half its length;
+              and f[1] <= most[1], f[2] <= 0: distances inward across the edge into two of its
+              faces; most[1] = 0, or INFINITY for an edge without a face that is wide enough;
+              and (f[1] + f[2]) / 2 <= most[1]: implied for points, not for boxes. A concave
+              edge has no region, but a box may still pass each half-space test; this mean
+              rejects it.
+              f[3] is the distance from the plane of the first face. It is perpendicular to
+              f[1], so the squared distance from the edge's line is f[1]^2 + f[3]^2.
+   corner     if f[0] ... f[5] <= 0: coordinates along six of its edges, away from the corner.
+              If it has fewer edges, the first is repeated. The lane of the corner holds f[0] to
+              f[2]; rows 0 to 2 of the lane SDM_CORNER_LANES higher hold f[3] to f[5]. g[3] is
+              the position of the corner.
 
-   Unused lanes have offset[0] = INFINITY, so no point satisfies their conditions. */
+   Unused lanes have offset[0] = INFINITY: no point satisfies that. */
 typedef struct sdm_feature_group {
-    /* [k][coordinate][lane] */
+    /* gradients, [k][coordinate][lane] */
     _Alignas(64) float g[4][3][8];
     float offset[4][8];
-    /* largest values of functions 0 and 1 in the region */
+    /* edges: largest values of abs(f[0]) and f[1] in the region; others: 0 */
     float most[2][8];
     /* abs(gx) + abs(gy) + abs(gz) of g[k]; for k = 3 of edges, of (g[1] + g[2]) / 2 */
     float sum[4][8];
@@ -82,7 +87,7 @@ typedef struct sdm_cluster_node {
 } sdm_cluster_node;
 
 /* All features of a surface. Features are numbered: a face by the slot of its triangle, edges from
- * edge_base on, corners from corner_base to end - 1. */
+   edge_base on, corners from corner_base to end - 1. */
 typedef struct sdm_features {
     /* [nodes of the tree] */
     sdm_cluster_node *node;

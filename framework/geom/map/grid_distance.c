@@ -91,7 +91,7 @@ static void parts_set(const sdm_grid_job *job, const int64_t size[3], const int 
 }
 
 /* Upper bound on abs(x - sdm_features.centre) over the boxes of the grid, plus the radius of the
- * surface, scaled. */
+   surface, scaled. */
 static double grid_reach(const sdm_grid_job *job)
 {
     double reach = 0;
@@ -115,7 +115,7 @@ static int64_t voxel_index_in(const int64_t size[3], const int64_t at[3])
 }
 
 /* Fills the tables vector, voxel, voxel_in_tile and tile_voxel of the job. in_vector: the eight
- * voxels of a vector. */
+   voxels of a vector. */
 static void voxel_tables_set(sdm_grid_job *job, const sdm_grid_parts *in_vector)
 {
     const sdm_grid_parts *tiles = &job->part[SDM_TILES], *vectors = &job->part[SDM_VECTORS];
@@ -192,7 +192,7 @@ static double job_set_tables(sdm_grid_job *job)
 }
 
 /* sdm_grid_distance() voxel by voxel in double, for grids so far away or so large that float cannot
- * tell features apart. */
+   tell features apart. */
 static sdm_status distance_by_points(const sdm_grid_job *job, const sdm_grid *g,
                                      const sdm_exact_opts *opts, int n_threads, sdm_error *err)
 {

@@ -133,14 +133,14 @@ struct sdm_grid_scratch {
 };
 
 /* Allocates the members of fixed size of a zeroed scratch. Whatever happens, end with
- * sdm_grid_scratch_dispose(). */
+   sdm_grid_scratch_dispose(). */
 sdm_status sdm_grid_scratch_start(sdm_grid_scratch *scratch, sdm_error *err);
 
 /* Makes room for `cap` clusters of a box. Keeps node[] and node_blocks[], loses the other lists. */
 sdm_status sdm_grid_scratch_clusters(sdm_grid_scratch *scratch, size_t cap, sdm_error *err);
 
 /* Makes room for `cap` candidates of a block and keeps those present. SDM_E_NOMEM where the
- * scratch for features would take more than `limit` bytes (0: unlimited). */
+   scratch for features would take more than `limit` bytes (0: unlimited). */
 sdm_status sdm_grid_scratch_candidates(sdm_grid_scratch *scratch, size_t cap, size_t limit,
                                        sdm_error *err);
 

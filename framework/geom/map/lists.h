@@ -8,20 +8,20 @@
 #include "simd/lanes.h"
 
 /* Decodes a lane reference 8 * item + lane to one of n items. */
-static inline size_t lane_item(uint16_t ref, size_t n)
+static inline size_t lane_item(uint32_t ref, size_t n)
 {
-    (void)n; // without assertions
-    assert(ref / 8u < n);
-    return ref / 8u;
+    (void)n; // unused without assertions
+    assert(ref / 8 < n);
+    return ref / 8;
 }
-static inline uint32_t lane_of(uint16_t ref) { return ref % 8u; }
+static inline uint32_t lane_of(uint32_t ref) { return ref % 8; }
 
 /* Appends a reference to lane i of `item` for each bit i of mask: writes to list[n ...] (eight
    elements, whatever the mask) and returns the new length. `room`: length of the array. */
 static inline size_t lanes_append(const sdm_grid_job *job, uint16_t *list, size_t n, size_t room,
                                   size_t item, unsigned mask)
 {
-    (void)room; // without assertions
+    (void)room; // unused without assertions
     assert(n + 8 <= room && 8 * item + 7 <= UINT16_MAX && mask < 256);
     const uint16_t b = (uint16_t)(8 * item);
     v8u16 lanes;

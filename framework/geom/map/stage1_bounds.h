@@ -10,7 +10,7 @@
 #define SDM_TINY 1e-30f
 
 /* c + the largest change of a linear function with gradient g from the centre of a part to its
- * corners. */
+   corners. */
 static inline v8f extent_plus(const sdm_grid_parts *q, bool aligned, point8 g, v8f c)
 {
     if (aligned)
@@ -78,7 +78,7 @@ static inline cull8 cull_start(const sdm_grid_job *job, const sdm_grid_parts *q,
 }
 
 /* Largest distance from the centres at which a convex set in direction -h may hold the nearest
- * point of some point of the part. */
+   point of some point of the part. */
 static inline v8f cull_limit(const sdm_grid_parts *q, bool aligned, const cull8 *v, point8 h)
 {
     return v8_min(v8_min(v->band, extent_plus(q, aligned, h, v->corner)),
@@ -167,7 +167,7 @@ static void references_of_blocks(const sdm_features *f, point8 p, float referenc
 }
 
 /* Reference points of the tiles of a block, whose centres are p: the nearest centroids of the
- * block's clusters, where these are nearer than the given points. */
+   block's clusters, where these are nearer than the given points. */
 static void references_of_tiles(const sdm_features *f, const sdm_cluster_list *clusters, point8 p,
                                 float reference[3][8])
 {

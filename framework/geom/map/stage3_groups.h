@@ -8,7 +8,7 @@
 #include "stage1_bounds.h"
 
 /* Largest change of each function of a group from the centre of the block to its corners, where the
- * block is not a cube along x, y, z; replaces sdm_feature_group.sum, and block.half is 1. */
+   block is not a cube along x, y, z; replaces sdm_feature_group.sum, and block.half is 1. */
 static void group_extent(const block *b, int kind, const sdm_feature_group *group, float out[4][8])
 {
     const sdm_grid_parts *q = &b->job->part[SDM_BLOCKS];
@@ -21,7 +21,7 @@ static void group_extent(const block *b, int kind, const sdm_feature_group *grou
 }
 
 /* Constants of the block in all lanes. A copy, so that the compiler need not reload them after
- * stores. */
+   stores. */
 typedef struct block_test {
     const block *b;
     v8f minus_half, error;

@@ -8,7 +8,7 @@
 #include "regions.h"
 
 /* Prepares the feature in a lane of a group for the parts of the block: fills x, and returns its
- * functions at the centres of the tiles. to_voxel: sdm_grid_job.to_voxel. */
+   functions at the centres of the tiles. to_voxel: sdm_grid_job.to_voxel. */
 SDM_FOR_KIND functions8 block_feature_start(const sdm_grid_job *job, int kind, point8 to_voxel,
                                             const sdm_block_group *m, uint32_t lane,
                                             sdm_block_feature *x)

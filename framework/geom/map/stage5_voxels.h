@@ -19,15 +19,15 @@ static void candidates_clear(sdm_candidates *c)
     }
 }
 
-/* Squared distances in float of the voxels of vector v (8 tile + vector) to feature x; INFINITY for
+/* Squared distances in float of the voxels of a vector of a tile to feature x; INFINITY for
    voxels that are surely outside of its region. at[function][vector]: sdm_batch.at_vectors of the
    feature's tile pair. */
 SDM_FOR_KIND v8f feature_distances(const sdm_grid_job *job, int kind, const sdm_block_feature *x,
-                                   const float (*at)[8], uint32_t v, v8f error)
+                                   const float (*at)[8], uint32_t tile, uint32_t vector, v8f error)
 {
     v8f f[SDM_FUNCTIONS];
     for (int k = 0; k < functions_of(kind); k++)
-        f[k] = v8_add(v8_load(x->to_voxels[k]), v8_all(at[k][v % 8]));
+        f[k] = v8_add(v8_load(x->to_voxels[k]), v8_all(at[k][vector]));
     // excess: by how much a voxel lies outside of the region
     v8f d2 = v8_mul(f[3], f[3]), excess = f[0];
     if (kind == SDM_EDGES) {
@@ -40,7 +40,7 @@ SDM_FOR_KIND v8f feature_distances(const sdm_grid_job *job, int kind, const sdm_
     if (kind == SDM_CORNERS) {
         // The region test matters: without it an edge and its end corner would be ambiguous within
         // sqrt(error) of the end, instead of within error.
-        const point8 from = p8_add(p8_load((const float(*)[8])job->voxel[v / 8][v % 8].x),
+        const point8 from = p8_add(p8_load((const float(*)[8])job->voxel[tile][vector].x),
                                    p8_all(x->from[0], x->from[1], x->from[2]));
         d2 = p8_dot(from, from);
         excess = v8_max(v8_max(excess, f[3]), v8_max(f[4], f[5]));
@@ -73,11 +73,13 @@ SDM_FOR_KIND void batch_measure(const block *b, int kind)
     uint32_t end = (uint32_t)c->n;
     for (size_t i = 0; i < n; i++) {
         const size_t pair = lane_item(batch->vector_pair[i], batch->n_tile_pair);
-        const uint16_t tile = batch->tile_pair[pair];
-        const uint32_t v = 8 * lane_of(tile) + lane_of(batch->vector_pair[i]);
-        const sdm_block_feature *x = &batch->feature[lane_item(tile, batch->n_feature)];
+        const uint32_t of_tile = batch->tile_pair[pair];
+        const uint32_t tile = lane_of(of_tile), vector = lane_of(batch->vector_pair[i]);
+        const uint32_t v = 8 * tile + vector;
+        const sdm_block_feature *x = &batch->feature[lane_item(of_tile, batch->n_feature)];
         const uint32_t number = x->number, before = c->last[v];
-        const v8f d2 = feature_distances(b->job, kind, x, batch->at_vectors[pair], v, error);
+        const v8f d2 =
+            feature_distances(b->job, kind, x, batch->at_vectors[pair], tile, vector, error);
         // the distance of a thin face is too inaccurate in float: leave its voxels to stage 6
         unsigned voxels;
         if (kind == SDM_THIN_FACES)

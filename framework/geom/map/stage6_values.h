@@ -90,7 +90,7 @@ static inline v4d dot4(v4d ax, v4d bx, v4d ay, v4d by, v4d az, v4d bz)
 }
 
 /* Squared distances of four points, each from its own feature x[number[i]]. Same operations in the
- * same order as sdm_feature_distance2(), hence the same bits. */
+   same order as sdm_feature_distance2(), hence the same bits. */
 static inline void distances4(const sdm_feature *x, const uint32_t number[4], v4d px, v4d py,
                               v4d pz, double out[4])
 {
@@ -110,7 +110,7 @@ static inline void distances4(const sdm_feature *x, const uint32_t number[4], v4
 }
 
 /* Sets x->number: the candidate that is clearly nearest in float, or else the nearest one in
- * double.
+   double.
  */
 static void tile_choose(const tile *t, voxels *x)
 {
@@ -160,7 +160,7 @@ static void tile_measure(const tile *t, voxels *x)
 }
 
 /* Sets x->number and x->d2 of a tile without candidates: by a search of the tree, or as outside of
- * the narrow band. */
+   the narrow band. */
 static void tile_search(const tile *t, voxels *x)
 {
     for (unsigned i = 0; i < 64; i++) {

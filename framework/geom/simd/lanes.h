@@ -12,8 +12,8 @@
 #include <immintrin.h>
 #endif
 
-/* For functions with a parameter `kind`: inlined into a caller that passes a constant, they are
- * specialised for this kind of feature. */
+/* Always inlined: a function with a parameter `kind` (of feature) is compiled anew for each caller
+   that passes a constant. */
 #define SDM_FOR_KIND static inline __attribute__((always_inline))
 
 typedef uint16_t v8u16 __attribute__((vector_size(16)));

@@ -35,8 +35,7 @@ SDM_INLINE void d4_store_f(float *p, d4 a)
     d2_store_f(p + 2, d4_high(a));
 }
 
-/* Transposes n rows (n even) of four lanes to four arrays of n doubles: to[lane][i] = row[i][lane].
- */
+/* to[lane][i] = row[i][lane] for i < n, n even. */
 SDM_INLINE void d4_store_rows(const d4 *row, int n, double *const to[4])
 {
     for (int i = 0; i < n; i += 2) {

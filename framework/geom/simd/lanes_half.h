@@ -66,7 +66,7 @@ static inline v4f v4f_fma(v4f a, v4f b, v4f c) { return a * b + c; }
 #endif
 
 /* Memory is accessed as v4f, which may alias floats; the struct v8f may not. The same below for v2d
- * and v4d. */
+   and v4d. */
 static inline v8f v8_load(const float *p)
 {
     const v4f *v = (const v4f *)(const void *)p;

@@ -1,5 +1,5 @@
-/* Two doubles as one compiler vector (v2d): one register of SSE2 or NEON, so it needs no choice of
-   an instruction set at run time. */
+/* Two doubles as one compiler vector (v2d): one register of SSE2 or NEON, which every x86-64 or
+   ARM64 processor has, so code with it needs no choice of the instruction set at run time. */
 #ifndef SDM_GEOM_TWO_LANES_KERNEL_H
 #define SDM_GEOM_TWO_LANES_KERNEL_H
 
@@ -14,7 +14,7 @@
 
 typedef double v2d __attribute__((vector_size(16)));
 
-/* Always inlined: the compiler must not pass vectors through calls. */
+/* Always inlined: a call would pass vectors through memory. */
 #define SDM_INLINE static inline __attribute__((always_inline))
 
 SDM_INLINE v2d d2_all(double x) { return (v2d){x, x}; }

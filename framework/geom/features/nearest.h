@@ -12,10 +12,9 @@ typedef struct sdm_nearest {
     sdm_features features; /* for many points at once */
 } sdm_nearest;
 
-/* topo: of m, n->tree: its tree. The rest is taken from the low end of the arena; the budget (may
-   be NULL) is asked for the features, not for the frames. */
+/* topo: of m, n->tree: its tree. The rest is taken from the low end of the arena. */
 sdm_status sdm_nearest_build(const sdm_mesh *m, const sdm_topology *topo, sdm_arena *arena,
-                             sdm_nearest *n, sdm_budget *budget, sdm_error *err);
+                             sdm_nearest *n, sdm_error *err);
 
 /* Squared distance from x to the nearest triangle with a squared distance below `bound`; then
  *slot, q and *feature are set, else `bound` is returned and nothing is written. */

@@ -131,8 +131,7 @@ static sdm_feature_groups *choose_kernel(void)
     return sdm_feature_groups_generic;
 }
 
-static sdm_status fill_clusters(const sdm_feature_builder *b, sdm_arena *arena, sdm_budget *budget,
-                                sdm_error *err)
+static sdm_status fill_clusters(const sdm_feature_builder *b, sdm_arena *arena, sdm_error *err)
 {
     sdm_features *f = b->f;
     sdm_cluster_node **list;
@@ -142,34 +141,18 @@ static sdm_status fill_clusters(const sdm_feature_builder *b, sdm_arena *arena, 
     numbers next = {f->edge_base, f->corner_base, 0};
     for (size_t i = 0; i < n; i++) number_cluster(b, list[i], &next);
     f->end = next.corner;
-    s = sdm_budget_take(budget, next.group * sizeof *f->group, err);
-    if (!s) s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->group, next.group, "features", err);
+    s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->group, next.group, "features", err);
     if (s) return s;
     choose_kernel()(b, list, n);
     return SDM_OK;
 }
 
-/* All but the groups; the list of clusters is among it. */
-static size_t bytes_of(const sdm_feature_builder *b)
-{
-    const sdm_features *f = b->f;
-    const size_t n = b->m->n_tri, n_vert = b->m->n_vert, n_edge = f->corner_base - f->edge_base;
-    return n * (sizeof *b->narrow + sizeof *f->centroid + sizeof *f->of_slot +
-                sizeof(sdm_cluster_node *)) +
-           n_edge * (sizeof *b->origin + sizeof *b->segment) + b->topo->n_edges * sizeof *b->edge +
-           n_vert * (sizeof *b->vertex + sizeof *b->corner + sizeof *b->along) +
-           b->tree->n_node * sizeof *f->node +
-           (f->corner_base + n_vert) * (sizeof *f->exact + sizeof *f->owner);
-}
-
-static sdm_status allocate(sdm_feature_builder *b, sdm_arena *arena, sdm_budget *budget,
-                           sdm_error *err)
+static sdm_status allocate(sdm_feature_builder *b, sdm_arena *arena, sdm_error *err)
 {
     sdm_features *f = b->f;
     const size_t n = b->m->n_tri, n_vert = b->m->n_vert, n_edge = f->corner_base - f->edge_base;
-    sdm_status s = sdm_budget_take(budget, bytes_of(b), err);
     // one more: the place of the next one is written to
-    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->origin, n_edge + 1, "features", err);
+    sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->origin, n_edge + 1, "features", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->segment, n_edge, "features", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->vertex, n_vert + 1, "features", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->edge, b->topo->n_edges, "features", err);
@@ -188,8 +171,7 @@ static sdm_status allocate(sdm_feature_builder *b, sdm_arena *arena, sdm_budget 
 }
 
 sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree,
-                              sdm_arena *arena, sdm_frame *frames, sdm_features *f,
-                              sdm_budget *budget, sdm_error *err)
+                              sdm_arena *arena, sdm_frame *frames, sdm_features *f, sdm_error *err)
 {
     const size_t n = m->n_tri;
     sdm_feature_builder b = {.m = m, .topo = topo, .tree = tree, .frames = frames, .f = f};
@@ -202,11 +184,11 @@ sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const
                         "surface of %zu triangles: too many to number their edges and vertices", n);
     f->edge_base = (uint32_t)n;
     f->corner_base = (uint32_t)(n + segments + topo->n_edges);
-    sdm_status s = allocate(&b, arena, budget, err);
+    sdm_status s = allocate(&b, arena, err);
     if (!s) {
         measure(&b);
         fill_nodes(&b);
-        s = fill_clusters(&b, arena, budget, err);
+        s = fill_clusters(&b, arena, err);
     }
     sdm_arena_release(arena, SDM_HIGH, before);
     return s;

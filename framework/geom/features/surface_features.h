@@ -14,7 +14,6 @@
 
 #include <stdbool.h>
 
-#include "memory/budget.h"
 #include "mesh/bvh.h"
 #include "mesh/point_triangle.h"
 #include "mesh/topology.h"
@@ -82,9 +81,8 @@ static inline float sdm_cluster_middle(const sdm_cluster_node *c, int a)
 }
 
 /* Fills frames[slot], too: of triangle tree->order[slot] of m; topo: of m. Taken from the low end
-   of the arena; the budget (may be NULL) is asked before. */
+   of the arena. */
 sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree,
-                              sdm_arena *arena, sdm_frame *frames, sdm_features *f,
-                              sdm_budget *budget, sdm_error *err);
+                              sdm_arena *arena, sdm_frame *frames, sdm_features *f, sdm_error *err);
 
 #endif

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "grid_job.h"
-#include "memory/budget.h"
+#include "memory/cancel.h"
 #include "sdm/internal/processor.h"
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"

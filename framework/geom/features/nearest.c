@@ -6,12 +6,11 @@
 #include "feature_distance.h"
 
 sdm_status sdm_nearest_build(const sdm_mesh *m, const sdm_topology *topo, sdm_arena *arena,
-                             sdm_nearest *n, sdm_budget *budget, sdm_error *err)
+                             sdm_nearest *n, sdm_error *err)
 {
     const sdm_status s =
         SDM_TAKE_UNSET(arena, SDM_LOW, &n->frames, m->n_tri, "frames of triangles", err);
-    return s ? s
-             : sdm_features_build(m, topo, &n->tree, arena, n->frames, &n->features, budget, err);
+    return s ? s : sdm_features_build(m, topo, &n->tree, arena, n->frames, &n->features, err);
 }
 
 double sdm_nearest_find(const sdm_nearest *n, const double x[3], double bound, uint32_t *slot,

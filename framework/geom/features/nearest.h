@@ -14,10 +14,9 @@ typedef struct sdm_nearest {
 } sdm_nearest;
 
 /* Builds frames and features of mesh m, whose topology is topo and whose tree n->tree is set.
-   Memory comes from the low end of the arena; the features, not the frames, are reserved in the
-   budget (may be NULL). */
+   Memory comes from the low end of the arena, which charges the memory limit. */
 sdm_status sdm_nearest_build(const sdm_mesh *m, const sdm_topology *topo, sdm_arena *arena,
-                             sdm_nearest *n, sdm_budget *budget, sdm_error *err);
+                             sdm_nearest *n, sdm_error *err);
 
 /* Finds the triangle nearest to x (mm) among those with a squared distance < bound. Returns its
    squared distance and sets its slot, the closest point q and where on the triangle q lies

@@ -145,8 +145,7 @@ static sdm_feature_groups *groups_choose(void)
 }
 
 /* Numbers the features of all clusters, then allocates and fills their groups. */
-static sdm_status clusters_fill(const sdm_feature_builder *b, sdm_arena *arena, sdm_budget *budget,
-                                sdm_error *err)
+static sdm_status clusters_fill(const sdm_feature_builder *b, sdm_arena *arena, sdm_error *err)
 {
     sdm_features *f = b->f;
     sdm_cluster_node **list;
@@ -156,36 +155,19 @@ static sdm_status clusters_fill(const sdm_feature_builder *b, sdm_arena *arena, 
     next_numbers next = {f->edge_base, f->corner_base, 0};
     for (size_t i = 0; i < n; i++) cluster_number(b, list[i], &next);
     f->end = next.corner;
-    s = sdm_budget_take(budget, next.group * sizeof *f->group, err);
-    if (!s) s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->group, next.group, "features", err);
+    s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->group, next.group, "features", err);
     if (s) return s;
     groups_choose()(b, list, n);
     return SDM_OK;
 }
 
-/* Bytes of all arrays of the builder, with the list of clusters, but without the groups. */
-static size_t builder_bytes(const sdm_feature_builder *b)
-{
-    const sdm_features *f = b->f;
-    const size_t n = b->m->n_tri, n_vert = b->m->n_vert, n_edge = f->corner_base - f->edge_base;
-    return n * (sizeof *b->narrow + sizeof *f->centroid + sizeof *f->of_slot +
-                sizeof(sdm_cluster_node *)) +
-           n_edge * (sizeof *b->edge_source + sizeof *b->segment) +
-           b->topo->n_edges * sizeof *b->edge +
-           n_vert * (sizeof *b->vertex + sizeof *b->corner + sizeof *b->along) +
-           b->tree->n_node * sizeof *f->node +
-           (f->corner_base + n_vert) * (sizeof *f->exact + sizeof *f->owner);
-}
-
-/* Reserves and takes all arrays but the groups and the list of clusters. */
-static sdm_status builder_allocate(sdm_feature_builder *b, sdm_arena *arena, sdm_budget *budget,
-                                   sdm_error *err)
+/* Takes all arrays but the groups and the list of clusters. */
+static sdm_status builder_allocate(sdm_feature_builder *b, sdm_arena *arena, sdm_error *err)
 {
     sdm_features *f = b->f;
     const size_t n = b->m->n_tri, n_vert = b->m->n_vert, n_edge = f->corner_base - f->edge_base;
-    sdm_status s = sdm_budget_take(budget, builder_bytes(b), err);
     // one element more: number_take() also writes to the next one
-    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->edge_source, n_edge + 1, "features", err);
+    sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->edge_source, n_edge + 1, "features", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->segment, n_edge, "features", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->vertex, n_vert + 1, "features", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->edge, b->topo->n_edges, "features", err);
@@ -204,8 +186,7 @@ static sdm_status builder_allocate(sdm_feature_builder *b, sdm_arena *arena, sdm
 }
 
 sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree,
-                              sdm_arena *arena, sdm_frame *frames, sdm_features *f,
-                              sdm_budget *budget, sdm_error *err)
+                              sdm_arena *arena, sdm_frame *frames, sdm_features *f, sdm_error *err)
 {
     const size_t n = m->n_tri;
     sdm_feature_builder b = {.m = m, .topo = topo, .tree = tree, .frames = frames, .f = f};
@@ -218,11 +199,11 @@ sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const
                         "surface of %zu triangles: too many to number their edges and vertices", n);
     f->edge_base = (uint32_t)n;
     f->corner_base = (uint32_t)(n + segments + topo->n_edges);
-    sdm_status s = builder_allocate(&b, arena, budget, err);
+    sdm_status s = builder_allocate(&b, arena, err);
     if (!s) {
         surface_measure(&b);
         nodes_set(&b);
-        s = clusters_fill(&b, arena, budget, err);
+        s = clusters_fill(&b, arena, err);
     }
     sdm_arena_release(arena, SDM_HIGH, before);
     return s;

@@ -3,7 +3,7 @@
 
 #include <stdatomic.h>
 
-#include "memory/budget.h"
+#include "memory/cancel.h"
 #include "sdm/internal/threads.h"
 #include "sdm/internal/vec3.h"
 

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "grid_scratch.h"
-#include "memory/budget.h"
+#include "memory/cancel.h"
 #include "sdm/internal/processor.h"
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "memory/budget.h"
+#include "memory/cancel.h"
 #include "sdm/internal/rng.h"
 #include "sdm/memory.h"
 #include "sign.h"

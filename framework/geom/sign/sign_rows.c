@@ -1,7 +1,7 @@
 /* Parallel loop over tiles of grid rows. */
 #include "sign_rows.h"
 
-#include "memory/budget.h"
+#include "memory/cancel.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/threads.h"
 #include <stdatomic.h>

@@ -6,7 +6,7 @@
 
 #include "bench.h"
 #include "report/terminal.h"
-#include "sdm/internal/naive_map.h"
+#include "sdm/internal/brute_force.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/methods.h"

@@ -11,7 +11,7 @@
 
 #include "oracle/exact_meshes.h"
 #include "sdm/exact.h"
-#include "sdm/internal/naive_map.h"
+#include "sdm/internal/brute_force.h"
 #include "sdm/internal/processor.h"
 
 static sdm_grid grid_of(int64_t nx, int64_t ny, int64_t nz, double spacing, double x, double y,

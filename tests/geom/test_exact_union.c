@@ -12,7 +12,7 @@
 #include "oracle/exact_meshes.h"
 #include "oracle/exact_tools.h"
 #include "sdm/exact.h"
-#include "sdm/internal/naive_map.h"
+#include "sdm/internal/brute_force.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/rng.h"
 

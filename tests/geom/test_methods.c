@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "oracle/exact_meshes.h"
-#include "sdm/internal/naive_map.h"
+#include "sdm/internal/brute_force.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/methods.h"
 #include "sdm/internal/rng.h"

@@ -1,7 +1,7 @@
 /* Method "naive": the distance of every voxel to every triangle by brute force. Each row of voxels
  * is one part of the parallel loop, so a run can be cancelled and reports progress. */
 #include "method.h"
-#include "sdm/internal/naive_map.h"
+#include "sdm/internal/brute_force.h"
 
 static void naive_map_row(void *job, int64_t row, int thread)
 {

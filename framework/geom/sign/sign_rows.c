@@ -6,7 +6,7 @@
 #include "sdm/internal/threads.h"
 #include <stdatomic.h>
 
-#define TILE_ROWS 16 // a tile has up to TILE x TILE rows
+#define TILE_ROWS 16 // a tile has up to TILE_ROWS x TILE_ROWS rows
 // open meshes: voxels of a row in one tile; the array `base` then has at most 1 MiB per thread
 #define PIECE_MAX 1024
 // from this many boundary edges on point queries are faster: every box of voxels tests all edges

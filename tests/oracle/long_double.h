@@ -1,8 +1,8 @@
 /* Oracles of the exact engine in long double: every triangle of a mesh, nothing precomputed,
    nothing shared with the engine. Distance by regions (Ericson, Real-Time Collision Detection,
    2005, 5.1.5), winding number by solid angles (Van Oosterom and Strackee 1983). */
-#ifndef SDM_TEST_BRUTE_FORCE_H
-#define SDM_TEST_BRUTE_FORCE_H
+#ifndef SDM_TEST_LONG_DOUBLE_H
+#define SDM_TEST_LONG_DOUBLE_H
 
 #include <math.h>
 #include <stdbool.h>

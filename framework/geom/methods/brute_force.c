@@ -5,7 +5,7 @@
 #include <math.h>
 
 #include "sdm/exact.h"
-#include "sdm/internal/naive_map.h"
+#include "sdm/internal/brute_force.h"
 #include "sdm/internal/threads.h"
 
 typedef struct vec {

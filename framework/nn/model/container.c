@@ -110,6 +110,8 @@ sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *s
     if (version != SDM_CONTAINER_VERSION)
         return sdm_fail(err, SDM_E_FORMAT, "damaged: format version %llu",
                         (unsigned long long)version);
+
+    // sizes, checksum of the header
     if (length != size)
         return sdm_fail(err, SDM_E_FORMAT, "%s: %zu bytes, its header says %llu",
                         size < length ? "truncated" : "damaged", size, (unsigned long long)length);

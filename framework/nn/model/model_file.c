@@ -9,12 +9,16 @@ void sdm_model_describe(const sdm_model_info *i, const char *kind, sdm_text *t)
 {
     const sdm_accuracy *a = &i->accuracy;
     sdm_text_add(t, "kind=%s\nversion=%s\nshape=%s\n", kind, SDM_VERSION_TEXT, i->shape);
+
+    // grid and conventions
     sdm_text_add(t, "grid.size=%lld %lld %lld\n", (long long)i->grid.n[0], (long long)i->grid.n[1],
                  (long long)i->grid.n[2]);
     sdm_text_add_reals(t, "grid.origin", i->grid.origin, 3);
     sdm_text_add_reals(t, "grid.spacing", i->grid.spacing, 3);
     sdm_text_add_reals(t, "grid.direction", i->grid.dir, 9);
     sdm_text_add(t, "unit=mm\nsign=negative inside\nframe=LPS\n");
+
+    // parameters and options
     sdm_text_add(t, "params=%zu\n", i->n_params);
     for (size_t p = 0; p < i->n_params; p++) {
         const sdm_model_param *q = &i->params[p];
@@ -25,6 +29,8 @@ void sdm_model_describe(const sdm_model_info *i, const char *kind, sdm_text *t)
     for (size_t o = 0; o < i->n_options; o++)
         sdm_text_add(t, "option.name=%s\noption.value=%s\n", i->option_names[o],
                      i->option_values[o]);
+
+    // accuracy and training
     sdm_text_add(t, "accuracy.samples=%lld\n", (long long)a->samples);
     sdm_text_add_real(t, "accuracy.mse_mm2", a->mse_mm2);
     sdm_text_add_real(t, "accuracy.rmse_mm", a->rmse_mm);

@@ -58,6 +58,7 @@ void sdm_pod_blocks(const sdm_grid *grid, size_t block, const sdm_pod_levels *le
                 const size_t index[3] = {parent->at[0] / edge + (i & 1),
                                          parent->at[1] / edge + (i >> 1 & 1),
                                          parent->at[2] / edge + (i >> 2)};
+                // a child outside the grid does not exist
                 if (index[0] >= count[0] || index[1] >= count[1] || index[2] >= count[2]) continue;
                 *child++ = block_at(grid, edge, index);
                 parent->n_children++;

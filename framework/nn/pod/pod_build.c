@@ -38,6 +38,8 @@ static void pack_weights(const sdm_pod_spec *spec, const pod_integers *integers,
 {
     const sdm_pod_arch *a = &spec->arch;
     const size_t n_blocks = a->levels.first[a->levels.n];
+
+    // MLP
     size_t next = 0, of_layer = 0;
     for (size_t l = 0; l < a->depth; l++) {
         const size_t k = sdm_pod_layer_inputs(a, l);
@@ -100,6 +102,8 @@ static sdm_status file_build(const sdm_pod_spec *spec, const pod_integers *integ
     const size_t head_count = sdm_pod_count_weights(
         spec->type, a->n_coefficients, integers ? integers->wide[n_blocks] : 0, a->n_latent);
     const size_t mean_count = sdm_pod_mean_count(&a->levels, spec->blocks);
+
+    // slabs, leaves, index of the weights of each block
     pod_slab *slabs = NULL;
     pod_leaf *leaves = NULL;
     float *bias = NULL, *mean = NULL;
@@ -116,6 +120,8 @@ static sdm_status file_build(const sdm_pod_spec *spec, const pod_integers *integ
             sdm_pod_place_weights(spec->type, &a->levels, spec->blocks, slabs,
                                   sdm_pod_slabs(&a->levels, spec->blocks, a->block, slabs, leaves),
                                   leaves, integers ? integers->wide : NULL, at);
+
+    // memory for the sections
     if (!s) s = SDM_ALLOC(&mean, mean_count, "model weights", err);
     if (!s) s = SDM_ALLOC(&mlp, mlp_count * number, "model weights", err);
     if (!s) s = SDM_ALLOC(&bias, a->depth * a->width, "model weights", err);

@@ -351,6 +351,8 @@ void sdm_pod_decode(const pod_network *m, const sdm_grid *grid, size_t rows, siz
             const size_t o = (size_t)i * PART;
             head_product(m, rows, residuals, fixed, o, min_size(PART, coefficients - o), w);
         }
+
+        // slabs, SDM_POD_ROWS rows at a time
         sdm_pod_slab_scratch_carve(m, min_size(rows + 1, SDM_POD_ROWS),
                                    w->threads + (size_t)sdm_thread() * w->per_thread, &j.s);
 #pragma omp for schedule(dynamic)

@@ -137,6 +137,8 @@ void sdm_pod_latent(const sdm_model *model, const double *p, size_t n, size_t n_
 {
     const pod_network *m = model->network;
     const sdm_pod_arch *a = &m->arch;
+
+    // polynomials
     const size_t rows = n + n_directions, total = n_poly(m), width = sdm_panel_outputs(a->width);
     for (size_t r = 0; r < n; r++)
         polynomials(model, p + r * a->n_params, n_directions > 0, w, w->phi + r * total);

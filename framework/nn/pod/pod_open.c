@@ -87,6 +87,8 @@ static sdm_status blocks_set_up(const sdm_section *ranks, const sdm_grid *grid, 
         ranks->size / 4 != n_blocks || ranks->size % 4)
         return sdm_fail(err, SDM_E_FORMAT, "damaged: %zu ranks of blocks, the grid has %zu blocks",
                         ranks->size / 4, n_blocks);
+
+    // sizes, memory, blocks
     a->n_terms = terms;
     a->n_inputs = inputs - 1;
     a->n_latent = terms + (a->depth ? a->width : 0);
@@ -131,16 +133,20 @@ static sdm_status read_integer_tables(const sdm_section *sections, size_t n, sdm
         sdm_model_weights(model, sections, n, "pod.quantum", n_blocks * sizeof *m->quantum, err);
     if (!m->quantum) return SDM_E_FORMAT;
 
-    // order and limits
+    // memory
     sdm_status s = SDM_ALLOC(&m->wide, n_blocks + 1, "model blocks", err);
     if (!s)
         s = SDM_ALLOC(&m->to_integer, m->coefficients_at[a->levels.n] + SDM_PANEL, "model blocks",
                       err);
     if (s) return s;
+
+    // order of the head's columns
     for (size_t i = 0; i < a->n_latent; i++)
         if (m->order[i] >= a->n_latent)
             return sdm_fail(err, SDM_E_FORMAT, "damaged: latent variable %u of %zu", m->order[i],
                             a->n_latent);
+
+    // limits, scales of the MLP
     const size_t n_limits = a->levels.n + 1 + a->depth;
     const uint8_t *limits = sdm_model_weights(model, sections, n, "pod.limit", n_limits * 4, err);
     if (!limits) return SDM_E_FORMAT;
@@ -184,6 +190,8 @@ static sdm_status bind_weights(const sdm_section *sections, size_t n, sdm_model 
         const sdm_status s = read_integer_tables(sections, n, model, err);
         if (s) return s;
     }
+
+    // sections and their sizes
     const struct {
         const char *name;
         size_t size;
@@ -203,6 +211,8 @@ static sdm_status bind_weights(const sdm_section *sections, size_t n, sdm_model 
         data[i] = sdm_model_weights(model, sections, n, need[i].name, need[i].size, err);
         if (!data[i]) return SDM_E_FORMAT;
     }
+
+    // layers of the MLP, head, basis, mean map
     const uint8_t *mlp = data[0];
     for (size_t l = 0; l < a->depth; l++) {
         m->layer[l] = mlp;

@@ -127,6 +127,8 @@ static sdm_status survey_sample(survey *s, sdm_error *err)
 {
     const sdm_pod_arch *a = &s->spec->arch;
     const size_t top = a->levels.n - 1;
+
+    // memory for the latents, and for the outputs of a block of each level
     float *z = NULL, *c = NULL, *y[SDM_POD_MAX_LEVELS] = {NULL};
     sdm_status status = SDM_ALLOC(&z, N * a->n_latent, "integer weights", err);
     if (!status) status = SDM_ALLOC(&c, N * a->n_coefficients, "integer weights", err);
@@ -138,6 +140,8 @@ static sdm_status survey_sample(survey *s, sdm_error *err)
         }
         status = SDM_ALLOC(&y[l], N * most, "integer weights", err);
     }
+
+    // latents, coefficients of the highest level, then all blocks below
     if (!status) status = sample_latent(s->spec, z, err);
     if (!status) {
         const matrix m = sdm_pod_head_matrix(s);

@@ -19,8 +19,8 @@ size_t sdm_poly_count(size_t n, size_t degree)
     return c;
 }
 
-// Appends all products whose degrees in the variables v .. n - 1 add up to `left`; current[0 .. v -
-// 1] are the degrees of the other variables. Returns the end of the table.
+// Appends all products whose degrees in variables v .. n - 1 add up to `left`; the degrees of the
+// variables before v are in current[]. Returns the end of the table.
 static uint8_t *exponents_fill(size_t n, size_t v, size_t left, uint8_t *current, uint8_t *out)
 {
     if (v + 1 == n) {

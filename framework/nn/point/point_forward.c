@@ -137,6 +137,8 @@ static void points_forward(const point_network *k, const map_bias *b, size_t n, 
 {
     const sdm_point_arch *a = &k->arch;
     const size_t sets = jacobian ? 1 + a->n_params : 1, ld = pad(k->max_width);
+
+    // hidden layers; set 0: values, sets 1 .. P: derivatives
     float *in = w->h[0], *out = w->h[1];
     for (size_t l = 0; l < a->depth; l++) {
         const size_t width = a->width[l];

@@ -87,8 +87,8 @@ void sdm_sdmnn_pass_tangent(const sdmnn_plan *p, const sdmnn_layers *w, const fl
 }
 
 // Each feature map is the input of one step, which overwrites the gradient by it. The results of
-// the way down have two: the merge, whose step comes first in this reverse order and overwrites,
-// and the pooling, which adds.
+// the way down are inputs of two steps: the convolution after the merge, which comes first in this
+// reverse order and overwrites, and the pooling, which adds.
 void sdm_sdmnn_pass_backward(const sdmnn_plan *p, const sdmnn_layers *w, const float *maps,
                              const float *slope, const float *map, float *back, float *volume,
                              float *gradient, int n_threads)

@@ -35,6 +35,8 @@ sdm_status sdm_sdmnn_check(const sdm_sdmnn_arch *a, sdm_error *err)
         return sdm_fail(err, SDM_E_ARG, "activation %d: need 0 .. 2", a->activation);
     if (!(a->dropout >= 0 && a->dropout < 1))
         return sdm_fail(err, SDM_E_ARG, "drop-out %g: need 0 or more, below 1", a->dropout);
+
+    // grid
     size_t n[3] = {a->n[0], a->n[1], a->n[2]};
     for (int i = 0; i < 3; i++)
         if (n[i] < 1 || n[i] > 1048576)
@@ -46,6 +48,8 @@ sdm_status sdm_sdmnn_check(const sdm_sdmnn_arch *a, sdm_error *err)
         return sdm_fail(err, SDM_E_ARG,
                         "%zu x %zu x %zu voxels and %zu channels are too much for one network",
                         n[0], n[1], n[2], a->channels);
+
+    // levels
     for (size_t l = 0; l < a->depth; l++) {
         if (n[0] * n[1] * n[2] == 1)
             return sdm_fail(err, SDM_E_ARG,

@@ -51,6 +51,8 @@ sdm_status sdm_sdmnn_build(const sdm_sdmnn_spec *spec, uint8_t **bytes, size_t *
     if (s) return s;
     sdmnn_plan p;
     sdm_sdmnn_plan_make(&spec->arch, false, &p);
+
+    // sections
     const size_t weight = spec->half ? sizeof(uint16_t) : sizeof(float);
     const size_t n_dense = sdm_sdmnn_dense_floats(&p),
                  n_volume = sdm_panel_count(p.cells, spec->arch.width),

@@ -47,7 +47,7 @@ typedef struct sdm_block_feature {
     float to_vectors[SDM_FUNCTIONS][8];
     /* sdm_block_group.extent of its group, and its lane there */
     const float (*extent)[8];
-    uint32_t lane;
+    size_t lane;
     uint32_t number;
     /* edges: sdm_feature_group.most of functions 0 and 1 */
     float most[2];

@@ -10,19 +10,21 @@
 /* Prepares the feature in a lane of a group for the parts of the block: fills x, and returns its
    functions at the centres of the tiles. to_voxel: sdm_grid_job.to_voxel. */
 SDM_FOR_KIND functions8 block_feature_start(const sdm_grid_job *job, int kind, point8 to_voxel,
-                                            const sdm_block_group *m, uint32_t lane,
+                                            const sdm_block_group *m, size_t lane,
                                             sdm_block_feature *x)
 {
+    // a copy: the compiler would load m->group again after each v8_store()
+    const sdm_feature_group *group = m->group;
     functions8 tile;
-    x->number = m->number + lane;
+    x->number = m->number + (uint32_t)lane;
     x->extent = m->extent;
     x->lane = lane;
-    for (int k = 0; k < 2 && kind == SDM_EDGES; k++) x->most[k] = m->group->most[k][lane];
+    for (int k = 0; k < 2 && kind == SDM_EDGES; k++) x->most[k] = group->most[k][lane];
     for (int a = 0; a < 3 && kind == SDM_CORNERS; a++)
-        x->from[a] = m->cluster->shift[a] - m->group->g[3][a][lane];
+        x->from[a] = m->cluster->shift[a] - group->g[3][a][lane];
     // offsets of tiles are 4 times those of voxels, if the grid is self-similar
     for (int k = 0; k < functions_of(kind); k++) {
-        const v8f step = p8_dot(function_gradient(kind, m->group, k, lane), to_voxel);
+        const v8f step = p8_dot(function_gradient(kind, group, k, lane), to_voxel);
         v8_store(x->to_voxels[k], step);
         tile.f[k] = v8_fma(step, v8_all(4), v8_all(function_value(kind, m->at_block, k, lane)));
     }
@@ -31,7 +33,7 @@ SDM_FOR_KIND functions8 block_feature_start(const sdm_grid_job *job, int kind, p
         const point8 vectors = p8_load((const float(*)[8])job->part[SDM_VECTORS].centre.x);
         const point8 tiles = p8_load((const float(*)[8])job->part[SDM_TILES].centre.x);
         for (int k = 0; k < functions_of(kind); k++) {
-            const point8 g = function_gradient(kind, m->group, k, lane);
+            const point8 g = function_gradient(kind, group, k, lane);
             v8_store(x->to_vectors[k], p8_dot(g, vectors));
             tile.f[k] = p8_linear(g, tiles, v8_all(function_value(kind, m->at_block, k, lane)));
         }
@@ -54,7 +56,7 @@ SDM_FOR_KIND void batch_test_tiles(block *b, int kind)
     unsigned met = 0;
     size_t n = 0;
     for (size_t i = 0; i < n_feature; i++) {
-        const uint32_t lane = lane_of(p->feature[i]);
+        const size_t lane = lane_of(p->feature[i]);
         const sdm_block_group *m = &p->group[lane_item(p->feature[i], n_group)];
         sdm_block_feature *x = &batch->feature[i];
         const functions8 f = block_feature_start(job, kind, to_voxel, m, lane, x);
@@ -81,7 +83,7 @@ SDM_FOR_KIND void batch_test_vectors(const block *b, int kind)
     size_t n = 0;
     for (size_t i = 0; i < n_tile_pair; i++) {
         // the functions at the centres of the tile's vectors
-        const uint32_t t = lane_of(batch->tile_pair[i]);
+        const size_t t = lane_of(batch->tile_pair[i]);
         const sdm_block_feature *x = &batch->feature[lane_item(batch->tile_pair[i], n_feature)];
         const float(*step)[8] = similar ? x->to_voxels : x->to_vectors;
         functions8 f;

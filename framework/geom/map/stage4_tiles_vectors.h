@@ -30,8 +30,8 @@ SDM_FOR_KIND functions8 block_feature_start(const sdm_grid_job *job, int kind, p
     }
     // else each level has its own offsets
     if (!job->self_similar) {
-        const point8 vectors = p8_load((const float(*)[8])job->part[SDM_VECTORS].centre.x);
-        const point8 tiles = p8_load((const float(*)[8])job->part[SDM_TILES].centre.x);
+        const point8 vectors = p8_load(job->part[SDM_VECTORS].centre.x);
+        const point8 tiles = p8_load(job->part[SDM_TILES].centre.x);
         for (int k = 0; k < functions_of(kind); k++) {
             const point8 g = function_gradient(kind, group, k, lane);
             v8_store(x->to_vectors[k], p8_dot(g, vectors));
@@ -50,7 +50,7 @@ SDM_FOR_KIND void batch_test_tiles(block *b, int kind)
     const sdm_grid_job *job = b->job;
     const sdm_pending *p = &b->scratch->pending[kind];
     const size_t n_feature = p->n, n_group = p->n_group;
-    const point8 to_voxel = p8_load((const float(*)[8])job->to_voxel.x);
+    const point8 to_voxel = p8_load(job->to_voxel.x);
     const v8f minus_half = v8_all(-b->half[SDM_TILES]), error = v8_all(b->error);
     sdm_batch *batch = b->scratch->batch;
     unsigned met = 0;
@@ -97,8 +97,8 @@ SDM_FOR_KIND void batch_test_vectors(const block *b, int kind)
             v8f d2 = v8_mul(f.f[3], f.f[3]);
             if (kind == SDM_EDGES) d2 = v8_fma(f.f[1], f.f[1], d2);
             if (kind == SDM_CORNERS) {
-                const point8 from = p8_add(p8_load((const float(*)[8])job->vector[t].x),
-                                           p8_all(x->from[0], x->from[1], x->from[2]));
+                const point8 from =
+                    p8_add(p8_load(job->vector[t].x), p8_all(x->from[0], x->from[1], x->from[2]));
                 d2 = p8_dot(from, from);
             }
             excess = v8_max(excess, v8_sub(d2, v8_load(b->far2[t])));

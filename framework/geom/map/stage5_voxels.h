@@ -40,8 +40,8 @@ SDM_FOR_KIND v8f feature_distances(const sdm_grid_job *job, int kind, const sdm_
     if (kind == SDM_CORNERS) {
         // The region test matters: without it an edge and its end corner would be ambiguous within
         // sqrt(error) of the end, instead of within error.
-        const point8 from = p8_add(p8_load((const float(*)[8])job->voxel[tile][vector].x),
-                                   p8_all(x->from[0], x->from[1], x->from[2]));
+        const point8 from =
+            p8_add(p8_load(job->voxel[tile][vector].x), p8_all(x->from[0], x->from[1], x->from[2]));
         d2 = p8_dot(from, from);
         excess = v8_max(v8_max(excess, f[3]), v8_max(f[4], f[5]));
     }

@@ -17,8 +17,8 @@ typedef struct block {
     // [tile][vector]: a feature whose squared distance from the vector's centre is larger is not
     // the nearest one of any of its voxels
     _Alignas(32) float far2[8][8];
-    // [level]: factor of sdm_block_group.extent that bounds the change of a function within the
-    // block (SDM_BLOCKS), a tile or a vector
+    // [level]: half[level] * sdm_block_group.extent bounds the change of a function from the centre
+    // of the block (SDM_BLOCKS), a tile or a vector to its corners
     float half[SDM_PART_LEVELS];
 } block;
 
@@ -30,9 +30,9 @@ static inline bool block_is_cube(const sdm_grid_job *job)
     return job->aligned && half[0] == half[1] && half[0] == half[2];
 }
 
-/* Factor k of the bound on float distances. With e = block.error, distances d are off by 2 e at
-   most, so abs(error of d^2) <= 4 (d + 1) e. Comparing two of them doubles it: k (d + 1), k = 8 e.
- */
+/* Two squared distances in float that differ by less than k (d + 1) may have either order; returns
+   k = 8 e for e = block.error. For abs(error of d) <= 2 e, so abs(error of d^2) <= 4 (d + 1) e, and
+   twice that for two of them. */
 static inline float ambiguity(float error) { return 8 * error; }
 
 #endif

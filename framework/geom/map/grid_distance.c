@@ -12,7 +12,7 @@
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
 
-// Largest extent of grid and surface, in longest edges: beyond it float cannot tell features apart.
+// Largest grid_reach(), in about longest edges: beyond it float cannot tell features apart.
 #define REACH_MAX 1e5
 
 static sdm_grid_kernel *kernel_choose(void)

@@ -20,8 +20,8 @@ typedef struct sdm_cluster_ref {
     float shift[3];
 } sdm_cluster_ref;
 
-/* A group of features, at least one of whose regions meets the current block: one feature per lane.
- */
+/* A group of features with its region functions relative to the current block; the regions of some
+   of its features meet the block. */
 typedef struct sdm_block_group {
     /* region functions at the centre of the block, [row][lane] */
     _Alignas(64) float at_block[4][8];
@@ -47,7 +47,7 @@ typedef struct sdm_block_feature {
     float to_vectors[SDM_FUNCTIONS][8];
     /* sdm_block_group.extent of its group, and its lane there */
     const float (*extent)[8];
-    uint32_t lane;
+    size_t lane;
     uint32_t number;
     /* edges: sdm_feature_group.most of functions 0 and 1 */
     float most[2];
@@ -119,7 +119,7 @@ typedef struct sdm_cluster_list {
 struct sdm_grid_scratch {
     /* clusters of the current box: indices of their nodes */
     uint32_t *node;
-    /* bit k: node[i] may hold the nearest feature of a point of block k */
+    /* bit k of node_blocks[i]: node[i] may hold the nearest feature of a point of block k */
     uint8_t *node_blocks;
     /* the same as one list for each block of the box */
     sdm_cluster_list block[8];

@@ -8,13 +8,13 @@
 #include "simd/lanes.h"
 
 /* Decodes a lane reference 8 * item + lane to one of n items. */
-static inline size_t lane_item(uint32_t ref, size_t n)
+static inline size_t lane_item(size_t ref, size_t n)
 {
     (void)n; // unused without assertions
     assert(ref / 8 < n);
     return ref / 8;
 }
-static inline uint32_t lane_of(uint32_t ref) { return ref % 8; }
+static inline size_t lane_of(size_t ref) { return ref % 8; }
 
 /* Appends a reference to lane i of `item` for each bit i of mask: writes to list[n ...] (eight
    elements, whatever the mask) and returns the new length. `room`: length of the array. */

@@ -15,24 +15,23 @@ SDM_FOR_KIND int functions_of(int kind) { return kind == SDM_CORNERS ? SDM_FUNCT
 /* Row of function k in the arrays of a group, and its lane for the feature in lane `lane`: corners
    keep functions 3 to 5 in the upper half of rows 0 to 2. */
 SDM_FOR_KIND int function_row(int kind, int k) { return kind == SDM_CORNERS ? k % 3 : k; }
-SDM_FOR_KIND uint32_t function_lane(int kind, int k, uint32_t lane)
+SDM_FOR_KIND size_t function_lane(int kind, int k, size_t lane)
 {
     assert(lane < (kind == SDM_CORNERS ? SDM_CORNER_LANES : 8));
-    return kind == SDM_CORNERS ? lane + SDM_CORNER_LANES * (uint32_t)(k / 3) : lane;
+    return kind == SDM_CORNERS ? lane + SDM_CORNER_LANES * (size_t)(k / 3) : lane;
 }
 
 /* Element of function k in an array [row][lane] of a group. */
-SDM_FOR_KIND float function_value(int kind, const float (*x)[8], int k, uint32_t lane)
+SDM_FOR_KIND float function_value(int kind, const float (*x)[8], int k, size_t lane)
 {
     return x[function_row(kind, k)][function_lane(kind, k, lane)];
 }
 
 /* Gradient of function k in all lanes of the result. */
-SDM_FOR_KIND point8 function_gradient(int kind, const sdm_feature_group *group, int k,
-                                      uint32_t lane)
+SDM_FOR_KIND point8 function_gradient(int kind, const sdm_feature_group *group, int k, size_t lane)
 {
     const float(*g)[8] = group->g[function_row(kind, k)];
-    const uint32_t l = function_lane(kind, k, lane);
+    const size_t l = function_lane(kind, k, lane);
     return p8_all(g[0][l], g[1][l], g[2][l]);
 }
 
@@ -45,8 +44,8 @@ typedef struct functions8 {
    (value at the part's centre - largest value in the region - largest change within the part). A
    part meets the region only if the result is <= error. extent, lane: see sdm_block_feature.
    minus_half: -block.half of the parts. most: edges only. */
-SDM_FOR_KIND v8f region_excess(int kind, const functions8 *x, const float (*extent)[8],
-                               uint32_t lane, v8f minus_half, const float most[2])
+SDM_FOR_KIND v8f region_excess(int kind, const functions8 *x, const float (*extent)[8], size_t lane,
+                               v8f minus_half, const float most[2])
 {
     v8f all = x->f[0];
     for (int k = 0;

@@ -6,8 +6,8 @@
 #include "grid_scratch.h"
 #include "simd/lanes.h"
 
-#define SDM_CULL 1e-3f // relative margin: more than two errors of v8_rsqrt()
-#define SDM_TINY 1e-30f
+#define SDM_CULL 1e-3f  // relative margin: more than two errors of v8_rsqrt()
+#define SDM_TINY 1e-30f // keeps divisors positive
 
 /* c + the largest change of a linear function with gradient g from the centre of a part to its
    corners. */
@@ -52,12 +52,12 @@ typedef struct cull8 {
     v8f band;
 } cull8;
 
-/* q: the level of the parts; reference[3][8]: their reference points. */
+/* centre, reference: the centres of eight parts and their reference points. q: their level. */
 static inline cull8 cull_start(const sdm_grid_job *job, const sdm_grid_parts *q, point8 centre,
-                               const float reference[3][8])
+                               const sdm_points *reference)
 {
     point8 g;
-    const v8f d = length8(p8_sub(centre, p8_load(reference)), &g);
+    const v8f d = length8(p8_sub(centre, p8_load(reference->x)), &g);
     const v8f r = v8_all(q->radius);
     // distance of the farthest corner from the reference point <= d + min(r, exact difference)
     v8f more = r;
@@ -102,9 +102,9 @@ typedef struct centroid8 {
     v8i slot;
 } centroid8;
 
-static inline centroid8 centroids_start(point8 p, const float reference[3][8])
+static inline centroid8 centroids_start(point8 p, const sdm_points *reference)
 {
-    const point8 w = p8_sub(p, p8_load(reference));
+    const point8 w = p8_sub(p, p8_load(reference->x));
     return (centroid8){p8_dot(w, w), v8_all_i(-1)};
 }
 
@@ -123,25 +123,26 @@ static inline void centroids_compare(const sdm_features *f, const sdm_cluster_no
 
 /* Replaces the reference points for which a nearer centroid was found. */
 static inline void centroids_finish(const sdm_features *f, const centroid8 *best,
-                                    float reference[3][8])
+                                    sdm_points *reference)
 {
     uint32_t slot[8];
     v8_store_i(slot, best->slot);
     for (int i = 0; i < 8; i++)
         for (int a = 0; a < 3 && slot[i] != SDM_NONE; a++)
-            reference[a][i] = f->centroid[slot[i]][a];
+            reference->x[a][i] = f->centroid[slot[i]][a];
 }
 
 /* Reference points of the blocks of a box, whose centres are p: the nearest centroids of the whole
    surface, by a walk of the tree. reference: in, points of the surface; out, nearest centroids
    where these are nearer. */
-static void references_of_blocks(const sdm_features *f, point8 p, float reference[3][8])
+static void references_of_blocks(const sdm_features *f, point8 p, sdm_points *reference)
 {
-    _Alignas(32) float x[3][8];
-    p8_store(x, p);
-    // parts 0 and 7 lie opposite: twice the centre of the box
-    const float twice_centre[3] = {x[0][0] + x[0][7], x[1][0] + x[1][7], x[2][0] + x[2][7]};
-    centroid8 best = centroids_start(p, (const float(*)[8])reference);
+    sdm_points at;
+    p8_store(at.x, p);
+    // parts 0 and 7 lie opposite to each other: twice the centre of the box
+    float twice_centre[3];
+    for (int a = 0; a < 3; a++) twice_centre[a] = at.x[a][0] + at.x[a][7];
+    centroid8 best = centroids_start(p, reference);
     uint32_t stack[SDM_BVH_DEPTH];
     int top = 0;
     stack[top++] = 0;
@@ -169,9 +170,9 @@ static void references_of_blocks(const sdm_features *f, point8 p, float referenc
 /* Reference points of the tiles of a block, whose centres are p: the nearest centroids of the
    block's clusters, where these are nearer than the given points. */
 static void references_of_tiles(const sdm_features *f, const sdm_cluster_list *clusters, point8 p,
-                                float reference[3][8])
+                                sdm_points *reference)
 {
-    centroid8 best = centroids_start(p, (const float(*)[8])reference);
+    centroid8 best = centroids_start(p, reference);
     for (size_t i = 0; i < clusters->n; i++) {
         const sdm_cluster_node *node = &f->node[clusters->list[i]];
         const point8 b = vector_from_box(node, p);

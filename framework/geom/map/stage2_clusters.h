@@ -6,8 +6,7 @@
 #include "lists.h"
 #include "stage1_bounds.h"
 
-/* Mask of the parts for which the features below a node may include the nearest one of some point.
- */
+/* Mask of the parts that contain a point whose nearest feature may lie below the node. */
 static inline int node_parts(const sdm_grid_parts *q, bool aligned, const cull8 *v,
                              const sdm_cluster_node *node)
 {

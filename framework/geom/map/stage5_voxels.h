@@ -23,7 +23,7 @@ static void candidates_clear(sdm_candidates *c)
    voxels that are surely outside of its region. at[function][vector]: sdm_batch.at_vectors of the
    feature's tile pair. */
 SDM_FOR_KIND v8f feature_distances(const sdm_grid_job *job, int kind, const sdm_block_feature *x,
-                                   const float (*at)[8], uint32_t tile, uint32_t vector, v8f error)
+                                   const float (*at)[8], size_t tile, size_t vector, v8f error)
 {
     v8f f[SDM_FUNCTIONS];
     for (int k = 0; k < functions_of(kind); k++)
@@ -40,8 +40,8 @@ SDM_FOR_KIND v8f feature_distances(const sdm_grid_job *job, int kind, const sdm_
     if (kind == SDM_CORNERS) {
         // The region test matters: without it an edge and its end corner would be ambiguous within
         // sqrt(error) of the end, instead of within error.
-        const point8 from = p8_add(p8_load((const float(*)[8])job->voxel[tile][vector].x),
-                                   p8_all(x->from[0], x->from[1], x->from[2]));
+        const point8 from =
+            p8_add(p8_load(job->voxel[tile][vector].x), p8_all(x->from[0], x->from[1], x->from[2]));
         d2 = p8_dot(from, from);
         excess = v8_max(v8_max(excess, f[3]), v8_max(f[4], f[5]));
     }
@@ -52,8 +52,8 @@ SDM_FOR_KIND v8f feature_distances(const sdm_grid_job *job, int kind, const sdm_
    Returns the mask of the voxels to which it may be the nearest: d2 < min * share + slack, where
    min is the smallest squared distance so far, k = ambiguity(), share = 1 + k and slack = 2 k. This
    is a bound on min + k (sqrt(min) + 1) that needs no root. */
-SDM_FOR_KIND unsigned candidate_compare(sdm_candidates *c, uint32_t v, v8i number, v8f d2,
-                                        v8f slack, v8f share)
+SDM_FOR_KIND unsigned candidate_compare(sdm_candidates *c, size_t v, v8i number, v8f d2, v8f slack,
+                                        v8f share)
 {
     const v8f first = v8_load(c->first[v]), nearest = v8_min(d2, first);
     v8_store(c->second[v], v8_min(v8_load(c->second[v]), v8_max(d2, first)));
@@ -73,9 +73,9 @@ SDM_FOR_KIND void batch_measure(const block *b, int kind)
     uint32_t end = (uint32_t)c->n;
     for (size_t i = 0; i < n; i++) {
         const size_t pair = lane_item(batch->vector_pair[i], batch->n_tile_pair);
-        const uint32_t of_tile = batch->tile_pair[pair];
-        const uint32_t tile = lane_of(of_tile), vector = lane_of(batch->vector_pair[i]);
-        const uint32_t v = 8 * tile + vector;
+        const size_t of_tile = batch->tile_pair[pair];
+        const size_t tile = lane_of(of_tile), vector = lane_of(batch->vector_pair[i]);
+        const size_t v = 8 * tile + vector;
         const sdm_block_feature *x = &batch->feature[lane_item(of_tile, batch->n_feature)];
         const uint32_t number = x->number, before = c->last[v];
         const v8f d2 =

@@ -1,5 +1,5 @@
-/* Stage 6: from the candidates of a tile to the values of its voxels, in double. Part of map.inc.
- */
+/* Stage 6: chooses the nearest candidate of each voxel of a tile, computes its distance in double
+   and writes it. Part of map.inc. */
 #ifndef SDM_GEOM_MAP_STAGE6_VALUES_H
 #define SDM_GEOM_MAP_STAGE6_VALUES_H
 
@@ -48,8 +48,8 @@ static inline void voxel_position(const tile *t, unsigned i, double p[3])
     for (int a = 0; a < 3; a++) p[a] = t->corner[a] + t->job->tile_voxel[a][i];
 }
 
-/* Nearest triangle of the whole surface by a search of the tree: returns its slot, sets the squared
-   distance. Where there is no candidate. */
+/* Searches the tree for the nearest triangle of the whole surface, for voxels without a candidate.
+   Returns its slot, which is the number of its face, and sets the squared distance. */
 static uint32_t nearest_in_tree(const tile *t, const double p[3], double *d2)
 {
     const sdm_nearest *n = t->job->surface;
@@ -109,9 +109,8 @@ static inline void distances4(const sdm_feature *x, const uint32_t number[4], v4
     v4_store(out, v4_if_negative(u[3], v4_mul(s, s), dot4(rx, rx, ry, ry, rz, rz)));
 }
 
-/* Sets x->number: the candidate that is clearly nearest in float, or else the nearest one in
-   double.
- */
+/* Sets x->number of all voxels: the candidate that is clearly nearest in float, or else the one
+   that is nearest in double. */
 static void tile_choose(const tile *t, voxels *x)
 {
     const sdm_grid_job *job = t->job;
@@ -148,7 +147,7 @@ static void tile_choose(const tile *t, voxels *x)
 /* Sets x->d2 of all voxels from x->number. */
 static void tile_measure(const tile *t, voxels *x)
 {
-    const double(*at)[64] = (const double(*)[64])t->job->tile_voxel;
+    const double(*at)[64] = t->job->tile_voxel;
     const double *c = t->corner;
     uint32_t number[64];
     for (int i = 0; i < 64; i++) number[i] = x->number[i] == SDM_NONE ? 0 : x->number[i];

@@ -25,7 +25,7 @@ sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape,
         const sdm_config_range *range = &config->shape.ranges[r];
         const int i = sdm_instance_param_index(shape, range->name);
         sdm_config_where(config, range->mark, where);
-        // no such parameter: suggest the one with the most similar name
+        // no such parameter: suggest the most similar name
         if (i < 0) {
             const char *names[SDM_MAX_PARAMS];
             for (size_t k = 0; k < n && k < SDM_MAX_PARAMS; k++) names[k] = params[k].name;
@@ -35,6 +35,7 @@ sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape,
                             sdm_instance_shape(shape)->name, range->name,
                             near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
         }
+        // narrowing is allowed, widening is not
         if (!(range->min >= params[i].min && range->max <= params[i].max &&
               range->min < range->max))
             return sdm_fail(err, SDM_E_CONFIG,

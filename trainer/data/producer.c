@@ -39,6 +39,7 @@ static void *worker_run(void *user)
     workbench w = {0};
     sdm_error err = {0};
     const sdm_status made = trainer_workbench_create(&w, d, &err);
+    // claim the next sample
     pthread_mutex_lock(&p->lock);
     for (;;) {
         while (!p->stop && p->next < p->end &&
@@ -47,6 +48,7 @@ static void *worker_run(void *user)
         if (p->stop || p->next >= p->end) break;
         const size_t index = p->next++, place = index % WINDOW;
         pthread_mutex_unlock(&p->lock);
+        // compute it without the lock
         double *params = p->params + place * d->n_params;
         sdm_sample_params(d->seed, STREAM_TRAIN, trainer_sample_plan_point(&d->plan, index), d->min,
                           d->max, d->n_params, params);
@@ -55,6 +57,7 @@ static void *worker_run(void *user)
                  : trainer_workbench_packed_map(&w, d, params, p->maps + place * d->n_voxels,
                                                 &p->scale[place], &err);
         pthread_mutex_lock(&p->lock);
+        // publish it
         p->done[place] = true;
         if (s && index < p->failed) {
             p->failed = index;
@@ -79,11 +82,13 @@ sdm_status trainer_producer_start(dataset *d, size_t first, int n_threads, produ
     p->end = d->n_start + d->n_online;
     p->allowed = d->plan.n_planned;
     p->failed = SIZE_MAX;
+    // window and locks
     pthread_mutex_init(&p->lock, NULL);
     pthread_cond_init(&p->made, NULL);
     pthread_cond_init(&p->taken, NULL);
     s = SDM_ALLOC(&p->params, WINDOW * d->n_params, "sample window", err);
     if (!s) s = SDM_ALLOC(&p->maps, WINDOW * d->n_voxels, "sample window", err);
+    // workers: fewer than asked for are enough
     for (; !s && p->n_workers < n_threads && p->n_workers < MAX_WORKERS; p->n_workers++) {
         if (pthread_create(&p->workers[p->n_workers], NULL, worker_run, p)) {
             if (p->n_workers == 0)
@@ -121,6 +126,7 @@ sdm_status trainer_producer_take(producer *p, size_t until, sdm_error *err)
     if (until > p->end) until = p->end;
     while (p->base < until) {
         const size_t place = p->base % WINDOW;
+        // wait for the sample
         pthread_mutex_lock(&p->lock);
         while (!p->done[place]) pthread_cond_wait(&p->made, &p->lock);
         const bool failed = p->base == p->failed;
@@ -136,6 +142,7 @@ sdm_status trainer_producer_take(producer *p, size_t until, sdm_error *err)
         memcpy(d->maps + slot * d->n_voxels, p->maps + place * d->n_voxels,
                d->n_voxels * sizeof *d->maps);
         d->scale[slot] = p->scale[place];
+        // free the place
         pthread_mutex_lock(&p->lock);
         p->done[place] = false;
         p->base++;

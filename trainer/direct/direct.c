@@ -125,8 +125,10 @@ static sdm_status direct_run(trainer *t, bool resumed, sdm_error *err)
     if (!s && trainer_by_time(t)) s = trainer_export_time(t, &d->export_seconds, err);
     trainer_speed speed = trainer_speed_start(t);
     for (double at; !s && (at = direct_fraction(t, d)) < 1;) {
+        // new maps, or stop
         if ((s = trainer_samples_take(t, trainer_samples_wanted(t, at), err))) break;
         if (trainer_cancelled(t)) return trainer_stop(t, err);
+        // one step
         const double rate = c->train.learning_rate * trainer_rate_schedule(at, c->train.warmup);
         if ((s = direct_step(t, d, rate, err))) break;
         // evaluate, report, save

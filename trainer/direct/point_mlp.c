@@ -63,6 +63,7 @@ void trainer_point_forward(const sdm_point_arch *a, const float *w, size_t batch
 {
     const point_arrays p = point_arrays_of(a, batch, workspace);
     const size_t n_u = a->n_params + 3;
+    // hidden layers
     for (size_t l = 0; l < a->depth; l++) {
         const size_t width = a->width[l], k = sdm_point_inputs(a, l),
                      before = sdm_point_hidden(a, l);

@@ -31,6 +31,7 @@ static void tridiagonalise(size_t n, double *a, double *d, double *e, double *wo
 {
 #define A(i, j) a[(i)*n + (j)]
     for (size_t i = n - 1; i > 0; i--) {
+        // scaled row i; a zero row needs no reflection
         double h = 0, scale = 0;
         if (i > 1)
             for (size_t k = 0; k < i; k++) scale += fabs(A(i, k));
@@ -43,6 +44,7 @@ static void tridiagonalise(size_t n, double *a, double *d, double *e, double *wo
             A(i, k) /= scale;
             h += A(i, k) * A(i, k);
         }
+        // Householder vector in row i
         const double f0 = A(i, i - 1), g0 = f0 >= 0 ? -sqrt(h) : sqrt(h);
         e[i] = scale * g0;
         h -= f0 * g0;
@@ -112,6 +114,7 @@ static int ql_iterate(size_t n, double *d, double *e, double *v)
                     e[m] = 0;
                     break;
                 }
+                // rotation of rows i and i + 1 of the tridiagonal matrix
                 s = f / r, c = g / r;
                 g = d[i + 1] - p;
                 r = (d[i] - g) * s + 2 * c * b;
@@ -306,6 +309,7 @@ sdm_status trainer_leading_eigenvectors(size_t n, const float *c, size_t k, uint
         for (size_t j = 0; j < wide; j++)
             ritz[i * wide + j] = 0.5 * ((double)small[i * wide + j] + small[j * wide + i]);
     if ((s = trainer_eigen_symmetric(wide, ritz, all, err))) goto done;
+    // back to n dimensions: the k leading ones
     for (size_t i = 0; i < wide * wide; i++) small[i] = (float)ritz[i];
     sdm_gemm(k, n, wide, (sdm_view){small, wide, 1}, (sdm_view){x, n, 1}, false, basis, n, 1);
     memcpy(values, all, k * sizeof *values);

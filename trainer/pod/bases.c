@@ -14,8 +14,8 @@
 #include "sdm/memory.h"
 #include "state/progress.h"
 
-/* At most this many maps are used: more change the error of the bases on unseen shapes by a few per
-   cent only. */
+/* At most this many maps are used. More would reduce the error of the bases on unseen shapes by a
+   few per cent only. */
 enum { BASES_MAPS = 4096 };
 
 typedef struct candidate {
@@ -198,6 +198,7 @@ static sdm_status upper_levels_of_tree(basis_work *m, size_t root, sdm_error *er
             child += sum_ranks(pod, pod->blocks[b].child,
                                pod->blocks[b].child + pod->blocks[b].n_children);
         }
+        // coefficients of this level
         const size_t ldh = sum_ranks(pod, tree.first[level], tree.end[level]);
         child = 0;
         for (size_t b = tree.first[level]; b < tree.end[level] && !s; b++) {

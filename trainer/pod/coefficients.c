@@ -70,6 +70,7 @@ sdm_status trainer_coefficients_project(const pod_state *pod, bool holdout, cons
     const sdm_pod_levels *levels = &pod->arch.levels;
     const long begin = (long)levels->first[levels->n - 1], end = (long)levels->first[levels->n];
     const size_t chunk = n < CHUNK ? n : CHUNK;
+    // one tree per iteration; maps in chunks, to limit the scratch memory
     bool short_of_memory = false;
 #pragma omp parallel for schedule(dynamic) num_threads(trainer_threads(pod->t))
     for (long root = begin; root < end; root++) {

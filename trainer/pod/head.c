@@ -116,6 +116,7 @@ sdm_status trainer_head_solve(const pod_state *pod, const float *w, float *head,
         sdm_gemm(latents, k, rows, (sdm_view){z + at * latents, 1, latents}, (sdm_view){y, k, 1},
                  at > 0, right, k, trainer_threads(pod->t));
     }
+    // solve the normal equations
     if (!s) s = head_factorise(pod, n, z, factor, err);
     if (!s) s = head_substitute(pod, factor, right, head, err);
     sdm_free(slots);

@@ -166,11 +166,13 @@ sdm_status trainer_mode_fit_run(pod_state *pod, sdm_error *err)
     sdm_status s = mode_batch_create(pod, batch, &b, err);
     trainer_speed speed = trainer_speed_start(t);
     for (double at; !s && (at = mode_fit_fraction(pod)) < 1;) {
+        // new maps, or stop
         if ((s = trainer_samples_take(t, trainer_samples_wanted(t, at), err))) break;
         if (trainer_cancelled(t)) {
             s = trainer_stop(t, err);
             break;
         }
+        // one step
         const double rate = c->train.learning_rate * trainer_rate_schedule(at, c->train.warmup);
         mode_fit_step(pod, &b, batch, rate);
         t->step++, t->phase_step++;

@@ -87,6 +87,7 @@ static sdm_status fit_polynomials(pod_state *pod, size_t n, const float *c, sdm_
     if (!s) s = SDM_ALLOC(&a, f * f, "polynomial fit", err);
     if (!s) s = SDM_ALLOC(&b, f * r, "polynomial fit", err);
     if (s) goto done;
+    // normal equations
     sdm_gemm(f, f, n, (sdm_view){pod->phi, 1, pod->n_poly}, (sdm_view){pod->phi, pod->n_poly, 1},
              false, gram, f, pod->t->n_threads);
     sdm_gemm(f, r, n, (sdm_view){pod->phi, 1, pod->n_poly}, (sdm_view){c, r, 1}, false, right, r,
@@ -122,6 +123,7 @@ static sdm_status project_holdout(pod_state *pod, sdm_error *err)
     sdm_status s = SDM_ALLOC(&y, h * k, "held-out targets", err);
     if (!s) s = SDM_ALLOC(&c, h * r, "held-out targets", err);
     if (!s) s = SDM_ALLOC(&targets, h, "held-out targets", err);
+    // mode coefficients of the held-out maps
     if (!s) s = trainer_dataset_first_slots(h, &slots, err);
     if (!s) s = trainer_coefficients_project(pod, true, slots, h, y, err);
     if (!s) {
@@ -188,6 +190,7 @@ sdm_status trainer_modes_make(pod_state *pod, size_t n, sdm_error *err)
                                   pod->modes, err);
     if (!s) {
         modes_from_coefficients(pod, n, y, c);
+        // inputs and target rows of the slots
         for (size_t i = 0; i < n; i++) {
             pod_phi(pod, pod->t->data.params + i * pod->t->data.n_params,
                     pod->phi + i * pod->n_poly);

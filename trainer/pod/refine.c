@@ -20,7 +20,7 @@
 /* Adam step sizes, relative to the typical size of a weight. Found by trial on the cochlea; within
    a factor of three of the best. */
 #define HEAD_STEP 0.05f // times pod->deviation
-#define BASIS_STEP 0.3f // / sqrt(outputs of the block)
+#define BASIS_STEP 0.3f // divided by sqrt(outputs of the block)
 #define MEAN_STEP 0.05f // mm
 
 /* Memory of a batch. */
@@ -298,6 +298,7 @@ sdm_status trainer_refine_evaluate(const pod_state *pod, const float *w, double 
     double sum = 0;
     for (size_t at = 0; at < d->n_holdout && !s; at += ROWS) {
         const size_t rows = d->n_holdout - at < ROWS ? d->n_holdout - at : ROWS;
+        // coefficients of the next held-out maps
         const float *phi[ROWS];
         for (size_t i = 0; i < rows; i++) phi[i] = pod->holdout_phi + (at + i) * pod->n_poly;
         trainer_head_latent(pod, w, rows, phi, b.x, b.z, b.workspace);
@@ -379,11 +380,13 @@ sdm_status trainer_refine_run(pod_state *pod, sdm_error *err)
     trainer_speed speed = trainer_speed_start(t);
     double at = refine_fraction(t, end);
     while (!s && at < 1) {
+        // new maps, or stop
         if ((s = trainer_samples_take(t, t->data.n_start + t->data.n_online, err))) break;
         if (trainer_cancelled(t)) {
             s = trainer_stop(t, err);
             break;
         }
+        // one step
         const double rate = c->train.refine_rate * trainer_rate_schedule(at, c->train.warmup);
         if ((s = refine_step(pod, &b, rate, err))) break;
         t->step++, t->phase_step++;

@@ -56,6 +56,7 @@ sdm_status trainer_checkpoint_write(trainer *t, sdm_error *err)
     char path[SDM_PATH_TEXT_MAX + 32];
     checkpoint_path(t, path, sizeof path);
     const parameters *p = t->kind->weights(t);
+    // counters and configuration
     const counters now = {.seconds = trainer_seconds(t),
                           .phase_started = t->phase_started,
                           .last_evaluation = t->last_evaluation,
@@ -69,6 +70,7 @@ sdm_status trainer_checkpoint_write(trainer *t, sdm_error *err)
                           .bases = t->kind->fingerprint(t)};
     sdm_text config = {0};
     sdm_status s = trainer_export_dump(t, &config, err);
+    // sections; the sample plan only where it depends on observations
     const sdm_section sections[] = {
         {"meta", "kind=checkpoint\n", 16},
         {"config", config.data, config.size},
@@ -334,6 +336,7 @@ sdm_status trainer_checkpoint_weights(trainer *t, sdm_error *err)
     if (!found) return sdm_fail(err, SDM_E_IO, "%s/checkpoint.sdmc: it has gone", t->folder);
     counters then;
     memcpy(&then, section_find(&o, "checkpoint")->data, sizeof then);
+    // refuse weights that belong to other maps
     if (then.bases != t->kind->fingerprint(t))
         s = sdm_fail(err, SDM_E_CONFIG,
                      "%s/checkpoint.sdmc: the maps differ from those it was written with "

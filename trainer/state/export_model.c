@@ -65,6 +65,7 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
         square += here;
         each[i] = sqrt(here / (double)d->n_voxels);
     }
+    // means and quantiles
     if (!s) {
         const double voxels = (double)n * (double)d->n_voxels;
         qsort(each, n, sizeof *each, compare_doubles);

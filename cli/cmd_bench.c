@@ -34,12 +34,14 @@ static sdm_status measure_exact(const cli_args *args, sdm_error *err)
     sdm_json j = {0};
     sdm_status s = SDM_ALLOC(&cases, N_CASES, "cases", err);
     if (!s && args->growth) sdm_json_open(&j, NULL, '[');
+    // measure the cases
     for (size_t i = 0; i < n && !s; i++) {
         s = measure_case(args, args->growth ? refine[i] : 1, args->growth ? scale[i] : 1, &cases[i],
                          &rows[i], err);
         if (!s && args->json) cli_bench_json(&j, &cases[i], &rows[i]);
     }
     if (!s && args->growth) sdm_json_close(&j, ']');
+    // print the result
     if (!s && args->json)
         s = cli_print_json(&j, err);
     else if (!s && args->growth)

@@ -57,18 +57,21 @@ static void fill_json(sdm_json *j, const char *file, const sdm_model_info *info,
     sdm_json_text(j, "shape", info->shape);
     sdm_json_int(j, "samples", (int64_t)e->n);
     sdm_json_uint(j, "seed", seed);
+    // errors of the distance
     sdm_json_real(j, "mse_mm2", e->mse_mm2);
     sdm_json_real(j, "rmse_mm", e->rmse_mm);
     sdm_json_real(j, "mae_mm", e->mae_mm);
     sdm_json_real(j, "max_abs_mm", e->max_abs_mm);
     sdm_json_real(j, "rmse_near_mm", e->rmse_near_mm);
     sdm_json_real(j, "dice", e->dice);
+    // distances between the surfaces
     sdm_json_real(j, "surface_mean_mm", e->surface_mean_mm);
     sdm_json_real(j, "surface_hausdorff_mm", e->surface_hausdorff_mm);
     sdm_json_real(j, "surface_hausdorff_max_mm", e->surface_hausdorff_max_mm);
     sdm_json_int(j, "surfaces", (int64_t)e->n_surface);
     sdm_json_int(j, "worst", (int64_t)e->worst);
     sdm_json_real(j, "worst_mse_mm2", e->sample[e->worst].mse_mm2);
+    // times
     sdm_json_real(j, "ms_network", t->ms_network);
     sdm_json_real(j, "ms_network_batch", t->ms_batch);
     sdm_json_int(j, "batch", (int64_t)t->batch_size);

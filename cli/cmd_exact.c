@@ -113,6 +113,7 @@ static void show_progress(void *user, double share)
 /* Computes the map with a method other than the exact engine. */
 static sdm_status run_method(job *j, sdm_error *err)
 {
+    // the grid
     const sdm_method *method = sdm_method_find(j->args->method, err);
     if (!method) return SDM_E_ARG;
     sdm_audit audit;
@@ -121,6 +122,7 @@ static sdm_status run_method(job *j, sdm_error *err)
     if (!s) s = SDM_ALLOC(&j->values, sdm_grid_count(&j->grid), "distance map", err);
     if (s) return s;
 
+    // the map
     progress_state w = {.title = method->name};
     const sdm_method_opts opts = {.exact = {.sign = find_sign_method(j->args->sign),
                                             .keep_overlap = j->args->keep_overlap,
@@ -134,6 +136,7 @@ static sdm_status run_method(job *j, sdm_error *err)
     s = method->map(&j->mesh, &j->grid, &opts, j->values, &report, err);
     cli_progress_clear(&w.bar);
     if (s) return s;
+    // the report
     j->report = report.exact;
     j->ms_build = report.ms_prepare;
     j->ms_query = report.ms_map;
@@ -220,6 +223,7 @@ static sdm_status print_json(const job *j, sdm_error *err)
     char hash[32];
     snprintf(hash, sizeof hash, "%016llx",
              (unsigned long long)sdm_crc64(0, j->values, voxels * sizeof *j->values));
+    // method and times
     sdm_json json = {0};
     sdm_json_open(&json, NULL, '{');
     sdm_json_text(&json, "method", j->args->method);
@@ -228,10 +232,12 @@ static sdm_status print_json(const job *j, sdm_error *err)
     sdm_json_real(&json, "ms_build", j->ms_build);
     sdm_json_real(&json, "ms_query", j->ms_query);
     sdm_json_real(&json, "ms_total", j->ms_build + j->ms_query);
+    // sizes
     sdm_json_int(&json, "voxels", (int64_t)voxels);
     sdm_json_int(&json, "triangles", (int64_t)j->report.audit.n_tri);
     sdm_json_int(&json, "triangles_used", (int64_t)j->report.n_tri_used);
     sdm_json_int(&json, "threads", sdm_threads((int)j->args->threads));
+    // signs, union and defects of the mesh
     sdm_json_text(&json, "sign_method", sdm_sign_method_name(j->report.sign));
     sdm_json_bool(&json, "union", j->report.unioned);
     sdm_json_real(&json, "union_error_mm", j->report.union_error_mm);
@@ -241,6 +247,7 @@ static sdm_status print_json(const job *j, sdm_error *err)
     sdm_json_int(&json, "boundary_edges", (int64_t)j->report.audit.boundary_edges);
     sdm_json_int(&json, "nonmanifold_edges", (int64_t)j->report.audit.nonmanifold_edges);
     sdm_json_int(&json, "degenerate", (int64_t)j->report.audit.degenerate);
+    // values
     sdm_json_real(&json, "min_mm", (double)min);
     sdm_json_real(&json, "max_mm", (double)max);
     sdm_json_int(&json, "inside_voxels", inside);

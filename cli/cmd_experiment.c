@@ -107,6 +107,7 @@ static sdm_status measure_rows(const cli_experiment_run *run, sdm_error *err)
     sdm_error why = {0};
     sdm_status first = SDM_OK;
     size_t failed = 0;
+    // the rows
     cli_experiment_log_start(run);
     for (size_t i = 0; i < run->e->n_rows && first != SDM_E_CANCELLED; i++) {
         sdm_error one = {0};
@@ -117,8 +118,10 @@ static sdm_status measure_rows(const cli_experiment_run *run, sdm_error *err)
         first = s;
         why = one;
     }
+    // figures that need several rows
     cli_experiment_fit_finish(run);
     find_speedups(run);
+    // the tables
     sdm_text markdown = {0};
     sdm_json json = {0};
     sdm_status s =

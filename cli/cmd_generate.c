@@ -140,7 +140,7 @@ static sdm_status prepare_job(job *j, sdm_error *err)
     if (!s && !args->rows) s = cli_row_files_check(args, 1, err);
     if (!s) s = open_shape(j, err);
     if (!s) s = check_rows(j, err);
-    // the file names of the last row are the longest
+    // with --params: the names of the last row, which are the longest
     if (!s && args->rows) s = cli_row_files_check(args, j->n_rows, err);
     return s ? s : allocate_maps(j, err);
 }
@@ -238,6 +238,7 @@ static sdm_status make_row(job *j, size_t row, sdm_error *err)
         .check = args->check,
         .max_error_mm = args->max_error,
         .max_error_of = find_statistic(args)};
+    // the map
     double *p = j->rows + row * j->info->n_params;
     sdm_result result = {0};
     const double start = sdm_clock();

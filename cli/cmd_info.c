@@ -21,6 +21,7 @@ static void print_model(const char *path, const sdm_model_info *m)
     printf("grid         %lld x %lld x %lld voxels of %g x %g x %g mm, origin %g %g %g (LPS)\n",
            (long long)g->n[0], (long long)g->n[1], (long long)g->n[2], g->spacing[0], g->spacing[1],
            g->spacing[2], g->origin[0], g->origin[1], g->origin[2]);
+    // parameters and options
     for (size_t i = 0; i < m->n_params; i++)
         printf("%s %-18s %.6g .. %.6g%s%s, default %.6g\n", i ? "            " : "parameters  ",
                m->params[i].name, m->params[i].min, m->params[i].max, *m->params[i].unit ? " " : "",
@@ -70,6 +71,7 @@ static sdm_status json_model(const char *path, const sdm_model_info *m, sdm_erro
     sdm_json_text(&j, "shape", m->shape);
     sdm_json_text(&j, "version", m->version);
     cli_json_grid(&j, "grid", &m->grid, false);
+    // parameters and options
     sdm_json_open(&j, "parameters", '[');
     for (size_t i = 0; i < m->n_params; i++) {
         sdm_json_open(&j, NULL, '{');
@@ -85,6 +87,7 @@ static sdm_status json_model(const char *path, const sdm_model_info *m, sdm_erro
     for (size_t i = 0; i < m->n_options; i++)
         sdm_json_text(&j, m->option_names[i], m->option_values[i]);
     sdm_json_close(&j, '}');
+    // accuracy, training and file
     json_accuracy(&j, &m->accuracy);
     sdm_json_uint(&j, "seed", m->seed);
     sdm_json_real(&j, "train_seconds", m->train_seconds);

@@ -162,6 +162,7 @@ static void json_options(sdm_json *j, const sdm_shape *shape)
  * with these options: the parameters of some shapes depend on them. */
 static sdm_status print_shape(const cli_args *args, const sdm_registry *registry, sdm_error *err)
 {
+    // the shape
     const char *name = args->files.items[0];
     const sdm_shape *shape = cli_find_shape(registry, name, err);
     if (!shape) return SDM_E_ARG;
@@ -172,6 +173,7 @@ static sdm_status print_shape(const cli_args *args, const sdm_registry *registry
     }
     size_t n = shape->n_params;
     const sdm_param *params = instance ? sdm_instance_params(instance, &n) : shape->params;
+    // print it
     sdm_status s = SDM_OK;
     if (args->json) {
         sdm_json json = {0};

@@ -141,6 +141,7 @@ static sdm_status store_value(cli_args *args, const cli_option *o, const char *v
     int64_t integer = 0;
     double real = 0;
     switch (o->kind) {
+    // texts
     case CLI_FLAG:
         *(bool *)field = true;
         return SDM_OK;
@@ -156,6 +157,7 @@ static sdm_status store_value(cli_args *args, const cli_option *o, const char *v
         if (!is_choice(o->choices, value)) return bad_value(o, value, err);
         *(const char **)field = value;
         return SDM_OK;
+    // numbers
     case CLI_INT:
         if (!sdm_parse_int(value, &integer) || !in_range(o, (double)integer))
             return bad_value(o, value, err);
@@ -284,6 +286,7 @@ static bool asks_for_help(int argc, char **argv)
 
 sdm_status cli_parse(int argc, char **argv, cli_args *args, sdm_error *err)
 {
+    // the command
     memset(args, 0, sizeof *args);
     set_defaults(args);
     if (argc < 2) return sdm_fail(err, SDM_E_ARG, "a command is needed; see sdmgen --help");
@@ -293,6 +296,7 @@ sdm_status cli_parse(int argc, char **argv, cli_args *args, sdm_error *err)
         args->help = true;
         return SDM_OK;
     }
+    // options and positional arguments; after "--" all arguments are positional
     sdm_status s = make_lists(argc, args, err);
     bool options_end = false;
     for (int i = 2; i < argc && !s; i++) {
@@ -305,6 +309,7 @@ sdm_status cli_parse(int argc, char **argv, cli_args *args, sdm_error *err)
     }
     if (s) return s;
 
+    // the number of positional arguments
     const cli_command *c = args->command;
     if (args->files.n < c->min_files)
         return sdm_fail(err, SDM_E_ARG, "usage: sdmgen %s %s", c->name, c->synopsis);

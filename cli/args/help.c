@@ -87,6 +87,7 @@ static void add_roff(sdm_text *out, const char *text)
 static void add_man_command(sdm_text *out, size_t command)
 {
     const cli_command *c = &cli_commands[command];
+    // heading, summary and details
     sdm_text_add(out, ".SS \"");
     add_roff(out, c->name);
     sdm_text_add(out, " ");
@@ -101,6 +102,7 @@ static void add_man_command(sdm_text *out, size_t command)
     }
     for (size_t i = 0; i < cli_n_options; i++) {
         if (!cli_option_fits(&cli_options[i], command)) continue;
+        // an option
         char form[128];
         sdm_text_add(out, ".TP\n.B \"");
         add_roff(out, option_form(&cli_options[i], form));

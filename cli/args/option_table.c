@@ -17,96 +17,93 @@
 
 const cli_command cli_commands[CLI_N_COMMANDS] = {
     {"train", "CONFIG [key=value ...]", "train a network on the shape of a configuration",
-     "Reads the YAML configuration, makes exact maps, trains the network and writes a run folder:\n"
-     "config.yaml (resolved), metrics.jsonl, checkpoint.sdmc, model.sdm, loss.png and slices.png.\n"
+     "Reads the YAML configuration, makes exact maps, trains the network and writes a run\n"
+     "folder: config.yaml (resolved), metrics.jsonl, checkpoint.sdmc, model.sdm, loss.png\n"
+     "and slices.png.\n"
      "key=value overrides a key of the configuration, e.g. network.depth=4.\n"
      "An interrupt (Ctrl-C) writes a checkpoint and stops; a second one stops at once.\n"
-     "A folder that holds a model or a checkpoint stays unchanged unless --resume or --force is\n"
-     "given.",
+     "A folder that holds a model or a checkpoint stays unchanged unless --resume or --force\n"
+     "is given.",
      "sdmgen train configs/cochlea.yaml train.minutes=5 --out runs/short", 1, SIZE_MAX},
     {"generate", "MODEL [-p name=value ...] -o FILE", "make distance maps with a trained network",
      "Parameters without -p have the model's default. The ending of FILE selects the output:\n"
-     ".vdb (level set), .nii .nii.gz .nrrd .mha .npy (image), .ply .stl .obj .off (zero surface),\n"
-     ".png (three slices). With --params each row of the table makes one output; the number of "
-     "the\n"
-     "row replaces %d (or %04d) in FILE, or is appended to the name.",
+     ".vdb (level set), .nii .nii.gz .nrrd .mha .npy (image), .ply .stl .obj .off (zero\n"
+     "surface), .png (three slices). With --params each row of the table makes one output;\n"
+     "the number of the row replaces %d (or %04d) in FILE, or is appended to the name.",
      "sdmgen generate runs/cochlea/model.sdm -p a=4.2 -p alpha=0.6 -o cochlea.vdb -o "
      "cochlea.nii.gz",
      1, 1},
     {"exact", "--shape NAME | --mesh FILE [-o FILE]", "compute an exact distance map",
-     "Computes the signed distance of every voxel to a shape or to a mesh file (.ply .stl .obj\n"
-     ".off, mm). A surface that overlaps itself stands for the union of the volumes it encloses.\n"
-     "Without grid options the grid is fitted to the mesh: 64 voxels along the longest edge of "
-     "its\n"
-     "bounding box, with a margin of a tenth of that edge on every side.",
+     "Computes the signed distance of every voxel to a shape or to a mesh file (.ply .stl\n"
+     ".obj .off, mm). A surface that overlaps itself stands for the union of the volumes it\n"
+     "encloses. Without grid options the grid is fitted to the bounding box of the mesh, with\n"
+     "a margin of a tenth of its longest edge on every side: 64 voxels along that edge,\n"
+     "margins included.",
      "sdmgen exact --shape cochlea -p a=4.2 --size 60,50,50 --spacing 0.2 -o cochlea.nrrd", 0, 0},
     {"mesh", "--shape NAME [-p name=value ...] [-o FILE]", "write the surface mesh of a shape",
      NULL, "sdmgen mesh --shape torus -o torus.ply --audit", 0, 0},
     {"eval", "MODEL", "measure a network on new random shapes",
-     "Draws random shapes that the training did not use and compares the network with the exact\n"
-     "engine: errors of the distance, overlap of the volumes inside (Dice), distances between the\n"
-     "zero surfaces, and the time per map on one core.",
+     "Draws random shapes that the training did not use and compares the network with the\n"
+     "exact engine: errors of the distance, overlap of the volumes inside (Dice), distances\n"
+     "between the zero surfaces, and the time per map on one core.",
      "sdmgen eval runs/cochlea/model.sdm --samples 100 --json", 1, 1},
     {"shapes", "[NAME]", "list the shapes, or the parameters and options of one", NULL,
      "sdmgen shapes cochlea", 0, 1},
     {"info", "FILE", "describe the content of a model, level set, image or mesh file", NULL,
      "sdmgen info runs/cochlea/model.sdm", 1, 1},
     {"verify", "FILE", "check a model, level set or image file",
-     "A model: checks all checksums and, if the shape is known, measures the accuracy again on\n"
-     "random shapes; exit code 4 if the RMSE is more than 25 % above the stated one.\n"
+     "A model: checks all checksums and, if the shape is known, measures the accuracy again\n"
+     "on random shapes; exit code 4 if the RMSE is more than 25 % above the stated one.\n"
      "A .vdb: checks the hash of its values and runs OpenVDB's checkLevelSet.\n"
-     "An image (.nii .nrrd .mha ...): checks that it is complete and, if it is compressed, the\n"
-     "checksum of gzip or zlib.",
+     "An image (.nii .nrrd .mha ...): checks that it is complete and, if it is compressed,\n"
+     "the checksum of gzip or zlib.",
      "sdmgen verify runs/cochlea/model.sdm --samples 50", 1, 1},
     {"config", "[CONFIG] [key=value ...]", "check, print or explain a configuration",
      "Checks the configuration, the options of the shape and the ranges. --dump prints the\n"
-     "configuration with every key resolved; --keys lists every key with type, range, default and\n"
-     "meaning.",
+     "configuration with every key resolved; --keys lists every key with type, range,\n"
+     "default and meaning.",
      "sdmgen config configs/cochlea.yaml network.depth=4 --dump", 0, SIZE_MAX},
     {"bench", "exact | network MODEL", "measure speed, as times and ratios",
-     "exact: time, memory and error of the exact engine, of the other methods (see exact "
-     "--method)\n"
-     "and of other programs for the same map, by default the cochlea on 60 x 50 x 50 voxels of\n"
-     "0.2 mm. All rows but one use a single thread. The other programs are files\n"
-     "sdmgen-peer-NAME in the folder of sdmgen or in libexec/sdmgen; missing ones are listed.\n"
-     "network: one map, a batch and derivatives of a model on one core, compared with the exact\n"
-     "engine if the shape is known and its data files exist.\n"
+     "exact: time, memory and error of the exact engine, of the other methods (see exact\n"
+     "--method) and of other programs for the same map, by default the cochlea on 60 x 50 x\n"
+     "50 voxels of 0.2 mm. All rows but one use a single thread. The other programs are\n"
+     "files sdmgen-peer-NAME in the folder of sdmgen or in libexec/sdmgen; missing ones are\n"
+     "listed.\n"
+     "network: one map, a batch and derivatives of a model on one core, compared with the\n"
+     "exact engine if the shape is known and its data files exist.\n"
      "A time is the fastest of several runs.",
      "sdmgen bench exact", 1, 2},
     {"experiment", "CONFIG [key=value ...]",
      "compare methods in one table, beside published figures",
-     "Trains the networks of the experiment or loads those that exist, times every method on one\n"
-     "core, measures the errors on random shapes that no network was trained on, draws slices and\n"
-     "surfaces, and writes table.md, table.csv, table.json and log.txt.\n"
-     "key=value overrides a key of the experiment (experiment.samples=20) or of every training\n"
-     "(train.minutes=1). A row that fails has its reason in the table, the other rows continue, "
-     "and\n"
-     "the exit code reports the failure. The same command resumes a stopped experiment.",
+     "Trains the networks of the experiment or loads those that exist, times every method on\n"
+     "one core, measures the errors on random shapes that no network was trained on, draws\n"
+     "slices and surfaces, and writes table.md, table.csv, table.json and log.txt.\n"
+     "key=value overrides a key of the experiment (experiment.samples=20) or of every\n"
+     "training (train.minutes=1). A row that fails has its reason in the table, the other\n"
+     "rows continue, and the exit code reports the failure. The same command resumes a\n"
+     "stopped experiment.",
      "sdmgen experiment configs/paper.yaml --out runs/paper", 0, SIZE_MAX},
     {"phantom", "--shape NAME [-p name=value ...] -o FILE",
      "make a CT-like test image with known truth",
-     "Makes an image of a shape in a given or random pose, with partial volume, tissue texture,\n"
-     "blur and noise. --label writes the labels, --truth the parameters, pose and settings of the\n"
-     "image. Without grid options the grid is fitted to the shape, 64 voxels along the longest\n"
-     "edge. --rotation and --frame are rotation vectors: axis times angle, in rad.",
+     "Makes an image of a shape in a given or random pose, with partial volume, tissue\n"
+     "texture, blur and noise. --label writes the labels, --truth the parameters, pose and\n"
+     "settings of the image. Without grid options the grid is fitted to the shape, 64 voxels\n"
+     "along the longest edge. --rotation and --frame are rotation vectors: axis times angle,\n"
+     "in rad.",
      "sdmgen phantom --shape cochlea --random-params --random-pose 20,1 --spacing 0.2 -o ct.nii.gz "
      "--truth truth.json",
      0, 0},
     {"fit", "MODEL IMAGE | --shape NAME IMAGE",
      "fit a shape to an image, a label map, a mesh or points",
-     "Estimates the parameters and the pose of the shape, with their uncertainty, using the "
-     "network\n"
-     "of MODEL or (--exact, --shape) the exact engine. IMAGE is a volume (.nii .nii.gz .nrrd "
-     ".nhdr\n"
-     ".mha .mhd); with --label, a label map or segmentation of these types; a mesh (.ply .stl "
-     ".obj\n"
-     ".off); or points (.csv with the header x,y,z, or .npy). Without a start pose the shape "
-     "starts\n"
-     "in the middle of the image, labels or points and many rotations are tried. The ending of -o "
-     "selects the output:\n"
-     ".vdb .ply .stl .obj .off the fitted shape in the estimated pose; .nii .nii.gz .nrrd .mha "
-     ".npy\n"
-     "distances on the grid of the image; .png the contour over the image; .json the results.\n"
+     "Estimates the parameters and the pose of the shape, with their uncertainty, using the\n"
+     "network of MODEL or (--exact, --shape) the exact engine. IMAGE is a volume (.nii\n"
+     ".nii.gz .nrrd .nhdr .mha .mhd); with --label, a label map or segmentation of these\n"
+     "types; a mesh (.ply .stl .obj .off); or points (.csv with the header x,y,z, or .npy).\n"
+     "Without a start pose the shape starts in the middle of the image, labels or points,\n"
+     "and many rotations are tried. The ending of FILE in -o selects the output: .vdb .ply\n"
+     ".stl .obj .off the fitted shape in the estimated pose; .nii .nii.gz .nrrd .mha .npy\n"
+     "distances on the grid of the image; .png the contour over the image; .json the\n"
+     "results.\n"
      "Exit code 4: the fit failed or is not to be trusted; files are then written only with\n"
      "--force.",
      "sdmgen fit runs/cochlea/model.sdm ct.nii.gz --start-centre 4,-2,7 --start-axis 0,0,1 -o "
@@ -163,7 +160,7 @@ const cli_option cli_options[] = {
      "the error that --max-error limits: largest (default), 95 % quantile, root mean square or "
      "mean"},
     {"method", 0, CLI_CHOICE, NULL, "exact|naive|cells|octree|edt", 0, 0, ON(CLI_EXACT), AT(method),
-     "exact: the engine (default); naive: every triangle for every voxel, with the surface inside "
+     "exact: the engine (default); naive: every triangle for every voxel, also triangles inside "
      "the union; cells: uniform cells of triangles (exact); octree: adaptive samples, error at "
      "most --tolerance; edt: distance transform, prints the bound on its error"},
     {"narrow", 0, CLI_REAL, "N", NULL, 0.5, 1e6, ON(CLI_EXACT), AT(narrow),
@@ -273,12 +270,12 @@ const cli_option cli_options[] = {
      "values in air cells, as for --inside (default -880,0)"},
     {"air-cells", 0, CLI_REAL3, "SHARE,MM,CLEAR", NULL, 0, 1e6, ON(CLI_PHANTOM),
      AT(phantom.air_cells),
-     "air cells outside: fraction of the candidate places filled (0 .. 1), diameter, clearance to "
+     "air cells outside, balls on a lattice: probability of each (0 .. 1), diameter, clearance to "
      "the surface (default: none)"},
     {"blur", 0, CLI_REAL13, "MM", NULL, 0, 1e9, ON(CLI_PHANTOM), AT(phantom.blur),
      "standard deviation of the point spread, one number or one per axis (default 0.15)"},
     {"texture", 0, CLI_REAL, "MM", NULL, 0, 1e9, ON(CLI_PHANTOM), AT(phantom.texture),
-     "correlation length of the texture of the tissues (default 0.4; 0: independent voxels)"},
+     "standard deviation of the Gaussian that smooths the texture (default 0.4; 0: white noise)"},
     {"noise", 0, CLI_REAL, "HU", NULL, 0, 1e6, ON(CLI_PHANTOM), AT(phantom.noise),
      "standard deviation of the noise (default 150)"},
     {"white-noise", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_PHANTOM), AT(phantom.white_noise),
@@ -313,8 +310,8 @@ const cli_option cli_options[] = {
     {"start-axis", 0, CLI_REAL3, "X,Y,Z", NULL, -1e12, 1e12, ON(CLI_FIT), AT(fit.start_axis),
      "direction of the z axis of the shape's frame at the start; rotations about it are tried"},
     {"start-points", 0, CLI_TEXT, "FILE.csv", NULL, 0, 0, ON(CLI_FIT), AT(fit.start_points),
-     "start from three or more pairs of points, not on one line: in the shape's frame and in the "
-     "image, header shape_x,shape_y,shape_z,x,y,z"},
+     "three or more pairs of points, not on one line, in the shape's frame and in the image: the "
+     "start pose maps one to the other; header shape_x,shape_y,shape_z,x,y,z"},
     {"turns", 0, CLI_INT, "N", NULL, 1, 4096, ON(CLI_FIT), AT(fit.turns),
      "number of rotations tried about the shape's z axis (default 12 with --start-axis, else 1)"},
     {"turns-sphere", 0, CLI_INT, "N", NULL, 1, 4096, ON(CLI_FIT), AT(fit.turns_sphere),
@@ -392,7 +389,7 @@ const cli_option cli_options[] = {
     {"plugin", 0, CLI_LIST, "FILE", NULL, 0, 0, WITH_SHAPES, AT(plugins),
      "load shapes from a shared object; may be repeated"},
     {"threads", 0, CLI_INT, "N", NULL, 0, 1024, ALL & ~ON(CLI_HELP), AT(threads),
-     "number of threads; 0: all (default). The number does not change results"},
+     "number of threads; 0: all (default). Results do not depend on it"},
     {"seed", 0, CLI_INT, "N", NULL, 0, 9007199254740992.0,
      ON(CLI_TRAIN) | ON(CLI_CONFIG) | ON(CLI_EVAL) | ON(CLI_VERIFY) | ON(CLI_BENCH) |
          ON(CLI_PHANTOM),

@@ -86,7 +86,7 @@ typedef struct cli_phantom_args {
     double inside[2], outside[2], air[2], air_cells[3];
     double blur[3], texture, noise;
     bool white_noise;
-    int64_t supersample; /* 0: not given */
+    int64_t supersample; /* 0: option missing */
     const char *type, *label, *truth;
 } cli_phantom_args;
 
@@ -96,7 +96,7 @@ typedef struct cli_fit_args {
     cli_list labels, reference_labels, keep;
     const char *reference, *label_out, *start_points, *image_model;
     double start_centre[3], start_axis[3], region[6];
-    int64_t turns, turns_sphere, max_iterations; /* 0: not given */
+    int64_t turns, turns_sphere, max_iterations; /* 0: option missing */
     double inside[2], outside[2], air[2];
     double blur, l_ref, point_sd, margin, cavity, tissue_field, label_close, least_inside;
     double prior_sd, prior_rotation, prior_translation, eps;

@@ -118,6 +118,7 @@ static sdm_status compare_surfaces(cli_fit *f, const sdm_mesh *reference, sdm_er
 sdm_status cli_fit_compare(cli_fit *f, sdm_error *err)
 {
     if (!f->reference || !f->surface.n_tri) return SDM_OK;
+    // the part of the reference's grid that holds both shapes
     const sdm_grid *whole = &f->reference_grid;
     const double pad = 2 * fmax(whole->spacing[0], fmax(whole->spacing[1], whole->spacing[2]));
     const cli_block of_labels = cli_block_of_labels(whole, f->reference, pad),
@@ -125,6 +126,7 @@ sdm_status cli_fit_compare(cli_fit *f, sdm_error *err)
                     block = cli_block_union(&of_labels, &of_fit);
     const sdm_grid g = cli_block_grid(whole, &block);
     const size_t n = sdm_grid_count(&g);
+    // labels and map on it
     float *labels = NULL, *map = NULL;
     sdm_mesh reference = {0};
     sdm_status s = SDM_ALLOC(&labels, n, "labels", err);
@@ -133,6 +135,7 @@ sdm_status cli_fit_compare(cli_fit *f, sdm_error *err)
     if (!s)
         s = sdm_fit_map(&f->map_source, f->result.params, &f->result.pose, &g, f->opts.n_threads,
                         map, err);
+    // overlap and distances
     if (!s) count_voxels(f, &g, map, labels);
     for (size_t i = 0; i < n && !s; i++)
         labels[i] = 0.5f - labels[i]; // zero half-way between voxels inside and outside

@@ -18,6 +18,7 @@ static void add_unknowns(sdm_json *j, const cli_fit *f)
     static const char *const pose[6] = {"rotation_x",    "rotation_y",    "rotation_z",
                                         "translation_x", "translation_y", "translation_z"};
     const sdm_fit_result *r = &f->result;
+    // parameters
     cli_json_params(j, "parameters", f->params, f->n_params, r->params);
     cli_json_params(j, "parameters_sd", f->params, f->n_params, r->sd);
     sdm_json_open(j, "at_bound", '[');
@@ -28,6 +29,7 @@ static void add_unknowns(sdm_json *j, const cli_fit *f)
     for (size_t i = 0; i < f->n_params; i++)
         if (r->by_prior[i]) sdm_json_text(j, NULL, f->params[i].name);
     sdm_json_close(j, ']');
+    // pose
     sdm_json_open(j, "pose", '{');
     cli_json_reals(j, "rotation_rad", r->pose.rotation, 3);
     cli_json_reals(j, "translation_mm", r->pose.translation, 3);
@@ -39,6 +41,7 @@ static void add_unknowns(sdm_json *j, const cli_fit *f)
                   "vector (axis times angle); sd of the rotation: of a small turn after it about "
                   "the axes of the world");
     sdm_json_close(j, '}');
+    // correlation and covariance
     sdm_json_open(j, "unknowns", '[');
     for (size_t i = 0; i < f->n_params; i++) sdm_json_text(j, NULL, f->params[i].name);
     for (int i = 0; i < 6; i++) sdm_json_text(j, NULL, pose[i]);

@@ -66,6 +66,7 @@ sdm_status cli_fit_write_picture(const cli_fit *f, const char *path, sdm_error *
     const sdm_grid g = cli_block_grid(&f->target.grid, &block);
     const size_t n = sdm_grid_count(&g);
     const bool compared = f->reference && !f->reference_is_target;
+    // image, map and reference on the grid of the picture
     float *image = NULL, *map = NULL, *reference = NULL;
     sdm_status s = SDM_ALLOC(&image, n, "picture", err);
     if (!s) s = SDM_ALLOC(&map, n, "picture", err);
@@ -73,6 +74,7 @@ sdm_status cli_fit_write_picture(const cli_fit *f, const char *path, sdm_error *
     if (!s)
         s = sdm_fit_map(&f->map_source, f->result.params, &f->result.pose, &g, f->opts.n_threads,
                         map, err);
+    // draw them
     if (!s) {
         char title[200], fitted[120];
         const sdm_picture_map maps[2] = {{fitted, map, false}, {"reference", reference, false}};

@@ -71,6 +71,7 @@ static void print_target(const cli_fit *f)
                r->point_sd);
         return;
     }
+    // voxels
     printf("%s: %zu voxels near the shape", cli_fit_kind(f), r->n_used);
     if (r->n_nan)
         printf(", %zu ignored because they are NaN%s", r->n_nan,
@@ -79,6 +80,7 @@ static void print_target(const cli_fit *f)
         printf(", %.0f %% of the shape in the image", 100 * r->inside_share);
     printf("\n");
     if (f->target.kind != SDM_FIT_IMAGE) return;
+    // values of the tissues
     print_law("inside", &r->appearance.inside[0]);
     printf("\n");
     for (size_t i = 0; i < r->appearance.n_outside; i++) {

@@ -52,6 +52,7 @@ static sdm_status pose_from_points(const cli_fit *f, sdm_pose *pose, sdm_error *
                                          {.name = "shape_z"}, {.name = "x"},
                                          {.name = "y"},       {.name = "z"}};
     const double none[6] = {NAN, NAN, NAN, NAN, NAN, NAN};
+    // read the pairs
     const char *path = f->args->fit.start_points;
     double *rows = NULL, *shape = NULL, *world = NULL;
     size_t n = 0;
@@ -64,6 +65,7 @@ static sdm_status pose_from_points(const cli_fit *f, sdm_pose *pose, sdm_error *
                          columns[i % 6].name, i / 6 + 1);
         (i % 6 < 3 ? shape : world)[i / 6 * 3 + i % 3] = rows[i];
     }
+    // align them
     if (!s && f->args->fit.ras) cli_fit_negate_xy(world, n);
     if (!s) s = sdm_fit_pose_from_points(shape, world, n, pose, err);
     if (s == SDM_E_ARG) {

@@ -59,6 +59,7 @@ static sdm_status read_header(csv_table *t, const sdm_param *params, size_t n, s
                         "%s: no header line: the first line must name the columns, such as '%s'",
                         t->path, params[0].name);
     for (char *cell; (cell = next_cell(&line));) {
+        // the parameter of the column
         const char *names[MAX_COLUMNS];
         size_t index = n;
         for (size_t i = 0; i < n && i < MAX_COLUMNS; i++) {
@@ -127,6 +128,7 @@ sdm_status cli_read_rows(const char *path, const sdm_param *params, size_t n, co
     if (!s) s = sdm_mul(count_lines(t.at), n, &total, err);
     if (!s) s = SDM_ALLOC(values, total, "table of parameters", err);
     if (!s) s = read_header(&t, params, n, err);
+    // the rows
     *n_rows = 0;
     for (char *line; !s && (line = next_line(&t)); (*n_rows)++) {
         double *row = *values + *n_rows * n;

@@ -213,6 +213,7 @@ sdm_status cli_grid_for_box(const cli_args *args, const double min[3], const dou
     const double longest = fmax(max[0] - min[0], fmax(max[1] - min[1], max[2] - min[2]));
     const double margin = 0.1 * longest;
     const bool has_size = args->size[0] > 0, has_spacing = args->spacing[0] > 0;
+    // spacing
     double spacing[3];
     int64_t n[3];
     for (int i = 0; i < 3; i++)
@@ -225,6 +226,7 @@ sdm_status cli_grid_for_box(const cli_args *args, const double min[3], const dou
                                   (double)(args->size[i] > 1 ? args->size[i] - 1 : 1));
         for (int i = 0; i < 3; i++) spacing[i] = need;
     }
+    // number of voxels
     for (int i = 0; i < 3; i++) {
         const double cells = (max[i] - min[i] + 2 * margin) / spacing[i];
         if (!has_size && !(cells < 1048576))
@@ -233,6 +235,7 @@ sdm_status cli_grid_for_box(const cli_args *args, const double min[3], const dou
                             max[i] - min[i]);
         n[i] = has_size ? args->size[i] : (int64_t)ceil(cells - 1e-9) + 1;
     }
+    // origin
     const double centre[3] = {0.5 * (min[0] + max[0]), 0.5 * (min[1] + max[1]),
                               0.5 * (min[2] + max[2])};
     *out = sdm_grid_centred(n, spacing[0], centre);

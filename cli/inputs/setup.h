@@ -67,7 +67,7 @@ void cli_add_params(const sdm_param *params, size_t n, const double *values, sdm
 
 /* *out = the axis-aligned grid of --size, --spacing and --origin. Missing options are chosen so
  * that the grid covers the box min .. max (mm) with a margin of 0.1 times its longest edge; without
- * --size and --spacing it has 64 voxels along that edge. SDM_E_ARG. */
+ * --size and --spacing it has 64 voxels along that edge, margins included. SDM_E_ARG. */
 sdm_status cli_grid_for_box(const cli_args *args, const double min[3], const double max[3],
                             sdm_grid *out, sdm_error *err);
 

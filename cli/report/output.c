@@ -79,6 +79,7 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
                             sdm_error *err)
 {
 #ifdef SDM_HAVE_VDB
+    // metadata
     static const char *const reasons[] = {"none", "range", "error"};
     const sdm_check none = {0}, *check = map->check ? map->check : &none;
     char error[32], rmse[32], q95[32], max[32];
@@ -96,6 +97,7 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
         {"sdm_check_max_mm", sdm_format_real(check->max_mm, max)},
     };
     const size_t n_metadata = sizeof metadata / sizeof *metadata - (map->check ? 0 : 3);
+    // the file
     const sdm_vdb_opts opts = {.band_voxels = args->band,
                                .dense = args->dense,
                                .half = args->half,

@@ -92,6 +92,7 @@ sdm_status cli_bench_case_open(const cli_args *args, double refine, double scale
         return sdm_fail(
             err, SDM_E_ARG,
             "bench exact: -p, -O and --edge belong to --shape; a mesh file has no parameters");
+    // mesh and grid
     const char *name = args->mesh ? args->mesh : args->shape ? args->shape : "cochlea";
     sdm_audit audit;
     sdm_status s = args->mesh ? cli_read_mesh(args->mesh, &c->mesh, err)
@@ -102,6 +103,7 @@ sdm_status cli_bench_case_open(const cli_args *args, double refine, double scale
     grid_rescale(&c->grid, scale);
     s = sdm_grid_check(&c->grid, err);
     if (s) return s;
+    // settings and memory of the maps
     c->voxels = sdm_grid_count(&c->grid);
     c->band_mm = args->band > 0 ? args->band * fmin(c->grid.spacing[0],
                                                     fmin(c->grid.spacing[1], c->grid.spacing[2]))

@@ -126,6 +126,7 @@ static sdm_status measure_machine(size_t bytes, network_times *t, sdm_error *err
     words *data = NULL, total = {0};
     sdm_status s = SDM_ALLOC(&a, 3 * N * N, "matrix to time", err);
     if (!s) s = sdm_alloc((void **)&data, n_words, sizeof *data, "memory to read", err);
+    // matrix product
     double best = INFINITY, read = INFINITY;
     for (int i = 0; i < REPEATS && !s; i++) {
         const double start = cli_thread_clock();
@@ -133,6 +134,7 @@ static sdm_status measure_machine(size_t bytes, network_times *t, sdm_error *err
                  1);
         best = fmin(best, cli_thread_clock() - start);
     }
+    // reading
     for (int i = 0; i < 2 * REPEATS && !s; i++) {
         const double start = cli_thread_clock();
         words a0 = {0}, a1 = a0, a2 = a0, a3 = a0;
@@ -167,6 +169,7 @@ static void print_times(const network_times *t, const sdm_model_info *info)
            "weights; %s\n\n",
            info->shape, info->kind, sdm_grid_count(&info->grid), info->n_params, 1e-6 * info->macs,
            1e-6 * (double)info->weight_bytes, sdm_kernels_name());
+    // one map and a batch
     const double used = gmacs(info->macs, one), bytes = 1e-6 * (double)info->weight_bytes / one;
     snprintf(note, sizeof note,
              "%.1f GMAC/s, %.0f %% of the peak; %.1f GB/s of weights, %.0f %% of reading", used,
@@ -177,11 +180,13 @@ static void print_times(const network_times *t, const sdm_model_info *info)
     snprintf(note, sizeof note, "%.1f GMAC/s, %.0f %% of the peak", batch,
              100 * batch / t->peak_gmacs);
     print_row(name, t->maps.ms_batch, one, note);
+    // derivatives
     snprintf(note, sizeof note, "%zu parameters; finite differences need %zu maps", info->n_params,
              info->n_params + 1);
     print_row("map and Jacobian", t->ms_jacobian, one, note);
     print_row("map and J v", t->ms_jvp, one, "");
     print_row("w J", t->ms_vjp, one, "");
+    // threads and exact engine
     snprintf(name, sizeof name, "one map, %d threads", t->threads);
     if (t->threads > 1) print_row(name, t->ms_threads, one, "wall-clock time");
     if (isfinite(t->maps.ms_exact))
@@ -203,6 +208,7 @@ static sdm_status print_json(const network_times *t, const sdm_model_info *info,
     sdm_json_int(&j, "voxels", (int64_t)sdm_grid_count(&info->grid));
     sdm_json_real(&j, "macs", info->macs);
     sdm_json_int(&j, "weight_bytes", (int64_t)info->weight_bytes);
+    // times
     sdm_json_int(&j, "threads", 1);
     sdm_json_real(&j, "ms_network", t->maps.ms_network);
     sdm_json_real(&j, "ms_network_batch", t->maps.ms_batch);
@@ -212,6 +218,7 @@ static sdm_status print_json(const network_times *t, const sdm_model_info *info,
     sdm_json_real(&j, "ms_vjp", t->ms_vjp);
     sdm_json_int(&j, "all_threads", t->threads);
     sdm_json_real(&j, "ms_network_all_threads", t->ms_threads);
+    // speed, and the exact engine
     sdm_json_real(&j, "gmacs", gmacs(info->macs, t->maps.ms_network));
     sdm_json_real(&j, "gmacs_batch", gmacs(info->macs, t->maps.ms_batch));
     sdm_json_real(&j, "peak_gmacs", t->peak_gmacs);

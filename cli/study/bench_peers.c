@@ -110,6 +110,7 @@ static int run_program(char **arguments, char output[OUTPUT_MAX])
     pid_t child;
     posix_spawn_file_actions_t actions;
     size_t n = 0;
+    // start the program with its output in a pipe
     output[0] = '\0';
     if (pipe(ends)) return -1;
     (void)fcntl(ends[0], F_SETFD, FD_CLOEXEC);
@@ -120,12 +121,14 @@ static int run_program(char **arguments, char output[OUTPUT_MAX])
     const int failed = posix_spawn(&child, arguments[0], &actions, NULL, arguments, environ);
     posix_spawn_file_actions_destroy(&actions);
     close(ends[1]);
+    // read the output
     char block[4096];
     for (ssize_t got; !failed && ((got = read(ends[0], block, sizeof block)) > 0 ||
                                   (got < 0 && errno == EINTR));)
         for (ssize_t i = 0; i < got && n + 1 < OUTPUT_MAX; i++) output[n++] = block[i];
     output[n] = '\0';
     close(ends[0]);
+    // get the exit code
     if (failed) {
         snprintf(output, OUTPUT_MAX, "cannot be started: %s", strerror(failed));
         return -1;
@@ -155,6 +158,7 @@ static void read_result(const cli_bench_case *c, const char *line, int code,
     size_t shape[4] = {0};
     int n_dim = 0;
     sdm_error err = {0};
+    // times
     if (json_value(line, "error", row->note, sizeof row->note)) return;
     if (code != 0 || !json_number(line, "prepare_ms", &row->ms_prepare) ||
         !json_number(line, "map_ms", &row->ms_map) || !json_number(line, "share", &row->share) ||
@@ -163,6 +167,7 @@ static void read_result(const cli_bench_case *c, const char *line, int code,
         return;
     }
     row->ms_map /= row->share;
+    // memory and note
     (void)json_number(line, "peak_kb", &kb);
     row->peak_mb = kb < 0 ? NAN : kb / 1024;
     (void)json_value(line, "version", version, sizeof version);
@@ -171,6 +176,7 @@ static void read_result(const cli_bench_case *c, const char *line, int code,
     const bool no_band =
         isfinite(c->band_mm) && json_value(line, "band", band, sizeof band) && strcmp(band, "true");
     snprintf(row->note, sizeof row->note, "%s: %s%s", version, note, no_band ? "; whole map" : "");
+    // values
     float *single = NULL;
     sdm_status s = sdm_npy_read(values_path, &values, shape, &n_dim, &err);
     const size_t wanted[3] = {(size_t)c->grid.n[2], (size_t)c->grid.n[1], (size_t)c->grid.n[0]};
@@ -178,6 +184,7 @@ static void read_result(const cli_bench_case *c, const char *line, int code,
         s = sdm_fail(&err, SDM_E_FORMAT, "its values have another size than the grid");
     if (!s) s = SDM_ALLOC(&single, c->voxels, "values of another program", &err);
     for (size_t i = 0; i < c->voxels && !s; i++) single[i] = (float)values[i];
+    // errors
     row->done = !s;
     if (s)
         snprintf(row->note, sizeof row->note, "%.200s", err.text);

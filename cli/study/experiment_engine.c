@@ -88,6 +88,7 @@ static sdm_status measure_own(const cli_experiment_run *run, cli_experiment_job 
     char timed[64];
     float *values = NULL;
     cli_eval e = {0};
+    // memory and pictures
     job->maker.make = make_map;
     job->maker.user = &own;
     const long before = cli_bench_peak_start();
@@ -95,6 +96,7 @@ static sdm_status measure_own(const cli_experiment_run *run, cli_experiment_job 
     if (!s) s = make_map(&own, job->nominal, values, err);
     out->figure[SDM_FIGURE_PEAK] = MB_OF_MIB * cli_bench_peak_mb(before);
     if (!s) s = cli_experiment_draw(run, job, values, err);
+    // times and errors
     if (!s && naive)
         s = cli_time_naive(&job->maker, seed, NAIVE_SHAPES, &out->figure[SDM_FIGURE_MS], &share,
                            err);
@@ -102,6 +104,7 @@ static sdm_status measure_own(const cli_experiment_run *run, cli_experiment_job 
     if (!s && !truth)
         s = cli_evaluate_maps(&job->maker, seed, (size_t)out->row->samples, true, &e, err);
     if (!s && !truth) cli_experiment_set_errors(out, &e);
+    // the note
     snprintf(out->note, sizeof out->note, "%s (%s), %s, mesh and preparation included",
              method->summary, method->reference, out->grid);
     snprintf(timed, sizeof timed, "; timed on %.0f %% of the voxels", 100 * share);

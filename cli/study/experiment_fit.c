@@ -96,6 +96,7 @@ static sdm_status fit_one(const cli_experiment_job *job, const sdm_fit_source *s
     const sdm_fit_target target = {.kind = SDM_FIT_IMAGE, .grid = p->grid, .values = p->values};
     sdm_fit_opts opts = sdm_fit_defaults();
     sdm_fit_result r = {0};
+    // fit
     opts.prior_sd = e->fit.prior_sd;
     opts.polish_eps = e->fit.eps;
     opts.start_params = p->start;
@@ -106,6 +107,7 @@ static sdm_status fit_one(const cli_experiment_job *job, const sdm_fit_source *s
     const double begin = cli_thread_clock();
     sdm_status s = sdm_fit(source, &target, &opts, &r, why);
     out->seconds = cli_thread_clock() - begin;
+    // store the estimate
     out->converged = !s;
     out->maps_network = r.n_network;
     out->maps_exact = r.n_exact;
@@ -115,6 +117,7 @@ static sdm_status fit_one(const cli_experiment_job *job, const sdm_fit_source *s
         out->sd[i] = s ? NAN : r.sd[i];
         out->at_bound[i] = !s && r.at_bound[i];
     }
+    // measure the overlap
     out->dice = NAN;
     const sdm_fit_source exact = {.shape = job->shape, .grid = job->maker.grid};
     if (!s)

@@ -106,6 +106,7 @@ static sdm_status measure_network(const cli_experiment_run *run, cli_experiment_
     if (!s) memset(values, 1, sdm_grid_count(&info->grid) * sizeof *values);
     const double map_mb = cli_bench_peak_mb(before);
     if (!s) s = measure_memory(path, job->nominal, values, &more, err);
+    // times and errors
     if (!s) s = cli_time_maps(model, NULL, seed, false, 0, &t, err);
     job->maker = cli_maker_of_model(model, job->shape);
     if (!s) s = cli_evaluate_maps(&job->maker, seed, (size_t)out->row->samples, true, &e, err);

@@ -18,12 +18,14 @@ static plan plan_row(const cli_experiment_run *run, const cli_experiment_job *jo
     const sdm_config *c = job->config;
     plan p = {.action = "measure"};
     const sdm_experiment_method *m = run->e->rows[job->index].method;
+    // rows without a network of their own
     if (m->fit) p.action = m->fit == SDM_EXPERIMENT_FIT_NAIVE ? "time a map" : "fit";
     if (*m->engine || m->fit == SDM_EXPERIMENT_FIT_POLISH) return p;
     if (m->fit && *run->e->fit.model) {
         p.action = "load, fit";
         return p;
     }
+    // rows with a network
     switch (cli_experiment_find_stored(run, job)) {
     case CLI_STORED_MODEL:
         p.action = m->fit ? "load, fit" : "load, measure";
@@ -37,6 +39,7 @@ static plan plan_row(const cli_experiment_run *run, const cli_experiment_job *jo
     default:
         p.action = m->fit ? "train, fit" : "train, measure";
     }
+    // the budget of the training
     p.minutes = c->train.minutes;
     if (c->train.minutes > 0)
         snprintf(p.budget, sizeof p.budget, "%g min", c->train.minutes);
@@ -78,10 +81,12 @@ sdm_status cli_experiment_print_plan(const cli_experiment_run *run, sdm_error *e
     size_t untimed = 0;
     int width = 28;
     sdm_status s = SDM_OK;
+    // width of the titles
     for (size_t i = 0; i < run->e->n_rows; i++) {
         const int length = (int)strlen(run->e->rows[i].title);
         if (length > width) width = length;
     }
+    // the rows
     sdm_json_open(&j, NULL, '{');
     sdm_json_open(&j, "rows", '[');
     for (size_t i = 0; i < run->e->n_rows && !s; i++) {
@@ -95,6 +100,7 @@ sdm_status cli_experiment_print_plan(const cli_experiment_run *run, sdm_error *e
         untimed += *p.budget && !(p.minutes > 0);
         add_row(run, job, &p, width, &j);
     }
+    // the sum
     sdm_json_close(&j, ']');
     sdm_json_real(&j, "minutes", minutes);
     sdm_json_real(&j, "limit", run->e->experiment.minutes);

@@ -86,6 +86,7 @@ static void add_markdown_table(const cli_experiment_run *run, const columns *c, 
 
 static void add_markdown(const cli_experiment_run *run, const columns *c, sdm_text *t)
 {
+    // title and tables
     char machine[256];
     cli_experiment_describe_machine(machine, sizeof machine);
     sdm_text_add(t, "# %s\n\n", run->e->experiment.title);
@@ -96,6 +97,7 @@ static void add_markdown(const cli_experiment_run *run, const columns *c, sdm_te
                  "; %s; seed %llu. Times: one core. Errors: differences from exact maps of random "
                  "shapes that no network was trained on.\n\n",
                  machine, (unsigned long long)run->e->experiment.seed);
+    // notes of the rows
     for (size_t i = 0; i < run->e->n_rows; i++) {
         const cli_experiment_result *r = &run->results[i];
         const sdm_experiment_reference *reference = r->row->reference;
@@ -109,6 +111,7 @@ static void add_markdown(const cli_experiment_run *run, const columns *c, sdm_te
         sdm_markdown_text(t, reference->source);
         sdm_text_add(t, "\n");
     }
+    // pictures
     if (!run->e->experiment.pictures) return;
     sdm_text_add(t, "\n");
     for (size_t i = 0; i < run->e->n_rows; i++) {

@@ -26,8 +26,8 @@ awk -v s="$(json seconds)" -v m="$(json mse_mm2)" 'BEGIN { exit !(s > 0 && m > 0
 
 # a finished run is safe
 before=$(cksum <run/model.sdm)
-expect 2 'run holds a trained model and no checkpoint to go on from' sdmgen train "$tiny" --out run
-expect 2 'run holds a trained model and no checkpoint to go on from' sdmgen train "$tiny" --out run --resume
+expect 2 'run holds a trained model and no checkpoint to continue from' sdmgen train "$tiny" --out run
+expect 2 'run holds a trained model and no checkpoint to continue from' sdmgen train "$tiny" --out run --resume
 expect 2 'exclude each other' sdmgen train "$tiny" --out run --resume --force
 [ "$before" = "$(cksum <run/model.sdm)" ] || bad 'the model has changed'
 

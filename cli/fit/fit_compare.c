@@ -1,9 +1,9 @@
-/* A fitted shape against labels: overlap of the insides, distances of the surfaces, in the field of
- * view. */
+/* Compares a fitted shape with labels: overlap of the voxels inside, and distances between the
+ * surfaces, within the field of view of the image. */
 #include <math.h>
 #include <stdlib.h>
 
-#include "fit/fit_command.h"
+#include "fit_command.h"
 #include "report/crop.h"
 #include "sdm/exact.h"
 #include "sdm/isosurface.h"
@@ -13,14 +13,14 @@ sdm_status cli_fit_read_reference(cli_fit *f, sdm_error *err)
 {
     const cli_fit_args *a = &f->args->fit;
     if (!a->reference && a->reference_labels.n)
-        return sdm_fail(err, SDM_E_ARG, "fit: --reference-label is a label of --reference FILE");
+        return sdm_fail(err, SDM_E_ARG, "fit: --reference-label needs --reference FILE");
     if (!a->reference && !a->labels.n && !isnan(a->label_close))
         return sdm_fail(err, SDM_E_ARG,
-                        "fit: --label-close is of labels: give --label or --reference");
+                        "fit: --label-close needs labels: give --label or --reference");
     if (!a->reference) {
         f->reference_grid = f->target.grid;
         f->reference = f->mask;
-        f->own_reference = true;
+        f->reference_is_target = true;
         return SDM_OK;
     }
     sdm_volume v = {0};
@@ -31,14 +31,15 @@ sdm_status cli_fit_read_reference(cli_fit *f, sdm_error *err)
     }
     f->reference_grid = v.grid;
     if (!s) s = SDM_ALLOC(&f->reference, sdm_grid_count(&v.grid), "labels", err);
-    if (!s) s = cli_label_mask(a->reference, &v, &a->reference_labels, f->reference, err);
-    if (!s) s = cli_close_labels(f, &v.grid, f->reference, err);
+    if (!s) s = cli_fit_label_mask(a->reference, &v, &a->reference_labels, f->reference, err);
+    if (!s) s = cli_fit_close_labels(f, &v.grid, f->reference, err);
     sdm_volume_dispose(&v);
     return s;
 }
 
-/* Points of the world in a voxel of the image; of any grid but the image's all are. */
-static bool is_seen(const cli_fit *f, const double world[3])
+/* True for points of the world within a voxel of the image; for all points when the target is
+ * points and there is no image. */
+static bool is_in_view(const cli_fit *f, const double world[3])
 {
     double at[3];
     if (f->target.kind == SDM_FIT_POINTS) return true;
@@ -48,6 +49,7 @@ static bool is_seen(const cli_fit *f, const double world[3])
     return true;
 }
 
+/* Counts the voxels inside map[g] (below 0) and labels[g] (above 0) and computes Dice. */
 static void count_voxels(cli_fit *f, const sdm_grid *g, const float *map, const float *labels)
 {
     cli_overlap *o = &f->overlap;
@@ -59,7 +61,7 @@ static void count_voxels(cli_fit *f, const sdm_grid *g, const float *map, const 
                 double world[3];
                 if (!fit && !reference) continue;
                 sdm_grid_world(g, index, world);
-                if (!is_seen(f, world)) continue;
+                if (!is_in_view(f, world)) continue;
                 o->n_fit += fit;
                 o->n_reference += reference;
                 o->n_both += fit && reference;
@@ -68,7 +70,8 @@ static void count_voxels(cli_fit *f, const sdm_grid *g, const float *map, const 
     o->dice = both ? 2 * (double)o->n_both / (double)both : NAN;
 }
 
-/* Appends the distances from the vertices of `from` that are seen to the surface of `to`. */
+/* Appends to list[*n] the distances of the vertices of `from` in the field of view to the surface
+ * of `to`. */
 static sdm_status add_distances(const cli_fit *f, const sdm_mesh *from, const sdm_mesh *to,
                                 double *list, size_t *n, sdm_error *err)
 {
@@ -78,7 +81,7 @@ static sdm_status add_distances(const cli_fit *f, const sdm_mesh *from, const sd
     if (s) return s;
     for (size_t i = 0; i < from->n_vert; i++) {
         const double *x = from->vert + 3 * i;
-        if (is_seen(f, x)) list[(*n)++] = sdm_exact_distance(engine, x);
+        if (is_in_view(f, x)) list[(*n)++] = sdm_exact_distance(engine, x);
     }
     sdm_exact_free(engine);
     return SDM_OK;
@@ -90,6 +93,7 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+/* Distances between the surfaces in both directions: mean, 95 % quantile, largest. */
 static sdm_status compare_surfaces(cli_fit *f, const sdm_mesh *reference, sdm_error *err)
 {
     cli_overlap *o = &f->overlap;
@@ -114,6 +118,7 @@ static sdm_status compare_surfaces(cli_fit *f, const sdm_mesh *reference, sdm_er
 sdm_status cli_fit_compare(cli_fit *f, sdm_error *err)
 {
     if (!f->reference || !f->surface.n_tri) return SDM_OK;
+    // the part of the reference's grid that holds both shapes
     const sdm_grid *whole = &f->reference_grid;
     const double pad = 2 * fmax(whole->spacing[0], fmax(whole->spacing[1], whole->spacing[2]));
     const cli_block of_labels = cli_block_of_labels(whole, f->reference, pad),
@@ -121,17 +126,19 @@ sdm_status cli_fit_compare(cli_fit *f, sdm_error *err)
                     block = cli_block_union(&of_labels, &of_fit);
     const sdm_grid g = cli_block_grid(whole, &block);
     const size_t n = sdm_grid_count(&g);
+    // labels and map on it
     float *labels = NULL, *map = NULL;
     sdm_mesh reference = {0};
     sdm_status s = SDM_ALLOC(&labels, n, "labels", err);
     if (!s) s = SDM_ALLOC(&map, n, "distance map", err);
     if (!s) cli_block_copy(whole, f->reference, &block, labels);
     if (!s)
-        s = sdm_fit_map(&f->drawn, f->result.params, &f->result.pose, &g, f->opts.n_threads, map,
-                        err);
+        s = sdm_fit_map(&f->map_source, f->result.params, &f->result.pose, &g, f->opts.n_threads,
+                        map, err);
+    // overlap and distances
     if (!s) count_voxels(f, &g, map, labels);
     for (size_t i = 0; i < n && !s; i++)
-        labels[i] = 0.5f - labels[i]; // a surface half-way between voxels
+        labels[i] = 0.5f - labels[i]; // zero half-way between voxels inside and outside
     if (!s) s = sdm_isosurface(&g, labels, 0.0f, &reference, NULL, err);
     if (!s && reference.n_tri) s = compare_surfaces(f, &reference, err);
     f->overlap.measured = !s;

@@ -314,6 +314,7 @@ static sdm_status set_axes(nrrd *f, sdm_error *err)
     sdm_image_header *h = f->h;
     int in_space = 0, layer_axis = -1;
     for (int a = 0; a < f->axes; a++) {
+        // an axis without a direction: layers
         if (has_field(f, DIRECTIONS) && !f->in_space[a]) {
             if (f->size[a] < 1)
                 return sdm_fail(err, SDM_E_FORMAT, "%s: axis %d has no entries", f->in->path, a);
@@ -323,6 +324,7 @@ static sdm_status set_axes(nrrd *f, sdm_error *err)
             for (int b = 0; b < a; b++) h->run *= (size_t)f->size[b];
             continue;
         }
+        // an axis in space
         if (in_space == 3) break;
         for (int row = 0; row < 3; row++) {
             const double step = has_field(f, DIRECTIONS) ? f->step[a][row]
@@ -332,6 +334,7 @@ static sdm_status set_axes(nrrd *f, sdm_error *err)
         }
         h->n[in_space++] = f->size[a];
     }
+    // exactly three axes in space, and the fourth counts layers
     if (in_space != 3 || (f->axes == 4 && layer_axis < 0))
         return sdm_fail(err, SDM_E_UNSUPPORTED,
                         "%s: need three axes with a direction in space (and one 'none' of four)",

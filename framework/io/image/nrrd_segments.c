@@ -41,6 +41,7 @@ sdm_status sdm_segments_take(sdm_volume *v, const sdm_stream *in, const char *ke
     size_t number;
     const char *what;
     if (!split_key(key, &number, &what)) return SDM_OK;
+    // the segment
     if (number >= SEGMENTS_MAX)
         return sdm_fail(err, SDM_E_UNSUPPORTED,
                         "%s:%zu: segment %zu, read are the numbers below %d", in->path, in->lines,
@@ -49,6 +50,7 @@ sdm_status sdm_segments_take(sdm_volume *v, const sdm_stream *in, const char *ke
     if (s) return s;
     sdm_segment *g = &v->segments[number];
     int64_t n;
+    // its property; unknown ones are ignored
     if (!strcmp(what, "Name")) {
         sdm_one_line(value, g->name, sizeof g->name);
     } else if (!strcmp(what, "ID")) {

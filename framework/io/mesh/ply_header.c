@@ -86,6 +86,7 @@ static sdm_status read_property(const sdm_scan *scan, char *line, sdm_ply_header
                         scan->line, SDM_PLY_PROPERTIES);
     sdm_ply_element *e = &h->element[h->n_elements - 1];
     sdm_ply_property p = {0};
+    // "TYPE NAME" or "list COUNT_TYPE TYPE NAME"
     const char *word = sdm_scan_word(&line);
     const bool list = is_word(word, "list");
     if (list) {
@@ -98,6 +99,7 @@ static sdm_status read_property(const sdm_scan *scan, char *line, sdm_ply_header
         (list && (p.count_type == SDM_PLY_NONE || p.count_type >= SDM_PLY_FLOAT32)) || !name)
         return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: the property's type or name cannot be read",
                         scan->path, scan->line);
+    // its role, which no other property of the element may have
     p.role = find_role(e, &p, name);
     for (size_t i = 0; i < e->n && p.role != SDM_PLY_SKIPPED; i++)
         if (h->property[e->first + i].role == p.role)
@@ -135,6 +137,7 @@ sdm_status sdm_ply_read_header(sdm_scan *scan, sdm_ply_header *h, sdm_error *err
     if (!is_word(line ? sdm_scan_word(&line) : NULL, "ply"))
         return sdm_fail(err, SDM_E_FORMAT, "%s:1: not a PLY file", scan->path);
     bool has_format = false;
+    // one keyword per line
     while ((line = sdm_scan_line(scan)) != NULL) {
         const char *word = sdm_scan_word(&line);
         sdm_status s = SDM_OK;

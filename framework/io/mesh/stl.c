@@ -96,6 +96,7 @@ static sdm_status read_ascii(sdm_builder *b, vertex_table *w, uint8_t *data, siz
         for (char *c = word; *c; c++) *c = lower(*c);
         sdm_status s = SDM_OK;
         double x[3];
+        // a corner; the begin and the end of a facet; words without effect
         if (strcmp(word, "vertex") == 0) {
             if (n < 0 || n > 2)
                 return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: vertex outside a facet of three",

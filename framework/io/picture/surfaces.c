@@ -19,10 +19,10 @@ enum {
     TOP = 46,
     GAP = 20,
     BAR = 14,
-    FOOT = 64
+    FOOT = 64 /* colour bars with numbers and caption */
 };
 
-/* Unit vectors of the world: to the right, upwards, to the viewer. */
+/* A direction of view: axis[0] points to the right, axis[1] upwards, axis[2] to the viewer. */
 typedef struct view {
     const char *name;
     double axis[3][3];
@@ -37,6 +37,7 @@ static const view VIEWS[N_VIEWS] = {
       {0.43301270189221933, -0.75, 0.5}}},
 };
 
+/* The surfaces and where everything lies on the canvas. */
 typedef struct scene {
     const sdm_picture_surface *surfaces;
     size_t n;
@@ -64,7 +65,7 @@ static double dot(const double a[3], const double b[3])
 }
 
 /* Finds the bounding boxes and the largest finite value. */
-static void measure(scene *sc)
+static void scene_measure(scene *sc)
 {
     for (int v = 0; v < N_VIEWS; v++)
         for (int d = 0; d < 2; d++) {
@@ -87,7 +88,7 @@ static void measure(scene *sc)
 }
 
 /* Finds the scale, the sizes of the panels and the colours. */
-static void place(scene *sc)
+static void scene_place(scene *sc)
 {
     double widest = 0, longest = 0;
     for (int v = 0; v < N_VIEWS; v++) {
@@ -120,8 +121,8 @@ static void add_normals(const sdm_mesh *m, double *normal)
     }
 }
 
-/* Lambert shading with light from the upper left behind the viewer; back sides are lit like front
- * sides. */
+/* Lambert shading with ambient light 0.42 and a light from the upper left behind the viewer. Back
+ * sides are lit like front sides. n[3] need not be of unit length. */
 static double brightness(const double n[3], const view *v)
 {
     static const double LIGHT[3] = {-0.4, 0.5, 0.76811};
@@ -143,27 +144,31 @@ typedef struct corner {
     double x, y, z, value, normal[3];
 } corner;
 
-/* Renders a triangle by barycentric coordinates b[3]; plain: one colour for all values. */
+/* Renders a triangle; plain: in one colour for all values. */
 static void draw_triangle(const scene *sc, raster *r, const view *v, const corner c[3], bool plain)
 {
     const double area =
         (c[1].x - c[0].x) * (c[2].y - c[0].y) - (c[2].x - c[0].x) * (c[1].y - c[0].y);
     if (!(fabs(area) > 0)) return;
+    // the bounding box in samples
     const int x0 = (int)fmax(0, floor(fmin(c[0].x, fmin(c[1].x, c[2].x)))),
               x1 = (int)fmin(r->w - 1, ceil(fmax(c[0].x, fmax(c[1].x, c[2].x)))),
               y0 = (int)fmax(0, floor(fmin(c[0].y, fmin(c[1].y, c[2].y)))),
               y1 = (int)fmin(r->h - 1, ceil(fmax(c[0].y, fmax(c[1].y, c[2].y))));
     for (int y = y0; y <= y1; y++)
         for (int x = x0; x <= x1; x++) {
+            // barycentric coordinates
             const double px = x + 0.5, py = y + 0.5;
             double b[3];
             b[1] = ((px - c[0].x) * (c[2].y - c[0].y) - (c[2].x - c[0].x) * (py - c[0].y)) / area;
             b[2] = ((c[1].x - c[0].x) * (py - c[0].y) - (px - c[0].x) * (c[1].y - c[0].y)) / area;
             b[0] = 1 - b[1] - b[2];
             if (!(b[0] >= 0 && b[1] >= 0 && b[2] >= 0)) continue;
+            // only in front of what has been drawn
             const size_t at = (size_t)y * (size_t)r->w + (size_t)x;
             const double z = b[0] * c[0].z + b[1] * c[1].z + b[2] * c[2].z;
             if (!(z > r->depth[at])) continue;
+            // colour of the interpolated value, brightness by the interpolated normal
             double n[3], value = 0;
             for (int d = 0; d < 3; d++)
                 n[d] = b[0] * c[0].normal[d] + b[1] * c[1].normal[d] + b[2] * c[2].normal[d];
@@ -177,6 +182,7 @@ static void draw_triangle(const scene *sc, raster *r, const view *v, const corne
         }
 }
 
+/* Renders a surface in one view. */
 static void draw_surface(const scene *sc, raster *r, int view_index, const sdm_picture_surface *p,
                          const double *normal)
 {
@@ -237,8 +243,8 @@ static sdm_status draw_panel(const scene *sc, sdm_canvas *c, size_t column, int 
     return s;
 }
 
-static sdm_status draw(const scene *sc, sdm_canvas *c, int bar_top, const char *caption,
-                       sdm_error *err)
+static sdm_status draw_scene(const scene *sc, sdm_canvas *c, int bar_top, const char *caption,
+                             sdm_error *err)
 {
     const sdm_type title = {.size = 13, .align = SDM_CENTRE, .bold = true, .colour = SDM_INK};
     const double unit = sc->limit < 0.1 ? 1000 : 1;
@@ -281,12 +287,12 @@ sdm_status sdm_picture_surfaces(const char *path, const sdm_picture_surface *sur
     }
     scene sc = {.surfaces = surfaces, .n = n};
     sdm_canvas *c = NULL;
-    measure(&sc);
-    place(&sc);
+    scene_measure(&sc);
+    scene_place(&sc);
     const int h = TOP + sc.height[0] + GAP + sc.height[1] + GAP + FOOT;
     sdm_status s = sdm_canvas_create(path, 2 * SIDE + (int)n * (sc.width + GAP) - GAP, h, &c, err);
     if (s) return s;
-    s = draw(&sc, c, h - FOOT, caption, err);
+    s = draw_scene(&sc, c, h - FOOT, caption, err);
     if (!s) return sdm_canvas_finish(c, err);
     sdm_canvas_discard(c);
     return s;

@@ -328,49 +328,42 @@ double sdm_canvas_text_width(sdm_canvas *c, double size, const char *text)
     return set_font(c, size, false, clean);
 }
 
-/* One <text> element; style: further attributes. */
-static void add_label(sdm_canvas *c, double x, double y, const sdm_type *type, const char *style,
-                      const char *clean)
+/* Adds a <text> element to an SVG file; the halo is a stroke below the letters. */
+static void add_label(sdm_canvas *c, double x, double y, sdm_type type, const char *clean)
 {
     static const char *const ANCHORS[] = {"start", "middle", "end"};
     char at[2][32], size[32];
     sdm_text *t = &c->labels;
     sdm_text_add(t, "<text transform=\"translate(%s,%s)%s\" font-family=\"sans-serif\"",
                  sdm_format_real(x, at[0]), sdm_format_real(y, at[1]),
-                 type->upwards ? " rotate(-90)" : "");
-    sdm_text_add(t, " font-size=\"%s\" font-weight=\"%s\" text-anchor=\"%s\" %s>",
-                 sdm_format_real(type->size * EM_PER_CAPITAL, size), type->bold ? "bold" : "normal",
-                 ANCHORS[type->align], style);
+                 type.upwards ? " rotate(-90)" : "");
+    sdm_text_add(t, " font-size=\"%s\"%s text-anchor=\"%s\" fill=\"#%02x%02x%02x\"%s>",
+                 sdm_format_real(type.size * EM_PER_CAPITAL, size),
+                 type.bold ? " font-weight=\"bold\"" : "", ANCHORS[type.align], type.colour.r,
+                 type.colour.g, type.colour.b,
+                 type.halo ? " stroke=\"#fff\" stroke-opacity=\"0.75\" stroke-width=\"3\""
+                             " stroke-linejoin=\"round\" paint-order=\"stroke\""
+                           : "");
     for (const char *p = clean; *p; p++) {
-        if (*p == '&' || *p == '<' || *p == '>')
-            sdm_text_add(t, *p == '&' ? "&amp;" : *p == '<' ? "&lt;" : "&gt;");
-        else
-            sdm_text_add(t, "%c", *p);
+        const char *entity = *p == '&' ? "&amp;" : *p == '<' ? "&lt;" : *p == '>' ? "&gt;" : NULL;
+        sdm_text_add(t, "%.*s", entity ? 5 : 1, entity ? entity : p);
     }
     sdm_text_add(t, "</text>\n");
 }
 
 void sdm_canvas_text(sdm_canvas *c, double x, double y, sdm_type type, const char *text)
 {
-    char clean[TEXT_MAX + 4], fill[32];
+    char clean[TEXT_MAX + 4];
     clean_text(text, clean);
-    // SVG: text elements
     if (c->format == FORMAT_SVG) {
-        snprintf(fill, sizeof fill, "fill=\"#%02x%02x%02x\"", type.colour.r, type.colour.g,
-                 type.colour.b);
-        if (type.halo)
-            add_label(c, x, y, &type,
-                      "fill=\"none\" stroke=\"#fff\" stroke-opacity=\"0.75\" stroke-width=\"3\" "
-                      "stroke-linejoin=\"round\"",
-                      clean);
-        add_label(c, x, y, &type, fill, clean);
+        add_label(c, x, y, type, clean);
         return;
     }
-    // else glyphs: first the rim of their outlines, then the text
     const double left = -set_font(c, type.size, type.bold, clean) * (int)type.align / 2;
     cairo_save(c->cr);
     cairo_translate(c->cr, x, y);
     if (type.upwards) cairo_rotate(c->cr, -acos(0));
+    // the rim of the letters' outlines, then the letters
     if (type.halo) {
         cairo_move_to(c->cr, left, 0);
         cairo_text_path(c->cr, clean);

@@ -40,7 +40,7 @@ static double interpolate(const sdm_slice *s, double u, double v)
     return low * (1 - tv) + high * tv;
 }
 
-/* The image of a slice or of a colour bar. */
+/* A slice and its colour scale. */
 typedef struct shading {
     sdm_box box;
     const sdm_slice *slice;
@@ -167,19 +167,13 @@ void sdm_panel_scale_bar(sdm_canvas *c, sdm_box box, double pixels_per_mm)
                     text);
 }
 
-static sdm_colour bar_pixel(const void *user, int x, int y)
-{
-    const shading *p = user;
-    (void)y;
-    return sdm_map_colour(p->map, p->low, p->high,
-                          p->low + (x + 0.5) / p->box.w * (p->high - p->low));
-}
-
 void sdm_colour_bar(sdm_canvas *c, sdm_box box, sdm_colour_map map, double low, double high,
                     const char *caption)
 {
-    const shading p = {.box = box, .map = map, .low = low, .high = high};
-    sdm_canvas_image(c, box, bar_pixel, &p);
+    // a slice of two voxels: their centres are at a quarter and three quarters of the bar
+    const float quarters[2] = {(float)(0.75 * low + 0.25 * high),
+                               (float)(0.25 * low + 0.75 * high)};
+    sdm_panel_colours(c, box, &(sdm_slice){quarters, {2, 1}, {1, 2}}, map, low, high);
     sdm_canvas_frame(c, box, SDM_INK_LIGHT);
     double first, step;
     char text[32];

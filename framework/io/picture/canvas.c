@@ -1,4 +1,4 @@
-/* The canvas on top of cairo: the only file that includes it. */
+/* The canvas, drawn by cairo; the only file that includes its headers. */
 #include "canvas.h"
 
 #include <cairo-pdf.h>
@@ -9,8 +9,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
+#include "bytes.h"
 #include "sdm/internal/file.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
@@ -26,12 +26,13 @@ static const char *const ENDINGS[N_FORMATS] = {".png", ".svg", ".pdf"};
 static const double EM_PER_CAPITAL = 1.37;
 
 struct sdm_canvas {
+    /* the caller's */
     const char *path;
     canvas_format format;
     cairo_surface_t *surface;
     cairo_t *cr;
     sdm_outfile *file;
-    /* SVG: cairo's document, and the text elements that are put at its end */
+    /* SVG: the document by cairo, and the text elements to put at its end */
     sdm_text document, labels;
     /* first error in writing the file */
     sdm_error error;
@@ -39,12 +40,11 @@ struct sdm_canvas {
 
 /* ---- the file ---- */
 
-// N_FORMATS: unknown
+/* The format of a file name; N_FORMATS: unknown ending. */
 static canvas_format format_of(const char *path)
 {
-    const size_t n = strlen(path);
     int f = 0;
-    while (f < N_FORMATS && (n < 4 || strcasecmp(path + n - 4, ENDINGS[f]))) f++;
+    while (f < N_FORMATS && !sdm_has_ext(path, ENDINGS[f])) f++;
     return (canvas_format)f;
 }
 
@@ -56,7 +56,8 @@ sdm_status sdm_picture_check(const char *path, sdm_error *err)
                     "%s: unknown type of picture, the name must end in .png, .svg or .pdf", path);
 }
 
-/* Called by cairo with the next bytes of the file. */
+/* Receives the next bytes of the file from cairo: of an SVG file into c->document, else into the
+ * output file. */
 static cairo_status_t write_bytes(void *user, const unsigned char *data, unsigned size)
 {
     sdm_canvas *c = user;
@@ -68,7 +69,8 @@ static cairo_status_t write_bytes(void *user, const unsigned char *data, unsigne
     return c->error.status ? CAIRO_STATUS_WRITE_ERROR : CAIRO_STATUS_SUCCESS;
 }
 
-static sdm_status fail(const sdm_canvas *c, cairo_status_t status, sdm_error *err)
+/* The error of writing the file, or else that of cairo. */
+static sdm_status canvas_fail(const sdm_canvas *c, cairo_status_t status, sdm_error *err)
 {
     if (c->error.status) return sdm_fail(err, c->error.status, "%s", c->error.text);
     if (status == CAIRO_STATUS_NO_MEMORY)
@@ -94,12 +96,14 @@ static void create_surface(sdm_canvas *c, int w, int h)
 
 sdm_status sdm_canvas_create(const char *path, int w, int h, sdm_canvas **out, sdm_error *err)
 {
+    // name and size
     *out = NULL;
     sdm_status s = sdm_picture_check(path, err);
     if (s) return s;
     if (w < 1 || h < 1 || w > SIDE_MAX || h > SIDE_MAX)
         return sdm_fail(err, SDM_E_ARG, "picture of %d x %d pixels, need 1 to %d a side", w, h,
                         SIDE_MAX);
+    // file, surface and context of cairo
     sdm_canvas *c = NULL;
     s = SDM_ALLOC(&c, 1, "picture", err);
     if (s) return s;
@@ -110,19 +114,20 @@ sdm_status sdm_canvas_create(const char *path, int w, int h, sdm_canvas **out, s
         create_surface(c, w, h);
         c->cr = cairo_create(c->surface);
         const cairo_status_t status = cairo_status(c->cr);
-        if (status) s = fail(c, status, err);
+        if (status) s = canvas_fail(c, status, err);
     }
     if (s) {
         sdm_canvas_discard(c);
         return s;
     }
-    // unhinted text is as wide in every format
+    // without hinting, text has the same width in every format
     cairo_font_options_t *options = cairo_font_options_create();
     cairo_font_options_set_antialias(options, CAIRO_ANTIALIAS_GRAY);
     cairo_font_options_set_hint_style(options, CAIRO_HINT_STYLE_NONE);
     cairo_font_options_set_hint_metrics(options, CAIRO_HINT_METRICS_OFF);
     cairo_set_font_options(c->cr, options);
     cairo_font_options_destroy(options);
+    // round line ends, a white ground
     cairo_set_line_cap(c->cr, CAIRO_LINE_CAP_ROUND);
     cairo_set_line_join(c->cr, CAIRO_LINE_JOIN_ROUND);
     sdm_canvas_fill(c, (sdm_box){0, 0, w, h}, (sdm_colour){255, 255, 255}, 1);
@@ -130,9 +135,10 @@ sdm_status sdm_canvas_create(const char *path, int w, int h, sdm_canvas **out, s
     return SDM_OK;
 }
 
-/* Appends cairo's elements to `t`. The numbers in the names of images and surfaces come from a
-   counter of the process: reduced by the first one, they are the same for the same picture. */
-static void add_numbered(sdm_text *t, const char *document)
+/* Appends the document by cairo with other ids. cairo numbers images and surfaces, "image12" and
+   "surface10", by a counter of the process. Subtracting the number of the first surface makes the
+   file of a picture the same whatever was drawn before. */
+static void add_renumbered(sdm_text *t, const char *document)
 {
     const char *first = strstr(document, "id=\"surface");
     const unsigned long base = first ? strtoul(first + strlen("id=\"surface"), NULL, 10) : 0;
@@ -151,7 +157,8 @@ static void add_numbered(sdm_text *t, const char *document)
     }
 }
 
-/* cairo would draw the shapes of the letters: here the text is put before the closing tag. */
+/* Writes the SVG file: the document by cairo with the text elements before its closing tag. (cairo
+ * itself draws text as outlines of glyphs, which cannot be searched or edited.) */
 static sdm_status write_svg(sdm_canvas *c, sdm_error *err)
 {
     static const char CLOSING[] = "</svg>";
@@ -159,10 +166,10 @@ static sdm_status write_svg(sdm_canvas *c, sdm_error *err)
     if (!closing) return sdm_fail(err, SDM_E_INTERNAL, "%s: cairo: no closing tag", c->path);
     *closing = '\0';
     sdm_text svg = {0};
-    add_numbered(&svg, c->document.data);
+    add_renumbered(&svg, c->document.data);
     sdm_text_add(&svg, "%s%s\n", c->labels.data ? c->labels.data : "", CLOSING);
     const sdm_status s = svg.failed || c->labels.failed
-                             ? fail(c, CAIRO_STATUS_NO_MEMORY, err)
+                             ? canvas_fail(c, CAIRO_STATUS_NO_MEMORY, err)
                              : sdm_outfile_write(c->file, svg.data, svg.size, err);
     sdm_text_dispose(&svg);
     return s;
@@ -175,7 +182,7 @@ sdm_status sdm_canvas_finish(sdm_canvas *c, sdm_error *err)
         status = cairo_surface_write_to_png_stream(c->surface, write_bytes, c);
     cairo_surface_finish(c->surface);
     if (!status) status = cairo_surface_status(c->surface);
-    sdm_status s = status ? fail(c, status, err) : SDM_OK;
+    sdm_status s = status ? canvas_fail(c, status, err) : SDM_OK;
     if (!s && c->format == FORMAT_SVG) s = write_svg(c, err);
     if (!s) s = sdm_outfile_commit(&c->file, err);
     sdm_canvas_discard(c);
@@ -304,7 +311,7 @@ static void clean_text(const char *text, char out[TEXT_MAX + 4])
 }
 
 /* Sets the font; returns the width of the clean text. */
-static double measure(sdm_canvas *c, double size, bool bold, const char *clean)
+static double set_font(sdm_canvas *c, double size, bool bold, const char *clean)
 {
     cairo_text_extents_t extents;
     cairo_select_font_face(c->cr, "sans-serif", CAIRO_FONT_SLANT_NORMAL,
@@ -318,50 +325,45 @@ double sdm_canvas_text_width(sdm_canvas *c, double size, const char *text)
 {
     char clean[TEXT_MAX + 4];
     clean_text(text, clean);
-    return measure(c, size, false, clean);
+    return set_font(c, size, false, clean);
 }
 
-/* One <text> element; style: further attributes. */
-static void add_label(sdm_canvas *c, double x, double y, const sdm_type *type, const char *style,
-                      const char *clean)
+/* Adds a <text> element to an SVG file; the halo is a stroke below the letters. */
+static void add_label(sdm_canvas *c, double x, double y, sdm_type type, const char *clean)
 {
     static const char *const ANCHORS[] = {"start", "middle", "end"};
     char at[2][32], size[32];
     sdm_text *t = &c->labels;
     sdm_text_add(t, "<text transform=\"translate(%s,%s)%s\" font-family=\"sans-serif\"",
                  sdm_format_real(x, at[0]), sdm_format_real(y, at[1]),
-                 type->upwards ? " rotate(-90)" : "");
-    sdm_text_add(t, " font-size=\"%s\" font-weight=\"%s\" text-anchor=\"%s\" %s>",
-                 sdm_format_real(type->size * EM_PER_CAPITAL, size), type->bold ? "bold" : "normal",
-                 ANCHORS[type->align], style);
+                 type.upwards ? " rotate(-90)" : "");
+    sdm_text_add(t, " font-size=\"%s\"%s text-anchor=\"%s\" fill=\"#%02x%02x%02x\"%s>",
+                 sdm_format_real(type.size * EM_PER_CAPITAL, size),
+                 type.bold ? " font-weight=\"bold\"" : "", ANCHORS[type.align], type.colour.r,
+                 type.colour.g, type.colour.b,
+                 type.halo ? " stroke=\"#fff\" stroke-opacity=\"0.75\" stroke-width=\"3\""
+                             " stroke-linejoin=\"round\" paint-order=\"stroke\""
+                           : "");
     for (const char *p = clean; *p; p++) {
-        if (*p == '&' || *p == '<' || *p == '>')
-            sdm_text_add(t, *p == '&' ? "&amp;" : *p == '<' ? "&lt;" : "&gt;");
-        else
-            sdm_text_add(t, "%c", *p);
+        const char *entity = *p == '&' ? "&amp;" : *p == '<' ? "&lt;" : *p == '>' ? "&gt;" : NULL;
+        sdm_text_add(t, "%.*s", entity ? 5 : 1, entity ? entity : p);
     }
     sdm_text_add(t, "</text>\n");
 }
 
 void sdm_canvas_text(sdm_canvas *c, double x, double y, sdm_type type, const char *text)
 {
-    char clean[TEXT_MAX + 4], fill[32];
+    char clean[TEXT_MAX + 4];
     clean_text(text, clean);
     if (c->format == FORMAT_SVG) {
-        snprintf(fill, sizeof fill, "fill=\"#%02x%02x%02x\"", type.colour.r, type.colour.g,
-                 type.colour.b);
-        if (type.halo)
-            add_label(c, x, y, &type,
-                      "fill=\"none\" stroke=\"#fff\" stroke-opacity=\"0.75\" stroke-width=\"3\" "
-                      "stroke-linejoin=\"round\"",
-                      clean);
-        add_label(c, x, y, &type, fill, clean);
+        add_label(c, x, y, type, clean);
         return;
     }
-    const double left = -measure(c, type.size, type.bold, clean) * (int)type.align / 2;
+    const double left = -set_font(c, type.size, type.bold, clean) * (int)type.align / 2;
     cairo_save(c->cr);
     cairo_translate(c->cr, x, y);
     if (type.upwards) cairo_rotate(c->cr, -acos(0));
+    // the rim of the letters' outlines, then the letters
     if (type.halo) {
         cairo_move_to(c->cr, left, 0);
         cairo_text_path(c->cr, clean);

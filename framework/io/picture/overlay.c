@@ -19,12 +19,13 @@ static const sdm_colour LINES[MAPS_MAX] = {
     {232, 40, 44}, {255, 214, 10}, {30, 190, 130}, {190, 110, 230}};
 static const sdm_colour RIM = {20, 20, 26};
 
+/* The data and where everything lies on the canvas. */
 typedef struct overlay {
     const float *image;
     const sdm_picture_map *maps;
     size_t n_maps;
     sdm_sections sections;
-    double low, high; /* the values shown in black and in white */
+    double low, high; /* the values shown as black and as white */
 } overlay;
 
 static int ascending(const void *a, const void *b)
@@ -35,7 +36,7 @@ static int ascending(const void *a, const void *b)
 
 /* Black and white are percentiles 1 and 99 of the three slices, so that a few bright voxels do not
  * darken the rest. */
-static sdm_status find_window(overlay *o, sdm_error *err)
+static sdm_status find_grey_range(overlay *o, sdm_error *err)
 {
     size_t n = 0, used = 0;
     sdm_slice slice[3];
@@ -62,6 +63,7 @@ static sdm_status find_window(overlay *o, sdm_error *err)
     return SDM_OK;
 }
 
+/* Draws one slice with its contours. */
 static void draw_panel(sdm_canvas *c, const overlay *o, sdm_box box, int axis)
 {
     const sdm_slice grey = sdm_section_of(&o->sections, o->image, axis);
@@ -86,7 +88,7 @@ static void draw_legend(sdm_canvas *c, const overlay *o, double x, double y)
     }
 }
 
-static void draw(sdm_canvas *c, const overlay *o, int height, const char *title)
+static void draw_overlay(sdm_canvas *c, const overlay *o, int height, const char *title)
 {
     const sdm_sections *s = &o->sections;
     int x = SDM_SECTION_LEFT;
@@ -102,8 +104,8 @@ static void draw(sdm_canvas *c, const overlay *o, int height, const char *title)
                    o->high, "value of the image");
 }
 
-static sdm_status check(const char *path, const sdm_grid *grid, const float *image,
-                        const sdm_picture_map *maps, size_t n_maps, sdm_error *err)
+static sdm_status check_arguments(const char *path, const sdm_grid *grid, const float *image,
+                                  const sdm_picture_map *maps, size_t n_maps, sdm_error *err)
 {
     if (!path || !grid || !image || (n_maps && !maps))
         return sdm_fail(err, SDM_E_ARG, "sdm_picture_overlay: NULL argument");
@@ -119,11 +121,11 @@ sdm_status sdm_picture_overlay(const char *path, const sdm_grid *grid, const flo
                                const sdm_picture_map *maps, size_t n_maps, const char *title,
                                sdm_error *err)
 {
-    sdm_status s = check(path, grid, image, maps, n_maps, err);
+    sdm_status s = check_arguments(path, grid, image, maps, n_maps, err);
     if (s) return s;
     overlay o = {.image = image, .maps = maps, .n_maps = n_maps};
     sdm_sections_place(&o.sections, grid, maps[0].values);
-    s = find_window(&o, err);
+    s = find_grey_range(&o, err);
     if (s) return s;
     int w = SDM_SECTION_LEFT, tall = 0;
     for (int axis = 0; axis < 3; axis++) {
@@ -134,6 +136,6 @@ sdm_status sdm_picture_overlay(const char *path, const sdm_grid *grid, const flo
     const int height = TOP + tall + SDM_SECTION_BELOW + FOOT;
     s = sdm_canvas_create(path, w < 480 ? 480 : w, height, &c, err);
     if (s) return s;
-    draw(c, &o, height, title);
+    draw_overlay(c, &o, height, title);
     return sdm_canvas_finish(c, err);
 }

@@ -4,13 +4,14 @@
 #include <math.h>
 #include <stdio.h>
 
+/* Colours of the table for a slice. */
 #define SHADES 2048
 /* A contour's rim is this much wider than its line, in pixels. */
 #define RIM 2.2
 #define RIM_ALPHA 0.55
 
 /* The value at column i, -1 <= i <= n[0], of row j inside of the slice. */
-static double along_row(const sdm_slice *s, int64_t i, int64_t j)
+static double row_value(const sdm_slice *s, int64_t i, int64_t j)
 {
     const float *row = s->v + (size_t)j * s->stride[1];
     const int64_t last = s->n[0] - 1;
@@ -24,9 +25,9 @@ static double along_row(const sdm_slice *s, int64_t i, int64_t j)
 static double value_at(const sdm_slice *s, int64_t i, int64_t j)
 {
     const int64_t last = s->n[1] - 1;
-    if (j >= 0 && j <= last) return along_row(s, i, j);
+    if (j >= 0 && j <= last) return row_value(s, i, j);
     const int64_t edge = j < 0 ? 0 : last, next = last == 0 ? 0 : j < 0 ? 1 : last - 1;
-    return 2 * along_row(s, i, edge) - along_row(s, i, next);
+    return 2 * row_value(s, i, edge) - row_value(s, i, next);
 }
 
 /* Bilinear; whole numbers u, v are the centres of voxels. */
@@ -39,7 +40,7 @@ static double interpolate(const sdm_slice *s, double u, double v)
     return low * (1 - tv) + high * tv;
 }
 
-/* The image of a slice or of a colour bar. */
+/* A slice and its colour scale. */
 typedef struct shading {
     sdm_box box;
     const sdm_slice *slice;
@@ -75,7 +76,7 @@ typedef struct corner {
 } corner;
 
 /* Where the level is crossed on the side from corner `from` to corner `to`. */
-static void crossing(const corner *from, const corner *to, double at[2])
+static void find_crossing(const corner *from, const corner *to, double at[2])
 {
     const double t = from->v / (from->v - to->v);
     at[0] = from->x + t * (to->x - from->x);
@@ -91,7 +92,7 @@ static void trace_cell(sdm_canvas *c, const corner k[4])
     for (int i = 0; i < 4; i++) {
         const corner *a = &k[i], *b = &k[(i + 1) % 4];
         if (!isfinite(a->v) || !isfinite(b->v)) return;
-        if ((a->v < 0) != (b->v < 0)) crossing(a, b, at[n++]);
+        if ((a->v < 0) != (b->v < 0)) find_crossing(a, b, at[n++]);
     }
     if (n == 4) {
         const double even = k[0].v * k[2].v, odd = k[1].v * k[3].v;
@@ -106,7 +107,8 @@ static void trace_cell(sdm_canvas *c, const corner k[4])
     }
 }
 
-static void trace(sdm_canvas *c, sdm_box box, const sdm_slice *s, double level)
+/* Adds the contour of the slice to the path. */
+static void trace_contour(sdm_canvas *c, sdm_box box, const sdm_slice *s, double level)
 {
     // cells between voxel centres, and one more on each side for the half voxel up to the border
     for (int64_t j = -1; j < s->n[1]; j++) {
@@ -128,7 +130,7 @@ void sdm_panel_contour(sdm_canvas *c, sdm_box box, const sdm_slice *s, double le
                        sdm_colour colour, sdm_colour rim)
 {
     sdm_canvas_clip(c, box);
-    trace(c, box, s, level);
+    trace_contour(c, box, s, level);
     sdm_canvas_stroke_keep(c, width + RIM, rim, RIM_ALPHA);
     sdm_canvas_stroke(c, width, colour);
     sdm_canvas_unclip(c);
@@ -165,19 +167,13 @@ void sdm_panel_scale_bar(sdm_canvas *c, sdm_box box, double pixels_per_mm)
                     text);
 }
 
-static sdm_colour bar_pixel(const void *user, int x, int y)
-{
-    const shading *p = user;
-    (void)y;
-    return sdm_map_colour(p->map, p->low, p->high,
-                          p->low + (x + 0.5) / p->box.w * (p->high - p->low));
-}
-
 void sdm_colour_bar(sdm_canvas *c, sdm_box box, sdm_colour_map map, double low, double high,
                     const char *caption)
 {
-    const shading p = {.box = box, .map = map, .low = low, .high = high};
-    sdm_canvas_image(c, box, bar_pixel, &p);
+    // a slice of two voxels: their centres are at a quarter and three quarters of the bar
+    const float quarters[2] = {(float)(0.75 * low + 0.25 * high),
+                               (float)(0.25 * low + 0.75 * high)};
+    sdm_panel_colours(c, box, &(sdm_slice){quarters, {2, 1}, {1, 2}}, map, low, high);
     sdm_canvas_frame(c, box, SDM_INK_LIGHT);
     double first, step;
     char text[32];

@@ -22,13 +22,14 @@ typedef struct window {
 } window;
 
 /* Point i in the coordinates of the axes; false when it is left out. */
-static bool point(const sdm_curve *curve, size_t i, bool log_y, double p[2])
+static bool curve_point(const sdm_curve *curve, size_t i, bool log_y, double p[2])
 {
     p[0] = curve->x[i];
     p[1] = log_y ? (curve->y[i] > 0 ? log10(curve->y[i]) : NAN) : curve->y[i];
     return fabs(p[0]) <= FLT_MAX && fabs(p[1]) <= FLT_MAX;
 }
 
+/* The range of the points, widened by 5 % above and below; never empty. */
 static void find_window(window *w, const sdm_curve *curves, size_t n_curves)
 {
     for (int d = 0; d < 2; d++) {
@@ -38,7 +39,7 @@ static void find_window(window *w, const sdm_curve *curves, size_t n_curves)
     for (size_t c = 0; c < n_curves; c++)
         for (size_t i = 0; i < curves[c].n; i++) {
             double p[2];
-            if (!point(&curves[c], i, w->log_y, p)) continue;
+            if (!curve_point(&curves[c], i, w->log_y, p)) continue;
             for (int d = 0; d < 2; d++) {
                 w->low[d] = fmin(w->low[d], p[d]);
                 w->high[d] = fmax(w->high[d], p[d]);
@@ -159,7 +160,7 @@ static void draw_curve(sdm_canvas *c, const window *w, const sdm_curve *curve, s
     bool is_started = false;
     sdm_canvas_clip(c, area);
     for (size_t i = 0; i < curve->n; i++) {
-        const bool ok = point(curve, i, w->log_y, p);
+        const bool ok = curve_point(curve, i, w->log_y, p);
         // a point between two gaps shows as a dot, a line of length 0
         if (ok && !is_started) sdm_canvas_move_to(c, to_x(w, p[0]), to_y(w, p[1]));
         if (ok) sdm_canvas_line_to(c, to_x(w, p[0]), to_y(w, p[1]));

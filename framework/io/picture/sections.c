@@ -1,4 +1,4 @@
-/* Three orthogonal sections of a grid on a canvas. */
+/* Places three orthogonal sections of a grid and draws their axes. */
 #include "sections.h"
 
 #include <math.h>
@@ -15,6 +15,7 @@ static void section_axes(int axis, int *right, int *up)
     *up = axis == 2 ? 1 : 2;
 }
 
+/* The index of each section: the middle of the negative values' bounding box. */
 static void find_middle(sdm_sections *s, const float *v)
 {
     const int64_t *n = s->grid->n;
@@ -33,6 +34,7 @@ static void find_middle(sdm_sections *s, const float *v)
     for (int d = 0; d < 3; d++) s->at[d] = high[d] < 0 ? (n[d] - 1) / 2 : (low[d] + high[d]) / 2;
 }
 
+/* Finds the grid axes that are parallel to a world axis. */
 static void find_axes(sdm_sections *s)
 {
     for (int axis = 0; axis < 3; axis++) {

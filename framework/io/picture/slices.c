@@ -33,7 +33,7 @@ typedef struct layout {
 
 /* The colour scale of distances or of errors: the range of their finite values, widened to hold 0;
  * symmetric about 0 for errors of both signs; never empty. */
-static void find_range(layout *l, bool error)
+static void layout_range(layout *l, bool error)
 {
     double low = INFINITY, high = -INFINITY;
     for (size_t m = 0; m < l->n_maps; m++) {
@@ -60,7 +60,7 @@ static void find_range(layout *l, bool error)
 }
 
 /* The boxes of the first column and the size of the canvas. */
-static void place(layout *l, int *width, int *height)
+static void layout_place(layout *l, int *width, int *height)
 {
     int y = TOP;
     sdm_sections_place(&l->sections, l->g, l->maps[0].values);
@@ -154,8 +154,9 @@ static void draw_column(sdm_canvas *c, const layout *l, size_t column, int foot)
     if (!e) draw_legend(c, l, x + l->column / 2.0, foot + 72);
 }
 
-static sdm_status check(const char *path, const sdm_grid *grid, const sdm_picture_map *maps,
-                        size_t n_maps, const float *levels, size_t n_levels, sdm_error *err)
+static sdm_status check_arguments(const char *path, const sdm_grid *grid,
+                                  const sdm_picture_map *maps, size_t n_maps, const float *levels,
+                                  size_t n_levels, sdm_error *err)
 {
     if (!path || !grid || !maps || (n_levels && !levels))
         return sdm_fail(err, SDM_E_ARG, "sdm_picture_slices: NULL argument");
@@ -173,13 +174,13 @@ static sdm_status check(const char *path, const sdm_grid *grid, const sdm_pictur
 sdm_status sdm_picture_slices(const char *path, const sdm_grid *grid, const sdm_picture_map *maps,
                               size_t n_maps, const float *levels, size_t n_levels, sdm_error *err)
 {
-    sdm_status s = check(path, grid, maps, n_maps, levels, n_levels, err);
+    sdm_status s = check_arguments(path, grid, maps, n_maps, levels, n_levels, err);
     if (s) return s;
     layout l = {.g = grid, .maps = maps, .n_maps = n_maps, .levels = levels, .n_levels = n_levels};
     int w, h;
-    find_range(&l, false);
-    find_range(&l, true);
-    place(&l, &w, &h);
+    layout_range(&l, false);
+    layout_range(&l, true);
+    layout_place(&l, &w, &h);
     sdm_canvas *c = NULL;
     s = sdm_canvas_create(path, w, h, &c, err);
     if (s) return s;

@@ -1,8 +1,8 @@
-/* Writing of MetaImage files (.mha): a text header with the data behind it, not compressed; frame
- * LPS, mm. */
-#include "imageparts.h"
+/* Writes MetaImage files (.mha): a text header followed by uncompressed voxels; frame LPS, mm. */
+#include "image_writers.h"
 #include "sdm/internal/text.h"
 
+/* Adds "key = v[0] v[1] ...". */
 static void add_vector(sdm_text *t, const char *key, const double *v, int n)
 {
     char number[32];
@@ -16,7 +16,7 @@ static void add_header(sdm_text *t, const sdm_image *m)
     const sdm_grid *g = m->grid;
     const char *type = sdm_voxel_formats[m->type].meta;
     const double centre[3] = {0};
-    double matrix[9]; /* the directions of the three axes, one after the other */
+    double matrix[9]; // the three axis directions, one after the other
     for (int i = 0; i < 9; i++) matrix[i] = g->dir[3 * (i % 3) + i / 3];
     char comment[256];
     sdm_one_line(m->text, comment, sizeof comment);
@@ -38,11 +38,11 @@ sdm_status sdm_metaimage_write(sdm_outfile *f, const sdm_image *m, sdm_error *er
     sdm_text header = {0};
     sdm_sink sink;
     add_header(&header, m);
-    sdm_status e =
+    sdm_status s =
         header.failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the header of an image") : SDM_OK;
-    if (!e) e = sdm_outfile_write(f, header.data, header.size, err);
+    if (!s) s = sdm_outfile_write(f, header.data, header.size, err);
     sdm_text_dispose(&header);
-    if (!e) e = sdm_sink_open(&sink, f, false, err);
-    if (!e) e = sdm_sink_voxels(&sink, m->values, m->type, sdm_grid_count(m->grid), err);
-    return e;
+    if (!s) s = sdm_sink_open(&sink, f, false, err);
+    if (!s) s = sdm_sink_voxels(&sink, m->values, m->type, sdm_grid_count(m->grid), err);
+    return s;
 }

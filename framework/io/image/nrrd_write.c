@@ -1,8 +1,9 @@
-/* Writing of NRRD files with the data attached and gzipped; frame left-posterior-superior, mm. */
-#include "imageparts.h"
+/* Writes NRRD files (.nrrd): a text header followed by the voxels, compressed with gzip; frame
+ * left-posterior-superior, mm. */
+#include "image_writers.h"
 #include "sdm/internal/text.h"
 
-/* "(x,y,z)" */
+/* Adds "(x,y,z)". */
 static void add_vector(sdm_text *t, const double v[3])
 {
     char x[32], y[32], z[32];
@@ -40,14 +41,14 @@ sdm_status sdm_nrrd_write(sdm_outfile *f, const sdm_image *m, sdm_error *err)
     sdm_text header = {0};
     sdm_sink sink;
     add_header(&header, m);
-    sdm_status e =
+    sdm_status s =
         header.failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the header of an image") : SDM_OK;
-    if (!e) e = sdm_outfile_write(f, header.data, header.size, err);
+    if (!s) s = sdm_outfile_write(f, header.data, header.size, err);
     sdm_text_dispose(&header);
-    if (!e) e = sdm_sink_open(&sink, f, true, err);
-    if (e) return e;
-    e = sdm_sink_voxels(&sink, m->values, m->type, sdm_grid_count(m->grid), err);
-    if (!e) e = sdm_sink_finish(&sink, err);
+    if (!s) s = sdm_sink_open(&sink, f, true, err);
+    if (s) return s;
+    s = sdm_sink_voxels(&sink, m->values, m->type, sdm_grid_count(m->grid), err);
+    if (!s) s = sdm_sink_finish(&sink, err);
     sdm_sink_free(&sink);
-    return e;
+    return s;
 }

@@ -1,15 +1,17 @@
-/* Reading of images: the format follows the name, the voxels become float. */
+/* Reads image files: the ending of the name selects the reader of the header; the voxels are
+ * converted to float. */
 #include "sdm/volume.h"
 
 #include <math.h>
 
+#include "image_readers.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/text.h"
-#include "volumeparts.h"
 
-enum { BLOCK = 4096 }; /* voxels decoded at once */
+enum { BLOCK = 4096 }; // voxels decoded at a time
 
-typedef sdm_status header_reader(sdm_stream *s, sdm_image_header *h, sdm_volume *v, sdm_error *err);
+typedef sdm_status header_reader(sdm_stream *in, sdm_image_header *h, sdm_volume *v,
+                                 sdm_error *err);
 
 static const struct {
     const char *ext;
@@ -44,7 +46,8 @@ static sdm_status fail_unknown(const char *path, sdm_error *err)
                     path);
 }
 
-static void survey(sdm_volume *v, const float *values, size_t n)
+/* Updates the statistics of *v with values[n]. */
+static void add_statistics(sdm_volume *v, const float *values, size_t n)
 {
     for (size_t i = 0; i < n; i++) {
         const float x = values[i];
@@ -57,13 +60,17 @@ static void survey(sdm_volume *v, const float *values, size_t n)
     }
 }
 
-/* Puts voxels in file order where they belong: layers take turns after every run. */
-typedef struct placer {
-    size_t run, layers, count;    /* count: voxels of a layer */
-    size_t in_run, layer, before; /* before: voxels of earlier runs of each layer */
-} placer;
+/* Sorts voxels in file order into layers. The file holds `run` voxels of layer 0, then `run` voxels
+ * of layer 1, and so on, and begins again with layer 0. */
+typedef struct layer_sorter {
+    size_t run, layers;
+    /* voxels of a whole layer */
+    size_t count;
+    /* the next voxel: its layer, its place in the run, the voxels of this layer in earlier runs */
+    size_t layer, in_run, before;
+} layer_sorter;
 
-static void place(placer *p, const float *from, size_t n, float *values)
+static void sort_voxels(layer_sorter *p, const float *from, size_t n, float *values)
 {
     while (n > 0) {
         const size_t left = p->run - p->in_run, part = n < left ? n : left;
@@ -79,47 +86,48 @@ static void place(placer *p, const float *from, size_t n, float *values)
     }
 }
 
-/* *total = voxels of all layers, once the file has turned out to be of that length. */
-static sdm_status count_voxels(sdm_stream *s, const sdm_image_header *h, size_t count,
+/* *total = number of voxels of all layers. Moves the stream to the first voxel when they are at the
+ * end of the file, and compares their size with the length of the file. */
+static sdm_status count_voxels(sdm_stream *in, const sdm_image_header *h, size_t count,
                                size_t *total, sdm_error *err)
 {
     const size_t size = sdm_voxel_size(h->type);
     size_t n_bytes;
     if (sdm_mul(count, h->layers, total, NULL) || sdm_mul(*total, size, &n_bytes, NULL))
         return sdm_fail(err, SDM_E_FORMAT,
-                        "%s: the header declares more voxels than memory can hold", s->path);
-    const sdm_status e = h->tail ? sdm_stream_skip_to_tail(s, n_bytes, err) : SDM_OK;
-    return e ? e : sdm_stream_expect(s, n_bytes, err);
+                        "%s: the header declares more voxels than memory can hold", in->path);
+    const sdm_status s = h->tail ? sdm_stream_skip_to_tail(in, n_bytes, err) : SDM_OK;
+    return s ? s : sdm_stream_expect(in, n_bytes, err);
 }
 
-static sdm_status read_voxels(sdm_stream *s, const sdm_image_header *h, sdm_volume *v,
+static sdm_status read_voxels(sdm_stream *in, const sdm_image_header *h, sdm_volume *v,
                               sdm_error *err)
 {
     uint8_t bytes[8 * BLOCK];
     float block[BLOCK];
     const size_t count = sdm_grid_count(&v->grid), size = sdm_voxel_size(h->type);
     size_t total;
-    sdm_status e = count_voxels(s, h, count, &total, err);
-    if (!e) e = SDM_ALLOC(&v->values, total, s->path, err);
-    if (e) return e;
+    sdm_status s = count_voxels(in, h, count, &total, err);
+    if (!s) s = SDM_ALLOC(&v->values, total, in->path, err);
+    if (s) return s;
     v->min = INFINITY;
     v->max = -INFINITY;
-    placer p = {.run = h->run ? h->run : count, .layers = h->layers, .count = count};
-    for (size_t done = 0; done < total && !e;) {
+    layer_sorter p = {.run = h->run ? h->run : count, .layers = h->layers, .count = count};
+    for (size_t done = 0; done < total && !s;) {
         const size_t n = total - done < BLOCK ? total - done : BLOCK;
-        e = sdm_stream_read(s, bytes, n * size, err);
-        if (e) break;
+        s = sdm_stream_read(in, bytes, n * size, err);
+        if (s) break;
         sdm_voxels_decode(bytes, h->type, h->big, h->slope, h->intercept, n, block);
-        survey(v, block, n);
-        place(&p, block, n, v->values);
+        add_statistics(v, block, n);
+        sort_voxels(&p, block, n, v->values);
         done += n;
     }
-    if (!e) e = sdm_stream_end(s, err);
+    if (!s) s = sdm_stream_end(in, err);
     if (v->min > v->max) v->min = v->max = 0;
-    v->checked = s->zip;
+    v->checked = in->zip;
     v->n_layers = h->layers;
     v->stored = h->type;
-    return e;
+    return s;
 }
 
 sdm_status sdm_volume_read(const char *path, sdm_volume *out, sdm_error *err)
@@ -127,19 +135,19 @@ sdm_status sdm_volume_read(const char *path, sdm_volume *out, sdm_error *err)
     if (!path || !out) return sdm_fail(err, SDM_E_ARG, "sdm_volume_read: NULL argument");
     sdm_volume_dispose(out);
     header_reader *read_header;
-    sdm_stream *s = NULL;
+    sdm_stream *in = NULL;
     sdm_image_header h = {.slope = 1, .layers = 1};
     if (!find_reader(path, &read_header)) return fail_unknown(path, err);
-    sdm_status e = SDM_ALLOC(&s, 1, "buffer of an image file", err);
-    if (e) return e;
-    e = sdm_stream_open(s, path, err);
-    if (!e) e = read_header(s, &h, out, err);
-    if (!e && (e = sdm_frame_grid(&h, &out->grid, err))) e = sdm_fail_in(err, e, "%s", path);
-    if (!e) e = read_voxels(s, &h, out, err);
-    sdm_stream_close(s);
-    sdm_free(s);
-    if (e) sdm_volume_dispose(out);
-    return e;
+    sdm_status s = SDM_ALLOC(&in, 1, "buffer of an image file", err);
+    if (s) return s;
+    s = sdm_stream_open(in, path, err);
+    if (!s) s = read_header(in, &h, out, err);
+    if (!s && (s = sdm_frame_grid(&h, &out->grid, err))) s = sdm_fail_in(err, s, "%s", path);
+    if (!s) s = read_voxels(in, &h, out, err);
+    sdm_stream_close(in);
+    sdm_free(in);
+    if (s) sdm_volume_dispose(out);
+    return s;
 }
 
 void sdm_volume_dispose(sdm_volume *v)
@@ -167,18 +175,4 @@ sdm_status sdm_volume_find_segment(const sdm_volume *v, const char *name, const 
              list.data ? list.data : "none: it names no segments");
     sdm_text_dispose(&list);
     return SDM_E_ARG;
-}
-
-double sdm_length_unit(const char *name)
-{
-    static const struct {
-        const char *names;
-        double mm;
-    } units[] = {{"mm|millimeter|millimetre|millimeters", 1},
-                 {"um|micron|microns|micrometer|micrometre|\xC2\xB5m", 1e-3},
-                 {"cm|centimeter|centimetre", 10},
-                 {"m|meter|metre", 1000}};
-    for (size_t i = 0; i < sizeof units / sizeof *units; i++)
-        if (sdm_is_listed(name, units[i].names)) return units[i].mm;
-    return 0;
 }

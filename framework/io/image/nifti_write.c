@@ -1,17 +1,16 @@
-/* Writing of NIfTI-1 single files (.nii): a 348-byte header, 4 bytes without extensions, the
- * voxels; frame RAS. */
-#include "imageparts.h"
+/* Writes NIfTI-1 single files (.nii): a header of 348 bytes, 4 zero bytes (no extensions), the
+ * voxels; frame RAS. Names in comments are the fields of nifti1.h. */
+#include "image_writers.h"
 
 #include <math.h>
 
-#define NIFTI_START 352
+#define NIFTI_START 352      /* offset of the first voxel */
 #define NIFTI_SIZE_MAX 32767 /* sizes are int16 */
 #define NIFTI_UNIT_MM 2
-#define NIFTI_SCANNER 1 /* code of both transforms: the world of the scanner */
+#define NIFTI_SCANNER 1 /* NIFTI_XFORM_SCANNER_ANAT */
 
-/* Row-major rotation (a reflection is taken out through qfac) -> unit quaternion with a >= 0; the
-   branch with the largest component is taken, so no root of a small number is divided by (Shepperd
-   1978). */
+/* Converts a rotation r[3][3] into a unit quaternion q = (a, b, c, d), a >= 0. Divides by the
+   largest component, so that no small number is in a denominator (Shepperd 1978). */
 static void quaternion(const double r[9], double q[4])
 {
     const double square[4] = {1 + r[0] + r[4] + r[8], 1 + r[0] - r[4] - r[8],
@@ -35,10 +34,11 @@ static double determinant(const double r[9])
            r[2] * (r[3] * r[7] - r[4] * r[6]);
 }
 
-/* Both transforms: qform as a quaternion, sform as a matrix. */
+/* Stores both transforms from voxels to the world: qform as a quaternion, sform as a matrix. A
+ * reflection is in sform as it is, and in qform as qfac = -1, a reversed third axis. */
 static void put_transform(uint8_t *h, const sdm_grid *g)
 {
-    const double flip[3] = {-1, -1, 1}; /* LPS -> RAS */
+    const double flip[3] = {-1, -1, 1}; // LPS to RAS
     double r[9], q[4];
     for (int i = 0; i < 9; i++) r[i] = flip[i / 3] * g->dir[i];
     for (int row = 0; row < 3; row++) {
@@ -91,11 +91,11 @@ sdm_status sdm_nifti_write(sdm_outfile *f, bool zip, const sdm_image *m, sdm_err
     sdm_sink sink;
     uint8_t header[NIFTI_START];
     put_header(header, m);
-    sdm_status e = sdm_sink_open(&sink, f, zip, err);
-    if (e) return e;
-    e = sdm_sink_write(&sink, header, sizeof header, err);
-    if (!e) e = sdm_sink_voxels(&sink, m->values, m->type, sdm_grid_count(g), err);
-    if (!e) e = sdm_sink_finish(&sink, err);
+    sdm_status s = sdm_sink_open(&sink, f, zip, err);
+    if (s) return s;
+    s = sdm_sink_write(&sink, header, sizeof header, err);
+    if (!s) s = sdm_sink_voxels(&sink, m->values, m->type, sdm_grid_count(g), err);
+    if (!s) s = sdm_sink_finish(&sink, err);
     sdm_sink_free(&sink);
-    return e;
+    return s;
 }

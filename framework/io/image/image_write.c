@@ -1,21 +1,21 @@
-/* Writing of image files: the format follows the name. */
+/* Writes image files; the ending of the name selects the format. */
+#include "image_writers.h"
 #include "sdm/image.h"
-#include "imageparts.h"
 
 static sdm_status write_file(const char *path, const sdm_image *m, sdm_error *err)
 {
     sdm_outfile *f = NULL;
-    sdm_status e = sdm_outfile_open(path, &f, err);
-    if (e) return e;
+    sdm_status s = sdm_outfile_open(path, &f, err);
+    if (s) return s;
     if (sdm_has_ext(path, ".nrrd"))
-        e = sdm_nrrd_write(f, m, err);
+        s = sdm_nrrd_write(f, m, err);
     else if (sdm_has_ext(path, ".mha"))
-        e = sdm_metaimage_write(f, m, err);
+        s = sdm_metaimage_write(f, m, err);
     else
-        e = sdm_nifti_write(f, sdm_has_ext(path, ".gz"), m, err);
-    if (!e) return sdm_outfile_commit(&f, err);
+        s = sdm_nifti_write(f, sdm_has_ext(path, ".gz"), m, err);
+    if (!s) return sdm_outfile_commit(&f, err);
     sdm_outfile_discard(&f);
-    return e;
+    return s;
 }
 
 sdm_status sdm_volume_write(const char *path, const sdm_grid *grid, const void *values,
@@ -26,8 +26,8 @@ sdm_status sdm_volume_write(const char *path, const sdm_grid *grid, const void *
         return sdm_fail(err, SDM_E_ARG, "sdm_volume_write: NULL argument");
     if (!sdm_voxel_size(type))
         return sdm_fail(err, SDM_E_ARG, "%s: %d is no voxel type", path, (int)type);
-    const sdm_status e = sdm_grid_check(grid, err);
-    if (e) return e;
+    const sdm_status s = sdm_grid_check(grid, err);
+    if (s) return s;
     const sdm_image m = {.grid = grid, .values = values, .type = type, .text = text ? text : ""};
     for (size_t i = 0; i < sizeof known / sizeof *known; i++)
         if (sdm_has_ext(path, known[i])) return write_file(path, &m, err);
@@ -44,8 +44,8 @@ sdm_status sdm_image_write(const char *path, const sdm_grid *grid, const float *
         return sdm_fail(err, SDM_E_ARG, "sdm_image_write: NULL argument");
     if (!sdm_has_ext(path, ".npy"))
         return sdm_volume_write(path, grid, values, SDM_VOXEL_FLOAT32, text, err);
-    const sdm_status e = sdm_grid_check(grid, err);
-    if (e) return e;
+    const sdm_status s = sdm_grid_check(grid, err);
+    if (s) return s;
     const size_t shape[3] = {(size_t)grid->n[2], (size_t)grid->n[1], (size_t)grid->n[0]};
     return sdm_npy_write(path, values, shape, 3, err);
 }

@@ -353,6 +353,7 @@ static sdm_status judge(const fit_problem *p, const sdm_fit_result *r, sdm_error
     const sdm_fit_opts *o = p->opts;
     const sdm_fit_appearance *a = &r->appearance, *b = &o->appearance;
     if (p->target->kind == SDM_FIT_IMAGE && !p->given_labels) {
+        // images: evidence and contrast
         const double in = main_mean(a->inside, a->n_inside),
                      out = main_mean(a->outside, a->n_outside);
         const bool darker = main_mean(b->inside, b->n_inside) < main_mean(b->outside, b->n_outside);

@@ -30,11 +30,13 @@ sdm_status sdm_fit_map(const sdm_fit_source *source, const double *params, const
     if (!params || !pose || !grid || !values)
         return sdm_fail(err, SDM_E_ARG,
                         "map of a fit: parameters, pose, grid and values are needed");
+    // the map in the shape's frame
     sdm_status s = sdm_pose_check(pose, err);
     if (!s) s = sdm_grid_check(grid, err);
     fit_maps maps = {0};
     if (!s) s = map_make(source, params, n_threads, &maps, err);
     if (!s) {
+        // interpolated at every voxel of the grid
         const fit_field f = {
             .grid = &maps.grid, .packed = maps.distance, .n_fields = 1, .distance = true};
         fit_state state;

@@ -158,6 +158,7 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
         start.point_sd = fmax(start.point_sd, 0.1 * p->extent.reach);
     p->state = start;
 
+    // each turn with all unknowns but point spread and appearance
     fit_newton_opts newton = {.phase = SDM_FIT_SEARCH,
                               .keep_params = o->keep_params,
                               .keep_pose = o->keep_pose,
@@ -179,6 +180,7 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
         p->state = start;
         s = samples_near_choose(p, SAMPLES_OF_KEPT, err);
     }
+    // the turns that continue, or the one start
     double best = -INFINITY;
     fit_state chosen = given;
     for (size_t i = 0; i < found.n && !s; i++) {

@@ -31,11 +31,9 @@ static double law_constant(double dof)
 }
 
 void sdm_fit_observation_prepare(const sdm_fit_opts *opts, sdm_fit_kind kind,
-                                 const fit_state *state, fit_observation *out)
+                                 const fit_state *state, fit_observation *obs)
 {
     const sdm_fit_appearance *appearance = &state->appearance;
-    // numbers of tissues; only images have any
-    fit_observation *obs = out;
     *obs = (fit_observation){.kind = kind,
                              .model = opts->image_model,
                              .l_ref = state->l_ref,
@@ -44,6 +42,7 @@ void sdm_fit_observation_prepare(const sdm_fit_opts *opts, sdm_fit_kind kind,
                              .n_in = appearance->n_inside,
                              .n_tissues = appearance->n_inside + appearance->n_outside,
                              .n_channels = 1};
+    // only images have tissues
     if (kind != SDM_FIT_IMAGE) {
         obs->n_in = obs->n_tissues = 0;
         return;

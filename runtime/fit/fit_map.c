@@ -46,6 +46,7 @@ sdm_status sdm_fit_map(const sdm_fit_source *source, const double *params, const
 #pragma omp parallel for schedule(static) num_threads(n_threads)
         for (int64_t row = 0; row < grid->n[1] * grid->n[2]; row++)
             for (int64_t i = 0; i < grid->n[0]; i++) {
+                // centre of the voxel in the world
                 double x[3];
                 sdm_grid_world(grid,
                                (const double[3]){(double)i, (double)(row % grid->n[1]),

@@ -304,6 +304,7 @@ void sdm_fit_moments_add(const fit_observation *obs, double value, const float *
         double log_f[2], p[FIT_TISSUES_MAX], ignored;
         const double u = posterior(obs, value, field, &ignored);
         mixtures(obs, value, log_f, p);
+        // robust weights of Student's t make it an iteratively reweighted estimate
         for (size_t i = 0; i < obs->n_tissues; i++) {
             const sdm_fit_law *t = &obs->tissue[i];
             const double r = value - t->mean, share = p[i] * (i < obs->n_in ? u : 1 - u);

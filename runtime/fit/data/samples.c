@@ -214,6 +214,7 @@ sdm_status sdm_fit_samples_evaluate(fit_samples *samples, const fit_maps *maps,
         if (s) return s;
         samples->band_capacity = room;
     }
+    // derivatives, one row for each sample of the band
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         for (size_t i = samples->n * slice / FIT_SLICES; i < samples->n * (slice + 1) / FIT_SLICES;

@@ -123,7 +123,7 @@ static double expected_gain(const fit_problem *p, const double *step)
     return sum;
 }
 
-// information of state and trial change places
+// swaps the information of state and trial
 static void information_swap(fit_problem *p)
 {
     const fit_information kept = p->information;

@@ -146,6 +146,7 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
     const sdm_fit_opts *o = p->opts;
     const fit_state given = p->state;
     fit_state start = given;
+    // samples near the start
     *turn = 0;
     const size_t n = o->turns == SDM_FIT_TURNS_NONE || o->keep_pose ? 1 : o->n_turns;
     sdm_status s = samples_near_choose(p, n > 1 ? SAMPLES_OF_TURNS : SAMPLES_OF_KEPT, err);
@@ -188,6 +189,7 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
         if (n > 1) turn_start(p, found.turn[i], &start, &p->prior);
         newton.max_iterations = KEPT_STEPS;
         s = sdm_fit_newton(p, &newton, &end, err);
+        // back to the given point spread
         p->state.blur = given.blur;
         p->state.l_ref = given.l_ref;
         p->state.point_sd = given.point_sd;

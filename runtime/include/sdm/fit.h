@@ -231,7 +231,7 @@ typedef struct sdm_fit_result {
     double *sd;
     /* [N][N]; 0 where a sd is 0, NaN where a sd is NaN */
     double *correlation;
-    /* [n_params] the estimate is at an end of its range: its sd says little */
+    /* [n_params] the estimate is at an end of its range: its sd is not reliable */
     bool *at_bound;
     /* [n_params] the sd is about that of the prior, or of a uniform distribution over the range:
      * the target does not determine the parameter */

@@ -238,7 +238,7 @@ static sdm_status maximise_settled(fit_problem *p, fit_newton_opts *newton, fit_
         if (newton->averaged) sdm_fit_averaging_widths(p, newton->half_width);
         if (newton->averaged || round > 0) sdm_fit_appearance_mark_absent(p);
         s = sdm_fit_newton(p, newton, end, err);
-        // the tissues are near their places now
+        // from the second round on the tissues are estimated well enough for a tissue field
         p->use_tissue_field = true;
     }
     return s;
@@ -353,6 +353,7 @@ static sdm_status judge(const fit_problem *p, const sdm_fit_result *r, sdm_error
     const sdm_fit_opts *o = p->opts;
     const sdm_fit_appearance *a = &r->appearance, *b = &o->appearance;
     if (p->target->kind == SDM_FIT_IMAGE && !p->given_labels) {
+        // images: evidence and contrast
         const double in = main_mean(a->inside, a->n_inside),
                      out = main_mean(a->outside, a->n_outside);
         const bool darker = main_mean(b->inside, b->n_inside) < main_mean(b->outside, b->n_outside);
@@ -363,6 +364,7 @@ static sdm_status judge(const fit_problem *p, const sdm_fit_result *r, sdm_error
                 "by %.3g (log-likelihood of independent voxels); check the start pose, and whether "
                 "the inside is %s than the outside in this image",
                 -r->evidence, darker ? "darker" : "brighter");
+        // the contrast must be that of the start
         if ((in < out) != darker)
             return sdm_fail(
                 err, SDM_E_QUALITY,

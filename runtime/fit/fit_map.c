@@ -30,11 +30,13 @@ sdm_status sdm_fit_map(const sdm_fit_source *source, const double *params, const
     if (!params || !pose || !grid || !values)
         return sdm_fail(err, SDM_E_ARG,
                         "map of a fit: parameters, pose, grid and values are needed");
+    // the map in the shape's frame
     sdm_status s = sdm_pose_check(pose, err);
     if (!s) s = sdm_grid_check(grid, err);
     fit_maps maps = {0};
     if (!s) s = map_make(source, params, n_threads, &maps, err);
     if (!s) {
+        // interpolated at every voxel of the grid
         const fit_field f = {
             .grid = &maps.grid, .packed = maps.distance, .n_fields = 1, .distance = true};
         fit_state state;
@@ -44,6 +46,7 @@ sdm_status sdm_fit_map(const sdm_fit_source *source, const double *params, const
 #pragma omp parallel for schedule(static) num_threads(n_threads)
         for (int64_t row = 0; row < grid->n[1] * grid->n[2]; row++)
             for (int64_t i = 0; i < grid->n[0]; i++) {
+                // centre of the voxel in the world
                 double x[3];
                 sdm_grid_world(grid,
                                (const double[3]){(double)i, (double)(row % grid->n[1]),

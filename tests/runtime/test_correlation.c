@@ -1,4 +1,5 @@
-/* Correlation of residuals: of smooth noise whose law is known, about fits of smooth functions. */
+/* Autocorrelation of residuals: of smooth noise with known correlation, after fits of smooth
+ * functions. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -17,13 +18,13 @@
 
 enum { NX = 26, NY = 24, NZ = 7, VOXELS = NX * NY * NZ, REACH = 4, UNKNOWNS = 12, FITS = 12 };
 
-// of noise with variance 1
+// smoothing kernel that makes noise of variance 1 from white noise
 static double kernel(int k)
 {
     return exp(-0.5 * k * k) / sqrt(1.7726372048266521);
 } // sum of exp(-k^2)
 
-// white noise through the kernel along each axis
+// e: white noise, smoothed by the kernel along each axis
 static void smooth_noise(uint64_t seed, double *e)
 {
     enum { WX = NX + 2 * REACH, WY = NY + 2 * REACH, WZ = NZ + 2 * REACH };
@@ -43,7 +44,7 @@ static void smooth_noise(uint64_t seed, double *e)
         e[i] = a[i % NX + REACH + (i / NX % NY + REACH) * WX + (i / NX / NY + REACH) * WX * WY];
 }
 
-// cosines, which are orthogonal on the voxels; influence: inverse of their products
+// roots are cosines, which are orthogonal on the voxels; influence: inverse of their products
 static void make_neighbours(fit_neighbours *v, double *influence)
 {
     *v = (fit_neighbours){.n = VOXELS, .n_unknowns = UNKNOWNS, .size = {NX, NY, NZ}, .step = 1};
@@ -53,7 +54,8 @@ static void make_neighbours(fit_neighbours *v, double *influence)
     v->residual = calloc(VOXELS, sizeof *v->residual);
     v->weight = calloc(VOXELS, sizeof *v->weight);
     v->root = calloc(VOXELS * UNKNOWNS, sizeof *v->root);
-    if (!v->number_at || !v->position || !v->draw || !v->residual || !v->weight || !v->root) abort();
+    if (!v->number_at || !v->position || !v->draw || !v->residual || !v->weight || !v->root)
+        abort();
     memset(influence, 0, UNKNOWNS * UNKNOWNS * sizeof *influence);
     for (int i = 0; i < VOXELS; i++) {
         const int p[3] = {i % NX, i / NX % NY, i / NX / NY};
@@ -83,7 +85,7 @@ static void free_neighbours(fit_neighbours *v)
     free(v->root);
 }
 
-// what is left of e by a fit of the functions
+// residuals of e after a least-squares fit of the cosines
 static void fit_functions(fit_neighbours *v, const double *influence, const double *e)
 {
     double x[UNKNOWNS];
@@ -138,7 +140,8 @@ static void test_threads(void **state)
     fit_functions(&v, influence, e);
     for (int i = 0; i < 2; i++) {
         int width;
-        assert_int_equal(sdm_fit_correlation_estimate(&v, 0.2, 1 + 2 * i, c[i], &width, NULL), SDM_OK);
+        assert_int_equal(sdm_fit_correlation_estimate(&v, 0.2, 1 + 2 * i, c[i], &width, NULL),
+                         SDM_OK);
         assert_int_equal(sdm_fit_correlation_correct(&v, influence, width, 1 + 2 * i, c[i], NULL),
                          SDM_OK);
     }

@@ -1,4 +1,4 @@
-/* Fields of a fit: smoothing and interpolation against closed forms. */
+/* Smoothing and interpolation of fields, against closed forms. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -42,7 +42,7 @@ static void test_blur(void **state)
         free(f);
         free(spare);
     }
-    // wider than its taps: cut, but a mean all the same
+    // wider than the largest number of taps: truncated, but the weights still sum to 1
     double *f = room(n, sizeof *f), *spare = room(n, sizeof *f);
     for (size_t i = 0; i < n; i++) f[i] = 7;
     sdm_fit_blur(&g, 1, 1e18, false, 2, &f, &spare);
@@ -63,7 +63,8 @@ static void test_sample(void **state)
         double x[3];
         sdm_grid_world(
             &g, (const double[3]){(double)(i % 9), (double)(i / 9 % 8), (double)(i / 9 / 8)}, x);
-        f[2 * i] = 1 + x[0] - 2 * x[1] + x[0] * x[1] + 0.5 * x[2] * x[2]; // exact for parabolas
+        f[2 * i] =
+            1 + x[0] - 2 * x[1] + x[0] * x[1] + 0.5 * x[2] * x[2]; // reproduced exactly: quadratic
         f[2 * i + 1] = 3 - x[2];
     }
     const fit_field field = {.grid = &g, .packed = f, .n_fields = 2, .distance = true};
@@ -79,21 +80,21 @@ static void test_sample(void **state)
                     fabs(slope[2] - x[2]) < 2e-5);
         assert_true(fabs(rest - (3 - x[2])) < 1e-6);
     }
-    // beyond the border: the way to it is added
+    // beyond the border: plus the distance to it
     double corner[3], out[3], slope[3];
     double rest;
     sdm_grid_world(&g, (const double[3]){8, 7, 6}, corner);
     sdm_grid_world(&g, (const double[3]){8 + 3 / 0.3, 7 + 4 / 0.25, 6}, out);
-    assert_true(fabs(sdm_fit_interpolate(&field, out) - sdm_fit_interpolate(&field, corner) - 5) < 1e-5);
+    assert_true(fabs(sdm_fit_interpolate(&field, out) - sdm_fit_interpolate(&field, corner) - 5) <
+                1e-5);
     (void)sdm_fit_interpolate_all(&field, out, slope, &rest);
     assert_true(fabs(slope[0] * (out[0] - corner[0]) + slope[1] * (out[1] - corner[1]) +
                      slope[2] * (out[2] - corner[2]) - 5) < 1e-4);
     free(f);
 }
 
-/* A point through the blur and between the voxels: the sum over a lattice, wherever that lies, is
-   1, the second moment the variance. Narrow ones too, which take the spread of the splines back,
-   are 0 soon. */
+/* An impulse, smoothed and interpolated: the sum over a shifted lattice is 1, and its second moment
+ * is the variance. Narrow Gaussians, which sharpen to offset the splines, vanish at a distance. */
 static void test_splines(void **state)
 {
     (void)state;
@@ -130,7 +131,7 @@ static void test_splines(void **state)
     }
 }
 
-// derivatives between the voxels against differences, the second ones continuous across voxels
+// derivatives of splines against differences; second derivatives are continuous across voxels
 static void test_splines_slope(void **state)
 {
     (void)state;
@@ -155,7 +156,7 @@ static void test_splines_slope(void **state)
         }
     }
     double second[2];
-    for (int side = 0; side < 2; side++) { // either side of a voxel
+    for (int side = 0; side < 2; side++) { // on either side of a voxel
         double slope[2][3], rest;
         for (int i = 0; i < 2; i++) {
             double x[3];
@@ -168,7 +169,7 @@ static void test_splines_slope(void **state)
     free(f);
 }
 
-// the sampled edge of a plane, sd two thirds of a voxel, wherever it lies between the voxels
+// a plane edge of sd 2/3 voxel, sampled at voxels and interpolated at all offsets
 static void test_splines_edge(void **state)
 {
     (void)state;

@@ -1,4 +1,5 @@
-/* Parts of the fit: derivatives against differences, bounds, correlated noise. */
+/* Parts of the fit: derivatives against differences, steps within limits, averaged gradient,
+ * Anderson acceleration. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -13,10 +14,12 @@
 #include "fit/solver/anderson.h"
 #include "fit/solver/averaged_gradient.h"
 #include "fit/solver/newton.h"
+#include "fit/solver/objective.h"
+#include "fit/solver/prior.h"
 #include "fit/solver/solve.h"
 #include "oracle/fit_tools.h"
 
-// ---- laws
+// ---- observation model
 
 static fit_observation observation_of(sdm_fit_kind kind, sdm_fit_model model, double dof)
 {
@@ -50,7 +53,8 @@ static void check_score(const fit_observation *obs, double value, double field, 
     sdm_fit_likelihood(obs, value, NULL, field, true, &r);
     close_to(r.log_likelihood, log_likelihood(obs, value, field), 0);
     close_to(r.score[0],
-             (log_likelihood(obs, value, field + h) - log_likelihood(obs, value, field - h)) / (2 * h),
+             (log_likelihood(obs, value, field + h) - log_likelihood(obs, value, field - h)) /
+                 (2 * h),
              1e-2);
     for (size_t c = 1; c < obs->n_channels; c++) {
         fit_observation up = *obs, down = *obs;
@@ -61,7 +65,7 @@ static void check_score(const fit_observation *obs, double value, double field, 
     }
     for (size_t a = 0; a < obs->n_channels; a++)
         assert_true(r.complete[a * (obs->n_channels + 1)] >= 0);
-    // observed is complete less what is missing
+    // observed information: complete less what is missing
     assert_true(r.observed[0] <= r.complete[0]);
 }
 
@@ -79,15 +83,15 @@ static void test_scores(void **state)
         }
     }
     const fit_observation label = observation_of(SDM_FIT_LABEL, SDM_FIT_LABELS, 0),
-                   points = observation_of(SDM_FIT_POINTS, SDM_FIT_LABELS, 0);
+                          points = observation_of(SDM_FIT_POINTS, SDM_FIT_LABELS, 0);
     for (double d = -2; d < 2; d += 0.31) {
         for (double u = 0; u <= 1; u += 0.25) check_score(&label, u, d, 1e-5);
         check_score(&points, 0, d, 1e-5);
     }
 }
 
-/* Densities integrate to 1, and over what values a voxel may have: mean score 0, mean square =
- * information (one pair of Gaussians). */
+/* Integrals over all values of a voxel: density 1, mean score 0, mean squared score = information
+ * (one pair of Gaussians). */
 static void test_information(void **state)
 {
     (void)state;
@@ -111,7 +115,7 @@ static void test_information(void **state)
     }
 }
 
-// ---- steps
+// ---- bounded steps
 
 static void test_step(void **state)
 {
@@ -123,7 +127,7 @@ static void test_step(void **state)
     for (int i = 0; i < 3; i++)
         assert_true(fabs(a[3 * i] * step[0] + a[3 * i + 1] * step[1] + a[3 * i + 2] * step[2] -
                          gradient[i]) < 1e-12);
-    // the third stops at its bound, the rest is best for that; the first is kept
+    // the third unknown stops at its limit, the second is optimal given that, the first is kept
     l.max[2] = 0.5;
     l.kept[0] = true;
     assert_true(sdm_fit_bounded_step(3, a, gradient, 0, &l, step, work));
@@ -131,21 +135,20 @@ static void test_step(void **state)
                 fabs(3 * step[1] + 0.2 * 0.5 - gradient[1]) < 1e-12);
     const double wrong[4] = {1, 2, 2, 1};
     assert_false(sdm_fit_bounded_step(2, wrong, gradient, 0,
-                              &(fit_limits){.min = {-9, -9}, .max = {9, 9}}, step, work));
+                                      &(fit_limits){.min = {-9, -9}, .max = {9, 9}}, step, work));
 }
 
-// ---- the whole gradient against differences of the log-likelihood, for each model
+// ---- gradient and averaged gradient against differences of the log-likelihood, for each model
 
 static double posterior_at(fit_problem *p, const fit_state *s)
 {
     p->state = *s;
     sdm_error err;
     if (sdm_fit_evaluate(p, &err)) fail_msg("%s", err.text);
-    return p->information.log_likelihood + sdm_fit_prior(p, s, NULL, NULL, NULL);
+    return sdm_fit_objective(p);
 }
 
-// derivatives by the parameters averaged over a half_width, on one side at a bound: differences of the
-// log-likelihood
+// the averaged gradient equals difference quotients over the intervals, one-sided at a bound
 static void check_average(fit_problem *p, const fit_state *s)
 {
     double half_width[FIT_PARAMS_MAX], found[2];
@@ -158,14 +161,17 @@ static void check_average(fit_problem *p, const fit_state *s)
     double average[3];
     memcpy(average, p->information.gradient, sizeof average);
     for (size_t k = 0; k < 3; k++) {
-        assert_true(half_width[k] > 1e-3 && half_width[k] < 0.03); // of an ellipsoid with voxels of 0.25 mm
+        assert_true(half_width[k] > 1e-3 &&
+                    half_width[k] < 0.03); // for an ellipsoid with map voxels of 0.25 mm
         for (int side = 0; side < 2; side++) {
             fit_state moved = *s;
-            moved.params[k] = fmin(s->params[k] + (side ? half_width[k] : -half_width[k]), p->high[k]);
+            moved.params[k] =
+                fmin(s->params[k] + (side ? half_width[k] : -half_width[k]), p->high[k]);
             (void)posterior_at(p, &moved);
             found[side] = p->information.log_likelihood;
         }
-        const double difference = (found[1] - found[0]) / (k == 1 ? half_width[k] : 2 * half_width[k]);
+        const double difference =
+            (found[1] - found[0]) / (k == 1 ? half_width[k] : 2 * half_width[k]);
         if (!(fabs(difference - average[k]) <= 1e-9 * fabs(difference)))
             fail_msg("parameter %zu: %.12g, differences %.12g", k, average[k], difference);
     }
@@ -204,13 +210,15 @@ static void check_gradient(sdm_fit_kind kind, sdm_fit_model model)
     bool changed;
     assert_int_equal(sdm_fit_information_create(n, &p.information, NULL), SDM_OK);
     const fit_region region = {.centre = {0.3, -0.2, 0.1}, .radius = 9};
-    assert_int_equal(sdm_fit_samples_choose(&t, &o, &region, 1, &p.samples, &changed, NULL), SDM_OK);
+    assert_int_equal(sdm_fit_samples_choose(&t, &o, &region, 1, &p.samples, &changed, NULL),
+                     SDM_OK);
     assert_true(changed && p.samples.n > 5000);
     fit_region few = region;
-    few.max_samples = 1000; // the rest is not gathered
+    few.max_samples = 1000; // stops after one sample more
     assert_int_equal(sdm_fit_samples_choose(&t, &o, &few, 1, &p.samples, &changed, NULL), SDM_OK);
     assert_true(changed && p.samples.n == 1001);
-    assert_int_equal(sdm_fit_samples_choose(&t, &o, &region, 1, &p.samples, &changed, NULL), SDM_OK);
+    assert_int_equal(sdm_fit_samples_choose(&t, &o, &region, 1, &p.samples, &changed, NULL),
+                     SDM_OK);
     assert_true(changed && p.samples.n > 5000);
     (void)posterior_at(&p, &s);
     double gradient[FIT_UNKNOWNS_MAX];
@@ -218,9 +226,10 @@ static void check_gradient(sdm_fit_kind kind, sdm_fit_model model)
     (void)sdm_fit_prior(&p, &s, gradient, NULL, NULL);
     for (size_t k = 0; k < n; k++) {
         if (k == fit_at_blur(3) && !p.maps.share) continue;
-        // wide enough to average over the creases between the triangles
+        // wide enough to average over the kinks of the likelihood
         const double h = k >= fit_columns(3) ? 1 : k == fit_at_blur(3) ? 1e-3 : 4e-3;
-        double step[FIT_UNKNOWNS_MAX] = {0}, found[2], size = sqrt(p.information.complete[k * (n + 1)]);
+        double step[FIT_UNKNOWNS_MAX] = {0}, found[2],
+               size = sqrt(p.information.complete[k * (n + 1)]);
         for (int side = 0; side < 2; side++) {
             fit_state moved;
             step[k] = side ? h : -h;
@@ -247,9 +256,9 @@ static void test_gradient(void **state)
     check_gradient(SDM_FIT_LABEL, SDM_FIT_LABELS);
 }
 
-// ---- acceleration
+// ---- Anderson acceleration
 
-// x -> fixed + A (x - fixed), with rates 0.99, 0.9, 0.5, -0.95 along skew directions
+// x -> fixed + A (x - fixed), with eigenvalues 0.99, 0.9, 0.5, -0.95 along skew directions
 static void affine(const double *x, double *y)
 {
     static const double RATE[4] = {0.99, 0.9, 0.5, -0.95};
@@ -271,8 +280,9 @@ static void test_anderson(void **state)
         off = 0;
         for (int k = 0; k < 4; k++) x[k] = y[k], off = fmax(off, fabs(x[k] - 1 - k));
     }
-    if (steps > 8) fail_msg("%d steps, off by %g", steps, off); // plain ones: 2,000
-    // no farther from the image than allowed
+    if (steps > 8) fail_msg("%d steps, off by %g", steps, off); // without acceleration: 2000
+
+    // the change of the image is limited
     m.count = 0;
     const double start[4] = {0, 0, 0, 0};
     memcpy(x, start, sizeof x);
@@ -297,8 +307,8 @@ static void test_anderson(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_scores), cmocka_unit_test(test_information),
-        cmocka_unit_test(test_step),   cmocka_unit_test(test_gradient),
+        cmocka_unit_test(test_scores),   cmocka_unit_test(test_information),
+        cmocka_unit_test(test_step),     cmocka_unit_test(test_gradient),
         cmocka_unit_test(test_anderson),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

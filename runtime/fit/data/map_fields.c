@@ -35,6 +35,7 @@ sdm_status sdm_fit_maps_create(const sdm_fit_source *source, bool share, const s
                     .n_threads = opts->n_threads,
                     .cancelled = opts->cancelled,
                     .user = opts->user};
+    // grid and parameters of the network or of the exact maps
     if (source->model) {
         m->grid = sdm_model_get_info(source->model)->grid;
         m->n_params = sdm_model_get_info(source->model)->n_params;

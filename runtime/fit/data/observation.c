@@ -31,10 +31,9 @@ static double law_constant(double dof)
 }
 
 void sdm_fit_observation_prepare(const sdm_fit_opts *opts, sdm_fit_kind kind,
-                                 const fit_state *state, fit_observation *out)
+                                 const fit_state *state, fit_observation *obs)
 {
     const sdm_fit_appearance *appearance = &state->appearance;
-    fit_observation *obs = out;
     *obs = (fit_observation){.kind = kind,
                              .model = opts->image_model,
                              .l_ref = state->l_ref,
@@ -43,6 +42,7 @@ void sdm_fit_observation_prepare(const sdm_fit_opts *opts, sdm_fit_kind kind,
                              .n_in = appearance->n_inside,
                              .n_tissues = appearance->n_inside + appearance->n_outside,
                              .n_channels = 1};
+    // only images have tissues
     if (kind != SDM_FIT_IMAGE) {
         obs->n_in = obs->n_tissues = 0;
         return;
@@ -157,9 +157,8 @@ static void likelihood_of_share(const fit_observation *obs, double value, const 
     memset(out->score, 0, c * sizeof *out->score);
     memset(out->root, 0, c * sizeof *out->root);
     memset(out->complete, 0, c * c * sizeof *out->complete);
-    memset(out->observed, 0,
-           // accumulates the covariance of the scores over pairs; turned into `observed` at the end
-           c * c * sizeof *out->observed);
+    // `observed` first accumulates the covariance of the scores over the pairs
+    memset(out->observed, 0, c * c * sizeof *out->observed);
     out->residual = 0;
     for (size_t i = 0; i < obs->n_pairs; i++) {
         const fit_pair *q = &obs->pair[i];
@@ -177,6 +176,7 @@ static void likelihood_of_share(const fit_observation *obs, double value, const 
                                  by_mean * (1 - share)};
         const double weight = p[i] * q->information / s[i].variance,
                      root = sqrt(q->information / s[i].variance);
+        // add, weighted by the probability of the pair
         for (int a = 0; a < 3; a++) {
             out->score[at[a]] += p[i] * score[a];
             out->root[at[a]] += p[i] * root * z[a];
@@ -300,9 +300,11 @@ void sdm_fit_moments_add(const fit_observation *obs, double value, const float *
                          double field, fit_moments *m)
 {
     if (obs->model == SDM_FIT_LABELS) {
+        // labels: posterior of inside, times the probability of each tissue of its side
         double log_f[2], p[FIT_TISSUES_MAX], ignored;
         const double u = posterior(obs, value, field, &ignored);
         mixtures(obs, value, log_f, p);
+        // robust weights of Student's t make it an iteratively reweighted estimate
         for (size_t i = 0; i < obs->n_tissues; i++) {
             const sdm_fit_law *t = &obs->tissue[i];
             const double r = value - t->mean, share = p[i] * (i < obs->n_in ? u : 1 - u);

@@ -51,7 +51,7 @@ typedef struct fit_observation {
 
 /* Observation model of a kind of target at the appearance, l_ref and point_sd of state. */
 void sdm_fit_observation_prepare(const sdm_fit_opts *opts, sdm_fit_kind kind,
-                                 const fit_state *state, fit_observation *out);
+                                 const fit_state *state, fit_observation *obs);
 
 /* Likelihood of one sample: all members of *out with derivatives, else log_likelihood alone.
    log_weight[n_tissues - n_in]: log weights of the outside tissues at the sample (partial volume

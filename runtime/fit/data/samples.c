@@ -56,40 +56,44 @@ static void region_voxels(const sdm_grid *g, const fit_region *r, size_t stride,
     }
 }
 
-static sdm_status samples_grow(fit_samples *s, sdm_error *err)
+static sdm_status samples_grow(fit_samples *samples, sdm_error *err)
 {
-    const size_t was = s->capacity, now = was ? 2 * was : 65536;
-    sdm_status status =
-        sdm_grow((void **)&s->world, 3 * was, 3 * now, sizeof *s->world, "voxels of the fit", err);
-    if (!status)
-        status = sdm_grow((void **)&s->value, was, now, sizeof *s->value, "voxels of the fit", err);
-    if (!status)
-        status = sdm_grow((void **)&s->voxel, was, now, sizeof *s->voxel, "voxels of the fit", err);
-    if (!status)
-        status = sdm_grow((void **)&s->field, was, now, sizeof *s->field, "voxels of the fit", err);
-    if (!status)
-        status = sdm_grow((void **)&s->row, was, now, sizeof *s->row, "voxels of the fit", err);
-    if (!status) s->capacity = now;
-    return status;
+    const size_t was = samples->capacity, now = was ? 2 * was : 65536;
+    sdm_status s = sdm_grow((void **)&samples->world, 3 * was, 3 * now, sizeof *samples->world,
+                            "voxels of the fit", err);
+    if (!s)
+        s = sdm_grow((void **)&samples->value, was, now, sizeof *samples->value,
+                     "voxels of the fit", err);
+    if (!s)
+        s = sdm_grow((void **)&samples->voxel, was, now, sizeof *samples->voxel,
+                     "voxels of the fit", err);
+    if (!s)
+        s = sdm_grow((void **)&samples->field, was, now, sizeof *samples->field,
+                     "voxels of the fit", err);
+    if (!s)
+        s = sdm_grow((void **)&samples->row, was, now, sizeof *samples->row, "voxels of the fit",
+                     err);
+    if (!s) samples->capacity = now;
+    return s;
 }
 
-static sdm_status samples_append(fit_samples *s, const double x[3], float value, size_t voxel,
+static sdm_status samples_append(fit_samples *samples, const double x[3], float value, size_t voxel,
                                  bool *changed, sdm_error *err)
 {
-    if (s->n == s->capacity) {
-        const sdm_status status = samples_grow(s, err);
-        if (status) return status;
+    if (samples->n == samples->capacity) {
+        const sdm_status s = samples_grow(samples, err);
+        if (s) return s;
     }
-    const size_t i = s->n++;
-    if (s->voxel[i] != voxel) *changed = true;
-    for (size_t k = 0; k < 3; k++) s->world[3 * i + k] = x[k];
-    s->value[i] = value;
-    s->voxel[i] = voxel;
+    const size_t i = samples->n++;
+    if (samples->voxel[i] != voxel) *changed = true;
+    for (size_t k = 0; k < 3; k++) samples->world[3 * i + k] = x[k];
+    samples->value[i] = value;
+    samples->voxel[i] = voxel;
     return SDM_OK;
 }
 
 static sdm_status voxels_choose(const sdm_fit_target *target, const sdm_fit_opts *opts,
-                                const fit_region *region, size_t stride, fit_samples *s,
+                                const fit_region *region, size_t stride, fit_samples *samples,
                                 bool *changed, sdm_error *err)
 {
     const sdm_grid *g = &target->grid;
@@ -99,6 +103,7 @@ static sdm_status voxels_choose(const sdm_fit_target *target, const sdm_fit_opts
     for (int64_t k = from[2]; k < to[2]; k += step)
         for (int64_t j = from[1]; j < to[1]; j += step)
             for (int64_t i = from[0]; i < to[0]; i += step) {
+                // voxels whose centre lies in the region
                 double x[3];
                 sdm_grid_world(g, (const double[3]){(double)i, (double)j, (double)k}, x);
                 if (!region_contains(opts, region, x)) continue;
@@ -106,7 +111,7 @@ static sdm_status voxels_choose(const sdm_fit_target *target, const sdm_fit_opts
                 const size_t voxel = (size_t)((k * g->n[1] + j) * g->n[0] + i);
                 const float value = target->values[voxel];
                 if (isnan(value)) {
-                    s->n_nan++;
+                    samples->n_nan++;
                     continue;
                 }
                 if (isinf(value))
@@ -114,8 +119,9 @@ static sdm_status voxels_choose(const sdm_fit_target *target, const sdm_fit_opts
                                     "voxel (%lld, %lld, %lld) of the image is infinite; NaN marks "
                                     "voxels without a value",
                                     (long long)i, (long long)j, (long long)k);
-                const sdm_status status = samples_append(s, x, value, voxel, changed, err);
-                if (status || (region->max_samples && s->n > region->max_samples)) return status;
+                // stop beyond the limit
+                const sdm_status s = samples_append(samples, x, value, voxel, changed, err);
+                if (s || (region->max_samples && samples->n > region->max_samples)) return s;
             }
     return SDM_OK;
 }
@@ -168,7 +174,7 @@ static void jacobian_row(const fit_maps *maps, const fit_field *f, const fit_sta
                          x[2] - state->translation[2]};
     const size_t n = maps->n_params;
     for (size_t k = 0; k < n; k++) columns[k] = (float)rest[k];
-    // rotation: (x - t) x g; translation: -g
+    // by rotation: g x (x - t); by translation: -g
     float *turn = columns + fit_at_rotation(n), *shift = columns + fit_at_translation(n);
     for (int k = 0; k < 3; k++) {
         const int a = (k + 1) % 3, b = (k + 2) % 3;
@@ -178,7 +184,7 @@ static void jacobian_row(const fit_maps *maps, const fit_field *f, const fit_sta
     columns[fit_at_blur(n)] = maps->share ? (float)rest[n] : 0;
 }
 
-sdm_status sdm_fit_samples_evaluate(fit_samples *s, const fit_maps *maps,
+sdm_status sdm_fit_samples_evaluate(fit_samples *samples, const fit_maps *maps,
                                     const fit_observation *obs, const fit_state *state,
                                     sdm_error *err)
 {
@@ -188,30 +194,33 @@ sdm_status sdm_fit_samples_evaluate(fit_samples *s, const fit_maps *maps,
     (void)n_threads; // without OpenMP
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
-        for (size_t i = s->n * slice / FIT_SLICES; i < s->n * (slice + 1) / FIT_SLICES; i++)
-            s->field[i] = sdm_fit_field_at(&f, state, s->world + 3 * i);
+        for (size_t i = samples->n * slice / FIT_SLICES; i < samples->n * (slice + 1) / FIT_SLICES;
+             i++)
+            samples->field[i] = sdm_fit_field_at(&f, state, samples->world + 3 * i);
     // rows of the Jacobian for the samples of the band
-    s->n_band = 0;
-    for (size_t i = 0; i < s->n; i++)
-        s->row[i] = sdm_fit_in_band(obs, s->field[i]) ? s->n_band++ : SIZE_MAX;
-    s->n_columns = fit_columns(maps->n_params);
+    samples->n_band = 0;
+    for (size_t i = 0; i < samples->n; i++)
+        samples->row[i] = sdm_fit_in_band(obs, samples->field[i]) ? samples->n_band++ : SIZE_MAX;
+    samples->n_columns = fit_columns(maps->n_params);
     // memory for the rows, a quarter more than needed
-    if (s->n_band > s->band_capacity) {
-        const size_t room = s->n_band + s->n_band / 4;
+    if (samples->n_band > samples->band_capacity) {
+        const size_t room = samples->n_band + samples->n_band / 4;
         size_t count;
-        sdm_status status = sdm_mul(room, s->n_columns, &count, err);
-        sdm_free(s->jacobian);
-        s->jacobian = NULL;
-        s->band_capacity = 0;
-        if (!status) status = SDM_ALLOC(&s->jacobian, count, "derivatives at the voxels", err);
-        if (status) return status;
-        s->band_capacity = room;
+        sdm_status s = sdm_mul(room, samples->n_columns, &count, err);
+        sdm_free(samples->jacobian);
+        samples->jacobian = NULL;
+        samples->band_capacity = 0;
+        if (!s) s = SDM_ALLOC(&samples->jacobian, count, "derivatives at the voxels", err);
+        if (s) return s;
+        samples->band_capacity = room;
     }
+    // derivatives, one row for each sample of the band
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
-        for (size_t i = s->n * slice / FIT_SLICES; i < s->n * (slice + 1) / FIT_SLICES; i++)
-            if (s->row[i] != SIZE_MAX)
-                jacobian_row(maps, &f, state, s->world + 3 * i,
-                             s->jacobian + s->row[i] * s->n_columns);
+        for (size_t i = samples->n * slice / FIT_SLICES; i < samples->n * (slice + 1) / FIT_SLICES;
+             i++)
+            if (samples->row[i] != SIZE_MAX)
+                jacobian_row(maps, &f, state, samples->world + 3 * i,
+                             samples->jacobian + samples->row[i] * samples->n_columns);
     return SDM_OK;
 }

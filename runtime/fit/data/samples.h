@@ -66,7 +66,7 @@ double sdm_fit_field_at(const fit_field *f, const fit_state *s, const double x[3
 
 /* Computes field, row and jacobian of every sample from maps->packed, which must hold derivatives.
  */
-sdm_status sdm_fit_samples_evaluate(fit_samples *s, const fit_maps *maps,
+sdm_status sdm_fit_samples_evaluate(fit_samples *samples, const fit_maps *maps,
                                     const fit_observation *obs, const fit_state *state,
                                     sdm_error *err);
 

@@ -123,7 +123,7 @@ static double expected_gain(const fit_problem *p, const double *step)
     return sum;
 }
 
-// information of state and trial change places
+// swaps the information of state and trial
 static void information_swap(fit_problem *p)
 {
     const fit_information kept = p->information;
@@ -217,6 +217,7 @@ static void step_accelerate(const fit_problem *p, const fit_newton_opts *opts, f
                             double *step)
 {
     const size_t n = p->information.n_unknowns;
+    // the point before the plain step, and its image
     double at[FIT_ANDERSON_MAX];
     for (size_t i = 0; i < n; i++) {
         at[i] = r->position[i];
@@ -235,6 +236,7 @@ static void step_accelerate(const fit_problem *p, const fit_newton_opts *opts, f
     else
         sdm_fit_anderson_mix(&r->anderson, FIT_ANDERSON_DEPTH, n + r->n_appearance, at, r->to,
                              ACCELERATION_MAX);
+    // back to a step, within the limits
     fit_limits limits;
     limits_set(p, opts, &limits);
     for (size_t i = 0; i < n; i++)

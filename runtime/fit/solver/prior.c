@@ -45,12 +45,14 @@ double sdm_fit_prior(const fit_problem *p, const fit_state *s, double *gradient,
     const size_t n = p->information.n_unknowns;
     const double *weight = p->prior_weight;
     double sum = 0;
+    // parameters
     for (size_t k = 0; k < p->n_params && o->prior_sd > 0; k++) {
         const double sd = sdm_fit_prior_sd(p, k), precision = weight[k] / (sd * sd);
         const double residual = s->params[k] - 0.5 * (p->low[k] + p->high[k]);
         sum -= 0.5 * precision * residual * residual;
         normal_add(n, k, residual, precision, gradient, complete, observed);
     }
+    // rotation
     if (o->prior_rotation_sd > 0) {
         double w[3];
         rotation_residual(p, s, w);
@@ -62,6 +64,7 @@ double sdm_fit_prior(const fit_problem *p, const fit_state *s, double *gradient,
             normal_add(n, at, w[k], precision, gradient, complete, observed);
         }
     }
+    // translation
     if (o->prior_translation_sd > 0) {
         for (size_t k = 0; k < 3; k++) {
             const size_t at = fit_at_translation(p->n_params) + k;

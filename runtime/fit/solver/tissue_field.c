@@ -137,21 +137,22 @@ static bool has_two_tissues(const fit_problem *p)
 // starts the field with the weights that are the same everywhere
 static sdm_status log_weights_init(fit_problem *p, sdm_error *err)
 {
-    fit_samples *s = &p->samples;
+    fit_samples *samples = &p->samples;
     const size_t n = p->observation.n_tissues - p->observation.n_in;
     size_t count;
-    sdm_status status = sdm_mul(s->n, n, &count, err);
-    if (!status && count > s->log_weight_capacity) {
-        sdm_free(s->log_weight);
-        s->log_weight = NULL;
-        s->log_weight_capacity = 0;
-        status = SDM_ALLOC(&s->log_weight, count, "voxels of the fit", err);
-        if (!status) s->log_weight_capacity = count;
+    sdm_status s = sdm_mul(samples->n, n, &count, err);
+    if (!s && count > samples->log_weight_capacity) {
+        sdm_free(samples->log_weight);
+        samples->log_weight = NULL;
+        samples->log_weight_capacity = 0;
+        s = SDM_ALLOC(&samples->log_weight, count, "voxels of the fit", err);
+        if (!s) samples->log_weight_capacity = count;
     }
-    if (status) return status;
-    s->n_outside = n;
-    for (size_t i = 0; i < s->n; i++)
-        memcpy(s->log_weight + i * n, p->observation.log_outside, n * sizeof *s->log_weight);
+    if (s) return s;
+    samples->n_outside = n;
+    for (size_t i = 0; i < samples->n; i++)
+        memcpy(samples->log_weight + i * n, p->observation.log_outside,
+               n * sizeof *samples->log_weight);
     return SDM_OK;
 }
 

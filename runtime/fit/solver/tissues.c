@@ -28,9 +28,7 @@ size_t sdm_fit_appearance_pack(const fit_problem *p, double *x)
     fit_state s = p->state;
     size_t n = 0;
     if (p->target->kind == SDM_FIT_POINTS) x[n++] = log(s.point_sd);
-    for (size_t i = 0;
-         p->target->kind == SDM_FIT_IMAGE && i < s.appearance.n_inside + s.appearance.n_outside;
-         i++) {
+    for (size_t i = 0; i < p->observation.n_tissues; i++) {
         const sdm_fit_law *t = tissue_law(&s.appearance, i);
         x[n++] = log(t->weight);
         x[n++] = log(t->sd);
@@ -43,9 +41,7 @@ void sdm_fit_appearance_unpack(fit_problem *p, const double *x)
 {
     fit_state *s = &p->state;
     if (p->target->kind == SDM_FIT_POINTS) s->point_sd = exp(*x);
-    for (size_t i = 0;
-         p->target->kind == SDM_FIT_IMAGE && i < s->appearance.n_inside + s->appearance.n_outside;
-         i++) {
+    for (size_t i = 0; i < p->observation.n_tissues; i++) {
         sdm_fit_law *t = tissue_law(&s->appearance, i);
         t->weight = exp(*x++);
         t->sd = exp(*x++);

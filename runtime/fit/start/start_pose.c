@@ -117,6 +117,7 @@ sdm_status sdm_fit_pose_from_points(const double *shape, const double *world, si
         middle[0][i % 3] += shape[i] / (double)n;
         middle[1][i % 3] += world[i] / (double)n;
     }
+    // products and squares about the centroids; the farthest point
     for (size_t i = 0; i < n; i++) {
         double d[2][3];
         for (size_t k = 0; k < 3; k++)
@@ -139,6 +140,7 @@ sdm_status sdm_fit_pose_from_points(const double *shape, const double *world, si
         v3_cross(far[0], d, c);
         across += v3_dot(c, c) / v3_dot(far[0], far[0]);
     }
+    // rotation, then translation
     if (across > 1e-12 * spread[0])
         horn_rotation(m, out->rotation);
     else // the points lie on one line

@@ -146,6 +146,7 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
     const sdm_fit_opts *o = p->opts;
     const fit_state given = p->state;
     fit_state start = given;
+    // samples near the start
     *turn = 0;
     const size_t n = o->turns == SDM_FIT_TURNS_NONE || o->keep_pose ? 1 : o->n_turns;
     sdm_status s = samples_near_choose(p, n > 1 ? SAMPLES_OF_TURNS : SAMPLES_OF_KEPT, err);
@@ -158,6 +159,7 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
         start.point_sd = fmax(start.point_sd, 0.1 * p->extent.reach);
     p->state = start;
 
+    // each turn with all unknowns but point spread and appearance
     fit_newton_opts newton = {.phase = SDM_FIT_SEARCH,
                               .keep_params = o->keep_params,
                               .keep_pose = o->keep_pose,
@@ -179,6 +181,7 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
         p->state = start;
         s = samples_near_choose(p, SAMPLES_OF_KEPT, err);
     }
+    // the turns that continue, or the one start
     double best = -INFINITY;
     fit_state chosen = given;
     for (size_t i = 0; i < found.n && !s; i++) {
@@ -186,6 +189,7 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
         if (n > 1) turn_start(p, found.turn[i], &start, &p->prior);
         newton.max_iterations = KEPT_STEPS;
         s = sdm_fit_newton(p, &newton, &end, err);
+        // back to the given point spread
         p->state.blur = given.blur;
         p->state.l_ref = given.l_ref;
         p->state.point_sd = given.point_sd;

@@ -48,6 +48,7 @@ sdm_status sdm_fit_correlation_estimate(const fit_neighbours *v, double effort, 
     *width = FIT_LAG_MAX;
     memset(c, 0, (FIT_LAG_ZERO + 1) * sizeof *c);
     for (int k = 0; k <= *width && !s; k++) {
+        // shell k: correlations, and their sum
 #pragma omp parallel for schedule(dynamic, 64) num_threads(n_threads)
         for (int number = 0; number <= FIT_LAG_ZERO; number++) {
             int lag[3];
@@ -60,7 +61,8 @@ sdm_status sdm_fit_correlation_estimate(const fit_neighbours *v, double effort, 
             sdm_fit_lag_vector(number, lag);
             if (sdm_fit_lag_length(lag) == k) sum += c[number], lags++;
         }
-        // standard error of the sum without correlation (Bartlett 1946)
+        // the first shell that does not exceed the standard error of uncorrelated data (Bartlett
+        // 1946) sets the width
         const double error = sqrt(lags / fmin((double)v->n, effort * LAG_VOXELS));
         if (*width == FIT_LAG_MAX && k > 0 && !(sum > fmax(0.05, 2 * error) * c[FIT_LAG_ZERO]))
             *width = 2 * (k - 1) < FIT_LAG_MAX ? 2 * (k - 1) : FIT_LAG_MAX - 1;
@@ -74,20 +76,20 @@ static double lag_taper(const int lag[3], int width, bool flat)
 {
     double w = 1;
     for (int a = 0; a < 3; a++) {
-        const double share = fabs((double)lag[a]) / (double)(width + 1);
-        w *= flat ? fmin(fmax(2 - 2 * share, 0), 1) : fmax(1 - share, 0);
+        const double fraction = fabs((double)lag[a]) / (double)(width + 1);
+        w *= flat ? fmin(fmax(2 - 2 * fraction, 0), 1) : fmax(1 - fraction, 0);
     }
     return w;
 }
 
-double sdm_fit_correlation_taper(const double *c, int width, bool flat, double *weighted)
+double sdm_fit_correlation_taper(const double *c, int width, bool flat, double *tapered)
 {
     double sum = c[FIT_LAG_ZERO];
     for (int number = 0; number <= FIT_LAG_ZERO; number++) {
         int lag[3];
         sdm_fit_lag_vector(number, lag);
-        weighted[number] = c[number] * lag_taper(lag, width, flat);
-        if (number < FIT_LAG_ZERO) sum += 2 * weighted[number];
+        tapered[number] = c[number] * lag_taper(lag, width, flat);
+        if (number < FIT_LAG_ZERO) sum += 2 * tapered[number];
     }
     return fmax(sum, c[FIT_LAG_ZERO]);
 }
@@ -102,7 +104,7 @@ typedef struct fit_bias {
     /* [n][n_unknowns] rows of Omega X */
     double *around;
     /* [n_unknowns][n_unknowns] X^T Omega X, A X^T Omega X, V = A X^T Omega X A */
-    double *information, *product, *covariance;
+    double *score_covariance, *product, *covariance;
 } fit_bias;
 
 static void bias_dispose(fit_bias *t)
@@ -110,7 +112,7 @@ static void bias_dispose(fit_bias *t)
     sdm_free(t->voxel);
     sdm_free(t->q);
     sdm_free(t->around);
-    sdm_free(t->information);
+    sdm_free(t->score_covariance);
     sdm_free(t->product);
     sdm_free(t->covariance);
 }
@@ -122,14 +124,14 @@ static sdm_status bias_create(const fit_neighbours *v, fit_bias *t, sdm_error *e
     const size_t square = v->n_unknowns * v->n_unknowns;
     if (!s) s = SDM_ALLOC(&t->q, t->n * v->n_unknowns, "correlation of residuals", err);
     if (!s) s = SDM_ALLOC(&t->around, t->n * v->n_unknowns, "correlation of residuals", err);
-    if (!s) s = SDM_ALLOC(&t->information, square, "correlation of residuals", err);
+    if (!s) s = SDM_ALLOC(&t->score_covariance, square, "correlation of residuals", err);
     if (!s) s = SDM_ALLOC(&t->product, square, "correlation of residuals", err);
     if (!s) s = SDM_ALLOC(&t->covariance, square, "correlation of residuals", err);
     return s;
 }
 
 // rows of Omega X: correlation-weighted sums of the roots of all neighbours
-static void bias_neighbour_sums(const fit_neighbours *v, const double *weighted, int width,
+static void bias_neighbour_sums(const fit_neighbours *v, const double *tapered, int width,
                                 int n_threads, fit_bias *t)
 {
     const size_t n = v->n_unknowns;
@@ -146,7 +148,7 @@ static void bias_neighbour_sums(const fit_neighbours *v, const double *weighted,
                 const size_t j = sdm_fit_neighbour(v, t->voxel[s], lag, sign);
                 if (j == SIZE_MAX) continue;
                 for (size_t a = 0; a < n; a++)
-                    around[a] += weighted[number] * (double)v->root[j * n + a];
+                    around[a] += tapered[number] * (double)v->root[j * n + a];
             }
         }
     }
@@ -168,16 +170,16 @@ static void bias_vectors(const fit_neighbours *v, const double *influence, fit_b
 {
     const size_t n = v->n_unknowns;
     const double scale = 0.5 * (double)v->n / (double)t->n;
-    memset(t->information, 0, n * n * sizeof *t->information);
+    memset(t->score_covariance, 0, n * n * sizeof *t->score_covariance);
     for (size_t s = 0; s < t->n; s++)
         for (size_t a = 0; a < n; a++)
             for (size_t b = 0; b < n; b++) {
                 const double x =
                     scale * (double)v->root[t->voxel[s] * n + a] * t->around[s * n + b];
-                t->information[a * n + b] += x;
-                t->information[b * n + a] += x;
+                t->score_covariance[a * n + b] += x;
+                t->score_covariance[b * n + a] += x;
             }
-    multiply(n, influence, t->information, t->product);
+    multiply(n, influence, t->score_covariance, t->product);
     multiply(n, t->product, influence, t->covariance);
     for (size_t s = 0; s < t->n; s++)
         for (size_t a = 0; a < n; a++) {
@@ -210,13 +212,13 @@ static double bias_at(const fit_neighbours *v, const fit_bias *t, const int lag[
 sdm_status sdm_fit_correlation_correct(const fit_neighbours *v, const double *influence, int width,
                                        int n_threads, double *c, sdm_error *err)
 {
-    double found[FIT_LAG_ZERO + 1], weighted[FIT_LAG_ZERO + 1];
+    double found[FIT_LAG_ZERO + 1], tapered[FIT_LAG_ZERO + 1];
     fit_bias t;
     const sdm_status s = bias_create(v, &t, err);
     memcpy(found, c, sizeof found);
     for (int round = 0; round < NEUMANN_TERMS && t.n && !s; round++) {
-        (void)sdm_fit_correlation_taper(c, width, true, weighted);
-        bias_neighbour_sums(v, weighted, width, n_threads, &t);
+        (void)sdm_fit_correlation_taper(c, width, true, tapered);
+        bias_neighbour_sums(v, tapered, width, n_threads, &t);
         bias_vectors(v, influence, &t);
 #pragma omp parallel for schedule(dynamic, 64) num_threads(n_threads)
         for (int number = 0; number <= FIT_LAG_ZERO; number++) {

@@ -14,10 +14,10 @@
 sdm_status sdm_fit_correlation_estimate(const fit_neighbours *v, double effort, int n_threads,
                                         double *c, int *width, sdm_error *err);
 
-/* Corrects c, of residuals, to that of the errors themselves. Residuals are errors less the part
-   that the fit could explain, mostly what is constant over many voxels, so their correlations are
-   too small. influence[n_unknowns][n_unknowns]: inverse of the information, 0 for unknowns that
-   were kept. */
+/* Turns c from the autocorrelation of the residuals into that of the errors. Residuals are errors
+   less the part that the fit could explain, mostly what is constant over many voxels, so their
+   correlations are too small. influence[n_unknowns][n_unknowns]: inverse of the information, 0 for
+   unknowns that were kept. */
 sdm_status sdm_fit_correlation_correct(const fit_neighbours *v, const double *influence, int width,
                                        int n_threads, double *c, sdm_error *err);
 

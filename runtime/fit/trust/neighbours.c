@@ -66,6 +66,7 @@ static void neighbours_fill(const fit_problem *p, fit_neighbours *v)
         fit_likelihood r;
         sdm_fit_likelihood(&p->observation, (double)s->value[i], fit_sample_weights(s, i),
                            s->field[i], true, &r);
+        // derivatives by the columns, then by the tissue means
         float *root = v->root + count * n, *model_score = v->model_score + count * n;
         const double slope = field_slope(p, columns);
         for (size_t a = 0; a < nc; a++) {
@@ -100,11 +101,11 @@ float sdm_fit_neighbours_threshold(const fit_neighbours *v, double wanted)
 sdm_status sdm_fit_neighbours_pick(const fit_neighbours *v, double wanted, uint32_t **list,
                                    size_t *n, sdm_error *err)
 {
-    const float share = sdm_fit_neighbours_threshold(v, wanted);
+    const float threshold = sdm_fit_neighbours_threshold(v, wanted);
     *n = 0;
     const sdm_status s = SDM_ALLOC(list, v->n, "voxels near the surface", err);
     for (size_t i = 0; i < v->n && !s; i++)
-        if (v->draw[i] <= share) (*list)[(*n)++] = (uint32_t)i;
+        if (v->draw[i] <= threshold) (*list)[(*n)++] = (uint32_t)i;
     return s;
 }
 

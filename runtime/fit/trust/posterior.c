@@ -97,7 +97,8 @@ static void covariance_fill(const fit_problem *p, const fit_score_covariance *sc
     // (MacKinnon and White 1985)
     const double lost =
         points ? fmin((double)free_unknowns(p, list) / fmax((double)p->samples.n, 1), 0.5) : 0;
-    // priors contribute their weighted precision times their weight
+    // the score of a prior with weight w has the variance w^2 / sd^2; sdm_fit_prior() gives w /
+    // sd^2
     memset(spread, 0, n * n * sizeof *spread);
     (void)sdm_fit_prior(p, &p->state, NULL, spread, NULL);
     for (size_t i = 0; i < size; i++) spread[i * (n + 1)] *= p->prior_weight[i];
@@ -106,6 +107,7 @@ static void covariance_fill(const fit_problem *p, const fit_score_covariance *sc
     for (size_t i = 0; i < n * n; i++)
         spread[i] += scatter->noise[i] / (1 - lost) + model * scatter->model[i];
     sdm_fit_add_weak_prior(p, spread);
+    // covariance, sd, correlation
     for (size_t i = 0; i < size; i++)
         for (size_t j = 0; j <= i; j++) {
             const double c = sandwich(n, influence, spread, i, j);
@@ -113,9 +115,8 @@ static void covariance_fill(const fit_problem *p, const fit_score_covariance *sc
         }
     for (size_t i = 0; i < size; i++) {
         const double variance = out->covariance[i * (size + 1)];
-        out->sd[i] = variance >= 0
-                         ? sqrt(variance)
-                         : NAN; // not 0, which would mean that the unknown is known exactly
+        // not 0, which would mean that the unknown is known exactly
+        out->sd[i] = variance >= 0 ? sqrt(variance) : NAN;
     }
     for (size_t i = 0; i < size; i++)
         for (size_t j = 0; j < size; j++) {

@@ -5,7 +5,7 @@
 
        cov(score) = sum over n and lags of C(lag) root_n root_(n+lag)^T
 
-   (Conley 1999; here the e_n form one stationary field). Lags are weighted by a window: 1 in its
+   (Conley 1999; here the e_n form one stationary field). Lags are tapered by a window: 1 in its
    inner half, then linear to 0 (Politis and Romano 1995). If the result is not positive definite,
    the window falls linearly from lag zero (Bartlett 1950), which makes it so unless the corrected
    correlations differ much from those of the residuals. */
@@ -36,15 +36,16 @@ static sdm_status products_add(const fit_neighbours *v, const double *c, double 
     const sdm_status s = SDM_ALLOC(&parts, FIT_SLICES * n * n, "covariance of the score", err);
     if (s) return s;
     (void)n_threads; // without OpenMP
-    const float share =
+    // subsample of the voxels where the sum starts
+    const float threshold =
         sdm_fit_neighbours_threshold(v, effort * PAIRS / (pow(2.0 * width + 1, 3) / 2 + 1));
     size_t chosen = 0;
-    for (size_t i = 0; i < v->n; i++) chosen += v->draw[i] <= share;
+    for (size_t i = 0; i < v->n; i++) chosen += v->draw[i] <= threshold;
     const double scale = (double)v->n / fmax((double)chosen, 1);
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         for (size_t i = v->n * slice / FIT_SLICES; i < v->n * (slice + 1) / FIT_SLICES; i++) {
-            if (v->draw[i] > share) continue;
+            if (v->draw[i] > threshold) continue;
             // correlation-weighted sum of the roots of the neighbours
             float around[FIT_UNKNOWNS_MAX] = {0};
             double *part = parts + slice * n * n;
@@ -57,10 +58,12 @@ static sdm_status products_add(const fit_neighbours *v, const double *c, double 
                 const float w = (float)(number == FIT_LAG_ZERO ? 0.5 * c[number] : c[number]);
                 for (size_t a = 0; a < n; a++) around[a] += w * x[j * n + a];
             }
+            // times the root of the voxel
             for (size_t a = 0; a < n; a++)
                 for (size_t b = 0; b < n; b++)
                     part[a * n + b] += (double)x[i * n + a] * (double)around[b];
         }
+    // sum of the slices, and its transpose for the other half of the lags
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         for (size_t a = 0; a < n; a++)
             for (size_t b = 0; b < n; b++)
@@ -107,12 +110,12 @@ static sdm_status noise_add(const fit_problem *p, const fit_neighbours *v, const
                             sdm_error *err)
 {
     const size_t n = v->n_unknowns;
-    double weighted[FIT_LAG_ZERO + 1], *work = NULL, scale[FIT_UNKNOWNS_MAX];
+    double tapered[FIT_LAG_ZERO + 1], *work = NULL, scale[FIT_UNKNOWNS_MAX];
     sdm_status s = SDM_ALLOC(&work, 2 * n * n, "covariance of the score", err);
     for (int flat = 1; flat >= 0 && !s; flat--) {
-        const double sum = sdm_fit_correlation_taper(c, width, flat, weighted);
+        const double sum = sdm_fit_correlation_taper(c, width, flat, tapered);
         memset(out->noise, 0, n * n * sizeof *out->noise);
-        s = products_add(v, weighted, definite ? 1 : ROUGH, width, n_threads, out->noise, err);
+        s = products_add(v, tapered, definite ? 1 : ROUGH, width, n_threads, out->noise, err);
         far_add(p, sum, out->noise);
         memcpy(work, out->noise, n * n * sizeof *work);
         sdm_fit_add_weak_prior(p, work);
@@ -129,6 +132,7 @@ static sdm_status model_error_add(const fit_problem *p, const fit_neighbours *v,
                                   double *out, sdm_error *err)
 {
     const size_t n = v->n_unknowns;
+    // cubes: edge in steps, and their number along each axis
     int64_t steps[3], count[3];
     for (int a = 0; a < 3; a++) {
         steps[a] =
@@ -141,6 +145,7 @@ static sdm_status model_error_add(const fit_problem *p, const fit_neighbours *v,
     sdm_status s = sdm_mul(cubes, n, &size, err);
     if (!s) s = SDM_ALLOC(&sum, size, "covariance of the score", err);
     if (s) return s;
+    // score caused by an error of 1 mm in each cube
     for (size_t i = 0; i < v->n; i++) {
         int64_t k[3];
         for (size_t a = 0; a < 3; a++) k[a] = v->position[3 * i + a] / steps[a];
@@ -165,8 +170,8 @@ static sdm_status voxels_covariance(const fit_problem *p, double model_mm, const
     if (!s) {
         int width;
         s = sdm_fit_correlation_estimate(&v, influence ? 1 : ROUGH, n_threads, c, &width, err);
-        double weighted[FIT_LAG_ZERO + 1];
-        if (!s) out->noise_factor = sdm_fit_correlation_taper(c, width, true, weighted);
+        double tapered[FIT_LAG_ZERO + 1];
+        if (!s) out->noise_factor = sdm_fit_correlation_taper(c, width, true, tapered);
         if (!s && influence)
             s = sdm_fit_correlation_correct(&v, influence, width, n_threads, c, err);
         if (!s) s = noise_add(p, &v, c, width, n_threads, influence, out, err);

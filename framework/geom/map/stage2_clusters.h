@@ -47,10 +47,9 @@ static sdm_status clusters_of_blocks(const sdm_grid_job *job, const cull8 *v, in
     return SDM_OK;
 }
 
-/* Lists the clusters of a block that may hold a nearest feature of its tiles, in
-   scratch->cluster[]. centre_mm: of the block; tiles: mask of the tiles inside the grid. Returns an
-   upper bound on the distance between a point of the block and a point of these clusters, scaled.
- */
+/* Lists the clusters of a block that may hold a nearest feature of its tiles: scratch->cluster[].
+   centre_mm: of the block. tiles: mask of the tiles inside the grid. Returns an upper bound on
+   the distance between a point of the block and a point of these clusters, scaled. */
 static float clusters_of_tiles(const sdm_grid_job *job, const sdm_cluster_list *in,
                                const double centre_mm[3], const cull8 *v, int tiles,
                                sdm_grid_scratch *scratch)

@@ -7,8 +7,9 @@
 #include "lists.h"
 #include "stage1_bounds.h"
 
-/* Largest change of each function of a group from the centre of the block to its corners, where the
-   block is not a cube along x, y, z; replaces sdm_feature_group.sum, and block.half is 1. */
+/* Largest change of each function of a group from the centre of the block to its corners. Replaces
+   sdm_feature_group.sum where the block is not a cube along x, y, z; block.half[SDM_BLOCKS] is 1
+   then. */
 static void group_extent(const block *b, int kind, const sdm_feature_group *group, float out[4][8])
 {
     const sdm_grid_parts *q = &b->job->part[SDM_BLOCKS];
@@ -54,6 +55,7 @@ SDM_FOR_KIND unsigned group_test(const block_test *w, bool cube, int kind,
         if (kind == SDM_EDGES && j < 2) f = v8_sub(f, v8_load(group->most[j]));
         excess = v8_max(excess, v8_fma(w->minus_half, v8_load(extent[j]), f));
     }
+    // (f1 + f2) / 2 <= 0 rejects concave edges
     if (kind == SDM_EDGES) {
         const v8f mean =
             v8_sub(v8_mul(v8_add(at[1], at[2]), v8_all(0.5f)), v8_load(group->most[1]));

@@ -59,7 +59,7 @@ sdm_status phantom_field_make(const sdm_grid *grid, const double sigma[3],
     }
     if (!s) s = SDM_ALLOC(&field, count, "random field", err);
     if (!s) {
-/* white noise, numbered by voxel */
+        // white noise, numbered by voxel
 #pragma omp parallel for num_threads(threads) schedule(static)
         for (size_t row = 0; row < size[1] * size[2]; row++) {
             if (phantom_check_cancelled(o, NULL)) continue;

@@ -97,7 +97,7 @@ static float cube_share(float d, float edge)
 
 /* Converts inside[n] and air[n] (may be NULL) of one plane of sub-voxels from distances to shares.
    Air keeps clear of the surface and takes no more than the inside leaves over. */
-static void to_shares(const shares_job *j, size_t n, float *inside, float *air)
+static void plane_to_shares(const shares_job *j, size_t n, float *inside, float *air)
 {
     const float edge = (float)j->edge, clear = (float)j->o->air_clear_mm;
     for (size_t i = 0; i < n; i++) {
@@ -152,7 +152,7 @@ static sdm_status add_block(const shares_job *j, size_t first, size_t n, float *
         if (phantom_check_cancelled(j->o, NULL)) continue;
         float *d = buffer + k * plane, *b = air ? air_buffer + k * plane : NULL;
         if (b) phantom_balls_plane(&j->balls, &j->fine, first + k, j->edge, b);
-        to_shares(j, plane, d, b);
+        plane_to_shares(j, plane, d, b);
         reduce_plane(j, d);
         if (b) reduce_plane(j, b);
     }

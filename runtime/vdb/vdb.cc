@@ -126,7 +126,7 @@ openvdb::math::Transform::Ptr linear_transform(const openvdb::Vec3d axis[3],
     return openvdb::math::Transform::createLinearTransform(m);
 }
 
-/* index-to-world transform; a level set gets the same voxel size on all axes (they agree
+/* Index-to-world transform; a level set gets the same voxel size on all axes (they agree
    to 1e-6). */
 openvdb::math::Transform::Ptr transform_of(const sdm_grid &g, bool level_set)
 {
@@ -177,9 +177,8 @@ void fill_block(Grid &grid, Grid::Accessor &acc, const sdm_band &box, const Coor
     if (leaf.onVoxelCount())
         acc.addLeaf(new Leaf(leaf));
     else if (inside)
-        acc.addTile(1, corner, -background,
-                    // no voxel near the surface, all inside: a tile instead of a leaf
-                    false);
+        // no voxel near the surface, all inside: a tile instead of a leaf
+        acc.addTile(1, corner, -background, false);
 }
 
 Grid::Ptr grid_of(const openvdb::math::Transform::Ptr &transform, const sdm_band &box,

@@ -10,57 +10,58 @@
 #include "sdm/vdb.h"
 
 // hidden: the library exports its C interface only
-namespace vdb_parts __attribute__((visibility("hidden")))
+#pragma GCC visibility push(hidden)
+
+namespace vdb_parts
 {
 
-    using Grid = openvdb::FloatGrid;
-    using openvdb::Coord;
+using Grid = openvdb::FloatGrid;
+using openvdb::Coord;
 
-    // exception that carries a status through C++ code; the message is in the caller's sdm_error
-    struct failure {
-        sdm_status status;
-    };
+// exception that carries a status through C++ code; the message is in the caller's sdm_error
+struct failure {
+    sdm_status status;
+};
 
-    inline void need(sdm_status s)
-    {
-        if (s) throw failure{s};
-    }
+inline void need(sdm_status s)
+{
+    if (s) throw failure{s};
+}
 
-    // v after a round trip through the file: rounded if the file has 16-bit floats (half)
-    inline float as_stored(float v, bool half)
-    {
-        return half ? openvdb::io::truncateRealToHalf(v) : v;
-    }
+// v after a round trip through the file: rounded if the file has 16-bit floats (half)
+inline float as_stored(float v, bool half) { return half ? openvdb::io::truncateRealToHalf(v) : v; }
 
-    // fails with SDM_E_CANCELLED if the caller wants to stop
-    void check_cancelled(const sdm_vdb_opts &o, sdm_error *err);
+// fails with SDM_E_CANCELLED if the caller wants to stop
+void check_cancelled(const sdm_vdb_opts &o, sdm_error *err);
 
-    // ---- vdb_creases.cc
+// ---- vdb_creases.cc
 
-    // A crease is a voxel at a zero crossing whose gradient checkLevelSet refuses. Changes values
-    // there until none is left, and counts the changes in report. It may end without success: the
-    // caller runs checkLevelSet.
-    void mend_creases(Grid & grid, const sdm_vdb_opts &o, sdm_vdb_report &report, sdm_error *err);
+// A crease is a voxel at a zero crossing whose gradient checkLevelSet refuses. Changes values
+// there until none is left, and counts the changes in report. It may end without success: the
+// caller runs checkLevelSet.
+void mend_creases(Grid &grid, const sdm_vdb_opts &o, sdm_vdb_report &report, sdm_error *err);
 
-    // ---- vdb_file.cc
+// ---- vdb_file.cc
 
-    extern const char *const GRID_NAME;
+extern const char *const GRID_NAME;
 
-    // CRC-64 of positions, extents and bits of all values in the order of the tree, tiles included
-    uint64_t hash_of(const Grid &grid);
+// CRC-64 of positions, extents and bits of all values in the order of the tree, tiles included
+uint64_t hash_of(const Grid &grid);
 
-    // string metadata `name`; "" if there is none
-    std::string text_of(const Grid &grid, const char *name);
+// string metadata `name`; "" if there is none
+std::string text_of(const Grid &grid, const char *name);
 
-    // checks the seal and reads the grid
-    Grid::Ptr read_grid(const char *path, bool *sealed, sdm_error *err);
+// checks the seal and reads the grid
+Grid::Ptr read_grid(const char *path, bool *sealed, sdm_error *err);
 
-    // writes to a temporary file, reads it back, compares, and only then renames it to path
-    void write_grid(const char *path, const Grid::Ptr &grid, sdm_error *err);
+// writes to a temporary file, reads it back, compares, and only then renames it to path
+void write_grid(const char *path, const Grid::Ptr &grid, sdm_error *err);
 
-    // fails with `status` if openvdb::tools::checkLevelSet refuses the grid
-    void check_level_set(const Grid &grid, const char *path, sdm_status status, sdm_error *err);
+// fails with `status` if openvdb::tools::checkLevelSet refuses the grid
+void check_level_set(const Grid &grid, const char *path, sdm_status status, sdm_error *err);
 
-} // namespace )
+} // namespace vdb_parts
+
+#pragma GCC visibility pop
 
 #endif

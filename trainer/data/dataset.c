@@ -163,7 +163,7 @@ sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hoo
                 s = trainer_workbench_packed_map(&w, d, p, d->maps + slot * d->n_voxels,
                                                  &d->scale[slot], &mine);
             }
-/* keep the first error, report, and ask whether to stop */
+            // keep the first error, report, and ask whether to stop
 #pragma omp critical(sdm_dataset_fill)
             {
                 if (s && (failed < 0 || i < failed)) failed = i, first = mine;

@@ -140,10 +140,8 @@ static sdm_status project_holdout(pod_state *pod, sdm_error *err)
                     pod->holdout_phi + i * pod->n_poly);
             targets[i] = pod->holdout_target + i * r;
         }
-        pod->holdout_floor =
-            fmax(0, energy / ((double)h *
-                              // a difference of energies: rounding can make it negative
-                              (double)pod->t->data.n_voxels));
+        // not below 0, which rounding of the difference could give
+        pod->holdout_floor = fmax(0, energy / ((double)h * (double)pod->t->data.n_voxels));
         s = subtract_polynomials(pod, h, pod->holdout_phi, c, targets, err);
     }
     sdm_free(targets);

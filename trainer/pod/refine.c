@@ -303,7 +303,7 @@ sdm_status trainer_refine_evaluate(const pod_state *pod, const float *w, double 
         for (size_t i = 0; i < rows; i++) phi[i] = pod->holdout_phi + (at + i) * pod->n_poly;
         trainer_head_latent(pod, w, rows, phi, b.x, b.z, b.workspace);
         head_forward(pod, w, &b, rows);
-/* sum of squared errors of each tree */
+        // sum of squared errors of each tree
 #pragma omp parallel for schedule(dynamic) num_threads(threads_for_trees(pod, &b))
         for (long i = 0; i < (long)n_trees(pod); i++) {
             const tree_work work = tree_work_of(pod, &b, first_tree(pod) + (size_t)i);

@@ -94,9 +94,11 @@ void sdm_sides_turn_to(sdm_sides *w, uint32_t t)
     w->tri = t;
     sdm_facet_frame(w->mesh, t, &w->frame);
     w->known = false;
+    // are paths possible, with few contacts and only crossings?
     w->simple = c->first[t + 1] - c->first[t] <= WALK_CONTACTS_MAX;
     for (uint32_t i = c->first[t]; i < c->first[t + 1] && w->simple; i++)
         w->simple = c->list[i].kind == SDM_CONTACT_CROSSING;
+    // the start point: the midpoint of an edge to a neighbour without contacts
     for (uint32_t k = 0; k < 3 && w->simple && !w->known; k++) {
         const uint32_t o = sdm_topology_neighbour(&w->survey->topo, 3 * t + k);
         if (o == SDM_NONE || !meets_nothing(w->survey, o) || sdm_sides_is_sliver(w->survey, o))
@@ -112,6 +114,7 @@ void sdm_sides_turn_to(sdm_sides *w, uint32_t t)
     }
 }
 
+/* (b - a) x (c - a) */
 static double cross2(const double a[2], const double b[2], const double c[2])
 {
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);

@@ -1,4 +1,4 @@
-/* Distances by brute force: the oracle of the tests and the "naive" method. */
+/* Signed distance by brute force: the oracle of the tests and the "naive" method. */
 #ifndef SDM_INTERNAL_BRUTE_FORCE_H
 #define SDM_INTERNAL_BRUTE_FORCE_H
 
@@ -9,11 +9,15 @@
 extern "C" {
 #endif
 
-/* Oracle and "naive" baseline, O(voxels * triangles) in double as VTK's class and the paper do it,
-   without any tree: distance to the nearest of all triangles of the mesh as it is, sign by the
-   winding number over all triangles > 1/2. Threaded over voxels. */
+/* values[nz][ny][nx] = signed distance, mm, negative inside, in double precision by
+ * O(voxels * triangles) operations without a tree, as in the reference implementations (VTK; Wang et
+ * al., MIDL 2020): distance to the nearest of all triangles of the mesh as given; inside where the
+ * generalised winding number, summed over all triangles, is > 1/2. Parallel over the voxels;
+ * n_threads 0: the OpenMP default. */
 sdm_status sdm_naive_map(const sdm_mesh *mesh, const sdm_grid *grid, int n_threads, float *values,
                          sdm_error *err);
+
+/* The same at one point x. */
 double sdm_naive_point(const sdm_mesh *mesh, const double x[3]);
 
 #ifdef __cplusplus

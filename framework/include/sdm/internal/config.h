@@ -88,9 +88,9 @@ typedef struct sdm_config {
         /* pod: hidden layers of the MLP, 0..16, default 3 (0: polynomials only); sdmnn: levels;
          * deepsdf, imnet: hidden layers */
         int depth;
-        int width;  /* units per hidden layer, 8..4096, default 128; imnet: of the first one */
-        int rank;   /* mean number of basis functions per block of the lowest level, 1..256,
-                     * default 9 */
+        int width; /* units per hidden layer, 8..4096, default 128; imnet: of the first one */
+        /* mean number of basis functions per block of the lowest level, 1..256, default 9 */
+        int rank;
         int levels; /* levels of blocks, 1..8, default 3 */
         int block;  /* edge of a block of the lowest level in voxels, 2..16, default 4 */
         int modes;  /* global modes in which the coefficients are learned, 8..2048, default 512 */
@@ -100,10 +100,10 @@ typedef struct sdm_config {
         double dropout;    /* sdmnn: fraction dropped at the two deepest levels, 0..0.9 */
         int skip;          /* deepsdf: hidden layer with the input again, 0 (none)..15 */
         sdm_output output; /* deepsdf, imnet: activation of the output layer */
-        sdm_activation activation; /* of the hidden layers, default silu; leaky_relu: slope 0.02
-                                    * below 0 */
-        sdm_weight_type weights; /* large weights in the model file; default i8 (pod), f16 (others)
-                                  */
+        /* of the hidden layers, default silu; leaky_relu has the slope 0.02 below 0 */
+        sdm_activation activation;
+        /* type of the large weights in the model file; default i8 (pod), f16 (others) */
+        sdm_weight_type weights;
     } network;
     struct {
         /* data.static: points of the static grid per parameter, one number for all or a list;
@@ -138,8 +138,8 @@ typedef struct sdm_config {
         double refine;
         int refine_batch;   /* samples per step during refinement, 1..4096, default 32 */
         double refine_rate; /* learning rate during refinement, default 3e-4 */
-        double average; /* decay of the moving average of the weights, 0..0.99999, default 0.998;
-                         * 0: off */
+        /* decay of the moving average of the weights, 0..0.99999, default 0.998; 0: off */
+        double average;
         /* time between evaluations on held-out shapes, default 20; every 500 steps if the budget is
          * not a time */
         double evaluate_seconds;

@@ -1,4 +1,5 @@
-/* Numbers as bytes in a file, of either byte order, independent of the machine's own. */
+/* Numbers as bytes of a file in either byte order, whatever the byte order of the machine; endings
+ * of file names. */
 #ifndef SDM_IO_BYTES_H
 #define SDM_IO_BYTES_H
 
@@ -9,6 +10,7 @@
 
 #include "sdm/internal/file.h"
 
+/* The unsigned number of `size` bytes at p; big: big-endian. */
 static inline uint64_t sdm_get_uint(const uint8_t *p, size_t size, bool big)
 {
     uint64_t v = 0;
@@ -32,7 +34,7 @@ static inline double sdm_get_f64(const uint8_t *p, bool big)
     return v;
 }
 
-/* Little endian: every file this project writes, except PNG. */
+/* Stores the lowest `size` bytes of v, little endian. */
 static inline void sdm_put_uint(uint8_t *p, size_t size, uint64_t v)
 {
     for (size_t i = 0; i < size; i++) p[i] = (uint8_t)(v >> 8 * i);
@@ -52,7 +54,8 @@ static inline void sdm_put_f64(uint8_t *p, double v)
     sdm_put_uint(p, 8, bits);
 }
 
-/* True when `path` ends with `ext` (".ply"), upper or lower case. */
+/* True when `path` ends with `ext` (".ply", in lower case), ignoring the case of `path`, and has
+ * more characters before it. */
 static inline bool sdm_has_ext(const char *path, const char *ext)
 {
     const size_t n = strlen(path), m = strlen(ext);

@@ -1,5 +1,5 @@
-/* Text files line by line and word by word, in place, with line numbers for messages. Readers of
-   meshes and, from a library of their own, of images use it. */
+/* Splits the text of a file into lines and words, in place, and counts lines for messages. Used by
+   the mesh readers, and by the image readers in libsdmgen_image: hence the exported functions. */
 #ifndef SDM_IO_SCAN_H
 #define SDM_IO_SCAN_H
 
@@ -11,36 +11,46 @@
 #include "sdm/internal/shared.h"
 #include "sdm/status.h"
 
-/* A text file in memory, cut up in place; `at` must be followed by one writable zero byte at `end`.
- */
+/* A text in memory, which is modified: words and lines are ended by zero bytes. Set at, end and
+   path, and comment and continues as the format needs; the rest is 0. */
 typedef struct sdm_scan {
+    /* the text that has not been read; *end must be a writable zero byte */
     char *at, *end;
+    /* name of the file, for messages */
     const char *path;
-    size_t line;    /* of what was returned last, from 1 */
-    size_t lines;   /* read so far */
-    char comment;   /* starts a comment that reaches to the end of the line; 0: none */
-    bool continues; /* a backslash at the end of a line joins it with the next */
+    /* number of the line that was returned last, from 1 */
+    size_t line;
+    /* number of lines read */
+    size_t lines;
+    /* this character starts a comment up to the end of the line; 0: no comments */
+    char comment;
+    /* a backslash at the end of a line joins it with the next one */
+    bool continues;
 } sdm_scan;
 
-/* Bytes of the byte order mark that UTF-8 text may begin with; the first line is read without it.
- */
+/* Length of the UTF-8 byte order mark at the start of the text: 3, or 0 without one.
+ * sdm_scan_line() skips it. */
 size_t sdm_scan_mark(const char *text, size_t size);
 
-/* Next line with something on it, NULL at the end of the text. */
-char *sdm_scan_line(sdm_scan *s);
+/* The next line that has more than blanks and comments, without leading blanks; NULL at the end of
+ * the text. */
+char *sdm_scan_line(sdm_scan *scan);
 
-/* Cuts the next word off *line, NULL when there is none. */
+/* The next word of *line, which is moved behind it; NULL when the line has no further word. */
 SDM_INTERNAL_API char *sdm_scan_word(char **line);
 
-/* Next word of the text, wherever its line ends; NULL at the end of the text. */
-char *sdm_scan_token(sdm_scan *s, char **line);
+/* The next word of *line or, after its end, of the following lines; NULL at the end of the text.
+ * *line is NULL before the first call. */
+char *sdm_scan_token(sdm_scan *scan, char **line);
 
-/* The next n words of a line as finite numbers. SDM_E_FORMAT names file, line and word. */
-SDM_INTERNAL_API sdm_status sdm_scan_reals(const sdm_scan *s, char **line, double *out, int n,
+/* Reads the next n words of *line as finite numbers into out[n]. SDM_E_FORMAT names file, line and
+ * word. */
+SDM_INTERNAL_API sdm_status sdm_scan_reals(const sdm_scan *scan, char **line, double *out, int n,
                                            sdm_error *err);
 
-/* The next word of a line as an integer in [0, limit). `what` names it in the message. */
-SDM_INTERNAL_API sdm_status sdm_scan_count(const sdm_scan *s, char **line, int64_t limit,
+/* Reads the next word of *line as an integer in 0 .. limit - 1. `what` is its name in messages.
+ * SDM_E_FORMAT. */
+SDM_INTERNAL_API sdm_status sdm_scan_count(const sdm_scan *scan, char **line, int64_t limit,
                                            const char *what, int64_t *out, sdm_error *err);
 
 #endif

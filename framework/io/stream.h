@@ -1,4 +1,4 @@
-/* An image file read from front to back, with or without inflate. */
+/* Reads an image file from front to back, with or without decompression. */
 #ifndef SDM_IO_STREAM_H
 #define SDM_IO_STREAM_H
 
@@ -11,49 +11,58 @@
 
 #define SDM_LINE_MAX 65536
 
-/* A regular file from front to back, from some byte on through inflate. Large: on the heap. */
+/* An open file. About 130 kB: allocate it on the heap. */
 typedef struct sdm_stream {
+    /* name of the file, for messages */
     char path[4096];
     FILE *file;
-    uint64_t left;           /* bytes of the file behind `end` */
-    const uint8_t *at, *end; /* fetched, not used yet */
+    /* bytes of the file that are not in the buffer yet */
+    uint64_t left;
+    /* the unread part of the buffer */
+    const uint8_t *at, *end;
     z_stream z;
-    bool zip, ended; /* ended: no byte of the data is left */
+    /* zip: the data are compressed; ended: all of them have been read */
+    bool zip, ended;
     uint8_t bytes[1 << 15];
+    /* the line that was read last */
     char line[SDM_LINE_MAX];
-    size_t lines; /* read so far */
+    /* number of lines read */
+    size_t lines;
 } sdm_stream;
 
-/* sdm_stream_close() always. */
-sdm_status sdm_stream_open(sdm_stream *s, const char *path, sdm_error *err);
-void sdm_stream_close(sdm_stream *s);
+/* Opens a regular file. Call sdm_stream_close() in every case, also after an error. SDM_E_IO;
+ * SDM_E_ARG for too long a name. */
+sdm_status sdm_stream_open(sdm_stream *in, const char *path, sdm_error *err);
+void sdm_stream_close(sdm_stream *in);
 
-/* Goes on in another file, that of the voxels, in the folder of the header. SDM_E_UNSUPPORTED for a
- * name that leaves it. */
-sdm_status sdm_stream_detach(sdm_stream *s, const char *name, sdm_error *err);
+/* Closes the header and opens `name`, the file of its voxels, in the same folder. SDM_E_UNSUPPORTED
+ * for a name that leads out of the folder. */
+sdm_status sdm_stream_detach(sdm_stream *in, const char *name, sdm_error *err);
 
-/* The next byte is that of gzip (RFC 1952) or zlib (RFC 1950) data, which reach to the end of the
- * file. */
-sdm_status sdm_stream_unzip(sdm_stream *s, sdm_error *err);
+/* Switches decompression on: from the next byte to its end, the file is gzip (RFC 1952) or zlib
+ * (RFC 1950) data. SDM_E_NOMEM. */
+sdm_status sdm_stream_unzip(sdm_stream *in, sdm_error *err);
 
-/* Without using it: true when the file begins like gzip. */
-bool sdm_stream_is_gzip(sdm_stream *s);
+/* True when the next two bytes, which stay unread, are the magic number of gzip. */
+bool sdm_stream_is_gzip(sdm_stream *in);
 
-/* Exactly `size` bytes; SDM_E_FORMAT when the file ends before, or is damaged. */
-sdm_status sdm_stream_read(sdm_stream *s, void *out, size_t size, sdm_error *err);
-sdm_status sdm_stream_skip(sdm_stream *s, uint64_t size, sdm_error *err);
-/* Leaves the last `size` bytes of a file that is not compressed, or all of them when it has fewer.
+/* Read or skip exactly `size` bytes. SDM_E_FORMAT when the data end before or are damaged;
+ * SDM_E_IO.
  */
-sdm_status sdm_stream_skip_to_tail(sdm_stream *s, uint64_t size, sdm_error *err);
+sdm_status sdm_stream_read(sdm_stream *in, void *out, size_t size, sdm_error *err);
+sdm_status sdm_stream_skip(sdm_stream *in, uint64_t size, sdm_error *err);
+/* Moves to the last `size` bytes of an uncompressed file; does nothing when fewer are left. */
+sdm_status sdm_stream_skip_to_tail(sdm_stream *in, uint64_t size, sdm_error *err);
 
-/* The next line in s->line, without its end; *more is false at the end of the file. */
-sdm_status sdm_stream_line(sdm_stream *s, bool *more, sdm_error *err);
+/* Reads the next line into in->line, without its line end; *more is false at the end of the file.
+ * SDM_E_FORMAT for a zero byte in the line or more than 65535 bytes. */
+sdm_status sdm_stream_line(sdm_stream *in, bool *more, sdm_error *err);
 
-/* SDM_E_FORMAT unless the rest of the file is `size` bytes, or compressed and long enough to become
- * `size` bytes. */
-sdm_status sdm_stream_expect(const sdm_stream *s, uint64_t size, sdm_error *err);
+/* SDM_E_FORMAT unless the rest of the file is `size` bytes long or, when compressed, long enough to
+ * expand to `size` bytes. */
+sdm_status sdm_stream_expect(const sdm_stream *in, uint64_t size, sdm_error *err);
 
-/* SDM_E_FORMAT unless everything was read; checks the checksum of compressed data. */
-sdm_status sdm_stream_end(sdm_stream *s, sdm_error *err);
+/* SDM_E_FORMAT unless all data have been read and the checksum of compressed data is right. */
+sdm_status sdm_stream_end(sdm_stream *in, sdm_error *err);
 
 #endif

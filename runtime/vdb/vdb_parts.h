@@ -1,5 +1,5 @@
-/* What the files of the level set library share that knows OpenVDB: C++, and no exception leaves
- * the library. */
+/* What the C++ files of the level set library share. Only these files use OpenVDB; no exception
+   leaves the library. */
 #ifndef VDB_PARTS_H
 #define VDB_PARTS_H
 
@@ -9,54 +9,59 @@
 
 #include "sdm/vdb.h"
 
-// the library exports its C interface alone
-namespace vdb_parts __attribute__((visibility("hidden")))
+// hidden: the library exports its C interface only
+#pragma GCC visibility push(hidden)
+
+namespace vdb_parts
 {
 
-    using Grid = openvdb::FloatGrid;
-    using openvdb::Coord;
+using Grid = openvdb::FloatGrid;
+using openvdb::Coord;
 
-    // a status on its way through C++ code; the text is in the caller's sdm_error
-    struct failure {
-        sdm_status status;
-    };
+// exception that carries a status through C++ code; the message is in the caller's sdm_error
+struct failure {
+    sdm_status status;
+};
 
-    inline void need(sdm_status s)
-    {
-        if (s) throw failure{s};
-    }
+inline void need(sdm_status s)
+{
+    if (s) throw failure{s};
+}
 
-    // as it comes back from a file of 16-bit floats, where it is written to one
-    inline float as_stored(float v, bool half)
-    {
-        return half ? openvdb::io::truncateRealToHalf(v) : v;
-    }
+// v after a round trip through the file: rounded if the file has 16-bit floats (half)
+inline float as_stored(float v, bool half) { return half ? openvdb::io::truncateRealToHalf(v) : v; }
 
-    // SDM_E_CANCELLED where the caller wants to stop
-    void check_cancelled(const sdm_vdb_opts &o, sdm_error *err);
+// fails with SDM_E_CANCELLED if the caller wants to stop
+void check_cancelled(const sdm_vdb_opts &o, sdm_error *err);
 
-    /* Changes values at creases until checkLevelSet has nothing to object to, and counts them in
-   report (the check is the caller's: this may end without success). */
-    void mend_creases(Grid & grid, const sdm_vdb_opts &o, sdm_vdb_report &report, sdm_error *err);
+// ---- vdb_creases.cc
 
-    // ---- files
+// A crease is a voxel at a zero crossing whose gradient checkLevelSet refuses. Changes values
+// there until none is left, and counts the changes in report. It may end without success: the
+// caller runs checkLevelSet.
+void mend_creases(Grid &grid, const sdm_vdb_opts &o, sdm_vdb_report &report, sdm_error *err);
 
-    extern const char *const GRID_NAME;
+// ---- vdb_file.cc
 
-    // of coordinates, extents and bits of all values in the order of the tree, tiles included
-    uint64_t hash_of(const Grid &grid);
+extern const char *const GRID_NAME;
 
-    // string metadata; "": none of that name
-    std::string text_of(const Grid &grid, const char *name);
+// CRC-64 of positions, extents and bits of all values in the order of the tree, tiles included
+uint64_t hash_of(const Grid &grid);
 
-    Grid::Ptr read_grid(const char *path, bool *sealed, sdm_error *err);
+// string metadata `name`; "" if there is none
+std::string text_of(const Grid &grid, const char *name);
 
-    // writes, reads back and compares before the file gets its name
-    void write_grid(const char *path, const Grid::Ptr &grid, sdm_error *err);
+// checks the seal and reads the grid
+Grid::Ptr read_grid(const char *path, bool *sealed, sdm_error *err);
 
-    // `status` where checkLevelSet objects
-    void check_level_set(const Grid &grid, const char *path, sdm_status status, sdm_error *err);
+// writes to a temporary file, reads it back, compares, and only then renames it to path
+void write_grid(const char *path, const Grid::Ptr &grid, sdm_error *err);
 
-} // namespace )
+// fails with `status` if openvdb::tools::checkLevelSet refuses the grid
+void check_level_set(const Grid &grid, const char *path, sdm_status status, sdm_error *err);
+
+} // namespace vdb_parts
+
+#pragma GCC visibility pop
 
 #endif

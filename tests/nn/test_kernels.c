@@ -236,15 +236,20 @@ static void bytes(void **state)
                 sdm_panel_pack_i8(outputs, wide, k, w, packed);
                 for (size_t rows = 1; rows <= ROWS; rows += rows < 7 ? 1 : 6) {
                     const size_t n_mean = rows / 2;
-                    const sdm_panel_out
-                        plain = {.y = y, .ld = MOST, .line = SDM_PANEL_ROW},
-                        added = {.y = apart,
-                                 .ld = APART,
-                                 .line = LINE,
-                                 .mean = mean,
-                                 .n_mean = n_mean},
-                        again = {.integers = integers, .ld = MOST, .factor = factor, .limit = 1234},
-                        whole = {.y = with_rest, .ld = MOST, .line = SDM_PANEL_ROW, .rest = true};
+                    const sdm_panel_out plain = {.y = y, .ld = MOST, .line = SDM_PANEL_ROW},
+                                        added = {.y = apart,
+                                                 .ld = APART,
+                                                 .line = LINE,
+                                                 .mean = mean,
+                                                 .n_mean = n_mean},
+                                        again = {.integers = integers,
+                                                 .ld = MOST,
+                                                 .factor = factor,
+                                                 .limit = 1234},
+                                        whole = {.y = with_rest,
+                                                 .ld = MOST,
+                                                 .line = SDM_PANEL_ROW,
+                                                 .residual = true};
                     for (size_t o = 0; o < outputs; o++)
                         factor[o] = (o % 3 ? 3e-4f : -1e-6f) / (float)k;
                     sdm_panel_i8(rows, outputs, wide, k, packed, x, 128, scale, &plain);
@@ -319,8 +324,8 @@ static void put(void **state)
             for (int stream = 0; stream < 2; stream++) {
                 float *to = memory + 1 + offset;
                 to[-1] = to[n] = 77;
-                sdm_put(n, y, to, stream);
-                sdm_put_end();
+                sdm_copy(n, y, to, stream);
+                sdm_copy_end();
                 assert_memory_equal(to, y, n * sizeof *y);
                 assert_true(to[-1] == 77 && to[n] == 77);
             }
@@ -364,7 +369,7 @@ static void quantisation(void **state)
                     int16_t alone[MOST], rest[MOST + 1];
                     float s, rest_scale;
                     x[n] = rest[n] = 77;
-                    sdm_quantise_rest(n, y, f, limit, x, &scale[0], rest, &rest_scale);
+                    sdm_quantise_residual(n, y, f, limit, x, &scale[0], rest, &rest_scale);
                     sdm_quantise(1, n, y, 0, f, limit, alone, 0, &s);
                     assert_true(s == scale[0] && x[n] == 77 && rest[n] == 77);
                     assert_memory_equal(x, alone, n * sizeof *x);
@@ -379,7 +384,7 @@ static void quantisation(void **state)
         for (int i = 0; i < MOST; i++) changed[i] = i % 2 ? 1e-40f : 0;
         sdm_quantise(1, MOST, changed, 0, ones, 32767, x, 0, scale);
         assert_true(scale[0] == 0 && x[3] == 0);
-        sdm_quantise_rest(MOST, changed, ones, 32767, x, &scale[0], x + LDX, &scale[1]);
+        sdm_quantise_residual(MOST, changed, ones, 32767, x, &scale[0], x + LDX, &scale[1]);
         assert_true(scale[0] == 0 && scale[1] == 0 && x[3] == 0 && x[LDX + 3] == 0);
         const float wrong[] = {NAN, -NAN, INFINITY, -INFINITY};
         for (int k = 0; k < 4; k++)
@@ -389,7 +394,7 @@ static void quantisation(void **state)
                 sdm_quantise(1, MOST, changed, 0, ones, 32767, x, 0, scale);
                 assert_true(isnan(scale[0]));
                 assert_int_equal(x[1], 0);
-                sdm_quantise_rest(MOST, changed, ones, 32767, x, &scale[0], x + LDX, &scale[1]);
+                sdm_quantise_residual(MOST, changed, ones, 32767, x, &scale[0], x + LDX, &scale[1]);
                 assert_true(isnan(scale[0]) && isnan(scale[1]) && x[1] == 0 && x[LDX + 1] == 0);
             }
     }

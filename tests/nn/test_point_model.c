@@ -45,7 +45,7 @@ static void make(toy *t, bool imnet, bool half, int activation)
     t->spec.arch = (sdm_point_arch){.n_params = P,
                                     .depth = 3,
                                     .width = {imnet ? 140 : 70, 70, imnet ? 35 : 70},
-                                    .again = imnet ? 6 : 2,
+                                    .skip = imnet ? 6 : 2,
                                     .activation = activation,
                                     .tanh_output = !imnet,
                                     .centre = {1, 2, 3},
@@ -96,7 +96,7 @@ static double reference(const toy *t, const double *p, size_t voxel)
     const float *w = t->weights;
     for (size_t l = 0; l < a->depth; l++) {
         const size_t before = l ? a->width[l - 1] : 0,
-                     k = before + (l == 0 || a->again >> l & 1 ? U : 0);
+                     k = before + (l == 0 || a->skip >> l & 1 ? U : 0);
         for (size_t o = 0; o < a->width[l]; o++) {
             double s = w[a->width[l] * k + o];
             for (size_t i = 0; i < k; i++) s += w[o * k + i] * (i < before ? h[i] : u[i - before]);
@@ -161,7 +161,7 @@ static void one_layer(void **state)
     toy t;
     make(&t, false, true, 0);
     t.spec.arch.depth = 1;
-    t.spec.arch.again = 0;
+    t.spec.arch.skip = 0;
     sdm_model *m = open_toy(&t);
     const double p[P] = {0.5, 0.5, 0.5};
     float map[VOXELS];

@@ -1,5 +1,4 @@
-/* Wide spaces of the shape's own tissue are left out: against brute force, and in fits beside one.
- */
+/* Cavities are left out of a fit: against brute force, and in fits next to one. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -21,7 +20,7 @@ static double between(const sdm_grid *g, size_t a, size_t b)
     return sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
 }
 
-// dark but for a few bright voxels and a NaN
+// a dark image with a few bright voxels and NaN
 static void test_brute_force(void **state)
 {
     (void)state;
@@ -46,7 +45,7 @@ static void test_brute_force(void **state)
         const sdm_fit_target t = {.kind = SDM_FIT_IMAGE, .grid = g, .values = image};
         size_t n, expected = 0, all = 0;
         o.n_threads = 1 + (int)(seed % 3);
-        assert_int_equal(sdm_fit_leave_out_cavities(&t, &o, &found, &n, NULL), SDM_OK);
+        assert_int_equal(sdm_fit_mask_cavities(&t, &o, &found, &n, NULL), SDM_OK);
         for (size_t i = 0; i < COUNT; i++) {
             bool out = false;
             for (size_t k = 0; k < COUNT; k++)
@@ -62,7 +61,7 @@ static void test_brute_force(void **state)
     }
 }
 
-// a ball of the shape's tissue that opens into its far end
+// a phantom with a large dark ball that opens into the far end of the ellipsoid
 static float *beside_a_ball(void)
 {
     float *v = phantom(TRUTH, &POSE, 0.3, 7);
@@ -111,7 +110,7 @@ static void test_beside_a_ball(void **state)
     free(v);
 }
 
-// a radius below that of the shape: no figure in silence
+// a radius smaller than that of the shape is reported
 static void test_too_narrow(void **state)
 {
     (void)state;

@@ -1,5 +1,4 @@
-/* Compartments labelled apart become one shape: closing of labels by a ball against brute force,
- * and what it must not do. */
+/* Closing of label maps by a ball: against brute force, at the border, and misuse. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -22,7 +21,7 @@ static sdm_grid grid_of(double h)
     return g;
 }
 
-// whether the offset is at most the radius long
+// whether the offset d (voxels) is at most `radius` long
 static bool reaches(const sdm_grid *g, const int d[3], double radius)
 {
     double square = 0;
@@ -38,7 +37,7 @@ static float label_at(const float *v, const int at[3])
     return v[(at[2] * NY + at[1]) * NX + at[0]];
 }
 
-// whether a ball about a centre, which may lie beyond the grid, touches no label
+// whether a ball touches no label; its centre may lie beyond the grid
 static bool is_free(const sdm_grid *g, const float *v, const int centre[3], double radius)
 {
     for (int k = -PAD; k <= PAD; k++)
@@ -84,8 +83,8 @@ static void test_brute_force(void **state)
     }
 }
 
-// a slab near the border of the grid, with a wall of one voxel in it: the wall is filled, the
-// outside is not
+// a slab near the border of the grid with a wall of one voxel in it: the wall is filled, nothing
+// else
 static void test_border(void **state)
 {
     (void)state;

@@ -1,5 +1,4 @@
-/* Fits to phantoms with known truth: what is recovered, and how honest the standard deviations are.
- */
+/* Fits to phantoms with known truth: accuracy, and whether standard deviations match the errors. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -10,7 +9,7 @@
 
 #include "oracle/fit_tools.h"
 
-// largest error of parameters (mm), turn (rad) and translation (mm)
+// largest error of parameters (mm), rotation (rad) and translation (mm)
 static double worst(const sdm_fit_result *r)
 {
     double e[9], most = 0;
@@ -28,7 +27,7 @@ static void test_clean(void **state)
     sdm_fit_result r = fit(&t, &o);
     assert_true(r.converged && r.n_params == 3 && r.n_exact > 3 && r.n_network == 0);
     if (!(worst(&r) < 4e-3)) fail_msg("off by %g", worst(&r));
-    // the point spread holds the box of the voxel, the means are those of the phantom
+    // the point spread includes the box of a voxel; the means are those of the phantom
     assert_true(fabs(r.blur - sqrt(0.04 + 0.0625 / 12)) < 0.01);
     assert_true(fabs(r.appearance.inside[0].mean - 40) < 5 &&
                 fabs(r.appearance.outside[0].mean - 1300) < 5);
@@ -37,7 +36,7 @@ static void test_clean(void **state)
     assert_true(r.n_iterations > 1 && r.objective[r.n_iterations - 1] < 0);
     sdm_fit_dispose(&r);
 
-    // another start ends at the same place
+    // another start leads to the same estimate
     sdm_fit_opts other = o;
     other.start_pose = POSE;
     other.start_params = TRUTH;
@@ -52,7 +51,7 @@ static void test_clean(void **state)
     free(v);
 }
 
-// noise, and the creases between triangles: fits from two sides end at the same place all the same
+// with noise and kinks of the likelihood: fits from two starts reach the same maximum
 static void test_one_maximum(void **state)
 {
     (void)state;
@@ -67,7 +66,7 @@ static void test_one_maximum(void **state)
         sdm_fit_result b = fit(&t, &o);
         assert_true(a.converged && b.converged);
         for (int k = 0; k < 3; k++) {
-            most = fmax(most, fabs(a.params[k] - b.params[k]) / 3); // ranges
+            most = fmax(most, fabs(a.params[k] - b.params[k]) / 3); // 3: range of a parameter
             most = fmax(most, fabs(a.pose.rotation[k] - b.pose.rotation[k]));
             most = fmax(most, fabs(a.pose.translation[k] - b.pose.translation[k]) / 2.5);
         }
@@ -79,7 +78,8 @@ static void test_one_maximum(void **state)
     assert_true(most < 1e-5);
 }
 
-// n fits to noisy phantoms: of one shape with other noise, or of other shapes in other poses
+// n fits to noisy phantoms: of one shape with different noise, or (random) of different shapes in
+// different poses. *rms: of the errors over their sd; *beyond: parameters with an error above 3 sd
 static void spread(size_t n, bool random, double *rms, size_t *beyond)
 {
     double square = 0;
@@ -155,7 +155,7 @@ static void test_labels_of_image(void **state)
     sdm_fit_opts o = near_start();
     o.image_model = SDM_FIT_LABELS;
     sdm_fit_result r = fit(&t, &o);
-    // the edge is where the laws cross, not quite where the surface is
+    // biased: the edge lies where the densities are equal, not at the surface
     if (!(worst(&r) < 0.25)) fail_msg("off by %g", worst(&r));
     assert_true(r.blur == 0 && r.evidence > 0);
     sdm_fit_dispose(&r);
@@ -170,7 +170,7 @@ static void test_label_map(void **state)
     float *v = calloc(sdm_grid_count(&g), sizeof *v);
     if (!v) abort();
     assert_int_equal(sdm_fit_map(&source, TRUTH, &POSE, &g, 1, v, NULL), SDM_OK);
-    // against the closed form; the mesh lies inside
+    // against the closed form; the triangles of the mesh lie slightly inside
     for (size_t i = 0; i < sdm_grid_count(&g); i += 37) {
         const double index[3] = {(double)(i % 36), (double)(i / 36 % 30), (double)(i / 36 / 30)};
         double x[3], y[3], d;
@@ -187,7 +187,7 @@ static void test_label_map(void **state)
     if (!(worst(&r) < 0.02)) fail_msg("off by %g", worst(&r));
     assert_true(isnan(r.evidence));
     sdm_fit_dispose(&r);
-    // the logistic law alone would draw the long end inwards, by 0.035 mm
+    // without its blur of the distance, the logistic prior would shorten the long axis by 0.035 mm
     sdm_fit_opts logistic = o;
     logistic.image_model = SDM_FIT_LABELS;
     logistic.l_ref = 0.1;
@@ -211,7 +211,7 @@ static void test_points(void **state)
     if (!x) abort();
     for (size_t i = 0; i < m.n_vert; i++) {
         sdm_pose_apply(&POSE, m.vert + 3 * i, x + 3 * i);
-        const double far = i % 20 == 0 ? 0.8 : 0.01; // some lie off
+        const double far = i % 20 == 0 ? 0.8 : 0.01; // every 20th is an outlier
         for (size_t k = 0; k < 3; k++) x[3 * i + k] += far * sdm_rng_normal(1, i, k);
     }
     const sdm_fit_target t = {.kind = SDM_FIT_POINTS, .points = x, .n_points = m.n_vert};
@@ -235,22 +235,22 @@ static void test_turns(void **state)
     float *v = phantom(TRUTH, &POSE, 1, 4);
     const sdm_fit_target t = image_of(v);
     sdm_fit_opts o = near_start();
-    // a quarter turn off about the shape's z, which no local step finds
+    // wrong by a quarter turn about the shape's z: local steps from there do not find the truth
     o.start_pose = sdm_pose_compose(&POSE, &(sdm_pose){{0, 0, 1.5707963267948966}, {0, 0, 0}});
     o.start_params = TRUTH;
     o.turns = SDM_FIT_TURNS_AXIS;
     o.n_turns = 8;
     sdm_fit_result r = fit(&t, &o);
-    // the turns beside the right one lead there, too; half a turn is the same ellipsoid; a quarter
-    // has the other axes
+    // turns next to the right one lead there, too. A half turn gives the same ellipsoid, a quarter
+    // turn exchanges its axes
     assert_true(r.turn % 4 != 0);
     for (int k = 0; k < 3; k++) assert_true(fabs(r.params[k] - TRUTH[k]) < 5 * r.sd[k]);
     sdm_fit_dispose(&r);
-    // priors are about each turn as it is tried, which moves the origin, too, about a pivot
-    // elsewhere
+    // priors are centred on each turned start; with a pivot off the origin the turn also moves the
+    // origin
     o.pivot[0] = 2;
     o.start_pose = sdm_pose_compose(
-        &POSE, &(sdm_pose){{0, 0, 1.5707963267948966}, {2, -2, 0}}); // keeps the pivot
+        &POSE, &(sdm_pose){{0, 0, 1.5707963267948966}, {2, -2, 0}}); // leaves the pivot in place
     o.prior_rotation_sd = 0.03;
     o.prior_translation_sd = 0.1;
     r = fit(&t, &o);
@@ -262,7 +262,7 @@ static void test_turns(void **state)
     o.n_turns = 40;
     o.start_pose = sdm_pose_compose(&POSE, &(sdm_pose){{1.1, 0.7, -0.8}, {0, 0, 0}});
     r = fit(&t, &o);
-    // the axes may have changed places: the same ellipsoid
+    // the axes may be permuted: the same ellipsoid
     for (int k = 0; k < 3; k++) {
         double nearest = INFINITY;
         for (int i = 0; i < 3; i++) nearest = fmin(nearest, fabs(r.params[i] - TRUTH[k]) / r.sd[i]);
@@ -272,7 +272,7 @@ static void test_turns(void **state)
     free(v);
 }
 
-// evidence: what is kept costs nothing (Schwarz 1978)
+// number of unknowns that the evidence was charged for: kept ones are free (Schwarz 1978)
 static double unknowns_paid(const sdm_fit_result *r)
 {
     const double factor = fmax(r->noise_factor, 1);
@@ -304,7 +304,7 @@ static void test_kept(void **state)
     free(v);
 }
 
-// a strong prior wins over the image, and sd are no larger than it
+// a strong prior overrules the image, and the sd are at most those of the prior
 static void test_priors(void **state)
 {
     (void)state;
@@ -320,7 +320,7 @@ static void test_priors(void **state)
         assert_true(r.sd[3 + k] < 2e-5 && r.sd[6 + k] < 2e-5);
     }
     sdm_fit_dispose(&r);
-    // of half of 1 .. 4: draws the parameters towards 2.5, and they are better known
+    // sd of 0.2 half ranges of 1 .. 4: draws the parameters towards 2.5 and narrows their sd
     o.prior_translation_sd = o.prior_rotation_sd = 0;
     const sdm_fit_result free_of_it = fit(&t, &o);
     o.prior_sd = 0.2;
@@ -335,8 +335,7 @@ static void test_priors(void **state)
     free(v);
 }
 
-// of a parameter without effect nothing is known but what was known before, with a prior and
-// without; of the others it is
+// the sd of a parameter without effect is that of its prior or range, and by_prior marks it alone
 static void test_no_effect(void **state)
 {
     (void)state;
@@ -348,7 +347,7 @@ static void test_no_effect(void **state)
     shape.name = "with_nothing";
     shape.params = params;
     shape.n_params = 4;
-    shape.velocity = NULL; // writes those of three
+    shape.velocity = NULL; // it would write the velocities of three parameters
     sdm_instance *instance = NULL;
     assert_int_equal(sdm_registry_add(registry, &shape, "test", NULL), SDM_OK);
     assert_int_equal(sdm_instance_create(sdm_registry_find(registry, "with_nothing", NULL),
@@ -375,8 +374,7 @@ static void test_no_effect(void **state)
     free(v);
 }
 
-// noise that is correlated: an estimate and its prior are weighed by their variances, as if it was
-// not
+// correlated noise: the prior is weighted such that estimate and prior combine by their variances
 static void test_prior_weight(void **state)
 {
     (void)state;
@@ -390,7 +388,7 @@ static void test_prior_weight(void **state)
     const double sd = r.sd[2], found = r.params[2], prior_sd = 10 * sd;
     assert_true(r.noise_factor > 3);
     sdm_fit_dispose(&r);
-    o.prior_sd = prior_sd / 1.5; // of half of 1 .. 4
+    o.prior_sd = prior_sd / 1.5; // in units of half of the range 1 .. 4
     r = fit(&t, &o);
     const double wanted = (2.5 - found) / (1 + prior_sd * prior_sd / (sd * sd)),
                  moved = r.params[2] - found;
@@ -400,7 +398,7 @@ static void test_prior_weight(void **state)
     free(v);
 }
 
-// two tissues outside that overlap: without acceleration 51 iterations
+// two overlapping tissues outside: 51 iterations without acceleration
 static void test_overlapping_tissues(void **state)
 {
     (void)state;
@@ -423,7 +421,7 @@ static void test_overlapping_tissues(void **state)
     free(v);
 }
 
-// a tissue that the image does not hold keeps its law: it does not look for something else to be
+// a tissue that is absent from the image keeps its mean and sd instead of modelling something else
 static void test_absent_tissue(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* Fits that cannot be: images without the shape, bad arguments, no memory, stops on request; and
- * the starts of fits. */
+/* Fits that must fail: images without the shape, bad arguments, lack of memory, cancellation. And
+ * starts from points and axes. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -39,7 +39,7 @@ static void test_no_shape(void **state)
     refused(SDM_E_QUALITY, "no such shape", &t, &o);
     free(v);
     v = phantom(TRUTH, &POSE, 1, 5);
-    for (size_t i = 0; i < n; i++) v[i] = 1340 - v[i]; // inside and outside change places
+    for (size_t i = 0; i < n; i++) v[i] = 1340 - v[i]; // opposite contrast
     t.values = v;
     const sdm_fit_source source = exact_source();
     sdm_fit_result r;
@@ -51,7 +51,7 @@ static void test_no_shape(void **state)
     free(v);
 }
 
-// what is known is told: where it stopped, and why
+// a failed fit returns its start and the reason
 static void test_known(void **state)
 {
     (void)state;
@@ -59,7 +59,7 @@ static void test_known(void **state)
     const sdm_fit_target t = image_of(v);
     const sdm_fit_opts o = near_start();
     sdm_fit_source source = exact_source();
-    source.grid.origin[0] += 50; // the shape is not on its maps
+    source.grid.origin[0] += 50; // the shape lies outside the grid of its maps
     sdm_fit_result r;
     sdm_error err = {0};
     assert_int_equal(sdm_fit(&source, &t, &o, &r, &err), SDM_E_QUALITY);
@@ -68,8 +68,7 @@ static void test_known(void **state)
         assert_true(fabs(r.pose.rotation[k] - o.start_pose.rotation[k]) < 1e-12);
     assert_memory_equal(r.pose.translation, o.start_pose.translation, sizeof r.pose.translation);
     assert_true(isnan(r.evidence) && isnan(r.log_likelihood_without) && !r.converged);
-    for (int k = 0; k < 9; k++)
-        assert_true(isnan(r.sd[k])); // not 0, which would be known for certain
+    for (int k = 0; k < 9; k++) assert_true(isnan(r.sd[k])); // 0 would mean known exactly
     for (int k = 0; k < 81; k++) assert_true(isnan(r.covariance[k]) && isnan(r.correlation[k]));
     assert_true(isnan(r.inside_share) && isnan(r.noise_factor) && isnan(r.model_error_mm));
     if (!*r.reason || strncmp(r.reason, err.text, 200) != 0) fail_msg("reason '%s'", r.reason);
@@ -134,7 +133,8 @@ static void test_refused(void **state)
     sdm_fit_result r = fit(&t, &o);
     assert_int_equal(r.n_nan, 1);
     sdm_fit_dispose(&r);
-    // half of the image is missing: more than half of the shape, and then less
+    // half of the image is missing: first more than least_inside of the shape lies in the rest,
+    // then less
     for (size_t i = 0; i < 36 * 30 * 26; i++)
         if (i % 36 < 20) v[i] = NAN;
     o.least_inside = 0.7;
@@ -149,7 +149,7 @@ static void test_refused(void **state)
     assert_int_equal(sdm_fit(&source, &t, &o, NULL, NULL), SDM_E_ARG);
 }
 
-// every now and then memory ends: an error, nothing left behind
+// the n-th allocation fails: an error, and nothing leaks
 static void test_memory(void **state)
 {
     (void)state;

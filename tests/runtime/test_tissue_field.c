@@ -1,4 +1,4 @@
-/* Tissues in places: an ellipsoid with bone on one side and something darker on the other. */
+/* Tissue field: an ellipsoid with bone on one side and a darker tissue on the other. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -9,6 +9,7 @@
 
 #include <cmocka.h>
 
+#include "fit/solver/objective.h"
 #include "fit/solver/tissue_field.h"
 #include "oracle/fit_tools.h"
 
@@ -22,7 +23,7 @@ static void voxel(const sdm_grid *g, size_t i, double x[3])
         g, (const double[3]){(double)(i % nx), (double)(i / nx % ny), (double)(i / nx / ny)}, x);
 }
 
-// what is bone in the phantom becomes darker where x is above 0.3 mm, partial volumes in proportion
+// phantom in which bone is replaced by the darker tissue where x > 0.3 mm, also in mixed voxels
 static float *two_sides(uint64_t seed)
 {
     const sdm_grid g = image_grid();
@@ -44,31 +45,32 @@ static sdm_fit_opts options(void)
     return o;
 }
 
-// a problem that stands at the truth
-static void stand(fit_problem *p, const sdm_fit_source *source)
+// sets up and evaluates a problem with its state at the truth
+static void problem_at_truth(fit_problem *p, const sdm_fit_source *source)
 {
     p->source = source;
-    p->n_params = 3, p->stride = 1, p->noise_factor = 1, p->places = true;
+    p->n_params = 3, p->stride = 1, p->noise_factor = 1, p->use_tissue_field = true;
     for (int k = 0; k < 3; k++) p->low[k] = 1, p->high[k] = 4;
-    p->maps_at[0] = p->packed_blur = NAN;
-    p->state = (fit_state){.blur = 0.25, .look = p->opts->appearance};
+    p->maps_params[0] = p->maps_blur = NAN;
+    p->state = (fit_state){.blur = 0.25, .appearance = p->opts->appearance};
     sdm_pose_matrix(&POSE, p->state.rotation);
     memcpy(p->state.translation, POSE.translation, sizeof POSE.translation);
     memcpy(p->state.params, TRUTH, sizeof TRUTH);
     assert_int_equal(sdm_fit_maps_create(source, true, p->opts, &p->maps, NULL), SDM_OK);
-    assert_int_equal(sdm_fit_sums_create(fit_columns(3) + 3, &p->sums, NULL), SDM_OK);
+    assert_int_equal(sdm_fit_information_create(fit_columns(3) + 3, &p->information, NULL), SDM_OK);
     const fit_region region = {.centre = {0.3, -0.2, 0.1}, .radius = 9};
     bool changed;
     assert_int_equal(
-        sdm_fit_sites_choose(p->target, p->opts, &region, 1, &p->sites, &changed, NULL), SDM_OK);
-    assert_int_equal(sdm_fit_look(p, NULL), SDM_OK);
+        sdm_fit_samples_choose(p->target, p->opts, &region, 1, &p->samples, &changed, NULL),
+        SDM_OK);
+    assert_int_equal(sdm_fit_evaluate(p, NULL), SDM_OK);
 }
 
-static void leave(fit_problem *p)
+static void problem_free(fit_problem *p)
 {
     sdm_fit_maps_dispose(&p->maps);
-    sdm_fit_sites_dispose(&p->sites);
-    sdm_fit_sums_dispose(&p->sums);
+    sdm_fit_samples_dispose(&p->samples);
+    sdm_fit_information_dispose(&p->information);
 }
 
 static void test_weights(void **state)
@@ -81,38 +83,39 @@ static void test_weights(void **state)
     for (int threads = 1; threads <= 3; threads += 2) {
         o.n_threads = threads;
         fit_problem p = {.target = &t, .opts = &o};
-        stand(&p, &source);
-        const double before = p.sums.log_likelihood;
-        assert_int_equal(sdm_fit_places_update(&p, NULL), SDM_OK);
-        const fit_sites *s = &p.sites;
+        problem_at_truth(&p, &source);
+        const double before = p.information.log_likelihood;
+        assert_int_equal(sdm_fit_tissue_field_update(&p, NULL), SDM_OK);
+        const fit_samples *s = &p.samples;
         assert_int_equal(s->n_outside, 2);
-        assert_true(p.sums.log_likelihood > before + 500);
+        assert_true(p.information.log_likelihood > before + 500);
         for (size_t i = 0; i < s->n; i++) {
-            const double bone = exp((double)s->place[2 * i]),
-                         dark = exp((double)s->place[2 * i + 1]);
+            const double bone = exp((double)s->log_weight[2 * i]),
+                         dark = exp((double)s->log_weight[2 * i + 1]);
             assert_true(fabs(bone + dark - 1) < 1e-5);
             if (s->world[3 * i] > 2.3) assert_true(dark > 0.85);
             if (s->world[3 * i] < -1.7) assert_true(bone > 0.85);
         }
-        // the log-likelihood is that of the sums without derivatives, too
-        assert_true(fabs(sdm_fit_sums_value(s, &p.maps, &p.laws, &p.state) / p.sums.log_likelihood -
+        // the same log-likelihood without derivatives
+        assert_true(fabs(sdm_fit_samples_log_likelihood(s, &p.maps, &p.observation, &p.state) /
+                             p.information.log_likelihood -
                          1) < 1e-12);
-        const size_t size = 2 * s->n * sizeof *s->place;
+        const size_t size = 2 * s->n * sizeof *s->log_weight;
         if (!first) {
             first = malloc(size);
             if (!first) abort();
-            memcpy(first, s->place, size);
+            memcpy(first, s->log_weight, size);
         } else {
-            assert_memory_equal(first, s->place, size);
+            assert_memory_equal(first, s->log_weight, size);
         }
-        leave(&p);
+        problem_free(&p);
     }
     free(first);
     free(v);
 }
 
-// places far smaller than the cells that the image is cut into
-static void test_small_places(void **state)
+// a window much narrower than the cells of the tissue field
+static void test_narrow_window(void **state)
 {
     (void)state;
     float *v = two_sides(6);
@@ -121,20 +124,20 @@ static void test_small_places(void **state)
     const sdm_fit_source source = exact_source();
     o.tissue_mm = 0.02;
     fit_problem p = {.target = &t, .opts = &o};
-    stand(&p, &source);
-    assert_int_equal(sdm_fit_places_update(&p, NULL), SDM_OK);
-    assert_int_equal(p.sites.n_outside, 2);
-    for (size_t i = 0; i < p.sites.n; i++) {
-        const double bone = exp((double)p.sites.place[2 * i]),
-                     dark = exp((double)p.sites.place[2 * i + 1]);
+    problem_at_truth(&p, &source);
+    assert_int_equal(sdm_fit_tissue_field_update(&p, NULL), SDM_OK);
+    assert_int_equal(p.samples.n_outside, 2);
+    for (size_t i = 0; i < p.samples.n; i++) {
+        const double bone = exp((double)p.samples.log_weight[2 * i]),
+                     dark = exp((double)p.samples.log_weight[2 * i + 1]);
         assert_true(fabs(bone + dark - 1) < 1e-5);
     }
-    assert_true(isfinite(p.sums.log_likelihood));
-    leave(&p);
+    assert_true(isfinite(p.information.log_likelihood));
+    problem_free(&p);
     free(v);
 }
 
-// not wanted, not yet, or no second tissue to speak of
+// no field: switched off, appearance kept, not yet in use, or less than two tissues
 static void test_none(void **state)
 {
     (void)state;
@@ -143,23 +146,23 @@ static void test_none(void **state)
     sdm_fit_opts o = options();
     const sdm_fit_source source = exact_source();
     fit_problem p = {.target = &t, .opts = &o};
-    stand(&p, &source);
-    const double before = p.sums.log_likelihood;
+    problem_at_truth(&p, &source);
+    const double before = p.information.log_likelihood;
     for (int way = 0; way < 4; way++) {
         o = options();
         if (way == 0) o.tissue_mm = 0;
         if (way == 1) o.keep_appearance = true;
-        p.places = way != 2;
+        p.use_tissue_field = way != 2;
         p.noise_factor = way == 3 ? 1e4 : 1;
-        assert_int_equal(sdm_fit_places_update(&p, NULL), SDM_OK);
-        assert_int_equal(p.sites.n_outside, 0);
-        assert_true(p.sums.log_likelihood == before);
+        assert_int_equal(sdm_fit_tissue_field_update(&p, NULL), SDM_OK);
+        assert_int_equal(p.samples.n_outside, 0);
+        assert_true(p.information.log_likelihood == before);
     }
-    leave(&p);
+    problem_free(&p);
     free(v);
 }
 
-// the side where bone is not what it is elsewhere does not pull the wall
+// a darker tissue on one side does not bias the estimate there
 static void test_fit(void **state)
 {
     (void)state;
@@ -170,7 +173,7 @@ static void test_fit(void **state)
     o.tissue_mm = 0;
     sdm_fit_result without = fit(&t, &o);
     if (!(with.log_likelihood - without.log_likelihood > 20 * with.noise_factor))
-        fail_msg("log-likelihood %g with places, %g without", with.log_likelihood,
+        fail_msg("log-likelihood %g with a tissue field, %g without", with.log_likelihood,
                  without.log_likelihood);
     double e[9];
     errors(&with, TRUTH, &POSE, e);
@@ -186,7 +189,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_weights),
-        cmocka_unit_test(test_small_places),
+        cmocka_unit_test(test_narrow_window),
         cmocka_unit_test(test_none),
         cmocka_unit_test(test_fit),
     };

@@ -1,4 +1,4 @@
-/* The nearest point of a surface for single points, and the data for many. */
+/* Nearest point of a surface: search of the tree for single points. */
 #include "nearest.h"
 
 #include <math.h>
@@ -36,7 +36,7 @@ double sdm_nearest_find(const sdm_nearest *n, const double x[3], double bound, u
             best = i;
         }
         if (node->count) continue;
-        // the nearer child on top
+        // push the children closer than the bound, the nearer one last, so that it is visited first
         const uint32_t c = node->first;
         const double d0 = sdm_bvh_box_distance2(&nodes[c], x),
                      d1 = sdm_bvh_box_distance2(&nodes[c + 1], x);

@@ -1,4 +1,5 @@
-/* Reading and writing of triangle mesh files, chosen by the file name: .ply .stl .obj .off */
+/* Reads and writes triangle mesh files; the ending of the name selects the format: .ply .stl .obj
+ * .off */
 #ifndef SDM_MESHFILE_H
 #define SDM_MESHFILE_H
 
@@ -8,13 +9,16 @@
 extern "C" {
 #endif
 
-/* Reads PLY (ASCII, binary of both byte orders), STL (ASCII, binary), OBJ, OFF. Polygons become
-   fans of triangles; bitwise equal vertices of STL are welded. Coordinates are taken as mm. *out is
-   zero-initialised. Sizes are checked against the file before anything is allocated. SDM_E_IO;
-   SDM_E_FORMAT with file and line (text) or byte offset; SDM_E_UNSUPPORTED for another type. */
+/* Reads PLY (ASCII, and binary in both byte orders), STL (ASCII, binary), OBJ and OFF. Polygons
+   become fans of triangles; equal vertices of STL are merged. Coordinates are mm. *out must be
+   zero-initialised; the caller frees it by sdm_mesh_dispose(). Declared sizes are checked against
+   the length of the file before memory is allocated. SDM_E_ARG, SDM_E_IO, SDM_E_NOMEM; SDM_E_FORMAT
+   with file and line (text) or byte offset (binary); SDM_E_UNSUPPORTED for another ending. */
 SDM_API sdm_status sdm_mesh_read(const char *path, sdm_mesh *out, sdm_error *err);
 
-/* Writes .ply (binary little endian, double), .stl (binary), .obj or .off, atomically. */
+/* Writes .ply (binary, little endian, double), .stl (binary, float32), .obj or .off. The file
+   appears under its name only when it is complete. SDM_E_ARG, SDM_E_IO, SDM_E_NOMEM; SDM_E_MESH for
+   bad indices or coordinates; SDM_E_UNSUPPORTED for another ending. */
 SDM_API sdm_status sdm_mesh_write(const char *path, const sdm_mesh *mesh, sdm_error *err);
 
 #ifdef __cplusplus

@@ -1,4 +1,5 @@
-/* A trained network and its file: everything needed to use it without the plug-in or the config. */
+/* A trained network and its file. The file holds everything that is needed to use the network: no
+   plug-in and no configuration. */
 #ifndef SDM_MODEL_H
 #define SDM_MODEL_H
 
@@ -12,91 +13,109 @@ extern "C" {
 
 #define SDM_MODEL_NAME_MAX 64
 
-/* A shape parameter as the network was trained on it. */
+/* A shape parameter: its name, its unit (e.g. "mm"), the range on which the network was trained,
+   min < max, and the default value. */
 typedef struct sdm_model_param {
     char name[SDM_MODEL_NAME_MAX], unit[16];
     double min, max, def;
 } sdm_model_param;
 
-/* Held-out figures measured at the end of training (fresh random shapes, exact distances as truth).
- */
+/* Errors of the network on random shapes that were not used in training, measured at the end of
+   training against exact distances. */
 typedef struct sdm_accuracy {
-    int64_t samples;
+    int64_t samples; /* number of shapes */
     double mse_mm2, rmse_mm, mae_mm, max_abs_mm;
-    double rmse_near_mm;           /* where |distance| <= 0.4 mm */
+    double rmse_near_mm;           /* over voxels with abs(exact distance) <= 0.4 mm */
     double q50_mm, q90_mm, q99_mm; /* quantiles over the shapes of the RMSE of one map */
 } sdm_accuracy;
 
-/* What a model says about itself. Texts are NUL-terminated and owned by the model. */
+/* Description of a model. All pointers stay valid until sdm_model_free(); texts are
+   NUL-terminated. */
 typedef struct sdm_model_info {
     char shape[SDM_MODEL_NAME_MAX];
-    char kind[16];    /* of network, e.g. "pod" */
+    char kind[16];    /* kind of network: "pod", "deepsdf", "imnet" or "sdmnn" */
     char version[16]; /* of the program that trained it */
     size_t n_params;
-    const sdm_model_param *params;
-    size_t n_options; /* options of the shape, as text, for the exact engine; behind an option NAME
-                         that is a file NAME.crc64, the checksum of its content when the network was
-                         trained */
-    const char *const *option_names, *const *option_values;
-    sdm_grid grid;
+    const sdm_model_param *params; /* [n_params] */
+    /* Options of the shape as text, for the exact distance. An option NAME whose value is a file is
+       followed by NAME.crc64: the CRC-64 of the file's content at the time of training. */
+    size_t n_options;
+    const char *const *option_names, *const *option_values; /* [n_options] */
+    sdm_grid grid;                                          /* of every map of the model */
     sdm_accuracy accuracy;
-    uint64_t seed;
+    uint64_t seed; /* of the training */
     double train_seconds;
-    int64_t train_samples; /* exact maps seen */
-    uint64_t checksum;     /* of the whole file */
+    int64_t train_samples; /* exact maps used in training */
+    uint64_t checksum;     /* CRC-64 of the file */
     size_t file_bytes, weight_bytes;
     double macs;        /* multiply-adds of one map */
-    const char *config; /* resolved config, YAML */
-    const char *folder; /* of the file; NULL: the model was in memory */
+    const char *config; /* configuration of the training with all defaults filled in, YAML */
+    const char *folder; /* folder of the file with a final '/'; NULL: opened from memory */
 } sdm_model_info;
 
-/* Immutable once opened: any number of threads may use one model. */
+/* Immutable after opening: any number of threads may use one model at the same time. */
 typedef struct sdm_model sdm_model;
 
-/* Reads and checks a model file: every size against the file's length before anything is allocated,
-   every checksum. SDM_E_IO; SDM_E_FORMAT: not a model, damaged, truncated, or of a newer version.
- */
+/* *out = the model of a file, to be freed with sdm_model_free(); NULL on error. All checksums are
+   checked, and all sizes against the length of the file before memory is allocated.
+   SDM_E_IO: the file cannot be read. SDM_E_FORMAT: it is not a model, is damaged or truncated, is a
+   checkpoint, or has another format version. SDM_E_NOMEM. [any thread] */
 SDM_API sdm_status sdm_model_open(const char *path, sdm_model **out, sdm_error *err);
-/* The same for a file that is in memory; the bytes are copied. `name` stands for the file in
- * messages. */
+
+/* The same for the content of a file, bytes[size], which is copied. `name` stands for the file in
+   error messages. [any thread] */
 SDM_API sdm_status sdm_model_open_memory(const char *name, const uint8_t *bytes, size_t size,
                                          sdm_model **out, sdm_error *err);
+
+/* NULL is fine. No thread may still use the model. */
 SDM_API void sdm_model_free(sdm_model *m);
+
+/* The description, owned by the model. [any thread] */
 SDM_API const sdm_model_info *sdm_model_get_info(const sdm_model *m);
 
-/* Bytes of scratch memory that one call of sdm_model_forward needs for a batch of n. */
+/* The functions below evaluate the network in the calling thread, without allocation. `scratch` is
+   memory of the caller, 64-byte aligned and at least as large as the function's ..._scratch_bytes()
+   says; concurrent calls need separate blocks. Parameters are in the order and the units of
+   sdm_model_info.params. Neither their ranges nor whether they are finite is checked. Maps are
+   signed distances in mm, negative inside, values[nz][ny][nx] with x fastest. */
+
+/* Bytes of scratch memory of sdm_model_forward() for n maps. [any thread] */
 SDM_API size_t sdm_model_scratch_bytes(const sdm_model *m, size_t n);
 
-/* values[n][nz][ny][nx] = the maps at params[n][n_params], mm, written; no checks of the
-   parameters, no allocation. scratch: sdm_model_scratch_bytes(m, n), 64-byte aligned. One thread.
-   [any thread] */
+/* values[n][nz][ny][nx] = the maps at params[n][n_params]. [any thread] */
 SDM_API void sdm_model_forward(const sdm_model *m, const double *params, size_t n, float *values,
                                void *scratch);
 
-/* Bytes of scratch memory for sdm_model_jacobian. */
+/* Bytes of scratch memory of sdm_model_jacobian(). [any thread] */
 SDM_API size_t sdm_model_jacobian_scratch_bytes(const sdm_model *m);
 
-/* The map and its derivatives by forward mode: values[nz][ny][nx], jacobian[n_params][nz][ny][nx]
-   (mm per unit of the parameter). One thread, no allocation. [any thread] */
+/* values[nz][ny][nx] = the map at params[n_params], jacobian[n_params][nz][ny][nx] = its derivative
+   by each parameter, mm per unit of the parameter (forward-mode differentiation). [any thread] */
 SDM_API void sdm_model_jacobian(const sdm_model *m, const double *params, float *values,
                                 float *jacobian, void *scratch);
 
-/* The map and its derivative along direction[n_params] (mm per unit of the direction) by forward
-   mode, cheaper than the Jacobian: values[nz][ny][nx], tangent[nz][ny][nx]. One thread, no
-   allocation; scratch as above. [any thread] */
+/* Bytes of scratch memory of sdm_model_jvp(). [any thread] */
 SDM_API size_t sdm_model_jvp_scratch_bytes(const sdm_model *m);
+
+/* Jacobian-vector product: values[nz][ny][nx] = the map, tangent[nz][ny][nx] = the sum over the
+   parameters p of direction[p] * d values / d params[p]. Costs at most as much as the Jacobian, and
+   less for "pod" and "sdmnn". [any thread] */
 SDM_API void sdm_model_jvp(const sdm_model *m, const double *params, const double *direction,
                            float *values, float *tangent, void *scratch);
 
-/* gradient[n_params] = sum over voxels of adjoint[nz][ny][nx] times d value / d parameter, by
-   reverse mode, at the cost of a few maps whatever the number of parameters. One thread, no
-   allocation; scratch as above. [any thread] */
+/* Bytes of scratch memory of sdm_model_vjp(). [any thread] */
 SDM_API size_t sdm_model_vjp_scratch_bytes(const sdm_model *m);
+
+/* Vector-Jacobian product: gradient[n_params], with gradient[p] = the sum over the voxels v of
+   adjoint[v] * d values[v] / d params[p]; adjoint[nz][ny][nx]. "pod" and "sdmnn" use reverse mode,
+   at the cost of a few maps for any number of parameters; others form the Jacobian. [any thread] */
 SDM_API void sdm_model_vjp(const sdm_model *m, const double *params, const float *adjoint,
                            double *gradient, void *scratch);
 
-/* tangent[n] = J direction[P], and gradient[P] = J^T adjoint[n], for a Jacobian J[P][n] that is
- * there. [any thread] */
+/* The same two products with a given jacobian[n_params][n]:
+   tangent[i] = sum over p of direction[p] * jacobian[p][i], tangent[n], direction[n_params];
+   gradient[p] = sum over i of adjoint[i] * jacobian[p][i], gradient[n_params], adjoint[n].
+   [any thread] */
 SDM_API void sdm_jacobian_times(const float *jacobian, size_t n_params, size_t n,
                                 const double *direction, float *tangent);
 SDM_API void sdm_jacobian_transposed_times(const float *jacobian, size_t n_params, size_t n,

@@ -1,10 +1,13 @@
-/* From the steps along the axes that a file states to a grid with orthonormal directions. */
+/* Turns the voxel-to-voxel steps in an image header into a grid with orthonormal axis directions.
+ */
 #include <math.h>
 
-#include "volumeparts.h"
+#include "image_readers.h"
 
-#define SHIFT_MAX 0.1 /* voxels: how far rounding in a header may move the farthest voxel */
-#define ROUNDS 12     /* of Newton's iteration, which doubles the number of right digits in each */
+/* Largest accepted displacement of a corner voxel by the rounding of a header, in voxels. */
+#define SHIFT_MAX 0.1
+/* Newton steps; each one doubles the number of correct digits. */
+#define NEWTON_STEPS 12
 
 static void cross(const double a[3], const double b[3], double out[3])
 {
@@ -12,12 +15,13 @@ static void cross(const double a[3], const double b[3], double out[3])
         out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
 
-/* The orthonormal matrix nearest to m (its polar factor) by X <- (X + X^-T) / 2 (Higham 1986);
-   false for a singular one. Rows may be columns as well. */
+/* Replaces m[3][3] by the nearest orthonormal matrix, its polar factor, with Newton's iteration
+   X <- (X + X^-T) / 2 (Higham 1986). False for a singular matrix. Row-major and column-major
+   storage give the same result. */
 static bool orthonormalise(double m[9])
 {
-    for (int round = 0; round < ROUNDS; round++) {
-        double c[9]; /* cofactors: X^-T times the determinant */
+    for (int round = 0; round < NEWTON_STEPS; round++) {
+        double c[9]; // the cofactors, det(X) X^-T
         for (int i = 0; i < 3; i++) cross(m + 3 * ((i + 1) % 3), m + 3 * ((i + 2) % 3), c + 3 * i);
         const double det = m[0] * c[0] + m[1] * c[1] + m[2] * c[2];
         if (!(det != 0)) return false;
@@ -26,8 +30,8 @@ static bool orthonormalise(double m[9])
     return true;
 }
 
-/* Distance between where the header and the grid put the farthest corner, in voxels of the shortest
- * spacing. */
+/* The largest distance, over the corners, between a corner voxel's position by the header and by
+ * the grid, in units of the shortest spacing. */
 static double largest_shift(const sdm_image_header *h, const sdm_grid *g)
 {
     double largest = 0, shortest = INFINITY;
@@ -42,7 +46,7 @@ static double largest_shift(const sdm_image_header *h, const sdm_grid *g)
             }
             square += d * d;
         }
-        if (!(square <= largest * largest)) largest = sqrt(square); /* NaN stays */
+        if (!(square <= largest * largest)) largest = sqrt(square); // NaN is kept
     }
     return largest / shortest;
 }
@@ -53,12 +57,12 @@ sdm_status sdm_frame_grid(const sdm_image_header *h, sdm_grid *out, sdm_error *e
     double dir[9];
     for (int a = 0; a < 3; a++) {
         g.n[a] = h->n[a];
-        g.origin[a] = h->origin[a] + 0.0; /* no negative zero */
+        g.origin[a] = h->origin[a] + 0.0; // turns -0 into 0
         g.spacing[a] = hypot(hypot(h->step[a], h->step[3 + a]), h->step[6 + a]);
         for (int row = 0; row < 3; row++) dir[3 * row + a] = h->step[3 * row + a] / g.spacing[a];
     }
-    sdm_status e = sdm_grid_check(&g, err); /* sizes, spacing, origin */
-    if (e) return SDM_E_FORMAT;
+    sdm_status s = sdm_grid_check(&g, err); // sizes, spacing and origin; not yet the directions
+    if (s) return SDM_E_FORMAT;
     const bool regular = orthonormalise(dir);
     for (int i = 0; i < 9; i++) g.dir[i] = dir[i] + 0.0;
     const double shift = regular ? largest_shift(h, &g) : INFINITY;
@@ -68,8 +72,8 @@ sdm_status sdm_frame_grid(const sdm_image_header *h, sdm_grid *out, sdm_error *e
                         "voxels off at a corner): resample "
                         "it to a straight grid, e.g. in 3D Slicer",
                         shift);
-    e = sdm_grid_check(&g, err);
-    if (e) return SDM_E_FORMAT;
+    s = sdm_grid_check(&g, err);
+    if (s) return SDM_E_FORMAT;
     *out = g;
     return SDM_OK;
 }

@@ -1,27 +1,32 @@
-/* Reading of MetaImage files (.mha, .mhd): raw or zlib, attached or beside the header; frame LPS.
- */
-#include "imageparts.h"
+/* Reads MetaImage files (.mha, .mhd): voxels raw or compressed with zlib, in the same file or in
+ * one beside the header; frame LPS. */
+#include "image_readers.h"
+#include "image_writers.h"
 #include "sdm/internal/text.h"
-#include "volumeparts.h"
 
-/* The header so far. */
+/* The lines of the header that have been read. */
 typedef struct metaimage {
-    sdm_stream *s;
+    sdm_stream *in;
     sdm_image_header *h;
     sdm_volume *v;
-    uint32_t seen; /* bit per field */
+    /* bit i: fields[i] has been read */
+    uint32_t seen;
     double spacing[3];
-    double matrix[9]; /* the directions of the three axes, one after the other */
-    double unit;      /* mm */
+    /* the three axis directions, one after the other */
+    double matrix[9];
+    /* mm per unit of length of the file */
+    double unit;
+    /* compressed with zlib */
     bool zip;
-    int64_t header_bytes; /* before the voxels; -1: whatever is too much */
+    /* bytes before the voxels of a separate file; -1: the voxels are the last bytes of it */
+    int64_t header_bytes;
     char data_file[512];
 } metaimage;
 
 static sdm_status fail_field(const metaimage *f, sdm_status status, sdm_error *err,
                              const char *text, const char *value)
 {
-    return sdm_fail(err, status, "%s:%zu: %s: '%.100s'", f->s->path, f->s->lines, text, value);
+    return sdm_fail(err, status, "%s:%zu: %s: '%.100s'", f->in->path, f->in->lines, text, value);
 }
 
 static sdm_status take_flag(const metaimage *f, const char *value, bool *out, sdm_error *err)
@@ -34,7 +39,7 @@ static sdm_status take_flag(const metaimage *f, const char *value, bool *out, sd
 
 static sdm_status take_numbers(const metaimage *f, char *value, double *out, int n, sdm_error *err)
 {
-    const sdm_scan place = {.path = f->s->path, .line = f->s->lines};
+    const sdm_scan place = {.path = f->in->path, .line = f->in->lines};
     return sdm_scan_reals(&place, &value, out, n, err);
 }
 
@@ -56,11 +61,11 @@ static sdm_status take_dimensions(metaimage *f, char *value, sdm_error *err)
 
 static sdm_status take_sizes(metaimage *f, char *value, sdm_error *err)
 {
-    const sdm_scan place = {.path = f->s->path, .line = f->s->lines};
-    sdm_status e = SDM_OK;
-    for (int a = 0; a < 3 && !e; a++)
-        e = sdm_scan_count(&place, &value, INT32_MAX, "size", &f->h->n[a], err);
-    return e;
+    const sdm_scan place = {.path = f->in->path, .line = f->in->lines};
+    sdm_status s = SDM_OK;
+    for (int a = 0; a < 3 && !s; a++)
+        s = sdm_scan_count(&place, &value, INT32_MAX, "size", &f->h->n[a], err);
+    return s;
 }
 
 static sdm_status take_type(metaimage *f, char *value, sdm_error *err)
@@ -105,8 +110,8 @@ static sdm_status take_unit(metaimage *f, char *value, sdm_error *err)
 static sdm_status take_binary(metaimage *f, char *value, sdm_error *err)
 {
     bool binary;
-    const sdm_status e = take_flag(f, value, &binary, err);
-    return e || binary ? e
+    const sdm_status s = take_flag(f, value, &binary, err);
+    return s || binary ? s
                        : fail_field(f, SDM_E_UNSUPPORTED, err,
                                     "voxels written as text are not read", value);
 }
@@ -127,12 +132,13 @@ static sdm_status take_header_size(metaimage *f, char *value, sdm_error *err)
     return fail_field(f, SDM_E_FORMAT, err, "bad size of a header", value);
 }
 
-/* Programs do not agree on whether these are applied to the voxels. */
+/* A slope other than 1 or an offset other than 0 is refused: programs disagree on whether they are
+ * to be applied to the voxels. */
 static sdm_status take_slope(metaimage *f, char *value, sdm_error *err)
 {
     double v;
-    const sdm_status e = take_numbers(f, value, &v, 1, err);
-    return e || v == 1 ? e
+    const sdm_status s = take_numbers(f, value, &v, 1, err);
+    return s || v == 1 ? s
                        : fail_field(f, SDM_E_UNSUPPORTED, err,
                                     "scaled values are not read, save them as they are", value);
 }
@@ -140,8 +146,8 @@ static sdm_status take_slope(metaimage *f, char *value, sdm_error *err)
 static sdm_status take_intercept(metaimage *f, char *value, sdm_error *err)
 {
     double v;
-    const sdm_status e = take_numbers(f, value, &v, 1, err);
-    return e || v == 0 ? e
+    const sdm_status s = take_numbers(f, value, &v, 1, err);
+    return s || v == 0 ? s
                        : fail_field(f, SDM_E_UNSUPPORTED, err,
                                     "moved values are not read, save them as they are", value);
 }
@@ -164,6 +170,7 @@ static sdm_status take_data_file(metaimage *f, char *value, sdm_error *err)
     return SDM_OK;
 }
 
+/* Indices of the fields that the reader looks up; those up to DATA_FILE are required. */
 enum { DIMENSIONS, SIZES, TYPE, SPACING, DATA_FILE, MATRIX, ORIGIN, OTHER };
 
 static const struct {
@@ -188,61 +195,63 @@ static const struct {
               {"ElementToIntensityFunctionOffset", take_intercept},
               {"Comment", take_comment}};
 
-static bool has(const metaimage *f, int field) { return f->seen >> field & 1; }
+static bool has_field(const metaimage *f, int field) { return f->seen >> field & 1; }
 
-/* "Key = value"; keys that say nothing about places and voxels are passed over. */
+/* Reads "Key = value". Keys that are not in fields[] do not affect geometry or voxels and are
+ * ignored. */
 static sdm_status take_line(metaimage *f, char *line, sdm_error *err)
 {
     char *equals = strchr(line, '='), *key = sdm_scan_word(&line);
     if (!equals || equals < key)
         return fail_field(f, SDM_E_FORMAT, err, "need 'Key = value'", key ? key : "");
-    if (key + strlen(key) > equals) *equals = '\0'; /* no blank before it */
+    if (key + strlen(key) > equals) *equals = '\0'; // "Key=value": the key ends at the sign
     char *value = equals + 1 + strspn(equals + 1, " \t");
     for (size_t n = strlen(value); n > 0 && (value[n - 1] == ' ' || value[n - 1] == '\t'); n--)
         value[n - 1] = '\0';
     for (size_t i = 0; i < sizeof fields / sizeof *fields; i++) {
         if (!sdm_is_listed(key, fields[i].names)) continue;
-        if (has(f, (int)i)) return fail_field(f, SDM_E_FORMAT, err, "a key given twice", key);
+        if (has_field(f, (int)i)) return fail_field(f, SDM_E_FORMAT, err, "a key given twice", key);
         f->seen |= UINT32_C(1) << i;
         return fields[i].take(f, value, err);
     }
     return SDM_OK;
 }
 
-/* ElementDataFile is the last line. */
+/* Reads all lines up to ElementDataFile, which ends the header. */
 static sdm_status read_fields(metaimage *f, sdm_error *err)
 {
-    while (!has(f, DATA_FILE)) {
+    while (!has_field(f, DATA_FILE)) {
         bool more;
-        sdm_status e = sdm_stream_line(f->s, &more, err);
-        if (!e && !more) break;
-        if (!e && f->s->line[strspn(f->s->line, " \t")]) e = take_line(f, f->s->line, err);
-        if (e) return e;
+        sdm_status s = sdm_stream_line(f->in, &more, err);
+        if (!s && !more) break;
+        if (!s && f->in->line[strspn(f->in->line, " \t")]) s = take_line(f, f->in->line, err);
+        if (s) return s;
     }
     for (int i = DIMENSIONS; i <= DATA_FILE; i++)
-        if (!has(f, i))
+        if (!has_field(f, i))
             return sdm_fail(err, i == SPACING ? SDM_E_UNSUPPORTED : SDM_E_FORMAT,
-                            "%s: the header has no key '%s'", f->s->path, fields[i].names);
+                            "%s: the header has no key '%s'", f->in->path, fields[i].names);
     return SDM_OK;
 }
 
-sdm_status sdm_metaimage_read(sdm_stream *s, sdm_image_header *h, sdm_volume *v, sdm_error *err)
+sdm_status sdm_metaimage_read(sdm_stream *in, sdm_image_header *h, sdm_volume *v, sdm_error *err)
 {
-    metaimage f = {.s = s, .h = h, .v = v, .unit = 1, .matrix = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
-    sdm_status e = read_fields(&f, err);
-    if (e) return e;
+    metaimage f = {.in = in, .h = h, .v = v, .unit = 1, .matrix = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    sdm_status s = read_fields(&f, err);
+    if (s) return s;
     for (int row = 0; row < 3; row++) {
         for (int a = 0; a < 3; a++)
             h->step[3 * row + a] = f.unit * f.matrix[3 * a + row] * f.spacing[a];
         h->origin[row] *= f.unit;
     }
-    v->placed = has(&f, MATRIX) && has(&f, ORIGIN);
+    v->placed = has_field(&f, MATRIX) && has_field(&f, ORIGIN);
     const bool local = !strcmp(f.data_file, "LOCAL");
     if (local && f.header_bytes != 0)
         return sdm_fail(err, SDM_E_UNSUPPORTED,
-                        "%s: 'HeaderSize' is read for voxels in a file of their own only", s->path);
-    if (!local) e = sdm_stream_detach(s, f.data_file, err);
+                        "%s: 'HeaderSize' is read for voxels in a file of their own only",
+                        in->path);
+    if (!local) s = sdm_stream_detach(in, f.data_file, err);
     h->tail = f.header_bytes < 0 && !f.zip;
-    if (!e && f.header_bytes > 0) e = sdm_stream_skip(s, (uint64_t)f.header_bytes, err);
-    return e || !f.zip ? e : sdm_stream_unzip(s, err);
+    if (!s && f.header_bytes > 0) s = sdm_stream_skip(in, (uint64_t)f.header_bytes, err);
+    return s || !f.zip ? s : sdm_stream_unzip(in, err);
 }

@@ -1,25 +1,33 @@
-/* Reading of NIfTI-1 and NIfTI-2 single files (.nii, .nii.gz): both byte orders, sform, qform or
- * voxel sizes alone; frame RAS. */
+/* Reads NIfTI-1 and NIfTI-2 single files (.nii, .nii.gz) in both byte orders; the frame comes from
+ * sform, qform or the voxel sizes alone, and is RAS. */
 #include <math.h>
 
-#include "imageparts.h"
-#include "volumeparts.h"
+#include "image_readers.h"
+#include "image_writers.h"
 
+/* Bytes of a header of version 1 and of version 2. */
 #define SIZE_1 348
 #define SIZE_2 540
+/* Largest accepted offset of the first voxel. */
 #define START_MAX (1 << 30)
+/* Codes of xyzt_units: metre, micrometre; everything else counts as mm. */
 #define UNIT_M 1
 #define UNIT_UM 3
-#define QUATERNION_SLACK                                                                           \
-    1e-4 /* of its squared length 1: the three stored numbers are rounded to float32 */
+/* Accepted excess of b^2 + c^2 + d^2 over 1: the components are rounded to float32. */
+#define QUATERNION_SLACK 1e-4
 
-/* The bytes of a header. Fields are named by their places in version 1 and in version 2. */
+/* A raw header. In the functions below, at_1 and at_2 are the byte offsets of a field in version 1
+ * and in version 2. */
 typedef struct nifti {
     const char *path;
     uint8_t bytes[SIZE_2];
-    bool two, big;
+    /* version 2 */
+    bool two;
+    /* big-endian */
+    bool big;
 } nifti;
 
+/* Entry `number` of a field of reals: float32 in version 1, float64 in version 2. */
 static double real_at(const nifti *f, size_t at_1, size_t at_2, size_t number)
 {
     return f->two ? sdm_get_f64(f->bytes + at_2 + 8 * number, f->big)
@@ -31,29 +39,33 @@ static int16_t short_at(const nifti *f, size_t at)
     return (int16_t)sdm_get_uint(f->bytes + at, 2, f->big);
 }
 
+/* dim[number]: the number of dimensions, then the sizes. */
 static int64_t dim(const nifti *f, size_t number)
 {
     return f->two ? (int64_t)sdm_get_uint(f->bytes + 16 + 8 * number, 8, f->big)
                   : short_at(f, 40 + 2 * number);
 }
 
+/* A field of int16 in version 1, int32 in version 2. */
 static int code_at(const nifti *f, size_t at_1, size_t at_2)
 {
     return f->two ? (int32_t)sdm_get_uint(f->bytes + at_2, 4, f->big) : short_at(f, at_1);
 }
 
-static sdm_status read_header(sdm_stream *s, nifti *f, sdm_error *err)
+/* Finds version and byte order from the header size in the first four bytes, and checks the magic
+ * string. */
+static sdm_status read_header(sdm_stream *in, nifti *f, sdm_error *err)
 {
-    f->path = s->path;
-    sdm_status e = sdm_stream_read(s, f->bytes, 4, err);
-    if (e) return e;
+    f->path = in->path;
+    sdm_status s = sdm_stream_read(in, f->bytes, 4, err);
+    if (s) return s;
     for (int big = 0; big < 2; big++) {
         const uint64_t size = sdm_get_uint(f->bytes, 4, big);
         if (size != SIZE_1 && size != SIZE_2) continue;
         f->big = big;
         f->two = size == SIZE_2;
-        e = sdm_stream_read(s, f->bytes + 4, (f->two ? SIZE_2 : SIZE_1) - 4, err);
-        if (e) return e;
+        s = sdm_stream_read(in, f->bytes + 4, (f->two ? SIZE_2 : SIZE_1) - 4, err);
+        if (s) return s;
         const uint8_t *magic = f->bytes + (f->two ? 4 : 344);
         if (!memcmp(magic, f->two ? "n+2\0\r\n\032\n" : "n+1", f->two ? 8 : 4)) return SDM_OK;
         if (!memcmp(magic, "ni1", 4) || !memcmp(magic, "ni2", 4))
@@ -107,7 +119,7 @@ static sdm_status read_type(const nifti *f, sdm_image_header *h, sdm_error *err)
                     f->path, code);
 }
 
-/* A slope of 0 or NaN means "not scaled". */
+/* Reads scl_slope and scl_inter. By the standard a slope of 0, or NaN, means unscaled values. */
 static sdm_status read_scale(const nifti *f, sdm_image_header *h, sdm_error *err)
 {
     const double slope = real_at(f, 112, 176, 0), intercept = real_at(f, 116, 184, 0);
@@ -150,8 +162,8 @@ static sdm_status use_qform(const nifti *f, sdm_image_header *h, sdm_error *err)
     return SDM_OK;
 }
 
-/* sform, else qform, else the sizes of the voxels alone (methods 3, 2 and 1 of nifti1.h); RAS ->
- * LPS, mm. */
+/* Reads the frame from sform, else qform, else the voxel sizes alone (methods 3, 2 and 1 of
+ * nifti1.h), and converts it from RAS to LPS and to mm. *placed: the file has sform or qform. */
 static sdm_status read_frame(const nifti *f, sdm_image_header *h, bool *placed, sdm_error *err)
 {
     const bool sform = code_at(f, 254, 348) > 0, qform = code_at(f, 252, 344) > 0;
@@ -163,11 +175,11 @@ static sdm_status read_frame(const nifti *f, sdm_image_header *h, bool *placed, 
                             spacing, a);
         h->step[4 * a] = spacing;
     }
-    sdm_status e = SDM_OK;
+    sdm_status s = SDM_OK;
     if (sform)
         use_sform(f, h);
     else if (qform)
-        e = use_qform(f, h, err);
+        s = use_qform(f, h, err);
     const int unit = (f->two ? (int)sdm_get_uint(f->bytes + 500, 4, f->big) : f->bytes[123]) & 7;
     const double mm = unit == UNIT_M ? 1000 : unit == UNIT_UM ? 1e-3 : 1;
     for (int row = 0; row < 3; row++) {
@@ -176,19 +188,19 @@ static sdm_status read_frame(const nifti *f, sdm_image_header *h, bool *placed, 
         h->origin[row] *= sign;
     }
     *placed = sform || qform;
-    return e;
+    return s;
 }
 
-sdm_status sdm_nifti_read(sdm_stream *s, sdm_image_header *h, sdm_volume *v, sdm_error *err)
+sdm_status sdm_nifti_read(sdm_stream *in, sdm_image_header *h, sdm_volume *v, sdm_error *err)
 {
     nifti f = {0};
-    sdm_status e = sdm_stream_is_gzip(s) ? sdm_stream_unzip(s, err) : SDM_OK;
-    if (!e) e = read_header(s, &f, err);
-    if (!e) e = read_sizes(&f, h->n, err);
-    if (!e) e = read_type(&f, h, err);
-    if (!e) e = read_scale(&f, h, err);
-    if (!e) e = read_frame(&f, h, &v->placed, err);
-    if (e) return e;
+    sdm_status s = sdm_stream_is_gzip(in) ? sdm_stream_unzip(in, err) : SDM_OK;
+    if (!s) s = read_header(in, &f, err);
+    if (!s) s = read_sizes(&f, h->n, err);
+    if (!s) s = read_type(&f, h, err);
+    if (!s) s = read_scale(&f, h, err);
+    if (!s) s = read_frame(&f, h, &v->placed, err);
+    if (s) return s;
     char text[81] = {0};
     memcpy(text, f.bytes + (f.two ? 240 : 148), 80);
     sdm_one_line(text, v->text, sizeof v->text);
@@ -200,5 +212,5 @@ sdm_status sdm_nifti_read(sdm_stream *s, sdm_image_header *h, sdm_volume *v, sdm
         return sdm_fail(err, SDM_E_FORMAT,
                         "%s: the voxels begin at byte %g, need a whole number from %zu to %d",
                         f.path, start, size + 4, START_MAX);
-    return sdm_stream_skip(s, (uint64_t)start - size, err);
+    return sdm_stream_skip(in, (uint64_t)start - size, err);
 }

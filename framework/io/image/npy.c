@@ -1,5 +1,5 @@
-/* Reading and writing of .npy arrays in C order. Read: format versions 1 to 3, float32 and float64
- * of both byte orders. */
+/* Reads and writes NumPy arrays (.npy) in C order. Reads format versions 1 to 3, float32 and
+ * float64 of both byte orders; writes float32 and uint32, little endian. */
 #include "sdm/image.h"
 
 #include <stdio.h>
@@ -9,17 +9,20 @@
 
 #define NPY_FILE_MAX ((size_t)1 << 31)
 #define NPY_HEADER_MAX ((size_t)1 << 16)
-#define NPY_PREFIX 10 /* magic, version, length of a version 1 header */
+#define NPY_PREFIX 10 /* bytes of magic string, version and header length in version 1 */
 
-/* What the header says; the header is a Python dictionary in ASCII. */
+/* The header, a Python dictionary as ASCII text: {'descr': '<f4', 'fortran_order': False, 'shape':
+ * (3, 4), }. */
 typedef struct npy_header {
+    /* byte order and type, "<f4" */
     char descr[16];
     bool has_descr, has_order, has_shape, fortran;
     size_t shape[4];
     int n_dim;
 } npy_header;
 
-/* A cursor in the header's text. */
+/* A position in the text of the header. The take_ functions skip white space, read what their name
+ * says and move behind it; false when something else is there. */
 typedef struct cursor {
     const char *at, *end;
 } cursor;
@@ -30,7 +33,7 @@ static void skip_space(cursor *c)
         c->at++;
 }
 
-static bool take(cursor *c, char wanted)
+static bool take_char(cursor *c, char wanted)
 {
     skip_space(c);
     if (c->at >= c->end || *c->at != wanted) return false;
@@ -58,7 +61,7 @@ static bool take_string(cursor *c, char *out, size_t size)
         out[n++] = *c->at++;
     }
     out[n] = '\0';
-    return take(c, quote);
+    return take_char(c, quote);
 }
 
 static bool take_size(cursor *c, size_t *out)
@@ -74,17 +77,17 @@ static bool take_size(cursor *c, size_t *out)
     return c->at > start;
 }
 
-/* "(3, 4)" or "(3,)"; more than four dimensions are counted but not kept. */
+/* Reads "(3, 4)" or "(3,)". All dimensions are counted in n_dim, the first four stored. */
 static bool take_shape(cursor *c, npy_header *h)
 {
     h->n_dim = 0;
-    if (!take(c, '(')) return false;
-    while (!take(c, ')')) {
+    if (!take_char(c, '(')) return false;
+    while (!take_char(c, ')')) {
         size_t v;
         if (!take_size(c, &v)) return false;
         if (h->n_dim < 4) h->shape[h->n_dim] = v;
         h->n_dim++;
-        if (!take(c, ',') && !(c->at < c->end && *c->at == ')')) return false;
+        if (!take_char(c, ',') && !(c->at < c->end && *c->at == ')')) return false;
     }
     return true;
 }
@@ -92,7 +95,7 @@ static bool take_shape(cursor *c, npy_header *h)
 static bool take_entry(cursor *c, npy_header *h)
 {
     char key[16];
-    if (!take_string(c, key, sizeof key) || !take(c, ':')) return false;
+    if (!take_string(c, key, sizeof key) || !take_char(c, ':')) return false;
     if (strcmp(key, "descr") == 0) return h->has_descr = take_string(c, h->descr, sizeof h->descr);
     if (strcmp(key, "shape") == 0) return h->has_shape = take_shape(c, h);
     if (strcmp(key, "fortran_order") != 0) return false;
@@ -102,16 +105,16 @@ static bool take_entry(cursor *c, npy_header *h)
 
 static bool parse_header(cursor c, npy_header *h)
 {
-    if (!take(&c, '{')) return false;
-    while (!take(&c, '}')) {
+    if (!take_char(&c, '{')) return false;
+    while (!take_char(&c, '}')) {
         if (!take_entry(&c, h)) return false;
-        if (!take(&c, ',') && !(c.at < c.end && *c.at == '}')) return false;
+        if (!take_char(&c, ',') && !(c.at < c.end && *c.at == '}')) return false;
     }
     skip_space(&c);
     return c.at == c.end && h->has_descr && h->has_order && h->has_shape;
 }
 
-/* Finds the header's text and the first byte of the data. */
+/* Finds the text of the header, and in *start the offset of the first value. */
 static sdm_status find_header(const char *path, const uint8_t *data, size_t size, cursor *text,
                               size_t *start, sdm_error *err)
 {
@@ -133,6 +136,8 @@ static sdm_status find_header(const char *path, const uint8_t *data, size_t size
     return SDM_OK;
 }
 
+/* Checks type, order and shape against the `available` bytes of values; *item: bytes of a value,
+ * *count: number of values. */
 static sdm_status check_header(const char *path, const npy_header *h, size_t *item, size_t *count,
                                size_t available, sdm_error *err)
 {
@@ -162,8 +167,8 @@ static sdm_status check_header(const char *path, const npy_header *h, size_t *it
     return SDM_OK;
 }
 
-static sdm_status decode(const char *path, const uint8_t *data, size_t size, double **values,
-                         size_t shape[4], int *n_dim, sdm_error *err)
+static sdm_status decode_file(const char *path, const uint8_t *data, size_t size, double **values,
+                              size_t shape[4], int *n_dim, sdm_error *err)
 {
     cursor text = {0};
     size_t start = 0, item = 0, count = 0;
@@ -195,12 +200,12 @@ sdm_status sdm_npy_read(const char *path, double **values, size_t shape[4], int 
     *values = NULL;
     sdm_status s = sdm_file_read(path, NPY_FILE_MAX, &data, &size, err);
     if (s) return s;
-    s = decode(path, data, size, values, shape, n_dim, err);
+    s = decode_file(path, data, size, values, shape, n_dim, err);
     sdm_free(data);
     return s;
 }
 
-/* Writes the version 1 header, padded so that the values start at a multiple of 64 bytes. */
+/* Writes a header of version 1, padded so that the values start at a multiple of 64 bytes. */
 static sdm_status write_header(sdm_outfile *f, const char *descr, const size_t *shape, int n_dim,
                                sdm_error *err)
 {
@@ -222,6 +227,7 @@ static sdm_status write_header(sdm_outfile *f, const char *descr, const size_t *
     return s ? s : sdm_outfile_write(f, text, (size_t)n, err);
 }
 
+/* Writes words[count] of 4 bytes, little endian. */
 static sdm_status write_words(sdm_outfile *f, const uint8_t *words, size_t count, sdm_error *err)
 {
     uint8_t block[4096];
@@ -238,7 +244,7 @@ static sdm_status write_words(sdm_outfile *f, const uint8_t *words, size_t count
     return SDM_OK;
 }
 
-/* An array of numbers of four bytes. */
+/* Writes an array of 4-byte values of type `descr`. */
 static sdm_status write_array(const char *path, const char *descr, const void *words,
                               const size_t *shape, int n_dim, sdm_error *err)
 {

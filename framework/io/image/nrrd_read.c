@@ -1,26 +1,32 @@
-/* Reading of NRRD files (.nrrd, .seg.nrrd, .nhdr): raw or gzip, attached or beside the header;
- * frames LPS, RAS and LAS. */
+/* Reads NRRD files (.nrrd, .seg.nrrd, .nhdr): voxels raw or compressed with gzip, in the same file
+ * or in one beside the header; frames LPS, RAS and LAS. */
 #include <math.h>
 
-#include "imageparts.h"
+#include "image_readers.h"
+#include "image_writers.h"
 #include "sdm/internal/text.h"
-#include "volumeparts.h"
 
 enum { AXES_MAX = 4 };
 
-/* The header so far. Axes are those of the file; rows of `step` those of its space. */
+/* The lines of the header that have been read. Axes are counted as in the file. */
 typedef struct nrrd {
-    sdm_stream *s;
+    sdm_stream *in;
     sdm_image_header *h;
     sdm_volume *v;
-    uint32_t seen; /* bit per field */
-    int axes;      /* 0: not stated yet */
+    /* bit i: fields[i] has been read */
+    uint32_t seen;
+    /* number of axes; 0: not read yet */
+    int axes;
     int64_t size[AXES_MAX];
     double spacing[AXES_MAX];
+    /* from a voxel to the next along each axis, in the space of the file */
     double step[AXES_MAX][3];
-    bool in_space[AXES_MAX]; /* has a direction */
-    double scale[3];         /* file -> LPS mm */
+    /* the axis has a direction in space; an axis without one counts layers or channels */
+    bool in_space[AXES_MAX];
+    /* factors from the space of the file to LPS in mm */
+    double scale[3];
     bool gzip;
+    /* to skip before the voxels; skip_bytes -1: the voxels are the last bytes of the file */
     int64_t skip_lines, skip_bytes;
     char data_file[512];
 } nrrd;
@@ -28,7 +34,7 @@ typedef struct nrrd {
 static sdm_status fail_field(const nrrd *f, sdm_status status, sdm_error *err, const char *text,
                              const char *value)
 {
-    return sdm_fail(err, status, "%s:%zu: %s: '%.100s'", f->s->path, f->s->lines, text, value);
+    return sdm_fail(err, status, "%s:%zu: %s: '%.100s'", f->in->path, f->in->lines, text, value);
 }
 
 static sdm_status take_dimension(nrrd *f, char *value, sdm_error *err)
@@ -57,32 +63,32 @@ static sdm_status take_type(nrrd *f, char *value, sdm_error *err)
 static sdm_status need_axes(const nrrd *f, const char *field, sdm_error *err)
 {
     if (f->axes > 0) return SDM_OK;
-    return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: '%s' comes before 'dimension'", f->s->path,
-                    f->s->lines, field);
+    return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: '%s' comes before 'dimension'", f->in->path,
+                    f->in->lines, field);
 }
 
 static sdm_status take_sizes(nrrd *f, char *value, sdm_error *err)
 {
-    sdm_status e = need_axes(f, "sizes", err);
-    const sdm_scan place = {.path = f->s->path, .line = f->s->lines};
-    for (int a = 0; a < f->axes && !e; a++)
-        e = sdm_scan_count(&place, &value, INT32_MAX, "size", &f->size[a], err);
-    if (!e && sdm_scan_word(&value))
-        e = sdm_fail(err, SDM_E_FORMAT, "%s:%zu: more than %d sizes", f->s->path, f->s->lines,
+    sdm_status s = need_axes(f, "sizes", err);
+    const sdm_scan place = {.path = f->in->path, .line = f->in->lines};
+    for (int a = 0; a < f->axes && !s; a++)
+        s = sdm_scan_count(&place, &value, INT32_MAX, "size", &f->size[a], err);
+    if (!s && sdm_scan_word(&value))
+        s = sdm_fail(err, SDM_E_FORMAT, "%s:%zu: more than %d sizes", f->in->path, f->in->lines,
                      f->axes);
-    return e;
+    return s;
 }
 
-/* NaN stands for an axis without one. */
+/* A spacing of "nan" marks an axis without one. */
 static sdm_status take_spacings(nrrd *f, char *value, sdm_error *err)
 {
-    const sdm_status e = need_axes(f, "spacings", err);
-    for (int a = 0; a < f->axes && !e; a++) {
+    const sdm_status s = need_axes(f, "spacings", err);
+    for (int a = 0; a < f->axes && !s; a++) {
         const char *word = sdm_scan_word(&value);
         if (!word || (!sdm_is_listed(word, "nan") && !sdm_parse_real(word, &f->spacing[a])))
             return fail_field(f, SDM_E_FORMAT, err, "bad spacing", word ? word : "");
     }
-    return e;
+    return s;
 }
 
 static sdm_status take_space(nrrd *f, char *value, sdm_error *err)
@@ -113,7 +119,7 @@ static sdm_status take_space_dimension(nrrd *f, char *value, sdm_error *err)
                : SDM_OK;
 }
 
-/* "mm" "mm" "mm" */
+/* Reads three units in quotes: "mm" "mm" "mm". An empty or unknown one ("???") counts as mm. */
 static sdm_status take_units(nrrd *f, char *value, sdm_error *err)
 {
     for (int row = 0; row < 3; row++) {
@@ -130,7 +136,8 @@ static sdm_status take_units(nrrd *f, char *value, sdm_error *err)
     return SDM_OK;
 }
 
-/* "(x,y,z)", or "none" where *given tells of it; moves *at behind it. */
+/* Reads "(x,y,z)" at *at, and moves *at behind it. With `given` not NULL, "none" is allowed too and
+ * sets *given to false. */
 static sdm_status take_vector(const nrrd *f, char **at, double v[3], bool *given, sdm_error *err)
 {
     char *p = *at + strspn(*at, " \t");
@@ -160,10 +167,10 @@ static sdm_status take_vector(const nrrd *f, char **at, double v[3], bool *given
 
 static sdm_status take_directions(nrrd *f, char *value, sdm_error *err)
 {
-    sdm_status e = need_axes(f, "space directions", err);
-    for (int a = 0; a < f->axes && !e; a++)
-        e = take_vector(f, &value, f->step[a], &f->in_space[a], err);
-    return e;
+    sdm_status s = need_axes(f, "space directions", err);
+    for (int a = 0; a < f->axes && !s; a++)
+        s = take_vector(f, &value, f->step[a], &f->in_space[a], err);
+    return s;
 }
 
 static sdm_status take_origin(nrrd *f, char *value, sdm_error *err)
@@ -217,6 +224,7 @@ static sdm_status take_skip_bytes(nrrd *f, char *value, sdm_error *err)
     return fail_field(f, SDM_E_FORMAT, err, "bad number of bytes to skip", value);
 }
 
+/* Indices of the fields that the reader looks up; those up to ENDIAN are required. */
 enum { DIMENSION, TYPE, SIZES, ENCODING, ENDIAN, SPACINGS, DIRECTIONS, ORIGIN, OTHER };
 
 static const struct {
@@ -238,10 +246,10 @@ static const struct {
               {"line skip|lineskip", take_skip_lines},
               {"byte skip|byteskip", take_skip_bytes}};
 
-static bool has(const nrrd *f, int field) { return f->seen >> field & 1; }
+static bool has_field(const nrrd *f, int field) { return f->seen >> field & 1; }
 
-/* "field: value" or "key:=value"; fields that say nothing about places and voxels are passed over.
- */
+/* Reads "field: value" or "key:=value". Fields that are not in fields[] do not affect geometry or
+ * voxels and are ignored. */
 static sdm_status take_line(nrrd *f, char *line, sdm_error *err)
 {
     char *colon = strchr(line, ':');
@@ -250,13 +258,14 @@ static sdm_status take_line(nrrd *f, char *line, sdm_error *err)
         return fail_field(f, SDM_E_FORMAT, err, "need 'field: value' or 'key:=value'", line);
     *colon = '\0';
     char *value = colon + 1;
-    if (*value == '=') return sdm_segments_take(f->v, f->s, line, value + 1, err);
+    if (*value == '=') return sdm_segments_take(f->v, f->in, line, value + 1, err);
     value += strspn(value, " \t");
     for (size_t n = strlen(value); n > 0 && (value[n - 1] == ' ' || value[n - 1] == '\t'); n--)
         value[n - 1] = '\0';
     for (size_t i = 0; i < sizeof fields / sizeof *fields; i++) {
         if (!sdm_is_listed(line, fields[i].names)) continue;
-        if (has(f, (int)i)) return fail_field(f, SDM_E_FORMAT, err, "a field given twice", line);
+        if (has_field(f, (int)i))
+            return fail_field(f, SDM_E_FORMAT, err, "a field given twice", line);
         f->seen |= UINT32_C(1) << i;
         return fields[i].take(f, value, err);
     }
@@ -266,96 +275,102 @@ static sdm_status take_line(nrrd *f, char *line, sdm_error *err)
 static sdm_status read_fields(nrrd *f, sdm_error *err)
 {
     bool more;
-    sdm_status e = sdm_stream_line(f->s, &more, err);
-    if (e) return e;
-    if (!more || strncmp(f->s->line, "NRRD000", 7) || f->s->line[7] < '1' || f->s->line[7] > '5' ||
-        f->s->line[8])
+    sdm_status s = sdm_stream_line(f->in, &more, err);
+    if (s) return s;
+    if (!more || strncmp(f->in->line, "NRRD000", 7) || f->in->line[7] < '1' ||
+        f->in->line[7] > '5' || f->in->line[8])
         return sdm_fail(err, SDM_E_FORMAT,
                         "%s: not a NRRD file: the first line is not NRRD0001 to NRRD0005",
-                        f->s->path);
+                        f->in->path);
     for (;;) {
-        e = sdm_stream_line(f->s, &more, err);
-        if (e || !more || !f->s->line[0])
-            break; /* a header beside its voxels may end with the file */
-        e = take_line(f, f->s->line, err);
-        if (e) return e;
+        s = sdm_stream_line(f->in, &more, err);
+        if (s || !more || !f->in->line[0])
+            break; // an empty line, or for a separate header the end of the file
+        s = take_line(f, f->in->line, err);
+        if (s) return s;
     }
-    return e;
+    return s;
 }
 
+/* Demands the required fields; the byte order only for voxels of several bytes. */
 static sdm_status check_fields(const nrrd *f, sdm_error *err)
 {
     for (int i = DIMENSION; i <= ENDIAN; i++)
-        if (!has(f, i) && !(i == ENDIAN && sdm_voxel_size(f->h->type) == 1))
-            return sdm_fail(err, SDM_E_FORMAT, "%s: the header has no field '%s'", f->s->path,
+        if (!has_field(f, i) && !(i == ENDIAN && sdm_voxel_size(f->h->type) == 1))
+            return sdm_fail(err, SDM_E_FORMAT, "%s: the header has no field '%s'", f->in->path,
                             fields[i].names);
-    if (!has(f, DIRECTIONS) && (!has(f, SPACINGS) || f->axes == 4))
+    if (!has_field(f, DIRECTIONS) && (!has_field(f, SPACINGS) || f->axes == 4))
         return sdm_fail(
             err, SDM_E_UNSUPPORTED,
             "%s: the header does not state the size of the voxels ('space directions'%s)",
-            f->s->path, f->axes == 4 ? "" : " or 'spacings'");
+            f->in->path, f->axes == 4 ? "" : " or 'spacings'");
     return SDM_OK;
 }
 
-/* Which axes are those of space; a fourth one is that of the layers. */
+/* Copies the geometry of the three axes in space to the header; an axis without a direction counts
+ * the layers. */
 static sdm_status set_axes(nrrd *f, sdm_error *err)
 {
     sdm_image_header *h = f->h;
-    int in_space = 0, list = -1;
+    int in_space = 0, layer_axis = -1;
     for (int a = 0; a < f->axes; a++) {
-        const bool here = has(f, DIRECTIONS) ? f->in_space[a] : true;
-        if (!here) {
+        // an axis without a direction: layers
+        if (has_field(f, DIRECTIONS) && !f->in_space[a]) {
             if (f->size[a] < 1)
-                return sdm_fail(err, SDM_E_FORMAT, "%s: axis %d has no entries", f->s->path, a);
-            list = a;
+                return sdm_fail(err, SDM_E_FORMAT, "%s: axis %d has no entries", f->in->path, a);
+            layer_axis = a;
             h->layers = (size_t)f->size[a];
             h->run = 1;
             for (int b = 0; b < a; b++) h->run *= (size_t)f->size[b];
             continue;
         }
+        // an axis in space
         if (in_space == 3) break;
         for (int row = 0; row < 3; row++) {
-            const double step = has(f, DIRECTIONS) ? f->step[a][row] : row == a ? f->spacing[a] : 0;
+            const double step = has_field(f, DIRECTIONS) ? f->step[a][row]
+                                : row == a               ? f->spacing[a]
+                                                         : 0;
             h->step[3 * row + in_space] = f->scale[row] * step;
         }
         h->n[in_space++] = f->size[a];
     }
-    if (in_space != 3 || (f->axes == 4 && list < 0))
+    // exactly three axes in space, and the fourth counts layers
+    if (in_space != 3 || (f->axes == 4 && layer_axis < 0))
         return sdm_fail(err, SDM_E_UNSUPPORTED,
                         "%s: need three axes with a direction in space (and one 'none' of four)",
-                        f->s->path);
+                        f->in->path);
     for (int row = 0; row < 3; row++) h->origin[row] *= f->scale[row];
-    f->v->placed = f->v->placed && has(f, DIRECTIONS) && has(f, ORIGIN);
+    f->v->placed = f->v->placed && has_field(f, DIRECTIONS) && has_field(f, ORIGIN);
     return SDM_OK;
 }
 
 /* Moves the stream to the first voxel. */
 static sdm_status find_voxels(nrrd *f, sdm_error *err)
 {
-    sdm_stream *s = f->s;
+    sdm_stream *in = f->in;
     if (f->gzip && (f->skip_lines || f->skip_bytes))
         return sdm_fail(err, SDM_E_UNSUPPORTED,
                         "%s: 'line skip' and 'byte skip' are read with the encoding raw only",
-                        s->path);
-    sdm_status e = f->data_file[0] ? sdm_stream_detach(s, f->data_file, err) : SDM_OK;
+                        in->path);
+    sdm_status s = f->data_file[0] ? sdm_stream_detach(in, f->data_file, err) : SDM_OK;
     bool more = true;
-    for (int64_t i = 0; i < f->skip_lines && more && !e; i++) e = sdm_stream_line(s, &more, err);
-    if (!e && f->gzip) return sdm_stream_unzip(s, err);
-    if (!e && f->skip_bytes > 0) e = sdm_stream_skip(s, (uint64_t)f->skip_bytes, err);
+    for (int64_t i = 0; i < f->skip_lines && more && !s; i++) s = sdm_stream_line(in, &more, err);
+    if (!s && f->gzip) return sdm_stream_unzip(in, err);
+    if (!s && f->skip_bytes > 0) s = sdm_stream_skip(in, (uint64_t)f->skip_bytes, err);
     f->h->tail = f->skip_bytes < 0;
-    return e;
+    return s;
 }
 
-sdm_status sdm_nrrd_read(sdm_stream *s, sdm_image_header *h, sdm_volume *v, sdm_error *err)
+sdm_status sdm_nrrd_read(sdm_stream *in, sdm_image_header *h, sdm_volume *v, sdm_error *err)
 {
-    nrrd f = {.s = s, .h = h, .v = v, .scale = {1, 1, 1}, .spacing = {NAN, NAN, NAN, NAN}};
-    sdm_status e = read_fields(&f, err);
-    if (!e) e = check_fields(&f, err);
-    if (!e) e = set_axes(&f, err);
-    if (!e) e = sdm_segments_finish(v, s, h->layers, err);
-    if (!e && h->layers > 1 && v->n_segments == 0)
-        e = sdm_fail(err, SDM_E_UNSUPPORTED,
-                     "%s: %zu images (or numbers a voxel) in one file, save one", s->path,
+    nrrd f = {.in = in, .h = h, .v = v, .scale = {1, 1, 1}, .spacing = {NAN, NAN, NAN, NAN}};
+    sdm_status s = read_fields(&f, err);
+    if (!s) s = check_fields(&f, err);
+    if (!s) s = set_axes(&f, err);
+    if (!s) s = sdm_segments_finish(v, in, h->layers, err);
+    if (!s && h->layers > 1 && v->n_segments == 0)
+        s = sdm_fail(err, SDM_E_UNSUPPORTED,
+                     "%s: %zu images (or numbers a voxel) in one file, save one", in->path,
                      h->layers);
-    return e ? e : find_voxels(&f, err);
+    return s ? s : find_voxels(&f, err);
 }

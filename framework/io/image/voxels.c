@@ -1,4 +1,4 @@
-/* Voxels as bytes in a file: any of ten types, either byte order. */
+/* Converts voxels of ten types, in both byte orders, from and to the bytes of a file. */
 #include "voxels.h"
 #include "bytes.h"
 
@@ -27,7 +27,7 @@ const char *sdm_voxel_name(sdm_voxel_type type)
     return is_type(type) ? sdm_voxel_formats[type].name : "unknown";
 }
 
-/* The locale plays no part. */
+/* Lower case of an ASCII letter, whatever the locale. */
 static char lower(char c) { return c >= 'A' && c <= 'Z' ? (char)(c - 'A' + 'a') : c; }
 
 bool sdm_is_listed(const char *word, const char *list)
@@ -43,7 +43,21 @@ bool sdm_is_listed(const char *word, const char *list)
     }
 }
 
-static double decode(const uint8_t *p, sdm_voxel_type type, bool big)
+double sdm_length_unit(const char *name)
+{
+    static const struct {
+        const char *names;
+        double mm;
+    } units[] = {{"mm|millimeter|millimetre|millimeters", 1},
+                 {"um|micron|microns|micrometer|micrometre|\xC2\xB5m", 1e-3},
+                 {"cm|centimeter|centimetre", 10},
+                 {"m|meter|metre", 1000}};
+    for (size_t i = 0; i < sizeof units / sizeof *units; i++)
+        if (sdm_is_listed(name, units[i].names)) return units[i].mm;
+    return 0;
+}
+
+static double decode_voxel(const uint8_t *p, sdm_voxel_type type, bool big)
 {
     switch (type) {
     case SDM_VOXEL_UINT8:
@@ -75,7 +89,7 @@ void sdm_voxels_decode(const uint8_t *p, sdm_voxel_type type, bool big, double s
     const size_t size = sdm_voxel_formats[type].size;
     const bool scaled = slope != 1 || intercept != 0;
     for (size_t i = 0; i < n; i++) {
-        const double v = decode(p + size * i, type, big);
+        const double v = decode_voxel(p + size * i, type, big);
         out[i] = (float)(scaled ? slope * v + intercept : v);
     }
 }

@@ -1,4 +1,4 @@
-/* Voxel types: their bytes and what each image format calls them. */
+/* Voxel types: their size and their name in each image format. */
 #ifndef SDM_IO_VOXELS_H
 #define SDM_IO_VOXELS_H
 
@@ -6,25 +6,30 @@
 
 #define SDM_N_VOXEL_TYPES 10
 
-/* Lists of names are separated by '|'; the first one is written. */
+/* One voxel type. Alternative names are separated by '|'; the writers use the first one. */
 typedef struct sdm_voxel_format {
     const char *name;
-    size_t size;
-    int nifti;        /* code of the datatype field */
-    const char *nrrd; /* without "_t": "int16_t" is "int16" */
-    const char *meta; /* without "MET_" */
+    size_t size;      /* bytes */
+    int nifti;        /* the code in the field datatype */
+    const char *nrrd; /* the readers remove a final "_t": "int16_t" */
+    const char *meta; /* without the prefix "MET_" */
 } sdm_voxel_format;
 
+/* Indexed by sdm_voxel_type. */
 extern const sdm_voxel_format sdm_voxel_formats[SDM_N_VOXEL_TYPES];
 
-/* True when `word` is in the list, upper or lower case. */
+/* True when `word` is one of the names in `list`, which are separated by '|'; case is ignored. */
 bool sdm_is_listed(const char *word, const char *list);
 
-/* out[n] = voxels of `type` in p, of either byte order, times slope plus intercept. */
+/* Millimetres in a unit of length ("mm", "um" ...); 0 for an unknown unit. */
+double sdm_length_unit(const char *name);
+
+/* out[i] = slope * v + intercept, computed in double, for the n voxels v of `type` at p; big: they
+ * are big-endian. */
 void sdm_voxels_decode(const uint8_t *p, sdm_voxel_type type, bool big, double slope,
                        double intercept, size_t n, float *out);
 
-/* p = n voxels of `type`, beginning with number `first` of the array `values`, little endian. */
+/* Stores values[first .. first + n - 1], an array of the C type of `type`, at p, little endian. */
 void sdm_voxels_encode(const void *values, sdm_voxel_type type, size_t first, size_t n, uint8_t *p);
 
 #endif

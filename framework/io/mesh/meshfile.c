@@ -1,10 +1,10 @@
-/* Triangle mesh files: the type follows the name. */
-#include "meshparts.h"
+/* Reads and writes triangle mesh files; the ending of the name selects the format. */
+#include "mesh_formats.h"
 #include "sdm/memory.h"
 
 #include <math.h>
 
-#define MESH_FILE_MAX ((size_t)1 << 31)
+#define MESH_FILE_MAX ((size_t)1 << 31) /* bytes */
 
 typedef struct mesh_format {
     const char *ext;
@@ -33,18 +33,19 @@ sdm_status sdm_mesh_read(const char *path, sdm_mesh *out, sdm_error *err)
     const mesh_format *format;
     uint8_t *data = NULL;
     size_t size = 0;
-    sdm_status e = find_format(path, &format, err);
-    if (!e) e = sdm_file_read(path, MESH_FILE_MAX, &data, &size, err);
-    if (e) return e;
+    sdm_status s = find_format(path, &format, err);
+    if (!s) s = sdm_file_read(path, MESH_FILE_MAX, &data, &size, err);
+    if (s) return s;
     sdm_builder b = {.path = path, .mesh = out};
     out->n_vert = out->n_tri = 0;
-    e = format->read(&b, data, size, err);
-    if (!e) e = sdm_builder_finish(&b, err);
+    s = format->read(&b, data, size, err);
+    if (!s) s = sdm_builder_finish(&b, err);
     sdm_free(data);
-    if (e) sdm_mesh_dispose(out);
-    return e;
+    if (s) sdm_mesh_dispose(out);
+    return s;
 }
 
+/* Demands finite coordinates and valid vertex indices. */
 static sdm_status check_mesh(const sdm_mesh *m, sdm_error *err)
 {
     for (size_t i = 0; i < 3 * m->n_vert; i++)
@@ -64,12 +65,12 @@ sdm_status sdm_mesh_write(const char *path, const sdm_mesh *mesh, sdm_error *err
     if (!path || !mesh) return sdm_fail(err, SDM_E_ARG, "sdm_mesh_write: NULL argument");
     const mesh_format *format;
     sdm_outfile *f = NULL;
-    sdm_status e = find_format(path, &format, err);
-    if (!e) e = check_mesh(mesh, err);
-    if (!e) e = sdm_outfile_open(path, &f, err);
-    if (e) return e;
-    e = format->write(f, mesh, err);
-    if (!e) return sdm_outfile_commit(&f, err);
+    sdm_status s = find_format(path, &format, err);
+    if (!s) s = check_mesh(mesh, err);
+    if (!s) s = sdm_outfile_open(path, &f, err);
+    if (s) return s;
+    s = format->write(f, mesh, err);
+    if (!s) return sdm_outfile_commit(&f, err);
     sdm_outfile_discard(&f);
-    return e;
+    return s;
 }

@@ -1,19 +1,21 @@
-/* PLY meshes: ASCII and binary of both byte orders; unknown elements and properties are skipped. */
+/* PLY meshes, ASCII and binary in both byte orders. Unknown elements and properties are ignored. */
 #include "ply.h"
 #include "sdm/internal/text.h"
 
 #include <math.h>
 
-/* Where the body is being read. */
+/* The reading position in the body of a file. */
 typedef struct body {
     sdm_builder *b;
     sdm_ply_header h;
-    const uint8_t *start, *at, *end; /* binary */
-    sdm_scan scan;                   /* ASCII */
+    /* binary: the file, the next number, the end */
+    const uint8_t *start, *at, *end;
+    /* ASCII: the text, and the rest of the current line */
+    sdm_scan scan;
     char *line;
 } body;
 
-/* Fails with the place in the file: a line or a byte. */
+/* SDM_E_FORMAT with the current line or byte. */
 static sdm_status fail_here(const body *y, sdm_error *err, const char *what)
 {
     if (y->h.ascii)
@@ -26,16 +28,16 @@ static size_t bytes_left(const body *y)
 {
     if (!y->h.ascii) return (size_t)(y->end - y->at);
     const char *from = y->line && *y->line ? y->line : y->scan.at;
-    return (size_t)(y->scan.end - from) + 1; /* the last word needs no separator */
+    return (size_t)(y->scan.end - from) + 1; // the last word needs no separator
 }
 
-/* Fewest bytes that a number takes. */
-static size_t least_size(const body *y, sdm_ply_type type)
+/* Lower bound on the bytes of a number; in ASCII a digit and a separator. */
+static size_t min_size(const body *y, sdm_ply_type type)
 {
     return y->h.ascii ? 2 : sdm_ply_type_size(type);
 }
 
-static double decode(const uint8_t *p, sdm_ply_type type, bool big)
+static double decode_number(const uint8_t *p, sdm_ply_type type, bool big)
 {
     const uint64_t v = sdm_get_uint(p, sdm_ply_type_size(type), big);
     switch (type) {
@@ -54,7 +56,7 @@ static double decode(const uint8_t *p, sdm_ply_type type, bool big)
     }
 }
 
-/* Next number of the body; NULL skips it. */
+/* Reads the next number of the body into *out; out = NULL skips it unchecked. */
 static sdm_status next_number(body *y, sdm_ply_type type, double *out, sdm_error *err)
 {
     if (y->h.ascii) {
@@ -65,64 +67,67 @@ static sdm_status next_number(body *y, sdm_ply_type type, double *out, sdm_error
     }
     const size_t size = sdm_ply_type_size(type);
     if (bytes_left(y) < size) return fail_here(y, err, "the file ends before its last element");
-    if (out) *out = decode(y->at, type, y->h.big);
+    if (out) *out = decode_number(y->at, type, y->h.big);
     if (out && !isfinite(*out)) return fail_here(y, err, "not a finite number");
     y->at += size;
     return SDM_OK;
 }
 
-/* A list: the corners of a face, or something to skip. */
+/* Reads a list property: the corners of a face; others are skipped. */
 static sdm_status read_list(body *y, const sdm_ply_property *p, sdm_error *err)
 {
     const bool corners = p->role == SDM_PLY_CORNERS;
     double n;
-    sdm_status e = next_number(y, p->count_type, &n, err);
-    if (e) return e;
-    if (!(n >= 0) || n != floor(n) || n > (double)(bytes_left(y) / least_size(y, p->type)))
+    sdm_status s = next_number(y, p->count_type, &n, err);
+    if (s) return s;
+    if (!(n >= 0) || n != floor(n) || n > (double)(bytes_left(y) / min_size(y, p->type)))
         return fail_here(y, err, "a list longer than the file");
     if (corners && n < 3) return fail_here(y, err, "a face of less than three corners");
     sdm_fan fan = {0};
     for (size_t i = 0; i < (size_t)n; i++) {
         double v;
-        e = next_number(y, p->type, corners ? &v : NULL, err);
-        if (e) return e;
+        s = next_number(y, p->type, corners ? &v : NULL, err);
+        if (s) return s;
         if (!corners) continue;
         if (!(v >= 0) || v != floor(v) || v >= (double)y->h.n_vert)
             return fail_here(y, err, "a vertex index outside the vertices");
-        e = sdm_builder_corner(y->b, &fan, (uint32_t)v, err);
-        if (e) return e;
+        s = sdm_builder_corner(y->b, &fan, (uint32_t)v, err);
+        if (s) return s;
     }
     return SDM_OK;
 }
 
+/* Reads the properties of one vertex, face or other element. */
 static sdm_status read_instance(body *y, const sdm_ply_element *element, sdm_error *err)
 {
     double x[3] = {0};
     for (size_t i = 0; i < element->n; i++) {
         const sdm_ply_property *p = &y->h.property[element->first + i];
-        sdm_status e;
+        sdm_status s;
         if (p->count_type != SDM_PLY_NONE)
-            e = read_list(y, p, err);
+            s = read_list(y, p, err);
         else
-            e = next_number(y, p->type, p->role <= SDM_PLY_Z ? &x[p->role] : NULL, err);
-        if (e) return e;
+            s = next_number(y, p->type, p->role <= SDM_PLY_Z ? &x[p->role] : NULL, err);
+        if (s) return s;
     }
     return element->is_vertex ? sdm_builder_vertex(y->b, x, err) : SDM_OK;
 }
 
+/* Reads all instances of an element. Before anything is allocated, their number is compared with
+ * the bytes left. */
 static sdm_status read_element(body *y, const sdm_ply_element *element, sdm_error *err)
 {
-    if (element->n == 0) return SDM_OK; /* nothing in the body, whatever the count says */
-    size_t least = 0;
+    if (element->n == 0) return SDM_OK; // without properties it takes no bytes
+    size_t smallest = 0;
     for (size_t i = 0; i < element->n; i++) {
         const sdm_ply_property *p = &y->h.property[element->first + i];
-        least += least_size(y, p->count_type != SDM_PLY_NONE ? p->count_type : p->type);
+        smallest += min_size(y, p->count_type != SDM_PLY_NONE ? p->count_type : p->type);
     }
-    if ((uint64_t)element->count > bytes_left(y) / least)
+    if ((uint64_t)element->count > bytes_left(y) / smallest)
         return fail_here(y, err, "more elements declared than the file holds");
     for (int64_t i = 0; i < element->count; i++) {
-        const sdm_status e = read_instance(y, element, err);
-        if (e) return e;
+        const sdm_status s = read_instance(y, element, err);
+        if (s) return s;
     }
     return SDM_OK;
 }
@@ -130,31 +135,31 @@ static sdm_status read_element(body *y, const sdm_ply_element *element, sdm_erro
 sdm_status sdm_ply_read(sdm_builder *b, uint8_t *data, size_t size, sdm_error *err)
 {
     body y = {.b = b, .scan = {.at = (char *)data, .end = (char *)data + size, .path = b->path}};
-    sdm_status e = sdm_ply_read_header(&y.scan, &y.h, err);
+    sdm_status s = sdm_ply_read_header(&y.scan, &y.h, err);
     y.start = data;
     y.at = (const uint8_t *)y.scan.at;
     y.end = data + size;
-    for (size_t i = 0; i < y.h.n_elements && !e; i++) e = read_element(&y, &y.h.element[i], err);
-    return e;
+    for (size_t i = 0; i < y.h.n_elements && !s; i++) s = read_element(&y, &y.h.element[i], err);
+    return s;
 }
 
 sdm_status sdm_ply_write(sdm_outfile *f, const sdm_mesh *m, sdm_error *err)
 {
-    sdm_status e = sdm_outfile_printf(
+    sdm_status s = sdm_outfile_printf(
         f, err,
         "ply\nformat binary_little_endian 1.0\ncomment unit: mm\nelement vertex %zu\n"
         "property double x\nproperty double y\nproperty double z\nelement face %zu\n"
         "property list uchar int vertex_indices\nend_header\n",
         m->n_vert, m->n_tri);
-    for (size_t i = 0; i < m->n_vert && !e; i++) {
+    for (size_t i = 0; i < m->n_vert && !s; i++) {
         uint8_t bytes[24];
         for (size_t d = 0; d < 3; d++) sdm_put_f64(bytes + 8 * d, m->vert[3 * i + d]);
-        e = sdm_outfile_write(f, bytes, sizeof bytes, err);
+        s = sdm_outfile_write(f, bytes, sizeof bytes, err);
     }
-    for (size_t i = 0; i < m->n_tri && !e; i++) {
+    for (size_t i = 0; i < m->n_tri && !s; i++) {
         uint8_t bytes[13] = {3};
         for (size_t c = 0; c < 3; c++) sdm_put_uint(bytes + 1 + 4 * c, 4, m->tri[3 * i + c]);
-        e = sdm_outfile_write(f, bytes, sizeof bytes, err);
+        s = sdm_outfile_write(f, bytes, sizeof bytes, err);
     }
-    return e;
+    return s;
 }

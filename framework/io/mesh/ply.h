@@ -1,12 +1,13 @@
-/* What the header of a PLY file says: elements and their properties, in the order of the body. */
+/* The header of a PLY file: elements and their properties, in the order of the body. */
 #ifndef SDM_IO_PLY_H
 #define SDM_IO_PLY_H
 
-#include "meshparts.h"
+#include "mesh_formats.h"
 
 #define SDM_PLY_ELEMENTS 16
 #define SDM_PLY_PROPERTIES 256
 
+/* The type of a number; NONE: no number. */
 typedef enum sdm_ply_type {
     SDM_PLY_NONE = 0,
     SDM_PLY_INT8,
@@ -19,7 +20,7 @@ typedef enum sdm_ply_type {
     SDM_PLY_FLOAT64
 } sdm_ply_type;
 
-/* What a property is good for; everything without a role is skipped. */
+/* How a property is used: as a coordinate of a vertex, as the corners of a face, or not at all. */
 typedef enum sdm_ply_role {
     SDM_PLY_X = 0,
     SDM_PLY_Y,
@@ -30,13 +31,13 @@ typedef enum sdm_ply_role {
 
 typedef struct sdm_ply_property {
     sdm_ply_type type;
-    sdm_ply_type count_type; /* of a list's length; NONE: a single value */
+    sdm_ply_type count_type; /* type of the length of a list; NONE: a single value */
     sdm_ply_role role;
 } sdm_ply_property;
 
 typedef struct sdm_ply_element {
-    int64_t count;
-    size_t first, n; /* its properties */
+    int64_t count;   /* instances in the body */
+    size_t first, n; /* its properties: property[first .. first + n - 1] */
     bool is_vertex, is_face;
 } sdm_ply_element;
 
@@ -48,11 +49,12 @@ typedef struct sdm_ply_header {
     sdm_ply_property property[SDM_PLY_PROPERTIES];
 } sdm_ply_header;
 
-/* Bytes of a number of this type. */
+/* Bytes of a number of this type; 0 for SDM_PLY_NONE. */
 size_t sdm_ply_type_size(sdm_ply_type type);
 
-/* Reads the header; s then stands at the first byte of the body. SDM_E_FORMAT, SDM_E_UNSUPPORTED.
+/* Reads the header into *h, which is zero-initialised; afterwards scan->at is the first byte of the
+ * body. SDM_E_FORMAT; SDM_E_UNSUPPORTED for an unknown format or too many elements or properties.
  */
-sdm_status sdm_ply_read_header(sdm_scan *s, sdm_ply_header *h, sdm_error *err);
+sdm_status sdm_ply_read_header(sdm_scan *scan, sdm_ply_header *h, sdm_error *err);
 
 #endif

@@ -1,21 +1,26 @@
-/* STL meshes: ASCII and binary; triangles without shared vertices, welded again on reading. */
-#include "meshparts.h"
+/* STL meshes, ASCII and binary. The format has no shared vertices: equal ones are merged on
+ * reading.
+ */
+#include "mesh_formats.h"
 #include "sdm/internal/rng.h"
 #include "sdm/memory.h"
 
 #include <float.h>
 #include <math.h>
 
+/* Bytes of the binary header with the number of facets, and of a facet. */
 #define STL_HEADER 84
 #define STL_FACET 50
 
-/* Vertices by their bits: open addressing, index + 1, 0 free. */
-typedef struct weld {
+/* A hash table of vertices by the bits of their coordinates, with open addressing: slot[mask + 1]
+ * holds vertex index + 1, 0 where it is free. */
+typedef struct vertex_table {
     uint32_t *slot;
     size_t mask;
-} weld;
+} vertex_table;
 
-static sdm_status weld_create(weld *w, size_t n_corner, sdm_error *err)
+/* At most half full with n_corner vertices. */
+static sdm_status table_create(vertex_table *w, size_t n_corner, sdm_error *err)
 {
     size_t size = 64;
     while (size < 2 * n_corner) size *= 2;
@@ -23,14 +28,15 @@ static sdm_status weld_create(weld *w, size_t n_corner, sdm_error *err)
     return SDM_ALLOC(&w->slot, size, "table of STL vertices", err);
 }
 
-static sdm_status weld_vertex(sdm_builder *b, weld *w, const double raw[3], uint32_t *out,
-                              sdm_error *err)
+/* The index of a vertex, which is added to the mesh when it is new. */
+static sdm_status merge_vertex(sdm_builder *b, vertex_table *w, const double raw[3], uint32_t *out,
+                               sdm_error *err)
 {
     uint64_t hash = 0;
     double x[3];
     for (int i = 0; i < 3; i++) {
         uint64_t bits;
-        x[i] = raw[i] + 0.0; /* -0 and +0 are one place */
+        x[i] = raw[i] + 0.0; // -0 becomes +0
         memcpy(&bits, &x[i], sizeof bits);
         hash = sdm_mix64(hash + 0x9E3779B97F4A7C15u + bits);
     }
@@ -40,16 +46,16 @@ static sdm_status weld_vertex(sdm_builder *b, weld *w, const double raw[3], uint
         if (memcmp(b->mesh->vert + 3 * (size_t)*out, x, sizeof x) == 0) return SDM_OK;
     }
     *out = (uint32_t)b->n_vert;
-    const sdm_status e = sdm_builder_vertex(b, x, err);
-    if (!e) w->slot[at] = *out + 1;
-    return e;
+    const sdm_status s = sdm_builder_vertex(b, x, err);
+    if (!s) w->slot[at] = *out + 1;
+    return s;
 }
 
-static sdm_status read_facets(sdm_builder *b, weld *w, const uint8_t *data, size_t n,
+static sdm_status read_facets(sdm_builder *b, vertex_table *w, const uint8_t *data, size_t n,
                               sdm_error *err)
 {
     for (size_t i = 0; i < n; i++) {
-        const uint8_t *facet = data + STL_HEADER + STL_FACET * i + 12; /* behind the normal */
+        const uint8_t *facet = data + STL_HEADER + STL_FACET * i + 12; // behind the normal
         uint32_t v[3];
         for (int c = 0; c < 3; c++) {
             double x[3];
@@ -58,18 +64,18 @@ static sdm_status read_facets(sdm_builder *b, weld *w, const uint8_t *data, size
                 return sdm_fail(err, SDM_E_FORMAT,
                                 "%s: byte %zu: coordinates of facet %zu are not finite", b->path,
                                 (size_t)(facet + 12 * c - data), i);
-            const sdm_status e = weld_vertex(b, w, x, &v[c], err);
-            if (e) return e;
+            const sdm_status s = merge_vertex(b, w, x, &v[c], err);
+            if (s) return s;
         }
-        const sdm_status e = sdm_builder_triangle(b, v[0], v[1], v[2], err);
-        if (e) return e;
+        const sdm_status s = sdm_builder_triangle(b, v[0], v[1], v[2], err);
+        if (s) return s;
     }
     return SDM_OK;
 }
 
 static char lower(char c) { return c >= 'A' && c <= 'Z' ? (char)(c - 'A' + 'a') : c; }
 
-/* Is "solid" the first word of the text, in upper or lower case? */
+/* True when the text begins with "solid", in upper or lower case, after blanks. */
 static bool begins_with_solid(const char *text, size_t size)
 {
     size_t at = sdm_scan_mark(text, size), n = 0;
@@ -78,50 +84,53 @@ static bool begins_with_solid(const char *text, size_t size)
     return n == 5;
 }
 
-static sdm_status read_ascii(sdm_builder *b, weld *w, uint8_t *data, size_t size, sdm_error *err)
+static sdm_status read_ascii(sdm_builder *b, vertex_table *w, uint8_t *data, size_t size,
+                             sdm_error *err)
 {
-    sdm_scan s = {.at = (char *)data, .end = (char *)data + size, .path = b->path};
+    sdm_scan scan = {.at = (char *)data, .end = (char *)data + size, .path = b->path};
     uint32_t v[3] = {0};
-    int n = -1; /* corners of the open facet; -1: none is open */
+    int n = -1; // corners of the open facet; -1: outside of a facet
     bool ended = false;
-    for (char *line; (line = sdm_scan_line(&s)) != NULL;) {
+    for (char *line; (line = sdm_scan_line(&scan)) != NULL;) {
         char *word = sdm_scan_word(&line);
         for (char *c = word; *c; c++) *c = lower(*c);
-        sdm_status e = SDM_OK;
+        sdm_status s = SDM_OK;
         double x[3];
+        // a corner; the begin and the end of a facet; words without effect
         if (strcmp(word, "vertex") == 0) {
             if (n < 0 || n > 2)
                 return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: vertex outside a facet of three",
-                                s.path, s.line);
-            e = sdm_scan_reals(&s, &line, x, 3, err);
-            if (!e) e = weld_vertex(b, w, x, &v[n++], err);
+                                scan.path, scan.line);
+            s = sdm_scan_reals(&scan, &line, x, 3, err);
+            if (!s) s = merge_vertex(b, w, x, &v[n++], err);
         } else if (strcmp(word, "facet") == 0) {
             if (n >= 0)
-                return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: facet inside a facet", s.path, s.line);
+                return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: facet inside a facet", scan.path,
+                                scan.line);
             n = 0;
         } else if (strcmp(word, "endfacet") == 0) {
             if (n != 3)
-                return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: facet of %d vertices", s.path, s.line,
-                                n < 0 ? 0 : n);
-            e = sdm_builder_triangle(b, v[0], v[1], v[2], err);
+                return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: facet of %d vertices", scan.path,
+                                scan.line, n < 0 ? 0 : n);
+            s = sdm_builder_triangle(b, v[0], v[1], v[2], err);
             n = -1;
         } else if (strcmp(word, "solid") != 0 && strcmp(word, "endsolid") != 0 &&
                    strcmp(word, "outer") != 0 && strcmp(word, "endloop") != 0) {
-            return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: '%.40s' is not a word of STL", s.path,
-                            s.line, word);
+            return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: '%.40s' is not a word of STL", scan.path,
+                            scan.line, word);
         }
-        if (e) return e;
+        if (s) return s;
         ended = strcmp(word, "endsolid") == 0;
     }
     if (n >= 0 || !ended)
-        return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: the file ends before 'endsolid'", s.path,
-                        s.lines);
+        return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: the file ends before 'endsolid'", scan.path,
+                        scan.lines);
     return SDM_OK;
 }
 
 sdm_status sdm_stl_read(sdm_builder *b, uint8_t *data, size_t size, sdm_error *err)
 {
-    /* "solid" may open a binary header too: the length decides */
+    // a binary header may begin with "solid" too, so the length of the file decides
     const uint64_t n = size >= STL_HEADER ? sdm_get_uint(data + 80, 4, false) : 0;
     const bool binary = size >= STL_HEADER && n * STL_FACET == size - STL_HEADER;
     const bool ascii = !binary && begins_with_solid((const char *)data, size);
@@ -132,13 +141,13 @@ sdm_status sdm_stl_read(sdm_builder *b, uint8_t *data, size_t size, sdm_error *e
         return sdm_fail(
             err, SDM_E_FORMAT, "%s: byte 80: %llu facets need %llu bytes, the file has %zu",
             b->path, (unsigned long long)n, (unsigned long long)(n * STL_FACET + STL_HEADER), size);
-    weld w = {0};
-    /* "vertex 0 0 0" is the shortest corner in ASCII */
-    sdm_status e = weld_create(&w, binary ? 3 * (size_t)n : size / 12, err);
-    if (!e)
-        e = binary ? read_facets(b, &w, data, (size_t)n, err) : read_ascii(b, &w, data, size, err);
+    vertex_table w = {0};
+    // a corner in ASCII, "vertex 0 0 0", has at least 12 bytes
+    sdm_status s = table_create(&w, binary ? 3 * (size_t)n : size / 12, err);
+    if (!s)
+        s = binary ? read_facets(b, &w, data, (size_t)n, err) : read_ascii(b, &w, data, size, err);
     sdm_free(w.slot);
-    return e;
+    return s;
 }
 
 /* Unit normal of a triangle, zero for a degenerate one. */
@@ -160,10 +169,10 @@ sdm_status sdm_stl_write(sdm_outfile *f, const sdm_mesh *m, sdm_error *err)
             return sdm_fail(err, SDM_E_MESH,
                             "coordinate %g of vertex %zu does not fit STL's float32", m->vert[i],
                             i / 3);
-    uint8_t header[STL_HEADER] = "binary STL, mm"; /* must not begin with "solid" */
+    uint8_t header[STL_HEADER] = "binary STL, mm"; // must not begin with "solid"
     sdm_put_uint(header + 80, 4, m->n_tri);
-    sdm_status e = sdm_outfile_write(f, header, sizeof header, err);
-    for (size_t i = 0; i < m->n_tri && !e; i++) {
+    sdm_status s = sdm_outfile_write(f, header, sizeof header, err);
+    for (size_t i = 0; i < m->n_tri && !s; i++) {
         const double *v[3];
         double n[3];
         uint8_t facet[STL_FACET] = {0};
@@ -173,7 +182,7 @@ sdm_status sdm_stl_write(sdm_outfile *f, const sdm_mesh *m, sdm_error *err)
             sdm_put_f32(facet + 4 * d, (float)n[d]);
             for (int c = 0; c < 3; c++) sdm_put_f32(facet + 12 + 12 * c + 4 * d, (float)v[c][d]);
         }
-        e = sdm_outfile_write(f, facet, sizeof facet, err);
+        s = sdm_outfile_write(f, facet, sizeof facet, err);
     }
-    return e;
+    return s;
 }

@@ -1,5 +1,5 @@
-/* Pictures of surfaces: orthographic views with a depth buffer, shaded, coloured by a value at each
- * vertex. */
+/* Pictures of surfaces: shaded orthographic views, rendered with a depth buffer and coloured by a
+ * value at each vertex. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -19,10 +19,10 @@ enum {
     TOP = 46,
     GAP = 20,
     BAR = 14,
-    FOOT = 64
+    FOOT = 64 /* colour bars with numbers and caption */
 };
 
-/* Unit vectors of the world: to the right, upwards, to the viewer. */
+/* A direction of view: axis[0] points to the right, axis[1] upwards, axis[2] to the viewer. */
 typedef struct view {
     const char *name;
     double axis[3][3];
@@ -37,18 +37,22 @@ static const view VIEWS[N_VIEWS] = {
       {0.43301270189221933, -0.75, 0.5}}},
 };
 
+/* The surfaces and where everything lies on the canvas. */
 typedef struct scene {
     const sdm_picture_surface *surfaces;
     size_t n;
-    double low[N_VIEWS][2],
-        high[N_VIEWS][2];       /* boxes of all surfaces in the planes of the views, mm */
-    double pixels;              /* per mm */
-    double limit;               /* values span -limit .. limit, mm */
-    int width, height[N_VIEWS]; /* of a panel */
-    sdm_colour shade[N_SHADES]; /* of values from -limit to limit */
+    /* bounding boxes of all surfaces in the planes of the views, mm */
+    double low[N_VIEWS][2], high[N_VIEWS][2];
+    double pixels; /* per mm */
+    /* the colours span the values -limit .. limit, mm */
+    double limit;
+    /* size of the panels in pixels */
+    int width, height[N_VIEWS];
+    /* colours of evenly spaced values from -limit to limit */
+    sdm_colour shade[N_SHADES];
 } scene;
 
-/* One panel in the making, FINE times as wide and high; depth -INFINITY: nothing there. */
+/* The samples of one panel, FINE times as wide and high; depth is -INFINITY where no surface is. */
 typedef struct raster {
     int w, h;
     double *depth;
@@ -60,45 +64,48 @@ static double dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static void measure(scene *s)
+/* Finds the bounding boxes and the largest finite value. */
+static void scene_measure(scene *sc)
 {
     for (int v = 0; v < N_VIEWS; v++)
         for (int d = 0; d < 2; d++) {
-            s->low[v][d] = INFINITY;
-            s->high[v][d] = -INFINITY;
+            sc->low[v][d] = INFINITY;
+            sc->high[v][d] = -INFINITY;
         }
-    for (size_t k = 0; k < s->n; k++) {
-        const sdm_picture_surface *p = &s->surfaces[k];
+    for (size_t k = 0; k < sc->n; k++) {
+        const sdm_picture_surface *p = &sc->surfaces[k];
         for (size_t i = 0; i < p->mesh->n_vert; i++) {
             for (int v = 0; v < N_VIEWS; v++)
                 for (int d = 0; d < 2; d++) {
                     const double at = dot(p->mesh->vert + 3 * i, VIEWS[v].axis[d]);
-                    s->low[v][d] = fmin(s->low[v][d], at);
-                    s->high[v][d] = fmax(s->high[v][d], at);
+                    sc->low[v][d] = fmin(sc->low[v][d], at);
+                    sc->high[v][d] = fmax(sc->high[v][d], at);
                 }
-            if (p->values && isfinite(p->values[i])) s->limit = fmax(s->limit, fabs(p->values[i]));
+            if (p->values && isfinite(p->values[i]))
+                sc->limit = fmax(sc->limit, fabs(p->values[i]));
         }
     }
 }
 
-static void place(scene *s)
+/* Finds the scale, the sizes of the panels and the colours. */
+static void scene_place(scene *sc)
 {
     double widest = 0, longest = 0;
     for (int v = 0; v < N_VIEWS; v++) {
-        widest = fmax(widest, s->high[v][0] - s->low[v][0]);
-        for (int d = 0; d < 2; d++) longest = fmax(longest, s->high[v][d] - s->low[v][d]);
+        widest = fmax(widest, sc->high[v][0] - sc->low[v][0]);
+        for (int d = 0; d < 2; d++) longest = fmax(longest, sc->high[v][d] - sc->low[v][d]);
     }
     if (!(longest > 0)) longest = widest = 1;
-    s->pixels = PANEL / longest;
-    s->width = (int)fmax(220, ceil(widest * s->pixels) + 8);
+    sc->pixels = PANEL / longest;
+    sc->width = (int)fmax(220, ceil(widest * sc->pixels) + 8);
     for (int v = 0; v < N_VIEWS; v++)
-        s->height[v] = (int)fmax(40, ceil((s->high[v][1] - s->low[v][1]) * s->pixels) + 40);
-    if (!(s->limit > 0)) s->limit = 1e-3;
+        sc->height[v] = (int)fmax(40, ceil((sc->high[v][1] - sc->low[v][1]) * sc->pixels) + 40);
+    if (!(sc->limit > 0)) sc->limit = 1e-3;
     for (int i = 0; i < N_SHADES; i++)
-        s->shade[i] = sdm_map_colour(SDM_MAP_SIGNED, -1, 1, (double)(i - MIDDLE) / MIDDLE);
+        sc->shade[i] = sdm_map_colour(SDM_MAP_SIGNED, -1, 1, (double)(i - MIDDLE) / MIDDLE);
 }
 
-/* Sums of the triangles' area vectors: normals of unnormalised length. */
+/* Adds the area vectors of the triangles at each vertex: normal[n_vert][3], not of unit length. */
 static void add_normals(const sdm_mesh *m, double *normal)
 {
     for (size_t t = 0; t < m->n_tri; t++) {
@@ -114,7 +121,8 @@ static void add_normals(const sdm_mesh *m, double *normal)
     }
 }
 
-/* Light from the upper left behind the viewer; backs of triangles are lit as their fronts. */
+/* Lambert shading with ambient light 0.42 and a light from the upper left behind the viewer. Back
+ * sides are lit like front sides. n[3] need not be of unit length. */
 static double brightness(const double n[3], const view *v)
 {
     static const double LIGHT[3] = {-0.4, 0.5, 0.76811};
@@ -124,42 +132,48 @@ static double brightness(const double n[3], const view *v)
     return length > 0 ? 0.42 + 0.58 * fmax(0, front * lit / length) : 0.42;
 }
 
-static sdm_colour colour_of(const scene *s, double value)
+static sdm_colour colour_of(const scene *sc, double value)
 {
     if (!isfinite(value)) return (sdm_colour){160, 160, 160};
-    return s->shade[(int)lround((fmax(-1, fmin(1, value / s->limit)) + 1) * MIDDLE)];
+    return sc->shade[(int)lround((fmax(-1, fmin(1, value / sc->limit)) + 1) * MIDDLE)];
 }
 
-/* A corner on its way to the raster: place, depth, what is interpolated. */
+/* A corner of a triangle: position in samples, depth towards the viewer in mm, and the quantities
+ * that are interpolated. */
 typedef struct corner {
     double x, y, z, value, normal[3];
 } corner;
 
-static void draw_triangle(const scene *s, raster *r, const view *v, const corner c[3], bool plain)
+/* Renders a triangle; plain: in one colour for all values. */
+static void draw_triangle(const scene *sc, raster *r, const view *v, const corner c[3], bool plain)
 {
     const double area =
         (c[1].x - c[0].x) * (c[2].y - c[0].y) - (c[2].x - c[0].x) * (c[1].y - c[0].y);
     if (!(fabs(area) > 0)) return;
+    // the bounding box in samples
     const int x0 = (int)fmax(0, floor(fmin(c[0].x, fmin(c[1].x, c[2].x)))),
               x1 = (int)fmin(r->w - 1, ceil(fmax(c[0].x, fmax(c[1].x, c[2].x)))),
               y0 = (int)fmax(0, floor(fmin(c[0].y, fmin(c[1].y, c[2].y)))),
               y1 = (int)fmin(r->h - 1, ceil(fmax(c[0].y, fmax(c[1].y, c[2].y))));
     for (int y = y0; y <= y1; y++)
         for (int x = x0; x <= x1; x++) {
+            // barycentric coordinates
             const double px = x + 0.5, py = y + 0.5;
             double b[3];
             b[1] = ((px - c[0].x) * (c[2].y - c[0].y) - (c[2].x - c[0].x) * (py - c[0].y)) / area;
             b[2] = ((c[1].x - c[0].x) * (py - c[0].y) - (px - c[0].x) * (c[1].y - c[0].y)) / area;
             b[0] = 1 - b[1] - b[2];
             if (!(b[0] >= 0 && b[1] >= 0 && b[2] >= 0)) continue;
+            // only in front of what has been drawn
             const size_t at = (size_t)y * (size_t)r->w + (size_t)x;
             const double z = b[0] * c[0].z + b[1] * c[1].z + b[2] * c[2].z;
             if (!(z > r->depth[at])) continue;
+            // colour of the interpolated value, brightness by the interpolated normal
             double n[3], value = 0;
             for (int d = 0; d < 3; d++)
                 n[d] = b[0] * c[0].normal[d] + b[1] * c[1].normal[d] + b[2] * c[2].normal[d];
             for (int k = 0; k < 3; k++) value += b[k] * c[k].value;
-            const sdm_colour base = plain ? (sdm_colour){214, 208, 196} : colour_of(s, value);
+            const sdm_colour base = plain ? (sdm_colour){214, 208, 196} : colour_of(sc, value);
             const double light = brightness(n, v);
             r->depth[at] = z;
             r->rgb[3 * at] = (uint8_t)(base.r * light + 0.5);
@@ -168,13 +182,14 @@ static void draw_triangle(const scene *s, raster *r, const view *v, const corner
         }
 }
 
-static void draw_surface(const scene *s, raster *r, int view_index, const sdm_picture_surface *p,
+/* Renders a surface in one view. */
+static void draw_surface(const scene *sc, raster *r, int view_index, const sdm_picture_surface *p,
                          const double *normal)
 {
     const view *v = &VIEWS[view_index];
-    const double scale = s->pixels * FINE,
-                 middle[2] = {0.5 * (s->low[view_index][0] + s->high[view_index][0]),
-                              0.5 * (s->low[view_index][1] + s->high[view_index][1])};
+    const double scale = sc->pixels * FINE,
+                 middle[2] = {0.5 * (sc->low[view_index][0] + sc->high[view_index][0]),
+                              0.5 * (sc->low[view_index][1] + sc->high[view_index][1])};
     for (size_t t = 0; t < p->mesh->n_tri; t++) {
         corner c[3];
         for (size_t k = 0; k < 3; k++) {
@@ -186,77 +201,74 @@ static void draw_surface(const scene *s, raster *r, int view_index, const sdm_pi
             c[k].value = p->values ? p->values[i] : 0;
             memcpy(c[k].normal, normal + 3 * i, sizeof c[k].normal);
         }
-        draw_triangle(s, r, v, c, !p->values);
+        draw_triangle(sc, r, v, c, !p->values);
     }
 }
 
-/* Averages the samples of each pixel over the white ground. */
-static void put_raster(sdm_canvas *canvas, const raster *r, int left, int top)
+/* The mean of the samples of a pixel. */
+static sdm_colour raster_pixel(const void *user, int x, int y)
 {
-    for (int y = 0; y < r->h / FINE; y++)
-        for (int x = 0; x < r->w / FINE; x++) {
-            int sum[3] = {0, 0, 0};
-            for (int k = 0; k < FINE * FINE; k++) {
-                const size_t at =
-                    (size_t)(y * FINE + k / FINE) * (size_t)r->w + (size_t)(x * FINE + k % FINE);
-                for (int d = 0; d < 3; d++) sum[d] += r->rgb[3 * at + (size_t)d];
-            }
-            uint8_t *to =
-                canvas->rgb + 3 * ((size_t)(top + y) * (size_t)canvas->w + (size_t)(left + x));
-            for (int d = 0; d < 3; d++)
-                to[d] = (uint8_t)((sum[d] + FINE * FINE / 2) / (FINE * FINE));
-        }
+    const raster *r = user;
+    int sum[3] = {0, 0, 0};
+    uint8_t mean[3];
+    for (int k = 0; k < FINE * FINE; k++) {
+        const size_t at =
+            (size_t)(y * FINE + k / FINE) * (size_t)r->w + (size_t)(x * FINE + k % FINE);
+        for (int d = 0; d < 3; d++) sum[d] += r->rgb[3 * at + (size_t)d];
+    }
+    for (int d = 0; d < 3; d++) mean[d] = (uint8_t)((sum[d] + FINE * FINE / 2) / (FINE * FINE));
+    return (sdm_colour){mean[0], mean[1], mean[2]};
 }
 
-static sdm_status draw_panel(const scene *s, sdm_canvas *canvas, size_t column, int v, int left,
-                             int top, sdm_error *err)
+static sdm_status draw_panel(const scene *sc, sdm_canvas *c, size_t column, int v, sdm_box box,
+                             sdm_error *err)
 {
-    const sdm_picture_surface *p = &s->surfaces[column];
-    raster r = {.w = s->width * FINE, .h = s->height[v] * FINE};
+    const sdm_picture_surface *p = &sc->surfaces[column];
+    raster r = {.w = box.w * FINE, .h = box.h * FINE};
     const size_t n = (size_t)r.w * (size_t)r.h;
     double *normal = NULL;
-    sdm_status e = SDM_ALLOC(&r.depth, n, "depth of a picture", err);
-    if (!e) e = SDM_ALLOC(&r.rgb, 3 * n, "panel of a picture", err);
-    if (!e) e = SDM_ALLOC(&normal, 3 * p->mesh->n_vert, "normals of a picture", err);
-    if (!e) {
+    sdm_status s = SDM_ALLOC(&r.depth, n, "depth of a picture", err);
+    if (!s) s = SDM_ALLOC(&r.rgb, 3 * n, "panel of a picture", err);
+    if (!s) s = SDM_ALLOC(&normal, 3 * p->mesh->n_vert, "normals of a picture", err);
+    if (!s) {
         for (size_t i = 0; i < n; i++) r.depth[i] = -INFINITY;
         memset(r.rgb, 255, 3 * n);
         add_normals(p->mesh, normal);
-        draw_surface(s, &r, v, p, normal);
-        put_raster(canvas, &r, left, top);
+        draw_surface(sc, &r, v, p, normal);
+        sdm_canvas_image(c, box, raster_pixel, &r);
     }
     sdm_free(r.depth);
     sdm_free(r.rgb);
     sdm_free(normal);
-    return e;
+    return s;
 }
 
-static sdm_status draw(const scene *s, sdm_canvas *c, const char *caption, sdm_error *err)
+static sdm_status draw_scene(const scene *sc, sdm_canvas *c, int bar_top, const char *caption,
+                             sdm_error *err)
 {
     const sdm_type title = {.size = 13, .align = SDM_CENTRE, .bold = true, .colour = SDM_INK};
-    const double unit = s->limit < 0.1 ? 1000 : 1;
+    const double unit = sc->limit < 0.1 ? 1000 : 1;
     char text[160];
-    sdm_status e = SDM_OK;
-    for (size_t k = 0; k < s->n && !e; k++) {
-        const int left = SIDE + (int)k * (s->width + GAP);
+    sdm_status s = SDM_OK;
+    for (size_t k = 0; k < sc->n && !s; k++) {
+        const int left = SIDE + (int)k * (sc->width + GAP);
         int top = TOP;
-        sdm_canvas_text(c, left + s->width / 2.0, TOP - 18, title,
-                        s->surfaces[k].title ? s->surfaces[k].title : "");
-        for (int v = 0; v < N_VIEWS && !e; v++) {
-            e = draw_panel(s, c, k, v, left, top, err);
+        sdm_canvas_text(c, left + sc->width / 2.0, TOP - 18, title,
+                        sc->surfaces[k].title ? sc->surfaces[k].title : "");
+        for (int v = 0; v < N_VIEWS && !s; v++) {
+            const sdm_box box = {left, top, sc->width, sc->height[v]};
+            s = draw_panel(sc, c, k, v, box, err);
             sdm_canvas_text(c, left + 6, top + 14, (sdm_type){.size = 9, .colour = SDM_INK_LIGHT},
                             VIEWS[v].name);
-            if (k == 0 && v == 0)
-                sdm_panel_scale_bar(c, (sdm_box){left, top, s->width, s->height[v]}, s->pixels);
-            top += s->height[v] + GAP;
+            if (k == 0 && v == 0) sdm_panel_scale_bar(c, box, sc->pixels);
+            top += sc->height[v] + GAP;
         }
-        if (!s->surfaces[k].values) continue;
-        const sdm_box bar = {left + s->width / 10, c->h - FOOT, s->width - 2 * (s->width / 10),
-                             BAR};
+        if (!sc->surfaces[k].values) continue;
+        const sdm_box bar = {left + sc->width / 10, bar_top, sc->width - 2 * (sc->width / 10), BAR};
         snprintf(text, sizeof text, "%.120s (%s)", caption, unit > 1 ? "\xC2\xB5m" : "mm");
-        sdm_colour_bar(c, bar, SDM_MAP_SIGNED, -s->limit * unit, s->limit * unit, text);
+        sdm_colour_bar(c, bar, SDM_MAP_SIGNED, -sc->limit * unit, sc->limit * unit, text);
     }
-    return e;
+    return s;
 }
 
 sdm_status sdm_picture_surfaces(const char *path, const sdm_picture_surface *surfaces, size_t n,
@@ -269,19 +281,19 @@ sdm_status sdm_picture_surfaces(const char *path, const sdm_picture_surface *sur
     for (size_t k = 0; k < n; k++) {
         if (!surfaces[k].mesh)
             return sdm_fail(err, SDM_E_ARG, "surface %zu of the picture has no mesh", k);
-        sdm_audit audit; /* indices and coordinates */
-        const sdm_status e = sdm_mesh_audit(surfaces[k].mesh, &audit, err);
-        if (e) return sdm_fail_in(err, e, "surface %zu of the picture", k);
+        sdm_audit audit; // refuses bad indices and coordinates that are not finite
+        const sdm_status s = sdm_mesh_audit(surfaces[k].mesh, &audit, err);
+        if (s) return sdm_fail_in(err, s, "surface %zu of the picture", k);
     }
-    scene s = {.surfaces = surfaces, .n = n};
-    sdm_canvas c;
-    measure(&s);
-    place(&s);
-    const int h = TOP + s.height[0] + GAP + s.height[1] + GAP + FOOT;
-    sdm_status e = sdm_canvas_create(&c, 2 * SIDE + (int)n * (s.width + GAP) - GAP, h, err);
-    if (e) return e;
-    e = draw(&s, &c, caption, err);
-    if (!e) e = sdm_png_write(path, &c, err);
-    sdm_canvas_dispose(&c);
-    return e;
+    scene sc = {.surfaces = surfaces, .n = n};
+    sdm_canvas *c = NULL;
+    scene_measure(&sc);
+    scene_place(&sc);
+    const int h = TOP + sc.height[0] + GAP + sc.height[1] + GAP + FOOT;
+    sdm_status s = sdm_canvas_create(path, 2 * SIDE + (int)n * (sc.width + GAP) - GAP, h, &c, err);
+    if (s) return s;
+    s = draw_scene(&sc, c, h - FOOT, caption, err);
+    if (!s) return sdm_canvas_finish(c, err);
+    sdm_canvas_discard(c);
+    return s;
 }

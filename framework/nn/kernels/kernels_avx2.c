@@ -14,7 +14,7 @@ static inline __m256 load_half(const uint16_t *p)
 #define LOAD_PAIRS(p)                                                                              \
     ((veci)_mm256_cvtepi8_epi16(_mm_loadu_si128((const __m128i *)(const void *)(p))))
 #define MADD(a, b) ((veci)_mm256_madd_epi16((__m256i)(a), (__m256i)(b)))
-#define LARGER(a, b) ((veci)_mm256_max_epi32((__m256i)(a), (__m256i)(b)))
+#define MAX_VECI(a, b) ((veci)_mm256_max_epi32((__m256i)(a), (__m256i)(b)))
 #define ROUND_TO_SHORTS(v) round_to_shorts(v)
 static inline __m128i round_to_shorts(__m256 v)
 {
@@ -28,8 +28,8 @@ static inline float sum_lanes(__m256 v)
     sum = _mm_add_ps(sum, _mm_movehl_ps(sum, sum));
     return _mm_cvtss_f32(_mm_add_ss(sum, _mm_movehdup_ps(sum)));
 }
-#define SMALLER_OF(a, b) _mm256_min_ps(a, b)
-#define LARGER_OF(a, b) _mm256_max_ps(a, b)
+#define MIN_VEC(a, b) _mm256_min_ps(a, b)
+#define MAX_VEC(a, b) _mm256_max_ps(a, b)
 #define FMA(a, b, c) _mm256_fmadd_ps(a, b, c)
 #define STREAM(p, v) _mm256_stream_ps(p, v)
 #include "kernels_simd.h"

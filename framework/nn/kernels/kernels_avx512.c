@@ -1,4 +1,4 @@
-/* Kernels for AVX-512; a part of kernels_avx512vnni.c too. */
+/* Kernels for AVX-512; kernels_avx512vnni.c includes this file. */
 #include <immintrin.h>
 #include <stdint.h>
 
@@ -16,11 +16,11 @@ static inline __m512 load_half(const uint16_t *p)
 #define LOAD_PAIRS(p)                                                                              \
     ((veci)_mm512_cvtepi8_epi16(_mm256_loadu_si256((const __m256i *)(const void *)(p))))
 #define MADD(a, b) ((veci)_mm512_madd_epi16((__m512i)(a), (__m512i)(b)))
-#define AHEAD 4096
+#define PREFETCH_BYTES 4096
 #define ROUND_TO_SHORTS(v) _mm512_cvtepi32_epi16(_mm512_cvtps_epi32(v))
 #define SUM_LANES(v) _mm512_reduce_add_ps(v)
-#define SMALLER_OF(a, b) _mm512_min_ps(a, b)
-#define LARGER_OF(a, b) _mm512_max_ps(a, b)
+#define MIN_VEC(a, b) _mm512_min_ps(a, b)
+#define MAX_VEC(a, b) _mm512_max_ps(a, b)
 #define FMA(a, b, c) _mm512_fmadd_ps(a, b, c)
 #define STREAM(p, v) _mm512_stream_ps(p, v)
 #include "kernels_simd.h"

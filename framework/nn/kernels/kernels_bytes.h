@@ -1,9 +1,27 @@
-/* Kernels for weights as bytes (sdm/kernels.h), a part of kernels_simd.h. A lane of 32 bits holds
-   two neighbouring inputs of one output as integers of 16 bits. From the instruction set:
-   LOAD_PAIRS(p), bytes to such lanes, MADD(a, b), the two products of each lane added, and
-   ADD_MADD(sum, a, b), where one instruction adds them to a sum. */
+/* Kernels for integer weights: the sdm_panel_i8 and sdm_quantise functions of
+   sdm/internal/kernels.h. A lane of 32 bits holds the weights of one output for a pair of
+   neighbouring inputs, as two integers of 16 bits.
 
-// the two inputs of a lane
+   An instruction set may define, before inclusion:
+     LOAD_PAIRS(p)          VW lanes from 2 VW narrow weights (bytes) at p
+     MADD(a, b)             in each lane the sum of the two products of 16-bit integers
+     ADD_MADD(sum, a, b)    sum + MADD(a, b) in one instruction
+     FMA(a, b, c)           a * b + c in one rounding
+     ROUND_TO_SHORTS(v)     floats rounded to nearest integers of 16 bits
+     MIN_VEC, MAX_VEC       minimum and maximum of two vectors of floats
+     MAX_VECI               maximum of two vectors of signed integers
+     PREFETCH_BYTES         how far ahead of their use weights are prefetched; 0: not at all */
+
+#ifndef SDM_KERNELS_BYTES_H
+#define SDM_KERNELS_BYTES_H
+
+#include <string.h>
+
+#include "kernels_table.h"
+#include "kernels_vector.h"
+#include "sdm/internal/kernels.h"
+
+// the first and the second 16-bit integer of each lane, sign-extended
 static inline veci first_of(veci v) { return (veci)((vecu)v << 16) >> 16; }
 static inline veci second_of(veci v) { return v >> 16; }
 
@@ -26,13 +44,13 @@ static inline veci load_pairs(const int8_t *p)
 #define LOAD_PAIRS(p) load_pairs(p)
 #endif
 
-// where there is an instruction for it; left to the compiler it is used in some loops and not in
-// others
+// Explicit where the instruction exists: the compiler would contract a * b + c in some loops only,
+// and the results of different block sizes would differ.
 #ifndef FMA
 #define FMA(a, b, c) ((a) * (b) + (c))
 #endif
 
-// numbers of 16 bits
+// VW lanes of wide weights, two 16-bit integers each
 static inline veci load_wide(const int8_t *p)
 {
     veci v;
@@ -40,6 +58,7 @@ static inline veci load_wide(const int8_t *p)
     return v;
 }
 
+// all lanes: the pair of inputs at p
 static inline veci splat_pair(const int16_t *p)
 {
     int32_t pair;
@@ -47,7 +66,7 @@ static inline veci splat_pair(const int16_t *p)
     return pair - (veci){0};
 }
 
-// outputs in rows of 4, `line` floats apart
+// VW outputs in rows of SDM_PANEL_ROW floats, `line` floats apart (sdm_panel_out.line)
 static inline void store_rows(float *y, size_t line, vec v)
 {
     typedef float row __attribute__((vector_size(16)));
@@ -56,13 +75,14 @@ static inline void store_rows(float *y, size_t line, vec v)
     for (int i = 0; i < VW / 4; i++) memcpy(y + (size_t)i * line, &rows[i], sizeof *rows);
 }
 
-// what a pointer has become is not put together anew for each use
-#define STEP(p) __asm__("" : "+r"(p));
+// Keeps the pointer p in a register: stops the compiler from recomputing base + offset for each
+// use.
+#define KEEP_IN_REGISTER(p) __asm__("" : "+r"(p));
 
 #ifndef ROUND_TO_SHORTS
 typedef uint16_t vec_short __attribute__((vector_size(2 * VW)));
 
-// nearest integers of 16 bits: the last bits of a number near 2^23
+// Nearest integers of 16 bits: after adding 1.5 * 2^23 they are the low bits of the float.
 static inline vec_short round_to_shorts(vec v)
 {
     return __builtin_convertvector((vecu)(v + 12582912.0f), vec_short);
@@ -70,9 +90,9 @@ static inline vec_short round_to_shorts(vec v)
 #define ROUND_TO_SHORTS(v) round_to_shorts(v)
 #endif
 
-#ifndef SMALLER_OF
-#define SMALLER_OF(a, b) ((vec)(((veci)(a) & ((a) < (b))) | ((veci)(b) & ~((a) < (b)))))
-#define LARGER_OF(a, b) ((vec)(((veci)(a) & ((a) > (b))) | ((veci)(b) & ~((a) > (b)))))
+#ifndef MIN_VEC
+#define MIN_VEC(a, b) ((vec)(((veci)(a) & ((a) < (b))) | ((veci)(b) & ~((a) < (b)))))
+#define MAX_VEC(a, b) ((vec)(((veci)(a) & ((a) > (b))) | ((veci)(b) & ~((a) > (b)))))
 #endif
 
 static inline void store_shorts(int16_t *x, vec v)
@@ -81,38 +101,31 @@ static inline void store_shorts(int16_t *x, vec v)
     memcpy(x, &s, sizeof s);
 }
 
-// to -most .. most, NaN to one of them
-static inline vec clip(vec v, vec most) { return LARGER_OF(SMALLER_OF(v, most), -most); }
+// v clipped to -limit .. limit; NaN becomes one of the two
+static inline vec clip(vec v, vec limit) { return MAX_VEC(MIN_VEC(v, limit), -limit); }
 
-enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inputs of a panel
+// bytes of the weights of one pair of inputs in a panel
+enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL };
 
-// where register j of the outputs has its weights of a pair, in bytes from panel o / 16 on
+// Offset in bytes of the weights of output register j for one pair of inputs; pair: WIDE or NARROW.
 #define BYTES_AT(j, pair)                                                                          \
     ((size_t)((j)*VW / SDM_PANEL) * panel + (size_t)((j)*VW % SDM_PANEL) * (pair / SDM_PANEL))
 
-// of a pair of inputs in n registers
+// Bytes of the weights of one pair of inputs for n registers of outputs.
 #define BYTES_OF(n, pair) ((n)*VW / SDM_PANEL * (pair))
 
-// weights are asked for so many bytes before they are used, where several rows share them
-#ifndef AHEAD
-#define AHEAD 0
+#ifndef PREFETCH_BYTES
+#define PREFETCH_BYTES 0
 #endif
 
-// loops over registers: sums stay in registers only when they are gone before arrays are taken
-// apart
-#if defined(__clang__)
-#define EACH(i, n) _Pragma("clang loop unroll(full)") for (int i = 0; i < (n); i++)
-#else
-#define EACH(i, n) _Pragma("GCC unroll 8") for (int i = 0; i < (n); i++)
-#endif
+// Start or continue a sum with the products of a pair. ADD_MADD has a longer latency than an
+// addition: it pays only with many independent sums.
+#define BYTES_SET(many, sum, a, b) sum = (vecu)MADD(a, b)
+#define BYTES_ADD(many, sum, a, b) sum = (many) ? ADD_MADD(sum, a, b) : (sum) + (vecu)MADD(a, b)
 
-// what becomes of products: the first of their sum, or more; a sum waits longer for ADD_MADD, which
-// only many sums at a time hide
-#define SET(many, sum, a, b) sum = (vecu)MADD(a, b)
-#define ADD(many, sum, a, b) sum = (many) ? ADD_MADD(sum, a, b) : (sum) + (vecu)MADD(a, b)
-
-// acc[rows][n] `into` by the products of a pair of inputs, `pair` bytes; what there is less of
-// stays in registers, inputs or weights
+// acc[rows][n] += (into = BYTES_ADD) or = (BYTES_SET) the products of the next pair of inputs,
+// whose weights have `pair` bytes in each panel. The smaller set, inputs or weights, stays in
+// registers.
 #define BYTES_PAIR(rows, n, into, pair, load_pair)                                                 \
     do {                                                                                           \
         if (rows < n) {                                                                            \
@@ -132,14 +145,15 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL }; // bytes of a pair of inp
                 EACH(j, n) into((rows) * (n) >= 4, acc[i][j], s, weight[j]);                       \
             }                                                                                      \
         }                                                                                          \
-        if (AHEAD && rows > 1) EACH(l, BYTES_OF(n, pair) / 64) __builtin_prefetch(ahead + 64 * l); \
-        ahead += BYTES_OF(n, pair);                                                                \
+        if (PREFETCH_BYTES && rows > 1)                                                            \
+            EACH(l, BYTES_OF(n, pair) / 64) __builtin_prefetch(prefetch + 64 * l);                 \
+        prefetch += BYTES_OF(n, pair);                                                             \
         w += pair, x += 2;                                                                         \
     } while (0)
 
 static const float no_mean[8 * VW] = {0};
 
-// acc[rows][n] to what sdm_panel_out asks for, from output o on
+// acc[rows][n] times scales to the floats of *to (sdm_panel_out), from output o on.
 #define BYTES_NUMBERS(rows, n)                                                                     \
     {                                                                                              \
         const size_t line = to->line, n_mean = to->n_mean;                                         \
@@ -148,24 +162,25 @@ static const float no_mean[8 * VW] = {0};
         EACH(i, rows)                                                                              \
         {                                                                                          \
             const vec s = splat(scale[i]);                                                         \
-            if (i == rows - 1 && i > 0 && to->rest) break;                                         \
+            if (i == rows - 1 && i > 0 && to->residual) break;                                     \
             if ((size_t)i >= n_mean) mean = no_mean;                                               \
             EACH(j, n)                                                                             \
             {                                                                                      \
                 vec v =                                                                            \
                     FMA(s, __builtin_convertvector((veci)acc[i][j], vec), load(mean + j * VW));    \
-                if (i == 0 && rows > 1 && to->rest)                                                \
+                if (i == 0 && rows > 1 && to->residual)                                            \
                     v = FMA(splat(scale[rows - 1]),                                                \
                             __builtin_convertvector((veci)acc[rows - 1][j], vec), v);              \
                 store_rows(y + (size_t)(j * VW / 4) * line, line, v);                              \
             }                                                                                      \
             y += ld;                                                                               \
-            STEP(y)                                                                                \
+            KEEP_IN_REGISTER(y)                                                                    \
         }                                                                                          \
     }
+// acc[rows][n] times scales and factors to the integers of *to, from output o on.
 #define BYTES_INTEGERS(rows, n)                                                                    \
     {                                                                                              \
-        const vec most = splat((float)to->limit);                                                  \
+        const vec limit = splat((float)to->limit);                                                 \
         const float *factor = to->factor + o;                                                      \
         int16_t *q = to->integers + o;                                                             \
         EACH(i, rows)                                                                              \
@@ -174,14 +189,15 @@ static const float no_mean[8 * VW] = {0};
             EACH(j, n)                                                                             \
             {                                                                                      \
                 const vec v = s * __builtin_convertvector((veci)acc[i][j], vec);                   \
-                store_shorts(q + j * VW, clip(v * load(factor + j * VW), most));                   \
+                store_shorts(q + j * VW, clip(v * load(factor + j * VW), limit));                  \
             }                                                                                      \
             q += ld;                                                                               \
-            STEP(q)                                                                                \
+            KEEP_IN_REGISTER(q)                                                                    \
         }                                                                                          \
     }
 
-// `rows` rows of x times `n` registers of outputs at a time, from output o on; where that ends
+// Products of `rows` rows for all outputs from o on, n registers at a time; wide, narrow: numbers
+// of pairs. Returns the first output that is left.
 #define BYTES_BLOCK(rows, n)                                                                       \
     static size_t bytes_##rows##x##n(size_t o, size_t outputs, size_t wide, size_t narrow,         \
                                      const int8_t *panels, const int16_t *inputs, size_t ldx,      \
@@ -190,17 +206,18 @@ static const float no_mean[8 * VW] = {0};
         const size_t panel = wide * WIDE + narrow * NARROW, ld = to->ld;                           \
         for (; o + n * VW <= outputs; o += n * VW) {                                               \
             const int8_t *w = panels + o / SDM_PANEL * panel + o % SDM_PANEL * (WIDE / SDM_PANEL); \
-            const int8_t *ahead = panels + o / SDM_PANEL * panel + AHEAD;                          \
+            const int8_t *prefetch = panels + o / SDM_PANEL * panel + PREFETCH_BYTES;              \
             const int16_t *x = inputs;                                                             \
             vecu acc[rows][n];                                                                     \
             if (wide)                                                                              \
-                BYTES_PAIR(rows, n, SET, WIDE, load_wide);                                         \
+                BYTES_PAIR(rows, n, BYTES_SET, WIDE, load_wide);                                   \
             else                                                                                   \
                 EACH(i, rows) EACH(j, n) acc[i][j] = (vecu){0};                                    \
-            for (size_t p = 1; p < wide; p++) BYTES_PAIR(rows, n, ADD, WIDE, load_wide);           \
+            for (size_t p = 1; p < wide; p++) BYTES_PAIR(rows, n, BYTES_ADD, WIDE, load_wide);     \
             w -= o % SDM_PANEL * ((WIDE - NARROW) / SDM_PANEL);                                    \
             UNROLL(2)                                                                              \
-            for (size_t p = 0; p < narrow; p++) BYTES_PAIR(rows, n, ADD, NARROW, LOAD_PAIRS);      \
+            for (size_t p = 0; p < narrow; p++)                                                    \
+                BYTES_PAIR(rows, n, BYTES_ADD, NARROW, LOAD_PAIRS);                                \
             if (to->y)                                                                             \
                 BYTES_NUMBERS(rows, n)                                                             \
             else                                                                                   \
@@ -211,8 +228,8 @@ static const float no_mean[8 * VW] = {0};
 
 #define BYTES_STEP(rows, n) o = bytes_##rows##x##n(o, outputs, wide, narrow, w, x, ldx, scale, to);
 
-// eight registers of 16 outputs would be eight panels, more places than the processor reads ahead
-// at a time
+// Not with 16 lanes: eight registers would be eight panels, hence more concurrent streams of memory
+// than the hardware prefetcher follows.
 #if VW < 16
 BYTES_BLOCK(1, 8)
 #define BYTES_EIGHT(rows) BYTES_STEP(rows, 8)
@@ -235,6 +252,7 @@ BYTES_BLOCK(5, 1)
 BYTES_BLOCK(6, 2)
 BYTES_BLOCK(6, 1)
 
+// all outputs of up to 6 rows
 static void bytes_rows(size_t rows, size_t outputs, size_t wide, size_t narrow, const int8_t *w,
                        const int16_t *x, size_t ldx, const float *scale, const sdm_panel_out *to)
 {
@@ -271,7 +289,7 @@ static void bytes_rows(size_t rows, size_t outputs, size_t wide, size_t narrow, 
     }
 }
 
-// outputs from row i and output o on
+// the destination of row i and output o, as a destination that begins there
 static inline sdm_panel_out out_from(const sdm_panel_out *to, size_t i, size_t o)
 {
     sdm_panel_out at = *to;
@@ -281,7 +299,7 @@ static inline sdm_panel_out out_from(const sdm_panel_out *to, size_t i, size_t o
     return at;
 }
 
-// as panel_f32(): a few panels for all rows, then the next
+// As panel_f32(): a few panels for all rows, then the next ones.
 static void panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w,
                      const int16_t *x, size_t ldx, const float *scale, const sdm_panel_out *to)
 {
@@ -291,11 +309,11 @@ static void panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, cons
         bytes_rows(batch, outputs, wide, narrow, w, x, ldx, scale, to);
         return;
     }
-    const size_t some = 2 * VW > SDM_PANEL ? 2 * VW : SDM_PANEL;
-    for (size_t o = 0; o < outputs; o += some, w += some / SDM_PANEL * panel)
+    const size_t step = 2 * VW > SDM_PANEL ? 2 * VW : SDM_PANEL;
+    for (size_t o = 0; o < outputs; o += step, w += step / SDM_PANEL * panel)
         for (size_t i = 0; i < batch; i += 6) {
             const sdm_panel_out at = out_from(to, i, o);
-            bytes_rows(batch - i < 6 ? batch - i : 6, outputs - o < some ? outputs - o : some, wide,
+            bytes_rows(batch - i < 6 ? batch - i : 6, outputs - o < step ? outputs - o : step, wide,
                        narrow, w, x + i * ldx, ldx, scale + i, &at);
         }
 }
@@ -314,7 +332,7 @@ static void panel_i8_blocks(size_t batch, size_t n, const sdm_panel_block *b, co
     }
 }
 
-// x[2 * pairs] += the transpose of `pairs` pairs of n outputs, `pair` bytes each
+// x[2 * pairs] += w^T * y for n outputs; pair: WIDE or NARROW.
 #define BACK_PAIRS(name, pair, load_pair)                                                          \
     static void name(size_t n, size_t pairs, size_t panel, const int8_t *w, const float *y,        \
                      float *x)                                                                     \
@@ -348,31 +366,36 @@ static void back_i8(size_t outputs, size_t n_wide, size_t k, const int8_t *w, co
     }
 }
 
+// y * factor (NULL: 1) at i .. i + VW - 1
 static inline vec product_at(size_t i, const float *y, const float *factor)
 {
     return factor ? load(y + i) * load(factor + i) : load(y + i);
 }
 
-#ifndef LARGER
-#define LARGER(a, b) (((a) & ((a) > (b))) | ((b) & ((a) <= (b))))
+#ifndef MAX_VECI
+#define MAX_VECI(a, b) (((a) & ((a) > (b))) | ((b) & ((a) <= (b))))
 #endif
 
-// magnitudes compared as integers: those of NaN and infinity are the largest
-static inline veci larger_magnitude(veci most, vec v)
+// Elementwise maximum of the magnitudes, as bits of floats. As integers they have the same order,
+// with infinity and NaN above all numbers.
+static inline veci larger_magnitude(veci largest, vec v)
 {
     const veci bits = (veci)v & 0x7fffffff;
-    return LARGER(bits, most);
+    return MAX_VECI(bits, largest);
 }
 
-// n >= VW from here on; the last register ends where they do: some are done twice
+// The functions from here to round_residual() need n >= VW. The last register ends at n - 1 and may
+// overlap the one before: its elements are computed twice.
+
+// largest magnitude of a row; infinity or NaN if an element is
 static inline float largest_of(size_t n, const float *y, const float *factor)
 {
     const size_t last = n - VW;
-    veci most = larger_magnitude((veci){0}, product_at(last, y, factor));
+    veci lanes = larger_magnitude((veci){0}, product_at(last, y, factor));
     UNROLL(4)
-    for (size_t i = 0; i < last; i += VW) most = larger_magnitude(most, product_at(i, y, factor));
+    for (size_t i = 0; i < last; i += VW) lanes = larger_magnitude(lanes, product_at(i, y, factor));
     int32_t bits = 0;
-    for (int j = 0; j < VW; j++) bits = most[j] > bits ? most[j] : bits;
+    for (int j = 0; j < VW; j++) bits = lanes[j] > bits ? lanes[j] : bits;
     float largest;
     memcpy(&largest, &bits, sizeof largest);
     return largest;
@@ -384,13 +407,13 @@ static inline void round_register(const float *y, const float *factor, float to_
     store_shorts(x + i, product_at(i, y, factor) * to_integer);
 }
 
-// returns the factor that gives them back
+// x[n] = the row rounded with the largest magnitude mapped to `limit`; returns the scale.
 static inline float round_row(size_t n, const float *y, const float *factor, float largest,
                               int limit, int16_t *x)
 {
     const float to_integer = (float)limit / largest;
-    if (!(to_integer > 0 &&
-          to_integer <= 3e38f)) { // not finite, or zero beside what a float can hold
+    // `largest` is not finite, or too small for its reciprocal: scale NaN or 0
+    if (!(to_integer > 0 && to_integer <= 3e38f)) {
         memset(x, 0, n * sizeof *x);
         return largest - largest;
     }
@@ -400,9 +423,10 @@ static inline float round_row(size_t n, const float *y, const float *factor, flo
     return largest / (float)limit;
 }
 
-// the largest of all rows first: a row then does not wait for its own
-static inline void quantise_by(size_t rows, size_t n, const float *y, size_t ldy,
-                               const float *factor, int limit, int16_t *x, size_t ldx, float *scale)
+// The maxima of all rows are found first, so that rounding a row does not wait for its own maximum.
+static inline void quantise_rows(size_t rows, size_t n, const float *y, size_t ldy,
+                                 const float *factor, int limit, int16_t *x, size_t ldx,
+                                 float *scale)
 {
     for (size_t r = 0; r < rows; r++) scale[r] = largest_of(n, y + r * ldy, factor);
     for (size_t r = 0; r < rows; r++)
@@ -416,53 +440,56 @@ static inline vec load_shorts(const int16_t *x)
     return __builtin_convertvector(__builtin_convertvector(shorts, veci), vec);
 }
 
-static inline void rest_register(const float *y, const float *factor, float to_integer, int limit,
-                                 size_t i, const int16_t *x, int16_t *rest)
+static inline void residual_register(const float *y, const float *factor, float to_integer,
+                                     int limit, size_t i, const int16_t *x, int16_t *residual)
 {
-    store_shorts(rest + i,
+    store_shorts(residual + i,
                  (product_at(i, y, factor) * to_integer - load_shorts(x + i)) * (float)limit);
 }
 
-// what round_row() left, a part of one of its integers: half of what integers may be
-static inline float round_rest(size_t n, const float *y, const float *factor, float largest,
-                               int limit, const int16_t *x, int16_t *rest)
+// residual[n] = the rounding error of round_row() in units of 1 / limit of its unit. The error is
+// at most half a unit, so that abs(residual) <= limit / 2. Returns the scale of the residual.
+static inline float round_residual(size_t n, const float *y, const float *factor, float largest,
+                                   int limit, const int16_t *x, int16_t *residual)
 {
     const float to_integer = (float)limit / largest;
     if (!(to_integer > 0 && to_integer <= 3e38f)) {
-        memset(rest, 0, n * sizeof *rest);
+        memset(residual, 0, n * sizeof *residual);
         return largest - largest;
     }
     const size_t last = n - VW;
     UNROLL(4)
-    for (size_t i = 0; i < last; i += VW) rest_register(y, factor, to_integer, limit, i, x, rest);
-    rest_register(y, factor, to_integer, limit, last, x, rest);
+    for (size_t i = 0; i < last; i += VW)
+        residual_register(y, factor, to_integer, limit, i, x, residual);
+    residual_register(y, factor, to_integer, limit, last, x, residual);
     return largest / (float)limit / (float)limit;
 }
 
-static void quantise_rest(size_t n, const float *y, const float *factor, int limit, int16_t *x,
-                          float *scale, int16_t *rest, float *rest_scale)
+static void quantise_residual(size_t n, const float *y, const float *factor, int limit, int16_t *x,
+                              float *scale, int16_t *residual, float *residual_scale)
 {
     if (n < VW) {
-        float some[VW] = {0};
+        float padded[VW] = {0};
         int16_t integers[2][VW];
-        for (size_t i = 0; i < n; i++) some[i] = factor ? y[i] * factor[i] : y[i];
-        quantise_rest(VW, some, NULL, limit, integers[0], scale, integers[1], rest_scale);
+        for (size_t i = 0; i < n; i++) padded[i] = factor ? y[i] * factor[i] : y[i];
+        quantise_residual(VW, padded, NULL, limit, integers[0], scale, integers[1], residual_scale);
         memcpy(x, integers[0], n * sizeof *x);
-        memcpy(rest, integers[1], n * sizeof *rest);
+        memcpy(residual, integers[1], n * sizeof *residual);
         return;
     }
     const float largest = largest_of(n, y, factor);
     *scale = round_row(n, y, factor, largest, limit, x);
-    *rest_scale = round_rest(n, y, factor, largest, limit, x, rest);
+    *residual_scale = round_residual(n, y, factor, largest, limit, x, residual);
 }
 
-static void quantise_few(size_t n, const float *y, const float *factor, int limit, int16_t *x,
-                         float *scale)
+// a row with n < VW, padded with zeros
+static void quantise_short(size_t n, const float *y, const float *factor, int limit, int16_t *x,
+                           float *scale)
 {
-    float some[VW] = {0};
+    float padded[VW] = {0};
     int16_t integers[VW];
-    for (size_t i = 0; i < n; i++) some[i] = factor ? y[i] * factor[i] : y[i];
-    quantise_by(1, VW, some, 0, NULL, limit, integers, 0, scale);
+    for (size_t i = 0; i < n; i++) padded[i] = factor ? y[i] * factor[i] : y[i];
+    quantise_rows(1, VW, padded, 0, NULL, limit, integers, 0, scale);
     memcpy(x, integers, n * sizeof *x);
 }
 
@@ -471,9 +498,11 @@ static void quantise(size_t rows, size_t n, const float *y, size_t ldy, const fl
 {
     if (n < VW)
         for (size_t r = 0; r < rows; r++)
-            quantise_few(n, y + r * ldy, factor, limit, x + r * ldx, scale + r);
+            quantise_short(n, y + r * ldy, factor, limit, x + r * ldx, scale + r);
     else if (factor)
-        quantise_by(rows, n, y, ldy, factor, limit, x, ldx, scale);
+        quantise_rows(rows, n, y, ldy, factor, limit, x, ldx, scale);
     else
-        quantise_by(rows, n, y, ldy, NULL, limit, x, ldx, scale);
+        quantise_rows(rows, n, y, ldy, NULL, limit, x, ldx, scale);
 }
+
+#endif

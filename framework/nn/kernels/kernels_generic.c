@@ -1,5 +1,5 @@
-/* Kernels for the baseline of the machine: SSE2 on x86-64, NEON on arm64, four-wide vectors
- * anywhere else. */
+/* Kernels for the baseline instruction set: SSE2 on x86-64, NEON on arm64, elsewhere whatever the
+   compiler makes of vectors of four floats. */
 #define TABLE sdm_kernels_generic
 #if defined(__x86_64__)
 #define ISA "sse2"

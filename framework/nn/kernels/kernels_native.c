@@ -1,5 +1,4 @@
-/* The kernels of the instruction set in use, the blocked matrix product, packing and half
- * precision. */
+/* Choice of the instruction set, the blocked matrix product, packing of weights, half precision. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -27,13 +26,14 @@ static const kernel_table *kernels(void)
 
 const char *sdm_kernels_name(void) { return kernels()->name; }
 
-// blocks of the product: A block KC x MC and B block KC x NC stay in the second-level cache (sums
-// are cut at KC: part of the result)
+// Block sizes of the matrix product: an MC x KC block of a and a KC x NC block of b fit in the
+// second-level cache. KC also fixes the order of the sums, hence the rounding of the result.
 enum { MC = 96, NC = 128, KC = 256 };
 
-static size_t least(size_t a, size_t b) { return a < b ? a : b; }
+static size_t min_size(size_t a, size_t b) { return a < b ? a : b; }
 
-// one full panel: packed[k][width]; width is a constant where this is inlined
+// One full panel: packed[k][width], element (p, i) = src[i * along + p * deep]. Callers pass a
+// constant width so that the loops are unrolled.
 static inline void pack_panel(size_t width, size_t k, const float *src, size_t along, size_t deep,
                               float *packed)
 {
@@ -45,12 +45,13 @@ static inline void pack_panel(size_t width, size_t k, const float *src, size_t a
     }
 }
 
-// packed[panels][k][width] from a view, zero beyond `count`
-static void pack(size_t count, size_t k, const float *data, size_t along, size_t deep, size_t width,
-                 float *packed)
+// All panels: packed[ceil(count / width)][k][width] from data[i * along + p * deep], i < count, p <
+// k; the last panel is padded with zeros.
+static void pack_panels(size_t count, size_t k, const float *data, size_t along, size_t deep,
+                        size_t width, float *packed)
 {
     for (size_t i0 = 0; i0 < count; i0 += width, packed += k * width) {
-        const size_t n = least(width, count - i0);
+        const size_t n = min_size(width, count - i0);
         const float *src = data + i0 * along;
         if (n < width) {
             memset(packed, 0, k * width * sizeof *packed);
@@ -65,26 +66,26 @@ static void pack(size_t count, size_t k, const float *data, size_t along, size_t
     }
 }
 
-// one MC x NC block of c over all of K
+// One block of c, m <= MC and n <= NC, over all of K.
 static void gemm_block(const kernel_table *t, size_t m, size_t n, size_t k, sdm_view a, sdm_view b,
                        bool add, float *c, size_t ldc)
 {
     _Alignas(64) float pa[MC * KC], pb[NC * KC], edge[12 * 32];
     for (size_t k0 = 0; k0 < k || k0 == 0; k0 += KC) {
-        const size_t kc = least(KC, k - k0);
-        const int keep = add || k0 > 0;
-        pack(m, kc, a.data + k0 * a.col, a.row, a.col, t->mr, pa);
-        pack(n, kc, b.data + k0 * b.row, b.col, b.row, t->nr, pb);
+        const size_t kc = min_size(KC, k - k0);
+        const int keep = add || k0 > 0; // add to c
+        pack_panels(m, kc, a.data + k0 * a.col, a.row, a.col, t->mr, pa);
+        pack_panels(n, kc, b.data + k0 * b.row, b.col, b.row, t->nr, pb);
         for (size_t j = 0; j < n; j += t->nr) {
-            const size_t nj = least(t->nr, n - j);
+            const size_t nj = min_size(t->nr, n - j);
             for (size_t i = 0; i < m; i += t->mr) {
-                const size_t mi = least(t->mr, m - i);
+                const size_t mi = min_size(t->mr, m - i);
                 float *at = c + i * ldc + j;
                 if (mi == t->mr && nj == t->nr) {
                     t->micro(kc, pa + i * kc, pb + j * kc, at, ldc, keep);
                     continue;
                 }
-                // an incomplete tile goes through a full one
+                // a tile that c cuts off is computed as a full tile in `edge`
                 if (keep)
                     for (size_t r = 0; r < mi; r++)
                         memcpy(edge + r * t->nr, at + r * ldc, nj * sizeof *at);
@@ -109,7 +110,8 @@ void sdm_gemm(size_t m, size_t n, size_t k, sdm_view a, sdm_view b, bool add, fl
         const size_t i = (size_t)(tile % rows) * MC, j = (size_t)(tile / rows) * NC;
         const sdm_view at = {a.data + i * a.row, a.row, a.col},
                        bt = {b.data + j * b.col, b.row, b.col};
-        gemm_block(t, least(MC, m - i), least(NC, n - j), k, at, bt, add, c + i * ldc + j, ldc);
+        gemm_block(t, min_size(MC, m - i), min_size(NC, n - j), k, at, bt, add, c + i * ldc + j,
+                   ldc);
     }
 }
 
@@ -154,8 +156,8 @@ void sdm_panel_back_f16(size_t outputs, size_t k, const uint16_t *w, const float
 
 size_t sdm_panel_i8_count(size_t outputs, size_t n_wide, size_t k)
 {
-    const size_t inputs = sdm_panel_even(n_wide) + sdm_panel_even(k), most = SIZE_MAX - SDM_PANEL;
-    return outputs > most || k >= SIZE_MAX / 4 || n_wide > k ||
+    const size_t inputs = sdm_panel_even(n_wide) + sdm_panel_even(k);
+    return outputs > SIZE_MAX - SDM_PANEL || k >= SIZE_MAX / 4 || n_wide > k ||
                    (inputs && sdm_panel_outputs(outputs) > SIZE_MAX / inputs)
                ? SIZE_MAX
                : sdm_panel_outputs(outputs) * inputs;
@@ -163,13 +165,13 @@ size_t sdm_panel_i8_count(size_t outputs, size_t n_wide, size_t k)
 
 int sdm_panel_i8_limit(size_t outputs, size_t k, const int16_t *w)
 {
-    int64_t most = 1;
+    int64_t largest = 1; // sum of the magnitudes of an output's weights
     for (size_t o = 0; o < outputs; o++) {
         int64_t sum = 0;
         for (size_t i = 0; i < k; i++) sum += abs(w[o * k + i]);
-        if (sum > most) most = sum;
+        if (sum > largest) largest = sum;
     }
-    const int64_t limit = INT32_MAX / most;
+    const int64_t limit = INT32_MAX / largest;
     return limit > INT16_MAX ? INT16_MAX : limit > 1 ? (int)limit : 1;
 }
 
@@ -181,8 +183,8 @@ void sdm_panel_pack_i8(size_t outputs, size_t n_wide, size_t k, const int16_t *w
             for (size_t j = o; j < o + SDM_PANEL; j++)
                 for (size_t q = i; q < i + 2; q++) {
                     const int16_t v = j < outputs && q < k ? w[j * k + q] : 0;
-                    const size_t size =
-                        i < wide ? 2 : 1; // little-endian: the first byte is all of a narrow one
+                    // little-endian: the first byte of v holds the whole narrow weight
+                    const size_t size = i < wide ? 2 : 1;
                     memcpy(panels, &v, size);
                     panels += size;
                 }
@@ -194,10 +196,10 @@ void sdm_quantise(size_t rows, size_t n, const float *y, size_t ldy, const float
     kernels()->quantise(rows, n, y, ldy, factor, limit, x, ldx, scale);
 }
 
-void sdm_quantise_rest(size_t n, const float *y, const float *factor, int limit, int16_t *x,
-                       float *scale, int16_t *rest, float *rest_scale)
+void sdm_quantise_residual(size_t n, const float *y, const float *factor, int limit, int16_t *x,
+                           float *scale, int16_t *residual, float *residual_scale)
 {
-    kernels()->quantise_rest(n, y, factor, limit, x, scale, rest, rest_scale);
+    kernels()->quantise_residual(n, y, factor, limit, x, scale, residual, residual_scale);
 }
 
 void sdm_panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w,
@@ -218,9 +220,12 @@ void sdm_panel_back_i8(size_t outputs, size_t n_wide, size_t k, const int8_t *w,
     kernels()->back_i8(sdm_panel_outputs(outputs), n_wide, k, w, y, x);
 }
 
-void sdm_put(size_t n, const float *y, float *to, bool stream) { kernels()->put(n, y, to, stream); }
+void sdm_copy(size_t n, const float *y, float *to, bool stream)
+{
+    kernels()->copy_floats(n, y, to, stream);
+}
 
-void sdm_put_end(void)
+void sdm_copy_end(void)
 {
 #if defined(__x86_64__)
     __builtin_ia32_sfence();
@@ -236,11 +241,10 @@ uint16_t sdm_half_from_float(float v)
     const uint16_t sign = (uint16_t)(bits >> 16 & 0x8000u);
     const float a = fabsf(v);
     if (!(a < 65520.0f)) return (uint16_t)(sign | (a != a ? 0x7e00u : 0x7c00u));
-    if (a < 0x1p-14f)
-        return (uint16_t)(sign | (uint16_t)lrintf(
-                                     a * 0x1p24f)); // subnormal: multiples of 2^-24, nearest even
+    // subnormal halves are multiples of 2^-24; lrintf() rounds to nearest even
+    if (a < 0x1p-14f) return (uint16_t)(sign | (uint16_t)lrintf(a * 0x1p24f));
     memcpy(&bits, &a, sizeof bits);
-    bits += 0xfffu + (bits >> 13 & 1); // nearest even at bit 13
+    bits += 0xfffu + (bits >> 13 & 1); // round to nearest even at bit 13
     return (uint16_t)(sign | (uint16_t)((bits >> 13) - (112u << 10)));
 }
 

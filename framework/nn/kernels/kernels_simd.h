@@ -1,40 +1,17 @@
 /* The kernels, written once with the compiler's vector types and compiled once for each instruction
-   set. Before inclusion: TABLE (name of the kernel_table), ISA (text), VW (floats in a register),
-   MR (rows of the register tile). */
+   set. Before inclusion, define TABLE (name of the kernel_table), ISA (name of the instruction
+   set), VW (floats in a register) and MR (rows of the register tile of the matrix product);
+   optionally LOAD_HALF with load_half(), STREAM(p, v) (a store that bypasses the caches), and the
+   macros of kernels_vector.h and kernels_bytes.h. */
 #include <string.h>
 
+#include "kernels_bytes.h"
 #include "kernels_table.h"
+#include "kernels_vector.h"
 #include "sdm/internal/kernels.h"
 
-#define NV 2 /* registers in a row of the register tile */
+#define NV 2 /* registers along a row of the register tile */
 #define NR (NV * VW)
-
-typedef float vec __attribute__((vector_size(4 * VW)));
-typedef float vec_u __attribute__((vector_size(4 * VW), aligned(4)));
-typedef int32_t veci __attribute__((vector_size(4 * VW)));
-typedef uint32_t vecu __attribute__((vector_size(4 * VW)));
-
-#define PRAGMA(text) _Pragma(#text)
-#if defined(__clang__)
-#define UNROLL(n) PRAGMA(clang loop unroll_count(n))
-#else
-#define UNROLL(n) PRAGMA(GCC unroll n)
-#endif
-
-static inline vec load(const float *p) { return *(const vec_u *)p; }
-static inline void store(float *p, vec v) { *(vec_u *)p = v; }
-static inline vec splat(float v) { return v - (vec){0}; }
-
-#ifndef SUM_LANES
-static inline float sum_lanes(vec v)
-{
-    float each[VW], total = 0;
-    store(each, v);
-    for (int j = 0; j < VW; j++) total += each[j];
-    return total;
-}
-#define SUM_LANES(v) sum_lanes(v)
-#endif
 
 static void micro(size_t k, const float *a, const float *b, float *c, size_t ldc, int add)
 {
@@ -57,8 +34,8 @@ static void micro(size_t k, const float *a, const float *b, float *c, size_t ldc
 #ifndef LOAD_HALF
 typedef uint16_t vech __attribute__((vector_size(2 * VW)));
 
-// exact for every half: the exponent is moved by a multiplication, which also makes subnormals
-// right
+// Half to float, exact. The bits of the half, shifted to their places in a float, are too small by
+// 2^112 because of the different exponent bias; the multiplication also handles subnormals.
 static inline vec load_half(const uint16_t *p)
 {
     vech packed;
@@ -70,7 +47,7 @@ static inline vec load_half(const uint16_t *p)
     v *= 0x1p112f;
     vecu bits;
     memcpy(&bits, &v, sizeof v);
-    // an exponent of all ones stays one: infinity and NaN
+    // infinity and NaN: an exponent of all ones stays all ones
     bits |= (vecu)((h & 0x7c00u) == 0x7c00u) & 0x7f800000u;
     bits |= sign;
     memcpy(&v, &bits, sizeof v);
@@ -78,10 +55,10 @@ static inline vec load_half(const uint16_t *p)
 }
 #endif
 
-// where register j of the outputs has its weights, in elements from panel o / 16 on
+// Offset of the weights of output register j (outputs j * VW .. j * VW + VW - 1), in elements.
 #define PANEL_AT(j) ((size_t)((j)*VW / SDM_PANEL) * SDM_PANEL * k + (size_t)((j)*VW % SDM_PANEL))
 
-// `rows` rows of x times `n` registers of outputs
+// `rows` rows of x times the weights of n registers of outputs.
 #define PANEL_BLOCK(type, suffix, load_weights, rows, n)                                           \
     static void block_##suffix##_##rows##x##n(size_t k, const type *w, const float *x, size_t ldx, \
                                               float *y, size_t ldy)                                \
@@ -101,7 +78,8 @@ static inline vec load_half(const uint16_t *p)
             for (int j = 0; j < n; j++) store(y + (size_t)i * ldy + (size_t)(j * VW), acc[i][j]);  \
     }
 
-// as many registers at a time as keep the multipliers busy and the sums in registers
+// All outputs from o on, n registers at a time. For each number of rows the largest n is the one
+// that hides the latency of the multiply-adds and still keeps all sums in registers.
 #define PANEL_STEP(suffix, rows, n)                                                                \
     for (; o + n * VW <= outputs; o += n * VW)                                                     \
         block_##suffix##_##rows##x##n(k, w + o / SDM_PANEL * SDM_PANEL * k + o % SDM_PANEL, x,     \
@@ -160,7 +138,8 @@ static inline vec load_half(const uint16_t *p)
         }                                                                                          \
     }                                                                                              \
                                                                                                    \
-    /* a few panels for all rows, then the next: they stay in the first-level cache */             \
+    /* For many rows: a few panels for all rows, then the next ones, so that the weights stay in   \
+   the first-level cache. */                                                                       \
     static void panel_##suffix(size_t batch, size_t outputs, size_t k, const type *w,              \
                                const float *x, size_t ldx, float *y, size_t ldy)                   \
     {                                                                                              \
@@ -168,18 +147,18 @@ static inline vec load_half(const uint16_t *p)
             rows_##suffix(batch, outputs, k, w, x, ldx, y, ldy);                                   \
             return;                                                                                \
         }                                                                                          \
-        const size_t some = 2 * VW > SDM_PANEL ? 2 * VW : SDM_PANEL;                               \
-        for (size_t o = 0; o < outputs; o += some, w += some * k)                                  \
+        const size_t step = 2 * VW > SDM_PANEL ? 2 * VW : SDM_PANEL;                               \
+        for (size_t o = 0; o < outputs; o += step, w += step * k)                                  \
             for (size_t i = 0; i < batch; i += 6)                                                  \
                 rows_##suffix(batch - i < 6 ? batch - i : 6,                                       \
-                              outputs - o < some ? outputs - o : some, k, w, x + i * ldx, ldx,     \
+                              outputs - o < step ? outputs - o : step, k, w, x + i * ldx, ldx,     \
                               y + i * ldy + o, ldy);                                               \
     }                                                                                              \
                                                                                                    \
     static void back_##suffix(size_t outputs, size_t k, const type *w, const float *y, float *x)   \
     {                                                                                              \
         memset(x, 0, k * sizeof *x);                                                               \
-        /* four panels at a time: the sum over the lanes is what costs */                          \
+        /* Four panels at a time, because the sum over the lanes of a register is expensive. */    \
         for (size_t o = 0; o < outputs; o += 4 * SDM_PANEL, w += 4 * SDM_PANEL * k) {              \
             const size_t n = outputs - o < 4 * SDM_PANEL ? outputs - o : 4 * SDM_PANEL;            \
             for (size_t p = 0; p < k; p++) {                                                       \
@@ -195,10 +174,8 @@ static inline vec load_half(const uint16_t *p)
 PANEL(float, f32, load)
 PANEL(uint16_t, f16, load_half)
 
-#include "kernels_bytes.h"
-
-// exp by 2^n times a polynomial of degree 6 on [-ln 2 / 2, ln 2 / 2] (coefficients: Taylor,
-// adjusted by the Cephes library's expf)
+// exp(x) = 2^n exp(r), n = x / ln 2 rounded, abs(r) <= ln 2 / 2. exp(r) is a polynomial of degree 7
+// with the coefficients of expf() in the Cephes library (Moshier). x is clamped to -87 .. 88.
 static inline vec exp_vec(vec x)
 {
     const vec lo = splat(-87.0f), hi = splat(88.0f);
@@ -210,8 +187,8 @@ static inline vec exp_vec(vec x)
     memcpy(&b2, &hi, sizeof hi);
     bits = (bits & ~(vecu)above) | (b2 & (vecu)above);
     memcpy(&x, &bits, sizeof x);
-    const vec shifted = x * 1.44269504088896341f + 12582912.0f,
-              n = shifted - 12582912.0f; // round to the nearest integer
+    // adding 1.5 * 2^23 rounds to the nearest integer
+    const vec shifted = x * 1.44269504088896341f + 12582912.0f, n = shifted - 12582912.0f;
     const vec r = (x - n * 0.693359375f) + n * 2.12194440e-4f;
     vec p = splat(1.9875691500e-4f);
     p = p * r + 1.3981999507e-3f;
@@ -221,8 +198,8 @@ static inline vec exp_vec(vec x)
     p = p * r + 5.0000001201e-1f;
     p = p * r * r + r + 1.0f;
     memcpy(&bits, &shifted, sizeof shifted);
-    const vecu scale = ((bits & 0x3ffu) + 127u)
-                       << 23; // low bits of `shifted` hold n in two's complement
+    // the low bits of `shifted` hold n in two's complement; scale = bits of 2^n
+    const vecu scale = ((bits & 0x3ffu) + 127u) << 23;
     vec s;
     memcpy(&s, &scale, sizeof s);
     return p * s;
@@ -233,15 +210,16 @@ static void exp_all(size_t n, const float *x, float *y)
     size_t i = 0;
     for (; i + VW <= n; i += VW) store(y + i, exp_vec(load(x + i)));
     if (i == n) return;
-    float rest[VW] = {0};
-    memcpy(rest, x + i, (n - i) * sizeof *x);
-    store(rest, exp_vec(load(rest)));
-    memcpy(y + i, rest, (n - i) * sizeof *x);
+    float tail[VW] = {0};
+    memcpy(tail, x + i, (n - i) * sizeof *x);
+    store(tail, exp_vec(load(tail)));
+    memcpy(y + i, tail, (n - i) * sizeof *x);
 }
 
 #ifdef STREAM
-// a quarter of a cache line at a time where it is not filled: an ordinary store would read it first
-static inline void put_past(size_t n, const float *y, float *to)
+// Streaming copy. The ends of `to` that do not fill a register are streamed in quarters of a cache
+// line: an ordinary store would read the line into the cache first.
+static inline void copy_streaming(size_t n, const float *y, float *to)
 {
     size_t i = -(uintptr_t)to / sizeof *to % 4;
     if (n < i) i = n;
@@ -255,11 +233,11 @@ static inline void put_past(size_t n, const float *y, float *to)
 }
 #endif
 
-static void put(size_t n, const float *y, float *to, bool stream)
+static void copy_floats(size_t n, const float *y, float *to, bool stream)
 {
 #ifdef STREAM
     if (stream) {
-        put_past(n, y, to);
+        copy_streaming(n, y, to);
         return;
     }
 #else
@@ -280,6 +258,6 @@ const kernel_table TABLE = {.name = ISA,
                             .panel_i8_blocks = panel_i8_blocks,
                             .back_i8 = back_i8,
                             .quantise = quantise,
-                            .quantise_rest = quantise_rest,
-                            .put = put,
+                            .quantise_residual = quantise_residual,
+                            .copy_floats = copy_floats,
                             .exp = exp_all};

@@ -1,4 +1,5 @@
-/* What each instruction set provides; filled by kernels_*.c from one source, kernels_simd.h. */
+/* The functions that each instruction set provides. kernels_*.c compile one source, kernels_simd.h,
+   for one instruction set each. Contracts: sdm/internal/kernels.h. */
 #ifndef SDM_KERNELS_TABLE_H
 #define SDM_KERNELS_TABLE_H
 
@@ -10,18 +11,17 @@
 
 typedef struct kernel_table {
     const char *name;
-    size_t mr, nr; /* rows and columns of the register tile of the matrix product */
-    /* c[mr][ldc] (+)= a[k][mr] * b[k][nr], packed */
+    size_t mr, nr; /* rows and columns of the tile of c that stays in registers in sdm_gemm() */
+    /* One tile: c[mr][ldc] = a * b, or += with `add`; packed a[k][mr], b[k][nr]. */
     void (*micro)(size_t k, const float *a, const float *b, float *c, size_t ldc, int add);
-    /* sdm_panel_*() and sdm_panel_back_*(); outputs: a multiple of 16 */
+    /* sdm_panel_*() and sdm_panel_back_*(); outputs: a multiple of SDM_PANEL */
     void (*panel_f32)(size_t batch, size_t outputs, size_t k, const float *w, const float *x,
                       size_t ldx, float *y, size_t ldy);
     void (*panel_f16)(size_t batch, size_t outputs, size_t k, const uint16_t *w, const float *x,
                       size_t ldx, float *y, size_t ldy);
     void (*back_f32)(size_t outputs, size_t k, const float *w, const float *y, float *x);
     void (*back_f16)(size_t outputs, size_t k, const uint16_t *w, const float *y, float *x);
-    /* sdm_panel_i8(), sdm_panel_back_i8(), sdm_quantise() and sdm_quantise_rest(); outputs: a
-     * multiple of 16 */
+    /* sdm_panel_i8*(), sdm_panel_back_i8(), sdm_quantise*(); outputs: a multiple of SDM_PANEL */
     void (*panel_i8)(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w,
                      const int16_t *x, size_t ldx, const float *scale, const sdm_panel_out *to);
     void (*panel_i8_blocks)(size_t batch, size_t n, const sdm_panel_block *blocks, const int8_t *w,
@@ -31,9 +31,10 @@ typedef struct kernel_table {
                     float *x);
     void (*quantise)(size_t rows, size_t n, const float *y, size_t ldy, const float *factor,
                      int limit, int16_t *x, size_t ldx, float *scale);
-    void (*quantise_rest)(size_t n, const float *y, const float *factor, int limit, int16_t *x,
-                          float *scale, int16_t *rest, float *rest_scale);
-    void (*put)(size_t n, const float *y, float *to, bool stream);
+    void (*quantise_residual)(size_t n, const float *y, const float *factor, int limit, int16_t *x,
+                              float *scale, int16_t *residual, float *residual_scale);
+    /* sdm_copy(), sdm_exp() */
+    void (*copy_floats)(size_t n, const float *y, float *to, bool stream);
     void (*exp)(size_t n, const float *x, float *y);
 } kernel_table;
 

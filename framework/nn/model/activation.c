@@ -1,4 +1,4 @@
-/* Activation functions with their derivatives. */
+/* Activation functions and their derivatives. */
 #include <math.h>
 
 #include "sdm/internal/kernels.h"

@@ -1,4 +1,4 @@
-/* The section file of models and checkpoints. */
+/* Builds, writes and parses the container: the file format of models and checkpoints. */
 #include "sdm/internal/container.h"
 
 #include <string.h>
@@ -11,12 +11,13 @@ static const char magic[8] = {'S', 'D', 'M', 'G', 'E', 'N', '\r', '\n'};
 
 enum { HEADER_BYTES = 24, ENTRY_BYTES = 48, NAME_BYTES = 24, ALIGN = 64 };
 
-static void put(uint8_t *p, uint64_t v, int bytes)
+// little-endian integers of 1 to 8 bytes
+static void store_le(uint8_t *p, uint64_t v, int bytes)
 {
     for (int i = 0; i < bytes; i++) p[i] = (uint8_t)(v >> (8 * i));
 }
 
-static uint64_t get(const uint8_t *p, int bytes)
+static uint64_t load_le(const uint8_t *p, int bytes)
 {
     uint64_t v = 0;
     for (int i = bytes - 1; i >= 0; i--) v = v << 8 | p[i];
@@ -32,6 +33,8 @@ sdm_status sdm_container_build(const sdm_section *sections, size_t n, uint8_t **
     if (n < 1 || n > SDM_CONTAINER_MAX_SECTIONS)
         return sdm_fail(err, SDM_E_INTERNAL, "%zu sections, need 1 to %u", n,
                         SDM_CONTAINER_MAX_SECTIONS);
+
+    // length of the file
     const size_t table_end = HEADER_BYTES + n * ENTRY_BYTES;
     size_t total = round_up(table_end + 8);
     for (size_t i = 0; i < n; i++) {
@@ -45,22 +48,28 @@ sdm_status sdm_container_build(const sdm_section *sections, size_t n, uint8_t **
     uint8_t *p = NULL;
     const sdm_status s = SDM_ALLOC(&p, total, "model file", err);
     if (s) return s;
+
+    // header
     memcpy(p, magic, sizeof magic);
-    put(p + 8, SDM_CONTAINER_VERSION, 4);
-    put(p + 12, n, 4);
-    put(p + 16, total, 8);
+    store_le(p + 8, SDM_CONTAINER_VERSION, 4);
+    store_le(p + 12, n, 4);
+    store_le(p + 16, total, 8);
+
+    // sections and their table
     size_t at = round_up(table_end + 8);
     for (size_t i = 0; i < n; i++) {
         uint8_t *entry = p + HEADER_BYTES + i * ENTRY_BYTES;
         memcpy(entry, sections[i].name, strlen(sections[i].name));
-        put(entry + 24, at, 8);
-        put(entry + 32, sections[i].size, 8);
-        put(entry + 40, sdm_crc64(0, sections[i].data, sections[i].size), 8);
+        store_le(entry + 24, at, 8);
+        store_le(entry + 32, sections[i].size, 8);
+        store_le(entry + 40, sdm_crc64(0, sections[i].data, sections[i].size), 8);
         if (sections[i].size) memcpy(p + at, sections[i].data, sections[i].size);
         at = round_up(at + sections[i].size);
     }
-    put(p + table_end, sdm_crc64(0, p, table_end), 8);
-    put(p + total - 8, sdm_crc64(0, p, total - 8), 8);
+
+    // checksums of the header and of the file
+    store_le(p + table_end, sdm_crc64(0, p, table_end), 8);
+    store_le(p + total - 8, sdm_crc64(0, p, total - 8), 8);
     *bytes = p;
     *size = total;
     return SDM_OK;
@@ -81,13 +90,14 @@ sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *s
                                char names[SDM_CONTAINER_MAX_SECTIONS][24], size_t *n,
                                uint64_t *checksum, sdm_error *err)
 {
+    // header
     if (size < sizeof magic || memcmp(bytes, magic, sizeof magic))
         return sdm_fail(err, SDM_E_FORMAT,
                         "not a model file (its first bytes are not those of one)");
     if (size < HEADER_BYTES + ENTRY_BYTES + 16)
         return sdm_fail(err, SDM_E_FORMAT, "truncated: only %zu bytes", size);
-    const uint64_t version = get(bytes + 8, 4), count = get(bytes + 12, 4),
-                   length = get(bytes + 16, 8);
+    const uint64_t version = load_le(bytes + 8, 4), count = load_le(bytes + 12, 4),
+                   length = load_le(bytes + 16, 8);
     if (version > SDM_CONTAINER_VERSION && version < 1000)
         return sdm_fail(
             err, SDM_E_FORMAT,
@@ -100,6 +110,8 @@ sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *s
     if (version != SDM_CONTAINER_VERSION)
         return sdm_fail(err, SDM_E_FORMAT, "damaged: format version %llu",
                         (unsigned long long)version);
+
+    // sizes, checksum of the header
     if (length != size)
         return sdm_fail(err, SDM_E_FORMAT, "%s: %zu bytes, its header says %llu",
                         size < length ? "truncated" : "damaged", size, (unsigned long long)length);
@@ -108,14 +120,14 @@ sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *s
     const size_t table_end = HEADER_BYTES + (size_t)count * ENTRY_BYTES;
     if (table_end + 16 > size)
         return sdm_fail(err, SDM_E_FORMAT, "truncated: the table of sections is not complete");
-    if (get(bytes + table_end, 8) != sdm_crc64(0, bytes, table_end))
+    if (load_le(bytes + table_end, 8) != sdm_crc64(0, bytes, table_end))
         return sdm_fail(err, SDM_E_FORMAT, "damaged: the checksum of the header is wrong");
 
-    // sections in order, aligned, behind each other, inside the file
+    // sections: aligned, in ascending order without overlap, inside the file
     uint64_t end = table_end + 8;
     for (size_t i = 0; i < count; i++) {
         const uint8_t *entry = bytes + HEADER_BYTES + i * ENTRY_BYTES;
-        const uint64_t at = get(entry + 24, 8), bytes_here = get(entry + 32, 8);
+        const uint64_t at = load_le(entry + 24, 8), bytes_here = load_le(entry + 32, 8);
         memcpy(names[i], entry, NAME_BYTES);
         if (names[i][NAME_BYTES - 1])
             return sdm_fail(err, SDM_E_FORMAT, "damaged: the name of section %zu does not end", i);
@@ -123,12 +135,12 @@ sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *s
             return sdm_fail(err, SDM_E_FORMAT, "damaged: section '%s' lies outside the file",
                             names[i]);
         end = at + bytes_here;
-        if (get(entry + 40, 8) != sdm_crc64(0, bytes + at, (size_t)bytes_here))
+        if (load_le(entry + 40, 8) != sdm_crc64(0, bytes + at, (size_t)bytes_here))
             return sdm_fail(err, SDM_E_FORMAT, "damaged: the checksum of section '%s' is wrong",
                             names[i]);
         sections[i] = (sdm_section){names[i], bytes + at, (size_t)bytes_here};
     }
-    *checksum = get(bytes + size - 8, 8);
+    *checksum = load_le(bytes + size - 8, 8);
     if (*checksum != sdm_crc64(0, bytes, size - 8))
         return sdm_fail(err, SDM_E_FORMAT, "damaged: the checksum of the file is wrong");
     *n = (size_t)count;

@@ -1,4 +1,4 @@
-/* Products with a Jacobian that is there. */
+/* Products of a given Jacobian with a direction and of its transpose with an adjoint map. */
 #include <string.h>
 
 #include "sdm/model.h"

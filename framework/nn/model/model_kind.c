@@ -1,18 +1,6 @@
-/* The kinds of network, and the calls that go to them. */
+/* The public functions that evaluate a model, passed on to its kind of network. */
 #include "model_kind.h"
 #include "sdm/internal/model_threads.h"
-
-#include <string.h>
-
-static const sdm_model_kind *const KINDS[] = {&sdm_kind_pod, &sdm_kind_deepsdf, &sdm_kind_imnet,
-                                              &sdm_kind_sdmnn};
-
-const sdm_model_kind *sdm_model_kind_find(const char *name)
-{
-    for (size_t i = 0; i < sizeof KINDS / sizeof *KINDS; i++)
-        if (strcmp(KINDS[i]->name, name) == 0) return KINDS[i];
-    return NULL;
-}
 
 bool sdm_model_is_threaded(const sdm_model *m) { return m->kind->threaded; }
 
@@ -38,7 +26,8 @@ void sdm_model_jacobian(const sdm_model *m, const double *params, float *values,
     m->kind->jacobian(m, params, values, jacobian, scratch, 1);
 }
 
-// scratch of a kind without products of its own: the Jacobian, then what it needs itself
+// For kinds without jvp or vjp: bytes of the Jacobian at the start of the scratch memory, rounded
+// up to 64. The map (vjp only) and the scratch memory of jacobian() follow.
 static size_t jacobian_bytes(const sdm_model *m)
 {
     const size_t bytes = m->info.n_params * sdm_grid_count(&m->info.grid) * sizeof(float);

@@ -1,4 +1,5 @@
-/* The description of a model: one "key=value" a line, written and read back in a fixed order. */
+/* The description of a model: lines "key=value" that are written and read in the same fixed
+   order. */
 #ifndef SDM_MODEL_TEXT_H
 #define SDM_MODEL_TEXT_H
 
@@ -6,26 +7,32 @@
 
 #include "sdm/internal/text.h"
 
-void sdm_put_real(sdm_text *t, const char *key, double v);
-void sdm_put_reals(sdm_text *t, const char *key, const double *v, size_t n);
+/* Append a line with one or n numbers, separated by spaces, in decimals that read back exactly. */
+void sdm_text_add_real(sdm_text *t, const char *key, double v);
+void sdm_text_add_reals(sdm_text *t, const char *key, const double *v, size_t n);
 
-/* Reads the lines in their order; after a failure every further read fails too and gives the lowest
-   allowed value, so that a row of reads needs one check: sdm_lines_check(). */
+/* Reader of the lines. The first failure (another key, or an invalid value) makes all later reads
+   fail too, so that a series of reads needs only one sdm_lines_check(). Set at and end before the
+   first read, all else to zero. */
 typedef struct sdm_lines {
-    const char *at, *end;
-    char value[1100];
+    const char *at, *end; /* rest of the text */
+    char value[1100];     /* of the last line read */
     bool failed;
-    char wanted[64]; /* last key asked for */
+    char key[64]; /* of the last line read, or of the one that failed */
 } sdm_lines;
 
-const char *sdm_next(sdm_lines *r,
-                     const char *key); /* the value, until the next read; "" after a failure */
-void sdm_next_reals(sdm_lines *r, const char *key, double *out, size_t n);
-double sdm_next_real(sdm_lines *r, const char *key);
-int64_t sdm_next_int(sdm_lines *r, const char *key, int64_t min, int64_t max);
-void sdm_next_text(sdm_lines *r, const char *key, char *out, size_t size);
+/* The value of the next line, whose key must be `key`; valid until the next read. "" on failure. */
+const char *sdm_lines_value(sdm_lines *r, const char *key);
 
-/* SDM_E_FORMAT, naming the key, when a read has failed. */
+/* The same, parsed as n numbers out[n], a number, an integer in min .. max, or a text of less than
+   `size` bytes, NUL-terminated. On failure the integer is min, the text is "", and numbers are 0 or
+   unchanged. */
+void sdm_lines_reals(sdm_lines *r, const char *key, double *out, size_t n);
+double sdm_lines_real(sdm_lines *r, const char *key);
+int64_t sdm_lines_int(sdm_lines *r, const char *key, int64_t min, int64_t max);
+void sdm_lines_text(sdm_lines *r, const char *key, char *out, size_t size);
+
+/* SDM_E_FORMAT, naming the key, if a read has failed. */
 sdm_status sdm_lines_check(const sdm_lines *r, sdm_error *err);
 
 #endif

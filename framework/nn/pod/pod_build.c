@@ -1,4 +1,4 @@
-/* Making of a pod model's file from weights: architecture and panels. */
+/* Builds the file of a pod model from its weights: description and packed sections. */
 #include <string.h>
 
 #include "pod_quantise.h"
@@ -7,11 +7,11 @@
 
 #ifdef __BYTE_ORDER__
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
-               "weights are written as they lie in memory: little-endian");
+               "weights are written as they are in memory: little-endian");
 #endif
 
-// read back by pod_open.c
-static void describe(const sdm_pod_spec *spec, sdm_text *t)
+// the text that read_architecture() of pod_open.c reads
+static void description_write(const sdm_pod_spec *spec, sdm_text *t)
 {
     const sdm_pod_arch *k = &spec->arch;
     sdm_model_describe(spec->info, sdm_kind_pod.name, t);
@@ -31,12 +31,15 @@ static void pack_matrix(sdm_pod_type type, size_t outputs, size_t k, sdm_view w,
         sdm_panel_pack_f32(outputs, k, w, (float *)to + offset);
 }
 
-// integers: NULL but for bytes
+// Packs the MLP, the head and the basis. integers: the quantised weights, NULL for floats or
+// halves; at[blocks]: sdm_pod_place_weights().
 static void pack_weights(const sdm_pod_spec *spec, const pod_integers *integers, const size_t *at,
                          void *mlp, float *bias, void *head, void *basis)
 {
     const sdm_pod_arch *a = &spec->arch;
     const size_t n_blocks = a->levels.first[a->levels.n];
+
+    // MLP
     size_t next = 0, of_layer = 0;
     for (size_t l = 0; l < a->depth; l++) {
         const size_t k = sdm_pod_layer_inputs(a, l);
@@ -49,12 +52,16 @@ static void pack_weights(const sdm_pod_spec *spec, const pod_integers *integers,
         of_layer += a->width * k;
         memcpy(bias + l * a->width, spec->weights.bias[l], a->width * sizeof *bias);
     }
+
+    // head
     if (integers)
         sdm_panel_pack_i8(a->n_coefficients, integers->wide[n_blocks], a->n_latent, integers->head,
                           head);
     else
         pack_matrix(spec->type, a->n_coefficients, a->n_latent,
                     (sdm_view){spec->weights.head, a->n_latent, 1}, head, 0);
+
+    // basis of each block
     for (size_t b = 0, from = 0; b < n_blocks; b++) {
         const size_t outputs = sdm_pod_outputs(spec->blocks, b), rank = spec->blocks[b].rank;
         if (integers)
@@ -67,7 +74,7 @@ static void pack_weights(const sdm_pod_spec *spec, const pod_integers *integers,
     }
 }
 
-// leaf by leaf, each filled up to whole panels
+// The mean map in the order of leaves[], each leaf padded to whole panels (`to` is zero before).
 static void place_mean(const sdm_pod_spec *spec, const pod_leaf *leaves, float *to)
 {
     for (size_t i = 0; i < spec->arch.levels.first[1]; i++) {
@@ -78,22 +85,25 @@ static void place_mean(const sdm_pod_spec *spec, const pod_leaf *leaves, float *
     }
 }
 
-// little-endian numbers of 32 bits
-static void put_numbers(const uint32_t *from, size_t n, uint8_t *to)
+// to[4 n] = from[n], little-endian
+static void store_u32(const uint32_t *from, size_t n, uint8_t *to)
 {
     for (size_t i = 0; i < n; i++)
         for (int b = 0; b < 4; b++) *to++ = (uint8_t)(from[i] >> (8 * b));
 }
 
-static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, uint8_t **bytes,
-                        size_t *size, sdm_error *err)
+// integers: the quantised weights; NULL for floats or halves
+static sdm_status file_build(const sdm_pod_spec *spec, const pod_integers *integers,
+                             uint8_t **bytes, size_t *size, sdm_error *err)
 {
     const sdm_pod_arch *a = &spec->arch;
-    const size_t number = sdm_pod_size(spec->type), n_blocks = a->levels.first[a->levels.n];
+    const size_t number = sdm_pod_weight_bytes(spec->type), n_blocks = a->levels.first[a->levels.n];
     const size_t mlp_count = sdm_pod_count_mlp(spec->type, a);
     const size_t head_count = sdm_pod_count_weights(
         spec->type, a->n_coefficients, integers ? integers->wide[n_blocks] : 0, a->n_latent);
     const size_t mean_count = sdm_pod_mean_count(&a->levels, spec->blocks);
+
+    // slabs, leaves, index of the weights of each block
     pod_slab *slabs = NULL;
     pod_leaf *leaves = NULL;
     float *bias = NULL, *mean = NULL;
@@ -110,6 +120,8 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
             sdm_pod_place_weights(spec->type, &a->levels, spec->blocks, slabs,
                                   sdm_pod_slabs(&a->levels, spec->blocks, a->block, slabs, leaves),
                                   leaves, integers ? integers->wide : NULL, at);
+
+    // memory for the sections
     if (!s) s = SDM_ALLOC(&mean, mean_count, "model weights", err);
     if (!s) s = SDM_ALLOC(&mlp, mlp_count * number, "model weights", err);
     if (!s) s = SDM_ALLOC(&bias, a->depth * a->width, "model weights", err);
@@ -118,16 +130,20 @@ static sdm_status build(const sdm_pod_spec *spec, const pod_integers *integers, 
     if (!s) s = SDM_ALLOC(&ranks, n_blocks * 4, "model weights", err);
     if (!s) s = SDM_ALLOC(&wide, (n_blocks + 1) * 4, "model weights", err);
     if (s) goto done;
+
+    // fill the sections
     pack_weights(spec, integers, at, mlp, bias, head, basis);
     place_mean(spec, leaves, mean);
-    for (size_t b = 0; b < n_blocks; b++) put_numbers(&spec->blocks[b].rank, 1, ranks + 4 * b);
+    for (size_t b = 0; b < n_blocks; b++) store_u32(&spec->blocks[b].rank, 1, ranks + 4 * b);
     if (integers) {
-        put_numbers(integers->wide, n_blocks + 1, wide);
-        put_numbers(integers->limit, a->levels.n + 1, limit);
-        put_numbers(integers->layer_limit, a->depth, limit + 4 * (a->levels.n + 1));
+        store_u32(integers->wide, n_blocks + 1, wide);
+        store_u32(integers->limit, a->levels.n + 1, limit);
+        store_u32(integers->layer_limit, a->depth, limit + 4 * (a->levels.n + 1));
     }
     sdm_pod_place_coefficients(&a->levels, spec->blocks, all);
-    describe(spec, &text);
+    description_write(spec, &text);
+
+    // the last six sections are for integer weights only
     const sdm_section sections[] = {
         {"pod.ranks", ranks, n_blocks * 4},
         {"pod.mlp", mlp, mlp_count * number},
@@ -162,10 +178,10 @@ done:
 
 sdm_status sdm_pod_build(const sdm_pod_spec *spec, uint8_t **bytes, size_t *size, sdm_error *err)
 {
-    if (spec->type != SDM_POD_I8) return build(spec, NULL, bytes, size, err);
+    if (spec->type != SDM_POD_I8) return file_build(spec, NULL, bytes, size, err);
     pod_integers integers;
     sdm_status s = sdm_pod_quantise(spec, &integers, err);
-    if (!s) s = build(spec, &integers, bytes, size, err);
+    if (!s) s = file_build(spec, &integers, bytes, size, err);
     sdm_pod_integers_dispose(&integers);
     return s;
 }

@@ -1,33 +1,33 @@
-/* The pod network at work: parameters -> latent variables -> map, with derivatives in forward and
-   reverse mode. No allocation. Letters as in sdm/pod.h. */
+/* Evaluation of a pod network: parameters -> latents -> map, with derivatives in forward and
+   reverse mode. No allocation. */
 #include "pod_internal.h"
 
-enum { ROWS = 24 }; // maps for which the head and the MLP are read once
+enum { MAPS = 24 }; // maps that share one pass over the weights of the MLP and the head
 
-// bytes of maps from which on they would push weights out of the caches rather than stay there for
-// their reader
-#define STREAMED 4e6
+// Bytes of all maps of a call above which they are written past the caches: they would evict the
+// weights, and the reader would not find them in the caches anyway.
+#define STREAM_BYTES_MIN 4e6
 
-static size_t smaller(size_t a, size_t b) { return a < b ? a : b; }
+static size_t min_size(size_t a, size_t b) { return a < b ? a : b; }
 
-// scratch, carved from the caller's block
+// scratch memory, carved from the caller's block
 typedef struct workspace {
     pod_latent latent;
-    pod_space space;
+    pod_scratch decode;
 } workspace;
 
 static size_t carve(const pod_network *m, size_t rows, int n_threads, float *memory, workspace *w)
 {
     const size_t latent = sdm_pod_latent_carve(m, rows, memory, &w->latent);
-    return (latent +
-            sdm_pod_space_carve(m, rows, n_threads, memory ? memory + latent : NULL, &w->space)) *
+    return (latent + sdm_pod_scratch_carve(m, rows, n_threads, memory ? memory + latent : NULL,
+                                           &w->decode)) *
            sizeof(float);
 }
 
 size_t sdm_pod_scratch_bytes(const sdm_model *m, size_t n, int n_threads)
 {
     workspace w;
-    return carve(m->network, smaller(n, ROWS), n_threads, NULL, &w);
+    return carve(m->network, min_size(n, MAPS), n_threads, NULL, &w);
 }
 
 void sdm_pod_forward(const sdm_model *m, const double *params, size_t n, float *values,
@@ -35,30 +35,31 @@ void sdm_pod_forward(const sdm_model *m, const double *params, size_t n, float *
 {
     const pod_network *k = m->network;
     const size_t voxels = sdm_grid_count(&m->info.grid);
-    const bool stream = (double)n * (double)voxels * sizeof *values > STREAMED;
+    const bool stream = (double)n * (double)voxels * sizeof *values > STREAM_BYTES_MIN;
     workspace w;
-    carve(k, smaller(n, ROWS), n_threads, scratch, &w);
-    for (size_t at = 0; at < n; at += ROWS) {
-        const size_t rows = smaller(ROWS, n - at);
-        float *maps[ROWS];
+    carve(k, min_size(n, MAPS), n_threads, scratch, &w);
+    for (size_t at = 0; at < n; at += MAPS) {
+        const size_t rows = min_size(MAPS, n - at);
+        float *maps[MAPS];
         for (size_t r = 0; r < rows; r++) maps[r] = values + (at + r) * voxels;
-        sdm_pod_latent(m, params + at * k->arch.n_params, rows, 0, NULL, &w.latent, w.space.z);
-        sdm_pod_decode(k, &m->info.grid, rows, rows, false, stream, maps, &w.space, n_threads);
+        sdm_pod_latent(m, params + at * k->arch.n_params, rows, 0, NULL, &w.latent, w.decode.z);
+        sdm_pod_decode(k, &m->info.grid, rows, rows, false, stream, maps, &w.decode, n_threads);
     }
 }
 
-// the map and its derivatives along direction[n][P]
-static void tangents(const sdm_model *m, const double *params, size_t n, const double *direction,
-                     float *values, float *tangent, void *scratch, int n_threads)
+// values = the map, tangent[n][voxels] = its derivatives along direction[n][P]
+static void forward_mode(const sdm_model *m, const double *params, size_t n,
+                         const double *direction, float *values, float *tangent, void *scratch,
+                         int n_threads)
 {
     const pod_network *k = m->network;
     const size_t voxels = sdm_grid_count(&m->info.grid);
     workspace w;
     carve(k, 1 + n, n_threads, scratch, &w);
-    sdm_pod_latent(m, params, 1, n, direction, &w.latent, w.space.z);
+    sdm_pod_latent(m, params, 1, n, direction, &w.latent, w.decode.z);
     float *maps[1 + SDM_POD_MAX_PARAMS] = {values};
     for (size_t r = 0; r < n; r++) maps[1 + r] = tangent + r * voxels;
-    sdm_pod_decode(k, &m->info.grid, 1 + n, 1, true, false, maps, &w.space, n_threads);
+    sdm_pod_decode(k, &m->info.grid, 1 + n, 1, true, false, maps, &w.decode, n_threads);
 }
 
 size_t sdm_pod_jacobian_scratch_bytes(const sdm_model *m, int n_threads)
@@ -74,7 +75,7 @@ void sdm_pod_jacobian(const sdm_model *m, const double *params, float *values, f
     const size_t n = m->info.n_params;
     double unit[SDM_POD_MAX_PARAMS * SDM_POD_MAX_PARAMS] = {0};
     for (size_t i = 0; i < n; i++) unit[i * n + i] = 1;
-    tangents(m, params, n, unit, values, jacobian, scratch, n_threads);
+    forward_mode(m, params, n, unit, values, jacobian, scratch, n_threads);
 }
 
 size_t sdm_pod_jvp_scratch_bytes(const sdm_model *m, int n_threads)
@@ -86,13 +87,13 @@ size_t sdm_pod_jvp_scratch_bytes(const sdm_model *m, int n_threads)
 void sdm_pod_jvp(const sdm_model *m, const double *params, const double *direction, float *values,
                  float *tangent, void *scratch, int n_threads)
 {
-    tangents(m, params, 1, direction, values, tangent, scratch, n_threads);
+    forward_mode(m, params, 1, direction, values, tangent, scratch, n_threads);
 }
 
 size_t sdm_pod_vjp_scratch_bytes(const sdm_model *m)
 {
     workspace w;
-    return carve(m->network, 2, 1, NULL, &w); // a second row of z: its gradient
+    return carve(m->network, 2, 1, NULL, &w); // the second row of z is the gradient by z
 }
 
 void sdm_pod_vjp(const sdm_model *m, const double *params, const float *adjoint, double *gradient,
@@ -101,8 +102,8 @@ void sdm_pod_vjp(const sdm_model *m, const double *params, const float *adjoint,
     const pod_network *k = m->network;
     workspace w;
     carve(k, 2, 1, scratch, &w);
-    float *dz = w.space.z + k->arch.n_latent;
-    sdm_pod_latent(m, params, 1, 0, NULL, &w.latent, w.space.z);
-    sdm_pod_decode_back(k, &m->info.grid, adjoint, &w.space, dz);
+    float *dz = w.decode.z + k->arch.n_latent;
+    sdm_pod_latent(m, params, 1, 0, NULL, &w.latent, w.decode.z);
+    sdm_pod_decode_back(k, &m->info.grid, adjoint, &w.decode, dz);
     sdm_pod_latent_back(m, params, &w.latent, dz, gradient);
 }

@@ -1,4 +1,28 @@
-/* The opened pod network. */
+/* The opened pod network and the functions between the files of this folder.
+
+   Words beside those of sdm/internal/pod.h:
+     integer weights  type SDM_POD_I8: matrices of integers with scales for rows and columns,
+                      w[o][i] = row_scale[o] * integer[o][i] * step[i]
+          narrow, wide     an input (column) whose integer weights have one byte, abs <= 127, or two
+                      bytes, abs <= SDM_WIDE
+     factor           of an input of a block: step of its column * row_scale of the row in the
+                      matrix above that computes it; so row scales are never applied to outputs
+     limit            largest magnitude of an input as an integer, such that no sum of 32 bits
+                      overflows: limit * max over o of (sum over i of abs(integer[o][i])) < 2^31
+     quantum          value of one unit of the inputs of a block when all maps use the same unit
+          residual         the rounding error of quantised inputs, itself quantised
+     survey           the network evaluated at random parameters before its weights are quantised,
+                      which shows how large the coefficients become (pod_survey.c)
+     top              a block of the highest level
+     leaf             a block of level 0
+     slab             the tops side by side along x with all their descendants; a unit of work
+     line             the leaves of a slab side by side along x
+     group            blocks whose inputs are quantised together: the children of one parent; each
+                      top is a group of its own
+     padded           rounded up to whole panels, sdm_panel_outputs()
+
+   Letters beside those of sdm/internal/pod.h: C coefficients of all levels, R rows (a row of
+   latents gives one map or the derivative of one). */
 #ifndef SDM_POD_INTERNAL_H
 #define SDM_POD_INTERNAL_H
 
@@ -6,17 +30,16 @@
 #include "sdm/internal/kernels.h"
 #include "sdm/internal/pod.h"
 
-/* Blocks of the highest level that lie side by side along x, and all below them: numbers of blocks,
- * first and behind the last. */
+/* A slab: ranges first .. end - 1 of block numbers. */
 typedef struct pod_slab {
     uint32_t top, top_end;
-    uint32_t leaf, leaf_end;   /* of the lowest level; also their places in pod_network.leaves */
-    uint32_t group, group_end; /* blocks that give the coefficients of the lowest level: above it,
-                                  or of it where it is the highest */
-    uint32_t coefficient, n_coefficients; /* of the lowest level */
+    uint32_t leaf, leaf_end; /* the same range of pod_network.leaves[] holds its leaves */
+    /* The parents of its leaves, one for each group of leaves; with one level, its leaves. */
+    uint32_t group, group_end;
+    uint32_t coefficient, n_coefficients; /* of level 0: index of the first, number */
 } pod_slab;
 
-/* A block of the lowest level, and which of its slab's groups it belongs to. */
+/* A leaf, and the index of its group within its slab. */
 typedef struct pod_leaf {
     uint32_t block, group;
 } pod_leaf;
@@ -27,54 +50,54 @@ typedef struct pod_network {
     sdm_pod_block *blocks;
     pod_slab *slabs;
     size_t n_slabs;
-    pod_leaf *leaves; /* slab by slab, along x, then y, then z */
-    /* What the decoder needs of leaves[], in the order in which it is read. x: among the
-     * coefficients of a slab, y: along a line of blocks. */
+    pod_leaf *leaves; /* slab by slab, in each with x fastest, then y, then z */
+    /* The product of each of leaves[]. Offsets x: within the coefficients of the slab, y: within
+       the line, scale: group * SDM_POD_ROWS. */
     sdm_panel_block *products;
     uint32_t *outputs;  /* [blocks] V_b */
-    size_t *weights_at; /* [blocks] where the weights of a block begin in basis */
-    /* Where the coefficients of a level begin among all; the last: their number C. */
+    size_t *weights_at; /* [blocks] index of the first weight of a block in basis */
+    /* Index of the first coefficient of each level among all C; the last entry: C. */
     size_t coefficients_at[SDM_POD_MAX_LEVELS + 1];
-    size_t max_outputs[SDM_POD_MAX_LEVELS];
-    /* Most coefficients of a level that are made together: of the highest those of a block, of the
-     * others those of a block's children. */
-    size_t max_group[SDM_POD_MAX_LEVELS];
-    size_t max_slab,
-        max_slab_groups; /* most coefficients of the lowest level, and groups, of a slab */
-    uint8_t *exponents;  /* [max(F, 1 + I)][P] */
-    const float *bias[SDM_POD_MAX_DEPTH]; /* [W] */
-    const float *mean;                    /* leaf by leaf, each filled up to whole panels */
-    /* Panels (sdm/kernels.h), the MLP's of two bytes when the others are bytes. The basis in the
-     * order in which it is read (sdm_pod_place_weights()). */
+    size_t max_outputs[SDM_POD_MAX_LEVELS]; /* of a block of the level */
+    size_t max_group[SDM_POD_MAX_LEVELS];   /* coefficients of a group of the level */
+    size_t max_slab, max_slab_groups;       /* coefficients of level 0 and groups of a slab */
+    uint8_t *exponents;                     /* [max(F, 1 + I)][P] */
+    const float *bias[SDM_POD_MAX_DEPTH];   /* [W] */
+    const float *mean;                      /* mean map in the order of leaves[], each padded */
+    /* Panels (sdm/internal/kernels.h). With integer weights those of the MLP are all wide. The
+       basis lies in the order in which it is read, see sdm_pod_place_weights(). */
     const void *layer[SDM_POD_MAX_DEPTH], *head, *basis;
-    /* Bytes only (pod_quantise.h). */
-    uint32_t *wide;                    /* [blocks + 1] the last: of the head */
-    const uint32_t *order;             /* [L] */
-    const float *factor;               /* [C + L] */
-    int limit[SDM_POD_MAX_LEVELS + 1]; /* of inputs of a level as integers; the last: of the head */
-    const float *quantum; /* [blocks] value of 1 of the integers that go into a block */
-    float *to_integer;    /* [C + SDM_PANEL] factor / quantum */
-    const float *layer_scale[SDM_POD_MAX_DEPTH]; /* [W] */
-    int layer_limit[SDM_POD_MAX_DEPTH];          /* of inputs of a layer as integers */
+
+    /* For integer weights only; C + L: all coefficients, then the columns of the head. */
+    uint32_t *wide;                              /* [blocks + 1] wide inputs; last: of the head */
+    const uint32_t *order;                       /* [L] latent of each column of the head */
+    const float *factor;                         /* [C + L] */
+    int limit[SDM_POD_MAX_LEVELS + 1];           /* of each level; the last: of the head */
+    const float *quantum;                        /* [blocks] */
+    float *to_integer;                           /* [C + SDM_PANEL] factor / quantum */
+    const float *layer_scale[SDM_POD_MAX_DEPTH]; /* [W] row scales of the MLP */
+    int layer_limit[SDM_POD_MAX_DEPTH];          /* limits of the MLP */
 } pod_network;
 
-/* Bytes of a stored number. */
-static inline size_t sdm_pod_size(sdm_pod_type type)
+/* Bytes of a stored weight; of a narrow one for integers. */
+static inline size_t sdm_pod_weight_bytes(sdm_pod_type type)
 {
     return type == SDM_POD_F32 ? 4 : type == SDM_POD_F16 ? 2 : 1;
 }
 
-/* y[rows][ldy] = x[rows][ldx] times float or half weights that begin at `at`, as sdm_panel_*(); and
- * the transpose. */
+/* sdm_panel_f32(), sdm_panel_f16() and their transposes with the panels at element `at` of
+   `weights`; not for integer weights. */
 void sdm_pod_product(sdm_pod_type type, size_t rows, size_t outputs, size_t k, const void *weights,
                      size_t at, const float *x, size_t ldx, float *y, size_t ldy);
 void sdm_pod_product_back(sdm_pod_type type, size_t outputs, size_t k, const void *weights,
                           size_t at, const float *y, float *x);
 
-/* Stored numbers of a matrix of `outputs` x k; n_wide: for bytes. */
+/* Elements (bytes for integer weights) of the panels of outputs x k weights; n_wide: for integer
+   weights. SIZE_MAX on overflow for integer weights. */
 size_t sdm_pod_count_weights(sdm_pod_type type, size_t outputs, size_t n_wide, size_t k);
 
-/* Stored numbers of a layer of the MLP, and of all. */
+/* Number of inputs of a layer of the MLP, and elements of the panels of a layer and of all
+   layers. */
 static inline size_t sdm_pod_layer_inputs(const sdm_pod_arch *a, size_t layer)
 {
     return layer ? a->width : a->n_inputs;
@@ -82,63 +105,63 @@ static inline size_t sdm_pod_layer_inputs(const sdm_pod_arch *a, size_t layer)
 size_t sdm_pod_count_layer(sdm_pod_type type, const sdm_pod_arch *a, size_t layer);
 size_t sdm_pod_count_mlp(sdm_pod_type type, const sdm_pod_arch *a);
 
-/* Slabs and leaves from blocks that are numbered; slabs[] has room for the blocks of the highest
-   level, leaves[] for those of the lowest. edge: of a block of the lowest level. Returns the number
-   of slabs. */
+/* Fills slabs[], with room for the number of tops, and leaves[number of leaves], from blocks after
+   sdm_pod_number(). edge: of a leaf, voxels. Returns the number of slabs. */
 size_t sdm_pod_slabs(const sdm_pod_levels *levels, const sdm_pod_block *blocks, size_t edge,
                      pod_slab *slabs, pod_leaf *leaves);
 
-/* at[blocks] = where the weights of each block begin, slab by slab: the levels above the lowest
-   depth first, then the leaves. wide[blocks]: for bytes. Returns their number. */
+/* at[blocks] = index of the first weight of each block in the stored basis, in the order of
+   decoding: slab by slab, in each the levels above 0 depth first, then the leaves as in leaves[].
+   wide[blocks]: for integer weights, else NULL. Returns the number of elements of the basis. */
 size_t sdm_pod_place_weights(sdm_pod_type type, const sdm_pod_levels *levels,
                              const sdm_pod_block *blocks, const pod_slab *slabs, size_t n_slabs,
                              const pod_leaf *leaves, const uint32_t *wide, size_t *at);
 
-/* Floats of the mean map, leaf by leaf, each filled up to whole panels. */
+/* Floats of the stored mean map, in which each leaf is padded. */
 size_t sdm_pod_mean_count(const sdm_pod_levels *levels, const sdm_pod_block *blocks);
 
-/* m->products from all else. */
-void sdm_pod_describe_leaves(pod_network *m);
+/* Sets m->products when all other members are set. */
+void sdm_pod_products_fill(pod_network *m);
 
-enum { SDM_POD_GROUP = 6 }; /* rows that go through a slab together: those of the kernels */
+/* Rows that are decoded together: the kernels compute up to 6 rows at a time. */
+enum { SDM_POD_ROWS = 6 };
 
-/* at[l] = number of coefficients of the levels below l, after sdm_pod_number(); the last: of all.
- */
+/* at[l] = number of coefficients of the levels below l, after sdm_pod_number(); at[levels] = C. */
 void sdm_pod_place_coefficients(const sdm_pod_levels *levels, const sdm_pod_block *blocks,
                                 size_t at[SDM_POD_MAX_LEVELS + 1]);
 
-/* Wide columns of the head; 0 when weights are not bytes. */
+/* Wide inputs of the head; 0 unless weights are integers. */
 static inline size_t sdm_pod_head_wide(const pod_network *m)
 {
     return m->wide ? m->wide[m->arch.levels.first[m->arch.levels.n]] : 0;
 }
 
-/* As sdm_quantise(), and a zero behind each row: it is read beside an odd last input, times zero.
- */
+/* sdm_quantise(), and x[r][n] = 0: sdm_panel_i8() reads one input beyond an odd n. */
 void sdm_pod_quantise_rows(size_t rows, size_t n, const float *y, size_t ldy, const float *factor,
                            int limit, int16_t *x, size_t ldx, float *scale);
 
-/* As sdm_quantise_rest(), and zeros behind both rows. */
-void sdm_pod_quantise_rest(size_t n, const float *y, const float *factor, int limit, int16_t *x,
-                           float *scale, int16_t *rest, float *rest_scale);
+/* sdm_quantise_residual(), and x[n] = residual[n] = 0. */
+void sdm_pod_quantise_residual(size_t n, const float *y, const float *factor, int limit, int16_t *x,
+                               float *scale, int16_t *residual, float *residual_scale);
 
-/* pod_latent.c: parameters to latent variables and back. Letters as in sdm/pod.h; D directions. */
+/* pod_latent.c: parameters to latents and back. T = max(F, 1 + I) polynomials, D directions. */
+
+/* Scratch memory for R rows. */
 typedef struct pod_latent {
-    float *phi;  /* [R][n_poly] all products and their derivatives along the directions */
-    float *h[2]; /* [R + 1][padded W] of a layer and of the one before; bytes: the last for the rest
-                    of the first */
-    float *slope;      /* [depth][padded W] */
-    float *dphi;       /* [P][n_poly] derivatives with respect to each parameter */
-    int16_t *integers; /* bytes: [R + 1][ld] inputs of a layer */
-    float *scale;      /* bytes: [R + 1] theirs */
+    float *phi;        /* [R][T] polynomials, then their derivatives along the directions */
+    float *h[2];       /* [R + 1][padded W] outputs of two layers in turn; the last row: residual */
+    float *slope;      /* [depth][padded W] derivative of the activation */
+    float *dphi;       /* [P][T] derivatives of the polynomials by each parameter */
+    int16_t *integers; /* integer weights: [R + 1][ld] inputs of a layer */
+    float *scale;      /* integer weights: [R + 1] scales of these inputs */
     size_t ld;
 } pod_latent;
 
-/* Sets the pointers into memory[] (NULL: none) for R rows of z; returns the floats needed. */
+/* Sets the pointers of *w into memory[] (NULL: none) for R rows; returns the floats needed. */
 size_t sdm_pod_latent_carve(const pod_network *m, size_t rows, float *memory, pod_latent *w);
 
-/* z[n][L]: latent variables at p[n][P]; of a single point their derivatives along direction[D][P]
- * too, z[1 + D][L]. */
+/* z[n][L] = the latents at p[n][P]. With n_directions = D > 0, n is 1 and z[1 + D][L] also gets the
+   derivatives along direction[D][P]. */
 void sdm_pod_latent(const sdm_model *model, const double *p, size_t n, size_t n_directions,
                     const double *direction, const pod_latent *w, float *z);
 
@@ -146,37 +169,43 @@ void sdm_pod_latent(const sdm_model *model, const double *p, size_t n, size_t n_
 void sdm_pod_latent_back(const sdm_model *model, const double *p, const pod_latent *w,
                          const float *dz, double *gradient);
 
-/* pod_decode.c: latent variables to maps and back. R rows of z go together: maps, or a map and its
- * derivatives. */
-typedef struct pod_space {
-    float *z; /* [R][L] */
-    float *c; /* [R][padded K] coefficients of the highest level; or the same as integers, rows as
-                 far apart */
-    float *sorted;       /* bytes: a row of z, or the inputs of a block, in the order of columns */
-    int16_t *z_integers; /* bytes: [R][ldz] */
-    float *z_scale;      /* bytes: [R] */
+/* pod_decode.c: latents to maps. */
+
+/* Scratch memory for R rows. */
+typedef struct pod_scratch {
+    float *z; /* [R][L] latents, set by the caller */
+    /* [R + 1][padded K] coefficients of the highest level (the last row: residual), as floats or,
+       in the same memory, as integers whose rows are 2 * padded K apart. */
+    float *c;
+    float *sorted;       /* integer weights: latents or inputs of a block, by column */
+    int16_t *z_integers; /* integer weights: [R + 1][ldz] */
+    float *z_scale;      /* integer weights: [R + 1] */
     size_t ldz;
-    float *threads; /* memory of each thread */
+    float *threads; /* [threads][per_thread] slab_scratch of each thread */
     size_t per_thread;
-} pod_space;
+} pod_scratch;
 
-/* Sets the pointers into memory[] (NULL: none); returns the floats needed. */
-size_t sdm_pod_space_carve(const pod_network *m, size_t rows, int n_threads, float *memory,
-                           pod_space *w);
+/* Sets the pointers of *w into memory[] (NULL: none); returns the floats needed. */
+size_t sdm_pod_scratch_carve(const pod_network *m, size_t rows, int n_threads, float *memory,
+                             pod_scratch *w);
 
-/* maps[R] from w->z; the mean map is added to the first `with_mean`. smooth: bytes do not round the
-   inputs of the first, so that it changes smoothly with the parameters, and inputs of any size are
-   as fine; else their units are fixed, for maps within the ranges of the parameters. stream: as
-   sdm_put(). */
+/* maps[R][voxels] = the decoder applied to the rows of w->z; the mean map is added to the first
+   with_mean rows. stream: as sdm_copy(). n_threads >= 1.
+
+   With integer weights: smooth = false quantises inputs with the fixed quantum of each block, which
+   is fastest; inputs beyond the limit are clipped. smooth = true uses a scale for each row and
+   group, and adds the residual of the first row: the first map then changes smoothly with the
+   parameters, as derivatives need it, and inputs may have any size. */
 void sdm_pod_decode(const pod_network *m, const sdm_grid *grid, size_t rows, size_t with_mean,
-                    bool smooth, bool stream, float *const *maps, const pod_space *w,
+                    bool smooth, bool stream, float *const *maps, const pod_scratch *w,
                     int n_threads);
 
-/* pod_decode_back.c: dz[L] = the transpose times adjoint[voxels]. One thread. */
+/* pod_decode_back.c: dz[L] = the transpose of the decoder applied to adjoint[nz][ny][nx]. w:
+   scratch memory for one row or more. One thread. */
 void sdm_pod_decode_back(const pod_network *m, const sdm_grid *grid, const float *adjoint,
-                         const pod_space *w, float *dz);
+                         const pod_scratch *w, float *dz);
 
-/* pod_forward.c */
+/* pod_forward.c: entries of the function table sdm_model_kind. */
 size_t sdm_pod_scratch_bytes(const sdm_model *m, size_t n, int n_threads);
 void sdm_pod_forward(const sdm_model *m, const double *params, size_t n, float *values,
                      void *scratch, int n_threads);

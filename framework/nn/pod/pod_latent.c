@@ -1,15 +1,21 @@
-/* The latent variables of a pod network: polynomials and MLP, with derivatives in forward and
- * reverse mode. */
+/* The latents of a pod network: polynomials and MLP, with derivatives in forward and reverse
+   mode. */
 #include <string.h>
 
 #include "pod_internal.h"
 #include "sdm/internal/kernels.h"
 
-static size_t larger(size_t a, size_t b) { return a > b ? a : b; }
-static size_t n_poly(const pod_network *m) { return larger(m->arch.n_terms, 1 + m->arch.n_inputs); }
-static size_t row(const pod_network *m)
+static size_t max_size(size_t a, size_t b) { return a > b ? a : b; }
+// number of polynomials that the latents and the MLP need
+static size_t n_poly(const pod_network *m)
 {
-    return larger(sdm_panel_outputs(m->arch.width), n_poly(m) + 1);
+    return max_size(m->arch.n_terms, 1 + m->arch.n_inputs);
+}
+// floats between rows of outputs of a layer; one more than the polynomials, because integer kernels
+// write whole pairs
+static size_t row_floats(const pod_network *m)
+{
+    return max_size(sdm_panel_outputs(m->arch.width), n_poly(m) + 1);
 }
 
 void sdm_pod_product(sdm_pod_type type, size_t rows, size_t outputs, size_t k, const void *weights,
@@ -37,23 +43,23 @@ void sdm_pod_quantise_rows(size_t rows, size_t n, const float *y, size_t ldy, co
     for (size_t r = 0; r < rows; r++) x[r * ldx + n] = 0;
 }
 
-void sdm_pod_quantise_rest(size_t n, const float *y, const float *factor, int limit, int16_t *x,
-                           float *scale, int16_t *rest, float *rest_scale)
+void sdm_pod_quantise_residual(size_t n, const float *y, const float *factor, int limit, int16_t *x,
+                               float *scale, int16_t *residual, float *residual_scale)
 {
-    sdm_quantise_rest(n, y, factor, limit, x, scale, rest, rest_scale);
-    x[n] = rest[n] = 0;
+    sdm_quantise_residual(n, y, factor, limit, x, scale, residual, residual_scale);
+    x[n] = residual[n] = 0;
 }
 
 size_t sdm_pod_latent_carve(const pod_network *m, size_t rows, float *memory, pod_latent *w)
 {
     const sdm_pod_arch *a = &m->arch;
-    const bool bytes = m->type == SDM_POD_I8;
-    w->ld = sdm_panel_outputs(row(m) + 1);
+    const bool integer = m->type == SDM_POD_I8;
+    w->ld = sdm_panel_outputs(row_floats(m) + 1);
     float *integers;
-    const size_t sizes[] = {rows * n_poly(m),        (rows + 1) * row(m),
-                            (rows + 1) * row(m),     a->depth * sdm_panel_outputs(a->width),
-                            a->n_params * n_poly(m), bytes ? (rows + 1) * w->ld / 2 : 0,
-                            bytes ? rows + 1 : 0};
+    const size_t sizes[] = {rows * n_poly(m),           (rows + 1) * row_floats(m),
+                            (rows + 1) * row_floats(m), a->depth * sdm_panel_outputs(a->width),
+                            a->n_params * n_poly(m),    integer ? (rows + 1) * w->ld / 2 : 0,
+                            integer ? rows + 1 : 0};
     float **const fields[] = {&w->phi,  &w->h[0],  &w->h[1], &w->slope,
                               &w->dphi, &integers, &w->scale};
     size_t total = 0;
@@ -65,7 +71,8 @@ size_t sdm_pod_latent_carve(const pod_network *m, size_t rows, float *memory, po
     return total;
 }
 
-// phi[n_poly] at p, and its derivatives with respect to each parameter when they are wanted
+// phi[n_poly] = the polynomials at p; with `slopes` also w->dphi, their derivatives by each
+// parameter.
 static void polynomials(const sdm_model *model, const double *p, bool slopes, const pod_latent *w,
                         float *phi)
 {
@@ -78,15 +85,15 @@ static void polynomials(const sdm_model *model, const double *p, bool slopes, co
         unit[i] = 2 / (q->max - q->min);
         x[i] = (p[i] - q->min) * unit[i] - 1;
     }
-    sdm_poly_eval(m->exponents, total, a->n_params, larger(a->degree, a->input_degree), x, phi,
+    sdm_poly_eval(m->exponents, total, a->n_params, max_size(a->degree, a->input_degree), x, phi,
                   slopes ? w->dphi : NULL);
     for (size_t i = 0; i < a->n_params && slopes; i++)
         for (size_t t = 0; t < total; t++) w->dphi[i * total + t] *= (float)unit[i];
 }
 
-// derivatives of phi along the directions
-static void along(const pod_network *m, size_t n_directions, const double *direction,
-                  const pod_latent *w)
+// Rows 1 .. n_directions of w->phi = the derivatives of the polynomials along direction[][P].
+static void directional_derivatives(const pod_network *m, size_t n_directions,
+                                    const double *direction, const pod_latent *w)
 {
     const size_t total = n_poly(m), n_params = m->arch.n_params;
     for (size_t d = 0; d < n_directions; d++) {
@@ -100,8 +107,8 @@ static void along(const pod_network *m, size_t n_directions, const double *direc
     }
 }
 
-/* out[rows][width] = a layer's products with in[rows][stride], without its bias. smooth: what
-   rounding leaves of the first row is added to it, by way of a row behind the last. */
+// out[rows][padded W] = the weights of a layer times in[rows][stride], without the bias. smooth:
+// the residual of the first row is multiplied too, as a row after the last, and added to the first.
 static void layer_products(const pod_network *m, size_t layer, size_t rows, bool smooth,
                            const float *in, size_t stride, const pod_latent *w, float *out)
 {
@@ -116,8 +123,8 @@ static void layer_products(const pod_network *m, size_t layer, size_t rows, bool
     const int limit = m->layer_limit[layer];
     sdm_pod_quantise_rows(rows, n, in, stride, NULL, limit, w->integers, w->ld, w->scale);
     if (smooth)
-        sdm_pod_quantise_rest(n, in, NULL, limit, w->integers, w->scale, w->integers + rows * w->ld,
-                              w->scale + rows);
+        sdm_pod_quantise_residual(n, in, NULL, limit, w->integers, w->scale,
+                                  w->integers + rows * w->ld, w->scale + rows);
     sdm_panel_i8(rows + smooth, m->arch.width, n, n, m->layer[layer], w->integers, w->ld, w->scale,
                  &to);
     for (size_t o = 0; o < width && smooth; o++) out[o] += out[rows * width + o];
@@ -130,16 +137,18 @@ void sdm_pod_latent(const sdm_model *model, const double *p, size_t n, size_t n_
 {
     const pod_network *m = model->network;
     const sdm_pod_arch *a = &m->arch;
+
+    // polynomials
     const size_t rows = n + n_directions, total = n_poly(m), width = sdm_panel_outputs(a->width);
     for (size_t r = 0; r < n; r++)
         polynomials(model, p + r * a->n_params, n_directions > 0, w, w->phi + r * total);
-    along(m, n_directions, direction, w);
+    directional_derivatives(m, n_directions, direction, w);
     for (size_t r = 0; r < rows; r++)
         memcpy(z + r * a->n_latent, w->phi + r * total, a->n_terms * sizeof *z);
     if (!a->depth) return;
 
-    // the MLP's input is the products of degree 1 and more; derivatives go through the same
-    // weights, then times the slope
+    // The MLP's inputs are the polynomials of degree 1 and more. Derivatives pass through the same
+    // weights, without bias, and are multiplied by the slope of the activation.
     float *in = w->phi + 1;
     size_t stride = total;
     for (size_t layer = 0; layer < a->depth; layer++) {
@@ -164,10 +173,10 @@ void sdm_pod_latent_back(const sdm_model *model, const double *p, const pod_late
     const sdm_pod_arch *a = &m->arch;
     const size_t total = n_poly(m), width = sdm_panel_outputs(a->width);
     polynomials(model, p, true, w, w->phi);
-    float *dphi = w->phi; // its values are not needed
+    float *dphi = w->phi; // gradient by the polynomials; their values are not needed
     memset(dphi, 0, total * sizeof *dphi);
     if (a->depth) {
-        // the gradient at the outputs of a layer, zero where outputs are rounding
+        // dh[padded W] = gradient by the outputs of a layer, zero in the padding
         float *dh = w->h[0], *below = w->h[1];
         memcpy(dh, dz + a->n_terms, a->width * sizeof *dh);
         for (size_t layer = a->depth; layer-- > 0;) {
@@ -184,6 +193,8 @@ void sdm_pod_latent_back(const sdm_model *model, const double *p, const pod_late
         }
         memcpy(dphi + 1, dh, a->n_inputs * sizeof *dphi);
     }
+
+    // the polynomials that are latents themselves, then the chain rule
     for (size_t t = 0; t < a->n_terms; t++) dphi[t] += dz[t];
     for (size_t i = 0; i < a->n_params; i++) {
         gradient[i] = 0;

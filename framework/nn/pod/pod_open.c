@@ -1,5 +1,5 @@
-/* Opening of a pod model: architecture, blocks and weights, every size checked before it is used.
- */
+/* Opens a pod model: reads architecture, ranks of the blocks and weights, and checks every size
+   before it is used. */
 #include <stdint.h>
 
 #include "pod_internal.h"
@@ -11,22 +11,24 @@ static sdm_status read_architecture(sdm_lines *lines, size_t n_params, pod_netwo
 {
     sdm_pod_arch *a = &m->arch;
     a->n_params = n_params;
-    a->degree = (size_t)sdm_next_int(lines, "pod.degree", 0, 12);
-    a->input_degree = (size_t)sdm_next_int(lines, "pod.input_degree", 1, 12);
-    a->depth = (size_t)sdm_next_int(lines, "pod.depth", 0, SDM_POD_MAX_DEPTH);
-    a->width = (size_t)sdm_next_int(lines, "pod.width", 1, 65536);
-    a->activation = (int)sdm_next_int(lines, "pod.activation", 0, 3);
-    m->type = (sdm_pod_type)sdm_next_int(lines, "pod.type", 0, SDM_POD_I8);
-    a->block = (size_t)sdm_next_int(lines, "pod.block", 1, 64);
-    a->levels.n = (size_t)sdm_next_int(lines, "pod.levels", 1, SDM_POD_MAX_LEVELS);
+    a->degree = (size_t)sdm_lines_int(lines, "pod.degree", 0, 12);
+    a->input_degree = (size_t)sdm_lines_int(lines, "pod.input_degree", 1, 12);
+    a->depth = (size_t)sdm_lines_int(lines, "pod.depth", 0, SDM_POD_MAX_DEPTH);
+    a->width = (size_t)sdm_lines_int(lines, "pod.width", 1, 65536);
+    a->activation = (int)sdm_lines_int(lines, "pod.activation", 0, 3);
+    m->type = (sdm_pod_type)sdm_lines_int(lines, "pod.type", 0, SDM_POD_I8);
+    a->block = (size_t)sdm_lines_int(lines, "pod.block", 1, 64);
+    a->levels.n = (size_t)sdm_lines_int(lines, "pod.levels", 1, SDM_POD_MAX_LEVELS);
     return sdm_lines_check(lines, err);
 }
 
-static uint32_t number(const uint8_t *p)
+// little-endian
+static uint32_t read_u32(const uint8_t *p)
 {
     return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
 }
 
+// Ranks of all blocks, and the sizes and orders that follow from them.
 static sdm_status read_ranks(const sdm_section *ranks, pod_network *m, sdm_error *err)
 {
     sdm_pod_arch *a = &m->arch;
@@ -35,13 +37,15 @@ static sdm_status read_ranks(const sdm_section *ranks, pod_network *m, sdm_error
     const uint8_t *p = ranks->data;
     for (size_t b = 0; b < n_blocks; b++, p += 4) {
         sdm_pod_block *k = &m->blocks[b];
-        k->rank = number(p);
+        k->rank = read_u32(p);
         if (k->rank > 1u << 20)
             return sdm_fail(err, SDM_E_FORMAT, "damaged: a block of rank %u", k->rank);
         if (b >= highest) a->n_coefficients += k->rank;
     }
     if (a->n_coefficients < 1 || a->n_coefficients > 1u << 30)
         return sdm_fail(err, SDM_E_FORMAT, "damaged: %zu coefficients", a->n_coefficients);
+
+    // number of outputs of each block, sizes of groups
     sdm_pod_number(&a->levels, m->blocks);
     for (size_t level = 0; level < a->levels.n; level++)
         for (size_t b = a->levels.first[level]; b < a->levels.first[level + 1]; b++) {
@@ -56,6 +60,8 @@ static sdm_status read_ranks(const sdm_section *ranks, pod_network *m, sdm_error
         }
     for (size_t level = 0; level + 1 < a->levels.n; level++)
         m->max_group[level] = m->max_outputs[level + 1];
+
+    // slabs
     sdm_pod_place_coefficients(&a->levels, m->blocks, m->coefficients_at);
     m->n_slabs = sdm_pod_slabs(&a->levels, m->blocks, a->block, m->slabs, m->leaves);
     for (const pod_slab *k = m->slabs; k < m->slabs + m->n_slabs; k++) {
@@ -66,9 +72,9 @@ static sdm_status read_ranks(const sdm_section *ranks, pod_network *m, sdm_error
     return SDM_OK;
 }
 
-// blocks from grid and ranks; sizes that follow from the architecture
-static sdm_status set_up(const sdm_section *ranks, const sdm_grid *grid, pod_network *m,
-                         sdm_error *err)
+// Blocks from the grid and their ranks; sizes that follow from the architecture.
+static sdm_status blocks_set_up(const sdm_section *ranks, const sdm_grid *grid, pod_network *m,
+                                sdm_error *err)
 {
     sdm_pod_arch *a = &m->arch;
     sdm_status s;
@@ -81,6 +87,8 @@ static sdm_status set_up(const sdm_section *ranks, const sdm_grid *grid, pod_net
         ranks->size / 4 != n_blocks || ranks->size % 4)
         return sdm_fail(err, SDM_E_FORMAT, "damaged: %zu ranks of blocks, the grid has %zu blocks",
                         ranks->size / 4, n_blocks);
+
+    // sizes, memory, blocks
     a->n_terms = terms;
     a->n_inputs = inputs - 1;
     a->n_latent = terms + (a->depth ? a->width : 0);
@@ -95,6 +103,8 @@ static sdm_status set_up(const sdm_section *ranks, const sdm_grid *grid, pod_net
     if ((s = SDM_ALLOC(&m->products, a->levels.first[1], "model blocks", err))) return s;
     sdm_pod_blocks(grid, a->block, &a->levels, m->blocks);
     if ((s = read_ranks(ranks, m, err))) return s;
+
+    // one table of polynomials for both degrees
     const size_t poly = inputs > terms ? inputs : terms;
     const size_t degree = a->degree > a->input_degree ? a->degree : a->input_degree;
     if ((s = SDM_ALLOC(&m->exponents, poly * a->n_params, "model polynomials", err))) return s;
@@ -102,9 +112,9 @@ static sdm_status set_up(const sdm_section *ranks, const sdm_grid *grid, pod_net
     return SDM_OK;
 }
 
-// what bytes have beside their panels
-static sdm_status read_bytes(const sdm_section *sections, size_t n, sdm_model *model,
-                             sdm_error *err)
+// The tables of integer weights: wide inputs, order, factors, quanta, limits, scales of the MLP.
+static sdm_status read_integer_tables(const sdm_section *sections, size_t n, sdm_model *model,
+                                      sdm_error *err)
 {
     pod_network *m = model->network;
     const sdm_pod_arch *a = &m->arch;
@@ -122,20 +132,26 @@ static sdm_status read_bytes(const sdm_section *sections, size_t n, sdm_model *m
     m->quantum =
         sdm_model_weights(model, sections, n, "pod.quantum", n_blocks * sizeof *m->quantum, err);
     if (!m->quantum) return SDM_E_FORMAT;
+
+    // memory
     sdm_status s = SDM_ALLOC(&m->wide, n_blocks + 1, "model blocks", err);
     if (!s)
         s = SDM_ALLOC(&m->to_integer, m->coefficients_at[a->levels.n] + SDM_PANEL, "model blocks",
                       err);
     if (s) return s;
+
+    // order of the head's columns
     for (size_t i = 0; i < a->n_latent; i++)
         if (m->order[i] >= a->n_latent)
             return sdm_fail(err, SDM_E_FORMAT, "damaged: latent variable %u of %zu", m->order[i],
                             a->n_latent);
+
+    // limits, scales of the MLP
     const size_t n_limits = a->levels.n + 1 + a->depth;
     const uint8_t *limits = sdm_model_weights(model, sections, n, "pod.limit", n_limits * 4, err);
     if (!limits) return SDM_E_FORMAT;
     for (size_t i = 0; i < n_limits; i++) {
-        const uint32_t limit = number(limits + 4 * i);
+        const uint32_t limit = read_u32(limits + 4 * i);
         if (limit < 1 || limit > INT16_MAX)
             return sdm_fail(err, SDM_E_FORMAT, "damaged: integers up to %u", limit);
         *(i <= a->levels.n ? &m->limit[i] : &m->layer_limit[i - a->levels.n - 1]) = (int)limit;
@@ -144,33 +160,38 @@ static sdm_status read_bytes(const sdm_section *sections, size_t n, sdm_model *m
                                            a->depth * a->width * sizeof *scale, err);
     if (!scale) return SDM_E_FORMAT;
     for (size_t l = 0; l < a->depth; l++) m->layer_scale[l] = scale + l * a->width;
+
+    // factors in units of the quanta, numbers of wide inputs
     for (size_t level = 0; level < a->levels.n; level++)
         for (size_t b = a->levels.first[level]; b < a->levels.first[level + 1]; b++) {
             const size_t at = m->coefficients_at[level] + m->blocks[b].coefficient;
             for (size_t i = at; i < at + m->blocks[b].rank; i++)
                 m->to_integer[i] = m->quantum[b] > 0 ? m->factor[i] / m->quantum[b] : 0;
-            m->wide[b] = number(wide + 4 * b);
+            m->wide[b] = read_u32(wide + 4 * b);
             if (m->wide[b] > m->blocks[b].rank)
                 return sdm_fail(err, SDM_E_FORMAT, "damaged: %u wide columns of a block of rank %u",
                                 m->wide[b], m->blocks[b].rank);
         }
-    m->wide[n_blocks] = number(wide + 4 * n_blocks);
+    m->wide[n_blocks] = read_u32(wide + 4 * n_blocks);
     if (m->wide[n_blocks] > a->n_latent)
         return sdm_fail(err, SDM_E_FORMAT, "damaged: %u wide columns of %zu", m->wide[n_blocks],
                         a->n_latent);
     return SDM_OK;
 }
 
+// Points the network to its weights in the file.
 static sdm_status bind_weights(const sdm_section *sections, size_t n, sdm_model *model,
                                sdm_error *err)
 {
     pod_network *m = model->network;
     const sdm_pod_arch *a = &m->arch;
-    const size_t weight = sdm_pod_size(m->type);
+    const size_t weight = sdm_pod_weight_bytes(m->type);
     if (m->type == SDM_POD_I8) {
-        const sdm_status s = read_bytes(sections, n, model, err);
+        const sdm_status s = read_integer_tables(sections, n, model, err);
         if (s) return s;
     }
+
+    // sections and their sizes
     const struct {
         const char *name;
         size_t size;
@@ -190,6 +211,8 @@ static sdm_status bind_weights(const sdm_section *sections, size_t n, sdm_model 
         data[i] = sdm_model_weights(model, sections, n, need[i].name, need[i].size, err);
         if (!data[i]) return SDM_E_FORMAT;
     }
+
+    // layers of the MLP, head, basis, mean map
     const uint8_t *mlp = data[0];
     for (size_t l = 0; l < a->depth; l++) {
         m->layer[l] = mlp;
@@ -199,11 +222,11 @@ static sdm_status bind_weights(const sdm_section *sections, size_t n, sdm_model 
     m->head = data[1];
     m->basis = data[2];
     m->mean = data[3];
-    sdm_pod_describe_leaves(m);
+    sdm_pod_products_fill(m);
     return SDM_OK;
 }
 
-static double macs(const pod_network *m)
+static double count_macs(const pod_network *m)
 {
     const sdm_pod_arch *a = &m->arch;
     double n = (double)a->n_coefficients * (double)a->n_latent;
@@ -224,19 +247,19 @@ static sdm_status open_network(sdm_model *m, sdm_lines *lines, const sdm_section
     if (s) return s;
     m->network = k;
     s = read_architecture(lines, m->info.n_params, k, err);
-    if (!s) s = set_up(ranks, &m->info.grid, k, err);
+    if (!s) s = blocks_set_up(ranks, &m->info.grid, k, err);
     if (!s) s = bind_weights(sections, n, m, err);
     if (s) return s;
-    m->info.macs = macs(k);
-    // every weight is used once in a map: fewer bytes mean that a size above passed the end of
-    // size_t
-    if (m->info.macs * (double)sdm_pod_size(k->type) > (double)m->info.weight_bytes)
+    m->info.macs = count_macs(k);
+    // Each multiply-add of a map uses a weight of its own. Fewer bytes of weights than that mean
+    // that a computed size has overflowed.
+    if (m->info.macs * (double)sdm_pod_weight_bytes(k->type) > (double)m->info.weight_bytes)
         return sdm_fail(err, SDM_E_FORMAT, "damaged: %zu bytes of weights for %.0f of them",
                         m->info.weight_bytes, m->info.macs);
     return SDM_OK;
 }
 
-static void dispose(void *network)
+static void network_free(void *network)
 {
     pod_network *m = network;
     if (!m) return;
@@ -254,7 +277,7 @@ static void dispose(void *network)
 
 const sdm_model_kind sdm_kind_pod = {.name = "pod",
                                      .open = open_network,
-                                     .dispose = dispose,
+                                     .dispose = network_free,
                                      .scratch_bytes = sdm_pod_scratch_bytes,
                                      .forward = sdm_pod_forward,
                                      .jacobian_scratch_bytes = sdm_pod_jacobian_scratch_bytes,

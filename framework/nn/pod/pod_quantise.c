@@ -1,6 +1,6 @@
-/* Weights as bytes. How large coefficients become is seen at random parameters; from that follows
-   what the rounding of a column does to the map, and which columns need two bytes. Letters as in
-   sdm/pod.h. */
+/* Integer weights of a pod network. The survey shows how large the inputs of each column are; from
+   that follows the error of the map that rounding the column causes, and which columns must be
+   wide. Words and letters as in pod_internal.h. */
 #include "pod_quantise.h"
 
 #include <math.h>
@@ -11,20 +11,18 @@
 #include "sdm/internal/kernels.h"
 #include "sdm/memory.h"
 
-enum {
-    FINE = 127,
-    FINER = 2
-}; // largest integer of a byte; how much finer than the columns of a byte those of two are
-enum { MLP_FINE = 2047 }; // largest integer of the MLP
+enum { BYTE_MAX = 127 };        // largest narrow weight
+enum { WIDE_FINER = 2 };        // error of a wide column <= largest of a narrow one / WIDE_FINER^2
+enum { MLP_WEIGHT_MAX = 2047 }; // largest integer weight of the MLP
 
-// how much larger than in the survey coefficients may become before they are clipped
-#define ROOM 2
+// inputs may become HEADROOM times as large as in the survey before they are clipped
+#define HEADROOM 2
 
-// mean square error of the map that rounding may add, of the variance of the maps: small beside
-// what the most accurate networks leave
-#define TOLERATED 5e-7
+// Rounding may add a mean square error of the map of at most ERROR_SHARE_MAX * variance of the map,
+// which is small beside the error of the most accurate networks.
+#define ERROR_SHARE_MAX 5e-7
 
-// largest magnitude in a column, rows scaled; NaN when one is not finite
+// largest abs(weight / row_scale) in column i, 1 if all are 0; NaN if one is not finite
 static double column_unit(const matrix *m, size_t i)
 {
     double most = 0;
@@ -36,7 +34,7 @@ static double column_unit(const matrix *m, size_t i)
     return most > 0 ? most : 1;
 }
 
-// what an error of 1 of the scale of each row does to the map
+// squared norm of the map for an independent error of 1 * row_scale in each output
 static double gain_of_rows(const matrix *m)
 {
     double sum = 0;
@@ -46,6 +44,7 @@ static double gain_of_rows(const matrix *m)
     return sum;
 }
 
+// squared norm of the map for an input i of 1, taking the outputs as orthogonal
 static double column_gain(const matrix *m, size_t i)
 {
     double sum = 0;
@@ -54,7 +53,9 @@ static double column_gain(const matrix *m, size_t i)
     return sum;
 }
 
-// columns to at most 1, then rows, then columns again; the figures of the matrices below are known
+// Sets the row scales and the units, gains and errors of the columns of m: columns are scaled to a
+// largest magnitude of 1, then rows, then columns again. The matrices of the level below come
+// first.
 static void find_scales(const matrix *m, size_t n_voxels)
 {
     for (size_t o = 0; o < m->outputs && m->out; o++) m->out[o].scale = 1;
@@ -67,17 +68,18 @@ static void find_scales(const matrix *m, size_t n_voxels)
         }
         m->out[o].scale = most > 0 ? most : 1;
     }
+
+    // a rounding error is uniform within one step: variance step^2 / 12
     const double rows = gain_of_rows(m);
     for (size_t i = 0; i < m->k; i++) {
         m->in[i].gain = column_gain(m, i);
         m->in[i].unit = column_unit(m, i);
-        const double step = m->in[i].unit / FINE;
+        const double step = m->in[i].unit / BYTE_MAX;
         m->in[i].error = m->in[i].square * step * step / 12 * rows / (double)n_voxels;
     }
 }
 
-// blocks of a level whose inputs are rounded together: one of the highest, else the children of one
-// above
+// a group: the blocks first .. end - 1 of `level`
 typedef struct group {
     size_t level, first, end;
 } group;
@@ -97,15 +99,16 @@ static group group_at(const survey *s, size_t level, size_t i)
     return (group){level, parent->child, parent->child + parent->n_children};
 }
 
-// the first columns, in pairs as they are stored, that have an error above `worth` for a byte more
-static size_t wide_columns(const matrix *m, double worth)
+// Number of columns of m to make wide, in pairs as they are stored: up to the last pair whose error
+// exceeds error_per_byte for each byte that making it wide costs.
+static size_t wide_columns(const matrix *m, double error_per_byte)
 {
     const double bytes = 2 * (double)sdm_panel_outputs(m->outputs);
     size_t n = m->k;
     while (n) {
         const size_t first = (n - 1) / 2 * 2;
         const double error = m->in[first].error + (n - first > 1 ? m->in[n - 1].error : 0);
-        if (error > worth * bytes) break;
+        if (error > error_per_byte * bytes) break;
         n = first;
     }
     return n;
@@ -123,91 +126,100 @@ static int by_error(const void *a, const void *b)
     return x->column < y->column ? -1 : 1;
 }
 
-// error left in a group when columns worth their byte have two (find_steps())
-static double choose_in_group(const survey *s, group g, double worth, uint32_t *wide)
+// wide[] of the blocks of a group, see wide_columns(). Returns the estimated mean square error of
+// the map from the group: that of the narrow columns, and of the wide ones with the steps of
+// find_steps().
+static double wide_choose_in_group(const survey *s, group g, double error_per_byte, uint32_t *wide)
 {
     double left = 0, most = 0;
     size_t n = 0;
     for (size_t b = g.first; b < g.end; b++) {
         const matrix m = sdm_pod_block_matrix(s, b, g.level);
-        wide[b] = (uint32_t)wide_columns(&m, worth);
+        wide[b] = (uint32_t)wide_columns(&m, error_per_byte);
         n += wide[b];
         for (size_t i = wide[b]; i < m.k; i++)
             left += m.in[i].error, most = fmax(most, m.in[i].error);
     }
-    return left + (double)n * most / (FINER * FINER);
+    return left + (double)n * most / (WIDE_FINER * WIDE_FINER);
 }
 
-// the same in all; numbers of wide columns to wide[blocks + 1]; head: its columns by error
-static double choose(const survey *s, const ranked *head, double worth, uint32_t *wide)
+// wide[blocks + 1] of all blocks and the head; returns the estimated mean square error of the map.
+// head[L]: the columns of the head in descending order of their errors.
+static double wide_choose(const survey *s, const ranked *head, double error_per_byte,
+                          uint32_t *wide)
 {
     const size_t latent = s->spec->arch.n_latent,
                  padded = sdm_panel_outputs(s->spec->arch.n_coefficients);
     double left = 0;
     size_t n = 0;
-    while (n < latent && head[n].error > worth * (double)padded) n++;
+    while (n < latent && head[n].error > error_per_byte * (double)padded) n++;
     n = n < latent ? sdm_panel_even(n) : n;
     wide[n_blocks(s)] = (uint32_t)n;
-    if (n < latent) left += (double)n * head[n].error / (FINER * FINER);
+    if (n < latent) left += (double)n * head[n].error / (WIDE_FINER * WIDE_FINER);
     for (; n < latent; n++) left += head[n].error;
     for (size_t l = 0; l < s->spec->arch.levels.n; l++)
         for (size_t i = 0; i < n_groups(s, l); i++)
-            left += choose_in_group(s, group_at(s, l, i), worth, wide);
+            left += wide_choose_in_group(s, group_at(s, l, i), error_per_byte, wide);
     return left;
 }
 
-// the largest worth with which the error is tolerable
-static sdm_status choose_wide(const survey *s, pod_integers *q, sdm_error *err)
+// q->wide and q->order for the largest error_per_byte with which the error of the map is within
+// ERROR_SHARE_MAX * variance, by bisection.
+static sdm_status wide_find(const survey *s, pod_integers *q, sdm_error *err)
 {
     const size_t latent = s->spec->arch.n_latent, c = s->coefficients_at[s->spec->arch.levels.n];
     ranked *head = NULL;
-    const sdm_status status = SDM_ALLOC(&head, latent, "weights as bytes", err);
+    const sdm_status status = SDM_ALLOC(&head, latent, "integer weights", err);
     if (status) return status;
     double most = 0;
-    for (size_t i = 0; i < c + latent; i++) most = fmax(most, s->figures[i].error);
-    for (size_t i = 0; i < latent; i++) head[i] = (ranked){s->figures[c + i].error, (uint32_t)i};
+    for (size_t i = 0; i < c + latent; i++) most = fmax(most, s->stats[i].error);
+    for (size_t i = 0; i < latent; i++) head[i] = (ranked){s->stats[c + i].error, (uint32_t)i};
     qsort(head, latent, sizeof *head, by_error);
-    double low = -100, high = 0; // binary logarithms of worth / most
+    double low = -100, high = 0; // log2(error_per_byte / most)
     while (high - low > 0.01) {
         const double middle = 0.5 * (low + high);
-        if (choose(s, head, most * exp2(middle), q->wide) <= TOLERATED * s->variance)
+        if (wide_choose(s, head, most * exp2(middle), q->wide) <= ERROR_SHARE_MAX * s->variance)
             low = middle;
         else
             high = middle;
     }
-    choose(s, head, most * exp2(low), q->wide);
+    wide_choose(s, head, most * exp2(low), q->wide);
     for (size_t i = 0; i < latent; i++) q->order[i] = head[i].column;
     sdm_free(head);
     return SDM_OK;
 }
 
-/* Integers. */
+/* Rounding to integers. */
 
-// largest input of a column of one byte, in units of the steps; order[i] (NULL: i) of the columns
+// Largest RMS input of a narrow column times the unit of the column. order[k] (NULL: 0 .. k - 1):
+// order of the columns.
 static double largest_input(const matrix *m, const uint32_t *order, size_t n_wide)
 {
     double most = 0;
     for (size_t i = n_wide; i < m->k; i++) {
-        const figures *f = &m->in[order ? order[i] : i];
+        const coefficient_stats *f = &m->in[order ? order[i] : i];
         most = fmax(most, sqrt(f->square) * f->unit);
     }
     return most;
 }
 
-/* Steps of the columns, of which the first n_wide have two bytes. Those are as fine as their inputs
-   deserve beside `most`, the largest of the others with which they are rounded, and no finer: the
-   smaller the step, the coarser the input. */
+// Steps of the columns, of which the first n_wide are wide. A narrow column has unit / BYTE_MAX.
+// The error of a column is proportional to (RMS input * step)^2: a wide step makes it `most` (of
+// largest_input()) / (WIDE_FINER * BYTE_MAX), and no finer, because inputs are multiplied by the
+// step before they are rounded: a smaller step leaves fewer bits to the input. unit / step is
+// clamped to 2 * BYTE_MAX .. SDM_WIDE.
 static void find_steps(const matrix *m, const uint32_t *order, size_t n_wide, double most)
 {
     for (size_t i = 0; i < m->k; i++) {
-        figures *f = &m->in[order ? order[i] : i];
+        coefficient_stats *f = &m->in[order ? order[i] : i];
         const double share = most > 0 ? sqrt(f->square) * f->unit / most : INFINITY;
-        f->step =
-            f->unit / (i < n_wide ? fmin(fmax(FINER * FINE * share, 2 * FINE), SDM_WIDE) : FINE);
+        f->step = f->unit / (i < n_wide
+                                 ? fmin(fmax(WIDE_FINER * BYTE_MAX * share, 2 * BYTE_MAX), SDM_WIDE)
+                                 : BYTE_MAX);
     }
 }
 
-// to[outputs][k]
+// to[outputs][k] = weights / (step * row_scale), rounded, columns in `order`; 0 where not finite.
 static void round_matrix(const matrix *m, const uint32_t *order, int16_t *to)
 {
     for (size_t o = 0; o < m->outputs; o++)
@@ -218,7 +230,8 @@ static void round_matrix(const matrix *m, const uint32_t *order, int16_t *to)
         }
 }
 
-static void lower(uint32_t *limit, const matrix *m, const int16_t *w)
+// *limit = min(*limit, the limit of the integers w of m)
+static void limit_lower(uint32_t *limit, const matrix *m, const int16_t *w)
 {
     const uint32_t here = (uint32_t)sdm_panel_i8_limit(m->outputs, m->k, w);
     if (here < *limit) *limit = here;
@@ -231,10 +244,11 @@ static void round_block(const survey *s, size_t b, size_t level, double most, po
     float *factor = q->factor + s->coefficients_at[level] + s->spec->blocks[b].coefficient;
     find_steps(&m, NULL, q->wide[b], most);
     round_matrix(&m, NULL, basis);
-    lower(&q->limit[level], &m, basis);
+    limit_lower(&q->limit[level], &m, basis);
     for (size_t i = 0; i < m.k; i++) factor[i] = (float)(m.in[i].scale * m.in[i].step);
 }
 
+// integers, limits and factors of the head and of all blocks
 static void round_all(const survey *s, pod_integers *q)
 {
     const sdm_pod_arch *a = &s->spec->arch;
@@ -243,7 +257,7 @@ static void round_all(const survey *s, pod_integers *q)
     for (size_t l = 0; l <= SDM_POD_MAX_LEVELS; l++) q->limit[l] = INT16_MAX;
     find_steps(&head, q->order, of_head, largest_input(&head, q->order, of_head));
     round_matrix(&head, q->order, q->head);
-    lower(&q->limit[a->levels.n], &head, q->head);
+    limit_lower(&q->limit[a->levels.n], &head, q->head);
     for (size_t i = 0; i < a->n_latent; i++)
         q->factor[s->coefficients_at[a->levels.n] + i] = (float)head.in[q->order[i]].step;
     for (size_t l = 0; l < a->levels.n; l++)
@@ -258,8 +272,7 @@ static void round_all(const survey *s, pod_integers *q)
         }
 }
 
-// what goes into the blocks of a group in the maps of the survey uses a part of the integers:
-// others may be larger by ROOM
+// Quanta: the largest input of a group in the survey, times HEADROOM, becomes the limit.
 static void find_quanta(const survey *s, pod_integers *q)
 {
     for (size_t l = 0; l < s->spec->arch.levels.n; l++)
@@ -269,15 +282,15 @@ static void find_quanta(const survey *s, pod_integers *q)
             for (size_t b = g.first; b < g.end; b++) {
                 const matrix m = sdm_pod_block_matrix(s, b, l);
                 for (size_t c = 0; c < m.k; c++)
-                    most = larger(most, m.in[c].largest * m.in[c].step);
+                    most = max_or_nan(most, m.in[c].largest * m.in[c].step);
             }
             for (size_t b = g.first; b < g.end; b++)
-                q->quantum[b] = (float)(ROOM * most / q->limit[l]);
+                q->quantum[b] = (float)(HEADROOM * most / q->limit[l]);
         }
 }
 
-// the MLP is small: all its weights have two bytes, of which they use 12 bits so that inputs may
-// use 13
+// The MLP is small: all its weights are wide. They use only 12 bits with the sign, so that sums of
+// 32 bits leave about 13 bits to the inputs.
 static void round_mlp(const sdm_pod_spec *spec, pod_integers *q)
 {
     const sdm_pod_arch *a = &spec->arch;
@@ -287,33 +300,33 @@ static void round_mlp(const sdm_pod_spec *spec, pod_integers *q)
         for (size_t o = 0; o < a->width; o++) {
             const float *w = spec->weights.layer[l] + o * k;
             double most = 0;
-            for (size_t i = 0; i < k; i++) most = larger(most, fabs((double)w[i]));
-            q->layer_scale[l * a->width + o] = (float)(most / MLP_FINE);
+            for (size_t i = 0; i < k; i++) most = max_or_nan(most, fabs((double)w[i]));
+            q->layer_scale[l * a->width + o] = (float)(most / MLP_WEIGHT_MAX);
             for (size_t i = 0; i < k; i++)
                 to[o * k + i] =
-                    (int16_t)(isfinite(w[i] / most) ? lrint(w[i] / most * MLP_FINE) : 0);
+                    (int16_t)(isfinite(w[i] / most) ? lrint(w[i] / most * MLP_WEIGHT_MAX) : 0);
         }
         q->layer_limit[l] = (uint32_t)sdm_panel_i8_limit(a->width, k, to);
         to += a->width * k;
     }
 }
 
-static sdm_status allocate(const survey *s, pod_integers *q, sdm_error *err)
+static sdm_status integers_allocate(const survey *s, pod_integers *q, sdm_error *err)
 {
     const sdm_pod_arch *a = &s->spec->arch;
-    sdm_status status = SDM_ALLOC(&q->wide, n_blocks(s) + 1, "weights as bytes", err);
-    if (!status) status = SDM_ALLOC(&q->order, a->n_latent, "weights as bytes", err);
+    sdm_status status = SDM_ALLOC(&q->wide, n_blocks(s) + 1, "integer weights", err);
+    if (!status) status = SDM_ALLOC(&q->order, a->n_latent, "integer weights", err);
     if (!status)
         status = SDM_ALLOC(&q->factor, s->coefficients_at[a->levels.n] + a->n_latent,
-                           "weights as bytes", err);
+                           "integer weights", err);
     size_t mlp = 0;
     for (size_t l = 0; l < a->depth; l++) mlp += a->width * sdm_pod_layer_inputs(a, l);
-    if (!status) status = SDM_ALLOC(&q->mlp, mlp, "weights as bytes", err);
-    if (!status) status = SDM_ALLOC(&q->layer_scale, a->depth * a->width, "weights as bytes", err);
-    if (!status) status = SDM_ALLOC(&q->quantum, n_blocks(s), "weights as bytes", err);
+    if (!status) status = SDM_ALLOC(&q->mlp, mlp, "integer weights", err);
+    if (!status) status = SDM_ALLOC(&q->layer_scale, a->depth * a->width, "integer weights", err);
+    if (!status) status = SDM_ALLOC(&q->quantum, n_blocks(s), "integer weights", err);
     if (!status)
-        status = SDM_ALLOC(&q->head, a->n_coefficients * a->n_latent, "weights as bytes", err);
-    if (!status) status = SDM_ALLOC(&q->basis, s->basis_at[n_blocks(s)], "weights as bytes", err);
+        status = SDM_ALLOC(&q->head, a->n_coefficients * a->n_latent, "integer weights", err);
+    if (!status) status = SDM_ALLOC(&q->basis, s->basis_at[n_blocks(s)], "integer weights", err);
     return status;
 }
 
@@ -323,7 +336,7 @@ sdm_status sdm_pod_quantise(const sdm_pod_spec *spec, pod_integers *out, sdm_err
     survey s;
     *out = (pod_integers){0};
     sdm_status status = sdm_pod_survey(spec, &s, err);
-    if (!status) status = allocate(&s, out, err);
+    if (!status) status = integers_allocate(&s, out, err);
     if (!status) {
         for (size_t l = 0; l < a->levels.n; l++)
             for (size_t b = a->levels.first[l]; b < a->levels.first[l + 1]; b++) {
@@ -332,7 +345,7 @@ sdm_status sdm_pod_quantise(const sdm_pod_spec *spec, pod_integers *out, sdm_err
             }
         const matrix head = sdm_pod_head_matrix(&s);
         find_scales(&head, a->n_voxels);
-        status = choose_wide(&s, out, err);
+        status = wide_find(&s, out, err);
     }
     if (!status) round_all(&s, out);
     if (!status) find_quanta(&s, out);

@@ -1,19 +1,20 @@
-/* The order in which the blocks of a pod network are decoded: slabs of blocks of the highest level
-   along x; in each the levels above the lowest depth first, then its blocks of the lowest level
-   along x, so that rows of the map are written from end to end. */
+/* The order in which the blocks of a pod network are decoded: slab by slab; in each the levels
+   above 0 depth first, then the leaves with x fastest, so that whole rows of the map are written.
+   Words as in pod_internal.h. */
 #include "pod_internal.h"
 
-// first block of the lowest level below block b of `level`
+// the first descendant of block b, `level` levels below it
 static size_t first_leaf(const sdm_pod_block *blocks, size_t b, size_t level)
 {
     while (level-- > 0) b = blocks[b].child;
     return b;
 }
 
-// sets leaves[] of a slab; their blocks fill a box of the grid
+// Sets leaves[] of a slab, x fastest. Its leaves fill a box of the grid that spans all of x.
 static void order_leaves(const sdm_pod_levels *levels, const sdm_pod_block *blocks, size_t edge,
                          const pod_slab *s, pod_leaf *leaves)
 {
+    // number of leaves of the box along x and y
     const sdm_pod_block *first = &blocks[s->leaf];
     size_t nx = 0, ny = 0;
     for (size_t b = s->leaf; b < s->leaf_end; b++) {
@@ -22,6 +23,8 @@ static void order_leaves(const sdm_pod_levels *levels, const sdm_pod_block *bloc
         if (x > nx) nx = x;
         if (y > ny) ny = y;
     }
+
+    // each leaf to its place in the box
     for (size_t g = s->group, b = s->leaf; g < s->group_end; g++) {
         const size_t n = levels->n > 1 ? blocks[g].n_children : 1;
         for (size_t end = b + n; b < end; b++) {
@@ -44,6 +47,8 @@ size_t sdm_pod_slabs(const sdm_pod_levels *levels, const sdm_pod_block *blocks, 
         s->top = (uint32_t)b;
         while (b < end && blocks[b].at[1] == first->at[1] && blocks[b].at[2] == first->at[2]) b++;
         s->top_end = (uint32_t)b;
+
+        // its leaves and groups: descendants of contiguous blocks are contiguous
         s->leaf = (uint32_t)first_leaf(blocks, s->top, top);
         s->leaf_end = (uint32_t)(b < end ? first_leaf(blocks, b, top) : levels->first[1]);
         s->group = (uint32_t)first_leaf(blocks, s->top, top - groups);
@@ -76,36 +81,38 @@ size_t sdm_pod_count_mlp(sdm_pod_type type, const sdm_pod_arch *a)
     return n;
 }
 
-typedef struct placing {
+// Running offset of sdm_pod_place_weights().
+typedef struct placement {
     sdm_pod_type type;
     const sdm_pod_block *blocks;
     const uint32_t *wide;
     size_t next, *at;
-} placing;
+} placement;
 
-static void place(placing *p, size_t b)
+static void block_place(placement *p, size_t b)
 {
     p->at[b] = p->next;
     p->next += sdm_pod_count_weights(p->type, sdm_pod_outputs(p->blocks, b),
                                      p->wide ? p->wide[b] : 0, p->blocks[b].rank);
 }
 
-static void place_upper(placing *p, size_t b, size_t level)
+// block b of `level` and its descendants above level 0, depth first
+static void upper_place(placement *p, size_t b, size_t level)
 {
     if (level == 0) return;
-    place(p, b);
+    block_place(p, b);
     for (size_t i = 0; i < p->blocks[b].n_children; i++)
-        place_upper(p, p->blocks[b].child + i, level - 1);
+        upper_place(p, p->blocks[b].child + i, level - 1);
 }
 
 size_t sdm_pod_place_weights(sdm_pod_type type, const sdm_pod_levels *levels,
                              const sdm_pod_block *blocks, const pod_slab *slabs, size_t n_slabs,
                              const pod_leaf *leaves, const uint32_t *wide, size_t *at)
 {
-    placing p = {type, blocks, wide, 0, at};
+    placement p = {type, blocks, wide, 0, at};
     for (const pod_slab *s = slabs; s < slabs + n_slabs; s++) {
-        for (size_t b = s->top; b < s->top_end; b++) place_upper(&p, b, levels->n - 1);
-        for (size_t i = s->leaf; i < s->leaf_end; i++) place(&p, leaves[i].block);
+        for (size_t b = s->top; b < s->top_end; b++) upper_place(&p, b, levels->n - 1);
+        for (size_t i = s->leaf; i < s->leaf_end; i++) block_place(&p, leaves[i].block);
     }
     return p.next;
 }
@@ -118,7 +125,7 @@ size_t sdm_pod_mean_count(const sdm_pod_levels *levels, const sdm_pod_block *blo
     return n;
 }
 
-void sdm_pod_describe_leaves(pod_network *m)
+void sdm_pod_products_fill(pod_network *m)
 {
     size_t mean = 0;
     for (const pod_slab *s = m->slabs; s < m->slabs + m->n_slabs; s++)
@@ -131,7 +138,7 @@ void sdm_pod_describe_leaves(pod_network *m)
                                                .n_wide = m->wide ? m->wide[b] : 0,
                                                .k = k->rank,
                                                .x = k->coefficient - s->coefficient,
-                                               .scale = m->leaves[i].group * SDM_POD_GROUP,
+                                               .scale = m->leaves[i].group * SDM_POD_ROWS,
                                                .y = k->at[0]};
             mean += sdm_panel_outputs(m->outputs[b]);
         }

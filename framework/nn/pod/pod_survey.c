@@ -1,6 +1,6 @@
-/* Random parameters through the layers of a pod network, before its weights are packed. N samples:
-   mean squares are over those from all of the ranges, the largest magnitudes also over those from
-   their corners and faces, where they are found soonest. */
+/* Survey of a pod network: its layers are evaluated in floats at N random parameters. Mean squares
+   are over the samples that are uniform in the parameter ranges. Largest magnitudes are over all
+   samples, including corners and faces of the ranges, where extremes are most likely. */
 #include "pod_survey.h"
 
 #include <math.h>
@@ -20,8 +20,8 @@ matrix sdm_pod_head_matrix(const survey *s)
                     .k = a->n_latent,
                     .row = a->n_latent,
                     .col = 1,
-                    .in = s->figures + s->coefficients_at[a->levels.n],
-                    .out = s->figures + s->coefficients_at[a->levels.n - 1]};
+                    .in = s->stats + s->coefficients_at[a->levels.n],
+                    .out = s->stats + s->coefficients_at[a->levels.n - 1]};
 }
 
 matrix sdm_pod_block_matrix(const survey *s, size_t b, size_t level)
@@ -33,14 +33,14 @@ matrix sdm_pod_block_matrix(const survey *s, size_t b, size_t level)
                 .k = k->rank,
                 .row = 1,
                 .col = outputs,
-                .in = s->figures + s->coefficients_at[level] + k->coefficient};
+                .in = s->stats + s->coefficients_at[level] + k->coefficient};
     if (level)
-        m.out = s->figures + s->coefficients_at[level - 1] + s->spec->blocks[k->child].coefficient;
+        m.out = s->stats + s->coefficients_at[level - 1] + s->spec->blocks[k->child].coefficient;
     return m;
 }
 
-// parameter i of sample n, in [-1, 1]; of up to six parameters every corner is met, on faces about
-// half of them are at an end
+// Parameter i of sample n, in [-1, 1]: uniform; on corners (all 64 corners of the first six
+// parameters); on faces, where each parameter is -1 or 1 with probability 1/2 and else uniform.
 static double sample_parameter(size_t n, size_t i, size_t n_params)
 {
     const double x = 2 * sdm_rng_uniform(0, STREAM, n * n_params + i) - 1;
@@ -49,7 +49,7 @@ static double sample_parameter(size_t n, size_t i, size_t n_params)
     return n >= RANDOM + CORNERS && fabs(x) < 0.5 ? 2 * x : x < 0 ? -1 : 1;
 }
 
-// z[N][L]
+// z[N][L] = the latents of all samples.
 static sdm_status sample_latent(const sdm_pod_spec *spec, float *z, sdm_error *err)
 {
     const sdm_pod_arch *a = &spec->arch;
@@ -57,10 +57,12 @@ static sdm_status sample_latent(const sdm_pod_spec *spec, float *z, sdm_error *e
     const size_t degree = a->degree > a->input_degree ? a->degree : a->input_degree;
     uint8_t *exponents = NULL;
     float *phi = NULL, *h[2] = {NULL, NULL};
-    sdm_status s = SDM_ALLOC(&exponents, total * a->n_params, "weights as bytes", err);
-    if (!s) s = SDM_ALLOC(&phi, N * total, "weights as bytes", err);
-    for (int i = 0; i < 2 && !s; i++) s = SDM_ALLOC(&h[i], N * w, "weights as bytes", err);
+    sdm_status s = SDM_ALLOC(&exponents, total * a->n_params, "integer weights", err);
+    if (!s) s = SDM_ALLOC(&phi, N * total, "integer weights", err);
+    for (int i = 0; i < 2 && !s; i++) s = SDM_ALLOC(&h[i], N * w, "integer weights", err);
     if (s) goto done;
+
+    // polynomials
     sdm_poly_table(a->n_params, degree, exponents);
     for (size_t n = 0; n < N; n++) {
         double x[SDM_POD_MAX_PARAMS];
@@ -68,6 +70,8 @@ static sdm_status sample_latent(const sdm_pod_spec *spec, float *z, sdm_error *e
         sdm_poly_eval(exponents, total, a->n_params, degree, x, phi + n * total, NULL);
         memcpy(z + n * a->n_latent, phi + n * total, a->n_terms * sizeof *z);
     }
+
+    // MLP
     const float *in = phi + 1;
     size_t stride = total;
     for (size_t l = 0; l < a->depth; l++) {
@@ -89,27 +93,29 @@ done:
     return s;
 }
 
-static void observe(size_t n, const float *x, size_t ldx, figures *f)
+// adds the samples x[N][ldx] of n coefficients to their statistics f[n]
+static void stats_update(size_t n, const float *x, size_t ldx, coefficient_stats *f)
 {
     for (size_t r = 0; r < N; r++)
         for (size_t i = 0; i < n; i++) {
             const double v = x[r * ldx + i];
             if (r < RANDOM) f[i].square += v * v / RANDOM;
-            f[i].largest = larger(f[i].largest, fabs(v));
+            f[i].largest = max_or_nan(f[i].largest, fabs(v));
         }
 }
 
-// c[N][ldc]: coefficients of block b; y: of each level [N][most outputs of a block there]
-static void sample_block(survey *s, size_t b, size_t level, const float *c, size_t ldc,
+// Statistics of block b of `level` and its descendants. c[N][ldc]: coefficients of b; y[level]:
+// buffer for the outputs of a block of each level.
+static void block_sample(survey *s, size_t b, size_t level, const float *c, size_t ldc,
                          float *const *y)
 {
     const sdm_pod_block *k = &s->spec->blocks[b];
     const matrix m = sdm_pod_block_matrix(s, b, level);
-    observe(m.k, c, ldc, m.in);
+    stats_update(m.k, c, ldc, m.in);
     sdm_gemm(N, m.outputs, m.k, (sdm_view){c, ldc, 1}, (sdm_view){m.w, m.col, m.row}, false,
              y[level], m.outputs, 1);
     for (size_t i = k->child; i < k->child + k->n_children; i++)
-        sample_block(s, i, level - 1,
+        block_sample(s, i, level - 1,
                      y[level] +
                          (s->spec->blocks[i].coefficient - s->spec->blocks[k->child].coefficient),
                      m.outputs, y);
@@ -117,29 +123,33 @@ static void sample_block(survey *s, size_t b, size_t level, const float *c, size
         s->variance += (double)y[0][i] * y[0][i] / RANDOM / (double)s->spec->arch.n_voxels;
 }
 
-static sdm_status sample(survey *s, sdm_error *err)
+static sdm_status survey_sample(survey *s, sdm_error *err)
 {
     const sdm_pod_arch *a = &s->spec->arch;
     const size_t top = a->levels.n - 1;
+
+    // memory for the latents, and for the outputs of a block of each level
     float *z = NULL, *c = NULL, *y[SDM_POD_MAX_LEVELS] = {NULL};
-    sdm_status status = SDM_ALLOC(&z, N * a->n_latent, "weights as bytes", err);
-    if (!status) status = SDM_ALLOC(&c, N * a->n_coefficients, "weights as bytes", err);
+    sdm_status status = SDM_ALLOC(&z, N * a->n_latent, "integer weights", err);
+    if (!status) status = SDM_ALLOC(&c, N * a->n_coefficients, "integer weights", err);
     for (size_t l = 0; l < a->levels.n && !status; l++) {
         size_t most = 1;
         for (size_t b = a->levels.first[l]; b < a->levels.first[l + 1]; b++) {
             const size_t outputs = sdm_pod_outputs(s->spec->blocks, b);
             if (outputs > most) most = outputs;
         }
-        status = SDM_ALLOC(&y[l], N * most, "weights as bytes", err);
+        status = SDM_ALLOC(&y[l], N * most, "integer weights", err);
     }
+
+    // latents, coefficients of the highest level, then all blocks below
     if (!status) status = sample_latent(s->spec, z, err);
     if (!status) {
         const matrix m = sdm_pod_head_matrix(s);
-        observe(m.k, z, m.k, m.in);
+        stats_update(m.k, z, m.k, m.in);
         sdm_gemm(N, m.outputs, m.k, (sdm_view){z, m.k, 1}, (sdm_view){m.w, m.col, m.row}, false, c,
                  m.outputs, 1);
         for (size_t b = a->levels.first[top]; b < a->levels.first[top + 1]; b++)
-            sample_block(s, b, top, c + s->spec->blocks[b].coefficient, a->n_coefficients, y);
+            block_sample(s, b, top, c + s->spec->blocks[b].coefficient, a->n_coefficients, y);
     }
     for (size_t l = 0; l < a->levels.n; l++) sdm_free(y[l]);
     sdm_free(c);
@@ -152,20 +162,20 @@ sdm_status sdm_pod_survey(const sdm_pod_spec *spec, survey *s, sdm_error *err)
     const sdm_pod_arch *a = &spec->arch;
     *s = (survey){.spec = spec};
     sdm_pod_place_coefficients(&a->levels, spec->blocks, s->coefficients_at);
-    sdm_status status = SDM_ALLOC(&s->basis_at, n_blocks(s) + 1, "weights as bytes", err);
+    sdm_status status = SDM_ALLOC(&s->basis_at, n_blocks(s) + 1, "integer weights", err);
     if (!status)
-        status = SDM_ALLOC(&s->figures, s->coefficients_at[a->levels.n] + a->n_latent,
-                           "weights as bytes", err);
+        status = SDM_ALLOC(&s->stats, s->coefficients_at[a->levels.n] + a->n_latent,
+                           "integer weights", err);
     if (status) return status;
     for (size_t b = 0; b < n_blocks(s); b++)
         s->basis_at[b + 1] =
             s->basis_at[b] + sdm_pod_outputs(spec->blocks, b) * spec->blocks[b].rank;
-    return sample(s, err);
+    return survey_sample(s, err);
 }
 
 void sdm_pod_survey_dispose(survey *s)
 {
-    sdm_free(s->figures);
+    sdm_free(s->stats);
     sdm_free(s->basis_at);
     *s = (survey){0};
 }

@@ -1,39 +1,41 @@
-/* What the weights of a pod network do, seen at random parameters (pod_quantise.c). Letters as in
- * sdm/pod.h. */
+/* Survey of a pod network: statistics of its coefficients at random parameters, from which
+   pod_quantise.c derives the integer weights. Words and letters as in pod_internal.h. */
 #ifndef SDM_POD_SURVEY_H
 #define SDM_POD_SURVEY_H
 
 #include "pod_internal.h"
 
-/* Of a coefficient of a block, or of a latent variable; all but the first two are left to
- * sdm_pod_quantise(). */
-typedef struct figures {
-    double square;  /* mean square */
-    double largest; /* magnitude; NaN when one is not a number */
-    double gain;    /* square of the map that a coefficient of 1 makes */
-    double unit;    /* largest magnitude in its column */
-    double scale;   /* of the row that gives it */
-    double error;   /* mean square error of the map when its column is single bytes */
-    double step;    /* of the integers of its column */
-} figures;
+/* Statistics of a coefficient or a latent, which is the input of a column of a matrix, and except
+   for latents the output of a row of another. sdm_pod_survey() sets the first two members,
+   sdm_pod_quantise() the others. */
+typedef struct coefficient_stats {
+    double square;  /* mean square at uniform parameters */
+    double largest; /* largest magnitude; NaN if one is */
+    double gain;    /* squared Euclidean norm of the map of a coefficient of 1, mm^2 */
+    double unit;    /* largest abs(weight / row_scale) in its column */
+    double scale;   /* row_scale of the row that computes it */
+    double error;   /* mean square error of the map if its column is narrow, mm^2 */
+    double step;    /* of its column */
+} coefficient_stats;
 
 typedef struct survey {
     const sdm_pod_spec *spec;
-    size_t *basis_at; /* [blocks] first weight of a block in spec->weights.basis */
-    size_t coefficients_at[SDM_POD_MAX_LEVELS + 1]; /* the last: C */
-    figures *figures;                               /* [C + L] */
-    double variance;                                /* of the map about its mean */
+    size_t *basis_at; /* [blocks + 1] index of the first weight of a block in spec->weights.basis */
+    size_t coefficients_at[SDM_POD_MAX_LEVELS + 1]; /* as in pod_network */
+    coefficient_stats *stats;                       /* [C + L] of coefficients, then of latents */
+    double variance; /* mean square of map - mean map, over voxels and parameters, mm^2 */
 } survey;
 
-/* Weights w[outputs][k] at w[o * row + i * col]. */
+/* The matrix from k inputs to `outputs` outputs: weight (o, i) is w[o * row + i * col]. */
 typedef struct matrix {
     const float *w;
     size_t outputs, k, row, col;
-    figures *in;  /* [k] */
-    figures *out; /* [outputs], NULL: voxels */
+    coefficient_stats *in;  /* [k] of the inputs */
+    coefficient_stats *out; /* [outputs] of the outputs; NULL: voxels, scale and gain 1 */
 } matrix;
 
-static inline double larger(double a, double b) { return b > a || b != b ? b : a; } // NaN stays
+/* The maximum; NaN if a or b is NaN. */
+static inline double max_or_nan(double a, double b) { return b > a || b != b ? b : a; }
 
 static inline double weight(const matrix *m, size_t o, size_t i)
 {
@@ -47,12 +49,12 @@ static inline size_t n_blocks(const survey *s)
     return s->spec->arch.levels.first[s->spec->arch.levels.n];
 }
 
-/* The weights that give the coefficients of the highest level; those of block b of `level`. */
+/* The head, and the basis of block b of `level`, as matrices. */
 matrix sdm_pod_head_matrix(const survey *s);
 matrix sdm_pod_block_matrix(const survey *s, size_t b, size_t level);
 
-/* Mean squares of all coefficients and latent variables, variance of the map. SDM_E_NOMEM;
- * sdm_pod_survey_dispose() also after an error. */
+/* Fills *s: mean square and largest magnitude of all coefficients and latents, variance of the map.
+   SDM_E_NOMEM. Call sdm_pod_survey_dispose() after success and after an error. */
 sdm_status sdm_pod_survey(const sdm_pod_spec *spec, survey *s, sdm_error *err);
 void sdm_pod_survey_dispose(survey *s);
 

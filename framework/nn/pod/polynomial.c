@@ -9,8 +9,8 @@
 
 size_t sdm_poly_count(size_t n, size_t degree)
 {
-    // binomial(n + degree, degree); every partial product is itself a binomial, so the division is
-    // exact
+    // binomial(n + degree, degree); each partial product is itself a binomial coefficient, so that
+    // the division is exact
     size_t c = 1;
     for (size_t i = 1; i <= degree; i++) {
         if (c > SIZE_MAX / (n + i)) return SIZE_MAX;
@@ -19,8 +19,9 @@ size_t sdm_poly_count(size_t n, size_t degree)
     return c;
 }
 
-// writes all exponents of exactly `left` in variables v .. n-1
-static uint8_t *fill(size_t n, size_t v, size_t left, uint8_t *current, uint8_t *out)
+// Appends all products whose degrees in variables v .. n - 1 add up to `left`; the degrees of the
+// variables before v are in current[]. Returns the end of the table.
+static uint8_t *exponents_fill(size_t n, size_t v, size_t left, uint8_t *current, uint8_t *out)
 {
     if (v + 1 == n) {
         current[v] = (uint8_t)left;
@@ -29,7 +30,7 @@ static uint8_t *fill(size_t n, size_t v, size_t left, uint8_t *current, uint8_t 
     }
     for (size_t e = left + 1; e-- > 0;) {
         current[v] = (uint8_t)e;
-        out = fill(n, v + 1, left - e, current, out);
+        out = exponents_fill(n, v + 1, left - e, current, out);
     }
     return out;
 }
@@ -37,15 +38,16 @@ static uint8_t *fill(size_t n, size_t v, size_t left, uint8_t *current, uint8_t 
 void sdm_poly_table(size_t n, size_t degree, uint8_t *exponents)
 {
     uint8_t current[SDM_POD_MAX_PARAMS] = {0};
-    for (size_t d = 0; d <= degree; d++) exponents = fill(n, 0, d, current, exponents);
+    for (size_t d = 0; d <= degree; d++) exponents = exponents_fill(n, 0, d, current, exponents);
 }
 
 void sdm_poly_eval(const uint8_t *exponents, size_t n_terms, size_t n, size_t degree,
                    const double *x, float *phi, float *dphi)
 {
+    // normalised Legendre polynomials of each variable, and their derivatives
     double value[SDM_POD_MAX_PARAMS][MAX_DEGREE + 1], slope[SDM_POD_MAX_PARAMS][MAX_DEGREE + 1];
     for (size_t v = 0; v < n; v++) {
-        // three-term recurrence, and P'(k+1) = P'(k-1) + (2k+1) P(k)
+        // (k + 1) P(k+1) = (2k + 1) x P(k) - k P(k-1), P'(k+1) = P'(k-1) + (2k + 1) P(k)
         double p[MAX_DEGREE + 1] = {1, x[v]}, q[MAX_DEGREE + 1] = {0, 1};
         for (size_t k = 1; k < degree; k++) {
             const double dk = (double)k;
@@ -57,6 +59,7 @@ void sdm_poly_eval(const uint8_t *exponents, size_t n_terms, size_t n, size_t de
             value[v][k] = norm * p[k], slope[v][k] = norm * q[k];
         }
     }
+    // their products
     for (size_t t = 0; t < n_terms; t++, exponents += n) {
         double product = 1;
         for (size_t v = 0; v < n; v++) product *= value[v][exponents[v]];

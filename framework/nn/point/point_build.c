@@ -1,60 +1,28 @@
-/* Layout of point networks, and making of their model file from weights. */
+/* Builds the file of a point network from its weights. */
 #include <string.h>
 
 #include "point_internal.h"
 #include "sdm/internal/kernels.h"
 #include "sdm/memory.h"
 
-size_t sdm_point_count(const sdm_point_arch *a)
-{
-    size_t n = a->width[a->depth - 1] + 1;
-    for (size_t l = 0; l < a->depth; l++) n += a->width[l] * (sdm_point_inputs(a, l) + 1);
-    return n;
-}
-
-size_t sdm_point_macs(const sdm_point_arch *a)
-{
-    size_t n = a->width[a->depth - 1];
-    for (size_t l = 0; l < a->depth; l++) n += a->width[l] * sdm_point_inputs(a, l);
-    return n;
-}
-
-size_t sdm_point_hidden_count(const sdm_point_arch *a, size_t *at)
-{
-    size_t n = 0;
-    for (size_t l = 0; l < a->depth; l++) {
-        if (at) at[l] = n;
-        if (l) n += sdm_panel_count(a->width[l], a->width[l - 1]);
-    }
-    return n;
-}
-
-size_t sdm_point_input_count(const sdm_point_arch *a, size_t *at)
-{
-    size_t n = 0;
-    for (size_t l = 0; l < a->depth; l++) {
-        if (at) at[l] = n;
-        n += a->width[l] * (1 + (sdm_point_enters(a, l) ? a->n_params + 3 : 0));
-    }
-    return n + a->width[a->depth - 1] + 1;
-}
-
-// read back by point_open.c
-static void describe(const sdm_point_spec *spec, sdm_text *t)
+// the text that read_architecture() of point_open.c reads
+static void description_write(const sdm_point_spec *spec, sdm_text *t)
 {
     const sdm_point_arch *a = &spec->arch;
     sdm_model_describe(spec->info, spec->kind, t);
     sdm_text_add(t, "point.depth=%zu\n", a->depth);
     for (size_t l = 0; l < a->depth; l++)
-        sdm_text_add(t, "point.width=%zu\npoint.input=%d\n", a->width[l], sdm_point_enters(a, l));
+        sdm_text_add(t, "point.width=%zu\npoint.input=%d\n", a->width[l],
+                     sdm_point_takes_input(a, l));
     sdm_text_add(t, "point.activation=%d\npoint.tanh=%d\npoint.half=%d\n", a->activation,
                  a->tanh_output, spec->half);
-    sdm_put_reals(t, "point.centre", a->centre, 3);
-    sdm_put_real(t, "point.radius", a->radius);
-    sdm_put_real(t, "point.scale", a->scale);
+    sdm_text_add_reals(t, "point.centre", a->centre, 3);
+    sdm_text_add_real(t, "point.radius", a->radius);
+    sdm_text_add_real(t, "point.scale", a->scale);
 }
 
-static void pack(const sdm_point_spec *spec, void *hidden, float *input)
+// the sections "point.hidden" and "point.input"
+static void weights_pack(const sdm_point_spec *spec, void *hidden, float *input)
 {
     const sdm_point_arch *a = &spec->arch;
     const float *w = spec->weights;
@@ -92,8 +60,8 @@ sdm_status sdm_point_build(const sdm_point_spec *spec, uint8_t **bytes, size_t *
     sdm_status s = SDM_ALLOC(&hidden, hidden_bytes, "model weights", err);
     if (!s) s = SDM_ALLOC(&input, inputs, "model weights", err);
     if (!s) {
-        pack(spec, hidden, input);
-        describe(spec, &text);
+        weights_pack(spec, hidden, input);
+        description_write(spec, &text);
         const sdm_section sections[] = {{"point.hidden", hidden, hidden_bytes},
                                         {"point.input", input, inputs * sizeof *input}};
         s = sdm_model_pack(spec->info, &text, sections, sizeof sections / sizeof *sections, bytes,

@@ -1,9 +1,10 @@
-/* A point network at work: all voxels of a map, with derivatives by forward mode. No allocation.
+/* Evaluation of a point network at all voxels of a map, with derivatives by forward mode. No
+   allocation. Letters as in sdm/internal/point_network.h.
 
-   What the parameters give to a layer is the same for all points of a map and is added to the bias
-   once: the input enters as its three coordinates. R points go through all layers together. A point
-   with tangents has 1 + P rows: the values of all R points, then, for each parameter, the tangents
-   of all R. */
+   The parameters are the same for all points of a map: their part of W_l u is added to the bias
+   once, so that only the three coordinates q enter at each point. R points pass through all layers
+   together. With derivatives each point has 1 + P rows: first the values of all R points, then for
+   each parameter the tangents of all R points. */
 #include <math.h>
 #include <string.h>
 
@@ -12,21 +13,23 @@
 #include "sdm/internal/pod.h"
 #include "sdm/internal/threads.h"
 
+// rounded up to whole panels
 static size_t pad(size_t n) { return sdm_panel_outputs(n); }
 
-// of one map: bias[1 + P][sum of pad(W_l)], the bias of each layer with the parameters in it, and
-// its derivatives by the parameters
+// Of one map: data[1 + P][stride], set 0: the bias of each layer plus the parameters' part of W_l
+// u; sets 1 .. P: its derivatives by the parameters. Layer l begins at at[l] of a set.
 typedef struct map_bias {
     size_t at[SDM_POINT_MAX_DEPTH], stride;
     float *data;
 } map_bias;
 
-// of one thread
+// scratch memory of one thread
 typedef struct workspace {
     float *h[2];  // [rows][pad(max width)]
-    float *slope; // [R][max width]
+    float *slope; // [R][max width] derivative of the activation
 } workspace;
 
+// sets b->at and b->stride; returns the floats of `sets` sets
 static size_t bias_floats(const point_network *k, size_t sets, map_bias *b)
 {
     b->stride = 0;
@@ -37,6 +40,7 @@ static size_t bias_floats(const point_network *k, size_t sets, map_bias *b)
     return sets * b->stride;
 }
 
+// sets the pointers into memory[] (NULL: none) for `rows` rows; returns the floats needed
 static size_t carve(const point_network *k, size_t rows, float *memory, workspace *w)
 {
     const size_t width = pad(k->max_width);
@@ -50,7 +54,8 @@ static size_t carve(const point_network *k, size_t rows, float *memory, workspac
     return total; // a multiple of 16 floats
 }
 
-static void set_bias(const sdm_model *m, const double *p, bool tangents, map_bias *b)
+// b->data at the parameters p[P]; sets 1 .. P only with `tangents`
+static void bias_set(const sdm_model *m, const double *p, bool tangents, map_bias *b)
 {
     const point_network *k = m->network;
     const sdm_point_arch *a = &k->arch;
@@ -71,8 +76,9 @@ static void set_bias(const sdm_model *m, const double *p, bool tangents, map_bia
     }
 }
 
-// q[n][3] of the voxels from `first` on
-static void place(const sdm_grid *g, const sdm_point_arch *a, size_t first, size_t n, float *q)
+// q[n][3] = scaled coordinates of the voxels from `first` on
+static void coordinates_fill(const sdm_grid *g, const sdm_point_arch *a, size_t first, size_t n,
+                             float *q)
 {
     const size_t nx = (size_t)g->n[0], ny = (size_t)g->n[1];
     for (size_t v = first; v < first + n; v++, q += 3) {
@@ -84,9 +90,9 @@ static void place(const sdm_grid *g, const sdm_point_arch *a, size_t first, size
     }
 }
 
-// y[n][ldy] = matrix of layer l times x[n][ldx]
-static void multiply(const point_network *k, size_t l, size_t n, const float *x, size_t ldx,
-                     float *y, size_t ldy)
+// y[n][ldy] = x[n][ldx] times the matrix of layer l > 0
+static void layer_multiply(const point_network *k, size_t l, size_t n, const float *x, size_t ldx,
+                           float *y, size_t ldy)
 {
     const size_t before = k->arch.width[l - 1], at = k->hidden_at[l];
     if (k->half)
@@ -96,14 +102,14 @@ static void multiply(const point_network *k, size_t l, size_t n, const float *x,
         sdm_panel_f32(n, k->arch.width[l], before, (const float *)k->hidden + at, x, ldx, y, ldy);
 }
 
-// y[n][ldy] += bias[width], and coordinates times their columns of the matrix when the input
-// enters; fresh: y is not added to
+// y[n][ldy] += bias[width] + columns[3][width]^T q[n][3]; columns NULL: bias only. clear: y is set
+// to zero first.
 static void add_input(size_t n, size_t width, const float *bias, const float *columns,
-                      const float *q, bool fresh, float *y, size_t ldy)
+                      const float *q, bool clear, float *y, size_t ldy)
 {
     for (size_t i = 0; i < n; i++, y += ldy) {
         const float *x = columns, *b = bias;
-        if (fresh) memset(y, 0, width * sizeof *y);
+        if (clear) memset(y, 0, width * sizeof *y);
         if (x && q) {
             const float q0 = q[3 * i], q1 = q[3 * i + 1], q2 = q[3 * i + 2];
             for (size_t o = 0; o < width; o++)
@@ -125,17 +131,19 @@ static float dot(const float *a, const float *b, size_t n)
     return sum;
 }
 
-// n <= R points at q[n][3] -> values[n], and jacobian[p][n] at stride `voxels` when it is not NULL
-static void points(const point_network *k, const map_bias *b, size_t n, const float *q,
-                   const workspace *w, float *values, float *jacobian, size_t voxels)
+// values[n] at n <= R points q[n][3], and jacobian[P][n], rows `voxels` floats apart, unless NULL.
+static void points_forward(const point_network *k, const map_bias *b, size_t n, const float *q,
+                           const workspace *w, float *values, float *jacobian, size_t voxels)
 {
     const sdm_point_arch *a = &k->arch;
     const size_t sets = jacobian ? 1 + a->n_params : 1, ld = pad(k->max_width);
+
+    // hidden layers; set 0: values, sets 1 .. P: derivatives
     float *in = w->h[0], *out = w->h[1];
     for (size_t l = 0; l < a->depth; l++) {
         const size_t width = a->width[l];
         const float *columns = k->input[l] ? k->input[l] + a->n_params * width : NULL;
-        if (l) multiply(k, l, sets * n, in, ld, out, ld);
+        if (l) layer_multiply(k, l, sets * n, in, ld, out, ld);
         for (size_t s = 0; s < sets; s++) {
             float *y = out + s * n * ld;
             add_input(n, width, b->data + s * b->stride + b->at[l], s ? NULL : columns, q, l == 0,
@@ -149,6 +157,8 @@ static void points(const point_network *k, const map_bias *b, size_t n, const fl
         float *swap = in;
         in = out, out = swap;
     }
+
+    // output layer
     const size_t last = a->width[a->depth - 1];
     for (size_t i = 0; i < n; i++) {
         const float sum = dot(in + i * ld, k->last, last) + k->last[last],
@@ -160,18 +170,17 @@ static void points(const point_network *k, const map_bias *b, size_t n, const fl
     }
 }
 
-// chunks of R voxels are shared among the threads: which chunk a voxel is in does not depend on
-// their number
-static void map(const sdm_model *m, const double *p, float *values, float *jacobian, void *scratch,
-                int n_threads)
+// One map. The threads share chunks of R voxels; the chunks do not depend on the number of threads.
+static void map_forward(const sdm_model *m, const double *p, float *values, float *jacobian,
+                        void *scratch, int n_threads)
 {
     const point_network *k = m->network;
     const size_t voxels = sdm_grid_count(&m->info.grid), sets = jacobian ? 1 + k->arch.n_params : 1;
     map_bias b = {.data = scratch};
-    workspace none;
+    workspace unused;
     float *memory = (float *)scratch + bias_floats(k, sets, &b);
-    const size_t each = carve(k, sets * k->rows, NULL, &none);
-    set_bias(m, p, jacobian != NULL, &b);
+    const size_t each = carve(k, sets * k->rows, NULL, &unused);
+    bias_set(m, p, jacobian != NULL, &b);
     (void)n_threads;
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads) if (n_threads > 1)
     for (size_t first = 0; first < voxels; first += k->rows) {
@@ -179,8 +188,8 @@ static void map(const sdm_model *m, const double *p, float *values, float *jacob
         float q[3 * 192];
         workspace w;
         carve(k, sets * k->rows, memory + (size_t)sdm_thread() * each, &w);
-        place(&m->info.grid, &k->arch, first, n, q);
-        points(k, &b, n, q, &w, values + first, jacobian ? jacobian + first : NULL, voxels);
+        coordinates_fill(&m->info.grid, &k->arch, first, n, q);
+        points_forward(k, &b, n, q, &w, values + first, jacobian ? jacobian + first : NULL, voxels);
     }
 }
 
@@ -203,7 +212,8 @@ void sdm_point_forward(const sdm_model *m, const double *params, size_t n, float
 {
     const size_t voxels = sdm_grid_count(&m->info.grid);
     for (size_t i = 0; i < n; i++)
-        map(m, params + i * m->info.n_params, values + i * voxels, NULL, scratch, n_threads);
+        map_forward(m, params + i * m->info.n_params, values + i * voxels, NULL, scratch,
+                    n_threads);
 }
 
 size_t sdm_point_jacobian_scratch_bytes(const sdm_model *m, int n_threads)
@@ -214,5 +224,5 @@ size_t sdm_point_jacobian_scratch_bytes(const sdm_model *m, int n_threads)
 void sdm_point_jacobian(const sdm_model *m, const double *params, float *values, float *jacobian,
                         void *scratch, int n_threads)
 {
-    map(m, params, values, jacobian, scratch, n_threads);
+    map_forward(m, params, values, jacobian, scratch, n_threads);
 }

@@ -1,4 +1,5 @@
-/* Opening of a model that is a point network: every size checked before it is used. */
+/* Opens a point network: reads architecture and weights, and checks every size before it is
+   used. */
 #include "point_internal.h"
 #include "sdm/internal/kernels.h"
 #include "sdm/memory.h"
@@ -8,25 +9,25 @@ static sdm_status read_architecture(sdm_lines *lines, size_t n_params, point_net
 {
     sdm_point_arch *a = &k->arch;
     a->n_params = n_params;
-    a->depth = (size_t)sdm_next_int(lines, "point.depth", 1, SDM_POINT_MAX_DEPTH);
+    a->depth = (size_t)sdm_lines_int(lines, "point.depth", 1, SDM_POINT_MAX_DEPTH);
     for (size_t l = 0; l < a->depth; l++) {
-        a->width[l] = (size_t)sdm_next_int(lines, "point.width", 1, SDM_POINT_MAX_WIDTH);
-        if (sdm_next_int(lines, "point.input", l ? 0 : 1, 1) && l) a->again |= 1u << l;
+        a->width[l] = (size_t)sdm_lines_int(lines, "point.width", 1, SDM_POINT_MAX_WIDTH);
+        if (sdm_lines_int(lines, "point.input", l ? 0 : 1, 1) && l) a->skip |= 1u << l;
         if (a->width[l] > k->max_width) k->max_width = a->width[l];
     }
-    a->activation = (int)sdm_next_int(lines, "point.activation", 0, 3);
-    a->tanh_output = sdm_next_int(lines, "point.tanh", 0, 1) != 0;
-    k->half = sdm_next_int(lines, "point.half", 0, 1) != 0;
-    sdm_next_reals(lines, "point.centre", a->centre, 3);
-    a->radius = sdm_next_real(lines, "point.radius");
+    a->activation = (int)sdm_lines_int(lines, "point.activation", 0, 3);
+    a->tanh_output = sdm_lines_int(lines, "point.tanh", 0, 1) != 0;
+    k->half = sdm_lines_int(lines, "point.half", 0, 1) != 0;
+    sdm_lines_reals(lines, "point.centre", a->centre, 3);
+    a->radius = sdm_lines_real(lines, "point.radius");
     if (!(a->radius > 0)) lines->failed = true;
-    a->scale = sdm_next_real(lines, "point.scale");
+    a->scale = sdm_lines_real(lines, "point.scale");
     if (!(a->scale > 0)) lines->failed = true;
     return sdm_lines_check(lines, err);
 }
 
-// as many points as keep their activations in the second-level cache; a multiple of the rows of the
-// kernels
+// R: number of points whose activations fit in the second-level cache, 48 .. 192 and a multiple of
+// 12, hence of the 6 rows of the kernels.
 static size_t rows_at_once(size_t width)
 {
     const size_t n = 98304 / width / 12 * 12;
@@ -53,7 +54,7 @@ static sdm_status open_network(sdm_model *m, sdm_lines *lines, const sdm_section
     if (!input) return SDM_E_FORMAT;
     for (size_t l = 0; l < a->depth; l++) {
         k->bias[l] = input + input_at[l];
-        if (sdm_point_enters(a, l)) k->input[l] = k->bias[l] + a->width[l];
+        if (sdm_point_takes_input(a, l)) k->input[l] = k->bias[l] + a->width[l];
     }
     k->last = input + inputs - a->width[a->depth - 1] - 1;
     k->rows = rows_at_once(k->max_width);
@@ -61,11 +62,11 @@ static sdm_status open_network(sdm_model *m, sdm_lines *lines, const sdm_section
     return SDM_OK;
 }
 
-static void dispose(void *network) { sdm_free(network); }
+static void network_free(void *network) { sdm_free(network); }
 
 #define POINT_KIND(text)                                                                           \
     {                                                                                              \
-        .name = text, .open = open_network, .dispose = dispose,                                    \
+        .name = text, .open = open_network, .dispose = network_free,                               \
         .scratch_bytes = sdm_point_scratch_bytes, .forward = sdm_point_forward, .threaded = true,  \
         .jacobian_scratch_bytes = sdm_point_jacobian_scratch_bytes, .jacobian = sdm_point_jacobian \
     }

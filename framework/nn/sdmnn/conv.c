@@ -1,4 +1,6 @@
-/* Convolution: packing, loops around the kernels, gradient of the weights. */
+/* Convolution of feature maps: packing of weights, loops around the kernels, gradient by the
+ * weights.
+ */
 #include "conv.h"
 
 #include <string.h>
@@ -11,12 +13,12 @@
 enum {
     GROUP = 32,          // output channels of a unit of work, a multiple of every mr
     GRADIENT_TERMS = 54, // terms of a unit of work of the gradient, a multiple of 3
-    MR_MAX = 8,
-    FEW = 256,      // positions of a map that is small
-    FEW_CHUNK = 128 // positions of it that are taken together
+    MR_MAX = 8,          // largest mr
+    SMALL_MAX = 256,     // largest number of positions of a small feature map
+    SMALL_CHUNK = 128    // positions of a small feature map in one matrix product
 };
 
-static const conv_table *table(void)
+static const conv_table *conv_kernels(void)
 {
 #if defined(__x86_64__)
     const char *isa = sdm_kernels_name();
@@ -26,16 +28,17 @@ static const conv_table *table(void)
     return &sdm_conv_generic;
 }
 
-static size_t least(size_t a, size_t b) { return a < b ? a : b; }
+static size_t min_size(size_t a, size_t b) { return a < b ? a : b; }
 static size_t divide_up(size_t a, size_t b) { return (a + b - 1) / b; }
 
-static int threads(int wanted, size_t units)
+static int thread_count(int wanted, size_t units)
 {
     const int n = sdm_threads(wanted);
     return (size_t)n < units ? n : (int)units;
 }
 
-// where the terms channel * taps + tap from k0 on lie, relative to the output's position
+// offset[n] of the inputs of the terms k0 .. k0 + n - 1 relative to the output's position; term
+// channel * taps + tap.
 static void offsets(const sdm_fmap *g, size_t taps, size_t k0, size_t n, ptrdiff_t *offset)
 {
     ptrdiff_t shift[27] = {0};
@@ -52,18 +55,19 @@ static void offsets(const sdm_fmap *g, size_t taps, size_t k0, size_t n, ptrdiff
 
 size_t sdm_conv_packed_count(sdm_conv c)
 {
-    const size_t mr = table()->mr;
+    const size_t mr = conv_kernels()->mr;
     return divide_up(c.out, mr) * mr * c.in * c.taps;
 }
 
-// [blocks of terms][tiles of output channels][terms][mr], zero beyond the last output channel
+// packed[blocks of SDM_CONV_TERMS terms][tiles of output channels][terms][mr], zero beyond the last
+// output channel
 void sdm_conv_pack(sdm_conv c, bool transposed, const float *w, float *packed)
 {
-    const size_t mr = table()->mr;
+    const size_t mr = conv_kernels()->mr;
     const sdm_conv to = transposed ? sdm_conv_opposite(c) : c;
     const size_t terms = to.in * to.taps;
     for (size_t k0 = 0; k0 < terms; k0 += SDM_CONV_TERMS) {
-        const size_t k1 = least(terms, k0 + SDM_CONV_TERMS);
+        const size_t k1 = min_size(terms, k0 + SDM_CONV_TERMS);
         for (size_t o0 = 0; o0 < to.out; o0 += mr) {
             for (size_t k = k0; k < k1; k++) {
                 const size_t i = k / c.taps, tap = k % c.taps;
@@ -77,7 +81,7 @@ void sdm_conv_pack(sdm_conv c, bool transposed, const float *w, float *packed)
     }
 }
 
-// a tile that reaches beyond the last output channel or position goes through a full one
+// A tile of rows x cols, cut off by the last output channel or position: computed as a full tile.
 static void edge_tile(const conv_table *t, size_t k, const float *a, const float *x,
                       const ptrdiff_t *offset, float *y, size_t ldy, size_t rows, size_t cols,
                       int add)
@@ -89,21 +93,21 @@ static void edge_tile(const conv_table *t, size_t k, const float *a, const float
     for (size_t i = 0; i < rows; i++) memcpy(y + i * ldy, edge + i * t->nr, cols * sizeof *y);
 }
 
-// output channels o0 .. o1 (o0 a multiple of mr) at positions p0 .. p1
-static void chunk(const conv_table *t, const sdm_fmap *g, sdm_conv c, const float *packed,
-                  const float *x, float *y, size_t o0, size_t o1, size_t p0, size_t p1)
+// Output channels o0 .. o1 - 1 (o0 a multiple of mr) at positions p0 .. p1 - 1.
+static void chunk_convolve(const conv_table *t, const sdm_fmap *g, sdm_conv c, const float *packed,
+                           const float *x, float *y, size_t o0, size_t o1, size_t p0, size_t p1)
 {
     const size_t terms = c.in * c.taps, padded = divide_up(c.out, t->mr) * t->mr;
     ptrdiff_t offset[SDM_CONV_TERMS];
     for (size_t k0 = 0; k0 < terms; k0 += SDM_CONV_TERMS) {
-        const size_t k = least(SDM_CONV_TERMS, terms - k0);
+        const size_t k = min_size(SDM_CONV_TERMS, terms - k0);
         const float *weights = packed + k0 * padded;
         offsets(g, c.taps, k0, k, offset);
         for (size_t p = p0; p < p1; p += t->nr) {
             for (size_t o = o0; o < o1; o += t->mr) {
                 float *at = y + o * g->stride + p;
                 const float *a = weights + o * k;
-                const size_t rows = least(t->mr, o1 - o), cols = least(t->nr, p1 - p);
+                const size_t rows = min_size(t->mr, o1 - o), cols = min_size(t->nr, p1 - p);
                 if (rows == t->mr && cols == t->nr)
                     t->tile(k, a, x + p, offset, at, g->stride, k0 > 0);
                 else
@@ -113,6 +117,7 @@ static void chunk(const conv_table *t, const sdm_fmap *g, sdm_conv c, const floa
     }
 }
 
+// f on channel o at positions p0 .. p1 - 1; clears the padding
 static void finish_chunk(const sdm_fmap *g, sdm_conv_finish f, float *y, size_t o, size_t p0,
                          size_t p1)
 {
@@ -128,15 +133,15 @@ static void finish_chunk(const sdm_fmap *g, sdm_conv_finish f, float *y, size_t 
 void sdm_conv_apply(const sdm_fmap *g, sdm_conv c, const float *packed, const float *x,
                     sdm_conv_finish finish, float *y, int n_threads)
 {
-    const conv_table *t = table();
+    const conv_table *t = conv_kernels();
     const size_t chunks = divide_up(g->count, SDM_CONV_CHUNK), groups = divide_up(c.out, GROUP);
-    n_threads = threads(n_threads, chunks * groups);
+    n_threads = thread_count(n_threads, chunks * groups);
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads) if (n_threads > 1)
     for (long unit = 0; unit < (long)(chunks * groups); unit++) {
         const size_t p0 = (size_t)unit % chunks * SDM_CONV_CHUNK,
-                     p1 = least(g->count, p0 + SDM_CONV_CHUNK);
-        const size_t o0 = (size_t)unit / chunks * GROUP, o1 = least(c.out, o0 + GROUP);
-        chunk(t, g, c, packed, x, y, o0, o1, p0, p1);
+                     p1 = min_size(g->count, p0 + SDM_CONV_CHUNK);
+        const size_t o0 = (size_t)unit / chunks * GROUP, o1 = min_size(c.out, o0 + GROUP);
+        chunk_convolve(t, g, c, packed, x, y, o0, o1, p0, p1);
         for (size_t o = o0; o < o1; o++) finish_chunk(g, finish, y, o, p0, p1);
     }
 }
@@ -151,31 +156,33 @@ static float sum_lanes(const float *v, size_t width)
 void sdm_conv_finish_maps(const sdm_fmap *g, size_t channels, sdm_conv_finish finish, float *y,
                           int n_threads)
 {
-    n_threads = threads(n_threads, channels);
+    n_threads = thread_count(n_threads, channels);
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
     for (long o = 0; o < (long)channels; o++) finish_chunk(g, finish, y, (size_t)o, 0, g->count);
 }
 
-// dw of output channels o .. o + rows and terms k0 .. k0 + k over all positions
+// dw of mr output channels from o on and GRADIENT_TERMS terms from k0 on, over all positions.
 static void gradient_unit(const conv_table *t, const sdm_fmap *g, sdm_conv c, const float *x,
                           const float *dy, float *dw, size_t o, size_t k0)
 {
-    const size_t terms = c.in * c.taps, k = least(GRADIENT_TERMS, terms - k0),
-                 rows = least(t->mr, c.out - o);
-    const size_t tile = 3 * t->mr * t->width; // numbers of one call of dot()
-    const size_t count =
-        divide_up(g->count, t->width) * t->width; // dy is zero beyond the last position
+    const size_t terms = c.in * c.taps, k = min_size(GRADIENT_TERMS, terms - k0),
+                 rows = min_size(t->mr, c.out - o);
+    const size_t tile = 3 * t->mr * t->width; // partial sums of one call of dot()
+    // positions, rounded up to whole registers: dy is zero beyond the last one
+    const size_t count = divide_up(g->count, t->width) * t->width;
     ptrdiff_t offset[GRADIENT_TERMS + 2];
     float sums[(GRADIENT_TERMS / 3) * SDM_CONV_SUMS_MAX], copy[MR_MAX * SDM_CONV_CHUNK];
     memset(sums, 0, divide_up(k, 3) * tile * sizeof *sums);
     offsets(g, c.taps, k0, k, offset);
-    for (size_t i = k; i < k + 2; i++)
-        offset[i] = offset[k - 1]; // a third tap that is not there: computed, not used
+    // dot() takes three taps: missing ones at the end are computed and not used
+    for (size_t i = k; i < k + 2; i++) offset[i] = offset[k - 1];
+
+    // partial sums in the lanes of registers
     for (size_t p = 0; p < count; p += SDM_CONV_CHUNK) {
-        const size_t n = least(SDM_CONV_CHUNK, count - p);
+        const size_t n = min_size(SDM_CONV_CHUNK, count - p);
         const float *d = dy + o * g->stride + p;
         size_t ldy = g->stride;
-        if (rows < t->mr) { // channels that are not there are zero
+        if (rows < t->mr) { // missing channels are zero
             memset(copy, 0, sizeof copy);
             for (size_t i = 0; i < rows; i++)
                 memcpy(copy + i * SDM_CONV_CHUNK, d + i * ldy, n * sizeof *d);
@@ -183,6 +190,8 @@ static void gradient_unit(const conv_table *t, const sdm_fmap *g, sdm_conv c, co
         }
         for (size_t i = 0; i < k; i += 3) t->dot(n, d, ldy, x + p, offset + i, sums + i / 3 * tile);
     }
+
+    // sums over the lanes
     for (size_t r = 0; r < rows; r++) {
         float *to = dw + (o + r) * terms + k0;
         for (size_t i = 0; i < k; i++)
@@ -190,29 +199,30 @@ static void gradient_unit(const conv_table *t, const sdm_fmap *g, sdm_conv c, co
     }
 }
 
-// The same for few positions, where adding up the registers would be most of the work: a matrix
-// product with the shifted maps copied side by side, for all output channels.
-static void gradient_few(const sdm_fmap *g, sdm_conv c, const float *x, const float *dy, float *dw,
-                         size_t k0)
+// dw of all output channels and SDM_CONV_TERMS terms from k0 on, for small feature maps, where the
+// sums over the lanes would dominate: a matrix product of dy and the shifted inputs.
+static void gradient_small(const sdm_fmap *g, sdm_conv c, const float *x, const float *dy,
+                           float *dw, size_t k0)
 {
-    const size_t terms = c.in * c.taps, k = least(SDM_CONV_TERMS, terms - k0);
+    const size_t terms = c.in * c.taps, k = min_size(SDM_CONV_TERMS, terms - k0);
     ptrdiff_t offset[SDM_CONV_TERMS];
-    float columns[SDM_CONV_TERMS * FEW_CHUNK];
+    float columns[SDM_CONV_TERMS * SMALL_CHUNK];
     offsets(g, c.taps, k0, k, offset);
-    for (size_t p = 0; p < g->count; p += FEW_CHUNK) {
-        const size_t n = least(FEW_CHUNK, g->count - p);
+    for (size_t p = 0; p < g->count; p += SMALL_CHUNK) {
+        const size_t n = min_size(SMALL_CHUNK, g->count - p);
         for (size_t i = 0; i < k; i++) memcpy(columns + i * n, x + p + offset[i], n * sizeof *x);
         sdm_gemm(c.out, k, n, (sdm_view){dy + p, g->stride, 1}, (sdm_view){columns, 1, n}, true,
                  dw + k0, terms, 1);
     }
 }
 
+// sum of v[n], in float over runs of 4096 elements and in double over the runs
 static float sum_of(size_t n, const float *v)
 {
     enum { LANES = 16, RUN = 4096 };
     double total = 0;
     for (size_t at = 0; at < n; at += RUN) {
-        const size_t end = least(n, at + RUN);
+        const size_t end = min_size(n, at + RUN);
         float lane[LANES] = {0};
         size_t i = at;
         for (; i + LANES <= end; i += LANES)
@@ -226,18 +236,18 @@ static float sum_of(size_t n, const float *v)
 void sdm_conv_gradient(const sdm_fmap *g, sdm_conv c, const float *x, const float *dy, float *dw,
                        float *db, int n_threads)
 {
-    const conv_table *t = table();
-    const bool few = g->count <= FEW;
-    const size_t panels = few ? 1 : divide_up(c.out, t->mr);
-    const size_t units = panels * divide_up(c.in * c.taps, few ? SDM_CONV_TERMS : GRADIENT_TERMS);
-    n_threads = threads(n_threads, units);
+    const conv_table *t = conv_kernels();
+    const bool small = g->count <= SMALL_MAX;
+    const size_t panels = small ? 1 : divide_up(c.out, t->mr);
+    const size_t units = panels * divide_up(c.in * c.taps, small ? SDM_CONV_TERMS : GRADIENT_TERMS);
+    n_threads = thread_count(n_threads, units);
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads) if (n_threads > 1)
     for (long i = 0; i < (long)(units + c.out); i++) {
         const size_t unit = (size_t)i;
         if (unit >= units)
             db[unit - units] += sum_of(g->count, dy + (unit - units) * g->stride);
-        else if (few)
-            gradient_few(g, c, x, dy, dw, unit * SDM_CONV_TERMS);
+        else if (small)
+            gradient_small(g, c, x, dy, dw, unit * SDM_CONV_TERMS);
         else
             gradient_unit(t, g, c, x, dy, dw, unit % panels * t->mr,
                           unit / panels * GRADIENT_TERMS);

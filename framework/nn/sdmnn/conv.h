@@ -1,7 +1,8 @@
-/* Convolution of feature maps (fmap.h), 3 x 3 x 3 with "same" zero padding or 1 x 1 x 1, as an
-   implicit matrix product: every tap is a shift of the flat array, so nothing is unrolled in
-   memory. Letters: I input and O output channels, T taps (27 or 1). One element is always summed in
-   the same order: the same bits for any number of threads. */
+/* Convolution of feature maps (fmap.h), 3 x 3 x 3 with zero padding or 1 x 1 x 1, as an implicit
+   matrix product: each tap is a shift of the flat array, so that no matrix of shifted maps is
+   formed. Letters: I input and O output channels, T taps (27 or 1). Each element is always summed
+   in the same order: the result does not depend on the number of threads. n_threads 0: the OpenMP
+   default. */
 #ifndef SDM_CONV_H
 #define SDM_CONV_H
 
@@ -11,38 +12,39 @@
 #include "sdm/internal/sdmnn.h"
 
 typedef struct sdm_conv {
-    size_t in, out, taps; /* weights w[out][in][taps], taps in the order z, y, x with x fastest */
+    size_t in, out, taps; /* I, O, T; weights w[O][I][T], taps [z][y][x] */
 } sdm_conv;
 
-/* Weights in the order of the kernels, which differs between instruction sets: for memory, never
- * for a file. */
+/* Floats of the packed weights. Packed weights are in the order of the kernels, which differs
+   between instruction sets: they are never stored in a file. */
 size_t sdm_conv_packed_count(sdm_conv c);
-/* `transposed`: for sdm_conv_apply of the opposite convolution, which takes dy[O] to dx[I]: taps
- * mirrored, in and out exchanged. */
+
+/* packed[] = the weights w[O][I][T]. transposed: for the opposite convolution, which takes dy[O] to
+   dx[I], with mirrored taps: packed[sdm_conv_packed_count(sdm_conv_opposite(c))]. */
 void sdm_conv_pack(sdm_conv c, bool transposed, const float *w, float *packed);
 static inline sdm_conv sdm_conv_opposite(sdm_conv c) { return (sdm_conv){c.out, c.in, c.taps}; }
 
-/* What follows the sum, in one pass over the output while it is in the cache. */
+/* Operations on the sums of the convolution, applied while they are in the cache. */
 typedef struct sdm_conv_finish {
     const float *bias; /* [O], or NULL */
-    int activation;    /* of sdm_activate(), or -1: none */
-    float *slope;      /* feature map of O channels: its derivative, or NULL */
+    int activation;    /* kind of sdm_activate(), or -1: none */
+    float *slope; /* feature map of O channels, set to the derivative of the activation; or NULL */
 } sdm_conv_finish;
 
-/* y[O] = activation(w * x[I] + bias). y must not overlap x. n_threads 0: the OpenMP default. */
+/* y[O] = activation(w * x[I] + bias). y must not overlap x. */
 void sdm_conv_apply(const sdm_fmap *g, sdm_conv c, const float *packed, const float *x,
                     sdm_conv_finish finish, float *y, int n_threads);
 
-/* The finish alone, in place on the sums y[O]. */
+/* y[O] = activation(y[O] + bias), in place. */
 void sdm_conv_finish_maps(const sdm_fmap *g, size_t channels, sdm_conv_finish finish, float *y,
                           int n_threads);
 
-/* dw[O][I][T] += sum over voxels of dy[O] x[I] shifted; db[O] += sum of dy[O]. */
+/* Gradient by the weights: dw[O][I][T] += sum over voxels of dy[O] * x[I] shifted by the tap;
+   db[O] += sum over voxels of dy[O]. */
 void sdm_conv_gradient(const sdm_fmap *g, sdm_conv c, const float *x, const float *dy, float *dw,
                        float *db, int n_threads);
 
-/* The four functions above, or others that do the same in another way (sdm_conv_native() in
- * sdm/sdmnn.h gives those above). */
+/* An implementation of the functions above. sdm_conv_native() has the functions themselves. */
 struct sdm_conv_backend {
     const char *name;
     size_t (*packed_count)(sdm_conv c);
@@ -53,7 +55,7 @@ struct sdm_conv_backend {
                      float *db, int n_threads);
 };
 
-/* Multiply-adds of one pass over the voxels, padding not counted. */
+/* Multiply-adds of sdm_conv_apply(), without padding. */
 double sdm_conv_work(const sdm_fmap *g, sdm_conv c);
 
 #endif

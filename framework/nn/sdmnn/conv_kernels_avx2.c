@@ -1,4 +1,4 @@
-/* Convolution for AVX2 and FMA. */
+/* Convolution kernels for AVX2 and FMA. */
 #define TABLE sdm_conv_avx2
 #define ISA "avx2"
 #define VW 8

@@ -1,4 +1,4 @@
-/* Convolution for AVX-512. */
+/* Convolution kernels for AVX-512. */
 #define TABLE sdm_conv_avx512
 #define ISA "avx512"
 #define VW 16

@@ -1,6 +1,7 @@
-/* Convolution by oneDNN 2.x, where that is faster than the native one: 3 x 3 x 3 with many channels
-   on the smaller levels, forward and towards the data. Everything else is native, and so is a call
-   that oneDNN fails. Maps and weights are reordered into its layout and back. */
+/* Convolution by oneDNN 2.x where it is faster than the native one: 3 x 3 x 3 with many channels on
+   the smaller levels, forward and backward to the inputs. The gradient by the weights is native,
+   and so is a call for which oneDNN reports an error. Each call reorders maps and weights to the
+   layout of oneDNN and back. */
 #include <oneapi/dnnl/dnnl.h>
 #include <pthread.h>
 #include <string.h>
@@ -14,29 +15,30 @@ static dnnl_engine_t engine;
 static dnnl_stream_t stream;
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 
-static void start(void)
+// creates engine and stream once; NULL if oneDNN fails
+static void engine_start(void)
 {
     if (dnnl_engine_create(&engine, dnnl_cpu, 0) != dnnl_success) engine = NULL;
     if (engine && dnnl_stream_create(&stream, engine, dnnl_stream_default_flags) != dnnl_success)
         stream = NULL;
 }
 
-// measured on AVX2: below 16 channels and on large maps the way into its layout and back costs more
-// than it gains
-static bool worth(const sdm_fmap *g, sdm_conv c)
+// Measured on AVX2: with fewer than 16 channels or on large maps the reordering costs more than
+// oneDNN saves.
+static bool onednn_pays(const sdm_fmap *g, sdm_conv c)
 {
     return c.taps == 27 && c.in % 16 == 0 && c.out % 16 == 0 &&
            g->n[0] * g->n[1] * g->n[2] <= 32768;
 }
 
-// behind the native order: the same weights as [outputs][inputs][taps], for the direction of the
-// pass
+// Packed weights: first those of sdm_conv_pack(), for native calls, then the same weights as
+// [outputs][inputs][taps] for oneDNN, transposed if the pass is backward.
 static size_t packed_count(sdm_conv c)
 {
     return (sdm_conv_packed_count(c) + 15) / 16 * 16 + c.in * c.out * c.taps;
 }
 
-static void pack(sdm_conv c, bool transposed, const float *w, float *packed)
+static void weights_pack(sdm_conv c, bool transposed, const float *w, float *packed)
 {
     const sdm_conv to = transposed ? sdm_conv_opposite(c) : c;
     sdm_conv_pack(c, transposed, w, packed);
@@ -48,15 +50,15 @@ static void pack(sdm_conv c, bool transposed, const float *w, float *packed)
                 *packed++ = w[(i * c.in + o) * c.taps + c.taps - 1 - t];
 }
 
-// what a call holds; freed whether it succeeds or not
+// Objects of a call; destroyed by call_destroy() after success and after an error.
 typedef struct call {
     dnnl_primitive_desc_t plan;
     dnnl_primitive_t convolution;
-    dnnl_memory_t user[3],
-        own[3]; // source, weights, result: as they lie here, and as oneDNN wants them
+    // source, weights, result: in our layout, and in the layout that oneDNN chooses
+    dnnl_memory_t user[3], own[3];
 } call;
 
-static void dispose(call *k)
+static void call_destroy(call *k)
 {
     for (int i = 0; i < 3; i++) {
         if (k->own[i]) dnnl_memory_destroy(k->own[i]);
@@ -81,6 +83,7 @@ static dnnl_status_t reorder(const dnnl_memory_desc_t *from_desc, dnnl_memory_t 
     return s;
 }
 
+// y[O] = w * x[I] by oneDNN
 static dnnl_status_t convolve(const sdm_fmap *g, sdm_conv c, const float *w, const float *x,
                               float *y, call *k)
 {
@@ -95,6 +98,8 @@ static dnnl_status_t convolve(const sdm_fmap *g, sdm_conv c, const float *w, con
         void *any;
     } source = {x}, weights = {w};
     void *const data[3] = {source.any, weights.any, y};
+
+    // memory in our layout, and descriptors with a layout of oneDNN's choice
     dnnl_memory_desc_t here[3], any[3];
     dnnl_status_t s = dnnl_success;
     for (int i = 0; i < 3 && !s; i++) {
@@ -104,6 +109,8 @@ static dnnl_status_t convolve(const sdm_fmap *g, sdm_conv c, const float *w, con
             s = dnnl_memory_desc_init_by_tag(&any[i], 5, dims[i], dnnl_f32, dnnl_format_tag_any);
         if (!s) s = dnnl_memory_create(&k->user[i], &here[i], engine, data[i]);
     }
+
+    // the convolution
     dnnl_convolution_desc_t d;
     if (!s)
         s = dnnl_convolution_forward_desc_init(&d, dnnl_forward_inference, dnnl_convolution_direct,
@@ -111,6 +118,8 @@ static dnnl_status_t convolve(const sdm_fmap *g, sdm_conv c, const float *w, con
     if (!s) s = dnnl_primitive_desc_create(&k->plan, &d, NULL, engine, NULL);
     if (!s) s = dnnl_primitive_create(&k->convolution, k->plan);
     if (s) return s;
+
+    // memory in oneDNN's layout, inputs reordered
     static const dnnl_query_t what[3] = {dnnl_query_src_md, dnnl_query_weights_md,
                                          dnnl_query_dst_md};
     const dnnl_memory_desc_t *wanted[3];
@@ -126,19 +135,19 @@ static dnnl_status_t convolve(const sdm_fmap *g, sdm_conv c, const float *w, con
     return s ? s : dnnl_stream_wait(stream);
 }
 
-static void apply(const sdm_fmap *g, sdm_conv c, const float *packed, const float *x,
-                  sdm_conv_finish finish, float *y, int n_threads)
+static void conv_apply(const sdm_fmap *g, sdm_conv c, const float *packed, const float *x,
+                       sdm_conv_finish finish, float *y, int n_threads)
 {
-    pthread_once(&once, start);
+    pthread_once(&once, engine_start);
     dnnl_status_t s = dnnl_unimplemented;
-    if (stream && worth(g, c)) {
+    if (stream && onednn_pays(g, c)) {
         call k = {0};
 #ifdef _OPENMP
-        const int before = omp_get_max_threads(); // oneDNN takes as many as OpenMP gives
+        const int before = omp_get_max_threads(); // oneDNN uses the OpenMP default
         if (n_threads) omp_set_num_threads(n_threads);
 #endif
         s = convolve(g, c, packed + (sdm_conv_packed_count(c) + 15) / 16 * 16, x, y, &k);
-        dispose(&k);
+        call_destroy(&k);
 #ifdef _OPENMP
         omp_set_num_threads(before);
 #endif
@@ -153,8 +162,8 @@ const sdm_conv_backend *sdm_conv_dnnl(void)
 {
     static const sdm_conv_backend backend = {.name = "onednn",
                                              .packed_count = packed_count,
-                                             .pack = pack,
-                                             .apply = apply,
+                                             .pack = weights_pack,
+                                             .apply = conv_apply,
                                              .gradient = sdm_conv_gradient};
     return &backend;
 }

@@ -1,5 +1,5 @@
-/* Convolution for the baseline of the machine: SSE2 on x86-64, NEON on arm64, four-wide vectors
- * anywhere else. */
+/* Convolution kernels for the baseline instruction set: SSE2 on x86-64, NEON on arm64, elsewhere
+   whatever the compiler makes of vectors of four floats. */
 #define TABLE sdm_conv_generic
 #define VW 4
 #if defined(__aarch64__)

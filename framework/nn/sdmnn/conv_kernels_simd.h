@@ -1,18 +1,13 @@
 /* The inner loops of the convolution, written once with the compiler's vector types and compiled
-   once for each instruction set. Before inclusion: TABLE (name of the conv_table), ISA (text), VW
-   (numbers in a register), MR (output channels of a tile), NV (registers along x). */
+   once for each instruction set. Before inclusion, define TABLE (name of the conv_table), ISA (name
+   of the instruction set), VW (floats in a register), MR (output channels of a tile) and NV
+   (registers of positions of a tile). Contracts: conv_kernels.h. */
 #include "conv_kernels.h"
-
-typedef float vec __attribute__((vector_size(4 * VW)));
-typedef float vec_u __attribute__((vector_size(4 * VW), aligned(4)));
-
-static inline vec load(const float *p) { return *(const vec_u *)p; }
-static inline void store(float *p, vec v) { *(vec_u *)p = v; }
-static inline vec splat(float v) { return v - (vec){0}; }
+#include "kernels/kernels_vector.h"
 
 _Static_assert(SDM_CONV_CHUNK % (NV * VW) == 0 && NV * VW <= SDM_CONV_NR_MAX,
-               "a chunk is made of whole tiles");
-_Static_assert(3 * MR * VW <= SDM_CONV_SUMS_MAX, "sums of a tile");
+               "a unit of work consists of whole tiles");
+_Static_assert(3 * MR * VW <= SDM_CONV_SUMS_MAX, "the partial sums of a tile fit in their array");
 
 static void tile(size_t k, const float *a, const float *x, const ptrdiff_t *offset, float *y,
                  size_t ldy, int add)

@@ -1,4 +1,4 @@
-/* Dense layer on a batch: x[B][I] -> y[B][O], weights w[O][I]. */
+/* Dense layer on a batch, and its gradients. */
 #include <string.h>
 
 #include "operators.h"

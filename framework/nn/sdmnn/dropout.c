@@ -1,11 +1,13 @@
-/* Drop-out of feature maps: y[C] and slope[C], in place; four voxels from each block of random
- * bits. */
+/* Drop-out of feature maps. Each block of 128 random bits serves four positions of a channel. */
 #include "operators.h"
 #include "sdm/internal/rng.h"
 
-static size_t draws(const sdm_fmap *g) { return (g->count + 3) / 4; }
+static size_t draws_of_channel(const sdm_fmap *g) { return (g->count + 3) / 4; }
 
-size_t sdm_dropout_draws(const sdm_fmap *g, size_t channels) { return channels * draws(g); }
+size_t sdm_dropout_draws(const sdm_fmap *g, size_t channels)
+{
+    return channels * draws_of_channel(g);
+}
 
 void sdm_dropout(const sdm_fmap *g, size_t channels, double rate, uint64_t seed, uint64_t stream,
                  uint64_t index, float *y, float *slope, int n_threads)
@@ -15,7 +17,7 @@ void sdm_dropout(const sdm_fmap *g, size_t channels, double rate, uint64_t seed,
     (void)n_threads;
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
     for (long c = 0; c < (long)channels; c++) {
-        const uint64_t first = index + (uint64_t)c * draws(g);
+        const uint64_t first = index + (uint64_t)c * draws_of_channel(g);
         for (size_t i = 0; i < g->count; i += 4) {
             uint32_t bits[4];
             sdm_rng_block(seed, stream, first + i / 4, bits);

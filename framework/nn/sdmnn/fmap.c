@@ -1,11 +1,11 @@
-/* Layout of feature maps and their padding. */
+/* Layout of feature maps, and copies between feature maps and plain maps. */
 #include "fmap.h"
 
 #include <string.h>
 
 static size_t up16(size_t n) { return (n + 15) / 16 * 16; }
 
-enum { OVERRUN = 64 }; // kernels read up to a tile beyond the last number
+enum { OVERRUN = 64 }; // floats after the last channel: kernels read up to a tile beyond its end
 
 sdm_fmap sdm_fmap_layout(const size_t n[3])
 {
@@ -34,8 +34,8 @@ void sdm_fmap_clear_pads(const sdm_fmap *g, size_t first, size_t last, float *ch
 {
     for (size_t r = first / g->row; r * g->row < last; r++) {
         const size_t begin = r * g->row, end = begin + g->row;
-        size_t from =
-            r % (g->n[1] + 1) == g->n[1] ? begin : end - 1; // the whole row, or its last column
+        // a padding row, or the padding column of a row of voxels
+        size_t from = r % (g->n[1] + 1) == g->n[1] ? begin : end - 1;
         if (from < first) from = first;
         for (size_t i = from; i < end && i < last; i++) channel[i] = 0;
     }

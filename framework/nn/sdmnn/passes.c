@@ -1,10 +1,11 @@
-/* Forward, tangent and backward pass of sdmnn. */
+/* Forward, tangent and backward pass of sdmnn through the steps of its plan. */
 #include "passes.h"
 
 #include "operators.h"
 
 // a *= b for all channels
-static void multiply(const sdm_fmap *g, size_t channels, float *a, const float *b, int n_threads)
+static void maps_multiply(const sdm_fmap *g, size_t channels, float *a, const float *b,
+                          int n_threads)
 {
     (void)n_threads;
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
@@ -14,14 +15,16 @@ static void multiply(const sdm_fmap *g, size_t channels, float *a, const float *
     }
 }
 
-static void enter(const sdmnn_plan *p, const float *volume, float *block, int n_threads)
+// copies the volume to the maps and up-samples it to level 0
+static void volume_enter(const sdmnn_plan *p, const float *volume, float *maps, int n_threads)
 {
-    sdm_fmap_read(&p->cell, volume, block + p->volume);
-    sdm_upsample_forward(&p->level[0], &p->cell, p->arch.block, 1, block + p->volume,
-                         block + p->input, n_threads);
+    sdm_fmap_read(&p->cell, volume, maps + p->volume);
+    sdm_upsample_forward(&p->level[0], &p->cell, p->arch.block, 1, maps + p->volume,
+                         maps + p->input, n_threads);
 }
 
-// drop-out of the steps before this one comes first
+// Index of the first random number of the drop-out of `step`: each draw has a contiguous range, in
+// the order of the steps.
 static uint64_t first_draw(const sdmnn_plan *p, const sdmnn_step *step, uint64_t draw)
 {
     uint64_t before = 0, all = 0;
@@ -34,15 +37,16 @@ static uint64_t first_draw(const sdmnn_plan *p, const sdmnn_step *step, uint64_t
     return draw * all + before;
 }
 
-void sdmnn_forward(const sdmnn_plan *p, const sdmnn_layers *w, const float *volume, float *block,
-                   float *slope, const sdmnn_draw *draw, float *map, int n_threads)
+void sdm_sdmnn_pass_forward(const sdmnn_plan *p, const sdmnn_layers *w, const float *volume,
+                            float *maps, float *slope, const sdmnn_draw *draw, float *map,
+                            int n_threads)
 {
-    enter(p, volume, block, n_threads);
+    volume_enter(p, volume, maps, n_threads);
     for (size_t i = 0; i < p->n_steps; i++) {
         const sdmnn_step *s = &p->steps[i];
         const sdm_fmap *g = &p->level[s->level];
-        const float *x = block + s->from;
-        float *y = block + s->to;
+        const float *x = maps + s->from;
+        float *y = maps + s->to;
         if (s->op == SDMNN_POOL) {
             sdm_pool_forward(g - 1, g, s->conv.out, x, y, n_threads);
         } else if (s->op == SDMNN_UPSAMPLE) {
@@ -56,51 +60,51 @@ void sdmnn_forward(const sdmnn_plan *p, const sdmnn_layers *w, const float *volu
                             first_draw(p, s, draw->draw), y, slope + s->to, n_threads);
         }
     }
-    if (map) sdm_fmap_write(&p->level[0], block + p->output, map);
+    if (map) sdm_fmap_write(&p->level[0], maps + p->output, map);
 }
 
-void sdmnn_tangent(const sdmnn_plan *p, const sdmnn_layers *w, const float *block,
-                   const float *slope, const float *volume, float *tangent, float *map,
-                   int n_threads)
+void sdm_sdmnn_pass_tangent(const sdmnn_plan *p, const sdmnn_layers *w, const float *maps,
+                            const float *slope, const float *volume, float *tangent, float *map,
+                            int n_threads)
 {
-    enter(p, volume, tangent, n_threads);
+    volume_enter(p, volume, tangent, n_threads);
     for (size_t i = 0; i < p->n_steps; i++) {
         const sdmnn_step *s = &p->steps[i];
         const sdm_fmap *g = &p->level[s->level];
         const float *dx = tangent + s->from;
         float *dy = tangent + s->to;
         if (s->op == SDMNN_POOL) {
-            sdm_pool_tangent(g - 1, g, s->conv.out, block + s->from, dx, dy, n_threads);
+            sdm_pool_tangent(g - 1, g, s->conv.out, maps + s->from, dx, dy, n_threads);
         } else if (s->op == SDMNN_UPSAMPLE) {
             sdm_upsample_forward(g, g + 1, 2, s->conv.out, dx, dy, n_threads);
         } else {
             w->backend->apply(g, s->conv, w->packed[i], dx, (sdm_conv_finish){NULL, -1, NULL}, dy,
                               n_threads);
-            if (!s->linear) multiply(g, s->conv.out, dy, slope + s->to, n_threads);
+            if (!s->linear) maps_multiply(g, s->conv.out, dy, slope + s->to, n_threads);
         }
     }
     sdm_fmap_write(&p->level[0], tangent + p->output, map);
 }
 
-// Every place but the maps of the way down is read by one step alone, so its derivative is
-// overwritten; those are read by the merging first (in this order) and by the pooling after it,
-// which adds.
-void sdmnn_backward(const sdmnn_plan *p, const sdmnn_layers *w, const float *block,
-                    const float *slope, const float *map, float *back, float *volume,
-                    float *gradient, int n_threads)
+// Each feature map is the input of one step, which overwrites the gradient by it. The results of
+// the way down are inputs of two steps: the convolution after the merge, which comes first in this
+// reverse order and overwrites, and the pooling, which adds.
+void sdm_sdmnn_pass_backward(const sdmnn_plan *p, const sdmnn_layers *w, const float *maps,
+                             const float *slope, const float *map, float *back, float *volume,
+                             float *gradient, int n_threads)
 {
     sdm_fmap_read(&p->level[0], map, back + p->output);
     for (size_t i = p->n_steps; i-- > 0;) {
         const sdmnn_step *s = &p->steps[i];
         const sdm_fmap *g = &p->level[s->level];
-        const float *x = block + s->from;
+        const float *x = maps + s->from;
         float *dx = back + s->from, *dy = back + s->to;
         if (s->op == SDMNN_POOL) {
             sdm_pool_backward(g - 1, g, s->conv.out, x, dy, dx, n_threads);
         } else if (s->op == SDMNN_UPSAMPLE) {
             sdm_upsample_backward(g, g + 1, 2, s->conv.out, dy, dx, n_threads);
         } else {
-            if (!s->linear) multiply(g, s->conv.out, dy, slope + s->to, n_threads);
+            if (!s->linear) maps_multiply(g, s->conv.out, dy, slope + s->to, n_threads);
             float *dw = gradient ? gradient + s->weights : NULL;
             if (dw)
                 w->backend->gradient(g, s->conv, x, dy, dw, dw + sdmnn_conv_weights(s), n_threads);

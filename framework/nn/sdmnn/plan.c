@@ -1,4 +1,5 @@
-/* From the architecture to steps and places; checks and counts. */
+/* The plan of an sdmnn network: from the architecture to steps and offsets; checks, counts and
+   random initial weights. */
 #include "plan.h"
 
 #include <math.h>
@@ -34,17 +35,21 @@ sdm_status sdm_sdmnn_check(const sdm_sdmnn_arch *a, sdm_error *err)
         return sdm_fail(err, SDM_E_ARG, "activation %d: need 0 .. 2", a->activation);
     if (!(a->dropout >= 0 && a->dropout < 1))
         return sdm_fail(err, SDM_E_ARG, "drop-out %g: need 0 or more, below 1", a->dropout);
+
+    // grid
     size_t n[3] = {a->n[0], a->n[1], a->n[2]};
     for (int i = 0; i < 3; i++)
         if (n[i] < 1 || n[i] > 1048576)
             return sdm_fail(err, SDM_E_ARG, "%zu voxels: need 1 .. 1048576", n[i]);
-    // far below the largest size_t, so that nothing below overflows; memory is asked for later
+    // far below SIZE_MAX, so that no size of the plan overflows; allocation may still fail later
     const double all = 16.0 * ((double)n[0] + 2) * ((double)n[1] + 2) * ((double)n[2] + 2) *
                        ((double)a->channels + 1);
     if (!(all < fmin(0x1p44, (double)(SIZE_MAX / 16))))
         return sdm_fail(err, SDM_E_ARG,
                         "%zu x %zu x %zu voxels and %zu channels are too much for one network",
                         n[0], n[1], n[2], a->channels);
+
+    // levels
     for (size_t l = 0; l < a->depth; l++) {
         if (n[0] * n[1] * n[2] == 1)
             return sdm_fail(err, SDM_E_ARG,
@@ -56,12 +61,13 @@ sdm_status sdm_sdmnn_check(const sdm_sdmnn_arch *a, sdm_error *err)
     return SDM_OK;
 }
 
+// appends a feature map to the maps; returns its offset
 static size_t add_buffer(sdmnn_plan *p, const sdm_fmap *g, size_t level, size_t channels)
 {
-    const size_t place = p->floats + g->lead;
-    p->buffers[p->n_buffers++] = (sdmnn_buffer){level, channels, place};
+    const size_t offset = p->floats + g->lead;
+    p->buffers[p->n_buffers++] = (sdmnn_buffer){level, channels, offset};
     p->floats += (sdm_fmap_floats(g, channels) + 15) / 16 * 16;
-    return place;
+    return offset;
 }
 
 static size_t add_map(sdmnn_plan *p, size_t level, size_t channels)
@@ -85,8 +91,9 @@ static void conv3(sdmnn_plan *p, size_t level, size_t from, size_t in, size_t to
     add_step(p, SDMNN_CONV, level, from, to, (sdm_conv){in, out, 27})->drop = drop;
 }
 
-void sdmnn_plan_make(const sdm_sdmnn_arch *a, bool keep, sdmnn_plan *p)
+void sdm_sdmnn_plan_make(const sdm_sdmnn_arch *a, bool keep, sdmnn_plan *p)
 {
+    // layouts
     memset(p, 0, sizeof *p);
     p->arch = *a;
     p->level[0] = sdm_fmap_layout(a->n);
@@ -101,7 +108,9 @@ void sdmnn_plan_make(const sdm_sdmnn_arch *a, bool keep, sdmnn_plan *p)
     p->volume = add_buffer(p, &p->cell, SDMNN_LEVELS, 1);
     p->input = add_map(p, 0, 1);
 
-    size_t first[SDMNN_LEVELS], merged[SDMNN_LEVELS]; // results of the convolutions of the way down
+    // Way down. first, merged: offsets of the results of the two convolutions of each level. merged
+    // has room for 2 c channels: the way up writes its half after the half of the way down.
+    size_t first[SDMNN_LEVELS], merged[SDMNN_LEVELS];
     size_t in = p->input, n_in = 1;
     for (size_t l = 0; l <= a->depth; l++) {
         const size_t c = channels_of(a, l);
@@ -114,11 +123,13 @@ void sdmnn_plan_make(const sdm_sdmnn_arch *a, bool keep, sdmnn_plan *p)
         n_in = c;
         add_step(p, SDMNN_POOL, l + 1, merged[l], in, (sdm_conv){c, c, 0});
     }
+
+    // way up
     in = merged[a->depth], n_in = channels_of(a, a->depth);
     for (size_t l = a->depth; l-- > 0;) {
         const size_t c = channels_of(a, l);
-        // up-sampling repeats voxels, so the convolution 1 x 1 x 1 gives the same before it with an
-        // eighth of the work
+        // The 1 x 1 x 1 convolution comes before the up-sampling: the result is the same, because
+        // up-sampling repeats voxels, with an eighth of the work.
         const size_t reduced = keep ? add_map(p, l + 1, c) : first[l + 1];
         add_step(p, SDMNN_CONV, l + 1, in, reduced, (sdm_conv){n_in, c, 1});
         add_step(p, SDMNN_UPSAMPLE, l, reduced, merged[l] + c * p->level[l].stride,
@@ -133,24 +144,24 @@ void sdmnn_plan_make(const sdm_sdmnn_arch *a, bool keep, sdmnn_plan *p)
     add_step(p, SDMNN_CONV, 0, in, p->output, (sdm_conv){n_in, 1, 1})->linear = true;
 }
 
-void sdmnn_plan_clear(const sdmnn_plan *p, float *block)
+void sdm_sdmnn_plan_clear(const sdmnn_plan *p, float *maps)
 {
     for (const sdmnn_buffer *b = p->buffers; b < p->buffers + p->n_buffers; b++)
         sdm_fmap_clear_gaps(b->level < SDMNN_LEVELS ? &p->level[b->level] : &p->cell, b->channels,
-                            block + b->place);
+                            maps + b->offset);
 }
 
 size_t sdm_sdmnn_count(const sdm_sdmnn_arch *a)
 {
     sdmnn_plan p;
-    sdmnn_plan_make(a, false, &p);
+    sdm_sdmnn_plan_make(a, false, &p);
     return p.n_weights;
 }
 
 double sdm_sdmnn_work(const sdm_sdmnn_arch *a)
 {
     sdmnn_plan p;
-    sdmnn_plan_make(a, false, &p);
+    sdm_sdmnn_plan_make(a, false, &p);
     double n = (double)a->width * (double)(a->n_params + p.cells);
     for (const sdmnn_step *s = p.steps; s < p.steps + p.n_steps; s++)
         if (s->op == SDMNN_CONV)
@@ -158,6 +169,7 @@ double sdm_sdmnn_work(const sdm_sdmnn_arch *a)
     return n;
 }
 
+// weights from index `at` on: normal with variance gain / inputs; then zero biases
 static void random_layer(uint64_t seed, uint64_t stream, size_t at, size_t outputs, size_t inputs,
                          double gain, float *w)
 {
@@ -170,7 +182,7 @@ static void random_layer(uint64_t seed, uint64_t stream, size_t at, size_t outpu
 void sdm_sdmnn_init(const sdm_sdmnn_arch *a, uint64_t seed, uint64_t stream, float *weights)
 {
     sdmnn_plan p;
-    sdmnn_plan_make(a, false, &p);
+    sdm_sdmnn_plan_make(a, false, &p);
     random_layer(seed, stream, 0, a->width, a->n_params, 2, weights);
     random_layer(seed, stream, sdmnn_dense1(&p), p.cells, a->width, 1, weights);
     for (const sdmnn_step *s = p.steps; s < p.steps + p.n_steps; s++)

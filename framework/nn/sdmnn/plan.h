@@ -1,6 +1,7 @@
-/* The architecture of sdmnn (sdm/sdmnn.h) as a list of steps from the volume of the dense layers to
-   the map, with the place of every feature map in one block of memory. Blocks of slopes, gradients
-   and tangents have the same places. */
+/* The architecture of sdmnn (sdm/internal/sdmnn.h) as a list of steps from the volume of the dense
+   layers to the map, with the offset of every feature map in one block of memory, called the maps.
+   Slopes, gradients and tangents are further blocks with the same offsets. A merge is no step: the
+   feature maps that it concatenates lie one after the other. */
 #ifndef SDM_SDMNN_PLAN_H
 #define SDM_SDMNN_PLAN_H
 
@@ -16,42 +17,43 @@ typedef enum sdmnn_op { SDMNN_CONV, SDMNN_POOL, SDMNN_UPSAMPLE } sdmnn_op;
 typedef struct sdmnn_step {
     sdmnn_op op;
     size_t level;    /* of the output */
-    size_t from, to; /* places of input and output in the block */
-    sdm_conv conv;   /* .out: channels of every operator */
-    size_t weights;  /* of a convolution: first of its weights; the biases follow them */
-    bool linear;     /* no activation */
-    bool drop;       /* drop-out in training */
+    size_t from, to; /* offsets of input and output in the maps */
+    sdm_conv conv;   /* .out: number of channels, for all operators */
+    size_t weights; /* of a convolution: index of its first weight; the biases follow the weights */
+    bool linear;    /* no activation */
+    bool drop;      /* drop-out in training */
 } sdmnn_step;
 
+/* A feature map of the maps. level = SDMNN_LEVELS: the volume, with layout sdmnn_plan.cell. */
 typedef struct sdmnn_buffer {
-    size_t level, channels, place;
+    size_t level, channels, offset;
 } sdmnn_buffer;
 
 typedef struct sdmnn_plan {
     sdm_sdmnn_arch arch;
-    size_t n_cells[3], cells; /* of the volume that the dense layers give */
-    sdm_fmap cell;            /* its layout */
-    sdm_fmap level[SDMNN_LEVELS];
-    size_t volume; /* place of the volume, one channel of `cell` */
-    size_t input,
-        output;    /* places of the up-sampled volume and of the map, one channel of level 0 */
-    size_t floats; /* of a block */
-    size_t n_weights;
+    size_t n_cells[3], cells;     /* size of the volume, along x, y, z and in all */
+    sdm_fmap cell;                /* layout of the volume */
+    sdm_fmap level[SDMNN_LEVELS]; /* layout of each level */
+    size_t volume;                /* offset of the volume, one channel */
+    size_t input, output; /* offsets of the up-sampled volume and of the map, one channel each */
+    size_t floats;        /* of the maps */
+    size_t n_weights;     /* sdm_sdmnn_count() */
     sdmnn_step steps[SDMNN_STEPS];
     size_t n_steps;
     sdmnn_buffer buffers[SDMNN_STEPS + 2];
     size_t n_buffers;
 } sdmnn_plan;
 
-/* keep: every feature map has a place of its own, as gradients and tangents need; otherwise the way
- * up reuses memory of the way down. */
-void sdmnn_plan_make(const sdm_sdmnn_arch *a, bool keep, sdmnn_plan *plan);
+/* *plan = the steps of an architecture that has passed sdm_sdmnn_check(). keep: every feature map
+   has memory of its own, as gradients and tangents need; otherwise the way up reuses the memory of
+   the way down. */
+void sdm_sdmnn_plan_make(const sdm_sdmnn_arch *a, bool keep, sdmnn_plan *plan);
 
-/* Zeros around every feature map of a block. */
-void sdmnn_plan_clear(const sdmnn_plan *plan, float *block);
+/* Writes the zeros around every feature map; maps[plan->floats]. */
+void sdm_sdmnn_plan_clear(const sdmnn_plan *plan, float *maps);
 
-/* Weights of the dense layers: w1[W][P], b1[W], w2[cells][W], b2[cells], at the front of all
- * weights. */
+/* Numbers of weights of the two dense layers, which come first among all weights: w1[W][P], b1[W]
+   and w2[cells][W], b2[cells]. */
 static inline size_t sdmnn_dense1(const sdmnn_plan *p)
 {
     return p->arch.width * (p->arch.n_params + 1);

@@ -1,8 +1,7 @@
-/* Max pooling of feature maps: x[C] of layout g -> y[C] of layout h, half the size. */
+/* Max pooling of feature maps by 2. */
 #include "operators.h"
 
-// place of the largest value of the window whose first voxel is at x[at], which has w[x], w[y],
-// w[z] voxels
+// Index of the maximum of the window of w[0] x w[1] x w[2] voxels whose first voxel is x[at].
 static size_t largest(const sdm_fmap *g, const float *x, size_t at, const size_t w[3])
 {
     size_t best = at;
@@ -15,9 +14,10 @@ static size_t largest(const sdm_fmap *g, const float *x, size_t at, const size_t
     return best;
 }
 
-// one channel: copies from the largest voxel of each window, or adds back to it
-static void windows(const sdm_fmap *g, const sdm_fmap *h, const float *x, const float *from,
-                    float *to, int back)
+// One channel. For each window with its maximum of x at voxel v: to[window] = from[v], or with
+// `back` to[v] += from[window].
+static void pool_windows(const sdm_fmap *g, const sdm_fmap *h, const float *x, const float *from,
+                         float *to, int back)
 {
     size_t w[3];
     for (size_t k = 0; k < h->n[2]; k++) {
@@ -44,7 +44,7 @@ void sdm_pool_tangent(const sdm_fmap *g, const sdm_fmap *h, size_t channels, con
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
     for (long c = 0; c < (long)channels; c++) {
         float *out = dy + (size_t)c * h->stride;
-        windows(g, h, x + (size_t)c * g->stride, dx + (size_t)c * g->stride, out, 0);
+        pool_windows(g, h, x + (size_t)c * g->stride, dx + (size_t)c * g->stride, out, 0);
         sdm_fmap_clear_pads(h, 0, h->count, out);
     }
 }
@@ -61,6 +61,6 @@ void sdm_pool_backward(const sdm_fmap *g, const sdm_fmap *h, size_t channels, co
     (void)n_threads;
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
     for (long c = 0; c < (long)channels; c++)
-        windows(g, h, x + (size_t)c * g->stride, dy + (size_t)c * h->stride,
-                dx + (size_t)c * g->stride, 1);
+        pool_windows(g, h, x + (size_t)c * g->stride, dy + (size_t)c * h->stride,
+                     dx + (size_t)c * g->stride, 1);
 }

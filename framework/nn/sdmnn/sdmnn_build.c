@@ -1,12 +1,12 @@
-/* Making of an sdmnn model's file from weights. */
+/* Builds the file of an sdmnn model from its weights. */
 #include <string.h>
 
 #include "sdm/internal/kernels.h"
 #include "sdm/memory.h"
 #include "sdmnn_model.h"
 
-// read back by sdmnn_open.c
-static void describe(const sdm_sdmnn_spec *spec, sdm_text *t)
+// the text that read_architecture() of sdmnn_open.c reads
+static void description_write(const sdm_sdmnn_spec *spec, sdm_text *t)
 {
     const sdm_sdmnn_arch *a = &spec->arch;
     sdm_model_describe(spec->info, "sdmnn", t);
@@ -15,14 +15,15 @@ static void describe(const sdm_sdmnn_spec *spec, sdm_text *t)
     sdm_text_add(t, "sdmnn.activation=%d\nsdmnn.half=%d\n", a->activation, spec->half);
 }
 
-static void put(bool half, const float *w, size_t n, void *to, size_t at)
+// elements at .. at + n - 1 of `to` = w[n], as halves or floats
+static void weights_store(bool half, const float *w, size_t n, void *to, size_t at)
 {
     if (!half) memcpy((float *)to + at, w, n * sizeof *w);
     for (size_t i = 0; i < n && half; i++) ((uint16_t *)to)[at + i] = sdm_half_from_float(w[i]);
 }
 
-static void fill(const sdm_sdmnn_spec *spec, const sdmnn_plan *p, float *dense, void *volume,
-                 void *conv)
+static void sections_fill(const sdm_sdmnn_spec *spec, const sdmnn_plan *p, float *dense,
+                          void *volume, void *conv)
 {
     const size_t width = spec->arch.width, first = sdmnn_dense1(p);
     const float *w2 = spec->weights + first, *b2 = w2 + p->cells * width;
@@ -37,7 +38,7 @@ static void fill(const sdm_sdmnn_spec *spec, const sdmnn_plan *p, float *dense, 
     for (const sdmnn_step *s = p->steps; s < p->steps + p->n_steps; s++) {
         if (s->op != SDMNN_CONV) continue;
         const size_t n = sdmnn_conv_weights(s);
-        put(spec->half, spec->weights + s->weights, n, conv, at);
+        weights_store(spec->half, spec->weights + s->weights, n, conv, at);
         memcpy(bias, spec->weights + s->weights + n, s->conv.out * sizeof *bias);
         at += n, bias += s->conv.out;
     }
@@ -49,19 +50,22 @@ sdm_status sdm_sdmnn_build(const sdm_sdmnn_spec *spec, uint8_t **bytes, size_t *
     sdm_status s = sdm_sdmnn_check(&spec->arch, err);
     if (s) return s;
     sdmnn_plan p;
-    sdmnn_plan_make(&spec->arch, false, &p);
+    sdm_sdmnn_plan_make(&spec->arch, false, &p);
+
+    // sections
     const size_t weight = spec->half ? sizeof(uint16_t) : sizeof(float);
-    const size_t n_dense = sdmnn_dense_floats(&p),
+    const size_t n_dense = sdm_sdmnn_dense_floats(&p),
                  n_volume = sdm_panel_count(p.cells, spec->arch.width),
-                 n_conv = sdmnn_conv_count(&p);
-    float *dense = NULL, *volume = NULL, *conv = NULL; // room for float, used for half too
+                 n_conv = sdm_sdmnn_conv_count(&p);
+    float *dense = NULL, *volume = NULL,
+          *conv = NULL; // large enough for floats, also used for halves
     sdm_text text = {0};
     s = SDM_ALLOC(&dense, n_dense, "model weights", err);
     if (!s) s = SDM_ALLOC(&volume, n_volume, "model weights", err);
     if (!s) s = SDM_ALLOC(&conv, n_conv, "model weights", err);
     if (!s) {
-        fill(spec, &p, dense, volume, conv);
-        describe(spec, &text);
+        sections_fill(spec, &p, dense, volume, conv);
+        description_write(spec, &text);
         const sdm_section sections[] = {{"sdmnn.dense", dense, n_dense * sizeof *dense},
                                         {"sdmnn.volume", volume, n_volume * weight},
                                         {"sdmnn.conv", conv, n_conv * weight}};

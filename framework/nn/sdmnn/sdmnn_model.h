@@ -1,6 +1,7 @@
-/* The opened sdmnn model. Sections of the file:
+/* The opened sdmnn model and the functions between its files. Letters as in sdm/internal/sdmnn.h.
+   Sections of the file:
      sdmnn.dense   float: w1[W][P], b1[W], b2[cells], then the biases of every convolution
-     sdmnn.volume  panels of w2, float or half
+          sdmnn.volume  panels of w2[cells][W] (sdm/internal/kernels.h), float or half
      sdmnn.conv    w[outputs][inputs][taps] of every convolution, float or half */
 #ifndef SDM_SDMNN_MODEL_H
 #define SDM_SDMNN_MODEL_H
@@ -9,40 +10,40 @@
 #include "passes.h"
 
 typedef struct sdmnn_model {
-    sdmnn_plan plan; /* of the forward pass */
-    sdmnn_plan kept; /* of the Jacobian */
-    sdmnn_layers layers;
-    float *packed; /* memory of layers.packed */
-    bool half;
+    sdmnn_plan plan;     /* of the forward pass: feature maps share memory */
+    sdmnn_plan kept;     /* of derivatives: all feature maps are kept */
+    sdmnn_layers layers; /* without `transposed` */
+    float *packed;       /* memory of layers.packed */
+    bool half;           /* sections sdmnn.volume and sdmnn.conv are halves */
     const float *w1, *b1, *b2;
-    const void *volume; /* panels */
-    const void *conv;
+    const void *volume, *conv; /* the sections */
 } sdmnn_model;
 
-/* Floats of the section sdmnn.dense. */
-size_t sdmnn_dense_floats(const sdmnn_plan *p);
-/* Weights of the section sdmnn.conv. */
-size_t sdmnn_conv_count(const sdmnn_plan *p);
+/* sdmnn_weights.c: number of floats of the section sdmnn.dense, of weights of sdmnn.conv. */
+size_t sdm_sdmnn_dense_floats(const sdmnn_plan *p);
 
-/* The convolutions in the order of this machine's kernels, for the forward or the backward pass, to
-   `to`, whose places come into packed[SDMNN_STEPS]. layer: room for the largest as float. */
-size_t sdmnn_packed_floats(const sdmnn_plan *p, bool transposed);
-size_t sdmnn_largest_layer(const sdmnn_plan *p);
-void sdmnn_pack_layers(const sdmnn_model *k, bool transposed, float *layer, float *to,
-                       const float **packed);
+size_t sdm_sdmnn_conv_count(const sdmnn_plan *p);
 
-/* Entries of the kind's table (model_kind.h). */
-size_t sdmnn_scratch_bytes(const sdm_model *m, size_t n, int n_threads);
-void sdmnn_model_forward(const sdm_model *m, const double *params, size_t n, float *values,
-                         void *scratch, int n_threads);
-size_t sdmnn_jacobian_scratch_bytes(const sdm_model *m, int n_threads);
-void sdmnn_model_jacobian(const sdm_model *m, const double *params, float *values, float *jacobian,
-                          void *scratch, int n_threads);
-size_t sdmnn_jvp_scratch_bytes(const sdm_model *m, int n_threads);
-void sdmnn_model_jvp(const sdm_model *m, const double *params, const double *direction,
-                     float *values, float *tangent, void *scratch, int n_threads);
-size_t sdmnn_vjp_scratch_bytes(const sdm_model *m);
-void sdmnn_model_vjp(const sdm_model *m, const double *params, const float *adjoint,
-                     double *gradient, void *scratch);
+/* sdmnn_weights.c: packs all convolutions for the forward or (transposed) the backward pass into
+   to[sdm_sdmnn_packed_floats()] and sets packed[SDMNN_STEPS], the start of each.
+   layer[sdm_sdmnn_largest_layer()]: buffer for the weights of one convolution as floats. */
+size_t sdm_sdmnn_packed_floats(const sdmnn_plan *p, bool transposed);
+size_t sdm_sdmnn_largest_layer(const sdmnn_plan *p);
+void sdm_sdmnn_pack_layers(const sdmnn_model *k, bool transposed, float *layer, float *to,
+                           const float **packed);
+
+/* sdmnn_run.c: entries of the function table sdm_model_kind. */
+size_t sdm_sdmnn_scratch_bytes(const sdm_model *m, size_t n, int n_threads);
+void sdm_sdmnn_model_forward(const sdm_model *m, const double *params, size_t n, float *values,
+                             void *scratch, int n_threads);
+size_t sdm_sdmnn_jacobian_scratch_bytes(const sdm_model *m, int n_threads);
+void sdm_sdmnn_model_jacobian(const sdm_model *m, const double *params, float *values,
+                              float *jacobian, void *scratch, int n_threads);
+size_t sdm_sdmnn_jvp_scratch_bytes(const sdm_model *m, int n_threads);
+void sdm_sdmnn_model_jvp(const sdm_model *m, const double *params, const double *direction,
+                         float *values, float *tangent, void *scratch, int n_threads);
+size_t sdm_sdmnn_vjp_scratch_bytes(const sdm_model *m);
+void sdm_sdmnn_model_vjp(const sdm_model *m, const double *params, const float *adjoint,
+                         double *gradient, void *scratch);
 
 #endif

@@ -1,5 +1,5 @@
-/* An sdmnn model at work, one map after another: parameters -> map, with derivatives by forward and
- * by reverse mode. No allocation. */
+/* Evaluation of an sdmnn model, one map after another, with derivatives in forward and reverse
+   mode. No allocation. */
 #include <string.h>
 
 #include "sdm/internal/kernels.h"
@@ -8,13 +8,13 @@
 
 static size_t up16(size_t n) { return (n + 15) / 16 * 16; }
 
-// scratch, carved from the caller's block; R rows: a map, or a map and its derivatives
+// Scratch memory, carved from the caller's block. R rows: a map, then its derivatives.
 typedef struct workspace {
-    float *hidden;     // [R][W]
-    float *volume;     // [R][sdm_panel_outputs(cells)]
-    float *activation; // [W]
-    float *block, *slope, *tangent;
-    float *layer, *transposed; // of sdmnn_pack_layers(), for reverse mode
+    float *hidden;                 // [R][W]
+    float *volume;                 // [R][sdm_panel_outputs(cells)]
+    float *activation;             // [W] derivative of the activation of the dense layer
+    float *maps, *slope, *tangent; // see passes.h
+    float *layer, *transposed;     // reverse mode: layer and `to` of sdm_sdmnn_pack_layers()
 } workspace;
 
 static size_t carve(const sdmnn_plan *p, size_t rows, bool reverse, void *memory, workspace *w)
@@ -26,9 +26,9 @@ static size_t carve(const sdmnn_plan *p, size_t rows, bool reverse, void *memory
                             p->floats,
                             more,
                             more,
-                            reverse ? sdmnn_largest_layer(p) : 0,
-                            reverse ? sdmnn_packed_floats(p, true) : 0};
-    float **const fields[] = {&w->hidden, &w->volume,  &w->activation, &w->block,
+                            reverse ? sdm_sdmnn_largest_layer(p) : 0,
+                            reverse ? sdm_sdmnn_packed_floats(p, true) : 0};
+    float **const fields[] = {&w->hidden, &w->volume,  &w->activation, &w->maps,
                               &w->slope,  &w->tangent, &w->layer,      &w->transposed};
     size_t total = 0;
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
@@ -38,18 +38,21 @@ static size_t carve(const sdmnn_plan *p, size_t rows, bool reverse, void *memory
     return total * sizeof(float);
 }
 
+// factor by which parameter i is scaled to [-1, 1]
 static double unit(const sdm_model *m, size_t i)
 {
     return 2 / (m->params[i].max - m->params[i].min);
 }
 
-// rows: 1; 2 for the derivative along a direction too; 1 + P for those by each parameter (direction
-// NULL)
+// w->volume = the output of the dense layers: row 0 the volume, then its derivatives: along
+// direction[P] (rows = 2) or, for direction NULL, by each parameter (rows = 1 + P).
 static void dense(const sdm_model *m, const double *params, size_t rows, const double *direction,
                   const workspace *w)
 {
     const sdmnn_model *k = m->network;
     const sdm_sdmnn_arch *a = &k->plan.arch;
+
+    // first layer and its derivatives
     for (size_t o = 0; o < a->width; o++) {
         double s = (double)k->b1[o], along = 0;
         for (size_t i = 0; i < a->n_params; i++) {
@@ -67,6 +70,7 @@ static void dense(const sdm_model *m, const double *params, size_t rows, const d
     for (size_t r = 1; r < rows; r++)
         for (size_t o = 0; o < a->width; o++) w->hidden[r * a->width + o] *= w->activation[o];
 
+    // second layer; the bias does not enter the derivatives
     const size_t cells = k->plan.cells, ld = sdm_panel_outputs(cells);
     if (k->half)
         sdm_panel_f16(rows, cells, a->width, k->volume, w->hidden, a->width, w->volume, ld);
@@ -75,7 +79,7 @@ static void dense(const sdm_model *m, const double *params, size_t rows, const d
     for (size_t i = 0; i < cells; i++) w->volume[i] += k->b2[i];
 }
 
-size_t sdmnn_scratch_bytes(const sdm_model *m, size_t n, int n_threads)
+size_t sdm_sdmnn_scratch_bytes(const sdm_model *m, size_t n, int n_threads)
 {
     const sdmnn_model *k = m->network;
     workspace w;
@@ -83,18 +87,18 @@ size_t sdmnn_scratch_bytes(const sdm_model *m, size_t n, int n_threads)
     return carve(&k->plan, 1, false, NULL, &w);
 }
 
-void sdmnn_model_forward(const sdm_model *m, const double *params, size_t n, float *values,
-                         void *scratch, int n_threads)
+void sdm_sdmnn_model_forward(const sdm_model *m, const double *params, size_t n, float *values,
+                             void *scratch, int n_threads)
 {
     const sdmnn_model *k = m->network;
     const size_t voxels = sdm_grid_count(&m->info.grid);
     workspace w;
     carve(&k->plan, 1, false, scratch, &w);
-    sdmnn_plan_clear(&k->plan, w.block);
+    sdm_sdmnn_plan_clear(&k->plan, w.maps);
     for (size_t i = 0; i < n; i++) {
         dense(m, params + i * m->info.n_params, 1, NULL, &w);
-        sdmnn_forward(&k->plan, &k->layers, w.volume, w.block, NULL, NULL, values + i * voxels,
-                      n_threads);
+        sdm_sdmnn_pass_forward(&k->plan, &k->layers, w.volume, w.maps, NULL, NULL,
+                               values + i * voxels, n_threads);
     }
 }
 
@@ -105,7 +109,7 @@ static size_t derivative_bytes(const sdm_model *m, size_t rows, bool reverse)
     return carve(&k->kept, rows, reverse, NULL, &w);
 }
 
-// the map, then its derivatives in the rows - 1 maps of `derivatives`
+// values = the map, derivatives[rows - 1][voxels] as in dense()
 static void forward_mode(const sdm_model *m, const double *params, size_t rows,
                          const double *direction, float *values, float *derivatives, void *scratch,
                          int n_threads)
@@ -114,60 +118,66 @@ static void forward_mode(const sdm_model *m, const double *params, size_t rows,
     const size_t voxels = sdm_grid_count(&m->info.grid), ld = sdm_panel_outputs(k->kept.cells);
     workspace w;
     carve(&k->kept, rows, false, scratch, &w);
-    sdmnn_plan_clear(&k->kept, w.block);
-    sdmnn_plan_clear(&k->kept, w.tangent);
+    sdm_sdmnn_plan_clear(&k->kept, w.maps);
+    sdm_sdmnn_plan_clear(&k->kept, w.tangent);
     dense(m, params, rows, direction, &w);
-    sdmnn_forward(&k->kept, &k->layers, w.volume, w.block, w.slope, NULL, values, n_threads);
+    sdm_sdmnn_pass_forward(&k->kept, &k->layers, w.volume, w.maps, w.slope, NULL, values,
+                           n_threads);
     for (size_t r = 1; r < rows; r++)
-        sdmnn_tangent(&k->kept, &k->layers, w.block, w.slope, w.volume + r * ld, w.tangent,
-                      derivatives + (r - 1) * voxels, n_threads);
+        sdm_sdmnn_pass_tangent(&k->kept, &k->layers, w.maps, w.slope, w.volume + r * ld, w.tangent,
+                               derivatives + (r - 1) * voxels, n_threads);
 }
 
-size_t sdmnn_jacobian_scratch_bytes(const sdm_model *m, int n_threads)
+size_t sdm_sdmnn_jacobian_scratch_bytes(const sdm_model *m, int n_threads)
 {
     (void)n_threads;
     return derivative_bytes(m, 1 + m->info.n_params, false);
 }
 
-void sdmnn_model_jacobian(const sdm_model *m, const double *params, float *values, float *jacobian,
-                          void *scratch, int n_threads)
+void sdm_sdmnn_model_jacobian(const sdm_model *m, const double *params, float *values,
+                              float *jacobian, void *scratch, int n_threads)
 {
     forward_mode(m, params, 1 + m->info.n_params, NULL, values, jacobian, scratch, n_threads);
 }
 
-size_t sdmnn_jvp_scratch_bytes(const sdm_model *m, int n_threads)
+size_t sdm_sdmnn_jvp_scratch_bytes(const sdm_model *m, int n_threads)
 {
     (void)n_threads;
     return derivative_bytes(m, 2, false);
 }
 
-void sdmnn_model_jvp(const sdm_model *m, const double *params, const double *direction,
-                     float *values, float *tangent, void *scratch, int n_threads)
+void sdm_sdmnn_model_jvp(const sdm_model *m, const double *params, const double *direction,
+                         float *values, float *tangent, void *scratch, int n_threads)
 {
     forward_mode(m, params, 2, direction, values, tangent, scratch, n_threads);
 }
 
-size_t sdmnn_vjp_scratch_bytes(const sdm_model *m) { return derivative_bytes(m, 2, true); }
+size_t sdm_sdmnn_vjp_scratch_bytes(const sdm_model *m) { return derivative_bytes(m, 2, true); }
 
-void sdmnn_model_vjp(const sdm_model *m, const double *params, const float *adjoint,
-                     double *gradient, void *scratch)
+void sdm_sdmnn_model_vjp(const sdm_model *m, const double *params, const float *adjoint,
+                         double *gradient, void *scratch)
 {
     const sdmnn_model *k = m->network;
     const sdm_sdmnn_arch *a = &k->kept.arch;
     const size_t cells = k->kept.cells, ld = sdm_panel_outputs(cells);
+
+    // forward pass with slopes
     workspace w;
     carve(&k->kept, 2, true, scratch, &w);
-    sdmnn_plan_clear(&k->kept, w.block);
-    sdmnn_plan_clear(&k->kept, w.tangent);
+    sdm_sdmnn_plan_clear(&k->kept, w.maps);
+    sdm_sdmnn_plan_clear(&k->kept, w.tangent);
     dense(m, params, 1, NULL, &w);
-    sdmnn_forward(&k->kept, &k->layers, w.volume, w.block, w.slope, NULL, NULL, 1);
+    sdm_sdmnn_pass_forward(&k->kept, &k->layers, w.volume, w.maps, w.slope, NULL, NULL, 1);
 
-    // the weights of the backward pass are packed anew: a hundredth of its work
+    // backward pass; packing its weights in each call takes about 1 % of its time
     sdmnn_layers layers = k->layers;
-    sdmnn_pack_layers(k, true, w.layer, w.transposed, layers.transposed);
+    sdm_sdmnn_pack_layers(k, true, w.layer, w.transposed, layers.transposed);
     float *dvolume = w.volume + ld, *dhidden = w.hidden + a->width;
     memset(dvolume + cells, 0, (ld - cells) * sizeof *dvolume);
-    sdmnn_backward(&k->kept, &layers, w.block, w.slope, adjoint, w.tangent, dvolume, NULL, 1);
+    sdm_sdmnn_pass_backward(&k->kept, &layers, w.maps, w.slope, adjoint, w.tangent, dvolume, NULL,
+                            1);
+
+    // dense layers
     if (k->half)
         sdm_panel_back_f16(cells, a->width, k->volume, dvolume, dhidden);
     else

@@ -1,10 +1,10 @@
-/* Up-sampling of feature maps to the nearest: x[C] of layout h -> y[C] of layout g, `factor` times
- * the size. */
+/* Nearest-neighbour up-sampling of feature maps, and its transpose. */
 #include <string.h>
 
 #include "operators.h"
 
-static void upsample(const sdm_fmap *g, const sdm_fmap *h, size_t factor, const float *x, float *y)
+static void upsample_channel(const sdm_fmap *g, const sdm_fmap *h, size_t factor, const float *x,
+                             float *y)
 {
     for (size_t k = 0; k < g->n[2]; k++) {
         for (size_t j = 0; j < g->n[1]; j++) {
@@ -17,7 +17,8 @@ static void upsample(const sdm_fmap *g, const sdm_fmap *h, size_t factor, const 
     sdm_fmap_clear_pads(g, 0, g->count, y);
 }
 
-static void gather(const sdm_fmap *g, const sdm_fmap *h, size_t factor, const float *dy, float *dx)
+static void sum_channel(const sdm_fmap *g, const sdm_fmap *h, size_t factor, const float *dy,
+                        float *dx)
 {
     memset(dx, 0, h->count * sizeof *dx);
     for (size_t k = 0; k < g->n[2]; k++) {
@@ -36,7 +37,7 @@ void sdm_upsample_forward(const sdm_fmap *g, const sdm_fmap *h, size_t factor, s
     (void)n_threads;
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
     for (long c = 0; c < (long)channels; c++)
-        upsample(g, h, factor, x + (size_t)c * h->stride, y + (size_t)c * g->stride);
+        upsample_channel(g, h, factor, x + (size_t)c * h->stride, y + (size_t)c * g->stride);
 }
 
 void sdm_upsample_backward(const sdm_fmap *g, const sdm_fmap *h, size_t factor, size_t channels,
@@ -45,5 +46,5 @@ void sdm_upsample_backward(const sdm_fmap *g, const sdm_fmap *h, size_t factor, 
     (void)n_threads;
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
     for (long c = 0; c < (long)channels; c++)
-        gather(g, h, factor, dy + (size_t)c * g->stride, dx + (size_t)c * h->stride);
+        sum_channel(g, h, factor, dy + (size_t)c * g->stride, dx + (size_t)c * h->stride);
 }

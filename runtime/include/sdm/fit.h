@@ -1,23 +1,28 @@
-/* Fitting a shape to an image: shape parameters and rigid pose, with their uncertainty.
+/* Fits a shape to an image: estimates shape parameters and rigid pose, with their uncertainty.
 
-   Unknown are the parameters theta[n] of the shape and its pose (sdm/pose.h), n + 6 numbers. The
-   signed distance map of the shape, by the network or the exact engine, is generated once an
-   iteration in the shape's frame and interpolated at the voxel centres of the image. Two models of
-   an image, both with tissues whose laws are estimated along with the shape:
-   - partial volume (Santago and Gage 1993): a voxel holds the share a of inside tissue, a = the
-   shape seen through a Gaussian point spread, and its value has the mean a m_in + (1 - a) m_out.
-   Unbiased where the image is blurred; the default;
-   - labels (Demarcy 2017; Wang et al. 2021): a voxel is inside with probability mu = 1 / (1 +
-   exp(distance / l_ref)), its value has the inside or the outside law. Expectation-maximisation;
-   tolerant, but its edge lies where the two laws cross, which in a blurred image is not where the
-   surface is. The posterior is maximised by damped Gauss-Newton steps; ranges of parameters are
-   bounds. Exact distances have creases where the nearest face changes, so a fit with exact maps
-   ends by derivatives that are averages over a motion of the surface of 3 % of a voxel of the map
-   (Ermoliev, Norkin and Wets 1995): one place, wherever it comes from. The covariance is the
-   sandwich H^-1 J H^-1 (Huber 1967), H the information of the observed values (labels: Louis 1982),
-   J the covariance of the score with the spatial correlation of the residuals (Conley 1999), freed
-   of what the fit has taken from it, so that correlated noise and a model that is a little wrong
-   widen it. */
+   Unknowns are the n parameters theta of the shape and the 6 numbers of its pose (sdm/pose.h). In
+   each iteration the network or the exact engine generates the map of the shape, its signed
+   distance on a grid in the shape's frame. The map is interpolated at the voxel centres of the
+   image. A tissue is a class of material inside or outside the shape, with a distribution of values
+   that is estimated along with the shape. Two models explain the value of a voxel:
+   - partial volume (Santago and Gage 1993), the default: the shape fills the share a of the voxel,
+     0 .. 1, seen through a Gaussian point spread, and the mean of the value is
+     a m_in + (1 - a) m_out, with the means m of the tissues. Unbiased where the image is blurred;
+   - labels (Demarcy 2017; Wang et al. 2021): the voxel is inside with probability
+     mu = 1 / (1 + exp(distance / l_ref)), and its value comes from the inside or the outside
+     tissues. Estimated by expectation-maximisation. Tolerant, but biased in blurred images: the
+   edge lies where the inside and the outside density are equal, not where the surface is.
+
+   The posterior density is maximised by damped Newton steps that use the information (negative
+   second derivative of the log-likelihood), within the ranges of the parameters. Exact distances
+   have creases where the nearest face changes, which make the likelihood non-smooth. A fit with
+   exact maps therefore ends with gradients averaged over a motion of the surface of 3 % of a map
+   voxel (Ermoliev, Norkin and Wets 1995), and reaches the same maximum from every nearby start.
+
+   The covariance is the sandwich H^-1 J H^-1 (Huber 1967). H is the observed information (labels:
+   Louis 1982). J is the covariance of the score, the gradient of the log-likelihood, with the
+   spatial correlation of the residuals (Conley 1999), corrected for what the fit has explained of
+   them. Correlated noise and small errors of the model therefore widen the covariance. */
 #ifndef SDM_FIT_H
 #define SDM_FIT_H
 
@@ -31,74 +36,91 @@
 extern "C" {
 #endif
 
-/* Where maps come from: a network, a shape, or both. */
+/* Where maps come from: a network, a shape, or both. The caller keeps ownership. */
 typedef struct sdm_fit_source {
-    const sdm_model *model; /* maps by the network; NULL: by the exact engine */
-    const sdm_instance *
-        shape; /* for the exact engine; may be NULL with a model (no polish, policy not exact). With
-                  a model its parameters must be those of the model (sdm_runtime_instance()) */
-    /* of exact maps, in the shape's frame, where the shape lies with a margin; unused with a model.
-       Voxels larger than 1.5 of the point spread of the image make deviations along what is weakly
-       determined too small. */
+    /* maps by this network; NULL: by the exact engine */
+    const sdm_model *model;
+    /* for the exact engine. May be NULL with a model: then no polish, and not the policy exact.
+       With a model its parameters must be those of the model, see sdm_runtime_instance() */
+    const sdm_instance *shape;
+    /* without a model: grid of the exact maps in the shape's frame, which holds the shape with a
+       margin. With voxels larger than 1.5 times the point spread of the image, the standard
+       deviations of weakly determined unknowns come out too small */
     sdm_grid grid;
-    sdm_range_policy policy; /* parameters outside the network's range. Refuse: bounds are that
-                                range and a start outside of it is SDM_E_RANGE; clamp: such a start
-                                is moved to the range and said so; exact: bounds are the shape's own
-                                range, outside of the network's the exact engine is asked */
+    /* with a model: parameters outside the network's range. Refuse: the range is the bound of the
+       fit, and a start outside is SDM_E_RANGE. Clamp: the same bound, but such a start is moved
+       into the range and start_clamped set. Exact: the shape's own range is the bound, and the
+       exact engine makes the maps outside the network's range */
+    sdm_range_policy policy;
 } sdm_fit_source;
 
 typedef enum sdm_fit_kind {
-    SDM_FIT_IMAGE = 0, /* values[nz][ny][nx], any unit */
-    SDM_FIT_LABEL =
-        1, /* values[nz][ny][nx] are probabilities of inside, 0 .. 1 (a label map: 0 and 1): taken
-              as shares of voxels (partial volume), or as labels with the logistic prior */
-    SDM_FIT_POINTS = 2 /* points[n_points][3] on the surface, world mm, with outliers */
+    /* values[nz][ny][nx], any unit */
+    SDM_FIT_IMAGE = 0,
+    /* values[nz][ny][nx] are probabilities of inside, 0 .. 1 (a label map: 0 and 1). The image
+       model takes them as shares of voxels (partial volume), or as labels with the logistic prior
+     */
+    SDM_FIT_LABEL = 1,
+    /* points[n_points][3] on the surface, world, mm; outliers are tolerated */
+    SDM_FIT_POINTS = 2
 } sdm_fit_kind;
 
-/* What is fitted to. Voxels that are NaN are left out and counted; infinite ones are SDM_E_FORMAT.
- */
+/* Data to fit to; the caller keeps ownership. Voxels that are NaN are skipped and counted; infinite
+ * ones are SDM_E_FORMAT. */
 typedef struct sdm_fit_target {
     sdm_fit_kind kind;
-    sdm_grid grid; /* image and label map: in the world */
+    /* image and label map: their grid in the world */
+    sdm_grid grid;
     const float *values;
     const double *points;
     size_t n_points;
 } sdm_fit_target;
 
+/* tissues inside, and tissues outside, at most */
 #define SDM_FIT_LAWS 4
 
-/* Values of one tissue: a Gaussian law, or Student's t with `dof` > 0 degrees of freedom (then sd
- * is its scale). */
+/* Distribution of the values of one tissue: a Gaussian, or Student's t with `dof` > 0 degrees of
+ * freedom (then sd is its scale). `weight` is the relative frequency of the tissue on its side. */
 typedef struct sdm_fit_law {
     double weight, mean, sd, dof;
 } sdm_fit_law;
 
-/* Mixtures of laws inside and outside; weights are relative. */
+/* All tissues: mixtures of distributions inside and outside. Weights are relative within a side. */
 typedef struct sdm_fit_appearance {
-    size_t n_inside, n_outside; /* 1 .. SDM_FIT_LAWS */
+    /* 1 .. SDM_FIT_LAWS */
+    size_t n_inside, n_outside;
     sdm_fit_law inside[SDM_FIT_LAWS], outside[SDM_FIT_LAWS];
 } sdm_fit_appearance;
 
 typedef enum sdm_fit_model { SDM_FIT_PARTIAL_VOLUME = 0, SDM_FIT_LABELS = 1 } sdm_fit_model;
 
+/* Rotations to try at the start. */
 typedef enum sdm_fit_turns {
     SDM_FIT_TURNS_NONE = 0,
-    SDM_FIT_TURNS_AXIS = 1, /* about z of the shape's frame (the modiolus of the cochlea), evenly */
-    SDM_FIT_TURNS_SPHERE = 2 /* all rotations, evenly (super-Fibonacci spirals, Alexa 2022) */
+    /* evenly about z of the shape's frame (the modiolus of the cochlea) */
+    SDM_FIT_TURNS_AXIS = 1,
+    /* evenly over all rotations (super-Fibonacci spirals, Alexa 2022) */
+    SDM_FIT_TURNS_SPHERE = 2
 } sdm_fit_turns;
 
 typedef enum sdm_fit_phase {
+    /* search for the start */
     SDM_FIT_SEARCH = 0,
     SDM_FIT_MAIN = 1,
+    /* exact maps after the fit with a network */
     SDM_FIT_POLISH = 2
 } sdm_fit_phase;
 
-/* State after an iteration; the arrays are valid during the call. */
+/* State after an iteration; params is valid during the call. */
 typedef struct sdm_fit_progress {
     sdm_fit_phase phase;
-    size_t iteration; /* from 1, over all phases */
-    double objective; /* log posterior density, without constants */
-    double step;      /* largest change, see sdm_fit_opts.eps */
+    /* from 1, over all phases */
+    size_t iteration;
+    /* log-posterior density, up to a constant */
+    double objective;
+    /* size of the step, in the units of sdm_fit_opts.eps */
+    double step;
+    /* [n] */
     const double *params;
     sdm_pose pose;
 } sdm_fit_progress;
@@ -106,158 +128,213 @@ typedef struct sdm_fit_progress {
 /* sdm_fit_defaults() fills it; change what differs. */
 typedef struct sdm_fit_opts {
     sdm_fit_model image_model;
-    double l_ref;                  /* mm, > 0: labels: scale of the logistic prior */
-    double blur;                   /* mm, > 0: sd of the point spread over the voxel, start value */
-    bool keep_blur;                /* true: not estimated */
-    sdm_fit_appearance appearance; /* start values */
-    bool keep_appearance;          /* true: not estimated */
-    /* mm, >= 0: tissues lie in places. Where the image holds two or more outside, partial volume:
-       their weights vary in space (Sanjay-Gopal and Hebert 1998), each the tissue's part of what is
-       about a place, seen through a Gaussian of this sd. 0: the same everywhere */
+    /* mm, > 0: labels: scale of the logistic prior */
+    double l_ref;
+    /* mm, > 0: partial volume: sd of the point spread, which includes the voxel's own box; start
+     * value */
+    double blur;
+    /* true: the blur is not estimated */
+    bool keep_blur;
+    /* tissues; start values */
+    sdm_fit_appearance appearance;
+    /* true: the appearance is not estimated */
+    bool keep_appearance;
+    /* mm, >= 0: partial volume, images with two or more outside tissues: the weights of these vary
+       in space (Sanjay-Gopal and Hebert 1998). At a point they are the parts of the tissues in its
+       surroundings, averaged with a Gaussian window of this sd. 0: the same everywhere */
     double tissue_mm;
-    double
-        point_sd; /* mm, > 0: sd of points about the surface; start value unless keep_appearance */
-    double point_dof; /* > 0: degrees of freedom of Student's t of points; small: tolerant of
-                         outliers */
+    /* mm, > 0: points: sd of their distance from the surface; start value, estimated unless
+     * keep_appearance */
+    double point_sd;
+    /* > 0: points: degrees of freedom of Student's t; small values tolerate outliers */
+    double point_dof;
 
-    const double *start_params; /* [n]; NULL: the defaults of the shape */
+    /* [n]; NULL: the defaults of the shape */
+    const double *start_params;
     sdm_pose start_pose;
-    sdm_fit_turns
-        turns; /* rotations tried before start_pose's own, about `pivot`, each with all unknowns */
-    size_t n_turns;   /* 1 .. 4096 of them; read with turns */
-    double pivot[3];  /* shape's frame, mm: the point the turns keep */
-    bool keep_params; /* true: pose alone */
-    bool keep_pose;   /* true: parameters alone */
+    /* rotations about `pivot` that are tried. Turn i starts at R = R_start Q_i, with the pivot
+       where start_pose has it; all unknowns that are not kept are fitted from there */
+    sdm_fit_turns turns;
+    /* 1 .. 4096 rotations; not read without turns */
+    size_t n_turns;
+    /* shape's frame, mm: the point that the turns leave in place */
+    double pivot[3];
+    /* true: the parameters are not estimated */
+    bool keep_params;
+    /* true: the pose is not estimated */
+    bool keep_pose;
 
-    double
-        prior_sd; /* of each parameter, in units of half of its range about the middle; 0: none. 0.5
-                     takes ranges as means and two standard deviations. Priors weigh what they say
-                     beside values that are correlated: the likelihood counts these as independent,
-                     and each prior is multiplied by how much that makes too little of a variance */
-    double prior_rotation_sd; /* rad, about the start pose; 0: none. With turns: about the start as
-                                 turned, the turn chosen */
-    double prior_translation_sd; /* mm, about the same; 0: none */
+    /* sd of the prior of each parameter, about the middle of its range, in units of half of the
+       range; 0: no prior. 0.5 takes the range as mean +- two sd. The likelihood counts correlated
+       voxels as independent and is therefore too sharp beside a prior: each log prior is multiplied
+       by the ratio of the variance with correlation to that without */
+    double prior_sd;
+    /* rad: sd of the rotation about the start pose; 0: no prior. With turns: about the start as
+     * rotated by the turn that is chosen */
+    double prior_rotation_sd;
+    /* mm: sd of the translation about the same pose; 0: no prior */
+    double prior_translation_sd;
 
-    double margin; /* mm, > 0: voxels farther outside of the shape at the start than this are not
-                      looked at; the region follows the shape and is fixed in the end */
-    bool use_box;  /* also no voxels outside of the box, in the world */
+    /* mm, > 0: voxels up to this distance outside the shape are used, besides all inside. The
+     * region follows the shape and is constant at the end */
+    double margin;
+    /* true: only voxels in this box of the world, mm, are used */
+    bool use_box;
     double box_min[3], box_max[3];
-    /* mm, >= 0: voxels of an image in spaces that look like the inside (by `appearance` and `blur`
-       as given) and hold a ball of this radius are left out: they are too wide to be the shape. 0:
-       none. It must be larger than the widest ball within the shape, by a quarter of it or so. */
+    /* mm, >= 0: images: leaves out spaces that look like the inside (by `appearance` and `blur` as
+       given) and hold a ball of this radius: they are too wide to be the shape. Should be about a
+       quarter larger than the radius of the largest ball in the shape. 0: none is left out */
     double cavity;
-    double least_inside; /* 0 .. 1: share of the volume of the fitted shape that must lie in the
-                            image */
+    /* 0 .. 1: share of the volume of the fitted shape that must lie in the image */
+    double least_inside;
 
-    size_t max_iterations;        /* of the main phase, >= 1; as many again for its end by averaged
-                                     derivatives */
-    size_t max_polish_iterations; /* with the exact engine, after a network's fit, counted as those;
-                                     0: none, 40 are enough */
-    double eps; /* > 0: the main phase ends when the largest step is below: share of a parameter's
-                   range, rad, share of the shape's size; with a network where steps promise no
-                   gain, too, and then goes on by averaged derivatives */
-    double polish_eps; /* > 0: the same for the end with exact maps */
-    int n_threads;     /* 0: the OpenMP default; the same bits for every value */
-    void (*progress)(void *user,
-                     const sdm_fit_progress *p); /* after every iteration; may be NULL */
-    bool (*cancelled)(
-        void *user); /* asked now and then; true stops with SDM_E_CANCELLED; may be NULL */
+    /* of the main phase, >= 1; the averaged gradient at its end has as many again */
+    size_t max_iterations;
+    /* with the exact engine after a network's fit, counted in the same way; 0: no polish; 40 are
+     * enough */
+    size_t max_polish_iterations;
+    /* > 0: steps end when the largest component is below: a change of a parameter over its range,
+       of the rotation in rad, of the translation over the size of the shape. With a network, steps
+       also end when several in a row promise no gain, with exact maps at the first such step;
+       averaged gradients follow unless the parameters are kept */
+    double eps;
+    /* > 0: the same for the averaged gradient with exact maps, in the main phase or the polish, and
+     * for all steps with exact maps where the parameters are kept */
+    double polish_eps;
+    /* >= 0; 0: the OpenMP default. The same bits for every value */
+    int n_threads;
+    /* called after every iteration; may be NULL */
+    void (*progress)(void *user, const sdm_fit_progress *p);
+    /* called now and then, at least before every map; true stops the fit with SDM_E_CANCELLED; may
+     * be NULL */
+    bool (*cancelled)(void *user);
+    /* passed to both */
     void *user;
 } sdm_fit_opts;
 
 /* Fluid in bone, in Hounsfield units: inside 40 +- 170; outside 1300 +- 270 and air -880 +- 150. */
 SDM_API sdm_fit_opts sdm_fit_defaults(void);
 
-/* Zero-initialise; sdm_fit_dispose() frees. N = n_params + 6. Rows and columns of matrices: the
-   parameters in their order, rotation (rad; a small turn, after the pose, about the axes of the
-   world through the origin of the shape), translation (mm). */
+/* Result of a fit; zero-initialise, sdm_fit_dispose() frees it. N = n_params + 6. Rows and columns
+   of matrices: the parameters in their order; rotation (rad: a small rotation vector about the axes
+   of the world through the origin of the shape, applied after the pose); translation (mm). */
 typedef struct sdm_fit_result {
     size_t n_params;
-    double *params;     /* [n_params] */
-    sdm_pose pose;      /* world = R shape + t */
-    double *covariance; /* [N][N] of the posterior; rows of what was kept are 0; all NaN where a fit
-                           ended before */
-    double *sd;         /* [N]; NaN as there */
-    double *correlation; /* [N][N]; 0 where sd is 0, NaN as there */
-    bool *at_bound;      /* [n_params] estimate is at an end of its range: its sd says little */
-    bool *by_prior; /* [n_params] sd is no less than that of the prior or the range: the target says
-                       nothing of it */
-    bool start_clamped;     /* the start was moved to the network's range */
-    size_t n_exact_outside; /* maps the exact engine made because parameters lay outside of the
-                               network's range */
+    /* [n_params] estimate */
+    double *params;
+    /* world = R shape + t */
+    sdm_pose pose;
+    /* [N][N] of the posterior; 0 for unknowns that were kept; all NaN where the fit failed before
+     * it was computed */
+    double *covariance;
+    /* [N] square roots of its diagonal; NaN in the same case, or where the variance is negative */
+    double *sd;
+    /* [N][N]; 0 where a sd is 0, NaN where a sd is NaN */
+    double *correlation;
+    /* [n_params] the estimate is at an end of its range: its sd is not reliable */
+    bool *at_bound;
+    /* [n_params] the sd is about that of the prior, or of a uniform distribution over the range:
+     * the target does not determine the parameter */
+    bool *by_prior;
+    /* the start was moved into the network's range */
+    bool start_clamped;
+    /* maps that the exact engine made because parameters lay outside the network's range */
+    size_t n_exact_outside;
 
     bool converged;
-    char reason[256];    /* why it stopped */
-    size_t n_iterations; /* of the main phase and the polish */
-    double *objective; /* [n_iterations] log posterior density after each, without constants; those
-                          of other voxels (the region follows the shape), other weights of priors,
-                          other sd or places of tissues do not compare */
-    double log_likelihood; /* of the target at the estimate */
-    /* image: of the same voxels by a mixture that knows no shape, tissues outside in the same
-     * places; else NaN */
+    /* why the fit stopped */
+    char reason[256];
+    /* of the main phase and the polish */
+    size_t n_iterations;
+    /* [n_iterations] log-posterior density after each, up to a constant. Values are comparable only
+       for the same voxels (the region follows the shape), weights of priors, sd of tissues and
+       tissue weights in space */
+    double *objective;
+    /* of the target at the estimate */
+    double log_likelihood;
+    /* image: of the same voxels by a mixture without a shape, whose outside tissues have the same
+     * weights in space; else NaN */
     double log_likelihood_without;
-    double evidence; /* image: how much better the shape explains it: gain in log-likelihood over
-                        correlated voxels, less what its unknowns cost (Schwarz 1978); below 0 the
-                        image holds no such shape. Else NaN */
-    double inside_share; /* share of the volume of the shape in the image; 1 for points; NaN where a
-                            fit ended before */
+    /* image: evidence of the shape: its gain in log-likelihood, corrected for correlated voxels,
+       less the cost of its unknowns (Schwarz 1978). At most 0: the image shows no such shape. Else
+       NaN */
+    double evidence;
+    /* share of the volume of the shape that lies in the image; 1 for points; NaN where the fit
+     * failed before it was computed, as all figures with this remark */
+    double inside_share;
 
-    size_t n_used, n_nan; /* voxels or points used; voxels near the shape left out because they are
-                             NaN or n_cavity's */
-    size_t n_cavity;      /* voxels of the image left out by sdm_fit_opts.cavity */
-    double noise_factor;  /* sum of the correlations of a residual with the others (1: independent);
-                             NaN as inside_share */
-    /* near the surface, of the maps of the last phase: held-out figure of the network, 0 for exact
-       ones; its share is in the covariance; NaN as inside_share */
+    /* voxels or points used; voxels near the shape that were skipped because they are NaN or belong
+     * to n_cavity */
+    size_t n_used, n_nan;
+    /* voxels of the whole image left out by sdm_fit_opts.cavity */
+    size_t n_cavity;
+    /* sum of the correlations of a residual with all residuals, itself included (1: independent);
+     * NaN as inside_share */
+    double noise_factor;
+    /* mm: error near the surface of the maps of the last phase, from held-out data of the network;
+     * 0 for exact maps; included in the covariance; NaN as inside_share */
     double model_error_mm;
-    double blur;                   /* partial volume: sd of the point spread, mm; else 0 */
-    sdm_fit_appearance appearance; /* at the end */
-    double point_sd;               /* points: sd about the surface, mm; else 0 */
-    size_t turn;                   /* the rotation that was chosen, from 0 */
+    /* partial volume: sd of the point spread, mm; else 0 */
+    double blur;
+    /* tissues at the end */
+    sdm_fit_appearance appearance;
+    /* points: sd of their distance from the surface, mm; else 0 */
+    double point_sd;
+    /* number of the rotation that was chosen, from 0 */
+    size_t turn;
 
-    size_t n_network, n_exact; /* maps with derivatives, by source */
-    double seconds, seconds_network, seconds_exact,
-        seconds_search; /* wall clock; all, of the maps, of the search over turns */
+    /* maps made, with or without derivatives, by network and by exact engine */
+    size_t n_network, n_exact;
+    /* wall clock: all; maps by network; maps by exact engine; search for the start */
+    double seconds, seconds_network, seconds_exact, seconds_search;
 } sdm_fit_result;
 
-/* Fits. SDM_E_ARG, SDM_E_RANGE: options or start; SDM_E_FORMAT: infinite or only NaN values, labels
-   outside 0 .. 1; SDM_E_CANCELLED; SDM_E_QUALITY: not converged, the image is constant, shows no
-   such shape or the opposite contrast, or less than least_inside of the shape lies in it. After
-   SDM_E_QUALITY *out is filled as far as it is known, after other errors empty. [any thread] */
+/* Fits the shape of source to target. Errors: SDM_E_ARG: source, options or start, or no voxel near
+   the start; SDM_E_RANGE: start parameters out of range; SDM_E_UNSUPPORTED: more than 64
+   parameters; SDM_E_FORMAT: infinite or only NaN values, points that are not finite, labels outside
+   0 .. 1; SDM_E_NOMEM; SDM_E_CANCELLED; SDM_E_QUALITY: not converged; a constant image; an image
+   that does not determine the shape, shows no such shape or the opposite contrast; less than
+   least_inside of the shape in it; or a shape as wide as the cavities that were left out. After
+   SDM_E_QUALITY *out holds what is known so far, after other errors it is empty. [any thread] */
 SDM_API sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
                            const sdm_fit_opts *opts, sdm_fit_result *out, sdm_error *err);
 SDM_API void sdm_fit_dispose(sdm_fit_result *r);
 
 /* Morphological closing of a label map by a ball of this radius (mm, > 0; Matheron 1975), in place:
-   voxels of values[nz][ny][nx] above 1/2 are labelled, and those that no ball reaches which touches
-   no labelled voxel become 1. For compartments labelled apart that are one shape: walls between
-   them thinner than about twice the radius are filled, the outside stays but for bays as narrow.
-   Beyond the grid nothing is labelled. SDM_E_ARG: grid or radius. The same for any number of
-   threads (0: the OpenMP default). [any thread, on values of its own] */
+   joins compartments of one shape that are labelled apart. Voxels of values[nz][ny][nx] above 1/2
+   are labelled. A voxel becomes 1 if every ball of this radius that covers it touches a labelled
+   voxel. Walls between compartments that are thinner than about twice the radius are filled; so are
+   bays of the outside that are as narrow, while the rest stays. Beyond the grid nothing is
+   labelled. SDM_E_ARG: grid or radius. The same bits for any number of threads (0: the OpenMP
+   default). [any thread, on values of its own] */
 SDM_API sdm_status sdm_fit_close_labels(const sdm_grid *grid, double radius, int n_threads,
                                         float *values, sdm_error *err);
 
-/* values[nz][ny][nx] = signed distance (mm, negative inside) of the shape at params and pose, at
-   the voxel centres of a grid in the world: the map of the source, interpolated. Beyond the
-   source's grid: distance to its border added. [any thread] */
+/* values[nz][ny][nx] = signed distance (mm, negative inside) of the shape at params[n] and pose, at
+   the voxel centres of a grid in the world, interpolated in the map of the source. Beyond the
+   source's grid the distance to its border is added. n_threads 0: the OpenMP default. [any thread]
+ */
 SDM_API sdm_status sdm_fit_map(const sdm_fit_source *source, const double *params,
                                const sdm_pose *pose, const sdm_grid *grid, int n_threads,
                                float *values, sdm_error *err);
 
-/* The pose that brings shape[n][3] to world[n][3], n >= 2, with the least squared distance (Horn
-   1987). With two points, or all on one line, the turn about it is the smallest from the identity.
-   SDM_E_ARG: points that coincide or are not finite. [any thread] */
+/* The pose that moves shape[n][3] to world[n][3] (mm), n >= 2, with the least sum of squared
+   distances (Horn 1987). Where all points lie on one line, as two do, the rotation about the line
+   is open: the smallest rotation is taken. SDM_E_ARG: points that coincide or are not finite. [any
+   thread] */
 SDM_API sdm_status sdm_fit_pose_from_points(const double *shape, const double *world, size_t n,
                                             sdm_pose *out, sdm_error *err);
 
-/* The pose that brings `point` of the shape's frame to `centre` and its axis z to `axis` (any
-   length but 0), turning as little as possible: with SDM_FIT_TURNS_AXIS a start from centre and
-   axis alone. [any thread] */
+/* The pose that moves `point` of the shape's frame to `centre` of the world (mm) and the shape's z
+   axis to the direction `axis` (any length but 0), with the smallest rotation. Together with
+   SDM_FIT_TURNS_AXIS it makes a start from a centre and an axis alone. SDM_E_ARG: an axis of length
+   0, or numbers that are not finite. [any thread] */
 SDM_API sdm_status sdm_fit_pose_from_axis(const double point[3], const double centre[3],
                                           const double axis[3], sdm_pose *out, sdm_error *err);
 
-/* Middle of the inside of the shape at params (NULL: the defaults), in its frame, mm: a pivot, or a
-   point for a centre. [any thread] */
+/* Centroid of the inside of the shape at params[n] (NULL: the defaults) in its frame, mm: for a
+   pivot, or as the `point` of sdm_fit_pose_from_axis(). SDM_E_QUALITY: no voxel of the map is
+   inside. [any thread] */
 SDM_API sdm_status sdm_fit_centre(const sdm_fit_source *source, const double *params,
                                   double centre[3], sdm_error *err);
 

@@ -1,13 +1,15 @@
-/* The file of models and checkpoints: named sections, 64-byte aligned, a checksum for each and one
-   over the whole. Little-endian:
+/* The file format of models and checkpoints: named sections, 64-byte aligned, with one checksum for
+   each and one for the whole file. Little-endian:
 
-   offset  0  "SDMGEN\r\n"      8 bytes (the line end shows a transfer as text)
-           8  version           u32, SDM_CONTAINER_VERSION
-          12  number of sections u32, 1 .. 64
-          16  length of the file u64
-          24  table             for each section: name[24] (zero-padded), offset u64, size u64,
-   CRC-64 u64 .  CRC-64 of all bytes before it (header) .  sections, each at a multiple of 64, gaps
-   zero last 8  CRC-64 of all bytes before it (whole file) */
+     offset 0   "SDMGEN\r\n"   8 bytes; a transfer as text changes the line end and is detected
+            8   version        u32, SDM_CONTAINER_VERSION
+           12   sections       u32, their number, 1 .. SDM_CONTAINER_MAX_SECTIONS
+           16   length         u64, of the file in bytes
+           24   table          for each section: name[24], padded with zeros,
+                               then u64 each: offset, size, CRC-64
+     then       checksum       u64, CRC-64 of all bytes before it
+     then       sections       each at a multiple of 64, gaps filled with zeros
+     last 8     checksum       u64, CRC-64 of all bytes before it */
 #ifndef SDM_CONTAINER_H
 #define SDM_CONTAINER_H
 
@@ -29,16 +31,19 @@ typedef struct sdm_section {
     size_t size;
 } sdm_section;
 
-/* Builds the file in memory: *bytes (sdm_free()) and *size. */
+/* *bytes = the file with sections[n], *size bytes, to be freed with sdm_free(); NULL on error.
+   SDM_E_NOMEM; SDM_E_INTERNAL: n or the length of a name is out of range. [any thread] */
 sdm_status sdm_container_build(const sdm_section *sections, size_t n, uint8_t **bytes, size_t *size,
                                sdm_error *err);
 
-/* Writes a built file atomically. */
+/* Writes a built file to `path` atomically: after an error (SDM_E_IO, SDM_E_NOMEM) an existing file
+   is unchanged. [any thread] */
 sdm_status sdm_container_write(const char *path, const uint8_t *bytes, size_t size, sdm_error *err);
 
-/* Checks everything (magic, version, sizes, overlaps, checksums) and fills
-   sections[SDM_CONTAINER_MAX_SECTIONS] with pointers into `bytes` (whose first byte must be 64-byte
-   aligned). SDM_E_FORMAT says what is wrong. names[] holds the section names. */
+/* Parses the file bytes[size], 64-byte aligned: sets *n, *checksum (of the whole file), and
+   sections[0 .. *n - 1], whose data point into `bytes` and whose names point into names[].
+   sections[] has room for SDM_CONTAINER_MAX_SECTIONS. SDM_E_FORMAT, with the reason: magic number,
+   version, sizes, overlap or a checksum is wrong. [any thread] */
 sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *sections,
                                char names[SDM_CONTAINER_MAX_SECTIONS][24], size_t *n,
                                uint64_t *checksum, sdm_error *err);

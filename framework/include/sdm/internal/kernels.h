@@ -1,5 +1,10 @@
-/* Dense linear algebra for networks: portable C, the widest instruction set of the machine chosen
-   at run time. Letters: M, N, K matrix sizes, B batch. The same bits for any number of threads. */
+/* Dense linear algebra for networks. The kernels are portable C, compiled once for each instruction
+   set; the widest one of the machine is chosen at run time.
+
+   Letters: M, N, K sizes of matrices, B rows of a batch. No function allocates memory or fails. The
+   result does not depend on the number of threads; between instruction sets the results in floats
+   differ by rounding. All functions may be called from any thread and run in the calling thread
+   alone, except sdm_gemm(). */
 #ifndef SDM_KERNELS_H
 #define SDM_KERNELS_H
 
@@ -13,135 +18,148 @@
 extern "C" {
 #endif
 
-/* A matrix in memory: element (i, j) at data[i * row + j * col]. */
+/* A matrix in memory: element (i, j) is data[i * row + j * col]. */
 typedef struct sdm_view {
     const float *data;
     size_t row, col;
 } sdm_view;
 
-/* c[M][ldc] = a (M x K) * b (K x N), added to the old c when `add`. Threaded over tiles of c;
-   n_threads 0: the OpenMP default. Every element is summed in the order of K in blocks of fixed
-   size. */
+/* Matrix product: c[M][ldc] = a * b, or c += a * b with `add`; a is M x K, b is K x N. A product
+   with K = 0 is zero. Up to n_threads threads share the tiles of c (0: the OpenMP default). Each
+   element is the sum over K in ascending order, in blocks of fixed size. */
 void sdm_gemm(size_t m, size_t n, size_t k, sdm_view a, sdm_view b, bool add, float *c, size_t ldc,
               int n_threads);
 
-/* Weights of a dense layer in panels of 16 outputs, the last one filled up with zeros; each panel
- * [K][16], float or half (bytes: below). */
+/* Weights of a dense layer with K inputs are stored in panels of SDM_PANEL outputs. A panel of
+   floats or halves is [K][SDM_PANEL]; the last panel is padded with zeros. */
 #define SDM_PANEL 16
 
-/* Outputs with those of filling up: y below has room for them in its last row too. */
+/* Number of outputs rounded up to whole panels: the "padded outputs" of the functions below. */
 static inline size_t sdm_panel_outputs(size_t outputs)
 {
     return (outputs + SDM_PANEL - 1) / SDM_PANEL * SDM_PANEL;
 }
 
-/* Number of elements of the weights of `outputs` x k. */
+/* Number of elements in the panels of `outputs` x k weights. */
 static inline size_t sdm_panel_count(size_t outputs, size_t k)
 {
     return sdm_panel_outputs(outputs) * k;
 }
 
-/* Packs weight(o, i) = w.data[o * w.row + i * w.col]. */
+/* panels[sdm_panel_count(outputs, k)] = the outputs x k matrix w. */
 void sdm_panel_pack_f32(size_t outputs, size_t k, sdm_view w, float *panels);
 void sdm_panel_pack_f16(size_t outputs, size_t k, sdm_view w, uint16_t *panels);
 
-/* y[B][ldy] = x[B][ldx] (K floats each) times the weights; sdm_panel_outputs(outputs) floats of
-   each row are written: ldy is at least that when there are several rows. One thread; the same bits
-   for each row whatever B. */
+/* y[B][ldy] = x[B][ldx] * w^T: K inputs in each row of x, sdm_panel_outputs(outputs) floats written
+   to each row of y, so that ldy >= sdm_panel_outputs(outputs) for B > 1. A row's result does not
+   depend on B. */
 void sdm_panel_f32(size_t batch, size_t outputs, size_t k, const float *w, const float *x,
                    size_t ldx, float *y, size_t ldy);
 void sdm_panel_f16(size_t batch, size_t outputs, size_t k, const uint16_t *w, const float *x,
                    size_t ldx, float *y, size_t ldy);
 
-/* The transpose: x[K] = the weights times y[sdm_panel_outputs(outputs)], of which those of filling
- * up must be finite. One thread. */
+/* The transpose: x[K] = w^T * y, y[sdm_panel_outputs(outputs)]. The padding of y must be finite. */
 void sdm_panel_back_f32(size_t outputs, size_t k, const float *w, const float *y, float *x);
 void sdm_panel_back_f16(size_t outputs, size_t k, const uint16_t *w, const float *y, float *x);
 
-/* Weights as bytes; the first n_wide inputs have weights of two, -SDM_WIDE .. SDM_WIDE. In panels
-   of 16 outputs too; in each two neighbouring inputs lie together, first the wide ones (an odd
-   number takes the next input in), then the others, an odd one filled up with zero. Inputs are
-   integers of 16 bits times a factor for each row, and sums are integers of 32 bits: exact, so the
-   same for every instruction set. */
+/* Integer weights. The first n_wide inputs are wide: their weights have two bytes and lie in
+   -SDM_WIDE .. SDM_WIDE. The other inputs are narrow: their weights have one byte, -128 .. 127.
+   Inputs are integers of 16 bits with one scale for each row: value = integer * scale. Sums of
+   products are integers of 32 bits, hence exact and the same for every instruction set.
+
+   A panel of SDM_PANEL outputs holds pairs of neighbouring inputs, [pair][SDM_PANEL][2], first the
+   wide pairs, then the narrow ones. With an odd n_wide the first narrow input joins the last wide
+   pair; with an odd K the last pair is padded with zero weights. */
 #define SDM_WIDE 16384
+
+/* k rounded up to an even number. */
 static inline size_t sdm_panel_even(size_t k) { return k + k % 2; }
 
-/* Bytes of the weights of `outputs` x k; SIZE_MAX when they do not fit. */
+/* Bytes of the panels of outputs x k weights; SIZE_MAX on overflow or for n_wide > k. */
 size_t sdm_panel_i8_count(size_t outputs, size_t n_wide, size_t k);
 
-/* Largest magnitude of inputs with which no sum of their products with w[outputs][k] passes the end
- * of its integer, 1 .. 32767. */
+/* Largest L in 1 .. 32767 such that no sum over k of w[o][k] * x[k] with abs(x[k]) <= L overflows
+   32 bits; w[outputs][k]. */
 int sdm_panel_i8_limit(size_t outputs, size_t k, const int16_t *w);
 
-/* Packs w[outputs][k], in -128 .. 127 but for the first n_wide of each row, which are in -SDM_WIDE
- * .. SDM_WIDE. */
+/* panels[sdm_panel_i8_count(outputs, n_wide, k)] = the weights w[outputs][k], in the ranges
+   above. */
 void sdm_panel_pack_i8(size_t outputs, size_t n_wide, size_t k, const int16_t *w, int8_t *panels);
 
-/* Each row of x[rows][ldx] = that of y[rows][ldy] times factor[n] (NULL: 1) as integers of at most
-   `limit`, rounded to nearest; scale[rows]: what gives them back. Not finite numbers make it NaN
-   and the row of x zero. */
+/* Quantises rows: with v = y[r][i] * factor[i] (factor[n]; NULL: 1) and m = the largest abs(v) of
+   row r, x[r][i] = v * limit / m rounded to nearest, and scale[r] = m / limit, so that
+   v = x[r][i] * scale[r] up to rounding. y[rows][ldy], x[rows][ldx], 1 <= limit <= 32767. A row of
+   zeros (or of values too small for limit / m to be a float) gives zeros and scale 0. A row with
+   NaN or infinity gives zeros and scale NaN. */
 void sdm_quantise(size_t rows, size_t n, const float *y, size_t ldy, const float *factor, int limit,
                   int16_t *x, size_t ldx, float *scale);
 
-/* One row, and a second of what rounding leaves of it: x times *scale plus rest times *rest_scale
-   is off by at most the largest magnitude / (2 limit^2), and rounding. */
-void sdm_quantise_rest(size_t n, const float *y, const float *factor, int limit, int16_t *x,
-                       float *scale, int16_t *rest, float *rest_scale);
+/* Quantises one row y[n] and its rounding error: x[n] and *scale as sdm_quantise(), and
+   residual[n] with *residual_scale = *scale / limit, such that
+   abs(x * *scale + residual * *residual_scale - v) <= m / (2 limit^2) + rounding in float. */
+void sdm_quantise_residual(size_t n, const float *y, const float *factor, int limit, int16_t *x,
+                           float *scale, int16_t *residual, float *residual_scale);
 
-/* What becomes of the sums of sdm_panel_i8(), times their scales: numbers, or integers for the next
- * product. */
+/* Number of outputs that sdm_panel_i8() stores contiguously. */
 #define SDM_PANEL_ROW 4
+
+/* Destination of sdm_panel_i8(): floats y, or for y == NULL integers, the inputs of the next
+   product. Room for sdm_panel_outputs(outputs) outputs in each row. */
 typedef struct sdm_panel_out {
-    float *y; /* [B][ld] in rows of SDM_PANEL_ROW, `line` floats apart (SDM_PANEL_ROW: one after
-                 another); NULL: integers */
-    int16_t *integers; /* [B][ld] times factor, rounded to nearest; what is beyond -limit .. limit,
-                          or NaN, becomes one of these */
+    /* Output o of row r: y[r * ld + o / SDM_PANEL_ROW * line + o % SDM_PANEL_ROW].
+       line = SDM_PANEL_ROW: all outputs of a row are contiguous. */
+    float *y;
+    /* integers[B][ld] = output * factor, rounded to nearest and clipped to -limit .. limit; NaN
+       becomes one of the two ends. */
+    int16_t *integers;
     size_t ld, line;
-    const float *mean; /* added to the first n_mean rows of y */
+    /* mean[padded outputs], added to the first n_mean rows of y; not read for n_mean = 0. */
+    const float *mean;
     size_t n_mean;
-    /* of y, B: 2 .. 6: the last row is added to the first, and has no place of its own; see
-     * sdm_quantise_rest() */
-    bool rest;
-    const float *factor; /* as many as outputs, filled up */
-    int limit;
+    /* For y and B = 2 .. 6: the result of the last row is added to the first row instead of being
+       stored. The last row is the residual of sdm_quantise_residual(). */
+    bool residual;
+    const float *factor; /* [padded outputs], of integers */
+    int limit;           /* of integers, 1 .. 32767 */
 } sdm_panel_out;
 
-/* to = scale[B] times x[B][ldx] times the weights; as sdm_panel_f32() but for the order of y. Of x,
-   sdm_panel_even(k) numbers of each row are read. */
+/* *to = scale[r] * (w * x[r]) for the rows r of x[B][ldx]; scale[B]. The first sdm_panel_even(k)
+   integers of each row of x are read; an odd K multiplies the last one by zero. */
 void sdm_panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w,
                   const int16_t *x, size_t ldx, const float *scale, const sdm_panel_out *to);
 
-/* One of several matrices: where its panels, inputs, their scales, outputs and their mean begin. */
+/* One of several matrices of sdm_panel_i8_blocks(). */
 typedef struct sdm_panel_block {
-    size_t weights, mean;
-    uint32_t outputs, n_wide, k;
-    uint32_t x, scale, y;
+    size_t weights, mean;        /* offsets of its panels in w and of its mean in to->mean */
+    uint32_t outputs, n_wide, k; /* as in sdm_panel_i8() */
+    uint32_t x, scale, y;        /* offsets into rows of x, into scale and into rows of to->y */
 } sdm_panel_block;
 
-/* sdm_panel_i8() for each of n blocks in turn, with numbers as outputs; B: 1 .. 6. */
+/* sdm_panel_i8() for each of blocks[n] in turn, B in 1 .. 6, to->y not NULL. */
 void sdm_panel_i8_blocks(size_t batch, size_t n, const sdm_panel_block *blocks, const int8_t *w,
                          const int16_t *x, size_t ldx, const float *scale, const sdm_panel_out *to);
 
-/* The transpose, as sdm_panel_back_f32(); x has room for sdm_panel_even(k). */
+/* The transpose: x[sdm_panel_even(k)] = w^T * y, y[sdm_panel_outputs(outputs)] floats, whose
+   padding must be finite. */
 void sdm_panel_back_i8(size_t outputs, size_t n_wide, size_t k, const int8_t *w, const float *y,
                        float *x);
 
-/* Half precision (IEEE 754 binary16), round to nearest even; values beyond its range become
- * infinite. */
+/* Half precision (IEEE 754 binary16), rounded to nearest even; values beyond its range become
+   infinite, NaN stays NaN. */
 uint16_t sdm_half_from_float(float v);
 float sdm_half_to_float(uint16_t h);
 
-/* to[n] = y[n]. stream: past the caches, for what is large beside them and not read soon;
-   sdm_put_end(), before others read it, in the thread that wrote. One thread; the same bits either
-   way. */
-void sdm_put(size_t n, const float *y, float *to, bool stream);
-void sdm_put_end(void);
+/* to[n] = y[n], without overlap. stream: the stores bypass the caches, for data that are larger
+   than the caches and not read soon. After streaming, the same thread calls sdm_copy_end() before
+   another thread reads the data. */
+void sdm_copy(size_t n, const float *y, float *to, bool stream);
+void sdm_copy_end(void);
 
-/* exp(x) for n values, relative error below 2e-7, in place allowed. */
+/* y[n] = exp(x[n]) with x clamped to -87 .. 88, relative error below 2e-7; y may be x. */
 void sdm_exp(size_t n, const float *x, float *y);
 
-/* Name of the instruction set in use: "sse2", "avx2", "avx512", "avx512vnni", "neon" or "generic".
- */
+/* Name of the instruction set in use: "sse2", "avx2", "avx512", "avx512vnni", "neon" or
+   "generic". */
 const char *sdm_kernels_name(void);
 
 #ifdef __cplusplus

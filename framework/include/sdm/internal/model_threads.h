@@ -1,4 +1,4 @@
-/* A network that shares the work of one map among threads. */
+/* Evaluation of one model by several threads. */
 #ifndef SDM_INTERNAL_MODEL_THREADS_H
 #define SDM_INTERNAL_MODEL_THREADS_H
 
@@ -8,10 +8,13 @@
 extern "C" {
 #endif
 
-/* The functions below share each map among n_threads >= 1 threads, with the same bits for any
-   number. True: a map is work enough for that; otherwise several maps are better given to a thread
-   each. */
+/* True: one map is enough work for several threads ("deepsdf", "imnet", "sdmnn"). False: it is
+   faster to give each thread its own maps. [any thread] */
 bool sdm_model_is_threaded(const sdm_model *m);
+
+/* As the functions of sdm/model.h of the same name without _threads, but n_threads >= 1 threads
+   share the work on each map. The result does not depend on n_threads. The scratch memory must be
+   that for the same n_threads. */
 size_t sdm_model_scratch_bytes_threads(const sdm_model *m, size_t n, int n_threads);
 void sdm_model_forward_threads(const sdm_model *m, const double *params, size_t n, float *values,
                                void *scratch, int n_threads);

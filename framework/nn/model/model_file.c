@@ -1,0 +1,83 @@
+/* The parts of a model file that all kinds of network share: the start of the description, packing
+   into a container, and looking up sections. */
+#include <string.h>
+
+#include "model_kind.h"
+
+// read_description() of model_open.c reads these lines in the same order
+void sdm_model_describe(const sdm_model_info *i, const char *kind, sdm_text *t)
+{
+    const sdm_accuracy *a = &i->accuracy;
+    sdm_text_add(t, "kind=%s\nversion=%s\nshape=%s\n", kind, SDM_VERSION_TEXT, i->shape);
+
+    // grid and conventions
+    sdm_text_add(t, "grid.size=%lld %lld %lld\n", (long long)i->grid.n[0], (long long)i->grid.n[1],
+                 (long long)i->grid.n[2]);
+    sdm_text_add_reals(t, "grid.origin", i->grid.origin, 3);
+    sdm_text_add_reals(t, "grid.spacing", i->grid.spacing, 3);
+    sdm_text_add_reals(t, "grid.direction", i->grid.dir, 9);
+    sdm_text_add(t, "unit=mm\nsign=negative inside\nframe=LPS\n");
+
+    // parameters and options
+    sdm_text_add(t, "params=%zu\n", i->n_params);
+    for (size_t p = 0; p < i->n_params; p++) {
+        const sdm_model_param *q = &i->params[p];
+        sdm_text_add(t, "param.name=%s\nparam.unit=%s\n", q->name, q->unit);
+        sdm_text_add_reals(t, "param.range", (const double[]){q->min, q->max, q->def}, 3);
+    }
+    sdm_text_add(t, "options=%zu\n", i->n_options);
+    for (size_t o = 0; o < i->n_options; o++)
+        sdm_text_add(t, "option.name=%s\noption.value=%s\n", i->option_names[o],
+                     i->option_values[o]);
+
+    // accuracy and training
+    sdm_text_add(t, "accuracy.samples=%lld\n", (long long)a->samples);
+    sdm_text_add_real(t, "accuracy.mse_mm2", a->mse_mm2);
+    sdm_text_add_real(t, "accuracy.rmse_mm", a->rmse_mm);
+    sdm_text_add_real(t, "accuracy.mae_mm", a->mae_mm);
+    sdm_text_add_real(t, "accuracy.max_abs_mm", a->max_abs_mm);
+    sdm_text_add_real(t, "accuracy.rmse_near_mm", a->rmse_near_mm);
+    sdm_text_add_reals(t, "accuracy.quantiles_mm",
+                       (const double[]){a->q50_mm, a->q90_mm, a->q99_mm}, 3);
+    sdm_text_add(t, "seed=%llu\n", (unsigned long long)i->seed);
+    sdm_text_add_real(t, "train.seconds", i->train_seconds);
+    sdm_text_add(t, "train.samples=%lld\n", (long long)i->train_samples);
+}
+
+sdm_status sdm_model_pack(const sdm_model_info *info, const sdm_text *description,
+                          const sdm_section *sections, size_t n, uint8_t **bytes, size_t *size,
+                          sdm_error *err)
+{
+    enum { COMMON = 2 };
+    const char *config = info->config ? info->config : "";
+    sdm_section all[SDM_CONTAINER_MAX_SECTIONS] = {{"meta", description->data, description->size},
+                                                   {"config", config, strlen(config)}};
+    if (description->failed)
+        return sdm_fail(err, SDM_E_NOMEM, "no memory for the model's description");
+    if (n > SDM_CONTAINER_MAX_SECTIONS - COMMON)
+        return sdm_fail(err, SDM_E_INTERNAL, "%zu sections of a network, at most %d", n,
+                        SDM_CONTAINER_MAX_SECTIONS - COMMON);
+    memcpy(all + COMMON, sections, n * sizeof *sections);
+    return sdm_container_build(all, COMMON + n, bytes, size, err);
+}
+
+const sdm_section *sdm_section_find(const sdm_section *sections, size_t n, const char *name)
+{
+    for (size_t i = 0; i < n; i++)
+        if (strcmp(sections[i].name, name) == 0) return &sections[i];
+    return NULL;
+}
+
+const void *sdm_model_weights(sdm_model *m, const sdm_section *sections, size_t n, const char *name,
+                              size_t size, sdm_error *err)
+{
+    const sdm_section *s = sdm_section_find(sections, n, name);
+    if (!s)
+        sdm_fail(err, SDM_E_FORMAT, "damaged: it has no section '%s'", name);
+    else if (s->size != size)
+        sdm_fail(err, SDM_E_FORMAT, "damaged: section '%s' has %zu bytes, need %zu", name, s->size,
+                 size);
+    if (!s || s->size != size) return NULL;
+    m->info.weight_bytes += size;
+    return s->data;
+}

@@ -1,0 +1,38 @@
+/* Scratch memory of a thread for one slab, shared by the decoder and its transpose. Words and
+   letters as in pod_internal.h. */
+#ifndef SDM_POD_DECODE_SCRATCH_H
+#define SDM_POD_DECODE_SCRATCH_H
+
+#include "pod_internal.h"
+
+/* Inputs of blocks: floats x[R][ld], or with integer weights q[R][ld] with a scale for each row. */
+typedef struct input {
+    float *x;
+    int16_t *q;
+    float *scale; /* [R] */
+    size_t ld;
+} input;
+
+/* For R <= SDM_POD_ROWS rows. */
+typedef struct slab_scratch {
+    float *y[SDM_POD_MAX_LEVELS]; /* [R][padded outputs] of a block of each level */
+    input x[SDM_POD_MAX_LEVELS];  /* integer weights: inputs of a group of each level above 0 */
+    input leaves; /* inputs of all leaves of the slab; scale[groups][SDM_POD_ROWS] */
+    float *line;  /* [R][ld_line] voxels of a line, [z][y][nx] */
+    size_t ld_line;
+    float *back; /* transpose: [coefficients of level 0 of the slab] gradient by them */
+} slab_scratch;
+
+/* Sets the pointers of *s into memory[] (NULL: none) for R rows; returns the floats needed. */
+size_t sdm_pod_slab_scratch_carve(const pod_network *m, size_t rows, float *memory,
+                                  slab_scratch *s);
+
+static inline bool sdm_pod_is_integer(const pod_network *m) { return m->type == SDM_POD_I8; }
+
+/* Index of the first voxel of a block in a map [nz][ny][nx]. */
+static inline size_t sdm_pod_first_voxel(const sdm_grid *g, const sdm_pod_block *b)
+{
+    return ((size_t)b->at[2] * (size_t)g->n[1] + b->at[1]) * (size_t)g->n[0] + b->at[0];
+}
+
+#endif

@@ -1,5 +1,5 @@
-/* sdmgen experiment: trains, measures and draws several methods, and writes one table that compares
- * them with each other and with published figures. */
+/* sdmgen experiment: trains, measures and draws several methods, and writes one table that
+ * compares them with each other and with published figures. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -1,5 +1,5 @@
-/* sdmgen fit: estimates the parameters and the pose of a shape from an image, labels, a mesh or
- * points. */
+/* sdmgen fit: estimates the parameters and the pose of a shape from an image, labels, a
+ * mesh or points. */
 #include <stdio.h>
 #include <string.h>
 
@@ -82,8 +82,8 @@ static sdm_status print_result(const cli_fit *f, sdm_error *err)
     return cli_print_json(&json, err);
 }
 
-/* Prints the result and writes the files; fails with the reason of a fit that is not to be trusted.
- */
+/* Prints the result and writes the files; fails with the reason of a fit that is not to be
+ * trusted. */
 static sdm_status show_result(cli_fit *f, sdm_error *err)
 {
     const bool files = f->args->outputs.n || f->args->fit.label_out,

@@ -131,7 +131,9 @@ static sdm_status prepare_job(job *j, sdm_error *err)
 {
     const cli_args *args = j->args;
     if (!args->outputs.n && !args->json && !args->gradient && !args->jacobian && !args->check)
-        return sdm_fail(err, SDM_E_ARG, "generate: an output is needed: -o FILE");
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "generate: an output is needed: -o FILE, --gradient, --jacobian, --check or --json");
     sdm_status s = sdm_model_open(args->files.items[0], &j->model, err);
     if (s) return s;
     j->info = sdm_model_get_info(j->model);

@@ -9,7 +9,6 @@
 #include "report/json_values.h"
 #include "report/terminal.h"
 #include "sdm/image.h"
-
 #include "sdm/memory.h"
 #include "sdm/volume.h"
 

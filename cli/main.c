@@ -12,6 +12,7 @@
 #include "commands.h"
 #include "report/terminal.h"
 
+/* The functions of the commands, by index into cli_commands. */
 static sdm_status (*const functions[CLI_N_COMMANDS])(const cli_args *args, sdm_error *err) = {
     [CLI_TRAIN] = cmd_train,
     [CLI_GENERATE] = cmd_generate,
@@ -62,8 +63,8 @@ static int run_command(const cli_args *args)
     return cli_report(&err);
 }
 
-/* Makes malloc() keep freed memory for the next map: getting every page from the system again costs
- * a third of the time that a small mesh takes to prepare. */
+/* Makes malloc() keep freed memory for the next map: getting every page from the system again
+ * costs a third of the time that a small mesh takes to prepare. */
 static void keep_memory(void)
 {
 #ifdef __GLIBC__

@@ -42,8 +42,8 @@ long status_kb(const char *name)
     return kb;
 }
 
-/* Resets the peak of the resident memory (Linux); returns the memory resident now, kB, -1: unknown.
- */
+/* Resets the peak of the resident memory (Linux); returns the memory resident now, kB, -1:
+ * unknown. */
 long start_peak()
 {
 #ifdef __GLIBC__

@@ -59,9 +59,9 @@ struct about {
 /* Writes the values of all voxels or of the required rows; captures the prepared data. */
 using map_function = std::function<void(float *values)>;
 
-/* Reads the arguments and the mesh, measures prepare() and the function that it returns, and writes
-   the results. Returns the exit code of main(). An exception becomes the "error" of the JSON line.
- */
+/* Reads the arguments and the mesh, measures prepare() and the function that it returns, and
+ * writes the results. Returns the exit code of main(). An exception becomes the "error" of
+ * the JSON line. */
 int run(int argc, char **argv, const about &a,
         const std::function<map_function(const job &)> &prepare);
 

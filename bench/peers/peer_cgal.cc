@@ -1,5 +1,5 @@
 /* CGAL: distances by its AABB tree with the search structure for distance queries, signs by
-   Side_of_triangle_mesh. */
+ * Side_of_triangle_mesh. */
 #include <CGAL/AABB_face_graph_triangle_primitive.h>
 #include <CGAL/AABB_traits.h>
 #include <CGAL/AABB_tree.h>

@@ -1,6 +1,6 @@
 /* Embree: point queries on its bounding volume hierarchy. A callback computes the distance to a
-   triangle, as in Embree's tutorial; the sign is that of the angle-weighted pseudo-normal
-   (Baerentzen and Aanaes 2005). */
+ * triangle, as in Embree's tutorial; the sign is that of the angle-weighted pseudo-normal
+ * (Baerentzen and Aanaes 2005). */
 #include <embree3/rtcore.h>
 
 #include <array>
@@ -59,7 +59,7 @@ struct triangles {
 };
 
 /* Pseudo-normals: at a corner the sum of the face normals weighted by their angles, at an edge the
-   sum of its two face normals. */
+ * sum of its two face normals. */
 void make_normals(triangles &t)
 {
     std::vector<vec> corner(t.vert.size(), vec{0, 0, 0});
@@ -95,8 +95,8 @@ struct query {
     float distance2; // squared distance to the nearest triangle so far
 };
 
-/* Callback for a triangle: shrinks the query's radius and returns true if the triangle is nearer.
- */
+/* Callback for a triangle: shrinks the query's radius and returns true if the triangle is
+ * nearer. */
 bool visit_triangle(RTCPointQueryFunctionArguments *args)
 {
     query &q = *static_cast<query *>(args->userPtr);

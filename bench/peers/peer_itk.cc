@@ -1,5 +1,5 @@
 /* ITK: a mask of the voxels inside by TriangleMeshToBinaryImageFilter, then its distance transform
-   by SignedMaurerDistanceMapImageFilter (Maurer, Qi and Raghavan 2003). */
+ * by SignedMaurerDistanceMapImageFilter (Maurer, Qi and Raghavan 2003). */
 #include <itkImage.h>
 #include <itkMesh.h>
 #include <itkMultiThreaderBase.h>

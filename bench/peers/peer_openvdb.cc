@@ -1,5 +1,5 @@
 /* OpenVDB: meshToVolume over a band that reaches all voxels of the grid, or over the requested
-   narrow band. */
+ * narrow band. */
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Dense.h>
 #include <openvdb/tools/MeshToVolume.h>
@@ -36,9 +36,10 @@ struct widths {
     float outside, inside;
 };
 
-/* Half widths that reach all voxels. Outside: the largest distance of 5 x 5 x 5 points of the grid
-   to the nearest of about 1000 vertices, plus a voxel; an estimate, because a safe bound would make
-   the band much slower. Inside: half the shortest edge of the mesh's bounding box, plus a voxel. */
+/* Half widths that reach all voxels. Outside: the largest distance of 5 x 5 x 5 points of the
+ * grid to the nearest of about 1000 vertices, plus a voxel; an estimate, because a safe bound
+ * would make the band much slower. Inside: half the shortest edge of the mesh's bounding box,
+ * plus a voxel. */
 widths full_widths(const peer::job &j)
 {
     const size_t step = 1 + j.mesh.n_vert / 1000;

@@ -96,8 +96,8 @@ static sdm_status bad_value(const cli_option *o, const char *value, sdm_error *e
                     sdm_format_real(o->min, low), sdm_format_real(o->max, high));
 }
 
-/* Splits the text at commas. Returns the number of values in out; 0 when a part is not a number, or
- * above 6 parts. */
+/* Splits the text at commas. Returns the number of values in out; 0 when a part is not a number,
+ * or above 6 parts. */
 static size_t split_numbers(const char *text, bool whole, double out[6])
 {
     size_t n = 0;
@@ -174,8 +174,8 @@ static sdm_status store_value(cli_args *args, const cli_option *o, const char *v
 
 /* ---- the command line ---- */
 
-/* Parses the option at argv[*i]. Its value is in the same argument or the next one, which advances
- * *i. */
+/* Parses the option at argv[*i]. Its value is in the same argument or the next one, which
+ * advances *i. */
 static sdm_status parse_option(int argc, char **argv, int *i, cli_args *args, sdm_error *err)
 {
     const char *word = argv[*i], *value = NULL;

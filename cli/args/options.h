@@ -1,5 +1,5 @@
-/* The tables of commands and options, and the parsed command line. Parsing, --help, the manual page
- * and the bash completion are all made from these tables. */
+/* The tables of commands and options, and the parsed command line. Parsing, --help, the manual
+ * page and the bash completion are all made from these tables. */
 #ifndef CLI_OPTIONS_H
 #define CLI_OPTIONS_H
 
@@ -71,8 +71,8 @@ typedef struct cli_list {
     size_t n;
 } cli_list;
 
-/* A pose: of the shape for `phantom`, of the start for `fit`. Each vector is NaN when its option is
- * missing. */
+/* A pose: of the shape for `phantom`, of the start for `fit`. Each vector is NaN when its
+ * option is missing. */
 typedef struct cli_pose_args {
     double rotation[3];    /* rotation vector (axis times angle), rad */
     double translation[3]; /* LPS mm */
@@ -102,9 +102,9 @@ typedef struct cli_fit_args {
     double prior_sd, prior_rotation, prior_translation, eps;
 } cli_fit_args;
 
-/* A parsed command line. Options that are missing keep the default stated in their help text;
-   seed -1, samples -1, size[0] 0, spacing[0] 0 and origin[0] NaN mean "option missing". A comment
-   names the commands that have the options. */
+/* A parsed command line. Options that are missing keep the default stated in their help text; seed
+ * -1, samples -1, size[0] 0, spacing[0] 0 and origin[0] NaN mean "option missing". A comment names
+ * the commands that have the options. */
 struct cli_args {
     const cli_command *command;
     cli_list files; /* positional arguments */
@@ -125,7 +125,8 @@ struct cli_args {
     const char *out;                 /* train, experiment */
     const char *rows;                /* generate: the file of --params */
     const char *policy;              /* generate, fit */
-    const char *shape, *mesh;        /* exact, mesh, bench, phantom, fit */
+    const char *shape;               /* exact, mesh, bench, phantom, fit */
+    const char *mesh;                /* exact, bench */
     const char *sign, *method;       /* exact */
     const char *pictures;            /* eval */
     const char *closest, *normal;    /* exact */
@@ -160,8 +161,8 @@ extern const size_t cli_n_options;
 #define CLI_ON(command) (UINT32_C(1) << (command))
 
 /* Parses argv[1..]. *args is written also after an error; cli_args_dispose() frees it. SDM_E_ARG:
-   an unknown command or option (with "did you mean"), a bad value, too few or too many arguments.
-   `--help` anywhere sets args->help; the other arguments are then not checked. */
+ * an unknown command or option (with "did you mean"), a bad value, too few or too many arguments.
+ * `--help` anywhere sets args->help; the other arguments are then not checked. */
 sdm_status cli_parse(int argc, char **argv, cli_args *args, sdm_error *err);
 void cli_args_dispose(cli_args *args);
 

@@ -72,9 +72,9 @@ sdm_status cli_fit_read_options(cli_fit *f, sdm_error *err);
 /* Sets the start pose and the rotations to try. SDM_E_ARG; SDM_E_FORMAT: a bad file of points. */
 sdm_status cli_fit_read_start(cli_fit *f, sdm_error *err);
 
-/* values[v->grid] = 1 where a voxel has one of the labels, else 0. words: values or names of
-   segments; without words: all segments, or all voxels but 0. SDM_E_ARG: no such label;
-   SDM_E_FORMAT: no voxel has the label. */
+/* values[v->grid] = 1 where a voxel has one of the labels, else 0. words: values, or names of
+ * segments; without words: all segments, or all voxels but 0. SDM_E_ARG: no such label;
+ * SDM_E_FORMAT: no voxel has the label. */
 sdm_status cli_fit_label_mask(const char *path, const sdm_volume *v, const cli_list *words,
                               float *values, sdm_error *err);
 
@@ -101,8 +101,8 @@ const char *cli_fit_kind(const cli_fit *f);
 /* Negates x and y of points[n][3]: RAS to LPS and back. */
 void cli_fit_negate_xy(double *points, size_t n);
 
-/* Before any work: checks the types of the output files and that they can be written. SDM_E_ARG,
- * SDM_E_IO. */
+/* Before any work: checks the types of the output files and that they can be written.
+ * SDM_E_ARG, SDM_E_IO. */
 sdm_status cli_fit_check_files(const cli_args *args, sdm_error *err);
 
 /* Writes the output files. */

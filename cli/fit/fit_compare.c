@@ -70,8 +70,8 @@ static void count_voxels(cli_fit *f, const sdm_grid *g, const float *map, const 
     o->dice = both ? 2 * (double)o->n_both / (double)both : NAN;
 }
 
-/* Appends to list[*n] the distances of the vertices of `from` in the field of view to the surface
- * of `to`. */
+/* Appends to list[*n] the distances of the vertices of `from` in the field of view to the
+ * surface of `to`. */
 static sdm_status add_distances(const cli_fit *f, const sdm_mesh *from, const sdm_mesh *to,
                                 double *list, size_t *n, sdm_error *err)
 {

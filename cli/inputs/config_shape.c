@@ -69,8 +69,8 @@ static sdm_status fail_at(const sdm_config *c, sdm_mark mark, sdm_status s, sdm_
     return sdm_fail_in(err, s, "%s", sdm_config_where(c, mark, where));
 }
 
-/* Replaces the paths in the configuration's options by the absolute ones that the shape was created
- * with. */
+/* Replaces the paths in the configuration's options by the absolute ones that the shape was
+ * created with. */
 static sdm_status store_absolute_paths(sdm_config *c, const sdm_instance *made, sdm_error *err)
 {
     const sdm_shape *shape = sdm_instance_shape(made);

@@ -1,6 +1,5 @@
-/* Reads the configuration of a training with overrides from the command line, and creates its
- * shape.
- */
+/* Reads the configuration of a training with overrides from the command line, and creates
+ * its shape. */
 #ifndef CLI_CONFIG_SHAPE_H
 #define CLI_CONFIG_SHAPE_H
 
@@ -9,8 +8,8 @@
 #include "sdm/registry.h"
 
 /* Reads the file files.items[0]; the key=value arguments after it, --seed and --threads override
-   its keys. *out (over 100 kB, so on the heap) is freed with sdm_free(). SDM_E_ARG: an argument is
-   not key=value; SDM_E_IO; SDM_E_CONFIG with one line for each mistake. */
+ * its keys. *out (over 100 kB, so on the heap) is freed with sdm_free(). SDM_E_ARG: an argument is
+ * not key=value; SDM_E_IO; SDM_E_CONFIG with one line for each mistake. */
 sdm_status cli_read_config(const cli_args *args, sdm_config **out, sdm_error *err);
 
 /* Creates the configured shape with its options; *out is freed with sdm_instance_free(). Relative

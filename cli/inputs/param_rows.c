@@ -18,7 +18,7 @@ typedef struct csv_table {
 } csv_table;
 
 /* Removes spaces, tabs and carriage returns from both ends. */
-static char *trim(char *word)
+static char *trim_spaces(char *word)
 {
     word += strspn(word, " \t\r");
     size_t length = strlen(word);
@@ -35,7 +35,7 @@ static char *next_line(csv_table *t)
         t->at += length + (line[length] == '\n');
         line[length] = '\0';
         t->line++;
-        line = trim(line);
+        line = trim_spaces(line);
         if (*line && *line != '#') return line;
     }
     return NULL;
@@ -48,7 +48,7 @@ static char *next_cell(char **line)
     char *cell = *line, *comma = strchr(cell, ',');
     *line = comma ? comma + 1 : NULL;
     if (comma) *comma = '\0';
-    return trim(cell);
+    return trim_spaces(cell);
 }
 
 static sdm_status read_header(csv_table *t, const sdm_param *params, size_t n, sdm_error *err)

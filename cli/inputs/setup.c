@@ -230,9 +230,10 @@ sdm_status cli_grid_for_box(const cli_args *args, const double min[3], const dou
     for (int i = 0; i < 3; i++) {
         const double cells = (max[i] - min[i] + 2 * margin) / spacing[i];
         if (!has_size && !(cells < 1048576))
-            return sdm_fail(err, SDM_E_ARG,
-                            "spacing %g mm gives over 2^20 voxels on a side of %g mm", spacing[i],
-                            max[i] - min[i]);
+            return sdm_fail(
+                err, SDM_E_ARG,
+                "spacing %g mm makes over 2^20 voxels along an edge of %g mm: need a larger one",
+                spacing[i], max[i] - min[i]);
         n[i] = has_size ? args->size[i] : (int64_t)ceil(cells - 1e-9) + 1;
     }
     // origin

@@ -8,8 +8,8 @@
 #include "sdm/registry.h"
 #include "sdm/runtime.h"
 
-/* A registry of the built-in shapes and the plug-ins in SDMGEN_PLUGIN_PATH and --plugin. Freed with
- * sdm_registry_free(). SDM_E_PLUGIN, SDM_E_NOMEM. */
+/* A registry of the built-in shapes and the plug-ins in SDMGEN_PLUGIN_PATH and --plugin. Freed
+ * with sdm_registry_free(). SDM_E_PLUGIN, SDM_E_NOMEM. */
 sdm_status cli_open_registry(const cli_args *args, sdm_registry **out, sdm_error *err);
 
 /* The shape of that name. NULL: there is none; *err holds SDM_E_ARG with "did you mean". */
@@ -27,11 +27,11 @@ typedef struct cli_shape {
     sdm_instance *instance;
     const sdm_param *params; /* [n_params], owned by the instance */
     size_t n_params;
-    double *values; /* [n_params]: the -p words, else the defaults; not yet checked for range */
+    double *values; /* [n_params] of -p, else the defaults; not yet checked for range */
 } cli_shape;
 
-/* Opens the registry, creates the shape `name` with the options and reads the -p words. SDM_E_ARG,
- * SDM_E_PLUGIN. */
+/* Opens the registry, creates the shape `name` with the options and reads the values of -p.
+ * SDM_E_ARG, SDM_E_PLUGIN. */
 sdm_status cli_shape_open(const cli_args *args, const char *name, const cli_list *options,
                           cli_shape *out, sdm_error *err);
 void cli_shape_dispose(cli_shape *shape);
@@ -47,9 +47,9 @@ sdm_status cli_model_params(const sdm_model_info *info, sdm_param **out, sdm_err
 /* The value of --policy. */
 sdm_range_policy cli_policy(const cli_args *args);
 
-/* values[n] = the defaults, overridden by the "name=value" words of -p. SDM_E_ARG: an unknown or
-   repeated name, or not a number. NaN and infinities pass: the range check that follows rejects
-   them with the name of the parameter. */
+/* values[n] = the defaults, overridden by the "name=value" arguments of -p. SDM_E_ARG: an unknown
+ * or repeated name, or not a number. NaN and infinities pass: the range check that follows rejects
+ * them with the name of the parameter. */
 sdm_status cli_read_params(const sdm_param *params, size_t n, const cli_list *given, double *values,
                            sdm_error *err);
 
@@ -66,8 +66,8 @@ sdm_status cli_check_range(const sdm_param *params, size_t n, const double *valu
 void cli_add_params(const sdm_param *params, size_t n, const double *values, sdm_text *out);
 
 /* *out = the axis-aligned grid of --size, --spacing and --origin. Missing options are chosen so
- * that the grid covers the box min .. max (mm) with a margin of 0.1 times its longest edge; without
- * --size and --spacing it has 64 voxels along that edge, margins included. SDM_E_ARG. */
+ * that the grid covers the box min .. max (mm) with a margin of 0.1 times its longest edge;
+ * without --size and --spacing it has 64 voxels along that edge, margins included. SDM_E_ARG. */
 sdm_status cli_grid_for_box(const cli_args *args, const double min[3], const double max[3],
                             sdm_grid *out, sdm_error *err);
 

@@ -6,7 +6,7 @@
 #include "report/terminal.h"
 #include "sdm/memory.h"
 
-/* True when one of the words "name=value" has this name. */
+/* True when one of the arguments "name=value" has this name. */
 static bool has_word(const cli_list *words, const char *name)
 {
     const size_t length = strlen(name);
@@ -15,7 +15,7 @@ static bool has_word(const cli_list *words, const char *name)
     return false;
 }
 
-/* --random-params: draws the parameters that have no -p word. */
+/* --random-params: draws the parameters without a -p value. */
 static sdm_status draw_params(cli_phantom *p, sdm_error *err)
 {
     cli_shape *shape = &p->shape;
@@ -130,8 +130,8 @@ static sdm_status grid_crop(const cli_phantom *p, const double min[3], const dou
     return SDM_OK;
 }
 
-/* Makes the grid: fitted to the shape in the frame of the image, cropped, then moved to the world.
- */
+/* Makes the grid: fitted to the shape in the frame of the image, cropped, then moved to
+ * the world. */
 static sdm_status grid_make(cli_phantom *p, sdm_mesh *mesh, sdm_error *err)
 {
     const cli_args *args = p->args;

@@ -1,5 +1,5 @@
-/* Writes the truth of a phantom as JSON: shape, parameters, pose, grid and settings of the image.
- */
+/* Writes the truth of a phantom as JSON: shape, parameters, pose, grid and settings of the
+ * image. */
 #include "phantom_command.h"
 #include "report/json_values.h"
 

@@ -7,18 +7,18 @@
 #include "sdm/grid.h"
 #include "sdm/mesh.h"
 
-/* A block of voxels: indices from[a] .. from[a] + n[a] - 1 along axis a; empty when an n[a] is 0.
- */
+/* A block of voxels: indices from[a] .. from[a] + n[a] - 1 along axis a; empty when an
+ * n[a] is 0. */
 typedef struct cli_block {
     int64_t from[3], n[3];
 } cli_block;
 
 /* The bounding box of the vertices (world), enlarged by `pad` mm on every side and clipped to the
-   grid. Empty when the box lies outside of the grid. */
+ * grid. Empty when the box lies outside of the grid. */
 cli_block cli_block_of_mesh(const sdm_grid *g, const sdm_mesh *m, double pad);
 
 /* The bounding box of the voxels with a value above 0, enlarged by `pad` mm on every side and
-   clipped to the grid. Empty without such a voxel. */
+ * clipped to the grid. Empty without such a voxel. */
 cli_block cli_block_of_labels(const sdm_grid *g, const float *values, double pad);
 
 /* The smallest block that holds both; an empty block does not count. */

@@ -1,5 +1,5 @@
-/* Arrays that `sdmgen exact` writes beside the distances (layers): --closest, --normal, --triangle,
- * and the derivatives by the parameters, --jacobian. */
+/* Arrays that `sdmgen exact` writes beside the distances (layers): --closest, --normal,
+ * --triangle, and the derivatives by the parameters, --jacobian. */
 #ifndef CLI_EXACT_LAYERS_H
 #define CLI_EXACT_LAYERS_H
 

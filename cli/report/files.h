@@ -15,8 +15,8 @@ bool cli_ends_with(const char *path, const char *suffix);
 bool cli_ends_with_any(const char *path, const char *endings);
 
 /* Before any work: checks that every output can be written and that no output is the same file as
-   an input or another output, also under a different name or through a link. outputs NULL: all
-   outputs of the command line. SDM_E_ARG, SDM_E_IO. */
+ * an input or another output, also under a different name or through a link. outputs NULL: all
+ * outputs of the command line. SDM_E_ARG, SDM_E_IO. */
 sdm_status cli_check_files(const cli_args *args, const cli_list *outputs, sdm_error *err);
 
 #endif

@@ -13,7 +13,8 @@ void cli_json_reals(sdm_json *json, const char *key, const double *v, size_t n);
 void cli_json_params(sdm_json *json, const char *key, const sdm_param *params, size_t n,
                      const double *values);
 
-/* Adds the grid as an object: size, spacing and origin (mm), and if wanted the direction matrix. */
+/* Adds the grid as an object: size, spacing and origin (mm), and with `with_direction` the
+ * direction matrix. */
 void cli_json_grid(sdm_json *json, const char *key, const sdm_grid *g, bool with_direction);
 
 /* Writes the finished text and a line feed to the file `path`. SDM_E_NOMEM when the text is

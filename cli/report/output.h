@@ -20,16 +20,15 @@ typedef struct cli_map {
     const sdm_check *check; /* errors of the network's map; NULL: not checked */
 } cli_map;
 
-/* Checks, before any work, that the ending of the name is a known type; meshes_only: a type of mesh
- * files. SDM_E_ARG; SDM_E_UNSUPPORTED: .vdb in a build without OpenVDB. */
+/* Checks, before any work, that the ending of the name is a known type; meshes_only: a type of
+ * mesh files. SDM_E_ARG; SDM_E_UNSUPPORTED: .vdb in a build without OpenVDB. */
 sdm_status cli_check_type(const char *path, bool meshes_only, sdm_error *err);
 
 /* Whether the name is that of a picture: .png .svg .pdf. */
 bool cli_is_picture(const char *path);
 
 /* Writes the map to `path`. Notices, such as a surface cut by the grid, go to stderr.
- * SDM_E_CANCELLED after an interrupt; SDM_E_MESH: a surface is wanted and the map has none;
- * SDM_E_IO. */
+ * SDM_E_CANCELLED after an interrupt; SDM_E_MESH: no zero surface to write as a mesh; SDM_E_IO. */
 sdm_status cli_write_map(const char *path, const cli_map *map, const cli_args *args,
                          sdm_error *err);
 

@@ -50,8 +50,8 @@ bool cli_wants_colour(void)
     return cli_has_terminal() && !(no && *no);
 }
 
-/* True when the line begins with its place: "file:line:column: ..." or "argument 'key=value': ...".
- */
+/* True when the line begins with its place: "file:line:column: ..." or "argument
+ * 'key=value': ...". */
 static bool has_place(const char *line, size_t length)
 {
     if (!strncmp(line, "argument '", 10)) return true;

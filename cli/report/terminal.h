@@ -24,7 +24,7 @@ void cli_set_quiet(bool quiet);
 bool cli_is_quiet(void);
 
 /* Prints the message of a failure on stderr, "sdmgen: error: text". Lines of a configuration error
-   that begin with their place, "file:line:column:", have no such prefix. Returns the exit code. */
+ * that begin with their place, "file:line:column:", have no such prefix. Returns the exit code. */
 int cli_report(const sdm_error *err);
 
 /* "sdmgen: text" on stderr, unless quiet. */
@@ -36,9 +36,9 @@ bool cli_wants_colour(void);
 /* True when stderr is a terminal that can redraw a line: TERM is set and not "dumb". */
 bool cli_has_terminal(void);
 
-/* Catches SIGINT and SIGTERM: the first sets a flag, the second ends the program at once with exit
-   code 130. Ignores SIGXFSZ: writing beyond a limit on file sizes then fails like any other write.
- */
+/* Catches SIGINT and SIGTERM: the first sets a flag, the second ends the program at once with
+ * exit code 130. Ignores SIGXFSZ: writing beyond a limit on file sizes then fails like any
+ * other write. */
 void cli_catch_interrupts(void);
 bool cli_is_interrupted(void);
 

@@ -42,8 +42,8 @@ typedef struct cli_bench_rows {
 } cli_bench_rows;
 
 /* Opens the mesh and the grid of the command line, with triangles `refine` times finer (only with
-   --shape) and voxels `scale` times smaller in the same box. Zero-initialise *c;
-   cli_bench_case_dispose() frees it, also after an error. */
+ * --shape) and voxels `scale` times smaller in the same box. Zero-initialise *c;
+ * cli_bench_case_dispose() frees it, also after an error. */
 sdm_status cli_bench_case_open(const cli_args *args, double refine, double scale, cli_bench_case *c,
                                sdm_error *err);
 void cli_bench_case_dispose(cli_bench_case *c);
@@ -60,8 +60,8 @@ sdm_status cli_bench_peers(const cli_bench_case *c, const cli_args *args, cli_be
 const char *cli_bench_peer_name(size_t i);
 
 /* Measures the peer `name`: times, memory and errors into *row, its map into values[nz][ny][nx]
-   (NaN: not computed), which may be NULL. If the program is missing or fails, row->done is false
-   and row->note is the reason; that is no error. */
+ * (NaN: not computed), which may be NULL. If the program is missing or fails, row->done is false
+ * and row->note is the reason; that is no error. */
 sdm_status cli_bench_peer(const cli_bench_case *c, const cli_args *args, const char *name,
                           float *values, cli_bench_row *row, sdm_error *err);
 
@@ -77,13 +77,13 @@ bool cli_bench_has_row(double share, int64_t r);
 sdm_status cli_bench_find_signs(cli_bench_case *c, sdm_error *err);
 
 /* Errors and wrong signs of values[nz][ny][nx] (NaN: not computed) into *row. Errors are measured
-   where the signs agree; if the mesh overlaps itself, only outside, because other methods measure
-   to the surface inside the union. */
+ * where the signs agree; if the mesh overlaps itself, only outside, because other methods measure
+ * to the surface inside the union. */
 void cli_bench_compare(const cli_bench_case *c, const float *values, cli_bench_row *row);
 
 /* cli_bench_peak_start() resets the peak of the resident memory (Linux) and returns the memory
-   resident now, kB; -1: unknown. cli_bench_peak_mb() returns the peak since then above that, MiB;
-   NaN: unknown. */
+ * resident now, kB; -1: unknown. cli_bench_peak_mb() returns the peak since then above that, MiB;
+ * NaN: unknown. */
 long cli_bench_peak_start(void);
 double cli_bench_peak_mb(long start);
 

@@ -34,8 +34,8 @@ static sdm_status make_shape_mesh(const cli_args *args, double refine, const cha
     return s;
 }
 
-/* The grid of --grid, --size, --spacing and --origin; by default 60 x 50 x 50 voxels. With a preset
-   grid, the cochlea has the same position in it as in the grid of its networks. */
+/* The grid of --grid, --size, --spacing and --origin; by default 60 x 50 x 50 voxels. With a
+ * preset grid, the cochlea has the same position in it as in the grid of its networks. */
 static sdm_status make_grid(const cli_args *args, bool cochlea, const sdm_audit *audit,
                             sdm_grid *out, sdm_error *err)
 {
@@ -58,8 +58,8 @@ static sdm_status make_grid(const cli_args *args, bool cochlea, const sdm_audit 
     return cli_grid_for_box(&a, audit->min, audit->max, out, err);
 }
 
-/* Changes the number of voxels by the factor `scale` along each axis. The box, bounded by the faces
- * of the outermost voxels, stays the same. */
+/* Changes the number of voxels by the factor `scale` along each axis. The box, bounded by the
+ * faces of the outermost voxels, stays the same. */
 static void grid_rescale(sdm_grid *g, double scale)
 {
     for (int i = 0; i < 3; i++) {

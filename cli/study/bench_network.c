@@ -1,6 +1,6 @@
 /* sdmgen bench network: times of one map, a batch, derivatives and several threads, and the
-   fraction of the machine's arithmetic and memory speed that they use. The fastest of several runs
-   counts, as in bench exact, because other programs can only add to the time. */
+ * fraction of the machine's arithmetic and memory speed that they use. The fastest of several runs
+ * counts, as in bench exact, because other programs can only add to the time. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -1,5 +1,5 @@
-/* Measures the methods of this library (sdm/internal/methods.h), and the exact engine on all cores.
- */
+/* Measures the methods of this library (sdm/internal/methods.h), and the exact engine on
+ * all cores. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -56,8 +56,8 @@ static void free_names(struct dirent **names, int n)
     free(names);
 }
 
-/* The folder of this program if it holds peers, as in a build; else libexec/sdmgen, as installed.
- */
+/* The folder of this program if it holds peers, as in a build; else libexec/sdmgen, as
+ * installed. */
 static void find_folder(char folder[PATH_SIZE])
 {
     char self[PATH_SIZE / 2];

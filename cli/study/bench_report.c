@@ -8,8 +8,7 @@
 static double total_ms(const cli_bench_row *r) { return r->ms_prepare + r->ms_map; }
 
 /* format_fixed() writes v with `digits` decimals, format_rounded() with `digits` significant
- * digits;
- * "-" if v is not finite. Return buf. */
+ * digits; "-" if v is not finite. Return buf. */
 static const char *format_fixed(double v, int digits, char buf[32])
 {
     snprintf(buf, 32, "-");
@@ -97,9 +96,8 @@ void cli_bench_json(sdm_json *j, const cli_bench_case *c, const cli_bench_rows *
     sdm_json_close(j, '}');
 }
 
-/* Prints one table: the total time of each method in ms and, in parentheses, ns per voxel or
- * triangle.
- */
+/* Prints one table: the total time of each method in ms and, in parentheses, ns per voxel
+ * or triangle. */
 static void print_growth(const cli_bench_case *cases, const cli_bench_rows *rows, size_t n,
                          bool voxels)
 {

@@ -1,5 +1,5 @@
-/* Measures networks and other methods against the exact engine on random shapes that no training
- * used. */
+/* Measures networks and other methods against the exact engine on random shapes that no
+ * training used. */
 #ifndef CLI_EVALUATE_H
 #define CLI_EVALUATE_H
 
@@ -35,8 +35,8 @@ typedef struct cli_eval {
     size_t worst, median; /* indices of the shapes with the largest and the median MSE */
 } cli_eval;
 
-/* p[n_params] = random parameters within the model's trained ranges, a function of seed and index.
- */
+/* p[n_params] = random parameters within the model's trained ranges, a function of seed
+ * and index. */
 void cli_eval_params(const sdm_model *m, uint64_t seed, size_t index, double *p);
 
 /* A method that makes maps of a shape, on one grid, at parameters in a box. The exact engine makes
@@ -52,9 +52,8 @@ typedef struct cli_map_maker {
     const void *user;
 } cli_map_maker;
 
-/* The model as a map maker, with at most SDM_MAX_PARAMS of its parameters. It refers to m and
- * shape.
- */
+/* The model as a map maker, with at most SDM_MAX_PARAMS of its parameters. It refers to m
+ * and shape. */
 cli_map_maker cli_maker_of_model(const sdm_model *m, const sdm_instance *shape);
 
 /* p[n_params] = random parameters within the maker's box, a function of seed and index. */
@@ -69,17 +68,16 @@ sdm_status cli_compare_maps(const sdm_grid *g, const float *values, const float 
 void cli_eval_reduce(cli_eval *e);
 
 /* Evaluates n random shapes on all threads; the number of threads does not change a bit of the
- * result. surfaces: also measures the zero surfaces. cli_eval_dispose() frees *out. SDM_E_ARG: n is
- * 0, or the model has too many parameters; SDM_E_CANCELLED. */
+ * result. surfaces: also measures the zero surfaces. cli_eval_dispose() frees *out. SDM_E_ARG: n
+ * is 0, or the model has too many parameters; SDM_E_CANCELLED. */
 sdm_status cli_evaluate_maps(const cli_map_maker *m, uint64_t seed, size_t n, bool surfaces,
                              cli_eval *out, sdm_error *err);
 sdm_status cli_evaluate(const sdm_model *m, const sdm_instance *shape, uint64_t seed, size_t n,
                         bool surfaces, cli_eval *out, sdm_error *err);
 void cli_eval_dispose(cli_eval *e);
 
-/* Writes slices exact | network | error of random shape `index`, or at p[n_params] if p is not
- * NULL.
- */
+/* Writes slices exact | network | error of random shape `index`, or at p[n_params] if p is
+ * not NULL. */
 sdm_status cli_picture_compare(const sdm_model *m, const sdm_instance *shape, uint64_t seed,
                                size_t index, const double *p, const char *path, sdm_error *err);
 
@@ -94,15 +92,15 @@ typedef struct cli_timing {
     size_t n_network, n_exact, n_naive; /* number of timed maps */
 } cli_timing;
 
-/* Measures medians over random shapes. fastest: measures the fastest of repeated runs on one shape
- * instead, and of repeated batches of random shapes; the naive method as without it. n_naive:
- * shapes for the naive method. shape NULL: only the network. */
+/* Measures the times: medians over random shapes; with `fastest`, minima over repeated maps of one
+ * shape and over repeated batches of random shapes. The naive method always has a median, over
+ * n_naive shapes. shape NULL: only the network. */
 sdm_status cli_time_maps(const sdm_model *m, const sdm_instance *shape, uint64_t seed, bool fastest,
                          size_t n_naive, cli_timing *out, sdm_error *err);
 
-/* *ms = median time of the naive method on one core over the first n random shapes of the maker.
- * Only a fraction of the slices, *share, is computed; *ms is scaled to all. Both are NaN when n is
- * 0. */
+/* *ms = median time of the naive method on one core over the first n random shapes of the
+ * maker. Only a fraction of the slices, *share, is computed; *ms is scaled to all. Both are
+ * NaN when n is 0. */
 sdm_status cli_time_naive(const cli_map_maker *m, uint64_t seed, size_t n, double *ms,
                           double *share, sdm_error *err);
 

@@ -86,13 +86,13 @@ sdm_status cli_experiment_network(const cli_experiment_run *run, cli_experiment_
 sdm_status cli_experiment_engine(const cli_experiment_run *run, cli_experiment_job *job,
                                  cli_experiment_result *out, sdm_error *err);
 
-/* Checks that a method or peer of that name exists. SDM_E_CONFIG with all names and "did you mean".
- */
+/* Checks that a method or peer of that name exists. SDM_E_CONFIG with all names and "did
+ * you mean". */
 sdm_status cli_experiment_check_engine(const char *name, sdm_error *err);
 
-/* Draws slices exact | method | error and the zero surfaces of the map values[nz][ny][nx] at
-   job->nominal, unless pictures are switched off. Without a zero surface surfaces.png is omitted.
- */
+/* Draws slices exact | method | error and the zero surfaces of the map values[nz][ny][nx]
+ * at job->nominal, unless pictures are switched off. Without a zero surface surfaces.png
+ * is omitted. */
 sdm_status cli_experiment_draw(const cli_experiment_run *run, const cli_experiment_job *job,
                                const float *values, sdm_error *err);
 
@@ -107,8 +107,8 @@ sdm_status cli_experiment_write_tables(const cli_experiment_run *run, sdm_text *
 /* Prints the planned action of every row and the duration of the trainings. */
 sdm_status cli_experiment_print_plan(const cli_experiment_run *run, sdm_error *err);
 
-/* Appends a line to FOLDER/log.txt, with the seconds since the start; also prints it as a notice.
- */
+/* Appends a line to FOLDER/log.txt, with the seconds since the start; also prints it as a
+ * notice. */
 void cli_experiment_log(const cli_experiment_run *run, const char *fmt, ...) SDM_PRINTF(2, 3);
 
 /* Appends the head of a log: date, version, machine, settings and command. */

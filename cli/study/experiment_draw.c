@@ -31,8 +31,8 @@ static sdm_status draw_slices(const cli_experiment_run *run, const cli_experimen
     return s;
 }
 
-/* distance[surface->n_vert] = signed distances from the mesh at the vertices of the zero surface.
- */
+/* distance[surface->n_vert] = signed distances from the mesh at the vertices of the zero
+ * surface. */
 static sdm_status find_distances(const sdm_mesh *mesh, const sdm_mesh *surface, double *distance,
                                  sdm_error *err)
 {

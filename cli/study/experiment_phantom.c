@@ -35,8 +35,8 @@ static void random_vector(uint64_t seed, uint64_t first, double length, double v
     for (int i = 0; i < 3; i++) v[i] *= length / sqrt(sum);
 }
 
-/* The true pose, rotated by fit.off_deg about `middle` and translated by fit.off_mm, both in random
- * directions. */
+/* The true pose, rotated by fit.off_deg about `middle` and translated by fit.off_mm, both in
+ * random directions. */
 static sdm_pose perturb_pose(const sdm_experiment *e, uint64_t seed, const sdm_pose *truth,
                              const double middle[3])
 {

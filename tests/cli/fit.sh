@@ -243,11 +243,11 @@ expect 2 "output 'no.txt': its name must end in" sdmgen fit $fit ct.nii.gz -o no
 expect 2 "'no.stl' is given twice" sdmgen fit $fit ct.nii.gz -o no.stl -o no.stl
 expect 2 "'no.nii' is given twice" sdmgen fit $fit ct.nii.gz -o no.nii --label-out no.nii
 expect 2 "label-out 'no.npy': its name must end in" sdmgen fit $fit ct.nii.gz --label-out no.npy
-expect 2 'polish comes after' sdmgen fit $fit ct.nii.gz --polish
+expect 2 'polish follows the fit of a network' sdmgen fit $fit ct.nii.gz --polish
 expect 2 'one of --rotation, --start-axis' sdmgen fit $fit ct.nii.gz --rotation 0,0,0 --start-axis 0,0,1
 expect 2 'one of --translation, --start-centre' sdmgen fit $fit ct.nii.gz --translation 0,0,0 --start-centre 0,0,0
 expect 2 'one of --turns and --turns-sphere' sdmgen fit $fit ct.nii.gz --turns 3 --turns-sphere 3
-expect 2 'reference-label is a label of' sdmgen fit $fit ct.nii.gz --reference-label 1
+expect 2 'reference-label needs --reference FILE' sdmgen fit $fit ct.nii.gz --reference-label 1
 expect 2 "keep 'shape': need one of" sdmgen fit $fit ct.nii.gz --keep shape
 expect 2 'leave nothing to fit' sdmgen fit $fit ct.nii.gz --keep parameters --keep pose
 expect 2 'standard deviations above 0' sdmgen fit $fit ct.nii.gz --inside 40,0

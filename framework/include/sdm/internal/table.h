@@ -1,5 +1,5 @@
-/* Cells of Markdown and CSV tables, appended to a text, and writing the finished table to a file.
- */
+/* Cells of Markdown and CSV tables, appended to a text, and writing the finished table to
+ * a file. */
 #ifndef SDM_TABLE_H
 #define SDM_TABLE_H
 

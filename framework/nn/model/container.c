@@ -93,7 +93,7 @@ sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *s
     // header
     if (size < sizeof magic || memcmp(bytes, magic, sizeof magic))
         return sdm_fail(err, SDM_E_FORMAT,
-                        "not a model file: it does not begin with the signature SDMGEN");
+                        "not a model file (it does not begin with the signature SDMGEN)");
     if (size < HEADER_BYTES + ENTRY_BYTES + 16)
         return sdm_fail(err, SDM_E_FORMAT, "truncated: only %zu bytes", size);
     const uint64_t version = load_le(bytes + 8, 4), count = load_le(bytes + 12, 4),

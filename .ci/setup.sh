@@ -2,7 +2,7 @@
 # Shared by ./run and ./run-tests (sourced, bash): installs what is missing and builds.
 
 # what a bare Debian 12 lacks; boost and imath are asked for by OpenVDB's own CMake files
-packages=(gcc g++ cmake ninja-build pkg-config libyaml-dev zlib1g-dev libopenvdb-dev libboost-iostreams-dev libcmocka-dev)
+packages=(gcc g++ cmake ninja-build pkg-config libyaml-dev zlib1g-dev libcairo2-dev libopenvdb-dev libboost-iostreams-dev libcmocka-dev)
 
 say() { printf '\n== %s\n' "$*"; }
 
@@ -35,12 +35,17 @@ install_packages() {
     "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing >/dev/null
 }
 
-# build PRESET [TARGET]: configures build/PRESET once and builds it.
-build() {
-    local preset=$1 target=${2:-all} generator=()
+# configure PRESET: makes build/PRESET ready.
+configure() {
+    local preset=$1 generator=()
     [ -f "build/$preset/CMakeCache.txt" ] || generator=(-G Ninja)
     cmake --preset "$preset" "${generator[@]}" >"$(log_of configure "$preset")" 2>&1 || fail_with "$(log_of configure "$preset")"
-    cmake --build --preset "$preset" --target "$target"
+}
+
+# build PRESET [TARGET]: configures build/PRESET and builds it.
+build() {
+    configure "$1"
+    cmake --build --preset "$1" --target "${2:-all}"
 }
 
 log_of() { mkdir -p "build/$2" && echo "build/$2/$1.log"; }

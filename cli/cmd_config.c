@@ -4,18 +4,11 @@
 #include "commands.h"
 #include "inputs/config_shape.h"
 #include "inputs/setup.h"
+#include "report/terminal.h"
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"
 
-static sdm_status print_text(sdm_text *text, sdm_error *err)
-{
-    const bool failed = text->failed || !text->data;
-    if (!failed) fputs(text->data, stdout);
-    sdm_text_dispose(text);
-    return failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the text") : SDM_OK;
-}
-
-/* What the configuration alone cannot know: the shape, its options and its ranges. */
+/* Checks the parts of the configuration that need the shape: its name, options and ranges. */
 static sdm_status check_shape(const cli_args *args, sdm_config *c, sdm_error *err)
 {
     double min[SDM_MAX_PARAMS], max[SDM_MAX_PARAMS];
@@ -39,9 +32,10 @@ sdm_status cmd_config(const cli_args *args, sdm_error *err)
     sdm_text text = {0};
     if (args->keys) {
         if (args->files.n > 0 || args->dump)
-            return sdm_fail(err, SDM_E_ARG, "config: --keys stands alone");
+            return sdm_fail(err, SDM_E_ARG,
+                            "config: --keys stands alone, without CONFIG and --dump");
         sdm_config_describe(args->markdown, &text);
-        return print_text(&text, err);
+        return cli_print_text(&text, err);
     }
     if (args->files.n == 0)
         return sdm_fail(err, SDM_E_ARG, "usage: sdmgen config CONFIG [key=value ...], or --keys");
@@ -50,7 +44,7 @@ sdm_status cmd_config(const cli_args *args, sdm_error *err)
     if (!s) s = check_shape(args, config, err);
     if (!s && args->dump) {
         sdm_config_dump(config, &text);
-        s = print_text(&text, err);
+        s = cli_print_text(&text, err);
     } else if (!s) {
         printf("%s: no mistakes\n", args->files.items[0]);
     }

@@ -1,4 +1,4 @@
-/* sdmgen eval: accuracy and speed of a network on fresh random shapes. */
+/* sdmgen eval: measures the accuracy and speed of a network on new random shapes. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -9,6 +9,7 @@
 #include "sdm/internal/config.h"
 #include "sdm/internal/file.h"
 #include "sdm/internal/threads.h"
+#include "sdm/picture.h"
 #include "study/evaluate.h"
 
 enum { DEFAULT_SAMPLES = 100 };
@@ -26,7 +27,7 @@ static void print_table(const char *file, const sdm_model_info *info, const cli_
 {
     printf("%s: %s, %zu parameters, %lld x %lld x %lld voxels\n", file, info->shape, info->n_params,
            (long long)info->grid.n[0], (long long)info->grid.n[1], (long long)info->grid.n[2]);
-    printf("%zu random shapes it was not trained on (seed %llu), exact distances as truth\n\n",
+    printf("%zu random shapes that the training did not use (seed %llu), against exact maps\n\n",
            e->n, (unsigned long long)seed);
     printf("  %-22s %10.3g mm^2\n", "MSE", e->mse_mm2);
     printf("  %-22s %10.5f mm\n", "RMSE", e->rmse_mm);
@@ -38,7 +39,7 @@ static void print_table(const char *file, const sdm_model_info *info, const cli_
     printf("  %-22s %10.5f mm (largest %.5f)\n", "surfaces, Hausdorff", e->surface_hausdorff_mm,
            e->surface_hausdorff_max_mm);
     if (e->n_surface < e->n)
-        printf("  (surfaces: %zu of %zu shapes have both)\n", e->n_surface, e->n);
+        printf("  (surfaces: of the %zu shapes with both, out of %zu)\n", e->n_surface, e->n);
     char batch[48], naive[64];
     snprintf(batch, sizeof batch, "network, batch of %zu", t->batch_size);
     snprintf(naive, sizeof naive, "  (from %.0f %% of the voxels)", 100 * t->naive_share);
@@ -57,18 +58,21 @@ static void fill_json(sdm_json *j, const char *file, const sdm_model_info *info,
     sdm_json_text(j, "shape", info->shape);
     sdm_json_int(j, "samples", (int64_t)e->n);
     sdm_json_uint(j, "seed", seed);
+    // errors of the distance
     sdm_json_real(j, "mse_mm2", e->mse_mm2);
     sdm_json_real(j, "rmse_mm", e->rmse_mm);
     sdm_json_real(j, "mae_mm", e->mae_mm);
     sdm_json_real(j, "max_abs_mm", e->max_abs_mm);
     sdm_json_real(j, "rmse_near_mm", e->rmse_near_mm);
     sdm_json_real(j, "dice", e->dice);
+    // distances between the surfaces
     sdm_json_real(j, "surface_mean_mm", e->surface_mean_mm);
     sdm_json_real(j, "surface_hausdorff_mm", e->surface_hausdorff_mm);
     sdm_json_real(j, "surface_hausdorff_max_mm", e->surface_hausdorff_max_mm);
     sdm_json_int(j, "surfaces", (int64_t)e->n_surface);
     sdm_json_int(j, "worst", (int64_t)e->worst);
     sdm_json_real(j, "worst_mse_mm2", e->sample[e->worst].mse_mm2);
+    // times
     sdm_json_real(j, "ms_network", t->ms_network);
     sdm_json_real(j, "ms_network_batch", t->ms_batch);
     sdm_json_int(j, "batch", (int64_t)t->batch_size);
@@ -77,7 +81,7 @@ static void fill_json(sdm_json *j, const char *file, const sdm_model_info *info,
     sdm_json_real(j, "naive_share", t->naive_share);
     sdm_json_real(j, "exact_over_network", t->ms_exact / t->ms_network);
     sdm_json_real(j, "naive_over_network", t->ms_naive / t->ms_network);
-    sdm_json_int(j, "threads", 1); /* of the times */
+    sdm_json_int(j, "threads", 1); // the times are those of one thread
     sdm_json_int(j, "workers", workers);
     sdm_json_close(j, '}');
 }
@@ -102,8 +106,8 @@ static sdm_status write_pictures(const cli_args *args, const sdm_model *m,
     return s;
 }
 
-static sdm_status measure(const cli_args *args, const sdm_model *m, const sdm_instance *shape,
-                          sdm_error *err)
+static sdm_status measure_model(const cli_args *args, const sdm_model *m, const sdm_instance *shape,
+                                sdm_error *err)
 {
     const uint64_t seed = args->seed < 0 ? 1 : (uint64_t)args->seed;
     const size_t n = args->samples < 0 ? DEFAULT_SAMPLES : (size_t)args->samples;
@@ -111,7 +115,8 @@ static sdm_status measure(const cli_args *args, const sdm_model *m, const sdm_in
     cli_eval e = {0};
     cli_timing t = {0};
     sdm_json json = {0};
-    sdm_status s = args->pictures ? sdm_make_folder(args->pictures, err) : SDM_OK;
+    sdm_status s = args->pictures ? sdm_picture_check("worst.png", err) : SDM_OK;
+    if (!s && args->pictures) s = sdm_make_folder(args->pictures, err);
     if (!s) s = cli_evaluate(m, shape, seed, n, true, &e, err);
     if (!s) s = cli_time_maps(m, shape, seed, false, (size_t)args->naive, &t, err);
     if (!s && args->pictures) s = write_pictures(args, m, shape, seed, &e, err);
@@ -122,7 +127,7 @@ static sdm_status measure(const cli_args *args, const sdm_model *m, const sdm_in
         print_table(args->files.items[0], info, &e, &t, seed);
     }
     if (!s && !(e.mse_mm2 <= args->max_mse))
-        s = sdm_fail(err, SDM_E_QUALITY, "MSE %.3g mm^2, demanded at most %.3g mm^2", e.mse_mm2,
+        s = sdm_fail(err, SDM_E_QUALITY, "MSE %.3g mm^2, --max-mse allows %.3g mm^2", e.mse_mm2,
                      args->max_mse);
     cli_eval_dispose(&e);
     return s;
@@ -136,7 +141,7 @@ sdm_status cmd_eval(const cli_args *args, sdm_error *err)
     sdm_status s = cli_open_registry(args, &registry, err);
     if (!s) s = sdm_model_open(args->files.items[0], &model, err);
     if (!s) s = sdm_runtime_instance(model, registry, &shape, err);
-    if (!s) s = measure(args, model, shape, err);
+    if (!s) s = measure_model(args, model, shape, err);
     sdm_model_free(model);
     sdm_instance_free(shape);
     sdm_registry_free(registry);

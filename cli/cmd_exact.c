@@ -1,10 +1,11 @@
-/* sdmgen exact: the exact distance map of a shape or a mesh file. */
+/* sdmgen exact: computes the exact distance map of a shape or a mesh file. */
 #include <stdio.h>
 #include <string.h>
 
 #include "commands.h"
 #include "inputs/setup.h"
 #include "report/exact_layers.h"
+#include "report/json_values.h"
 #include "report/output.h"
 #include "report/progress.h"
 #include "report/report_audit.h"
@@ -26,40 +27,34 @@ typedef struct job {
     float *values;
     cli_layers layers;
     double ms_build, ms_query;
-    sdm_sign_certificate certificate; /* checked: 0 without --certify */
-    double bound_mm;                  /* on the error of the distances to the surface, 0: exact */
+    sdm_sign_certificate certificate; /* checked == 0 without --certify */
+    double bound_mm;                  /* bound on the error of the distances; 0: exact */
 } job;
 
-static sdm_status mesh_of_shape(job *j, sdm_error *err)
+static sdm_status make_shape_mesh(job *j, sdm_error *err)
 {
-    sdm_registry *registry = NULL;
-    sdm_instance *shape = NULL;
-    double *values = NULL;
-    size_t n = 0;
-    sdm_status s = cli_open_registry(j->args, &registry, err);
-    if (!s) s = cli_open_shape(registry, j->args->shape, &j->args->options, &shape, err);
-    const sdm_param *params = s ? NULL : sdm_instance_params(shape, &n);
-    if (!s) s = SDM_ALLOC(&values, n, "parameters", err);
-    if (!s) s = cli_read_params(params, n, &j->args->params, values, err);
+    cli_shape shape = {0};
+    sdm_status s = cli_shape_open(j->args, j->args->shape, &j->args->options, &shape, err);
     const double start = sdm_clock();
-    if (!s) s = sdm_instance_mesh(shape, values, &j->mesh, err);
+    if (!s) s = sdm_instance_mesh(shape.instance, shape.values, &j->mesh, err);
     j->ms_mesh = 1e3 * (sdm_clock() - start);
-    if (!s) s = cli_layers_velocity(&j->layers, j->args, shape, values, j->mesh.n_vert, err);
-    if (!s) cli_add_params(params, n, values, &j->params);
-    sdm_free(values);
-    sdm_instance_free(shape);
-    sdm_registry_free(registry);
+    if (!s)
+        s = cli_layers_velocity(&j->layers, j->args, shape.instance, shape.values, j->mesh.n_vert,
+                                err);
+    if (!s) cli_add_params(shape.params, shape.n_params, shape.values, &j->params);
+    cli_shape_dispose(&shape);
     return s;
 }
 
-static sdm_status get_mesh(job *j, sdm_error *err)
+/* Checks the options and opens the mesh. */
+static sdm_status open_mesh(job *j, sdm_error *err)
 {
     const cli_args *args = j->args;
     if (!args->shape == !args->mesh)
         return sdm_fail(err, SDM_E_ARG, "exact: either --shape NAME or --mesh FILE is needed");
     if (args->mesh && (args->params.n > 0 || args->options.n > 0))
         return sdm_fail(err, SDM_E_ARG,
-                        "exact: -p and -O belong to --shape, a mesh file has no parameters");
+                        "exact: -p and -O belong to --shape; a mesh file has no parameters");
     if (args->outputs.n == 0 && !args->json && !cli_layers_wanted(args))
         return sdm_fail(err, SDM_E_ARG, "exact: an output is needed: -o FILE, or --json");
     if (args->certify && strcmp(args->method, "exact"))
@@ -70,10 +65,10 @@ static sdm_status get_mesh(job *j, sdm_error *err)
                         args->method);
     const sdm_status s = cli_layers_check(args, err);
     if (s) return s;
-    return args->mesh ? cli_read_mesh(args->mesh, &j->mesh, err) : mesh_of_shape(j, err);
+    return args->mesh ? cli_read_mesh(args->mesh, &j->mesh, err) : make_shape_mesh(j, err);
 }
 
-static sdm_sign_method sign_of(const char *name)
+static sdm_sign_method find_sign_method(const char *name)
 {
     for (int m = SDM_SIGN_AUTO; m <= SDM_SIGN_WINDING; m++)
         if (!strcmp(name, sdm_sign_method_name((sdm_sign_method)m))) return (sdm_sign_method)m;
@@ -82,7 +77,7 @@ static sdm_sign_method sign_of(const char *name)
 
 static sdm_status run_engine(job *j, sdm_error *err)
 {
-    const sdm_exact_opts opts = {.sign = sign_of(j->args->sign),
+    const sdm_exact_opts opts = {.sign = find_sign_method(j->args->sign),
                                  .keep_overlap = j->args->keep_overlap,
                                  .n_threads = (int)j->args->threads,
                                  .cancelled = cli_interrupted};
@@ -92,7 +87,7 @@ static sdm_status run_engine(job *j, sdm_error *err)
     const double built = sdm_clock();
     if (s) return s;
     j->report = *sdm_exact_get_report(engine);
-    s = cli_fit_grid(j->args, j->report.audit.min, j->report.audit.max, &j->grid, err);
+    s = cli_grid_for_box(j->args, j->report.audit.min, j->report.audit.max, &j->grid, err);
     if (!s) s = SDM_ALLOC(&j->values, sdm_grid_count(&j->grid), "distance map", err);
     const double query = sdm_clock();
     if (!s) s = cli_layers_map(&j->layers, j->args, engine, &j->grid, j->values, err);
@@ -104,30 +99,32 @@ static sdm_status run_engine(job *j, sdm_error *err)
     return s;
 }
 
-typedef struct watch {
+typedef struct progress_state {
     cli_progress bar;
     const char *title;
-} watch;
+} progress_state;
 
 static void show_progress(void *user, double share)
 {
-    watch *w = user;
+    progress_state *w = user;
     cli_progress_show(&w->bar, w->title, share, NULL);
 }
 
-/* Any other method of the table. */
+/* Computes the map with a method other than the exact engine. */
 static sdm_status run_method(job *j, sdm_error *err)
 {
+    // the grid
     const sdm_method *method = sdm_method_find(j->args->method, err);
     if (!method) return SDM_E_ARG;
     sdm_audit audit;
     sdm_status s = sdm_mesh_audit(&j->mesh, &audit, err);
-    if (!s) s = cli_fit_grid(j->args, audit.min, audit.max, &j->grid, err);
+    if (!s) s = cli_grid_for_box(j->args, audit.min, audit.max, &j->grid, err);
     if (!s) s = SDM_ALLOC(&j->values, sdm_grid_count(&j->grid), "distance map", err);
     if (s) return s;
 
-    watch w = {.title = method->name};
-    const sdm_method_opts opts = {.exact = {.sign = sign_of(j->args->sign),
+    // the map
+    progress_state w = {.title = method->name};
+    const sdm_method_opts opts = {.exact = {.sign = find_sign_method(j->args->sign),
                                             .keep_overlap = j->args->keep_overlap,
                                             .n_threads = (int)j->args->threads,
                                             .cancelled = cli_interrupted,
@@ -139,6 +136,7 @@ static sdm_status run_method(job *j, sdm_error *err)
     s = method->map(&j->mesh, &j->grid, &opts, j->values, &report, err);
     cli_progress_clear(&w.bar);
     if (s) return s;
+    // the report
     j->report = report.exact;
     j->ms_build = report.ms_prepare;
     j->ms_query = report.ms_map;
@@ -149,7 +147,8 @@ static sdm_status run_method(job *j, sdm_error *err)
     return SDM_OK;
 }
 
-static void value_range(const job *j, float *min, float *max, int64_t *inside)
+/* The smallest and the largest distance, and the number of voxels inside. */
+static void find_range(const job *j, float *min, float *max, int64_t *inside)
 {
     const size_t n = sdm_grid_count(&j->grid);
     *min = *max = j->values[0];
@@ -166,16 +165,17 @@ static void notice_mesh(const job *j)
     const sdm_audit *a = &j->report.audit;
     int64_t inside;
     float min, max;
-    value_range(j, &min, &max, &inside);
+    find_range(j, &min, &max, &inside);
     if (!inside)
-        cli_notice("no voxel of the grid is inside the surface: is it where the shape is?");
-    if (j->report.turned) cli_notice("the mesh was inside out and has been turned");
+        cli_notice("no voxel of the grid is inside the surface: does the grid cover the shape?");
+    if (j->report.turned) cli_notice("the mesh was inside out; its orientation has been reversed");
     if (j->report.parts_turned)
-        cli_notice("%zu parts were inside out and have been turned", j->report.parts_turned);
+        cli_notice("%zu parts were inside out; their orientation has been reversed",
+                   j->report.parts_turned);
     cli_notice_audit(a);
     if (j->report.unioned)
         cli_notice("the mesh overlaps itself: the union of its %zu triangles is bounded by %zu "
-                   "(error at most %.2g mm)",
+                   "triangles (error at most %.2g mm)",
                    a->n_tri, j->report.n_tri_used, j->report.union_error_mm);
 }
 
@@ -195,7 +195,7 @@ static void notice_signs(const job *j)
                    c->compared);
     }
     if (c->below_zero)
-        cli_notice("%zu voxels lie in a part of the mesh that is inside out and count as outside",
+        cli_notice("%zu voxels are in a part of the mesh that is inside out and count as outside",
                    c->below_zero);
 }
 
@@ -218,11 +218,12 @@ static sdm_status print_json(const job *j, sdm_error *err)
 {
     float min, max;
     int64_t inside;
-    value_range(j, &min, &max, &inside);
+    find_range(j, &min, &max, &inside);
     const size_t voxels = sdm_grid_count(&j->grid);
     char hash[32];
     snprintf(hash, sizeof hash, "%016llx",
              (unsigned long long)sdm_crc64(0, j->values, voxels * sizeof *j->values));
+    // method and times
     sdm_json json = {0};
     sdm_json_open(&json, NULL, '{');
     sdm_json_text(&json, "method", j->args->method);
@@ -231,10 +232,12 @@ static sdm_status print_json(const job *j, sdm_error *err)
     sdm_json_real(&json, "ms_build", j->ms_build);
     sdm_json_real(&json, "ms_query", j->ms_query);
     sdm_json_real(&json, "ms_total", j->ms_build + j->ms_query);
+    // sizes
     sdm_json_int(&json, "voxels", (int64_t)voxels);
     sdm_json_int(&json, "triangles", (int64_t)j->report.audit.n_tri);
     sdm_json_int(&json, "triangles_used", (int64_t)j->report.n_tri_used);
     sdm_json_int(&json, "threads", sdm_threads((int)j->args->threads));
+    // signs, union and defects of the mesh
     sdm_json_text(&json, "sign_method", sdm_sign_method_name(j->report.sign));
     sdm_json_bool(&json, "union", j->report.unioned);
     sdm_json_real(&json, "union_error_mm", j->report.union_error_mm);
@@ -244,6 +247,7 @@ static sdm_status print_json(const job *j, sdm_error *err)
     sdm_json_int(&json, "boundary_edges", (int64_t)j->report.audit.boundary_edges);
     sdm_json_int(&json, "nonmanifold_edges", (int64_t)j->report.audit.nonmanifold_edges);
     sdm_json_int(&json, "degenerate", (int64_t)j->report.audit.degenerate);
+    // values
     sdm_json_real(&json, "min_mm", (double)min);
     sdm_json_real(&json, "max_mm", (double)max);
     sdm_json_int(&json, "inside_voxels", inside);
@@ -256,7 +260,7 @@ static sdm_status print_json(const job *j, sdm_error *err)
         sdm_json_int(&json, "below_zero", (int64_t)c->below_zero);
     }
     sdm_json_text(&json, "values_crc64", hash);
-    cli_json_grid(&json, "grid", &j->grid);
+    cli_json_grid(&json, "grid", &j->grid, false);
     sdm_json_close(&json, '}');
     return cli_print_json(&json, err);
 }
@@ -264,7 +268,7 @@ static sdm_status print_json(const job *j, sdm_error *err)
 sdm_status cmd_exact(const cli_args *args, sdm_error *err)
 {
     job j = {.args = args};
-    sdm_status s = get_mesh(&j, err);
+    sdm_status s = open_mesh(&j, err);
     if (!s) s = strcmp(args->method, "exact") ? run_method(&j, err) : run_engine(&j, err);
     if (!s) notice_mesh(&j);
     if (!s) notice_signs(&j);

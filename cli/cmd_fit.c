@@ -1,4 +1,5 @@
-/* sdmgen fit: parameters and pose of a shape from an image, labels, a mesh or points. */
+/* sdmgen fit: estimates the parameters and the pose of a shape from an image, labels, a mesh or
+ * points. */
 #include <stdio.h>
 #include <string.h>
 
@@ -7,22 +8,22 @@
 #include "report/progress.h"
 #include "report/terminal.h"
 
-/* One bar over the whole: iterations of all phases that are expected at most. */
-typedef struct watch {
+/* One progress bar over all phases. */
+typedef struct progress_state {
     cli_progress bar;
-    size_t expected;
-} watch;
+    size_t expected; /* upper estimate of the number of iterations of all phases */
+} progress_state;
 
-static void show(void *user, const sdm_fit_progress *p)
+static void show_progress(void *user, const sdm_fit_progress *p)
 {
     static const char *const phases[] = {"search", "fit", "polish"};
-    watch *w = user;
+    progress_state *w = user;
     char text[80];
     snprintf(text, sizeof text, "iteration %zu  step %.1e", p->iteration, p->step);
     cli_progress_show(&w->bar, phases[p->phase], (double)p->iteration / (double)w->expected, text);
 }
 
-static sdm_status read_words(cli_fit *f, sdm_error *err)
+static sdm_status check_arguments(cli_fit *f, sdm_error *err)
 {
     const cli_args *args = f->args;
     const bool with_model = args->files.n == 2;
@@ -38,12 +39,14 @@ static sdm_status read_words(cli_fit *f, sdm_error *err)
     return cli_fit_check_files(args, err);
 }
 
-/* A fit of poor quality is no error yet: what is known of it is shown first. */
-static sdm_status run(cli_fit *f, sdm_error *err)
+/* Fits. SDM_OK also for a fit that is not to be trusted (f->doubt): its result is shown before the
+ * command fails. */
+static sdm_status fit_shape(cli_fit *f, sdm_error *err)
 {
     const size_t turns = f->opts.turns == SDM_FIT_TURNS_NONE ? 0 : f->opts.n_turns;
-    watch w = {.expected = 6 * turns + 12 + f->opts.max_iterations + f->opts.max_polish_iterations};
-    f->opts.progress = show;
+    progress_state w = {.expected = 6 * turns + 12 + f->opts.max_iterations +
+                                    f->opts.max_polish_iterations};
+    f->opts.progress = show_progress;
     f->opts.cancelled = cli_interrupted;
     f->opts.user = &w;
     cli_progress_start(&w.bar);
@@ -55,20 +58,20 @@ static sdm_status run(cli_fit *f, sdm_error *err)
     return sdm_fail(err, s, "%s: %s", f->path, f->doubt.text);
 }
 
-static void notice(const cli_fit *f)
+static void print_notices(const cli_fit *f)
 {
     const sdm_fit_result *r = &f->result;
     if (f->start_clamped || r->start_clamped)
-        cli_notice("the start was moved into the range of the parameters");
+        cli_notice("the start parameters were clamped to their range");
     if (r->n_exact_outside)
-        cli_notice("%zu maps outside of the network's range were made by the exact engine",
+        cli_notice("%zu maps outside of the trained range were made by the exact engine",
                    r->n_exact_outside);
     if (r->n_nan)
-        cli_notice("%zu voxels are NaN%s and were left out", r->n_nan,
-                   r->n_cavity ? " or in wide spaces" : "");
+        cli_notice("%zu voxels are NaN%s and were ignored", r->n_nan,
+                   r->n_cavity ? " or in wide spaces (--cavity)" : "");
 }
 
-static sdm_status report(const cli_fit *f, sdm_error *err)
+static sdm_status print_result(const cli_fit *f, sdm_error *err)
 {
     if (!f->args->json) {
         cli_fit_print(f);
@@ -79,17 +82,19 @@ static sdm_status report(const cli_fit *f, sdm_error *err)
     return cli_print_json(&json, err);
 }
 
+/* Prints the result and writes the files; fails with the reason of a fit that is not to be trusted.
+ */
 static sdm_status show_result(cli_fit *f, sdm_error *err)
 {
     const bool files = f->args->outputs.n || f->args->fit.label_out,
                write = !f->doubt.status || f->args->force;
     sdm_status s = SDM_OK;
     if (f->found) {
-        notice(f);
-        s = cli_fit_draw_up(f, err);
+        print_notices(f);
+        s = cli_fit_make_map(f, err);
         if (!s) s = cli_fit_compare(f, err);
         if (!s && write) s = cli_fit_write_files(f, err);
-        if (!s) s = report(f, err);
+        if (!s) s = print_result(f, err);
     }
     if (s || !f->doubt.status) return s;
     return sdm_fail(err, f->doubt.status, "%s: %s%s", f->path, f->doubt.text,
@@ -100,13 +105,13 @@ static sdm_status show_result(cli_fit *f, sdm_error *err)
 sdm_status cmd_fit(const cli_args *args, sdm_error *err)
 {
     cli_fit f = {.args = args};
-    sdm_status s = read_words(&f, err);
+    sdm_status s = check_arguments(&f, err);
     if (!s) s = cli_fit_open_source(&f, err);
     if (!s) s = cli_fit_read_options(&f, err);
     if (!s) s = cli_fit_read_target(&f, err);
     if (!s) s = cli_fit_read_reference(&f, err);
     if (!s) s = cli_fit_read_start(&f, err);
-    if (!s) s = run(&f, err);
+    if (!s) s = fit_shape(&f, err);
     if (!s) s = show_result(&f, err);
     cli_fit_dispose(&f);
     return s;

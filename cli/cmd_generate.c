@@ -1,4 +1,4 @@
-/* sdmgen generate: distance maps from a trained network. */
+/* sdmgen generate: makes distance maps with a trained network. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -6,6 +6,7 @@
 #include "commands.h"
 #include "inputs/setup.h"
 #include "report/generate_files.h"
+#include "report/json_values.h"
 #include "report/output.h"
 #include "report/progress.h"
 #include "report/terminal.h"
@@ -17,25 +18,29 @@
 #include "sdm/internal/threads.h"
 #include "sdm/map.h"
 
-/* What one call works with. */
+/* The state of one call of the command. */
 typedef struct job {
     const cli_args *args;
     sdm_registry *registry;
-    sdm_instance *shape; /* for the exact engine and checks, else NULL */
+    sdm_instance *shape; /* for the exact engine and checks; NULL: not needed */
     sdm_model *model;
     const sdm_model_info *info;
     sdm_param *params;
     double *rows; /* [n_rows][n_params] */
     size_t n_rows;
-    float *values, *gradient,
-        *jacobian; /* [nz][ny][nx], [3][...], [n_params][...]; those not wanted NULL */
-    double ms;     /* of all maps */
-    size_t n_clamped, n_exact, n_exact_error, n_checked;
-    sdm_check check; /* over all rows: mean, root mean square, largest q95 and max, mean bias */
-    uint64_t hash;
+    float *values;             /* [nz][ny][nx] mm */
+    float *gradient;           /* [3][nz][ny][nx]; NULL: not wanted */
+    float *jacobian;           /* [n_params][nz][ny][nx]; NULL: not wanted */
+    double ms;                 /* total time of all maps */
+    size_t n_clamped, n_exact; /* rows with clamped parameters; maps of the exact engine */
+    size_t n_exact_error; /* maps of the exact engine because the network's error was too large */
+    size_t n_checked;
+    sdm_check check; /* over all rows: means of mean, bias and square; largest q95 and max */
+    uint64_t hash;   /* CRC-64 of all maps */
 } job;
 
-static sdm_check_stat error_of(const cli_args *args)
+/* The statistic of --error-of. */
+static sdm_check_stat find_statistic(const cli_args *args)
 {
     int stat = SDM_CHECK_MAX;
     while (stat < SDM_CHECK_MEAN &&
@@ -56,7 +61,7 @@ static void job_dispose(job *j)
     sdm_registry_free(j->registry);
 }
 
-/* What the policy asks of a row. */
+/* Checks the parameters of a row according to --policy. */
 static sdm_status check_row(const job *j, const double *p, sdm_error *err)
 {
     const size_t n = j->info->n_params;
@@ -69,7 +74,7 @@ static sdm_status check_row(const job *j, const double *p, sdm_error *err)
     return SDM_OK;
 }
 
-/* Every row, before the first map is made: all or nothing. */
+/* Checks every row before the first map is made: either all maps are made or none. */
 static sdm_status check_rows(const job *j, sdm_error *err)
 {
     for (size_t i = 0; i < j->n_rows; i++) {
@@ -79,7 +84,7 @@ static sdm_status check_rows(const job *j, sdm_error *err)
     return SDM_OK;
 }
 
-/* Parameters of every row. */
+/* Reads the parameters of every row; without --params there is one row. */
 static sdm_status read_rows(job *j, sdm_error *err)
 {
     const size_t n = j->info->n_params;
@@ -97,7 +102,7 @@ static sdm_status read_rows(job *j, sdm_error *err)
     return s;
 }
 
-/* The exact shape, where it is needed. */
+/* Creates the shape if --check, --max-error or --policy exact need it. */
 static sdm_status open_shape(job *j, sdm_error *err)
 {
     const cli_args *args = j->args;
@@ -110,7 +115,7 @@ static sdm_status open_shape(job *j, sdm_error *err)
                        : s;
 }
 
-static sdm_status make_room(job *j, sdm_error *err)
+static sdm_status allocate_maps(job *j, sdm_error *err)
 {
     const size_t n = sdm_grid_count(&j->info->grid);
     size_t count;
@@ -121,7 +126,8 @@ static sdm_status make_room(job *j, sdm_error *err)
     return s ? s : SDM_ALLOC(&j->jacobian, count, "derivatives", err);
 }
 
-static sdm_status prepare(job *j, sdm_error *err)
+/* Opens the model and checks everything before the first map is made. */
+static sdm_status prepare_job(job *j, sdm_error *err)
 {
     const cli_args *args = j->args;
     if (!args->outputs.n && !args->json && !args->gradient && !args->jacobian && !args->check)
@@ -134,9 +140,9 @@ static sdm_status prepare(job *j, sdm_error *err)
     if (!s && !args->rows) s = cli_row_files_check(args, 1, err);
     if (!s) s = open_shape(j, err);
     if (!s) s = check_rows(j, err);
-    // the last names too, before the first map is made
+    // with --params: the names of the last row, which are the longest
     if (!s && args->rows) s = cli_row_files_check(args, j->n_rows, err);
-    return s ? s : make_room(j, err);
+    return s ? s : allocate_maps(j, err);
 }
 
 static sdm_status write_maps(const job *j, size_t row, const sdm_result *result,
@@ -195,18 +201,18 @@ static void add_check(job *j, const sdm_check *c)
     all->outside += c->outside;
 }
 
-/* What is to be said of a row: nothing happens in silence. */
+/* Reports clamped parameters, maps of the exact engine and, with --check, the errors of the map. */
 static void notice_row(const job *j, size_t row, const sdm_result *r)
 {
     char where[32] = "";
     if (j->args->rows) snprintf(where, sizeof where, "row %zu: ", row + 1);
-    if (r->clamped) cli_notice("%sparameters outside the trained range were moved into it", where);
+    if (r->clamped) cli_notice("%sparameters outside the trained range were clamped to it", where);
     if (r->reason == SDM_REASON_RANGE)
         cli_notice("%sparameters outside the trained range, computed by the exact engine", where);
     if (r->reason == SDM_REASON_ERROR)
         cli_notice("%serror of the network near the surface (%s) %.3g mm, above %g mm: computed by "
                    "the exact engine",
-                   where, j->args->error_of, sdm_check_get(&r->check, error_of(j->args)),
+                   where, j->args->error_of, sdm_check_get(&r->check, find_statistic(j->args)),
                    j->args->max_error);
     if (!j->args->check || j->args->json) return;
     const sdm_check *c = &r->check;
@@ -222,8 +228,8 @@ static void notice_row(const job *j, size_t row, const sdm_result *r)
 static sdm_status make_row(job *j, size_t row, sdm_error *err)
 {
     const cli_args *args = j->args;
-    // rows that the policy refuses have been refused: what is left to the exact engine is a
-    // network's map over the bound
+    // check_rows() has refused rows out of range, so with --policy refuse the exact engine only
+    // replaces maps whose error exceeds --max-error
     const sdm_range_policy policy = cli_policy(args);
     const sdm_generate_opts opts = {
         .policy = policy == SDM_RANGE_REFUSE && args->max_error > 0 ? SDM_RANGE_EXACT : policy,
@@ -231,7 +237,8 @@ static sdm_status make_row(job *j, size_t row, sdm_error *err)
         .n_threads = (int)args->threads,
         .check = args->check,
         .max_error_mm = args->max_error,
-        .max_error_of = error_of(args)};
+        .max_error_of = find_statistic(args)};
+    // the map
     double *p = j->rows + row * j->info->n_params;
     sdm_result result = {0};
     const double start = sdm_clock();
@@ -240,7 +247,7 @@ static sdm_status make_row(job *j, size_t row, sdm_error *err)
                                      : sdm_generate(j->model, p, &opts, j->values, &result, err);
     if (s) return args->rows ? sdm_fail_in(err, s, "%s: row %zu", args->rows, row + 1) : s;
     j->ms += 1e3 * (sdm_clock() - start);
-    // what is told of the map is what it was made from
+    // the metadata must hold the clamped parameters
     for (size_t i = 0; i < j->info->n_params && result.clamped; i++)
         p[i] = fmin(fmax(p[i], j->params[i].min), j->params[i].max);
     j->n_clamped += result.clamped;
@@ -252,7 +259,7 @@ static sdm_status make_row(job *j, size_t row, sdm_error *err)
     return write_row(j, row, &result, err);
 }
 
-static void report_check(const job *j, sdm_json *json)
+static void add_check_json(const job *j, sdm_json *json)
 {
     const sdm_check *c = &j->check;
     sdm_json_open(json, "check", '{');
@@ -269,9 +276,8 @@ static void report_check(const job *j, sdm_json *json)
     sdm_json_close(json, '}');
 }
 
-static sdm_status report(const job *j, sdm_error *err)
+static sdm_status print_json(const job *j, sdm_error *err)
 {
-    if (!j->args->json) return SDM_OK;
     char hash[32];
     snprintf(hash, sizeof hash, "%016llx", (unsigned long long)j->hash);
     sdm_json json = {0};
@@ -283,16 +289,11 @@ static sdm_status report(const job *j, sdm_error *err)
     sdm_json_int(&json, "clamped", (int64_t)j->n_clamped);
     sdm_json_int(&json, "exact", (int64_t)j->n_exact);
     sdm_json_int(&json, "exact_by_error", (int64_t)j->n_exact_error);
-    if (j->shape && (j->args->check || j->args->max_error > 0)) report_check(j, &json);
+    if (j->shape && (j->args->check || j->args->max_error > 0)) add_check_json(j, &json);
     sdm_json_real(&json, "error_rmse_mm", j->info->accuracy.rmse_mm);
     sdm_json_text(&json, "values_crc64", hash);
-    cli_json_grid(&json, "grid", &j->info->grid);
-    if (j->n_rows == 1) {
-        sdm_json_open(&json, "parameters", '{');
-        for (size_t i = 0; i < j->info->n_params; i++)
-            sdm_json_real(&json, j->params[i].name, j->rows[i]);
-        sdm_json_close(&json, '}');
-    }
+    cli_json_grid(&json, "grid", &j->info->grid, false);
+    if (j->n_rows == 1) cli_json_params(&json, "parameters", j->params, j->info->n_params, j->rows);
     sdm_json_close(&json, '}');
     return cli_print_json(&json, err);
 }
@@ -301,7 +302,7 @@ sdm_status cmd_generate(const cli_args *args, sdm_error *err)
 {
     job j = {.args = args};
     cli_progress progress;
-    sdm_status s = prepare(&j, err);
+    sdm_status s = prepare_job(&j, err);
     cli_progress_start(&progress);
     for (size_t i = 0; i < j.n_rows && !s; i++) {
         s = make_row(&j, i, err);
@@ -309,7 +310,7 @@ sdm_status cmd_generate(const cli_args *args, sdm_error *err)
         cli_progress_show(&progress, "generate", (double)(i + 1) / (double)j.n_rows, NULL);
     }
     cli_progress_clear(&progress);
-    if (!s) s = report(&j, err);
+    if (!s && args->json) s = print_json(&j, err);
     job_dispose(&j);
     return s;
 }

@@ -1,31 +1,16 @@
-/* sdmgen help: the texts made from the tables. */
-#include <stdio.h>
-#include <string.h>
-
+/* sdmgen help: prints the help texts, the manual page or the bash completion. */
 #include "args/help.h"
 #include "commands.h"
-
-static sdm_status help_on(const char *name, sdm_text *text, sdm_error *err)
-{
-    const char *names[CLI_N_COMMANDS];
-    for (size_t i = 0; i < CLI_N_COMMANDS; i++) {
-        names[i] = cli_commands[i].name;
-        if (strcmp(name, names[i])) continue;
-        cli_help_command(&cli_commands[i], text);
-        return SDM_OK;
-    }
-    const char *near = sdm_nearest_name(name, names, CLI_N_COMMANDS);
-    if (near)
-        return sdm_fail(err, SDM_E_ARG, "unknown command '%s'; did you mean '%s'?", name, near);
-    return sdm_fail(err, SDM_E_ARG, "unknown command '%s'; see sdmgen --help", name);
-}
+#include "report/terminal.h"
 
 sdm_status cmd_help(const cli_args *args, sdm_error *err)
 {
     sdm_text text = {0};
-    sdm_status s = SDM_OK;
-    if (args->files.n == 1)
-        s = help_on(args->files.items[0], &text, err);
+    const bool one = args->files.n == 1;
+    const cli_command *command = one ? cli_find_command(args->files.items[0], err) : NULL;
+    if (one && !command) return SDM_E_ARG;
+    if (command)
+        cli_help_command(command, &text);
     else if (args->man)
         cli_help_man(&text);
     else if (args->completion)
@@ -34,8 +19,5 @@ sdm_status cmd_help(const cli_args *args, sdm_error *err)
         cli_help_markdown(&text);
     else
         cli_help_all(&text);
-    if (!s && text.failed) s = sdm_fail(err, SDM_E_NOMEM, "out of memory for the help text");
-    if (!s) fputs(text.data, stdout);
-    sdm_text_dispose(&text);
-    return s;
+    return cli_print_text(&text, err);
 }

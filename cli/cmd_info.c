@@ -1,10 +1,11 @@
-/* sdmgen info: what a model, level set, image or mesh file holds. */
+/* sdmgen info: describes the content of a model, level set, image or mesh file. */
 #include <stdio.h>
 #include <string.h>
 
 #include "commands.h"
 #include "inputs/setup.h"
 #include "report/files.h"
+#include "report/json_values.h"
 #include "report/report_audit.h"
 #include "report/report_image.h"
 #include "report/terminal.h"
@@ -20,6 +21,7 @@ static void print_model(const char *path, const sdm_model_info *m)
     printf("grid         %lld x %lld x %lld voxels of %g x %g x %g mm, origin %g %g %g (LPS)\n",
            (long long)g->n[0], (long long)g->n[1], (long long)g->n[2], g->spacing[0], g->spacing[1],
            g->spacing[2], g->origin[0], g->origin[1], g->origin[2]);
+    // parameters and options
     for (size_t i = 0; i < m->n_params; i++)
         printf("%s %-18s %.6g .. %.6g%s%s, default %.6g\n", i ? "            " : "parameters  ",
                m->params[i].name, m->params[i].min, m->params[i].max, *m->params[i].unit ? " " : "",
@@ -27,13 +29,15 @@ static void print_model(const char *path, const sdm_model_info *m)
     for (size_t i = 0; i < m->n_options; i++)
         printf("%s %-18s %s\n", i ? "            " : "options     ", m->option_names[i],
                m->option_values[i]);
-    printf("accuracy     on %lld unseen shapes: MSE %.3g mm^2, RMSE %.5f mm, mean %.5f mm, largest "
-           "%.5f mm\n",
-           (long long)a->samples, a->mse_mm2, a->rmse_mm, a->mae_mm, a->max_abs_mm);
+    printf(
+        "accuracy     on %lld held-out shapes: MSE %.3g mm^2, RMSE %.5f mm, mean %.5f mm, largest "
+        "%.5f mm\n",
+        (long long)a->samples, a->mse_mm2, a->rmse_mm, a->mae_mm, a->max_abs_mm);
     printf("             RMSE within 0.4 mm of the surface %.5f mm\n", a->rmse_near_mm);
-    printf("             RMSE of one map: half below %.5f mm, 90 %% below %.5f mm, 99 %% below "
-           "%.5f mm\n",
-           a->q50_mm, a->q90_mm, a->q99_mm);
+    printf(
+        "             RMSE of single maps: 50 %% below %.5f mm, 90 %% below %.5f mm, 99 %% below "
+        "%.5f mm\n",
+        a->q50_mm, a->q90_mm, a->q99_mm);
     printf("training     %.1f s, %lld exact maps, seed %llu, sdmgen %s\n", m->train_seconds,
            (long long)m->train_samples, (unsigned long long)m->seed, m->version);
     printf("file         %zu bytes, weights %zu bytes, checksum %016llx\n", m->file_bytes,
@@ -66,7 +70,8 @@ static sdm_status json_model(const char *path, const sdm_model_info *m, sdm_erro
     sdm_json_text(&j, "kind", m->kind);
     sdm_json_text(&j, "shape", m->shape);
     sdm_json_text(&j, "version", m->version);
-    cli_json_grid(&j, "grid", &m->grid);
+    cli_json_grid(&j, "grid", &m->grid, false);
+    // parameters and options
     sdm_json_open(&j, "parameters", '[');
     for (size_t i = 0; i < m->n_params; i++) {
         sdm_json_open(&j, NULL, '{');
@@ -82,6 +87,7 @@ static sdm_status json_model(const char *path, const sdm_model_info *m, sdm_erro
     for (size_t i = 0; i < m->n_options; i++)
         sdm_json_text(&j, m->option_names[i], m->option_values[i]);
     sdm_json_close(&j, '}');
+    // accuracy, training and file
     json_accuracy(&j, &m->accuracy);
     sdm_json_uint(&j, "seed", m->seed);
     sdm_json_real(&j, "train_seconds", m->train_seconds);
@@ -172,10 +178,8 @@ static sdm_status info_vdb(const cli_args *args, const char *path, sdm_error *er
 
 sdm_status cmd_info(const cli_args *args, sdm_error *err)
 {
-    static const char *const meshes[] = {".ply", ".stl", ".obj", ".off"};
     const char *path = args->files.items[0];
-    for (size_t i = 0; i < sizeof meshes / sizeof *meshes; i++)
-        if (cli_ends_with(path, meshes[i])) return info_mesh(args, path, err);
+    if (cli_ends_with_any(path, CLI_MESH_ENDINGS)) return info_mesh(args, path, err);
     if (sdm_volume_knows(path)) return info_image(args, path, err);
     return cli_ends_with(path, ".vdb") ? info_vdb(args, path, err) : info_model(args, path, err);
 }

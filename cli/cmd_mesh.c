@@ -1,4 +1,4 @@
-/* sdmgen mesh: the surface mesh of a shape. */
+/* sdmgen mesh: writes the surface mesh of a shape, or audits it. */
 #include <stdio.h>
 
 #include "commands.h"
@@ -7,26 +7,9 @@
 #include "report/output.h"
 #include "report/report_audit.h"
 #include "report/terminal.h"
-#include "sdm/memory.h"
 #include "sdm/meshfile.h"
 
-static sdm_status make_mesh(const cli_args *args, const sdm_registry *registry, sdm_mesh *mesh,
-                            sdm_error *err)
-{
-    sdm_instance *shape = NULL;
-    double *values = NULL;
-    size_t n = 0;
-    sdm_status s = cli_open_shape(registry, args->shape, &args->options, &shape, err);
-    const sdm_param *params = s ? NULL : sdm_instance_params(shape, &n);
-    if (!s) s = SDM_ALLOC(&values, n, "parameters", err);
-    if (!s) s = cli_read_params(params, n, &args->params, values, err);
-    if (!s) s = sdm_instance_mesh(shape, values, mesh, err);
-    sdm_free(values);
-    sdm_instance_free(shape);
-    return s;
-}
-
-static sdm_status report(const cli_args *args, const sdm_mesh *mesh, sdm_error *err)
+static sdm_status report_audit(const cli_args *args, const sdm_mesh *mesh, sdm_error *err)
 {
     sdm_audit audit;
     if (!args->audit && !args->json) return SDM_OK;
@@ -49,18 +32,18 @@ sdm_status cmd_mesh(const cli_args *args, sdm_error *err)
     if (!args->shape) return sdm_fail(err, SDM_E_ARG, "mesh: --shape NAME is needed");
     if (args->outputs.n == 0 && !args->audit && !args->json)
         return sdm_fail(err, SDM_E_ARG, "mesh: an output is needed: -o FILE, or --audit");
-    sdm_registry *registry = NULL;
+    cli_shape shape = {0};
     sdm_mesh mesh = {0};
     sdm_status s = SDM_OK;
     for (size_t i = 0; i < args->outputs.n && !s; i++)
         s = cli_check_type(args->outputs.items[i], true, err);
     if (!s) s = cli_check_files(args, NULL, err);
-    if (!s) s = cli_open_registry(args, &registry, err);
-    if (!s) s = make_mesh(args, registry, &mesh, err);
+    if (!s) s = cli_shape_open(args, args->shape, &args->options, &shape, err);
+    if (!s) s = sdm_instance_mesh(shape.instance, shape.values, &mesh, err);
     for (size_t i = 0; i < args->outputs.n && !s; i++)
         s = sdm_mesh_write(args->outputs.items[i], &mesh, err);
-    if (!s) s = report(args, &mesh, err);
+    if (!s) s = report_audit(args, &mesh, err);
     sdm_mesh_dispose(&mesh);
-    sdm_registry_free(registry);
+    cli_shape_dispose(&shape);
     return s;
 }

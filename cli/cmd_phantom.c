@@ -1,31 +1,25 @@
-/* sdmgen phantom: a test image of a shape, with its labels and the truth. */
+/* sdmgen phantom: makes a test image of a shape, its labels and the truth. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "commands.h"
-#include "inputs/setup.h"
 #include "phantom/phantom_command.h"
 #include "report/files.h"
+#include "report/json_values.h"
 #include "report/terminal.h"
 #include "sdm/image.h"
-#include "sdm/internal/file.h"
+
 #include "sdm/memory.h"
 #include "sdm/volume.h"
 
-static bool is_volume(const char *path)
-{
-    return cli_ends_with(path, ".nii") || cli_ends_with(path, ".nii.gz") ||
-           cli_ends_with(path, ".nrrd") || cli_ends_with(path, ".mha");
-}
-
 /* ---- before any work ---- */
 
-static sdm_status check_type(const char *option, const char *path, bool known, const char *types,
-                             sdm_error *err)
+static sdm_status check_ending(const char *option, const char *path, const char *endings,
+                               sdm_error *err)
 {
-    if (known) return SDM_OK;
-    return sdm_fail(err, SDM_E_ARG, "%s '%s': its name must end in %s", option, path, types);
+    if (!path || cli_ends_with_any(path, endings)) return SDM_OK;
+    return sdm_fail(err, SDM_E_ARG, "%s '%s': its name must end in %s", option, path, endings);
 }
 
 static sdm_status check_files(const cli_args *args, sdm_error *err)
@@ -35,21 +29,17 @@ static sdm_status check_files(const cli_args *args, sdm_error *err)
         return sdm_fail(err, SDM_E_ARG,
                         "phantom: an output is needed: -o FILE, --label, --truth or --json");
     sdm_status s = SDM_OK;
-    for (size_t i = 0; i < args->outputs.n && !s; i++) {
-        const char *path = args->outputs.items[i];
-        s = check_type("output", path, is_volume(path) || cli_ends_with(path, ".npy"),
-                       ".nii .nii.gz .nrrd .mha or .npy", err);
-    }
-    if (!s && label)
-        s = check_type("--label", label, is_volume(label), ".nii .nii.gz .nrrd or .mha", err);
-    if (!s && truth) s = check_type("--truth", truth, cli_ends_with(truth, ".json"), ".json", err);
+    for (size_t i = 0; i < args->outputs.n && !s; i++)
+        s = check_ending("output", args->outputs.items[i], CLI_VOLUME_ENDINGS " .npy", err);
+    if (!s) s = check_ending("--label", label, CLI_VOLUME_ENDINGS, err);
+    if (!s) s = check_ending("--truth", truth, ".json", err);
     return s ? s : cli_check_files(args, NULL, err);
 }
 
-/* ---- after it ---- */
+/* ---- output ---- */
 
-/* Whole numbers in values[n]'s own range; *clipped counts those that do not fit. */
-static void to_int16(const float *values, size_t n, int16_t *out, size_t *clipped)
+/* out[n] = values[n] rounded and clipped to int16; *clipped: the number of clipped values. */
+static void round_to_int16(const float *values, size_t n, int16_t *out, size_t *clipped)
 {
     *clipped = 0;
     for (size_t i = 0; i < n; i++) {
@@ -67,7 +57,7 @@ static sdm_status write_images(const cli_phantom *p, const float *values, const 
     size_t clipped = 0;
     int16_t *rounded = NULL;
     sdm_status s = whole ? SDM_ALLOC(&rounded, sdm_grid_count(&p->grid), "image", err) : SDM_OK;
-    if (!s && whole) to_int16(values, sdm_grid_count(&p->grid), rounded, &clipped);
+    if (!s && whole) round_to_int16(values, sdm_grid_count(&p->grid), rounded, &clipped);
     if (clipped)
         cli_notice("%zu values do not fit in int16 and were clipped; --type float32 keeps them",
                    clipped);
@@ -84,28 +74,19 @@ static sdm_status write_images(const cli_phantom *p, const float *values, const 
     return s;
 }
 
-static sdm_status write_text(const char *path, const char *text, sdm_error *err)
-{
-    sdm_outfile *file = NULL;
-    sdm_status s = sdm_outfile_open(path, &file, err);
-    if (!s) s = sdm_outfile_printf(file, err, "%s\n", text);
-    if (!s) return sdm_outfile_commit(&file, err);
-    sdm_outfile_discard(&file);
-    return s;
-}
-
+/* Writes the truth to the file of --truth and, with --json, to stdout. */
 static sdm_status write_truth(const cli_phantom *p, size_t inside, sdm_error *err)
 {
+    const char *path = p->args->phantom.truth;
     sdm_json json = {0};
     cli_phantom_truth(p, inside, &json);
-    sdm_status s = json.text.failed ? sdm_fail(err, SDM_E_NOMEM, "the truth: no memory") : SDM_OK;
-    if (!s && p->args->phantom.truth) s = write_text(p->args->phantom.truth, json.text.data, err);
+    sdm_status s = path ? cli_json_write(&json, path, err) : SDM_OK;
     if (!s && p->args->json) return cli_print_json(&json, err);
     sdm_json_dispose(&json);
     return s;
 }
 
-static sdm_status make_files(const cli_phantom *p, sdm_error *err)
+static sdm_status make_image(const cli_phantom *p, sdm_error *err)
 {
     const cli_args *args = p->args;
     const size_t n = sdm_grid_count(&p->grid);
@@ -118,10 +99,11 @@ static sdm_status make_files(const cli_phantom *p, sdm_error *err)
     sdm_status s = args->outputs.n ? SDM_ALLOC(&values, n, "image", err) : SDM_OK;
     if (!s) s = SDM_ALLOC(&label, n, "labels", err);
     if (!s)
-        s = sdm_phantom_make(p->shape, p->params, &p->pose, &p->opts, &p->grid, values, label, err);
+        s = sdm_phantom_make(p->shape.instance, p->shape.values, &p->pose, &p->opts, &p->grid,
+                             values, label, err);
     if (!s) s = cli_check_interrupt(err);
     for (size_t i = 0; i < n && !s; i++) inside += label[i];
-    if (!s && !inside) cli_notice("no voxel is inside the shape: is the grid where it is?");
+    if (!s && !inside) cli_notice("no voxel is inside the shape: does the grid cover it?");
     if (!s && p->cut) cli_notice("the shape leaves the field of view");
     if (!s && values) s = write_images(p, values, text, err);
     if (!s && args->phantom.label)
@@ -136,16 +118,9 @@ sdm_status cmd_phantom(const cli_args *args, sdm_error *err)
 {
     if (!args->shape) return sdm_fail(err, SDM_E_ARG, "phantom: --shape NAME is needed");
     cli_phantom p = {.args = args};
-    sdm_registry *registry = NULL;
-    sdm_instance *shape = NULL;
     sdm_status s = check_files(args, err);
-    if (!s) s = cli_open_registry(args, &registry, err);
-    if (!s) s = cli_open_shape(registry, args->shape, &args->options, &shape, err);
-    p.shape = shape;
     if (!s) s = cli_phantom_setup(&p, err);
-    if (!s) s = make_files(&p, err);
-    sdm_free(p.params);
-    sdm_instance_free(shape);
-    sdm_registry_free(registry);
+    if (!s) s = make_image(&p, err);
+    cli_shape_dispose(&p.shape);
     return s;
 }

@@ -1,4 +1,4 @@
-/* sdmgen shapes: the known shapes, their parameters and options. */
+/* sdmgen shapes: lists the known shapes, or the parameters and options of one. */
 #include <stdio.h>
 #include <string.h>
 
@@ -21,34 +21,34 @@ static const char *option_type(const sdm_option *o)
     }
 }
 
-/* Aligned: a column is as wide as its widest cell. Texts are those of the shape, of any length. */
+/* A printed table with aligned columns: each is as wide as its widest cell. */
 enum { COLUMNS = 5 };
 typedef struct cell {
-    const char *text;
+    const char *text; /* a text of the shape, of any length, or `buffer` */
     int length;
-    char own[48]; /* where the text is not one of the shape */
+    char buffer[48]; /* a number or a range */
 } cell;
 typedef struct table {
     cell (*row)[COLUMNS];
     size_t n;
 } table;
 
-static void put(cell *c, const char *text)
+static void cell_set(cell *c, const char *text)
 {
     c->text = text ? text : "";
     c->length = (int)strlen(c->text);
 }
 
-static void put_number(cell *c, double value)
+static void cell_set_number(cell *c, double value)
 {
-    snprintf(c->own, sizeof c->own, "%.6g", value);
-    put(c, c->own);
+    snprintf(c->buffer, sizeof c->buffer, "%.6g", value);
+    cell_set(c, c->buffer);
 }
 
-static void put_range(cell *c, double min, double max)
+static void cell_set_range(cell *c, double min, double max)
 {
-    snprintf(c->own, sizeof c->own, "%.6g .. %.6g", min, max);
-    put(c, c->own);
+    snprintf(c->buffer, sizeof c->buffer, "%.6g .. %.6g", min, max);
+    cell_set(c, c->buffer);
 }
 
 static sdm_status table_start(table *t, size_t n_rows, sdm_error *err)
@@ -56,10 +56,11 @@ static sdm_status table_start(table *t, size_t n_rows, sdm_error *err)
     static const char *const titles[COLUMNS] = {"name", "unit", "range", "default", "meaning"};
     t->n = 1;
     const sdm_status s = sdm_alloc((void **)&t->row, n_rows + 1, sizeof *t->row, "table", err);
-    for (size_t k = 0; k < COLUMNS && !s; k++) put(&t->row[0][k], titles[k]);
+    for (size_t k = 0; k < COLUMNS && !s; k++) cell_set(&t->row[0][k], titles[k]);
     return s;
 }
 
+/* Prints the table and frees it. */
 static void table_print(table *t, const char *title)
 {
     int width[COLUMNS] = {0};
@@ -83,11 +84,11 @@ static sdm_status print_params(const sdm_param *params, size_t n, sdm_error *err
     for (size_t i = 0; i < n; i++) {
         const sdm_param *p = &params[i];
         cell *row = t.row[t.n++];
-        put(&row[0], p->name);
-        put(&row[1], p->unit);
-        put_range(&row[2], p->min, p->max);
-        put_number(&row[3], p->def);
-        put(&row[4], p->help);
+        cell_set(&row[0], p->name);
+        cell_set(&row[1], p->unit);
+        cell_set_range(&row[2], p->min, p->max);
+        cell_set_number(&row[3], p->def);
+        cell_set(&row[4], p->help);
     }
     table_print(&t, "parameters");
     return SDM_OK;
@@ -101,20 +102,20 @@ static sdm_status print_options(const sdm_shape *shape, sdm_error *err)
     for (uint32_t i = 0; i < shape->n_options; i++) {
         const sdm_option *o = &shape->options[i];
         cell *row = t.row[t.n++];
-        put(&row[0], o->name);
-        put(&row[1], o->unit);
-        put(&row[3], "");
+        cell_set(&row[0], o->name);
+        cell_set(&row[1], o->unit);
+        cell_set(&row[3], "");
         if (o->type == SDM_OPTION_REAL || o->type == SDM_OPTION_INT) {
-            put_range(&row[2], o->min, o->max);
-            put_number(&row[3], o->def);
+            cell_set_range(&row[2], o->min, o->max);
+            cell_set_number(&row[3], o->def);
         } else if (o->type == SDM_OPTION_CHOICE) {
-            put(&row[2], o->choices);
-            put(&row[3], o->choices);
-            row[3].length = (int)strcspn(o->choices, "|"); // the first is the default
+            cell_set(&row[2], o->choices);
+            cell_set(&row[3], o->choices);
+            row[3].length = (int)strcspn(o->choices, "|"); // the first choice is the default
         } else {
-            put(&row[2], "file");
+            cell_set(&row[2], "file");
         }
-        put(&row[4], o->help);
+        cell_set(&row[4], o->help);
     }
     table_print(&t, "options");
     return SDM_OK;
@@ -157,20 +158,22 @@ static void json_options(sdm_json *j, const sdm_shape *shape)
     sdm_json_close(j, ']');
 }
 
-/* The parameters of the table, or, for a shape whose parameters depend on its options, of the
- * instance that -O makes. */
-static sdm_status show_one(const cli_args *args, const sdm_registry *registry, sdm_error *err)
+/* Prints the parameters and options of one shape. With -O the parameters are those of an instance
+ * with these options: the parameters of some shapes depend on them. */
+static sdm_status print_shape(const cli_args *args, const sdm_registry *registry, sdm_error *err)
 {
+    // the shape
     const char *name = args->files.items[0];
     const sdm_shape *shape = cli_find_shape(registry, name, err);
     if (!shape) return SDM_E_ARG;
     sdm_instance *instance = NULL;
     if (args->options.n > 0) {
-        const sdm_status s = cli_open_shape(registry, name, &args->options, &instance, err);
+        const sdm_status s = cli_create_shape(registry, name, &args->options, &instance, err);
         if (s) return s;
     }
     size_t n = shape->n_params;
     const sdm_param *params = instance ? sdm_instance_params(instance, &n) : shape->params;
+    // print it
     sdm_status s = SDM_OK;
     if (args->json) {
         sdm_json json = {0};
@@ -185,14 +188,14 @@ static sdm_status show_one(const cli_args *args, const sdm_registry *registry, s
         printf("%s - %s\n", shape->name, shape->summary ? shape->summary : "");
         s = print_params(params, n, err);
         if (!s && !instance && shape->describe)
-            printf("\nits parameters depend on its options: give these with -O\n");
+            printf("\nits parameters depend on its options: set them with -O\n");
         if (!s) s = print_options(shape, err);
     }
     sdm_instance_free(instance);
     return s;
 }
 
-static sdm_status list_all(const cli_args *args, const sdm_registry *registry, sdm_error *err)
+static sdm_status print_list(const cli_args *args, const sdm_registry *registry, sdm_error *err)
 {
     const size_t n = sdm_registry_count(registry);
     if (!args->json) {
@@ -225,7 +228,8 @@ sdm_status cmd_shapes(const cli_args *args, sdm_error *err)
         return sdm_fail(err, SDM_E_ARG, "shapes: -O needs the NAME of a shape");
     sdm_registry *registry = NULL;
     sdm_status s = cli_open_registry(args, &registry, err);
-    if (!s) s = args->files.n > 0 ? show_one(args, registry, err) : list_all(args, registry, err);
+    if (!s)
+        s = args->files.n > 0 ? print_shape(args, registry, err) : print_list(args, registry, err);
     sdm_registry_free(registry);
     return s;
 }

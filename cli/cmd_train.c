@@ -1,4 +1,4 @@
-/* sdmgen train: from a configuration to a run folder with a trained model. */
+/* sdmgen train: trains the network of a configuration and writes a run folder with the model. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -12,13 +12,14 @@
 #include "report/train_progress.h"
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"
+#include "sdm/picture.h"
 #include "study/evaluate.h"
 
-/* A finished model or a checkpoint is never overwritten by mistake. */
+/* Refuses a folder with a model or a checkpoint, unless --resume or --force is given. */
 static sdm_status check_folder(const cli_args *args, const char *folder, sdm_error *err)
 {
     static const struct {
-        const char *name, *what;
+        const char *name, *content;
     } files[] = {{"model.sdm", "a trained model"},
                  {"checkpoint.sdmc", "the checkpoint of a training"}};
     if (args->resume && args->force)
@@ -32,18 +33,17 @@ static sdm_status check_folder(const cli_args *args, const char *folder, sdm_err
     if (args->force || (!there[0] && !there[1])) return SDM_OK;
     if (!there[1])
         return sdm_fail(err, SDM_E_ARG,
-                        "%s holds %s and no checkpoint to go on from: start anew with --force, or "
-                        "choose --out DIR",
-                        folder, files[0].what);
+                        "%s holds %s and no checkpoint to continue from: start again with --force, "
+                        "or choose --out DIR",
+                        folder, files[0].content);
     if (args->resume) return SDM_OK;
     return sdm_fail(
         err, SDM_E_ARG,
-        "%s holds %s: go on with --resume, start anew with --force, or choose --out DIR", folder,
-        files[there[0] ? 0 : 1].what);
+        "%s holds %s: continue with --resume, start again with --force, or choose --out DIR",
+        folder, files[there[0] ? 0 : 1].content);
 }
 
-/* Slices exact | network | error at the shape's default parameters, as far as the model was trained
- * on them. */
+/* Draws slices exact | network | error at the default parameters of the model. */
 static sdm_status write_picture(const sdm_train_report *report, const sdm_instance *shape,
                                 const char *folder, sdm_error *err)
 {
@@ -63,6 +63,7 @@ static sdm_status write_picture(const sdm_train_report *report, const sdm_instan
 static sdm_status print_summary(const cli_args *args, const sdm_train_report *r, sdm_error *err)
 {
     const sdm_accuracy *a = &r->accuracy;
+    // as JSON
     if (args->json) {
         sdm_json j = {0};
         sdm_json_open(&j, NULL, '{');
@@ -79,6 +80,7 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
         sdm_json_close(&j, '}');
         return cli_print_json(&j, err);
     }
+    // as text
     char steps[32], maps[32];
     printf("%s\n", r->model_path);
     printf("  trained     %.1f s, %s steps, %s exact maps\n", r->seconds,
@@ -90,8 +92,8 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
     return SDM_OK;
 }
 
-/* A new shape's mistakes show in its mesh: said before hours are spent on it. A mesh that fails is
- * left to the training. */
+/* Reports defects of the mesh at the default parameters before a long training starts. If the mesh
+ * cannot be made, the training reports the error. */
 static void notice_mesh(const sdm_instance *shape)
 {
     double p[SDM_MAX_PARAMS];
@@ -102,14 +104,14 @@ static void notice_mesh(const sdm_instance *shape)
     sdm_audit audit;
     if (n <= SDM_MAX_PARAMS && !sdm_instance_mesh(shape, p, &mesh, NULL) &&
         !sdm_mesh_audit(&mesh, &audit, NULL)) {
-        if (audit.inverted) cli_notice("the mesh is inside out and is turned");
+        if (audit.inverted) cli_notice("the mesh is inside out; its orientation will be reversed");
         cli_notice_audit(&audit);
     }
     sdm_mesh_dispose(&mesh);
 }
 
-static sdm_status train(const cli_args *args, const sdm_config *config, const sdm_instance *shape,
-                        sdm_error *err)
+static sdm_status train_network(const cli_args *args, const sdm_config *config,
+                                const sdm_instance *shape, sdm_error *err)
 {
     const char *folder = config->output.folder;
     cli_progress progress;
@@ -121,7 +123,9 @@ static sdm_status train(const cli_args *args, const sdm_config *config, const sd
     cli_progress_clear(&progress);
     if (s) return s;
     sdm_error picture = {0};
-    if (write_picture(&report, shape, folder, &picture)) cli_notice("%s", picture.text);
+    // without SDM_PICTURE, the notice about loss.png says enough
+    if (!sdm_picture_check("slices.png", NULL) && write_picture(&report, shape, folder, &picture))
+        cli_notice("%s", picture.text);
     return print_summary(args, &report, err);
 }
 
@@ -137,7 +141,7 @@ sdm_status cmd_train(const cli_args *args, sdm_error *err)
     if (!s) s = check_folder(args, config->output.folder, err);
     if (!s) s = cli_open_registry(args, &registry, err);
     if (!s) s = cli_config_shape(config, registry, &shape, err);
-    if (!s) s = train(args, config, shape, err);
+    if (!s) s = train_network(args, config, shape, err);
     sdm_instance_free(shape);
     sdm_registry_free(registry);
     sdm_free(config);

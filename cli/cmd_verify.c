@@ -1,4 +1,5 @@
-/* sdmgen verify: is a model, level set or image file whole, and as accurate as it says? */
+/* sdmgen verify: checks that a model, level set or image file is complete, and that a model is as
+ * accurate as it states. */
 #include <stdio.h>
 #include <string.h>
 
@@ -12,7 +13,8 @@
 #include "study/evaluate.h"
 
 enum { DEFAULT_SAMPLES = 20 };
-#define TOLERANCE 1.25 /* measured RMSE over stated RMSE: room for another draw of shapes */
+/* Largest ratio of measured to stated RMSE: the random shapes differ. */
+#define TOLERANCE 1.25
 
 static sdm_status verify_vdb(const cli_args *args, const char *path, sdm_error *err)
 {
@@ -41,8 +43,8 @@ static sdm_status verify_vdb(const cli_args *args, const char *path, sdm_error *
 #endif
 }
 
-/* An image has no hash of ours: all that can be said is whether it reads, and whether gzip or zlib
- * would have noticed a change. */
+/* Image files hold no hash of the values: only the structure is checked, and the checksum of gzip
+ * or zlib where the voxels are compressed. */
 static sdm_status verify_image(const cli_args *args, const char *path, sdm_error *err)
 {
     sdm_volume v = {0};
@@ -57,10 +59,10 @@ static sdm_status verify_image(const cli_args *args, const char *path, sdm_error
         sdm_json_close(&j, '}');
         s = cli_print_json(&j, err);
     } else if (!s) {
-        printf("%s: whole: %lld x %lld x %lld %s voxels, %s\n", path, (long long)v.grid.n[0],
+        printf("%s: complete: %lld x %lld x %lld %s voxels, %s\n", path, (long long)v.grid.n[0],
                (long long)v.grid.n[1], (long long)v.grid.n[2], sdm_voxel_name(v.stored),
                v.checked ? "the checksum of the compressed data is right"
-                         : "without a checksum: a changed voxel would go unnoticed");
+                         : "no checksum: changed voxels cannot be detected");
         if (v.n_nan > 0 || v.n_inf > 0)
             printf("%zu values are NaN, %zu infinite\n", v.n_nan, v.n_inf);
     }
@@ -68,8 +70,8 @@ static sdm_status verify_image(const cli_args *args, const char *path, sdm_error
     return s;
 }
 
-static sdm_status report(const cli_args *args, const char *path, const sdm_model_info *info,
-                         const cli_eval *e, sdm_error *err)
+static sdm_status report_model(const cli_args *args, const char *path, const sdm_model_info *info,
+                               const cli_eval *e, sdm_error *err)
 {
     const double stated = info->accuracy.rmse_mm;
     const bool good = e->n == 0 || e->rmse_mm <= TOLERANCE * stated;
@@ -104,7 +106,7 @@ static sdm_status verify_model(const cli_args *args, const char *path, sdm_error
     sdm_model *model = NULL;
     cli_eval e = {0};
     sdm_status s = cli_open_registry(args, &registry, err);
-    if (!s) s = cli_open_model(path, &model, err); /* checks every checksum */
+    if (!s) s = cli_open_model(path, &model, err); // verifies every checksum
     const sdm_model_info *info = s ? NULL : sdm_model_get_info(model);
     const bool known = !s && sdm_registry_find(registry, info->shape, NULL);
     if (!s && known) s = sdm_runtime_instance(model, registry, &shape, err);
@@ -113,10 +115,9 @@ static sdm_status verify_model(const cli_args *args, const char *path, sdm_error
                          args->samples < 0 ? DEFAULT_SAMPLES : (size_t)args->samples, false, &e,
                          err);
     if (!s && !known)
-        cli_notice(
-            "shape '%s' is not known here (--plugin FILE loads it): the accuracy was not measured",
-            info->shape);
-    if (!s) s = report(args, path, info, &e, err);
+        cli_notice("shape '%s' is unknown (--plugin FILE loads it): the accuracy was not measured",
+                   info->shape);
+    if (!s) s = report_model(args, path, info, &e, err);
     cli_eval_dispose(&e);
     sdm_model_free(model);
     sdm_instance_free(shape);

@@ -1,5 +1,5 @@
-/* The commands of sdmgen, one file each. Each writes results to stdout, notices to stderr, and
-   leaves the message of a failure in *err; the exit code follows from the status. */
+/* The commands of sdmgen, one file each. A command writes results to stdout and notices to stderr.
+   On failure it returns a status, which determines the exit code, and its message in *err. */
 #ifndef CLI_COMMANDS_H
 #define CLI_COMMANDS_H
 

@@ -1,4 +1,4 @@
-/* sdmgen: reads the command line, runs one command, turns its status into an exit code. */
+/* sdmgen: parses the command line, runs one command and turns its status into an exit code. */
 #include <stdio.h>
 #include <string.h>
 #ifdef __GLIBC__
@@ -12,19 +12,34 @@
 #include "commands.h"
 #include "report/terminal.h"
 
+static sdm_status (*const functions[CLI_N_COMMANDS])(const cli_args *args, sdm_error *err) = {
+    [CLI_TRAIN] = cmd_train,
+    [CLI_GENERATE] = cmd_generate,
+    [CLI_EXACT] = cmd_exact,
+    [CLI_MESH] = cmd_mesh,
+    [CLI_EVAL] = cmd_eval,
+    [CLI_SHAPES] = cmd_shapes,
+    [CLI_INFO] = cmd_info,
+    [CLI_VERIFY] = cmd_verify,
+    [CLI_CONFIG] = cmd_config,
+    [CLI_BENCH] = cmd_bench,
+    [CLI_EXPERIMENT] = cmd_experiment,
+    [CLI_PHANTOM] = cmd_phantom,
+    [CLI_FIT] = cmd_fit,
+    [CLI_HELP] = cmd_help};
+
 static int print_help(const cli_command *command)
 {
     sdm_text text = {0};
+    sdm_error err = {0};
     if (command)
         cli_help_command(command, &text);
     else
         cli_help_all(&text);
-    if (text.data) fputs(text.data, stdout);
-    sdm_text_dispose(&text);
-    return CLI_EXIT_DONE;
+    return cli_print_text(&text, &err) ? cli_report(&err) : CLI_EXIT_DONE;
 }
 
-/* A result that could not be written out is no result. */
+/* Turns success into failure when stdout cannot be written, for example to a full disk. */
 static int flush_results(int code)
 {
     if (fflush(stdout) == 0 && !ferror(stdout)) return code;
@@ -40,15 +55,15 @@ static int run_command(const cli_args *args)
 #endif
     cli_catch_interrupts();
     sdm_error err = {0};
-    const sdm_status s = args->command->run(args, &err);
+    const sdm_status s = functions[args->command - cli_commands](args, &err);
     if (!s) return CLI_EXIT_DONE;
     err.status = s;
     fflush(stdout);
     return cli_report(&err);
 }
 
-/* Keeps freed memory for the next map: asking the system for every page anew costs a third of
- * preparing a small mesh. */
+/* Makes malloc() keep freed memory for the next map: getting every page from the system again costs
+ * a third of the time that a small mesh takes to prepare. */
 static void keep_memory(void)
 {
 #ifdef __GLIBC__

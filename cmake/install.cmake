@@ -1,14 +1,16 @@
-# What is installed: three shared libraries (libsdmgen: libc, libm and OpenMP alone; libsdmgen_image: zlib; libsdmgen_vdb: OpenVDB),
-# the public headers, a CMake package, pkg-config files, configs, documentation.
+# Installs four shared libraries (libsdmgen: libc, libm and OpenMP alone; libsdmgen_image: zlib; libsdmgen_picture: cairo;
+# libsdmgen_vdb: OpenVDB), the public headers, a CMake package, pkg-config files, configs and documentation.
 include(CMakePackageConfigHelpers)
 
-# sdm_library(NAME LANGUAGE PARTS ... LINK ...): target sdmgen_NAME, libsdmgen_NAME.so made of the object files of the parts
+# sdm_library(TARGET LANGUAGE OUTPUT NAME EXPORT NAME PARTS ... LINK ...): shared library
+# libOUTPUT.so from the object files of the parts, exported as sdmgen::EXPORT
 function(sdm_library target language)
   cmake_parse_arguments(LIB "" "OUTPUT;EXPORT" "PARTS;LINK" ${ARGN})
   list(TRANSFORM LIB_PARTS REPLACE "(.+)" "$<TARGET_OBJECTS:\\1>" OUTPUT_VARIABLE objects)
   add_library(${target} SHARED ${objects})
-  set_target_properties(${target} PROPERTIES OUTPUT_NAME ${LIB_OUTPUT} EXPORT_NAME ${LIB_EXPORT} LINKER_LANGUAGE ${language}
-    VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR} INSTALL_RPATH "$ORIGIN")
+  set_target_properties(${target} PROPERTIES OUTPUT_NAME ${LIB_OUTPUT} EXPORT_NAME ${LIB_EXPORT}
+    LINKER_LANGUAGE ${language} VERSION ${PROJECT_VERSION}
+    SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR} INSTALL_RPATH "$ORIGIN")
   target_include_directories(${target} INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_link_libraries(${target} PRIVATE sdm_flags ${LIB_LINK})
   if(NOT SDM_SANITIZE)
@@ -19,75 +21,98 @@ endfunction()
 
 set(parts sdm_core sdm_geom sdm_nn sdm_io sdm_shape sdm_shapes sdm_runtime)
 if(SDM_SHARED)
-  sdm_library(sdmgen_shared C OUTPUT sdmgen EXPORT sdmgen PARTS ${parts} LINK ${SDM_LIBM} ${CMAKE_DL_LIBS} ${SDM_THREADS})
+  sdm_library(sdmgen_shared C OUTPUT sdmgen EXPORT sdmgen PARTS ${parts} LINK ${SDM_LIBM}
+    ${CMAKE_DL_LIBS} ${SDM_THREADS})
 endif()
 if(TARGET sdm_image)
-  sdm_library(sdmgen_image C OUTPUT sdmgen_image EXPORT image PARTS sdm_image LINK sdmgen_shared ZLIB::ZLIB ${SDM_LIBM})
+  sdm_library(sdmgen_image C OUTPUT sdmgen_image EXPORT image PARTS sdm_image LINK sdmgen_shared
+    ZLIB::ZLIB ${SDM_LIBM})
   target_link_libraries(sdmgen_image INTERFACE sdmgen_shared)
 endif()
+if(SDM_PICTURE)
+  sdm_library(sdmgen_picture C OUTPUT sdmgen_picture EXPORT picture PARTS sdm_picture LINK sdmgen_shared PkgConfig::CAIRO ${SDM_LIBM})
+  target_link_libraries(sdmgen_picture INTERFACE sdmgen_shared)
+endif()
 if(SDM_VDB)
-  sdm_library(sdmgen_vdb CXX OUTPUT sdmgen_vdb EXPORT vdb PARTS sdm_vdb LINK sdmgen_shared OpenVDB::openvdb)
+  sdm_library(sdmgen_vdb CXX OUTPUT sdmgen_vdb EXPORT vdb PARTS sdm_vdb LINK sdmgen_shared
+    OpenVDB::openvdb)
   target_link_libraries(sdmgen_vdb INTERFACE sdmgen_shared)
 endif()
 
-# the same code for linking into one program
+# the same object files as a static library
 if(SDM_STATIC)
   list(TRANSFORM parts REPLACE "(.+)" "$<TARGET_OBJECTS:\\1>" OUTPUT_VARIABLE objects)
   add_library(sdmgen_static STATIC ${objects})
-  set_target_properties(sdmgen_static PROPERTIES OUTPUT_NAME sdmgen EXPORT_NAME static LINKER_LANGUAGE C)
-  target_include_directories(sdmgen_static INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-  target_link_libraries(sdmgen_static INTERFACE m ${CMAKE_DL_LIBS} ${SDM_THREADS} $<$<BOOL:${SDM_OPENMP}>:OpenMP::OpenMP_C>)
+  set_target_properties(sdmgen_static PROPERTIES OUTPUT_NAME sdmgen EXPORT_NAME static
+    LINKER_LANGUAGE C)
+  target_include_directories(sdmgen_static
+    INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_link_libraries(sdmgen_static INTERFACE m ${CMAKE_DL_LIBS} ${SDM_THREADS}
+    $<$<BOOL:${SDM_OPENMP}>:OpenMP::OpenMP_C>)
   if(CMAKE_SYSTEM_PROCESSOR STREQUAL wasm32)
-    # the linker's stack of 64 KiB is too small for the blocks of the matrix product; placed first, an overflow traps
+    # the linker's default stack of 64 KiB is too small for the blocks of the matrix product; with
+    # the stack first in memory an overflow traps
     target_link_options(sdmgen_static INTERFACE LINKER:-z,stack-size=1048576 LINKER:--stack-first)
     target_link_libraries(sdmgen_static INTERFACE wasi-emulated-getpid)
   endif()
   install(TARGETS sdmgen_static EXPORT sdmgenTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 endif()
 
-# a plug-in needs a header and nothing to link
+# plug-ins need only a header, no library
 add_library(sdmgen_plugin INTERFACE)
 set_target_properties(sdmgen_plugin PROPERTIES EXPORT_NAME plugin)
 target_include_directories(sdmgen_plugin INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 target_compile_features(sdmgen_plugin INTERFACE c_std_11)
 install(TARGETS sdmgen_plugin EXPORT sdmgenTargets)
 
-# headers of what the libraries hold: not of the configuration and the trainer, which belong to the program
+# headers for users; those in internal/ are between the parts of the project
 foreach(folder framework runtime shapes)
   if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/include/sdm)
-    install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/include/sdm DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h"
-            PATTERN config.h EXCLUDE PATTERN experiment.h EXCLUDE PATTERN vdb.h EXCLUDE)
+    install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/include/sdm
+      DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h"
+      PATTERN internal EXCLUDE PATTERN vdb.h EXCLUDE)
   endif()
 endforeach()
 if(SDM_VDB)
-  install(FILES ${PROJECT_SOURCE_DIR}/runtime/include/sdm/vdb.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sdm)
+  install(FILES ${PROJECT_SOURCE_DIR}/runtime/include/sdm/vdb.h
+    DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sdm)
 endif()
 
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/sdmgen)
 install(EXPORT sdmgenTargets NAMESPACE sdmgen:: DESTINATION ${package})
-configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/sdmgenConfig.cmake.in ${PROJECT_BINARY_DIR}/sdmgenConfig.cmake
+configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/sdmgenConfig.cmake.in
+  ${PROJECT_BINARY_DIR}/sdmgenConfig.cmake
   INSTALL_DESTINATION ${package} NO_SET_AND_CHECK_MACRO)
-write_basic_package_version_file(${PROJECT_BINARY_DIR}/sdmgenConfigVersion.cmake COMPATIBILITY SameMinorVersion)
-install(FILES ${PROJECT_BINARY_DIR}/sdmgenConfig.cmake ${PROJECT_BINARY_DIR}/sdmgenConfigVersion.cmake DESTINATION ${package})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/sdmgenConfigVersion.cmake
+  COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/sdmgenConfig.cmake
+  ${PROJECT_BINARY_DIR}/sdmgenConfigVersion.cmake DESTINATION ${package})
 
-# sdm_pkgconfig(NAME LIBRARY DESCRIPTION REQUIRES): one pkg-config file a library
+# sdm_pkgconfig(NAME LIBRARY DESCRIPTION REQUIRES): writes and installs one pkg-config file
 cmake_path(SET pkgconfig_folder NORMALIZE "/${CMAKE_INSTALL_LIBDIR}/pkgconfig")
 cmake_path(RELATIVE_PATH pkgconfig_folder BASE_DIRECTORY "/" OUTPUT_VARIABLE pkgconfig_folder)
 file(RELATIVE_PATH SDM_PC_UP "/${pkgconfig_folder}" "/")
 string(REGEX REPLACE "/$" "" SDM_PC_UP "${SDM_PC_UP}")
 function(sdm_pkgconfig SDM_PC_NAME SDM_PC_LIBRARY SDM_PC_DESCRIPTION SDM_PC_REQUIRES)
-  configure_file(${PROJECT_SOURCE_DIR}/cmake/sdmgen.pc.in ${PROJECT_BINARY_DIR}/${SDM_PC_NAME}.pc @ONLY)
-  install(FILES ${PROJECT_BINARY_DIR}/${SDM_PC_NAME}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/sdmgen.pc.in ${PROJECT_BINARY_DIR}/${SDM_PC_NAME}.pc
+    @ONLY)
+  install(FILES ${PROJECT_BINARY_DIR}/${SDM_PC_NAME}.pc
+    DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 endfunction()
 sdm_pkgconfig(sdmgen sdmgen "${PROJECT_DESCRIPTION}" "")
 if(TARGET sdmgen_image)
-  sdm_pkgconfig(sdmgen-image sdmgen_image "Images and pictures of signed distance maps" sdmgen)
+  sdm_pkgconfig(sdmgen-image sdmgen_image "Image files of signed distance maps" sdmgen)
+endif()
+if(SDM_PICTURE)
+  sdm_pkgconfig(sdmgen-picture sdmgen_picture "Pictures of signed distance maps" sdmgen)
 endif()
 if(SDM_VDB)
   sdm_pkgconfig(sdmgen-vdb sdmgen_vdb "OpenVDB level sets from signed distance maps" sdmgen)
 endif()
 
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/configs ${PROJECT_SOURCE_DIR}/examples DESTINATION ${CMAKE_INSTALL_DATADIR}/sdmgen OPTIONAL)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/configs ${PROJECT_SOURCE_DIR}/examples
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/sdmgen OPTIONAL)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs DESTINATION ${CMAKE_INSTALL_DOCDIR} OPTIONAL)
-install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md
+  ${PROJECT_SOURCE_DIR}/CHANGELOG.md
         DESTINATION ${CMAKE_INSTALL_DOCDIR} OPTIONAL)

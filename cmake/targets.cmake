@@ -1,4 +1,5 @@
-# How a part of the project becomes a library: sdm_part(NAME SOURCES ... LINK ...).
+# Compiler flags of all targets, and sdm_part(NAME SOURCES ... LINK ... INCLUDE ...): a static
+# library from one part of the project.
 set(SDM_WARNINGS -Wall -Wextra -Wpedantic -Wshadow -Wvla -Wwrite-strings
     $<$<COMPILE_LANGUAGE:C>:-Wconversion -Wstrict-prototypes -Wmissing-prototypes>)
 if(SDM_WERROR)
@@ -6,17 +7,20 @@ if(SDM_WERROR)
 endif()
 
 add_library(sdm_flags INTERFACE)
-target_compile_options(sdm_flags INTERFACE ${SDM_WARNINGS} $<$<COMPILE_LANGUAGE:C>:-fno-math-errno -ffp-contract=off>)
+target_compile_options(sdm_flags INTERFACE ${SDM_WARNINGS}
+  $<$<COMPILE_LANGUAGE:C>:-fno-math-errno -ffp-contract=off>)
 target_compile_definitions(sdm_flags INTERFACE _POSIX_C_SOURCE=200809L)
 if(SDM_SANITIZE)
-  target_compile_options(sdm_flags INTERFACE -fsanitize=${SDM_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_compile_options(sdm_flags INTERFACE -fsanitize=${SDM_SANITIZE} -fno-sanitize-recover=all
+    -fno-omit-frame-pointer)
   target_link_options(sdm_flags INTERFACE -fsanitize=${SDM_SANITIZE})
 endif()
 if(SDM_OPENMP)
   target_link_libraries(sdm_flags INTERFACE OpenMP::OpenMP_C)
 else()
-  # what is used in pragmas alone is not used
-  target_compile_options(sdm_flags INTERFACE -Wno-unknown-pragmas -Wno-unused-function -Wno-unused-parameter)
+  # without OpenMP, variables and functions that only pragmas use cause warnings
+  target_compile_options(sdm_flags INTERFACE -Wno-unknown-pragmas -Wno-unused-function
+    -Wno-unused-parameter)
 endif()
 
 function(sdm_part name)

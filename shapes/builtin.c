@@ -1,4 +1,4 @@
-/* The built-in shapes: shapes.def made into declarations, then into a list. */
+/* List of the built-in shapes, generated from shapes.def. */
 #include "sdm/builtin_shapes.h"
 
 #define SHAPE(name) extern const sdm_shape sdm_shape_##name;

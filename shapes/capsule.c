@@ -1,5 +1,5 @@
-/* The capsule: all points within a radius of a segment of the z axis. Vertices lie on the surface.
- */
+/* Capsule: all points within a radius of a segment on the z axis. All vertices lie on the
+ * surface. */
 #include <math.h>
 
 #include "lathe.h"
@@ -17,7 +17,8 @@ static const sdm_option OPTIONS[] = {
      "edge length the mesh aims at, at the default parameters"},
 };
 
-/* Rings of one cap (its pole and the rim not counted), steps of the straight part, sectors. */
+/* Number of rings of one cap (without pole and rim), intervals along the straight part, rings in
+ * total, sectors. */
 typedef struct layout {
     size_t n_cap, n_side, n_rings, n_sectors;
 } layout;
@@ -32,74 +33,76 @@ static layout layout_of(const sdm_option_value *options)
     return l;
 }
 
-/* A ring (or pole: i = -1 or n_rings) is at radius * across from the axis and at radius * up +
- * length * along. */
-typedef struct place {
+/* Position of ring i (-1 and n_rings are the poles): distance from the axis = radius * across, z =
+ * radius * up + length * along. */
+typedef struct ring_place {
     double across, up, along;
-} place;
+} ring_place;
 
-static place place_of(const layout *l, ptrdiff_t i)
+static ring_place ring_place_of(const layout *l, ptrdiff_t i)
 {
     const ptrdiff_t n_cap = (ptrdiff_t)l->n_cap, rim0 = n_cap, rim1 = n_cap + (ptrdiff_t)l->n_side;
-    if (i >= rim0 && i <= rim1) return (place){1, 0, (double)(i - rim0) / (double)l->n_side - 0.5};
-    const ptrdiff_t steps = i < rim0 ? rim0 - i : i - rim1; // from the rim
+    if (i >= rim0 && i <= rim1)
+        return (ring_place){1, 0, (double)(i - rim0) / (double)l->n_side - 0.5};
+    // number of rings between ring i and the rim of its cap
+    const ptrdiff_t steps = i < rim0 ? rim0 - i : i - rim1;
     const double angle = LATHE_PI / 2 * (double)steps / (double)(n_cap + 1);
-    return (place){steps > n_cap ? 0 : cos(angle), i < rim0 ? -sin(angle) : sin(angle),
-                   i < rim0 ? -0.5 : 0.5};
+    return (ring_place){steps > n_cap ? 0 : cos(angle), i < rim0 ? -sin(angle) : sin(angle),
+                        i < rim0 ? -0.5 : 0.5};
 }
 
-static double *put(double *at, double x, double y, double z)
+static double *vertex_write(double *at, double x, double y, double z)
 {
     at[0] = x, at[1] = y, at[2] = z;
     return at + 3;
 }
 
-// vert[n_vert][3] = radius * (across, up) + length * along: linear in the parameters, so this gives
-// the derivatives too
-static void write(const layout *l, double radius, double length, double *vert)
+/* Writes vert[n_vert][3]. Vertices are linear in radius and length, so (1, 0) and (0, 1) give the
+ * derivatives. */
+static void capsule_write(const layout *l, double radius, double length, double *vert)
 {
     const ptrdiff_t n = (ptrdiff_t)l->n_rings;
     for (ptrdiff_t i = -1; i <= n; i++) {
-        const place at = place_of(l, i);
+        const ring_place at = ring_place_of(l, i);
         const double across = radius * at.across, z = radius * at.up + length * at.along;
         if (i < 0 || i == n) {
-            vert = put(vert, 0, 0, z);
+            vert = vertex_write(vert, 0, 0, z);
             continue;
         }
         for (size_t j = 0; j < l->n_sectors; j++) {
             const double angle = sdm_lathe_angle((size_t)i, j, l->n_sectors);
-            vert = put(vert, across * cos(angle), across * sin(angle), z);
+            vert = vertex_write(vert, across * cos(angle), across * sin(angle), z);
         }
     }
 }
 
-static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
-                const double *p, sdm_mesh_out *out)
+static int capsule_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                        const double *p, sdm_mesh_out *out)
 {
     (void)self;
     const layout l = layout_of(options);
     const int failed = host->reserve(host, out, sdm_lathe_n_vert(l.n_rings, l.n_sectors),
                                      sdm_lathe_n_tri(l.n_rings, l.n_sectors));
     if (failed) return failed;
-    write(&l, p[RADIUS], p[LENGTH], out->vert);
+    capsule_write(&l, p[RADIUS], p[LENGTH], out->vert);
     sdm_lathe_triangles(l.n_rings, l.n_sectors, false, out->tri);
     return 0;
 }
 
-static int velocity(const void *self, const sdm_host *host, const sdm_option_value *options,
-                    const double *p, size_t n_vert, double *out)
+static int capsule_velocity(const void *self, const sdm_host *host, const sdm_option_value *options,
+                            const double *p, size_t n_vert, double *out)
 {
     (void)self, (void)p;
     const layout l = layout_of(options);
     if (n_vert != sdm_lathe_n_vert(l.n_rings, l.n_sectors))
-        return host->fail(host, "velocity of another number of vertices");
-    write(&l, 1, 0, out);
-    write(&l, 0, 1, out + 3 * n_vert);
+        return host->fail(host, "velocity: n_vert is not the number of vertices of the mesh");
+    capsule_write(&l, 1, 0, out);
+    capsule_write(&l, 0, 1, out + 3 * n_vert);
     return 0;
 }
 
-static int distance(const void *self, const sdm_host *host, const sdm_option_value *options,
-                    const double *p, const double x[3], double *out)
+static int capsule_distance(const void *self, const sdm_host *host, const sdm_option_value *options,
+                            const double *p, const double x[3], double *out)
 {
     (void)self, (void)host, (void)options;
     *out = hypot(hypot(x[0], x[1]), fmax(fabs(x[2]) - p[LENGTH] / 2, 0)) - p[RADIUS];
@@ -115,7 +118,7 @@ const sdm_shape sdm_shape_capsule = {
     .n_params = N_PARAMS,
     .options = OPTIONS,
     .n_options = 1,
-    .mesh = mesh,
-    .velocity = velocity,
-    .distance = distance,
+    .mesh = capsule_mesh,
+    .velocity = capsule_velocity,
+    .distance = capsule_distance,
 };

@@ -1,34 +1,33 @@
-/* The cochlea: a tube of slowly changing radius about a rising logarithmic spiral.
-
-   A RECONSTRUCTION. The published model names the four parameters and their ranges; its centreline
-   is a logarithmic spiral with a polynomial start and a wave of the basal turn along the modiolus.
-   Rise, wave, tube radius, section and caps are not published in closed form: the formulas here
-   were chosen so that the centreline follows measured cochleae to 0.13 to 0.29 mm.
-
-       r = a exp(-b theta)    z = c theta + alpha exp(-kappa theta) cos(theta - phi)    R = radius -
-   taper theta + flare exp(-theta / flare_angle)
-
-   Turns touch and overlap: the mesh intersects itself on purpose, and the shape is the union of
-   what the tube encloses.
-
-   Rings sit at fixed angles theta with a fixed number of sectors, both chosen from the options at
-   the default parameters, so that every vertex is a smooth function of the parameters. With the
-   default options the mesh has 3,420 triangles; its edges are 0.36 +- 0.10 mm at the default
-   parameters and 0.34 +- 0.11 mm over the parameter ranges. Ring vertices lie ON the tube, its
-   polygons are inscribed: between them the mesh is inside of the tube by up to R (1 - cos(pi /
-   sectors)), 0.015 R, and, along the tube, by edge^2 / 8 times the curvature of its wall (outside
-   on the inner side of the bend). The distance is that of a ball of radius R swept along the
-   centreline: the same surface where R changes slowly (to 4 micrometres without flare), and up to
-   0.013 mm (0.05 mm at a = 2) farther out at the flare.
-
-   Near the apex the tube is wider than the bend of its centreline, and the inner parts of
-   neighbouring sections would run backwards: the mesh would be inside out there, and enclose less
-   than the tube does. Each section is therefore cut off where the centreline's centre of curvature
-   lies. Nothing of the shape is lost by it: a point behind that centre is nearer to another part of
-   the centreline, whose section or cap encloses it.
-
-   With free = anatomy constants that differ between ears are parameters too: for fits to images,
-   where they need not be chosen. */
+/* Cochlea: a tube of slowly changing radius around a rising logarithmic spiral. A RECONSTRUCTION:
+ * the published model gives the four parameters, their ranges, and a centreline that is a
+ * logarithmic spiral with a polynomial start and a longitudinal wave in the basal turn. Rise, wave,
+ * tube radius, cross-section and caps are not published in closed form; the formulas below were
+ * chosen so that the centreline follows measured cochleae to 0.13 .. 0.29 mm.
+ *
+ *     r = a exp(-b theta)    z = c theta + alpha exp(-kappa theta) cos(theta - phi)
+ *     R = radius - taper theta + flare exp(-theta / flare_angle)
+ *
+ * Turns touch and overlap: the mesh intersects itself on purpose, and the shape is the union of the
+ * volumes that the tube encloses. Rings of vertices lie at fixed fractions of the apical angle with
+ * a fixed number of sectors. Both depend only on the options, so every vertex is a smooth function
+ * of the parameters. With the default options the mesh has 3,420 triangles; edges are 0.36 +- 0.10
+ * mm long at the default parameters and 0.34 +- 0.11 mm over the parameter ranges.
+ *
+ * Ring vertices lie ON the tube and its polygons are inscribed: between them the mesh is inside of
+ * the tube by up to R (1 - cos(pi / sectors)) = 0.015 R across the tube, and by edge^2 / 8 times
+ * the curvature of the wall along the tube (outside on the inner side of the bend). The closed-form
+ * distance is that of a ball of radius R swept along the centreline. Its surface agrees with the
+ * tube where R changes slowly (to 4 micrometres without flare) and is up to 0.013 mm (0.05 mm at a
+ * = 2) farther out at the flare.
+ *
+ * Near the apex the tube radius exceeds the radius of curvature of the centreline, so the inner
+ * parts of neighbouring cross-sections would run backwards: the mesh would be inside out there and
+ * enclose less than the tube. Each section is therefore cut off at the centre of curvature. The
+ * shape loses nothing: a point behind that centre is nearer to another part of the centreline,
+ * whose section or cap encloses it.
+ *
+ * With free = anatomy, anatomical constants that vary between ears become parameters, too: for fits
+ * to images. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -39,10 +38,10 @@
 #include "lathe.h"
 #include "sdm/shape.h"
 
-/* The published four; of the anatomy what `free` sets free. The ranges of c, p0 and theta are twice
-   the standard deviation on either side of the defaults: of the height of cochleae (0.4 mm), of
-   their basal diameter (0.4 mm) and of the number of turns (2.2 to 2.9; Erixon, Hogstorp, Wadin and
-   Rask-Andersen 2009). For kappa and theta2 there are no measurements. */
+/* The four published parameters, then the anatomical constants that are parameters with free =
+ * anatomy. The ranges of c, theta and p0 are default +- 2 standard deviations of the height of
+ * cochleae (0.4 mm), the number of turns (2.2 to 2.9) and the basal diameter (0.4 mm; Erixon,
+ * Hogstorp, Wadin and Rask-Andersen 2009). kappa and theta2 have not been measured. */
 static const sdm_param PARAMS[COCHLEA_UNKNOWNS] = {
     [COCHLEA_A] = {"a", "mm", 2.0, 5.0, 4.4,
                    "scale of the radial component: radius of the centreline at theta = 0"},
@@ -112,7 +111,7 @@ static const sdm_option OPTIONS[N_OPTIONS] = {
               "defaults"},
 };
 
-/* The option that tells an unknown of the anatomy. */
+/* Option that sets an anatomical constant; 0: none, for the four published parameters. */
 static const int OPTION_OF[COCHLEA_UNKNOWNS] = {[COCHLEA_C] = RISE,
                                                 [COCHLEA_KAPPA] = KAPPA,
                                                 [COCHLEA_THETA] = THETA,
@@ -122,12 +121,14 @@ static const int OPTION_OF[COCHLEA_UNKNOWNS] = {[COCHLEA_C] = RISE,
 typedef struct cochlea {
     cochlea_model model;
     sdm_param params[COCHLEA_UNKNOWNS];
-    size_t unknown[COCHLEA_UNKNOWNS]; /* [n_params] which of the unknowns a parameter is */
+    /* [n_params] index of each parameter among the COCHLEA_UNKNOWNS */
+    size_t unknown[COCHLEA_UNKNOWNS];
     uint32_t n_params;
-    double constant[COCHLEA_UNKNOWNS]; /* the unknowns where they are no parameters */
+    double constant[COCHLEA_UNKNOWNS]; /* values of the unknowns that are not parameters */
     bool left;
     size_t n_rings, n_sectors;
-    double *direction; /* [2][n_sectors][2]: cosine and sine of the angles of even and odd rings */
+    /* [2][n_sectors][2] cosine and sine of the vertex angles of even and odd rings */
+    double *direction;
     cochlea_ring rings[];
 } cochlea;
 
@@ -142,7 +143,7 @@ static cochlea_model model_of(const sdm_option_value *o)
                            .ratio = o[RATIO].number};
 }
 
-static void default_unknowns(const sdm_option_value *o, double *x)
+static void unknowns_default(const sdm_option_value *o, double *x)
 {
     for (int k = 0; k < COCHLEA_UNKNOWNS; k++)
         x[k] = OPTION_OF[k] ? o[OPTION_OF[k]].number : PARAMS[k].def;
@@ -154,15 +155,14 @@ static void unknowns_at(const cochlea *c, const double *p, double *x)
     for (size_t i = 0; i < c->n_params; i++) x[c->unknown[i]] = p[i];
 }
 
-static bool is_free(const sdm_option_value *o, int unknown)
+static bool unknown_is_free(const sdm_option_value *o, int unknown)
 {
     if (!OPTION_OF[unknown]) return true;
     const bool of_start = unknown == COCHLEA_THETA2 || unknown == COCHLEA_P0;
     return o[FREE].number > 0 && (o[START].number > 0 || !of_start);
 }
 
-// how far the vertices of a ring move per radian, root mean square over the ring, at the default
-// parameters
+/* Root mean square over a ring of abs(d(vertex) / d(theta)), mm/rad, at the default parameters. */
 static double ring_speed(const cochlea_model *m, const double *x, double theta)
 {
     cochlea_section s;
@@ -178,9 +178,9 @@ static double ring_speed(const cochlea_model *m, const double *x, double theta)
 
 #define SAMPLES 1024
 
-// way[i]: length travelled up to the share i / SAMPLES of the apical angle (trapezoidal rule);
-// returns the mean circumference of the sections
-static double measure(const cochlea_model *m, const double *x, double way[SAMPLES + 1])
+/* Arc length of the ring motion (ring_speed) by the trapezoidal rule: way[i] = length from 0 to i /
+ * SAMPLES of the apical angle, mm. Returns the mean circumference of the sections, mm. */
+static double way_measure(const cochlea_model *m, const double *x, double way[SAMPLES + 1])
 {
     const double step = x[COCHLEA_THETA] / SAMPLES;
     double last = ring_speed(m, x, 0), round = 0;
@@ -194,49 +194,51 @@ static double measure(const cochlea_model *m, const double *x, double way[SAMPLE
     return round / way[SAMPLES];
 }
 
-// one cap: rings between pole and tube, from the pole on at the base, towards it at the apex
-static cochlea_ring *cap(size_t n, bool apex, cochlea_ring *r)
+/* Writes the n rings of a cap between pole and tube: from pole to tube at the base, from tube to
+ * pole at the apex. Returns the address after the last one. */
+static cochlea_ring *cap_rings(size_t n, bool apex, cochlea_ring *r)
 {
     for (size_t i = 1; i <= n; i++) {
         const double up = LATHE_PI / 2 * (double)(apex ? i : n + 1 - i) / (double)(n + 1);
         *r++ = (cochlea_ring){
-            .share = apex, .shrink = cos(up), .ahead = (apex ? 1 : -1) * sin(up), .whole = true};
+            .fraction = apex, .shrink = cos(up), .ahead = (apex ? 1 : -1) * sin(up), .whole = true};
     }
     return r;
 }
 
-static void place_rings(cochlea *c, size_t n_base, size_t n_tube, size_t n_apex,
+static void rings_place(cochlea *c, size_t n_base, size_t n_tube, size_t n_apex,
                         const double way[SAMPLES + 1])
 {
-    cochlea_ring *r = cap(n_base, false, c->rings);
+    cochlea_ring *r = cap_rings(n_base, false, c->rings);
     size_t at = 0;
     for (size_t i = 0; i <= n_tube; i++) {
         const double target = way[SAMPLES] * (double)i / (double)n_tube;
         while (at + 1 < SAMPLES && way[at + 1] < target) at++;
         const double part = (target - way[at]) / (way[at + 1] - way[at]);
-        const double share = i == n_tube ? 1 : ((double)at + part) / SAMPLES;
-        *r++ = (cochlea_ring){.share = share, .shrink = 1, .whole = i == 0 || i == n_tube};
+        const double fraction = i == n_tube ? 1 : ((double)at + part) / SAMPLES;
+        *r++ = (cochlea_ring){.fraction = fraction, .shrink = 1, .whole = i == 0 || i == n_tube};
     }
-    cap(n_apex, true, r);
+    cap_rings(n_apex, true, r);
 }
 
-static void choose_params(cochlea *c, const sdm_option_value *options)
+static void params_choose(cochlea *c, const sdm_option_value *options)
 {
     for (int k = 0; k < COCHLEA_UNKNOWNS; k++) {
-        if (!is_free(options, k)) continue;
+        if (!unknown_is_free(options, k)) continue;
         c->params[c->n_params] = PARAMS[k];
         c->params[c->n_params].def = c->constant[k];
         c->unknown[c->n_params++] = (size_t)k;
     }
 }
 
-static int create(const sdm_host *host, const sdm_option_value *options, void **self)
+static int cochlea_create(const sdm_host *host, const sdm_option_value *options, void **self)
 {
+    // values of the unknowns; parameters must lie in their ranges
     const cochlea_model m = model_of(options);
     double x[COCHLEA_UNKNOWNS];
-    default_unknowns(options, x);
+    unknowns_default(options, x);
     for (int k = 0; k < COCHLEA_UNKNOWNS; k++)
-        if (is_free(options, k) && !(x[k] >= PARAMS[k].min && x[k] <= PARAMS[k].max)) {
+        if (unknown_is_free(options, k) && !(x[k] >= PARAMS[k].min && x[k] <= PARAMS[k].max)) {
             char text[160];
             snprintf(text, sizeof text,
                      "%s = %g, but with free = anatomy it is a parameter: need %g to %g",
@@ -244,9 +246,10 @@ static int create(const sdm_host *host, const sdm_option_value *options, void **
             return host->fail(host, text);
         }
 
-    // the largest angle that may come has the thinnest tube
+    // the tube is thinnest at the largest possible angle
     const double end = x[COCHLEA_THETA],
-                 farthest = is_free(options, COCHLEA_THETA) ? PARAMS[COCHLEA_THETA].max : end,
+                 farthest =
+                     unknown_is_free(options, COCHLEA_THETA) ? PARAMS[COCHLEA_THETA].max : end,
                  thin = sdm_cochlea_radius_at(&m, farthest);
     if (!(thin >= 0.02)) {
         char text[160];
@@ -257,10 +260,12 @@ static int create(const sdm_host *host, const sdm_option_value *options, void **
         return host->fail(host, text);
     }
 
-    // counts depend on the options alone; the factors make the mean over the parameter ranges about
-    // `edge`, and triangles a little longer along the tube, where it is less curved
+    // Counts depend only on the options. The factors 1.1 and 1.2 make the mean edge over the
+    // parameter ranges about `edge`, with triangles a little longer along the tube, where the
+    // curvature is lower.
     double way[SAMPLES + 1];
-    const double edge = options[EDGE].number, round = measure(&m, x, way), quarter = LATHE_PI / 2;
+    const double edge = options[EDGE].number, round = way_measure(&m, x, way),
+                 quarter = LATHE_PI / 2;
     const size_t n_sectors = sdm_lathe_pieces(round, 1.1 * edge, 6),
                  n_tube = sdm_lathe_pieces(way[SAMPLES], 1.2 * edge, 8);
     const size_t n_base =
@@ -269,6 +274,7 @@ static int create(const sdm_host *host, const sdm_option_value *options, void **
         sdm_lathe_pieces(quarter * sdm_cochlea_radius_at(&m, end), 1.2 * edge, 2) - 1;
     const size_t n_rings = n_base + n_tube + 1 + n_apex;
 
+    // the instance
     cochlea *c = malloc(sizeof *c + n_rings * sizeof *c->rings);
     double *direction = malloc(4 * n_sectors * sizeof *direction);
     if (!c || !direction) {
@@ -288,24 +294,25 @@ static int create(const sdm_host *host, const sdm_option_value *options, void **
             *direction++ = sin(angle);
         }
     memcpy(c->constant, x, sizeof x);
-    choose_params(c, options);
-    place_rings(c, n_base, n_tube, n_apex, way);
+    params_choose(c, options);
+    rings_place(c, n_base, n_tube, n_apex, way);
     *self = c;
     return 0;
 }
 
-static void destroy(void *self)
+static void cochlea_destroy(void *self)
 {
     cochlea *c = self;
     free(c->direction);
     free(c);
 }
 
-// calls put(user, vertex, position with derivatives) for every vertex, in the order of the lathe
-static void vertices(const cochlea *c, const double *p, cochlea_put *put, void *user)
+/* Calls put() with the number, position and derivatives of every vertex, in the order of
+ * lathe.h. */
+static void vertices_visit(const cochlea *c, const double *p, cochlea_put *put, void *user)
 {
-    const cochlea_ring base = {.share = 0, .ahead = -1, .whole = true},
-                       apex = {.share = 1, .ahead = 1, .whole = true};
+    const cochlea_ring base = {.fraction = 0, .ahead = -1, .whole = true},
+                       apex = {.fraction = 1, .ahead = 1, .whole = true};
     const double none[2] = {0, 0};
     double x[COCHLEA_UNKNOWNS];
     unknowns_at(c, p, x);
@@ -318,28 +325,28 @@ static void vertices(const cochlea *c, const double *p, cochlea_put *put, void *
                         user);
 }
 
-static void put_position(void *user, size_t vertex, const dual at[3])
+static void position_write(void *user, size_t vertex, const dual at[3])
 {
     double *vert = user;
     for (int k = 0; k < 3; k++) vert[3 * vertex + (size_t)k] = at[k].v;
 }
 
-static void describe(const void *self, const sdm_param **params, uint32_t *n_params)
+static void cochlea_describe(const void *self, const sdm_param **params, uint32_t *n_params)
 {
     const cochlea *c = self;
     *params = c->params;
     *n_params = c->n_params;
 }
 
-static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
-                const double *p, sdm_mesh_out *out)
+static int cochlea_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                        const double *p, sdm_mesh_out *out)
 {
     (void)options;
     const cochlea *c = self;
     const int failed = host->reserve(host, out, sdm_lathe_n_vert(c->n_rings, c->n_sectors),
                                      sdm_lathe_n_tri(c->n_rings, c->n_sectors));
     if (failed) return failed;
-    vertices(c, p, put_position, out->vert);
+    vertices_visit(c, p, position_write, out->vert);
     sdm_lathe_triangles(c->n_rings, c->n_sectors, c->left, out->tri);
     return 0;
 }
@@ -350,7 +357,7 @@ typedef struct velocity_out {
     size_t n_vert;
 } velocity_out;
 
-static void put_velocity(void *user, size_t vertex, const dual at[3])
+static void velocity_write(void *user, size_t vertex, const dual at[3])
 {
     const velocity_out *o = user;
     for (size_t i = 0; i < o->shape->n_params; i++)
@@ -358,21 +365,21 @@ static void put_velocity(void *user, size_t vertex, const dual at[3])
             o->velocity[3 * (i * o->n_vert + vertex) + k] = at[k].d[o->shape->unknown[i]];
 }
 
-static int velocity(const void *self, const sdm_host *host, const sdm_option_value *options,
-                    const double *p, size_t n_vert, double *velocity_at)
+static int cochlea_velocity(const void *self, const sdm_host *host, const sdm_option_value *options,
+                            const double *p, size_t n_vert, double *velocity_at)
 {
     (void)options;
     const cochlea *c = self;
     if (n_vert != sdm_lathe_n_vert(c->n_rings, c->n_sectors))
-        return host->fail(host, "velocity of another number of vertices");
+        return host->fail(host, "velocity: n_vert is not the number of vertices of the mesh");
     velocity_out out = {c, velocity_at, n_vert};
-    vertices(c, p, put_velocity, &out);
+    vertices_visit(c, p, velocity_write, &out);
     return 0;
 }
 
-// the ball of the tube's radius swept along the centreline
-static int distance(const void *self, const sdm_host *host, const sdm_option_value *options,
-                    const double *p, const double point[3], double *out)
+/* Signed distance to the ball of the tube's radius swept along the centreline. */
+static int cochlea_distance(const void *self, const sdm_host *host, const sdm_option_value *options,
+                            const double *p, const double point[3], double *out)
 {
     (void)options;
     const cochlea *c = self;
@@ -396,10 +403,10 @@ const sdm_shape sdm_shape_cochlea = {
     .n_params = COCHLEA_C,
     .options = OPTIONS,
     .n_options = N_OPTIONS,
-    .create = create,
-    .destroy = destroy,
-    .describe = describe,
-    .mesh = mesh,
-    .velocity = velocity,
-    .distance = distance,
+    .create = cochlea_create,
+    .destroy = cochlea_destroy,
+    .describe = cochlea_describe,
+    .mesh = cochlea_mesh,
+    .velocity = cochlea_velocity,
+    .distance = cochlea_distance,
 };

@@ -1,4 +1,5 @@
-/* The centreline of the cochlea: a logarithmic spiral that rises, with a wave on the basal turn. */
+/* Centreline of the cochlea (a rising logarithmic spiral with a wave in the basal turn), its frame
+ * and tube radius, with derivatives by dual numbers. */
 #include "cochlea_curve.h"
 
 #include <math.h>
@@ -44,57 +45,57 @@ dual sdm_dual_apply(dual a, double f, double df)
     return a;
 }
 
-static dual root(dual a)
+static dual dual_sqrt(dual a)
 {
     const double r = sqrt(a.v);
     return sdm_dual_apply(a, r, 0.5 / r);
 }
 
-static dual dot(const dual a[3], const dual b[3])
+static dual dual_dot(const dual a[3], const dual b[3])
 {
     return sdm_dual_add(sdm_dual_add(sdm_dual_mul(a[0], b[0]), sdm_dual_mul(a[1], b[1])),
                         sdm_dual_mul(a[2], b[2]));
 }
 
-static dual exponential(dual a)
+static dual dual_exp(dual a)
 {
     const double e = exp(a.v);
     return sdm_dual_apply(a, e, e);
 }
 
-static dual cosine(dual a) { return sdm_dual_apply(a, cos(a.v), -sin(a.v)); }
-static dual sine(dual a) { return sdm_dual_apply(a, sin(a.v), cos(a.v)); }
+static dual dual_cos(dual a) { return sdm_dual_apply(a, cos(a.v), -sin(a.v)); }
+static dual dual_sin(dual a) { return sdm_dual_apply(a, sin(a.v), cos(a.v)); }
 
-static dual unknown(const double *x, int k)
+static dual dual_unknown(const double *x, int k)
 {
     dual u = sdm_dual_of(x[k]);
     u.d[k] = 1;
     return u;
 }
 
-// r, dr/dtheta and its derivative
-static void spiral(const double *x, dual theta, dual r[3])
+/* r[3] = r, dr/dtheta, d2r/dtheta2 of the logarithmic spiral. */
+static void spiral_at(const double *x, dual theta, dual r[3])
 {
-    const dual b = unknown(x, COCHLEA_B);
-    r[0] = sdm_dual_mul(unknown(x, COCHLEA_A),
-                        exponential(sdm_dual_scale(-1, sdm_dual_mul(b, theta))));
+    const dual b = dual_unknown(x, COCHLEA_B);
+    r[0] = sdm_dual_mul(dual_unknown(x, COCHLEA_A),
+                        dual_exp(sdm_dual_scale(-1, sdm_dual_mul(b, theta))));
     r[1] = sdm_dual_scale(-1, sdm_dual_mul(b, r[0]));
     r[2] = sdm_dual_scale(-1, sdm_dual_mul(b, r[1]));
 }
 
-// Taylor's polynomial of the spiral at theta2 up to the second order, and a cubic term that makes
-// r(0) = p0: C2 at theta2
-static void basal_cubic(const double *x, dual theta, dual r[3])
+/* Polynomial start: Taylor polynomial of the spiral at theta2 up to second order plus a cubic term,
+ * so that r(0) = p0 and r is C2 at theta2. r[3] as in spiral_at(). */
+static void cubic_at(const double *x, dual theta, dual r[3])
 {
-    const dual end = unknown(x, COCHLEA_THETA2), end2 = sdm_dual_mul(end, end),
+    const dual end = dual_unknown(x, COCHLEA_THETA2), end2 = sdm_dual_mul(end, end),
                h = sdm_dual_sub(theta, end);
     dual s[3];
-    spiral(x, end, s);
+    spiral_at(x, end, s);
     const dual half = sdm_dual_scale(0.5, s[2]);
     const dual start =
         sdm_dual_add(sdm_dual_sub(s[0], sdm_dual_mul(end, s[1])), sdm_dual_mul(end2, half));
     const dual k =
-        sdm_dual_div(sdm_dual_sub(start, unknown(x, COCHLEA_P0)), sdm_dual_mul(end2, end));
+        sdm_dual_div(sdm_dual_sub(start, dual_unknown(x, COCHLEA_P0)), sdm_dual_mul(end2, end));
     const dual kh = sdm_dual_mul(k, h);
     r[0] = sdm_dual_add(
         s[0], sdm_dual_mul(h, sdm_dual_add(s[1], sdm_dual_mul(h, sdm_dual_add(half, kh)))));
@@ -102,14 +103,14 @@ static void basal_cubic(const double *x, dual theta, dual r[3])
     r[2] = sdm_dual_add(s[2], sdm_dual_scale(6, kh));
 }
 
-// z and its first two derivatives: z = c theta + alpha exp(-kappa theta) cos(theta - phi)
-static void height(const double *x, dual theta, dual z[3])
+/* z[3] = z, dz/dtheta, d2z/dtheta2 for z = c theta + alpha exp(-kappa theta) cos(theta - phi). */
+static void height_at(const double *x, dual theta, dual z[3])
 {
-    const dual rise = unknown(x, COCHLEA_C), k = unknown(x, COCHLEA_KAPPA);
-    const dual turned = sdm_dual_sub(theta, unknown(x, COCHLEA_PHI)), c = cosine(turned),
-               s = sine(turned);
-    const dual decay = exponential(sdm_dual_scale(-1, sdm_dual_mul(k, theta)));
-    const dual wave = sdm_dual_mul(unknown(x, COCHLEA_ALPHA), decay);
+    const dual rise = dual_unknown(x, COCHLEA_C), k = dual_unknown(x, COCHLEA_KAPPA);
+    const dual turned = sdm_dual_sub(theta, dual_unknown(x, COCHLEA_PHI)), c = dual_cos(turned),
+               s = dual_sin(turned);
+    const dual decay = dual_exp(sdm_dual_scale(-1, sdm_dual_mul(k, theta)));
+    const dual wave = sdm_dual_mul(dual_unknown(x, COCHLEA_ALPHA), decay);
     const dual level = sdm_dual_sub(sdm_dual_mul(k, k), sdm_dual_of(1));
     z[0] = sdm_dual_add(sdm_dual_mul(rise, theta), sdm_dual_mul(wave, c));
     z[1] = sdm_dual_sub(rise, sdm_dual_mul(wave, sdm_dual_add(sdm_dual_mul(k, c), s)));
@@ -117,16 +118,17 @@ static void height(const double *x, dual theta, dual z[3])
         wave, sdm_dual_add(sdm_dual_mul(level, c), sdm_dual_scale(2, sdm_dual_mul(k, s))));
 }
 
-// curve[order][3]: position and derivatives with respect to theta
+/* curve[order][3]: position of the centreline, first and second derivative with respect to
+ * theta. */
 static void curve_at(const cochlea_model *m, const double *x, dual theta, dual curve[3][3])
 {
     dual r[3], z[3];
     if (m->cubic && theta.v < x[COCHLEA_THETA2])
-        basal_cubic(x, theta, r);
+        cubic_at(x, theta, r);
     else
-        spiral(x, theta, r);
-    height(x, theta, z);
-    const dual c = cosine(theta), s = sine(theta), level = sdm_dual_sub(r[2], r[0]),
+        spiral_at(x, theta, r);
+    height_at(x, theta, z);
+    const dual c = dual_cos(theta), s = dual_sin(theta), level = sdm_dual_sub(r[2], r[0]),
                twice = sdm_dual_scale(2, r[1]);
     curve[0][0] = sdm_dual_mul(c, r[0]);
     curve[0][1] = sdm_dual_mul(s, r[0]);
@@ -137,7 +139,7 @@ static void curve_at(const cochlea_model *m, const double *x, dual theta, dual c
     for (int k = 0; k < 3; k++) curve[k][2] = z[k];
 }
 
-// half axes of the tube
+/* Half axes of the cross-section. */
 static void tube_at(const cochlea_model *m, dual theta, dual *wide, dual *high)
 {
     const double flare = m->flare * exp(-theta.v / m->flare_angle);
@@ -151,20 +153,21 @@ static void tube_at(const cochlea_model *m, dual theta, dual *wide, dual *high)
     *high = sdm_dual_mul(*wide, ratio);
 }
 
-void sdm_cochlea_section_at(const cochlea_model *m, const double *x, double share,
+void sdm_cochlea_section_at(const cochlea_model *m, const double *x, double fraction,
                             cochlea_section *out)
 {
-    const dual theta = sdm_dual_scale(share, unknown(x, COCHLEA_THETA));
+    const dual theta = sdm_dual_scale(fraction, dual_unknown(x, COCHLEA_THETA));
     dual curve[3][3];
     curve_at(m, x, theta, curve);
     const dual *d1 = curve[1], *d2 = curve[2];
-    const dual speed2 = dot(d1, d1), speed = root(speed2);
-    const dual level = root(sdm_dual_add(sdm_dual_mul(d1[0], d1[0]), sdm_dual_mul(d1[1], d1[1])));
+    const dual speed2 = dual_dot(d1, d1), speed = dual_sqrt(speed2);
+    const dual level =
+        dual_sqrt(sdm_dual_add(sdm_dual_mul(d1[0], d1[0]), sdm_dual_mul(d1[1], d1[1])));
     for (int k = 0; k < 3; k++)
         out->centre[k] = curve[0][k], out->tangent[k] = sdm_dual_div(d1[k], speed);
 
-    // e1 = tangent x z, normalised: a fixed rule, so that vertices are functions of the parameters
-    // here and nowhere else
+    // e1 = tangent x z, normalised: depends only on the tangent here (unlike a transported frame),
+    // so vertices are smooth functions of the parameters
     const dual *t = out->tangent, *e1 = out->e1;
     out->e1[0] = sdm_dual_div(d1[1], level);
     out->e1[1] = sdm_dual_scale(-1, sdm_dual_div(d1[0], level));
@@ -173,9 +176,9 @@ void sdm_cochlea_section_at(const cochlea_model *m, const double *x, double shar
     out->e2[1] = sdm_dual_mul(t[2], e1[0]);
     out->e2[2] = sdm_dual_sub(sdm_dual_mul(t[0], e1[1]), sdm_dual_mul(t[1], e1[0]));
 
-    // the part of the second derivative across the tangent, by arc length
-    out->bend[0] = sdm_dual_div(dot(d2, out->e1), speed2);
-    out->bend[1] = sdm_dual_div(dot(d2, out->e2), speed2);
+    // curvature vector: component of the second derivative normal to the tangent, per arc length
+    out->bend[0] = sdm_dual_div(dual_dot(d2, out->e1), speed2);
+    out->bend[1] = sdm_dual_div(dual_dot(d2, out->e2), speed2);
     tube_at(m, theta, &out->wide, &out->high);
 }
 
@@ -184,7 +187,7 @@ void sdm_cochlea_centre_at(const cochlea_model *m, const double *x, double theta
     double r = x[COCHLEA_A] * exp(-x[COCHLEA_B] * theta);
     if (m->cubic && theta < x[COCHLEA_THETA2]) {
         dual basal[3];
-        basal_cubic(x, sdm_dual_of(theta), basal);
+        cubic_at(x, sdm_dual_of(theta), basal);
         r = basal[0].v;
     }
     centre[0] = r * cos(theta);

@@ -1,69 +1,73 @@
-/* The centreline of the cochlea, its moving frame and its tube radius, with derivatives with
- * respect to the parameters. */
+/* Centreline of the cochlea, its moving frame and tube radius, with derivatives with respect to the
+ * parameters. */
 #ifndef COCHLEA_CURVE_H
 #define COCHLEA_CURVE_H
 
 #include <stdbool.h>
 
-/* What may be a parameter. The published four, then constants of the anatomy. */
+/* Indices of the unknowns x[COCHLEA_UNKNOWNS] of the model: the four published parameters, then
+ * anatomical constants that can be parameters (option `free`). */
 enum {
     COCHLEA_A,
     COCHLEA_ALPHA,
     COCHLEA_B,
     COCHLEA_PHI,
-    COCHLEA_C,      /* rise, mm / rad */
-    COCHLEA_KAPPA,  /* decay of the wave, 1 / rad */
+    COCHLEA_C,      /* rise of the centreline, mm/rad */
+    COCHLEA_KAPPA,  /* decay of the wave, 1/rad */
     COCHLEA_THETA,  /* angle of the apical end, rad */
-    COCHLEA_THETA2, /* a cubic start lies below this angle, rad, */
-    COCHLEA_P0,     /* and begins at this radius, mm */
+    COCHLEA_THETA2, /* end of the polynomial start, rad */
+    COCHLEA_P0,     /* radius of the polynomial start at theta = 0, mm */
     COCHLEA_UNKNOWNS
 };
 
-/* A number with its derivatives with respect to the unknowns (forward differentiation). */
+/* Dual number for forward automatic differentiation: value v and derivatives d with respect to the
+ * unknowns. */
 typedef struct dual {
     double v, d[COCHLEA_UNKNOWNS];
 } dual;
 
-/* What is never a parameter. */
+/* Properties of the model that are never parameters. */
 typedef struct cochlea_model {
-    bool cubic; /* the basal start is a polynomial */
-    double radius,
-        taper; /* tube radius = radius - taper theta + flare exp(-theta / flare_angle), mm */
+    bool cubic; /* polynomial start below theta2 */
+    /* tube radius = radius - taper theta + flare exp(-theta / flare_angle), mm */
+    double radius, taper;
     double flare, flare_angle;
-    bool ellipse; /* the section is an ellipse of axis ratio `ratio` at the base, a circle after one
-                     turn */
+    /* the cross-section is an ellipse with axis ratio `ratio` at the base and becomes a circle
+     * after one turn */
+    bool ellipse;
     double ratio;
 } cochlea_model;
 
-/* A cross-section: centre, unit tangent, the axes across it (e1 outwards and level, e2 = tangent x
-   e1), the curvature vector of the centreline in those axes (1 / mm), and the half axes of the tube
-   along them (mm). */
+/* A cross-section: centre (mm), unit tangent, unit vectors e1 (outward, horizontal) and e2 =
+ * tangent x e1, curvature vector `bend` of the centreline in (e1, e2) (1/mm), and the half axes
+ * `wide` along e1 and `high` along e2 (mm). */
 typedef struct cochlea_section {
     dual centre[3], tangent[3], e1[3], e2[3], bend[2], wide, high;
 } cochlea_section;
 
-/* x[COCHLEA_UNKNOWNS] are the unknowns. The section at `share` of the apical angle, 0 .. 1. */
-void sdm_cochlea_section_at(const cochlea_model *m, const double *x, double share,
+/* The cross-section at theta = fraction * (apical angle), 0 <= fraction <= 1.
+ * x[COCHLEA_UNKNOWNS]. */
+void sdm_cochlea_section_at(const cochlea_model *m, const double *x, double fraction,
                             cochlea_section *out);
 
-/* Position alone, at an angle. */
+/* Position of the centreline at an angle, mm, without derivatives. */
 void sdm_cochlea_centre_at(const cochlea_model *m, const double *x, double theta, double centre[3]);
 
 /* Tube radius at an angle, mm. */
 double sdm_cochlea_radius_at(const cochlea_model *m, double theta);
 
-/* Signed distance of a point to the ball of the tube's radius swept along the centreline, mm: exact
- * outside, a bound inside. */
+/* Signed distance (mm) from a point to the volume of a ball of the tube's radius swept along the
+ * centreline: exact outside; inside its absolute value is a lower bound of the true one. */
 double sdm_cochlea_distance(const cochlea_model *m, const double *x, const double point[3]);
 
-/* Arithmetic of duals. */
+/* Arithmetic of dual numbers. */
 dual sdm_dual_of(double v);
 dual sdm_dual_add(dual a, dual b);
 dual sdm_dual_sub(dual a, dual b);
 dual sdm_dual_mul(dual a, dual b);
 dual sdm_dual_div(dual a, dual b);
 dual sdm_dual_scale(double s, dual a);
-/* f(a), given the value and the derivative of f there. */
+/* f(a), given the value f and the derivative df at a.v. */
 dual sdm_dual_apply(dual a, double f, double df);
 
 #endif

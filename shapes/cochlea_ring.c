@@ -1,30 +1,32 @@
-/* Rings of the cochlea, cut off where sections would run backwards. */
+/* Rings of vertices of the cochlea, cut off where neighbouring sections would overlap. */
 #include "cochlea_ring.h"
 
-// share of the distance to the centre of curvature from which a section is bent, and width of the
-// bend: C2
+// The cut is smooth (C2): it starts at this fraction of the distance to the centre of curvature and
+// takes this width.
 #define CUT_FROM 0.90
-#define CUT_OVER 0.16
+#define CUT_WIDTH 0.16
 
-// moves a vertex (x along e1, y along e2) that lies at or behind the centre of curvature back to it
-static void cut_off(const dual bend[2], dual *x, dual *y)
+/* Projects a vertex (x along e1, y along e2) that lies near or beyond the centre of curvature back
+ * in front of it. */
+static void vertex_cut(const dual bend[2], dual *x, dual *y)
 {
-    const dual u = sdm_dual_add(sdm_dual_mul(*x, bend[0]),
-                                sdm_dual_mul(*y, bend[1])); // 1: at the centre of curvature
-    const double w = (u.v - CUT_FROM) / CUT_OVER, end = CUT_FROM + CUT_OVER / 2;
-    const dual kept = w < 1
-                          ? sdm_dual_apply(u, CUT_FROM + CUT_OVER * w * (1 + w * w * (0.5 * w - 1)),
-                                           1 - w * w * (3 - 2 * w))
-                          : sdm_dual_of(end);
+    // position along the curvature vector; 1: at the centre of curvature
+    const dual u = sdm_dual_add(sdm_dual_mul(*x, bend[0]), sdm_dual_mul(*y, bend[1]));
+    const double w = (u.v - CUT_FROM) / CUT_WIDTH, end = CUT_FROM + CUT_WIDTH / 2;
+    const dual kept =
+        w < 1 ? sdm_dual_apply(u, CUT_FROM + CUT_WIDTH * w * (1 + w * w * (0.5 * w - 1)),
+                               1 - w * w * (3 - 2 * w))
+              : sdm_dual_of(end);
     const dual bend2 = sdm_dual_add(sdm_dual_mul(bend[0], bend[0]), sdm_dual_mul(bend[1], bend[1]));
     const dual back = sdm_dual_div(sdm_dual_sub(u, kept), bend2);
     *x = sdm_dual_sub(*x, sdm_dual_mul(back, bend[0]));
     *y = sdm_dual_sub(*y, sdm_dual_mul(back, bend[1]));
 }
 
-static void cut_vertex(const cochlea_section *s, const dual middle[3], dual x, dual y, dual at[3])
+static void vertex_cut_at(const cochlea_section *s, const dual middle[3], dual x, dual y,
+                          dual at[3])
 {
-    cut_off(s->bend, &x, &y);
+    vertex_cut(s->bend, &x, &y);
     for (int k = 0; k < 3; k++)
         at[k] = sdm_dual_add(middle[k],
                              sdm_dual_add(sdm_dual_mul(x, s->e1[k]), sdm_dual_mul(y, s->e2[k])));
@@ -35,8 +37,8 @@ void sdm_cochlea_ring_at(const cochlea_model *m, const double *x, const cochlea_
                          cochlea_put *put, void *user)
 {
     cochlea_section s;
-    sdm_cochlea_section_at(m, x, r->share, &s);
-    // vertex = middle + cosine * wide + sine * high, but where it is cut off
+    sdm_cochlea_section_at(m, x, r->fraction, &s);
+    // vertex = middle + cosine * wide + sine * high, if it is not cut off
     dual middle[3], wide[3], high[3], at[3];
     for (int k = 0; k < 3; k++) {
         middle[k] =
@@ -47,7 +49,7 @@ void sdm_cochlea_ring_at(const cochlea_model *m, const double *x, const cochlea_
     for (size_t j = 0; j < n_sectors; j++) {
         const double co = direction[2 * j], si = direction[2 * j + 1];
         if (!r->whole && co * s.wide.v * s.bend[0].v + si * s.high.v * s.bend[1].v > CUT_FROM)
-            cut_vertex(&s, middle, sdm_dual_scale(co, s.wide), sdm_dual_scale(si, s.high), at);
+            vertex_cut_at(&s, middle, sdm_dual_scale(co, s.wide), sdm_dual_scale(si, s.high), at);
         else
             for (int k = 0; k < 3; k++)
                 at[k] = sdm_dual_add(middle[k], sdm_dual_add(sdm_dual_scale(co, wide[k]),

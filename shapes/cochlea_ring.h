@@ -1,4 +1,4 @@
-/* Rings of vertices about the centreline of the cochlea. */
+/* Rings of vertices around the centreline of the cochlea. */
 #ifndef COCHLEA_RING_H
 #define COCHLEA_RING_H
 
@@ -6,17 +6,18 @@
 
 #include "cochlea_curve.h"
 
-/* The section at a share of the apical angle, on a cap moved `ahead` along the tangent and shrunk;
- * both in radii of the tube. */
+/* A ring: cross-section at a fraction of the apical angle; for caps scaled by `shrink` and moved by
+ * `ahead` tube radii along the tangent. */
 typedef struct cochlea_ring {
-    double share, shrink, ahead;
-    bool whole; /* not cut off: rings of the caps, and the two they start from */
+    double fraction, shrink, ahead;
+    /* never cut off: the rings of the caps and the first and last ring of the tube */
+    bool whole;
 } cochlea_ring;
 
 typedef void cochlea_put(void *user, size_t vertex, const dual at[3]);
 
-/* Calls put() for the vertices of a ring at the unknowns x, numbered from `first`.
-   direction[n_sectors][2]: cosine and sine of their angles. left: mirrored in y. */
+/* Calls put() for the n_sectors vertices of a ring, numbered from `first`. x: unknowns;
+ * direction[n_sectors][2]: cosine and sine of the vertex angles; left: mirrored in y. */
 void sdm_cochlea_ring_at(const cochlea_model *m, const double *x, const cochlea_ring *r,
                          size_t n_sectors, const double *direction, bool left, size_t first,
                          cochlea_put *put, void *user);

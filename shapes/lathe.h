@@ -1,4 +1,4 @@
-/* The mesh topology of everything that is round about a line: a pole, rings of vertices, a pole. */
+/* Mesh topology of bodies of revolution and similar shapes: a pole, rings of vertices, a pole. */
 #ifndef LATHE_H
 #define LATHE_H
 
@@ -8,20 +8,21 @@
 
 #define LATHE_PI 3.14159265358979323846
 
-/* Vertices are in this order: first pole, rings[n_rings][n_sectors], last pole. Odd rings are
-   turned by half a sector, which makes triangles nearly equilateral. */
+/* Number of vertices and triangles. Vertices are in this order: first pole,
+ * rings[n_rings][n_sectors], last pole. Odd rings are rotated by half a sector, so triangles are
+ * nearly equilateral. */
 size_t sdm_lathe_n_vert(size_t n_rings, size_t n_sectors);
 size_t sdm_lathe_n_tri(size_t n_rings, size_t n_sectors);
 
-/* Angle of a vertex about the line, from the first to the second axis of the section; first, second
-   axis and the direction from the first pole to the last are right-handed. */
+/* Angle (rad) of a vertex of a ring, from the first towards the second axis of the cross-section;
+ * first axis, second axis and the direction from the first to the last pole are right-handed. */
 double sdm_lathe_angle(size_t ring, size_t sector, size_t n_sectors);
 
-/* Writes tri[sdm_lathe_n_tri()][3], counter-clockwise seen from outside; `mirrored` turns them, for
- * vertices that are reflected. */
+/* Writes tri[sdm_lathe_n_tri()][3], counter-clockwise seen from outside; mirrored: with the
+ * opposite orientation, for vertices that are reflected. */
 void sdm_lathe_triangles(size_t n_rings, size_t n_sectors, bool mirrored, uint32_t *tri);
 
-/* How many pieces of about `edge` a length is cut into, at least `least`. */
+/* Number of pieces of length `edge` (rounded) in `length`, at least `least`. */
 size_t sdm_lathe_pieces(double length, double edge, size_t least);
 
 #endif

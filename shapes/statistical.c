@@ -1,11 +1,8 @@
-/* The statistical shape: a point-distribution model (Cootes, Taylor, Cooper and Graham 1995) from
-   files,
-
-       vertex = mean + sum over the modes of weight * mode,
-
-   with weights m1, m2 ... in standard deviations. Modes are in mm per standard deviation, or of any
-   length when the standard deviations along them are given beside. Triangles are those of the mean.
- */
+/* Statistical shape: a point-distribution model (Cootes, Taylor, Cooper and Graham 1995) from
+ * files: vertex = mean + sum over modes of weight * mode. The parameters m1, m2, ... are the
+ * weights in standard deviations. Modes are in mm per standard deviation; with the option
+ * `deviations` they have any length and are multiplied by the standard deviations. The triangles
+ * are those of the mean mesh. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -42,7 +39,7 @@ typedef struct model {
     char helps[MODES_MAX][48];
 } model;
 
-static void destroy(void *self)
+static void statistical_destroy(void *self)
 {
     model *m = self;
     free(m->mean);
@@ -51,7 +48,7 @@ static void destroy(void *self)
     free(m);
 }
 
-/* A file of numbers. */
+/* Array from a .npy file. */
 typedef struct array {
     const char *path;
     const double *values;
@@ -59,14 +56,14 @@ typedef struct array {
     int n_dim;
 } array;
 
-static int fail_about(const sdm_host *host, const char *path, const char *what)
+static int file_fail(const sdm_host *host, const char *path, const char *what)
 {
     char text[2400];
     snprintf(text, sizeof text, "%.1000s: %s", path, what);
     return host->fail(host, text);
 }
 
-static int read_array(const sdm_host *host, array *a)
+static int array_read(const sdm_host *host, array *a)
 {
     const int failed = host->read_npy(host, a->path, &a->values, a->shape, &a->n_dim);
     if (failed) return failed;
@@ -76,13 +73,13 @@ static int read_array(const sdm_host *host, array *a)
         if (!isfinite(a->values[i])) {
             char what[96];
             snprintf(what, sizeof what, "number %zu is not finite", i);
-            return fail_about(host, a->path, what);
+            return file_fail(host, a->path, what);
         }
     return 0;
 }
 
-// the array must be [modes][vertices][3] or [modes][3 vertices]
-static int check_modes(const sdm_host *host, const array *modes, const char *mean_path,
+/* Checks that the array is [modes][vertices][3] or [modes][3 vertices] and fits the mean mesh. */
+static int modes_check(const sdm_host *host, const array *modes, const char *mean_path,
                        size_t n_vert)
 {
     char what[1300];
@@ -90,42 +87,42 @@ static int check_modes(const sdm_host *host, const array *modes, const char *mea
         snprintf(what, sizeof what,
                  "has %d dimensions, need [modes][vertices][3] or [modes][3 vertices]",
                  modes->n_dim);
-        return fail_about(host, modes->path, what);
+        return file_fail(host, modes->path, what);
     }
     const size_t numbers = modes->n_dim == 3 ? 3 * modes->shape[1] : modes->shape[1];
     if (numbers % 3) {
         snprintf(what, sizeof what, "has %zu numbers a mode, need a multiple of 3", numbers);
-        return fail_about(host, modes->path, what);
+        return file_fail(host, modes->path, what);
     }
     if (numbers / 3 != n_vert) {
         snprintf(what, sizeof what, "has modes of %zu vertices, but the mean %.900s has %zu",
                  numbers / 3, mean_path, n_vert);
-        return fail_about(host, modes->path, what);
+        return file_fail(host, modes->path, what);
     }
-    if (modes->shape[0] == 0) return fail_about(host, modes->path, "has no mode");
+    if (modes->shape[0] == 0) return file_fail(host, modes->path, "has no mode");
     return 0;
 }
 
-static int check_deviations(const sdm_host *host, const array *deviations, const array *modes)
+static int deviations_check(const sdm_host *host, const array *deviations, const array *modes)
 {
     char what[1300];
     if (deviations->n_dim != 1 || deviations->shape[0] != modes->shape[0]) {
         snprintf(what, sizeof what,
                  "has %zu numbers in %d dimensions, need one for each of the %zu modes of %.900s",
                  deviations->shape[0], deviations->n_dim, modes->shape[0], modes->path);
-        return fail_about(host, deviations->path, what);
+        return file_fail(host, deviations->path, what);
     }
     for (size_t i = 0; i < deviations->shape[0]; i++)
         if (!(deviations->values[i] > 0)) {
             snprintf(what, sizeof what, "standard deviation %zu is %g, need > 0", i,
                      deviations->values[i]);
-            return fail_about(host, deviations->path, what);
+            return file_fail(host, deviations->path, what);
         }
     return 0;
 }
 
-// number of modes in use, or 0 with the reason said
-static size_t count_modes(const sdm_host *host, const array *modes, double asked)
+/* Number of modes to use, or 0 after an error. */
+static size_t modes_count(const sdm_host *host, const array *modes, double asked)
 {
     const size_t n = asked > 0 ? (size_t)asked : modes->shape[0];
     char what[128];
@@ -136,28 +133,28 @@ static size_t count_modes(const sdm_host *host, const array *modes, double asked
                  modes->shape[0], MODES_MAX);
     else
         return n;
-    fail_about(host, modes->path, what);
+    file_fail(host, modes->path, what);
     return 0;
 }
 
-static void *copy(const void *from, size_t count, size_t size)
+static void *array_copy(const void *from, size_t count, size_t size)
 {
     void *to = count ? calloc(count, size) : NULL;
     if (to) memcpy(to, from, count * size);
     return to;
 }
 
-static int build(const sdm_host *host, const sdm_mesh_out *mean, const array *modes,
-                 const array *deviations, size_t n_modes, double limit, model **out)
+static int model_build(const sdm_host *host, const sdm_mesh_out *mean, const array *modes,
+                       const array *deviations, size_t n_modes, double limit, model **out)
 {
     model *m = calloc(1, sizeof *m);
     if (!m) return host->fail(host, "out of memory");
     m->n_vert = mean->n_vert, m->n_tri = mean->n_tri, m->n_modes = n_modes;
-    m->mean = copy(mean->vert, 3 * m->n_vert, sizeof *m->mean);
-    m->tri = copy(mean->tri, 3 * m->n_tri, sizeof *m->tri);
-    m->modes = copy(modes->values, n_modes * 3 * m->n_vert, sizeof *m->modes);
+    m->mean = array_copy(mean->vert, 3 * m->n_vert, sizeof *m->mean);
+    m->tri = array_copy(mean->tri, 3 * m->n_tri, sizeof *m->tri);
+    m->modes = array_copy(modes->values, n_modes * 3 * m->n_vert, sizeof *m->modes);
     if (!m->mean || !m->tri || !m->modes) {
-        destroy(m);
+        statistical_destroy(m);
         return host->fail(host, "out of memory");
     }
     for (size_t i = 0; i < n_modes; i++) {
@@ -171,7 +168,7 @@ static int build(const sdm_host *host, const sdm_mesh_out *mean, const array *mo
     return 0;
 }
 
-static int create(const sdm_host *host, const sdm_option_value *options, void **self)
+static int statistical_create(const sdm_host *host, const sdm_option_value *options, void **self)
 {
     if (!options[MEAN].text[0])
         return host->fail(host, "option 'mean' is missing: the file of the mean mesh");
@@ -181,29 +178,29 @@ static int create(const sdm_host *host, const sdm_option_value *options, void **
     sdm_mesh_out mean = {0};
     int failed = host->read_mesh(host, options[MEAN].text, &mean);
     if (!failed && (mean.n_vert == 0 || mean.n_tri == 0))
-        failed = fail_about(host, options[MEAN].text, "has no triangle");
-    if (!failed) failed = read_array(host, &modes);
-    if (!failed) failed = check_modes(host, &modes, options[MEAN].text, mean.n_vert);
-    if (!failed && deviations.path[0]) failed = read_array(host, &deviations);
-    if (!failed && deviations.path[0]) failed = check_deviations(host, &deviations, &modes);
+        failed = file_fail(host, options[MEAN].text, "has no triangle");
+    if (!failed) failed = array_read(host, &modes);
+    if (!failed) failed = modes_check(host, &modes, options[MEAN].text, mean.n_vert);
+    if (!failed && deviations.path[0]) failed = array_read(host, &deviations);
+    if (!failed && deviations.path[0]) failed = deviations_check(host, &deviations, &modes);
     if (failed) return failed;
-    const size_t n_modes = count_modes(host, &modes, options[COUNT].number);
+    const size_t n_modes = modes_count(host, &modes, options[COUNT].number);
     if (n_modes == 0) return 1;
     model *m = NULL;
-    failed = build(host, &mean, &modes, &deviations, n_modes, options[LIMIT].number, &m);
+    failed = model_build(host, &mean, &modes, &deviations, n_modes, options[LIMIT].number, &m);
     *self = m;
     return failed;
 }
 
-static void describe(const void *self, const sdm_param **params, uint32_t *n_params)
+static void statistical_describe(const void *self, const sdm_param **params, uint32_t *n_params)
 {
     const model *m = self;
     *params = m->params;
     *n_params = (uint32_t)m->n_modes;
 }
 
-static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
-                const double *p, sdm_mesh_out *out)
+static int statistical_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                            const double *p, sdm_mesh_out *out)
 {
     (void)options;
     const model *m = self;
@@ -217,12 +214,14 @@ static int mesh(const void *self, const sdm_host *host, const sdm_option_value *
     return 0;
 }
 
-static int velocity(const void *self, const sdm_host *host, const sdm_option_value *options,
-                    const double *p, size_t n_vert, double *out)
+static int statistical_velocity(const void *self, const sdm_host *host,
+                                const sdm_option_value *options, const double *p, size_t n_vert,
+                                double *out)
 {
     (void)options, (void)p;
     const model *m = self;
-    if (n_vert != m->n_vert) return host->fail(host, "velocity of another number of vertices");
+    if (n_vert != m->n_vert)
+        return host->fail(host, "velocity: n_vert is not the number of vertices of the mesh");
     memcpy(out, m->modes, m->n_modes * 3 * n_vert * sizeof *out);
     return 0;
 }
@@ -235,9 +234,9 @@ const sdm_shape sdm_shape_statistical = {
                "standard deviations",
     .options = OPTIONS,
     .n_options = N_OPTIONS,
-    .create = create,
-    .destroy = destroy,
-    .describe = describe,
-    .mesh = mesh,
-    .velocity = velocity,
+    .create = statistical_create,
+    .destroy = statistical_destroy,
+    .describe = statistical_describe,
+    .mesh = statistical_mesh,
+    .velocity = statistical_velocity,
 };

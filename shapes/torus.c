@@ -1,4 +1,4 @@
-/* The torus about the z axis. Vertices lie on the surface. */
+/* Torus around the z axis. All vertices lie on the surface. */
 #include <math.h>
 
 #include "lathe.h"
@@ -16,19 +16,19 @@ static const sdm_option OPTIONS[] = {
      "edge length the mesh aims at, at the default parameters"},
 };
 
-// sectors around the axis and around the tube
-static void counts(const sdm_option_value *options, size_t *n_long, size_t *n_round)
+/* Number of sectors around the axis and around the tube. */
+static void sector_counts(const sdm_option_value *options, size_t *n_long, size_t *n_round)
 {
     *n_long = sdm_lathe_pieces(2 * LATHE_PI * PARAMS[MAJOR].def, options[0].number, 8);
     *n_round = sdm_lathe_pieces(2 * LATHE_PI * PARAMS[MINOR].def, options[0].number, 6);
 }
 
-static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
-                const double *p, sdm_mesh_out *out)
+static int torus_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                      const double *p, sdm_mesh_out *out)
 {
     (void)self;
     size_t n_long, n_round;
-    counts(options, &n_long, &n_round);
+    sector_counts(options, &n_long, &n_round);
     const int failed = host->reserve(host, out, n_long * n_round, 2 * n_long * n_round);
     if (failed) return failed;
 
@@ -52,14 +52,14 @@ static int mesh(const void *self, const sdm_host *host, const sdm_option_value *
     return 0;
 }
 
-static int velocity(const void *self, const sdm_host *host, const sdm_option_value *options,
-                    const double *p, size_t n_vert, double *out)
+static int torus_velocity(const void *self, const sdm_host *host, const sdm_option_value *options,
+                          const double *p, size_t n_vert, double *out)
 {
     (void)self, (void)p;
     size_t n_long, n_round;
-    counts(options, &n_long, &n_round);
+    sector_counts(options, &n_long, &n_round);
     if (n_vert != n_long * n_round)
-        return host->fail(host, "velocity of another number of vertices");
+        return host->fail(host, "velocity: n_vert is not the number of vertices of the mesh");
     double *major = out, *minor = out + 3 * n_vert;
     for (size_t i = 0; i < n_long; i++)
         for (size_t j = 0; j < n_round; j++) {
@@ -72,9 +72,9 @@ static int velocity(const void *self, const sdm_host *host, const sdm_option_val
     return 0;
 }
 
-// exact everywhere: the ranges keep minor below major
-static int distance(const void *self, const sdm_host *host, const sdm_option_value *options,
-                    const double *p, const double x[3], double *out)
+/* Exact everywhere, because the parameter ranges keep minor < major. */
+static int torus_distance(const void *self, const sdm_host *host, const sdm_option_value *options,
+                          const double *p, const double x[3], double *out)
 {
     (void)self, (void)host, (void)options;
     *out = hypot(hypot(x[0], x[1]) - p[MAJOR], x[2]) - p[MINOR];
@@ -90,7 +90,7 @@ const sdm_shape sdm_shape_torus = {
     .n_params = N_PARAMS,
     .options = OPTIONS,
     .n_options = 1,
-    .mesh = mesh,
-    .velocity = velocity,
-    .distance = distance,
+    .mesh = torus_mesh,
+    .velocity = torus_velocity,
+    .distance = torus_distance,
 };

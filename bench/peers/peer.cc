@@ -1,4 +1,4 @@
-/* The frame of a peer program: arguments, timing, memory, results. */
+/* Runs a peer program: reads its arguments, measures time and memory, writes the results. */
 #include "peer.h"
 
 #include <algorithm>
@@ -20,7 +20,7 @@
 namespace
 {
 
-constexpr double enough_s = 3; // no further run after this
+constexpr double time_limit_s = 3; // no run starts after this
 
 double clock_s(clockid_t clock)
 {
@@ -29,7 +29,7 @@ double clock_s(clockid_t clock)
     return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-/* A line "NAME:  123 kB" of /proc/self/status; -1 when there is none. */
+/* The number in the line "NAME:  123 kB" of /proc/self/status; -1: no such line. */
 long status_kb(const char *name)
 {
     FILE *f = std::fopen("/proc/self/status", "r");
@@ -42,7 +42,8 @@ long status_kb(const char *name)
     return kb;
 }
 
-/* Starts a new high-water mark of the resident memory (Linux) and returns what is resident now. */
+/* Resets the peak of the resident memory (Linux); returns the memory resident now, kB, -1: unknown.
+ */
 long start_peak()
 {
 #ifdef __GLIBC__
@@ -54,14 +55,14 @@ long start_peak()
     return std::fclose(f) ? -1 : status_kb("VmRSS");
 }
 
-double real(const char *text)
+double parse_real(const char *text)
 {
     double v = 0;
     if (!sdm_parse_real(text, &v)) throw std::runtime_error(std::string("not a number: ") + text);
     return v;
 }
 
-void check(sdm_status s, const sdm_error &err)
+void throw_error(sdm_status s, const sdm_error &err)
 {
     if (s) throw std::runtime_error(err.text);
 }
@@ -72,23 +73,23 @@ void read_job(int argc, char **argv, peer::job &j)
         throw std::runtime_error(
             "arguments: MESH NX NY NZ OX OY OZ SX SY SZ SHARE BAND REPEAT VALUES.npy");
     sdm_error err{};
-    check(sdm_mesh_read(argv[1], &j.mesh, &err), err);
+    throw_error(sdm_mesh_read(argv[1], &j.mesh, &err), err);
     const double zero[3] = {0, 0, 0};
     int64_t n[3];
-    for (int i = 0; i < 3; i++) n[i] = static_cast<int64_t>(real(argv[2 + i]));
+    for (int i = 0; i < 3; i++) n[i] = static_cast<int64_t>(parse_real(argv[2 + i]));
     j.grid = sdm_grid_centred(n, 1, zero);
     for (int i = 0; i < 3; i++) {
-        j.grid.origin[i] = real(argv[5 + i]);
-        j.grid.spacing[i] = real(argv[8 + i]);
+        j.grid.origin[i] = parse_real(argv[5 + i]);
+        j.grid.spacing[i] = parse_real(argv[8 + i]);
     }
-    check(sdm_grid_check(&j.grid, &err), err);
-    j.share = real(argv[11]);
-    j.band = real(argv[12]);
-    j.repeat = static_cast<int>(real(argv[13]));
+    throw_error(sdm_grid_check(&j.grid, &err), err);
+    j.share = parse_real(argv[11]);
+    j.band = parse_real(argv[12]);
+    j.repeat = static_cast<int>(parse_real(argv[13]));
 }
 
-/* Share of the rows that has_row() takes. */
-double exact_share(const peer::job &j)
+/* Fraction of the rows for which has_row() is true. */
+double row_share(const peer::job &j)
 {
     const int64_t rows = j.grid.n[1] * j.grid.n[2];
     int64_t done = 0;
@@ -99,13 +100,14 @@ double exact_share(const peer::job &j)
 void measure(const char *path, const peer::job &j, const peer::about &a,
              const std::function<peer::map_function(const peer::job &)> &prepare)
 {
+    // the fastest of several runs
     std::vector<float> values(sdm_grid_count(&j.grid), std::numeric_limits<float>::quiet_NaN());
     double prepare_s = HUGE_VAL, map_s = HUGE_VAL;
     const long before = start_peak();
     long peak = -1;
     const double begin = clock_s(CLOCK_MONOTONIC);
     for (int i = 0;
-         i < std::max(1, j.repeat) && (i == 0 || clock_s(CLOCK_MONOTONIC) - begin < enough_s);
+         i < std::max(1, j.repeat) && (i == 0 || clock_s(CLOCK_MONOTONIC) - begin < time_limit_s);
          i++) {
         const double start = clock_s(CLOCK_PROCESS_CPUTIME_ID);
         const peer::map_function map = prepare(j);
@@ -118,16 +120,18 @@ void measure(const char *path, const peer::job &j, const peer::about &a,
         }
         if (i == 0 && before >= 0) peak = std::max(0L, status_kb("VmHWM") - before);
     }
+    // the values
     const size_t shape[3] = {static_cast<size_t>(j.grid.n[2]), static_cast<size_t>(j.grid.n[1]),
                              static_cast<size_t>(j.grid.n[0])};
     sdm_error err{};
-    check(sdm_npy_write(path, values.data(), shape, 3, &err), err);
+    throw_error(sdm_npy_write(path, values.data(), shape, 3, &err), err);
 
+    // the line of JSON
     sdm_json out{};
     sdm_json_open(&out, nullptr, '{');
     sdm_json_real(&out, "prepare_ms", 1e3 * prepare_s);
     sdm_json_real(&out, "map_ms", 1e3 * map_s);
-    sdm_json_real(&out, "share", a.whole ? 1 : exact_share(j));
+    sdm_json_real(&out, "share", a.whole ? 1 : row_share(j));
     sdm_json_int(&out, "peak_kb", peak);
     sdm_json_bool(&out, "band", a.band);
     sdm_json_text(&out, "version", a.version.c_str());

@@ -1,14 +1,26 @@
-/* What the peer programs share: other people's libraries that make the same distance map, each in a
-   program sdmgen-peer-NAME that `sdmgen bench exact` starts. sdmgen-peer-NAME MESH NX NY NZ OX OY
-   OZ SX SY SZ SHARE BAND REPEAT VALUES.npy MESH: .ply in mm. Then voxels, centre of the first voxel
-   and voxel edges (mm) of an axis-aligned grid. SHARE in (0, 1]: only rows r (of voxels along x, r
-   = j + NY k) with frac(r * 0.6180339887498949) < SHARE need to be done, as much as the library
-   can. BAND: 0, or only voxels with |distance| <= BAND mm need a value. REPEAT: runs at most; the
-   best one counts. Written: float32 values[NZ][NY][NX], mm, negative inside, NaN where nothing was
-   computed; and one line of JSON on stdout: prepare_ms, map_ms   processor time of one thread,
-   files not included, for the share share                of the voxels done peak_kb largest
-   resident memory over that before preparing; -1: unknown band                 true when BAND saved
-   work version, note        texts or {"error": "what is missing and what to install"}. */
+/* Peer programs: each makes the map of `sdmgen bench exact` with another library. Call:
+
+     sdmgen-peer-NAME MESH NX NY NZ OX OY OZ SX SY SZ SHARE BAND REPEAT VALUES.npy
+
+   MESH          .ply file, mm
+   NX NY NZ      number of voxels of an axis-aligned grid
+   OX OY OZ      centre of the first voxel, mm
+   SX SY SZ      edges of a voxel, mm
+   SHARE         in (0, 1]: row r = j + NY k of voxels along x must be computed if
+                 frac(r * 0.6180339887498949) < SHARE; a library may compute more
+   BAND          0, or only voxels with abs(distance) <= BAND mm need a value
+   REPEAT        largest number of runs; the fastest one counts
+   VALUES.npy    output: float32 values[NZ][NY][NX], mm, negative inside, NaN where not computed
+
+   The program prints one line of JSON on stdout:
+
+   prepare_ms, map_ms  processor time of one thread, without files, for the computed share
+   share               fraction of the voxels computed
+   peak_kb             peak of the resident memory above that before preparing; -1: unknown
+   band                true when BAND saved work
+   version, note       texts
+
+   or {"error": "what is missing and what to install"}. */
 #ifndef SDMGEN_PEER_H
 #define SDMGEN_PEER_H
 
@@ -22,12 +34,14 @@
 namespace peer
 {
 
+/* The arguments. */
 struct job {
     sdm_mesh mesh{};
     sdm_grid grid{};
     double share = 1, band = 0;
     int repeat = 1;
 
+    /* True for the rows of voxels that SHARE requires. */
     bool has_row(int64_t row) const
     {
         const double x = static_cast<double>(row) * 0.6180339887498949;
@@ -35,21 +49,23 @@ struct job {
     }
 };
 
+/* Facts about a library. */
 struct about {
     std::string version, note;
-    bool whole = false; // always the whole grid, whatever the share
-    bool band = false;  // does less for a band
+    bool whole = false; // computes the whole grid for every share
+    bool band = false;  // does less work for a narrow band
 };
 
-/* Writes the values of all voxels, or of the share's. What it captures is what was prepared. */
+/* Writes the values of all voxels or of the required rows; captures the prepared data. */
 using map_function = std::function<void(float *values)>;
 
-/* Reads the arguments and the mesh, times prepare() and the map it returns, writes the results.
-   Returns main()'s exit code. An exception becomes the "error" of the JSON line. */
+/* Reads the arguments and the mesh, measures prepare() and the function that it returns, and writes
+   the results. Returns the exit code of main(). An exception becomes the "error" of the JSON line.
+ */
 int run(int argc, char **argv, const about &a,
         const std::function<map_function(const job &)> &prepare);
 
-/* values = distance(x) at every voxel of the share, in rows along x. */
+/* values = distance(x) at every voxel of the required rows, in the order of x. */
 template <class F> void for_voxels(const job &j, float *values, F &&distance)
 {
     const sdm_grid &g = j.grid;

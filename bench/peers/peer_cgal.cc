@@ -1,4 +1,5 @@
-/* CGAL: AABB tree with its points for distance queries, the side by Side_of_triangle_mesh. */
+/* CGAL: distances by its AABB tree with the search structure for distance queries, signs by
+   Side_of_triangle_mesh. */
 #include <CGAL/AABB_face_graph_triangle_primitive.h>
 #include <CGAL/AABB_traits.h>
 #include <CGAL/AABB_tree.h>
@@ -18,7 +19,7 @@
 namespace
 {
 
-// as CGAL's manual has it for distance queries: the fastest kernel; its predicates are not exact
+// the fastest kernel, which CGAL's manual uses for distance queries; its predicates are not exact
 using kernel = CGAL::Simple_cartesian<double>;
 using surface = CGAL::Surface_mesh<kernel::Point_3>;
 using primitive = CGAL::AABB_face_graph_triangle_primitive<surface>;
@@ -69,7 +70,7 @@ int main(int argc, char **argv)
 {
     peer::about a;
     a.version = "CGAL " CGAL_VERSION_STR;
-    a.note =
-        "AABB tree with accelerate_distance_queries, Side_of_triangle_mesh; all surface counted";
+    a.note = "AABB tree with accelerate_distance_queries, Side_of_triangle_mesh; measures to all "
+             "triangles";
     return peer::run(argc, argv, a, prepare);
 }

@@ -1,5 +1,6 @@
-/* Embree: point queries on its tree of boxes, the distance to a triangle in a callback as in
-   Embree's own tutorial, the sign by angle-weighted pseudo-normals (Baerentzen and Aanaes 2005). */
+/* Embree: point queries on its bounding volume hierarchy. A callback computes the distance to a
+   triangle, as in Embree's tutorial; the sign is that of the angle-weighted pseudo-normal
+   (Baerentzen and Aanaes 2005). */
 #include <embree3/rtcore.h>
 
 #include <array>
@@ -30,10 +31,10 @@ vec unit(vec a)
     return l > 0 ? (1 / l) * a : a;
 }
 
-/* Part of a triangle: corners 0..2, edges 3 (01), 4 (12), 5 (20), face 6. */
+/* Parts of a triangle, as indices into its normals. */
 enum part { corner_0, corner_1, corner_2, edge_01, edge_12, edge_20, face };
 
-/* Nearest point of a triangle (Ericson 2005, 5.1.5) and the part it lies on. */
+/* The point of the triangle a, b, c nearest to p (Ericson 2005, 5.1.5); on: the part it lies on. */
 vec nearest(vec p, vec a, vec b, vec c, part &on)
 {
     const vec ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
@@ -54,10 +55,11 @@ vec nearest(vec p, vec a, vec b, vec c, part &on)
 struct triangles {
     std::vector<vec> vert;
     std::vector<std::array<unsigned, 3>> tri;
-    std::vector<std::array<vec, 7>> normal; // by part
+    std::vector<std::array<vec, 7>> normal; // [triangle][part]
 };
 
-/* Normals of the parts: corners weighted by angle, edges the sum of their two faces. */
+/* Pseudo-normals: at a corner the sum of the face normals weighted by their angles, at an edge the
+   sum of its two face normals. */
 void make_normals(triangles &t)
 {
     std::vector<vec> corner(t.vert.size(), vec{0, 0, 0});
@@ -90,10 +92,12 @@ struct query {
     vec point, nearest;
     unsigned triangle;
     part on;
-    float least; // squared distance
+    float distance2; // squared distance to the nearest triangle so far
 };
 
-bool visit(RTCPointQueryFunctionArguments *args)
+/* Callback for a triangle: shrinks the query's radius and returns true if the triangle is nearer.
+ */
+bool visit_triangle(RTCPointQueryFunctionArguments *args)
 {
     query &q = *static_cast<query *>(args->userPtr);
     const auto &v = q.t->tri[args->primID];
@@ -101,8 +105,8 @@ bool visit(RTCPointQueryFunctionArguments *args)
     const vec at = nearest(q.point, q.t->vert[v[0]], q.t->vert[v[1]], q.t->vert[v[2]], on);
     const vec r = q.point - at;
     const float d = dot(r, r);
-    if (!(d < q.least)) return false;
-    q.least = d;
+    if (!(d < q.distance2)) return false;
+    q.distance2 = d;
     q.nearest = at;
     q.triangle = args->primID;
     q.on = on;
@@ -130,10 +134,10 @@ struct scene {
                                              sizeof(vec), m.n_vert);
         void *tri = rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                             sizeof t.tri[0], m.n_tri);
-        if (!vert || !tri) throw std::runtime_error("Embree has no memory for the mesh");
+        if (!vert || !tri) throw std::runtime_error("Embree: out of memory for the mesh");
         std::copy(t.vert.begin(), t.vert.end(), static_cast<vec *>(vert));
         std::copy(t.tri.begin(), t.tri.end(), static_cast<std::array<unsigned, 3> *>(tri));
-        rtcSetGeometryPointQueryFunction(g, visit);
+        rtcSetGeometryPointQueryFunction(g, visit_triangle);
         rtcCommitGeometry(g);
         rtcAttachGeometry(tree, g);
         rtcReleaseGeometry(g);
@@ -154,8 +158,8 @@ peer::map_function prepare(const peer::job &j)
         RTCPointQueryContext context;
         rtcInitPointQueryContext(&context);
         vec last{};
-        float bound =
-            INFINITY; // |distance| at the voxel before: a neighbour's is larger by the step at most
+        // abs(distance) at the previous voxel; abs(distance here) <= bound + length of the step
+        float bound = INFINITY;
         peer::for_voxels(j, values, [&](const double x[3]) {
             const vec p = {static_cast<float>(x[0]), static_cast<float>(x[1]),
                            static_cast<float>(x[2])};
@@ -170,7 +174,7 @@ peer::map_function prepare(const peer::job &j)
                 return NAN;
             }
             last = p;
-            bound = std::sqrt(q.least);
+            bound = std::sqrt(q.distance2);
             return dot(p - q.nearest, s->t.normal[q.triangle][q.on]) < 0 ? -bound : bound;
         });
     };
@@ -182,8 +186,9 @@ int main(int argc, char **argv)
 {
     peer::about a;
     a.version = "Embree " RTC_VERSION_STRING;
-    a.note = "float32; point queries started with the bound of the voxel before, pseudo-normals; "
-             "all surface counted";
+    a.note =
+        "float32; point queries bounded by the distance of the previous voxel, pseudo-normals; "
+        "measures to all triangles";
     a.band = true;
     return peer::run(argc, argv, a, prepare);
 }

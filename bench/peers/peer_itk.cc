@@ -1,5 +1,5 @@
-/* ITK: the voxels inside by TriangleMeshToBinaryImageFilter, their distance transform by
-   SignedMaurerDistanceMapImageFilter (Maurer, Qi and Raghavan 2003). */
+/* ITK: a mask of the voxels inside by TriangleMeshToBinaryImageFilter, then its distance transform
+   by SignedMaurerDistanceMapImageFilter (Maurer, Qi and Raghavan 2003). */
 #include <itkImage.h>
 #include <itkMesh.h>
 #include <itkMultiThreaderBase.h>
@@ -52,7 +52,7 @@ peer::map_function prepare(const peer::job &j)
         distance->UseImageSpacingOn();
         distance->InsideIsPositiveOff();
         distance->Update();
-        // zero at the outermost voxels inside: the surface is half a voxel farther out
+        // zero at the outermost voxels inside; the surface is half a voxel farther out
         const float half =
             static_cast<float>(0.5 * *std::min_element(j.grid.spacing, j.grid.spacing + 3));
         const float *d = distance->GetOutput()->GetBufferPointer();
@@ -68,7 +68,7 @@ int main(int argc, char **argv)
     itk::MultiThreaderBase::SetGlobalMaximumNumberOfThreads(1);
     peer::about a;
     a.version = std::string("ITK ") + itk::Version::GetITKVersion();
-    a.note = "TriangleMeshToBinaryImage (prepare), SignedMaurerDistanceMap less half a voxel: "
+    a.note = "TriangleMeshToBinaryImage (prepare), SignedMaurerDistanceMap minus half a voxel: "
              "approximate";
     a.whole = true;
     return peer::run(argc, argv, a, prepare);

@@ -1,5 +1,5 @@
-/* OpenVDB: meshToVolume over a band as wide as the grid needs, or over the narrow band asked for.
- */
+/* OpenVDB: meshToVolume over a band that reaches all voxels of the grid, or over the requested
+   narrow band. */
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Dense.h>
 #include <openvdb/tools/MeshToVolume.h>
@@ -13,7 +13,7 @@
 namespace
 {
 
-/* The mesh as meshToVolume() asks for it, in double: voxel indices. */
+/* Adapter with the interface that meshToVolume() requires of a mesh: vertices in voxel indices. */
 class adapter
 {
   public:
@@ -31,15 +31,15 @@ class adapter
     const peer::job &job_;
 };
 
-/* Widths of the band in voxels that reach every voxel. */
+/* Half widths of the band in voxels. */
 struct widths {
     float outside, inside;
 };
 
-/* Outside: the farthest of 5 x 5 x 5 points of the grid from the nearest of some vertices, and a
-   voxel more; a wide band costs much, so no safe bound. Inside: half the least edge of the mesh's
-   box. */
-widths widest(const peer::job &j)
+/* Half widths that reach all voxels. Outside: the largest distance of 5 x 5 x 5 points of the grid
+   to the nearest of about 1000 vertices, plus a voxel; an estimate, because a safe bound would make
+   the band much slower. Inside: half the shortest edge of the mesh's bounding box, plus a voxel. */
+widths full_widths(const peer::job &j)
 {
     const size_t step = 1 + j.mesh.n_vert / 1000;
     double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL},
@@ -50,7 +50,7 @@ widths widest(const peer::job &j)
     }
     for (int k = 0; k < 125; k++) {
         const int at[3] = {k % 5, k / 5 % 5, k / 25};
-        double least = HUGE_VAL;
+        double nearest2 = HUGE_VAL;
         for (size_t v = 0; v < j.mesh.n_vert; v += step) {
             double sum = 0;
             for (int i = 0; i < 3; i++) {
@@ -58,9 +58,9 @@ widths widest(const peer::job &j)
                                                         static_cast<double>(j.grid.n[i] - 1);
                 sum += (x - j.mesh.vert[3 * v + i]) * (x - j.mesh.vert[3 * v + i]);
             }
-            least = std::min(least, sum);
+            nearest2 = std::min(nearest2, sum);
         }
-        far2 = std::max(far2, least);
+        far2 = std::max(far2, nearest2);
     }
     const double edge = std::min({high[0] - low[0], high[1] - low[1], high[2] - low[2]}),
                  h = j.grid.spacing[0];
@@ -72,9 +72,9 @@ peer::map_function prepare(const peer::job &j)
     if (j.grid.spacing[0] != j.grid.spacing[1] || j.grid.spacing[0] != j.grid.spacing[2])
         throw std::runtime_error("OpenVDB level sets need voxels with equal edges");
     const double h = j.grid.spacing[0];
-    // half a voxel more, so that voxels just at the band's edge are in
+    // half a voxel more, to include voxels at the edge of the band
     const float narrow = static_cast<float>(j.band / h + 0.5);
-    const widths w = j.band > 0 ? widths{narrow, narrow} : widest(j);
+    const widths w = j.band > 0 ? widths{narrow, narrow} : full_widths(j);
     const auto frame = openvdb::math::Transform::createLinearTransform(h);
     const auto level =
         openvdb::tools::meshToVolume<openvdb::FloatGrid>(adapter(j), *frame, w.outside, w.inside);

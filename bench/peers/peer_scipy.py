@@ -1,5 +1,6 @@
 #!/usr/bin/python3 -B
-"""SciPy: exact Euclidean distance transforms of the voxels inside and outside, which VTK's stencil tells apart."""
+"""SciPy: Euclidean distance transforms of the voxels inside and of those outside; VTK's stencil
+makes the mask of the voxels inside."""
 import json
 import sys
 
@@ -13,7 +14,8 @@ try:
     from vtkmodules.vtkCommonCore import vtkVersion
     from vtkmodules.vtkImagingStencil import vtkImageStencilToImage, vtkPolyDataToImageStencil
 except ImportError as e:
-    print(json.dumps({"error": f"SciPy or VTK's Python modules are missing ({e}): install python3-scipy python3-vtk9"}))
+    print(json.dumps({"error": f"SciPy or VTK's Python modules are missing ({e}): "
+                               "install python3-scipy python3-vtk9"}))
     sys.exit(1)
 
 
@@ -30,11 +32,13 @@ def prepare(job):
     image.SetInsideValue(1)
     image.SetOutsideValue(0)
     image.Update()
-    mask = vtk_to_numpy(image.GetOutput().GetPointData().GetScalars()).reshape(job.n[::-1]).astype(bool)
+    values = vtk_to_numpy(image.GetOutput().GetPointData().GetScalars())
+    mask = values.reshape(job.n[::-1]).astype(bool)
 
     def compute():
         spacing = job.spacing[::-1]
-        half = 0.5 * job.spacing.min()  # the surface lies between the voxels, half an edge from either
+        # the surface lies between voxels inside and outside, about half an edge from both
+        half = 0.5 * job.spacing.min()
         outside = distance_transform_edt(~mask, sampling=spacing)
         inside = distance_transform_edt(mask, sampling=spacing)
         return np.where(mask, half - inside, outside - half)
@@ -43,5 +47,5 @@ def prepare(job):
 
 
 sdmgen_peer.run(f"SciPy {scipy.__version__}, VTK {vtkVersion.GetVTKVersion()}",
-                "vtkPolyDataToImageStencil makes the mask (prepare), distance_transform_edt the map: approximate", prepare,
-                whole=True)
+                "vtkPolyDataToImageStencil makes the mask (prepare), distance_transform_edt the "
+                "map: approximate", prepare, whole=True)

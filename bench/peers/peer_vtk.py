@@ -1,5 +1,5 @@
 #!/usr/bin/python3 -B
-"""VTK: vtkImplicitPolyDataDistance on an array of points."""
+"""VTK: vtkImplicitPolyDataDistance at an array of points."""
 import json
 import sys
 
@@ -30,4 +30,5 @@ def prepare(job):
 
 
 sdmgen_peer.run(f"VTK {vtkVersion.GetVTKVersion()}",
-                "vtkImplicitPolyDataDistance, FunctionValue of an array of points; all surface counted", prepare)
+                "vtkImplicitPolyDataDistance, FunctionValue of an array of points; measures to all "
+                "triangles", prepare)

@@ -1,4 +1,5 @@
-"""The frame of a peer program in Python: arguments, mesh, timing, memory, results. The protocol is in peer.h."""
+"""Runs a peer program in Python: reads its arguments and the mesh, measures time and memory, writes
+the results. For the protocol see peer.h."""
 import json
 import re
 import sys
@@ -10,11 +11,11 @@ except ImportError:
     print(json.dumps({"error": "NumPy is missing: install python3-numpy"}))
     sys.exit(1)
 
-ENOUGH_S = 3  # no further run after this
+TIME_LIMIT_S = 3  # no run starts after this
 
 
 def vtk_mesh(job):
-    """The mesh as vtkPolyData, coordinates in double as they are."""
+    """The mesh as vtkPolyData, with coordinates in double."""
     from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
     from vtkmodules.vtkCommonCore import vtkPoints
     from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
@@ -29,12 +30,13 @@ def vtk_mesh(job):
 
 
 def read_ply(path):
-    """vert[n][3] in double and tri[n][3] of a file as sdmgen writes it: binary, little endian, triangles."""
+    """vert[n][3] in double and tri[n][3] of a .ply file of sdmgen (binary, little endian)."""
     with open(path, "rb") as f:
         data = f.read()
     start = data.index(b"end_header\n") + 11
     header = data[:start].decode("ascii")
-    n_vert, n_tri = (int(re.search(rf"element {what} (\d+)", header).group(1)) for what in ("vertex", "face"))
+    n_vert, n_tri = (int(re.search(rf"element {name} (\d+)", header).group(1))
+                     for name in ("vertex", "face"))
     vert = np.frombuffer(data, "<f8", 3 * n_vert, start).reshape(-1, 3)
     face = np.dtype([("n", "u1"), ("v", "<i4", 3)])
     return vert, np.frombuffer(data, face, n_tri, start + 24 * n_vert)["v"].astype(np.int64)
@@ -43,18 +45,19 @@ def read_ply(path):
 class Job:
     def __init__(self, arguments):
         if len(arguments) != 14:
-            raise ValueError("arguments: MESH NX NY NZ OX OY OZ SX SY SZ SHARE BAND REPEAT VALUES.npy")
+            raise ValueError("need the arguments MESH NX NY NZ OX OY OZ SX SY SZ SHARE BAND REPEAT "
+                             "VALUES.npy")
         self.vert, self.tri = read_ply(arguments[0])
         self.n = [int(a) for a in arguments[1:4]]
         self.origin = np.array([float(a) for a in arguments[4:7]])
         self.spacing = np.array([float(a) for a in arguments[7:10]])
         self.share, self.band = float(arguments[10]), float(arguments[11])
         self.repeat, self.out = int(arguments[12]), arguments[13]
-        turn = np.arange(self.n[1] * self.n[2]) * 0.6180339887498949
-        self.rows = np.flatnonzero(turn - np.floor(turn) < self.share)
+        multiple = np.arange(self.n[1] * self.n[2]) * 0.6180339887498949
+        self.rows = np.flatnonzero(multiple - np.floor(multiple) < self.share)
 
     def points(self):
-        """Voxel centres of the rows of the share, [rows * nx][3]."""
+        """Voxel centres of the rows to compute, [rows * nx][3]."""
         x = np.empty((len(self.rows), self.n[0], 3))
         x[..., 0] = self.origin[0] + self.spacing[0] * np.arange(self.n[0])
         x[..., 1] = (self.origin[1] + self.spacing[1] * (self.rows % self.n[1]))[:, None]
@@ -63,12 +66,13 @@ class Job:
 
 
 def status_kb(name):
+    """The number in the line "NAME:  123 kB" of /proc/self/status."""
     with open("/proc/self/status", encoding="ascii") as f:
         return int(re.search(rf"{name}:\s*(\d+)", f.read()).group(1))
 
 
 def start_peak():
-    """Starts a new high-water mark of the resident memory (Linux) and returns what is resident now."""
+    """Resets the peak of the resident memory (Linux); returns the current one, kB; -1: unknown."""
     try:
         with open("/proc/self/clear_refs", "w", encoding="ascii") as f:
             f.write("5")
@@ -78,7 +82,9 @@ def start_peak():
 
 
 def run(version, note, prepare, whole=False, band=False):
-    """prepare(job) returns a function that returns the values: of the rows' voxels, or with `whole` of all, [nz][ny][nx]."""
+    """Measures prepare(job) and the function that it returns, and prints the result. That function
+    returns the values at job.points() or, with `whole`, of all voxels [nz][ny][nx]. band: the peer
+    does less work for a narrow band."""
     try:
         job = Job(sys.argv[1:])
         best, before, peak, begin = None, start_peak(), -1, time.monotonic()
@@ -91,15 +97,15 @@ def run(version, note, prepare, whole=False, band=False):
             best = times if best is None else min(best, times, key=sum)
             if i == 0 and before >= 0:
                 peak = max(0, status_kb("VmHWM") - before)
-            if time.monotonic() - begin > ENOUGH_S:
+            if time.monotonic() - begin > TIME_LIMIT_S:
                 break
         out = np.full((job.n[1] * job.n[2], job.n[0]), np.nan, np.float32)
         rows = slice(None) if whole else job.rows
         out[rows] = np.asarray(values).reshape(-1, job.n[0])
         np.save(job.out, out.reshape(job.n[2], job.n[1], job.n[0]))
         share = 1 if whole else len(job.rows) / (job.n[1] * job.n[2])
-        print(json.dumps({"prepare_ms": 1e3 * best[0], "map_ms": 1e3 * best[1], "share": share, "peak_kb": peak,
-                          "band": band, "version": version, "note": note}))
-    except Exception as e:  # whatever a library throws is this peer's result
+        print(json.dumps({"prepare_ms": 1e3 * best[0], "map_ms": 1e3 * best[1], "share": share,
+                          "peak_kb": peak, "band": band, "version": version, "note": note}))
+    except Exception as e:  # an exception of a library is a result: its message
         print(json.dumps({"error": f"{type(e).__name__}: {e}"}))
         sys.exit(1)

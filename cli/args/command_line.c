@@ -1,4 +1,4 @@
-/* Parses the command line by the tables of option_table.c. */
+/* Parses the command line according to the tables of option_table.c. */
 #include "options.h"
 
 #include <math.h>
@@ -13,14 +13,19 @@ bool cli_option_fits(const cli_option *option, size_t command)
 
 static size_t command_index(const cli_args *args) { return (size_t)(args->command - cli_commands); }
 
-static sdm_status unknown_command(const char *word, sdm_error *err)
+const cli_command *cli_find_command(const char *name, sdm_error *err)
 {
     const char *names[CLI_N_COMMANDS];
-    for (size_t i = 0; i < CLI_N_COMMANDS; i++) names[i] = cli_commands[i].name;
-    const char *near = sdm_nearest_name(word, names, CLI_N_COMMANDS);
+    for (size_t i = 0; i < CLI_N_COMMANDS; i++) {
+        names[i] = cli_commands[i].name;
+        if (!strcmp(name, names[i])) return &cli_commands[i];
+    }
+    const char *near = sdm_nearest_name(name, names, CLI_N_COMMANDS);
     if (near)
-        return sdm_fail(err, SDM_E_ARG, "unknown command '%s'; did you mean '%s'?", word, near);
-    return sdm_fail(err, SDM_E_ARG, "unknown command '%s'; see sdmgen --help", word);
+        sdm_fail(err, SDM_E_ARG, "unknown command '%s'; did you mean '%s'?", name, near);
+    else
+        sdm_fail(err, SDM_E_ARG, "unknown command '%s'; see sdmgen --help", name);
+    return NULL;
 }
 
 static sdm_status unknown_option(const cli_args *args, const char *word, size_t length,
@@ -79,7 +84,7 @@ static sdm_status bad_value(const cli_option *o, const char *value, sdm_error *e
 {
     if (o->kind == CLI_CHOICE)
         return sdm_fail(err, SDM_E_ARG, "--%s '%s': need one of %s", o->name, value, o->choices);
-    const char *what = o->kind == CLI_INT     ? "a whole number"
+    const char *form = o->kind == CLI_INT     ? "a whole number"
                        : o->kind == CLI_INT3  ? "three whole numbers X,Y,Z"
                        : o->kind == CLI_REAL  ? "a number"
                        : o->kind == CLI_REAL2 ? "two numbers X,Y"
@@ -87,11 +92,12 @@ static sdm_status bad_value(const cli_option *o, const char *value, sdm_error *e
                        : o->kind == CLI_REAL6 ? "six numbers"
                                               : "one number or three";
     char low[32], high[32];
-    return sdm_fail(err, SDM_E_ARG, "--%s '%s': need %s in %s .. %s", o->name, value, what,
+    return sdm_fail(err, SDM_E_ARG, "--%s '%s': need %s in %s .. %s", o->name, value, form,
                     sdm_format_real(o->min, low), sdm_format_real(o->max, high));
 }
 
-/* Splits at commas into at most 6 numbers; returns how many, 0 when one is not a number. */
+/* Splits the text at commas. Returns the number of values in out; 0 when a part is not a number, or
+ * above 6 parts. */
 static size_t split_numbers(const char *text, bool whole, double out[6])
 {
     size_t n = 0;
@@ -110,7 +116,8 @@ static size_t split_numbers(const char *text, bool whole, double out[6])
     return n;
 }
 
-static sdm_status store_several(const cli_option *o, const char *value, void *field, sdm_error *err)
+/* The value of a CLI_INT3 or CLI_REAL* option other than CLI_REAL. */
+static sdm_status store_vector(const cli_option *o, const char *value, void *field, sdm_error *err)
 {
     double v[6];
     const size_t n = split_numbers(value, o->kind == CLI_INT3, v);
@@ -127,12 +134,14 @@ static sdm_status store_several(const cli_option *o, const char *value, void *fi
     return SDM_OK;
 }
 
-static sdm_status store(cli_args *args, const cli_option *o, const char *value, sdm_error *err)
+static sdm_status store_value(cli_args *args, const cli_option *o, const char *value,
+                              sdm_error *err)
 {
     void *field = (char *)args + o->offset;
     int64_t integer = 0;
     double real = 0;
     switch (o->kind) {
+    // texts
     case CLI_FLAG:
         *(bool *)field = true;
         return SDM_OK;
@@ -148,6 +157,7 @@ static sdm_status store(cli_args *args, const cli_option *o, const char *value, 
         if (!is_choice(o->choices, value)) return bad_value(o, value, err);
         *(const char **)field = value;
         return SDM_OK;
+    // numbers
     case CLI_INT:
         if (!sdm_parse_int(value, &integer) || !in_range(o, (double)integer))
             return bad_value(o, value, err);
@@ -158,14 +168,15 @@ static sdm_status store(cli_args *args, const cli_option *o, const char *value, 
         *(double *)field = real;
         return SDM_OK;
     default:
-        return store_several(o, value, field, err);
+        return store_vector(o, value, field, err);
     }
 }
 
 /* ---- the command line ---- */
 
-/* Takes one option at argv[*i], with its value from the same or the next argument. */
-static sdm_status take_option(int argc, char **argv, int *i, cli_args *args, sdm_error *err)
+/* Parses the option at argv[*i]. Its value is in the same argument or the next one, which advances
+ * *i. */
+static sdm_status parse_option(int argc, char **argv, int *i, cli_args *args, sdm_error *err)
 {
     const char *word = argv[*i], *value = NULL;
     const cli_option *o;
@@ -189,14 +200,12 @@ static sdm_status take_option(int argc, char **argv, int *i, cli_args *args, sdm
         value = argv[++*i];
     }
     if (value && !*value) return sdm_fail(err, SDM_E_ARG, "--%s: empty value", o->name);
-    return store(args, o, value, err);
+    return store_value(args, o, value, err);
 }
 
 static void set_phantom_defaults(cli_phantom_args *p)
 {
-    const cli_phantom_args none = {.rotation = {NAN, NAN, NAN},
-                                   .translation = {NAN, NAN, NAN},
-                                   .random_pose = {NAN, NAN},
+    const cli_phantom_args none = {.random_pose = {NAN, NAN},
                                    .frame = {NAN, NAN, NAN},
                                    .crop = {NAN, NAN, NAN},
                                    .inside = {NAN, NAN},
@@ -224,7 +233,7 @@ static void set_fit_defaults(cli_fit_args *f)
                                .point_sd = NAN,
                                .margin = NAN,
                                .cavity = NAN,
-                               .tissue_places = NAN,
+                               .tissue_field = NAN,
                                .label_close = NAN,
                                .least_inside = NAN,
                                .prior_sd = NAN,
@@ -245,10 +254,12 @@ static void set_defaults(cli_args *args)
     args->method = "exact";
     args->sign = "auto";
     args->error_of = "max";
+    args->pose = (cli_pose_args){{NAN, NAN, NAN}, {NAN, NAN, NAN}};
     set_phantom_defaults(&args->phantom);
     set_fit_defaults(&args->fit);
 }
 
+/* One block holds the items of all lists: no list has more than argc of them. */
 static sdm_status make_lists(int argc, cli_args *args, sdm_error *err)
 {
     cli_list *lists[] = {&args->files,
@@ -275,28 +286,30 @@ static bool asks_for_help(int argc, char **argv)
 
 sdm_status cli_parse(int argc, char **argv, cli_args *args, sdm_error *err)
 {
+    // the command
     memset(args, 0, sizeof *args);
     set_defaults(args);
     if (argc < 2) return sdm_fail(err, SDM_E_ARG, "a command is needed; see sdmgen --help");
-    for (size_t i = 0; i < CLI_N_COMMANDS; i++)
-        if (!strcmp(argv[1], cli_commands[i].name)) args->command = &cli_commands[i];
-    if (!args->command) return unknown_command(argv[1], err);
+    args->command = cli_find_command(argv[1], err);
+    if (!args->command) return SDM_E_ARG;
     if (asks_for_help(argc, argv)) {
         args->help = true;
         return SDM_OK;
     }
+    // options and positional arguments; after "--" all arguments are positional
     sdm_status s = make_lists(argc, args, err);
     bool options_end = false;
     for (int i = 2; i < argc && !s; i++) {
         if (!options_end && !strcmp(argv[i], "--"))
             options_end = true;
         else if (!options_end && argv[i][0] == '-' && argv[i][1])
-            s = take_option(argc, argv, &i, args, err);
+            s = parse_option(argc, argv, &i, args, err);
         else
             args->files.items[args->files.n++] = argv[i];
     }
     if (s) return s;
 
+    // the number of positional arguments
     const cli_command *c = args->command;
     if (args->files.n < c->min_files)
         return sdm_fail(err, SDM_E_ARG, "usage: sdmgen %s %s", c->name, c->synopsis);

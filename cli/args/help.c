@@ -1,10 +1,11 @@
-/* --help, the manual page, the Markdown reference and the bash completion, all from the tables. */
+/* Makes --help, the manual page, the Markdown reference and the bash completion from the tables of
+ * commands and options. */
 #include "help.h"
 
 #include <stdio.h>
 #include <string.h>
 
-/* "-o, --output FILE" of an option. */
+/* Writes the option as in --help, "-o, --output FILE", into buf and returns buf. */
 static const char *option_form(const cli_option *o, char buf[128])
 {
     char letter[8] = "";
@@ -14,8 +15,8 @@ static const char *option_form(const cli_option *o, char buf[128])
     return buf;
 }
 
-/* Text broken at spaces into lines of at most `width` characters, each after the first behind
- * `indent` spaces. */
+/* Appends the text, broken at spaces into lines of at most `width` characters. All lines but the
+ * first begin with `indent` spaces, which `width` does not count. */
 static void add_wrapped(sdm_text *out, const char *text, size_t indent, size_t width)
 {
     size_t column = 0;
@@ -66,8 +67,8 @@ void cli_help_command(const cli_command *c, sdm_text *out)
 
 /* ---- manual page ---- */
 
-/* Text for roff: a hyphen is written \-, a backslash \e, and a line never begins with a dot or a
- * quote. */
+/* Appends the text escaped for roff: a hyphen becomes \-, a backslash \e, and \& precedes a dot or
+ * a quote at the start of a line. */
 static void add_roff(sdm_text *out, const char *text)
 {
     bool line_start = true;
@@ -86,6 +87,7 @@ static void add_roff(sdm_text *out, const char *text)
 static void add_man_command(sdm_text *out, size_t command)
 {
     const cli_command *c = &cli_commands[command];
+    // heading, summary and details
     sdm_text_add(out, ".SS \"");
     add_roff(out, c->name);
     sdm_text_add(out, " ");
@@ -100,6 +102,7 @@ static void add_man_command(sdm_text *out, size_t command)
     }
     for (size_t i = 0; i < cli_n_options; i++) {
         if (!cli_option_fits(&cli_options[i], command)) continue;
+        // an option
         char form[128];
         sdm_text_add(out, ".TP\n.B \"");
         add_roff(out, option_form(&cli_options[i], form));
@@ -137,7 +140,7 @@ void cli_help_man(sdm_text *out)
 
 /* ---- Markdown ---- */
 
-/* A cell of a Markdown table: the bar is its only special character here. */
+/* Appends a cell of a Markdown table. Only the bar is escaped: help texts may hold Markdown. */
 static void add_cell(sdm_text *out, const char *text)
 {
     for (; *text; text++) sdm_text_add(out, *text == '|' ? "\\|" : "%c", *text);
@@ -167,7 +170,8 @@ void cli_help_markdown(sdm_text *out)
 
 /* ---- bash completion ---- */
 
-/* What a value completes to: files for names of files, words for choices, nothing for numbers. */
+/* Appends the completion of an option's value: file names, the words of a choice, the names of the
+ * shapes, or nothing for numbers and other texts. */
 static void add_completion_value(sdm_text *out, const cli_option *o)
 {
     const bool file = o->value && (strstr(o->value, "FILE") || !strcmp(o->value, "DIR"));

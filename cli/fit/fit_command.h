@@ -1,4 +1,4 @@
-/* What the parts of `sdmgen fit` share. */
+/* The state of a fit of a shape to an image, labels or points, and the steps of `sdmgen fit`. */
 #ifndef CLI_FIT_H
 #define CLI_FIT_H
 
@@ -6,101 +6,116 @@
 #include "sdm/fit.h"
 #include "sdm/volume.h"
 
-/* Fitted shape against labels. Of the surfaces the vertices within the field of view count. */
+/* Comparison of the fitted shape with labels, within the field of view of the image. */
 typedef struct cli_overlap {
     bool measured;
-    size_t n_fit, n_reference, n_both; /* voxels of the reference's grid */
+    size_t n_fit, n_reference, n_both; /* voxels of the reference's grid inside */
     double dice;
-    bool has_surface; /* both surfaces have vertices in the field of view */
-    double mean_mm, q95_mm, hausdorff_mm;
+    bool has_surface;                     /* both surfaces have vertices in the field of view */
+    double mean_mm, q95_mm, hausdorff_mm; /* distances between the surfaces, in both directions */
 } cli_overlap;
 
 /* Zero-initialise all but args; cli_fit_dispose() frees. */
 typedef struct cli_fit {
     const cli_args *args;
-    const char *path, *model_path; /* of the image; NULL without a model */
+    const char *path;       /* of the image, labels, mesh or points */
+    const char *model_path; /* NULL: without a model */
 
-    /* fit_source.c: where maps come from */
+    /* fit_source.c: the maps are made by a network, the exact engine or both */
     sdm_registry *registry;
     sdm_instance *shape;
     sdm_model *model;
     const char *shape_name;
     sdm_param *params; /* [n_params] */
     size_t n_params;
-    double *start;      /* [n_params] */
-    bool start_clamped; /* it was moved to its range */
-    double pivot[3];    /* middle of the shape at the start, in its frame */
+    double *start;      /* [n_params] parameters at the start */
+    bool start_clamped; /* the start was clamped to the range of the parameters */
+    double pivot[3];    /* middle of the shape at the start, in the shape's frame, mm */
     sdm_fit_source source;
 
-    /* fit_target.c: what is fitted to */
+    /* fit_target.c: the image, labels or points to fit to */
     sdm_volume image;
-    float *mask;    /* of a label map; else NULL */
-    double *points; /* [n_points][3]; else NULL */
+    float *mask;    /* [nz][ny][nx] labels, 1 inside, 0 outside; NULL: the target is no label map */
+    double *points; /* [n_points][3] mm; NULL: the target is a volume */
     sdm_fit_target target;
 
     sdm_fit_opts opts;
 
-    /* fit_compare.c: labels to compare with; those of the target where no others are given */
+    /* fit_compare.c: labels to compare the fitted shape with */
     sdm_grid reference_grid;
-    float *reference; /* NULL: none */
-    bool own_reference;
+    float *reference;         /* [reference_grid] 1 inside, 0 outside; NULL: none */
+    bool reference_is_target; /* reference == mask: the labels of the target itself */
 
     /* fit_result.c */
     sdm_fit_result result;
-    bool found;           /* result holds an estimate */
-    sdm_error doubt;      /* status SDM_E_QUALITY: why it is not to be trusted; SDM_OK: it is */
-    sdm_fit_source drawn; /* of the maps below: the last one of the fit */
-    bool by_network;
-    sdm_grid posed;   /* grid of that source in the pose that was found */
-    float *map;       /* [posed] distance */
-    sdm_mesh surface; /* of it, in the world */
+    bool found; /* result holds an estimate */
+    sdm_error
+        doubt; /* status SDM_E_QUALITY: why the estimate is not to be trusted; SDM_OK: it is */
+    sdm_fit_source map_source; /* source of `map`: the one of the last iterations */
+    bool by_network;           /* the network makes `map`: the estimate is in its trained range */
+    sdm_grid map_grid;         /* grid of that source, in the estimated pose */
+    float *map;                /* [map_grid] signed distance, mm */
+    sdm_mesh surface;          /* zero surface of the map, in the world */
     cli_overlap overlap;
 } cli_fit;
 
-/* The model or shape, start parameters, pivot. */
+/* Opens the model or the shape; sets the start parameters and the source of the maps. SDM_E_ARG,
+ * SDM_E_RANGE, errors of opening. */
 sdm_status cli_fit_open_source(cli_fit *f, sdm_error *err);
 
-/* The image, labels, mesh or points. */
+/* Reads the image, label map, mesh or points. SDM_E_ARG, SDM_E_FORMAT, SDM_E_IO. */
 sdm_status cli_fit_read_target(cli_fit *f, sdm_error *err);
 
-/* What was asked for of the fit itself, without the start pose. */
+/* Sets f->opts from the command line, except for the start pose and the rotations. SDM_E_ARG. */
 sdm_status cli_fit_read_options(cli_fit *f, sdm_error *err);
 
-/* The pose of the start and the rotations tried. */
+/* Sets the start pose and the rotations to try. SDM_E_ARG; SDM_E_FORMAT: a bad file of points. */
 sdm_status cli_fit_read_start(cli_fit *f, sdm_error *err);
 
-/* values[grid] = 1 where a voxel has one of the labels (values, or names of segments), else 0. No
-   words: all segments, or all voxels but 0. SDM_E_ARG: no such label; SDM_E_FORMAT: no voxel has
-   it. */
-sdm_status cli_label_mask(const char *path, const sdm_volume *v, const cli_list *words,
-                          float *values, sdm_error *err);
+/* values[v->grid] = 1 where a voxel has one of the labels, else 0. words: values or names of
+   segments; without words: all segments, or all voxels but 0. SDM_E_ARG: no such label;
+   SDM_E_FORMAT: no voxel has the label. */
+sdm_status cli_fit_label_mask(const char *path, const sdm_volume *v, const cli_list *words,
+                              float *values, sdm_error *err);
 
-/* Labels of a grid, 1 and 0, closed as --label-close says. */
-sdm_status cli_close_labels(const cli_fit *f, const sdm_grid *grid, float *values, sdm_error *err);
+/* With --label-close: morphological closing of values[grid] (1 and 0) by a ball of that radius. */
+sdm_status cli_fit_close_labels(const cli_fit *f, const sdm_grid *grid, float *values,
+                                sdm_error *err);
 
 /* Longest edge of a voxel of the maps, mm. */
 double cli_fit_map_voxel(const cli_fit *f);
 
-/* The labels to compare with, before the fit; and the comparison after it. */
+/* Before the fit: reads the labels of --reference; without them the labels of the target are the
+ * reference. SDM_E_ARG, SDM_E_FORMAT, SDM_E_IO. */
 sdm_status cli_fit_read_reference(cli_fit *f, sdm_error *err);
+
+/* After cli_fit_make_map(): fills f->overlap, unless there is no reference or no surface. */
 sdm_status cli_fit_compare(cli_fit *f, sdm_error *err);
 
-/* Map and surface of the estimate. */
-sdm_status cli_fit_draw_up(cli_fit *f, sdm_error *err);
+/* Computes f->map and f->surface of the estimate. */
+sdm_status cli_fit_make_map(cli_fit *f, sdm_error *err);
 
-/* What the figures of a command line are called: "image", "labels", "points". */
+/* Kind of the target: "image", "labels" or "points". */
 const char *cli_fit_kind(const cli_fit *f);
 
-/* x and y negated: from RAS to LPS and back. */
-void cli_turn_ras(double *points, size_t n);
+/* Negates x and y of points[n][3]: RAS to LPS and back. */
+void cli_fit_negate_xy(double *points, size_t n);
 
-/* Output files: whether they can be written, before any work; writing them. */
+/* Before any work: checks the types of the output files and that they can be written. SDM_E_ARG,
+ * SDM_E_IO. */
 sdm_status cli_fit_check_files(const cli_args *args, sdm_error *err);
+
+/* Writes the output files. */
 sdm_status cli_fit_write_files(const cli_fit *f, sdm_error *err);
+
+/* Writes slices of the image near the shape with the contour of the fitted shape, and of the
+ * reference where --reference gives one. */
 sdm_status cli_fit_write_picture(const cli_fit *f, const char *path, sdm_error *err);
 
-/* The result for people on stdout, and as one JSON object. */
+/* Prints the result as text on stdout. */
 void cli_fit_print(const cli_fit *f);
+
+/* Adds the result as one JSON object. */
 void cli_fit_json(const cli_fit *f, sdm_json *json);
 
 void cli_fit_dispose(cli_fit *f);

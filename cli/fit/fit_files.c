@@ -1,19 +1,18 @@
-/* The output files of a fit. */
+/* Checks and writes the output files of a fit. */
 #include <stdio.h>
 
 #include "fit_command.h"
 #include "inputs/setup.h"
 #include "report/files.h"
+#include "report/json_values.h"
 #include "report/output.h"
-#include "sdm/internal/file.h"
 #include "sdm/memory.h"
 
-/* Types that lie on the grid of the image; the others have the pose of the shape. */
+/* Files of these types are written on the grid of the image, level sets and surfaces in the pose of
+ * the shape. */
 static bool is_image(const char *path)
 {
-    return cli_ends_with(path, ".nii") || cli_ends_with(path, ".nii.gz") ||
-           cli_ends_with(path, ".nrrd") || cli_ends_with(path, ".mha") ||
-           cli_ends_with(path, ".npy");
+    return cli_ends_with_any(path, CLI_VOLUME_ENDINGS " .npy");
 }
 
 /* ---- before any work ---- */
@@ -25,38 +24,31 @@ sdm_status cli_fit_check_files(const cli_args *args, sdm_error *err)
     for (size_t i = 0; i < args->outputs.n && !s; i++)
         if (!cli_ends_with(args->outputs.items[i], ".json"))
             s = cli_check_type(args->outputs.items[i], false, err);
-    if (!s && label && (!is_image(label) || cli_ends_with(label, ".npy")))
+    if (!s && label && !cli_ends_with_any(label, CLI_VOLUME_ENDINGS))
         s = sdm_fail(err, SDM_E_ARG,
                      "--label-out '%s': its name must end in .nii .nii.gz .nrrd or .mha", label);
     return s ? s : cli_check_files(args, NULL, err);
 }
 
-/* ---- after it ---- */
+/* ---- after the fit ---- */
 
 static sdm_status write_json(const cli_fit *f, const char *path, sdm_error *err)
 {
     sdm_json json = {0};
-    sdm_outfile *file = NULL;
     cli_fit_json(f, &json);
-    sdm_status s = json.text.failed ? sdm_fail(err, SDM_E_NOMEM, "%s: no memory", path) : SDM_OK;
-    if (!s) s = sdm_outfile_open(path, &file, err);
-    if (!s) s = sdm_outfile_printf(file, err, "%s\n", json.text.data);
-    if (!s)
-        s = sdm_outfile_commit(&file, err);
-    else
-        sdm_outfile_discard(&file);
+    const sdm_status s = cli_json_write(&json, path, err);
     sdm_json_dispose(&json);
     return s;
 }
 
-/* A map of the fit on one of its two grids, with what is known of it. */
-typedef struct drawing {
+/* Metadata of the maps of a fit. */
+typedef struct map_metadata {
     const cli_fit *f;
-    sdm_text params;
-    char origin[64];
-} drawing;
+    sdm_text params; /* "a=4.4 alpha=0.5" */
+    char origin[64]; /* "model CHECKSUM" or "exact" */
+} map_metadata;
 
-static sdm_status write_map(const drawing *d, const char *path, const sdm_grid *g,
+static sdm_status write_map(const map_metadata *d, const char *path, const sdm_grid *g,
                             const float *values, sdm_error *err)
 {
     const cli_fit *f = d->f;
@@ -85,21 +77,22 @@ static sdm_status write_labels(const cli_fit *f, const sdm_grid *g, const float 
     return s;
 }
 
-/* Files on the grid of the image; a fit to points has none but that of the map. */
-static sdm_status write_images(const drawing *d, sdm_error *err)
+/* Writes images and labels on the grid of the image; after a fit to points, which has no image, on
+ * the grid of the map. */
+static sdm_status write_images(const map_metadata *d, sdm_error *err)
 {
     const cli_fit *f = d->f;
     const cli_list *outputs = &f->args->outputs;
     const bool points = f->target.kind == SDM_FIT_POINTS;
-    const sdm_grid *g = points ? &f->posed : &f->target.grid;
+    const sdm_grid *g = points ? &f->map_grid : &f->target.grid;
     bool wanted = f->args->fit.label_out;
     for (size_t i = 0; i < outputs->n; i++) wanted = wanted || is_image(outputs->items[i]);
     if (!wanted) return SDM_OK;
     float *values = points ? f->map : NULL;
     sdm_status s = points ? SDM_OK : SDM_ALLOC(&values, sdm_grid_count(g), "distance map", err);
     if (!s && !points)
-        s = sdm_fit_map(&f->drawn, f->result.params, &f->result.pose, g, f->opts.n_threads, values,
-                        err);
+        s = sdm_fit_map(&f->map_source, f->result.params, &f->result.pose, g, f->opts.n_threads,
+                        values, err);
     for (size_t i = 0; i < outputs->n && !s; i++)
         if (is_image(outputs->items[i])) s = write_map(d, outputs->items[i], g, values, err);
     if (!s && f->args->fit.label_out) s = write_labels(f, g, values, err);
@@ -110,7 +103,7 @@ static sdm_status write_images(const drawing *d, sdm_error *err)
 sdm_status cli_fit_write_files(const cli_fit *f, sdm_error *err)
 {
     const cli_list *outputs = &f->args->outputs;
-    drawing d = {.f = f, .origin = "exact"};
+    map_metadata d = {.f = f, .origin = "exact"};
     if (f->by_network)
         snprintf(d.origin, sizeof d.origin, "model %016llx",
                  (unsigned long long)sdm_model_get_info(f->model)->checksum);
@@ -123,10 +116,10 @@ sdm_status cli_fit_write_files(const cli_fit *f, sdm_error *err)
         if (is_image(path)) continue;
         if (cli_ends_with(path, ".json"))
             s = write_json(f, path, err);
-        else if (cli_ends_with(path, ".png") && f->target.kind != SDM_FIT_POINTS)
+        else if (cli_is_picture(path) && f->target.kind != SDM_FIT_POINTS)
             s = cli_fit_write_picture(f, path, err);
         else
-            s = write_map(&d, path, &f->posed, f->map, err);
+            s = write_map(&d, path, &f->map_grid, f->map, err);
     }
     sdm_text_dispose(&d.params);
     return s;

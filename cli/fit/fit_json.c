@@ -1,30 +1,15 @@
-/* The result of a fit as JSON. */
+/* Writes the result of a fit as JSON. */
 #include <math.h>
 
 #include "fit_command.h"
-#include "inputs/setup.h"
-#include "report/terminal.h"
+#include "report/json_values.h"
 #include "sdm/internal/threads.h"
 
-static void add_numbers(sdm_json *j, const char *key, const double *v, size_t n)
-{
-    sdm_json_open(j, key, '[');
-    for (size_t i = 0; i < n; i++) sdm_json_real(j, NULL, v[i]);
-    sdm_json_close(j, ']');
-}
-
-static void add_named(sdm_json *j, const char *key, const cli_fit *f, const double *v)
-{
-    sdm_json_open(j, key, '{');
-    for (size_t i = 0; i < f->n_params; i++) sdm_json_real(j, f->params[i].name, v[i]);
-    sdm_json_close(j, '}');
-}
-
-/* Rows and columns in the order of "unknowns". */
+/* Adds m[n][n]. Rows and columns have the order of the member "unknowns". */
 static void add_matrix(sdm_json *j, const char *key, const double *m, size_t n)
 {
     sdm_json_open(j, key, '[');
-    for (size_t i = 0; i < n; i++) add_numbers(j, NULL, m + i * n, n);
+    for (size_t i = 0; i < n; i++) cli_json_reals(j, NULL, m + i * n, n);
     sdm_json_close(j, ']');
 }
 
@@ -33,8 +18,9 @@ static void add_unknowns(sdm_json *j, const cli_fit *f)
     static const char *const pose[6] = {"rotation_x",    "rotation_y",    "rotation_z",
                                         "translation_x", "translation_y", "translation_z"};
     const sdm_fit_result *r = &f->result;
-    add_named(j, "parameters", f, r->params);
-    add_named(j, "parameters_sd", f, r->sd);
+    // parameters
+    cli_json_params(j, "parameters", f->params, f->n_params, r->params);
+    cli_json_params(j, "parameters_sd", f->params, f->n_params, r->sd);
     sdm_json_open(j, "at_bound", '[');
     for (size_t i = 0; i < f->n_params; i++)
         if (r->at_bound[i]) sdm_json_text(j, NULL, f->params[i].name);
@@ -43,17 +29,19 @@ static void add_unknowns(sdm_json *j, const cli_fit *f)
     for (size_t i = 0; i < f->n_params; i++)
         if (r->by_prior[i]) sdm_json_text(j, NULL, f->params[i].name);
     sdm_json_close(j, ']');
+    // pose
     sdm_json_open(j, "pose", '{');
-    add_numbers(j, "rotation_rad", r->pose.rotation, 3);
-    add_numbers(j, "translation_mm", r->pose.translation, 3);
-    add_numbers(j, "rotation_sd_rad", r->sd + f->n_params, 3);
-    add_numbers(j, "translation_sd_mm", r->sd + f->n_params + 3, 3);
+    cli_json_reals(j, "rotation_rad", r->pose.rotation, 3);
+    cli_json_reals(j, "translation_mm", r->pose.translation, 3);
+    cli_json_reals(j, "rotation_sd_rad", r->sd + f->n_params, 3);
+    cli_json_reals(j, "translation_sd_mm", r->sd + f->n_params + 3, 3);
     sdm_json_text(j, "meaning",
                   "world = R x + translation, LPS mm; R turns about the origin of the shape's "
                   "frame by the rotation "
                   "vector (axis times angle); sd of the rotation: of a small turn after it about "
                   "the axes of the world");
     sdm_json_close(j, '}');
+    // correlation and covariance
     sdm_json_open(j, "unknowns", '[');
     for (size_t i = 0; i < f->n_params; i++) sdm_json_text(j, NULL, f->params[i].name);
     for (int i = 0; i < 6; i++) sdm_json_text(j, NULL, pose[i]);
@@ -62,7 +50,8 @@ static void add_unknowns(sdm_json *j, const cli_fit *f)
     add_matrix(j, "covariance", r->covariance, f->n_params + 6);
 }
 
-static void add_laws(sdm_json *j, const char *key, const sdm_fit_law *law, size_t n)
+/* Adds the n normal distributions of the values on one side of the surface. */
+static void add_mixture(sdm_json *j, const char *key, const sdm_fit_law *law, size_t n)
 {
     sdm_json_open(j, key, '[');
     for (size_t i = 0; i < n; i++) {
@@ -91,8 +80,8 @@ static void add_target(sdm_json *j, const cli_fit *f)
     sdm_json_real(j, "evidence", r->evidence);
     if (r->blur > 0) sdm_json_real(j, "blur_mm", r->blur);
     sdm_json_real(j, "map_voxel_mm", cli_fit_map_voxel(f));
-    add_laws(j, "inside", r->appearance.inside, r->appearance.n_inside);
-    add_laws(j, "outside", r->appearance.outside, r->appearance.n_outside);
+    add_mixture(j, "inside", r->appearance.inside, r->appearance.n_inside);
+    add_mixture(j, "outside", r->appearance.outside, r->appearance.n_outside);
 }
 
 static void add_overlap(sdm_json *j, const cli_fit *f)
@@ -100,7 +89,7 @@ static void add_overlap(sdm_json *j, const cli_fit *f)
     const cli_overlap *o = &f->overlap;
     if (!o->measured) return;
     sdm_json_open(j, "overlap", '{');
-    sdm_json_text(j, "with", f->own_reference ? f->path : f->args->fit.reference);
+    sdm_json_text(j, "with", f->reference_is_target ? f->path : f->args->fit.reference);
     if (!isnan(f->args->fit.label_close))
         sdm_json_real(j, "label_close_mm", f->args->fit.label_close);
     sdm_json_real(j, "dice", o->dice);
@@ -118,7 +107,7 @@ static void add_work(sdm_json *j, const cli_fit *f)
 {
     const sdm_fit_result *r = &f->result;
     sdm_json_int(j, "iterations", (int64_t)r->n_iterations);
-    add_numbers(j, "objective", r->objective, r->n_iterations);
+    cli_json_reals(j, "objective", r->objective, r->n_iterations);
     sdm_json_bool(j, "start_clamped", f->start_clamped || r->start_clamped);
     sdm_json_int(j, "turn", (int64_t)r->turn);
     sdm_json_int(j, "maps_network", (int64_t)r->n_network);
@@ -148,6 +137,6 @@ void cli_fit_json(const cli_fit *f, sdm_json *j)
     add_overlap(j, f);
     add_target(j, f);
     add_work(j, f);
-    if (f->target.kind != SDM_FIT_POINTS) cli_json_grid(j, "grid", &f->target.grid);
+    if (f->target.kind != SDM_FIT_POINTS) cli_json_grid(j, "grid", &f->target.grid, false);
     sdm_json_close(j, '}');
 }

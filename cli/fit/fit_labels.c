@@ -1,15 +1,16 @@
-/* Labels of a label map or a segmentation as a mask. */
+/* Selects labels of a label map or a segmentation as a mask of 1 and 0. */
 #include <math.h>
 
 #include "fit_command.h"
 #include "sdm/memory.h"
 
-/* What one word stands for: a value in one layer, or in all. */
+/* A label: a value in one layer or in all layers. */
 typedef struct label {
     float value;
-    size_t layer; /* n_layers: all */
+    size_t layer; /* n_layers: all layers */
 } label;
 
+/* The label of a word: the name of a segment, or a value. */
 static sdm_status find_label(const char *path, const sdm_volume *v, const char *word, label *out,
                              sdm_error *err)
 {
@@ -33,7 +34,7 @@ static sdm_status find_label(const char *path, const sdm_volume *v, const char *
         word);
 }
 
-/* Returns how many voxels have it. */
+/* Sets the voxels of the label to 1; returns their number. */
 static size_t add_label(const sdm_volume *v, const label *l, float *mask)
 {
     const size_t n = sdm_grid_count(&v->grid);
@@ -47,7 +48,7 @@ static size_t add_label(const sdm_volume *v, const label *l, float *mask)
     return found;
 }
 
-/* Without words: every voxel that is not 0, in any layer. */
+/* Sets every voxel to 1 that is not 0 in some layer. */
 static void add_all(const sdm_volume *v, float *mask)
 {
     const size_t n = sdm_grid_count(&v->grid);
@@ -55,8 +56,8 @@ static void add_all(const sdm_volume *v, float *mask)
         if (v->values[i] > 0 || v->values[i] < 0) mask[i % n] = 1;
 }
 
-sdm_status cli_label_mask(const char *path, const sdm_volume *v, const cli_list *words,
-                          float *values, sdm_error *err)
+sdm_status cli_fit_label_mask(const char *path, const sdm_volume *v, const cli_list *words,
+                              float *values, sdm_error *err)
 {
     const size_t n = sdm_grid_count(&v->grid);
     for (size_t i = 0; i < n; i++) values[i] = 0;
@@ -76,7 +77,8 @@ sdm_status cli_label_mask(const char *path, const sdm_volume *v, const cli_list 
     return SDM_OK;
 }
 
-sdm_status cli_close_labels(const cli_fit *f, const sdm_grid *grid, float *values, sdm_error *err)
+sdm_status cli_fit_close_labels(const cli_fit *f, const sdm_grid *grid, float *values,
+                                sdm_error *err)
 {
     const double radius = f->args->fit.label_close;
     if (isnan(radius)) return SDM_OK;

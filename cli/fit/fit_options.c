@@ -1,23 +1,24 @@
-/* Options of a fit from the command line. */
+/* Sets the options of a fit from the command line. */
 #include <math.h>
 #include <string.h>
 
 #include "fit_command.h"
 
-static sdm_fit_law law(const double given[2], double weight)
+static sdm_fit_law make_law(const double given[2], double weight)
 {
     return (sdm_fit_law){.weight = weight, .mean = given[0], .sd = given[1]};
 }
 
-static sdm_status read_appearance(const cli_fit_args *a, sdm_fit_appearance *look, sdm_error *err)
+/* Values of the tissues at the start. The default second tissue outside (air) is dropped when the
+ * command line gives other tissues but no air. */
+static sdm_status read_appearance(const cli_fit_args *a, sdm_fit_appearance *t, sdm_error *err)
 {
     const bool has_air = !isnan(a->air[0]), other = !isnan(a->inside[0]) || !isnan(a->outside[0]);
-    if (!isnan(a->inside[0])) look->inside[0] = law(a->inside, 1);
-    if (!isnan(a->outside[0])) look->outside[0] = law(a->outside, look->outside[0].weight);
-    if (has_air) look->outside[1] = law(a->air, look->outside[1].weight);
-    if (other && !has_air) look->n_outside = 1;
-    if (look->inside[0].sd > 0 && look->outside[0].sd > 0 &&
-        (look->n_outside == 1 || look->outside[1].sd > 0))
+    if (!isnan(a->inside[0])) t->inside[0] = make_law(a->inside, 1);
+    if (!isnan(a->outside[0])) t->outside[0] = make_law(a->outside, t->outside[0].weight);
+    if (has_air) t->outside[1] = make_law(a->air, t->outside[1].weight);
+    if (other && !has_air) t->n_outside = 1;
+    if (t->inside[0].sd > 0 && t->outside[0].sd > 0 && (t->n_outside == 1 || t->outside[1].sd > 0))
         return SDM_OK;
     return sdm_fail(err, SDM_E_ARG,
                     "fit: --inside, --outside and --air need standard deviations above 0");
@@ -42,22 +43,24 @@ static sdm_status read_keep(const cli_list *words, sdm_fit_opts *o, sdm_error *e
         *known[k].field = true;
     }
     if (o->keep_params && o->keep_pose)
-        return sdm_fail(err, SDM_E_ARG, "--keep of parameters and pose leaves nothing to fit");
+        return sdm_fail(err, SDM_E_ARG,
+                        "--keep parameters and --keep pose together leave nothing to fit");
     return SDM_OK;
 }
 
-static void set(double given, double *field)
+/* *field = the given number, unless the option is missing. */
+static void set_real(double given, double *field)
 {
     if (!isnan(given)) *field = given;
 }
 
-/* Two opposite corners, in any order. */
+/* --region: a box from two opposite corners in any order. */
 static void read_region(const cli_fit_args *a, sdm_fit_opts *o)
 {
     if (isnan(a->region[0])) return;
     double corner[6];
     memcpy(corner, a->region, sizeof corner);
-    if (a->ras) cli_turn_ras(corner, 2);
+    if (a->ras) cli_fit_negate_xy(corner, 2);
     o->use_box = true;
     for (int k = 0; k < 3; k++) {
         o->box_min[k] = fmin(corner[k], corner[3 + k]);
@@ -71,16 +74,16 @@ sdm_status cli_fit_read_options(cli_fit *f, sdm_error *err)
     sdm_fit_opts *o = &f->opts;
     *o = sdm_fit_defaults();
     if (!strcmp(a->image_model, "labels")) o->image_model = SDM_FIT_LABELS;
-    set(a->blur, &o->blur);
-    set(a->l_ref, &o->l_ref);
-    set(a->point_sd, &o->point_sd);
-    set(a->margin, &o->margin);
-    set(a->cavity, &o->cavity);
-    set(a->tissue_places, &o->tissue_mm);
-    set(a->least_inside, &o->least_inside);
-    set(a->prior_sd, &o->prior_sd);
-    set(a->prior_rotation, &o->prior_rotation_sd);
-    set(a->prior_translation, &o->prior_translation_sd);
+    set_real(a->blur, &o->blur);
+    set_real(a->l_ref, &o->l_ref);
+    set_real(a->point_sd, &o->point_sd);
+    set_real(a->margin, &o->margin);
+    set_real(a->cavity, &o->cavity);
+    set_real(a->tissue_field, &o->tissue_mm);
+    set_real(a->least_inside, &o->least_inside);
+    set_real(a->prior_sd, &o->prior_sd);
+    set_real(a->prior_rotation, &o->prior_rotation_sd);
+    set_real(a->prior_translation, &o->prior_translation_sd);
     if (!isnan(a->eps)) o->eps = o->polish_eps = a->eps;
     if (a->max_iterations) o->max_iterations = (size_t)a->max_iterations;
     if (a->polish) o->max_polish_iterations = o->max_iterations;

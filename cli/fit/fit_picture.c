@@ -1,4 +1,4 @@
-/* A picture of a fit: the contour over slices of the image near the shape. */
+/* Draws the contour of the fitted shape over slices of the image near the shape. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -8,8 +8,8 @@
 #include "sdm/memory.h"
 #include "sdm/picture.h"
 
-/* Trilinear; 0 outside of the grid. */
-static double sample(const sdm_grid *g, const float *values, const double world[3])
+/* Trilinear interpolation at a point of the world; voxels outside of the grid count as 0. */
+static double interpolate(const sdm_grid *g, const float *values, const double world[3])
 {
     double at[3], sum = 0;
     sdm_grid_index(g, world, at);
@@ -30,7 +30,7 @@ static double sample(const sdm_grid *g, const float *values, const double world[
     return sum;
 }
 
-/* The labels to compare with on the grid of the picture, below 0 inside. */
+/* out[g] = the reference labels on the grid of the picture, as 0.5 - label: below 0 inside. */
 static void sample_reference(const cli_fit *f, const sdm_grid *g, float *out)
 {
     for (int64_t k = 0; k < g->n[2]; k++)
@@ -39,11 +39,12 @@ static void sample_reference(const cli_fit *f, const sdm_grid *g, float *out)
                 const double index[3] = {(double)i, (double)j, (double)k};
                 double world[3];
                 sdm_grid_world(g, index, world);
-                *out++ = 0.5f - (float)sample(&f->reference_grid, f->reference, world);
+                *out++ = 0.5f - (float)interpolate(&f->reference_grid, f->reference, world);
             }
 }
 
-/* The voxels that are shown: the shape and half of its extent around, within the image. */
+/* The voxels to draw: the bounding box of the shape, enlarged by half of its longest edge and
+ * clipped to the image; the whole image if the shape lies outside. */
 static cli_block choose_block(const cli_fit *f)
 {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY},
@@ -64,14 +65,16 @@ sdm_status cli_fit_write_picture(const cli_fit *f, const char *path, sdm_error *
     const cli_block block = choose_block(f);
     const sdm_grid g = cli_block_grid(&f->target.grid, &block);
     const size_t n = sdm_grid_count(&g);
-    const bool compared = f->reference && !f->own_reference;
+    const bool compared = f->reference && !f->reference_is_target;
+    // image, map and reference on the grid of the picture
     float *image = NULL, *map = NULL, *reference = NULL;
     sdm_status s = SDM_ALLOC(&image, n, "picture", err);
     if (!s) s = SDM_ALLOC(&map, n, "picture", err);
     if (!s && compared) s = SDM_ALLOC(&reference, n, "picture", err);
     if (!s)
-        s = sdm_fit_map(&f->drawn, f->result.params, &f->result.pose, &g, f->opts.n_threads, map,
-                        err);
+        s = sdm_fit_map(&f->map_source, f->result.params, &f->result.pose, &g, f->opts.n_threads,
+                        map, err);
+    // draw them
     if (!s) {
         char title[200], fitted[120];
         const sdm_picture_map maps[2] = {{fitted, map, false}, {"reference", reference, false}};

@@ -1,4 +1,4 @@
-/* The result of a fit for people. */
+/* Prints the result of a fit as text. */
 #include <math.h>
 #include <stdio.h>
 
@@ -13,10 +13,10 @@ static void print_params(const cli_fit *f)
         if (isnan(r->sd[i])) printf(" +- %-9s", "unknown");
         if (r->sd[i] > 0) printf(" +- %-9.2g", r->sd[i]);
         printf(" %s%s%s\n", p->unit,
-               r->at_bound[i] ? "   at the end of its range: the standard deviation says little"
+               r->at_bound[i] ? "   at the end of its range: the standard deviation is unreliable"
                               : "",
                r->by_prior[i]
-                   ? "   not determined: the standard deviation is at least that of before the fit"
+                   ? "   not determined: the standard deviation is at least that of the prior"
                    : "");
     }
 }
@@ -34,7 +34,7 @@ static void print_overlap(const cli_fit *f)
     const cli_overlap *o = &f->overlap;
     if (!o->measured) return;
     printf("%s: Dice %.4f (%zu voxels fitted, %zu labelled",
-           f->own_reference ? "labels" : "reference", o->dice, o->n_fit, o->n_reference);
+           f->reference_is_target ? "labels" : "reference", o->dice, o->n_fit, o->n_reference);
     if (!isnan(f->args->fit.label_close)) printf(", closed by %g mm", f->args->fit.label_close);
     printf(")\n");
     if (o->has_surface)
@@ -47,47 +47,51 @@ static void print_law(const char *side, const sdm_fit_law *law)
     printf("  %-12s %.4g (sd %.3g)", side, law->mean, law->sd);
 }
 
-// maps with voxels of more point spreads make what is weakly determined look surer than it is
-#define SPREADS_MOST 1.5
+/* With voxels of the maps larger than this times the point spread, the standard deviations of
+ * weakly determined parameters come out too small. */
+#define VOXEL_OVER_SPREAD_MAX 1.5
 
 static void print_spread(const cli_fit *f)
 {
     const double blur = f->result.blur, voxel = cli_fit_map_voxel(f);
     printf("  point spread %.3g mm\n", blur);
-    if (f->opts.keep_params || !(voxel > SPREADS_MOST * blur)) return;
-    printf("  maps of %.3g mm are coarse beside it: standard deviations may be too small; a fit "
-           "with %s--spacing %.2g has "
-           "finer ones\n",
-           voxel, f->source.model ? "--exact " : "", blur);
+    if (f->opts.keep_params || !(voxel > VOXEL_OVER_SPREAD_MAX * blur)) return;
+    printf(
+        "  the voxels of the maps, %.3g mm, are coarse compared with it: standard deviations may "
+        "be too small; a fit with %s--spacing %.2g has finer maps\n",
+        voxel, f->source.model ? "--exact " : "", blur);
 }
 
-/* What the image looks like to the fit. */
+/* The used voxels or points, the values of the tissues and the evidence. */
 static void print_target(const cli_fit *f)
 {
     const sdm_fit_result *r = &f->result;
     if (f->target.kind == SDM_FIT_POINTS) {
-        printf("points: %zu, %.3g mm about the surface\n", r->n_used, r->point_sd);
+        printf("points: %zu, standard deviation %.3g mm about the surface\n", r->n_used,
+               r->point_sd);
         return;
     }
+    // voxels
     printf("%s: %zu voxels near the shape", cli_fit_kind(f), r->n_used);
     if (r->n_nan)
-        printf(", %zu left out because they are NaN%s", r->n_nan,
-               r->n_cavity ? " or in wide spaces" : "");
+        printf(", %zu ignored because they are NaN%s", r->n_nan,
+               r->n_cavity ? " or in wide spaces (--cavity)" : "");
     if (!isnan(r->inside_share))
         printf(", %.0f %% of the shape in the image", 100 * r->inside_share);
     printf("\n");
     if (f->target.kind != SDM_FIT_IMAGE) return;
+    // values of the tissues
     print_law("inside", &r->appearance.inside[0]);
     printf("\n");
     for (size_t i = 0; i < r->appearance.n_outside; i++) {
-        if (r->appearance.outside[i].weight < 1e-3) continue; // not in this image
+        if (r->appearance.outside[i].weight < 1e-3) continue; // no such tissue in this image
         print_law("outside", &r->appearance.outside[i]);
         printf(r->appearance.n_outside > 1 ? ", share %.2g\n" : "\n",
                r->appearance.outside[i].weight);
     }
     if (r->blur > 0) print_spread(f);
     if (!isnan(r->evidence))
-        printf("  evidence     %.4g (log-likelihood over an image without the shape)\n",
+        printf("  evidence     %.4g (log-likelihood relative to an image without the shape)\n",
                r->evidence);
 }
 

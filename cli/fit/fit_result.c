@@ -1,4 +1,4 @@
-/* The estimate as a map and a surface in the world. */
+/* Computes the map and the zero surface of the estimate in the world. */
 #include <string.h>
 
 #include "fit_command.h"
@@ -14,9 +14,9 @@ const char *cli_fit_kind(const cli_fit *f)
                                              : "points";
 }
 
-/* The source's grid, turned and moved with the shape: its map is that of the source, not
- * interpolated. */
-static sdm_grid pose_grid(const sdm_grid *g, const sdm_pose *pose)
+/* The grid, rotated and translated with the shape. On it the source's values need no interpolation.
+ */
+static sdm_grid grid_in_pose(const sdm_grid *g, const sdm_pose *pose)
 {
     sdm_grid posed = *g;
     double r[9];
@@ -26,22 +26,24 @@ static sdm_grid pose_grid(const sdm_grid *g, const sdm_pose *pose)
     return posed;
 }
 
-sdm_status cli_fit_draw_up(cli_fit *f, sdm_error *err)
+sdm_status cli_fit_make_map(cli_fit *f, sdm_error *err)
 {
     const sdm_fit_result *r = &f->result;
-    f->drawn = f->source;
-    if (f->source.model &&
-        r->n_exact > r->n_exact_outside) { // the last maps were those of a polish
-        f->drawn.grid = sdm_model_get_info(f->model)->grid;
-        f->drawn.model = NULL;
+    f->map_source = f->source;
+    // exact maps within the trained range come from polishing, which is the last phase
+    if (f->source.model && r->n_exact > r->n_exact_outside) {
+        f->map_source.grid = sdm_model_get_info(f->model)->grid;
+        f->map_source.model = NULL;
     }
-    f->by_network = f->drawn.model && !cli_check_range(f->params, f->n_params, r->params, NULL);
-    f->posed =
-        pose_grid(f->drawn.model ? &sdm_model_get_info(f->model)->grid : &f->drawn.grid, &r->pose);
-    sdm_status s = SDM_ALLOC(&f->map, sdm_grid_count(&f->posed), "distance map", err);
+    f->by_network =
+        f->map_source.model && !cli_check_range(f->params, f->n_params, r->params, NULL);
+    f->map_grid = grid_in_pose(
+        f->map_source.model ? &sdm_model_get_info(f->model)->grid : &f->map_source.grid, &r->pose);
+    sdm_status s = SDM_ALLOC(&f->map, sdm_grid_count(&f->map_grid), "distance map", err);
     if (!s)
-        s = sdm_fit_map(&f->drawn, r->params, &r->pose, &f->posed, f->opts.n_threads, f->map, err);
-    return s ? s : sdm_isosurface(&f->posed, f->map, 0.0f, &f->surface, NULL, err);
+        s = sdm_fit_map(&f->map_source, r->params, &r->pose, &f->map_grid, f->opts.n_threads,
+                        f->map, err);
+    return s ? s : sdm_isosurface(&f->map_grid, f->map, 0.0f, &f->surface, NULL, err);
 }
 
 void cli_fit_dispose(cli_fit *f)
@@ -49,7 +51,7 @@ void cli_fit_dispose(cli_fit *f)
     sdm_mesh_dispose(&f->surface);
     sdm_free(f->map);
     sdm_fit_dispose(&f->result);
-    if (!f->own_reference) sdm_free(f->reference);
+    if (!f->reference_is_target) sdm_free(f->reference);
     sdm_free(f->points);
     sdm_free(f->mask);
     sdm_volume_dispose(&f->image);

@@ -1,4 +1,4 @@
-/* Where the maps of a fit come from: a network, the exact engine, or both. */
+/* Opens the source of the maps of a fit: a network, the exact engine, or both. */
 #include <math.h>
 #include <string.h>
 
@@ -10,7 +10,7 @@ static sdm_status open_model(cli_fit *f, sdm_error *err)
 {
     const cli_args *args = f->args;
     if (args->options.n)
-        return sdm_fail(err, SDM_E_ARG, "fit: -O belongs to --shape, a model states its own");
+        return sdm_fail(err, SDM_E_ARG, "fit: -O belongs to --shape; a model has its own options");
     sdm_status s = sdm_model_open(f->model_path, &f->model, err);
     if (s) return s;
     const sdm_model_info *info = sdm_model_get_info(f->model);
@@ -35,7 +35,7 @@ static sdm_status open_model(cli_fit *f, sdm_error *err)
 static sdm_status open_shape(cli_fit *f, sdm_error *err)
 {
     sdm_status s = cli_open_registry(f->args, &f->registry, err);
-    if (!s) s = cli_open_shape(f->registry, f->args->shape, &f->args->options, &f->shape, err);
+    if (!s) s = cli_create_shape(f->registry, f->args->shape, &f->args->options, &f->shape, err);
     if (!s) f->shape_name = f->args->shape;
     return s;
 }
@@ -48,7 +48,7 @@ static sdm_status shape_params(cli_fit *f, sdm_error *err)
     return s;
 }
 
-/* Enlarges the box by that of the shape at p. */
+/* Enlarges the box min .. max by the bounding box of the shape at p. */
 static sdm_status add_box(const cli_fit *f, const double *p, double min[3], double max[3],
                           sdm_error *err)
 {
@@ -63,8 +63,8 @@ static sdm_status add_box(const cli_fit *f, const double *p, double min[3], doub
     return s;
 }
 
-/* A grid that holds the shape wherever one parameter goes from the start: beyond it the distance is
- * an estimate. */
+/* Sets the grid of exact maps: it holds the shape at the start and with any one parameter at an end
+ * of its range. Beyond the grid a fit only estimates distances. */
 static sdm_status exact_grid(cli_fit *f, sdm_error *err)
 {
     if (f->model && !(f->args->spacing[0] > 0)) {
@@ -84,7 +84,7 @@ static sdm_status exact_grid(cli_fit *f, sdm_error *err)
         p[i] = f->start[i];
     }
     sdm_free(p);
-    return s ? s : cli_fit_grid(f->args, min, max, &f->source.grid, err);
+    return s ? s : cli_grid_for_box(f->args, min, max, &f->source.grid, err);
 }
 
 double cli_fit_map_voxel(const cli_fit *f)
@@ -94,7 +94,7 @@ double cli_fit_map_voxel(const cli_fit *f)
     return fmax(h[0], fmax(h[1], h[2]));
 }
 
-/* What the policy asks of the start. */
+/* Checks the start parameters, or clamps them, according to --policy. */
 static sdm_status check_start(cli_fit *f, sdm_error *err)
 {
     bool finite = true;
@@ -117,11 +117,11 @@ sdm_status cli_fit_open_source(cli_fit *f, sdm_error *err)
     if (network && f->args->spacing[0] > 0)
         return sdm_fail(
             err, SDM_E_ARG,
-            "fit: --spacing is of exact maps (--exact, --shape); a model has its own grid");
+            "fit: --spacing applies to exact maps (--exact, --shape); a model has its own grid");
     if (!network && f->args->fit.polish)
         return sdm_fail(
             err, SDM_E_ARG,
-            "fit: --polish comes after a network's fit; this one is exact from the start");
+            "fit: --polish follows the fit of a network; this fit is exact from the start");
     sdm_status s = f->model_path ? open_model(f, err) : open_shape(f, err);
     if (!s && !f->params) s = shape_params(f, err);
     if (!s) s = SDM_ALLOC(&f->start, f->n_params, "parameters", err);

@@ -1,4 +1,4 @@
-/* Where a fit begins: a pose, and the rotations that are tried. */
+/* Sets the start pose of a fit and the rotations to try. */
 #include <math.h>
 #include <string.h>
 
@@ -9,7 +9,7 @@
 
 enum { TURNS_ABOUT_AXIS = 12, TURNS_ALL = 60 };
 
-/* The middle of what is to be seen, in the world. */
+/* The middle of the points, labels, region or image, in the world. */
 static void default_centre(const cli_fit *f, double centre[3])
 {
     const sdm_grid *g = &f->target.grid;
@@ -38,19 +38,21 @@ static void default_centre(const cli_fit *f, double centre[3])
         for (int a = 0; a < 3; a++) centre[a] = 0.5 * (f->opts.box_min[a] + f->opts.box_max[a]);
 }
 
-static void given_point(const cli_fit *f, const double given[3], double out[3])
+/* out = a point or direction of the command line in LPS. */
+static void convert_to_lps(const cli_fit *f, const double given[3], double out[3])
 {
     memcpy(out, given, 3 * sizeof *out);
-    if (f->args->fit.ras) cli_turn_ras(out, 1);
+    if (f->args->fit.ras) cli_fit_negate_xy(out, 1);
 }
 
-/* Pairs of points from a table. */
-static sdm_status from_points(const cli_fit *f, sdm_pose *pose, sdm_error *err)
+/* --start-points: the pose that brings the points of the shape nearest to those of the image. */
+static sdm_status pose_from_points(const cli_fit *f, sdm_pose *pose, sdm_error *err)
 {
     static const sdm_param columns[6] = {{.name = "shape_x"}, {.name = "shape_y"},
                                          {.name = "shape_z"}, {.name = "x"},
                                          {.name = "y"},       {.name = "z"}};
     const double none[6] = {NAN, NAN, NAN, NAN, NAN, NAN};
+    // read the pairs
     const char *path = f->args->fit.start_points;
     double *rows = NULL, *shape = NULL, *world = NULL;
     size_t n = 0;
@@ -63,7 +65,8 @@ static sdm_status from_points(const cli_fit *f, sdm_pose *pose, sdm_error *err)
                          columns[i % 6].name, i / 6 + 1);
         (i % 6 < 3 ? shape : world)[i / 6 * 3 + i % 3] = rows[i];
     }
-    if (!s && f->args->fit.ras) cli_turn_ras(world, n);
+    // align them
+    if (!s && f->args->fit.ras) cli_fit_negate_xy(world, n);
     if (!s) s = sdm_fit_pose_from_points(shape, world, n, pose, err);
     if (s == SDM_E_ARG) {
         s = sdm_fail_in(err, SDM_E_FORMAT, "%s", path);
@@ -75,10 +78,11 @@ static sdm_status from_points(const cli_fit *f, sdm_pose *pose, sdm_error *err)
     return s;
 }
 
-static sdm_status check_words(const cli_fit *f, sdm_error *err)
+/* Refuses options that contradict each other. */
+static sdm_status check_start_options(const cli_fit *f, sdm_error *err)
 {
     const cli_fit_args *a = &f->args->fit;
-    const cli_phantom_args *p = &f->args->phantom;
+    const cli_pose_args *p = &f->args->pose;
     const int turned = !isnan(p->rotation[0]) + !isnan(a->start_axis[0]) + !!a->start_points;
     const int placed = !isnan(p->translation[0]) + !isnan(a->start_centre[0]) + !!a->start_points;
     if (turned > 1)
@@ -96,7 +100,8 @@ static sdm_status check_words(const cli_fit *f, sdm_error *err)
     return SDM_OK;
 }
 
-/* How many rotations, and about what; a rotation that is given is not doubted. */
+/* Sets the number of rotations to try and their axes. With a given start rotation no others are
+ * tried unless an option asks for them. */
 static void read_turns(cli_fit *f, bool has_rotation)
 {
     const cli_fit_args *a = &f->args->fit;
@@ -112,14 +117,15 @@ static void read_turns(cli_fit *f, bool has_rotation)
     if (f->opts.keep_pose) f->opts.turns = SDM_FIT_TURNS_NONE;
 }
 
-/* The pose that brings the middle of the shape to `centre`, turned as given. */
-static sdm_status from_centre(cli_fit *f, const double centre[3], sdm_error *err)
+/* The start pose with the middle of the shape at `centre` and the rotation of --start-axis or
+ * --rotation, else none. */
+static sdm_status pose_from_centre(cli_fit *f, const double centre[3], sdm_error *err)
 {
-    const cli_phantom_args *p = &f->args->phantom;
+    const cli_pose_args *p = &f->args->pose;
     sdm_pose *pose = &f->opts.start_pose;
     if (!isnan(f->args->fit.start_axis[0])) {
         double axis[3];
-        given_point(f, f->args->fit.start_axis, axis);
+        convert_to_lps(f, f->args->fit.start_axis, axis);
         return sdm_fit_pose_from_axis(f->pivot, centre, axis, pose, err);
     }
     double moved[3];
@@ -132,16 +138,16 @@ static sdm_status from_centre(cli_fit *f, const double centre[3], sdm_error *err
 
 sdm_status cli_fit_read_start(cli_fit *f, sdm_error *err)
 {
-    const cli_phantom_args *p = &f->args->phantom;
+    const cli_pose_args *p = &f->args->pose;
     const bool has_translation = !isnan(p->translation[0]),
                has_centre = !isnan(f->args->fit.start_centre[0]);
     const bool has_points = f->args->fit.start_points;
     double centre[3];
-    sdm_status s = check_words(f, err);
+    sdm_status s = check_start_options(f, err);
     if (!s) s = sdm_fit_centre(&f->source, f->start, f->pivot, err);
     if (s) return s;
     read_turns(f, has_points || has_translation || !isnan(p->rotation[0]));
-    if (has_points) return from_points(f, &f->opts.start_pose, err);
+    if (has_points) return pose_from_points(f, &f->opts.start_pose, err);
     if (has_translation) {
         for (int a = 0; a < 3; a++)
             f->opts.start_pose.rotation[a] = isnan(p->rotation[a]) ? 0 : p->rotation[a];
@@ -149,12 +155,12 @@ sdm_status cli_fit_read_start(cli_fit *f, sdm_error *err)
         return SDM_OK;
     }
     if (has_centre)
-        given_point(f, f->args->fit.start_centre, centre);
+        convert_to_lps(f, f->args->fit.start_centre, centre);
     else
         default_centre(f, centre);
     if (!has_centre && f->target.kind == SDM_FIT_IMAGE)
-        cli_notice("no start is given: the shape begins in the middle of the %s, %.4g, %.4g, %.4g "
-                   "mm (LPS)",
+        cli_notice("no start pose is given: the shape starts in the middle of the %s, %.4g, %.4g, "
+                   "%.4g mm (LPS)",
                    f->opts.use_box ? "region" : "image", centre[0], centre[1], centre[2]);
-    return from_centre(f, centre, err);
+    return pose_from_centre(f, centre, err);
 }

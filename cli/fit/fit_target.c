@@ -1,4 +1,4 @@
-/* What a fit is made to: an image, labels, a mesh or points. */
+/* Reads the target of a fit: an image, labels, a mesh or points. */
 #include <math.h>
 #include <string.h>
 
@@ -9,15 +9,10 @@
 #include "sdm/image.h"
 #include "sdm/memory.h"
 
-enum { POINTS_MOST = 50000 }; /* more vertices of a mesh add time, not knowledge */
+/* More vertices of a mesh make a fit slower but hardly more precise. */
+enum { POINTS_MAX = 50000 };
 
-static bool is_mesh(const char *path)
-{
-    return cli_ends_with(path, ".ply") || cli_ends_with(path, ".stl") ||
-           cli_ends_with(path, ".obj") || cli_ends_with(path, ".off");
-}
-
-void cli_turn_ras(double *points, size_t n)
+void cli_fit_negate_xy(double *points, size_t n)
 {
     for (size_t i = 0; i < n; i++) {
         points[3 * i] = -points[3 * i];
@@ -27,29 +22,29 @@ void cli_turn_ras(double *points, size_t n)
 
 /* ---- images ---- */
 
-static sdm_status as_image(cli_fit *f, sdm_error *err)
+static sdm_status use_image(cli_fit *f, sdm_error *err)
 {
     const sdm_volume *v = &f->image;
     if (v->n_segments)
         return sdm_fail(
             err, SDM_E_ARG,
-            "%s is a segmentation of %zu segments: name those of the shape, e.g. --label '%s'",
+            "%s is a segmentation of %zu segments: select those of the shape, e.g. --label '%s'",
             f->path, v->n_segments, v->segments[0].name);
     if (v->n_layers > 1)
         return sdm_fail(err, SDM_E_FORMAT, "%s has %zu layers, need one image", f->path,
                         v->n_layers);
     if (v->stored <= SDM_VOXEL_INT64 && v->min >= 0 && v->max <= 1)
-        cli_notice("%s holds 0 and 1 alone: for a label map give --label 1", f->path);
+        cli_notice("%s holds only 0 and 1: if it is a label map, give --label 1", f->path);
     f->target.kind = SDM_FIT_IMAGE;
     f->target.values = v->values;
     return SDM_OK;
 }
 
-static sdm_status as_labels(cli_fit *f, sdm_error *err)
+static sdm_status use_labels(cli_fit *f, sdm_error *err)
 {
     sdm_status s = SDM_ALLOC(&f->mask, sdm_grid_count(&f->image.grid), "labels", err);
-    if (!s) s = cli_label_mask(f->path, &f->image, &f->args->fit.labels, f->mask, err);
-    if (!s) s = cli_close_labels(f, &f->image.grid, f->mask, err);
+    if (!s) s = cli_fit_label_mask(f->path, &f->image, &f->args->fit.labels, f->mask, err);
+    if (!s) s = cli_fit_close_labels(f, &f->image.grid, f->mask, err);
     f->target.kind = SDM_FIT_LABEL;
     f->target.values = f->mask;
     return s;
@@ -59,9 +54,10 @@ static sdm_status read_volume(cli_fit *f, sdm_error *err)
 {
     sdm_status s = sdm_volume_read(f->path, &f->image, err);
     if (s) return s;
-    if (!f->image.placed) cli_notice("%s names no frame: its axes are taken as they are", f->path);
+    if (!f->image.placed)
+        cli_notice("%s states no frame: the default axes of its format are assumed", f->path);
     f->target.grid = f->image.grid;
-    return f->args->fit.labels.n ? as_labels(f, err) : as_image(f, err);
+    return f->args->fit.labels.n ? use_labels(f, err) : use_image(f, err);
 }
 
 /* ---- points ---- */
@@ -87,13 +83,13 @@ static sdm_status read_array(cli_fit *f, sdm_error *err)
     return SDM_OK;
 }
 
-/* The vertices; of very many every so many-th. */
+/* The vertices of a mesh file; if they exceed POINTS_MAX, every k-th of them. */
 static sdm_status read_vertices(cli_fit *f, sdm_error *err)
 {
     sdm_mesh mesh = {0};
     sdm_status s = cli_read_mesh(f->path, &mesh, err);
     if (s) return s;
-    const size_t step = 1 + (mesh.n_vert - 1) / POINTS_MOST,
+    const size_t step = 1 + (mesh.n_vert - 1) / POINTS_MAX,
                  n = mesh.n_vert ? 1 + (mesh.n_vert - 1) / step : 0;
     s = SDM_ALLOC(&f->points, 3 * n, "points", err);
     for (size_t i = 0; i < n && !s; i++)
@@ -106,7 +102,8 @@ static sdm_status read_vertices(cli_fit *f, sdm_error *err)
 static sdm_status read_points(cli_fit *f, sdm_error *err)
 {
     if (f->args->fit.labels.n)
-        return sdm_fail(err, SDM_E_ARG, "fit: --label is of volumes, %s has no labels", f->path);
+        return sdm_fail(err, SDM_E_ARG, "fit: --label applies to volumes; %s has no labels",
+                        f->path);
     const sdm_status s = cli_ends_with(f->path, ".csv")   ? read_table(f, err)
                          : cli_ends_with(f->path, ".npy") ? read_array(f, err)
                                                           : read_vertices(f, err);
@@ -118,7 +115,7 @@ static sdm_status read_points(cli_fit *f, sdm_error *err)
     if (f->target.n_points < 3)
         return sdm_fail(err, SDM_E_FORMAT, "%s: %zu points, need 3 or more", f->path,
                         f->target.n_points);
-    if (f->args->fit.ras) cli_turn_ras(f->points, f->target.n_points);
+    if (f->args->fit.ras) cli_fit_negate_xy(f->points, f->target.n_points);
     f->target.kind = SDM_FIT_POINTS;
     f->target.points = f->points;
     return SDM_OK;
@@ -127,8 +124,7 @@ static sdm_status read_points(cli_fit *f, sdm_error *err)
 sdm_status cli_fit_read_target(cli_fit *f, sdm_error *err)
 {
     if (sdm_volume_knows(f->path)) return read_volume(f, err);
-    if (is_mesh(f->path) || cli_ends_with(f->path, ".csv") || cli_ends_with(f->path, ".npy"))
-        return read_points(f, err);
+    if (cli_ends_with_any(f->path, CLI_MESH_ENDINGS " .csv .npy")) return read_points(f, err);
     return sdm_fail(err, SDM_E_ARG,
                     "fit: image '%s': its name must end in .nii .nii.gz .nrrd .nhdr .mha .mhd "
                     "(volume), .ply .stl .obj "

@@ -1,4 +1,4 @@
-/* Reads a configuration and creates its shape. */
+/* Reads the configuration of a training and creates its shape. */
 #define _XOPEN_SOURCE 700 // realpath()
 #include "config_shape.h"
 
@@ -39,8 +39,8 @@ sdm_status cli_read_config(const cli_args *args, sdm_config **out, sdm_error *er
     return s;
 }
 
-/* The folder of the configuration, absolute: what its relative paths start from. */
-static sdm_status folder_of(const char *file, char **out, sdm_error *err)
+/* *out = the absolute folder of the configuration, to be freed with free(). */
+static sdm_status find_folder(const char *file, char **out, sdm_error *err)
 {
     char folder[SDM_PATH_TEXT_MAX] = ".";
     const char *slash = strrchr(file, '/');
@@ -50,8 +50,8 @@ static sdm_status folder_of(const char *file, char **out, sdm_error *err)
     return *out ? SDM_OK : sdm_fail(err, SDM_E_IO, "%s: %s", folder, strerror(errno));
 }
 
-/* The place of the option that a message is about: the one it names in quotes, else the shape's
- * name. */
+/* The place in the file to report with a message: that of the option whose quoted name is in the
+ * text, else that of the shape's name. */
 static sdm_mark mark_of_message(const sdm_config *c, const char *text)
 {
     for (size_t i = 0; i < c->shape.n_options; i++) {
@@ -62,16 +62,16 @@ static sdm_mark mark_of_message(const sdm_config *c, const char *text)
     return c->shape.mark;
 }
 
-/* Puts the place of `mark` before the message. */
+/* Puts the place "file:line:column" of `mark` before the message in *err. */
 static sdm_status fail_at(const sdm_config *c, sdm_mark mark, sdm_status s, sdm_error *err)
 {
     char where[1200];
     return sdm_fail_in(err, s, "%s", sdm_config_where(c, mark, where));
 }
 
-/* Keeps the paths that the shape was made with: the configuration then means the same files
- * wherever it is written to. */
-static sdm_status keep_paths(sdm_config *c, const sdm_instance *made, sdm_error *err)
+/* Replaces the paths in the configuration's options by the absolute ones that the shape was created
+ * with. */
+static sdm_status store_absolute_paths(sdm_config *c, const sdm_instance *made, sdm_error *err)
 {
     const sdm_shape *shape = sdm_instance_shape(made);
     const sdm_option_value *values = sdm_instance_options(made);
@@ -100,10 +100,10 @@ sdm_status cli_config_shape(sdm_config *c, const sdm_registry *r, sdm_instance *
     for (size_t i = 0; i < c->shape.n_options; i++)
         options[i] = (sdm_named_text){c->shape.options[i].name, c->shape.options[i].value};
     char *folder = NULL;
-    sdm_status s = folder_of(c->file, &folder, err);
+    sdm_status s = find_folder(c->file, &folder, err);
     if (!s) s = sdm_instance_create(shape, options, c->shape.n_options, folder, out, err);
     free(folder);
-    if (!s) s = keep_paths(c, *out, err);
+    if (!s) s = store_absolute_paths(c, *out, err);
     if (s == SDM_E_CONFIG) return fail_at(c, mark_of_message(c, err ? err->text : ""), s, err);
     return s;
 }

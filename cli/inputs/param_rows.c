@@ -1,4 +1,4 @@
-/* Tables of parameters (CSV): a header of names, then one line of numbers for each map. */
+/* Reads CSV tables of numbers: a header line of names, then one line of numbers for each row. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,14 +9,15 @@
 
 enum { MAX_COLUMNS = 256, MAX_BYTES = 64 << 20 };
 
-typedef struct table {
+typedef struct csv_table {
     const char *path;
-    char *at; /* rest of the text */
-    int line;
-    size_t column[MAX_COLUMNS]; /* parameter of each column */
+    char *at;                   /* the text that is not read yet */
+    int line;                   /* number of the current line, from 1 */
+    size_t column[MAX_COLUMNS]; /* index of the parameter in each column */
     size_t n_columns;
-} table;
+} csv_table;
 
+/* Removes spaces, tabs and carriage returns from both ends. */
 static char *trim(char *word)
 {
     word += strspn(word, " \t\r");
@@ -25,8 +26,8 @@ static char *trim(char *word)
     return word;
 }
 
-/* Next line that is not empty and not a comment (#), trimmed; NULL at the end. */
-static char *next_line(table *t)
+/* The next line that is neither empty nor a comment (#), trimmed; NULL at the end. */
+static char *next_line(csv_table *t)
 {
     while (*t->at) {
         char *line = t->at;
@@ -40,7 +41,7 @@ static char *next_line(table *t)
     return NULL;
 }
 
-/* Cuts the next cell off *line; NULL behind the last. */
+/* Removes the next cell from *line and returns it trimmed; NULL after the last one. */
 static char *next_cell(char **line)
 {
     if (!*line) return NULL;
@@ -50,14 +51,15 @@ static char *next_cell(char **line)
     return trim(cell);
 }
 
-static sdm_status read_header(table *t, const sdm_param *params, size_t n, sdm_error *err)
+static sdm_status read_header(csv_table *t, const sdm_param *params, size_t n, sdm_error *err)
 {
     char *line = next_line(t);
     if (!line)
         return sdm_fail(err, SDM_E_FORMAT,
-                        "%s: no header line: the first names the columns, such as '%s'", t->path,
-                        params[0].name);
+                        "%s: no header line: the first line must name the columns, such as '%s'",
+                        t->path, params[0].name);
     for (char *cell; (cell = next_cell(&line));) {
+        // the parameter of the column
         const char *names[MAX_COLUMNS];
         size_t index = n;
         for (size_t i = 0; i < n && i < MAX_COLUMNS; i++) {
@@ -72,25 +74,26 @@ static sdm_status read_header(table *t, const sdm_param *params, size_t n, sdm_e
         }
         for (size_t i = 0; i < t->n_columns; i++)
             if (t->column[i] == index)
-                return sdm_fail(err, SDM_E_FORMAT, "%s:%d: column '%s' is there twice", t->path,
+                return sdm_fail(err, SDM_E_FORMAT, "%s:%d: column '%s' appears twice", t->path,
                                 t->line, cell);
-        t->column[t->n_columns++] = index; /* distinct, so at most n <= MAX_COLUMNS */
+        // the columns are distinct, so n_columns <= n <= MAX_COLUMNS
+        t->column[t->n_columns++] = index;
     }
     return SDM_OK;
 }
 
-static sdm_status read_row(table *t, char *line, double *row, sdm_error *err)
+static sdm_status read_row(csv_table *t, char *line, double *row, sdm_error *err)
 {
     size_t column = 0;
     for (char *cell; (cell = next_cell(&line)); column++) {
         if (column >= t->n_columns)
-            return sdm_fail(err, SDM_E_FORMAT, "%s:%d: more than the header's %zu values", t->path,
-                            t->line, t->n_columns);
+            return sdm_fail(err, SDM_E_FORMAT, "%s:%d: more values than the %zu of the header",
+                            t->path, t->line, t->n_columns);
         double *value = &row[t->column[column]];
         if (sdm_parse_real(cell, value)) continue;
+        // NaN and infinities pass here: the range check that follows names the parameter
         char *end = NULL;
-        *value = strtod(
-            cell, &end); /* NaN and infinities are left to the range check, which names them */
+        *value = strtod(cell, &end);
         if (end == cell || *end || isfinite(*value))
             return sdm_fail(err, SDM_E_FORMAT, "%s:%d: '%.100s' is not a number", t->path, t->line,
                             cell);
@@ -117,21 +120,22 @@ sdm_status cli_read_rows(const char *path, const sdm_param *params, size_t n, co
     size_t size = 0, total = 0;
     sdm_status s = sdm_file_read(path, MAX_BYTES, &data, &size, err);
     if (s) return s;
-    // spreadsheets put a byte order mark in front
+    // spreadsheets begin the file with a byte order mark
     const bool marked = size >= 3 && !memcmp(data, "\xef\xbb\xbf", 3);
-    table t = {.path = path, .at = (char *)data + (marked ? 3 : 0)};
+    csv_table t = {.path = path, .at = (char *)data + (marked ? 3 : 0)};
     if (strlen((char *)data) != size)
         s = sdm_fail(err, SDM_E_FORMAT, "%s: not a text file (a zero byte)", path);
     if (!s) s = sdm_mul(count_lines(t.at), n, &total, err);
     if (!s) s = SDM_ALLOC(values, total, "table of parameters", err);
     if (!s) s = read_header(&t, params, n, err);
+    // the rows
     *n_rows = 0;
     for (char *line; !s && (line = next_line(&t)); (*n_rows)++) {
         double *row = *values + *n_rows * n;
         memcpy(row, base, n * sizeof *row);
         s = read_row(&t, line, row, err);
     }
-    if (!s && *n_rows == 0) s = sdm_fail(err, SDM_E_FORMAT, "%s: no row behind the header", path);
+    if (!s && *n_rows == 0) s = sdm_fail(err, SDM_E_FORMAT, "%s: no row after the header", path);
     if (s) {
         sdm_free(*values);
         *values = NULL;

@@ -1,4 +1,4 @@
-/* Shapes, parameters and grids from the command line. */
+/* Opens the shapes, models and mesh files of the command line; reads parameters and grids. */
 #include "setup.h"
 
 #include <math.h>
@@ -25,14 +25,14 @@ sdm_status cli_open_registry(const cli_args *args, sdm_registry **out, sdm_error
     return s;
 }
 
-/* Splits "name=value"; the copy in buf holds both parts. */
-static sdm_status split_word(const char *word, const char *what, char buf[SDM_ERROR_TEXT_MAX],
+/* Splits "name=value" into two texts in buf. option: "-p" or "-O", for the message. */
+static sdm_status split_word(const char *word, const char *option, char buf[SDM_ERROR_TEXT_MAX],
                              const char **name, const char **value, sdm_error *err)
 {
     const size_t length = strlen(word);
     const char *equals = strchr(word, '=');
     if (!equals || equals == word || length >= SDM_ERROR_TEXT_MAX)
-        return sdm_fail(err, SDM_E_ARG, "%s '%.200s': need name=value", what, word);
+        return sdm_fail(err, SDM_E_ARG, "%s '%.200s': need name=value", option, word);
     memcpy(buf, word, length + 1);
     buf[equals - word] = '\0';
     *name = buf;
@@ -47,13 +47,13 @@ const sdm_shape *cli_find_shape(const sdm_registry *r, const char *name, sdm_err
     if (!shape)
         sdm_fail(err, SDM_E_ARG, "unknown shape '%s'%s%s%s", name,
                  near ? "; did you mean '"
-                      : "; sdmgen shapes lists those known, --plugin FILE loads others",
+                      : "; sdmgen shapes lists the known ones, --plugin FILE loads others",
                  near ? near : "", near ? "'?" : "");
     return shape;
 }
 
-sdm_status cli_open_shape(const sdm_registry *r, const char *name, const cli_list *options,
-                          sdm_instance **out, sdm_error *err)
+sdm_status cli_create_shape(const sdm_registry *r, const char *name, const cli_list *options,
+                            sdm_instance **out, sdm_error *err)
 {
     const sdm_shape *shape = cli_find_shape(r, name, err);
     if (!shape) return SDM_E_ARG;
@@ -64,13 +64,32 @@ sdm_status cli_open_shape(const sdm_registry *r, const char *name, const cli_lis
     for (size_t i = 0; i < options->n && !s; i++)
         s = split_word(options->items[i], "-O", words[i], &named[i].name, &named[i].value, err);
     if (!s) s = sdm_instance_create(shape, named, options->n, NULL, out, err);
-    if (s == SDM_E_CONFIG) { /* no configuration here: the command line is wrong */
+    if (s == SDM_E_CONFIG) { // the options are on the command line, not in a configuration
         s = SDM_E_ARG;
         if (err) err->status = s;
     }
     sdm_free(words);
     sdm_free(named);
     return s;
+}
+
+sdm_status cli_shape_open(const cli_args *args, const char *name, const cli_list *options,
+                          cli_shape *out, sdm_error *err)
+{
+    sdm_status s = cli_open_registry(args, &out->registry, err);
+    if (!s) s = cli_create_shape(out->registry, name, options, &out->instance, err);
+    if (s) return s;
+    out->params = sdm_instance_params(out->instance, &out->n_params);
+    s = SDM_ALLOC(&out->values, out->n_params, "parameters", err);
+    return s ? s : cli_read_params(out->params, out->n_params, &args->params, out->values, err);
+}
+
+void cli_shape_dispose(cli_shape *shape)
+{
+    sdm_free(shape->values);
+    sdm_instance_free(shape->instance);
+    sdm_registry_free(shape->registry);
+    *shape = (cli_shape){0};
 }
 
 sdm_status cli_open_model(const char *path, sdm_model **out, sdm_error *err)
@@ -80,9 +99,10 @@ sdm_status cli_open_model(const char *path, sdm_model **out, sdm_error *err)
     if (!s) return s;
     const bool other = s == SDM_E_FORMAT && !cli_ends_with(path, ".sdm");
     return sdm_fail(err, s, "%s%s", why.text,
-                    other ? "; by its name it is no level set (.vdb) and no image (.nii .nii.gz "
-                            ".nrrd .nhdr .mha .mhd)"
-                          : "");
+                    other
+                        ? "; its name is neither that of a level set (.vdb) nor of an image (.nii "
+                          ".nii.gz .nrrd .nhdr .mha .mhd)"
+                        : "");
 }
 
 sdm_status cli_model_params(const sdm_model_info *info, sdm_param **out, sdm_error *err)
@@ -105,7 +125,7 @@ sdm_range_policy cli_policy(const cli_args *args)
 
 /* ---- parameters ---- */
 
-/* A number that may be NaN or infinite (also by overflow), which sdm_parse_real() refuses. */
+/* Like sdm_parse_real(), but accepts NaN and infinities, also as the result of an overflow. */
 static bool parse_any_real(const char *text, double *out)
 {
     if (sdm_parse_real(text, out)) return true;
@@ -187,23 +207,26 @@ void cli_add_params(const sdm_param *params, size_t n, const double *values, sdm
 
 /* ---- grids ---- */
 
-sdm_status cli_fit_grid(const cli_args *args, const double min[3], const double max[3],
-                        sdm_grid *out, sdm_error *err)
+sdm_status cli_grid_for_box(const cli_args *args, const double min[3], const double max[3],
+                            sdm_grid *out, sdm_error *err)
 {
     const double longest = fmax(max[0] - min[0], fmax(max[1] - min[1], max[2] - min[2]));
     const double margin = 0.1 * longest;
     const bool has_size = args->size[0] > 0, has_spacing = args->spacing[0] > 0;
+    // spacing
     double spacing[3];
     int64_t n[3];
     for (int i = 0; i < 3; i++)
         spacing[i] = has_spacing ? args->spacing[i] : (longest + 2 * margin) / 63;
-    if (has_size && !has_spacing) { /* the smallest uniform spacing that covers the box */
+    if (has_size &&
+        !has_spacing) { // the smallest uniform spacing with which the grid covers the box
         double need = 0;
         for (int i = 0; i < 3; i++)
             need = fmax(need, (max[i] - min[i] + 2 * margin) /
                                   (double)(args->size[i] > 1 ? args->size[i] - 1 : 1));
         for (int i = 0; i < 3; i++) spacing[i] = need;
     }
+    // number of voxels
     for (int i = 0; i < 3; i++) {
         const double cells = (max[i] - min[i] + 2 * margin) / spacing[i];
         if (!has_size && !(cells < 1048576))
@@ -212,6 +235,7 @@ sdm_status cli_fit_grid(const cli_args *args, const double min[3], const double 
                             max[i] - min[i]);
         n[i] = has_size ? args->size[i] : (int64_t)ceil(cells - 1e-9) + 1;
     }
+    // origin
     const double centre[3] = {0.5 * (min[0] + max[0]), 0.5 * (min[1] + max[1]),
                               0.5 * (min[2] + max[2])};
     *out = sdm_grid_centred(n, spacing[0], centre);
@@ -232,19 +256,4 @@ sdm_status cli_read_mesh(const char *path, sdm_mesh *out, sdm_error *err)
         if (err) err->status = s;
     }
     return s;
-}
-
-void cli_json_grid(sdm_json *json, const char *key, const sdm_grid *g)
-{
-    sdm_json_open(json, key, '{');
-    sdm_json_open(json, "size", '[');
-    for (int i = 0; i < 3; i++) sdm_json_int(json, NULL, g->n[i]);
-    sdm_json_close(json, ']');
-    sdm_json_open(json, "spacing", '[');
-    for (int i = 0; i < 3; i++) sdm_json_real(json, NULL, g->spacing[i]);
-    sdm_json_close(json, ']');
-    sdm_json_open(json, "origin", '[');
-    for (int i = 0; i < 3; i++) sdm_json_real(json, NULL, g->origin[i]);
-    sdm_json_close(json, ']');
-    sdm_json_close(json, '}');
 }

@@ -1,5 +1,5 @@
-/* From words on the command line to objects: shapes with their options, parameters, tables of
- * parameters, grids. */
+/* Opens what the command line names: shapes with their options and parameters, models, tables of
+ * parameters, grids and mesh files. */
 #ifndef CLI_SETUP_H
 #define CLI_SETUP_H
 
@@ -8,54 +8,70 @@
 #include "sdm/registry.h"
 #include "sdm/runtime.h"
 
-/* The built-in shapes, those of SDMGEN_PLUGIN_PATH and those of --plugin. Freed with
- * sdm_registry_free(). */
+/* A registry of the built-in shapes and the plug-ins in SDMGEN_PLUGIN_PATH and --plugin. Freed with
+ * sdm_registry_free(). SDM_E_PLUGIN, SDM_E_NOMEM. */
 sdm_status cli_open_registry(const cli_args *args, sdm_registry **out, sdm_error *err);
 
-/* NULL: there is none, SDM_E_ARG in *err with "did you mean". */
+/* The shape of that name. NULL: there is none; *err holds SDM_E_ARG with "did you mean". */
 const sdm_shape *cli_find_shape(const sdm_registry *r, const char *name, sdm_error *err);
 
-/* Shape `name` with the -O options of the command line (files relative to the current folder).
- * SDM_E_ARG with "did you mean". */
-sdm_status cli_open_shape(const sdm_registry *r, const char *name, const cli_list *options,
-                          sdm_instance **out, sdm_error *err);
+/* Creates the shape `name` with the options "name=value" of -O; relative paths start from the
+ * current folder. *out is freed with sdm_instance_free(). SDM_E_ARG with "did you mean". */
+sdm_status cli_create_shape(const sdm_registry *r, const char *name, const cli_list *options,
+                            sdm_instance **out, sdm_error *err);
 
-/* A model where files of other types could be given, too: what is known is told of a file that is
- * none. */
+/* A shape with the registry that holds it and the parameter values of the command line.
+ * Zero-initialise; cli_shape_dispose() frees, also after an error. */
+typedef struct cli_shape {
+    sdm_registry *registry;
+    sdm_instance *instance;
+    const sdm_param *params; /* [n_params], owned by the instance */
+    size_t n_params;
+    double *values; /* [n_params]: the -p words, else the defaults; not yet checked for range */
+} cli_shape;
+
+/* Opens the registry, creates the shape `name` with the options and reads the -p words. SDM_E_ARG,
+ * SDM_E_PLUGIN. */
+sdm_status cli_shape_open(const cli_args *args, const char *name, const cli_list *options,
+                          cli_shape *out, sdm_error *err);
+void cli_shape_dispose(cli_shape *shape);
+
+/* Opens a model where the command also accepts other types of files: the message about a file that
+ * is no model lists these types. Freed with sdm_model_free(). */
 sdm_status cli_open_model(const char *path, sdm_model **out, sdm_error *err);
 
-/* Parameters of a model as a shape's: *out points into `info` and is freed with sdm_free(). */
+/* *out[info->n_params] = the parameters of a model in the form of a shape's. Their texts belong to
+ * `info`; the array is freed with sdm_free(). */
 sdm_status cli_model_params(const sdm_model_info *info, sdm_param **out, sdm_error *err);
 
-/* Of --policy. */
+/* The value of --policy. */
 sdm_range_policy cli_policy(const cli_args *args);
 
-/* values[n] = the defaults, then the -p name=value words. SDM_E_ARG: an unknown or repeated name,
-   not a number. NaN and infinities pass: the range check that follows names them. */
+/* values[n] = the defaults, overridden by the "name=value" words of -p. SDM_E_ARG: an unknown or
+   repeated name, or not a number. NaN and infinities pass: the range check that follows rejects
+   them with the name of the parameter. */
 sdm_status cli_read_params(const sdm_param *params, size_t n, const cli_list *given, double *values,
                            sdm_error *err);
 
-/* A table of parameters: a header line of names, then a line of numbers for each row; the others
- *take base[n]. values[n_rows][n] is freed with sdm_free(). SDM_E_IO, SDM_E_FORMAT with file and
- *line. */
+/* Reads a CSV table of parameters: a header line of names, then a line of numbers for each row.
+ * Parameters without a column have the values base[n]. *values[*n_rows][n] is freed with
+ * sdm_free(). SDM_E_ARG: too many parameters; SDM_E_IO; SDM_E_FORMAT with file and line. */
 sdm_status cli_read_rows(const char *path, const sdm_param *params, size_t n, const double *base,
                          double **values, size_t *n_rows, sdm_error *err);
 
-/* SDM_E_RANGE naming the first value that is not finite or not in its range. */
+/* SDM_E_RANGE with the name of the first parameter that is not finite or outside of its range. */
 sdm_status cli_check_range(const sdm_param *params, size_t n, const double *values, sdm_error *err);
 
-/* "a=4.4 alpha=0.5". */
+/* Appends the values as "a=4.4 alpha=0.5". */
 void cli_add_params(const sdm_param *params, size_t n, const double *values, sdm_text *out);
 
-/* The grid of --size, --spacing and --origin; what is missing is fitted to the box min..max.
- * SDM_E_ARG. */
-sdm_status cli_fit_grid(const cli_args *args, const double min[3], const double max[3],
-                        sdm_grid *out, sdm_error *err);
+/* *out = the axis-aligned grid of --size, --spacing and --origin. Missing options are chosen so
+ * that the grid covers the box min .. max (mm) with a margin of 0.1 times its longest edge; without
+ * --size and --spacing it has 64 voxels along that edge, margins included. SDM_E_ARG. */
+sdm_status cli_grid_for_box(const cli_args *args, const double min[3], const double max[3],
+                            sdm_grid *out, sdm_error *err);
 
-/* Reads a mesh file; a type that is not known is SDM_E_FORMAT here. */
+/* sdm_mesh_read() with SDM_E_FORMAT instead of SDM_E_UNSUPPORTED for an unknown type of file. */
 sdm_status cli_read_mesh(const char *path, sdm_mesh *out, sdm_error *err);
-
-/* Adds the grid as an object under `key`. */
-void cli_json_grid(sdm_json *json, const char *key, const sdm_grid *g);
 
 #endif

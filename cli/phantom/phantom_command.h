@@ -1,27 +1,25 @@
-/* What the parts of `sdmgen phantom` share. */
+/* A phantom: a CT-like test image of a shape, made by `sdmgen phantom`. */
 #ifndef CLI_PHANTOM_H
 #define CLI_PHANTOM_H
 
-#include "args/options.h"
+#include "inputs/setup.h"
 #include "sdm/phantom.h"
 
-/* Everything an image was made from. */
+/* All settings of an image. Zero-initialise all but args; cli_shape_dispose(&p.shape) frees. */
 typedef struct cli_phantom {
     const cli_args *args;
-    const sdm_instance *shape;
-    double *params; /* [n_params] */
-    size_t n_params;
-    sdm_pose pose;
-    sdm_grid grid;
+    cli_shape shape; /* with the parameters of the image */
+    sdm_pose pose;   /* of the shape in the world */
+    sdm_grid grid;   /* of the image */
     sdm_phantom_opts opts;
-    bool cut; /* the shape leaves the box of the voxels' centres */
+    bool cut; /* the shape leaves the box of the voxel centres */
 } cli_phantom;
 
-/* Fills in all but args, shape and params[n_params], which are given room. SDM_E_ARG, SDM_E_RANGE.
- */
+/* Opens the shape and derives its parameters, the pose, the grid and the options of the image from
+ * p->args. SDM_E_ARG, SDM_E_RANGE. */
 sdm_status cli_phantom_setup(cli_phantom *p, sdm_error *err);
 
-/* The truth as one JSON object; inside: voxels of the label that are 1. */
+/* Adds the truth as one JSON object; inside: the number of voxels with label 1. */
 void cli_phantom_truth(const cli_phantom *p, size_t inside, sdm_json *json);
 
 #endif

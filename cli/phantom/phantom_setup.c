@@ -1,13 +1,13 @@
-/* Parameters, pose, grid and options of a phantom from the command line. */
+/* Derives the parameters, pose, grid and options of a phantom from the command line. */
 #include <math.h>
 #include <string.h>
 
-#include "inputs/setup.h"
 #include "phantom_command.h"
 #include "report/terminal.h"
 #include "sdm/memory.h"
 
-static bool is_given(const cli_list *words, const char *name)
+/* True when one of the words "name=value" has this name. */
+static bool has_word(const cli_list *words, const char *name)
 {
     const size_t length = strlen(name);
     for (size_t i = 0; i < words->n; i++)
@@ -15,34 +15,34 @@ static bool is_given(const cli_list *words, const char *name)
     return false;
 }
 
-static sdm_status read_params(cli_phantom *p, sdm_error *err)
+/* --random-params: draws the parameters that have no -p word. */
+static sdm_status draw_params(cli_phantom *p, sdm_error *err)
 {
-    const cli_args *args = p->args;
-    const sdm_param *params = sdm_instance_params(p->shape, &p->n_params);
+    cli_shape *shape = &p->shape;
     double *drawn = NULL;
-    sdm_status s = SDM_ALLOC(&p->params, p->n_params, "parameters", err);
-    if (!s) s = SDM_ALLOC(&drawn, p->n_params, "parameters", err);
-    if (!s) s = cli_read_params(params, p->n_params, &args->params, p->params, err);
-    if (!s && args->phantom.random_params) {
-        sdm_phantom_random_params(p->shape, p->opts.seed, drawn);
-        for (size_t i = 0; i < p->n_params; i++)
-            if (!is_given(&args->params, params[i].name)) p->params[i] = drawn[i];
-    }
+    if (!p->args->phantom.random_params) return SDM_OK;
+    const sdm_status s = SDM_ALLOC(&drawn, shape->n_params, "parameters", err);
+    if (s) return s;
+    sdm_phantom_random_params(shape->instance, p->opts.seed, drawn);
+    for (size_t i = 0; i < shape->n_params; i++)
+        if (!has_word(&p->args->params, shape->params[i].name)) shape->values[i] = drawn[i];
     sdm_free(drawn);
-    return s;
+    return SDM_OK;
 }
 
-/* The random pose comes after the given one: it is how far that one is off. */
+/* The pose of --rotation and --translation, then a random rotation and translation: rotation =
+ * R_random R_given, translation = t_given + t_random. */
 static sdm_status read_pose(cli_phantom *p, sdm_error *err)
 {
     const cli_phantom_args *a = &p->args->phantom;
+    const cli_pose_args *pose = &p->args->pose;
     for (int i = 0; i < 3; i++) {
-        p->pose.rotation[i] = isnan(a->rotation[i]) ? 0 : a->rotation[i];
-        p->pose.translation[i] = isnan(a->translation[i]) ? 0 : a->translation[i];
+        p->pose.rotation[i] = isnan(pose->rotation[i]) ? 0 : pose->rotation[i];
+        p->pose.translation[i] = isnan(pose->translation[i]) ? 0 : pose->translation[i];
     }
     if (isnan(a->random_pose[0])) return SDM_OK;
     if (a->random_pose[0] > 180)
-        return sdm_fail(err, SDM_E_ARG, "--random-pose: a turn of %g degrees, need at most 180",
+        return sdm_fail(err, SDM_E_ARG, "--random-pose: a rotation of %g degrees, need at most 180",
                         a->random_pose[0]);
     const double degree = acos(-1) / 180;
     const sdm_pose drawn =
@@ -58,6 +58,7 @@ static sdm_status read_pose(cli_phantom *p, sdm_error *err)
     return SDM_OK;
 }
 
+/* *t = the given mean and standard deviation, unless the option is missing. */
 static void set_tissue(const double given[2], sdm_tissue *t)
 {
     if (!isnan(given[0])) *t = (sdm_tissue){given[0], given[1]};
@@ -88,9 +89,10 @@ static void read_options(cli_phantom *p)
 
 /* ---- the grid ---- */
 
-/* Vertices to the world, then to the axes of the image; min..max is their box there. */
-static void to_frame(const cli_phantom *p, const sdm_pose *frame, sdm_mesh *mesh, double min[3],
-                     double max[3])
+/* Transforms the vertices from the shape's frame through the world into the frame of the image;
+ * min .. max is their bounding box there. */
+static void mesh_to_image_frame(const cli_phantom *p, const sdm_pose *frame, sdm_mesh *mesh,
+                                double min[3], double max[3])
 {
     const sdm_pose back = sdm_pose_inverse(frame), all = sdm_pose_compose(&back, &p->pose);
     for (int i = 0; i < 3; i++) min[i] = INFINITY, max[i] = -INFINITY;
@@ -101,16 +103,17 @@ static void to_frame(const cli_phantom *p, const sdm_pose *frame, sdm_mesh *mesh
     }
 }
 
-/* Ends the grid (in the image's frame) before the far end of the box, or begins it behind the near
- * end. */
-static sdm_status crop(const cli_phantom *p, const double min[3], const double max[3], sdm_grid *g,
-                       sdm_error *err)
+/* --crop: moves an end of the grid (in the frame of the image) into the box min .. max of the
+ * shape. A fraction f > 0 ends the grid at max - f (max - min), f < 0 begins it at min - f (max -
+ * min). With --size the grid moves as a whole. */
+static sdm_status grid_crop(const cli_phantom *p, const double min[3], const double max[3],
+                            sdm_grid *g, sdm_error *err)
 {
     for (int i = 0; i < 3; i++) {
         const double share = p->args->phantom.crop[i], extent = max[i] - min[i], h = g->spacing[i];
         if (isnan(share) || share == 0) continue;
         const double last = g->origin[i] + (double)(g->n[i] - 1) * h;
-        // voxels too many beyond the new end
+        // length of the grid beyond the new end, mm
         const double far =
             share > 0 ? last - (max[i] - share * extent) : min[i] - share * extent - g->origin[i];
         const int64_t drop = (int64_t)ceil(fmax(far / h, 0));
@@ -119,14 +122,17 @@ static sdm_status crop(const cli_phantom *p, const double min[3], const double m
             continue;
         }
         if (drop >= g->n[i])
-            return sdm_fail(err, SDM_E_ARG, "--crop %g along %c leaves no voxel", share, "xyz"[i]);
+            return sdm_fail(err, SDM_E_ARG, "--crop %g along %c leaves no voxel of the grid", share,
+                            "xyz"[i]);
         g->n[i] -= drop;
         if (share < 0) g->origin[i] += (double)drop * h;
     }
     return SDM_OK;
 }
 
-static sdm_status fit_grid(cli_phantom *p, sdm_mesh *mesh, sdm_error *err)
+/* Makes the grid: fitted to the shape in the frame of the image, cropped, then moved to the world.
+ */
+static sdm_status grid_make(cli_phantom *p, sdm_mesh *mesh, sdm_error *err)
 {
     const cli_args *args = p->args;
     const double *turn = args->phantom.frame;
@@ -134,16 +140,16 @@ static sdm_status fit_grid(cli_phantom *p, sdm_mesh *mesh, sdm_error *err)
     const sdm_pose frame = {.rotation = {isnan(turn[0]) ? 0 : turn[0], isnan(turn[1]) ? 0 : turn[1],
                                          isnan(turn[2]) ? 0 : turn[2]}};
     double min[3], max[3];
-    to_frame(p, &frame, mesh, min, max);
+    mesh_to_image_frame(p, &frame, mesh, min, max);
     if (placed && !isnan(args->phantom.crop[0]))
         return sdm_fail(
             err, SDM_E_ARG,
-            "--crop and --origin exclude each other: the origin says where the grid is");
-    sdm_status s = cli_fit_grid(args, min, max, &p->grid, err);
+            "--crop and --origin exclude each other: both determine the position of the grid");
+    sdm_status s = cli_grid_for_box(args, min, max, &p->grid, err);
     if (s) return s;
-    if (placed) // given in the world, and the grid is still in the image's frame
+    if (placed) // --origin is in the world, the grid still in the frame of the image
         sdm_pose_apply_inverse(&frame, p->grid.origin, p->grid.origin);
-    s = crop(p, min, max, &p->grid, err);
+    s = grid_crop(p, min, max, &p->grid, err);
     for (int i = 0; i < 3; i++) {
         const double end = p->grid.origin[i] + (double)(p->grid.n[i] - 1) * p->grid.spacing[i];
         p->cut |= min[i] < p->grid.origin[i] || max[i] > end;
@@ -157,10 +163,11 @@ sdm_status cli_phantom_setup(cli_phantom *p, sdm_error *err)
 {
     sdm_mesh mesh = {0};
     read_options(p);
-    sdm_status s = read_params(p, err);
+    sdm_status s = cli_shape_open(p->args, p->args->shape, &p->args->options, &p->shape, err);
+    if (!s) s = draw_params(p, err);
     if (!s) s = read_pose(p, err);
-    if (!s) s = sdm_instance_mesh(p->shape, p->params, &mesh, err);
-    if (!s) s = fit_grid(p, &mesh, err);
+    if (!s) s = sdm_instance_mesh(p->shape.instance, p->shape.values, &mesh, err);
+    if (!s) s = grid_make(p, &mesh, err);
     sdm_mesh_dispose(&mesh);
     return s;
 }

@@ -1,10 +1,10 @@
-/* Blocks of voxels. */
+/* Bounding boxes in voxel indices and copies of the voxels in them. */
 #include "crop.h"
 
 #include <math.h>
 #include <string.h>
 
-/* From a box of continuous indices. */
+/* The block of a box low .. high in continuous voxel indices, enlarged by `pad` mm. */
 static cli_block block_of_box(const sdm_grid *g, const double low[3], const double high[3],
                               double pad)
 {

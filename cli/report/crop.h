@@ -1,4 +1,4 @@
-/* Parts of a grid and of the maps on it. */
+/* Blocks of voxels: a box of a grid, for cropping maps and images. */
 #ifndef CLI_CROP_H
 #define CLI_CROP_H
 
@@ -7,25 +7,29 @@
 #include "sdm/grid.h"
 #include "sdm/mesh.h"
 
-/* A block of voxels, from index `from` on, n of them along each axis. */
+/* A block of voxels: indices from[a] .. from[a] + n[a] - 1 along axis a; empty when an n[a] is 0.
+ */
 typedef struct cli_block {
     int64_t from[3], n[3];
 } cli_block;
 
-/* The voxels around the vertices of a mesh, `pad` mm more on every side, as far as the grid goes; n
-   is 0 along an axis when they are all outside. */
+/* The bounding box of the vertices (world), enlarged by `pad` mm on every side and clipped to the
+   grid. Empty when the box lies outside of the grid. */
 cli_block cli_block_of_mesh(const sdm_grid *g, const sdm_mesh *m, double pad);
 
-/* The voxels whose value is above 0, `pad` mm more on every side. n is 0 without one. */
+/* The bounding box of the voxels with a value above 0, enlarged by `pad` mm on every side and
+   clipped to the grid. Empty without such a voxel. */
 cli_block cli_block_of_labels(const sdm_grid *g, const float *values, double pad);
 
-/* The least block that holds both; one that is empty does not count. */
+/* The smallest block that holds both; an empty block does not count. */
 cli_block cli_block_union(const cli_block *a, const cli_block *b);
 
 bool cli_block_is_empty(const cli_block *b);
+
+/* The grid of the block's voxels. */
 sdm_grid cli_block_grid(const sdm_grid *g, const cli_block *b);
 
-/* out[b->n] = values of the block. */
+/* out[n[2]][n[1]][n[0]] = the values of the block in values[g->n[2]][g->n[1]][g->n[0]]. */
 void cli_block_copy(const sdm_grid *g, const float *values, const cli_block *b, float *out);
 
 #endif

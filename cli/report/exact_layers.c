@@ -1,4 +1,4 @@
-/* Layers of an exact map on their way from the options to the files. */
+/* Checks the options of the layers of an exact map, computes the layers and writes them. */
 #include "exact_layers.h"
 
 #include <math.h>
@@ -45,8 +45,8 @@ sdm_status cli_layers_check(const cli_args *args, sdm_error *err)
         if (cli_ends_with(args->outputs.items[i], ".vdb") && !(args->narrow > band))
             s = sdm_fail(
                 err, SDM_E_ARG,
-                "--narrow %g is too narrow for a level set with --band %g: give more than that",
-                args->narrow, band);
+                "--narrow %g is too narrow for a level set with --band %g: need more than %g",
+                args->narrow, band, band);
     }
     if (!s && args->jacobian && !args->shape)
         s = sdm_fail(err, SDM_E_ARG, "--jacobian needs --shape: a mesh file has no parameters");
@@ -83,7 +83,7 @@ sdm_status cli_layers_map(cli_layers *l, const cli_args *args, const sdm_exact *
                                                l->jacobian, err)
                     : sdm_exact_map_layers(engine, grid, &l->arrays, err);
     const uint32_t *source = sdm_exact_source(engine);
-    // beyond a narrow band there is none
+    // outside of a narrow band there is no nearest triangle: UINT32_MAX stays
     for (size_t i = 0; l->arrays.triangle && i < n && !s; i++)
         if (l->arrays.triangle[i] != UINT32_MAX)
             l->arrays.triangle[i] = source[l->arrays.triangle[i]];

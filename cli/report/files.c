@@ -1,7 +1,8 @@
-/* Outputs that would overwrite an input or one another are refused before any work, and so are
- * those that cannot be made. */
+/* Checks the output files before any work: an output must be writable and must not overwrite an
+ * input or another output. */
 #include "files.h"
 
+#include <stdio.h>
 #include <string.h>
 #include <strings.h>
 #include <sys/stat.h>
@@ -16,14 +17,26 @@ bool cli_ends_with(const char *path, const char *suffix)
     return n > k && !strcasecmp(path + n - k, suffix);
 }
 
-/* A file that is there, or the name of a new one in its folder. */
+bool cli_ends_with_any(const char *path, const char *endings)
+{
+    for (char ending[16]; *endings; endings += strspn(endings, " ")) {
+        const size_t length = strcspn(endings, " ");
+        snprintf(ending, sizeof ending, "%.*s", (int)length, endings);
+        if (cli_ends_with(path, ending)) return true;
+        endings += length;
+    }
+    return false;
+}
+
+/* Identity of a file: device and inode of an existing file; for a new file those of its folder and
+ * its name. */
 typedef struct file_id {
     dev_t device;
     ino_t number;
-    const char *name; /* "": it is there */
+    const char *name; /* "": the file exists */
 } file_id;
 
-static bool identify(const char *path, file_id *id)
+static bool file_identify(const char *path, file_id *id)
 {
     struct stat st;
     char folder[SDM_PATH_TEXT_MAX] = ".";
@@ -41,14 +54,15 @@ static bool identify(const char *path, file_id *id)
     return true;
 }
 
-static bool is_same(const char *a, const char *b)
+static bool is_same_file(const char *a, const char *b)
 {
     file_id x, y;
-    return identify(a, &x) && identify(b, &y) && x.device == y.device && x.number == y.number &&
-           !strcmp(x.name, y.name);
+    return file_identify(a, &x) && file_identify(b, &y) && x.device == y.device &&
+           x.number == y.number && !strcmp(x.name, y.name);
 }
 
-/* All that a command may read, options of the shape such as mesh=FILE among them. */
+/* All files that a command may read. Shape options may hold paths (mesh=FILE), so the values of all
+ * of them count. */
 static sdm_status find_inputs(const cli_args *args, cli_list *out, sdm_error *err)
 {
     const char *const single[] = {args->mesh, args->rows, args->fit.reference,
@@ -86,15 +100,16 @@ static sdm_status check_output(const cli_list *outputs, size_t index, const cli_
 {
     const char *path = outputs->items[index];
     for (size_t i = 0; i < inputs->n; i++)
-        if (is_same(path, inputs->items[i]))
+        if (is_same_file(path, inputs->items[i]))
             return sdm_fail(err, SDM_E_ARG,
                             "output '%s' would overwrite the input '%s': give it another name",
                             path, inputs->items[i]);
     for (size_t i = 0; i < index; i++)
-        if (is_same(path, outputs->items[i]))
+        if (is_same_file(path, outputs->items[i]))
             return sdm_fail(err, SDM_E_ARG, "output '%s' is given twice, also as '%s'", path,
                             outputs->items[i]);
-    sdm_outfile *trial = NULL; /* the only honest test of "can be written" */
+    // opening the temporary file shows whether the output can be written
+    sdm_outfile *trial = NULL;
     const sdm_status s = sdm_outfile_open(path, &trial, err);
     sdm_outfile_discard(&trial);
     return s;

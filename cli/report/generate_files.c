@@ -1,4 +1,4 @@
-/* From the names on the command line to those of each row. */
+/* Makes the file names of each row of parameters from the names on the command line. */
 #include "generate_files.h"
 
 #include "files.h"
@@ -6,6 +6,7 @@
 #include "sdm/internal/config.h"
 #include "sdm/memory.h"
 
+/* Adds the name, numbered with --params, to f->list and stores it in *place unless that is NULL. */
 static sdm_status add_name(const cli_args *args, const char *name, size_t row, cli_row_files *f,
                            const char **place, sdm_error *err)
 {
@@ -19,9 +20,9 @@ static sdm_status add_name(const cli_args *args, const char *name, size_t row, c
 
 sdm_status cli_row_files_name(const cli_args *args, size_t row, cli_row_files *out, sdm_error *err)
 {
-    const size_t most = args->outputs.n + 2;
-    sdm_status s = SDM_ALLOC(&out->text, most * SDM_PATH_TEXT_MAX, "names of the outputs", err);
-    if (!s) s = SDM_ALLOC(&out->list.items, most, "names of the outputs", err);
+    const size_t n_max = args->outputs.n + 2;
+    sdm_status s = SDM_ALLOC(&out->text, n_max * SDM_PATH_TEXT_MAX, "names of the outputs", err);
+    if (!s) s = SDM_ALLOC(&out->list.items, n_max, "names of the outputs", err);
     for (size_t i = 0; i < args->outputs.n && !s; i++)
         s = add_name(args, args->outputs.items[i], row, out, NULL, err);
     if (!s && args->gradient) s = add_name(args, args->gradient, row, out, &out->gradient, err);

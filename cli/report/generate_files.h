@@ -1,23 +1,24 @@
-/* Names of the files that generate writes for each row of parameters: the outputs, --gradient,
- * --jacobian. */
+/* Names of the files that `sdmgen generate` writes for each row of parameters: the outputs,
+ * --gradient and --jacobian. */
 #ifndef CLI_GENERATE_FILES_H
 #define CLI_GENERATE_FILES_H
 
 #include "args/options.h"
 
-/* Zero-initialise. */
+/* Zero-initialise; cli_row_files_dispose() frees, also after an error. */
 typedef struct cli_row_files {
-    cli_list list; /* the outputs in their order, then the others, as far as they are wanted */
-    const char *gradient, *jacobian;
-    char *text;
+    cli_list list; /* outputs in their order, then --gradient and --jacobian where given */
+    const char *gradient, *jacobian; /* NULL: not wanted */
+    char *text;                      /* storage of numbered names */
 } cli_row_files;
 
-/* The files of a row, numbered with --params; to be disposed of, also after an error. SDM_E_ARG: a
- * name is too long. */
+/* The names of the files of row `row` (counted from 1). With --params the names contain the number
+ * of the row. SDM_E_ARG: a name is too long. */
 sdm_status cli_row_files_name(const cli_args *args, size_t row, cli_row_files *out, sdm_error *err);
 void cli_row_files_dispose(cli_row_files *f);
 
-/* Before any work: the types, and that the files of row `last` can be made. SDM_E_ARG, SDM_E_IO. */
+/* Before any work: checks the types of the files, and that the files of row `last` can be written.
+ * SDM_E_ARG, SDM_E_IO. */
 sdm_status cli_row_files_check(const cli_args *args, size_t last, sdm_error *err);
 
 #endif

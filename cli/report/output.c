@@ -1,4 +1,4 @@
-/* Output files: their type follows their name. */
+/* Writes maps as level sets, images, surfaces or pictures, as the ending of the file name says. */
 #include "output.h"
 
 #include <stdio.h>
@@ -27,9 +27,11 @@ static const struct {
 } kinds[] = {{".vdb", KIND_VDB},     {".nii", KIND_IMAGE},   {".nii.gz", KIND_IMAGE},
              {".nrrd", KIND_IMAGE},  {".mha", KIND_IMAGE},   {".npy", KIND_IMAGE},
              {".ply", KIND_SURFACE}, {".stl", KIND_SURFACE}, {".obj", KIND_SURFACE},
-             {".off", KIND_SURFACE}, {".png", KIND_PICTURE}};
+             {".off", KIND_SURFACE}, {".png", KIND_PICTURE}, {".svg", KIND_PICTURE},
+             {".pdf", KIND_PICTURE}};
 enum { N_KINDS = sizeof kinds / sizeof *kinds };
 
+/* The type of the file by its ending; *suffix (may be NULL) points to the ending. */
 static file_kind kind_of(const char *path, const char **suffix)
 {
     for (size_t i = 0; i < N_KINDS; i++) {
@@ -50,23 +52,25 @@ sdm_status cli_check_type(const char *path, bool meshes_only, sdm_error *err)
         return sdm_fail(
             err, SDM_E_ARG,
             "output '%s': its name must end in .vdb .nii .nii.gz .nrrd .mha .npy .ply .stl "
-            ".obj .off or .png",
+            ".obj .off .png .svg or .pdf",
             path);
 #ifndef SDM_HAVE_VDB
     if (kind == KIND_VDB)
         return sdm_fail(err, SDM_E_UNSUPPORTED, "output '%s': built without OpenVDB", path);
 #endif
-    return SDM_OK;
+    return kind == KIND_PICTURE ? sdm_picture_check(path, err) : SDM_OK;
 }
 
-/* What made the map, in a word. */
+bool cli_is_picture(const char *path) { return kind_of(path, NULL) == KIND_PICTURE; }
+
+/* One word for the method that made the map: "network", "exact", "edt" ... */
 static const char *made_by(const cli_map *map)
 {
     return map->source == SDM_SOURCE_NETWORK ? "network" : map->origin;
 }
 
-/* The same with what else is to be known about it. */
-static void describe(const cli_map *map, char text[80])
+/* The method, and in parentheses whether parameters were clamped or the network was replaced. */
+static void describe_method(const cli_map *map, char text[80])
 {
     static const char *const reasons[] = {"", " (out of the trained range)",
                                           " (network over the bound)"};
@@ -78,6 +82,7 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
                             sdm_error *err)
 {
 #ifdef SDM_HAVE_VDB
+    // metadata
     static const char *const reasons[] = {"none", "range", "error"};
     const sdm_check none = {0}, *check = map->check ? map->check : &none;
     char error[32], rmse[32], q95[32], max[32];
@@ -95,6 +100,7 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
         {"sdm_check_max_mm", sdm_format_real(check->max_mm, max)},
     };
     const size_t n_metadata = sizeof metadata / sizeof *metadata - (map->check ? 0 : 3);
+    // the file
     const sdm_vdb_opts opts = {.band_voxels = args->band,
                                .dense = args->dense,
                                .half = args->half,
@@ -104,9 +110,8 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
     sdm_vdb_report report = {0};
     const sdm_status s = sdm_vdb_write(path, map->grid, map->values, &opts, &report, err);
     if (!s && report.adjusted_voxels > 0)
-        cli_notice("%s: %lld voxels at creases were adjusted, by at most %.2g mm, to make a valid "
-                   "level set; none "
-                   "changed sides",
+        cli_notice("%s: %lld voxels at creases were adjusted by at most %.2g mm to make a valid "
+                   "level set; no sign changed",
                    path, (long long)report.adjusted_voxels, report.adjusted_mm);
     if (!s && report.cut)
         cli_notice("%s: the surface leaves the grid and is cut at its border", path);
@@ -135,7 +140,7 @@ static sdm_status write_picture(const char *path, const cli_map *map, sdm_error 
 {
     static const float levels[] = {0.0f, 1.0f};
     char title[80];
-    describe(map, title);
+    describe_method(map, title);
     const sdm_picture_map column = {title, map->values, false};
     return sdm_picture_slices(path, map->grid, &column, 1, levels, 2, err);
 }
@@ -149,8 +154,8 @@ sdm_status cli_write_map(const char *path, const cli_map *map, const cli_args *a
     case KIND_VDB:
         return write_vdb(path, map, args, err);
     case KIND_IMAGE:
-        // how it was made first: a NIfTI file keeps 79 characters
-        describe(map, made);
+        // the method comes first: NIfTI files keep only 79 characters
+        describe_method(map, made);
         snprintf(text, sizeof text, "sdmgen %s: %s: %s %s, mm, negative inside", SDM_VERSION_TEXT,
                  made, map->shape, map->params);
         return sdm_image_write(path, map->grid, map->values, text, err);
@@ -163,7 +168,7 @@ sdm_status cli_write_map(const char *path, const cli_map *map, const cli_args *a
     }
 }
 
-/* Length of a %d, %4d or %04d at `at`, with its width; 0 when there is none. */
+/* Length of a %d, %4d or %04d at `at`, 0 when there is none; *width: its field width. */
 static size_t number_mark(const char *at, int *width)
 {
     if (*at != '%') return 0;

@@ -1,4 +1,4 @@
-/* The progress bar. */
+/* Draws the progress bar, or prints progress lines where stderr is no terminal. */
 #include "progress.h"
 
 #include <stdio.h>
@@ -26,10 +26,11 @@ static size_t terminal_width(void)
     return size.ws_col;
 }
 
-/* The bar takes what the figures leave of the line. */
-static void draw_bar(char bar[MAX_CELLS + 1], double fraction, size_t left)
+/* bar = a text of '#' and '-' with about `room` characters, the columns left beside title and text.
+ */
+static void bar_draw(char bar[MAX_CELLS + 1], double fraction, size_t room)
 {
-    const size_t cells = left < MIN_CELLS ? MIN_CELLS : left > MAX_CELLS ? MAX_CELLS : left;
+    const size_t cells = room < MIN_CELLS ? MIN_CELLS : room > MAX_CELLS ? MAX_CELLS : room;
     const size_t full = (size_t)(fraction * (double)cells + 0.5);
     for (size_t i = 0; i < cells; i++) bar[i] = i < full ? '#' : '-';
     bar[cells] = '\0';
@@ -51,9 +52,10 @@ void cli_progress_show(cli_progress *p, const char *title, double fraction, cons
     char line[LINE_MAX_BYTES], bar[MAX_CELLS + 1];
     const size_t width = terminal_width(),
                  around = strlen(title) + strlen(text) + strlen("  100 % [] ") + 1;
-    draw_bar(bar, fraction, width > around ? width - around : 0);
+    bar_draw(bar, fraction, width > around ? width - around : 0);
     snprintf(line, sizeof line, "%s %3.0f %% [%s] %s", title, 100 * fraction, bar, text);
-    if (width < sizeof line) line[width - 1] = '\0'; /* a wrapped line could not be redrawn */
+    // a line that wraps could not be redrawn in place
+    if (width < sizeof line) line[width - 1] = '\0';
     fprintf(stderr, "\r%s\033[K", line);
     fflush(stderr);
     p->drawn = true;

@@ -1,22 +1,24 @@
-/* A progress line on stderr: a bar that is redrawn on a terminal, a plain line every ten seconds
- * elsewhere. */
+/* Progress on stderr: on a terminal a bar that is redrawn in place, elsewhere a plain line every
+ * ten seconds. */
 #ifndef CLI_PROGRESS_H
 #define CLI_PROGRESS_H
 
 #include <stdbool.h>
 
 typedef struct cli_progress {
-    bool terminal, drawn;
-    double last, interval; /* time of the last line, seconds between two */
+    bool terminal;   /* stderr is a terminal */
+    bool drawn;      /* a bar is visible */
+    double last;     /* time of the last line, s */
+    double interval; /* shortest time between two lines, s */
 } cli_progress;
 
 void cli_progress_start(cli_progress *p);
 
-/* title: what is being done; fraction 0..1; text (may be NULL): the figures behind the bar. Cheap
- * to call often. */
+/* Shows the title (the current work), the fraction done (0..1, others are clamped) and the text
+ * (NULL: none) after the bar. Cheap: does nothing until the interval has passed. */
 void cli_progress_show(cli_progress *p, const char *title, double fraction, const char *text);
 
-/* Removes the bar, so that something else can be printed. */
+/* Removes the bar before other output. */
 void cli_progress_clear(cli_progress *p);
 
 #endif

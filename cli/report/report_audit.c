@@ -1,8 +1,9 @@
-/* Prints what an audit of a mesh has found. */
+/* Prints the figures of a mesh audit. */
 #include "report_audit.h"
 
 #include <stdio.h>
 
+#include "json_values.h"
 #include "terminal.h"
 
 void cli_print_audit(const sdm_audit *a)
@@ -41,19 +42,15 @@ void cli_json_audit(sdm_json *json, const sdm_audit *a)
     sdm_json_int(json, "self_intersections", (int64_t)a->self_intersections);
     sdm_json_real(json, "volume_mm3", a->volume);
     sdm_json_real(json, "area_mm2", a->area);
-    sdm_json_open(json, "min", '[');
-    for (int i = 0; i < 3; i++) sdm_json_real(json, NULL, a->min[i]);
-    sdm_json_close(json, ']');
-    sdm_json_open(json, "max", '[');
-    for (int i = 0; i < 3; i++) sdm_json_real(json, NULL, a->max[i]);
-    sdm_json_close(json, ']');
+    cli_json_reals(json, "min", a->min, 3);
+    cli_json_reals(json, "max", a->max, 3);
 }
 
 void cli_notice_audit(const sdm_audit *a)
 {
     if (a->boundary_edges > 0)
         cli_notice(
-            "the mesh is open: %zu boundary edges; inside is where the winding number is over 1/2",
+            "the mesh is open: %zu boundary edges; inside is where the winding number exceeds 1/2",
             a->boundary_edges);
     if (a->nonmanifold_edges > 0)
         cli_notice("%zu edges with more than two triangles", a->nonmanifold_edges);

@@ -1,14 +1,18 @@
-/* A mesh audit as text and as JSON. */
+/* Prints a mesh audit as text, as JSON and as notices. */
 #ifndef CLI_REPORT_AUDIT_H
 #define CLI_REPORT_AUDIT_H
 
 #include "sdm/internal/text.h"
 #include "sdm/mesh.h"
 
+/* All figures of the audit, one a line, on stdout. */
 void cli_print_audit(const sdm_audit *a);
+
+/* Adds the figures as members of the open object. */
 void cli_json_audit(sdm_json *json, const sdm_audit *a);
-/* Notices of what an exact map of the mesh has to cope with; none of a closed mesh without blemish.
- */
+
+/* A notice for each defect that affects an exact map: boundary, non-manifold or misoriented edges,
+ * degenerate or duplicate triangles. */
 void cli_notice_audit(const sdm_audit *a);
 
 #endif

@@ -1,9 +1,9 @@
-/* What an image file holds, for people and as JSON. */
+/* Prints the grid, the range of values and the segments of an image file. */
 #include "report_image.h"
 
 #include <stdio.h>
 
-#include "inputs/setup.h"
+#include "json_values.h"
 #include "terminal.h"
 
 static void print_grid(const sdm_grid *g)
@@ -28,7 +28,7 @@ void cli_print_volume(const char *path, const sdm_volume *v)
     print_grid(&v->grid);
     if (!v->placed)
         printf(
-            "             the file does not say where it lies: axes and origin are only assumed\n");
+            "             the file states no frame: axes and origin are defaults of its format\n");
     printf("values       %.9g .. %.9g\n", (double)v->min, (double)v->max);
     if (v->n_nan > 0 || v->n_inf > 0)
         printf("             %zu are NaN, %zu infinite\n", v->n_nan, v->n_inf);
@@ -45,10 +45,8 @@ void cli_json_volume(sdm_json *j, const char *path, const sdm_volume *v)
     sdm_json_text(j, "file", path);
     sdm_json_text(j, "type", "image");
     sdm_json_text(j, "voxel_type", sdm_voxel_name(v->stored));
-    cli_json_grid(j, "grid", &v->grid);
-    sdm_json_open(j, "direction", '[');
-    for (int i = 0; i < 9; i++) sdm_json_real(j, NULL, v->grid.dir[i]);
-    sdm_json_close(j, ']');
+    cli_json_grid(j, "grid", &v->grid, false);
+    cli_json_reals(j, "direction", v->grid.dir, 9);
     sdm_json_bool(j, "placed", v->placed);
     sdm_json_int(j, "layers", (int64_t)v->n_layers);
     sdm_json_real(j, "min", (double)v->min);

@@ -1,14 +1,14 @@
-/* What an image file holds, for people and as JSON. */
+/* Prints the content of an image file as text and as JSON. */
 #ifndef CLI_REPORT_IMAGE_H
 #define CLI_REPORT_IMAGE_H
 
 #include "sdm/internal/text.h"
 #include "sdm/volume.h"
 
-/* Several lines on stdout. */
+/* Grid, range of values, segments and description, as text on stdout. */
 void cli_print_volume(const char *path, const sdm_volume *v);
 
-/* The members of an object. */
+/* The same, and the direction matrix, as members of the open object. */
 void cli_json_volume(sdm_json *j, const char *path, const sdm_volume *v);
 
 #endif

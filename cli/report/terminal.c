@@ -50,8 +50,8 @@ bool cli_wants_colour(void)
     return cli_has_terminal() && !(no && *no);
 }
 
-/* A line that says itself where it comes from: "file:line:column: ..." or "argument 'key=value':
- * ...". */
+/* True when the line begins with its place: "file:line:column: ..." or "argument 'key=value': ...".
+ */
 static bool has_place(const char *line, size_t length)
 {
     if (!strncmp(line, "argument '", 10)) return true;
@@ -107,8 +107,7 @@ void cli_catch_interrupts(void)
     sigemptyset(&action.sa_mask);
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
-    // a limit on the size of files is an error of writing like any other, with its message and no
-    // file left
+    // beyond a limit on file sizes write() then fails: a message appears and no file is left
     action.sa_handler = SIG_IGN;
     sigaction(SIGXFSZ, &action, NULL);
 }
@@ -132,6 +131,14 @@ sdm_status cli_print_json(sdm_json *json, sdm_error *err)
     if (!failed) puts(json->text.data);
     sdm_json_dispose(json);
     return failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the JSON text") : SDM_OK;
+}
+
+sdm_status cli_print_text(sdm_text *text, sdm_error *err)
+{
+    const bool failed = text->failed || !text->data;
+    if (!failed) fputs(text->data, stdout);
+    sdm_text_dispose(text);
+    return failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the text") : SDM_OK;
 }
 
 double cli_thread_clock(void)

@@ -1,5 +1,4 @@
-/* What the commands share towards the user and the system: messages, exit codes, interrupts, clock,
- * threads. */
+/* Messages, exit codes, interrupts and the processor clock, shared by all commands. */
 #ifndef CLI_TERMINAL_H
 #define CLI_TERMINAL_H
 
@@ -8,7 +7,7 @@
 #include "sdm/internal/text.h"
 #include "sdm/status.h"
 
-/* Exit codes, fixed for scripts. */
+/* Exit codes. Scripts rely on them: they must not change. */
 enum {
     CLI_EXIT_DONE = 0,
     CLI_EXIT_FAILED = 1,
@@ -20,38 +19,45 @@ enum {
 };
 int cli_exit_code(sdm_status status);
 
-/* Switches notices and progress off. */
+/* true: no notices and no progress from now on. */
 void cli_set_quiet(bool quiet);
 bool cli_is_quiet(void);
 
-/* Prints the message of a failure on stderr: "sdmgen: error: text"; a mistake in a configuration
-   with its place has its line to itself. Returns the exit code. */
+/* Prints the message of a failure on stderr, "sdmgen: error: text". Lines of a configuration error
+   that begin with their place, "file:line:column:", have no such prefix. Returns the exit code. */
 int cli_report(const sdm_error *err);
 
 /* "sdmgen: text" on stderr, unless quiet. */
 void cli_notice(const char *fmt, ...) SDM_PRINTF(1, 2);
 
-/* Terminal colours on stderr are wanted: a terminal, not TERM=dumb, NO_COLOR unset or empty. */
+/* True when stderr takes colours: a terminal, not TERM=dumb, NO_COLOR unset or empty. */
 bool cli_wants_colour(void);
-/* stderr is a terminal that can redraw a line. */
+
+/* True when stderr is a terminal that can redraw a line: TERM is set and not "dumb". */
 bool cli_has_terminal(void);
 
-/* Catches SIGINT and SIGTERM: the first sets a flag, the second ends the program at once with 130.
+/* Catches SIGINT and SIGTERM: the first sets a flag, the second ends the program at once with exit
+   code 130. Ignores SIGXFSZ: writing beyond a limit on file sizes then fails like any other write.
  */
 void cli_catch_interrupts(void);
 bool cli_is_interrupted(void);
-/* The same as a hook of the library. */
+
+/* cli_is_interrupted() with the signature of the library's `cancelled` callbacks. */
 bool cli_interrupted(void *user);
-/* SDM_E_CANCELLED when interrupted. */
+
+/* SDM_E_CANCELLED after an interrupt, else SDM_OK. */
 sdm_status cli_check_interrupt(sdm_error *err);
 
-/* Prints a finished JSON text as one line on stdout and disposes of it. SDM_E_NOMEM. */
+/* Prints a finished JSON text as one line on stdout and frees it. SDM_E_NOMEM: it is incomplete. */
 sdm_status cli_print_json(sdm_json *json, sdm_error *err);
 
-/* Seconds of this thread's processor: other programs on the machine do not count. */
+/* Prints a text on stdout and frees it. SDM_E_NOMEM: it is incomplete. */
+sdm_status cli_print_text(sdm_text *text, sdm_error *err);
+
+/* Processor time of the calling thread, s: other programs on the machine do not count. */
 double cli_thread_clock(void);
 
-/* n with its thousands separated by commas; buf has 32 bytes; returns buf. */
+/* Writes n into buf with commas between groups of three digits; returns buf. */
 const char *cli_format_count(int64_t n, char buf[32]);
 
 #endif

@@ -1,4 +1,4 @@
-/* What a training tells: a line of progress with budget, error and speed, and its notices. */
+/* Shows the progress of a training (step, loss, error, time left, speed) and prints its notices. */
 #include "train_progress.h"
 
 #include <math.h>
@@ -13,7 +13,7 @@ static const char *phase_name(sdm_phase phase)
         return "data";
     case SDM_PHASE_BASES:
         return "bases";
-    case SDM_PHASE_FIT:
+    case SDM_PHASE_MODE_FIT:
         return "fit";
     case SDM_PHASE_REFINE:
         return "refine";
@@ -22,7 +22,8 @@ static const char *phase_name(sdm_phase phase)
     }
 }
 
-static void add_time(char *buf, size_t size, double seconds)
+/* 1:05, 2:01:30; "-:--" when the time is unknown. */
+static void format_time(char *buf, size_t size, double seconds)
 {
     if (!(seconds >= 0) || seconds > 1e8)
         snprintf(buf, size, "-:--");
@@ -48,7 +49,7 @@ static void format_rate(char buf[32], double rate)
 static void on_progress(void *user, const sdm_progress *p)
 {
     char count[32], loss[32] = "-", error[32] = "-", left[32], rate[32], text[256];
-    add_time(left, sizeof left, p->seconds_left);
+    format_time(left, sizeof left, p->seconds_left);
     if (p->phase == SDM_PHASE_DATA || p->phase == SDM_PHASE_BASES) {
         snprintf(text, sizeof text, "%s exact maps  %s left", cli_format_count(p->samples, count),
                  left);
@@ -69,14 +70,10 @@ static void on_message(void *user, const char *line)
     cli_notice("%s", line);
 }
 
-static bool on_question(void *user)
-{
-    (void)user;
-    return cli_is_interrupted();
-}
-
 sdm_train_hooks cli_train_hooks(cli_progress *progress)
 {
-    return (sdm_train_hooks){
-        .progress = on_progress, .cancelled = on_question, .message = on_message, .user = progress};
+    return (sdm_train_hooks){.progress = on_progress,
+                             .cancelled = cli_interrupted,
+                             .message = on_message,
+                             .user = progress};
 }

@@ -1,11 +1,11 @@
-/* The hooks of a training that is watched on the terminal and stopped by an interrupt. */
+/* Callbacks that show a training on the terminal and stop it after an interrupt. */
 #ifndef CLI_TRAIN_PROGRESS_H
 #define CLI_TRAIN_PROGRESS_H
 
 #include "progress.h"
 #include "sdm/internal/train.h"
 
-/* *progress, which the caller starts and clears, lives as long as the training. */
+/* *progress must live as long as the training; the caller starts and clears it. */
 sdm_train_hooks cli_train_hooks(cli_progress *progress);
 
 #endif

@@ -1,96 +1,103 @@
-/* sdmgen bench exact: one mesh and grid, a row of figures for every way to make the map; sdmgen
- * bench network: a model. */
+/* Benchmarks: `sdmgen bench exact` measures all ways to make the distance map of one mesh on one
+ * grid, `sdmgen bench network` the maps and derivatives of a model. */
 #ifndef CLI_BENCH_H
 #define CLI_BENCH_H
 
 #include "args/options.h"
 #include "sdm/exact.h"
 
-typedef struct bench_case {
-    char title[512]; /* mesh and grid in words */
+/* The mesh and the grid of a benchmark, with the exact map as the reference. */
+typedef struct cli_bench_case {
+    char title[512]; /* the mesh and the grid in words */
     sdm_mesh mesh;
     sdm_grid grid; /* axis-aligned */
     size_t voxels;
-    double band_mm; /* only |distance| up to this counts; INFINITY: all */
-    double share;   /* of the voxels, for what is slow */
-    size_t repeat;  /* runs at most */
+    double band_mm; /* errors are measured where abs(distance) < band_mm; INFINITY: everywhere */
+    double share;   /* fraction of the voxels that slow programs compute */
+    size_t repeat;  /* largest number of runs */
     int threads;    /* of the row with all cores */
-    float *exact;   /* [nz][ny][nx] map of the exact engine: what the others are compared with */
-    float *winding; /* [nz][ny][nx] its sign: by the winding number of the whole mesh; NaN: not
-                       asked */
-    bool unioned;   /* the mesh overlaps itself */
-} bench_case;
+    float *exact;   /* [nz][ny][nx] map of the exact engine, the reference for errors, mm */
+    float *winding; /* [nz][ny][nx] distance signed by the winding number of the whole mesh; NaN:
+                       not computed */
+    bool unioned;   /* the mesh overlaps itself; exact is the distance to its union */
+} cli_bench_case;
 
-/* One way to make the map. Times are of one thread's processor, but for the row with all cores: the
- * clock's. */
-typedef struct bench_row {
+/* The figures of one method or program. Times are processor times of one thread; only the row with
+ * all cores has wall-clock times. */
+typedef struct cli_bench_row {
     char name[48];
-    char note[256]; /* version, method; or why there are no figures */
-    bool done;      /* there are figures */
+    char note[256]; /* version and method; without figures: the reason */
+    bool done;      /* the row has figures */
     double ms_prepare, ms_map;
-    double share;                 /* of the voxels done; ms_map is scaled to all */
-    double peak_mb;               /* resident memory over that before; NaN: unknown */
-    double max_error, mean_error; /* mm, against case.exact; NaN: nothing to compare */
-    size_t compared;              /* voxels the errors are over */
-    size_t wrong, judged;         /* signs that are wrong, signs looked at */
-} bench_row;
+    double share;                 /* fraction of the voxels computed; ms_map is scaled to all */
+    double peak_mb;               /* growth of the resident memory, MiB; NaN: unknown */
+    double max_error, mean_error; /* against case.exact, mm; NaN: no voxel compared */
+    size_t compared;              /* voxels compared for the errors */
+    size_t wrong, judged;         /* voxels with a wrong sign; voxels with a checked sign */
+} cli_bench_row;
 
-typedef struct bench_rows {
-    bench_row *items;
+typedef struct cli_bench_rows {
+    cli_bench_row *items;
     size_t n, capacity;
-} bench_rows;
+} cli_bench_rows;
 
-/* The mesh and grid of the command line, with `refine` times finer triangles (--shape alone) and
-   voxels `scale` times smaller in the same box. *c is zero-initialised; bench_case_dispose() frees
-   it in every case. */
-sdm_status bench_case_open(const cli_args *args, double refine, double scale, bench_case *c,
+/* Opens the mesh and the grid of the command line, with triangles `refine` times finer (only with
+   --shape) and voxels `scale` times smaller in the same box. Zero-initialise *c;
+   cli_bench_case_dispose() frees it, also after an error. */
+sdm_status cli_bench_case_open(const cli_args *args, double refine, double scale, cli_bench_case *c,
+                               sdm_error *err);
+void cli_bench_case_dispose(cli_bench_case *c);
+
+/* Measures the methods of this library: fills c->exact and c->winding and adds the rows. */
+sdm_status cli_bench_own(cli_bench_case *c, cli_bench_rows *rows, sdm_error *err);
+
+/* Measures the other programs (peers) and adds a row for each. A program that is missing or fails
+ * has a row without figures; that is no error. */
+sdm_status cli_bench_peers(const cli_bench_case *c, const cli_args *args, cli_bench_rows *rows,
                            sdm_error *err);
-void bench_case_dispose(bench_case *c);
 
-/* Fills c->exact, c->winding and adds the rows of this library's own methods. */
-sdm_status bench_own(bench_case *c, bench_rows *rows, sdm_error *err);
+/* Name of the i-th known peer; NULL after the last one. */
+const char *cli_bench_peer_name(size_t i);
 
-/* Adds a row for every other program. Those that are missing or fail are rows without figures, no
- * error. */
-sdm_status bench_peers(const bench_case *c, const cli_args *args, bench_rows *rows, sdm_error *err);
+/* Measures the peer `name`: times, memory and errors into *row, its map into values[nz][ny][nx]
+   (NaN: not computed), which may be NULL. If the program is missing or fails, row->done is false
+   and row->note is the reason; that is no error. */
+sdm_status cli_bench_peer(const cli_bench_case *c, const cli_args *args, const char *name,
+                          float *values, cli_bench_row *row, sdm_error *err);
 
-/* Other programs by name: entry i of their table, NULL beyond its end. */
-const char *bench_peer_name(size_t i);
+/* Appends a row with this name, zero otherwise. *row is valid until the next call. */
+sdm_status cli_bench_add(cli_bench_rows *rows, const char *name, cli_bench_row **row,
+                         sdm_error *err);
 
-/* One of them: times, memory and errors into *row, its map into values[nz][ny][nx] (NaN: not done),
-   which may be NULL. A program that is missing or fails is a row without figures, its note says
-   why, no error. */
-sdm_status bench_peer(const bench_case *c, const cli_args *args, const char *name, float *values,
-                      bench_row *row, sdm_error *err);
+/* True when row r = j + ny k of voxels along x belongs to the share. The rows are evenly spread,
+ * and the rows of a smaller share belong to every larger one. */
+bool cli_bench_has_row(double share, int64_t r);
 
-/* Appends a row, zero but for its name. */
-sdm_status bench_add(bench_rows *rows, const char *name, bench_row **row, sdm_error *err);
+/* Fills c->winding on all threads, for at most about a million voxels. */
+sdm_status cli_bench_find_signs(cli_bench_case *c, sdm_error *err);
 
-/* Is row r = j + ny k of voxels along x in the share? Evenly spread, and rows of a smaller share
- * are in a larger one's. */
-bool bench_has_row(double share, int64_t r);
+/* Errors and wrong signs of values[nz][ny][nx] (NaN: not computed) into *row. Errors are measured
+   where the signs agree; if the mesh overlaps itself, only outside, because other methods measure
+   to the surface inside the union. */
+void cli_bench_compare(const cli_bench_case *c, const float *values, cli_bench_row *row);
 
-/* c->winding, on all threads, for a share of at most about a million voxels. */
-sdm_status bench_find_signs(bench_case *c, sdm_error *err);
+/* cli_bench_peak_start() resets the peak of the resident memory (Linux) and returns the memory
+   resident now, kB; -1: unknown. cli_bench_peak_mb() returns the peak since then above that, MiB;
+   NaN: unknown. */
+long cli_bench_peak_start(void);
+double cli_bench_peak_mb(long start);
 
-/* Errors and signs of values[nz][ny][nx] (NaN: not done) into *row. Errors count where both maps
-   are outside if the mesh overlaps itself, where the signs agree if not: surface inside the union
-   is no mistake of others. */
-void bench_compare(const bench_case *c, const float *values, bench_row *row);
+/* `sdmgen bench network MODEL`: measures one map, batches, derivatives and threads, compares them
+ * with the arithmetic and memory speed of the machine, and prints the result. */
+sdm_status cli_bench_network(const cli_args *args, sdm_error *err);
 
-/* Starts a new high-water mark of the resident memory: returns kB resident now, -1: unknown. Then:
- * MB above it. */
-long bench_peak_start(void);
-double bench_peak_mb(long start);
+/* Print or add the table of one case. */
+void cli_bench_print(const cli_bench_case *c, const cli_bench_rows *rows);
+void cli_bench_json(sdm_json *j, const cli_bench_case *c, const cli_bench_rows *rows);
 
-/* sdmgen bench network MODEL: one map, batches, derivatives and threads, with the share of the
- * machine that is used. */
-sdm_status bench_network(const cli_args *args, sdm_error *err);
-
-/* Tables and JSON. bench_report_growth: three grids, then three meshes. */
-void bench_print(const bench_case *c, const bench_rows *rows);
-void bench_json(sdm_json *j, const bench_case *c, const bench_rows *rows);
-void bench_print_growth(const bench_case *cases, const bench_rows *rows, size_t n_grids,
-                        size_t n_meshes);
+/* Prints total times of cases[n_grids] with growing grids, then of cases[n_meshes] with growing
+ * meshes, and the time per voxel or triangle. */
+void cli_bench_print_growth(const cli_bench_case *cases, const cli_bench_rows *rows, size_t n_grids,
+                            size_t n_meshes);
 
 #endif

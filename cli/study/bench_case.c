@@ -1,4 +1,4 @@
-/* What is measured: mesh and grid of the command line. */
+/* Opens the mesh and the grid of a benchmark from the command line. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -9,51 +9,43 @@
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
 
-#define LARGE_MAP 1e6 /* voxels; above it slow programs do a share */
+/* Above LARGE_MAP voxels, slow programs compute only the fraction LARGE_SHARE of them. */
+#define LARGE_MAP 1e6
 #define LARGE_SHARE 0.01
 
-static sdm_status mesh_of_shape(const cli_args *args, double refine, bench_case *c, char *name,
-                                size_t size, sdm_error *err)
+/* Makes the mesh of a shape; --edge and `refine` set its option "edge". */
+static sdm_status make_shape_mesh(const cli_args *args, double refine, const char *name,
+                                  cli_bench_case *c, sdm_error *err)
 {
-    const char *shape_name = args->shape ? args->shape : "cochlea";
     char number[32], edge[64];
     cli_list options = {0};
-    sdm_registry *registry = NULL;
-    sdm_instance *shape = NULL;
-    double *p = NULL;
-    size_t n = 0;
+    cli_shape shape = {0};
     const double wanted = (args->edge > 0 ? args->edge : 0.3) / refine;
     snprintf(edge, sizeof edge, "edge=%s", sdm_format_real(wanted, number));
     sdm_status s = SDM_ALLOC(&options.items, args->options.n + 1, "shape options", err);
     for (size_t i = 0; i < args->options.n && !s; i++)
         options.items[options.n++] = args->options.items[i];
     if (!s && (args->edge > 0 || refine != 1)) options.items[options.n++] = edge;
-    if (!s) s = cli_open_registry(args, &registry, err);
-    if (!s) s = cli_open_shape(registry, shape_name, &options, &shape, err);
-    const sdm_param *params = s ? NULL : sdm_instance_params(shape, &n);
-    if (!s) s = SDM_ALLOC(&p, n, "parameters", err);
-    if (!s) s = cli_read_params(params, n, &args->params, p, err);
-    if (!s) s = cli_check_range(params, n, p, err);
-    if (!s) s = sdm_instance_mesh(shape, p, &c->mesh, err);
-    snprintf(name, size, "%s", shape_name);
-    sdm_free(p);
-    sdm_instance_free(shape);
-    sdm_registry_free(registry);
+    if (!s) s = cli_shape_open(args, name, &options, &shape, err);
+    if (!s) s = cli_check_range(shape.params, shape.n_params, shape.values, err);
+    if (!s) s = sdm_instance_mesh(shape.instance, shape.values, &c->mesh, err);
+    cli_shape_dispose(&shape);
     sdm_free((void *)options.items);
     return s;
 }
 
-/* The grid of --grid, --size, --spacing and --origin; 60 x 50 x 50 voxels when nothing is said. The
-   cochlea keeps the place it has in the box of its networks. */
-static sdm_status grid_of(const cli_args *args, bool cochlea, const sdm_audit *audit, sdm_grid *out,
-                          sdm_error *err)
+/* The grid of --grid, --size, --spacing and --origin; by default 60 x 50 x 50 voxels. With a preset
+   grid, the cochlea has the same position in it as in the grid of its networks. */
+static sdm_status make_grid(const cli_args *args, bool cochlea, const sdm_audit *audit,
+                            sdm_grid *out, sdm_error *err)
 {
     const bool g2 = args->grid && !strcmp(args->grid, "g2");
     cli_args a = *args;
     if (a.grid && (a.size[0] > 0 || a.spacing[0] > 0))
         return sdm_fail(
             err, SDM_E_ARG,
-            "bench: --grid %s has a size and a spacing; give it or --size and --spacing", a.grid);
+            "bench: --grid %s has a size and a spacing: give either --grid or --size and --spacing",
+            a.grid);
     const bool preset = a.grid || (cochlea && a.size[0] == 0 && !(a.spacing[0] > 0));
     const int64_t size[3] = {g2 ? 256 : 60, g2 ? 256 : 50, g2 ? 192 : 50};
     for (int i = 0; i < 3 && (preset || (args->size[0] == 0 && !(args->spacing[0] > 0))); i++)
@@ -63,11 +55,12 @@ static sdm_status grid_of(const cli_args *args, bool cochlea, const sdm_audit *a
         *out = sdm_grid_centred(a.size, a.spacing[0], (const double[3]){0.5, 0.4, 1.2});
         return SDM_OK;
     }
-    return cli_fit_grid(&a, audit->min, audit->max, out, err);
+    return cli_grid_for_box(&a, audit->min, audit->max, out, err);
 }
 
-/* The same box with other voxels; voxels fill it, centres do not reach its walls. */
-static void rescale(sdm_grid *g, double scale)
+/* Changes the number of voxels by the factor `scale` along each axis. The box, bounded by the faces
+ * of the outermost voxels, stays the same. */
+static void grid_rescale(sdm_grid *g, double scale)
 {
     for (int i = 0; i < 3; i++) {
         const double wall = g->origin[i] - 0.5 * g->spacing[i], old = (double)g->n[i];
@@ -77,7 +70,7 @@ static void rescale(sdm_grid *g, double scale)
     }
 }
 
-static void write_title(bench_case *c, const char *name)
+static void write_title(cli_bench_case *c, const char *name)
 {
     char spacing[64];
     const double *h = c->grid.spacing;
@@ -90,26 +83,27 @@ static void write_title(bench_case *c, const char *name)
              (long long)c->grid.n[2], spacing);
 }
 
-sdm_status bench_case_open(const cli_args *args, double refine, double scale, bench_case *c,
-                           sdm_error *err)
+sdm_status cli_bench_case_open(const cli_args *args, double refine, double scale, cli_bench_case *c,
+                               sdm_error *err)
 {
     if (args->shape && args->mesh)
         return sdm_fail(err, SDM_E_ARG, "bench exact: either --shape NAME or --mesh FILE");
     if (args->mesh && (args->params.n > 0 || args->options.n > 0 || args->edge > 0))
         return sdm_fail(
             err, SDM_E_ARG,
-            "bench exact: -p, -O and --edge belong to --shape, a mesh file is as it is");
-    char name[320];
-    snprintf(name, sizeof name, "%.300s", args->mesh ? args->mesh : "");
+            "bench exact: -p, -O and --edge belong to --shape; a mesh file has no parameters");
+    // mesh and grid
+    const char *name = args->mesh ? args->mesh : args->shape ? args->shape : "cochlea";
     sdm_audit audit;
     sdm_status s = args->mesh ? cli_read_mesh(args->mesh, &c->mesh, err)
-                              : mesh_of_shape(args, refine, c, name, sizeof name, err);
+                              : make_shape_mesh(args, refine, name, c, err);
     if (!s) s = sdm_mesh_audit(&c->mesh, &audit, err);
-    if (!s) s = grid_of(args, !strcmp(name, "cochlea"), &audit, &c->grid, err);
+    if (!s) s = make_grid(args, !strcmp(name, "cochlea"), &audit, &c->grid, err);
     if (s) return s;
-    rescale(&c->grid, scale);
+    grid_rescale(&c->grid, scale);
     s = sdm_grid_check(&c->grid, err);
     if (s) return s;
+    // settings and memory of the maps
     c->voxels = sdm_grid_count(&c->grid);
     c->band_mm = args->band > 0 ? args->band * fmin(c->grid.spacing[0],
                                                     fmin(c->grid.spacing[1], c->grid.spacing[2]))
@@ -122,7 +116,7 @@ sdm_status bench_case_open(const cli_args *args, double refine, double scale, be
     return s ? s : SDM_ALLOC(&c->winding, c->voxels, "signs by the winding number", err);
 }
 
-void bench_case_dispose(bench_case *c)
+void cli_bench_case_dispose(cli_bench_case *c)
 {
     sdm_mesh_dispose(&c->mesh);
     sdm_free(c->exact);

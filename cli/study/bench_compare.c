@@ -1,4 +1,4 @@
-/* Errors, wrong signs and memory of the ways to make a map. */
+/* Measures errors, wrong signs and memory of a method. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,19 +9,19 @@
 
 #include "bench.h"
 
-#define MOST_SIGNS 1e6 /* voxels whose winding number is asked for */
+#define SIGNS_MAX 1e6 /* largest number of voxels whose winding number is computed */
 
-bool bench_has_row(double share, int64_t r)
+bool cli_bench_has_row(double share, int64_t r)
 {
-    const double turn =
-        (double)r * 0.6180339887498949; /* multiples of the golden ratio spread evenly */
-    return turn - floor(turn) < share;
+    // fractional parts of multiples of the golden ratio are evenly spread
+    const double multiple = (double)r * 0.6180339887498949;
+    return multiple - floor(multiple) < share;
 }
 
-sdm_status bench_find_signs(bench_case *c, sdm_error *err)
+sdm_status cli_bench_find_signs(cli_bench_case *c, sdm_error *err)
 {
     const sdm_exact_opts opts = {.sign = SDM_SIGN_WINDING, .keep_overlap = true};
-    const double share = fmin(1, MOST_SIGNS / (double)c->voxels);
+    const double share = fmin(1, SIGNS_MAX / (double)c->voxels);
     const sdm_grid *g = &c->grid;
     sdm_exact *engine = NULL;
     sdm_status s = sdm_exact_create(&c->mesh, &opts, &engine, err);
@@ -33,20 +33,20 @@ sdm_status bench_find_signs(bench_case *c, sdm_error *err)
         sdm_grid_world(g, (const double[3]){0, (double)(r % g->n[1]), (double)(r / g->n[1])},
                        row.origin);
         for (int64_t i = 0; i < g->n[0]; i++) values[i] = NAN;
-        if (bench_has_row(share, r)) s = sdm_exact_map(engine, &row, values, err);
+        if (cli_bench_has_row(share, r)) s = sdm_exact_map(engine, &row, values, err);
     }
     sdm_exact_free(engine);
     return s;
 }
 
-void bench_compare(const bench_case *c, const float *values, bench_row *row)
+void cli_bench_compare(const cli_bench_case *c, const float *values, cli_bench_row *row)
 {
     double sum = 0, max = 0;
     row->compared = row->wrong = row->judged = 0;
     for (size_t i = 0; i < c->voxels; i++) {
         const double v = (double)values[i], e = (double)c->exact[i], w = (double)c->winding[i];
         if (!isfinite(v) || !(fabs(e) < c->band_mm)) continue;
-        if (isfinite(w) && w != 0) { /* on the surface both signs are right */
+        if (isfinite(w) && w != 0) { // on the surface both signs are right
             row->judged++;
             row->wrong += (v < 0) != (w < 0);
         }
@@ -61,7 +61,7 @@ void bench_compare(const bench_case *c, const float *values, bench_row *row)
 
 /* ---- memory ---- */
 
-/* "NAME:  123 kB" of the process; -1 where there is no such line. */
+/* The number in the line "NAME:  123 kB" of /proc/self/status; -1: no such line. */
 static long status_kb(const char *name)
 {
     FILE *f = fopen("/proc/self/status", "r");
@@ -75,10 +75,10 @@ static long status_kb(const char *name)
     return kb;
 }
 
-long bench_peak_start(void)
+long cli_bench_peak_start(void)
 {
 #ifdef __GLIBC__
-    malloc_trim(0); /* free memory that is still resident would hide what comes */
+    malloc_trim(0); // free memory that is still resident would hide new allocations
 #endif
     FILE *f = fopen("/proc/self/clear_refs", "w");
     if (!f) return -1;
@@ -86,7 +86,7 @@ long bench_peak_start(void)
     return fclose(f) == 0 && written ? status_kb("VmRSS") : -1;
 }
 
-double bench_peak_mb(long start)
+double cli_bench_peak_mb(long start)
 {
     const long peak = status_kb("VmHWM");
     return start < 0 || peak < 0 ? NAN : fmax(0, (double)(peak - start) / 1024);

@@ -1,6 +1,6 @@
-/* sdmgen bench network: one map, batches, derivatives and threads of a model, and what part of the
-   machine they use. Of several runs the fastest counts, as in bench exact: other programs only add
-   to the time. */
+/* sdmgen bench network: times of one map, a batch, derivatives and several threads, and the
+   fraction of the machine's arithmetic and memory speed that they use. The fastest of several runs
+   counts, as in bench exact, because other programs can only add to the time. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -15,52 +15,56 @@
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
 
-enum { RUNS = 100, LEAST = 3 };
-#define ENOUGH_S 4.0 /* of one figure */
+/* Runs of one figure: RUNS, or after TIME_LIMIT_S as few as RUNS_MIN. */
+enum { RUNS = 100, RUNS_MIN = 3 };
+#define TIME_LIMIT_S 4.0
 
 typedef struct network_times {
     cli_timing maps;
-    double ms_jacobian, ms_jvp, ms_vjp; /* one core; the map comes with the first two */
-    double ms_threads;                  /* one map on all cores, clock on the wall */
+    double ms_jacobian, ms_jvp, ms_vjp; /* one core; the first two include the map */
+    double ms_threads;                  /* one map on all cores, wall-clock time */
     int threads;
-    double peak_gmacs; /* of the matrix product on one core */
-    double
-        read_gbs; /* of one core reading as many bytes as the model has weights, again and again */
-    sdm_error no_exact; /* why there is no time of the exact engine */
+    double peak_gmacs;  /* 10^9 multiply-adds per second of the matrix product on one core */
+    double read_gbs;    /* GB/s of one core reading a block of the size of the weights repeatedly */
+    sdm_error no_exact; /* why the exact engine has no time */
 } network_times;
 
-/* Of memory that is there already. */
-typedef struct work {
+/* A model with all memory that its derivatives need: allocation is not timed. */
+typedef struct derivative_work {
     const sdm_model *m;
     double p[SDM_MAX_PARAMS], direction[SDM_MAX_PARAMS], gradient[SDM_MAX_PARAMS];
     float *values, *jacobian;
     void *scratch;
-} work;
+} derivative_work;
 
-static void run_jacobian(work *w)
+static void call_jacobian(derivative_work *w)
 {
     sdm_model_jacobian(w->m, w->p, w->values, w->jacobian, w->scratch);
 }
-static void run_jvp(work *w)
+static void call_jvp(derivative_work *w)
 {
     sdm_model_jvp(w->m, w->p, w->direction, w->values, w->jacobian, w->scratch);
 }
-static void run_vjp(work *w) { sdm_model_vjp(w->m, w->p, w->values, w->gradient, w->scratch); }
+static void call_vjp(derivative_work *w)
+{
+    sdm_model_vjp(w->m, w->p, w->values, w->gradient, w->scratch);
+}
 
-static sdm_status time_call(work *w, void (*call)(work *), double *ms, sdm_error *err)
+static sdm_status time_call(derivative_work *w, void (*call)(derivative_work *), double *ms,
+                            sdm_error *err)
 {
     double each[RUNS];
     const double begin = sdm_clock();
     size_t n = 0;
     call(w);
-    while (n < RUNS && (n < LEAST || sdm_clock() - begin < ENOUGH_S)) {
+    while (n < RUNS && (n < RUNS_MIN || sdm_clock() - begin < TIME_LIMIT_S)) {
         const double start = cli_thread_clock();
         call(w);
         each[n++] = 1e3 * (cli_thread_clock() - start);
         const sdm_status s = cli_check_interrupt(err);
         if (s) return s;
     }
-    *ms = cli_least(each, n);
+    *ms = cli_minimum(each, n);
     return SDM_OK;
 }
 
@@ -74,16 +78,16 @@ static sdm_status time_derivatives(const sdm_model *m, uint64_t seed, network_ti
     const size_t scratch =
         larger(sdm_model_jacobian_scratch_bytes(m),
                larger(sdm_model_jvp_scratch_bytes(m), sdm_model_vjp_scratch_bytes(m)));
-    work w = {.m = m};
+    derivative_work w = {.m = m};
     cli_eval_params(m, seed, 0, w.p);
     for (size_t i = 0; i < info->n_params; i++)
         w.direction[i] = info->params[i].max - info->params[i].min;
     sdm_status s = SDM_ALLOC(&w.values, voxels, "map to time", err);
     if (!s) s = SDM_ALLOC(&w.jacobian, voxels * info->n_params, "derivatives to time", err);
     if (!s) s = sdm_alloc(&w.scratch, scratch, 1, "memory of the network", err);
-    if (!s) s = time_call(&w, run_jacobian, &t->ms_jacobian, err);
-    if (!s) s = time_call(&w, run_jvp, &t->ms_jvp, err);
-    if (!s) s = time_call(&w, run_vjp, &t->ms_vjp, err);
+    if (!s) s = time_call(&w, call_jacobian, &t->ms_jacobian, err);
+    if (!s) s = time_call(&w, call_jvp, &t->ms_jvp, err);
+    if (!s) s = time_call(&w, call_vjp, &t->ms_vjp, err);
     sdm_free(w.scratch);
     sdm_free(w.jacobian);
     sdm_free(w.values);
@@ -100,7 +104,8 @@ static sdm_status time_threads(const sdm_model *m, uint64_t seed, int threads, n
         SDM_ALLOC(&values, sdm_grid_count(&sdm_model_get_info(m)->grid), "map to time", err);
     const double begin = sdm_clock();
     cli_eval_params(m, seed, 0, p);
-    for (size_t i = 0; i < RUNS && !s && (i < LEAST || sdm_clock() - begin < ENOUGH_S); i++) {
+    for (size_t i = 0; i < RUNS && !s && (i < RUNS_MIN || sdm_clock() - begin < TIME_LIMIT_S);
+         i++) {
         const double start = sdm_clock();
         s = sdm_generate(m, p, &opts, values, NULL, err);
         best = fmin(best, 1e3 * (sdm_clock() - start));
@@ -111,24 +116,26 @@ static sdm_status time_threads(const sdm_model *m, uint64_t seed, int threads, n
     return s;
 }
 
-/* The machine: the matrix product at its best, and a read of the same bytes over and over. */
+/* Speed of the machine: a large matrix product, and repeated reading of a block of `bytes`. */
 static sdm_status measure_machine(size_t bytes, network_times *t, sdm_error *err)
 {
-    enum { N = 384, TURNS = 5 };
+    enum { N = 384, REPEATS = 5 };
     typedef uint64_t words __attribute__((vector_size(16)));
     const size_t n_words = bytes / sizeof(words) / 4 * 4 + 4;
     float *a = NULL;
     words *data = NULL, total = {0};
     sdm_status s = SDM_ALLOC(&a, 3 * N * N, "matrix to time", err);
     if (!s) s = sdm_alloc((void **)&data, n_words, sizeof *data, "memory to read", err);
+    // matrix product
     double best = INFINITY, read = INFINITY;
-    for (int i = 0; i < TURNS && !s; i++) {
+    for (int i = 0; i < REPEATS && !s; i++) {
         const double start = cli_thread_clock();
         sdm_gemm(N, N, N, (sdm_view){a, N, 1}, (sdm_view){a + N * N, N, 1}, false, a + 2 * N * N, N,
                  1);
         best = fmin(best, cli_thread_clock() - start);
     }
-    for (int i = 0; i < 2 * TURNS && !s; i++) {
+    // reading
+    for (int i = 0; i < 2 * REPEATS && !s; i++) {
         const double start = cli_thread_clock();
         words a0 = {0}, a1 = a0, a2 = a0, a3 = a0;
         for (size_t k = 0; k < n_words; k += 4)
@@ -138,13 +145,15 @@ static sdm_status measure_machine(size_t bytes, network_times *t, sdm_error *err
     }
     t->peak_gmacs = 1e-9 * (double)N * N * N / best;
     t->read_gbs = 1e-9 * (double)(n_words * sizeof *data) / read;
-    if (!s && total[0] + total[1] != 0) /* memory is zero: the loop is kept for this */
-        s = sdm_fail(err, SDM_E_INTERNAL, "memory that was zero is not");
+    // the block is zero; the use of the sum keeps the compiler from removing the loop
+    if (!s && total[0] + total[1] != 0)
+        s = sdm_fail(err, SDM_E_INTERNAL, "zero-initialised memory is not zero");
     sdm_free(data);
     sdm_free(a);
     return s;
 }
 
+/* 10^9 multiply-adds per second. */
 static double gmacs(double macs, double ms) { return 1e-6 * macs / ms; }
 
 static void print_row(const char *name, double ms, double one, const char *note)
@@ -160,6 +169,7 @@ static void print_times(const network_times *t, const sdm_model_info *info)
            "weights; %s\n\n",
            info->shape, info->kind, sdm_grid_count(&info->grid), info->n_params, 1e-6 * info->macs,
            1e-6 * (double)info->weight_bytes, sdm_kernels_name());
+    // one map and a batch
     const double used = gmacs(info->macs, one), bytes = 1e-6 * (double)info->weight_bytes / one;
     snprintf(note, sizeof note,
              "%.1f GMAC/s, %.0f %% of the peak; %.1f GB/s of weights, %.0f %% of reading", used,
@@ -170,20 +180,21 @@ static void print_times(const network_times *t, const sdm_model_info *info)
     snprintf(note, sizeof note, "%.1f GMAC/s, %.0f %% of the peak", batch,
              100 * batch / t->peak_gmacs);
     print_row(name, t->maps.ms_batch, one, note);
-    snprintf(note, sizeof note, "%zu parameters; by differences %zu maps", info->n_params,
+    // derivatives
+    snprintf(note, sizeof note, "%zu parameters; finite differences need %zu maps", info->n_params,
              info->n_params + 1);
     print_row("map and Jacobian", t->ms_jacobian, one, note);
     print_row("map and J v", t->ms_jvp, one, "");
     print_row("w J", t->ms_vjp, one, "");
+    // threads and exact engine
     snprintf(name, sizeof name, "one map, %d threads", t->threads);
-    if (t->threads > 1) print_row(name, t->ms_threads, one, "clock on the wall");
+    if (t->threads > 1) print_row(name, t->ms_threads, one, "wall-clock time");
     if (isfinite(t->maps.ms_exact))
         print_row("exact engine", t->maps.ms_exact, one, "");
     else
         printf("  %-26s not measured: %s\n", "exact engine", t->no_exact.text);
-    printf("\nThe fastest of several runs; one core where nothing else is said. Peak: the matrix "
-           "product, %.1f GMAC/s; "
-           "reading: %.1f GB/s.\n",
+    printf("\nThe fastest of several runs, on one core unless stated otherwise. Peak: the matrix "
+           "product, %.1f GMAC/s; reading: %.1f GB/s.\n",
            t->peak_gmacs, t->read_gbs);
 }
 
@@ -197,6 +208,7 @@ static sdm_status print_json(const network_times *t, const sdm_model_info *info,
     sdm_json_int(&j, "voxels", (int64_t)sdm_grid_count(&info->grid));
     sdm_json_real(&j, "macs", info->macs);
     sdm_json_int(&j, "weight_bytes", (int64_t)info->weight_bytes);
+    // times
     sdm_json_int(&j, "threads", 1);
     sdm_json_real(&j, "ms_network", t->maps.ms_network);
     sdm_json_real(&j, "ms_network_batch", t->maps.ms_batch);
@@ -206,6 +218,7 @@ static sdm_status print_json(const network_times *t, const sdm_model_info *info,
     sdm_json_real(&j, "ms_vjp", t->ms_vjp);
     sdm_json_int(&j, "all_threads", t->threads);
     sdm_json_real(&j, "ms_network_all_threads", t->ms_threads);
+    // speed, and the exact engine
     sdm_json_real(&j, "gmacs", gmacs(info->macs, t->maps.ms_network));
     sdm_json_real(&j, "gmacs_batch", gmacs(info->macs, t->maps.ms_batch));
     sdm_json_real(&j, "peak_gmacs", t->peak_gmacs);
@@ -217,8 +230,8 @@ static sdm_status print_json(const network_times *t, const sdm_model_info *info,
     return cli_print_json(&j, err);
 }
 
-/* The shape for the time of the exact engine; without it, or its data files, the network is
- * measured alone. */
+/* Creates the shape for the exact engine. If the shape is unknown or its data files are missing,
+ * *why is the reason and only the network is measured. */
 static sdm_status open_shape(const sdm_model *m, const sdm_registry *registry, sdm_instance **shape,
                              sdm_error *why, sdm_error *err)
 {
@@ -228,7 +241,7 @@ static sdm_status open_shape(const sdm_model *m, const sdm_registry *registry, s
     return s;
 }
 
-sdm_status bench_network(const cli_args *args, sdm_error *err)
+sdm_status cli_bench_network(const cli_args *args, sdm_error *err)
 {
     if (args->files.n != 2) return sdm_fail(err, SDM_E_ARG, "usage: sdmgen bench network MODEL");
     const uint64_t seed = args->seed < 0 ? 1 : (uint64_t)args->seed;
@@ -241,8 +254,8 @@ sdm_status bench_network(const cli_args *args, sdm_error *err)
     const sdm_model_info *info = s ? NULL : sdm_model_get_info(model);
     if (!s) s = open_shape(model, registry, &shape, &t.no_exact, err);
     if (!s && info->n_params > SDM_MAX_PARAMS)
-        s = sdm_fail(err, SDM_E_UNSUPPORTED, "%zu parameters, at most %d", info->n_params,
-                     SDM_MAX_PARAMS);
+        s = sdm_fail(err, SDM_E_UNSUPPORTED, "%zu parameters, at most %d can be sampled",
+                     info->n_params, SDM_MAX_PARAMS);
     if (!s) s = cli_time_maps(model, shape, seed, true, 0, &t.maps, err);
     if (!s) s = time_derivatives(model, seed, &t, err);
     if (!s) s = time_threads(model, seed, sdm_threads((int)args->threads), &t, err);

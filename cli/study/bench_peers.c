@@ -1,5 +1,5 @@
-/* Other programs for the same map: found, started, read. The protocol is told in
- * bench/peers/peer.h. */
+/* Finds and starts other programs that make the same map (peers) and reads their results. For the
+ * protocol see bench/peers/peer.h. */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -20,11 +20,11 @@
 #include "sdm/meshfile.h"
 
 #define PREFIX "sdmgen-peer-"
-enum { N_ARGUMENTS = 15, MOST_OUTPUT = 65536, MOST_PATH = PATH_MAX };
+enum { N_ARGUMENTS = 15, OUTPUT_MAX = 65536, PATH_SIZE = PATH_MAX };
 
 extern char **environ;
 
-/* Those this project has programs for, in the order of the table. */
+/* The peers of this project, in the order of the table, and the packages they need. */
 static const struct {
     const char *name, *packages;
 } known[] = {{"vtk", "python3-vtk9"},           {"cgal", "libcgal-dev"},
@@ -32,7 +32,7 @@ static const struct {
              {"itk", "libinsighttoolkit5-dev"}, {"scipy", "python3-scipy python3-vtk9"}};
 enum { N_KNOWN = sizeof known / sizeof *known };
 
-/* ---- where they are ---- */
+/* ---- folders ---- */
 
 static bool is_folder(const char *path)
 {
@@ -42,7 +42,7 @@ static bool is_folder(const char *path)
 
 static int is_peer(const struct dirent *e) { return !strncmp(e->d_name, PREFIX, strlen(PREFIX)); }
 
-/* Names of the programs in a folder, sorted; 0 when there is none. */
+/* *names = the sorted names of the peers in a folder; returns their number. free_names() frees. */
 static int list_peers(const char *folder, struct dirent ***names)
 {
     *names = NULL;
@@ -56,24 +56,25 @@ static void free_names(struct dirent **names, int n)
     free(names);
 }
 
-/* Beside this program (where it was built), else in libexec/sdmgen (where it was installed). */
-static void find_folder(char folder[MOST_PATH])
+/* The folder of this program if it holds peers, as in a build; else libexec/sdmgen, as installed.
+ */
+static void find_folder(char folder[PATH_SIZE])
 {
-    char self[MOST_PATH / 2];
+    char self[PATH_SIZE / 2];
     const ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
     self[length > 0 ? length : 0] = '\0';
     char *slash = strrchr(self, '/');
     if (slash) *slash = '\0';
-    snprintf(folder, MOST_PATH, "%s", self);
+    snprintf(folder, PATH_SIZE, "%s", self);
     struct dirent **names;
     const int n = list_peers(folder, &names);
     free_names(names, n);
-    if (n == 0) snprintf(folder, MOST_PATH, "%s/%s", self, SDM_PEER_FOLDER);
+    if (n == 0) snprintf(folder, PATH_SIZE, "%s/%s", self, SDM_PEER_FOLDER);
 }
 
 /* ---- one line of JSON ---- */
 
-/* The text or number under `key` of a flat object, without quotes; false when there is none. */
+/* out[size] = the text or number of `key` in a flat object, without quotes; false: no such key. */
 static bool json_value(const char *line, const char *key, char *out, size_t size)
 {
     char quoted[64];
@@ -101,14 +102,15 @@ static bool json_number(const char *line, const char *key, double *out)
 
 /* ---- one program ---- */
 
-/* Starts the program and reads what it prints, stderr too. Returns its exit code, -1 when it cannot
- * be started or was killed. */
-static int run_program(char **arguments, char output[MOST_OUTPUT])
+/* Runs a program; output = its stdout and stderr, cut at OUTPUT_MAX. Returns its exit code, -1 if
+ * it cannot be started or was killed. */
+static int run_program(char **arguments, char output[OUTPUT_MAX])
 {
     int ends[2], status = -1;
     pid_t child;
     posix_spawn_file_actions_t actions;
     size_t n = 0;
+    // start the program with its output in a pipe
     output[0] = '\0';
     if (pipe(ends)) return -1;
     (void)fcntl(ends[0], F_SETFD, FD_CLOEXEC);
@@ -119,21 +121,23 @@ static int run_program(char **arguments, char output[MOST_OUTPUT])
     const int failed = posix_spawn(&child, arguments[0], &actions, NULL, arguments, environ);
     posix_spawn_file_actions_destroy(&actions);
     close(ends[1]);
+    // read the output
     char block[4096];
     for (ssize_t got; !failed && ((got = read(ends[0], block, sizeof block)) > 0 ||
                                   (got < 0 && errno == EINTR));)
-        for (ssize_t i = 0; i < got && n + 1 < MOST_OUTPUT; i++) output[n++] = block[i];
+        for (ssize_t i = 0; i < got && n + 1 < OUTPUT_MAX; i++) output[n++] = block[i];
     output[n] = '\0';
     close(ends[0]);
+    // get the exit code
     if (failed) {
-        snprintf(output, MOST_OUTPUT, "cannot be started: %s", strerror(failed));
+        snprintf(output, OUTPUT_MAX, "cannot be started: %s", strerror(failed));
         return -1;
     }
     while (waitpid(child, &status, 0) < 0 && errno == EINTR) continue;
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
-/* The last line that is a JSON object, or else the last line; cuts the text after it. */
+/* The last line that is a JSON object, else the last line. Splits `output` into lines. */
 static char *result_line(char *output)
 {
     char *json = NULL, *last = output;
@@ -144,15 +148,17 @@ static char *result_line(char *output)
     return json ? json : last;
 }
 
-/* Figures of the JSON line and errors of the values into *row; what goes wrong is its note. */
-static void read_result(const bench_case *c, const char *line, int code, const char *values_path,
-                        float *out, bench_row *row)
+/* Stores the figures of the JSON line and the errors of the values in *row, and the values in out
+ * (may be NULL). After a failure row->done is false and row->note is the reason. */
+static void read_result(const cli_bench_case *c, const char *line, int code,
+                        const char *values_path, float *out, cli_bench_row *row)
 {
     char version[64] = "", note[160] = "";
     double kb = -1, *values = NULL;
     size_t shape[4] = {0};
     int n_dim = 0;
     sdm_error err = {0};
+    // times
     if (json_value(line, "error", row->note, sizeof row->note)) return;
     if (code != 0 || !json_number(line, "prepare_ms", &row->ms_prepare) ||
         !json_number(line, "map_ms", &row->ms_map) || !json_number(line, "share", &row->share) ||
@@ -161,6 +167,7 @@ static void read_result(const bench_case *c, const char *line, int code, const c
         return;
     }
     row->ms_map /= row->share;
+    // memory and note
     (void)json_number(line, "peak_kb", &kb);
     row->peak_mb = kb < 0 ? NAN : kb / 1024;
     (void)json_value(line, "version", version, sizeof version);
@@ -169,6 +176,7 @@ static void read_result(const bench_case *c, const char *line, int code, const c
     const bool no_band =
         isfinite(c->band_mm) && json_value(line, "band", band, sizeof band) && strcmp(band, "true");
     snprintf(row->note, sizeof row->note, "%s: %s%s", version, note, no_band ? "; whole map" : "");
+    // values
     float *single = NULL;
     sdm_status s = sdm_npy_read(values_path, &values, shape, &n_dim, &err);
     const size_t wanted[3] = {(size_t)c->grid.n[2], (size_t)c->grid.n[1], (size_t)c->grid.n[0]};
@@ -176,26 +184,27 @@ static void read_result(const bench_case *c, const char *line, int code, const c
         s = sdm_fail(&err, SDM_E_FORMAT, "its values have another size than the grid");
     if (!s) s = SDM_ALLOC(&single, c->voxels, "values of another program", &err);
     for (size_t i = 0; i < c->voxels && !s; i++) single[i] = (float)values[i];
+    // errors
     row->done = !s;
     if (s)
         snprintf(row->note, sizeof row->note, "%.200s", err.text);
     else
-        bench_compare(c, single, row);
+        cli_bench_compare(c, single, row);
     if (!s && out) memcpy(out, single, c->voxels * sizeof *out);
     sdm_free(single);
     sdm_free(values);
 }
 
-/* What measuring needs besides the case: where the programs are, files for mesh and values. */
+/* The folder of the peers, a temporary folder, and the files in it for the mesh and the values. */
 typedef struct workplace {
-    char folder[MOST_PATH], work[MOST_PATH / 2], mesh_path[MOST_PATH], values_path[MOST_PATH];
+    char folder[PATH_SIZE], work[PATH_SIZE / 2], mesh_path[PATH_SIZE], values_path[PATH_SIZE];
 } workplace;
 
-static sdm_status measure_peer(const bench_case *c, const workplace *w, const char *name,
-                               float *values, bench_row *row, sdm_error *err)
+static sdm_status measure_peer(const cli_bench_case *c, const workplace *w, const char *name,
+                               float *values, cli_bench_row *row, sdm_error *err)
 {
-    char program[MOST_PATH + 300], number[12][32], *output = NULL;
-    sdm_status s = SDM_ALLOC(&output, MOST_OUTPUT, "output of another program", err);
+    char program[PATH_SIZE + 300], number[12][32], *output = NULL;
+    sdm_status s = SDM_ALLOC(&output, OUTPUT_MAX, "output of another program", err);
     if (s) return s;
     snprintf(program, sizeof program, "%s/" PREFIX "%s", w->folder, name);
     for (int i = 0; i < 3; i++) {
@@ -216,17 +225,18 @@ static sdm_status measure_peer(const bench_case *c, const workplace *w, const ch
     return cli_check_interrupt(err);
 }
 
-static void say_missing(size_t k, bench_row *row)
+static void note_missing(size_t k, cli_bench_row *row)
 {
     const char *packages = k < N_KNOWN ? known[k].packages : "its packages";
     snprintf(row->note, sizeof row->note, "not built: install %s and configure with -DSDM_PEERS=ON",
              packages);
 }
 
-static sdm_status measure_all(const bench_case *c, const workplace *w, bench_rows *rows,
+/* Measures the known peers in the order of their table, then the others in the folder. */
+static sdm_status measure_all(const cli_bench_case *c, const workplace *w, cli_bench_rows *rows,
                               sdm_error *err)
 {
-    bench_row *row = NULL;
+    cli_bench_row *row = NULL;
     struct dirent **names;
     const int n = list_peers(w->folder, &names);
     sdm_status s = SDM_OK;
@@ -234,29 +244,29 @@ static sdm_status measure_all(const bench_case *c, const workplace *w, bench_row
         bool found = false;
         for (int i = 0; i < n; i++)
             found |= !strcmp(names[i]->d_name + strlen(PREFIX), known[k].name);
-        s = bench_add(rows, known[k].name, &row, err);
+        s = cli_bench_add(rows, known[k].name, &row, err);
         if (!s && found) s = measure_peer(c, w, known[k].name, NULL, row, err);
-        if (!s && !found) say_missing(k, row);
+        if (!s && !found) note_missing(k, row);
     }
     for (int i = 0; i < n && !s; i++) {
         const char *name = names[i]->d_name + strlen(PREFIX);
         bool done = false;
         for (size_t k = 0; k < N_KNOWN; k++) done |= !strcmp(name, known[k].name);
         if (done) continue;
-        s = bench_add(rows, name, &row, err);
+        s = cli_bench_add(rows, name, &row, err);
         if (!s) s = measure_peer(c, w, name, NULL, row, err);
     }
     free_names(names, n);
     return s;
 }
 
-static sdm_status open_workplace(const bench_case *c, const char *folder, workplace *w,
+static sdm_status open_workplace(const cli_bench_case *c, const char *folder, workplace *w,
                                  sdm_error *err)
 {
     const char *temporary = getenv("TMPDIR");
     if (folder && !is_folder(folder))
         return sdm_fail(err, SDM_E_ARG,
-                        "--peers '%.200s': no such folder (none: without other programs)", folder);
+                        "--peers '%.200s': no such folder (none: run no other programs)", folder);
     if (folder)
         snprintf(w->folder, sizeof w->folder, "%s", folder);
     else
@@ -264,7 +274,7 @@ static sdm_status open_workplace(const bench_case *c, const char *folder, workpl
     snprintf(w->work, sizeof w->work, "%.1000s/sdmgen-bench-XXXXXX",
              temporary && *temporary ? temporary : "/tmp");
     if (!mkdtemp(w->work))
-        return sdm_fail(err, SDM_E_IO, "no folder for temporary files: %s: %s", w->work,
+        return sdm_fail(err, SDM_E_IO, "cannot make a folder for temporary files: %s: %s", w->work,
                         strerror(errno));
     snprintf(w->mesh_path, sizeof w->mesh_path, "%s/mesh.ply", w->work);
     snprintf(w->values_path, sizeof w->values_path, "%s/values.npy", w->work);
@@ -279,7 +289,8 @@ static void close_workplace(const workplace *w)
     (void)rmdir(w->work);
 }
 
-sdm_status bench_peers(const bench_case *c, const cli_args *args, bench_rows *rows, sdm_error *err)
+sdm_status cli_bench_peers(const cli_bench_case *c, const cli_args *args, cli_bench_rows *rows,
+                           sdm_error *err)
 {
     workplace w = {.work = ""};
     if (args->peers && !strcmp(args->peers, "none")) return SDM_OK;
@@ -289,7 +300,7 @@ sdm_status bench_peers(const bench_case *c, const cli_args *args, bench_rows *ro
     return s;
 }
 
-/* ---- one of them ---- */
+/* ---- a single peer ---- */
 
 static size_t find_known(const char *name)
 {
@@ -298,21 +309,21 @@ static size_t find_known(const char *name)
     return k;
 }
 
-const char *bench_peer_name(size_t i) { return i < N_KNOWN ? known[i].name : NULL; }
+const char *cli_bench_peer_name(size_t i) { return i < N_KNOWN ? known[i].name : NULL; }
 
-sdm_status bench_peer(const bench_case *c, const cli_args *args, const char *name, float *values,
-                      bench_row *row, sdm_error *err)
+sdm_status cli_bench_peer(const cli_bench_case *c, const cli_args *args, const char *name,
+                          float *values, cli_bench_row *row, sdm_error *err)
 {
-    char program[MOST_PATH + 300];
+    char program[PATH_SIZE + 300];
     workplace w = {.work = ""};
     if (args->peers && !strcmp(args->peers, "none")) {
-        snprintf(row->note, sizeof row->note, "--peers none: not asked for");
+        snprintf(row->note, sizeof row->note, "not run: --peers none");
         return SDM_OK;
     }
     sdm_status s = open_workplace(c, args->peers, &w, err);
     snprintf(program, sizeof program, "%s/" PREFIX "%s", w.folder, name);
     if (!s && access(program, X_OK) != 0)
-        say_missing(find_known(name), row);
+        note_missing(find_known(name), row);
     else if (!s)
         s = measure_peer(c, &w, name, values, row, err);
     close_workplace(&w);

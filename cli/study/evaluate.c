@@ -1,4 +1,4 @@
-/* Errors of a network on fresh random shapes, with the exact engine as the truth. */
+/* Measures the errors of a network or another method on random shapes, against exact maps. */
 #include "evaluate.h"
 
 #include <math.h>
@@ -32,7 +32,7 @@ cli_map_maker cli_maker_of_model(const sdm_model *m, const sdm_instance *shape)
 
 void cli_maker_params(const cli_map_maker *m, uint64_t seed, size_t index, double *p)
 {
-    sdm_sample_params(seed, SDM_STREAM_EVAL, index, m->min, m->max, m->n_params, p);
+    sdm_sample_params(seed, CLI_STREAM_EVAL, index, m->min, m->max, m->n_params, p);
 }
 
 void cli_eval_params(const sdm_model *m, uint64_t seed, size_t index, double *p)
@@ -49,7 +49,7 @@ static void compare_values(const float *network, const float *exact, size_t n, c
         const double e = fabs((double)network[i] - (double)exact[i]);
         sum2 += e * e;
         sum += e;
-        if (!(e <= worst)) worst = e; /* a NaN stays */
+        if (!(e <= worst)) worst = e; // a NaN stays
         if (fabsf(exact[i]) <= (float)CLI_NEAR_MM) {
             near += e * e;
             n_near++;
@@ -67,9 +67,10 @@ static void compare_values(const float *network, const float *exact, size_t n, c
         in_network + in_exact > 0 ? 2.0 * (double)both / (double)(in_network + in_exact) : 1.0;
 }
 
-/* Distances from the vertices of `from` to the surface of `to`: their sum and largest. */
-static sdm_status distances_to(const sdm_mesh *from, const sdm_mesh *to, double *sum,
-                               double *largest, sdm_error *err)
+/* Adds the distances from the vertices of `from` to the surface of `to` to *sum and updates their
+ * maximum *largest. */
+static sdm_status add_distances(const sdm_mesh *from, const sdm_mesh *to, double *sum,
+                                double *largest, sdm_error *err)
 {
     const sdm_exact_opts opts = {.keep_overlap = true, .n_threads = 1};
     sdm_exact *engine = NULL;
@@ -93,8 +94,8 @@ static sdm_status compare_surfaces(const sdm_grid *g, const float *network, cons
     if (!s) s = sdm_isosurface(g, exact, 0.0f, &b, NULL, err);
     out->has_surface = !s && a.n_tri > 0 && b.n_tri > 0;
     if (out->has_surface) {
-        s = distances_to(&a, &b, &sum, &largest, err);
-        if (!s) s = distances_to(&b, &a, &sum, &largest, err);
+        s = add_distances(&a, &b, &sum, &largest, err);
+        if (!s) s = add_distances(&b, &a, &sum, &largest, err);
         out->surface_mean_mm = sum / (double)(a.n_vert + b.n_vert);
         out->surface_hausdorff_mm = largest;
     }
@@ -110,8 +111,8 @@ sdm_status cli_compare_maps(const sdm_grid *g, const float *values, const float 
     return surfaces ? compare_surfaces(g, values, exact, out, err) : SDM_OK;
 }
 
-/* The map to judge and the exact one at p, on the calling thread alone. */
-static sdm_status both_maps(const cli_map_maker *m, const double *p, float *values, float *exact,
+/* The maker's map and the exact map at p; uses only the calling thread. */
+static sdm_status make_maps(const cli_map_maker *m, const double *p, float *values, float *exact,
                             sdm_error *err)
 {
     const sdm_exact_opts opts = {.n_threads = 1};
@@ -119,30 +120,33 @@ static sdm_status both_maps(const cli_map_maker *m, const double *p, float *valu
     return s ? s : sdm_exact_shape_map(m->shape, p, &opts, &m->grid, exact, NULL, err);
 }
 
-static sdm_status one_sample(const cli_map_maker *m, uint64_t seed, size_t index, bool surfaces,
-                             float *maps, cli_eval_sample *out, sdm_error *err)
+/* Errors for random shape `index`; maps: memory for two maps. */
+static sdm_status evaluate_sample(const cli_map_maker *m, uint64_t seed, size_t index,
+                                  bool surfaces, float *maps, cli_eval_sample *out, sdm_error *err)
 {
     const size_t n = sdm_grid_count(&m->grid);
     double p[SDM_MAX_PARAMS];
     cli_maker_params(m, seed, index, p);
-    const sdm_status s = both_maps(m, p, maps, maps + n, err);
+    const sdm_status s = make_maps(m, p, maps, maps + n, err);
     return s ? s : cli_compare_maps(&m->grid, maps, maps + n, surfaces, out, err);
 }
 
 /* ---- all samples ---- */
 
-typedef struct work {
+/* State of an evaluation, shared by all threads. */
+typedef struct evaluation {
     const cli_map_maker *m;
     uint64_t seed;
     bool surfaces;
     cli_eval *out;
-    size_t failed; /* lowest index that failed, n when none */
-    sdm_error err; /* its message */
+    size_t failed; /* lowest index of a failed sample, n: none */
+    sdm_error err; /* message of that sample */
     size_t done;
     cli_progress progress;
-} work;
+} evaluation;
 
-static void keep_first_error(work *w, size_t index, const sdm_error *err)
+/* Keeps the error with the lowest index, so that the message does not depend on the threads. */
+static void keep_first_error(evaluation *w, size_t index, const sdm_error *err)
 {
 #pragma omp critical(cli_evaluate_error)
     if (index < w->failed) {
@@ -151,11 +155,12 @@ static void keep_first_error(work *w, size_t index, const sdm_error *err)
     }
 }
 
-static void run_sample(work *w, size_t index, float *maps)
+static void evaluate_index(evaluation *w, size_t index, float *maps)
 {
     sdm_error err = {0};
     sdm_status s = cli_check_interrupt(&err);
-    if (!s) s = one_sample(w->m, w->seed, index, w->surfaces, maps, &w->out->sample[index], &err);
+    if (!s)
+        s = evaluate_sample(w->m, w->seed, index, w->surfaces, maps, &w->out->sample[index], &err);
     if (s) {
         err.status = s;
         keep_first_error(w, index, &err);
@@ -167,7 +172,7 @@ static void run_sample(work *w, size_t index, float *maps)
         cli_progress_show(&w->progress, "measure", (double)done / (double)w->out->n, NULL);
 }
 
-static void run_samples(work *w)
+static void evaluate_all(evaluation *w)
 {
     const size_t n_values = sdm_grid_count(&w->m->grid);
     const long n = (long)w->out->n;
@@ -180,7 +185,7 @@ static void run_samples(work *w)
         if (s) keep_first_error(w, 0, &err);
 #pragma omp for schedule(dynamic, 1)
         for (long i = 0; i < n; i++)
-            if (!s) run_sample(w, (size_t)i, maps);
+            if (!s) evaluate_index(w, (size_t)i, maps);
         sdm_free(maps);
     }
 }
@@ -197,6 +202,7 @@ static int compare_ranked(const void *a, const void *b)
     return (x->index > y->index) - (x->index < y->index);
 }
 
+/* Finds the samples with the largest and the median MSE; equal MSE are ordered by index. */
 static sdm_status rank_samples(cli_eval *e, sdm_error *err)
 {
     ranked *order = NULL;
@@ -210,7 +216,7 @@ static sdm_status rank_samples(cli_eval *e, sdm_error *err)
     return SDM_OK;
 }
 
-/* Sums in the order of the index: the same bits whoever computed the samples. */
+/* Sums in the order of the index: the result has the same bits for every number of threads. */
 void cli_eval_reduce(cli_eval *e)
 {
     double near_sum = 0;
@@ -256,9 +262,9 @@ sdm_status cli_evaluate_maps(const cli_map_maker *m, uint64_t seed, size_t n, bo
     sdm_status s = SDM_ALLOC(&out->sample, n, "figures of the samples", err);
     if (s) return s;
     out->n = n;
-    work w = {.m = m, .seed = seed, .surfaces = surfaces, .out = out, .failed = n};
+    evaluation w = {.m = m, .seed = seed, .surfaces = surfaces, .out = out, .failed = n};
     cli_progress_start(&w.progress);
-    run_samples(&w);
+    evaluate_all(&w);
     cli_progress_clear(&w.progress);
     if (w.failed < n) s = sdm_fail(err, w.err.status, "random shape %zu: %s", w.failed, w.err.text);
     if (s == SDM_E_CANCELLED) s = sdm_fail(err, s, "interrupted");
@@ -287,7 +293,7 @@ sdm_status cli_picture_compare(const sdm_model *m, const sdm_instance *shape, ui
     sdm_status s = sdm_alloc((void **)&maps, n, 3 * sizeof *maps, "maps of the picture", err);
     if (s) return s;
     if (!p) cli_maker_params(&maker, seed, index, sampled);
-    s = both_maps(&maker, p ? p : sampled, maps + n, maps, err);
+    s = make_maps(&maker, p ? p : sampled, maps + n, maps, err);
     for (size_t i = 0; i < n && !s; i++) maps[2 * n + i] = maps[n + i] - maps[i];
     const sdm_picture_map columns[] = {
         {"exact", maps, false}, {"network", maps + n, false}, {"error", maps + 2 * n, true}};

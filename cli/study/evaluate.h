@@ -1,4 +1,5 @@
-/* Measures a network against the exact engine on random shapes it was not trained on. */
+/* Measures networks and other methods against the exact engine on random shapes that no training
+ * used. */
 #ifndef CLI_EVALUATE_H
 #define CLI_EVALUATE_H
 
@@ -6,97 +7,109 @@
 #include "sdm/internal/config.h"
 #include "sdm/runtime.h"
 
-/* Stream of the random shapes of eval and verify; training uses other streams. */
-#define SDM_STREAM_EVAL 900
+/* Random stream of the shapes of eval and verify; training uses other streams. */
+#define CLI_STREAM_EVAL 900
 
-/* Voxels with |exact distance| up to this count as near the surface, mm. */
+/* Voxels with abs(exact distance) <= CLI_NEAR_MM are near the surface, mm. */
 #define CLI_NEAR_MM 0.4
 
-/* One shape: network against exact map. */
+/* Errors of one map against the exact map. */
 typedef struct cli_eval_sample {
     double mse_mm2, mae_mm, max_abs_mm;
-    double near_sum; /* squared errors near the surface, mm^2 */
+    double near_sum; /* sum of squared errors near the surface, mm^2 */
     size_t n_near;
-    double dice;            /* overlap of the insides; 1 when both are empty */
+    double dice;            /* overlap of the volumes inside; 1 when both are empty */
     bool has_surface;       /* both maps have a zero surface */
-    double surface_mean_mm; /* mean distance between the zero surfaces, both ways */
+    double surface_mean_mm; /* mean distance between the zero surfaces, in both directions */
     double surface_hausdorff_mm;
 } cli_eval_sample;
 
+/* Errors over n shapes. */
 typedef struct cli_eval {
     cli_eval_sample *sample; /* [n], in the order of their index */
-    size_t n, n_surface;
+    size_t n, n_surface;     /* shapes; shapes where both maps have a surface */
     double mse_mm2, rmse_mm, mae_mm, max_abs_mm, rmse_near_mm, dice;
-    double surface_mean_mm,
-        surface_hausdorff_mm; /* means over the shapes that have both surfaces */
+    /* means over the shapes with both surfaces */
+    double surface_mean_mm, surface_hausdorff_mm;
     double surface_hausdorff_max_mm;
-    size_t worst, median; /* shapes by MSE */
+    size_t worst, median; /* indices of the shapes with the largest and the median MSE */
 } cli_eval;
 
-/* Parameters of random shape `index` within the model's trained ranges; p[n_params]. */
+/* p[n_params] = random parameters within the model's trained ranges, a function of seed and index.
+ */
 void cli_eval_params(const sdm_model *m, uint64_t seed, size_t index, double *p);
 
-/* Anything that makes maps of a shape on a grid from parameters in a box; the exact engine makes
- * the truth from the same shape. */
+/* A method that makes maps of a shape, on one grid, at parameters in a box. The exact engine makes
+ * the reference maps from the same shape. */
 typedef struct cli_map_maker {
     const sdm_instance *shape;
     sdm_grid grid;
     size_t n_params;
     double min[SDM_MAX_PARAMS], max[SDM_MAX_PARAMS];
-    /* values[nz][ny][nx] at p[n_params], on the calling thread alone. [any thread] */
+    /* values[nz][ny][nx] = the map at p[n_params], mm; uses only the calling thread. [any thread]
+     */
     sdm_status (*make)(const void *user, const double *p, float *values, sdm_error *err);
     const void *user;
 } cli_map_maker;
 
-/* The model as a maker; it has at most SDM_MAX_PARAMS parameters. */
+/* The model as a map maker, with at most SDM_MAX_PARAMS of its parameters. It refers to m and
+ * shape.
+ */
 cli_map_maker cli_maker_of_model(const sdm_model *m, const sdm_instance *shape);
 
-/* Parameters of random shape `index` within the maker's box; p[n_params]. */
+/* p[n_params] = random parameters within the maker's box, a function of seed and index. */
 void cli_maker_params(const cli_map_maker *m, uint64_t seed, size_t index, double *p);
 
-/* Figures of one map against the exact one; surfaces: those of the zero surfaces too. */
+/* Errors of values[nz][ny][nx] against exact[nz][ny][nx]; surfaces: also the distances between the
+ * zero surfaces. */
 sdm_status cli_compare_maps(const sdm_grid *g, const float *values, const float *exact,
                             bool surfaces, cli_eval_sample *out, sdm_error *err);
 
-/* Fills the means and largest figures, zero before, from sample[n]. */
+/* Computes the means and maxima of e from sample[n]; they must be zero before. */
 void cli_eval_reduce(cli_eval *e);
 
-/* Evaluates n shapes on all threads; the same bits for any number of them. surfaces: measure the
- * zero surfaces too. */
+/* Evaluates n random shapes on all threads; the number of threads does not change a bit of the
+ * result. surfaces: also measures the zero surfaces. cli_eval_dispose() frees *out. SDM_E_ARG: n is
+ * 0, or the model has too many parameters; SDM_E_CANCELLED. */
 sdm_status cli_evaluate_maps(const cli_map_maker *m, uint64_t seed, size_t n, bool surfaces,
                              cli_eval *out, sdm_error *err);
 sdm_status cli_evaluate(const sdm_model *m, const sdm_instance *shape, uint64_t seed, size_t n,
                         bool surfaces, cli_eval *out, sdm_error *err);
 void cli_eval_dispose(cli_eval *e);
 
-/* Writes exact | network | error slices of shape `index`, or at parameters p when p is not NULL. */
+/* Writes slices exact | network | error of random shape `index`, or at p[n_params] if p is not
+ * NULL.
+ */
 sdm_status cli_picture_compare(const sdm_model *m, const sdm_instance *shape, uint64_t seed,
                                size_t index, const double *p, const char *path, sdm_error *err);
 
-/* Time per map on one core, of its processor alone: ms, files not included. Mesh making and tree
- * building count for the exact engine. */
+/* Times per map on one core: processor time in ms, without files. The time of the exact engine and
+ * of the naive method includes making the mesh and building the tree where they need them. */
 typedef struct cli_timing {
-    double ms_network, ms_batch; /* one map; one map of a batch of batch_size */
+    double ms_network, ms_batch; /* a single map; a map in a batch of batch_size */
     size_t batch_size;
-    double ms_exact;
-    double ms_naive,
-        naive_share; /* from a share of the slices, scaled to all; NaN when not measured */
-    size_t n_network, n_exact, n_naive;
+    double ms_exact;    /* NaN: not measured */
+    double ms_naive;    /* scaled to all voxels; NaN: not measured */
+    double naive_share; /* fraction of the slices that the naive method computed; NaN: none */
+    size_t n_network, n_exact, n_naive; /* number of timed maps */
 } cli_timing;
 
-/* Medians over random shapes; fastest: the fastest, of one shape again and again, a batch of as
- * many shapes, the naive method as ever. shape may be NULL: the network alone. */
+/* Measures medians over random shapes. fastest: measures the fastest of repeated runs on one shape
+ * instead, and of repeated batches of random shapes; the naive method as without it. n_naive:
+ * shapes for the naive method. shape NULL: only the network. */
 sdm_status cli_time_maps(const sdm_model *m, const sdm_instance *shape, uint64_t seed, bool fastest,
                          size_t n_naive, cli_timing *out, sdm_error *err);
 
-/* Time of the naive method on one core for the mesh, scaled from a share of the slices. */
-sdm_status cli_time_naive(const sdm_mesh *mesh, const sdm_grid *grid, double *ms, double *share,
-                          sdm_error *err);
+/* *ms = median time of the naive method on one core over the first n random shapes of the maker.
+ * Only a fraction of the slices, *share, is computed; *ms is scaled to all. Both are NaN when n is
+ * 0. */
+sdm_status cli_time_naive(const cli_map_maker *m, uint64_t seed, size_t n, double *ms,
+                          double *share, sdm_error *err);
 
 /* Sorts v[n] and returns its median. */
 double cli_median(double *v, size_t n);
 
-/* The least of v[n]. */
-double cli_least(double *v, size_t n);
+/* The smallest of v[n]. */
+double cli_minimum(double *v, size_t n);
 
 #endif

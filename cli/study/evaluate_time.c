@@ -1,4 +1,4 @@
-/* Time per map on one core: network, exact engine, naive method. */
+/* Measures the time per map on one core for a network, the exact engine and the naive method. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,11 +10,11 @@
 #include "sdm/internal/methods.h"
 #include "sdm/memory.h"
 
-enum { N_NETWORK = 51, N_LEAST = 3, N_EXACT = 9, BATCH = 32, N_BATCHES = 9, NAIVE_STEP = 16 };
-#define ENOUGH_S                                                                                   \
-    6.0 /* for slow networks: no further map after this, no batch that takes longer                \
-         */
-#define BATCH_BYTES 2e8 /* largest batch of large maps */
+enum { N_NETWORK = 51, N_MIN = 3, N_EXACT = 9, BATCH = 32, N_BATCHES = 9, NAIVE_STEP = 16 };
+/* For slow networks: no map starts after this time, and a batch is small enough to end within it.
+ */
+#define TIME_LIMIT_S 6.0
+#define BATCH_BYTES 2e8 /* largest size of the maps of a batch */
 
 static int compare_reals(const void *a, const void *b)
 {
@@ -28,16 +28,16 @@ double cli_median(double *v, size_t n)
     return n % 2 ? v[n / 2] : 0.5 * (v[n / 2 - 1] + v[n / 2]);
 }
 
-double cli_least(double *v, size_t n)
+double cli_minimum(double *v, size_t n)
 {
     double least = INFINITY;
     for (size_t i = 0; i < n; i++) least = fmin(least, v[i]);
     return least;
 }
 
-static double figure(bool fastest, double *ms, size_t n)
+static double summary(bool fastest, double *ms, size_t n)
 {
-    return fastest ? cli_least(ms, n) : cli_median(ms, n);
+    return fastest ? cli_minimum(ms, n) : cli_median(ms, n);
 }
 
 static sdm_status time_network(const sdm_model *m, uint64_t seed, bool fastest, float *values,
@@ -47,24 +47,24 @@ static sdm_status time_network(const sdm_model *m, uint64_t seed, bool fastest, 
     double p[SDM_MAX_PARAMS], ms[N_NETWORK];
     const double begin = sdm_clock();
     size_t n = 0;
-    for (size_t i = 0; i <= N_NETWORK && (n < N_LEAST || sdm_clock() - begin < ENOUGH_S); i++) {
+    for (size_t i = 0; i <= N_NETWORK && (n < N_MIN || sdm_clock() - begin < TIME_LIMIT_S); i++) {
         cli_eval_params(m, seed, fastest ? 0 : i, p);
         const double start = cli_thread_clock();
         sdm_status s = sdm_generate(m, p, &opts, values, NULL, err);
         if (!s) s = cli_check_interrupt(err);
         if (s) return s;
-        if (i > 0) ms[n++] = 1e3 * (cli_thread_clock() - start); /* the first one warms up */
+        if (i > 0) ms[n++] = 1e3 * (cli_thread_clock() - start); // the first map warms up
     }
-    out->ms_network = figure(fastest, ms, n);
+    out->ms_network = summary(fastest, ms, n);
     out->n_network = n;
     return SDM_OK;
 }
 
-/* A batch of the usual size, or a smaller one where maps are large or slow. */
+/* BATCH maps, or fewer if the maps are large or slow. */
 static size_t batch_size(const sdm_model *m, double ms_network)
 {
     const double bytes = (double)sdm_grid_count(&sdm_model_get_info(m)->grid) * sizeof(float);
-    return (size_t)fmax(1, fmin(BATCH, fmin(BATCH_BYTES / bytes, 1e3 * ENOUGH_S / ms_network)));
+    return (size_t)fmax(1, fmin(BATCH, fmin(BATCH_BYTES / bytes, 1e3 * TIME_LIMIT_S / ms_network)));
 }
 
 static sdm_status time_batch(const sdm_model *m, uint64_t seed, bool fastest, size_t size,
@@ -79,13 +79,13 @@ static sdm_status time_batch(const sdm_model *m, uint64_t seed, bool fastest, si
     sdm_status s = sdm_alloc((void **)&values, sdm_grid_count(&sdm_model_get_info(m)->grid),
                              size * sizeof *values, "batch of maps to time", err);
     for (size_t i = 0; i < size; i++) cli_eval_params(m, seed, i, p + i * n_params);
-    for (size_t k = 0; k <= N_BATCHES && !s && (n < 1 || sdm_clock() - begin < ENOUGH_S); k++) {
+    for (size_t k = 0; k <= N_BATCHES && !s && (n < 1 || sdm_clock() - begin < TIME_LIMIT_S); k++) {
         const double start = cli_thread_clock();
         s = sdm_generate_batch(m, p, size, &opts, values, NULL, err);
         if (!s) s = cli_check_interrupt(err);
         if (k > 0) ms[n++] = 1e3 * (cli_thread_clock() - start) / (double)size;
     }
-    if (!s) out->ms_batch = figure(fastest, ms, n);
+    if (!s) out->ms_batch = summary(fastest, ms, n);
     out->batch_size = size;
     sdm_free(values);
     return s;
@@ -105,15 +105,16 @@ static sdm_status time_exact(const sdm_model *m, const sdm_instance *shape, uint
         if (s) return s;
         if (i > 0) ms[i - 1] = 1e3 * (cli_thread_clock() - start);
     }
-    out->ms_exact = figure(fastest, ms, N_EXACT);
+    out->ms_exact = summary(fastest, ms, N_EXACT);
     out->n_exact = N_EXACT;
     return SDM_OK;
 }
 
-sdm_status cli_time_naive(const sdm_mesh *mesh, const sdm_grid *grid, double *ms, double *share,
-                          sdm_error *err)
+/* Time of the naive method for one mesh. Every voxel costs the same, so a few slices, spread over
+ * the box, represent all. */
+static sdm_status time_naive_mesh(const sdm_mesh *mesh, const sdm_grid *grid, double *ms,
+                                  double *share, sdm_error *err)
 {
-    /* every voxel costs the same, so a few slices, spread over the box, stand for all */
     sdm_grid thin = *grid;
     thin.n[2] = (grid->n[2] + NAIVE_STEP - 1) / NAIVE_STEP;
     thin.spacing[2] = grid->spacing[2] * (double)grid->n[2] / (double)thin.n[2];
@@ -131,23 +132,22 @@ sdm_status cli_time_naive(const sdm_mesh *mesh, const sdm_grid *grid, double *ms
     return s;
 }
 
-static sdm_status time_naive(const sdm_model *m, const sdm_instance *shape, uint64_t seed, size_t n,
-                             cli_timing *out, sdm_error *err)
+sdm_status cli_time_naive(const cli_map_maker *m, uint64_t seed, size_t n, double *ms,
+                          double *share, sdm_error *err)
 {
-    double p[SDM_MAX_PARAMS], *ms = NULL;
+    double p[SDM_MAX_PARAMS], *each = NULL;
     sdm_mesh mesh = {0};
-    sdm_status s = SDM_ALLOC(&ms, n, "times", err);
+    sdm_status s = SDM_ALLOC(&each, n, "times", err);
+    *ms = *share = NAN;
     for (size_t i = 0; i < n && !s; i++) {
-        cli_eval_params(m, seed, i, p);
-        s = sdm_instance_mesh(shape, p, &mesh, err);
-        if (!s)
-            s = cli_time_naive(&mesh, &sdm_model_get_info(m)->grid, &ms[i], &out->naive_share, err);
+        cli_maker_params(m, seed, i, p);
+        s = sdm_instance_mesh(m->shape, p, &mesh, err);
+        if (!s) s = time_naive_mesh(&mesh, &m->grid, &each[i], share, err);
         if (!s) s = cli_check_interrupt(err);
     }
-    if (!s && n > 0) out->ms_naive = cli_median(ms, n);
-    out->n_naive = n;
+    if (!s && n > 0) *ms = cli_median(each, n);
     sdm_mesh_dispose(&mesh);
-    sdm_free(ms);
+    sdm_free(each);
     return s;
 }
 
@@ -156,13 +156,15 @@ sdm_status cli_time_maps(const sdm_model *m, const sdm_instance *shape, uint64_t
 {
     memset(out, 0, sizeof *out);
     out->ms_exact = out->ms_naive = out->naive_share = NAN;
+    out->n_naive = n_naive;
     float *values = NULL;
-    sdm_status s =
-        SDM_ALLOC(&values, sdm_grid_count(&sdm_model_get_info(m)->grid), "map to time", err);
+    const cli_map_maker maker = cli_maker_of_model(m, shape);
+    sdm_status s = SDM_ALLOC(&values, sdm_grid_count(&maker.grid), "map to time", err);
     if (!s) s = time_network(m, seed, fastest, values, out, err);
     if (!s) s = time_batch(m, seed, fastest, batch_size(m, out->ms_network), out, err);
     if (!s && shape) s = time_exact(m, shape, seed, fastest, values, out, err);
-    if (!s && shape) s = time_naive(m, shape, seed, n_naive, out, err);
+    if (!s && shape)
+        s = cli_time_naive(&maker, seed, n_naive, &out->ms_naive, &out->naive_share, err);
     sdm_free(values);
     return s;
 }

@@ -1,4 +1,5 @@
-/* Pictures of a row: slices with contours at 0 and 1 mm, and the zero surface over the mesh. */
+/* Draws the pictures of a row: slices with contours at 0 and 1 mm, and the zero surface, coloured
+ * by its distance from the mesh. */
 #include <stdio.h>
 #include <string.h>
 
@@ -9,7 +10,7 @@
 #include "sdm/memory.h"
 #include "sdm/picture.h"
 
-static sdm_status draw_slices(const experiment_run *run, const experiment_job *job,
+static sdm_status draw_slices(const cli_experiment_run *run, const cli_experiment_job *job,
                               const float *values, sdm_error *err)
 {
     static const float levels[] = {0.0f, 1.0f};
@@ -24,13 +25,14 @@ static sdm_status draw_slices(const experiment_run *run, const experiment_job *j
     const sdm_picture_map columns[] = {{"exact", maps, false},
                                        {run->e->rows[job->index].title, values, false},
                                        {"error", maps + n, true}};
-    if (!s) s = experiment_path(run, job->index, "slices.png", path, err);
+    if (!s) s = cli_experiment_path(run, job->index, "slices.png", path, err);
     if (!s) s = sdm_picture_slices(path, g, columns, 3, levels, 2, err);
     sdm_free(maps);
     return s;
 }
 
-/* Signed distances from the exact surface at the vertices of the method's zero surface. */
+/* distance[surface->n_vert] = signed distances from the mesh at the vertices of the zero surface.
+ */
 static sdm_status find_distances(const sdm_mesh *mesh, const sdm_mesh *surface, double *distance,
                                  sdm_error *err)
 {
@@ -43,7 +45,7 @@ static sdm_status find_distances(const sdm_mesh *mesh, const sdm_mesh *surface, 
     return s;
 }
 
-static sdm_status draw_surfaces(const experiment_run *run, const experiment_job *job,
+static sdm_status draw_surfaces(const cli_experiment_run *run, const cli_experiment_job *job,
                                 const float *values, sdm_error *err)
 {
     char path[SDM_PATH_TEXT_MAX];
@@ -59,7 +61,7 @@ static sdm_status draw_surfaces(const experiment_run *run, const experiment_job 
     if (!s) s = find_distances(&mesh, &surface, distance, err);
     const sdm_picture_surface columns[] = {{"mesh", &mesh, NULL},
                                            {run->e->rows[job->index].title, &surface, distance}};
-    if (!s) s = experiment_path(run, job->index, "surfaces.png", path, err);
+    if (!s) s = cli_experiment_path(run, job->index, "surfaces.png", path, err);
     if (!s)
         s = sdm_picture_surfaces(path, columns, 2, "zero surface's distance from the mesh", err);
     sdm_free(distance);
@@ -68,8 +70,8 @@ static sdm_status draw_surfaces(const experiment_run *run, const experiment_job 
     return s;
 }
 
-sdm_status experiment_draw(const experiment_run *run, const experiment_job *job,
-                           const float *values, sdm_error *err)
+sdm_status cli_experiment_draw(const cli_experiment_run *run, const cli_experiment_job *job,
+                               const float *values, sdm_error *err)
 {
     if (!run->e->experiment.pictures) return SDM_OK;
     sdm_status s = sdm_make_folder(job->config->output.folder, err);

@@ -1,5 +1,5 @@
-/* A row that fits: a network, a network polished by exact maps, exact maps alone, or what naive
- * ones would cost. */
+/* Rows of an experiment that fit shapes to phantoms: with a network, with a network and exact maps
+ * (polish), with exact maps, or only the time of naive maps. */
 #include "experiment_fit.h"
 
 #include <math.h>
@@ -11,13 +11,14 @@
 #include "sdm/fit.h"
 #include "sdm/memory.h"
 
-/* Shapes whose naive maps are timed. */
+/* Number of shapes on which the naive method is timed. */
 enum { NAIVE_SHAPES = 2 };
 
 /* ---- the network ---- */
 
-/* A model from elsewhere knows the shape, wherever phantoms are drawn. */
-static sdm_status check_model(const experiment_job *job, const char *path,
+/* Checks that a model is one of the job's shape and was trained on all its ranges, from which the
+ * phantoms are drawn. */
+static sdm_status check_model(const cli_experiment_job *job, const char *path,
                               const sdm_model_info *info, sdm_error *err)
 {
     size_t n;
@@ -26,7 +27,7 @@ static sdm_status check_model(const experiment_job *job, const char *path,
     if (strcmp(info->shape, shape) != 0 || info->n_params != n)
         return sdm_fail(
             err, SDM_E_CONFIG,
-            "fit.model: %.500s is of the shape '%s' with %zu parameters, need '%s' with %zu", path,
+            "fit.model: %.500s has the shape '%s' with %zu parameters, need '%s' with %zu", path,
             info->shape, info->n_params, shape, n);
     for (size_t i = 0; i < n; i++) {
         const double min = job->maker.min[i], max = job->maker.max[i];
@@ -35,40 +36,42 @@ static sdm_status check_model(const experiment_job *job, const char *path,
             continue;
         return sdm_fail(
             err, SDM_E_CONFIG,
-            "fit.model: %.500s was trained on %s = %g .. %g, the experiment has %s = %g .. %g",
+            "fit.model: %.500s was trained on %s = %g .. %g, the experiment needs %s = %g .. %g",
             path, info->params[i].name, info->params[i].min, info->params[i].max, params[i].name,
             min, max);
     }
     return SDM_OK;
 }
 
-/* That of fit.model, of this row's own training, or of the row that polishing goes on from. */
-static sdm_status open_network(const experiment_run *run, const experiment_job *job,
-                               experiment_result *out, sdm_model **model, sdm_error *err)
+/* Opens the network: the file fit.model, the row's own (trained if necessary), or for polishing
+ * that of the row with the same network. */
+static sdm_status open_network(const cli_experiment_run *run, const cli_experiment_job *job,
+                               cli_experiment_result *out, sdm_model **model, sdm_error *err)
 {
     const char *given = run->e->fit.model;
-    const experiment_result *trained = &run->results[out->row->network_row];
+    const cli_experiment_result *trained = &run->results[out->row->network_row];
     char path[SDM_PATH_TEXT_MAX];
     sdm_status s = SDM_OK;
     out->loaded = *given != 0;
-    // a model that lies there may be that of another configuration
-    if (!*given && trained != out && trained->state != EXPERIMENT_DONE)
-        return sdm_fail(err,
-                        trained->state == EXPERIMENT_MISSING ? SDM_E_UNSUPPORTED : SDM_E_QUALITY,
-                        "its network is that of '%s', which was not done", trained->row->title);
+    // the row's folder may hold the model of another configuration, so that row must be done
+    if (!*given && trained != out && trained->state != CLI_EXPERIMENT_DONE)
+        return sdm_fail(
+            err, trained->state == CLI_EXPERIMENT_MISSING ? SDM_E_UNSUPPORTED : SDM_E_QUALITY,
+            "the network of '%s', which it uses, is not available", trained->row->title);
     if (*given)
         snprintf(path, sizeof path, "%s", given);
     else
-        s = experiment_path(run, out->row->network_row, "model.sdm", path, err);
-    if (!s && !*given && trained == out) s = experiment_provide(run, job, out, err);
+        s = cli_experiment_path(run, out->row->network_row, "model.sdm", path, err);
+    if (!s && !*given && trained == out) s = cli_experiment_provide_model(run, job, out, err);
     if (!s) s = sdm_model_open(path, model, err);
     return s ? s : check_model(job, path, sdm_model_get_info(*model), err);
 }
 
 /* ---- one phantom ---- */
 
+/* Overlap of the fitted shape with the phantom's label. */
 static sdm_status measure_dice(const sdm_fit_source *source, const sdm_fit_result *found,
-                               const experiment_phantom *p, double *dice, sdm_error *err)
+                               const cli_experiment_phantom *p, double *dice, sdm_error *err)
 {
     const size_t n = sdm_grid_count(&p->grid);
     size_t both = 0, sum = 0;
@@ -85,24 +88,26 @@ static sdm_status measure_dice(const sdm_fit_source *source, const sdm_fit_resul
     return s;
 }
 
-/* A fit that is not to be trusted is a result; its reason is left in *why. */
-static sdm_status fit_one(const experiment_job *job, const sdm_fit_source *source, bool polish,
-                          const sdm_experiment *e, const experiment_phantom *p, experiment_fit *out,
-                          sdm_error *why, sdm_error *err)
+/* Fits one phantom. A fit that does not converge is a result, not an error: *why is the reason. */
+static sdm_status fit_one(const cli_experiment_job *job, const sdm_fit_source *source, bool polish,
+                          const sdm_experiment *e, const cli_experiment_phantom *p,
+                          cli_experiment_fit *out, sdm_error *why, sdm_error *err)
 {
     const sdm_fit_target target = {.kind = SDM_FIT_IMAGE, .grid = p->grid, .values = p->values};
     sdm_fit_opts opts = sdm_fit_defaults();
     sdm_fit_result r = {0};
+    // fit
     opts.prior_sd = e->fit.prior_sd;
     opts.polish_eps = e->fit.eps;
     opts.start_params = p->start;
     opts.start_pose = p->start_pose;
     opts.max_polish_iterations = polish ? opts.max_iterations : 0;
-    opts.n_threads = 1; // the time is that of one core
+    opts.n_threads = 1; // the table has times of one core
     opts.cancelled = cli_interrupted;
     const double begin = cli_thread_clock();
     sdm_status s = sdm_fit(source, &target, &opts, &r, why);
     out->seconds = cli_thread_clock() - begin;
+    // store the estimate
     out->converged = !s;
     out->maps_network = r.n_network;
     out->maps_exact = r.n_exact;
@@ -112,6 +117,7 @@ static sdm_status fit_one(const experiment_job *job, const sdm_fit_source *sourc
         out->sd[i] = s ? NAN : r.sd[i];
         out->at_bound[i] = !s && r.at_bound[i];
     }
+    // measure the overlap
     out->dice = NAN;
     const sdm_fit_source exact = {.shape = job->shape, .grid = job->maker.grid};
     if (!s)
@@ -122,12 +128,12 @@ static sdm_status fit_one(const experiment_job *job, const sdm_fit_source *sourc
     return s == SDM_E_QUALITY ? SDM_OK : s;
 }
 
-/* ---- all of them ---- */
+/* ---- all phantoms ---- */
 
-static sdm_status make_fits(const experiment_run *run, const experiment_job *job,
-                            experiment_fits **out, sdm_error *err)
+static sdm_status allocate_fits(const cli_experiment_run *run, const cli_experiment_job *job,
+                                cli_experiment_fits **out, sdm_error *err)
 {
-    experiment_fits *f = NULL;
+    cli_experiment_fits *f = NULL;
     const sdm_param *params = sdm_instance_params(job->shape, NULL);
     sdm_status s = SDM_ALLOC(&f, 1, "fits", err);
     if (s) return s;
@@ -141,25 +147,26 @@ static sdm_status make_fits(const experiment_run *run, const experiment_job *job
     return SDM_ALLOC(&f->fit, f->n, "fits", err);
 }
 
-void experiment_fits_free(experiment_fits *f)
+void cli_experiment_fits_free(cli_experiment_fits *f)
 {
     if (f) sdm_free(f->fit);
     sdm_free(f);
 }
 
-static sdm_status fit_all(const experiment_run *run, const experiment_job *job,
-                          const sdm_fit_source *source, experiment_result *out, sdm_error *why,
+/* Fits all phantoms; *why is the reason of the first fit that did not converge. */
+static sdm_status fit_all(const cli_experiment_run *run, const cli_experiment_job *job,
+                          const sdm_fit_source *source, cli_experiment_result *out, sdm_error *why,
                           sdm_error *err)
 {
     const bool polish = out->row->method->fit == SDM_EXPERIMENT_FIT_POLISH;
-    sdm_status s = make_fits(run, job, &out->fits, err);
+    sdm_status s = allocate_fits(run, job, &out->fits, err);
     cli_progress bar;
     cli_progress_start(&bar);
     for (size_t i = 0; !s && i < out->fits->n; i++) {
-        experiment_phantom phantom = {0};
+        cli_experiment_phantom phantom = {0};
         sdm_error doubt = {0};
         cli_progress_show(&bar, out->row->title, (double)i / (double)out->fits->n, NULL);
-        s = experiment_phantom_make(run, job, i, &phantom, err);
+        s = cli_experiment_phantom_make(run, job, i, &phantom, err);
         if (!s) s = fit_one(job, source, polish, run->e, &phantom, &out->fits->fit[i], &doubt, err);
         if (!s && !out->fits->fit[i].converged && !why->status) {
             *why = doubt;
@@ -167,18 +174,18 @@ static sdm_status fit_all(const experiment_run *run, const experiment_job *job,
         }
         if (!s) s = cli_check_interrupt(err);
         if (s) s = sdm_fail_in(err, s, "phantom %zu", i + 1);
-        experiment_phantom_dispose(&phantom);
+        cli_experiment_phantom_dispose(&phantom);
     }
     cli_progress_clear(&bar);
     return s;
 }
 
-static void set_figures(experiment_result *out)
+static void set_figures(cli_experiment_result *out)
 {
-    const experiment_fits *f = out->fits;
+    const cli_experiment_fits *f = out->fits;
     double fits = 0, seconds = 0, dice = 0, network = 0, exact = 0, within = 0, counted = 0;
     for (size_t i = 0; i < f->n; i++) {
-        const experiment_fit *one = &f->fit[i];
+        const cli_experiment_fit *one = &f->fit[i];
         seconds += one->seconds / (double)f->n;
         network += (double)one->maps_network / (double)f->n;
         exact += (double)one->maps_exact / (double)f->n;
@@ -201,25 +208,8 @@ static void set_figures(experiment_result *out)
 
 /* ---- rows ---- */
 
-static sdm_status time_naive(const experiment_run *run, const experiment_job *job,
-                             experiment_result *out, sdm_error *err)
-{
-    double p[SDM_MAX_PARAMS], ms[NAIVE_SHAPES], share = 1;
-    sdm_status s = SDM_OK;
-    for (size_t i = 0; i < NAIVE_SHAPES && !s; i++) {
-        sdm_mesh mesh = {0};
-        cli_maker_params(&job->maker, run->e->experiment.seed, i, p);
-        s = sdm_instance_mesh(job->shape, p, &mesh, err);
-        if (!s) s = cli_time_naive(&mesh, &job->maker.grid, &ms[i], &share, err);
-        if (!s) s = cli_check_interrupt(err);
-        sdm_mesh_dispose(&mesh);
-    }
-    if (!s) out->figure[SDM_FIGURE_MS] = cli_median(ms, NAIVE_SHAPES);
-    return s;
-}
-
-static void describe(const experiment_run *run, const sdm_model *model, const sdm_error *why,
-                     experiment_result *out)
+static void set_note(const cli_experiment_run *run, const sdm_model *model, const sdm_error *why,
+                     cli_experiment_result *out)
 {
     char maps[64] = "exact maps";
     if (model)
@@ -228,26 +218,29 @@ static void describe(const experiment_run *run, const sdm_model *model, const sd
     snprintf(out->note, sizeof out->note,
              "%s, %s; %lld phantoms with voxels of %g mm, started %g mm and %g degrees off%s%.200s",
              maps, out->grid, (long long)run->e->fit.phantoms, run->e->fit.voxel,
-             run->e->fit.off_mm, run->e->fit.off_deg,
-             why->status ? "; the first that failed: " : "", why->text);
+             run->e->fit.off_mm, run->e->fit.off_deg, why->status ? "; the first failure: " : "",
+             why->text);
 }
 
-sdm_status experiment_fit_row(const experiment_run *run, experiment_job *job,
-                              experiment_result *out, sdm_error *err)
+sdm_status cli_experiment_fit_row(const cli_experiment_run *run, cli_experiment_job *job,
+                                  cli_experiment_result *out, sdm_error *err)
 {
     const int fit = out->row->method->fit;
     const bool by_network = fit == SDM_EXPERIMENT_FIT_NETWORK || fit == SDM_EXPERIMENT_FIT_POLISH;
     sdm_model *model = NULL;
     sdm_error why = {0};
-    if (fit == SDM_EXPERIMENT_FIT_NAIVE) return time_naive(run, job, out, err);
+    double share;
+    if (fit == SDM_EXPERIMENT_FIT_NAIVE)
+        return cli_time_naive(&job->maker, run->e->experiment.seed, NAIVE_SHAPES,
+                              &out->figure[SDM_FIGURE_MS], &share, err);
     sdm_status s = by_network ? open_network(run, job, out, &model, err) : SDM_OK;
     const sdm_fit_source source = {.model = model, .shape = job->shape, .grid = job->maker.grid};
     if (!s) s = fit_all(run, job, &source, out, &why, err);
     if (!s) set_figures(out);
-    if (!s) describe(run, model, &why, out);
+    if (!s) set_note(run, model, &why, out);
     if (!s)
-        experiment_log(run, "%s: %.0f of %zu fits converged, %.3g s each", out->row->title,
-                       out->figure[SDM_FIGURE_FITS], out->fits->n, out->figure[SDM_FIGURE_FIT]);
+        cli_experiment_log(run, "%s: %.0f of %zu fits converged, %.3g s each", out->row->title,
+                           out->figure[SDM_FIGURE_FITS], out->fits->n, out->figure[SDM_FIGURE_FIT]);
     sdm_model_free(model);
     return s;
 }

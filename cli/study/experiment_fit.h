@@ -1,66 +1,68 @@
-/* Rows of an experiment that find shapes in test images with known truth. */
+/* Rows of an experiment that fit shapes to test images with known truth (phantoms). */
 #ifndef CLI_EXPERIMENT_FIT_H
 #define CLI_EXPERIMENT_FIT_H
 
 #include "experiment_command.h"
 #include "sdm/pose.h"
 
-/* An image, what it shows, and where a fit begins. Zero-initialise; experiment_phantom_dispose()
- * frees. */
-typedef struct experiment_phantom {
-    double truth[SDM_MAX_PARAMS], start[SDM_MAX_PARAMS];
-    sdm_pose pose, start_pose;
+/* A test image with its truth and the start of a fit. Zero-initialise;
+ * cli_experiment_phantom_dispose() frees. */
+typedef struct cli_experiment_phantom {
+    double truth[SDM_MAX_PARAMS], start[SDM_MAX_PARAMS]; /* parameters */
+    sdm_pose pose, start_pose;                           /* true pose, start pose */
     sdm_grid grid;
-    float *values;
-    uint8_t *label;
-} experiment_phantom;
+    float *values;  /* [nz][ny][nx] HU */
+    uint8_t *label; /* [nz][ny][nx] 1 inside, 0 outside */
+} cli_experiment_phantom;
 
-/* Phantom `index` of the experiment: the same for every method whose shape has the same ranges. */
-sdm_status experiment_phantom_make(const experiment_run *run, const experiment_job *job,
-                                   size_t index, experiment_phantom *out, sdm_error *err);
-void experiment_phantom_dispose(experiment_phantom *p);
+/* Makes phantom `index` of the experiment. It is the same for all methods whose shapes have the
+ * same ranges. SDM_E_ARG: fit.voxel is too small. */
+sdm_status cli_experiment_phantom_make(const cli_experiment_run *run, const cli_experiment_job *job,
+                                       size_t index, cli_experiment_phantom *out, sdm_error *err);
+void cli_experiment_phantom_dispose(cli_experiment_phantom *p);
 
-/* What a method found in one phantom; the estimate is known where the fit converged. */
-typedef struct experiment_fit {
+/* The fit of a method to one phantom. found and sd are NaN unless it converged. */
+typedef struct cli_experiment_fit {
     bool converged;
-    bool at_bound[SDM_MAX_PARAMS];
+    bool at_bound[SDM_MAX_PARAMS]; /* the estimate is at an end of its range */
     double truth[SDM_MAX_PARAMS], found[SDM_MAX_PARAMS], sd[SDM_MAX_PARAMS];
     double seconds, dice;
-    size_t maps_network, maps_exact;
-} experiment_fit;
+    size_t maps_network, maps_exact; /* maps that each source made */
+} cli_experiment_fit;
 
-struct experiment_fits {
+struct cli_experiment_fits {
     size_t n, n_params;
     char name[SDM_MAX_PARAMS][SDM_NAME_MAX], unit[SDM_MAX_PARAMS][16];
-    experiment_fit *fit; /* [n] */
+    cli_experiment_fit *fit; /* [n] */
 };
 
-/* Of one parameter, over the fits that converged; NaN: not known. */
-typedef struct experiment_spread {
-    double difference; /* mean |estimate - estimate of the exact fit| */
-    double error;      /* mean |estimate - truth| */
+/* Errors of one parameter over the fits that converged; NaN: unknown. */
+typedef struct cli_experiment_spread {
+    double difference; /* mean abs(estimate - estimate of the exact fit) */
+    double error;      /* mean abs(estimate - truth) */
     double sd;         /* mean standard deviation */
-    double within; /* share of estimates within three of them of the truth; those at a bound do not
-                      count */
-    double reference; /* difference that others reported */
-} experiment_spread;
-experiment_spread experiment_fit_spread(const experiment_run *run, const experiment_result *r,
-                                        size_t param);
+    double within; /* fraction with abs(estimate - truth) <= 3 sd, without estimates at a bound */
+    double reference; /* published difference */
+} cli_experiment_spread;
+cli_experiment_spread cli_experiment_fit_spread(const cli_experiment_run *run,
+                                                const cli_experiment_result *r, size_t param);
 
-/* Fits every phantom and fills the figures of *out; that of a naive method waits for
- * experiment_fit_finish(). */
-sdm_status experiment_fit_row(const experiment_run *run, experiment_job *job,
-                              experiment_result *out, sdm_error *err);
+/* Fits all phantoms and fills the figures of *out. A row of the naive method only times its maps;
+ * cli_experiment_fit_finish() derives its figures. */
+sdm_status cli_experiment_fit_row(const cli_experiment_run *run, cli_experiment_job *job,
+                                  cli_experiment_result *out, sdm_error *err);
 
-/* After all rows: what the exact fits would cost with naive maps. */
-void experiment_fit_finish(const experiment_run *run);
+/* After all rows: sets the time of naive rows to what the exact fits would take with naive maps. */
+void cli_experiment_fit_finish(const cli_experiment_run *run);
 
-/* The parameters one by one: a second table in Markdown, a list in a row's JSON, parameters.csv and
- * ROW/fits.csv. */
-void experiment_fit_markdown(const experiment_run *run, sdm_text *t);
-void experiment_fit_json(const experiment_run *run, const experiment_result *r, sdm_json *j);
-sdm_status experiment_fit_write(const experiment_run *run, sdm_error *err);
+/* Results by parameter: a second table in Markdown, a list in the JSON of a row, and the files
+ * parameters.csv and ROW/fits.csv. */
+void cli_experiment_fit_markdown(const cli_experiment_run *run, sdm_text *t);
+void cli_experiment_fit_json(const cli_experiment_run *run, const cli_experiment_result *r,
+                             sdm_json *j);
+sdm_status cli_experiment_fit_write(const cli_experiment_run *run, sdm_error *err);
 
-void experiment_fits_free(experiment_fits *f);
+/* NULL is allowed. */
+void cli_experiment_fits_free(cli_experiment_fits *f);
 
 #endif

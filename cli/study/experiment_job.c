@@ -1,4 +1,4 @@
-/* Rows of an experiment: configuration, shape, ranges and files of each. */
+/* Prepares the rows of an experiment: their configuration, shape, ranges and files. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -8,6 +8,7 @@
 #include "inputs/config_shape.h"
 #include "sdm/internal/container.h"
 #include "sdm/internal/file.h"
+#include "sdm/internal/table.h"
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"
 
@@ -21,8 +22,8 @@ static void describe_grid(const sdm_grid *g, char *buf, size_t size)
              h[1], h[2]);
 }
 
-/* Every name of a reference's differences is a parameter. */
-static sdm_status check_reference(const experiment_run *run, const experiment_job *job,
+/* Checks that the published differences name parameters of the shape. */
+static sdm_status check_reference(const cli_experiment_run *run, const cli_experiment_job *job,
                                   sdm_error *err)
 {
     const sdm_experiment_reference *r = run->e->rows[job->index].reference;
@@ -34,14 +35,14 @@ static sdm_status check_reference(const experiment_run *run, const experiment_jo
     return SDM_OK;
 }
 
-static sdm_status open_job(const experiment_run *run, size_t index, experiment_job *job,
+static sdm_status job_open(const cli_experiment_run *run, size_t index, cli_experiment_job *job,
                            sdm_error *err)
 {
     job->index = index;
     sdm_status s = SDM_ALLOC(&job->config, 1, "configuration", err);
     if (!s) s = sdm_experiment_config(run->e, index, job->config, err);
     if (!s && run->args->threads > 0) job->config->threads = (int)run->args->threads;
-    if (!s) s = experiment_path(run, index, "", job->config->output.folder, err);
+    if (!s) s = cli_experiment_path(run, index, "", job->config->output.folder, err);
     if (!s) s = cli_config_shape(job->config, run->registry, &job->shape, err);
     if (s) return s;
     cli_map_maker *m = &job->maker;
@@ -59,20 +60,21 @@ static sdm_status open_job(const experiment_run *run, size_t index, experiment_j
     return s;
 }
 
-sdm_status experiment_job_open(const experiment_run *run, size_t index, experiment_job *job)
+sdm_status cli_experiment_job_open(const cli_experiment_run *run, size_t index,
+                                   cli_experiment_job *job)
 {
-    return job->why.status = open_job(run, index, job, &job->why);
+    return job->open_error.status = job_open(run, index, job, &job->open_error);
 }
 
-void experiment_job_close(experiment_job *job)
+void cli_experiment_job_close(cli_experiment_job *job)
 {
     sdm_instance_free(job->shape);
     sdm_free(job->config);
     memset(job, 0, sizeof *job);
 }
 
-sdm_status experiment_path(const experiment_run *run, size_t index, const char *name,
-                           char path[SDM_PATH_TEXT_MAX], sdm_error *err)
+sdm_status cli_experiment_path(const cli_experiment_run *run, size_t index, const char *name,
+                               char path[SDM_PATH_TEXT_MAX], sdm_error *err)
 {
     if (snprintf(path, SDM_PATH_TEXT_MAX, "%s/%s%s%s", run->folder, run->e->rows[index].folder,
                  *name ? "/" : "", name) < SDM_PATH_TEXT_MAX)
@@ -80,8 +82,17 @@ sdm_status experiment_path(const experiment_run *run, size_t index, const char *
     return sdm_fail(err, SDM_E_ARG, "the folder '%.100s...': the name is too long", run->folder);
 }
 
-/* Two configurations give the same network. */
-static bool is_same(const sdm_config *a, const char *name, const char *text, size_t size)
+sdm_status cli_experiment_write_file(const cli_experiment_run *run, const char *name,
+                                     const sdm_text *text, sdm_error *err)
+{
+    char path[SDM_PATH_TEXT_MAX + 16];
+    snprintf(path, sizeof path, "%s/%s", run->folder, name);
+    return sdm_text_write(text, path, err);
+}
+
+/* True when the configurations a and text[size] give the same network; keys that do not affect it
+ * are ignored. name: the source of the text. */
+static bool is_same_config(const sdm_config *a, const char *name, const char *text, size_t size)
 {
     sdm_config *copy = NULL, *other = NULL;
     sdm_text x = {0}, y = {0};
@@ -108,12 +119,13 @@ static bool is_same_model(const sdm_config *c, const char *path)
     sdm_model *model = NULL;
     if (sdm_model_open(path, &model, NULL)) return false;
     const char *text = sdm_model_get_info(model)->config;
-    const bool same = text && is_same(c, path, text, strlen(text));
+    const bool same = text && is_same_config(c, path, text, strlen(text));
     sdm_model_free(model);
     return same;
 }
 
-/* The budget too: a training that goes on with another one is not that of this row. */
+/* The checkpoint stores the configuration of its training. Its budget must agree too: a checkpoint
+ * with another budget does not lead to the network of this row. */
 static bool is_same_checkpoint(const sdm_config *c, const char *path)
 {
     sdm_section section[SDM_CONTAINER_MAX_SECTIONS];
@@ -126,18 +138,19 @@ static bool is_same_checkpoint(const sdm_config *c, const char *path)
         !sdm_container_parse(bytes, size, section, name, &n, &checksum, NULL))
         for (size_t i = 0; i < n; i++)
             if (!strcmp(name[i], "config"))
-                same = is_same(c, path, section[i].data, section[i].size);
+                same = is_same_config(c, path, section[i].data, section[i].size);
     sdm_free(bytes);
     return same;
 }
 
-experiment_stock experiment_find(const experiment_run *run, const experiment_job *job)
+cli_experiment_stored cli_experiment_find_stored(const cli_experiment_run *run,
+                                                 const cli_experiment_job *job)
 {
     char model[SDM_PATH_TEXT_MAX], checkpoint[SDM_PATH_TEXT_MAX];
-    if (run->args->force || experiment_path(run, job->index, "model.sdm", model, NULL) ||
-        experiment_path(run, job->index, "checkpoint.sdmc", checkpoint, NULL))
-        return STOCK_NONE;
-    if (is_same_model(job->config, model)) return STOCK_MODEL;
-    if (is_same_checkpoint(job->config, checkpoint)) return STOCK_CHECKPOINT;
-    return access(model, F_OK) && access(checkpoint, F_OK) ? STOCK_NONE : STOCK_OTHER;
+    if (run->args->force || cli_experiment_path(run, job->index, "model.sdm", model, NULL) ||
+        cli_experiment_path(run, job->index, "checkpoint.sdmc", checkpoint, NULL))
+        return CLI_STORED_NONE;
+    if (is_same_model(job->config, model)) return CLI_STORED_MODEL;
+    if (is_same_checkpoint(job->config, checkpoint)) return CLI_STORED_CHECKPOINT;
+    return access(model, F_OK) && access(checkpoint, F_OK) ? CLI_STORED_NONE : CLI_STORED_OTHER;
 }

@@ -1,4 +1,5 @@
-/* The log of an experiment: what was done when, with which program, on which machine. */
+/* Writes the log of an experiment: version, machine, settings and command, then the steps with
+ * their times. */
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -11,7 +12,7 @@
 #include "sdm/internal/clock.h"
 #include "sdm/internal/threads.h"
 
-/* Behind "model name :" of the first processor. */
+/* buf = the name of the first processor, from the line "model name : NAME" of /proc/cpuinfo. */
 static void find_processor(char *buf, size_t size)
 {
     char line[256];
@@ -26,7 +27,7 @@ static void find_processor(char *buf, size_t size)
     if (f) fclose(f);
 }
 
-void experiment_describe_machine(char *buf, size_t size)
+void cli_experiment_describe_machine(char *buf, size_t size)
 {
     struct utsname name;
     char processor[128];
@@ -38,15 +39,15 @@ void experiment_describe_machine(char *buf, size_t size)
         snprintf(buf, size, "%s, %ld cores, %s %s", processor, cores, name.sysname, name.machine);
 }
 
-/* Appends; a log that cannot be written stops nothing. */
-static FILE *open_log(const experiment_run *run)
+/* Opens the log for appending. NULL: it cannot be written; the experiment continues without it. */
+static FILE *open_log(const cli_experiment_run *run)
 {
     char path[SDM_PATH_TEXT_MAX + 16];
     snprintf(path, sizeof path, "%s/log.txt", run->folder);
     return fopen(path, "a");
 }
 
-void experiment_log(const experiment_run *run, const char *fmt, ...)
+void cli_experiment_log(const cli_experiment_run *run, const char *fmt, ...)
 {
     char text[SDM_ERROR_TEXT_MAX];
     va_list args;
@@ -60,7 +61,7 @@ void experiment_log(const experiment_run *run, const char *fmt, ...)
     fclose(f);
 }
 
-void experiment_log_start(const experiment_run *run)
+void cli_experiment_log_start(const cli_experiment_run *run)
 {
     char date[64] = "", machine[256];
     const time_t now = time(NULL);
@@ -68,7 +69,7 @@ void experiment_log_start(const experiment_run *run)
     FILE *f = open_log(run);
     if (!f) return;
     if (gmtime_r(&now, &utc)) strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", &utc);
-    experiment_describe_machine(machine, sizeof machine);
+    cli_experiment_describe_machine(machine, sizeof machine);
     fprintf(f,
             "%s  sdmgen " SDM_VERSION_TEXT
             "  %s\n  %d threads, seed %llu, %lld shapes, budget %g min\n",

@@ -1,4 +1,5 @@
-/* A row with a network: trained, gone on with or loaded, then measured. */
+/* Rows of an experiment with a network: trains it, continues its training or loads it, then
+ * measures it. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -14,8 +15,9 @@
 #define MB 1e6
 #define MB_OF_MIB 1.048576
 
-/* No training is begun that would end too late. */
-static sdm_status check_budget(const experiment_run *run, const experiment_job *job, sdm_error *err)
+/* Refuses a training that would end after experiment.minutes. */
+static sdm_status check_budget(const cli_experiment_run *run, const cli_experiment_job *job,
+                               sdm_error *err)
 {
     const double limit = run->e->experiment.minutes, needed = job->config->train.minutes,
                  used = (sdm_clock() - run->start) / 60;
@@ -26,111 +28,116 @@ static sdm_status check_budget(const experiment_run *run, const experiment_job *
         used, limit, needed);
 }
 
-static sdm_status train(const experiment_run *run, const experiment_job *job, bool resume,
-                        sdm_error *err)
+static sdm_status train_network(const cli_experiment_run *run, const cli_experiment_job *job,
+                                bool resume, sdm_error *err)
 {
     cli_progress progress;
     sdm_train_report report = {0};
     const sdm_train_hooks hooks = cli_train_hooks(&progress);
-    const long before = bench_peak_start();
+    const long before = cli_bench_peak_start();
     cli_progress_start(&progress);
     const sdm_status s = sdm_train(job->config, job->shape, job->config->output.folder, resume,
                                    &hooks, &report, err);
     cli_progress_clear(&progress);
     if (!s)
-        experiment_log(run, "%s: trained in %.1f s, peak of the memory %.0f MB",
-                       run->e->rows[job->index].title, report.seconds,
-                       MB_OF_MIB * bench_peak_mb(before));
+        cli_experiment_log(run, "%s: trained in %.1f s, peak memory %.0f MB",
+                           run->e->rows[job->index].title, report.seconds,
+                           MB_OF_MIB * cli_bench_peak_mb(before));
     return s;
 }
 
-/* A checkpoint of other maps (another plug-in or data file) is refused; then training starts anew.
- */
-sdm_status experiment_provide(const experiment_run *run, const experiment_job *job,
-                              experiment_result *out, sdm_error *err)
+/* sdm_train() refuses a checkpoint whose maps differ (another plug-in or data file); then the
+ * training starts again. */
+sdm_status cli_experiment_provide_model(const cli_experiment_run *run,
+                                        const cli_experiment_job *job, cli_experiment_result *out,
+                                        sdm_error *err)
 {
-    const experiment_stock stock = experiment_find(run, job);
+    const cli_experiment_stored stored = cli_experiment_find_stored(run, job);
     const char *title = out->row->title;
-    out->loaded = stock == STOCK_MODEL;
+    out->loaded = stored == CLI_STORED_MODEL;
     if (out->loaded) {
-        experiment_log(run, "%s: the model in %s is loaded, not trained again", title,
-                       job->config->output.folder);
+        cli_experiment_log(run, "%s: the model in %s is loaded, not trained again", title,
+                           job->config->output.folder);
         return SDM_OK;
     }
     sdm_status s = check_budget(run, job, err);
     if (s) return s;
-    if (stock == STOCK_OTHER)
-        experiment_log(
+    if (stored == CLI_STORED_OTHER)
+        cli_experiment_log(
             run, "%s: the model or checkpoint in %s has another configuration and is replaced",
             title, job->config->output.folder);
-    experiment_log(run, "%s: training%s, %s", title, stock == STOCK_CHECKPOINT ? " goes on" : "",
-                   out->grid);
-    s = train(run, job, stock == STOCK_CHECKPOINT, err);
-    if (s == SDM_E_CONFIG && stock == STOCK_CHECKPOINT) {
-        experiment_log(run, "%s: the checkpoint is of other maps; training starts anew", title);
-        s = train(run, job, false, err);
+    cli_experiment_log(run, "%s: training%s, %s", title,
+                       stored == CLI_STORED_CHECKPOINT ? " continues" : "", out->grid);
+    s = train_network(run, job, stored == CLI_STORED_CHECKPOINT, err);
+    if (s == SDM_E_CONFIG && stored == CLI_STORED_CHECKPOINT) {
+        cli_experiment_log(run, "%s: the checkpoint has other maps; training starts again", title);
+        s = train_network(run, job, false, err);
     }
     return s;
 }
 
+/* *mb = growth of the resident memory while the model is opened and makes a map, MiB. */
 static sdm_status measure_memory(const char *path, const double *p, float *values, double *mb,
                                  sdm_error *err)
 {
     const sdm_generate_opts opts = {.policy = SDM_RANGE_CLAMP, .n_threads = 1};
     sdm_model *model = NULL;
-    const long before = bench_peak_start();
+    const long before = cli_bench_peak_start();
     sdm_status s = sdm_model_open(path, &model, err);
     if (!s) s = sdm_generate(model, p, &opts, values, NULL, err);
-    *mb = bench_peak_mb(before);
+    *mb = cli_bench_peak_mb(before);
     sdm_model_free(model);
     return s;
 }
 
-static sdm_status measure(const experiment_run *run, experiment_job *job, const char *path,
-                          const sdm_model *model, experiment_result *out, sdm_error *err)
+static sdm_status measure_network(const cli_experiment_run *run, cli_experiment_job *job,
+                                  const char *path, const sdm_model *model,
+                                  cli_experiment_result *out, sdm_error *err)
 {
     const sdm_model_info *info = sdm_model_get_info(model);
     const uint64_t seed = run->e->experiment.seed;
     cli_eval e = {0};
     cli_timing t = {0};
     float *values = NULL;
-    const long before = bench_peak_start(); /* the map counts */
+    // the memory of the map counts too
+    const long before = cli_bench_peak_start();
     double more = 0;
     sdm_status s = SDM_ALLOC(&values, sdm_grid_count(&info->grid), "distance map", err);
     if (!s) memset(values, 1, sdm_grid_count(&info->grid) * sizeof *values);
-    const double map_mb = bench_peak_mb(before);
+    const double map_mb = cli_bench_peak_mb(before);
     if (!s) s = measure_memory(path, job->nominal, values, &more, err);
+    // times and errors
     if (!s) s = cli_time_maps(model, NULL, seed, false, 0, &t, err);
     job->maker = cli_maker_of_model(model, job->shape);
     if (!s) s = cli_evaluate_maps(&job->maker, seed, (size_t)out->row->samples, true, &e, err);
     if (!s) {
-        experiment_set_errors(out, &e);
+        cli_experiment_set_errors(out, &e);
         out->figure[SDM_FIGURE_MS] = t.ms_network;
         out->figure[SDM_FIGURE_MS_BATCH] = t.ms_batch;
-        if (info->train_seconds > 0)
-            out->figure[SDM_FIGURE_TRAIN] = info->train_seconds; /* 0: a budget of steps */
+        // 0 when the budget is a number of steps
+        if (info->train_seconds > 0) out->figure[SDM_FIGURE_TRAIN] = info->train_seconds;
         out->figure[SDM_FIGURE_MODEL] = (double)info->file_bytes / MB;
         out->figure[SDM_FIGURE_PEAK] = MB_OF_MIB * (map_mb + more);
         snprintf(out->note, sizeof out->note,
-                 "network %s, %s, %lld maps seen in training, seed %llu%s", info->kind, out->grid,
+                 "network %s, %s, %lld maps used in training, seed %llu%s", info->kind, out->grid,
                  (long long)info->train_samples, (unsigned long long)info->seed,
                  out->loaded ? "; loaded" : "");
-        s = experiment_draw(run, job, values, err);
+        s = cli_experiment_draw(run, job, values, err);
     }
     cli_eval_dispose(&e);
     sdm_free(values);
     return s;
 }
 
-sdm_status experiment_network(const experiment_run *run, experiment_job *job,
-                              experiment_result *out, sdm_error *err)
+sdm_status cli_experiment_network(const cli_experiment_run *run, cli_experiment_job *job,
+                                  cli_experiment_result *out, sdm_error *err)
 {
     char path[SDM_PATH_TEXT_MAX];
     sdm_model *model = NULL;
-    sdm_status s = experiment_path(run, job->index, "model.sdm", path, err);
-    if (!s) s = experiment_provide(run, job, out, err);
+    sdm_status s = cli_experiment_path(run, job->index, "model.sdm", path, err);
+    if (!s) s = cli_experiment_provide_model(run, job, out, err);
     if (!s) s = sdm_model_open(path, &model, err);
-    if (!s) s = measure(run, job, path, model, out, err);
+    if (!s) s = measure_network(run, job, path, model, out, err);
     sdm_model_free(model);
     return s;
 }

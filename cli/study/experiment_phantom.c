@@ -1,4 +1,5 @@
-/* Phantoms of an experiment: random shapes in random poses, and starts a given distance off. */
+/* Makes the phantoms of an experiment: random shapes in random poses, with start poses at a given
+ * distance from the true pose. */
 #include <math.h>
 #include <string.h>
 
@@ -9,20 +10,21 @@
 #include "sdm/memory.h"
 #include "sdm/phantom.h"
 
-/* Streams of the seeds of phantoms and of the directions of starts. */
+/* Random streams: seeds of the phantoms, directions of the start poses. */
 enum { STREAM_SEED = 910, STREAM_START = 911 };
-#define PLACE_MM 10.0 /* phantoms lie within this of the origin */
+#define TRANSLATION_MAX_MM 10.0 /* of the true poses */
 
 static const double PI = 3.14159265358979323846;
 
-static uint64_t seed_of(uint64_t seed, size_t index)
+static uint64_t phantom_seed(uint64_t seed, size_t index)
 {
     uint32_t bits[4];
     sdm_rng_block(seed, STREAM_SEED, index, bits);
     return (uint64_t)bits[0] << 32 | bits[1];
 }
 
-/* A vector of the given length in a direction uniform on the sphere. */
+/* v = a vector of the given length, its direction uniform on the sphere; first: index of the first
+ * of three random numbers. */
 static void random_vector(uint64_t seed, uint64_t first, double length, double v[3])
 {
     double sum = 0;
@@ -33,9 +35,10 @@ static void random_vector(uint64_t seed, uint64_t first, double length, double v
     for (int i = 0; i < 3; i++) v[i] *= length / sqrt(sum);
 }
 
-/* The true pose, turned about the middle of the shape and moved. */
-static sdm_pose start_near(const sdm_experiment *e, uint64_t seed, const sdm_pose *truth,
-                           const double middle[3])
+/* The true pose, rotated by fit.off_deg about `middle` and translated by fit.off_mm, both in random
+ * directions. */
+static sdm_pose perturb_pose(const sdm_experiment *e, uint64_t seed, const sdm_pose *truth,
+                             const double middle[3])
 {
     sdm_pose off = {{0, 0, 0}, {0, 0, 0}};
     double shift[3], turned[3];
@@ -46,9 +49,9 @@ static sdm_pose start_near(const sdm_experiment *e, uint64_t seed, const sdm_pos
     return sdm_pose_compose(&off, truth);
 }
 
-/* The box of the shape where it lies in the world. */
-static sdm_status find_box(const experiment_job *job, const experiment_phantom *p, double min[3],
-                           double max[3], sdm_error *err)
+/* min .. max = bounding box of the shape in its true pose. */
+static sdm_status find_box(const cli_experiment_job *job, const cli_experiment_phantom *p,
+                           double min[3], double max[3], sdm_error *err)
 {
     sdm_mesh mesh = {0};
     const sdm_status s = sdm_instance_mesh(job->shape, p->truth, &mesh, err);
@@ -62,7 +65,7 @@ static sdm_status find_box(const experiment_job *job, const experiment_phantom *
     return s;
 }
 
-/* The image holds all that a fit looks at from its start. */
+/* A grid around the box, wide enough for all voxels that a fit uses from its start pose on. */
 static sdm_status make_grid(const sdm_experiment *e, const double min[3], const double max[3],
                             sdm_grid *out, sdm_error *err)
 {
@@ -74,7 +77,7 @@ static sdm_status make_grid(const sdm_experiment *e, const double min[3], const 
         if (!(voxels < 4096))
             return sdm_fail(
                 err, SDM_E_ARG,
-                "fit.voxel: %g mm makes images of %.3g voxels along %c; use larger ones",
+                "fit.voxel: %g mm makes images of %.3g voxels along %c; use larger voxels",
                 e->fit.voxel, voxels, "xyz"[i]);
         n[i] = 1 + (int64_t)voxels;
         middle[i] = 0.5 * (min[i] + max[i]);
@@ -83,12 +86,12 @@ static sdm_status make_grid(const sdm_experiment *e, const double min[3], const 
     return sdm_grid_check(out, err);
 }
 
-sdm_status experiment_phantom_make(const experiment_run *run, const experiment_job *job,
-                                   size_t index, experiment_phantom *out, sdm_error *err)
+sdm_status cli_experiment_phantom_make(const cli_experiment_run *run, const cli_experiment_job *job,
+                                       size_t index, cli_experiment_phantom *out, sdm_error *err)
 {
     const sdm_experiment *e = run->e;
     const cli_map_maker *m = &job->maker;
-    const uint64_t seed = seed_of(e->experiment.seed, index);
+    const uint64_t seed = phantom_seed(e->experiment.seed, index);
     sdm_phantom_opts opts = sdm_phantom_defaults();
     double min[3], max[3], middle[3];
     opts.seed = seed;
@@ -99,11 +102,11 @@ sdm_status experiment_phantom_make(const experiment_run *run, const experiment_j
         out->start[i] = 0.5 * (m->min[i] + m->max[i]);
         out->truth[i] = out->start[i] + e->fit.range * (out->truth[i] - out->start[i]);
     }
-    out->pose = sdm_phantom_random_pose(PI, PLACE_MM, seed);
+    out->pose = sdm_phantom_random_pose(PI, TRANSLATION_MAX_MM, seed);
     sdm_status s = find_box(job, out, min, max, err);
     if (s) return s;
     for (int i = 0; i < 3; i++) middle[i] = 0.5 * (min[i] + max[i]);
-    out->start_pose = start_near(e, seed, &out->pose, middle);
+    out->start_pose = perturb_pose(e, seed, &out->pose, middle);
     s = make_grid(e, min, max, &out->grid, err);
     if (!s) s = SDM_ALLOC(&out->values, sdm_grid_count(&out->grid), "image", err);
     if (!s) s = SDM_ALLOC(&out->label, sdm_grid_count(&out->grid), "labels", err);
@@ -113,7 +116,7 @@ sdm_status experiment_phantom_make(const experiment_run *run, const experiment_j
     return s;
 }
 
-void experiment_phantom_dispose(experiment_phantom *p)
+void cli_experiment_phantom_dispose(cli_experiment_phantom *p)
 {
     sdm_free(p->values);
     sdm_free(p->label);

@@ -1,4 +1,4 @@
-/* What an experiment would do: rows, budgets, what is there already. */
+/* Prints the plan of an experiment: the action of every row and the duration of the trainings. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -6,36 +6,40 @@
 #include "experiment_command.h"
 #include "report/terminal.h"
 
+/* The planned action of a row and its training. */
 typedef struct plan {
     const char *action;
-    double minutes;
-    char budget[64];
+    double minutes;  /* 0: no training, or a budget of steps or samples */
+    char budget[64]; /* "5 min", "2000 steps"; "": no training */
 } plan;
 
-static plan plan_row(const experiment_run *run, const experiment_job *job)
+static plan plan_row(const cli_experiment_run *run, const cli_experiment_job *job)
 {
     const sdm_config *c = job->config;
     plan p = {.action = "measure"};
     const sdm_experiment_method *m = run->e->rows[job->index].method;
+    // rows without a network of their own
     if (m->fit) p.action = m->fit == SDM_EXPERIMENT_FIT_NAIVE ? "time a map" : "fit";
     if (*m->engine || m->fit == SDM_EXPERIMENT_FIT_POLISH) return p;
     if (m->fit && *run->e->fit.model) {
         p.action = "load, fit";
         return p;
     }
-    switch (experiment_find(run, job)) {
-    case STOCK_MODEL:
+    // rows with a network
+    switch (cli_experiment_find_stored(run, job)) {
+    case CLI_STORED_MODEL:
         p.action = m->fit ? "load, fit" : "load, measure";
         return p;
-    case STOCK_CHECKPOINT:
+    case CLI_STORED_CHECKPOINT:
         p.action = m->fit ? "go on training, fit" : "go on training, measure";
         break;
-    case STOCK_OTHER:
+    case CLI_STORED_OTHER:
         p.action = m->fit ? "train anew, fit" : "train anew, measure";
         break;
     default:
         p.action = m->fit ? "train, fit" : "train, measure";
     }
+    // the budget of the training
     p.minutes = c->train.minutes;
     if (c->train.minutes > 0)
         snprintf(p.budget, sizeof p.budget, "%g min", c->train.minutes);
@@ -46,8 +50,8 @@ static plan plan_row(const experiment_run *run, const experiment_job *job)
     return p;
 }
 
-static void add_row(const experiment_run *run, const experiment_job *job, const plan *p, int width,
-                    sdm_json *j)
+static void add_row(const cli_experiment_run *run, const cli_experiment_job *job, const plan *p,
+                    int width, sdm_json *j)
 {
     const sdm_experiment_row *row = &run->e->rows[job->index];
     const long long samples = row->method->fit ? run->e->fit.phantoms : row->samples;
@@ -70,23 +74,25 @@ static void add_row(const experiment_run *run, const experiment_job *job, const 
     }
 }
 
-sdm_status experiment_print_plan(const experiment_run *run, sdm_error *err)
+sdm_status cli_experiment_print_plan(const cli_experiment_run *run, sdm_error *err)
 {
     sdm_json j = {0};
     double minutes = 0;
     size_t untimed = 0;
     int width = 28;
     sdm_status s = SDM_OK;
+    // width of the titles
     for (size_t i = 0; i < run->e->n_rows; i++) {
         const int length = (int)strlen(run->e->rows[i].title);
         if (length > width) width = length;
     }
+    // the rows
     sdm_json_open(&j, NULL, '{');
     sdm_json_open(&j, "rows", '[');
     for (size_t i = 0; i < run->e->n_rows && !s; i++) {
-        const experiment_job *job = &run->jobs[i];
-        if ((s = job->why.status)) {
-            if (err) *err = job->why;
+        const cli_experiment_job *job = &run->jobs[i];
+        if ((s = job->open_error.status)) {
+            if (err) *err = job->open_error;
             break;
         }
         const plan p = plan_row(run, job);
@@ -94,6 +100,7 @@ sdm_status experiment_print_plan(const experiment_run *run, sdm_error *err)
         untimed += *p.budget && !(p.minutes > 0);
         add_row(run, job, &p, width, &j);
     }
+    // the sum
     sdm_json_close(&j, ']');
     sdm_json_real(&j, "minutes", minutes);
     sdm_json_real(&j, "limit", run->e->experiment.minutes);
@@ -101,8 +108,8 @@ sdm_status experiment_print_plan(const experiment_run *run, sdm_error *err)
     if (!s && run->args->json) return cli_print_json(&j, err);
     sdm_json_dispose(&j);
     if (s) return s;
-    printf("\ntrainings of %g min in all", minutes);
-    if (untimed) printf(", and %zu by steps or samples, whose time is not known", untimed);
+    printf("\ntrainings: %g min in total", minutes);
+    if (untimed) printf(", and %zu by steps or samples, of unknown duration", untimed);
     if (run->e->experiment.minutes > 0) printf("; limit %g min", run->e->experiment.minutes);
     printf("; results in %s\n", run->folder);
     return SDM_OK;

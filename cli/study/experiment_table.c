@@ -1,20 +1,19 @@
-/* The table of an experiment as Markdown, CSV and JSON. */
+/* Writes the table of an experiment as Markdown, CSV and JSON. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "experiment_fit.h"
-#include "report/terminal.h"
 #include "sdm/internal/clock.h"
-#include "sdm/internal/file.h"
+#include "sdm/internal/table.h"
 
-static const char *state_name(experiment_state state)
+static const char *state_name(cli_experiment_state state)
 {
     static const char *const NAMES[] = {"not done", "done", "not available", "failed"};
     return NAMES[state];
 }
 
-void experiment_set_errors(experiment_result *out, const cli_eval *e)
+void cli_experiment_set_errors(cli_experiment_result *out, const cli_eval *e)
 {
     out->figure[SDM_FIGURE_MSE] = e->mse_mm2;
     out->figure[SDM_FIGURE_RMSE] = e->rmse_mm;
@@ -26,113 +25,98 @@ void experiment_set_errors(experiment_result *out, const cli_eval *e)
     out->figure[SDM_FIGURE_SHAPES] = (double)e->n;
 }
 
-/* Columns that anything is known for. */
+/* Columns of the table: figures that some row has, measured (own) or published (reference). */
 typedef struct columns {
     bool own[SDM_N_FIGURES], reference[SDM_N_FIGURES];
 } columns;
 
-static double reference_of(const experiment_result *r, int f)
+/* The published figure f of the row; NaN: none. */
+static double reference_figure(const cli_experiment_result *r, int f)
 {
     return r->row->reference ? r->row->reference->value[f] : NAN;
 }
 
-static columns find_columns(const experiment_run *run)
+static columns find_columns(const cli_experiment_run *run)
 {
     columns c = {.own = {false}};
     for (size_t i = 0; i < run->e->n_rows; i++)
         for (int f = 0; f < SDM_N_FIGURES; f++) {
-            c.reference[f] |= isfinite(reference_of(&run->results[i], f));
-            c.own[f] |=
-                isfinite(run->results[i].figure[f]) || isfinite(reference_of(&run->results[i], f));
+            c.reference[f] |= isfinite(reference_figure(&run->results[i], f));
+            c.own[f] |= isfinite(run->results[i].figure[f]) ||
+                        isfinite(reference_figure(&run->results[i], f));
         }
     return c;
 }
 
 /* ---- Markdown ---- */
 
-/* Three digits, in plain notation where that is short. */
-static void add_number(sdm_text *t, double v)
+/* Adds the head of a column, "MSE, mm^2 (source) |"; source NULL: measured here. */
+static void add_head(sdm_text *t, const sdm_figure_info *info, const char *source)
 {
-    if (!isfinite(v))
-        sdm_text_add(t, " - |");
-    else if (v != 0 && (fabs(v) < 1e-3 || fabs(v) >= 1e6))
-        sdm_text_add(t, " %.2e |", v);
-    else if (fabs(v) >= 100 || v == floor(v))
-        sdm_text_add(t, " %.0f |", v);
-    else
-        sdm_text_add(t, " %.3g |", v);
-}
-
-/* A text without what means something in a cell. */
-void experiment_add_cell(sdm_text *t, const char *text)
-{
-    for (const char *p = text; *p; p++) sdm_text_add(t, strchr("|*_`<\\[", *p) ? "\\%c" : "%c", *p);
-}
-
-static void add_head(sdm_text *t, const char *name, const sdm_figure_info *info, const char *whose)
-{
-    sdm_text_add(t, " %s%s%s", name, *info->unit ? ", " : "", info->unit);
-    if (whose) sdm_text_add(t, " (%s)", whose);
+    sdm_text_add(t, " %s%s%s", info->title, *info->unit ? ", " : "", info->unit);
+    if (source) sdm_text_add(t, " (%s)", source);
     sdm_text_add(t, " |");
 }
 
-static void add_markdown_table(const experiment_run *run, const columns *c, sdm_text *t)
+static void add_markdown_table(const cli_experiment_run *run, const columns *c, sdm_text *t)
 {
     size_t n = 0;
     sdm_text_add(t, "| method |");
     for (int f = 0; f < SDM_N_FIGURES; f++) {
         const sdm_figure_info *info = sdm_figure_get_info((sdm_figure)f);
-        if (c->own[f]) add_head(t, info->title, info, NULL);
-        if (c->reference[f]) add_head(t, info->title, info, run->e->experiment.reference);
+        if (c->own[f]) add_head(t, info, NULL);
+        if (c->reference[f]) add_head(t, info, run->e->experiment.reference);
         n += (size_t)c->own[f] + (size_t)c->reference[f];
     }
-    sdm_text_add(t, "\n|---|");
-    for (size_t i = 0; i < n; i++) sdm_text_add(t, "---:|");
     sdm_text_add(t, "\n");
+    sdm_markdown_rule(t, 1, n);
     for (size_t i = 0; i < run->e->n_rows; i++) {
-        const experiment_result *r = &run->results[i];
+        const cli_experiment_result *r = &run->results[i];
         sdm_text_add(t, "| ");
-        experiment_add_cell(t, r->row->title);
-        if (r->state != EXPERIMENT_DONE) sdm_text_add(t, " (%s)", state_name(r->state));
+        sdm_markdown_text(t, r->row->title);
+        if (r->state != CLI_EXPERIMENT_DONE) sdm_text_add(t, " (%s)", state_name(r->state));
         sdm_text_add(t, " |");
         for (int f = 0; f < SDM_N_FIGURES; f++) {
-            if (c->own[f]) add_number(t, r->figure[f]);
-            if (c->reference[f]) add_number(t, reference_of(r, f));
+            if (c->own[f]) sdm_markdown_plain(t, r->figure[f]);
+            if (c->reference[f]) sdm_markdown_plain(t, reference_figure(r, f));
         }
         sdm_text_add(t, "\n");
     }
 }
 
-static void add_markdown(const experiment_run *run, const columns *c, sdm_text *t)
+static void add_markdown(const cli_experiment_run *run, const columns *c, sdm_text *t)
 {
+    // title and tables
     char machine[256];
-    experiment_describe_machine(machine, sizeof machine);
+    cli_experiment_describe_machine(machine, sizeof machine);
     sdm_text_add(t, "# %s\n\n", run->e->experiment.title);
     add_markdown_table(run, c, t);
-    experiment_fit_markdown(run, t);
+    cli_experiment_fit_markdown(run, t);
     sdm_text_add(t,
                  "\nsdmgen " SDM_VERSION_TEXT
-                 "; %s; seed %llu. Times are of one core, errors are from exact maps of "
-                 "random shapes that no network was trained on.\n\n",
+                 "; %s; seed %llu. Times: one core. Errors: differences from exact maps of random "
+                 "shapes that no network was trained on.\n\n",
                  machine, (unsigned long long)run->e->experiment.seed);
+    // notes of the rows
     for (size_t i = 0; i < run->e->n_rows; i++) {
-        const experiment_result *r = &run->results[i];
+        const cli_experiment_result *r = &run->results[i];
         const sdm_experiment_reference *reference = r->row->reference;
         sdm_text_add(t, "- ");
-        experiment_add_cell(t, r->row->title);
+        sdm_markdown_text(t, r->row->title);
         sdm_text_add(t, ": %s: ", state_name(r->state));
-        experiment_add_cell(t, r->note);
+        sdm_markdown_text(t, r->note);
         sdm_text_add(t, "\n");
         if (!reference || !*reference->source) continue;
         sdm_text_add(t, "  - %s: ", run->e->experiment.reference);
-        experiment_add_cell(t, reference->source);
+        sdm_markdown_text(t, reference->source);
         sdm_text_add(t, "\n");
     }
+    // pictures
     if (!run->e->experiment.pictures) return;
     sdm_text_add(t, "\n");
     for (size_t i = 0; i < run->e->n_rows; i++) {
         const sdm_experiment_row *row = run->results[i].row;
-        if (run->results[i].state != EXPERIMENT_DONE || row->method->fit) continue;
+        if (run->results[i].state != CLI_EXPERIMENT_DONE || row->method->fit) continue;
         sdm_text_add(t, "![slices](%s/slices.png) ![surfaces](%s/surfaces.png)\n", row->folder,
                      row->folder);
     }
@@ -140,16 +124,8 @@ static void add_markdown(const experiment_run *run, const columns *c, sdm_text *
 
 /* ---- CSV ---- */
 
-void experiment_add_csv_text(sdm_text *t, const char *text)
+static void add_csv(const cli_experiment_run *run, const columns *c, sdm_text *t)
 {
-    sdm_text_add(t, "\"");
-    for (const char *p = text; *p; p++) sdm_text_add(t, *p == '"' ? "\"\"" : "%c", *p);
-    sdm_text_add(t, "\"");
-}
-
-static void add_csv(const experiment_run *run, const columns *c, sdm_text *t)
-{
-    char number[32];
     sdm_text_add(t, "method,state,loaded,samples");
     for (int f = 0; f < SDM_N_FIGURES; f++) {
         const char *key = sdm_figure_get_info((sdm_figure)f)->key;
@@ -158,27 +134,26 @@ static void add_csv(const experiment_run *run, const columns *c, sdm_text *t)
     }
     sdm_text_add(t, ",note,source\n");
     for (size_t i = 0; i < run->e->n_rows; i++) {
-        const experiment_result *r = &run->results[i];
-        experiment_add_csv_text(t, r->row->title);
+        const cli_experiment_result *r = &run->results[i];
+        sdm_csv_text(t, r->row->title);
         sdm_text_add(t, ",%s,%s,%lld", state_name(r->state), r->loaded ? "true" : "false",
                      (long long)r->row->samples);
         for (int f = 0; f < SDM_N_FIGURES; f++) {
-            const double own = r->figure[f], other = reference_of(r, f);
-            sdm_text_add(t, ",%s", isfinite(own) ? sdm_format_real(own, number) : "");
-            if (c->reference[f])
-                sdm_text_add(t, ",%s", isfinite(other) ? sdm_format_real(other, number) : "");
+
+            sdm_csv_real(t, r->figure[f]);
+            if (c->reference[f]) sdm_csv_real(t, reference_figure(r, f));
         }
         sdm_text_add(t, ",");
-        experiment_add_csv_text(t, r->note);
+        sdm_csv_text(t, r->note);
         sdm_text_add(t, ",");
-        experiment_add_csv_text(t, r->row->reference ? r->row->reference->source : "");
+        sdm_csv_text(t, r->row->reference ? r->row->reference->source : "");
         sdm_text_add(t, "\n");
     }
 }
 
 /* ---- JSON ---- */
 
-static void add_json_row(const experiment_run *run, const experiment_result *r, sdm_json *j)
+static void add_json_row(const cli_experiment_run *run, const cli_experiment_result *r, sdm_json *j)
 {
     const sdm_experiment_reference *reference = r->row->reference;
     sdm_json_open(j, NULL, '{');
@@ -200,15 +175,15 @@ static void add_json_row(const experiment_run *run, const experiment_result *r, 
         sdm_json_text(j, "source", reference->source);
         sdm_json_close(j, '}');
     }
-    experiment_fit_json(run, r, j);
+    cli_experiment_fit_json(run, r, j);
     sdm_json_text(j, "note", r->note);
     sdm_json_close(j, '}');
 }
 
-static void add_json(const experiment_run *run, sdm_json *j)
+static void add_json(const cli_experiment_run *run, sdm_json *j)
 {
     char machine[256];
-    experiment_describe_machine(machine, sizeof machine);
+    cli_experiment_describe_machine(machine, sizeof machine);
     sdm_json_open(j, NULL, '{');
     sdm_json_text(j, "title", run->e->experiment.title);
     sdm_json_text(j, "config", run->e->file);
@@ -223,32 +198,18 @@ static void add_json(const experiment_run *run, sdm_json *j)
     sdm_json_close(j, '}');
 }
 
-sdm_status experiment_write_file(const experiment_run *run, const char *name, const sdm_text *text,
-                                 sdm_error *err)
-{
-    char path[SDM_PATH_TEXT_MAX + 16];
-    sdm_outfile *f = NULL;
-    if (text->failed) return sdm_fail(err, SDM_E_NOMEM, "out of memory for %s", name);
-    snprintf(path, sizeof path, "%s/%s", run->folder, name);
-    sdm_status s = sdm_outfile_open(path, &f, err);
-    if (!s) s = sdm_outfile_write(f, text->data, text->size, err);
-    if (!s) return sdm_outfile_commit(&f, err);
-    sdm_outfile_discard(&f);
-    return s;
-}
-
-sdm_status experiment_write_tables(const experiment_run *run, sdm_text *markdown, sdm_json *json,
-                                   sdm_error *err)
+sdm_status cli_experiment_write_tables(const cli_experiment_run *run, sdm_text *markdown,
+                                       sdm_json *json, sdm_error *err)
 {
     const columns c = find_columns(run);
     sdm_text csv = {0};
     add_markdown(run, &c, markdown);
     add_csv(run, &c, &csv);
     add_json(run, json);
-    sdm_status s = experiment_write_file(run, "table.md", markdown, err);
-    if (!s) s = experiment_write_file(run, "table.csv", &csv, err);
-    if (!s) s = experiment_write_file(run, "table.json", &json->text, err);
-    if (!s) s = experiment_fit_write(run, err);
+    sdm_status s = cli_experiment_write_file(run, "table.md", markdown, err);
+    if (!s) s = cli_experiment_write_file(run, "table.csv", &csv, err);
+    if (!s) s = cli_experiment_write_file(run, "table.json", &json->text, err);
+    if (!s) s = cli_experiment_fit_write(run, err);
     sdm_text_dispose(&csv);
     return s;
 }

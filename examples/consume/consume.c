@@ -1,5 +1,5 @@
-/* The C interface in one page: opens a model, makes a distance map, reads it at a point. Usage:
- * consume MODEL */
+/* Example of the C interface: opens a model, computes a signed distance map with default parameters
+ * and prints the value of the central voxel. Usage: consume MODEL */
 #include <stdio.h>
 
 #include "sdm/memory.h"

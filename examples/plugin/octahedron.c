@@ -1,4 +1,4 @@
-/* A shape plug-in in one file: a regular octahedron. */
+/* Example of a shape plug-in in one file: a regular octahedron. */
 #include <math.h>
 
 #include <sdm/shape.h>
@@ -14,20 +14,20 @@ static const sdm_param PARAMS[N_PARAMS] = {
                 .help = "distance of the corners from the centre"},
 };
 
-/* The mesh at parameters p. Ask for room, write vertices (mm) and triangles (counter-clockwise seen
- * from outside). */
-static int mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
-                const double *p, sdm_mesh_out *out)
+/* Computes the mesh at parameters p: reserve the arrays, then write vertices (mm) and triangles
+ * (counter-clockwise seen from outside). */
+static int octahedron_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                           const double *p, sdm_mesh_out *out)
 {
     (void)self, (void)options;
     const int failed = host->reserve(host, out, 6, 8);
     if (failed) return failed;
 
-    // corners 0, 1: +x, -x; 2, 3: +y, -y; 4, 5: +z, -z
+    // vertices 0, 1: +x, -x; 2, 3: +y, -y; 4, 5: +z, -z
     for (int i = 0; i < 18; i++) out->vert[i] = 0;
     for (int i = 0; i < 6; i++) out->vert[3 * i + i / 2] = i % 2 ? -p[RADIUS] : p[RADIUS];
 
-    // one triangle in each octant; a mirrored octant turns it round
+    // one triangle per octant; mirrored octants need the opposite order of vertices
     for (unsigned i = 0; i < 8; i++) {
         const unsigned x = i & 1, y = i >> 1 & 1, z = i >> 2 & 1, mirrored = x ^ y ^ z;
         uint32_t *tri = out->tri + 3 * i;
@@ -38,18 +38,19 @@ static int mesh(const void *self, const sdm_host *host, const sdm_option_value *
     return 0;
 }
 
-/* Optional: the exact distance, negative inside. The tests of a shape compare its mesh with this.
- */
-static int distance(const void *self, const sdm_host *host, const sdm_option_value *options,
-                    const double *p, const double x[3], double *out)
+/* Optional: closed-form signed distance (mm), negative inside. Tests of the mesh compare with
+ * it. */
+static int octahedron_distance(const void *self, const sdm_host *host,
+                               const sdm_option_value *options, const double *p, const double x[3],
+                               double *out)
 {
     (void)self, (void)host, (void)options;
     double q[3], sum = 0, d2 = 0;
-    for (int k = 0; k < 3; k++)
-        sum += q[k] = fabs(x[k]); // by symmetry in the octant of positive numbers
+    // symmetry: move the point to the octant x, y, z >= 0
+    for (int k = 0; k < 3; k++) sum += q[k] = fabs(x[k]);
 
-    // the foot on the plane of the face; where it leaves the octant, on the edge, then at the
-    // corner
+    // project onto the plane of the face; if the projection leaves the octant, onto the edge, then
+    // the vertex
     double foot[3], rest = sum - p[RADIUS];
     int n = 3, used[3] = {1, 1, 1};
     for (int again = 1; again;) {
@@ -75,9 +76,9 @@ static const sdm_shape OCTAHEDRON = {
     .summary = "regular octahedron about the origin; distance exact",
     .params = PARAMS,
     .n_params = N_PARAMS,
-    .mesh = mesh,
-    .distance = distance,
+    .mesh = octahedron_mesh,
+    .distance = octahedron_distance,
 };
 
-/* The one symbol the program looks for: shape 0, 1, ... of this file, NULL behind the last. */
+/* The only exported symbol: returns shape 0, 1, ... of this file, NULL after the last. */
 const sdm_shape *sdm_plugin_shape(uint32_t index) { return index == 0 ? &OCTAHEDRON : NULL; }

@@ -1,13 +1,12 @@
-/* Writes a synthetic point-distribution model for the shape `statistical`: mean.ply, modes.npy and
-   deviations.npy in a folder.
-
-   cc -O2 -o make_model make_model.c -lm && ./make_model .
-
-   The mean is a rounded blob; the modes are smooth displacements of it (swelling, stretching,
-   bending, pear, twist, bending sideways, taper, bulging), made orthonormal, as a principal
-   component analysis of aligned meshes gives them. In place of the synthetic fields put the rows of
-   your own analysis: modes[n_modes][n_vert][3] of length 1, and the standard deviation along each
-   in mm. */
+/* Example for the shape `statistical`: writes a synthetic point-distribution model (mean.ply,
+ * modes.npy, deviations.npy) to a folder.
+ *
+ *     cc -O2 -o make_model make_model.c -lm && ./make_model .
+ *
+ * The mean is a rounded blob. The modes are smooth displacement fields (swelling, stretching,
+ * bending, pear, twist, sideways bending, taper, bulging), orthonormalised like the result of a
+ * principal component analysis of aligned meshes. To use your own analysis, replace them by
+ * modes[n_modes][n_vert][3] of norm 1 and the standard deviation along each mode in mm. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -31,7 +30,7 @@ static void make_vertices(void)
         const double down = PI * ring / (RINGS + 1), round = 2 * PI * ((v - 1) % SECTORS) / SECTORS;
         const double across = ring == 0 || ring == RINGS + 1 ? 0 : sin(down);
         const double x = across * cos(round), y = across * sin(round), z = -cos(down);
-        const double swell = 1 + 0.12 * x * x * x - 0.1 * y * z; // no symmetry left
+        const double swell = 1 + 0.12 * x * x * x - 0.1 * y * z; // breaks all symmetries
         mean[v][0] = 3.6 * swell * x;
         mean[v][1] = 2.8 * swell * y;
         mean[v][2] = 2.2 * swell * z;
@@ -70,7 +69,7 @@ static void make_modes(void)
             {0, -z * x, y * x}, {0, x * x, 0},           {x * z, y * z, 0}, {z * z, 0, 0}};
         for (int i = 0; i < N_MODES; i++) memcpy(modes[i][v], field[i], sizeof field[i]);
     }
-    // Gram and Schmidt, twice for the sake of rounding
+    // Gram-Schmidt orthonormalisation, done twice because of rounding errors
     for (int i = 0; i < N_MODES; i++) {
         for (int j = 0; j < 2 * i; j++) {
             const double share = dot(i, j % i);
@@ -80,8 +79,9 @@ static void make_modes(void)
         const double length = sqrt(dot(i, i));
         for (int v = 0; v < N_VERT; v++)
             for (int k = 0; k < 3; k++) modes[i][v][k] /= length;
-        deviations[i] = 0.25 * pow(0.75, i) *
-                        sqrt(N_VERT); // root mean square over the vertices: 0.25 mm and less
+        // root mean square displacement over the vertices: 0.25 mm for the first mode, less for
+        // others
+        deviations[i] = 0.25 * pow(0.75, i) * sqrt(N_VERT);
     }
 }
 
@@ -121,7 +121,8 @@ static void write_ply(const char *folder)
     finish(f);
 }
 
-// version 1.0 of the format: a header that fills a multiple of 64 bytes; little-endian machines
+/* .npy format version 1.0, header of 128 bytes (a multiple of 64). For little-endian machines
+ * only. */
 static void write_npy(const char *folder, const char *name, const char *shape, const double *values,
                       size_t count)
 {

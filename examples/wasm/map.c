@@ -1,5 +1,6 @@
-/* A map from a model, as a program for WASI: map MODEL OUT.npy [NAME=VALUE ...]. Parameters that
-   are not given have their defaults; outside the range of the network the exact engine answers. */
+/* Example for WASI: computes a map from a model. Usage: map MODEL OUT.npy [NAME=VALUE ...].
+ * Other parameters have their defaults; outside of the network's range the exact engine computes
+ * the map. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,8 +20,8 @@ static double now_ms(void)
     return 1e3 * (double)t.tv_sec + 1e-6 * (double)t.tv_nsec;
 }
 
-// "rx=2.5" into its place in params[]
-static sdm_status set_param(const sdm_model_info *info, const char *text, double *params,
+/* Parses NAME=VALUE and stores the value in params[]. */
+static sdm_status param_set(const sdm_model_info *info, const char *text, double *params,
                             sdm_error *err)
 {
     const char *equal = strchr(text, '=');
@@ -34,8 +35,9 @@ static sdm_status set_param(const sdm_model_info *info, const char *text, double
     return sdm_fail(err, SDM_E_ARG, "'%s' is not NAME=VALUE of a parameter of this model", text);
 }
 
-// the same map several times: the shortest time says most
-static sdm_status make_map(const sdm_model *model, const sdm_instance *shape, const double *params,
+/* Computes the map REPEATS times and prints the shortest time, which is disturbed least by other
+ * load. */
+static sdm_status map_make(const sdm_model *model, const sdm_instance *shape, const double *params,
                            float *values, sdm_error *err)
 {
     const sdm_model_info *info = sdm_model_get_info(model);
@@ -56,8 +58,8 @@ static sdm_status make_map(const sdm_model *model, const sdm_instance *shape, co
     return SDM_OK;
 }
 
-static sdm_status run(const sdm_model *model, const sdm_instance *shape, const char *out,
-                      char **settings, sdm_error *err)
+static sdm_status map_write(const sdm_model *model, const sdm_instance *shape, const char *out,
+                            char **settings, sdm_error *err)
 {
     const sdm_model_info *info = sdm_model_get_info(model);
     const size_t size[3] = {(size_t)info->grid.n[2], (size_t)info->grid.n[1],
@@ -67,8 +69,8 @@ static sdm_status run(const sdm_model *model, const sdm_instance *shape, const c
     sdm_status s = SDM_ALLOC(&values, sdm_grid_count(&info->grid), "map", err);
     if (!s) s = SDM_ALLOC(&params, info->n_params, "parameters", err);
     for (size_t i = 0; i < info->n_params && !s; i++) params[i] = info->params[i].def;
-    for (; *settings && !s; settings++) s = set_param(info, *settings, params, err);
-    if (!s) s = make_map(model, shape, params, values, err);
+    for (; *settings && !s; settings++) s = param_set(info, *settings, params, err);
+    if (!s) s = map_make(model, shape, params, values, err);
     if (!s) s = sdm_npy_write(out, values, size, 3, err);
     sdm_free(params);
     sdm_free(values);
@@ -89,7 +91,7 @@ int main(int argc, char **argv)
     if (!s) s = sdm_registry_create(&shapes, &err);
     if (!s) s = sdm_builtin_shapes_add(shapes, &err);
     if (!s) s = sdm_runtime_instance(model, shapes, &shape, &err);
-    if (!s) s = run(model, shape, argv[2], argv + 3, &err);
+    if (!s) s = map_write(model, shape, argv[2], argv + 3, &err);
     if (s) fprintf(stderr, "map: %s\n", err.text);
     sdm_instance_free(shape);
     sdm_registry_free(shapes);

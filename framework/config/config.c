@@ -1,4 +1,5 @@
-/* Reads a configuration: the file, then the overrides, then the rules that span several keys. */
+/* Reads a training configuration: the file, then the overrides, then the rules that involve several
+ * keys. */
 #include "sdm/internal/config.h"
 
 #include <stdio.h>
@@ -43,8 +44,8 @@ sdm_status sdm_config_override(sdm_reader *r, const char *text, sdm_mark mark, s
     return s == SDM_E_CONFIG ? SDM_OK : s;
 }
 
-/* An experiment by mistake: every one of its keys would be told, and nothing of what to do. True:
- * refused. */
+/* Refuses an experiment with one message instead of one for each of its unknown keys. True when the
+ * tree is an experiment. */
 static bool refuse_experiment(sdm_mistakes *mistakes, const sdm_tree_node *root)
 {
     for (const sdm_tree_node *n = root ? root->first : NULL; n; n = n->next) {
@@ -56,7 +57,8 @@ static bool refuse_experiment(sdm_mistakes *mistakes, const sdm_tree_node *root)
     return false;
 }
 
-/* Mistakes of the YAML itself end here: after them every key would seem to be missing. */
+/* Reads the file and the overrides. Mistakes in the YAML syntax of the file end the reading,
+ * because every key after them would be reported as missing. */
 static sdm_status read_all(sdm_reader *r, const char *text, size_t size,
                            const char *const *overrides, const sdm_mark *places, size_t n_overrides,
                            sdm_error *err)

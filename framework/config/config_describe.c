@@ -1,65 +1,20 @@
-/* Writes a configuration as YAML and the table of all keys. */
-#include <math.h>
+/* Writes a configuration as YAML, and the table of all keys. */
 #include <stdio.h>
 #include <string.h>
 
+#include "config_parse.h"
 #include "kinds.h"
 #include "schema.h"
 
-const char *sdm_field_type_name(const sdm_field *f)
+static const char *field_type_name(const sdm_field *f)
 {
     static const char *const NAMES[] = {"integer", "integer", "integer", "number",
                                         "name",    "text",    "special"};
     return f->shown_type ? f->shown_type : NAMES[f->type];
 }
 
-const char *sdm_format_plain(double v, char buf[32])
-{
-    if (!(fabs(v) < 1e9) || v != nearbyint(v)) return sdm_format_real(v, buf);
-    snprintf(buf, 32, "%.0f", v);
-    return buf;
-}
-
-static void join_choices(const char *choices, char *buf, size_t size)
-{
-    char name[SDM_NAME_MAX];
-    size_t used = 0;
-    buf[0] = 0;
-    for (int i = 0; used < size && sdm_choice_name(choices, i, name); i++)
-        used += (size_t)snprintf(buf + used, size - used, "%s%s", i ? ", " : "", name);
-}
-
-const char *sdm_field_range(const sdm_field *f, char *buf, size_t size)
-{
-    char a[32], b[32];
-    if (f->shown_range)
-        snprintf(buf, size, "%s", f->shown_range);
-    else if (f->type == SDM_FIELD_CHOICE)
-        join_choices(f->choices, buf, size);
-    else if (f->type == SDM_FIELD_UINT64)
-        snprintf(buf, size, "0 .. %llu", (unsigned long long)UINT64_MAX);
-    else if (f->type == SDM_FIELD_TEXT)
-        snprintf(buf, size, "1 .. %.0f bytes", f->max);
-    else if (f->type == SDM_FIELD_REAL)
-        snprintf(buf, size, "%s .. %s", sdm_format_plain(f->min, a), sdm_format_plain(f->max, b));
-    else
-        snprintf(buf, size, "%lld .. %lld", (long long)f->min, (long long)f->max);
-    return buf;
-}
-
-void sdm_dump_text(const char *text, sdm_text *out)
-{
-    sdm_text_add(out, "\"");
-    for (const char *p = text; *p;) {
-        size_t plain = strcspn(p, "\"\\");
-        sdm_text_add(out, "%.*s", (int)plain, p);
-        p += plain;
-        if (*p) sdm_text_add(out, "\\%c", *p++);
-    }
-    sdm_text_add(out, "\"");
-}
-
-void sdm_field_dump(const sdm_config *c, const sdm_field *f, sdm_text *out)
+/* Appends the value of a field in YAML syntax. */
+static void field_dump(const sdm_config *c, const sdm_field *f, sdm_text *out)
 {
     const char *at = (const char *)c + f->offset;
     char buf[SDM_NAME_MAX];
@@ -101,16 +56,18 @@ void sdm_config_dump(const sdm_config *c, sdm_text *out)
             const sdm_field *f = &sections[s].fields[k];
             if (f->type == SDM_FIELD_SPECIAL && !f->dump) continue;
             if (!sdm_kind_has(f, (int)c->network.kind)) continue;
-            if (f->type == SDM_FIELD_TEXT && !*((const char *)c + f->offset)) continue; // not set
+            // an empty text has not been set
+            if (f->type == SDM_FIELD_TEXT && !*((const char *)c + f->offset)) continue;
             if (!begun) sdm_text_add(out, "%s:\n", sections[s].name);
             begun = true;
             sdm_text_add(out, "%s%s: ", nested ? "  " : "", f->key);
-            sdm_field_dump(c, f, out);
+            field_dump(c, f, out);
             sdm_text_add(out, "\n");
         }
     }
 }
 
+// The table of all keys: CELL is the maximum length of a cell.
 enum { COLUMNS = 6, CELL = 400 };
 typedef char table_row[COLUMNS][CELL];
 
@@ -124,7 +81,7 @@ static void fill_row(const sdm_section *section, const sdm_field *f, bool markdo
                                      : "required";
     snprintf(row[0], CELL, "%s%s%s%s%s", quote, section->name, *section->name ? "." : "", f->key,
              quote);
-    snprintf(row[1], CELL, "%s", sdm_field_type_name(f));
+    snprintf(row[1], CELL, "%s", field_type_name(f));
     sdm_field_range(f, row[2], CELL);
     snprintf(row[3], CELL, "%s", def);
     snprintf(row[4], CELL, "%s", f->unit);
@@ -157,7 +114,7 @@ void sdm_fields_describe(const sdm_section *sections, size_t n, bool markdown, s
     table_row row;
     int width[COLUMNS];
 
-    // a first pass for the widths of the aligned text
+    // first pass: the widths of the columns of the aligned text
     for (int i = 0; i < COLUMNS; i++) width[i] = (int)strlen(HEAD[i]);
     for (size_t s = 0; s < n; s++) {
         for (size_t k = 0; k < sections[s].n_fields; k++) {

@@ -1,21 +1,25 @@
-/* What the configurations of a training and of an experiment share. */
+/* Functions shared by training configurations and experiments. */
 #ifndef SDM_CONFIG_PARSE_H
 #define SDM_CONFIG_PARSE_H
 
 #include "fields.h"
 
-/* sdm_config_parse(); override i was said in line and column of the file places[i].source, where it
- * has a line. places may be NULL. */
+/* sdm_config_parse(), with the origin of each override: when places[i].line > 0, mistakes in
+ * overrides[i] are reported at that line and column of the file places[i].source, else as an
+ * argument. places may be NULL. */
 sdm_status sdm_config_parse_placed(const char *name, const char *text, size_t size,
                                    const char *const *overrides, const sdm_mark *places,
                                    size_t n_overrides, sdm_config *out, sdm_error *err);
 
-/* Reads one "key=value" into what the reader is of. Mistakes are recorded; another status only when
- * nothing can go on. */
+/* Reads one "key=value" into the struct of the reader. Mistakes are recorded and give SDM_OK; any
+ * other status (SDM_E_NOMEM) ends the reading. */
 sdm_status sdm_config_override(sdm_reader *r, const char *text, sdm_mark mark, sdm_error *err);
 
-/* The name of a file without folders and ending, of at most 200 bytes, or `none` where nothing is
-   left. Bytes that a text must not hold become '_'. */
+/* out = the name of a file without folders and extension, at most 200 bytes; `none` when that is
+ * empty. Bytes that are not printable UTF-8 become '_'. */
 void sdm_bare_name(const char *file, const char *none, char out[256]);
+
+/* Appends a table of every key of sections[n]: name, type, range, default, unit, meaning. */
+void sdm_fields_describe(const sdm_section *sections, size_t n, bool markdown, sdm_text *out);
 
 #endif

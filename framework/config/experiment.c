@@ -1,5 +1,5 @@
-/* Reads an experiment: the file, the overrides, the training configuration under it, and that of
- * every row. */
+/* Reads an experiment: the file, the overrides and the base configuration, and checks the training
+ * configuration of every row. */
 #include "sdm/internal/experiment.h"
 
 #include <stdio.h>
@@ -29,7 +29,7 @@ void sdm_experiment_free(sdm_experiment *e)
 
 /* ---- one row ---- */
 
-/* Texts and places of every list in turn; returns how many. */
+/* Concatenates the texts and marks of the lists (NULL: empty); returns their number. */
 static size_t gather(const sdm_experiment *e, const sdm_overrides *const lists[], size_t n_lists,
                      const char **texts, sdm_mark *places)
 {
@@ -53,10 +53,11 @@ sdm_status sdm_experiment_config(const sdm_experiment *e, size_t row, sdm_config
                         "an experiment's configuration needs a row and a place for the result");
     const sdm_experiment_method *m = e->rows[e->rows[row].network_row].method;
     const sdm_experiment_variant *v = e->rows[row].variant;
-    /* an engine is not trained, but a training configuration has a budget */
+    // An engine is not trained, but a training configuration must have a budget.
     snprintf(kind_text, sizeof kind_text, "%s%s",
              *m->engine ? "train.steps=1" : "network.kind=", m->network);
     sdm_override kind = {kind_text, m->mark};
+    // later lists override earlier ones: for an engine the dummy budget comes first
     const sdm_overrides first = {.items = &kind, .n = 1};
     const sdm_overrides *lists[N_LISTS] = {&e->common, &first, &m->set, v ? &v->set : NULL,
                                            &e->command_line};
@@ -81,9 +82,10 @@ sdm_status sdm_experiment_config(const sdm_experiment *e, size_t row, sdm_config
 
 /* ---- the whole ---- */
 
-/* One key=value of the command line; those of the training wait for the rows. */
-static sdm_status apply(sdm_experiment *e, sdm_reader *r, const char *text, int number,
-                        sdm_error *err)
+/* Applies one key=value of the command line. Keys of the training configuration are only stored;
+ * sdm_experiment_config() applies them to every row. */
+static sdm_status apply_override(sdm_experiment *e, sdm_reader *r, const char *text, int number,
+                                 sdm_error *err)
 {
     const sdm_mark mark = {.override = number, .source = text};
     const size_t length = strcspn(text, "=");
@@ -92,7 +94,8 @@ static sdm_status apply(sdm_experiment *e, sdm_reader *r, const char *text, int 
     return sdm_config_override(r, text, mark, err);
 }
 
-/* What the file names is meant from its own folder: `name` becomes a path. */
+/* Turns `name`, relative to the folder of the experiment's file, into a path. False when it is too
+ * long. */
 static bool place_beside(const sdm_experiment *e, char name[SDM_PATH_TEXT_MAX])
 {
     char path[SDM_PATH_TEXT_MAX];
@@ -104,7 +107,8 @@ static bool place_beside(const sdm_experiment *e, char name[SDM_PATH_TEXT_MAX])
     return true;
 }
 
-/* The base is a file beside the experiment's: its name becomes a path, its text is kept. */
+/* Reads the file e->base in the folder of the experiment's file; its name becomes a path, its text
+ * is kept for the rows. */
 static sdm_status read_base(sdm_experiment *e, sdm_reader *r, sdm_error *err)
 {
     const sdm_mark mark = sdm_fields_given(r, "", "base")->mark;
@@ -127,7 +131,8 @@ static sdm_status read_base(sdm_experiment *e, sdm_reader *r, sdm_error *err)
     return SDM_OK;
 }
 
-/* A model that the command line names is meant from the working folder, as its other files are. */
+/* A relative path fit.model in the file is relative to the folder of the file; on the command line
+ * it is relative to the working folder, like other files there. */
 static void place_model(sdm_experiment *e, sdm_reader *r)
 {
     const sdm_mark mark = sdm_fields_given(r, "fit", "model")->mark;
@@ -136,7 +141,8 @@ static void place_model(sdm_experiment *e, sdm_reader *r)
         sdm_mistakes_add(r->mistakes, mark, "fit.model: the path is too long");
 }
 
-/* Mistakes of the YAML itself end here, as in a training configuration. */
+/* Reads the file, the overrides and the base. Mistakes in the YAML syntax of the file end the
+ * reading, as in a training configuration. */
 static sdm_status read_all(sdm_experiment *e, sdm_reader *r, const char *text, size_t size,
                            const char *const *overrides, size_t n_overrides, sdm_error *err)
 {
@@ -147,14 +153,15 @@ static sdm_status read_all(sdm_experiment *e, sdm_reader *r, const char *text, s
         !tree.root || tree.root->kind == SDM_TREE_MAP || sdm_tree_is_empty(tree.root);
     sdm_tree_dispose(&tree);
     if (s == SDM_E_CONFIG || (!s && !is_keyed)) return sdm_mistakes_report(r->mistakes, err);
-    for (size_t i = 0; i < n_overrides && !s; i++) s = apply(e, r, overrides[i], (int)i + 1, err);
+    for (size_t i = 0; i < n_overrides && !s; i++)
+        s = apply_override(e, r, overrides[i], (int)i + 1, err);
     if (!s) s = read_base(e, r, err);
     if (!s) place_model(e, r);
     if (!s) s = sdm_experiment_finish(e, r, err);
     return s ? s : sdm_mistakes_report(r->mistakes, err);
 }
 
-/* The training configuration of every row is right. */
+/* Reads the training configuration of every row, to report its mistakes. */
 static sdm_status check_rows(const sdm_experiment *e, sdm_error *err)
 {
     sdm_config *config = NULL;

@@ -1,12 +1,12 @@
-/* The rows of an experiment's table: methods times variants, with their titles, folders and
- * references. */
+/* Makes the rows of an experiment's table: one per method and variant, with title, folder and
+ * reference figures. */
 #include <stdio.h>
 #include <string.h>
 
 #include "experiment_schema.h"
 #include "sdm/memory.h"
 
-/* "POD, 128^3" -> "pod-128-3". */
+/* The folder name of a title: "POD, 128^3" -> "pod-128-3". */
 static void make_folder(const char *title, char folder[SDM_EXPERIMENT_TITLE_MAX])
 {
     size_t n = 0;
@@ -36,7 +36,8 @@ static void make_row(const sdm_experiment *e, const sdm_experiment_method *m,
     make_folder(row->title, row->folder);
 }
 
-/* Polishing takes the network of the nearest method before it that fits with one. */
+/* Sets network_row of every row. A method with fit: polish uses the network of the last method with
+ * fit: network before it. `model`: position of the key fit.model. */
 static void find_networks(sdm_experiment *e, sdm_mark model, sdm_mistakes *mistakes)
 {
     size_t n_networks = 0;
@@ -63,6 +64,7 @@ static void find_networks(sdm_experiment *e, sdm_mark model, sdm_mistakes *mista
             n_networks);
 }
 
+/* Records two rows with the same folder. */
 static void check_folders(const sdm_experiment *e, sdm_mistakes *m)
 {
     for (size_t i = 0; i < e->n_rows; i++)
@@ -77,6 +79,7 @@ static void check_folders(const sdm_experiment *e, sdm_mistakes *m)
         }
 }
 
+/* Sets `reference` of the rows; records references without a row, and two for one row. */
 static void attach_references(sdm_experiment *e, sdm_mistakes *m)
 {
     const char *titles[SDM_EXPERIMENT_ROWS_MAX];
@@ -98,6 +101,7 @@ static void attach_references(sdm_experiment *e, sdm_mistakes *m)
     }
 }
 
+/* Records a baseline that is not the name of a method. */
 static void check_baseline(const sdm_experiment *e, sdm_mark mark, sdm_mistakes *m)
 {
     const char *names[SDM_EXPERIMENT_ROWS_MAX], *wanted = e->experiment.baseline;
@@ -125,6 +129,7 @@ sdm_status sdm_experiment_finish(sdm_experiment *e, sdm_reader *r, sdm_error *er
                          e->n_methods, n_variants, SDM_EXPERIMENT_ROWS_MAX);
     if (r->mistakes->count > 0) return SDM_OK;
 
+    // variant by variant, each with all methods
     const sdm_status s =
         SDM_ALLOC(&e->rows, e->n_methods * n_variants, "rows of the experiment", err);
     if (s) return s;

@@ -1,4 +1,4 @@
-/* The keys of an experiment: one table for each kind of mapping, and the readers of its lists. */
+/* The keys of an experiment: one table per kind of mapping, and functions that read its lists. */
 #include "experiment_schema.h"
 
 #include <math.h>
@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "config_parse.h"
 #include "overrides.h"
 #include "sdm/memory.h"
 
@@ -27,36 +28,40 @@
     }
 
 static const sdm_figure_info FIGURES[SDM_N_FIGURES] = {
-    [SDM_FIGURE_MS] = {"ms", "one map", "ms", "time of one map on one core, files not included"},
+    [SDM_FIGURE_MS] = {"ms", "one map", "ms", "time of one map on one core, without file access"},
     [SDM_FIGURE_MS_BATCH] = {"ms_batch", "one of a batch", "ms",
-                             "time of a map of a batch on one core"},
+                             "time per map of a batch on one core"},
     [SDM_FIGURE_SPEEDUP] = {"speedup", "speed-up", "x",
-                            "how many times faster one map is than the baseline's"},
+                            "time of one map of the baseline divided by that of this method"},
     [SDM_FIGURE_MSE] = {"mse_mm2", "MSE", "mm^2", "mean squared error over all voxels and shapes"},
-    [SDM_FIGURE_RMSE] = {"rmse_mm", "RMSE", "mm", "its root"},
+    [SDM_FIGURE_RMSE] = {"rmse_mm", "RMSE", "mm", "square root of the MSE"},
     [SDM_FIGURE_RMSE_NEAR] = {"rmse_near_mm", "RMSE near", "mm",
-                              "the same within 0.4 mm of the surface"},
+                              "RMSE over voxels within 0.4 mm of the surface"},
     [SDM_FIGURE_MAX] = {"max_abs_mm", "largest error", "mm",
-                        "largest error of all voxels and shapes"},
-    [SDM_FIGURE_DICE] = {"dice", "Dice", "", "mean overlap of the insides"},
+                        "largest absolute error over all voxels and shapes"},
+    [SDM_FIGURE_DICE] = {"dice", "Dice", "",
+                         "Dice coefficient of the insides, mean over the shapes"},
     [SDM_FIGURE_SURFACE_MEAN] = {"surface_mean_mm", "surface", "mm",
-                                 "mean distance between the zero surfaces"},
-    [SDM_FIGURE_SURFACE_MAX] = {"surface_hausdorff_mm", "Hausdorff", "mm",
-                                "largest distance between the zero surfaces, mean over the shapes"},
+                                 "mean distance between the surfaces at value 0"},
+    [SDM_FIGURE_SURFACE_MAX] =
+        {"surface_hausdorff_mm", "Hausdorff", "mm",
+         "largest distance between the surfaces at value 0, mean over the shapes"},
     [SDM_FIGURE_TRAIN] = {"train_s", "training", "s", "time of the training"},
     [SDM_FIGURE_MODEL] = {"model_mb", "model", "MB", "size of the model file"},
     [SDM_FIGURE_PEAK] = {"peak_mb", "memory", "MB",
-                         "peak of the resident memory for one map, the map included"},
-    [SDM_FIGURE_SHAPES] = {"shapes", "shapes", "", "shapes the errors are measured on"},
-    [SDM_FIGURE_FITS] = {"fits", "fits converged", "", "fits that converged, of the shapes"},
+                         "peak resident memory for one map, including the map"},
+    [SDM_FIGURE_SHAPES] = {"shapes", "shapes", "",
+                           "number of shapes on which the errors are measured"},
+    [SDM_FIGURE_FITS] = {"fits", "fits converged", "",
+                         "number of fits that converged, out of `shapes`"},
     [SDM_FIGURE_FIT] = {"fit_s", "one fit", "s", "mean time of a fit on one core"},
     [SDM_FIGURE_MAPS_NETWORK] = {"maps_network", "network maps", "",
-                                 "maps with derivatives by the network, mean of a fit"},
+                                 "maps with derivatives by the network, mean per fit"},
     [SDM_FIGURE_MAPS_EXACT] = {"maps_exact", "exact maps", "",
-                               "maps with derivatives by the exact engine, mean of a fit"},
-    [SDM_FIGURE_WITHIN] =
-        {"within_3sd", "within 3 sd", "",
-         "share of the estimates within three standard deviations of the truth, all parameters"},
+                               "maps with derivatives by the exact engine, mean per fit"},
+    [SDM_FIGURE_WITHIN] = {"within_3sd", "within 3 sd", "",
+                           "fraction of the estimates, over all parameters, within three standard "
+                           "deviations of the truth"},
 };
 
 const sdm_figure_info *sdm_figure_get_info(sdm_figure f)
@@ -77,86 +82,139 @@ static bool read_references(sdm_reader *r, const sdm_field *f, const sdm_tree_no
 static bool read_differences(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
                              const char *path);
 
-// clang-format off
 #define E sdm_experiment
 static const sdm_field EXPERIMENT[] = {
-    TEXT(E, "title", experiment.title, 256, "the file's name", "what stands above the table"),
-    TEXT(E, "folder", experiment.folder, SDM_PATH_TEXT_MAX, "runs/NAME, after the file", "folder of the results"),
-    ROW(E, "seed", SDM_FIELD_UINT64, experiment.seed, 0, 0, "1", "", "of the random shapes that are measured; training has its own"),
-    ROW(E, "samples", SDM_FIELD_INT64, experiment.samples, 1, 1e6, "100", "shapes", "random shapes the errors of a network are measured on"),
-    ROW(E, "engine_samples", SDM_FIELD_INT64, experiment.engine_samples, 1, 1e6, "5", "shapes", "the same for an engine"),
-    ROW(E, "minutes", SDM_FIELD_REAL, experiment.minutes, 0, 1e6, "0", "min", "no training is begun that would end later than this; 0: no limit"),
-    TEXT(E, "baseline", experiment.baseline, SDM_NAME_MAX, "none", "method that the speed-up refers to"),
-    TEXT(E, "reference", experiment.reference, SDM_NAME_MAX, "reference", "heading of the figures in `reference`"),
-    {.key = "pictures", .type = SDM_FIELD_CHOICE, .offset = offsetof(E, experiment.pictures), .choices = "no|yes", .def = "yes",
-     .unit = "", .help = "draw slices with contours and surfaces of every row"},
+    TEXT(E, "title", experiment.title, 256, "the file's name", "title above the table"),
+    TEXT(E, "folder", experiment.folder, SDM_PATH_TEXT_MAX, "runs/NAME, after the file",
+         "folder for the results"),
+    ROW(E, "seed", SDM_FIELD_UINT64, experiment.seed, 0, 0, "1", "",
+        "seed of the random test shapes; training has its own seed"),
+    ROW(E, "samples", SDM_FIELD_INT64, experiment.samples, 1, 1e6, "100", "shapes",
+        "random test shapes on which the errors of a network are measured"),
+    ROW(E, "engine_samples", SDM_FIELD_INT64, experiment.engine_samples, 1, 1e6, "5", "shapes",
+        "the same for an engine"),
+    ROW(E, "minutes", SDM_FIELD_REAL, experiment.minutes, 0, 1e6, "0", "min",
+        "time limit: no training is started that would end later; 0: no limit"),
+    TEXT(E, "baseline", experiment.baseline, SDM_NAME_MAX, "none",
+         "method to which the speed-up refers"),
+    TEXT(E, "reference", experiment.reference, SDM_NAME_MAX, "reference",
+         "column heading of the figures in `reference`"),
+    {.key = "pictures",
+     .type = SDM_FIELD_CHOICE,
+     .offset = offsetof(E, experiment.pictures),
+     .choices = "no|yes",
+     .def = "yes",
+     .unit = "",
+     .help = "draw slices with contours, and surfaces, for every row"},
 };
 
 static const sdm_field FIT[] = {
-    ROW(E, "phantoms", SDM_FIELD_INT64, fit.phantoms, 1, 1e4, "9", "images", "test images of random shapes in random poses that methods with `fit` are measured on"),
-    ROW(E, "off_mm", SDM_FIELD_REAL, fit.off_mm, 0, 1e6, "1", "mm", "how far the start lies from the true place, in a random direction"),
-    ROW(E, "off_deg", SDM_FIELD_REAL, fit.off_deg, 0, 180, "15", "degrees", "how far it is turned, about a random axis"),
-    ROW(E, "voxel", SDM_FIELD_REAL, fit.voxel, 1e-6, 1e6, "0.25", "mm", "edge of a voxel of the images"),
-    ROW(E, "range", SDM_FIELD_REAL, fit.range, 0, 1, "0.8", "", "share of every parameter's range, about its middle, that the shapes are drawn from"),
-    ROW(E, "prior_sd", SDM_FIELD_REAL, fit.prior_sd, 0, 1e6, "1", "", "standard deviation of every parameter before the image is seen, in halves of its range about the middle; 0: nothing is known. Exact fits have the range of the shape itself"),
-    ROW(E, "eps", SDM_FIELD_REAL, fit.eps, 1e-12, 1e-4, "3e-6", "", "a fit with exact maps ends when the largest step is below: share of a range, rad, share of the size of the shape"),
-    TEXT(E, "model", fit.model, SDM_PATH_TEXT_MAX, "none", "model file to fit with, in the file from its folder; none: the network is trained"),
+    ROW(E, "phantoms", SDM_FIELD_INT64, fit.phantoms, 1, 1e4, "9", "images",
+        "test images, of random shapes in random poses, for the methods with `fit`"),
+    ROW(E, "off_mm", SDM_FIELD_REAL, fit.off_mm, 0, 1e6, "1", "mm",
+        "distance of the start position from the true one, in a random direction"),
+    ROW(E, "off_deg", SDM_FIELD_REAL, fit.off_deg, 0, 180, "15", "degrees",
+        "angle of the start orientation from the true one, about a random axis"),
+    ROW(E, "voxel", SDM_FIELD_REAL, fit.voxel, 1e-6, 1e6, "0.25", "mm", "voxel size of the images"),
+    ROW(E, "range", SDM_FIELD_REAL, fit.range, 0, 1, "0.8", "",
+        "fraction of the range of every parameter, about its middle, from which the shapes are "
+        "drawn"),
+    ROW(E, "prior_sd", SDM_FIELD_REAL, fit.prior_sd, 0, 1e6, "1", "",
+        "standard deviation of the prior of every parameter, in units of half its range, about the "
+        "middle of the range; 0: no prior. Exact fits use the range of the shape itself"),
+    ROW(E, "eps", SDM_FIELD_REAL, fit.eps, 1e-12, 1e-4, "3e-6", "",
+        "a fit with exact maps has converged when all steps are smaller than this: as fraction of "
+        "a parameter range, in rad, as fraction of the size of the shape"),
+    TEXT(E, "model", fit.model, SDM_PATH_TEXT_MAX, "none",
+         "model file of the network for the fit; a path in this file is relative to its folder; "
+         "none: the network is trained"),
 };
 
 static const sdm_field TOP[] = {
-    TEXT(E, "base", base, SDM_NAME_MAX, "none", "training configuration under all rows: the name of a file beside this one"),
-    SPECIAL("shape", read_training, "mapping", "keys of a training", "none", "as in a training configuration, over the base; for every row"),
+    TEXT(E, "base", base, SDM_NAME_MAX, "none",
+         "training configuration on which all rows are based: the name of a file in the same "
+         "folder"),
+    SPECIAL("shape", read_training, "mapping", "keys of a training", "none",
+            "as in a training configuration, for every row; overrides the base"),
     SPECIAL("grid", read_training, "mapping", "keys of a training", "none", "the same"),
     SPECIAL("network", read_training, "mapping", "keys of a training", "none", "the same"),
     SPECIAL("data", read_training, "mapping", "keys of a training", "none", "the same"),
     SPECIAL("train", read_training, "mapping", "keys of a training", "none", "the same"),
-    SPECIAL("seed", read_training, "integer", "0 .. 18446744073709551615", "the base's", "seed of the trainings"),
-    SPECIAL("threads", read_training, "integer", "0 .. 1024", "the base's", "threads of the trainings"),
-    SPECIAL("methods", read_methods, "list", "1 to 64 methods", "required", "what is compared, each with the keys under methods"),
-    SPECIAL("variants", read_variants, "list", "0 to 64 variants", "none", "every method is done once for each of them"),
-    SPECIAL("reference", read_references, "list", "0 to 64 references", "none", "figures of others, shown beside a row's own"),
+    SPECIAL("seed", read_training, "integer", "0 .. 18446744073709551615", "the base's",
+            "seed of the training runs"),
+    SPECIAL("threads", read_training, "integer", "0 .. 1024", "the base's",
+            "threads of the training runs"),
+    SPECIAL("methods", read_methods, "list", "1 to 64 methods", "required",
+            "the methods to compare, each with the keys methods[]"),
+    SPECIAL("variants", read_variants, "list", "0 to 64 variants", "none",
+            "every method is run once for each variant"),
+    SPECIAL("reference", read_references, "list", "0 to 64 references", "none",
+            "figures reported by others, shown beside those of the row"),
 };
 
 #define M sdm_experiment_method
 static const sdm_field METHOD[] = {
-    TEXT(M, "name", name, SDM_NAME_MAX, "required", "title of its row"),
-    TEXT(M, "network", network, SDM_NAME_MAX, "none", "kind of a network to train (network.kind)"),
-    TEXT(M, "engine", engine, SDM_NAME_MAX, "none", "method without training: exact, naive, cells, octree, edt, or another program: vtk, cgal, embree, openvdb, itk, scipy"),
-    {.key = "fit", .type = SDM_FIELD_CHOICE, .offset = offsetof(M, fit), .choices = "none|network|polish|exact|naive", .def = "none",
-     .unit = "", .help = "find shapes in images: with the network of this method, with that of the method before it and exact maps at the end, with exact maps; naive: what that would cost"},
-    ROW(M, "samples", SDM_FIELD_INT64, samples, 0, 1e6, "0", "shapes", "shapes its errors are measured on; 0: as the experiment says"),
-    SPECIAL("set", read_set, "mapping", "keys of a training", "none", "keys of the training configuration for this method, e.g. {train.minutes: 4}"),
+    TEXT(M, "name", name, SDM_NAME_MAX, "required", "title of the row of the method"),
+    TEXT(M, "network", network, SDM_NAME_MAX, "none", "kind of network to train (network.kind)"),
+    TEXT(M, "engine", engine, SDM_NAME_MAX, "none",
+         "method without training: exact, naive, cells, octree, edt, or an external program: vtk, "
+         "cgal, embree, openvdb, itk, scipy"),
+    {.key = "fit",
+     .type = SDM_FIELD_CHOICE,
+     .offset = offsetof(M, fit),
+     .choices = "none|network|polish|exact|naive",
+     .def = "none",
+     .unit = "",
+     .help = "fit shapes to images. network: with maps of the network of this method; polish: the "
+             "same with the last such network above, then with exact maps; exact: with exact maps; "
+             "naive: not run, the cost of exact if the naive method made the maps"},
+    ROW(M, "samples", SDM_FIELD_INT64, samples, 0, 1e6, "0", "shapes",
+        "shapes on which its errors are measured; 0: as given in experiment"),
+    SPECIAL("set", read_set, "mapping", "keys of a training", "none",
+            "keys of the training configuration for this method, e.g. {train.minutes: 4}"),
 };
 
 #define V sdm_experiment_variant
 static const sdm_field VARIANT[] = {
-    TEXT(V, "name", name, SDM_NAME_MAX, "required", "stands behind the method's name"),
-    SPECIAL("set", read_set, "mapping", "keys of a training", "none", "keys of the training configuration in this variant, e.g. {grid.spacing: 0.1}"),
+    TEXT(V, "name", name, SDM_NAME_MAX, "required", "appended to the name of the method"),
+    SPECIAL("set", read_set, "mapping", "keys of a training", "none",
+            "keys of the training configuration in this variant, e.g. {grid.spacing: 0.1}"),
 };
 
 #define R sdm_experiment_reference
-#define FIGURE(name, which, help_)                                                                                     \
-    {                                                                                                                  \
-        .key = name, .type = SDM_FIELD_REAL, .offset = offsetof(R, value[which]), .max = 1e12, .shown_def = "none",    \
-        .unit = "", .help = help_                                                                                      \
+#define FIGURE(name, which, help_)                                                                 \
+    {                                                                                              \
+        .key = name, .type = SDM_FIELD_REAL, .offset = offsetof(R, value[which]), .max = 1e12,     \
+        .shown_def = "none", .unit = "", .help = help_                                             \
     }
 static const sdm_field REFERENCE[] = {
-    TEXT(R, "row", row, SDM_EXPERIMENT_TITLE_MAX, "required", "title of the row it belongs to"),
-    TEXT(R, "source", source, 256, "none", "where the figures come from"),
-    FIGURE("ms", SDM_FIGURE_MS, "ms, one map"), FIGURE("ms_batch", SDM_FIGURE_MS_BATCH, "ms, a map of a batch"),
-    FIGURE("speedup", SDM_FIGURE_SPEEDUP, "times faster than the baseline"), FIGURE("mse_mm2", SDM_FIGURE_MSE, "mm^2"),
-    FIGURE("rmse_mm", SDM_FIGURE_RMSE, "mm"), FIGURE("rmse_near_mm", SDM_FIGURE_RMSE_NEAR, "mm"),
-    FIGURE("max_abs_mm", SDM_FIGURE_MAX, "mm"), FIGURE("dice", SDM_FIGURE_DICE, "0 .. 1"),
-    FIGURE("surface_mean_mm", SDM_FIGURE_SURFACE_MEAN, "mm"), FIGURE("surface_hausdorff_mm", SDM_FIGURE_SURFACE_MAX, "mm"),
-    FIGURE("train_s", SDM_FIGURE_TRAIN, "s"), FIGURE("model_mb", SDM_FIGURE_MODEL, "MB"), FIGURE("peak_mb", SDM_FIGURE_PEAK, "MB"),
-    FIGURE("shapes", SDM_FIGURE_SHAPES, "shapes the errors are of"),
-    FIGURE("fits", SDM_FIGURE_FITS, "fits that converged"), FIGURE("fit_s", SDM_FIGURE_FIT, "s, one fit"),
-    FIGURE("maps_network", SDM_FIGURE_MAPS_NETWORK, "maps of a fit"), FIGURE("maps_exact", SDM_FIGURE_MAPS_EXACT, "maps of a fit"),
+    TEXT(R, "row", row, SDM_EXPERIMENT_TITLE_MAX, "required",
+         "title of the row to which it belongs"),
+    TEXT(R, "source", source, 256, "none", "source of the figures"),
+    FIGURE("ms", SDM_FIGURE_MS, "ms, one map"),
+    FIGURE("ms_batch", SDM_FIGURE_MS_BATCH, "ms, per map of a batch"),
+    FIGURE("speedup", SDM_FIGURE_SPEEDUP, "times faster than the baseline"),
+    FIGURE("mse_mm2", SDM_FIGURE_MSE, "mm^2"),
+    FIGURE("rmse_mm", SDM_FIGURE_RMSE, "mm"),
+    FIGURE("rmse_near_mm", SDM_FIGURE_RMSE_NEAR, "mm"),
+    FIGURE("max_abs_mm", SDM_FIGURE_MAX, "mm"),
+    FIGURE("dice", SDM_FIGURE_DICE, "0 .. 1"),
+    FIGURE("surface_mean_mm", SDM_FIGURE_SURFACE_MEAN, "mm"),
+    FIGURE("surface_hausdorff_mm", SDM_FIGURE_SURFACE_MAX, "mm"),
+    FIGURE("train_s", SDM_FIGURE_TRAIN, "s"),
+    FIGURE("model_mb", SDM_FIGURE_MODEL, "MB"),
+    FIGURE("peak_mb", SDM_FIGURE_PEAK, "MB"),
+    FIGURE("shapes", SDM_FIGURE_SHAPES, "number of shapes"),
+    FIGURE("fits", SDM_FIGURE_FITS, "number of fits that converged"),
+    FIGURE("fit_s", SDM_FIGURE_FIT, "s, one fit"),
+    FIGURE("maps_network", SDM_FIGURE_MAPS_NETWORK, "maps per fit"),
+    FIGURE("maps_exact", SDM_FIGURE_MAPS_EXACT, "maps per fit"),
     FIGURE("within_3sd", SDM_FIGURE_WITHIN, "0 .. 1"),
-    SPECIAL("difference", read_differences, "mapping", "names of parameters", "none", "mean difference of a parameter from the exact fit, e.g. {a: 2e-8}"),
+    SPECIAL("difference", read_differences, "mapping", "names of parameters", "none",
+            "mean absolute difference of each parameter from the exact fit, e.g. {a: 2e-8}"),
 };
 
-/* The first are of the file, the others of the elements of its lists. */
+/* Indices in SECTIONS: first the sections of the file, then those of the elements of its lists. */
 enum { N_FILE_SECTIONS = 3, OF_METHODS = N_FILE_SECTIONS, OF_VARIANTS, OF_REFERENCES };
 static const sdm_section SECTIONS[] = {
     {.name = "experiment", .fields = EXPERIMENT, .n_fields = COUNT(EXPERIMENT)},
@@ -166,7 +224,6 @@ static const sdm_section SECTIONS[] = {
     {.name = "variants[]", .fields = VARIANT, .n_fields = COUNT(VARIANT)},
     {.name = "reference[]", .fields = REFERENCE, .n_fields = COUNT(REFERENCE)},
 };
-// clang-format on
 
 const sdm_section *sdm_experiment_sections(size_t *n)
 {
@@ -192,10 +249,11 @@ bool sdm_experiment_is_training_key(const char *key, size_t length)
 
 /* ---- keys of the training configuration ---- */
 
+/* Adds the keys of a mapping to `set` as overrides. */
 static bool add_keys(sdm_reader *r, sdm_overrides *set, const char *prefix,
                      const sdm_tree_node *node, const char *path)
 {
-    if (sdm_tree_is_empty(node)) return true; /* all its keys are commented out */
+    if (sdm_tree_is_empty(node)) return true; // all keys are commented out
     if (node->kind != SDM_TREE_MAP) return sdm_refuse_type(r, node, path, "keys with values");
     return sdm_overrides_add_tree(set, prefix, node, r->mistakes);
 }
@@ -223,8 +281,8 @@ static bool read_training(sdm_reader *r, const sdm_field *f, const sdm_tree_node
 
 /* ---- lists ---- */
 
-/* Reads the elements of a list into a new array by the table of `section`, whose first key is
- * required. */
+/* Reads the elements of a list into the new array *array[*n], elements of `size` bytes, by the
+ * table of `section`; its first key is required. begin() initialises an element. */
 static bool read_list(sdm_reader *r, const sdm_tree_node *node, const char *path,
                       const sdm_section *section, void **array, size_t *n, size_t size,
                       void (*begin)(void *element, sdm_mark mark))
@@ -276,7 +334,7 @@ static bool refuse_method(sdm_reader *r, const M *m, const char *why)
     return false;
 }
 
-/* What a method of a fit needs besides; an exact or naive one gets its engine. */
+/* Checks the keys of a method with `fit`; an exact or naive fit gets its engine. */
 static bool finish_fit(sdm_reader *r, M *m)
 {
     if (m->fit == SDM_EXPERIMENT_FIT_NETWORK) {
@@ -331,7 +389,7 @@ static bool read_references(sdm_reader *r, const sdm_field *f, const sdm_tree_no
                      &e->n_references, sizeof *e->references, begin_reference);
 }
 
-/* {NAME: number, ...}; whether the shape has such parameters is not known here. */
+/* Reads {PARAMETER: number, ...}; the shape is not known here, so the names are not checked. */
 static bool read_differences(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
                              const char *path)
 {

@@ -1,16 +1,18 @@
-/* The tables of an experiment's configuration and the rules that span several of its keys. */
+/* The tables of an experiment, and the rules that involve several of its keys. */
 #ifndef SDM_EXPERIMENT_SCHEMA_H
 #define SDM_EXPERIMENT_SCHEMA_H
 
 #include "fields.h"
 #include "sdm/internal/experiment.h"
 
+/* The tables of the sections of the file, constant; *n = their number. */
 const sdm_section *sdm_experiment_sections(size_t *n);
 
-/* Whether a dotted key, "grid.size", is one of the training configuration. */
+/* True when the dotted key[length], "grid.size", belongs to the training configuration. */
 bool sdm_experiment_is_training_key(const char *key, size_t length);
 
-/* After the file and the overrides: the rows, and what is missing or said twice. SDM_E_NOMEM. */
+/* Call after the file and all overrides: makes the rows, and records missing keys, names that occur
+ * twice and references to rows or methods that do not exist. SDM_E_NOMEM. */
 sdm_status sdm_experiment_finish(sdm_experiment *e, sdm_reader *r, sdm_error *err);
 
 #endif

@@ -1,18 +1,42 @@
-/* Reads values of a tree into a struct by field tables and reports what does not fit. */
+/* Reads the values of a YAML tree into a struct by field tables, and reports values that do not
+ * fit.
+ */
 #include "fields.h"
 
 #include <assert.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #define CHOICES_MAX 16
 
-/* A default goes through the same reader as a value of a file, so that the tables cannot promise
- * what is refused. */
+/* Reads one value. Defaults are read by it, too, so the tables cannot have a default that would be
+ * refused in a file. */
 static bool read_field(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
                        const char *path);
 
-const char *sdm_describe_node(const sdm_tree_node *node, char buf[SDM_QUOTE_MAX + 16])
+const char *sdm_format_plain(double v, char buf[32])
+{
+    if (!(fabs(v) < 1e9) || v != nearbyint(v)) return sdm_format_real(v, buf);
+    snprintf(buf, 32, "%.0f", v);
+    return buf;
+}
+
+void sdm_dump_text(const char *text, sdm_text *out)
+{
+    sdm_text_add(out, "\"");
+    for (const char *p = text; *p;) {
+        size_t plain = strcspn(p, "\"\\");
+        sdm_text_add(out, "%.*s", (int)plain, p);
+        p += plain;
+        if (*p) sdm_text_add(out, "\\%c", *p++);
+    }
+    sdm_text_add(out, "\"");
+}
+
+/* The content of a node for messages: "a list of 3", "a mapping", "nothing", "the text 'x'" or
+ * "'x'". Returns buf. */
+static const char *describe_node(const sdm_tree_node *node, char buf[SDM_QUOTE_MAX + 16])
 {
     char quoted[SDM_QUOTE_MAX];
     if (node->kind == SDM_TREE_LIST)
@@ -31,7 +55,7 @@ bool sdm_refuse_type(sdm_reader *r, const sdm_tree_node *node, const char *path,
 {
     char buf[SDM_QUOTE_MAX + 16];
     sdm_mistakes_add(r->mistakes, node->mark, "%s: needs %s, got %s", path, wanted,
-                     sdm_describe_node(node, buf));
+                     describe_node(node, buf));
     return false;
 }
 
@@ -52,7 +76,8 @@ bool sdm_read_real(sdm_reader *r, const sdm_tree_node *node, const char *path, d
     return true;
 }
 
-/* An integer too large for 64 bits is out of range, not of a wrong type. */
+/* Does the text have the syntax of an integer? One too large for 64 bits has: it is out of range,
+ * not of the wrong type. */
 static bool is_integer(const char *text)
 {
     size_t sign = *text == '-' || *text == '+';
@@ -129,6 +154,34 @@ bool sdm_choice_name(const char *choices, int index, char buf[SDM_NAME_MAX])
     memcpy(buf, p, length);
     buf[length] = 0;
     return true;
+}
+
+/* "a|b|c" -> "a, b, c", cut at `size`. */
+static void join_choices(const char *choices, char *buf, size_t size)
+{
+    char name[SDM_NAME_MAX];
+    size_t used = 0;
+    buf[0] = 0;
+    for (int i = 0; used < size && sdm_choice_name(choices, i, name); i++)
+        used += (size_t)snprintf(buf + used, size - used, "%s%s", i ? ", " : "", name);
+}
+
+const char *sdm_field_range(const sdm_field *f, char *buf, size_t size)
+{
+    char a[32], b[32];
+    if (f->shown_range)
+        snprintf(buf, size, "%s", f->shown_range);
+    else if (f->type == SDM_FIELD_CHOICE)
+        join_choices(f->choices, buf, size);
+    else if (f->type == SDM_FIELD_UINT64)
+        snprintf(buf, size, "0 .. %llu", (unsigned long long)UINT64_MAX);
+    else if (f->type == SDM_FIELD_TEXT)
+        snprintf(buf, size, "1 .. %.0f bytes", f->max);
+    else if (f->type == SDM_FIELD_REAL)
+        snprintf(buf, size, "%s .. %s", sdm_format_plain(f->min, a), sdm_format_plain(f->max, b));
+    else
+        snprintf(buf, size, "%lld .. %lld", (long long)f->min, (long long)f->max);
+    return buf;
 }
 
 static bool read_choice(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
@@ -210,8 +263,8 @@ sdm_given *sdm_fields_given(sdm_reader *r, const char *section, const char *key)
     return &r->given[0][0];
 }
 
-/* The nearest key of the same section; else a section that has this very key, for a key on the
- * wrong level. */
+/* The key to suggest for an unknown one: the most similar key of the same section (with `full` its
+ * dotted path), else the path of the same key in another section. NULL: none. */
 static const char *suggest(const sdm_reader *r, const sdm_section *section, const char *key,
                            bool full, char buf[SDM_KEY_PATH_MAX])
 {
@@ -238,6 +291,7 @@ static const char *suggest(const sdm_reader *r, const sdm_section *section, cons
     return NULL;
 }
 
+/* Records an unknown key, with a suggestion where there is one. */
 static void refuse_key(sdm_reader *r, const sdm_section *section, const sdm_tree_node *node)
 {
     char quoted[SDM_QUOTE_MAX], buf[SDM_KEY_PATH_MAX];
@@ -269,7 +323,7 @@ static void read_key(sdm_reader *r, size_t s, const sdm_tree_node *node)
 static void read_section(sdm_reader *r, size_t s, const sdm_tree_node *node)
 {
     if (!sdm_mark_is_set(r->section_mark[s])) r->section_mark[s] = node->key_mark;
-    // a section whose keys are all commented out
+    // in a file a section may be empty: all its keys are commented out
     if (sdm_tree_is_empty(node) && node->mark.override == 0) return;
     if (node->kind != SDM_TREE_MAP) {
         sdm_refuse_type(r, node, r->sections[s].name, "keys with values");
@@ -281,7 +335,7 @@ static void read_section(sdm_reader *r, size_t s, const sdm_tree_node *node)
 
 void sdm_fields_read(sdm_reader *r, const sdm_tree_node *root)
 {
-    size_t top = 0;
+    size_t top = 0; // the section of the keys at top level
     while (*r->sections[top].name) top++;
     if (!root || sdm_tree_is_empty(root)) return;
     if (root->kind != SDM_TREE_MAP) {

@@ -6,7 +6,7 @@
 
 bool sdm_kind_has(const sdm_field *f, int kind) { return !f->kinds || (f->kinds >> kind & 1); }
 
-static const char *list(const sdm_field *f, bool defaults, char *buf, size_t size)
+static const char *list_kinds(const sdm_field *f, bool defaults, char *buf, size_t size)
 {
     char name[SDM_NAME_MAX];
     size_t used = 0;
@@ -20,14 +20,14 @@ static const char *list(const sdm_field *f, bool defaults, char *buf, size_t siz
 
 const char *sdm_kind_names(const sdm_field *f, char *buf, size_t size)
 {
-    return list(f, false, buf, size);
+    return list_kinds(f, false, buf, size);
 }
 const char *sdm_kind_defaults(const sdm_field *f, char *buf, size_t size)
 {
-    return list(f, true, buf, size);
+    return list_kinds(f, true, buf, size);
 }
 
-// narrower ranges than those of the table of keys
+/* Checks the ranges that are narrower for one kind than in the table of keys. */
 static void check_limits(sdm_reader *r, sdm_mark place)
 {
     const sdm_config *c = r->config;
@@ -55,8 +55,8 @@ static void check_limits(sdm_reader *r, sdm_mark place)
 void sdm_kinds_settle(sdm_reader *r, sdm_mark place)
 {
     const int kind = (int)r->config->network.kind;
-    const bool bytes =
-        kind != SDM_NETWORK_POD && r->config->network.weights == SDM_WEIGHT_I8; // pod only
+    // only pod has weights of type i8
+    const bool bytes = kind != SDM_NETWORK_POD && r->config->network.weights == SDM_WEIGHT_I8;
     char names[200], chosen[SDM_NAME_MAX];
     sdm_choice_name(SDM_KIND_CHOICES, kind, chosen);
     for (size_t s = 0; s < r->n_sections; s++)
@@ -64,6 +64,7 @@ void sdm_kinds_settle(sdm_reader *r, sdm_mark place)
             const sdm_field *f = &r->sections[s].fields[k];
             sdm_given *g = &r->given[s][k];
             if (!f->kinds && !f->kind_defs) continue;
+            // a key of the file that does not fit the kind of an override counts as not given
             const bool fits = sdm_kind_has(f, kind) &&
                               !(f->offset == offsetof(sdm_config, network.weights) && bytes);
             if (!fits && kind != r->file_kind && g->mark.override == 0) *g = (sdm_given){0};
@@ -74,7 +75,7 @@ void sdm_kinds_settle(sdm_reader *r, sdm_mark place)
             if (sdm_mark_is_set(g->mark)) continue;
             sdm_field_set_default(r, f, f->kind_defs ? f->kind_defs[kind] : f->def);
         }
-    // Park et al. 2019: halfway
+    // default of deepsdf: the input enters again at half of the depth (Park et al. 2019)
     if (kind == SDM_NETWORK_DEEPSDF &&
         !sdm_mark_is_set(sdm_fields_given(r, "network", "skip")->mark))
         r->config->network.skip = r->config->network.depth / 2;

@@ -1,4 +1,4 @@
-/* What depends on network.kind: which keys there are, and their defaults. */
+/* Keys and defaults that depend on network.kind. */
 #ifndef SDM_KINDS_H
 #define SDM_KINDS_H
 
@@ -6,16 +6,18 @@
 
 #define SDM_KIND_CHOICES "pod|sdmnn|deepsdf|imnet"
 
-/* True when networks of that kind have the key. */
+/* True when networks of `kind` (sdm_network_kind) have the key f. */
 bool sdm_kind_has(const sdm_field *f, int kind);
 
-/* Names of the kinds that have the key, or their defaults: "pod 3, sdmnn 4". */
+/* The kinds that have the key, "pod, sdmnn", or these with their defaults, "pod 3, sdmnn 4". Return
+ * buf. */
 const char *sdm_kind_names(const sdm_field *f, char *buf, size_t size);
 const char *sdm_kind_defaults(const sdm_field *f, char *buf, size_t size);
 
-/* After the file and the overrides. A key that the kind does not have is a mistake; only those in
-   the file step back when an override has changed the kind. What is not given takes the default of
-   the kind. `place` is for mistakes that have no better one. */
+/* Call after the file and all overrides are read. Keys that are not given get the default of the
+ * kind. A key that the kind does not have is a mistake; but if an override has changed the kind,
+ * keys of the file that no longer fit are ignored. `place`: position for mistakes of keys that are
+ * not given. */
 void sdm_kinds_settle(sdm_reader *r, sdm_mark place);
 
 #endif

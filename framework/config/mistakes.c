@@ -1,12 +1,12 @@
-/* Collects mistakes in a configuration and prints them, one line each, ordered by position. */
+/* Collects the mistakes in a configuration and prints them, one per line, sorted by position. */
 #include "mistakes.h"
 
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
-/* The file comes before the arguments; within one place the order of discovery counts, so this is a
- * strict "less". */
+/* Strict order of positions: the file before the overrides. Mistakes at the same position stay in
+ * the order in which they were found. */
 static bool is_before(sdm_mark a, sdm_mark b)
 {
     if (a.override != b.override) return a.override < b.override;
@@ -22,7 +22,7 @@ void sdm_mistakes_add(sdm_mistakes *m, sdm_mark mark, const char *fmt, ...)
     while (at > 0 && is_before(mark, m->first[at - 1].mark)) at--;
     if (at == SDM_MISTAKES_SHOWN) return;
 
-    // make room; the last one falls out of a full list
+    // insert; a full list loses its last entry
     size_t moved = (kept < SDM_MISTAKES_SHOWN ? kept : SDM_MISTAKES_SHOWN - 1) - at;
     memmove(&m->first[at + 1], &m->first[at], moved * sizeof m->first[0]);
     m->first[at].mark = mark;
@@ -46,12 +46,12 @@ const char *sdm_mark_print(sdm_mark mark, const char *file, char *buf, size_t si
 
 sdm_status sdm_mistakes_report(const sdm_mistakes *m, sdm_error *err)
 {
-    enum { TAIL = 32 }; /* "... and N more" */
+    enum { TAIL = 32 }; // room for "... and N more"
     char text[SDM_ERROR_TEXT_MAX];
     size_t used = 0, shown = 0;
     if (m->count == 0) return SDM_OK;
 
-    // whole lines only, so that nothing is cut in the middle
+    // as many whole lines as fit
     text[0] = 0;
     for (; shown < m->count && shown < SDM_MISTAKES_SHOWN; shown++) {
         char place[SDM_PATH_TEXT_MAX + SDM_QUOTE_MAX], line[sizeof place + SDM_MISTAKE_TEXT_MAX];

@@ -1,5 +1,5 @@
-/* The list of mistakes found in a configuration: the first few by position are kept, the rest are
- * counted. */
+/* The mistakes found in a configuration. The first SDM_MISTAKES_SHOWN by position are kept, the
+ * others only counted. */
 #ifndef SDM_MISTAKES_H
 #define SDM_MISTAKES_H
 
@@ -15,21 +15,24 @@ typedef struct sdm_mistake {
 } sdm_mistake;
 
 typedef struct sdm_mistakes {
-    const char *file; /* of the marks without a source; the caller's */
-    size_t count;
-    sdm_mistake first[SDM_MISTAKES_SHOWN]; /* sorted: the file by line and column, then the
-                                              overrides by number */
+    const char *file; /* file name for marks without a source; owned by the caller */
+    size_t count;     /* of all mistakes */
+    /* sorted: those of the file by line and column, then those of the overrides by number */
+    sdm_mistake first[SDM_MISTAKES_SHOWN];
 } sdm_mistakes;
 
+/* Records a mistake with a formatted message. */
 void sdm_mistakes_add(sdm_mistakes *m, sdm_mark mark, const char *fmt, ...) SDM_PRINTF(3, 4);
 
-/* SDM_OK when there are none, else SDM_E_CONFIG with one line for each in err->text. */
+/* SDM_OK when there are no mistakes, else SDM_E_CONFIG with one line per mistake in err->text. */
 sdm_status sdm_mistakes_report(const sdm_mistakes *m, sdm_error *err);
 
-/* "file:line:column", "argument 'key=value'", or the file alone. Returns buf. */
+/* buf[size] = position of a mark: "file:line:column", "argument 'key=value'", or the file name
+ * alone. Returns buf. */
 const char *sdm_mark_print(sdm_mark mark, const char *file, char *buf, size_t size);
 
-/* `text` made fit for a message: on one line, cut behind 60 bytes. Returns buf. */
+/* buf = `text` for use in a message: control characters become '?', and it is cut after 60 bytes.
+ * Returns buf. */
 const char *sdm_quote(const char *text, char buf[SDM_QUOTE_MAX]);
 
 #endif

@@ -1,5 +1,5 @@
-/* Turns parts of a YAML tree into key=value texts, so that they go the way of overrides of the
- * command line. */
+/* Converts parts of a YAML tree to key=value texts, so that they can be applied like the overrides
+ * of the command line. */
 #include "overrides.h"
 
 #include <stdio.h>
@@ -33,9 +33,8 @@ void sdm_overrides_dispose(sdm_overrides *o)
     *o = (sdm_overrides){0};
 }
 
-/* The value as YAML on one line. A plain scalar means the same alone and within brackets, but for
-   texts with commas or brackets of their own, which are no numbers and keep their meaning in
-   quotes. */
+/* Appends the value as YAML on one line. Plain scalars with characters that have a meaning within
+ * brackets are put in quotes; they are not numbers, so quotes do not change their meaning. */
 static void add_value(const sdm_tree_node *node, sdm_text *out)
 {
     const bool is_list = node->kind == SDM_TREE_LIST;
@@ -58,7 +57,7 @@ static void add_value(const sdm_tree_node *node, sdm_text *out)
     sdm_text_add(out, is_list ? "]" : "}");
 }
 
-/* All texts of the value are one line, as they will be read again. */
+/* Are all texts and keys of the value printable, so that it can be written on one line? */
 static bool is_printable(const sdm_tree_node *node)
 {
     if (node->text && node->text[sdm_tree_printable(node->text, strlen(node->text))]) return false;

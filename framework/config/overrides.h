@@ -1,17 +1,17 @@
-/* Lists of key=value texts with their places, made from a YAML tree. */
+/* Lists of key=value texts with their positions, made from a YAML tree. */
 #ifndef SDM_OVERRIDES_H
 #define SDM_OVERRIDES_H
 
 #include "sdm/internal/experiment.h"
 #include "yaml_tree.h"
 
-/* Appends "key=value" for every leaf below `node`, keys joined by dots behind `prefix` ("" for
-   none): {grid: {spacing: 0.2}} gives "grid.spacing=0.2". Lists are leaves. False after a mistake
-   was recorded. */
+/* Appends "key=value" for every leaf below the mapping `node`. The key is the path of the leaf,
+ * joined by dots, after `prefix` ("" for none): {grid: {spacing: 0.2}} gives "grid.spacing=0.2".
+ * Lists are leaves. False after a mistake was recorded. */
 bool sdm_overrides_add_tree(sdm_overrides *o, const char *prefix, const sdm_tree_node *node,
                             sdm_mistakes *mistakes);
 
-/* Appends one; the text is copied. */
+/* Appends a copy of one "key=value" text. SDM_E_NOMEM. */
 sdm_status sdm_overrides_add(sdm_overrides *o, const char *text, sdm_mark mark, sdm_error *err);
 
 void sdm_overrides_dispose(sdm_overrides *o);

@@ -1,4 +1,4 @@
-/* The keys of the experiment configuration: one table a section, and the rules that span several
+/* The keys of a training configuration: one table per section, and the rules that involve several
  * keys. */
 #include "schema.h"
 
@@ -33,7 +33,8 @@ CHECK_ENUM(sdm_weight_type);
         .key = name, .type = SDM_FIELD_CHOICE, .offset = AT(member), .choices = list, .def = def_, \
         .unit = "", .help = help_                                                                  \
     }
-// a key that only some kinds of network have; one whose default depends on the kind
+// OF_KIND: a key that only some kinds of network have. BY_KIND: a key with a default that depends
+// on the kind.
 #define OF_KIND(which, type_, name, member, low, high, def_, unit_, help_)                         \
     {                                                                                              \
         .key = name, .type = type_, .offset = AT(member), .min = low, .max = high, .def = def_,    \
@@ -57,8 +58,7 @@ enum {
 };
 enum { POINTS = DEEPSDF | IMNET };
 
-// defaults of pod, sdmnn, deepsdf and imnet: those of Park et al. 2019 and of Chen and Zhang 2019
-// for the last two
+// Defaults for pod, sdmnn, deepsdf (from Park et al. 2019) and imnet (from Chen and Zhang 2019).
 static const char *const
     DEPTH[] = {"3", "4", "8", "5"},
     *const WIDTH[] = {"128", "64", "512", "2048"}, *const BLOCK[] = {"4", "2", "4", "4"},
@@ -67,100 +67,191 @@ static const char *const
     *const WEIGHTS[] = {"i8", "f16", "f16", "f16"}, *const BATCH[] = {"256", "8", "16", "16"},
     *const RATE[] = {"3e-3", "1e-3", "5e-4", "5e-4"};
 
-// clang-format off
 static const sdm_field SHAPE[] = {
-    ROW("name", SDM_FIELD_TEXT, shape.name, 1, SDM_NAME_MAX - 1, NULL, "", "the shape; the command \"shapes\" lists them"),
-    SPECIAL("options", sdm_read_key_options, sdm_dump_key_options, "mapping", "names of the shape's options", "none", "",
-            "what is the same for all shapes of a run: mesh density, constants, data files"),
-    SPECIAL("ranges", sdm_read_key_ranges, sdm_dump_key_ranges, "mapping", "parameter: [min, max]", "the shape's own", "",
-            "ranges the network is trained on, within the shape's own"),
+    ROW("name", SDM_FIELD_TEXT, shape.name, 1, SDM_NAME_MAX - 1, NULL, "",
+        "name of the shape; \"sdmgen shapes\" lists them"),
+    SPECIAL(
+        "options", sdm_read_key_options, sdm_dump_key_options, "mapping",
+        "names of the shape's options", "none", "",
+        "settings that are the same for all shapes of a run: mesh density, constants, data files"),
+    SPECIAL("ranges", sdm_read_key_ranges, sdm_dump_key_ranges, "mapping", "parameter: [min, max]",
+            "the shape's own", "",
+            "parameter ranges on which the network is trained, within those of the shape"),
 };
 
 static const sdm_field GRID[] = {
-    SPECIAL("size", sdm_read_key_size, sdm_dump_key_size, "3 integers", "1 .. 1048576", "required", "voxels",
-            "number of voxels along x, y and z"),
-    SPECIAL("spacing", sdm_read_key_spacing, sdm_dump_key_spacing, "1 or 3 numbers", "1e-06 .. 1000000", "required", "mm",
-            "distance of neighbouring voxels"),
-    SPECIAL("origin", sdm_read_key_origin, sdm_dump_key_origin, "3 numbers", "-1e+09 .. 1e+09", "from the centre", "mm",
-            "centre of the first voxel; not together with grid.centre"),
+    SPECIAL("size", sdm_read_key_size, sdm_dump_key_size, "3 integers", "1 .. 1048576", "required",
+            "voxels", "number of voxels along x, y and z"),
+    SPECIAL("spacing", sdm_read_key_spacing, sdm_dump_key_spacing, "1 or 3 numbers",
+            "1e-06 .. 1000000", "required", "mm", "distance between neighbouring voxels"),
+    SPECIAL("origin", sdm_read_key_origin, sdm_dump_key_origin, "3 numbers", "-1e+09 .. 1e+09",
+            "from the centre", "mm", "centre of the first voxel; not together with grid.centre"),
     SPECIAL("centre", sdm_read_key_centre, NULL, "3 numbers", "-1e+09 .. 1e+09", "[0, 0, 0]", "mm",
-            "middle of the box; not together with grid.origin"),
+            "centre of the grid; not together with grid.origin"),
 };
 
 static const sdm_field NETWORK[] = {
     CHOICE("kind", network.kind, SDM_KIND_CHOICES, "pod",
-           "pod: bases per block, coefficients by polynomials and an MLP; sdmnn: encoder-decoder of 3-D convolutions; deepsdf, imnet: one distance a point"),
-    BY_KIND(INT, "depth", network.depth, 0, 16, "layers", DEPTH,
-            "hidden layers of the MLP (pod: 0 for polynomials only); levels of sdmnn"),
+           "pod: basis functions per block, with coefficients from polynomials and an MLP; sdmnn: "
+           "3-D convolutional encoder-decoder; deepsdf, imnet: one distance per point, evaluated "
+           "at every voxel"),
+    BY_KIND(
+        INT, "depth", network.depth, 0, 16, "layers", DEPTH,
+        "number of hidden layers (pod: of the MLP, 0: polynomials only); sdmnn: number of levels"),
     BY_KIND(INT, "width", network.width, 8, 4096, "units", WIDTH,
-            "units of a hidden layer; imnet: of the first, halved from layer to layer"),
-    OF_KIND(POD, INT, "rank", network.rank, 1, 256, "9", "", "basis functions per block of the lowest level on average"),
-    OF_KIND(POD, INT, "levels", network.levels, 1, 8, "3", "levels", "levels of blocks, each of twice the edge of the one below"),
-    {.key = "block", .type = INT, .offset = AT(network.block), .min = 1, .max = 16, .unit = "voxels", .kinds = POD | SDMNN,
-     .kind_defs = BLOCK, .help = "edge of a block of the lowest level, from 2; sdmnn: of a cell of the volume that the dense layers give"},
-    OF_KIND(POD, INT, "modes", network.modes, 8, 2048, "512", "", "global modes the coefficients are learned in"),
-    OF_KIND(POD, INT, "degree", network.degree, 0, 12, "6", "", "total degree of the polynomial part"),
+            "units per hidden layer; imnet: of the first one, halved in each further layer"),
+    OF_KIND(POD, INT, "rank", network.rank, 1, 256, "9", "",
+            "mean number of basis functions per block of the lowest level"),
+    OF_KIND(POD, INT, "levels", network.levels, 1, 8, "3", "levels",
+            "number of levels of blocks; the edge of the blocks doubles from level to level"),
+    {.key = "block",
+     .type = INT,
+     .offset = AT(network.block),
+     .min = 1,
+     .max = 16,
+     .unit = "voxels",
+     .kinds = POD | SDMNN,
+     .kind_defs = BLOCK,
+     .help = "pod: edge of a block of the lowest level, at least 2; sdmnn: edge of a cell of the "
+             "volume that the dense layers produce"},
+    OF_KIND(POD, INT, "modes", network.modes, 8, 2048, "512", "",
+            "number of global modes in which the coefficients are learned"),
+    OF_KIND(POD, INT, "degree", network.degree, 0, 12, "6", "",
+            "total degree of the polynomial part"),
     OF_KIND(POD, INT, "input_degree", network.input_degree, 1, 8, "4", "",
-            "total degree of the products of parameters fed to the MLP"),
-    OF_KIND(SDMNN, INT, "channels", network.channels, 1, 512, "16", "", "channels of the first level, doubled from level to level"),
-    OF_KIND(SDMNN, REAL, "dropout", network.dropout, 0, 0.9, "0.1", "", "share of units dropped at the two deepest levels while training"),
-    {.key = "skip", .type = INT, .offset = AT(network.skip), .max = 15, .def = "4", .shown_def = "half of the depth", .unit = "",
-     .kinds = DEEPSDF, .help = "hidden layer where the input enters again; 0: none"},
-    {.key = "output", .type = SDM_FIELD_CHOICE, .offset = AT(network.output), .choices = "linear|tanh", .unit = "",
-     .kinds = POINTS, .kind_defs = OUTPUT_TYPE, .help = "what the last layer gives; tanh: bounded by the largest distance of the maps"},
-    {.key = "activation", .type = SDM_FIELD_CHOICE, .offset = AT(network.activation), .choices = "silu|tanh|relu|leaky_relu",
-     .unit = "", .kind_defs = ACTIVATION, .help = "activation of the hidden layers"},
-    {.key = "weights", .type = SDM_FIELD_CHOICE, .offset = AT(network.weights), .choices = "f32|f16|i8", .unit = "", .kind_defs = WEIGHTS,
-     .help = "type of the large weights in the model file; i8, pod only: bytes, two for a weight where one is not enough"},
+            "total degree of the products of parameters that are inputs of the MLP"),
+    OF_KIND(SDMNN, INT, "channels", network.channels, 1, 512, "16", "",
+            "channels of the first level, doubled in each further level"),
+    OF_KIND(SDMNN, REAL, "dropout", network.dropout, 0, 0.9, "0.1", "",
+            "fraction of units dropped at the two deepest levels during training"),
+    {.key = "skip",
+     .type = INT,
+     .offset = AT(network.skip),
+     .max = 15,
+     .def = "4",
+     .shown_def = "half of the depth",
+     .unit = "",
+     .kinds = DEEPSDF,
+     .help = "hidden layer at which the input is fed in again; 0: none"},
+    {.key = "output",
+     .type = SDM_FIELD_CHOICE,
+     .offset = AT(network.output),
+     .choices = "linear|tanh",
+     .unit = "",
+     .kinds = POINTS,
+     .kind_defs = OUTPUT_TYPE,
+     .help = "activation of the output layer; tanh: bounded by the largest distance in the maps"},
+    {.key = "activation",
+     .type = SDM_FIELD_CHOICE,
+     .offset = AT(network.activation),
+     .choices = "silu|tanh|relu|leaky_relu",
+     .unit = "",
+     .kind_defs = ACTIVATION,
+     .help = "activation of the hidden layers"},
+    {.key = "weights",
+     .type = SDM_FIELD_CHOICE,
+     .offset = AT(network.weights),
+     .choices = "f32|f16|i8",
+     .unit = "",
+     .kind_defs = WEIGHTS,
+     .help = "type of the large weights in the model file; i8 (pod only): one byte per weight, two "
+             "where one is not precise enough"},
 };
 
 static const sdm_field DATA[] = {
-    {.key = "static", .type = SDM_FIELD_SPECIAL, .read = sdm_read_key_static, .dump = sdm_dump_key_static, .def = "5",
-     .shown_type = "integer or list", .shown_range = "0 .. 1000", .unit = "points",
-     .help = "points of the static grid along each parameter, one number for all or one a parameter; 0: no static grid"},
-    ROW("online", INT64, data.online, 0, 1e7, "4096", "shapes", "random shapes made while training goes on"),
-    ROW("start", INT64, data.start, 0, 1e6, "3456", "shapes", "random shapes made before training starts, for the bases"),
-    ROW("holdout", INT64, data.holdout, 1, 1e5, "100", "shapes", "random shapes that are never trained on, for the accuracy"),
-    {.key = "sampling", .type = SDM_FIELD_CHOICE, .offset = AT(data.sampling), .choices = "uniform|error", .def = "uniform", .unit = "",
-     .kinds = POD, .help = "online shapes: evenly over the parameters (Sobol'), or densely where the network errs"},
-    ROW("static_share", REAL, data.static_share, 0, 1, "0.1", "", "share of each batch drawn from the static grid"),
-    ROW("memory_gb", REAL, data.memory_gb, 0.001, 1e6, "6", "GB", "budget for maps kept in memory"),
-    ROW("workers", INT, data.workers, 0, 1024, "0", "threads", "threads that make online samples; 0: half of the threads"),
+    {.key = "static",
+     .type = SDM_FIELD_SPECIAL,
+     .read = sdm_read_key_static,
+     .dump = sdm_dump_key_static,
+     .def = "5",
+     .shown_type = "integer or list",
+     .shown_range = "0 .. 1000",
+     .unit = "points",
+     .help = "points of the static grid, a regular grid of parameters, along each parameter: one "
+             "number for all or a list with one per parameter; 0: no static grid"},
+    ROW("online", INT64, data.online, 0, 1e7, "4096", "shapes",
+        "random shapes generated during training"),
+    ROW("start", INT64, data.start, 0, 1e6, "3456", "shapes",
+        "random shapes generated before training starts, from which the bases are computed"),
+    ROW("holdout", INT64, data.holdout, 1, 1e5, "100", "shapes",
+        "random shapes that are not used for training, to measure the accuracy"),
+    {.key = "sampling",
+     .type = SDM_FIELD_CHOICE,
+     .offset = AT(data.sampling),
+     .choices = "uniform|error",
+     .def = "uniform",
+     .unit = "",
+     .kinds = POD,
+     .help = "distribution of the online shapes: uniform over the parameters (Sobol'), or denser "
+             "where the error of the network is larger"},
+    ROW("static_share", REAL, data.static_share, 0, 1, "0.1", "",
+        "fraction of each batch drawn from the static grid"),
+    ROW("memory_gb", REAL, data.memory_gb, 0.001, 1e6, "6", "GB", "memory budget for maps"),
+    ROW("workers", INT, data.workers, 0, 1024, "0", "threads",
+        "threads that generate online shapes; 0: half of the threads"),
 };
 
 static const sdm_field TRAIN[] = {
-    ROW("minutes", REAL, train.minutes, 0, 1e6, "0", "min", "budget of time, data and evaluation included; 0: not by time"),
-    ROW("steps", INT64, train.steps, 0, 1e12, "0", "steps", "budget of optimiser steps; 0: not by steps"),
-    ROW("samples", INT64, train.samples, 0, 1e15, "0", "samples", "budget of samples (steps times batch); 0: not by samples"),
-    BY_KIND(INT, "batch", train.batch, 1, 65536, "samples", BATCH, "maps of a step"),
-    OF_KIND(POINTS, INT, "points", train.points, 8, 1048576, "512", "voxels", "voxels drawn from each map of a step"),
-    BY_KIND(REAL, "learning_rate", train.learning_rate, 1e-9, 1, "", RATE, "highest learning rate of the cosine schedule"),
-    ROW("warmup", REAL, train.warmup, 0, 0.5, "0.02", "", "share of the budget in which the learning rate grows"),
+    ROW("minutes", REAL, train.minutes, 0, 1e6, "0", "min",
+        "time budget, including data generation and evaluation; 0: not limited by time"),
+    ROW("steps", INT64, train.steps, 0, 1e12, "0", "steps",
+        "budget of optimiser steps; 0: not limited by steps"),
+    ROW("samples", INT64, train.samples, 0, 1e15, "0", "samples",
+        "budget of samples (steps times batch); 0: not limited by samples"),
+    BY_KIND(INT, "batch", train.batch, 1, 65536, "samples", BATCH, "maps per step"),
+    OF_KIND(POINTS, INT, "points", train.points, 8, 1048576, "512", "voxels",
+            "voxels drawn from each map in a step"),
+    BY_KIND(REAL, "learning_rate", train.learning_rate, 1e-9, 1, "", RATE,
+            "maximum learning rate of the cosine schedule"),
+    ROW("warmup", REAL, train.warmup, 0, 0.5, "0.02", "",
+        "fraction of the budget during which the learning rate increases"),
     CHOICE("loss", train.loss, "mse|l1|huber|clamped_l1", "mse",
-           "what is made small: squared, absolute, Huber error, or the absolute error of clamped distances"),
-    ROW("clamp_mm", REAL, train.clamp_mm, 1e-6, 1e6, "0.1", "mm", "clamped_l1: distances beyond count as this"),
+           "training loss: squared, absolute or Huber error, or the absolute error of clamped "
+           "distances"),
+    ROW("clamp_mm", REAL, train.clamp_mm, 1e-6, 1e6, "0.1", "mm",
+        "clamped_l1: bound to which distances are clamped"),
     OF_KIND(SDMNN | POINTS, REAL, "eikonal", train.eikonal, 0, 1000, "0", "",
-            "weight of the squared difference of the slope of the map from 1; 0: off"),
+            "weight of the eikonal term, the squared deviation of the length of the gradient from "
+            "1; 0: off"),
     ROW("near_weight", REAL, train.near_weight, 0, 100, "0", "",
-        "extra weight of voxels near the surface; deepsdf, imnet: they are drawn so much more often"),
-    ROW("near_mm", REAL, train.near_mm, 1e-6, 1e6, "0.4", "mm", "voxels nearer than this count as near"),
-    OF_KIND(POD, REAL, "refine", train.refine, 0, 1, "0.4", "", "last share of the budget, trained end to end, decoder included"),
-    OF_KIND(POD, INT, "refine_batch", train.refine_batch, 1, 4096, "32", "samples", "samples of a step in that share"),
-    OF_KIND(POD, REAL, "refine_rate", train.refine_rate, 1e-9, 1, "3e-4", "", "learning rate in that share"),
-    ROW("average", REAL, train.average, 0, 0.99999, "0.998", "", "decay of the average of the weights; 0: no average"),
+        "extra weight w of voxels near the surface: they count 1 + w times; deepsdf, imnet: they "
+        "are "
+        "drawn 1 + w times as often"),
+    ROW("near_mm", REAL, train.near_mm, 1e-6, 1e6, "0.4", "mm",
+        "voxels closer to the surface than this count as near"),
+    OF_KIND(
+        POD, REAL, "refine", train.refine, 0, 1, "0.4", "",
+        "last fraction of the budget, used for refinement: training end to end, decoder included"),
+    OF_KIND(POD, INT, "refine_batch", train.refine_batch, 1, 4096, "32", "samples",
+            "samples per step during refinement"),
+    OF_KIND(POD, REAL, "refine_rate", train.refine_rate, 1e-9, 1, "3e-4", "",
+            "learning rate during refinement"),
+    ROW("average", REAL, train.average, 0, 0.99999, "0.998", "",
+        "decay of the moving average of the weights; 0: no average"),
     ROW("evaluate_seconds", REAL, train.evaluate_seconds, 0.001, 1e6, "20", "s",
-        "time between evaluations; every 500 steps when the budget is not a time"),
-    ROW("checkpoint_seconds", REAL, train.checkpoint_seconds, 0.001, 1e6, "60", "s", "time between checkpoints"),
+        "time between evaluations; every 500 steps if the budget is not a time"),
+    ROW("checkpoint_seconds", REAL, train.checkpoint_seconds, 0.001, 1e6, "60", "s",
+        "time between checkpoints"),
 };
 
 static const sdm_field OUTPUT[] = {
-    {.key = "folder", .type = SDM_FIELD_TEXT, .offset = AT(output.folder), .max = SDM_PATH_TEXT_MAX - 1,
-     .shown_def = "runs/NAME, after the file", .unit = "", .help = "folder of the run: model, checkpoint, metrics, pictures"},
+    {.key = "folder",
+     .type = SDM_FIELD_TEXT,
+     .offset = AT(output.folder),
+     .max = SDM_PATH_TEXT_MAX - 1,
+     .shown_def = "runs/NAME, after the file",
+     .unit = "",
+     .help = "folder of the run: model, checkpoint, metrics, pictures"},
 };
 
 static const sdm_field TOP[] = {
-    {.key = "seed", .type = SDM_FIELD_UINT64, .offset = AT(seed), .def = "1", .unit = "", .help = "of all random numbers of a run"},
-    ROW("threads", INT, threads, 0, 1024, "0", "threads", "threads to use; 0: all"),
+    {.key = "seed",
+     .type = SDM_FIELD_UINT64,
+     .offset = AT(seed),
+     .def = "1",
+     .unit = "",
+     .help = "seed of all random numbers of a run"},
+    ROW("threads", INT, threads, 0, 1024, "0", "threads", "number of threads; 0: all"),
 };
 
 static const sdm_section SECTIONS[] = {
@@ -172,7 +263,6 @@ static const sdm_section SECTIONS[] = {
     {.name = "output", .fields = OUTPUT, .n_fields = COUNT(OUTPUT)},
     {.name = "", .fields = TOP, .n_fields = COUNT(TOP)},
 };
-// clang-format on
 
 const sdm_section *sdm_config_sections(size_t *n)
 {
@@ -180,11 +270,13 @@ const sdm_section *sdm_config_sections(size_t *n)
     return SECTIONS;
 }
 
+/* Was the key last given by this override, with an accepted value? */
 static bool by_override(const sdm_given *g, int override)
 {
     return g->mark.override == override && !g->refused;
 }
 
+/* The three alternative budgets of train: where each was given, and whether it is positive. */
 static void budgets(sdm_reader *r, sdm_given *given[3], bool positive[3])
 {
     static const char *const KEYS[3] = {"minutes", "steps", "samples"};
@@ -204,7 +296,7 @@ void sdm_config_settle_override(sdm_reader *r, int override)
     if (by_override(centre, override) && origin->mark.override != override)
         *origin = (sdm_given){0};
 
-    // a budget given here takes the place of the others
+    // a positive budget given by this override replaces the others
     budgets(r, given, positive);
     for (int i = 0; i < 3; i++) replaces |= positive[i] && by_override(given[i], override);
     if (!replaces) return;
@@ -213,12 +305,14 @@ void sdm_config_settle_override(sdm_reader *r, int override)
     if (given[2]->mark.override != override) r->config->train.samples = 0;
 }
 
+/* Is position a after position b? */
 static bool is_later(sdm_mark a, sdm_mark b)
 {
     if (a.override != b.override) return a.override > b.override;
     return a.line != b.line ? a.line > b.line : a.column > b.column;
 }
 
+/* Exactly one budget must be positive. */
 static void check_budget(sdm_reader *r, sdm_mark section)
 {
     sdm_given *given[3];
@@ -241,6 +335,7 @@ static void check_budget(sdm_reader *r, sdm_mark section)
             "only one of train.minutes, train.steps and train.samples may be positive, got %d", n);
 }
 
+/* Records a missing key, unless it was given. */
 static void require(sdm_reader *r, const char *section, const char *key, sdm_mark mark,
                     const char *example)
 {
@@ -248,6 +343,7 @@ static void require(sdm_reader *r, const char *section, const char *key, sdm_mar
     sdm_mistakes_add(r->mistakes, mark, "missing key '%s.%s'; e.g. %s", section, key, example);
 }
 
+/* Checks the grid and computes its origin from grid.centre. */
 static void finish_grid(sdm_reader *r, sdm_mark section)
 {
     sdm_grid *g = &r->config->grid;
@@ -265,7 +361,7 @@ static void finish_grid(sdm_reader *r, sdm_mark section)
         for (int i = 0; i < 3; i++)
             g->origin[i] = r->centre[i] - 0.5 * (double)(g->n[i] - 1) * g->spacing[i];
 
-    // sizes that were missing or refused are still 0
+    // size or spacing is still 0 if it was missing or refused
     sdm_error err;
     if (g->n[0] == 0 || !(g->spacing[0] > 0)) return;
     if (sdm_grid_check(g, &err))
@@ -273,6 +369,7 @@ static void finish_grid(sdm_reader *r, sdm_mark section)
                          "grid.size: %.200s", err.text);
 }
 
+/* Where a section begins, or `top` if the section is missing. */
 static sdm_mark section_place(const sdm_reader *r, const char *name, sdm_mark top)
 {
     size_t s = 0;

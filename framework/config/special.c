@@ -1,5 +1,5 @@
-/* Reads and writes a configuration's values that are more than one number or name: grid, ranges,
- * options, counts. */
+/* Reads and writes the values of a configuration that are not a single number or name: grid,
+ * ranges, options and the counts of the static grid. */
 #include "special.h"
 
 #include <stdio.h>
@@ -11,7 +11,7 @@
 #define PLACE_MAX 1e9
 #define STATIC_MAX 1000
 
-/* [x, y, z], all of them checked. */
+/* Reads [x, y, z] within min .. max and reports mistakes of all three. */
 static bool read_three(sdm_reader *r, const sdm_tree_node *node, const char *path, double min,
                        double max, double out[3])
 {
@@ -78,7 +78,7 @@ bool sdm_read_key_centre(sdm_reader *r, const sdm_field *f, const sdm_tree_node 
     return read_three(r, node, path, -PLACE_MAX, PLACE_MAX, r->centre);
 }
 
-/* Names of options and parameters, as the plug-in interface has them. */
+/* Reads the key of an entry: the name of an option or parameter of a shape. */
 static bool read_name(sdm_reader *r, const sdm_tree_node *node, const char *path,
                       char out[SDM_NAME_MAX])
 {
@@ -101,6 +101,7 @@ static bool read_name(sdm_reader *r, const sdm_tree_node *node, const char *path
     return true;
 }
 
+/* Adds one option, or replaces the one of the same name. */
 static bool read_option(sdm_reader *r, const sdm_tree_node *node, const char *path)
 {
     sdm_config_option option = {.mark = node->key_mark};
@@ -121,6 +122,7 @@ static bool read_option(sdm_reader *r, const sdm_tree_node *node, const char *pa
     return true;
 }
 
+/* Adds one range, or replaces the one of the same name. */
 static bool read_range(sdm_reader *r, const sdm_tree_node *node, const char *path)
 {
     sdm_config_range range = {.mark = node->key_mark};
@@ -174,7 +176,7 @@ bool sdm_read_key_ranges(sdm_reader *r, const sdm_field *f, const sdm_tree_node 
     return fits;
 }
 
-/* One number for all parameters, a list of one a parameter, or 0 for no static grid at all. */
+/* One number for all parameters, a list with one number per parameter, or 0 for no static grid. */
 bool sdm_read_key_static(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
                          const char *path)
 {

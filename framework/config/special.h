@@ -1,4 +1,5 @@
-/* Readers and writers of the SPECIAL rows of the tables; the signatures are those of sdm_field. */
+/* Functions of the SPECIAL rows of the tables of a training configuration. The signatures are those
+ * of sdm_field.read and sdm_field.dump; NAME in sdm_read_key_NAME() is the key. */
 #ifndef SDM_SPECIAL_H
 #define SDM_SPECIAL_H
 

@@ -1,4 +1,6 @@
-/* libyaml's events turned into a tree of nodes with marks; the only file that includes libyaml. */
+/* Builds a tree of nodes with marks from the events of libyaml. The only file that includes
+ * libyaml.
+ */
 #include "yaml_tree.h"
 
 #include <stdio.h>
@@ -11,8 +13,8 @@
 /* An open list or map. */
 typedef struct tree_frame {
     sdm_tree_node *node;
-    bool want_key;   /* a map whose next event is a key */
-    bool drop_value; /* the key was refused: so is its value */
+    bool want_key;   /* a map: the next event is a key */
+    bool drop_value; /* the key was refused: the next value is dropped */
     const char *key;
     sdm_mark key_mark;
 } tree_frame;
@@ -27,10 +29,11 @@ typedef struct tree_builder {
     bool has_document;
 } tree_builder;
 
-/* Length of the UTF-8 sequence at s (0: invalid, overlong or a surrogate) and its code point. */
+/* Returns the length of the UTF-8 sequence at s, 0 if it is invalid, overlong or a surrogate.
+ * *code = its code point. */
 static size_t utf8_next(const unsigned char *s, size_t left, uint32_t *code)
 {
-    static const uint32_t LEAST[5] = {0, 0, 0x80, 0x800, 0x10000};
+    static const uint32_t CODE_MIN[5] = {0, 0, 0x80, 0x800, 0x10000};
     size_t n = s[0] < 0x80 ? 1 : s[0] >> 5 == 6 ? 2 : s[0] >> 4 == 14 ? 3 : s[0] >> 3 == 30 ? 4 : 0;
     if (n == 0 || n > left) return 0;
     uint32_t c = n == 1 ? s[0] : s[0] & (0x7Fu >> n);
@@ -38,12 +41,12 @@ static size_t utf8_next(const unsigned char *s, size_t left, uint32_t *code)
         if ((s[i] & 0xC0) != 0x80) return 0;
         c = c << 6 | (s[i] & 0x3Fu);
     }
-    if (c < LEAST[n] || c > 0x10FFFF || (c >= 0xD800 && c <= 0xDFFF)) return 0;
+    if (c < CODE_MIN[n] || c > 0x10FFFF || (c >= 0xD800 && c <= 0xDFFF)) return 0;
     *code = c;
     return n;
 }
 
-/* The characters YAML calls printable, less the line breaks and the byte order mark. */
+/* The characters that YAML defines as printable, without line breaks and the byte order mark. */
 static bool is_printable(uint32_t c)
 {
     if (c < 0xA0) return c >= 0x20 && c < 0x7F;
@@ -62,14 +65,14 @@ size_t sdm_tree_printable(const char *text, size_t size)
     return size;
 }
 
-/* Of a text in the file; all of an override has the same. */
+/* The mark of a position; all positions in an override have the mark of the override. */
 static sdm_mark mark_at(sdm_mark override, int line, int column)
 {
     return override.override > 0 ? override : (sdm_mark){.line = line, .column = column};
 }
 
-/* Encoding and tabs, checked first: libyaml's own words for these do not help, and it takes byte
- * order marks in silence. */
+/* Checks encoding and tabs before libyaml does: its messages for these do not help, and it accepts
+ * byte order marks silently. */
 static bool check_characters(const unsigned char *s, size_t size, sdm_mark override,
                              sdm_mistakes *mistakes)
 {
@@ -150,7 +153,7 @@ static sdm_status add_node(tree_builder *b, sdm_tree_kind kind, sdm_mark mark, s
     return SDM_OK;
 }
 
-/* Hangs a finished scalar or a just opened collection below the innermost open one. */
+/* Adds a scalar or a newly opened list or map to the innermost open list or map. */
 static void attach(tree_builder *b, sdm_tree_node *node)
 {
     if (b->depth == 0) {
@@ -160,7 +163,7 @@ static void attach(tree_builder *b, sdm_tree_node *node)
     tree_frame *f = &b->stack[b->depth - 1];
     sdm_tree_node *parent = f->node;
     if (parent->kind == SDM_TREE_MAP) {
-        // a collection in the place of a key; its value is dropped with it
+        // a list or map in place of a key: dropped with its value
         if (f->want_key) {
             sdm_mistakes_add(b->mistakes, node->mark, "a key must be a single name");
             f->want_key = false;
@@ -187,7 +190,7 @@ static const sdm_tree_node *find_child(const sdm_tree_node *map, const char *key
     return child;
 }
 
-/* "network.depth" for key `depth` in the innermost open map. */
+/* out = the dotted path of a key in the innermost open map: "network.depth" for `depth`. */
 static void full_path(const tree_builder *b, const char *key, char *out, size_t size)
 {
     size_t used = 0;
@@ -199,7 +202,7 @@ static void full_path(const tree_builder *b, const char *key, char *out, size_t 
     if (used < size) snprintf(out + used, size - used, "%s", key);
 }
 
-static sdm_status take_key(tree_builder *b, tree_frame *f, const char *text, size_t size,
+static sdm_status read_key(tree_builder *b, tree_frame *f, const char *text, size_t size,
                            sdm_mark mark)
 {
     sdm_status s = copy_text(b->tree, text, size, &f->key, b->err);
@@ -220,6 +223,7 @@ static sdm_status take_key(tree_builder *b, tree_frame *f, const char *text, siz
     return SDM_OK;
 }
 
+/* Refuses anchors and tags. */
 static void check_extras(tree_builder *b, const yaml_char_t *anchor, const yaml_char_t *tag,
                          sdm_mark mark)
 {
@@ -232,7 +236,7 @@ static void check_extras(tree_builder *b, const yaml_char_t *anchor, const yaml_
                          sdm_quote((const char *)tag, buf));
 }
 
-static sdm_status take_scalar(tree_builder *b, const yaml_event_t *e)
+static sdm_status read_scalar(tree_builder *b, const yaml_event_t *e)
 {
     const char *text = (const char *)e->data.scalar.value;
     size_t size = e->data.scalar.length;
@@ -243,7 +247,7 @@ static sdm_status take_scalar(tree_builder *b, const yaml_event_t *e)
         size = strlen(text);
     }
     tree_frame *f = b->depth ? &b->stack[b->depth - 1] : NULL;
-    if (f && f->node->kind == SDM_TREE_MAP && f->want_key) return take_key(b, f, text, size, mark);
+    if (f && f->node->kind == SDM_TREE_MAP && f->want_key) return read_key(b, f, text, size, mark);
 
     sdm_tree_node *node = NULL;
     sdm_status s = add_node(b, SDM_TREE_SCALAR, mark, &node);
@@ -273,8 +277,8 @@ static sdm_status open_collection(tree_builder *b, const yaml_event_t *e)
     return SDM_OK;
 }
 
-/* Nothing can stand in for the value of an alias, so reading ends here. */
-static sdm_status take_alias(tree_builder *b, const yaml_event_t *e)
+/* Refuses an alias; its value is unknown, so reading ends here. */
+static sdm_status refuse_alias(tree_builder *b, const yaml_event_t *e)
 {
     char buf[SDM_QUOTE_MAX];
     sdm_mark mark = mark_of(b, e->start_mark);
@@ -300,15 +304,15 @@ static sdm_status open_document(tree_builder *b, const yaml_event_t *e)
     return SDM_OK;
 }
 
-static sdm_status take_event(tree_builder *b, const yaml_event_t *e)
+static sdm_status read_event(tree_builder *b, const yaml_event_t *e)
 {
     switch (e->type) {
     case YAML_DOCUMENT_START_EVENT:
         return open_document(b, e);
     case YAML_ALIAS_EVENT:
-        return take_alias(b, e);
+        return refuse_alias(b, e);
     case YAML_SCALAR_EVENT:
-        return take_scalar(b, e);
+        return read_scalar(b, e);
     case YAML_SEQUENCE_START_EVENT:
     case YAML_MAPPING_START_EVENT:
         return open_collection(b, e);
@@ -321,7 +325,7 @@ static sdm_status take_event(tree_builder *b, const yaml_event_t *e)
     }
 }
 
-/* Whether character `index` (libyaml counts characters, not bytes) is a tab. */
+/* Is character number `index` a tab? libyaml counts characters, not bytes. */
 static bool is_tab(const char *text, size_t size, size_t index)
 {
     size_t at = 0;
@@ -352,9 +356,9 @@ static sdm_status report_syntax(const tree_builder *b, const yaml_parser_t *pars
     return SDM_E_CONFIG;
 }
 
-/* Event by event, so that depth and size are checked while libyaml has looked ahead by no more than
- * a line's worth. */
-static sdm_status build(tree_builder *b, yaml_parser_t *parser, const char *text, size_t size)
+/* Parses event by event: depth and size are checked when libyaml has read at most about one line
+ * ahead. */
+static sdm_status tree_build(tree_builder *b, yaml_parser_t *parser, const char *text, size_t size)
 {
     sdm_status s = SDM_OK;
     bool more = true;
@@ -363,17 +367,18 @@ static sdm_status build(tree_builder *b, yaml_parser_t *parser, const char *text
     while (more && !s) {
         yaml_event_t event;
         if (!yaml_parser_parse(parser, &event)) return report_syntax(b, parser, text, size);
-        s = take_event(b, &event);
+        s = read_event(b, &event);
         more = event.type != YAML_STREAM_END_EVENT;
         yaml_event_delete(&event);
     }
     return s;
 }
 
-static sdm_status allocate(sdm_tree *tree, size_t size, sdm_error *err)
+/* Allocates nodes and texts for a document of `size` bytes. */
+static sdm_status tree_allocate(sdm_tree *tree, size_t size, sdm_error *err)
 {
-    // a byte makes at most two nodes, and an escape at most 1.5 bytes a byte; both are checked
-    // again when used. The spare room is for sdm_tree_wrap()
+    // Bounds: two nodes per byte, and 1.5 bytes of text per byte of an escape sequence. Both are
+    // checked again on use. sdm_tree_wrap() needs the rest.
     size_t nodes = 2 * size + 2;
     tree->max_nodes = nodes < SDM_TREE_NODES_MAX ? nodes : SDM_TREE_NODES_MAX;
     tree->pool_size = 2 * size + 2 * tree->max_nodes + SDM_TREE_PATH_BYTES + SDM_TREE_PATH_NAMES;
@@ -402,14 +407,14 @@ sdm_status sdm_tree_parse(sdm_tree *tree, const char *text, size_t size, sdm_mar
     }
     if (!check_characters((const unsigned char *)text, size, override, mistakes))
         return SDM_E_CONFIG;
-    sdm_status s = allocate(tree, size, err);
+    sdm_status s = tree_allocate(tree, size, err);
     if (s) return s;
 
     yaml_parser_t parser;
     if (!yaml_parser_initialize(&parser))
         return sdm_fail(err, SDM_E_NOMEM, "out of memory while reading YAML");
     tree_builder b = {.tree = tree, .mistakes = mistakes, .err = err, .override = override};
-    s = build(&b, &parser, text, size);
+    s = tree_build(&b, &parser, text, size);
     yaml_parser_delete(&parser);
     return s;
 }
@@ -423,7 +428,7 @@ sdm_status sdm_tree_wrap(sdm_tree *tree, const char *path, size_t length, sdm_ma
         *tree->root = (sdm_tree_node){.kind = SDM_TREE_SCALAR, .text = "", .mark = override};
     }
     for (size_t end = length + 1; end > 0;) {
-        // the last name first: [start, end - 1)
+        // from the last name, path[start .. end - 1), to the first
         size_t start = end - 1;
         while (start > 0 && path[start - 1] != '.') start--;
         const char *key = NULL;

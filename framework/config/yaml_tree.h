@@ -1,5 +1,5 @@
-/* A YAML document as a small tree with marks. A strict subset: no tags, anchors, aliases or
- * directives, one document. */
+/* A YAML document as a tree of nodes with their positions (marks). Only a subset of YAML is
+ * allowed: one document without tags, anchors, aliases and directives. */
 #ifndef SDM_YAML_TREE_H
 #define SDM_YAML_TREE_H
 
@@ -8,54 +8,55 @@
 #define SDM_TREE_BYTES_MAX ((size_t)1 << 20)
 #define SDM_TREE_DEPTH_MAX 32
 #define SDM_TREE_NODES_MAX 4096
-#define SDM_TREE_PATH_BYTES 512 /* longest dotted key of an override */
-#define SDM_TREE_PATH_NAMES 8   /* most names in it */
+#define SDM_TREE_PATH_BYTES 512 /* maximum length of the dotted key of an override */
+#define SDM_TREE_PATH_NAMES 8   /* maximum number of names in it */
 
 typedef enum sdm_tree_kind { SDM_TREE_SCALAR = 0, SDM_TREE_LIST, SDM_TREE_MAP } sdm_tree_kind;
 
 typedef struct sdm_tree_node {
     sdm_tree_kind kind;
-    bool quoted;      /* a scalar that is not plain */
+    bool quoted;      /* scalar in quotes or block style */
     const char *text; /* of a scalar, else NULL */
     const char *key;  /* of an entry of a map, else NULL */
     sdm_mark mark, key_mark;
     size_t n_children;
-    struct sdm_tree_node *first, *last, *next; /* children in order of the file; the next sibling */
+    struct sdm_tree_node *first, *last; /* children, in the order of the file */
+    struct sdm_tree_node *next;         /* next sibling */
 } sdm_tree_node;
 
-/* Zero-initialise; sdm_tree_dispose() frees. Nodes and texts belong to the tree. */
+/* Zero-initialise; sdm_tree_dispose() frees. Nodes and texts are owned by the tree. */
 typedef struct sdm_tree {
     sdm_tree_node *nodes;
     size_t n_nodes, max_nodes;
-    char *pool;
+    char *pool; /* the texts */
     size_t pool_used, pool_size;
     sdm_tree_node *root; /* NULL: an empty document */
 } sdm_tree;
 
-/* The text of a file, at most SDM_TREE_BYTES_MAX bytes; *data is freed by sdm_free(). SDM_E_IO,
+/* Reads a file of at most SDM_TREE_BYTES_MAX bytes; *data is freed with sdm_free(). SDM_E_IO,
  * SDM_E_CONFIG (too long), SDM_E_NOMEM. */
 sdm_status sdm_tree_read(const char *path, uint8_t **data, size_t *size, sdm_error *err);
 
-/* Reads text[size]. override: of the key=value argument the text comes from, for all marks in it;
-   zero for the file. Mistakes go to *mistakes; repeated keys are among them and only the first one
-   is kept in the tree. SDM_E_CONFIG: there is no usable tree, the reason is in *mistakes;
-   SDM_E_NOMEM with *err set. */
+/* Parses text[size]. override: mark of the key=value argument that contains the text, which then
+ * becomes the mark of all nodes; zero for the text of a file. Mistakes are added to *mistakes;
+ * repeated keys are mistakes, too, and only the first one is kept in the tree. SDM_E_CONFIG: there
+ * is no usable tree, for the reason in *mistakes. SDM_E_NOMEM: described in *err. */
 sdm_status sdm_tree_parse(sdm_tree *tree, const char *text, size_t size, sdm_mark override,
                           sdm_mistakes *mistakes, sdm_error *err);
 
-/* Puts the root below the dotted key `path[length]`: "a.b" around 4 gives {a: {b: 4}}; an empty
-   document counts as an empty value. Once for a tree; at most SDM_TREE_PATH_BYTES bytes and
-   SDM_TREE_PATH_NAMES names. */
+/* Puts the root below the dotted key path[length]: "a.b" and the root 4 give {a: {b: 4}}; an empty
+ * document counts as an empty value. At most once per tree. path has fewer than SDM_TREE_PATH_BYTES
+ * bytes and at most SDM_TREE_PATH_NAMES names. */
 sdm_status sdm_tree_wrap(sdm_tree *tree, const char *path, size_t length, sdm_mark override,
                          sdm_error *err);
 
 void sdm_tree_dispose(sdm_tree *tree);
 
-/* True for an empty value, as in "key:". */
+/* True for a scalar without text, as in "key:". */
 bool sdm_tree_is_empty(const sdm_tree_node *node);
 
-/* Offset of the first byte of text[size] that is no printable UTF-8 (tabs and line breaks are not
- * printable), or `size`. */
+/* Offset of the first byte of text[size] that is not printable UTF-8 (tabs and line breaks are not
+ * printable); `size` when there is none. */
 size_t sdm_tree_printable(const char *text, size_t size);
 
 #endif

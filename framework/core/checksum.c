@@ -1,4 +1,4 @@
-/* CRC-64/XZ, eight bytes a step ("slicing by 8", Kounavis and Berry 2005). */
+/* CRC-64/XZ, computed eight bytes at a time ("slicing by 8", Kounavis and Berry 2005). */
 #include "sdm/internal/checksum.h"
 
 #include "once.h"
@@ -8,7 +8,7 @@
 static uint64_t table[8][256];
 static sdm_once once = SDM_ONCE_INIT;
 
-static void fill_table(void)
+static void table_fill(void)
 {
     for (unsigned i = 0; i < 256; i++) {
         uint64_t c = i;
@@ -22,12 +22,13 @@ static void fill_table(void)
 
 uint64_t sdm_crc64(uint64_t crc, const void *data, size_t size)
 {
-    sdm_once_run(&once, fill_table);
+    sdm_once_run(&once, table_fill);
     const uint8_t *p = data;
     crc = ~crc;
     for (; size >= 8; size -= 8, p += 8) {
         uint64_t w = 0;
-        for (int i = 7; i >= 0; i--) w = w << 8 | p[i]; // little endian on any machine
+        // the 8 bytes in little-endian order, on any machine
+        for (int i = 7; i >= 0; i--) w = w << 8 | p[i];
         crc ^= w;
         uint64_t next = 0;
         for (int i = 0; i < 8; i++) next ^= table[7 - i][(crc >> (8 * i)) & 255];

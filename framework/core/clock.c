@@ -1,4 +1,4 @@
-/* Seconds that have gone by. */
+/* Monotonic clock. */
 #include "sdm/internal/clock.h"
 
 #include <time.h>

@@ -1,12 +1,12 @@
-/* Lower envelopes of parabolas on a line. */
+/* Lower envelope of parabolas along a line of samples. */
 #include "sdm/internal/envelope.h"
 
 #include <math.h>
 
 void sdm_lower_envelope(double *f, int64_t n, double spacing, double *scratch)
 {
-    // parabola m of the envelope: its lowest place, its height there, and where it begins to be the
-    // lowest
+    // parabola m of the envelope: position of its minimum, value there, and start of the interval
+    // in which it is the lowest
     double *site = scratch, *from = site + n, *height = from + n;
     const double square = spacing * spacing;
     int64_t m = 0;
@@ -15,7 +15,7 @@ void sdm_lower_envelope(double *f, int64_t n, double spacing, double *scratch)
         const double x = (double)i;
         double start = -INFINITY;
         while (m > 0) {
-            // where the new parabola goes below the last one
+            // intersection of the new parabola with the last one; right of it the new one is lower
             start = 0.5 * (x + site[m - 1] + (f[i] - height[m - 1]) / (square * (x - site[m - 1])));
             if (start > from[m - 1]) break;
             m--;

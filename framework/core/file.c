@@ -1,4 +1,4 @@
-/* Whole-file reading and atomic writing. */
+/* Reading of whole files, atomic writing, creation of folders. */
 #include "sdm/internal/file.h"
 
 #include <errno.h>
@@ -18,13 +18,14 @@ sdm_status sdm_file_read(const char *path, uint64_t max_bytes, uint8_t **data, s
 {
     *data = NULL;
     *size = 0;
-    const int fd =
-        open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); // a FIFO would wait for its writer
+    // O_NONBLOCK: opening a FIFO must not wait for a writer
+    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (fd < 0) return sdm_fail(err, SDM_E_IO, "%s: cannot open: %s", path, strerror(errno));
     sdm_status s = SDM_OK;
     uint8_t *block = NULL;
     struct stat st;
     size_t n = 0;
+    // check type and size
     if (fstat(fd, &st)) {
         s = sdm_fail(err, SDM_E_IO, "%s: cannot read its size: %s", path, strerror(errno));
         goto done;
@@ -39,11 +40,13 @@ sdm_status sdm_file_read(const char *path, uint64_t max_bytes, uint8_t **data, s
                      (unsigned long long)st.st_size, (unsigned long long)max_bytes);
         goto done;
     }
-    if ((uint64_t)st.st_size >= SIZE_MAX) { // of a machine with 32-bit addresses
+    // only possible with 32-bit addresses
+    if ((uint64_t)st.st_size >= SIZE_MAX) {
         s = sdm_fail(err, SDM_E_NOMEM, "%s: %llu bytes are more than memory can hold", path,
                      (unsigned long long)st.st_size);
         goto done;
     }
+    // read all bytes; the block has a zero byte at the end
     n = (size_t)st.st_size;
     if ((s = SDM_ALLOC(&block, n + 1, path, err))) goto done;
     for (size_t at = 0; at < n;) {
@@ -79,7 +82,7 @@ struct sdm_outfile {
     uint8_t buffer[BUFFER_BYTES];
 };
 
-static char *with_suffix(const char *path, const char *suffix)
+static char *path_with_suffix(const char *path, const char *suffix)
 {
     const size_t n = strlen(path), m = strlen(suffix);
     char *out = malloc(n + m + 1);
@@ -89,16 +92,17 @@ static char *with_suffix(const char *path, const char *suffix)
     return out;
 }
 
-/* Opens a file of its own beside `path`: no other writer of that name, here or elsewhere, has it.
- */
-static int open_temp(const char *path, char **temp)
+/* Creates a temporary file in the folder of `path` with a unique name (process id and counter).
+ * Returns its file descriptor, or -1 with errno set; *temp: its name, to be freed, NULL on
+ * error. */
+static int temp_open(const char *path, char **temp)
 {
     static atomic_ulong counter;
     for (;;) {
         char suffix[64];
         snprintf(suffix, sizeof suffix, ".%ld.%lu.tmp", (long)getpid(),
                  atomic_fetch_add(&counter, 1));
-        *temp = with_suffix(path, suffix);
+        *temp = path_with_suffix(path, suffix);
         if (!*temp) errno = ENOMEM;
         const int fd = *temp ? open(*temp, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666) : -1;
         if (fd >= 0) return fd;
@@ -117,7 +121,7 @@ sdm_status sdm_outfile_open(const char *path, sdm_outfile **out, sdm_error *err)
     const sdm_status s = SDM_ALLOC(&f, 1, "output buffer", err);
     if (s) return s;
     f->fd = -1;
-    f->path = with_suffix(path, "");
+    f->path = path_with_suffix(path, "");
     if (!f->path) {
         sdm_outfile_discard(&f);
         return sdm_fail(err, SDM_E_NOMEM, "%s: no memory for its name", path);
@@ -129,7 +133,7 @@ sdm_status sdm_outfile_open(const char *path, sdm_outfile **out, sdm_error *err)
                         S_ISDIR(st.st_mode) ? "folder"
                                             : "device, pipe or socket, which a file would replace");
     }
-    f->fd = open_temp(path, &f->temp);
+    f->fd = temp_open(path, &f->temp);
     if (f->fd < 0) {
         const int code = errno;
         sdm_outfile_discard(&f);
@@ -141,7 +145,7 @@ sdm_status sdm_outfile_open(const char *path, sdm_outfile **out, sdm_error *err)
 
 const char *sdm_outfile_temp_path(const sdm_outfile *f) { return f->temp; }
 
-static sdm_status flush(sdm_outfile *f, sdm_error *err)
+static sdm_status outfile_flush(sdm_outfile *f, sdm_error *err)
 {
     for (size_t at = 0; at < f->filled;) {
         const ssize_t put = write(f->fd, f->buffer + at, f->filled - at);
@@ -159,7 +163,7 @@ sdm_status sdm_outfile_write(sdm_outfile *f, const void *data, size_t size, sdm_
     const uint8_t *p = data;
     while (size) {
         if (f->filled == BUFFER_BYTES) {
-            const sdm_status s = flush(f, err);
+            const sdm_status s = outfile_flush(f, err);
             if (s) return s;
         }
         size_t n = BUFFER_BYTES - f->filled;
@@ -186,10 +190,10 @@ sdm_status sdm_outfile_printf(sdm_outfile *f, sdm_error *err, const char *fmt, .
     return s;
 }
 
-// makes the rename itself durable; file systems that cannot sync a folder are not an error
-static void sync_folder(const char *path)
+/* Makes the rename durable. Not every file system can sync a folder, so errors are ignored. */
+static void folder_sync(const char *path)
 {
-    char *folder = with_suffix(path, "");
+    char *folder = path_with_suffix(path, "");
     if (!folder) return;
     char *slash = strrchr(folder, '/');
     if (slash) slash[slash == folder] = '\0';
@@ -204,8 +208,8 @@ static void sync_folder(const char *path)
 sdm_status sdm_outfile_commit(sdm_outfile **pf, sdm_error *err)
 {
     sdm_outfile *f = *pf;
-    sdm_status s = flush(f, err);
-    // a library may have replaced the temporary file by name: sync what has that name now
+    sdm_status s = outfile_flush(f, err);
+    // a library may have replaced the temporary file: open it by name again before fsync()
     if (!s) {
         const int fd = open(f->temp, O_RDWR | O_CLOEXEC);
         if (fd < 0 || fsync(fd))
@@ -221,7 +225,7 @@ sdm_status sdm_outfile_commit(sdm_outfile **pf, sdm_error *err)
         sdm_outfile_discard(pf);
         return s;
     }
-    sync_folder(f->path);
+    folder_sync(f->path);
     free(f->path);
     free(f->temp);
     sdm_free(f);
@@ -244,7 +248,7 @@ void sdm_outfile_discard(sdm_outfile **pf)
 sdm_status sdm_make_folder(const char *path, sdm_error *err)
 {
     if (!*path) return sdm_fail(err, SDM_E_ARG, "the name of a folder is empty");
-    char *name = with_suffix(path, "");
+    char *name = path_with_suffix(path, "");
     if (!name) return sdm_fail(err, SDM_E_NOMEM, "%s: no memory for its name", path);
     sdm_status s = SDM_OK;
     for (char *at = name + 1; !s; at++) {

@@ -1,4 +1,4 @@
-/* The regular grid: checks and coordinates. */
+/* Regular grid: checks and conversion of coordinates. */
 #include "sdm/grid.h"
 
 #include <math.h>
@@ -21,7 +21,8 @@ sdm_status sdm_grid_check(const sdm_grid *g, sdm_error *err)
         if (g->n[a] < 1 || g->n[a] > 1 << 20)
             return sdm_fail(err, SDM_E_ARG, "grid size along %c is %lld, need 1 to 1048576",
                             axis[a], (long long)g->n[a]);
-        if (!(g->spacing[a] >= 1e-100) || !(g->spacing[a] <= 1e100)) // squares must be numbers too
+        // squares of spacings must be finite and normal, too
+        if (!(g->spacing[a] >= 1e-100) || !(g->spacing[a] <= 1e100))
             return sdm_fail(
                 err, SDM_E_ARG,
                 "grid spacing along %c is %g mm, need a positive number (1e-100 to 1e100)", axis[a],
@@ -31,7 +32,7 @@ sdm_status sdm_grid_check(const sdm_grid *g, sdm_error *err)
                             "grid origin along %c is %g mm, need a finite number up to 1e100",
                             axis[a], g->origin[a]);
     }
-    // 2^60 floats cannot be addressed: three factors of at most 2^20 do not overflow int64
+    // each size is at most 2^20, so the product of three does not overflow int64
     if ((uint64_t)(g->n[0] * g->n[1] * g->n[2]) > SIZE_MAX / sizeof(double) / 4)
         return sdm_fail(err, SDM_E_ARG,
                         "grid of %lld x %lld x %lld voxels is more than memory can hold",

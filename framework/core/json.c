@@ -1,10 +1,10 @@
-/* JSON writer. */
+/* JSON writer (sdm/internal/text.h). */
 #include <math.h>
 #include <string.h>
 
 #include "sdm/internal/text.h"
 
-static void quoted(sdm_text *t, const char *s)
+static void json_quote(sdm_text *t, const char *s)
 {
     sdm_text_add(t, "\"");
     for (; *s; s++) {
@@ -21,18 +21,18 @@ static void quoted(sdm_text *t, const char *s)
     sdm_text_add(t, "\"");
 }
 
-static void begin(sdm_json *j, const char *key)
+static void json_begin(sdm_json *j, const char *key)
 {
     if (j->needs_comma[j->depth]) sdm_text_add(&j->text, ", ");
     j->needs_comma[j->depth] = true;
     if (!key) return;
-    quoted(&j->text, key);
+    json_quote(&j->text, key);
     sdm_text_add(&j->text, ": ");
 }
 
 void sdm_json_open(sdm_json *j, const char *key, char bracket)
 {
-    begin(j, key);
+    json_begin(j, key);
     sdm_text_add(&j->text, "%c", bracket);
     if (j->depth + 1 == (int)(sizeof j->needs_comma / sizeof *j->needs_comma)) {
         j->text.failed = true;
@@ -50,32 +50,32 @@ void sdm_json_close(sdm_json *j, char bracket)
 void sdm_json_real(sdm_json *j, const char *key, double v)
 {
     char buf[32];
-    begin(j, key);
+    json_begin(j, key);
     sdm_text_add(&j->text, "%s", isfinite(v) ? sdm_format_real(v, buf) : "null");
 }
 
 void sdm_json_int(sdm_json *j, const char *key, int64_t v)
 {
-    begin(j, key);
+    json_begin(j, key);
     sdm_text_add(&j->text, "%lld", (long long)v);
 }
 
 void sdm_json_uint(sdm_json *j, const char *key, uint64_t v)
 {
-    begin(j, key);
+    json_begin(j, key);
     sdm_text_add(&j->text, "%llu", (unsigned long long)v);
 }
 
 void sdm_json_bool(sdm_json *j, const char *key, bool v)
 {
-    begin(j, key);
+    json_begin(j, key);
     sdm_text_add(&j->text, v ? "true" : "false");
 }
 
 void sdm_json_text(sdm_json *j, const char *key, const char *v)
 {
-    begin(j, key);
-    quoted(&j->text, v);
+    json_begin(j, key);
+    json_quote(&j->text, v);
 }
 
 void sdm_json_dispose(sdm_json *j)

@@ -1,6 +1,6 @@
-/* Checked, aligned memory with a trap for tests. */
+/* Aligned memory with overflow checks and simulated failures for tests. */
 #ifdef __linux__
-#define _DEFAULT_SOURCE // madvise
+#define _DEFAULT_SOURCE // for madvise()
 #endif
 #include "sdm/internal/heap.h"
 
@@ -15,11 +15,12 @@
 #define ALIGNMENT 64u
 #define HUGE_PAGE ((size_t)2 << 20)
 
-static atomic_ulong fail_after; // 0: off; only tests set it
+/* The allocation that fails, counted from now; 0: none; only set by tests. */
+static atomic_ulong fail_after;
 
 void sdm_alloc_fail_after(unsigned long n) { atomic_store(&fail_after, n); }
 
-static bool must_fail(void)
+static bool failure_due(void)
 {
     return atomic_load_explicit(&fail_after, memory_order_relaxed) &&
            atomic_fetch_sub(&fail_after, 1) == 1;
@@ -33,9 +34,9 @@ sdm_status sdm_mul(size_t a, size_t b, size_t *out, sdm_error *err)
     return SDM_OK;
 }
 
-/* *used: bytes of the block, which may be larger than asked for. */
-static sdm_status allocate(void **out, size_t count, size_t size, size_t *used, const char *what,
-                           sdm_error *err)
+/* Allocates without initialisation. *used: bytes of the block, rounded up to the alignment. */
+static sdm_status block_allocate(void **out, size_t count, size_t size, size_t *used,
+                                 const char *what, sdm_error *err)
 {
     *out = NULL;
     size_t bytes = 0;
@@ -46,10 +47,10 @@ static sdm_status allocate(void **out, size_t count, size_t size, size_t *used, 
     bytes = (bytes + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
     if (!bytes) bytes = ALIGNMENT;
     void *block = NULL;
-    // blocks of many pages: large pages spare a third of the time of a first touch
+    // large pages cut the time of the first access to a big block by a third
     const bool large = bytes >= 2 * HUGE_PAGE && bytes <= SIZE_MAX - HUGE_PAGE;
     if (large) bytes = (bytes + HUGE_PAGE - 1) / HUGE_PAGE * HUGE_PAGE;
-    if (!must_fail()) block = aligned_alloc(large ? HUGE_PAGE : ALIGNMENT, bytes);
+    if (!failure_due()) block = aligned_alloc(large ? HUGE_PAGE : ALIGNMENT, bytes);
 #ifdef MADV_HUGEPAGE
     if (block && large) (void)madvise(block, bytes, MADV_HUGEPAGE);
 #endif
@@ -62,7 +63,7 @@ static sdm_status allocate(void **out, size_t count, size_t size, size_t *used, 
 sdm_status sdm_alloc(void **out, size_t count, size_t size, const char *what, sdm_error *err)
 {
     size_t used = 0;
-    const sdm_status s = allocate(out, count, size, &used, what, err);
+    const sdm_status s = block_allocate(out, count, size, &used, what, err);
     if (!s) memset(*out, 0, used);
     return s;
 }
@@ -70,7 +71,7 @@ sdm_status sdm_alloc(void **out, size_t count, size_t size, const char *what, sd
 sdm_status sdm_alloc_unset(void **out, size_t count, size_t size, const char *what, sdm_error *err)
 {
     size_t used;
-    return allocate(out, count, size, &used, what, err);
+    return block_allocate(out, count, size, &used, what, err);
 }
 
 sdm_status sdm_grow(void **block, size_t old_count, size_t new_count, size_t size, const char *what,

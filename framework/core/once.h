@@ -1,4 +1,4 @@
-/* Something done once, by whichever thread comes first. */
+/* One-time initialisation by the first thread that needs it (pthread_once). */
 #ifndef SDM_CORE_ONCE_H
 #define SDM_CORE_ONCE_H
 

@@ -1,21 +1,24 @@
-/* Rigid poses: rotation vectors, matrices and quaternions. */
+/* Rigid poses; rotation vectors, matrices and quaternions. */
 #include "sdm/pose.h"
 #include "sdm/internal/rotation.h"
 
 #include <math.h>
 
-static double length(const double v[3]) { return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
+static double vector_length(const double v[3])
+{
+    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
 
 static double sinc(double x) { return x == 0 ? 1 : sin(x) / x; }
 
-static void cross(const double a[3], const double b[3], double out[3])
+static void vector_cross(const double a[3], const double b[3], double out[3])
 {
     for (int i = 0; i < 3; i++)
         out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
 
-// m = I + a [r]x + b [r]x^2
-static void series(const double r[3], double a, double b, double m[9])
+/* m = I + a [r]x + b [r]x^2, where [r]x is the matrix of the cross product with r. */
+static void rotation_series(const double r[3], double a, double b, double m[9])
 {
     const double square = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
     const double skew[9] = {0, -r[2], r[1], r[2], 0, -r[0], -r[1], r[0], 0};
@@ -45,9 +48,9 @@ sdm_status sdm_pose_check(const sdm_pose *pose, sdm_error *err)
 
 void sdm_pose_matrix(const sdm_pose *pose, double r[9])
 {
-    // (1 - cos t) / t^2 = sinc(t / 2)^2 / 2 does not cancel at small angles
-    const double angle = length(pose->rotation), half = sinc(0.5 * angle);
-    series(pose->rotation, sinc(angle), 0.5 * half * half, r);
+    // (1 - cos t) / t^2 = sinc(t / 2)^2 / 2 has no cancellation at small angles
+    const double angle = vector_length(pose->rotation), half = sinc(0.5 * angle);
+    rotation_series(pose->rotation, sinc(angle), 0.5 * half * half, r);
 }
 
 void sdm_pose_apply(const sdm_pose *pose, const double x[3], double world[3])
@@ -77,17 +80,17 @@ sdm_pose sdm_pose_inverse(const sdm_pose *pose)
     return inverse;
 }
 
-static void quaternion_of(const double rotation[3], double q[4])
+static void quaternion_of_rotation(const double rotation[3], double q[4])
 {
-    const double half = 0.5 * length(rotation), s = 0.5 * sinc(half);
+    const double half = 0.5 * vector_length(rotation), s = 0.5 * sinc(half);
     q[0] = cos(half);
     for (int i = 0; i < 3; i++) q[1 + i] = s * rotation[i];
 }
 
 void sdm_rotation_of_quaternion(const double q[4], double rotation[3])
 {
-    // the shorter of the two turns that q and -q stand for
-    const double sine = length(q + 1), sign = q[0] < 0 ? -1 : 1;
+    // q and -q are the same rotation: take the angle of at most pi
+    const double sine = vector_length(q + 1), sign = q[0] < 0 ? -1 : 1;
     const double scale = sine == 0 ? 2 * sign : 2 * sign * atan2(sine, fabs(q[0])) / sine;
     for (int i = 0; i < 3; i++) rotation[i] = scale * q[1 + i];
 }
@@ -95,10 +98,10 @@ void sdm_rotation_of_quaternion(const double q[4], double rotation[3])
 sdm_pose sdm_pose_compose(const sdm_pose *outer, const sdm_pose *inner)
 {
     double a[4], b[4], q[4];
-    quaternion_of(outer->rotation, a);
-    quaternion_of(inner->rotation, b);
+    quaternion_of_rotation(outer->rotation, a);
+    quaternion_of_rotation(inner->rotation, b);
     q[0] = a[0] * b[0] - (a[1] * b[1] + a[2] * b[2] + a[3] * b[3]);
-    cross(a + 1, b + 1, q + 1);
+    vector_cross(a + 1, b + 1, q + 1);
     for (int i = 1; i < 4; i++) q[i] += a[0] * b[i] + b[0] * a[i];
     sdm_pose both;
     sdm_rotation_of_quaternion(q, both.rotation);
@@ -115,7 +118,8 @@ void sdm_rotation_product(const double a[9], const double b[9], double out[9])
 
 void sdm_rotation_vector(const double r[9], double rotation[3])
 {
-    // Shepperd (1978): from the largest of the four squares, so that no small number is divided by
+    // Shepperd (1978): start with the largest of the four squared components, to avoid division by
+    // a small number
     const double trace = r[0] + r[4] + r[8];
     int k = 0;
     for (int i = 1; i < 3; i++)
@@ -138,8 +142,9 @@ void sdm_rotation_vector(const double r[9], double rotation[3])
     sdm_rotation_of_quaternion(q, rotation);
 }
 
-// (t - sin t) / t^3: the formula cancels at small angles
-static double third_coefficient(double angle)
+/* (t - sin t) / t^3; by its power series below 1 rad, where the formula suffers from
+ * cancellation. */
+static double jacobian_coefficient(double angle)
 {
     const double square = angle * angle;
     if (angle >= 1) return (1 - sinc(angle)) / square;
@@ -150,6 +155,6 @@ static double third_coefficient(double angle)
 
 void sdm_rotation_jacobian(const double rotation[3], double j[9])
 {
-    const double angle = length(rotation), half = sinc(0.5 * angle);
-    series(rotation, 0.5 * half * half, third_coefficient(angle), j);
+    const double angle = vector_length(rotation), half = sinc(0.5 * angle);
+    rotation_series(rotation, 0.5 * half * half, jacobian_coefficient(angle), j);
 }

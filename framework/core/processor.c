@@ -1,15 +1,16 @@
-/* Choice of the instruction set. */
+/* Instruction set of the processor. */
 #include "sdm/internal/processor.h"
 
 static int wanted_level = -1;
 
-// The processor's abilities are read from memory, where the start-up code of the compiler's library
-// keeps them: a call costs little.
+/* Cheap enough for every call: __builtin_cpu_supports() reads flags that the start-up code of the
+ * compiler's run-time library has stored. */
 int sdm_processor_level(void)
 {
     int best = SDM_PROCESSOR_BASELINE;
 #if defined(__x86_64__) && defined(__GNUC__)
-    // every processor with AVX2 has F16C, a name that clang 14 does not know
+    // "f16c" is not tested because clang 14 does not accept the name; every processor with AVX2 has
+    // it
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) best = SDM_PROCESSOR_AVX2;
     if (best == SDM_PROCESSOR_AVX2 && __builtin_cpu_supports("avx512f") &&
         __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq") &&

@@ -1,4 +1,4 @@
-/* Philox4x32-10 (Salmon et al. 2011) and the laws drawn from it. */
+/* Philox4x32-10 (Salmon et al. 2011), and random numbers of several distributions from its bits. */
 #include "sdm/internal/rng.h"
 
 #include <math.h>
@@ -17,7 +17,7 @@ void sdm_rng_block(uint64_t seed, uint64_t stream, uint64_t index, uint32_t out[
     for (int i = 0; i < 4; i++) out[i] = c[i];
 }
 
-static double unit(uint32_t high, uint32_t low)
+static double unit_real(uint32_t high, uint32_t low)
 {
     return (double)(((uint64_t)high << 32 | low) >> 11) * 0x1p-53;
 }
@@ -26,14 +26,15 @@ double sdm_rng_uniform(uint64_t seed, uint64_t stream, uint64_t index)
 {
     uint32_t r[4];
     sdm_rng_block(seed, stream, index, r);
-    return unit(r[0], r[1]);
+    return unit_real(r[0], r[1]);
 }
 
 double sdm_rng_normal(uint64_t seed, uint64_t stream, uint64_t index)
 {
     uint32_t r[4];
     sdm_rng_block(seed, stream, index, r);
-    const double u = 1.0 - unit(r[0], r[1]), v = unit(r[2], r[3]); // u > 0
+    // u > 0, so log(u) is finite
+    const double u = 1.0 - unit_real(r[0], r[1]), v = unit_real(r[2], r[3]);
     return sqrt(-2.0 * log(u)) * cos(6.283185307179586476925 * v);
 }
 

@@ -1,4 +1,4 @@
-/* Status names and error text. */
+/* Names of status codes, formatting of error messages. */
 #include "sdm/status.h"
 
 #include <stdarg.h>
@@ -25,7 +25,7 @@ sdm_status sdm_fail_in(sdm_error *err, sdm_status status, const char *fmt, ...)
     if (vsnprintf(prefix, sizeof prefix, fmt, args) < 0) prefix[0] = '\0';
     va_end(args);
 
-    // the old text moves to the right; its end is cut when there is no room
+    // move the old text right to make room for the prefix; cut its end if it does not fit
     const size_t n = strlen(prefix), room = sizeof err->text - n - 3;
     size_t old = strnlen(err->text, sizeof err->text - 1);
     if (old > room) old = room;

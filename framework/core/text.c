@@ -1,4 +1,4 @@
-/* Growing text, numbers without the locale, nearest names. */
+/* Text buffer, conversion of numbers independent of the locale, similar names. */
 #include "sdm/internal/text.h"
 
 #include <locale.h>
@@ -38,8 +38,7 @@ void sdm_text_add(sdm_text *t, const char *fmt, ...)
     va_end(again);
 }
 
-// strtod follows the locale of the process; a private "C" locale would need newlocale, so the
-// decimal point is put in by hand
+/* Strtod() uses the decimal point of the current locale, so replace '.' by that character. */
 bool sdm_parse_real(const char *s, double *out)
 {
     char buf[512];
@@ -74,7 +73,7 @@ bool sdm_parse_int(const char *s, int64_t *out)
 const char *sdm_format_real(double v, char buf[32])
 {
     const char point = localeconv()->decimal_point[0];
-    if (fabs(v) < 1e15 && v == floor(v)) { // 20, not 2e+01
+    if (fabs(v) < 1e15 && v == floor(v)) { // integers without exponent: 20, not 2e+01
         snprintf(buf, 32, "%.0f", v);
         return buf;
     }
@@ -91,8 +90,9 @@ const char *sdm_format_real(double v, char buf[32])
 
 static int smaller(int a, int b) { return a < b ? a : b; }
 
-// optimal string alignment: insertions, deletions, replacements, swaps of neighbours
-static int distance(const char *a, const char *b)
+/* Optimal string alignment distance: insertions, deletions, substitutions, transpositions of
+ * neighbours. */
+static int edit_distance(const char *a, const char *b)
 {
     const int n = (int)strnlen(a, WORD_MAX), m = (int)strnlen(b, WORD_MAX);
     int row[3][WORD_MAX + 1];
@@ -114,10 +114,10 @@ static int distance(const char *a, const char *b)
 const char *sdm_nearest_name(const char *word, const char *const *names, size_t n)
 {
     const int length = (int)strnlen(word, WORD_MAX);
-    int best = length <= 2 ? 2 : length / 3 + 2; // as near as this at least, exclusive
+    int best = length <= 2 ? 2 : length / 3 + 2; // distances must be below this limit
     const char *nearest = NULL;
     for (size_t i = 0; i < n; i++) {
-        const int d = distance(word, names[i]);
+        const int d = edit_distance(word, names[i]);
         if (d < best) best = d, nearest = names[i];
     }
     return nearest;

@@ -1,18 +1,19 @@
-/* Numbers of threads. */
+/* Number of threads. */
 #include "sdm/internal/threads.h"
 
 #ifdef _OPENMP
 #include <omp.h>
 #endif
 
-/* So many on a small machine, too: tests ask for more than it has. */
-#define MOST 64
+/* Lower limit of the allowed maximum: tests use more threads than a small machine has
+ * processors. */
+#define LIMIT_MIN 64
 
 int sdm_threads(int wanted)
 {
 #ifdef _OPENMP
     const int n = wanted > 0 ? wanted : omp_get_max_threads(), twice = 2 * omp_get_num_procs();
-    const int most = twice > MOST ? twice : MOST;
+    const int most = twice > LIMIT_MIN ? twice : LIMIT_MIN;
     return n < most ? n : most;
 #else
     (void)wanted;

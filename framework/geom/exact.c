@@ -1,4 +1,5 @@
-/* The exact engine: from a mesh to a prepared solid, maps and single points. */
+/* The exact engine: prepares a mesh for distance queries, and answers them for grids and single
+ * points. */
 #include "sdm/exact.h"
 
 #include <float.h>
@@ -18,15 +19,14 @@
 struct sdm_exact {
     sdm_exact_opts opts;
     sdm_exact_report report;
-    sdm_arena arena;     // of the survey and of nearest
-    sdm_mesh solid;      // the mesh as given, turned if it was inside out: the sign comes from it
-    sdm_mesh surface;    // what distances are measured to
-    uint32_t *source;    // [surface.n_tri] triangle of the given mesh
-    sdm_survey survey;   // of solid
-    sdm_nearest nearest; // of surface
+    sdm_arena arena;     // holds survey and nearest; with a memory limit `used` counts all of this
+    sdm_mesh solid;      // the given mesh with its orientation corrected: the sign comes from it
+    sdm_mesh surface;    // the mesh to which distances are measured
+    uint32_t *source;    // [surface.n_tri] the triangle of the given mesh
+    sdm_survey survey;   // of `solid`
+    sdm_nearest nearest; // of `surface`
     sdm_sign sign;
-    double rounding; // size of a rounding error of the coordinates
-    size_t held;     // with a memory limit: bytes of all this
+    double rounding; // bound on the rounding error of the coordinates, mm
 };
 
 const char *sdm_sign_method_name(sdm_sign_method m)
@@ -35,138 +35,137 @@ const char *sdm_sign_method_name(sdm_sign_method m)
     return (unsigned)m < sizeof names / sizeof *names ? names[m] : "unknown";
 }
 
+/* Bytes of the arrays of a mesh, unused capacity included. */
 static size_t mesh_bytes(const sdm_mesh *m)
-{
-    return m->n_vert * 3 * sizeof *m->vert + m->n_tri * 3 * sizeof *m->tri;
-}
-
-/* The options with what the memory limit leaves beside the engine and `more` bytes. */
-static sdm_exact_opts opts_beside(const sdm_exact *e, size_t more)
-{
-    sdm_exact_opts o = e->opts;
-    const size_t taken = more < SIZE_MAX - e->held ? e->held + more : SIZE_MAX;
-    if (o.memory_limit)
-        o.memory_limit = taken < o.memory_limit ? o.memory_limit - taken : 1; // 0 would be none
-    return o;
-}
-
-/* With room that is not used. */
-static size_t mesh_room(const sdm_mesh *m)
 {
     return m->cap_vert * 3 * sizeof *m->vert + m->cap_tri * 3 * sizeof *m->tri;
 }
 
-static void drop_survey(sdm_exact *e, sdm_arena_mark low, sdm_arena_mark high)
+/* The options with memory_limit reduced to what the engine and `more` bytes leave of it. */
+static sdm_exact_opts opts_beside(const sdm_exact *e, size_t more)
+{
+    sdm_exact_opts o = e->opts;
+    const size_t taken = more < SIZE_MAX - e->arena.used ? e->arena.used + more : SIZE_MAX;
+    if (o.memory_limit) // at least 1: 0 means no limit
+        o.memory_limit = taken < o.memory_limit ? o.memory_limit - taken : 1;
+    return o;
+}
+
+static sdm_status copy_mesh(sdm_exact *e, const sdm_mesh *mesh, sdm_error *err)
+{
+    const sdm_status s = sdm_arena_charge(
+        &e->arena, mesh->n_vert * 3 * sizeof *mesh->vert + mesh->n_tri * 3 * sizeof *mesh->tri,
+        err);
+    return s ? s : sdm_mesh_copy(mesh, &e->solid, err);
+}
+
+/* Surveys the solid in the arena, in place of the survey that begins at the two marks. */
+static sdm_status survey_again(sdm_exact *e, sdm_arena_mark low, sdm_arena_mark high,
+                               sdm_error *err)
 {
     sdm_arena_release(&e->arena, SDM_LOW, low);
     sdm_arena_release(&e->arena, SDM_HIGH, high);
     e->survey = (sdm_survey){0};
+    return sdm_survey_build(&e->solid, &e->arena, &e->survey, err);
 }
 
-static sdm_status survey_solid(sdm_exact *e, sdm_budget *budget, sdm_error *err)
+/* Surveys the solid and corrects its orientation. The audit of the report is that of the given
+ * mesh. */
+static sdm_status survey_solid(sdm_exact *e, sdm_error *err)
 {
-    const size_t used = budget->used;
     const sdm_arena_mark low = e->arena.end[SDM_LOW], high = e->arena.end[SDM_HIGH];
-    sdm_status s = sdm_survey_build(&e->solid, &e->arena, &e->survey, budget, err);
+    sdm_status s = sdm_survey_build(&e->solid, &e->arena, &e->survey, err);
     if (s) return s;
     e->report.audit = e->survey.audit;
     if (e->survey.audit.inverted) {
-        // inside out: turn every triangle; the report keeps what was found
         for (size_t t = 0; t < e->solid.n_tri; t++) sdm_triangle_turn(&e->solid, t);
         e->report.turned = true;
-        drop_survey(e, low, high);
-        budget->used = used;
-        s = sdm_survey_build(&e->solid, &e->arena, &e->survey, budget, err);
+        s = survey_again(e, low, high, err);
+        if (s) return s;
     }
-    if (!s) s = sdm_parts_turn(&e->solid, &e->survey, &e->report.parts_turned, err);
-    if (s || !e->report.parts_turned) return s;
-    drop_survey(e, low, high);
-    budget->used = used;
-    return sdm_survey_build(&e->solid, &e->arena, &e->survey, budget, err);
+    s = sdm_parts_turn(&e->solid, &e->survey, &e->report.parts_turned, err);
+    return s || !e->report.parts_turned ? s : survey_again(e, low, high, err);
 }
 
-static sdm_status make_surface(sdm_exact *e, sdm_budget *budget, sdm_error *err)
+/* The surface: the union hull of the solid, or a copy of the solid if nothing is removed. */
+static sdm_status make_surface(sdm_exact *e, sdm_error *err)
 {
-    const size_t used = budget->used;
     bool changed = false;
-    if (e->survey.audit.closed && !e->opts.keep_overlap) {
-        const sdm_status s =
-            sdm_union_hull(&e->solid, &e->survey, &e->arena, &e->surface, &e->source, &changed,
-                           &e->report.union_error_mm, budget, err);
-        if (s) return s;
-        // sheets that cancel everywhere enclose nothing: distances are to the sheets
-        if (changed && !e->surface.n_tri) changed = false;
-    }
-    e->report.unioned = changed;
-    if (changed) return SDM_OK;
+    sdm_status s = SDM_OK;
+    if (e->survey.audit.closed && !e->opts.keep_overlap)
+        s = sdm_union_hull(&e->solid, &e->survey, &e->arena, &e->surface, &e->source, &changed,
+                           &e->report.union_error_mm, err);
+    if (s) return s;
+    // sheets that cancel everywhere enclose nothing: distances are then to the sheets
+    e->report.unioned = changed && e->surface.n_tri;
+    if (e->report.unioned) return SDM_OK;
     e->report.union_error_mm = 0;
+    e->arena.used -= mesh_bytes(&e->surface) + e->surface.cap_tri * sizeof *e->source;
     sdm_free(e->source);
     e->source = NULL;
     sdm_mesh_dispose(&e->surface);
-    budget->used = used;
-    sdm_status s =
-        sdm_budget_take(budget, mesh_bytes(&e->solid) + e->solid.n_tri * sizeof *e->source, err);
+    s = sdm_arena_charge(&e->arena, mesh_bytes(&e->solid) + e->solid.n_tri * sizeof *e->source,
+                         err);
     if (!s) s = SDM_ALLOC(&e->source, e->solid.n_tri, "sources of triangles", err);
     for (size_t t = 0; t < e->solid.n_tri && !s; t++) e->source[t] = (uint32_t)t;
     return s ? s : sdm_mesh_copy(&e->solid, &e->surface, err);
 }
 
-/* The tree and the data of the surface, which nothing but the tree of the solid stays beside. */
-static sdm_status build_nearest(sdm_exact *e, sdm_budget *budget, sdm_error *err)
+/* Refuses the pseudonormal method when inner surface was removed. */
+static sdm_status check_pseudonormal(const sdm_exact *e, sdm_error *err)
+{
+    if (e->report.sign != SDM_SIGN_PSEUDONORMAL || !e->report.unioned) return SDM_OK;
+    return sdm_fail(err, SDM_E_ARG,
+                    "sign method pseudonormal needs a mesh without surface inside the solid, this "
+                    "one has some; use auto");
+}
+
+/* Tree and features of the surface. Of the survey only the tree and, where needed, the topology
+ * stay. */
+static sdm_status build_nearest(sdm_exact *e, sdm_error *err)
 {
     const sdm_mesh *m = &e->surface;
-    const bool keep_topology = !e->report.unioned || e->report.sign != SDM_SIGN_CROSSINGS;
-    sdm_survey_shrink(&e->survey, &e->arena, keep_topology);
-    budget->used = 0;
-    size_t scratch = 0,
-           bytes = mesh_bytes(&e->solid) + mesh_room(m) + m->cap_tri * sizeof *e->source;
-    bytes += e->survey.tree.n_node * sizeof(sdm_bvh_node) + e->solid.n_tri * sizeof(uint32_t);
-    if (keep_topology) bytes += sdm_topology_bytes(&e->solid, &(size_t){0});
-    if (e->report.unioned) bytes += sdm_topology_bytes(m, &scratch);
-    bytes += sdm_bvh_bytes(m->n_tri, &scratch) + m->n_tri * sizeof(sdm_frame);
-    sdm_status s = sdm_budget_take(budget, bytes + scratch, err);
-    if (s) return s;
+    sdm_survey_shrink(&e->survey, &e->arena,
+                      !e->report.unioned || e->report.sign != SDM_SIGN_CROSSINGS);
     if (!e->report.unioned) {
-        e->nearest.tree = e->survey.tree; // of the same triangles
-        return sdm_nearest_build(m, &e->survey.topo, &e->arena, &e->nearest, budget, err);
+        // the surface has the triangles of the solid, and so the same tree and topology
+        e->nearest.tree = e->survey.tree;
+        return sdm_nearest_build(m, &e->survey.topo, &e->arena, &e->nearest, err);
     }
     const sdm_arena_mark before = e->arena.end[SDM_HIGH];
     sdm_topology topo = {0};
-    s = sdm_bvh_derive(&e->survey.tree, m, e->source, &e->arena, &e->nearest.tree, err);
+    sdm_status s = sdm_bvh_derive(&e->survey.tree, m, e->source, &e->arena, &e->nearest.tree, err);
     if (!s) s = sdm_topology_build(m, &e->arena, &topo, err);
-    if (!s) s = sdm_nearest_build(m, &topo, &e->arena, &e->nearest, budget, err);
+    if (!s) s = sdm_nearest_build(m, &topo, &e->arena, &e->nearest, err);
     sdm_arena_release(&e->arena, SDM_HIGH, before);
     return s;
 }
 
-/* What a closed mesh takes with a few contacts. Guessed too low, arrays are allocated one by one.
- */
+static sdm_status build_sign(sdm_exact *e, sdm_error *err)
+{
+    const sdm_status s =
+        sdm_sign_build(&e->solid, &e->survey, &e->nearest, e->report.sign, &e->sign, err);
+    return s ? s : sdm_arena_charge(&e->arena, sdm_sign_bytes(&e->sign), err);
+}
+
+/* Bytes that the arena needs for a closed mesh with few contacts. Larger needs are met by separate
+ * allocations. */
 static size_t usual_bytes(const sdm_mesh *m) { return 1080 * m->n_tri + 220 * m->n_vert; }
 
+/* The preparation step by step. After an error sdm_exact_free() frees what is there. */
 static sdm_status prepare(sdm_exact *e, const sdm_mesh *mesh, sdm_error *err)
 {
-    sdm_budget budget = {.limit = e->opts.memory_limit, .n_tri = mesh->n_tri, .opts = &e->opts};
-    sdm_status s = sdm_budget_take(&budget, mesh_bytes(mesh), err);
-    if (!s) s = sdm_mesh_copy(mesh, &e->solid, err);
-    if (!s && !budget.limit) s = sdm_arena_reserve(&e->arena, usual_bytes(mesh), err);
-    if (!s) s = survey_solid(e, &budget, err);
+    e->arena.opts = &e->opts;
+    e->arena.n_tri = mesh->n_tri;
+    sdm_status s = copy_mesh(e, mesh, err);
+    if (!s) s = sdm_arena_reserve(&e->arena, usual_bytes(mesh), err);
+    if (!s) s = survey_solid(e, err);
     if (!s) s = sdm_sign_choose(&e->report.audit, e->opts.sign, &e->report.sign, err);
-    if (!s) s = make_surface(e, &budget, err);
-    if (!s && e->report.sign == SDM_SIGN_PSEUDONORMAL && e->report.unioned)
-        s = sdm_fail(err, SDM_E_ARG,
-                     "sign method pseudonormal needs a mesh without surface inside the solid, this "
-                     "one has some; use auto");
-    if (!s) s = build_nearest(e, &budget, err);
-    if (!s) s = sdm_sign_build(&e->solid, &e->survey, &e->nearest, e->report.sign, &e->sign, err);
+    if (!s) s = make_surface(e, err);
+    if (!s) s = check_pseudonormal(e, err);
+    if (!s) s = build_nearest(e, err);
+    if (!s) s = build_sign(e, err);
     if (s) return s;
-    if (budget.limit) {
-        e->held = mesh_bytes(&e->solid) + mesh_room(&e->surface) +
-                  e->surface.cap_tri * sizeof *e->source + sdm_arena_extra_bytes(&e->arena) +
-                  sdm_sign_bytes(&e->sign);
-        budget.used = 0;
-        s = sdm_budget_take(&budget, e->held, err);
-        if (s) return s;
-    }
     double largest = 0;
     for (int a = 0; a < 3; a++)
         largest = fmax(largest, fmax(fabs(e->report.audit.min[a]), fabs(e->report.audit.max[a])));
@@ -211,7 +210,7 @@ const sdm_exact_report *sdm_exact_get_report(const sdm_exact *e) { return &e->re
 const sdm_mesh *sdm_exact_surface(const sdm_exact *e) { return &e->surface; }
 const uint32_t *sdm_exact_source(const sdm_exact *e) { return e->source; }
 
-/* Squares of the coordinates must be numbers, too. */
+/* False for NaN and for coordinates whose squares could overflow. */
 static bool is_point(const double x[3])
 {
     return fabs(x[0]) <= 1e150 && fabs(x[1]) <= 1e150 && fabs(x[2]) <= 1e150;
@@ -225,6 +224,7 @@ double sdm_exact_point(const sdm_exact *e, const double x[3], double closest[3],
     double q[3] = {NAN, NAN, NAN}, n[3] = {NAN, NAN, NAN};
     double d = NAN;
     if (is_point(x)) {
+        // the nearest triangle gives the sign, its nearest feature the distance
         (void)sdm_nearest_find(&e->nearest, x, INFINITY, &slot, q, &feature);
         const bool inside = sdm_sign_inside(&e->sign, x, slot, q, feature);
         d = sqrt(sdm_nearest_feature(&e->nearest, x, &slot));
@@ -248,8 +248,8 @@ double sdm_exact_distance(const sdm_exact *e, const double x[3])
     return sqrt(sdm_nearest_feature(&e->nearest, x, &slot));
 }
 
-/* The map, and the slot of the nearest triangle of every voxel where slot is not NULL; `more` bytes
- * are taken beside. */
+/* Fills values[] with the signed map and, if slot is not NULL, slot[] with the slot of the nearest
+ * triangle of every voxel. `more`: bytes in use beside the engine, for the memory limit. */
 static sdm_status fill_map(const sdm_exact *e, const sdm_grid *grid, double band_mm, size_t more,
                            float *values, uint32_t *slot, sdm_error *err)
 {
@@ -283,6 +283,7 @@ sdm_status sdm_exact_certify(const sdm_exact *e, const sdm_grid *grid, const flo
                         "certificate without an engine, a grid, a map or a place for the result");
     const sdm_status s = sdm_grid_check(grid, err);
     if (s) return s;
+    // largest abs(coordinate) of a voxel: at a corner of the grid
     double largest = 0;
     for (int corner = 0; corner < 8; corner++) {
         double index[3], x[3];
@@ -290,14 +291,14 @@ sdm_status sdm_exact_certify(const sdm_exact *e, const sdm_grid *grid, const flo
         sdm_grid_world(grid, index, x);
         for (int a = 0; a < 3; a++) largest = fmax(largest, fabs(x[a]));
     }
-    // roundings of the mesh's coordinates and of the voxels'
+    // the tolerance is the sum of the rounding errors of the mesh and of the voxel centres
     const sdm_exact_opts opts = opts_beside(e, 0);
     return sdm_sign_certify(&e->sign, grid, &opts, 4 * e->rounding + 16 * DBL_EPSILON * largest,
                             values, out, err);
 }
 
-/* Layers and derivatives: the job says which. Values that nobody wants are needed all the same, for
- * the signs. */
+/* Fills the layers and derivatives of *job. The map itself is always computed, because the layers
+ * need its signs; if the caller has no array for it, into a temporary one. */
 static sdm_status map_with_layers(const sdm_exact *e, const sdm_grid *grid, sdm_layers_job *job,
                                   sdm_error *err)
 {
@@ -307,6 +308,7 @@ static sdm_status map_with_layers(const sdm_exact *e, const sdm_grid *grid, sdm_
     if (!(band >= 0))
         return sdm_fail(err, SDM_E_ARG,
                         "narrow band of %g mm, need a positive width or 0 for the whole map", band);
+    // temporary arrays: the map, the nearest triangles, and the frames of the solid's triangles
     const bool layers = sdm_layers_wanted(job);
     const size_t n_value = job->out->values ? 0 : sdm_grid_count(grid),
                  limit = opts_beside(e, 0).memory_limit;
@@ -326,6 +328,7 @@ static sdm_status map_with_layers(const sdm_exact *e, const sdm_grid *grid, sdm_
     if (!s)
         s = fill_map(e, grid, band > 0 ? band : INFINITY, need, values, layers ? slot : NULL, err);
     if (!s && n_frame) sdm_sheets_frames(&e->solid, sdm_threads(e->opts.n_threads), frames);
+    // the layers from the map
     const double seam = e->report.unioned ? 2 * e->report.union_error_mm : 0;
     job->sheets = (sdm_sheets){&e->nearest, &e->solid, frames, e->source, seam};
     job->rounding = e->rounding;

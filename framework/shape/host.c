@@ -1,4 +1,4 @@
-/* What the program offers a plug-in during a call. */
+/* Implementation of sdm_host: the services that a plug-in can call during a callback. */
 #include <stdio.h>
 #include <string.h>
 
@@ -10,16 +10,16 @@
 
 #define DATA_FILE_MAX (UINT64_C(1) << 32)
 
-/* Memory that lives as long as the call. */
+/* Memory that is freed at the end of the callback. */
 typedef struct host_block {
     struct host_block *next;
     void *data;
     sdm_mesh mesh;
 } host_block;
 
-static host_call *call_of(const sdm_host *host) { return host->ctx; }
+static host_call *host_call_of(const sdm_host *host) { return host->ctx; }
 
-static host_block *new_block(host_call *c)
+static host_block *block_new(host_call *c)
 {
     host_block *b = NULL;
     if (SDM_ALLOC(&b, 1, "plug-in data", &c->err)) return NULL;
@@ -28,43 +28,44 @@ static host_block *new_block(host_call *c)
     return b;
 }
 
-static int give(sdm_mesh *m, sdm_mesh_out *out)
+static int mesh_out_set(sdm_mesh *m, sdm_mesh_out *out)
 {
     *out = (sdm_mesh_out){.vert = m->vert, .tri = m->tri, .n_vert = m->n_vert, .n_tri = m->n_tri};
     return 0;
 }
 
-static int reserve(const sdm_host *host, sdm_mesh_out *out, size_t n_vert, size_t n_tri)
+static int host_reserve(const sdm_host *host, sdm_mesh_out *out, size_t n_vert, size_t n_tri)
 {
-    host_call *c = call_of(host);
+    host_call *c = host_call_of(host);
     sdm_mesh *m = c->mesh;
     if (!m) {
-        host_block *b = new_block(c);
+        host_block *b = block_new(c);
         if (!b) return (int)SDM_E_NOMEM;
         m = &b->mesh;
     }
     const sdm_status s = sdm_mesh_reserve(m, n_vert, n_tri, &c->err);
-    return s ? (int)s : give(m, out);
+    return s ? (int)s : mesh_out_set(m, out);
 }
 
-static int fail(const sdm_host *host, const char *text)
+static int host_fail(const sdm_host *host, const char *text)
 {
-    return (int)sdm_fail(&call_of(host)->err, SDM_E_PLUGIN, "%s", text ? text : "no reason given");
+    return (int)sdm_fail(&host_call_of(host)->err, SDM_E_PLUGIN, "%s",
+                         text ? text : "no reason given");
 }
 
-// the files of a shape are read once, in create(): a mesh must not depend on what a file holds at
-// that moment
-static int refuse_file(host_call *c, const char *path)
+/* Files may only be read in create(): a mesh must not depend on the content of a file at the time
+ * of mesh(). */
+static int file_refuse(host_call *c, const char *path)
 {
     return (int)sdm_fail(&c->err, SDM_E_PLUGIN, "%s: files are read in create() alone", path);
 }
 
-static int read_file(const sdm_host *host, const char *path, const unsigned char **data,
-                     size_t *size)
+static int host_read_file(const sdm_host *host, const char *path, const unsigned char **data,
+                          size_t *size)
 {
-    host_call *c = call_of(host);
-    if (!c->files) return refuse_file(c, path);
-    host_block *b = new_block(c);
+    host_call *c = host_call_of(host);
+    if (!c->files) return file_refuse(c, path);
+    host_block *b = block_new(c);
     if (!b) return (int)SDM_E_NOMEM;
     uint8_t *bytes = NULL;
     const sdm_status s = sdm_file_read(path, DATA_FILE_MAX, &bytes, size, &c->err);
@@ -73,22 +74,22 @@ static int read_file(const sdm_host *host, const char *path, const unsigned char
     return (int)s;
 }
 
-static int read_mesh(const sdm_host *host, const char *path, sdm_mesh_out *out)
+static int host_read_mesh(const sdm_host *host, const char *path, sdm_mesh_out *out)
 {
-    host_call *c = call_of(host);
-    if (!c->files) return refuse_file(c, path);
-    host_block *b = new_block(c);
+    host_call *c = host_call_of(host);
+    if (!c->files) return file_refuse(c, path);
+    host_block *b = block_new(c);
     if (!b) return (int)SDM_E_NOMEM;
     const sdm_status s = sdm_mesh_read(path, &b->mesh, &c->err);
-    return s ? (int)s : give(&b->mesh, out);
+    return s ? (int)s : mesh_out_set(&b->mesh, out);
 }
 
-static int read_npy(const sdm_host *host, const char *path, const double **values, size_t shape[4],
-                    int *n_dim)
+static int host_read_npy(const sdm_host *host, const char *path, const double **values,
+                         size_t shape[4], int *n_dim)
 {
-    host_call *c = call_of(host);
-    if (!c->files) return refuse_file(c, path);
-    host_block *b = new_block(c);
+    host_call *c = host_call_of(host);
+    if (!c->files) return file_refuse(c, path);
+    host_block *b = block_new(c);
     if (!b) return (int)SDM_E_NOMEM;
     double *numbers = NULL;
     const sdm_status s = sdm_npy_read(path, &numbers, shape, n_dim, &c->err);
@@ -99,15 +100,16 @@ static int read_npy(const sdm_host *host, const char *path, const double **value
 
 void sdm_host_call_begin(host_call *c, sdm_mesh *mesh, bool files)
 {
-    // not the error's text, which is long: this runs once a mesh
+    // set members one by one: clearing the whole struct would clear the long error text for every
+    // mesh
     c->host = (sdm_host){.abi = SDM_SHAPE_ABI,
                          .size = (uint32_t)sizeof(sdm_host),
                          .ctx = c,
-                         .reserve = reserve,
-                         .fail = fail,
-                         .read_file = read_file,
-                         .read_mesh = read_mesh,
-                         .read_npy = read_npy};
+                         .reserve = host_reserve,
+                         .fail = host_fail,
+                         .read_file = host_read_file,
+                         .read_mesh = host_read_mesh,
+                         .read_npy = host_read_npy};
     c->mesh = mesh;
     c->files = files;
     c->blocks = NULL;

@@ -1,4 +1,5 @@
-/* A shape with its options fixed: checks before and after every call of a plug-in. */
+/* Instances: a shape with fixed option values. Checks arguments before and results after every
+ * callback of the plug-in. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -7,7 +8,7 @@
 #include "sdm/memory.h"
 #include "shape_internal.h"
 
-static sdm_status run_create(sdm_instance *s, sdm_error *err)
+static sdm_status instance_call_create(sdm_instance *s, sdm_error *err)
 {
     if (!s->shape->create) return SDM_OK;
     host_call call;
@@ -24,7 +25,7 @@ static sdm_status run_create(sdm_instance *s, sdm_error *err)
     return status;
 }
 
-static sdm_status run_describe(sdm_instance *s, sdm_error *err)
+static sdm_status instance_call_describe(sdm_instance *s, sdm_error *err)
 {
     s->params = s->shape->params;
     s->n_params = s->shape->n_params;
@@ -45,7 +46,7 @@ sdm_status sdm_instance_create(const sdm_shape *shape, const sdm_named_text *opt
                                size_t n_options, const char *base_dir, sdm_instance **out,
                                sdm_error *err)
 {
-    if (!out) return sdm_fail(err, SDM_E_ARG, "no place for the instance");
+    if (!out) return sdm_fail(err, SDM_E_ARG, "the address of the instance must not be NULL");
     *out = NULL;
     if (!shape || (n_options && !options))
         return sdm_fail(err, SDM_E_ARG, "a shape and its options are needed to make an instance");
@@ -57,8 +58,8 @@ sdm_status sdm_instance_create(const sdm_shape *shape, const sdm_named_text *opt
     if (!status)
         status =
             sdm_shape_parse_options(shape, options, n_options, base_dir, s->options, &s->text, err);
-    if (!status) status = run_create(s, err);
-    if (!status) status = run_describe(s, err);
+    if (!status) status = instance_call_create(s, err);
+    if (!status) status = instance_call_describe(s, err);
     if (status)
         sdm_instance_free(s);
     else
@@ -97,7 +98,7 @@ sdm_status sdm_instance_check(const sdm_instance *s, const double *p, sdm_error 
     if (!s || !p) return sdm_fail(err, SDM_E_ARG, "an instance and its parameters are needed");
     for (size_t i = 0; i < s->n_params; i++) {
         const sdm_param *q = &s->params[i];
-        if (p[i] >= q->min && p[i] <= q->max) continue; // false for NaN
+        if (p[i] >= q->min && p[i] <= q->max) continue; // a comparison with NaN is false
         char value[32], min[32], max[32];
         return sdm_fail(err, SDM_E_RANGE, "parameter '%s' of shape '%s' is %s%s%s, need %s .. %s",
                         q->name, s->shape->name, sdm_format_real(p[i], value),
@@ -126,8 +127,9 @@ sdm_status sdm_instance_fail_at(const sdm_instance *s, const double *p, sdm_stat
     return sdm_fail_in(err, status, "%s", where);
 }
 
-// what the plug-in wrote, against what it was given room for
-static sdm_status check_mesh(const sdm_mesh *m, const sdm_mesh_out *out, sdm_error *err)
+/* The plug-in must have filled the arrays of host->reserve() with valid indices and finite
+ * coordinates. */
+static sdm_status mesh_out_check(const sdm_mesh *m, const sdm_mesh_out *out, sdm_error *err)
 {
     if (!out->vert || out->vert != m->vert || out->tri != m->tri || out->n_vert != m->n_vert ||
         out->n_tri != m->n_tri)
@@ -151,14 +153,14 @@ sdm_status sdm_instance_mesh(const sdm_instance *s, const double *p, sdm_mesh *o
 {
     sdm_status status = sdm_instance_check(s, p, err);
     if (status) return status;
-    if (!out) return sdm_fail(err, SDM_E_ARG, "no place for the mesh");
+    if (!out) return sdm_fail(err, SDM_E_ARG, "the address of the mesh must not be NULL");
     out->n_vert = out->n_tri = 0;
     sdm_mesh_out filled = {0};
     host_call call;
     sdm_host_call_begin(&call, out, false);
     const int failed = s->shape->mesh(s->self, &call.host, s->options, p, &filled);
     status = failed ? sdm_host_call_failed(&call, "mesh", failed, SDM_E_PLUGIN, err)
-                    : check_mesh(out, &filled, err);
+                    : mesh_out_check(out, &filled, err);
     sdm_host_call_end(&call);
     if (!status) return SDM_OK;
     out->n_vert = out->n_tri = 0;
@@ -171,7 +173,8 @@ sdm_status sdm_instance_distance(const sdm_instance *s, const double *p, const d
     sdm_status status = sdm_instance_check(s, p, err);
     if (status) return status;
     if (!x || !distance)
-        return sdm_fail(err, SDM_E_ARG, "a point and a place for the distance are needed");
+        return sdm_fail(err, SDM_E_ARG,
+                        "the addresses of the point and the distance must not be NULL");
     if (!s->shape->distance)
         return sdm_fail(err, SDM_E_UNSUPPORTED, "shape '%s' has no closed-form distance",
                         s->shape->name);
@@ -181,7 +184,8 @@ sdm_status sdm_instance_distance(const sdm_instance *s, const double *p, const d
     sdm_host_call_begin(&call, NULL, false);
     double d = NAN;
     const int failed = s->shape->distance(s->self, &call.host, s->options, p, x, &d);
-    if (failed) // a shape may have a closed form for some of its options only
+    // a shape may have a closed form only for some values of its options
+    if (failed)
         status = sdm_host_call_failed(&call, "distance", failed, SDM_E_UNSUPPORTED, err);
     else if (!isfinite(d))
         status = sdm_fail(err, SDM_E_PLUGIN, "distance() gives a number that is not finite");

@@ -1,5 +1,5 @@
-/* Plug-ins from shared objects. */
-#define _XOPEN_SOURCE 700 // realpath()
+/* Loads plug-ins from shared objects. */
+#define _XOPEN_SOURCE 700 // for realpath()
 #include <dirent.h>
 #include <dlfcn.h>
 #include <errno.h>
@@ -11,10 +11,10 @@
 #include "sdm/memory.h"
 #include "shape_internal.h"
 
-#define SHAPES_OF_A_FILE_MAX 256
+#define FILE_SHAPES_MAX 256
 
-static sdm_status add_all(sdm_registry *r, sdm_plugin_entry plugin_shape, const char *path,
-                          sdm_error *err)
+static sdm_status shapes_add_all(sdm_registry *r, sdm_plugin_entry plugin_shape, const char *path,
+                                 sdm_error *err)
 {
     for (uint32_t i = 0;; i++) {
         const sdm_shape *shape = plugin_shape(i);
@@ -22,11 +22,11 @@ static sdm_status add_all(sdm_registry *r, sdm_plugin_entry plugin_shape, const 
             return sdm_fail(err, SDM_E_PLUGIN,
                             "%s: has no shape: " SDM_PLUGIN_SYMBOL "(0) gives NULL", path);
         if (!shape) return SDM_OK;
-        if (i == SHAPES_OF_A_FILE_MAX)
+        if (i == FILE_SHAPES_MAX)
             return sdm_fail(err, SDM_E_PLUGIN,
                             "%s: more than %d shapes: " SDM_PLUGIN_SYMBOL
                             "() must give NULL behind the last",
-                            path, SHAPES_OF_A_FILE_MAX);
+                            path, FILE_SHAPES_MAX);
         const sdm_status s = sdm_registry_add(r, shape, path, err);
         if (s) return s;
     }
@@ -37,7 +37,7 @@ sdm_status sdm_registry_load(sdm_registry *r, const char *file, sdm_error *err)
     if (!r || !file || !file[0])
         return sdm_fail(err, SDM_E_ARG, "registry and file are needed to load a plug-in");
 
-    // an absolute path: a bare name would make dlopen() search the system's library folders
+    // absolute path, because dlopen() searches the system's library folders for a bare name
     char *path = realpath(file, NULL);
     if (!path) return sdm_fail(err, SDM_E_PLUGIN, "plug-in %s: %s", file, strerror(errno));
     void *object = dlopen(path, RTLD_NOW | RTLD_LOCAL);
@@ -49,17 +49,19 @@ sdm_status sdm_registry_load(sdm_registry *r, const char *file, sdm_error *err)
         return s;
     }
 
+    // call the entry function for all shapes of the file
     sdm_plugin_entry plugin_shape = NULL;
     *(void **)&plugin_shape = dlsym(object, SDM_PLUGIN_SYMBOL);
     const size_t before = sdm_registry_count(r);
-    sdm_status s = plugin_shape ? add_all(r, plugin_shape, path, err)
+    sdm_status s = plugin_shape ? shapes_add_all(r, plugin_shape, path, err)
                                 : sdm_fail(err, SDM_E_PLUGIN,
                                            "%s: exports no function " SDM_PLUGIN_SYMBOL
                                            "(): not a plug-in, or hidden by -fvisibility",
                                            path);
     if (!s) s = sdm_registry_keep(r, object, err);
     if (s) {
-        sdm_registry_shrink(r, before); // all shapes of a file or none
+        // add all shapes of a file or none
+        sdm_registry_shrink(r, before);
         sdm_object_close(object);
     }
     free(path);
@@ -68,17 +70,17 @@ sdm_status sdm_registry_load(sdm_registry *r, const char *file, sdm_error *err)
 
 void sdm_object_close(void *object) { (void)dlclose(object); }
 
-static int is_object(const struct dirent *e)
+static int is_shared_object(const struct dirent *e)
 {
     const size_t n = strlen(e->d_name);
     return n > 3 && strcmp(e->d_name + n - 3, ".so") == 0;
 }
 
-// in the order of names, so that a clash is reported alike everywhere
-static sdm_status load_folder(sdm_registry *r, const char *folder, sdm_error *err)
+/* Loads in alphabetical order, so that a name clash is reported in the same way on all systems. */
+static sdm_status folder_load(sdm_registry *r, const char *folder, sdm_error *err)
 {
     struct dirent **list = NULL;
-    const int n = scandir(folder, &list, is_object, alphasort);
+    const int n = scandir(folder, &list, is_shared_object, alphasort);
     if (n < 0) return sdm_fail(err, SDM_E_PLUGIN, "plug-in folder %s: %s", folder, strerror(errno));
     sdm_status s = SDM_OK;
     for (int i = 0; i < n; i++) {
@@ -104,7 +106,7 @@ sdm_status sdm_registry_load_path(sdm_registry *r, const char *path, sdm_error *
         memcpy(folder, at, n);
         folder[n] = '\0';
         if (n) {
-            const sdm_status s = load_folder(r, folder, err);
+            const sdm_status s = folder_load(r, folder, err);
             if (s) return s;
         }
         at += n + (at[n] == ':');

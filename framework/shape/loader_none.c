@@ -1,5 +1,5 @@
-/* In place of loader.c where there are no shared objects (SDM_PLUGINS=OFF, WebAssembly): what would
- * load one says so. */
+/* Replaces loader.c in builds without shared objects (SDM_PLUGINS=OFF, WebAssembly): loading a
+ * plug-in fails with SDM_E_UNSUPPORTED. */
 #include "shape_internal.h"
 
 sdm_status sdm_registry_load(sdm_registry *r, const char *file, sdm_error *err)

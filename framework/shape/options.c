@@ -1,4 +1,4 @@
-/* Option values from text. */
+/* Conversion of option values from text. */
 #include <stdio.h>
 #include <string.h>
 
@@ -6,7 +6,7 @@
 #include "sdm/memory.h"
 #include "shape_internal.h"
 
-static sdm_status unknown_option(const sdm_shape *shape, const char *name, sdm_error *err)
+static sdm_status option_fail_unknown(const sdm_shape *shape, const char *name, sdm_error *err)
 {
     const char *names[SHAPE_OPTIONS_MAX];
     for (uint32_t i = 0; i < shape->n_options; i++) names[i] = shape->options[i].name;
@@ -15,22 +15,22 @@ static sdm_status unknown_option(const sdm_shape *shape, const char *name, sdm_e
         return sdm_fail(err, SDM_E_CONFIG, "shape '%s' has no option '%s'; did you mean '%s'?",
                         shape->name, name, near);
     if (!shape->n_options)
-        return sdm_fail(err, SDM_E_CONFIG, "shape '%s' has no option '%s', nor any other",
+        return sdm_fail(err, SDM_E_CONFIG, "shape '%s' has no option '%s': it has no options",
                         shape->name, name);
     return sdm_fail(err, SDM_E_CONFIG,
                     "shape '%s' has no option '%s'; 'sdmgen shapes %s' lists them", shape->name,
                     name, shape->name);
 }
 
-// the text given for an option, NULL when it is not
-static const char *find_given(const sdm_named_text *given, size_t n, const char *name)
+/* The text given for option `name`, or NULL. */
+static const char *given_find(const sdm_named_text *given, size_t n, const char *name)
 {
     for (size_t i = 0; i < n; i++)
         if (strcmp(given[i].name, name) == 0) return given[i].value;
     return NULL;
 }
 
-static sdm_status check_given(const sdm_shape *shape, const sdm_named_text *given, size_t n,
+static sdm_status given_check(const sdm_shape *shape, const sdm_named_text *given, size_t n,
                               sdm_error *err)
 {
     for (size_t i = 0; i < n; i++) {
@@ -40,7 +40,7 @@ static sdm_status check_given(const sdm_shape *shape, const sdm_named_text *give
         bool known = false;
         for (uint32_t k = 0; k < shape->n_options; k++)
             known = known || strcmp(shape->options[k].name, given[i].name) == 0;
-        if (!known) return unknown_option(shape, given[i].name, err);
+        if (!known) return option_fail_unknown(shape, given[i].name, err);
         for (size_t j = 0; j < i; j++)
             if (strcmp(given[j].name, given[i].name) == 0)
                 return sdm_fail(err, SDM_E_CONFIG, "shape '%s': option '%s' is given twice",
@@ -49,7 +49,7 @@ static sdm_status check_given(const sdm_shape *shape, const sdm_named_text *give
     return SDM_OK;
 }
 
-static sdm_status parse_number(const sdm_shape *shape, const sdm_option *o, const char *given,
+static sdm_status number_parse(const sdm_shape *shape, const sdm_option *o, const char *given,
                                sdm_option_value *out, sdm_error *err)
 {
     double v = 0;
@@ -70,8 +70,9 @@ static sdm_status parse_number(const sdm_shape *shape, const sdm_option *o, cons
     return SDM_OK;
 }
 
-// `words` is a writable copy of the choices, cut apart here; the value's text points into it
-static sdm_status parse_choice(const sdm_shape *shape, const sdm_option *o, const char *given,
+/* `words` is a writable copy of o->choices; it is split at '|' in place, and out->text points into
+ * it. given == NULL selects the first choice. */
+static sdm_status choice_parse(const sdm_shape *shape, const sdm_option *o, const char *given,
                                char *words, sdm_option_value *out, sdm_error *err)
 {
     const char *names[SHAPE_OPTIONS_MAX];
@@ -94,18 +95,18 @@ static sdm_status parse_choice(const sdm_shape *shape, const sdm_option *o, cons
                     shape->name, o->name, given, o->choices);
 }
 
-static bool needs_folder(const sdm_option *o, const char *given, const char *base_dir)
+static bool path_needs_folder(const sdm_option *o, const char *given, const char *base_dir)
 {
     return o->type == SDM_OPTION_FILE && given && given[0] && given[0] != '/' && base_dir &&
            base_dir[0];
 }
 
-// bytes of text that a value needs
-static size_t text_size(const sdm_option *o, const char *given, const char *base_dir)
+/* Bytes that the value of option o needs in the text block. */
+static size_t option_text_size(const sdm_option *o, const char *given, const char *base_dir)
 {
     if (o->type == SDM_OPTION_CHOICE) return strlen(o->choices) + 1;
     if (o->type != SDM_OPTION_FILE || !given) return 1;
-    return strlen(given) + 1 + (needs_folder(o, given, base_dir) ? strlen(base_dir) + 1 : 0);
+    return strlen(given) + 1 + (path_needs_folder(o, given, base_dir) ? strlen(base_dir) + 1 : 0);
 }
 
 sdm_status sdm_shape_parse_options(const sdm_shape *shape, const sdm_named_text *given,
@@ -113,31 +114,33 @@ sdm_status sdm_shape_parse_options(const sdm_shape *shape, const sdm_named_text 
                                    char **text, sdm_error *err)
 {
     *text = NULL;
-    sdm_status s = check_given(shape, given, n_given, err);
+    sdm_status s = given_check(shape, given, n_given, err);
     if (s) return s;
+    // one block for all texts
     size_t size = 0;
     for (uint32_t i = 0; i < shape->n_options; i++)
-        size += text_size(&shape->options[i], find_given(given, n_given, shape->options[i].name),
-                          base_dir);
+        size += option_text_size(&shape->options[i],
+                                 given_find(given, n_given, shape->options[i].name), base_dir);
     s = SDM_ALLOC(text, size, "option texts", err);
     if (s) return s;
 
+    // parse the values; missing ones have their defaults
     char *at = *text;
     for (uint32_t i = 0; i < shape->n_options && !s; i++) {
         const sdm_option *o = &shape->options[i];
-        const char *value = find_given(given, n_given, o->name);
-        const size_t room = text_size(o, value, base_dir);
+        const char *value = given_find(given, n_given, o->name);
+        const size_t room = option_text_size(o, value, base_dir);
         values[i] = (sdm_option_value){o->def, at};
         if (o->type == SDM_OPTION_CHOICE) {
             memcpy(at, o->choices, room);
-            s = parse_choice(shape, o, value, at, &values[i], err);
+            s = choice_parse(shape, o, value, at, &values[i], err);
         } else if (o->type == SDM_OPTION_FILE) {
             values[i].number = 0;
-            const bool folder = needs_folder(o, value, base_dir);
+            const bool folder = path_needs_folder(o, value, base_dir);
             snprintf(at, room, "%s%s%s", folder ? base_dir : "", folder ? "/" : "",
                      value ? value : "");
         } else if (value) {
-            s = parse_number(shape, o, value, &values[i], err);
+            s = number_parse(shape, o, value, &values[i], err);
         }
         at += room;
     }

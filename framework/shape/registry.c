@@ -1,4 +1,4 @@
-/* The set of known shapes. */
+/* Registry: the set of known shapes. */
 #include <string.h>
 
 #include "sdm/internal/heap.h"
@@ -11,9 +11,10 @@ typedef struct entry {
 } entry;
 
 struct sdm_registry {
-    entry **entries; /* pointers, so that a shape keeps its address */
+    /* pointers, because the address of a shape must not change when the array grows */
+    entry **entries;
     size_t count, capacity;
-    void **objects; /* of plug-ins */
+    void **objects; /* handles of loaded shared objects */
     size_t n_objects;
 };
 
@@ -50,7 +51,7 @@ sdm_status sdm_registry_keep(sdm_registry *r, void *object, sdm_error *err)
     return SDM_OK;
 }
 
-static sdm_status make_room(sdm_registry *r, sdm_error *err)
+static sdm_status registry_make_room(sdm_registry *r, sdm_error *err)
 {
     if (r->count < r->capacity) return SDM_OK;
     const size_t capacity = r->capacity ? 2 * r->capacity : 16;
@@ -74,7 +75,7 @@ sdm_status sdm_registry_add(sdm_registry *r, const sdm_shape *shape, const char 
                             "%s: shape '%s' is there already (%s): choose another name", origin,
                             checked.name, r->entries[i]->origin);
 
-    s = make_room(r, err);
+    s = registry_make_room(r, err);
     if (s) return s;
     entry *e = NULL;
     s = SDM_ALLOC(&e, 1, "shape", err);

@@ -1,4 +1,4 @@
-/* Checks of a plug-in's table, before anything of it is used. */
+/* Validation of a plug-in's table before its first use. */
 #include <math.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -18,7 +18,7 @@ static bool is_name(const char *s)
 
 #define NAME_RULE "names are a small letter, then small letters, digits and _, at most 63 in all"
 
-static sdm_status check_range(const char *who, const char *what, const char *name, double min,
+static sdm_status range_check(const char *who, const char *what, const char *name, double min,
                               double max, double def, sdm_error *err)
 {
     if (!isfinite(min) || !isfinite(max) || !(min < max))
@@ -53,14 +53,14 @@ sdm_status sdm_shape_check_params(const char *who, const sdm_param *params, uint
         if (!p->unit || !p->help)
             return sdm_fail(err, SDM_E_PLUGIN, "%s: parameter '%s' has no %s (\"\" is fine)", who,
                             p->name, p->unit ? "help" : "unit");
-        const sdm_status s = check_range(who, "parameter", p->name, p->min, p->max, p->def, err);
+        const sdm_status s = range_check(who, "parameter", p->name, p->min, p->max, p->def, err);
         if (s) return s;
     }
     return SDM_OK;
 }
 
-// choices are words between bars: none empty, none twice
-static sdm_status check_choices(const char *who, const sdm_option *o, sdm_error *err)
+/* o->choices is a list of words separated by '|', none of them empty or repeated. */
+static sdm_status choices_check(const char *who, const sdm_option *o, sdm_error *err)
 {
     const char *all = o->choices;
     if (!all || !all[0])
@@ -81,7 +81,7 @@ static sdm_status check_choices(const char *who, const sdm_option *o, sdm_error 
     }
 }
 
-static sdm_status check_option(const char *who, const sdm_option *o, sdm_error *err)
+static sdm_status option_check(const char *who, const sdm_option *o, sdm_error *err)
 {
     switch (o->type) {
     case SDM_OPTION_INT:
@@ -90,11 +90,11 @@ static sdm_status check_option(const char *who, const sdm_option *o, sdm_error *
                 err, SDM_E_PLUGIN,
                 "%s: option '%s' is an integer, but its range %g .. %g or default %g is none", who,
                 o->name, o->min, o->max, o->def);
-        return check_range(who, "option", o->name, o->min, o->max, o->def, err);
+        return range_check(who, "option", o->name, o->min, o->max, o->def, err);
     case SDM_OPTION_REAL:
-        return check_range(who, "option", o->name, o->min, o->max, o->def, err);
+        return range_check(who, "option", o->name, o->min, o->max, o->def, err);
     case SDM_OPTION_CHOICE:
-        return check_choices(who, o, err);
+        return choices_check(who, o, err);
     case SDM_OPTION_FILE:
         return SDM_OK;
     }
@@ -102,7 +102,7 @@ static sdm_status check_option(const char *who, const sdm_option *o, sdm_error *
                     (int)o->type);
 }
 
-static sdm_status check_options(const char *who, const sdm_option *options, uint32_t n,
+static sdm_status options_check(const char *who, const sdm_option *options, uint32_t n,
                                 sdm_error *err)
 {
     if (n > SHAPE_OPTIONS_MAX)
@@ -122,13 +122,13 @@ static sdm_status check_options(const char *who, const sdm_option *options, uint
         if (!o->unit || !o->help)
             return sdm_fail(err, SDM_E_PLUGIN, "%s: option '%s' has no %s (\"\" is fine)", who,
                             o->name, o->unit ? "help" : "unit");
-        const sdm_status s = check_option(who, o, err);
+        const sdm_status s = option_check(who, o, err);
         if (s) return s;
     }
     return SDM_OK;
 }
 
-static sdm_status check_callbacks(const char *who, const sdm_shape *t, sdm_error *err)
+static sdm_status callbacks_check(const char *who, const sdm_shape *t, sdm_error *err)
 {
     if (!t->mesh) return sdm_fail(err, SDM_E_PLUGIN, "%s: no callback mesh()", who);
     if (!t->create != !t->destroy)
@@ -143,7 +143,7 @@ static sdm_status check_callbacks(const char *who, const sdm_shape *t, sdm_error
 sdm_status sdm_shape_copy_checked(const sdm_shape *table, const char *origin, sdm_shape *out,
                                   sdm_error *err)
 {
-    // the two leading words alone are sure to be there; the rest is looked at in the copy
+    // only abi and size are certain to exist; everything else is read from the copy
     uint32_t lead[2];
     memcpy(lead, table, sizeof lead);
     if (lead[0] != SDM_SHAPE_ABI)
@@ -159,7 +159,7 @@ sdm_status sdm_shape_copy_checked(const sdm_shape *table, const char *origin, sd
             "%s: shape table of %u bytes, need at least %zu: set .size = sizeof(sdm_shape)", origin,
             (unsigned)lead[1], need);
     *out = (sdm_shape){0};
-    // a size that ends inside a pointer gives no pointer
+    // do not copy half a pointer if `size` is not a multiple of the pointer size
     const size_t whole = lead[1] / sizeof(void *) * sizeof(void *);
     memcpy(out, (const void *)table, whole < sizeof *out ? whole : sizeof *out);
     out->size = (uint32_t)sizeof *out;
@@ -170,10 +170,10 @@ sdm_status sdm_shape_copy_checked(const sdm_shape *table, const char *origin, sd
     char who[1200];
     snprintf(who, sizeof who, "%.1000s: shape '%s'", origin, out->name);
     if (!out->summary) return sdm_fail(err, SDM_E_PLUGIN, "%s: no summary", who);
-    sdm_status s = check_callbacks(who, out, err);
+    sdm_status s = callbacks_check(who, out, err);
     if (!s) s = sdm_shape_check_params(who, out->params, out->n_params, err);
     if (!s && !out->n_params && !out->describe)
         s = sdm_fail(err, SDM_E_PLUGIN, "%s: no parameters", who);
-    if (!s) s = check_options(who, out->options, out->n_options, err);
+    if (!s) s = options_check(who, out->options, out->n_options, err);
     return s;
 }

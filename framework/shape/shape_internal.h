@@ -1,4 +1,4 @@
-/* What the files of this folder share. */
+/* Declarations shared by the source files of this folder. */
 #ifndef SHAPE_INTERNAL_H
 #define SHAPE_INTERNAL_H
 
@@ -9,43 +9,47 @@
 #define SHAPE_PARAMS_MAX 64
 #define SHAPE_OPTIONS_MAX 64
 
-/* shape_check.c: copies min(size, sizeof) of a plug-in's table to a zeroed one and checks what it
-   says. The message starts with the origin. */
+/* shape_check.c: copies min(size, sizeof(sdm_shape)) bytes of a plug-in's table to *out (the rest
+ * is zero) and checks the contents. `origin` is the start of error messages. SDM_E_PLUGIN. */
 sdm_status sdm_shape_copy_checked(const sdm_shape *table, const char *origin, sdm_shape *out,
                                   sdm_error *err);
 
-/* Names, ranges and defaults of parameters; `who` starts the messages. */
+/* shape_check.c: checks names, ranges and defaults of params[n]. `who` is the start of error
+ * messages. SDM_E_PLUGIN. */
 sdm_status sdm_shape_check_params(const char *who, const sdm_param *params, uint32_t n,
                                   sdm_error *err);
 
-/* registry.c: forgets the shapes from `count` on; keeps an opened object to be closed with the
- * registry. */
+/* registry.c: removes the shapes from index `count` on, and adds the handle of a shared object to
+ * those that sdm_registry_free() closes. */
 void sdm_registry_shrink(sdm_registry *r, size_t count);
 sdm_status sdm_registry_keep(sdm_registry *r, void *object, sdm_error *err);
 
-/* loader.c, or loader_none.c where there are no shared objects. */
+/* loader.c or loader_none.c: closes a shared object. */
 void sdm_object_close(void *object);
 
-/* options.c: values[n_options], their text in one block *text (sdm_free()). */
+/* options.c: writes values[shape->n_options]; their texts are stored in the new block *text, which
+ * the caller frees with sdm_free(). SDM_E_ARG, SDM_E_CONFIG, SDM_E_NOMEM. */
 sdm_status sdm_shape_parse_options(const sdm_shape *shape, const sdm_named_text *given,
                                    size_t n_given, const char *base_dir, sdm_option_value *values,
                                    char **text, sdm_error *err);
 
-/* host.c: one call of a callback. `mesh` (may be NULL) is where reserve() makes room; without it,
-   and with `files`, blocks of the call's own are used. sdm_host_call_end() frees these. */
+/* host.c: state of one callback. host->reserve() allocates in `mesh` if it is not NULL, otherwise
+ * in a block of the call. files: may the callback read files? sdm_host_call_end() frees the blocks
+ * of the call. */
 typedef struct host_call {
     sdm_host host;
     sdm_mesh *mesh;
     bool files;
     struct host_block *blocks;
-    sdm_error err; /* status SDM_OK until something fails */
+    sdm_error err; /* SDM_OK until a function of the host fails */
 } host_call;
 
 void sdm_host_call_begin(host_call *c, sdm_mesh *mesh, bool files);
 void sdm_host_call_end(host_call *c);
 
-/* The status and text of a callback that returned non-zero: memory stays SDM_E_NOMEM, everything
- * else becomes `otherwise`. */
+/* host.c: error of a callback that returned non-zero. Stores the message of the host, or one with
+ * the name of the callback and the value returned. Returns SDM_E_NOMEM if memory was short, else
+ * `otherwise`. */
 sdm_status sdm_host_call_failed(const host_call *c, const char *callback, int returned,
                                 sdm_status otherwise, sdm_error *err);
 
@@ -58,7 +62,8 @@ struct sdm_instance {
     char *text;
 };
 
-/* instance.c: puts "shape 'NAME' at a=4.4 alpha=0.5 ...: " before the text of *err. */
+/* instance.c: inserts "shape 'NAME' at a=4.4 alpha=0.5 ...: " before the text of *err and returns
+ * `status`. */
 sdm_status sdm_instance_fail_at(const sdm_instance *s, const double *p, sdm_status status,
                                 sdm_error *err);
 

@@ -5,12 +5,12 @@
 #include "sdm/memory.h"
 #include "shape_internal.h"
 
-/* Truncation and rounding error of a central difference are about equal there, for coordinates of
- * some mm. */
-#define STEP_SHARE 1e-5
+/* Step of the finite differences as a fraction of the parameter's range. For coordinates of a few
+ * mm the truncation and rounding errors of a central difference are then about equal. */
+#define STEP_FRACTION 1e-5
 
-static sdm_status by_callback(const sdm_instance *s, const double *p, size_t n_vert,
-                              double *velocity, sdm_error *err)
+static sdm_status velocity_by_callback(const sdm_instance *s, const double *p, size_t n_vert,
+                                       double *velocity, sdm_error *err)
 {
     host_call call;
     sdm_host_call_begin(&call, NULL, false);
@@ -26,14 +26,14 @@ static sdm_status by_callback(const sdm_instance *s, const double *p, size_t n_v
     return status ? sdm_instance_fail_at(s, p, status, err) : SDM_OK;
 }
 
-// adds weight * vertices at p with parameter k at `place`
-static sdm_status add_moved(const sdm_instance *s, const double *p, size_t k, double place,
-                            double weight, size_t n_vert, sdm_mesh *mesh, double *sum,
-                            sdm_error *err)
+/* Adds weight * (vertices at p with p[k] = value) to sum[n_vert][3]. */
+static sdm_status moved_vertices_add(const sdm_instance *s, const double *p, size_t k, double value,
+                                     double weight, size_t n_vert, sdm_mesh *mesh, double *sum,
+                                     sdm_error *err)
 {
     double moved[SHAPE_PARAMS_MAX];
     memcpy(moved, p, s->n_params * sizeof *moved);
-    moved[k] = place;
+    moved[k] = value;
     const sdm_status status = sdm_instance_mesh(s, moved, mesh, err);
     if (status) return status;
     if (mesh->n_vert != n_vert)
@@ -46,32 +46,33 @@ static sdm_status add_moved(const sdm_instance *s, const double *p, size_t k, do
     return SDM_OK;
 }
 
-// of second order in both forms: from places on both sides, at an end of the range from here and
-// two places on one side; weights are those of the steps as they are rounded
-static sdm_status by_differences(const sdm_instance *s, const double *p, size_t n_vert,
-                                 double *velocity, sdm_error *err)
+/* Finite differences of second order: central, or at the end of a range one-sided from the values
+ * p, p + h, p + 2 h. Weights are computed from the differences of the rounded values. */
+static sdm_status velocity_by_differences(const sdm_instance *s, const double *p, size_t n_vert,
+                                          double *velocity, sdm_error *err)
 {
     sdm_mesh mesh = {0};
     sdm_status status = SDM_OK;
     for (size_t k = 0; k < s->n_params && !status; k++) {
         const sdm_param *q = &s->params[k];
-        const double step = STEP_SHARE * (q->max - q->min), h = p[k] + step > q->max ? -step : step;
-        double *v = velocity + 3 * n_vert * k, place[3] = {p[k] - h, p[k] + h, p[k] + 2 * h},
+        const double step = STEP_FRACTION * (q->max - q->min),
+                     h = p[k] + step > q->max ? -step : step;
+        double *v = velocity + 3 * n_vert * k, value[3] = {p[k] - h, p[k] + h, p[k] + 2 * h},
                weight[3];
-        const bool within = place[0] >= q->min && place[0] <= q->max;
+        const bool within = value[0] >= q->min && value[0] <= q->max;
         if (within) {
-            weight[1] = 1 / (place[1] - place[0]);
+            weight[1] = 1 / (value[1] - value[0]);
             weight[0] = -weight[1];
         } else {
-            const double a = place[1] - p[k], b = place[2] - p[k];
-            place[0] = p[k];
+            const double a = value[1] - p[k], b = value[2] - p[k];
+            value[0] = p[k];
             weight[0] = -(a + b) / (a * b);
             weight[1] = b / (a * (b - a));
             weight[2] = -a / (b * (b - a));
         }
         memset(v, 0, 3 * n_vert * sizeof *v);
         for (int i = 0; i < (within ? 2 : 3) && !status; i++)
-            status = add_moved(s, p, k, place[i], weight[i], n_vert, &mesh, v, err);
+            status = moved_vertices_add(s, p, k, value[i], weight[i], n_vert, &mesh, v, err);
     }
     sdm_mesh_dispose(&mesh);
     return status;
@@ -83,8 +84,9 @@ sdm_status sdm_instance_velocity(const sdm_instance *s, const double *p, size_t 
     const sdm_status status = sdm_instance_check(s, p, err);
     if (status) return status;
     if (!velocity || n_vert == 0)
-        return sdm_fail(err, SDM_E_ARG,
-                        "a place for the velocities of at least one vertex is needed");
-    return s->shape->velocity ? by_callback(s, p, n_vert, velocity, err)
-                              : by_differences(s, p, n_vert, velocity, err);
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "the address of the velocities must not be NULL, and the number of vertices not 0");
+    return s->shape->velocity ? velocity_by_callback(s, p, n_vert, velocity, err)
+                              : velocity_by_differences(s, p, n_vert, velocity, err);
 }

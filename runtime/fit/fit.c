@@ -1,4 +1,7 @@
-/* The fit from beginning to end. */
+/* A fit from beginning to end: sdm_fit(), the last function of this file, lists its steps in order.
+ */
+#include "sdm/fit.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -6,36 +9,36 @@
 #include "fit/data/blur.h"
 #include "fit/data/cavity.h"
 #include "fit/solver/averaged_gradient.h"
+#include "fit/solver/newton.h"
+#include "fit/solver/objective.h"
+#include "fit/solver/prior.h"
 #include "fit/solver/tissue_field.h"
 #include "fit/solver/tissues.h"
 #include "fit/start/start_search.h"
 #include "fit/trust/evidence.h"
 #include "fit/trust/posterior.h"
-#include "fit/trust/scores.h"
 #include "fit_check.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/rotation.h"
 #include "sdm/memory.h"
 
-// the region follows the shape, and the priors are weighed, so many times at most
-#define ROUNDS_MOST 8
-// voxels at most, before only every second one along each axis is taken
-#define SITES_MOST 2000000
-// as long as the region and the weights of the priors are not the last, small steps are not worth
-// while
+// rounds at most in which region, prior weights and state are brought into agreement
+#define ROUNDS_MAX 8
+// samples at most; with more voxels the stride doubles
+#define SAMPLES_MAX 2000000
+// eps of the rounds in which the region and the prior weights may still change
 #define EPS_FIRST 1e-2
 #define EPS_FIRST_AVERAGED 1e-4
-// relative change of the weights that is left
+// relative change of the prior weights that is ignored: always; after an end by flat steps
 #define WEIGHT_EPS 1e-3
 #define WEIGHT_ROUGH 0.05
-// so many steps in a row that promise no gain are an end; exact maps have creases, and need not try
-// again
-#define FLAT_MOST 6
-// of the deviation before the fit: what is left where the target says next to nothing
+// flat steps in a row that end the iterations with a network's maps
+#define FLAT_MAX 6
+// a parameter is determined by its prior alone if its sd exceeds this share of the prior's
 #define BY_PRIOR 0.9
-// a prior against all evidence would feed itself: the worse the fit, the more alike are
-// neighbouring residuals
-#define WEIGHINGS_MOST 4
+// The priors are reweighted this often at most. Without a limit a prior that contradicts the image
+// could reinforce itself: a worse fit has more correlated residuals, which strengthen the prior.
+#define WEIGHINGS_MAX 4
 
 sdm_fit_opts sdm_fit_defaults(void)
 {
@@ -74,7 +77,8 @@ void sdm_fit_dispose(sdm_fit_result *r)
     *r = (sdm_fit_result){0};
 }
 
-static sdm_status make_result(size_t n, sdm_fit_result *out, sdm_error *err)
+// all numbers that a fit may leave open are NaN
+static sdm_status result_create(size_t n, sdm_fit_result *out, sdm_error *err)
 {
     const size_t size = n + 6;
     out->n_params = n;
@@ -91,16 +95,17 @@ static sdm_status make_result(size_t n, sdm_fit_result *out, sdm_error *err)
     return s;
 }
 
-static void dispose_problem(fit_problem *p)
+static void problem_dispose(fit_problem *p)
 {
     sdm_fit_maps_dispose(&p->maps);
-    sdm_fit_sites_dispose(&p->sites);
-    sdm_fit_sums_dispose(&p->sums);
-    sdm_fit_sums_dispose(&p->trial);
+    sdm_fit_samples_dispose(&p->samples);
+    sdm_fit_information_dispose(&p->information);
+    sdm_fit_information_dispose(&p->trial);
     sdm_free(p->objective);
 }
 
-static sdm_status start_params(fit_problem *p, bool *clamped, sdm_error *err)
+// start values of the parameters, checked against their bounds or clamped to them
+static sdm_status params_start(fit_problem *p, bool *clamped, sdm_error *err)
 {
     const sdm_fit_source *source = p->source;
     for (size_t k = 0; k < p->n_params; k++) {
@@ -125,58 +130,62 @@ static sdm_status start_params(fit_problem *p, bool *clamped, sdm_error *err)
     return SDM_OK;
 }
 
-static sdm_status begin(fit_problem *p, sdm_fit_result *out, sdm_error *err)
+// state at the start, memory, maps and extent of the shape there
+static sdm_status problem_start(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
     const sdm_fit_opts *o = p->opts;
     const bool share = p->target->kind == SDM_FIT_IMAGE && o->image_model == SDM_FIT_PARTIAL_VOLUME;
-    sdm_status s = start_params(p, &out->start_clamped, err);
+    sdm_status s = params_start(p, &out->start_clamped, err);
     if (!s) s = sdm_fit_maps_create(p->source, share, o, &p->maps, err);
     if (s) return s;
-    if (share && o->keep_blur && o->blur < p->maps.least_blur)
+    if (share && o->keep_blur && o->blur < p->maps.min_blur)
         return sdm_fail(err, SDM_E_ARG,
                         "a blur of %g mm is kept, but maps with voxels of %g mm carry one of %g mm "
-                        "or more: take smaller "
-                        "voxels for the maps (spacing), or a wider blur",
-                        o->blur, 2 * p->maps.least_blur, p->maps.least_blur);
+                        "or more: take smaller voxels for the maps (spacing), or a wider blur",
+                        o->blur, 2 * p->maps.min_blur, p->maps.min_blur);
+    // the start state
     sdm_pose_matrix(&o->start_pose, p->state.rotation);
     memcpy(p->state.translation, o->start_pose.translation, sizeof p->state.translation);
-    p->state.look = o->appearance;
-    p->state.blur = fmax(o->blur, p->maps.least_blur);
+    p->state.appearance = o->appearance;
+    p->state.blur = fmax(o->blur, p->maps.min_blur);
     p->state.l_ref = o->l_ref;
     p->state.point_sd = o->point_sd;
     p->prior = p->state;
     s = sdm_fit_blur_check(&p->maps.grid, share ? "blur" : "l_ref", share ? o->blur : o->l_ref,
                            sdm_fit_field_blur(p), err);
     if (s) return s;
+    // memory, and maps at the start
     const size_t tissues = share ? o->appearance.n_inside + o->appearance.n_outside : 0;
-    s = sdm_fit_sums_create(fit_columns(p->n_params) + tissues, &p->sums, err);
-    if (!s) s = sdm_fit_sums_create(fit_columns(p->n_params) + tissues, &p->trial, err);
-    if (!s) s = sdm_fit_maps_at(&p->maps, p->state.params, true, err);
+    s = sdm_fit_information_create(fit_columns(p->n_params) + tissues, &p->information, err);
+    if (!s) s = sdm_fit_information_create(fit_columns(p->n_params) + tissues, &p->trial, err);
+    if (!s) s = sdm_fit_maps_make(&p->maps, p->state.params, true, err);
     if (!s) s = sdm_fit_extent(&p->maps, &p->extent, err);
-    memcpy(p->maps_at, p->state.params, sizeof p->maps_at);
-    p->packed_blur = NAN;
+    memcpy(p->maps_params, p->state.params, sizeof p->maps_params);
+    p->maps_blur = NAN;
     return s;
 }
 
-// the voxels about the shape where it is now
-static sdm_status follow(fit_problem *p, bool *changed, sdm_error *err)
+// takes the samples near the shape in its present position
+static sdm_status samples_follow(fit_problem *p, bool *changed, sdm_error *err)
 {
     fit_region region = {.radius = 1.5 * p->extent.reach + p->opts->margin,
                          .follow = &p->maps,
                          .state = &p->state,
                          .margin = p->opts->margin,
-                         .most = SITES_MOST};
+                         .max_samples = SAMPLES_MAX};
     sdm_fit_to_world(&p->state, p->extent.centre, region.centre);
     sdm_status s = SDM_OK;
-    for (;; p->stride *= 2) { // from that of before on: whether voxels are others is asked of those
-        s = sdm_fit_sites_choose(p->target, p->opts, &region, p->stride, &p->sites, changed, err);
-        if (s || p->target->kind == SDM_FIT_POINTS || p->sites.n <= SITES_MOST) return s;
+    // starts with the earlier stride, so that *changed compares equal strides
+    for (;; p->stride *= 2) {
+        s = sdm_fit_samples_choose(p->target, p->opts, &region, p->stride, &p->samples, changed,
+                                   err);
+        if (s || p->target->kind == SDM_FIT_POINTS || p->samples.n <= SAMPLES_MAX) return s;
     }
 }
 
-// the weights of the priors from the residuals where the fit stands; *change: the largest,
-// relative, 0 where they are left
-static sdm_status weigh_priors(fit_problem *p, double *change, sdm_error *err)
+// updates the prior weights from the residuals at the present state; *change: their largest
+// relative change, 0 where it is negligible or nothing has a prior
+static sdm_status priors_reweight(fit_problem *p, double *change, sdm_error *err)
 {
     double weight[FIT_PARAMS_MAX + 6] = {0};
     const sdm_status s = sdm_fit_weigh_priors(p, weight, &p->noise_factor, err);
@@ -192,99 +201,117 @@ static sdm_status weigh_priors(fit_problem *p, double *change, sdm_error *err)
     return SDM_OK;
 }
 
-// iterates until neither the state nor the region nor the weights of the priors change
-static sdm_status settle(fit_problem *p, fit_run *run, fit_ended *ended, sdm_error *err)
+// Newton's method until state, region and prior weights agree; end->converged is false where the
+// iterations are used up
+static sdm_status maximise_settled(fit_problem *p, fit_newton_opts *newton, fit_newton_end *end,
+                                   sdm_error *err)
 {
-    const size_t most = run->max_iterations, before = p->n_iterations;
-    // without priors only the noise factor is of use, and by averaged derivatives that of before
-    const int weighings = sdm_fit_has_prior(p) ? WEIGHINGS_MOST : run->averaged ? 0 : 2;
-    const double first = run->averaged ? EPS_FIRST_AVERAGED : EPS_FIRST;
-    const double eps = run->eps;
+    const size_t most = newton->max_iterations, before = p->n_iterations;
+    // without priors the weights serve the noise factor alone; averaged gradients then keep the
+    // earlier one
+    const int weighings = sdm_fit_has_prior(p) ? WEIGHINGS_MAX : newton->averaged ? 0 : 2;
+    const double first = newton->averaged ? EPS_FIRST_AVERAGED : EPS_FIRST;
+    const double eps = newton->eps;
     sdm_status s = SDM_OK;
-    for (int round = 0; round < ROUNDS_MOST && !s; round++) {
+    for (int round = 0; round < ROUNDS_MAX && !s; round++) {
         bool changed;
         double change = 0;
-        s = sdm_fit_look(p, err); // maps of the state
-        if (!s) s = follow(p, &changed, err);
-        if (!s && !p->sites.n)
+        s = sdm_fit_evaluate(p, err); // maps at the state, for the region
+        if (!s) s = samples_follow(p, &changed, err);
+        if (!s && !p->samples.n)
             return sdm_fail(err, SDM_E_QUALITY,
                             "the shape has left the image: no voxel near it is left");
-        if (!s && changed) s = sdm_fit_look(p, err); // samples of the region
-        if (!s && changed) s = sdm_fit_places_update(p, err);
-        if (!s && round < weighings) s = weigh_priors(p, &change, err);
-        // steps that are rough do not tell small changes of the region and the weights
-        const bool last = ended->rough ? change < WEIGHT_ROUGH : !changed && !(change > 0);
-        if (s || (round > 0 && run->eps <= eps && last)) return s;
+        if (!s && changed) s = sdm_fit_evaluate(p, err); // the new samples
+        if (!s && changed) s = sdm_fit_tissue_field_update(p, err);
+        if (!s && round < weighings) s = priors_reweight(p, &change, err);
+        // flat steps cannot resolve small changes of region and weights
+        const bool last = end->flat ? change < WEIGHT_ROUGH : !changed && !(change > 0);
+        if (s || (round > 0 && newton->eps <= eps && last)) return s;
+        // iterations left, and a coarse eps until region and weights settle
         const size_t used = p->n_iterations - before;
         if (used >= most) {
-            ended->converged = false;
+            end->converged = false;
             return s;
         }
-        run->max_iterations = most - used;
-        run->eps = fmax(eps, first * (round ? fmin(change, 1) : 1));
-        if (run->averaged) sdm_fit_ways(p, run->way);
-        if (run->averaged || round > 0) sdm_fit_look_settle(p);
-        s = sdm_fit_iterate(p, run, ended, err);
-        p->places = true; // tissues that are there by now
+        newton->max_iterations = most - used;
+        newton->eps = fmax(eps, first * (round ? fmin(change, 1) : 1));
+        if (newton->averaged) sdm_fit_averaging_widths(p, newton->half_width);
+        if (newton->averaged || round > 0) sdm_fit_appearance_mark_absent(p);
+        s = sdm_fit_newton(p, newton, end, err);
+        // the tissues are near their places now
+        p->use_tissue_field = true;
     }
     return s;
 }
 
-/* To the maximum with maps of one kind. Its last part goes by averaged derivatives: exact maps have
-   creases, and where the data say little of a parameter the rounding of a network's derivatives
-   makes steps that do not end. */
-static sdm_status approach(fit_problem *p, fit_run *run, fit_ended *ended, sdm_error *err)
+/* Maximises with maps of one kind. Plain Newton steps come first, then steps with the averaged
+ * gradient: with exact maps because of the kinks of the likelihood; with a network's maps where
+ * flat steps ended the iterations, because rounding errors of its derivatives then prevent
+ * convergence along weakly determined directions. */
+static sdm_status maximise_with_maps(fit_problem *p, fit_newton_opts *newton, fit_newton_end *end,
+                                     sdm_error *err)
 {
     const sdm_fit_opts *o = p->opts;
     const bool exact = p->maps.exact, average = !o->keep_params;
     const double eps = exact ? o->polish_eps : o->eps;
-    const size_t max_iterations = run->max_iterations;
-    run->averaged = p->places = false;
-    p->sites.n_outside = 0;
+    const size_t max_iterations = newton->max_iterations;
+    // plain Newton steps
+    newton->averaged = p->use_tissue_field = false;
+    p->samples.n_outside = 0;
     p->stride = 1;
     memset(p->absent, 0, sizeof p->absent);
-    run->eps = average ? o->eps : eps;
-    run->flat_most = !average ? 0 : exact ? 1 : FLAT_MOST;
-    sdm_status s = settle(p, run, ended, err);
-    if (s || !ended->converged || !average || !(exact || ended->rough)) return s;
-    run->averaged = true;
-    run->max_iterations = max_iterations;
-    run->eps = eps;
-    run->flat_most = 0;
-    return settle(p, run, ended, err);
+    newton->eps = average ? o->eps : eps;
+    newton->max_flat = !average ? 0 : exact ? 1 : FLAT_MAX;
+    sdm_status s = maximise_settled(p, newton, end, err);
+    if (s || !end->converged || !average || !(exact || end->flat)) return s;
+    // averaged gradient
+    newton->averaged = true;
+    newton->max_iterations = max_iterations;
+    newton->eps = eps;
+    newton->max_flat = 0;
+    return maximise_settled(p, newton, end, err);
 }
 
-static sdm_status climb(fit_problem *p, sdm_fit_result *out, sdm_error *err)
+static sdm_status start_find(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
-    const sdm_fit_opts *o = p->opts;
     const double from = sdm_clock();
-    sdm_status s = sdm_fit_search(p, &out->turn, err);
+    const sdm_status s = sdm_fit_start_search(p, &out->turn, err);
     out->seconds_search = sdm_clock() - from;
-    if (s) return s;
-    fit_run run = {.phase = SDM_FIT_MAIN,
-                   .keep_params = o->keep_params,
-                   .keep_pose = o->keep_pose,
-                   .keep_blur = o->keep_blur,
-                   .keep_look = o->keep_appearance,
-                   .max_iterations = o->max_iterations};
-    fit_ended ended = {0};
-    s = approach(p, &run, &ended, err);
-    const char *what = p->source->model ? "fit" : "fit with exact maps";
-    if (!s && ended.converged && p->source->model && p->source->shape && o->max_polish_iterations) {
-        p->maps.exact = true;
-        p->state.look = o->appearance; // the network's errors may have become a tissue
-        p->maps_at[0] = NAN;
-        run.phase = SDM_FIT_POLISH;
-        run.max_iterations = o->max_polish_iterations;
-        what = "polish with exact maps";
-        s = approach(p, &run, &ended, err);
-    }
-    out->converged = !s && ended.converged;
-    snprintf(out->reason, sizeof out->reason, "%s%s: last step %.2g, %sbelow %g", what,
-             out->converged ? "" : " stopped", ended.step, out->converged ? "" : "not ", run.eps);
     return s;
 }
 
+/* Main phase, and the polish with exact maps after a network's fit if the options have one. */
+static sdm_status maximise(fit_problem *p, sdm_fit_result *out, sdm_error *err)
+{
+    const sdm_fit_opts *o = p->opts;
+    fit_newton_opts newton = {.phase = SDM_FIT_MAIN,
+                              .keep_params = o->keep_params,
+                              .keep_pose = o->keep_pose,
+                              .keep_blur = o->keep_blur,
+                              .keep_appearance = o->keep_appearance,
+                              .max_iterations = o->max_iterations};
+    fit_newton_end end = {0};
+    // main phase
+    sdm_status s = maximise_with_maps(p, &newton, &end, err);
+    const char *what = p->source->model ? "fit" : "fit with exact maps";
+    // polish: the appearance restarts, because it may have modelled the network's errors as a
+    // tissue
+    if (!s && end.converged && p->source->model && p->source->shape && o->max_polish_iterations) {
+        p->maps.exact = true;
+        p->state.appearance = o->appearance;
+        p->maps_params[0] = NAN;
+        newton.phase = SDM_FIT_POLISH;
+        newton.max_iterations = o->max_polish_iterations;
+        what = "polish with exact maps";
+        s = maximise_with_maps(p, &newton, &end, err);
+    }
+    out->converged = !s && end.converged;
+    snprintf(out->reason, sizeof out->reason, "%s%s: last step %.2g, %sbelow %g", what,
+             out->converged ? "" : " stopped", end.step, out->converged ? "" : "not ", newton.eps);
+    return s;
+}
+
+// the estimate and the counts; covariance and evidence are in *out already
 static void report(fit_problem *p, sdm_fit_result *out)
 {
     const fit_state *s = &p->state;
@@ -299,11 +326,11 @@ static void report(fit_problem *p, sdm_fit_result *out)
     out->n_iterations = p->n_iterations;
     out->objective = p->objective;
     p->objective = NULL;
-    out->log_likelihood = p->sums.log_likelihood;
-    out->n_used = p->sites.n;
-    out->n_nan = p->sites.n_nan;
+    out->log_likelihood = p->information.log_likelihood;
+    out->n_used = p->samples.n;
+    out->n_nan = p->samples.n_nan;
     out->blur = p->maps.share ? s->blur : 0;
-    out->appearance = s->look;
+    out->appearance = s->appearance;
     out->point_sd = p->target->kind == SDM_FIT_POINTS ? s->point_sd : 0;
     out->n_network = p->maps.n_network;
     out->n_exact = p->maps.n_exact;
@@ -311,8 +338,8 @@ static void report(fit_problem *p, sdm_fit_result *out)
     out->seconds_exact = p->maps.seconds_exact;
 }
 
-// mean of the mixture
-static double mean_of(const sdm_fit_law *law, size_t n)
+// mean of the tissue with the largest weight
+static double main_mean(const sdm_fit_law *law, size_t n)
 {
     size_t most = 0;
     for (size_t i = 1; i < n; i++)
@@ -320,35 +347,35 @@ static double mean_of(const sdm_fit_law *law, size_t n)
     return law[most].mean;
 }
 
-// reasons not to believe a fit, the plainest first
+// reasons to distrust a fit, the most basic first
 static sdm_status judge(const fit_problem *p, const sdm_fit_result *r, sdm_error *err)
 {
     const sdm_fit_opts *o = p->opts;
     const sdm_fit_appearance *a = &r->appearance, *b = &o->appearance;
     if (p->target->kind == SDM_FIT_IMAGE && !p->given_labels) {
-        const double in = mean_of(a->inside, a->n_inside), out = mean_of(a->outside, a->n_outside);
-        const bool darker = mean_of(b->inside, b->n_inside) < mean_of(b->outside, b->n_outside);
+        const double in = main_mean(a->inside, a->n_inside),
+                     out = main_mean(a->outside, a->n_outside);
+        const bool darker = main_mean(b->inside, b->n_inside) < main_mean(b->outside, b->n_outside);
         if (!(r->evidence > 0))
-            return sdm_fail(err, SDM_E_QUALITY,
-                            "the image shows no such shape near the start: explaining it without "
-                            "one is better by %.3g "
-                            "(log-likelihood of independent voxels); check the start pose, and "
-                            "whether the inside is "
-                            "%s than the outside in this image",
-                            -r->evidence, darker ? "darker" : "brighter");
+            return sdm_fail(
+                err, SDM_E_QUALITY,
+                "the image shows no such shape near the start: explaining it without one is better "
+                "by %.3g (log-likelihood of independent voxels); check the start pose, and whether "
+                "the inside is %s than the outside in this image",
+                -r->evidence, darker ? "darker" : "brighter");
         if ((in < out) != darker)
-            return sdm_fail(err, SDM_E_QUALITY,
-                            "the contrast is the opposite of the start's: inside %.4g, outside "
-                            "%.4g, but the start says "
-                            "that the inside is %s; give laws of this kind of image",
-                            in, out, darker ? "darker" : "brighter");
+            return sdm_fail(
+                err, SDM_E_QUALITY,
+                "the contrast is the opposite of the start's: inside %.4g, outside %.4g, but the "
+                "start says that the inside is %s; give tissue values of this kind of image",
+                in, out, darker ? "darker" : "brighter");
     }
+    // the shape must not be a cavity itself, nor leave the image
     const double widest = sdm_fit_inradius(&p->maps);
     if (r->n_cavity && !(widest < o->cavity))
         return sdm_fail(err, SDM_E_QUALITY,
                         "the fitted shape holds a ball of %.3g mm, but spaces that hold one of "
-                        "%.3g mm were left out "
-                        "(cavity): give a radius above that of the shape",
+                        "%.3g mm were left out (cavity): give a radius above that of the shape",
                         widest, o->cavity);
     if (!(r->inside_share >= o->least_inside))
         return sdm_fail(err, SDM_E_QUALITY,
@@ -362,26 +389,28 @@ static sdm_status judge(const fit_problem *p, const sdm_fit_result *r, sdm_error
     return SDM_OK;
 }
 
-static sdm_status finish(fit_problem *p, sdm_fit_result *out, sdm_error *err)
+// covariance, share in the image, evidence
+static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
     sdm_status s = sdm_fit_posterior(p, out, err);
     if (s && s != SDM_E_QUALITY) return s;
     out->inside_share = sdm_fit_inside_share(p);
     if (p->target->kind == SDM_FIT_IMAGE && !p->given_labels) {
-        const sdm_status found = sdm_fit_without_shape(p, &out->log_likelihood_without, err);
+        const sdm_status found =
+            sdm_fit_shapeless_log_likelihood(p, &out->log_likelihood_without, err);
         if (found) return found;
-        const double factor = fmax(out->noise_factor, 1), n = (double)p->sites.n / factor;
+        // log-likelihoods of independent samples, less the cost of the unknowns (Schwarz 1978)
+        const double factor = fmax(out->noise_factor, 1), n = (double)p->samples.n / factor;
         const double unknowns =
             (p->opts->keep_params ? 0 : (double)p->n_params) + (p->opts->keep_pose ? 0 : 6);
-        out->evidence = (p->sums.log_likelihood - out->log_likelihood_without) / factor -
+        out->evidence = (p->information.log_likelihood - out->log_likelihood_without) / factor -
                         0.5 * unknowns * log(n);
     }
     return s;
 }
 
-// a label map as an image of what is 1 inside and 0 outside: shares, seen through a point spread
-// that is narrow
-static void take_labels(sdm_fit_target *target, sdm_fit_opts *opts)
+// a label map as an image with the value 1 inside and 0 outside, with fixed tissues
+static void labels_as_image(sdm_fit_target *target, sdm_fit_opts *opts)
 {
     target->kind = SDM_FIT_IMAGE;
     opts->appearance = (sdm_fit_appearance){.n_inside = 1,
@@ -399,29 +428,38 @@ sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
     const double from = sdm_clock();
     fit_problem p = {.source = source, .target = target, .opts = opts, .noise_factor = 1};
     for (size_t k = 0; k < FIT_PARAMS_MAX + 6; k++) p.prior_weight[k] = 1;
-    sdm_fit_target as_image;
-    sdm_fit_opts with_labels;
+
+    // 1. check the arguments
     sdm_status s = sdm_fit_check_source(source, &p.n_params, err);
     if (!s) s = sdm_fit_check(target, opts, err);
+
+    // 2. present a label map as an image, and an image without its cavities
+    sdm_fit_target as_image;
+    sdm_fit_opts with_labels;
+    float *values = NULL;
     if (!s && target->kind == SDM_FIT_LABEL && opts->image_model == SDM_FIT_PARTIAL_VOLUME) {
         as_image = *target, with_labels = *opts;
-        take_labels(&as_image, &with_labels);
+        labels_as_image(&as_image, &with_labels);
         p.target = &as_image, p.opts = &with_labels, p.given_labels = true;
     }
-    float *values = NULL;
     if (!s && target->kind == SDM_FIT_IMAGE && opts->cavity > 0) {
-        s = sdm_fit_leave_out_cavities(target, opts, &values, &out->n_cavity, err);
+        s = sdm_fit_mask_cavities(target, opts, &values, &out->n_cavity, err);
         as_image = *target, as_image.values = values;
         p.target = &as_image;
     }
-    if (!s) s = make_result(p.n_params, out, err);
-    if (!s) s = begin(&p, out, err);
-    if (!s) s = climb(&p, out, err);
-    if (!s) s = finish(&p, out, err);
+
+    // 3. set up the problem at the start; 4. search for a better start; 5. maximise the posterior
+    if (!s) s = result_create(p.n_params, out, err);
+    if (!s) s = problem_start(&p, out, err);
+    if (!s) s = start_find(&p, out, err);
+    if (!s) s = maximise(&p, out, err);
+
+    // 6. covariance and evidence; 7. the result, also of a fit that failed for its quality
+    if (!s) s = assess(&p, out, err);
     if (out->n_params && (!s || s == SDM_E_QUALITY)) report(&p, out);
     if (!s) s = judge(&p, out, err);
     if (s && err && !*out->reason) snprintf(out->reason, sizeof out->reason, "%.255s", err->text);
-    dispose_problem(&p);
+    problem_dispose(&p);
     sdm_free(values);
     out->seconds = sdm_clock() - from;
     if (s && s != SDM_E_QUALITY) sdm_fit_dispose(out);

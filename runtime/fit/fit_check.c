@@ -1,9 +1,9 @@
-/* Checks of sources, targets and options. Comparisons are those that NaN cannot pass. */
+/* Checks of the arguments of a fit. Comparisons are written such that NaN fails them. */
 #include "fit_check.h"
 
 #include <math.h>
 
-#include "fit/data/problem.h"
+#include "fit/data/unknowns.h"
 
 sdm_status sdm_fit_check_source(const sdm_fit_source *source, size_t *n_params, sdm_error *err)
 {
@@ -47,7 +47,7 @@ void sdm_fit_bounds(const sdm_fit_source *source, size_t k, double *low, double 
     }
 }
 
-// what no fit can be made to
+// values of an image or label map: at least one number, not all equal, labels in 0 .. 1
 static sdm_status check_values(const sdm_fit_target *t, sdm_error *err)
 {
     const size_t n = sdm_grid_count(&t->grid);
@@ -109,7 +109,7 @@ static sdm_status check_laws(const char *side, const sdm_fit_law *law, size_t n,
     return SDM_OK;
 }
 
-static sdm_status check_look(const sdm_fit_appearance *a, sdm_error *err)
+static sdm_status check_appearance(const sdm_fit_appearance *a, sdm_error *err)
 {
     sdm_status s = check_laws("inside", a->inside, a->n_inside, err);
     if (!s) s = check_laws("outside", a->outside, a->n_outside, err);
@@ -121,6 +121,7 @@ static sdm_status check_look(const sdm_fit_appearance *a, sdm_error *err)
     return s;
 }
 
+/* A numeric option and its allowed range: above 0, or from 0 on. */
 typedef struct number {
     const char *name;
     double value;
@@ -176,6 +177,6 @@ sdm_status sdm_fit_check(const sdm_fit_target *target, const sdm_fit_opts *o, sd
     }
     sdm_status s = sdm_pose_check(&o->start_pose, err);
     if (!s) s = check_numbers(o, err);
-    if (!s) s = check_look(&o->appearance, err);
+    if (!s) s = check_appearance(&o->appearance, err);
     return s ? s : check_target(target, err);
 }

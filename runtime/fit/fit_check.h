@@ -1,16 +1,20 @@
-/* What sdm_fit() is asked, before anything is computed. */
+/* Checks of the arguments of sdm_fit(), before anything is computed. */
 #ifndef FIT_CHECK_H
 #define FIT_CHECK_H
 
 #include "sdm/fit.h"
 
-/* A source alone; *n_params receives the number of its parameters. */
+/* Checks the source. *n_params: number of its parameters. SDM_E_ARG; SDM_E_UNSUPPORTED: not 1 to
+ * FIT_PARAMS_MAX parameters. */
 sdm_status sdm_fit_check_source(const sdm_fit_source *source, size_t *n_params, sdm_error *err);
 
-/* Bounds of parameter k under the source's policy, and its name. */
+/* Bounds of parameter k of a checked source under its policy, in the unit of the parameter, and its
+ * name, which the source owns. */
 void sdm_fit_bounds(const sdm_fit_source *source, size_t k, double *low, double *high,
                     const char **name);
 
+/* Checks target and options. SDM_E_ARG; SDM_E_FORMAT: values that no image, label map or point list
+ * may have; SDM_E_QUALITY: a constant image. */
 sdm_status sdm_fit_check(const sdm_fit_target *target, const sdm_fit_opts *opts, sdm_error *err);
 
 #endif

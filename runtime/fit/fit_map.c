@@ -1,4 +1,4 @@
-/* Maps of a fitted shape on grids of the world, and its middle. */
+/* Map of a fitted shape on a grid of the world, and the centroid of a shape. */
 #include <string.h>
 
 #include "fit/data/interpolate.h"
@@ -6,9 +6,9 @@
 #include "fit_check.h"
 #include "sdm/internal/threads.h"
 
-// the map of the source at params (NULL: the defaults)
-static sdm_status map_at(const sdm_fit_source *source, const double *params, int n_threads,
-                         fit_maps *maps, sdm_error *err)
+// map of the source at params[n_params], NULL: the defaults
+static sdm_status map_make(const sdm_fit_source *source, const double *params, int n_threads,
+                           fit_maps *maps, sdm_error *err)
 {
     size_t n;
     sdm_status s = sdm_fit_check_source(source, &n, err);
@@ -21,7 +21,7 @@ static sdm_status map_at(const sdm_fit_source *source, const double *params, int
                   : source->model ? sdm_model_get_info(source->model)->params[k].def
                                   : sdm_instance_params(source->shape, &ignored)[k].def;
     }
-    return s ? s : sdm_fit_maps_at(maps, used, false, err);
+    return s ? s : sdm_fit_maps_make(maps, used, false, err);
 }
 
 sdm_status sdm_fit_map(const sdm_fit_source *source, const double *params, const sdm_pose *pose,
@@ -33,7 +33,7 @@ sdm_status sdm_fit_map(const sdm_fit_source *source, const double *params, const
     sdm_status s = sdm_pose_check(pose, err);
     if (!s) s = sdm_grid_check(grid, err);
     fit_maps maps = {0};
-    if (!s) s = map_at(source, params, n_threads, &maps, err);
+    if (!s) s = map_make(source, params, n_threads, &maps, err);
     if (!s) {
         const fit_field f = {
             .grid = &maps.grid, .packed = maps.distance, .n_fields = 1, .distance = true};
@@ -62,7 +62,7 @@ sdm_status sdm_fit_centre(const sdm_fit_source *source, const double *params, do
     if (!centre) return sdm_fail(err, SDM_E_ARG, "centre of a shape: a place for it is needed");
     fit_maps maps = {0};
     fit_extent extent;
-    sdm_status s = map_at(source, params, 0, &maps, err);
+    sdm_status s = map_make(source, params, 0, &maps, err);
     if (!s) s = sdm_fit_extent(&maps, &extent, err);
     if (!s) memcpy(centre, extent.centre, sizeof extent.centre);
     sdm_fit_maps_dispose(&maps);

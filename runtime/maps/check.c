@@ -1,4 +1,4 @@
-/* A-posteriori check: the map against exact distances at voxels near the surface. */
+/* A-posteriori check of a map against exact distances at voxels near the surface. */
 #include "sdm/check.h"
 
 #include <math.h>
@@ -22,7 +22,7 @@ double sdm_check_get(const sdm_check *c, sdm_check_stat stat)
     return (unsigned)stat < sizeof figures / sizeof *figures ? figures[stat] : (double)NAN;
 }
 
-/* upto[t]: area of the triangles 0 .. t. */
+/* Running sum of areas: upto[t] = area of triangles 0 .. t. */
 static void add_areas(const sdm_mesh *m, double *upto)
 {
     double sum = 0;
@@ -40,8 +40,8 @@ static void add_areas(const sdm_mesh *m, double *upto)
     }
 }
 
-/* The first triangle of which the sum is above `area`. */
-static size_t triangle_at(const double *upto, size_t n, double area)
+/* First triangle t with upto[t] > area, by bisection. */
+static size_t triangle_find(const double *upto, size_t n, double area)
 {
     size_t low = 0, high = n - 1;
     while (low < high) {
@@ -54,11 +54,12 @@ static size_t triangle_at(const double *upto, size_t n, double area)
     return low;
 }
 
-/* Point i: one in each of as many shares of the surface, uniform in it. */
+/* Random point i on the surface: stratified sampling, one uniform point in each of SDM_CHECK_POINTS
+   equal shares of the area. */
 static void surface_point(const sdm_mesh *m, const double *upto, uint64_t i, double x[3])
 {
     const double place = ((double)i + sdm_rng_uniform(SEED, STREAM_PLACE, i)) / SDM_CHECK_POINTS;
-    const uint32_t *k = m->tri + 3 * triangle_at(upto, m->n_tri, place * upto[m->n_tri - 1]);
+    const uint32_t *k = m->tri + 3 * triangle_find(upto, m->n_tri, place * upto[m->n_tri - 1]);
     const double u = sqrt(sdm_rng_uniform(SEED, STREAM_EDGE, i)),
                  v = u * sdm_rng_uniform(SEED, STREAM_CORNER, i);
     for (int a = 0; a < 3; a++)
@@ -67,7 +68,8 @@ static void surface_point(const sdm_mesh *m, const double *upto, uint64_t i, dou
                v * m->vert[3 * (size_t)k[2] + (size_t)a];
 }
 
-/* Error of the map at the voxel in which x lies; false when there is none. */
+/* Error of the map at the voxel that contains x; x becomes the centre of the voxel. false if x is
+   outside the grid. */
 static bool error_at(const sdm_exact *engine, const sdm_grid *g, const float *values, double x[3],
                      double *error)
 {
@@ -84,15 +86,17 @@ static bool error_at(const sdm_exact *engine, const sdm_grid *g, const float *va
     return true;
 }
 
-static int compare(const void *a, const void *b)
+static int compare_errors(const void *a, const void *b)
 {
     const double x = *(const double *)a, y = *(const double *)b;
     if (isnan(x) || isnan(y))
-        return (isnan(x) != 0) - (isnan(y) != 0); // a NaN is worse than anything
+        // NaN is larger than any number
+        return (isnan(x) != 0) - (isnan(y) != 0);
     return (x > y) - (x < y);
 }
 
-static void reduce(double *error, sdm_check *c)
+/* Statistics of c->used errors; overwrites error[] with the sorted absolute values. */
+static void errors_reduce(double *error, sdm_check *c)
 {
     const size_t n = c->used;
     double sum = 0, sizes = 0, squares = 0;
@@ -101,8 +105,8 @@ static void reduce(double *error, sdm_check *c)
         squares += error[i] * error[i];
         sizes += error[i] = fabs(error[i]);
     }
-    qsort(error, n, sizeof *error, compare);
-    c->mean_mm = sizes / (double)n; // NaN without a point
+    qsort(error, n, sizeof *error, compare_errors);
+    c->mean_mm = sizes / (double)n; // 0 / 0 = NaN if no point is used
     c->bias_mm = sum / (double)n;
     c->rmse_mm = sqrt(squares / (double)n);
     c->q95_mm = n ? error[(95 * n + 99) / 100 - 1] : (double)NAN;
@@ -123,6 +127,7 @@ sdm_status sdm_check_map(const sdm_exact *engine, const sdm_grid *grid, const fl
     s = SDM_ALLOC(&upto, m->n_tri, "areas of triangles", err);
     if (s) return s;
     add_areas(m, upto);
+    // errors at the voxels of the points
     for (uint64_t i = 0; i < SDM_CHECK_POINTS; i++) {
         surface_point(m, upto, i, x);
         if (error_at(engine, grid, values, x, &error[out->used]))
@@ -130,7 +135,7 @@ sdm_status sdm_check_map(const sdm_exact *engine, const sdm_grid *grid, const fl
         else
             out->outside++;
     }
-    reduce(error, out);
+    errors_reduce(error, out);
     sdm_free(upto);
     return SDM_OK;
 }

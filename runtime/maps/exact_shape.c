@@ -1,4 +1,4 @@
-/* Exact maps of shapes: from parameters through the mesh to the exact engine. */
+/* Exact maps and derivatives of a shape: parameters, mesh, exact engine. */
 #include "sdm/internal/heap.h"
 #include "sdm/runtime.h"
 
@@ -21,8 +21,9 @@ sdm_status sdm_exact_shape_map(const sdm_instance *shape, const double *p,
     return s;
 }
 
-static sdm_status velocities(const sdm_instance *shape, const double *p, size_t n_params,
-                             size_t n_vert, double **out, sdm_error *err)
+/* *out = new array [n_params][n_vert][3]: velocity of each vertex by each parameter. */
+static sdm_status vertex_velocities(const sdm_instance *shape, const double *p, size_t n_params,
+                                    size_t n_vert, double **out, sdm_error *err)
 {
     size_t count;
     sdm_status s = sdm_mul(3 * n_vert, n_params, &count, err);
@@ -45,7 +46,7 @@ sdm_status sdm_exact_shape_jacobian(const sdm_instance *shape, const double *p,
     size_t n_params;
     (void)sdm_instance_params(shape, &n_params);
     s = sdm_instance_mesh(shape, p, &mesh, err);
-    if (!s) s = velocities(shape, p, n_params, mesh.n_vert, &velocity, err);
+    if (!s) s = vertex_velocities(shape, p, n_params, mesh.n_vert, &velocity, err);
     if (!s) s = sdm_exact_create(&mesh, opts, &engine, err);
     const sdm_exact_layers layers = {.values = values};
     if (!s) s = sdm_exact_map_derivative(engine, grid, velocity, n_params, &layers, jacobian, err);

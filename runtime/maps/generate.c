@@ -1,32 +1,34 @@
-/* Maps from a model: range policy, batches over threads, the way to the exact engine. */
+/* Maps and derivatives of a model: range policy, batches over threads, exact maps where the policy
+   asks for them. */
 #include "sdm/runtime.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "checked.h"
+#include "check_results.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/model_threads.h"
 #include "sdm/internal/threads.h"
 
-// maps of one slice of a batch: fixed, so that how a map is computed does not depend on the number
-// of threads
+/* Maps in a slice of a batch. Fixed, so that the arithmetic of a map does not depend on the number
+   of threads. */
 #define SLICE 24u
-// threads that share one map: at most, and multiply-adds that are worth one more (some 50 us)
-#define SHARED 256
+/* Threads that share one map: most of them, and multiply-adds of the network that justify one more
+   (about 50 us). */
+#define SHARE_MAX 256
 #define SHARE_MACS 1e6
 
-static int thread_count(int wanted, size_t most)
+static int thread_count(int wanted, size_t max)
 {
     const int n = sdm_threads(wanted);
-    return (size_t)n < most ? n : (int)most;
+    return (size_t)n < max ? n : (int)max;
 }
 
-// threads for a map that is shared
+/* Number of threads for a map that several threads share. */
 static int sharing_threads(const sdm_model *m, int wanted)
 {
-    const double most = fmin(1 + sdm_model_get_info(m)->macs / SHARE_MACS, SHARED);
-    return thread_count(wanted, (size_t)most);
+    const double max = fmin(1 + sdm_model_get_info(m)->macs / SHARE_MACS, SHARE_MAX);
+    return thread_count(wanted, (size_t)max);
 }
 
 static sdm_generate_opts options_or_default(const sdm_generate_opts *opts)
@@ -61,7 +63,7 @@ static sdm_status check_options(const sdm_model *m, const sdm_generate_opts *o, 
     return SDM_OK;
 }
 
-static sdm_status refuse(const sdm_model_param *p, double value, sdm_error *err)
+static sdm_status refuse_param(const sdm_model_param *p, double value, sdm_error *err)
 {
     return sdm_fail(err, SDM_E_RANGE, "%s = %.9g %s, need %.9g to %.9g%s", p->name, value, p->unit,
                     p->min, p->max,
@@ -70,8 +72,8 @@ static sdm_status refuse(const sdm_model_param *p, double value, sdm_error *err)
                         : "");
 }
 
-// checks params[n_params], writes what the network is to be asked for to used[] (may be NULL) and
-// how to *result
+/* Checks params[n_params]. used[n_params] (may be NULL) = parameters for the network: clamped to
+   the trained range. *result = how the map is to be computed. */
 static sdm_status check_params(const sdm_model *m, const double *params, const sdm_generate_opts *o,
                                double *used, sdm_result *result, sdm_error *err)
 {
@@ -80,7 +82,8 @@ static sdm_status check_params(const sdm_model *m, const double *params, const s
     for (size_t i = 0; i < info->n_params; i++) {
         const sdm_model_param *p = &info->params[i];
         const double x = params[i], near = x < p->min ? p->min : x > p->max ? p->max : x;
-        if (!isfinite(x) || (x != near && o->policy == SDM_RANGE_REFUSE)) return refuse(p, x, err);
+        if (!isfinite(x) || (x != near && o->policy == SDM_RANGE_REFUSE))
+            return refuse_param(p, x, err);
         if (x != near && o->policy == SDM_RANGE_CLAMP) result->clamped = true;
         if (x != near && o->policy == SDM_RANGE_EXACT) result->source = SDM_SOURCE_EXACT;
         if (used) used[i] = near;
@@ -91,7 +94,7 @@ static sdm_status check_params(const sdm_model *m, const double *params, const s
     return sdm_instance_check(o->exact_shape, params, err);
 }
 
-// the network's maps of one slice, in runs between those of the exact engine
+/* The maps of one slice that the network computes: each uninterrupted run of them in one call. */
 static void forward_slice(const sdm_model *m, const double *used, const sdm_result *results,
                           size_t n, int n_threads, float *values, void *scratch)
 {
@@ -107,12 +110,13 @@ static void forward_slice(const sdm_model *m, const double *used, const sdm_resu
     }
 }
 
+/* All maps of the network in a batch. wanted: number of threads. */
 static sdm_status forward_batch(const sdm_model *m, const double *used, const sdm_result *results,
                                 size_t n, int wanted, float *values, sdm_error *err)
 {
     const sdm_model_info *info = sdm_model_get_info(m);
     const size_t voxels = sdm_grid_count(&info->grid), slices = (n + SLICE - 1) / SLICE;
-    // threads take slices, or share the maps of one slice after the other
+    // either each thread computes whole slices, or all threads share the maps of one slice
     const int all = sharing_threads(m, wanted),
               inner = n == 1 || sdm_model_is_threaded(m) ? all : 1;
     const int threads = inner > 1 ? 1 : thread_count(wanted, slices);
@@ -133,12 +137,14 @@ static sdm_status forward_batch(const sdm_model *m, const double *used, const sd
     return SDM_OK;
 }
 
-static sdm_status in_map(sdm_status s, size_t n, size_t i, sdm_error *err)
+/* Prefixes the message of error s with the number of the map in a batch. */
+static sdm_status fail_in_map(sdm_status s, size_t n, size_t i, sdm_error *err)
 {
     return s && n > 1 ? sdm_fail_in(err, s, "map %zu of %zu", i, n) : s;
 }
 
-// checks all, then computes all: results[n] and used[n][n_params] are working memory here
+/* Checks the parameters of all maps, then computes the maps. results[n] and used[n][n_params]
+   (parameters for the network) are written even after an error. */
 static sdm_status generate_all(const sdm_model *m, const double *params, size_t n,
                                const sdm_generate_opts *o, float *values, sdm_result *results,
                                double *used, sdm_error *err)
@@ -148,16 +154,16 @@ static sdm_status generate_all(const sdm_model *m, const double *params, size_t 
     bool network = false;
     for (size_t i = 0; i < n; i++) {
         const sdm_status s = check_params(m, params + i * p, o, used + i * p, &results[i], err);
-        if (s) return in_map(s, n, i, err);
+        if (s) return fail_in_map(s, n, i, err);
         network = network || results[i].source == SDM_SOURCE_NETWORK;
     }
     sdm_status s = network ? forward_batch(m, used, results, n, o->n_threads, values, err) : SDM_OK;
     const sdm_exact_opts exact = {.n_threads = o->n_threads};
     for (size_t i = 0; i < n && !s; i++)
         if (results[i].source == SDM_SOURCE_EXACT)
-            s = in_map(sdm_exact_shape_map(o->exact_shape, params + i * p, &exact, &info->grid,
-                                           values + i * voxels, NULL, err),
-                       n, i, err);
+            s = fail_in_map(sdm_exact_shape_map(o->exact_shape, params + i * p, &exact, &info->grid,
+                                                values + i * voxels, NULL, err),
+                            n, i, err);
     return !s && network && sdm_wants_check(o)
                ? sdm_check_results(m, used, n, o, values, results, err)
                : s;
@@ -193,17 +199,17 @@ sdm_status sdm_generate(const sdm_model *m, const double *params, const sdm_gene
     return sdm_generate_batch(m, params, 1, opts, values, result, err);
 }
 
-// options and parameters of one map: *used[n_params] is what the network is to be asked for
-// (sdm_free(), also after an error)
-static sdm_status prepare(const sdm_model *m, const double *params, const sdm_generate_opts *o,
-                          double **used, sdm_result *found, sdm_error *err)
+/* Checks options and parameters of one map. *used = new array [n_params] with the parameters for
+   the network; free with sdm_free(), also after an error. */
+static sdm_status prepare_one(const sdm_model *m, const double *params, const sdm_generate_opts *o,
+                              double **used, sdm_result *found, sdm_error *err)
 {
     sdm_status s = check_options(m, o, err);
     if (!s) s = SDM_ALLOC(used, sdm_model_get_info(m)->n_params, "parameters", err);
     return s ? s : check_params(m, params, o, *used, found, err);
 }
 
-// map and derivatives at checked parameters
+/* Map and derivatives at checked parameters. */
 static sdm_status jacobian_at(const sdm_model *m, const double *params, const double *used,
                               const sdm_generate_opts *o, float *values, float *jacobian,
                               sdm_result *result, sdm_error *err)
@@ -234,14 +240,14 @@ sdm_status sdm_generate_jacobian(const sdm_model *m, const double *params,
     const sdm_generate_opts o = options_or_default(opts);
     double *used = NULL;
     sdm_result found = {0};
-    sdm_status s = prepare(m, params, &o, &used, &found, err);
+    sdm_status s = prepare_one(m, params, &o, &used, &found, err);
     if (!s) s = jacobian_at(m, params, used, &o, values, jacobian, &found, err);
     if ((!s || s == SDM_E_QUALITY) && result) *result = found;
     sdm_free(used);
     return s;
 }
 
-// the exact Jacobian into new memory
+/* *jacobian = new array with the exact Jacobian; free with sdm_free(). */
 static sdm_status exact_jacobian(const sdm_model *m, const double *params,
                                  const sdm_generate_opts *o, float *values, float **jacobian,
                                  sdm_error *err)
@@ -257,6 +263,7 @@ static sdm_status exact_jacobian(const sdm_model *m, const double *params,
     return s;
 }
 
+/* Map and directional derivative at checked parameters. */
 static sdm_status jvp_at(const sdm_model *m, const double *params, const double *used,
                          const double *direction, const sdm_generate_opts *o, float *values,
                          float *tangent, sdm_result *result, sdm_error *err)
@@ -280,6 +287,7 @@ static sdm_status jvp_at(const sdm_model *m, const double *params, const double 
     return s;
 }
 
+/* Product of `adjoint` with the Jacobian at checked parameters. */
 static sdm_status vjp_at(const sdm_model *m, const double *params, const double *used,
                          const float *adjoint, const sdm_generate_opts *o, double *gradient,
                          const sdm_result *result, sdm_error *err)
@@ -312,7 +320,7 @@ sdm_status sdm_generate_jvp(const sdm_model *m, const double *params, const doub
     const sdm_generate_opts o = options_or_default(opts);
     double *used = NULL;
     sdm_result found = {0};
-    sdm_status s = prepare(m, params, &o, &used, &found, err);
+    sdm_status s = prepare_one(m, params, &o, &used, &found, err);
     if (!s) s = jvp_at(m, params, used, direction, &o, values, tangent, &found, err);
     if ((!s || s == SDM_E_QUALITY) && result) *result = found;
     sdm_free(used);
@@ -329,7 +337,7 @@ sdm_status sdm_generate_vjp(const sdm_model *m, const double *params, const floa
     const sdm_generate_opts o = options_or_default(opts);
     double *used = NULL;
     sdm_result found = {0};
-    sdm_status s = prepare(m, params, &o, &used, &found, err);
+    sdm_status s = prepare_one(m, params, &o, &used, &found, err);
     if (!s) s = vjp_at(m, params, used, adjoint, &o, gradient, &found, err);
     if (!s && result) *result = found;
     sdm_free(used);

@@ -1,19 +1,21 @@
-/* The gradient of a map. */
+/* The gradient of a map by finite differences. */
 #include "sdm/map.h"
 
 #include "sdm/internal/threads.h"
 
-/* Derivative by the index along an axis of n voxels, `step` apart in memory, at number i. */
+/* Finite difference with respect to the index i on an axis of n voxels; at points to voxel i,
+   neighbours are `step` floats apart. */
 static double difference(const float *at, int64_t i, int64_t n, int64_t step)
 {
     if (n < 2) return 0;
     if (i > 0 && i < n - 1) return 0.5 * ((double)at[step] - (double)at[-step]);
-    const int64_t in = i ? -step : step; // into the grid
+    const int64_t in = i ? -step : step; // towards the inside of the grid
     const double sign = i ? -1 : 1, first = (double)at[in] - (double)at[0];
     return n == 2 ? sign * first
                   : sign * (1.5 * first - 0.5 * ((double)at[2 * in] - (double)at[in]));
 }
 
+/* The gradient along row (j, k). */
 static void gradient_row(const sdm_grid *g, const float *values, int64_t j, int64_t k,
                          float *gradient)
 {
@@ -23,7 +25,9 @@ static void gradient_row(const sdm_grid *g, const float *values, int64_t j, int6
         double d[3];
         for (int a = 0; a < 3; a++)
             d[a] = difference(values + row + i, a ? place[a] : i, g->n[a], step[a]) / g->spacing[a];
-        for (int a = 0; a < 3; a++) // dir is orthonormal: its inverse transposed is dir
+        // index axes to world axes: the inverse transpose of dir, which is dir since it is
+        // orthonormal
+        for (int a = 0; a < 3; a++)
             gradient[a * n + row + i] =
                 (float)(g->dir[3 * a] * d[0] + g->dir[3 * a + 1] * d[1] + g->dir[3 * a + 2] * d[2]);
     }

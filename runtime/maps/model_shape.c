@@ -1,5 +1,5 @@
-/* The shape that a model was trained on: its options and data files, and whether its parameters
- * agree. */
+/* Recreates the shape that a model was trained on: its options, its data files, and a check that
+   its parameters agree. */
 #include <stdio.h>
 #include <string.h>
 
@@ -7,6 +7,7 @@
 #include "sdm/memory.h"
 #include "sdm/runtime.h"
 
+/* SDM_E_PLUGIN unless number, names and units of the parameters agree. */
 static sdm_status check_agreement(const sdm_model_info *info, const sdm_instance *shape,
                                   sdm_error *err)
 {
@@ -30,7 +31,8 @@ static sdm_status check_agreement(const sdm_model_info *info, const sdm_instance
     return SDM_OK;
 }
 
-// a file of another content would make another shape, in silence
+/* SDM_E_FORMAT unless the file has checksum `wanted`: another file would silently give another
+   shape. */
 static sdm_status check_file(const char *path, const char *option, const char *wanted,
                              sdm_error *err)
 {
@@ -45,13 +47,15 @@ static sdm_status check_file(const char *path, const char *option, const char *w
                     option, found, wanted);
 }
 
+/* The options of the shape, from the model file. */
 typedef struct model_options {
     sdm_named_text *given;
     size_t n;
-    char (*beside)[4096]; // paths of data files that lie beside the model
+    char (*beside)[4096]; // [n] paths of the data files in the folder of the model
 } model_options;
 
-// where the file of the last option lies now: at its place of the training, or beside the model
+/* Finds the data file of the last option: at its path of the training, or in the folder of the
+   model. */
 static sdm_status find_file(const sdm_model_info *info, model_options *o, const char *wanted,
                             sdm_error *err)
 {
@@ -70,8 +74,8 @@ static sdm_status find_file(const sdm_model_info *info, model_options *o, const 
                        file->name);
 }
 
-// the options of the shape among those of the model: behind one that is a file there may be its
-// checksum
+/* Collects the options of the shape from those of the model. A file option may be followed by an
+   entry NAME.crc64 with its checksum. */
 static sdm_status read_options(const sdm_model_info *info, model_options *o, sdm_error *err)
 {
     sdm_status s = SDM_ALLOC(&o->given, info->n_options, "options", err);

@@ -1,4 +1,5 @@
-/* Test images with known truth: options, tissues, and how the parts make an image. */
+/* Makes phantoms: checks of the options, label, and the image from its parts; random parameters and
+   poses. */
 #include "sdm/phantom.h"
 
 #include <math.h>
@@ -8,11 +9,11 @@
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
 
-enum { MOST_VOXELS = 64, MOST_SUPERSAMPLING = 16 };
+enum { SIGMA_VOXELS_MAX = 64, SUPERSAMPLING_MAX = 16 };
 
 sdm_phantom_opts sdm_phantom_defaults(void)
 {
-    // noise as in air; with it the tissues have standard deviations of 170, 270 and 150 HU
+    // noise as measured in air; together with it the tissues have 170, 270 and 150 HU
     return (sdm_phantom_opts){.inside = {40, 80},
                               .outside = {1300, 225},
                               .air = {-880, 0},
@@ -40,14 +41,14 @@ static sdm_status check_tissue(const char *name, sdm_tissue t, sdm_error *err)
     return SDM_OK;
 }
 
-// a smoothing width in mm against the voxels
+/* SDM_E_ARG unless 0 <= width (mm) <= 64 voxels along the axis. */
 static sdm_status check_width(const char *what, double width, int axis, const sdm_grid *g,
                               sdm_error *err)
 {
-    const double limit = MOST_VOXELS * g->spacing[axis];
+    const double limit = SIGMA_VOXELS_MAX * g->spacing[axis];
     if (width >= 0 && width <= limit) return SDM_OK;
     return sdm_fail(err, SDM_E_ARG, "%s along %c is %g mm, need 0 to %g (%d voxels)", what,
-                    "xyz"[axis], width, limit, MOST_VOXELS);
+                    "xyz"[axis], width, limit, SIGMA_VOXELS_MAX);
 }
 
 static sdm_status check_air(const sdm_phantom_opts *o, sdm_error *err)
@@ -78,9 +79,9 @@ static sdm_status check_options(const sdm_phantom_opts *o, const sdm_grid *g, sd
     if (s) return s;
     if (!(o->noise >= 0) || !(o->noise <= 1e30))
         return sdm_fail(err, SDM_E_ARG, "noise is %g, need a finite number from 0 on", o->noise);
-    if (o->supersampling < 1 || o->supersampling > MOST_SUPERSAMPLING)
+    if (o->supersampling < 1 || o->supersampling > SUPERSAMPLING_MAX)
         return sdm_fail(err, SDM_E_ARG, "supersampling is %d, need 1 to %d", o->supersampling,
-                        MOST_SUPERSAMPLING);
+                        SUPERSAMPLING_MAX);
     if (o->n_threads < 0)
         return sdm_fail(err, SDM_E_ARG, "%d threads, need 0 (all) or more", o->n_threads);
     return SDM_OK;
@@ -88,12 +89,7 @@ static sdm_status check_options(const sdm_phantom_opts *o, const sdm_grid *g, sd
 
 /* ---- the image ---- */
 
-sdm_status phantom_check(const sdm_phantom_opts *o, sdm_error *err)
-{
-    if (!o->cancelled || !o->cancelled(o->user)) return SDM_OK;
-    return sdm_fail(err, SDM_E_CANCELLED, "phantom stopped on request");
-}
-
+/* *out = new exact engine of the shape at p (NULL: defaults). */
 static sdm_status make_engine(const sdm_instance *shape, const double *p, const sdm_phantom_opts *o,
                               sdm_exact **out, sdm_error *err)
 {
@@ -112,6 +108,7 @@ static sdm_status make_engine(const sdm_instance *shape, const double *p, const 
     return s;
 }
 
+/* label[nz][ny][nx] = 1 where the voxel centre is inside the shape. */
 static sdm_status make_label(const sdm_exact *engine, const sdm_pose *pose, const sdm_grid *grid,
                              uint8_t *label, sdm_error *err)
 {
@@ -119,18 +116,18 @@ static sdm_status make_label(const sdm_exact *engine, const sdm_pose *pose, cons
     const size_t n = sdm_grid_count(grid);
     float *distance = NULL;
     sdm_status s = SDM_ALLOC(&distance, n, "distance map", err);
-    const sdm_exact_layers layers = {.values = distance,
-                                     .band_mm = grid->spacing[0]}; // the signs are all that counts
+    const sdm_exact_layers layers = {
+        .values = distance, .band_mm = grid->spacing[0]}; // only signs are needed: a narrow band
     if (!s) s = sdm_exact_map_layers(engine, &seen, &layers, err);
     for (size_t i = 0; i < n && !s; i++) label[i] = distance[i] < 0;
     sdm_free(distance);
     return s;
 }
 
-// values[] = the image from the shares inside[] = values[] and air[], with the fields that are
-// wanted
-static void mix(const sdm_phantom_opts *o, size_t n, const float *air, const float *texture,
-                const float *noise, float *values)
+/* Replaces values[n], which holds the shares of the inside, by the image. air, texture, noise:
+   shares of air and random fields, NULL if not wanted. */
+static void mix_tissues(const sdm_phantom_opts *o, size_t n, const float *air, const float *texture,
+                        const float *noise, float *values)
 {
     const double mean[2] = {o->inside.mean - o->outside.mean, o->air.mean - o->outside.mean};
     const double base = o->outside.sd * o->outside.sd;
@@ -145,6 +142,7 @@ static void mix(const sdm_phantom_opts *o, size_t n, const float *air, const flo
     }
 }
 
+/* values[nz][ny][nx] = the image. */
 static sdm_status make_values(const sdm_exact *engine, const sdm_pose *pose,
                               const sdm_phantom_opts *o, const sdm_grid *grid, float *values,
                               sdm_error *err)
@@ -162,7 +160,7 @@ static sdm_status make_values(const sdm_exact *engine, const sdm_pose *pose,
     if (!s && o->noise > 0)
         s = phantom_field_make(grid, o->noise_is_blurred ? o->blur : white, o, PHANTOM_STREAM_NOISE,
                                &noise, err);
-    if (!s) mix(o, n, air, texture, noise, values);
+    if (!s) mix_tissues(o, n, air, texture, noise, values);
     sdm_free(noise);
     sdm_free(texture);
     sdm_free(air);
@@ -201,7 +199,8 @@ void sdm_phantom_random_params(const sdm_instance *shape, uint64_t seed, double 
     }
 }
 
-// a vector of uniform direction and the given length
+/* v = random vector of uniform direction and the given length, from numbers first .. first + 2 of
+   the stream. */
 static void random_vector(uint64_t seed, uint64_t first, double length, double v[3])
 {
     double square = 0;
@@ -216,7 +215,8 @@ sdm_pose sdm_phantom_random_pose(double max_angle, double max_mm, uint64_t seed)
 {
     sdm_pose pose;
     const double turn = sdm_rng_uniform(seed, PHANTOM_STREAM_POSE, 0);
-    const double shift = cbrt(sdm_rng_uniform(seed, PHANTOM_STREAM_POSE, 1)); // uniform in the ball
+    // cube root: uniform in the ball
+    const double shift = cbrt(sdm_rng_uniform(seed, PHANTOM_STREAM_POSE, 1));
     random_vector(seed, 2, turn * max_angle, pose.rotation);
     random_vector(seed, 5, shift * max_mm, pose.translation);
     return pose;

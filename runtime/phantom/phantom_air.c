@@ -1,13 +1,14 @@
-/* Air cells of phantoms: balls in some of the cubes of a lattice fixed in the world. */
+/* Air cells of phantoms: balls with random centres in randomly chosen cubes of a lattice fixed in
+   the world. */
 #include <math.h>
 
 #include "phantom_parts.h"
 #include "sdm/internal/rng.h"
 #include "sdm/memory.h"
 
-#define REACH ((int64_t)1 << 20) // cubes are numbered by 3 x 21 bits
+#define REACH ((int64_t)1 << 20) // |cube index| < REACH, so that three indices fit into 63 bits
 
-// cubes first[3] .. last[3] may hold a ball that reaches the box
+/* Range first[3] .. last[3] of the cubes whose ball may intersect the box. */
 static sdm_status find_cubes(const sdm_phantom_opts *o, const double min[3], const double max[3],
                              int64_t first[3], int64_t last[3], sdm_error *err)
 {
@@ -28,7 +29,7 @@ static sdm_status find_cubes(const sdm_phantom_opts *o, const double min[3], con
     return SDM_OK;
 }
 
-// counts the balls, and writes their centres unless NULL
+/* Counts the balls in cubes first .. last; writes their centres unless centre is NULL. */
 static size_t list_balls(const sdm_phantom_opts *o, const int64_t first[3], const int64_t last[3],
                          double (*centre)[3])
 {
@@ -67,8 +68,8 @@ void phantom_balls_dispose(phantom_balls *b)
     *b = (phantom_balls){0};
 }
 
-// indices of an axis of n voxels within `half` of `centre`: *first .. *last - 1
-static void span(double centre, double half, int64_t n, int64_t *first, int64_t *last)
+/* *first .. *last - 1: indices within `half` of `centre` on an axis of n voxels. */
+static void index_range(double centre, double half, int64_t n, int64_t *first, int64_t *last)
 {
     *first = (int64_t)fmax(ceil(centre - half), 0);
     *last = (int64_t)fmin(floor(centre + half) + 1, (double)n);
@@ -85,9 +86,10 @@ void phantom_balls_plane(const phantom_balls *b, const sdm_grid *grid, size_t k,
         int64_t x0, x1, y0, y1;
         sdm_grid_index(grid, b->centre[n], c);
         const double dz = ((double)k - c[2]) * h[2];
+        // only the square around the ball
         if (fabs(dz) > far) continue;
-        span(c[0], far / h[0], nx, &x0, &x1);
-        span(c[1], far / h[1], ny, &y0, &y1);
+        index_range(c[0], far / h[0], nx, &x0, &x1);
+        index_range(c[1], far / h[1], ny, &y0, &y1);
         for (int64_t y = y0; y < y1; y++)
             for (int64_t x = x0; x < x1; x++) {
                 const double dx = ((double)x - c[0]) * h[0], dy = ((double)y - c[1]) * h[1];

@@ -1,13 +1,15 @@
-/* Filters of phantoms: the point spread and the box of a voxel along one axis, smoothing of random
- * fields. */
+/* Filters along one axis: the point spread over the box of a voxel, and the smoothing of random
+   fields. */
 #include <math.h>
 
 #include "phantom_parts.h"
 #include "sdm/memory.h"
 
-enum { RUN = 64, GROUP = 8 }; // sums at a time: they stay in the first cache, in registers
+/* Results computed together: across rows their sums stay in the first-level cache, along a line in
+   registers. */
+enum { ROW_RESULTS = 64, LINE_RESULTS = 8 };
 
-// weights of the Gaussian at -radius .. radius, of sum 1
+/* g[2 radius + 1] = Gaussian at -radius .. radius samples, of sum 1. */
 static void gaussian(double sigma, size_t radius, double *g)
 {
     const size_t n = 2 * radius + 1;
@@ -21,7 +23,7 @@ static void gaussian(double sigma, size_t radius, double *g)
 
 sdm_status phantom_filter_make(double sigma, size_t step, phantom_filter *out, sdm_error *err)
 {
-    // below half a sample a sampled Gaussian would lose its variance
+    // for sigma < 0.5 a sampled Gaussian has too small a variance
     const bool narrow = sigma < 0.5;
     const size_t radius = sigma == 0 ? 0 : narrow ? 1 : (size_t)ceil(4 * sigma), n = 2 * radius + 1;
     double *g = NULL;
@@ -38,6 +40,7 @@ sdm_status phantom_filter_make(double sigma, size_t step, phantom_filter *out, s
         g[0] = g[2] = 0.5 * sigma * sigma, g[1] = 1 - sigma * sigma;
     else
         gaussian(sigma, radius, g);
+    // convolution with the box
     double *w = g + n;
     for (size_t i = 0; i < step; i++)
         for (size_t j = 0; j < n; j++) w[i + j] += g[j] / (double)step;
@@ -57,17 +60,18 @@ size_t phantom_filter_samples(const phantom_filter *f, size_t n)
     return n * f->step + (f->n - f->step);
 }
 
-// Both work in place: result k goes where no later one reads, because step * (k + 1) > k.
+/* In place: result k is written to index k, and later results read from (k + 1) * step > k on. */
 
 void phantom_filter_line(const phantom_filter *f, float *data, size_t n)
 {
-    for (size_t first = 0; first < n; first += GROUP) {
-        const size_t m = n - first < GROUP ? n - first : GROUP;
+    for (size_t first = 0; first < n; first += LINE_RESULTS) {
+        const size_t m = n - first < LINE_RESULTS ? n - first : LINE_RESULTS;
         const float *in = data + first * f->step;
-        float sum[GROUP] = {0};
-        if (m == GROUP)
+        float sum[LINE_RESULTS] = {0};
+        if (m == LINE_RESULTS)
             for (size_t j = 0; j < f->n; j++)
-                for (size_t i = 0; i < GROUP; i++) sum[i] += f->weight[j] * in[i * f->step + j];
+                for (size_t i = 0; i < LINE_RESULTS; i++)
+                    sum[i] += f->weight[j] * in[i * f->step + j];
         else
             for (size_t j = 0; j < f->n; j++)
                 for (size_t i = 0; i < m; i++) sum[i] += f->weight[j] * in[i * f->step + j];
@@ -79,10 +83,10 @@ void phantom_filter_rows(const phantom_filter *f, float *data, size_t n, size_t 
                          size_t inner)
 {
     for (size_t k = 0; k < n; k++) {
-        for (size_t first = 0; first < inner; first += RUN) {
-            const size_t m = inner - first < RUN ? inner - first : RUN;
+        for (size_t first = 0; first < inner; first += ROW_RESULTS) {
+            const size_t m = inner - first < ROW_RESULTS ? inner - first : ROW_RESULTS;
             const float *in = data + k * f->step * stride + first;
-            float sum[RUN] = {0};
+            float sum[ROW_RESULTS] = {0};
             for (size_t j = 0; j < f->n; j++)
                 for (size_t i = 0; i < m; i++) sum[i] += f->weight[j] * in[j * stride + i];
             float *to = data + k * stride + first;

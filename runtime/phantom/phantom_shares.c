@@ -1,5 +1,5 @@
-/* Shares of the tissues in the voxels of a phantom: exact distances on sub-voxels, then box and
- * point spread along x, y and z. */
+/* Shares of the tissues in the voxels: exact distances at sub-voxels, then box and point spread
+   along x, y and z. */
 #include <math.h>
 #include <string.h>
 
@@ -7,20 +7,21 @@
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
 
-#define BLOCK ((size_t)1 << 24) // sub-voxels worked on at a time
-enum { MOST_SUB = 32 };         // sub-voxels along one edge of a long voxel
+#define BLOCK_VOXELS ((size_t)1 << 24) // sub-voxels computed at a time
+enum { EDGE_MAX = 32 };                // sub-voxels along an edge of a long voxel
 
-typedef struct job {
+/* Inputs and filters of one computation. */
+typedef struct shares_job {
     const sdm_exact *engine;
     const sdm_phantom_opts *o;
     const sdm_grid *grid;
     phantom_filter filter[3];
-    sdm_grid fine;       /* sub-voxels of the grid and of the margin the filters reach, world */
-    sdm_grid shape_fine; /* the same seen from the shape */
-    double edge;         /* of a sub-voxel, mm */
+    sdm_grid fine; /* sub-voxels of the grid, with the margin that the filters need, in the world */
+    sdm_grid shape_fine; /* the same in coordinates of the shape */
+    double edge;         /* edge of a sub-voxel, mean of three, mm */
     phantom_balls balls;
     int threads;
-} job;
+} shares_job;
 
 sdm_grid phantom_shape_grid(const sdm_grid *grid, const sdm_pose *pose)
 {
@@ -36,7 +37,7 @@ sdm_grid phantom_shape_grid(const sdm_grid *grid, const sdm_pose *pose)
     return g;
 }
 
-// voxels first .. first + n - 1 along z
+/* Planes first .. first + n - 1 along z of grid g. */
 static sdm_grid planes_of(const sdm_grid *g, size_t first, size_t n)
 {
     const double start[3] = {0, 0, (double)first};
@@ -46,8 +47,8 @@ static sdm_grid planes_of(const sdm_grid *g, size_t first, size_t n)
     return part;
 }
 
-// as many sub-voxels along each edge as make them nearly cubes
-static sdm_status make_fine_grid(job *j, const sdm_pose *pose, sdm_error *err)
+/* Chooses the sub-voxels, nearly cubes, and makes the filters. */
+static sdm_status make_fine_grid(shares_job *j, const sdm_pose *pose, sdm_error *err)
 {
     const sdm_grid *g = j->grid;
     const double shortest = fmin(g->spacing[0], fmin(g->spacing[1], g->spacing[2]));
@@ -56,7 +57,7 @@ static sdm_status make_fine_grid(job *j, const sdm_pose *pose, sdm_error *err)
     j->edge = 0;
     for (int a = 0; a < 3; a++) {
         const double wanted = round(j->o->supersampling * g->spacing[a] / shortest);
-        const size_t sub = (size_t)fmin(wanted, fmax(MOST_SUB, j->o->supersampling));
+        const size_t sub = (size_t)fmin(wanted, fmax(EDGE_MAX, j->o->supersampling));
         j->fine.spacing[a] = g->spacing[a] / (double)sub;
         j->edge += j->fine.spacing[a] / 3;
         const sdm_status s =
@@ -73,7 +74,8 @@ static sdm_status make_fine_grid(job *j, const sdm_pose *pose, sdm_error *err)
     return SDM_OK;
 }
 
-static sdm_status make_balls(job *j, sdm_error *err)
+/* The air cells that intersect the bounding box of the sub-voxels. */
+static sdm_status make_balls(shares_job *j, sdm_error *err)
 {
     double min[3] = {INFINITY, INFINITY, INFINITY}, max[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (int corner = 0; corner < 8; corner++) {
@@ -85,36 +87,38 @@ static sdm_status make_balls(job *j, sdm_error *err)
     return phantom_balls_make(j->o, min, max, &j->balls, err);
 }
 
-// share of a cube below a face at signed distance d from its centre: exact where the face is across
-// an axis
-static float share(float d, float edge)
+/* Share of a cube on the negative side of a plane at signed distance d from its centre; exact for
+   planes perpendicular to an axis. */
+static float cube_share(float d, float edge)
 {
     const float s = 0.5f - d / edge;
     return s < 0 ? 0 : s > 1 ? 1 : s;
 }
 
-// distances of one plane of sub-voxels become shares; air[] comes with the distances to the balls
-static void to_shares(const job *j, size_t n, float *inside, float *air)
+/* Converts inside[n] and air[n] (may be NULL) of one plane of sub-voxels from distances to shares.
+   Air keeps clear of the surface and takes no more than the inside leaves over. */
+static void to_shares(const shares_job *j, size_t n, float *inside, float *air)
 {
     const float edge = (float)j->edge, clear = (float)j->o->air_clear_mm;
     for (size_t i = 0; i < n; i++) {
         const float d = inside[i];
-        inside[i] = share(d, edge);
-        if (air) air[i] = fminf(share(fmaxf(air[i], clear - d), edge), 1 - inside[i]);
+        inside[i] = cube_share(d, edge);
+        if (air) air[i] = fminf(cube_share(fmaxf(air[i], clear - d), edge), 1 - inside[i]);
     }
 }
 
-// sub-voxels of a plane to voxels, in place
-static void reduce_plane(const job *j, float *plane)
+/* Filters a plane of sub-voxels to voxels along x and y, in place. */
+static void reduce_plane(const shares_job *j, float *plane)
 {
     const size_t nx = (size_t)j->grid->n[0], ny = (size_t)j->grid->n[1], row = (size_t)j->fine.n[0];
     phantom_filter_rows(&j->filter[1], plane, ny, row, row);
     for (size_t y = 0; y < ny; y++) phantom_filter_line(&j->filter[0], plane + y * row, nx);
 }
 
-// adds what planes first .. first + n - 1 give to the voxels: along z in the order of the planes,
-// whatever the blocks
-static void add_planes(const job *j, const float *planes, size_t first, size_t n, float *out)
+/* Adds planes first .. first + n - 1, already filtered along x and y, to the voxels out[nz][ny][nx]
+   with the weights along z; always in the order of the planes, so that the block size does not
+   change the sums. */
+static void add_planes(const shares_job *j, const float *planes, size_t first, size_t n, float *out)
 {
     const size_t nx = (size_t)j->grid->n[0], ny = (size_t)j->grid->n[1], nz = (size_t)j->grid->n[2];
     const size_t row = (size_t)j->fine.n[0], plane = row * (size_t)j->fine.n[1];
@@ -133,8 +137,9 @@ static void add_planes(const job *j, const float *planes, size_t first, size_t n
     }
 }
 
-static sdm_status run_block(const job *j, size_t first, size_t n, float *buffer, float *air_buffer,
-                            float *inside, float *air, sdm_error *err)
+/* Distances, shares and filtering of planes first .. first + n - 1 of the sub-voxels. */
+static sdm_status add_block(const shares_job *j, size_t first, size_t n, float *buffer,
+                            float *air_buffer, float *inside, float *air, sdm_error *err)
 {
     const size_t plane = (size_t)j->fine.n[0] * (size_t)j->fine.n[1];
     const sdm_grid here = planes_of(&j->shape_fine, first, n);
@@ -144,30 +149,31 @@ static sdm_status run_block(const job *j, size_t first, size_t n, float *buffer,
     if (s) return s;
 #pragma omp parallel for num_threads(j->threads) schedule(dynamic)
     for (size_t k = 0; k < n; k++) {
-        if (phantom_check(j->o, NULL)) continue;
+        if (phantom_check_cancelled(j->o, NULL)) continue;
         float *d = buffer + k * plane, *b = air ? air_buffer + k * plane : NULL;
         if (b) phantom_balls_plane(&j->balls, &j->fine, first + k, j->edge, b);
         to_shares(j, plane, d, b);
         reduce_plane(j, d);
         if (b) reduce_plane(j, b);
     }
-    const sdm_status stopped = phantom_check(j->o, err);
+    const sdm_status stopped = phantom_check_cancelled(j->o, err);
     if (stopped) return stopped;
     add_planes(j, buffer, first, n, inside);
     if (air) add_planes(j, air_buffer, first, n, air);
     return SDM_OK;
 }
 
-static sdm_status run_blocks(const job *j, float *inside, float *air, sdm_error *err)
+/* All planes, one block after another to limit the memory. */
+static sdm_status add_blocks(const shares_job *j, float *inside, float *air, sdm_error *err)
 {
     const size_t plane = (size_t)j->fine.n[0] * (size_t)j->fine.n[1], planes = (size_t)j->fine.n[2];
-    const size_t fit = BLOCK / plane + 1, block = fit < planes ? fit : planes;
+    const size_t max = BLOCK_VOXELS / plane + 1, block = max < planes ? max : planes;
     float *buffer = NULL, *air_buffer = NULL;
     sdm_status s = SDM_ALLOC(&buffer, block * plane, "sub-voxels", err);
     if (!s && air) s = SDM_ALLOC(&air_buffer, block * plane, "sub-voxels", err);
     for (size_t first = 0; first < planes && !s; first += block) {
         const size_t n = planes - first < block ? planes - first : block;
-        s = run_block(j, first, n, buffer, air_buffer, inside, air, err);
+        s = add_block(j, first, n, buffer, air_buffer, inside, air, err);
     }
     sdm_free(air_buffer);
     sdm_free(buffer);
@@ -177,13 +183,13 @@ static sdm_status run_blocks(const job *j, float *inside, float *air, sdm_error 
 sdm_status phantom_shares(const sdm_exact *engine, const sdm_pose *pose, const sdm_phantom_opts *o,
                           const sdm_grid *grid, float *inside, float *air, sdm_error *err)
 {
-    job j = {.engine = engine, .o = o, .grid = grid, .threads = sdm_threads(o->n_threads)};
+    shares_job j = {.engine = engine, .o = o, .grid = grid, .threads = sdm_threads(o->n_threads)};
     const size_t bytes = sdm_grid_count(grid) * sizeof *inside;
     memset(inside, 0, bytes);
     if (air) memset(air, 0, bytes);
     sdm_status s = make_fine_grid(&j, pose, err);
     if (!s && air) s = make_balls(&j, err);
-    if (!s) s = run_blocks(&j, inside, air, err);
+    if (!s) s = add_blocks(&j, inside, air, err);
     phantom_balls_dispose(&j.balls);
     for (int a = 0; a < 3; a++) phantom_filter_dispose(&j.filter[a]);
     return s;

@@ -1,4 +1,4 @@
-/* Closes a map into the values of a narrow-band level set. */
+/* Turns a map into the values of a narrow-band level set. */
 #include "band.h"
 
 #include <math.h>
@@ -13,7 +13,8 @@ void sdm_band_dispose(sdm_band *b)
     memset(b, 0, sizeof *b);
 }
 
-static sdm_status reserve(const sdm_grid *grid, int32_t pad, sdm_band *out, sdm_error *err)
+/* Allocates the values of the grid with a margin of `pad` voxels. */
+static sdm_status band_reserve(const sdm_grid *grid, int32_t pad, sdm_band *out, sdm_error *err)
 {
     memset(out, 0, sizeof *out);
     out->pad = pad;
@@ -40,7 +41,7 @@ sdm_status sdm_band_copy(const sdm_grid *grid, const float *values, sdm_band *ou
 {
     memset(out, 0, sizeof *out);
     sdm_status s = check_finite(grid, values, err);
-    if (!s) s = reserve(grid, 0, out, err);
+    if (!s) s = band_reserve(grid, 0, out, err);
     if (!s) memcpy(out->values, values, sdm_grid_count(grid) * sizeof *values);
     return s;
 }
@@ -55,6 +56,7 @@ static bool on_border(const int64_t n[3], int64_t i, int64_t j, int64_t k)
     return i == 0 || j == 0 || k == 0 || i == n[0] - 1 || j == n[1] - 1 || k == n[2] - 1;
 }
 
+/* Smallest value on the border of the grid; negative: the surface leaves the grid. */
 static float border_minimum(const sdm_grid *g, const float *v)
 {
     float low = INFINITY;
@@ -65,18 +67,22 @@ static float border_minimum(const sdm_grid *g, const float *v)
     return low;
 }
 
-// signed distance (mm) of a voxel centre to the box that the voxels fill; negative inside
+/* Signed distance (mm) of the centre of voxel (i, j, k) to the box that the voxels fill; negative
+   inside. */
 static float box_distance(const sdm_grid *g, int64_t i, int64_t j, int64_t k)
 {
     const int64_t index[3] = {i, j, k};
     int64_t layer = INT64_MAX;
     for (int a = 0; a < 3; a++) {
-        const int64_t near = index[a] < g->n[a] - 1 - index[a] ? index[a] : g->n[a] - 1 - index[a];
-        if (near < layer) layer = near;
+        const int64_t to_border =
+            index[a] < g->n[a] - 1 - index[a] ? index[a] : g->n[a] - 1 - index[a];
+        if (to_border < layer) layer = to_border;
     }
     return (float)(-((double)layer + 0.5) * g->spacing[0]);
 }
 
+/* Counts zero crossings between neighbours, and those where a value is not inside the band: a
+   distance map has none of these. */
 static sdm_status check_jumps(const sdm_band *b, double width, sdm_error *err)
 {
     const size_t step[3] = {1, (size_t)b->n[0], (size_t)(b->n[0] * b->n[1])};
@@ -106,7 +112,7 @@ static sdm_status check_jumps(const sdm_band *b, double width, sdm_error *err)
     return SDM_OK;
 }
 
-// the values of one row
+/* Sets one row of values: map, cut map, or distance from the faces outside the grid. */
 static void close_row(const sdm_grid *g, const float *values, double width, int64_t j, int64_t k,
                       sdm_faces *faces, sdm_band *out)
 {
@@ -133,7 +139,8 @@ sdm_status sdm_band_close(const sdm_grid *g, const float *values, double width,
     if (s) return s;
     const float low = border_minimum(g, values);
     sdm_faces faces = {0};
-    s = reserve(g, (double)low < width ? (int32_t)ceil(width / g->spacing[0]) + 1 : 0, out, err);
+    s = band_reserve(g, (double)low < width ? (int32_t)ceil(width / g->spacing[0]) + 1 : 0, out,
+                     err);
     if (!s && out->pad) s = sdm_faces_create(g, values, &faces, err);
     out->cut = low < 0;
     for (int64_t k = 0; k < out->n[2] && !s; k++) {

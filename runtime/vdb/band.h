@@ -1,5 +1,5 @@
-/* From a map to the values of a level set: closing at the grid's border, padding, checks. Internal
- * to the level set library. */
+/* Turns a map into the values of a narrow-band level set: checks, padding, closing at the border of
+   the grid. Internal to the level set library. */
 #ifndef SDM_BAND_H
 #define SDM_BAND_H
 
@@ -11,25 +11,27 @@
 extern "C" {
 #endif
 
-/* A box of voxels: values[n[2]][n[1]][n[0]] in mm; voxel (0, 0, 0) has index (-pad, -pad, -pad) in
- * the grid of the map. */
+/* Values on a box of voxels: values[n[2]][n[1]][n[0]] in mm. Its first voxel has index (-pad, -pad,
+   -pad) in the grid of the map. */
 typedef struct sdm_band {
     int64_t n[3];
     int32_t pad;
     float *values;
-    bool cut; /* the surface left the grid and has been closed at its border */
+    bool cut; /* the surface left the grid and was closed at its border */
 } sdm_band;
 
-/* Copies values[nz][ny][nx] (checked for NaN and infinities: SDM_E_ARG) without padding. */
+/* Copies values[nz][ny][nx] without padding. SDM_E_ARG: a value is NaN or infinite. */
 sdm_status sdm_band_copy(const sdm_grid *grid, const float *values, sdm_band *out, sdm_error *err);
 
-/* The same for a level set of half width `width` mm on uniform voxels.
-   Cut surface: the solid is intersected with the box that the voxels fill (half a voxel beyond the
-   outermost centres) as max(d, d_box), which is the exact distance away from the rim of the cut.
-   Wherever the band leaves the grid, the box is padded by the band and the distance there is min
-   over points b of the box's faces of |p - b| + max(d(b), 0): exact but for the sampling of b.
-   SDM_E_ARG: no surface in the grid. SDM_E_QUALITY: neighbours whose values jump across the band,
-   so not a distance map. SDM_E_CANCELLED by opts->cancelled, all that is read of opts. */
+/* Values for a level set of half width `width` mm on uniform voxels.
+   If the surface leaves the grid, the solid is intersected with the box B that the voxels fill
+   (half a voxel beyond the outermost centres): max(d, d_B), the exact distance except near the rim
+   of the cut. Where the band leaves the grid, the values are padded by the band; the distance there
+   is the minimum over points b of the faces of B of |p - b| + max(d(b), 0), exact except for the
+   sampling of b. SDM_E_ARG: no surface in the grid, or a value is not finite. SDM_E_QUALITY:
+   neighbouring values jump across the band, so this is not a distance map. SDM_E_CANCELLED from
+   opts->cancelled(); other members of opts are not used. Call sdm_band_dispose() also after an
+   error. */
 sdm_status sdm_band_close(const sdm_grid *grid, const float *values, double width,
                           const sdm_vdb_opts *opts, sdm_band *out, sdm_error *err);
 

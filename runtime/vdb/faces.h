@@ -1,5 +1,5 @@
-/* Distances beyond the grid of a map, from the faces of its box. Internal to the level set library.
- */
+/* Distances outside the grid of a map, from the distances at the faces of its box. Internal to the
+   level set library. */
 #ifndef SDM_FACES_H
 #define SDM_FACES_H
 
@@ -9,34 +9,34 @@
 extern "C" {
 #endif
 
-/* More than any row of points needs. */
+/* Enough levels for any grid: n points along an axis need 1 + log2 n. */
 #define SDM_FACE_LEVELS 64
 
-/* One face of the box: the distance d(b) at its points b, half a voxel beyond the outermost
-   centres, and the minima of squares of 2, 4, 8
-   ... points to a side. */
+/* One face of the box. Its points b lie half a voxel beyond the outermost voxel centres. Level 0
+   holds max(d(b), 0) at the points, level l the minimum over squares of 2^l x 2^l points. */
 typedef struct sdm_face {
     int levels;
-    int64_t n[SDM_FACE_LEVELS]
-             [2]; /* squares of a level, along the two axes after that of the face */
-    double *least[SDM_FACE_LEVELS];
-    int64_t last[2]; /* the point found last: the next voxel's is most often near */
+    /* Squares of each level along the two axes that follow the axis of the face. */
+    int64_t n[SDM_FACE_LEVELS][2];
+    double *min[SDM_FACE_LEVELS];
+    /* The nearest point of the last search: a good start for the next voxel. */
+    int64_t last[2];
 } sdm_face;
 
 typedef struct sdm_faces {
-    double voxel; /* mm */
+    double voxel; /* edge of a voxel, mm */
     int64_t n[3];
     sdm_face face[6]; /* low and high along x, y, z */
 } sdm_faces;
 
-/* Of values[nz][ny][nx] on uniform voxels. sdm_faces_dispose() frees it in every case. SDM_E_NOMEM.
- */
+/* The faces of values[nz][ny][nx] on uniform voxels. Call sdm_faces_dispose() also after an error.
+   SDM_E_NOMEM. */
 sdm_status sdm_faces_create(const sdm_grid *g, const float *values, sdm_faces *out, sdm_error *err);
 void sdm_faces_dispose(sdm_faces *f);
 
-/* min over the faces that voxel p outside of the grid sees, and their points b, of |p - b| +
- * max(d(b), 0), mm; at most `most`. */
-double sdm_faces_distance(sdm_faces *f, const int64_t p[3], double most);
+/* Distance (mm) at voxel index p outside the grid: the minimum of |p - b| + max(d(b), 0) over the
+   points b of all faces whose outer side p lies on; `max` if that is smaller. */
+double sdm_faces_distance(sdm_faces *f, const int64_t p[3], double max);
 
 #ifdef __cplusplus
 }

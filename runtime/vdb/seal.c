@@ -1,4 +1,4 @@
-/* The checksum behind a level set file. */
+/* Appends and checks the checksum at the end of a level set file. */
 #include "seal.h"
 
 #include <errno.h>
@@ -13,13 +13,13 @@
 #define SEAL_BYTES 16u
 #define PIECE_BYTES (1u << 20)
 
-// what one pass over a file finds
+/* Results of one pass over a file. */
 typedef struct scan {
-    uint64_t crc;             // of everything but the last SEAL_BYTES bytes
+    uint64_t crc;             // of all bytes except the last SEAL_BYTES
     uint64_t crc_whole;       // of everything
     uint8_t tail[SEAL_BYTES]; // the last bytes
     size_t size;
-    bool marked; // SDM_SEAL_MARK occurs
+    bool marked; // SDM_SEAL_MARK was found
 } scan;
 
 static bool holds_mark(const uint8_t *data, size_t size)
@@ -35,8 +35,9 @@ static bool holds_mark(const uint8_t *data, size_t size)
     return false;
 }
 
-// block: PIECE_BYTES + 2 * SEAL_BYTES; the last SEAL_BYTES bytes seen are always held back in front
-// of the next piece
+/* Reads a file piece by piece. block[PIECE_BYTES + 2 * SEAL_BYTES] is scratch memory: the last
+   SEAL_BYTES bytes read are kept at its beginning, since they may be the seal, or the first part of
+   a mark that continues in the next piece. */
 static sdm_status scan_file(FILE *f, const char *path, uint8_t *block, scan *out, sdm_error *err)
 {
     memset(out, 0, sizeof *out);

@@ -1,5 +1,5 @@
-/* Level sets through OpenVDB, which the files vdb*.cc alone know, and which are the only ones in
- * C++. No exception leaves them. */
+/* Level sets with OpenVDB: map to grid, metadata, verification. The files vdb*.cc are the only C++
+   files and the only users of OpenVDB; no exception leaves them. */
 #include "sdm/vdb.h"
 
 #include <algorithm>
@@ -29,7 +29,7 @@ void initialize_once()
     std::call_once(once, [] { openvdb::initialize(); });
 }
 
-// runs f and turns whatever it throws into a status
+/* Runs f; an exception becomes a status. */
 template <typename F>
 sdm_status guarded(const char *path, sdm_status when_unreadable, sdm_error *err, F f)
 {
@@ -101,11 +101,11 @@ void add_metadata(Grid &grid, const sdm_vdb_opts &o, const sdm_vdb_report &r, sd
 
 // ---- map to grid
 
-// most that the size of turned voxels is enlarged, in units of its last place
-const int ROUNDINGS_MOST = 64;
+/* Largest enlargement of rotated voxels, in units in the last place. */
+const int ROUNDINGS_MAX = 64;
 
-// smallest background that can be stored and is not below the band: checkLevelSet divides it by the
-// voxel size of the transform
+/* Smallest background that can be stored and whose quotient by the voxel size, which checkLevelSet
+   computes, is not below the band. */
 float background_value(double band_voxels, double voxel, bool half)
 {
     float b = static_cast<float>(band_voxels * voxel), stored = as_stored(b, half);
@@ -114,7 +114,8 @@ float background_value(double band_voxels, double voxel, bool half)
     return stored;
 }
 
-// OpenVDB multiplies row vectors: row a is axis a, the last row the origin
+/* OpenVDB multiplies row vectors from the left: row a of the matrix is axis a, the last row the
+   origin. */
 openvdb::math::Transform::Ptr linear_transform(const openvdb::Vec3d axis[3],
                                                const openvdb::Vec3d &size, const double origin[3])
 {
@@ -125,10 +126,11 @@ openvdb::math::Transform::Ptr linear_transform(const openvdb::Vec3d axis[3],
     return openvdb::math::Transform::createLinearTransform(m);
 }
 
-// of a level set: with one size for all axes, equal as they are to 1e-6 only
+/* index-to-world transform; a level set gets the same voxel size on all axes (they agree
+   to 1e-6). */
 openvdb::math::Transform::Ptr transform_of(const sdm_grid &g, bool level_set)
 {
-    // axes a: columns of dir, made orthonormal to the last digit
+    // axes: columns of dir, orthonormalised to the last digit
     openvdb::Vec3d axis[3], size(g.spacing[0], g.spacing[1], g.spacing[2]);
     for (int a = 0; a < 3; a++) {
         axis[a] = openvdb::Vec3d(g.dir[a], g.dir[3 + a], g.dir[6 + a]);
@@ -143,16 +145,17 @@ openvdb::math::Transform::Ptr transform_of(const sdm_grid &g, bool level_set)
         return t;
     }
     auto t = linear_transform(axis, size, g.origin);
-    // whether turned voxels count as uniform hangs on roundings of 1e-15: some next size rounds
-    // otherwise
-    for (int i = 0; level_set && i < ROUNDINGS_MOST && !t->hasUniformScale(); i++) {
+    // hasUniformScale() of rotated axes fails by roundings of 1e-15: enlarge the voxels by single
+    // units in the last place until it holds
+    for (int i = 0; level_set && i < ROUNDINGS_MAX && !t->hasUniformScale(); i++) {
         size = openvdb::Vec3d(std::nextafter(size[0], INFINITY));
         t = linear_transform(axis, size, g.origin);
     }
     return t;
 }
 
-// one 8^3 block of the tree from the box; active where |value| < band (everywhere when dense)
+/* One 8^3 leaf of the tree from the box of values; active where abs(value) < band, everywhere if
+   dense. */
 void fill_block(Grid &grid, Grid::Accessor &acc, const sdm_band &box, const Coord &corner,
                 bool dense, bool half)
 {
@@ -175,7 +178,8 @@ void fill_block(Grid &grid, Grid::Accessor &acc, const sdm_band &box, const Coor
         acc.addLeaf(new Leaf(leaf));
     else if (inside)
         acc.addTile(1, corner, -background,
-                    false); // far inside: no voxel of the block is near the surface
+                    // no voxel near the surface, all inside: a tile instead of a leaf
+                    false);
 }
 
 Grid::Ptr grid_of(const openvdb::math::Transform::Ptr &transform, const sdm_band &box,
@@ -192,7 +196,7 @@ Grid::Ptr grid_of(const openvdb::math::Transform::Ptr &transform, const sdm_band
         for (int j = low; j < box.n[1] - box.pad; j += dim)
             for (int i = low; i < box.n[0] - box.pad; i += dim)
                 fill_block(*grid, acc, box, Coord(i, j, k), dense, half);
-    if (!dense) grid->tree().prune(); // joins inside tiles
+    if (!dense) grid->tree().prune(); // merges equal tiles
     return grid;
 }
 
@@ -212,7 +216,8 @@ void check_options(const sdm_grid &g, const sdm_vdb_opts &o, sdm_error *err)
     if (o.n_metadata && !o.metadata)
         need(sdm_fail(err, SDM_E_ARG, "%zu metadata entries at NULL", o.n_metadata));
     const double h = g.spacing[0];
-    if (!(h * g.spacing[1] * g.spacing[2] > 4e-15)) // below 3e-15 it takes them for nothing
+    // OpenVDB treats a voxel volume below 3e-15 as zero
+    if (!(h * g.spacing[1] * g.spacing[2] > 4e-15))
         need(sdm_fail(err, SDM_E_ARG,
                       "spacing %g x %g x %g mm is too small for OpenVDB, need at least 2e-5 mm", h,
                       g.spacing[1], g.spacing[2]));
@@ -222,11 +227,12 @@ void check_options(const sdm_grid &g, const sdm_vdb_opts &o, sdm_error *err)
                       "spacing %g x %g x %g mm: a level set needs voxels of one size; write the "
                       "map itself with --dense",
                       g.spacing[0], g.spacing[1], g.spacing[2]));
-    if (!o.dense && !(band_of(o) * h < (o.half ? 65000.0 : 3e38))) // some room for rounding up
+    // a margin below the largest number: the background is rounded up
+    if (!o.dense && !(band_of(o) * h < (o.half ? 65000.0 : 3e38)))
         need(sdm_fail(err, SDM_E_ARG, "spacing %g mm is too large for the number format", h));
 }
 
-// the half format ends at 65504
+/* 16-bit floats end at 65504. */
 void check_half(const sdm_band &box, sdm_error *err)
 {
     const size_t count = static_cast<size_t>(box.n[0] * box.n[1] * box.n[2]);

@@ -1,5 +1,6 @@
-/* Creases of level sets: values that OpenVDB's check of the gradient refuses, changed by the least
- * that it accepts. */
+/* Mends creases of level sets. A crease is a voxel at a zero crossing whose gradient
+   openvdb::tools::checkLevelSet refuses; the values of its stencil are changed by the smallest
+   amounts that it accepts. */
 #include <openvdb/math/Stencils.h>
 
 #include <algorithm>
@@ -14,28 +15,29 @@ using namespace vdb_parts;
 namespace
 {
 
-// CheckEikonal refuses squared gradients outside [0.5, 1.5]; the margin is for the rounding of the
-// check itself
+/* checkLevelSet accepts squared gradients in [0.5, 1.5]; the margin covers its rounding errors. */
 const float SQUARE_LOW = 0.52f, SQUARE_HIGH = 1.48f;
-// how far within it a gradient is brought, for what its neighbours ask, and the part of the way at
-// a time
+/* A squared gradient is moved this far into the interval, since changes for its neighbours move it
+   again; each step goes this part of the way (relaxation). */
 const float SQUARE_INSET = 0.05f, RELAXATION = 0.7f;
-// a map that is wrong at a larger share of its zero crossings is no distance
-const double CREASES_MOST = 0.5;
-// every so many rounds go by first differences, and from such a round on all of the stencil may
-// change, against cycles
-const int ROUNDS_MOST = 300, PLAIN_EVERY = 6, WIDE_FROM = 24;
-// in voxels: most that a value changes at a time, and least that is left of one that was not
-// smaller
-const float STEP_MOST = 0.25f, SIZE_LEAST = 0.1f;
-// values of less of the squared slope stay
-const float SHARE_LEAST = 1e-3f;
+/* A map with creases at a larger share of its zero crossings is not a distance: nothing
+   is changed. */
+const double CREASES_MAX = 0.5;
+/* Every PLAIN_EVERY-th round uses first differences instead of the WENO gradient, and from round
+   WIDE_FROM on the whole stencil may change instead of the nearest neighbours: both break cycles.
+ */
+const int ROUNDS_MAX = 300, PLAIN_EVERY = 6, WIDE_FROM = 24;
+/* In voxels: largest change of a value per step, and lower bound of abs(value), unless it was
+   smaller at first. */
+const float STEP_MAX = 0.25f, SIZE_MIN = 0.1f;
+/* Values that contribute less than this to the squared slope are not changed. */
+const float SHARE_MIN = 1e-3f;
 
-// that of the check: a voxel and three on each side along x, y, z
+/* The stencil of checkLevelSet: a voxel and three neighbours on each side along x, y, z. */
 using Stencil = openvdb::math::WenoStencil<const Grid>;
 const int STENCIL_SIZE = Stencil::SIZE;
 
-// place of value n of the stencil
+/* Voxel of value n of the stencil around `at`. */
 Coord stencil_place(const Coord &at, int n)
 {
     static const int along[] = {-3, -2, -1, 1, 2, 3};
@@ -51,7 +53,8 @@ bool on_crease(const Stencil &stencil)
     return !(square >= SQUARE_LOW && square <= SQUARE_HIGH);
 }
 
-// squared gradient by first differences, in voxels: at a zero crossing it never vanishes
+/* Squared gradient by upwind first differences; unlike the WENO gradient it is never 0 at a zero
+   crossing. */
 float plain_square(const Stencil &stencil, float voxel)
 {
     const float here = stencil.getValue(0), side = here > 0 ? 1.0f : -1.0f;
@@ -65,6 +68,7 @@ float plain_square(const Stencil &stencil, float voxel)
     return sum;
 }
 
+// all creases of the grid; none if there are too many
 std::vector<Coord> find_creases(const Grid &grid)
 {
     std::vector<Coord> found;
@@ -75,12 +79,13 @@ std::vector<Coord> find_creases(const Grid &grid)
         crossings += stencil.zeroCrossing();
         if (on_crease(stencil)) found.push_back(v.getCoord());
     }
-    if (static_cast<double>(found.size()) > CREASES_MOST * static_cast<double>(crossings))
+    if (static_cast<double>(found.size()) > CREASES_MAX * static_cast<double>(crossings))
         found.clear();
     return found;
 }
 
-// the same where the stencil reaches what was changed: stencils of creases of before
+/* Creases among the voxels whose stencil contains a voxel of the stencils of the creases `before`:
+   all that the last round can have changed. */
 std::vector<Coord> find_creases_near(const Grid &grid, const std::vector<Coord> &before)
 {
     std::vector<Coord> near, found;
@@ -100,11 +105,11 @@ std::vector<Coord> find_creases_near(const Grid &grid, const std::vector<Coord> 
     return found;
 }
 
-// the first value seen of each voxel that is changed
+/* The original value of each changed voxel. */
 using originals = std::map<Coord, float>;
 
 struct sweep_limits {
-    float voxel, most; // mm
+    float voxel, max; // edge of a voxel, largest abs(value), mm
     bool half;
 };
 
@@ -114,8 +119,8 @@ float square_at(Stencil &stencil, const Coord &at, bool plain, float voxel)
     return plain ? plain_square(stencil, voxel) : stencil.normSqGrad();
 }
 
-// derivative of the squared gradient at a voxel by the value of another, times the size of a voxel;
-// away from 0, where signs stay
+/* Derivative of the squared gradient at voxel `at` by the value at voxel `by`, times the voxel
+   size; the finite difference goes away from 0, so that signs stay. */
 float derivative(Grid::Accessor &acc, Stencil &stencil, const Coord &at, const Coord &by,
                  bool plain, float voxel)
 {
@@ -127,17 +132,18 @@ float derivative(Grid::Accessor &acc, Stencil &stencil, const Coord &at, const C
     return (after - before) / part;
 }
 
-/* The least change of a voxel and its neighbours, or of the whole stencil, that brings the squared
-   gradient back to where it is allowed, to first order (Kaczmarz 1937). Signs stay, and with them
-   the voxels that are inside. */
-void project(Grid::Accessor &acc, Stencil &stencil, const Coord &at, int round,
-             const sweep_limits &l, originals &original)
+/* One step of the Kaczmarz method (1937): the smallest change of the voxel and its neighbours, or
+   of the whole stencil, that to first order moves the squared gradient into the accepted interval.
+   Signs stay, so no voxel changes between inside and outside. */
+void mend_crease(Grid::Accessor &acc, Stencil &stencil, const Coord &at, int round,
+                 const sweep_limits &l, originals &original)
 {
     stencil.moveTo(at);
-    if (!on_crease(stencil)) return; // by what was done beside it
+    if (!on_crease(stencil)) return; // an earlier step of this round has mended it
     const float square = stencil.normSqGrad();
     const float missing =
         (square < SQUARE_LOW ? SQUARE_LOW + SQUARE_INSET : SQUARE_HIGH - SQUARE_INSET) - square;
+    // derivatives by the values that may change
     float slope[STENCIL_SIZE], sum = 0;
     for (int n = 0; n < STENCIL_SIZE; n++) {
         const Coord c = stencil_place(at, n);
@@ -147,14 +153,15 @@ void project(Grid::Accessor &acc, Stencil &stencil, const Coord &at, int round,
         sum += slope[n] * slope[n];
     }
     for (int n = 0; n < STENCIL_SIZE; n++) {
-        if (!(slope[n] * slope[n] > SHARE_LEAST * sum)) continue;
+        if (!(slope[n] * slope[n] > SHARE_MIN * sum)) continue;
         const Coord c = stencil_place(at, n);
+        // change along the derivatives, within the limits
         const float v = acc.getValue(c), first = original.emplace(c, v).first->second;
         const float step =
-            std::min(std::max(RELAXATION * missing * slope[n] / sum, -STEP_MOST), STEP_MOST) *
+            std::min(std::max(RELAXATION * missing * slope[n] / sum, -STEP_MAX), STEP_MAX) *
             l.voxel;
-        const float least = std::min(std::fabs(first), SIZE_LEAST * l.voxel);
-        const float size = std::min(std::max(first < 0 ? -v - step : v + step, least), l.most);
+        const float min = std::min(std::fabs(first), SIZE_MIN * l.voxel);
+        const float size = std::min(std::max(first < 0 ? -v - step : v + step, min), l.max);
         acc.setValueOnly(c, as_stored(first < 0 ? -size : size, l.half));
     }
 }
@@ -171,9 +178,9 @@ void vdb_parts::mend_creases(Grid &grid, const sdm_vdb_opts &o, sdm_vdb_report &
         static_cast<float>(grid.voxelSize()[0]),
         std::nextafter(as_stored(grid.background() * 0.999f, o.half), 0.0f), o.half};
     std::vector<Coord> found = find_creases(grid);
-    for (int round = 1; round <= ROUNDS_MOST && !found.empty(); round++) {
+    for (int round = 1; round <= ROUNDS_MAX && !found.empty(); round++) {
         check_cancelled(o, err);
-        for (const Coord &c : found) project(acc, stencil, c, round, limits, original);
+        for (const Coord &c : found) mend_crease(acc, stencil, c, round, limits, original);
         found = find_creases_near(grid, found);
     }
     for (const auto &[c, v] : original) {

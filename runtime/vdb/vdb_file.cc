@@ -1,4 +1,4 @@
-/* Files of level sets: written, sealed, read back and checked. */
+/* Files of level sets: hash, reading with check of the seal, writing with verification. */
 #include <openvdb/io/File.h>
 #include <openvdb/tools/Diagnostics.h>
 
@@ -41,7 +41,8 @@ Grid::Ptr vdb_parts::read_grid(const char *path, bool *sealed, sdm_error *err)
 {
     need(sdm_seal_check(path, sealed, err));
     openvdb::io::File file(path);
-    file.open(false); // whole, not mapped: what was checked is what is used
+    // read at once instead of memory-mapped: what is used is what was checked
+    file.open(false);
     if (!file.hasGrid(GRID_NAME))
         need(sdm_fail(err, SDM_E_FORMAT, "%s: has no grid named \"%s\"", path, GRID_NAME));
     Grid::Ptr grid = openvdb::gridPtrCast<Grid>(file.readGrid(GRID_NAME));

@@ -1,5 +1,5 @@
-/* What the files of the level set library share that knows OpenVDB: C++, and no exception leaves
- * the library. */
+/* What the C++ files of the level set library share. Only these files use OpenVDB; no exception
+   leaves the library. */
 #ifndef VDB_PARTS_H
 #define VDB_PARTS_H
 
@@ -9,14 +9,14 @@
 
 #include "sdm/vdb.h"
 
-// the library exports its C interface alone
+// hidden: the library exports its C interface only
 namespace vdb_parts __attribute__((visibility("hidden")))
 {
 
     using Grid = openvdb::FloatGrid;
     using openvdb::Coord;
 
-    // a status on its way through C++ code; the text is in the caller's sdm_error
+    // exception that carries a status through C++ code; the message is in the caller's sdm_error
     struct failure {
         sdm_status status;
     };
@@ -26,35 +26,39 @@ namespace vdb_parts __attribute__((visibility("hidden")))
         if (s) throw failure{s};
     }
 
-    // as it comes back from a file of 16-bit floats, where it is written to one
+    // v after a round trip through the file: rounded if the file has 16-bit floats (half)
     inline float as_stored(float v, bool half)
     {
         return half ? openvdb::io::truncateRealToHalf(v) : v;
     }
 
-    // SDM_E_CANCELLED where the caller wants to stop
+    // fails with SDM_E_CANCELLED if the caller wants to stop
     void check_cancelled(const sdm_vdb_opts &o, sdm_error *err);
 
-    /* Changes values at creases until checkLevelSet has nothing to object to, and counts them in
-   report (the check is the caller's: this may end without success). */
+    // ---- vdb_creases.cc
+
+    // A crease is a voxel at a zero crossing whose gradient checkLevelSet refuses. Changes values
+    // there until none is left, and counts the changes in report. It may end without success: the
+    // caller runs checkLevelSet.
     void mend_creases(Grid & grid, const sdm_vdb_opts &o, sdm_vdb_report &report, sdm_error *err);
 
-    // ---- files
+    // ---- vdb_file.cc
 
     extern const char *const GRID_NAME;
 
-    // of coordinates, extents and bits of all values in the order of the tree, tiles included
+    // CRC-64 of positions, extents and bits of all values in the order of the tree, tiles included
     uint64_t hash_of(const Grid &grid);
 
-    // string metadata; "": none of that name
+    // string metadata `name`; "" if there is none
     std::string text_of(const Grid &grid, const char *name);
 
+    // checks the seal and reads the grid
     Grid::Ptr read_grid(const char *path, bool *sealed, sdm_error *err);
 
-    // writes, reads back and compares before the file gets its name
+    // writes to a temporary file, reads it back, compares, and only then renames it to path
     void write_grid(const char *path, const Grid::Ptr &grid, sdm_error *err);
 
-    // `status` where checkLevelSet objects
+    // fails with `status` if openvdb::tools::checkLevelSet refuses the grid
     void check_level_set(const Grid &grid, const char *path, sdm_status status, sdm_error *err);
 
 } // namespace )

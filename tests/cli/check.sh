@@ -54,7 +54,7 @@ has '"check": \{"maps": 2'
 near "$(json points)" 2000 0
 
 # parameters out of the range: every policy says so in every output
-expect 0 'moved into it' sdmgen generate $model -p a=5.000000000000001 --policy clamp --json -o c.nii -o c.mha -o c.nrrd
+expect 0 'clamped to it' sdmgen generate $model -p a=5.000000000000001 --policy clamp --json -o c.nii -o c.mha -o c.nrrd
 near "$(json clamped)" 1 0
 for file in c.nii c.mha c.nrrd; do
     head -c 600 $file | tr '\0' '\n' | grep -aq 'network (clamped): cochlea a=5 ' || bad "$file does not say that it is clamped"
@@ -65,7 +65,7 @@ for policy in refuse clamp exact; do
     done
     [ $policy = clamp ] || expect 5 'a. .*1e\+300|a = 1e\+300' sdmgen generate $model -p a=1e300 --policy $policy -o never.npy
 done
-expect 0 'moved into it' sdmgen generate $model -p a=1e300 --policy clamp --json
+expect 0 'clamped to it' sdmgen generate $model -p a=1e300 --policy clamp --json
 near "$(json clamped)" 1 0
 # within the range of the shape, out of that of the network
 expect 0 - sdmgen train "$source_folder/tests/cli/tiny.yaml" shape.name=torus 'shape.ranges.major=[2.5,3.5]' train.steps=2 --out narrow --quiet

@@ -70,8 +70,10 @@ awk -v max="$(json max_mm)" -v min="$(json min_mm)" 'BEGIN { exit !(min < 0 && m
 
 # every type of output; names decide
 expect 0 - sdmgen exact --mesh cube.off "${grid[@]}" --quiet -o o.nii -o o.nii.gz -o o.nrrd -o o.mha -o o.ply -o o.stl -o o.obj \
-    -o o.off -o o.png
-present o.nii o.nii.gz o.nrrd o.mha o.ply o.stl o.obj o.off o.png
+    -o o.off -o o.png -o o.svg -o o.PDF
+present o.nii o.nii.gz o.nrrd o.mha o.ply o.stl o.obj o.off o.png o.svg o.PDF
+[ "$(head -c 4 o.PDF)" = %PDF ] || bad 'o.PDF is no PDF'
+grep -q '>exact</text>' o.svg || bad 'o.svg has no title'
 expect 0 - sdmgen info o.ply
 has '^closed +yes'
 expect 0 - sdmgen info o.off --json

@@ -28,7 +28,7 @@ md() { awk -F'|' -v name=" $1" -v row=" $2 " '$2 == " method " { for (i = 2; i <
 expect 0 - sdmgen experiment tiny.yaml --dry-run --out never
 has '^POD +pod .*train, measure +20 steps +samples 4 +never/pod$'
 has '^exact engine +exact .*samples 2 '
-has '^trainings of 0 min in all, and 1 by steps or samples, whose time is not known; results in never$'
+has '^trainings: 0 min in total, and 1 by steps or samples, of unknown duration; results in never$'
 expect 0 - sdmgen experiment tiny.yaml --dry-run --json --out never
 [ "$(json minutes)" = 0 ] || bad "minutes of the plan: $(json minutes)"
 absent never
@@ -84,7 +84,7 @@ grep -q 'has another configuration and is replaced' err || bad "not said: $(cat 
 
 # a checkpoint is gone on from with the same budget alone: with another one the model would not be that of its configuration
 stopped_at 'bases and' experiment tiny.yaml train.steps=1000000000 --out stopped --peers none
-grep -q 'the same command goes on where it stopped' err || bad "not said: $(cat err)"
+grep -q 'the same command continues where it stopped' err || bad "not said: $(cat err)"
 present stopped/pod/checkpoint.sdmc stopped/table.md
 expect 0 - sdmgen experiment tiny.yaml train.steps=1000000000 --dry-run --out stopped
 has '^POD .*go on training, measure'
@@ -97,7 +97,7 @@ grep -q '"evaluate", "step": 20,' stopped/pod/metrics.jsonl || bad "not 20 steps
 # an interrupt leaves the tables of the run before; --force trained anew what it reached, so without it the rest goes on
 tables=$(cksum stopped/table.*)
 stopped_at 'bases and' experiment tiny.yaml train.steps=1000000000 --out stopped --peers none --force
-grep -q 'the same command without --force goes on where it stopped' err || bad "not said: $(cat err)"
+grep -q 'the same command without --force continues where it stopped' err || bad "not said: $(cat err)"
 [ "$tables" = "$(cksum stopped/table.*)" ] || bad "tables of rows that were not done: $(cat stopped/table.md)"
 
 # a row that fails: its reason is in the table, the others are done, the exit code tells
@@ -157,7 +157,7 @@ expect 2 'keys stands alone' sdmgen experiment tiny.yaml --keys
 for config in "$source_folder"/configs/*.yaml; do
     grep -q '^methods:' "$config" || continue
     expect 0 - sdmgen experiment "$config" --dry-run
-    has '^trainings of [0-9]+ min'
+    has '^trainings: [0-9]+ min'
 done
 expect 0 - sdmgen experiment --keys --markdown
 cp out keys.md

@@ -100,19 +100,19 @@ has '^network +pod .*load, fit +phantoms 2 '
 sdmgen experiment tiny.yaml network.width=8 train.minutes=3 experiment.minutes=2 fit.phantoms=1 --out run >out 2>err
 [ $? -eq 4 ] || bad "over the budget: exit code"
 grep -q '^| network (failed) |' run/table.md || bad 'trained over the budget'
-grep -q "polished: failed: its network is that of 'network', which was not done" run/table.md || bad "polished by another network: $(cat run/table.md)"
+grep -q "polished: failed: the network of 'network', which it uses, is not available" run/table.md || bad "polished by another network: $(cat run/table.md)"
 ! grep -q 'is replaced' err || bad 'said to be replaced, but not trained'
 
 # a start far off: fits that fail are counted and told, not averaged
 expect 0 - sdmgen experiment tiny.yaml --out far --quiet fit.off_mm=9 fit.phantoms=1 fit.model=run/network/model.sdm
 [ "$(cell far/table.csv exact - fits)" = 0 ] && [ -z "$(cell far/parameters.csv exact rx error)" ] || bad 'a failed fit was averaged'
-grep -q 'exact: done: .*the first that failed: ' far/table.md || bad 'no reason of a failed fit'
+grep -q 'exact: done: .*the first failure: ' far/table.md || bad 'no reason of a failed fit'
 
 # models that do not fit
 sed 's/rx: \[3.4, 4.2\]/rx: [3.3, 4.2]/' tiny.yaml >wider.yaml
 sdmgen experiment wider.yaml --out wider --quiet fit.model=run/network/model.sdm >out 2>err
 [ $? -eq 2 ] || bad 'a model of a smaller range: exit code'
-grep -q 'model.sdm was trained on rx = 3.4 .. 4.2, the experiment has rx = 3.3 .. 4.2' wider/table.md || bad 'no reason: smaller range'
+grep -q 'model.sdm was trained on rx = 3.4 .. 4.2, the experiment needs rx = 3.3 .. 4.2' wider/table.md || bad 'no reason: smaller range'
 grep -q '^| exact |' wider/table.md || bad 'the rows behind were not done'
 
 # mistakes, before anything is done

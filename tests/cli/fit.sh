@@ -34,7 +34,7 @@ expect 0 - sdmgen phantom $shape $truth $turned --spacing 0.4 -o ct.nii.gz --lab
 vdb=
 sdmgen exact $shape -o probe.vdb -q 2>err && vdb='-o fit.vdb' # else built without OpenVDB
 expect 0 - sdmgen fit $fit --exact ct.nii.gz $near_truth --reference label.nrrd $vdb -o fit.stl -o fit.ply \
-    -o fit.nii.gz -o fit.nrrd -o fit.npy -o fit.png -o fit.json --label-out fitted.nrrd --json --threads 1
+    -o fit.nii.gz -o fit.nrrd -o fit.npy -o fit.png -o fit.svg -o fit.pdf -o fit.json --label-out fitted.nrrd --json --threads 1
 cp out first.json
 is_json out
 is_json fit.json
@@ -53,12 +53,14 @@ awk -v m="$(json surface_mean_mm)" -v q="$(json surface_q95_mm)" -v h="$(json su
 has '"not_determined": \[\]'
 [ "$(json map_voxel_mm)" = 0.35 ] || bad "maps of $(json map_voxel_mm) mm"
 [ "$(json maps_network)" = 0 ] && [ "$(json maps_exact)" -gt 3 ] || bad 'maps must be exact'
-present ${vdb#-o } fit.stl fit.ply fit.nii.gz fit.nrrd fit.npy fit.png fit.json fitted.nrrd
+present ${vdb#-o } fit.stl fit.ply fit.nii.gz fit.nrrd fit.npy fit.png fit.svg fit.pdf fit.json fitted.nrrd
 for file in fit.nii.gz fit.nrrd fitted.nrrd; do
     expect 0 - sdmgen info $file
     grep -Fqx "$(sdmgen info ct.nii.gz | grep '^grid')" out || bad "$file is not on the grid of the image"
 done
 [ "$(head -c 8 fit.png | od -An -t x1 | tr -d ' ')" = 89504e470d0a1a0a ] || bad 'fit.png is no PNG'
+[ "$(head -c 4 fit.pdf)" = %PDF ] || bad 'fit.pdf is no PDF'
+grep -q '>ct.nii.gz</text>' fit.svg || bad 'fit.svg has no title'
 expect 0 - sdmgen info fit.stl --json
 near "$(json volume_mm3)" 73.3 4 # 4/3 pi 3.5 2.5 2
 if [ -n "$vdb" ]; then
@@ -81,7 +83,7 @@ has '^ellipsoid fitted to ct.nii.gz$'
 has 'rx +3\.[0-9]+ \+- 0\.0'
 has 'reference: Dice 0.9'
 has 'converged after'
-has 'maps of 0.35 mm are coarse beside it.*; a fit with --spacing 0.1[0-9]* has'
+has 'voxels of the maps, 0.35 mm, are coarse.*; a fit with --spacing 0.1[0-9]* has'
 expect 0 - sdmgen fit $fit ct.nii.gz $near_truth --blur 0.3 --keep blur
 has 'point spread 0.3 mm'
 ! grep -q 'are coarse' out || bad 'maps of 0.35 mm are fine beside a point spread of 0.3 mm'
@@ -96,7 +98,7 @@ within rx 3.5 4
 expect 0 - sdmgen phantom --shape cochlea --random-params --random-pose 20,1 --spacing 0.3 --seed 111 -o small.nii --label small-label.nii --quiet
 expect 0 - sdmgen fit --shape cochlea small.nii --spacing 0.4 --start-centre 0.6,1,1.3 --start-axis 0,0,1 --eps 1e-3 --reference small-label.nii --json
 awk -v d="$(json dice)" 'BEGIN { exit !(d > 0.95) }' || bad "another turn was found: Dice $(json dice)"
-expect 0 'no start is given.*20.*-30.*10' sdmgen fit $fit ct.nii.gz --turns-sphere 3 --spacing 0.5 --json
+expect 0 'no start pose is given.*20.*-30.*10' sdmgen fit $fit ct.nii.gz --turns-sphere 3 --spacing 0.5 --json
 awk -v d="$(json evidence)" 'BEGIN { exit !(d > 0) }' || bad "evidence $(json evidence)"
 
 # what is kept is kept
@@ -140,7 +142,7 @@ expect 0 - sdmgen fit $fit walled.nii --label 1 --label-close 0.4 --reference wa
 near "$(json voxels_reference)" "$whole" 40
 near "$(param rx)" "$rx" 0.06
 [ "$(json label_close_mm)" = 0.4 ] || bad "label_close_mm $(json label_close_mm)"
-expect 2 'label-close is of labels: give --label or --reference' sdmgen fit $fit ct.nii.gz $near_truth --label-close 0.4
+expect 2 'label-close needs labels: give --label or --reference' sdmgen fit $fit ct.nii.gz $near_truth --label-close 0.4
 expect 2 'closing by a ball of 1e.08 mm: too wide for voxels of 0.4' sdmgen fit $fit walled.nii --label 1 --label-close 1e8 --rotation 0,0,0
 list() { sed -n "s/.*\"$1\": \[\([^]]*\)\].*/\1/p" truth.json | tr -d ' '; }
 {
@@ -152,7 +154,7 @@ list() { sed -n "s/.*\"$1\": \[\([^]]*\)\].*/\1/p" truth.json | tr -d ' '; }
 } >named.seg.nrrd
 expect 0 - sdmgen fit $fit named.seg.nrrd --label fluid --rotation 0,0,0 --spacing 0.5 --json
 near "$(param rx)" "$rx" 0.001
-expect 2 "named.seg.nrrd is a segmentation of 2 segments: name those of the shape, e.g. --label 'fluid'" sdmgen fit $fit named.seg.nrrd
+expect 2 "named.seg.nrrd is a segmentation of 2 segments: select those of the shape, e.g. --label 'fluid'" sdmgen fit $fit named.seg.nrrd
 expect 2 'named.seg.nrrd: .*fluid' sdmgen fit $fit named.seg.nrrd --label fluit
 expect 0 - sdmgen fit $fit fit.stl --rotation 0,0,0 --spacing 0.35 -o mesh.png -o mesh.off --label-out mesh.nrrd --json
 [ "$(json kind)" = points ] || bad "kind $(json kind)"
@@ -203,7 +205,7 @@ words() { for ((i = 0; i < $2; i++)); do printf "$1"; done; } # little endian fl
     words '\0\0\300\177' 50
     tail -c +553 float.nii
 } >some.nii
-expect 0 '50 voxels are NaN and were left out' sdmgen fit $fit some.nii $near_truth --margin 9 --json
+expect 0 '50 voxels are NaN and were ignored' sdmgen fit $fit some.nii $near_truth --margin 9 --json
 [ "$(json nan)" = 50 ] || bad "$(json nan) voxels are NaN"
 {
     head -c 352 float.nii
@@ -223,7 +225,7 @@ expect 3 "label.nrrd: no voxel has the label '7'" sdmgen fit $fit label.nrrd --l
 printf 'x,y,z\n0,0,0\n1,0,0\n' >two.csv
 expect 3 'two.csv: 2 points, need 3' sdmgen fit $fit two.csv -o no.stl
 printf '' >nothing.csv
-expect 3 "nothing.csv: no header line: the first names the columns, such as 'x'" sdmgen fit $fit nothing.csv -o no.stl
+expect 3 "nothing.csv: no header line: the first line must name the columns, such as 'x'" sdmgen fit $fit nothing.csv -o no.stl
 printf 'first,second\n0,0\n' >abc.csv
 expect 3 "abc.csv:1: unknown column 'first'; the first is 'x'" sdmgen fit $fit abc.csv -o no.stl
 printf 'x,y\n0,0\n1,0\n2,2\n' >flat.csv
@@ -247,17 +249,17 @@ expect 2 'one of --translation, --start-centre' sdmgen fit $fit ct.nii.gz --tran
 expect 2 'one of --turns and --turns-sphere' sdmgen fit $fit ct.nii.gz --turns 3 --turns-sphere 3
 expect 2 'reference-label is a label of' sdmgen fit $fit ct.nii.gz --reference-label 1
 expect 2 "keep 'shape': need one of" sdmgen fit $fit ct.nii.gz --keep shape
-expect 2 'leaves nothing to fit' sdmgen fit $fit ct.nii.gz --keep parameters --keep pose
+expect 2 'leave nothing to fit' sdmgen fit $fit ct.nii.gz --keep parameters --keep pose
 expect 2 'standard deviations above 0' sdmgen fit $fit ct.nii.gz --inside 40,0
 expect 2 "region '1,2,3': need six numbers" sdmgen fit $fit ct.nii.gz --region 1,2,3
 expect 2 "label 'fluid': need a whole number" sdmgen fit $fit label.nrrd --label fluid
-expect 2 'label is of volumes' sdmgen fit $fit fit.stl --label 1
+expect 2 'label applies to volumes' sdmgen fit $fit fit.stl --label 1
 expect 2 'no voxel of the image lies near the shape' sdmgen fit $fit ct.nii.gz --rotation 0,0,0 --start-centre 90,0,0 -o no.stl
 expect 2 'no voxel of the image lies near .*its middle at 90, ' sdmgen fit --shape cochlea ct.nii.gz --rotation 0,0,0 --start-centre 90,0,0 -o no.stl
 expect 2 'all [0-9]+ voxels of the image near the shape .*cavity' sdmgen fit $fit ct.nii.gz $near_truth --inside 600,2000 --outside 9000,10 --cavity 0.5 -o no.stl
 expect 2 "did you mean 'rx'" sdmgen fit $fit ct.nii.gz -p rc=3
 expect 5 'rx = 9, allowed' sdmgen fit $fit ct.nii.gz -p rx=9 -o no.stl
-expect 0 'start was moved into the range' sdmgen fit $fit ct.nii.gz $near_truth -p rx=9 --policy clamp --json
+expect 0 'start parameters were clamped to their range' sdmgen fit $fit ct.nii.gz $near_truth -p rx=9 --policy clamp --json
 [ "$(json start_clamped)" = true ] || bad 'a start that was moved must be marked'
 absent no.stl no.vdb no.json no.png no.nrrd no.nii no.txt no.npy
 finish

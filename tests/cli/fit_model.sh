@@ -42,7 +42,7 @@ done
 expect 5 'a = 5.5, allowed 2 .. 5' sdmgen fit $model ct.nii $start -p a=5.5 -o no.nrrd
 sdmgen fit $model ct.nii $start -p a=5.5 --keep parameters --policy clamp --json >out 2>err # a poor fit, but begun
 [ "$(json start_clamped)" = true ] || bad 'a start that was moved must be marked'
-grep -q 'the start was moved into the range' err || bad "no notice of the start: $(cat err)"
+grep -q 'the start parameters were clamped to their range' err || bad "no notice of the start: $(cat err)"
 expect 5 "'a' of shape 'cochlea' is 50 mm, need 2 .. 5" sdmgen fit $model ct.nii $start -p a=50 --policy exact -o no.nrrd
 
 # an interrupt, nothing written
@@ -56,7 +56,7 @@ code=$?
 [ ! -s out ] || bad 'an interrupted fit has no result'
 
 # mistakes
-expect 2 'spacing is of exact maps' sdmgen fit $model ct.nii $start --spacing 0.3
+expect 2 'spacing applies to exact maps' sdmgen fit $model ct.nii $start --spacing 0.3
 expect 2 'O belongs to --shape' sdmgen fit $model ct.nii $start -O edge=0.5
 expect 1 'nowhere.sdm' sdmgen fit nowhere.sdm ct.nii $start -o no.nrrd
 expect 3 'ct.nii' sdmgen fit ct.nii ct.nii $start -o no.nrrd

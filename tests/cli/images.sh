@@ -17,7 +17,7 @@ for file in m.nii m.nii.gz m.nrrd m.mha; do
     near "$(json min)" "$deepest" 1e-6
     [ "$(json type)" = image ] && [ "$(json placed)" = true ] && [ "$(json voxel_type)" = float32 ] || bad "$(cat out)"
     expect 0 - sdmgen verify $file
-    has 'whole: 9 x 10 x 11 float32 voxels'
+    has 'complete: 9 x 10 x 11 float32 voxels'
 done
 expect 0 - sdmgen verify m.nrrd
 has 'the checksum of the compressed data is right'
@@ -45,6 +45,6 @@ expect 1 'another folder' sdmgen info away.mha
 expect 1 'none\.nrrd: cannot open' sdmgen verify none.nrrd
 expect 0 - sdmgen exact --shape torus -o map.npy
 for command in info verify; do
-    expect 3 'map\.npy: not a model file .*; by its name it is no level set \(\.vdb\) and no image \(\.nii ' sdmgen $command map.npy
+    expect 3 'map\.npy: not a model file .*; its name is neither that of a level set \(\.vdb\) nor of an image \(\.nii ' sdmgen $command map.npy
 done
 finish

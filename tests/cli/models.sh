@@ -11,8 +11,8 @@ expect 0 - sdmgen info $model --json
 for key in checksum train_seconds rmse_mm q99_mm weight_bytes; do [ -n "$(json $key)" ] || bad "info: no $key"; done
 
 # outputs
-expect 0 - sdmgen generate $model -p a=4.2 -p alpha=0.6 -o m.nii -o m.nii.gz -o m.nrrd -o m.mha -o m.npy -o m.ply -o m.png --json
-present m.nii m.nii.gz m.nrrd m.mha m.npy m.ply m.png
+expect 0 - sdmgen generate $model -p a=4.2 -p alpha=0.6 -o m.nii -o m.nii.gz -o m.nrrd -o m.mha -o m.npy -o m.ply -o m.png -o m.svg -o m.pdf --json
+present m.nii m.nii.gz m.nrrd m.mha m.npy m.ply m.png m.svg m.pdf
 near "$(json a)" 4.2 0
 near "$(json maps)" 1 0
 hash=$(json values_crc64)
@@ -47,7 +47,7 @@ expect 2 'its name must end in' sdmgen generate $model -o x.txt
 expect 1 'nowhere' sdmgen generate $model -o nowhere/x.npy
 expect 1 'missing\.sdm' sdmgen generate missing.sdm -o x.npy
 absent x.npy x.txt nowhere
-expect 0 'moved into it' sdmgen generate $model -p a=7 --policy clamp -o c.npy --json
+expect 0 'clamped to it' sdmgen generate $model -p a=7 --policy clamp -o c.npy --json
 near "$(json clamped)" 1 0
 near "$(json a)" 5 0 # of the map, not what was asked for
 expect 0 - sdmgen generate $model -p a=5 -o five.npy
@@ -83,7 +83,7 @@ expect 3 'short\.csv:2: 1 values, the header has 2' sdmgen generate $model --par
 printf 'alpha,a\n1,three\n' >word.csv
 expect 3 "word\.csv:2: 'three' is not a number" sdmgen generate $model --params word.csv -o x.npy
 printf '' >empty.csv
-expect 3 "empty\.csv: no header line: the first names the columns, such as 'a'" sdmgen generate $model --params empty.csv -o x.npy
+expect 3 "empty\.csv: no header line: the first line must name the columns, such as 'a'" sdmgen generate $model --params empty.csv -o x.npy
 absent x1.npy x2.npy x-0001.npy
 
 # measuring
@@ -101,7 +101,7 @@ expect 0 - sdmgen eval $model --samples 3 --naive 0 --json --quiet --threads 1
 [ "$mse" = "$(json mse_mm2)" ] || bad 'eval depends on the number of threads'
 expect 0 - sdmgen eval $model --samples 2 --naive 0 --quiet
 has '^  RMSE +[0-9.]+ mm$'
-expect 4 'MSE .* demanded at most' sdmgen eval $model --samples 2 --naive 0 --quiet --max-mse 1e-12
+expect 4 'MSE .* --max-mse allows' sdmgen eval $model --samples 2 --naive 0 --quiet --max-mse 1e-12
 expect 0 - sdmgen bench network $model --json
 awk -v v="$(json ms_network)" 'BEGIN { exit !(v > 0) }' || bad 'bench: no ms_network'
 awk -v v="$(json ms_exact)" 'BEGIN { exit !(v > 0) }' || bad 'bench: no ms_exact'

@@ -74,7 +74,7 @@ has 'float32'
 # mistakes are named, before any file is made
 expect 2 'shape NAME is needed' sdmgen phantom -o x.nii
 expect 2 'an output is needed' sdmgen phantom $small
-expect 2 "output 'x.vdb': its name must end in .nii .nii.gz .nrrd .mha or .npy" sdmgen phantom $small -o x.vdb
+expect 2 "output 'x.vdb': its name must end in .nii .nii.gz .nrrd .mha .npy" sdmgen phantom $small -o x.vdb
 expect 2 "label 'x.npy': its name must end in" sdmgen phantom $small -o x.nii --label x.npy
 expect 2 "truth 'x.txt': its name must end in .json" sdmgen phantom $small -o x.nii --truth x.txt
 expect 2 "'x.nii' is given twice" sdmgen phantom $small -o x.nii --label x.nii
@@ -87,7 +87,7 @@ expect 2 "blur '-1': need one number or three" sdmgen phantom $small -o x.nii --
 expect 2 'blur along y is 33 mm, need 0 to 32' sdmgen phantom $small -o x.nii --blur 1,33,1
 expect 2 "noise 'nan': need a number" sdmgen phantom $small -o x.nii --noise nan
 expect 2 'share of air cells is 2, need 0 to 1' sdmgen phantom $small -o x.nii --air-cells 2,1,1
-expect 2 'random-pose: a turn of 181 degrees' sdmgen phantom $small -o x.nii --random-pose 181,0
+expect 2 'random-pose: a rotation of 181 degrees' sdmgen phantom $small -o x.nii --random-pose 181,0
 expect 2 'crop and --origin exclude each other' sdmgen phantom $small -o x.nii --crop 0,0,0.5 --origin 0,0,0
 expect 2 "crop '0,0,1'" sdmgen phantom $small -o x.nii --crop 0,0,1
 expect 2 "type 'float': need one of int16\|float32" sdmgen phantom $small -o x.nii --type float

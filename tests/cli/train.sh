@@ -26,8 +26,8 @@ awk -v s="$(json seconds)" -v m="$(json mse_mm2)" 'BEGIN { exit !(s > 0 && m > 0
 
 # a finished run is safe
 before=$(cksum <run/model.sdm)
-expect 2 'run holds a trained model and no checkpoint to go on from' sdmgen train "$tiny" --out run
-expect 2 'run holds a trained model and no checkpoint to go on from' sdmgen train "$tiny" --out run --resume
+expect 2 'run holds a trained model and no checkpoint to continue from' sdmgen train "$tiny" --out run
+expect 2 'run holds a trained model and no checkpoint to continue from' sdmgen train "$tiny" --out run --resume
 expect 2 'exclude each other' sdmgen train "$tiny" --out run --resume --force
 [ "$before" = "$(cksum <run/model.sdm)" ] || bad 'the model has changed'
 
@@ -114,7 +114,7 @@ rm -r never $'m\xf6ved'
 deviations=moved/conf/statistical/deviations.npy
 cp $deviations kept.npy
 { head -c 128 kept.npy && tail -c 32 kept.npy && tail -c 64 kept.npy | head -c 32; } >$deviations # 5 to 8, 1 to 4
-expect 2 'the maps come out otherwise' "${run[@]}" train.steps=$steps
+expect 2 'the maps differ from those it was written with' "${run[@]}" train.steps=$steps
 cp kept.npy $deviations
 expect 0 - "${run[@]}" train.steps=$steps
 cd elsewhere || exit 1

@@ -37,7 +37,7 @@ static size_t visits_of(const sdm_mesh *m)
     sdm_facets_build(m, (const double[3]){0, 0, 0}, facets, &area, &volume);
     assert_int_equal(sdm_topology_build(m, &arena, &topo, NULL), SDM_OK);
     const double tolerance = 16 * 0x1p-52 * largest;
-    assert_int_equal(sdm_fans_visit(m, &topo, facets, tolerance, &arena, count, &n, NULL, NULL),
+    assert_int_equal(sdm_fans_visit(m, &topo, facets, tolerance, &arena, count, &n, NULL),
                      SDM_OK);
     sdm_arena_dispose(&arena);
     free(facets);

@@ -73,7 +73,7 @@ static void each_lane(void **state)
         v8_store(out[1], v8_min(x, y));
         v8_store(out[2], v8_abs(x));
         v8_store(out[3], v8_rsqrt(v8_abs(z)));
-        v8_store(out[4], v8_signed(z, x, y));
+        v8_store(out[4], v8_if_negative(z, x, y));
         v8_store(out[5], v8_sqrt(v8_abs(z)));
         v8_store_i(number, v8_if_less(x, y, v8_all_i(1), v8_all_i(-1)));
         for (int i = 0; i < 8; i++) {
@@ -112,7 +112,7 @@ static void doubles(void **state)
     for (int i = 0; i < 4; i++)
         for (int j = 0; j < 4; j++) assert_true(out[i][j] == a[j][i]);
     _Alignas(32) const double mask[4] = {-1, 0, -1, 0};
-    v4_store(out[0], v4_signed(v4_load(mask), v4_load(a[0]), v4_load(a[1])));
+    v4_store(out[0], v4_if_negative(v4_load(mask), v4_load(a[0]), v4_load(a[1])));
     for (int j = 0; j < 4; j++) assert_true(out[0][j] == a[mask[j] < 0 ? 0 : 1][j]);
 }
 

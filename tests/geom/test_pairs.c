@@ -33,7 +33,7 @@ static void visit_pairs(const sdm_mesh *m, double slack, visits *v)
     sdm_bvh tree = {0};
     assert_int_equal(sdm_topology_build(m, &arena, &topo, NULL), SDM_OK);
     assert_int_equal(sdm_bvh_build(m, &arena, &tree, NULL), SDM_OK);
-    assert_int_equal(sdm_pairs_visit(m, &topo, &tree, slack, &arena, visit, v, NULL, NULL), SDM_OK);
+    assert_int_equal(sdm_pairs_visit(m, &topo, &tree, slack, &arena, visit, v, NULL), SDM_OK);
     sdm_arena_dispose(&arena);
 }
 

@@ -17,12 +17,12 @@ compile() { # compile HEADER INCLUDE_FOLDER...
 }
 
 count=0
-for header in "$root"/*/include/sdm/*.h; do
-    folder=${header%/sdm/*}
-    name=sdm/${header##*/}
+for header in "$root"/*/include/sdm/*.h "$root"/*/include/sdm/internal/*.h; do
+    folder=${header%%/include/sdm/*}/include
+    name=sdm/${header#*/include/sdm/}
     compile "$name" "$folder" "$root/framework/include" || { echo "$header does not compile alone"; exit 1; }
     # whatever has functions must be callable from C++
-    if grep -q '^SDM_API' "$header" && ! grep -q '^extern "C" {' "$header"; then
+    if grep -Eq '^(SDM_API|SDM_INTERNAL_API|sdm_status sdm_)' "$header" && ! grep -q '^extern "C" {' "$header"; then
         echo "$header has functions and no extern \"C\""
         exit 1
     fi

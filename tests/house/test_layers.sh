@@ -1,48 +1,79 @@
 #!/bin/sh
-# Order of dependencies: test_layers.sh SOURCE_FOLDER. Checks every #include, then proves on a copy that wrong ones are found.
+# The order of the house: test_layers.sh SOURCE_FOLDER. Checks the place and name of every file and every #include; then puts wrong
+# ones into a copy and checks that each is found. The table of parts and rooms below is the rule; docs/architecture.md explains it.
 set -eu
 root=$1
 work=$(mktemp -d "${TMPDIR:-/tmp}/test_layers.XXXXXX")
 trap 'rm -rf "$work"' EXIT
 
-# prints one line for each include that breaks the order
+# prints one line for each file or include that breaks the order
 check() {
     (cd "$1" && find framework shapes runtime trainer cli -type f | sort) >"$work/files"
     (cd "$1" && awk -v files="$work/files" '
-    function wrong(text) { print FILENAME ":" FNR ": " text; }
-    # the part a file or a public header belongs to
-    function part_of(path,   n, p, base) {
-        n = split(path, p, "/"); base = p[n]
-        if (path ~ /\/include\/sdm\//) return base in owner ? owner[base] : "?"
+    function wrong(text) { print FILENAME ":" FNR ": " text }
+    function basename(path) { sub(/^.*\//, "", path); return path }
+    function is_header(path) { return path ~ /\/include\/sdm\// }
+    # the part that a file or a shared header belongs to
+    function part_of(path,   p) {
+        if (is_header(path)) return basename(path) in owner ? owner[basename(path)] : "?"
+        split(path, p, "/")
         return p[1] == "framework" ? p[2] : p[1]
     }
-    function allow(part, list,   n, p, i) { n = split(list, p, " "); for (i = 1; i <= n; i++) allowed[part, p[i]] = 1 }
+    # the folder of a part, with a slash; empty for headers shared between parts
+    function root_of(path) {
+        if (is_header(path)) return ""
+        return match(path, /^(framework\/[a-z]+|[a-z]+)\//) ? substr(path, 1, RLENGTH) : ""
+    }
+    # the room of a file within its part: its folder from the root of the part, "." for the root itself
+    function room_of(path, root,   room) {
+        room = substr(path, length(root) + 1)
+        return sub(/\/[^\/]*$/, "", room) ? room : "."
+    }
+    function parts(part, list,   n, p, i) { n = split(list, p, " "); for (i = 1; i <= n; i++) allowed[part, p[i]] = 1 }
+    # rooms of a part in order: each uses itself and those before it
+    function rooms(root, list,   n, r, i) { n = split(list, r, " "); for (i = 1; i <= n; i++) rank[root, r[i]] = i }
     function own(part, list,   n, p, i) { n = split(list, p, " "); for (i = 1; i <= n; i++) owner[p[i] ".h"] = part }
     BEGIN {
-        vdb = "^runtime/vdb[a-z_]*[.]cc$"
-        own("core", "checksum clock envelope export file grid json memory pose rng status text threads")
+        own("core", "export grid memory pose status")
+        own("core", "checksum clock envelope file heap processor rng rotation shared table text threads vec3")
         own("config", "config experiment")
-        own("geom", "mesh exact methods")
-        own("nn", "model pod point_network sdmnn kernels container")
-        own("io", "image volume meshfile")
-        own("shape", "shape registry")
+        own("geom", "exact isosurface mesh")
+        own("geom", "brute_force builder methods")
+        own("nn", "model")
+        own("nn", "container kernels model_threads pod point_network sdmnn")
+        own("io", "image meshfile picture volume")
+        own("shape", "registry shape")
+        own("shapes", "builtin_shapes")
         own("runtime", "check fit map phantom runtime vdb")
         own("trainer", "train")
-        own("shapes", "builtin_shapes")
-        allow("core", "core")
-        allow("config", "core config")
-        allow("geom", "core geom")
-        allow("nn", "core nn")
-        allow("io", "core geom io")
-        allow("shape", "core geom io shape")
-        allow("shapes", "core geom shape shapes")
-        allow("runtime", "core geom nn io shape runtime")
-        allow("trainer", "core config geom nn io shape trainer")
-        allow("cli", "core config geom nn io shape shapes runtime trainer cli")
+        parts("core", "core")
+        parts("config", "core config")
+        parts("geom", "core geom")
+        parts("nn", "core nn")
+        parts("io", "core geom io")
+        parts("shape", "core geom io shape")
+        parts("shapes", "core geom shape shapes")
+        parts("runtime", "core geom nn io shape runtime")
+        parts("trainer", "core config geom nn io shape trainer")
+        parts("cli", "core config geom nn io shape shapes runtime trainer cli")
+        rooms("framework/geom/", "memory simd exactly mesh solid features map sign layers methods .")
+        rooms("framework/nn/", "kernels model pod point sdmnn")
+        rooms("framework/io/", ". mesh image picture")
+        rooms("runtime/", "maps phantom fit/data fit/solver fit/start fit/trust fit vdb")
+        rooms("trainer/", "data . pod direct")
+        rooms("cli/", "args report inputs phantom fit study .")
+        rooms("framework/core/", "."); rooms("framework/config/", "."); rooms("framework/shape/", "."); rooms("shapes/", ".")
         while ((getline line < files) > 0) {
             exists[line] = 1
-            if (line ~ /\.(cc|cpp|cxx|hpp|hh)$/ && line !~ vdb) print line ": C++ outside of runtime/vdb*.cc"
-            if (line ~ /\/include\/sdm\/[^\/]*$/ && part_of(line) == "?") print line ": public header without a part in the table of this test"
+            name = basename(line); folder = substr(line, 1, length(line) - length(name))
+            if (name == "CMakeLists.txt") continue
+            if (name in place) print line ": there is a file of this name in " place[name]
+            place[name] = folder
+            if (line ~ /\.(cc|cpp|cxx|hpp|hh)$/ && line !~ /^runtime\/vdb\//) print line ": C++ outside of runtime/vdb"
+            if (is_header(line) && part_of(line) == "?") print line ": header without a part in the table of this test"
+            root = root_of(line)
+            if (root != "" && !((root, room_of(line, root)) in rank)) print line ": folder without a place in the table of this test"
+            if (!is_header(line) && ++in_folder[folder] == 31) print line ": the 31st file of its folder"
         }
     }
     !/^[ \t]*#[ \t]*include/ { next }
@@ -50,24 +81,35 @@ check() {
         name = $0; sub(/^[ \t]*#[ \t]*include[ \t]*/, "", name)
         quoted = substr(name, 1, 1) == "\""
         sub(/^["<]/, "", name); sub(/[">].*$/, "", name)
+        part = part_of(FILENAME); root = root_of(FILENAME); room = room_of(FILENAME, root)
         folder = FILENAME; sub(/[^\/]*$/, "", folder)
-        base = substr(FILENAME, length(folder) + 1)
-        # a folder within a part of the framework, e.g. geom/methods, sees the headers of the part
-        part_folder = folder; if (!sub(/[^\/]*\/$/, "", part_folder) || part_folder !~ /^framework\/[a-z]*\/$/) part_folder = folder
-        part = part_of(FILENAME)
         if (name ~ /^sdm\//) {
-            header = substr(name, 5)
-            if (!(header in owner)) wrong("unknown public header " name)
+            header = basename(name)
+            known = header in owner && ((name ~ /^sdm\/internal\//) == !((owner_folder(owner[header]) "include/sdm/" header) in exists))
+            if (!known) wrong("unknown header " name)
             else if (!((part, owner[header]) in allowed)) wrong(part " must not include " name " of " owner[header])
-        } else if (quoted && (name ~ /\// || !((folder name) in exists || (part_folder name) in exists))) wrong("\"" name "\" is not in the same folder or in that of its part")
-        if (name ~ /(immintrin|x86intrin|emmintrin|arm_neon|arm_sve)\.h$/ && !(FILENAME ~ /^framework\// && (base ~ /kernel/ || base == "lanes.h"))) wrong(name " outside of the kernels")
+            else if (name ~ /^sdm\/internal\// && FILENAME ~ /\/include\/sdm\/[^\/]*$/) wrong(name " in a header for users")
+        } else if (quoted && name ~ /\//) {
+            target = root name
+            if (root == "" || !(target in exists)) wrong("\"" name "\" is no file of " root)
+            else if (room_of(target, root) == room) wrong("\"" name "\" is in the same folder: leave the folder out")
+            else if (rank[root, room_of(target, root)] > rank[root, room]) wrong(root room " must not include " name)
+        } else if (quoted && !((folder name) in exists)) {
+            if (!((root name) in exists)) wrong("\"" name "\" is neither in the same folder nor in " root)
+            else if (rank[root, "."] > rank[root, room]) wrong(root room " must not include " name)
+        }
+        if (name ~ /(immintrin|x86intrin|emmintrin|arm_neon|arm_sve)\.h$/ && FILENAME !~ /^framework\/(geom\/(simd|map)|nn\/kernels)\//)
+            wrong(name " outside of simd/, map/ and kernels/")
         if (name ~ /dnnl/ && FILENAME != "framework/nn/sdmnn/conv_kernels_dnnl.c") wrong(name " outside of framework/nn/sdmnn/conv_kernels_dnnl.c")
         if (name ~ /yaml\.h$/ && part != "config") wrong(name " outside of framework/config")
-        if (name ~ /^(openvdb|tbb)\// && FILENAME !~ vdb && FILENAME != "runtime/vdb_parts.h") wrong(name " outside of runtime/vdb*")
+        if (name ~ /^(openvdb|tbb)\// && FILENAME !~ /^runtime\/vdb\//) wrong(name " outside of runtime/vdb")
+        if (name ~ /cairo.*\.h$/ && FILENAME !~ /^framework\/io\/picture\//) wrong(name " outside of framework/io/picture")
         if (name ~ /^z(lib|conf)\.h$/ && part != "io") wrong(name " outside of framework/io")
         if (name ~ /^dlfcn\.h$/ && part != "shape") wrong(name " outside of framework/shape")
-        if (FILENAME ~ /\/include\/sdm\// && !quoted && name !~ /^std(bool|def|int)\.h$/) wrong(name " in a public header")
-    }' $(grep -E '\.(c|cc|h|inc)$' "$work/files"))
+        if (is_header(FILENAME) && !quoted && name !~ /^(std(arg|bool|def|int)|pthread|math)\.h$/) wrong(name " in a header between parts")
+    }
+    function owner_folder(part) { return part ~ /^(runtime|trainer|shapes)$/ ? part "/" : "framework/" }
+    ' $(grep -E '\.(c|cc|h|inc)$' "$work/files"))
 }
 
 found=$(check "$root")
@@ -82,7 +124,10 @@ files=$(grep -c . "$work/files")
 copy=$work/copy
 mkdir "$copy"
 (cd "$root" && tar cf - framework shapes runtime trainer cli) | (cd "$copy" && tar xf -)
+tried=0
 must_find() { # must_find FILE LINE
+    tried=$((tried + 1))
+    mkdir -p "$(dirname "$copy/$1")"
     had=no
     if [ -e "$copy/$1" ]; then had=yes; cp "$copy/$1" "$work/kept"; fi
     printf '%s\n' "$2" >>"$copy/$1"
@@ -94,33 +139,50 @@ must_find() { # must_find FILE LINE
     if [ $had = yes ]; then cp "$work/kept" "$copy/$1"; else rm "$copy/$1"; fi
 }
 must_find framework/core/status.c '#include "sdm/mesh.h"'
-must_find framework/core/file.c '#include "sdm/config.h"'
-must_find framework/geom/mesh.c '#include "sdm/meshfile.h"'
-must_find framework/geom/mesh.c '#include "sdm/model.h"'
-must_find framework/nn/blocks.c '#include "sdm/exact.h"'
-must_find framework/nn/blocks.c '  #  include <immintrin.h>'
-must_find framework/nn/blocks.c '#include <oneapi/dnnl/dnnl.h>'
-must_find framework/config/config.c '#include "sdm/registry.h"'
-must_find framework/io/npy.c '#include "sdm/registry.h"'
-must_find framework/io/npy.c '#include <yaml.h>'
-must_find framework/include/sdm/grid.h '#include "sdm/exact.h"'
-must_find framework/include/sdm/exact.h '#include <omp.h>'
-must_find framework/shape/new.c '#include "sdm/runtime.h"'
-must_find framework/geom/new.c '#include "../nn/model_internal.h"'
+must_find framework/core/file.c '#include "sdm/internal/config.h"'
+must_find framework/core/file.c '#include "sdm/internal/memory.h"'
+must_find framework/geom/mesh/mesh.c '#include "sdm/meshfile.h"'
+must_find framework/geom/mesh/mesh.c '#include "sdm/model.h"'
+must_find framework/geom/mesh/mesh.c '#include "solid/fan.h"'
+must_find framework/geom/mesh/mesh.c '#include "mesh/bvh.h"'
+must_find framework/geom/mesh/bvh.c '#include <immintrin.h>'
+must_find framework/geom/new.c '#include "../nn/model/model_kind.h"'
 must_find framework/geom/new.c '#include "bytes.h"'
 must_find framework/geom/methods/new.c '#include "bytes.h"'
 must_find framework/geom/new.c '#include "method.h"'
-must_find framework/geom/new.cc '// C++'
-must_find framework/include/sdm/unlisted.h '/* a header nobody placed */'
-must_find runtime/runtime.c '#include "sdm/train.h"'
-must_find runtime/runtime.c '#include "sdm/builtin_shapes.h"'
-must_find runtime/runtime.c '#include <openvdb/openvdb.h>'
-must_find runtime/runtime.c '#include "sdm/config.h"'
+must_find framework/geom/mesh/new.cc '// C++'
+must_find framework/geom/solid/bvh.c '/* a name that geom/mesh has */'
+must_find framework/geom/room/new.c '/* a room without a place */'
+must_find framework/nn/pod/blocks.c '#include "sdm/exact.h"'
+must_find framework/nn/pod/blocks.c '  #  include <immintrin.h>'
+must_find framework/nn/pod/blocks.c '#include <oneapi/dnnl/dnnl.h>'
+must_find framework/nn/model/model_open.c '#include "pod/blocks.h"'
+must_find framework/config/config.c '#include "sdm/registry.h"'
+must_find framework/io/image/npy.c '#include "sdm/registry.h"'
+must_find framework/io/image/npy.c '#include <yaml.h>'
+must_find framework/io/image/npy.c '#include <cairo.h>'
+must_find framework/include/sdm/grid.h '#include "sdm/exact.h"'
+must_find framework/include/sdm/grid.h '#include "sdm/internal/heap.h"'
+must_find framework/include/sdm/exact.h '#include <omp.h>'
+must_find framework/include/sdm/unlisted.h '/* a header without a place */'
+must_find framework/shape/new.c '#include "sdm/runtime.h"'
+must_find runtime/maps/generate.c '#include "sdm/internal/train.h"'
+must_find runtime/maps/generate.c '#include "sdm/builtin_shapes.h"'
+must_find runtime/maps/generate.c '#include <openvdb/openvdb.h>'
+must_find runtime/maps/generate.c '#include "sdm/internal/config.h"'
+must_find runtime/fit/data/blur.c '#include "fit/solver/newton.h"'
 must_find trainer/new.c '#include "sdm/runtime.h"'
 must_find trainer/new.c '#include "sdm/vdb.h"'
 must_find trainer/new.c '#include <zlib.h>'
 must_find shapes/new.c '#include "sdm/runtime.h"'
-must_find shapes/new.c '#include "sdm/train.h"'
+must_find shapes/new.c '#include "sdm/internal/train.h"'
 must_find cli/new.c '#include <dlfcn.h>'
 must_find cli/new.c '#include "sdm/no_such.h"'
-echo "$files files in order; 31 wrong includes found"
+# a folder may have 30 files of its own
+n=$(find "$copy/framework/core" -maxdepth 1 -type f | wc -l)
+while [ "$n" -lt 30 ]; do
+    n=$((n + 1))
+    : >"$copy/framework/core/fill_$n.c"
+done
+must_find framework/core/xyz_one_too_many.c '/* the 31st file */'
+echo "$files files in order; $tried wrong ones found"

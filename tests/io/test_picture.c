@@ -1,5 +1,5 @@
-/* Pictures: the PNG decoded by a small reader of our own, contours and curves where they belong,
- * every glyph drawn. */
+/* Pictures as PNG, decoded by a small reader: images pixel by pixel, contours and curves where they
+ * belong, text, colours, ticks, misuse. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -21,23 +21,37 @@ static bool is_colour(const unsigned char *p, int r, int g, int b)
     return abs(p[0] - r) < 12 && abs(p[1] - g) < 12 && abs(p[2] - b) < 12;
 }
 
-static void test_png_round_trip(void **state)
+static sdm_colour noise_pixel(const void *user, int x, int y)
+{
+    const uint64_t i = (uint64_t)(y * *(const int *)user + x);
+    return (sdm_colour){(uint8_t)sdm_rng_below(1, 0, i, 256), (uint8_t)(i / 7), (uint8_t)x};
+}
+
+/* An image is copied pixel by pixel, and what is clipped stays white. */
+static void test_image_is_exact(void **state)
 {
     (void)state;
     static const int size[][2] = {{1, 1}, {37, 23}, {400, 300}};
     for (size_t k = 0; k < 3; k++) {
-        sdm_canvas c;
-        assert_int_equal(sdm_canvas_create(&c, size[k][0], size[k][1], NULL), SDM_OK);
-        const size_t n = 3 * (size_t)c.w * (size_t)c.h;
-        /* noise above, a ramp below: every filter has its chance */
-        for (size_t i = 0; i < n; i++)
-            c.rgb[i] = (uint8_t)(i < n / 2 ? sdm_rng_below(1, 0, i, 256) : i / 7);
-        assert_int_equal(sdm_png_write("test_picture_a.png", &c, NULL), SDM_OK);
+        const int w = size[k][0], h = size[k][1];
+        sdm_canvas *c;
+        assert_int_equal(sdm_canvas_create("test_picture_a.png", w + 7, h + 5, &c, NULL), SDM_OK);
+        sdm_canvas_image(c, (sdm_box){4, 2, w, h}, noise_pixel, &w);
+        sdm_canvas_clip(c, (sdm_box){0, 0, 2, 2});
+        sdm_canvas_fill(c, (sdm_box){0, 0, 3, 3}, (sdm_colour){0, 0, 255}, 1);
+        sdm_canvas_unclip(c);
+        assert_int_equal(sdm_canvas_finish(c, NULL), SDM_OK);
         picture p = read_png("test_picture_a.png");
-        assert_true(p.w == c.w && p.h == c.h);
-        assert_memory_equal(p.rgb, c.rgb, n);
+        assert_true(p.w == w + 7 && p.h == h + 5);
+        for (int y = 0; y < p.h; y++)
+            for (int x = 0; x < p.w; x++) {
+                const bool inside = x >= 4 && x < 4 + w && y >= 2 && y < 2 + h;
+                const sdm_colour want = inside           ? noise_pixel(&w, x - 4, y - 2)
+                                        : x < 2 && y < 2 ? (sdm_colour){0, 0, 255}
+                                                         : (sdm_colour){255, 255, 255};
+                assert_memory_equal(p.rgb + 3 * (y * p.w + x), &want, 3);
+            }
         free(p.rgb);
-        sdm_canvas_dispose(&c);
     }
 }
 
@@ -51,22 +65,24 @@ static void test_contour_is_subpixel(void **state)
     for (int i = 0; i < 1200; i++) v[i] = (float)(hypot(i % 40 - cx, i / 40 - cy) - radius);
     const sdm_slice s = {v, {40, 30}, {1, 40}};
     const sdm_box box = {20, 10, 400, 300};
-    sdm_canvas c;
-    assert_int_equal(sdm_canvas_create(&c, 440, 320, NULL), SDM_OK);
-    sdm_panel_contour(&c, box, &s, 0, 2, (sdm_colour){255, 0, 0}, (sdm_colour){255, 255, 255});
+    sdm_canvas *c;
+    assert_int_equal(sdm_canvas_create("test_picture_c.png", 440, 320, &c, NULL), SDM_OK);
+    sdm_panel_contour(c, box, &s, 0, 2, (sdm_colour){255, 0, 0}, (sdm_colour){255, 255, 255});
+    assert_int_equal(sdm_canvas_finish(c, NULL), SDM_OK);
+    picture p = read_png("test_picture_c.png");
     bool seen[360] = {false};
-    for (int y = 0; y < c.h; y++)
-        for (int x = 0; x < c.w; x++) {
+    for (int y = 0; y < p.h; y++)
+        for (int x = 0; x < p.w; x++) {
             const double dx = x + 0.5 - box.x - (cx + 0.5) * pixels,
                          dy = box.y + box.h - (y + 0.5) - (cy + 0.5) * pixels;
-            const bool red = c.rgb[3 * (y * c.w + x) + 1] < 128;
+            const bool red = p.rgb[3 * (y * p.w + x) + 1] < 128;
             const double off = fabs(hypot(dx, dy) - radius * pixels);
             if (red) assert_true(off < 1.4);
             if (off < 0.4) assert_true(red);
             if (red) seen[(int)((atan2(dy, dx) + 3.1415926535) / 6.2831853072 * 360) % 360] = true;
         }
     for (int i = 0; i < 360; i++) assert_true(seen[i]);
-    sdm_canvas_dispose(&c);
+    free(p.rgb);
 }
 
 /* A ball in a grid of three spacings: round in all three slices, of one scale, cut through its
@@ -288,33 +304,65 @@ static void test_odd_plots(void **state)
         }
 }
 
-static void test_glyphs(void **state)
+/* Draws text on a white canvas; returns the box of its ink, x0 y0 x1 y1. */
+static void ink_of(sdm_type type, double x, double y, const char *text, int box[4])
+{
+    sdm_canvas *c;
+    assert_int_equal(sdm_canvas_create("test_picture_t.png", 400, 120, &c, NULL), SDM_OK);
+    sdm_canvas_text(c, x, y, type, text);
+    assert_int_equal(sdm_canvas_finish(c, NULL), SDM_OK);
+    picture p = read_png("test_picture_t.png");
+    box[0] = p.w, box[1] = p.h, box[2] = box[3] = -1;
+    for (int i = 0; i < p.w * p.h; i++)
+        if (p.rgb[3 * i] < 128) {
+            box[0] = i % p.w < box[0] ? i % p.w : box[0];
+            box[1] = i / p.w < box[1] ? i / p.w : box[1];
+            box[2] = i % p.w > box[2] ? i % p.w : box[2];
+            box[3] = i / p.w > box[3] ? i / p.w : box[3];
+        }
+    free(p.rgb);
+}
+
+static void test_text(void **state)
 {
     (void)state;
-    sdm_canvas c;
-    assert_int_equal(sdm_canvas_create(&c, 200, 120, NULL), SDM_OK);
-    uint8_t *last = malloc(200 * 120 * 3);
-    assert_non_null(last);
-    for (int code = '!'; code <= '~'; code++) {
-        const char text[2] = {(char)code, 0};
-        memset(c.rgb, 255, 200 * 120 * 3);
-        sdm_canvas_text(&c, 60, 80, (sdm_type){.size = 56}, text);
-        int low = 200, high = -1;
-        for (int i = 0; i < 200 * 120; i++)
-            if (c.rgb[3 * i] < 128) {
-                low = i % 200 < low ? i % 200 : low;
-                high = i % 200 > high ? i % 200 : high;
-            }
-        /* something is there, inside the glyph's width, and not the glyph before */
-        assert_true(high >= low && low > 52 && high < 68 + sdm_text_width(56, text));
-        assert_true(memcmp(last, c.rgb, 200 * 120 * 3) != 0);
-        memcpy(last, c.rgb, 200 * 120 * 3);
+    int box[4];
+    sdm_canvas *c;
+    assert_int_equal(sdm_canvas_create("test_picture_t.png", 4, 4, &c, NULL), SDM_OK);
+    const double width = sdm_canvas_text_width(c, 20, "HHHHH");
+    assert_true(sdm_canvas_text_width(c, 10, "mm\xC2\xB2") > sdm_canvas_text_width(c, 10, "mm"));
+    assert_true(fabs(sdm_canvas_text_width(c, 10, "HHHHH") - width / 2) < 0.01);
+    sdm_canvas_discard(c);
+
+    /* capitals of the given height on the base line, aligned at the point */
+    for (int align = 0; align < 3; align++) {
+        ink_of((sdm_type){.size = 20, .align = (sdm_align)align}, 200, 80, "HHHHH", box);
+        const double left = 200 - width * align / 2;
+        assert_true(abs(box[3] - 79) <= 1 && abs(box[3] - box[1] - 19) <= 2);
+        assert_true(fabs(box[0] - left) < 5 && fabs(box[2] - left - width) < 5);
     }
-    assert_true(sdm_text_width(10, "mm\xC2\xB2") > sdm_text_width(10, "mm"));
-    sdm_canvas_text(&c, 1e9, -1e9, (sdm_type){.size = 1e6, .halo = true, .upwards = true},
-                    "far away \xE2\x88");
-    free(last);
-    sdm_canvas_dispose(&c);
+    ink_of((sdm_type){.size = 20, .align = SDM_CENTRE, .upwards = true}, 200, 60, "HHHHH", box);
+    assert_true(abs(box[2] - 199) <= 1 && abs(box[2] - box[0] - 19) <= 2);
+    assert_true(abs(box[1] + box[3] - 120) <= 6 && fabs(box[3] - box[1] - width) < 8);
+
+    /* whatever the bytes: every character but the space is drawn, malformed ones as '?' */
+    for (int code = 1; code < 256; code++) {
+        const char text[2] = {(char)code, 0};
+        ink_of((sdm_type){.size = 40, .bold = code & 1}, 60, 80, text, box);
+        assert_true((box[2] >= box[0]) == (code != ' '));
+    }
+    static const char *const odd[] = {"\xE2\x88",     "\xF8\x88\x80\x80", "\xC0\x80",
+                                      "\xED\xA0\x80", "\xEF\xBF\xBF",     "\xF4\x90\x80\x80"};
+    for (size_t i = 0; i < sizeof odd / sizeof *odd; i++) {
+        ink_of((sdm_type){.size = 20, .halo = true}, 60, 80, odd[i], box);
+        assert_true(box[2] >= box[0]);
+    }
+    ink_of((sdm_type){.size = 20}, 60, 80, "", box);
+    assert_true(box[2] < 0);
+    static char long_text[5000];
+    memset(long_text, 'm', sizeof long_text - 1);
+    ink_of((sdm_type){.size = 20, .align = SDM_RIGHT}, 390, 80, long_text, box);
+    assert_true(box[0] == 0 && box[2] > 370);
 }
 
 static void test_colours(void **state)
@@ -377,6 +425,11 @@ static void test_misuse(void **state)
     const sdm_picture_map map = {"a", v, false}, none = {"a", NULL, false};
     const sdm_curve curve = {"a", x, x, 2}, broken = {"a", x, NULL, 2};
     sdm_error err;
+    sdm_canvas *c = NULL;
+    assert_int_equal(sdm_canvas_create("a.png", 0, 10, &c, &err), SDM_E_ARG);
+    assert_int_equal(sdm_canvas_create("a.png", 10, 16385, &c, &err), SDM_E_ARG);
+    assert_null(c);
+    sdm_canvas_discard(c);
     assert_int_equal(sdm_picture_slices(NULL, &g, &map, 1, &level, 1, &err), SDM_E_ARG);
     assert_int_equal(sdm_picture_slices("a.png", NULL, &map, 1, &level, 1, &err), SDM_E_ARG);
     assert_int_equal(sdm_picture_slices("a.png", &g, NULL, 1, &level, 1, &err), SDM_E_ARG);
@@ -392,7 +445,8 @@ static void test_misuse(void **state)
     assert_int_equal(sdm_picture_plot("a.png", "", "", "", false, &broken, 1, &err), SDM_E_ARG);
     assert_int_equal(sdm_picture_plot("no_such_folder/a.png", "", "", "", false, &curve, 1, &err),
                      SDM_E_IO);
-    for (unsigned long n = 1; n < 9; n++) {
+    unsigned long n = 1;
+    for (;; n++) {
         sdm_alloc_fail_after(n);
         const sdm_status s =
             sdm_picture_plot("test_picture_none.png", "", "", "", false, &curve, 1, &err);
@@ -401,6 +455,7 @@ static void test_misuse(void **state)
         assert_int_equal(s, SDM_E_NOMEM);
         assert_null(fopen("test_picture_none.png", "rb"));
     }
+    assert_true(n > 1);
     remove("test_picture_none.png");
     free(v);
 }
@@ -408,10 +463,10 @@ static void test_misuse(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_png_round_trip), cmocka_unit_test(test_contour_is_subpixel),
+        cmocka_unit_test(test_image_is_exact), cmocka_unit_test(test_contour_is_subpixel),
         cmocka_unit_test(test_slices),         cmocka_unit_test(test_slices_of_odd_maps),
         cmocka_unit_test(test_overlay),        cmocka_unit_test(test_plot),
-        cmocka_unit_test(test_odd_plots),      cmocka_unit_test(test_glyphs),
+        cmocka_unit_test(test_odd_plots),      cmocka_unit_test(test_text),
         cmocka_unit_test(test_colours),        cmocka_unit_test(test_ticks),
         cmocka_unit_test(test_misuse),
     };

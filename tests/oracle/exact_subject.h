@@ -6,7 +6,7 @@
 #include <float.h>
 #include <stdlib.h>
 
-#include "oracle/brute_force.h"
+#include "oracle/long_double.h"
 #include "oracle/random_meshes.h"
 #include "sdm/exact.h"
 

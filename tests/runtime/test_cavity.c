@@ -46,7 +46,7 @@ static void test_brute_force(void **state)
         const sdm_fit_target t = {.kind = SDM_FIT_IMAGE, .grid = g, .values = image};
         size_t n, expected = 0, all = 0;
         o.n_threads = 1 + (int)(seed % 3);
-        assert_int_equal(sdm_fit_leave_out_cavities(&t, &o, &found, &n, NULL), SDM_OK);
+        assert_int_equal(sdm_fit_mask_cavities(&t, &o, &found, &n, NULL), SDM_OK);
         for (size_t i = 0; i < COUNT; i++) {
             bool out = false;
             for (size_t k = 0; k < COUNT; k++)

@@ -44,22 +44,22 @@ static void smooth_noise(uint64_t seed, double *e)
 }
 
 // cosines, which are orthogonal on the voxels; influence: inverse of their products
-static void make_shell(fit_shell *v, double *influence)
+static void make_neighbours(fit_neighbours *v, double *influence)
 {
-    *v = (fit_shell){.n = VOXELS, .n_unknowns = UNKNOWNS, .size = {NX, NY, NZ}, .step = 1};
-    v->at = calloc(VOXELS, sizeof *v->at);
-    v->place = calloc(3 * VOXELS, sizeof *v->place);
-    v->lot = calloc(VOXELS, sizeof *v->lot);
+    *v = (fit_neighbours){.n = VOXELS, .n_unknowns = UNKNOWNS, .size = {NX, NY, NZ}, .step = 1};
+    v->number_at = calloc(VOXELS, sizeof *v->number_at);
+    v->position = calloc(3 * VOXELS, sizeof *v->position);
+    v->draw = calloc(VOXELS, sizeof *v->draw);
     v->residual = calloc(VOXELS, sizeof *v->residual);
     v->weight = calloc(VOXELS, sizeof *v->weight);
     v->root = calloc(VOXELS * UNKNOWNS, sizeof *v->root);
-    if (!v->at || !v->place || !v->lot || !v->residual || !v->weight || !v->root) abort();
+    if (!v->number_at || !v->position || !v->draw || !v->residual || !v->weight || !v->root) abort();
     memset(influence, 0, UNKNOWNS * UNKNOWNS * sizeof *influence);
     for (int i = 0; i < VOXELS; i++) {
         const int p[3] = {i % NX, i / NX % NY, i / NX / NY};
-        for (int k = 0; k < 3; k++) v->place[3 * i + k] = p[k];
-        v->at[i] = (uint32_t)i + 1;
-        v->lot[i] = (float)sdm_rng_uniform(3, 4, (uint64_t)i);
+        for (int k = 0; k < 3; k++) v->position[3 * i + k] = p[k];
+        v->number_at[i] = (uint32_t)i + 1;
+        v->draw[i] = (float)sdm_rng_uniform(3, 4, (uint64_t)i);
         v->weight[i] = 1;
         for (int a = 0; a < UNKNOWNS; a++)
             v->root[UNKNOWNS * i + a] = (float)(cos(PI * (p[0] + 0.5) * (a % 4) / NX) *
@@ -73,18 +73,18 @@ static void make_shell(fit_shell *v, double *influence)
     }
 }
 
-static void free_shell(fit_shell *v)
+static void free_neighbours(fit_neighbours *v)
 {
-    free(v->at);
-    free(v->place);
-    free(v->lot);
+    free(v->number_at);
+    free(v->position);
+    free(v->draw);
     free(v->residual);
     free(v->weight);
     free(v->root);
 }
 
 // what is left of e by a fit of the functions
-static void fit_functions(fit_shell *v, const double *influence, const double *e)
+static void fit_functions(fit_neighbours *v, const double *influence, const double *e)
 {
     double x[UNKNOWNS];
     for (int a = 0; a < UNKNOWNS; a++) {
@@ -99,56 +99,56 @@ static void fit_functions(fit_shell *v, const double *influence, const double *e
     }
 }
 
-static void test_freed(void **state)
+static void test_corrected(void **state)
 {
     (void)state;
-    static double e[VOXELS], influence[UNKNOWNS * UNKNOWNS], c[FIT_LAG_MIDDLE + 1],
-        weighted[FIT_LAG_MIDDLE + 1];
+    static double e[VOXELS], influence[UNKNOWNS * UNKNOWNS], c[FIT_LAG_ZERO + 1],
+        weighted[FIT_LAG_ZERO + 1];
     double sum = 0, square = 0, before = 0, after = 0, variance = 0;
-    fit_shell v;
-    make_shell(&v, influence);
+    fit_neighbours v;
+    make_neighbours(&v, influence);
     for (int k = -REACH; k <= REACH; k++) sum += kernel(k), square += kernel(k) * kernel(k);
     const double wanted = pow(sum * sum / square, 3);
     for (uint64_t seed = 0; seed < FITS; seed++) {
         int width;
         smooth_noise(seed, e);
         fit_functions(&v, influence, e);
-        assert_int_equal(sdm_fit_correlate(&v, 1, 1, c, &width, NULL), SDM_OK);
-        before += sdm_fit_weigh_lags(c, width, true, weighted) / FITS;
-        assert_int_equal(sdm_fit_free_correlation(&v, influence, width, 1, c, NULL), SDM_OK);
-        after += sdm_fit_weigh_lags(c, width, true, weighted) / FITS;
-        variance += c[FIT_LAG_MIDDLE] / FITS;
+        assert_int_equal(sdm_fit_correlation_estimate(&v, 1, 1, c, &width, NULL), SDM_OK);
+        before += sdm_fit_correlation_taper(c, width, true, weighted) / FITS;
+        assert_int_equal(sdm_fit_correlation_correct(&v, influence, width, 1, c, NULL), SDM_OK);
+        after += sdm_fit_correlation_taper(c, width, true, weighted) / FITS;
+        variance += c[FIT_LAG_ZERO] / FITS;
     }
     printf("sum of correlations %.1f: %.1f of residuals, %.1f freed; variance %.3f\n", wanted,
            before, after, variance);
     assert_true(before < 0.75 * wanted);
     assert_true(fabs(after / wanted - 1) < 0.12);
     assert_true(fabs(variance - 1) < 0.05);
-    free_shell(&v);
+    free_neighbours(&v);
 }
 
 // the same bits for any number of threads
 static void test_threads(void **state)
 {
     (void)state;
-    static double e[VOXELS], influence[UNKNOWNS * UNKNOWNS], c[2][FIT_LAG_MIDDLE + 1];
-    fit_shell v;
-    make_shell(&v, influence);
+    static double e[VOXELS], influence[UNKNOWNS * UNKNOWNS], c[2][FIT_LAG_ZERO + 1];
+    fit_neighbours v;
+    make_neighbours(&v, influence);
     smooth_noise(1, e);
     fit_functions(&v, influence, e);
     for (int i = 0; i < 2; i++) {
         int width;
-        assert_int_equal(sdm_fit_correlate(&v, 0.2, 1 + 2 * i, c[i], &width, NULL), SDM_OK);
-        assert_int_equal(sdm_fit_free_correlation(&v, influence, width, 1 + 2 * i, c[i], NULL),
+        assert_int_equal(sdm_fit_correlation_estimate(&v, 0.2, 1 + 2 * i, c[i], &width, NULL), SDM_OK);
+        assert_int_equal(sdm_fit_correlation_correct(&v, influence, width, 1 + 2 * i, c[i], NULL),
                          SDM_OK);
     }
     assert_memory_equal(c[0], c[1], sizeof c[0]);
-    free_shell(&v);
+    free_neighbours(&v);
 }
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_freed),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_corrected),
                                        cmocka_unit_test(test_threads)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -73,7 +73,7 @@ static void test_sample(void **state)
         for (uint64_t k = 0; k < 3; k++)
             index[k] = 1 + (double)(g.n[k] - 3) * sdm_rng_uniform(1, (uint64_t)i, k);
         sdm_grid_world(&g, index, x);
-        const double v = sdm_fit_sample_all(&field, x, slope, &rest);
+        const double v = sdm_fit_interpolate_all(&field, x, slope, &rest);
         assert_true(fabs(v - (1 + x[0] - 2 * x[1] + x[0] * x[1] + 0.5 * x[2] * x[2])) < 2e-6);
         assert_true(fabs(slope[0] - (1 + x[1])) < 2e-5 && fabs(slope[1] - (x[0] - 2)) < 2e-5 &&
                     fabs(slope[2] - x[2]) < 2e-5);
@@ -84,8 +84,8 @@ static void test_sample(void **state)
     double rest;
     sdm_grid_world(&g, (const double[3]){8, 7, 6}, corner);
     sdm_grid_world(&g, (const double[3]){8 + 3 / 0.3, 7 + 4 / 0.25, 6}, out);
-    assert_true(fabs(sdm_fit_sample(&field, out) - sdm_fit_sample(&field, corner) - 5) < 1e-5);
-    (void)sdm_fit_sample_all(&field, out, slope, &rest);
+    assert_true(fabs(sdm_fit_interpolate(&field, out) - sdm_fit_interpolate(&field, corner) - 5) < 1e-5);
+    (void)sdm_fit_interpolate_all(&field, out, slope, &rest);
     assert_true(fabs(slope[0] * (out[0] - corner[0]) + slope[1] * (out[1] - corner[1]) +
                      slope[2] * (out[2] - corner[2]) - 5) < 1e-4);
     free(f);
@@ -118,7 +118,7 @@ static void test_splines(void **state)
                            (const double[3]){(double)at[0] + off[0], (double)at[1] + off[1],
                                              (double)at[2] + off[2]},
                            x);
-            const double v = sdm_fit_sample(&field, x);
+            const double v = sdm_fit_interpolate(&field, x);
             sum += v;
             for (int a = 0; a < 3; a++) second[a] += v * (x[a] - centre[a]) * (x[a] - centre[a]);
             if (variance < 0.01 && fabs((double)at[0] + off[0] - 16) > 12) assert_true(v == 0);
@@ -145,12 +145,12 @@ static void test_splines_slope(void **state)
         for (uint64_t k = 0; k < 3; k++)
             index[k] = 0.1 + ((double)g.n[k] - 1.2) * sdm_rng_uniform(2, (uint64_t)i, k);
         sdm_grid_world(&g, index, x);
-        (void)sdm_fit_sample_all(&field, x, slope, &rest);
+        (void)sdm_fit_interpolate_all(&field, x, slope, &rest);
         for (int a = 0; a < 3; a++) {
             double after[3] = {x[0], x[1], x[2]}, before[3] = {x[0], x[1], x[2]};
             after[a] += 1e-5, before[a] -= 1e-5;
             const double difference =
-                (sdm_fit_sample(&field, after) - sdm_fit_sample(&field, before)) / 2e-5;
+                (sdm_fit_interpolate(&field, after) - sdm_fit_interpolate(&field, before)) / 2e-5;
             assert_true(fabs(difference - slope[a]) < 1e-7);
         }
     }
@@ -160,7 +160,7 @@ static void test_splines_slope(void **state)
         for (int i = 0; i < 2; i++) {
             double x[3];
             sdm_grid_world(&g, (const double[3]){4 + (side ? 1e-6 : -1e-6) * (1 + i), 3.3, 3.6}, x);
-            (void)sdm_fit_sample_all(&field, x, slope[i], &rest);
+            (void)sdm_fit_interpolate_all(&field, x, slope[i], &rest);
         }
         second[side] = (side ? 1 : -1) * (slope[1][0] - slope[0][0]) / 1e-6;
     }
@@ -180,7 +180,7 @@ static void test_splines_edge(void **state)
         sdm_fit_blur(&g, 1, 4.0 / 9 - 0.25, true, 1, &f, &spare);
         const fit_field field = {.grid = &g, .packed = f, .n_fields = 1};
         for (double x = 4; x < 19; x += 0.1) {
-            const double v = sdm_fit_sample(&field, (const double[3]){x, 0, 0});
+            const double v = sdm_fit_interpolate(&field, (const double[3]){x, 0, 0});
             most = fmax(most, fabs(v - 0.5 * erfc((x - 11.5 - shift) / (2.0 / 3 * sqrt(2)))));
         }
         free(f);

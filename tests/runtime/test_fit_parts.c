@@ -18,23 +18,23 @@
 
 // ---- laws
 
-static fit_laws laws_of(sdm_fit_kind kind, sdm_fit_model model, double dof)
+static fit_observation observation_of(sdm_fit_kind kind, sdm_fit_model model, double dof)
 {
     sdm_fit_opts o = sdm_fit_defaults();
     o.image_model = model;
     o.appearance.n_inside = 2;
     o.appearance.inside[1] = (sdm_fit_law){.weight = 0.5, .mean = 300, .sd = 100, .dof = dof};
     o.appearance.outside[0].dof = dof;
-    const fit_state s = {.l_ref = 0.3, .point_sd = 0.2, .look = o.appearance};
-    fit_laws l;
-    sdm_fit_laws_prepare(&o, kind, &s, &l);
-    return l;
+    const fit_state s = {.l_ref = 0.3, .point_sd = 0.2, .appearance = o.appearance};
+    fit_observation obs;
+    sdm_fit_observation_prepare(&o, kind, &s, &obs);
+    return obs;
 }
 
-static double log_likelihood(const fit_laws *l, double value, double field)
+static double log_likelihood(const fit_observation *obs, double value, double field)
 {
-    fit_response r;
-    sdm_fit_respond(l, value, NULL, field, false, &r);
+    fit_likelihood r;
+    sdm_fit_likelihood(obs, value, NULL, field, false, &r);
     return r.log_likelihood;
 }
 
@@ -44,23 +44,23 @@ static void close_to(double found, double wanted, double scale)
         fail_msg("%.12g, wanted %.12g", found, wanted);
 }
 
-static void check_score(const fit_laws *l, double value, double field, double h)
+static void check_score(const fit_observation *obs, double value, double field, double h)
 {
-    fit_response r;
-    sdm_fit_respond(l, value, NULL, field, true, &r);
-    close_to(r.log_likelihood, log_likelihood(l, value, field), 0);
+    fit_likelihood r;
+    sdm_fit_likelihood(obs, value, NULL, field, true, &r);
+    close_to(r.log_likelihood, log_likelihood(obs, value, field), 0);
     close_to(r.score[0],
-             (log_likelihood(l, value, field + h) - log_likelihood(l, value, field - h)) / (2 * h),
+             (log_likelihood(obs, value, field + h) - log_likelihood(obs, value, field - h)) / (2 * h),
              1e-2);
-    for (size_t c = 1; c < l->n_channels; c++) {
-        fit_laws up = *l, down = *l;
+    for (size_t c = 1; c < obs->n_channels; c++) {
+        fit_observation up = *obs, down = *obs;
         up.tissue[c - 1].mean += 1e-2, down.tissue[c - 1].mean -= 1e-2;
         close_to(r.score[c],
                  (log_likelihood(&up, value, field) - log_likelihood(&down, value, field)) / 2e-2,
                  1e-4);
     }
-    for (size_t a = 0; a < l->n_channels; a++)
-        assert_true(r.complete[a * (l->n_channels + 1)] >= 0);
+    for (size_t a = 0; a < obs->n_channels; a++)
+        assert_true(r.complete[a * (obs->n_channels + 1)] >= 0);
     // observed is complete less what is missing
     assert_true(r.observed[0] <= r.complete[0]);
 }
@@ -69,8 +69,8 @@ static void test_scores(void **state)
 {
     (void)state;
     for (int dof = 0; dof < 5; dof += 4) {
-        const fit_laws share = laws_of(SDM_FIT_IMAGE, SDM_FIT_PARTIAL_VOLUME, dof);
-        const fit_laws labels = laws_of(SDM_FIT_IMAGE, SDM_FIT_LABELS, dof);
+        const fit_observation share = observation_of(SDM_FIT_IMAGE, SDM_FIT_PARTIAL_VOLUME, dof);
+        const fit_observation labels = observation_of(SDM_FIT_IMAGE, SDM_FIT_LABELS, dof);
         assert_int_equal(share.n_channels, 5);
         assert_int_equal(labels.n_channels, 1);
         for (double value = -1500; value < 2500; value += 190) {
@@ -78,8 +78,8 @@ static void test_scores(void **state)
             for (double d = -2; d < 2; d += 0.31) check_score(&labels, value, d, 1e-5);
         }
     }
-    const fit_laws label = laws_of(SDM_FIT_LABEL, SDM_FIT_LABELS, 0),
-                   points = laws_of(SDM_FIT_POINTS, SDM_FIT_LABELS, 0);
+    const fit_observation label = observation_of(SDM_FIT_LABEL, SDM_FIT_LABELS, 0),
+                   points = observation_of(SDM_FIT_POINTS, SDM_FIT_LABELS, 0);
     for (double d = -2; d < 2; d += 0.31) {
         for (double u = 0; u <= 1; u += 0.25) check_score(&label, u, d, 1e-5);
         check_score(&points, 0, d, 1e-5);
@@ -93,14 +93,14 @@ static void test_information(void **state)
     (void)state;
     sdm_fit_opts o = sdm_fit_defaults();
     o.appearance.n_outside = 1;
-    const fit_state s = {.l_ref = 0.3, .point_sd = 0.2, .look = o.appearance};
-    fit_laws l;
-    sdm_fit_laws_prepare(&o, SDM_FIT_IMAGE, &s, &l);
+    const fit_state s = {.l_ref = 0.3, .point_sd = 0.2, .appearance = o.appearance};
+    fit_observation obs;
+    sdm_fit_observation_prepare(&o, SDM_FIT_IMAGE, &s, &obs);
     for (double a = 0.05; a < 1; a += 0.15) {
         double all = 0, mean = 0, square = 0, product = 0;
-        fit_response r = {0};
+        fit_likelihood r = {0};
         for (double v = -3000; v < 5000; v++) {
-            sdm_fit_respond(&l, v, NULL, a, true, &r);
+            sdm_fit_likelihood(&obs, v, NULL, a, true, &r);
             const double p = exp(r.log_likelihood);
             all += p, mean += p * r.score[0], square += p * r.score[0] * r.score[0];
             product += p * r.score[0] * r.score[1];
@@ -117,21 +117,21 @@ static void test_step(void **state)
 {
     (void)state;
     const double a[9] = {4, 1, 0.5, 1, 3, 0.2, 0.5, 0.2, 2}, gradient[3] = {1, -2, 3};
-    fit_limits l = {.least = {-9, -9, -9}, .most = {9, 9, 9}};
+    fit_limits l = {.min = {-9, -9, -9}, .max = {9, 9, 9}};
     double step[3], work[18];
-    assert_true(sdm_fit_step(3, a, gradient, 0, &l, step, work));
+    assert_true(sdm_fit_bounded_step(3, a, gradient, 0, &l, step, work));
     for (int i = 0; i < 3; i++)
         assert_true(fabs(a[3 * i] * step[0] + a[3 * i + 1] * step[1] + a[3 * i + 2] * step[2] -
                          gradient[i]) < 1e-12);
     // the third stops at its bound, the rest is best for that; the first is kept
-    l.most[2] = 0.5;
+    l.max[2] = 0.5;
     l.kept[0] = true;
-    assert_true(sdm_fit_step(3, a, gradient, 0, &l, step, work));
+    assert_true(sdm_fit_bounded_step(3, a, gradient, 0, &l, step, work));
     assert_true(step[0] == 0 && step[2] == 0.5 &&
                 fabs(3 * step[1] + 0.2 * 0.5 - gradient[1]) < 1e-12);
     const double wrong[4] = {1, 2, 2, 1};
-    assert_false(sdm_fit_step(2, wrong, gradient, 0,
-                              &(fit_limits){.least = {-9, -9}, .most = {9, 9}}, step, work));
+    assert_false(sdm_fit_bounded_step(2, wrong, gradient, 0,
+                              &(fit_limits){.min = {-9, -9}, .max = {9, 9}}, step, work));
 }
 
 // ---- the whole gradient against differences of the log-likelihood, for each model
@@ -140,32 +140,32 @@ static double posterior_at(fit_problem *p, const fit_state *s)
 {
     p->state = *s;
     sdm_error err;
-    if (sdm_fit_look(p, &err)) fail_msg("%s", err.text);
-    return p->sums.log_likelihood + sdm_fit_prior(p, s, NULL, NULL, NULL);
+    if (sdm_fit_evaluate(p, &err)) fail_msg("%s", err.text);
+    return p->information.log_likelihood + sdm_fit_prior(p, s, NULL, NULL, NULL);
 }
 
-// derivatives by the parameters averaged over a way, on one side at a bound: differences of the
+// derivatives by the parameters averaged over a half_width, on one side at a bound: differences of the
 // log-likelihood
 static void check_average(fit_problem *p, const fit_state *s)
 {
-    double way[FIT_PARAMS_MAX], found[2];
+    double half_width[FIT_PARAMS_MAX], found[2];
     (void)posterior_at(p, s);
-    sdm_fit_ways(p, way);
+    sdm_fit_averaging_widths(p, half_width);
     p->high[1] = s->params[1];
-    const double by_pose = p->sums.gradient[fit_at_rotation(3)];
-    assert_int_equal(sdm_fit_average_gradient(p, way, NULL), SDM_OK);
-    assert_true(p->sums.gradient[fit_at_rotation(3)] == by_pose);
+    const double by_pose = p->information.gradient[fit_at_rotation(3)];
+    assert_int_equal(sdm_fit_average_gradient(p, half_width, NULL), SDM_OK);
+    assert_true(p->information.gradient[fit_at_rotation(3)] == by_pose);
     double average[3];
-    memcpy(average, p->sums.gradient, sizeof average);
+    memcpy(average, p->information.gradient, sizeof average);
     for (size_t k = 0; k < 3; k++) {
-        assert_true(way[k] > 1e-3 && way[k] < 0.03); // of an ellipsoid with voxels of 0.25 mm
+        assert_true(half_width[k] > 1e-3 && half_width[k] < 0.03); // of an ellipsoid with voxels of 0.25 mm
         for (int side = 0; side < 2; side++) {
             fit_state moved = *s;
-            moved.params[k] = fmin(s->params[k] + (side ? way[k] : -way[k]), p->high[k]);
+            moved.params[k] = fmin(s->params[k] + (side ? half_width[k] : -half_width[k]), p->high[k]);
             (void)posterior_at(p, &moved);
-            found[side] = p->sums.log_likelihood;
+            found[side] = p->information.log_likelihood;
         }
-        const double difference = (found[1] - found[0]) / (k == 1 ? way[k] : 2 * way[k]);
+        const double difference = (found[1] - found[0]) / (k == 1 ? half_width[k] : 2 * half_width[k]);
         if (!(fabs(difference - average[k]) <= 1e-9 * fabs(difference)))
             fail_msg("parameter %zu: %.12g, differences %.12g", k, average[k], difference);
     }
@@ -192,39 +192,39 @@ static void check_gradient(sdm_fit_kind kind, sdm_fit_model model)
                                          kind == SDM_FIT_IMAGE && model == SDM_FIT_PARTIAL_VOLUME,
                                          &o, &p.maps, NULL),
                      SDM_OK);
-    fit_state s = {.blur = 0.3, .l_ref = 0.2, .point_sd = 0.1, .look = o.appearance};
+    fit_state s = {.blur = 0.3, .l_ref = 0.2, .point_sd = 0.1, .appearance = o.appearance};
     sdm_pose_matrix(&o.start_pose, s.rotation);
     memcpy(s.translation, o.start_pose.translation, sizeof s.translation);
     memcpy(s.params, START, sizeof START);
     p.prior = p.state = s;
     p.prior.translation[1] += 0.1;
     sdm_pose_matrix(&POSE, p.prior.rotation);
-    p.maps_at[0] = p.packed_blur = NAN;
+    p.maps_params[0] = p.maps_blur = NAN;
     const size_t n = fit_columns(3) + (p.maps.share ? 2 : 0);
     bool changed;
-    assert_int_equal(sdm_fit_sums_create(n, &p.sums, NULL), SDM_OK);
+    assert_int_equal(sdm_fit_information_create(n, &p.information, NULL), SDM_OK);
     const fit_region region = {.centre = {0.3, -0.2, 0.1}, .radius = 9};
-    assert_int_equal(sdm_fit_sites_choose(&t, &o, &region, 1, &p.sites, &changed, NULL), SDM_OK);
-    assert_true(changed && p.sites.n > 5000);
+    assert_int_equal(sdm_fit_samples_choose(&t, &o, &region, 1, &p.samples, &changed, NULL), SDM_OK);
+    assert_true(changed && p.samples.n > 5000);
     fit_region few = region;
-    few.most = 1000; // the rest is not gathered
-    assert_int_equal(sdm_fit_sites_choose(&t, &o, &few, 1, &p.sites, &changed, NULL), SDM_OK);
-    assert_true(changed && p.sites.n == 1001);
-    assert_int_equal(sdm_fit_sites_choose(&t, &o, &region, 1, &p.sites, &changed, NULL), SDM_OK);
-    assert_true(changed && p.sites.n > 5000);
+    few.max_samples = 1000; // the rest is not gathered
+    assert_int_equal(sdm_fit_samples_choose(&t, &o, &few, 1, &p.samples, &changed, NULL), SDM_OK);
+    assert_true(changed && p.samples.n == 1001);
+    assert_int_equal(sdm_fit_samples_choose(&t, &o, &region, 1, &p.samples, &changed, NULL), SDM_OK);
+    assert_true(changed && p.samples.n > 5000);
     (void)posterior_at(&p, &s);
     double gradient[FIT_UNKNOWNS_MAX];
-    memcpy(gradient, p.sums.gradient, n * sizeof *gradient);
+    memcpy(gradient, p.information.gradient, n * sizeof *gradient);
     (void)sdm_fit_prior(&p, &s, gradient, NULL, NULL);
     for (size_t k = 0; k < n; k++) {
         if (k == fit_at_blur(3) && !p.maps.share) continue;
         // wide enough to average over the creases between the triangles
         const double h = k >= fit_columns(3) ? 1 : k == fit_at_blur(3) ? 1e-3 : 4e-3;
-        double step[FIT_UNKNOWNS_MAX] = {0}, found[2], size = sqrt(p.sums.complete[k * (n + 1)]);
+        double step[FIT_UNKNOWNS_MAX] = {0}, found[2], size = sqrt(p.information.complete[k * (n + 1)]);
         for (int side = 0; side < 2; side++) {
             fit_state moved;
             step[k] = side ? h : -h;
-            sdm_fit_move(&p, &s, step, &moved);
+            sdm_fit_state_move(&p, &s, step, &moved);
             found[side] = posterior_at(&p, &moved);
         }
         const double difference = (found[1] - found[0]) / (2 * h);
@@ -234,8 +234,8 @@ static void check_gradient(sdm_fit_kind kind, sdm_fit_model model)
     }
     check_average(&p, &s);
     sdm_fit_maps_dispose(&p.maps);
-    sdm_fit_sites_dispose(&p.sites);
-    sdm_fit_sums_dispose(&p.sums);
+    sdm_fit_samples_dispose(&p.samples);
+    sdm_fit_information_dispose(&p.information);
     free(v);
 }
 
@@ -259,15 +259,15 @@ static void affine(const double *x, double *y)
     }
 }
 
-static void test_mixing(void **state)
+static void test_anderson(void **state)
 {
     (void)state;
-    fit_mixing m = {0};
+    fit_anderson m = {0};
     double x[4] = {0.5, 2.5, 2, 4.5}, y[4], off = INFINITY;
     int steps = 0;
     for (; steps < 12 && off > 1e-9; steps++) {
         affine(x, y);
-        sdm_fit_mix(&m, FIT_MIXING_DEPTH, 4, x, y, 100);
+        sdm_fit_anderson_mix(&m, FIT_ANDERSON_DEPTH, 4, x, y, 100);
         off = 0;
         for (int k = 0; k < 4; k++) x[k] = y[k], off = fmax(off, fabs(x[k] - 1 - k));
     }
@@ -280,7 +280,7 @@ static void test_mixing(void **state)
         double image[4];
         affine(x, image);
         memcpy(y, image, sizeof y);
-        sdm_fit_mix(&m, FIT_MIXING_DEPTH, 4, x, y, 0.01);
+        sdm_fit_anderson_mix(&m, FIT_ANDERSON_DEPTH, 4, x, y, 0.01);
         for (int k = 0; k < 4; k++) assert_true(fabs(y[k] - image[k]) <= 0.01 * (1 + 1e-12));
         memcpy(x, y, sizeof x);
     }
@@ -289,7 +289,7 @@ static void test_mixing(void **state)
     const double fixed[4] = {1, 2, 3, 4};
     for (int i = 0; i < 4; i++) {
         memcpy(y, fixed, sizeof y);
-        sdm_fit_mix(&m, FIT_MIXING_DEPTH, 4, fixed, y, 1);
+        sdm_fit_anderson_mix(&m, FIT_ANDERSON_DEPTH, 4, fixed, y, 1);
         assert_memory_equal(y, fixed, sizeof y);
     }
 }
@@ -299,7 +299,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_scores), cmocka_unit_test(test_information),
         cmocka_unit_test(test_step),   cmocka_unit_test(test_gradient),
-        cmocka_unit_test(test_mixing),
+        cmocka_unit_test(test_anderson),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -48,27 +48,27 @@ static sdm_fit_opts options(void)
 static void stand(fit_problem *p, const sdm_fit_source *source)
 {
     p->source = source;
-    p->n_params = 3, p->stride = 1, p->noise_factor = 1, p->places = true;
+    p->n_params = 3, p->stride = 1, p->noise_factor = 1, p->use_tissue_field = true;
     for (int k = 0; k < 3; k++) p->low[k] = 1, p->high[k] = 4;
-    p->maps_at[0] = p->packed_blur = NAN;
-    p->state = (fit_state){.blur = 0.25, .look = p->opts->appearance};
+    p->maps_params[0] = p->maps_blur = NAN;
+    p->state = (fit_state){.blur = 0.25, .appearance = p->opts->appearance};
     sdm_pose_matrix(&POSE, p->state.rotation);
     memcpy(p->state.translation, POSE.translation, sizeof POSE.translation);
     memcpy(p->state.params, TRUTH, sizeof TRUTH);
     assert_int_equal(sdm_fit_maps_create(source, true, p->opts, &p->maps, NULL), SDM_OK);
-    assert_int_equal(sdm_fit_sums_create(fit_columns(3) + 3, &p->sums, NULL), SDM_OK);
+    assert_int_equal(sdm_fit_information_create(fit_columns(3) + 3, &p->information, NULL), SDM_OK);
     const fit_region region = {.centre = {0.3, -0.2, 0.1}, .radius = 9};
     bool changed;
     assert_int_equal(
-        sdm_fit_sites_choose(p->target, p->opts, &region, 1, &p->sites, &changed, NULL), SDM_OK);
-    assert_int_equal(sdm_fit_look(p, NULL), SDM_OK);
+        sdm_fit_samples_choose(p->target, p->opts, &region, 1, &p->samples, &changed, NULL), SDM_OK);
+    assert_int_equal(sdm_fit_evaluate(p, NULL), SDM_OK);
 }
 
 static void leave(fit_problem *p)
 {
     sdm_fit_maps_dispose(&p->maps);
-    sdm_fit_sites_dispose(&p->sites);
-    sdm_fit_sums_dispose(&p->sums);
+    sdm_fit_samples_dispose(&p->samples);
+    sdm_fit_information_dispose(&p->information);
 }
 
 static void test_weights(void **state)
@@ -82,28 +82,28 @@ static void test_weights(void **state)
         o.n_threads = threads;
         fit_problem p = {.target = &t, .opts = &o};
         stand(&p, &source);
-        const double before = p.sums.log_likelihood;
-        assert_int_equal(sdm_fit_places_update(&p, NULL), SDM_OK);
-        const fit_sites *s = &p.sites;
+        const double before = p.information.log_likelihood;
+        assert_int_equal(sdm_fit_tissue_field_update(&p, NULL), SDM_OK);
+        const fit_samples *s = &p.samples;
         assert_int_equal(s->n_outside, 2);
-        assert_true(p.sums.log_likelihood > before + 500);
+        assert_true(p.information.log_likelihood > before + 500);
         for (size_t i = 0; i < s->n; i++) {
-            const double bone = exp((double)s->place[2 * i]),
-                         dark = exp((double)s->place[2 * i + 1]);
+            const double bone = exp((double)s->log_weight[2 * i]),
+                         dark = exp((double)s->log_weight[2 * i + 1]);
             assert_true(fabs(bone + dark - 1) < 1e-5);
             if (s->world[3 * i] > 2.3) assert_true(dark > 0.85);
             if (s->world[3 * i] < -1.7) assert_true(bone > 0.85);
         }
         // the log-likelihood is that of the sums without derivatives, too
-        assert_true(fabs(sdm_fit_sums_value(s, &p.maps, &p.laws, &p.state) / p.sums.log_likelihood -
+        assert_true(fabs(sdm_fit_samples_log_likelihood(s, &p.maps, &p.observation, &p.state) / p.information.log_likelihood -
                          1) < 1e-12);
-        const size_t size = 2 * s->n * sizeof *s->place;
+        const size_t size = 2 * s->n * sizeof *s->log_weight;
         if (!first) {
             first = malloc(size);
             if (!first) abort();
-            memcpy(first, s->place, size);
+            memcpy(first, s->log_weight, size);
         } else {
-            assert_memory_equal(first, s->place, size);
+            assert_memory_equal(first, s->log_weight, size);
         }
         leave(&p);
     }
@@ -122,14 +122,14 @@ static void test_small_places(void **state)
     o.tissue_mm = 0.02;
     fit_problem p = {.target = &t, .opts = &o};
     stand(&p, &source);
-    assert_int_equal(sdm_fit_places_update(&p, NULL), SDM_OK);
-    assert_int_equal(p.sites.n_outside, 2);
-    for (size_t i = 0; i < p.sites.n; i++) {
-        const double bone = exp((double)p.sites.place[2 * i]),
-                     dark = exp((double)p.sites.place[2 * i + 1]);
+    assert_int_equal(sdm_fit_tissue_field_update(&p, NULL), SDM_OK);
+    assert_int_equal(p.samples.n_outside, 2);
+    for (size_t i = 0; i < p.samples.n; i++) {
+        const double bone = exp((double)p.samples.log_weight[2 * i]),
+                     dark = exp((double)p.samples.log_weight[2 * i + 1]);
         assert_true(fabs(bone + dark - 1) < 1e-5);
     }
-    assert_true(isfinite(p.sums.log_likelihood));
+    assert_true(isfinite(p.information.log_likelihood));
     leave(&p);
     free(v);
 }
@@ -144,16 +144,16 @@ static void test_none(void **state)
     const sdm_fit_source source = exact_source();
     fit_problem p = {.target = &t, .opts = &o};
     stand(&p, &source);
-    const double before = p.sums.log_likelihood;
+    const double before = p.information.log_likelihood;
     for (int way = 0; way < 4; way++) {
         o = options();
         if (way == 0) o.tissue_mm = 0;
         if (way == 1) o.keep_appearance = true;
-        p.places = way != 2;
+        p.use_tissue_field = way != 2;
         p.noise_factor = way == 3 ? 1e4 : 1;
-        assert_int_equal(sdm_fit_places_update(&p, NULL), SDM_OK);
-        assert_int_equal(p.sites.n_outside, 0);
-        assert_true(p.sums.log_likelihood == before);
+        assert_int_equal(sdm_fit_tissue_field_update(&p, NULL), SDM_OK);
+        assert_int_equal(p.samples.n_outside, 0);
+        assert_true(p.information.log_likelihood == before);
     }
     leave(&p);
     free(v);

@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "linalg.h"
+#include "numerics/linalg.h"
 #include "sdm/internal/rng.h"
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"
@@ -28,7 +28,7 @@ static void eigenvectors(void **state)
             for (size_t j = 0; j <= i; j++)
                 a0[i * n + j] = a0[j * n + i] = sdm_rng_normal(1, t, i * n + j);
         memcpy(a, a0, n * n * sizeof *a);
-        assert_int_equal(eigen_symmetric(n, a, v, NULL), 0);
+        assert_int_equal(trainer_eigen_symmetric(n, a, v, NULL), 0);
         for (size_t i = 0; i < n; i++) {
             if (i) assert_true(v[i] <= v[i - 1]);
             for (size_t j = 0; j < n; j++) {
@@ -44,7 +44,7 @@ static void eigenvectors(void **state)
         sdm_free(v);
     }
     double diagonal[9] = {2, 0, 0, 0, 3, 0, 0, 0, 1}, values[3]; // already diagonal, repeated zeros
-    assert_int_equal(eigen_symmetric(3, diagonal, values, NULL), 0);
+    assert_int_equal(trainer_eigen_symmetric(3, diagonal, values, NULL), 0);
     assert_true(values[0] == 3 && values[1] == 2 && values[2] == 1);
 }
 
@@ -66,11 +66,11 @@ static void solve(void **state)
             b[2 * i + c] = 0;
             for (int j = 0; j < N; j++) b[2 * i + c] += a[i * N + j] * x[2 * j + c];
         }
-    assert_int_equal(cholesky(N, a), 0);
-    cholesky_solve(N, a, 2, b);
+    assert_int_equal(trainer_cholesky(N, a), 0);
+    trainer_cholesky_solve(N, a, 2, b);
     for (int i = 0; i < 2 * N; i++) assert_true(fabs(b[i] - x[i]) < 1e-9);
     double indefinite[4] = {1, 2, 2, 1};
-    assert_int_equal(cholesky(2, indefinite), 2);
+    assert_int_equal(trainer_cholesky(2, indefinite), 2);
 }
 
 static void spaces(void **state)
@@ -84,7 +84,7 @@ static void spaces(void **state)
     assert_int_equal(SDM_ALLOC(&c, N * N, "c", NULL), 0);
     assert_int_equal(SDM_ALLOC(&basis, N * N, "b", NULL), 0);
     for (size_t i = 0; i < N * N; i++) q[i] = (float)sdm_rng_normal(4, 1, i);
-    assert_int_equal(orthonormalise(N, N, q, 1, NULL), 0);
+    assert_int_equal(trainer_orthonormalise(N, N, q, 1, NULL), 0);
     for (size_t i = 0; i < N; i++)
         for (size_t j = 0; j < N; j++) {
             double s = 0;
@@ -92,7 +92,7 @@ static void spaces(void **state)
                 s += (double)q[k * N + i] * q[k * N + j] * pow(0.6, (double)k);
             c[i * N + j] = (float)s;
         }
-    assert_int_equal(leading_eigenvectors(N, c, K, 1, 2, basis, values, NULL), 0);
+    assert_int_equal(trainer_leading_eigenvectors(N, c, K, 1, 2, basis, values, NULL), 0);
     for (size_t k = 0; k < K; k++) {
         assert_true(fabs(values[k] / pow(0.6, (double)k) - 1) < 1e-3);
         double along = 0;
@@ -104,7 +104,7 @@ static void spaces(void **state)
     assert_int_equal(SDM_ALLOC(&rows, 8 * N, "r", NULL), 0);
     for (size_t i = 0; i < 7 * N; i++)
         rows[i] = (float)(sdm_rng_normal(4, 5, i) * pow(10, (double)(i / N) - 4));
-    assert_int_equal(orthonormalise(7, N, rows, 1, NULL), 0);
+    assert_int_equal(trainer_orthonormalise(7, N, rows, 1, NULL), 0);
     for (size_t i = 0; i < 7; i++)
         for (size_t j = 0; j < 7; j++) {
             double dot = 0;
@@ -114,8 +114,8 @@ static void spaces(void **state)
     // the same bits for any number of threads
     assert_int_equal(SDM_ALLOC(&one, K * N, "1", NULL), 0);
     assert_int_equal(SDM_ALLOC(&two, K * N, "2", NULL), 0);
-    assert_int_equal(leading_space(N, N, c, K, 9, 1, one, NULL), 0);
-    assert_int_equal(leading_space(N, N, c, K, 9, 3, two, NULL), 0);
+    assert_int_equal(trainer_leading_space(N, N, c, K, 9, 0, 1, one, NULL), 0);
+    assert_int_equal(trainer_leading_space(N, N, c, K, 9, 0, 3, two, NULL), 0);
     assert_memory_equal(one, two, K * N * sizeof *one);
     sdm_free(q);
     sdm_free(c);

@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "optimiser.h"
+#include "numerics/optimiser.h"
 #include "pod/mlp.h"
 #include "sdm/internal/rng.h"
 #include "sdm/memory.h"
@@ -20,7 +20,7 @@ enum { BATCH = 5, INPUTS = 7, WIDTH = 9, DEPTH = 3 };
 static double loss(const sdm_pod_arch *a, const float *w, const float *x, const float *dh,
                    float *workspace)
 {
-    const float *h = mlp_forward(a, w, BATCH, x, workspace, 1);
+    const float *h = trainer_mlp_forward(a, w, BATCH, x, workspace, 1);
     double s = 0;
     for (int i = 0; i < BATCH * WIDTH; i++) s += (double)dh[i] * h[i];
     return s;
@@ -32,17 +32,17 @@ static void gradient(void **state)
     for (int activation = 0; activation < 2; activation++) {
         const sdm_pod_arch a = {
             .depth = DEPTH, .width = WIDTH, .n_inputs = INPUTS, .activation = activation};
-        const size_t n = mlp_count(&a);
+        const size_t n = trainer_mlp_count(&a);
         assert_int_equal(n, WIDTH * (INPUTS + 1) + 2 * WIDTH * (WIDTH + 1));
         float *w, *g, *workspace, x[BATCH * INPUTS], dh[BATCH * WIDTH];
         assert_int_equal(SDM_ALLOC(&w, n, "w", NULL), 0);
         assert_int_equal(SDM_ALLOC(&g, n, "g", NULL), 0);
-        assert_int_equal(SDM_ALLOC(&workspace, mlp_workspace(&a, BATCH), "ws", NULL), 0);
-        mlp_init(&a, 3, w);
+        assert_int_equal(SDM_ALLOC(&workspace, trainer_mlp_workspace(&a, BATCH), "ws", NULL), 0);
+        trainer_mlp_init(&a, 3, w);
         for (size_t i = 0; i < BATCH * INPUTS; i++) x[i] = (float)sdm_rng_normal(1, 1, i);
         for (size_t i = 0; i < BATCH * WIDTH; i++) dh[i] = (float)sdm_rng_normal(1, 2, i);
-        mlp_forward(&a, w, BATCH, x, workspace, 1);
-        mlp_backward(&a, w, BATCH, x, workspace, dh, g, 1);
+        trainer_mlp_forward(&a, w, BATCH, x, workspace, 1);
+        trainer_mlp_backward(&a, w, BATCH, x, workspace, dh, g, 1);
         double size = 0;
         for (size_t i = 0; i < n; i++) size = fmax(size, fabs((double)g[i]));
         for (size_t i = 0; i < n; i++) {
@@ -65,25 +65,26 @@ static void adam(void **state)
     (void)state;
     // the first step moves every weight by the rate against its gradient's sign, whatever the size
     parameters p;
-    assert_int_equal(parameters_create(&p, 3, NULL), 0);
+    assert_int_equal(trainer_parameters_create(&p, 3, NULL), 0);
     const float g[3] = {1e-3f, -40, 0};
-    adam_update(&p, 0, 3, g, adam_begin(0.01, 1), 2);
+    trainer_adam_update(&p, 0, 3, g, trainer_adam_begin(0.01, 1), 2);
     assert_true(fabs((double)p.w[0] + 0.02) < 1e-6 && fabs((double)p.w[1] - 0.02) < 1e-6 &&
                 p.w[2] == 0);
     // a quadratic bowl is walked down
     for (int t = 2; t < 2000; t++) {
         const float slope[3] = {2 * (p.w[0] - 1), 20 * (p.w[1] + 2), p.w[2]};
-        adam_update(&p, 0, 3, slope, adam_begin(0.01, t), 1);
-        average_update(&p, 0.99, 1);
+        trainer_adam_update(&p, 0, 3, slope, trainer_adam_begin(0.01, t), 1);
+        trainer_average_update(&p, 0.99, 1);
     }
     assert_true(fabs((double)p.w[0] - 1) < 1e-3 && fabs((double)p.w[1] + 2) < 1e-3);
     assert_true(fabs((double)p.average[0] - 1) < 1e-2);
-    parameters_dispose(&p);
+    trainer_parameters_dispose(&p);
 
-    assert_true(schedule(0, 0.1) == 0 && fabs(schedule(0.05, 0.1) - 0.5) < 1e-12 &&
-                fabs(schedule(0.1, 0.1) - 1) < 1e-12);
-    assert_true(fabs(schedule(0.55, 0.1) - 0.5) < 1e-12 && schedule(1, 0.1) < 1e-12 &&
-                schedule(2, 0) < 1e-12);
+    assert_true(trainer_rate_schedule(0, 0.1) == 0 &&
+                fabs(trainer_rate_schedule(0.05, 0.1) - 0.5) < 1e-12 &&
+                fabs(trainer_rate_schedule(0.1, 0.1) - 1) < 1e-12);
+    assert_true(fabs(trainer_rate_schedule(0.55, 0.1) - 0.5) < 1e-12 &&
+                trainer_rate_schedule(1, 0.1) < 1e-12 && trainer_rate_schedule(2, 0) < 1e-12);
 }
 
 int main(void)

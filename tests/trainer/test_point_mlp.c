@@ -12,7 +12,7 @@
 
 #include "direct/point_draw.h"
 #include "direct/point_mlp.h"
-#include "loss.h"
+#include "numerics/loss.h"
 #include "sdm/internal/rng.h"
 #include "sdm/memory.h"
 
@@ -42,7 +42,7 @@ static double loss(const sdm_point_arch *a, const float *w, const float *u, cons
 {
     float value[BATCH];
     double sum = 0;
-    point_forward(a, w, BATCH, u, workspace, value, 1);
+    trainer_point_forward(a, w, BATCH, u, workspace, value, 1);
     for (int i = 0; i < BATCH; i++) sum += (double)slope[i] * value[i];
     return sum;
 }
@@ -57,12 +57,12 @@ static void backward(void **state)
         float *w, *gradient, *workspace, u[BATCH * U], value[BATCH], slope[BATCH];
         assert_int_equal(SDM_ALLOC(&w, n, "w", NULL), 0);
         assert_int_equal(SDM_ALLOC(&gradient, n, "g", NULL), 0);
-        assert_int_equal(SDM_ALLOC(&workspace, point_workspace(&a, BATCH), "ws", NULL), 0);
-        point_init(&a, 3, w);
+        assert_int_equal(SDM_ALLOC(&workspace, trainer_point_workspace(&a, BATCH), "ws", NULL), 0);
+        trainer_point_init(&a, 3, w);
         random_fill(u, BATCH * U, 1, 1);
         random_fill(slope, BATCH, 2, 0.1);
-        point_forward(&a, w, BATCH, u, workspace, value, 1);
-        point_backward(&a, w, BATCH, u, workspace, slope, gradient, 1);
+        trainer_point_forward(&a, w, BATCH, u, workspace, value, 1);
+        trainer_point_backward(&a, w, BATCH, u, workspace, slope, gradient, 1);
         double size = 0;
         for (size_t i = 0; i < n; i++) size = fmax(size, fabs((double)gradient[i]));
         for (size_t i = 0; i < n; i++) {
@@ -79,11 +79,11 @@ static void backward(void **state)
         assert_int_equal(SDM_ALLOC(&twice, 2 * n, "g", NULL), 0);
         for (int threads = 2; threads <= 3; threads++) {
             memset(twice, 0, 2 * n * sizeof *twice);
-            point_forward(&a, w, BATCH, u, workspace, value, threads);
-            point_backward(&a, w, BATCH, u, workspace, slope, twice, threads);
+            trainer_point_forward(&a, w, BATCH, u, workspace, value, threads);
+            trainer_point_backward(&a, w, BATCH, u, workspace, slope, twice, threads);
             assert_memory_equal(twice, gradient, n * sizeof *twice);
         }
-        point_backward(&a, w, BATCH, u, workspace, slope, twice, 1);
+        trainer_point_backward(&a, w, BATCH, u, workspace, slope, twice, 1);
         for (size_t i = 0; i < n; i++)
             assert_true(fabs((double)twice[i] - 2 * (double)gradient[i]) < 1e-5 * size);
         sdm_free(twice);
@@ -132,11 +132,11 @@ static void slopes(void **state)
             const double h = 1e-7, slope = (loss_of(&c, (double)predicted + h, (double)target) -
                                             loss_of(&c, (double)predicted - h, (double)target)) /
                                            (2 * h);
-            assert_true(fabs(slope - (double)loss_slope(&c, predicted, target, &square)) <
+            assert_true(fabs(slope - (double)trainer_loss_slope(&c, predicted, target, &square)) <
                         1e-4 * (1 + fabs(slope)));
             const double weight = fabsf(target) < 0.2f ? 4 : 1;
-            assert_true(fabs(slope / weight -
-                             (double)loss_slope_drawn(&c, predicted, target, &squares)) < 1e-4);
+            assert_true(fabs(slope / weight - (double)trainer_loss_slope_drawn(
+                                                  &c, predicted, target, &squares)) < 1e-4);
         }
         assert_true(square > 40 && square < 60 && square == squares); // 200 times 0.5^2
     }
@@ -160,7 +160,7 @@ static void eikonal(void **state)
         float f[4], slope[4] = {1, 1, 1, 1};
         random_fill(f, 4, 20 + trial, 0.4);
         double g[4] = {(double)f[0], (double)f[1], (double)f[2], (double)f[3]};
-        assert_true(fabs(loss_eikonal(&c, f, 0.5f, slope) - eikonal_of(&c, g)) < 1e-6);
+        assert_true(fabs(trainer_loss_eikonal(&c, f, 0.5f, slope) - eikonal_of(&c, g)) < 1e-6);
         for (int i = 0; i < 4; i++) {
             const double h = 1e-6, keep = g[i];
             g[i] = keep + h;
@@ -176,8 +176,8 @@ static void eikonal(void **state)
     // in
     const float exact[4] = {0, 0.5f, 0, 0}, flat[4] = {1, 1, 1, 1};
     float none[4] = {0};
-    assert_true(loss_eikonal(&c, exact, 1, none) == 0 &&
-                fabs(loss_eikonal(&c, flat, 1, none) - 0.7) < 1e-12);
+    assert_true(trainer_loss_eikonal(&c, exact, 1, none) == 0 &&
+                fabs(trainer_loss_eikonal(&c, flat, 1, none) - 0.7) < 1e-12);
     for (int i = 0; i < 4; i++) assert_true(none[i] == 0);
 }
 
@@ -210,7 +210,7 @@ static void whole_map(void **state)
         double square = 0;
         for (int v = 0; v < 60; v++)
             square += ((double)f[v] - (double)target[v]) * ((double)f[v] - (double)target[v]);
-        assert_true(fabs(loss_map(&c, f, target, slope) / square - 1) < 1e-6);
+        assert_true(fabs(trainer_loss_map(&c, f, target, slope) / square - 1) < 1e-6);
         for (int v = 0; v < 60; v++) {
             const float keep = f[v], h = 1.0f / 1024;
             f[v] = keep + h;
@@ -239,7 +239,7 @@ static void drawn(void **state)
     for (int weight = 0; weight < 10; weight += 9) {
         size_t count[VOXELS] = {0}, near = 0;
         c.train.near_weight = weight;
-        for (uint64_t i = 0; i < DRAWN; i++) count[point_draw(&c, &d, 0, i)]++;
+        for (uint64_t i = 0; i < DRAWN; i++) count[trainer_point_draw(&c, &d, 0, i)]++;
         for (int v = 0; v < VOXELS; v++) {
             const double wanted =
                 (double)DRAWN * (v < 6 ? 1 + weight : 1) / (6 * (1 + weight) + VOXELS - 6);
@@ -250,11 +250,11 @@ static void drawn(void **state)
     }
     // a map whose scale makes all or none near
     c.train.near_mm = 1e-6;
-    for (uint64_t i = 0; i < 100; i++) assert_true(point_draw(&c, &d, 1, i) < VOXELS);
+    for (uint64_t i = 0; i < 100; i++) assert_true(trainer_point_draw(&c, &d, 1, i) < VOXELS);
 
     const sdm_grid g = {.n = {3, 4, 5}};
     for (size_t v = 0; v < VOXELS; v++) {
-        const size_t w = point_with_neighbours(&g, v), x = v % 3, y = v / 3 % 4, z = v / 12;
+        const size_t w = trainer_point_with_neighbours(&g, v), x = v % 3, y = v / 3 % 4, z = v / 12;
         assert_int_equal(w, (z < 3 ? z : 3) * 12 + (y < 2 ? y : 2) * 3 + (x < 1 ? x : 1));
     }
 }
@@ -275,8 +275,9 @@ static void file_is_the_network(void **state)
         const size_t n = sdm_point_count(&spec.arch);
         float *w, *workspace, u[60 * U], value[60], map[60];
         assert_int_equal(SDM_ALLOC(&w, n, "w", NULL), 0);
-        assert_int_equal(SDM_ALLOC(&workspace, point_workspace(&spec.arch, 60), "ws", NULL), 0);
-        point_init(&spec.arch, 3, w);
+        assert_int_equal(SDM_ALLOC(&workspace, trainer_point_workspace(&spec.arch, 60), "ws", NULL),
+                         0);
+        trainer_point_init(&spec.arch, 3, w);
         for (size_t i = 0; i < n; i++) w[i] += (float)(0.1 * sdm_rng_normal(2, 9, i)); // biases too
         spec.weights = w;
         uint8_t *bytes;
@@ -296,7 +297,7 @@ static void file_is_the_network(void **state)
                             spec.arch.radius);
         }
         sdm_model_forward(m, p, 1, map, scratch);
-        point_forward(&spec.arch, w, 60, u, workspace, value, 1);
+        trainer_point_forward(&spec.arch, w, 60, u, workspace, value, 1);
         for (int v = 0; v < 60; v++) assert_true(fabsf(map[v] - value[v]) < 1e-5f * 2.5f);
         sdm_model_free(m);
         sdm_free(scratch);

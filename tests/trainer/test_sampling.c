@@ -39,22 +39,22 @@ static void regression_finds_a_polynomial(void **state)
         value[i] = quadratic(x + i * P);
     }
     error_model m;
-    assert_int_equal(error_model_fit(&m, P, N, x, value, NULL), SDM_OK);
+    assert_int_equal(trainer_error_model_fit(&m, P, N, x, value, NULL), SDM_OK);
     assert_true(m.degree >= 2);
     for (size_t i = 0; i < 50; i++) {
         const double at[P] = {uniform(i, -0.9, 0.9), uniform(5 * i, -0.9, 0.9),
                               uniform(11 * i, -0.9, 0.9)};
-        assert_true(fabs(error_model_at(&m, at) - quadratic(at)) < 0.05);
+        assert_true(fabs(trainer_error_model_at(&m, at) - quadratic(at)) < 0.05);
     }
-    error_model_dispose(&m);
+    trainer_error_model_dispose(&m);
     // too few observations for slopes: a constant, which one observation of nothing pulls down
-    assert_int_equal(error_model_fit(&m, P, 3, x, (const double[]){2, 2, 2}, NULL), SDM_OK);
+    assert_int_equal(trainer_error_model_fit(&m, P, 3, x, (const double[]){2, 2, 2}, NULL), SDM_OK);
     assert_int_equal(m.degree, 0);
-    assert_true(fabs(error_model_at(&m, x) - 1.5) < 1e-6);
-    error_model_dispose(&m);
-    assert_int_equal(error_model_fit(&m, P, 0, x, value, NULL), SDM_OK);
-    assert_true(error_model_at(&m, x) == 0);
-    error_model_dispose(&m);
+    assert_true(fabs(trainer_error_model_at(&m, x) - 1.5) < 1e-6);
+    trainer_error_model_dispose(&m);
+    assert_int_equal(trainer_error_model_fit(&m, P, 0, x, value, NULL), SDM_OK);
+    assert_true(trainer_error_model_at(&m, x) == 0);
+    trainer_error_model_dispose(&m);
 }
 
 static const double LOW[2] = {-3, 10}, HIGH[2] = {5, 11};
@@ -63,7 +63,7 @@ static const sample_space space = {.n_params = 2, .min = LOW, .max = HIGH, .seed
 // first parameter of a sample, scaled to -1 .. 1
 static void scaled(const sample_plan *p, size_t i, double *x)
 {
-    sdm_sample_params(space.seed, STREAM_TRAIN, sample_plan_point(p, i), LOW, HIGH, 2, x);
+    sdm_sample_params(space.seed, STREAM_TRAIN, trainer_sample_plan_point(p, i), LOW, HIGH, 2, x);
     for (int k = 0; k < 2; k++) x[k] = 2 * (x[k] - LOW[k]) / (HIGH[k] - LOW[k]) - 1;
 }
 
@@ -77,7 +77,7 @@ static void observe(sample_plan *p, size_t first, size_t n)
         scaled(p, first + i, x);
         error[i] = exp(2 * x[0]) / (double)(first + 1);
     }
-    sample_plan_observe(p, first, n, error);
+    trainer_sample_plan_observe(p, first, n, error);
 }
 
 static void run_plan(sample_plan *p, size_t n_start, size_t from)
@@ -86,7 +86,7 @@ static void run_plan(sample_plan *p, size_t n_start, size_t from)
         const size_t n = p->n - at < SAMPLE_ROUND ? p->n - at : SAMPLE_ROUND;
         assert_true(p->n_planned >= at + n);
         observe(p, at, n);
-        assert_int_equal(sample_plan_extend(p, &space, n_start, at + n, NULL), SDM_OK);
+        assert_int_equal(trainer_sample_plan_extend(p, &space, n_start, at + n, NULL), SDM_OK);
     }
 }
 
@@ -95,10 +95,10 @@ static void density_follows_the_error(void **state)
     (void)state;
     enum { START = 100, N = 20000, BINS = 4 };
     sample_plan p;
-    assert_int_equal(sample_plan_create(&p, true, N, NULL), SDM_OK);
-    sample_plan_start(&p, START);
+    assert_int_equal(trainer_sample_plan_create(&p, true, N, NULL), SDM_OK);
+    trainer_sample_plan_start(&p, START);
     assert_int_equal(p.n_planned, START + 2 * SAMPLE_ROUND);
-    for (size_t i = 0; i < p.n_planned; i++) assert_int_equal(sample_plan_point(&p, i), i);
+    for (size_t i = 0; i < p.n_planned; i++) assert_int_equal(trainer_sample_plan_point(&p, i), i);
     run_plan(&p, START, START);
     assert_int_equal(p.n_planned, N);
 
@@ -117,7 +117,7 @@ static void density_follows_the_error(void **state)
         assert_true(fabs(count[0][b] / all - share) < 0.015);
         assert_true(fabs(count[1][b] / all - 1.0 / BINS) < 0.015);
     }
-    sample_plan_dispose(&p);
+    trainer_sample_plan_dispose(&p);
 }
 
 // what is left of a plan after a round gives the rest of it again
@@ -126,10 +126,10 @@ static void plan_goes_on(void **state)
     (void)state;
     enum { START = 40, N = 1000, BREAK = START + 8 * SAMPLE_ROUND };
     sample_plan whole, rest;
-    assert_int_equal(sample_plan_create(&whole, true, N, NULL), SDM_OK);
-    sample_plan_start(&whole, START);
+    assert_int_equal(trainer_sample_plan_create(&whole, true, N, NULL), SDM_OK);
+    trainer_sample_plan_start(&whole, START);
     run_plan(&whole, START, START);
-    assert_int_equal(sample_plan_create(&rest, true, N, NULL), SDM_OK);
+    assert_int_equal(trainer_sample_plan_create(&rest, true, N, NULL), SDM_OK);
     rest.n_planned = BREAK + 2 * SAMPLE_ROUND;
     memcpy(rest.point, whole.point, rest.n_planned * sizeof *rest.point);
     memcpy(rest.error, whole.error, BREAK * sizeof *rest.error);
@@ -137,8 +137,8 @@ static void plan_goes_on(void **state)
     assert_memory_equal(whole.point, rest.point, N * sizeof *whole.point);
     assert_memory_equal(whole.error, rest.error, N * sizeof *whole.error);
     assert_int_not_equal(whole.point[N - 1], N - 1);
-    sample_plan_dispose(&whole);
-    sample_plan_dispose(&rest);
+    trainer_sample_plan_dispose(&whole);
+    trainer_sample_plan_dispose(&rest);
 }
 
 // no observation, no reason to prefer a point; maps met without an error are none
@@ -147,17 +147,17 @@ static void nothing_observed(void **state)
     (void)state;
     enum { START = 10, N = 300 };
     sample_plan p;
-    assert_int_equal(sample_plan_create(&p, true, N, NULL), SDM_OK);
-    sample_plan_start(&p, START);
-    sample_plan_observe(&p, START, 3, (const double[]){0, 0, NAN});
+    assert_int_equal(trainer_sample_plan_create(&p, true, N, NULL), SDM_OK);
+    trainer_sample_plan_start(&p, START);
+    trainer_sample_plan_observe(&p, START, 3, (const double[]){0, 0, NAN});
     for (size_t taken = START; taken <= N; taken++)
-        assert_int_equal(sample_plan_extend(&p, &space, START, taken, NULL), SDM_OK);
-    for (size_t i = 0; i < N; i++) assert_int_equal(sample_plan_point(&p, i), i);
-    sample_plan_dispose(&p);
-    assert_int_equal(sample_plan_create(&p, false, N, NULL), SDM_OK);
-    sample_plan_start(&p, START);
-    assert_true(p.n_planned == N && sample_plan_point(&p, N - 1) == N - 1);
-    sample_plan_dispose(&p);
+        assert_int_equal(trainer_sample_plan_extend(&p, &space, START, taken, NULL), SDM_OK);
+    for (size_t i = 0; i < N; i++) assert_int_equal(trainer_sample_plan_point(&p, i), i);
+    trainer_sample_plan_dispose(&p);
+    assert_int_equal(trainer_sample_plan_create(&p, false, N, NULL), SDM_OK);
+    trainer_sample_plan_start(&p, START);
+    assert_true(p.n_planned == N && trainer_sample_plan_point(&p, N - 1) == N - 1);
+    trainer_sample_plan_dispose(&p);
 }
 
 static const char base[] =

@@ -1,18 +1,20 @@
-/* The pool of exact maps. */
+/* The pool of exact maps: sizes, storage, and the maps made before training. */
 #include "dataset.h"
 
 #include <math.h>
 #include <stdatomic.h>
 #include <string.h>
 
-#include "produce.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/rng.h"
 #include "sdm/internal/threads.h"
 #include "streams.h"
+#include "workbench.h"
 
-sdm_status dataset_create(dataset *d, const sdm_config *config, sdm_error *err)
+sdm_status trainer_dataset_create(dataset *d, const sdm_config *config, sdm_error *err)
 {
+    // size of the static grid; a huge product stays at SIZE_MAX / 64, which the memory check
+    // refuses
     d->n_static = config->data.n_static_counts ? 1 : 0;
     const double bytes = config->data.memory_gb * 1e9;
     for (size_t i = 0; i < d->n_params && config->data.n_static_counts; i++) {
@@ -32,8 +34,8 @@ sdm_status dataset_create(dataset *d, const sdm_config *config, sdm_error *err)
     d->n_online = (size_t)config->data.online;
     d->n_holdout = (size_t)config->data.holdout;
 
-    // what fits: static grid and held-out maps always, then as many random maps as there is room
-    // for
+    // the memory holds the static grid and the held-out maps in any case (these as floats: two
+    // units each), and as many random maps as fit into the rest
     const double map_bytes = 2.0 * (double)d->n_voxels;
     const double room = bytes / map_bytes - (double)d->n_static - 2.0 * (double)d->n_holdout;
     if (room < (double)d->n_start || room < 1)
@@ -51,6 +53,7 @@ sdm_status dataset_create(dataset *d, const sdm_config *config, sdm_error *err)
     if (d->n_static + d->n_start == 0)
         return sdm_fail(err, SDM_E_CONFIG,
                         "%s: data.static and data.start give no map to start from", config->file);
+    // arrays
     sdm_status s = SDM_ALLOC(&d->params, d->n_slots * d->n_params, "training parameters", err);
     size_t count = 0;
     if (!s) s = sdm_mul(d->n_slots, d->n_voxels, &count, err);
@@ -61,38 +64,48 @@ sdm_status dataset_create(dataset *d, const sdm_config *config, sdm_error *err)
     if (!s) s = sdm_mul(d->n_holdout, d->n_voxels, &count, err);
     if (!s) s = SDM_ALLOC(&d->holdout, count, "held-out maps", err);
     if (!s)
-        s = sample_plan_create(&d->plan, config->data.sampling == SDM_SAMPLING_ERROR, n_random,
-                               err);
+        s = trainer_sample_plan_create(&d->plan, config->data.sampling == SDM_SAMPLING_ERROR,
+                                       n_random, err);
     return s;
 }
 
-void dataset_dispose(dataset *d)
+void trainer_dataset_dispose(dataset *d)
 {
     sdm_free(d->params);
     sdm_free(d->maps);
     sdm_free(d->scale);
     sdm_free(d->holdout_params);
     sdm_free(d->holdout);
-    sample_plan_dispose(&d->plan);
+    trainer_sample_plan_dispose(&d->plan);
     *d = (dataset){0};
 }
 
-sample_space dataset_space(const dataset *d)
+sample_space trainer_dataset_space(const dataset *d)
 {
     return (sample_space){.n_params = d->n_params, .min = d->min, .max = d->max, .seed = d->seed};
 }
 
-size_t dataset_slot(const dataset *d, size_t index) { return d->n_static + index % d->n_ring; }
+size_t trainer_dataset_slot(const dataset *d, size_t index)
+{
+    return d->n_static + index % d->n_ring;
+}
 
-size_t dataset_random_slots(const dataset *d)
+sdm_status trainer_dataset_first_slots(size_t n, size_t **slots, sdm_error *err)
+{
+    const sdm_status s = SDM_ALLOC(slots, n, "numbers of maps", err);
+    for (size_t i = 0; i < n && !s; i++) (*slots)[i] = i;
+    return s;
+}
+
+size_t trainer_dataset_random_slots(const dataset *d)
 {
     return d->n_taken < d->n_ring ? d->n_taken : d->n_ring;
 }
 
-size_t dataset_draw(const dataset *d, uint64_t stream, double share, size_t batch, uint64_t step,
-                    size_t i)
+size_t trainer_dataset_draw(const dataset *d, uint64_t stream, double share, size_t batch,
+                            uint64_t step, size_t i)
 {
-    const size_t n_random = dataset_random_slots(d);
+    const size_t n_random = trainer_dataset_random_slots(d);
     bool from_grid = (double)i < share * (double)batch;
     if (!d->n_static) from_grid = false;
     if (!n_random) from_grid = true;
@@ -101,14 +114,8 @@ size_t dataset_draw(const dataset *d, uint64_t stream, double share, size_t batc
     return d->n_static + (size_t)sdm_rng_below(d->seed, stream, counter, n_random);
 }
 
-void dataset_map(const dataset *d, size_t slot, float *map)
-{
-    const int16_t *from = d->maps + slot * d->n_voxels;
-    const float scale = d->scale[slot];
-    for (size_t i = 0; i < d->n_voxels; i++) map[i] = scale * (float)from[i];
-}
-
-// parameters of point `index` of the static grid: ends included, the middle when there is one point
+/* Parameters p[n_params] of point `index` of the static grid: both ends of each range are included;
+   with one point it is the middle. */
 static void static_params(const dataset *d, size_t index, double *p)
 {
     for (size_t i = 0; i < d->n_params; i++) {
@@ -120,12 +127,13 @@ static void static_params(const dataset *d, size_t index, double *p)
     }
 }
 
-sdm_status dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_error *err)
+sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_error *err)
 {
-    enum { FEWEST = 128 }; // random maps that bases are made from in any case
+    enum { MIN_RANDOM = 128 }; // random maps that are made even if hooks->enough() is true
     const size_t all = d->n_holdout + d->n_static + d->n_start;
     size_t done = 0;
-    long failed = -1; // lowest failed sample: the message does not depend on scheduling
+    long failed =
+        -1; // number of the lowest failed sample: the message does not depend on scheduling
     sdm_error first = {0};
     atomic_bool stop = false, enough = false;
     n_threads = sdm_threads(n_threads);
@@ -133,29 +141,29 @@ sdm_status dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_
     {
         workbench w = {0};
         sdm_error mine = {0};
-        const sdm_status made = workbench_create(&w, d, &mine);
+        const sdm_status made = trainer_workbench_create(&w, d, &mine);
 #pragma omp for schedule(dynamic)
         for (long i = 0; i < (long)all; i++) {
             const size_t at = (size_t)i;
-            if (stop || (enough && at >= d->n_holdout + d->n_static + FEWEST)) continue;
+            if (stop || (enough && at >= d->n_holdout + d->n_static + MIN_RANDOM)) continue;
             sdm_status s = made;
             if (!s && at < d->n_holdout) {
                 double *p = d->holdout_params + at * d->n_params;
                 sdm_sample_params(d->seed, STREAM_HOLDOUT, at, d->min, d->max, d->n_params, p);
-                s = workbench_map(&w, d, p, d->holdout + at * d->n_voxels, &mine);
+                s = trainer_workbench_map(&w, d, p, d->holdout + at * d->n_voxels, &mine);
             } else if (!s) {
-                const size_t slot =
-                    at -
-                    d->n_holdout; // n_start <= n_ring: random sample k lies in slot n_static + k
+                // n_start <= n_ring, so random sample k lies in slot n_static + k
+                const size_t slot = at - d->n_holdout;
                 double *p = d->params + slot * d->n_params;
                 if (slot < d->n_static)
                     static_params(d, slot, p);
                 else
                     sdm_sample_params(d->seed, STREAM_TRAIN, slot - d->n_static, d->min, d->max,
                                       d->n_params, p);
-                s = workbench_packed_map(&w, d, p, d->maps + slot * d->n_voxels, &d->scale[slot],
-                                         &mine);
+                s = trainer_workbench_packed_map(&w, d, p, d->maps + slot * d->n_voxels,
+                                                 &d->scale[slot], &mine);
             }
+/* keep the first error, report, and ask whether to stop */
 #pragma omp critical(sdm_dataset_fill)
             {
                 if (s && (failed < 0 || i < failed)) failed = i, first = mine;
@@ -170,19 +178,19 @@ sdm_status dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_
                 }
             }
         }
-        workbench_dispose(&w);
+        trainer_workbench_dispose(&w);
     }
     if (failed >= 0) {
         if (err) *err = first;
         return first.status;
     }
-    // a map that was made has a scale; those behind the first that was not are made again during
-    // training
+    // a slot with a map has scale > 0; maps after the first gap are made again during training
     size_t made = 0;
     while (made < d->n_start && d->scale[d->n_static + made] > 0) made++;
     d->n_online += d->n_start - made;
     d->n_taken = d->n_start = made;
     if (d->plan.n_planned == 0)
-        sample_plan_start(&d->plan, made); // else it is that of a checkpoint
+        // a resumed run has read its plan from the checkpoint
+        trainer_sample_plan_start(&d->plan, made);
     return SDM_OK;
 }

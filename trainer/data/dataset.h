@@ -1,6 +1,7 @@
-/* The exact maps a network is trained on: a static grid over the parameters, and random shapes in a
-   replay pool that worker threads fill while training goes on. Which sample is in which slot after
-   n samples depends on n alone. */
+/* The exact maps that a network is trained and tested on: a static grid over the parameters, random
+   shapes in a replay pool that worker threads refill during training (producer.h), and held-out
+   random shapes for the evaluation. A "slot" is a place for one map in the pool. Which sample lies
+   in which slot after n samples depends on n only. */
 #ifndef SDM_DATASET_H
 #define SDM_DATASET_H
 
@@ -8,9 +9,9 @@
 #include "sdm/internal/pod.h"
 #include "sdm/internal/train.h"
 
-/* Maps are kept in block order (sdm/pod.h) as 16-bit integers with a scale for each map: 150,000
-   voxels take 300 kB, and the rounding, at most 1/65534 of the largest distance, adds about 2e-8
-   mm^2 to the mean square error of a 7 mm map. */
+/* Maps are stored in block order (sdm/internal/pod.h) as 16-bit integers with one scale per map:
+   150,000 voxels take 300 kB. The rounding error is at most 1/65534 of the largest distance, which
+   adds about 2e-8 mm^2 to the mean square error of a 7 mm map. */
 typedef struct dataset {
     const sdm_instance *shape;
     const sdm_grid *grid;
@@ -19,70 +20,57 @@ typedef struct dataset {
     double min[SDM_POD_MAX_PARAMS], max[SDM_POD_MAX_PARAMS];
     uint64_t seed;
     size_t counts[SDM_POD_MAX_PARAMS]; /* points of the static grid along each parameter */
-    size_t n_static, n_start,
-        n_online;     /* samples: static; random before training; random during it */
-    size_t n_ring;    /* slots for random maps; they replace the oldest when there are more samples
-                         than slots */
+    /* Numbers of maps: static grid; random, made before training; random, made during training. */
+    size_t n_static, n_start, n_online;
+    /* Slots for random maps. With fewer slots than samples new maps replace the oldest ones. */
+    size_t n_ring;
     size_t n_slots;   /* n_static + n_ring */
-    size_t n_taken;   /* random samples taken into the pool so far */
-    sample_plan plan; /* which point of the Sobol' sequence each random sample is */
+    size_t n_taken;   /* random samples put into the pool so far */
+    sample_plan plan; /* Sobol' point of each random sample */
     double *params;   /* [n_slots][P] */
     int16_t *maps;    /* [n_slots][n_voxels] */
-    float *scale;     /* [n_slots] mm per unit */
+    float *scale;     /* [n_slots] mm per unit; 0: no map yet */
     size_t n_holdout;
     double *holdout_params; /* [n_holdout][P] */
     float *holdout;         /* [n_holdout][n_voxels], block order, mm */
 } dataset;
 
-/* Fills the sizes and allocates; grid, blocks, shape, ranges and seed are set by the caller.
-   SDM_E_CONFIG when the pool cannot hold the static grid and the start within the budget. */
-sdm_status dataset_create(dataset *d, const sdm_config *config, sdm_error *err);
-void dataset_dispose(dataset *d);
+/* Computes the sizes from the configuration and allocates the arrays. n_params and n_voxels must be
+   set. SDM_E_CONFIG: data.memory_gb is too small for the static grid, the held-out maps and the
+   maps before training. Call trainer_dataset_dispose() also after an error. */
+sdm_status trainer_dataset_create(dataset *d, const sdm_config *config, sdm_error *err);
+void trainer_dataset_dispose(dataset *d);
 
-/* What is asked of the caller while maps are made; every function may be NULL. */
+/* Callbacks of trainer_dataset_fill(); each may be NULL. */
 typedef struct fill_hooks {
-    void (*report)(void *user, size_t done, size_t all); /* on the calling thread */
+    /* Called by the calling thread. */
+    void (*report)(void *user, size_t done, size_t all);
     bool (*cancelled)(void *user);
-    bool (*enough)(void *user); /* true: the rest of the start is left to be made during training
-                                   (n_start and n_online change) */
+    /* true: the remaining maps of n_start are left to be made during training; n_start and n_online
+       change accordingly. */
+    bool (*enough)(void *user);
     void *user;
 } fill_hooks;
 
-/* Makes all maps that are needed before training: held-out, static, start. */
-sdm_status dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_error *err);
+/* Makes all maps needed before training: held-out, static, start. shape, grid, blocks, n_blocks,
+   min, max and seed must be set. */
+sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_error *err);
 
-/* The space that plan and random samples are of; it points into d. */
-sample_space dataset_space(const dataset *d);
+/* The parameter space of the random samples; its pointers refer to d. */
+sample_space trainer_dataset_space(const dataset *d);
 
 /* Number of slots that hold a random map. */
-size_t dataset_random_slots(const dataset *d);
+size_t trainer_dataset_random_slots(const dataset *d);
 
 /* Slot of random sample `index`. */
-size_t dataset_slot(const dataset *d, size_t index);
+size_t trainer_dataset_slot(const dataset *d, size_t index);
 
-/* Slot in row `i` of the batch of `step`: counter-based in `stream`; the first `share` of the rows
- * from the static grid. */
-size_t dataset_draw(const dataset *d, uint64_t stream, double share, size_t batch, uint64_t step,
-                    size_t i);
+/* *slots = new array {0, 1, .. n - 1}; free with sdm_free(). */
+sdm_status trainer_dataset_first_slots(size_t n, size_t **slots, sdm_error *err);
 
-/* map[n_voxels] of a slot, mm, block order. */
-void dataset_map(const dataset *d, size_t slot, float *map);
-
-/* Threads that make random samples from `first` on, in order, while the caller trains: those that
-   are planned, and more as the caller allows. */
-typedef struct producer producer;
-sdm_status producer_start(dataset *d, size_t first, int n_threads, producer **out, sdm_error *err);
-
-/* Samples below n_planned may be made: their points are in d->plan. */
-void producer_allow(producer *p, size_t n_planned);
-
-/* Number of finished samples that wait to be taken, without a gap. */
-size_t producer_ready(producer *p);
-
-/* Takes finished samples into the pool until it holds `until` of them, waiting for those that are
- * not ready. */
-sdm_status producer_take(producer *p, size_t until, sdm_error *err);
-
-void producer_stop(producer *p);
+/* Random slot for row i of the batch of `step`, from the counter-based numbers of `stream`. The
+   first share * batch rows come from the static grid, the others from the random maps. */
+size_t trainer_dataset_draw(const dataset *d, uint64_t stream, double share, size_t batch,
+                            uint64_t step, size_t i);
 
 #endif

@@ -1,22 +1,22 @@
-/* Regression of the error on the parameters. */
+/* Least squares fit of a polynomial to the logarithm of the error. */
 #include "error_model.h"
 
-#include "linalg.h"
+#include "numerics/linalg.h"
 #include "sdm/memory.h"
 
 enum { MAX_DEGREE = 4, OBSERVATIONS_PER_TERM = 4 };
 
 static size_t degree_for(size_t n_params, size_t n)
 {
-    size_t degree = MAX_DEGREE, most = n / OBSERVATIONS_PER_TERM;
-    if (most > ERROR_MODEL_MAX_TERMS) most = ERROR_MODEL_MAX_TERMS;
-    while (degree > 0 && sdm_poly_count(n_params, degree) > most) degree--;
+    size_t degree = MAX_DEGREE, terms = n / OBSERVATIONS_PER_TERM;
+    if (terms > ERROR_MODEL_MAX_TERMS) terms = ERROR_MODEL_MAX_TERMS;
+    while (degree > 0 && sdm_poly_count(n_params, degree) > terms) degree--;
     return degree;
 }
 
-// gram[F][F] and right[F] of the observations
-static void sum_up(const error_model *m, size_t n, const double *x, const double *value,
-                   double *gram, double *right)
+/* Adds the normal equations of the n observations: matrix gram[F][F], right-hand side right[F]. */
+static void add_normal_equations(const error_model *m, size_t n, const double *x,
+                                 const double *value, double *gram, double *right)
 {
     float phi[ERROR_MODEL_MAX_TERMS];
     const size_t f = m->n_terms;
@@ -27,15 +27,16 @@ static void sum_up(const error_model *m, size_t n, const double *x, const double
             for (size_t k = 0; k <= j; k++) gram[j * f + k] += (double)phi[j] * phi[k];
         }
     }
-    // a ridge of one observation: directions that the samples hardly reach stay flat
+    // ridge with the weight of one observation: terms that the observations hardly determine stay
+    // small
     for (size_t j = 0; j < f; j++) {
         gram[j * f + j] += 1;
         for (size_t k = 0; k < j; k++) gram[k * f + j] = gram[j * f + k];
     }
 }
 
-sdm_status error_model_fit(error_model *m, size_t n_params, size_t n, const double *x,
-                           const double *value, sdm_error *err)
+sdm_status trainer_error_model_fit(error_model *m, size_t n_params, size_t n, const double *x,
+                                   const double *value, sdm_error *err)
 {
     *m = (error_model){.n_params = n_params, .degree = degree_for(n_params, n)};
     const size_t f = m->n_terms = sdm_poly_count(n_params, m->degree);
@@ -45,19 +46,19 @@ sdm_status error_model_fit(error_model *m, size_t n_params, size_t n, const doub
     if (!s) s = SDM_ALLOC(&gram, f * f, "error model", err);
     if (!s) {
         sdm_poly_table(n_params, m->degree, m->exponents);
-        sum_up(m, n, x, value, gram, m->weights);
-        if (cholesky(f, gram))
+        add_normal_equations(m, n, x, value, gram, m->weights);
+        if (trainer_cholesky(f, gram))
             s = sdm_fail(err, SDM_E_INTERNAL, "the error model of %zu observations has no solution",
                          n);
         else
-            cholesky_solve(f, gram, 1, m->weights);
+            trainer_cholesky_solve(f, gram, 1, m->weights);
     }
     sdm_free(gram);
-    if (s) error_model_dispose(m);
+    if (s) trainer_error_model_dispose(m);
     return s;
 }
 
-double error_model_at(const error_model *m, const double *x)
+double trainer_error_model_at(const error_model *m, const double *x)
 {
     float phi[ERROR_MODEL_MAX_TERMS];
     sdm_poly_eval(m->exponents, m->n_terms, m->n_params, m->degree, x, phi, NULL);
@@ -66,7 +67,7 @@ double error_model_at(const error_model *m, const double *x)
     return sum;
 }
 
-void error_model_dispose(error_model *m)
+void trainer_error_model_dispose(error_model *m)
 {
     sdm_free(m->exponents);
     sdm_free(m->weights);

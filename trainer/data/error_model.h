@@ -1,6 +1,6 @@
-/* Regression of a network's error on the parameters: the logarithm of the error as a polynomial
-   (products of Legendre polynomials of bounded total degree, sdm/pod.h) by least squares. The
-   degree is the highest that the number of observations can determine. */
+/* Regression of the network's error over the shape parameters: a polynomial for the logarithm of
+   the error (products of Legendre polynomials of bounded total degree, sdm/internal/pod.h), fitted
+   by least squares. Its degree is the highest one with at least four observations per term. */
 #ifndef SDM_ERROR_MODEL_H
 #define SDM_ERROR_MODEL_H
 
@@ -13,17 +13,18 @@
 #define ERROR_MODEL_MAX_TERMS 256
 
 typedef struct error_model {
-    size_t n_params, degree, n_terms; /* one term: a constant */
+    size_t n_params, degree, n_terms; /* n_terms == 1: a constant */
     uint8_t *exponents;               /* [n_terms][n_params] */
     double *weights;                  /* [n_terms] */
 } error_model;
 
-/* From n observations: x[n][n_params] in -1 .. 1, value[n] logarithms. Few observations give a
- * constant, none gives 0. */
-sdm_status error_model_fit(error_model *m, size_t n_params, size_t n, const double *x,
-                           const double *value, sdm_error *err);
-/* The logarithm of the error at x[n_params]. */
-double error_model_at(const error_model *m, const double *x);
-void error_model_dispose(error_model *m);
+/* Fits the model to n observations: parameters x[n][n_params] scaled to -1 .. 1, value[n] =
+   logarithm of the error. Few observations give a constant, n == 0 gives the constant 0. */
+sdm_status trainer_error_model_fit(error_model *m, size_t n_params, size_t n, const double *x,
+                                   const double *value, sdm_error *err);
+
+/* Predicted logarithm of the error at x[n_params]. */
+double trainer_error_model_at(const error_model *m, const double *x);
+void trainer_error_model_dispose(error_model *m);
 
 #endif

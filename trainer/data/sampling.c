@@ -1,4 +1,4 @@
-/* Low-discrepancy and counter-based samples of the parameters. */
+/* Random parameters of shapes: Sobol' points, or independent random numbers in high dimensions. */
 #include <stdint.h>
 
 #include "sdm/internal/rng.h"
@@ -7,7 +7,8 @@
 #define DIMENSIONS 16
 #define BITS 32
 
-// primitive polynomials and initial direction numbers of Joe and Kuo (2008), dimensions 2 to 16
+/* Primitive polynomials and initial direction numbers of Joe and Kuo (2008) for dimensions 2
+   to 16. */
 static const struct {
     uint8_t degree, polynomial, m[6];
 } joe_kuo[DIMENSIONS - 1] = {
@@ -28,9 +29,10 @@ static const struct {
     {6, 16, {1, 3, 1, 13, 27, 49}},
 };
 
-// component d of Sobol' point `index`, as a 32-bit fraction
+/* Component d of Sobol' point `index`, as a 32-bit fraction. */
 static uint32_t sobol(uint64_t index, size_t d)
 {
+    // direction numbers v by the recurrence of the primitive polynomial
     uint32_t v[BITS], out = 0;
     if (d == 0) {
         for (int i = 0; i < BITS; i++) v[i] = UINT32_C(1) << (31 - i);
@@ -54,7 +56,8 @@ void sdm_sample_params(uint64_t seed, uint64_t stream, uint64_t index, const dou
     for (size_t d = 0; d < n; d++) {
         double u;
         if (n <= DIMENSIONS && index <= UINT32_MAX) {
-            uint32_t shift[4]; // digital shift: one random number for each dimension
+            // digital shift: exclusive or with one random number per dimension
+            uint32_t shift[4];
             sdm_rng_block(seed, stream, d, shift);
             u = ((double)(sobol(index, d) ^ shift[0]) + 0.5) * 0x1p-32;
         } else {

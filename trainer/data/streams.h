@@ -1,18 +1,19 @@
-/* Streams of random numbers: one for each purpose, so that none disturbs another. */
+/* Streams of the counter-based random numbers: one for each purpose, so that drawing more numbers
+   for one purpose does not change the others. */
 #ifndef SDM_STREAMS_H
 #define SDM_STREAMS_H
 
 enum {
-    STREAM_TRAIN = 100,
-    STREAM_HOLDOUT = 200,
-    STREAM_FIT = 300,
-    STREAM_REFINE = 350,
-    STREAM_INIT = 400,
-    STREAM_POINTS = 600,
-    STREAM_EVALUATE = 650,
+    STREAM_TRAIN = 100,    // parameters of random training maps
+    STREAM_HOLDOUT = 200,  // parameters of held-out maps
+    STREAM_BATCH = 300,    // slots of a batch: mode fit of pod, training of the direct kinds
+    STREAM_REFINE = 350,   // slots of a batch: refinement of pod
+    STREAM_INIT = 400,     // initial weights
+    STREAM_POINTS = 600,   // voxels of a map that a point network is trained on
+    STREAM_EVALUATE = 650, // voxels of a held-out map that a point network is evaluated on
     STREAM_DROPOUT = 700,
-    STREAM_PLAN = 750,
-    STREAM_BASES = 1000 // and on: one for each block
+    STREAM_PLAN = 750,  // thinning of the Sobol' sequence (sample_plan.h)
+    STREAM_BASES = 1000 // start of subspace iterations: global modes; block b has 1001 + b
 };
 
 #endif

@@ -1,47 +1,52 @@
-/* Training of networks that learn by gradients on exact maps: one phase of Adam steps with warm-up
-   and half a cosine, and an average of the weights. The networks: direct_network (kind.h). */
+/* Trains networks that learn by gradients on exact maps: one phase of Adam steps with a running
+   average of the weights. */
+#include "direct.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "data/streams.h"
-#include "export_model.h"
-#include "kind.h"
+#include "direct_network.h"
 #include "sdm/internal/checksum.h"
 #include "sdm/memory.h"
+#include "state/checkpoint.h"
+#include "state/export_model.h"
+#include "state/new_samples.h"
+#include "state/progress.h"
 
-typedef struct direct {
+typedef struct direct_state {
     const direct_network *kind;
-    void *network;
+    void *network; // made by kind->create()
     parameters weights;
-    float *gradient; // [weights.n]
-    size_t *slots;   // [batch]
-    double export_seconds;
-} direct;
+    float *gradient;       // [weights.n]
+    size_t *slots;         // [batch]
+    double export_seconds; // expected duration of the final evaluation
+} direct_state;
 
 static const direct_network *network_of(sdm_network_kind kind)
 {
     switch (kind) {
     case SDM_NETWORK_DEEPSDF:
     case SDM_NETWORK_IMNET:
-        return &point_direct;
+        return &trainer_network_point;
     case SDM_NETWORK_SDMNN:
-        return &sdmnn_direct;
+        return &trainer_network_sdmnn;
     case SDM_NETWORK_POD:
         break;
     }
     return NULL;
 }
 
-// maps lie as [nz][ny][nx]
-static size_t block(const sdm_config *c)
+/* Map order, [nz][ny][nx]. */
+static size_t direct_block(const sdm_config *c)
 {
     (void)c;
     return 0;
 }
 
-static sdm_status begin(trainer *t, sdm_error *err)
+static sdm_status direct_begin(trainer *t, sdm_error *err)
 {
-    direct *d = NULL;
+    direct_state *d = NULL;
     const direct_network *kind = network_of(t->config->network.kind);
     size_t n = 0;
     if (!kind)
@@ -52,7 +57,7 @@ static sdm_status begin(trainer *t, sdm_error *err)
     t->state = d;
     d->kind = kind;
     s = kind->create(t, &d->network, &n, err);
-    if (!s) s = parameters_create(&d->weights, n, err);
+    if (!s) s = trainer_parameters_create(&d->weights, n, err);
     if (!s) s = SDM_ALLOC(&d->gradient, n, "gradient", err);
     if (!s) s = SDM_ALLOC(&d->slots, (size_t)t->config->train.batch, "batch", err);
     if (s) return s;
@@ -62,31 +67,33 @@ static sdm_status begin(trainer *t, sdm_error *err)
     return SDM_OK;
 }
 
-// Adam and the average, weight by weight: the same bits for any number of threads
-static void update(trainer *t, direct *d, double rate)
+/* Weight update and average; the same bits for any number of threads, since each weight is
+   independent. */
+static void direct_update(trainer *t, direct_state *d, double rate)
 {
     enum { SLICE = 16384 };
-    const adam_step adam = adam_begin(rate, t->phase_step + 1);
+    const adam_step adam = trainer_adam_begin(rate, t->phase_step + 1);
     parameters *p = &d->weights;
 #pragma omp parallel for schedule(static) num_threads(trainer_threads(t))
     for (long at = 0; at < (long)p->n; at += SLICE) {
         const size_t first = (size_t)at, n = p->n - first < SLICE ? p->n - first : SLICE;
-        adam_update(p, first, n, d->gradient + first, adam, 1);
+        trainer_adam_update(p, first, n, d->gradient + first, adam, 1);
     }
-    // the average starts with the weights themselves and lengthens its memory
+    // the average follows the weights closely at first and then more and more slowly
     const double n = (double)t->phase_step + 1;
-    average_update(p,
-                   t->config->train.average > 0 ? fmin(t->config->train.average, n / (n + 10)) : 0,
-                   trainer_threads(t));
+    trainer_average_update(
+        p, t->config->train.average > 0 ? fmin(t->config->train.average, n / (n + 10)) : 0,
+        trainer_threads(t));
 }
 
-static sdm_status step(trainer *t, direct *d, double rate, sdm_error *err)
+/* One Adam step on a random batch. */
+static sdm_status direct_step(trainer *t, direct_state *d, double rate, sdm_error *err)
 {
     const direct_batch b = {
         .n = (size_t)t->config->train.batch, .slots = d->slots, .step = (uint64_t)t->step};
     for (size_t i = 0; i < b.n; i++)
-        d->slots[i] =
-            dataset_draw(&t->data, STREAM_FIT, t->config->data.static_share, b.n, b.step, i);
+        d->slots[i] = trainer_dataset_draw(&t->data, STREAM_BATCH, t->config->data.static_share,
+                                           b.n, b.step, i);
     const sdm_status s =
         d->kind->gradient(t, d->network, d->weights.w, &b, d->gradient, &t->loss, err);
     if (s) return s;
@@ -95,12 +102,13 @@ static sdm_status step(trainer *t, direct *d, double rate, sdm_error *err)
             err, SDM_E_CONFIG,
             "%s: training diverged at step %lld (loss is not a number): lower train.learning_rate",
             t->config->file, (long long)t->step);
-    update(t, d, rate);
+    direct_update(t, d, rate);
     t->step++, t->phase_step++;
     return SDM_OK;
 }
 
-static double fraction_of_phase(const trainer *t, const direct *d)
+/* Used part of the budget: of the steps, or of the time before the final evaluation. */
+static double direct_fraction(const trainer *t, const direct_state *d)
 {
     if (!trainer_by_time(t)) return trainer_fraction(t);
     const double total = t->config->train.minutes * 60,
@@ -109,74 +117,67 @@ static double fraction_of_phase(const trainer *t, const direct *d)
     return length > 0 ? (trainer_seconds(t) - t->phase_started) / length : 1;
 }
 
-static sdm_status run(trainer *t, bool resumed, sdm_error *err)
+static sdm_status direct_run(trainer *t, bool resumed, sdm_error *err)
 {
     const sdm_config *c = t->config;
-    direct *d = t->state;
-    sdm_status s = resumed ? checkpoint_weights(t, err) : SDM_OK;
-    if (!s && trainer_by_time(t)) s = export_time(t, &d->export_seconds, err);
-    int64_t last_step = t->phase_step;
-    double last_time = trainer_seconds(t);
-    for (double at; !s && (at = fraction_of_phase(t, d)) < 1;) {
-        const size_t all = t->data.n_start + t->data.n_online;
-        const double want = (double)t->data.n_start + (double)t->data.n_online * fmin(1, at / 0.75);
-        if ((s = trainer_take_samples(t, want < (double)all ? (size_t)want : all, err))) break;
+    direct_state *d = t->state;
+    sdm_status s = resumed ? trainer_checkpoint_weights(t, err) : SDM_OK;
+    if (!s && trainer_by_time(t)) s = trainer_export_time(t, &d->export_seconds, err);
+    trainer_speed speed = trainer_speed_start(t);
+    for (double at; !s && (at = direct_fraction(t, d)) < 1;) {
+        // new maps, or stop
+        if ((s = trainer_samples_take(t, trainer_samples_wanted(t, at), err))) break;
         if (trainer_cancelled(t)) return trainer_stop(t, err);
-        const double rate = c->train.learning_rate * schedule(at, c->train.warmup);
-        if ((s = step(t, d, rate, err))) break;
+        // one step
+        const double rate = c->train.learning_rate * trainer_rate_schedule(at, c->train.warmup);
+        if ((s = direct_step(t, d, rate, err))) break;
+        // evaluate, report, save
         double now = trainer_seconds(t);
-        if (trainer_by_time(t) ? now - t->last_evaluation >= c->train.evaluate_seconds
-                               : t->phase_step % 500 == 0) {
+        if (trainer_evaluation_due(t, now)) {
             if ((s = d->kind->evaluate(t, d->network, d->weights.average, &t->heldout_mse, err)))
                 break;
             t->last_evaluation = now = trainer_seconds(t);
             if ((s = trainer_metric(t, rate, err))) break;
         }
-        if (now - last_time > 0.5) {
-            trainer_report(t, trainer_fraction(t),
-                           (double)(t->phase_step - last_step) * (double)c->train.batch /
-                               (now - last_time),
-                           true);
-            last_step = t->phase_step, last_time = now;
-        }
-        if (now - t->last_checkpoint > c->train.checkpoint_seconds) s = checkpoint_write(t, err);
+        trainer_speed_report(t, &speed, (size_t)c->train.batch, now);
+        s = trainer_checkpoint_if_due(t, now, err);
     }
     return s;
 }
 
-static parameters *weights(trainer *t) { return &((direct *)t->state)->weights; }
+static parameters *direct_weights(trainer *t) { return &((direct_state *)t->state)->weights; }
 
-// of the maps before training and the first of the held-out ones
-static uint64_t fingerprint(const trainer *t)
+/* Checksum of the scales of the maps made before training, and of the first held-out map. */
+static uint64_t direct_fingerprint(const trainer *t)
 {
     const dataset *d = &t->data;
     const uint64_t crc = sdm_crc64(0, d->scale, (d->n_static + d->n_start) * sizeof *d->scale);
     return sdm_crc64(crc, d->holdout, d->n_voxels * sizeof *d->holdout);
 }
 
-static sdm_status build(const trainer *t, const sdm_model_info *info, uint8_t **bytes, size_t *size,
-                        sdm_error *err)
+static sdm_status direct_build(const trainer *t, const sdm_model_info *info, uint8_t **bytes,
+                               size_t *size, sdm_error *err)
 {
-    const direct *d = t->state;
+    const direct_state *d = t->state;
     return d->kind->build(t, d->network, d->weights.average, info, bytes, size, err);
 }
 
-static void dispose(trainer *t)
+static void direct_dispose(trainer *t)
 {
-    direct *d = t->state;
+    direct_state *d = t->state;
     if (!d) return;
     d->kind->dispose(d->network);
-    parameters_dispose(&d->weights);
+    trainer_parameters_dispose(&d->weights);
     sdm_free(d->gradient);
     sdm_free(d->slots);
     sdm_free(d);
     t->state = NULL;
 }
 
-const train_kind direct_train = {.block = block,
-                                 .begin = begin,
-                                 .run = run,
-                                 .weights = weights,
-                                 .fingerprint = fingerprint,
-                                 .build = build,
-                                 .dispose = dispose};
+const train_kind trainer_kind_direct = {.block = direct_block,
+                                        .begin = direct_begin,
+                                        .run = direct_run,
+                                        .weights = direct_weights,
+                                        .fingerprint = direct_fingerprint,
+                                        .build = direct_build,
+                                        .dispose = direct_dispose};

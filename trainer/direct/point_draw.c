@@ -1,4 +1,4 @@
-/* Random voxels. */
+/* Draws random voxels of a map by rejection. */
 #include "point_draw.h"
 
 #include <math.h>
@@ -6,11 +6,10 @@
 #include "data/streams.h"
 #include "sdm/internal/rng.h"
 
-size_t point_draw(const sdm_config *c, const dataset *d, size_t slot, uint64_t index)
+size_t trainer_point_draw(const sdm_config *c, const dataset *d, size_t slot, uint64_t index)
 {
-    enum {
-        TRIES = 256
-    }; // by rejection; more tries are hardly ever needed, and then the last one counts
+    // random numbers per voxel; in the rare case that all are rejected, the last voxel counts
+    enum { TRIES = 256 };
     const int16_t *map = d->maps + slot * d->n_voxels;
     const double keep = 1 / (1 + c->train.near_weight);
     size_t voxel = 0;
@@ -25,7 +24,7 @@ size_t point_draw(const sdm_config *c, const dataset *d, size_t slot, uint64_t i
     return voxel;
 }
 
-size_t point_with_neighbours(const sdm_grid *g, size_t voxel)
+size_t trainer_point_with_neighbours(const sdm_grid *g, size_t voxel)
 {
     const size_t nx = (size_t)g->n[0], ny = (size_t)g->n[1], nz = (size_t)g->n[2];
     if (voxel % nx == nx - 1) voxel--;

@@ -1,15 +1,16 @@
-/* Which voxels of a map a point network is trained on. */
+/* Draws the voxels of a map that a point network is trained on. */
 #ifndef SDM_POINT_DRAW_H
 #define SDM_POINT_DRAW_H
 
 #include "data/dataset.h"
 
-/* Voxel of random number `index` (stream STREAM_POINTS) from the map in `slot`: all alike, but
-   those near the surface (train.near_mm) 1 + train.near_weight times as often. [any thread] */
-size_t point_draw(const sdm_config *c, const dataset *d, size_t slot, uint64_t index);
+/* Random voxel of the map in `slot`, from counter-based number `index` of STREAM_POINTS. Voxels
+   with abs(distance) < train.near_mm are drawn 1 + train.near_weight times as often as the others.
+   [any thread] */
+size_t trainer_point_draw(const sdm_config *c, const dataset *d, size_t slot, uint64_t index);
 
-/* The voxel, or the nearest one that has a neighbour behind it along every axis; every size of the
- * grid is at least 2. */
-size_t point_with_neighbours(const sdm_grid *g, size_t voxel);
+/* `voxel`, moved back by one along each axis where it is the last one, so that it has a next
+   neighbour along every axis. All grid sizes must be at least 2. */
+size_t trainer_point_with_neighbours(const sdm_grid *g, size_t voxel);
 
 #endif

@@ -1,30 +1,34 @@
-/* Point networks in the trainer: random voxels of the maps of a batch, near the surface more often.
- */
+/* The point networks deepsdf and imnet in the trainer: they learn from random voxels of the maps of
+   a batch. */
 #include <math.h>
 #include <string.h>
 
 #include "data/streams.h"
-#include "kind.h"
-#include "loss.h"
+#include "direct_network.h"
+#include "numerics/loss.h"
 #include "point_draw.h"
 #include "point_mlp.h"
 #include "sdm/internal/rng.h"
 #include "sdm/memory.h"
+#include "state/progress.h"
 
 enum {
-    CHUNK = 2048,
-    EVALUATED = 512
-}; // points that go through the network together; voxels of a held-out map that are looked at
+    CHUNK = 2048,   // points that pass through the network together
+    EVALUATED = 512 // random voxels of each held-out map in an evaluation
+};
 
 typedef struct point_trainer {
     sdm_point_arch arch;
-    size_t group; // 1; with the eikonal term 4: a voxel and its neighbours along x, y and z
+    // Voxels drawn together: 1; with the eikonal term 4, a voxel and its next neighbours along x, y
+    // and z.
+    size_t group;
     size_t voxels[CHUNK];
     float u[CHUNK * (SDM_POD_MAX_PARAMS + 3)], target[CHUNK], value[CHUNK], slope[CHUNK];
     float *workspace;
 } point_trainer;
 
-static void design(const trainer *t, sdm_point_arch *a)
+/* The network that the configuration asks for, scaled to the grid and to the maps made so far. */
+static void point_design(const trainer *t, sdm_point_arch *a)
 {
     const sdm_config *c = t->config;
     const dataset *d = &t->data;
@@ -38,6 +42,7 @@ static void design(const trainer *t, sdm_point_arch *a)
         a->width[l] = width > 8 ? width : 8;
         if (l && (imnet || l == (size_t)c->network.skip)) a->skip |= 1u << l;
     }
+    // centre and radius of the inputs: the grid
     double middle[3];
     for (int i = 0; i < 3; i++) {
         middle[i] = 0.5 * (double)(c->grid.n[i] - 1);
@@ -45,27 +50,27 @@ static void design(const trainer *t, sdm_point_arch *a)
         if (half > a->radius) a->radius = half;
     }
     sdm_grid_world(&c->grid, middle, a->centre);
-    // the largest distance of the maps so far, with a little room for those to come
+    // scale of the output: the largest distance of the maps so far, with some room for later maps
     float largest = 0;
     for (size_t i = 0; i < d->n_static + d->n_start; i++)
         if (d->scale[i] > largest) largest = d->scale[i];
     a->scale = 1.05 * 32767 * (double)largest;
 }
 
-static sdm_status create(const trainer *t, void **network, size_t *n_weights, sdm_error *err)
+static sdm_status point_create(const trainer *t, void **network, size_t *n_weights, sdm_error *err)
 {
     point_trainer *p = NULL;
     sdm_status s = SDM_ALLOC(&p, 1, "batch", err);
     if (s) return s;
     *network = p;
-    design(t, &p->arch);
+    point_design(t, &p->arch);
     const int64_t *n = t->config->grid.n;
     p->group = t->config->train.eikonal > 0 && n[0] > 1 && n[1] > 1 && n[2] > 1 ? 4 : 1;
     *n_weights = sdm_point_count(&p->arch);
-    return SDM_ALLOC(&p->workspace, point_workspace(&p->arch, CHUNK), "batch", err);
+    return SDM_ALLOC(&p->workspace, trainer_point_workspace(&p->arch, CHUNK), "batch", err);
 }
 
-static void dispose(void *network)
+static void point_dispose(void *network)
 {
     point_trainer *p = network;
     if (!p) return;
@@ -73,14 +78,14 @@ static void dispose(void *network)
     sdm_free(p);
 }
 
-static void init(const trainer *t, const void *network, float *w)
+static void point_init(const trainer *t, const void *network, float *w)
 {
-    point_init(&((const point_trainer *)network)->arch, t->config->seed, w);
+    trainer_point_init(&((const point_trainer *)network)->arch, t->config->seed, w);
 }
 
-// row i of the input: a voxel of a shape
-static void set_input(const trainer *t, point_trainer *p, size_t i, const double *params,
-                      size_t voxel)
+/* Row i of the input u: the shape at params[P] and the world position of a voxel. */
+static void point_set_input(const trainer *t, point_trainer *p, size_t i, const double *params,
+                            size_t voxel)
 {
     const sdm_point_arch *a = &p->arch;
     const sdm_grid *g = &t->config->grid;
@@ -96,9 +101,10 @@ static void set_input(const trainer *t, point_trainer *p, size_t i, const double
     for (int k = 0; k < 3; k++) *u++ = (float)((world[k] - a->centre[k]) / a->radius);
 }
 
-// points first .. first + n of the batch, `each` of every map
-static void gather(const trainer *t, point_trainer *p, const direct_batch *b, size_t each,
-                   size_t first, size_t n)
+/* Draws points first .. first + n - 1 of the batch, `each` from every map: inputs p->u and exact
+   distances p->target. */
+static void points_gather(const trainer *t, point_trainer *p, const direct_batch *b, size_t each,
+                          size_t first, size_t n)
 {
     const dataset *d = &t->data;
     const size_t row = (size_t)t->config->grid.n[0], slice = row * (size_t)t->config->grid.n[1];
@@ -106,18 +112,18 @@ static void gather(const trainer *t, point_trainer *p, const direct_batch *b, si
 #pragma omp parallel for schedule(static) num_threads(trainer_threads(t))
     for (size_t i = 0; i < n; i += p->group) {
         const size_t slot = b->slots[(first + i) / each];
-        size_t voxel = point_draw(t->config, d, slot, b->step * b->n * each + first + i);
-        if (p->group > 1) voxel = point_with_neighbours(&t->config->grid, voxel);
+        size_t voxel = trainer_point_draw(t->config, d, slot, b->step * b->n * each + first + i);
+        if (p->group > 1) voxel = trainer_point_with_neighbours(&t->config->grid, voxel);
         for (size_t k = 0; k < p->group; k++) {
-            set_input(t, p, i + k, d->params + slot * d->n_params, voxel + step[k]);
+            point_set_input(t, p, i + k, d->params + slot * d->n_params, voxel + step[k]);
             p->target[i + k] =
                 d->scale[slot] * (float)d->maps[slot * d->n_voxels + voxel + step[k]];
         }
     }
 }
 
-static sdm_status gradient(const trainer *t, void *network, const float *w, const direct_batch *b,
-                           float *out, double *mse, sdm_error *err)
+static sdm_status point_gradient(const trainer *t, void *network, const float *w,
+                                 const direct_batch *b, float *out, double *mse, sdm_error *err)
 {
     point_trainer *p = network;
     const sdm_config *c = t->config;
@@ -129,20 +135,21 @@ static sdm_status gradient(const trainer *t, void *network, const float *w, cons
     memset(out, 0, sdm_point_count(&p->arch) * sizeof *out);
     for (size_t first = 0; first < all; first += CHUNK) {
         const size_t n = all - first < CHUNK ? all - first : CHUNK;
-        gather(t, p, b, each, first, n);
-        point_forward(&p->arch, w, n, p->u, p->workspace, p->value, trainer_threads(t));
+        points_gather(t, p, b, each, first, n);
+        trainer_point_forward(&p->arch, w, n, p->u, p->workspace, p->value, trainer_threads(t));
         for (size_t i = 0; i < n; i++)
-            p->slope[i] = share * loss_slope_drawn(c, p->value[i], p->target[i], &square);
+            p->slope[i] = share * trainer_loss_slope_drawn(c, p->value[i], p->target[i], &square);
         for (size_t i = 0; i + 3 < n && p->group > 1; i += 4)
-            loss_eikonal(c, p->value + i, 4 * share, p->slope + i);
-        point_backward(&p->arch, w, n, p->u, p->workspace, p->slope, out, trainer_threads(t));
+            trainer_loss_eikonal(c, p->value + i, 4 * share, p->slope + i);
+        trainer_point_backward(&p->arch, w, n, p->u, p->workspace, p->slope, out,
+                               trainer_threads(t));
     }
     *mse = square / (double)all;
     return SDM_OK;
 }
 
-static sdm_status evaluate(const trainer *t, void *network, const float *w, double *mse,
-                           sdm_error *err)
+static sdm_status point_evaluate(const trainer *t, void *network, const float *w, double *mse,
+                                 sdm_error *err)
 {
     point_trainer *p = network;
     const dataset *d = &t->data;
@@ -155,9 +162,9 @@ static sdm_status evaluate(const trainer *t, void *network, const float *w, doub
             const size_t map = (first + i) / EVALUATED;
             p->voxels[i] =
                 (size_t)sdm_rng_below(t->config->seed, STREAM_EVALUATE, first + i, d->n_voxels);
-            set_input(t, p, i, d->holdout_params + map * d->n_params, p->voxels[i]);
+            point_set_input(t, p, i, d->holdout_params + map * d->n_params, p->voxels[i]);
         }
-        point_forward(&p->arch, w, n, p->u, p->workspace, p->value, trainer_threads(t));
+        trainer_point_forward(&p->arch, w, n, p->u, p->workspace, p->value, trainer_threads(t));
         for (size_t i = 0; i < n; i++) {
             const double e =
                 (double)p->value[i] -
@@ -169,8 +176,9 @@ static sdm_status evaluate(const trainer *t, void *network, const float *w, doub
     return SDM_OK;
 }
 
-static sdm_status build(const trainer *t, const void *network, const float *w,
-                        const sdm_model_info *info, uint8_t **bytes, size_t *size, sdm_error *err)
+static sdm_status point_build(const trainer *t, const void *network, const float *w,
+                              const sdm_model_info *info, uint8_t **bytes, size_t *size,
+                              sdm_error *err)
 {
     const sdm_point_spec spec = {.info = info,
                                  .kind = t->config->network.kind == SDM_NETWORK_IMNET ? "imnet"
@@ -181,9 +189,9 @@ static sdm_status build(const trainer *t, const void *network, const float *w,
     return sdm_point_build(&spec, bytes, size, err);
 }
 
-const direct_network point_direct = {.create = create,
-                                     .dispose = dispose,
-                                     .init = init,
-                                     .gradient = gradient,
-                                     .evaluate = evaluate,
-                                     .build = build};
+const direct_network trainer_network_point = {.create = point_create,
+                                              .dispose = point_dispose,
+                                              .init = point_init,
+                                              .gradient = point_gradient,
+                                              .evaluate = point_evaluate,
+                                              .build = point_build};

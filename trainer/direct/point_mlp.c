@@ -1,4 +1,4 @@
-/* Forward and backward pass of a point network. */
+/* Forward and backward pass of the perceptron of a point network. */
 #include "point_mlp.h"
 
 #include <math.h>
@@ -9,9 +9,9 @@
 #include "sdm/internal/pod.h"
 #include "sdm/internal/rng.h"
 
-enum { SLICE = 32 }; // points that a thread takes at a time
+enum { SLICE = 32 }; // points that a thread activates at a time
 
-void point_init(const sdm_point_arch *a, uint64_t seed, float *w)
+void trainer_point_init(const sdm_point_arch *a, uint64_t seed, float *w)
 {
     size_t at = 0;
     for (size_t l = 0; l <= a->depth; l++) {
@@ -26,16 +26,18 @@ void point_init(const sdm_point_arch *a, uint64_t seed, float *w)
     }
 }
 
-// workspace: of each layer h[B][W_l] and its slope[B][W_l]; slope[B] of the last;
-// delta[2][B][largest W_l]
-typedef struct places {
+/* The arrays in the workspace: for each hidden layer its output h[B][W_l] and the derivative of its
+   activation slope[B][W_l]; last[B], the derivative of the output function; delta[2][B][largest
+   W_l], gradients of two layers in turn. */
+typedef struct point_arrays {
     float *h[SDM_POINT_MAX_DEPTH], *slope[SDM_POINT_MAX_DEPTH], *last, *delta[2];
     size_t total;
-} places;
+} point_arrays;
 
-static places places_of(const sdm_point_arch *a, size_t batch, float *workspace)
+/* Sets the pointers for workspace != NULL; total is the number of floats in any case. */
+static point_arrays point_arrays_of(const sdm_point_arch *a, size_t batch, float *workspace)
 {
-    places p = {.total = batch};
+    point_arrays p = {.total = batch};
     size_t widest = 0;
     p.last = workspace;
     for (size_t l = 0; l < a->depth; l++) {
@@ -51,21 +53,23 @@ static places places_of(const sdm_point_arch *a, size_t batch, float *workspace)
     return p;
 }
 
-size_t point_workspace(const sdm_point_arch *a, size_t batch)
+size_t trainer_point_workspace(const sdm_point_arch *a, size_t batch)
 {
-    return places_of(a, batch, NULL).total;
+    return point_arrays_of(a, batch, NULL).total;
 }
 
-void point_forward(const sdm_point_arch *a, const float *w, size_t batch, const float *u,
-                   float *workspace, float *value, int n_threads)
+void trainer_point_forward(const sdm_point_arch *a, const float *w, size_t batch, const float *u,
+                           float *workspace, float *value, int n_threads)
 {
-    const places p = places_of(a, batch, workspace);
+    const point_arrays p = point_arrays_of(a, batch, workspace);
     const size_t n_u = a->n_params + 3;
+    // hidden layers
     for (size_t l = 0; l < a->depth; l++) {
         const size_t width = a->width[l], k = sdm_point_inputs(a, l),
                      before = sdm_point_hidden(a, l);
         const float *bias = w + width * k;
         float *h = p.h[l];
+        // h = bias + matrix [output of the layer before, u]
         for (size_t i = 0; i < batch; i++) memcpy(h + i * width, bias, width * sizeof *h);
         if (before)
             sdm_gemm(batch, width, before, (sdm_view){p.h[l - 1], before, 1}, (sdm_view){w, 1, k},
@@ -80,6 +84,7 @@ void point_forward(const sdm_point_arch *a, const float *w, size_t batch, const 
             sdm_activate(a->activation, n, h + i * width, h + i * width, p.slope[l] + i * width);
         }
     }
+    // output layer
     const size_t last = a->width[a->depth - 1];
     const float *h = p.h[a->depth - 1];
 #pragma omp parallel for schedule(static) num_threads(n_threads)
@@ -93,7 +98,8 @@ void point_forward(const sdm_point_arch *a, const float *w, size_t batch, const 
     (void)n_threads;
 }
 
-// gradient of one layer: dw[width][k] += d^T [before, u], db[width] += the sum of d
+/* Adds the gradient of one layer: dw[width][k] += d^T [h, u], db[width] += sum of d over the batch.
+   before, n_u: columns of h and u, 0 if the layer does not have them. */
 static void layer_gradient(size_t batch, size_t width, const float *d, size_t before,
                            const float *h, size_t n_u, const float *u, float *dw, int n_threads)
 {
@@ -108,13 +114,14 @@ static void layer_gradient(size_t batch, size_t width, const float *d, size_t be
         for (size_t o = 0; o < width; o++) db[o] += d[i * width + o];
 }
 
-void point_backward(const sdm_point_arch *a, const float *w, size_t batch, const float *u,
-                    float *workspace, const float *slope, float *gradient, int n_threads)
+void trainer_point_backward(const sdm_point_arch *a, const float *w, size_t batch, const float *u,
+                            float *workspace, const float *slope, float *gradient, int n_threads)
 {
-    places p = places_of(a, batch, workspace);
+    point_arrays p = point_arrays_of(a, batch, workspace);
     const size_t last = a->width[a->depth - 1];
-    size_t at = sdm_point_count(a) - last - 1; // first weight of the layer behind
+    size_t at = sdm_point_count(a) - last - 1; // first weight of the output layer
     float *d = p.delta[0], *other = p.delta[1];
+    // output layer
     for (size_t i = 0; i < batch; i++) {
         const float s = slope[i] * p.last[i];
         const float *h = p.h[a->depth - 1] + i * last;
@@ -124,6 +131,7 @@ void point_backward(const sdm_point_arch *a, const float *w, size_t batch, const
         }
         gradient[at + last] += s;
     }
+    // hidden layers from the last to the first
     for (size_t l = a->depth; l-- > 0;) {
         const size_t width = a->width[l], k = sdm_point_inputs(a, l),
                      before = sdm_point_hidden(a, l);

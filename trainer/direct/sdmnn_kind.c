@@ -1,11 +1,12 @@
-/* The sdmnn network in the trainer: whole maps, one after another. */
+/* The sdmnn network in the trainer: it learns from whole maps, one after another. */
 #include "data/streams.h"
-#include "kind.h"
-#include "loss.h"
+#include "direct_network.h"
+#include "numerics/loss.h"
 #include "sdm/internal/sdmnn.h"
 #include "sdm/memory.h"
+#include "state/progress.h"
 
-enum { EVALUATED = 16 }; // held-out maps that are looked at while training goes on
+enum { EVALUATED = 16 }; // held-out maps in an evaluation during training
 
 typedef struct sdmnn_trainer {
     sdm_sdmnn_arch arch;
@@ -13,13 +14,14 @@ typedef struct sdmnn_trainer {
     float *x;      // [batch][P] scaled parameters
     float *target; // [V] exact map
     float *value;  // [V] map of the network
-    // of the batch at work
+    // state of the batch for sdmnn_map_loss()
     const trainer *t;
     const direct_batch *batch;
-    double square;
+    double square; // sum of squared errors, mm^2
 } sdmnn_trainer;
 
-static const sdm_conv_backend *backend(void)
+/* Convolutions of oneDNN where the build has it. */
+static const sdm_conv_backend *conv_backend(void)
 {
 #ifdef SDM_HAVE_DNNL
     return sdm_conv_dnnl();
@@ -28,7 +30,7 @@ static const sdm_conv_backend *backend(void)
 #endif
 }
 
-static sdm_status create(const trainer *t, void **network, size_t *n_weights, sdm_error *err)
+static sdm_status sdmnn_create(const trainer *t, void **network, size_t *n_weights, sdm_error *err)
 {
     const sdm_config *c = t->config;
     sdmnn_trainer *p = NULL;
@@ -46,7 +48,7 @@ static sdm_status create(const trainer *t, void **network, size_t *n_weights, sd
     if (sdm_sdmnn_check(&p->arch, err))
         return sdm_fail_in(err, SDM_E_CONFIG, "%s: network", c->file);
     const size_t batch = (size_t)c->train.batch;
-    s = sdm_sdmnn_create(&p->arch, batch, backend(), &p->net, err);
+    s = sdm_sdmnn_create(&p->arch, batch, conv_backend(), &p->net, err);
     if (!s) s = SDM_ALLOC(&p->x, batch * p->arch.n_params, "batch", err);
     if (!s) s = SDM_ALLOC(&p->target, t->data.n_voxels, "batch", err);
     if (!s) s = SDM_ALLOC(&p->value, t->data.n_voxels, "batch", err);
@@ -54,7 +56,7 @@ static sdm_status create(const trainer *t, void **network, size_t *n_weights, sd
     return s;
 }
 
-static void dispose(void *network)
+static void sdmnn_dispose(void *network)
 {
     sdmnn_trainer *p = network;
     if (!p) return;
@@ -65,7 +67,7 @@ static void dispose(void *network)
     sdm_free(p);
 }
 
-static void init(const trainer *t, const void *network, float *w)
+static void sdmnn_init(const trainer *t, const void *network, float *w)
 {
     sdm_sdmnn_init(&((const sdmnn_trainer *)network)->arch, t->config->seed, STREAM_INIT, w);
 }
@@ -76,7 +78,9 @@ static void scale_params(const dataset *d, const double *params, float *x)
         x[k] = (float)(2 * (params[k] - d->min[k]) / (d->max[k] - d->min[k]) - 1);
 }
 
-static double map_loss(void *user, size_t index, const float *values, float *dvalues)
+/* Callback of sdm_sdmnn_gradient(): dvalues = derivative of the batch's loss by the values of map
+   `index`. */
+static double sdmnn_map_loss(void *user, size_t index, const float *values, float *dvalues)
 {
     sdmnn_trainer *p = user;
     const dataset *d = &p->t->data;
@@ -84,13 +88,13 @@ static double map_loss(void *user, size_t index, const float *values, float *dva
     const float share = 1.0f / (float)p->batch->n;
     for (size_t v = 0; v < d->n_voxels; v++)
         p->target[v] = d->scale[slot] * (float)d->maps[slot * d->n_voxels + v];
-    p->square += loss_map(p->t->config, values, p->target, dvalues);
+    p->square += trainer_loss_map(p->t->config, values, p->target, dvalues);
     for (size_t v = 0; v < d->n_voxels; v++) dvalues[v] *= share;
     return 0;
 }
 
-static sdm_status gradient(const trainer *t, void *network, const float *w, const direct_batch *b,
-                           float *out, double *mse, sdm_error *err)
+static sdm_status sdmnn_gradient(const trainer *t, void *network, const float *w,
+                                 const direct_batch *b, float *out, double *mse, sdm_error *err)
 {
     sdmnn_trainer *p = network;
     const dataset *d = &t->data;
@@ -99,14 +103,14 @@ static sdm_status gradient(const trainer *t, void *network, const float *w, cons
     for (size_t i = 0; i < b->n; i++)
         scale_params(d, d->params + b->slots[i] * d->n_params, p->x + i * d->n_params);
     sdm_sdmnn_set(p->net, w);
-    sdm_sdmnn_gradient(p->net, b->n, p->x, map_loss, p, t->config->seed, STREAM_DROPOUT,
+    sdm_sdmnn_gradient(p->net, b->n, p->x, sdmnn_map_loss, p, t->config->seed, STREAM_DROPOUT,
                        b->step * b->n, out, trainer_threads(t));
     *mse = p->square / ((double)b->n * (double)d->n_voxels);
     return SDM_OK;
 }
 
-static sdm_status evaluate(const trainer *t, void *network, const float *w, double *mse,
-                           sdm_error *err)
+static sdm_status sdmnn_evaluate(const trainer *t, void *network, const float *w, double *mse,
+                                 sdm_error *err)
 {
     sdmnn_trainer *p = network;
     const dataset *d = &t->data;
@@ -127,8 +131,9 @@ static sdm_status evaluate(const trainer *t, void *network, const float *w, doub
     return SDM_OK;
 }
 
-static sdm_status build(const trainer *t, const void *network, const float *w,
-                        const sdm_model_info *info, uint8_t **bytes, size_t *size, sdm_error *err)
+static sdm_status sdmnn_build(const trainer *t, const void *network, const float *w,
+                              const sdm_model_info *info, uint8_t **bytes, size_t *size,
+                              sdm_error *err)
 {
     const sdm_sdmnn_spec spec = {.info = info,
                                  .arch = ((const sdmnn_trainer *)network)->arch,
@@ -137,9 +142,9 @@ static sdm_status build(const trainer *t, const void *network, const float *w,
     return sdm_sdmnn_build(&spec, bytes, size, err);
 }
 
-const direct_network sdmnn_direct = {.create = create,
-                                     .dispose = dispose,
-                                     .init = init,
-                                     .gradient = gradient,
-                                     .evaluate = evaluate,
-                                     .build = build};
+const direct_network trainer_network_sdmnn = {.create = sdmnn_create,
+                                              .dispose = sdmnn_dispose,
+                                              .init = sdmnn_init,
+                                              .gradient = sdmnn_gradient,
+                                              .evaluate = sdmnn_evaluate,
+                                              .build = sdmnn_build};

@@ -1,16 +1,17 @@
-/* From maps up the levels of blocks to the coefficients of the highest. */
+/* Projects maps on the local bases, level by level. */
 #include "coefficients.h"
 
 #include "pod_tree.h"
 #include "sdm/internal/kernels.h"
 #include "sdm/memory.h"
+#include "state/progress.h"
 
-void coefficients_rows(const trainer *t, const sdm_pod_block *b, bool holdout, const size_t *slots,
-                       size_t n, float *rows)
+void trainer_coefficients_block_rows(const pod_state *pod, const sdm_pod_block *b, bool holdout,
+                                     const size_t *slots, size_t n, float *rows)
 {
-    const dataset *d = &t->data;
+    const dataset *d = &pod->t->data;
     const size_t voxels = sdm_pod_block_voxels(b);
-    const float *mean = t->mean + b->voxel;
+    const float *mean = pod->mean + b->voxel;
     for (size_t i = 0; i < n; i++) {
         if (holdout) {
             const float *from = d->holdout + slots[i] * d->n_voxels + b->voxel;
@@ -24,59 +25,64 @@ void coefficients_rows(const trainer *t, const sdm_pod_block *b, bool holdout, c
     }
 }
 
-void coefficients_project(size_t n, size_t rank, size_t outputs, const float *basis,
-                          const float *from, size_t ldf, float *to, size_t ldt)
+void trainer_coefficients_project_block(size_t n, size_t rank, size_t outputs, const float *basis,
+                                        const float *from, size_t ldf, float *to, size_t ldt)
 {
     sdm_gemm(n, rank, outputs, (sdm_view){from, ldf, 1}, (sdm_view){basis, 1, outputs}, false, to,
              ldt, 1);
 }
 
-// coefficients of `root` and of everything below it: rows `slots[n]` into y[n][K]
-static void climb(const trainer *t, const pod_tree *tree, bool holdout, const size_t *slots,
-                  size_t n, float *rows, float *below, float *here, float *y)
+/* y[n][K]: fills the coefficients of the tree's root for the maps in slots[n]. rows, below and here
+   are scratch memory; below and here hold the coefficients of two levels in turn. */
+static void tree_project(const pod_state *pod, const pod_tree *tree, bool holdout,
+                         const size_t *slots, size_t n, float *rows, float *below, float *here,
+                         float *y)
 {
-    const size_t k = t->arch.n_coefficients, top = t->arch.levels.n - 1;
+    const size_t k = pod->arch.n_coefficients, top = pod->arch.levels.n - 1;
     size_t ldb = 0;
     for (size_t level = 0; level <= top; level++) {
-        const uint32_t first = t->blocks[tree->first[level]].coefficient;
-        const size_t ldh = level == top ? k : pod_tree_coefficients(t->blocks, tree, level);
+        const uint32_t first = pod->blocks[tree->first[level]].coefficient;
+        const size_t ldh =
+            level == top ? k : trainer_pod_tree_coefficients(pod->blocks, tree, level);
         float *const to = level == top ? y + first : here;
         for (size_t b = tree->first[level]; b < tree->end[level]; b++) {
-            const sdm_pod_block *block = &t->blocks[b];
-            const size_t outputs = sdm_pod_outputs(t->blocks, b);
+            const sdm_pod_block *block = &pod->blocks[b];
+            const size_t outputs = sdm_pod_outputs(pod->blocks, b);
             const float *from = rows;
             if (level == 0)
-                coefficients_rows(t, block, holdout, slots, n, rows);
+                trainer_coefficients_block_rows(pod, block, holdout, slots, n, rows);
             else
-                from = below + (t->blocks[block->child].coefficient -
-                                t->blocks[tree->first[level - 1]].coefficient);
-            coefficients_project(n, block->rank, outputs, t->basis + t->matrix_at[b], from,
-                                 level ? ldb : outputs, to + (block->coefficient - first), ldh);
+                from = below + (pod->blocks[block->child].coefficient -
+                                pod->blocks[tree->first[level - 1]].coefficient);
+            trainer_coefficients_project_block(
+                n, block->rank, outputs, pod->basis + pod->matrix_at[b], from,
+                level ? ldb : outputs, to + (block->coefficient - first), ldh);
         }
         float *const swap = below;
         below = here, here = swap, ldb = ldh;
     }
 }
 
-sdm_status coefficients_of(const trainer *t, bool holdout, const size_t *slots, size_t n, float *y,
-                           sdm_error *err)
+sdm_status trainer_coefficients_project(const pod_state *pod, bool holdout, const size_t *slots,
+                                        size_t n, float *y, sdm_error *err)
 {
     enum { CHUNK = 256 };
-    const sdm_pod_levels *levels = &t->arch.levels;
+    const sdm_pod_levels *levels = &pod->arch.levels;
     const long begin = (long)levels->first[levels->n - 1], end = (long)levels->first[levels->n];
-    const size_t most = n < CHUNK ? n : CHUNK;
+    const size_t chunk = n < CHUNK ? n : CHUNK;
+    // one tree per iteration; maps in chunks, to limit the scratch memory
     bool short_of_memory = false;
-#pragma omp parallel for schedule(dynamic) num_threads(trainer_threads(t))
+#pragma omp parallel for schedule(dynamic) num_threads(trainer_threads(pod->t))
     for (long root = begin; root < end; root++) {
-        const pod_tree tree = pod_tree_of(levels, t->blocks, (size_t)root);
-        const size_t widest = pod_tree_coefficients(t->blocks, &tree, 0);
+        const pod_tree tree = trainer_pod_tree(levels, pod->blocks, (size_t)root);
+        const size_t widest = trainer_pod_tree_coefficients(pod->blocks, &tree, 0);
         float *rows = NULL, *below = NULL, *here = NULL;
-        sdm_status s = SDM_ALLOC(&rows, most * tree.largest, "local coefficients", NULL);
-        if (!s) s = SDM_ALLOC(&below, most * widest, "local coefficients", NULL);
-        if (!s) s = SDM_ALLOC(&here, most * widest, "local coefficients", NULL);
+        sdm_status s = SDM_ALLOC(&rows, chunk * tree.largest, "local coefficients", NULL);
+        if (!s) s = SDM_ALLOC(&below, chunk * widest, "local coefficients", NULL);
+        if (!s) s = SDM_ALLOC(&here, chunk * widest, "local coefficients", NULL);
         for (size_t at = 0; at < n && !s; at += CHUNK)
-            climb(t, &tree, holdout, slots + at, n - at < CHUNK ? n - at : CHUNK, rows, below, here,
-                  y + at * t->arch.n_coefficients);
+            tree_project(pod, &tree, holdout, slots + at, n - at < CHUNK ? n - at : CHUNK, rows,
+                         below, here, y + at * pod->arch.n_coefficients);
         sdm_free(here);
         sdm_free(below);
         sdm_free(rows);

@@ -1,4 +1,4 @@
-/* Forward and backward pass of the MLP. */
+/* Forward and backward pass of the perceptron of the `pod` network. */
 #include "mlp.h"
 
 #include <math.h>
@@ -8,61 +8,64 @@
 #include "sdm/internal/kernels.h"
 #include "sdm/internal/rng.h"
 
-static size_t inputs(const sdm_pod_arch *a, size_t l) { return l ? a->width : a->n_inputs; }
+/* Inputs of layer l. */
+static size_t layer_inputs(const sdm_pod_arch *a, size_t l) { return l ? a->width : a->n_inputs; }
 
-static size_t offset(const sdm_pod_arch *a, size_t l)
+/* First weight of layer l. */
+static size_t layer_offset(const sdm_pod_arch *a, size_t l)
 {
     size_t n = 0;
-    for (size_t i = 0; i < l; i++) n += (inputs(a, i) + 1) * a->width;
+    for (size_t i = 0; i < l; i++) n += (layer_inputs(a, i) + 1) * a->width;
     return n;
 }
 
-size_t mlp_count(const sdm_pod_arch *a) { return offset(a, a->depth); }
-const float *mlp_layer(const sdm_pod_arch *a, const float *weights, size_t l)
+size_t trainer_mlp_count(const sdm_pod_arch *a) { return layer_offset(a, a->depth); }
+const float *trainer_mlp_layer(const sdm_pod_arch *a, const float *weights, size_t l)
 {
-    return weights + offset(a, l);
+    return weights + layer_offset(a, l);
 }
-const float *mlp_bias(const sdm_pod_arch *a, const float *weights, size_t l)
+const float *trainer_mlp_bias(const sdm_pod_arch *a, const float *weights, size_t l)
 {
-    return weights + offset(a, l) + inputs(a, l) * a->width;
+    return weights + layer_offset(a, l) + layer_inputs(a, l) * a->width;
 }
 
-void mlp_init(const sdm_pod_arch *a, uint64_t seed, float *weights)
+void trainer_mlp_init(const sdm_pod_arch *a, uint64_t seed, float *weights)
 {
     for (size_t l = 0; l < a->depth; l++) {
-        const size_t at = offset(a, l), n = inputs(a, l) * a->width;
-        const double sd = sqrt(2.0 / (double)inputs(a, l));
+        const size_t at = layer_offset(a, l), n = layer_inputs(a, l) * a->width;
+        const double sd = sqrt(2.0 / (double)layer_inputs(a, l));
         for (size_t i = 0; i < n; i++)
             weights[at + i] = (float)(sd * sdm_rng_normal(seed, STREAM_INIT, at + i));
         memset(weights + at + n, 0, a->width * sizeof *weights);
     }
 }
 
-size_t mlp_workspace(const sdm_pod_arch *a, size_t batch)
+size_t trainer_mlp_workspace(const sdm_pod_arch *a, size_t batch)
 {
     return (2 * a->depth + 2) * batch * a->width;
 }
 
-// workspace: h[depth][B][W], slope[depth][B][W], delta[2][B][W]
-const float *mlp_forward(const sdm_pod_arch *a, const float *weights, size_t batch, const float *x,
-                         float *workspace, int n_threads)
+/* The workspace holds h[depth][B][W], slope[depth][B][W] (derivatives of the activations) and
+   delta[2][B][W] (gradients of two layers in turn). */
+const float *trainer_mlp_forward(const sdm_pod_arch *a, const float *weights, size_t batch,
+                                 const float *x, float *workspace, int n_threads)
 {
     const size_t w = a->width, layer = batch * w;
     for (size_t l = 0; l < a->depth; l++) {
         float *h = workspace + l * layer, *slope = workspace + (a->depth + l) * layer;
-        const size_t k = inputs(a, l);
-        const float *bias = mlp_bias(a, weights, l);
+        const size_t k = layer_inputs(a, l);
+        const float *bias = trainer_mlp_bias(a, weights, l);
         for (size_t i = 0; i < batch; i++) memcpy(h + i * w, bias, w * sizeof *h);
-        sdm_gemm(batch, w, k, (sdm_view){x, k, 1}, (sdm_view){mlp_layer(a, weights, l), 1, k}, true,
-                 h, w, n_threads);
+        sdm_gemm(batch, w, k, (sdm_view){x, k, 1},
+                 (sdm_view){trainer_mlp_layer(a, weights, l), 1, k}, true, h, w, n_threads);
         sdm_activate(a->activation, layer, h, h, slope);
         x = h;
     }
     return x;
 }
 
-void mlp_backward(const sdm_pod_arch *a, const float *weights, size_t batch, const float *x,
-                  float *workspace, const float *dh, float *gradient, int n_threads)
+void trainer_mlp_backward(const sdm_pod_arch *a, const float *weights, size_t batch, const float *x,
+                          float *workspace, const float *dh, float *gradient, int n_threads)
 {
     const size_t w = a->width, layer = batch * w;
     float *delta[2] = {workspace + 2 * a->depth * layer, workspace + (2 * a->depth + 1) * layer};
@@ -71,16 +74,18 @@ void mlp_backward(const sdm_pod_arch *a, const float *weights, size_t batch, con
         float *d = delta[0];
         const float *slope = workspace + (a->depth + l) * layer,
                     *in = l ? workspace + (l - 1) * layer : x;
-        const size_t k = inputs(a, l), at = offset(a, l);
+        const size_t k = layer_inputs(a, l), at = layer_offset(a, l);
+        // gradient of matrix and bias
         for (size_t i = 0; i < layer; i++) d[i] *= slope[i];
         float *dw = gradient + at, *db = dw + k * w;
         sdm_gemm(w, k, batch, (sdm_view){d, 1, w}, (sdm_view){in, k, 1}, false, dw, k, n_threads);
         memset(db, 0, w * sizeof *db);
         for (size_t i = 0; i < batch; i++)
             for (size_t o = 0; o < w; o++) db[o] += d[i * w + o];
+        // gradient of the layer below
         if (l == 0) break;
-        sdm_gemm(batch, w, w, (sdm_view){d, w, 1}, (sdm_view){mlp_layer(a, weights, l), w, 1},
-                 false, delta[1], w, n_threads);
+        sdm_gemm(batch, w, w, (sdm_view){d, w, 1},
+                 (sdm_view){trainer_mlp_layer(a, weights, l), w, 1}, false, delta[1], w, n_threads);
         float *swap = delta[0];
         delta[0] = delta[1], delta[1] = swap;
     }

@@ -1,26 +1,28 @@
-/* Fitting of the MLP to the coefficients of the global modes: cheap steps, since no map is touched.
-   For orthonormal bases the error of the coefficients is the error of the map. Letters as in
-   sdm/pod.h; R modes, B batch. */
+/* Fits the MLP to the mode coefficients. B batch, other letters as in pod_state.h. */
+#include "mode_fit.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "data/streams.h"
 #include "mlp.h"
 #include "sdm/internal/kernels.h"
-#include "sdm/internal/rng.h"
 #include "sdm/memory.h"
-#include "trainer.h"
+#include "state/checkpoint.h"
+#include "state/new_samples.h"
+#include "state/progress.h"
 
-typedef struct fit_batch {
+/* Memory of a batch. */
+typedef struct mode_batch {
     float *x;         // [B][I]
     float *target;    // [B][R]
-    float *predicted; // [B][R], then its gradient
+    float *predicted; // [B][R], later the gradient with respect to it
     float *dh;        // [B][W]
     float *workspace;
     float *gradient; // [n]
-} fit_batch;
+} mode_batch;
 
-static void fit_dispose(fit_batch *b)
+static void mode_batch_dispose(mode_batch *b)
 {
     sdm_free(b->x);
     sdm_free(b->target);
@@ -30,134 +32,149 @@ static void fit_dispose(fit_batch *b)
     sdm_free(b->gradient);
 }
 
-static sdm_status fit_create(const trainer *t, size_t rows, fit_batch *b, sdm_error *err)
+static sdm_status mode_batch_create(const pod_state *pod, size_t rows, mode_batch *b,
+                                    sdm_error *err)
 {
-    const sdm_pod_arch *a = &t->arch;
+    const sdm_pod_arch *a = &pod->arch;
     sdm_status s = SDM_ALLOC(&b->x, rows * a->n_inputs, "batch", err);
-    if (!s) s = SDM_ALLOC(&b->target, rows * t->n_modes, "batch", err);
-    if (!s) s = SDM_ALLOC(&b->predicted, rows * t->n_modes, "batch", err);
+    if (!s) s = SDM_ALLOC(&b->target, rows * pod->n_modes, "batch", err);
+    if (!s) s = SDM_ALLOC(&b->predicted, rows * pod->n_modes, "batch", err);
     if (!s) s = SDM_ALLOC(&b->dh, rows * a->width, "batch", err);
-    if (!s) s = SDM_ALLOC(&b->workspace, mlp_workspace(a, rows), "batch", err);
-    if (!s) s = SDM_ALLOC(&b->gradient, t->fit.n, "gradient", err);
+    if (!s) s = SDM_ALLOC(&b->workspace, trainer_mlp_workspace(a, rows), "batch", err);
+    if (!s) s = SDM_ALLOC(&b->gradient, pod->mode_fit.n, "gradient", err);
     return s;
 }
 
-// predicted[B][R] from x with weights w
-static const float *predict(const trainer *t, const float *w, size_t rows, fit_batch *b)
+/* predicted[B][R] = MLP and readout at x with weights w. Returns h[B][W], the output of the MLP. */
+static const float *modes_predict(const pod_state *pod, const float *w, size_t rows, mode_batch *b)
 {
-    const sdm_pod_arch *a = &t->arch;
-    const float *h = mlp_forward(a, w, rows, b->x, b->workspace, trainer_threads(t));
-    sdm_gemm(rows, t->n_modes, a->width, (sdm_view){h, a->width, 1},
-             (sdm_view){w + mlp_count(a), 1, a->width}, false, b->predicted, t->n_modes,
-             trainer_threads(t));
+    const sdm_pod_arch *a = &pod->arch;
+    const float *h = trainer_mlp_forward(a, w, rows, b->x, b->workspace, trainer_threads(pod->t));
+    sdm_gemm(rows, pod->n_modes, a->width, (sdm_view){h, a->width, 1},
+             (sdm_view){w + trainer_mlp_count(a), 1, a->width}, false, b->predicted, pod->n_modes,
+             trainer_threads(pod->t));
     return h;
 }
 
-// mean square error of the maps, mm^2, by the error of the modes and what lies outside them
-static double evaluate(const trainer *t, const float *w, fit_batch *b, size_t batch)
+/* Mean square error (mm^2) on the held-out maps: the error of the mode coefficients plus what the
+   modes cannot represent. */
+static double modes_evaluate(const pod_state *pod, const float *w, mode_batch *b, size_t batch)
 {
-    const size_t n = t->data.n_holdout, r = t->n_modes, inputs = t->arch.n_inputs;
+    const size_t n = pod->t->data.n_holdout, r = pod->n_modes, inputs = pod->arch.n_inputs;
     double sum = 0;
     for (size_t at = 0; at < n; at += batch) {
         const size_t rows = n - at < batch ? n - at : batch;
         for (size_t i = 0; i < rows; i++)
-            memcpy(b->x + i * inputs, t->holdout_phi + (at + i) * t->n_poly + 1,
+            memcpy(b->x + i * inputs, pod->holdout_phi + (at + i) * pod->n_poly + 1,
                    inputs * sizeof *b->x);
-        predict(t, w, rows, b);
+        modes_predict(pod, w, rows, b);
         for (size_t i = 0; i < rows * r; i++) {
-            const double e = (double)b->predicted[i] - t->holdout_target[at * r + i];
+            const double e = (double)b->predicted[i] - pod->holdout_target[at * r + i];
             sum += e * e;
         }
     }
-    const double scale = t->target_scale;
-    return t->holdout_floor + sum * scale * scale / ((double)n * (double)t->data.n_voxels);
+    const double scale = pod->target_scale;
+    return pod->holdout_floor + sum * scale * scale / ((double)n * (double)pod->t->data.n_voxels);
 }
 
-sdm_status fit_errors(const trainer *t, const size_t *slots, size_t n, double *error,
-                      sdm_error *err)
+sdm_status trainer_mode_fit_errors(const pod_state *pod, const size_t *slots, size_t n,
+                                   double *error, sdm_error *err)
 {
-    const size_t r = t->n_modes, inputs = t->arch.n_inputs;
-    fit_batch b = {0};
-    const sdm_status s = fit_create(t, n, &b, err);
+    const size_t r = pod->n_modes, inputs = pod->arch.n_inputs;
+    mode_batch b = {0};
+    const sdm_status s = mode_batch_create(pod, n, &b, err);
     for (size_t i = 0; i < n && !s; i++)
-        memcpy(b.x + i * inputs, t->phi + slots[i] * t->n_poly + 1, inputs * sizeof *b.x);
-    if (!s) predict(t, t->fit.average, n, &b);
+        memcpy(b.x + i * inputs, pod->phi + slots[i] * pod->n_poly + 1, inputs * sizeof *b.x);
+    if (!s) modes_predict(pod, pod->mode_fit.average, n, &b);
     for (size_t i = 0; i < n && !s; i++) {
         double sum = 0;
         for (size_t j = 0; j < r; j++) {
-            const double e = (double)b.predicted[i * r + j] - t->target[slots[i] * r + j];
+            const double e = (double)b.predicted[i * r + j] - pod->target[slots[i] * r + j];
             sum += e * e;
         }
-        error[i] = t->target_scale * sqrt(sum / (double)t->data.n_voxels);
+        error[i] = pod->target_scale * sqrt(sum / (double)pod->t->data.n_voxels);
     }
-    fit_dispose(&b);
+    mode_batch_dispose(&b);
     return s;
 }
 
-static void step(trainer *t, fit_batch *b, size_t batch, double rate)
+/* One Adam step on a random batch. */
+static void mode_fit_step(pod_state *pod, mode_batch *b, size_t batch, double rate)
 {
-    const sdm_pod_arch *a = &t->arch;
-    const size_t r = t->n_modes, readout = mlp_count(a);
-    const double share = t->config->data.static_share;
+    const sdm_pod_arch *a = &pod->arch;
+    const size_t r = pod->n_modes, readout = trainer_mlp_count(a);
+    const double share = pod->t->config->data.static_share;
+    // random batch
     for (size_t i = 0; i < batch; i++) {
-        const size_t slot = dataset_draw(&t->data, STREAM_FIT, share, batch, (uint64_t)t->step, i);
-        memcpy(b->x + i * a->n_inputs, t->phi + slot * t->n_poly + 1, a->n_inputs * sizeof *b->x);
-        memcpy(b->target + i * r, t->target + slot * r, r * sizeof *b->target);
+        const size_t slot = trainer_dataset_draw(&pod->t->data, STREAM_BATCH, share, batch,
+                                                 (uint64_t)pod->t->step, i);
+        memcpy(b->x + i * a->n_inputs, pod->phi + slot * pod->n_poly + 1,
+               a->n_inputs * sizeof *b->x);
+        memcpy(b->target + i * r, pod->target + slot * r, r * sizeof *b->target);
     }
-    const float *h = predict(t, t->fit.w, batch, b);
+    // loss and its gradient with respect to the predictions
+    const float *h = modes_predict(pod, pod->mode_fit.w, batch, b);
     double sum = 0;
     for (size_t i = 0; i < batch * r; i++) {
         const float e = b->predicted[i] - b->target[i];
         sum += (double)e * e;
         b->predicted[i] = e * (2.0f / (float)batch);
     }
-    const double scale = t->target_scale;
-    t->loss = t->holdout_floor + sum * scale * scale / ((double)batch * (double)t->data.n_voxels);
+    const double scale = pod->target_scale;
+    pod->t->loss =
+        pod->holdout_floor + sum * scale * scale / ((double)batch * (double)pod->t->data.n_voxels);
 
-    const int threads = trainer_threads(t);
+    // gradient with respect to the weights
+    const int threads = trainer_threads(pod->t);
     sdm_gemm(r, a->width, batch, (sdm_view){b->predicted, 1, r}, (sdm_view){h, a->width, 1}, false,
              b->gradient + readout, a->width, threads);
     sdm_gemm(batch, a->width, r, (sdm_view){b->predicted, r, 1},
-             (sdm_view){t->fit.w + readout, a->width, 1}, false, b->dh, a->width, threads);
-    mlp_backward(a, t->fit.w, batch, b->x, b->workspace, b->dh, b->gradient, threads);
-    adam_update(&t->fit, 0, t->fit.n, b->gradient, adam_begin(rate, t->phase_step + 1), 1);
-    if (t->config->train.average > 0) {
-        // the average starts with the weights themselves and lengthens its memory
-        const double n = (double)t->phase_step + 1,
-                     decay = fmin(t->config->train.average, n / (n + 10));
-        average_update(&t->fit, decay, 1);
+             (sdm_view){pod->mode_fit.w + readout, a->width, 1}, false, b->dh, a->width, threads);
+    trainer_mlp_backward(a, pod->mode_fit.w, batch, b->x, b->workspace, b->dh, b->gradient,
+                         threads);
+    trainer_adam_update(&pod->mode_fit, 0, pod->mode_fit.n, b->gradient,
+                        trainer_adam_begin(rate, pod->t->phase_step + 1), 1);
+    if (pod->t->config->train.average > 0) {
+        // the average follows the weights closely at first and then more and more slowly
+        const double n = (double)pod->t->phase_step + 1,
+                     decay = fmin(pod->t->config->train.average, n / (n + 10));
+        trainer_average_update(&pod->mode_fit, decay, 1);
     } else
-        memcpy(t->fit.average, t->fit.w, t->fit.n * sizeof *t->fit.w);
+        memcpy(pod->mode_fit.average, pod->mode_fit.w, pod->mode_fit.n * sizeof *pod->mode_fit.w);
 }
 
-static double fraction_of_phase(const trainer *t)
+/* Used part of the phase's budget: a share 1 - train.refine of the steps, at least one step, or the
+   time until mode_fit_end. */
+static double mode_fit_fraction(const pod_state *pod)
 {
-    if (!trainer_by_time(t)) return (double)t->phase_step / (double)trainer_fit_steps(t);
-    const double length = t->fit_end - t->phase_started;
+    const trainer *t = pod->t;
+    if (!trainer_by_time(t)) {
+        const double steps = floor((1 - t->config->train.refine) * (double)trainer_steps(t) + 0.5);
+        return (double)t->phase_step / fmax(steps, 1);
+    }
+    const double length = pod->mode_fit_end - t->phase_started;
     return length > 0 ? (trainer_seconds(t) - t->phase_started) / length : 1;
 }
 
-sdm_status fit_run(trainer *t, sdm_error *err)
+sdm_status trainer_mode_fit_run(pod_state *pod, sdm_error *err)
 {
-    const sdm_pod_arch *a = &t->arch;
+    trainer *t = pod->t;
     const sdm_config *c = t->config;
-    if (!a->depth) return SDM_OK;
+    if (!pod->arch.depth) return SDM_OK;
     const size_t batch = (size_t)c->train.batch;
-    fit_batch b = {0};
-    sdm_status s = fit_create(t, batch, &b, err);
-    int64_t last_step = t->phase_step;
-    double last_time = trainer_seconds(t);
-    for (double at; !s && (at = fraction_of_phase(t)) < 1;) {
-        const size_t n_random = t->data.n_start + t->data.n_online;
-        const double want = (double)t->data.n_start + (double)t->data.n_online * fmin(1, at / 0.75);
-        if ((s = trainer_take_samples(t, want < (double)n_random ? (size_t)want : n_random, err)))
-            break;
+    mode_batch b = {0};
+    sdm_status s = mode_batch_create(pod, batch, &b, err);
+    trainer_speed speed = trainer_speed_start(t);
+    for (double at; !s && (at = mode_fit_fraction(pod)) < 1;) {
+        // new maps, or stop
+        if ((s = trainer_samples_take(t, trainer_samples_wanted(t, at), err))) break;
         if (trainer_cancelled(t)) {
             s = trainer_stop(t, err);
             break;
         }
-        const double rate = c->train.learning_rate * schedule(at, c->train.warmup);
-        step(t, &b, batch, rate);
+        // one step
+        const double rate = c->train.learning_rate * trainer_rate_schedule(at, c->train.warmup);
+        mode_fit_step(pod, &b, batch, rate);
         t->step++, t->phase_step++;
         if (!isfinite(t->loss)) {
             s = sdm_fail(err, SDM_E_CONFIG,
@@ -166,22 +183,17 @@ sdm_status fit_run(trainer *t, sdm_error *err)
                          c->file, (long long)t->step);
             break;
         }
+        // evaluate, report, save
         const double now = trainer_seconds(t);
-        if (trainer_by_time(t) ? now - t->last_evaluation >= c->train.evaluate_seconds
-                               : t->phase_step % 500 == 0) {
-            t->heldout_mse = evaluate(t, t->fit.average, &b, batch);
+        if (trainer_evaluation_due(t, now)) {
+            t->heldout_mse = modes_evaluate(pod, pod->mode_fit.average, &b, batch);
             t->last_evaluation = now;
             if ((s = trainer_metric(t, rate, err))) break;
         }
-        if (now - last_time > 0.5) {
-            trainer_report(t, trainer_fraction(t),
-                           (double)(t->phase_step - last_step) * (double)batch / (now - last_time),
-                           true);
-            last_step = t->phase_step, last_time = now;
-        }
-        if (now - t->last_checkpoint > c->train.checkpoint_seconds) s = checkpoint_write(t, err);
+        trainer_speed_report(t, &speed, batch, now);
+        s = trainer_checkpoint_if_due(t, now, err);
     }
-    if (!s) t->heldout_mse = evaluate(t, t->fit.average, &b, batch);
-    fit_dispose(&b);
+    if (!s) t->heldout_mse = modes_evaluate(pod, pod->mode_fit.average, &b, batch);
+    mode_batch_dispose(&b);
     return s;
 }

@@ -1,7 +1,7 @@
-/* Trees of blocks. */
+/* Extents of the trees of blocks. */
 #include "pod_tree.h"
 
-pod_tree pod_tree_of(const sdm_pod_levels *levels, const sdm_pod_block *blocks, size_t root)
+pod_tree trainer_pod_tree(const sdm_pod_levels *levels, const sdm_pod_block *blocks, size_t root)
 {
     size_t level = levels->n - 1;
     pod_tree tree = {0};
@@ -20,7 +20,8 @@ pod_tree pod_tree_of(const sdm_pod_levels *levels, const sdm_pod_block *blocks, 
     return tree;
 }
 
-size_t pod_tree_coefficients(const sdm_pod_block *blocks, const pod_tree *tree, size_t level)
+size_t trainer_pod_tree_coefficients(const sdm_pod_block *blocks, const pod_tree *tree,
+                                     size_t level)
 {
     const sdm_pod_block *last = &blocks[tree->end[level] - 1];
     return last->coefficient + last->rank - blocks[tree->first[level]].coefficient;

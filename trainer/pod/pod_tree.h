@@ -1,20 +1,23 @@
-/* A block of the highest level with everything below it: a tree that can be worked on alone. */
+/* A "tree": one block of the highest level with all blocks below it. Trees can be computed
+   independently of each other, so each is the work of one thread. */
 #ifndef SDM_POD_TREE_H
 #define SDM_POD_TREE_H
 
 #include "sdm/internal/pod.h"
 
 typedef struct pod_tree {
-    size_t first[SDM_POD_MAX_LEVELS],
-        end[SDM_POD_MAX_LEVELS]; /* blocks of each level: first .. end - 1 */
-    size_t largest;              /* voxels of the largest block of the lowest level */
-    size_t voxels;               /* of all; they are neighbours in block order */
+    /* Blocks of each level: first .. end - 1. */
+    size_t first[SDM_POD_MAX_LEVELS], end[SDM_POD_MAX_LEVELS];
+    size_t largest; /* voxels of the largest block of the lowest level */
+    size_t voxels;  /* of the whole tree; contiguous in block order */
 } pod_tree;
 
-pod_tree pod_tree_of(const sdm_pod_levels *levels, const sdm_pod_block *blocks, size_t root);
+/* The tree below block `root` of the highest level. */
+pod_tree trainer_pod_tree(const sdm_pod_levels *levels, const sdm_pod_block *blocks, size_t root);
 
-/* Number of coefficients of the tree's blocks of a level, which are neighbours; after
- * sdm_pod_number(). */
-size_t pod_tree_coefficients(const sdm_pod_block *blocks, const pod_tree *tree, size_t level);
+/* Number of coefficients of the tree's blocks of one level; they are contiguous. Call after
+   sdm_pod_number(). */
+size_t trainer_pod_tree_coefficients(const sdm_pod_block *blocks, const pod_tree *tree,
+                                     size_t level);
 
 #endif

@@ -1,11 +1,11 @@
-/* Sums of doubles without rounding (Shewchuk 1997): components that do not overlap, smallest first.
- */
+/* Exact sums of doubles as expansions (Shewchuk 1997): an expansion e[n] is an unevaluated sum of n
+ * doubles whose bits do not overlap, ordered from the smallest to the largest magnitude. */
 #ifndef SDM_GEOM_EXPANSION_H
 #define SDM_GEOM_EXPANSION_H
 
 #include <math.h>
 
-/* Adds b to e[n]; returns the new length, at most n + 1. */
+/* Adds b to the expansion e[n]; returns its new length, at most n + 1. */
 static inline int sdm_expansion_add(double *e, int n, double b)
 {
     double q = b;
@@ -21,7 +21,7 @@ static inline int sdm_expansion_add(double *e, int n, double b)
     return m;
 }
 
-/* Adds a * b to e[n]; returns the new length, at most n + 2. */
+/* Adds the exact product a * b to the expansion e[n]; returns its new length, at most n + 2. */
 static inline int sdm_expansion_add_product(double *e, int n, double a, double b)
 {
     const double high = a * b;
@@ -29,6 +29,7 @@ static inline int sdm_expansion_add_product(double *e, int n, double a, double b
     return sdm_expansion_add(e, n, high);
 }
 
+/* Sign of the sum, -1, 0 or 1: the sign of the largest component. */
 static inline int sdm_expansion_sign(const double *e, int n)
 {
     return n == 0 ? 0 : e[n - 1] > 0 ? 1 : -1;

@@ -1,5 +1,5 @@
-/* Where a line meets a triangle: floating point with a bound on its error, exact arithmetic where
- * that is not enough. */
+/* Line-triangle intersection: floating point with an error bound, and exact arithmetic when the
+ * result is within that bound. */
 #include "line_triangle.h"
 
 #include <float.h>
@@ -17,8 +17,9 @@ int sdm_line_meets(const double v[3][3], const double p[2], double area[3])
     return sa == sc ? sa : 0;
 }
 
-/* Sign of the sum over the corners of (area opposite to it) * (x - p[0]). */
-static int exact_sign(const double v[3][3], const double p[3])
+/* Exact sign of the sum over the three corners of area * (v[i][0] - p[0]), with area as in
+ * sdm_line_meets(). */
+static int after_exact(const double v[3][3], const double p[3])
 {
     double sum[160];
     int n = 0;
@@ -51,7 +52,7 @@ int sdm_line_meets_after(const double v[3][3], const double p[3], int orientatio
         if (y > dy) dy = y;
         if (z > dz) dz = z;
     }
-    // the areas are wrong by 16 epsilon dy dz at most and not larger than 4 dy dz
+    // abs(error of an area) <= 16 epsilon dy dz, and abs(area) <= 4 dy dz
     if (fabs(sum) > 32 * DBL_EPSILON * dy * dz * dx) return (sum > 0) == (orientation > 0) ? 1 : -1;
-    return exact_sign(v, p) * orientation;
+    return after_exact(v, p) * orientation;
 }

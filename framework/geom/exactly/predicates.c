@@ -1,4 +1,4 @@
-/* Exact predicates: which side of a line a point lies on. */
+/* Exact predicate: on which side of a line a point lies. */
 #include "predicates.h"
 
 #include <float.h>
@@ -6,7 +6,8 @@
 
 #include "expansion.h"
 
-static int exact_sign(const double u[2], const double v[2], const double p[2])
+/* Sign of (v - u) x (p - u), expanded into six products and summed exactly. */
+static int side_exact(const double u[2], const double v[2], const double p[2])
 {
     const double factor[6][2] = {{v[0], p[1]},  {-v[0], u[1]}, {-u[0], p[1]},
                                  {-v[1], p[0]}, {v[1], u[0]},  {u[1], p[0]}};
@@ -24,9 +25,10 @@ int sdm_side(const double u[2], const double v[2], const double p[2], double *ar
     if (area) *area = det;
     if (fabs(det) > 4 * DBL_EPSILON * (fabs(left) + fabs(right))) return det > 0 ? 1 : -1;
     if (u[0] == v[0] && u[1] == v[1]) return 0;
-    const int sign = exact_sign(u, v, p);
+    const int sign = side_exact(u, v, p);
     if (sign) return sign;
-    // on the line: moving p by (e, e^2) changes the determinant by -(vy - uy) e + (vx - ux) e^2
+    // p is on the line: the move by (e, e^2) changes the determinant by
+    // -(v[1] - u[1]) e + (v[0] - u[0]) e^2, and the first term that is not 0 decides
     if (v[1] != u[1]) return v[1] < u[1] ? 1 : -1;
     return v[0] < u[0] ? -1 : 1;
 }

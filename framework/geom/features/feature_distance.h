@@ -1,4 +1,5 @@
-/* Squared distance from a point to a feature in double: what a map's values are made of. */
+/* Squared distance in double from a point to a feature: every value of a distance map is the root
+   of one of these. */
 #ifndef SDM_GEOM_FEATURE_DISTANCE_H
 #define SDM_GEOM_FEATURE_DISTANCE_H
 
@@ -6,8 +7,9 @@
 
 #include "surface_features.h"
 
-/* INFINITY where p does not project into the face or the edge. The same operations as the kernels
- * do for the nearest feature. */
+/* Squared distance (mm^2) from p to feature `number`; INFINITY where p does not project into the
+   face or the edge. frames[slot]: of the surface. Same operations in the same order as distances4()
+   of the map kernels, hence the same bits. */
 static inline double sdm_feature_distance2(const sdm_features *f, const sdm_frame *frames,
                                            uint32_t number, const double p[3])
 {

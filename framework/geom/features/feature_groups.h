@@ -1,38 +1,47 @@
-/* The features of clusters: from the triangles, edges and corners that they are numbered by to
- * their data. */
+/* Computes the data of all features (frames, groups, exact features) once they are numbered and
+   assigned to clusters; see surface_features.h. */
 #ifndef SDM_GEOM_FEATURE_GROUPS_H
 #define SDM_GEOM_FEATURE_GROUPS_H
 
 #include "surface_features.h"
 
+/* Edges of a corner that bound its region; more are ignored, which only enlarges the region. */
 #define SDM_CORNER_EDGES 6u
 
-/* Unit vectors along the first n edges away from a corner, as they are found. */
+/* Unit vectors from a corner along the first n of its edges. */
 typedef struct sdm_corner_edges {
     float u[SDM_CORNER_EDGES][3];
     uint32_t n;
 } sdm_corner_edges;
 
-/* The mesh, its tree and what is numbered; the rest is to be filled. */
+/* Input, output and scratch arrays of sdm_features_build(). */
 typedef struct sdm_feature_builder {
     const sdm_mesh *m;
     const sdm_topology *topo;
     const sdm_bvh *tree;
-    sdm_frame *frames; /* [slot] */
+    /* output: [slot] */
+    sdm_frame *frames;
+    /* output; the numbers of features and the boxes of clusters are set before the groups */
     sdm_features *f;
-    uint32_t *edge;   /* [n_edges] number of an edge of the topology */
-    uint32_t *corner; /* [n_vert] number of a corner */
-    uint32_t *origin; /* [corner_base - edge_base] edge of the topology; n_edges + triangle for one
-                         with a repeated vertex */
-    uint32_t *vertex; /* [end - corner_base] vertex of a corner */
-    uint32_t (*segment)[4]; /* [corner_base - edge_base] scratch: vertices of an edge and opposite
-                               to it */
-    bool *narrow; /* [n_tri] scratch: the triangle has no reliable direction into it from an edge */
-    sdm_corner_edges *along; /* [end - corner_base] scratch, cleared */
+    /* feature number of each edge of the topology, [topo->n_edges]; SDM_NONE: not yet numbered */
+    uint32_t *edge;
+    /* feature number of the corner at each vertex, [n_vert]; SDM_NONE: not yet numbered */
+    uint32_t *corner;
+    /* edge of the topology of each feature from edge_base on, [corner_base - edge_base]; for a
+       triangle with a repeated vertex, which is a segment, n_edges + triangle */
+    uint32_t *edge_source;
+    /* vertex of each corner, [end - corner_base] */
+    uint32_t *vertex;
+    /* scratch, see segment_find(), [corner_base - edge_base] */
+    uint32_t (*segment)[4];
+    /* scratch: the direction from an edge into this triangle is unreliable, [n_tri] */
+    bool *narrow;
+    /* scratch, zeroed: edges of each corner, [end - corner_base] */
+    sdm_corner_edges *along;
 } sdm_feature_builder;
 
-/* Fills frames, groups and exact features of n clusters, those of all of the surface, whose
- * numbers, groups and boxes are known. */
+/* Fills frames, centroids, groups and exact features for all n clusters of a surface, whose feature
+   numbers, groups and boxes are set. Both variants give the same bits. */
 typedef void sdm_feature_groups(const sdm_feature_builder *b, sdm_cluster_node *const *cluster,
                                 size_t n);
 sdm_feature_groups sdm_feature_groups_generic;

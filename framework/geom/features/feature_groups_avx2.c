@@ -1,3 +1,3 @@
-/* The groups of features for AVX2; the same bits. */
+/* Groups of features, compiled for AVX2; same bits as the generic version. */
 #define KERNEL sdm_feature_groups_avx2
 #include "feature_groups.inc"

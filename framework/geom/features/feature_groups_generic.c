@@ -1,3 +1,3 @@
-/* The groups of features for any processor. */
+/* Groups of features, compiled for any processor. */
 #define KERNEL sdm_feature_groups_generic
 #include "feature_groups.inc"

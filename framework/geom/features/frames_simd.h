@@ -1,4 +1,5 @@
-/* Four frames of triangles at once; the same bits as sdm_frame_build(). */
+/* Frames of four triangles at once, one per SIMD lane; the same operations in the same order as
+   sdm_frame_build() in mesh/point_triangle.c, hence the same bits. */
 #ifndef SDM_GEOM_FRAME4_KERNEL_H
 #define SDM_GEOM_FRAME4_KERNEL_H
 
@@ -6,15 +7,17 @@
 #include "sdm/internal/vec3.h"
 #include "simd/lanes_four.h"
 
-/* Four frames side by side, in the order of sdm_frame. */
+/* Four frames, one per lane. Its members have the order of sdm_frame: both are also accessed as
+   arrays of doubles. */
 typedef struct sdm_frame4 {
     d4 a[3], u[3], v[3], n[3], half[3];
     d4 e1x, e1y, kt1, kh1;
     d4 e2x, e2y, kt2, rotation, flat;
 } sdm_frame4;
 
-/* Unit directions of (dx, dy), or of -x when it has no length; returns the lengths. */
-SDM_INLINE d4 direction(d4 dx, d4 dy, d4 *ex, d4 *ey)
+/* Sets (ex, ey) to the unit vector along (dx, dy), or to (-1, 0) where that is 0; returns the
+   length. */
+SDM_INLINE d4 direction4(d4 dx, d4 dy, d4 *ex, d4 *ey)
 {
     const d4 len = d4_sqrt(dx * dx + dy * dy);
     *ex = d4_select(len > 0.0, dx / len, d4_all(-1));
@@ -22,13 +25,13 @@ SDM_INLINE d4 direction(d4 dx, d4 dy, d4 *ex, d4 *ey)
     return len;
 }
 
-SDM_INLINE void subtract(const d4 a[3], const d4 b[3], d4 r[3])
+SDM_INLINE void subtract4(const d4 a[3], const d4 b[3], d4 r[3])
 {
     for (int i = 0; i < 3; i++) r[i] = a[i] - b[i];
 }
 
-/* In the lanes of triangles of no area any v across u. */
-static void set_flat(d4_mask flat, sdm_frame4 *f)
+/* In the lanes of triangles without area: v = any unit vector perpendicular to u. */
+static void frame4_set_flat(d4_mask flat, sdm_frame4 *f)
 {
     for (int lane = 0; lane < 4; lane++) {
         if (!flat[lane]) continue;
@@ -38,13 +41,14 @@ static void set_flat(d4_mask flat, sdm_frame4 *f)
     }
 }
 
+/* corner[corner][coordinate] of four triangles; fills f. */
 SDM_INLINE void sdm_frames_build(const d4 corner[3][3], sdm_frame4 *f)
 {
-    // turn the triangle until its longest edge comes first
+    // rotate the corners so that the longest edge comes first: a is its start
     d4 ab[3], bc[3], ca[3], ac[3], w[3];
-    subtract(corner[0], corner[1], ab);
-    subtract(corner[1], corner[2], bc);
-    subtract(corner[2], corner[0], ca);
+    subtract4(corner[0], corner[1], ab);
+    subtract4(corner[1], corner[2], bc);
+    subtract4(corner[2], corner[0], ca);
     const d4 l0 = d4_dot(ab, ab), l1 = d4_dot(bc, bc), l2 = d4_dot(ca, ca);
     const d4_mask stays = (l0 >= l1) & (l0 >= l2), once = ~stays & (l1 >= l2);
     f->rotation = d4_select(stays, d4_all(0), d4_select(once, d4_all(1), d4_all(2)));
@@ -57,7 +61,7 @@ SDM_INLINE void sdm_frames_build(const d4 corner[3][3], sdm_frame4 *f)
     const d4 length = d4_sqrt(d4_dot(ab, ab));
     for (int i = 0; i < 3; i++) f->u[i] = d4_select(length > 0.0, ab[i] / length, d4_all(i == 0));
 
-    // v: the part of ac across u, taken twice so that it is orthogonal for needles as well
+    // v: ac orthogonalised against u, twice, so that it is orthogonal for needles as well
     d4 cx = d4_all(0);
     for (int i = 0; i < 3; i++) w[i] = ac[i];
     for (int pass = 0; pass < 2; pass++) {
@@ -66,22 +70,22 @@ SDM_INLINE void sdm_frames_build(const d4 corner[3][3], sdm_frame4 *f)
         for (int i = 0; i < 3; i++) w[i] += -along * f->u[i];
     }
     const d4 cy = d4_sqrt(d4_dot(w, w));
-    // what is left of a needle after two passes may be rounding: below that there is no plane to
-    // find
+    // a remainder of a needle's ac below 2^-52 of the longest edge is rounding error: no plane
     const d4_mask flat = ~(cy > 2.3e-16 * length);
     for (int i = 0; i < 3; i++) f->v[i] = w[i] / cy;
     const d4 along = d4_dot(f->v, f->u);
     for (int i = 0; i < 3; i++) f->v[i] += -along * f->u[i];
     const d4 across = d4_sqrt(d4_dot(f->v, f->v));
     for (int i = 0; i < 3; i++) f->v[i] /= across;
-    if (d4_any(flat)) set_flat(flat, f);
+    if (d4_any(flat)) frame4_set_flat(flat, f);
     for (int i = 0; i < 3; i++)
         f->n[i] = f->u[(i + 1) % 3] * f->v[(i + 2) % 3] - f->u[(i + 2) % 3] * f->v[(i + 1) % 3];
 
+    // the third corner is (x, y) in the frame; edges 1 and 2 run from (length, 0) over it to (0, 0)
     const d4 y = d4_select(flat, d4_all(0), d4_dot(ac, f->v));
     const d4 x = d4_select(flat, d4_dot(ac, f->u), cx);
-    const d4 len1 = direction(x - length, y, &f->e1x, &f->e1y);
-    const d4 len2 = direction(-x, -y, &f->e2x, &f->e2y);
+    const d4 len1 = direction4(x - length, y, &f->e1x, &f->e1y);
+    const d4 len2 = direction4(-x, -y, &f->e2x, &f->e2y);
     f->half[0] = 0.5 * length;
     f->half[1] = 0.5 * len1;
     f->half[2] = 0.5 * len2;

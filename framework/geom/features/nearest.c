@@ -1,4 +1,4 @@
-/* The nearest point of a surface for single points, and the data for many. */
+/* Nearest point of a surface: search of the tree for single points. */
 #include "nearest.h"
 
 #include <math.h>
@@ -6,12 +6,11 @@
 #include "feature_distance.h"
 
 sdm_status sdm_nearest_build(const sdm_mesh *m, const sdm_topology *topo, sdm_arena *arena,
-                             sdm_nearest *n, sdm_budget *budget, sdm_error *err)
+                             sdm_nearest *n, sdm_error *err)
 {
     const sdm_status s =
         SDM_TAKE_UNSET(arena, SDM_LOW, &n->frames, m->n_tri, "frames of triangles", err);
-    return s ? s
-             : sdm_features_build(m, topo, &n->tree, arena, n->frames, &n->features, budget, err);
+    return s ? s : sdm_features_build(m, topo, &n->tree, arena, n->frames, &n->features, err);
 }
 
 double sdm_nearest_find(const sdm_nearest *n, const double x[3], double bound, uint32_t *slot,
@@ -37,7 +36,7 @@ double sdm_nearest_find(const sdm_nearest *n, const double x[3], double bound, u
             best = i;
         }
         if (node->count) continue;
-        // the nearer child on top
+        // push the children closer than the bound, the nearer one last, so that it is visited first
         const uint32_t c = node->first;
         const double d0 = sdm_bvh_box_distance2(&nodes[c], x),
                      d1 = sdm_bvh_box_distance2(&nodes[c + 1], x);

@@ -1,5 +1,4 @@
-/* The nearest point of a surface: tree and frames of the triangles for single points, features for
- * many at once. */
+/* Nearest point of a surface: a tree of triangles for single points, features for distance maps. */
 #ifndef SDM_GEOM_NEAREST_H
 #define SDM_GEOM_NEAREST_H
 
@@ -8,22 +7,27 @@
 
 typedef struct sdm_nearest {
     sdm_bvh tree;
-    sdm_frame *frames;     /* [slot] */
-    sdm_features features; /* for many points at once */
+    /* frames of the triangles, [slot] */
+    sdm_frame *frames;
+    /* for distance maps, and for values with the same bits as theirs */
+    sdm_features features;
 } sdm_nearest;
 
-/* topo: of m, n->tree: its tree. The rest is taken from the low end of the arena; the budget (may
-   be NULL) is asked for the features, not for the frames. */
+/* Builds frames and features of mesh m, whose topology is topo and whose tree n->tree is set.
+   Memory comes from the low end of the arena, which charges the memory limit. */
 sdm_status sdm_nearest_build(const sdm_mesh *m, const sdm_topology *topo, sdm_arena *arena,
-                             sdm_nearest *n, sdm_budget *budget, sdm_error *err);
+                             sdm_nearest *n, sdm_error *err);
 
-/* Squared distance from x to the nearest triangle with a squared distance below `bound`; then
- *slot, q and *feature are set, else `bound` is returned and nothing is written. */
+/* Finds the triangle nearest to x (mm) among those with a squared distance < bound. Returns its
+   squared distance and sets its slot, the closest point q and where on the triangle q lies
+   (*feature: SDM_CORNER_0 ... SDM_FACE). Without such a triangle returns `bound` and writes
+   nothing. */
 double sdm_nearest_find(const sdm_nearest *n, const double x[3], double bound, uint32_t *slot,
                         double q[3], int *feature);
 
-/* Of the features of triangle *slot the nearest to x: its squared distance, the bits that maps are
- * made of; *slot becomes its owner's. */
+/* Squared distance from x to the nearest of the seven features (face, edges, corners) of the
+   triangle with slot *slot, with the same bits as in a distance map. Sets *slot to the owner of
+   this feature (sdm_features.owner). */
 double sdm_nearest_feature(const sdm_nearest *n, const double x[3], uint32_t *slot);
 
 #endif

@@ -1,4 +1,5 @@
-/* The features of a surface and their regions. */
+/* Features of a surface: scale, clusters, and numbers of the edges and corners; the groups are
+   filled by feature_groups.inc. */
 #include "surface_features.h"
 
 #include <math.h>
@@ -10,17 +11,19 @@
 
 static const double *vertex(const sdm_feature_builder *b, size_t v) { return &b->m->vert[3 * v]; }
 
-/* Centre, radius and scale. */
-static void measure(const sdm_feature_builder *b)
+/* Sets centre, radius and scale of the features. */
+static void surface_measure(const sdm_feature_builder *b)
 {
     sdm_features *f = b->f;
     const sdm_bvh_node *root = b->tree->node;
     double d[3], longest = 0;
+    // bounding box
     for (int a = 0; a < 3; a++) {
         d[a] = root->hi[a] - root->lo[a];
         f->centre[a] = root->lo[a] + 0.5 * d[a];
     }
     f->radius = 0.5 * v3_norm(d);
+    // squared length of the longest edge
     for (size_t t = 0; t < b->m->n_tri; t++) {
         const uint32_t *v = &b->m->tri[3 * t];
         for (int k = 0; k < 3; k++) {
@@ -29,14 +32,16 @@ static void measure(const sdm_feature_builder *b)
         }
     }
     int exponent = 0;
-    // without any edge the whole surface is the measure
+    // all triangles are points: use the size of the whole surface
     const double size = longest > 0 ? sqrt(longest) : f->radius;
     if (size > 0) (void)frexp(size, &exponent);
     f->scale = ldexp(1, -exponent);
 }
 
-/* Boxes, and which nodes are clusters: children come after their parent. */
-static void fill_nodes(const sdm_feature_builder *b)
+/* Sets the boxes of all nodes, and marks as clusters the leaves and the nodes whose two children
+   are clusters with at most SDM_CLUSTER faces together. Runs backwards: children come after their
+   parent. */
+static void nodes_set(const sdm_feature_builder *b)
 {
     sdm_features *f = b->f;
     for (size_t i = b->tree->n_node; i-- > 0;) {
@@ -47,6 +52,7 @@ static void fill_nodes(const sdm_feature_builder *b)
             node->lo[a] = (float)((from->lo[a] - f->centre[a]) * f->scale);
             node->hi[a] = (float)((from->hi[a] - f->centre[a]) * f->scale);
         }
+        // merge the children, if both are clusters and small enough
         if (from->count) continue;
         const sdm_cluster_node *child = &f->node[from->first];
         if (!child[0].count || !child[1].count || child[0].count + child[1].count > SDM_CLUSTER)
@@ -56,8 +62,8 @@ static void fill_nodes(const sdm_feature_builder *b)
     }
 }
 
-/* The clusters in the order of the tree. */
-static size_t list_clusters(const sdm_features *f, sdm_cluster_node **list)
+/* Lists the clusters in the order of their faces; returns their number. */
+static size_t clusters_list(const sdm_features *f, sdm_cluster_node **list)
 {
     uint32_t stack[SDM_BVH_DEPTH];
     int top = 0;
@@ -75,28 +81,31 @@ static size_t list_clusters(const sdm_features *f, sdm_cluster_node **list)
     return n;
 }
 
-/* What is numbered so far. */
-typedef struct numbers {
+/* Next free number of an edge, a corner and a group. */
+typedef struct next_numbers {
     uint32_t edge, corner, group;
-} numbers;
+} next_numbers;
 
-/* The number of an edge or corner: its own, or the next where it has none yet. */
-static inline uint32_t number_of(uint32_t *own, uint32_t *next, uint32_t *origin, uint32_t from)
+/* Returns the feature number *own of an edge or corner; where it is SDM_NONE, takes the number
+   *next and stores the edge or vertex in source[number]. Free of branches, because first
+   occurrences are unpredictable: source[*next] is always written. */
+static inline uint32_t number_take(uint32_t *own, uint32_t *next, uint32_t *source, uint32_t item)
 {
-    // without branches: who is the first cannot be foreseen
     const bool is_new = *own == SDM_NONE;
     const uint32_t number = is_new ? *next : *own;
-    origin[*next] = from;
+    source[*next] = item;
     *next += is_new;
     return *own = number;
 }
 
-/* Edges and corners of a cluster are those that no cluster before it has; a triangle with a
- * repeated vertex is a segment of its own. */
-static void number_cluster(const sdm_feature_builder *b, sdm_cluster_node *node, numbers *n)
+/* Numbers the edges and corners of a cluster that no cluster before it contains, and its groups. A
+   triangle with a repeated vertex has no edge in the topology: it becomes one edge feature, a
+   segment. */
+static void cluster_number(const sdm_feature_builder *b, sdm_cluster_node *node, next_numbers *n)
 {
     sdm_features *f = b->f;
-    uint32_t *origin = b->origin - f->edge_base, *vertices = b->vertex - f->corner_base;
+    // both indexed by feature numbers
+    uint32_t *source = b->edge_source - f->edge_base, *vertices = b->vertex - f->corner_base;
     node->edge = n->edge;
     node->corner = n->corner;
     for (uint32_t slot = node->first; slot < node->first + node->count; slot++) {
@@ -104,18 +113,22 @@ static void number_cluster(const sdm_feature_builder *b, sdm_cluster_node *node,
         const uint32_t *v = &b->topo->tri[3 * t], *edge = &b->topo->edge[3 * t];
         uint32_t *of = f->of_slot[slot];
         f->owner[slot] = slot;
+        // corners
         for (int k = 0; k < 3; k++) {
-            of[3 + k] = number_of(&b->corner[v[k]], &n->corner, vertices, v[k]);
+            of[3 + k] = number_take(&b->corner[v[k]], &n->corner, vertices, v[k]);
             f->owner[of[3 + k]] = slot;
         }
+        // edges
         const bool is_segment = edge[0] == SDM_NONE;
-        if (is_segment) origin[n->edge] = (uint32_t)(b->topo->n_edges + t);
+        if (is_segment) source[n->edge] = (uint32_t)(b->topo->n_edges + t);
         for (int k = 0; k < 3; k++) {
-            of[k] = is_segment ? n->edge : number_of(&b->edge[edge[k]], &n->edge, origin, edge[k]);
+            of[k] =
+                is_segment ? n->edge : number_take(&b->edge[edge[k]], &n->edge, source, edge[k]);
             f->owner[of[k]] = slot;
         }
         n->edge += is_segment;
     }
+    // ends, and groups: one of faces, then those of edges and corners
     node->edge_end = n->edge;
     node->corner_end = n->corner;
     node->group = n->group;
@@ -123,7 +136,7 @@ static void number_cluster(const sdm_feature_builder *b, sdm_cluster_node *node,
     n->group += (n->corner - node->corner + SDM_CORNER_LANES - 1) / SDM_CORNER_LANES;
 }
 
-static sdm_feature_groups *choose_kernel(void)
+static sdm_feature_groups *groups_choose(void)
 {
 #if defined(__x86_64__) && defined(__GNUC__)
     if (sdm_processor_level() >= SDM_PROCESSOR_AVX2) return sdm_feature_groups_avx2;
@@ -131,45 +144,30 @@ static sdm_feature_groups *choose_kernel(void)
     return sdm_feature_groups_generic;
 }
 
-static sdm_status fill_clusters(const sdm_feature_builder *b, sdm_arena *arena, sdm_budget *budget,
-                                sdm_error *err)
+/* Numbers the features of all clusters, then allocates and fills their groups. */
+static sdm_status clusters_fill(const sdm_feature_builder *b, sdm_arena *arena, sdm_error *err)
 {
     sdm_features *f = b->f;
     sdm_cluster_node **list;
     sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &list, b->m->n_tri, "features", err);
     if (s) return s;
-    const size_t n = list_clusters(f, list);
-    numbers next = {f->edge_base, f->corner_base, 0};
-    for (size_t i = 0; i < n; i++) number_cluster(b, list[i], &next);
+    const size_t n = clusters_list(f, list);
+    next_numbers next = {f->edge_base, f->corner_base, 0};
+    for (size_t i = 0; i < n; i++) cluster_number(b, list[i], &next);
     f->end = next.corner;
-    s = sdm_budget_take(budget, next.group * sizeof *f->group, err);
-    if (!s) s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->group, next.group, "features", err);
+    s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->group, next.group, "features", err);
     if (s) return s;
-    choose_kernel()(b, list, n);
+    groups_choose()(b, list, n);
     return SDM_OK;
 }
 
-/* All but the groups; the list of clusters is among it. */
-static size_t bytes_of(const sdm_feature_builder *b)
-{
-    const sdm_features *f = b->f;
-    const size_t n = b->m->n_tri, n_vert = b->m->n_vert, n_edge = f->corner_base - f->edge_base;
-    return n * (sizeof *b->narrow + sizeof *f->centroid + sizeof *f->of_slot +
-                sizeof(sdm_cluster_node *)) +
-           n_edge * (sizeof *b->origin + sizeof *b->segment) + b->topo->n_edges * sizeof *b->edge +
-           n_vert * (sizeof *b->vertex + sizeof *b->corner + sizeof *b->along) +
-           b->tree->n_node * sizeof *f->node +
-           (f->corner_base + n_vert) * (sizeof *f->exact + sizeof *f->owner);
-}
-
-static sdm_status allocate(sdm_feature_builder *b, sdm_arena *arena, sdm_budget *budget,
-                           sdm_error *err)
+/* Takes all arrays but the groups and the list of clusters. */
+static sdm_status builder_allocate(sdm_feature_builder *b, sdm_arena *arena, sdm_error *err)
 {
     sdm_features *f = b->f;
     const size_t n = b->m->n_tri, n_vert = b->m->n_vert, n_edge = f->corner_base - f->edge_base;
-    sdm_status s = sdm_budget_take(budget, bytes_of(b), err);
-    // one more: the place of the next one is written to
-    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->origin, n_edge + 1, "features", err);
+    // one element more: number_take() also writes to the next one
+    sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->edge_source, n_edge + 1, "features", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->segment, n_edge, "features", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->vertex, n_vert + 1, "features", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->edge, b->topo->n_edges, "features", err);
@@ -188,8 +186,7 @@ static sdm_status allocate(sdm_feature_builder *b, sdm_arena *arena, sdm_budget 
 }
 
 sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree,
-                              sdm_arena *arena, sdm_frame *frames, sdm_features *f,
-                              sdm_budget *budget, sdm_error *err)
+                              sdm_arena *arena, sdm_frame *frames, sdm_features *f, sdm_error *err)
 {
     const size_t n = m->n_tri;
     sdm_feature_builder b = {.m = m, .topo = topo, .tree = tree, .frames = frames, .f = f};
@@ -197,16 +194,16 @@ sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const
     size_t segments = 0;
     for (size_t t = 0; t < n; t++) segments += topo->edge[3 * t] == SDM_NONE;
     if (n + segments + topo->n_edges + m->n_vert >=
-        SDM_NONE / 2) // the kernels count in 32 bits with a sign
+        SDM_NONE / 2) // the map kernels hold feature numbers as int32_t
         return sdm_fail(err, SDM_E_NOMEM,
                         "surface of %zu triangles: too many to number their edges and vertices", n);
     f->edge_base = (uint32_t)n;
     f->corner_base = (uint32_t)(n + segments + topo->n_edges);
-    sdm_status s = allocate(&b, arena, budget, err);
+    sdm_status s = builder_allocate(&b, arena, err);
     if (!s) {
-        measure(&b);
-        fill_nodes(&b);
-        s = fill_clusters(&b, arena, budget, err);
+        surface_measure(&b);
+        nodes_set(&b);
+        s = clusters_fill(&b, arena, err);
     }
     sdm_arena_release(arena, SDM_HIGH, before);
     return s;

@@ -1,90 +1,124 @@
-/* The features of a surface - faces, edges, corners - each with the region of space from which it
-   can be the nearest.
+/* The features of a surface: its faces, edges and corners (vertices), each with its region, the set
+   of points to which it can be the nearest feature (Mauch 2003).
 
-   For a point p whose nearest point x lies inside a face, p projects into the face; inside an edge,
-   p projects into the edge and lies beyond the edge as seen from each of its faces; at a corner, p
-   lies beyond the corner as seen along each of its edges (the regions of Mauch 2003). All of these
-   are half spaces, so that whole boxes can be tested at once.
+   If the point of the surface nearest to p lies inside a face, p projects into the face. If it lies
+   inside an edge, p projects into the edge and, seen from each of the edge's faces, lies beyond the
+   edge. If it is a corner, p lies beyond the corner along each of its edges. So every region is an
+   intersection of half spaces, and a whole box of points can be tested at once.
 
-   Up to eight triangles under one node of the tree are a cluster; an edge or corner belongs to the
-   first cluster that has it. Float positions of clusters are relative to `centre`, those of
-   features to the middle of their cluster's box, lengths multiplied by `scale`. */
+   A cluster is a node of the tree with up to eight triangles below it; an edge or corner belongs to
+   the first cluster that contains it. Features of a cluster are stored in groups of eight, one in
+   each SIMD lane. Float values are scaled: the boxes of clusters are (x - centre) * scale, the
+   functions of features take (x - centre of the cluster's box) * scale. */
 #ifndef SDM_GEOM_SURFACE_FEATURES_H
 #define SDM_GEOM_SURFACE_FEATURES_H
 
 #include <stdbool.h>
 
-#include "memory/budget.h"
 #include "mesh/bvh.h"
 #include "mesh/point_triangle.h"
 #include "mesh/topology.h"
 
-/* Eight faces or edges or four corners of a cluster, in lanes, by linear functions of the point p:
-   g[k] . p + offset[k], and what they are at most in the feature's region. Faces: 0 - 2 the
-   distance outward across each edge, 3 the distance from the plane; most 0. A thin face (too narrow
-   for float): 0 - 3 the distances outward from a rectangle around it, in its plane. Edges: the size
-   of 0, along it from its middle, is at most half its length; 1 and 2 inward across it into two of
-   its faces, at most 0, or INFINITY for 1 where there is no face; 3 the distance from the plane of
-   the first: 1 and 3 are perpendicular, so that their squares sum up to that of the distance. 1 + 2
-   is at most 0, too: that leaves out an edge as seen from where its faces form a valley. Corners: 0
-   - 2 the way along edges away from it, at most 0: three edges in its lane, three in the fourth
-   lane from there (fewer are repeated); g[3] is the corner itself. Nothing in the lane: offset[0] =
-   INFINITY. */
+/* A group: up to eight features of one kind of a cluster, one in each lane (corners: four, two
+   lanes each), given by their region functions f[k](p) = g[k] . p + offset[k]. Gradients have
+   length 1, or 0 where a function bounds nothing. p lies in the region of a
+
+   face       if f[0], f[1], f[2] <= 0: distances outward across each edge, in the face's plane.
+              f[3] is the distance from this plane.
+   thin face  if f[0] ... f[3] <= 0: distances outward from a rectangle around the face, in its
+              plane. For faces too narrow for float distances.
+   edge       if abs(f[0]) <= most[0]: coordinate along the edge from its midpoint; most[0] is
+              half its length;
+              and f[1] <= most[1], f[2] <= 0: distances inward across the edge into two of its
+              faces; most[1] = 0, or INFINITY for an edge without a face that is wide enough;
+              and (f[1] + f[2]) / 2 <= most[1]: implied for points, not for boxes. A concave
+              edge has no region, but a box may still pass each half-space test; this mean
+              rejects it.
+              f[3] is the distance from the plane of the first face. It is perpendicular to
+              f[1], so the squared distance from the edge's line is f[1]^2 + f[3]^2.
+   corner     if f[0] ... f[5] <= 0: coordinates along six of its edges, away from the corner.
+              If it has fewer edges, the first is repeated. The lane of the corner holds f[0] to
+              f[2]; rows 0 to 2 of the lane SDM_CORNER_LANES higher hold f[3] to f[5]. g[3] is
+              the position of the corner.
+
+   Unused lanes have offset[0] = INFINITY: no point satisfies that. */
 typedef struct sdm_feature_group {
-    _Alignas(64) float g[4][3][8]; /* [k][coordinate] */
+    /* gradients, [k][coordinate][lane] */
+    _Alignas(64) float g[4][3][8];
     float offset[4][8];
-    float most[2][8]; /* of functions 0 and 1 */
-    float sum[4]
-             [8]; /* of the sizes of the coordinates of g[k]; 3 of an edge: of (g[1] + g[2]) / 2 */
+    /* edges: largest values of abs(f[0]) and f[1] in the region; others: 0 */
+    float most[2][8];
+    /* abs(gx) + abs(gy) + abs(gz) of g[k]; for k = 3 of edges, of (g[1] + g[2]) / 2 */
+    float sum[4][8];
 } sdm_feature_group;
 
+/* Corners of a group; also the distance between the two lanes of a corner. */
 #define SDM_CORNER_LANES 4
 
-/* A feature in double, mm: its anchor a, a point of it, and a unit vector u: normal of the face
-   (face = -1, else 0), along the edge (which ends at a + length u), 0 for a corner. */
+/* A feature in double, mm, for the exact distance. */
 typedef struct sdm_feature {
+    /* a point of the feature: corner of the face, start of the edge, the corner itself */
     _Alignas(32) double a[3];
-    double u[3], length, face;
+    /* unit vector: normal of the face, direction of the edge; 0 for a corner */
+    double u[3];
+    /* of an edge, which ends at a + length u; else 0 */
+    double length;
+    /* -1: the feature is a face; 0: an edge or a corner */
+    double face;
 } sdm_feature;
 
+/* Most faces of a cluster. */
 #define SDM_CLUSTER 8
 
-/* Node of the tree of triangles. count > 0: a cluster of the faces first .. first + count and of
-   some edges and corners; what is below it in the tree is not used. count == 0: its children are
-   first and first + 1. */
+/* Node of the tree of triangles, in the places of sdm_bvh.node. count > 0: a cluster; nodes below
+   it are not used. count == 0: its children are the nodes first and first + 1. */
 typedef struct sdm_cluster_node {
+    /* bounding box, scaled */
     float lo[3], hi[3];
+    /* cluster: its faces are the slots first ... first + count - 1 */
     uint32_t first, count;
+    /* numbers of its edges, edge ... edge_end - 1, and of its corners */
     uint32_t edge, edge_end, corner, corner_end;
-    uint32_t group; /* of its faces; those of its edges follow, then those of its corners */
-    uint32_t thin;  /* bit i: face first + i is thin */
+    /* index of its group of faces; the groups of its edges follow, then those of its corners */
+    uint32_t group;
+    /* bit i: face first + i is thin */
+    uint32_t thin;
 } sdm_cluster_node;
 
-/* Numbers of features: a face has the slot of its triangle, edges begin at edge_base, corners at
- * corner_base. */
+/* All features of a surface. Features are numbered: a face by the slot of its triangle, edges from
+   edge_base on, corners from corner_base to end - 1. */
 typedef struct sdm_features {
-    sdm_cluster_node *node; /* [nodes of the tree] */
-    float (*centroid)[3];   /* [n_tri] of the triangles */
-    bool any_thin;          /* there is a thin face */
+    /* [nodes of the tree] */
+    sdm_cluster_node *node;
+    /* centroids of the triangles, [n_tri][coordinate], scaled */
+    float (*centroid)[3];
+    /* at least one face is thin */
+    bool any_thin;
     sdm_feature_group *group;
     uint32_t edge_base, corner_base, end;
-    sdm_feature *exact;       /* [end] */
-    uint32_t (*of_slot)[6];   /* [n_tri] edges and corners of a triangle */
-    uint32_t *owner;          /* [end] slot of a triangle that has the feature */
-    double centre[3], radius; /* middle of the surface's box, half its diagonal, mm */
-    double scale;             /* power of two: the longest edge becomes 0.5 .. 1 */
+    /* [end] */
+    sdm_feature *exact;
+    /* numbers of the edges and corners of each triangle, [n_tri][3 edges, 3 corners] */
+    uint32_t (*of_slot)[6];
+    /* slot of a triangle to which the feature belongs, [end] */
+    uint32_t *owner;
+    /* centre of the surface's bounding box and half its diagonal, mm */
+    double centre[3], radius;
+    /* power of two that makes the longest edge 0.5 to 1 long */
+    double scale;
 } sdm_features;
 
-/* Coordinate a of the point that the functions of a cluster are relative to. */
-static inline float sdm_cluster_middle(const sdm_cluster_node *c, int a)
+/* Coordinate a of the centre of a cluster's box: the origin of its features' functions, scaled. */
+static inline float sdm_cluster_centre(const sdm_cluster_node *c, int a)
 {
     return 0.5f * (c->lo[a] + c->hi[a]);
 }
 
-/* Fills frames[slot], too: of triangle tree->order[slot] of m; topo: of m. Taken from the low end
-   of the arena; the budget (may be NULL) is asked before. */
+/* Builds the features of mesh m with topology topo and tree `tree`, and frames[slot] of all
+   triangles tree->order[slot]. f must be zeroed. Memory comes from the low end of the arena, scratch
+   from its high end, which is released at the end. SDM_E_NOMEM where memory, the memory limit or
+   31-bit feature numbers do not suffice. */
 sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree,
-                              sdm_arena *arena, sdm_frame *frames, sdm_features *f,
-                              sdm_budget *budget, sdm_error *err);
+                              sdm_arena *arena, sdm_frame *frames, sdm_features *f, sdm_error *err);
 
 #endif

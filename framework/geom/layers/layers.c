@@ -1,9 +1,9 @@
-/* Layers of a map, one voxel after another. */
+/* Layers of a map: closest point, normal, triangle and derivatives, computed voxel by voxel. */
 #include "layers.h"
 
 #include <stdatomic.h>
 
-#include "memory/budget.h"
+#include "memory/cancel.h"
 #include "sdm/internal/threads.h"
 #include "sdm/internal/vec3.h"
 
@@ -17,8 +17,8 @@ void sdm_distance_gradient(const sdm_nearest *surface, double rounding, uint32_t
     for (int i = 0; i < 3; i++) n[i] = on_surface ? surface->frames[slot].n[i] : r[i] / length;
 }
 
-static void fill_derivative(const sdm_layers_job *job, const sdm_vertex_gradient *g, size_t voxel,
-                            size_t n_voxel)
+static void voxel_fill_derivative(const sdm_layers_job *job, const sdm_vertex_gradient *g,
+                                  size_t voxel, size_t n_voxel)
 {
     const size_t n_vert = job->sheets.mesh->n_vert;
     for (size_t k = 0; k < job->n_velocity; k++) {
@@ -29,7 +29,7 @@ static void fill_derivative(const sdm_layers_job *job, const sdm_vertex_gradient
     }
 }
 
-static void fill_voxel(const sdm_layers_job *job, const double x[3], size_t voxel, size_t n_voxel)
+static void voxel_fill(const sdm_layers_job *job, const double x[3], size_t voxel, size_t n_voxel)
 {
     const sdm_nearest *surface = job->sheets.surface;
     const sdm_exact_layers *out = job->out;
@@ -50,7 +50,7 @@ static void fill_voxel(const sdm_layers_job *job, const double x[3], size_t voxe
     if (!job->derivative) return;
     sdm_vertex_gradient g = {.n = 0};
     if (slot != SDM_NONE) sdm_vertex_gradient_find(&job->sheets, slot, feature, q, n, d < 0, &g);
-    fill_derivative(job, &g, voxel, n_voxel);
+    voxel_fill_derivative(job, &g, voxel, n_voxel);
 }
 
 bool sdm_layers_wanted(const sdm_layers_job *job)
@@ -61,7 +61,7 @@ bool sdm_layers_wanted(const sdm_layers_job *job)
 sdm_status sdm_layers_fill(const sdm_layers_job *job, const sdm_grid *g, sdm_error *err)
 {
     const int n_threads = sdm_threads(job->opts->n_threads);
-    (void)n_threads; // without OpenMP
+    (void)n_threads; // unused without OpenMP
     const int64_t n_rows = g->n[1] * g->n[2];
     const size_t n_voxel = sdm_grid_count(g);
     atomic_bool stop = false;
@@ -73,7 +73,7 @@ sdm_status sdm_layers_fill(const sdm_layers_job *job, const sdm_grid *g, sdm_err
             sdm_grid_world(
                 g, (const double[3]){(double)i, (double)(row % g->n[1]), (double)(row / g->n[1])},
                 x);
-            fill_voxel(job, x, (size_t)(row * g->n[0] + i), n_voxel);
+            voxel_fill(job, x, (size_t)(row * g->n[0] + i), n_voxel);
         }
     }
     return atomic_load(&stop) ? sdm_fail(err, SDM_E_CANCELLED, "map stopped on request") : SDM_OK;

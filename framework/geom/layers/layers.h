@@ -1,4 +1,5 @@
-/* What is known of the voxels of a grid beside their distance. */
+/* Layers of a map: per voxel the nearest triangle, nearest point, normal and derivatives, in
+ * addition to the distance. */
 #ifndef SDM_GEOM_LAYERS_H
 #define SDM_GEOM_LAYERS_H
 
@@ -8,23 +9,27 @@
 
 typedef struct sdm_layers_job {
     sdm_sheets sheets;
-    double rounding; /* distances up to this are on the surface */
+    double rounding; /* voxels with abs(distance) <= rounding lie on the surface, mm */
     const sdm_exact_opts *opts;
-    const float *values;  /* [nz][ny][nx] the map */
-    const uint32_t *slot; /* [nz][ny][nx] of a nearest triangle, SDM_NONE beyond a narrow band */
+    const float *values; /* [nz][ny][nx] signed distance, mm */
+    /* [nz][ny][nx] nearest triangle (slot of sheets.surface), SDM_NONE outside of a narrow band */
+    const uint32_t *slot;
     const sdm_exact_layers *out;
-    const double *velocity; /* [n_velocity][n_vert of the mesh][3] */
+    /* [n_velocity][n_vert][3] motions of the vertices of sheets.mesh */
+    const double *velocity;
     size_t n_velocity;
-    float *derivative; /* [n_velocity][nz][ny][nx] */
+    float *derivative; /* [n_velocity][nz][ny][nx] result, NULL: not wanted */
 } sdm_layers_job;
 
-/* Is anything wanted but the values? */
+/* Is any layer other than the values requested? */
 bool sdm_layers_wanted(const sdm_layers_job *job);
 
-/* Fills every layer but the values. The grid is checked. SDM_E_CANCELLED. */
+/* Fills all requested layers except the values. The grid must have passed sdm_grid_check(). Errors:
+ * SDM_E_CANCELLED. */
 sdm_status sdm_layers_fill(const sdm_layers_job *job, const sdm_grid *g, sdm_error *err);
 
-/* Unit gradient at x of the signed distance d to the nearest point q, on triangle `slot`. */
+/* n = unit gradient of the signed distance d (mm) at x. q: nearest surface point, on triangle
+ * `slot`. On the surface (abs(d) <= rounding) it is the normal of the triangle. */
 void sdm_distance_gradient(const sdm_nearest *surface, double rounding, uint32_t slot,
                            const double x[3], const double q[3], double d, double n[3]);
 

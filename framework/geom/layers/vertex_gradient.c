@@ -1,25 +1,31 @@
-/* The distance is |x - q|, the least over all points q of the surface, so to first order only the
-   motion of the nearest one along the normal counts (Danskin 1967): the derivative for a vertex is
-   -(barycentric coordinate of q) * normal. A point inside a union may have its nearest point where
-   two or three sheets cross. That point slides on all of them as they move, each sheet giving it
-   its own motion along its own normal: the normal is split into those of the sheets, with factors
-   that are not negative (the sheets bound a convex cone outside). */
+/* Derivative of the distance with respect to mesh vertices. The distance is the minimum of abs(x -
+ * q) over all surface points q, so its derivative depends only on the motion of the nearest point
+ * along the normal (Danskin 1967): d(distance) / d(vertex) = -(barycentric coordinate of q) *
+ * normal.
+ *
+ * Inside a union the nearest point may lie where two or three sheets cross. It slides along all of
+ * them as they move, and each sheet contributes its own motion along its own normal. The normal is
+ * therefore split into a linear combination of the normals of the sheets, with factors >= 0,
+ * because the outer normals span a convex cone. */
 #include "vertex_gradient.h"
 
 #include "mesh/facet.h"
 #include "sdm/internal/vec3.h"
 
-// sheets through one point; more than a few do not cross in general position
-#define SHEETS 16
-// of unit vectors: what is left of the normal after the split is moved with the nearest triangle
+// largest number of sheets through one point; in general position only three cross
+#define SHEETS_MAX 16
+// largest remainder of the unit normal after the split; the remainder is assigned to the nearest
+// triangle
 #define SPLIT_ERROR 1e-6
 
+/* The sheets through one point, the nearest triangle first. */
 typedef struct crossing {
     int n;
-    uint32_t tri[SHEETS]; // of the mesh
-    const double *normal[SHEETS];
+    uint32_t tri[SHEETS_MAX]; // numbers in the mesh
+    const double *normal[SHEETS_MAX];
 } crossing;
 
+/* normal = sum over i of factor[i] * (normal of sheet[i]) + remainder of length `error`. */
 typedef struct split {
     int n, sheet[3];
     double factor[3], error;
@@ -27,15 +33,15 @@ typedef struct split {
 
 void sdm_sheets_frames(const sdm_mesh *m, int n_threads, sdm_frame *frames)
 {
-    (void)n_threads; // without OpenMP
+    (void)n_threads; // unused without OpenMP
 #pragma omp parallel for num_threads(n_threads)
     for (size_t t = 0; t < m->n_tri; t++) sdm_facet_frame(m, t, &frames[t]);
 }
 
 static double clamp(double x, double most) { return x > 0 ? fmin(x, most) : 0; }
 
-/* Barycentric coordinates of q in triangle t, none negative. Along the longest edge they are exact
- * for needles too. */
+/* Barycentric coordinates of q in triangle t, clamped to >= 0. Computed along the longest edge
+ * first, so they stay accurate for needles. */
 static void barycentric(const sdm_frame *f, const double q[3], double w[3])
 {
     double r[3];
@@ -50,8 +56,9 @@ static void barycentric(const sdm_frame *f, const double q[3], double w[3])
     w[(turn + 2) % 3] = third;
 }
 
-// the part of the normal that triangle t moves
-static void add_triangle(const sdm_sheets *s, uint32_t t, const double q[3], const double part[3],
+/* Adds the derivative for the vertices of triangle t, where `part` is the component of the normal
+ * assigned to it. */
+static void gradient_add(const sdm_sheets *s, uint32_t t, const double q[3], const double part[3],
                          sdm_vertex_gradient *out)
 {
     double w[3];
@@ -63,7 +70,7 @@ static void add_triangle(const sdm_sheets *s, uint32_t t, const double q[3], con
     }
 }
 
-static void add_sheet(const sdm_sheets *s, uint32_t t, crossing *c)
+static void crossing_add(const sdm_sheets *s, uint32_t t, crossing *c)
 {
     for (int i = 0; i < c->n; i++)
         if (c->tri[i] == t) return;
@@ -71,30 +78,31 @@ static void add_sheet(const sdm_sheets *s, uint32_t t, crossing *c)
     c->normal[c->n++] = s->frames[t].n;
 }
 
-// the triangles of the mesh with surface at q; `first` comes first
-static void find_sheets(const sdm_sheets *s, uint32_t first, const double q[3], crossing *c)
+/* Collects the mesh triangles with a piece of surface within `seam` of q; `first` becomes the first
+ * entry. */
+static void crossing_find(const sdm_sheets *s, uint32_t first, const double q[3], crossing *c)
 {
     const sdm_bvh *tree = &s->surface->tree;
     const double reach2 = s->seam * s->seam;
     uint32_t stack[SDM_BVH_DEPTH];
     int top = 0;
     c->n = 0;
-    add_sheet(s, first, c);
+    crossing_add(s, first, c);
     stack[top++] = 0;
-    while (top && c->n < SHEETS) {
+    while (top && c->n < SHEETS_MAX) {
         const sdm_bvh_node *node = &tree->node[stack[--top]];
         if (!(sdm_bvh_box_distance2(node, q) <= reach2)) continue;
-        for (uint32_t i = node->first; i < node->first + node->count && c->n < SHEETS; i++)
+        for (uint32_t i = node->first; i < node->first + node->count && c->n < SHEETS_MAX; i++)
             if (sdm_frame_distance2(&s->surface->frames[i], q) <= reach2)
-                add_sheet(s, s->source[tree->order[i]], c);
+                crossing_add(s, s->source[tree->order[i]], c);
         if (node->count) continue;
         stack[top++] = node->first + 1;
         stack[top++] = node->first;
     }
 }
 
-// takes the split when no factor is negative and less is left than before
-static void try_split(const crossing *c, const double normal[3], split p, split *best)
+/* Keeps the split in *best if all factors are >= 0 and its remainder is smaller. */
+static void split_try(const crossing *c, const double normal[3], split p, split *best)
 {
     double rest[3] = {normal[0], normal[1], normal[2]};
     for (int i = 0; i < p.n; i++) {
@@ -105,17 +113,18 @@ static void try_split(const crossing *c, const double normal[3], split p, split 
     if (p.error < best->error) *best = p;
 }
 
-static void try_two(const crossing *c, const double normal[3], int i, int j, split *best)
+static void split_try_two(const crossing *c, const double normal[3], int i, int j, split *best)
 {
     const double *a = c->normal[i], *b = c->normal[j];
     const double na = v3_dot(normal, a), nb = v3_dot(normal, b), ab = v3_dot(a, b),
                  det = 1 - ab * ab;
     if (det > 0)
-        try_split(c, normal, (split){2, {i, j}, {(na - ab * nb) / det, (nb - ab * na) / det}, 0},
+        split_try(c, normal, (split){2, {i, j}, {(na - ab * nb) / det, (nb - ab * na) / det}, 0},
                   best);
 }
 
-static void try_three(const crossing *c, const double normal[3], int i, int j, int k, split *best)
+static void split_try_three(const crossing *c, const double normal[3], int i, int j, int k,
+                            split *best)
 {
     double bc[3], ca[3], ab[3];
     v3_cross(c->normal[j], c->normal[k], bc);
@@ -123,7 +132,7 @@ static void try_three(const crossing *c, const double normal[3], int i, int j, i
     v3_cross(c->normal[i], c->normal[j], ab);
     const double det = v3_dot(c->normal[i], bc);
     if (det != 0)
-        try_split(
+        split_try(
             c, normal,
             (split){3,
                     {i, j, k},
@@ -132,16 +141,16 @@ static void try_three(const crossing *c, const double normal[3], int i, int j, i
             best);
 }
 
-// the fewest sheets that make up the normal
-static split split_normal(const crossing *c, const double normal[3])
+/* Finds the smallest number of sheets (1, 2 or 3) whose normals combine to the normal. */
+static split split_find(const crossing *c, const double normal[3])
 {
     split best = {.error = INFINITY};
-    try_split(c, normal, (split){1, {0}, {v3_dot(normal, c->normal[0])}, 0}, &best);
+    split_try(c, normal, (split){1, {0}, {v3_dot(normal, c->normal[0])}, 0}, &best);
     for (int i = 0; i < c->n && best.error > SPLIT_ERROR; i++)
-        for (int j = i + 1; j < c->n; j++) try_two(c, normal, i, j, &best);
+        for (int j = i + 1; j < c->n; j++) split_try_two(c, normal, i, j, &best);
     for (int i = 0; i < c->n && best.error > SPLIT_ERROR; i++)
         for (int j = i + 1; j < c->n; j++)
-            for (int k = j + 1; k < c->n; k++) try_three(c, normal, i, j, k, &best);
+            for (int k = j + 1; k < c->n; k++) split_try_three(c, normal, i, j, k, &best);
     return best;
 }
 
@@ -151,17 +160,18 @@ void sdm_vertex_gradient_find(const sdm_sheets *s, uint32_t slot, int feature, c
     const uint32_t t = s->source[s->surface->tree.order[slot]];
     double rest[3] = {normal[0], normal[1], normal[2]};
     out->n = 0;
-    // seen from outside, sheets that cross do so in a reentrant corner, which is nearest to nothing
+    // only inside: seen from outside, crossing sheets form a concave corner, which is never the
+    // nearest point
     if (s->seam > 0 && inside && feature != SDM_FACE) {
         crossing c;
-        find_sheets(s, t, q, &c);
-        const split p = c.n > 1 ? split_normal(&c, normal) : (split){0};
+        crossing_find(s, t, q, &c);
+        const split p = c.n > 1 ? split_find(&c, normal) : (split){0};
         for (int i = 0; i < p.n; i++) {
             double part[3];
             for (int k = 0; k < 3; k++) part[k] = p.factor[i] * c.normal[p.sheet[i]][k];
             v3_sub(rest, part, rest);
-            add_triangle(s, c.tri[p.sheet[i]], q, part, out);
+            gradient_add(s, c.tri[p.sheet[i]], q, part, out);
         }
     }
-    add_triangle(s, t, q, rest, out);
+    gradient_add(s, t, q, rest, out);
 }

@@ -1,4 +1,4 @@
-/* How the signed distance at a point changes when the vertices of the mesh move. */
+/* Derivative of the signed distance at a point with respect to the vertices of the mesh. */
 #ifndef SDM_GEOM_VERTEX_GRADIENT_H
 #define SDM_GEOM_VERTEX_GRADIENT_H
 
@@ -6,16 +6,20 @@
 
 #include "features/nearest.h"
 
-/* A surface and the mesh whose triangles it consists of, whole or cut. */
+/* A surface and the mesh from which it was made: each triangle of the surface is a triangle of the
+ * mesh or a piece of one. A sheet is a mesh triangle that has such pieces. */
 typedef struct sdm_sheets {
     const sdm_nearest *surface;
     const sdm_mesh *mesh;
     const sdm_frame *frames; /* [mesh->n_tri] */
-    const uint32_t *source;  /* triangle of the mesh for each triangle of the surface */
-    double seam; /* pieces of different triangles meet to within this length; 0: nothing was cut */
+    const uint32_t *source;  /* source[triangle of the surface] = triangle of the mesh */
+    /* pieces of different triangles that meet are at most this far apart, mm; 0: no triangle was
+     * cut */
+    double seam;
 } sdm_sheets;
 
-/* Derivatives with respect to vertices that may occur more than once. */
+/* Derivatives d[i][3] of the distance with respect to the position of vertex[i], i < n. A vertex
+ * may occur more than once: the derivatives add up. */
 #define SDM_GRADIENT_VERTICES 12
 typedef struct sdm_vertex_gradient {
     int n;
@@ -23,11 +27,12 @@ typedef struct sdm_vertex_gradient {
     double d[SDM_GRADIENT_VERTICES][3];
 } sdm_vertex_gradient;
 
-/* Frames of the triangles of a mesh. */
+/* Writes frames[m->n_tri], the frames of the triangles of a mesh. */
 void sdm_sheets_frames(const sdm_mesh *m, int n_threads, sdm_frame *frames);
 
-/* slot, feature, q: nearest triangle and point of the surface; normal: gradient of the signed
-   distance with respect to the point; inside: the distance is negative. */
+/* Derivative at a point x. slot, feature, q: nearest triangle of the surface, where on it the
+ * nearest point lies (point_triangle.h), and the nearest point; normal: gradient of the signed
+ * distance with respect to x; inside: the distance is negative. [any thread] */
 void sdm_vertex_gradient_find(const sdm_sheets *s, uint32_t slot, int feature, const double q[3],
                               const double normal[3], bool inside, sdm_vertex_gradient *out);
 

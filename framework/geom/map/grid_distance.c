@@ -1,20 +1,21 @@
-/* The distance map: how the grid is cut into blocks and tiles, and the threads over the blocks. */
+/* The distance map: division of the grid into boxes, blocks, tiles and vectors (defined in
+   map.inc), tables of their offsets, choice of the kernel, and threads over rows of boxes. */
 #include "grid_distance.h"
 
 #include <math.h>
 #include <stdatomic.h>
 #include <string.h>
 
-#include "grid_job.h"
-#include "memory/budget.h"
+#include "grid_scratch.h"
+#include "memory/cancel.h"
 #include "sdm/internal/processor.h"
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
 
-// in edges: beyond it all features are equally near in single precision
-#define FARTHEST 1e5
+// Largest grid_reach(), in about longest edges: beyond it float cannot tell features apart.
+#define REACH_MAX 1e5
 
-static sdm_grid_kernel *choose_kernel(void)
+static sdm_grid_kernel *kernel_choose(void)
 {
 #if defined(__x86_64__) && defined(__GNUC__)
     const int level = sdm_processor_level();
@@ -24,8 +25,8 @@ static sdm_grid_kernel *choose_kernel(void)
     return sdm_grid_kernel_generic;
 }
 
-/* Position of voxel `at` (may be fractional) relative to voxel (0, 0, 0). */
-static void offset(const sdm_grid_job *job, const double at[3], double out[3])
+/* out: vector in mm from voxel (0, 0, 0) to voxel `at`, whose indices may be fractional. */
+static void voxel_offset(const sdm_grid_job *job, const double at[3], double out[3])
 {
     for (int c = 0; c < 3; c++)
         out[c] = at[0] * job->step[0][c] + at[1] * job->step[1][c] + at[2] * job->step[2][c];
@@ -37,62 +38,67 @@ static double step_length(const sdm_grid_job *job, int a)
     return sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
 }
 
-/* Doubles a box along the axis where it is shortest, first along axes where the grid goes on;
- * returns the axis. */
-static int double_box(const sdm_grid_job *job, int64_t size[3])
+/* Doubles a part of size[3] voxels along one axis and returns this axis: the one where the part is
+   shortest in mm, among those where it is smaller than the grid, if any. */
+static int part_double(const sdm_grid_job *job, int64_t size[3])
 {
     int best = -1;
-    bool best_goes_on = false;
+    bool best_smaller = false;
     for (int a = 0; a < 3; a++) {
-        const bool goes_on = size[a] < job->n[a];
+        const bool smaller = size[a] < job->n[a]; // than the grid
         const bool shorter = best < 0 || (double)size[a] * step_length(job, a) <
                                              (double)size[best] * step_length(job, best);
-        if (goes_on < best_goes_on || (goes_on == best_goes_on && !shorter)) continue;
+        if (smaller < best_smaller || (smaller == best_smaller && !shorter)) continue;
         best = a;
-        best_goes_on = goes_on;
+        best_smaller = smaller;
     }
     size[best] *= 2;
     return best;
 }
 
-/* Eight parts of `size` voxels, doubled along the axes `along` to `whole`. */
-static void set_parts(const sdm_grid_job *job, const int64_t size[3], const int along[3],
+/* Fills q with the eight parts of size[3] voxels of a whole of whole[3] voxels. along[3]: the axes
+   along which three doublings lead from the part to the whole; bit b of a part's number selects its
+   half along axis along[b]. */
+static void parts_set(const sdm_grid_job *job, const int64_t size[3], const int along[3],
                       const int64_t whole[3], sdm_grid_parts *q)
 {
     const double scale = job->features->scale;
     double radius = 0;
+    // extents
     for (int a = 0; a < 3; a++) {
         const double half = 0.5 * (double)(size[a] - 1), length = half * step_length(job, a);
         q->size[a] = size[a];
         q->half[a] = (float)(length * scale);
-        for (int c = 0; c < 3; c++) q->axis[a][c] = (float)(half * job->step[a][c] * scale);
+        for (int c = 0; c < 3; c++) q->half_axis[a][c] = (float)(half * job->step[a][c] * scale);
         radius += length * length;
     }
-    // axes are orthogonal to 1e-6
+    // 1e-5 covers grid axes that are orthogonal to 1e-6 only
     q->radius = (float)(sqrt(radius) * scale * (1 + 1e-5));
+    // first voxels and centres
     for (int i = 0; i < 8; i++) {
-        int64_t now[3] = {size[0], size[1], size[2]};
+        int64_t doubled[3] = {size[0], size[1], size[2]};
         double at[3];
         memset(q->first[i], 0, sizeof q->first[i]);
         for (int b = 0; b < 3; b++) {
-            if (i >> b & 1) q->first[i][along[b]] += now[along[b]];
-            now[along[b]] *= 2;
+            if (i >> b & 1) q->first[i][along[b]] += doubled[along[b]];
+            doubled[along[b]] *= 2;
         }
         for (int a = 0; a < 3; a++)
             at[a] = (double)q->first[i][a] + 0.5 * (double)(size[a] - whole[a]);
-        offset(job, at, q->middle_mm[i]);
-        for (int c = 0; c < 3; c++) q->middle.x[c][i] = (float)(q->middle_mm[i][c] * scale);
+        voxel_offset(job, at, q->centre_mm[i]);
+        for (int c = 0; c < 3; c++) q->centre.x[c][i] = (float)(q->centre_mm[i][c] * scale);
     }
 }
 
-/* How far grid and surface reach from the middle of the surface. */
-static double reach_of(const sdm_grid_job *job)
+/* Upper bound on abs(x - sdm_features.centre) over the boxes of the grid, plus the radius of the
+   surface, scaled. */
+static double grid_reach(const sdm_grid_job *job)
 {
     double reach = 0;
     for (int k = 0; k < 8; k++) {
         double at[3], x[3], d = 0;
         for (int a = 0; a < 3; a++) at[a] = (double)((k >> a & 1) * job->n_box[a] * job->box[a]);
-        offset(job, at, x);
+        voxel_offset(job, at, x);
         for (int c = 0; c < 3; c++) {
             const double r = job->origin[c] + x[c] - job->features->centre[c];
             d += r * r;
@@ -102,15 +108,17 @@ static double reach_of(const sdm_grid_job *job)
     return (reach + job->features->radius) * job->features->scale;
 }
 
-/* Index of a place in a tile or vector, x fastest. */
-static int64_t index_in(const int64_t size[3], const int64_t at[3])
+/* Index of voxel `at` within a part of size[3] voxels, x fastest. */
+static int64_t voxel_index_in(const int64_t size[3], const int64_t at[3])
 {
     return (at[2] * size[1] + at[1]) * size[0] + at[0];
 }
 
-static void set_voxels(sdm_grid_job *job, const sdm_grid_parts *in_vector)
+/* Fills the tables vector, voxel, voxel_in_tile and tile_voxel of the job. in_vector: the eight
+   voxels of a vector. */
+static void voxel_tables_set(sdm_grid_job *job, const sdm_grid_parts *in_vector)
 {
-    const sdm_grid_parts *tiles = &job->part[SDM_TO_TILES], *vectors = &job->part[SDM_TO_VECTORS];
+    const sdm_grid_parts *tiles = &job->part[SDM_TILES], *vectors = &job->part[SDM_VECTORS];
     for (int v = 0; v < 8; v++) {
         for (int i = 0; i < 8; i++) {
             int64_t in_tile[3];
@@ -119,58 +127,63 @@ static void set_voxels(sdm_grid_job *job, const sdm_grid_parts *in_vector)
                 in_tile[a] = vectors->first[v][a] + in_vector->first[i][a];
                 at[a] = (double)in_tile[a];
             }
-            const int64_t index = index_in(tiles->size, in_tile);
-            offset(job, at, x);
+            // within the tile, mm
+            const int64_t index = voxel_index_in(tiles->size, in_tile);
+            voxel_offset(job, at, x);
             job->voxel_in_tile[v][i] = (uint8_t)index;
             for (int c = 0; c < 3; c++) job->tile_voxel[c][index] = x[c];
+            // within the block, scaled
             for (int t = 0; t < 8; t++) {
                 for (int c = 0; c < 3; c++) {
-                    const double middle = tiles->middle_mm[t][c] + vectors->middle_mm[v][c];
-                    job->vector[t].x[c][v] = (float)(middle * job->features->scale);
+                    const double centre = tiles->centre_mm[t][c] + vectors->centre_mm[v][c];
+                    job->vector[t].x[c][v] = (float)(centre * job->features->scale);
                     job->voxel[t][v].x[c][i] =
-                        (float)((middle + in_vector->middle_mm[i][c]) * job->features->scale);
+                        (float)((centre + in_vector->centre_mm[i][c]) * job->features->scale);
                 }
             }
         }
     }
 }
 
-/* Returns how far grid and surface reach, see reach_of(). */
-static double fill_tables(sdm_grid_job *job)
+/* Fills all members of the job that depend on the division of the grid; returns grid_reach(). */
+static double job_set_tables(sdm_grid_job *job)
 {
-    // of a voxel, a vector, a tile, a block, a box
-    int64_t size[SDM_GRID_STEPS + 2][3] = {{1, 1, 1}};
-    int along[SDM_GRID_STEPS + 1][3];
-    for (int i = 0; i <= SDM_GRID_STEPS; i++) {
+    // sizes of a voxel, a vector, a tile, a block and a box
+    int64_t size[SDM_PART_LEVELS + 2][3] = {{1, 1, 1}};
+    int along[SDM_PART_LEVELS + 1][3];
+    for (int i = 0; i <= SDM_PART_LEVELS; i++) {
         memcpy(size[i + 1], size[i], sizeof size[i]);
-        for (int b = 0; b < 3; b++) along[i][b] = double_box(job, size[i + 1]);
+        for (int b = 0; b < 3; b++) along[i][b] = part_double(job, size[i + 1]);
     }
-    for (int i = 0; i < SDM_GRID_STEPS; i++) {
-        const int k = SDM_GRID_STEPS - i;
-        set_parts(job, size[k], along[k], size[k + 1], &job->part[i]);
+    for (int i = 0; i < SDM_PART_LEVELS; i++) {
+        const int k = SDM_PART_LEVELS - i;
+        parts_set(job, size[k], along[k], size[k + 1], &job->part[i]);
     }
-    // NaN along an axis of one voxel
-    for (int i = 0; i < SDM_GRID_STEPS; i++)
+    // 0 / 0 along an axis where a block has one voxel: fmaxf() ignores the NaN
+    for (int i = 0; i < SDM_PART_LEVELS; i++)
         for (int a = 0; a < 3; a++)
-            job->share[i] =
-                fmaxf(job->share[i], job->part[i].half[a] / job->part[SDM_TO_BLOCKS].half[a]);
+            job->extent_ratio[i] =
+                fmaxf(job->extent_ratio[i], job->part[i].half[a] / job->part[SDM_BLOCKS].half[a]);
     sdm_grid_parts in_vector;
-    set_parts(job, size[0], along[0], size[1], &in_vector);
-    job->to_voxel = in_vector.middle;
-    job->alike = true;
+    parts_set(job, size[0], along[0], size[1], &in_vector);
+    // are the offsets of vectors and tiles 2 and 4 times those of voxels?
+    job->to_voxel = in_vector.centre;
+    job->self_similar = true;
     for (int c = 0; c < 3; c++)
         for (int i = 0; i < 8; i++)
-            job->alike &= job->part[SDM_TO_VECTORS].middle.x[c][i] == 2 * job->to_voxel.x[c][i] &&
-                          job->part[SDM_TO_TILES].middle.x[c][i] == 4 * job->to_voxel.x[c][i];
-    set_voxels(job, &in_vector);
+            job->self_similar &=
+                job->part[SDM_VECTORS].centre.x[c][i] == 2 * job->to_voxel.x[c][i] &&
+                job->part[SDM_TILES].centre.x[c][i] == 4 * job->to_voxel.x[c][i];
+    voxel_tables_set(job, &in_vector);
+    // boxes over the grid
     job->aligned = true;
     for (int a = 0; a < 3; a++) {
-        job->box[a] = size[SDM_GRID_STEPS + 1][a];
+        job->box[a] = size[SDM_PART_LEVELS + 1][a];
         job->n_box[a] = (job->n[a] + job->box[a] - 1) / job->box[a];
         for (int c = 0; c < 3; c++) job->aligned &= c == a || job->step[a][c] == 0;
     }
-    // a linear function at a part's middle: 17 roundings of the largest coordinates, doubled
-    const double reach = reach_of(job);
+    // error of a linear function: 17 roundings (2^-24 each) of the largest coordinate, doubled
+    const double reach = grid_reach(job);
     job->error = (float)(2e-6 * reach);
     for (int mask = 0; mask < 256; mask++)
         for (int i = 0, n = 0; i < 8; i++)
@@ -178,14 +191,14 @@ static double fill_tables(sdm_grid_job *job)
     return reach;
 }
 
-/* The same voxel by voxel, for grids so far away that single precision cannot tell the features
- * apart. */
-static sdm_status ask_points(const sdm_grid_job *job, const sdm_grid *g, const sdm_exact_opts *opts,
-                             int n_threads, sdm_error *err)
+/* sdm_grid_distance() voxel by voxel in double, for grids so far away or so large that float cannot
+   tell features apart. */
+static sdm_status distance_by_points(const sdm_grid_job *job, const sdm_grid *g,
+                                     const sdm_exact_opts *opts, int n_threads, sdm_error *err)
 {
     const int64_t n_rows = job->n[1] * job->n[2];
     atomic_int stop = 0;
-    (void)n_threads; // without OpenMP
+    (void)n_threads; // unused without OpenMP
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (int64_t row = 0; row < n_rows; row++) {
         if (sdm_cancelled(opts)) atomic_store(&stop, 1);
@@ -222,14 +235,16 @@ sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g,
         for (int c = 0; c < 3; c++)
             job.step[a][c] = g->n[a] > 1 ? g->dir[3 * c + a] * g->spacing[a] : 0;
     }
-    const double reach = fill_tables(&job);
+    const double reach = job_set_tables(&job);
     const int n_threads = sdm_threads(opts->n_threads);
-    if (!(reach < FARTHEST)) return ask_points(&job, g, opts, n_threads, err);
+    if (!(reach < REACH_MAX)) return distance_by_points(&job, g, opts, n_threads, err);
+    // each thread gets an equal share of the memory limit; 0 would mean no limit
     job.limit = opts->memory_limit / (size_t)n_threads;
     if (opts->memory_limit && !job.limit) job.limit = 1;
-    sdm_grid_kernel *kernel = choose_kernel();
+    sdm_grid_kernel *kernel = kernel_choose();
     const int64_t n_rows = job.n_box[1] * job.n_box[2];
     atomic_int stop = SDM_OK;
+    // of several errors the one in the lowest row is reported
     int64_t failed = n_rows;
     sdm_status status = SDM_OK;
 #pragma omp parallel num_threads(n_threads)

@@ -1,3 +1,3 @@
-/* The block kernel for any processor. */
+/* The distance map kernel for any processor. */
 #define KERNEL sdm_grid_kernel_generic
 #include "map.inc"

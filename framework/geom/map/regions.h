@@ -1,41 +1,64 @@
-/* Features and the regions in which they can be the nearest. Part of the map kernels. */
-#ifndef SDM_GEOM_FEATURES_KERNEL_H
-#define SDM_GEOM_FEATURES_KERNEL_H
+/* Region functions of single features at eight points. Part of map.inc; sdm_feature_group in
+   surface_features.h defines the functions and their layout. */
+#ifndef SDM_GEOM_MAP_REGIONS_H
+#define SDM_GEOM_MAP_REGIONS_H
 
-#include "stage1_bounds.h"
+#include <assert.h>
 
+#include "features/surface_features.h"
+#include "grid_scratch.h"
+#include "simd/lanes.h"
+
+/* Region functions of a feature. */
 SDM_FOR_KIND int functions_of(int kind) { return kind == SDM_CORNERS ? SDM_FUNCTIONS : 4; }
 
-/* From the lane of a feature in the first of rows of eight floats, `rows` of them for a function of
- * the group, to its function k. */
-SDM_FOR_KIND int place_of(int kind, int k, int rows)
+/* Row of function k in the arrays of a group, and its lane for the feature in lane `lane`: corners
+   keep functions 3 to 5 in the upper half of rows 0 to 2. */
+SDM_FOR_KIND int function_row(int kind, int k) { return kind == SDM_CORNERS ? k % 3 : k; }
+SDM_FOR_KIND size_t function_lane(int kind, int k, size_t lane)
 {
-    return kind == SDM_CORNERS ? 8 * rows * (k % 3) + SDM_CORNER_LANES * (k / 3) : 8 * rows * k;
+    assert(lane < (kind == SDM_CORNERS ? SDM_CORNER_LANES : 8));
+    return kind == SDM_CORNERS ? lane + SDM_CORNER_LANES * (size_t)(k / 3) : lane;
 }
 
-/* The functions of a feature at eight points. */
+/* Element of function k in an array [row][lane] of a group. */
+SDM_FOR_KIND float function_value(int kind, const float (*x)[8], int k, size_t lane)
+{
+    return x[function_row(kind, k)][function_lane(kind, k, lane)];
+}
+
+/* Gradient of function k in all lanes of the result. */
+SDM_FOR_KIND point8 function_gradient(int kind, const sdm_feature_group *group, int k, size_t lane)
+{
+    const float(*g)[8] = group->g[function_row(kind, k)];
+    const size_t l = function_lane(kind, k, lane);
+    return p8_all(g[0][l], g[1][l], g[2][l]);
+}
+
+/* The functions of one feature at eight points. */
 typedef struct functions8 {
     v8f f[SDM_FUNCTIONS];
 } functions8;
 
-/* How far the worst of a feature's functions at the middles of parts is beyond what is most in its
-   region, less what it changes within the part: at most the error of a function where the part
-   meets the region. sum: as in a group, in the feature's lane; less: half extents of the part with
-   the other sign. */
-SDM_FOR_KIND v8f beyond(int kind, const functions8 *x, const float *sum, v8f less,
-                        const float most[2])
+/* By how much eight parts lie outside a feature's region: the maximum over its functions of
+   (value at the part's centre - largest value in the region - largest change within the part). A
+   part meets the region only if the result is <= error. extent, lane: see sdm_block_feature.
+   minus_half: -block.half of the parts. most: edges only. */
+SDM_FOR_KIND v8f region_excess(int kind, const functions8 *x, const float (*extent)[8], size_t lane,
+                               v8f minus_half, const float most[2])
 {
     v8f all = x->f[0];
     for (int k = 0;
          k < functions_of(kind) && (k < 3 || kind == SDM_THIN_FACES || kind == SDM_CORNERS); k++) {
         v8f f = kind == SDM_EDGES && k == 0 ? v8_abs(x->f[0]) : x->f[k];
         if (kind == SDM_EDGES && k < 2) f = v8_sub(f, v8_all(most[k]));
-        f = v8_fma(less, v8_all(sum[place_of(kind, k, 1)]), f);
+        f = v8_fma(minus_half, v8_all(function_value(kind, extent, k, lane)), f);
         all = k ? v8_max(all, f) : f;
     }
     if (kind != SDM_EDGES) return all;
+    // (f1 + f2) / 2 <= 0 rejects concave edges; row 3 of an edge's extent is for this mean
     const v8f mean = v8_sub(v8_mul(v8_add(x->f[1], x->f[2]), v8_all(0.5f)), v8_all(most[1]));
-    return v8_max(all, v8_fma(less, v8_all(sum[24]), mean));
+    return v8_max(all, v8_fma(minus_half, v8_all(function_value(kind, extent, 3, lane)), mean));
 }
 
 #endif

@@ -1,23 +1,56 @@
-/* From the candidates of a tile to the distances of its voxels in double. Part of the map kernels.
- */
-#ifndef SDM_GEOM_VALUES_KERNEL_H
-#define SDM_GEOM_VALUES_KERNEL_H
+/* Stage 6: chooses the nearest candidate of each voxel of a tile, computes its distance in double
+   and writes it. Part of map.inc. */
+#ifndef SDM_GEOM_MAP_STAGE6_VALUES_H
+#define SDM_GEOM_MAP_STAGE6_VALUES_H
 
+#include <assert.h>
+
+#include "block.h"
 #include "features/feature_distance.h"
-#include "stage5_voxels.h"
+#include "simd/lanes.h"
 
 typedef struct tile {
     const sdm_grid_job *job;
-    const sdm_grid_scratch *s;
-    unsigned number;  /* in the block */
-    int64_t first[3]; /* voxel */
-    double corner[3]; /* mm: its first voxel */
-    unsigned wanted;  /* vectors that begin inside the grid */
-    float error;      /* bound on the error of a linear function */
+    const sdm_candidates *candidates;
+    // number of the tile within the block
+    unsigned number;
+    // first voxel of the tile, and its position in mm
+    int64_t first[3];
+    double corner[3];
+    // mask of the vectors that begin inside the grid
+    unsigned vectors;
+    // block.error
+    float error;
 } tile;
 
-/* Bounds are meant to leave somebody; should they not, the tree knows. */
-static uint32_t ask_tree(const tile *t, const double p[3], double *d2)
+/* Results of the 64 voxels of a tile, indexed as by sdm_grid_job.voxel_in_tile. */
+typedef struct voxels {
+    // number of the nearest feature, SDM_NONE: none known
+    uint32_t number[64];
+    // squared distance, mm^2
+    _Alignas(32) double d2[64];
+    // voxels whose distances tile_choose() has already computed, with these distances
+    int n_settled;
+    uint8_t settled[64];
+    double settled_d2[64];
+} voxels;
+
+/* Index within the tile of the voxel in a lane of a vector. */
+static inline unsigned voxel_index(const sdm_grid_job *job, int vector, int lane)
+{
+    const unsigned i = job->voxel_in_tile[vector][lane];
+    assert(i < 64);
+    return i;
+}
+
+static inline void voxel_position(const tile *t, unsigned i, double p[3])
+{
+    for (int a = 0; a < 3; a++) p[a] = t->corner[a] + t->job->tile_voxel[a][i];
+}
+
+/* Searches the tree for the nearest triangle of the whole surface, for voxels without a candidate.
+   Returns its slot, which is the number of its face, and sets the squared distance. */
+static uint32_t nearest_in_tree(const tile *t, const double p[3], double *d2)
 {
     const sdm_nearest *n = t->job->surface;
     uint32_t slot = 0;
@@ -28,109 +61,124 @@ static uint32_t ask_tree(const tile *t, const double p[3], double *d2)
     return slot;
 }
 
-/* The nearest of the candidates of a voxel, in double. */
-static uint32_t settle(const tile *t, unsigned v, int lane, const double p[3], double *d2)
+/* Number of the nearest feature of voxel p in a lane of vector v (8 tile + vector), by the
+   distances in double of all candidates marked for this lane. Of equally near ones the candidate
+   found first counts. */
+static uint32_t voxel_settle(const tile *t, unsigned v, int lane, const double p[3], double *d2)
 {
-    const sdm_candidates *c = t->s->of_vectors;
+    const sdm_candidates *c = t->candidates;
     uint32_t best = SDM_NONE;
     *d2 = INFINITY;
     for (uint32_t i = c->last[v]; i != SDM_NONE; i = c->list[i].before) {
+        assert(i < c->n);
         if (!(c->list[i].voxels >> lane & 1)) continue;
         const double d =
             sdm_feature_distance2(t->job->features, t->job->surface->frames, c->list[i].number, p);
-        if (!(d < *d2 || (d == *d2 && d < INFINITY))) continue; // of several the first
+        if (!(d < *d2 || (d == *d2 && d < INFINITY))) continue; // the list runs backwards
         *d2 = d;
         best = c->list[i].number;
     }
-    if (best == SDM_NONE && !(t->job->band_mm < INFINITY)) best = ask_tree(t, p, d2);
+    // Fallback: the culling bounds always leave a candidate; if they do not, search the tree.
+    if (best == SDM_NONE && !(t->job->band_mm < INFINITY)) best = nearest_in_tree(t, p, d2);
     return best;
 }
 
 /* ax bx + ay by + az bz */
-static inline v4d v4_sum(v4d ax, v4d bx, v4d ay, v4d by, v4d az, v4d bz)
+static inline v4d dot4(v4d ax, v4d bx, v4d ay, v4d by, v4d az, v4d bz)
 {
     return v4_add(v4_add(v4_mul(ax, bx), v4_mul(ay, by)), v4_mul(az, bz));
 }
 
-/* Squared distances of four points to a feature each; the operations of sdm_feature_distance2(). */
-static inline void measure_four(const sdm_feature *x, const uint32_t number[4], v4d px, v4d py,
-                                v4d pz, double out[4])
+/* Squared distances of four points, each from its own feature x[number[i]]. Same operations in the
+   same order as sdm_feature_distance2(), hence the same bits. */
+static inline void distances4(const sdm_feature *x, const uint32_t number[4], v4d px, v4d py,
+                              v4d pz, double out[4])
 {
     v4d a[4], u[4];
     for (int i = 0; i < 4; i++) {
         a[i] = v4_load(x[number[i]].a);
         u[i] = v4_load(&x[number[i]].u[1]);
     }
-    // rows of a: ax ay az ux, of u: uy uz length face
+    // after this the rows of a are ax ay az ux, those of u are uy uz length face
     v4_transpose(a);
     v4_transpose(u);
     const v4d wx = v4_sub(px, a[0]), wy = v4_sub(py, a[1]), wz = v4_sub(pz, a[2]);
-    const v4d s = v4_sum(wx, a[3], wy, u[0], wz, u[1]);
+    const v4d s = dot4(wx, a[3], wy, u[0], wz, u[1]);
     const v4d rx = v4_sub(wx, v4_mul(s, a[3])), ry = v4_sub(wy, v4_mul(s, u[0])),
               rz = v4_sub(wz, v4_mul(s, u[1]));
-    v4_store(out, v4_signed(u[3], v4_mul(s, s), v4_sum(rx, rx, ry, ry, rz, rz)));
+    v4_store(out, v4_if_negative(u[3], v4_mul(s, s), dot4(rx, rx, ry, ry, rz, rz)));
 }
 
-/* The voxels of a tile. */
-typedef struct voxels {
-    uint32_t number[64]; /* of the nearest feature */
-    _Alignas(32) double d2[64];
-    int n_settled; /* what had to be settled in double */
-    uint8_t settled[64];
-    double settled_d2[64];
-} voxels;
-
-static void choose_features(const tile *t, voxels *x)
+/* Sets x->number of all voxels: the candidate that is clearly nearest in float, or else the one
+   that is nearest in double. */
+static void tile_choose(const tile *t, voxels *x)
 {
     const sdm_grid_job *job = t->job;
-    const v8f doubt = v8_all(doubt_of(t->error));
+    const sdm_candidates *c = t->candidates;
+    const v8f k = v8_all(ambiguity(t->error));
     for (int v = 0; v < 8; v++) {
-        const uint8_t *place = job->voxel_in_tile[v];
-        if (!(t->wanted >> v & 1)) {
-            for (int i = 0; i < 8; i++) x->number[place[i]] = 0;
+        if (!(t->vectors >> v & 1)) {
+            for (int i = 0; i < 8; i++) x->number[voxel_index(job, v, i)] = 0;
             continue;
         }
+        // clear: the second nearest is farther than the first by more than the errors of both;
+        // false for NaN (INFINITY - INFINITY)
         const unsigned at = 8 * t->number + (unsigned)v;
-        const sdm_candidates *c = t->s->of_vectors;
         const v8f first = v8_load(c->first[at]);
-        const v8f limit = v8_fma(v8_add(v8_sqrt(first), v8_all(1)), doubt, first);
+        const v8f limit = v8_fma(v8_add(v8_sqrt(first), v8_all(1)), k, first);
         const int clear = v8_greater(v8_load(c->second[at]), limit) & (int)~c->open[at];
         for (int i = 0; i < 8; i++) {
-            const uint32_t number = x->number[place[i]] = c->number[at][i];
-            __builtin_prefetch(&job->features->exact[number]); // for measure_voxels()
+            const uint32_t number = x->number[voxel_index(job, v, i)] = c->number[at][i];
+            __builtin_prefetch(&job->features->exact[number]); // for tile_measure()
         }
-        // NaN (INFINITY - INFINITY) is not clear either
+        // the other voxels: all of their candidates in double
         for (int open = 0xff & ~clear; open; open &= open - 1) {
-            const int lane = __builtin_ctz((unsigned)open), i = place[lane];
+            const int lane = __builtin_ctz((unsigned)open);
+            const unsigned i = voxel_index(job, v, lane);
             double p[3];
-            for (int a = 0; a < 3; a++) p[a] = t->corner[a] + job->tile_voxel[a][i];
+            voxel_position(t, i, p);
             x->settled[x->n_settled] = (uint8_t)i;
-            x->number[i] = settle(t, at, lane, p, &x->settled_d2[x->n_settled]);
+            x->number[i] = voxel_settle(t, at, lane, p, &x->settled_d2[x->n_settled]);
             x->n_settled++;
         }
     }
 }
 
-/* Squared distances of the voxels in double. */
-static void measure_voxels(const tile *t, voxels *x)
+/* Sets x->d2 of all voxels from x->number. */
+static void tile_measure(const tile *t, voxels *x)
 {
-    const double(*at)[64] = (const double(*)[64])t->job->tile_voxel;
+    const double(*at)[64] = t->job->tile_voxel;
     const double *c = t->corner;
     uint32_t number[64];
     for (int i = 0; i < 64; i++) number[i] = x->number[i] == SDM_NONE ? 0 : x->number[i];
     for (int i = 0; i < 64; i += 4)
-        measure_four(t->job->features->exact, &number[i], v4_add(v4_all(c[0]), v4_load(&at[0][i])),
-                     v4_add(v4_all(c[1]), v4_load(&at[1][i])),
-                     v4_add(v4_all(c[2]), v4_load(&at[2][i])), &x->d2[i]);
+        distances4(t->job->features->exact, &number[i], v4_add(v4_all(c[0]), v4_load(&at[0][i])),
+                   v4_add(v4_all(c[1]), v4_load(&at[1][i])),
+                   v4_add(v4_all(c[2]), v4_load(&at[2][i])), &x->d2[i]);
     for (int i = 0; i < x->n_settled; i++) x->d2[x->settled[i]] = x->settled_d2[i];
 }
 
-static void write_tile(const tile *t, voxels *x)
+/* Sets x->number and x->d2 of a tile without candidates: by a search of the tree, or as outside of
+   the narrow band. */
+static void tile_search(const tile *t, voxels *x)
+{
+    for (unsigned i = 0; i < 64; i++) {
+        double p[3];
+        voxel_position(t, i, p);
+        x->number[i] = SDM_NONE;
+        x->d2[i] = INFINITY;
+        if (!(t->job->band_mm < INFINITY)) x->number[i] = nearest_in_tree(t, p, &x->d2[i]);
+    }
+}
+
+/* Writes the distances (mm) and the slots of the voxels that are inside the grid. */
+static void tile_write(const tile *t, voxels *x)
 {
     const sdm_grid_job *job = t->job;
-    const int64_t *whole = job->part[SDM_TO_TILES].size;
+    const int64_t *whole = job->part[SDM_TILES].size;
     float d[64];
     for (int i = 0; i < 64; i++) d[i] = (float)sqrt(x->d2[i]);
+    // from features to triangles
     for (int i = 0; i < 64 && job->slot; i++)
         x->number[i] = x->number[i] == SDM_NONE ? SDM_NONE : job->features->owner[x->number[i]];
     if (job->band_mm < INFINITY)
@@ -139,6 +187,7 @@ static void write_tile(const tile *t, voxels *x)
             d[i] = (float)job->band_mm;
             x->number[i] = SDM_NONE;
         }
+    // row by row, cut off at the end of the grid
     int64_t size[3];
     for (int a = 0; a < 3; a++)
         size[a] = job->n[a] - t->first[a] < whole[a] ? job->n[a] - t->first[a] : whole[a];
@@ -147,7 +196,7 @@ static void write_tile(const tile *t, voxels *x)
             const int64_t to =
                 ((t->first[2] + z) * job->n[1] + t->first[1] + y) * job->n[0] + t->first[0];
             const int64_t from = (z * whole[1] + y) * whole[0];
-            if (size[0] == 4) // the usual size, so that no function is called
+            if (size[0] == 4) // the usual size: a constant lets the compiler inline memcpy
                 memcpy(&job->values[to], &d[from], 4 * sizeof *d);
             else
                 memcpy(&job->values[to], &d[from], (size_t)size[0] * sizeof *d);

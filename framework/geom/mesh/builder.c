@@ -1,10 +1,11 @@
-/* Growing meshes: room is doubled, not added vertex by vertex. */
+/* Meshes that grow: capacity increases geometrically, not vertex by vertex. */
 #include "sdm/internal/builder.h"
 
 #include <string.h>
 
-/* Doubles the room for vertices or triangles. */
-static sdm_status make_room(sdm_builder *b, size_t need_vert, size_t need_tri, sdm_error *err)
+/* Enlarges the arrays to at least the given counts, by half as much again where they are too small.
+ */
+static sdm_status builder_reserve(sdm_builder *b, size_t need_vert, size_t need_tri, sdm_error *err)
 {
     size_t n_vert = b->mesh->n_vert, n_tri = b->mesh->n_tri;
     if (need_vert > n_vert) n_vert = need_vert < 64 ? 64 : need_vert + need_vert / 2;
@@ -15,7 +16,7 @@ static sdm_status make_room(sdm_builder *b, size_t need_vert, size_t need_tri, s
 sdm_status sdm_builder_vertex(sdm_builder *b, const double x[3], sdm_error *err)
 {
     if (b->n_vert >= b->mesh->n_vert) {
-        const sdm_status s = make_room(b, b->n_vert + 1, b->n_tri, err);
+        const sdm_status s = builder_reserve(b, b->n_vert + 1, b->n_tri, err);
         if (s) return s;
     }
     memcpy(b->mesh->vert + 3 * b->n_vert++, x, 3 * sizeof *x);
@@ -26,7 +27,7 @@ sdm_status sdm_builder_triangle(sdm_builder *b, uint32_t v0, uint32_t v1, uint32
                                 sdm_error *err)
 {
     if (b->n_tri >= b->mesh->n_tri) {
-        const sdm_status s = make_room(b, b->n_vert, b->n_tri + 1, err);
+        const sdm_status s = builder_reserve(b, b->n_vert, b->n_tri + 1, err);
         if (s) return s;
     }
     uint32_t *t = b->mesh->tri + 3 * b->n_tri++;

@@ -1,41 +1,39 @@
-/* Bounding volume hierarchy over the triangles of a mesh: a flat array of boxes, a few triangles a
- * leaf. */
+/* Bounding volume hierarchy over the triangles of a mesh: a flat array of nodes with axis-aligned
+ * boxes; at most four triangles per leaf. */
 #ifndef SDM_GEOM_BVH_H
 #define SDM_GEOM_BVH_H
 
 #include "memory/arena.h"
 #include "sdm/mesh.h"
 
-/* Deepest tree that can be built: what a traversal's stack must hold. */
+/* Bound on the depth of a tree, and so on the length of a traversal stack. */
 #define SDM_BVH_DEPTH 128
 
-/* count > 0: a leaf of order[first .. first + count). count == 0: children are nodes first and
- * first + 1. */
+/* count > 0: a leaf with the triangles order[first .. first + count). count == 0: an inner node
+ * with children node[first] and node[first + 1]. lo, hi: bounding box, mm. node[0] is the root. */
 typedef struct sdm_bvh_node {
     double lo[3], hi[3];
     uint32_t first, count;
 } sdm_bvh_node;
 
-/* "Slot": place of a triangle in the tree's order; order[slot] is its index in the mesh. */
+/* A "slot" is the position of a triangle in the order of the tree's leaves; order[slot] is its
+ * index in the mesh. */
 typedef struct sdm_bvh {
-    sdm_bvh_node *node;
-    uint32_t *order;
+    sdm_bvh_node *node; /* [n_node] */
+    uint32_t *order;    /* [n_tri] */
     size_t n_node, n_tri;
 } sdm_bvh;
 
-/* Bytes that a build takes at most: those that stay; to *scratch is added what is taken in passing.
- */
-size_t sdm_bvh_bytes(size_t n_tri, size_t *scratch);
-
-/* Splits in the middle of space; the same tree in every call. n_tri > 0. Taken from the low end of
- * the arena. */
+/* Builds *b over m, which has at least one triangle. Deterministic. Its arrays are taken from the
+ * low end of the arena, scratch memory from the high end. SDM_E_NOMEM. */
 sdm_status sdm_bvh_build(const sdm_mesh *m, sdm_arena *arena, sdm_bvh *b, sdm_error *err);
-/* The same for a mesh made of pieces of the triangles of the mesh of tree `from`, at less cost:
-   piece i is of triangle source[i], which never falls. */
+
+/* The same, cheaper, for a mesh m that was cut from a mesh with the tree `from`: triangle i of m is
+ * a part of triangle source[i] of that mesh; source[] is sorted in ascending order. */
 sdm_status sdm_bvh_derive(const sdm_bvh *from, const sdm_mesh *m, const uint32_t *source,
                           sdm_arena *arena, sdm_bvh *b, sdm_error *err);
 
-/* Squared distance from p to a box. */
+/* Squared distance, mm^2, from p to the box of node n; 0 inside. */
 static inline double sdm_bvh_box_distance2(const sdm_bvh_node *n, const double p[3])
 {
     double sum = 0;

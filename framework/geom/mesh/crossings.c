@@ -1,17 +1,20 @@
-/* Integer winding numbers by signed crossings: exact decisions on which triangles a ray meets
- * (line_triangle.h). */
+/* Integer winding numbers by signed ray crossings; whether a ray crosses a triangle is decided
+ * exactly (line_triangle.h). */
 #include "crossings.h"
 
 #include <math.h>
 
 #include "exactly/line_triangle.h"
 
+/* An axis-parallel ray. axis[0] is the ray's own axis, axis[1] and axis[2] are the other two; p[i]
+ * is the coordinate of its start along axis[i]. */
 typedef struct ray {
-    double p[3]; /* along the ray's axis, then across it */
+    double p[3];
     int axis[3], direction;
 } ray;
 
-static int crossing(const sdm_mesh *m, uint32_t t, const ray *r)
+/* +1: the ray leaves through triangle t; -1: it enters; 0: it does not cross t. */
+static int ray_crossing(const sdm_mesh *m, uint32_t t, const ray *r)
 {
     double v[3][3], area[3];
     for (int k = 0; k < 3; k++) {
@@ -24,7 +27,8 @@ static int crossing(const sdm_mesh *m, uint32_t t, const ray *r)
     return after == r->direction ? orientation * r->direction : 0;
 }
 
-static int reaches(const sdm_bvh_node *n, const ray *r)
+/* Does the ray meet the box of node n? */
+static int ray_meets_box(const sdm_bvh_node *n, const ray *r)
 {
     const int x = r->axis[0], y = r->axis[1], z = r->axis[2];
     if (r->p[1] < n->lo[y] || r->p[1] > n->hi[y] || r->p[2] < n->lo[z] || r->p[2] > n->hi[z])
@@ -32,7 +36,7 @@ static int reaches(const sdm_bvh_node *n, const ray *r)
     return r->direction > 0 ? n->hi[x] >= r->p[0] : n->lo[x] <= r->p[0];
 }
 
-static int skipped(uint32_t t, const uint32_t *skip, size_t n_skip)
+static int is_skipped(uint32_t t, const uint32_t *skip, size_t n_skip)
 {
     for (size_t i = 0; i < n_skip; i++)
         if (skip[i] == t) return 1;
@@ -46,13 +50,14 @@ int sdm_ray_winding(const sdm_mesh *m, const sdm_bvh *tree, const double p[3], i
     const ray r = {{p[axis], p[y], p[z]}, {axis, y, z}, direction};
     uint32_t stack[SDM_BVH_DEPTH];
     int top = 0, winding = 0;
-    if (reaches(&tree->node[0], &r)) stack[top++] = 0;
+    if (ray_meets_box(&tree->node[0], &r)) stack[top++] = 0;
     while (top) {
         const sdm_bvh_node *n = &tree->node[stack[--top]];
         for (uint32_t i = n->first; n->count && i < n->first + n->count; i++)
-            if (!skipped(tree->order[i], skip, n_skip)) winding += crossing(m, tree->order[i], &r);
+            if (!is_skipped(tree->order[i], skip, n_skip))
+                winding += ray_crossing(m, tree->order[i], &r);
         for (uint32_t c = n->first; !n->count && c < n->first + 2; c++)
-            if (reaches(&tree->node[c], &r)) stack[top++] = c;
+            if (ray_meets_box(&tree->node[c], &r)) stack[top++] = c;
     }
     return winding;
 }

@@ -5,12 +5,12 @@
 
 #include "sdm/internal/vec3.h"
 
-/* Below this share of the longest edge the cross product has lost half of the digits of the height.
- */
+/* A triangle with height / longest edge below this is a needle: the cross product of its edges has
+ * lost half of the digits of its height. */
 #define NEEDLE 1e-7
-/* Squared lengths in this range have squares of their own that are numbers too. */
-#define LEAST_SQUARE 1e-140
-#define MOST_SQUARE 1e140
+/* Squared lengths between these can be squared again without overflow or underflow. */
+#define SQUARE_MIN 1e-140
+#define SQUARE_MAX 1e140
 
 void sdm_facet_frame(const sdm_mesh *m, size_t t, sdm_frame *f)
 {
@@ -43,13 +43,15 @@ void sdm_facets_build(const sdm_mesh *m, const double apex[3], sdm_facet *facet,
         v3_sub(a, apex, from);
         v3_cross(ab, ac, n);
         const double lab = v3_dot(ab, ab), lac = v3_dot(ac, ac), lbc = v3_dot(bc, bc);
-        const double most = lab > lac ? lab : lac;
-        const double square = most > lbc ? most : lbc, longest = sqrt(square), norm = v3_norm(n);
+        const double larger = lab > lac ? lab : lac;
+        const double square = larger > lbc ? larger : lbc, longest = sqrt(square),
+                     norm = v3_norm(n);
         *volume += v3_dot(from, n) / 6;
         *area += 0.5 * norm;
+        // normal and height from the cross product where it is accurate, else from the frame
         sdm_facet *f = &facet[t];
         f->longest = longest;
-        if (norm > NEEDLE * square && square > LEAST_SQUARE && square < MOST_SQUARE) {
+        if (norm > NEEDLE * square && square > SQUARE_MIN && square < SQUARE_MAX) {
             const double one = 1 / norm;
             for (int i = 0; i < 3; i++) f->n[i] = n[i] * one;
             f->height = norm / longest;

@@ -1,4 +1,4 @@
-/* What is asked of every triangle of a mesh: its normal and how flat it is. */
+/* Normal, longest edge and height of every triangle of a mesh. */
 #ifndef SDM_GEOM_FACET_H
 #define SDM_GEOM_FACET_H
 
@@ -6,19 +6,21 @@
 #include "sdm/mesh.h"
 
 typedef struct sdm_facet {
-    double
-        n[3]; /* unit normal, outward; any vector across the longest edge when there is no area */
-    double longest; /* length of the longest edge */
-    double height;  /* over it; exact to rounding for needles too */
+    /* outward unit normal; for a triangle without area any unit vector perpendicular to its longest
+     * edge */
+    double n[3];
+    double longest; /* length of the longest edge, mm */
+    double height;  /* over the longest edge, mm; accurate to rounding for needles too */
 } sdm_facet;
 
-/* Frame of triangle t. */
+/* *f = the frame of triangle t (point_triangle.h). */
 void sdm_facet_frame(const sdm_mesh *m, size_t t, sdm_frame *f);
 
-/* Mean of the corners of triangle t. */
+/* x = centroid of triangle t. */
 void sdm_facet_centre(const sdm_mesh *m, size_t t, double x[3]);
 
-/* facet[n_tri]; *area (mm^2) and *volume (mm^3, signed, of the cones from `apex`) are set. */
+/* Fills facet[n_tri]. *area = surface area, mm^2. *volume = signed volume, mm^3, summed over the
+ * tetrahedra of the triangles with `apex`; a point near the mesh keeps the rounding error small. */
 void sdm_facets_build(const sdm_mesh *m, const double apex[3], sdm_facet *facet, double *area,
                       double *volume);
 

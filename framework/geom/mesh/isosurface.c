@@ -1,8 +1,9 @@
-/* Iso-surfaces of maps: marching cubes (Lorensen and Cline 1987) without a table of cases. In every
-   cell the crossings of each face are joined by directed segments; the segments chain into loops,
-   and the loops become triangles. An ambiguous face is decided by its bilinear saddle (Nielson and
-   Hamann 1991), a function of the face alone: both cells at a face draw the same segments in
-   opposite directions, which closes the surface. */
+/* Iso-surface of a map: marching cubes (Lorensen and Cline 1987) without a table of cases. On each
+ * face of a cell (8 neighbouring voxels) directed segments join the points where the level is
+ * crossed; the segments of the six faces form closed loops, and the loops become triangles. An
+ * ambiguous face is decided by the value of its bilinear interpolant at the saddle (Nielson and
+ * Hamann 1991). This depends on the face alone, so both cells at a face draw the same segments in
+ * opposite directions, which closes the surface. */
 #include <float.h>
 #include <math.h>
 
@@ -12,37 +13,38 @@
 
 #define NO_VERTEX UINT32_MAX
 
-/* A vertex keeps this distance (in voxels) from the voxel centres: values equal to the level would
- * make empty triangles. */
-#define LEAST_STEP 1e-4
+/* Minimum distance of a vertex from a voxel centre, in voxels: voxels exactly at the level would
+ * give triangles without area. */
+#define STEP_MIN 1e-4
 
-/* Corner c of a cell is at (c & 1, c >> 1 & 1, c >> 2). Edge 4 a + 2 v + u runs along axis a, at u
-   along axis a + 1 and v along axis a + 2 (modulo 3); this is the corner it starts from. */
+/* Corner c of a cell is at (c & 1, c >> 1 & 1, c >> 2). Edge 4 a + 2 v + u of a cell runs along
+ * axis a; it is at u along axis (a + 1) % 3 and at v along axis (a + 2) % 3. Returns the corner at
+ * its lower end. */
 static int edge_start(int edge)
 {
     const int a = edge >> 2, u = edge & 1, v = edge >> 1 & 1;
     return u << (a + 1) % 3 | v << (a + 2) % 3;
 }
 
-/* The work at a surface: two layers of vertices on the edges along x and y, one on the edges along
- * z between them. */
+/* State of the extraction, which goes through the grid layer by layer in z. Vertex indices are kept
+ * for the edges along x and y in two layers, and for the edges along z between them. */
 typedef struct tracer {
     const sdm_grid *g;
     const float *values;
     double level;
-    bool mirrored, cut;
+    bool mirrored; /* the grid's axes form a left-handed system */
+    bool cut;      /* the surface leaves the grid */
     size_t nx, ny, nz;
     uint32_t *edge[2][2]; /* [layer & 1][axis]: [ny][nx] */
     uint32_t *edge_z;     /* [ny][nx] */
     sdm_builder b;
 } tracer;
 
-/* A cell on the surface: values minus level at the corners, vertices on the edges, and for each
- * edge the one its loop goes to. */
+/* A cell that the surface passes through. */
 typedef struct cell {
-    double v[8];
-    uint32_t vertex[12];
-    int next[12];
+    double v[8];         /* value minus level at the corners; < 0: inside */
+    uint32_t vertex[12]; /* vertex on each edge, or NO_VERTEX */
+    int next[12];        /* the edge to which the segment from each edge leads; -1: none */
 } cell;
 
 static double value_at(const tracer *t, size_t i, size_t j, size_t k)
@@ -50,7 +52,8 @@ static double value_at(const tracer *t, size_t i, size_t j, size_t k)
     return (double)t->values[(k * t->ny + j) * t->nx + i] - t->level;
 }
 
-/* The vertex on the edge from (i, j, k) along `axis`, if the level is crossed there. */
+/* Adds the vertex on the grid edge from voxel `at` along `axis`; *vertex = NO_VERTEX when the level
+ * is not crossed there. */
 static sdm_status add_crossing(tracer *t, const size_t at[3], int axis, uint32_t *vertex,
                                sdm_error *err)
 {
@@ -60,43 +63,47 @@ static sdm_status add_crossing(tracer *t, const size_t at[3], int axis, uint32_t
     const double a = value_at(t, at[0], at[1], at[2]);
     const double b = value_at(t, at[0] + (axis == 0), at[1] + (axis == 1), at[2] + (axis == 2));
     if ((a < 0) == (b < 0)) return SDM_OK;
+    // a vertex on the boundary of the grid
     for (int d = 0; d < 3; d++) t->cut = t->cut || (d != axis && (at[d] == 0 || at[d] + 1 == n[d]));
-    if (t->nx < 2 || t->ny < 2 || t->nz < 2) return SDM_OK; /* no cell would use it */
+    // a grid of one layer has no cells to use the vertex
+    if (t->nx < 2 || t->ny < 2 || t->nz < 2) return SDM_OK;
     double index[3] = {(double)at[0], (double)at[1], (double)at[2]}, world[3];
-    index[axis] += fmin(fmax(a / (a - b), LEAST_STEP), 1 - LEAST_STEP);
+    index[axis] += fmin(fmax(a / (a - b), STEP_MIN), 1 - STEP_MIN);
     sdm_grid_world(t->g, index, world);
     *vertex = (uint32_t)t->b.n_vert;
     return sdm_builder_vertex(&t->b, world, err);
 }
 
-/* Vertices on the edges in layer k, and with `upwards` on those from layer k to the next. */
+/* Adds the vertices on the grid edges along x and y in layer k, or with `upwards` those on the
+ * edges from layer k to layer k + 1. */
 static sdm_status add_layer(tracer *t, size_t k, bool upwards, sdm_error *err)
 {
     for (size_t j = 0; j < t->ny; j++) {
         for (size_t i = 0; i < t->nx; i++) {
             const size_t at[3] = {i, j, k}, slot = j * t->nx + i;
-            sdm_status e;
+            sdm_status s;
             if (upwards) {
-                e = add_crossing(t, at, 2, &t->edge_z[slot], err);
-                if (e) return e;
+                s = add_crossing(t, at, 2, &t->edge_z[slot], err);
+                if (s) return s;
                 continue;
             }
             for (int axis = 0; axis < 2; axis++) {
-                e = add_crossing(t, at, axis, &t->edge[k & 1][axis][slot], err);
-                if (e) return e;
+                s = add_crossing(t, at, axis, &t->edge[k & 1][axis][slot], err);
+                if (s) return s;
             }
         }
     }
     return SDM_OK;
 }
 
-/* Directed segments on the face normal to `axis` at its lower (side 0) or upper end. Going around
-   the face counter-clockwise as seen from outside the cell, a segment leads from an edge where the
-   walk enters the inside to one where it leaves it. */
+/* Draws the directed segments on one face of the cell: the lower (side 0) or upper (side 1) face
+ * perpendicular to `axis`. Walk around the face counter-clockwise, seen from outside the cell: each
+ * segment leads from an edge on which the walk enters the inside to one on which it leaves. */
 static void join_face(cell *c, int axis, int side)
 {
     const int a1 = (axis + 1) % 3, a2 = (axis + 2) % 3, base = side << axis, one = 1 << a1,
               two = 1 << a2;
+    // corners and edges in the order of the walk
     const int upper[4] = {base, base | one, base | one | two, base | two},
               lower[4] = {upper[0], upper[3], upper[2], upper[1]};
     const int up[4] = {4 * a1 + 2 * side, 4 * a2 + 2 + side, 4 * a1 + 2 * side + 1, 4 * a2 + side};
@@ -110,23 +117,24 @@ static void join_face(cell *c, int axis, int side)
     }
     if (n_enter == 1) c->next[enter[0]] = leave[0];
     if (n_enter != 2) return;
-    /* four crossings: joined if the saddle is inside; then a segment leads back to the leave
-     * before, else to the next one */
+    // Four crossings: the two inside corners are joined if the saddle is inside. Then each segment
+    // leads to the previous leaving edge of the walk, else to the next one.
     const double even = c->v[corner[0]] * c->v[corner[2]], odd = c->v[corner[1]] * c->v[corner[3]];
     const bool starts_inside = c->v[corner[0]] < 0,
                joined = starts_inside ? even > odd : odd > even;
     for (int i = 0; i < 2; i++) c->next[enter[i]] = leave[(i + (starts_inside != joined)) % 2];
 }
 
-/* The two faces an edge lies on, as bits. */
+/* The two faces of the cell on which an edge lies, as a bit mask. */
 static int edge_faces(int edge)
 {
     const int a = edge >> 2;
     return 1 << (2 * ((a + 1) % 3) + (edge & 1)) | 1 << (2 * ((a + 2) % 3) + (edge >> 1 & 1));
 }
 
-/* Sum of the squared diagonals of the fan around corner p of a loop, or infinity when a diagonal
-   lies on a face of the cell: the cell behind that face could draw the same one. */
+/* Cost of triangulating loop[n] as a fan around its corner p: the sum of the squared lengths of its
+ * diagonals. INFINITY when a diagonal lies on a face of the cell: the neighbouring cell could use
+ * the same diagonal, which would then be an edge of four triangles. */
 static double fan_cost(const tracer *t, const cell *c, const int *loop, int n, int p)
 {
     double cost = 0;
@@ -146,7 +154,8 @@ static sdm_status add_triangle(tracer *t, uint32_t a, uint32_t b, uint32_t c, sd
                        : sdm_builder_triangle(&t->b, a, b, c, err);
 }
 
-/* A fan around the middle of the loop, for the few loops that have no other. */
+/* Triangulates the loop as a fan around its centroid, a new vertex, for the few loops on which
+ * every other fan costs INFINITY. */
 static sdm_status fill_around_middle(tracer *t, const cell *c, const int *loop, int n,
                                      sdm_error *err)
 {
@@ -155,35 +164,38 @@ static sdm_status fill_around_middle(tracer *t, const cell *c, const int *loop, 
         for (int d = 0; d < 3; d++)
             middle[d] += t->b.mesh->vert[3 * (size_t)c->vertex[loop[i]] + (size_t)d] / n;
     const uint32_t v = (uint32_t)t->b.n_vert;
-    sdm_status e = sdm_builder_vertex(&t->b, middle, err);
-    for (int i = 0; i < n && !e; i++)
-        e = add_triangle(t, v, c->vertex[loop[i]], c->vertex[loop[(i + 1) % n]], err);
-    return e;
+    sdm_status s = sdm_builder_vertex(&t->b, middle, err);
+    for (int i = 0; i < n && !s; i++)
+        s = add_triangle(t, v, c->vertex[loop[i]], c->vertex[loop[(i + 1) % n]], err);
+    return s;
 }
 
+/* Triangulates the loop as the cheapest fan. */
 static sdm_status fill_loop(tracer *t, const cell *c, const int *loop, int n, sdm_error *err)
 {
     int best = 0;
-    double least = INFINITY;
+    double best_cost = INFINITY;
     for (int p = 0; p < n; p++) {
         const double cost = fan_cost(t, c, loop, n, p);
-        if (!(cost < least)) continue;
-        least = cost;
+        if (!(cost < best_cost)) continue;
+        best_cost = cost;
         best = p;
     }
-    if (!(least < INFINITY)) return fill_around_middle(t, c, loop, n, err);
-    sdm_status e = SDM_OK;
-    for (int i = 1; i < n - 1 && !e; i++)
-        e = add_triangle(t, c->vertex[loop[best]], c->vertex[loop[(best + i) % n]],
+    if (!(best_cost < INFINITY)) return fill_around_middle(t, c, loop, n, err);
+    sdm_status s = SDM_OK;
+    for (int i = 1; i < n - 1 && !s; i++)
+        s = add_triangle(t, c->vertex[loop[best]], c->vertex[loop[(best + i) % n]],
                          c->vertex[loop[(best + i + 1) % n]], err);
-    return e;
+    return s;
 }
 
+/* Adds the triangles of one cell. */
 static sdm_status trace_cell(tracer *t, cell *c, sdm_error *err)
 {
     for (int e = 0; e < 12; e++) c->next[e] = -1;
     for (int face = 0; face < 6; face++) join_face(c, face >> 1, face & 1);
     for (int start = 0; start < 12; start++) {
+        // follow the loop through this edge, and delete its segments
         int loop[12], n = 0;
         for (int e = start; c->next[e] >= 0;) {
             loop[n++] = e;
@@ -191,13 +203,13 @@ static sdm_status trace_cell(tracer *t, cell *c, sdm_error *err)
             c->next[e] = -1;
             e = next;
         }
-        const sdm_status status = n ? fill_loop(t, c, loop, n, err) : SDM_OK;
-        if (status) return status;
+        const sdm_status s = n ? fill_loop(t, c, loop, n, err) : SDM_OK;
+        if (s) return s;
     }
     return SDM_OK;
 }
 
-/* The vertices on the twelve edges of the cell at (i, j, k). */
+/* Fills c->vertex for the cell with lower corner (i, j, k). */
 static void collect_vertices(const tracer *t, size_t i, size_t j, size_t k, cell *c)
 {
     for (int e = 0; e < 12; e++) {
@@ -208,6 +220,7 @@ static void collect_vertices(const tracer *t, size_t i, size_t j, size_t k, cell
     }
 }
 
+/* Adds the triangles of the cells between layers k and k + 1. */
 static sdm_status trace_layer(tracer *t, size_t k, sdm_error *err)
 {
     for (size_t j = 0; j + 1 < t->ny; j++) {
@@ -220,22 +233,22 @@ static sdm_status trace_layer(tracer *t, size_t k, sdm_error *err)
             }
             if (inside == 0 || inside == 8) continue;
             collect_vertices(t, i, j, k, &c);
-            const sdm_status e = trace_cell(t, &c, err);
-            if (e) return e;
+            const sdm_status s = trace_cell(t, &c, err);
+            if (s) return s;
         }
     }
     return SDM_OK;
 }
 
-static sdm_status trace(tracer *t, sdm_error *err)
+static sdm_status trace_grid(tracer *t, sdm_error *err)
 {
-    sdm_status e = add_layer(t, 0, false, err);
-    for (size_t k = 0; k < t->nz && !e; k++) {
-        if (k + 1 < t->nz) e = add_layer(t, k + 1, false, err);
-        if (!e) e = add_layer(t, k, true, err);
-        if (!e && k + 1 < t->nz) e = trace_layer(t, k, err);
+    sdm_status s = add_layer(t, 0, false, err);
+    for (size_t k = 0; k < t->nz && !s; k++) {
+        if (k + 1 < t->nz) s = add_layer(t, k + 1, false, err);
+        if (!s) s = add_layer(t, k, true, err);
+        if (!s && k + 1 < t->nz) s = trace_layer(t, k, err);
     }
-    return e ? e : sdm_builder_finish(&t->b, err);
+    return s ? s : sdm_builder_finish(&t->b, err);
 }
 
 static sdm_status check_values(const sdm_grid *g, const float *values, float level, sdm_error *err)
@@ -255,31 +268,33 @@ sdm_status sdm_isosurface(const sdm_grid *grid, const float *values, float level
                           bool *cut, sdm_error *err)
 {
     if (!grid || !values || !out) return sdm_fail(err, SDM_E_ARG, "sdm_isosurface: NULL argument");
-    sdm_status e = sdm_grid_check(grid, err);
-    if (!e) e = check_values(grid, values, level, err);
-    if (e) return e;
+    sdm_status s = sdm_grid_check(grid, err);
+    if (!s) s = check_values(grid, values, level, err);
+    if (s) return s;
     out->n_vert = out->n_tri = 0;
     tracer t = {
         .g = grid, .values = values, .level = (double)level, .b = {.path = "", .mesh = out}};
     t.nx = (size_t)grid->n[0];
     t.ny = (size_t)grid->n[1];
     t.nz = (size_t)grid->n[2];
+    // sign of the determinant of the direction matrix
     const double *r = grid->dir;
     t.mirrored = r[0] * (r[4] * r[8] - r[5] * r[7]) - r[1] * (r[3] * r[8] - r[5] * r[6]) +
                      r[2] * (r[3] * r[7] - r[4] * r[6]) <
                  0;
+    // five layers of vertex indices: two of edges along x, two along y, one along z
     uint32_t *layers = NULL;
     const size_t area = t.nx * t.ny;
     size_t five;
-    e = sdm_mul(area, 5, &five, err);
-    if (!e) e = SDM_ALLOC(&layers, five, "layers of an iso-surface", err);
-    if (!e) {
+    s = sdm_mul(area, 5, &five, err);
+    if (!s) s = SDM_ALLOC(&layers, five, "layers of an iso-surface", err);
+    if (!s) {
         for (int i = 0; i < 4; i++) t.edge[i >> 1][i & 1] = layers + (size_t)i * area;
         t.edge_z = layers + 4 * area;
-        e = trace(&t, err);
+        s = trace_grid(&t, err);
     }
     sdm_free(layers);
-    if (e) sdm_mesh_dispose(out);
-    if (!e && cut) *cut = t.cut;
-    return e;
+    if (s) sdm_mesh_dispose(out);
+    if (!s && cut) *cut = t.cut;
+    return s;
 }

@@ -1,4 +1,4 @@
-/* Triangle meshes: storage. */
+/* Storage of triangle meshes. */
 #include "sdm/mesh.h"
 
 #include <string.h>

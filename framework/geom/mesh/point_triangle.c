@@ -1,12 +1,12 @@
-/* Closest point on a triangle through the triangle's own frame. */
+/* Point-triangle distance in the triangle's own coordinate frame. */
 #include "point_triangle.h"
 
 #include <math.h>
 
 #include "sdm/internal/vec3.h"
 
-/* Unit direction of (dx, dy), or of -x when it has no length; returns the length. */
-static double direction(double dx, double dy, double *ex, double *ey)
+/* (*ex, *ey) = unit vector along (dx, dy), or (-1, 0) for the zero vector; returns the length. */
+static double unit_direction(double dx, double dy, double *ex, double *ey)
 {
     const double len = sqrt(dx * dx + dy * dy);
     *ex = len > 0 ? dx / len : -1;
@@ -16,7 +16,7 @@ static double direction(double dx, double dy, double *ex, double *ey)
 
 void sdm_frame_build(const double a[3], const double b[3], const double c[3], sdm_frame *f)
 {
-    // turn the triangle until its longest edge comes first
+    // rotate the corners so that the longest edge comes first
     const double *corner[5] = {a, b, c, a, b};
     const double l0 = v3_dist2(a, b), l1 = v3_dist2(b, c), l2 = v3_dist2(c, a);
     const int rotation = l0 >= l1 && l0 >= l2 ? 0 : l1 >= l2 ? 1 : 2;
@@ -30,7 +30,8 @@ void sdm_frame_build(const double a[3], const double b[3], const double c[3], sd
         f->u[i] = length > 0 ? ab[i] / length : i == 0;
     }
 
-    // v: the part of ac across u, taken twice so that it is orthogonal for needles as well
+    // v = component of ac perpendicular to u; projected out twice (Gram-Schmidt with
+    // reorthogonalisation), so that it is orthogonal for needles as well
     double w[3] = {ac[0], ac[1], ac[2]};
     double cx = 0;
     for (int pass = 0; pass < 2; pass++) {
@@ -39,8 +40,7 @@ void sdm_frame_build(const double a[3], const double b[3], const double c[3], sd
         v3_along(w, -along, f->u, w);
     }
     const double cy = v3_norm(w);
-    // what is left of a needle after two passes may be rounding: below that there is no plane to
-    // find
+    // a remainder below the rounding error of ac: the triangle has no area and no normal
     const int flat = !(cy > 2.3e-16 * length);
     if (flat) {
         v3_perpendicular(f->u, f->v);
@@ -53,10 +53,11 @@ void sdm_frame_build(const double a[3], const double b[3], const double c[3], sd
     }
     v3_cross(f->u, f->v, f->n);
 
+    // the other two edges as lines in the frame
     const double y = flat ? 0 : v3_dot(ac, f->v);
     const double x = flat ? v3_dot(ac, f->u) : cx;
-    const double len1 = direction(x - length, y, &f->e1x, &f->e1y);
-    const double len2 = direction(-x, -y, &f->e2x, &f->e2y);
+    const double len1 = unit_direction(x - length, y, &f->e1x, &f->e1y);
+    const double len2 = unit_direction(-x, -y, &f->e2x, &f->e2y);
     f->half[0] = 0.5 * length;
     f->half[1] = 0.5 * len1;
     f->half[2] = 0.5 * len2;
@@ -69,10 +70,12 @@ void sdm_frame_build(const double a[3], const double b[3], const double c[3], sd
 
 double sdm_frame_height(const sdm_frame *f)
 {
-    // 2 area / base: the third corner is (2 half[0] + 2 half[1] e1) in the frame
+    // y coordinate of the third corner, (2 half[0], 0) + 2 half[1] (e1x, e1y)
     return 2 * f->half[1] * fabs(f->e1y);
 }
 
+/* A point in the coordinates of a frame: (x, y, z) along u, v, n; t_k and h_k of sdm_frame for the
+ * three edges. */
 typedef struct position {
     double x, y, z, t[3], h[3];
 } position;
@@ -104,8 +107,8 @@ double sdm_frame_distance2(const sdm_frame *f, const double p[3])
         beyond[k] = fmax(fabs(s.t[k]) - f->half[k], 0);
         d[k] = beyond[k] * beyond[k] + s.h[k] * s.h[k];
     }
-    // inside the three lines; what lies beyond the ends of the longest edge guards needles, whose
-    // lines nearly coincide
+    // Above the face when inside all three edge lines. beyond[0] is 0 then but for needles, whose
+    // edge lines nearly coincide far beyond the ends of the longest edge.
     if (s.h[0] < 0 && s.h[1] < 0 && s.h[2] < 0) return beyond[0] * beyond[0] + s.z * s.z;
     return fmin(fmin(d[0], d[1]), d[2]) + s.z * s.z;
 }
@@ -126,7 +129,7 @@ double sdm_frame_closest(const sdm_frame *f, const double p[3], double q[3], int
             const double d = beyond * beyond + s.h[k] * s.h[k];
             if (!(d < best)) continue;
             best = d;
-            // outward across edge k is (ey, -ex)
+            // the outward normal of edge k in the plane is (ey, -ex)
             x = s.x - beyond * ex[k] - s.h[k] * ey[k];
             y = s.y - beyond * ey[k] + s.h[k] * ex[k];
             const int at = beyond > 0 ? (k + 1) % 3 : k;

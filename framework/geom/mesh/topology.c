@@ -1,11 +1,12 @@
-/* Which vertices coincide and which triangles share which edges: hashing for the first, lists of
- * each vertex for the second. */
+/* Welds coinciding vertices with a hash table and finds the edges with one list of half-edges per
+ * vertex. */
 #include "topology.h"
 
 #include <string.h>
 
 #include "sdm/internal/rng.h"
 
+/* Size of the hash table for n vertices: a power of two, at most half full. */
 static size_t table_size(size_t n)
 {
     size_t size = 16;
@@ -21,16 +22,17 @@ static uint64_t bits_of(double x)
     return b;
 }
 
+/* weld[v] = lowest index of a vertex with the coordinates of v. */
 static sdm_status weld_vertices(const sdm_mesh *m, sdm_arena *arena, uint32_t *weld, sdm_error *err)
 {
     const sdm_arena_mark before = arena->end[SDM_LOW];
     const size_t size = table_size(m->n_vert);
-    uint32_t *table; // vertex + 1; 0: free
+    uint32_t *table; // [size] hash table with linear probing: vertex + 1; 0: free
     const sdm_status s = SDM_TAKE(arena, SDM_LOW, &table, size, "vertex table", err);
     if (s) return s;
     for (size_t v = 0; v < m->n_vert; v++) {
         const double *p = &m->vert[3 * v];
-        // odd factors: coordinates of a grid must not meet
+        // odd factors: points of a grid must not share sums and collide
         const uint64_t x = bits_of(p[0]), y = bits_of(p[1]), z = bits_of(p[2]);
         size_t slot = sdm_mix64(x + y * 0x9e3779b97f4a7c15u + z * 0xd1b54a32d192ed03u) & (size - 1);
         for (;; slot = (slot + 1) & (size - 1)) {
@@ -54,18 +56,18 @@ static sdm_status weld_vertices(const sdm_mesh *m, sdm_arena *arena, uint32_t *w
 static inline uint32_t lower(uint32_t a, uint32_t b) { return a < b ? a : b; }
 static inline uint32_t higher(uint32_t a, uint32_t b) { return a < b ? b : a; }
 
-/* A half-edge in the list of the lower of its vertices. */
+/* A half-edge in the list of the lower of its two vertices. */
 typedef struct half_edge {
-    uint32_t hi;
-    uint32_t index; // 2 * half-edge + whether it runs upwards
+    uint32_t hi;    // the higher vertex
+    uint32_t index; // 2 * half-edge + (1 if it runs from the lower to the higher vertex)
 } half_edge;
 
-/* The half-edges of which a vertex is the lower end, rising: list[lo[v] .. lo[v + 1]). By counting.
- */
+/* Counting sort of the half-edges by their lower vertex: those of v become
+ * list[lo[v] .. lo[v + 1]), in ascending order. lo[n_vert + 2] is zero on entry. */
 static void list_half_edges(const sdm_topology *t, uint32_t *lo, half_edge *list)
 {
-    // counts, then starts, two places ahead: filling moves each start to the place of the one
-    // before
+    // lo[v + 2] = number of half-edges of v; after the prefix sum lo[v + 1] = start of v's list,
+    // which filling advances to its end, the start of the next list
     uint32_t *count = lo + 2;
     for (size_t i = 0; i < t->n_tri; i++) {
         const uint32_t *v = &t->tri[3 * i];
@@ -86,18 +88,20 @@ static void list_half_edges(const sdm_topology *t, uint32_t *lo, half_edge *list
     }
 }
 
-/* While the edges of vertex lo are made: its edge to each other vertex; valid where `lo` is that
- * vertex + 1. */
+/* Entry of a vertex: `edge` joins it to the vertex lo - 1, the last lower vertex that has an edge
+ * to it. */
 typedef struct mark {
     uint32_t lo, edge;
 } mark;
 
+/* Fills t->edges, t->edge and t->next from the sorted half-edges. seen[n_vert] is zero on entry. */
 static void make_edges(sdm_topology *t, const uint32_t *lo, const half_edge *list, mark *seen)
 {
     uint32_t n = 0;
     for (uint32_t v = 0; v < t->n_vert; v++) {
         for (uint32_t i = lo[v]; i < lo[v + 1]; i++) {
-            // without branches: every second half-edge is the first of its edge
+            // The edge of this half-edge: a new one, or the one in seen[]. Without branches, which
+            // would be mispredicted: every second half-edge is the first of its edge.
             const half_edge x = list[i];
             const uint32_t h = x.index / 2, is_up = x.index % 2;
             mark *m = &seen[x.hi];
@@ -105,6 +109,7 @@ static void make_edges(sdm_topology *t, const uint32_t *lo, const half_edge *lis
             const uint32_t edge = is_new ? n : m->edge, keep = is_new - 1u;
             *m = (mark){v + 1, edge};
             n += is_new;
+            // `keep` masks the members of an edge: 0 for a new one, all bits otherwise
             sdm_edge *e = &t->edges[edge];
             t->edge[h] = edge;
             t->next[h] = e->first | ~keep;
@@ -131,16 +136,10 @@ static sdm_status find_edges(sdm_topology *t, sdm_arena *arena, sdm_error *err)
     return s;
 }
 
-size_t sdm_topology_bytes(const sdm_mesh *m, size_t *scratch)
-{
-    *scratch += table_size(m->n_vert) * sizeof(uint32_t) +
-                m->n_vert * (sizeof(mark) + sizeof(uint32_t)) + 3 * m->n_tri * sizeof(half_edge);
-    return m->n_vert * sizeof(uint32_t) + m->n_tri * (9 * sizeof(uint32_t) + 3 * sizeof(sdm_edge));
-}
-
 sdm_status sdm_topology_build(const sdm_mesh *m, sdm_arena *arena, sdm_topology *t, sdm_error *err)
 {
-    if (m->n_tri > UINT32_MAX / 6 - 1) // half-edges are numbered, with a bit for their direction
+    // 2 * half-edge + direction must fit in 32 bits
+    if (m->n_tri > UINT32_MAX / 6 - 1)
         return sdm_fail(err, SDM_E_MESH, "mesh of %zu triangles, at most %u can be prepared",
                         m->n_tri, UINT32_MAX / 6 - 1);
     t->n_vert = m->n_vert;
@@ -152,6 +151,7 @@ sdm_status sdm_topology_build(const sdm_mesh *m, sdm_arena *arena, sdm_topology 
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &t->edges, 3 * m->n_tri, "edges", err);
     if (!s) s = weld_vertices(m, arena, t->weld, err);
     if (s) return s;
+    // triangles with welded vertices; degenerate ones get no half-edges (all bytes 0xff: SDM_NONE)
     for (size_t i = 0; i < m->n_tri; i++) {
         uint32_t *v = &t->tri[3 * i];
         for (size_t k = 0; k < 3; k++) v[k] = t->weld[m->tri[3 * i + k]];

@@ -1,5 +1,6 @@
-/* The oracle and the "naive" baseline: every point against every triangle in double, nothing
-   precomputed, no tree. On purpose it shares no geometry with the engine. */
+/* Brute force: the distance of every point to every triangle in double, without a tree or other
+ * precomputed data. It shares no geometry code with the exact engine on purpose, so that tests can
+ * use it as an independent oracle. It is also the method "naive". */
 #include <float.h>
 #include <math.h>
 
@@ -29,8 +30,8 @@ static double segment_distance2(vec a, vec b)
     return dot(q, q);
 }
 
-/* Squared distance from the origin to the triangle: its plane where the foot of the perpendicular
- * lies inside, else its edges. */
+/* Squared distance from the origin to the triangle: to its plane if the origin projects into the
+ * triangle, otherwise to the nearest edge. */
 static double triangle_distance2(vec a, vec b, vec c)
 {
     const double edges =
@@ -39,7 +40,7 @@ static double triangle_distance2(vec a, vec b, vec c)
     const vec n = cross(ab, minus(c, a));
     const double nn = dot(n, n);
     const double size = fmax(dot(ab, ab), fmax(dot(bc, bc), dot(ca, ca)));
-    // the plane of a needle is rounding only; its edges are as near to within rounding
+    // the normal of a needle is mostly rounding error; its edges are equally near up to rounding
     if (!(nn > 1e-18 * size * size)) return edges;
     if (dot(cross(n, ab), a) < 0 && dot(cross(n, bc), b) < 0 && dot(cross(n, ca), c) < 0) {
         const vec middle = {(a.x + b.x + c.x) / 3, (a.y + b.y + c.y) / 3, (a.z + b.z + c.z) / 3};
@@ -49,7 +50,8 @@ static double triangle_distance2(vec a, vec b, vec c)
     return edges;
 }
 
-/* Solid angle of the triangle seen from the origin. */
+/* Solid angle of the triangle seen from the origin, positive where the normal points away from it
+ * (Van Oosterom and Strackee 1983). */
 static double solid_angle(vec a, vec b, vec c)
 {
     const double la = sqrt(dot(a, a)), lb = sqrt(dot(b, b)), lc = sqrt(dot(c, c));
@@ -82,7 +84,7 @@ sdm_status sdm_naive_map(const sdm_mesh *mesh, const sdm_grid *grid, int n_threa
                          sdm_error *err)
 {
     if (!mesh || !grid || !values)
-        return sdm_fail(err, SDM_E_ARG, "map without a mesh, a grid or a place for the values");
+        return sdm_fail(err, SDM_E_ARG, "mesh, grid and values of a map must not be NULL");
     sdm_audit audit;
     sdm_status s = sdm_mesh_audit(mesh, &audit, err);
     if (!s) s = sdm_grid_check(grid, err);

@@ -1,7 +1,8 @@
-/* Method "edt": linear-time exact Euclidean distance transform (Maurer, Qi, Raghavan 2003), here
-   with seeds finer than the voxels: the points where the lines of voxel centres along x, y and z
-   cross the surface. Three transforms, one for each direction of lines, the nearest seed of all
-   counts. Approximate: the surface between the seeds is not seen. */
+/* Method "edt": exact Euclidean distance transform in linear time (Maurer, Qi, Raghavan 2003) of
+ * seeds finer than the voxels: the points where grid lines (lines through voxel centres) along x, y
+ * and z cross the surface. Three transforms, one for each direction of grid lines; a voxel gets the
+ * distance to the nearest seed of all. The result is approximate, because the surface between the
+ * seeds is ignored. */
 #include <math.h>
 #include <stdio.h>
 
@@ -9,20 +10,24 @@
 #include "sdm/internal/envelope.h"
 #include "sdm/memory.h"
 
-/* Lines next to each other that are worked on together, for the cache. */
+/* Neighbouring lines that one thread transforms together, so that it uses whole cache lines. */
 enum { BUNDLE = 16 };
 
-typedef struct job {
+typedef struct edt_job {
     sdm_run *run;
     sdm_seeds seeds[3];
-    float *work;       /* [nz][ny][nx] squared distance to the seeds of the lines along `first` */
-    double *line;      /* [n_threads][4 * longest line]: see scratch() */
-    int64_t longest;   /* voxels of the longest line */
-    int first, axis;   /* direction of the seeds' lines, of this pass */
-    int64_t n, stride; /* of the lines along axis */
-} job;
+    /* [nz][ny][nx] squared distance to the nearest seed on lines along axis `first`, mm^2 */
+    float *work;
+    /* [n_threads][4 * longest] scratch memory, see line_scratch() */
+    double *line;
+    int64_t longest; /* largest number of voxels along an axis */
+    /* axis of the seeds' grid lines, axis of the lines of the current pass */
+    int first, axis;
+    /* of a line along `axis`: number of voxels, distance between neighbours in `work` */
+    int64_t n, stride;
+} edt_job;
 
-static void set_axis(job *j, int axis)
+static void edt_set_axis(edt_job *j, int axis)
 {
     const int64_t *n = j->run->grid->n;
     j->axis = axis;
@@ -30,15 +35,16 @@ static void set_axis(job *j, int axis)
     j->stride = axis == 0 ? 1 : axis == 1 ? n[0] : n[0] * n[1];
 }
 
-/* Parts of a pass: bundles of lines. */
-static int64_t n_bundles(const job *j)
+/* Number of parts of a pass: a part is a bundle of up to BUNDLE neighbouring lines. */
+static int64_t bundle_count(const edt_job *j)
 {
     const int64_t lines = (int64_t)sdm_grid_count(j->run->grid) / j->n;
     return j->stride == 1 ? lines : lines / j->stride * ((j->stride + BUNDLE - 1) / BUNDLE);
 }
 
-/* First voxel of the bundle, its lines, and the number of its first line. */
-static int64_t bundle(const job *j, int64_t part, int64_t *lines, int64_t *line)
+/* Returns the index of the first voxel of bundle `part`; *lines = number of its lines, *line =
+ * number of its first line (numbered as in sdm_seeds). */
+static int64_t bundle_first_voxel(const edt_job *j, int64_t part, int64_t *lines, int64_t *line)
 {
     if (j->stride == 1) {
         *lines = 1;
@@ -52,26 +58,28 @@ static int64_t bundle(const job *j, int64_t part, int64_t *lines, int64_t *line)
     return plane * j->stride * j->n + from;
 }
 
-static double *scratch(const job *j, int thread)
+static double *line_scratch(const edt_job *j, int thread)
 {
     return j->line + (size_t)thread * 4 * (size_t)j->longest;
 }
 
-/* Squared distances to the seeds of the same line. */
-static void along_seeds(void *arg, int64_t part, int thread)
+/* First pass of a transform: squared distance of every voxel to the nearest seed on its own
+ * line. */
+static void edt_along_seeds(void *arg, int64_t part, int thread)
 {
-    job *j = arg;
+    edt_job *j = arg;
     const sdm_seeds *s = &j->seeds[j->axis];
-    double *before = scratch(j, thread),
-           *after = before + j->n; // nearest seed of each voxel on either side
+    // [n] nearest seed on either side of each voxel
+    double *before = line_scratch(j, thread), *after = before + j->n;
     const double spacing = j->run->grid->spacing[j->axis], last = (double)(j->n - 1);
     int64_t lines, line;
-    const int64_t voxel = bundle(j, part, &lines, &line);
+    const int64_t voxel = bundle_first_voxel(j, part, &lines, &line);
     for (int64_t l = 0; l < lines; l++) {
         for (int64_t i = 0; i < j->n; i++) {
             before[i] = -INFINITY;
             after[i] = INFINITY;
         }
+        // store each seed at the voxels next to it, then propagate along the line
         for (uint32_t k = s->first[line + l]; k < s->first[line + l + 1]; k++) {
             const double x = s->at[k], up = ceil(x), down = floor(x);
             if (up <= last)
@@ -90,15 +98,15 @@ static void along_seeds(void *arg, int64_t part, int thread)
     }
 }
 
-/* Squared distances to seeds of other lines; the last pass of the three keeps the nearest of all
- * directions. */
-static void across_seeds(void *arg, int64_t part, int thread)
+/* Second and third pass of a transform: the minimum over one more axis. The third pass also takes
+ * the minimum over the transforms done so far, in run->values. */
+static void edt_across_seeds(void *arg, int64_t part, int thread)
 {
-    job *j = arg;
-    double *f = scratch(j, thread), *rest = f + j->longest;
+    edt_job *j = arg;
+    double *f = line_scratch(j, thread), *rest = f + j->longest;
     const int last_axis = j->first == 2 ? 1 : 2;
     int64_t lines, line;
-    const int64_t voxel = bundle(j, part, &lines, &line);
+    const int64_t voxel = bundle_first_voxel(j, part, &lines, &line);
     for (int64_t l = 0; l < lines; l++) {
         float *at = j->work + voxel + l, *values = j->run->values + voxel + l;
         for (int64_t i = 0; i < j->n; i++) f[i] = (double)at[i * j->stride];
@@ -112,7 +120,7 @@ static void across_seeds(void *arg, int64_t part, int thread)
     }
 }
 
-static sdm_status transform(job *j, sdm_error *err)
+static sdm_status edt_transform(edt_job *j, sdm_error *err)
 {
     sdm_run *run = j->run;
     const size_t n = sdm_grid_count(run->grid), scratch_size = 4 * (size_t)j->longest;
@@ -125,19 +133,19 @@ static sdm_status transform(job *j, sdm_error *err)
     for (size_t i = 0; i < n && !s; i++) run->values[i] = INFINITY;
     for (int stage = 0; stage < 9 && !s; stage++) {
         j->first = stage / 3;
-        // the lines of the seeds first, then the two other directions
+        // passes of a transform: the axis of the seeds' lines first, then the two other axes
         const int other = stage % 3 == 0   ? j->first
                           : stage % 3 == 1 ? j->first == 0
                           : j->first == 2  ? 1
                                            : 2;
-        set_axis(j, other);
-        s = sdm_run_parts(run, n_bundles(j), stage % 3 ? across_seeds : along_seeds, j, stage, 10,
-                          err);
+        edt_set_axis(j, other);
+        s = sdm_run_parts(run, bundle_count(j), stage % 3 ? edt_across_seeds : edt_along_seeds, j,
+                          stage, 10, err);
     }
     return s;
 }
 
-static sdm_status distances(job *j, sdm_error *err)
+static sdm_status edt_distances(edt_job *j, sdm_error *err)
 {
     sdm_run *run = j->run;
     const sdm_mesh *m = run->surface;
@@ -147,7 +155,7 @@ static sdm_status distances(job *j, sdm_error *err)
     for (size_t v = 0; v < m->n_vert && !s; v++)
         sdm_grid_index(run->grid, &m->vert[3 * v], &index[3 * v]);
     for (int a = 0; a < 3 && !s; a++) s = sdm_seeds_build(run, index, a, &j->seeds[a], err);
-    if (!s) s = transform(j, err);
+    if (!s) s = edt_transform(j, err);
     double *bound = &run->report.error_bound_mm;
     if (!s) s = sdm_seeds_bound(run, index, j->seeds, run->values, bound, err);
     if (!s && *bound == INFINITY)
@@ -161,15 +169,15 @@ static sdm_status distances(job *j, sdm_error *err)
     return s;
 }
 
-static sdm_status map(const sdm_mesh *mesh, const sdm_grid *grid, const sdm_method_opts *opts,
-                      float *values, sdm_method_report *report, sdm_error *err)
+static sdm_status edt_map(const sdm_mesh *mesh, const sdm_grid *grid, const sdm_method_opts *opts,
+                          float *values, sdm_method_report *report, sdm_error *err)
 {
     sdm_run run;
-    job j = {.run = &run};
+    edt_job j = {.run = &run};
     sdm_status s = sdm_run_begin(&run, mesh, grid, opts, values, err);
     for (int a = 0; a < 3 && !s; a++)
         if (grid->n[a] > j.longest) j.longest = grid->n[a];
-    if (!s) s = distances(&j, err);
+    if (!s) s = edt_distances(&j, err);
     if (!s) s = sdm_run_sign(&run, err);
     if (!s)
         snprintf(
@@ -184,4 +192,4 @@ static sdm_status map(const sdm_mesh *mesh, const sdm_grid *grid, const sdm_meth
 
 const sdm_method sdm_method_edt = {
     "edt", "Euclidean distance transform of the surface's crossings with the grid's lines",
-    "Maurer, Qi, Raghavan 2003", false, map};
+    "Maurer, Qi, Raghavan 2003", false, edt_map};

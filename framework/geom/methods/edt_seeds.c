@@ -1,5 +1,5 @@
-/* Where the lines of the grid cross the surface, and how far the surface can be from these points.
- */
+/* Crossings of the grid lines with the surface, and a bound on the distance from the surface to the
+ * nearest crossing. */
 #include "edt_seeds.h"
 
 #include <math.h>
@@ -7,7 +7,8 @@
 
 #include "sdm/memory.h"
 
-/* Whole numbers in [lo, hi], made larger by rounding, cut to 0 .. n - 1. */
+/* Integers in [lo, hi] within 0 .. n - 1 as *from .. *to (empty when *from > *to). A margin for
+ * rounding may add an integer just outside. */
 static void whole_range(double lo, double hi, int64_t n, int64_t *from, int64_t *to)
 {
     const double margin = 1e-12 * (fabs(lo) + fabs(hi));
@@ -17,67 +18,72 @@ static void whole_range(double lo, double hi, int64_t n, int64_t *from, int64_t 
     *to = hi < (double)(n - 1) ? hi < 0 ? -1 : (int64_t)hi : n - 1;
 }
 
-/* Point (depth along the axis, across the line) of a triangle's slice. */
-typedef struct end {
+/* Point of a triangle in index coordinates, in a plane of constant `up`: depth is along the grid
+ * lines, `across` is the second axis of the plane. */
+typedef struct slice_end {
     double depth, across;
-} end;
+} slice_end;
 
-static void widen(end p, end *lo, end *hi)
+static void slice_widen(slice_end p, slice_end *lo, slice_end *hi)
 {
     if (p.across < lo->across) *lo = p;
     if (p.across > hi->across) *hi = p;
 }
 
-/* The segment in which the triangle meets the plane up = k; false: it does not. v[corner]: depth,
- * across, up. */
-static bool slice_at(const double v[3][3], double k, end *lo, end *hi)
+/* Intersection of the triangle with the plane up = k: the segment *lo .. *hi, sorted by `across`.
+ * v[corner] = (depth, across, up). Returns false when they do not meet. */
+static bool slice_at(const double v[3][3], double k, slice_end *lo, slice_end *hi)
 {
-    *lo = (end){0, INFINITY};
-    *hi = (end){0, -INFINITY};
+    *lo = (slice_end){0, INFINITY};
+    *hi = (slice_end){0, -INFINITY};
     for (int c = 0; c < 3; c++) {
         const double *a = v[c], *b = v[(c + 1) % 3];
         if ((a[2] < k && b[2] < k) || (a[2] > k && b[2] > k)) continue;
         if (a[2] == b[2]) {
-            widen((end){a[0], a[1]}, lo, hi);
-            widen((end){b[0], b[1]}, lo, hi);
+            slice_widen((slice_end){a[0], a[1]}, lo, hi);
+            slice_widen((slice_end){b[0], b[1]}, lo, hi);
         } else {
             const double t = (k - a[2]) / (b[2] - a[2]);
-            widen((end){a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])}, lo, hi);
+            slice_widen((slice_end){a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])}, lo, hi);
         }
     }
     return lo->across <= hi->across;
 }
 
-/* A crossing: counted while the lists have no place, stored afterwards. */
-static void put(sdm_seeds *s, size_t line, double at)
+/* Adds a crossing at index coordinate `at` to a line. While s->at is NULL crossings are only
+ * counted. */
+static void seeds_add(sdm_seeds *s, size_t line, double at)
 {
     const uint32_t i = s->first[line]++;
     if (s->at) s->at[i] = at;
 }
 
-static void cross(const double v[3][3], const int64_t n[2], sdm_seeds *s)
+/* Adds the crossings of one triangle with all lines. v as in slice_at(); n: grid sizes along
+ * `across` and `up`. */
+static void seeds_cross_triangle(const double v[3][3], const int64_t n[2], sdm_seeds *s)
 {
     const double least = sdm_lesser(v[0][2], sdm_lesser(v[1][2], v[2][2])),
                  most = sdm_greater(v[0][2], sdm_greater(v[1][2], v[2][2]));
     int64_t k, k1;
     whole_range(least, most, n[1], &k, &k1);
     for (; k <= k1; k++) {
-        end lo, hi;
+        slice_end lo, hi;
         int64_t j, j1;
-        // rounding of the range must not lose a slice through a corner
+        // clamp k to the triangle's range: whole_range() may exceed it by rounding, and a slice
+        // through a corner must not be lost
         if (!slice_at(v, sdm_greater(least, sdm_lesser((double)k, most)), &lo, &hi)) continue;
         whole_range(lo.across, hi.across, n[0], &j, &j1);
         for (; j <= j1; j++) {
             const double width = hi.across - lo.across,
                          t = width > 0 ? ((double)j - lo.across) / width : 0;
-            put(s, (size_t)(k * n[0] + j),
-                lo.depth + sdm_greater(0, sdm_lesser(t, 1)) * (hi.depth - lo.depth));
-            if (!(width > 0)) put(s, (size_t)(k * n[0] + j), hi.depth);
+            seeds_add(s, (size_t)(k * n[0] + j),
+                      lo.depth + sdm_greater(0, sdm_lesser(t, 1)) * (hi.depth - lo.depth));
+            if (!(width > 0)) seeds_add(s, (size_t)(k * n[0] + j), hi.depth);
         }
     }
 }
 
-static void cross_all(const sdm_run *run, const double *index, int axis, sdm_seeds *s)
+static void seeds_cross_surface(const sdm_run *run, const double *index, int axis, sdm_seeds *s)
 {
     const int across = axis == 0, up = axis == 2 ? 1 : 2;
     const int64_t n[2] = {run->grid->n[across], run->grid->n[up]};
@@ -89,7 +95,7 @@ static void cross_all(const sdm_run *run, const double *index, int axis, sdm_see
             v[c][1] = x[across];
             v[c][2] = x[up];
         }
-        cross((const double(*)[3])v, n, s);
+        seeds_cross_triangle((const double(*)[3])v, n, s);
     }
 }
 
@@ -101,7 +107,7 @@ sdm_status sdm_seeds_build(sdm_run *run, const double *index, int axis, sdm_seed
     sdm_status st = sdm_run_reserve(run, lines + 1, sizeof *s->first, err);
     if (!st) st = SDM_ALLOC(&s->first, lines + 1, "crossings of grid lines", err);
     if (st) return st;
-    cross_all(run, index, axis, s);
+    seeds_cross_surface(run, index, axis, s);
     size_t sum = 0;
     for (size_t i = 0; i <= lines; i++) {
         const uint32_t count = s->first[i];
@@ -114,9 +120,9 @@ sdm_status sdm_seeds_build(sdm_run *run, const double *index, int axis, sdm_seed
     st = sdm_run_reserve(run, sum, sizeof *s->at, err);
     if (!st) st = SDM_ALLOC(&s->at, sum, "crossings of grid lines", err);
     if (st) return st;
-    cross_all(run, index, axis, s);
-    memmove(s->first + 1, s->first,
-            lines * sizeof *s->first); // filling has moved every start to the next one
+    seeds_cross_surface(run, index, axis, s);
+    // the fill has advanced every start to the start of the next line: shift them back
+    memmove(s->first + 1, s->first, lines * sizeof *s->first);
     s->first[0] = 0;
     return SDM_OK;
 }
@@ -128,26 +134,29 @@ void sdm_seeds_dispose(sdm_seeds *s)
     *s = (sdm_seeds){0};
 }
 
-/* ---- the bound ----
-   Seeds lie on the surface, so the distance to the nearest one is never below the true one, and
-   above it by at most the distance from the true nearest point q to a seed. The surface is cut into
-   pieces smaller than a voxel; the largest distance from a point of a piece to a seed bounds the
-   error. Pieces farther from every voxel than the map's largest value hold no q. The search starts
-   from half a voxel's diagonal and what the middles of the triangles need, so most triangles need
-   few pieces. */
+/* ---- error bound ----
+ *
+ * A seed lies on the surface, so the distance to the nearest seed is >= the true distance. It
+ * exceeds it by at most the distance from q, the true nearest surface point, to some seed. The
+ * triangles are cut into pieces smaller than a voxel; the largest distance from a point of any
+ * piece to a seed bounds the error. Pieces farther from the grid than the largest map value cannot
+ * contain q and are skipped. The search starts with a lower limit of the bound (half a voxel
+ * diagonal, and the value at the centroid of every triangle), so most triangles are accepted with
+ * few cuts. */
 
+/* Input and result of the search for the error bound. */
 typedef struct bound_job {
     const sdm_run *run;
     const double *index;
     const sdm_seeds *seeds;
     const float *map;
-    double piece;    /* largest radius of a piece, mm */
-    double farthest; /* largest value of the map */
-    double least;    /* where the search starts, mm */
-    double *found;   /* [part] */
+    double piece;    /* pieces up to this radius are not cut further, mm */
+    double farthest; /* largest value of the map, mm */
+    double least;    /* initial value of the search for the maximum, mm */
+    double *found;   /* [part] largest distance to a seed, mm */
 } bound_job;
 
-enum { TRIANGLES_A_PART = 64 };
+enum { PART_TRIANGLES = 64 };
 
 static double length2(const double spacing[3], const double d[3])
 {
@@ -156,8 +165,9 @@ static double length2(const double spacing[3], const double d[3])
     return sum;
 }
 
-/* Squared distance from p to the nearest seed on the lines around it. */
-static double near_seed2(const bound_job *b, const double p[3])
+/* Squared distance (mm^2) from p (index coordinates) to the nearest seed on the grid lines through
+ * the 8 voxel centres around p; INFINITY when they have no seed. */
+static double near_seed_distance2(const bound_job *b, const double p[3])
 {
     const sdm_grid *g = b->run->grid;
     int64_t lo[3], hi[3];
@@ -185,12 +195,12 @@ static double near_seed2(const bound_job *b, const double p[3])
     return best;
 }
 
-/* Distance from p to a seed, from above: by the lines around p, else by way of the voxel next to p.
- */
-static double seed_distance(const bound_job *b, const double p[3])
+/* Upper bound on the distance from p to the nearest seed: the nearest one on the lines around p, or
+ * the distance to the nearest voxel plus its map value. */
+static double seed_distance_bound(const bound_job *b, const double p[3])
 {
     const sdm_grid *g = b->run->grid;
-    const double near2 = near_seed2(b, p);
+    const double near2 = near_seed_distance2(b, p);
     int64_t voxel[3];
     double d[3];
     for (int a = 0; a < 3; a++) {
@@ -201,8 +211,8 @@ static double seed_distance(const bound_job *b, const double p[3])
     return sdm_lesser(sqrt(near2), sqrt(length2(g->spacing, d)) + by);
 }
 
-/* Distance from p to the box of the voxel centres. */
-static double outside(const bound_job *b, const double p[3])
+/* Distance (mm) from p to the box spanned by the voxel centres; 0 inside. */
+static double outside_distance(const bound_job *b, const double p[3])
 {
     const sdm_grid *g = b->run->grid;
     double d[3];
@@ -211,7 +221,7 @@ static double outside(const bound_job *b, const double p[3])
     return sqrt(length2(g->spacing, d));
 }
 
-static void measure_piece(const bound_job *b, const double v[3][3], double *found)
+static void bound_piece(const bound_job *b, const double v[3][3], double *found)
 {
     const sdm_grid *g = b->run->grid;
     double middle[3], side2[3], radius2 = 0;
@@ -225,15 +235,16 @@ static void measure_piece(const bound_job *b, const double v[3][3], double *foun
         side2[c] = length2(g->spacing, (const double[3]){p[0] - q[0], p[1] - q[1], p[2] - q[2]});
         if (side2[c] > side2[longest]) longest = c;
     }
+    // skip pieces that are too far from the grid or cannot raise the maximum
     const double radius = sqrt(radius2);
-    if (outside(b, middle) - radius > b->farthest) return;
-    const double largest = seed_distance(b, middle) + radius;
+    if (outside_distance(b, middle) - radius > b->farthest) return;
+    const double largest = seed_distance_bound(b, middle) + radius;
     if (largest <= *found) return;
     if (radius <= b->piece) {
         *found = largest;
         return;
     }
-    // in two across the longest side
+    // bisect the longest side
     const double *p = v[longest], *q = v[(longest + 1) % 3], *r = v[(longest + 2) % 3];
     double half[2][3][3];
     for (int a = 0; a < 3; a++) {
@@ -243,38 +254,39 @@ static void measure_piece(const bound_job *b, const double v[3][3], double *foun
         half[1][1][a] = q[a];
         half[0][2][a] = half[1][2][a] = r[a];
     }
-    measure_piece(b, (const double(*)[3])half[0], found);
-    measure_piece(b, (const double(*)[3])half[1], found);
+    bound_piece(b, (const double(*)[3])half[0], found);
+    bound_piece(b, (const double(*)[3])half[1], found);
 }
 
-static void corners(const bound_job *b, size_t t, double v[3][3])
+static void triangle_corners(const bound_job *b, size_t t, double v[3][3])
 {
     const uint32_t *tri = &b->run->surface->tri[3 * t];
     for (int c = 0; c < 3; c++) memcpy(v[c], &b->index[3 * (size_t)tri[c]], sizeof v[c]);
 }
 
-static void measure_triangles(void *job, int64_t part, int thread)
+static void bound_triangles(void *job, int64_t part, int thread)
 {
     const bound_job *b = job;
-    const size_t from = (size_t)part * TRIANGLES_A_PART, to = from + TRIANGLES_A_PART;
+    const size_t from = (size_t)part * PART_TRIANGLES, to = from + PART_TRIANGLES;
     (void)thread;
     b->found[part] = b->least;
     for (size_t t = from; t < to && t < b->run->surface->n_tri; t++) {
         double v[3][3];
-        corners(b, t, v);
-        measure_piece(b, (const double(*)[3])v, &b->found[part]);
+        triangle_corners(b, t, v);
+        bound_piece(b, (const double(*)[3])v, &b->found[part]);
     }
 }
 
-/* Where the search starts: what is found below that needs no care. */
-static double first_guess(const bound_job *b)
+/* Initial value of the search: pieces with a smaller distance to a seed need no further cuts. */
+static double bound_start(const bound_job *b)
 {
     double least = 0.5 * sqrt(length2(b->run->grid->spacing, (const double[3]){1, 1, 1}));
     for (size_t t = 0; t < b->run->surface->n_tri; t++) {
         double v[3][3], middle[3];
-        corners(b, t, v);
+        triangle_corners(b, t, v);
         for (int a = 0; a < 3; a++) middle[a] = (v[0][a] + v[1][a] + v[2][a]) / 3;
-        if (outside(b, middle) <= b->farthest) least = sdm_greater(least, seed_distance(b, middle));
+        if (outside_distance(b, middle) <= b->farthest)
+            least = sdm_greater(least, seed_distance_bound(b, middle));
     }
     return least;
 }
@@ -289,15 +301,16 @@ sdm_status sdm_seeds_bound(const sdm_run *run, const double *index, const sdm_se
         b.farthest = sdm_greater(b.farthest, (double)map[i]);
     *bound = INFINITY;
     if (b.farthest == INFINITY) return SDM_OK;
-    b.least = first_guess(&b);
-    const int64_t parts =
-        (int64_t)((run->surface->n_tri + TRIANGLES_A_PART - 1) / TRIANGLES_A_PART);
+    b.least = bound_start(&b);
+    // largest distance over all triangles, in parallel
+    const int64_t parts = (int64_t)((run->surface->n_tri + PART_TRIANGLES - 1) / PART_TRIANGLES);
     sdm_status s = SDM_ALLOC(&b.found, (size_t)parts, "error bounds", err);
-    if (!s) s = sdm_run_parts(run, parts, measure_triangles, &b, 9, 10, err);
+    if (!s) s = sdm_run_parts(run, parts, bound_triangles, &b, 9, 10, err);
     if (!s) *bound = 0;
     for (int64_t i = 0; i < parts && !s; i++) *bound = sdm_greater(*bound, b.found[i]);
     sdm_free(b.found);
-    // the map is in float, the grid's axes are orthonormal to rounding only
+    // margin: the map is rounded to float (relative error 1.2e-7), and the grid axes are
+    // orthonormal only up to `skew`
     double skew = 0;
     for (int i = 0; i < 9; i++) {
         const double *d = g->dir;

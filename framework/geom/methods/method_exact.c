@@ -1,8 +1,8 @@
-/* Method "exact": the engine. */
+/* Method "exact": calls the exact engine (sdm/exact.h). */
 #include "method.h"
 
-static sdm_status map(const sdm_mesh *mesh, const sdm_grid *grid, const sdm_method_opts *opts,
-                      float *values, sdm_method_report *report, sdm_error *err)
+static sdm_status exact_map(const sdm_mesh *mesh, const sdm_grid *grid, const sdm_method_opts *opts,
+                            float *values, sdm_method_report *report, sdm_error *err)
 {
     sdm_run run;
     sdm_status s = sdm_run_begin(&run, mesh, grid, opts, values, err);
@@ -13,4 +13,4 @@ static sdm_status map(const sdm_mesh *mesh, const sdm_grid *grid, const sdm_meth
 
 const sdm_method sdm_method_exact = {
     "exact", "the exact engine: candidate features shared by blocks of voxels", "sdm/exact.h", true,
-    map};
+    exact_map};

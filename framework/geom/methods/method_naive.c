@@ -1,9 +1,9 @@
-/* Method "naive": every voxel against every triangle, row by row so that it can be stopped and
- * shows where it is. */
+/* Method "naive": the distance of every voxel to every triangle by brute force. Each row of voxels
+ * is one part of the parallel loop, so a run can be cancelled and reports progress. */
 #include "method.h"
 #include "sdm/internal/brute_force.h"
 
-static void map_row(void *job, int64_t row, int thread)
+static void naive_map_row(void *job, int64_t row, int thread)
 {
     const sdm_run *run = job;
     const int64_t nx = run->grid->n[0], ny = run->grid->n[1];
@@ -16,8 +16,8 @@ static void map_row(void *job, int64_t row, int thread)
     }
 }
 
-static sdm_status map(const sdm_mesh *mesh, const sdm_grid *grid, const sdm_method_opts *opts,
-                      float *values, sdm_method_report *report, sdm_error *err)
+static sdm_status naive_map(const sdm_mesh *mesh, const sdm_grid *grid, const sdm_method_opts *opts,
+                            float *values, sdm_method_report *report, sdm_error *err)
 {
     sdm_run run;
     sdm_status s = sdm_run_begin_plain(&run, mesh, grid, opts, values, err);
@@ -26,10 +26,10 @@ static sdm_status map(const sdm_mesh *mesh, const sdm_grid *grid, const sdm_meth
     run.report.exact.sign = SDM_SIGN_WINDING;
     run.report.exact.n_tri_used = mesh->n_tri;
     sdm_run_prepared(&run);
-    return sdm_run_end(&run, report,
-                       sdm_run_parts(&run, grid->n[1] * grid->n[2], map_row, &run, 0, 1, err));
+    return sdm_run_end(
+        &run, report, sdm_run_parts(&run, grid->n[1] * grid->n[2], naive_map_row, &run, 0, 1, err));
 }
 
 const sdm_method sdm_method_naive = {"naive",
                                      "every voxel against every triangle, all surface counted",
-                                     "sign: Jacobson et al. 2013", true, map};
+                                     "sign: Jacobson et al. 2013", true, naive_map};

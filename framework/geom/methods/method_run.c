@@ -1,4 +1,4 @@
-/* What the methods share. */
+/* Steps shared by all methods (method.h). */
 #include <stdatomic.h>
 #include <string.h>
 
@@ -12,7 +12,7 @@ sdm_status sdm_run_begin_plain(sdm_run *run, const sdm_mesh *mesh, const sdm_gri
 {
     memset(run, 0, sizeof *run);
     if (!mesh || !grid || !values)
-        return sdm_fail(err, SDM_E_ARG, "map without a mesh, a grid or a place for the values");
+        return sdm_fail(err, SDM_E_ARG, "mesh, grid and values of a map must not be NULL");
     run->mesh = mesh;
     run->grid = grid;
     run->values = values;
@@ -80,7 +80,7 @@ sdm_status sdm_run_parts(const sdm_run *run, int64_t n,
         const int thread = sdm_thread();
         if (atomic_load(&stop)) continue;
         part(job, i, thread);
-        if (thread != 0) continue; // callbacks come from the calling thread alone
+        if (thread != 0) continue; // only the calling thread runs the callbacks
         if (run->opts.progress)
             run->opts.progress(o->user, ((double)stage + (double)(i + 1) / (double)n) / n_stages);
         if (o->cancelled && o->cancelled(o->user)) atomic_store(&stop, true);
@@ -100,8 +100,6 @@ sdm_status sdm_run_frames(sdm_run *run, sdm_frame **frames, sdm_error *err)
     }
     return s;
 }
-
-/* ---- the sign ---- */
 
 sdm_status sdm_run_sign(const sdm_run *run, sdm_error *err)
 {

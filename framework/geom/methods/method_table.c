@@ -1,4 +1,4 @@
-/* The table of methods. */
+/* Table of all methods, and look-up by name. */
 #include <string.h>
 
 #include "method.h"

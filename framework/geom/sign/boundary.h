@@ -1,67 +1,74 @@
-/* The boundary of an open mesh and what it adds to signed crossings (Martens and Bessmeltsev 2025):
-   close the mesh with strips that run from every boundary edge to infinity along a direction d. A
-   ray against d meets no strip, so its signed crossings with the mesh are the winding number of the
-   closed surface, and the generalised winding number of the mesh is that plus the strips' share of
-   the sphere, a sum over boundary edges. Boundary is every edge whose triangles do not cancel in
-   direction. */
+/* Boundary of an open mesh and its part of the generalised winding number (Martens and Bessmeltsev
+ * 2025). A strip runs from every boundary edge to infinity along a direction d, so that mesh and
+ * strips form a closed surface. A ray in direction -d meets no strip: its signed crossings with the
+ * mesh are the winding number of the closed surface. The generalised winding number of the mesh is
+ * this number plus the sum of the solid angles of all strips over 4 pi. An edge belongs to the
+ * boundary when its triangles do not use it equally often in both directions. */
 #ifndef SDM_GEOM_BOUNDARY_H
 #define SDM_GEOM_BOUNDARY_H
 
 #include "mesh/topology.h"
 
-/* Edges that follow each other along the boundary, and the chord from their first to their last
-   vertex. Seen from far away both have nearly the same strips: between them lies a fan of
-   triangles. */
+/* Node of the tree over the boundary: consecutive edges along the boundary, and the chord from
+ * their first to their last vertex. Edges and chord enclose a fan of triangles, so seen from far
+ * away their strips have nearly the same solid angle. */
 typedef struct sdm_chain {
-    double end[2][3]; /* of the chord, mm */
-    uint32_t vert[2]; /* the same as vertices of the mesh */
-    uint32_t n;       /* edges; 1: the chord is the edge */
-    double weight;    /* triangles that run along it; 0: the edges do not follow each other */
-    double length;    /* of the edges, mm */
-    double fan;       /* area of the fan, mm^2 */
-    double middle[3], radius; /* of a ball that holds the edges */
+    double end[2][3]; /* end points of the chord, mm */
+    uint32_t vert[2]; /* their vertex numbers in the mesh */
+    uint32_t n;       /* number of edges; 1: the chord is the edge itself */
+    /* number of surplus triangles at each edge; 0: the edges are not consecutive or differ in
+     * weight */
+    double weight;
+    double length;            /* total length of the edges, mm */
+    double fan;               /* area of the fan, mm^2 */
+    double centre[3], radius; /* bounding sphere of the edges */
 } sdm_chain;
 
 typedef struct sdm_boundary {
-    sdm_chain *chain; /* [2 n - 1] tree of halves: the first child of i is i + 1, the second i + 2 *
-                         (edges of the first) */
-    size_t n;         /* boundary edges */
+    /* [2 n - 1] binary tree in depth-first order: the first child of node i is i + 1, the second i
+     * + 2 * (number of edges of the first) */
+    sdm_chain *chain;
+    size_t n; /* number of boundary edges */
 } sdm_boundary;
 
-/* topo: of m. *b is zero-initialised; sdm_boundary_dispose() frees it, also after an error. */
+/* Builds the tree of boundary edges. topo: of m. *b is zero-initialised; sdm_boundary_dispose()
+ * frees it, also after an error. SDM_E_NOMEM. */
 sdm_status sdm_boundary_build(const sdm_mesh *m, const sdm_topology *topo, sdm_boundary *b,
                               sdm_error *err);
 void sdm_boundary_dispose(sdm_boundary *b);
 
-/* The direction d of the strips and the coordinates in which crossings are decided: both must see
- * the same side of an edge. */
+/* Direction d of the strips, and the coordinates in which crossings are decided: strips and
+ * crossings must agree on which side of an edge a point lies. */
 typedef struct sdm_strips {
     const sdm_boundary *boundary;
-    const double
-        *across;       /* [n_vert][3] vertices; coordinate 0 rises against d, 1 and 2 are across */
+    /* [n_vert][3] vertices: coordinate 0 increases along -d, coordinates 1 and 2 are transverse */
+    const double *across;
     double d[3];       /* unit vector */
-    double step[2][3]; /* unit of coordinates 1 and 2, mm */
-    int orientation;   /* -1: the three coordinates are left-handed */
+    double step[2][3]; /* world vectors of one unit along coordinates 1 and 2, mm */
+    int orientation;   /* +1; -1: the three coordinates are left-handed */
 } sdm_strips;
 
-/* What is known of the strips' share around a point. */
-typedef struct sdm_strips_share {
-    double share;     /* what the strips add to the winding number of the point */
-    double error;     /* bound on its error, rounding left aside */
-    double steepness; /* 4 pi times a bound on its gradient there */
-    double distance;  /* at most that to the nearest boundary edge, mm; infinite without one */
-} sdm_strips_share;
+/* Winding number of the strips at a point x, with bounds. */
+typedef struct sdm_strips_winding {
+    double winding; /* solid angle of all strips over 4 pi, signed */
+    double error;   /* bound on the error of `winding` from chords, without rounding */
+    /* bound on abs(gradient of `winding`), times 4 pi, 1/mm */
+    double steepness;
+    /* lower bound on the distance from x to the boundary, mm; INFINITY without boundary */
+    double distance;
+} sdm_strips_winding;
 
-/* Share of the strips at x; p[2]: x across d in the coordinates of `across`. tolerance: largest
-   error of one chain taken as its chord, 0 for none; whole numbers are right always. [any thread]
- */
-sdm_strips_share sdm_strips_find(const sdm_strips *s, const double x[3], const double p[2],
-                                 double tolerance);
+/* Winding number of the strips at x. p[2]: coordinates 1 and 2 of x in the system of s->across.
+ * tolerance: largest error of the winding number from one chain replaced by its chord, 0: no chain
+ * is replaced. Errors by whole numbers cannot occur, because the side of x at each strip is exact.
+ * [any thread] */
+sdm_strips_winding sdm_strips_evaluate(const sdm_strips *s, const double x[3], const double p[2],
+                                       double tolerance);
 
-/* How far from the point (mm) the share is sure to change by less than `change` (> 0), jumps by
-   whole numbers left aside. The gradient of a solid angle is an integral over the boundary (law of
-   Biot and Savart): at most the sum over its edges of min(length / r^2, 2 / r), r the distance,
-   over 4 pi. */
-double sdm_strips_reach(const sdm_strips_share *s, double change);
+/* Radius (mm) around x within which the winding number of the strips changes by less than `change`
+ * (> 0), apart from jumps by whole numbers at a strip. By the law of Biot and Savart the gradient
+ * of a solid angle is an integral over the boundary: abs(gradient) <= 1 / (4 pi) * sum over the
+ * edges of min(length / r^2, 2 / r) with r the distance from x to the edge. */
+double sdm_strips_reach(const sdm_strips_winding *s, double change);
 
 #endif

@@ -1,14 +1,14 @@
-/* Angle-weighted pseudo-normals. */
+/* Angle-weighted pseudo-normals of the vertices, edges and faces of a mesh. */
 #include "pseudonormal.h"
 
 #include "mesh/point_triangle.h"
 #include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
 
-static void add_scaled(double sum[3], double t, const double n[3]) { v3_along(sum, t, n, sum); }
+static void normal_add(double sum[3], double t, const double n[3]) { v3_along(sum, t, n, sum); }
 
-static void add_triangle(const sdm_mesh *m, const sdm_topology *topo, sdm_pseudonormals *p,
-                         size_t t)
+static void pseudonormals_add(const sdm_mesh *m, const sdm_topology *topo, sdm_pseudonormals *p,
+                              size_t t)
 {
     const double *v[3];
     double ab[3], ac[3], n[3];
@@ -17,16 +17,16 @@ static void add_triangle(const sdm_mesh *m, const sdm_topology *topo, sdm_pseudo
     v3_sub(v[2], v[0], ac);
     v3_cross(ab, ac, n);
     const double len = v3_norm(n);
-    if (!(len > 0)) return; // no direction: its neighbours stand for it
+    if (!(len > 0)) return; // a triangle without area has no normal and adds nothing
     for (int i = 0; i < 3; i++) p->face[t][i] = n[i] / len;
     for (size_t k = 0; k < 3; k++) {
         double a[3], b[3], c[3];
         v3_sub(v[(k + 1) % 3], v[k], a);
         v3_sub(v[(k + 2) % 3], v[k], b);
         v3_cross(a, b, c);
-        add_scaled(p->vertex[topo->tri[3 * t + k]], atan2(v3_norm(c), v3_dot(a, b)), p->face[t]);
+        normal_add(p->vertex[topo->tri[3 * t + k]], atan2(v3_norm(c), v3_dot(a, b)), p->face[t]);
         if (topo->edge[3 * t + k] != SDM_NONE)
-            add_scaled(p->edge[topo->edge[3 * t + k]], 1, p->face[t]);
+            normal_add(p->edge[topo->edge[3 * t + k]], 1, p->face[t]);
     }
 }
 
@@ -36,7 +36,7 @@ sdm_status sdm_pseudonormals_build(const sdm_mesh *m, const sdm_topology *topo,
     sdm_status s = SDM_ALLOC(&p->vertex, m->n_vert, "pseudo-normals", err);
     if (!s) s = SDM_ALLOC(&p->edge, topo->n_edges, "pseudo-normals", err);
     if (!s) s = SDM_ALLOC(&p->face, m->n_tri, "pseudo-normals", err);
-    for (size_t t = 0; t < m->n_tri && !s; t++) add_triangle(m, topo, p, t);
+    for (size_t t = 0; t < m->n_tri && !s; t++) pseudonormals_add(m, topo, p, t);
     return s;
 }
 

@@ -1,22 +1,24 @@
-/* Angle-weighted pseudo-normals (Baerentzen and Aanaes 2005): the sign of the distance to a
- * manifold mesh without overlap. */
+/* Angle-weighted pseudo-normals (Baerentzen and Aanaes 2005): they give the sign of the distance to
+ * a manifold mesh without self-intersections. */
 #ifndef SDM_GEOM_PSEUDONORMAL_H
 #define SDM_GEOM_PSEUDONORMAL_H
 
 #include "mesh/topology.h"
 
 typedef struct sdm_pseudonormals {
-    double (*vertex)[3]; /* [n_vert], welded vertices */
+    double (*vertex)[3]; /* [n_vert] vertices of the topology (welded) */
     double (*edge)[3];   /* [n_edges] */
-    double (*face)[3];   /* [n_tri] */
+    double (*face)[3];   /* [n_tri] unit vectors, 0 for a triangle without area */
 } sdm_pseudonormals;
 
-/* *p is zero-initialised; sdm_pseudonormals_dispose() frees it. */
+/* Sums the normals of the faces at every vertex (weighted by angle) and edge. topo: of m. *p is
+ * zero-initialised; sdm_pseudonormals_dispose() frees it, also after an error. SDM_E_NOMEM. */
 sdm_status sdm_pseudonormals_build(const sdm_mesh *m, const sdm_topology *topo,
                                    sdm_pseudonormals *p, sdm_error *err);
 void sdm_pseudonormals_dispose(sdm_pseudonormals *p);
 
-/* The normal at a feature (point_triangle.h) of a triangle. */
+/* The pseudo-normal (not normalised) at a feature of triangle `tri`: SDM_CORNER_0 .. SDM_FACE
+ * (point_triangle.h). [any thread] */
 const double *sdm_pseudonormal(const sdm_pseudonormals *p, const sdm_topology *topo, uint32_t tri,
                                int feature);
 

@@ -1,29 +1,30 @@
-/* Rounded shares of the strips over boxes of voxels: one evaluation where a bound allows it, else
- * halves of the box. */
+/* Rounded winding number of the strips for boxes of voxels: one evaluation at the centre if the
+ * gradient bound covers the box, otherwise the box is split in two. */
 #include "row_base.h"
 
 #include <math.h>
 #include <stdbool.h>
 
-#define COARSE 4e-3 // error of a chain of boundary edges, in turns: one among others
+// error of the winding number allowed for each chain of edges: for boxes, for single voxels
+#define COARSE 4e-3
 #define FINE 1e-6
 
-/* Voxels lo .. hi along the three axes of the rows. */
+/* Voxels lo .. hi (both included) along the three axes of the rows. */
 typedef struct box {
     int64_t lo[3], hi[3];
 } box;
 
-typedef struct job {
+typedef struct base_job {
     sdm_strips strips;
     const sdm_rows *rows;
     const sdm_grid *grid;
     const sdm_row_tile *tile;
     int32_t *base;
-} job;
+} base_job;
 
-/* May the strip of a boundary edge pass between the rows of the box? Never between voxels of one
- * row. */
-static bool passes(const job *t, const uint32_t vert[2], const box *b)
+/* May the strip of a boundary edge separate rows of the box? (A strip is parallel to the rows, so
+ * it never separates voxels of one row.) vert[2]: ends of the edge. */
+static bool strip_meets_box(const base_job *t, const uint32_t vert[2], const box *b)
 {
     const double *u = &t->rows->across[3 * (size_t)vert[0]],
                  *v = &t->rows->across[3 * (size_t)vert[1]];
@@ -40,16 +41,16 @@ static bool passes(const job *t, const uint32_t vert[2], const box *b)
     return !(fabs(off) > (fabs(dy) * half[2] + fabs(dz) * half[1]) * (1 + 1e-9));
 }
 
-static bool cut_by_strips(const job *t, const box *b)
+static bool box_cut_by_strips(const base_job *t, const box *b)
 {
     if (b->lo[1] == b->hi[1] && b->lo[2] == b->hi[2]) return false;
     const sdm_boundary *edges = t->strips.boundary;
     for (size_t i = 0; i + 1 < 2 * edges->n; i++)
-        if (edges->chain[i].n == 1 && passes(t, edges->chain[i].vert, b)) return true;
+        if (edges->chain[i].n == 1 && strip_meets_box(t, edges->chain[i].vert, b)) return true;
     return false;
 }
 
-static void write(const job *t, const box *b, int32_t value)
+static void box_write(const base_job *t, const box *b, int32_t value)
 {
     const int64_t n0 = t->tile->i1 - t->tile->i0, n1 = t->tile->j1 - t->tile->j0;
     for (int64_t k = b->lo[2]; k <= b->hi[2]; k++) {
@@ -60,8 +61,8 @@ static void write(const job *t, const box *b, int32_t value)
     }
 }
 
-/* Longest axis of the box from `axis` on; its length in mm. */
-static double longest(const job *t, const box *b, int axis, int *split)
+/* Length (mm) of the longest side of the box among axes `axis` .. 2; *split = its axis. */
+static double box_longest_axis(const base_job *t, const box *b, int axis, int *split)
 {
     double most = -1;
     for (int a = axis; a < 3; a++) {
@@ -74,9 +75,10 @@ static double longest(const job *t, const box *b, int axis, int *split)
     return most;
 }
 
-/* Writes the base of the whole box if one evaluation at its middle is enough. *reach: how far that
- * would be enough. */
-static bool settled(const job *t, const box *b, double *reach)
+/* Writes the base of the whole box if one evaluation at its centre suffices. *reach: in: skip the
+ * evaluation (return false) for boxes with a larger half diagonal; out: radius around the centre in
+ * which the evaluated base is valid. */
+static bool box_settled(const base_job *t, const box *b, double *reach)
 {
     double at[3], index[3], x[3], half2 = 0;
     for (int a = 0; a < 3; a++) {
@@ -85,50 +87,54 @@ static bool settled(const job *t, const box *b, double *reach)
         at[a] = index[t->rows->axis[a]] = 0.5 * (double)(b->lo[a] + b->hi[a]);
         half2 += half * half;
     }
-    // a middle that moves a little changes nothing: directions are orthonormal to 1e-6
+    // the margin covers directions that are orthonormal to only 1e-6
     const double half = sqrt(half2) * (1 + 1e-5);
     if (half > *reach) return false;
     sdm_grid_world(t->grid, index, x);
-    sdm_strips_share s = sdm_strips_find(&t->strips, x, &at[1], half2 > 0 ? COARSE : FINE);
-    if (!(half2 > 0) && fabs(fabs(s.share - floor(s.share)) - 0.5) <= s.error + 1e-9)
-        s = sdm_strips_find(&t->strips, x, &at[1], 0);
-    const double whole = floor(s.share + 0.5), room = 0.5 - fabs(s.share - whole) - s.error - 1e-9;
+    sdm_strips_winding s = sdm_strips_evaluate(&t->strips, x, &at[1], half2 > 0 ? COARSE : FINE);
+    if (!(half2 > 0) && fabs(fabs(s.winding - floor(s.winding)) - 0.5) <= s.error + 1e-9)
+        s = sdm_strips_evaluate(&t->strips, x, &at[1], 0);
+    const double whole = floor(s.winding + 0.5),
+                 room = 0.5 - fabs(s.winding - whole) - s.error - 1e-9;
     *reach = room > 0 ? sdm_strips_reach(&s, room) : 0;
     if (half2 > 0 && !(*reach > half)) return false;
-    // at exactly 1/2 a voxel is outside
-    write(t, b, (int32_t)(s.share + 0.5 > whole ? whole : whole - 1));
+    // a winding number of exactly 1/2 means outside
+    box_write(t, b, (int32_t)(s.winding + 0.5 > whole ? whole : whole - 1));
     return true;
 }
 
-/* hope: a box larger than this around its middle is not worth an evaluation. */
-static void settle(const job *t, box b, double hope)
+/* Fills the base of box b, recursively. hope: estimated radius in which the base is constant around
+ * the centre; boxes with a larger half diagonal are split without an evaluation. */
+static void box_settle(const base_job *t, box b, double hope)
 {
     int split = 0;
     double length;
-    // rows on both sides of a strip are taken apart first: that is needed at every length
-    if (cut_by_strips(t, &b))
-        length = longest(t, &b, 1, &split);
-    else if (settled(t, &b, &hope))
+    // split between rows first if a strip separates them: such a box can never be settled as a
+    // whole
+    if (box_cut_by_strips(t, &b))
+        length = box_longest_axis(t, &b, 1, &split);
+    else if (box_settled(t, &b, &hope))
         return;
     else
-        length = longest(t, &b, 0, &split);
-    // how far a middle is from trouble changes no faster than the middle moves, about
+        length = box_longest_axis(t, &b, 0, &split);
+    // estimate for the children: the radius changes about as much as the centre moves
     hope += 0.3 * length;
     box rest = b;
     b.hi[split] = (b.lo[split] + b.hi[split]) / 2;
     rest.lo[split] = b.hi[split] + 1;
-    settle(t, b, hope);
-    settle(t, rest, hope);
+    box_settle(t, b, hope);
+    box_settle(t, rest, hope);
 }
 
 void sdm_row_base_fill(const sdm_boundary *b, const sdm_rows *rows, const sdm_grid *g,
                        const sdm_row_tile *tile, int32_t *base)
 {
-    job t = {.strips = {.boundary = b, .across = rows->across, .orientation = rows->orientation},
-             .rows = rows,
-             .grid = g,
-             .tile = tile,
-             .base = base};
+    base_job t = {
+        .strips = {.boundary = b, .across = rows->across, .orientation = rows->orientation},
+        .rows = rows,
+        .grid = g,
+        .tile = tile,
+        .base = base};
     double length2 = 0;
     for (int c = 0; c < 3; c++) {
         for (int k = 0; k < 2; k++)
@@ -137,6 +143,7 @@ void sdm_row_base_fill(const sdm_boundary *b, const sdm_rows *rows, const sdm_gr
         length2 += t.strips.d[c] * t.strips.d[c];
     }
     for (int c = 0; c < 3; c++) t.strips.d[c] /= sqrt(length2);
-    settle(&t, (box){{tile->i0, tile->j0, tile->k0}, {tile->i1 - 1, tile->j1 - 1, tile->k1 - 1}},
-           INFINITY);
+    box_settle(&t,
+               (box){{tile->i0, tile->j0, tile->k0}, {tile->i1 - 1, tile->j1 - 1, tile->k1 - 1}},
+               INFINITY);
 }

@@ -1,4 +1,4 @@
-/* Signs of points and of grids. */
+/* Sign of points and of grids, by the method that sdm_sign_choose() selected. */
 #include "sign.h"
 
 #include "mesh/crossings.h"
@@ -16,7 +16,7 @@ sdm_status sdm_sign_choose(const sdm_audit *a, sdm_sign_method wanted, sdm_sign_
                         "edges and %zu edges with "
                         "triangles of mixed orientation; use winding",
                         a->boundary_edges, a->misoriented_edges);
-    // beside a triangle without area an edge knows one of its faces only
+    // an edge next to a triangle without area would get the normal of only one of its faces
     if (m == SDM_SIGN_PSEUDONORMAL && (!a->manifold || a->self_intersections || a->degenerate))
         return sdm_fail(err, SDM_E_ARG,
                         "sign method pseudonormal needs a manifold mesh without overlap, this one "
@@ -59,7 +59,7 @@ size_t sdm_sign_bytes(const sdm_sign *s)
     if (s->method == SDM_SIGN_PSEUDONORMAL)
         return (t->n_vert + t->n_edges + t->n_tri) * sizeof(double[3]);
     return 2 * s->winding.boundary.n * sizeof(sdm_chain) +
-           (s->winding.cluster ? s->survey->tree.n_node * sizeof(sdm_cluster) : 0);
+           (s->winding.far_field ? s->survey->tree.n_node * sizeof(sdm_far_field) : 0);
 }
 
 bool sdm_sign_inside(const sdm_sign *s, const double x[3], uint32_t slot, const double q[3],
@@ -78,9 +78,9 @@ bool sdm_sign_inside(const sdm_sign *s, const double x[3], uint32_t slot, const 
     }
 }
 
-/* Signs of one row of voxels by asking for every point. */
-static void sign_by_points(const sdm_sign *s, const sdm_grid *g, int64_t j, int64_t k,
-                           float *values)
+/* Negates the values of one row of voxels that lie inside, one point query per voxel. */
+static void row_flip_by_points(const sdm_sign *s, const sdm_grid *g, int64_t j, int64_t k,
+                               float *values)
 {
     for (int64_t i = 0; i < g->n[0]; i++) {
         const double index[3] = {(double)i, (double)j, (double)k};
@@ -101,7 +101,7 @@ typedef struct map_job {
     float *values;
 } map_job;
 
-static void flip_tile(void *user, const sdm_row_tile *t, const int32_t *base)
+static void tile_flip(void *user, const sdm_row_tile *t, const int32_t *base)
 {
     const map_job *job = user;
     const int64_t n0 = job->grid->n[0], n1 = job->grid->n[1];
@@ -110,7 +110,7 @@ static void flip_tile(void *user, const sdm_row_tile *t, const int32_t *base)
             const int64_t row = k * n1 + j;
             float *values = job->values + row * n0;
             if (!job->rows) {
-                sign_by_points(job->sign, job->grid, j, k, values);
+                row_flip_by_points(job->sign, job->grid, j, k, values);
                 continue;
             }
             sdm_rows_apply(&job->rows->rows, (size_t)row, t->i0, t->i1, base, values);
@@ -130,7 +130,7 @@ sdm_status sdm_sign_map(const sdm_sign *s, const sdm_grid *g, const sdm_exact_op
         st = sdm_sign_rows_build(s->solid,
                                  s->method == SDM_SIGN_WINDING ? &s->winding.boundary : NULL, g,
                                  (const int[3]){0, 1, 2}, opts, &rows, err);
-    if (!st) st = sdm_sign_tiles(&rows, g->n[1], g->n[2], opts, flip_tile, &job, err);
+    if (!st) st = sdm_sign_tiles(&rows, g->n[1], g->n[2], opts, tile_flip, &job, err);
     sdm_rows_dispose(&rows.rows);
     return st;
 }

@@ -1,4 +1,5 @@
-/* Inside or outside: the choice of the method, points and grids. */
+/* Inside or outside: choice of the sign method, and the sign of single points and of whole
+ * grids. */
 #ifndef SDM_GEOM_SIGN_H
 #define SDM_GEOM_SIGN_H
 
@@ -14,37 +15,41 @@ typedef struct sdm_sign {
     sdm_sign_method method;
     const sdm_mesh *solid;
     const sdm_survey *survey;
-    const sdm_nearest
-        *surface; /* the solid's surface without what lies inside; asked for pseudo-normals only */
+    /* surface of the solid without triangles inside of it (after the union); used by pseudo-normals
+     * only */
+    const sdm_nearest *surface;
     sdm_winding winding;
     sdm_pseudonormals normals;
 } sdm_sign;
 
-/* The method to use where `wanted` is. SDM_E_ARG where it does not fit the mesh. */
+/* Resolves SDM_SIGN_AUTO to the method for this mesh; any other `wanted` is checked and copied.
+ * SDM_E_ARG when the mesh does not meet the requirements of the method. */
 sdm_status sdm_sign_choose(const sdm_audit *a, sdm_sign_method wanted, sdm_sign_method *method,
                            sdm_error *err);
 
-/* What is pointed to must stay as long as *s. *s is zero-initialised; sdm_sign_dispose() frees it,
- * also after an error. */
+/* Prepares the signs of `solid`. The mesh, the survey and the surface must stay valid as long as
+ * *s. *s is zero-initialised; sdm_sign_dispose() frees it, also after an error. SDM_E_NOMEM. */
 sdm_status sdm_sign_build(const sdm_mesh *solid, const sdm_survey *survey,
                           const sdm_nearest *surface, sdm_sign_method method, sdm_sign *s,
                           sdm_error *err);
 void sdm_sign_dispose(sdm_sign *s);
 
-/* Bytes that *s has allocated. */
+/* Bytes allocated by *s. */
 size_t sdm_sign_bytes(const sdm_sign *s);
 
-/* Is x inside? slot, q, feature: its nearest point, used for pseudo-normals only. [any thread] */
+/* Is x inside? slot, q, feature: nearest triangle of s->surface, nearest point and where it lies on
+ * the triangle (point_triangle.h); used by pseudo-normals only. [any thread] */
 bool sdm_sign_inside(const sdm_sign *s, const double x[3], uint32_t slot, const double q[3],
                      int feature);
 
-/* Turns the sign of values[nz][ny][nx] of the voxels inside; the same for any number of threads.
-   Uses n_threads, memory_limit, cancelled and user of opts. */
+/* Negates values[nz][ny][nx] at the voxels inside; same result for any number of threads. Uses
+ * n_threads, memory_limit, cancelled and user of opts. SDM_E_NOMEM, SDM_E_CANCELLED. */
 sdm_status sdm_sign_map(const sdm_sign *s, const sdm_grid *g, const sdm_exact_opts *opts,
                         float *values, sdm_error *err);
 
-/* Compares the signs of a map with other ways to find them: see sdm_exact_certify(). rounding:
-   distance of a voxel that may count as on the surface. */
+/* Compares the signs of a map with those of other methods: see sdm_exact_certify(). Voxels with
+ * abs(value) <= rounding (mm) lie on the surface up to rounding and are not compared. SDM_E_NOMEM,
+ * SDM_E_CANCELLED. */
 sdm_status sdm_sign_certify(const sdm_sign *s, const sdm_grid *g, const sdm_exact_opts *opts,
                             double rounding, const float *values, sdm_sign_certificate *out,
                             sdm_error *err);

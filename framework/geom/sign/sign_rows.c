@@ -1,25 +1,26 @@
-/* The threads over tiles of rows. */
+/* Parallel loop over tiles of grid rows. */
 #include "sign_rows.h"
 
-#include "memory/budget.h"
+#include "memory/cancel.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/threads.h"
 #include <stdatomic.h>
 
-#define TILE 16    // rows of a tile along both axes
-#define PIECE 1024 // voxels of them at most on an open mesh: 1 MiB a thread
-#define LONG                                                                                       \
-    4096 // boundary edges from which points are faster: every box of voxels asks all of them
+#define TILE_ROWS 16 // a tile has up to TILE_ROWS x TILE_ROWS rows
+// open meshes: voxels of a row in one tile; the array `base` then has at most 1 MiB per thread
+#define PIECE_MAX 1024
+// from this many boundary edges on point queries are faster: every box of voxels tests all edges
+#define LONG_BOUNDARY 4096
 
 bool sdm_sign_fits_rows(sdm_sign_method method, const sdm_boundary *b)
 {
-    return method == SDM_SIGN_CROSSINGS || (method == SDM_SIGN_WINDING && b->n < LONG);
+    return method == SDM_SIGN_CROSSINGS || (method == SDM_SIGN_WINDING && b->n < LONG_BOUNDARY);
 }
 
-/* What a thread takes on an open mesh. */
+/* Size of the array `base` of one thread (open meshes only). */
 static size_t base_bytes(const sdm_sign_rows *r)
 {
-    return TILE * TILE * (size_t)r->piece * sizeof(int32_t);
+    return TILE_ROWS * TILE_ROWS * (size_t)r->piece * sizeof(int32_t);
 }
 
 sdm_status sdm_sign_rows_build(const sdm_mesh *m, const sdm_boundary *b, const sdm_grid *g,
@@ -30,13 +31,13 @@ sdm_status sdm_sign_rows_build(const sdm_mesh *m, const sdm_boundary *b, const s
     const size_t limit = opts->memory_limit;
     r->boundary = b;
     r->grid = g;
-    r->piece = g->n[axis[0]] < PIECE ? g->n[axis[0]] : PIECE;
+    r->piece = g->n[axis[0]] < PIECE_MAX ? g->n[axis[0]] : PIECE_MAX;
     const size_t bytes = b ? (size_t)n_threads * base_bytes(r) : 0;
     if (limit && bytes >= limit)
         return sdm_fail(err, SDM_E_NOMEM,
                         "the signs of an open mesh need %zu bytes in %d threads, memory_limit "
                         "leaves %zu; raise it or "
-                        "take fewer threads",
+                        "use fewer threads",
                         bytes, n_threads, limit);
     return sdm_rows_build(m, g, axis, n_threads, limit ? limit - bytes : 0, &r->rows, err);
 }
@@ -45,10 +46,12 @@ sdm_status sdm_sign_tiles(const sdm_sign_rows *r, int64_t n1, int64_t n2,
                           const sdm_exact_opts *opts, sdm_sign_visit *visit, void *user,
                           sdm_error *err)
 {
-    const int64_t n0 = r->rows.n[0], t1 = (n1 + TILE - 1) / TILE, t2 = (n2 + TILE - 1) / TILE;
+    const int64_t n0 = r->rows.n[0], t1 = (n1 + TILE_ROWS - 1) / TILE_ROWS,
+                  t2 = (n2 + TILE_ROWS - 1) / TILE_ROWS;
     const int64_t t0 = r->boundary ? (n0 + r->piece - 1) / r->piece : 1;
     const int n_threads = sdm_threads(opts->n_threads);
-    (void)n_threads; // without OpenMP
+    (void)n_threads; // unused without OpenMP
+    // one parallel loop over all tiles; the first error stops it
     atomic_int stop = SDM_OK;
     sdm_status status = SDM_OK;
 #pragma omp parallel num_threads(n_threads)
@@ -62,13 +65,16 @@ sdm_status sdm_sign_tiles(const sdm_sign_rows *r, int64_t n1, int64_t n2,
         for (int64_t t = 0; t < t0 * t1 * t2; t++) {
             if (atomic_load(&stop)) continue;
             sdm_status s = ready;
-            const int64_t i = t % t0 * r->piece, j = t / t0 % t1 * TILE, k = t / t0 / t1 * TILE;
+            // the voxels of tile t
+            const int64_t i = t % t0 * r->piece, j = t / t0 % t1 * TILE_ROWS,
+                          k = t / t0 / t1 * TILE_ROWS;
             const sdm_row_tile tile = {.i0 = i,
                                        .i1 = t0 > 1 && i + r->piece < n0 ? i + r->piece : n0,
                                        .j0 = j,
-                                       .j1 = j + TILE < n1 ? j + TILE : n1,
+                                       .j1 = j + TILE_ROWS < n1 ? j + TILE_ROWS : n1,
                                        .k0 = k,
-                                       .k1 = k + TILE < n2 ? k + TILE : n2};
+                                       .k1 = k + TILE_ROWS < n2 ? k + TILE_ROWS : n2};
+            // winding numbers to add, then the work of the caller
             if (!s && base) sdm_row_base_fill(r->boundary, &r->rows, r->grid, &tile, base);
             if (!s) visit(user, &tile, base);
             if (!s && sdm_cancelled(opts))

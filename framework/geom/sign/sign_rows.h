@@ -1,5 +1,5 @@
-/* Signs by rows of a grid, tile by tile in all threads: crossings, and on open meshes what the
- * boundary adds. */
+/* Signs of a whole grid by rows of voxels, in parallel over tiles of rows: crossings of the rows
+ * with the mesh and, for open meshes, the winding number of the strips that close the boundary. */
 #ifndef SDM_GEOM_SIGN_ROWS_H
 #define SDM_GEOM_SIGN_ROWS_H
 
@@ -10,23 +10,26 @@ typedef struct sdm_sign_rows {
     sdm_rows rows;
     const sdm_boundary *boundary; /* NULL: the mesh is closed */
     const sdm_grid *grid;
-    int64_t piece; /* on an open mesh: voxels of a row in a tile at most */
+    int64_t piece; /* open meshes: largest number of voxels of a row in one tile */
 } sdm_sign_rows;
 
-/* Is the sign of a whole grid found by rows? Else by points. */
+/* Are crossings along rows the faster way to the signs of a whole grid? Otherwise use point
+ * queries. */
 bool sdm_sign_fits_rows(sdm_sign_method method, const sdm_boundary *b);
 
-/* Rows along axis[0]. Free with sdm_rows_dispose(&r->rows), also after an error. Uses n_threads and
- * memory_limit of opts. */
+/* Finds the crossings of all rows along axis[0] of the grid; axis: a permutation of 0, 1, 2. b:
+ * NULL for a closed mesh. *r is zero-initialised. Free with sdm_rows_dispose(&r->rows), also after
+ * an error. Uses n_threads and memory_limit of opts. SDM_E_NOMEM. */
 sdm_status sdm_sign_rows_build(const sdm_mesh *m, const sdm_boundary *b, const sdm_grid *g,
                                const int axis[3], const sdm_exact_opts *opts, sdm_sign_rows *r,
                                sdm_error *err);
 
-/* Called for every tile, in any thread. base[k1 - k0][j1 - j0][i1 - i0]: see sdm_row_base_fill();
-   NULL on a closed mesh, whose tiles are of whole rows. */
+/* Callback for one tile, called in any thread. base[k1 - k0][j1 - j0][i1 - i0]: winding number to
+ * add, see sdm_row_base_fill(); NULL for a closed mesh, where tiles contain whole rows. */
 typedef void sdm_sign_visit(void *user, const sdm_row_tile *tile, const int32_t *base);
 
-/* Cuts n1 x n2 rows into tiles and visits them. Uses n_threads, cancelled and user of opts. */
+/* Divides n1 x n2 rows into tiles and calls visit() for each, in parallel. Uses n_threads,
+ * cancelled and user of opts. SDM_E_NOMEM, SDM_E_CANCELLED. */
 sdm_status sdm_sign_tiles(const sdm_sign_rows *r, int64_t n1, int64_t n2,
                           const sdm_exact_opts *opts, sdm_sign_visit *visit, void *user,
                           sdm_error *err);

@@ -1,4 +1,4 @@
-/* Generalised winding numbers (Jacobson et al. 2013) of points: for meshes that are not closed. */
+/* Generalised winding numbers of points (Jacobson et al. 2013), for meshes that are not closed. */
 #ifndef SDM_GEOM_WINDING_H
 #define SDM_GEOM_WINDING_H
 
@@ -7,39 +7,43 @@
 #include "boundary.h"
 #include "mesh/bvh.h"
 
-/* The triangles of a node seen from far away (Barill et al. 2018): Taylor expansion of their solid
- * angle about their middle. */
-typedef struct sdm_cluster {
-    double middle[3]; /* weighted by area */
-    double normal[3]; /* sum of the area vectors */
-    double second[6]; /* sum of area vector x (place - middle), symmetric part: xx, yy, zz, xy, yz,
-                         zx */
-    double spread;    /* integral of |place - middle|^2 over the area */
-    double area, radius; /* radius: of a ball around the middle that holds the node */
-} sdm_cluster;
+/* Far-field approximation of the triangles of a tree node (Barill et al. 2018): Taylor expansion of
+ * their solid angle around their centroid. */
+typedef struct sdm_far_field {
+    double centroid[3]; /* centroid of the area, mm */
+    double normal[3];   /* sum of the area vectors, mm^2 */
+    /* symmetric part of the sum of (area vector) x (position - centroid)^T: xx, yy, zz, xy, yz, zx
+     */
+    double second[6];
+    double spread; /* integral of abs(position - centroid)^2 over the area */
+    /* area, mm^2, and radius (mm) of a bounding sphere around `centroid` */
+    double area, radius;
+} sdm_far_field;
 
 typedef struct sdm_winding {
     const sdm_mesh *mesh;
     const sdm_bvh *tree;
     sdm_boundary boundary;
-    sdm_cluster *cluster; /* [n_node]; NULL where the boundary is short enough to do without */
+    /* [n_node] for the nodes of the tree; NULL: the boundary is so short that it is not needed */
+    sdm_far_field *far_field;
 } sdm_winding;
 
-/* Mesh and tree must stay as long as *w; topo: of the mesh. *w is zero-initialised;
- * sdm_winding_dispose() frees it. */
+/* Prepares the winding numbers of mesh m. Mesh and tree must stay valid as long as *w; topo: of the
+ * mesh, used by this call only. *w is zero-initialised; sdm_winding_dispose() frees it, also after
+ * an error. SDM_E_NOMEM. */
 sdm_status sdm_winding_build(const sdm_mesh *m, const sdm_bvh *tree, const sdm_topology *topo,
                              sdm_winding *w, sdm_error *err);
 void sdm_winding_dispose(sdm_winding *w);
 
-/* Winding number of x to rounding: the crossings of one ray and the boundary where that is less
-   work than every triangle. [any thread] */
+/* Winding number at x up to rounding: crossings of one ray plus the strips of the boundary, or the
+ * sum over all triangles where that is faster. [any thread] */
 double sdm_winding_number(const sdm_winding *w, const double x[3]);
 
-/* The same by every triangle. [any thread] */
+/* Winding number at x as the sum of the solid angles of all triangles. [any thread] */
 double sdm_winding_sum(const sdm_winding *w, const double x[3]);
 
-/* Is the winding number above 1/2? Clusters decide where the bound on their error allows it. [any
- * thread] */
+/* Is the winding number at x above 1/2? Uses the far-field approximation if its error bound leaves
+ * no doubt, otherwise sdm_winding_number(). [any thread] */
 bool sdm_winding_inside(const sdm_winding *w, const double x[3]);
 
 #endif

@@ -1,4 +1,7 @@
-/* Eight floats or four doubles at once: registers of AVX2, elsewhere two of half the size. */
+/* SIMD types of eight floats (v8f), eight 32-bit integers (v8i) and four doubles (v4d): one AVX2
+   register each, elsewhere two registers of half the size (lanes_half.h, same functions and names).
+   A lane is one element. v8_load(), v8_store(), v4_load() and v4_store() need 32-byte alignment;
+   v8_load_i() and v8_store_i() do not. */
 #ifndef SDM_GEOM_LANES_H
 #define SDM_GEOM_LANES_H
 
@@ -9,10 +12,11 @@
 #include <immintrin.h>
 #endif
 
-/* For what is compiled anew for every kind of thing: the kind is a constant then. */
+/* Always inlined: a function with a parameter `kind` (of feature) is compiled anew for each caller
+   that passes a constant. */
 #define SDM_FOR_KIND static inline __attribute__((always_inline))
 
-typedef uint16_t v8s __attribute__((vector_size(16)));
+typedef uint16_t v8u16 __attribute__((vector_size(16)));
 
 #if defined(__AVX2__) && defined(__FMA__)
 typedef float v8f __attribute__((vector_size(32)));
@@ -35,14 +39,14 @@ static inline v8f v8_max(v8f a, v8f b) { return (v8f)_mm256_max_ps((__m256)a, (_
 static inline v8f v8_min(v8f a, v8f b) { return (v8f)_mm256_min_ps((__m256)a, (__m256)b); }
 static inline v8f v8_abs(v8f a) { return (v8f)_mm256_andnot_ps(_mm256_set1_ps(-0.0f), (__m256)a); }
 static inline v8f v8_sqrt(v8f a) { return (v8f)_mm256_sqrt_ps((__m256)a); }
-/* 1 / sqrt(a) to 4e-4 */
+/* 1 / sqrt(a), relative error < 4e-4; the bits depend on the processor */
 static inline v8f v8_rsqrt(v8f a) { return (v8f)_mm256_rsqrt_ps((__m256)a); }
-/* x where the sign of m is set, else y */
-static inline v8f v8_signed(v8f m, v8f x, v8f y)
+/* x where the sign bit of m is set (also -0), else y */
+static inline v8f v8_if_negative(v8f m, v8f x, v8f y)
 {
     return (v8f)_mm256_blendv_ps((__m256)y, (__m256)x, (__m256)m);
 }
-/* bit i: a[i] > b[i] */
+/* Mask with bit i set where a[i] > b[i]; a NaN compares false. */
 static inline int v8_greater(v8f a, v8f b)
 {
     return _mm256_movemask_ps(_mm256_cmp_ps((__m256)a, (__m256)b, _CMP_GT_OQ));
@@ -64,7 +68,7 @@ static inline v8i v8_if_less(v8f a, v8f b, v8i x, v8i y)
         (__m256i)y, (__m256i)x,
         _mm256_castps_si256(_mm256_cmp_ps((__m256)a, (__m256)b, _CMP_LT_OQ)));
 }
-/* Writes the lanes named by order[8] to out[8]. */
+/* out[i] = a[order[i]] for i = 0 to 7; order[] must be aligned to 16 bytes. */
 static inline void v8_permute(uint32_t *out, v8i a, const uint16_t *order)
 {
     const __m256i which =
@@ -78,10 +82,12 @@ static inline void v4_store(double *p, v4d x) { *(v4d *)(void *)p = x; }
 static inline v4d v4_add(v4d a, v4d b) { return a + b; }
 static inline v4d v4_sub(v4d a, v4d b) { return a - b; }
 static inline v4d v4_mul(v4d a, v4d b) { return a * b; }
-static inline v4d v4_signed(v4d m, v4d x, v4d y)
+/* x where m < 0, else y; m must not be -0 or NaN */
+static inline v4d v4_if_negative(v4d m, v4d x, v4d y)
 {
     return (v4d)_mm256_blendv_pd((__m256d)y, (__m256d)x, (__m256d)m);
 }
+/* Transposes a matrix of 4 x 4 doubles in place, r[row] with one column in each lane. */
 static inline void v4_transpose(v4d r[4])
 {
     const __m256d a = _mm256_unpacklo_pd((__m256d)r[0], (__m256d)r[1]);
@@ -97,7 +103,7 @@ static inline void v4_transpose(v4d r[4])
 #include "lanes_half.h"
 #endif
 
-/* Eight points or vectors. */
+/* Eight points or vectors, one in each lane. */
 typedef struct point8 {
     v8f x, y, z;
 } point8;

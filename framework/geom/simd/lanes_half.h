@@ -1,6 +1,6 @@
-/* Eight floats or four doubles in two registers of SSE2 or NEON, or as the compiler makes them.
-   Part of lanes.h, which says what the functions do. Not a vector type of the size of both:
-   compilers compare and select its elements one by one. */
+/* The types and functions of lanes.h without AVX2: each value is a pair of registers of SSE2 or
+   NEON, elsewhere of compiler vectors of 16 bytes. Part of lanes.h, which documents the functions.
+   Not one vector type of 32 bytes: compilers compare and select its elements one by one. */
 #ifndef SDM_GEOM_HALF_LANES_KERNEL_H
 #define SDM_GEOM_HALF_LANES_KERNEL_H
 
@@ -25,6 +25,7 @@ typedef struct v4d {
     v2d low, high;
 } v4d;
 
+/* x where m is all ones, y where m is 0 */
 static inline v4f v4f_select(v4i m, v4f x, v4f y) { return (v4f)((m & (v4i)x) | (~m & (v4i)y)); }
 
 #if defined(__SSE2__)
@@ -40,7 +41,7 @@ static inline v4f v4f_min(v4f a, v4f b) { return (v4f)vminnmq_f32((float32x4_t)a
 static inline v4f v4f_sqrt(v4f a) { return (v4f)vsqrtq_f32((float32x4_t)a); }
 static inline v4f v4f_rsqrt(v4f a)
 {
-    const float32x4_t x = (float32x4_t)a, r = vrsqrteq_f32(x); // to 2^-8; a step of Newton's method
+    const float32x4_t x = (float32x4_t)a, r = vrsqrteq_f32(x); // error 2^-8, then one Newton step
     return (v4f)vmulq_f32(r, vrsqrtsq_f32(vmulq_f32(x, r), r));
 }
 static inline int v4i_bits(v4i m)
@@ -64,7 +65,8 @@ static inline int v4i_bits(v4i m) { return (m[0] & 1) | (m[1] & 2) | (m[2] & 4) 
 static inline v4f v4f_fma(v4f a, v4f b, v4f c) { return a * b + c; }
 #endif
 
-/* Through the vectors, which may alias floats; the structures of two may not. */
+/* Memory is accessed as v4f, which may alias floats; the struct v8f may not. The same below for v2d
+   and v4d. */
 static inline v8f v8_load(const float *p)
 {
     const v4f *v = (const v4f *)(const void *)p;
@@ -98,7 +100,7 @@ static inline v8f v8_abs(v8f a)
 }
 static inline v8f v8_sqrt(v8f a) { return (v8f){v4f_sqrt(a.low), v4f_sqrt(a.high)}; }
 static inline v8f v8_rsqrt(v8f a) { return (v8f){v4f_rsqrt(a.low), v4f_rsqrt(a.high)}; }
-static inline v8f v8_signed(v8f m, v8f x, v8f y)
+static inline v8f v8_if_negative(v8f m, v8f x, v8f y)
 {
     return (v8f){v4f_select((v4i)m.low >> 31, x.low, y.low),
                  v4f_select((v4i)m.high >> 31, x.high, y.high)};
@@ -142,14 +144,14 @@ static inline void v4_store(double *p, v4d x)
 static inline v4d v4_add(v4d a, v4d b) { return (v4d){a.low + b.low, a.high + b.high}; }
 static inline v4d v4_sub(v4d a, v4d b) { return (v4d){a.low - b.low, a.high - b.high}; }
 static inline v4d v4_mul(v4d a, v4d b) { return (v4d){a.low * b.low, a.high * b.high}; }
-static inline v2d v2d_signed(v2d m, v2d x, v2d y)
+static inline v2d v2d_if_negative(v2d m, v2d x, v2d y)
 {
-    const v2l set = m < 0; // never -0 or NaN
+    const v2l set = m < 0; // m is never -0 or NaN, see v4_if_negative()
     return (v2d)((set & (v2l)x) | (~set & (v2l)y));
 }
-static inline v4d v4_signed(v4d m, v4d x, v4d y)
+static inline v4d v4_if_negative(v4d m, v4d x, v4d y)
 {
-    return (v4d){v2d_signed(m.low, x.low, y.low), v2d_signed(m.high, x.high, y.high)};
+    return (v4d){v2d_if_negative(m.low, x.low, y.low), v2d_if_negative(m.high, x.high, y.high)};
 }
 static inline void v4_transpose(v4d r[4])
 {

@@ -1,4 +1,5 @@
-/* Two doubles at once, which SSE2 and NEON have a register for. */
+/* Two doubles as one compiler vector (v2d): one register of SSE2 or NEON, which every x86-64 or
+   ARM64 processor has, so code with it needs no choice of the instruction set at run time. */
 #ifndef SDM_GEOM_TWO_LANES_KERNEL_H
 #define SDM_GEOM_TWO_LANES_KERNEL_H
 
@@ -13,6 +14,7 @@
 
 typedef double v2d __attribute__((vector_size(16)));
 
+/* Always inlined: a call would pass vectors through memory. */
 #define SDM_INLINE static inline __attribute__((always_inline))
 
 SDM_INLINE v2d d2_all(double x) { return (v2d){x, x}; }
@@ -25,14 +27,14 @@ SDM_INLINE v2d d2_load(const double *p)
 SDM_INLINE void d2_store(double *p, v2d a) { memcpy(p, &a, sizeof a); }
 
 #if defined(__SSE2__)
-/* a < b ? a : b and a > b ? a : b */
+/* a < b ? a : b (d2_lesser) and a > b ? a : b (d2_greater) in each lane; b where one is NaN. */
 SDM_INLINE v2d d2_lesser(v2d a, v2d b) { return (v2d)_mm_min_pd((__m128d)a, (__m128d)b); }
 SDM_INLINE v2d d2_greater(v2d a, v2d b) { return (v2d)_mm_max_pd((__m128d)a, (__m128d)b); }
 SDM_INLINE v2d d2_sqrt(v2d a) { return (v2d)_mm_sqrt_pd((__m128d)a); }
-/* The first and the second of both. */
+/* (a[0], b[0]) and (a[1], b[1]) */
 SDM_INLINE v2d d2_firsts(v2d a, v2d b) { return (v2d)_mm_unpacklo_pd((__m128d)a, (__m128d)b); }
 SDM_INLINE v2d d2_seconds(v2d a, v2d b) { return (v2d)_mm_unpackhi_pd((__m128d)a, (__m128d)b); }
-/* Rounded to floats; these as doubles. */
+/* Rounded to two floats, stored to p[2]; d2_rounded(): rounded to float and back to double. */
 SDM_INLINE void d2_store_f(float *p, v2d a)
 {
     _mm_storel_pi((__m64 *)(void *)p, _mm_cvtpd_ps((__m128d)a));

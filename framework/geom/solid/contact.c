@@ -1,5 +1,6 @@
-/* Triangle-triangle intersections of a mesh with itself: pairs that share no vertex from the tree,
-   those that share one from the vertices; segments by clipping in the triangle's frame. */
+/* Self-intersections of a mesh. Candidate pairs of triangles without a common vertex come from the
+ * tree (pairs.h), pairs with one from the fans around the vertices (fan.h). The segment in which
+ * two triangles meet is found by clipping in the frame of each. */
 #include "contact.h"
 
 #include <float.h>
@@ -10,19 +11,20 @@
 #include "sdm/internal/heap.h"
 #include "sdm/internal/vec3.h"
 
-#define KEPT                                                                                       \
-    256u // frames of triangles at hand: those that meet others are asked for again and again
+// Size of the cache of frames: a triangle that meets others occurs in many pairs.
+#define FRAMES_KEPT 256u
 
 typedef struct finder {
     const sdm_mesh *mesh;
     const sdm_topology *topo;
     const sdm_facet *facets;
     sdm_contacts *out;
-    sdm_contact *list; // [cap], as they are found
+    sdm_contact *list; // [cap] contacts in the order in which they are found
     size_t cap;
-    sdm_frame *frame; // [KEPT] of triangles frame_of[KEPT], at the place t % KEPT
+    // [FRAMES_KEPT] direct-mapped cache: frame[t % FRAMES_KEPT] is that of triangle frame_of[...]
+    sdm_frame *frame;
     uint32_t *frame_of;
-    sdm_budget *budget;
+    sdm_arena *arena;
     sdm_error *err;
 } finder;
 
@@ -39,25 +41,25 @@ void sdm_frame_lift(const sdm_frame *f, const double xy[2], double x[3])
     for (int i = 0; i < 3; i++) x[i] = f->a[i] + xy[0] * f->u[i] + xy[1] * f->v[i];
 }
 
+/* Coordinates of corner i of triangle t. */
 static const double *corner(const finder *w, uint32_t t, int i)
 {
     return &w->mesh->vert[3 * (size_t)w->topo->tri[3 * (size_t)t + (size_t)i]];
 }
 
-static sdm_status add(finder *w, sdm_contact c)
+static sdm_status contact_add(finder *w, sdm_contact c)
 {
     sdm_contacts *out = w->out;
-    // sheets laid on each other many times over: the number of contacts grows with the square of
-    // the layers
-    const size_t most = 64 * w->topo->n_tri + ((size_t)1 << 20);
-    if (out->n == most)
+    // bound for many coincident layers: contacts grow with the square of their number
+    const size_t n_max = 64 * w->topo->n_tri + ((size_t)1 << 20);
+    if (out->n == n_max)
         return sdm_fail(w->err, SDM_E_MESH,
                         "triangles of the mesh touch or cross each other more than %zu times: "
                         "remove its duplicate layers",
-                        most);
+                        n_max);
     if (out->n == w->cap) {
         const size_t cap = w->cap ? 2 * w->cap : 256;
-        sdm_status s = sdm_budget_take(w->budget, (cap - w->cap) * sizeof *w->list, w->err);
+        sdm_status s = sdm_arena_charge(w->arena, (cap - w->cap) * sizeof *w->list, w->err);
         if (!s) s = sdm_grow((void **)&w->list, out->n, cap, sizeof *w->list, "contacts", w->err);
         if (s) return s;
         w->cap = cap;
@@ -66,27 +68,30 @@ static sdm_status add(finder *w, sdm_contact c)
     return SDM_OK;
 }
 
-static void find_frame(const finder *w, uint32_t t, sdm_frame *f)
+/* *f = the frame of triangle t, from the cache where possible. */
+static void frame_get(const finder *w, uint32_t t, sdm_frame *f)
 {
-    sdm_frame *kept = &w->frame[t % KEPT];
-    if (w->frame_of[t % KEPT] != t) sdm_facet_frame(w->mesh, t, kept);
-    w->frame_of[t % KEPT] = t;
+    sdm_frame *kept = &w->frame[t % FRAMES_KEPT];
+    if (w->frame_of[t % FRAMES_KEPT] != t) sdm_facet_frame(w->mesh, t, kept);
+    w->frame_of[t % FRAMES_KEPT] = t;
     *f = *kept;
 }
 
-/* A triangle of a pair. */
-typedef struct side {
+/* One triangle of a pair. */
+typedef struct pair_tri {
     uint32_t tri;
     sdm_frame frame;
-    double d[3];  // distances of its corners from the plane of the other; what rounding may explain
-                  // is 0
-    double moved; // the largest that was made 0
-    int mask;     // signs that occur: 1 negative, 2 zero, 4 positive
-} side;
+    // signed distances of its corners from the plane of the other triangle; 0 when the distance is
+    // not larger than its error
+    double d[3];
+    double moved; // largest distance that was set to 0
+    int mask;     // signs that occur in d: 1 negative, 2 zero, 4 positive
+} pair_tri;
 
-/* Fills in the distances of s from the plane of `other`. The doubt of that plane grows with the way
-   from its triangle, along the longest edge in its lengths and across in heights. */
-static void plane_distances(const finder *w, side *s, const side *other)
+/* Fills s->d: distances of the corners of s from the plane of `other`. The error of that plane is
+ * the tolerance at the triangle itself and grows linearly with the distance from it: along the
+ * longest edge in units of its length, across it in units of the height. */
+static void plane_distances(const finder *w, pair_tri *s, const pair_tri *other)
 {
     const sdm_frame *f = &other->frame;
     const double height = sdm_frame_height(f), per_length = height / (2 * f->half[0]);
@@ -106,7 +111,8 @@ static void plane_distances(const finder *w, side *s, const side *other)
     }
 }
 
-/* Does triangle j lie on one side of the plane of i, beyond any doubt? Most pairs end here. */
+/* Fast rejection of most pairs: does triangle j lie on one side of the plane of i by more than the
+ * error of the distances? */
 static bool clearly_apart(const finder *w, uint32_t i, uint32_t j)
 {
     const sdm_facet *f = &w->facets[i];
@@ -116,15 +122,15 @@ static bool clearly_apart(const finder *w, uint32_t i, uint32_t j)
         double r[3];
         v3_sub(corner(w, j, k), a, r);
         const double d = v3_dot(r, f->n) * f->height;
-        const double doubt = tolerance * (f->height + fabs(r[0]) + fabs(r[1]) + fabs(r[2]));
-        above += d > doubt;
-        below += d < -doubt;
+        const double error = tolerance * (f->height + fabs(r[0]) + fabs(r[1]) + fabs(r[2]));
+        above += d > error;
+        below += d < -error;
     }
     return above == 3 || below == 3;
 }
 
-/* The part of the segment p q that lies on the triangle of frame f (made larger by the tolerance);
-   false when it is not longer than the tolerance. */
+/* Clips the segment p q, in the coordinates of frame f, to its triangle enlarged by the tolerance.
+ * False when the rest is not longer than 4 tolerances. */
 static bool clip_segment(const sdm_frame *f, double tolerance, double p[2], double q[2])
 {
     const double hp[3] = {-p[1], f->e1y * p[0] - f->e1x * p[1] - f->kh1,
@@ -147,11 +153,13 @@ static bool clip_segment(const sdm_frame *f, double tolerance, double p[2], doub
     return true;
 }
 
-/* Where triangle s meets the plane of the other: two points; false when it touches in one. */
-static bool plane_section(const finder *w, const side *s, double p[2][3])
+/* p[2] = end points of the segment in which triangle s meets the plane of the other triangle; false
+ * when it meets it in one point or not at all. */
+static bool plane_section(const finder *w, const pair_tri *s, double p[2][3])
 {
     const double *d = s->d;
     int n = 0;
+    // corners on the plane, then edges that cross it
     for (int k = 0; k < 3 && n < 2; k++)
         if (d[k] == 0) memcpy(p[n++], corner(w, s->tri, k), sizeof p[0]);
     for (int k = 0; k < 3 && n < 2; k++) {
@@ -165,8 +173,9 @@ static bool plane_section(const finder *w, const side *s, double p[2][3])
     return n == 2;
 }
 
-/* Adds what `on` has of the segment in which `other` meets its plane. */
-static sdm_status add_section(finder *w, const side *on, const side *other, bool *met)
+/* Adds a contact of triangle `on`: the part of it that the segment covers in which `other` meets
+ * its plane. *met = true when there is one, else *met is unchanged. */
+static sdm_status add_section(finder *w, const pair_tri *on, const pair_tri *other, bool *met)
 {
     double p[2][3];
     if (!plane_section(w, other, p)) return SDM_OK;
@@ -176,12 +185,13 @@ static sdm_status add_section(finder *w, const side *on, const side *other, bool
     sdm_frame_flatten(&on->frame, p[1], c.q);
     if (!clip_segment(&on->frame, w->out->tolerance, c.p, c.q)) return SDM_OK;
     *met = true;
-    return add(w, c);
+    return contact_add(w, c);
 }
 
-/* As both have it: the plane of `other` is in doubt all over `on`, so that no other segment is to
- * be had. */
-static sdm_status add_only_section(finder *w, const side *on, const side *other, bool *met)
+/* Adds the section on `on` as the contact of both triangles. For when all corners of `on` are on
+ * the plane of `other` within its error, so that no section on `other` can be computed. */
+static sdm_status add_common_section(finder *w, const pair_tri *on, const pair_tri *other,
+                                     bool *met)
 {
     sdm_status s = add_section(w, on, other, met);
     if (s || !*met) return s;
@@ -193,60 +203,64 @@ static sdm_status add_only_section(finder *w, const side *on, const side *other,
     sdm_frame_flatten(&other->frame, x, c.p);
     sdm_frame_lift(&on->frame, c.q, x);
     sdm_frame_flatten(&other->frame, x, c.q);
-    return add(w, c);
+    return contact_add(w, c);
 }
 
-/* True when one of two coplanar triangles covers more than a seam of the other: some edge separates
- * them otherwise. */
-static bool covers(const finder *w, const side *a, const side *b)
+/* Do two coplanar triangles overlap by more than a strip 4 tolerances wide? Not if all corners of
+ * one lie beyond, or at most that far inside, an edge line of the other (separating axes). */
+static bool covers(const finder *w, const pair_tri *a, const pair_tri *b)
 {
     for (int turn = 0; turn < 2; turn++) {
         const sdm_frame *f = turn ? &b->frame : &a->frame;
         const uint32_t other = turn ? a->tri : b->tri;
-        double least[3] = {INFINITY, INFINITY, INFINITY};
+        double lowest[3] = {INFINITY, INFINITY, INFINITY};
         for (int k = 0; k < 3; k++) {
             double x[2];
             sdm_frame_flatten(f, corner(w, other, k), x);
-            least[0] = fmin(least[0], -x[1]);
-            least[1] = fmin(least[1], f->e1y * x[0] - f->e1x * x[1] - f->kh1);
-            least[2] = fmin(least[2], f->e2y * x[0] - f->e2x * x[1]);
+            lowest[0] = fmin(lowest[0], -x[1]);
+            lowest[1] = fmin(lowest[1], f->e1y * x[0] - f->e1x * x[1] - f->kh1);
+            lowest[2] = fmin(lowest[2], f->e2y * x[0] - f->e2x * x[1]);
         }
         for (int k = 0; k < 3; k++)
-            if (!(least[k] < -4 * w->out->tolerance)) return false;
+            if (!(lowest[k] < -4 * w->out->tolerance)) return false;
     }
     return true;
 }
 
-static sdm_status add_coplanar(finder *w, const side *on, const side *other)
+/* Adds the contacts of `on` with a coplanar triangle that overlaps it: the overlap itself, and a
+ * segment for each edge of `other` that runs on it. */
+static sdm_status add_coplanar(finder *w, const pair_tri *on, const pair_tri *other)
 {
-    sdm_status s =
-        add(w, (sdm_contact){.tri = on->tri, .other = other->tri, .kind = SDM_CONTACT_COPLANAR});
+    sdm_status s = contact_add(
+        w, (sdm_contact){.tri = on->tri, .other = other->tri, .kind = SDM_CONTACT_COPLANAR});
     for (int k = 0; k < 3 && !s; k++) {
         sdm_contact c = {.tri = on->tri, .other = other->tri, .kind = SDM_CONTACT_TOUCH};
         sdm_frame_flatten(&on->frame, corner(w, other->tri, k), c.p);
         sdm_frame_flatten(&on->frame, corner(w, other->tri, (k + 1) % 3), c.q);
-        if (clip_segment(&on->frame, w->out->tolerance, c.p, c.q)) s = add(w, c);
+        if (clip_segment(&on->frame, w->out->tolerance, c.p, c.q)) s = contact_add(w, c);
     }
     return s;
 }
 
-/* Triangles i < j that share so many vertices. */
-static sdm_status meet(finder *w, uint32_t i, uint32_t j, int shared)
+/* Finds the contacts of triangles i < j, which have `shared` common vertices. */
+static sdm_status pair_intersect(finder *w, uint32_t i, uint32_t j, int shared)
 {
     sdm_contacts *out = w->out;
-    side a = {.tri = i}, b = {.tri = j};
-    find_frame(w, i, &a.frame);
-    find_frame(w, j, &b.frame);
+    pair_tri a = {.tri = i}, b = {.tri = j};
+    frame_get(w, i, &a.frame);
+    frame_get(w, j, &b.frame);
+    // no contact if one triangle is strictly on one side of the other's plane
     plane_distances(w, &b, &a);
     if (b.mask == 1 || b.mask == 4) return SDM_OK;
     if (shared && (b.mask == 3 || b.mask == 6)) {
-        // the rest of j lies on one side: i and j meet in what they share unless another corner of
-        // j is on the plane as well
+        // j is on one side of the plane of i: they meet in the common vertices only, unless another
+        // corner of j is on the plane as well
         if ((b.d[0] == 0) + (b.d[1] == 0) + (b.d[2] == 0) == shared) return SDM_OK;
     }
     plane_distances(w, &a, &b);
     if (a.mask == 1 || a.mask == 4) return SDM_OK;
 
+    // coplanar; one in the plane of the other within the error of that plane; the general case
     sdm_status s = SDM_OK;
     bool met = false;
     if (b.mask == 2 && a.mask == 2) {
@@ -254,9 +268,9 @@ static sdm_status meet(finder *w, uint32_t i, uint32_t j, int shared)
         if (met) s = add_coplanar(w, &a, &b);
         if (met && !s) s = add_coplanar(w, &b, &a);
     } else if (shared < 2 && b.mask == 2) {
-        s = add_only_section(w, &b, &a, &met);
+        s = add_common_section(w, &b, &a, &met);
     } else if (shared < 2 && a.mask == 2) {
-        s = add_only_section(w, &a, &b, &met);
+        s = add_common_section(w, &a, &b, &met);
     } else if (shared < 2) {
         s = add_section(w, &a, &b, &met);
         if (!s) s = add_section(w, &b, &a, &met);
@@ -268,7 +282,8 @@ static sdm_status meet(finder *w, uint32_t i, uint32_t j, int shared)
     return s;
 }
 
-static bool is_flat(const finder *w, uint32_t t)
+/* Slivers, triangles not higher than the tolerance, meet nothing. */
+static bool is_sliver(const finder *w, uint32_t t)
 {
     return !(w->facets[t].height > w->out->tolerance);
 }
@@ -276,19 +291,19 @@ static bool is_flat(const finder *w, uint32_t t)
 static sdm_status visit_apart(void *user, uint32_t i, uint32_t j)
 {
     finder *w = user;
-    if (is_flat(w, i) || is_flat(w, j) || clearly_apart(w, i, j) || clearly_apart(w, j, i))
+    if (is_sliver(w, i) || is_sliver(w, j) || clearly_apart(w, i, j) || clearly_apart(w, j, i))
         return SDM_OK;
-    return i < j ? meet(w, i, j, 0) : meet(w, j, i, 0);
+    return i < j ? pair_intersect(w, i, j, 0) : pair_intersect(w, j, i, 0);
 }
 
 static sdm_status visit_neighbours(void *user, uint32_t i, uint32_t j, int shared)
 {
     finder *w = user;
-    if (is_flat(w, i) || is_flat(w, j)) return SDM_OK;
-    return meet(w, i, j, shared);
+    if (is_sliver(w, i) || is_sliver(w, j)) return SDM_OK;
+    return pair_intersect(w, i, j, shared);
 }
 
-/* The contacts in the order of their triangles. */
+/* Counting sort of list[c->n] by triangle into c->list and c->first. */
 static sdm_status sort_contacts(const sdm_contact *list, size_t n_tri, sdm_arena *arena,
                                 sdm_contacts *c, sdm_error *err)
 {
@@ -305,30 +320,26 @@ static sdm_status sort_contacts(const sdm_contact *list, size_t n_tri, sdm_arena
 
 sdm_status sdm_contacts_find(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree,
                              const sdm_facet *facets, sdm_arena *arena, sdm_contacts *c,
-                             sdm_budget *budget, sdm_error *err)
+                             sdm_error *err)
 {
     double largest = 0;
     for (size_t i = 0; i < 3 * m->n_vert; i++)
         largest = fabs(m->vert[i]) > largest ? fabs(m->vert[i]) : largest;
     c->tolerance = 16 * DBL_EPSILON * largest;
-    finder w = {.mesh = m, .topo = topo, .facets = facets, .out = c, .budget = budget, .err = err};
+    finder w = {.mesh = m, .topo = topo, .facets = facets, .out = c, .arena = arena, .err = err};
+    // the contacts in the order of the pairs
     const sdm_arena_mark before = arena->end[SDM_HIGH];
-    const size_t fans = sdm_fans_bytes(m->n_vert), pairs = sdm_pairs_bytes(m->n_vert, tree);
-    const size_t scratch =
-        (fans > pairs ? fans : pairs) + KEPT * (sizeof *w.frame + sizeof *w.frame_of);
-    sdm_status s = sdm_budget_take(budget, scratch, err);
-    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &w.frame, KEPT, "frames of triangles", err);
-    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &w.frame_of, KEPT, "frames of triangles", err);
-    if (!s) memset(w.frame_of, 0xff, KEPT * sizeof *w.frame_of);
+    sdm_status s =
+        SDM_TAKE_UNSET(arena, SDM_HIGH, &w.frame, FRAMES_KEPT, "frames of triangles", err);
     if (!s)
-        s = sdm_fans_visit(m, topo, facets, c->tolerance, arena, visit_neighbours, &w, budget, err);
-    if (!s) s = sdm_pairs_visit(m, topo, tree, c->tolerance, arena, visit_apart, &w, budget, err);
+        s = SDM_TAKE_UNSET(arena, SDM_HIGH, &w.frame_of, FRAMES_KEPT, "frames of triangles", err);
+    if (!s) memset(w.frame_of, 0xff, FRAMES_KEPT * sizeof *w.frame_of);
+    if (!s) s = sdm_fans_visit(m, topo, facets, c->tolerance, arena, visit_neighbours, &w, err);
+    if (!s) s = sdm_pairs_visit(m, topo, tree, c->tolerance, arena, visit_apart, &w, err);
     sdm_arena_release(arena, SDM_HIGH, before);
-    if (!s && budget) budget->used -= scratch;
-    if (!s)
-        s = sdm_budget_take(budget, (m->n_tri + 1) * sizeof *c->first + c->n * sizeof *c->list,
-                            err);
+    // and in the order of their triangles
     if (!s) s = sort_contacts(w.list, m->n_tri, arena, c, err);
     sdm_free(w.list);
+    arena->used -= w.cap * sizeof *w.list;
     return s;
 }

@@ -1,44 +1,51 @@
-/* Where the triangles of a mesh meet other than along shared edges and corners. */
+/* Contacts: where two triangles of a mesh intersect or overlap elsewhere than in their common
+ * vertices and edges. */
 #ifndef SDM_GEOM_CONTACT_H
 #define SDM_GEOM_CONTACT_H
 
-#include "memory/budget.h"
 #include "mesh/bvh.h"
 #include "mesh/facet.h"
 #include "mesh/topology.h"
 
 typedef enum sdm_contact_kind {
-    SDM_CONTACT_CROSSING, /* `other` and `tri` pass through each other along the segment p q, no
-                             corner on the other's plane */
-    SDM_CONTACT_TOUCH,    /* as before, but some corner lies on the other's plane */
-    SDM_CONTACT_COPLANAR  /* `other` lies on `tri` and covers a part of it; no segment */
+    /* `tri` and `other` intersect along the segment p q; no corner of one is on the other's plane
+     */
+    SDM_CONTACT_CROSSING,
+    /* they intersect along p q, and a corner of one is on the other's plane */
+    SDM_CONTACT_TOUCH,
+    /* `other` is coplanar with `tri` and overlaps it; p and q are not set */
+    SDM_CONTACT_COPLANAR
 } sdm_contact_kind;
 
-/* One meeting as seen by `tri`; each pair of triangles gives contacts for both. */
+/* A contact of triangle `tri` with triangle `other`; each pair that meets gives contacts to both
+ * triangles. */
 typedef struct sdm_contact {
     uint32_t tri, other;
     sdm_contact_kind kind;
-    double p[2], q[2]; /* in the frame of tri */
+    double p[2], q[2]; /* (x, y) in the frame of tri */
 } sdm_contact;
 
-/* Contacts sorted by triangle: those of t are list[first[t] .. first[t + 1]). */
+/* All contacts, sorted by triangle: those of t are list[first[t] .. first[t + 1]). */
 typedef struct sdm_contacts {
-    sdm_contact *list;
-    uint32_t *first;
+    sdm_contact *list; /* [n] */
+    uint32_t *first;   /* [n_tri + 1] */
     size_t n;
-    size_t crossing_pairs; /* pairs that share no vertex */
-    double
-        tolerance; /* length below which two things coincide: a few roundings of the coordinates */
-    double error;  /* largest distance by which a vertex was moved onto a plane */
+    size_t crossing_pairs; /* pairs of triangles that meet and share no vertex */
+    /* Lengths up to this count as 0, mm: 16 DBL_EPSILON * (largest abs(coordinate)). */
+    double tolerance;
+    /* largest distance, mm, of a vertex from a plane on which it was taken to lie */
+    double error;
 } sdm_contacts;
 
-/* facets[n_tri]; triangles that are not higher than the tolerance meet nothing. Taken from the high
-   end of the arena. *c is zero-initialised; budget may be NULL. */
+/* Fills *c, which is zero-initialised; facets[n_tri] are those of m. Triangles not higher than the
+ * tolerance have no contacts. The arrays are taken from the high end of the arena. SDM_E_MESH: more
+ * than 64 n_tri + 2^20 contacts; SDM_E_NOMEM, SDM_E_CANCELLED. */
 sdm_status sdm_contacts_find(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree,
                              const sdm_facet *facets, sdm_arena *arena, sdm_contacts *c,
-                             sdm_budget *budget, sdm_error *err);
+                             sdm_error *err);
 
-/* Position of x in the frame's plane, and back. */
+/* xy = coordinates of x along u and v of the frame (projection on its plane); sdm_frame_lift() is
+ * the inverse, x = the point of the plane at xy. */
 void sdm_frame_flatten(const sdm_frame *f, const double x[3], double xy[2]);
 void sdm_frame_lift(const sdm_frame *f, const double xy[2], double x[3]);
 

@@ -1,6 +1,7 @@
-/* Binary space partition of a convex polygon by segments. Pieces wait on a stack whose corners and
-   segments lie behind each other in two arrays, so that memory is reused as soon as a piece is
-   taken. */
+/* Binary space partition of a convex polygon by segments: a piece is cut along the line of a
+ * segment that enters its interior, until no segment enters any piece. The pieces are on a stack;
+ * their corners and segments are consecutive in two arrays, so that popping a piece frees its
+ * memory. */
 #include "cutting.h"
 
 #include <math.h>
@@ -8,8 +9,9 @@
 
 #include "sdm/internal/heap.h"
 
-static sdm_status make_room(void **block, size_t used, size_t *cap, size_t need, size_t size,
-                            sdm_error *err)
+/* Enlarges an array with capacity *cap, `used` elements of which matter, to at least `need`. */
+static sdm_status array_reserve(void **block, size_t used, size_t *cap, size_t need, size_t size,
+                                sdm_error *err)
 {
     if (need <= *cap) return SDM_OK;
     const size_t bigger = 2 * need + 64;
@@ -18,7 +20,7 @@ static sdm_status make_room(void **block, size_t used, size_t *cap, size_t need,
     return s;
 }
 
-/* Signed distance of x from the line through the segment, and the position along it. */
+/* A directed line through a segment: its start p, unit direction d and the segment's length. */
 typedef struct line {
     double p[2], d[2], length;
 } line;
@@ -29,40 +31,47 @@ static line line_of(const double s[4])
     return (line){{s[0], s[1]}, {dx / length, dy / length}, length};
 }
 
-static double across(const line *l, const double x[2])
+/* Signed distance of x from the line, positive to its left. */
+static double line_distance(const line *l, const double x[2])
 {
     return l->d[0] * (x[1] - l->p[1]) - l->d[1] * (x[0] - l->p[0]);
 }
-static double along(const line *l, const double x[2])
+
+/* Position of the projection of x along the line; 0 at the segment's start. */
+static double line_position(const line *l, const double x[2])
 {
     return l->d[0] * (x[0] - l->p[0]) + l->d[1] * (x[1] - l->p[1]);
 }
 
-static void meeting(const sdm_corner *a, double ha, const sdm_corner *b, double hb, sdm_corner *out)
+/* *out = point of the edge a b on the line; ha and hb are the distances of a and b from the line,
+ * of opposite sign. */
+static void edge_cross(const sdm_corner *a, double ha, const sdm_corner *b, double hb,
+                       sdm_corner *out)
 {
     const double t = ha / (ha - hb);
     out->vertex = SDM_NONE;
     for (int i = 0; i < 2; i++) out->x[i] = a->x[i] + t * (b->x[i] - a->x[i]);
 }
 
-/* Does the segment run through the interior of the polygon? */
-static bool enters(const double segment[4], const sdm_corner *c, size_t n, double tolerance)
+/* Does the segment run through the interior of the polygon, by more than the tolerance? */
+static bool segment_enters(const double segment[4], const sdm_corner *c, size_t n, double tolerance)
 {
     const line l = line_of(segment);
+    // extent of the polygon across the line, and from .. to where the line crosses it
     double low = 0, high = 0, from = INFINITY, to = -INFINITY;
-    double h = across(&l, c[n - 1].x);
+    double h = line_distance(&l, c[n - 1].x);
     for (size_t i = 0; i < n; i++) {
         const double before = h;
-        h = across(&l, c[i].x);
+        h = line_distance(&l, c[i].x);
         low = fmin(low, h);
         high = fmax(high, h);
         if ((before < 0) == (h < 0) && h != 0) continue;
         sdm_corner x = c[i];
         if (h != 0 && before != 0)
-            meeting(&c[i ? i - 1 : n - 1], before, &c[i], h, &x);
+            edge_cross(&c[i ? i - 1 : n - 1], before, &c[i], h, &x);
         else if (h != 0)
             x = c[i ? i - 1 : n - 1];
-        const double s = along(&l, x.x);
+        const double s = line_position(&l, x.x);
         from = fmin(from, s);
         to = fmax(to, s);
     }
@@ -70,27 +79,29 @@ static bool enters(const double segment[4], const sdm_corner *c, size_t n, doubl
     return fmin(to, l.length) - fmax(from, 0) > tolerance;
 }
 
-/* The part of a polygon on one side of a line (side +1: left). Returns its number of corners. */
-static size_t half_polygon(const line *l, double side, const sdm_corner *c, size_t n,
+/* out = the part of a convex polygon on one side of a line (side +1: left, -1: right). Returns its
+ * number of corners. */
+static size_t polygon_half(const line *l, double side, const sdm_corner *c, size_t n,
                            sdm_corner *out)
 {
     size_t m = 0;
-    double h = side * across(l, c[n - 1].x);
+    double h = side * line_distance(l, c[n - 1].x);
     for (size_t i = 0; i < n; i++) {
         const double before = h;
-        h = side * across(l, c[i].x);
+        h = side * line_distance(l, c[i].x);
         if ((before > 0 && h < 0) || (before < 0 && h > 0))
-            meeting(&c[i ? i - 1 : n - 1], before, &c[i], h, &out[m++]);
+            edge_cross(&c[i ? i - 1 : n - 1], before, &c[i], h, &out[m++]);
         if (h >= 0) out[m++] = c[i];
     }
     return m;
 }
 
-/* The part of a segment on one side of a line; false when nothing is left. */
-static bool half_segment(const line *l, double side, const double s[4], double tolerance,
+/* out = the part of a segment on one side of a line; false when none of it is farther than the
+ * tolerance from the line. */
+static bool segment_half(const line *l, double side, const double s[4], double tolerance,
                          double out[4])
 {
-    const double hp = side * across(l, s), hq = side * across(l, s + 2);
+    const double hp = side * line_distance(l, s), hq = side * line_distance(l, s + 2);
     if (!(hp > tolerance || hq > tolerance)) return false;
     memcpy(out, s, 4 * sizeof *out);
     if (hp >= 0 && hq >= 0) return true;
@@ -100,7 +111,8 @@ static bool half_segment(const line *l, double side, const double s[4], double t
     return true;
 }
 
-static bool narrow(const sdm_corner *c, size_t n, double tolerance)
+/* Is the polygon at most about the tolerance wide: area <= tolerance * perimeter? */
+static bool polygon_is_narrow(const sdm_corner *c, size_t n, double tolerance)
 {
     double area = 0, perimeter = 0;
     for (size_t i = 0; i < n; i++) {
@@ -112,24 +124,26 @@ static bool narrow(const sdm_corner *c, size_t n, double tolerance)
     return !(fabs(area) > tolerance * perimeter);
 }
 
-/* Puts one half of the piece in the work arrays on the stack. */
-static sdm_status push_half(sdm_cutter *w, size_t *n_piece, sdm_cut_piece at, sdm_cut_piece from,
-                            const line *l, double side, double tolerance, sdm_cut_piece *made,
-                            sdm_error *err)
+/* Pushes the half of the piece `from`, whose corners and segments are in the work arrays, on one
+ * side of a line; `at` says where in the arrays of the stack its corners and segments begin.
+ * *made = the pushed piece, or one without corners when the half is empty. */
+static sdm_status piece_push_half(sdm_cutter *w, size_t *n_piece, sdm_cut_piece at,
+                                  sdm_cut_piece from, const line *l, double side, double tolerance,
+                                  sdm_cut_piece *made, sdm_error *err)
 {
-    sdm_status s = make_room((void **)&w->corner, at.first_corner, &w->cap_corner,
-                             at.first_corner + 2 * from.n_corner + 2, sizeof *w->corner, err);
+    sdm_status s = array_reserve((void **)&w->corner, at.first_corner, &w->cap_corner,
+                                 at.first_corner + 2 * from.n_corner + 2, sizeof *w->corner, err);
     if (!s)
-        s = make_room((void **)&w->segment, at.first_segment, &w->cap_segment,
-                      at.first_segment + from.n_segment, sizeof *w->segment, err);
+        s = array_reserve((void **)&w->segment, at.first_segment, &w->cap_segment,
+                          at.first_segment + from.n_segment, sizeof *w->segment, err);
     if (!s)
-        s = make_room((void **)&w->piece, *n_piece, &w->cap_piece, *n_piece + 1, sizeof *w->piece,
-                      err);
+        s = array_reserve((void **)&w->piece, *n_piece, &w->cap_piece, *n_piece + 1,
+                          sizeof *w->piece, err);
     if (s) return s;
-    at.n_corner = half_polygon(l, side, w->work_corner, from.n_corner, w->corner + at.first_corner);
+    at.n_corner = polygon_half(l, side, w->work_corner, from.n_corner, w->corner + at.first_corner);
     at.n_segment = 0;
     for (size_t i = 0; i < from.n_segment; i++)
-        at.n_segment += half_segment(l, side, w->work_segment[i], tolerance,
+        at.n_segment += segment_half(l, side, w->work_segment[i], tolerance,
                                      w->segment[at.first_segment + at.n_segment]);
     if (at.n_corner < 3)
         at.n_corner = at.n_segment = 0;
@@ -139,14 +153,14 @@ static sdm_status push_half(sdm_cutter *w, size_t *n_piece, sdm_cut_piece at, sd
     return SDM_OK;
 }
 
-/* Copies a piece off the stack, so that its place can be overwritten. */
-static sdm_status take(sdm_cutter *w, sdm_cut_piece p, sdm_error *err)
+/* Copies a piece from the stack to the work arrays, so that its memory can be overwritten. */
+static sdm_status piece_pop(sdm_cutter *w, sdm_cut_piece p, sdm_error *err)
 {
-    sdm_status s = make_room((void **)&w->work_corner, 0, &w->cap_work_corner, p.n_corner,
-                             sizeof *w->work_corner, err);
+    sdm_status s = array_reserve((void **)&w->work_corner, 0, &w->cap_work_corner, p.n_corner,
+                                 sizeof *w->work_corner, err);
     if (!s)
-        s = make_room((void **)&w->work_segment, 0, &w->cap_work_segment, p.n_segment,
-                      sizeof *w->work_segment, err);
+        s = array_reserve((void **)&w->work_segment, 0, &w->cap_work_segment, p.n_segment,
+                          sizeof *w->work_segment, err);
     if (s) return s;
     memcpy(w->work_corner, w->corner + p.first_corner, p.n_corner * sizeof *w->corner);
     if (p.n_segment)
@@ -154,12 +168,13 @@ static sdm_status take(sdm_cutter *w, sdm_cut_piece p, sdm_error *err)
     return SDM_OK;
 }
 
-static sdm_status start(sdm_cutter *w, const sdm_corner corner[3], const sdm_contact *contacts,
-                        size_t n, sdm_error *err)
+/* Makes the triangle, with the segments of its contacts, the only piece on the stack. */
+static sdm_status cutter_start(sdm_cutter *w, const sdm_corner corner[3],
+                               const sdm_contact *contacts, size_t n, sdm_error *err)
 {
-    sdm_status s = make_room((void **)&w->corner, 0, &w->cap_corner, 3, sizeof *w->corner, err);
-    if (!s) s = make_room((void **)&w->segment, 0, &w->cap_segment, n, sizeof *w->segment, err);
-    if (!s) s = make_room((void **)&w->piece, 0, &w->cap_piece, 1, sizeof *w->piece, err);
+    sdm_status s = array_reserve((void **)&w->corner, 0, &w->cap_corner, 3, sizeof *w->corner, err);
+    if (!s) s = array_reserve((void **)&w->segment, 0, &w->cap_segment, n, sizeof *w->segment, err);
+    if (!s) s = array_reserve((void **)&w->piece, 0, &w->cap_piece, 1, sizeof *w->piece, err);
     if (s) return s;
     memcpy(w->corner, corner, 3 * sizeof *corner);
     size_t m = 0;
@@ -177,34 +192,35 @@ sdm_status sdm_cut_triangle(sdm_cutter *w, const sdm_corner corner[3], const sdm
                             sdm_status (*visit)(void *user, const sdm_corner *corner, size_t n),
                             void *user, sdm_error *err)
 {
-    sdm_status s = start(w, corner, contacts, n, err);
+    sdm_status s = cutter_start(w, corner, contacts, n, err);
     size_t n_piece = 1;
     while (!s && n_piece) {
         const sdm_cut_piece p = w->piece[--n_piece];
-        s = take(w, p, err);
+        s = piece_pop(w, p, err);
         if (s) return s;
-        // the middle of those that cut: a fair choice where they run along a curve
-        size_t cutters = 0, chosen = 0;
+        // keep the segments that enter the piece
+        size_t cutters = 0;
         for (size_t i = 0; i < p.n_segment; i++) {
-            if (!enters(w->work_segment[i], w->work_corner, p.n_corner, tolerance)) continue;
+            if (!segment_enters(w->work_segment[i], w->work_corner, p.n_corner, tolerance))
+                continue;
             if (cutters != i)
                 memcpy(w->work_segment[cutters], w->work_segment[i], sizeof *w->work_segment);
             cutters++;
         }
         if (!cutters) {
-            if (!narrow(w->work_corner, p.n_corner, tolerance))
+            if (!polygon_is_narrow(w->work_corner, p.n_corner, tolerance))
                 s = visit(user, w->work_corner, p.n_corner);
             continue;
         }
-        chosen = cutters / 2;
-        const line l = line_of(w->work_segment[chosen]);
+        // cut along the middle one: if they run along a curve, the halves are balanced
+        const line l = line_of(w->work_segment[cutters / 2]);
         sdm_cut_piece from = p, left;
         from.n_segment = cutters;
-        s = push_half(w, &n_piece, p, from, &l, 1, tolerance, &left, err);
+        s = piece_push_half(w, &n_piece, p, from, &l, 1, tolerance, &left, err);
         if (s) return s;
         const sdm_cut_piece behind = {.first_corner = p.first_corner + left.n_corner,
                                       .first_segment = p.first_segment + left.n_segment};
-        s = push_half(w, &n_piece, behind, from, &l, -1, tolerance, &left, err);
+        s = piece_push_half(w, &n_piece, behind, from, &l, -1, tolerance, &left, err);
     }
     return s;
 }

@@ -1,48 +1,52 @@
-/* The triangles around a vertex. Where they are a closed fan whose normals agree with one direction
-   and which goes round the vertex once, as seen along that direction, its triangles lie side by
-   side: no two of them meet but in what they share. */
+/* Pairs of triangles with a common vertex. Most are excluded by a test of the whole fan, the
+ * triangles around a vertex: if it is closed, all its normals are within a fixed angle of their
+ * mean, and it winds around the vertex exactly once as seen along that mean, then the fan is a
+ * disc: seen along the mean it does not overlap itself, so its triangles meet in common vertices
+ * and edges only. */
 #include "fan.h"
 
+#include "memory/cancel.h"
 #include "sdm/internal/vec3.h"
 
-/* Cosine of the largest angle between a normal and their mean, far from doubt. */
-#define AGREE 0.25
-/* Least height in tolerances: a normal is then sure to some 1e-3, however long the triangle. More
-   is not asked of the shape, so that the needles around the middle of a round face are a disc, how
-   many there may be. */
-#define SOUND 1e3
+/* Bound on cos(angle between a normal and the mean normal of a disc), far above its rounding error.
+ */
+#define COSINE_MIN 0.25
+/* Minimum height of a triangle in a disc, in tolerances: its normal is then accurate to about 1e-3.
+ * Long needles are allowed, so that a round face triangulated from its centre is a disc. */
+#define HEIGHT_MIN 1e3
 
-typedef struct fan {
+typedef struct search {
     const sdm_mesh *mesh;
     const sdm_topology *topo;
     const sdm_facet *facets;
-    double least; // height
+    double height_min;
+} search;
+
+/* The fan of one vertex; its members are sums over its triangles. */
+typedef struct fan {
+    double mean[3];  // sum of the unit normals
+    double dot_min;  // bound on the dot product of each normal with `mean`
+    double side[3];  // a vector perpendicular to `mean`
+    uint32_t rounds; // how often the fan winds around the vertex
+    bool is_disc;
 } fan;
 
-/* What the triangles around a vertex are, summed up triangle by triangle. */
-typedef struct around {
-    double mean[3], least; // sum of the normals, and what their product with each must exceed
-    double side[3];        // across the mean
-    uint32_t rounds;       // how often the triangles go round
-    bool is_disc;
-} around;
+static const double *vertex(const search *w, uint32_t v) { return &w->mesh->vert[3 * (size_t)v]; }
 
-static const double *vertex(const fan *w, uint32_t v) { return &w->mesh->vert[3 * (size_t)v]; }
-
-/* Every edge must have one triangle on each side, so that the triangles are closed fans; all must
- * be sound. */
-static void sum_normals(const fan *w, around *list)
+/* Sets `mean` of every fan. is_disc stays true when all its triangles are high enough and every
+ * edge has one triangle on each side, so that the fan is closed. */
+static void sum_normals(const search *w, fan *list)
 {
     const sdm_topology *t = w->topo;
-    for (size_t v = 0; v < t->n_vert; v++) list[v] = (around){.is_disc = true};
+    for (size_t v = 0; v < t->n_vert; v++) list[v] = (fan){.is_disc = true};
     for (size_t i = 0; i < t->n_tri; i++) {
         if (t->edge[3 * i] == SDM_NONE) continue;
         const sdm_facet *f = &w->facets[i];
-        const bool is_sound = f->height > w->least;
+        const bool is_high = f->height > w->height_min;
         for (size_t k = 0; k < 3; k++) {
-            around *a = &list[t->tri[3 * i + k]];
+            fan *a = &list[t->tri[3 * i + k]];
             v3_along(a->mean, 1, f->n, a->mean);
-            a->is_disc = a->is_disc && is_sound;
+            a->is_disc = a->is_disc && is_high;
         }
     }
     for (size_t i = 0; i < t->n_edges; i++) {
@@ -51,24 +55,25 @@ static void sum_normals(const fan *w, around *list)
     }
 }
 
-static void choose_sides(size_t n, around *list)
+/* Sets `side` and `dot_min` of every fan. */
+static void choose_sides(size_t n, fan *list)
 {
     for (size_t v = 0; v < n; v++) {
-        around *a = &list[v];
+        fan *a = &list[v];
         double axis[3] = {0, 0, 0};
         int least = 0;
         for (int i = 1; i < 3; i++)
             if (fabs(a->mean[i]) < fabs(a->mean[least])) least = i;
         axis[least] = 1;
         v3_cross(a->mean, axis, a->side);
-        a->least = AGREE * v3_norm(a->mean);
+        a->dot_min = COSINE_MIN * v3_norm(a->mean);
     }
 }
 
-/* The triangles around a vertex are a disc, seen from one side without overlap: their normals agree
-   with the mean and they go round once. All turn the same way then: how often they pass a
-   half-plane through the vertex is how often they go round. */
-static void count_rounds(const fan *w, around *list)
+/* Checks the normals against `mean` and sets `rounds`. When all normals agree with the mean, all
+ * triangles of the fan turn in the same direction as seen along it, so the number of triangles that
+ * cross a fixed half-plane through the vertex is the number of rounds. */
+static void count_rounds(const search *w, fan *list)
 {
     const sdm_topology *t = w->topo;
     for (size_t i = 0; i < t->n_tri; i++) {
@@ -78,20 +83,20 @@ static void count_rounds(const fan *w, around *list)
         if (t->edge[3 * i] == SDM_NONE) continue;
         for (int k = 0; k < 3; k++) v3_sub(vertex(w, v[(k + 1) % 3]), vertex(w, v[k]), edge[k]);
         for (int k = 0; k < 3; k++) {
-            around *a = &list[v[k]];
-            a->is_disc = a->is_disc && v3_dot(a->mean, n) > a->least;
+            fan *a = &list[v[k]];
+            a->is_disc = a->is_disc && v3_dot(a->mean, n) > a->dot_min;
             a->rounds += v3_dot(edge[k], a->side) < 0 && v3_dot(edge[(k + 2) % 3], a->side) <= 0;
         }
     }
 }
 
-/* Corners (3 * triangle + corner) of the vertices that are no disc, rising: at[first[v]] ..
- * at[first[v + 1]). */
+/* Corners (3 * triangle + corner) at the vertices whose fan is not a disc, in ascending order:
+ * those of v are at[first[v]] .. at[first[v + 1] - 1]. */
 typedef struct corners {
     uint32_t *first, *at;
 } corners;
 
-static sdm_status list_corners(const fan *w, const around *list, sdm_arena *arena, corners *c,
+static sdm_status list_corners(const search *w, const fan *list, sdm_arena *arena, corners *c,
                                sdm_error *err)
 {
     const sdm_topology *t = w->topo;
@@ -108,15 +113,15 @@ static sdm_status list_corners(const fan *w, const around *list, sdm_arena *aren
     return s;
 }
 
-/* Pairs around v, each at the first of the vertices it shares; none when a shared vertex is one of
- * a disc. */
-static sdm_status visit_pairs(const fan *w, const around *list, const corners *c, uint32_t v,
+/* Visits the pairs of triangles around v. A pair is visited only at the lowest of its common
+ * vertices, and not at all when the fan of one of them is a disc. */
+static sdm_status visit_pairs(const search *w, const fan *list, const corners *c, uint32_t v,
                               sdm_status (*visit)(void *user, uint32_t i, uint32_t j, int shared),
-                              void *user, const sdm_budget *budget, sdm_error *err)
+                              void *user, const sdm_exact_opts *opts, sdm_error *err)
 {
     const sdm_topology *t = w->topo;
     for (uint32_t i = c->first[v]; i < c->first[v + 1]; i++) {
-        const sdm_status stop = sdm_budget_ask(budget, err);
+        const sdm_status stop = sdm_cancel_check(opts, err);
         if (stop) return stop;
         for (uint32_t j = i + 1; j < c->first[v + 1]; j++) {
             const uint32_t p = c->at[i] / 3, q = c->at[j] / 3;
@@ -135,19 +140,18 @@ static sdm_status visit_pairs(const fan *w, const around *list, const corners *c
     return SDM_OK;
 }
 
-size_t sdm_fans_bytes(size_t n_vert) { return n_vert * (sizeof(around) + sizeof(uint32_t)); }
-
 sdm_status sdm_fans_visit(const sdm_mesh *m, const sdm_topology *topo, const sdm_facet *facets,
                           double tolerance, sdm_arena *arena,
                           sdm_status (*visit)(void *user, uint32_t i, uint32_t j, int shared),
-                          void *user, const sdm_budget *budget, sdm_error *err)
+                          void *user, sdm_error *err)
 {
     const sdm_arena_mark before = arena->end[SDM_HIGH];
-    const fan w = {m, topo, facets, SOUND * tolerance};
-    around *list;
+    const search w = {m, topo, facets, HEIGHT_MIN * tolerance};
+    fan *list; // [n_vert]
     corners c = {0};
     sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &list, m->n_vert, "vertices", err);
     if (s) return s;
+    // which fans are discs
     sum_normals(&w, list);
     choose_sides(m->n_vert, list);
     count_rounds(&w, list);
@@ -156,9 +160,10 @@ sdm_status sdm_fans_visit(const sdm_mesh *m, const sdm_topology *topo, const sdm
         list[v].is_disc = list[v].is_disc && list[v].rounds == 1;
         any = any || !list[v].is_disc;
     }
+    // the pairs around the other vertices
     if (any) s = list_corners(&w, list, arena, &c, err);
     for (uint32_t v = 0; v < m->n_vert && any && !s; v++)
-        if (!list[v].is_disc) s = visit_pairs(&w, list, &c, v, visit, user, budget, err);
+        if (!list[v].is_disc) s = visit_pairs(&w, list, &c, v, visit, user, arena->opts, err);
     sdm_arena_release(arena, SDM_HIGH, before);
     return s;
 }

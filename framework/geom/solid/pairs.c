@@ -1,30 +1,33 @@
-/* Pairs of triangles by boxes of eight, of eight of these and so on, in the order of the tree.
-   Boxes are floats in units of the mesh's size, rounded outwards. */
+/* Overlapping boxes by a hierarchy of fan-out eight: blocks of up to eight triangles in the order
+ * of the tree, then the boxes of eight blocks, of eight of those, and so on. Boxes are floats in
+ * units of the mesh's size, rounded outwards. */
 #include "pairs.h"
 
 #include <math.h>
 #include <string.h>
 
+#include "memory/cancel.h"
 #include "pairs_simd.h"
 
-#define OUTWARDS 0x1p-22f // twice the rounding of a number between 0 and 1, and then some
-#define MOST_LEVELS 11    // of 8 to the power of a level: 32 bits
+#define OUTWARDS 0x1p-22f // margin of a box: more than twice the rounding error of a float <= 1
+#define LEVELS_MAX 11     // 8^11 >= 2^32 blocks
 
-/* Up to eight triangles under one node of the tree; lanes without one overlap nothing. */
+/* Up to eight triangles of one node of the tree. The box of an unused lane is empty and overlaps
+ * nothing. */
 typedef struct block {
     sdm_box8 box;
-    uint32_t tri[8], corner[8][3];
+    uint32_t tri[8], corner[8][3]; // corners are welded vertices
     uint32_t count;
 } block;
 
 typedef struct pairing {
     block *blocks;
-    // of the blocks: lane c of element i of level k is the box of element 8 i + c of the level
-    // before
-    sdm_box8 *level[MOST_LEVELS];
+    // Lane c of level[0][i] is the box of block 8 i + c; lane c of level[k][i] is the box of
+    // all lanes of level[k - 1][8 i + c].
+    sdm_box8 *level[LEVELS_MAX];
     size_t n_block;
     int n_level;
-    uint8_t *has; // [n_vert] bit k: triangle k of the block at hand has the vertex
+    uint8_t *has; // [n_vert] bit k: the vertex is a corner of triangle k of the current block
     sdm_status (*visit)(void *user, uint32_t i, uint32_t j);
     void *user;
 } pairing;
@@ -34,7 +37,7 @@ static inline uint8_t *has_corner(const pairing *w, const block *b, size_t lane,
     return &w->has[b->corner[lane][c]];
 }
 
-/* Triangles of blocks i <= j; those of i are marked. */
+/* Visits the pairs of a triangle of block i, the current one, and a triangle of block j >= i. */
 static sdm_status pairs_of_blocks(const pairing *w, size_t i, size_t j)
 {
     const block *a = &w->blocks[i], *b = &w->blocks[j];
@@ -45,7 +48,7 @@ static sdm_status pairs_of_blocks(const pairing *w, size_t i, size_t j)
         const unsigned shared =
             *has_corner(w, b, l, 0) | *has_corner(w, b, l, 1) | *has_corner(w, b, l, 2);
         unsigned mask = box8_overlap(&a->box, &b->box, l) & ~shared;
-        if (i == j) mask &= (1u << l) - 1; // each pair once
+        if (i == j) mask &= (1u << l) - 1; // each pair only once
         for (; mask; mask &= mask - 1) {
             const sdm_status s = w->visit(w->user, a->tri[__builtin_ctz(mask)], b->tri[l]);
             if (s) return s;
@@ -54,17 +57,18 @@ static sdm_status pairs_of_blocks(const pairing *w, size_t i, size_t j)
     return SDM_OK;
 }
 
-/* Pairs of a block with itself and with those behind it. */
+/* Visits the pairs of block i with itself and with all later blocks. */
 static sdm_status pairs_of_block(const pairing *w, size_t i)
 {
     struct {
         size_t at;
         int level;
-    } stack[8 * MOST_LEVELS];
+    } stack[8 * LEVELS_MAX];
     const block *b = &w->blocks[i];
     sdm_status s = SDM_OK;
     for (size_t l = 0; l < b->count; l++)
         for (int c = 0; c < 3; c++) *has_corner(w, b, l, c) |= (uint8_t)(1u << l);
+    // traverse the levels from the root; elements before block i are masked out
     int top = 0;
     stack[top].at = 0;
     stack[top++].level = w->n_level - 1;
@@ -78,7 +82,7 @@ static sdm_status pairs_of_block(const pairing *w, size_t i)
         unsigned mask = box8_overlap(&w->level[level][at], &w->level[0][i / 8], i % 8);
         const size_t first = i >> 3 * level;
         if (8 * at < first) mask &= 255u << (first - 8 * at);
-        // the last one first, so that the first one comes out first
+        // push in descending order, so that they are popped in ascending order
         while (mask) {
             const unsigned lane = 31u - (unsigned)__builtin_clz(mask);
             mask ^= 1u << lane;
@@ -91,7 +95,7 @@ static sdm_status pairs_of_block(const pairing *w, size_t i)
     return s;
 }
 
-/* From the mesh to boxes in floats. */
+/* Conversion of boxes to floats: (x - origin) * scale, enlarged by the margin on each side. */
 typedef struct scaling {
     double origin[3], scale;
     float margin;
@@ -103,13 +107,14 @@ static scaling scaling_of(const sdm_bvh_node *root, double slack)
     for (int a = 0; a < 3; a++) size = fmax(size, root->hi[a] - root->lo[a]);
     scaling r = {.scale = size > 0 && 1 / size < INFINITY ? 1 / size : 0};
     memcpy(r.origin, root->lo, sizeof r.origin);
-    // coordinates are 0 .. 1: more than 1 overlaps all the same, and infinite boxes would overlap
-    // lanes without a triangle
+    // Scaled coordinates are in 0 .. 1, so a margin of 1 makes all boxes overlap. A larger margin
+    // could become infinite, and then boxes would overlap the empty boxes of unused lanes.
     r.margin = (float)fmin(slack * r.scale, 1) + OUTWARDS;
     return r;
 }
 
-static void set_lane(sdm_box8 *box, size_t lane, const scaling *r, const double lo[3],
+/* Sets lane `lane` to the box lo .. hi in mm; lane_clear() makes it empty. */
+static void lane_set(sdm_box8 *box, size_t lane, const scaling *r, const double lo[3],
                      const double hi[3])
 {
     for (int a = 0; a < 3; a++) {
@@ -118,7 +123,7 @@ static void set_lane(sdm_box8 *box, size_t lane, const scaling *r, const double 
     }
 }
 
-static void clear_lane(sdm_box8 *box, size_t lane)
+static void lane_clear(sdm_box8 *box, size_t lane)
 {
     for (int a = 0; a < 3; a++) {
         box->lo[a][lane] = INFINITY;
@@ -130,7 +135,7 @@ static void fill_block(const sdm_mesh *m, const sdm_topology *topo, const uint32
                        uint32_t count, const scaling *r, block *b)
 {
     b->count = count;
-    for (size_t k = count; k < 8; k++) clear_lane(&b->box, k);
+    for (size_t k = count; k < 8; k++) lane_clear(&b->box, k);
     for (size_t k = 0; k < count; k++) {
         const size_t t = b->tri[k] = order[k];
         double lo[3], hi[3];
@@ -142,11 +147,12 @@ static void fill_block(const sdm_mesh *m, const sdm_topology *topo, const uint32
                 hi[a] = c == 0 || x[a] > hi[a] ? x[a] : hi[a];
             }
         }
-        set_lane(&b->box, k, r, lo, hi);
+        lane_set(&b->box, k, r, lo, hi);
     }
 }
 
-/* Triangles below a node where they are a block, 0: its children are looked at. */
+/* Number of triangles below node n if they become one block: n is a leaf, or has two leaves with at
+ * most 8 triangles as children. Else 0. */
 static uint32_t block_size(const sdm_bvh_node *node, const sdm_bvh_node *n)
 {
     if (n->count) return n->count;
@@ -154,7 +160,7 @@ static uint32_t block_size(const sdm_bvh_node *node, const sdm_bvh_node *n)
     return c[0].count && c[1].count && c[0].count + c[1].count <= 8 ? c[0].count + c[1].count : 0;
 }
 
-/* Blocks in the order of the tree and their boxes. */
+/* Fills the blocks in the order of the tree, and level 0. */
 static void fill_blocks(pairing *w, const sdm_mesh *m, const sdm_topology *topo,
                         const sdm_bvh *tree, double slack)
 {
@@ -172,19 +178,19 @@ static void fill_blocks(pairing *w, const sdm_mesh *m, const sdm_topology *topo,
         }
         const uint32_t first = n->count ? n->first : tree->node[n->first].first;
         fill_block(m, topo, tree->order + first, count, &r, &w->blocks[w->n_block]);
-        set_lane(&w->level[0][w->n_block / 8], w->n_block % 8, &r, n->lo, n->hi);
+        lane_set(&w->level[0][w->n_block / 8], w->n_block % 8, &r, n->lo, n->hi);
         w->n_block++;
     }
 }
 
-/* The boxes of n elements are in level k: that of each eight in the next. */
+/* Level k has the boxes of n elements: clears its unused lanes and fills level k + 1. */
 static void fill_level(const pairing *w, int k, size_t n)
 {
-    for (; n % 8; n++) clear_lane(&w->level[k][n / 8], n % 8);
+    for (; n % 8; n++) lane_clear(&w->level[k][n / 8], n % 8);
     for (size_t i = 0; i < n / 8 && k + 1 < w->n_level; i++) {
         const sdm_box8 *from = &w->level[k][i];
         sdm_box8 *to = &w->level[k + 1][i / 8];
-        clear_lane(to, i % 8);
+        lane_clear(to, i % 8);
         for (int a = 0; a < 3; a++) {
             for (int l = 0; l < 8; l++) {
                 to->lo[a][i % 8] = fminf(to->lo[a][i % 8], from->lo[a][l]);
@@ -194,23 +200,14 @@ static void fill_level(const pairing *w, int k, size_t n)
     }
 }
 
-/* Nodes of which some may be blocks. */
-static size_t most_blocks(const sdm_bvh *tree) { return (tree->n_node + 1) / 2; }
-
-size_t sdm_pairs_bytes(size_t n_vert, const sdm_bvh *tree)
-{
-    const size_t n = most_blocks(tree);
-    return n_vert + n * sizeof(block) + (n / 7 + MOST_LEVELS) * sizeof(sdm_box8);
-}
-
 sdm_status sdm_pairs_visit(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree,
                            double slack, sdm_arena *arena,
                            sdm_status (*visit)(void *user, uint32_t i, uint32_t j), void *user,
-                           const sdm_budget *budget, sdm_error *err)
+                           sdm_error *err)
 {
     const sdm_arena_mark before = arena->end[SDM_HIGH];
     pairing w = {.visit = visit, .user = user};
-    size_t n = most_blocks(tree);
+    size_t n = (tree->n_node + 1) / 2; // leaves of the tree, at least as many as blocks
     sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &w.blocks, n, "pairs of triangles", err);
     if (!s) s = SDM_TAKE(arena, SDM_HIGH, &w.has, m->n_vert, "pairs of triangles", err);
     do {
@@ -225,7 +222,7 @@ sdm_status sdm_pairs_visit(const sdm_mesh *m, const sdm_topology *topo, const sd
         for (int k = 0; k < w.n_level; k++, n = (n + 7) / 8) fill_level(&w, k, n);
     }
     for (size_t i = 0; i < w.n_block && !s; i++) {
-        s = sdm_budget_ask(budget, err);
+        s = sdm_cancel_check(arena->opts, err);
         if (!s) s = pairs_of_block(&w, i);
     }
     sdm_arena_release(arena, SDM_HIGH, before);

@@ -1,20 +1,18 @@
-/* Pairs of triangles that may meet: those whose boxes overlap. */
+/* Candidate pairs of triangles without a common vertex that may meet: their boxes overlap. */
 #ifndef SDM_GEOM_PAIRS_H
 #define SDM_GEOM_PAIRS_H
 
-#include "memory/budget.h"
 #include "mesh/bvh.h"
 #include "mesh/topology.h"
 
-/* Bytes that a visit takes in passing. */
-size_t sdm_pairs_bytes(size_t n_vert, const sdm_bvh *tree);
-
-/* Calls visit(user, i, j) for every pair of triangles (mesh indices) that share no vertex and whose
-   boxes, made larger by `slack`, overlap; stops at the first status that is not SDM_OK and returns
-   it. budget: asked whether to stop; may be NULL. */
+/* Calls visit(user, i, j) once for every pair of triangles (indices in the mesh, i < j or i > j)
+ * that share no welded vertex and whose bounding boxes, enlarged by `slack` mm on each side,
+ * overlap; some other pairs without a common vertex may be among them. Scratch memory is taken from
+ * the high end of the arena and released. Stops at the first status of visit() other than SDM_OK
+ * and returns it; SDM_E_NOMEM, SDM_E_CANCELLED as the arena's options say. */
 sdm_status sdm_pairs_visit(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree,
                            double slack, sdm_arena *arena,
                            sdm_status (*visit)(void *user, uint32_t i, uint32_t j), void *user,
-                           const sdm_budget *budget, sdm_error *err);
+                           sdm_error *err);
 
 #endif

@@ -1,17 +1,18 @@
-/* Eight boxes at once: which overlap another. Masks have bit k for lane k. */
-#ifndef SDM_GEOM_PAIR_KERNEL_H
-#define SDM_GEOM_PAIR_KERNEL_H
+/* Overlap tests of eight axis-aligned boxes against one other box, with SSE2 where available. */
+#ifndef SDM_GEOM_PAIRS_SIMD_H
+#define SDM_GEOM_PAIRS_SIMD_H
 
 #include <stddef.h>
 #if defined(__SSE2__)
 #include <emmintrin.h>
 #endif
 
+/* Eight boxes, one per lane: lo[axis][lane], hi[axis][lane]. */
 typedef struct sdm_box8 {
     _Alignas(32) float lo[3][8], hi[3][8];
 } sdm_box8;
 
-/* Lanes of a that do not lie apart from lane k of b. */
+/* Bit mask of the lanes of a whose box overlaps or touches the box in lane k of b. */
 static inline unsigned box8_overlap(const sdm_box8 *a, const sdm_box8 *b, size_t k)
 {
 #if defined(__SSE2__)

@@ -1,4 +1,4 @@
-/* Which closed parts of a mesh are inside out: one ray each. */
+/* Finds the parts of a closed mesh that are inside out: one ray per part. */
 #include "parts.h"
 
 #include <stdbool.h>
@@ -6,40 +6,44 @@
 #include "mesh/crossings.h"
 #include "sdm/memory.h"
 
-/* What is known of the part whose root is a triangle. */
+/* A part; stored at the index of its root triangle. */
 typedef struct part {
-    uint32_t widest; /* triangle with the largest area */
-    bool meets;      /* another part */
+    uint32_t widest; /* its triangle with the largest area */
+    bool meets;      /* it has contacts with another part */
     bool turn;
 } part;
 
-sdm_status sdm_parts_turn(sdm_mesh *m, const sdm_survey *s, size_t *n_turned, sdm_error *err)
+sdm_status sdm_parts_turn(sdm_mesh *m, const sdm_survey *survey, size_t *n_turned, sdm_error *err)
 {
     *n_turned = 0;
-    if (!s->audit.closed || s->audit.components < 2) return SDM_OK;
+    if (!survey->audit.closed || survey->audit.components < 2) return SDM_OK;
+    const sdm_facet *facets = survey->facets;
+    const sdm_contacts *contacts = &survey->contacts;
     uint32_t *root = NULL;
     part *parts = NULL;
-    sdm_status st = SDM_ALLOC(&root, m->n_tri, "parts", err);
-    if (!st) st = SDM_ALLOC(&parts, m->n_tri, "parts", err);
-    if (!st) {
-        sdm_topology_parts(&s->topo, root);
+    sdm_status s = SDM_ALLOC(&root, m->n_tri, "parts", err);
+    if (!s) s = SDM_ALLOC(&parts, m->n_tri, "parts", err);
+    if (!s) {
+        // the widest triangle of each part, and whether the part meets another
+        sdm_topology_parts(&survey->topo, root);
         for (uint32_t t = 0; t < m->n_tri; t++) root[t] = sdm_forest_root(root, t);
         for (uint32_t t = 0; t < m->n_tri; t++) parts[t].widest = t;
         for (uint32_t t = 0; t < m->n_tri; t++) {
             part *p = &parts[root[t]];
-            const sdm_facet *f = &s->facets[t], *best = &s->facets[p->widest];
+            const sdm_facet *f = &facets[t], *best = &facets[p->widest];
             if (f->longest * f->height > best->longest * best->height) p->widest = t;
-            for (uint32_t c = s->contacts.first[t]; c < s->contacts.first[t + 1]; c++)
-                if (root[s->contacts.list[c].other] != root[t]) p->meets = true;
+            for (uint32_t c = contacts->first[t]; c < contacts->first[t + 1]; c++)
+                if (root[contacts->list[c].other] != root[t]) p->meets = true;
         }
+        // winding number just outside the widest triangle of each other part
         for (uint32_t t = 0; t < m->n_tri; t++) {
             part *p = &parts[t];
-            if (root[t] != t || p->meets || !(s->facets[p->widest].height > s->contacts.tolerance))
+            if (root[t] != t || p->meets || !(facets[p->widest].height > contacts->tolerance))
                 continue;
             double x[3];
             sdm_facet_centre(m, p->widest, x);
             p->turn =
-                sdm_ray_winding_along(m, &s->tree, x, s->facets[p->widest].n, &p->widest, 1) < 0;
+                sdm_ray_winding_along(m, &survey->tree, x, facets[p->widest].n, &p->widest, 1) < 0;
             *n_turned += p->turn;
         }
         for (size_t t = 0; t < m->n_tri && *n_turned; t++)
@@ -47,5 +51,5 @@ sdm_status sdm_parts_turn(sdm_mesh *m, const sdm_survey *s, size_t *n_turned, sd
     }
     sdm_free(root);
     sdm_free(parts);
-    return st;
+    return s;
 }

@@ -1,9 +1,10 @@
-/* Closed parts of a mesh that are inside out. */
+/* Parts (components connected by edges) of a closed mesh that are inside out. */
 #ifndef SDM_GEOM_PARTS_H
 #define SDM_GEOM_PARTS_H
 
 #include "survey.h"
 
+/* Reverses the orientation of triangle t. */
 static inline void sdm_triangle_turn(sdm_mesh *m, size_t t)
 {
     const uint32_t v = m->tri[3 * t + 1];
@@ -11,10 +12,11 @@ static inline void sdm_triangle_turn(sdm_mesh *m, size_t t)
     m->tri[3 * t + 2] = v;
 }
 
-/* Turns the triangles of parts (components by edges) of the closed mesh m on which the winding
-   number is below 0: no solid has such a place. A cavity in a solid is none, and parts that meet
-   others are left as they are: there is no telling which is wrong. *n_turned: how many; when it is
-   not 0 the survey of m no longer holds. */
-sdm_status sdm_parts_turn(sdm_mesh *m, const sdm_survey *s, size_t *n_turned, sdm_error *err);
+/* Turns each part of the closed mesh m with a winding number below 0 just outside of its widest
+ * triangle: the boundary of a solid has no such point. The surface of a cavity in a solid has a
+ * winding number of at least 0 outside and stays. Parts with contacts to other parts stay too: it
+ * is undecidable which of them is wrong. *n_turned: number of turned parts; if it is not 0, the
+ * survey of m is out of date. SDM_E_NOMEM. */
+sdm_status sdm_parts_turn(sdm_mesh *m, const sdm_survey *survey, size_t *n_turned, sdm_error *err);
 
 #endif

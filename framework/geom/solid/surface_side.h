@@ -1,42 +1,45 @@
-/* What lies outside of a place on the surface of a closed mesh: which parts of the surface bound
-   the union of what it encloses. */
+/* Decides which parts of the surface of a closed mesh bound its solid, the points with winding
+ * number >= 1: those with a winding number <= 0 just outside and >= 1 just inside. */
 #ifndef SDM_GEOM_SURFACE_SIDE_H
 #define SDM_GEOM_SURFACE_SIDE_H
 
 #include "survey.h"
 
-/* Winding number just outside of the surface, known for triangles that meet nothing; for those that
-   meet others it is carried on from a place where it is known. Zero-initialise;
-   sdm_sides_dispose(). */
+/* Winding numbers just outside the surface. Zero-initialise; sdm_sides_dispose() frees. */
 typedef struct sdm_sides {
     const sdm_mesh *mesh;
     const sdm_survey *survey;
-    int32_t *outside; /* [n_tri] of triangles that meet nothing */
-    /* the triangle at hand */
+    int32_t *outside; /* [n_tri] winding number outside triangles without contacts */
+    /* the current triangle and its frame */
     uint32_t tri;
     sdm_frame frame;
-    bool simple, known; /* all that it meets passes through it; `start` is set */
-    double start[2];    /* a place on it */
-    int start_outside;  /* and the winding number there */
-    uint32_t *skip;     /* the triangle and what lies on it */
+    bool simple;       /* it has only contacts of kind CROSSING, and few of them */
+    bool known;        /* start and start_outside are set */
+    double start[2];   /* a point of the triangle, in its frame */
+    int start_outside; /* winding number just outside that point */
+    uint32_t *skip;    /* [cap_skip] the triangle and its coplanar contacts */
     size_t cap_skip;
 } sdm_sides;
 
-/* Is the triangle flat, so that its neighbours stand for it? */
-bool sdm_sides_flat(const sdm_survey *s, uint32_t t);
+/* Is triangle t a sliver: not higher than the tolerance? Slivers are ignored; their neighbours
+ * cover them. */
+bool sdm_sides_is_sliver(const sdm_survey *survey, uint32_t t);
 
-/* outside[] is taken from the high end of the arena. One ray for each patch of triangles that meet
-   nothing: the winding number does not change across an edge between two of them. */
+/* Finds the winding numbers outside[]: one ray for each patch of neighbouring triangles without
+ * contacts, since the winding number does not change across an edge between two of them. outside[]
+ * is taken from the high end of the arena. m and survey must outlive *w. SDM_E_NOMEM. */
 sdm_status sdm_sides_build(const sdm_mesh *m, const sdm_survey *survey, sdm_arena *arena,
-                           sdm_sides *s, sdm_error *err);
-void sdm_sides_dispose(sdm_sides *s);
+                           sdm_sides *w, sdm_error *err);
+void sdm_sides_dispose(sdm_sides *w);
 
-/* Is the triangle, which meets nothing, boundary of the solid? */
-bool sdm_sides_keep_whole(const sdm_sides *s, uint32_t t);
+/* True when triangle t, which has no contacts, bounds the solid. */
+bool sdm_sides_keep_whole(const sdm_sides *w, uint32_t t);
 
-/* Turns to a triangle that meets others; its frame is set. */
-void sdm_sides_turn_to(sdm_sides *s, uint32_t t);
-/* Is it boundary of the solid at xy (of its frame), and does it stand for what lies on it there? */
-sdm_status sdm_sides_keep(sdm_sides *s, const double xy[2], bool *keep, sdm_error *err);
+/* Makes triangle t, which has contacts, the current triangle and sets w->frame. */
+void sdm_sides_turn_to(sdm_sides *w, uint32_t t);
+
+/* *keep = the current triangle bounds the solid at the point xy of its frame and, of several
+ * coplanar triangles there with its orientation, has the lowest index. SDM_E_NOMEM. */
+sdm_status sdm_sides_keep(sdm_sides *w, const double xy[2], bool *keep, sdm_error *err);
 
 #endif

@@ -1,10 +1,8 @@
-/* What is found out about a mesh before it is used: the audit and the structures it was made with.
- */
+/* Survey of a mesh: the audit and the data structures built for it, which the later steps reuse. */
 #ifndef SDM_GEOM_SURVEY_H
 #define SDM_GEOM_SURVEY_H
 
 #include "contact.h"
-#include "memory/budget.h"
 #include "mesh/bvh.h"
 #include "mesh/facet.h"
 #include "mesh/topology.h"
@@ -18,14 +16,14 @@ typedef struct sdm_survey {
     sdm_arena_mark start, with_topology; /* the arena's high end before and after the topology */
 } sdm_survey;
 
-/* *s is zero-initialised; all of it is in the arena: the tree at the low end, the rest at the high
-   end. budget may be NULL. Errors as sdm_mesh_audit(). */
-sdm_status sdm_survey_build(const sdm_mesh *m, sdm_arena *arena, sdm_survey *s, sdm_budget *budget,
+/* Fills *survey, which is zero-initialised. All its arrays are in the arena: the tree at the low
+ * end, the others at the high end. Errors as sdm_mesh_audit(), also SDM_E_CANCELLED and, beyond
+ * the memory limit of the arena, SDM_E_NOMEM. */
+sdm_status sdm_survey_build(const sdm_mesh *m, sdm_arena *arena, sdm_survey *survey,
                             sdm_error *err);
-/* What a survey takes on closed meshes with a few contacts. */
-size_t sdm_survey_usual_bytes(const sdm_mesh *m);
-/* Releases what is not asked for any more once the surface is made; the audit and the tree stay,
- * the topology on demand. */
-void sdm_survey_shrink(sdm_survey *s, sdm_arena *arena, bool keep_topology);
+
+/* Releases the facets and contacts, without keep_topology also the topology; the audit and the tree
+ * stay. All that was taken from the arena's high end since the survey is released with them. */
+void sdm_survey_shrink(sdm_survey *survey, sdm_arena *arena, bool keep_topology);
 
 #endif

@@ -1,24 +1,25 @@
-/* The union hull. Where two triangles meet, both are cut along the segment they share, so the
-   winding number just outside a piece is the same all over it and one ray decides the piece.
-   Triangles that meet nothing are decided by patches: the winding number outside does not change
-   across an edge between two of them.
-
-   Where the winding number is nowhere below 0 and no sheets cancel, the nearest point of the whole
-   mesh lies on the boundary already for a point outside the solid (the way to it crosses nothing),
-   so the removal changes distances inside only. Surface between numbers that are all 0 or less, of
-   a part that is inside out, bounds no solid and goes as well. */
+/* The union hull: the boundary of the points with winding number >= 1. Triangles with contacts are
+ * cut along the contact segments. The winding number just outside is then constant on each piece,
+ * and one test decides whether the piece stays. Triangles without contacts are decided in patches
+ * (surface_side.h).
+ *
+ * If the winding number is nowhere negative and no sheets cancel, the removal changes distances
+ * inside the solid only: for a point outside, the straight path to the nearest point of the mesh
+ * crosses no surface, so that point is on the boundary. Surface with winding numbers <= 0 on both
+ * sides (of a part that is inside out) bounds no solid and is removed, too. */
 #include "union_hull.h"
 
 #include <string.h>
 
 #include "cutting.h"
+#include "memory/cancel.h"
 #include "sdm/internal/heap.h"
 #include "surface_side.h"
 #include "vertex_table.h"
 
-// in tolerances: within it vertices that cuts make are one, the same place as found on two
-// triangles or three
-#define SAME_PLACE 4
+// Vertices made by cuts are merged within this distance, in tolerances: one point of the seam is
+// computed on each of the two or three triangles that meet there.
+#define MERGE 4
 
 typedef struct hull {
     const sdm_mesh *mesh;
@@ -26,12 +27,11 @@ typedef struct hull {
     sdm_arena *arena;
     sdm_mesh *out;
     uint32_t *source; // [out->cap_tri]
-    sdm_budget *budget;
     sdm_error *err;
     sdm_sides sides;
     sdm_vertex_table seam; // vertices made by cuts
-    size_t pieces, kept;   // of the triangle being cut
-    size_t n_vert, n_tri;  // used in out
+    size_t pieces, kept;   // number of pieces of the current triangle
+    size_t n_vert, n_tri;  // filled in `out`
 } hull;
 
 static size_t bytes_for(size_t n_vert, size_t n_tri)
@@ -39,17 +39,17 @@ static size_t bytes_for(size_t n_vert, size_t n_tri)
     return n_vert * 3 * sizeof(double) + n_tri * 4 * sizeof(uint32_t);
 }
 
-/* Room for more vertices and triangles; half as much again when it is short. */
-static sdm_status make_room(hull *w, size_t more_vert, size_t more_tri)
+/* Makes room for more vertices and triangles; an array that is too small grows by half. */
+static sdm_status hull_reserve(hull *w, size_t more_vert, size_t more_tri)
 {
     sdm_mesh *out = w->out;
     const size_t need_vert = w->n_vert + more_vert, need_tri = w->n_tri + more_tri;
     if (need_vert <= out->cap_vert && need_tri <= out->cap_tri) return SDM_OK;
     const size_t n_vert = need_vert <= out->cap_vert ? out->cap_vert : need_vert + need_vert / 2;
     const size_t n_tri = need_tri <= out->cap_tri ? out->cap_tri : need_tri + need_tri / 2;
-    sdm_status s = sdm_budget_take(w->budget, bytes_for(n_vert, n_tri), w->err);
+    sdm_status s = sdm_arena_charge(w->arena, bytes_for(n_vert, n_tri), w->err);
     if (s) return s;
-    if (w->budget) w->budget->used -= bytes_for(out->cap_vert, out->cap_tri);
+    w->arena->used -= bytes_for(out->cap_vert, out->cap_tri);
     out->n_vert = w->n_vert;
     out->n_tri = w->n_tri;
     s = sdm_mesh_reserve(out, n_vert, n_tri, w->err);
@@ -65,7 +65,8 @@ static void add_triangle(hull *w, uint32_t a, uint32_t b, uint32_t c, uint32_t s
     w->source[w->n_tri++] = source;
 }
 
-/* The vertex at xy of the triangle being cut. */
+/* *v = the vertex at xy of the current triangle: an earlier one within the tolerance, or a new one.
+ */
 static sdm_status seam_vertex(hull *w, const double xy[2], uint32_t *v)
 {
     double x[3];
@@ -76,6 +77,7 @@ static sdm_status seam_vertex(hull *w, const double xy[2], uint32_t *v)
     return sdm_vertex_table_add(&w->seam, w->out->vert, *v, w->err);
 }
 
+/* For sdm_cut_triangle(): adds a piece of the current triangle if it stays. */
 static sdm_status add_piece(void *user, const sdm_corner *c, size_t n)
 {
     hull *w = user;
@@ -87,9 +89,9 @@ static sdm_status add_piece(void *user, const sdm_corner *c, size_t n)
     w->pieces++;
     if (s || !keep) return s;
     w->kept++;
-    // a fan; corners that are vertices of the mesh keep them, triangles narrower than the tolerance
-    // may vanish
-    s = make_room(w, n, n);
+    // triangulated as a fan; corners that are vertices of the mesh stay the same vertices, and
+    // triangles of which two corners merge are left out
+    s = hull_reserve(w, n, n);
     if (s) return s;
     uint32_t first = 0, before = 0;
     for (size_t i = 0; i < n; i++) {
@@ -103,8 +105,8 @@ static sdm_status add_piece(void *user, const sdm_corner *c, size_t n)
     return s;
 }
 
-/* Cuts triangle t and adds the pieces that stay; *whole: all of them do, so none is added. */
-static sdm_status cut(hull *w, sdm_cutter *cutter, uint32_t t, bool *whole)
+/* Cuts triangle t and adds the pieces that stay. *whole = all of them stay; then none is added. */
+static sdm_status cut_triangle(hull *w, sdm_cutter *cutter, uint32_t t, bool *whole)
 {
     const sdm_contacts *c = &w->survey->contacts;
     const size_t n_vert = w->n_vert, n_tri = w->n_tri;
@@ -120,6 +122,7 @@ static sdm_status cut(hull *w, sdm_cutter *cutter, uint32_t t, bool *whole)
         sdm_cut_triangle(cutter, corner, c->list + c->first[t], c->first[t + 1] - c->first[t],
                          c->tolerance, add_piece, w, w->err);
     *whole = w->kept == w->pieces && w->pieces;
+    // take back the vertices and triangles of the pieces
     if (!s && *whole) {
         w->n_vert = n_vert;
         w->n_tri = n_tri;
@@ -130,7 +133,7 @@ static sdm_status cut(hull *w, sdm_cutter *cutter, uint32_t t, bool *whole)
 static sdm_status add_whole(hull *w, uint32_t t)
 {
     const uint32_t *v = &w->mesh->tri[3 * (size_t)t];
-    const sdm_status s = make_room(w, 0, 1);
+    const sdm_status s = hull_reserve(w, 0, 1);
     if (!s) add_triangle(w, v[0], v[1], v[2], t);
     return s;
 }
@@ -139,36 +142,37 @@ static sdm_status add_whole(hull *w, uint32_t t)
 static sdm_status drop_unused(sdm_mesh *m, sdm_arena *arena, sdm_error *err)
 {
     const sdm_arena_mark before = arena->end[SDM_HIGH];
-    uint32_t *place;
-    const sdm_status s = SDM_TAKE(arena, SDM_HIGH, &place, m->n_vert, "vertices in use", err);
+    uint32_t *index; // [n_vert] first 1 for used vertices, then their new index
+    const sdm_status s = SDM_TAKE(arena, SDM_HIGH, &index, m->n_vert, "vertices in use", err);
     if (s) return s;
-    for (size_t i = 0; i < 3 * m->n_tri; i++) place[m->tri[i]] = 1;
+    for (size_t i = 0; i < 3 * m->n_tri; i++) index[m->tri[i]] = 1;
     size_t n = 0;
     for (size_t v = 0; v < m->n_vert; v++) {
-        if (!place[v]) continue;
-        place[v] = (uint32_t)n;
+        if (!index[v]) continue;
+        index[v] = (uint32_t)n;
         memmove(&m->vert[3 * n++], &m->vert[3 * v], 3 * sizeof *m->vert);
     }
-    for (size_t i = 0; i < 3 * m->n_tri; i++) m->tri[i] = place[m->tri[i]];
+    for (size_t i = 0; i < 3 * m->n_tri; i++) m->tri[i] = index[m->tri[i]];
     m->n_vert = n;
     sdm_arena_release(arena, SDM_HIGH, before);
     return SDM_OK;
 }
 
-static sdm_status build(hull *w, bool *changed)
+/* Adds the triangles and pieces that stay. *changed = something was left out. */
+static sdm_status hull_build(hull *w, bool *changed)
 {
     const sdm_contacts *c = &w->survey->contacts;
     const sdm_arena_mark before = w->arena->end[SDM_HIGH];
     sdm_cutter cutter = {0};
     sdm_status s = sdm_sides_build(w->mesh, w->survey, w->arena, &w->sides, w->err);
-    w->seam.tolerance = SAME_PLACE * c->tolerance;
+    w->seam.tolerance = MERGE * c->tolerance;
     *changed = false;
     for (uint32_t t = 0; t < w->mesh->n_tri && !s; t++) {
-        if (sdm_sides_flat(w->survey, t)) continue;
+        if (sdm_sides_is_sliver(w->survey, t)) continue;
         bool whole = false;
         if (c->first[t] != c->first[t + 1]) {
-            s = sdm_budget_ask(w->budget, w->err);
-            if (!s) s = cut(w, &cutter, t, &whole);
+            s = sdm_cancel_check(w->arena->opts, w->err);
+            if (!s) s = cut_triangle(w, &cutter, t, &whole);
         } else {
             whole = sdm_sides_keep_whole(&w->sides, t);
         }
@@ -182,33 +186,26 @@ static sdm_status build(hull *w, bool *changed)
     return s;
 }
 
-sdm_status sdm_union_hull(const sdm_mesh *m, const sdm_survey *s, sdm_arena *arena, sdm_mesh *out,
-                          uint32_t **source, bool *changed, double *error_mm, sdm_budget *budget,
+sdm_status sdm_union_hull(const sdm_mesh *m, const sdm_survey *survey, sdm_arena *arena,
+                          sdm_mesh *out, uint32_t **source, bool *changed, double *error_mm,
                           sdm_error *err)
 {
-    hull w = {.mesh = m,
-              .survey = s,
-              .arena = arena,
-              .out = out,
-              .budget = budget,
-              .err = err,
-              .n_vert = m->n_vert};
-    // the copy, and what the walk over the surface takes in passing
-    sdm_status st = sdm_budget_take(
-        budget, bytes_for(m->n_vert, m->n_tri) + m->n_tri * 3 * sizeof(uint32_t), err);
-    if (!st) st = sdm_mesh_reserve(out, m->n_vert, m->n_tri, err);
-    if (!st) st = SDM_ALLOC(&w.source, out->cap_tri, "sources of triangles", err);
-    if (!st) memcpy(out->vert, m->vert, 3 * m->n_vert * sizeof *m->vert);
-    if (!st) st = build(&w, changed);
-    if (!st && budget) budget->used -= m->n_tri * 3 * sizeof(uint32_t);
+    hull w = {
+        .mesh = m, .survey = survey, .arena = arena, .out = out, .err = err, .n_vert = m->n_vert};
+    // all vertices of m come first, at the same index; unused ones are dropped at the end
+    sdm_status s = sdm_arena_charge(arena, bytes_for(m->n_vert, m->n_tri), err);
+    if (!s) s = sdm_mesh_reserve(out, m->n_vert, m->n_tri, err);
+    if (!s) s = SDM_ALLOC(&w.source, out->cap_tri, "sources of triangles", err);
+    if (!s) memcpy(out->vert, m->vert, 3 * m->n_vert * sizeof *m->vert);
+    if (!s) s = hull_build(&w, changed);
     *source = w.source;
     *error_mm = 0;
-    if (st) return st;
+    if (s) return s;
     out->n_vert = w.n_vert;
     out->n_tri = w.n_tri;
     if (!*changed) return SDM_OK;
-    // narrow pieces and seams up to the tolerance, vertices moved onto planes and to others,
-    // rounding of the new vertices
-    *error_mm = (8 + 2 * SAME_PLACE) * s->contacts.tolerance + 2 * s->contacts.error;
+    // sum of the errors: narrow pieces that were left out, rounding of new vertices, vertices moved
+    // onto planes, and vertices merged
+    *error_mm = (8 + 2 * MERGE) * survey->contacts.tolerance + 2 * survey->contacts.error;
     return drop_unused(out, arena, err);
 }

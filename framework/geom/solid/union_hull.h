@@ -1,17 +1,19 @@
-/* The boundary of what a closed mesh encloses, as a mesh: surface inside the solid is removed by
- * exact clipping. */
+/* The union hull of a closed mesh: the boundary of its solid as a mesh. Surface inside the solid is
+ * removed by clipping. */
 #ifndef SDM_GEOM_UNION_HULL_H
 #define SDM_GEOM_UNION_HULL_H
 
 #include "survey.h"
 
-/* Keeps the parts of a closed mesh with winding number <= 0 outside and >= 1 inside. *out and
-   *source ([n_tri of out]: the triangle of m that each is a part of) are zero-initialised and the
-   caller's to free, also after an error. changed: something was removed, else they are not of use.
-   *error_mm: bound on the distance by which *out may differ from the true boundary. budget may be
-   NULL. The arena's high end is as before. */
-sdm_status sdm_union_hull(const sdm_mesh *m, const sdm_survey *s, sdm_arena *arena, sdm_mesh *out,
-                          uint32_t **source, bool *changed, double *error_mm, sdm_budget *budget,
+/* *out = the parts of the closed mesh m with winding number <= 0 just outside and >= 1 just inside.
+ * (*source)[out->n_tri] = for each triangle of *out the triangle of m of which it is a part; it has
+ * room for out->cap_tri elements. *changed = some surface was removed; if not, *out and *source are
+ * not valid. *error_mm = bound, mm, on the distance between *out and the true boundary.
+ * *out and *source are zero-initialised; the caller frees them, also after an error. Their bytes
+ * (of the capacities) stay charged to the arena; scratch memory from its high end is released.
+ * SDM_E_NOMEM, SDM_E_CANCELLED. */
+sdm_status sdm_union_hull(const sdm_mesh *m, const sdm_survey *survey, sdm_arena *arena,
+                          sdm_mesh *out, uint32_t **source, bool *changed, double *error_mm,
                           sdm_error *err);
 
 #endif

@@ -1,5 +1,5 @@
-/* Vertices by their cell of a coarse grid, hashed; near a side of a cell the one beyond it is
- * asked, too. */
+/* Spatial hash: vertices are hashed by their cell of a coarse grid. For a point near the boundary
+ * of a cell the search includes the cell beyond it. */
 #include "vertex_table.h"
 
 #include <math.h>
@@ -7,13 +7,14 @@
 #include "sdm/internal/rng.h"
 #include "sdm/memory.h"
 
-#define CELL 1024.0 // in tolerances: so large that hardly a vertex is near a side
+#define CELL 1024.0 // edge of a cell in tolerances: large, so that few points are near a boundary
 
-/* Cells are numbered towards zero: the one at zero is twice as wide. */
+/* Index of a cell: coordinate / edge, truncated towards zero, so that cell 0 is twice as wide. */
 typedef struct cell {
     int64_t x[3];
 } cell;
 
+/* The cell of x moved by `shift` along each axis. */
 static cell cell_of(const sdm_vertex_table *t, const double x[3], double shift)
 {
     const double size = CELL * t->tolerance;
@@ -21,7 +22,8 @@ static cell cell_of(const sdm_vertex_table *t, const double x[3], double shift)
                    (int64_t)((x[2] + shift) / size)}};
 }
 
-static size_t place_of(const sdm_vertex_table *t, const cell *c)
+/* First index to probe in the table for cell c. */
+static size_t cell_hash(const sdm_vertex_table *t, const cell *c)
 {
     const uint64_t y = (uint64_t)c->x[1] * 0x9e3779b97f4a7c15u,
                    z = (uint64_t)c->x[2] * 0xd1b54a32d192ed03u;
@@ -34,14 +36,14 @@ void sdm_vertex_table_find(const sdm_vertex_table *t, const double *vert, uint32
     *v = n_vert;
     if (!t->size) return;
     const cell low = cell_of(t, x, -t->tolerance), high = cell_of(t, x, t->tolerance);
-    // axes along which the vertex is near a side; all combinations of them
+    // bits of `near`: axes along which x is near a boundary; `side` runs through all subsets
     unsigned near = 0, side = 0;
     for (int a = 0; a < 3; a++) near |= (unsigned)(low.x[a] != high.x[a]) << a;
     do {
         cell c;
         for (int a = 0; a < 3; a++) c.x[a] = side >> a & 1 ? high.x[a] : low.x[a];
-        for (size_t i = place_of(t, &c); t->place[i]; i = (i + 1) & (t->size - 1)) {
-            const uint32_t u = t->place[i] - 1;
+        for (size_t i = cell_hash(t, &c); t->entry[i]; i = (i + 1) & (t->size - 1)) {
+            const uint32_t u = t->entry[i] - 1;
             const double *y = &vert[3 * (size_t)u];
             if (u >= n_vert ||
                 !(fabs(y[0] - x[0]) <= t->tolerance && fabs(y[1] - x[1]) <= t->tolerance &&
@@ -54,33 +56,35 @@ void sdm_vertex_table_find(const sdm_vertex_table *t, const double *vert, uint32
     } while (side);
 }
 
-static void put(sdm_vertex_table *t, const double *vert, uint32_t v)
+/* Inserts vertex v; there is a free entry. */
+static void table_insert(sdm_vertex_table *t, const double *vert, uint32_t v)
 {
     const cell c = cell_of(t, &vert[3 * (size_t)v], 0);
-    size_t i = place_of(t, &c);
-    while (t->place[i]) i = (i + 1) & (t->size - 1);
-    t->place[i] = v + 1;
+    size_t i = cell_hash(t, &c);
+    while (t->entry[i]) i = (i + 1) & (t->size - 1);
+    t->entry[i] = v + 1;
     t->n++;
 }
 
 sdm_status sdm_vertex_table_add(sdm_vertex_table *t, const double *vert, uint32_t v, sdm_error *err)
 {
     if (2 * (t->n + 1) > t->size) {
+        // at most half full: rehash into a table of twice the size
         sdm_vertex_table bigger = {.tolerance = t->tolerance, .size = t->size ? 2 * t->size : 256};
         const sdm_status s =
-            SDM_ALLOC(&bigger.place, bigger.size, "vertices of cut triangles", err);
+            SDM_ALLOC(&bigger.entry, bigger.size, "vertices of cut triangles", err);
         if (s) return s;
         for (size_t i = 0; i < t->size; i++)
-            if (t->place[i]) put(&bigger, vert, t->place[i] - 1);
-        sdm_free(t->place);
+            if (t->entry[i]) table_insert(&bigger, vert, t->entry[i] - 1);
+        sdm_free(t->entry);
         *t = bigger;
     }
-    put(t, vert, v);
+    table_insert(t, vert, v);
     return SDM_OK;
 }
 
 void sdm_vertex_table_dispose(sdm_vertex_table *t)
 {
-    sdm_free(t->place);
+    sdm_free(t->entry);
     *t = (sdm_vertex_table){0};
 }

@@ -1,4 +1,4 @@
-/* Vertices found again by where they are, to a tolerance. */
+/* Hash table that finds a vertex by its coordinates, to a tolerance. */
 #ifndef SDM_GEOM_VERTEX_TABLE_H
 #define SDM_GEOM_VERTEX_TABLE_H
 
@@ -7,19 +7,20 @@
 
 #include "sdm/status.h"
 
-/* Zero-initialise, set the tolerance; sdm_vertex_table_dispose(). */
+/* Zero-initialise, then set `tolerance`; sdm_vertex_table_dispose() frees. */
 typedef struct sdm_vertex_table {
-    double tolerance; /* along each axis; > 0 */
-    uint32_t *place;  /* [size] vertex + 1; 0: free */
-    size_t size, n;
+    double tolerance; /* maximum difference along each axis, mm; > 0 */
+    uint32_t *entry;  /* [size] vertex + 1; 0: free */
+    size_t size, n;   /* size is 0 or a power of two; n entries are used */
 } sdm_vertex_table;
 
-/* *v = a vertex below n_vert that was added and lies within the tolerance of x; n_vert without one.
-   vert[n_vert][3] may have changed since vertices were added, from n_vert on also which ones they
-   are. */
+/* *v = an added vertex with an index below n_vert and within the tolerance of x; n_vert if there is
+ * none. The table stores indices only and reads coordinates from vert[n_vert][3]: entries
+ * of vertices that were since removed (index >= n_vert) are skipped, and for an index that was
+ * reused the new coordinates count. */
 void sdm_vertex_table_find(const sdm_vertex_table *t, const double *vert, uint32_t n_vert,
                            const double x[3], uint32_t *v);
-/* Adds vertex v. */
+/* Adds vertex v, whose coordinates are vert[v]. SDM_E_NOMEM. */
 sdm_status sdm_vertex_table_add(sdm_vertex_table *t, const double *vert, uint32_t v,
                                 sdm_error *err);
 void sdm_vertex_table_dispose(sdm_vertex_table *t);

@@ -1,21 +1,25 @@
-/* The exact engine: signed distance from points and grids to a triangle mesh; NEGATIVE INSIDE, mm.
-   A mesh that overlaps itself is taken as the union of what it encloses: surface inside the union
-   does not count. Inside is where the winding number is at least 1 on a closed mesh (the directions
-   of the triangles of every edge cancel), above 1/2 on any other. So
-   - a part of opposite orientation within a solid is a cavity, a part of the same orientation
-   counts once with the solid;
-   - a closed mesh that is inside out as a whole is turned, and so is a part around which or in
-   which the number would be below 0 and that meets no other part: a body that is inside out beside
-   others, or nested in a cavity. Cavities are not. Parts that meet others stay as they are: one
-   that is inside out takes away what it overlaps and is not solid itself;
-   - a face given twice counts as one, a face and its back enclose nothing; where only such sheets
-   are given (zero thickness) no point is inside and distances are to the sheets;
-   - parts and gaps of the union thinner than 128 roundings (2^-52) of the largest coordinate, tips
-   of needles among them, count or not, as it happens; the distance is then that to the next part,
-   whatever union_error_mm says. As near to surface inside the union either sign is right;
-   - on an open, one-sided or mixed mesh nothing is turned; a flat sheet or a Moebius strip has no
-   inside, a cup ends about where its opening is seen under half of the sphere. The sign then
-   changes away from the surface, too. */
+/* The exact engine: signed distance, mm, NEGATIVE INSIDE, from points and grids to a triangle mesh.
+ *
+ * A mesh is closed when on every edge as many triangles run in one direction as in the other. A
+ * point is inside when its winding number is >= 1 (closed mesh) or > 1/2 (any other mesh). A mesh
+ * that overlaps itself therefore counts as the union of the volumes that it encloses, and surface
+ * inside the union is ignored. A "part" is a set of triangles connected by edges. In particular:
+ * - A part of opposite orientation inside a solid is a cavity; a part of the same orientation
+ * inside a solid changes nothing.
+ * - A closed mesh that is inside out as a whole is turned. So is a part that meets no other part
+ * and has a winding number < 0 around or in it: a body that is inside out beside other bodies, or
+ *   within a cavity. Cavities are not turned. Parts that meet others are never turned: one that is
+ *   inside out subtracts its volume from the others and is not solid itself.
+ * - A triangle given twice counts once. Two triangles back to back enclose nothing; if a mesh
+ *   consists only of such sheets (zero thickness), no point is inside and distances are to the
+ *   sheets.
+ * - Parts and gaps of the union thinner than 128 * 2^-52 * (largest abs(coordinate)), the tips of
+ *   needles among them, may be kept or lost. The distance is then to the next part of the surface,
+ *   and union_error_mm does not cover this. Within the same distance of surface inside the union
+ *   either sign may result.
+ * - An open, one-sided or inconsistently oriented mesh is never turned. A flat sheet or a Moebius
+ *   strip has no inside; the inside of a cup ends about where its opening fills half of the field
+ * of view (solid angle 2 pi), so the sign changes away from the surface, too. */
 #ifndef SDM_EXACT_H
 #define SDM_EXACT_H
 
@@ -27,129 +31,145 @@ extern "C" {
 #endif
 
 typedef enum sdm_sign_method {
-    SDM_SIGN_AUTO = 0,  /* crossings on closed meshes, winding otherwise */
-    SDM_SIGN_CROSSINGS, /* signed crossings along a ray: the integer winding number; closed meshes
-                           only */
-    SDM_SIGN_PSEUDONORMAL, /* angle-weighted pseudo-normal (Baerentzen and Aanaes 2005); only
-                              manifold meshes without overlap and without degenerate triangles */
-    SDM_SIGN_WINDING       /* generalised winding number > 1/2 (Jacobson et al. 2013); any mesh */
+    /* SDM_SIGN_CROSSINGS on closed meshes, SDM_SIGN_WINDING otherwise */
+    SDM_SIGN_AUTO = 0,
+    /* integer winding number from signed ray crossings; closed meshes only */
+    SDM_SIGN_CROSSINGS,
+    /* angle-weighted pseudonormal (Baerentzen and Aanaes 2005); only manifold meshes without
+     * overlap and without degenerate triangles */
+    SDM_SIGN_PSEUDONORMAL,
+    /* generalised winding number > 1/2 (Jacobson et al. 2013); any mesh */
+    SDM_SIGN_WINDING
 } sdm_sign_method;
 
+/* Zero-initialised: the defaults. */
 typedef struct sdm_exact_opts {
     sdm_sign_method sign;
-    bool keep_overlap;   /* true: distance to every triangle, also those inside the union (signs are
-                            the union's) */
-    int n_threads;       /* 0: the OpenMP default; the result is the same bits for every value */
-    size_t memory_limit; /* bytes the engine may take beside the output; 0: no limit */
-    bool (*cancelled)(
-        void *user); /* asked now and then; true stops with SDM_E_CANCELLED; may be NULL */
+    /* true: distances are to every triangle, also to those inside the union; signs are still those
+     * of the union */
+    bool keep_overlap;
+    int n_threads;       /* 0: the OpenMP default; results are the same bits for every value */
+    size_t memory_limit; /* bytes that the engine may allocate besides the output; 0: no limit */
+    /* Called repeatedly with `user`, only in the thread that called the library; returns true to
+     * stop the call with SDM_E_CANCELLED. May be NULL. */
+    bool (*cancelled)(void *user);
     void *user;
 } sdm_exact_opts;
 
 typedef struct sdm_exact_report {
-    sdm_audit audit;
-    sdm_sign_method sign;  /* the method used */
-    bool turned;           /* the mesh was inside out and has been turned */
-    bool unioned;          /* inner surface was removed */
-    size_t n_tri_used;     /* triangles after the union */
-    double union_error_mm; /* bound on the error by removing inner surface, see above for thin
-                              parts; 0 without */
-    double ms_build;       /* audit, union, tree */
-    size_t parts_turned;   /* closed parts among others that were inside out and have been turned */
+    sdm_audit audit;      /* of the given mesh, before any turn */
+    sdm_sign_method sign; /* the method in use, not AUTO */
+    bool turned;          /* the whole mesh was inside out and was turned */
+    bool unioned;         /* surface inside the union was removed */
+    size_t n_tri_used;    /* triangles of sdm_exact_surface() */
+    /* bound, mm, on the error of distances from removing inner surface; 0 when none was removed.
+     * Thin parts are excepted, see above. */
+    double union_error_mm;
+    double ms_build;     /* time of sdm_exact_create() in milliseconds */
+    size_t parts_turned; /* parts that were inside out and were turned, apart from `turned` */
 } sdm_exact_report;
 
 /* A prepared mesh. Immutable after creation: any number of threads may query it. */
 typedef struct sdm_exact sdm_exact;
 
-/* Audits the mesh, chooses the sign method, removes inner surface and builds the tree. The mesh is
-   not needed afterwards. opts may be NULL. SDM_E_MESH, SDM_E_NOMEM, SDM_E_ARG (a sign method that
-   does not fit the mesh), SDM_E_CANCELLED. */
+/* Audits the mesh, selects the sign method, removes surface inside the union and builds the search
+ * tree. *out is freed with sdm_exact_free(); the mesh is copied and may be freed. opts may be NULL:
+ * the defaults. SDM_E_MESH (see sdm_mesh_audit()), SDM_E_ARG (NULL, or a sign method that does not
+ * suit the mesh), SDM_E_NOMEM, SDM_E_CANCELLED. */
 SDM_API sdm_status sdm_exact_create(const sdm_mesh *mesh, const sdm_exact_opts *opts,
                                     sdm_exact **out, sdm_error *err);
 SDM_API void sdm_exact_free(sdm_exact *e);
+
+/* The report of the preparation, owned by e. */
 SDM_API const sdm_exact_report *sdm_exact_get_report(const sdm_exact *e);
 
-/* The used surface (union boundary) as a mesh owned by e. */
+/* The mesh to which distances are measured (the boundary of the union), owned by e. */
 SDM_API const sdm_mesh *sdm_exact_surface(const sdm_exact *e);
-/* [sdm_exact_surface()->n_tri] triangle of the given mesh that each triangle of the surface is a
- * part of, owned by e. */
+/* [sdm_exact_surface()->n_tri] index of the triangle of the given mesh of which each triangle of
+ * the surface is a part; owned by e. */
 SDM_API const uint32_t *sdm_exact_source(const sdm_exact *e);
 
-/* values[nz][ny][nx] = signed distance at the voxel centres, mm, written; the same bits for any
- * number of threads. */
+/* values[nz][ny][nx] = signed distance, mm, at the voxel centres; the same bits for any number of
+ * threads. SDM_E_ARG (NULL or an invalid grid), SDM_E_NOMEM, SDM_E_CANCELLED. */
 SDM_API sdm_status sdm_exact_map(const sdm_exact *e, const sdm_grid *grid, float *values,
                                  sdm_error *err);
 
-/* Turns the sign of the voxels inside: gives distances of another origin, all >= 0, the signs of
-   the engine. Threads and errors as sdm_exact_map(). */
+/* Negates values[nz][ny][nx] at the voxels inside: gives unsigned distances (all >= 0) from another
+ * source the signs of the engine. Threads and errors as sdm_exact_map(). */
 SDM_API sdm_status sdm_exact_sign(const sdm_exact *e, const sdm_grid *grid, float *values,
                                   sdm_error *err);
 
-/* What sdm_exact_certify() has found. */
+/* Result of sdm_exact_certify(). */
 typedef struct sdm_sign_certificate {
-    sdm_sign_method method; /* the map's */
-    const char *compared; /* what its signs were compared with, a constant text: "crossings along y
-                             and z", ... */
-    size_t voxels;        /* of the map */
-    size_t checked; /* voxels compared: all, or a sample where the boundary of an open mesh is very
-                       long */
-    size_t wrong;   /* of these, voxels where not everything agrees */
-    size_t below_zero; /* voxels with a winding number below -1/2: part of the mesh is inside out
-                          there */
-    int64_t first_wrong[3]; /* index (i, j, k) of the first voxel that is wrong; -1 without one */
+    sdm_sign_method method; /* sign method of the map */
+    /* the independent method used for comparison, a constant string: "crossings along y and z", ...
+     */
+    const char *compared;
+    size_t voxels; /* number of voxels of the map */
+    /* number of voxels compared: all, or a sample if the boundary of an open mesh is very long */
+    size_t checked;
+    size_t wrong; /* number of compared voxels at which the methods disagree */
+    /* number of voxels with a winding number < -1/2: there a part of the mesh is inside out */
+    size_t below_zero;
+    int64_t first_wrong[3]; /* index (i, j, k) of the first wrong voxel; -1 if there is none */
 } sdm_sign_certificate;
 
-/* Finds the signs of a map made by sdm_exact_map(e, grid) again in ways independent of it and
-   compares: signed crossings along the other axes of the grid, on an open mesh together with its
-   boundary, or sums of solid angles at a sample of the voxels. Voxels on the surface to rounding,
-   and those with a winding number of 1/2 to 1e-9, count as right, NaN as wrong. Threads and errors
-   as sdm_exact_map(). */
+/* Checks the signs of values[nz][ny][nx], a map made by sdm_exact_map(e, grid), against independent
+ * methods: signed crossings along the other axes of the grid (on an open mesh with a term for its
+ * boundary), or sums of solid angles at a sample of the voxels. Voxels on the surface to rounding,
+ * and those with abs(winding number - 1/2) <= 1e-9, count as right; NaN counts as wrong. Threads
+ * and errors as sdm_exact_map(). */
 SDM_API sdm_status sdm_exact_certify(const sdm_exact *e, const sdm_grid *grid, const float *values,
                                      sdm_sign_certificate *out, sdm_error *err);
 
-/* What is known of every voxel; NULL: not wanted. As sdm_exact_point() gives it at the voxel
-   centre, rounded; where several triangles are equally near, one of them. */
+/* Output arrays with one element per voxel, allocated by the caller; NULL: not wanted. The values
+ * are those of sdm_exact_point() at the voxel centre, rounded to float. If several triangles are
+ * equally near, one of them is taken. */
 typedef struct sdm_exact_layers {
-    float *values;      /* [nz][ny][nx] signed distance, mm: what sdm_exact_map() gives */
+    float *values;      /* [nz][ny][nx] signed distance, mm, as by sdm_exact_map() */
     float *closest;     /* [nz][ny][nx][3] nearest surface point, mm */
     float *normal;      /* [nz][ny][nx][3] unit vector along the gradient of the signed distance */
     uint32_t *triangle; /* [nz][ny][nx] nearest triangle, an index in sdm_exact_surface() */
-    double band_mm; /* > 0: narrow band, at a cost in proportion to it: distances from band_mm on
-                       become +-band_mm, there triangle is UINT32_MAX, closest and normal are NaN,
-                       derivatives 0; 0: the whole map */
+    /* 0: the whole map. > 0: narrow band, mm; the cost is proportional to its width. Where
+     * abs(distance) >= band_mm the distance becomes +-band_mm, `triangle` UINT32_MAX, `closest` and
+     * `normal` NaN, and derivatives 0. */
+    double band_mm;
 } sdm_exact_layers;
 
-/* The map with layers, in arrays of the caller; the same bits for any number of threads. Errors as
- * sdm_exact_map(). */
+/* Fills the layers; the same bits for any number of threads. Errors as sdm_exact_map(); SDM_E_ARG
+ * also for a negative band_mm. */
 SDM_API sdm_status sdm_exact_map_layers(const sdm_exact *e, const sdm_grid *grid,
                                         const sdm_exact_layers *layers, sdm_error *err);
 
-/* Derivative of the map as the vertices of the given mesh move: derivative[n][nz][ny][nx], mm per
-   unit of the n motions, from velocity[n][n_vert][3] = d(vertex)/d(parameter). With x* the nearest
-   surface point and n the gradient of the distance it is -n . v(x*), v interpolated on the triangle
-   of x*; where sheets of a union cross at x*, each counts with its share of n. The distance has no
-   derivative where several surface points are equally near (medial axis): there it is that of the
-   one taken, one-sided. A sign that changes away from the surface (open meshes) counts as fixed.
-   layers may be NULL. Threads and errors as above. */
+/* Derivatives of the map with respect to n parameters that move the vertices of the given mesh.
+ * velocity[n][n_vert][3] = d(vertex)/d(parameter), mm per unit of the parameter;
+ * derivative[n][nz][ny][nx] = d(distance)/d(parameter) in the same unit. With x* the nearest
+ * surface point, g the gradient of the signed distance and v the velocity, interpolated linearly on
+ * the triangle of x*, the derivative is -g . v(x*). Where several sheets of a union cross at x*, g
+ * is split into multiples of their normals and each sheet moves its own share. On the medial axis,
+ * where several surface points are equally near and the distance has no derivative, it is the
+ * one-sided derivative for the point taken. Where the sign changes away from the surface (open
+ * meshes), that change counts as fixed. layers may be NULL. Threads and errors as
+ * sdm_exact_map_layers(). */
 SDM_API sdm_status sdm_exact_map_derivative(const sdm_exact *e, const sdm_grid *grid,
                                             const double *velocity, size_t n,
                                             const sdm_exact_layers *layers, float *derivative,
                                             sdm_error *err);
 
-/* Signed distance at one point; every pointer may be NULL. closest[3]: nearest surface point;
-   normal[3]: unit vector along the gradient of the signed distance (the outward normal of the
-   nearest triangle where the point lies on the surface); triangle: index in sdm_exact_surface().
-   NaN, triangle without meaning, for a point with a coordinate that is not finite or beyond
-   +-1e150. [any thread] */
+/* Returns the signed distance, mm, at the point x; every output pointer may be NULL. closest[3] =
+ * nearest surface point; normal[3] = unit vector along the gradient of the signed distance (for a
+ * point on the surface, the outward normal of the nearest triangle); *triangle = nearest triangle,
+ * an index in sdm_exact_surface(). If a coordinate is not finite or abs(coordinate) > 1e150, all
+ * results are NaN and *triangle has no meaning. [any thread] */
 SDM_API double sdm_exact_point(const sdm_exact *e, const double x[3], double closest[3],
                                double normal[3], uint32_t *triangle);
 
-/* Distance without its sign, the same bits: on open meshes, where a sign is a sum over the
-   boundary, much cheaper. NaN as above. [any thread] */
+/* Returns the absolute value of sdm_exact_point(), the same bits. Much cheaper on open meshes,
+ * where the sign is a sum over the boundary. NaN as above. [any thread] */
 SDM_API double sdm_exact_distance(const sdm_exact *e, const double x[3]);
 
-SDM_API const char *
-sdm_sign_method_name(sdm_sign_method m); /* "auto", "crossings", "pseudonormal", "winding" */
+/* "auto", "crossings", "pseudonormal" or "winding"; "unknown" for any other value. [any thread] */
+SDM_API const char *sdm_sign_method_name(sdm_sign_method m);
 
 #ifdef __cplusplus
 }

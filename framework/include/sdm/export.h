@@ -1,4 +1,4 @@
-/* Visibility of the public symbols of the shared libraries. */
+/* Version of the library, and visibility of the public symbols of its shared libraries. */
 #ifndef SDM_EXPORT_H
 #define SDM_EXPORT_H
 

@@ -1,5 +1,5 @@
-/* The regular grid a map lives on. Everywhere: mm, frame LPS, index (i, j, k) <-> (x, y, z), x
- * fastest: values[nz][ny][nx]. */
+/* Regular voxel grid of a map. Everywhere: mm, coordinate system LPS (x to the left, y to
+ * posterior, z to superior), index (i, j, k) <-> (x, y, z), x fastest: values[nz][ny][nx]. */
 #ifndef SDM_GRID_H
 #define SDM_GRID_H
 
@@ -12,8 +12,8 @@
 extern "C" {
 #endif
 
-/* world = origin + dir * diag(spacing) * (i, j, k): origin is the CENTRE of voxel (0, 0, 0); dir is
-   row-major and orthonormal (a reflection is allowed). */
+/* world = origin + dir * diag(spacing) * (i, j, k). origin is the CENTRE of voxel (0, 0, 0), in mm;
+ * spacing is in mm; dir is a row-major orthonormal 3 x 3 matrix (reflections are allowed). */
 typedef struct sdm_grid {
     int64_t n[3];
     double origin[3];
@@ -21,17 +21,19 @@ typedef struct sdm_grid {
     double dir[9];
 } sdm_grid;
 
-/* Axis-aligned grid of n voxels of one spacing whose middle is `centre`. */
+/* Axis-aligned grid of n[3] voxels with the same spacing (mm) along all axes and the centre
+ * `centre` (mm). Not checked. */
 SDM_API sdm_grid sdm_grid_centred(const int64_t n[3], double spacing, const double centre[3]);
 
-/* Sizes 1 .. 2^20 with a product that fits, spacing finite and positive, origin finite, dir
-   orthonormal to 1e-6. SDM_E_ARG names the first that is not. */
+/* Checks that sizes are 1 .. 2^20, the number of voxels fits into memory, spacings and origin are
+ * finite (1e-100 .. 1e100 mm and up to 1e100 mm), and dir is orthonormal to 1e-6. SDM_E_ARG names
+ * the first violation. [any thread] */
 SDM_API sdm_status sdm_grid_check(const sdm_grid *g, sdm_error *err);
 
-/* Number of voxels; the grid must have passed sdm_grid_check(). */
+/* Number of voxels. The grid must have passed sdm_grid_check(). [any thread] */
 SDM_API size_t sdm_grid_count(const sdm_grid *g);
 
-/* World position (mm) of a continuous index, and back. */
+/* World position (mm) of a continuous index, and the inverse. [any thread] */
 SDM_API void sdm_grid_world(const sdm_grid *g, const double index[3], double world[3]);
 SDM_API void sdm_grid_index(const sdm_grid *g, const double world[3], double index[3]);
 

@@ -1,4 +1,4 @@
-/* The surface on which a map has a given value. */
+/* Extraction of iso-surfaces: the surface on which a map has a given value. */
 #ifndef SDM_ISOSURFACE_H
 #define SDM_ISOSURFACE_H
 
@@ -10,10 +10,12 @@
 extern "C" {
 #endif
 
-/* The iso-surface at `level` by marching cubes (Lorensen and Cline 1987), closed wherever it does
-   not leave the grid, normals towards larger values, vertices shared. *cut (may be NULL): true when
-   the surface leaves the grid. *out is zero-initialised; it has no triangle when nothing crosses
-   the level. World coordinates, mm. The same bits in every call. */
+/* *out = the iso-surface of values[nz][ny][nx] at `level` by marching cubes (Lorensen and Cline
+ * 1987), in world coordinates, mm. It is closed except where it leaves the grid, its normals point
+ * towards larger values, and triangles share vertices. It has no triangles if no value crosses the
+ * level. *cut (may be NULL) = the surface leaves the grid. *out is zero-initialised by the caller
+ * and empty after an error. Deterministic. SDM_E_ARG: NULL, an invalid grid, or a value or level
+ * that is not finite; SDM_E_NOMEM, SDM_E_MESH (too large a mesh). */
 SDM_API sdm_status sdm_isosurface(const sdm_grid *grid, const float *values, float level,
                                   sdm_mesh *out, bool *cut, sdm_error *err);
 

@@ -1,4 +1,4 @@
-/* Memory of the library: products of sizes are tested for overflow, blocks are 64-byte aligned. */
+/* Memory allocation of the library: checked for overflow, 64-byte aligned. */
 #ifndef SDM_MEMORY_H
 #define SDM_MEMORY_H
 
@@ -11,21 +11,21 @@
 extern "C" {
 #endif
 
-/* *out = new zeroed block of count * size bytes, 64-byte aligned, freed with sdm_free(). A count of
-   0 gives a valid block. `what` names the block in the message. SDM_E_NOMEM on overflow or when
-   memory is short. */
+/* *out = new zeroed block of count * size bytes, 64-byte aligned, to be freed with sdm_free(). A
+ * count of 0 gives a valid block. `what` names the block in the error message. SDM_E_NOMEM on
+ * overflow or lack of memory; *out is then NULL. [any thread] */
 SDM_API sdm_status sdm_alloc(void **out, size_t count, size_t size, const char *what,
                              sdm_error *err);
 
-/* Frees a block that a function of the library has allocated; NULL is fine. */
+/* Frees a block that was allocated by the library; NULL is allowed. [any thread] */
 SDM_API void sdm_free(void *block);
 
 #ifdef __cplusplus
 }
 #endif
 
-/* Allocates `count` elements of the type that *ptr points to: sdm_alloc with the cast and the size
- * in one place. */
+/* Allocates `count` elements of the type that *ptr points to: sdm_alloc() with the cast and the
+ * element size. */
 #define SDM_ALLOC(ptr, count, what, err)                                                           \
     sdm_alloc((void **)(ptr), (count), sizeof(**(ptr)), (what), (err))
 

@@ -1,4 +1,4 @@
-/* Triangle meshes: storage and audit. */
+/* Triangle meshes: storage, and the audit of a mesh for errors. */
 #ifndef SDM_MESH_H
 #define SDM_MESH_H
 
@@ -12,43 +12,49 @@
 extern "C" {
 #endif
 
-/* Zero-initialise; sdm_mesh_dispose() frees. vert[n_vert][3] in mm, tri[n_tri][3] vertex indices,
-   counter-clockwise seen from outside. */
+/* A triangle mesh that owns its arrays. Zero-initialise; sdm_mesh_dispose() frees. */
 typedef struct sdm_mesh {
-    double *vert;
-    uint32_t *tri;
-    size_t n_vert, n_tri;
-    size_t cap_vert, cap_tri;
+    double *vert;             /* [n_vert][3] mm */
+    uint32_t *tri;            /* [n_tri][3] vertex indices, counter-clockwise seen from outside */
+    size_t n_vert, n_tri;     /* counts */
+    size_t cap_vert, cap_tri; /* allocated counts */
 } sdm_mesh;
 
-/* Sets n_vert and n_tri and makes room for them; the content is then the caller's to write. Old
-   content is kept as far as it fits. SDM_E_MESH over 2^31 vertices or triangles, SDM_E_NOMEM. */
+/* Sets n_vert and n_tri and allocates the arrays for them; the caller then writes their content.
+ * Old content is kept as far as it fits. SDM_E_MESH: more than 2^31 vertices or triangles;
+ * SDM_E_NOMEM. */
 SDM_API sdm_status sdm_mesh_reserve(sdm_mesh *m, size_t n_vert, size_t n_tri, sdm_error *err);
+
+/* Copies `from` to `to`, which keeps arrays that are large enough. Errors as sdm_mesh_reserve(). */
 SDM_API sdm_status sdm_mesh_copy(const sdm_mesh *from, sdm_mesh *to, sdm_error *err);
+
+/* Frees the arrays and zeroes *m. m may be NULL. */
 SDM_API void sdm_mesh_dispose(sdm_mesh *m);
 
-/* What an audit finds; counts are of triangles unless said otherwise. */
+/* Result of an audit. Vertices with equal coordinates count as one vertex. */
 typedef struct sdm_audit {
     size_t n_vert, n_tri;
-    size_t degenerate;         /* zero area, or a repeated vertex */
-    size_t duplicate;          /* the same three vertices as an earlier triangle */
-    size_t boundary_edges;     /* edges with one triangle */
-    size_t nonmanifold_edges;  /* edges with three or more */
-    size_t misoriented_edges;  /* edges whose two triangles run along them in the same direction */
-    size_t components;         /* connected by edges */
-    size_t self_intersections; /* pairs of triangles that cross and share no vertex */
+    size_t degenerate;         /* triangles without area (to rounding) or with a repeated vertex */
+    size_t duplicate;          /* triangles with the same three vertices as an earlier one */
+    size_t boundary_edges;     /* edges of one triangle */
+    size_t nonmanifold_edges;  /* edges of three or more triangles */
+    size_t misoriented_edges;  /* edges of two triangles that run along it in the same direction */
+    size_t components;         /* sets of triangles connected by edges */
+    size_t self_intersections; /* pairs of triangles that meet and share no vertex */
     double volume;             /* signed, mm^3; negative: the mesh is inside out */
     double area;               /* mm^2 */
     double min[3], max[3];     /* bounding box, mm */
-    bool closed; /* no boundary edge, every edge balanced in direction: crossings define the inside
-                  */
-    bool manifold; /* closed, and every edge has two triangles of one orientation */
-    bool inverted; /* closed, and the volume is negative beyond rounding of the coordinates */
+    /* on every edge as many triangles run in one direction as in the other: integer winding numbers
+     * then define the inside */
+    bool closed;
+    bool manifold; /* closed, and every edge has exactly two triangles */
+    bool inverted; /* closed, and the volume is negative by more than its rounding error */
 } sdm_audit;
 
-/* Examines a mesh. SDM_E_MESH: no triangle, an index out of range, a coordinate that is not finite
-   or above 1e70, a largest one below 1e-70 (all 0 will do). Between these the result is scale free:
-   no absolute tolerance is used. [any thread] */
+/* Audits a mesh. SDM_E_MESH: no triangle, an index out of range, a coordinate that is not finite or
+ * with abs(coordinate) > 1e70, or all abs(coordinate) < 1e-70 (unless all are 0). Otherwise scaling
+ * the mesh does not change the findings: all tolerances are relative. SDM_E_ARG, SDM_E_NOMEM.
+ * [any thread] */
 SDM_API sdm_status sdm_mesh_audit(const sdm_mesh *m, sdm_audit *out, sdm_error *err);
 
 #ifdef __cplusplus

@@ -1,4 +1,11 @@
-/* Pictures of maps, surfaces and curves. */
+/* Pictures of maps, surfaces and curves, as PNG, SVG or PDF.
+ *
+ * The format follows the ending of `path`, .png, .svg or .pdf; another one is SDM_E_UNSUPPORTED.
+ * The file is written under a temporary name and then renamed, so that no broken picture appears.
+ * Errors of all functions: SDM_E_ARG for arguments that are missing or too many, SDM_E_IO,
+ * SDM_E_NOMEM, and SDM_E_UNSUPPORTED for all pictures in a build with SDM_PICTURE=OFF. The same
+ * picture is the same bytes, given the same fonts and version of cairo (SVG: as long as no other
+ * thread uses cairo). [any thread] */
 #ifndef SDM_PICTURE_H
 #define SDM_PICTURE_H
 
@@ -11,53 +18,60 @@
 extern "C" {
 #endif
 
-/* One column of a picture of maps: a title and the values; `error` columns are drawn with a scale
- * of their own. */
+/* SDM_OK when this build can write a picture of that name, by its ending alone; else
+ * SDM_E_UNSUPPORTED. */
+SDM_API sdm_status sdm_picture_check(const char *path, sdm_error *err);
+
+/* One column of a picture of maps. */
 typedef struct sdm_picture_map {
-    const char *title;
+    const char *title; /* may be NULL */
+    /* [nz][ny][nx], mm */
     const float *values;
+    /* an error map: it has another colour scale than the distances */
     bool error;
 } sdm_picture_map;
 
-/* PNG: a row for each of the three orthogonal slices through the middle of the region where the
-   first map is negative, a column for each map, with iso-contours at `levels[n_levels]` (the first
-   in red, the second in yellow), titles, millimetre scale and colour bars with numbers. Atomic. */
+/* Draws slices of maps[n_maps], 1 to 16 on the same grid: a row for each of the three orthogonal
+   slices through the middle of the region where the first map is negative, a column for each map,
+   with contours at levels[n_levels] mm (0 to 16; the first in red, the second in yellow), titles,
+   axes in mm, a scale bar and colour bars. */
 SDM_API sdm_status sdm_picture_slices(const char *path, const sdm_grid *grid,
                                       const sdm_picture_map *maps, size_t n_maps,
                                       const float *levels, size_t n_levels, sdm_error *err);
 
-/* PNG: the three orthogonal slices of image[nz][ny][nx], side by side, through the middle of the
-   region where the first map is negative: grey, from the 1st to the 99th percentile of the slices,
-   with the zero contours of maps[n_maps] over it (1 to 4, the first in red, the second in yellow;
-   `error` is not read), their titles, millimetre scales and `title` (may be NULL). Atomic.
-   SDM_E_ARG. [any thread] */
+/* Draws the three orthogonal slices of image[nz][ny][nx], side by side, through the middle of the
+   region where the first map is negative: in grey, from the 1st to the 99th percentile of the
+   slices, under the zero contours of maps[n_maps] (1 to 4, the first in red, the second in yellow;
+   `error` is not used), with their titles, axes in mm and `title` (may be NULL). */
 SDM_API sdm_status sdm_picture_overlay(const char *path, const sdm_grid *grid, const float *image,
                                        const sdm_picture_map *maps, size_t n_maps,
                                        const char *title, sdm_error *err);
 
 /* One surface of a picture. */
 typedef struct sdm_picture_surface {
-    const char *title;
+    const char *title; /* may be NULL */
     const sdm_mesh *mesh;
-    const double *values; /* [n_vert] mm, shown in colours from -max to max of all surfaces; NULL:
-                             one plain colour */
+    /* [n_vert] in mm, shown in colours that span -max .. max of all surfaces; NULL: one plain
+     * colour */
+    const double *values;
 } sdm_picture_surface;
 
-/* PNG: the surfaces side by side, each from +z and obliquely, shaded, to one scale, with a colour
-   bar of `caption` under those that have values. The audit's errors; SDM_E_ARG for other than 1 to
-   8 surfaces. Atomic. */
+/* Draws surfaces[n], 1 to 8, side by side, to one scale, shaded: each seen from +z and obliquely,
+   with a colour bar of `caption` under those that have values. Also returns the errors of
+   sdm_mesh_audit(). */
 SDM_API sdm_status sdm_picture_surfaces(const char *path, const sdm_picture_surface *surfaces,
                                         size_t n, const char *caption, sdm_error *err);
 
-/* One curve of a plot. */
+/* One curve of a plot: the points (x[i], y[i]), i < n, joined by lines. A point that is not finite
+   (or, on a logarithmic axis, not positive) is left out and leaves a gap. */
 typedef struct sdm_curve {
-    const char *title;
+    const char *title; /* for the legend; NULL or "": not listed */
     const double *x, *y;
     size_t n;
 } sdm_curve;
 
-/* PNG line plot with axes, tick labels and a legend; log_y draws a logarithmic axis (values <= 0
- * are left out). Atomic. */
+/* Draws curves[n_curves], 1 to 16, with axes, tick labels and a legend; log_y: the y axis is
+   logarithmic. title, x_label and y_label may be NULL. */
 SDM_API sdm_status sdm_picture_plot(const char *path, const char *title, const char *x_label,
                                     const char *y_label, bool log_y, const sdm_curve *curves,
                                     size_t n_curves, sdm_error *err);

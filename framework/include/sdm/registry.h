@@ -1,4 +1,4 @@
-/* The host's side of plug-ins: registry, loader, instances. */
+/* Host side of the shape plug-ins: registry of shapes, loader, instances. */
 #ifndef SDM_REGISTRY_H
 #define SDM_REGISTRY_H
 
@@ -11,45 +11,49 @@
 extern "C" {
 #endif
 
-/* A set of known shapes. Filled at start-up by one thread, then read by any. */
+/* A set of shapes. Fill it from one thread; after that any thread may read it. */
 typedef struct sdm_registry sdm_registry;
 
 SDM_API sdm_status sdm_registry_create(sdm_registry **out, sdm_error *err);
-SDM_API void sdm_registry_free(sdm_registry *r); /* closes loaded plug-ins: free instances first */
+/* Also unloads the plug-ins that were loaded: free all instances first. NULL is allowed. */
+SDM_API void sdm_registry_free(sdm_registry *r);
 
-/* Checks abi, size, names, ranges and required callbacks and stores a copy of the table (min(size,
-   sizeof) of it). `origin` is said in messages ("built in" or a file). SDM_E_PLUGIN names what is
-   wrong; another shape of the same name is refused. */
+/* Checks ABI version, size, names, ranges and required callbacks of the table *shape and stores a
+ * copy of it (min(shape->size, sizeof(sdm_shape)) bytes). `origin` appears in messages ("built in"
+ * or a file name). SDM_E_PLUGIN names the mistake; a second shape of the same name is one. */
 SDM_API sdm_status sdm_registry_add(sdm_registry *r, const sdm_shape *shape, const char *origin,
                                     sdm_error *err);
 
-/* Loads a shared object and adds all its shapes; `file` comes from the command line or the
-   environment, never from a config. SDM_E_PLUGIN; SDM_E_UNSUPPORTED in a build without shared
-   objects (SDM_PLUGINS=OFF). */
+/* Loads a shared object and adds all its shapes. `file` must come from the command line or the
+ * environment, never from a configuration. SDM_E_PLUGIN; SDM_E_UNSUPPORTED in a build without
+ * plug-ins (SDM_PLUGINS=OFF). */
 SDM_API sdm_status sdm_registry_load(sdm_registry *r, const char *file, sdm_error *err);
 
-/* Loads every *.so in the folders of a colon-separated path (value of SDMGEN_PLUGIN_PATH); NULL
- * does nothing. Errors as above. */
+/* Loads every *.so in the folders of a colon-separated path (the value of SDMGEN_PLUGIN_PATH); NULL
+ * does nothing. Errors as sdm_registry_load(). */
 SDM_API sdm_status sdm_registry_load_path(sdm_registry *r, const char *path, sdm_error *err);
 
 SDM_API size_t sdm_registry_count(const sdm_registry *r);
-SDM_API const sdm_shape *sdm_registry_at(const sdm_registry *r,
-                                         size_t index); /* in order of addition */
+/* Shape and origin of entry `index`, in order of addition. */
+SDM_API const sdm_shape *sdm_registry_at(const sdm_registry *r, size_t index);
 SDM_API const char *sdm_registry_origin(const sdm_registry *r, size_t index);
-/* NULL when unknown; then *nearest (may be NULL) is a similar name or NULL. */
+/* The shape of this name. If there is none: NULL, and *nearest (may be NULL) is a similar name or
+ * NULL. */
 SDM_API const sdm_shape *sdm_registry_find(const sdm_registry *r, const char *name,
                                            const char **nearest);
 
-/* A shape with its options fixed. Immutable after creation: any number of threads may call it. */
+/* A shape with fixed option values. Immutable after creation, so any number of threads may use
+ * it. */
 typedef struct sdm_instance sdm_instance;
 
 typedef struct sdm_named_text {
     const char *name, *value;
 } sdm_named_text;
 
-/* Fixes the options given as text by name; the others take their defaults. base_dir (may be NULL):
-   folder against which relative FILE options are resolved. SDM_E_CONFIG: an unknown option (with
-   "did you mean"), a bad value; SDM_E_PLUGIN: create() failed. */
+/* Creates an instance with the given options; all others have their defaults. The shape must stay
+ * valid as long as the instance. base_dir (may be NULL): folder for relative paths in FILE options.
+ * SDM_E_CONFIG: unknown option (with "did you mean") or bad value; SDM_E_PLUGIN: the plug-in's
+ * create() failed. */
 SDM_API sdm_status sdm_instance_create(const sdm_shape *shape, const sdm_named_text *options,
                                        size_t n_options, const char *base_dir, sdm_instance **out,
                                        sdm_error *err);
@@ -57,26 +61,30 @@ SDM_API void sdm_instance_free(sdm_instance *s);
 
 SDM_API const sdm_shape *sdm_instance_shape(const sdm_instance *s);
 SDM_API const sdm_param *sdm_instance_params(const sdm_instance *s, size_t *n);
-SDM_API const sdm_option_value *
-sdm_instance_options(const sdm_instance *s); /* in the order of the shape's table */
-SDM_API int sdm_instance_param_index(const sdm_instance *s, const char *name); /* -1 when unknown */
+/* Option values in the order of the shape's table. */
+SDM_API const sdm_option_value *sdm_instance_options(const sdm_instance *s);
+/* Index of a parameter; -1 if there is none of this name. */
+SDM_API int sdm_instance_param_index(const sdm_instance *s, const char *name);
 
-/* p[n_params]: finite and inside [min, max] of each parameter, else SDM_E_RANGE naming it, its
- * value and range. */
+/* Checks that every p[n_params] is finite and inside [min, max] of its parameter. SDM_E_RANGE names
+ * the parameter, its value and its range. */
 SDM_API sdm_status sdm_instance_check(const sdm_instance *s, const double *p, sdm_error *err);
 
-/* The mesh at p, checked: parameters before, indices and coordinates after the call. *out is
-   zero-initialised or reused. SDM_E_RANGE, SDM_E_PLUGIN (with shape, parameters and reason),
-   SDM_E_NOMEM. [any thread] */
+/* Computes the mesh at parameters p[n_params]. The parameters are checked before, indices and
+ * coordinates of the mesh after the call of the plug-in. *out is zero-initialised or the mesh of an
+ * earlier call, whose memory is reused. SDM_E_RANGE, SDM_E_PLUGIN (names shape, parameters and
+ * reason), SDM_E_NOMEM. [any thread] */
 SDM_API sdm_status sdm_instance_mesh(const sdm_instance *s, const double *p, sdm_mesh *out,
                                      sdm_error *err);
 
-/* velocity[n_params][n_vert][3] by the plug-in's callback, or by central differences of the mesh
-   (one-sided at a range's end). [any thread] */
+/* velocity[n_params][n_vert][3] = d(vertex)/d(parameter), mm per unit of the parameter: from the
+ * plug-in's callback, otherwise by central differences of the mesh (one-sided at the end of a
+ * range). [any thread] */
 SDM_API sdm_status sdm_instance_velocity(const sdm_instance *s, const double *p, size_t n_vert,
                                          double *velocity, sdm_error *err);
 
-/* Closed-form distance; SDM_E_UNSUPPORTED when the shape has none. [any thread] */
+/* *distance = closed-form signed distance (mm) at x[3]; SDM_E_UNSUPPORTED if the shape has none.
+ * [any thread] */
 SDM_API sdm_status sdm_instance_distance(const sdm_instance *s, const double *p, const double x[3],
                                          double *distance, sdm_error *err);
 

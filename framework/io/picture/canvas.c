@@ -1,126 +1,376 @@
-/* An RGB canvas: boxes and antialiased strokes with round ends. */
+/* The canvas on top of cairo: the only file that includes it. */
 #include "canvas.h"
 
+#include <cairo-pdf.h>
+#include <cairo-svg.h>
+#include <cairo.h>
+#include <ctype.h>
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
+#include "sdm/internal/file.h"
+#include "sdm/internal/text.h"
 #include "sdm/memory.h"
+#include "sdm/picture.h"
 
-#define SIDE_MAX 16384
+enum { SIDE_MAX = 16384, TEXT_MAX = 500 };
 
-static int least(int a, int b) { return a < b ? a : b; }
-static int most(int a, int b) { return a > b ? a : b; }
+typedef enum canvas_format { FORMAT_PNG, FORMAT_SVG, FORMAT_PDF, N_FORMATS } canvas_format;
 
-static void clear_dirty(sdm_canvas *c)
+static const char *const ENDINGS[N_FORMATS] = {".png", ".svg", ".pdf"};
+
+/* Font size over the height of a capital letter, for common sans-serif fonts. */
+static const double EM_PER_CAPITAL = 1.37;
+
+struct sdm_canvas {
+    const char *path;
+    canvas_format format;
+    cairo_surface_t *surface;
+    cairo_t *cr;
+    sdm_outfile *file;
+    /* SVG: cairo's document, and the text elements that are put at its end */
+    sdm_text document, labels;
+    /* first error in writing the file */
+    sdm_error error;
+};
+
+/* ---- the file ---- */
+
+// N_FORMATS: unknown
+static canvas_format format_of(const char *path)
 {
-    c->dirty[0] = c->w;
-    c->dirty[1] = c->h;
-    c->dirty[2] = c->dirty[3] = 0;
+    const size_t n = strlen(path);
+    int f = 0;
+    while (f < N_FORMATS && (n < 4 || strcasecmp(path + n - 4, ENDINGS[f]))) f++;
+    return (canvas_format)f;
 }
 
-sdm_status sdm_canvas_create(sdm_canvas *c, int w, int h, sdm_error *err)
+sdm_status sdm_picture_check(const char *path, sdm_error *err)
 {
-    memset(c, 0, sizeof *c);
+    if (!path) return sdm_fail(err, SDM_E_ARG, "a picture without a file name");
+    if (format_of(path) < N_FORMATS) return SDM_OK;
+    return sdm_fail(err, SDM_E_UNSUPPORTED,
+                    "%s: unknown type of picture, the name must end in .png, .svg or .pdf", path);
+}
+
+/* Called by cairo with the next bytes of the file. */
+static cairo_status_t write_bytes(void *user, const unsigned char *data, unsigned size)
+{
+    sdm_canvas *c = user;
+    if (c->format == FORMAT_SVG)
+        sdm_text_add(&c->document, "%.*s", (int)size, (const char *)data);
+    else if (!c->error.status)
+        sdm_outfile_write(c->file, data, size, &c->error);
+    if (c->document.failed) return CAIRO_STATUS_NO_MEMORY;
+    return c->error.status ? CAIRO_STATUS_WRITE_ERROR : CAIRO_STATUS_SUCCESS;
+}
+
+static sdm_status fail(const sdm_canvas *c, cairo_status_t status, sdm_error *err)
+{
+    if (c->error.status) return sdm_fail(err, c->error.status, "%s", c->error.text);
+    if (status == CAIRO_STATUS_NO_MEMORY)
+        return sdm_fail(err, SDM_E_NOMEM, "%s: out of memory for the picture", c->path);
+    return sdm_fail(err, SDM_E_INTERNAL, "%s: cairo: %s", c->path, cairo_status_to_string(status));
+}
+
+static void create_surface(sdm_canvas *c, int w, int h)
+{
+    if (c->format == FORMAT_PNG) {
+        c->surface = cairo_image_surface_create(CAIRO_FORMAT_RGB24, w, h);
+    } else if (c->format == FORMAT_SVG) {
+        c->surface = cairo_svg_surface_create_for_stream(write_bytes, c, w, h);
+        cairo_svg_surface_set_document_unit(c->surface, CAIRO_SVG_UNIT_PX);
+    } else {
+        c->surface = cairo_pdf_surface_create_for_stream(write_bytes, c, w, h);
+        // a fixed date: the same picture is the same bytes
+        cairo_pdf_surface_set_metadata(c->surface, CAIRO_PDF_METADATA_CREATE_DATE,
+                                       "1970-01-01T00:00:00Z");
+        cairo_pdf_surface_set_metadata(c->surface, CAIRO_PDF_METADATA_CREATOR, "sdmgen");
+    }
+}
+
+sdm_status sdm_canvas_create(const char *path, int w, int h, sdm_canvas **out, sdm_error *err)
+{
+    *out = NULL;
+    sdm_status s = sdm_picture_check(path, err);
+    if (s) return s;
     if (w < 1 || h < 1 || w > SIDE_MAX || h > SIDE_MAX)
         return sdm_fail(err, SDM_E_ARG, "picture of %d x %d pixels, need 1 to %d a side", w, h,
                         SIDE_MAX);
-    c->w = w;
-    c->h = h;
-    const size_t n = (size_t)w * (size_t)h;
-    sdm_status e = SDM_ALLOC(&c->rgb, 3 * n, "pixels of a picture", err);
-    if (!e) e = SDM_ALLOC(&c->mask, n, "mask of a picture", err);
-    if (e) {
-        sdm_canvas_dispose(c);
-        return e;
+    sdm_canvas *c = NULL;
+    s = SDM_ALLOC(&c, 1, "picture", err);
+    if (s) return s;
+    c->path = path;
+    c->format = format_of(path);
+    s = sdm_outfile_open(path, &c->file, err);
+    if (!s) {
+        create_surface(c, w, h);
+        c->cr = cairo_create(c->surface);
+        const cairo_status_t status = cairo_status(c->cr);
+        if (status) s = fail(c, status, err);
     }
-    memset(c->rgb, 255, 3 * n);
-    sdm_canvas_unclip(c);
-    clear_dirty(c);
+    if (s) {
+        sdm_canvas_discard(c);
+        return s;
+    }
+    // unhinted text is as wide in every format
+    cairo_font_options_t *options = cairo_font_options_create();
+    cairo_font_options_set_antialias(options, CAIRO_ANTIALIAS_GRAY);
+    cairo_font_options_set_hint_style(options, CAIRO_HINT_STYLE_NONE);
+    cairo_font_options_set_hint_metrics(options, CAIRO_HINT_METRICS_OFF);
+    cairo_set_font_options(c->cr, options);
+    cairo_font_options_destroy(options);
+    cairo_set_line_cap(c->cr, CAIRO_LINE_CAP_ROUND);
+    cairo_set_line_join(c->cr, CAIRO_LINE_JOIN_ROUND);
+    sdm_canvas_fill(c, (sdm_box){0, 0, w, h}, (sdm_colour){255, 255, 255}, 1);
+    *out = c;
     return SDM_OK;
 }
 
-void sdm_canvas_dispose(sdm_canvas *c)
+/* Appends cairo's elements to `t`. The numbers in the names of images and surfaces come from a
+   counter of the process: reduced by the first one, they are the same for the same picture. */
+static void add_numbered(sdm_text *t, const char *document)
 {
-    sdm_free(c->rgb);
-    sdm_free(c->mask);
-    memset(c, 0, sizeof *c);
+    const char *first = strstr(document, "id=\"surface");
+    const unsigned long base = first ? strtoul(first + strlen("id=\"surface"), NULL, 10) : 0;
+    for (const char *at = document; *at;) {
+        // names follow a quotation mark or a hash sign
+        size_t n = strcspn(at, "\"#");
+        n += at[n] != '\0';
+        sdm_text_add(t, "%.*s", (int)n, at);
+        at += n;
+        const int word = !strncmp(at, "image", 5) ? 5 : !strncmp(at, "surface", 7) ? 7 : 0;
+        if (!word || !isdigit((unsigned char)at[word])) continue;
+        char *end;
+        const unsigned long number = strtoul(at + word, &end, 10);
+        sdm_text_add(t, "%.*s%lu", word, at, number - base);
+        at = end;
+    }
 }
 
-void sdm_canvas_clip(sdm_canvas *c, int x, int y, int w, int h)
+/* cairo would draw the shapes of the letters: here the text is put before the closing tag. */
+static sdm_status write_svg(sdm_canvas *c, sdm_error *err)
 {
-    c->clip[0] = most(x, 0);
-    c->clip[1] = most(y, 0);
-    c->clip[2] = least(x + w, c->w);
-    c->clip[3] = least(y + h, c->h);
+    static const char CLOSING[] = "</svg>";
+    char *closing = c->document.data ? strstr(c->document.data, CLOSING) : NULL;
+    if (!closing) return sdm_fail(err, SDM_E_INTERNAL, "%s: cairo: no closing tag", c->path);
+    *closing = '\0';
+    sdm_text svg = {0};
+    add_numbered(&svg, c->document.data);
+    sdm_text_add(&svg, "%s%s\n", c->labels.data ? c->labels.data : "", CLOSING);
+    const sdm_status s = svg.failed || c->labels.failed
+                             ? fail(c, CAIRO_STATUS_NO_MEMORY, err)
+                             : sdm_outfile_write(c->file, svg.data, svg.size, err);
+    sdm_text_dispose(&svg);
+    return s;
 }
 
-void sdm_canvas_unclip(sdm_canvas *c) { sdm_canvas_clip(c, 0, 0, c->w, c->h); }
-
-static void blend(uint8_t *pixel, sdm_colour colour, double alpha)
+sdm_status sdm_canvas_finish(sdm_canvas *c, sdm_error *err)
 {
-    const uint8_t to[3] = {colour.r, colour.g, colour.b};
-    for (int i = 0; i < 3; i++) pixel[i] = (uint8_t)(pixel[i] + alpha * (to[i] - pixel[i]) + 0.5);
+    cairo_status_t status = cairo_status(c->cr);
+    if (!status && c->format == FORMAT_PNG)
+        status = cairo_surface_write_to_png_stream(c->surface, write_bytes, c);
+    cairo_surface_finish(c->surface);
+    if (!status) status = cairo_surface_status(c->surface);
+    sdm_status s = status ? fail(c, status, err) : SDM_OK;
+    if (!s && c->format == FORMAT_SVG) s = write_svg(c, err);
+    if (!s) s = sdm_outfile_commit(&c->file, err);
+    sdm_canvas_discard(c);
+    return s;
 }
 
-void sdm_canvas_box(sdm_canvas *c, int x, int y, int w, int h, sdm_colour colour, double alpha)
+void sdm_canvas_discard(sdm_canvas *c)
 {
-    for (int py = most(y, c->clip[1]); py < least(y + h, c->clip[3]); py++)
-        for (int px = most(x, c->clip[0]); px < least(x + w, c->clip[2]); px++)
-            blend(c->rgb + 3 * ((size_t)py * (size_t)c->w + (size_t)px), colour, alpha);
+    if (!c) return;
+    cairo_destroy(c->cr);
+    cairo_surface_destroy(c->surface);
+    sdm_outfile_discard(&c->file);
+    sdm_text_dispose(&c->document);
+    sdm_text_dispose(&c->labels);
+    sdm_free(c);
 }
 
-void sdm_canvas_frame(sdm_canvas *c, int x, int y, int w, int h, sdm_colour colour)
+/* ---- drawing ---- */
+
+static void set_colour(sdm_canvas *c, sdm_colour colour, double alpha)
 {
-    sdm_canvas_box(c, x - 1, y - 1, w + 2, 1, colour, 1);
-    sdm_canvas_box(c, x - 1, y + h, w + 2, 1, colour, 1);
-    sdm_canvas_box(c, x - 1, y, 1, h, colour, 1);
-    sdm_canvas_box(c, x + w, y, 1, h, colour, 1);
+    cairo_set_source_rgba(c->cr, colour.r / 255.0, colour.g / 255.0, colour.b / 255.0, alpha);
 }
 
-/* Distance from p to the segment a + t u, t in 0 .. 1. */
-static double segment_distance(double px, double py, double ax, double ay, double ux, double uy)
+void sdm_canvas_clip(sdm_canvas *c, sdm_box box)
 {
-    const double length2 = ux * ux + uy * uy;
-    double t = length2 > 0 ? ((px - ax) * ux + (py - ay) * uy) / length2 : 0;
-    t = t < 0 ? 0 : t > 1 ? 1 : t;
-    const double dx = px - ax - t * ux, dy = py - ay - t * uy;
-    return sqrt(dx * dx + dy * dy);
+    cairo_rectangle(c->cr, box.x, box.y, box.w, box.h);
+    cairo_clip(c->cr);
 }
 
-/* Coordinates far outside the canvas must not overflow an int. */
-static int whole(double v, int limit) { return v < -1 ? -1 : v > limit ? limit : (int)floor(v); }
+void sdm_canvas_unclip(sdm_canvas *c) { cairo_reset_clip(c->cr); }
 
-void sdm_canvas_stroke(sdm_canvas *c, double x0, double y0, double x1, double y1, double width)
+void sdm_canvas_fill(sdm_canvas *c, sdm_box box, sdm_colour colour, double alpha)
 {
-    if (!(isfinite(x0) && isfinite(y0) && isfinite(x1) && isfinite(y1))) return;
-    const double reach = width / 2 + 1;
-    const int left = most(whole(fmin(x0, x1) - reach, c->w), c->clip[0]);
-    const int right = least(whole(fmax(x0, x1) + reach, c->w) + 1, c->clip[2]);
-    const int top = most(whole(fmin(y0, y1) - reach, c->h), c->clip[1]);
-    const int bottom = least(whole(fmax(y0, y1) + reach, c->h) + 1, c->clip[3]);
-    for (int py = top; py < bottom; py++) {
-        for (int px = left; px < right; px++) {
-            const double d = segment_distance(px + 0.5, py + 0.5, x0, y0, x1 - x0, y1 - y0);
-            const double cover = fmin(1, width / 2 + 0.5 - d);
-            uint8_t *m = c->mask + (size_t)py * (size_t)c->w + (size_t)px;
-            if (cover > 0) *m = (uint8_t)most(*m, (int)(255 * cover + 0.5));
+    set_colour(c, colour, alpha);
+    cairo_rectangle(c->cr, box.x, box.y, box.w, box.h);
+    cairo_fill(c->cr);
+}
+
+void sdm_canvas_frame(sdm_canvas *c, sdm_box box, sdm_colour colour)
+{
+    set_colour(c, colour, 1);
+    cairo_set_line_width(c->cr, 1);
+    cairo_rectangle(c->cr, box.x - 0.5, box.y - 0.5, box.w + 1, box.h + 1);
+    cairo_stroke(c->cr);
+}
+
+void sdm_canvas_move_to(sdm_canvas *c, double x, double y) { cairo_move_to(c->cr, x, y); }
+
+void sdm_canvas_line_to(sdm_canvas *c, double x, double y) { cairo_line_to(c->cr, x, y); }
+
+void sdm_canvas_stroke_keep(sdm_canvas *c, double width, sdm_colour colour, double alpha)
+{
+    set_colour(c, colour, alpha);
+    cairo_set_line_width(c->cr, width);
+    cairo_stroke_preserve(c->cr);
+}
+
+void sdm_canvas_stroke(sdm_canvas *c, double width, sdm_colour colour)
+{
+    sdm_canvas_stroke_keep(c, width, colour, 1);
+    cairo_new_path(c->cr);
+}
+
+void sdm_canvas_line(sdm_canvas *c, double x0, double y0, double x1, double y1, double width,
+                     sdm_colour colour)
+{
+    cairo_move_to(c->cr, x0, y0);
+    cairo_line_to(c->cr, x1, y1);
+    sdm_canvas_stroke(c, width, colour);
+}
+
+void sdm_canvas_image(sdm_canvas *c, sdm_box box, sdm_canvas_pixel *pixel, const void *user)
+{
+    cairo_surface_t *image = cairo_image_surface_create(CAIRO_FORMAT_RGB24, box.w, box.h);
+    unsigned char *data = cairo_image_surface_get_data(image);
+    // without memory, data is NULL and the image is in an error state that c->cr inherits
+    for (int y = 0; data && y < box.h; y++) {
+        uint32_t *row = (uint32_t *)(void *)(data + y * cairo_image_surface_get_stride(image));
+        for (int x = 0; x < box.w; x++) {
+            const sdm_colour v = pixel(user, x, y);
+            row[x] = (uint32_t)v.r << 16 | (uint32_t)v.g << 8 | v.b;
         }
     }
-    if (left >= right || top >= bottom) return;
-    c->dirty[0] = least(c->dirty[0], left);
-    c->dirty[1] = least(c->dirty[1], top);
-    c->dirty[2] = most(c->dirty[2], right);
-    c->dirty[3] = most(c->dirty[3], bottom);
+    cairo_surface_mark_dirty(image);
+    cairo_set_source_surface(c->cr, image, box.x, box.y);
+    cairo_pattern_set_filter(cairo_get_source(c->cr), CAIRO_FILTER_NEAREST);
+    cairo_rectangle(c->cr, box.x, box.y, box.w, box.h);
+    cairo_fill(c->cr);
+    cairo_surface_destroy(image);
 }
 
-void sdm_canvas_ink(sdm_canvas *c, sdm_colour colour, double alpha)
+/* ---- text ---- */
+
+/* Length of the UTF-8 character at s; 0 for malformed bytes, control characters and code points
+ * that XML does not allow. */
+static size_t character_length(const unsigned char *s)
 {
-    for (int y = c->dirty[1]; y < c->dirty[3]; y++) {
-        for (int x = c->dirty[0]; x < c->dirty[2]; x++) {
-            const size_t i = (size_t)y * (size_t)c->w + (size_t)x;
-            if (c->mask[i]) blend(c->rgb + 3 * i, colour, alpha * c->mask[i] / 255);
-            c->mask[i] = 0;
-        }
+    static const uint32_t FIRST[] = {0, 0x20, 0x80, 0x800, 0x10000};
+    const size_t n = s[0] < 0x80       ? 1
+                     : s[0] >> 5 == 6  ? 2
+                     : s[0] >> 4 == 14 ? 3
+                     : s[0] >> 3 == 30 ? 4
+                                       : 0;
+    uint32_t code = n == 1 ? s[0] : s[0] & (0x7Fu >> n);
+    for (size_t i = 1; i < n; i++) {
+        if ((s[i] & 0xC0) != 0x80) return 0;
+        code = code << 6 | (s[i] & 0x3Fu);
     }
-    clear_dirty(c);
+    const bool is_allowed = code >= FIRST[n] && !(code >= 0x7F && code < 0xA0) &&
+                            !(code >= 0xD800 && code < 0xE000) && (code & 0xFFFE) != 0xFFFE &&
+                            code <= 0x10FFFF;
+    return is_allowed ? n : 0;
+}
+
+static void clean_text(const char *text, char out[TEXT_MAX + 4])
+{
+    size_t used = 0;
+    while (*text && used < TEXT_MAX) {
+        const size_t n = character_length((const unsigned char *)text);
+        memcpy(out + used, n ? text : "?", n ? n : 1);
+        used += n ? n : 1;
+        text += n ? n : 1;
+    }
+    out[used] = '\0';
+}
+
+/* Sets the font; returns the width of the clean text. */
+static double measure(sdm_canvas *c, double size, bool bold, const char *clean)
+{
+    cairo_text_extents_t extents;
+    cairo_select_font_face(c->cr, "sans-serif", CAIRO_FONT_SLANT_NORMAL,
+                           bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
+    cairo_set_font_size(c->cr, size * EM_PER_CAPITAL);
+    cairo_text_extents(c->cr, clean, &extents);
+    return extents.x_advance;
+}
+
+double sdm_canvas_text_width(sdm_canvas *c, double size, const char *text)
+{
+    char clean[TEXT_MAX + 4];
+    clean_text(text, clean);
+    return measure(c, size, false, clean);
+}
+
+/* One <text> element; style: further attributes. */
+static void add_label(sdm_canvas *c, double x, double y, const sdm_type *type, const char *style,
+                      const char *clean)
+{
+    static const char *const ANCHORS[] = {"start", "middle", "end"};
+    char at[2][32], size[32];
+    sdm_text *t = &c->labels;
+    sdm_text_add(t, "<text transform=\"translate(%s,%s)%s\" font-family=\"sans-serif\"",
+                 sdm_format_real(x, at[0]), sdm_format_real(y, at[1]),
+                 type->upwards ? " rotate(-90)" : "");
+    sdm_text_add(t, " font-size=\"%s\" font-weight=\"%s\" text-anchor=\"%s\" %s>",
+                 sdm_format_real(type->size * EM_PER_CAPITAL, size), type->bold ? "bold" : "normal",
+                 ANCHORS[type->align], style);
+    for (const char *p = clean; *p; p++) {
+        if (*p == '&' || *p == '<' || *p == '>')
+            sdm_text_add(t, *p == '&' ? "&amp;" : *p == '<' ? "&lt;" : "&gt;");
+        else
+            sdm_text_add(t, "%c", *p);
+    }
+    sdm_text_add(t, "</text>\n");
+}
+
+void sdm_canvas_text(sdm_canvas *c, double x, double y, sdm_type type, const char *text)
+{
+    char clean[TEXT_MAX + 4], fill[32];
+    clean_text(text, clean);
+    if (c->format == FORMAT_SVG) {
+        snprintf(fill, sizeof fill, "fill=\"#%02x%02x%02x\"", type.colour.r, type.colour.g,
+                 type.colour.b);
+        if (type.halo)
+            add_label(c, x, y, &type,
+                      "fill=\"none\" stroke=\"#fff\" stroke-opacity=\"0.75\" stroke-width=\"3\" "
+                      "stroke-linejoin=\"round\"",
+                      clean);
+        add_label(c, x, y, &type, fill, clean);
+        return;
+    }
+    const double left = -measure(c, type.size, type.bold, clean) * (int)type.align / 2;
+    cairo_save(c->cr);
+    cairo_translate(c->cr, x, y);
+    if (type.upwards) cairo_rotate(c->cr, -acos(0));
+    if (type.halo) {
+        cairo_move_to(c->cr, left, 0);
+        cairo_text_path(c->cr, clean);
+        sdm_canvas_stroke_keep(c, 3, (sdm_colour){255, 255, 255}, 0.75);
+        cairo_new_path(c->cr);
+    }
+    set_colour(c, type.colour, 1);
+    cairo_move_to(c->cr, left, 0);
+    cairo_show_text(c->cr, clean);
+    cairo_new_path(c->cr);
+    cairo_restore(c->cr);
 }

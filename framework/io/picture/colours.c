@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdio.h>
 
+/* sRGB to linear light, 0 .. 1, and back. */
 static double to_linear(uint8_t v)
 {
     const double s = v / 255.0;
@@ -17,6 +18,7 @@ static uint8_t from_linear(double v)
     return (uint8_t)(255 * fmin(1, fmax(0, s)) + 0.5);
 }
 
+/* OKLab: lightness, green to red, blue to yellow. */
 static void to_lab(sdm_colour c, double lab[3])
 {
     const double r = to_linear(c.r), g = to_linear(c.g), b = to_linear(c.b);
@@ -40,7 +42,7 @@ static sdm_colour from_lab(const double lab[3])
 
 #define ANCHORS 5
 
-/* t in 0 .. 1 along evenly spaced anchors. */
+/* The colour at t, 0 .. 1, along evenly spaced anchors. */
 static sdm_colour mix(const sdm_colour anchor[ANCHORS], double t)
 {
     const double at = fmin(1, fmax(0, t)) * (ANCHORS - 1);
@@ -88,7 +90,7 @@ const char *sdm_tick_text(double value, double step, char buf[32])
     const int decimals = (int)fmax(0, ceil(-log10(step) - 1e-9));
     const double size = fabs(value);
     const bool zero = size < step * 1e-6;
-    const char *sign = value < 0 && !zero ? "\xE2\x88\x92" : ""; /* a minus as wide as a plus */
+    const char *sign = value < 0 && !zero ? "\xE2\x88\x92" : ""; // U+2212, as wide as a plus
     if (decimals > 4 || size >= 1e7)
         snprintf(buf, 32, "%s%.3g", sign, zero ? 0 : size);
     else

@@ -10,7 +10,7 @@
 enum {
     MAPS_MAX = 4,
     TOP = 46,
-    FOOT = 100, /* grey bar with numbers and caption, then the key of the contours */
+    FOOT = 100, /* grey bar with numbers and caption, then the legend of the contours */
     BAR = 14,
     RIGHT = 22
 };
@@ -24,7 +24,7 @@ typedef struct overlay {
     const sdm_picture_map *maps;
     size_t n_maps;
     sdm_sections sections;
-    double low, high; /* values that are black and white */
+    double low, high; /* the values shown in black and in white */
 } overlay;
 
 static int ascending(const void *a, const void *b)
@@ -33,7 +33,8 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Percentiles 1 and 99 of the three slices: a few bright voxels must not darken the rest. */
+/* Black and white are percentiles 1 and 99 of the three slices, so that a few bright voxels do not
+ * darken the rest. */
 static sdm_status find_window(overlay *o, sdm_error *err)
 {
     size_t n = 0, used = 0;
@@ -73,22 +74,19 @@ static void draw_panel(sdm_canvas *c, const overlay *o, sdm_box box, int axis)
     if (axis == 0) sdm_panel_scale_bar(c, box, o->sections.pixels);
 }
 
-/* A sample of each line with its title. */
-static void draw_key(sdm_canvas *c, const overlay *o, double x, double y)
+/* The legend: a sample of each contour's line with its title. */
+static void draw_legend(sdm_canvas *c, const overlay *o, double x, double y)
 {
     const sdm_type type = {.size = 10, .colour = SDM_INK};
     for (size_t m = 0; m < o->n_maps; m++) {
         const char *title = o->maps[m].title ? o->maps[m].title : "";
-        sdm_canvas_stroke(c, x, y - 4.5, x + 22, y - 4.5, 4.2);
-        sdm_canvas_ink(c, RIM, 0.55);
-        sdm_canvas_stroke(c, x, y - 4.5, x + 22, y - 4.5, 2);
-        sdm_canvas_ink(c, LINES[m], 1);
+        sdm_contour_sample(c, x, y - 4.5, 22, LINES[m], RIM);
         sdm_canvas_text(c, x + 30, y, type, title);
-        x += 30 + sdm_text_width(10, title) + 30;
+        x += 30 + sdm_canvas_text_width(c, 10, title) + 30;
     }
 }
 
-static void draw(sdm_canvas *c, const overlay *o, const char *title)
+static void draw(sdm_canvas *c, const overlay *o, int height, const char *title)
 {
     const sdm_sections *s = &o->sections;
     int x = SDM_SECTION_LEFT;
@@ -99,10 +97,9 @@ static void draw(sdm_canvas *c, const overlay *o, const char *title)
         draw_panel(c, o, (sdm_box){x, TOP, s->w[axis], s->h[axis]}, axis);
         x += s->w[axis] + SDM_SECTION_LEFT;
     }
-    const int foot = c->h - FOOT;
-    draw_key(c, o, SDM_SECTION_LEFT, c->h - 16);
-    sdm_colour_bar(c, (sdm_box){SDM_SECTION_LEFT, foot, 260, BAR}, SDM_MAP_GREY, o->low, o->high,
-                   "value of the image");
+    draw_legend(c, o, SDM_SECTION_LEFT, height - 16);
+    sdm_colour_bar(c, (sdm_box){SDM_SECTION_LEFT, height - FOOT, 260, BAR}, SDM_MAP_GREY, o->low,
+                   o->high, "value of the image");
 }
 
 static sdm_status check(const char *path, const sdm_grid *grid, const float *image,
@@ -133,11 +130,10 @@ sdm_status sdm_picture_overlay(const char *path, const sdm_grid *grid, const flo
         w += o.sections.w[axis] + (axis < 2 ? SDM_SECTION_LEFT : RIGHT);
         if (o.sections.h[axis] > tall) tall = o.sections.h[axis];
     }
-    sdm_canvas c;
-    s = sdm_canvas_create(&c, w < 480 ? 480 : w, TOP + tall + SDM_SECTION_BELOW + FOOT, err);
+    sdm_canvas *c = NULL;
+    const int height = TOP + tall + SDM_SECTION_BELOW + FOOT;
+    s = sdm_canvas_create(path, w < 480 ? 480 : w, height, &c, err);
     if (s) return s;
-    draw(&c, &o, title);
-    s = sdm_png_write(path, &c, err);
-    sdm_canvas_dispose(&c);
-    return s;
+    draw(c, &o, height, title);
+    return sdm_canvas_finish(c, err);
 }

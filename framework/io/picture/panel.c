@@ -5,7 +5,11 @@
 #include <stdio.h>
 
 #define SHADES 2048
+/* A contour's rim is this much wider than its line, in pixels. */
+#define RIM 2.2
+#define RIM_ALPHA 0.55
 
+/* The value at column i, -1 <= i <= n[0], of row j inside of the slice. */
 static double along_row(const sdm_slice *s, int64_t i, int64_t j)
 {
     const float *row = s->v + (size_t)j * s->stride[1];
@@ -15,8 +19,8 @@ static double along_row(const sdm_slice *s, int64_t i, int64_t j)
     return 2 * (double)row[(size_t)edge * s->stride[0]] - (double)row[(size_t)next * s->stride[0]];
 }
 
-/* The value at a whole index; one step outside it goes on linearly, so that lines reach the border
- * without a bend. */
+/* The value at index (i, j); one step outside of the slice it is extrapolated linearly, so that
+ * contours reach the border without a bend. */
 static double value_at(const sdm_slice *s, int64_t i, int64_t j)
 {
     const int64_t last = s->n[1] - 1;
@@ -25,6 +29,7 @@ static double value_at(const sdm_slice *s, int64_t i, int64_t j)
     return 2 * along_row(s, i, edge) - along_row(s, i, next);
 }
 
+/* Bilinear; whole numbers u, v are the centres of voxels. */
 static double interpolate(const sdm_slice *s, double u, double v)
 {
     const double fu = floor(u), fv = floor(v), tu = u - fu, tv = v - fv;
@@ -34,30 +39,42 @@ static double interpolate(const sdm_slice *s, double u, double v)
     return low * (1 - tv) + high * tv;
 }
 
+/* The image of a slice or of a colour bar. */
+typedef struct shading {
+    sdm_box box;
+    const sdm_slice *slice;
+    sdm_colour_map map;
+    double low, high;
+    /* colours of evenly spaced values from low to high */
+    sdm_colour table[SHADES];
+} shading;
+
+static sdm_colour slice_pixel(const void *user, int x, int y)
+{
+    const shading *p = user;
+    const double u = (x + 0.5) / p->box.w * (double)p->slice->n[0] - 0.5;
+    const double v = (1 - (y + 0.5) / p->box.h) * (double)p->slice->n[1] - 0.5;
+    const double value = interpolate(p->slice, u, v),
+                 shade = (value - p->low) / (p->high - p->low) * (SHADES - 1) + 0.5;
+    if (!isfinite(value)) return sdm_map_colour(p->map, p->low, p->high, value);
+    return p->table[shade >= SHADES ? SHADES - 1 : shade > 0 ? (int)shade : 0];
+}
+
 void sdm_panel_colours(sdm_canvas *c, sdm_box box, const sdm_slice *s, sdm_colour_map map,
                        double low, double high)
 {
-    sdm_colour table[SHADES];
+    shading p = {.box = box, .slice = s, .map = map, .low = low, .high = high};
     for (int i = 0; i < SHADES; i++)
-        table[i] = sdm_map_colour(map, low, high, low + (high - low) * i / (SHADES - 1));
-    for (int y = 0; y < box.h; y++) {
-        for (int x = 0; x < box.w; x++) {
-            const double u = (x + 0.5) / box.w * (double)s->n[0] - 0.5;
-            const double v = (1 - (y + 0.5) / box.h) * (double)s->n[1] - 0.5;
-            const double value = interpolate(s, u, v),
-                         shade = (value - low) / (high - low) * (SHADES - 1) + 0.5;
-            sdm_colour colour = table[shade >= SHADES ? SHADES - 1 : shade > 0 ? (int)shade : 0];
-            if (!isfinite(value)) colour = sdm_map_colour(map, low, high, value);
-            sdm_canvas_box(c, box.x + x, box.y + y, 1, 1, colour, 1);
-        }
-    }
+        p.table[i] = sdm_map_colour(map, low, high, low + (high - low) * i / (SHADES - 1));
+    sdm_canvas_image(c, box, slice_pixel, &p);
 }
 
-/* Where the level is crossed on the side from corner `from` to corner `to`, in pixels. */
+/* A corner of a cell between voxel centres: its place on the canvas, its value less the level. */
 typedef struct corner {
     double x, y, v;
 } corner;
 
+/* Where the level is crossed on the side from corner `from` to corner `to`. */
 static void crossing(const corner *from, const corner *to, double at[2])
 {
     const double t = from->v / (from->v - to->v);
@@ -65,9 +82,9 @@ static void crossing(const corner *from, const corner *to, double at[2])
     at[1] = from->y + t * (to->y - from->y);
 }
 
-/* The segments in one cell; values are minus the level. Four crossings are paired by the sign of
- * the bilinear saddle. */
-static void trace_cell(sdm_canvas *c, const corner k[4], double width)
+/* Adds the contour's lines in one cell to the path. Four crossings are paired by the sign of the
+ * bilinear saddle. */
+static void trace_cell(sdm_canvas *c, const corner k[4])
 {
     double at[4][2];
     int n = 0, first = 0;
@@ -78,19 +95,20 @@ static void trace_cell(sdm_canvas *c, const corner k[4], double width)
     }
     if (n == 4) {
         const double even = k[0].v * k[2].v, odd = k[1].v * k[3].v;
-        const bool cut_off_even =
-            (k[0].v < 0) == (odd > even); /* corners 0 and 2 are on their own */
+        // true: the lines cut off corners 0 and 2
+        const bool cut_off_even = (k[0].v < 0) == (odd > even);
         first = cut_off_even ? 3 : 0;
     }
     for (int i = 0; i + 1 < n; i += 2) {
         const double *a = at[(first + i) % n], *b = at[(first + i + 1) % n];
-        sdm_canvas_stroke(c, a[0], a[1], b[0], b[1], width);
+        sdm_canvas_move_to(c, a[0], a[1]);
+        sdm_canvas_line_to(c, b[0], b[1]);
     }
 }
 
-static void trace(sdm_canvas *c, sdm_box box, const sdm_slice *s, double level, double width)
+static void trace(sdm_canvas *c, sdm_box box, const sdm_slice *s, double level)
 {
-    /* cells between voxel centres, and one more around; what lies outside the box is clipped */
+    // cells between voxel centres, and one more on each side for the half voxel up to the border
     for (int64_t j = -1; j < s->n[1]; j++) {
         for (int64_t i = -1; i < s->n[0]; i++) {
             corner k[4];
@@ -101,7 +119,7 @@ static void trace(sdm_canvas *c, sdm_box box, const sdm_slice *s, double level, 
                                 box.y + (1 - v / (double)s->n[1]) * box.h,
                                 value_at(s, p[0], p[1]) - level};
             }
-            trace_cell(c, k, width);
+            trace_cell(c, k);
         }
     }
 }
@@ -109,12 +127,20 @@ static void trace(sdm_canvas *c, sdm_box box, const sdm_slice *s, double level, 
 void sdm_panel_contour(sdm_canvas *c, sdm_box box, const sdm_slice *s, double level, double width,
                        sdm_colour colour, sdm_colour rim)
 {
-    sdm_canvas_clip(c, box.x, box.y, box.w, box.h);
-    trace(c, box, s, level, width + 2.2);
-    sdm_canvas_ink(c, rim, 0.55);
-    trace(c, box, s, level, width);
-    sdm_canvas_ink(c, colour, 1);
+    sdm_canvas_clip(c, box);
+    trace(c, box, s, level);
+    sdm_canvas_stroke_keep(c, width + RIM, rim, RIM_ALPHA);
+    sdm_canvas_stroke(c, width, colour);
     sdm_canvas_unclip(c);
+}
+
+void sdm_contour_sample(sdm_canvas *c, double x, double y, double length, sdm_colour colour,
+                        sdm_colour rim)
+{
+    sdm_canvas_move_to(c, x, y);
+    sdm_canvas_line_to(c, x + length, y);
+    sdm_canvas_stroke_keep(c, 2 + RIM, rim, RIM_ALPHA);
+    sdm_canvas_stroke(c, 2, colour);
 }
 
 void sdm_panel_scale_bar(sdm_canvas *c, sdm_box box, double pixels_per_mm)
@@ -124,35 +150,42 @@ void sdm_panel_scale_bar(sdm_canvas *c, sdm_box box, double pixels_per_mm)
     sdm_ticks(0, box.w / pixels_per_mm, 4, &first, &mm);
     const double length = mm * pixels_per_mm, x = box.x + 12, y = box.y + box.h - 12;
     if (!(length < box.w - 24)) return;
-    for (int pass = 0; pass < 2; pass++) {
-        const double width = pass ? 2.5 : 6;
-        sdm_canvas_stroke(c, x, y, x + length, y, width);
-        sdm_canvas_stroke(c, x, y - 3.5, x, y + 3.5, pass ? 1.6 : 5);
-        sdm_canvas_stroke(c, x + length, y - 3.5, x + length, y + 3.5, pass ? 1.6 : 5);
-        sdm_canvas_ink(c, pass ? SDM_INK : (sdm_colour){255, 255, 255}, pass ? 1 : 0.75);
-    }
+    // the bar with a cross line at each end
+    sdm_canvas_move_to(c, x, y - 3.5);
+    sdm_canvas_line_to(c, x, y + 3.5);
+    sdm_canvas_move_to(c, x, y);
+    sdm_canvas_line_to(c, x + length, y);
+    sdm_canvas_move_to(c, x + length, y - 3.5);
+    sdm_canvas_line_to(c, x + length, y + 3.5);
+    sdm_canvas_stroke_keep(c, 5.5, SDM_WHITE, 0.75);
+    sdm_canvas_stroke(c, 2, SDM_INK);
     snprintf(text, sizeof text, "%s mm", sdm_tick_text(mm, mm, number));
     sdm_canvas_text(c, x + length / 2, y - 9,
                     (sdm_type){.size = 9, .align = SDM_CENTRE, .colour = SDM_INK, .halo = true},
                     text);
 }
 
+static sdm_colour bar_pixel(const void *user, int x, int y)
+{
+    const shading *p = user;
+    (void)y;
+    return sdm_map_colour(p->map, p->low, p->high,
+                          p->low + (x + 0.5) / p->box.w * (p->high - p->low));
+}
+
 void sdm_colour_bar(sdm_canvas *c, sdm_box box, sdm_colour_map map, double low, double high,
                     const char *caption)
 {
-    for (int x = 0; x < box.w; x++) {
-        const double v = low + (x + 0.5) / box.w * (high - low);
-        sdm_canvas_box(c, box.x + x, box.y, 1, box.h, sdm_map_colour(map, low, high, v), 1);
-    }
-    sdm_canvas_frame(c, box.x, box.y, box.w, box.h, SDM_INK_LIGHT);
+    const shading p = {.box = box, .map = map, .low = low, .high = high};
+    sdm_canvas_image(c, box, bar_pixel, &p);
+    sdm_canvas_frame(c, box, SDM_INK_LIGHT);
     double first, step;
     char text[32];
     const sdm_type type = {.size = 9, .align = SDM_CENTRE, .colour = SDM_INK};
-    const int n = sdm_ticks(low, high, 9, &first, &step);
+    const int n = sdm_ticks(low, high, box.w / 33, &first, &step);
     for (int i = 0; i < n; i++) {
         const double v = first + i * step, x = box.x + (v - low) / (high - low) * box.w;
-        sdm_canvas_stroke(c, x, box.y + box.h + 1, x, box.y + box.h + 5, 1);
-        sdm_canvas_ink(c, SDM_INK_LIGHT, 1);
+        sdm_canvas_line(c, x, box.y + box.h + 1, x, box.y + box.h + 5, 1, SDM_INK_LIGHT);
         sdm_canvas_text(c, x, box.y + box.h + 19, type, sdm_tick_text(v, step, text));
     }
     sdm_canvas_text(c, box.x + box.w / 2.0, box.y + box.h + 38, type, caption);

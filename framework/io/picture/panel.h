@@ -4,35 +4,36 @@
 
 #include "canvas.h"
 
-/* n[0] values to the right, n[1] upwards. */
+/* A slice of a map: value (i, j) is v[i * stride[0] + j * stride[1]], 0 <= i < n[0] to the right,
+ * 0 <= j < n[1] upwards. */
 typedef struct sdm_slice {
     const float *v;
     int64_t n[2];
     size_t stride[2];
 } sdm_slice;
 
-/* Where on the canvas, in whole pixels. */
-typedef struct sdm_box {
-    int x, y, w, h;
-} sdm_box;
-
-/* Fills the box with the bilinear interpolant; the box covers whole voxels. */
+/* Fills the box, which covers whole voxels, with the colours of the bilinear interpolant. */
 void sdm_panel_colours(sdm_canvas *c, sdm_box box, const sdm_slice *s, sdm_colour_map map,
                        double low, double high);
 
-/* The line where the slice crosses `level`, by marching squares; colour over a wider line of `rim`.
- */
+/* The line where the slice crosses `level`, by marching squares: `width` pixels of `colour` over a
+   wider, translucent line of `rim`. Cells with a value that is not finite are left out. */
 void sdm_panel_contour(sdm_canvas *c, sdm_box box, const sdm_slice *s, double level, double width,
                        sdm_colour colour, sdm_colour rim);
 
-/* A bar of a round number of mm in the lower left corner. */
+/* A bar of a round number of mm in the lower left corner; none where the box is too narrow. */
 void sdm_panel_scale_bar(sdm_canvas *c, sdm_box box, double pixels_per_mm);
 
-/* A horizontal colour bar with numbers and a caption below; `box` is the bar itself. */
+/* A horizontal colour bar, with numbers and a caption below it; `box` is the bar alone. */
 void sdm_colour_bar(sdm_canvas *c, sdm_box box, sdm_colour_map map, double low, double high,
                     const char *caption);
 
+/* A sample of a contour's line for a legend, from (x, y) to the right. */
+void sdm_contour_sample(sdm_canvas *c, double x, double y, double length, sdm_colour colour,
+                        sdm_colour rim);
+
 #define SDM_INK ((sdm_colour){38, 40, 46})
 #define SDM_INK_LIGHT ((sdm_colour){120, 124, 132})
+#define SDM_WHITE ((sdm_colour){255, 255, 255})
 
 #endif

@@ -1,4 +1,4 @@
-/* Line plots: axes, ticks, legend. */
+/* Line plots with axes, tick labels and a legend. */
 #include "sdm/picture.h"
 
 #include <float.h>
@@ -11,16 +11,17 @@
 #define HEIGHT 600
 #define CURVES_MAX 16
 
+/* The rectangle inside of the axes. */
 static const sdm_box area = {92, 56, WIDTH - 92 - 32, HEIGHT - 56 - 70};
 static const sdm_colour grid_ink = {228, 230, 234};
 
-/* The window of the plot; y is a decadic logarithm where log_y. */
+/* The range of the axes; y is log10 of the values when log_y is set. */
 typedef struct window {
     double low[2], high[2];
     bool log_y;
 } window;
 
-/* One point in the window's coordinates; false when it cannot be drawn. */
+/* Point i in the coordinates of the axes; false when it is left out. */
 static bool point(const sdm_curve *curve, size_t i, bool log_y, double p[2])
 {
     p[0] = curve->x[i];
@@ -53,6 +54,7 @@ static void find_window(window *w, const sdm_curve *curves, size_t n_curves)
     }
 }
 
+/* Coordinates of the axes to pixels. */
 static double to_x(const window *w, double v)
 {
     return area.x + (v - w->low[0]) / (w->high[0] - w->low[0]) * area.w;
@@ -60,13 +62,6 @@ static double to_x(const window *w, double v)
 static double to_y(const window *w, double v)
 {
     return area.y + (1 - (v - w->low[1]) / (w->high[1] - w->low[1])) * area.h;
-}
-
-static void line(sdm_canvas *c, double x0, double y0, double x1, double y1, double width,
-                 sdm_colour colour)
-{
-    sdm_canvas_stroke(c, x0, y0, x1, y1, width);
-    sdm_canvas_ink(c, colour, 1);
 }
 
 static void draw_x_axis(sdm_canvas *c, const window *w)
@@ -77,8 +72,8 @@ static void draw_x_axis(sdm_canvas *c, const window *w)
     const int n = sdm_ticks(w->low[0], w->high[0], 8, &first, &step);
     for (int i = 0; i < n; i++) {
         const double v = first + i * step, x = floor(to_x(w, v)) + 0.5;
-        line(c, x, area.y, x, area.y + area.h, 1, grid_ink);
-        line(c, x, area.y + area.h, x, area.y + area.h + 5, 1, SDM_INK_LIGHT);
+        sdm_canvas_line(c, x, area.y, x, area.y + area.h, 1, grid_ink);
+        sdm_canvas_line(c, x, area.y + area.h, x, area.y + area.h + 5, 1, SDM_INK_LIGHT);
         sdm_canvas_text(c, x, area.y + area.h + 22, type, sdm_tick_text(v, step, text));
     }
 }
@@ -86,8 +81,8 @@ static void draw_x_axis(sdm_canvas *c, const window *w)
 static void y_tick(sdm_canvas *c, double y, const char *text)
 {
     y = floor(y) + 0.5;
-    line(c, area.x, y, area.x + area.w, y, 1, grid_ink);
-    line(c, area.x - 5, y, area.x, y, 1, SDM_INK_LIGHT);
+    sdm_canvas_line(c, area.x, y, area.x + area.w, y, 1, grid_ink);
+    sdm_canvas_line(c, area.x - 5, y, area.x, y, 1, SDM_INK_LIGHT);
     if (text)
         sdm_canvas_text(c, area.x - 10, y + 5,
                         (sdm_type){.size = 10, .align = SDM_RIGHT, .colour = SDM_INK}, text);
@@ -102,10 +97,11 @@ static void power_of_ten(sdm_canvas *c, double y, int exponent)
     sdm_type type = {.size = 7, .align = SDM_RIGHT, .colour = SDM_INK};
     sdm_canvas_text(c, area.x - 10, y - 1, type, text);
     type.size = 10;
-    sdm_canvas_text(c, area.x - 12 - sdm_text_width(7, text), y + 6, type, "10");
+    sdm_canvas_text(c, area.x - 12 - sdm_canvas_text_width(c, 7, text), y + 6, type, "10");
 }
 
-/* Decades, and over a short range 2 and 5 of each. */
+/* Labels at the decades (every second, third ... where there are over ten), and, over less than 1.6
+ * decades, at 2 and 5 times them. */
 static void draw_log_axis(sdm_canvas *c, const window *w)
 {
     const double decades = w->high[1] - w->low[1];
@@ -125,7 +121,8 @@ static void draw_log_axis(sdm_canvas *c, const window *w)
             } else if (m == 1 || labelled) {
                 y_tick(c, y, text);
             } else {
-                line(c, area.x - 3, floor(y) + 0.5, area.x, floor(y) + 0.5, 1, SDM_INK_LIGHT);
+                sdm_canvas_line(c, area.x - 3, floor(y) + 0.5, area.x, floor(y) + 0.5, 1,
+                                SDM_INK_LIGHT);
             }
         }
     }
@@ -135,7 +132,7 @@ static void draw_y_axis(sdm_canvas *c, const window *w)
 {
     double first, step;
     char text[32];
-    /* less than a factor of two: decades say nothing */
+    // a linear scale when the values span less than about a factor of two
     if (w->log_y && w->high[1] - w->low[1] > 0.35) {
         draw_log_axis(c, w);
         return;
@@ -158,22 +155,17 @@ static sdm_colour curve_colour(size_t i)
 
 static void draw_curve(sdm_canvas *c, const window *w, const sdm_curve *curve, sdm_colour colour)
 {
-    double before[2], p[2];
-    bool has_before = false;
-    sdm_canvas_clip(c, area.x, area.y, area.w, area.h);
+    double p[2];
+    bool is_started = false;
+    sdm_canvas_clip(c, area);
     for (size_t i = 0; i < curve->n; i++) {
         const bool ok = point(curve, i, w->log_y, p);
-        /* a point between two gaps still shows, as a dot */
-        if (ok) {
-            const double *from = has_before ? before : p;
-            sdm_canvas_stroke(c, to_x(w, from[0]), to_y(w, from[1]), to_x(w, p[0]), to_y(w, p[1]),
-                              has_before ? 1.8 : 2.4);
-            before[0] = p[0];
-            before[1] = p[1];
-        }
-        has_before = ok;
+        // a point between two gaps shows as a dot, a line of length 0
+        if (ok && !is_started) sdm_canvas_move_to(c, to_x(w, p[0]), to_y(w, p[1]));
+        if (ok) sdm_canvas_line_to(c, to_x(w, p[0]), to_y(w, p[1]));
+        is_started = ok;
     }
-    sdm_canvas_ink(c, colour, 1);
+    sdm_canvas_stroke(c, 1.8, colour);
     sdm_canvas_unclip(c);
 }
 
@@ -183,18 +175,19 @@ static void draw_legend(sdm_canvas *c, const sdm_curve *curves, size_t n)
     int rows = 0;
     for (size_t i = 0; i < n; i++)
         if (curves[i].title && curves[i].title[0]) {
-            widest = fmax(widest, sdm_text_width(10, curves[i].title));
+            widest = fmax(widest, sdm_canvas_text_width(c, 10, curves[i].title));
             rows++;
         }
     if (!rows) return;
-    const int w = (int)widest + 66, h = 22 * rows + 12, x = area.x + area.w - w - 12;
+    const int w = (int)widest + 66, x = area.x + area.w - w - 12;
     int y = area.y + 12;
-    sdm_canvas_box(c, x, y, w, h, (sdm_colour){255, 255, 255}, 0.88);
-    sdm_canvas_frame(c, x, y, w, h, grid_ink);
+    const sdm_box box = {x, y, w, 22 * rows + 12};
+    sdm_canvas_fill(c, box, SDM_WHITE, 0.88);
+    sdm_canvas_frame(c, box, grid_ink);
     y += 22;
     for (size_t i = 0; i < n; i++) {
         if (!curves[i].title || !curves[i].title[0]) continue;
-        line(c, x + 12, y - 5, x + 42, y - 5, 2.4, curve_colour(i));
+        sdm_canvas_line(c, x + 12, y - 5, x + 42, y - 5, 2.4, curve_colour(i));
         sdm_canvas_text(c, x + 52, y, (sdm_type){.size = 10, .colour = SDM_INK}, curves[i].title);
         y += 22;
     }
@@ -224,16 +217,14 @@ sdm_status sdm_picture_plot(const char *path, const char *title, const char *x_l
             return sdm_fail(err, SDM_E_ARG, "curve %zu has no values", i);
     window w = {.log_y = log_y};
     find_window(&w, curves, n_curves);
-    sdm_canvas c;
-    sdm_status e = sdm_canvas_create(&c, WIDTH, HEIGHT, err);
-    if (e) return e;
-    draw_x_axis(&c, &w);
-    draw_y_axis(&c, &w);
-    for (size_t i = 0; i < n_curves; i++) draw_curve(&c, &w, &curves[i], curve_colour(i));
-    sdm_canvas_frame(&c, area.x, area.y, area.w, area.h, SDM_INK_LIGHT);
-    draw_legend(&c, curves, n_curves);
-    draw_labels(&c, title, x_label, y_label);
-    e = sdm_png_write(path, &c, err);
-    sdm_canvas_dispose(&c);
-    return e;
+    sdm_canvas *c = NULL;
+    const sdm_status s = sdm_canvas_create(path, WIDTH, HEIGHT, &c, err);
+    if (s) return s;
+    draw_x_axis(c, &w);
+    draw_y_axis(c, &w);
+    for (size_t i = 0; i < n_curves; i++) draw_curve(c, &w, &curves[i], curve_colour(i));
+    sdm_canvas_frame(c, area, SDM_INK_LIGHT);
+    draw_legend(c, curves, n_curves);
+    draw_labels(c, title, x_label, y_label);
+    return sdm_canvas_finish(c, err);
 }

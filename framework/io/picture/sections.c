@@ -74,23 +74,24 @@ sdm_slice sdm_section_of(const sdm_sections *s, const float *values, int axis)
                        {stride[right], stride[up]}};
 }
 
-/* Position of index `at` along an axis of the grid: in the world where the axis is one of it, else
- * from the first voxel. */
+/* Coordinate in mm of index `at` along an axis of the grid: a world coordinate when the axis is
+ * parallel to a world axis, else the distance from the first voxel. */
 static double position(const sdm_sections *s, int axis, double at)
 {
     const sdm_grid *g = s->grid;
     const int w = s->world[axis];
     if (w < 0) return at * g->spacing[axis];
-    /* the other indices do not matter for this coordinate */
+    // the other grid axes are orthogonal to this world axis and do not change its coordinate
     return g->origin[w] + g->dir[3 * w + axis] * at * g->spacing[axis];
 }
 
+/* x, y, z for a world axis; i, j, k for an oblique grid axis. */
 static char axis_name(const sdm_sections *s, int axis)
 {
     return s->world[axis] < 0 ? "ijk"[axis] : "xyz"[s->world[axis]];
 }
 
-/* Numbers along one side of a panel, in mm. */
+/* Ticks with numbers in mm along the lower side of the box, or (upwards) along its left side. */
 static void draw_axis(sdm_canvas *c, const sdm_sections *s, sdm_box box, int axis, bool upwards)
 {
     const double last = (double)s->grid->n[axis] - 0.5, a = position(s, axis, -0.5),
@@ -104,8 +105,7 @@ static void draw_axis(sdm_canvas *c, const sdm_sections *s, sdm_box box, int axi
         const double v = first + i * step, t = (v - a) / (b - a);
         const double x = upwards ? box.x - 1 : box.x + t * box.w,
                      y = upwards ? box.y + (1 - t) * box.h : box.y + box.h + 1;
-        sdm_canvas_stroke(c, x, y, upwards ? x - 4 : x, upwards ? y : y + 4, 1);
-        sdm_canvas_ink(c, SDM_INK_LIGHT, 1);
+        sdm_canvas_line(c, x, y, upwards ? x - 4 : x, upwards ? y : y + 4, 1, SDM_INK_LIGHT);
         sdm_canvas_text(c, upwards ? x - 8 : x, upwards ? y + 4.5 : y + 18, type,
                         sdm_tick_text(v, step, text));
     }
@@ -123,15 +123,15 @@ void sdm_section_draw_frame(sdm_canvas *c, const sdm_sections *s, sdm_box box, i
     int right, up;
     char text[64], number[32];
     section_axes(axis, &right, &up);
-    sdm_canvas_frame(c, box.x, box.y, box.w, box.h, SDM_INK_LIGHT);
+    sdm_canvas_frame(c, box, SDM_INK_LIGHT);
     if (s->world[axis] < 0)
         snprintf(text, sizeof text, "%c = %lld of %lld", axis_name(s, axis), (long long)s->at[axis],
                  (long long)s->grid->n[axis]);
     else
         snprintf(text, sizeof text, "%c = %s mm", axis_name(s, axis),
                  sdm_tick_text(position(s, axis, (double)s->at[axis]), 0.01, number));
-    sdm_canvas_box(c, box.x, box.y, (int)sdm_text_width(10, text) + 17, 25,
-                   (sdm_colour){255, 255, 255}, 0.82);
+    const int width = (int)sdm_canvas_text_width(c, 10, text) + 17;
+    sdm_canvas_fill(c, (sdm_box){box.x, box.y, width, 25}, SDM_WHITE, 0.82);
     sdm_canvas_text(c, box.x + 8, box.y + 18, (sdm_type){.size = 10, .colour = SDM_INK}, text);
     draw_axis(c, s, box, right, false);
     if (left) draw_axis(c, s, box, up, true);

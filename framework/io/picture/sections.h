@@ -1,5 +1,5 @@
-/* Three orthogonal sections of a grid on a canvas: where they lie, how large they are, their axes
- * in mm. */
+/* Three orthogonal sections of a grid on a canvas: their positions, their sizes and their axes in
+ * mm. */
 #ifndef SDM_IO_SECTIONS_H
 #define SDM_IO_SECTIONS_H
 
@@ -8,22 +8,26 @@
 
 typedef struct sdm_sections {
     const sdm_grid *grid;
-    int64_t at[3]; /* index of the section normal to each axis */
-    int world[3];  /* axis of the world an axis of the grid runs along, or -1 */
+    /* section a is normal to axis a of the grid and shows the voxels of index at[a] along it */
+    int64_t at[3];
+    /* the world axis (0 x, 1 y, 2 z) that each grid axis is parallel to, or -1 */
+    int world[3];
     double pixels; /* per mm */
+    /* size of each section in pixels */
     int w[3], h[3];
+    /* width of a column that holds any of them */
     int widest;
 } sdm_sections;
 
-/* Sections through the middle of the box around the negative values of map[nz][ny][nx]; of the grid
- * when there are none. */
+/* Places the sections through the middle of the bounding box of the negative values of
+ * map[nz][ny][nx], or of the grid when there are none. `grid` must outlive *s. */
 void sdm_sections_place(sdm_sections *s, const sdm_grid *grid, const float *map);
 
-/* The section of any map of the grid. */
+/* The section normal to `axis` of values[nz][ny][nx] on the same grid. */
 sdm_slice sdm_section_of(const sdm_sections *s, const float *values, int axis);
 
-/* What surrounds a section: frame, where it lies, numbers along its lower and, if wanted, its left
- * side. */
+/* Draws the frame of a section, its position in a corner, and numbers in mm along its lower side
+ * and, if `left`, along its left side. */
 void sdm_section_draw_frame(sdm_canvas *c, const sdm_sections *s, sdm_box box, int axis, bool left);
 
 #define SDM_SECTION_LEFT 66  /* room for numbers and axis names */

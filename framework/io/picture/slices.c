@@ -1,5 +1,5 @@
-/* Pictures of maps: three orthogonal slices of each, side by side, with contours, scales and
- * positions. */
+/* Pictures of maps: a column of three orthogonal slices for each, with contours, axes in mm and
+ * colour bars. */
 #include "sdm/picture.h"
 
 #include <math.h>
@@ -17,7 +17,7 @@
 #define BAR 14
 #define FOOT 84 /* colour bars with numbers and captions */
 
-/* Everything that is known before the first pixel. */
+/* The data and where everything lies on the canvas. */
 typedef struct layout {
     const sdm_grid *g;
     const sdm_picture_map *maps;
@@ -27,11 +27,12 @@ typedef struct layout {
     sdm_sections sections;
     sdm_box row[3];         /* panels of the first column; row r is normal to axis r */
     int column;             /* width of a column */
-    double low[2], high[2]; /* distance and error scale */
-    double unit[2];         /* factor of the printed numbers: 1 for mm, 1000 for micrometres */
+    double low[2], high[2]; /* colour scales: [0] distances, [1] errors, mm */
+    double unit[2];         /* printed number per mm: 1, or 1000 for micrometres */
 } layout;
 
-/* Range of the finite values of the maps of one kind. */
+/* The colour scale of distances or of errors: the range of their finite values, widened to hold 0;
+ * symmetric about 0 for errors of both signs; never empty. */
 static void find_range(layout *l, bool error)
 {
     double low = INFINITY, high = -INFINITY;
@@ -58,7 +59,7 @@ static void find_range(layout *l, bool error)
     l->unit[error] = error && high < 0.1 ? 1000 : 1;
 }
 
-/* Places of panels and size of the canvas. */
+/* The boxes of the first column and the size of the canvas. */
 static void place(layout *l, int *width, int *height)
 {
     int y = TOP;
@@ -73,6 +74,8 @@ static void place(layout *l, int *width, int *height)
     *height = y + FOOT;
 }
 
+static const sdm_colour DARK = {40, 40, 48};
+
 static sdm_colour level_colour(size_t i)
 {
     static const sdm_colour known[] = {
@@ -80,20 +83,19 @@ static sdm_colour level_colour(size_t i)
     return known[i % (sizeof known / sizeof *known)];
 }
 
-/* Distances get their own contours; on an error map the contours of the first map show where the
- * surface is. */
+/* A map of distances shows its own contours; a map of errors shows those of the first map, thin and
+ * white, to mark the surface. */
 static void draw_contours(sdm_canvas *c, const layout *l, sdm_box box, const sdm_picture_map *map,
                           int axis)
 {
-    const sdm_colour white = {255, 255, 255}, dark = {40, 40, 48};
     const sdm_slice s =
         sdm_section_of(&l->sections, map->error ? l->maps[0].values : map->values, axis);
     for (size_t i = l->n_levels; i-- > 0;) {
         if (map->error)
-            sdm_panel_contour(c, box, &s, (double)l->levels[i], i ? 0.9 : 1.4, white, dark);
+            sdm_panel_contour(c, box, &s, (double)l->levels[i], i ? 0.9 : 1.4, SDM_WHITE, DARK);
         else
             sdm_panel_contour(c, box, &s, (double)l->levels[i], i ? 1.6 : 2, level_colour(i),
-                              i ? dark : white);
+                              i ? DARK : SDM_WHITE);
     }
 }
 
@@ -114,8 +116,9 @@ static void draw_panel(sdm_canvas *c, const layout *l, size_t column, int axis)
     if (column == 0) sdm_panel_scale_bar(c, box, l->sections.pixels);
 }
 
-/* A sample of each contour's line with its level, behind the caption of the distances. */
-static void draw_key(sdm_canvas *c, const layout *l, double x, double y)
+/* The legend, centred at x: a sample of each contour's line with its level. The first pass
+ * measures, the second draws. */
+static void draw_legend(sdm_canvas *c, const layout *l, double x, double y)
 {
     char text[48];
     const sdm_type type = {.size = 9, .colour = SDM_INK};
@@ -124,12 +127,9 @@ static void draw_key(sdm_canvas *c, const layout *l, double x, double y)
         double at = x - total / 2;
         for (size_t i = 0; i < l->n_levels; i++) {
             snprintf(text, sizeof text, "%g mm", (double)l->levels[i]);
-            const double w = sdm_text_width(9, text);
+            const double w = sdm_canvas_text_width(c, 9, text);
             if (pass) {
-                sdm_canvas_stroke(c, at, y - 4.5, at + 18, y - 4.5, 4.2);
-                sdm_canvas_ink(c, i ? (sdm_colour){40, 40, 48} : (sdm_colour){255, 255, 255}, 0.55);
-                sdm_canvas_stroke(c, at, y - 4.5, at + 18, y - 4.5, 2);
-                sdm_canvas_ink(c, level_colour(i), 1);
+                sdm_contour_sample(c, at, y - 4.5, 18, level_colour(i), i ? DARK : SDM_WHITE);
                 sdm_canvas_text(c, at + 25, y, type, text);
             }
             at += 25 + w + 18;
@@ -151,7 +151,7 @@ static void draw_column(sdm_canvas *c, const layout *l, size_t column, int foot)
                                            : "error (mm)";
     sdm_colour_bar(c, bar, map_of(l, map->error), l->low[e] * l->unit[e], l->high[e] * l->unit[e],
                    caption);
-    if (!e) draw_key(c, l, x + l->column / 2.0, foot + 72);
+    if (!e) draw_legend(c, l, x + l->column / 2.0, foot + 72);
 }
 
 static sdm_status check(const char *path, const sdm_grid *grid, const sdm_picture_map *maps,
@@ -173,18 +173,16 @@ static sdm_status check(const char *path, const sdm_grid *grid, const sdm_pictur
 sdm_status sdm_picture_slices(const char *path, const sdm_grid *grid, const sdm_picture_map *maps,
                               size_t n_maps, const float *levels, size_t n_levels, sdm_error *err)
 {
-    sdm_status e = check(path, grid, maps, n_maps, levels, n_levels, err);
-    if (e) return e;
+    sdm_status s = check(path, grid, maps, n_maps, levels, n_levels, err);
+    if (s) return s;
     layout l = {.g = grid, .maps = maps, .n_maps = n_maps, .levels = levels, .n_levels = n_levels};
     int w, h;
     find_range(&l, false);
     find_range(&l, true);
     place(&l, &w, &h);
-    sdm_canvas c;
-    e = sdm_canvas_create(&c, w, h, err);
-    if (e) return e;
-    for (size_t m = 0; m < n_maps; m++) draw_column(&c, &l, m, h - FOOT);
-    e = sdm_png_write(path, &c, err);
-    sdm_canvas_dispose(&c);
-    return e;
+    sdm_canvas *c = NULL;
+    s = sdm_canvas_create(path, w, h, &c, err);
+    if (s) return s;
+    for (size_t m = 0; m < n_maps; m++) draw_column(c, &l, m, h - FOOT);
+    return sdm_canvas_finish(c, err);
 }

@@ -1,5 +1,5 @@
-/* Pictures of surfaces: orthographic views with a depth buffer, shaded, coloured by a value at each
- * vertex. */
+/* Pictures of surfaces: shaded orthographic views, rendered with a depth buffer and coloured by a
+ * value at each vertex. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -40,15 +40,18 @@ static const view VIEWS[N_VIEWS] = {
 typedef struct scene {
     const sdm_picture_surface *surfaces;
     size_t n;
-    double low[N_VIEWS][2],
-        high[N_VIEWS][2];       /* boxes of all surfaces in the planes of the views, mm */
-    double pixels;              /* per mm */
-    double limit;               /* values span -limit .. limit, mm */
-    int width, height[N_VIEWS]; /* of a panel */
-    sdm_colour shade[N_SHADES]; /* of values from -limit to limit */
+    /* bounding boxes of all surfaces in the planes of the views, mm */
+    double low[N_VIEWS][2], high[N_VIEWS][2];
+    double pixels; /* per mm */
+    /* the colours span the values -limit .. limit, mm */
+    double limit;
+    /* size of the panels in pixels */
+    int width, height[N_VIEWS];
+    /* colours of evenly spaced values from -limit to limit */
+    sdm_colour shade[N_SHADES];
 } scene;
 
-/* One panel in the making, FINE times as wide and high; depth -INFINITY: nothing there. */
+/* The samples of one panel, FINE times as wide and high; depth is -INFINITY where no surface is. */
 typedef struct raster {
     int w, h;
     double *depth;
@@ -60,6 +63,7 @@ static double dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
+/* Finds the bounding boxes and the largest finite value. */
 static void measure(scene *s)
 {
     for (int v = 0; v < N_VIEWS; v++)
@@ -81,6 +85,7 @@ static void measure(scene *s)
     }
 }
 
+/* Finds the scale, the sizes of the panels and the colours. */
 static void place(scene *s)
 {
     double widest = 0, longest = 0;
@@ -98,7 +103,7 @@ static void place(scene *s)
         s->shade[i] = sdm_map_colour(SDM_MAP_SIGNED, -1, 1, (double)(i - MIDDLE) / MIDDLE);
 }
 
-/* Sums of the triangles' area vectors: normals of unnormalised length. */
+/* Adds the area vectors of the triangles at each vertex: normal[n_vert][3], not of unit length. */
 static void add_normals(const sdm_mesh *m, double *normal)
 {
     for (size_t t = 0; t < m->n_tri; t++) {
@@ -114,7 +119,8 @@ static void add_normals(const sdm_mesh *m, double *normal)
     }
 }
 
-/* Light from the upper left behind the viewer; backs of triangles are lit as their fronts. */
+/* Lambert shading with light from the upper left behind the viewer; back sides are lit like front
+ * sides. */
 static double brightness(const double n[3], const view *v)
 {
     static const double LIGHT[3] = {-0.4, 0.5, 0.76811};
@@ -130,11 +136,13 @@ static sdm_colour colour_of(const scene *s, double value)
     return s->shade[(int)lround((fmax(-1, fmin(1, value / s->limit)) + 1) * MIDDLE)];
 }
 
-/* A corner on its way to the raster: place, depth, what is interpolated. */
+/* A corner of a triangle: position in samples, depth towards the viewer in mm, and the quantities
+ * that are interpolated. */
 typedef struct corner {
     double x, y, z, value, normal[3];
 } corner;
 
+/* Renders a triangle by barycentric coordinates b[3]; plain: one colour for all values. */
 static void draw_triangle(const scene *s, raster *r, const view *v, const corner c[3], bool plain)
 {
     const double area =
@@ -190,29 +198,26 @@ static void draw_surface(const scene *s, raster *r, int view_index, const sdm_pi
     }
 }
 
-/* Averages the samples of each pixel over the white ground. */
-static void put_raster(sdm_canvas *canvas, const raster *r, int left, int top)
+/* The mean of the samples of a pixel. */
+static sdm_colour raster_pixel(const void *user, int x, int y)
 {
-    for (int y = 0; y < r->h / FINE; y++)
-        for (int x = 0; x < r->w / FINE; x++) {
-            int sum[3] = {0, 0, 0};
-            for (int k = 0; k < FINE * FINE; k++) {
-                const size_t at =
-                    (size_t)(y * FINE + k / FINE) * (size_t)r->w + (size_t)(x * FINE + k % FINE);
-                for (int d = 0; d < 3; d++) sum[d] += r->rgb[3 * at + (size_t)d];
-            }
-            uint8_t *to =
-                canvas->rgb + 3 * ((size_t)(top + y) * (size_t)canvas->w + (size_t)(left + x));
-            for (int d = 0; d < 3; d++)
-                to[d] = (uint8_t)((sum[d] + FINE * FINE / 2) / (FINE * FINE));
-        }
+    const raster *r = user;
+    int sum[3] = {0, 0, 0};
+    uint8_t mean[3];
+    for (int k = 0; k < FINE * FINE; k++) {
+        const size_t at =
+            (size_t)(y * FINE + k / FINE) * (size_t)r->w + (size_t)(x * FINE + k % FINE);
+        for (int d = 0; d < 3; d++) sum[d] += r->rgb[3 * at + (size_t)d];
+    }
+    for (int d = 0; d < 3; d++) mean[d] = (uint8_t)((sum[d] + FINE * FINE / 2) / (FINE * FINE));
+    return (sdm_colour){mean[0], mean[1], mean[2]};
 }
 
-static sdm_status draw_panel(const scene *s, sdm_canvas *canvas, size_t column, int v, int left,
-                             int top, sdm_error *err)
+static sdm_status draw_panel(const scene *s, sdm_canvas *c, size_t column, int v, sdm_box box,
+                             sdm_error *err)
 {
     const sdm_picture_surface *p = &s->surfaces[column];
-    raster r = {.w = s->width * FINE, .h = s->height[v] * FINE};
+    raster r = {.w = box.w * FINE, .h = box.h * FINE};
     const size_t n = (size_t)r.w * (size_t)r.h;
     double *normal = NULL;
     sdm_status e = SDM_ALLOC(&r.depth, n, "depth of a picture", err);
@@ -223,7 +228,7 @@ static sdm_status draw_panel(const scene *s, sdm_canvas *canvas, size_t column, 
         memset(r.rgb, 255, 3 * n);
         add_normals(p->mesh, normal);
         draw_surface(s, &r, v, p, normal);
-        put_raster(canvas, &r, left, top);
+        sdm_canvas_image(c, box, raster_pixel, &r);
     }
     sdm_free(r.depth);
     sdm_free(r.rgb);
@@ -231,7 +236,8 @@ static sdm_status draw_panel(const scene *s, sdm_canvas *canvas, size_t column, 
     return e;
 }
 
-static sdm_status draw(const scene *s, sdm_canvas *c, const char *caption, sdm_error *err)
+static sdm_status draw(const scene *s, sdm_canvas *c, int bar_top, const char *caption,
+                       sdm_error *err)
 {
     const sdm_type title = {.size = 13, .align = SDM_CENTRE, .bold = true, .colour = SDM_INK};
     const double unit = s->limit < 0.1 ? 1000 : 1;
@@ -243,16 +249,15 @@ static sdm_status draw(const scene *s, sdm_canvas *c, const char *caption, sdm_e
         sdm_canvas_text(c, left + s->width / 2.0, TOP - 18, title,
                         s->surfaces[k].title ? s->surfaces[k].title : "");
         for (int v = 0; v < N_VIEWS && !e; v++) {
-            e = draw_panel(s, c, k, v, left, top, err);
+            const sdm_box box = {left, top, s->width, s->height[v]};
+            e = draw_panel(s, c, k, v, box, err);
             sdm_canvas_text(c, left + 6, top + 14, (sdm_type){.size = 9, .colour = SDM_INK_LIGHT},
                             VIEWS[v].name);
-            if (k == 0 && v == 0)
-                sdm_panel_scale_bar(c, (sdm_box){left, top, s->width, s->height[v]}, s->pixels);
+            if (k == 0 && v == 0) sdm_panel_scale_bar(c, box, s->pixels);
             top += s->height[v] + GAP;
         }
         if (!s->surfaces[k].values) continue;
-        const sdm_box bar = {left + s->width / 10, c->h - FOOT, s->width - 2 * (s->width / 10),
-                             BAR};
+        const sdm_box bar = {left + s->width / 10, bar_top, s->width - 2 * (s->width / 10), BAR};
         snprintf(text, sizeof text, "%.120s (%s)", caption, unit > 1 ? "\xC2\xB5m" : "mm");
         sdm_colour_bar(c, bar, SDM_MAP_SIGNED, -s->limit * unit, s->limit * unit, text);
     }
@@ -269,19 +274,19 @@ sdm_status sdm_picture_surfaces(const char *path, const sdm_picture_surface *sur
     for (size_t k = 0; k < n; k++) {
         if (!surfaces[k].mesh)
             return sdm_fail(err, SDM_E_ARG, "surface %zu of the picture has no mesh", k);
-        sdm_audit audit; /* indices and coordinates */
+        sdm_audit audit; // refuses bad indices and coordinates that are not finite
         const sdm_status e = sdm_mesh_audit(surfaces[k].mesh, &audit, err);
         if (e) return sdm_fail_in(err, e, "surface %zu of the picture", k);
     }
     scene s = {.surfaces = surfaces, .n = n};
-    sdm_canvas c;
+    sdm_canvas *c = NULL;
     measure(&s);
     place(&s);
     const int h = TOP + s.height[0] + GAP + s.height[1] + GAP + FOOT;
-    sdm_status e = sdm_canvas_create(&c, 2 * SIDE + (int)n * (s.width + GAP) - GAP, h, err);
+    sdm_status e = sdm_canvas_create(path, 2 * SIDE + (int)n * (s.width + GAP) - GAP, h, &c, err);
     if (e) return e;
-    e = draw(&s, &c, caption, err);
-    if (!e) e = sdm_png_write(path, &c, err);
-    sdm_canvas_dispose(&c);
+    e = draw(&s, c, h - FOOT, caption, err);
+    if (!e) return sdm_canvas_finish(c, err);
+    sdm_canvas_discard(c);
     return e;
 }

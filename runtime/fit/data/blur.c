@@ -1,16 +1,17 @@
-/* The discrete Gaussian T(k, t) = exp(-t) I_k(t) (Lindeberg 1990): its variance is t exactly,
-   however narrow, and dT/dt is half the second difference of T. They are a group: T(-t) undoes
-   T(t). */
+/* Convolution with the discrete Gaussian T(k, t) = exp(-t) I_k(t), k the voxel and t the variance
+ * in voxels^2 (Lindeberg 1990). Its variance is exactly t, however narrow it is, and dT/dt is half
+ * the second difference of T. T(-t), which sharpens, is the inverse of T(t). */
 #include "blur.h"
 
 #include <math.h>
 
-// taps on one side at most: four deviations of the widest Gaussian
+// taps on one side at most: 4 sd of the widest Gaussian
 #define RADIUS_MAX 128
 
-/* T(0..r, variance), normalised; returns r. Downward recurrence I_{k-1} = I_{k+1} + 2k/t I_k
-   (Miller 1952). Of a negative variance I_k(-t) = (-1)^k I_k(t). */
-static int gaussian(double variance, double tap[RADIUS_MAX + 1])
+/* tap[0 .. r] = T(k, variance), normalised to sum 1 over both sides; returns r, the number of taps
+ * on one side. The Bessel functions come from the downward recurrence I_{k-1} = I_{k+1} + 2k/t I_k
+ * (Miller 1952). A negative variance uses I_k(-t) = (-1)^k I_k(t). */
+static int gaussian_taps(double variance, double tap[RADIUS_MAX + 1])
 {
     const double t = fabs(variance);
     if (!(t > 1e-12)) {
@@ -19,18 +20,19 @@ static int gaussian(double variance, double tap[RADIUS_MAX + 1])
     }
     int r = (int)fmin(ceil(6 * sqrt(t)) + 4, RADIUS_MAX);
     double above = 0, here = 1e-290, sum = 0;
-    for (int k = r + 12; k >= 0; k--) { // here = I_k up to a factor
+    for (int k = r + 12; k >= 0; k--) { // here = I_k times an unknown factor
         if (k <= r) tap[k] = here;
         sum += k ? 2 * here : here;
         const double below = above + 2 * k / t * here;
         above = here;
         here = below;
-        if (here > 1e200) { // scaled down together
+        if (here > 1e200) { // against overflow: scale all numbers down together
             for (int i = k; i <= r; i++) tap[i] *= 1e-200;
             above *= 1e-200, here *= 1e-200, sum *= 1e-200;
         }
     }
     while (r > 0 && tap[r] < 1e-8 * sum) r--;
+    // signs of a negative variance; normalise the taps that are kept
     for (int k = 1; k <= r && variance < 0; k += 2) tap[k] = -tap[k];
     double kept = tap[0];
     for (int k = 1; k <= r; k++) kept += 2 * tap[k];
@@ -42,17 +44,17 @@ sdm_status sdm_fit_blur_check(const sdm_grid *g, const char *name, double value,
                               sdm_error *err)
 {
     const double voxel = fmin(g->spacing[0], fmin(g->spacing[1], g->spacing[2]));
-    if (sd <= FIT_BLUR_MOST * voxel) return SDM_OK;
+    if (sd <= FIT_BLUR_MAX * voxel) return SDM_OK;
     return sdm_fail(err, SDM_E_ARG,
                     "%s of %g mm spreads over %.3g voxels of %g mm, at most %g: make it smaller",
-                    name, value, sd / voxel, voxel, FIT_BLUR_MOST);
+                    name, value, sd / voxel, voxel, FIT_BLUR_MAX);
 }
 
-static int64_t clamp(int64_t i, int64_t n) { return i < 0 ? 0 : i < n ? i : n - 1; }
+static int64_t index_clamp(int64_t i, int64_t n) { return i < 0 ? 0 : i < n ? i : n - 1; }
 
-// out[n] = sum over k of tap[k] times the elements k * step before and after
-static void blur_some(const double *in, double *out, size_t n, size_t step, int r,
-                      const double *tap)
+// interior: out[n] = sum over k of tap[k] * (elements k * step before and after)
+static void blur_interior(const double *in, double *out, size_t n, size_t step, int r,
+                          const double *tap)
 {
     for (size_t i = 0; i < n; i++) out[i] = tap[0] * in[i];
     for (int k = 1; k <= r; k++) {
@@ -61,7 +63,7 @@ static void blur_some(const double *in, double *out, size_t n, size_t step, int 
     }
 }
 
-// voxel i of a line of n voxels that are `step` apart, each of them `width` numbers
+// border: voxel i of a line of n voxels, `step` numbers apart; each voxel has `width` numbers
 static void blur_at_border(const double *in, double *out, int64_t i, int64_t n, size_t step,
                            size_t width, int r, const double *tap)
 {
@@ -69,13 +71,13 @@ static void blur_at_border(const double *in, double *out, int64_t i, int64_t n, 
     const double *centre = in + (size_t)i * step;
     for (size_t e = 0; e < width; e++) to[e] = tap[0] * centre[e];
     for (int k = 1; k <= r; k++) {
-        const double *a = in + (size_t)clamp(i - k, n) * step,
-                     *b = in + (size_t)clamp(i + k, n) * step;
+        const double *a = in + (size_t)index_clamp(i - k, n) * step,
+                     *b = in + (size_t)index_clamp(i + k, n) * step;
         for (size_t e = 0; e < width; e++) to[e] += tap[k] * (a[e] + b[e]);
     }
 }
 
-// along the first axis: a row
+// a row along the first axis: its borders, and the interior between them
 static void blur_row(const double *in, double *out, int64_t n, size_t n_fields, int r,
                      const double *tap)
 {
@@ -83,11 +85,11 @@ static void blur_row(const double *in, double *out, int64_t n, size_t n_fields, 
     for (int64_t i = 0; i < from; i++) blur_at_border(in, out, i, n, n_fields, n_fields, r, tap);
     const size_t first = (size_t)from * n_fields;
     if (to > from)
-        blur_some(in + first, out + first, (size_t)(to - from) * n_fields, n_fields, r, tap);
+        blur_interior(in + first, out + first, (size_t)(to - from) * n_fields, n_fields, r, tap);
     for (int64_t i = to; i < n; i++) blur_at_border(in, out, i, n, n_fields, n_fields, r, tap);
 }
 
-// what cubic B-splines spread along an axis, voxels^2
+// variance that interpolation by cubic B-splines adds along an axis, voxels^2
 #define SPLINE_VARIANCE (1.0 / 3)
 
 void sdm_fit_blur(const sdm_grid *g, size_t n_fields, double variance, bool splines, int n_threads,
@@ -98,8 +100,9 @@ void sdm_fit_blur(const sdm_grid *g, size_t n_fields, double variance, bool spli
     const size_t row = n_fields * (size_t)g->n[0], step[3] = {n_fields, row, row * (size_t)g->n[1]};
     for (int axis = 0; axis < 3; axis++) {
         double tap[RADIUS_MAX + 1];
-        const int r = gaussian(variance / (g->spacing[axis] * g->spacing[axis]) - less, tap);
+        const int r = gaussian_taps(variance / (g->spacing[axis] * g->spacing[axis]) - less, tap);
         if (r == 0) continue;
+        // every line of voxels along the first axis; the other axes combine whole lines
         const double *in = *packed;
         double *out = *spare;
 #pragma omp parallel for schedule(static) num_threads(n_threads)
@@ -110,7 +113,7 @@ void sdm_fit_blur(const sdm_grid *g, size_t n_fields, double variance, bool spli
             if (axis == 0)
                 blur_row(in + start, out + start, n, n_fields, r, tap);
             else if (at >= r && at + r < n)
-                blur_some(in + start, out + start, row, step[axis], r, tap);
+                blur_interior(in + start, out + start, row, step[axis], r, tap);
             else
                 blur_at_border(in + origin, out + origin, at, n, step[axis], row, r, tap);
         }

@@ -1,4 +1,4 @@
-/* Gaussian smoothing of packed fields on a grid. */
+/* Gaussian smoothing and the Laplacian of packed fields on a grid. */
 #ifndef FIT_BLUR_H
 #define FIT_BLUR_H
 
@@ -6,23 +6,24 @@
 
 #include "sdm/grid.h"
 
-/* Standard deviation of the widest Gaussian, in voxels. */
-#define FIT_BLUR_MOST 32.0
+/* sd of the widest Gaussian, in voxels */
+#define FIT_BLUR_MAX 32.0
 
-/* SDM_E_ARG where a Gaussian of this sd (mm), which option `name` = value (mm) asks for, is wider
- * on this grid. */
+/* SDM_E_ARG where sd (mm) exceeds FIT_BLUR_MAX voxels along the axis with the smallest ones. `name`
+ * and `value` (mm): the option that leads to this sd, for the message. */
 sdm_status sdm_fit_blur_check(const sdm_grid *g, const char *name, double value, double sd,
                               sdm_error *err);
 
-/* (*packed)[voxels][n_fields] through the discrete Gaussian of this variance (mm^2); the border
-   repeats. splines: what comes out are coefficients of cubic B-splines, whose own spread, a third
-   of a voxel^2, is part of the variance. *spare, of the same size, may change places with *packed.
-   The same bits for any number of threads. */
+/* Convolves (*packed)[voxels][n_fields] with a discrete Gaussian of this variance (mm^2); the
+   values of the border continue beyond it. splines: the results are used as coefficients of cubic
+   B-splines, which add 1/3 voxel^2 of variance along each axis; that much is subtracted, and a
+   negative rest sharpens. *spare: scratch of the same size; the two pointers may be swapped.
+   n_threads >= 1; the same bits for any number. */
 void sdm_fit_blur(const sdm_grid *g, size_t n_fields, double variance, bool splines, int n_threads,
                   double **packed, double **spare);
 
-/* The last field = scale * Laplacian of the first: the derivative by the sd of the blur, with scale
- * = that sd. */
+/* Last field = scale * Laplacian of the first, per mm^2: with scale = sd of the blur (mm), the
+ * derivative of the first field by that sd. */
 void sdm_fit_laplacian(const sdm_grid *g, size_t n_fields, double scale, int n_threads,
                        double *packed);
 

@@ -1,14 +1,15 @@
-/* Opening by a ball: the union of all balls of a radius that the space holds (Matheron 1975),
- * through two exact distance transforms. */
+/* Finds cavities by a morphological opening with a ball (Matheron 1975): the union of all balls of
+ * the radius that fit into the inside-like space. Two exact distance transforms compute it. */
 #include "cavity.h"
 
 #include <math.h>
 
 #include "blur.h"
+#include "distance_transform.h"
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
-#include "transform.h"
 
+// log density of a mixture of Gaussians at a value
 static double log_mixture(const sdm_fit_law *law, size_t n, double value)
 {
     double sum = 0, most = -INFINITY, all = 0;
@@ -25,8 +26,8 @@ static double log_mixture(const sdm_fit_law *law, size_t n, double value)
     return most + log(sum);
 }
 
-// 0 where the value is likelier outside or not known, INFINITY where it is likelier inside
-static sdm_status find_walls(const sdm_fit_target *t, const sdm_fit_opts *o, int n_threads,
+// wall[voxel] = 0: outside is more likely, or NaN; INFINITY: inside is more likely
+static sdm_status walls_find(const sdm_fit_target *t, const sdm_fit_opts *o, int n_threads,
                              float *wall, sdm_error *err)
 {
     const size_t n = sdm_grid_count(&t->grid);
@@ -34,6 +35,7 @@ static sdm_status find_walls(const sdm_fit_target *t, const sdm_fit_opts *o, int
     sdm_status s = SDM_ALLOC(&packed, n, "smoothed image", err);
     if (!s) s = SDM_ALLOC(&spare, n, "smoothed image", err);
     if (!s) {
+        // smooth the image; NaN counts as outside
         const sdm_fit_appearance *a = &o->appearance;
         for (size_t i = 0; i < n; i++)
             packed[i] = isnan(t->values[i]) ? a->outside[0].mean : (double)t->values[i];
@@ -51,8 +53,8 @@ static sdm_status find_walls(const sdm_fit_target *t, const sdm_fit_opts *o, int
     return s;
 }
 
-sdm_status sdm_fit_leave_out_cavities(const sdm_fit_target *target, const sdm_fit_opts *opts,
-                                      float **values, size_t *count, sdm_error *err)
+sdm_status sdm_fit_mask_cavities(const sdm_fit_target *target, const sdm_fit_opts *opts,
+                                 float **values, size_t *count, sdm_error *err)
 {
     const size_t n = sdm_grid_count(&target->grid);
     const int n_threads = sdm_threads(opts->n_threads);
@@ -63,12 +65,14 @@ sdm_status sdm_fit_leave_out_cavities(const sdm_fit_target *target, const sdm_fi
     sdm_status s = sdm_fit_blur_check(&target->grid, "blur", opts->blur, opts->blur, err);
     if (!s) s = SDM_ALLOC(&distance, n, "distance to walls", err);
     if (!s) s = SDM_ALLOC(values, n, "image", err);
-    if (!s) s = find_walls(target, opts, n_threads, distance, err);
-    if (!s) s = sdm_fit_transform(&target->grid, n_threads, distance, err);
+    if (!s) s = walls_find(target, opts, n_threads, distance, err);
+    if (!s) s = sdm_fit_distance_transform(&target->grid, n_threads, distance, err);
     for (size_t i = 0; i < n && !s; i++)
-        distance[i] = (double)distance[i] >= square ? 0 : INFINITY; // centres of balls
-    if (!s) s = sdm_fit_transform(&target->grid, n_threads, distance, err);
+        // voxels where a ball can be centred
+        distance[i] = (double)distance[i] >= square ? 0 : INFINITY;
+    if (!s) s = sdm_fit_distance_transform(&target->grid, n_threads, distance, err);
     for (size_t i = 0; i < n && !s; i++) {
+        // the voxels that these balls cover
         const bool out = (double)distance[i] < square && !isnan(target->values[i]);
         (*values)[i] = out ? NAN : target->values[i];
         *count += out;

@@ -1,18 +1,24 @@
-/* Piecewise cubic polynomials on 4 x 4 x 4 voxels. */
+/* Interpolation by piecewise cubic polynomials of 4 x 4 x 4 voxels. */
 #include "interpolate.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "problem.h"
+#include "unknowns.h"
 
+/* The 4 voxels along each axis that contribute to a point, and their weights. */
 typedef struct taps {
-    size_t at[3][4]; // offsets of the voxels along each axis, in voxels of the packed array
-    double weight[3][4], slope[3][4]; // slope: by the index
-    double beyond[3], distance;       // way from the border of the grid to x, mm along its axes
+    /* offset of each voxel along each axis, in voxels of the packed array */
+    size_t at[3][4];
+    /* weight of each voxel, and its derivative by the voxel index */
+    double weight[3][4], slope[3][4];
+    /* mm: displacement from the border of the grid to the point along the grid's axes, and its
+     * length; 0 inside the grid */
+    double beyond[3], distance;
 } taps;
 
-// Keys' kernel with a = -1/2, for the part u of the way from the second to the third voxel
+// cubic convolution kernel with a = -1/2 (Keys 1981): weights w and derivatives d of 4 voxels at
+// the fraction u, 0 .. 1, between the second and the third
 static inline void keys(double u, double w[4], double d[4])
 {
     const double u2 = u * u, u3 = u2 * u;
@@ -22,7 +28,7 @@ static inline void keys(double u, double w[4], double d[4])
     w[3] = 0.5 * u3 - 0.5 * u2, d[3] = 1.5 * u2 - u;
 }
 
-// cubic B-splines there
+// the same for cubic B-splines
 static inline void spline(double u, double w[4], double d[4])
 {
     const double v = 1 - u, u2 = u * u, v2 = v * v;
@@ -32,9 +38,10 @@ static inline void spline(double u, double w[4], double d[4])
     w[3] = u2 * u / 6, d[3] = 0.5 * u2;
 }
 
-static void find(const fit_field *f, const double x[3], taps *t)
+static void taps_find(const fit_field *f, const double x[3], taps *t)
 {
     const sdm_grid *g = f->grid;
+    // point and voxels along each axis, clamped to the grid
     double index[3];
     sdm_grid_index(g, x, index);
     const size_t step[3] = {1, (size_t)g->n[0], (size_t)g->n[0] * (size_t)g->n[1]};
@@ -45,6 +52,7 @@ static void find(const fit_field *f, const double x[3], taps *t)
                                                                          : last;
         t->beyond[a] = (index[a] - c) * g->spacing[a];
         beyond2 += t->beyond[a] * t->beyond[a];
+        // weights of the four voxels
         int64_t first = (int64_t)c;
         if (first > g->n[a] - 2 && first > 0) first--;
         if (f->distance)
@@ -52,15 +60,16 @@ static void find(const fit_field *f, const double x[3], taps *t)
         else
             spline(c - (double)first, t->weight[a], t->slope[a]);
         for (int i = 0; i < 4; i++) {
+            // (offsets are clamped: the values of the border continue)
             const int64_t k = first - 1 + i;
             t->at[a][i] = step[a] * (size_t)(k < 0 ? 0 : k < g->n[a] ? k : g->n[a] - 1);
-            if (t->beyond[a] != 0) t->slope[a][i] = 0; // the border repeats
+            if (t->beyond[a] != 0) t->slope[a][i] = 0; // beyond the border the values are constant
         }
     }
     t->distance = sqrt(beyond2);
 }
 
-// the first field of the four voxels of a row, and how much of it counts
+// sum[4] += w * first field of the four voxels of a row
 static inline void add_row(const fit_field *f, const taps *t, const double *row, double w,
                            double sum[4])
 {
@@ -82,10 +91,10 @@ static inline const double *row_at(const fit_field *f, const taps *t, int k, int
     return f->packed + (t->at[2][k] + t->at[1][j]) * f->n_fields;
 }
 
-double sdm_fit_sample(const fit_field *f, const double x[3])
+double sdm_fit_interpolate(const fit_field *f, const double x[3])
 {
     taps t;
-    find(f, x, &t);
+    taps_find(f, x, &t);
     double sum[4] = {0};
     for (int k = 0; k < 4; k++)
         for (int j = 0; j < 4; j++)
@@ -93,7 +102,7 @@ double sdm_fit_sample(const fit_field *f, const double x[3])
     return f->distance ? dot(t.weight[0], sum) + t.distance : dot(t.weight[0], sum);
 }
 
-// the other fields: rest += w * what the weights make of the four voxels of a row
+// rest += w * interpolation of the other fields along a row
 static inline void add_rest(const fit_field *f, const taps *t, const double *row, double w,
                             double *rest)
 {
@@ -105,20 +114,22 @@ static inline void add_rest(const fit_field *f, const taps *t, const double *row
     for (size_t q = 1; q < n; q++) rest[q - 1] += (wa * a[q] + wb * b[q]) + (wc * c[q] + wd * d[q]);
 }
 
-double sdm_fit_sample_all(const fit_field *f, const double x[3], double gradient[3], double *rest)
+double sdm_fit_interpolate_all(const fit_field *f, const double x[3], double gradient[3],
+                               double *rest)
 {
     taps t;
-    find(f, x, &t);
+    taps_find(f, x, &t);
     double sum[4] = {0}, by_y[4] = {0}, by_z[4] = {0}, others[FIT_FIELDS_MAX] = {0};
     for (int k = 0; k < 4; k++)
         for (int j = 0; j < 4; j++) {
             const double *row = row_at(f, &t, k, j), w = t.weight[2][k] * t.weight[1][j];
-            add_row(f, &t, row, w, sum); // as sdm_fit_sample() does: the same bits
+            add_row(f, &t, row, w, sum); // as in sdm_fit_interpolate(), for the same bits
             add_row(f, &t, row, t.weight[2][k] * t.slope[1][j], by_y);
             add_row(f, &t, row, t.slope[2][k] * t.weight[1][j], by_z);
             add_rest(f, &t, row, w, others);
         }
     for (size_t q = 1; q < f->n_fields; q++) rest[q - 1] = others[q - 1];
+    // gradient along the axes of the grid, then in its frame
     double along[3] = {dot(t.slope[0], sum), dot(t.weight[0], by_y), dot(t.weight[0], by_z)};
     for (int a = 0; a < 3; a++) {
         along[a] /= f->grid->spacing[a];

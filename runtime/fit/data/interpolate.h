@@ -1,28 +1,31 @@
-/* Packed fields between the voxels of their grid. */
-#ifndef FIT_SAMPLE_H
-#define FIT_SAMPLE_H
+/* Interpolation of fields between the voxels of their grid. */
+#ifndef FIT_INTERPOLATE_H
+#define FIT_INTERPOLATE_H
 
 #include <stdbool.h>
 
 #include "sdm/grid.h"
 
-/* packed[voxels][n_fields] on a grid. distance: values, between the voxels by cubic convolution
-   (Keys 1981), which goes through them; beyond the grid the distance to its border is added to the
-   first field. Else coefficients of cubic B-splines, which have continuous second derivatives
-   (steps towards a maximum want a likelihood that is as smooth); beyond the grid the values are
-   those of the border. */
+/* n_fields fields on one grid, packed[voxels][n_fields]; the grid's voxels in the order z, y, x. */
 typedef struct fit_field {
     const sdm_grid *grid;
     const double *packed;
     size_t n_fields;
+    /* true: packed holds values, interpolated by cubic convolution (Keys 1981), which reproduces
+       them at the voxels. Beyond the grid the distance to its border is added to the first field.
+
+       false: packed holds coefficients of cubic B-splines, whose second derivatives are continuous;
+       Newton's method converges well only on a likelihood that is as smooth. Beyond the grid the
+       values of the border continue. */
     bool distance;
 } fit_field;
 
-/* First field at x (frame of the grid): continuous with its gradient. */
-double sdm_fit_sample(const fit_field *f, const double x[3]);
+/* First field at x (frame of the grid, mm). Continuous, and so is its gradient. [any thread] */
+double sdm_fit_interpolate(const fit_field *f, const double x[3]);
 
-/* The same with its gradient (frame of the grid, per mm), and the other fields: rest[n_fields - 1].
- */
-double sdm_fit_sample_all(const fit_field *f, const double x[3], double gradient[3], double *rest);
+/* The same, bit for bit, with gradient[3] of the first field (frame of the grid, per mm) and the
+ * values of the other fields, rest[n_fields - 1]. [any thread] */
+double sdm_fit_interpolate_all(const fit_field *f, const double x[3], double gradient[3],
+                               double *rest);
 
 #endif

@@ -1,11 +1,14 @@
-/* The share of the shape seen through a Gaussian point spread G of sd s is a = G * [distance < 0].
-   On the grid of the map it is made in three steps: an edge of sd s0, half a voxel, drawn by the
-   distance itself, the discrete Gaussian (Lindeberg 1990), which keeps its variance whatever the
-   grid and whose derivative by it is half the discrete Laplacian, and between the voxels cubic
-   B-splines, which spread by h^2 / 3 along an axis with voxels of h. The Gaussian has what is left,
-   s^2 - s0^2 - h^2 / 3, and where that is negative undoes as much of the splines. So the share has
-   continuous second derivatives, and without an inverse filter (Unser, Aldroubi and Eden 1993) it
-   is 0 or 1 a few voxels from the surface, and does not ring. */
+/* Maps of the shape and their fields.
+
+   The share at a voxel is a = G * [distance < 0], the inside convolved with a Gaussian point spread
+   G of sd s. It is computed in three steps. (1) At the voxels of the map, with spacing h, the
+   distance itself draws an edge of sd s0 = h / 2. (2) The discrete Gaussian (Lindeberg 1990)
+   smooths the edge: its variance is exact on every grid, and its derivative by the variance is half
+   the discrete Laplacian. (3) Between the voxels cubic B-splines interpolate, which adds h^2 / 3 of
+   variance along an axis. The discrete Gaussian therefore has the variance s^2 - s0^2 - h^2 / 3;
+   where that is negative, it sharpens. The share has continuous second derivatives. Its values are
+   used as the B-spline coefficients, without the inverse filter of interpolation (Unser, Aldroubi
+   and Eden 1993): so it is exactly 0 or 1 a few voxels from the surface and does not ring. */
 #include "map_fields.h"
 
 #include <math.h>
@@ -15,8 +18,9 @@
 #include "sdm/internal/clock.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/threads.h"
+#include "sdm/internal/vec3.h"
 
-static size_t fields_of(const fit_maps *m, bool derivatives)
+static size_t field_count(const fit_maps *m, bool derivatives)
 {
     return derivatives ? m->n_params + (m->share ? 2 : 1) : 1;
 }
@@ -39,10 +43,11 @@ sdm_status sdm_fit_maps_create(const sdm_fit_source *source, bool share, const s
         (void)sdm_instance_params(source->shape, &m->n_params);
     }
     m->n_voxels = sdm_grid_count(&m->grid);
-    m->least_blur = 0.5 * fmax(m->grid.spacing[0], fmax(m->grid.spacing[1], m->grid.spacing[2]));
+    m->min_blur = 0.5 * fmax(m->grid.spacing[0], fmax(m->grid.spacing[1], m->grid.spacing[2]));
+    // memory for map, derivatives and fields
     size_t jacobian, fields;
     sdm_status s = sdm_mul(m->n_voxels, m->n_params, &jacobian, err);
-    if (!s) s = sdm_mul(m->n_voxels, fields_of(m, true), &fields, err);
+    if (!s) s = sdm_mul(m->n_voxels, field_count(m, true), &fields, err);
     if (!s) s = SDM_ALLOC(&m->values, m->n_voxels, "map", err);
     if (!s) s = SDM_ALLOC(&m->jacobian, jacobian, "derivatives of the map", err);
     if (!s) s = SDM_ALLOC(&m->distance, m->n_voxels, "map", err);
@@ -62,14 +67,15 @@ void sdm_fit_maps_dispose(fit_maps *m)
     *m = (fit_maps){0};
 }
 
-static bool outside_of_network(const sdm_model_info *info, const double *params)
+static bool outside_network_range(const sdm_model_info *info, const double *params)
 {
     for (size_t k = 0; k < info->n_params; k++)
         if (!(params[k] >= info->params[k].min && params[k] <= info->params[k].max)) return true;
     return false;
 }
 
-static sdm_status make_exact(fit_maps *m, const double *params, bool derivatives, sdm_error *err)
+static sdm_status map_make_exact(fit_maps *m, const double *params, bool derivatives,
+                                 sdm_error *err)
 {
     const sdm_exact_opts o = {
         .n_threads = m->n_threads, .cancelled = m->cancelled, .user = m->user};
@@ -80,23 +86,24 @@ static sdm_status make_exact(fit_maps *m, const double *params, bool derivatives
     return sdm_exact_shape_map(shape, params, &o, &m->grid, m->values, NULL, err);
 }
 
-// always with derivatives: such maps change smoothly with the parameters
-static sdm_status make_by_network(fit_maps *m, const double *params, sdm_error *err)
+// always with derivatives: changes of the parameters then give smooth changes of the map
+static sdm_status map_make_network(fit_maps *m, const double *params, sdm_error *err)
 {
     const sdm_generate_opts o = {.policy = SDM_RANGE_REFUSE, .n_threads = m->n_threads};
     return sdm_generate_jacobian(m->source->model, params, &o, m->values, m->jacobian, NULL, err);
 }
 
-sdm_status sdm_fit_maps_at(fit_maps *m, const double *params, bool derivatives, sdm_error *err)
+sdm_status sdm_fit_maps_make(fit_maps *m, const double *params, bool derivatives, sdm_error *err)
 {
     if (m->cancelled && m->cancelled(m->user))
         return sdm_fail(err, SDM_E_CANCELLED, "fit stopped on request");
     const double from = sdm_clock();
+    // network or exact engine
     const bool outside = !m->exact && m->source->policy == SDM_RANGE_EXACT &&
-                         outside_of_network(sdm_model_get_info(m->source->model), params);
+                         outside_network_range(sdm_model_get_info(m->source->model), params);
     const bool exact = m->exact || outside;
     const sdm_status s =
-        exact ? make_exact(m, params, derivatives, err) : make_by_network(m, params, err);
+        exact ? map_make_exact(m, params, derivatives, err) : map_make_network(m, params, err);
     *(exact ? &m->n_exact : &m->n_network) += 1;
     *(exact ? &m->seconds_exact : &m->seconds_network) += sdm_clock() - from;
     m->n_outside += outside;
@@ -104,11 +111,11 @@ sdm_status sdm_fit_maps_at(fit_maps *m, const double *params, bool derivatives, 
     return s;
 }
 
-/* (1 + s0^2/2 Laplacian) f at voxel v = (i, j, k): f through a Gaussian of sd s0, to first order.
-   It makes the drawn edge that of the curved surface seen through s0, not of its tangent plane. The
-   border repeats. */
-static double smoothed(const sdm_grid *g, const float *f, size_t v, const int64_t index[3],
-                       double s0)
+/* (1 + s0^2/2 Laplacian) f at voxel v with this index[3]: f convolved with a Gaussian of sd s0
+ * (mm), to order s0^2. Applied to the distance, it makes the drawn edge that of the curved surface,
+ * not of its tangent plane, seen through s0. Values of the border continue beyond it. */
+static double voxel_smoothed(const sdm_grid *g, const float *f, size_t v, const int64_t index[3],
+                             double s0)
 {
     const size_t step[3] = {1, (size_t)g->n[0], (size_t)g->n[0] * (size_t)g->n[1]};
     double sum = (double)f[v];
@@ -121,30 +128,32 @@ static double smoothed(const sdm_grid *g, const float *f, size_t v, const int64_
     return sum;
 }
 
-// sd of a Gaussian beyond which nothing of it is left in a double
-#define FAR 8.0
+// in sd: beyond it the tail of a Gaussian is 0 in double precision
+#define GAUSSIAN_END 8.0
 
-// the edge of sd s0 and, where wanted, its derivatives, packed
-static void draw_row(const fit_maps *m, int64_t row)
+// share: an edge of sd s0 with, where wanted, its derivatives, into a row of `packed`
+static void share_row(const fit_maps *m, int64_t row)
 {
     const sdm_grid *g = &m->grid;
-    const double s0 = m->least_blur, scale = 0.39894228040143268 / s0; // 1 / (s0 sqrt(2 pi))
+    const double s0 = m->min_blur, scale = 0.39894228040143268 / s0; // 1 / (s0 sqrt(2 pi))
     int64_t index[3] = {0, row % g->n[1], row / g->n[1]};
     for (index[0] = 0; index[0] < g->n[0]; index[0]++) {
         const size_t v = (size_t)(row * g->n[0] + index[0]);
         double *f = m->packed + v * m->n_fields;
-        const double x = smoothed(g, m->values, v, index, s0) / s0;
-        f[0] = fabs(x) < FAR ? 0.5 * erfc(x * 0.70710678118654752) : x < 0;
+        const double x = voxel_smoothed(g, m->values, v, index, s0) / s0;
+        f[0] = fabs(x) < GAUSSIAN_END ? 0.5 * erfc(x * 0.70710678118654752) : x < 0;
         if (m->n_fields == 1) continue;
-        const double slope = fabs(x) < FAR ? -scale * exp(-0.5 * x * x) : 0;
+        const double slope = fabs(x) < GAUSSIAN_END ? -scale * exp(-0.5 * x * x) : 0;
         for (size_t k = 0; k < m->n_params; k++)
-            f[1 + k] =
-                slope == 0 ? 0 : slope * smoothed(g, m->jacobian + k * m->n_voxels, v, index, s0);
+            f[1 + k] = slope == 0
+                           ? 0
+                           : slope * voxel_smoothed(g, m->jacobian + k * m->n_voxels, v, index, s0);
         f[1 + m->n_params] = 0;
     }
 }
 
-static void pack_row(const fit_maps *m, int64_t row)
+// signed distance and its derivatives, into a row of `packed`
+static void distance_row(const fit_maps *m, int64_t row)
 {
     for (int64_t i = 0; i < m->grid.n[0]; i++) {
         const size_t v = (size_t)(row * m->grid.n[0] + i);
@@ -160,17 +169,65 @@ void sdm_fit_maps_pack(fit_maps *m, double blur, bool derivatives)
     const int64_t rows = m->grid.n[1] * m->grid.n[2];
     const int n_threads = sdm_threads(m->n_threads);
     (void)n_threads; // without OpenMP
-    m->n_fields = fields_of(m, derivatives);
+    m->n_fields = field_count(m, derivatives);
 #pragma omp parallel for schedule(static) num_threads(n_threads)
     for (int64_t row = 0; row < rows; row++) {
         if (m->share)
-            draw_row(m, row);
+            share_row(m, row);
         else
-            pack_row(m, row);
+            distance_row(m, row);
     }
-    const double drawn = m->share ? m->least_blur : 0,
+    // the blur that the drawn edge does not have yet; see the top of the file
+    const double drawn = m->share ? m->min_blur : 0,
                  variance = fmax(blur * blur - drawn * drawn, 0);
     sdm_fit_blur(&m->grid, m->n_fields, variance, m->share, n_threads, &m->packed, &m->spare);
     if (m->share && derivatives)
         sdm_fit_laplacian(&m->grid, m->n_fields, blur, n_threads, m->packed);
+}
+
+fit_field sdm_fit_maps_field(const fit_maps *maps)
+{
+    return (fit_field){.grid = &maps->grid,
+                       .packed = maps->packed,
+                       .n_fields = maps->n_fields,
+                       .distance = !maps->share};
+}
+
+static void voxel_centre(const sdm_grid *g, size_t voxel, double x[3])
+{
+    const size_t nx = (size_t)g->n[0], ny = (size_t)g->n[1];
+    const double index[3] = {(double)(voxel % nx), (double)(voxel / nx % ny),
+                             (double)(voxel / nx / ny)};
+    sdm_grid_world(g, index, x);
+}
+
+sdm_status sdm_fit_extent(const fit_maps *maps, fit_extent *out, sdm_error *err)
+{
+    double n = 0, sum[3] = {0, 0, 0}, x[3];
+    for (size_t v = 0; v < maps->n_voxels; v++) {
+        if (!(maps->distance[v] < 0)) continue;
+        voxel_centre(&maps->grid, v, x);
+        n++;
+        for (int k = 0; k < 3; k++) sum[k] += x[k];
+    }
+    if (!(n > 0))
+        return sdm_fail(
+            err, SDM_E_QUALITY,
+            "no voxel of the map lies inside the shape: its grid is too coarse or lies elsewhere");
+    *out = (fit_extent){.volume = n * maps->grid.spacing[0] * maps->grid.spacing[1] *
+                                  maps->grid.spacing[2]};
+    for (int k = 0; k < 3; k++) out->centre[k] = sum[k] / n;
+    for (size_t v = 0; v < maps->n_voxels; v++) {
+        if (!(maps->distance[v] < 0)) continue;
+        voxel_centre(&maps->grid, v, x);
+        out->reach = fmax(out->reach, sqrt(v3_dist2(x, out->centre)));
+    }
+    return SDM_OK;
+}
+
+double sdm_fit_inradius(const fit_maps *maps)
+{
+    double least = 0;
+    for (size_t v = 0; v < maps->n_voxels; v++) least = fmin(least, maps->distance[v]);
+    return -least;
 }

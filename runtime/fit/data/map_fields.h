@@ -1,41 +1,69 @@
-/* Maps of the shape with their derivatives, as fields that are sampled: the signed distance, or the
- * share of the shape in a voxel. */
-#ifndef FIT_MAPS_H
-#define FIT_MAPS_H
+/* Maps of the shape in its own frame, and the fields made from them: the signed distance or the
+ * share, with their derivatives. */
+#ifndef FIT_MAP_FIELDS_H
+#define FIT_MAP_FIELDS_H
 
-#include "problem.h"
+#include "interpolate.h"
+#include "unknowns.h"
 
 typedef struct fit_maps {
     const sdm_fit_source *source;
+    /* of the maps, in the shape's frame */
     sdm_grid grid;
     size_t n_voxels, n_params;
-    size_t n_fields; // of packed
-    bool share; // the field is the share of the shape seen through a point spread; else the signed
-                // distance
-    bool exact; // ask the exact engine whatever the parameters are
-    double least_blur; // mm, what the spacing of the grid can carry
+    /* of packed; 1 without derivatives */
+    size_t n_fields;
+    /* true: the field is the share; false: the signed distance */
+    bool share;
+    /* true: always use the exact engine; false: the network, where the policy allows it */
+    bool exact;
+    /* mm: narrowest point spread that the spacing of the grid can represent, half a voxel */
+    double min_blur;
+    /* as in sdm_fit_opts */
     int n_threads;
     bool (*cancelled)(void *user);
     void *user;
-    float *values, *jacobian; // [n_voxels], [n_params][n_voxels]: as maps are made
-    double *distance;         // [n_voxels]: values
-    // [n_voxels][n_fields]: the field, its derivatives by the parameters and (share) by the blur;
-    // see fit_field
+    /* latest map (mm) [n_voxels], and its derivatives by the parameters [n_params][n_voxels] */
+    float *values, *jacobian;
+    /* [n_voxels] the latest map in double precision, mm */
+    double *distance;
+    /* [n_voxels][n_fields] the field, its derivatives by the parameters and (share) by the blur, as
+     * fit_field.packed; `spare` is scratch memory of the same size */
     double *packed, *spare;
+    /* maps made so far: by network, by the exact engine, and those of the latter that were made
+     * because parameters lay outside the network's range */
     size_t n_network, n_exact, n_outside;
+    /* wall clock of making them */
     double seconds_network, seconds_exact;
 } fit_maps;
 
-/* Zero-initialise before. */
+/* Allocates for the grid of the source; on error *out is empty. */
 sdm_status sdm_fit_maps_create(const sdm_fit_source *source, bool share, const sdm_fit_opts *opts,
                                fit_maps *out, sdm_error *err);
 void sdm_fit_maps_dispose(fit_maps *m);
 
-/* Distance and, where `derivatives`, jacobian at params. */
-sdm_status sdm_fit_maps_at(fit_maps *m, const double *params, bool derivatives, sdm_error *err);
+/* Makes values, distance and (derivatives) jacobian at params[n_params]; `packed` stays out of
+ * date. SDM_E_CANCELLED and errors of the engines. */
+sdm_status sdm_fit_maps_make(fit_maps *m, const double *params, bool derivatives, sdm_error *err);
 
-/* The fields of what sdm_fit_maps_at() made, without `derivatives` the first alone, seen through a
-   Gaussian of sd blur (mm): for shares at least least_blur, for distances 0 or more. */
+/* Fills `packed` from the latest map, without derivatives its first field alone, seen through a
+   Gaussian of sd blur (mm). Shares: blur >= min_blur. Distances: blur >= 0. Derivatives need a map
+   made with them. */
 void sdm_fit_maps_pack(fit_maps *m, double blur, bool derivatives);
+
+/* View of `packed` for interpolation. */
+fit_field sdm_fit_maps_field(const fit_maps *maps);
+
+/* Where the shape lies on its map: centroid (mm), largest distance from it to a voxel inside (mm),
+ * volume (mm^3). */
+typedef struct fit_extent {
+    double centre[3], reach, volume;
+} fit_extent;
+
+/* Of the voxels of maps->distance that are inside. SDM_E_QUALITY: none is. */
+sdm_status sdm_fit_extent(const fit_maps *maps, fit_extent *out, sdm_error *err);
+
+/* Radius (mm) of the largest ball inside the shape, centred on a voxel of the map. */
+double sdm_fit_inradius(const fit_maps *maps);
 
 #endif

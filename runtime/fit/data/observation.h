@@ -1,78 +1,96 @@
-/* How likely a value is, given the field at its place: the observation models of images, label maps
- * and points. */
-#ifndef FIT_LAWS_H
-#define FIT_LAWS_H
+/* Observation models: how likely the value of a sample is, given the field there. For images, label
+ * maps and points. */
+#ifndef FIT_OBSERVATION_H
+#define FIT_OBSERVATION_H
 
-#include "problem.h"
+#include "unknowns.h"
 
-/* Channels of a response: the field, then the means of the tissues (inside, outside) where they are
- * unknowns. */
+/* Channels: what the likelihood of one sample depends on. Channel 0 is the field; partial volume
+ * adds the means of the tissues, inside first. */
 enum { FIT_CHANNELS = 1 + FIT_TISSUES_MAX };
 
-/* Log-likelihood of one value with derivatives by its channels. */
-typedef struct fit_response {
+/* Log-likelihood of one sample with its derivatives by the channels. */
+typedef struct fit_likelihood {
     double log_likelihood;
+    /* [n_channels] gradient */
     double score[FIT_CHANNELS];
-    /* Negative second derivatives [n_channels][n_channels]. complete: as if it were known which
-       tissues the value comes from, never negative; observed: less what is not known (Louis 1982).
-     */
+    /* [n_channels][n_channels] information. complete: expected, as if the tissue of the sample were
+     * known, positive semidefinite; observed: the complete one less what is missing (Louis 1982) */
     double complete[FIT_CHANNELS * FIT_CHANNELS], observed[FIT_CHANNELS * FIT_CHANNELS];
-    /* score = residual * root about, with a residual of mean 0 and variance 1. */
+    /* score ~ residual * root[n_channels], with a residual of mean 0 and variance 1 */
     double residual, root[FIT_CHANNELS];
-} fit_response;
+} fit_likelihood;
 
-/* Values of the constants of a law pair, made once for a look. */
+/* Constants of a pair of tissues, which share a voxel: tissue `in` inside, tissue `out` outside
+ * (indices into fit_observation.tissue). */
 typedef struct fit_pair {
-    size_t in, out;    // tissues, counted inside first
-    double log_weight; // of the tissue inside
+    size_t in, out;
+    /* of the inside tissue */
+    double log_weight;
+    /* degrees of freedom (0: Gaussian), log of the normalising constant of the density, and
+     * expected information of a unit scale */
     double dof, constant, information;
 } fit_pair;
 
-typedef struct fit_laws {
+typedef struct fit_observation {
     sdm_fit_kind kind;
     sdm_fit_model model;
+    /* mm, mm, degrees of freedom of points */
     double l_ref, point_sd, point_dof;
+    /* inside tissues, all tissues, channels in use, pairs in use */
     size_t n_in, n_tissues, n_channels, n_pairs;
-    sdm_fit_law tissue[FIT_TISSUES_MAX];  // inside first; weights sum to 1 on either side
-    double log_constant[FIT_TISSUES_MAX]; // of a law with sd 1
-    float log_outside[SDM_FIT_LAWS];      // log weights of the tissues outside
+    /* [n_tissues] inside first; weights sum to 1 inside, and to 1 outside */
+    sdm_fit_law tissue[FIT_TISSUES_MAX];
+    /* [n_tissues] log of the normalising constant of the density with sd 1 */
+    double log_constant[FIT_TISSUES_MAX];
+    /* [n_tissues - n_in] log weights of the outside tissues */
+    float log_outside[SDM_FIT_LAWS];
+    /* [n_pairs] partial volume only */
     fit_pair pair[SDM_FIT_LAWS * SDM_FIT_LAWS];
-} fit_laws;
+} fit_observation;
 
-void sdm_fit_laws_prepare(const sdm_fit_opts *opts, sdm_fit_kind kind, const fit_state *state,
-                          fit_laws *out);
+/* Observation model of a kind of target at the appearance, l_ref and point_sd of state. */
+void sdm_fit_observation_prepare(const sdm_fit_opts *opts, sdm_fit_kind kind,
+                                 const fit_state *state, fit_observation *out);
 
-/* All of *out where `derivatives`, the log-likelihood alone otherwise. place[n_tissues - n_in]: log
-   weights of the tissues outside at the place of the value (shares of a partial volume alone);
-   NULL: those of the laws. */
-void sdm_fit_respond(const fit_laws *l, double value, const float *place, double field,
-                     bool derivatives, fit_response *out);
+/* Likelihood of one sample: all members of *out with derivatives, else log_likelihood alone.
+   log_weight[n_tissues - n_in]: log weights of the outside tissues at the sample (partial volume
+   only); NULL: those of the model. [any thread, as all functions below] */
+void sdm_fit_likelihood(const fit_observation *obs, double value, const float *log_weight,
+                        double field, bool derivatives, fit_likelihood *out);
 
-/* False where the field is so far from the surface that no derivative by it counts. */
-bool sdm_fit_near(const fit_laws *l, double field);
+/* Whether a field value lies in the band: near enough to the surface that derivatives by it are not
+ * negligible. */
+bool sdm_fit_in_band(const fit_observation *obs, double field);
 
-/* log density of a tissue at a value, weight left out. */
-double sdm_fit_log_density(const fit_laws *l, size_t tissue, double value);
+/* Log density of a tissue at a value, without the weight of the tissue. */
+double sdm_fit_log_density(const fit_observation *obs, size_t tissue, double value);
 
-/* Sums over values for the re-estimation of weights, sd and (labels) means. */
+/* Sums over samples for the re-estimation of the tissues, each [n_tissues]. r is the residual about
+   the mean; w the probability of the tissue times its robust weight (1 for Gaussians). */
 typedef struct fit_moments {
-    double share[FIT_TISSUES_MAX]; // weight of the tissue
-    double n[FIT_TISSUES_MAX];     // divisor of the square
+    /* probable amount of the tissue, in samples: its weight, unnormalised */
+    double share[FIT_TISSUES_MAX];
+    /* divisor of `square` for the variance, in samples */
+    double n[FIT_TISSUES_MAX];
+    /* sums of w and of w r, for the means of labels */
     double count[FIT_TISSUES_MAX], first[FIT_TISSUES_MAX];
+    /* sum of squared residuals, robustly weighted */
     double square[FIT_TISSUES_MAX];
 } fit_moments;
 
-void sdm_fit_moments_add(const fit_laws *l, double value, const float *place, double field,
-                         fit_moments *m);
+/* Adds one sample. */
+void sdm_fit_moments_add(const fit_observation *obs, double value, const float *log_weight,
+                         double field, fit_moments *m);
 
-/* part[n_tissues - n_in]: how much of a voxel each tissue outside probably has; together what is
- * not the shape. */
-void sdm_fit_outside(const fit_laws *l, double value, const float *place, double field,
-                     double *part);
+/* Sets weights, sd and (labels) means of *appearance from the moments. Tissues with kept[n_tissues]
+   take their weights alone. min_sd: lower bound of sd, so that no density collapses to a point. */
+void sdm_fit_moments_apply(const fit_observation *obs, const fit_moments *m, const bool *kept,
+                           double min_sd, sdm_fit_appearance *appearance);
 
-/* Writes what the sums say to look, of tissues that are kept their weights alone; least_sd keeps
- * laws from collapsing. */
-void sdm_fit_moments_apply(const fit_laws *l, const fit_moments *m, const bool *kept,
-                           double least_sd, sdm_fit_appearance *look);
+/* share[n_tissues - n_in]: probable part of the voxel that each outside tissue fills; they sum to 1
+ * less the share of the shape. Partial volume only. */
+void sdm_fit_outside_shares(const fit_observation *obs, double value, const float *log_weight,
+                            double field, double *share);
 
 #endif

@@ -1,75 +1,77 @@
-/* The voxels or points that are looked at, and the field of the shape there. */
-#ifndef FIT_SITES_H
-#define FIT_SITES_H
+/* Samples: the voxels or points that a fit uses, and the field of the shape there. */
+#ifndef FIT_SAMPLES_H
+#define FIT_SAMPLES_H
 
-#include "interpolate.h"
 #include "map_fields.h"
 #include "observation.h"
 
-/* Fixed number of parts in which sites are worked through: sums do not depend on the number of
- * threads. */
+/* Sums over samples are made in this number of slices, added in order: their bits do not depend on
+ * the number of threads. */
 #define FIT_SLICES 64u
 
-typedef struct fit_sites {
+/* Zero-initialise. */
+typedef struct fit_samples {
+    /* samples; memory for samples; voxels of the region that were skipped because they are NaN */
     size_t n, capacity, n_nan;
-    double *world; // [n][3] mm
-    float *value;  // [n]
-    size_t *voxel; // [n] place in the image
-    double *field; // [n]
-    float *place;  // [n][n_outside] log weights of the tissues outside, see sdm_fit_places_update()
-    size_t n_outside, place_capacity; // n_outside 0: the same weights everywhere
-    size_t *slot; // [n] place in columns, or SIZE_MAX: the field has no derivative that counts
-    size_t n_near, near_capacity, n_columns;
-    float *columns; // [n_near][n_columns]: derivatives of the field by parameters, rotation,
-                    // translation, blur
-} fit_sites;
+    /* [n][3] position in the world, mm */
+    double *world;
+    /* [n] value of the image; 0 for points */
+    float *value;
+    /* [n] index of the voxel in the image, or of the point */
+    size_t *voxel;
+    /* [n] field of the shape at the sample */
+    double *field;
+    /* [n][n_outside] tissue field: log weights of the outside tissues at the sample; n_outside = 0:
+     * the weights are the same everywhere */
+    float *log_weight;
+    size_t n_outside, log_weight_capacity;
+    /* [n] row of `jacobian`, or SIZE_MAX outside the band */
+    size_t *row;
+    /* rows in use (samples of the band), memory for rows, columns */
+    size_t n_band, band_capacity, n_columns;
+    /* [n_band][n_columns] derivatives of the field by parameters, rotation, translation, blur */
+    float *jacobian;
+} fit_samples;
 
-/* Where the shape is on its map: middle, farthest inside voxel from there (mm), volume (mm^3). */
-typedef struct fit_extent {
-    double centre[3], reach, volume;
-} fit_extent;
-
-/* Of the distance that maps holds. SDM_E_QUALITY: nothing is inside. */
-sdm_status sdm_fit_extent(const fit_maps *maps, fit_extent *out, sdm_error *err);
-
-/* Radius of the largest ball in the shape whose centre is a voxel of the map, mm. */
-double sdm_fit_inradius(const fit_maps *maps);
-
-/* A region of the world. */
+/* Region of the world to take samples from: a ball, cut by the box of the options. */
 typedef struct fit_region {
-    double centre[3], radius; // a ball
-    const fit_maps *follow;   // not NULL: also where the distance of the shape is at most margin
+    /* mm */
+    double centre[3], radius;
+    /* not NULL: only where the signed distance of these maps, at the pose of state, is at most
+     * margin (mm) */
+    const fit_maps *follow;
     const fit_state *state;
     double margin;
-    size_t most; // voxels wanted at most: beyond them the choice stops, with one more. 0: all
+    /* > 0: stop when the number of samples exceeds this; 0: no limit */
+    size_t max_samples;
 } fit_region;
 
-/* Chooses the voxels of a region (every `stride`-th along each axis), or all points. *changed: they
-   are not those that were there before. SDM_E_FORMAT: an infinite value. */
-sdm_status sdm_fit_sites_choose(const sdm_fit_target *target, const sdm_fit_opts *opts,
-                                const fit_region *region, size_t stride, fit_sites *sites,
-                                bool *changed, sdm_error *err);
-void sdm_fit_sites_dispose(fit_sites *s);
+/* Takes the voxels of a region, every stride-th along each axis, or all points of a point target.
+   *changed: they differ from the earlier ones; the tissue field is then removed. SDM_E_FORMAT: an
+   infinite value. */
+sdm_status sdm_fit_samples_choose(const sdm_fit_target *target, const sdm_fit_opts *opts,
+                                  const fit_region *region, size_t stride, fit_samples *samples,
+                                  bool *changed, sdm_error *err);
+void sdm_fit_samples_dispose(fit_samples *s);
 
-/* Of site i, for sdm_fit_respond(). */
-static inline const float *fit_place(const fit_sites *s, size_t i)
+/* Log weights of the outside tissues at sample i for sdm_fit_likelihood(); NULL: no tissue field.
+ */
+static inline const float *fit_sample_weights(const fit_samples *s, size_t i)
 {
-    return s->n_outside ? s->place + i * s->n_outside : NULL;
+    return s->n_outside ? s->log_weight + i * s->n_outside : NULL;
 }
 
-/* What sdm_fit_maps_pack() made. */
-fit_field sdm_fit_field(const fit_maps *maps);
-
-/* The first field at x of the world, with the shape at the pose of s. */
+/* First field at x of the world (mm), with the shape at the pose of s. */
 double sdm_fit_field_at(const fit_field *f, const fit_state *s, const double x[3]);
 
-/* Field and columns at every site from the packed fields. */
-sdm_status sdm_fit_sites_sample(fit_sites *s, const fit_maps *maps, const fit_laws *laws,
-                                const fit_state *state, sdm_error *err);
+/* Computes field, row and jacobian of every sample from maps->packed, which must hold derivatives.
+ */
+sdm_status sdm_fit_samples_evaluate(fit_samples *s, const fit_maps *maps,
+                                    const fit_observation *obs, const fit_state *state,
+                                    sdm_error *err);
 
-/* y = R^T (x - t). */
+/* World to shape's frame, y = R^T (x - t), and back, x = R y + t; mm. */
 void sdm_fit_to_shape(const fit_state *s, const double x[3], double y[3]);
-/* x = R y + t. */
 void sdm_fit_to_world(const fit_state *s, const double y[3], double x[3]);
 
 #endif

@@ -1,20 +1,28 @@
-/* Acceleration of fixed-point iterations. */
-#ifndef FIT_MIXING_H
-#define FIT_MIXING_H
+/* Anderson acceleration of fixed-point iterations x -> g(x). */
+#ifndef FIT_ANDERSON_H
+#define FIT_ANDERSON_H
 
-#include "fit/data/problem.h"
+#include "fit/data/unknowns.h"
 
-enum { FIT_MIXING_DEPTH = 5, FIT_MIXING_MAX = FIT_UNKNOWNS_MAX + 3 * FIT_TISSUES_MAX };
+enum {
+    /* earlier pairs that are combined at most */
+    FIT_ANDERSON_DEPTH = 5,
+    /* components of a point at most: all unknowns, and three numbers for each tissue */
+    FIT_ANDERSON_MAX = FIT_UNKNOWNS_MAX + 3 * FIT_TISSUES_MAX
+};
 
-/* The last points and their images; zero-initialise, and again where the map has changed. */
-typedef struct fit_mixing {
-    size_t count; // of pairs held, the newest last
-    double point[FIT_MIXING_DEPTH + 1][FIT_MIXING_MAX], image[FIT_MIXING_DEPTH + 1][FIT_MIXING_MAX];
-} fit_mixing;
+/* The last `count` points x and their images g(x), the newest last. Zero-initialise; set count = 0
+   where g has changed. */
+typedef struct fit_anderson {
+    size_t count;
+    double point[FIT_ANDERSON_DEPTH + 1][FIT_ANDERSON_MAX];
+    double image[FIT_ANDERSON_DEPTH + 1][FIT_ANDERSON_MAX];
+} fit_anderson;
 
-/* x[n]: the point the map was asked at; y[n]: its image, replaced by a guess of the fixed point
-   from up to `depth` pairs before that differs from it by `most` in no component. n <=
-   FIT_MIXING_MAX, depth <= FIT_MIXING_DEPTH. */
-void sdm_fit_mix(fit_mixing *m, size_t depth, size_t n, const double *x, double *y, double most);
+/* Stores the pair x[n], y[n] = g(x) and replaces y by an estimate of the fixed point from it and up
+   to `depth` earlier pairs. The whole change of y is scaled down such that no component changes by
+   more than max_change. n <= FIT_ANDERSON_MAX, depth <= FIT_ANDERSON_DEPTH. */
+void sdm_fit_anderson_mix(fit_anderson *m, size_t depth, size_t n, const double *x, double *y,
+                          double max_change);
 
 #endif

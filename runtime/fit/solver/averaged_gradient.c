@@ -1,19 +1,24 @@
-/* See creases.h. */
+/* Averaged gradient: difference quotients of the log-likelihood over a fixed motion of the surface.
+ */
 #include "averaged_gradient.h"
 
 #include <math.h>
 
-// so far the surface moves on the way (rms, voxels of the map): over many kinks, and little beside
-// what an image tells
-#define MOTION 0.03
-// share of a parameter's range at most
-#define WAY_MOST 0.05
+#include "objective.h"
 
-void sdm_fit_ways(const fit_problem *p, double *way)
+// rms motion of the surface over the half width, in voxels of the map: it crosses many kinks, but
+// is small compared to what an image resolves
+#define MOTION 0.03
+// half width at most, as a share of the parameter's range
+#define WIDTH_MAX 0.05
+
+void sdm_fit_averaging_widths(const fit_problem *p, double *half_width)
 {
     const fit_maps *m = &p->maps;
     const double *h = m->grid.spacing, step = fmax(h[0], fmax(h[1], h[2]));
     for (size_t k = 0; k < p->n_params; k++) {
+        // rms motion of the surface per unit of the parameter, over voxels within one voxel of the
+        // surface
         double sum = 0, n = 0;
         for (size_t v = 0; v < m->n_voxels; v++) {
             if (fabs(m->distance[v]) > step) continue;
@@ -22,24 +27,25 @@ void sdm_fit_ways(const fit_problem *p, double *way)
             n++;
         }
         const double range = p->high[k] - p->low[k];
-        way[k] = fmin(n > 0 && sum > 0 ? MOTION * step / sqrt(sum / n) : range, WAY_MOST * range);
+        half_width[k] =
+            fmin(n > 0 && sum > 0 ? MOTION * step / sqrt(sum / n) : range, WIDTH_MAX * range);
     }
 }
 
-sdm_status sdm_fit_average_gradient(fit_problem *p, const double *way, sdm_error *err)
+sdm_status sdm_fit_average_gradient(fit_problem *p, const double *half_width, sdm_error *err)
 {
     double params[FIT_PARAMS_MAX];
     for (size_t k = 0; k < p->n_params; k++) params[k] = p->state.params[k];
     for (size_t k = 0; k < p->n_params; k++) {
-        const double here = params[k], low = fmax(here - way[k], p->low[k]),
-                     high = fmin(here + way[k], p->high[k]);
+        const double here = params[k], low = fmax(here - half_width[k], p->low[k]),
+                     high = fmin(here + half_width[k], p->high[k]);
         double before, after;
         params[k] = low;
-        sdm_status s = sdm_fit_value(p, params, &before, err);
+        sdm_status s = sdm_fit_log_likelihood(p, params, &before, err);
         params[k] = high;
-        if (!s) s = sdm_fit_value(p, params, &after, err);
+        if (!s) s = sdm_fit_log_likelihood(p, params, &after, err);
         if (s) return s;
-        p->sums.gradient[k] = (after - before) / (high - low);
+        p->information.gradient[k] = (after - before) / (high - low);
         params[k] = here;
     }
     return SDM_OK;

@@ -1,20 +1,24 @@
-/* The end of a fit with exact maps.
-   A distance has creases where two places of a surface are equally near. As a parameter changes
-   they sweep over the voxels, and the log-likelihood has a kink at each: derivatives jump, and
-   steps by them go to and fro. Its difference over a way is continuous all the same, and the
-   derivative's mean over that way (Ermoliev, Norkin and Wets 1995). By the pose and the tissues
-   there are no kinks. */
-#ifndef FIT_CREASES_H
-#define FIT_CREASES_H
+/* Averaged gradient for fits with exact maps.
 
-#include "newton.h"
+   A signed distance has creases: surfaces where the nearest point of the shape jumps. As a
+   parameter changes, creases sweep over the samples, and the log-likelihood has a kink each time.
+   Its gradient jumps there, and steps along it oscillate. The mean of the derivative over an
+   interval is a difference quotient of the log-likelihood, which is continuous (Ermoliev, Norkin
+   and Wets 1995). Pose and tissues cause no such kinks: their derivatives are not averaged. */
+#ifndef FIT_AVERAGED_GRADIENT_H
+#define FIT_AVERAGED_GRADIENT_H
 
-/* way[n_params]: half of what derivatives are averaged over, from the maps of problem->state: a
-   small motion of the surface, which neither noise nor tissues change. */
-void sdm_fit_ways(const fit_problem *p, double *way);
+#include "problem.h"
 
-/* The derivatives of problem->sums by the parameters replaced by their means over +-way, or as much
- * of it as lies in the bounds. */
-sdm_status sdm_fit_average_gradient(fit_problem *p, const double *way, sdm_error *err);
+/* half_width[n_params], in the units of the parameters: half of the interval of each. The surface
+   moves by a small, fixed part of a map voxel over it (root mean square over voxels near the
+   surface), at most a small share of the parameter's range. Depends on problem->maps alone, with
+   derivatives: neither noise nor tissues change it. */
+void sdm_fit_averaging_widths(const fit_problem *p, double *half_width);
+
+/* Replaces the derivatives by the parameters in problem->information.gradient by their means over
+   +-half_width, cut off at the bounds of the parameters. Takes two maps for each parameter, and
+   leaves problem->maps out of date. */
+sdm_status sdm_fit_average_gradient(fit_problem *p, const double *half_width, sdm_error *err);
 
 #endif

@@ -1,4 +1,4 @@
-/* Sums over slices of sites, added in the order of the slices. */
+/* Sums over the samples, in slices that threads share and that are added in order. */
 #include "information.h"
 
 #include <float.h>
@@ -8,36 +8,37 @@
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
 
-// neighbouring voxels share the rounding of a voxel of the map, and their scores are alike
+// relative rounding of a field value; the factor 8 allows for neighbouring samples that share the
+// rounding of one map voxel and have similar scores
 #define ROUNDING (8 * (double)FLT_EPSILON)
 
-// numbers of one slice: log-likelihood, its squared derivatives by the relative rounding of fields,
-// gradient, two matrices
+// numbers of a slice: log-likelihood; sum of squared derivatives of it by relative errors of the
+// field; gradient; complete and observed information
 static size_t part_size(size_t n) { return 2 + n + 2 * n * n; }
 
-sdm_status sdm_fit_sums_create(size_t n_unknowns, fit_sums *out, sdm_error *err)
+sdm_status sdm_fit_information_create(size_t n_unknowns, fit_information *out, sdm_error *err)
 {
     const size_t n = n_unknowns;
-    *out = (fit_sums){.n_unknowns = n};
-    sdm_status s = SDM_ALLOC(&out->gradient, n, "sums of the fit", err);
-    if (!s) s = SDM_ALLOC(&out->complete, n * n, "sums of the fit", err);
-    if (!s) s = SDM_ALLOC(&out->observed, n * n, "sums of the fit", err);
-    if (!s) s = SDM_ALLOC(&out->parts, FIT_SLICES * part_size(n), "sums of the fit", err);
-    if (s) sdm_fit_sums_dispose(out);
+    *out = (fit_information){.n_unknowns = n};
+    sdm_status s = SDM_ALLOC(&out->gradient, n, "normal equations", err);
+    if (!s) s = SDM_ALLOC(&out->complete, n * n, "normal equations", err);
+    if (!s) s = SDM_ALLOC(&out->observed, n * n, "normal equations", err);
+    if (!s) s = SDM_ALLOC(&out->parts, FIT_SLICES * part_size(n), "normal equations", err);
+    if (s) sdm_fit_information_dispose(out);
     return s;
 }
 
-void sdm_fit_sums_dispose(fit_sums *s)
+void sdm_fit_information_dispose(fit_information *s)
 {
     sdm_free(s->gradient);
     sdm_free(s->complete);
     sdm_free(s->observed);
     sdm_free(s->parts);
-    *s = (fit_sums){0};
+    *s = (fit_information){0};
 }
 
-// field of one site: the block of the columns, and their products with the means
-static void add_columns(const fit_response *r, const float *column, size_t n_columns,
+// one sample of the band: column by column, and column by tissue mean, upper triangles
+static void add_columns(const fit_likelihood *r, const float *column, size_t n_columns,
                         size_t n_channels, size_t n, double *gradient, double *complete,
                         double *observed)
 {
@@ -55,43 +56,46 @@ static void add_columns(const fit_response *r, const float *column, size_t n_col
     }
 }
 
-// upper triangles
-static void add_slice(const fit_sites *s, const fit_laws *l, size_t from, size_t to, size_t n,
-                      double *part)
+// all samples of a slice; upper triangles
+static void add_slice(const fit_samples *s, const fit_observation *obs, size_t from, size_t to,
+                      size_t n, double *part)
 {
     double *gradient = part + 2, *complete = gradient + n, *observed = complete + n * n;
     const size_t nc = s->n_columns;
     memset(part, 0, part_size(n) * sizeof *part);
     for (size_t i = from; i < to; i++) {
-        fit_response r;
-        const bool near = s->slot[i] != SIZE_MAX;
-        sdm_fit_respond(l, (double)s->value[i], fit_place(s, i), s->field[i],
-                        near || l->n_channels > 1, &r);
+        fit_likelihood r;
+        const bool near = s->row[i] != SIZE_MAX;
+        sdm_fit_likelihood(obs, (double)s->value[i], fit_sample_weights(s, i), s->field[i],
+                           near || obs->n_channels > 1, &r);
         part[0] += r.log_likelihood;
         if (near) part[1] += r.score[0] * r.score[0] * s->field[i] * s->field[i];
         if (near)
-            add_columns(&r, s->columns + s->slot[i] * nc, nc, l->n_channels, n, gradient, complete,
-                        observed);
-        for (size_t a = 1; a < l->n_channels; a++) {
+            add_columns(&r, s->jacobian + s->row[i] * nc, nc, obs->n_channels, n, gradient,
+                        complete, observed);
+        // tissue mean by tissue mean
+        for (size_t a = 1; a < obs->n_channels; a++) {
             gradient[nc + a - 1] += r.score[a];
-            for (size_t b = a; b < l->n_channels; b++) {
-                complete[(nc + a - 1) * n + nc + b - 1] += r.complete[a * l->n_channels + b];
-                observed[(nc + a - 1) * n + nc + b - 1] += r.observed[a * l->n_channels + b];
+            for (size_t b = a; b < obs->n_channels; b++) {
+                complete[(nc + a - 1) * n + nc + b - 1] += r.complete[a * obs->n_channels + b];
+                observed[(nc + a - 1) * n + nc + b - 1] += r.observed[a * obs->n_channels + b];
             }
         }
     }
 }
 
-void sdm_fit_sums_fill(fit_sums *s, const fit_sites *sites, const fit_laws *laws, int n_threads)
+void sdm_fit_information_compute(fit_information *s, const fit_samples *samples,
+                                 const fit_observation *obs, int n_threads)
 {
     const size_t n = s->n_unknowns, size = part_size(n);
     n_threads = sdm_threads(n_threads);
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
-        add_slice(sites, laws, sites->n * slice / FIT_SLICES, sites->n * (slice + 1) / FIT_SLICES,
-                  n, s->parts + slice * size);
+        add_slice(samples, obs, samples->n * slice / FIT_SLICES,
+                  samples->n * (slice + 1) / FIT_SLICES, n, s->parts + slice * size);
     for (size_t slice = 1; slice < FIT_SLICES; slice++)
         for (size_t i = 0; i < size; i++) s->parts[i] += s->parts[slice * size + i];
+    // the total, with full matrices
     s->log_likelihood = s->parts[0];
     s->rounding = ROUNDING * sqrt(s->parts[1]);
     memcpy(s->gradient, s->parts + 2, n * sizeof *s->gradient);
@@ -103,37 +107,39 @@ void sdm_fit_sums_fill(fit_sums *s, const fit_sites *sites, const fit_laws *laws
         }
 }
 
-double sdm_fit_sums_value(const fit_sites *sites, const fit_maps *maps, const fit_laws *laws,
-                          const fit_state *state)
+double sdm_fit_samples_log_likelihood(const fit_samples *samples, const fit_maps *maps,
+                                      const fit_observation *obs, const fit_state *state)
 {
-    const fit_field f = sdm_fit_field(maps);
+    const fit_field f = sdm_fit_maps_field(maps);
     double part[FIT_SLICES] = {0}, sum = 0;
     const int n_threads = sdm_threads(maps->n_threads);
     (void)n_threads; // without OpenMP
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
-        for (size_t i = sites->n * slice / FIT_SLICES; i < sites->n * (slice + 1) / FIT_SLICES;
+        for (size_t i = samples->n * slice / FIT_SLICES; i < samples->n * (slice + 1) / FIT_SLICES;
              i++) {
-            const double field = sdm_fit_field_at(&f, state, sites->world + 3 * i);
-            fit_response r;
-            sdm_fit_respond(laws, (double)sites->value[i], fit_place(sites, i), field, false, &r);
+            const double field = sdm_fit_field_at(&f, state, samples->world + 3 * i);
+            fit_likelihood r;
+            sdm_fit_likelihood(obs, (double)samples->value[i], fit_sample_weights(samples, i),
+                               field, false, &r);
             part[slice] += r.log_likelihood;
         }
     for (size_t slice = 0; slice < FIT_SLICES; slice++) sum += part[slice];
     return sum;
 }
 
-void sdm_fit_sums_moments(const fit_sites *sites, const fit_laws *laws, int n_threads,
-                          fit_moments *out)
+void sdm_fit_samples_moments(const fit_samples *samples, const fit_observation *obs, int n_threads,
+                             fit_moments *out)
 {
     fit_moments part[FIT_SLICES];
     memset(part, 0, sizeof part);
     n_threads = sdm_threads(n_threads);
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
-        for (size_t i = sites->n * slice / FIT_SLICES; i < sites->n * (slice + 1) / FIT_SLICES; i++)
-            sdm_fit_moments_add(laws, (double)sites->value[i], fit_place(sites, i), sites->field[i],
-                                &part[slice]);
+        for (size_t i = samples->n * slice / FIT_SLICES; i < samples->n * (slice + 1) / FIT_SLICES;
+             i++)
+            sdm_fit_moments_add(obs, (double)samples->value[i], fit_sample_weights(samples, i),
+                                samples->field[i], &part[slice]);
     *out = part[0];
     for (size_t slice = 1; slice < FIT_SLICES; slice++)
         for (size_t i = 0; i < FIT_TISSUES_MAX; i++) {

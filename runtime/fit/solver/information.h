@@ -1,31 +1,40 @@
-/* Log-likelihood of all sites with its derivatives by all unknowns. */
-#ifndef FIT_SUMS_H
-#define FIT_SUMS_H
+/* Sums over all samples: log-likelihood, gradient, information matrices, moments of the tissues. */
+#ifndef FIT_INFORMATION_H
+#define FIT_INFORMATION_H
 
 #include "fit/data/samples.h"
 
-typedef struct fit_sums {
-    size_t n_unknowns; // columns of the field, then means of the tissues
+/* Log-likelihood of all samples and its derivatives by the n_unknowns unknowns: the columns, then
+   the means of the tissues. */
+typedef struct fit_information {
+    size_t n_unknowns;
     double log_likelihood;
-    double rounding;             // what the rounding of the maps, which are floats, makes of it
-    double *gradient;            // [n_unknowns]
-    double *complete, *observed; // [n_unknowns][n_unknowns], see fit_response
-    double *parts;               // working memory
-} fit_sums;
+    /* error of log_likelihood caused by the single precision of the maps */
+    double rounding;
+    /* [n_unknowns] */
+    double *gradient;
+    /* [n_unknowns][n_unknowns] symmetric, see fit_likelihood */
+    double *complete, *observed;
+    /* scratch memory: sums of each slice of the samples */
+    double *parts;
+} fit_information;
 
-sdm_status sdm_fit_sums_create(size_t n_unknowns, fit_sums *out, sdm_error *err);
-void sdm_fit_sums_dispose(fit_sums *s);
+/* Allocates; on error *out is empty. */
+sdm_status sdm_fit_information_create(size_t n_unknowns, fit_information *out, sdm_error *err);
+void sdm_fit_information_dispose(fit_information *s);
 
-/* From what sdm_fit_sites_sample() left; the same bits for any number of threads. */
-void sdm_fit_sums_fill(fit_sums *s, const fit_sites *sites, const fit_laws *laws, int n_threads);
+/* Fills *s after sdm_fit_samples_evaluate(). The same bits for any number of threads (0: the OpenMP
+   default), as the functions below. */
+void sdm_fit_information_compute(fit_information *s, const fit_samples *samples,
+                                 const fit_observation *obs, int n_threads);
 
-/* The log-likelihood alone, at the state whose first field maps hold; what sites hold stays. The
- * same bits for any number of threads. */
-double sdm_fit_sums_value(const fit_sites *sites, const fit_maps *maps, const fit_laws *laws,
-                          const fit_state *state);
+/* The log-likelihood alone, of the packed maps at the pose of state. Does not touch what the
+   samples store of the field. */
+double sdm_fit_samples_log_likelihood(const fit_samples *samples, const fit_maps *maps,
+                                      const fit_observation *obs, const fit_state *state);
 
-/* The laws' moments over all sites. */
-void sdm_fit_sums_moments(const fit_sites *sites, const fit_laws *laws, int n_threads,
-                          fit_moments *out);
+/* Moments of the tissues over all samples, see sdm_fit_moments_add(). */
+void sdm_fit_samples_moments(const fit_samples *samples, const fit_observation *obs, int n_threads,
+                             fit_moments *out);
 
 #endif

@@ -1,6 +1,6 @@
-/* Damped Newton steps (Levenberg 1944, Marquardt 1963) with the information of the observed values
-   (Louis 1982) where it is positive definite, of the complete ones elsewhere: the step is then that
-   of expectation-maximisation. */
+/* Newton's method with damping (Levenberg 1944, Marquardt 1963). It uses the observed information
+ * where that is positive definite, else the complete one, which makes the step that of
+ * expectation-maximisation (Louis 1982). */
 #include "newton.h"
 
 #include <math.h>
@@ -8,76 +8,36 @@
 
 #include "anderson.h"
 #include "averaged_gradient.h"
+#include "objective.h"
+#include "prior.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/rotation.h"
+#include "solve.h"
 #include "tissues.h"
 
-// largest step of one iteration: share of a range, rad, share of the shape's reach
-#define STEP_MOST 0.25
-// a gain in log-likelihood, of values that are independent, that means nothing (a few hundredths of
-// a standard deviation): steps that promise less, or less than what rounding makes, are taken
-// without asking whether they gain
-#define GAIN_LEAST 1e-3
-#define DAMPING_MOST 1e8
-// standard deviation of the logistic law of scale 1, pi / sqrt(3)
-#define LOGISTIC_SD 1.8137993642342178
-// with more of it the size of a step says nothing of how far the maximum is
-#define DAMPING_TRUE 0.1
-// steps below which they are accelerated, and the most an acceleration changes an unknown, in its
-// unit
-#define STEP_RUSHED 0.01
-#define RUSH_MOST 0.1
-// where averaged derivatives are steep, the steps that are taken go to nothing, plain ones only to
-// so many times the end
-#define STEEP_MOST 10.0
-// and with averaged derivatives, in plain steps
-#define RUSH_AVERAGED 4.0
+// largest step of one iteration: share of a parameter's range, rad, share of the shape's reach
+#define STEP_MAX 0.25
+// Negligible gain in log-likelihood of independent samples (a step of a few hundredths of a sd);
+// multiplied by the noise factor for correlated ones. A step whose predicted gain is below this, or
+// below rounding errors, is "flat": it is accepted unless the objective clearly drops.
+#define GAIN_MIN 1e-3
+// the search for a damped step gives up above this factor
+#define DAMPING_MAX 1e8
+// above this damping the size of a step does not tell the distance to the maximum
+#define DAMPING_SMALL 0.1
+// Acceleration starts when steps are smaller than this; it changes no unknown by more than
+// ACCELERATION_MAX units (see unknown_unit()).
+#define ACCELERATED_BELOW 0.01
+#define ACCELERATION_MAX 0.1
+// With averaged gradients near a kink, accelerated steps converge but plain Newton steps stall at a
+// few times eps: accept up to STEEP_MAX * eps.
+#define STEEP_MAX 10.0
+// averaged gradients: an acceleration changes no unknown by more than this factor times the largest
+// component of the plain step
+#define ACCELERATION_FACTOR 4.0
 
-// the logistic law of labels is seen through its own spread: its edge would lie inside of a curved
-// surface
-double sdm_fit_field_blur(const fit_problem *p)
-{
-    const bool labels = !p->maps.share && p->target->kind != SDM_FIT_POINTS;
-    return labels ? p->state.l_ref * LOGISTIC_SD : p->maps.share ? p->state.blur : 0;
-}
-
-sdm_status sdm_fit_value(fit_problem *p, const double *params, double *log_likelihood,
-                         sdm_error *err)
-{
-    p->maps_at[0] = p->packed_blur = NAN;
-    const sdm_status s = sdm_fit_maps_at(&p->maps, params, false, err);
-    if (s) return s;
-    sdm_fit_maps_pack(&p->maps, sdm_fit_field_blur(p), false);
-    *log_likelihood = sdm_fit_sums_value(&p->sites, &p->maps, &p->laws, &p->state);
-    return SDM_OK;
-}
-
-sdm_status sdm_fit_look(fit_problem *p, sdm_error *err)
-{
-    const fit_state *s = &p->state;
-    sdm_status status = SDM_OK;
-    bool same = true;
-    for (size_t k = 0; k < p->n_params; k++) same = same && p->maps_at[k] == s->params[k];
-    if (!same) {
-        p->packed_blur = p->maps_at[0] = NAN;
-        status = sdm_fit_maps_at(&p->maps, s->params, true, err);
-        if (!status) memcpy(p->maps_at, s->params, p->n_params * sizeof *s->params);
-    } else if (p->maps.cancelled && p->maps.cancelled(p->maps.user)) {
-        status = sdm_fail(err, SDM_E_CANCELLED, "fit stopped on request");
-    }
-    if (status) return status;
-    const double blur = sdm_fit_field_blur(p);
-    if (!(p->packed_blur == blur)) {
-        sdm_fit_maps_pack(&p->maps, blur, true);
-        p->packed_blur = blur;
-    }
-    sdm_fit_laws_prepare(p->opts, p->target->kind, s, &p->laws);
-    status = sdm_fit_sites_sample(&p->sites, &p->maps, &p->laws, s, err);
-    if (!status) sdm_fit_sums_fill(&p->sums, &p->sites, &p->laws, p->opts->n_threads);
-    return status;
-}
-
-void sdm_fit_move(const fit_problem *p, const fit_state *from, const double *step, fit_state *to)
+void sdm_fit_state_move(const fit_problem *p, const fit_state *from, const double *step,
+                        fit_state *to)
 {
     const size_t n = p->n_params;
     *to = *from;
@@ -89,36 +49,38 @@ void sdm_fit_move(const fit_problem *p, const fit_state *from, const double *ste
     sdm_rotation_product(r, from->rotation, to->rotation);
     for (size_t k = 0; k < 3; k++) to->translation[k] += step[fit_at_translation(n) + k];
     to->blur += step[fit_at_blur(n)];
-    for (size_t i = 0; fit_columns(n) + i < p->sums.n_unknowns; i++) {
-        sdm_fit_law *t =
-            i < to->look.n_inside ? &to->look.inside[i] : &to->look.outside[i - to->look.n_inside];
+    for (size_t i = 0; fit_columns(n) + i < p->information.n_unknowns; i++) {
+        sdm_fit_law *t = i < to->appearance.n_inside
+                             ? &to->appearance.inside[i]
+                             : &to->appearance.outside[i - to->appearance.n_inside];
         t->mean += step[fit_columns(n) + i];
     }
 }
 
-static void set_limits(const fit_problem *p, const fit_run *run, fit_limits *l)
+// limits of the next step: what is kept, bounds, and largest steps
+static void limits_set(const fit_problem *p, const fit_newton_opts *opts, fit_limits *l)
 {
     const size_t n = p->n_params;
     const fit_state *s = &p->state;
-    for (size_t i = 0; i < p->sums.n_unknowns; i++) {
-        l->least[i] = -INFINITY, l->most[i] = INFINITY;
-        l->kept[i] = i < n       ? run->keep_params
-                     : i < n + 6 ? run->keep_pose
-                     : i > n + 6 ? run->keep_look || fit_mean_stays(p, i)
+    for (size_t i = 0; i < p->information.n_unknowns; i++) {
+        l->min[i] = -INFINITY, l->max[i] = INFINITY;
+        l->kept[i] = i < n       ? opts->keep_params
+                     : i < n + 6 ? opts->keep_pose
+                     : i > n + 6 ? opts->keep_appearance || fit_mean_is_kept(p, i)
                                  : false;
     }
     for (size_t k = 0; k < n; k++) {
-        const double most = STEP_MOST * (p->high[k] - p->low[k]);
-        l->least[k] = fmax(p->low[k] - s->params[k], -most);
-        l->most[k] = fmin(p->high[k] - s->params[k], most);
+        const double most = STEP_MAX * (p->high[k] - p->low[k]);
+        l->min[k] = fmax(p->low[k] - s->params[k], -most);
+        l->max[k] = fmin(p->high[k] - s->params[k], most);
     }
     const size_t blur = fit_at_blur(n);
-    l->kept[blur] = run->keep_blur || !p->maps.share;
-    l->least[blur] = fmax(p->maps.least_blur - s->blur, -0.5 * s->blur);
-    l->most[blur] = fmin(0.5 * s->blur, fmax(p->extent.reach - s->blur, 0));
+    l->kept[blur] = opts->keep_blur || !p->maps.share;
+    l->min[blur] = fmax(p->maps.min_blur - s->blur, -0.5 * s->blur);
+    l->max[blur] = fmin(0.5 * s->blur, fmax(p->extent.reach - s->blur, 0));
 }
 
-// the largest of what sdm_fit_opts.eps counts
+// largest component of a step, in the units of sdm_fit_opts.eps
 static double step_size(const fit_problem *p, const double *step)
 {
     double most = 0;
@@ -131,80 +93,87 @@ static double step_size(const fit_problem *p, const double *step)
     return most;
 }
 
-static bool find_step(const fit_problem *p, const fit_run *run, double damping, bool observed,
-                      double *step, double *work)
+// step[n] that maximises the quadratic model within the limits; observed: which information. work:
+// 3 n n. False: not positive definite
+static bool step_find(const fit_problem *p, const fit_newton_opts *opts, double damping,
+                      bool observed, double *step, double *work)
 {
-    const size_t n = p->sums.n_unknowns;
+    const size_t n = p->information.n_unknowns;
     double gradient[FIT_UNKNOWNS_MAX], *a = work;
-    memcpy(gradient, p->sums.gradient, n * sizeof *gradient);
-    memcpy(a, observed ? p->sums.observed : p->sums.complete, n * n * sizeof *a);
+    memcpy(gradient, p->information.gradient, n * sizeof *gradient);
+    memcpy(a, observed ? p->information.observed : p->information.complete, n * n * sizeof *a);
     (void)sdm_fit_prior(p, &p->state, gradient, a, NULL);
-    sdm_fit_add_ignorance(p, a);
+    sdm_fit_add_weak_prior(p, a);
     fit_limits limits;
-    set_limits(p, run, &limits);
-    if (!sdm_fit_step(n, a, gradient, damping, &limits, step, work + n * n)) return false;
+    limits_set(p, opts, &limits);
+    if (!sdm_fit_bounded_step(n, a, gradient, damping, &limits, step, work + n * n)) return false;
     const double size = step_size(p, step);
-    const double factor = size > STEP_MOST ? STEP_MOST / size : 1;
+    const double factor = size > STEP_MAX ? STEP_MAX / size : 1;
     for (size_t i = 0; i < n; i++) step[i] *= factor;
     return true;
 }
 
+// gain of a step to first order
 static double expected_gain(const fit_problem *p, const double *step)
 {
     double gradient[FIT_UNKNOWNS_MAX], sum = 0;
-    memcpy(gradient, p->sums.gradient, p->sums.n_unknowns * sizeof *gradient);
+    memcpy(gradient, p->information.gradient, p->information.n_unknowns * sizeof *gradient);
     (void)sdm_fit_prior(p, &p->state, gradient, NULL, NULL);
-    for (size_t i = 0; i < p->sums.n_unknowns; i++) sum += gradient[i] * step[i];
+    for (size_t i = 0; i < p->information.n_unknowns; i++) sum += gradient[i] * step[i];
     return sum;
 }
 
-static void swap_sums(fit_problem *p)
+// information of state and trial change places
+static void information_swap(fit_problem *p)
 {
-    const fit_sums kept = p->sums;
-    p->sums = p->trial;
+    const fit_information kept = p->information;
+    p->information = p->trial;
     p->trial = kept;
 }
 
-/* Where the steps of an iteration stand. */
-typedef struct fit_pace {
-    double damping;
-    int flat; // steps in a row whose gain was too small to tell
-} fit_pace;
+/* Damping of the steps. */
+typedef struct fit_damping {
+    /* the diagonal of the information is multiplied by 1 + factor */
+    double factor;
+    /* flat steps in a row, see GAIN_MIN */
+    int flat;
+} fit_damping;
 
-// moves by a step; *gained is false where that does not gain, and the state is as before but for
-// its maps
-static sdm_status try_step(fit_problem *p, const double *step, fit_pace *pace, bool *gained,
+// Moves by a step and evaluates. *gained = false: the objective dropped; state and information are
+// restored, but maps and samples stay those of the trial.
+static sdm_status step_try(fit_problem *p, const double *step, fit_damping *d, bool *gained,
                            sdm_error *err)
 {
-    const double before = p->sums.log_likelihood + sdm_fit_prior(p, &p->state, NULL, NULL, NULL);
+    const double before = sdm_fit_objective(p);
     const double expected = expected_gain(p, step);
     const fit_state from = p->state;
-    sdm_fit_move(p, &from, step, &p->state);
-    swap_sums(p);
-    const sdm_status s = sdm_fit_look(p, err);
+    sdm_fit_state_move(p, &from, step, &p->state);
+    information_swap(p);
+    const sdm_status s = sdm_fit_evaluate(p, err);
     if (s) return s;
-    const double after = p->sums.log_likelihood + sdm_fit_prior(p, &p->state, NULL, NULL, NULL);
-    const double least = fmax(p->sums.rounding, GAIN_LEAST * p->noise_factor);
+    const double after = sdm_fit_objective(p);
+    const double least = fmax(p->information.rounding, GAIN_MIN * p->noise_factor);
     const bool flat = fabs(expected) < least;
     *gained = after > before || (flat && after > before - 2 * least);
-    pace->flat = flat ? pace->flat + *gained : 0;
+    d->flat = flat ? d->flat + *gained : 0;
     if (*gained) return SDM_OK;
     p->state = from;
-    swap_sums(p);
+    information_swap(p);
     return SDM_OK;
 }
 
-/* One step that gains; *taken is false where none does. */
-static sdm_status one_step(fit_problem *p, const fit_run *run, fit_pace *pace, double *step,
-                           double *work, bool *taken, sdm_error *err)
+/* Increases the damping until a step gains; then reduces it for the next one. *taken = false: no
+ * damping helps; the state is unchanged and evaluated. */
+static sdm_status damped_step(fit_problem *p, const fit_newton_opts *opts, fit_damping *d,
+                              double *step, double *work, bool *taken, sdm_error *err)
 {
     bool observed = true;
     *taken = false;
-    for (double *damping = &pace->damping; *damping <= DAMPING_MOST;
+    for (double *damping = &d->factor; *damping <= DAMPING_MAX;
          *damping = fmax(10 * *damping, 1e-3)) {
-        if (observed) observed = find_step(p, run, *damping, true, step, work);
-        if (!observed && !find_step(p, run, *damping, false, step, work)) continue;
-        const sdm_status s = try_step(p, step, pace, taken, err);
+        if (observed) observed = step_find(p, opts, *damping, true, step, work);
+        if (!observed && !step_find(p, opts, *damping, false, step, work)) continue;
+        const sdm_status s = step_try(p, step, d, taken, err);
         if (s) return s;
         if (*taken) {
             *damping = *damping > 1e-6 ? *damping / 10 : 0;
@@ -212,22 +181,28 @@ static sdm_status one_step(fit_problem *p, const fit_run *run, fit_pace *pace, d
         }
         observed = false;
     }
-    return sdm_fit_look(p, err); // maps and samples of the state that is kept
+    // restore maps and samples
+    return sdm_fit_evaluate(p, err);
 }
 
-/* Steps near the maximum: what is left out of the information, and the tissues, which wait for the
-   shape, make them converge linearly, and slowly where tissues overlap. They are accelerated
-   together. */
-typedef struct fit_rush {
-    fit_mixing mixing;
-    size_t n_look;
-    double place[FIT_UNKNOWNS_MAX]; // the way so far, in units
-    double from[FIT_LOOK_MAX];      // numbers of the tissues before they were estimated
-    double to[FIT_MIXING_MAX];      // where an accelerated step leads, tissues last
-} fit_rush;
+/* Anderson acceleration of the steps near the maximum. Plain steps converge only linearly, because
+ * the information is approximate and tissues are re-estimated in turn with the shape; slowly where
+ * tissues overlap. Unknowns and appearance are accelerated together as one vector. */
+typedef struct fit_acceleration {
+    fit_anderson anderson;
+    /* numbers of the appearance in the vector; 0: it is kept */
+    size_t n_appearance;
+    /* sum of all steps, in the units of unknown_unit() */
+    double position[FIT_UNKNOWNS_MAX];
+    /* appearance before its latest re-estimation */
+    double from[FIT_APPEARANCE_MAX];
+    /* end of the accelerated step: unknowns, then appearance */
+    double to[FIT_ANDERSON_MAX];
+} fit_acceleration;
 
-// what unknowns are measured in
-static double unit_of(const fit_problem *p, size_t i)
+// unit of an unknown in the accelerated vector: range, 1 rad, reach of the shape, contrast of the
+// image
+static double unknown_unit(const fit_problem *p, size_t i)
 {
     const size_t n = p->n_params;
     const sdm_fit_appearance *a = &p->opts->appearance;
@@ -237,77 +212,89 @@ static double unit_of(const fit_problem *p, size_t i)
     return fabs(a->inside[0].mean - a->outside[0].mean);
 }
 
-// replaces a plain step by an accelerated one, within the limits
-static void accelerate(const fit_problem *p, const fit_run *run, fit_rush *r, double *step)
+// replaces a plain step by the accelerated one, clamped to the limits
+static void step_accelerate(const fit_problem *p, const fit_newton_opts *opts, fit_acceleration *r,
+                            double *step)
 {
-    const size_t n = p->sums.n_unknowns;
-    double at[FIT_MIXING_MAX];
+    const size_t n = p->information.n_unknowns;
+    double at[FIT_ANDERSON_MAX];
     for (size_t i = 0; i < n; i++) {
-        at[i] = r->place[i];
-        r->to[i] = at[i] + step[i] / unit_of(p, i);
+        at[i] = r->position[i];
+        r->to[i] = at[i] + step[i] / unknown_unit(p, i);
     }
-    for (size_t i = 0; i < r->n_look; i++) at[n + i] = r->from[i];
-    (void)sdm_fit_look_numbers(p, r->to + n);
+    for (size_t i = 0; i < r->n_appearance; i++) at[n + i] = r->from[i];
+    (void)sdm_fit_appearance_pack(p, r->to + n);
     double largest = 0;
-    for (size_t i = 0; i < n + r->n_look; i++) largest = fmax(largest, fabs(r->to[i] - at[i]));
-    if (run->averaged) // their slope jumps: the last step alone says something, and not for long
-        sdm_fit_mix(&r->mixing, 1, n + r->n_look, at, r->to,
-                    fmin(RUSH_MOST, RUSH_AVERAGED * largest));
+    for (size_t i = 0; i < n + r->n_appearance; i++)
+        largest = fmax(largest, fabs(r->to[i] - at[i]));
+    // averaged: the function jumps from step to step, so only the last pair is used, and the change
+    // is limited
+    if (opts->averaged)
+        sdm_fit_anderson_mix(&r->anderson, 1, n + r->n_appearance, at, r->to,
+                             fmin(ACCELERATION_MAX, ACCELERATION_FACTOR * largest));
     else
-        sdm_fit_mix(&r->mixing, FIT_MIXING_DEPTH, n + r->n_look, at, r->to, RUSH_MOST);
+        sdm_fit_anderson_mix(&r->anderson, FIT_ANDERSON_DEPTH, n + r->n_appearance, at, r->to,
+                             ACCELERATION_MAX);
     fit_limits limits;
-    set_limits(p, run, &limits);
+    limits_set(p, opts, &limits);
     for (size_t i = 0; i < n; i++)
-        step[i] = limits.kept[i] ? 0
-                                 : fmin(fmax((r->to[i] - at[i]) * unit_of(p, i), limits.least[i]),
-                                        limits.most[i]);
+        step[i] =
+            limits.kept[i]
+                ? 0
+                : fmin(fmax((r->to[i] - at[i]) * unknown_unit(p, i), limits.min[i]), limits.max[i]);
 }
 
-// what a step that was taken means for the next acceleration
-static void rushed(fit_problem *p, const fit_run *run, fit_rush *r, const double *step)
+// after an accelerated step: advances the position and accepts the accelerated appearance
+static void acceleration_advance(fit_problem *p, const fit_newton_opts *opts, fit_acceleration *r,
+                                 const double *step)
 {
-    for (size_t i = 0; i < p->sums.n_unknowns; i++) r->place[i] += step[i] / unit_of(p, i);
-    if (!run->keep_look) sdm_fit_look_set(p, r->to + p->sums.n_unknowns);
+    for (size_t i = 0; i < p->information.n_unknowns; i++)
+        r->position[i] += step[i] / unknown_unit(p, i);
+    if (!opts->keep_appearance) sdm_fit_appearance_unpack(p, r->to + p->information.n_unknowns);
 }
 
-/* An accelerated step; *size: that of the plain one, how far the maximum is. *taken is false where
- * it does not gain. */
-static sdm_status rush(fit_problem *p, const fit_run *run, fit_rush *r, fit_pace *pace,
-                       double *step, double *work, double *size, bool *taken, sdm_error *err)
+/* One accelerated step. *size: of the plain step, an estimate of the distance to the maximum.
+ * *taken = false: no plain step, or the objective dropped. */
+static sdm_status accelerated_step(fit_problem *p, const fit_newton_opts *opts, fit_acceleration *r,
+                                   fit_damping *d, double *step, double *work, double *size,
+                                   bool *taken, sdm_error *err)
 {
     *taken = false;
-    if (!find_step(p, run, 0, true, step, work)) return SDM_OK;
+    if (!step_find(p, opts, 0, true, step, work)) return SDM_OK;
     *size = step_size(p, step);
-    accelerate(p, run, r, step);
-    const sdm_status s = try_step(p, step, pace, taken, err);
-    if (!s && *taken) rushed(p, run, r, step);
+    step_accelerate(p, opts, r, step);
+    const sdm_status s = step_try(p, step, d, taken, err);
+    if (!s && *taken) acceleration_advance(p, opts, r, step);
     return s;
 }
 
-/* The same by averaged derivatives. Whether it gains is not asked: it may go beyond the kink that
- * is the maximum. */
-static sdm_status average_step(fit_problem *p, const fit_run *run, fit_rush *r, double *step,
-                               double *work, double *size, bool *taken, sdm_error *err)
+/* One accelerated step with the averaged gradient. The objective is not tested: the step may cross
+ * the kink that is the maximum. */
+static sdm_status averaged_step(fit_problem *p, const fit_newton_opts *opts, fit_acceleration *r,
+                                double *step, double *work, double *size, bool *taken,
+                                sdm_error *err)
 {
-    sdm_status s = sdm_fit_average_gradient(p, run->way, err);
+    sdm_status s = sdm_fit_average_gradient(p, opts->half_width, err);
     if (s) return s;
-    *taken = find_step(p, run, 0, true, step, work) || find_step(p, run, 0, false, step, work);
+    *taken = step_find(p, opts, 0, true, step, work) || step_find(p, opts, 0, false, step, work);
     if (!*taken) return SDM_OK;
     *size = step_size(p, step);
-    accelerate(p, run, r, step);
+    step_accelerate(p, opts, r, step);
     const fit_state from = p->state;
-    sdm_fit_move(p, &from, step, &p->state);
-    s = sdm_fit_look(p, err);
-    if (!s) rushed(p, run, r, step);
+    sdm_fit_state_move(p, &from, step, &p->state);
+    s = sdm_fit_evaluate(p, err);
+    if (!s) acceleration_advance(p, opts, r, step);
     return s;
 }
 
-static sdm_status record(fit_problem *p, const fit_run *run, double step, sdm_error *err)
+// reports an iteration and, except in the search, stores its objective
+static sdm_status iteration_record(fit_problem *p, const fit_newton_opts *opts, double step,
+                                   sdm_error *err)
 {
-    const double objective = p->sums.log_likelihood + sdm_fit_prior(p, &p->state, NULL, NULL, NULL);
+    const double objective = sdm_fit_objective(p);
     p->n_steps++;
     if (p->opts->progress) {
-        sdm_fit_progress g = {.phase = run->phase,
+        sdm_fit_progress g = {.phase = opts->phase,
                               .iteration = p->n_steps,
                               .objective = objective,
                               .step = step,
@@ -316,7 +303,7 @@ static sdm_status record(fit_problem *p, const fit_run *run, double step, sdm_er
         memcpy(g.pose.translation, p->state.translation, sizeof g.pose.translation);
         p->opts->progress(p->opts->user, &g);
     }
-    if (run->phase == SDM_FIT_SEARCH) return SDM_OK;
+    if (opts->phase == SDM_FIT_SEARCH) return SDM_OK;
     if (p->n_iterations == p->objective_capacity) {
         const size_t now = 2 * p->objective_capacity + 16;
         const sdm_status s = sdm_grow((void **)&p->objective, p->objective_capacity, now,
@@ -328,49 +315,55 @@ static sdm_status record(fit_problem *p, const fit_run *run, double step, sdm_er
     return SDM_OK;
 }
 
-sdm_status sdm_fit_iterate(fit_problem *p, const fit_run *run, fit_ended *out, sdm_error *err)
+sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newton_end *out,
+                          sdm_error *err)
 {
-    const size_t n = p->sums.n_unknowns;
+    const size_t n = p->information.n_unknowns;
     double step[FIT_UNKNOWNS_MAX], *work = NULL;
-    fit_rush quick = {0};
-    fit_pace pace = {.damping = run->phase == SDM_FIT_SEARCH ? 1e-2 : 1e-4};
-    double way_before = INFINITY;
-    *out = (fit_ended){.step = INFINITY};
+    fit_acceleration acceleration = {0};
+    fit_damping damping = {.factor = opts->phase == SDM_FIT_SEARCH ? 1e-2 : 1e-4};
+    double taken_before = INFINITY;
+    *out = (fit_newton_end){.step = INFINITY};
     sdm_status s = SDM_ALLOC(&work, 3 * n * n, "matrices of the fit", err);
-    if (!s) s = sdm_fit_look(p, err);
-    for (size_t i = 0; i < run->max_iterations && !s && !out->converged; i++) {
-        quick.n_look = run->keep_look ? 0 : sdm_fit_look_numbers(p, quick.from);
-        if (!run->keep_look) s = sdm_fit_look_update(p, err);
+    if (!s) s = sdm_fit_evaluate(p, err);
+    for (size_t i = 0; i < opts->max_iterations && !s && !out->converged; i++) {
+        // tissues
+        acceleration.n_appearance =
+            opts->keep_appearance ? 0 : sdm_fit_appearance_pack(p, acceleration.from);
+        if (!opts->keep_appearance) s = sdm_fit_appearance_update(p, err);
         if (s) break;
+        // unknowns: an accelerated step near the maximum, a damped one otherwise
         bool taken = false;
         double size = INFINITY;
-        if (run->averaged)
-            s = average_step(p, run, &quick, step, work, &size, &taken, err);
-        else if (out->step <= STEP_RUSHED)
-            s = rush(p, run, &quick, &pace, step, work, &size, &taken, err);
-        if (!s && !taken && !run->averaged) {
-            quick.mixing.count = 0;
-            s = one_step(p, run, &pace, step, work, &taken, err);
-            // with much damping the size of a step says nothing of how far the maximum is
-            if (taken && (pace.damping <= DAMPING_TRUE || !isfinite(size)))
+        if (opts->averaged)
+            s = averaged_step(p, opts, &acceleration, step, work, &size, &taken, err);
+        else if (out->step <= ACCELERATED_BELOW)
+            s = accelerated_step(p, opts, &acceleration, &damping, step, work, &size, &taken, err);
+        if (!s && !taken && !opts->averaged) {
+            acceleration.anderson.count = 0;
+            s = damped_step(p, opts, &damping, step, work, &taken, err);
+            // with much damping the size of a step does not tell the distance to the maximum
+            if (taken && (damping.factor <= DAMPING_SMALL || !isfinite(size)))
                 size = step_size(p, step);
         }
         if (s) break;
         if (!taken) {
-            // nowhere to go: a maximum to rounding, or derivatives that do not fit
-            out->converged = out->step <= 1e3 * run->eps;
+            // no step gains: the maximum up to rounding, or derivatives that do not match the
+            // objective
+            out->converged = out->step <= 1e3 * opts->eps;
             break;
         }
-        const double way = step_size(p, step);
-        const bool steep =
-            run->averaged && size <= STEEP_MOST * run->eps && fmax(way, way_before) <= run->eps;
-        way_before = way;
-        out->step = steep ? way : size;
+        // converged?
+        const double taken_size = step_size(p, step);
+        const bool steep = opts->averaged && size <= STEEP_MAX * opts->eps &&
+                           fmax(taken_size, taken_before) <= opts->eps;
+        taken_before = taken_size;
+        out->step = steep ? taken_size : size;
         out->converged =
-            steep || (size <= run->eps && (run->averaged || pace.damping <= DAMPING_TRUE));
-        out->rough = !out->converged && run->flat_most > 0 && pace.flat >= run->flat_most;
-        out->converged = out->converged || out->rough;
-        s = record(p, run, out->step, err);
+            steep || (size <= opts->eps && (opts->averaged || damping.factor <= DAMPING_SMALL));
+        out->flat = !out->converged && opts->max_flat > 0 && damping.flat >= opts->max_flat;
+        out->converged = out->converged || out->flat;
+        s = iteration_record(p, opts, out->step, err);
     }
     sdm_free(work);
     return s;

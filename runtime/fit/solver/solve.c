@@ -1,11 +1,11 @@
-/* Cholesky, and steps within bounds. */
+/* Cholesky factorisation, and steps within limits. */
 #include "solve.h"
 
 #include <float.h>
 #include <math.h>
 #include <string.h>
 
-bool sdm_fit_factorise(size_t n, const double *a, double *factor, double *scale)
+bool sdm_fit_cholesky(size_t n, const double *a, double *factor, double *scale)
 {
     for (size_t i = 0; i < n; i++) {
         if (!(a[i * n + i] > 0)) return false;
@@ -17,7 +17,8 @@ bool sdm_fit_factorise(size_t n, const double *a, double *factor, double *scale)
             for (size_t k = 0; k < j; k++) sum -= factor[i * n + k] * factor[j * n + k];
             if (i != j)
                 factor[i * n + j] = sum / factor[j * n + j];
-            else if (sum > 8 * (double)n * DBL_EPSILON) // what is left of 1
+            else if (sum > 8 * (double)n *
+                               DBL_EPSILON) // pivot of the unit diagonal: positive beyond rounding
                 factor[i * n + i] = sqrt(sum);
             else
                 return false;
@@ -25,7 +26,7 @@ bool sdm_fit_factorise(size_t n, const double *a, double *factor, double *scale)
     return true;
 }
 
-void sdm_fit_back(size_t n, const double *factor, const double *scale, double *x)
+void sdm_fit_solve(size_t n, const double *factor, const double *scale, double *x)
 {
     for (size_t i = 0; i < n; i++) {
         double sum = x[i] * scale[i];
@@ -40,9 +41,9 @@ void sdm_fit_back(size_t n, const double *factor, const double *scale, double *x
     for (size_t i = 0; i < n; i++) x[i] *= scale[i];
 }
 
-// the step where the unknowns that are `held` take the values they have in step
-static bool step_of_rest(size_t n, const double *a, const double *gradient, double damping,
-                         const bool *held, double *step, double *work)
+// solves for the unknowns that are not held, with the held ones at their values in step[n]
+static bool free_step(size_t n, const double *a, const double *gradient, double damping,
+                      const bool *held, double *step, double *work)
 {
     size_t rest[FIT_UNKNOWNS_MAX], m = 0;
     double x[FIT_UNKNOWNS_MAX], scale[FIT_UNKNOWNS_MAX], *matrix = work, *factor = work + n * n;
@@ -55,30 +56,31 @@ static bool step_of_rest(size_t n, const double *a, const double *gradient, doub
         for (size_t j = 0; j < m; j++)
             matrix[i * m + j] = a[rest[i] * n + rest[j]] * (i == j ? 1 + damping : 1);
     }
-    if (!sdm_fit_factorise(m, matrix, factor, scale)) return false;
-    sdm_fit_back(m, factor, scale, x);
+    if (!sdm_fit_cholesky(m, matrix, factor, scale)) return false;
+    sdm_fit_solve(m, factor, scale, x);
     for (size_t i = 0; i < m; i++) step[rest[i]] = x[i];
     return true;
 }
 
-bool sdm_fit_step(size_t n, const double *a, const double *gradient, double damping,
-                  const fit_limits *limits, double *step, double *work)
+bool sdm_fit_bounded_step(size_t n, const double *a, const double *gradient, double damping,
+                          const fit_limits *limits, double *step, double *work)
 {
     bool held[FIT_UNKNOWNS_MAX];
     memcpy(held, limits->kept, n * sizeof *held);
     memset(step, 0, n * sizeof *step);
     for (size_t round = 0; round <= n; round++) {
-        if (!step_of_rest(n, a, gradient, damping, held, step, work)) return false;
+        if (!free_step(n, a, gradient, damping, held, step, work)) return false;
         size_t beyond = n;
         double most = 0;
-        for (size_t i = 0; i < n; i++) { // the one that goes farthest beyond is stopped first
+        // hold the unknown that is farthest beyond its limit, in sd
+        for (size_t i = 0; i < n; i++) {
             if (held[i]) continue;
             const double over =
-                fmax(limits->least[i] - step[i], step[i] - limits->most[i]) * sqrt(a[i * n + i]);
+                fmax(limits->min[i] - step[i], step[i] - limits->max[i]) * sqrt(a[i * n + i]);
             if (over > most) most = over, beyond = i;
         }
         if (beyond == n) return true;
-        step[beyond] = fmin(fmax(step[beyond], limits->least[beyond]), limits->most[beyond]);
+        step[beyond] = fmin(fmax(step[beyond], limits->min[beyond]), limits->max[beyond]);
         held[beyond] = true;
     }
     return true;

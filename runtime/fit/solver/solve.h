@@ -1,25 +1,28 @@
-/* Small symmetric systems. Matrices are [n][n], n at most FIT_UNKNOWNS_MAX. */
+/* Small symmetric linear systems. Matrices are [n][n], row-major, n <= FIT_UNKNOWNS_MAX. */
 #ifndef FIT_SOLVE_H
 #define FIT_SOLVE_H
 
-#include "fit/data/problem.h"
+#include "fit/data/unknowns.h"
 
-/* Cholesky factor of a scaled to a unit diagonal. False: a is not positive definite beyond
- * rounding. */
-bool sdm_fit_factorise(size_t n, const double *a, double *factor, double *scale);
+/* Cholesky factor (lower triangle of factor[n][n]) of a scaled to a unit diagonal by scale[n].
+   Reads the lower triangle of a. False: a is not positive definite beyond rounding. */
+bool sdm_fit_cholesky(size_t n, const double *a, double *factor, double *scale);
 
-/* x := a^-1 x. */
-void sdm_fit_back(size_t n, const double *factor, const double *scale, double *x);
+/* x[n] := a^-1 x, with factor and scale from sdm_fit_cholesky(). */
+void sdm_fit_solve(size_t n, const double *factor, const double *scale, double *x);
 
-/* What each unknown may do in a step: nothing, or move within [least, most], least <= 0 <= most. */
+/* Limits of a step. kept: the unknown does not move; else min <= step <= max, with min <= 0 <= max.
+ */
 typedef struct fit_limits {
     bool kept[FIT_UNKNOWNS_MAX];
-    double least[FIT_UNKNOWNS_MAX], most[FIT_UNKNOWNS_MAX];
+    double min[FIT_UNKNOWNS_MAX], max[FIT_UNKNOWNS_MAX];
 } fit_limits;
 
-/* step = argmax of gradient . step - 1/2 step . (a + damping diag a) step within the limits, by an
-   active set. work: 2 n n. False: a is not positive definite. */
-bool sdm_fit_step(size_t n, const double *a, const double *gradient, double damping,
-                  const fit_limits *limits, double *step, double *work);
+/* step[n] maximises gradient . step - 1/2 step . (a + damping diag a) step within the limits. By an
+   active set that only grows: an unknown that was stopped at a limit is not released, so with
+   several limits the step may fall short of the maximum. work: 2 n n numbers. False: a, with its
+   damping and without the unknowns at limits, is not positive definite. */
+bool sdm_fit_bounded_step(size_t n, const double *a, const double *gradient, double damping,
+                          const fit_limits *limits, double *step, double *work);
 
 #endif

@@ -1,12 +1,15 @@
-/* Tissues lie in places: weights of those outside of the shape that vary smoothly in space. */
-#ifndef FIT_PLACES_H
-#define FIT_PLACES_H
+/* Tissue field: weights of the outside tissues that vary smoothly in space. */
+#ifndef FIT_TISSUE_FIELD_H
+#define FIT_TISSUE_FIELD_H
 
-#include "newton.h"
+#include "problem.h"
 
-/* Estimates problem->sites.place anew, from what it is, and problem->sums with it. None where the
-   image does not hold two tissues outside, or where they are not wanted. The same bits for any
-   number of threads. */
-sdm_status sdm_fit_places_update(fit_problem *p, sdm_error *err);
+/* Improves the tissue field at the samples, problem->samples.log_weight, by a few steps of
+   expectation-maximisation, and updates problem->information. Starts from equal weights where there
+   is no field yet. Removes the field (n_outside = 0) and leaves the information as it is where
+   problem->use_tissue_field or the options switch it off, the appearance is kept, the model is not
+   partial volume or fewer than two outside tissues are present. The same bits for any number of
+   threads. */
+sdm_status sdm_fit_tissue_field_update(fit_problem *p, sdm_error *err);
 
 #endif

@@ -1,24 +1,29 @@
-/* Re-estimation of the tissues: weights, sd and (labels) means, and the sd of points, which
- * Newton's steps leave as they are. */
-#ifndef FIT_LOOK_H
-#define FIT_LOOK_H
+/* Re-estimation of the tissues' appearance between Newton steps: weights, sd and (labels) means of
+   the tissues, and the sd of points. With partial volume the means are unknowns of Newton's method.
+ */
+#ifndef FIT_TISSUES_H
+#define FIT_TISSUES_H
 
-#include "newton.h"
+#include "problem.h"
 
-enum { FIT_LOOK_MAX = 3 * FIT_TISSUES_MAX };
+/* numbers of sdm_fit_appearance_pack() at most */
+enum { FIT_APPEARANCE_MAX = 3 * FIT_TISSUES_MAX };
 
-/* What is estimated, as numbers of any size and of about the same scale; x[FIT_LOOK_MAX]. Returns
- * how many. */
-size_t sdm_fit_look_numbers(const fit_problem *p, double *x);
+/* Writes what is re-estimated in problem->state to x[FIT_APPEARANCE_MAX] as unbounded numbers of
+   similar scale (logarithms of weights and sd; means over the contrast of the start). Returns their
+   number. */
+size_t sdm_fit_appearance_pack(const fit_problem *p, double *x);
 
-/* The estimates of problem->state from such numbers. */
-void sdm_fit_look_set(fit_problem *p, const double *x);
+/* The inverse: sets problem->state and its observation model from x; weights are normalised. */
+void sdm_fit_appearance_unpack(fit_problem *p, const double *x);
 
-/* Tissues that hold less than one independent value, or fewer than ten values, are absent from now
- * on: they have the laws of the start, which stay. */
-void sdm_fit_look_settle(fit_problem *p);
+/* Decides anew which tissues the image does not hold: those with less than one independent sample,
+   or with fewer than ten. They take mean and sd of the start and keep them until the next call.
+   Images with an estimated appearance only. */
+void sdm_fit_appearance_mark_absent(fit_problem *p);
 
-/* One step of the estimation in problem->state, and laws and sums with it. */
-sdm_status sdm_fit_look_update(fit_problem *p, sdm_error *err);
+/* One step of re-estimation of the tissue field and the appearance in problem->state; updates
+   observation model and information. Nothing to do for label maps. */
+sdm_status sdm_fit_appearance_update(fit_problem *p, sdm_error *err);
 
 #endif

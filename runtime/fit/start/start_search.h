@@ -1,12 +1,18 @@
-/* The beginning of a fit: which turn of the start pose to go on from. */
-#ifndef FIT_SEARCH_H
-#define FIT_SEARCH_H
+/* Search for the start of a fit: which rotation of the start pose leads to the best fit. */
+#ifndef FIT_START_SEARCH_H
+#define FIT_START_SEARCH_H
 
-#include "fit/solver/newton.h"
+#include "fit/solver/problem.h"
 
-/* From problem->state with a wide point spread: pose alone from every turn, the best goes on with
-   all unknowns. *turn: the one chosen; problem->prior takes its rotation. The region is a ball
-   about the shape, which holds every turn. */
-sdm_status sdm_fit_search(fit_problem *p, size_t *turn, sdm_error *err);
+/* Replaces problem->state by a better start. One start (no turns, or the pose is kept): some
+   iterations with a wide point spread. Several turns, R = R_start Q with the pivot kept in place:
+   some iterations from each with a wide point spread; the best few distinct ones continue with more
+   samples, first with the wide point spread, then with the given one; the objective decides.
+
+   Parameters and pose move unless the options keep them; point spread, l_ref, point_sd and
+   appearance end at their start values. *turn: number of the chosen turn, 0 without turns.
+   problem->prior becomes the start pose with this turn. Samples come from a ball that holds every
+   turn of the shape. SDM_E_ARG: no sample in it. */
+sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err);
 
 #endif

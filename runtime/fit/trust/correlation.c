@@ -1,10 +1,13 @@
-/* Residuals are e^ = (I - P) e, P = X A X^T with the roots X of the score and the influence A. With
-   Omega the correlation of e
+/* Autocorrelation of the residuals, and its correction for the fit.
 
-       E[e^ e^T] = Omega - P Omega - Omega P + P Omega P
+   Residuals are e' = (I - P) e with the errors e and the projection P = X A X^T; X are the roots
+   x_n of the score, row by row, A the influence. With the covariance Omega of e
 
-   whose mean over the pairs of a lag is less than C(lag). What is missing is added: the first terms
-   of a series (Neumann), as Omega is made of C itself. */
+       E[e' e'^T] = Omega - P Omega - Omega P + P Omega P
+
+   The mean over the pairs of a lag is therefore smaller than C(lag). The correction adds the
+   missing terms. Omega is made of C itself, so the correction is iterated: the first terms of a
+   Neumann series. */
 #include "correlation.h"
 
 #include <math.h>
@@ -12,14 +15,15 @@
 
 #include "sdm/memory.h"
 
-// sums over pairs begin at so many of the voxels: of a correlation, of what the fit has taken
-#define PAIRS_OF_LAG 8000
-#define TAKEN_OF 800
-// terms of the series
-#define ROUNDS 4
+// voxels of the subsample for the mean over a lag, and for the correction by the fit
+#define LAG_VOXELS 8000
+#define BIAS_VOXELS 800
+// terms of the Neumann series
+#define NEUMANN_TERMS 4
 
-// weighted mean of e_n e_(n+lag)
-static double correlation_at(const fit_shell *v, const uint32_t *list, size_t n, const int lag[3])
+// weighted mean of e_n e_(n+lag) over a subsample
+static double correlation_at(const fit_neighbours *v, const uint32_t *list, size_t n,
+                             const int lag[3])
 {
     double sum = 0, weight = 0;
     for (size_t k = 0; k < n; k++) {
@@ -32,41 +36,41 @@ static double correlation_at(const fit_shell *v, const uint32_t *list, size_t n,
     return weight > 0 ? sum / weight : 0;
 }
 
-// ring by ring of lags; the window is twice as wide as the last ring before the first whose sum
-// does not stand out
-sdm_status sdm_fit_correlate(const fit_shell *v, double effort, int n_threads, double *c,
-                             int *width, sdm_error *err)
+/* Shells of lags of the same length, outwards. The window is twice as wide as the last shell before
+ * the first whose sum does not stand out. */
+sdm_status sdm_fit_correlation_estimate(const fit_neighbours *v, double effort, int n_threads,
+                                        double *c, int *width, sdm_error *err)
 {
     uint32_t *list = NULL;
     size_t n;
-    const sdm_status s = sdm_fit_shell_pick(v, effort * PAIRS_OF_LAG, &list, &n, err);
+    const sdm_status s = sdm_fit_neighbours_pick(v, effort * LAG_VOXELS, &list, &n, err);
     (void)n_threads; // without OpenMP
-    *width = FIT_LAG_MOST;
-    memset(c, 0, (FIT_LAG_MIDDLE + 1) * sizeof *c);
+    *width = FIT_LAG_MAX;
+    memset(c, 0, (FIT_LAG_ZERO + 1) * sizeof *c);
     for (int k = 0; k <= *width && !s; k++) {
 #pragma omp parallel for schedule(dynamic, 64) num_threads(n_threads)
-        for (int number = 0; number <= FIT_LAG_MIDDLE; number++) {
+        for (int number = 0; number <= FIT_LAG_ZERO; number++) {
             int lag[3];
-            sdm_fit_lag_of(number, lag);
-            if (sdm_fit_lag_size(lag) == k) c[number] = correlation_at(v, list, n, lag);
+            sdm_fit_lag_vector(number, lag);
+            if (sdm_fit_lag_length(lag) == k) c[number] = correlation_at(v, list, n, lag);
         }
         double sum = 0, lags = 0;
-        for (int number = 0; number <= FIT_LAG_MIDDLE; number++) {
+        for (int number = 0; number <= FIT_LAG_ZERO; number++) {
             int lag[3];
-            sdm_fit_lag_of(number, lag);
-            if (sdm_fit_lag_size(lag) == k) sum += c[number], lags++;
+            sdm_fit_lag_vector(number, lag);
+            if (sdm_fit_lag_length(lag) == k) sum += c[number], lags++;
         }
-        // standard error of the sum where nothing is correlated (Bartlett 1946)
-        const double error = sqrt(lags / fmin((double)v->n, effort * PAIRS_OF_LAG));
-        if (*width == FIT_LAG_MOST && k > 0 && !(sum > fmax(0.05, 2 * error) * c[FIT_LAG_MIDDLE]))
-            *width = 2 * (k - 1) < FIT_LAG_MOST ? 2 * (k - 1) : FIT_LAG_MOST - 1;
+        // standard error of the sum without correlation (Bartlett 1946)
+        const double error = sqrt(lags / fmin((double)v->n, effort * LAG_VOXELS));
+        if (*width == FIT_LAG_MAX && k > 0 && !(sum > fmax(0.05, 2 * error) * c[FIT_LAG_ZERO]))
+            *width = 2 * (k - 1) < FIT_LAG_MAX ? 2 * (k - 1) : FIT_LAG_MAX - 1;
     }
     sdm_free(list);
     return s;
 }
 
-// weight of a lag in a window
-static double taper(const int lag[3], int width, bool flat)
+// weight of a lag in the window
+static double lag_taper(const int lag[3], int width, bool flat)
 {
     double w = 1;
     for (int a = 0; a < 3; a++) {
@@ -76,54 +80,57 @@ static double taper(const int lag[3], int width, bool flat)
     return w;
 }
 
-double sdm_fit_weigh_lags(const double *c, int width, bool flat, double *weighted)
+double sdm_fit_correlation_taper(const double *c, int width, bool flat, double *weighted)
 {
-    double sum = c[FIT_LAG_MIDDLE];
-    for (int number = 0; number <= FIT_LAG_MIDDLE; number++) {
+    double sum = c[FIT_LAG_ZERO];
+    for (int number = 0; number <= FIT_LAG_ZERO; number++) {
         int lag[3];
-        sdm_fit_lag_of(number, lag);
-        weighted[number] = c[number] * taper(lag, width, flat);
-        if (number < FIT_LAG_MIDDLE) sum += 2 * weighted[number];
+        sdm_fit_lag_vector(number, lag);
+        weighted[number] = c[number] * lag_taper(lag, width, flat);
+        if (number < FIT_LAG_ZERO) sum += 2 * weighted[number];
     }
-    return fmax(sum, c[FIT_LAG_MIDDLE]);
+    return fmax(sum, c[FIT_LAG_ZERO]);
 }
 
-/* What is worked with: voxels where sums begin, and for each q = 2 A (Omega X) - V x, with the
- * covariance V = A X^T Omega X A. */
-typedef struct taken {
+/* Scratch memory of the correction. Notation as at the top of the file. */
+typedef struct fit_bias {
     size_t n, n_unknowns;
-    uint32_t *voxel;                    // [n]
-    double *q;                          // [n][n_unknowns]
-    double *around;                     // [n][n_unknowns] Omega X
-    double *scatter, *product, *spread; // [n_unknowns][n_unknowns]
-} taken;
+    /* [n] subsample of the voxels */
+    uint32_t *voxel;
+    /* [n][n_unknowns] q_i = 2 A (Omega X)_i - V x_i; the correction of a pair i, j is q_i . x_j */
+    double *q;
+    /* [n][n_unknowns] rows of Omega X */
+    double *around;
+    /* [n_unknowns][n_unknowns] X^T Omega X, A X^T Omega X, V = A X^T Omega X A */
+    double *information, *product, *covariance;
+} fit_bias;
 
-static void dispose(taken *t)
+static void bias_dispose(fit_bias *t)
 {
     sdm_free(t->voxel);
     sdm_free(t->q);
     sdm_free(t->around);
-    sdm_free(t->scatter);
+    sdm_free(t->information);
     sdm_free(t->product);
-    sdm_free(t->spread);
+    sdm_free(t->covariance);
 }
 
-static sdm_status create(const fit_shell *v, taken *t, sdm_error *err)
+static sdm_status bias_create(const fit_neighbours *v, fit_bias *t, sdm_error *err)
 {
-    *t = (taken){.n_unknowns = v->n_unknowns};
-    sdm_status s = sdm_fit_shell_pick(v, TAKEN_OF, &t->voxel, &t->n, err);
+    *t = (fit_bias){.n_unknowns = v->n_unknowns};
+    sdm_status s = sdm_fit_neighbours_pick(v, BIAS_VOXELS, &t->voxel, &t->n, err);
     const size_t square = v->n_unknowns * v->n_unknowns;
     if (!s) s = SDM_ALLOC(&t->q, t->n * v->n_unknowns, "correlation of residuals", err);
     if (!s) s = SDM_ALLOC(&t->around, t->n * v->n_unknowns, "correlation of residuals", err);
-    if (!s) s = SDM_ALLOC(&t->scatter, square, "correlation of residuals", err);
+    if (!s) s = SDM_ALLOC(&t->information, square, "correlation of residuals", err);
     if (!s) s = SDM_ALLOC(&t->product, square, "correlation of residuals", err);
-    if (!s) s = SDM_ALLOC(&t->spread, square, "correlation of residuals", err);
+    if (!s) s = SDM_ALLOC(&t->covariance, square, "correlation of residuals", err);
     return s;
 }
 
-// Omega X at the voxels
-static void look_around(const fit_shell *v, const double *weighted, int width, int n_threads,
-                        taken *t)
+// rows of Omega X: correlation-weighted sums of the roots of all neighbours
+static void bias_neighbour_sums(const fit_neighbours *v, const double *weighted, int width,
+                                int n_threads, fit_bias *t)
 {
     const size_t n = v->n_unknowns;
     (void)n_threads; // without OpenMP
@@ -131,11 +138,11 @@ static void look_around(const fit_shell *v, const double *weighted, int width, i
     for (size_t s = 0; s < t->n; s++) {
         double *around = t->around + s * n;
         memset(around, 0, n * sizeof *around);
-        for (int number = 0; number <= FIT_LAG_MIDDLE; number++) {
+        for (int number = 0; number <= FIT_LAG_ZERO; number++) {
             int lag[3];
-            sdm_fit_lag_of(number, lag);
-            if (sdm_fit_lag_size(lag) > width) continue;
-            for (int sign = -1; sign <= (number == FIT_LAG_MIDDLE ? -1 : 1); sign += 2) {
+            sdm_fit_lag_vector(number, lag);
+            if (sdm_fit_lag_length(lag) > width) continue;
+            for (int sign = -1; sign <= (number == FIT_LAG_ZERO ? -1 : 1); sign += 2) {
                 const size_t j = sdm_fit_neighbour(v, t->voxel[s], lag, sign);
                 if (j == SIZE_MAX) continue;
                 for (size_t a = 0; a < n; a++)
@@ -156,33 +163,34 @@ static void multiply(size_t n, const double *a, const double *b, double *out)
         }
 }
 
-static void find_q(const fit_shell *v, const double *influence, taken *t)
+// X^T Omega X from the subsample, V, and q
+static void bias_vectors(const fit_neighbours *v, const double *influence, fit_bias *t)
 {
     const size_t n = v->n_unknowns;
     const double scale = 0.5 * (double)v->n / (double)t->n;
-    memset(t->scatter, 0, n * n * sizeof *t->scatter);
+    memset(t->information, 0, n * n * sizeof *t->information);
     for (size_t s = 0; s < t->n; s++)
         for (size_t a = 0; a < n; a++)
             for (size_t b = 0; b < n; b++) {
                 const double x =
                     scale * (double)v->root[t->voxel[s] * n + a] * t->around[s * n + b];
-                t->scatter[a * n + b] += x;
-                t->scatter[b * n + a] += x;
+                t->information[a * n + b] += x;
+                t->information[b * n + a] += x;
             }
-    multiply(n, influence, t->scatter, t->product);
-    multiply(n, t->product, influence, t->spread);
+    multiply(n, influence, t->information, t->product);
+    multiply(n, t->product, influence, t->covariance);
     for (size_t s = 0; s < t->n; s++)
         for (size_t a = 0; a < n; a++) {
             double sum = 0;
             for (size_t b = 0; b < n; b++)
                 sum += 2 * influence[a * n + b] * t->around[s * n + b] -
-                       t->spread[a * n + b] * (double)v->root[t->voxel[s] * n + b];
+                       t->covariance[a * n + b] * (double)v->root[t->voxel[s] * n + b];
             t->q[s * n + a] = sum;
         }
 }
 
-// weighted mean over the pairs of a lag of what the fit has taken
-static double taken_at(const fit_shell *v, const taken *t, const int lag[3])
+// weighted mean over the pairs of a lag of what the fit has removed from C(lag)
+static double bias_at(const fit_neighbours *v, const fit_bias *t, const int lag[3])
 {
     const size_t n = v->n_unknowns;
     double sum = 0, weight = 0;
@@ -199,24 +207,24 @@ static double taken_at(const fit_shell *v, const taken *t, const int lag[3])
     return weight > 0 ? sum / weight : 0;
 }
 
-sdm_status sdm_fit_free_correlation(const fit_shell *v, const double *influence, int width,
-                                    int n_threads, double *c, sdm_error *err)
+sdm_status sdm_fit_correlation_correct(const fit_neighbours *v, const double *influence, int width,
+                                       int n_threads, double *c, sdm_error *err)
 {
-    double found[FIT_LAG_MIDDLE + 1], weighted[FIT_LAG_MIDDLE + 1];
-    taken t;
-    const sdm_status s = create(v, &t, err);
+    double found[FIT_LAG_ZERO + 1], weighted[FIT_LAG_ZERO + 1];
+    fit_bias t;
+    const sdm_status s = bias_create(v, &t, err);
     memcpy(found, c, sizeof found);
-    for (int round = 0; round < ROUNDS && t.n && !s; round++) {
-        (void)sdm_fit_weigh_lags(c, width, true, weighted);
-        look_around(v, weighted, width, n_threads, &t);
-        find_q(v, influence, &t);
+    for (int round = 0; round < NEUMANN_TERMS && t.n && !s; round++) {
+        (void)sdm_fit_correlation_taper(c, width, true, weighted);
+        bias_neighbour_sums(v, weighted, width, n_threads, &t);
+        bias_vectors(v, influence, &t);
 #pragma omp parallel for schedule(dynamic, 64) num_threads(n_threads)
-        for (int number = 0; number <= FIT_LAG_MIDDLE; number++) {
+        for (int number = 0; number <= FIT_LAG_ZERO; number++) {
             int lag[3];
-            sdm_fit_lag_of(number, lag);
-            if (sdm_fit_lag_size(lag) <= width) c[number] = found[number] + taken_at(v, &t, lag);
+            sdm_fit_lag_vector(number, lag);
+            if (sdm_fit_lag_length(lag) <= width) c[number] = found[number] + bias_at(v, &t, lag);
         }
     }
-    dispose(&t);
+    bias_dispose(&t);
     return s;
 }

@@ -1,24 +1,29 @@
-/* Correlation of neighbouring residuals. C[FIT_LAG_MIDDLE + 1]: of half of the lags and of none,
- * the last. */
+/* Autocorrelation of the residuals over lags, displacements between voxels.
+
+   An array c[FIT_LAG_ZERO + 1] holds C(lag) of one half of all lags and of lag zero, which is its
+   last element; C(-lag) = C(lag). Functions give the same bits for any number of threads. */
 #ifndef FIT_CORRELATION_H
 #define FIT_CORRELATION_H
 
 #include "neighbours.h"
 
-/* C(lag) = E[e_n e_(n+lag)] as the residuals are, and the half width of the window of lags that
-   stand out. effort: part of the pairs that are taken. The same bits for any number of threads, as
-   below. */
-sdm_status sdm_fit_correlate(const fit_shell *v, double effort, int n_threads, double *c,
-                             int *width, sdm_error *err);
+/* c: C(lag) = mean of e_n e_(n+lag) of the residuals e, weighted; C(0), the variance of residuals,
+   is about 1. *width: half width, in steps, of the window of lags whose correlations stand out from
+   their error; c is 0 beyond the lags that were examined. effort, 0 .. 1: part of the voxel pairs
+   that is used. n_threads >= 1. */
+sdm_status sdm_fit_correlation_estimate(const fit_neighbours *v, double effort, int n_threads,
+                                        double *c, int *width, sdm_error *err);
 
-/* The same of the errors themselves: residuals are about the fit, which has taken from them what it
-   could explain, most of all what is alike over many voxels. influence[n_unknowns][n_unknowns]:
-   inverse of the information, 0 for what was kept. */
-sdm_status sdm_fit_free_correlation(const fit_shell *v, const double *influence, int width,
-                                    int n_threads, double *c, sdm_error *err);
+/* Corrects c, of residuals, to that of the errors themselves. Residuals are errors less the part
+   that the fit could explain, mostly what is constant over many voxels, so their correlations are
+   too small. influence[n_unknowns][n_unknowns]: inverse of the information, 0 for unknowns that
+   were kept. */
+sdm_status sdm_fit_correlation_correct(const fit_neighbours *v, const double *influence, int width,
+                                       int n_threads, double *c, sdm_error *err);
 
-/* weighted[]: correlations in a window, whose weights are 1 in its inner half where `flat`; returns
- * their sum over all lags, at least C(0). */
-double sdm_fit_weigh_lags(const double *c, int width, bool flat, double *weighted);
+/* tapered[FIT_LAG_ZERO + 1] = c times a window over lags. flat: weight 1 in the inner half, then
+   linear to 0 beyond width; else linear from lag zero. Returns the sum over all lags of both
+   halves, at least C(0). */
+double sdm_fit_correlation_taper(const double *c, int width, bool flat, double *tapered);
 
 #endif

@@ -2,14 +2,16 @@
 #ifndef FIT_EVIDENCE_H
 #define FIT_EVIDENCE_H
 
-#include "fit/solver/newton.h"
+#include "fit/solver/problem.h"
 
-/* Log-likelihood of the values at the sites by a mixture of the same tissues that knows no shape,
- * its laws estimated. */
-sdm_status sdm_fit_without_shape(const fit_problem *p, double *log_likelihood, sdm_error *err);
+/* *log_likelihood: of the sample values under a mixture of the fit's tissues, re-estimated, without
+   a shape: the same weights for every sample, but for the tissue field of the outside tissues.
+   Images only. */
+sdm_status sdm_fit_shapeless_log_likelihood(const fit_problem *p, double *log_likelihood,
+                                            sdm_error *err);
 
-/* Share of the volume of the shape at problem->state that lies in the image, on voxels that are not
- * NaN. */
+/* Share (0 .. 1) of the volume of the shape at problem->state that lies on voxels of the image that
+ * are not NaN. 1 for points. */
 double sdm_fit_inside_share(const fit_problem *p);
 
 #endif

@@ -1,4 +1,4 @@
-/* The voxels whose scores say something of the shape. */
+/* The voxels of the inner band. */
 #include "neighbours.h"
 
 #include <math.h>
@@ -6,44 +6,47 @@
 #include "sdm/internal/heap.h"
 #include "sdm/internal/rng.h"
 
-static void place_of(const sdm_grid *g, size_t voxel, int64_t index[3])
+// index of an image voxel along each axis
+static void voxel_index(const sdm_grid *g, size_t voxel, int64_t index[3])
 {
     index[0] = (int64_t)voxel % g->n[0];
     index[1] = (int64_t)voxel / g->n[0] % g->n[1];
     index[2] = (int64_t)voxel / g->n[0] / g->n[1];
 }
 
-// whether a voxel's score says anything of the shape; those that hardly do would thin out the
-// others, of which some are taken
-bool sdm_fit_in_shell(const fit_problem *p, size_t site)
+// excludes samples with negligible scores: they would take the place of informative ones in
+// subsamples
+bool sdm_fit_in_inner_band(const fit_problem *p, size_t sample)
 {
-    return p->sites.slot[site] != SIZE_MAX &&
-           !(p->maps.share && fabs(fabs(p->sites.field[site] - 0.5) - 0.5) <= 1e-6);
+    return p->samples.row[sample] != SIZE_MAX &&
+           !(p->maps.share && fabs(fabs(p->samples.field[sample] - 0.5) - 0.5) <= 1e-6);
 }
 
-size_t sdm_fit_count_shell(const fit_problem *p)
+size_t sdm_fit_inner_band_count(const fit_problem *p)
 {
     size_t n = 0;
-    for (size_t i = 0; i < p->sites.n; i++) n += sdm_fit_in_shell(p, i);
+    for (size_t i = 0; i < p->samples.n; i++) n += sdm_fit_in_inner_band(p, i);
     return n;
 }
 
-static void find_box(const fit_problem *p, fit_shell *v)
+// bounding box of the inner band
+static void box_find(const fit_problem *p, fit_neighbours *v)
 {
     int64_t to[3] = {0, 0, 0}, index[3];
-    for (int a = 0; a < 3; a++) v->from[a] = INT64_MAX;
-    for (size_t i = 0; i < p->sites.n; i++) {
-        if (!sdm_fit_in_shell(p, i)) continue;
-        place_of(&p->target->grid, p->sites.voxel[i], index);
+    for (int a = 0; a < 3; a++) v->first[a] = INT64_MAX;
+    for (size_t i = 0; i < p->samples.n; i++) {
+        if (!sdm_fit_in_inner_band(p, i)) continue;
+        voxel_index(&p->target->grid, p->samples.voxel[i], index);
         for (int a = 0; a < 3; a++) {
-            if (index[a] < v->from[a]) v->from[a] = index[a];
+            if (index[a] < v->first[a]) v->first[a] = index[a];
             if (index[a] > to[a]) to[a] = index[a];
         }
     }
-    for (int a = 0; a < 3; a++) v->size[a] = (to[a] - v->from[a]) / v->step + 1;
+    for (int a = 0; a < 3; a++) v->size[a] = (to[a] - v->first[a]) / v->step + 1;
 }
 
-// what an error of the map of 1 mm does to the field: the slope of the field across the surface
+// change of the field per mm of map error: 1 for distances, else minus the norm of the gradient of
+// the share
 static double field_slope(const fit_problem *p, const float *columns)
 {
     const float *shift = columns + fit_at_translation(p->n_params);
@@ -52,84 +55,88 @@ static double field_slope(const fit_problem *p, const float *columns)
                  (double)(shift[2] * shift[2]));
 }
 
-static void fill_near(const fit_problem *p, fit_shell *v)
+static void neighbours_fill(const fit_problem *p, fit_neighbours *v)
 {
-    const fit_sites *s = &p->sites;
+    const fit_samples *s = &p->samples;
     const size_t nc = s->n_columns, n = v->n_unknowns;
     size_t count = 0;
     for (size_t i = 0; i < s->n; i++) {
-        if (!sdm_fit_in_shell(p, i)) continue;
-        const float *columns = s->columns + s->slot[i] * nc;
-        fit_response r;
-        sdm_fit_respond(&p->laws, (double)s->value[i], fit_place(s, i), s->field[i], true, &r);
-        float *root = v->root + count * n, *push = v->push + count * n;
+        if (!sdm_fit_in_inner_band(p, i)) continue;
+        const float *columns = s->jacobian + s->row[i] * nc;
+        fit_likelihood r;
+        sdm_fit_likelihood(&p->observation, (double)s->value[i], fit_sample_weights(s, i),
+                           s->field[i], true, &r);
+        float *root = v->root + count * n, *model_score = v->model_score + count * n;
         const double slope = field_slope(p, columns);
         for (size_t a = 0; a < nc; a++) {
             root[a] = (float)(r.root[0] * (double)columns[a]);
-            push[a] = (float)(r.complete[0] * slope * (double)columns[a]);
+            model_score[a] = (float)(r.complete[0] * slope * (double)columns[a]);
         }
         for (size_t a = nc; a < n; a++) {
             root[a] = (float)r.root[1 + a - nc];
-            push[a] = (float)(r.complete[1 + a - nc] * slope);
+            model_score[a] = (float)(r.complete[1 + a - nc] * slope);
         }
+        // residual, weight and position
         v->residual[count] = (float)r.residual;
         v->weight[count] = (float)fabs(r.root[0]);
-        v->lot[count] = (float)sdm_rng_uniform(0, 0, s->voxel[i]);
+        v->draw[count] = (float)sdm_rng_uniform(0, 0, s->voxel[i]);
         int64_t index[3];
-        place_of(&p->target->grid, s->voxel[i], index);
+        voxel_index(&p->target->grid, s->voxel[i], index);
         for (int a = 0; a < 3; a++)
-            v->place[3 * count + (size_t)a] = (int32_t)((index[a] - v->from[a]) / v->step);
-        const int32_t *at = v->place + 3 * count;
-        v->at[((size_t)at[2] * (size_t)v->size[1] + (size_t)at[1]) * (size_t)v->size[0] +
-              (size_t)at[0]] = (uint32_t)++count;
+            v->position[3 * count + (size_t)a] = (int32_t)((index[a] - v->first[a]) / v->step);
+        const int32_t *at = v->position + 3 * count;
+        v->number_at[((size_t)at[2] * (size_t)v->size[1] + (size_t)at[1]) * (size_t)v->size[0] +
+                     (size_t)at[0]] = (uint32_t)++count;
     }
 }
 
-float sdm_fit_shell_share(const fit_shell *v, double wanted)
+float sdm_fit_neighbours_threshold(const fit_neighbours *v, double wanted)
 {
-    // the same for a voxel more or less: other voxels would be chosen
+    // rounded to steps of a factor 2^(1/4), so that a few voxels more or less do not change the
+    // choice
     return (float)exp2(0.25 * floor(4 * log2(wanted / (double)v->n)));
 }
 
-sdm_status sdm_fit_shell_pick(const fit_shell *v, double wanted, uint32_t **list, size_t *n,
-                              sdm_error *err)
+sdm_status sdm_fit_neighbours_pick(const fit_neighbours *v, double wanted, uint32_t **list,
+                                   size_t *n, sdm_error *err)
 {
-    const float share = sdm_fit_shell_share(v, wanted);
+    const float share = sdm_fit_neighbours_threshold(v, wanted);
     *n = 0;
     const sdm_status s = SDM_ALLOC(list, v->n, "voxels near the surface", err);
     for (size_t i = 0; i < v->n && !s; i++)
-        if (v->lot[i] <= share) (*list)[(*n)++] = (uint32_t)i;
+        if (v->draw[i] <= share) (*list)[(*n)++] = (uint32_t)i;
     return s;
 }
 
-void sdm_fit_shell_dispose(fit_shell *v)
+void sdm_fit_neighbours_dispose(fit_neighbours *v)
 {
-    sdm_free(v->at);
-    sdm_free(v->place);
-    sdm_free(v->lot);
+    sdm_free(v->number_at);
+    sdm_free(v->position);
+    sdm_free(v->draw);
     sdm_free(v->residual);
     sdm_free(v->weight);
     sdm_free(v->root);
-    sdm_free(v->push);
-    *v = (fit_shell){0};
+    sdm_free(v->model_score);
+    *v = (fit_neighbours){0};
 }
 
-sdm_status sdm_fit_shell_create(const fit_problem *p, fit_shell *out, sdm_error *err)
+sdm_status sdm_fit_neighbours_create(const fit_problem *p, fit_neighbours *out, sdm_error *err)
 {
-    fit_shell *v = out;
-    *v = (fit_shell){
-        .n = sdm_fit_count_shell(p), .n_unknowns = p->sums.n_unknowns, .step = (int64_t)p->stride};
-    find_box(p, v);
+    fit_neighbours *v = out;
+    *v = (fit_neighbours){.n = sdm_fit_inner_band_count(p),
+                          .n_unknowns = p->information.n_unknowns,
+                          .step = (int64_t)p->stride};
+    box_find(p, v);
     size_t count, box;
     sdm_status s = sdm_mul(v->n, v->n_unknowns, &count, err);
     if (!s) s = sdm_mul((size_t)v->size[0] * (size_t)v->size[1], (size_t)v->size[2], &box, err);
-    if (!s) s = SDM_ALLOC(&v->at, box, "voxels near the surface", err);
-    if (!s) s = SDM_ALLOC(&v->place, 3 * v->n, "voxels near the surface", err);
-    if (!s) s = SDM_ALLOC(&v->lot, v->n, "voxels near the surface", err);
+    if (!s) s = SDM_ALLOC(&v->number_at, box, "voxels near the surface", err);
+    if (!s) s = SDM_ALLOC(&v->position, 3 * v->n, "voxels near the surface", err);
+    if (!s) s = SDM_ALLOC(&v->draw, v->n, "voxels near the surface", err);
     if (!s) s = SDM_ALLOC(&v->residual, v->n, "voxels near the surface", err);
     if (!s) s = SDM_ALLOC(&v->weight, v->n, "voxels near the surface", err);
     if (!s) s = SDM_ALLOC(&v->root, count, "voxels near the surface", err);
-    if (!s) s = SDM_ALLOC(&v->push, count, "voxels near the surface", err);
-    if (!s) fill_near(p, v);
+    if (!s) s = SDM_ALLOC(&v->model_score, count, "voxels near the surface", err);
+    if (!s) neighbours_fill(p, v);
     return s;
 }

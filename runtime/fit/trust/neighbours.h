@@ -1,54 +1,67 @@
-/* Voxels near the surface, found by their place: what the correlation of residuals and the
- * covariance of the score are summed over. */
-#ifndef FIT_SHELL_H
-#define FIT_SHELL_H
+/* Voxels of the inner band with their residuals and scores, and look-up of the neighbour at a lag.
+ * Autocorrelation and score covariance are sums over these. */
+#ifndef FIT_NEIGHBOURS_H
+#define FIT_NEIGHBOURS_H
 
-#include "fit/solver/newton.h"
+#include "fit/solver/problem.h"
 
-/* Largest lag along an axis, in steps of the voxels that are used. */
 enum {
-    FIT_LAG_MOST = 10,
-    FIT_LAGS = 2 * FIT_LAG_MOST + 1,
-    FIT_LAG_MIDDLE = FIT_LAGS * FIT_LAGS * FIT_LAGS / 2
+    /* largest lag along an axis, in steps (problem->stride voxels) */
+    FIT_LAG_MAX = 10,
+    /* lags along an axis */
+    FIT_LAGS = 2 * FIT_LAG_MAX + 1,
+    /* number of lag zero; numbers below it are one half of all lags, those above their opposites */
+    FIT_LAG_ZERO = FIT_LAGS * FIT_LAGS * FIT_LAGS / 2
 };
 
-typedef struct fit_shell {
+/* The n voxels of the inner band. */
+typedef struct fit_neighbours {
     size_t n, n_unknowns;
-    int64_t size[3], from[3], step; // the box, in steps
-    uint32_t *at;                   // [size] 1 + number of the voxel, or 0
-    int32_t *place;                 // [n][3] in the box
-    float *lot;               // [n] 0 .. 1 at random, of the voxel alone: the lowest are picked
-    float *residual, *weight; // [n]
-    float *root;              // [n][n_unknowns]
-    float *push;              // [n][n_unknowns] score by an error of the map of 1 mm
-} fit_shell;
+    /* bounding box: extent in steps, first voxel of the image, voxels of the image to a step */
+    int64_t size[3], first[3], step;
+    /* [size[2]][size[1]][size[0]] 1 + number of the voxel there; 0: none */
+    uint32_t *number_at;
+    /* [n][3] index of each voxel in the box, in steps */
+    int32_t *position;
+    /* [n] random number 0 .. 1, a function of the voxel's index in the image alone; a subsample is
+     * the voxels whose number is at most a threshold */
+    float *draw;
+    /* [n] normalised residual; weight of the voxel in correlations */
+    float *residual, *weight;
+    /* [n][n_unknowns] score = residual * root */
+    float *root;
+    /* [n][n_unknowns] expected score caused by a map error of 1 mm */
+    float *model_score;
+} fit_neighbours;
 
-/* From the sites of problem->state. sdm_fit_shell_dispose() frees it in every case. */
-sdm_status sdm_fit_shell_create(const fit_problem *p, fit_shell *out, sdm_error *err);
-void sdm_fit_shell_dispose(fit_shell *v);
+/* From the samples of problem->state. Call sdm_fit_neighbours_dispose() even after an error. */
+sdm_status sdm_fit_neighbours_create(const fit_problem *p, fit_neighbours *out, sdm_error *err);
+void sdm_fit_neighbours_dispose(fit_neighbours *v);
 
-/* Whether the score of a site says anything of the shape, and how many do. */
-bool sdm_fit_in_shell(const fit_problem *p, size_t site);
-size_t sdm_fit_count_shell(const fit_problem *p);
+/* Whether a sample belongs to the inner band: its derivative by the surface is large enough to
+   matter in correlations, a stricter test than sdm_fit_in_band(). And the number of such samples.
+ */
+bool sdm_fit_in_inner_band(const fit_problem *p, size_t sample);
+size_t sdm_fit_inner_band_count(const fit_problem *p);
 
-/* Lots up to this are about `wanted` voxels of the shell. */
-float sdm_fit_shell_share(const fit_shell *v, double wanted);
+/* Threshold of `draw` that selects about `wanted` voxels; above 1 where there are fewer. */
+float sdm_fit_neighbours_threshold(const fit_neighbours *v, double wanted);
 
-/* The numbers of about so many voxels, in order; the caller frees *list with sdm_free(). */
-sdm_status sdm_fit_shell_pick(const fit_shell *v, double wanted, uint32_t **list, size_t *n,
-                              sdm_error *err);
+/* *list: increasing numbers of about `wanted` voxels, *n of them; the caller frees it with
+ * sdm_free(). */
+sdm_status sdm_fit_neighbours_pick(const fit_neighbours *v, double wanted, uint32_t **list,
+                                   size_t *n, sdm_error *err);
 
-/* Lags are numbered through; those above FIT_LAG_MIDDLE, which is no lag, are the other half of a
- * symmetric table. */
-static inline void sdm_fit_lag_of(int number, int lag[3])
+/* The lag of a number, 0 .. FIT_LAGS^3 - 1, in steps along each axis. */
+static inline void sdm_fit_lag_vector(int number, int lag[3])
 {
-    lag[0] = number % FIT_LAGS - FIT_LAG_MOST;
-    lag[1] = number / FIT_LAGS % FIT_LAGS - FIT_LAG_MOST;
-    lag[2] = number / (FIT_LAGS * FIT_LAGS) - FIT_LAG_MOST;
+    lag[0] = number % FIT_LAGS - FIT_LAG_MAX;
+    lag[1] = number / FIT_LAGS % FIT_LAGS - FIT_LAG_MAX;
+    lag[2] = number / (FIT_LAGS * FIT_LAGS) - FIT_LAG_MAX;
 }
 
-/* Along the axis where it is the longest. */
-static inline int sdm_fit_lag_size(const int lag[3])
+/* Maximum norm of a lag. */
+static inline int sdm_fit_lag_length(const int lag[3])
 {
     int most = 0;
     for (int a = 0; a < 3; a++)
@@ -57,14 +70,15 @@ static inline int sdm_fit_lag_size(const int lag[3])
 }
 
 /* Number of the voxel at sign * lag from voxel i, or SIZE_MAX. */
-static inline size_t sdm_fit_neighbour(const fit_shell *v, size_t i, const int lag[3], int sign)
+static inline size_t sdm_fit_neighbour(const fit_neighbours *v, size_t i, const int lag[3],
+                                       int sign)
 {
     int64_t k[3];
     for (int a = 0; a < 3; a++) {
-        k[a] = v->place[3 * i + (size_t)a] + sign * lag[a];
+        k[a] = v->position[3 * i + (size_t)a] + sign * lag[a];
         if (k[a] < 0 || k[a] >= v->size[a]) return SIZE_MAX;
     }
-    const uint32_t found = v->at[(k[2] * v->size[1] + k[1]) * v->size[0] + k[0]];
+    const uint32_t found = v->number_at[(k[2] * v->size[1] + k[1]) * v->size[0] + k[0]];
     return found ? found - 1 : SIZE_MAX;
 }
 

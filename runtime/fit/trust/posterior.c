@@ -1,60 +1,66 @@
-/* Covariance H^-1 J H^-1 (Huber 1967): right also where the values are not independent and the
- * model is not quite that of the image. */
+/* Sandwich covariance H^-1 J H^-1 (Huber 1967), H the information and J the covariance of the
+ * score. It also holds where the samples are correlated and the observation model is slightly
+ * wrong. */
 #include "posterior.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "scores.h"
+#include "fit/solver/prior.h"
+#include "fit/solver/solve.h"
+#include "score_covariance.h"
 #include "sdm/memory.h"
 
-// edge of the cubes within which the error of a network's map is alike, in steps of its grid
+// edge of the cubes within which the error of a network's map is assumed constant, in voxels of the
+// map
 #define MODEL_STEPS 5.0
 
-// the unknowns that were estimated
-static size_t estimated(const fit_problem *p, size_t *list)
+// list[]: indices of the unknowns that were estimated; returns their number
+static size_t free_unknowns(const fit_problem *p, size_t *list)
 {
     const sdm_fit_opts *o = p->opts;
     size_t count = 0;
-    for (size_t i = 0; i < p->sums.n_unknowns; i++) {
+    for (size_t i = 0; i < p->information.n_unknowns; i++) {
         const size_t n = p->n_params;
         const bool kept = i < n       ? o->keep_params
                           : i < n + 6 ? o->keep_pose
-                          : i > n + 6 ? fit_mean_stays(p, i)
+                          : i > n + 6 ? fit_mean_is_kept(p, i)
                                       : o->keep_blur || !p->maps.share;
         if (!kept) list[count++] = i;
     }
     return count;
 }
 
-static void take(size_t n, const double *a, size_t m, const size_t *list, double *out)
+// out[m][m]: the rows and columns of a[n][n] in the list
+static void submatrix(size_t n, const double *a, size_t m, const size_t *list, double *out)
 {
     for (size_t i = 0; i < m; i++)
         for (size_t j = 0; j < m; j++) out[i * m + j] = a[list[i] * n + list[j]];
 }
 
-/* influence[n][n]: inverse of the information of what was estimated, 0 for the rest; that of the
-   observed values where it is positive definite, else of the complete ones. work: 3 n n. False:
-   neither is. */
-static bool find_influence(const fit_problem *p, bool with_priors, double *influence, double *work)
+/* influence[n][n]: inverse of the information of the unknowns that were estimated, 0 for the
+ * others. Of the observed information where that is positive definite, else of the complete one.
+ * work: 3 n n. False: neither is. */
+static bool influence_compute(const fit_problem *p, bool with_priors, double *influence,
+                              double *work)
 {
-    const size_t n = p->sums.n_unknowns;
+    const size_t n = p->information.n_unknowns;
     size_t list[FIT_UNKNOWNS_MAX];
-    const size_t m = estimated(p, list);
+    const size_t m = free_unknowns(p, list);
     double *information = work, *small = work + n * n, *factor = work + 2 * n * n,
            scale[FIT_UNKNOWNS_MAX];
     memset(influence, 0, n * n * sizeof *influence);
     for (int complete = 0; complete < 2; complete++) {
-        memcpy(information, complete ? p->sums.complete : p->sums.observed,
+        memcpy(information, complete ? p->information.complete : p->information.observed,
                n * n * sizeof *information);
         if (with_priors) (void)sdm_fit_prior(p, &p->state, NULL, information, NULL);
-        sdm_fit_add_ignorance(p, information);
-        take(n, information, m, list, small);
-        if (!sdm_fit_factorise(m, small, factor, scale)) continue;
+        sdm_fit_add_weak_prior(p, information);
+        submatrix(n, information, m, list, small);
+        if (!sdm_fit_cholesky(m, small, factor, scale)) continue;
         for (size_t j = 0; j < m; j++) {
             double column[FIT_UNKNOWNS_MAX] = {0};
             column[j] = 1;
-            sdm_fit_back(m, factor, scale, column);
+            sdm_fit_solve(m, factor, scale, column);
             for (size_t i = 0; i < m; i++) influence[list[i] * n + list[j]] = column[i];
         }
         return true;
@@ -62,7 +68,7 @@ static bool find_influence(const fit_problem *p, bool with_priors, double *influ
     return false;
 }
 
-// element (i, j) of influence scatter influence
+// element (i, j) of influence * scatter * influence
 static double sandwich(size_t n, const double *influence, const double *scatter, size_t i, size_t j)
 {
     double sum = 0;
@@ -72,6 +78,7 @@ static double sandwich(size_t n, const double *influence, const double *scatter,
     return sum;
 }
 
+// error (mm) of the maps near the surface, of the network's held-out data; 0: exact maps
 static double model_error(const fit_problem *p)
 {
     if (p->maps.exact) return 0;
@@ -79,25 +86,26 @@ static double model_error(const fit_problem *p)
     return a->rmse_near_mm > 0 ? a->rmse_near_mm : a->rmse_mm;
 }
 
-// spread: working memory, n n
-static void fill(const fit_problem *p, const fit_scatter *scatter, const double *influence,
-                 double *spread, sdm_fit_result *out)
+// covariance, sd and correlation from the sandwich; spread[n][n]: scratch memory
+static void covariance_fill(const fit_problem *p, const fit_score_covariance *scatter,
+                            const double *influence, double *spread, sdm_fit_result *out)
 {
-    const size_t n = p->sums.n_unknowns, size = p->n_params + 6;
+    const size_t n = p->information.n_unknowns, size = p->n_params + 6;
     const bool points = p->target->kind == SDM_FIT_POINTS;
     size_t list[FIT_UNKNOWNS_MAX];
-    // residuals of points, too, are smaller about a fit than about the truth (MacKinnon and White
-    // 1985)
+    // residuals of points about a fit are smaller than about the truth: degrees of freedom
+    // (MacKinnon and White 1985)
     const double lost =
-        points ? fmin((double)estimated(p, list) / fmax((double)p->sites.n, 1), 0.5) : 0;
-    // what priors of those weights scatter
+        points ? fmin((double)free_unknowns(p, list) / fmax((double)p->samples.n, 1), 0.5) : 0;
+    // priors contribute their weighted precision times their weight
     memset(spread, 0, n * n * sizeof *spread);
     (void)sdm_fit_prior(p, &p->state, NULL, spread, NULL);
     for (size_t i = 0; i < size; i++) spread[i * (n + 1)] *= p->prior_weight[i];
+    // noise of the samples and error of the network
     const double model = out->model_error_mm * out->model_error_mm;
     for (size_t i = 0; i < n * n; i++)
         spread[i] += scatter->noise[i] / (1 - lost) + model * scatter->model[i];
-    sdm_fit_add_ignorance(p, spread);
+    sdm_fit_add_weak_prior(p, spread);
     for (size_t i = 0; i < size; i++)
         for (size_t j = 0; j <= i; j++) {
             const double c = sandwich(n, influence, spread, i, j);
@@ -105,7 +113,9 @@ static void fill(const fit_problem *p, const fit_scatter *scatter, const double 
         }
     for (size_t i = 0; i < size; i++) {
         const double variance = out->covariance[i * (size + 1)];
-        out->sd[i] = variance >= 0 ? sqrt(variance) : NAN; // not 0, which says that it is known
+        out->sd[i] = variance >= 0
+                         ? sqrt(variance)
+                         : NAN; // not 0, which would mean that the unknown is known exactly
     }
     for (size_t i = 0; i < size; i++)
         for (size_t j = 0; j < size; j++) {
@@ -119,18 +129,18 @@ static void fill(const fit_problem *p, const fit_scatter *scatter, const double 
 sdm_status sdm_fit_weigh_priors(const fit_problem *p, double *weight, double *noise_factor,
                                 sdm_error *err)
 {
-    const size_t n = p->sums.n_unknowns;
+    const size_t n = p->information.n_unknowns;
     size_t list[FIT_UNKNOWNS_MAX];
-    const size_t m = estimated(p, list);
-    fit_scatter scatter;
+    const size_t m = free_unknowns(p, list);
+    fit_score_covariance scatter;
     double *work = NULL;
-    sdm_status s = sdm_fit_scatter_create(p, 0, NULL, &scatter, err);
+    sdm_status s = sdm_fit_score_covariance_create(p, 0, NULL, &scatter, err);
     if (s) return s;
     *noise_factor = fmax(scatter.noise_factor, 1);
     s = SDM_ALLOC(&work, 4 * n * n, "matrices of the fit", err);
     if (!s) {
         double *influence = work + 3 * n * n;
-        const bool known = find_influence(p, false, influence, work);
+        const bool known = influence_compute(p, false, influence, work);
         for (size_t i = 0; i < p->n_params + 6; i++) weight[i] = 1;
         for (size_t k = 0; k < m; k++) {
             const size_t i = list[k];
@@ -141,30 +151,30 @@ sdm_status sdm_fit_weigh_priors(const fit_problem *p, double *weight, double *no
         }
     }
     sdm_free(work);
-    sdm_fit_scatter_dispose(&scatter);
+    sdm_fit_score_covariance_dispose(&scatter);
     return s;
 }
 
 sdm_status sdm_fit_posterior(const fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
-    const size_t n = p->sums.n_unknowns;
+    const size_t n = p->information.n_unknowns;
     const double *spacing = p->maps.grid.spacing;
     out->model_error_mm = model_error(p);
     const double model_mm =
         out->model_error_mm > 0 ? MODEL_STEPS * fmax(spacing[0], fmax(spacing[1], spacing[2])) : 0;
-    fit_scatter scatter = {0};
+    fit_score_covariance scatter = {0};
     double *work = NULL;
     sdm_status s = SDM_ALLOC(&work, 4 * n * n, "matrices of the fit", err);
     if (s) return s;
     double *influence = work + 3 * n * n;
-    const bool known = find_influence(p, true, influence, work);
-    s = sdm_fit_scatter_create(p, model_mm, known ? influence : NULL, &scatter, err);
+    const bool known = influence_compute(p, true, influence, work);
+    s = sdm_fit_score_covariance_create(p, model_mm, known ? influence : NULL, &scatter, err);
     out->noise_factor = scatter.noise_factor;
-    if (!s && known) fill(p, &scatter, influence, work, out);
+    if (!s && known) covariance_fill(p, &scatter, influence, work, out);
     if (!s && !known)
         s = sdm_fail(err, SDM_E_QUALITY,
                      "the image does not determine the shape: its information is singular");
     sdm_free(work);
-    sdm_fit_scatter_dispose(&scatter);
+    sdm_fit_score_covariance_dispose(&scatter);
     return s;
 }

@@ -1,17 +1,18 @@
-/* The posterior at the maximum: covariance, and what it stands on. */
+/* Uncertainty of a fit: the covariance of the estimate, and the weights of the priors. */
 #ifndef FIT_POSTERIOR_H
 #define FIT_POSTERIOR_H
 
-#include "fit/solver/newton.h"
+#include "fit/solver/problem.h"
 
-/* Fills covariance, sd, correlation, noise_factor and model_error_mm of *out, whose arrays are
- * there. */
+/* Fills covariance, sd, correlation, noise_factor and model_error_mm of *out, whose arrays must be
+   allocated. SDM_E_QUALITY: the information is singular; the matrices then keep their values. */
 sdm_status sdm_fit_posterior(const fit_problem *p, sdm_fit_result *out, sdm_error *err);
 
-/* weight[n_params + 6] of the log prior of each unknown beside a log-likelihood that counts
-   correlated values as independent: its variance as the residuals scatter over that as if they were
-   independent, at least 1 (the magnitude adjustment of Pauli, Racugno and Ventura 2011, along each
-   unknown). *noise_factor: as in sdm_fit_result. */
+/* weight[n_params + 6]: factor of each log prior. The log-likelihood counts correlated samples as
+   independent, which makes it too sharp beside a prior. Along each unknown its factor is the
+   sandwich variance over the variance for independent samples, at least 1 (magnitude adjustment,
+   Pauli, Racugno and Ventura 2011). *noise_factor: a rough estimate of that in sdm_fit_result, at
+   least 1. */
 sdm_status sdm_fit_weigh_priors(const fit_problem *p, double *weight, double *noise_factor,
                                 sdm_error *err);
 

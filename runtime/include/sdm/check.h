@@ -11,20 +11,21 @@ extern "C" {
 
 #define SDM_CHECK_POINTS 1000
 
-/* Error = value of the map - exact distance, mm, at the voxels nearest to SDM_CHECK_POINTS points
-   that are spread evenly over the true surface: within about half a voxel of it, where the zero
-   surface of the map is decided. No interpolation is involved: an exact map has errors of rounding
-   only. A sample: the largest error of all voxels is a little larger, and a surface of the map
-   where the true one is far away is not seen. NaN when no voxel was used. */
+/* Error = value of the map minus exact distance, mm, at the voxels nearest to SDM_CHECK_POINTS
+   points spread evenly over the true surface. These voxels lie within about half a voxel of the
+   surface and decide where the zero surface of the map is. Nothing is interpolated: an exact map
+   has rounding errors only. The check is a sample: the largest error over all voxels is somewhat
+   larger than max_mm, and a false surface far from the true one is not found. All errors are NaN if
+   used == 0. */
 typedef struct sdm_check {
-    double mean_mm, rmse_mm, q95_mm,
-        max_mm;     /* |error|: mean, root mean square, 95 % quantile (nearest rank), largest */
-    double bias_mm; /* mean error; above 0: the map's surface lies inside the true one */
-    size_t used;    /* points in voxels of the grid */
-    size_t outside; /* points that are in none */
+    /* abs(error): mean, root mean square, 95 % quantile (nearest rank), largest. */
+    double mean_mm, rmse_mm, q95_mm, max_mm;
+    double bias_mm; /* mean error; > 0: the map's surface lies inside the true one */
+    size_t used;    /* points inside the grid */
+    size_t outside; /* points outside the grid, not checked */
 } sdm_check;
 
-/* Which figure a bound is for. */
+/* The statistic of the error that a bound applies to. */
 typedef enum sdm_check_stat {
     SDM_CHECK_MAX = 0,
     SDM_CHECK_Q95 = 1,
@@ -32,17 +33,20 @@ typedef enum sdm_check_stat {
     SDM_CHECK_MEAN = 3
 } sdm_check_stat;
 
-SDM_API double sdm_check_get(const sdm_check *c, sdm_check_stat stat); /* NaN for an unknown one */
-SDM_API const char *sdm_check_stat_name(sdm_check_stat stat); /* "max", "q95", "rmse", "mean" */
+/* Value of a statistic, mm; NaN for an unknown one. */
+SDM_API double sdm_check_get(const sdm_check *c, sdm_check_stat stat);
 
-/* Checks values[nz][ny][nx] against a prepared mesh. The same points for the same surface.
- * SDM_E_ARG, SDM_E_NOMEM. [any thread] */
+/* "max", "q95", "rmse" or "mean"; "unknown" for an unknown one. */
+SDM_API const char *sdm_check_stat_name(sdm_check_stat stat);
+
+/* Checks values[nz][ny][nx] against the surface of `engine`. The points are the same for the same
+   surface. SDM_E_ARG, SDM_E_NOMEM. [any thread] */
 SDM_API sdm_status sdm_check_map(const sdm_exact *engine, const sdm_grid *grid, const float *values,
                                  sdm_check *out, sdm_error *err);
 
-/* The same for a shape at p[n_params]: makes mesh and engine, which is most of the time and does
-   not depend on the grid. Errors of sdm_instance_mesh() and sdm_exact_create(), too. [any thread]
- */
+/* Checks values[nz][ny][nx] against a shape at p[n_params]. It builds mesh and engine, which takes
+   most of the time, however small the grid is. Also returns the errors of sdm_instance_mesh() and
+   sdm_exact_create(). [any thread] */
 SDM_API sdm_status sdm_check_shape(const sdm_instance *shape, const double *p, const sdm_grid *grid,
                                    const float *values, sdm_check *out, sdm_error *err);
 

@@ -1,5 +1,5 @@
-/* The runtime: a model opened once, maps generated into the caller's memory from any number of
- * threads. */
+/* The runtime: opens a model once and generates maps into the caller's memory, from any number of
+   threads. */
 #ifndef SDM_RUNTIME_H
 #define SDM_RUNTIME_H
 
@@ -10,104 +10,114 @@
 extern "C" {
 #endif
 
-/* What happens to parameters outside the range the network was trained on. They are never answered
- * in silence. */
+/* Treatment of parameters outside the range that the network was trained on. Such a map is never
+   returned without an error or a flag in the result. */
 typedef enum sdm_range_policy {
-    SDM_RANGE_REFUSE = 0, /* SDM_E_RANGE */
-    SDM_RANGE_CLAMP,      /* moved to the nearest allowed value, flagged in the result */
-    SDM_RANGE_EXACT /* computed by the exact engine from the shape, flagged in the result; needs an
-                       instance */
+    /* SDM_E_RANGE. */
+    SDM_RANGE_REFUSE = 0,
+    /* Parameters are moved to the nearest allowed value; the result has `clamped` set. */
+    SDM_RANGE_CLAMP,
+    /* The exact engine computes the map from the shape; needs exact_shape. The result has `source`
+       SDM_SOURCE_EXACT. */
+    SDM_RANGE_EXACT
 } sdm_range_policy;
 
 typedef enum sdm_source { SDM_SOURCE_NETWORK = 0, SDM_SOURCE_EXACT = 1 } sdm_source;
 
-/* Why the exact engine made a map. */
+/* Why the exact engine computed a map. */
 typedef enum sdm_reason {
     SDM_REASON_NONE = 0,
     SDM_REASON_RANGE = 1, /* a parameter outside the trained range */
-    SDM_REASON_ERROR = 2  /* the network's map was over max_error_mm */
+    SDM_REASON_ERROR = 2  /* the error of the network's map was above max_error_mm */
 } sdm_reason;
 
-/* How one map was made. */
+/* How a map was computed. */
 typedef struct sdm_result {
     sdm_source source;
-    bool clamped;      /* a parameter was moved */
-    double error_mm;   /* RMSE to expect: held-out RMSE of the network; 0 for the exact engine */
-    sdm_reason reason; /* of the exact engine */
-    bool checked;      /* check is filled */
-    sdm_check check;   /* errors found in the network's map, also when it was replaced */
+    bool clamped;      /* a parameter was moved into its range */
+    double error_mm;   /* expected root mean square error: that on held-out maps; 0 if exact */
+    sdm_reason reason; /* if source is SDM_SOURCE_EXACT */
+    bool checked;      /* `check` is valid */
+    sdm_check check;   /* of the network's map, even if it was replaced by an exact one */
 } sdm_result;
 
-/* Zero-initialise; grows at its end only. */
+/* Initialise with zeros. Later versions add members at the end only. */
 typedef struct sdm_generate_opts {
     sdm_range_policy policy;
-    const sdm_instance *exact_shape; /* for SDM_RANGE_EXACT and checks: sdm_runtime_instance() or
-                                        the caller's; else NULL */
-    int n_threads;                   /* 0: the OpenMP default; same bits for every value */
-    bool check;                      /* every map of the network is checked: sdm_check_map() */
-    double max_error_mm;         /* > 0: checks; a worse map is replaced under SDM_RANGE_EXACT, else
-                                    SDM_E_QUALITY; 0: no bound */
-    sdm_check_stat max_error_of; /* the figure that max_error_mm bounds */
+    /* For SDM_RANGE_EXACT and checks: from sdm_runtime_instance() or the caller's own; else NULL.
+     */
+    const sdm_instance *exact_shape;
+    int n_threads; /* 0: the OpenMP default; the same bits for every value */
+    bool check;    /* checks every map of the network with sdm_check_map() */
+    /* > 0: every map is checked. One with a larger error is replaced by an exact map under
+       SDM_RANGE_EXACT, else it gives SDM_E_QUALITY. 0: no bound. */
+    double max_error_mm;
+    sdm_check_stat max_error_of; /* the statistic that max_error_mm bounds */
 } sdm_generate_opts;
 
-/* One map: values[nz][ny][nx], mm, negative inside, written at the voxels of the model's grid.
-   params[n_params] in the model's order. opts, result may be NULL. SDM_E_RANGE names the parameter,
-   its value and the range (NaN and infinities always fail). SDM_E_QUALITY: over max_error_mm;
-   values and result are written all the same. [any thread] */
+/* One map: values[nz][ny][nx] on the model's grid, mm, negative inside, for params[n_params] in the
+   model's order. opts and result may be NULL. SDM_E_RANGE names the parameter, its value and its
+   range; NaN and infinities always fail. SDM_E_QUALITY: the error is above max_error_mm; values and
+   result are written nevertheless. [any thread] */
 SDM_API sdm_status sdm_generate(const sdm_model *m, const double *params,
                                 const sdm_generate_opts *opts, float *values, sdm_result *result,
                                 sdm_error *err);
 
-/* A batch: params[n][n_params] -> values[n][nz][ny][nx], results[n] (may be NULL). All or nothing:
-   parameters of all are checked before the first is computed; the message says which one failed.
-   SDM_E_QUALITY: all are written, the message names the first that is over max_error_mm. [any
-   thread] */
+/* n maps: params[n][n_params] -> values[n][nz][ny][nx], results[n] (may be NULL). All parameters
+   are checked before the first map is computed; if one fails, no map is written and the message
+   says which one. SDM_E_QUALITY: all maps are written; the message names the first one above
+   max_error_mm. [any thread] */
 SDM_API sdm_status sdm_generate_batch(const sdm_model *m, const double *params, size_t n,
                                       const sdm_generate_opts *opts, float *values,
                                       sdm_result *results, sdm_error *err);
 
-/* Map and derivatives: jacobian[n_params][nz][ny][nx], mm per unit; of the network, or by
-   sdm_exact_shape_jacobian() where the exact engine makes the map. At clamped parameters they are
-   the network's at the end of the range. A `pod` network takes less time for it than for n_params +
-   1 calls of sdm_generate(). The map changes smoothly with the parameters. Where weights are bytes
-   it differs from that of sdm_generate() by rounding: of cochleas 2e-4 mm (root mean square), 2e-3
-   mm at most; and rounding adds to a derivative, of the largest one by the same parameter, 2e-4
-   (root mean square), 1.5e-3 at most. Errors as above, SDM_E_PLUGIN as there. [any thread] */
+/* Map and derivatives: jacobian[n_params][nz][ny][nx] = derivative of the map by each parameter, mm
+   per unit of the parameter; from the network, or from sdm_exact_shape_jacobian() if the exact
+   engine computes the map. For clamped parameters it is the network's derivative at the end of the
+   range. For a `pod` network it takes less time than n_params + 1 calls of sdm_generate().
+   The map depends smoothly on the parameters. If weights are stored as bytes, it differs from that
+   of sdm_generate() by rounding: for cochleas by 2e-4 mm root mean square, 2e-3 mm at most; and the
+   error of the derivatives is, relative to the largest derivative by the same parameter, 2e-4 root
+   mean square, 1.5e-3 at most. Errors as for sdm_generate() and sdm_exact_shape_jacobian(). [any
+   thread] */
 SDM_API sdm_status sdm_generate_jacobian(const sdm_model *m, const double *params,
                                          const sdm_generate_opts *opts, float *values,
                                          float *jacobian, sdm_result *result, sdm_error *err);
 
-/* Map and derivative along direction[n_params]: tangent[nz][ny][nx] = J direction, mm, cheaper than
-   the Jacobian; otherwise the same. [any thread] */
+/* Map and directional derivative: tangent[nz][ny][nx] = J direction, mm, with direction[n_params]
+   and the Jacobian J of sdm_generate_jacobian(). Cheaper than the Jacobian; otherwise the same.
+   [any thread] */
 SDM_API sdm_status sdm_generate_jvp(const sdm_model *m, const double *params,
                                     const double *direction, const sdm_generate_opts *opts,
                                     float *values, float *tangent, sdm_result *result,
                                     sdm_error *err);
 
-/* gradient[n_params] = J^T adjoint[nz][ny][nx]: the derivative of any function of the map from its
-   derivative by the voxels, at the cost of a few maps whatever the number of parameters. There is
-   no map, so `check` and `max_error_mm` do nothing; otherwise as sdm_generate_jacobian(). [any
-   thread] */
+/* gradient[n_params] = J^T adjoint[nz][ny][nx]: if `adjoint` is the derivative of a function of the
+   map with respect to the voxels, this is its derivative with respect to the parameters. Costs as
+   much as a few maps, whatever the number of parameters. No map is computed, so `check` and
+   `max_error_mm` have no effect; otherwise as sdm_generate_jacobian(). [any thread] */
 SDM_API sdm_status sdm_generate_vjp(const sdm_model *m, const double *params, const float *adjoint,
                                     const sdm_generate_opts *opts, double *gradient,
                                     sdm_result *result, sdm_error *err);
 
-/* The shape the model was trained on, with its options, from a registry that knows it; checks that
-   the parameters agree. Only what needs the exact shape needs this. SDM_E_PLUGIN when the registry
-   does not have it; SDM_E_IO: a data file is neither where it was when the network was trained nor
-   beside the model; SDM_E_FORMAT: it has another content. */
+/* *out = new instance of the shape that the model was trained on, with the same options, from a
+   registry that contains the shape; free with sdm_instance_free(). Only for the exact engine:
+   networks do not need it. SDM_E_PLUGIN: the registry does not contain the shape, or its parameters
+   differ from the model's. SDM_E_IO: a data file is neither at its path of the training nor in the
+   model's folder; SDM_E_FORMAT: its content differs from that of the training. */
 SDM_API sdm_status sdm_runtime_instance(const sdm_model *m, const sdm_registry *r,
                                         sdm_instance **out, sdm_error *err);
 
-/* Exact map of a shape at p: mesh, engine, map, in one call. report may be NULL. [any thread] */
+/* Exact map of a shape at p: builds mesh and engine and computes the map. report may be NULL. [any
+   thread] */
 SDM_API sdm_status sdm_exact_shape_map(const sdm_instance *shape, const double *p,
                                        const sdm_exact_opts *opts, const sdm_grid *grid,
                                        float *values, sdm_exact_report *report, sdm_error *err);
 
-/* Exact map and its derivatives: jacobian[n_params][nz][ny][nx], mm per unit of the parameter
-   (sdm_exact_map_derivative() says what it is and where there is none), from
-   sdm_instance_velocity(). values, report may be NULL. SDM_E_PLUGIN when the number of vertices
-   depends on the parameters. [any thread] */
+/* Exact map and its derivatives: jacobian[n_params][nz][ny][nx], mm per unit of the parameter, from
+   sdm_instance_velocity(); sdm_exact_map_derivative() defines them and says where none exists.
+   values and report may be NULL. SDM_E_PLUGIN: the number of vertices depends on the parameters.
+   [any thread] */
 SDM_API sdm_status sdm_exact_shape_jacobian(const sdm_instance *shape, const double *p,
                                             const sdm_exact_opts *opts, const sdm_grid *grid,
                                             float *values, float *jacobian,

@@ -1,4 +1,4 @@
-/* The shapes that come with the program: one line each in shapes/shapes.def. */
+/* The shapes that are built into the library (list: shapes/shapes.def). */
 #ifndef SDM_BUILTIN_SHAPES_H
 #define SDM_BUILTIN_SHAPES_H
 
@@ -8,8 +8,8 @@
 extern "C" {
 #endif
 
-/* Adds every built-in shape to a registry, in the order of shapes.def. SDM_E_PLUGIN (a name is
- * taken), SDM_E_NOMEM. */
+/* Adds all built-in shapes to a registry, in the order of shapes.def. SDM_E_PLUGIN if a name exists
+ * already, SDM_E_NOMEM. */
 SDM_API sdm_status sdm_builtin_shapes_add(sdm_registry *registry, sdm_error *err);
 
 #ifdef __cplusplus

@@ -11,6 +11,9 @@
 #ifdef WITH_IMAGE
 #include "sdm/image.h"
 #endif
+#ifdef WITH_PICTURE
+#include "sdm/picture.h"
+#endif
 #ifdef WITH_VDB
 #include "sdm/vdb.h"
 #endif
@@ -96,6 +99,12 @@ int main(int argc, char **argv)
 #ifdef WITH_IMAGE
     snprintf(path, sizeof path, "%s/map.nrrd", argv[1]);
     need(sdm_image_write(path, &grid, values, "octahedron", &err), &err);
+#endif
+#ifdef WITH_PICTURE
+    snprintf(path, sizeof path, "%s/map.svg", argv[1]);
+    need(sdm_picture_slices(path, &grid, &(sdm_picture_map){"octahedron", values, false}, 1, NULL,
+                            0, &err),
+         &err);
 #endif
 #ifdef WITH_VDB
     snprintf(path, sizeof path, "%s/map.vdb", argv[1]);

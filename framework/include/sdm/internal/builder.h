@@ -1,5 +1,5 @@
-/* A mesh that grows vertex by vertex and polygon by polygon, for code that does not know the counts
- * beforehand. */
+/* Builds a mesh vertex by vertex and polygon by polygon when the counts are not known in advance.
+ */
 #ifndef SDM_INTERNAL_BUILDER_H
 #define SDM_INTERNAL_BUILDER_H
 
@@ -9,21 +9,23 @@
 extern "C" {
 #endif
 
-/* A mesh under construction: n_vert and n_tri say what is filled, the mesh's own counts what there
- * is room for. */
+/* A mesh under construction. n_vert and n_tri are the counts filled so far; those in *mesh are
+ * capacities until sdm_builder_finish(). */
 typedef struct sdm_builder {
-    const char *path; /* for messages */
+    const char *path; /* file name for messages of the callers */
     sdm_mesh *mesh;
     size_t n_vert, n_tri;
 } sdm_builder;
 
-/* Both grow geometrically; sdm_builder_finish() sets the mesh's counts to what is filled. */
+/* Append a vertex or a triangle; the arrays grow geometrically. sdm_builder_finish() sets the
+ * counts of the mesh. Errors as sdm_mesh_reserve(). */
 sdm_status sdm_builder_vertex(sdm_builder *b, const double x[3], sdm_error *err);
 sdm_status sdm_builder_triangle(sdm_builder *b, uint32_t v0, uint32_t v1, uint32_t v2,
                                 sdm_error *err);
 sdm_status sdm_builder_finish(sdm_builder *b, sdm_error *err);
 
-/* A polygon given corner by corner becomes a fan around its first corner. Start with n = 0. */
+/* A polygon that is triangulated as a fan around its first corner. Zero-initialise for each
+ * polygon, then call sdm_builder_corner() with the vertex index of each corner in turn. */
 typedef struct sdm_fan {
     size_t n;
     uint32_t first, last;

@@ -1,5 +1,5 @@
-/* CRC-64/XZ (reflected polynomial 0xC96C5795D7870F42, ECMA-182): detects every burst of up to 64
- * bits. */
+/* CRC-64/XZ (reflected polynomial 0xC96C5795D7870F42, ECMA-182); it detects every burst error of up
+ * to 64 bits. */
 #ifndef SDM_CHECKSUM_H
 #define SDM_CHECKSUM_H
 
@@ -13,7 +13,8 @@
 extern "C" {
 #endif
 
-/* Checksum of `size` bytes at `data`, going on from `crc` (0 at the start). [any thread] */
+/* Checksum of size bytes at data, continued from the checksum `crc` of the bytes before (0 at the
+ * start). [any thread] */
 SDM_INTERNAL_API uint64_t sdm_crc64(uint64_t crc, const void *data, size_t size);
 
 /* Checksum of the content of a regular file. SDM_E_IO, SDM_E_NOMEM. [any thread] */

@@ -1,4 +1,4 @@
-/* Time that has gone by. */
+/* Monotonic clock for measuring elapsed time. */
 #ifndef SDM_CLOCK_H
 #define SDM_CLOCK_H
 
@@ -8,7 +8,8 @@
 extern "C" {
 #endif
 
-/* Seconds of a clock that never goes back; differences alone mean something. [any thread] */
+/* Time in seconds since an arbitrary start; it never decreases, so only differences are meaningful.
+ * [any thread] */
 double sdm_clock(void);
 
 #ifdef __cplusplus

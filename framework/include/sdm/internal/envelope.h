@@ -1,4 +1,5 @@
-/* One line of an exact Euclidean distance transform. */
+/* One-dimensional squared distance transform, the building block of exact Euclidean distance
+ * transforms. */
 #ifndef SDM_ENVELOPE_H
 #define SDM_ENVELOPE_H
 
@@ -10,10 +11,10 @@
 extern "C" {
 #endif
 
-/* f[i], i < n, becomes the least of f[k] + (spacing (i - k))^2 over all k: the lower envelope of
-   parabolas, in linear time (Felzenszwalb and Huttenlocher 2012). f is a squared distance, mm^2
-   where spacing is mm: 0 or more, INFINITY where there is nothing; a line of nothing stays as it
-   is. scratch: 3 n numbers. Cannot fail. [any thread, on f and scratch of its own] */
+/* Replaces f[i], 0 <= i < n, by min over k of f[k] + (spacing (i - k))^2: the lower envelope of
+ * parabolas, in linear time (Felzenszwalb and Huttenlocher 2012). f: squared distances >= 0, mm^2
+ * for a spacing in mm; INFINITY where no distance is known (if that holds for all i, f is
+ * unchanged). scratch[3 n]. Cannot fail. [any thread, with its own f and scratch] */
 void sdm_lower_envelope(double *f, int64_t n, double spacing, double *scratch);
 
 #ifdef __cplusplus

@@ -1,5 +1,5 @@
-/* Whole-file reading with a size limit, and atomic writing: temporary name, fsync, rename, fsync of
- * the folder. */
+/* Reads whole files up to a size limit and writes files atomically: temporary name, fsync, rename,
+ * fsync of the folder. */
 #ifndef SDM_FILE_H
 #define SDM_FILE_H
 
@@ -13,41 +13,42 @@
 extern "C" {
 #endif
 
-/* Reads a regular file of at most max_bytes into a new block (sdm_free()), with one zero byte
-   behind the content. SDM_E_IO when it cannot be read, SDM_E_FORMAT when it is larger, SDM_E_NOMEM
-   when memory cannot hold it. */
+/* Reads a regular file of at most max_bytes into a new block, followed by a zero byte; free it with
+ * sdm_free(). *size: bytes of the file. SDM_E_IO if it cannot be read, SDM_E_FORMAT if it is
+ * larger, SDM_E_NOMEM. On error *data is NULL. [any thread] */
 sdm_status sdm_file_read(const char *path, uint64_t max_bytes, uint8_t **data, size_t *size,
                          sdm_error *err);
 
-/* A file under construction: nothing appears under its final name before sdm_outfile_commit()
- * succeeds. */
+/* An output file: nothing appears under its final name before sdm_outfile_commit() succeeds. */
 typedef struct sdm_outfile sdm_outfile;
 
-/* Opens a temporary file beside `path`, of its own for every call, also of one path. SDM_E_IO when
-   the folder cannot be written, and when `path` is neither a regular file (or a link to one: the
-   link is replaced) nor new. */
+/* Opens a new temporary file in the folder of `path`, with a unique name for every call. An
+ * existing regular file at `path` (or a link to one) is replaced at commit. SDM_E_IO if the folder
+ * is not writable or `path` is not a regular file. SDM_E_NOMEM. */
 SDM_INTERNAL_API sdm_status sdm_outfile_open(const char *path, sdm_outfile **out, sdm_error *err);
 
-/* Name of the temporary file, for libraries that write by name; valid until commit or discard. */
+/* Name of the temporary file, for libraries that open files by name; valid until commit or
+ * discard. */
 SDM_INTERNAL_API const char *sdm_outfile_temp_path(const sdm_outfile *f);
 
-/* Appends bytes (buffered). After an error only discard is left. */
+/* Appends bytes (buffered). After an error only sdm_outfile_discard() is allowed. SDM_E_IO. */
 SDM_INTERNAL_API sdm_status sdm_outfile_write(sdm_outfile *f, const void *data, size_t size,
                                               sdm_error *err);
 
-/* Appends formatted text. */
+/* Appends formatted text. SDM_E_IO, SDM_E_NOMEM. */
 sdm_status sdm_outfile_printf(sdm_outfile *f, sdm_error *err, const char *fmt, ...)
     SDM_PRINTF(3, 4);
 
-/* Flushes, fsyncs, renames to the final name and fsyncs the folder. Frees *f in every case; on
-   error the temporary file is removed and a file of the final name is as it was. */
+/* Flushes, calls fsync, renames to the final name and calls fsync for the folder. Frees *f in all
+ * cases. On error (SDM_E_IO) the temporary file is removed and an existing file of the final name
+ * is unchanged. */
 SDM_INTERNAL_API sdm_status sdm_outfile_commit(sdm_outfile **f, sdm_error *err);
 
-/* Removes the temporary file and frees *f; NULL is fine. */
+/* Removes the temporary file and frees *f; *f may be NULL. */
 SDM_INTERNAL_API void sdm_outfile_discard(sdm_outfile **f);
 
-/* Creates `path` and its missing parents (mode 0777 under the umask); no error when it exists as a
- * folder. */
+/* Creates the folder `path` and its missing parents (mode 0777 with the umask). It is no error if
+ * the folder exists. SDM_E_ARG, SDM_E_IO, SDM_E_NOMEM. */
 sdm_status sdm_make_folder(const char *path, sdm_error *err);
 
 #ifdef __cplusplus

@@ -1,4 +1,5 @@
-/* Memory for the parts of the library: sizes, growth, and the trap of the tests. */
+/* Memory functions for use inside the library (see sdm/memory.h): overflow checks, growing arrays,
+ * simulated failures for tests. */
 #ifndef SDM_INTERNAL_HEAP_H
 #define SDM_INTERNAL_HEAP_H
 
@@ -9,20 +10,21 @@
 extern "C" {
 #endif
 
-/* *out = a * b; SDM_E_NOMEM on overflow. */
+/* *out = a * b; SDM_E_NOMEM on overflow. [any thread] */
 SDM_INTERNAL_API sdm_status sdm_mul(size_t a, size_t b, size_t *out, sdm_error *err);
 
-/* The same without the zeros, for what is written before it is read: clearing costs as much as
- * writing. */
+/* As sdm_alloc(), but without zeroing, for blocks that are completely written before they are read:
+ * zeroing costs as much as writing. [any thread] */
 sdm_status sdm_alloc_unset(void **out, size_t count, size_t size, const char *what, sdm_error *err);
 
-/* Grows *block from old_count to new_count elements (geometric growth is the caller's); the added
-   part is zeroed. On error *block is unchanged and still owned by the caller. */
+/* Changes the size of *block from old_count to new_count elements; new elements are zero. The
+ * caller chooses a geometric growth. *block may be NULL. On SDM_E_NOMEM *block is unchanged and
+ * still owned by the caller. [any thread] */
 SDM_INTERNAL_API sdm_status sdm_grow(void **block, size_t old_count, size_t new_count, size_t size,
                                      const char *what, sdm_error *err);
 
-/* For tests: lets the n-th following sdm_alloc() fail (1 = the next one); 0 switches the trap off.
- * Not thread safe. */
+/* For tests: makes the n-th allocation from now fail (1: the next one); 0: none. Counts the
+ * allocations of all threads. */
 void sdm_alloc_fail_after(unsigned long n);
 
 #ifdef __cplusplus

@@ -1,5 +1,5 @@
-/* A growing text buffer, JSON on top of it, number parsing without the locale, and "did you mean".
- */
+/* Growing text buffer, JSON writer, conversion of numbers independent of the locale, and similar
+ * names for "did you mean". */
 #ifndef SDM_TEXT_H
 #define SDM_TEXT_H
 
@@ -14,8 +14,9 @@
 extern "C" {
 #endif
 
-/* Zero-initialise; sdm_text_dispose() frees. `data` is NUL-terminated (NULL while empty). A failed
-   append sets `failed` and makes the following ones do nothing, so a chain needs one check. */
+/* Text buffer. Zero-initialise it; sdm_text_dispose() frees it. `data` is NUL-terminated (NULL
+ * while empty). A failed sdm_text_add() sets `failed`, and later calls do nothing, so one check at
+ * the end suffices. */
 typedef struct sdm_text {
     char *data;
     size_t size, capacity;
@@ -25,9 +26,9 @@ typedef struct sdm_text {
 SDM_INTERNAL_API void sdm_text_dispose(sdm_text *t);
 SDM_INTERNAL_API void sdm_text_add(sdm_text *t, const char *fmt, ...) SDM_PRINTF(2, 3);
 
-/* JSON writer: objects and arrays with commas placed by the writer. `key` is NULL inside an array.
-   Numbers are written with the fewest digits that read back the same; NaN and infinities become
-   null. */
+/* JSON writer. It inserts commas and quotes strings. `key` is NULL inside an array. Numbers have
+ * the fewest digits that read back to the same value; NaN and infinities become null. Errors set
+ * text.failed. */
 typedef struct sdm_json {
     sdm_text text;
     int depth;
@@ -43,16 +44,17 @@ void sdm_json_bool(sdm_json *j, const char *key, bool v);
 void sdm_json_text(sdm_json *j, const char *key, const char *v);
 void sdm_json_dispose(sdm_json *j);
 
-/* Parses the whole of `s` as a finite decimal number; the locale plays no part. False for anything
-   else, NaN, infinities and overflow included. */
+/* Parses the whole string s as a finite decimal number with '.' as decimal point. Returns false for
+ * anything else, including NaN, infinities and overflow. */
 SDM_INTERNAL_API bool sdm_parse_real(const char *s, double *out);
 SDM_INTERNAL_API bool sdm_parse_int(const char *s, int64_t *out);
 
-/* Writes v with the fewest digits that read back the same; buf has 32 bytes; returns buf. */
+/* Writes v with the fewest digits that read back to the same value, with '.' as decimal point.
+ * Returns buf. */
 SDM_INTERNAL_API const char *sdm_format_real(double v, char buf[32]);
 
-/* The name nearest to `word` among names[n] (optimal string alignment distance), or NULL when none
- * is near. */
+/* The most similar of names[n] to `word` by optimal string alignment distance, or NULL if none is
+ * similar. */
 const char *sdm_nearest_name(const char *word, const char *const *names, size_t n);
 
 #ifdef __cplusplus

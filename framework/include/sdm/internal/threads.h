@@ -1,4 +1,4 @@
-/* How many threads a call takes, and which of them one is. */
+/* Number of threads for a parallel section, and number of the calling thread. */
 #ifndef SDM_THREADS_H
 #define SDM_THREADS_H
 
@@ -8,12 +8,13 @@
 extern "C" {
 #endif
 
-/* `wanted` where it is positive, else as many as OpenMP would take, but at most 64 or two for each
-   processor, whichever is more: OpenMP ends the program where it cannot start as many. 1 in a build
-   without OpenMP. [any thread] */
+/* Number of threads to use: `wanted` if positive, else OpenMP's default; at most max(64, 2 *
+ * processors), because OpenMP aborts the program if it cannot start a thread. 1 in a build without
+ * OpenMP. [any thread] */
 int sdm_threads(int wanted);
 
-/* Number of the calling thread in its team, 0 for the one that called the library. [any thread] */
+/* Number of the calling thread in its OpenMP team, from 0; 0 outside of parallel sections. [any
+ * thread] */
 int sdm_thread(void);
 
 #ifdef __cplusplus

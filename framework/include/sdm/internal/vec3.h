@@ -1,19 +1,22 @@
-/* Three-vectors in double: the few operations that geometry needs. */
+/* Operations on three-dimensional vectors of doubles. */
 #ifndef SDM_GEOM_VEC3_H
 #define SDM_GEOM_VEC3_H
 
 #include <math.h>
 
+/* r = a - b */
 static inline void v3_sub(const double a[3], const double b[3], double r[3])
 {
     for (int i = 0; i < 3; i++) r[i] = a[i] - b[i];
 }
 
+/* a . b */
 static inline double v3_dot(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
+/* r = a x b; r must not overlap a or b */
 static inline void v3_cross(const double a[3], const double b[3], double r[3])
 {
     r[0] = a[1] * b[2] - a[2] * b[1];
@@ -21,8 +24,10 @@ static inline void v3_cross(const double a[3], const double b[3], double r[3])
     r[2] = a[0] * b[1] - a[1] * b[0];
 }
 
+/* length of a */
 static inline double v3_norm(const double a[3]) { return sqrt(v3_dot(a, a)); }
 
+/* squared distance of the points a and b */
 static inline double v3_dist2(const double a[3], const double b[3])
 {
     double d[3];
@@ -36,7 +41,7 @@ static inline void v3_along(const double a[3], double t, const double d[3], doub
     for (int i = 0; i < 3; i++) r[i] = a[i] + t * d[i];
 }
 
-/* Any unit vector v perpendicular to the unit vector u. */
+/* v = some unit vector perpendicular to the unit vector u */
 static inline void v3_perpendicular(const double u[3], double v[3])
 {
     int least = 0;

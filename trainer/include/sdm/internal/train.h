@@ -1,4 +1,4 @@
-/* Training: config and shape in, model file and run folder out. */
+/* Training: takes a configuration and a shape, writes a model file and the other files of a run. */
 #ifndef SDM_TRAIN_H
 #define SDM_TRAIN_H
 
@@ -11,58 +11,71 @@
 extern "C" {
 #endif
 
+/* Phases of a run, in order. Checkpoints store the number. */
 typedef enum sdm_phase {
+    /* Exact maps are computed. */
     SDM_PHASE_DATA = 0,
+    /* `pod`: local bases and global modes are computed from the maps. */
     SDM_PHASE_BASES,
-    SDM_PHASE_FIT,
+    /* `pod`: the MLP is fitted to the mode coefficients. Other kinds: the whole training. Its name
+       in metrics.jsonl is "fit". */
+    SDM_PHASE_MODE_FIT,
+    /* `pod`: all weights are trained together on maps. */
     SDM_PHASE_REFINE,
+    /* The finished model is measured on the held-out maps. */
     SDM_PHASE_EVALUATE
 } sdm_phase;
 
-/* Where training stands; given to the progress callback. */
+/* State of a run, passed to the progress callback. */
 typedef struct sdm_progress {
     sdm_phase phase;
-    double fraction;           /* of the whole budget, 0..1 */
-    int64_t step, samples;     /* optimiser steps; exact maps made so far */
-    double loss;               /* training loss, mm^2 (NaN when unknown) */
-    double heldout_rmse_mm;    /* last evaluation (NaN before the first) */
-    double samples_per_second; /* trained samples */
+    double fraction; /* used part of the whole budget, 0 .. 1 */
+    /* Optimiser steps; exact training maps computed so far. */
+    int64_t step, samples;
+    double loss; /* training loss, mm^2; NaN before the first step */
+    /* Held-out root mean square error at the last evaluation; NaN before the first. */
+    double heldout_rmse_mm;
+    /* Maps per second: computed ones in the data phase, trained ones later. */
+    double samples_per_second;
     double seconds, seconds_left;
 } sdm_progress;
 
+/* Callbacks of the caller; each may be NULL. */
 typedef struct sdm_train_hooks {
-    void (*progress)(
-        void *user,
-        const sdm_progress *p); /* on the training thread, about 10 times a second; may be NULL */
-    bool (*cancelled)(void *user); /* true: write a checkpoint, stop with SDM_E_CANCELLED; may be
-                                      NULL; any thread */
-    void (*message)(void *user,
-                    const char *line); /* notices, one line; may be NULL; training thread */
+    /* Called by the training thread about 10 times a second at most. */
+    void (*progress)(void *user, const sdm_progress *p);
+    /* Called by any thread. true: the run writes a checkpoint and ends with SDM_E_CANCELLED. */
+    bool (*cancelled)(void *user);
+    /* Called by the training thread with a notice of one line. */
+    void (*message)(void *user, const char *line);
     void *user;
 } sdm_train_hooks;
 
 typedef struct sdm_train_report {
     char model_path[SDM_PATH_TEXT_MAX];
     sdm_accuracy accuracy;
+    /* Optimiser steps; training maps. */
     int64_t steps, samples;
     double seconds;
 } sdm_train_report;
 
-/* Trains what the config says into `folder`: config.yaml (resolved), metrics.jsonl,
-   checkpoint.sdmc, model.sdm, loss.png. resume: goes on from the checkpoint in `folder`
-   (SDM_E_CONFIG when its config differs in more than the budget and output). */
+/* Trains a network as `config` says and writes into `folder`: config.yaml (with all defaults filled
+   in), metrics.jsonl, checkpoint.sdmc (removed at the end of the run), model.sdm, loss.png.
+   resume: continues from the checkpoint in `folder`; SDM_E_CONFIG if the checkpoint's configuration
+   differs in more than budget and output. hooks and report may be NULL. */
 sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const char *folder,
                      bool resume, const sdm_train_hooks *hooks, sdm_train_report *report,
                      sdm_error *err);
 
-/* Ranges the network is trained on: the shape's, narrowed by the config; min[n], max[n].
-   SDM_E_CONFIG: an unknown parameter, or a range wider than the shape's, with file:line:column. */
+/* Parameter ranges of the training, min[n] and max[n]: those of the shape, narrowed by the
+   configuration. SDM_E_CONFIG with file:line:column: a parameter is unknown, or its range is wider
+   than the shape's. */
 sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape, double *min,
                             double *max, sdm_error *err);
 
-/* Parameters of random shape `index` of stream `stream` within [min, max]^n: Sobol' points (Joe and
-   Kuo 2008) with a random digital shift up to 16 dimensions, counter-based uniform numbers beyond;
-   p[n]. [any thread] */
+/* Random parameter vector p[n] number `index` of stream `stream`, uniform within [min, max]: Sobol'
+   points (Joe and Kuo 2008) with a random digital shift for n <= 16, independent counter-based
+   random numbers for n > 16. Depends on the arguments only. [any thread] */
 void sdm_sample_params(uint64_t seed, uint64_t stream, uint64_t index, const double *min,
                        const double *max, size_t n, double *p);
 

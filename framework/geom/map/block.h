@@ -1,0 +1,38 @@
+/* State of the current block, shared by stages 3 to 6. Part of map.inc. */
+#ifndef SDM_GEOM_MAP_BLOCK_H
+#define SDM_GEOM_MAP_BLOCK_H
+
+#include "grid_scratch.h"
+
+/* The current block. Stages 3 to 5 use float positions relative to its centre, scaled. */
+typedef struct block {
+    const sdm_grid_job *job;
+    sdm_grid_scratch *scratch;
+    // [tile]: bit v is set where vector v begins inside the grid
+    uint8_t vectors_in_grid[8];
+    // bit t: tile t meets the region of at least one feature
+    unsigned tiles_met;
+    // bound on the rounding error of a region function within the block
+    float error;
+    // [tile][vector]: a feature whose squared distance from the vector's centre is larger is not
+    // the nearest one of any of its voxels
+    _Alignas(32) float far2[8][8];
+    // [level]: half[level] * sdm_block_group.extent bounds the change of a function from the centre
+    // of the block (SDM_BLOCKS), a tile or a vector to its corners
+    float half[SDM_PART_LEVELS];
+} block;
+
+/* Is a block a cube along x, y, z? Then a linear function with gradient g changes from its centre
+   to its corners by at most half (|gx| + |gy| + |gz|), which sdm_feature_group.sum holds. */
+static inline bool block_is_cube(const sdm_grid_job *job)
+{
+    const float *half = job->part[SDM_BLOCKS].half;
+    return job->aligned && half[0] == half[1] && half[0] == half[2];
+}
+
+/* Two squared distances in float that differ by less than k (d + 1) may have either order; returns
+   k = 8 e for e = block.error. For abs(error of d) <= 2 e, so abs(error of d^2) <= 4 (d + 1) e, and
+   twice that for two of them. */
+static inline float ambiguity(float error) { return 8 * error; }
+
+#endif

@@ -1,0 +1,39 @@
+/* Cells of Markdown and CSV tables, appended to a text, and writing the finished table to a file.
+ */
+#ifndef SDM_TABLE_H
+#define SDM_TABLE_H
+
+#include "sdm/internal/text.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Appends a Markdown text; a backslash precedes each of | * _ ` < \ [. */
+void sdm_markdown_text(sdm_text *t, const char *text);
+
+/* Appends the cell of a number with its closing bar, " 1.23 |": three significant digits; " - |"
+ * for NaN and infinities. sdm_markdown_plain() avoids exponents from 1e-3 to 1e6 and writes
+ * integers and values from 100 on without decimals: " 1235 |". */
+void sdm_markdown_real(sdm_text *t, double v);
+void sdm_markdown_plain(sdm_text *t, double v);
+
+/* Appends the line below the head of a table: n_left columns aligned left, then n_right columns
+ * aligned right. */
+void sdm_markdown_rule(sdm_text *t, size_t n_left, size_t n_right);
+
+/* Appends a CSV text in double quotes; quotes in it are doubled. */
+void sdm_csv_text(sdm_text *t, const char *text);
+
+/* Appends a comma and a CSV number with the fewest digits that read back the same; nothing after
+ * the comma for NaN and infinities. */
+void sdm_csv_real(sdm_text *t, double v);
+
+/* Writes the text to the file `path`, atomically as in sdm/internal/file.h. SDM_E_NOMEM: the text
+ * is incomplete, an allocation failed; SDM_E_IO. */
+sdm_status sdm_text_write(const sdm_text *t, const char *path, sdm_error *err);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,65 @@
+/* Evaluation of the objective: from a state to maps, samples, log-likelihood and derivatives. */
+#include "objective.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "prior.h"
+
+// sd of the logistic distribution of scale 1, pi / sqrt(3)
+#define LOGISTIC_SD 1.8137993642342178
+
+// Labels: blurring the distance by the sd of the logistic prior offsets a bias; without it the edge
+// lies inside a convex surface.
+double sdm_fit_field_blur(const fit_problem *p)
+{
+    const bool labels = !p->maps.share && p->target->kind != SDM_FIT_POINTS;
+    return labels ? p->state.l_ref * LOGISTIC_SD : p->maps.share ? p->state.blur : 0;
+}
+
+sdm_status sdm_fit_evaluate(fit_problem *p, sdm_error *err)
+{
+    const fit_state *state = &p->state;
+    sdm_status s = SDM_OK;
+    bool same = true;
+    // maps of the parameters
+    for (size_t k = 0; k < p->n_params; k++) same = same && p->maps_params[k] == state->params[k];
+    if (!same) {
+        p->maps_blur = p->maps_params[0] = NAN;
+        s = sdm_fit_maps_make(&p->maps, state->params, true, err);
+        if (!s) memcpy(p->maps_params, state->params, p->n_params * sizeof *state->params);
+    } else if (p->maps.cancelled && p->maps.cancelled(p->maps.user)) {
+        s = sdm_fail(err, SDM_E_CANCELLED, "fit stopped on request");
+    }
+    if (s) return s;
+    // the field seen through the blur
+    const double blur = sdm_fit_field_blur(p);
+    if (!(p->maps_blur == blur)) {
+        sdm_fit_maps_pack(&p->maps, blur, true);
+        p->maps_blur = blur;
+    }
+    // field, log-likelihood and derivatives at the samples
+    sdm_fit_observation_prepare(p->opts, p->target->kind, state, &p->observation);
+    s = sdm_fit_samples_evaluate(&p->samples, &p->maps, &p->observation, state, err);
+    if (!s)
+        sdm_fit_information_compute(&p->information, &p->samples, &p->observation,
+                                    p->opts->n_threads);
+    return s;
+}
+
+double sdm_fit_objective(const fit_problem *p)
+{
+    return p->information.log_likelihood + sdm_fit_prior(p, &p->state, NULL, NULL, NULL);
+}
+
+sdm_status sdm_fit_log_likelihood(fit_problem *p, const double *params, double *log_likelihood,
+                                  sdm_error *err)
+{
+    p->maps_params[0] = p->maps_blur = NAN;
+    const sdm_status s = sdm_fit_maps_make(&p->maps, params, false, err);
+    if (s) return s;
+    sdm_fit_maps_pack(&p->maps, sdm_fit_field_blur(p), false);
+    *log_likelihood =
+        sdm_fit_samples_log_likelihood(&p->samples, &p->maps, &p->observation, &p->state);
+    return SDM_OK;
+}

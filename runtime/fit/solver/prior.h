@@ -1,0 +1,27 @@
+/* Prior densities of the shape parameters and the pose. */
+#ifndef FIT_PRIOR_H
+#define FIT_PRIOR_H
+
+#include "problem.h"
+
+/* Whether any unknown that is estimated has a prior. */
+bool sdm_fit_has_prior(const fit_problem *p);
+
+/* Sd of parameter k before the fit, in its unit: of its prior, or of the uniform distribution over
+   its range where it has none. */
+double sdm_fit_prior_sd(const fit_problem *p, size_t k);
+
+/* Log prior density of state s, up to a constant: Gaussians, each multiplied by
+   problem->prior_weight. Adds its derivatives by the N = information.n_unknowns unknowns to
+   gradient[N] and its negative second derivatives to complete[N][N] and observed[N][N]; each of the
+   three may be NULL. */
+double sdm_fit_prior(const fit_problem *p, const fit_state *s, double *gradient, double *complete,
+                     double *observed);
+
+/* Adds the weakest prior to the information matrix a[N][N], for parameters and pose that have no
+   prior of their own: the precision of a uniform distribution over the range of a parameter and
+   over all rotations, and a sd of the shape's reach for translations. It keeps steps along
+   directions that the data leave open finite, and does not move the maximum. */
+void sdm_fit_add_weak_prior(const fit_problem *p, double *a);
+
+#endif

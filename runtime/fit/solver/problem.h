@@ -1,0 +1,76 @@
+/* The complete state of one fit, shared by the solver, the search for a start and the assessment.
+
+   Glossary
+   - sample: a voxel of the image, or a surface point, that the fit uses.
+   - field: the function of space through which the shape explains a sample: its signed distance
+     (mm, negative inside) or its share. It is computed on a map, a grid in the shape's frame.
+   - share: the part of a voxel that the shape fills, 0 .. 1, seen through the point spread.
+   - observation model: the probability of a sample's value given the field at the sample.
+   - tissue: a class of material with one intensity distribution (a Gaussian or Student's t). Some
+     tissues lie inside the shape, the others outside.
+   - appearance: weights, means and sd of all tissues.
+   - tissue field: weights of the outside tissues that vary smoothly in space.
+   - band: the samples near the surface, where the derivative of the field is not negligible.
+   - score: derivative of the log-likelihood, of one sample or of all.
+   - information: negative second derivative of the log-likelihood, the matrix of the normal
+     equations. `complete` pretends that the tissue of every sample is known (expected information
+     of expectation-maximisation); `observed` accounts for what is not known (Louis 1982).
+   - evidence: log-likelihood gained by the shape over a mixture of the same tissues without a
+     shape, less the cost of the shape's unknowns (Schwarz 1978). */
+#ifndef FIT_PROBLEM_H
+#define FIT_PROBLEM_H
+
+#include "information.h"
+
+typedef struct fit_problem {
+    /* inputs, owned by the caller of sdm_fit() or by its stack frame */
+    const sdm_fit_source *source;
+    const sdm_fit_target *target;
+    const sdm_fit_opts *opts;
+    /* the caller's target is a label map; `target` presents it as an image of values 0 and 1 */
+    bool given_labels;
+
+    /* shape parameters, and their bounds [n_params] */
+    size_t n_params;
+    double low[FIT_PARAMS_MAX], high[FIT_PARAMS_MAX];
+    /* centre of the priors of rotation and translation; only the pose is used */
+    fit_state prior;
+    /* [n_params + 6] factor >= 1 of each log prior, see sdm_fit_weigh_priors() */
+    double prior_weight[FIT_PARAMS_MAX + 6];
+    /* >= 1: number of correlated samples that carry as much information as one independent one */
+    double noise_factor;
+    /* where the start shape lies on its map */
+    fit_extent extent;
+
+    /* maps of the shape and their derivatives */
+    fit_maps maps;
+    /* parameters [n_params] and blur (mm) that `maps` holds; NaN in the first one: out of date */
+    double maps_params[FIT_PARAMS_MAX], maps_blur;
+    /* samples, taken every `stride`-th voxel along each axis of the image, >= 1 */
+    fit_samples samples;
+    size_t stride;
+    /* observation model and unknowns at the current iteration */
+    fit_observation observation;
+    fit_state state;
+    /* [tissues, inside first] the image does not hold the tissue: its mean and sd stay at the start
+     * values, see sdm_fit_appearance_mark_absent() */
+    bool absent[FIT_TISSUES_MAX];
+    /* false: weights of the outside tissues are the same everywhere, whatever the options say */
+    bool use_tissue_field;
+    /* log-likelihood and its derivatives at `state`, and memory for those at a trial state */
+    fit_information information, trial;
+
+    /* [n_iterations] log-posterior density after each iteration, without those of the search */
+    double *objective;
+    size_t n_iterations, objective_capacity;
+    /* iterations so far, with those of the search */
+    size_t n_steps;
+} fit_problem;
+
+/* Whether unknown i, the mean of a tissue, keeps its value. */
+static inline bool fit_mean_is_kept(const fit_problem *p, size_t i)
+{
+    return p->opts->keep_appearance || p->absent[i - fit_columns(p->n_params)];
+}
+
+#endif

@@ -1,0 +1,30 @@
+/* Covariance of the score (the gradient of the log-likelihood) when neighbouring residuals are
+ * correlated. */
+#ifndef FIT_SCORE_COVARIANCE_H
+#define FIT_SCORE_COVARIANCE_H
+
+#include "fit/solver/problem.h"
+
+/* Matrices [n_unknowns][n_unknowns]. */
+typedef struct fit_score_covariance {
+    /* caused by the noise of the samples */
+    double *noise;
+    /* caused by a map error of 1 mm (rms); multiply by the squared error in mm */
+    double *model;
+    /* sum of the correlations of a residual with all others, itself included; not corrected for the
+     * fit. 1 for points */
+    double noise_factor;
+} fit_score_covariance;
+
+/* Computes both at problem->state from its samples; on error *out is empty. model_mm: edge (mm) of
+   the cubes within which the error of a network's map is constant; 0: model stays 0.
+   influence[N][N]: inverse of the information, 0 for unknowns that were kept. With it the
+   correlations are corrected for the part of the noise that the fit has explained, and `noise` is
+   made positive definite by a narrower window of lags where necessary. NULL: a cheap, rough
+   estimate of `noise`. */
+sdm_status sdm_fit_score_covariance_create(const fit_problem *p, double model_mm,
+                                           const double *influence, fit_score_covariance *out,
+                                           sdm_error *err);
+void sdm_fit_score_covariance_dispose(fit_score_covariance *s);
+
+#endif

@@ -1,0 +1,21 @@
+/* Checks the maps that a network has computed, by exact distances. */
+#ifndef SDM_RUNTIME_CHECK_RESULTS_H
+#define SDM_RUNTIME_CHECK_RESULTS_H
+
+#include "sdm/runtime.h"
+
+/* true if the options ask for a check of every map. */
+static inline bool sdm_wants_check(const sdm_generate_opts *o)
+{
+    return o->check || o->max_error_mm > 0;
+}
+
+/* Checks those of values[n][nz][ny][nx] that the network has computed (results[i].source), at
+   parameters used[n][n_params], and completes their results. A map above o->max_error_mm is
+   replaced by the exact one under SDM_RANGE_EXACT. Otherwise SDM_E_QUALITY for the first such map,
+   after all maps are checked. */
+sdm_status sdm_check_results(const sdm_model *m, const double *used, size_t n,
+                             const sdm_generate_opts *o, float *values, sdm_result *results,
+                             sdm_error *err);
+
+#endif

@@ -1,0 +1,36 @@
+#!/bin/sh
+# test_symbols.sh SOURCE_FOLDER LIBRARY.so...: the shared libraries export what exported.txt lists, and nothing else. A line of the list:
+#   LIBRARY FUNCTION            for users: declared with SDM_API in an installed header
+#   LIBRARY FUNCTION internal   for the other libraries of the project: declared with SDM_INTERNAL_API in a header that is not installed
+set -eu
+root=$1
+shift
+list=$root/tests/house/exported.txt
+work=$(mktemp -d "${TMPDIR:-/tmp}/test_symbols.XXXXXX")
+trap 'rm -rf "$work"' EXIT
+
+# C++ templates of OpenVDB, which must be visible, begin with _Z
+for file; do
+    name=${file##*/lib}
+    nm -D -P --defined-only "$file" | awk -v name="${name%%.so*}" '$2 ~ /^[TDBR]$/ && $1 !~ /^[_.]/ { print name, $1 }'
+done | sort >"$work/exported"
+awk '{ print $1, $2 }' "$list" | sort >"$work/listed"
+if ! diff "$work/listed" "$work/exported" >"$work/diff"; then
+    echo "exported symbols differ from tests/house/exported.txt (< listed, > exported):"
+    cat "$work/diff"
+    exit 1
+fi
+
+# declared FOLDERS... MACRO: names of the functions whose declaration begins with the macro
+declared() {
+    tr '\n' ' ' | grep -oE "(^|[^A-Z_])$1 [^;{]*" | grep -oE 'sdm_[a-z0-9_]+\(' | tr -d '(' | sort -u
+}
+cat "$root"/*/include/sdm/*.h | declared SDM_API >"$work/public"
+cat "$root"/*/include/sdm/internal/*.h "$root"/framework/io/*.h | declared SDM_INTERNAL_API >"$work/internal"
+awk '$3 == "" { print $2 }' "$list" | sort >"$work/listed_public"
+awk '$3 == "internal" { print $2 }' "$list" | sort >"$work/listed_internal"
+diff "$work/listed_public" "$work/public" || { echo "SDM_API in the installed headers differs from exported.txt (< listed, > declared)"; exit 1; }
+diff "$work/listed_internal" "$work/internal" || { echo "SDM_INTERNAL_API differs from exported.txt (< listed, > declared)"; exit 1; }
+public=$(wc -l <"$work/public")
+[ "$public" -le 120 ] || { echo "$public public functions, at most 120 are meant to be"; exit 1; }
+echo "$public public functions, $(wc -l <"$work/internal") internal ones exported"

@@ -1,0 +1,281 @@
+/* The three formats of pictures: chosen by the ending, well-formed, with text as text, the same
+ * bytes every time, and nothing left behind by a failure. */
+#include <dirent.h>
+#include <math.h>
+#include <setjmp.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "sdm/internal/heap.h"
+#include "sdm/picture.h"
+
+enum { SIDE = 12 };
+
+/* Writes one of the four pictures, with titles that need escaping. */
+static sdm_status write_picture(int kind, const char *path, sdm_error *err)
+{
+    static float v[SIDE * SIDE * SIDE];
+    static double vert[] = {2, 0, 0, -2, 0, 0, 0, 2, 0, 0, -2, 0, 0, 0, 2, 0, 0, -2};
+    static uint32_t tri[] = {0, 2, 4, 2, 1, 4, 1, 3, 4, 3, 0, 4,
+                             2, 0, 5, 1, 2, 5, 3, 1, 5, 0, 3, 5};
+    static const double values[] = {1, -1, 0, 0.5, 0.2, -0.7}, x[] = {0, 1, 2, 3};
+    static const float level = 0;
+    const sdm_grid g = {
+        .n = {SIDE, SIDE, SIDE}, .spacing = {1, 1, 1}, .dir = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    for (int i = 0; i < SIDE * SIDE * SIDE; i++)
+        v[i] =
+            (float)hypot(hypot(i % SIDE - 5.6, i / SIDE % SIDE - 5.7), i / SIDE / SIDE - 5.2) - 4;
+    const sdm_picture_map maps[] = {{"a < b & \"c\" > d", v, false}, {"image7 #image7", v, true}};
+    const sdm_mesh mesh = {.vert = vert, .tri = tri, .n_vert = 6, .n_tri = 8};
+    const sdm_picture_surface surface = {"a < b & \"c\" > d", &mesh, values};
+    const sdm_curve curve = {"a < b & \"c\" > d", x, x, 4};
+    switch (kind) {
+    case 0:
+        return sdm_picture_slices(path, &g, maps, 2, &level, 1, err);
+    case 1:
+        return sdm_picture_overlay(path, &g, v, maps, 1, "\x01 title \xFF", err);
+    case 2:
+        return sdm_picture_surfaces(path, &surface, 1, "\xC2\xB5", err);
+    default:
+        return sdm_picture_plot(path, "plot", "x", "y", false, &curve, 1, err);
+    }
+}
+
+/* The whole file, with a zero byte at its end. */
+static char *read_file(const char *path, size_t *size)
+{
+    FILE *f = fopen(path, "rb");
+    assert_non_null(f);
+    char *data = malloc(1 << 22);
+    assert_non_null(data);
+    *size = fread(data, 1, (1 << 22) - 1, f);
+    data[*size] = 0;
+    fclose(f);
+    return data;
+}
+
+/* Demands elements that nest, attributes in quotes, and no stray < or &. */
+static void check_xml(const char *at)
+{
+    char open[32][32];
+    int depth = 0, elements = 0;
+    assert_memory_equal(at, "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n", 39);
+    at += 39;
+    while (*at) {
+        if (*at == '&') {
+            assert_true(!strncmp(at, "&amp;", 5) || !strncmp(at, "&lt;", 4) ||
+                        !strncmp(at, "&gt;", 4));
+            at++;
+        } else if (*at != '<') {
+            assert_true(depth > 0 || *at == '\n');
+            at++;
+        } else {
+            const int closing = at[1] == '/';
+            char name[32];
+            assert_int_equal(sscanf(at + 1 + closing, "%31[a-zA-Z]", name), 1);
+            at += 1 + closing + (int)strlen(name);
+            while (*at != '>' && strncmp(at, "/>", 2)) {
+                assert_true(*at && *at != '<' && *at != '&');
+                if (*at++ != '"') continue;
+                const size_t n = strcspn(at, "\"<&");
+                assert_int_equal(at[n], '"');
+                at += n + 1;
+            }
+            if (closing) {
+                assert_true(depth > 0);
+                assert_string_equal(name, open[--depth]);
+            } else if (*at == '>') {
+                assert_true(depth < 32);
+                strcpy(open[depth++], name);
+            }
+            at += *at == '>' ? 1 : 2;
+            elements++;
+        }
+    }
+    assert_true(depth == 0 && elements > 10);
+}
+
+static int count(const char *text, const char *word)
+{
+    int n = 0;
+    for (; (text = strstr(text, word)); text++) n++;
+    return n;
+}
+
+static void test_svg(void **state)
+{
+    (void)state;
+    static const int images[] = {2 * 3 + 2, 3 + 1, 2 + 1, 0};
+    static const char *const texts[][3] = {
+        {">a &lt; b &amp; \"c\" &gt; d</text>", ">signed distance (mm)</text>",
+         ">image7 #image7</text>"},
+        {">? title ?</text>", ">value of the image</text>", ">a &lt; b &amp; \"c\" &gt; d</text>"},
+        {">a &lt; b &amp; \"c\" &gt; d</text>", ">oblique</text>", ">\xC2\xB5 (mm)</text>"},
+        {">plot</text>", "rotate(-90)", ">a &lt; b &amp; \"c\" &gt; d</text>"}};
+    for (int kind = 0; kind < 4; kind++) {
+        sdm_error err;
+        size_t size, again;
+        if (write_picture(kind, "a.svg", &err)) fail_msg("%s", err.text);
+        char *svg = read_file("a.svg", &size);
+        assert_int_equal(strlen(svg), size);
+        check_xml(svg);
+        assert_memory_equal(svg + size - 7, "</svg>\n", 7);
+        for (int i = 0; i < 3; i++) assert_non_null(strstr(svg, texts[kind][i]));
+        /* lines are paths; only maps and bars of colours are images, each shown once */
+        assert_int_equal(count(svg, "<image "), images[kind]);
+        assert_true(count(svg, "<path ") > 5);
+        for (const char *p = svg; (p = strstr(p, "href=\"#")); p++) {
+            char id[40] = "id=\"";
+            assert_int_equal(sscanf(p + 7, "%30[a-z0-9]", id + 4), 1);
+            assert_int_equal(count(svg, strcat(id, "\"")), 1);
+        }
+        /* in the same process, after other pictures, the same bytes */
+        assert_int_equal(write_picture(0, "b.svg", NULL), SDM_OK);
+        assert_int_equal(write_picture(kind, "b.svg", NULL), SDM_OK);
+        char *other = read_file("b.svg", &again);
+        assert_int_equal(size, again);
+        assert_memory_equal(svg, other, size);
+        free(other);
+        free(svg);
+    }
+}
+
+static void test_pdf(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < 4; kind++) {
+        sdm_error err;
+        size_t size, again;
+        if (write_picture(kind, "a.pdf", &err)) fail_msg("%s", err.text);
+        char *pdf = read_file("a.pdf", &size);
+        assert_memory_equal(pdf, "%PDF-1.", 7);
+        assert_memory_equal(pdf + size - 6, "%%EOF\n", 6);
+        size_t start = size - 6;
+        while (start > 0 && memcmp(pdf + start, "startxref", 9)) start--;
+        assert_memory_equal(pdf + strtoul(pdf + start + 9, NULL, 10), "xref", 4);
+        /* text is text: a font, and a map of its glyphs to characters */
+        size_t fonts = 0, unicode = 0;
+        for (size_t i = 0; i + 10 < size; i++) {
+            fonts += !memcmp(pdf + i, "/FontFile", 9);
+            unicode += !memcmp(pdf + i, "/ToUnicode", 10);
+        }
+        assert_true(fonts > 0 && unicode > 0);
+        assert_int_equal(write_picture(0, "b.pdf", NULL), SDM_OK);
+        assert_int_equal(write_picture(kind, "b.pdf", NULL), SDM_OK);
+        char *other = read_file("b.pdf", &again);
+        assert_int_equal(size, again);
+        assert_memory_equal(pdf, other, size);
+        free(other);
+        free(pdf);
+    }
+}
+
+static int count_files(const char *folder)
+{
+    int n = 0;
+    DIR *d = opendir(folder);
+    assert_non_null(d);
+    for (const struct dirent *e; (e = readdir(d));) n += e->d_name[0] != '.';
+    closedir(d);
+    return n;
+}
+
+/* Unknown endings, folders that are missing or are files' names, and memory that runs out: the
+ * right status, and not a file more. */
+static void test_refused(void **state)
+{
+    (void)state;
+    static const char *const unknown[] = {"a.jpg",    "a",      "png",
+                                          "a.png.gz", "a.svgz", "folder.png/a"};
+    static const char *const known[] = {"new.png", "new.SVG", "new.Pdf"};
+    sdm_error err;
+    mkdir("folder.png", 0777);
+    for (int i = 0; i < 3; i++) remove(known[i]);
+    const int files = count_files(".");
+    for (int kind = 0; kind < 4; kind++) {
+        for (size_t i = 0; i < sizeof unknown / sizeof *unknown; i++) {
+            assert_int_equal(sdm_picture_check(unknown[i], &err), SDM_E_UNSUPPORTED);
+            assert_int_equal(write_picture(kind, unknown[i], &err), SDM_E_UNSUPPORTED);
+            assert_non_null(strstr(err.text, unknown[i]));
+            assert_non_null(strstr(err.text, ".png, .svg or .pdf"));
+        }
+        assert_int_equal(write_picture(kind, "folder.png", &err), SDM_E_IO);
+        for (int i = 0; i < 3; i++) {
+            char path[64];
+            snprintf(path, sizeof path, "no_such_folder/%s", known[i]);
+            assert_int_equal(sdm_picture_check(path, &err), SDM_OK);
+            assert_int_equal(write_picture(kind, path, &err), SDM_E_IO);
+            if (i > 0 && kind < 3) continue; // every picture as PNG, the plot in every format
+            for (unsigned long n = 1;; n++) {
+                sdm_alloc_fail_after(n);
+                const sdm_status s = write_picture(kind, known[i], &err);
+                sdm_alloc_fail_after(0);
+                if (s == SDM_OK) {
+                    assert_true(n > 2);
+                    break;
+                }
+                assert_int_equal(s, SDM_E_NOMEM);
+                assert_int_equal(count_files("."), files);
+            }
+            assert_int_equal(count_files("."), files + 1);
+            remove(known[i]);
+        }
+    }
+    rmdir("folder.png");
+    assert_int_equal(sdm_picture_check(NULL, &err), SDM_E_ARG);
+}
+
+/* A limit on the size of files stands for a full disk: the status, and the picture that was there
+ * before stays. */
+static void test_full_disk(void **state)
+{
+    (void)state;
+    static const char *const paths[] = {"kept.png", "kept.svg", "kept.pdf"};
+    sdm_error err;
+    struct rlimit before;
+    for (int i = 0; i < 3; i++) remove(paths[i]);
+    const int files = count_files(".");
+    signal(SIGXFSZ, SIG_IGN);
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
+    for (int i = 0; i < 3; i++) {
+        FILE *f = fopen(paths[i], "wb");
+        assert_non_null(f);
+        fputs("before", f);
+        fclose(f);
+        assert_int_equal(setrlimit(RLIMIT_FSIZE, &(struct rlimit){1000, before.rlim_max}), 0);
+        const sdm_status s = write_picture(3, paths[i], &err);
+        assert_int_equal(setrlimit(RLIMIT_FSIZE, &before), 0);
+        assert_int_equal(s, SDM_E_IO);
+        assert_non_null(strstr(err.text, paths[i]));
+        assert_int_equal(count_files("."), files + i + 1);
+        size_t size;
+        char *data = read_file(paths[i], &size);
+        assert_string_equal(data, "before");
+        free(data);
+        assert_int_equal(write_picture(3, paths[i], NULL), SDM_OK);
+        data = read_file(paths[i], &size);
+        assert_true(size > 1000);
+        free(data);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_svg),
+        cmocka_unit_test(test_pdf),
+        cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_full_disk),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

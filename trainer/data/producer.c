@@ -1,0 +1,170 @@
+/* Worker threads that compute random training maps in the background. */
+#include "producer.h"
+
+#include <pthread.h>
+#include <string.h>
+
+#include "sdm/memory.h"
+#include "streams.h"
+#include "workbench.h"
+
+/* Finished samples wait in a window between the workers and the trainer: sample i in place i mod
+   WINDOW. */
+enum { WINDOW = 64, MAX_WORKERS = 256 };
+
+struct producer {
+    dataset *d;
+    pthread_mutex_t lock;
+    pthread_cond_t made, taken;
+    size_t next, end; // sample to be made next; end of the samples (one past the last)
+    size_t allowed;   // end of the samples whose point is planned
+    size_t base;      // first sample in the window: all before it are in the pool
+    bool done[WINDOW];
+    double *params; // [WINDOW][P]
+    int16_t *maps;  // [WINDOW][n_voxels]
+    float scale[WINDOW];
+    sdm_error error; // of sample `failed`
+    size_t failed;   // lowest failed sample; SIZE_MAX: none
+    bool stop;
+    int n_workers;
+    pthread_t workers[MAX_WORKERS];
+};
+
+/* A worker: computes the next sample as soon as its place in the window is free and its point is
+   planned. */
+static void *worker_run(void *user)
+{
+    producer *p = user;
+    const dataset *d = p->d;
+    workbench w = {0};
+    sdm_error err = {0};
+    const sdm_status made = trainer_workbench_create(&w, d, &err);
+    // claim the next sample
+    pthread_mutex_lock(&p->lock);
+    for (;;) {
+        while (!p->stop && p->next < p->end &&
+               (p->next >= p->base + WINDOW || p->next >= p->allowed))
+            pthread_cond_wait(&p->taken, &p->lock);
+        if (p->stop || p->next >= p->end) break;
+        const size_t index = p->next++, place = index % WINDOW;
+        pthread_mutex_unlock(&p->lock);
+        // compute it without the lock
+        double *params = p->params + place * d->n_params;
+        sdm_sample_params(d->seed, STREAM_TRAIN, trainer_sample_plan_point(&d->plan, index), d->min,
+                          d->max, d->n_params, params);
+        const sdm_status s =
+            made ? made
+                 : trainer_workbench_packed_map(&w, d, params, p->maps + place * d->n_voxels,
+                                                &p->scale[place], &err);
+        pthread_mutex_lock(&p->lock);
+        // publish it
+        p->done[place] = true;
+        if (s && index < p->failed) {
+            p->failed = index;
+            p->error = err;
+        }
+        pthread_cond_broadcast(&p->made);
+    }
+    pthread_mutex_unlock(&p->lock);
+    trainer_workbench_dispose(&w);
+    return NULL;
+}
+
+sdm_status trainer_producer_start(dataset *d, size_t first, int n_threads, producer **out,
+                                  sdm_error *err)
+{
+    *out = NULL;
+    producer *p = NULL;
+    sdm_status s = SDM_ALLOC(&p, 1, "sample producer", err);
+    if (s) return s;
+    p->d = d;
+    p->next = p->base = first;
+    p->end = d->n_start + d->n_online;
+    p->allowed = d->plan.n_planned;
+    p->failed = SIZE_MAX;
+    // window and locks
+    pthread_mutex_init(&p->lock, NULL);
+    pthread_cond_init(&p->made, NULL);
+    pthread_cond_init(&p->taken, NULL);
+    s = SDM_ALLOC(&p->params, WINDOW * d->n_params, "sample window", err);
+    if (!s) s = SDM_ALLOC(&p->maps, WINDOW * d->n_voxels, "sample window", err);
+    // workers: fewer than asked for are enough
+    for (; !s && p->n_workers < n_threads && p->n_workers < MAX_WORKERS; p->n_workers++) {
+        if (pthread_create(&p->workers[p->n_workers], NULL, worker_run, p)) {
+            if (p->n_workers == 0)
+                s = sdm_fail(err, SDM_E_NOMEM, "cannot start a thread that makes samples");
+            break;
+        }
+    }
+    if (s)
+        trainer_producer_stop(p);
+    else
+        *out = p;
+    return s;
+}
+
+void trainer_producer_allow(producer *p, size_t n_planned)
+{
+    pthread_mutex_lock(&p->lock);
+    p->allowed = n_planned;
+    pthread_cond_broadcast(&p->taken);
+    pthread_mutex_unlock(&p->lock);
+}
+
+size_t trainer_producer_ready(producer *p)
+{
+    pthread_mutex_lock(&p->lock);
+    size_t n = 0;
+    while (n < WINDOW && p->done[(p->base + n) % WINDOW]) n++;
+    pthread_mutex_unlock(&p->lock);
+    return n;
+}
+
+sdm_status trainer_producer_take(producer *p, size_t until, sdm_error *err)
+{
+    dataset *d = p->d;
+    if (until > p->end) until = p->end;
+    while (p->base < until) {
+        const size_t place = p->base % WINDOW;
+        // wait for the sample
+        pthread_mutex_lock(&p->lock);
+        while (!p->done[place]) pthread_cond_wait(&p->made, &p->lock);
+        const bool failed = p->base == p->failed;
+        pthread_mutex_unlock(&p->lock);
+        if (failed) {
+            if (err) *err = p->error;
+            return p->error.status;
+        }
+        // workers do not touch this place until `base` moves on
+        const size_t slot = trainer_dataset_slot(d, p->base);
+        memcpy(d->params + slot * d->n_params, p->params + place * d->n_params,
+               d->n_params * sizeof *d->params);
+        memcpy(d->maps + slot * d->n_voxels, p->maps + place * d->n_voxels,
+               d->n_voxels * sizeof *d->maps);
+        d->scale[slot] = p->scale[place];
+        // free the place
+        pthread_mutex_lock(&p->lock);
+        p->done[place] = false;
+        p->base++;
+        d->n_taken = p->base;
+        pthread_cond_broadcast(&p->taken);
+        pthread_mutex_unlock(&p->lock);
+    }
+    return SDM_OK;
+}
+
+void trainer_producer_stop(producer *p)
+{
+    if (!p) return;
+    pthread_mutex_lock(&p->lock);
+    p->stop = true;
+    pthread_cond_broadcast(&p->taken);
+    pthread_mutex_unlock(&p->lock);
+    for (int i = 0; i < p->n_workers; i++) pthread_join(p->workers[i], NULL);
+    pthread_cond_destroy(&p->made);
+    pthread_cond_destroy(&p->taken);
+    pthread_mutex_destroy(&p->lock);
+    sdm_free(p->params);
+    sdm_free(p->maps);
+    sdm_free(p);
+}

@@ -1,0 +1,27 @@
+/* Worker threads that compute random training maps in the background while the caller trains. */
+#ifndef SDM_PRODUCER_H
+#define SDM_PRODUCER_H
+
+#include "dataset.h"
+
+typedef struct producer producer;
+
+/* Starts n_threads workers, which compute the random samples of d in order from `first` on, as far
+   as they are planned (d->plan) and up to 64 samples ahead of those taken. d must outlive them. */
+sdm_status trainer_producer_start(dataset *d, size_t first, int n_threads, producer **out,
+                                  sdm_error *err);
+
+/* Allows samples below n_planned: their points are in d->plan. */
+void trainer_producer_allow(producer *p, size_t n_planned);
+
+/* Number of finished samples that can be taken now without waiting. */
+size_t trainer_producer_ready(producer *p);
+
+/* Moves finished samples into the pool until it holds `until` random samples; waits for unfinished
+   ones. Returns the error of the first sample that failed. */
+sdm_status trainer_producer_take(producer *p, size_t until, sdm_error *err);
+
+/* Stops the workers and frees the producer; NULL does nothing. */
+void trainer_producer_stop(producer *p);
+
+#endif

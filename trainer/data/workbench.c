@@ -1,0 +1,49 @@
+/* Exact maps, one at a time. */
+#include "workbench.h"
+
+#include <math.h>
+
+#include "sdm/memory.h"
+
+sdm_status trainer_workbench_create(workbench *w, const dataset *d, sdm_error *err)
+{
+    const sdm_status s = SDM_ALLOC(&w->map, d->n_voxels, "exact map", err);
+    return s ? s : SDM_ALLOC(&w->blocked, d->n_voxels, "exact map", err);
+}
+
+void trainer_workbench_dispose(workbench *w)
+{
+    sdm_mesh_dispose(&w->mesh);
+    sdm_free(w->map);
+    sdm_free(w->blocked);
+    *w = (workbench){0};
+}
+
+sdm_status trainer_workbench_map(workbench *w, const dataset *d, const double *p, float *blocked,
+                                 sdm_error *err)
+{
+    sdm_status s = sdm_instance_mesh(d->shape, p, &w->mesh, err);
+    if (s) return s;
+    const sdm_exact_opts opts = {.n_threads = 1};
+    sdm_exact *exact = NULL;
+    s = sdm_exact_create(&w->mesh, &opts, &exact, err);
+    if (!s) s = sdm_exact_map(exact, d->grid, w->map, err);
+    sdm_exact_free(exact);
+    if (s) return sdm_fail_in(err, s, "shape '%s'", sdm_instance_shape(d->shape)->name);
+    sdm_pod_gather(d->grid, d->blocks, d->n_blocks, w->map, blocked);
+    return SDM_OK;
+}
+
+sdm_status trainer_workbench_packed_map(workbench *w, const dataset *d, const double *p,
+                                        int16_t *packed, float *scale, sdm_error *err)
+{
+    const sdm_status s = trainer_workbench_map(w, d, p, w->blocked, err);
+    if (s) return s;
+    float largest = 0;
+    for (size_t i = 0; i < d->n_voxels; i++) largest = fmaxf(largest, fabsf(w->blocked[i]));
+    if (!(largest > 0)) largest = 1;
+    *scale = largest / 32767.0f;
+    const float inverse = 32767.0f / largest;
+    for (size_t i = 0; i < d->n_voxels; i++) packed[i] = (int16_t)lrintf(w->blocked[i] * inverse);
+    return SDM_OK;
+}

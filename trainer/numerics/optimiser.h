@@ -1,0 +1,41 @@
+/* The Adam optimiser (Kingma and Ba 2015), the running average of weights and the schedule of the
+   learning rate. */
+#ifndef SDM_OPTIMISER_H
+#define SDM_OPTIMISER_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "sdm/status.h"
+
+/* n weights w with Adam's first and second moments m and v, and the running average of w. */
+typedef struct parameters {
+    size_t n;
+    float *w, *m, *v, *average;
+} parameters;
+
+/* Allocates all arrays, filled with 0. Call trainer_parameters_dispose() also after an error. */
+sdm_status trainer_parameters_create(parameters *p, size_t n, sdm_error *err);
+void trainer_parameters_dispose(parameters *p);
+
+/* Learning rate and bias corrections of one Adam step. */
+typedef struct adam_step {
+    float rate, correct_m, correct_v;
+} adam_step;
+
+/* Step t = 1, 2, ... of learning rate `rate`. */
+adam_step trainer_adam_begin(double rate, int64_t t);
+
+/* Updates weights first .. first + n - 1 and their moments from the gradient g[n], with the
+   learning rate multiplied by `scale`. One thread. */
+void trainer_adam_update(parameters *p, size_t first, size_t n, const float *g, adam_step step,
+                         float scale);
+
+/* average += (1 - decay) * (w - average) for all weights; the same bits for any n_threads. */
+void trainer_average_update(parameters *p, double decay, int n_threads);
+
+/* Factor of the learning rate at `fraction` (0 .. 1) of a phase: rises linearly from 0 to 1 up to
+   `warmup`, then falls to 0 along half a cosine. */
+double trainer_rate_schedule(double fraction, double warmup);
+
+#endif

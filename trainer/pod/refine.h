@@ -1,0 +1,19 @@
+/* Refinement: MLP, head, bases and mean map are trained together, end to end on maps. */
+#ifndef SDM_TRAINER_REFINE_H
+#define SDM_TRAINER_REFINE_H
+
+#include "pod_state.h"
+
+/* Allocates the weights of the phase and, unless resumed, sets them: MLP from the mode fit, head by
+   least squares, bases and mean map as computed. resumed: trainer_checkpoint_weights() fills them.
+ */
+sdm_status trainer_refine_start(pod_state *pod, bool resumed, sdm_error *err);
+
+/* Runs phase SDM_PHASE_REFINE to its end; nothing if train.refine is 0. */
+sdm_status trainer_refine_run(pod_state *pod, sdm_error *err);
+
+/* *mse = mean square error (mm^2) of weights w on the held-out maps. */
+sdm_status trainer_refine_evaluate(const pod_state *pod, const float *w, double *mse,
+                                   sdm_error *err);
+
+#endif

@@ -1,0 +1,344 @@
+/* Writes the model file with its measured accuracy, the configuration and the loss curve. */
+#include "export_model.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "kind.h"
+#include "progress.h"
+#include "sdm/internal/checksum.h"
+#include "sdm/internal/container.h"
+#include "sdm/internal/file.h"
+#include "sdm/internal/model_threads.h"
+#include "sdm/internal/text.h"
+#include "sdm/memory.h"
+#include "sdm/picture.h"
+
+/* Voxels within this distance of the surface count for rmse_near_mm. */
+#define NEAR_MM 0.4f
+
+static int compare_doubles(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return x < y ? -1 : x > y;
+}
+
+/* Nearest-rank quantile of n values in ascending order. */
+static double quantile(const double *sorted, size_t n, double q)
+{
+    size_t i = (size_t)ceil(q * (double)n);
+    return sorted[i ? i - 1 : 0];
+}
+
+/* Errors of the model on the first n held-out maps. */
+static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, sdm_accuracy *out,
+                                sdm_error *err)
+{
+    const dataset *d = &t->data;
+    float *map = NULL, *blocked = NULL;
+    void *scratch = NULL;
+    double *each = NULL;
+    sdm_status s = SDM_ALLOC(&map, d->n_voxels, "evaluation", err);
+    if (!s) s = SDM_ALLOC(&blocked, d->n_voxels, "evaluation", err);
+    if (!s)
+        s = sdm_alloc(&scratch, sdm_model_scratch_bytes_threads(m, 1, t->n_threads), 1,
+                      "evaluation", err);
+    if (!s) s = SDM_ALLOC(&each, n, "evaluation", err);
+    double square = 0, absolute = 0, near = 0, largest = 0;
+    size_t n_near = 0;
+    // sum the errors over maps and voxels
+    for (size_t i = 0; i < n && !s; i++) {
+        sdm_model_forward_threads(m, d->holdout_params + i * d->n_params, 1, map, scratch,
+                                  t->n_threads);
+        sdm_pod_gather(d->grid, t->blocks, d->n_blocks, map, blocked);
+        const float *truth = d->holdout + i * d->n_voxels;
+        double here = 0;
+        for (size_t v = 0; v < d->n_voxels; v++) {
+            const double e = (double)blocked[v] - truth[v];
+            here += e * e;
+            absolute += fabs(e);
+            if (fabs(e) > largest) largest = fabs(e);
+            if (fabsf(truth[v]) <= NEAR_MM) near += e * e, n_near++;
+        }
+        square += here;
+        each[i] = sqrt(here / (double)d->n_voxels);
+    }
+    // means and quantiles
+    if (!s) {
+        const double voxels = (double)n * (double)d->n_voxels;
+        qsort(each, n, sizeof *each, compare_doubles);
+        *out = (sdm_accuracy){.samples = (int64_t)n,
+                              .mse_mm2 = square / voxels,
+                              .rmse_mm = sqrt(square / voxels),
+                              .mae_mm = absolute / voxels,
+                              .max_abs_mm = largest,
+                              .rmse_near_mm = n_near ? sqrt(near / (double)n_near) : 0,
+                              .q50_mm = quantile(each, n, 0.5),
+                              .q90_mm = quantile(each, n, 0.9),
+                              .q99_mm = quantile(each, n, 0.99)};
+    }
+    sdm_free(each);
+    sdm_free(scratch);
+    sdm_free(blocked);
+    sdm_free(map);
+    return s;
+}
+
+/* Refuses texts that a model file has no room for. */
+static sdm_status check_texts(const trainer *t, sdm_error *err)
+{
+    enum { VALUE_MAX = 1000 };
+    size_t n;
+    const sdm_param *params = sdm_instance_params(t->shape, &n);
+    for (size_t i = 0; i < n; i++)
+        if (strlen(params[i].name) >= SDM_MODEL_NAME_MAX ||
+            strlen(params[i].unit) >= sizeof((sdm_model_param *)0)->unit ||
+            strpbrk(params[i].unit, "\r\n"))
+            return sdm_fail(
+                err, SDM_E_PLUGIN,
+                "parameter '%.100s' in '%.100s': name or unit is too long for a model file",
+                params[i].name, params[i].unit);
+    const sdm_shape *shape = sdm_instance_shape(t->shape);
+    const sdm_option_value *values = sdm_instance_options(t->shape);
+    for (uint32_t i = 0; i < shape->n_options; i++)
+        if (values[i].text &&
+            (strlen(values[i].text) > VALUE_MAX || strpbrk(values[i].text, "\r\n")))
+            return sdm_fail(err, SDM_E_CONFIG,
+                            "%s: shape.options.%s is longer than %d characters or has a line break",
+                            t->config->file, shape->options[i].name, VALUE_MAX);
+    return SDM_OK;
+}
+
+/* Checksums of the data files: the model stores them, so that the exact engine is never used with
+   other files later. */
+static void checksum_files(trainer *t)
+{
+    const sdm_shape *shape = sdm_instance_shape(t->shape);
+    const sdm_option_value *values = sdm_instance_options(t->shape);
+    for (uint32_t i = 0; i < shape->n_options && i < SDM_MAX_OPTIONS; i++)
+        if (shape->options[i].type == SDM_OPTION_FILE && values[i].text[0] &&
+            sdm_file_checksum(values[i].text, &t->file_sums[i], NULL))
+            // unreadable here is no error: a plug-in may accept a folder, for example
+            t->file_sums[i] = 0;
+}
+
+sdm_status trainer_export_prepare(trainer *t, sdm_error *err)
+{
+    checksum_files(t);
+    return check_texts(t, err);
+}
+
+/* Every option of the shape as text, so that the model file can be used without the configuration.
+   A file option is followed by an entry NAME.crc64 with its checksum. */
+typedef struct option_texts {
+    const char *names[2 * SDM_MAX_OPTIONS], *values[2 * SDM_MAX_OPTIONS];
+    char texts[SDM_MAX_OPTIONS][32];              // texts of numbers and of checksums
+    char sums[SDM_MAX_OPTIONS][SDM_NAME_MAX + 8]; // names of the checksum entries
+    size_t n;
+} option_texts;
+
+static void collect_options(const trainer *t, option_texts *o)
+{
+    const sdm_shape *shape = sdm_instance_shape(t->shape);
+    const sdm_option_value *v = sdm_instance_options(t->shape);
+    for (uint32_t i = 0; i < shape->n_options && i < SDM_MAX_OPTIONS; i++) {
+        const sdm_option *option = &shape->options[i];
+        const bool text = option->type == SDM_OPTION_CHOICE || option->type == SDM_OPTION_FILE;
+        o->names[o->n] = option->name;
+        o->values[o->n] =
+            text ? (v[i].text ? v[i].text : "") : sdm_format_real(v[i].number, o->texts[i]);
+        o->n++;
+        if (!t->file_sums[i]) continue;
+        snprintf(o->sums[i], sizeof o->sums[i], "%s.crc64", option->name);
+        snprintf(o->texts[i], sizeof o->texts[i], "%016llx", (unsigned long long)t->file_sums[i]);
+        o->names[o->n] = o->sums[i];
+        o->values[o->n++] = o->texts[i];
+    }
+}
+
+/* Number after `key` in one line of metrics.jsonl; NaN if there is none. */
+static double metric_number(const char *line, const char *key)
+{
+    const char *at = strstr(line, key);
+    return at ? strtod(at + strlen(key), NULL) : NAN;
+}
+
+/* loss.png: training loss and held-out error over the steps, from the lines of metrics.jsonl. */
+static sdm_status curve_write(const trainer *t, sdm_error *err)
+{
+    double *step = NULL, *loss = NULL, *heldout = NULL;
+    size_t lines = 0, n = 0;
+    for (const char *p = t->metrics->data; p && *p; p++) lines += *p == '\n';
+    sdm_status s = SDM_ALLOC(&step, lines, "loss curve", err);
+    if (!s) s = SDM_ALLOC(&loss, lines, "loss curve", err);
+    if (!s) s = SDM_ALLOC(&heldout, lines, "loss curve", err);
+    if (!s) {
+        for (const char *p = t->metrics->data; p && *p; p = strchr(p, '\n') + 1) {
+            step[n] = metric_number(p, "\"step\": ");
+            loss[n] = metric_number(p, "\"loss_mm2\": ");
+            heldout[n++] = metric_number(p, "\"heldout_mse_mm2\": ");
+        }
+        char path[SDM_PATH_TEXT_MAX + 32];
+        snprintf(path, sizeof path, "%s/loss.png", t->folder);
+        const sdm_curve curves[] = {{"training", step, loss, n}, {"held out", step, heldout, n}};
+        s = sdm_picture_plot(path, "Mean square error", "step", "mm^2", true, curves, 2, err);
+    }
+    sdm_free(heldout);
+    sdm_free(loss);
+    sdm_free(step);
+    return s;
+}
+
+sdm_status trainer_export_dump(const trainer *t, sdm_text *out, sdm_error *err)
+{
+    sdm_config *c = NULL;
+    sdm_status s = SDM_ALLOC(&c, 1, "resolved config", err);
+    if (s) return s;
+    *c = *t->config;
+    sdm_config_strip(c);
+    sdm_config_dump(c, out);
+    if (out->failed)
+        s = sdm_fail(err, SDM_E_NOMEM, "no memory for the resolved config");
+    else // parse it back: a path that is not UTF-8, for example, would make checkpoints unreadable
+        s = sdm_config_parse("config.yaml", out->data, out->size, NULL, 0, c, err);
+    sdm_free(c);
+    return s;
+}
+
+sdm_status trainer_export_config(const trainer *t, sdm_outfile **out, sdm_error *err)
+{
+    char path[SDM_PATH_TEXT_MAX + 32];
+    snprintf(path, sizeof path, "%s/config.yaml", t->folder);
+    sdm_text config = {0};
+    sdm_status s = trainer_export_dump(t, &config, err);
+    if (!s) s = sdm_outfile_open(path, out, err);
+    if (!s) s = sdm_outfile_write(*out, config.data, config.size, err);
+    sdm_text_dispose(&config);
+    return s;
+}
+
+/* Fills params[P], *options and *info with what the model file says about shape, grid and training.
+   The pointers in *info refer to the other arguments. */
+static void describe_model(const trainer *t, const sdm_text *config, option_texts *options,
+                           sdm_model_param *params, sdm_model_info *info)
+{
+    size_t n;
+    const sdm_param *p = sdm_instance_params(t->shape, &n);
+    for (size_t i = 0; i < n; i++) {
+        snprintf(params[i].name, sizeof params[i].name, "%s", p[i].name);
+        snprintf(params[i].unit, sizeof params[i].unit, "%s", p[i].unit);
+        params[i].min = t->data.min[i];
+        params[i].max = t->data.max[i];
+        params[i].def = fmin(fmax(p[i].def, params[i].min), params[i].max);
+    }
+    collect_options(t, options);
+    *info = (sdm_model_info){.n_params = n,
+                             .params = params,
+                             .n_options = options->n,
+                             .option_names = options->names,
+                             .option_values = options->values,
+                             .grid = t->config->grid,
+                             .seed = t->config->seed,
+                             .train_samples = (int64_t)(t->data.n_static + t->data.n_taken),
+                             .config = config->data};
+    // with a budget of steps the file has the same bits in every run
+    info->train_seconds = trainer_by_time(t) ? trainer_seconds(t) : 0;
+    snprintf(info->shape, sizeof info->shape, "%s", sdm_instance_shape(t->shape)->name);
+}
+
+/* The texts and numbers of a model file, and the memory they point to. */
+typedef struct description {
+    sdm_text config;
+    option_texts options;
+    sdm_model_param params[SDM_POD_MAX_PARAMS];
+    sdm_model_info info;
+} description;
+
+static sdm_status description_create(const trainer *t, description **out, sdm_error *err)
+{
+    description *d = NULL;
+    sdm_status s = SDM_ALLOC(&d, 1, "description of the model", err);
+    if (s) return s;
+    *out = d;
+    if (!(s = trainer_export_dump(t, &d->config, err)))
+        describe_model(t, &d->config, &d->options, d->params, &d->info);
+    return s;
+}
+
+static void description_free(description *d)
+{
+    if (d) sdm_text_dispose(&d->config);
+    sdm_free(d);
+}
+
+/* Opens the model of the averaged weights from memory, as the runtime would open its file. */
+static sdm_status model_open(const trainer *t, const char *path, const description *d,
+                             sdm_model **out, sdm_error *err)
+{
+    uint8_t *bytes = NULL;
+    size_t size = 0;
+    sdm_status s = t->kind->build(t, &d->info, &bytes, &size, err);
+    if (!s) s = sdm_model_open_memory(path, bytes, size, out, err);
+    sdm_free(bytes);
+    return s;
+}
+
+sdm_status trainer_export_time(trainer *t, double *seconds, sdm_error *err)
+{
+    description *d = NULL;
+    sdm_model *model = NULL;
+    sdm_accuracy one;
+    sdm_status s = description_create(t, &d, err);
+    if (!s) s = model_open(t, "model", d, &model, err);
+    const double start = trainer_seconds(t);
+    if (!s) s = measure_model(t, model, 1, &one, err);
+    *seconds = (trainer_seconds(t) - start) * (double)t->data.n_holdout;
+    sdm_model_free(model);
+    description_free(d);
+    return s;
+}
+
+sdm_status trainer_export_model(trainer *t, sdm_train_report *report, sdm_error *err)
+{
+    description *d = NULL;
+    sdm_model *model = NULL;
+    uint8_t *bytes = NULL;
+    size_t size = 0;
+    char path[SDM_PATH_TEXT_MAX + 32];
+    snprintf(path, sizeof path, "%s/model.sdm", t->folder);
+    // build a first model and measure it
+    sdm_status s = description_create(t, &d, err);
+    if (!s) s = model_open(t, path, d, &model, err);
+    if (!s) s = measure_model(t, model, t->data.n_holdout, &t->accuracy, err);
+    sdm_model_free(model);
+    if (!s && !isfinite(t->accuracy.mse_mm2))
+        s = sdm_fail(err, SDM_E_QUALITY,
+                     "the trained network gives numbers that are not finite: use "
+                     "network.weights=f32 or lower the "
+                     "learning rates");
+    // build the final model, which holds its measured accuracy
+    if (!s) {
+        d->info.accuracy = t->accuracy;
+        t->heldout_mse = t->accuracy.mse_mm2;
+        s = trainer_metric(t, 0, err);
+    }
+    if (!s) s = t->kind->build(t, &d->info, &bytes, &size, err);
+    if (!s) s = sdm_container_write(path, bytes, size, err);
+    sdm_free(bytes);
+    sdm_error picture = {0};
+    if (!s && curve_write(t, &picture))
+        // a failed picture is no reason to lose the network: a notice only
+        trainer_message(t, "%s", picture.text);
+    if (!s && report) {
+        *report = (sdm_train_report){.accuracy = t->accuracy,
+                                     .steps = t->step,
+                                     .samples = d->info.train_samples,
+                                     .seconds = trainer_seconds(t)};
+        snprintf(report->model_path, sizeof report->model_path, "%.*s",
+                 (int)sizeof report->model_path - 1, path);
+    }
+    description_free(d);
+    return s;
+}

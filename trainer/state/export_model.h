@@ -1,0 +1,28 @@
+/* Writes the results of a run: model file with its measured accuracy, configuration, loss curve. */
+#ifndef SDM_TRAINER_EXPORT_H
+#define SDM_TRAINER_EXPORT_H
+
+#include "sdm/internal/file.h"
+#include "trainer.h"
+
+/* Call before the training: refuses names, units and option values that a model file has no room
+   for, and computes the checksums of the shape's data files. */
+sdm_status trainer_export_prepare(trainer *t, sdm_error *err);
+
+/* Appends the configuration with all defaults filled in to *out, stripped of paths and thread
+   counts (sdm_config_strip()), so that the model file has the same bits wherever it is trained. */
+sdm_status trainer_export_dump(const trainer *t, sdm_text *out, sdm_error *err);
+
+/* Writes this configuration to a temporary file, which becomes config.yaml when the caller commits
+ *out. The caller owns *out even after an error: sdm_outfile_discard(). */
+sdm_status trainer_export_config(const trainer *t, sdm_outfile **out, sdm_error *err);
+
+/* Builds the model from the averaged weights, measures it on the held-out maps exactly as the
+   runtime will run it, writes model.sdm and loss.png and fills *report (may be NULL).
+   SDM_E_QUALITY: the network gives numbers that are not finite. */
+sdm_status trainer_export_model(trainer *t, sdm_train_report *report, sdm_error *err);
+
+/* *seconds = expected duration of the measurement in trainer_export_model(), from one map. */
+sdm_status trainer_export_time(trainer *t, double *seconds, sdm_error *err);
+
+#endif

@@ -1,0 +1,38 @@
+/* The interface of a kind of network to the trainer. There are two: trainer_kind_pod
+   (pod/pod_kind.h), and trainer_kind_direct (direct/direct.h) for networks that learn by gradients
+   on the maps themselves. */
+#ifndef SDM_TRAINER_KIND_H
+#define SDM_TRAINER_KIND_H
+
+#include "trainer.h"
+
+struct train_kind {
+    /* Edge of the blocks in which maps are stored (dataset.h), voxels; 0: map order. */
+    size_t (*block)(const sdm_config *c);
+    /* Number of levels of blocks (sdm/internal/pod.h); NULL: 1. */
+    size_t (*levels)(const sdm_config *c);
+    /* Called once the maps before training exist: allocates t->state, designs the network, sets its
+       initial weights. */
+    sdm_status (*begin)(trainer *t, sdm_error *err);
+    /* Called when new random maps have been put into slots[n]; NULL: nothing to do. */
+    sdm_status (*samples_taken)(trainer *t, const size_t *slots, size_t n, sdm_error *err);
+    /* error[n] = root mean square errors (mm) of the network on the maps in slots[n], in phase
+       SDM_PHASE_MODE_FIT. Only for kinds that allow data.sampling (sdm/internal/config.h). */
+    sdm_status (*errors)(const trainer *t, const size_t *slots, size_t n, double *error,
+                         sdm_error *err);
+    /* Trains from phase t->phase to the end. resumed: from the checkpoint; the kind allocates the
+       weights of the phase and calls trainer_checkpoint_weights() to fill them. */
+    sdm_status (*run)(trainer *t, bool resumed, sdm_error *err);
+    /* The weights that are trained in the current phase. */
+    parameters *(*weights)(trainer *t);
+    /* Checksum of everything besides the configuration that the meaning of the weights depends on.
+     */
+    uint64_t (*fingerprint)(const trainer *t);
+    /* *bytes = new model file with the averaged weights; free with sdm_free(). */
+    sdm_status (*build)(const trainer *t, const sdm_model_info *info, uint8_t **bytes, size_t *size,
+                        sdm_error *err);
+    /* Frees t->state; NULL does nothing. */
+    void (*dispose)(trainer *t);
+};
+
+#endif

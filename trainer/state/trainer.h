@@ -1,0 +1,43 @@
+/* The state of a training run that all kinds of networks share. What differs from kind to kind is
+   reached through `kind` (kind.h); a kind keeps its own data behind `state`. */
+#ifndef SDM_TRAINER_H
+#define SDM_TRAINER_H
+
+#include "data/dataset.h"
+#include "data/producer.h"
+#include "numerics/optimiser.h"
+#include "sdm/internal/pod.h"
+#include "sdm/internal/train.h"
+
+typedef struct train_kind train_kind;
+
+typedef struct trainer {
+    const sdm_config *config;
+    const sdm_instance *shape;
+    const char *folder;
+    sdm_train_hooks hooks;
+    int n_threads;
+    const train_kind *kind;
+    void *state; /* of the kind; NULL before train_kind.begin() */
+
+    /* Blocks of all levels (sdm/internal/pod.h). Maps are stored in the order of the blocks of the
+       lowest level; a single block means map order. */
+    sdm_pod_levels levels;
+    sdm_pod_block *blocks;
+    dataset data;
+    producer *producer; /* NULL: no online sample is left to make */
+
+    /* CRC-64 of the shape's data files, by option; 0: the option names no file. */
+    uint64_t file_sums[SDM_MAX_OPTIONS];
+
+    sdm_phase phase;
+    int64_t step, phase_step; /* optimiser steps of the run; of this phase */
+    double started;           /* sdm_clock() at the start, minus the time used before a resume, s */
+    /* Seconds since `started`. */
+    double phase_started, last_report, last_checkpoint, last_evaluation;
+    double loss, heldout_mse; /* mm^2 */
+    struct sdm_text *metrics; /* all lines of metrics.jsonl */
+    sdm_accuracy accuracy;    /* of the finished model */
+} trainer;
+
+#endif

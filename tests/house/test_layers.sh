@@ -57,7 +57,7 @@ check() {
         parts("trainer", "core config geom nn io shape trainer")
         parts("cli", "core config geom nn io shape shapes runtime trainer cli")
         rooms("framework/geom/", "memory simd exactly mesh solid features map sign layers methods .")
-        rooms("framework/nn/", "kernels model pod point sdmnn")
+        rooms("framework/nn/", "kernels model pod point sdmnn open")
         rooms("framework/io/", ". mesh image picture")
         rooms("runtime/", "maps phantom fit/data fit/solver fit/start fit/trust fit vdb")
         rooms("trainer/", "data . pod direct")
@@ -156,7 +156,7 @@ must_find framework/geom/room/new.c '/* a room without a place */'
 must_find framework/nn/pod/blocks.c '#include "sdm/exact.h"'
 must_find framework/nn/pod/blocks.c '  #  include <immintrin.h>'
 must_find framework/nn/pod/blocks.c '#include <oneapi/dnnl/dnnl.h>'
-must_find framework/nn/model/model_open.c '#include "pod/blocks.h"'
+must_find framework/nn/model/model_kind.c '#include "pod/blocks.h"'
 must_find framework/config/config.c '#include "sdm/registry.h"'
 must_find framework/io/image/npy.c '#include "sdm/registry.h"'
 must_find framework/io/image/npy.c '#include <yaml.h>'

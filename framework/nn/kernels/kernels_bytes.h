@@ -151,7 +151,7 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL };
         w += pair, x += 2;                                                                         \
     } while (0)
 
-static const float no_mean[8 * VW] = {0};
+static const float no_mean[8 * VW] = {0}; // the mean of rows without one
 
 // acc[rows][n] times scales to the floats of *to (sdm_panel_out), from output o on.
 #define BYTES_NUMBERS(rows, n)                                                                     \

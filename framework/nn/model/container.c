@@ -93,7 +93,7 @@ sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *s
     // header
     if (size < sizeof magic || memcmp(bytes, magic, sizeof magic))
         return sdm_fail(err, SDM_E_FORMAT,
-                        "not a model file (its first bytes are not those of one)");
+                        "not a model file (it does not begin with the signature SDMGEN)");
     if (size < HEADER_BYTES + ENTRY_BYTES + 16)
         return sdm_fail(err, SDM_E_FORMAT, "truncated: only %zu bytes", size);
     const uint64_t version = load_le(bytes + 8, 4), count = load_le(bytes + 12, 4),
@@ -113,7 +113,7 @@ sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *s
 
     // sizes, checksum of the header
     if (length != size)
-        return sdm_fail(err, SDM_E_FORMAT, "%s: %zu bytes, its header says %llu",
+        return sdm_fail(err, SDM_E_FORMAT, "%s: it has %zu bytes, its header gives %llu",
                         size < length ? "truncated" : "damaged", size, (unsigned long long)length);
     if (count < 1 || count > SDM_CONTAINER_MAX_SECTIONS)
         return sdm_fail(err, SDM_E_FORMAT, "damaged: %llu sections", (unsigned long long)count);

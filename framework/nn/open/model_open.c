@@ -144,7 +144,7 @@ static sdm_status open_bytes(uint8_t *bytes, size_t size, sdm_model **out, sdm_e
     if (!s && (!meta || !config))
         s = sdm_fail(err, SDM_E_FORMAT, "damaged: a section of a model is missing");
 
-    // description and configuration, then what belongs to the kind of network
+    // description and configuration, then the weights of the kind of network
     sdm_lines lines = {0};
     if (!s) {
         lines.at = meta->data;

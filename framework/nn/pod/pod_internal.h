@@ -1,6 +1,6 @@
 /* The opened pod network and the functions between the files of this folder.
 
-   Words beside those of sdm/internal/pod.h:
+      Words in addition to sdm/internal/pod.h:
      integer weights  type SDM_POD_I8: matrices of integers with scales for rows and columns,
                       w[o][i] = row_scale[o] * integer[o][i] * step[i]
           narrow, wide     an input (column) whose integer weights have one byte, abs <= 127, or two
@@ -21,7 +21,7 @@
                       top is a group of its own
      padded           rounded up to whole panels, sdm_panel_outputs()
 
-   Letters beside those of sdm/internal/pod.h: C coefficients of all levels, R rows (a row of
+      Letters in addition to sdm/internal/pod.h: C coefficients of all levels, R rows (a row of
    latents gives one map or the derivative of one). */
 #ifndef SDM_POD_INTERNAL_H
 #define SDM_POD_INTERNAL_H
@@ -64,7 +64,7 @@ typedef struct pod_network {
     uint8_t *exponents;                     /* [max(F, 1 + I)][P] */
     const float *bias[SDM_POD_MAX_DEPTH];   /* [W] */
     const float *mean;                      /* mean map in the order of leaves[], each padded */
-    /* Panels (sdm/internal/kernels.h). With integer weights those of the MLP are all wide. The
+    /* Panels (sdm/internal/kernels.h). With integer weights all inputs of the MLP are wide. The
        basis lies in the order in which it is read, see sdm_pod_place_weights(). */
     const void *layer[SDM_POD_MAX_DEPTH], *head, *basis;
 

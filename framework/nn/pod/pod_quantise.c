@@ -19,7 +19,7 @@ enum { MLP_WEIGHT_MAX = 2047 }; // largest integer weight of the MLP
 #define HEADROOM 2
 
 // Rounding may add a mean square error of the map of at most ERROR_SHARE_MAX * variance of the map,
-// which is small beside the error of the most accurate networks.
+// which is small compared with the error of the most accurate networks.
 #define ERROR_SHARE_MAX 5e-7
 
 // largest abs(weight / row_scale) in column i, 1 if all are 0; NaN if one is not finite

@@ -31,7 +31,7 @@ static bool onednn_pays(const sdm_fmap *g, sdm_conv c)
            g->n[0] * g->n[1] * g->n[2] <= 32768;
 }
 
-// Packed weights: first those of sdm_conv_pack(), for native calls, then the same weights as
+// Packed weights: first the result of sdm_conv_pack(), for native calls, then the same weights as
 // [outputs][inputs][taps] for oneDNN, transposed if the pass is backward.
 static size_t packed_count(sdm_conv c)
 {

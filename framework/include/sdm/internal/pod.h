@@ -115,7 +115,7 @@ typedef struct sdm_pod_arch {
     sdm_pod_levels levels;
 } sdm_pod_arch;
 
-/* blocked[voxels] = map[nz][ny][nx] in block order; blocks[n_blocks]: those of level 0. */
+/* blocked[voxels] = map[nz][ny][nx] in block order; blocks[n_blocks]: all blocks of level 0. */
 void sdm_pod_gather(const sdm_grid *grid, const sdm_pod_block *blocks, size_t n_blocks,
                     const float *map, float *blocked);
 

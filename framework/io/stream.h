@@ -11,7 +11,7 @@
 
 #define SDM_LINE_MAX 65536
 
-/* An open file. About 130 kB: allocate it on the heap. */
+/* An open file. About 100 kB: allocate it on the heap. */
 typedef struct sdm_stream {
     /* name of the file, for messages */
     char path[4096];
@@ -47,8 +47,7 @@ sdm_status sdm_stream_unzip(sdm_stream *in, sdm_error *err);
 bool sdm_stream_is_gzip(sdm_stream *in);
 
 /* Read or skip exactly `size` bytes. SDM_E_FORMAT when the data end before or are damaged;
- * SDM_E_IO.
- */
+ * SDM_E_IO. */
 sdm_status sdm_stream_read(sdm_stream *in, void *out, size_t size, sdm_error *err);
 sdm_status sdm_stream_skip(sdm_stream *in, uint64_t size, sdm_error *err);
 /* Moves to the last `size` bytes of an uncompressed file; does nothing when fewer are left. */

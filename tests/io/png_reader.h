@@ -1,5 +1,5 @@
-/* Reads the PNG files that the library writes: a small decoder of our own (8-bit RGB), for tests of
- * pictures. */
+/* A small decoder of PNG files with 8-bit RGB pixels, as cairo writes them, for tests of pictures.
+ */
 #ifndef TESTS_PNG_READER_H
 #define TESTS_PNG_READER_H
 
@@ -48,6 +48,7 @@ static void unfilter(const unsigned char *raw, picture *p)
     }
 }
 
+/* The caller frees rgb. Fails the test for a file that is damaged or not of that kind. */
 static picture read_png(const char *path)
 {
     FILE *f = fopen(path, "rb");

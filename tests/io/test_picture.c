@@ -55,8 +55,8 @@ static void test_image_is_exact(void **state)
     }
 }
 
-/* A circle that misses every voxel centre: each inked pixel is near it, and it is inked all around.
- */
+/* The contour of a circle that misses every voxel centre: each coloured pixel is within a pixel of
+ * the circle, and there are such pixels in every direction. */
 static void test_contour_is_subpixel(void **state)
 {
     (void)state;
@@ -85,8 +85,7 @@ static void test_contour_is_subpixel(void **state)
     free(p.rgb);
 }
 
-/* A ball in a grid of three spacings: round in all three slices, of one scale, cut through its
- * middle. */
+/* The distance to a ball on a grid with a different spacing along each axis. */
 static float *ball_map(sdm_grid *g, double radius)
 {
     *g = (sdm_grid){.n = {40, 28, 25},
@@ -105,6 +104,7 @@ static float *ball_map(sdm_grid *g, double radius)
     return v;
 }
 
+/* The ball is a circle of the same size in all three slices. */
 static void test_slices(void **state)
 {
     (void)state;
@@ -132,7 +132,7 @@ static void test_slices(void **state)
         if (n && top < 0) top = y;
         if (n || top < 0) continue;
         const int height = y - top, width = right - left + 1;
-        if (height > 20) { /* else it is the key */
+        if (height > 20) { // else it is the legend
             assert_true(abs(height - width) <= 3);
             if (!runs) first = height;
             assert_true(abs(height - first) <= 3);
@@ -157,7 +157,7 @@ static void test_slices(void **state)
     free(e);
 }
 
-/* Whatever the values and the grid: a picture comes out. */
+/* Constant, NaN and huge values, and grids of one voxel or one line, give a picture too. */
 static void test_slices_of_odd_maps(void **state)
 {
     (void)state;
@@ -181,8 +181,8 @@ static void test_slices_of_odd_maps(void **state)
         }
 }
 
-/* A bright ball on a dark ground, two contours: three circles of the first, side by side, white
- * within and black far outside. */
+/* A bright ball on a dark ground with two contours: the first one makes three circles side by side,
+ * white inside and black outside. */
 static void test_overlay(void **state)
 {
     (void)state;
@@ -203,7 +203,7 @@ static void test_overlay(void **state)
             const unsigned char *pixel = p.rgb + 3 * ((size_t)y * (size_t)p.w + (size_t)x);
             yellow += is_colour(pixel, 255, 214, 10);
             if (!is_colour(pixel, 232, 40, 44)) continue;
-            if (y < p.h - 40) bottom = y; /* below it is the key */
+            if (y < p.h - 40) bottom = y; // below it is the legend
         }
         if (bottom >= 0 && left < 0) left = x;
         if (bottom >= 0 || left < 0) continue;

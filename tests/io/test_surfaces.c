@@ -1,4 +1,4 @@
-/* Pictures of surfaces: what is in front, colours, scale, misuse. */
+/* Pictures of surfaces: hidden surfaces, colours, scale, misuse. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -28,8 +28,8 @@ static void add_square(sdm_mesh *m, double *values, double half, double z, doubl
     memcpy(m->tri + 3 * t, corners, sizeof corners);
 }
 
-/* A small square above a large one: what is nearer hides what is behind in whatever order they
- * come; colours by sign; to scale. */
+/* A small square above a large one hides its middle, in either order of the triangles; colours
+ * follow the sign of the values, and areas the scale. */
 static void test_surfaces(void **state)
 {
     (void)state;

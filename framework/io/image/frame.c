@@ -1,5 +1,4 @@
-/* Turns the voxel-to-voxel steps in an image header into a grid with orthonormal axis directions.
- */
+/* Turns the steps from voxel to voxel in an image header into a grid with orthonormal axes. */
 #include <math.h>
 
 #include "image_readers.h"
@@ -46,7 +45,8 @@ static double largest_shift(const sdm_image_header *h, const sdm_grid *g)
             }
             square += d * d;
         }
-        if (!(square <= largest * largest)) largest = sqrt(square); // NaN is kept
+        if (!(square <= largest * largest))
+            largest = sqrt(square); // a NaN is kept; the caller refuses it
     }
     return largest / shortest;
 }

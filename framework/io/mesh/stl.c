@@ -1,5 +1,4 @@
-/* STL meshes, ASCII and binary. The format has no shared vertices: equal ones are merged on
- * reading.
+/* STL meshes, ASCII and binary. The format repeats shared vertices: equal ones are merged on read.
  */
 #include "mesh_formats.h"
 #include "sdm/internal/rng.h"
@@ -19,7 +18,7 @@ typedef struct vertex_table {
     size_t mask;
 } vertex_table;
 
-/* At most half full with n_corner vertices. */
+/* Allocates a table that n_corner vertices fill to at most one half. */
 static sdm_status table_create(vertex_table *w, size_t n_corner, sdm_error *err)
 {
     size_t size = 64;
@@ -28,7 +27,7 @@ static sdm_status table_create(vertex_table *w, size_t n_corner, sdm_error *err)
     return SDM_ALLOC(&w->slot, size, "table of STL vertices", err);
 }
 
-/* The index of a vertex, which is added to the mesh when it is new. */
+/* *out = index of the vertex at raw[3], which is added to the mesh when it is new. */
 static sdm_status merge_vertex(sdm_builder *b, vertex_table *w, const double raw[3], uint32_t *out,
                                sdm_error *err)
 {
@@ -55,7 +54,7 @@ static sdm_status read_facets(sdm_builder *b, vertex_table *w, const uint8_t *da
                               sdm_error *err)
 {
     for (size_t i = 0; i < n; i++) {
-        const uint8_t *facet = data + STL_HEADER + STL_FACET * i + 12; // behind the normal
+        const uint8_t *facet = data + STL_HEADER + STL_FACET * i + 12; // skips the normal
         uint32_t v[3];
         for (int c = 0; c < 3; c++) {
             double x[3];

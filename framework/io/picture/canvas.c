@@ -26,7 +26,7 @@ static const char *const ENDINGS[N_FORMATS] = {".png", ".svg", ".pdf"};
 static const double EM_PER_CAPITAL = 1.37;
 
 struct sdm_canvas {
-    /* the caller's */
+    /* name of the file, owned by the caller */
     const char *path;
     canvas_format format;
     cairo_surface_t *surface;
@@ -143,7 +143,7 @@ static void add_renumbered(sdm_text *t, const char *document)
     const char *first = strstr(document, "id=\"surface");
     const unsigned long base = first ? strtoul(first + strlen("id=\"surface"), NULL, 10) : 0;
     for (const char *at = document; *at;) {
-        // names follow a quotation mark or a hash sign
+        // ids follow a quotation mark or a hash sign
         size_t n = strcspn(at, "\"#");
         n += at[n] != '\0';
         sdm_text_add(t, "%.*s", (int)n, at);
@@ -259,7 +259,7 @@ void sdm_canvas_image(sdm_canvas *c, sdm_box box, sdm_canvas_pixel *pixel, const
 {
     cairo_surface_t *image = cairo_image_surface_create(CAIRO_FORMAT_RGB24, box.w, box.h);
     unsigned char *data = cairo_image_surface_get_data(image);
-    // without memory, data is NULL and the image is in an error state that c->cr inherits
+    // out of memory: data is NULL, and c->cr takes over the error of the image
     for (int y = 0; data && y < box.h; y++) {
         uint32_t *row = (uint32_t *)(void *)(data + y * cairo_image_surface_get_stride(image));
         for (int x = 0; x < box.w; x++) {

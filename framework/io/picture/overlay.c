@@ -7,6 +7,7 @@
 #include "sdm/picture.h"
 #include "sections.h"
 
+/* Limits, and lengths in pixels. */
 enum {
     MAPS_MAX = 4,
     TOP = 46,

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #define PANEL_WIDE 340.0 /* pixels of the widest section */
-#define PANEL_TALL 420.0 /* and of the tallest */
+#define PANEL_TALL 420.0 /* pixels of the tallest section */
 
 /* The two axes of the grid that a section normal to `axis` shows: to the right and upwards. */
 static void section_axes(int axis, int *right, int *up)

@@ -9,6 +9,7 @@
 
 #define MAPS_MAX 16
 #define LEVELS_MAX 16
+/* Lengths of the layout in pixels. */
 #define LEFT SDM_SECTION_LEFT
 #define RIGHT 22
 #define TOP 46

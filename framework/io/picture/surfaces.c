@@ -8,13 +8,14 @@
 #include "sdm/memory.h"
 #include "sdm/picture.h"
 
+/* Limits, and lengths in pixels. */
 enum {
     SURFACES_MAX = 8,
     N_VIEWS = 2,
     FINE = 3, /* samples of a pixel along each side */
     N_SHADES = 255,
-    MIDDLE = N_SHADES / 2,
-    PANEL = 400, /* pixels of the longer side of the largest view */
+    MIDDLE = N_SHADES / 2, /* index of the colour of 0 */
+    PANEL = 400,           /* pixels of the longer side of the largest view */
     SIDE = 20,
     TOP = 46,
     GAP = 20,

@@ -7,7 +7,7 @@
 #include "report/exact_layers.h"
 #include "report/json_values.h"
 #include "report/output.h"
-#include "report/progress.h"
+#include "report/progress_bar.h"
 #include "report/report_audit.h"
 #include "report/terminal.h"
 #include "sdm/exact.h"

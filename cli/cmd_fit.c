@@ -5,7 +5,7 @@
 
 #include "commands.h"
 #include "fit/fit_command.h"
-#include "report/progress.h"
+#include "report/progress_bar.h"
 #include "report/terminal.h"
 
 /* One progress bar over all phases. */

@@ -8,7 +8,7 @@
 #include "report/generate_files.h"
 #include "report/json_values.h"
 #include "report/output.h"
-#include "report/progress.h"
+#include "report/progress_bar.h"
 #include "report/terminal.h"
 #include "sdm/image.h"
 #include "sdm/internal/checksum.h"

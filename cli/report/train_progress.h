@@ -2,7 +2,7 @@
 #ifndef CLI_TRAIN_PROGRESS_H
 #define CLI_TRAIN_PROGRESS_H
 
-#include "progress.h"
+#include "progress_bar.h"
 #include "sdm/internal/train.h"
 
 /* *progress must live as long as the training; the caller starts and clears it. */

@@ -3,7 +3,7 @@
 #ifndef CLI_EVALUATE_H
 #define CLI_EVALUATE_H
 
-#include "report/progress.h"
+#include "report/progress_bar.h"
 #include "sdm/internal/config.h"
 #include "sdm/runtime.h"
 

@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "report/progress.h"
+#include "report/progress_bar.h"
 #include "report/terminal.h"
 #include "sdm/fit.h"
 #include "sdm/memory.h"

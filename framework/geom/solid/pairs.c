@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "memory/cancel.h"
-#include "pairs_simd.h"
+#include "simd/boxes.h"
 
 #define OUTWARDS 0x1p-22f // margin of a box: more than twice the rounding error of a float <= 1
 #define LEVELS_MAX 11     // 8^11 >= 2^32 blocks

@@ -10,9 +10,9 @@ extern "C" {
 #endif
 
 /* values[nz][ny][nx] = signed distance, mm, negative inside, in double precision by
- * O(voxels * triangles) operations without a tree, as in the reference implementations (VTK; Wang et
- * al., MIDL 2020): distance to the nearest of all triangles of the mesh as given; inside where the
- * generalised winding number, summed over all triangles, is > 1/2. Parallel over the voxels;
+ * O(voxels * triangles) operations without a tree, as in the reference implementations (VTK; Wang
+ * et al., MIDL 2020): distance to the nearest of all triangles of the mesh as given; inside where
+ * the generalised winding number, summed over all triangles, is > 1/2. Parallel over the voxels;
  * n_threads 0: the OpenMP default. */
 sdm_status sdm_naive_map(const sdm_mesh *mesh, const sdm_grid *grid, int n_threads, float *values,
                          sdm_error *err);

@@ -1,5 +1,5 @@
 /* Draws the progress bar, or prints progress lines where stderr is no terminal. */
-#include "progress.h"
+#include "progress_bar.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 /* Overlap tests of eight axis-aligned boxes against one other box, with SSE2 where available. */
-#ifndef SDM_GEOM_PAIRS_SIMD_H
-#define SDM_GEOM_PAIRS_SIMD_H
+#ifndef SDM_GEOM_BOXES_H
+#define SDM_GEOM_BOXES_H
 
 #include <stddef.h>
 #if defined(__SSE2__)

@@ -1,5 +1,6 @@
 /* The plug-in interface is frozen: layout of version 1, tables of other sizes, and shared objects
- * good and bad. */
+ * good and bad.
+ * Tests: loader.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

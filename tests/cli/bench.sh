@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen bench exact: figures of our own methods, of other programs (here scripts that say what they are told to), and what is missing.
+# Tests: bench_case.c bench_compare.c bench_own.c bench_peers.c bench_report.c cmd_bench.c
 . "$(dirname "$0")/common.sh"
 
 mkdir tmp peers none

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # generate --check, --max-error, --gradient, --jacobian: figures, the exact engine in place of a bad map, what is said about it and where.
+# Tests: check.c cmd_generate.c
 . "$(dirname "$0")/common.sh"
 model=../files-of-train/run/model.sdm
 present $model

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen config: the shipped configurations are right; every mistake has its line, with its place.
+# Tests: cmd_config.c config_shape.c
 . "$(dirname "$0")/common.sh"
 
 for config in "$source_folder"/configs/*.yaml; do

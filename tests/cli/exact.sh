@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen exact: values against closed forms, every output type, bad meshes, no partial files.
+# Tests: cmd_exact.c json_values.c output.c report_audit.c
 . "$(dirname "$0")/common.sh"
 
 # floats FILE SKIP: the float32 values behind SKIP bytes, one a line

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen exact --closest --normal --triangle --jacobian: shapes and values of the arrays, mistakes, no partial files.
+# Tests: exact_layers.c
 . "$(dirname "$0")/common.sh"
 
 # numbers FILE COUNT TYPE: the values that end the file, one a line

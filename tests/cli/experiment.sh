@@ -1,5 +1,7 @@
 #!/usr/bin/env bash
 # sdmgen experiment: the table in three forms, references, pictures, a second run that loads, rows that fail, mistakes.
+# Tests: cmd_experiment.c experiment_draw.c experiment_engine.c experiment_job.c experiment_log.c experiment_network.c
+# experiment_plan.c experiment_table.c
 . "$(dirname "$0")/common.sh"
 
 cat >tiny.yaml <<'END'

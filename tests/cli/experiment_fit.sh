@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen experiment with fits: every method on the same phantoms, the tables in all forms, a model from elsewhere, mistakes.
+# Tests: experiment_fit.c experiment_fit_table.c experiment_phantom.c
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive
 

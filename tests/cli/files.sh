@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # No output overwrites an input or another output, whatever the names of the files.
+# Tests: files.c generate_files.c
 . "$(dirname "$0")/common.sh"
 small='--shape ellipsoid --spacing 0.5'
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen fit with a trained model: network, exact maps of the same shape, polish, ranges, an interrupt.
+# Tests: fit_source.c
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive
 model=../files-of-train/run/model.sdm

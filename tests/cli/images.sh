@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen info and verify on images: our own, files made here, and what is not read.
+# Tests: cmd_info.c cmd_verify.c report_image.c
 . "$(dirname "$0")/common.sh"
 
 # a tetrahedron whose faces meet at the origin at right angles

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # Every kind of network from train to eval: the commands need to know nothing of the kind.
+# Tests: bench_network.c
 . "$(dirname "$0")/common.sh"
 cat >base.yaml <<'END'
 shape: {name: capsule}

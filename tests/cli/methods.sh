@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen exact --method: every method through the program, with every kind of output; bounds and notices.
+# Tests: method_table.c
 . "$(dirname "$0")/common.sh"
 
 floats() { od -An -v -t f4 -w4 -j "$2" "$1" | tr -d ' '; }

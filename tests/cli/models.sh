@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # generate, info, eval, verify on a trained model: outputs, parameters, tables of parameters, damaged files.
+# Tests: cmd_eval.c cmd_generate.c cmd_info.c cmd_verify.c evaluate.c evaluate_time.c param_rows.c
 . "$(dirname "$0")/common.sh"
 model=../files-of-train/run/model.sdm
 present $model

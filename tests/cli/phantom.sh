@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen phantom: image, labels, truth; mistakes; no partial files.
+# Tests: cmd_phantom.c phantom_setup.c phantom_truth.c
 . "$(dirname "$0")/common.sh"
 
 # values FILE TYPE: all values of a .npy file, one a line

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen shapes and sdmgen mesh.
+# Tests: cmd_mesh.c cmd_shapes.c report_audit.c setup.c
 . "$(dirname "$0")/common.sh"
 
 expect 0 - sdmgen shapes

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen train: a run folder, its protection, interrupt and resume. The tests of models use the run made here.
+# Tests: cmd_train.c train_progress.c
 . "$(dirname "$0")/common.sh"
 tiny=$source_folder/tests/cli/tiny.yaml
 

@@ -1,5 +1,6 @@
 /* Configuration: values, defaults, overrides, rules between keys, and the exact wording of
- * mistakes. */
+ * mistakes.
+ * Tests: config.c fields.c kinds.c mistakes.c schema.c special.c yaml_tree.c */
 #include <locale.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,4 +1,5 @@
-/* Configuration: the shipped files are valid, and the documentation is what the tables say. */
+/* Configuration: the shipped files are valid, and the documentation is what the tables say.
+ * Tests: config_describe.c */
 #include <glob.h>
 #include <setjmp.h>
 #include <stdarg.h>

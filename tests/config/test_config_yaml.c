@@ -1,5 +1,5 @@
 /* Configuration: the strict subset of YAML, its limits, and dump -> read on random configurations.
- */
+ * Tests: yaml_tree.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,5 +1,6 @@
 /* Configuration of an experiment: rows, variants, the training configuration of each row,
- * references, and every mistake with its place. */
+ * references, and every mistake with its place.
+ * Tests: experiment.c experiment_rows.c experiment_schema.c overrides.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

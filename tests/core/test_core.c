@@ -1,4 +1,5 @@
-/* Core: status, memory, random numbers, checksums, files, text, grids. */
+/* Core: status, memory, random numbers, checksums, files, text, grids.
+ * Tests: checksum.c file.c grid.c json.c memory.c rng.c status.c text.c threads.c */
 #include <limits.h>
 #include <math.h>
 #include <setjmp.h>

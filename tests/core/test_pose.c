@@ -1,4 +1,5 @@
-/* Rigid poses: against the vector form of Rodrigues' formula, each other and differences. */
+/* Rigid poses: against the vector form of Rodrigues' formula, each other and differences.
+ * Tests: pose.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

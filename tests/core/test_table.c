@@ -1,4 +1,5 @@
-/* Markdown and CSV cells, and writing a table. */
+/* Markdown and CSV cells, and writing a table.
+ * Tests: table.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,6 @@
 /* Distances of the exact engine against brute force and closed forms: values, grids, threads,
- * scales, misuse. */
+ * scales, misuse.
+ * Tests: brute_force.c cancel.c exact.c */
 #include <float.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,6 @@
 /* Maps of grids that are far away, thin, enormous or tiny beside the surface, and narrow bands,
- * against brute force. */
+ * against brute force.
+ * Tests: boundary.c grid_distance.c row_base.c */
 #include <float.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,6 @@
 /* Layers of the exact engine's maps: nearest triangle, closest point and gradient against single
- * points, differences and geometry. */
+ * points, differences and geometry.
+ * Tests: exact.c pseudonormal.c sign.c */
 #include <limits.h>
 #include <setjmp.h>
 #include <stdarg.h>

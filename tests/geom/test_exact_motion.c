@@ -1,5 +1,6 @@
 /* What must not change the exact engine's answer: order of triangles and corners, repeated
-   vertices, scale, rotation, a far origin. test_exact_motion [MESHES [FIRST]] */
+ * vertices, scale, rotation, a far origin. test_exact_motion [MESHES [FIRST]]
+ * Tests: exact.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,5 +1,6 @@
 /* The exact engine at the places where engines fail, against closed forms: regions of a triangle,
-   ties, blades, gaps, rays through corners, triangles without area. */
+ * ties, blades, gaps, rays through corners, triangles without area.
+ * Tests: exact.c nearest.c point_triangle.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,5 +1,6 @@
-/* Signs of the exact engine: cavities, open and one-sided meshes, inside-out meshes, methods, exact
- * predicates. */
+/* Signs of the exact engine: cavities, open and one-sided meshes, inside-out meshes, methods,
+ * exact predicates.
+ * Tests: crossings.c parts.c predicates.c pseudonormal.c sign.c winding.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,5 +1,6 @@
 /* Meshes that overlap themselves: the exact engine against closed forms of unions, the swept
- * sphere, and dense classified points. */
+ * sphere, and dense classified points.
+ * Tests: contact.c cutting.c grid_scratch.c parts.c surface_side.c union_hull.c vertex_table.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

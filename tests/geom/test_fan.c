@@ -1,5 +1,6 @@
 /* Triangles around a vertex: those that are not visited meet in nothing but what they share, by
- * exact arithmetic. */
+ * exact arithmetic.
+ * Tests: fan.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

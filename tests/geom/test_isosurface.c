@@ -1,4 +1,5 @@
-/* Iso-surfaces: closed, oriented, on the level, and around exactly the voxels that are inside. */
+/* Iso-surfaces: closed, oriented, on the level, and around exactly the voxels that are inside.
+ * Tests: isosurface.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,4 +1,5 @@
-/* Meshes: storage, and what the audit says of meshes whose answers are known. */
+/* Meshes: storage, and what the audit says of meshes whose answers are known.
+ * Tests: mesh.c survey.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

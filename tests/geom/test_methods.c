@@ -1,5 +1,7 @@
 /* The table of methods: exact ones against brute force, approximate ones within the bound they
- * state; grids, threads, limits, misuse. */
+ * state; grids, threads, limits, misuse.
+ * Tests: cancel.c cells.c edt.c edt_seeds.c method_exact.c method_naive.c method_run.c
+ * method_table.c octree.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

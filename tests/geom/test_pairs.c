@@ -1,4 +1,5 @@
-/* Pairs of triangles that may meet, against all pairs. */
+/* Pairs of triangles that may meet, against all pairs.
+ * Tests: pairs.c */
 #include <float.h>
 #include <math.h>
 #include <setjmp.h>

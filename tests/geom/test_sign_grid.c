@@ -1,5 +1,6 @@
 /* Signs of whole grids on closed meshes: rows that run within faces, parts that are inside out,
- * scale and place, the certificate. */
+ * scale and place, the certificate.
+ * Tests: certify.c row_base.c rows.c sign_rows.c */
 #include "oracle/sign_check.h"
 
 /* Half of the box |x| <= 4, |y| <= 3, |z| <= 5: a prism below a diagonal. How far x is outside of

@@ -1,4 +1,5 @@
-/* Signs of whole grids on open meshes: voxel by voxel against sums of solid angles. */
+/* Signs of whole grids on open meshes: voxel by voxel against sums of solid angles.
+ * Tests: arena.c certify.c rows.c sign_rows.c winding.c */
 #include "oracle/sign_check.h"
 #include "sdm/internal/threads.h"
 

@@ -1,5 +1,6 @@
 /* Derivatives of exact maps as the vertices of a mesh move: motions of whole meshes, and of sheets
- * that cross in a union. */
+ * that cross in a union.
+ * Tests: layers.c vertex_gradient.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

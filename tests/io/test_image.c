@@ -1,4 +1,5 @@
-/* Image files and .npy arrays, read back by small readers that share nothing with the writers. */
+/* Image files and .npy arrays, read back by small readers that share nothing with the writers.
+ * Tests: image_write.c metaimage_write.c nifti_write.c npy.c nrrd_write.c sink.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,4 +1,5 @@
-/* Mesh files: round trips, every dialect, and hostile content. */
+/* Mesh files: round trips, every dialect, and hostile content.
+ * Tests: builder.c meshfile.c obj.c off.c ply.c ply_header.c scan.c stl.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,6 @@
-/* Pictures as PNG, decoded by a small reader: images pixel by pixel, contours and curves where they
- * belong, text, colours, ticks, misuse. */
+/* Pictures as PNG, decoded by a small reader: images pixel by pixel, contours and curves where
+ * they belong, text, colours, ticks, misuse.
+ * Tests: canvas.c colours.c overlay.c panel.c plot.c sections.c slices.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,6 @@
 /* The three formats of pictures: chosen by the ending, well-formed, with text as text, the same
- * bytes every time, and nothing left behind by a failure. */
+ * bytes every time, and nothing left behind by a failure.
+ * Tests: canvas.c */
 #include <dirent.h>
 #include <math.h>
 #include <setjmp.h>

@@ -1,4 +1,5 @@
-/* A build without cairo: every picture is refused with the option that would give it. */
+/* A build without cairo: every picture is refused with the option that would give it.
+ * Tests: picture_none.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,4 +1,5 @@
-/* Pictures of surfaces: hidden surfaces, colours, scale, misuse. */
+/* Pictures of surfaces: hidden surfaces, colours, scale, misuse.
+ * Tests: surfaces.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

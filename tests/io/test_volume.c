@@ -1,5 +1,5 @@
 /* Reading of images: voxels of every type, from files made byte by byte and from our own writers.
- */
+ * Tests: voxels.c */
 #include "volume_files.h"
 
 #include "image_phantom.h"

@@ -1,5 +1,6 @@
-/* Images that are cut off, changed at random or made to exhaust memory: an error, and nothing large
- * allocated before it. */
+/* Images that are cut off, changed at random or made to exhaust memory: an error, and nothing
+ * large allocated before it.
+ * Tests: nifti_read.c stream.c */
 #include "volume_files.h"
 
 #include <sys/stat.h>

@@ -1,5 +1,6 @@
 /* Reading of images: where the voxels lie, in every way a header can say it, voxels beside the
- * header, and segments. */
+ * header, and segments.
+ * Tests: frame.c image_read.c */
 #include "volume_files.h"
 
 #include <math.h>

@@ -1,5 +1,6 @@
 /* Images of a kind that is not read, or with a header that cannot be: each with a status and a
- * message that names the reason. */
+ * message that names the reason.
+ * Tests: metaimage_read.c nrrd_read.c nrrd_segments.c */
 #include "volume_files.h"
 
 #include <math.h>

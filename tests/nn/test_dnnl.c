@@ -1,4 +1,5 @@
-/* Convolution by oneDNN against the native one; the same bits for any number of threads. */
+/* Convolution by oneDNN against the native one; the same bits for any number of threads.
+ * Tests: conv_kernels_dnnl.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

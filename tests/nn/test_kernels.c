@@ -1,4 +1,6 @@
-/* Dense kernels against plain loops in double; the same bits for any number of threads. */
+/* Dense kernels against plain loops in double; the same bits for any number of threads.
+ * Tests: kernels_avx2.c kernels_avx512.c kernels_avx512vnni.c kernels_generic.c kernels_native.c
+ * processor.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

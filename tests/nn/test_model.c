@@ -1,5 +1,7 @@
 /* The pod network against plain double arithmetic, its derivatives against differences, its file
- * against damage. */
+ * against damage.
+ * Tests: container.c model_file.c model_open.c pod_build.c pod_decode.c pod_decode_back.c
+ * pod_forward.c pod_latent.c pod_open.c pod_quantise.c pod_slabs.c pod_survey.c polynomial.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,7 @@
 /* Operators on feature maps against plain loops in double, for every instruction set of this
-   machine; the same bits for any number of threads; zeros around the maps stay zero. */
+ * machine; the same bits for any number of threads; zeros around the maps stay zero.
+ * Tests: conv.c conv_kernels_avx2.c conv_kernels_avx512.c conv_kernels_generic.c dense.c dropout.c
+ * pool.c upsample.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,6 @@
-/* Models that are point networks: against plain double arithmetic, derivatives against differences,
- * the file against damage. */
+/* Models that are point networks: against plain double arithmetic, derivatives against
+ * differences, the file against damage.
+ * Tests: point_forward.c point_layout.c point_open.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,4 +1,5 @@
-/* The sdmnn network against its definition in plain double loops, and its derivatives. */
+/* The sdmnn network against its definition in plain double loops, and its derivatives.
+ * Tests: fmap.c model_kind.c passes.c sdmnn_run.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,4 +1,5 @@
-/* Misuse of the sdmnn network, and damage of its file. */
+/* Misuse of the sdmnn network, and damage of its file.
+ * Tests: model_text.c plan.c sdmnn_build.c sdmnn_open.c sdmnn_weights.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

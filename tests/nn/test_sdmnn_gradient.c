@@ -1,6 +1,7 @@
 /* The gradient of the whole sdmnn network against central differences, with drop-out; a network
-   without kinks, so that differences are derivatives: SiLU for the activation, and steps so small
-   that the largest voxel of a window stays the largest. */
+ * without kinks, so that differences are derivatives: SiLU for the activation, and steps so small
+ * that the largest voxel of a window stays the largest.
+ * Tests: sdmnn_training.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,4 +1,5 @@
-/* Cavities are left out of a fit: against brute force, and in fits next to one. */
+/* Cavities are left out of a fit: against brute force, and in fits next to one.
+ * Tests: cavity.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,4 +1,5 @@
-/* The check of a map: figures known in closed form, whatever the mesh and the grid. */
+/* The check of a map: figures known in closed form, whatever the mesh and the grid.
+ * Tests: check.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,4 +1,5 @@
-/* Closing of label maps by a ball: against brute force, at the border, and misuse. */
+/* Closing of label maps by a ball: against brute force, at the border, and misuse.
+ * Tests: closing.c distance_transform.c envelope.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,6 @@
 /* Autocorrelation of residuals: of smooth noise with known correlation, after fits of smooth
- * functions. */
+ * functions.
+ * Tests: correlation.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

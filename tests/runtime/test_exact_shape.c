@@ -1,5 +1,6 @@
 /* Derivatives of exact maps with respect to the parameters of shapes: against closed forms and
- * differences of exact distances. */
+ * differences of exact distances.
+ * Tests: exact_shape.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,4 +1,5 @@
-/* Distances beyond the grid of a level set: against all points of the faces, one by one. */
+/* Distances beyond the grid of a level set: against all points of the faces, one by one.
+ * Tests: faces.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,4 +1,6 @@
-/* Fits to phantoms with known truth: accuracy, and whether standard deviations match the errors. */
+/* Fits to phantoms with known truth: accuracy, and whether standard deviations match the errors.
+ * Tests: fit.c fit_check.c fit_map.c newton.c observation.c prior.c score_covariance.c
+ * start_search.c tissues.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,4 +1,5 @@
-/* Smoothing and interpolation of fields, against closed forms. */
+/* Smoothing and interpolation of fields, against closed forms.
+ * Tests: interpolate.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,6 @@
 /* Parts of the fit: derivatives against differences, steps within limits, averaged gradient,
- * Anderson acceleration. */
+ * Anderson acceleration.
+ * Tests: anderson.c averaged_gradient.c map_fields.c newton.c objective.c solve.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,6 @@
 /* Fits that must fail: images without the shape, bad arguments, lack of memory, cancellation. And
- * starts from points and axes. */
+ * starts from points and axes.
+ * Tests: start_pose.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

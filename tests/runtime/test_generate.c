@@ -1,5 +1,6 @@
-/* The runtime with a model whose maps are known in closed form: a ball of radius + 0.1 bulge, exact
- * in the network's own terms. */
+/* The runtime with a model whose maps are known in closed form: a ball of radius + 0.1 bulge,
+ * exact in the network's own terms.
+ * Tests: check_results.c generate.c jacobian.c model_shape.c */
 #include <math.h>
 #include <pthread.h>
 #include <setjmp.h>

@@ -1,5 +1,6 @@
 /* The gradient of a map: exact for what differences of second order must get right, the exact
- * engine's normals elsewhere. */
+ * engine's normals elsewhere.
+ * Tests: map_gradient.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

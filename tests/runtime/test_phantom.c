@@ -1,4 +1,5 @@
-/* Phantoms: volumes, edges, labels and air cells against closed forms. */
+/* Phantoms: volumes, edges, labels and air cells against closed forms.
+ * Tests: phantom.c phantom_field.c phantom_shares.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

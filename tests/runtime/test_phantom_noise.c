@@ -1,4 +1,5 @@
-/* Phantoms: noise and random truth against their laws; the same bits, misuse. */
+/* Phantoms: noise and random truth against their laws; the same bits, misuse.
+ * Tests: phantom_air.c phantom_filter.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,4 +1,5 @@
-/* Tissue field: an ellipsoid with bone on one side and a darker tissue on the other. */
+/* Tissue field: an ellipsoid with bone on one side and a darker tissue on the other.
+ * Tests: blur.c evidence.c information.c neighbours.c posterior.c samples.c tissue_field.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

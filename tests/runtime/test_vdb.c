@@ -1,4 +1,5 @@
-/* Level set files against closed-form distances: what is written is read back through OpenVDB. */
+/* Level set files against closed-form distances: what is written is read back through OpenVDB.
+ * Tests: band.c seal.c vdb.cc vdb_creases.cc vdb_file.cc */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

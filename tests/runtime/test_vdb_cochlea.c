@@ -1,6 +1,7 @@
 /* Level sets of real shapes: cochleas have creases, sheets and gaps thinner than a voxel, on which
-   OpenVDB's checkLevelSet still wants a gradient. Every one must be written, pass the check, keep
-   the side of every voxel, and stay close to the map it came from. */
+ * OpenVDB's checkLevelSet still wants a gradient. Every one must be written, pass the check, keep
+ * the side of every voxel, and stay close to the map it came from.
+ * Tests: vdb.cc vdb_creases.cc */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,5 @@
 /* The loader of a build without shared objects: it says what to do, and built-in shapes need none.
- */
+ * Tests: loader_none.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

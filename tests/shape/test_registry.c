@@ -1,5 +1,6 @@
 /* The host's side of shapes: what is refused at registration, options from text, checks around
- * every call. */
+ * every call.
+ * Tests: host.c instance.c options.c registry.c shape_check.c velocity.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

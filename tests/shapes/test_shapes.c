@@ -1,5 +1,7 @@
 /* The built-in shapes with closed forms: meshes against volumes, areas and distances known
-   otherwise, velocities against differences, and the cochlea against its own definition. */
+ * otherwise, velocities against differences, and the cochlea against its own definition.
+ * Tests: builtin.c capsule.c cochlea.c cochlea_curve.c cochlea_distance.c cochlea_ring.c
+ * ellipsoid.c lathe.c torus.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

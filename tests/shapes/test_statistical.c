@@ -1,5 +1,5 @@
 /* The statistical shape: models from files, and every way in which the files may not fit together.
- */
+ * Tests: statistical.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,6 @@
 /* Eigenvectors, factorisations, orthonormal bases and samples of the trainer against their
- * definitions. */
+ * definitions.
+ * Tests: linalg.c sampling.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,6 @@
 /* Backward pass of the MLP against central differences of its forward pass; optimiser and schedule
- * against their formulas. */
+ * against their formulas.
+ * Tests: mlp.c optimiser.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,6 @@
 /* The derivative of a trained network against that of the exact engine, which has it from the
- * motion of the surface. */
+ * motion of the surface.
+ * Tests: jacobian.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

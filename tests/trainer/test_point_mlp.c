@@ -1,5 +1,6 @@
 /* Point networks in the trainer: backward pass and losses against central differences, the model
- * file against the trainer's forward pass. */
+ * file against the trainer's forward pass.
+ * Tests: activation.c loss.c point_build.c point_draw.c point_mlp.c point_open.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,6 @@
 /* Error-driven sampling: the regression of the error, the density of the plan, the same bits for
- * any number of threads and after a resume. */
+ * any number of threads and after a resume.
+ * Tests: error_model.c sample_plan.c sampling.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,6 @@
-/* Training of the networks that learn by gradients on maps: accuracy, losses, the same bits for any
- * number of threads, resume. */
+/* Training of the networks that learn by gradients on maps: accuracy, losses, the same bits for
+ * any number of threads, resume.
+ * Tests: direct.c point_kind.c sdmnn_kind.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

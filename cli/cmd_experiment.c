@@ -13,6 +13,7 @@
 #include "sdm/memory.h"
 #include "sdm/picture.h"
 #include "study/experiment_fit.h"
+#include "study/experiment_fit_table.h"
 
 static sdm_status read_experiment(const cli_args *args, sdm_experiment **out, sdm_error *err)
 {

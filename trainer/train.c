@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "data/dataset_fill.h"
 #include "direct/direct.h"
 #include "pod/pod_kind.h"
 #include "sdm/internal/clock.h"

@@ -1,6 +1,7 @@
 /* Rows of an experiment that fit shapes to phantoms: with a network, with a network and exact maps
  * (polish), with exact maps, or only the time of naive maps. */
 #include "experiment_fit.h"
+#include "experiment_phantom.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "experiment_fit.h"
+#include "experiment_phantom.h"
 #include "report/terminal.h"
 #include "sdm/fit.h"
 #include "sdm/internal/rng.h"

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "experiment_fit.h"
+#include "experiment_fit_table.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/table.h"
 

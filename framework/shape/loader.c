@@ -13,6 +13,8 @@
 
 #define FILE_SHAPES_MAX 256
 
+static void object_close(void *object) { (void)dlclose(object); }
+
 static sdm_status shapes_add_all(sdm_registry *r, sdm_plugin_entry plugin_shape, const char *path,
                                  sdm_error *err)
 {
@@ -58,17 +60,15 @@ sdm_status sdm_registry_load(sdm_registry *r, const char *file, sdm_error *err)
                                            "%s: exports no function " SDM_PLUGIN_SYMBOL
                                            "(): not a plug-in, or hidden by -fvisibility",
                                            path);
-    if (!s) s = sdm_registry_keep(r, object, err);
+    if (!s) s = sdm_registry_keep(r, object, object_close, err);
     if (s) {
         // add all shapes of a file or none
         sdm_registry_shrink(r, before);
-        sdm_object_close(object);
+        object_close(object);
     }
     free(path);
     return s;
 }
-
-void sdm_object_close(void *object) { (void)dlclose(object); }
 
 static int is_shared_object(const struct dirent *e)
 {

@@ -18,5 +18,3 @@ sdm_status sdm_registry_load_path(sdm_registry *r, const char *path, sdm_error *
     if (!r) return sdm_fail(err, SDM_E_ARG, "a registry is needed to load plug-ins");
     return path && *path ? sdm_registry_load(r, path, err) : SDM_OK;
 }
-
-void sdm_object_close(void *object) { (void)object; }

@@ -10,11 +10,16 @@ typedef struct entry {
     char *origin;
 } entry;
 
+typedef struct loaded {
+    void *object;
+    void (*close)(void *object);
+} loaded;
+
 struct sdm_registry {
     /* pointers, because the address of a shape must not change when the array grows */
     entry **entries;
     size_t count, capacity;
-    void **objects; /* handles of loaded shared objects */
+    loaded *objects; /* shared objects that the shapes come from */
     size_t n_objects;
 };
 
@@ -36,18 +41,19 @@ void sdm_registry_free(sdm_registry *r)
 {
     if (!r) return;
     sdm_registry_shrink(r, 0);
-    for (size_t i = r->n_objects; i-- > 0;) sdm_object_close(r->objects[i]);
+    for (size_t i = r->n_objects; i-- > 0;) r->objects[i].close(r->objects[i].object);
     sdm_free(r->objects);
     sdm_free(r->entries);
     sdm_free(r);
 }
 
-sdm_status sdm_registry_keep(sdm_registry *r, void *object, sdm_error *err)
+sdm_status sdm_registry_keep(sdm_registry *r, void *object, void (*close)(void *object),
+                             sdm_error *err)
 {
     const sdm_status s = sdm_grow((void **)&r->objects, r->n_objects, r->n_objects + 1,
                                   sizeof *r->objects, "plug-ins", err);
     if (s) return s;
-    r->objects[r->n_objects++] = object;
+    r->objects[r->n_objects++] = (loaded){object, close};
     return SDM_OK;
 }
 

@@ -19,13 +19,13 @@ sdm_status sdm_shape_copy_checked(const sdm_shape *table, const char *origin, sd
 sdm_status sdm_shape_check_params(const char *who, const sdm_param *params, uint32_t n,
                                   sdm_error *err);
 
-/* registry.c: removes the shapes from index `count` on, and adds the handle of a shared object to
- * those that sdm_registry_free() closes. */
+/* registry.c: removes the shapes from index `count` on. */
 void sdm_registry_shrink(sdm_registry *r, size_t count);
-sdm_status sdm_registry_keep(sdm_registry *r, void *object, sdm_error *err);
 
-/* loader.c or loader_none.c: closes a shared object. */
-void sdm_object_close(void *object);
+/* registry.c: sdm_registry_free() will call close(object), for a shared object that holds shapes of
+ * the registry. SDM_E_NOMEM; then the caller still owns the object. */
+sdm_status sdm_registry_keep(sdm_registry *r, void *object, void (*close)(void *object),
+                             sdm_error *err);
 
 /* options.c: writes values[shape->n_options]; their texts are stored in the new block *text, which
  * the caller frees with sdm_free(). SDM_E_ARG, SDM_E_CONFIG, SDM_E_NOMEM. */

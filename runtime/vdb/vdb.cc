@@ -329,12 +329,6 @@ std::string describe(const Grid &grid, bool sealed)
 
 } // namespace
 
-void vdb_parts::check_cancelled(const sdm_vdb_opts &o, sdm_error *err)
-{
-    if (o.cancelled && o.cancelled(o.user))
-        need(sdm_fail(err, SDM_E_CANCELLED, "level set stopped on request"));
-}
-
 sdm_status sdm_vdb_write(const char *path, const sdm_grid *grid, const float *values,
                          const sdm_vdb_opts *opts, sdm_vdb_report *report, sdm_error *err)
 {

@@ -32,7 +32,11 @@ inline void need(sdm_status s)
 inline float as_stored(float v, bool half) { return half ? openvdb::io::truncateRealToHalf(v) : v; }
 
 // fails with SDM_E_CANCELLED if the caller wants to stop
-void check_cancelled(const sdm_vdb_opts &o, sdm_error *err);
+inline void check_cancelled(const sdm_vdb_opts &o, sdm_error *err)
+{
+    if (o.cancelled && o.cancelled(o.user))
+        need(sdm_fail(err, SDM_E_CANCELLED, "level set stopped on request"));
+}
 
 // ---- vdb_creases.cc
 

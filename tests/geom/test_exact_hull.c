@@ -2,7 +2,7 @@
  * found is on the boundary of the places enclosed at least once, and nothing nearer is.
  * test_exact_hull [MESHES [FIRST]]
  * Tests: bvh.c clock.c contact.c crossings.c cutting.c facet.c line_triangle.c nearest.c parts.c
- * point_triangle.c predicates.c surface_features.c surface_side.c topology.c union_hull.c
+ * point_triangle.c predicates.c feature_build.c surface_side.c topology.c union_hull.c
  * vertex_table.c */
 #include <setjmp.h>
 #include <stdarg.h>

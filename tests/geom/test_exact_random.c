@@ -1,7 +1,7 @@
 /* The exact engine against brute force on random meshes: distances, signs, nearest points, maps,
  * threads, instruction sets. test_exact_random [MESHES [FIRST]]
  * Tests: feature_groups_avx2.c feature_groups_generic.c grid_distance.c map_avx2.c map_avx512.c
- * map_generic.c nearest.c surface_features.c */
+ * map_generic.c nearest.c feature_build.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

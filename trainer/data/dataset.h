@@ -41,21 +41,6 @@ typedef struct dataset {
 sdm_status trainer_dataset_create(dataset *d, const sdm_config *config, sdm_error *err);
 void trainer_dataset_dispose(dataset *d);
 
-/* Callbacks of trainer_dataset_fill(); each may be NULL. */
-typedef struct fill_hooks {
-    /* Called by the calling thread. */
-    void (*report)(void *user, size_t done, size_t all);
-    bool (*cancelled)(void *user);
-    /* true: the remaining maps of n_start are left to be made during training; n_start and n_online
-       change accordingly. */
-    bool (*enough)(void *user);
-    void *user;
-} fill_hooks;
-
-/* Makes all maps needed before training: held-out, static, start. shape, grid, blocks, n_blocks,
-   min, max and seed must be set. */
-sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_error *err);
-
 /* The parameter space of the random samples; its pointers refer to d. */
 sample_space trainer_dataset_space(const dataset *d);
 

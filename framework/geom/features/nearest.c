@@ -3,6 +3,7 @@
 
 #include <math.h>
 
+#include "feature_build.h"
 #include "feature_distance.h"
 
 sdm_status sdm_nearest_build(const sdm_mesh *m, const sdm_topology *topo, sdm_arena *arena,

@@ -1,5 +1,5 @@
 /* PLY meshes, ASCII and binary in both byte orders. Unknown elements and properties are ignored. */
-#include "ply.h"
+#include "ply_header.h"
 #include "sdm/internal/text.h"
 
 #include <math.h>

@@ -1,5 +1,5 @@
 /* Reads the header of a PLY file: format, elements, properties. */
-#include "ply.h"
+#include "ply_header.h"
 
 size_t sdm_ply_type_size(sdm_ply_type type)
 {

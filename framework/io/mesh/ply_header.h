@@ -1,6 +1,6 @@
 /* The header of a PLY file: elements and their properties, in the order of the body. */
-#ifndef SDM_IO_PLY_H
-#define SDM_IO_PLY_H
+#ifndef SDM_IO_PLY_HEADER_H
+#define SDM_IO_PLY_HEADER_H
 
 #include "mesh_formats.h"
 

@@ -1,6 +1,6 @@
 /* Features of a surface: scale, clusters, and numbers of the edges and corners; the groups are
    filled by feature_groups.inc. */
-#include "surface_features.h"
+#include "feature_build.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,0 +1,89 @@
+/* The maps before training, computed by all threads. */
+#include "dataset_fill.h"
+
+#include <stdatomic.h>
+
+#include "sdm/internal/threads.h"
+#include "streams.h"
+#include "workbench.h"
+
+/* Parameters p[n_params] of point `index` of the static grid: both ends of each range are included;
+   with one point it is the middle. */
+static void static_params(const dataset *d, size_t index, double *p)
+{
+    for (size_t i = 0; i < d->n_params; i++) {
+        const size_t n = d->counts[i], k = index % n;
+        index /= n;
+        p[i] = n == 1 ? 0.5 * (d->min[i] + d->max[i])
+                      : d->min[i] + (d->max[i] - d->min[i]) * (double)k / (double)(n - 1);
+        if (k + 1 == n && n > 1) p[i] = d->max[i];
+    }
+}
+
+sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_error *err)
+{
+    enum { MIN_RANDOM = 128 }; // random maps that are made even if hooks->enough() is true
+    const size_t all = d->n_holdout + d->n_static + d->n_start;
+    size_t done = 0;
+    long failed =
+        -1; // number of the lowest failed sample: the message does not depend on scheduling
+    sdm_error first = {0};
+    atomic_bool stop = false, enough = false;
+    n_threads = sdm_threads(n_threads);
+#pragma omp parallel num_threads(n_threads)
+    {
+        workbench w = {0};
+        sdm_error mine = {0};
+        const sdm_status made = trainer_workbench_create(&w, d, &mine);
+#pragma omp for schedule(dynamic)
+        for (long i = 0; i < (long)all; i++) {
+            const size_t at = (size_t)i;
+            if (stop || (enough && at >= d->n_holdout + d->n_static + MIN_RANDOM)) continue;
+            sdm_status s = made;
+            if (!s && at < d->n_holdout) {
+                double *p = d->holdout_params + at * d->n_params;
+                sdm_sample_params(d->seed, STREAM_HOLDOUT, at, d->min, d->max, d->n_params, p);
+                s = trainer_workbench_map(&w, d, p, d->holdout + at * d->n_voxels, &mine);
+            } else if (!s) {
+                // n_start <= n_ring, so random sample k lies in slot n_static + k
+                const size_t slot = at - d->n_holdout;
+                double *p = d->params + slot * d->n_params;
+                if (slot < d->n_static)
+                    static_params(d, slot, p);
+                else
+                    sdm_sample_params(d->seed, STREAM_TRAIN, slot - d->n_static, d->min, d->max,
+                                      d->n_params, p);
+                s = trainer_workbench_packed_map(&w, d, p, d->maps + slot * d->n_voxels,
+                                                 &d->scale[slot], &mine);
+            }
+            // keep the first error, report, and ask whether to stop
+#pragma omp critical(sdm_dataset_fill)
+            {
+                if (s && (failed < 0 || i < failed)) failed = i, first = mine;
+                if (s) stop = true;
+                done++;
+                if (hooks->report && sdm_thread() == 0) hooks->report(hooks->user, done, all);
+                if (hooks->enough && hooks->enough(hooks->user)) enough = true;
+                if (hooks->cancelled && !stop && hooks->cancelled(hooks->user)) {
+                    stop = true;
+                    failed = (long)all;
+                    sdm_fail(&first, SDM_E_CANCELLED, "stopped on request");
+                }
+            }
+        }
+        trainer_workbench_dispose(&w);
+    }
+    if (failed >= 0) {
+        if (err) *err = first;
+        return first.status;
+    }
+    // a slot with a map has scale > 0; maps after the first gap are made again during training
+    size_t made = 0;
+    while (made < d->n_start && d->scale[d->n_static + made] > 0) made++;
+    d->n_online += d->n_start - made;
+    d->n_taken = d->n_start = made;
+    if (d->plan.n_planned == 0)
+        // a resumed run has read its plan from the checkpoint
+        trainer_sample_plan_start(&d->plan, made);
+    return SDM_OK;
+}

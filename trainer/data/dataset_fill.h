@@ -1,0 +1,22 @@
+/* Computes the maps that are needed before training: held-out, static grid, first random ones. */
+#ifndef SDM_DATASET_FILL_H
+#define SDM_DATASET_FILL_H
+
+#include "dataset.h"
+
+/* Callbacks of trainer_dataset_fill(); each may be NULL. */
+typedef struct fill_hooks {
+    /* Called by the calling thread. */
+    void (*report)(void *user, size_t done, size_t all);
+    bool (*cancelled)(void *user);
+    /* true: the remaining maps of n_start are left to be made during training; n_start and n_online
+       change accordingly. */
+    bool (*enough)(void *user);
+    void *user;
+} fill_hooks;
+
+/* Makes all maps needed before training: held-out, static, start. shape, grid, blocks, n_blocks,
+   min, max and seed must be set. */
+sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_error *err);
+
+#endif

@@ -1,8 +1,8 @@
 /* Training end to end on small grids: accuracy, the same bits for any number of threads, resume,
  * cancellation, mistakes.
- * Tests: bases.c blocks.c checkpoint.c coefficients.c dataset.c dataset_fill.c export_model.c head.c mode_fit.c
- * modes.c new_samples.c pod_kind.c pod_tree.c producer.c progress.c refine.c sample_plan.c train.c
- * workbench.c */
+ * Tests: bases.c blocks.c checkpoint.c coefficients.c dataset.c dataset_fill.c export_model.c
+ * head.c mode_fit.c modes.c new_samples.c pod_kind.c pod_tree.c producer.c progress.c refine.c
+ * sample_plan.c train.c workbench.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

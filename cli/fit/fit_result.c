@@ -14,8 +14,8 @@ const char *cli_fit_kind(const cli_fit *f)
                                              : "points";
 }
 
-/* The grid, rotated and translated with the shape. On it the source's values need no
- * interpolation. */
+/* The grid g, rotated and translated with the shape. On it the map of the network or of the exact
+ * engine needs no interpolation. */
 static sdm_grid grid_in_pose(const sdm_grid *g, const sdm_pose *pose)
 {
     sdm_grid posed = *g;

@@ -26,7 +26,7 @@ typedef struct network_times {
     int threads;
     double peak_gmacs;  /* 10^9 multiply-adds per second of the matrix product on one core */
     double read_gbs;    /* GB/s of one core reading a block of the size of the weights repeatedly */
-    sdm_error no_exact; /* why the exact engine has no time */
+    sdm_error no_exact; /* why no time was measured for the exact engine */
 } network_times;
 
 /* A model with all memory that its derivatives need: allocation is not timed. */

@@ -300,7 +300,7 @@ sdm_status cli_bench_peers(const cli_bench_case *c, const cli_args *args, cli_be
     return s;
 }
 
-/* ---- a single peer ---- */
+/* ---- one peer, a program that makes maps with another library ---- */
 
 static size_t find_known(const char *name)
 {

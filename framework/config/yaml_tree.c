@@ -377,8 +377,9 @@ static sdm_status tree_build(tree_builder *b, yaml_parser_t *parser, const char 
 /* Allocates nodes and texts for a document of `size` bytes. */
 static sdm_status tree_allocate(sdm_tree *tree, size_t size, sdm_error *err)
 {
-    // Bounds: two nodes per byte, and 1.5 bytes of text per byte of an escape sequence. Both are
-    // checked again on use. sdm_tree_wrap() needs the rest.
+    // Upper bounds: two nodes per byte of the document, and two bytes of text per byte (an escape
+    // sequence yields at most 1.5) plus a terminator per node; both are checked again on use.
+    // The terms SDM_TREE_PATH_... are for sdm_tree_wrap().
     size_t nodes = 2 * size + 2;
     tree->max_nodes = nodes < SDM_TREE_NODES_MAX ? nodes : SDM_TREE_NODES_MAX;
     tree->pool_size = 2 * size + 2 * tree->max_nodes + SDM_TREE_PATH_BYTES + SDM_TREE_PATH_NAMES;

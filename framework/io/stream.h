@@ -46,7 +46,7 @@ sdm_status sdm_stream_unzip(sdm_stream *in, sdm_error *err);
 /* True when the next two bytes, which stay unread, are the magic number of gzip. */
 bool sdm_stream_is_gzip(sdm_stream *in);
 
-/* Read or skip exactly `size` bytes. SDM_E_FORMAT when the data end before or are damaged;
+/* Read or skip exactly `size` bytes. SDM_E_FORMAT: the data are damaged or end too early;
  * SDM_E_IO. */
 sdm_status sdm_stream_read(sdm_stream *in, void *out, size_t size, sdm_error *err);
 sdm_status sdm_stream_skip(sdm_stream *in, uint64_t size, sdm_error *err);

@@ -456,7 +456,7 @@ sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
     if (!s) s = start_find(&p, out, err);
     if (!s) s = maximise(&p, out, err);
 
-    // 6. covariance and evidence; 7. the result, also of a fit that failed for its quality
+    // 6. covariance and evidence; 7. the result, also of a fit that failed with SDM_E_QUALITY
     if (!s) s = assess(&p, out, err);
     if (out->n_params && (!s || s == SDM_E_QUALITY)) report(&p, out);
     if (!s) s = judge(&p, out, err);

@@ -101,7 +101,8 @@ void add_metadata(Grid &grid, const sdm_vdb_opts &o, const sdm_vdb_report &r, sd
 
 // ---- map to grid
 
-/* Largest enlargement of rotated voxels, in units in the last place. */
+/* Most units in the last place by which the voxel size of a rotated grid may be increased until
+   OpenVDB takes it for uniform. */
 const int ROUNDINGS_MAX = 64;
 
 /* Smallest background that can be stored and whose quotient by the voxel size, which checkLevelSet

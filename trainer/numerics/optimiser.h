@@ -23,7 +23,7 @@ typedef struct adam_step {
     float rate, correct_m, correct_v;
 } adam_step;
 
-/* Step t = 1, 2, ... of learning rate `rate`. */
+/* Constants of Adam's step t = 1, 2, ... with learning rate `rate`. */
 adam_step trainer_adam_begin(double rate, int64_t t);
 
 /* Updates weights first .. first + n - 1 and their moments from the gradient g[n], with the

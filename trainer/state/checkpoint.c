@@ -177,7 +177,7 @@ static sdm_status checkpoint_refuse(const trainer *t, const char *what, sdm_erro
                     t->folder, what);
 }
 
-/* Skips the indent of a line of text; returns its length, at most 200, for "%.*s". */
+/* Skips the indent of a line of text; returns the length of the rest, at most 200, for "%.*s". */
 static int line_length(const char **text)
 {
     *text += strspn(*text, " ");

@@ -11,8 +11,8 @@ struct train_kind {
     size_t (*block)(const sdm_config *c);
     /* Number of levels of blocks (sdm/internal/pod.h); NULL: 1. */
     size_t (*levels)(const sdm_config *c);
-    /* Called once the maps before training exist: allocates t->state, designs the network, sets its
-       initial weights. */
+    /* Called after the maps that precede training have been made: allocates t->state, designs the
+       network, sets its initial weights. */
     sdm_status (*begin)(trainer *t, sdm_error *err);
     /* Called when new random maps have been put into slots[n]; NULL: nothing to do. */
     sdm_status (*samples_taken)(trainer *t, const size_t *slots, size_t n, sdm_error *err);

@@ -98,9 +98,9 @@ static inline uint32_t number_take(uint32_t *own, uint32_t *next, uint32_t *sour
     return *own = number;
 }
 
-/* Numbers the edges and corners of a cluster that no cluster before it contains, and its groups. A
-   triangle with a repeated vertex has no edge in the topology: it becomes one edge feature, a
-   segment. */
+/* Numbers the groups of a cluster, and those of its edges and corners that no earlier cluster
+   contains. A triangle with a repeated vertex has no edge in the topology: it becomes one edge
+   feature, a segment. */
 static void cluster_number(const sdm_feature_builder *b, sdm_cluster_node *node, next_numbers *n)
 {
     sdm_features *f = b->f;

@@ -56,8 +56,8 @@ static void barycentric(const sdm_frame *f, const double q[3], double w[3])
     w[(turn + 2) % 3] = third;
 }
 
-/* Adds the derivative for the vertices of triangle t, where `part` is the component of the normal
- * assigned to it. */
+/* Adds the derivative by the vertices of triangle t, for its point q; the vector `part` is the
+ * share of the normal that triangle t gets. */
 static void gradient_add(const sdm_sheets *s, uint32_t t, const double q[3], const double part[3],
                          sdm_vertex_gradient *out)
 {

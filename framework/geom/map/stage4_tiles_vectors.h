@@ -70,8 +70,9 @@ SDM_FOR_KIND void batch_test_tiles(block *b, int kind)
     batch->n_tile_pair = n;
 }
 
-/* Lists the pairs of a feature and a vector of the batch's tile pairs: those where the vector meets
-   the region and the feature is not too far from it. */
+/* For each pair (feature, tile) of the batch, lists the pairs of this feature and a vector of the
+   tile for which the vector meets the feature's region and the feature is near enough to be the
+   nearest at one of the vector's voxels. */
 SDM_FOR_KIND void batch_test_vectors(const block *b, int kind)
 {
     const sdm_grid_job *job = b->job;

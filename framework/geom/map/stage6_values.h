@@ -74,7 +74,8 @@ static uint32_t voxel_settle(const tile *t, unsigned v, int lane, const double p
         if (!(c->list[i].voxels >> lane & 1)) continue;
         const double d =
             sdm_feature_distance2(t->job->features, t->job->surface->frames, c->list[i].number, p);
-        if (!(d < *d2 || (d == *d2 && d < INFINITY))) continue; // the list runs backwards
+        if (!(d < *d2 || (d == *d2 && d < INFINITY))) continue;
+        // equal distances are accepted: the list is read backwards, and its first feature wins
         *d2 = d;
         best = c->list[i].number;
     }

@@ -1,5 +1,5 @@
-/* Four doubles as one compiler vector (d4) with arithmetic operators and elements: one register of
-   AVX, two of SSE2 or NEON. v4d of lanes.h has neither. */
+/* Four doubles as one compiler vector (d4): one register of AVX, two of SSE2 or NEON. Unlike v4d of
+   lanes.h, it has arithmetic operators and element access, d[i]. */
 #ifndef SDM_GEOM_FOUR_LANES_KERNEL_H
 #define SDM_GEOM_FOUR_LANES_KERNEL_H
 

@@ -30,7 +30,7 @@ typedef struct sdm_cutter {
  * visit(user, corner, n) for each piece, its corners in the orientation of the triangle. Pieces
  * with area <= tolerance * perimeter are left out. Stops at the first status of visit() other than
  * SDM_OK and returns it; SDM_E_NOMEM. */
-sdm_status sdm_cut_triangle(sdm_cutter *c, const sdm_corner corner[3], const sdm_contact *contacts,
+sdm_status sdm_cut_triangle(sdm_cutter *w, const sdm_corner corner[3], const sdm_contact *contacts,
                             size_t n, double tolerance,
                             sdm_status (*visit)(void *user, const sdm_corner *corner, size_t n),
                             void *user, sdm_error *err);

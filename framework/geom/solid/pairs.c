@@ -213,8 +213,8 @@ sdm_status sdm_pairs_visit(const sdm_mesh *m, const sdm_topology *topo, const sd
     do {
         n = (n + 7) / 8;
         if (!s)
-            s = SDM_TAKE_UNSET(arena, SDM_HIGH, &w.level[w.n_level++], n, "pairs of triangles",
-                               err);
+            s = SDM_TAKE_UNSET(arena, SDM_HIGH, &w.level[w.n_level], n, "pairs of triangles", err);
+        w.n_level++;
     } while (!s && n > 1);
     if (!s) {
         fill_blocks(&w, m, topo, tree, slack);

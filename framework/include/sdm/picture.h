@@ -1,11 +1,11 @@
 /* Pictures of maps, surfaces and curves, as PNG, SVG or PDF.
  *
- * The format follows the ending of `path`, .png, .svg or .pdf; another one is SDM_E_UNSUPPORTED.
+ * The format follows the ending of `path`: .png, .svg or .pdf; others give SDM_E_UNSUPPORTED.
  * The file is written under a temporary name and then renamed, so that no broken picture appears.
- * Errors of all functions: SDM_E_ARG for arguments that are missing or too many, SDM_E_IO,
- * SDM_E_NOMEM, and SDM_E_UNSUPPORTED for all pictures in a build with SDM_PICTURE=OFF. The same
- * picture is the same bytes, given the same fonts and version of cairo (SVG: as long as no other
- * thread uses cairo). [any thread] */
+ * Errors of all functions: SDM_E_ARG (a NULL argument, or too many items), SDM_E_IO,
+ * SDM_E_NOMEM, and SDM_E_UNSUPPORTED for all pictures in a build with SDM_PICTURE=OFF. Drawing the
+ * same picture again gives the same bytes, with the same fonts and version of cairo (SVG: as long
+ * as no other thread uses cairo). [any thread] */
 #ifndef SDM_PICTURE_H
 #define SDM_PICTURE_H
 

@@ -120,12 +120,13 @@ static void upper_product(const slab_task *j, size_t b, const input *in, float *
                   in, NULL, y, ldy);
 }
 
-// Scales of n integer inputs of block b and its group. A row whose latents are not finite gets the
-// scale NaN, because z_scale - z_scale is NaN instead of 0.
+// Sets the scale of each row of the n integer inputs of block b and the blocks that share its
+// inputs, and pads an odd n with a zero input. A row whose latents are not finite gets the scale
+// NaN, because z_scale - z_scale is NaN instead of 0.
 static void quantum_set(const slab_task *j, size_t b, size_t n, const input *to)
 {
     for (size_t r = 0; r < j->rows; r++) {
-        to->q[r * to->ld + n] = 0; // read together with an odd last input, times zero
+        to->q[r * to->ld + n] = 0; // the product reads pairs of inputs
         to->scale[r] = j->m->quantum[b] + (j->z_scale[r] - j->z_scale[r]);
     }
 }
@@ -310,7 +311,7 @@ static void quantise_latent(const pod_network *m, size_t rows, size_t residuals,
     }
 }
 
-// w->c = the coefficients at .. at + n - 1 of the highest level.
+// w->c = the n coefficients of the highest level that begin at index `at`.
 static void head_product(const pod_network *m, size_t rows, size_t residuals, bool fixed, size_t at,
                          size_t n, const pod_scratch *w)
 {

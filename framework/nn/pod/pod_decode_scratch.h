@@ -13,7 +13,7 @@ typedef struct input {
     size_t ld;
 } input;
 
-/* For R <= SDM_POD_ROWS rows. */
+/* Scratch memory of one slab, for R <= SDM_POD_ROWS rows; a row is one map or one derivative. */
 typedef struct slab_scratch {
     float *y[SDM_POD_MAX_LEVELS]; /* [R][padded outputs] of a block of each level */
     input x[SDM_POD_MAX_LEVELS];  /* integer weights: inputs of a group of each level above 0 */

@@ -28,7 +28,7 @@ static uint32_t read_u32(const uint8_t *p)
     return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
 }
 
-// Ranks of all blocks, and the sizes and orders that follow from them.
+// Reads the ranks of all blocks, and derives array sizes and the storage order of the weights.
 static sdm_status read_ranks(const sdm_section *ranks, pod_network *m, sdm_error *err)
 {
     sdm_pod_arch *a = &m->arch;

@@ -272,7 +272,8 @@ static void round_all(const survey *s, pod_integers *q)
         }
 }
 
-// Quanta: the largest input of a group in the survey, times HEADROOM, becomes the limit.
+// Sets the quanta, the values of one unit of the integer inputs: the largest integer stands for
+// HEADROOM times the largest input that the survey found in the group of blocks.
 static void find_quanta(const survey *s, pod_integers *q)
 {
     for (size_t l = 0; l < s->spec->arch.levels.n; l++)

@@ -9,7 +9,7 @@
    for latents the output of a row of another. sdm_pod_survey() sets the first two members,
    sdm_pod_quantise() the others. */
 typedef struct coefficient_stats {
-    double square;  /* mean square at uniform parameters */
+    double square;  /* mean square over uniformly distributed parameters */
     double largest; /* largest magnitude; NaN if one is */
     double gain;    /* squared Euclidean norm of the map of a coefficient of 1, mm^2 */
     double unit;    /* largest abs(weight / row_scale) in its column */

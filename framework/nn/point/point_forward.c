@@ -170,7 +170,8 @@ static void points_forward(const point_network *k, const map_bias *b, size_t n, 
     }
 }
 
-// One map. The threads share chunks of R voxels; the chunks do not depend on the number of threads.
+// One map. The voxels are divided into chunks of R, which are distributed over the threads; the
+// chunks do not depend on the number of threads.
 static void map_forward(const sdm_model *m, const double *p, float *values, float *jacobian,
                         void *scratch, int n_threads)
 {

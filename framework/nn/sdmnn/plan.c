@@ -128,8 +128,8 @@ void sdm_sdmnn_plan_make(const sdm_sdmnn_arch *a, bool keep, sdmnn_plan *p)
     in = merged[a->depth], n_in = channels_of(a, a->depth);
     for (size_t l = a->depth; l-- > 0;) {
         const size_t c = channels_of(a, l);
-        // The 1 x 1 x 1 convolution comes before the up-sampling: the result is the same, because
-        // up-sampling repeats voxels, with an eighth of the work.
+        // The 1 x 1 x 1 convolution comes before the up-sampling, which needs an eighth of the
+        // work. The result is the same, because up-sampling only repeats voxels.
         const size_t reduced = keep ? add_map(p, l + 1, c) : first[l + 1];
         add_step(p, SDMNN_CONV, l + 1, in, reduced, (sdm_conv){n_in, c, 1});
         add_step(p, SDMNN_UPSAMPLE, l, reduced, merged[l] + c * p->level[l].stride,

@@ -34,7 +34,7 @@ typedef struct sdmnn_plan {
     size_t n_cells[3], cells;     /* size of the volume, along x, y, z and in all */
     sdm_fmap cell;                /* layout of the volume */
     sdm_fmap level[SDMNN_LEVELS]; /* layout of each level */
-    size_t volume;                /* offset of the volume, one channel */
+    size_t volume;                /* offset of the volume in the work memory, one channel */
     size_t input, output; /* offsets of the up-sampled volume and of the map, one channel each */
     size_t floats;        /* of the maps */
     size_t n_weights;     /* sdm_sdmnn_count() */

@@ -53,7 +53,7 @@ typedef struct fit_observation {
 void sdm_fit_observation_prepare(const sdm_fit_opts *opts, sdm_fit_kind kind,
                                  const fit_state *state, fit_observation *obs);
 
-/* Likelihood of one sample: all members of *out with derivatives, else log_likelihood alone.
+/* Likelihood of one sample. Sets all members of *out if `derivatives`, else log_likelihood alone.
    log_weight[n_tissues - n_in]: log weights of the outside tissues at the sample (partial volume
    only); NULL: those of the model. [any thread, as all functions below] */
 void sdm_fit_likelihood(const fit_observation *obs, double value, const float *log_weight,
@@ -88,9 +88,9 @@ void sdm_fit_moments_add(const fit_observation *obs, double value, const float *
 void sdm_fit_moments_apply(const fit_observation *obs, const fit_moments *m, const bool *kept,
                            double min_sd, sdm_fit_appearance *appearance);
 
-/* share[n_tissues - n_in]: probable part of the voxel that each outside tissue fills; they sum to 1
+/* part[n_tissues - n_in]: expected part of the voxel that each outside tissue fills; they sum to 1
  * less the share of the shape. Partial volume only. */
 void sdm_fit_outside_shares(const fit_observation *obs, double value, const float *log_weight,
-                            double field, double *share);
+                            double field, double *part);
 
 #endif

@@ -5,9 +5,9 @@
 #include "fit/data/unknowns.h"
 
 enum {
-    /* earlier pairs that are combined at most */
+    /* largest number of earlier pairs that are combined */
     FIT_ANDERSON_DEPTH = 5,
-    /* components of a point at most: all unknowns, and three numbers for each tissue */
+    /* largest number of components of a point: all unknowns, and three numbers for each tissue */
     FIT_ANDERSON_MAX = FIT_UNKNOWNS_MAX + 3 * FIT_TISSUES_MAX
 };
 

@@ -21,9 +21,9 @@ sdm_status sdm_fit_correlation_estimate(const fit_neighbours *v, double effort, 
 sdm_status sdm_fit_correlation_correct(const fit_neighbours *v, const double *influence, int width,
                                        int n_threads, double *c, sdm_error *err);
 
-/* tapered[FIT_LAG_ZERO + 1] = c times a window over lags. flat: weight 1 in the inner half, then
-   linear to 0 beyond width; else linear from lag zero. Returns the sum over all lags of both
-   halves, at least C(0). */
+/* tapered[FIT_LAG_ZERO + 1] = c times a window over lags. flat: weight 1 up to lag width / 2, then
+   falling linearly to 0 just past `width`; else falling linearly from lag zero. Returns the sum
+   over all lags and their opposites (c stores one of each pair), but at least C(0). */
 double sdm_fit_correlation_taper(const double *c, int width, bool flat, double *tapered);
 
 #endif

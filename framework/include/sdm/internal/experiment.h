@@ -173,8 +173,9 @@ sdm_status sdm_experiment_parse(const char *name, const char *text, size_t size,
 void sdm_experiment_free(sdm_experiment *e);
 
 /* *out = the training configuration of a row: the base, then the keys of the experiment, of the
- * method, of the variant and of the command line, each overriding the earlier ones. For an engine
- * only shape, grid and ranges have a meaning. SDM_E_ARG: no such row; SDM_E_NOMEM. [any thread] */
+ * method, of the variant and of the command line, each overriding the earlier ones. For a row
+ * that measures an engine instead of a network, only shape, grid and ranges have a meaning.
+ * SDM_E_ARG: no such row; SDM_E_NOMEM. [any thread] */
 sdm_status sdm_experiment_config(const sdm_experiment *e, size_t row, sdm_config *out,
                                  sdm_error *err);
 

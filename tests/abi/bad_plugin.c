@@ -1,4 +1,5 @@
-/* Plug-ins that do not follow the rules, one a VARIANT: test_abi loads each of them. */
+/* Plug-ins that break the rules of the plug-in interface: each VARIANT is built as a shared object
+ * of its own, and test_abi checks that it is refused. */
 #include "sdm/shape.h"
 
 #define WRONG_ABI 1
@@ -24,7 +25,7 @@ const sdm_shape *some_other_name(uint32_t index);
 #endif
 
 #if VARIANT == UNDEFINED
-int a_function_that_nobody_has(void);
+int a_function_without_definition(void);
 #endif
 
 const sdm_shape *sdm_plugin_shape(uint32_t index)
@@ -42,7 +43,7 @@ const sdm_shape *sdm_plugin_shape(uint32_t index)
         break;
     case NO_SHAPE:
         return 0;
-    case ENDLESS: { // every call another name
+    case ENDLESS: { // a new shape with a new name for every index, without end
         static char name[8] = "s000000";
         for (uint32_t i = 6, n = index; i > 0; i--, n /= 10) name[i] = (char)('0' + n % 10);
         static char names[300][8];
@@ -60,7 +61,7 @@ const sdm_shape *sdm_plugin_shape(uint32_t index)
         break;
     }
 #if VARIANT == UNDEFINED
-    return a_function_that_nobody_has() ? &shape : 0;
+    return a_function_without_definition() ? &shape : 0;
 #else
     return index == 0 ? &shape : 0;
 #endif

@@ -1,5 +1,5 @@
-/* The plug-in interface is frozen: layout of version 1, tables of other sizes, and shared objects
- * good and bad.
+/* The plug-in interface is frozen: tests the memory layout of version 1, shape tables that are
+ * shorter or longer than the current one, and the loading of valid and invalid shared objects.
  * Tests: loader.c */
 #include <math.h>
 #include <setjmp.h>
@@ -18,11 +18,12 @@
 #include "sdm/mesh.h"
 
 #ifndef PLUGIN_FOLDER
-#define PLUGIN_FOLDER "plugins" /* one folder a variant of bad_plugin.c, and good/octahedron.so */
+// one folder for each variant of bad_plugin.c, and good/octahedron.so
+#define PLUGIN_FOLDER "plugins"
 #endif
 
-/* Version 1 as it was published. Never edit these: a difference to sdm/shape.h must stop the
- * compiler. */
+/* Version 1 as it was published. Never edit these structures: if sdm/shape.h differs from them, the
+ * static assertions below must stop the compiler. */
 struct param_v1 {
     const char *name, *unit;
     double min, max, def;
@@ -71,10 +72,10 @@ struct shape_v1 {
                     const double[3], double *);
 };
 
-#define SAME(v1, now, field)                                                                       \
+#define SAME_OFFSET(v1, now, field)                                                                \
     _Static_assert(offsetof(struct v1, field) == offsetof(now, field), #field " has moved")
 _Static_assert(SDM_SHAPE_ABI == 1, "a new interface version needs a frozen copy of its own");
-// tables of the plug-in that are read by index cannot grow at all; the others may grow at the end
+// structures that a plug-in passes as arrays must keep their size; the others may grow at the end
 _Static_assert(sizeof(struct param_v1) == sizeof(sdm_param), "sdm_param has changed");
 _Static_assert(sizeof(struct option_v1) == sizeof(sdm_option), "sdm_option has changed");
 _Static_assert(sizeof(struct option_value_v1) == sizeof(sdm_option_value),
@@ -82,44 +83,44 @@ _Static_assert(sizeof(struct option_value_v1) == sizeof(sdm_option_value),
 _Static_assert(sizeof(struct mesh_out_v1) == sizeof(sdm_mesh_out), "sdm_mesh_out has changed");
 _Static_assert(sizeof(struct host_v1) <= sizeof(sdm_host), "sdm_host has shrunk");
 _Static_assert(sizeof(struct shape_v1) <= sizeof(sdm_shape), "sdm_shape has shrunk");
-SAME(param_v1, sdm_param, unit);
-SAME(param_v1, sdm_param, min);
-SAME(param_v1, sdm_param, max);
-SAME(param_v1, sdm_param, def);
-SAME(param_v1, sdm_param, help);
-SAME(option_v1, sdm_option, type);
-SAME(option_v1, sdm_option, unit);
-SAME(option_v1, sdm_option, min);
-SAME(option_v1, sdm_option, max);
-SAME(option_v1, sdm_option, def);
-SAME(option_v1, sdm_option, choices);
-SAME(option_v1, sdm_option, help);
-SAME(option_value_v1, sdm_option_value, text);
-SAME(mesh_out_v1, sdm_mesh_out, tri);
-SAME(mesh_out_v1, sdm_mesh_out, n_vert);
-SAME(mesh_out_v1, sdm_mesh_out, n_tri);
-SAME(host_v1, sdm_host, abi);
-SAME(host_v1, sdm_host, size);
-SAME(host_v1, sdm_host, ctx);
-SAME(host_v1, sdm_host, reserve);
-SAME(host_v1, sdm_host, fail);
-SAME(host_v1, sdm_host, read_file);
-SAME(host_v1, sdm_host, read_mesh);
-SAME(host_v1, sdm_host, read_npy);
-SAME(shape_v1, sdm_shape, abi);
-SAME(shape_v1, sdm_shape, size);
-SAME(shape_v1, sdm_shape, name);
-SAME(shape_v1, sdm_shape, summary);
-SAME(shape_v1, sdm_shape, params);
-SAME(shape_v1, sdm_shape, n_params);
-SAME(shape_v1, sdm_shape, options);
-SAME(shape_v1, sdm_shape, n_options);
-SAME(shape_v1, sdm_shape, create);
-SAME(shape_v1, sdm_shape, destroy);
-SAME(shape_v1, sdm_shape, describe);
-SAME(shape_v1, sdm_shape, mesh);
-SAME(shape_v1, sdm_shape, velocity);
-SAME(shape_v1, sdm_shape, distance);
+SAME_OFFSET(param_v1, sdm_param, unit);
+SAME_OFFSET(param_v1, sdm_param, min);
+SAME_OFFSET(param_v1, sdm_param, max);
+SAME_OFFSET(param_v1, sdm_param, def);
+SAME_OFFSET(param_v1, sdm_param, help);
+SAME_OFFSET(option_v1, sdm_option, type);
+SAME_OFFSET(option_v1, sdm_option, unit);
+SAME_OFFSET(option_v1, sdm_option, min);
+SAME_OFFSET(option_v1, sdm_option, max);
+SAME_OFFSET(option_v1, sdm_option, def);
+SAME_OFFSET(option_v1, sdm_option, choices);
+SAME_OFFSET(option_v1, sdm_option, help);
+SAME_OFFSET(option_value_v1, sdm_option_value, text);
+SAME_OFFSET(mesh_out_v1, sdm_mesh_out, tri);
+SAME_OFFSET(mesh_out_v1, sdm_mesh_out, n_vert);
+SAME_OFFSET(mesh_out_v1, sdm_mesh_out, n_tri);
+SAME_OFFSET(host_v1, sdm_host, abi);
+SAME_OFFSET(host_v1, sdm_host, size);
+SAME_OFFSET(host_v1, sdm_host, ctx);
+SAME_OFFSET(host_v1, sdm_host, reserve);
+SAME_OFFSET(host_v1, sdm_host, fail);
+SAME_OFFSET(host_v1, sdm_host, read_file);
+SAME_OFFSET(host_v1, sdm_host, read_mesh);
+SAME_OFFSET(host_v1, sdm_host, read_npy);
+SAME_OFFSET(shape_v1, sdm_shape, abi);
+SAME_OFFSET(shape_v1, sdm_shape, size);
+SAME_OFFSET(shape_v1, sdm_shape, name);
+SAME_OFFSET(shape_v1, sdm_shape, summary);
+SAME_OFFSET(shape_v1, sdm_shape, params);
+SAME_OFFSET(shape_v1, sdm_shape, n_params);
+SAME_OFFSET(shape_v1, sdm_shape, options);
+SAME_OFFSET(shape_v1, sdm_shape, n_options);
+SAME_OFFSET(shape_v1, sdm_shape, create);
+SAME_OFFSET(shape_v1, sdm_shape, destroy);
+SAME_OFFSET(shape_v1, sdm_shape, describe);
+SAME_OFFSET(shape_v1, sdm_shape, mesh);
+SAME_OFFSET(shape_v1, sdm_shape, velocity);
+SAME_OFFSET(shape_v1, sdm_shape, distance);
 _Static_assert(SDM_OPTION_REAL == 0 && SDM_OPTION_INT == 1 && SDM_OPTION_CHOICE == 2 &&
                    SDM_OPTION_FILE == 3,
                "option types");
@@ -140,7 +141,7 @@ static int tear_down(void **state)
     return 0;
 }
 
-static void has(const char *text)
+static void error_contains(const char *text)
 {
     if (!strstr(err.text, text)) fail_msg("'%s' is not in '%s'", text, err.text);
 }
@@ -171,8 +172,9 @@ static struct shape_v1 table_v1(void)
                              .mesh = mesh};
 }
 
-// a table in a block of exactly its size: reading behind it is seen by the sanitizer
-static sdm_status add_block(const void *bytes, size_t size)
+// Adds a table in a heap block of exactly its size, so that AddressSanitizer reports any access
+// beyond its end.
+static sdm_status table_add(const void *bytes, size_t size)
 {
     void *block = malloc(size);
     assert_non_null(block);
@@ -182,7 +184,7 @@ static sdm_status add_block(const void *bytes, size_t size)
     return s;
 }
 
-static void make_mesh_of(const sdm_shape *shape)
+static void check_mesh_of(const sdm_shape *shape)
 {
     sdm_instance *s = NULL;
     sdm_mesh m = {0};
@@ -194,40 +196,40 @@ static void make_mesh_of(const sdm_shape *shape)
     sdm_instance_free(s);
 }
 
-static void test_table_of_version_1(void **state)
+static void test_table_of_version_1_is_accepted(void **state)
 {
     (void)state;
     const struct shape_v1 table = table_v1();
-    assert_int_equal(add_block(&table, sizeof table), SDM_OK);
-    make_mesh_of(sdm_registry_find(registry, "old", NULL));
+    assert_int_equal(table_add(&table, sizeof table), SDM_OK);
+    check_mesh_of(sdm_registry_find(registry, "old", NULL));
 }
 
-// a table that ends behind mesh(): the rest counts as absent
-static void test_short_table(void **state)
+// A table that ends after its member mesh: all later members count as NULL.
+static void test_missing_members_count_as_null(void **state)
 {
     (void)state;
     struct shape_v1 table = table_v1();
     const size_t least = offsetof(struct shape_v1, mesh) + sizeof table.mesh;
     table.size = (uint32_t)least;
-    assert_int_equal(add_block(&table, least), SDM_OK);
+    assert_int_equal(table_add(&table, least), SDM_OK);
     const sdm_shape *shape = sdm_registry_find(registry, "old", NULL);
     assert_null(shape->velocity);
     assert_null(shape->distance);
-    make_mesh_of(shape);
+    check_mesh_of(shape);
 
     for (size_t size = 8; size < least; size += 4) {
         table.size = (uint32_t)size;
         table.name = "short";
-        assert_int_equal(add_block(&table, size), SDM_E_PLUGIN);
-        has("block: shape table of ");
-        has("set .size = sizeof(sdm_shape)");
+        assert_int_equal(table_add(&table, size), SDM_E_PLUGIN);
+        error_contains("block: shape table of ");
+        error_contains("set .size = sizeof(sdm_shape)");
     }
     table.size = 0;
-    assert_int_equal(add_block(&table, 8), SDM_E_PLUGIN);
+    assert_int_equal(table_add(&table, 8), SDM_E_PLUGIN);
 }
 
-// a table of a later version of this interface: what is behind ours is not looked at
-static void test_long_table(void **state)
+// A table of a later version: members beyond the known ones must be ignored.
+static void test_unknown_members_are_ignored(void **state)
 {
     (void)state;
     struct {
@@ -235,58 +237,58 @@ static void test_long_table(void **state)
         void *later[4];
     } table = {.known = table_v1(), .later = {&table, &table, &table, &table}};
     table.known.size = sizeof table;
-    assert_int_equal(add_block(&table, sizeof table), SDM_OK);
+    assert_int_equal(table_add(&table, sizeof table), SDM_OK);
     const sdm_shape *shape = sdm_registry_find(registry, "old", NULL);
     assert_int_equal(shape->size, sizeof(sdm_shape));
-    make_mesh_of(shape);
+    check_mesh_of(shape);
 }
 
-static void test_wrong_abi(void **state)
+static void test_other_interface_versions_are_refused(void **state)
 {
     (void)state;
     const uint32_t bad[] = {0, 2, 0x01000000, UINT32_MAX};
     for (size_t i = 0; i < 4; i++) {
         const uint32_t lead[2] = {bad[i],
-                                  sizeof(sdm_shape)}; // nothing behind the two words is touched
-        assert_int_equal(add_block(lead, sizeof lead), SDM_E_PLUGIN);
+                                  sizeof(sdm_shape)}; // nothing beyond these two words may be read
+        assert_int_equal(table_add(lead, sizeof lead), SDM_E_PLUGIN);
         char text[128];
         snprintf(text, sizeof text,
                  "block: shape table of plug-in interface %u, this program has interface 1",
                  (unsigned)bad[i]);
-        has(text);
+        error_contains(text);
     }
     assert_int_equal(sdm_registry_count(registry), 0);
 }
 
-static void load(const char *variant, sdm_status status, const char *text)
+static void check_refused(const char *variant, sdm_status status, const char *text)
 {
     char path[512];
     snprintf(path, sizeof path, "%s/%s/plugin.so", PLUGIN_FOLDER, variant);
     err.text[0] = '\0';
     const size_t before = sdm_registry_count(registry);
     assert_int_equal(sdm_registry_load(registry, path, &err), status);
-    has(variant); // the file is named
-    has(text);
-    assert_int_equal(sdm_registry_count(registry), before); // all shapes of a file or none
+    error_contains(variant); // the message names the file
+    error_contains(text);
+    assert_int_equal(sdm_registry_count(registry), before); // no shape of a refused file is added
 }
 
-static void test_bad_objects(void **state)
+static void test_bad_plugins_are_refused(void **state)
 {
     (void)state;
     assert_int_equal(sdm_builtin_shapes_add(registry, &err), SDM_OK);
-    load("wrong_abi", SDM_E_PLUGIN,
-         "shape table of plug-in interface 2, this program has interface 1");
-    load("no_symbol", SDM_E_PLUGIN, "exports no function sdm_plugin_shape()");
-    load("no_shape", SDM_E_PLUGIN, "has no shape: sdm_plugin_shape(0) gives NULL");
-    load("endless", SDM_E_PLUGIN, "more than 256 shapes");
-    load("taken_name", SDM_E_PLUGIN, "shape 'torus' is there already (built in)");
-    load("second_bad", SDM_E_PLUGIN, "no callback mesh()");
-    load("undefined", SDM_E_PLUGIN, "a_function_that_nobody_has");
-    load("missing", SDM_E_PLUGIN, "No such file or directory");
+    check_refused("wrong_abi", SDM_E_PLUGIN,
+                  "shape table of plug-in interface 2, this program has interface 1");
+    check_refused("no_symbol", SDM_E_PLUGIN, "exports no function sdm_plugin_shape()");
+    check_refused("no_shape", SDM_E_PLUGIN, "has no shape: sdm_plugin_shape(0) gives NULL");
+    check_refused("endless", SDM_E_PLUGIN, "more than 256 shapes");
+    check_refused("taken_name", SDM_E_PLUGIN, "shape 'torus' is there already (built in)");
+    check_refused("second_bad", SDM_E_PLUGIN, "no callback mesh()");
+    check_refused("undefined", SDM_E_PLUGIN, "a_function_without_definition");
+    check_refused("missing", SDM_E_PLUGIN, "No such file or directory");
     assert_null(sdm_registry_find(registry, "lone", NULL));
 }
 
-static void put(const char *path, const void *bytes, size_t size)
+static void file_write(const char *path, const void *bytes, size_t size)
 {
     FILE *f = fopen(path, "wb");
     assert_non_null(f);
@@ -294,26 +296,26 @@ static void put(const char *path, const void *bytes, size_t size)
     assert_int_equal(fclose(f), 0);
 }
 
-static void test_not_an_object(void **state)
+static void test_other_files_are_refused(void **state)
 {
     (void)state;
     static const char TEXT[] = "this is no shared object, however long it may go on to be",
                       ELF[] = "\177ELF\2\1\1";
-    put("test_abi_text.so", TEXT, sizeof TEXT);
-    put("test_abi_cut.so", ELF, sizeof ELF);
-    put("test_abi_empty.so", TEXT, 0);
+    file_write("test_abi_text.so", TEXT, sizeof TEXT);
+    file_write("test_abi_cut.so", ELF, sizeof ELF);
+    file_write("test_abi_empty.so", TEXT, 0);
     static const char *const FILES[] = {"test_abi_text.so", "test_abi_cut.so", "test_abi_empty.so"};
     for (size_t i = 0; i < 3; i++) {
         assert_int_equal(sdm_registry_load(registry, FILES[i], &err), SDM_E_PLUGIN);
-        has("cannot be loaded");
-        has(FILES[i]);
+        error_contains("cannot be loaded");
+        error_contains(FILES[i]);
         remove(FILES[i]);
     }
     assert_int_equal(sdm_registry_load(registry, ".", &err), SDM_E_PLUGIN); // a folder
 }
 
-// the example, from a relative path and as a folder of a search path
-static void test_good_object(void **state)
+// The example plug-in, found through a search path with a relative folder.
+static void test_example_plugin_works(void **state)
 {
     (void)state;
     assert_int_equal(sdm_registry_load_path(registry, ":" PLUGIN_FOLDER "/good:", &err), SDM_OK);
@@ -346,20 +348,19 @@ static void test_good_object(void **state)
     sdm_instance_free(s);
     assert_int_equal(sdm_registry_load_path(registry, PLUGIN_FOLDER "/good", &err),
                      SDM_E_PLUGIN); // a second time
-    has("shape 'octahedron' is there already (/");
+    error_contains("shape 'octahedron' is there already (/");
 }
 
-// what is loaded first does not depend on the order of the folder; files of other names are passed
-// over
-static void test_folder(void **state)
+// Files of a folder are loaded in alphabetical order; files that do not end in .so are ignored.
+static void test_folder_is_loaded_in_order(void **state)
 {
     (void)state;
     mkdir("test_abi_folder", 0777);
-    put("test_abi_folder/b.so", "b", 1);
-    put("test_abi_folder/a.so", "a", 1);
-    put("test_abi_folder/readme.txt", "c", 1);
+    file_write("test_abi_folder/b.so", "b", 1);
+    file_write("test_abi_folder/a.so", "a", 1);
+    file_write("test_abi_folder/readme.txt", "c", 1);
     assert_int_equal(sdm_registry_load_path(registry, "test_abi_folder", &err), SDM_E_PLUGIN);
-    has("test_abi_folder/a.so cannot be loaded");
+    error_contains("test_abi_folder/a.so cannot be loaded");
     remove("test_abi_folder/a.so");
     remove("test_abi_folder/b.so");
     assert_int_equal(sdm_registry_load_path(registry, "test_abi_folder", &err), SDM_OK);
@@ -371,10 +372,14 @@ int main(void)
 {
 #define WITH_REGISTRY(test) cmocka_unit_test_setup_teardown(test, set_up, tear_down)
     const struct CMUnitTest tests[] = {
-        WITH_REGISTRY(test_table_of_version_1), WITH_REGISTRY(test_short_table),
-        WITH_REGISTRY(test_long_table),         WITH_REGISTRY(test_wrong_abi),
-        WITH_REGISTRY(test_bad_objects),        WITH_REGISTRY(test_not_an_object),
-        WITH_REGISTRY(test_good_object),        WITH_REGISTRY(test_folder),
+        WITH_REGISTRY(test_table_of_version_1_is_accepted),
+        WITH_REGISTRY(test_missing_members_count_as_null),
+        WITH_REGISTRY(test_unknown_members_are_ignored),
+        WITH_REGISTRY(test_other_interface_versions_are_refused),
+        WITH_REGISTRY(test_bad_plugins_are_refused),
+        WITH_REGISTRY(test_other_files_are_refused),
+        WITH_REGISTRY(test_example_plugin_works),
+        WITH_REGISTRY(test_folder_is_loaded_in_order),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,6 @@
-# Installs into a scratch folder and uses what is there as others would: find_package, pkg-config, an out-of-tree plug-in.
-# cmake -DBUILD=... -DSOURCE=... -DWORK=... -DCC=... -DVERSION=... -DGENERATOR=... -DLIBDIR=... -DSANITIZE=... -P test_install.cmake
+# Installs the project into a scratch folder and uses it as external projects would: through find_package, through pkg-config, and by
+# building a plug-in out of tree. Usage: cmake -DBUILD=... -DSOURCE=... -DWORK=... -DCC=... -DVERSION=... -DGENERATOR=... -DLIBDIR=...
+# -DSANITIZE=... -P test_install.cmake
 cmake_minimum_required(VERSION 3.25)
 file(REMOVE_RECURSE ${WORK})
 file(MAKE_DIRECTORY ${WORK}/out)
@@ -24,7 +25,7 @@ endfunction()
 
 run(COMMAND ${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix})
 
-# the installed folder may be moved: nothing in the package names the place of the build or of the sources
+# The package must be relocatable: its files must not name the build folder or the source folder.
 file(GLOB texts ${lib}/cmake/sdmgen/* ${lib}/pkgconfig/*)
 list(LENGTH texts n_texts)
 if(n_texts LESS 4)
@@ -52,7 +53,7 @@ foreach(file include/sdm/config.h include/sdm/train.h)
   endif()
 endforeach()
 
-# the runtime needs libc, libm and OpenMP alone
+# libsdmgen.so may depend on libc, libm and OpenMP only
 if(NOT SANITIZE)
   find_program(READELF NAMES readelf llvm-readelf llvm-readelf-14)
   if(NOT READELF)
@@ -70,7 +71,7 @@ if(NOT SANITIZE)
     endif()
   endforeach()
   message("libsdmgen.so: ${needed}")
-  # only what the headers declare is visible
+  # only functions that the headers declare may be exported
   run(COMMAND ${READELF} --dyn-syms -W ${lib}/libsdmgen.so OUTPUT symbols)
   string(REGEX MATCHALL "(GLOBAL|WEAK) +DEFAULT +[0-9]+ [^\n]*" defined "${symbols}")
   if(NOT symbols MATCHES " sdm_generate_batch")
@@ -83,7 +84,7 @@ if(NOT SANITIZE)
   endforeach()
 endif()
 
-# out-of-tree plug-in
+# build the example plug-in out of tree
 function(build name folder)
   run(COMMAND ${CMAKE_COMMAND} -G ${GENERATOR} -S ${folder} -B ${WORK}/${name} -DCMAKE_PREFIX_PATH=${prefix} -DCMAKE_C_COMPILER=${CC}
               -DCMAKE_BUILD_TYPE=Release "-DCMAKE_C_FLAGS=${flags}" -DSDM_VERSION=${VERSION})
@@ -96,7 +97,7 @@ if(NOT n_plugin EQUAL 1)
   message(FATAL_ERROR "examples/plugin gave ${n_plugin} shared objects, expected one: ${plugin}")
 endif()
 
-# consumer through find_package
+# build and run the consumer through find_package
 build(consumer ${SOURCE}/tests/abi/consumer)
 run(COMMAND ${WORK}/consumer/consumer ${WORK}/out ${plugin} OUTPUT said)
 message("${said}")
@@ -104,7 +105,7 @@ if(NOT said MATCHES "sdmgen ${VERSION}\n" OR NOT said MATCHES "plug-in shape ")
   message(FATAL_ERROR "the consumer said: ${said}")
 endif()
 
-# a version that is not there, and a component that does not exist, are refused
+# find_package must refuse an unavailable version and an unknown component
 foreach(wanted "9.0 REQUIRED" "${VERSION} REQUIRED COMPONENTS nonsense")
   file(WRITE ${WORK}/refused/CMakeLists.txt "cmake_minimum_required(VERSION 3.25)\nproject(x C)\nfind_package(sdmgen ${wanted})\n")
   execute_process(COMMAND ${CMAKE_COMMAND} -G ${GENERATOR} -S ${WORK}/refused -B ${WORK}/refused/build -DCMAKE_PREFIX_PATH=${prefix}
@@ -115,7 +116,7 @@ foreach(wanted "9.0 REQUIRED" "${VERSION} REQUIRED COMPONENTS nonsense")
   endif()
 endforeach()
 
-# consumer through pkg-config
+# build and run the consumer through pkg-config
 find_program(PKG_CONFIG NAMES pkg-config REQUIRED)
 set(ENV{PKG_CONFIG_PATH} ${lib}/pkgconfig)
 set(modules sdmgen)
@@ -137,7 +138,7 @@ if(NOT said STREQUAL "${VERSION}\n")
   message(FATAL_ERROR "pkg-config says version ${said}")
 endif()
 
-# the installed program knows the plug-in
+# the installed program lists the shape of the plug-in
 if(EXISTS ${prefix}/bin/sdmgen)
   run(COMMAND ${prefix}/bin/sdmgen shapes --plugin ${plugin} OUTPUT said)
   run(COMMAND ${prefix}/bin/sdmgen shapes OUTPUT said_without)

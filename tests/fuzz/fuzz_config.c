@@ -1,7 +1,7 @@
-/* Fuzz target of the configuration: any bytes give a config or a message; what is read is dumped
-   and reads back the same. Parts of the input are separated by the byte 0x01: first the file, then
-   key=value arguments. With SDM_FUZZ_REPLAY it is a program that feeds files or folders of files to
-   the target. */
+/* Fuzz target of the configuration reader: every input must give either a configuration or an error
+ * message, and a configuration must survive being dumped and read again. The input is a YAML file,
+ * followed by key=value arguments, each preceded by the byte 0x01. Compiled with SDM_FUZZ_REPLAY
+ * this is a program that runs the target on files or folders of files. */
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -42,7 +42,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (size) memcpy(text, data, size);
     text[size] = 0;
 
-    // the parser gets a block of its exact size, so that reading past the end is noticed
+    // the parser gets a block of exactly the file's size, so that AddressSanitizer notices reads
+    // past its end
     char *end = memchr(text, 1, size);
     const size_t file_size = end ? (size_t)(end - text) : size;
     char *file = malloc(file_size ? file_size : 1);

@@ -1,5 +1,5 @@
-/* Distances of the exact engine against brute force and closed forms: values, grids, threads,
- * scales, misuse.
+/* Distances of the exact engine, compared with brute force and closed forms: single points, maps,
+ * numbers of threads, instruction sets, scales, invalid arguments, cancellation.
  * Tests: brute_force.c cancel.c exact.c */
 #include <float.h>
 #include <setjmp.h>
@@ -33,9 +33,10 @@ static float *map_of(const sdm_exact *e, const sdm_grid *g)
     return v;
 }
 
-/* |map - naive| within float rounding plus `absolute`; signs equal unless the distance is below
- * `absolute`. */
-static void compare(const float *map, const sdm_mesh *m, const sdm_grid *g, double absolute)
+/* Requires abs(abs(map) - abs(brute force)) <= absolute + rounding to float, and equal signs where
+ * abs(distance) exceeds this limit. */
+static void compare_with_brute_force(const float *map, const sdm_mesh *m, const sdm_grid *g,
+                                     double absolute)
 {
     for (size_t i = 0; i < sdm_grid_count(g); i++) {
         const size_t nx = (size_t)g->n[0], ny = (size_t)g->n[1];
@@ -50,8 +51,9 @@ static void compare(const float *map, const sdm_mesh *m, const sdm_grid *g, doub
     }
 }
 
-/* A mesh of n random triangles; many without area, needles, repeated and coplanar ones. */
-static void random_soup(sdm_mesh *m, size_t n, uint64_t seed)
+/* A mesh of n random triangles; about half of them are of zero area, needles, or on a coarse
+ * lattice (so that some coincide or are coplanar). */
+static void mesh_random_triangles(sdm_mesh *m, size_t n, uint64_t seed)
 {
     mesh_make(m, 3 * n, n);
     for (size_t t = 0; t < n; t++) {
@@ -62,8 +64,9 @@ static void random_soup(sdm_mesh *m, size_t n, uint64_t seed)
             if (kind == 0) v[1][a] = v[0][a];           // a segment
             if (kind == 1) v[1][a] = v[2][a] = v[0][a]; // a point
             if (kind == 2)
-                v[2][a] = v[0][a] + 0.375 * (v[1][a] - v[0][a]); // on a line, to rounding
-            if (kind == 3) v[2][a] = v[0][a] + 1e-7 * v[2][a];   // a needle
+                // three collinear points, to rounding
+                v[2][a] = v[0][a] + 0.375 * (v[1][a] - v[0][a]);
+            if (kind == 3) v[2][a] = v[0][a] + 1e-7 * v[2][a]; // a needle
             if (kind == 4)
                 v[0][a] = floor(4 * v[0][a]) / 4, v[1][a] = floor(4 * v[1][a]) / 4,
                 v[2][a] = floor(4 * v[2][a]) / 4;
@@ -73,19 +76,19 @@ static void random_soup(sdm_mesh *m, size_t n, uint64_t seed)
     }
 }
 
-static void rotation(uint64_t seed, double dir[9])
+static void random_rotation(uint64_t seed, double dir[9])
 {
     double q[4];
     for (uint64_t i = 0; i < 4; i++) q[i] = uniform(seed, i, -1, 1);
     quaternion_rotation(q, dir);
 }
 
-static void test_random_meshes(void **state)
+static void test_random_triangles_match_brute_force(void **state)
 {
     (void)state;
     for (uint64_t round = 0; round < 60; round++) {
         sdm_mesh m = {0};
-        random_soup(&m, 1 + sdm_rng_below(7, 1000, round, 60), 100 + round);
+        mesh_random_triangles(&m, 1 + sdm_rng_below(7, 1000, round, 60), 100 + round);
         sdm_exact *e = engine(&m, &(sdm_exact_opts){.n_threads = 1});
         for (uint64_t i = 0; i < 400; i++) {
             double x[3], q[3], n[3];
@@ -105,14 +108,14 @@ static void test_random_meshes(void **state)
         sdm_grid g = {.n = {1 + (int64_t)sdm_rng_below(7, 1001, round, 14),
                             1 + (int64_t)sdm_rng_below(7, 1002, round, 14),
                             1 + (int64_t)sdm_rng_below(7, 1003, round, 14)}};
-        rotation(300 + round, g.dir);
+        random_rotation(300 + round, g.dir);
         for (int a = 0; a < 3; a++) {
             if (round % 2) g.dir[3 * a] = -g.dir[3 * a]; // a reflection
             g.spacing[a] = uniform(400 + round, (uint64_t)a, 0.01, 0.3);
             g.origin[a] = uniform(500 + round, (uint64_t)a, -1.5, 0.5);
         }
         float *v = map_of(e, &g);
-        compare(v, &m, &g, 1e-12);
+        compare_with_brute_force(v, &m, &g, 1e-12);
         free(v);
         sdm_exact_free(e);
         sdm_mesh_dispose(&m);
@@ -122,7 +125,8 @@ static void test_random_meshes(void **state)
 static void test_box_is_exact(void **state)
 {
     (void)state;
-    // voxels on corners, edges and faces, rows along edges: every tie there is
+    // voxels lie on vertices, edges and faces of the box and rows run along its edges: all kinds of
+    // ties between features
     const double lo[3] = {0, 0, 0}, hi[3] = {1, 2, 1.5};
     sdm_mesh m = {0};
     mesh_box(&m, lo, hi);
@@ -156,7 +160,7 @@ static void test_box_is_exact(void **state)
     sdm_mesh_dispose(&m);
 }
 
-static void test_sphere_within_its_facets(void **state)
+static void test_sphere_within_sagitta(void **state)
 {
     (void)state;
     const double centre[3] = {0.3, -0.2, 0.1};
@@ -180,7 +184,7 @@ static void test_sphere_within_its_facets(void **state)
     sdm_mesh_dispose(&m);
 }
 
-static void test_threads_and_instruction_sets(void **state)
+static void test_threads_and_instruction_sets_agree(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -195,8 +199,8 @@ static void test_threads_and_instruction_sets(void **state)
         for (int threads = 1; threads <= 3; threads++) {
             sdm_exact *e = engine(&m, &(sdm_exact_opts){.n_threads = threads});
             float *v = map_of(e, &g);
-            // one instruction set gives the same bits for any number of threads; between sets the
-            // last bit may differ
+            // With one instruction set the bits do not depend on the number of threads; between
+            // instruction sets the last bit may differ.
             if (threads == 1) {
                 for (size_t i = 0; first && i < sdm_grid_count(&g); i++)
                     assert_true(fabsf(v[i] - first[i]) <= fabsf(v[i]) * 1.2e-7f);
@@ -204,7 +208,7 @@ static void test_threads_and_instruction_sets(void **state)
                 first = v;
             }
             assert_memory_equal(v, first, sdm_grid_count(&g) * sizeof *v);
-            // the grid is the points
+            // the map agrees with sdm_exact_point()
             for (size_t i = 0; i < sdm_grid_count(&g); i += 97) {
                 const double index[3] = {(double)(i % 45), (double)(i / 45 % 41),
                                          (double)(i / 45 / 41)};
@@ -222,7 +226,7 @@ static void test_threads_and_instruction_sets(void **state)
     sdm_mesh_dispose(&m);
 }
 
-static void test_scale_and_place(void **state)
+static void test_scaling_and_shifting(void **state)
 {
     (void)state;
     sdm_mesh m = {0}, far = {0};
@@ -234,7 +238,7 @@ static void test_scale_and_place(void **state)
     float *v = map_of(e, &g);
     const size_t used = sdm_exact_get_report(e)->n_tri_used;
     sdm_exact_free(e);
-    // powers of two: the same digits
+    // scaling by a power of two scales the map exactly
     for (int exponent = -30; exponent <= 30; exponent += 15) {
         sdm_mesh_copy(&m, &far, NULL);
         sdm_grid h = g;
@@ -250,7 +254,7 @@ static void test_scale_and_place(void **state)
         free(w);
         sdm_exact_free(e);
     }
-    // 10^5 mm away
+    // shifted by 131072 mm along each axis
     sdm_mesh_copy(&m, &far, NULL);
     sdm_grid h = g;
     for (size_t i = 0; i < 3 * far.n_vert; i++) far.vert[i] = m.vert[i] + 131072;
@@ -278,25 +282,25 @@ static void test_thin_grids_and_single_voxels(void **state)
         sdm_grid g = sdm_grid_centred(sizes[i], 0.07, (const double[3]){0.11, 0.2, -0.3});
         g.spacing[i % 3] = 0.003;
         float *v = map_of(e, &g);
-        compare(v, &m, &g, 1e-13);
+        compare_with_brute_force(v, &m, &g, 1e-13);
         free(v);
     }
-    // a voxel far larger than the mesh, a mesh far larger than the grid
+    // voxels much larger than the mesh, then a grid much smaller than the mesh
     const sdm_grid wide =
         sdm_grid_centred((const int64_t[3]){9, 10, 11}, 1e4, (const double[3]){1, 2, 3});
     const sdm_grid tiny =
         sdm_grid_centred((const int64_t[3]){9, 10, 11}, 1e-6, (const double[3]){1, 0, 0});
     float *v = map_of(e, &wide);
-    compare(v, &m, &wide, 1e-12);
+    compare_with_brute_force(v, &m, &wide, 1e-12);
     free(v);
     v = map_of(e, &tiny);
-    compare(v, &m, &tiny, 1e-13);
+    compare_with_brute_force(v, &m, &tiny, 1e-13);
     free(v);
     sdm_exact_free(e);
     sdm_mesh_dispose(&m);
 }
 
-static void test_lipschitz(void **state)
+static void test_distance_is_1_lipschitz(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -314,8 +318,8 @@ static void test_lipschitz(void **state)
         double apart = 0;
         for (int a = 0; a < 3; a++) apart += (x[a] - y[a]) * (x[a] - y[a]);
         assert_true(fabs(dx - dy) <= sqrt(apart) + 1e-12);
-        // a step along the normal is a step of the distance, if no other part of the surface comes
-        // nearer
+        // a step h towards the surface, along the normal, reduces the distance by h unless another
+        // part of the surface is nearer
         const double h = 1e-6;
         for (int a = 0; a < 3; a++) y[a] = x[a] - h * n[a] * (dx > 0 ? 1 : -1);
         if (fabs(dx) > 1e-3)
@@ -326,10 +330,11 @@ static void test_lipschitz(void **state)
     sdm_mesh_dispose(&m);
 }
 
-static bool stop_later(void *user) { return ++*(int *)user >= 0; }
+static bool cancel_after_calls(void *user) { return ++*(int *)user >= 0; }
 
-/* Every question in the preparation of a mesh that needs a union may stop it. */
-static void test_preparation_stops(void **state)
+/* The callback `cancelled` requests a stop at its n-th call, for n = 1, 2, ...: each time the
+ * preparation of a mesh that needs a union must stop with SDM_E_CANCELLED and free its memory. */
+static void test_preparation_can_be_cancelled(void **state)
 {
     (void)state;
     sdm_mesh m = {0}, b = {0};
@@ -338,12 +343,12 @@ static void test_preparation_stops(void **state)
     mesh_append(&m, &b);
     sdm_exact *e = NULL;
     for (int n = 1; !e; n++) {
-        int asked = -n;
+        int calls = -n;
         sdm_error err = {0};
         const sdm_status s = sdm_exact_create(
-            &m, &(sdm_exact_opts){.cancelled = stop_later, .user = &asked}, &e, &err);
-        assert_int_equal(s, asked < 0 ? SDM_OK : SDM_E_CANCELLED);
-        assert_true(asked <= 0 && (s == SDM_OK) == (e != NULL));
+            &m, &(sdm_exact_opts){.cancelled = cancel_after_calls, .user = &calls}, &e, &err);
+        assert_int_equal(s, calls < 0 ? SDM_OK : SDM_E_CANCELLED);
+        assert_true(calls <= 0 && (s == SDM_OK) == (e != NULL));
         if (s) assert_string_equal(err.text, "preparation of the mesh stopped on request");
         if (e) assert_true(n > 50);
     }
@@ -352,7 +357,7 @@ static void test_preparation_stops(void **state)
     sdm_mesh_dispose(&b);
 }
 
-static void test_misuse(void **state)
+static void test_invalid_arguments_and_limits(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -372,14 +377,15 @@ static void test_misuse(void **state)
                      SDM_E_ARG);
     assert_int_equal(sdm_exact_create(&m, &(sdm_exact_opts){.memory_limit = 100}, &e, &err),
                      SDM_E_NOMEM);
-    int asked = -1000; // before it stops
-    e = engine(&m, &(sdm_exact_opts){.n_threads = 1, .cancelled = stop_later, .user = &asked});
-    assert_true(asked > -1000 && asked < -900);
-    asked = -1;
+    int calls = -1000; // counts up to 0, then requests a stop
+    e = engine(&m,
+               &(sdm_exact_opts){.n_threads = 1, .cancelled = cancel_after_calls, .user = &calls});
+    assert_true(calls > -1000 && calls < -900);
+    calls = -1;
     sdm_grid g = sdm_grid_centred((const int64_t[3]){30, 30, 30}, 0.1, zero);
     float *v = malloc(sdm_grid_count(&g) * sizeof *v);
     assert_int_equal(sdm_exact_map(e, &g, v, &err), SDM_E_CANCELLED);
-    assert_int_equal(asked, 0);
+    assert_int_equal(calls, 0);
     assert_int_equal(sdm_exact_map(e, NULL, v, &err), SDM_E_ARG);
     g.spacing[1] = NAN;
     assert_int_equal(sdm_exact_map(e, &g, v, &err), SDM_E_ARG);
@@ -408,7 +414,7 @@ static void test_misuse(void **state)
     sdm_mesh_dispose(&m);
 }
 
-static void test_naive_map_is_naive_points(void **state)
+static void test_naive_map_matches_naive_points(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -416,12 +422,12 @@ static void test_naive_map_is_naive_points(void **state)
     const sdm_grid g = sdm_grid_centred((const int64_t[3]){5, 6, 7}, 0.4, zero);
     float v[5 * 6 * 7];
     assert_int_equal(sdm_naive_map(&m, &g, 2, v, NULL), SDM_OK);
-    compare(v, &m, &g, 0);
+    compare_with_brute_force(v, &m, &g, 0);
     assert_true(v[2 + 5 * (3 + 6 * 3)] < -0.7 && v[0] > 0.8);
     sdm_mesh_dispose(&m);
 }
 
-static void test_memory_is_short(void **state)
+static void test_failed_allocations(void **state)
 {
     (void)state;
     sdm_mesh m = {0}, b = {0};
@@ -449,14 +455,14 @@ static void test_memory_is_short(void **state)
     sdm_mesh_dispose(&b);
 }
 
-/* Faces too low for regions in float, nearest for whole vectors of voxels, by every instruction
- * set. */
-static void test_thin_faces(void **state)
+/* Faces so narrow that float precision cannot decide their Voronoi regions, but that are nearest to
+ * many voxels at once; for every instruction set. */
+static void test_narrow_faces(void **state)
 {
     (void)state;
     sdm_mesh m = {0}, b = {0};
     mesh_box(&m, (const double[3]){0, 0, 0}, (const double[3]){4, 0.05, 1});
-    // half way up the voxels above a thin face lie below a wide one, too, that is hardly farther
+    // halfway between the boxes the wide face above is hardly farther than the narrow one below
     mesh_box(&b, (const double[3]){-1, -1, 1.2}, (const double[3]){5, 1, 1.5});
     mesh_append(&m, &b);
     sdm_exact *e = engine(&m, NULL);
@@ -465,7 +471,7 @@ static void test_thin_faces(void **state)
     for (int level = 0; level < 3; level++) {
         (void)sdm_processor_select(level);
         float *map = map_of(e, &g);
-        compare(map, &m, &g, 0);
+        compare_with_brute_force(map, &m, &g, 0);
         free(map);
     }
     (void)sdm_processor_select(-1);
@@ -477,18 +483,18 @@ static void test_thin_faces(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_random_meshes),
+        cmocka_unit_test(test_random_triangles_match_brute_force),
         cmocka_unit_test(test_box_is_exact),
-        cmocka_unit_test(test_sphere_within_its_facets),
-        cmocka_unit_test(test_threads_and_instruction_sets),
-        cmocka_unit_test(test_scale_and_place),
+        cmocka_unit_test(test_sphere_within_sagitta),
+        cmocka_unit_test(test_threads_and_instruction_sets_agree),
+        cmocka_unit_test(test_scaling_and_shifting),
         cmocka_unit_test(test_thin_grids_and_single_voxels),
-        cmocka_unit_test(test_thin_faces),
-        cmocka_unit_test(test_lipschitz),
-        cmocka_unit_test(test_preparation_stops),
-        cmocka_unit_test(test_misuse),
-        cmocka_unit_test(test_naive_map_is_naive_points),
-        cmocka_unit_test(test_memory_is_short),
+        cmocka_unit_test(test_narrow_faces),
+        cmocka_unit_test(test_distance_is_1_lipschitz),
+        cmocka_unit_test(test_preparation_can_be_cancelled),
+        cmocka_unit_test(test_invalid_arguments_and_limits),
+        cmocka_unit_test(test_naive_map_matches_naive_points),
+        cmocka_unit_test(test_failed_allocations),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

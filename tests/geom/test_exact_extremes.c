@@ -1,5 +1,5 @@
-/* Maps of grids that are far away, thin, enormous or tiny beside the surface, and narrow bands,
- * against brute force.
+/* Maps of extreme grids (very far from the surface, thin, huge or tiny) and narrow bands, compared
+ * with brute force.
  * Tests: boundary.c grid_distance.c row_base.c */
 #include <float.h>
 #include <setjmp.h>
@@ -24,8 +24,9 @@ static sdm_grid grid_of(int64_t nx, int64_t ny, int64_t nz, double spacing, doub
                       .dir = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
 }
 
-/* band_mm 0: the whole map. */
-static void check(const sdm_mesh *m, sdm_grid g, double band_mm)
+/* Compares a map with brute force for every instruction set. band_mm > 0: values are limited to
+ * +-band_mm and voxels outside of the band have no nearest triangle; 0: no limit. */
+static void compare_with_brute_force(const sdm_mesh *m, sdm_grid g, double band_mm)
 {
     const size_t n = sdm_grid_count(&g);
     float *values = malloc(n * sizeof *values);
@@ -69,7 +70,7 @@ static void check(const sdm_mesh *m, sdm_grid g, double band_mm)
     free(triangle);
 }
 
-static void triangle_of(sdm_mesh *m, double size)
+static void mesh_right_triangle(sdm_mesh *m, double size)
 {
     mesh_make(m, 3, 1);
     mesh_vertex(m, 0, 0, 0, 0);
@@ -83,16 +84,16 @@ static void test_narrow_bands(void **state)
     (void)state;
     sdm_mesh m = {0};
     mesh_sphere(&m, (const double[3]){0, 0, 0}, 1, 10);
-    // a band much wider than the voxels: its limit must allow for rounding in proportion to the
-    // band
-    check(&m, grid_of(40, 40, 40, 0.05, 2.0641, 2.0641, 2.0641), 5);
-    check(&m, grid_of(30, 30, 30, 0.1, -1.5, -1.5, -1.5), 0.25);
-    check(&m, grid_of(30, 30, 30, 0.1, -1.5, -1.5, -1.5), 1e-6);
-    check(&m, grid_of(20, 20, 20, 0.1, 50, 0, 0), 3);
+    // a band much wider than a voxel: the culling limit must include rounding errors in proportion
+    // to the band
+    compare_with_brute_force(&m, grid_of(40, 40, 40, 0.05, 2.0641, 2.0641, 2.0641), 5);
+    compare_with_brute_force(&m, grid_of(30, 30, 30, 0.1, -1.5, -1.5, -1.5), 0.25);
+    compare_with_brute_force(&m, grid_of(30, 30, 30, 0.1, -1.5, -1.5, -1.5), 1e-6);
+    compare_with_brute_force(&m, grid_of(20, 20, 20, 0.1, 50, 0, 0), 3);
     sdm_mesh_dispose(&m);
     float value;
     sdm_exact *e;
-    triangle_of(&m, 1);
+    mesh_right_triangle(&m, 1);
     assert_int_equal(sdm_exact_create(&m, NULL, &e, NULL), SDM_OK);
     const sdm_grid g = grid_of(1, 1, 1, 1, 0, 0, 0);
     const double wrong[2] = {-1, NAN};
@@ -110,7 +111,7 @@ static void test_far_away(void **state)
     (void)state;
     sdm_mesh m = {0};
     mesh_sphere(&m, (const double[3]){0, 0, 0}, 1, 6);
-    // two needles: too narrow to be told apart in single precision
+    // two needles so narrow that single precision cannot separate their edges
     const size_t v = m.n_vert, t = m.n_tri;
     mesh_make(&m, v + 6, t + 2);
     for (size_t i = 0; i < 2; i++) {
@@ -121,34 +122,35 @@ static void test_far_away(void **state)
     }
     const double far[5] = {1e2, 1e4, 4e4, 3e5, 1e9};
     for (int i = 0; i < 5; i++) {
-        check(&m, grid_of(8, 8, 8, 0.5, 0, 0, far[i]), 0);
-        check(&m, grid_of(8, 8, 8, 0.5, 0, 0, far[i]), far[i] + 1);
+        compare_with_brute_force(&m, grid_of(8, 8, 8, 0.5, 0, 0, far[i]), 0);
+        compare_with_brute_force(&m, grid_of(8, 8, 8, 0.5, 0, 0, far[i]), far[i] + 1);
     }
     sdm_mesh_dispose(&m);
 }
 
-static void test_sizes(void **state)
+static void test_extreme_sizes(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
-    triangle_of(&m, 1);
-    // the spacing along an axis of one voxel means nothing
+    mesh_right_triangle(&m, 1);
+    // the spacing along an axis with a single voxel has no effect
     for (double spacing = 1; spacing <= 1e100; spacing *= 1e20) {
-        check(&m, grid_of(1, 1, 1, spacing, 1.1, 0.2, 0.3), 0);
+        compare_with_brute_force(&m, grid_of(1, 1, 1, spacing, 1.1, 0.2, 0.3), 0);
         sdm_grid slice = grid_of(1, 5, 5, 0.1, 1.1, 0.2, 0.3);
         slice.spacing[0] = spacing;
-        check(&m, slice, 0);
+        compare_with_brute_force(&m, slice, 0);
     }
     const double spacing[5] = {1e-30, 1e-9, 1e4, 1e9, 1e30};
-    for (int i = 0; i < 5; i++) check(&m, grid_of(5, 4, 3, spacing[i], 0, 0, 0), 0);
+    for (int i = 0; i < 5; i++)
+        compare_with_brute_force(&m, grid_of(5, 4, 3, spacing[i], 0, 0, 0), 0);
     sdm_mesh_dispose(&m);
-    triangle_of(&m, 1e-17);
-    check(&m, grid_of(9, 9, 9, 0.05, 0.3, 0.1, 0.2), 0);
+    mesh_right_triangle(&m, 1e-17);
+    compare_with_brute_force(&m, grid_of(9, 9, 9, 0.05, 0.3, 0.1, 0.2), 0);
     sdm_mesh_dispose(&m);
-    // no edge at all
-    triangle_of(&m, 0);
-    check(&m, grid_of(9, 9, 9, 1e-30, 1e-30, 0, 0), 0);
-    check(&m, grid_of(9, 9, 9, 1e20, 0, 0, 0), 0);
+    // a triangle that is a point
+    mesh_right_triangle(&m, 0);
+    compare_with_brute_force(&m, grid_of(9, 9, 9, 1e-30, 1e-30, 0, 0), 0);
+    compare_with_brute_force(&m, grid_of(9, 9, 9, 1e20, 0, 0, 0), 0);
     sdm_mesh_dispose(&m);
 }
 
@@ -157,7 +159,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_narrow_bands),
         cmocka_unit_test(test_far_away),
-        cmocka_unit_test(test_sizes),
+        cmocka_unit_test(test_extreme_sizes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

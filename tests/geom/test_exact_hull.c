@@ -1,6 +1,6 @@
-/* The union of overlapping random meshes: a certificate for every distance. The nearest point
- * found is on the boundary of the places enclosed at least once, and nothing nearer is.
- * test_exact_hull [MESHES [FIRST]]
+/* Unions of overlapping random meshes. Two properties prove each distance: the nearest point found
+ * is on the boundary of the union (the set of points with winding number >= 1), and no boundary
+ * point is nearer. Usage: test_exact_hull [MESHES [FIRST]]
  * Tests: bvh.c clock.c contact.c crossings.c cutting.c facet.c line_triangle.c nearest.c parts.c
  * point_triangle.c predicates.c feature_build.c surface_side.c topology.c union_hull.c
  * vertex_table.c */
@@ -16,24 +16,25 @@
 enum { POINTS = 6, SAMPLES = 3 };
 static uint64_t n_meshes = 440, first;
 
-typedef enum border { BORDER_NO, BORDER_YES, BORDER_UNSURE } border;
+typedef enum boundary_state { BOUNDARY_NO, BOUNDARY_YES, BOUNDARY_UNSURE } boundary_state;
 
-/* Do the two sides of the point p of a face with normal n differ? Unsure where other surface is as
- * near as the places asked. */
-static border border_at(const subject *s, point p, point n, real step)
+/* Is p, a point of a face with unit normal n, on the boundary of the union? Tests whether the
+ * points p - step n and p + step n lie on different sides (inside/outside). BOUNDARY_UNSURE if
+ * another part of the surface is nearer than about `step` to one of them. */
+static boundary_state boundary_test(const subject *s, point p, point n, real step)
 {
     bool inside[2];
     for (int side = 0; side < 2; side++) {
         const real way = side ? -step : step;
         const point y = {p.x + way * n.x, p.y + way * n.y, p.z + way * n.z};
         const double x[3] = {(double)y.x, (double)y.y, (double)y.z};
-        if (brute_distance(&s->mesh, x) < 0.9L * step) return BORDER_UNSURE;
+        if (brute_distance(&s->mesh, x) < 0.9L * step) return BOUNDARY_UNSURE;
         inside[side] = truly_inside(s, point_of(x));
     }
-    return inside[0] != inside[1] ? BORDER_YES : BORDER_NO;
+    return inside[0] != inside[1] ? BOUNDARY_YES : BOUNDARY_NO;
 }
 
-static bool normal_of(point a, point b, point c, point *n)
+static bool unit_normal(point a, point b, point c, point *n)
 {
     const point ab = minus(b, a), ac = minus(c, a);
     *n = cross(ab, ac);
@@ -49,57 +50,60 @@ static point inner_point(point a, point b, point c, double s, double t)
                    a.z + s * (b.z - a.z) + t * (c.z - a.z)};
 }
 
-static size_t n_border, n_buried;
+static size_t n_boundary, n_buried;
 
-/* No point of the given mesh that is nearer than d bounds the solid. */
-static void check_nothing_nearer(subject *s, const double x[3], double d)
+/* Fails if a point of the input mesh that is nearer to x than abs(d) lies on the boundary of the
+ * union. Samples SAMPLES points on each triangle that comes near enough. */
+static void check_no_boundary_point_nearer(subject *s, const double x[3], double d)
 {
     for (size_t t = 0; t < s->mesh.n_tri; t++) {
         const point a = corner_of(&s->mesh, 3 * t), b = corner_of(&s->mesh, 3 * t + 1),
                     c = corner_of(&s->mesh, 3 * t + 2);
         const point q = closest_on_triangle(point_of(x), a, b, c);
         point n;
-        if (distance(point_of(x), q) > fabs(d) - 1e-8 * s->size || !normal_of(a, b, c, &n))
+        if (distance(point_of(x), q) > fabs(d) - 1e-8 * s->size || !unit_normal(a, b, c, &n))
             continue;
         for (int k = 0; k < SAMPLES; k++) {
-            // some on the way from the nearest point to anywhere
+            // a random point between q, the nearest point of the triangle, and a random point of it
             const double u = roll(&s->dice, 0, 1), v = roll(&s->dice, 0, 1 - u);
             const point p = towards(q, inner_point(a, b, c, u, v), roll(&s->dice, 0.001, 1));
             if (distance(point_of(x), p) > fabs(d) - 1e-8 * s->size) continue;
-            const border found = border_at(s, p, n, 1e-11L * s->size);
-            CHECK(found != BORDER_YES, s, x, "%.17g, but triangle %zu bounds the solid at %.17Lg",
+            const boundary_state found = boundary_test(s, p, n, 1e-11L * s->size);
+            CHECK(found != BOUNDARY_YES, s, x, "%.17g, but triangle %zu bounds the solid at %.17Lg",
                   d, t, distance(point_of(x), p));
-            n_buried += found == BORDER_NO;
+            n_buried += found == BOUNDARY_NO;
         }
     }
 }
 
-static void check_nearest_bounds(subject *s, const double x[3], double d, uint32_t t)
+static void check_nearest_is_on_boundary(subject *s, const double x[3], double d, uint32_t t)
 {
     const sdm_mesh *used = sdm_exact_surface(s->engine);
     const point a = corner_of(used, 3 * (size_t)t), b = corner_of(used, 3 * (size_t)t + 1),
                 c = corner_of(used, 3 * (size_t)t + 2);
     point n;
-    if (!normal_of(a, b, c, &n)) return;
-    // steps of different size: the first may leave a thin wedge on its other side
+    if (!unit_normal(a, b, c, &n)) return;
+    // several step lengths: a step that is longer than a neighbouring wedge is thick crosses both
+    // of its faces and finds no change of side
     int yes = 0, no = 0;
     for (int k = 0; k < SAMPLES; k++) {
         const double u = roll(&s->dice, 0, 1), v = roll(&s->dice, 0, 1 - u);
         for (real step = 1e-11L; step > 0.5e-13L; step /= 10) {
-            const border found = border_at(s, inner_point(a, b, c, u, v), n, step * s->size);
-            yes += found == BORDER_YES;
-            no += found == BORDER_NO;
+            const boundary_state found =
+                boundary_test(s, inner_point(a, b, c, u, v), n, step * s->size);
+            yes += found == BOUNDARY_YES;
+            no += found == BOUNDARY_NO;
         }
     }
     CHECK(yes || !no, s, x, "%.17g, but its nearest triangle %u does not bound the solid", d,
           (unsigned)t);
-    n_border += (size_t)yes;
+    n_boundary += (size_t)yes;
 }
 
-static void test_certificates(void **state)
+static void test_nearest_point_is_nearest_boundary_point(void **state)
 {
     (void)state;
-    n_border = n_buried = 0;
+    n_boundary = n_buried = 0;
     for (uint64_t i = first; i < first + n_meshes; i++) {
         if (random_families[i % RANDOM_FAMILIES].kind != SURFACE_OVERLAP &&
             random_families[i % RANDOM_FAMILIES].kind != SURFACE_CANCELS)
@@ -116,20 +120,20 @@ static void test_certificates(void **state)
                 for (int a = 0; a < 3; a++) x[a] = roll(&s.dice, lo[a], hi[a]);
             }
             const double d = sdm_exact_point(s.engine, x, NULL, NULL, &t);
-            check_nothing_nearer(&s, x, d);
-            check_nearest_bounds(&s, x, d, t);
+            check_no_boundary_point_nearer(&s, x, d);
+            check_nearest_is_on_boundary(&s, x, d, t);
         }
         subject_dispose(&s);
     }
-    print_message("%zu places on the boundary, %zu buried ones\n", n_border, n_buried);
-    if (n_meshes >= 100) assert_true(n_border > n_meshes && n_buried > n_meshes);
+    print_message("%zu places on the boundary, %zu buried ones\n", n_boundary, n_buried);
+    if (n_meshes >= 100) assert_true(n_boundary > n_meshes && n_buried > n_meshes);
 }
 
 int main(int argc, char **argv)
 {
     subject_range(argc, argv, &n_meshes, &first);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_certificates),
+        cmocka_unit_test(test_nearest_point_is_nearest_boundary_point),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,5 @@
-/* Layers of the exact engine's maps: nearest triangle, closest point and gradient against single
- * points, differences and geometry.
+/* Layers of the exact engine's maps (nearest triangle, closest point, gradient), compared with
+ * single points, finite differences and geometry.
  * Tests: exact.c pseudonormal.c sign.c */
 #include <limits.h>
 #include <setjmp.h>
@@ -23,7 +23,7 @@ typedef struct layers {
     sdm_exact_layers l;
 } layers;
 
-static layers fill(const sdm_exact *e, const sdm_grid *g)
+static layers layers_make(const sdm_exact *e, const sdm_grid *g)
 {
     sdm_error err = {0};
     layers r = {.grid = *g, .n = sdm_grid_count(g)};
@@ -35,7 +35,7 @@ static layers fill(const sdm_exact *e, const sdm_grid *g)
     return r;
 }
 
-static void dispose(layers *r)
+static void layers_dispose(layers *r)
 {
     free(r->l.values);
     free(r->l.closest);
@@ -43,8 +43,8 @@ static void dispose(layers *r)
     free(r->l.triangle);
 }
 
-/* Distance from one triangle, by the brute force of the library. */
-static double to_triangle(const sdm_mesh *m, uint32_t t, const double x[3])
+/* Distance from x to triangle t of m, by sdm_naive_point(). */
+static double distance_to_triangle(const sdm_mesh *m, uint32_t t, const double x[3])
 {
     double vert[9];
     uint32_t tri[3] = {0, 1, 2};
@@ -53,9 +53,9 @@ static double to_triangle(const sdm_mesh *m, uint32_t t, const double x[3])
     return fabs(sdm_naive_point(&(sdm_mesh){.vert = vert, .tri = tri, .n_vert = 3, .n_tri = 1}, x));
 }
 
-/* Every layer against sdm_exact_point() and against what it means. size: largest coordinate, for
- * float rounding. */
-static void check(const sdm_exact *e, const layers *r, double size)
+/* Compares every layer with sdm_exact_point() and checks how the layers are related geometrically.
+ * size: largest abs(coordinate), for the rounding to float. */
+static void check_layers(const sdm_exact *e, const layers *r, double size)
 {
     const sdm_mesh *surface = sdm_exact_surface(e);
     const double rounding = 1.2e-7 * size;
@@ -70,7 +70,8 @@ static void check(const sdm_exact *e, const layers *r, double size)
         position(&r->grid, i, x);
         const double d = sdm_exact_point(e, x, q, n, &t);
         const float *normal = r->l.normal + 3 * i, *closest = r->l.closest + 3 * i;
-        // to rounding of the coordinates, less than the last bit of all but the smallest distances
+        // tolerance: the rounding of coordinates, which is less than one float ulp of all but the
+        // smallest distances
         assert_true(r->l.values[i] == (float)d || fabs((double)r->l.values[i] - d) < 1e-15 * size);
         assert_true(r->l.triangle[i] < surface->n_tri);
         for (int a = 0; a < 3; a++) {
@@ -84,9 +85,10 @@ static void check(const sdm_exact *e, const layers *r, double size)
         assert_true(fabs(sqrt(distance) - fabs(d)) <= 2 * rounding &&
                     fabs(dot - d) <= 2 * rounding);
         const double cq[3] = {(double)closest[0], (double)closest[1], (double)closest[2]};
-        assert_true(to_triangle(surface, r->l.triangle[i], cq) <= rounding);
+        assert_true(distance_to_triangle(surface, r->l.triangle[i], cq) <= rounding);
         if (t != r->l.triangle[i]) {
-            assert_true(fabs(to_triangle(surface, r->l.triangle[i], x) - fabs(d)) <= 1e-14 * size);
+            assert_true(fabs(distance_to_triangle(surface, r->l.triangle[i], x) - fabs(d)) <=
+                        1e-14 * size);
             continue;
         }
         same++;
@@ -96,7 +98,7 @@ static void check(const sdm_exact *e, const layers *r, double size)
     assert_true(same > r->n * 9 / 10);
 }
 
-static sdm_grid tilted(const double centre[3], double half)
+static sdm_grid tilted_grid(const double centre[3], double half)
 {
     const double c = cos(0.3), s = sin(0.3);
     const double dir[9] = {c, -s, 0, -s, -c, 0, 0, 0, 1}; // a rotation and a reflection
@@ -114,17 +116,17 @@ static const double ZERO[3] = {0, 0, 0};
 static void check_mesh(const sdm_mesh *m, const sdm_exact_opts *o, const sdm_grid *g, double size)
 {
     sdm_exact *e = engine(m, o);
-    layers r = fill(e, g);
-    check(e, &r, size);
-    dispose(&r);
+    layers r = layers_make(e, g);
+    check_layers(e, &r, size);
+    layers_dispose(&r);
     sdm_exact_free(e);
 }
 
-static void test_equal_to_points(void **state)
+static void test_layers_match_points(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
-    sdm_grid g = tilted(ZERO, 1.7);
+    sdm_grid g = tilted_grid(ZERO, 1.7);
     mesh_sphere(&m, ZERO, 1.2, 9);
     check_mesh(&m, NULL, &g, 4);
     mesh_flip(&m); // inside out
@@ -141,7 +143,7 @@ static void test_equal_to_points(void **state)
             sdm_grid_centred((int64_t[3]){9, 9, 9}, 0.5, (double[3]){far, far, far});
         check_mesh(&m, NULL, &on, far + 2);
     }
-    // on an oblique face far away the rounding of coordinates exceeds the distance
+    // on an oblique face far from the origin the rounding of coordinates exceeds the distance
     const double far = 4194304.7;
     mesh_make(&m, 4, 4);
     for (size_t v = 0; v < 4; v++)
@@ -154,20 +156,21 @@ static void test_equal_to_points(void **state)
                          .dir = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
     check_mesh(&m, NULL, &on, far + 8);
     mesh_spiral(&m, &SPIRAL_NOMINAL, 0.6);
-    g = tilted((double[3]){0, 0, 1.5}, 5);
+    g = tilted_grid((double[3]){0, 0, 1.5}, 5);
     check_mesh(&m, NULL, &g, 12);
     check_mesh(&m, &(sdm_exact_opts){.keep_overlap = true}, &g, 12);
     sdm_mesh_dispose(&m);
 }
 
-/* Central differences of the distance, wherever those to both sides agree: there the distance is
- * smooth. */
+/* Compares the gradient with central differences wherever forward and backward differences
+ * agree, that is, where the distance is smooth. At least the share `wanted` of all samples must
+ * be smooth. */
 static void check_gradient(const sdm_mesh *m, const sdm_exact_opts *o, const sdm_grid *g,
                            double wanted)
 {
     const double h = 1e-5;
     sdm_exact *e = engine(m, o);
-    layers r = fill(e, g);
+    layers r = layers_make(e, g);
     size_t smooth = 0;
     for (size_t i = 0; i < 3 * r.n; i++) {
         double x[3];
@@ -182,28 +185,28 @@ static void check_gradient(const sdm_mesh *m, const sdm_exact_opts *o, const sdm
         assert_true(fabs((forward + backward) / 2 - (double)r.l.normal[i]) < 1e-3);
     }
     assert_true((double)smooth > wanted * 3 * (double)r.n);
-    dispose(&r);
+    layers_dispose(&r);
     sdm_exact_free(e);
 }
 
-static void test_gradient(void **state)
+static void test_gradient_matches_differences(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
-    sdm_grid g = tilted(ZERO, 1.7);
+    sdm_grid g = tilted_grid(ZERO, 1.7);
     mesh_sphere(&m, ZERO, 1.2, 9);
     check_gradient(&m, NULL, &g, 0.98);
     mesh_flip(&m);
     check_gradient(&m, NULL, &g, 0.98);
     mesh_spiral(&m, &SPIRAL_NOMINAL, 0.6);
-    g = tilted((double[3]){0, 0, 1.5}, 5);
+    g = tilted_grid((double[3]){0, 0, 1.5}, 5);
     check_gradient(&m, NULL, &g, 0.98);
     check_gradient(&m, &(sdm_exact_opts){.keep_overlap = true}, &g, 0.98);
     sdm_mesh_dispose(&m);
 }
 
-/* On the surface of a box the normal is a face's, outward. */
-static void test_on_the_surface(void **state)
+/* On the surface of a box the normal is the outward normal of a face. */
+static void test_normals_on_the_surface(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -212,7 +215,7 @@ static void test_on_the_surface(void **state)
         if (turned) mesh_flip(&m);
         const sdm_grid g = sdm_grid_centred((int64_t[3]){5, 5, 5}, 0.5, ZERO);
         sdm_exact *e = engine(&m, NULL);
-        layers r = fill(e, &g);
+        layers r = layers_make(e, &g);
         size_t n = 0;
         for (size_t i = 0; i < r.n; i++) {
             if (fabs((double)r.l.values[i]) > 1e-12) continue;
@@ -224,46 +227,46 @@ static void test_on_the_surface(void **state)
             n++;
         }
         assert_int_equal(n, 98);
-        dispose(&r);
+        layers_dispose(&r);
         sdm_exact_free(e);
     }
     sdm_mesh_dispose(&m);
 }
 
-static void test_threads_and_choice(void **state)
+static void test_threads_and_choice_of_layers(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
     mesh_spiral(&m, &SPIRAL_NOMINAL, 0.6);
-    const sdm_grid g = tilted((double[3]){0, 0, 1.5}, 5);
+    const sdm_grid g = tilted_grid((double[3]){0, 0, 1.5}, 5);
     sdm_exact *one = engine(&m, &(sdm_exact_opts){.n_threads = 1});
-    layers a = fill(one, &g);
+    layers a = layers_make(one, &g);
     for (int n_threads = 2; n_threads <= 3; n_threads++) {
         sdm_exact *e = engine(&m, &(sdm_exact_opts){.n_threads = n_threads});
-        layers b = fill(e, &g);
+        layers b = layers_make(e, &g);
         assert_memory_equal(a.l.values, b.l.values, a.n * sizeof(float));
         assert_memory_equal(a.l.closest, b.l.closest, 3 * a.n * sizeof(float));
         assert_memory_equal(a.l.normal, b.l.normal, 3 * a.n * sizeof(float));
         assert_memory_equal(a.l.triangle, b.l.triangle, a.n * sizeof(uint32_t));
-        dispose(&b);
+        layers_dispose(&b);
         sdm_exact_free(e);
     }
-    // one layer alone
+    // a single layer gives the same result
     layers c = {.n = a.n, .l = {.normal = room(3 * a.n, sizeof(float))}};
     assert_int_equal(sdm_exact_map_layers(one, &g, &c.l, NULL), SDM_OK);
     assert_memory_equal(a.l.normal, c.l.normal, 3 * a.n * sizeof(float));
-    dispose(&c);
-    // none at all is fine
+    layers_dispose(&c);
+    // no layer at all is allowed
     assert_int_equal(sdm_exact_map_layers(one, &g, &(sdm_exact_layers){0}, NULL), SDM_OK);
-    dispose(&a);
+    layers_dispose(&a);
     sdm_exact_free(one);
     sdm_mesh_dispose(&m);
 }
 
-static int asked;
-static bool stop_late(void *user) { return asked++ >= *(const int *)user; }
+static int calls;
+static bool cancel_after_patience(void *user) { return calls++ >= *(const int *)user; }
 
-static void test_misuse(void **state)
+static void test_invalid_arguments_and_cancellation(void **state)
 {
     (void)state;
     sdm_error err = {0};
@@ -287,19 +290,20 @@ static void test_misuse(void **state)
     assert_non_null(strstr(err.text, "1728000"));
     sdm_exact_free(e);
 
-    // asked in the map, then in the layers: never stopped, stopped at the first question and at the
-    // last
+    // The callback is called first by the map, then by the layers. patience = number of calls
+    // before it requests a stop: never, at the last call, at the first call.
     int patience = INT_MAX;
-    e = engine(&m, &(sdm_exact_opts){.n_threads = 1, .cancelled = stop_late, .user = &patience});
-    asked = 0;
+    e = engine(&m, &(sdm_exact_opts){
+                       .n_threads = 1, .cancelled = cancel_after_patience, .user = &patience});
+    calls = 0;
     assert_int_equal(sdm_exact_map(e, &g, values, &err), SDM_OK);
-    const int of_map = asked;
-    asked = 0;
+    const int of_map = calls;
+    calls = 0;
     assert_int_equal(sdm_exact_map_layers(e, &g, &l, &err), SDM_OK);
-    assert_true(asked > of_map);
-    patience = asked - 1;
+    assert_true(calls > of_map);
+    patience = calls - 1;
     for (int i = 0; i < 2; i++) {
-        asked = 0;
+        calls = 0;
         assert_int_equal(sdm_exact_map_layers(e, &g, &l, &err), SDM_E_CANCELLED);
         patience = 0;
     }
@@ -318,9 +322,11 @@ static void test_misuse(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_equal_to_points), cmocka_unit_test(test_gradient),
-        cmocka_unit_test(test_on_the_surface),  cmocka_unit_test(test_threads_and_choice),
-        cmocka_unit_test(test_misuse),
+        cmocka_unit_test(test_layers_match_points),
+        cmocka_unit_test(test_gradient_matches_differences),
+        cmocka_unit_test(test_normals_on_the_surface),
+        cmocka_unit_test(test_threads_and_choice_of_layers),
+        cmocka_unit_test(test_invalid_arguments_and_cancellation),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,6 @@
-/* What must not change the exact engine's answer: order of triangles and corners, repeated
- * vertices, scale, rotation, a far origin. test_exact_motion [MESHES [FIRST]]
+/* Invariance of the exact engine: reordered triangles and vertices, duplicated vertices, scaling,
+ * rotation and a distant origin must not change the distances. Usage: test_exact_motion [MESHES
+ * [FIRST]]
  * Tests: exact.c */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -13,27 +14,31 @@
 enum { POINTS = 30 };
 static uint64_t n_meshes = 110, first, n_tips;
 
-/* A place the mesh is brought to: x -> factor * r x + by. */
+/* A similarity transform: x -> factor * r x + by. */
 typedef struct motion {
     double factor, r[9], by[3];
 } motion;
 
-static motion at_rest(void) { return (motion){.factor = 1, .r = {1, 0, 0, 0, 1, 0, 0, 0, 1}}; }
+static motion motion_identity(void)
+{
+    return (motion){.factor = 1, .r = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+}
 
-static void move(const motion *m, const double x[3], double y[3])
+static void motion_apply(const motion *m, const double x[3], double y[3])
 {
     rotate(m->r, x, y);
     for (int a = 0; a < 3; a++) y[a] = m->factor * y[a] + m->by[a];
 }
 
-static void move_mesh(const motion *to, const sdm_mesh *m, sdm_mesh *out)
+static void motion_apply_to_mesh(const motion *to, const sdm_mesh *m, sdm_mesh *out)
 {
     if (sdm_mesh_copy(m, out, NULL)) abort();
-    for (size_t v = 0; v < m->n_vert; v++) move(to, &m->vert[3 * v], &out->vert[3 * v]);
+    for (size_t v = 0; v < m->n_vert; v++) motion_apply(to, &m->vert[3 * v], &out->vert[3 * v]);
 }
 
-/* How far the tip of the nearest piece of the union moves when a side of it moves by the union's
-   error: far for needles, which may also be there or not. */
+/* Error bound at needle tips: how far the tip of the nearest triangle of the union moves when
+ * one of its sides moves by union_error_mm. It is large for needles, which may even appear or
+ * vanish. */
 static double tip_error(const sdm_exact *e, const double x[3])
 {
     uint32_t t;
@@ -57,9 +62,10 @@ static size_t distinct_vertices(const sdm_mesh *m)
     return n;
 }
 
-/* The moved mesh has the moved distances, to `roundings` of the coordinates here and there. */
-static void compare(subject *s, const sdm_mesh *moved, const motion *to, const sdm_exact_opts *opts,
-                    double roundings)
+/* `moved` must be the mesh of *s transformed by `to`: all distances scale with to->factor, to
+ * within `roundings` units of rounding in both frames. */
+static void compare_with(subject *s, const sdm_mesh *moved, const motion *to,
+                         const sdm_exact_opts *opts, double roundings)
 {
     sdm_exact *here = engine_of(s, &s->mesh, opts), *there = engine_of(s, moved, opts);
     double lo[3], hi[3];
@@ -67,21 +73,20 @@ static void compare(subject *s, const sdm_mesh *moved, const motion *to, const s
     const double seams = sdm_exact_get_report(here)->union_error_mm * to->factor +
                          sdm_exact_get_report(there)->union_error_mm;
     const bool closed = sdm_exact_get_report(here)->audit.closed;
-    // vertices nearer to each other than the rounding of where they are moved to become one: what
-    // was closed may open
+    // rounding may merge vertices that are very close; then a closed mesh may become open
     const bool welded = distinct_vertices(&s->mesh) != distinct_vertices(moved);
     if (!welded) assert_int_equal(closed, sdm_exact_get_report(there)->audit.closed);
-    // a volume that is rounding has no sign: which side is called inside is chance
+    // if the volume is within rounding of 0, inside and outside are interchangeable
     const sdm_audit *audit = &sdm_exact_get_report(here)->audit;
     const bool sided = fabs(audit->volume) > 64 * DBL_EPSILON * audit->area * s->largest;
-    // parts that touch each other meet or not by chance of rounding, and only those that do not are
-    // turned
+    // Whether touching parts intersect depends on rounding, and an inside-out part is reversed only
+    // if it intersects no other part: compare only if equally many parts were reversed.
     const bool same =
         sdm_exact_get_report(here)->parts_turned == sdm_exact_get_report(there)->parts_turned;
     for (int k = 0; k < POINTS && sided && same && !welded; k++) {
         double x[3], y[3], reach = largest;
         random_point(&s->mesh, &s->dice, x);
-        move(to, x, y);
+        motion_apply(to, x, y);
         for (int a = 0; a < 3; a++) reach = fmax(reach, fabs(y[a]));
         const double d = to->factor * sdm_exact_point(here, x, NULL, NULL, NULL),
                      e = sdm_exact_point(there, y, NULL, NULL, NULL);
@@ -92,7 +97,7 @@ static void compare(subject *s, const sdm_mesh *moved, const motion *to, const s
                                                               : tip_error(there, y));
         CHECK(tip || off <= 0, s, x, "%.17g, %.17g after a motion", d, e);
         n_tips += tip;
-        // near buried sheets, too, the sign is that of some place within rounding
+        // near a sheet, buried ones included, rounding may move the point to the other side
         const double clear = to->factor * (double)brute_distance(&s->mesh, x);
         const bool even = !closed && fabsl(brute_winding(&s->mesh, point_of(x)) - 0.5L) < 1e-6L;
         if (!even && clear > (closed ? tolerance : tolerance + open_margin * s->size * to->factor))
@@ -102,41 +107,41 @@ static void compare(subject *s, const sdm_mesh *moved, const motion *to, const s
     sdm_exact_free(there);
 }
 
-/* compare() with the mesh of *s moved. */
+/* compare_with() for the transformed mesh of *s. */
 static void compare_moved(subject *s, const motion *to, const sdm_exact_opts *opts)
 {
     sdm_mesh other = {0};
-    move_mesh(to, &s->mesh, &other);
-    compare(s, &other, to, opts, bound);
+    motion_apply_to_mesh(to, &s->mesh, &other);
+    compare_with(s, &other, to, opts, bound);
     sdm_mesh_dispose(&other);
 }
 
-static void test_order(void **state)
+static void test_order_of_triangles_and_vertices(void **state)
 {
     (void)state;
     for (uint64_t i = first; i < first + n_meshes; i++) {
         subject s;
         subject_make(&s, i, NULL);
         sdm_mesh other = {0};
-        const motion rest = at_rest();
-        move_mesh(&rest, &s.mesh, &other);
+        const motion rest = motion_identity();
+        motion_apply_to_mesh(&rest, &s.mesh, &other);
         mesh_shuffle(&other, &s.dice);
-        compare(&s, &other, &rest, NULL, bound);
-        // every triangle with its own vertices, in another order
+        compare_with(&s, &other, &rest, NULL, bound);
+        // separate vertices for each triangle, in reverse order
         mesh_make(&other, 3 * s.mesh.n_tri, s.mesh.n_tri);
         for (size_t c = 0; c < 3 * s.mesh.n_tri; c++) {
             const double *v = &s.mesh.vert[3 * (size_t)s.mesh.tri[c]];
             mesh_vertex(&other, 3 * s.mesh.n_tri - 1 - c, v[0], v[1], v[2]);
             other.tri[c] = (uint32_t)(3 * s.mesh.n_tri - 1 - c);
         }
-        compare(&s, &other, &rest, NULL, bound);
+        compare_with(&s, &other, &rest, NULL, bound);
         sdm_mesh_dispose(&other);
         subject_dispose(&s);
     }
 }
 
-/* Powers of two change the exponent of every number and no digit. */
-static void test_powers_of_two(void **state)
+/* Scaling by powers of two changes only exponents: the results must scale bit by bit. */
+static void test_powers_of_two_scale_bit_by_bit(void **state)
 {
     (void)state;
     for (uint64_t i = first; i < first + n_meshes; i++) {
@@ -150,9 +155,9 @@ static void test_powers_of_two(void **state)
         const double d = sdm_exact_point(s.engine, x, NULL, NULL, NULL);
         for (int exponent = -30; exponent <= 30; exponent += 20) {
             sdm_mesh other = {0};
-            motion to = at_rest();
+            motion to = motion_identity();
             to.factor = ldexp(1, exponent);
-            move_mesh(&to, &s.mesh, &other);
+            motion_apply_to_mesh(&to, &s.mesh, &other);
             sdm_exact *e = engine_of(&s, &other, NULL);
             sdm_grid h = g;
             double y[3];
@@ -185,22 +190,22 @@ static void test_scales(void **state)
     for (uint64_t i = first; i < first + n_meshes; i++) {
         subject s;
         subject_make(&s, i, NULL);
-        motion to = at_rest();
+        motion to = motion_identity();
         to.factor = factors[i / RANDOM_FAMILIES % 4];
         compare_moved(&s, &to, NULL);
         subject_dispose(&s);
     }
 }
 
-/* Rounding moves the vertices: sheets that lay on each other may cross then, but no distance
- * changes by more. */
+/* Rotations round the vertices: coincident sheets may intersect afterwards, but the distances
+ * change by no more than the rounding. */
 static void test_rotations(void **state)
 {
     (void)state;
     for (uint64_t i = first; i < first + n_meshes; i++) {
         subject s;
         subject_make(&s, i, NULL);
-        motion to = at_rest();
+        motion to = motion_identity();
         rotation(&s.dice, to.r);
         for (int a = 0; a < 3; a++) to.by[a] = roll(&s.dice, -3, 3) * s.size;
         compare_moved(&s, &to, NULL);
@@ -208,15 +213,15 @@ static void test_rotations(void **state)
     }
 }
 
-/* At 10^6 times its size from the origin parts of the mesh are thinner than rounding and vanish
- * from the union: all surface. */
+/* At a distance of 10^6 times the mesh size, thin parts vanish from the union by rounding: compare
+ * with keep_overlap. */
 static void test_far_origin(void **state)
 {
     (void)state;
     for (uint64_t i = first; i < first + n_meshes; i++) {
         subject s;
         subject_make(&s, i, NULL);
-        motion to = at_rest();
+        motion to = motion_identity();
         for (int a = 0; a < 3; a++) to.by[a] = roll(&s.dice, -1e6, 1e6) * s.size;
         compare_moved(&s, &to, &(sdm_exact_opts){.keep_overlap = true});
         subject_dispose(&s);
@@ -227,8 +232,10 @@ int main(int argc, char **argv)
 {
     subject_range(argc, argv, &n_meshes, &first);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_order),      cmocka_unit_test(test_powers_of_two),
-        cmocka_unit_test(test_scales),     cmocka_unit_test(test_rotations),
+        cmocka_unit_test(test_order_of_triangles_and_vertices),
+        cmocka_unit_test(test_powers_of_two_scale_bit_by_bit),
+        cmocka_unit_test(test_scales),
+        cmocka_unit_test(test_rotations),
         cmocka_unit_test(test_far_origin),
     };
     const int failed = cmocka_run_group_tests(tests, NULL, NULL);

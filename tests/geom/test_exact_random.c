@@ -1,5 +1,5 @@
-/* The exact engine against brute force on random meshes: distances, signs, nearest points, maps,
- * threads, instruction sets. test_exact_random [MESHES [FIRST]]
+/* The exact engine on random meshes compared with brute force in long double: distances, signs,
+ * nearest points, maps, threads, instruction sets. Usage: test_exact_random [MESHES [FIRST]]
  * Tests: feature_groups_avx2.c feature_groups_generic.c grid_distance.c map_avx2.c map_avx512.c
  * map_generic.c nearest.c feature_build.c */
 #include <setjmp.h>
@@ -15,7 +15,7 @@
 enum { POINTS = 100 };
 static uint64_t n_meshes = 330, first;
 
-static double worst; // error of a distance, in roundings
+static double worst; // largest error of a distance, in units of rounding_at()
 
 static void check_nearest(const subject *s, const double x[3], double d, const double q[3],
                           const double n[3], uint32_t t)
@@ -29,7 +29,7 @@ static void check_nearest(const subject *s, const double x[3], double d, const d
           distance(p, o));
     CHECK(distance(o, closest_on_triangle(o, a, b, c)) <= tolerance, s, x,
           "nearest point not on its triangle");
-    // the direction of a short way is rounded
+    // the direction of a very short vector is dominated by rounding
     if (fabs(d) > 1e3 * tolerance) {
         CHECK(fabsl(length(point_of(n)) - 1) <= 2 * tolerance / fabs(d) + 4 * DBL_EPSILON, s, x,
               "normal of length %.17Lg", length(point_of(n)));
@@ -38,8 +38,9 @@ static void check_nearest(const subject *s, const double x[3], double d, const d
     }
 }
 
-/* Is the sign at x, `truth` away from the surface, farther than rounding from the other one? */
-static bool judged(const subject *s, const double x[3], double truth, double rounding)
+/* Is x, at distance `truth` from the surface, far enough from any change of sign that rounding
+ * cannot affect the expected sign? */
+static bool sign_is_certain(const subject *s, const double x[3], double truth, double rounding)
 {
     if (s->report->audit.closed) return truth > rounding;
     return truth > open_margin * s->size &&
@@ -54,8 +55,8 @@ static void check_point(const subject *s, const sdm_exact *all, const double x[3
     const double truth = (double)brute_distance(&s->mesh, x), tolerance = bound * unit;
     const double seam = tolerance + s->report->union_error_mm;
     CHECK(fabs(d) >= truth - seam, s, x, "%.17g, nearer than every triangle: %.17g", d, truth);
-    // where the whole surface counts; on buried sheets the sign is that of some place within
-    // rounding
+    // where buried surface does not matter: no union, no buried parts, or a point outside of the
+    // solid
     const surface_kind kind = s->family->kind;
     if (!s->report->unioned || kind == SURFACE_BOUNDARY ||
         (kind == SURFACE_OVERLAP && d > 0 && truth > seam))
@@ -64,7 +65,7 @@ static void check_point(const subject *s, const sdm_exact *all, const double x[3
     CHECK(fabs(fabs(whole) - truth) <= tolerance, s, x, "%.17g with all surface, brute force %.17g",
           whole, truth);
     worst = fmax(worst, fabs(fabs(whole) - truth) / unit);
-    if (judged(s, x, truth, seam)) {
+    if (sign_is_certain(s, x, truth, seam)) {
         const bool in = truly_inside(s, point_of(x));
         CHECK((d < 0) == in && (whole < 0) == in, s, x, "%.17g, but the winding number says %s", d,
               in ? "inside" : "outside");
@@ -72,7 +73,7 @@ static void check_point(const subject *s, const sdm_exact *all, const double x[3
     check_nearest(s, x, d, q, n, t);
 }
 
-static void test_points(void **state)
+static void test_points_match_brute_force(void **state)
 {
     (void)state;
     worst = 0;
@@ -94,7 +95,8 @@ static void test_points(void **state)
 
 static size_t n_voxels, n_unequal;
 
-/* The map is the points, and changes from voxel to voxel by the way between them at most. */
+/* The map must agree with sdm_exact_point() and be 1-Lipschitz: neighbouring voxels differ by at
+ * most the spacing. */
 static void check_map(const subject *s, const sdm_grid *g, const float *v, bool exact)
 {
     const size_t step[3] = {1, (size_t)g->n[0], (size_t)(g->n[0] * g->n[1])}, n = sdm_grid_count(g);
@@ -105,18 +107,19 @@ static void check_map(const subject *s, const sdm_grid *g, const float *v, bool 
                      tolerance = bound * rounding_at(s, x);
         n_voxels++;
         n_unequal += fabsf(v[i]) != fabsf((float)d);
-        // the float of a distance that near: a map measures in another way, and rounds the voxel's
-        // position unless `exact`
+        // The map computes distances in another order and, unless `exact`, also rounds the voxel's
+        // position: the value may be the float of any distance within `room`.
         const double room = (exact ? 2 : 4) * rounding_at(s, x);
         CHECK(fabsf(v[i]) >= (float)(fabs(d) - room) && fabsf(v[i]) <= (float)(fabs(d) + room), s,
               x, "voxel %zu: %.9g, point %.17g", i, (double)v[i], d);
-        // the rows decide in voxels: the vertices are rounded once more
-        if (judged(s, x, fabs(d), 4 * tolerance))
+        // the sign of a row is computed in index coordinates, for which the vertices are rounded
+        // once more
+        if (sign_is_certain(s, x, fabs(d), 4 * tolerance))
             CHECK((v[i] < 0) == (d < 0), s, x, "voxel %zu: %.9g, point %.17g", i, (double)v[i], d);
         for (int a = 0; a < 3; a++) {
             if (i / step[a] % (size_t)g->n[a] + 1 >= (size_t)g->n[a]) continue;
             double here = v[i], next = v[i + step[a]];
-            if (!s->report->audit.closed) { // the sign of an open mesh may change anywhere
+            if (!s->report->audit.closed) { // the sign of an open mesh may change anywhere in space
                 here = fabs(here);
                 next = fabs(next);
             }
@@ -128,7 +131,7 @@ static void check_map(const subject *s, const sdm_grid *g, const float *v, bool 
     }
 }
 
-static void test_maps(void **state)
+static void test_maps_match_points(void **state)
 {
     (void)state;
     n_voxels = n_unequal = 0;
@@ -146,7 +149,7 @@ static void test_maps(void **state)
                   n_voxels);
 }
 
-static void test_threads_and_instruction_sets(void **state)
+static void test_threads_and_instruction_sets_give_same_bits(void **state)
 {
     (void)state;
     const int best = sdm_processor_select(-1);
@@ -181,9 +184,9 @@ int main(int argc, char **argv)
 {
     subject_range(argc, argv, &n_meshes, &first);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_points),
-        cmocka_unit_test(test_maps),
-        cmocka_unit_test(test_threads_and_instruction_sets),
+        cmocka_unit_test(test_points_match_brute_force),
+        cmocka_unit_test(test_maps_match_points),
+        cmocka_unit_test(test_threads_and_instruction_sets_give_same_bits),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,5 @@
-/* Signs of the exact engine: cavities, open and one-sided meshes, inside-out meshes, methods,
- * exact predicates.
+/* Signs of the exact engine at single points: cavities, open, one-sided and inside-out meshes, the
+ * three sign methods, exact predicates.
  * Tests: crossings.c parts.c predicates.c pseudonormal.c sign.c winding.c */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -25,11 +25,11 @@ static double uniform(uint64_t stream, uint64_t i, double lo, double hi)
 
 static double norm(const double x[3]) { return sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]); }
 
-static void test_sides_are_exact(void **state)
+static void test_orientation_predicate_is_exact(void **state)
 {
     (void)state;
-    // small integers scaled by an odd factor near a far place: compared with whole-number
-    // arithmetic
+    // coordinates are integers, scaled by a power of two and far from the origin: the expected sign
+    // is computed in integer arithmetic
     for (uint64_t i = 0; i < 20000; i++) {
         int64_t c[6];
         double p[3][2];
@@ -43,17 +43,19 @@ static void test_sides_are_exact(void **state)
         const bool same = c[0] == c[2] && c[1] == c[3];
         if (!same) assert_int_equal(side, -sdm_side(p[1], p[0], p[2], NULL));
     }
-    // a line where the rounded determinant is wrong
+    // a line for which the determinant in floating point has the wrong sign
     const double u[2] = {0.5, 0.5}, v[2] = {12, 12}, near[2] = {0.5 + 0x1p-53, 0.5};
     assert_int_equal(sdm_side(u, v, near, NULL), -1);
     const double far[2] = {24, 24};
     assert_int_equal(sdm_side(u, v, far, NULL),
-                     -1); // tie: moved by (e, e^2), to the right of the diagonal
+                     // collinear: the tie-break moves p by (e, e^2), e -> 0, which is to the right
+                     // of the diagonal
+                     -1);
 }
 
-// a ball inside a ball, both facing outwards: the inner surface does not count, and pseudo-normals
-// cannot be asked
-static void test_nested_solid(void **state)
+// A ball within a ball, both oriented outwards: the inner surface bounds nothing in the union, and
+// the pseudo-normal method refuses the mesh.
+static void test_nested_ball_is_united(void **state)
 {
     (void)state;
     sdm_mesh m = {0}, part = {0};
@@ -71,8 +73,9 @@ static void test_nested_solid(void **state)
     sdm_mesh_dispose(&part);
 }
 
-// the same triangle a thousand times: an error in bounded memory
-static void test_layers(void **state)
+// The same triangle 3000 times: the audit must fail with an error instead of using unbounded
+// memory.
+static void test_many_equal_triangles_are_refused(void **state)
 {
     (void)state;
     enum { LAYERS = 3000 };
@@ -87,10 +90,10 @@ static void test_layers(void **state)
     sdm_mesh_dispose(&m);
 }
 
-static void test_nested_cavity(void **state)
+static void test_ball_within_cavity(void **state)
 {
     (void)state;
-    // a ball with a hollow that holds a ball
+    // a ball with a cavity that contains a smaller ball
     sdm_mesh m = {0}, part = {0};
     mesh_sphere(&m, zero, 3, 24);
     mesh_sphere(&part, zero, 2, 24);
@@ -128,7 +131,7 @@ static void test_nested_cavity(void **state)
     sdm_mesh_dispose(&part);
 }
 
-static void test_inside_out(void **state)
+static void test_inside_out_mesh_gives_same_map(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -153,11 +156,11 @@ static void test_inside_out(void **state)
     sdm_mesh_dispose(&m);
 }
 
-static void test_open_cup(void **state)
+static void test_open_cup_uses_winding_number(void **state)
 {
     (void)state;
-    // a sphere without its top: inside by the winding number where the opening is seen under less
-    // than half the sphere
+    // a sphere without its top; a point is inside if its winding number exceeds 1/2, that is, if
+    // the opening covers a solid angle of less than 2 pi
     sdm_mesh m = {0};
     mesh_sphere(&m, zero, 1, 30);
     size_t kept = 0;
@@ -180,14 +183,14 @@ static void test_open_cup(void **state)
         const double d = sdm_exact_point(e, x, NULL, NULL, NULL), b = sdm_naive_point(&m, x);
         assert_true(fabs(d - b) < 1e-12);
     }
-    // the same on a grid, in all threads
+    // the same for a map, with the default number of threads
     const sdm_grid g = sdm_grid_centred((const int64_t[3]){13, 14, 15}, 0.2, zero);
     float v[13 * 14 * 15], w[13 * 14 * 15];
     assert_int_equal(sdm_exact_map(e, &g, v, NULL), SDM_OK);
     assert_int_equal(sdm_naive_map(&m, &g, 1, w, NULL), SDM_OK);
     for (int i = 0; i < 13 * 14 * 15; i++) assert_true(fabsf(v[i] - w[i]) <= 2e-7f);
     sdm_exact_free(e);
-    // methods that need a closed mesh refuse
+    // methods that require a closed mesh return an error
     sdm_error err = {0};
     assert_int_equal(sdm_exact_create(&m, &(sdm_exact_opts){.sign = SDM_SIGN_CROSSINGS}, &e, &err),
                      SDM_E_ARG);
@@ -215,8 +218,8 @@ static void test_pseudonormal_refuses_overlap(void **state)
     sdm_mesh_dispose(&b);
 }
 
-/* A prism with a vertex in the middle of an edge that only one of the faces there has, a triangle
- * without area between them. */
+/* A prism with a T-junction: vertex 6 lies in the middle of an edge of which only one side is split
+ * there; a triangle of zero area fills the slit. */
 static void test_pseudonormal_refuses_degenerate(void **state)
 {
     (void)state;
@@ -234,7 +237,7 @@ static void test_pseudonormal_refuses_degenerate(void **state)
         sdm_exact_create(&m, &(sdm_exact_opts){.sign = SDM_SIGN_PSEUDONORMAL}, &e, &err),
         SDM_E_ARG);
     assert_non_null(strstr(err.text, " 1 triangles without area"));
-    // what is used in its place
+    // the automatic choice takes crossings instead
     e = engine(&m, NULL);
     assert_true(sdm_exact_get_report(e)->audit.manifold &&
                 sdm_exact_get_report(e)->sign == SDM_SIGN_CROSSINGS);
@@ -242,10 +245,10 @@ static void test_pseudonormal_refuses_degenerate(void **state)
     sdm_mesh_dispose(&m);
 }
 
-static void test_moebius_strip(void **state)
+static void test_moebius_strip_has_right_distances(void **state)
 {
     (void)state;
-    // one-sided: there is no inside, the distance is still right
+    // A Moebius strip has one side and thus no inside; the unsigned distance must still be right.
     const size_t n = 40;
     sdm_mesh m = {0};
     mesh_make(&m, 2 * n, 2 * n);
@@ -275,10 +278,10 @@ static void test_moebius_strip(void **state)
     sdm_mesh_dispose(&m);
 }
 
-static void test_sheets_that_cancel(void **state)
+static void test_opposite_sheets_enclose_nothing(void **state)
 {
     (void)state;
-    // a triangle and its back enclose nothing: positive everywhere
+    // a triangle and its reverse enclose nothing: the distance is positive everywhere
     sdm_mesh m = {0};
     mesh_make(&m, 3, 2);
     mesh_vertex(&m, 0, 0, 0, 0);
@@ -297,8 +300,8 @@ static void test_sheets_that_cancel(void **state)
     sdm_mesh_dispose(&m);
 }
 
-/* Methods agree on a sharp manifold mesh: a star with needles and blades. */
-static void test_methods_agree(void **state)
+/* All three sign methods agree on a manifold mesh with sharp spikes and dents. */
+static void test_sign_methods_agree(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -323,17 +326,17 @@ static void test_methods_agree(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sides_are_exact),
-        cmocka_unit_test(test_nested_solid),
-        cmocka_unit_test(test_layers),
-        cmocka_unit_test(test_nested_cavity),
-        cmocka_unit_test(test_inside_out),
-        cmocka_unit_test(test_open_cup),
+        cmocka_unit_test(test_orientation_predicate_is_exact),
+        cmocka_unit_test(test_nested_ball_is_united),
+        cmocka_unit_test(test_many_equal_triangles_are_refused),
+        cmocka_unit_test(test_ball_within_cavity),
+        cmocka_unit_test(test_inside_out_mesh_gives_same_map),
+        cmocka_unit_test(test_open_cup_uses_winding_number),
         cmocka_unit_test(test_pseudonormal_refuses_overlap),
         cmocka_unit_test(test_pseudonormal_refuses_degenerate),
-        cmocka_unit_test(test_moebius_strip),
-        cmocka_unit_test(test_sheets_that_cancel),
-        cmocka_unit_test(test_methods_agree),
+        cmocka_unit_test(test_moebius_strip_has_right_distances),
+        cmocka_unit_test(test_opposite_sheets_enclose_nothing),
+        cmocka_unit_test(test_sign_methods_agree),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,6 @@
-/* Meshes that overlap themselves: the exact engine against closed forms of unions, the swept
- * sphere, and dense classified points.
+/* Meshes that overlap themselves: distances of the exact engine compared with closed forms of
+ * unions, a swept sphere, and dense samples of the boundary; source triangles of the union and
+ * memory limits.
  * Tests: contact.c cutting.c grid_scratch.c parts.c surface_side.c union_hull.c vertex_table.c */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -30,13 +31,15 @@ static double distance(const double a[3], const double b[3])
                 (a[2] - b[2]) * (a[2] - b[2]));
 }
 
-/* Signed distance to the union of two spheres with middles on the x axis at 0 and c. */
-static double two_spheres(const double x[3], double r0, double c, double r1)
+/* Signed distance to the union of two spheres of radii r0 and r1, centred at 0 and c on the x
+ * axis. */
+static double two_spheres_distance(const double x[3], double r0, double c, double r1)
 {
     const double middle[2][3] = {{0, 0, 0}, {c, 0, 0}}, radius[2] = {r0, r1};
     const double d[2] = {distance(x, middle[0]) - r0, distance(x, middle[1]) - r1};
     if (d[0] > 0 && d[1] > 0) return fmin(d[0], d[1]);
-    // inside: the nearest point is on a cap, or on the circle where the spheres meet
+    // inside: the nearest boundary point is on an outer cap, or on the circle where the spheres
+    // intersect
     const double cx = (c * c + r0 * r0 - r1 * r1) / (2 * c), cr = sqrt(r0 * r0 - cx * cx);
     double best = hypot(x[0] - cx, hypot(x[1], x[2]) - cr);
     for (int i = 0; i < 2; i++) {
@@ -50,7 +53,7 @@ static double two_spheres(const double x[3], double r0, double c, double r1)
     return -best;
 }
 
-static void test_two_spheres(void **state)
+static void test_two_spheres_match_closed_form(void **state)
 {
     (void)state;
     const size_t n = 48;
@@ -65,8 +68,8 @@ static void test_two_spheres(void **state)
         const sdm_exact_report *r = sdm_exact_get_report(e);
         assert_true(r->unioned && r->union_error_mm > 0 && r->union_error_mm < 1e-12 &&
                     r->audit.self_intersections > 20);
-        // facets lie inside the spheres by up to the sagitta; where they cross the circle moves by
-        // that over the sine of the angle
+        // The facets deviate from the spheres by at most the sagitta; the circle of intersection
+        // moves by the sagitta divided by the sine of the angle between the spheres.
         const double sagitta = 2.2 * 1.1 * (1 - cos(pi / 2 / (double)n));
         const double cosine = (1 + r1 * r1 - c * c) / (2 * r1), sine = sqrt(1 - cosine * cosine);
         for (uint64_t i = 0; i < 4000; i++) {
@@ -74,11 +77,12 @@ static void test_two_spheres(void **state)
             uint32_t t;
             for (uint64_t a = 0; a < 3; a++)
                 x[a] = uniform((uint64_t)round, 3 * i + a, -1.5, 1.5) + (a == 0 ? c / 2 : 0);
-            const double d = sdm_exact_point(e, x, q, NULL, &t), truth = two_spheres(x, 1, c, r1);
+            const double d = sdm_exact_point(e, x, q, NULL, &t),
+                         truth = two_spheres_distance(x, 1, c, r1);
             assert_true(fabs(d - truth) <= 2 * sagitta / sine);
             assert_true(t < sdm_exact_surface(e)->n_tri);
-            // nothing inside the union is surface
-            assert_true(two_spheres(q, 1, c, r1) > -2 * sagitta / sine);
+            // the nearest point q is not inside the union
+            assert_true(two_spheres_distance(q, 1, c, r1) > -2 * sagitta / sine);
         }
         sdm_exact_free(e);
         sdm_mesh_dispose(&m);
@@ -86,13 +90,14 @@ static void test_two_spheres(void **state)
     }
 }
 
-/* Union of boxes by brute force: the distance to those points of the faces that no box holds
- * inside. Coplanar faces count. */
+/* An axis-parallel box from corner lo to corner hi. union_of_boxes_distance() gives the distance to
+ * the union by brute force: to all parts of the faces that are not inside the union. Faces shared
+ * by two boxes count as inside. */
 typedef struct box {
     double lo[3], hi[3];
 } box;
 
-static double union_of_boxes(const double x[3], const box *b, int n)
+static double union_of_boxes_distance(const double x[3], const box *b, int n)
 {
     bool in = false;
     double best = INFINITY;
@@ -101,8 +106,8 @@ static double union_of_boxes(const double x[3], const box *b, int n)
         for (int a = 0; a < 3; a++) all = all && x[a] > b[i].lo[a] && x[a] < b[i].hi[a];
         in = in || all;
     }
-    // all coordinates of all boxes cut each face into cells that lie inside another box or not:
-    // take each cell as a rectangle
+    // the coordinates of all boxes divide each face into rectangles, each of which lies entirely
+    // inside the union or on its boundary
     for (int i = 0; i < n; i++) {
         for (int f = 0; f < 6; f++) {
             const int a = f / 2, u = (a + 1) % 3, v = (a + 2) % 3;
@@ -128,7 +133,7 @@ static double union_of_boxes(const double x[3], const box *b, int n)
                     if (!(cut[0][p + 1] > cut[0][p]) || !(cut[1][q + 1] > cut[1][q])) continue;
                     const double mu = 0.5 * (cut[0][p] + cut[0][p + 1]),
                                  mv = 0.5 * (cut[1][q] + cut[1][q + 1]);
-                    // surface unless both sides are in some box
+                    // on the boundary unless both sides are in some box
                     bool side[2] = {false, false};
                     for (int j = 0; j < n; j++) {
                         if (!(mu > b[j].lo[u] && mu < b[j].hi[u] && mv > b[j].lo[v] &&
@@ -160,7 +165,8 @@ static void check_boxes(const box *b, int n, uint64_t stream, int unioned)
     for (uint64_t i = 0; i < 600; i++) {
         double x[3];
         for (uint64_t a = 0; a < 3; a++) x[a] = uniform(stream, 3 * i + a, -0.7, 3.2);
-        const double d = sdm_exact_point(e, x, NULL, NULL, NULL), truth = union_of_boxes(x, b, n);
+        const double d = sdm_exact_point(e, x, NULL, NULL, NULL),
+                     truth = union_of_boxes_distance(x, b, n);
         if (!(fabs(d - truth) < 1e-12))
             fail_msg("stream %u: %.17g at %g %g %g, need %.17g", (unsigned)stream, d, x[0], x[1],
                      x[2], truth);
@@ -173,8 +179,9 @@ static void check_boxes(const box *b, int n, uint64_t stream, int unioned)
 static void test_boxes_with_coplanar_faces(void **state)
 {
     (void)state;
-    // overlap with shared face planes, touching faces (whole and in part), one in another, the same
-    // box twice, along an edge
+    // in this order: overlap with coplanar faces, a shared face, faces that touch in part, a box
+    // within a box, the same with two coplanar faces, two equal boxes, a shared edge, two boxes
+    // apart
     check_boxes((const box[]){{{0, 0, 0}, {1, 1, 1}}, {{0.5, 0, 0}, {1.5, 1, 1}}}, 2, 1, true);
     check_boxes((const box[]){{{0, 0, 0}, {1, 1, 1}}, {{1, 0, 0}, {2, 1, 1}}}, 2, 2, true);
     check_boxes((const box[]){{{0, 0, 0}, {1, 1, 1}}, {{1, 0.25, 0.3}, {2, 0.75, 0.6}}}, 2, 3,
@@ -193,7 +200,7 @@ static void test_random_boxes(void **state)
         box b[4];
         for (uint64_t i = 0; i < 4; i++) {
             for (uint64_t a = 0; a < 3; a++) {
-                // coordinates of a coarse lattice: faces coincide often
+                // coordinates on a coarse lattice (odd rounds): faces often coincide
                 const double lattice = round % 2 ? 0.5 : 1e-3;
                 b[i].lo[a] = floor(uniform(900 + round, 8 * i + a, 0, 1.99) / lattice) * lattice;
                 b[i].hi[a] =
@@ -219,9 +226,9 @@ static void test_spiral_against_swept_sphere(void **state)
         const sdm_exact_report *r = sdm_exact_get_report(e);
         assert_true(r->audit.closed && r->audit.manifold && r->unioned &&
                     r->union_error_mm < 1e-11);
-        // facets: chords around the tube, and along it where the outer side of the narrowest turn
-        // is coarsest; the radius shrinks by 0.02 a radian, so the normal section is not quite the
-        // swept sphere
+        // Largest deviation: chords around the tube, chords along it on the outer side of the
+        // narrowest turn, and 0.001 because the normal section of a tube whose radius shrinks by
+        // 0.02 per radian is not exactly the section of the swept sphere.
         const double bend = edge / (s.a * exp(-s.b * s.end)), around = edge;
         const double bound = 1.1 * (1 - cos(around / 2)) + 2.2 * bend * bend / 8 * 1.5 + 0.001;
         for (uint64_t i = 0; i < 300; i++) {
@@ -232,8 +239,7 @@ static void test_spiral_against_swept_sphere(void **state)
                          swept = spiral_distance(&s, x);
             if (swept > 0) assert_true(fabs(d - swept) < bound);
             if (swept < -bound) assert_true(d < 0);
-            // inside an overlap the swept sphere is a bound only: the true depth is at least as
-            // large
+            // where turns overlap, the swept sphere gives only a lower bound on the depth
             if (swept < -bound) assert_true(d < swept + bound);
         }
         sdm_exact_free(e);
@@ -241,9 +247,10 @@ static void test_spiral_against_swept_sphere(void **state)
     }
 }
 
-/* Points spread over every triangle, kept where the place just outside is outside and the place
-   just inside is inside: what is left of the surface in the union. */
-static size_t outer_points(const sdm_mesh *m, size_t n, double **points)
+/* Samples points on every triangle and keeps those on the boundary of the union: the point just
+ * outside has a positive distance, the point just inside a negative one. points: [returned
+ * number][3], caller frees. */
+static size_t boundary_samples(const sdm_mesh *m, size_t n, double **points)
 {
     *points = malloc(3 * sizeof(double) * m->n_tri * n * n);
     if (!*points) abort();
@@ -276,7 +283,7 @@ static size_t outer_points(const sdm_mesh *m, size_t n, double **points)
     return count;
 }
 
-static void test_dense_points(void **state)
+static void test_spiral_against_boundary_samples(void **state)
 {
     (void)state;
     const spiral s = {2.0, 0.2, 0.6, 0.3, 9, 0.25};
@@ -285,7 +292,7 @@ static void test_dense_points(void **state)
     sdm_exact *e = engine(&m, NULL), *plain = engine(&m, &(sdm_exact_opts){.keep_overlap = true});
     assert_false(sdm_exact_get_report(plain)->unioned);
     double *points, longest = 0;
-    const size_t n = 8, count = outer_points(&m, n, &points);
+    const size_t n = 8, count = boundary_samples(&m, n, &points);
     for (size_t i = 0; i < 3 * m.n_tri; i++)
         longest = fmax(
             longest, distance(&m.vert[3 * m.tri[i]], &m.vert[3 * m.tri[i / 3 * 3 + (i + 1) % 3]]));
@@ -298,7 +305,7 @@ static void test_dense_points(void **state)
                      o = sdm_exact_point(plain, x, NULL, NULL, NULL);
         assert_true(fabs(d) <= best + 1e-8 && fabs(d) >= best - 1.2 * longest / (double)n);
         assert_true((d < 0) == (sdm_naive_point(&m, x) < 0) && (d < 0) == (o < 0));
-        // outside, inner surface makes no difference
+        // outside of the solid, buried surface does not affect the distance
         if (d > 0) assert_true(fabs(d - o) < 1e-12);
         deeper += d < o - 1e-6;
     }
@@ -309,8 +316,8 @@ static void test_dense_points(void **state)
     sdm_mesh_dispose(&m);
 }
 
-/* Random closed meshes that cross themselves everywhere: a sphere whose vertices are shaken. */
-static void test_shaken_spheres(void **state)
+/* Random closed meshes with many self-intersections: spheres with randomly displaced vertices. */
+static void test_displaced_spheres_against_boundary_samples(void **state)
 {
     (void)state;
     for (uint64_t round = 0; round < 12; round++) {
@@ -321,7 +328,7 @@ static void test_shaken_spheres(void **state)
         const sdm_exact_report *r = sdm_exact_get_report(e);
         assert_true(r->sign == SDM_SIGN_CROSSINGS);
         double *points;
-        const size_t count = outer_points(&m, 24, &points);
+        const size_t count = boundary_samples(&m, 24, &points);
         for (uint64_t i = 0; i < 150; i++) {
             double x[3], best = INFINITY;
             for (uint64_t a = 0; a < 3; a++) x[a] = uniform(100 + round, 3 * i + a, -1.5, 1.5);
@@ -336,7 +343,7 @@ static void test_shaken_spheres(void **state)
     }
 }
 
-/* Twice the vector of the triangle's area; returns its length. */
+/* n = twice the area vector of the triangle a b c; returns its length. */
 static double area_vector(const double a[3], const double b[3], const double c[3], double n[3])
 {
     for (int i = 0; i < 3; i++) {
@@ -346,8 +353,8 @@ static double area_vector(const double a[3], const double b[3], const double c[3
     return sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
 }
 
-/* Every triangle of the surface lies in the plane and inside of the triangle it comes from and has
-   its orientation; a surface without overlap is the mesh itself. */
+/* Every triangle of the engine's surface must lie within its source triangle of the mesh and keep
+ * its orientation; without a union both surfaces are the same. */
 static void check_source(const sdm_mesh *m, const sdm_exact_opts *o)
 {
     sdm_exact *e = engine(m, o);
@@ -367,7 +374,8 @@ static void check_source(const sdm_mesh *m, const sdm_exact_opts *o)
         assert_true(size > 0 && size <= area * (1 + 1e-9));
         assert_true(turned * (n[0] * normal[0] + n[1] * normal[1] + n[2] * normal[2]) > 0);
         for (size_t k = 0; k < 3; k++) {
-            // the corner's shares of the source, by areas, make it up and are not negative
+            // barycentric coordinates of the vertex in its source triangle: not negative, and they
+            // reproduce the vertex
             double sum[3] = {0, 0, 0};
             for (size_t i = 0; i < 3; i++) {
                 const double a = area_vector(part[k], v[(i + 1) % 3], v[(i + 2) % 3], n);
@@ -383,7 +391,7 @@ static void check_source(const sdm_mesh *m, const sdm_exact_opts *o)
     sdm_exact_free(e);
 }
 
-static void test_source(void **state)
+static void test_source_triangles(void **state)
 {
     (void)state;
     const spiral s = {2.0, 0.2, 0.6, 0.3, 9, 0.25};
@@ -402,9 +410,9 @@ static void test_source(void **state)
     sdm_mesh_dispose(&b);
 }
 
-/* Triangles around one vertex that pass through each other: a pyramid of a pentagram, whose
- * neighbouring faces are in order. */
-static void test_fan_that_goes_round_twice(void **state)
+/* A bipyramid over a pentagram: the triangles around an apex wind around it twice and intersect,
+ * although neighbours along the fan are consistently oriented. */
+static void test_fan_that_winds_twice(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -420,13 +428,13 @@ static void test_fan_that_goes_round_twice(void **state)
     sdm_exact *e = engine(&m, NULL);
     assert_true(sdm_exact_get_report(e)->unioned &&
                 sdm_exact_get_report(e)->sign == SDM_SIGN_CROSSINGS);
-    // in the plane z = 0 what is left is the outline of the star; from the middle its notches are
-    // nearest
+    // the union's section at z = 0 is the outline of the star; its notches are nearest to the
+    // centre
     double q[3];
     const double notch = cos(2 * pi / 5) / cos(pi / 5);
     const double d = sdm_exact_point(e, (const double[3]){0, 0, 0}, q, NULL, NULL);
-    // the valley from the notch (radius `notch`) up to the tip: distance of the middle from that
-    // line
+    // expected: distance of the centre from the concave edge between a notch (radius `notch`) and
+    // an apex
     assert_true(fabs(d + notch / sqrt(1 + notch * notch)) < 1e-12);
     for (size_t i = 0; i < 3 * sdm_exact_surface(e)->n_vert; i += 3) {
         const double *v = &sdm_exact_surface(e)->vert[i];
@@ -436,9 +444,9 @@ static void test_fan_that_goes_round_twice(void **state)
     sdm_mesh_dispose(&m);
 }
 
-/* Whatever the limit, the engine is made or says what it needs; the limit that suffices is near
- * what it takes. */
-static void test_memory_limit(void **state)
+/* For every memory_limit the engine is either created or fails with a message that names the limit;
+ * the smallest sufficient limit is of the size of the memory in use. */
+static void test_smallest_memory_limit(void **state)
 {
     (void)state;
     sdm_mesh m = {0}, b = {0};
@@ -464,7 +472,7 @@ static void test_memory_limit(void **state)
         refused++;
     }
     assert_true(refused > 20);
-    // many triangles meet here: more than meshes without overlap take, but not without measure
+    // bytes per triangle: more than for meshes without overlap, but bounded
     assert_true(limit > 500 * m.n_tri && limit < 8000 * m.n_tri);
     mesh_sphere(&b, (const double[3]){0, 0, 0}, 1, 100);
     sdm_exact *e = NULL;
@@ -475,7 +483,8 @@ static void test_memory_limit(void **state)
     sdm_mesh_dispose(&b);
 }
 
-/* The limit is for all together: what fits into it alone does not fit beside the engine. */
+/* memory_limit covers the engine and the certificate together: a certificate that would fit alone
+ * is refused if the engine already takes most of the limit. */
 static void test_memory_limit_is_shared(void **state)
 {
     (void)state;
@@ -486,7 +495,8 @@ static void test_memory_limit_is_shared(void **state)
     while (sdm_exact_create(&m, &(sdm_exact_opts){.memory_limit = limit}, &e, NULL))
         limit += limit / 16;
     sdm_exact_free(e);
-    // the certificate takes two bits a voxel, in 16 along x; nothing of the mesh is met here
+    // the certificate takes two bits per voxel, in groups of 16 voxels along x; the mesh is far
+    // from the grid, so there are no crossings to store
     int64_t n = 16;
     while ((size_t)(n + 1) * (size_t)(n + 1) * ((size_t)n / 16 + 1) * 4 < limit) n++;
     const sdm_grid g =
@@ -508,8 +518,9 @@ static void test_memory_limit_is_shared(void **state)
     sdm_mesh_dispose(&m);
 }
 
-/* Where triangles cross, each of them gives the same place: one vertex of the surface. */
-static void test_seam_vertices(void **state)
+/* Both triangles that intersect compute the vertices on their line of intersection: these must be
+ * merged to one vertex each. */
+static void test_intersection_vertices_are_merged(void **state)
 {
     (void)state;
     sdm_mesh m = {0}, b = {0};
@@ -535,9 +546,9 @@ static void test_seam_vertices(void **state)
     sdm_mesh_dispose(&b);
 }
 
-/* With a limit the engine's arrays are allocated one by one, without one they share a block: the
-   same bits either way, and every allocation may fail. */
-static void test_with_and_without_block(void **state)
+/* With a memory_limit the engine's arrays are allocated one by one, without one they share a single
+ * block: both give the same bits, and every allocation may fail. */
+static void test_separate_and_shared_allocation_agree(void **state)
 {
     (void)state;
     sdm_mesh m = {0}, b = {0};
@@ -574,12 +585,18 @@ static void test_with_and_without_block(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_two_spheres),   cmocka_unit_test(test_boxes_with_coplanar_faces),
-        cmocka_unit_test(test_random_boxes),  cmocka_unit_test(test_spiral_against_swept_sphere),
-        cmocka_unit_test(test_dense_points),  cmocka_unit_test(test_shaken_spheres),
-        cmocka_unit_test(test_source),        cmocka_unit_test(test_fan_that_goes_round_twice),
-        cmocka_unit_test(test_memory_limit),  cmocka_unit_test(test_with_and_without_block),
-        cmocka_unit_test(test_seam_vertices), cmocka_unit_test(test_memory_limit_is_shared),
+        cmocka_unit_test(test_two_spheres_match_closed_form),
+        cmocka_unit_test(test_boxes_with_coplanar_faces),
+        cmocka_unit_test(test_random_boxes),
+        cmocka_unit_test(test_spiral_against_swept_sphere),
+        cmocka_unit_test(test_spiral_against_boundary_samples),
+        cmocka_unit_test(test_displaced_spheres_against_boundary_samples),
+        cmocka_unit_test(test_source_triangles),
+        cmocka_unit_test(test_fan_that_winds_twice),
+        cmocka_unit_test(test_smallest_memory_limit),
+        cmocka_unit_test(test_separate_and_shared_allocation_agree),
+        cmocka_unit_test(test_intersection_vertices_are_merged),
+        cmocka_unit_test(test_memory_limit_is_shared),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

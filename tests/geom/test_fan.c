@@ -1,5 +1,5 @@
-/* Triangles around a vertex: those that are not visited meet in nothing but what they share, by
- * exact arithmetic.
+/* Fans, the triangles around a vertex: sdm_fans_visit() may skip pairs of triangles only if they
+ * share nothing but a common vertex or edge, which is checked in exact integer arithmetic.
  * Tests: fan.c */
 #include <math.h>
 #include <setjmp.h>
@@ -16,9 +16,9 @@
 #include "solid/fan.h"
 
 #define PI 3.14159265358979323846
-#define REACH 1e6 // whole coordinates up to this have determinants of 64 bits
+#define REACH 1e6 // determinants of integer coordinates up to REACH fit into 64 bits
 
-static sdm_status count(void *user, uint32_t i, uint32_t j, int shared)
+static sdm_status visit_count(void *user, uint32_t i, uint32_t j, int shared)
 {
     (void)i, (void)j;
     assert_in_range(shared, 1, 3);
@@ -38,50 +38,53 @@ static size_t visits_of(const sdm_mesh *m)
     sdm_facets_build(m, (const double[3]){0, 0, 0}, facets, &area, &volume);
     assert_int_equal(sdm_topology_build(m, &arena, &topo, NULL), SDM_OK);
     const double tolerance = 16 * 0x1p-52 * largest;
-    assert_int_equal(sdm_fans_visit(m, &topo, facets, tolerance, &arena, count, &n, NULL), SDM_OK);
+    assert_int_equal(sdm_fans_visit(m, &topo, facets, tolerance, &arena, visit_count, &n, NULL),
+                     SDM_OK);
     sdm_arena_dispose(&arena);
     free(facets);
     return n;
 }
 
-static int det(const int64_t a[3], const int64_t b[3], const int64_t c[3])
+static int det_sign(const int64_t a[3], const int64_t b[3], const int64_t c[3])
 {
     const int64_t d = a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
                       a[2] * (b[0] * c[1] - b[1] * c[0]);
     return (d > 0) - (d < 0);
 }
 
-/* Of a x b, for vectors in one plane: the sign along the axis, on which the plane's normal is not
- * 0. */
-static int turn(const int64_t a[3], const int64_t b[3], int axis)
+/* Sign of the component of a x b along `axis`. a and b lie in a plane whose normal is not 0 along
+ * it. */
+static int cross_sign(const int64_t a[3], const int64_t b[3], int axis)
 {
     const int x = (axis + 1) % 3, y = (axis + 2) % 3;
     const int64_t d = a[x] * b[y] - a[y] * b[x];
     return (d > 0) - (d < 0);
 }
 
-static bool holds(const int64_t a[3], const int64_t b[3], const int64_t x[3], int axis)
+static bool sector_contains(const int64_t a[3], const int64_t b[3], const int64_t x[3], int axis)
 {
-    const int way = turn(a, b, axis);
-    return turn(a, x, axis) * way >= 0 && turn(x, b, axis) * way >= 0;
+    const int way = cross_sign(a, b, axis);
+    return cross_sign(a, x, axis) * way >= 0 && cross_sign(x, b, axis) * way >= 0;
 }
 
-/* Do the sectors a b and c d, each of less than half a turn, have a ray in common? It is s a + t b
- * = u c + v d. */
-static bool meet(const int64_t a[3], const int64_t b[3], const int64_t c[3], const int64_t d[3])
+/* Do two sectors (cones spanned by a, b and by c, d, each of less than 180 degrees) have a common
+ * ray? Solves s a + t b = u c + v d with s, t, u, v >= 0. */
+static bool sectors_meet(const int64_t a[3], const int64_t b[3], const int64_t c[3],
+                         const int64_t d[3])
 {
-    const int s = det(b, c, d), t = -det(a, c, d), u = -det(a, b, d), v = det(a, b, c);
+    const int s = det_sign(b, c, d), t = -det_sign(a, c, d), u = -det_sign(a, b, d),
+              v = det_sign(a, b, c);
     if (s || t || u || v)
         return (s >= 0 && t >= 0 && u >= 0 && v >= 0) || (s <= 0 && t <= 0 && u <= 0 && v <= 0);
     for (int axis = 0; axis < 3; axis++)
-        if (turn(a, b, axis) && turn(c, d, axis))
-            return holds(a, b, c, axis) || holds(a, b, d, axis) || holds(c, d, a, axis) ||
-                   holds(c, d, b, axis);
-    return true; // a sector without area
+        if (cross_sign(a, b, axis) && cross_sign(c, d, axis))
+            return sector_contains(a, b, c, axis) || sector_contains(a, b, d, axis) ||
+                   sector_contains(c, d, a, axis) || sector_contains(c, d, b, axis);
+    return true; // a degenerate sector
 }
 
-/* A ring of n whole points that goes round `rounds` times at random steps, on a cone, a saddle or
-   neither, some with steps back, turned any way. */
+/* A ring of n points with integer coordinates that winds around the origin `rounds` times in random
+ * steps, on a cone, a saddle or a rough surface; some rings step back. Even seeds are rotated. */
 static void make_ring(uint64_t seed, size_t n, int rounds, int64_t (*ring)[3])
 {
     const double rise = sdm_rng_normal(seed, 0, 0),
@@ -105,7 +108,7 @@ static void make_ring(uint64_t seed, size_t n, int rounds, int64_t (*ring)[3])
     }
 }
 
-static void fan_of(sdm_mesh *m, const int64_t (*ring)[3], size_t n, const double middle[3])
+static void mesh_fan(sdm_mesh *m, const int64_t (*ring)[3], size_t n, const double middle[3])
 {
     mesh_make(m, n + 1, n);
     mesh_vertex(m, n, middle[0], middle[1], middle[2]);
@@ -116,14 +119,14 @@ static void fan_of(sdm_mesh *m, const int64_t (*ring)[3], size_t n, const double
     }
 }
 
-static void test_random_fans(void **state)
+static void test_meeting_triangles_are_visited(void **state)
 {
     (void)state;
-    enum { MOST = 40 };
+    enum { RING_MAX = 40 };
     size_t discs = 0, folded = 0;
     for (uint64_t seed = 0; seed < 4000; seed++) {
-        int64_t ring[MOST][3];
-        const size_t n = 3 + sdm_rng_below(seed, 9, 0, MOST - 3);
+        int64_t ring[RING_MAX][3];
+        const size_t n = 3 + sdm_rng_below(seed, 9, 0, RING_MAX - 3);
         const double far = seed % 6 ? 0 : 1e6, middle[3] = {far, -far, far};
         sdm_mesh m = {0};
         make_ring(seed, n, seed % 11 ? 1 : 2, ring);
@@ -131,16 +134,17 @@ static void test_random_fans(void **state)
         for (size_t i = 0; i < n; i++)
             for (size_t j = 0; j < i; j++) same = same || !memcmp(ring[i], ring[j], sizeof ring[i]);
         if (same) continue;
-        fan_of(&m, (const int64_t(*)[3])ring, n, middle);
+        mesh_fan(&m, (const int64_t(*)[3])ring, n, middle);
         const size_t visits = visits_of(&m);
         bool meets = false;
         for (size_t i = 0; i < n; i++) {
             for (size_t j = i + 2; j < n && j - i < n - 1; j++)
-                meets = meets || meet(ring[i], ring[i + 1], ring[j], ring[(j + 1) % n]);
-            // neighbours meet where they lie on the same side of their edge
+                meets = meets || sectors_meet(ring[i], ring[i + 1], ring[j], ring[(j + 1) % n]);
+            // neighbouring triangles overlap if they are coplanar and on the same side of their
+            // common edge
             const int64_t *a = ring[(i + n - 1) % n], *b = ring[i], *c = ring[(i + 1) % n];
-            for (int axis = 0; axis < 3 && !det(a, b, c); axis++)
-                meets = meets || turn(a, b, axis) * turn(b, c, axis) < 0;
+            for (int axis = 0; axis < 3 && !det_sign(a, b, c); axis++)
+                meets = meets || cross_sign(a, b, axis) * cross_sign(b, c, axis) < 0;
         }
         if (visits == 0 && meets)
             fail_msg("seed %d: triangles that meet were not visited", (int)seed);
@@ -153,8 +157,9 @@ static void test_random_fans(void **state)
     assert_true(discs > 1500 && folded > 500);
 }
 
-/* Round faces of many needles: no pair of them is visited. */
-static void test_round_faces(void **state)
+/* Discs and saddles of up to 100000 needles around one vertex: no pair is visited, so the cost
+ * stays linear. */
+static void test_round_faces_need_no_visits(void **state)
 {
     (void)state;
     for (size_t n = 100; n <= 100000; n *= 10) {
@@ -175,7 +180,7 @@ static void test_round_faces(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_random_fans),
-                                       cmocka_unit_test(test_round_faces)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_meeting_triangles_are_visited),
+                                       cmocka_unit_test(test_round_faces_need_no_visits)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

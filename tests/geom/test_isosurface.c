@@ -1,4 +1,5 @@
-/* Iso-surfaces: closed, oriented, on the level, and around exactly the voxels that are inside.
+/* Iso-surfaces of sampled functions: closed, consistently oriented, at the level, and enclosing
+ * exactly the voxels with values below the level.
  * Tests: isosurface.c */
 #include <math.h>
 #include <setjmp.h>
@@ -16,7 +17,7 @@
 #define PI 3.14159265358979323846
 
 /* An oblique rotation, row-major; `mirror` makes it a reflection. */
-static void oblique(double dir[9], bool mirror)
+static void oblique_rotation(double dir[9], bool mirror)
 {
     const double a = 0.4, b = -0.7, ca = cos(a), sa = sin(a), cb = cos(b), sb = sin(b);
     const double r[9] = {ca, -sa * cb, sa * sb, sa, ca * cb, -ca * sb, 0, sb, cb};
@@ -44,7 +45,8 @@ static uint32_t *sorted_edges(const sdm_mesh *m)
     return e;
 }
 
-/* Edges without a partner of opposite direction; fails when a directed edge is there twice. */
+/* Number of directed edges a -> b without the opposite edge b -> a; fails if a directed edge occurs
+ * twice or `allowed` (may be NULL) rejects one of the open edges. */
 static size_t open_edges(const sdm_mesh *m,
                          bool (*allowed)(const sdm_mesh *, const uint32_t *, const void *),
                          const void *user)
@@ -132,12 +134,12 @@ static double ring(const double x[3])
     return sqrt(r * r + x[2] * x[2]) - 1.2;
 }
 
-/* A grid around the origin of three sizes and spacings in an oblique frame, filled from a closed
- * form. */
-static float *sample(sdm_grid *g, bool mirror, solid f)
+/* Samples f on an oblique grid around the origin with different sizes and spacings along the axes
+ * (caller frees). */
+static float *sample_on_oblique_grid(sdm_grid *g, bool mirror, solid f)
 {
     *g = (sdm_grid){.n = {52, 45, 60}, .spacing = {0.2, 0.25, 0.17}};
-    oblique(g->dir, mirror);
+    oblique_rotation(g->dir, mirror);
     const double middle[3] = {25.7, 22.1, 29.4}, zero[3] = {0};
     double at[3];
     sdm_grid_world(g, middle, at);
@@ -154,11 +156,11 @@ static float *sample(sdm_grid *g, bool mirror, solid f)
     return v;
 }
 
-static void check_solid(solid f, bool mirror, float level, double true_volume, double true_area,
-                        long true_euler)
+static void check_surface(solid f, bool mirror, float level, double true_volume, double true_area,
+                          long true_euler)
 {
     sdm_grid g;
-    float *v = sample(&g, mirror, f);
+    float *v = sample_on_oblique_grid(&g, mirror, f);
     sdm_mesh m = {0};
     sdm_error err;
     bool cut = true;
@@ -168,31 +170,31 @@ static void check_solid(solid f, bool mirror, float level, double true_volume, d
     assert_int_equal(euler(&m), true_euler);
     assert_true(fabs(volume(&m) / true_volume - 1) < 0.01);
     assert_true(fabs(area(&m) / true_area - 1) < 0.01);
-    /* linear interpolation along an edge of h = 0.25 is off by h^2 / 8 times the curvature at most
-     */
+    /* error of linear interpolation along an edge of length h = 0.25: at most h^2 / 8 *
+     * curvature */
     for (size_t i = 0; i < m.n_vert; i++)
         assert_true(fabs(f(m.vert + 3 * i) - (double)level) < 0.25 * 0.25 / 8 / 1.0 + 1e-4);
     sdm_mesh_dispose(&m);
     free(v);
 }
 
-static void test_ball(void **state)
+static void test_surface_of_ball(void **state)
 {
     (void)state;
-    check_solid(ball, false, 0, 4 * PI / 3 * 27, 4 * PI * 9, 2);
-    check_solid(ball, true, 0, 4 * PI / 3 * 27, 4 * PI * 9, 2);
-    check_solid(ball, false, 0.75f, 4 * PI / 3 * 3.75 * 3.75 * 3.75, 4 * PI * 3.75 * 3.75, 2);
+    check_surface(ball, false, 0, 4 * PI / 3 * 27, 4 * PI * 9, 2);
+    check_surface(ball, true, 0, 4 * PI / 3 * 27, 4 * PI * 9, 2);
+    check_surface(ball, false, 0.75f, 4 * PI / 3 * 3.75 * 3.75 * 3.75, 4 * PI * 3.75 * 3.75, 2);
 }
 
-static void test_torus(void **state)
+static void test_surface_of_torus(void **state)
 {
     (void)state;
-    check_solid(ring, false, 0, 2 * PI * PI * 3 * 1.44, 4 * PI * PI * 3 * 1.2, 0);
-    check_solid(ring, true, 0, 2 * PI * PI * 3 * 1.44, 4 * PI * PI * 3 * 1.2, 0);
+    check_surface(ring, false, 0, 2 * PI * PI * 3 * 1.44, 4 * PI * PI * 3 * 1.2, 0);
+    check_surface(ring, true, 0, 2 * PI * PI * 3 * 1.44, 4 * PI * PI * 3 * 1.2, 0);
 }
 
-/* Noise of `steps` values each side of zero, or continuous for 0; outside along the border when
- * `closed`. */
+/* Fills v with random noise: uniform in [-1, 1] for steps = 0, else integers from -steps to steps.
+ * `closed` makes all border voxels positive (outside). */
 static void fill_noise(float *v, const int64_t n[3], uint64_t seed, int steps, bool closed)
 {
     for (int64_t k = 0, i = 0; k < n[2]; k++)
@@ -206,9 +208,9 @@ static void fill_noise(float *v, const int64_t n[3], uint64_t seed, int steps, b
             }
 }
 
-/* Every case and every ambiguity comes up: the surface is closed and separates inside from outside
- * voxels. */
-static void test_noise_is_separated(void **state)
+/* Noise covers all cases of the cell table including the ambiguous ones. The surface must be
+ * closed, with winding number 1 around voxels below the level and 0 around all others. */
+static void test_noise_is_enclosed_exactly(void **state)
 {
     (void)state;
     sdm_grid g = {.n = {7, 6, 8}, .spacing = {0.5, 0.8, 1.1}, .origin = {1, -2, 3}};
@@ -217,7 +219,7 @@ static void test_noise_is_separated(void **state)
         sdm_mesh m = {0};
         sdm_error err;
         bool cut = true;
-        oblique(g.dir, seed % 2);
+        oblique_rotation(g.dir, seed % 2);
         fill_noise(v, g.n, seed, (int)(seed % 3), true);
         assert_int_equal(sdm_isosurface(&g, v, 0, &m, &cut, &err), SDM_OK);
         assert_false(cut);
@@ -233,7 +235,7 @@ static void test_noise_is_separated(void **state)
     }
 }
 
-/* Both ends of an edge lie on one face of the grid. */
+/* Do both ends of an edge lie on the same face of the grid's bounding box? */
 static bool on_border(const sdm_mesh *m, const uint32_t *edge, const void *user)
 {
     const sdm_grid *g = user;
@@ -266,8 +268,8 @@ static void test_noise_is_open_at_the_border_only(void **state)
     }
 }
 
-/* Values that are exactly the level give no empty triangle. */
-static void test_exact_level(void **state)
+/* Values equal to the level must not produce triangles of zero area. */
+static void test_values_equal_to_level_give_no_empty_triangles(void **state)
 {
     (void)state;
     const double middle[3] = {0};
@@ -284,15 +286,15 @@ static void test_exact_level(void **state)
         const sdm_mesh one = {.vert = m.vert, .tri = m.tri + 3 * i, .n_vert = m.n_vert, .n_tri = 1};
         assert_true(area(&one) > 1e-9);
     }
-    assert_true(fabs(volume(&m) - 4.0 / 3 * 27) < 0.01); /* an octahedron */
+    assert_true(fabs(volume(&m) - 4.0 / 3 * 27) < 0.01); /* volume of an octahedron of radius 3 */
     sdm_mesh_dispose(&m);
 }
 
-static void test_same_bits(void **state)
+static void test_result_is_reproducible(void **state)
 {
     (void)state;
     sdm_grid g;
-    float *v = sample(&g, false, ring);
+    float *v = sample_on_oblique_grid(&g, false, ring);
     sdm_mesh a = {0}, b = {0};
     sdm_error err;
     assert_int_equal(sdm_isosurface(&g, v, 0, &a, NULL, &err), SDM_OK);
@@ -305,7 +307,7 @@ static void test_same_bits(void **state)
     free(v);
 }
 
-static void test_nothing_to_draw(void **state)
+static void test_empty_surface(void **state)
 {
     (void)state;
     sdm_grid g = {.n = {2, 3, 4}, .spacing = {1, 1, 1}, .dir = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
@@ -317,7 +319,7 @@ static void test_nothing_to_draw(void **state)
     assert_int_equal(sdm_isosurface(&g, v, 0, &m, &cut, &err), SDM_OK);
     assert_int_equal(m.n_tri, 0);
     assert_false(cut);
-    /* one layer has no cell, but the surface does leave it */
+    /* a grid of one layer has no cells, but the inside touches its border: cut is true */
     g.n[2] = 1;
     v[0] = -1;
     assert_int_equal(sdm_isosurface(&g, v, 0, &m, &cut, &err), SDM_OK);
@@ -327,7 +329,7 @@ static void test_nothing_to_draw(void **state)
     sdm_mesh_dispose(&m);
 }
 
-static void test_misuse(void **state)
+static void test_invalid_arguments_and_failed_allocations(void **state)
 {
     (void)state;
     sdm_grid g = {.n = {2, 2, 2}, .spacing = {1, 1, 1}, .dir = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
@@ -364,14 +366,14 @@ static void test_misuse(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_ball),
-        cmocka_unit_test(test_torus),
-        cmocka_unit_test(test_noise_is_separated),
+        cmocka_unit_test(test_surface_of_ball),
+        cmocka_unit_test(test_surface_of_torus),
+        cmocka_unit_test(test_noise_is_enclosed_exactly),
         cmocka_unit_test(test_noise_is_open_at_the_border_only),
-        cmocka_unit_test(test_exact_level),
-        cmocka_unit_test(test_same_bits),
-        cmocka_unit_test(test_nothing_to_draw),
-        cmocka_unit_test(test_misuse),
+        cmocka_unit_test(test_values_equal_to_level_give_no_empty_triangles),
+        cmocka_unit_test(test_result_is_reproducible),
+        cmocka_unit_test(test_empty_surface),
+        cmocka_unit_test(test_invalid_arguments_and_failed_allocations),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -16,8 +16,8 @@ typedef struct group {
     double d[4][4];
 } group;
 
-/* Lanes are written and read as numbers, too, through the structure that holds them: the compiler
- * must not take the two for different memory. */
+/* The kernels access the same memory as SIMD vectors and as single numbers. These functions mix
+ * both: they fail if the compiler assumes that such accesses never overlap (strict aliasing). */
 static __attribute__((noinline)) float store_between(group *x, float *row, int k, int lane)
 {
     x->f[k][lane] = 1;
@@ -43,7 +43,7 @@ static __attribute__((noinline)) double store_doubles_between(group *x, double *
     return x->d[k][lane];
 }
 
-static void lanes_are_numbers(void **state)
+static void test_vectors_and_numbers_share_memory(void **state)
 {
     (void)state;
     group x = {0};
@@ -58,7 +58,7 @@ static void random_lanes(uint64_t stream, float out[8])
     for (uint64_t i = 0; i < 8; i++) out[i] = (float)sdm_rng_normal(7, stream, i);
 }
 
-static void each_lane(void **state)
+static void test_lane_operations(void **state)
 {
     (void)state;
     for (uint64_t turn = 0; turn < 200; turn++) {
@@ -89,7 +89,7 @@ static void each_lane(void **state)
     }
 }
 
-static void lists(void **state)
+static void test_permutation(void **state)
 {
     (void)state;
     _Alignas(16) const uint16_t order[8] = {7, 0, 3, 3, 1, 6, 2, 5};
@@ -99,7 +99,7 @@ static void lists(void **state)
     for (int i = 0; i < 8; i++) assert_true(out[i] == from[order[i]]);
 }
 
-static void doubles(void **state)
+static void test_four_doubles(void **state)
 {
     (void)state;
     _Alignas(32) double a[4][4], out[4][4];
@@ -118,8 +118,9 @@ static void doubles(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(lanes_are_numbers),
-                                       cmocka_unit_test(each_lane), cmocka_unit_test(lists),
-                                       cmocka_unit_test(doubles)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_vectors_and_numbers_share_memory),
+                                       cmocka_unit_test(test_lane_operations),
+                                       cmocka_unit_test(test_permutation),
+                                       cmocka_unit_test(test_four_doubles)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

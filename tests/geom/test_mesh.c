@@ -1,4 +1,4 @@
-/* Meshes: storage, and what the audit says of meshes whose answers are known.
+/* Meshes: storage, and the audit (sdm_mesh_audit) of meshes with known properties.
  * Tests: mesh.c survey.c */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -22,7 +22,7 @@ static sdm_audit audit_of(const sdm_mesh *m)
     return a;
 }
 
-static void test_storage(void **state)
+static void test_reserve_copy_and_dispose(void **state)
 {
     (void)state;
     sdm_mesh m = {0}, copy = {0};
@@ -51,7 +51,7 @@ static void test_storage(void **state)
     sdm_mesh_dispose(&copy);
 }
 
-static void test_box(void **state)
+static void test_audit_of_box(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -72,7 +72,7 @@ static void test_box(void **state)
     sdm_mesh_dispose(&m);
 }
 
-static void test_flaws(void **state)
+static void test_audit_counts_flaws(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -82,13 +82,14 @@ static void test_flaws(void **state)
     sdm_audit a = audit_of(&m);
     assert_true(!a.closed && !a.manifold);
     assert_int_equal(a.boundary_edges, 3);
-    // one triangle turned: each of its edges has two triangles of one direction
+    // one triangle with reversed orientation: along its three edges both triangles run in the same
+    // direction
     m.n_tri = 12;
     mesh_triangle(&m, 0, m.tri[0], m.tri[2], m.tri[1]);
     a = audit_of(&m);
     assert_true(!a.closed);
     assert_int_equal(a.misoriented_edges, 3);
-    // a copy of a triangle, and one without area
+    // a duplicate of a triangle, and one of zero area
     mesh_box(&m, zero, one);
     mesh_make(&m, 8, 14);
     mesh_triangle(&m, 12, m.tri[1], m.tri[2], m.tri[0]);
@@ -100,8 +101,9 @@ static void test_flaws(void **state)
     sdm_mesh_dispose(&m);
 }
 
-/* Both sides of a sheet: the volume is 0, and what rounding makes of it says nothing. */
-static void test_volume_of_rounding(void **state)
+/* A triangle and its reverse enclose no volume. The computed volume is a rounding error of either
+ * sign and must not make the audit report an inside-out mesh. */
+static void test_rounded_zero_volume_is_not_inverted(void **state)
 {
     (void)state;
     int negative = 0;
@@ -119,10 +121,10 @@ static void test_volume_of_rounding(void **state)
     assert_true(negative > 10);
 }
 
-static void test_soup_is_welded(void **state)
+static void test_equal_vertices_are_merged(void **state)
 {
     (void)state;
-    // the box as loose triangles, as an STL file holds it
+    // the box with separate vertices for each triangle, as in an STL file; some zeros are -0.0
     sdm_mesh box = {0}, soup = {0};
     mesh_box(&box, zero, one);
     mesh_make(&soup, 36, 12);
@@ -138,7 +140,7 @@ static void test_soup_is_welded(void **state)
     sdm_mesh_dispose(&soup);
 }
 
-static void test_components_and_crossings(void **state)
+static void test_components_and_self_intersections(void **state)
 {
     (void)state;
     sdm_mesh m = {0}, b = {0};
@@ -148,8 +150,7 @@ static void test_components_and_crossings(void **state)
     sdm_audit a = audit_of(&m);
     assert_int_equal(a.components, 2);
     assert_int_equal(a.self_intersections, 0);
-    // two triangles through each other, and their copies far away and tiny: scale and place do not
-    // matter
+    // two triangles that intersect; the same shifted far away (i = 1) and scaled down (i = 2)
     for (int i = 0; i < 3; i++) {
         const double scale = i == 2 ? 1e-9 : 1, at = i == 1 ? 1e6 : 0;
         mesh_make(&m, 6, 2);
@@ -163,19 +164,20 @@ static void test_components_and_crossings(void **state)
         assert_int_equal(a.self_intersections, 1);
         assert_false(a.closed);
     }
-    // the second moved off the first
+    // move the second triangle along x so that it no longer touches the first
     for (size_t k = 3; k < 6; k++) m.vert[3 * k] += 2.5e-9;
     assert_int_equal(audit_of(&m).self_intersections, 0);
     sdm_mesh_dispose(&m);
     sdm_mesh_dispose(&b);
 }
 
-/* Does the segment from p to q pass through the triangle v? In general position. */
-static bool passes(const double p[3], const double q[3], const double v[3][3])
+/* Does the segment from p to q pass through the triangle v? Valid for general position only. */
+static bool segment_meets_triangle(const double p[3], const double q[3], const double v[3][3])
 {
     double side[3], normal[3], h[2];
     for (int k = 0; k < 3; k++) {
-        // volume of p, q and an edge: on which side of the edge the line passes
+        // signed volume of the tetrahedron of p, q and edge k: tells on which side of the edge the
+        // line p q passes
         double a[3], b[3], c[3];
         for (int i = 0; i < 3; i++) {
             a[i] = q[i] - p[i];
@@ -199,17 +201,18 @@ static bool passes(const double p[3], const double q[3], const double v[3][3])
            (h[0] > 0) != (h[1] > 0);
 }
 
-static bool cross(const double a[3][3], const double b[3][3])
+static bool triangles_intersect(const double a[3][3], const double b[3][3])
 {
     bool met = false;
     for (int k = 0; k < 3; k++)
-        met = met || passes(a[k], a[(k + 1) % 3], b) || passes(b[k], b[(k + 1) % 3], a);
+        met = met || segment_meets_triangle(a[k], a[(k + 1) % 3], b) ||
+              segment_meets_triangle(b[k], b[(k + 1) % 3], a);
     return met;
 }
 
-/* Random meshes of triangles, some of which share vertices, against all pairs by brute force; sizes
- * up to 1 : 1000. */
-static void test_crossings_of_random_triangles(void **state)
+/* Random triangles with sizes in a ratio of up to 1 : 1000, some of which share a vertex. The
+ * number of self-intersections must equal a brute-force count over all pairs. */
+static void test_self_intersections_match_brute_force(void **state)
 {
     (void)state;
     size_t total = 0;
@@ -227,7 +230,7 @@ static void test_crossings_of_random_triangles(void **state)
                 mesh_vertex(&m, 3 * t + k, x[0], x[1], x[2]);
             }
             mesh_triangle(&m, t, 3 * t, 3 * t + 1, 3 * t + 2);
-            // every third takes its first corner from another
+            // every third triangle shares its first vertex with an earlier one
             if (t % 3 == 2)
                 m.tri[3 * t] =
                     m.tri[3 * (size_t)(sdm_rng_uniform(5, round, 20 * t + 15) * (double)t)];
@@ -243,7 +246,8 @@ static void test_crossings_of_random_triangles(void **state)
                     memcpy(a[k], &m.vert[3 * m.tri[3 * i + k]], sizeof a[k]);
                     memcpy(b[k], &m.vert[3 * m.tri[3 * j + k]], sizeof b[k]);
                 }
-                count += !shared && cross((const double(*)[3])a, (const double(*)[3])b);
+                count +=
+                    !shared && triangles_intersect((const double(*)[3])a, (const double(*)[3])b);
             }
         }
         assert_int_equal(audit_of(&m).self_intersections, count);
@@ -253,9 +257,9 @@ static void test_crossings_of_random_triangles(void **state)
     assert_true(total > 300);
 }
 
-/* The same counts, and areas and volumes in proportion, at every size that is accepted; inside out
- * is found at every size. */
-static void test_sizes(void **state)
+/* Scaling a mesh by any accepted power of two keeps the counts and the inside-out flag, and scales
+ * area and volume exactly. Sizes beyond the limits are refused. */
+static void test_audit_scales_with_size(void **state)
 {
     (void)state;
     sdm_mesh m = {0}, b = {0};
@@ -287,7 +291,7 @@ static void test_sizes(void **state)
     sdm_mesh_dispose(&b);
 }
 
-static void test_misuse(void **state)
+static void test_invalid_meshes_are_refused(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -307,7 +311,7 @@ static void test_misuse(void **state)
     sdm_mesh_dispose(&m);
 }
 
-static void test_memory_is_short(void **state)
+static void test_failed_allocations(void **state)
 {
     (void)state;
     sdm_mesh m = {0}, b = {0};
@@ -333,16 +337,16 @@ static void test_memory_is_short(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_storage),
-        cmocka_unit_test(test_box),
-        cmocka_unit_test(test_flaws),
-        cmocka_unit_test(test_volume_of_rounding),
-        cmocka_unit_test(test_soup_is_welded),
-        cmocka_unit_test(test_components_and_crossings),
-        cmocka_unit_test(test_crossings_of_random_triangles),
-        cmocka_unit_test(test_sizes),
-        cmocka_unit_test(test_misuse),
-        cmocka_unit_test(test_memory_is_short),
+        cmocka_unit_test(test_reserve_copy_and_dispose),
+        cmocka_unit_test(test_audit_of_box),
+        cmocka_unit_test(test_audit_counts_flaws),
+        cmocka_unit_test(test_rounded_zero_volume_is_not_inverted),
+        cmocka_unit_test(test_equal_vertices_are_merged),
+        cmocka_unit_test(test_components_and_self_intersections),
+        cmocka_unit_test(test_self_intersections_match_brute_force),
+        cmocka_unit_test(test_audit_scales_with_size),
+        cmocka_unit_test(test_invalid_meshes_are_refused),
+        cmocka_unit_test(test_failed_allocations),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

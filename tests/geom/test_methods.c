@@ -1,5 +1,6 @@
-/* The table of methods: exact ones against brute force, approximate ones within the bound they
- * state; grids, threads, limits, misuse.
+/* All methods of the method table: exact ones compared with brute force, approximate ones within
+ * their reported error bound; several meshes and grids, numbers of threads, memory limits,
+ * cancellation, invalid arguments.
  * Tests: cancel.c cells.c edt.c edt_seeds.c method_exact.c method_naive.c method_run.c
  * method_table.c octree.c */
 #include <setjmp.h>
@@ -21,14 +22,15 @@ static double uniform(uint64_t stream, uint64_t i, double lo, double hi)
     return lo + (hi - lo) * sdm_rng_uniform(11, stream, i);
 }
 
-static void rotation(uint64_t seed, double dir[9])
+static void random_rotation(uint64_t seed, double dir[9])
 {
     double q[4];
     for (uint64_t i = 0; i < 4; i++) q[i] = uniform(seed, i, -1, 1);
     quaternion_rotation(q, dir);
 }
 
-/* ---- meshes without overlap, about the origin, of size 1 to 2 ---- */
+/* ---- meshes around the origin, of size 1 to 2; all but the soup are closed and do not overlap
+ * ---- */
 
 static void make_box(sdm_mesh *m)
 {
@@ -65,7 +67,7 @@ static void make_torus(sdm_mesh *m)
     }
 }
 
-/* Tetrahedra of every quality, each in a place of its own. */
+/* 27 random tetrahedra, from well-shaped to flat, each in its own cell of a lattice. */
 static void make_tetrahedra(sdm_mesh *m)
 {
     mesh_make(m, 4 * 27, 4 * 27);
@@ -91,7 +93,7 @@ static void make_tetrahedra(sdm_mesh *m)
     }
 }
 
-/* Triangles that bound nothing; some without area. */
+/* Random triangles that enclose nothing; some of them have zero area. */
 static void make_soup(sdm_mesh *m)
 {
     mesh_make(m, 3 * 40, 40);
@@ -119,11 +121,11 @@ static sdm_grid make_grid(int which)
     static const double centre[3] = {0.02, -0.03, 0.01};
     sdm_grid g = sdm_grid_centred((const int64_t[3]){19, 22, 17}, 0.14, centre);
     if (which == 0) return g;
-    if (which == 1) { // anisotropic, turned, and more than one top cell of an octree
+    if (which == 1) { // anisotropic, rotated, and large enough for several root cells of the octree
         g = sdm_grid_centred((const int64_t[3]){35, 12, 18}, 0.085, centre);
         g.spacing[1] = 0.2;
         g.spacing[2] = 0.14;
-        rotation(70, g.dir);
+        random_rotation(70, g.dir);
         sdm_grid turned = g;
         for (int a = 0; a < 3; a++) turned.origin[a] = 0;
         double middle[3];
@@ -131,7 +133,7 @@ static sdm_grid make_grid(int which)
         for (int a = 0; a < 3; a++) g.origin[a] = -middle[a];
     }
     if (which == 2) { // reflected
-        rotation(71, g.dir);
+        random_rotation(71, g.dir);
         for (int a = 0; a < 3; a++) {
             g.dir[3 * a] = -g.dir[3 * a];
             g.origin[a] = uniform(72, (uint64_t)a, -1.2, -0.8);
@@ -143,11 +145,12 @@ static sdm_grid make_grid(int which)
     if (which == 6) g.origin[0] += 5; // beside the mesh
     if (which == 7)
         g = sdm_grid_centred((const int64_t[3]){9, 8, 7}, 0.2,
-                             (double[3]){4, 4, 4}); // no line meets it
+                             (double[3]){4, 4, 4}); // no grid line meets the mesh
     return g;
 }
 
-/* NULL when the method refuses the grid, which only edt may: no line of it crosses the surface. */
+/* Map by method m (caller frees). NULL if the method rejects the grid, which only "edt" may do,
+ * when no grid line crosses the surface. */
 static float *map_of(const sdm_method *m, const sdm_mesh *mesh, const sdm_grid *g,
                      const sdm_method_opts *o, sdm_method_report *r)
 {
@@ -161,7 +164,7 @@ static float *map_of(const sdm_method *m, const sdm_mesh *mesh, const sdm_grid *
     return NULL;
 }
 
-static double brute_force(const sdm_mesh *m, const sdm_grid *g, size_t i)
+static double brute_force_at_voxel(const sdm_mesh *m, const sdm_grid *g, size_t i)
 {
     const size_t nx = (size_t)g->n[0], ny = (size_t)g->n[1];
     double x[3];
@@ -171,7 +174,7 @@ static double brute_force(const sdm_mesh *m, const sdm_grid *g, size_t i)
 }
 
 /* Every method on every mesh and grid. */
-static void test_against_brute_force(void **state)
+static void test_error_bounds_against_brute_force(void **state)
 {
     (void)state;
     for (int which = 0; which < N_MESHES; which++) {
@@ -182,12 +185,12 @@ static void test_against_brute_force(void **state)
             const size_t n = sdm_grid_count(&g);
             double *truth = malloc(n * sizeof *truth);
             assert_non_null(truth);
-            for (size_t i = 0; i < n; i++) truth[i] = brute_force(&m, &g, i);
+            for (size_t i = 0; i < n; i++) truth[i] = brute_force_at_voxel(&m, &g, i);
             for (size_t k = 0; k < sdm_method_count(); k++) {
                 const sdm_method *method = sdm_method_at(k);
                 sdm_method_report r;
                 if (n > 2000 && !strcmp(method->name, "naive"))
-                    continue; // the same work as the truth
+                    continue; // the naive method is the reference itself
                 float *v = map_of(method, &m, &g, NULL, &r);
                 if (!v && grid != 7 && grid != 6 && grid != 5 && grid != 4)
                     fail_msg("edt refuses grid %d", grid);
@@ -203,7 +206,7 @@ static void test_against_brute_force(void **state)
                         fail_msg(
                             "%s, mesh %d, grid %d, voxel %zu: %.9g, brute force %.17g, bound %g",
                             method->name, which, grid, i, (double)v[i], d, r.error_bound_mm);
-                    // its seeds lie on the surface
+                    // edt measures to seeds on the surface: it never underestimates
                     if (!strcmp(method->name, "edt"))
                         assert_true(fabs((double)v[i]) >= fabs(d) * (1 - 1e-6) - 1e-9);
                 }
@@ -215,8 +218,9 @@ static void test_against_brute_force(void **state)
     }
 }
 
-/* Overlap, inside out, open, all surface kept: the surface and the sign are the engine's. */
-static void test_same_question(void **state)
+/* All methods must treat overlapping, inside-out and open meshes and the options keep_overlap and
+ * sign in the same way as the method "exact": same surface, same signs. */
+static void test_methods_agree_on_surface_and_sign(void **state)
 {
     (void)state;
     const sdm_grid g = make_grid(1);
@@ -251,9 +255,8 @@ static void test_same_question(void **state)
     }
 }
 
-/* The octree keeps what it is asked for, interpolates where it may, and is exact where it may not.
- */
-static void test_octree_error(void **state)
+/* The octree keeps the requested error bound, and interpolates where the bound allows it. */
+static void test_octree_keeps_error_bound(void **state)
 {
     (void)state;
     const sdm_method *octree = sdm_method_find("octree", NULL);
@@ -262,29 +265,30 @@ static void test_octree_error(void **state)
     sdm_grid g = make_grid(1);
     g.spacing[0] = g.spacing[1] = g.spacing[2] = 0.2;
     for (int i = 0; i < 4; i++) {
-        const double asked[4] = {0, 1e-9, 0.03, 0.3};
+        const double requested[4] = {0, 1e-9, 0.03, 0.3};
         sdm_method_report r;
-        float *v = map_of(octree, &m, &g, &(sdm_method_opts){.max_error_mm = asked[i]}, &r);
-        assert_true(r.error_bound_mm == (i == 0 ? 0.05 * 0.2 : asked[i]));
+        float *v = map_of(octree, &m, &g, &(sdm_method_opts){.max_error_mm = requested[i]}, &r);
+        assert_true(r.error_bound_mm == (i == 0 ? 0.05 * 0.2 : requested[i]));
         double worst = 0;
         for (size_t k = 0; k < sdm_grid_count(&g); k++)
-            worst = fmax(worst, fabs((double)v[k] - brute_force(&m, &g, k)));
+            worst = fmax(worst, fabs((double)v[k] - brute_force_at_voxel(&m, &g, k)));
         assert_true(worst <= r.error_bound_mm + 1e-6);
-        if (asked[i] >= 0.03) assert_true(worst > 0.1 * asked[i]); // it does interpolate
+        if (requested[i] >= 0.03) assert_true(worst > 0.1 * requested[i]); // interpolation was used
         free(v);
     }
     sdm_mesh_dispose(&m);
 }
 
-/* A ball that no line of the grid meets: edt cannot see it, but its bound must say so where it
- * counts. */
-static void test_edt_unseen(void **state)
+/* A small ball that lies between the grid lines has no seeds, so "edt" misses it; its reported
+ * error bound must cover the resulting error, unless the ball is too far away to matter. */
+static void test_edt_bound_covers_missed_parts(void **state)
 {
     (void)state;
     const sdm_method *edt = sdm_method_find("edt", NULL);
     const sdm_grid g =
         sdm_grid_centred((const int64_t[3]){30, 30, 30}, 0.1, (const double[3]){0, 0, 0});
-    // between the lines; outside at a corner; so far away that no voxel asks for it
+    // positions of the small ball: between grid lines; outside of the grid near a corner; so far
+    // away that no voxel is nearest to it
     const double place[3][3] = {{1, 0.7, 0.7}, {1.6, 1.6, 1.6}, {50, 50, 50}},
                  radius[3] = {0.03, 0.1, 1};
     sdm_error err = {0};
@@ -294,13 +298,13 @@ static void test_edt_unseen(void **state)
         mesh_sphere(&m, (const double[3]){-0.5, 0, 0}, 0.4, 16);
         mesh_sphere(&speck, place[i], radius[i], 6);
         free(map_of(edt, &m, &g, NULL, &seen));
-        assert_true(seen.error_bound_mm < 0.15); // one and a half voxels
+        assert_true(seen.error_bound_mm < 0.15); // 1.5 voxels
         mesh_append(&m, &speck);
         float *v = map_of(edt, &m, &g, NULL, &unseen);
         assert_non_null(v);
         double worst = 0;
         for (size_t k = 0; k < sdm_grid_count(&g); k++)
-            worst = fmax(worst, fabs(fabs((double)v[k]) - fabs(brute_force(&m, &g, k))));
+            worst = fmax(worst, fabs(fabs((double)v[k]) - fabs(brute_force_at_voxel(&m, &g, k))));
         assert_true(worst <= unseen.error_bound_mm && unseen.error_bound_mm < worst + 0.6);
         assert_true(i == 2 ? unseen.error_bound_mm == seen.error_bound_mm : worst > 1);
         assert_int_equal(edt->map(&speck, &g, NULL, v, NULL, &err), SDM_E_ARG);
@@ -311,7 +315,7 @@ static void test_edt_unseen(void **state)
     }
 }
 
-static void test_threads(void **state)
+static void test_threads_give_same_bits(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -342,9 +346,9 @@ typedef struct watcher {
     int calls, patience;
 } watcher;
 
-static bool impatient(void *user) { return --((watcher *)user)->patience < 0; }
+static bool cancel_when_patience_ends(void *user) { return --((watcher *)user)->patience < 0; }
 
-static void watch(void *user, double share)
+static void progress_record(void *user, double share)
 {
     watcher *w = user;
     assert_true(share > 0 && share <= 1 + 1e-12);
@@ -352,7 +356,7 @@ static void watch(void *user, double share)
     w->calls++;
 }
 
-static void test_limits(void **state)
+static void test_cancellation_and_memory_limits(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -365,11 +369,12 @@ static void test_limits(void **state)
         sdm_method_report r, untouched;
         sdm_error err = {0};
         watcher w = {.patience = 1 << 30};
-        sdm_method_opts o = {.exact = {.n_threads = 1, .user = &w, .cancelled = impatient},
-                             .progress = watch};
+        sdm_method_opts o = {
+            .exact = {.n_threads = 1, .user = &w, .cancelled = cancel_when_patience_ends},
+            .progress = progress_record};
         assert_int_equal(method->map(&m, &g, &o, v, &r, &err), SDM_OK);
         if (strcmp(method->name, "exact")) assert_true(w.calls > 0 && fabs(w.share - 1) < 1e-12);
-        // slow ones are asked often
+        // the slow method reports its progress after every row
         if (!strcmp(method->name, "naive")) assert_int_equal(w.calls, g.n[1] * g.n[2]);
         memset(&untouched, 7, sizeof untouched);
         w.patience = 0;
@@ -380,8 +385,8 @@ static void test_limits(void **state)
         o.exact.memory_limit = 1000;
         assert_int_equal(method->map(&m, &g, &o, v, &r, &err), SDM_E_NOMEM);
         assert_non_null(strstr(err.text, "memory_limit"));
-        // what the method says it takes is what it needs; the engine's own need is below that of
-        // eight threads' octrees
+        // the reported number of bytes is the smallest sufficient memory_limit of the octree with 8
+        // threads; the engine needs less than that
         o.exact.memory_limit = 0;
         o.exact.n_threads = 8;
         assert_int_equal(method->map(&m, &g, &o, v, &r, &err), SDM_OK);
@@ -393,7 +398,7 @@ static void test_limits(void **state)
             assert_non_null(strstr(err.text, "use method exact"));
         }
         o.exact.n_threads = 1;
-        // short memory at every allocation
+        // every single allocation may fail
         o.exact.memory_limit = 0;
         sdm_status s = SDM_E_NOMEM;
         unsigned long n = 1;
@@ -409,7 +414,7 @@ static void test_limits(void **state)
     sdm_mesh_dispose(&m);
 }
 
-static void test_misuse(void **state)
+static void test_invalid_arguments(void **state)
 {
     (void)state;
     sdm_mesh m = {0}, empty = {0};
@@ -426,7 +431,7 @@ static void test_misuse(void **state)
     for (size_t k = 0; k < sdm_method_count(); k++) {
         const sdm_method *method = sdm_method_at(k);
         assert_ptr_equal(sdm_method_find(method->name, NULL), method);
-        assert_non_null(strstr(unknown.text, method->name)); // the message names them all
+        assert_non_null(strstr(unknown.text, method->name)); // the message lists all methods
         assert_true(*method->summary && *method->reference);
         assert_int_equal(method->map(NULL, &g, NULL, &v, NULL, &err), SDM_E_ARG);
         assert_int_equal(method->map(&m, NULL, NULL, &v, NULL, &err), SDM_E_ARG);
@@ -449,13 +454,13 @@ static void test_misuse(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_against_brute_force),
-        cmocka_unit_test(test_same_question),
-        cmocka_unit_test(test_octree_error),
-        cmocka_unit_test(test_edt_unseen),
-        cmocka_unit_test(test_threads),
-        cmocka_unit_test(test_limits),
-        cmocka_unit_test(test_misuse),
+        cmocka_unit_test(test_error_bounds_against_brute_force),
+        cmocka_unit_test(test_methods_agree_on_surface_and_sign),
+        cmocka_unit_test(test_octree_keeps_error_bound),
+        cmocka_unit_test(test_edt_bound_covers_missed_parts),
+        cmocka_unit_test(test_threads_give_same_bits),
+        cmocka_unit_test(test_cancellation_and_memory_limits),
+        cmocka_unit_test(test_invalid_arguments),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,5 @@
-/* Pairs of triangles that may meet, against all pairs.
+/* Candidate pairs of triangles whose bounding boxes overlap (sdm_pairs_visit), compared with a loop
+ * over all pairs.
  * Tests: pairs.c */
 #include <float.h>
 #include <math.h>
@@ -38,14 +39,14 @@ static void visit_pairs(const sdm_mesh *m, double slack, visits *v)
     sdm_arena_dispose(&arena);
 }
 
-static bool share(const sdm_mesh *m, size_t i, size_t j)
+static bool share_vertex(const sdm_mesh *m, size_t i, size_t j)
 {
     for (size_t k = 0; k < 9; k++)
         if (m->tri[3 * i + k / 3] == m->tri[3 * j + k % 3]) return true;
     return false;
 }
 
-static bool apart(const sdm_mesh *m, size_t i, size_t j, double slack)
+static bool boxes_apart(const sdm_mesh *m, size_t i, size_t j, double slack)
 {
     for (size_t a = 0; a < 3; a++) {
         double lo[2] = {INFINITY, INFINITY}, hi[2] = {-INFINITY, -INFINITY};
@@ -60,7 +61,7 @@ static bool apart(const sdm_mesh *m, size_t i, size_t j, double slack)
     return false;
 }
 
-static void test_all_pairs(void **state)
+static void test_pairs_match_brute_force(void **state)
 {
     (void)state;
     for (uint64_t round = 0; round < 200; round++) {
@@ -81,8 +82,8 @@ static void test_all_pairs(void **state)
         for (size_t i = 0; i < n; i++)
             for (size_t j = i; j < n; j++) {
                 const unsigned seen = v.seen[i * n + j];
-                const bool never = i == j || share(&m, i, j),
-                           must = !never && !apart(&m, i, j, slack);
+                const bool never = i == j || share_vertex(&m, i, j),
+                           must = !never && !boxes_apart(&m, i, j, slack);
                 if (never ? seen != 0 : must ? seen != 1 : seen > 1)
                     fail_msg("round %u: pair %zu, %zu was seen %u times", (unsigned)round, i, j,
                              seen);
@@ -92,9 +93,9 @@ static void test_all_pairs(void **state)
     }
 }
 
-// a mesh that is nothing beside its place: the slack is more than it is wide by any factor, up to
-// infinity in single precision
-static void test_thin(void **state)
+// A mesh that is flat at x = 1 and tiny along y and z: the slack exceeds its extent by any factor,
+// up to overflow to infinity in single precision.
+static void test_slack_beyond_extent(void **state)
 {
     (void)state;
     for (double scale = 1e-10; scale >= 1e-300; scale *= 1e-10) {
@@ -111,15 +112,16 @@ static void test_thin(void **state)
         visit_pairs(&m, 16 * DBL_EPSILON, &v);
         for (size_t i = 0; i < n; i++)
             for (size_t j = i; j < n; j++) {
-                if (!apart(&m, i, j, 16 * DBL_EPSILON)) assert_int_equal(v.seen[i * n + j], i != j);
+                if (!boxes_apart(&m, i, j, 16 * DBL_EPSILON))
+                    assert_int_equal(v.seen[i * n + j], i != j);
             }
         free(v.seen);
         sdm_mesh_dispose(&m);
     }
 }
 
-// a part far away does not make pairs of all that is near
-static void test_far_part(void **state)
+// A distant part makes the slack larger; the number of visited pairs must at most double.
+static void test_far_part_adds_few_pairs(void **state)
 {
     (void)state;
     size_t n[2];
@@ -140,8 +142,8 @@ static void test_far_part(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_all_pairs),
-                                       cmocka_unit_test(test_thin),
-                                       cmocka_unit_test(test_far_part)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_pairs_match_brute_force),
+                                       cmocka_unit_test(test_slack_beyond_extent),
+                                       cmocka_unit_test(test_far_part_adds_few_pairs)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

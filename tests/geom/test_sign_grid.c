@@ -1,17 +1,17 @@
-/* Signs of whole grids on closed meshes: rows that run within faces, parts that are inside out,
- * scale and place, the certificate.
+/* Signs of whole maps of closed meshes: grid rows that lie within faces, inside-out parts, scaled
+ * and shifted inputs, and the certificate of signs.
  * Tests: certify.c row_base.c rows.c sign_rows.c */
 #include "oracle/sign_check.h"
 
-/* Half of the box |x| <= 4, |y| <= 3, |z| <= 5: a prism below a diagonal. How far x is outside of
- * it, at least. */
-static double outside_prism(const double x[3])
+/* Bound on the signed distance to a prism, which is the half of the box abs(x) <= 4, abs(y) <= 3,
+ * abs(z) <= 5 on the negative side of its diagonal plane. Its sign is exact: > 0 outside. */
+static double prism_distance_bound(const double x[3])
 {
     const double diagonal = (x[0] / 4 + x[2] / 5) / sqrt(1.0 / 16 + 1.0 / 25);
     return fmax(fmax(fabs(x[1]) - 3, diagonal), fmax(-4 - x[0], -5 - x[2]));
 }
 
-static void prism(sdm_mesh *m)
+static void mesh_prism(sdm_mesh *m)
 {
     static const uint8_t tri[8][3] = {{0, 1, 2}, {3, 5, 4}, {0, 3, 4}, {0, 4, 1},
                                       {1, 4, 5}, {1, 5, 2}, {2, 5, 3}, {2, 3, 0}};
@@ -21,9 +21,10 @@ static void prism(sdm_mesh *m)
     for (size_t t = 0; t < 8; t++) mesh_triangle(m, t, tri[t][0], tri[t][1], tri[t][2]);
 }
 
-/* A prism whose faces lie in rows of a grid that is rotated with it: rounding moves corners to
-   either side of the rows, and the faces are met along their whole length or not at all. */
-static void test_rows_within_faces(void **state)
+/* A rotated prism whose faces lie exactly in rows of the equally rotated grid. Rounding moves the
+ * vertices to either side of a row, so that a row crosses a face along its whole length or not at
+ * all. */
+static void test_rows_within_faces_have_right_signs(void **state)
 {
     (void)state;
     for (uint64_t seed = 0; seed < 80; seed++) {
@@ -33,7 +34,7 @@ static void test_rows_within_faces(void **state)
         const double first[3] = {-7, -6, -7};
         memcpy(g.dir, r, sizeof r);
         sdm_mesh m = {0};
-        prism(&m);
+        mesh_prism(&m);
         for (size_t v = 0; v < m.n_vert; v++) {
             const double *p = &m.vert[3 * v];
             const double y[3] = {p[0], 0.8 * p[1] + 0.6 * p[2], 0.8 * p[2] - 0.6 * p[1]};
@@ -54,9 +55,9 @@ static void test_rows_within_faces(void **state)
                 voxel(&g, i, x);
                 for (size_t a = 0; a < 3; a++)
                     y[a] = r[a] * x[0] + r[3 + a] * x[1] + r[6 + a] * x[2];
-                // two faces are slanted across the rows: 4 y - 3 z = +-15
+                // undo the rotation about x: two faces are oblique to the rows, 4 y - 3 z = +-15
                 const double p[3] = {y[0], 0.8 * y[1] - 0.6 * y[2], 0.6 * y[1] + 0.8 * y[2]};
-                const double out = outside_prism(p);
+                const double out = prism_distance_bound(p);
                 if (fabs(out) < 1e-12) continue;
                 if ((out < 0) != (v[i] < 0))
                     fail_msg("seed %d: voxel %zu at %g %g %g: %g", (int)seed, i, y[0], y[1], y[2],
@@ -70,7 +71,7 @@ static void test_rows_within_faces(void **state)
     }
 }
 
-static void test_certificate(void **state)
+static void test_certificate_counts_wrong_signs(void **state)
 {
     (void)state;
     sdm_mesh m = {0}, cavity = {0};
@@ -78,7 +79,8 @@ static void test_certificate(void **state)
     mesh_sphere(&cavity, zero, 0.5, 9);
     mesh_flip(&cavity);
     mesh_append(&m, &cavity);
-    // 21 voxels: the last byte of a line of compared signs is not full
+    // 21 voxels along x: the last byte of a row in the bit array of compared signs is only partly
+    // used
     const sdm_grid g = sdm_grid_centred((const int64_t[3]){21, 18, 19}, 0.13, zero);
     const size_t n = sdm_grid_count(&g);
     static const char *const compared[] = {"crossings along y and z", "crossings along x, y and z",
@@ -100,7 +102,7 @@ static void test_certificate(void **state)
         }
         assert_true(c.first_wrong[0] == 20 && c.first_wrong[1] == 17 && c.first_wrong[2] == 3);
         for (size_t k = 0; k < 3; k++) v[places[k]] = -v[places[k]];
-        // not a number: outside, within the solid, within the cavity
+        // replace values by NaN: outside of the ball, within the solid, within the cavity
         const size_t nan_places[] = {5 + 21 * (4 + 18), 16 + 21 * (8 + 18 * 9),
                                      10 + 21 * (8 + 18 * 9)};
         for (size_t k = 0; k < 3; k++) {
@@ -121,7 +123,7 @@ static void test_certificate(void **state)
     sdm_mesh_dispose(&cavity);
 }
 
-static void test_signs_of_given_distances(void **state)
+static void test_signs_are_applied_to_given_distances(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -141,10 +143,10 @@ static void test_signs_of_given_distances(void **state)
     sdm_mesh_dispose(&m);
 }
 
-/* Signs of a mesh and a grid multiplied by a factor and moved: as before the change, but for voxels
- * on the surface. */
-static void check_moved(const sdm_mesh *m, const sdm_grid *g, const float *v, double factor,
-                        const double shift[3])
+/* Scales and shifts the mesh and the grid: the signs must stay the same, except at voxels within
+ * rounding of the surface. */
+static void check_signs_after_motion(const sdm_mesh *m, const sdm_grid *g, const float *v,
+                                     double factor, const double shift[3])
 {
     sdm_mesh b = {0};
     assert_int_equal(sdm_mesh_copy(m, &b, NULL), SDM_OK);
@@ -167,7 +169,7 @@ static void check_moved(const sdm_mesh *m, const sdm_grid *g, const float *v, do
     sdm_mesh_dispose(&b);
 }
 
-static void test_scale_and_place(void **state)
+static void test_scaling_and_shifting_keep_signs(void **state)
 {
     (void)state;
     static const double factors[] = {0x1p-30, 0x1p30, 1e-9, 1e-3, 1e9, 3e-5};
@@ -179,23 +181,25 @@ static void test_scale_and_place(void **state)
         sdm_exact *e = engine(&m, SDM_SIGN_AUTO, 1);
         float *v = map(e, &g);
         for (size_t i = 0; i < sizeof factors / sizeof *factors; i++)
-            check_moved(&m, &g, v, factors[i], zero);
-        check_moved(&m, &g, v, 1, (const double[3]){1e6, -3e6, 2e6});
-        check_moved(&m, &g, v, 1e-9, (const double[3]){1e-3, 1e-3, -1e-3});
+            check_signs_after_motion(&m, &g, v, factors[i], zero);
+        check_signs_after_motion(&m, &g, v, 1, (const double[3]){1e6, -3e6, 2e6});
+        check_signs_after_motion(&m, &g, v, 1e-9, (const double[3]){1e-3, 1e-3, -1e-3});
         free(v);
         sdm_exact_free(e);
         sdm_mesh_dispose(&m);
     }
 }
 
-/* Faces given twice, sheets without thickness, parts that are inside out: as exact.h says. */
-static void test_odd_closed_meshes(void **state)
+/* Meshes that contain every face twice: with equal orientation the winding number is 2 inside and
+ * the map stays the same; with opposite orientation the copies cancel and nothing is inside (see
+ * exact.h). */
+static void test_duplicated_faces(void **state)
 {
     (void)state;
     const sdm_grid g =
         sdm_grid_centred((const int64_t[3]){17, 17, 17}, 0.19, (const double[3]){0.4, 0.01, 0.02});
     sdm_mesh m = {0}, part = {0};
-    // every face twice: the winding number is 2 inside
+    // every face twice, equal orientation: the winding number is 2 inside
     mesh_sphere(&m, zero, 1, 10);
     sdm_exact *once = engine(&m, SDM_SIGN_AUTO, 1);
     float *v = map(once, &g), *w;
@@ -207,7 +211,8 @@ static void test_odd_closed_meshes(void **state)
     for (size_t i = 0; i < sdm_grid_count(&g); i++) assert_true(fabsf(v[i] - w[i]) < 1e-6f);
     free(w);
     sdm_exact_free(e);
-    // every face and its back: nothing is inside, distances to the sheet stay
+    // every face twice, opposite orientation: nothing is inside, but the unsigned distances stay
+    // the same
     mesh_sphere(&m, zero, 1, 10);
     mesh_flip(&part);
     mesh_append(&m, &part);
@@ -223,7 +228,7 @@ static void test_odd_closed_meshes(void **state)
     sdm_mesh_dispose(&part);
 }
 
-static void add_ball(sdm_mesh *m, double x, double radius, bool flipped)
+static void append_ball(sdm_mesh *m, double x, double radius, bool flipped)
 {
     sdm_mesh ball = {0};
     mesh_sphere(&ball, (const double[3]){x, 0, 0}, radius, 12);
@@ -232,44 +237,47 @@ static void add_ball(sdm_mesh *m, double x, double radius, bool flipped)
     sdm_mesh_dispose(&ball);
 }
 
-static double at(const sdm_exact *e, double x)
+static double distance_on_x_axis(const sdm_exact *e, double x)
 {
     return sdm_exact_point(e, (const double[3]){x, 0.01, 0}, NULL, NULL, NULL);
 }
 
-static void test_parts_inside_out(void **state)
+static void test_inside_out_parts_are_reversed_or_subtracted(void **state)
 {
     (void)state;
-    // a solid with a cavity; beside it the same with both turned round; in the first cavity a ball
-    // turned round
+    // a ball with a cavity (left), an inside-out ball with an inside-out cavity (right), and an
+    // inside-out ball within the left cavity
     sdm_mesh m = {0};
-    add_ball(&m, 0, 3, false);
-    add_ball(&m, 0, 2, true);
-    add_ball(&m, 6, 2, true);
-    add_ball(&m, 6, 1, false);
-    add_ball(&m, 0.5, 1, true);
+    append_ball(&m, 0, 3, false);
+    append_ball(&m, 0, 2, true);
+    append_ball(&m, 6, 2, true);
+    append_ball(&m, 6, 1, false);
+    append_ball(&m, 0.5, 1, true);
     sdm_exact *e = engine(&m, SDM_SIGN_AUTO, 1);
     const sdm_exact_report *r = sdm_exact_get_report(e);
     assert_true(!r->turned && !r->unioned && r->parts_turned == 3);
-    assert_true(at(e, 2.5) < -0.45 && at(e, -1.5) > 0.45 && at(e, 0.5) < -0.95 && at(e, 6) > 0.9 &&
-                at(e, 7.5) < -0.45);
+    assert_true(distance_on_x_axis(e, 2.5) < -0.45 && distance_on_x_axis(e, -1.5) > 0.45 &&
+                distance_on_x_axis(e, 0.5) < -0.95 && distance_on_x_axis(e, 6) > 0.9 &&
+                distance_on_x_axis(e, 7.5) < -0.45);
     sdm_exact_free(e);
-    // all of it inside out
+    // the whole mesh inside out
     mesh_flip(&m);
     e = engine(&m, SDM_SIGN_AUTO, 1);
     r = sdm_exact_get_report(e);
     assert_true(r->turned && r->parts_turned == 3);
-    assert_true(at(e, 2.5) < -0.45 && at(e, -1.5) > 0.45 && at(e, 0.5) < -0.95 && at(e, 6) > 0.9 &&
-                at(e, 7.5) < -0.45);
+    assert_true(distance_on_x_axis(e, 2.5) < -0.45 && distance_on_x_axis(e, -1.5) > 0.45 &&
+                distance_on_x_axis(e, 0.5) < -0.95 && distance_on_x_axis(e, 6) > 0.9 &&
+                distance_on_x_axis(e, 7.5) < -0.45);
     sdm_exact_free(e);
     sdm_mesh_dispose(&m);
 
-    // one that meets the solid takes away
-    add_ball(&m, 0, 2, false);
-    add_ball(&m, 2, 1, true);
+    // an inside-out part that intersects a solid is subtracted from it
+    append_ball(&m, 0, 2, false);
+    append_ball(&m, 2, 1, true);
     e = engine(&m, SDM_SIGN_AUTO, 1);
     assert_int_equal(sdm_exact_get_report(e)->parts_turned, 0);
-    assert_true(at(e, 0) < 0 && at(e, 1.5) > 0 && at(e, 2.5) > 0);
+    assert_true(distance_on_x_axis(e, 0) < 0 && distance_on_x_axis(e, 1.5) > 0 &&
+                distance_on_x_axis(e, 2.5) > 0);
     const sdm_grid g = sdm_grid_centred((const int64_t[3]){40, 30, 30}, 0.17, zero);
     float *v = map(e, &g);
     sdm_sign_certificate c;
@@ -289,9 +297,12 @@ static void test_parts_inside_out(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_rows_within_faces),        cmocka_unit_test(test_certificate),
-        cmocka_unit_test(test_signs_of_given_distances), cmocka_unit_test(test_scale_and_place),
-        cmocka_unit_test(test_odd_closed_meshes),        cmocka_unit_test(test_parts_inside_out),
+        cmocka_unit_test(test_rows_within_faces_have_right_signs),
+        cmocka_unit_test(test_certificate_counts_wrong_signs),
+        cmocka_unit_test(test_signs_are_applied_to_given_distances),
+        cmocka_unit_test(test_scaling_and_shifting_keep_signs),
+        cmocka_unit_test(test_duplicated_faces),
+        cmocka_unit_test(test_inside_out_parts_are_reversed_or_subtracted),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

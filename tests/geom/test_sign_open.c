@@ -1,12 +1,13 @@
-/* Signs of whole grids on open meshes: voxel by voxel against sums of solid angles.
+/* Signs of whole maps of open meshes, voxel by voxel, compared with winding numbers from sums of
+ * solid angles.
  * Tests: arena.c certify.c rows.c sign_rows.c winding.c */
 #include "oracle/sign_check.h"
 #include "sdm/internal/threads.h"
 
-static bool two_holes(const double c[3]) { return c[0] > 0.7 || (c[1] < -0.5 && c[2] < 0.2); }
-static bool beside(const double c[3]) { return c[0] > 0; }
+static bool within_two_caps(const double c[3]) { return c[0] > 0.7 || (c[1] < -0.5 && c[2] < 0.2); }
+static bool at_positive_x(const double c[3]) { return c[0] > 0; }
 
-static void moebius(sdm_mesh *m, size_t n)
+static void mesh_moebius(sdm_mesh *m, size_t n)
 {
     mesh_make(m, 2 * n, 2 * n);
     for (size_t i = 0; i < n; i++) {
@@ -22,7 +23,7 @@ static void moebius(sdm_mesh *m, size_t n)
     }
 }
 
-static void shatter(sdm_mesh *m)
+static void mesh_separate_triangles(sdm_mesh *m)
 {
     sdm_mesh pieces = {0};
     mesh_make(&pieces, 3 * m->n_tri, m->n_tri);
@@ -40,8 +41,8 @@ static void shatter(sdm_mesh *m)
 
 enum { N_OPEN = 9 };
 
-/* Cups, a half, mixed orientation, a fin, a one-sided strip, an overlapping open tube, a sheet, a
- * soup. */
+/* The open meshes: 0 and 1 spheres with holes, 2 half a sphere, 3 mixed orientation, 4 sphere with
+ * a fin, 5 Moebius strip, 6 half of an overlapping tube, 7 flat sheet, 8 separate triangles. */
 static void open_mesh(int which, sdm_mesh *m)
 {
     mesh_sphere(m, zero, 1, which == 8 ? 6 : 16);
@@ -50,16 +51,17 @@ static void open_mesh(int which, sdm_mesh *m)
         drop_triangles(m, above);
         break;
     case 1:
-        drop_triangles(m, two_holes);
+        drop_triangles(m, within_two_caps);
         break;
     case 2:
-        drop_triangles(m, beside);
+        drop_triangles(m, at_positive_x);
         break;
-    case 3: // a third of the triangles turned: weights of two along most edges
+    // every third triangle reversed: most edges are then run through twice in the same direction
+    case 3:
         for (size_t t = 0; t < m->n_tri; t += 3)
             mesh_triangle(m, t, m->tri[3 * t], m->tri[3 * t + 2], m->tri[3 * t + 1]);
         break;
-    case 4: { // a closed sphere with a fin: an edge of three triangles
+    case 4: { // a closed sphere with a fin: one edge has three triangles
         const size_t n = m->n_tri, v = m->n_vert;
         mesh_make(m, v + 1, n + 1);
         mesh_vertex(m, v, 0.3, 0.2, 1.8);
@@ -67,29 +69,29 @@ static void open_mesh(int which, sdm_mesh *m)
         break;
     }
     case 5:
-        moebius(m, 24);
+        mesh_moebius(m, 24);
         break;
     case 6: {
         const spiral s = SPIRAL_NOMINAL;
         mesh_spiral(m, &s, 0.9);
         for (size_t i = 0; i < 3 * m->n_vert; i++) m->vert[i] *= 0.25;
-        drop_triangles(m, beside);
+        drop_triangles(m, at_positive_x);
         break;
     }
-    case 7: // one quad: nowhere above 1/2
+    case 7: // one quad: its winding number never exceeds 1/2
         mesh_make(m, 4, 2);
         for (size_t k = 0; k < 4; k++)
             mesh_vertex(m, k, k & 1 ? 0.8 : -0.9, k & 2 ? 0.7 : -0.8, 0.1);
         mesh_triangle(m, 0, 0, 1, 3);
         mesh_triangle(m, 1, 0, 3, 2);
         break;
-    default: // no two triangles share a vertex
-        shatter(m);
+    default: // a sphere of separate triangles that share no vertices
+        mesh_separate_triangles(m);
         break;
     }
 }
 
-static void check_open(const sdm_mesh *m, const sdm_grid *g, const char *name)
+static void check_signs(const sdm_mesh *m, const sdm_grid *g, const char *name)
 {
     sdm_exact *e = engine(m, SDM_SIGN_AUTO, 1), *threads = engine(m, SDM_SIGN_AUTO, 3);
     assert_int_equal(sdm_exact_get_report(e)->sign, SDM_SIGN_WINDING);
@@ -119,7 +121,7 @@ static void check_open(const sdm_mesh *m, const sdm_grid *g, const char *name)
     sdm_exact_free(threads);
 }
 
-static void test_open_meshes(void **state)
+static void test_signs_match_winding_numbers(void **state)
 {
     (void)state;
     for (int which = 0; which < N_OPEN; which++) {
@@ -127,8 +129,8 @@ static void test_open_meshes(void **state)
         open_mesh(which, &m);
         char name[40];
         for (uint64_t seed = 0; seed < 3; seed++) {
-            // along the axes, with voxels in the planes of many vertices; then rotated,
-            // anisotropic, mirrored
+            // seed 0: axis-aligned, with voxels in the planes of many vertices; seeds 1 and 2:
+            // rotated and anisotropic, 2 also mirrored
             sdm_grid g = sdm_grid_centred((const int64_t[3]){23, 21, 25}, 0.125, zero);
             if (seed) {
                 rotation(100 + seed, seed == 2, g.dir);
@@ -140,14 +142,15 @@ static void test_open_meshes(void **state)
                 }
             }
             snprintf(name, sizeof name, "mesh %d, grid %d", which, (int)seed);
-            check_open(&m, &g, name);
+            check_signs(&m, &g, name);
         }
         sdm_mesh_dispose(&m);
     }
 }
 
-// the grid is a part of the mesh: crossings and boundary lie before, in and behind the rows
-static void test_open_mesh_beyond_the_grid(void **state)
+// The grid covers only a small part of the mesh: crossings and boundary edges lie in front of,
+// within and behind the rows.
+static void test_grid_covers_part_of_mesh(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -157,34 +160,34 @@ static void test_open_mesh_beyond_the_grid(void **state)
                                   uniform(2, 3 * i + 2, -1, 1)};
         const sdm_grid g =
             sdm_grid_centred((const int64_t[3]){9, 40, 3 + (int64_t)i}, 0.02, centre);
-        check_open(&m, &g, "part");
+        check_signs(&m, &g, "part");
     }
     sdm_mesh_dispose(&m);
 }
 
-static bool stop_later(void *user) { return ++*(int *)user >= 0; }
+static bool cancel_after_calls(void *user) { return ++*(int *)user >= 0; }
 
-static void test_cancelled(void **state)
+static void test_signs_can_be_cancelled(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
     open_mesh(0, &m);
     sdm_exact *e = NULL;
-    int asked = -1000000; // before it stops
-    const sdm_exact_opts o = {.n_threads = 1, .cancelled = stop_later, .user = &asked};
+    int calls = -1000000; // counts up to 0, then requests a stop
+    const sdm_exact_opts o = {.n_threads = 1, .cancelled = cancel_after_calls, .user = &calls};
     sdm_error err = {0};
     assert_int_equal(sdm_exact_create(&m, &o, &e, &err), SDM_OK);
-    asked = -1;
+    calls = -1;
     const sdm_grid g = sdm_grid_centred((const int64_t[3]){8, 40, 40}, 0.05, zero);
     float *v = calloc(sdm_grid_count(&g), sizeof *v);
     assert_int_equal(sdm_exact_sign(e, &g, v, &err), SDM_E_CANCELLED);
-    assert_int_equal(asked, 0);
+    assert_int_equal(calls, 0);
     free(v);
     sdm_exact_free(e);
     sdm_mesh_dispose(&m);
 }
 
-// rows longer than what is settled at once, along x and, in the certificate, along y
+// Rows longer than one tile of the sign computation: along x, and along y for the certificate.
 static void test_long_rows(void **state)
 {
     (void)state;
@@ -197,13 +200,13 @@ static void test_long_rows(void **state)
         sdm_grid g = sdm_grid_centred(n, 0.5, (const double[3]){0.1, 0.2, 0.3});
         g.spacing[axis] = 0.004;
         g.origin[axis] = -2.4;
-        check_open(&m, &g, "long rows");
+        check_signs(&m, &g, "long rows");
         sdm_mesh_dispose(&m);
     }
 }
 
-// what threads take for rows counts
-static void test_memory_limit(void **state)
+// The scratch memory of all threads counts towards memory_limit.
+static void test_memory_limit_includes_thread_scratch(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -223,15 +226,16 @@ static void test_memory_limit(void **state)
     sdm_mesh_dispose(&m);
 }
 
-/* A boundary so long that signs are certified by sums over all triangles. */
-static void test_by_sums(void **state)
+/* A mesh whose boundary is so long that the certificate falls back to sums of solid angles over all
+ * triangles. */
+static void test_certificate_by_solid_angle_sums(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
     mesh_sphere(&m, zero, 1, 20);
-    shatter(&m);
-    int asked = -1000000;
-    const sdm_exact_opts o = {.n_threads = 1, .cancelled = stop_later, .user = &asked};
+    mesh_separate_triangles(&m);
+    int calls = -1000000;
+    const sdm_exact_opts o = {.n_threads = 1, .cancelled = cancel_after_calls, .user = &calls};
     sdm_exact *e = NULL;
     sdm_error err = {0};
     sdm_sign_certificate c;
@@ -245,9 +249,9 @@ static void test_by_sums(void **state)
                     c.first_wrong[2] == (bad ? 0 : -1));
         v[0] = NAN;
     }
-    asked = -1;
+    calls = -1;
     assert_int_equal(sdm_exact_certify(e, &g, v, &c, &err), SDM_E_CANCELLED);
-    assert_int_equal(asked, 0);
+    assert_int_equal(calls, 0);
     free(v);
     sdm_exact_free(e);
     sdm_mesh_dispose(&m);
@@ -256,9 +260,12 @@ static void test_by_sums(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_open_meshes),  cmocka_unit_test(test_open_mesh_beyond_the_grid),
-        cmocka_unit_test(test_cancelled),    cmocka_unit_test(test_long_rows),
-        cmocka_unit_test(test_memory_limit), cmocka_unit_test(test_by_sums),
+        cmocka_unit_test(test_signs_match_winding_numbers),
+        cmocka_unit_test(test_grid_covers_part_of_mesh),
+        cmocka_unit_test(test_signs_can_be_cancelled),
+        cmocka_unit_test(test_long_rows),
+        cmocka_unit_test(test_memory_limit_includes_thread_scratch),
+        cmocka_unit_test(test_certificate_by_solid_angle_sums),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

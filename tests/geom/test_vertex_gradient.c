@@ -1,5 +1,5 @@
-/* Derivatives of exact maps as the vertices of a mesh move: motions of whole meshes, and of sheets
- * that cross in a union.
+/* Derivatives of exact maps with respect to moving vertices: motions of whole meshes, and of single
+ * sheets that intersect in a union.
  * Tests: layers.c vertex_gradient.c */
 #include <math.h>
 #include <setjmp.h>
@@ -21,8 +21,9 @@ static const double ZERO[3] = {0, 0, 0};
 
 /* ---- motions of whole meshes ---- */
 
-/* A mesh that is shifted by v and grows by s changes its distance by -n . v and d - n . x: exact,
-   also on needles and on triangles without area, whose weights must add up to the position. */
+/* Translating a mesh by v changes the distance at the rate -n . v, scaling it changes it at the
+ * rate d - n . x. Both hold exactly, also on needles and triangles of zero area, because the
+ * barycentric weights must reproduce the nearest point. */
 static void check_motions(const sdm_mesh *m, const sdm_exact_opts *o, const sdm_grid *g,
                           double tolerance)
 {
@@ -55,7 +56,7 @@ static void check_motions(const sdm_mesh *m, const sdm_exact_opts *o, const sdm_
     free(slope);
 }
 
-static void test_whole_mesh(void **state)
+static void test_translation_and_scaling(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -67,7 +68,7 @@ static void test_whole_mesh(void **state)
     m.n_tri -= 30;
     check_motions(&m, NULL, &g, 3e-6);
     for (uint64_t round = 0; round < 20; round++) {
-        // triangles of every kind: needles, segments, points
+        // triangles of all kinds: general, needles, segments, points
         const size_t n = 20;
         mesh_make(&m, 3 * n, n);
         for (uint64_t i = 0; i < 9 * n; i++) m.vert[i] = 2 * sdm_rng_uniform(3, round, i) - 1;
@@ -91,10 +92,10 @@ static void test_whole_mesh(void **state)
 
 /* ---- sheets that cross ---- */
 
-/* Three boxes that leave an octant free, its corner at the origin: shifting the box behind plane k
-   by p moves the corner to p_k along axis k, and to nothing along the other axes. Inside, d =
-   -|max(p - x, 0)|; outside, the nearest face. */
-static void test_three_sheets(void **state)
+/* Three boxes whose union leaves one octant free, with its vertex at the origin. Shifting box k
+ * along axis k by p_k moves this vertex along axis k; shifts along other axes change nothing.
+ * Inside the union d = -norm(max(p - x, 0)); outside, the nearest face decides. */
+static void test_three_sheets_move_their_vertex(void **state)
 {
     (void)state;
     const double lo[3][3] = {{-9, -8, -8.3}, {-8.1, -9.3, -8.4}, {-8.5, -8.6, -9.7}};
@@ -106,7 +107,7 @@ static void test_three_sheets(void **state)
         mesh_box(&box, lo[b], hi[b]);
         mesh_append(&m, &box);
     }
-    // parameter 3 b + a: box b along axis a
+    // parameter 3 b + a shifts box b along axis a
     double *velocity = room(9 * 3 * m.n_vert, sizeof *velocity);
     for (size_t k = 0; k < 9; k++)
         for (size_t v = 8 * (k / 3); v < 8 * (k / 3) + 8; v++)
@@ -146,17 +147,17 @@ static void test_three_sheets(void **state)
     sdm_mesh_dispose(&box);
 }
 
-/* Four boxes that leave a pyramid free, its apex at the origin. Shifting one decides nothing alone,
-   but a solid that grows has smaller distances, and what the four sheets contribute along their
-   normals makes up the gradient. */
-static void test_four_sheets(void **state)
+/* Four boxes whose union leaves a pyramid free, with its apex at the origin. Shifting one box does
+ * not move the apex in a unique way, but the contributions of the sheets must be >= 0 (a growing
+ * solid reduces the distance) and, multiplied by the sheets' normals, add up to the gradient. */
+static void test_four_sheets_add_up_to_gradient(void **state)
 {
     (void)state;
     sdm_error err = {0};
     sdm_mesh m = {0}, box = {0};
     double out[4][3];
     for (int b = 0; b < 4; b++) {
-        // the box behind the plane z = 0, tilted by 45 degrees and turned about z
+        // the box below the plane z = 0, tilted by 45 degrees and rotated about z
         const double c = cos(PI / 2 * b), s = sin(PI / 2 * b), r = sqrt(0.5);
         const double axis[3][3] = {{r * c, r * s, -r}, {-s, c, 0}, {r * c, r * s, r}};
         mesh_box(&box, (double[3]){-8 - 0.1 * b, -9, -9 - 0.3 * b},
@@ -207,9 +208,9 @@ static void test_four_sheets(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_whole_mesh),
-        cmocka_unit_test(test_three_sheets),
-        cmocka_unit_test(test_four_sheets),
+        cmocka_unit_test(test_translation_and_scaling),
+        cmocka_unit_test(test_three_sheets_move_their_vertex),
+        cmocka_unit_test(test_four_sheets_add_up_to_gradient),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

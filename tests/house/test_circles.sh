@@ -1,13 +1,14 @@
 #!/bin/sh
-# test_circles.sh SOURCE_FOLDER LIBRARY_OR_OBJECT...: no circle of files. A file (a source with the header of its name) stands above another one when it
-# includes its header or when its object code calls a function that the other one defines.
+# test_circles.sh SOURCE_FOLDER LIBRARY_OR_OBJECT...: checks that files do not depend on each other in a cycle. A file here is a source
+# together with the header of the same name. File a uses file b if a includes the header of b or if the object code of a calls a function
+# defined in b.
 set -eu
 root=$1
 shift
 work=$(mktemp -d "${TMPDIR:-/tmp}/test_circles.XXXXXX")
 trap 'rm -rf "$work"' EXIT
 
-# pairs "a b" (a uses b) on standard input; prints those that lie on a circle: b reaches a again
+# circles: reads pairs "a b" (a uses b) and prints those that belong to a cycle, that is, from b one gets back to a
 circles() {
     awk '$1 != $2 && !seen[$1, $2]++ { from[++n] = $1; to[n] = $2; next_of[$1] = next_of[$1] " " $2 }
     function reaches(start, goal,   queue, head, tail, visited, m, list, i) {
@@ -22,7 +23,7 @@ circles() {
     END { for (i = 1; i <= n; i++) if (reaches(to[i], from[i])) print from[i], "uses", to[i] }'
 }
 
-# calls: every symbol has one definition
+# calls OBJECT...: prints pairs "a b" for every symbol that the object code of a uses and b defines
 calls() {
     nm -A -P "$@" | awk '
         NF >= 3 {
@@ -33,7 +34,8 @@ calls() {
         END { for (i = 1; i <= n; i++) if (symbol[i] in defined) print use[i], defined[symbol[i]] }'
 }
 
-# includes; a header shared between parts stands for itself, since its name need not be that of a source
+# includes FOLDER: prints pairs "a b" for every #include. Headers in include/sdm/ count as files of their own, since their names may differ
+# from the source's.
 includes() {
     (cd "$1" && grep -rnoE '^[ \t]*#[ \t]*include[ \t]*"[^"]+"' framework shapes runtime trainer cli --include='*.c' --include='*.cc' \
         --include='*.h' --include='*.inc') | awk -F: '
@@ -56,7 +58,7 @@ if [ -n "$found" ]; then
     exit 1
 fi
 
-# the test itself: a circle of three files is found, and nothing beside it
+# self-test: an added cycle of three files is found, and nothing else
 found=$({ cat "$work/calls"; printf 'one two\ntwo three\nthree one\none status\n'; } | circles | sort | tr '\n' ,)
 [ "$found" = "one uses two,three uses one,two uses three," ] || { echo "self-test: found '$found'"; exit 1; }
 echo "$(sort -u "$work/calls" "$work/includes" | wc -l) uses between files, no circle"

@@ -1,6 +1,6 @@
 #!/bin/sh
-# test_headers.sh SOURCE_FOLDER VERSION CC CXX: every public header compiles alone, twice included, as C11 and as C++17, and the
-# version in sdm/export.h is that of the build.
+# test_headers.sh SOURCE_FOLDER VERSION CC CXX: checks that every header in include/sdm/ compiles on its own, also if included twice, as C11
+# and as C++17, and that the version in sdm/export.h is that of the build.
 set -eu
 root=$1 version=$2 cc=$3 cxx=$4
 work=$(mktemp -d "${TMPDIR:-/tmp}/test_headers.XXXXXX")
@@ -21,7 +21,7 @@ for header in "$root"/*/include/sdm/*.h "$root"/*/include/sdm/internal/*.h; do
     folder=${header%%/include/sdm/*}/include
     name=sdm/${header#*/include/sdm/}
     compile "$name" "$folder" "$root/framework/include" || { echo "$header does not compile alone"; exit 1; }
-    # whatever has functions must be callable from C++
+    # headers with functions must be callable from C++
     if grep -Eq '^(SDM_API|SDM_INTERNAL_API|sdm_status sdm_)' "$header" && ! grep -q '^extern "C" {' "$header"; then
         echo "$header has functions and no extern \"C\""
         exit 1
@@ -30,12 +30,12 @@ for header in "$root"/*/include/sdm/*.h "$root"/*/include/sdm/internal/*.h; do
 done
 [ "$count" -ge 15 ] || { echo "only $count headers found in $root"; exit 1; }
 
-# a plug-in's header stands on nothing but the C library
+# sdm/shape.h, the header for plug-ins, must not include other headers of the project
 mkdir -p "$work/alone/sdm"
 cp "$root/framework/include/sdm/shape.h" "$work/alone/sdm/"
 compile sdm/shape.h "$work/alone" || { echo "sdm/shape.h needs other headers"; exit 1; }
 
-# the test itself: a header that leans on another one's includes is found
+# self-test: a header that lacks an #include is found
 mkdir -p "$work/bad/sdm"
 echo 'size_t leans_on_stddef(void);' >"$work/bad/sdm/bad.h"
 if compile sdm/bad.h "$work/bad" 2>"$work/said"; then

@@ -1,37 +1,40 @@
 #!/bin/sh
-# The order of the house: test_layers.sh SOURCE_FOLDER. Checks the place and name of every file and every #include; then puts wrong
-# ones into a copy and checks that each is found. The table of parts and rooms below is the rule; docs/architecture.md explains it.
+# test_layers.sh SOURCE_FOLDER: checks the place and name of every source file and that every #include follows the layers of the
+# architecture (see CONTRIBUTING.md): which part may use which part, and within a part which folder ("room") may use which. Both rules
+# are in the table below. A self-test then adds files and includes that break a rule to a copy and checks that each is found.
 set -eu
 root=$1
 work=$(mktemp -d "${TMPDIR:-/tmp}/test_layers.XXXXXX")
 trap 'rm -rf "$work"' EXIT
 
-# prints one line for each file or include that breaks the order
+# check FOLDER: prints a line for every file or include that breaks a rule
 check() {
     (cd "$1" && find framework shapes runtime trainer cli -type f | sort) >"$work/files"
     (cd "$1" && awk -v files="$work/files" '
     function wrong(text) { print FILENAME ":" FNR ": " text }
     function basename(path) { sub(/^.*\//, "", path); return path }
     function is_header(path) { return path ~ /\/include\/sdm\// }
-    # the part that a file or a shared header belongs to
+    # the part that a file belongs to; for headers in include/sdm/ according to the table of own()
     function part_of(path,   p) {
         if (is_header(path)) return basename(path) in owner ? owner[basename(path)] : "?"
         split(path, p, "/")
         return p[1] == "framework" ? p[2] : p[1]
     }
-    # the folder of a part, with a slash; empty for headers shared between parts
+    # the root folder of the part of a file, with a slash; empty for headers in include/sdm/
     function root_of(path) {
         if (is_header(path)) return ""
         return match(path, /^(framework\/[a-z]+|[a-z]+)\//) ? substr(path, 1, RLENGTH) : ""
     }
-    # the room of a file within its part: its folder from the root of the part, "." for the root itself
+    # the room of a file: its folder relative to the root of its part, "." for the root itself
     function room_of(path, root,   room) {
         room = substr(path, length(root) + 1)
         return sub(/\/[^\/]*$/, "", room) ? room : "."
     }
+    # a part may use the parts in the list
     function parts(part, list,   n, p, i) { n = split(list, p, " "); for (i = 1; i <= n; i++) allowed[part, p[i]] = 1 }
-    # rooms of a part in order: each uses itself and those before it
+    # rooms of a part in order: each may use itself and those before it
     function rooms(root, list,   n, r, i) { n = split(list, r, " "); for (i = 1; i <= n; i++) rank[root, r[i]] = i }
+    # the headers in include/sdm/ that belong to a part
     function own(part, list,   n, p, i) { n = split(list, p, " "); for (i = 1; i <= n; i++) owner[p[i] ".h"] = part }
     BEGIN {
         own("core", "export grid memory pose status")
@@ -120,7 +123,7 @@ fi
 files=$(grep -c . "$work/files")
 [ "$files" -gt 40 ] || { echo "only $files source files found in $root"; exit 1; }
 
-# self-test: each wrong line, put into a copy, must be found, and nothing else
+# self-test: each line below breaks a rule; appended to a file of a copy, it must be found, and nothing else
 copy=$work/copy
 mkdir "$copy"
 (cd "$root" && tar cf - framework shapes runtime trainer cli) | (cd "$copy" && tar xf -)
@@ -178,7 +181,7 @@ must_find shapes/new.c '#include "sdm/runtime.h"'
 must_find shapes/new.c '#include "sdm/internal/train.h"'
 must_find cli/new.c '#include <dlfcn.h>'
 must_find cli/new.c '#include "sdm/no_such.h"'
-# a folder may have 30 files of its own
+# a folder may have at most 30 files
 n=$(find "$copy/framework/core" -maxdepth 1 -type f | wc -l)
 while [ "$n" -lt 30 ]; do
     n=$((n + 1))

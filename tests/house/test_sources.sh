@@ -1,12 +1,12 @@
 #!/bin/sh
-# test_sources.sh SOURCE_FOLDER: every source is named by a test of it, in the first comment of a file below tests/ ("Tests: bvh.c topology.c"),
-# and every name there is the name of a source.
+# test_sources.sh SOURCE_FOLDER: checks that every source file is listed by at least one test in its first comment ("Tests: bvh.c
+# topology.c"), and that every listed name is that of a source file.
 set -eu
 root=$1
 work=$(mktemp -d "${TMPDIR:-/tmp}/test_sources.XXXXXX")
 trap 'rm -rf "$work"' EXIT
 
-# named FOLDER: "test source" for each name behind "Tests:", up to the end of the comment
+# named FOLDER: prints a line "TEST SOURCE" for each name between "Tests:" and the end of the comment
 named() {
     (cd "$1" && find tests -type f \( -name '*.c' -o -name '*.sh' -o -name '*.py' \) ! -path 'tests/house/*' | sort | xargs awk '
         FNR == 1 { open = 0; done = 0 }
@@ -38,7 +38,7 @@ fi
 sources=$(grep -c . "$work/sources")
 [ "$sources" -gt 100 ] || { echo "only $sources sources found in $root"; exit 1; }
 
-# the test itself: a source without a test, and a name without a source
+# self-test: a source that no test lists and a listed name without a source are found
 mkdir "$work/copy"
 (cd "$root" && tar cf - framework shapes runtime trainer cli tests) | (cd "$work/copy" && tar xf -)
 echo 'int nothing;' >"$work/copy/framework/core/untested.c"

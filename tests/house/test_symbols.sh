@@ -1,7 +1,9 @@
 #!/bin/sh
-# test_symbols.sh SOURCE_FOLDER LIBRARY.so...: the shared libraries export what exported.txt lists, and nothing else. A line of the list:
-#   LIBRARY FUNCTION            for users: declared with SDM_API in an installed header
-#   LIBRARY FUNCTION internal   for the other libraries of the project: declared with SDM_INTERNAL_API in a header that is not installed
+# test_symbols.sh SOURCE_FOLDER LIBRARY.so...: checks that the shared libraries export exactly the functions listed in exported.txt, and
+# that the headers declare the same functions.
+# A line of the list is one of
+# LIBRARY FUNCTION (public: declared with SDM_API in an installed header)
+# LIBRARY FUNCTION internal (for the other libraries of the project: declared with SDM_INTERNAL_API in a header that is not installed)
 set -eu
 root=$1
 shift
@@ -9,7 +11,7 @@ list=$root/tests/house/exported.txt
 work=$(mktemp -d "${TMPDIR:-/tmp}/test_symbols.XXXXXX")
 trap 'rm -rf "$work"' EXIT
 
-# C++ templates of OpenVDB, which must be visible, begin with _Z
+# ignore names that begin with _ or a dot: C++ templates of OpenVDB (_Z...) have to be visible
 for file; do
     name=${file##*/lib}
     nm -D -P --defined-only "$file" | awk -v name="${name%%.so*}" '$2 ~ /^[TDBR]$/ && $1 !~ /^[_.]/ { print name, $1 }'
@@ -21,7 +23,7 @@ if ! diff "$work/listed" "$work/exported" >"$work/diff"; then
     exit 1
 fi
 
-# declared FOLDERS... MACRO: names of the functions whose declaration begins with the macro
+# declared MACRO: reads headers from standard input, prints the names of all functions whose declaration begins with MACRO
 declared() {
     tr '\n' ' ' | grep -oE "(^|[^A-Z_])$1 [^;{]*" | grep -oE 'sdm_[a-z0-9_]+\(' | tr -d '(' | sort -u
 }

@@ -1,7 +1,7 @@
-"""Reads the phantom of write_phantom with the readers other people use and compares values and positions.
+"""Reads the test images of write_phantom with widely used libraries and compares voxel values and positions.
 
 usage: check_images.py WRITE_PHANTOM [FOLDER]
-Readers: numpy (needed), nibabel, vtk, SimpleITK (each optional). Exit status 77 when none of the three is there.
+Needs numpy; uses those of nibabel, vtk and SimpleITK that are installed. Exit status 77 (skipped) if none of the three is.
 """
 import os
 import subprocess
@@ -17,6 +17,7 @@ except ImportError:
     sys.exit(EXIT_SKIPPED)
 
 
+# The readers return a list of (name, values[x][y][z], 3 x 4 affine map from index to LPS mm or (spacing, origin)).
 def read_nibabel(path):
     import nibabel
 
@@ -45,7 +46,7 @@ def read_vtk_mha(path):
     reader.SetFileName(path)
     reader.Update()
     values, data = vtk_values(reader)
-    # this reader leaves the direction out of the image: spacing and origin are all it says
+    # this reader ignores the direction matrix: compare spacing and origin only
     return [("vtk", values, (np.array(data.GetSpacing()), np.array(data.GetOrigin())))]
 
 
@@ -56,12 +57,12 @@ def read_vtk_nifti(path):
     reader.SetFileName(path)
     reader.Update()
     values, data = vtk_values(reader)
-    # where qfac is -1 this reader turns the order of the slices: undo that
+    # for qfac = -1 this reader reverses the order of the slices: undo it
     turn = np.eye(4)
     if reader.GetQFac() < 0:
         turn[2, 2], turn[2, 3] = -1, values.shape[2] - 1
         values = values[:, :, ::-1]
-    # the matrices work on data coordinates: index times spacing
+    # the matrices apply to index * spacing
     step = np.diag(list(data.GetSpacing()) + [1.0])
     found = []
     for name, matrix in (("vtk sform", reader.GetSFormMatrix()), ("vtk qform", reader.GetQFormMatrix())):

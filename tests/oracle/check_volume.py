@@ -1,7 +1,7 @@
-"""Writes images with the libraries other people use and compares what read_volume finds in them: values and positions.
+"""Writes images with widely used libraries and compares the voxel values and positions that read_volume reads from them.
 
 usage: check_volume.py READ_VOLUME [FOLDER]
-Writers: nibabel (NIfTI-1 and -2) and vtk (MetaImage, NIfTI), each optional; numpy is needed. Exit status 77 when there is none.
+Needs numpy; uses those of nibabel (NIfTI-1 and -2) and vtk (MetaImage, NIfTI) that are installed. Exit status 77 (skipped) if neither is.
 """
 import itertools
 import os
@@ -24,7 +24,7 @@ TYPES = ["uint8", "int8", "uint16", "int16", "uint32", "int32", "uint64", "int64
 
 
 def phantom(kind):
-    """Every voxel of its own value where the type has enough of them."""
+    """Test values: all voxels differ where the range of the type allows it."""
     i, j, k = np.meshgrid(*[np.arange(n) for n in SHAPE], indexing="ij")
     if kind in ("uint8", "int8"):
         return (i + 3 * j + 11 * k - (40 if kind == "int8" else 0)).astype(kind)
@@ -42,7 +42,7 @@ def rotation(a, b, c):
 
 
 def frames():
-    """Rotations and reflections: every order and direction of the axes, and oblique ones."""
+    """Direction matrices: all signed permutations of the axes, and oblique rotations with and without a reflection."""
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1, -1), repeat=3):
             m = np.zeros((3, 3))
@@ -55,6 +55,8 @@ def frames():
 
 
 class Checks:
+    """Collects written images and compares them with the output of `program` (read_volume)."""
+
     def __init__(self, program, folder):
         self.program, self.folder, self.todo = program, folder, []
 
@@ -112,19 +114,19 @@ def add_nibabel(checks):
         for ending in (".nii", ".nii.gz"):
             save(make(cls, phantom(kind), affines[-2], order), ending, kind)
     for affine in affines:
-        for codes in ((1, 1), (0, 1), (2, 0)):  # both, qform alone, sform alone
+        for codes in ((1, 1), (0, 1), (2, 0)):  # both transforms, qform only, sform only
             save(make(classes[0], phantom("int16"), affine, sform=codes[0], qform=codes[1]), ".nii", "int16")
         save(make(classes[1], phantom("int16"), affine, sform=0), ".nii", "int16")
-    # both transforms, different ones
+    # sform and qform that differ
     image = make(classes[0], phantom("int16"), affines[-1])
     image.set_sform(affines[-3], 2)
     save(image, ".nii", "int16")
-    # real values in whole numbers: nibabel chooses slope and intercept
+    # real values stored as integers: nibabel chooses slope and intercept
     for kind in ("uint8", "int16", "int32"):
         image = make(classes[0], phantom("float64"), affines[-2])
         image.set_data_dtype(kind)
         save(image, ".nii.gz", kind)
-    # several images of one: dimensions of length 1; an extension before the voxels
+    # extra dimensions of length 1; then a header extension before the voxels
     image = make(classes[0], phantom("int16")[..., None, None], affines[-2])
     path = checks.path(".nii")
     nibabel.save(image, path)
@@ -141,7 +143,7 @@ def add_vtk(checks):
 
     spacing, origin = np.array([0.2, 0.35, 1.25]), np.array([-12.25, 31.5, 7.125])
     plain = np.column_stack([np.diag(spacing), origin])
-    for kind in [t for t in TYPES if not t.endswith("int64")]:  # MetaImage's names of 64-bit integers are not VTK's
+    for kind in [t for t in TYPES if not t.endswith("int64")]:  # VTK names 64-bit integers differently from MetaImage
         image = vtkImageData()
         image.SetDimensions(*SHAPE)
         image.SetSpacing(*spacing)
@@ -161,7 +163,7 @@ def add_vtk(checks):
         writer.SetFileName(path)
         writer.SetInputData(image)
         writer.Write()
-        # VTK takes its coordinates for those of NIfTI, RAS
+        # VTK writes its coordinates as NIfTI's RAS coordinates without conversion
         checks.add(path, phantom(kind), RAS_TO_LPS @ plain, kind)
 
 

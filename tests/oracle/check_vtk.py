@@ -1,14 +1,14 @@
-"""Compares distances of the exact engine, as written by write_exact_points, with those of VTK.
+"""Compares distances of the exact engine, written by write_exact_points, with those of VTK.
 
 usage: check_vtk.py WRITE_EXACT_POINTS
-VTK's vtkImplicitPolyDataDistance gives unsigned distances here: its sign is a pseudo-normal's and is not judged.
-Exit status 77 without VTK (Debian: python3-vtk9).
+Only absolute values are compared, because vtkImplicitPolyDataDistance takes its sign from pseudo-normals.
+Exit status 77 (skipped) without VTK (Debian: python3-vtk9).
 """
 import subprocess
 import sys
 
 EXIT_SKIPPED = 77
-TOLERANCE = 1e-9  # of the largest coordinate; VTK itself is off by up to 1e-10 near needles
+TOLERANCE = 1e-9  # relative to the largest coordinate; VTK has errors of up to 1e-10 near needles
 
 try:
     import vtk

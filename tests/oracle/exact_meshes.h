@@ -1,5 +1,5 @@
-/* Meshes for the tests and benchmarks of the exact engine: boxes, spheres, and a tube along a
- * spiral that overlaps itself. */
+/* Meshes for tests and benchmarks of the exact engine: boxes, spheres, and a self-overlapping tube
+ * along a spiral; with closed-form distances for some of them. */
 #ifndef SDM_TEST_EXACT_MESHES_H
 #define SDM_TEST_EXACT_MESHES_H
 
@@ -33,7 +33,7 @@ static inline void mesh_flip(sdm_mesh *m)
         mesh_triangle(m, t, m->tri[3 * t], m->tri[3 * t + 2], m->tri[3 * t + 1]);
 }
 
-/* Appends a copy of b. */
+/* Appends a copy of b to a. */
 static inline void mesh_append(sdm_mesh *a, const sdm_mesh *b)
 {
     const size_t nv = a->n_vert, nt = a->n_tri;
@@ -42,7 +42,8 @@ static inline void mesh_append(sdm_mesh *a, const sdm_mesh *b)
     for (size_t i = 0; i < 3 * b->n_tri; i++) a->tri[3 * nt + i] = b->tri[i] + (uint32_t)nv;
 }
 
-/* Rotation by a quaternion of any length, columns orthonormal to rounding. */
+/* Rotation matrix r (row-major) of a quaternion (w, x, y, z) of any length but 0; orthonormal to
+ * rounding. */
 static inline void quaternion_rotation(const double q[4], double r[9])
 {
     const double len = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
@@ -53,7 +54,7 @@ static inline void quaternion_rotation(const double q[4], double r[9])
     for (int i = 0; i < 9; i++) r[i] = m[i];
 }
 
-/* Distance between x and the box between two corners; negative inside of it. */
+/* Signed distance from x to the box with corners lo and hi; negative inside. */
 static inline double box_distance(const double x[3], const double lo[3], const double hi[3])
 {
     double out = 0, in = -INFINITY;
@@ -65,7 +66,7 @@ static inline double box_distance(const double x[3], const double lo[3], const d
     return in > 0 ? sqrt(out) : in;
 }
 
-/* Box between two corners, 12 triangles. */
+/* Box from corner lo to corner hi, 12 triangles. */
 static inline void mesh_box(sdm_mesh *m, const double lo[3], const double hi[3])
 {
     static const uint8_t quad[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
@@ -79,7 +80,7 @@ static inline void mesh_box(sdm_mesh *m, const double lo[3], const double hi[3])
     }
 }
 
-/* Sphere of n rings and 2 n meridians, vertices on the sphere. */
+/* Sphere of n latitude bands and 2 n meridians; all vertices lie on the sphere. */
 static inline void mesh_sphere(sdm_mesh *m, const double centre[3], double radius, size_t n)
 {
     const double pi = 3.14159265358979323846;
@@ -108,7 +109,8 @@ static inline void mesh_sphere(sdm_mesh *m, const double centre[3], double radiu
     }
 }
 
-/* The reconstructed cochlea: a tube along a logarithmic spiral with a longitudinal wave. */
+/* Model of a cochlea: a tube around a logarithmic spiral of radius a exp(-b theta), 0 <= theta <=
+ * end, with a longitudinal wave (amplitude alpha, phase phi) and a widened start (flare, mm). */
 typedef struct spiral {
     double a, b, alpha, phi, end, flare;
 } spiral;
@@ -135,13 +137,14 @@ static inline double spiral_radius(const spiral *s, double theta)
     return 1.11 - 0.02 * theta + s->flare * exp(-theta / 0.35);
 }
 
-/* Swept-sphere oracle: min over the centreline of |x - c| - R. */
+/* Signed distance to the union of spheres along the centreline: min over theta of norm(x - c) - R.
+ * Exact outside; inside it is only a bound. */
 static inline double spiral_distance(const spiral *s, const double x[3])
 {
     double best = INFINITY, at = 0;
     const int n = 1000;
     for (int pass = 0; pass < 3; pass++) {
-        // refine around the best sample
+        // sample the whole centreline, then twice around the best sample
         const double half = pass == 0 ? s->end / 2 : pass == 1 ? s->end / n : s->end / n / 50;
         const double mid = pass == 0 ? s->end / 2 : at;
         for (int i = 0; i <= n; i++) {
@@ -159,11 +162,11 @@ static inline double spiral_distance(const spiral *s, const double x[3])
     return best;
 }
 
-/* Tube with edges of about `edge`, spherical caps at both ends. */
+/* Tube with edges of about `edge` mm and spherical caps at both ends. */
 static inline void mesh_spiral(sdm_mesh *m, const spiral *s, double edge)
 {
     const double pi = 3.14159265358979323846;
-    // rings at equal steps of the centreline
+    // rings are equally spaced along the centreline
     const int fine = 20000;
     double *length = malloc(sizeof *length * (size_t)(fine + 1));
     if (!length) abort();

@@ -1,5 +1,5 @@
-/* A random mesh with its engine, and what the tests of both ask: truth, tolerances, voxels. Include
- * after cmocka.h. */
+/* A random mesh with its exact engine ("subject"), and what tests of the engine need: expected
+ * signs, tolerances, maps, random grids. Include after cmocka.h. */
 #ifndef SDM_TEST_EXACT_SUBJECT_H
 #define SDM_TEST_EXACT_SUBJECT_H
 
@@ -12,19 +12,19 @@
 
 enum { SUBJECT_SEED = 2026 };
 
-/* Largest error of a distance, in roundings: DBL_EPSILON times the largest coordinate of the mesh
- * and of the point. */
+/* Largest error allowed for a distance, in units of rounding_at(). */
 static const double bound = 16;
 
-/* Signs of open meshes are sums of rounded angles: not judged nearer to the surface than this share
- * of its size. */
+/* Signs of open meshes come from rounded sums of angles: they are not checked nearer to the surface
+ * than this fraction of its size. */
 static const double open_margin = 1e-8;
 
 typedef struct subject {
     const random_family *family;
     uint64_t number;
-    sdm_mesh mesh, solid; // as given, and with what the engine reports to have turned
-    double largest, size; // coordinate, edge of the bounding box
+    // solid: the mesh with all parts reversed that the engine reports as reversed
+    sdm_mesh mesh, solid;
+    double largest, size; // largest abs(coordinate), longest edge of the bounding box
     sdm_exact *engine;
     const sdm_exact_report *report;
     dice dice;
@@ -48,7 +48,7 @@ static inline sdm_exact *engine_of(const subject *s, const sdm_mesh *m, const sd
     return e;
 }
 
-/* Turns connected parts of negative volume; returns their number. */
+/* Reverses all connected parts with a negative volume; returns their number. */
 static inline size_t turn_parts(sdm_mesh *m)
 {
     uint32_t *part = malloc(m->n_vert * sizeof *part);
@@ -81,6 +81,7 @@ static inline size_t turn_parts(sdm_mesh *m)
     return n;
 }
 
+/* Makes mesh `number` with its engine; free with subject_dispose(). */
 static inline void subject_make(subject *s, uint64_t number, const sdm_exact_opts *opts)
 {
     double lo[3], hi[3];
@@ -102,6 +103,8 @@ static inline void subject_dispose(subject *s)
     sdm_mesh_dispose(&s->solid);
 }
 
+/* Unit of rounding errors at x: DBL_EPSILON times the largest abs(coordinate) of the mesh and of x.
+ */
 static inline double rounding_at(const subject *s, const double x[3])
 {
     double largest = s->largest;
@@ -109,18 +112,18 @@ static inline double rounding_at(const subject *s, const double x[3])
     return DBL_EPSILON * largest;
 }
 
-/* Is p inside? Right where it is farther from all triangles than rounding. */
+/* Is p inside the solid? Reliable if p is farther from all triangles than rounding. */
 static inline bool truly_inside(const subject *s, point p)
 {
     const real w = brute_winding(&s->solid, p);
     if (!s->report->audit.closed) return w > 0.5L;
-    // the sum of the solid angles of a closed mesh is whole
+    // the winding number of a closed mesh is an integer
     if (!(fabsl(w - roundl(w)) < 1e-3L))
         fail_msg("mesh %u, %s: winding number %.9Lg", (unsigned)s->number, s->family->name, w);
     return lroundl(w) >= 1;
 }
 
-/* Position of voxel i of values[nz][ny][nx]. */
+/* Position of voxel i of a map values[nz][ny][nx]. */
 static inline void voxel(const sdm_grid *g, size_t i, double x[3])
 {
     const size_t nx = (size_t)g->n[0], ny = (size_t)g->n[1];
@@ -137,8 +140,9 @@ static inline float *map_of(const subject *s, const sdm_exact *e, const sdm_grid
     return v;
 }
 
-/* A grid around or near the mesh. Exact: the positions of all voxels are numbers without rounding.
-   Otherwise voxels on corners of the mesh, or rotated, reflected and with three spacings. */
+/* A random grid around or near the mesh, possibly mirrored. *exact = true: all voxel positions are
+ * exact in floating point. Otherwise one voxel lies on a vertex of the mesh, and half of these
+ * grids are rotated with three different spacings. */
 static inline sdm_grid random_grid(subject *s, bool *exact)
 {
     dice *d = &s->dice;
@@ -162,7 +166,8 @@ static inline sdm_grid random_grid(subject *s, bool *exact)
     return g;
 }
 
-/* Arguments of the program: how many meshes (n_meshes if none), and the number of the first one. */
+/* Reads the program's arguments [MESHES [FIRST]]: number of meshes (default: *n_meshes) and number
+ * of the first one (default: 0). */
 static inline void subject_range(int argc, char **argv, uint64_t *n_meshes, uint64_t *first)
 {
     if (argc > 1) *n_meshes = strtoull(argv[1], NULL, 10);

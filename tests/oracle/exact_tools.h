@@ -1,4 +1,4 @@
-/* What the tests of the exact engine begin with; cmocka.h comes before. */
+/* Common helpers for tests of the exact engine. Include after cmocka.h. */
 #ifndef SDM_TEST_EXACT_TOOLS_H
 #define SDM_TEST_EXACT_TOOLS_H
 
@@ -6,6 +6,7 @@
 
 #include "sdm/exact.h"
 
+/* The engine of m; the test fails if it cannot be created. */
 static inline sdm_exact *engine(const sdm_mesh *m, const sdm_exact_opts *o)
 {
     sdm_exact *e = NULL;
@@ -14,6 +15,7 @@ static inline sdm_exact *engine(const sdm_mesh *m, const sdm_exact_opts *o)
     return e;
 }
 
+/* n zeroed elements; aborts if there is no memory (caller frees). */
 static inline void *room(size_t n, size_t size)
 {
     void *p = calloc(n, size);
@@ -21,7 +23,7 @@ static inline void *room(size_t n, size_t size)
     return p;
 }
 
-/* Centre of voxel i of a map. */
+/* Position of voxel i of a map values[nz][ny][nx]. */
 static inline void position(const sdm_grid *g, size_t i, double x[3])
 {
     const size_t nx = (size_t)g->n[0], ny = (size_t)g->n[1];

@@ -1,5 +1,5 @@
-/* Common parts of the tests of fits: a small ellipsoid and phantoms of it. Include cmocka.h before.
- */
+/* Common parts of the tests of fits: a small ellipsoid, phantom images of it, options. Include
+ * after cmocka.h. */
 #ifndef SDM_TEST_FIT_TOOLS_H
 #define SDM_TEST_FIT_TOOLS_H
 
@@ -42,7 +42,7 @@ static inline sdm_fit_source exact_source(void)
         .grid = sdm_grid_centred((int64_t[3]){30, 28, 26}, 0.25, (double[3]){0, 0, 0})};
 }
 
-/* An image grid with rotated axes and a different spacing along each. */
+/* An image grid with rotated axes and a different spacing along each axis. */
 static inline sdm_grid image_grid(void)
 {
     sdm_grid g = sdm_grid_centred((int64_t[3]){36, 30, 26}, 0.25, (double[3]){0, 0, 0});
@@ -56,7 +56,8 @@ static inline sdm_grid image_grid(void)
     return g;
 }
 
-/* Phantom image of the ellipsoid (caller frees); noise: factor on the default noise and texture. */
+/* Phantom image of the ellipsoid (caller frees). noise: factor on the default standard deviations
+ * of texture and noise. */
 static inline float *phantom(const double *p, const sdm_pose *pose, double noise, uint64_t seed)
 {
     sdm_error err = {0};
@@ -80,7 +81,7 @@ static inline sdm_fit_target image_of(const float *values)
 
 static const double START[3] = {2.2, 2.0, 1.5};
 
-/* Options with a start near the truth, but not at it. */
+/* Options with start values near the truth. */
 static inline sdm_fit_opts near_start(void)
 {
     sdm_fit_opts o = sdm_fit_defaults();
@@ -100,8 +101,8 @@ static inline sdm_fit_result fit(const sdm_fit_target *t, const sdm_fit_opts *o)
     return r;
 }
 
-/* e[n_params + 6]: errors in the order of the covariance: parameters, rotation (rad, about the
- * world's axes), translation (mm). */
+/* Errors of a fit: e[n_params + 6] in the order of the covariance matrix: parameters, rotation
+ * vector (rad, about the axes of the world frame), translation (mm). */
 static inline void errors(const sdm_fit_result *r, const double *p, const sdm_pose *pose, double *e)
 {
     double a[9], b[9], m[9] = {0};

@@ -1,6 +1,6 @@
-/* Oracles of the exact engine in long double: every triangle of a mesh, nothing precomputed,
-   nothing shared with the engine. Distance by regions (Ericson, Real-Time Collision Detection,
-   2005, 5.1.5), winding number by solid angles (Van Oosterom and Strackee 1983). */
+/* Brute-force reference for the exact engine in long double. It visits every triangle, precomputes
+ * nothing and shares no code with the engine. Distance: Ericson, Real-Time Collision Detection,
+ * 2005, 5.1.5; winding number: Van Oosterom and Strackee 1983. */
 #ifndef SDM_TEST_LONG_DOUBLE_H
 #define SDM_TEST_LONG_DOUBLE_H
 
@@ -47,8 +47,8 @@ static inline point nearer(point p, point q, point r)
     return distance(p, r) < distance(p, q) ? r : q;
 }
 
-/* Closest point inside a needle a b c, c opposite its longest edge: the distance to the chord at
- * height s is convex in s. */
+/* Closest point of a needle a b c whose longest edge is a b. Searches along its height: the
+ * distance to the chord at height s is a convex function of s. */
 static inline point closest_on_needle(point p, point a, point b, point c)
 {
     real lo = 0, hi = 1;
@@ -66,8 +66,8 @@ static inline point closest_on_needle(point p, point a, point b, point c)
     return best;
 }
 
-/* Closest point of a triangle, exact to the rounding of long double for every shape of it; not so
-   exact where it is farther than `best`. */
+/* Closest point of a triangle of any shape, exact to the rounding of long double. Only if it is
+ * farther than `best` may the result be less accurate. */
 static inline point closest_within(point p, point a, point b, point c, real best)
 {
     point q = nearer(p, nearer(p, closest_on_segment(p, a, b), closest_on_segment(p, b, c)),
@@ -78,8 +78,8 @@ static inline point closest_within(point p, point a, point b, point c, real best
     const real area2 = length(n);
     if (!(longest > 0)) return q;
     if (!(area2 > 1e-3L * longest * longest)) {
-        // a needle has no normal to rely on; its inside is nearer than its sides by its height at
-        // most
+        // The normal of a needle is inaccurate. Interior points are nearer than the edges by at
+        // most its height: if that cannot beat `best`, the edges suffice.
         if (distance(p, q) - area2 / longest > best) return q;
         if (ab == longest) return nearer(p, q, closest_on_needle(p, a, b, c));
         return nearer(
@@ -98,7 +98,7 @@ static inline point closest_on_triangle(point p, point a, point b, point c)
     return closest_within(p, a, b, c, INFINITY);
 }
 
-/* Distance from x to the nearest of all triangles. */
+/* Distance from x to the nearest triangle of the mesh. */
 static inline real brute_distance(const sdm_mesh *m, const double x[3])
 {
     const point p = point_of(x);
@@ -106,14 +106,14 @@ static inline real brute_distance(const sdm_mesh *m, const double x[3])
     for (size_t t = 0; t < m->n_tri; t++) {
         const point a = corner_of(m, 3 * t), b = corner_of(m, 3 * t + 1),
                     c = corner_of(m, 3 * t + 2);
-        // no point of the triangle is farther from its corner a than the longer edge there
+        // skip: no point of the triangle is farther from a than the longer of the two edges at a
         if (distance(p, a) - fmaxl(distance(a, b), distance(a, c)) > best) continue;
         best = fminl(best, distance(p, closest_within(p, a, b, c, best)));
     }
     return best;
 }
 
-/* A type of more than 100 bits. */
+/* A floating-point type with more than 100 bits of mantissa where the compiler has one. */
 #ifdef __SIZEOF_FLOAT128__
 __extension__ typedef __float128 wide;
 #else
@@ -133,9 +133,9 @@ static inline wide wide_length(const wide a[3])
     return root;
 }
 
-/* Half the solid angle of a triangle with corners r relative to the eye. The two parts of the
-   tangent may cancel down to the last bits of a double where the eye is close to the triangle or
-   the triangle is a needle: there in wide numbers. */
+/* Half the solid angle of a triangle; r: its vertices relative to the eye point. Numerator and
+ * denominator of the tangent may cancel almost completely if the eye is close to the triangle or
+ * the triangle is a needle; then the type `wide` is used. */
 static inline real half_solid_angle(const point r[3])
 {
     const real l[3] = {length(r[0]), length(r[1]), length(r[2])};
@@ -155,7 +155,7 @@ static inline real half_solid_angle(const point r[3])
     const wide det = wide_dot(v[0], c);
     const wide den = len[0] * len[1] * len[2] + wide_dot(v[0], v[1]) * len[2] +
                      wide_dot(v[1], v[2]) * len[0] + wide_dot(v[2], v[0]) * len[1];
-    // seen from its plane a triangle has no solid angle; on it there is no answer
+    // 0 for an eye in the triangle's plane (on the triangle itself the angle is undefined)
     return det != 0 ? atan2l((long double)det, (long double)den) : 0;
 }
 

@@ -1,4 +1,4 @@
-/* What the tests of phantoms begin with: shapes, a grid, options; cmocka.h comes before. */
+/* Common parts of the tests of phantoms: two shapes, grids, options. Include after cmocka.h. */
 #ifndef SDM_TEST_PHANTOM_TOOLS_H
 #define SDM_TEST_PHANTOM_TOOLS_H
 
@@ -11,7 +11,8 @@
 
 #define PI 3.14159265358979323846
 
-/* A block whose face x = 0 is all a small grid sees of it: inside is x < 0. */
+/* A block so large that a small grid around the origin meets only its face x = 0: a half space,
+ * inside is x < 0. */
 static inline int block_mesh(const void *self, const sdm_host *host,
                              const sdm_option_value *options, const double *p, sdm_mesh_out *out)
 {
@@ -61,13 +62,14 @@ static inline int tear_down(void **state)
     return 0;
 }
 
-/* Shares of the inside: no blur, no noise. */
+/* Options without blur and noise, inside 1 and outside 0: the phantom's values are the fractions of
+ * the voxels that lie inside. */
 static inline sdm_phantom_opts plain(void)
 {
     return (sdm_phantom_opts){.inside = {1, 0}, .outside = {0, 0}, .supersampling = 3, .seed = 7};
 }
 
-/* Not along the axes, three spacings, left-handed. */
+/* An oblique, left-handed grid around the origin with a different spacing along each axis. */
 static inline sdm_grid oblique(int64_t nx, int64_t ny, int64_t nz)
 {
     const double a = 0.4, ca = cos(a), sa = sin(a), b = -0.7, cb = cos(b), sb = sin(b);
@@ -82,6 +84,7 @@ static inline sdm_grid oblique(int64_t nx, int64_t ny, int64_t nz)
     return g;
 }
 
+/* A phantom image of the shape (caller frees). label: [count] or NULL. */
 static inline float *make(const sdm_instance *shape, const double *p, const sdm_pose *pose,
                           const sdm_phantom_opts *o, const sdm_grid *g, uint8_t *label)
 {

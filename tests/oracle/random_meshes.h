@@ -1,5 +1,5 @@
-/* Random meshes for the tests of the exact engine, and points where engines fail: mesh number i is
-   the same everywhere. Families are listed in random_families[]. */
+/* Random meshes for tests of the exact engine (see random_families[]) and query points at which
+ * such engines tend to fail. Mesh number i is the same on all machines. */
 #ifndef SDM_TEST_RANDOM_MESHES_H
 #define SDM_TEST_RANDOM_MESHES_H
 
@@ -7,6 +7,7 @@
 
 /* ---- solids that overlap ---- */
 
+/* A sphere with randomly displaced vertices. */
 static inline void random_shaken(sdm_mesh *m, dice *d)
 {
     const double zero[3] = {0, 0, 0}, much = roll(d, 0.1, 0.5);
@@ -14,13 +15,14 @@ static inline void random_shaken(sdm_mesh *m, dice *d)
     for (size_t i = 0; i < 3 * m->n_vert; i++) m->vert[i] += roll(d, -much, much);
 }
 
+/* A torus whose tube is wider than its hole: it overlaps itself. */
 static inline void random_spindle(sdm_mesh *m, dice *d)
 {
     const size_t nu = 3 + pick(d, 8), nv = 3 + pick(d, 5);
     make_torus(m, 1, roll(d, 1.0, 2.0), nu, nv);
 }
 
-/* Copies of a solid moved a little, by multiples of 1/4, or not at all. */
+/* Several solids, mostly copies of one, shifted a little, by multiples of 1/4, or not at all. */
 static inline void random_copies(sdm_mesh *m, dice *d)
 {
     sdm_mesh base = {0}, part = {0};
@@ -39,9 +41,9 @@ static inline void random_copies(sdm_mesh *m, dice *d)
     sdm_mesh_dispose(&part);
 }
 
-/* ---- closed meshes with surface that bounds nothing ---- */
+/* ---- closed meshes, parts of whose surface enclose nothing ---- */
 
-/* A solid, the same again two or three times, some of them turned. */
+/* A solid and one to three copies of it at the same place, some of them reversed. */
 static inline void random_layers(sdm_mesh *m, dice *d)
 {
     sdm_mesh part = {0};
@@ -54,7 +56,7 @@ static inline void random_layers(sdm_mesh *m, dice *d)
     sdm_mesh_dispose(&part);
 }
 
-/* A wavy sheet with a front and a back, alone or across a box. */
+/* A wavy or flat sheet with a front and a back side, alone or across a box. */
 static inline void random_sheet(sdm_mesh *m, dice *d)
 {
     const size_t n = 2 + pick(d, 3);
@@ -96,7 +98,7 @@ static inline void random_turned_part(sdm_mesh *m, dice *d)
 
 /* ---- meshes that are not closed ---- */
 
-/* Triangles anywhere: some without area, needles, points, on a lattice. */
+/* Random separate triangles: some of zero area, needles, points, or on a lattice. */
 static inline void random_soup(sdm_mesh *m, dice *d)
 {
     const size_t n = 1 + pick(d, 40);
@@ -118,7 +120,7 @@ static inline void random_soup(sdm_mesh *m, dice *d)
     }
 }
 
-/* A solid with holes. */
+/* A solid with some triangles removed. */
 static inline void random_cup(sdm_mesh *m, dice *d)
 {
     random_solid(m, d);
@@ -129,7 +131,7 @@ static inline void random_cup(sdm_mesh *m, dice *d)
     }
 }
 
-/* A solid with some triangles turned. */
+/* A solid with some triangles reversed. */
 static inline void random_mixed(sdm_mesh *m, dice *d)
 {
     random_solid(m, d);
@@ -161,7 +163,7 @@ static inline void random_moebius(sdm_mesh *m, dice *d)
 typedef enum surface_kind {
     SURFACE_BOUNDARY, /* closed, all of it bounds the solid */
     SURFACE_OVERLAP,  /* closed, some of it lies inside the solid */
-    SURFACE_CANCELS,  /* closed, some of it bounds nothing on either side */
+    SURFACE_CANCELS,  /* closed, some of it has the outside on both sides */
     SURFACE_OPEN
 } surface_kind;
 
@@ -187,7 +189,7 @@ static const random_family random_families[] = {
     {"spindle", random_spindle, SURFACE_OVERLAP},
     {"copies", random_copies, SURFACE_OVERLAP},
     {"shaken", random_shaken,
-     SURFACE_CANCELS}, // loops of the shaken surface may enclose places less than no times
+     SURFACE_CANCELS}, // loops of the surface may have a negative winding number
     {"layers", random_layers, SURFACE_CANCELS},
     {"sheet", random_sheet, SURFACE_CANCELS},
     {"turned part", random_turned_part, SURFACE_CANCELS},
@@ -198,8 +200,8 @@ static const random_family random_families[] = {
 };
 enum { RANDOM_FAMILIES = sizeof random_families / sizeof *random_families };
 
-/* Mesh number `number` of a family, as it is, rotated, moved or scaled, with its triangles
- * shuffled. */
+/* Makes mesh `number`: of family number % RANDOM_FAMILIES, possibly rotated, shifted and scaled,
+ * with triangles in random order. Returns its family. */
 static inline const random_family *random_mesh(sdm_mesh *m, uint64_t seed, uint64_t number)
 {
     const random_family *f = &random_families[number % RANDOM_FAMILIES];
@@ -220,7 +222,7 @@ static inline const random_family *random_mesh(sdm_mesh *m, uint64_t seed, uint6
     return f;
 }
 
-/* Box of the vertices in use, and the largest of their coordinates. */
+/* Bounding box of all vertices that triangles use; returns their largest abs(coordinate). */
 static inline double mesh_bounds(const sdm_mesh *m, double lo[3], double hi[3])
 {
     double largest = 0;
@@ -239,9 +241,10 @@ static inline double mesh_bounds(const sdm_mesh *m, double lo[3], double hi[3])
     return largest;
 }
 
-/* A point where engines fail: on corners, edges, faces, their lines and planes; from there nowhere,
-   a little away, along an axis (so that rays along the axes meet needles, edges and corners), far
-   away; with coordinates of several corners; or anywhere around. */
+/* A query point at which engines tend to fail. A point on a vertex, an edge, a face, or on their
+ * lines and planes is shifted: not at all, a little, or along one axis or two (so that
+ * axis-parallel rays hit needles, edges and vertices). Or: coordinates taken from several vertices,
+ * anywhere near the mesh, or far away. */
 static inline void random_point(const sdm_mesh *m, dice *d, double x[3])
 {
     double lo[3], hi[3], size = 0;
@@ -250,7 +253,8 @@ static inline void random_point(const sdm_mesh *m, dice *d, double x[3])
     const size_t t = pick(d, m->n_tri), axis = pick(d, 3);
     const double *v[3];
     for (size_t k = 0; k < 3; k++) v[k] = &m->vert[3 * (size_t)m->tri[3 * t + k]];
-    double s = roll(d, 0, 1), r = roll(d, 0, 1 - s); // on the face
+    // barycentric coordinates; here a point of the face
+    double s = roll(d, 0, 1), r = roll(d, 0, 1 - s);
     switch (pick(d, 8)) {
     case 0:
         s = r = 0;

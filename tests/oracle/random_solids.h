@@ -1,5 +1,5 @@
-/* Random solids without overlap for the tests of the exact engine, from the project's counter-based
-   random numbers; and what moves meshes. */
+/* Random closed meshes for tests of the exact engine, from the project's counter-based random
+ * numbers; and functions that move and reorder meshes. */
 #ifndef SDM_TEST_RANDOM_SOLIDS_H
 #define SDM_TEST_RANDOM_SOLIDS_H
 
@@ -8,31 +8,35 @@
 #include "oracle/exact_meshes.h"
 #include "sdm/internal/rng.h"
 
-/* A sequence of random numbers. */
+/* A sequence of random numbers, fixed by seed and stream; next: index of the next number. */
 typedef struct dice {
     uint64_t seed, stream, next;
 } dice;
 
+/* Uniform in [lo, hi). */
 static inline double roll(dice *d, double lo, double hi)
 {
     return lo + (hi - lo) * sdm_rng_uniform(d->seed, d->stream, d->next++);
 }
+/* An integer, uniform in [0, n). */
 static inline size_t pick(dice *d, size_t n)
 {
     return (size_t)sdm_rng_below(d->seed, d->stream, d->next++, n);
 }
+/* 10^x with x uniform in [lo, hi). */
 static inline double power_of_ten(dice *d, double lo, double hi)
 {
     return pow(10, roll(d, lo, hi));
 }
 
-/* A number in [lo, hi], in half of the calls a multiple of 1/4. */
+/* A random number in [lo, hi], rounded to a multiple of 1/4 in half of the calls. */
 static inline double lattice(dice *d, double lo, double hi)
 {
     const double x = roll(d, lo, hi);
     return pick(d, 2) ? round(4 * x) / 4 : x;
 }
 
+/* A random rotation matrix, row-major. */
 static inline void rotation(dice *d, double r[9])
 {
     double q[4];
@@ -40,6 +44,7 @@ static inline void rotation(dice *d, double r[9])
     quaternion_rotation(q, r);
 }
 
+/* y = r x; y may be x. */
 static inline void rotate(const double r[9], const double x[3], double y[3])
 {
     double t[3];
@@ -62,7 +67,7 @@ static inline void mesh_move(sdm_mesh *m, const double by[3])
     for (size_t i = 0; i < 3 * m->n_vert; i++) m->vert[i] += by[i % 3];
 }
 
-/* Triangles in random order, each starting at a random corner. */
+/* Puts the triangles into random order, each starting at a random vertex. */
 static inline void mesh_shuffle(sdm_mesh *m, dice *d)
 {
     for (size_t t = m->n_tri; t-- > 0;) {
@@ -94,7 +99,8 @@ static inline void random_tetrahedron(sdm_mesh *m, dice *d)
     for (size_t t = 0; t < 4; t++) mesh_triangle(m, t, face[t][0], face[t][1], face[t][2]);
 }
 
-/* A sphere whose radius changes from vertex to vertex: spikes and dents that meet nothing. */
+/* A star-shaped solid: a sphere whose radius varies from vertex to vertex, with spikes and dents
+ * but no self-intersections. */
 static inline void random_star(sdm_mesh *m, dice *d)
 {
     const double zero[3] = {0, 0, 0}, least = pick(d, 3) ? 0.5 : power_of_ten(d, -6, -1);
@@ -105,7 +111,7 @@ static inline void random_star(sdm_mesh *m, dice *d)
     }
 }
 
-/* Hull of a few points by trying every triple. */
+/* Convex hull of a few random points: tries every triple of points as a face. */
 static inline void random_hull(sdm_mesh *m, dice *d)
 {
     const size_t n = 4 + pick(d, 9);
@@ -138,7 +144,8 @@ static inline void random_hull(sdm_mesh *m, dice *d)
     m->n_tri = count;
 }
 
-/* Torus; a spindle that overlaps itself when the tube is wide. */
+/* Torus with radius `big` of its circle and `small` of its tube; for small > big a spindle torus,
+ * which overlaps itself. */
 static inline void make_torus(sdm_mesh *m, double big, double small, size_t nu, size_t nv)
 {
     const double pi = 3.14159265358979323846;
@@ -162,7 +169,7 @@ static inline void random_torus(sdm_mesh *m, dice *d)
     make_torus(m, 1, roll(d, 0.05, 0.95), nu, nv);
 }
 
-/* Extruded star polygon: fins where its radius is large, down to no width at its waist. */
+/* Extruded star polygon: n / 2 fins, joined at a waist that may be extremely narrow. */
 static inline void random_prism(sdm_mesh *m, dice *d)
 {
     const size_t n = 3 + pick(d, 12);
@@ -183,7 +190,7 @@ static inline void random_prism(sdm_mesh *m, dice *d)
     mesh_vertex(m, 2 * n + 1, 0, 0, height);
 }
 
-/* A wedge as sharp as 1e-12. */
+/* A wedge with a thickness from 1e-12 to 1. */
 static inline void random_wedge(sdm_mesh *m, dice *d)
 {
     static const uint8_t face[8][3] = {{0, 2, 1}, {3, 4, 5}, {0, 1, 4}, {0, 4, 3},
@@ -198,7 +205,7 @@ static inline void random_wedge(sdm_mesh *m, dice *d)
     for (size_t t = 0; t < 8; t++) mesh_triangle(m, t, face[t][0], face[t][1], face[t][2]);
 }
 
-/* Two boxes a little apart, or one that is as thin as the gap. */
+/* Two boxes separated by a narrow gap; the first one may be as thin as the gap. */
 static inline void random_gap(sdm_mesh *m, dice *d)
 {
     const double gap = power_of_ten(d, -12, -1), lo[3] = {0, 0, 0},
@@ -212,6 +219,7 @@ static inline void random_gap(sdm_mesh *m, dice *d)
     sdm_mesh_dispose(&part);
 }
 
+/* A solid of a random kind, oriented outwards. */
 static inline void random_solid(sdm_mesh *m, dice *d)
 {
     static void (*const make[])(sdm_mesh *, dice *) = {
@@ -229,7 +237,7 @@ static inline void random_solid(sdm_mesh *m, dice *d)
     if (volume < 0) mesh_flip(m);
 }
 
-/* A solid in a solid's cavity, turned inwards, and perhaps another one in it. */
+/* Nested concentric spheres, alternately a solid and a cavity, two to four in all. */
 static inline void random_cavity(sdm_mesh *m, dice *d)
 {
     const double zero[3] = {0, 0, 0};
@@ -244,8 +252,8 @@ static inline void random_cavity(sdm_mesh *m, dice *d)
     sdm_mesh_dispose(&part);
 }
 
-/* Cubes of a lattice with all faces between full and empty: edges of four triangles, corners that
- * touch. */
+/* A union of unit cubes of a lattice; its mesh consists of all faces between full and empty cells.
+ * Has edges with four triangles and vertices where cubes only touch. */
 static inline void random_cubes(sdm_mesh *m, dice *d)
 {
     enum { N = 3 };
@@ -277,13 +285,14 @@ static inline void random_cubes(sdm_mesh *m, dice *d)
     }
 }
 
-/* Two boxes that touch at a corner, along an edge, or on a face, whole or in part. */
+/* Two boxes that touch at a vertex, along an edge, or at a face, fully or in part. */
 static inline void random_touch(sdm_mesh *m, dice *d)
 {
     double lo[3] = {0, 0, 0}, hi[3] = {1, 1, 1};
     sdm_mesh part = {0};
     mesh_box(m, lo, hi);
-    const size_t shared = 1 + pick(d, 3); // axes along which they only touch
+    // number of axes along which the boxes touch without overlap
+    const size_t shared = 1 + pick(d, 3);
     for (size_t a = 0; a < 3; a++) {
         lo[a] = a < shared ? 1 : 0.25 * (double)pick(d, 4);
         hi[a] = lo[a] + 0.25 * (double)(1 + pick(d, 4));
@@ -293,8 +302,8 @@ static inline void random_touch(sdm_mesh *m, dice *d)
     sdm_mesh_dispose(&part);
 }
 
-/* A solid whose triangles are split at points inside, on edges, and on corners: slivers, triangles
- * without area, repeated vertices. */
+/* A solid some of whose triangles are split at points inside, on edges or on vertices: gives
+ * slivers, triangles of zero area and repeated vertices. */
 static inline void random_slivers(sdm_mesh *m, dice *d)
 {
     random_solid(m, d);
@@ -304,13 +313,13 @@ static inline void random_slivers(sdm_mesh *m, dice *d)
         double s = roll(d, 0, 1), r = roll(d, 0, 1 - s);
         switch (pick(d, 4)) {
         case 0:
-            s = r = 0; // on a
+            s = r = 0; // on vertex a
             break;
         case 1:
-            r = 0; // on an edge: the triangle there has no area
+            r = 0; // on edge a b: the triangle at it has zero area
             break;
         case 2:
-            r *= 1e-12; // beside it
+            r *= 1e-12; // very close to edge a b
             break;
         default:
             break;

@@ -1,4 +1,4 @@
-/* Reads image files and prints what they hold as plain numbers, two lines a file, for
+/* Reads image files and prints their geometry and values as text, two lines per file, for
  * check_volume.py. */
 #include <stdio.h>
 
@@ -13,7 +13,8 @@ int main(int argc, char **argv)
             fprintf(stderr, "%s\n", err.text);
             return 1;
         }
-        /* sizes, then the 3 x 4 affine map from index to LPS mm, row by row, then the type */
+        /* number of voxels along each axis, the 3 x 4 affine map from voxel index to LPS mm row by
+         * row, then the voxel type */
         const sdm_grid *g = &v.grid;
         printf("%lld %lld %lld", (long long)g->n[0], (long long)g->n[1], (long long)g->n[2]);
         for (int r = 0; r < 3; r++) {

@@ -1,5 +1,5 @@
-/* For tests of signs on grids: engines and maps that must succeed, rotated grids, winding numbers
- * by an own formula. */
+/* Tools for tests of signs of whole maps: engines and maps that must succeed, rotated grids, and
+ * winding numbers by a formula that differs from the engine's. */
 #ifndef SDM_TEST_SIGN_CHECK_H
 #define SDM_TEST_SIGN_CHECK_H
 
@@ -40,6 +40,7 @@ static inline float *map(const sdm_exact *e, const sdm_grid *g)
     return v;
 }
 
+/* Position of voxel i of a map values[nz][ny][nx]. */
 static inline void voxel(const sdm_grid *g, size_t i, double x[3])
 {
     const int64_t v = (int64_t)i;
@@ -48,8 +49,8 @@ static inline void voxel(const sdm_grid *g, size_t i, double x[3])
     sdm_grid_world(g, index, x);
 }
 
-/* Rotation by random angles, columns orthonormal to rounding; mirrored: its first column turned
- * round. */
+/* Random rotation matrix, orthonormal to rounding. mirrored: the first column is negated (a
+ * reflection). */
 static inline void rotation(uint64_t seed, bool mirrored, double r[9])
 {
     double q[4];
@@ -58,8 +59,8 @@ static inline void rotation(uint64_t seed, bool mirrored, double r[9])
     for (int i = 0; mirrored && i < 9; i += 3) r[i] = -r[i];
 }
 
-/* Winding number by the angles that triangles are seen under; an own formula: the solid angle of
-   three unit vectors by their products (Eriksson 1990). */
+/* Winding number: sum of the solid angles of all triangles over 4 pi, by the dot products of unit
+ * vectors (Eriksson 1990), which is not the engine's formula. */
 static inline double winding(const sdm_mesh *m, const double x[3])
 {
     double sum = 0;
@@ -85,6 +86,7 @@ static inline double winding(const sdm_mesh *m, const double x[3])
     return sum / (4 * 3.14159265358979323846);
 }
 
+/* Removes all triangles whose centroid satisfies `drop`. */
 static inline void drop_triangles(sdm_mesh *m, bool (*drop)(const double middle[3]))
 {
     size_t n = 0;

@@ -1,6 +1,6 @@
-/* Writes random closed meshes without overlap, points, and their distances by the exact engine as
-   text for check_vtk.py: "mesh V T P", V lines of a vertex, T lines of a triangle, P lines of a
-   point and its signed distance. */
+/* Writes random closed meshes without overlap, query points and their distances by the exact engine
+ * as text for check_vtk.py: a line "mesh V T P FAMILY", V lines with the coordinates of a vertex, T
+ * lines with the vertices of a triangle, P lines with a point and its signed distance. */
 #include <stdio.h>
 
 #include "oracle/random_meshes.h"

@@ -1,5 +1,5 @@
-/* Writes the asymmetric phantom in every image format into a folder, with its values and geometry,
- * for check_images.py. */
+/* Writes an asymmetric test image into a folder in every image format, and prints its geometry, for
+ * check_images.py. */
 #include <stdio.h>
 
 #include "io/image_phantom.h"
@@ -20,8 +20,8 @@ static int write_one(const char *folder, int mirror)
             return 1;
         }
     }
-    /* the geometry as plain numbers: sizes, then the 3 x 4 affine map from index to LPS mm, row by
-     * row */
+    /* the geometry: number of voxels along each axis, then the 3 x 4 affine map from voxel index to
+     * LPS mm, row by row */
     printf("%d %lld %lld %lld", mirror, (long long)g.n[0], (long long)g.n[1], (long long)g.n[2]);
     for (int r = 0; r < 3; r++) {
         for (int c = 0; c < 3; c++) printf(" %.17g", g.dir[3 * r + c] * g.spacing[c]);

@@ -1,5 +1,6 @@
-/* The exact engine at the places where engines fail, against closed forms: regions of a triangle,
- * ties, blades, gaps, rays through corners, triangles without area.
+/* The exact engine on inputs that are numerically difficult, compared with closed forms: all
+ * regions of a triangle, ties between features, thin wedges, narrow gaps, rays through vertices and
+ * edges, triangles of zero area.
  * Tests: exact.c nearest.c point_triangle.c */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -22,7 +23,7 @@ static sdm_exact *engine(const sdm_mesh *m)
     return e;
 }
 
-static double at(const sdm_exact *e, double x, double y, double z)
+static double distance_at(const sdm_exact *e, double x, double y, double z)
 {
     return sdm_exact_point(e, (const double[3]){x, y, z}, NULL, NULL, NULL);
 }
@@ -32,15 +33,17 @@ static double dot3(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static void single(sdm_mesh *m, const double v[3][3], size_t turn)
+static void mesh_single_triangle(sdm_mesh *m, const double v[3][3], size_t turn)
 {
     mesh_make(m, 3, 1);
     for (size_t k = 0; k < 3; k++) mesh_vertex(m, k, v[k][0], v[k][1], v[k][2]);
     mesh_triangle(m, 0, turn % 3, (turn + 1 + turn / 3) % 3, (turn + 2 - turn / 3) % 3);
 }
 
-/* Points made in each of the seven regions, where the distance is the length of the way there. */
-static void test_regions_of_a_triangle(void **state)
+/* A point is constructed in each of the seven regions (Voronoi regions of the face, three edges and
+ * three vertices) of a triangle as foot point + offset; its distance must be the length of the
+ * offset. */
+static void test_constructed_points_in_all_triangle_regions(void **state)
 {
     (void)state;
     for (uint64_t round = 0; round < 300; round++) {
@@ -50,7 +53,7 @@ static void test_regions_of_a_triangle(void **state)
         for (int k = 0; k < 9; k++)
             v[k / 3][k % 3] = whole ? floor(roll(&d, -4, 5)) : roll(&d, -1, 1);
         sdm_mesh m = {0};
-        single(&m, (const double(*)[3])v, round % 6);
+        mesh_single_triangle(&m, (const double(*)[3])v, round % 6);
         sdm_exact *e = engine(&m);
         double side[3][3];
         for (int k = 0; k < 3; k++)
@@ -69,11 +72,12 @@ static void test_regions_of_a_triangle(void **state)
             const double s = roll(&d, 0, 1), t = roll(&d, 0, 1 - s),
                          up = pick(&d, 3) ? roll(&d, -2, 2) : 0;
             double from[3], way[3], out[3];
-            // out of the triangle across side k, in its plane
+            // out: in the plane of the triangle, perpendicular to side k, pointing away from the
+            // triangle
             for (int a = 0; a < 3; a++)
                 out[a] =
                     side[k][(a + 1) % 3] * n[(a + 2) % 3] - side[k][(a + 2) % 3] * n[(a + 1) % 3];
-            const int region = i / 3 % 3; // face, side, corner
+            const int region = i / 3 % 3; // 0: face, 1: edge, 2: vertex
             const double far = roll(&d, 0, 1);
             for (int a = 0; a < 3; a++) {
                 if (region == 0) {
@@ -87,7 +91,8 @@ static void test_regions_of_a_triangle(void **state)
                     way[a] = whole ? floor(roll(&d, -3, 4)) : roll(&d, -1, 1);
                 }
             }
-            // behind the corner: no step along either side comes nearer
+            // keep only offsets within the vertex region: moving along either side increases the
+            // distance
             if (region == 2 && (dot3(way, side[k]) > 0 || dot3(way, side[(k + 2) % 3]) < 0))
                 continue;
             made[region]++;
@@ -105,8 +110,9 @@ static void test_regions_of_a_triangle(void **state)
     }
 }
 
-/* Cubes of a lattice, their truth from the full and the empty cells; all numbers are exact. */
-static void test_lattice_of_cubes(void **state)
+/* Unions of unit cubes of a lattice. The expected distance is computed from the full and the empty
+ * lattice cells; all coordinates are exact in floating point. */
+static void test_cube_lattice_matches_cell_distances(void **state)
 {
     (void)state;
     for (uint64_t round = 0; round < 40; round++) {
@@ -154,9 +160,9 @@ static void test_lattice_of_cubes(void **state)
     }
 }
 
-/* A cube seen along its diagonal: rays and rows through two opposite corners and along three edges
- * at once. */
-static void test_along_the_diagonal(void **state)
+/* A unit cube with grid rows along its space diagonal: rows pass through two opposite vertices and
+ * cross three edges at the same point. */
+static void test_rows_through_vertices_and_edges(void **state)
 {
     (void)state;
     const double third = sqrt(1.0 / 3), half = sqrt(0.5), sixth = sqrt(1.0 / 6);
@@ -166,7 +172,8 @@ static void test_along_the_diagonal(void **state)
     mesh_box(&turned, zero, one);
     mesh_rotate(&turned, r);
     sdm_exact *straight = engine(&m), *tilted = engine(&turned);
-    // rows along the diagonal of the straight cube; rows along x of the tilted one
+    // `straight` is mapped on a tilted grid, `tilted` (the rotated cube) on an axis-aligned one; in
+    // both cases the rows run along the cube's diagonal
     sdm_grid g = {.n = {25, 13, 13}, .spacing = {sqrt(3.0) / 8, sqrt(0.5) / 2, sqrt(1.0 / 6) / 2}};
     double index[3] = {-8, -6, -6}, first[3];
     for (int b = 0; b < 3; b++) index[b] *= g.spacing[b];
@@ -202,9 +209,9 @@ static void test_along_the_diagonal(void **state)
     sdm_mesh_dispose(&turned);
 }
 
-/* Triangles that are points, segments, or segments with a corner between must not be seen, also
- * end-on. */
-static void test_triangles_without_area(void **state)
+/* Triangles of zero area (a point, or a segment with the third vertex at an end or in between) must
+ * not change the inside/outside sign, even if rays run along them. */
+static void test_zero_area_triangles_keep_the_sign(void **state)
 {
     (void)state;
     const double corner[4][3] = {{1, 1, 1}, {-2, 1, 1}, {0.5, 0.5, 0.25}, {0.25, 1, 1}};
@@ -219,7 +226,7 @@ static void test_triangles_without_area(void **state)
                 mesh_vertex(&m, 8 + k, c[(3 - axis) % 3], c[(4 - axis) % 3], c[(5 - axis) % 3]);
             }
             mesh_triangle(&m, 12, 8, 9, 10);
-            mesh_triangle(&m, 13, 10, 9, 8); // closed again where the three corners differ
+            mesh_triangle(&m, 13, 10, 9, 8); // the reversed copy closes the mesh again
             sdm_exact *e = engine(&m);
             assert_true(sdm_exact_get_report(e)->audit.closed &&
                         sdm_exact_get_report(e)->audit.degenerate == 2);
@@ -233,7 +240,8 @@ static void test_triangles_without_area(void **state)
                 sdm_grid_world(&g, index, x);
                 const double truth = box_distance(x, zero, one),
                              found = sdm_exact_point(e, x, NULL, NULL, NULL);
-                // such a triangle may count as surface; as a side of the solid it may not
+                // a triangle of zero area may count as surface (distance 0), but it must not
+                // separate inside from outside
                 if (fabs(truth) > 0 && fabs(found) > 1e-15 && (found < 0) != (truth < 0))
                     fail_msg("kind %d along %c: %g at (%g, %g, %g), need %g", kind, "xyz"[axis],
                              found, x[0], x[1], x[2], truth);
@@ -248,8 +256,9 @@ static void test_triangles_without_area(void **state)
     }
 }
 
-/* A blade of thickness t at its back: both sides of it, and its edge. */
-static void test_blades(void **state)
+/* A wedge with a sharp edge at x = 0 and thickness t at x = 1: distances from both of its large
+ * faces and from the sharp edge. */
+static void test_thin_wedges(void **state)
 {
     (void)state;
     static const uint8_t face[8][3] = {{0, 2, 1}, {3, 4, 5}, {0, 1, 4}, {0, 4, 3},
@@ -268,23 +277,23 @@ static void test_blades(void **state)
         const double slope = 1 / sqrt(1 + t * t);
         for (int i = 1; i < 16; i++) {
             const double x = i / 16.0, z = 0.5;
-            assert_true(fabs(at(e, x, -0.25, z) - 0.25) <= 1e-15);
-            assert_true(fabs(at(e, x, t * x + 0.01, z) - 0.01 * slope) <= 1e-15);
-            // in the middle of the blade, and as far outside on both sides
+            assert_true(fabs(distance_at(e, x, -0.25, z) - 0.25) <= 1e-15);
+            assert_true(fabs(distance_at(e, x, t * x + 0.01, z) - 0.01 * slope) <= 1e-15);
+            // halfway between the two faces, then at similar distances outside of each face
             const double h = 0.5 * t * x;
-            assert_true(fabs(at(e, x, h, z) + fmin(h * slope, h)) <= 1e-15 || 1 - x < h);
-            assert_true(fabs(at(e, x, -h, z) - h) <= 1e-15);
-            assert_true(fabs(at(e, x, 3 * h, z) - h * slope) <= 1e-15);
+            assert_true(fabs(distance_at(e, x, h, z) + fmin(h * slope, h)) <= 1e-15 || 1 - x < h);
+            assert_true(fabs(distance_at(e, x, -h, z) - h) <= 1e-15);
+            assert_true(fabs(distance_at(e, x, 3 * h, z) - h * slope) <= 1e-15);
         }
-        assert_true(fabs(at(e, -0.5, 0, 0.5) - 0.5) <= 1e-15);
+        assert_true(fabs(distance_at(e, -0.5, 0, 0.5) - 0.5) <= 1e-15);
         sdm_exact_free(e);
         sdm_mesh_dispose(&m);
     }
 }
 
-/* Two cubes a gap apart: in the gap the distance is to the nearer one, on its axis half of the gap.
- */
-static void test_gaps(void **state)
+/* Two unit cubes separated by a narrow gap: halfway across the gap the distance is half of the
+ * gap's width. */
+static void test_narrow_gaps(void **state)
 {
     (void)state;
     for (int power = 0; power <= 12; power++) {
@@ -298,11 +307,12 @@ static void test_gaps(void **state)
         assert_false(sdm_exact_get_report(e)->unioned);
         for (int i = 1; i < 8; i++) {
             const double y = i / 8.0, middle = 1 + width / 2;
-            assert_true(fabs(at(e, middle, y, 0.5) - width / 2) <= 4 * DBL_EPSILON);
-            assert_true(at(e, middle, y, 0.5) > 0);
-            assert_true(fabs(at(e, 1 - width / 4, y, 0.5) + fmin(width / 4, fmin(y, 1 - y))) <=
-                        4 * DBL_EPSILON);
-            assert_true(at(e, 1 - width / 4, y, 0.5) < 0 && at(e, lo[0] + width / 4, y, 0.5) < 0);
+            assert_true(fabs(distance_at(e, middle, y, 0.5) - width / 2) <= 4 * DBL_EPSILON);
+            assert_true(distance_at(e, middle, y, 0.5) > 0);
+            assert_true(fabs(distance_at(e, 1 - width / 4, y, 0.5) +
+                             fmin(width / 4, fmin(y, 1 - y))) <= 4 * DBL_EPSILON);
+            assert_true(distance_at(e, 1 - width / 4, y, 0.5) < 0 &&
+                        distance_at(e, lo[0] + width / 4, y, 0.5) < 0);
         }
         sdm_exact_free(e);
         sdm_mesh_dispose(&m);
@@ -310,8 +320,9 @@ static void test_gaps(void **state)
     }
 }
 
-/* Corners of an inner sheet: the winding number is one or two all around, the sign is minus. */
-static void test_on_inner_sheets(void **state)
+/* A random star buried in a box. At its vertices the winding number jumps from 1 to 2, but both
+ * values mean inside: the distance is the negative distance to the box. */
+static void test_vertices_of_buried_parts_are_inside(void **state)
 {
     (void)state;
     for (uint64_t round = 0; round < 30; round++) {
@@ -345,9 +356,10 @@ static void test_on_inner_sheets(void **state)
     }
 }
 
-/* Faces of a tilted plate some 40 tolerances thick with a long triangle in one of them or in both:
-   away from it its plane is in doubt by more, but the faces must not be taken for one sheet. */
-static void test_thin_plates(void **state)
+/* A tilted plate that is about 40 rounding tolerances thick, with a long thin triangle in one face
+ * or in both. Extrapolated beyond such a triangle, the rounding error of its plane exceeds the
+ * thickness; the engine must still keep the two faces apart. */
+static void test_thin_plates_keep_two_faces(void **state)
 {
     (void)state;
     static const double thickness = 2e-10,
@@ -403,14 +415,14 @@ static void test_thin_plates(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_regions_of_a_triangle),
-        cmocka_unit_test(test_lattice_of_cubes),
-        cmocka_unit_test(test_along_the_diagonal),
-        cmocka_unit_test(test_triangles_without_area),
-        cmocka_unit_test(test_blades),
-        cmocka_unit_test(test_gaps),
-        cmocka_unit_test(test_thin_plates),
-        cmocka_unit_test(test_on_inner_sheets),
+        cmocka_unit_test(test_constructed_points_in_all_triangle_regions),
+        cmocka_unit_test(test_cube_lattice_matches_cell_distances),
+        cmocka_unit_test(test_rows_through_vertices_and_edges),
+        cmocka_unit_test(test_zero_area_triangles_keep_the_sign),
+        cmocka_unit_test(test_thin_wedges),
+        cmocka_unit_test(test_narrow_gaps),
+        cmocka_unit_test(test_thin_plates_keep_two_faces),
+        cmocka_unit_test(test_vertices_of_buried_parts_are_inside),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -311,7 +311,8 @@ static void test_other_files_are_refused(void **state)
         error_contains(FILES[i]);
         remove(FILES[i]);
     }
-    assert_int_equal(sdm_registry_load(registry, ".", &err), SDM_E_PLUGIN); // a folder
+    // a folder is no shared object
+    assert_int_equal(sdm_registry_load(registry, ".", &err), SDM_E_PLUGIN);
 }
 
 // The example plug-in, found through a search path with a relative folder.
@@ -320,7 +321,7 @@ static void test_example_plugin_works(void **state)
     (void)state;
     assert_int_equal(sdm_registry_load_path(registry, ":" PLUGIN_FOLDER "/good:", &err), SDM_OK);
     assert_int_equal(sdm_registry_count(registry), 1);
-    assert_int_equal(sdm_registry_origin(registry, 0)[0], '/'); // absolute
+    assert_int_equal(sdm_registry_origin(registry, 0)[0], '/'); // the path of origin is absolute
     const sdm_shape *shape = sdm_registry_find(registry, "octahedron", NULL);
     assert_non_null(shape);
 
@@ -332,7 +333,7 @@ static void test_example_plugin_works(void **state)
     assert_int_equal(sdm_instance_mesh(s, &p, &m, &err), SDM_OK);
     assert_int_equal(sdm_mesh_audit(&m, &a, &err), SDM_OK);
     assert_true(a.manifold && !a.inverted && a.self_intersections == 0);
-    assert_true(fabs(a.volume - 4.0 / 3 * 27) < 1e-12); // 4/3 r^3
+    assert_true(fabs(a.volume - 4.0 / 3 * 27) < 1e-12); // volume of an octahedron: 4/3 r^3
     const double AT[][4] = {
         {0, 0, 0, -1.7320508075688772}, {5, 0, 0, 2}, {0, -3, 0, 0}, {2, 2, 2, 1.7320508075688772},
         {-3, 3, 0, 2.1213203435596424}, {1, 1, -1, 0}};
@@ -347,7 +348,7 @@ static void test_example_plugin_works(void **state)
     sdm_mesh_dispose(&m);
     sdm_instance_free(s);
     assert_int_equal(sdm_registry_load_path(registry, PLUGIN_FOLDER "/good", &err),
-                     SDM_E_PLUGIN); // a second time
+                     SDM_E_PLUGIN); // the name is already in use
     error_contains("shape 'octahedron' is there already (/");
 }
 

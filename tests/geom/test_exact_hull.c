@@ -1,8 +1,8 @@
 /* Unions of overlapping random meshes. Two properties prove each distance: the nearest point found
  * is on the boundary of the union (the set of points with winding number >= 1), and no boundary
  * point is nearer. Usage: test_exact_hull [MESHES [FIRST]]
- * Tests: bvh.c clock.c contact.c crossings.c cutting.c facet.c line_triangle.c nearest.c parts.c
- * point_triangle.c predicates.c feature_build.c surface_side.c topology.c union_hull.c
+ * Tests: bvh.c contact.c crossings.c cutting.c facet.c feature_build.c line_triangle.c nearest.c
+ * parts.c point_triangle.c predicates.c surface_side.c topology.c union_hull.c
  * vertex_table.c */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -129,9 +129,9 @@ static void test_layers_match_points(void **state)
     sdm_grid g = tilted_grid(ZERO, 1.7);
     mesh_sphere(&m, ZERO, 1.2, 9);
     check_mesh(&m, NULL, &g, 4);
-    mesh_flip(&m); // inside out
+    mesh_flip(&m); // inside-out mesh
     check_mesh(&m, NULL, &g, 4);
-    m.n_tri -= 40; // open
+    m.n_tri -= 40; // open mesh
     check_mesh(&m, NULL, &g, 4);
     mesh_box(&m, (double[3]){-1, -0.5, -1}, (double[3]){0.7, 1, 1.1});
     check_mesh(&m, &(sdm_exact_opts){.sign = SDM_SIGN_PSEUDONORMAL}, &g, 4);

@@ -1,4 +1,5 @@
-/* Lanes of the map kernels on the baseline of the machine, one by one. */
+/* SIMD operations of simd/lanes.h with the baseline instruction set of the machine, compared lane
+ * by lane with scalar arithmetic. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

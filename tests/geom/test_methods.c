@@ -1,7 +1,7 @@
 /* All methods of the method table: exact ones compared with brute force, approximate ones within
  * their reported error bound; several meshes and grids, numbers of threads, memory limits,
  * cancellation, invalid arguments.
- * Tests: cancel.c cells.c edt.c edt_seeds.c method_exact.c method_naive.c method_run.c
+ * Tests: cancel.c cells.c clock.c edt.c edt_seeds.c method_exact.c method_naive.c method_run.c
  * method_table.c octree.c */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -132,7 +132,7 @@ static sdm_grid make_grid(int which)
         sdm_grid_world(&turned, (const double[3]){17, 5.5, 8.5}, middle);
         for (int a = 0; a < 3; a++) g.origin[a] = -middle[a];
     }
-    if (which == 2) { // reflected
+    if (which == 2) { // reflected and rotated
         random_rotation(71, g.dir);
         for (int a = 0; a < 3; a++) {
             g.dir[3 * a] = -g.dir[3 * a];
@@ -142,7 +142,7 @@ static sdm_grid make_grid(int which)
     if (which == 3) g = sdm_grid_centred((const int64_t[3]){1, 25, 30}, 0.09, centre);
     if (which == 4) g = sdm_grid_centred((const int64_t[3]){40, 1, 1}, 0.05, centre);
     if (which == 5) g = sdm_grid_centred((const int64_t[3]){1, 1, 1}, 0.3, centre);
-    if (which == 6) g.origin[0] += 5; // beside the mesh
+    if (which == 6) g.origin[0] += 5; // shifted by 5 mm along x: the mesh lies beside the grid
     if (which == 7)
         g = sdm_grid_centred((const int64_t[3]){9, 8, 7}, 0.2,
                              (double[3]){4, 4, 4}); // no grid line meets the mesh
@@ -173,7 +173,8 @@ static double brute_force_at_voxel(const sdm_mesh *m, const sdm_grid *g, size_t 
     return sdm_naive_point(m, x);
 }
 
-/* Every method on every mesh and grid. */
+/* Every method on every mesh and grid: the distances must be within the reported error bound, the
+ * signs exact. */
 static void test_error_bounds_against_brute_force(void **state)
 {
     (void)state;
@@ -325,7 +326,7 @@ static void test_threads_give_same_bits(void **state)
     const size_t bytes = sdm_grid_count(&g) * sizeof(float);
     for (size_t k = 0; k < sdm_method_count(); k++) {
         const sdm_method *method = sdm_method_at(k);
-        if (!strcmp(method->name, "naive")) g.n[2] = 2; // slow
+        if (!strcmp(method->name, "naive")) g.n[2] = 2; // this method is slow
         sdm_method_report one, r;
         float *reference = map_of(method, &m, &g, &(sdm_method_opts){.exact.n_threads = 1}, &one);
         for (int n = 2; n <= 5; n += 3) {
@@ -445,7 +446,7 @@ static void test_invalid_arguments(void **state)
             SDM_E_ARG);
         assert_non_null(strstr(err.text, "max_error_mm"));
         assert_int_equal(method->map(&m, &g, NULL, &v, NULL, NULL),
-                         SDM_OK); // no report, no error text
+                         SDM_OK); // the report and the error text are optional
     }
     assert_null(sdm_method_find(NULL, NULL));
     sdm_mesh_dispose(&m);

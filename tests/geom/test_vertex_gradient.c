@@ -90,7 +90,7 @@ static void test_translation_and_scaling(void **state)
     sdm_mesh_dispose(&m);
 }
 
-/* ---- sheets that cross ---- */
+/* ---- sheets that intersect in a union ---- */
 
 /* Three boxes whose union leaves one octant free, with its vertex at the origin. Shifting box k
  * along axis k by p_k moves this vertex along axis k; shifts along other axes change nothing.

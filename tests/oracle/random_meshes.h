@@ -15,7 +15,7 @@ static inline void random_shaken(sdm_mesh *m, dice *d)
     for (size_t i = 0; i < 3 * m->n_vert; i++) m->vert[i] += roll(d, -much, much);
 }
 
-/* A torus whose tube is wider than its hole: it overlaps itself. */
+/* A spindle torus: tube radius >= ring radius, overlaps itself. */
 static inline void random_spindle(sdm_mesh *m, dice *d)
 {
     const size_t nu = 3 + pick(d, 8), nv = 3 + pick(d, 5);

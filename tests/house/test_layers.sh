@@ -1,6 +1,6 @@
 #!/bin/sh
 # test_layers.sh SOURCE_FOLDER: checks the place and name of every source file and that every #include follows the layers of the
-# architecture (see CONTRIBUTING.md): which part may use which part, and within a part which folder ("room") may use which. Both rules
+# architecture (see docs/architecture.md): which part may use which part, and within a part which folder ("room") may use which. Both rules
 # are in the table below. A self-test then adds files and includes that break a rule to a copy and checks that each is found.
 set -eu
 root=$1

@@ -288,7 +288,7 @@ typedef struct sdm_fit_result {
     /* error near the surface of the maps of the last phase, mm: that of the network on held-out
        data, 0 for exact maps. The covariance includes it. NaN as inside_share */
     double model_error_mm;
-    /* partial volume: sd of the point spread, mm; labels and points: 0 */
+    /* partial volume: sd of the point spread, mm; other fits: 0 */
     double blur;
     /* tissues at the end of the fit */
     sdm_fit_appearance appearance;

@@ -29,8 +29,8 @@ typedef struct sdm_tissue {
 
 /* Start from sdm_phantom_defaults(). */
 typedef struct sdm_phantom_opts {
-    sdm_tissue inside,
-        outside;    /* inside and outside of the shape's surface; by default fluid and bone */
+    /* Inside and outside of the shape's surface; by default fluid and bone. */
+    sdm_tissue inside, outside;
     sdm_tissue air; /* tissue in the air cells */
     /* Probability, 0 .. 1, that a cube of edge air_mm of a lattice contains an air cell; 0: none.
      */

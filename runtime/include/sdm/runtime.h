@@ -35,11 +35,11 @@ typedef enum sdm_reason {
 typedef struct sdm_result {
     sdm_source source;
     bool clamped; /* a parameter was moved into its range */
-    double
-        error_mm; /* expected root mean square error: the network's on held-out maps; 0 if exact */
+    /* Expected root mean square error: that of the network on held-out maps; 0 if exact. */
+    double error_mm;
     sdm_reason reason; /* why source is SDM_SOURCE_EXACT */
     bool checked;      /* `check` is valid */
-    sdm_check check;   /* of the network's map, even if it was replaced by an exact one */
+    sdm_check check;   /* check of the network's map, even if an exact one has replaced it */
 } sdm_result;
 
 /* Initialise with zeros. Later versions add members at the end only. */

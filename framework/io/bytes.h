@@ -1,5 +1,5 @@
-/* Numbers as bytes of a file in either byte order, whatever the byte order of the machine; endings
- * of file names. */
+/* Reads numbers from the bytes of a file in either byte order, and writes them in little endian,
+   whatever the byte order of the machine; tests the endings of file names. */
 #ifndef SDM_IO_BYTES_H
 #define SDM_IO_BYTES_H
 

@@ -11,8 +11,9 @@
 #include "sdm/internal/shared.h"
 #include "sdm/status.h"
 
-/* A text in memory, which is modified: words and lines are ended by zero bytes. Set at, end and
-   path, and comment and continues as the format needs; the rest is 0. */
+/* A text in memory, which is modified: words and lines are ended by zero bytes. Before the first
+   call set at, end and path, and comment and continues as the format needs; all other members are
+   0. */
 typedef struct sdm_scan {
     /* the text that has not been read; *end must be a writable zero byte */
     char *at, *end;
@@ -24,7 +25,7 @@ typedef struct sdm_scan {
     size_t lines;
     /* this character starts a comment up to the end of the line; 0: no comments */
     char comment;
-    /* a backslash at the end of a line joins it with the next one */
+    /* true: a backslash at the end of a line joins it with the next line */
     bool continues;
 } sdm_scan;
 

@@ -59,8 +59,7 @@ sdm_status sdm_stream_detach(sdm_stream *in, const char *name, sdm_error *err)
     return s ? sdm_fail_in(err, s, "%s", header) : SDM_OK;
 }
 
-/* Refills the buffer when it holds less than two bytes, as many as sdm_stream_is_gzip() looks at.
- */
+/* Refills the buffer when it holds less than two bytes, since sdm_stream_is_gzip() looks at two. */
 static sdm_status fill_buffer(sdm_stream *in, sdm_error *err)
 {
     const size_t kept = (size_t)(in->end - in->at), room = sizeof in->bytes - kept;
@@ -92,8 +91,8 @@ sdm_status sdm_stream_unzip(sdm_stream *in, sdm_error *err)
     return SDM_OK;
 }
 
-/* Calls inflate once: up to `size` bytes to out, *got of them. Sets in->ended after the last byte.
- */
+/* Calls inflate() once, which writes at most `size` bytes to out; *got = how many. Sets in->ended
+   after the last byte. */
 static sdm_status inflate_part(sdm_stream *in, uint8_t *out, size_t size, size_t *got,
                                sdm_error *err)
 {
@@ -122,7 +121,7 @@ static sdm_status inflate_part(sdm_stream *in, uint8_t *out, size_t size, size_t
     return s;
 }
 
-/* Reads `size` bytes, or fewer at the end of the data; *taken: how many. */
+/* Reads `size` bytes, or fewer at the end of the data; *taken = how many. */
 static sdm_status read_some(sdm_stream *in, uint8_t *out, size_t size, size_t *taken,
                             sdm_error *err)
 {

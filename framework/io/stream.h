@@ -21,7 +21,7 @@ typedef struct sdm_stream {
     /* the unread part of the buffer */
     const uint8_t *at, *end;
     z_stream z;
-    /* zip: the data are compressed; ended: all of them have been read */
+    /* zip: the data are compressed; ended: all data have been read */
     bool zip, ended;
     uint8_t bytes[1 << 15];
     /* the line that was read last */
@@ -31,7 +31,7 @@ typedef struct sdm_stream {
 } sdm_stream;
 
 /* Opens a regular file. Call sdm_stream_close() in every case, also after an error. SDM_E_IO;
- * SDM_E_ARG for too long a name. */
+   SDM_E_ARG when the name is too long. */
 sdm_status sdm_stream_open(sdm_stream *in, const char *path, sdm_error *err);
 void sdm_stream_close(sdm_stream *in);
 

@@ -18,8 +18,8 @@
 extern "C" {
 #endif
 
-/* SDM_OK when this build can write a picture of that name, by its ending alone; else
- * SDM_E_UNSUPPORTED. */
+/* Checks the ending of `path`: SDM_OK when this build can write such a picture, else
+   SDM_E_UNSUPPORTED. */
 SDM_API sdm_status sdm_picture_check(const char *path, sdm_error *err);
 
 /* One column of a picture of maps. */
@@ -27,7 +27,7 @@ typedef struct sdm_picture_map {
     const char *title; /* may be NULL */
     /* [nz][ny][nx], mm */
     const float *values;
-    /* an error map: it has another colour scale than the distances */
+    /* true: an error map, which has another colour scale than the distances */
     bool error;
 } sdm_picture_map;
 
@@ -40,9 +40,10 @@ SDM_API sdm_status sdm_picture_slices(const char *path, const sdm_grid *grid,
                                       const float *levels, size_t n_levels, sdm_error *err);
 
 /* Draws the three orthogonal slices of image[nz][ny][nx], side by side, through the middle of the
-   region where the first map is negative: in grey, from the 1st to the 99th percentile of the
-   slices, under the zero contours of maps[n_maps] (1 to 4, the first in red, the second in yellow;
-   `error` is not used), with their titles, axes in mm and `title` (may be NULL). */
+   region where the first map is negative. The image is grey, from the 1st to the 99th percentile of
+   the slices. Over it lie the zero contours of maps[n_maps] (1 to 4, the first in red, the second
+   in yellow; `error` is not used). A legend lists the titles of the maps; the picture has axes in
+   mm and a `title` (may be NULL). */
 SDM_API sdm_status sdm_picture_overlay(const char *path, const sdm_grid *grid, const float *image,
                                        const sdm_picture_map *maps, size_t n_maps,
                                        const char *title, sdm_error *err);
@@ -51,14 +52,14 @@ SDM_API sdm_status sdm_picture_overlay(const char *path, const sdm_grid *grid, c
 typedef struct sdm_picture_surface {
     const char *title; /* may be NULL */
     const sdm_mesh *mesh;
-    /* [n_vert] in mm, shown in colours that span -max .. max of all surfaces; NULL: one plain
-     * colour */
+    /* [n_vert] mm, shown in colours that span -max .. max, where max is the largest absolute value
+       of all surfaces; NULL: one plain colour */
     const double *values;
 } sdm_picture_surface;
 
-/* Draws surfaces[n], 1 to 8, side by side, to one scale, shaded: each seen from +z and obliquely,
-   with a colour bar of `caption` under those that have values. Also returns the errors of
-   sdm_mesh_audit(). */
+/* Draws surfaces[n], 1 to 8, side by side, shaded and at one scale: each is seen from +z and
+   obliquely. Under surfaces with values there is a colour bar with `caption`. Also returns the
+   errors of sdm_mesh_audit(). */
 SDM_API sdm_status sdm_picture_surfaces(const char *path, const sdm_picture_surface *surfaces,
                                         size_t n, const char *caption, sdm_error *err);
 

@@ -20,7 +20,8 @@ SDM_API void sdm_registry_free(sdm_registry *r);
 
 /* Checks ABI version, size, names, ranges and required callbacks of the table *shape and stores a
  * copy of it (min(shape->size, sizeof(sdm_shape)) bytes). `origin` appears in messages ("built in"
- * or a file name). SDM_E_PLUGIN names the mistake; a second shape of the same name is one. */
+ * or a file name). SDM_E_PLUGIN names the mistake; a second shape of the same name is a mistake,
+ * too. */
 SDM_API sdm_status sdm_registry_add(sdm_registry *r, const sdm_shape *shape, const char *origin,
                                     sdm_error *err);
 
@@ -37,8 +38,8 @@ SDM_API size_t sdm_registry_count(const sdm_registry *r);
 /* Shape and origin of entry `index`, in order of addition. */
 SDM_API const sdm_shape *sdm_registry_at(const sdm_registry *r, size_t index);
 SDM_API const char *sdm_registry_origin(const sdm_registry *r, size_t index);
-/* The shape of this name. If there is none: NULL, and *nearest (may be NULL) is a similar name or
- * NULL. */
+/* The shape of this name. If there is none, the result is NULL, and *nearest (`nearest` may be
+   NULL) is a similar name or NULL. */
 SDM_API const sdm_shape *sdm_registry_find(const sdm_registry *r, const char *name,
                                            const char **nearest);
 

@@ -25,10 +25,10 @@ typedef struct sdm_param {
 } sdm_param;
 
 typedef enum sdm_option_type {
-    /* path of a file; the host resolves relative paths against the folder of the configuration */
     SDM_OPTION_REAL = 0,
     SDM_OPTION_INT = 1,
-    SDM_OPTION_CHOICE = 2, /* one of `choices`, "left|right" */
+    SDM_OPTION_CHOICE = 2, /* one of the words in `choices`, "left|right" */
+    /* path of a file; the host resolves relative paths against the folder of the configuration */
     SDM_OPTION_FILE = 3
 } sdm_option_type;
 
@@ -38,12 +38,12 @@ typedef struct sdm_option {
     const char *name;
     sdm_option_type type;
     const char *unit;
-    double min, max, def; /* REAL and INT */
+    double min, max, def; /* for REAL and INT */
     const char *choices;  /* CHOICE: "left|right", the first one is the default */
     const char *help;
 } sdm_option;
 
-/* Value of an option as passed to the callbacks, in the order of the shape's option table. */
+/* The value of an option as passed to the callbacks, in the order of the shape's option table. */
 typedef struct sdm_option_value {
     double number;    /* REAL, INT: the value; CHOICE: index of the choice */
     const char *text; /* FILE: the path, "" if not given; CHOICE: name of the choice */
@@ -61,8 +61,9 @@ typedef struct sdm_mesh_out {
 typedef struct sdm_host {
     uint32_t abi, size;
     void *ctx;
-    /* Allocates the arrays of *out and sets its sizes; in create() they are valid until it returns.
-     * Returns 0, or non-zero if memory is short; the callback must then return this value. */
+    /* Allocates the arrays of *out and sets its sizes. Arrays reserved in create() are valid until
+     * create() returns. Returns 0, or non-zero if memory is short; the callback must then return
+     * this value. */
     int (*reserve)(const struct sdm_host *host, sdm_mesh_out *out, size_t n_vert, size_t n_tri);
     /* Sets the error message and returns a non-zero value, which the callback must return. `text`
      * is copied. */
@@ -71,7 +72,7 @@ typedef struct sdm_host {
      * Returns 0 or non-zero. */
     int (*read_file)(const struct sdm_host *host, const char *path, const unsigned char **data,
                      size_t *size);
-    /* Reads a mesh file (.ply .stl .obj .off) into *out; its arrays are valid until the callback
+    /* Reads a mesh file (.ply .stl .obj .off) into *out, whose arrays are valid until the callback
      * returns. Only for create(). Returns 0 or non-zero. */
     int (*read_mesh)(const struct sdm_host *host, const char *path, sdm_mesh_out *out);
     /* Reads a .npy file of float32 or float64 in C order, at most 4 dimensions. *values (converted
@@ -91,18 +92,18 @@ typedef struct sdm_shape {
     const sdm_option *options;
     uint32_t n_options;
 
-    /* Optional, both or neither: data shared by all calls of one instance. create() returns 0 on
-     * success. *self is passed to all other callbacks (NULL without create()); the plug-in owns the
-     * memory behind it and frees it in destroy(). */
+    /* Optional, both or neither: make and free data that all calls of one instance share. create()
+     * returns 0 on success. *self is passed to all other callbacks (NULL without create()); the
+     * plug-in owns the memory behind it and frees it in destroy(). */
     int (*create)(const sdm_host *host, const sdm_option_value *options, void **self);
     void (*destroy)(void *self);
 
-    /* Optional: parameters that depend on the data of the instance (for example the number of
-     * modes). They stay valid as long as self. Without this callback `params` is used. */
+    /* Optional: gives parameters that depend on the data of the instance (for example, one for each
+       mode). They stay valid as long as self. Without this callback the member `params` is used. */
     void (*describe)(const void *self, const sdm_param **params, uint32_t *n_params);
 
-    /* Required: the mesh at parameters p[n_params]. Vertices depend smoothly on p; the numbers of
-     * vertices and triangles should not depend on p. Returns 0 on success. */
+    /* Required: makes the mesh at parameters p[n_params]. Vertices depend smoothly on p; the
+     * numbers of vertices and triangles should not depend on p. Returns 0 on success. */
     int (*mesh)(const void *self, const sdm_host *host, const sdm_option_value *options,
                 const double *p, sdm_mesh_out *out);
 

@@ -27,8 +27,8 @@ typedef enum sdm_voxel_type {
     SDM_VOXEL_FLOAT64 = 9
 } sdm_voxel_type;
 
-/* The bytes of a voxel, and the name of its type, "uint8" ... "float64"; 0 and "unknown" for a
- * value that is no type. */
+/* The number of bytes of a voxel, and the name of its type, "uint8" ... "float64"; 0 and "unknown"
+   for a value that is no type. */
 SDM_API size_t sdm_voxel_size(sdm_voxel_type type);
 SDM_API const char *sdm_voxel_name(sdm_voxel_type type);
 
@@ -50,9 +50,9 @@ typedef struct sdm_volume {
     sdm_grid grid;
     /* false: the file has no complete frame, and the default of its format is assumed */
     bool placed;
-    /* the voxels were compressed, and the checksum of gzip or zlib is right */
+    /* true: the voxels were compressed, and the checksum of gzip or zlib is right */
     bool checked;
-    /* 1, or more for a segmentation with overlapping segments */
+    /* number of layers: 1, or more for a segmentation with overlapping segments */
     size_t n_layers;
     /* [n_layers][nz][ny][nx]; slope and intercept of the file are applied in double, then rounded
      * to float: integers beyond 2^24 and float64 lose digits */

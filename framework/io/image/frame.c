@@ -3,7 +3,8 @@
 
 #include "image_readers.h"
 
-/* Largest accepted displacement of a corner voxel by the rounding of a header, in voxels. */
+/* Largest accepted displacement, in voxels, of a corner voxel by the rounding of numbers in a
+   header. */
 #define SHIFT_MAX 0.1
 /* Newton steps; each one doubles the number of correct digits. */
 #define NEWTON_STEPS 12
@@ -29,8 +30,8 @@ static bool orthonormalise(double m[9])
     return true;
 }
 
-/* The largest distance, over the corners, between a corner voxel's position by the header and by
- * the grid, in units of the shortest spacing. */
+/* The largest distance, over the corner voxels, between the positions that the header and the grid
+   give to the voxel, in units of the shortest spacing. */
 static double largest_shift(const sdm_image_header *h, const sdm_grid *g)
 {
     double largest = 0, shortest = INFINITY;

@@ -64,9 +64,10 @@ static void add_statistics(sdm_volume *v, const float *values, size_t n)
  * of layer 1, and so on, and begins again with layer 0. */
 typedef struct layer_sorter {
     size_t run, layers;
-    /* voxels of a whole layer */
+    /* number of voxels of a whole layer */
     size_t count;
-    /* the next voxel: its layer, its place in the run, the voxels of this layer in earlier runs */
+    /* the next voxel: its layer, its place in the run, and the number of voxels of its layer in
+       earlier runs */
     size_t layer, in_run, before;
 } layer_sorter;
 
@@ -86,8 +87,8 @@ static void sort_voxels(layer_sorter *p, const float *from, size_t n, float *val
     }
 }
 
-/* *total = number of voxels of all layers. Moves the stream to the first voxel when they are at the
- * end of the file, and compares their size with the length of the file. */
+/* *total = number of voxels of all layers. Moves the stream to the first voxel when the voxels are
+   at the end of the file, and compares their size in bytes with the length of the file. */
 static sdm_status count_voxels(sdm_stream *in, const sdm_image_header *h, size_t count,
                                size_t *total, sdm_error *err)
 {

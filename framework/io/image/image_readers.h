@@ -16,11 +16,11 @@ typedef struct sdm_image_header {
     /* centre of voxel (0, 0, 0), LPS, mm */
     double origin[3];
     sdm_voxel_type type;
-    /* big-endian */
+    /* true: the voxels are big-endian */
     bool big;
     /* value = slope * stored value + intercept */
     double slope, intercept;
-    /* the voxels are the last bytes of the file instead of the next ones */
+    /* true: the voxels are the last bytes of the file, instead of those that follow the header */
     bool tail;
     /* The file holds `run` voxels of layer 0, then of layer 1 ..., then the next `run` voxels of
      * layer 0. run = 0: a whole layer at a time. */
@@ -35,7 +35,7 @@ sdm_status sdm_nrrd_read(sdm_stream *in, sdm_image_header *h, sdm_volume *v, sdm
 sdm_status sdm_metaimage_read(sdm_stream *in, sdm_image_header *h, sdm_volume *v, sdm_error *err);
 
 /* The grid of a header, with orthonormal axis directions. SDM_E_UNSUPPORTED when the axes are
- * sheared, by more than a tenth of a voxel at a corner; SDM_E_FORMAT when the numbers are not a
+ * sheared by more than a tenth of a voxel at a corner; SDM_E_FORMAT when the numbers are not a
  * valid grid. */
 sdm_status sdm_frame_grid(const sdm_image_header *h, sdm_grid *out, sdm_error *err);
 

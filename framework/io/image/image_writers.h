@@ -13,19 +13,19 @@
 typedef struct sdm_sink {
     sdm_outfile *file;
     z_stream z;
-    /* compress with gzip */
+    /* true: the bytes are compressed with gzip */
     bool zip;
     /* compressed bytes on their way to the file */
     uint8_t out[1 << 15];
 } sdm_sink;
 
-/* Initialises *s, which borrows `file`. SDM_E_NOMEM. */
+/* Initialises *sink, which borrows `file`. SDM_E_NOMEM. */
 sdm_status sdm_sink_open(sdm_sink *sink, sdm_outfile *file, bool zip, sdm_error *err);
 sdm_status sdm_sink_write(sdm_sink *sink, const void *data, size_t size, sdm_error *err);
 /* Writes values[count] of the C type of `type`, little endian. */
 sdm_status sdm_sink_voxels(sdm_sink *sink, const void *values, sdm_voxel_type type, size_t count,
                            sdm_error *err);
-/* Writes what the compressor still holds back. */
+/* Writes the bytes that the compressor still holds back. */
 sdm_status sdm_sink_finish(sdm_sink *sink, sdm_error *err);
 void sdm_sink_free(sdm_sink *sink);
 

@@ -4,7 +4,7 @@
 #include "image_writers.h"
 #include "sdm/internal/text.h"
 
-/* The lines of the header that have been read. */
+/* The contents of the header lines that have been read. */
 typedef struct metaimage {
     sdm_stream *in;
     sdm_image_header *h;
@@ -16,9 +16,10 @@ typedef struct metaimage {
     double matrix[9];
     /* mm per unit of length of the file */
     double unit;
-    /* compressed with zlib */
+    /* true: the voxels are compressed with zlib */
     bool zip;
-    /* bytes before the voxels of a separate file; -1: the voxels are the last bytes of it */
+    /* number of bytes before the voxels in a separate file; -1: the voxels are the last bytes of
+       that file */
     int64_t header_bytes;
     char data_file[512];
 } metaimage;

@@ -21,9 +21,9 @@
 typedef struct nifti {
     const char *path;
     uint8_t bytes[SIZE_2];
-    /* version 2 */
+    /* true: version 2 of the format */
     bool two;
-    /* big-endian */
+    /* true: the file is big-endian */
     bool big;
 } nifti;
 
@@ -39,14 +39,15 @@ static int16_t short_at(const nifti *f, size_t at)
     return (int16_t)sdm_get_uint(f->bytes + at, 2, f->big);
 }
 
-/* dim[number]: the number of dimensions, then the sizes. */
+/* Entry `number` of the field dim: dim[0] is the number of dimensions, dim[1], dim[2] ... are the
+   sizes. */
 static int64_t dim(const nifti *f, size_t number)
 {
     return f->two ? (int64_t)sdm_get_uint(f->bytes + 16 + 8 * number, 8, f->big)
                   : short_at(f, 40 + 2 * number);
 }
 
-/* A field of int16 in version 1, int32 in version 2. */
+/* A field that is an int16 in version 1 and an int32 in version 2. */
 static int code_at(const nifti *f, size_t at_1, size_t at_2)
 {
     return f->two ? (int32_t)sdm_get_uint(f->bytes + at_2, 4, f->big) : short_at(f, at_1);

@@ -22,7 +22,7 @@ typedef struct npy_header {
 } npy_header;
 
 /* A position in the text of the header. The take_ functions skip white space, read what their name
- * says and move behind it; false when something else is there. */
+   says and move behind it; they return false when something else is there. */
 typedef struct cursor {
     const char *at, *end;
 } cursor;
@@ -114,7 +114,7 @@ static bool parse_header(cursor c, npy_header *h)
     return c.at == c.end && h->has_descr && h->has_order && h->has_shape;
 }
 
-/* Finds the text of the header, and in *start the offset of the first value. */
+/* Finds the header: *text = its text, *start = offset of the first value. */
 static sdm_status find_header(const char *path, const uint8_t *data, size_t size, cursor *text,
                               size_t *start, sdm_error *err)
 {

@@ -8,7 +8,7 @@
 
 enum { AXES_MAX = 4 };
 
-/* The lines of the header that have been read. Axes are counted as in the file. */
+/* The contents of the header lines that have been read. Axes are numbered as in the file. */
 typedef struct nrrd {
     sdm_stream *in;
     sdm_image_header *h;
@@ -19,14 +19,16 @@ typedef struct nrrd {
     int axes;
     int64_t size[AXES_MAX];
     double spacing[AXES_MAX];
-    /* from a voxel to the next along each axis, in the space of the file */
+    /* vector from a voxel to the next along each axis, in the space of the file */
     double step[AXES_MAX][3];
-    /* the axis has a direction in space; an axis without one counts layers or channels */
+    /* true: the axis has a direction in space; an axis without a direction counts layers or
+       channels */
     bool in_space[AXES_MAX];
     /* factors from the space of the file to LPS in mm */
     double scale[3];
     bool gzip;
-    /* to skip before the voxels; skip_bytes -1: the voxels are the last bytes of the file */
+    /* lines and bytes to skip before the voxels; skip_bytes = -1: the voxels are the last bytes of
+       the file */
     int64_t skip_lines, skip_bytes;
     char data_file[512];
 } nrrd;
@@ -79,7 +81,7 @@ static sdm_status take_sizes(nrrd *f, char *value, sdm_error *err)
     return s;
 }
 
-/* A spacing of "nan" marks an axis without one. */
+/* A spacing of "nan" marks an axis that has no spacing. */
 static sdm_status take_spacings(nrrd *f, char *value, sdm_error *err)
 {
     const sdm_status s = need_axes(f, "spacings", err);
@@ -119,7 +121,7 @@ static sdm_status take_space_dimension(nrrd *f, char *value, sdm_error *err)
                : SDM_OK;
 }
 
-/* Reads three units in quotes: "mm" "mm" "mm". An empty or unknown one ("???") counts as mm. */
+/* Reads three units in quotes: "mm" "mm" "mm". An empty unit or "???" (unknown) counts as mm. */
 static sdm_status take_units(nrrd *f, char *value, sdm_error *err)
 {
     for (int row = 0; row < 3; row++) {
@@ -292,7 +294,8 @@ static sdm_status read_fields(nrrd *f, sdm_error *err)
     return s;
 }
 
-/* Demands the required fields; the byte order only for voxels of several bytes. */
+/* Demands the required fields (the byte order only for voxels of several bytes), and a field that
+   states the size of the voxels. */
 static sdm_status check_fields(const nrrd *f, sdm_error *err)
 {
     for (int i = DIMENSION; i <= ENDIAN; i++)
@@ -334,7 +337,7 @@ static sdm_status set_axes(nrrd *f, sdm_error *err)
         }
         h->n[in_space++] = f->size[a];
     }
-    // exactly three axes in space, and the fourth counts layers
+    // need exactly three axes in space, and a fourth axis must count layers
     if (in_space != 3 || (f->axes == 4 && layer_axis < 0))
         return sdm_fail(err, SDM_E_UNSUPPORTED,
                         "%s: need three axes with a direction in space (and one 'none' of four)",

@@ -10,9 +10,9 @@
 typedef struct sdm_voxel_format {
     const char *name;
     size_t size;      /* bytes */
-    int nifti;        /* the code in the field datatype */
-    const char *nrrd; /* the readers remove a final "_t": "int16_t" */
-    const char *meta; /* without the prefix "MET_" */
+    int nifti;        /* the code in the field datatype of a NIfTI header */
+    const char *nrrd; /* names in NRRD files; the reader removes a final "_t", as in "int16_t" */
+    const char *meta; /* names in MetaImage files, without the prefix "MET_" */
 } sdm_voxel_format;
 
 /* Indexed by sdm_voxel_type. */

@@ -7,8 +7,8 @@
 #include "sdm/internal/builder.h"
 #include "sdm/meshfile.h"
 
-/* Read a whole file, data[size] and a zero byte behind it, which they may modify, into the builder.
- * The caller calls sdm_builder_finish(). SDM_E_FORMAT with file and line or byte,
+/* Read a whole file, data[size], into the builder. A zero byte follows the data; the functions may
+ * modify both. The caller calls sdm_builder_finish(). SDM_E_FORMAT with file and line or byte,
  * SDM_E_UNSUPPORTED, SDM_E_NOMEM. */
 sdm_status sdm_ply_read(sdm_builder *b, uint8_t *data, size_t size, sdm_error *err);
 sdm_status sdm_stl_read(sdm_builder *b, uint8_t *data, size_t size, sdm_error *err);

@@ -3,14 +3,15 @@
 #include "mesh_formats.h"
 #include "sdm/internal/text.h"
 
-/* The largest vertex index of all faces and its line (0: none yet). It is checked at the end of the
- * file, since a face may refer to vertices that follow it. */
+/* The largest vertex index of all faces, and the line on which it stands (0: no face yet). The
+   index is checked at the end of the file, since a face may refer to vertices that follow it. */
 typedef struct max_index {
     size_t index, line;
 } max_index;
 
 /* Reads a corner, "12", "12/3", "12//4" or "12/3/4", of which only the first number, the vertex, is
- * used. Vertices are counted from 1, or with negative numbers backwards from the latest one, -1. */
+ * used. Vertices are counted from 1; negative numbers count backwards from the latest vertex,
+ * -1. */
 static sdm_status read_corner(const sdm_builder *b, const sdm_scan *scan, char *word, uint32_t *out,
                               max_index *max, sdm_error *err)
 {

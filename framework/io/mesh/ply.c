@@ -15,7 +15,7 @@ typedef struct body {
     char *line;
 } body;
 
-/* SDM_E_FORMAT with the current line or byte. */
+/* Fails with SDM_E_FORMAT; the message names the current line or byte. */
 static sdm_status fail_here(const body *y, sdm_error *err, const char *what)
 {
     if (y->h.ascii)
@@ -31,7 +31,7 @@ static size_t bytes_left(const body *y)
     return (size_t)(y->scan.end - from) + 1; // the last word needs no separator
 }
 
-/* Lower bound on the bytes of a number; in ASCII a digit and a separator. */
+/* Smallest number of bytes that a number takes; in ASCII a digit and a separator. */
 static size_t min_size(const body *y, sdm_ply_type type)
 {
     return y->h.ascii ? 2 : sdm_ply_type_size(type);
@@ -73,7 +73,7 @@ static sdm_status next_number(body *y, sdm_ply_type type, double *out, sdm_error
     return SDM_OK;
 }
 
-/* Reads a list property: the corners of a face; others are skipped. */
+/* Reads a list property if it holds the corners of a face; skips any other list. */
 static sdm_status read_list(body *y, const sdm_ply_property *p, sdm_error *err)
 {
     const bool corners = p->role == SDM_PLY_CORNERS;
@@ -117,7 +117,7 @@ static sdm_status read_instance(body *y, const sdm_ply_element *element, sdm_err
  * the bytes left. */
 static sdm_status read_element(body *y, const sdm_ply_element *element, sdm_error *err)
 {
-    if (element->n == 0) return SDM_OK; // without properties it takes no bytes
+    if (element->n == 0) return SDM_OK; // an element without properties takes no bytes
     size_t smallest = 0;
     for (size_t i = 0; i < element->n; i++) {
         const sdm_ply_property *p = &y->h.property[element->first + i];

@@ -7,7 +7,7 @@ size_t sdm_ply_type_size(sdm_ply_type type)
     return size[type];
 }
 
-/* SDM_PLY_NONE for an unknown name or NULL. */
+/* The type of this name; SDM_PLY_NONE for an unknown name or NULL. */
 static sdm_ply_type find_type(const char *word)
 {
     static const struct {

@@ -7,7 +7,7 @@
 #define SDM_PLY_ELEMENTS 16
 #define SDM_PLY_PROPERTIES 256
 
-/* The type of a number; NONE: no number. */
+/* The type of a number in the file; SDM_PLY_NONE: no number. */
 typedef enum sdm_ply_type {
     SDM_PLY_NONE = 0,
     SDM_PLY_INT8,

@@ -1,5 +1,5 @@
-/* STL meshes, ASCII and binary. The format repeats shared vertices: equal ones are merged on read.
- */
+/* STL meshes, ASCII and binary. The format repeats a vertex in every triangle that uses it; the
+   reader merges equal vertices. */
 #include "mesh_formats.h"
 #include "sdm/internal/rng.h"
 #include "sdm/memory.h"
@@ -7,12 +7,12 @@
 #include <float.h>
 #include <math.h>
 
-/* Bytes of the binary header with the number of facets, and of a facet. */
+/* Number of bytes of the binary header, which includes the number of facets, and of a facet. */
 #define STL_HEADER 84
 #define STL_FACET 50
 
 /* A hash table of vertices by the bits of their coordinates, with open addressing: slot[mask + 1]
- * holds vertex index + 1, 0 where it is free. */
+   holds vertex index + 1; a free slot holds 0. */
 typedef struct vertex_table {
     uint32_t *slot;
     size_t mask;
@@ -149,7 +149,7 @@ sdm_status sdm_stl_read(sdm_builder *b, uint8_t *data, size_t size, sdm_error *e
     return s;
 }
 
-/* Unit normal of a triangle, zero for a degenerate one. */
+/* n = unit normal of the triangle a, b, c; zero for a degenerate triangle. */
 static void facet_normal(const double *a, const double *b, const double *c, double n[3])
 {
     const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]},

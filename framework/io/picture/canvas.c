@@ -1,4 +1,4 @@
-/* The canvas, drawn by cairo; the only file that includes its headers. */
+/* The canvas, drawn by cairo; the only file that includes cairo's headers. */
 #include "canvas.h"
 
 #include <cairo-pdf.h>
@@ -56,8 +56,8 @@ sdm_status sdm_picture_check(const char *path, sdm_error *err)
                     "%s: unknown type of picture, the name must end in .png, .svg or .pdf", path);
 }
 
-/* Receives the next bytes of the file from cairo: of an SVG file into c->document, else into the
- * output file. */
+/* Receives the next bytes of the file from cairo: adds those of an SVG file to c->document, and
+   writes those of other files to the output file. */
 static cairo_status_t write_bytes(void *user, const unsigned char *data, unsigned size)
 {
     sdm_canvas *c = user;
@@ -69,7 +69,7 @@ static cairo_status_t write_bytes(void *user, const unsigned char *data, unsigne
     return c->error.status ? CAIRO_STATUS_WRITE_ERROR : CAIRO_STATUS_SUCCESS;
 }
 
-/* The error of writing the file, or else that of cairo. */
+/* Reports the error in writing the file; if there was none, the error of cairo. */
 static sdm_status canvas_fail(const sdm_canvas *c, cairo_status_t status, sdm_error *err)
 {
     if (c->error.status) return sdm_fail(err, c->error.status, "%s", c->error.text);

@@ -38,13 +38,13 @@ void sdm_canvas_discard(sdm_canvas *c);
 void sdm_canvas_clip(sdm_canvas *c, sdm_box box);
 void sdm_canvas_unclip(sdm_canvas *c);
 
-/* alpha: 0 transparent .. 1 opaque. */
+/* Fills the box; alpha: 0 transparent .. 1 opaque. */
 void sdm_canvas_fill(sdm_canvas *c, sdm_box box, sdm_colour colour, double alpha);
-/* An outline of one pixel just outside the box. */
+/* Draws an outline of one pixel just outside the box. */
 void sdm_canvas_frame(sdm_canvas *c, sdm_box box, sdm_colour colour);
 
-/* The path: move to the start of a line, then to its further points. Line ends are round, so a line
- * of length 0 is a dot. */
+/* Add to the path: move to the start of a line, then draw to its further points. Line ends are
+ * round, so a line of length 0 is a dot. */
 void sdm_canvas_move_to(sdm_canvas *c, double x, double y);
 void sdm_canvas_line_to(sdm_canvas *c, double x, double y);
 /* Strokes the path and keeps it, for a second stroke on top. Where the path crosses itself, alpha
@@ -67,13 +67,13 @@ typedef enum sdm_align { SDM_LEFT = 0, SDM_CENTRE = 1, SDM_RIGHT = 2 } sdm_align
 typedef struct sdm_type {
     /* height of capital letters */
     double size;
-    /* which point of the text (x, y) is */
+    /* which point of the text lies at (x, y) */
     sdm_align align;
-    /* upwards instead of to the right */
+    /* true: the text runs upwards instead of to the right */
     bool upwards;
     bool bold;
     sdm_colour colour;
-    /* a white rim, for text on an image */
+    /* true: the text has a white rim, for text on an image */
     bool halo;
 } sdm_type;
 
@@ -94,10 +94,10 @@ typedef enum sdm_colour_map {
    end, NaN and infinities grey. The diverging maps are white at 0 and need low < 0 < high. */
 sdm_colour sdm_map_colour(sdm_colour_map map, double low, double high, double value);
 
-/* Round tick positions *first + i *step in low .. high, about `wanted` of them, with a step of 1, 2
-   or 5 times a power of ten. Returns how many there are. */
+/* Finds round tick positions *first + i * *step in low .. high, about `wanted` of them, with a step
+   of 1, 2 or 5 times a power of ten. Returns the number of ticks. */
 int sdm_ticks(double low, double high, int wanted, double *first, double *step);
-/* The number of a tick, with as many decimals as its step needs; buf has 32 bytes; returns buf. */
+/* Writes the number of a tick to buf, with as many decimals as `step` needs, and returns buf. */
 const char *sdm_tick_text(double value, double step, char buf[32]);
 
 #endif

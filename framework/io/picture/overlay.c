@@ -35,8 +35,8 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Black and white are percentiles 1 and 99 of the three slices, so that a few bright voxels do not
- * darken the rest. */
+/* Finds the values shown as black and as white: the 1st and the 99th percentile of the three
+   slices, so that a few bright voxels do not darken the others. */
 static sdm_status find_grey_range(overlay *o, sdm_error *err)
 {
     size_t n = 0, used = 0;

@@ -4,13 +4,14 @@
 #include <math.h>
 #include <stdio.h>
 
-/* Colours of the table for a slice. */
+/* Number of colours in the table for a slice. */
 #define SHADES 2048
 /* A contour's rim is this much wider than its line, in pixels. */
 #define RIM 2.2
 #define RIM_ALPHA 0.55
 
-/* The value at column i, -1 <= i <= n[0], of row j inside of the slice. */
+/* The value at column i, -1 <= i <= n[0], of row j, 0 <= j < n[1]; one column outside of the slice
+   it is extrapolated linearly. */
 static double row_value(const sdm_slice *s, int64_t i, int64_t j)
 {
     const float *row = s->v + (size_t)j * s->stride[1];
@@ -30,7 +31,7 @@ static double value_at(const sdm_slice *s, int64_t i, int64_t j)
     return 2 * row_value(s, i, edge) - row_value(s, i, next);
 }
 
-/* Bilinear; whole numbers u, v are the centres of voxels. */
+/* The value at (u, v), interpolated bilinearly; whole numbers u, v are the centres of voxels. */
 static double interpolate(const sdm_slice *s, double u, double v)
 {
     const double fu = floor(u), fv = floor(v), tu = u - fu, tv = v - fv;

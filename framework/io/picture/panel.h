@@ -12,23 +12,25 @@ typedef struct sdm_slice {
     size_t stride[2];
 } sdm_slice;
 
-/* Fills the box, which covers whole voxels, with the colours of the bilinear interpolant. */
+/* Fills the box, which covers whole voxels, with the colours of the values, interpolated
+   bilinearly. */
 void sdm_panel_colours(sdm_canvas *c, sdm_box box, const sdm_slice *s, sdm_colour_map map,
                        double low, double high);
 
-/* The line where the slice crosses `level`, by marching squares: `width` pixels of `colour` over a
-   wider, translucent line of `rim`. Cells with a value that is not finite are left out. */
+/* Draws the line where the slice crosses `level`, by marching squares: `width` pixels of `colour`
+   over a wider, translucent line of `rim`. Cells with a value that is not finite are left out. */
 void sdm_panel_contour(sdm_canvas *c, sdm_box box, const sdm_slice *s, double level, double width,
                        sdm_colour colour, sdm_colour rim);
 
-/* A bar of a round number of mm in the lower left corner; none where the box is too narrow. */
+/* Draws a bar that is a round number of mm long in the lower left corner; none if the box is too
+   narrow. */
 void sdm_panel_scale_bar(sdm_canvas *c, sdm_box box, double pixels_per_mm);
 
-/* A horizontal colour bar, with numbers and a caption below it; `box` is the bar alone. */
+/* Draws a horizontal colour bar, with numbers and a caption below it; `box` is the bar alone. */
 void sdm_colour_bar(sdm_canvas *c, sdm_box box, sdm_colour_map map, double low, double high,
                     const char *caption);
 
-/* A sample of a contour's line for a legend, from (x, y) to the right. */
+/* Draws a sample of a contour's line for a legend, from (x, y) to the right. */
 void sdm_contour_sample(sdm_canvas *c, double x, double y, double length, sdm_colour colour,
                         sdm_colour rim);
 

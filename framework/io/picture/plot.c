@@ -29,7 +29,8 @@ static bool curve_point(const sdm_curve *curve, size_t i, bool log_y, double p[2
     return fabs(p[0]) <= FLT_MAX && fabs(p[1]) <= FLT_MAX;
 }
 
-/* The range of the points, widened by 5 % above and below; never empty. */
+/* Finds the range of the points. The range of y is widened by 5 % below and above; a range of
+   length 0 is widened, too. */
 static void find_window(window *w, const sdm_curve *curves, size_t n_curves)
 {
     for (int d = 0; d < 2; d++) {
@@ -89,7 +90,7 @@ static void y_tick(sdm_canvas *c, double y, const char *text)
                         (sdm_type){.size = 10, .align = SDM_RIGHT, .colour = SDM_INK}, text);
 }
 
-/* "10" with a small raised exponent. */
+/* Draws "10" with a small raised exponent. */
 static void power_of_ten(sdm_canvas *c, double y, int exponent)
 {
     char text[16];
@@ -101,8 +102,8 @@ static void power_of_ten(sdm_canvas *c, double y, int exponent)
     sdm_canvas_text(c, area.x - 12 - sdm_canvas_text_width(c, 7, text), y + 6, type, "10");
 }
 
-/* Labels at the decades (every second, third ... where there are over ten), and, over less than 1.6
- * decades, at 2 and 5 times them. */
+/* Draws ticks, with labels at the powers of ten (every second, third ... of them when the axis
+   spans over ten) and, when the axis spans less than 1.6 decades, at 2 and 5 times these powers. */
 static void draw_log_axis(sdm_canvas *c, const window *w)
 {
     const double decades = w->high[1] - w->low[1];
@@ -133,7 +134,7 @@ static void draw_y_axis(sdm_canvas *c, const window *w)
 {
     double first, step;
     char text[32];
-    // a linear scale when the values span less than about a factor of two
+    // ticks in even steps when the values span less than about a factor of two
     if (w->log_y && w->high[1] - w->low[1] > 0.35) {
         draw_log_axis(c, w);
         return;

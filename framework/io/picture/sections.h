@@ -12,15 +12,16 @@ typedef struct sdm_sections {
     int64_t at[3];
     /* the world axis (0 x, 1 y, 2 z) that each grid axis is parallel to, or -1 */
     int world[3];
-    double pixels; /* per mm */
-    /* size of each section in pixels */
+    double pixels; /* pixels per mm */
+    /* width and height of each section in pixels */
     int w[3], h[3];
-    /* width of a column that holds any of them */
+    /* width, in pixels, of a column that holds any of the sections */
     int widest;
 } sdm_sections;
 
 /* Places the sections through the middle of the bounding box of the negative values of
- * map[nz][ny][nx], or of the grid when there are none. `grid` must outlive *s. */
+ * map[nz][ny][nx], or of the grid when there are none, and sets their sizes. `grid` must outlive
+ * *s. */
 void sdm_sections_place(sdm_sections *s, const sdm_grid *grid, const float *map);
 
 /* The section normal to `axis` of values[nz][ny][nx] on the same grid. */
@@ -30,7 +31,7 @@ sdm_slice sdm_section_of(const sdm_sections *s, const float *values, int axis);
  * and, if `left`, along its left side. */
 void sdm_section_draw_frame(sdm_canvas *c, const sdm_sections *s, sdm_box box, int axis, bool left);
 
-#define SDM_SECTION_LEFT 66  /* room for numbers and axis names */
-#define SDM_SECTION_BELOW 54 /* the same under a section */
+#define SDM_SECTION_LEFT 66  /* room for numbers and axis names left of a section, pixels */
+#define SDM_SECTION_BELOW 54 /* the same below a section */
 
 #endif

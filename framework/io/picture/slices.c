@@ -1,5 +1,5 @@
-/* Pictures of maps: a column of three orthogonal slices for each, with contours, axes in mm and
- * colour bars. */
+/* Pictures of maps: a column of three orthogonal slices for each map, with contours, axes in mm and
+   colour bars. */
 #include "sdm/picture.h"
 
 #include <math.h>

@@ -12,7 +12,7 @@
 enum {
     SURFACES_MAX = 8,
     N_VIEWS = 2,
-    FINE = 3, /* samples of a pixel along each side */
+    FINE = 3, /* samples along each side of a pixel */
     N_SHADES = 255,
     MIDDLE = N_SHADES / 2, /* index of the colour of 0 */
     PANEL = 400,           /* pixels of the longer side of the largest view */
@@ -53,7 +53,8 @@ typedef struct scene {
     sdm_colour shade[N_SHADES];
 } scene;
 
-/* The samples of one panel, FINE times as wide and high; depth is -INFINITY where no surface is. */
+/* The samples of one panel, FINE times as many as pixels in width and height; depth is -INFINITY
+   where no surface is. */
 typedef struct raster {
     int w, h;
     double *depth;
@@ -65,7 +66,7 @@ static double dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Finds the bounding boxes and the largest finite value. */
+/* Finds the bounding boxes and the largest absolute value that is finite. */
 static void scene_measure(scene *sc)
 {
     for (int v = 0; v < N_VIEWS; v++)
@@ -106,7 +107,8 @@ static void scene_place(scene *sc)
         sc->shade[i] = sdm_map_colour(SDM_MAP_SIGNED, -1, 1, (double)(i - MIDDLE) / MIDDLE);
 }
 
-/* Adds the area vectors of the triangles at each vertex: normal[n_vert][3], not of unit length. */
+/* Adds to normal[n_vert][3], for each vertex, the cross products of two edges of each triangle at
+   the vertex; the sums are normal to the surface, but not of unit length. */
 static void add_normals(const sdm_mesh *m, double *normal)
 {
     for (size_t t = 0; t < m->n_tri; t++) {
@@ -145,7 +147,7 @@ typedef struct corner {
     double x, y, z, value, normal[3];
 } corner;
 
-/* Renders a triangle; plain: in one colour for all values. */
+/* Renders a triangle; plain: in one colour, whatever the values. */
 static void draw_triangle(const scene *sc, raster *r, const view *v, const corner c[3], bool plain)
 {
     const double area =

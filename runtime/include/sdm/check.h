@@ -33,10 +33,10 @@ typedef enum sdm_check_stat {
     SDM_CHECK_MEAN = 3
 } sdm_check_stat;
 
-/* Value of a statistic, mm; NaN for an unknown one. */
+/* The value of a statistic, mm; NaN for an unknown statistic. */
 SDM_API double sdm_check_get(const sdm_check *c, sdm_check_stat stat);
 
-/* "max", "q95", "rmse" or "mean"; "unknown" for an unknown one. */
+/* The name of a statistic: "max", "q95", "rmse" or "mean"; "unknown" for an unknown statistic. */
 SDM_API const char *sdm_check_stat_name(sdm_check_stat stat);
 
 /* Checks values[nz][ny][nx] against the surface of `engine`. The points are the same for the same
@@ -44,9 +44,9 @@ SDM_API const char *sdm_check_stat_name(sdm_check_stat stat);
 SDM_API sdm_status sdm_check_map(const sdm_exact *engine, const sdm_grid *grid, const float *values,
                                  sdm_check *out, sdm_error *err);
 
-/* Checks values[nz][ny][nx] against a shape at p[n_params]. It builds mesh and engine, which takes
-   most of the time, however small the grid is. Also returns the errors of sdm_instance_mesh() and
-   sdm_exact_create(). [any thread] */
+/* Checks values[nz][ny][nx] against a shape at p[n_params]. Most of the time is spent on building
+   the mesh and the engine, however small the grid is. Also returns the errors of
+   sdm_instance_mesh() and sdm_exact_create(). [any thread] */
 SDM_API sdm_status sdm_check_shape(const sdm_instance *shape, const double *p, const sdm_grid *grid,
                                    const float *values, sdm_check *out, sdm_error *err);
 

@@ -15,14 +15,15 @@
 
    The posterior density is maximised by damped Newton steps that use the information (negative
    second derivative of the log-likelihood), within the ranges of the parameters. Exact distances
-   have creases where the nearest face changes, which make the likelihood non-smooth. A fit with
+   have creases where the nearest face changes; these make the likelihood non-smooth. A fit with
    exact maps therefore ends with gradients averaged over a motion of the surface of 3 % of a map
    voxel (Ermoliev, Norkin and Wets 1995), and reaches the same maximum from every nearby start.
 
    The covariance is the sandwich H^-1 J H^-1 (Huber 1967). H is the observed information (labels:
    Louis 1982). J is the covariance of the score, the gradient of the log-likelihood, with the
-   spatial correlation of the residuals (Conley 1999), corrected for what the fit has explained of
-   them. Correlated noise and small errors of the model therefore widen the covariance. */
+   spatial correlation of the residuals (Conley 1999), corrected for the part of the residuals that
+   the fit has explained. Correlated noise and small errors of the model therefore widen the
+   covariance. In this header sd means standard deviation. */
 #ifndef SDM_FIT_H
 #define SDM_FIT_H
 
@@ -38,35 +39,37 @@ extern "C" {
 
 /* Where maps come from: a network, a shape, or both. The caller keeps ownership. */
 typedef struct sdm_fit_source {
-    /* maps by this network; NULL: by the exact engine */
+    /* the network that makes the maps; NULL: the exact engine makes them */
     const sdm_model *model;
-    /* for the exact engine. May be NULL with a model: then no polish, and not the policy exact.
-       With a model its parameters must be those of the model, see sdm_runtime_instance() */
+    /* the shape for the exact engine. May be NULL with a model: then there is no polish, and
+       SDM_RANGE_EXACT is not allowed. With a model, the parameters of the shape must be those of
+       the model, see sdm_runtime_instance() */
     const sdm_instance *shape;
-    /* without a model: grid of the exact maps in the shape's frame, which holds the shape with a
+    /* without a model: grid of the exact maps in the shape's frame; it must hold the shape with a
        margin. With voxels larger than 1.5 times the point spread of the image, the standard
        deviations of weakly determined unknowns come out too small */
     sdm_grid grid;
-    /* with a model: parameters outside the network's range. Refuse: the range is the bound of the
-       fit, and a start outside is SDM_E_RANGE. Clamp: the same bound, but such a start is moved
-       into the range and start_clamped set. Exact: the shape's own range is the bound, and the
-       exact engine makes the maps outside the network's range */
+    /* with a model: how parameters outside the network's range are treated. Refuse: the fit stays
+       in the network's range, and a start outside it gives SDM_E_RANGE. Clamp: the fit stays in the
+       network's range, too, but a start outside it is moved into it, and start_clamped is set.
+       Exact: the fit stays in the shape's own range, and the exact engine makes the maps outside
+       the network's range */
     sdm_range_policy policy;
 } sdm_fit_source;
 
 typedef enum sdm_fit_kind {
-    /* values[nz][ny][nx], any unit */
+    /* values[nz][ny][nx] are an image in any unit */
     SDM_FIT_IMAGE = 0,
     /* values[nz][ny][nx] are probabilities of inside, 0 .. 1 (a label map: 0 and 1). The image
        model takes them as shares of voxels (partial volume), or as labels with the logistic prior
      */
     SDM_FIT_LABEL = 1,
-    /* points[n_points][3] on the surface, world, mm; outliers are tolerated */
+    /* points[n_points][3] lie on the surface, in the world, mm; outliers are tolerated */
     SDM_FIT_POINTS = 2
 } sdm_fit_kind;
 
-/* Data to fit to; the caller keeps ownership. Voxels that are NaN are skipped and counted; infinite
- * ones are SDM_E_FORMAT. */
+/* Data to fit to; the caller keeps ownership. Voxels that are NaN are skipped and counted; an
+   infinite voxel gives SDM_E_FORMAT. */
 typedef struct sdm_fit_target {
     sdm_fit_kind kind;
     /* image and label map: their grid in the world */
@@ -76,7 +79,7 @@ typedef struct sdm_fit_target {
     size_t n_points;
 } sdm_fit_target;
 
-/* tissues inside, and tissues outside, at most */
+/* largest number of tissues inside, and of tissues outside */
 #define SDM_FIT_LAWS 4
 
 /* Distribution of the values of one tissue: a Gaussian, or Student's t with `dof` > 0 degrees of
@@ -107,20 +110,20 @@ typedef enum sdm_fit_phase {
     /* search for the start */
     SDM_FIT_SEARCH = 0,
     SDM_FIT_MAIN = 1,
-    /* exact maps after the fit with a network */
+    /* steps with exact maps after the fit with a network */
     SDM_FIT_POLISH = 2
 } sdm_fit_phase;
 
-/* State after an iteration; params is valid during the call. */
+/* State after an iteration; params is valid during the call of progress(). */
 typedef struct sdm_fit_progress {
     sdm_fit_phase phase;
-    /* from 1, over all phases */
+    /* number of the iteration, counted from 1 over all phases */
     size_t iteration;
     /* log-posterior density, up to a constant */
     double objective;
     /* size of the step, in the units of sdm_fit_opts.eps */
     double step;
-    /* [n] */
+    /* [n_params] */
     const double *params;
     sdm_pose pose;
 } sdm_fit_progress;
@@ -128,36 +131,38 @@ typedef struct sdm_fit_progress {
 /* sdm_fit_defaults() fills it; change what differs. */
 typedef struct sdm_fit_opts {
     sdm_fit_model image_model;
-    /* mm, > 0: labels: scale of the logistic prior */
+    /* labels: scale of the logistic prior, mm, > 0 */
     double l_ref;
-    /* mm, > 0: partial volume: sd of the point spread, which includes the voxel's own box; start
-     * value */
+    /* partial volume: start value of the sd of the point spread, mm, > 0; the point spread includes
+       the voxel's own box */
     double blur;
     /* true: the blur is not estimated */
     bool keep_blur;
-    /* tissues; start values */
+    /* start values of the tissues */
     sdm_fit_appearance appearance;
     /* true: the appearance is not estimated */
     bool keep_appearance;
-    /* mm, >= 0: partial volume, images with two or more outside tissues: the weights of these vary
-       in space (Sanjay-Gopal and Hebert 1998). At a point they are the parts of the tissues in its
-       surroundings, averaged with a Gaussian window of this sd. 0: the same everywhere */
+    /* partial volume, images with two or more outside tissues: the weights of the outside tissues
+       vary in space (Sanjay-Gopal and Hebert 1998). At a point they are the parts of the tissues in
+       its surroundings, averaged with a Gaussian window of this sd, mm, >= 0. 0: the weights are
+       the same everywhere */
     double tissue_mm;
-    /* mm, > 0: points: sd of their distance from the surface; start value, estimated unless
-     * keep_appearance */
+    /* points: start value of the sd of the points' distances from the surface, mm, > 0; the sd is
+       estimated unless keep_appearance is set */
     double point_sd;
-    /* > 0: points: degrees of freedom of Student's t; small values tolerate outliers */
+    /* points: degrees of freedom of Student's t for the distances, > 0; small values tolerate
+       outliers */
     double point_dof;
 
-    /* [n]; NULL: the defaults of the shape */
+    /* [n_params] start values of the parameters; NULL: the defaults of the shape */
     const double *start_params;
     sdm_pose start_pose;
     /* rotations about `pivot` that are tried. Turn i starts at R = R_start Q_i, with the pivot
        where start_pose has it; all unknowns that are not kept are fitted from there */
     sdm_fit_turns turns;
-    /* 1 .. 4096 rotations; not read without turns */
+    /* number of turns, 1 .. 4096; not read with SDM_FIT_TURNS_NONE */
     size_t n_turns;
-    /* shape's frame, mm: the point that the turns leave in place */
+    /* the point that the turns leave in place, in the shape's frame, mm */
     double pivot[3];
     /* true: the parameters are not estimated */
     bool keep_params;
@@ -165,127 +170,137 @@ typedef struct sdm_fit_opts {
     bool keep_pose;
 
     /* sd of the prior of each parameter, about the middle of its range, in units of half of the
-       range; 0: no prior. 0.5 takes the range as mean +- two sd. The likelihood counts correlated
-       voxels as independent and is therefore too sharp beside a prior: each log prior is multiplied
-       by the ratio of the variance with correlation to that without */
+       range; 0: no prior. With 0.5 the range is the mean +- two sd. The likelihood counts
+       correlated voxels as independent and is therefore too sharp beside a prior: each log prior is
+       multiplied by the ratio of the variance with correlation to the variance without
+       correlation */
     double prior_sd;
-    /* rad: sd of the rotation about the start pose; 0: no prior. With turns: about the start as
-     * rotated by the turn that is chosen */
+    /* sd of the prior of the rotation, rad; 0: no prior. The prior is centred at the start pose,
+       with turns at the start pose rotated by the chosen turn */
     double prior_rotation_sd;
-    /* mm: sd of the translation about the same pose; 0: no prior */
+    /* sd of the prior of the translation, mm, centred at the same pose; 0: no prior */
     double prior_translation_sd;
 
-    /* mm, > 0: voxels up to this distance outside the shape are used, besides all inside. The
-     * region follows the shape and is constant at the end */
+    /* voxels up to this distance outside the shape are used, besides all voxels inside; mm, > 0.
+       This region follows the shape and is constant at the end */
     double margin;
     /* true: only voxels in this box of the world, mm, are used */
     bool use_box;
     double box_min[3], box_max[3];
-    /* mm, >= 0: images: leaves out spaces that look like the inside (by `appearance` and `blur` as
-       given) and hold a ball of this radius: they are too wide to be the shape. Should be about a
-       quarter larger than the radius of the largest ball in the shape. 0: none is left out */
+    /* images: spaces that look like the inside (by `appearance` and `blur` as given) and hold a
+       ball of this radius, mm, >= 0, are left out, since they are too wide to be the shape. The
+       radius should be about a quarter larger than that of the largest ball in the shape. 0: no
+       space is left out */
     double cavity;
     /* 0 .. 1: share of the volume of the fitted shape that must lie in the image */
     double least_inside;
 
-    /* of the main phase, >= 1; the averaged gradient at its end has as many again */
+    /* largest number of iterations of the main phase, >= 1; the steps with the averaged gradient at
+       its end have as many again */
     size_t max_iterations;
-    /* with the exact engine after a network's fit, counted in the same way; 0: no polish; 40 are
-     * enough */
+    /* largest number of iterations of the polish, with the exact engine after a network's fit,
+       counted in the same way; 0: no polish; 40 are enough */
     size_t max_polish_iterations;
-    /* > 0: steps end when the largest component is below: a change of a parameter over its range,
-       of the rotation in rad, of the translation over the size of the shape. With a network, steps
-       also end when several in a row promise no gain, with exact maps at the first such step;
-       averaged gradients follow unless the parameters are kept */
+    /* > 0: the steps end when the largest component of a step is at most eps. Components are the
+       change of a parameter over its range, of the rotation in rad, and of the translation over the
+       size of the shape. Unless the parameters are kept, the steps also end when they promise no
+       gain: with a network several in a row, with exact maps the first one. Steps with averaged
+       gradients follow such an end, and with exact maps every end */
     double eps;
-    /* > 0: the same for the averaged gradient with exact maps, in the main phase or the polish, and
-     * for all steps with exact maps where the parameters are kept */
+    /* > 0: the same limit for steps with the averaged gradient and exact maps, in the main phase or
+       the polish, and for all steps with exact maps where the parameters are kept */
     double polish_eps;
-    /* >= 0; 0: the OpenMP default. The same bits for every value */
+    /* number of threads, >= 0; 0: the OpenMP default. The result has the same bits for every
+       value */
     int n_threads;
     /* called after every iteration; may be NULL */
     void (*progress)(void *user, const sdm_fit_progress *p);
-    /* called now and then, at least before every map; true stops the fit with SDM_E_CANCELLED; may
-     * be NULL */
+    /* called now and then, at least before every map; the value true stops the fit with
+     * SDM_E_CANCELLED; may be NULL */
     bool (*cancelled)(void *user);
-    /* passed to both */
+    /* passed to progress() and cancelled() */
     void *user;
 } sdm_fit_opts;
 
-/* Fluid in bone, in Hounsfield units: inside 40 +- 170; outside 1300 +- 270 and air -880 +- 150. */
+/* Default options. The tissues are fluid in bone, in Hounsfield units (mean +- sd): inside 40 +-
+   170; outside bone 1300 +- 270 and air -880 +- 150. */
 SDM_API sdm_fit_opts sdm_fit_defaults(void);
 
 /* Result of a fit; zero-initialise, sdm_fit_dispose() frees it. N = n_params + 6. Rows and columns
-   of matrices: the parameters in their order; rotation (rad: a small rotation vector about the axes
-   of the world through the origin of the shape, applied after the pose); translation (mm). */
+   of matrices stand for the parameters in their order; then the rotation (rad: a small rotation
+   vector about the axes of the world through the origin of the shape, applied after the pose); then
+   the translation (mm). */
 typedef struct sdm_fit_result {
     size_t n_params;
     /* [n_params] estimate */
     double *params;
     /* world = R shape + t */
     sdm_pose pose;
-    /* [N][N] of the posterior; 0 for unknowns that were kept; all NaN where the fit failed before
-     * it was computed */
+    /* [N][N] covariance of the posterior; 0 for unknowns that were kept; all NaN if the fit failed
+       before computing it */
     double *covariance;
-    /* [N] square roots of its diagonal; NaN in the same case, or where the variance is negative */
+    /* [N] square roots of the diagonal of the covariance; NaN in the same case, or where the
+       variance is negative */
     double *sd;
-    /* [N][N]; 0 where a sd is 0, NaN where a sd is NaN */
+    /* [N][N] correlations of the unknowns; 0 where a sd is 0, NaN where a sd is NaN */
     double *correlation;
-    /* [n_params] the estimate is at an end of its range: its sd is not reliable */
+    /* [n_params] true: the estimate is at an end of its range, and its sd is not reliable */
     bool *at_bound;
-    /* [n_params] the sd is about that of the prior, or of a uniform distribution over the range:
-     * the target does not determine the parameter */
+    /* [n_params] true: the sd is about that of the prior, or of a uniform distribution over the
+       range, so the target does not determine the parameter */
     bool *by_prior;
-    /* the start was moved into the network's range */
+    /* true: the start was moved into the network's range */
     bool start_clamped;
-    /* maps that the exact engine made because parameters lay outside the network's range */
+    /* number of maps that the exact engine made because parameters lay outside the network's
+       range */
     size_t n_exact_outside;
 
     bool converged;
     /* why the fit stopped */
     char reason[256];
-    /* of the main phase and the polish */
+    /* number of iterations of the main phase and the polish */
     size_t n_iterations;
-    /* [n_iterations] log-posterior density after each, up to a constant. Values are comparable only
-       for the same voxels (the region follows the shape), weights of priors, sd of tissues and
-       tissue weights in space */
+    /* [n_iterations] log-posterior density after each iteration, up to a constant. Two values are
+       comparable only if the voxels (the region follows the shape), the weights of the priors, the
+       sd of the tissues and the tissue weights in space are the same */
     double *objective;
-    /* of the target at the estimate */
+    /* log-likelihood of the target at the estimate */
     double log_likelihood;
-    /* image: of the same voxels by a mixture without a shape, whose outside tissues have the same
-     * weights in space; else NaN */
+    /* image: log-likelihood of the same voxels under a mixture of tissues without a shape, whose
+       outside tissues have the same weights in space; other targets: NaN */
     double log_likelihood_without;
     /* image: evidence of the shape: its gain in log-likelihood, corrected for correlated voxels,
-       less the cost of its unknowns (Schwarz 1978). At most 0: the image shows no such shape. Else
-       NaN */
+       less the cost of its unknowns (Schwarz 1978). At most 0: the image shows no such shape. Other
+       targets: NaN */
     double evidence;
-    /* share of the volume of the shape that lies in the image; 1 for points; NaN where the fit
-     * failed before it was computed, as all figures with this remark */
+    /* share of the volume of the shape that lies in the image; 1 for points; NaN if the fit failed
+       before computing it; the same holds for the figures marked "NaN as inside_share" */
     double inside_share;
 
-    /* voxels or points used; voxels near the shape that were skipped because they are NaN or belong
-     * to n_cavity */
+    /* n_used: voxels or points used; n_nan: voxels near the shape that were skipped because they
+       are NaN or are counted in n_cavity */
     size_t n_used, n_nan;
-    /* voxels of the whole image left out by sdm_fit_opts.cavity */
+    /* number of voxels of the whole image left out by sdm_fit_opts.cavity */
     size_t n_cavity;
     /* sum of the correlations of a residual with all residuals, itself included (1: independent);
      * NaN as inside_share */
     double noise_factor;
-    /* mm: error near the surface of the maps of the last phase, from held-out data of the network;
-     * 0 for exact maps; included in the covariance; NaN as inside_share */
+    /* error near the surface of the maps of the last phase, mm: that of the network on held-out
+       data, 0 for exact maps. The covariance includes it. NaN as inside_share */
     double model_error_mm;
-    /* partial volume: sd of the point spread, mm; else 0 */
+    /* partial volume: sd of the point spread, mm; other fits: 0 */
     double blur;
-    /* tissues at the end */
+    /* tissues at the end of the fit */
     sdm_fit_appearance appearance;
-    /* points: sd of their distance from the surface, mm; else 0 */
+    /* points: sd of the points' distances from the surface, mm; other targets: 0 */
     double point_sd;
     /* number of the rotation that was chosen, from 0 */
     size_t turn;
 
-    /* maps made, with or without derivatives, by network and by exact engine */
+    /* number of maps, with or without derivatives, that the network and the exact engine made */
     size_t n_network, n_exact;
-    /* wall clock: all; maps by network; maps by exact engine; search for the start */
+    /* wall-clock time in total, in maps of the network, in maps of the exact engine, and in the
+       search for the start */
     double seconds, seconds_network, seconds_exact, seconds_search;
 } sdm_fit_result;
 
@@ -304,24 +319,24 @@ SDM_API void sdm_fit_dispose(sdm_fit_result *r);
    joins compartments of one shape that are labelled apart. Voxels of values[nz][ny][nx] above 1/2
    are labelled. A voxel becomes 1 if every ball of this radius that covers it touches a labelled
    voxel. Walls between compartments that are thinner than about twice the radius are filled; so are
-   bays of the outside that are as narrow, while the rest stays. Beyond the grid nothing is
-   labelled. SDM_E_ARG: grid or radius. The same bits for any number of threads (0: the OpenMP
-   default). [any thread, on values of its own] */
+   bays of the outside that are as narrow; all other voxels keep their state. Beyond the grid
+   nothing is labelled. SDM_E_ARG: grid or radius. The same bits for any number of threads (0: the
+   OpenMP default). [any thread, on values of its own] */
 SDM_API sdm_status sdm_fit_close_labels(const sdm_grid *grid, double radius, int n_threads,
                                         float *values, sdm_error *err);
 
 /* values[nz][ny][nx] = signed distance (mm, negative inside) of the shape at params[n] and pose, at
-   the voxel centres of a grid in the world, interpolated in the map of the source. Beyond the
-   source's grid the distance to its border is added. n_threads 0: the OpenMP default. [any thread]
- */
+   the voxel centres of a grid in the world, interpolated from the map of the source. Beyond the
+   source's grid the distance to its border is added. n_threads 0: the OpenMP default. [any
+   thread] */
 SDM_API sdm_status sdm_fit_map(const sdm_fit_source *source, const double *params,
                                const sdm_pose *pose, const sdm_grid *grid, int n_threads,
                                float *values, sdm_error *err);
 
 /* The pose that moves shape[n][3] to world[n][3] (mm), n >= 2, with the least sum of squared
-   distances (Horn 1987). Where all points lie on one line, as two do, the rotation about the line
-   is open: the smallest rotation is taken. SDM_E_ARG: points that coincide or are not finite. [any
-   thread] */
+   distances (Horn 1987). Where all points lie on one line, as two points do, the rotation about the
+   line is undetermined: the smallest rotation is taken. SDM_E_ARG: points that coincide or are not
+   finite. [any thread] */
 SDM_API sdm_status sdm_fit_pose_from_points(const double *shape, const double *world, size_t n,
                                             sdm_pose *out, sdm_error *err);
 
@@ -332,9 +347,9 @@ SDM_API sdm_status sdm_fit_pose_from_points(const double *shape, const double *w
 SDM_API sdm_status sdm_fit_pose_from_axis(const double point[3], const double centre[3],
                                           const double axis[3], sdm_pose *out, sdm_error *err);
 
-/* Centroid of the inside of the shape at params[n] (NULL: the defaults) in its frame, mm: for a
-   pivot, or as the `point` of sdm_fit_pose_from_axis(). SDM_E_QUALITY: no voxel of the map is
-   inside. [any thread] */
+/* *centre = centroid of the inside of the shape at params[n] (NULL: the defaults), in the shape's
+   frame, mm. Use it as a pivot, or as the `point` of sdm_fit_pose_from_axis(). SDM_E_QUALITY: no
+   voxel of the map is inside. [any thread] */
 SDM_API sdm_status sdm_fit_centre(const sdm_fit_source *source, const double *params,
                                   double centre[3], sdm_error *err);
 

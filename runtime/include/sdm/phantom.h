@@ -29,25 +29,27 @@ typedef struct sdm_tissue {
 
 /* Start from sdm_phantom_defaults(). */
 typedef struct sdm_phantom_opts {
-    sdm_tissue inside, outside; /* of the shape's surface: fluid and bone */
-    sdm_tissue air;             /* in the air cells */
+    /* Inside and outside of the shape's surface; by default fluid and bone. */
+    sdm_tissue inside, outside;
+    sdm_tissue air; /* tissue in the air cells */
     /* Probability, 0 .. 1, that a cube of edge air_mm of a lattice contains an air cell; 0: none.
      */
     double air_share;
     double air_mm; /* diameter of an air cell, which is a ball, mm */
-    /* There is no air inside the surface, nor outside it at a distance below this, mm. */
+    /* Least distance of the air from the surface, mm. There is no air inside the surface. */
     double air_clear_mm;
     /* Standard deviation of the point spread along the grid axes, mm; at most 64 voxels. */
     double blur[3];
-    /* Texture xi: white noise smoothed by a Gaussian of this standard deviation, mm; at most 64
-       voxels; 0: white noise. */
+    /* The texture xi is white noise smoothed by a Gaussian of this standard deviation, mm, at most
+       64 voxels; 0: not smoothed. */
     double texture_mm;
-    double noise; /* standard deviation of the noise */
-    /* Noise eta: true: white noise smoothed by a Gaussian of width `blur`; false: white noise. */
+    double noise; /* standard deviation of the noise, HU */
+    /* true: the noise eta is white noise smoothed by a Gaussian of width `blur`; false: white
+       noise. */
     bool noise_is_blurred;
     /* Number of sub-voxels along the shortest edge of a voxel, 1 .. 16; longer edges have more. */
     int supersampling;
-    uint64_t seed; /* of the random fields and the air cells */
+    uint64_t seed; /* seed of the random fields and the air cells */
     int n_threads; /* 0: the OpenMP default; the same bits for every value */
     /* Called now and then by any thread; true stops with SDM_E_CANCELLED. May be NULL. */
     bool (*cancelled)(void *user);

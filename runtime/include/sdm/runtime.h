@@ -13,7 +13,7 @@ extern "C" {
 /* Treatment of parameters outside the range that the network was trained on. Such a map is never
    returned without an error or a flag in the result. */
 typedef enum sdm_range_policy {
-    /* SDM_E_RANGE. */
+    /* The call fails with SDM_E_RANGE. */
     SDM_RANGE_REFUSE = 0,
     /* Parameters are moved to the nearest allowed value; the result has `clamped` set. */
     SDM_RANGE_CLAMP,
@@ -34,23 +34,25 @@ typedef enum sdm_reason {
 /* How a map was computed. */
 typedef struct sdm_result {
     sdm_source source;
-    bool clamped;      /* a parameter was moved into its range */
-    double error_mm;   /* expected root mean square error: that on held-out maps; 0 if exact */
-    sdm_reason reason; /* if source is SDM_SOURCE_EXACT */
+    bool clamped; /* a parameter was moved into its range */
+    /* Expected root mean square error: that of the network on held-out maps; 0 if exact. */
+    double error_mm;
+    sdm_reason reason; /* why source is SDM_SOURCE_EXACT */
     bool checked;      /* `check` is valid */
-    sdm_check check;   /* of the network's map, even if it was replaced by an exact one */
+    sdm_check check;   /* check of the network's map, even if an exact one has replaced it */
 } sdm_result;
 
 /* Initialise with zeros. Later versions add members at the end only. */
 typedef struct sdm_generate_opts {
     sdm_range_policy policy;
-    /* For SDM_RANGE_EXACT and checks: from sdm_runtime_instance() or the caller's own; else NULL.
-     */
+    /* The shape for SDM_RANGE_EXACT and for checks, from sdm_runtime_instance() or the caller's
+       own; NULL if neither is wanted. */
     const sdm_instance *exact_shape;
     int n_threads; /* 0: the OpenMP default; the same bits for every value */
     bool check;    /* checks every map of the network with sdm_check_map() */
-    /* > 0: every map is checked. One with a larger error is replaced by an exact map under
-       SDM_RANGE_EXACT, else it gives SDM_E_QUALITY. 0: no bound. */
+    /* > 0: every map of the network is checked. A map with a larger error is replaced by an exact
+       map under SDM_RANGE_EXACT; under other policies the call returns SDM_E_QUALITY. 0: no
+       bound. */
     double max_error_mm;
     sdm_check_stat max_error_of; /* the statistic that max_error_mm bounds */
 } sdm_generate_opts;
@@ -74,9 +76,9 @@ SDM_API sdm_status sdm_generate_batch(const sdm_model *m, const double *params, 
 /* Map and derivatives: jacobian[n_params][nz][ny][nx] = derivative of the map by each parameter, mm
    per unit of the parameter; from the network, or from sdm_exact_shape_jacobian() if the exact
    engine computes the map. For clamped parameters it is the network's derivative at the end of the
-   range. For a `pod` network it takes less time than n_params + 1 calls of sdm_generate().
-   The map depends smoothly on the parameters. If weights are stored as bytes, it differs from that
-   of sdm_generate() by rounding: for cochleas by 2e-4 mm root mean square, 2e-3 mm at most; and the
+   range. For a `pod` network it takes less time than n_params + 1 calls of sdm_generate(). The map
+   depends smoothly on the parameters. If weights are stored as bytes, the map differs from that of
+   sdm_generate() by rounding: for cochleas by 2e-4 mm root mean square, 2e-3 mm at most; and the
    error of the derivatives is, relative to the largest derivative by the same parameter, 2e-4 root
    mean square, 1.5e-3 at most. Errors as for sdm_generate() and sdm_exact_shape_jacobian(). [any
    thread] */
@@ -85,8 +87,8 @@ SDM_API sdm_status sdm_generate_jacobian(const sdm_model *m, const double *param
                                          float *jacobian, sdm_result *result, sdm_error *err);
 
 /* Map and directional derivative: tangent[nz][ny][nx] = J direction, mm, with direction[n_params]
-   and the Jacobian J of sdm_generate_jacobian(). Cheaper than the Jacobian; otherwise the same.
-   [any thread] */
+   and the Jacobian J of sdm_generate_jacobian(). Takes less time than the Jacobian; otherwise as
+   sdm_generate_jacobian(). [any thread] */
 SDM_API sdm_status sdm_generate_jvp(const sdm_model *m, const double *params,
                                     const double *direction, const sdm_generate_opts *opts,
                                     float *values, float *tangent, sdm_result *result,
@@ -103,8 +105,8 @@ SDM_API sdm_status sdm_generate_vjp(const sdm_model *m, const double *params, co
 /* *out = new instance of the shape that the model was trained on, with the same options, from a
    registry that contains the shape; free with sdm_instance_free(). Only for the exact engine:
    networks do not need it. SDM_E_PLUGIN: the registry does not contain the shape, or its parameters
-   differ from the model's. SDM_E_IO: a data file is neither at its path of the training nor in the
-   model's folder; SDM_E_FORMAT: its content differs from that of the training. */
+   differ from the model's. SDM_E_IO: a data file is neither at the path it had in training nor in
+   the model's folder; SDM_E_FORMAT: the content of a data file differs from that in training. */
 SDM_API sdm_status sdm_runtime_instance(const sdm_model *m, const sdm_registry *r,
                                         sdm_instance **out, sdm_error *err);
 
@@ -114,10 +116,10 @@ SDM_API sdm_status sdm_exact_shape_map(const sdm_instance *shape, const double *
                                        const sdm_exact_opts *opts, const sdm_grid *grid,
                                        float *values, sdm_exact_report *report, sdm_error *err);
 
-/* Exact map and its derivatives: jacobian[n_params][nz][ny][nx], mm per unit of the parameter, from
-   sdm_instance_velocity(); sdm_exact_map_derivative() defines them and says where none exists.
-   values and report may be NULL. SDM_E_PLUGIN: the number of vertices depends on the parameters.
-   [any thread] */
+/* Exact map and its derivatives: jacobian[n_params][nz][ny][nx], mm per unit of the parameter,
+   computed from sdm_instance_velocity(); sdm_exact_map_derivative() defines the derivatives and
+   says where none exists. values and report may be NULL. SDM_E_PLUGIN: the number of vertices
+   depends on the parameters. [any thread] */
 SDM_API sdm_status sdm_exact_shape_jacobian(const sdm_instance *shape, const double *p,
                                             const sdm_exact_opts *opts, const sdm_grid *grid,
                                             float *values, float *jacobian,

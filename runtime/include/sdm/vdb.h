@@ -17,11 +17,11 @@ typedef struct sdm_named_value {
 
 typedef struct sdm_vdb_opts {
     double band_voxels; /* half width of the narrow band in voxels, 3 .. 100; 0: the default 3 */
-    bool dense;         /* writes the whole map, grid class unset, instead of a level set */
-    bool half;          /* values are stored as 16-bit floats */
-    /* String metadata, for example version, shape, parameters, source, error. Each name at most
-       once, and none that the writer sets itself: name, class, creator, file_*, is_* and the sdm_*
-       of this header. */
+    bool dense; /* true: writes the whole map, with grid class unset, instead of a level set */
+    bool half;  /* true: values are stored as 16-bit floats */
+    /* String metadata, for example version, shape, parameters, source, error. Each name may be
+       given at most once. Names that the writer sets itself are not allowed: name, class, creator,
+       file_*, is_* and its own sdm_* entries. */
     const sdm_named_value *metadata;
     size_t n_metadata;
     /* Called now and then; true: SDM_E_CANCELLED and no file. May be NULL. */
@@ -31,7 +31,7 @@ typedef struct sdm_vdb_opts {
 
 typedef struct sdm_vdb_report {
     int64_t active_voxels;
-    bool cut; /* the surface leaves the grid: the level set is closed at the border of the grid */
+    bool cut; /* true: the surface leaves the grid; the level set is closed at its border */
     /* CRC-64 of the values, stored as metadata "sdm_hash"; sdm_vdb_verify() checks it. */
     uint64_t hash;
     /* Voxels whose value was changed to satisfy checkLevelSet (creases, very thin parts). */
@@ -62,7 +62,7 @@ SDM_API sdm_status sdm_vdb_write(const char *path, const sdm_grid *grid, const f
                                  const sdm_vdb_opts *opts, sdm_vdb_report *report, sdm_error *err);
 
 /* Reads a file back: checks the checksum of the file, recomputes the hash and, for a level set,
-   runs checkLevelSet. *text (may be NULL) = new multi-line description (grid, class, voxels,
+   runs checkLevelSet. *text (`text` may be NULL) = new multi-line description (grid, class, voxels,
    metadata), freed with sdm_free(). SDM_E_FORMAT: damaged, or the hash differs. */
 SDM_API sdm_status sdm_vdb_verify(const char *path, char **text, sdm_error *err);
 

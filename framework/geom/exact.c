@@ -19,12 +19,14 @@
 struct sdm_exact {
     sdm_exact_opts opts;
     sdm_exact_report report;
-    sdm_arena arena;     // holds survey and nearest; with a memory limit `used` counts all of this
-    sdm_mesh solid;      // the given mesh with its orientation corrected: the sign comes from it
-    sdm_mesh surface;    // the mesh to which distances are measured
-    uint32_t *source;    // [surface.n_tri] the triangle of the given mesh
-    sdm_survey survey;   // of `solid`
-    sdm_nearest nearest; // of `surface`
+    // holds survey and nearest; with a memory limit, arena.used counts the bytes of all members
+    sdm_arena arena;
+    sdm_mesh solid;   // the given mesh with its orientation corrected: the sign comes from it
+    sdm_mesh surface; // the mesh to which distances are measured
+    // [surface.n_tri] triangle of the given mesh from which each triangle of `surface` was cut
+    uint32_t *source;
+    sdm_survey survey;   // audit, topology and tree of `solid`
+    sdm_nearest nearest; // tree and features of `surface`
     sdm_sign sign;
     double rounding; // bound on the rounding error of the coordinates, mm
 };
@@ -41,7 +43,7 @@ static size_t mesh_bytes(const sdm_mesh *m)
     return m->cap_vert * 3 * sizeof *m->vert + m->cap_tri * 3 * sizeof *m->tri;
 }
 
-/* The options with memory_limit reduced to what the engine and `more` bytes leave of it. */
+/* The options with memory_limit reduced by the bytes of the engine and by `more` further bytes. */
 static sdm_exact_opts opts_beside(const sdm_exact *e, size_t more)
 {
     sdm_exact_opts o = e->opts;
@@ -59,7 +61,8 @@ static sdm_status copy_mesh(sdm_exact *e, const sdm_mesh *mesh, sdm_error *err)
     return s ? s : sdm_mesh_copy(mesh, &e->solid, err);
 }
 
-/* Surveys the solid in the arena, in place of the survey that begins at the two marks. */
+/* Replaces the survey of the solid by a new one. low, high: state of the arena's ends before the
+ * old survey, whose memory is released first. */
 static sdm_status survey_again(sdm_exact *e, sdm_arena_mark low, sdm_arena_mark high,
                                sdm_error *err)
 {
@@ -69,8 +72,8 @@ static sdm_status survey_again(sdm_exact *e, sdm_arena_mark low, sdm_arena_mark 
     return sdm_survey_build(&e->solid, &e->arena, &e->survey, err);
 }
 
-/* Surveys the solid and corrects its orientation. The audit of the report is that of the given
- * mesh. */
+/* Surveys the solid and corrects its orientation. report.audit is the audit before the
+ * correction. */
 static sdm_status survey_solid(sdm_exact *e, sdm_error *err)
 {
     const sdm_arena_mark low = e->arena.end[SDM_LOW], high = e->arena.end[SDM_HIGH];
@@ -87,7 +90,7 @@ static sdm_status survey_solid(sdm_exact *e, sdm_error *err)
     return s || !e->report.parts_turned ? s : survey_again(e, low, high, err);
 }
 
-/* The surface: the union hull of the solid, or a copy of the solid if nothing is removed. */
+/* Makes the surface: the union hull of the solid, or a copy of the solid if nothing is removed. */
 static sdm_status make_surface(sdm_exact *e, sdm_error *err)
 {
     bool changed = false;
@@ -120,8 +123,8 @@ static sdm_status check_pseudonormal(const sdm_exact *e, sdm_error *err)
                     "one has some; use auto");
 }
 
-/* Tree and features of the surface. Of the survey only the tree and, where needed, the topology
- * stay. */
+/* Builds the tree and the features of the surface. Frees the survey except for its tree and, where
+ * needed, its topology. */
 static sdm_status build_nearest(sdm_exact *e, sdm_error *err)
 {
     const sdm_mesh *m = &e->surface;
@@ -152,7 +155,7 @@ static sdm_status build_sign(sdm_exact *e, sdm_error *err)
  * allocations. */
 static size_t usual_bytes(const sdm_mesh *m) { return 1080 * m->n_tri + 220 * m->n_vert; }
 
-/* The preparation step by step. After an error sdm_exact_free() frees what is there. */
+/* Runs the preparation step by step. After an error the caller frees e with sdm_exact_free(). */
 static sdm_status prepare(sdm_exact *e, const sdm_mesh *mesh, sdm_error *err)
 {
     e->arena.opts = &e->opts;
@@ -210,7 +213,7 @@ const sdm_exact_report *sdm_exact_get_report(const sdm_exact *e) { return &e->re
 const sdm_mesh *sdm_exact_surface(const sdm_exact *e) { return &e->surface; }
 const uint32_t *sdm_exact_source(const sdm_exact *e) { return e->source; }
 
-/* False for NaN and for coordinates whose squares could overflow. */
+/* Is x a usable point? False for NaN and for coordinates whose squares could overflow. */
 static bool is_point(const double x[3])
 {
     return fabs(x[0]) <= 1e150 && fabs(x[1]) <= 1e150 && fabs(x[2]) <= 1e150;
@@ -224,7 +227,8 @@ double sdm_exact_point(const sdm_exact *e, const double x[3], double closest[3],
     double q[3] = {NAN, NAN, NAN}, n[3] = {NAN, NAN, NAN};
     double d = NAN;
     if (is_point(x)) {
-        // the nearest triangle gives the sign, its nearest feature the distance
+        // the sign is found from the nearest triangle, the distance from the nearest feature of
+        // this triangle
         (void)sdm_nearest_find(&e->nearest, x, INFINITY, &slot, q, &feature);
         const bool inside = sdm_sign_inside(&e->sign, x, slot, q, feature);
         d = sqrt(sdm_nearest_feature(&e->nearest, x, &slot));
@@ -298,7 +302,7 @@ sdm_status sdm_exact_certify(const sdm_exact *e, const sdm_grid *grid, const flo
 }
 
 /* Fills the layers and derivatives of *job. The map itself is always computed, because the layers
- * need its signs; if the caller has no array for it, into a temporary one. */
+ * need its signs; it is written to a temporary array if the caller has none. */
 static sdm_status map_with_layers(const sdm_exact *e, const sdm_grid *grid, sdm_layers_job *job,
                                   sdm_error *err)
 {

@@ -1,6 +1,6 @@
 /* Exact predicates: signs of small determinants without rounding error. Ties are broken by
- * simulation of simplicity (Edelsbrunner and Muecke 1990), floating-point filter and expansions
- * after Shewchuk 1997. */
+ * simulation of simplicity (Edelsbrunner and Muecke 1990); the floating-point filter and the
+ * expansions follow Shewchuk 1997. */
 #ifndef SDM_GEOM_PREDICATES_H
 #define SDM_GEOM_PREDICATES_H
 

@@ -1,5 +1,5 @@
-/* Features of a surface: scale, clusters, and numbers of the edges and corners; the groups are
-   filled by feature_groups.inc. */
+/* Builds the features of a surface (terms: surface_features.h): computes their scale, forms the
+   clusters, and numbers edges and corners; feature_groups.inc then fills the groups. */
 #include "feature_build.h"
 
 #include <math.h>
@@ -39,8 +39,8 @@ static void surface_measure(const sdm_feature_builder *b)
 }
 
 /* Sets the boxes of all nodes, and marks as clusters the leaves and the nodes whose two children
-   are clusters with at most SDM_CLUSTER faces together. Runs backwards: children come after their
-   parent. */
+   are clusters with at most SDM_CLUSTER faces together. Runs backwards, because children come after
+   their parent in the array. */
 static void nodes_set(const sdm_feature_builder *b)
 {
     sdm_features *f = b->f;
@@ -98,13 +98,13 @@ static inline uint32_t number_take(uint32_t *own, uint32_t *next, uint32_t *sour
     return *own = number;
 }
 
-/* Numbers the groups of a cluster, and those of its edges and corners that no earlier cluster
-   contains. A triangle with a repeated vertex has no edge in the topology: it becomes one edge
-   feature, a segment. */
+/* Numbers the edges and corners of a cluster that no earlier cluster contains, and the cluster's
+   groups of features. A triangle with a repeated vertex has no edge in the topology: it becomes one
+   edge feature, the segment between its different vertices. */
 static void cluster_number(const sdm_feature_builder *b, sdm_cluster_node *node, next_numbers *n)
 {
     sdm_features *f = b->f;
-    // both indexed by feature numbers
+    // both pointers are shifted, so that feature numbers index them
     uint32_t *source = b->edge_source - f->edge_base, *vertices = b->vertex - f->corner_base;
     node->edge = n->edge;
     node->corner = n->corner;
@@ -128,7 +128,8 @@ static void cluster_number(const sdm_feature_builder *b, sdm_cluster_node *node,
         }
         n->edge += is_segment;
     }
-    // ends, and groups: one of faces, then those of edges and corners
+    // ends of the numbers; then the groups: one group of faces, the groups of edges, those of
+    // corners
     node->edge_end = n->edge;
     node->corner_end = n->corner;
     node->group = n->group;
@@ -161,12 +162,12 @@ static sdm_status clusters_fill(const sdm_feature_builder *b, sdm_arena *arena, 
     return SDM_OK;
 }
 
-/* Takes all arrays but the groups and the list of clusters. */
+/* Allocates all arrays except the groups and the list of clusters. */
 static sdm_status builder_allocate(sdm_feature_builder *b, sdm_arena *arena, sdm_error *err)
 {
     sdm_features *f = b->f;
     const size_t n = b->m->n_tri, n_vert = b->m->n_vert, n_edge = f->corner_base - f->edge_base;
-    // one element more: number_take() also writes to the next one
+    // one extra element: number_take() always writes to source[*next]
     sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->edge_source, n_edge + 1, "features", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->segment, n_edge, "features", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &b->vertex, n_vert + 1, "features", err);

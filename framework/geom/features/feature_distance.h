@@ -1,5 +1,5 @@
-/* Squared distance in double from a point to a feature: every value of a distance map is the root
-   of one of these. */
+/* Squared distance in double from a point to a feature: every value of a distance map is the square
+   root of such a distance. */
 #ifndef SDM_GEOM_FEATURE_DISTANCE_H
 #define SDM_GEOM_FEATURE_DISTANCE_H
 
@@ -8,8 +8,8 @@
 #include "surface_features.h"
 
 /* Squared distance (mm^2) from p to feature `number`; INFINITY where p does not project into the
-   face or the edge. frames[slot]: of the surface. Same operations in the same order as distances4()
-   of the map kernels, hence the same bits. */
+   face or the edge. frames[slot]: the frames of the surface's triangles. The operations and their
+   order are those of distances4() of the map kernels, hence the same bits. */
 static inline double sdm_feature_distance2(const sdm_features *f, const sdm_frame *frames,
                                            uint32_t number, const double p[3])
 {

@@ -5,7 +5,8 @@
 
 #include "surface_features.h"
 
-/* Edges of a corner that bound its region; more are ignored, which only enlarges the region. */
+/* Largest number of edges that bound the region of a corner; further edges are ignored, which only
+   enlarges the region. */
 #define SDM_CORNER_EDGES 6u
 
 /* Unit vectors from a corner along the first n of its edges. */
@@ -19,29 +20,31 @@ typedef struct sdm_feature_builder {
     const sdm_mesh *m;
     const sdm_topology *topo;
     const sdm_bvh *tree;
-    /* output: [slot] */
+    /* output: frames of the triangles, [slot] */
     sdm_frame *frames;
-    /* output; the numbers of features and the boxes of clusters are set before the groups */
+    /* output: the features; their numbers and the boxes of the clusters are set before the
+       groups */
     sdm_features *f;
     /* feature number of each edge of the topology, [topo->n_edges]; SDM_NONE: not yet numbered */
     uint32_t *edge;
     /* feature number of the corner at each vertex, [n_vert]; SDM_NONE: not yet numbered */
     uint32_t *corner;
-    /* edge of the topology of each feature from edge_base on, [corner_base - edge_base]; for a
-       triangle with a repeated vertex, which is a segment, n_edges + triangle */
+    /* for each edge feature the index of its edge in the topology, or topo->n_edges + triangle for
+       a triangle with a repeated vertex (a segment), [corner_base - edge_base] */
     uint32_t *edge_source;
     /* vertex of each corner, [end - corner_base] */
     uint32_t *vertex;
-    /* scratch, see segment_find(), [corner_base - edge_base] */
+    /* scratch: vertices of each edge feature, set by segment_find(), [corner_base - edge_base] */
     uint32_t (*segment)[4];
-    /* scratch: the direction from an edge into this triangle is unreliable, [n_tri] */
+    /* scratch: whether the direction from an edge into the triangle is unreliable, [n_tri] */
     bool *narrow;
     /* scratch, zeroed: edges of each corner, [end - corner_base] */
     sdm_corner_edges *along;
 } sdm_feature_builder;
 
-/* Fills frames, centroids, groups and exact features for all n clusters of a surface, whose feature
-   numbers, groups and boxes are set. Both variants give the same bits. */
+/* Fills frames, centroids, groups and exact features for all n clusters of a surface. The boxes of
+   the clusters and the numbers of features and groups must be set. Both variants give the same
+   bits. */
 typedef void sdm_feature_groups(const sdm_feature_builder *b, sdm_cluster_node *const *cluster,
                                 size_t n);
 sdm_feature_groups sdm_feature_groups_generic;

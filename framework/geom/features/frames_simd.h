@@ -1,5 +1,6 @@
-/* Frames of four triangles at once, one per SIMD lane; the same operations in the same order as
-   sdm_frame_build() in mesh/point_triangle.c, hence the same bits. */
+/* Builds the frames (sdm_frame: local coordinates) of four triangles at once, one per SIMD lane.
+   The operations and their order are those of sdm_frame_build() in mesh/point_triangle.c, hence the
+   same bits. */
 #ifndef SDM_GEOM_FRAME4_KERNEL_H
 #define SDM_GEOM_FRAME4_KERNEL_H
 
@@ -7,16 +8,16 @@
 #include "sdm/internal/vec3.h"
 #include "simd/lanes_four.h"
 
-/* Four frames, one per lane. Its members have the order of sdm_frame: both are also accessed as
-   arrays of doubles. */
+/* Four frames, one per lane. The members have the same order as in sdm_frame, because both structs
+   are also accessed as arrays of doubles. */
 typedef struct sdm_frame4 {
     d4 a[3], u[3], v[3], n[3], half[3];
     d4 e1x, e1y, kt1, kh1;
     d4 e2x, e2y, kt2, rotation, flat;
 } sdm_frame4;
 
-/* Sets (ex, ey) to the unit vector along (dx, dy), or to (-1, 0) where that is 0; returns the
-   length. */
+/* Sets (ex, ey) to the unit vector along (dx, dy), or to (-1, 0) where (dx, dy) is 0; returns the
+   length of (dx, dy). */
 SDM_INLINE d4 direction4(d4 dx, d4 dy, d4 *ex, d4 *ey)
 {
     const d4 len = d4_sqrt(dx * dx + dy * dy);
@@ -41,7 +42,7 @@ static void frame4_set_flat(d4_mask flat, sdm_frame4 *f)
     }
 }
 
-/* corner[corner][coordinate] of four triangles; fills f. */
+/* Builds the frames f of four triangles with the vertices corner[corner][coordinate]. */
 SDM_INLINE void sdm_frames_build(const d4 corner[3][3], sdm_frame4 *f)
 {
     // rotate the corners so that the longest edge comes first: a is its start
@@ -70,7 +71,8 @@ SDM_INLINE void sdm_frames_build(const d4 corner[3][3], sdm_frame4 *f)
         for (int i = 0; i < 3; i++) w[i] += -along * f->u[i];
     }
     const d4 cy = d4_sqrt(d4_dot(w, w));
-    // a remainder of a needle's ac below 2^-52 of the longest edge is rounding error: no plane
+    // if the remainder of ac is below 2^-52 of the longest edge, it is only rounding error: the
+    // triangle has no plane
     const d4_mask flat = ~(cy > 2.3e-16 * length);
     for (int i = 0; i < 3; i++) f->v[i] = w[i] / cy;
     const d4 along = d4_dot(f->v, f->u);
@@ -81,7 +83,8 @@ SDM_INLINE void sdm_frames_build(const d4 corner[3][3], sdm_frame4 *f)
     for (int i = 0; i < 3; i++)
         f->n[i] = f->u[(i + 1) % 3] * f->v[(i + 2) % 3] - f->u[(i + 2) % 3] * f->v[(i + 1) % 3];
 
-    // the third corner is (x, y) in the frame; edges 1 and 2 run from (length, 0) over it to (0, 0)
+    // the third corner is (x, y) in the frame; edge 1 runs from (length, 0) to (x, y), edge 2 on to
+    // (0, 0)
     const d4 y = d4_select(flat, d4_all(0), d4_dot(ac, f->v));
     const d4 x = d4_select(flat, d4_dot(ac, f->u), cx);
     const d4 len1 = direction4(x - length, y, &f->e1x, &f->e1y);

@@ -1,4 +1,5 @@
-/* Nearest point of a surface: a tree of triangles for single points, features for distance maps. */
+/* Nearest point of a surface: a tree of triangles for single points, features for distance maps.
+   The slot of a triangle is its position in the order of the tree (sdm_bvh.order). */
 #ifndef SDM_GEOM_NEAREST_H
 #define SDM_GEOM_NEAREST_H
 
@@ -9,12 +10,12 @@ typedef struct sdm_nearest {
     sdm_bvh tree;
     /* frames of the triangles, [slot] */
     sdm_frame *frames;
-    /* for distance maps, and for values with the same bits as theirs */
+    /* features for distance maps, and for single distances with the same bits as in maps */
     sdm_features features;
 } sdm_nearest;
 
-/* Builds frames and features of mesh m, whose topology is topo and whose tree n->tree is set.
-   Memory comes from the low end of the arena, which charges the memory limit. */
+/* Builds frames and features of mesh m, whose topology is topo and whose tree is n->tree, set by
+   the caller. Memory comes from the low end of the arena, which charges the memory limit. */
 sdm_status sdm_nearest_build(const sdm_mesh *m, const sdm_topology *topo, sdm_arena *arena,
                              sdm_nearest *n, sdm_error *err);
 

@@ -46,13 +46,14 @@ typedef struct sdm_feature_group {
     /* gradients, [k][coordinate][lane] */
     _Alignas(64) float g[4][3][8];
     float offset[4][8];
-    /* edges: largest values of abs(f[0]) and f[1] in the region; others: 0 */
+    /* edges: largest values of abs(f[0]) and f[1] in the region; faces and corners: 0 */
     float most[2][8];
-    /* abs(gx) + abs(gy) + abs(gz) of g[k]; for k = 3 of edges, of (g[1] + g[2]) / 2 */
+    /* abs(gx) + abs(gy) + abs(gz) of each gradient g[k]; in a group of edges, sum[3] is that of
+       (g[1] + g[2]) / 2 */
     float sum[4][8];
 } sdm_feature_group;
 
-/* Corners of a group; also the distance between the two lanes of a corner. */
+/* Largest number of corners of a group; also the distance between the two lanes of a corner. */
 #define SDM_CORNER_LANES 4
 
 /* A feature in double, mm, for the exact distance. */
@@ -61,25 +62,28 @@ typedef struct sdm_feature {
     _Alignas(32) double a[3];
     /* unit vector: normal of the face, direction of the edge; 0 for a corner */
     double u[3];
-    /* of an edge, which ends at a + length u; else 0 */
+    /* length of an edge, which ends at a + length * u; 0 for a face or a corner */
     double length;
     /* -1: the feature is a face; 0: an edge or a corner */
     double face;
 } sdm_feature;
 
-/* Most faces of a cluster. */
+/* Largest number of faces of a cluster. */
 #define SDM_CLUSTER 8
 
-/* Node of the tree of triangles, in the places of sdm_bvh.node. count > 0: a cluster; nodes below
-   it are not used. count == 0: its children are the nodes first and first + 1. */
+/* Node of the tree of triangles; it has the same index as in sdm_bvh.node. count > 0: the node is a
+   cluster, and the nodes below it are not used. count == 0: its children are the nodes first and
+   first + 1. */
 typedef struct sdm_cluster_node {
     /* bounding box, scaled */
     float lo[3], hi[3];
     /* cluster: its faces are the slots first ... first + count - 1 */
     uint32_t first, count;
-    /* numbers of its edges, edge ... edge_end - 1, and of its corners */
+    /* numbers of the cluster's edges, edge ... edge_end - 1, and corners, corner ... corner_end -
+       1 */
     uint32_t edge, edge_end, corner, corner_end;
-    /* index of its group of faces; the groups of its edges follow, then those of its corners */
+    /* index of the cluster's group of faces; its groups of edges follow, then its groups of
+       corners */
     uint32_t group;
     /* bit i: face first + i is thin */
     uint32_t thin;
@@ -88,19 +92,20 @@ typedef struct sdm_cluster_node {
 /* All features of a surface. Features are numbered: a face by the slot of its triangle, edges from
    edge_base on, corners from corner_base to end - 1. */
 typedef struct sdm_features {
-    /* [nodes of the tree] */
+    /* nodes of the tree, [sdm_bvh.n_node] */
     sdm_cluster_node *node;
     /* centroids of the triangles, [n_tri][coordinate], scaled */
     float (*centroid)[3];
     /* at least one face is thin */
     bool any_thin;
+    /* groups of all clusters, see sdm_cluster_node.group */
     sdm_feature_group *group;
     uint32_t edge_base, corner_base, end;
-    /* [end] */
+    /* the features in double, [end] */
     sdm_feature *exact;
     /* numbers of the edges and corners of each triangle, [n_tri][3 edges, 3 corners] */
     uint32_t (*of_slot)[6];
-    /* slot of a triangle to which the feature belongs, [end] */
+    /* slot of one triangle to which each feature belongs, [end] */
     uint32_t *owner;
     /* centre of the surface's bounding box and half its diagonal, mm */
     double centre[3], radius;

@@ -15,7 +15,8 @@ typedef struct sdm_layers_job {
     /* [nz][ny][nx] nearest triangle (slot of sheets.surface), SDM_NONE outside of a narrow band */
     const uint32_t *slot;
     const sdm_exact_layers *out;
-    /* [n_velocity][n_vert][3] motions of the vertices of sheets.mesh */
+    /* [n_velocity][n_vert][3] velocities of the vertices of sheets.mesh; see
+     * sdm_exact_map_derivative() */
     const double *velocity;
     size_t n_velocity;
     float *derivative; /* [n_velocity][nz][ny][nx] result, NULL: not wanted */
@@ -28,8 +29,9 @@ bool sdm_layers_wanted(const sdm_layers_job *job);
  * SDM_E_CANCELLED. */
 sdm_status sdm_layers_fill(const sdm_layers_job *job, const sdm_grid *g, sdm_error *err);
 
-/* n = unit gradient of the signed distance d (mm) at x. q: nearest surface point, on triangle
- * `slot`. On the surface (abs(d) <= rounding) it is the normal of the triangle. */
+/* n = unit gradient of the signed distance d (mm) at x. q: nearest surface point, on the triangle
+ * with this slot. If x lies on the surface (abs(d) <= rounding), n is the normal of this
+ * triangle. */
 void sdm_distance_gradient(const sdm_nearest *surface, double rounding, uint32_t slot,
                            const double x[3], const double q[3], double d, double n[3]);
 

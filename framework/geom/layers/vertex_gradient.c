@@ -14,8 +14,8 @@
 
 // largest number of sheets through one point; in general position only three cross
 #define SHEETS_MAX 16
-// largest remainder of the unit normal after the split; the remainder is assigned to the nearest
-// triangle
+// largest accepted length of the remainder when the unit normal is split; the remainder is assigned
+// to the nearest triangle
 #define SPLIT_ERROR 1e-6
 
 /* The sheets through one point, the nearest triangle first. */
@@ -56,8 +56,8 @@ static void barycentric(const sdm_frame *f, const double q[3], double w[3])
     w[(turn + 2) % 3] = third;
 }
 
-/* Adds the derivative by the vertices of triangle t, for its point q; the vector `part` is the
- * share of the normal that triangle t gets. */
+/* Adds the derivatives with respect to the three vertices of triangle t, on which q lies. The
+ * vector `part` is the part of the normal that is assigned to triangle t. */
 static void gradient_add(const sdm_sheets *s, uint32_t t, const double q[3], const double part[3],
                          sdm_vertex_gradient *out)
 {
@@ -101,7 +101,8 @@ static void crossing_find(const sdm_sheets *s, uint32_t first, const double q[3]
     }
 }
 
-/* Keeps the split in *best if all factors are >= 0 and its remainder is smaller. */
+/* Computes the remainder of split p and copies p to *best if all its factors are >= 0 (up to
+ * SPLIT_ERROR) and its remainder is smaller than that of *best. */
 static void split_try(const crossing *c, const double normal[3], split p, split *best)
 {
     double rest[3] = {normal[0], normal[1], normal[2]};
@@ -141,7 +142,7 @@ static void split_try_three(const crossing *c, const double normal[3], int i, in
             best);
 }
 
-/* Finds the smallest number of sheets (1, 2 or 3) whose normals combine to the normal. */
+/* Finds the smallest number of sheets (1, 2 or 3) of which `normal` is a linear combination. */
 static split split_find(const crossing *c, const double normal[3])
 {
     split best = {.error = INFINITY};

@@ -11,7 +11,7 @@
 typedef struct sdm_sheets {
     const sdm_nearest *surface;
     const sdm_mesh *mesh;
-    const sdm_frame *frames; /* [mesh->n_tri] */
+    const sdm_frame *frames; /* [mesh->n_tri] frames of the triangles of mesh */
     const uint32_t *source;  /* source[triangle of the surface] = triangle of the mesh */
     /* pieces of different triangles that meet are at most this far apart, mm; 0: no triangle was
      * cut */
@@ -30,9 +30,10 @@ typedef struct sdm_vertex_gradient {
 /* Writes frames[m->n_tri], the frames of the triangles of a mesh. */
 void sdm_sheets_frames(const sdm_mesh *m, int n_threads, sdm_frame *frames);
 
-/* Derivative at a point x. slot, feature, q: nearest triangle of the surface, where on it the
- * nearest point lies (point_triangle.h), and the nearest point; normal: gradient of the signed
- * distance with respect to x; inside: the distance is negative. [any thread] */
+/* Computes the derivatives of the signed distance at a point x. slot, feature, q: nearest triangle
+ * of the surface, where on it the nearest point lies (point_triangle.h), and the nearest point;
+ * normal: gradient of the signed distance with respect to x; inside: the distance is negative. [any
+ * thread] */
 void sdm_vertex_gradient_find(const sdm_sheets *s, uint32_t slot, int feature, const double q[3],
                               const double normal[3], bool inside, sdm_vertex_gradient *out);
 

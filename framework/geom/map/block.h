@@ -1,4 +1,4 @@
-/* State of the current block, shared by stages 3 to 6. Part of map.inc. */
+/* State of the current block, shared by stages 3 to 6. Part of map.inc, which defines the terms. */
 #ifndef SDM_GEOM_MAP_BLOCK_H
 #define SDM_GEOM_MAP_BLOCK_H
 
@@ -15,10 +15,10 @@ typedef struct block {
     // bound on the rounding error of a region function within the block
     float error;
     // [tile][vector]: a feature whose squared distance from the vector's centre is larger is not
-    // the nearest one of any of its voxels
+    // the nearest feature of any voxel of the vector
     _Alignas(32) float far2[8][8];
-    // [level]: half[level] * sdm_block_group.extent bounds the change of a function from the centre
-    // of the block (SDM_BLOCKS), a tile or a vector to its corners
+    // [SDM_BLOCKS, SDM_TILES, SDM_VECTORS]: half[level] * sdm_block_group.extent bounds the change
+    // of a function from the centre of the block, of a tile or of a vector to its corners
     float half[SDM_PART_LEVELS];
 } block;
 
@@ -31,8 +31,8 @@ static inline bool block_is_cube(const sdm_grid_job *job)
 }
 
 /* Two squared distances in float that differ by less than k (d + 1) may have either order; returns
-   k = 8 e for e = block.error. For abs(error of d) <= 2 e, so abs(error of d^2) <= 4 (d + 1) e, and
-   twice that for two of them. */
+   k = 8 e for e = block.error. Reason: abs(error of d) <= 2 e, so abs(error of d^2) <= 4 (d + 1) e,
+   and the difference of two such values has at most twice this error. */
 static inline float ambiguity(float error) { return 8 * error; }
 
 #endif

@@ -1,5 +1,6 @@
-/* The distance map: division of the grid into boxes, blocks, tiles and vectors (defined in
-   map.inc), tables of their offsets, choice of the kernel, and threads over rows of boxes. */
+/* Computes a distance map: divides the grid into boxes, blocks, tiles and vectors (defined in
+   map.inc), tabulates their offsets, chooses the kernel, and distributes rows of boxes to
+   threads. */
 #include "grid_distance.h"
 
 #include <math.h>
@@ -12,7 +13,8 @@
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
 
-// Largest grid_reach(), in about longest edges: beyond it float cannot tell features apart.
+// Largest grid_reach() for the kernels (unit: 1 to 2 longest edges): beyond it float cannot tell
+// features apart.
 #define REACH_MAX 1e5
 
 static sdm_grid_kernel *kernel_choose(void)
@@ -38,8 +40,8 @@ static double step_length(const sdm_grid_job *job, int a)
     return sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
 }
 
-/* Doubles a part of size[3] voxels along one axis and returns this axis: the one where the part is
-   shortest in mm, among those where it is smaller than the grid, if any. */
+/* Doubles a part of size[3] voxels along one axis and returns this axis. It is the axis along which
+   the part is shortest in mm; axes along which the part is smaller than the grid come first. */
 static int part_double(const sdm_grid_job *job, int64_t size[3])
 {
     int best = -1;
@@ -72,7 +74,7 @@ static void parts_set(const sdm_grid_job *job, const int64_t size[3], const int 
         for (int c = 0; c < 3; c++) q->half_axis[a][c] = (float)(half * job->step[a][c] * scale);
         radius += length * length;
     }
-    // 1e-5 covers grid axes that are orthogonal to 1e-6 only
+    // the factor 1 + 1e-5 allows for grid axes that are orthogonal only up to 1e-6
     q->radius = (float)(sqrt(radius) * scale * (1 + 1e-5));
     // first voxels and centres
     for (int i = 0; i < 8; i++) {
@@ -191,8 +193,8 @@ static double job_set_tables(sdm_grid_job *job)
     return reach;
 }
 
-/* sdm_grid_distance() voxel by voxel in double, for grids so far away or so large that float cannot
-   tell features apart. */
+/* Does the work of sdm_grid_distance() voxel by voxel in double, for grids so far away or so large
+   that float cannot tell features apart. */
 static sdm_status distance_by_points(const sdm_grid_job *job, const sdm_grid *g,
                                      const sdm_exact_opts *opts, int n_threads, sdm_error *err)
 {

@@ -28,7 +28,7 @@ typedef struct sdm_grid_parts {
     double centre_mm[8][3];
     /* first voxel of each part relative to the first voxel of the whole, [part][axis] */
     int64_t first[8][3];
-    /* voxels of a part along each axis of the grid */
+    /* number of voxels of a part along each axis of the grid */
     int64_t size[3];
     /* half the distance between the outermost voxel centres along each axis of the grid, scaled */
     float half[3];
@@ -45,17 +45,17 @@ typedef struct sdm_grid_job {
     float *values;
     /* output: slot of a nearest triangle, [nz][ny][nx]; may be NULL */
     uint32_t *slot;
-    /* voxels of the grid along each axis */
+    /* number of voxels of the grid along each axis */
     int64_t n[3];
-    /* voxels of a box along each axis */
+    /* number of voxels of a box along each axis */
     int64_t box[3];
-    /* boxes that cover the grid along each axis */
+    /* number of boxes that cover the grid along each axis */
     int64_t n_box[3];
     /* position of voxel (0, 0, 0), mm */
     double origin[3];
     /* step[a]: vector from one voxel to the next along grid axis a, mm */
     double step[3][3];
-    /* the grid axes are the coordinate axes x, y, z */
+    /* whether the grid axes are the coordinate axes x, y, z */
     bool aligned;
     /* narrow band, scaled: larger distances are replaced by the band; INFINITY: no band */
     float band;
@@ -65,22 +65,23 @@ typedef struct sdm_grid_job {
     sdm_grid_parts part[SDM_PART_LEVELS];
     /* [tile]: centres of its eight vectors relative to the centre of the block, scaled */
     sdm_points vector[8];
-    /* [tile][vector]: its eight voxels relative to the centre of the block, scaled */
+    /* [tile][vector]: positions of its eight voxels relative to the centre of the block, scaled */
     sdm_points voxel[8][8];
     /* [vector][lane]: index of the voxel within its tile (0 to 63), x fastest */
     uint8_t voxel_in_tile[8][8];
-    /* [coordinate][index]: voxels of a tile relative to its first voxel, mm */
+    /* [coordinate][index]: positions of the voxels of a tile relative to its first voxel, mm */
     _Alignas(64) double tile_voxel[3][64];
-    /* voxels of a vector relative to its centre, scaled */
+    /* positions of the eight voxels of a vector relative to its centre, scaled */
     sdm_points to_voxel;
-    /* offsets of vectors in a tile are exactly 2 and of tiles in a block exactly 4 times those of
-       voxels in a vector */
+    /* whether the offsets of vectors in a tile are exactly twice, and those of tiles in a block
+       exactly four times, the offsets of voxels in a vector */
     bool self_similar;
     /* lanes_of[mask]: the lanes of the set bits, ascending, then zeros */
     _Alignas(16) uint16_t lanes_of[256][8];
     /* [level]: largest ratio over the grid axes of a part's half extent to that of a block */
     float extent_ratio[SDM_PART_LEVELS];
-    /* bound on the rounding error of a linear function with a unit gradient at a part's centre */
+    /* bound on the rounding error of a linear function with a unit gradient at a part's centre,
+       scaled */
     float error;
     /* largest scratch memory of one thread for one block's features, bytes; 0: unlimited */
     size_t limit;
@@ -89,10 +90,10 @@ typedef struct sdm_grid_job {
 /* Scratch memory of one thread (grid_scratch.h). */
 typedef struct sdm_grid_scratch sdm_grid_scratch;
 
-/* Unsigned distances of one row of boxes: (0 .. n_box[0] - 1, by, bz). Writes job->values and
-   job->slot. Threads may work on different rows, each with its own scratch. The nearest feature is
-   found in float with a margin for rounding errors; its distance is computed in double without
-   fused multiply-add, so every instruction set gives the same bits. */
+/* Computes the unsigned distances for one row of boxes, those with the indices (0 .. n_box[0] - 1,
+   by, bz). Writes job->values and job->slot. Threads may work on different rows, each with its own
+   scratch. The nearest feature is found in float with a margin for rounding errors; its distance is
+   computed in double without fused multiply-add, so every instruction set gives the same bits. */
 typedef sdm_status sdm_grid_kernel(const sdm_grid_job *job, sdm_grid_scratch *scratch, int64_t by,
                                    int64_t bz, sdm_error *err);
 sdm_grid_kernel sdm_grid_kernel_generic;

@@ -8,15 +8,15 @@
 /* Kinds of features. Thin faces are too narrow for float distances, see sdm_feature_group. */
 enum { SDM_FACES, SDM_THIN_FACES, SDM_EDGES, SDM_CORNERS, SDM_FEATURE_KINDS };
 
-/* Most region functions of a feature: corners have six, all other kinds four. */
+/* Largest number of region functions of a feature: corners have six, all other kinds four. */
 #define SDM_FUNCTIONS 6
 
 /* A cluster that passed the test against the current block. */
 typedef struct sdm_cluster_ref {
     uint32_t node;
-    /* bit t: it may hold the nearest feature of a point of tile t */
+    /* bit t: the cluster may hold the nearest feature of a point of tile t */
     uint32_t tiles;
-    /* from the centre of the cluster to the centre of the block, scaled */
+    /* vector from the centre of the cluster to the centre of the block, scaled */
     float shift[3];
 } sdm_cluster_ref;
 
@@ -25,7 +25,7 @@ typedef struct sdm_cluster_ref {
 typedef struct sdm_block_group {
     /* region functions at the centre of the block, [row][lane] */
     _Alignas(64) float at_block[4][8];
-    /* storage for `extent` where the group's own sums do not apply */
+    /* storage for `extent` if sdm_feature_group.sum does not apply, see group_extent() */
     float own_extent[4][8];
     /* the largest change of each function from the centre of the block to its corners is
        extent[row][lane] * block.half[SDM_BLOCKS]; points to group->sum or own_extent */
@@ -36,16 +36,18 @@ typedef struct sdm_block_group {
     uint32_t number;
 } sdm_block_group;
 
-/* One feature of a batch, prepared for the parts of the current block. Its functions are linear:
-   the steps from the centre of a part to the centres of its eight parts are the same everywhere. */
+/* One feature of a batch, prepared for the parts of the current block. Its region functions are
+   linear: their steps from the centre of a whole to the centres of its eight parts are the same for
+   all wholes of a level. */
 typedef struct sdm_block_feature {
     /* steps of the functions from the centre of a vector to its voxels, [function][voxel] */
     _Alignas(64) float to_voxels[SDM_FUNCTIONS][8];
     /* values of the functions at the centres of the tiles, [function][tile] */
     float at_tiles[SDM_FUNCTIONS][8];
-    /* steps from the centre of a tile to its vectors; unused if sdm_grid_job.self_similar */
+    /* steps of the functions from the centre of a tile to the centres of its vectors,
+       [function][vector]; unused if sdm_grid_job.self_similar */
     float to_vectors[SDM_FUNCTIONS][8];
-    /* sdm_block_group.extent of its group, and its lane there */
+    /* sdm_block_group.extent of the feature's group, and the feature's lane in this group */
     const float (*extent)[8];
     size_t lane;
     uint32_t number;
@@ -55,16 +57,17 @@ typedef struct sdm_block_feature {
     float from[3];
 } sdm_block_feature;
 
-/* Features of one kind that pass stages 4 and 5 together: as many as the L1 cache holds. */
+/* Largest number of features of one kind that pass stages 4 and 5 together; their data fit in the
+   L1 cache. */
 enum { SDM_BATCH = 24 };
 
 /* A lane reference: 8 * item + lane in 16 bits, for lane `lane` of element `item` of an array; see
-   lane_item() in lists.h. Lists of them are written eight at a time and need room for eight more
-   than they hold. */
+   lane_item() in lists.h. Lists of lane references are written eight elements at a time: an array
+   needs room for eight more elements than its list has. */
 _Static_assert(8 * (8 * SDM_BATCH) <= UINT16_MAX, "lane references must fit into 16 bits");
 
-/* Queue of features of one kind for the next batch. It is emptied when n > SDM_BATCH - 8, so that
-   the features of one more group always fit. */
+/* Queue of features of one kind for the next batch. The queue is emptied when n > SDM_BATCH - 8, so
+   that the features of one more group always fit. */
 typedef struct sdm_pending {
     /* groups of the features, and room for the next group */
     sdm_block_group group[SDM_BATCH + 1];
@@ -78,9 +81,11 @@ typedef struct sdm_batch {
     sdm_block_feature feature[SDM_BATCH];
     /* values of the functions at the centres of the vectors, [tile pair][function][vector] */
     _Alignas(64) float at_vectors[8 * SDM_BATCH][8][8];
-    /* tile pairs: lane references into feature[]; the lane is a tile that meets the region */
+    /* tile pairs: lane references into feature[]; the lane is the number of a tile that meets the
+       feature's region */
     uint16_t tile_pair[8 * SDM_BATCH + 8];
-    /* vector pairs: lane references into tile_pair[]; the lane is a vector that meets the region */
+    /* vector pairs: lane references into tile_pair[]; the lane is the number of a vector of this
+       tile that meets the feature's region */
     uint16_t vector_pair[64 * SDM_BATCH + 8];
     size_t n_feature, n_tile_pair, n_vector_pair;
 } sdm_batch;
@@ -90,9 +95,10 @@ typedef struct sdm_batch {
 typedef struct sdm_candidate {
     /* number of the feature */
     uint32_t number;
-    /* index of the vector's previous candidate, SDM_NONE: this is the first */
+    /* index of the vector's previous candidate; SDM_NONE: this candidate is the first */
     uint32_t before;
-    /* bit i: it may be nearest to voxel i, judged against the candidates up to this one */
+    /* bit i: the feature may be the nearest one to voxel i, compared with all candidates found up
+       to this one */
     uint32_t voxels;
 } sdm_candidate;
 
@@ -102,9 +108,10 @@ typedef struct sdm_candidates {
     _Alignas(64) float first[64][8], second[64][8];
     /* number of the nearest candidate, [vector][voxel] */
     uint32_t number[64][8];
-    /* index of the vector's last candidate in list[], SDM_NONE: it has none */
+    /* index of the vector's last candidate in list[]; SDM_NONE: the vector has no candidate */
     uint32_t last[64];
-    /* bit i: voxel i lies in the region of a thin face, so float cannot settle it */
+    /* bit i: voxel i lies in the region of a thin face, so its nearest feature cannot be found in
+       float */
     uint32_t open[64];
     sdm_candidate *list;
     size_t n, cap;
@@ -121,7 +128,7 @@ struct sdm_grid_scratch {
     uint32_t *node;
     /* bit k of node_blocks[i]: node[i] may hold the nearest feature of a point of block k */
     uint8_t *node_blocks;
-    /* the same as one list for each block of the box */
+    /* the same information as one list for each block of the box */
     sdm_cluster_list block[8];
     /* clusters of the current block */
     sdm_cluster_ref *cluster;
@@ -132,8 +139,8 @@ struct sdm_grid_scratch {
     sdm_candidates *candidates;
 };
 
-/* Allocates the members of fixed size of a zeroed scratch. Whatever happens, end with
-   sdm_grid_scratch_dispose(). */
+/* Allocates the members of fixed size of a zeroed scratch. The caller ends with
+   sdm_grid_scratch_dispose(), also after an error. */
 sdm_status sdm_grid_scratch_start(sdm_grid_scratch *scratch, sdm_error *err);
 
 /* Makes room for `cap` clusters of a box. Keeps node[] and node_blocks[], loses the other lists. */
@@ -144,7 +151,7 @@ sdm_status sdm_grid_scratch_clusters(sdm_grid_scratch *scratch, size_t cap, sdm_
 sdm_status sdm_grid_scratch_candidates(sdm_grid_scratch *scratch, size_t cap, size_t limit,
                                        sdm_error *err);
 
-/* Frees all members; the scratch is zeroed. */
+/* Frees all members and zeroes the scratch. */
 void sdm_grid_scratch_dispose(sdm_grid_scratch *scratch);
 
 #endif

@@ -7,7 +7,7 @@
 #include "grid_scratch.h"
 #include "simd/lanes.h"
 
-/* Decodes a lane reference 8 * item + lane to one of n items. */
+/* lane_item() and lane_of(): the item (< n) and the lane of a lane reference 8 * item + lane. */
 static inline size_t lane_item(size_t ref, size_t n)
 {
     (void)n; // unused without assertions

@@ -9,7 +9,7 @@
 #include "grid_scratch.h"
 #include "simd/lanes.h"
 
-/* Region functions of a feature. */
+/* Number of region functions of a feature. */
 SDM_FOR_KIND int functions_of(int kind) { return kind == SDM_CORNERS ? SDM_FUNCTIONS : 4; }
 
 /* Row of function k in the arrays of a group, and its lane for the feature in lane `lane`: corners

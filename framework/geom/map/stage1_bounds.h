@@ -1,5 +1,6 @@
-/* Stage 1: bounds on the distance. For eight parts at once, finds a reference point on the surface
-   near each and derives how far a cluster may be to matter. Part of map.inc. */
+/* Stage 1: bounds on the distance. For eight parts at once, finds a point of the surface near each
+   part (its reference point) and derives the largest distance at which a cluster may hold the
+   nearest feature. Part of map.inc. */
 #ifndef SDM_GEOM_MAP_STAGE1_BOUNDS_H
 #define SDM_GEOM_MAP_STAGE1_BOUNDS_H
 
@@ -44,15 +45,18 @@ static inline v8f length8(point8 w, point8 *unit)
 typedef struct cull8 {
     /* centres of the parts, and directions g */
     point8 centre, g;
-    /* distance of the reference point from the farthest corner; to be added: extent of h */
+    /* distance of the reference point from the farthest corner; cull_limit() adds the extent of
+       h */
     v8f corner;
-    /* D + r^2 / (2 D); to be added: extent of h - g */
+    /* D + r^2 / (2 D); cull_limit() adds the extent of h - g */
     v8f curved;
-    /* narrow band + r: farther sets are outside the band everywhere in the part */
+    /* width of the narrow band + r: farther sets are outside the band for every point of the
+       part */
     v8f band;
 } cull8;
 
-/* centre, reference: the centres of eight parts and their reference points. q: their level. */
+/* Computes the culling data of eight parts. centre, reference: the centres of the parts and their
+   reference points. q: the level of the parts. */
 static inline cull8 cull_start(const sdm_grid_job *job, const sdm_grid_parts *q, point8 centre,
                                const sdm_points *reference)
 {
@@ -67,7 +71,7 @@ static inline cull8 cull_start(const sdm_grid_job *job, const sdm_grid_parts *q,
                           v8_fma(v8_abs(g.z), d, v8_all(q->half[2]))};
         more = v8_min(more, v8_fma(d, v8_all(SDM_CULL), v8_sub(v8_sqrt(p8_dot(w, w)), d)));
     }
-    // base: d with all margins
+    // base: d plus all margins for rounding
     const v8f base = v8_fma(v8_add(d, r), v8_all(SDM_CULL), v8_add(d, v8_all(4 * job->error)));
     const v8f curvature = v8_div(v8_mul(r, r), v8_add(v8_add(d, d), v8_all(SDM_TINY)));
     return (cull8){.centre = centre,
@@ -77,8 +81,9 @@ static inline cull8 cull_start(const sdm_grid_job *job, const sdm_grid_parts *q,
                    .band = v8_all((job->band + q->radius) * (1 + SDM_CULL) + 4 * job->error)};
 }
 
-/* Largest distance from the centres at which a convex set in direction -h may hold the nearest
-   point of some point of the part. */
+/* For each part, the largest distance from its centre at which a convex set may hold the surface
+   point nearest to some point of the part. h: unit vector from the set's nearest point to the
+   centre. */
 static inline v8f cull_limit(const sdm_grid_parts *q, bool aligned, const cull8 *v, point8 h)
 {
     return v8_min(v8_min(v->band, extent_plus(q, aligned, h, v->corner)),
@@ -95,8 +100,9 @@ static inline point8 vector_from_box(const sdm_cluster_node *node, point8 p)
     return p8_sub(p, nearest);
 }
 
-/* Nearest triangle centroids so far to eight points: squared distances, and slots of the triangles
-   (-1: none is nearer than the given reference point). Centroids serve as reference points. */
+/* For each of eight points the nearest triangle centroid so far: its squared distance, and the slot
+   of the triangle (-1: none is nearer than the given reference point). Centroids serve as reference
+   points. */
 typedef struct centroid8 {
     v8f d2;
     v8i slot;
@@ -132,14 +138,14 @@ static inline void centroids_finish(const sdm_features *f, const centroid8 *best
             reference->x[a][i] = f->centroid[slot[i]][a];
 }
 
-/* Reference points of the blocks of a box, whose centres are p: the nearest centroids of the whole
-   surface, by a walk of the tree. reference: in, points of the surface; out, nearest centroids
-   where these are nearer. */
+/* Finds reference points for the eight blocks of a box by a walk of the tree: the triangle
+   centroids of the whole surface that are nearest to the centres p of the blocks. reference: on
+   input eight points of the surface; each is replaced if the centroid is nearer. */
 static void references_of_blocks(const sdm_features *f, point8 p, sdm_points *reference)
 {
     sdm_points at;
     p8_store(at.x, p);
-    // parts 0 and 7 lie opposite to each other: twice the centre of the box
+    // parts 0 and 7 lie opposite to each other: their centres add up to twice the centre of the box
     float twice_centre[3];
     for (int a = 0; a < 3; a++) twice_centre[a] = at.x[a][0] + at.x[a][7];
     centroid8 best = centroids_start(p, reference);
@@ -154,7 +160,7 @@ static void references_of_blocks(const sdm_features *f, point8 p, sdm_points *re
             centroids_compare(f, node, p, &best);
             continue;
         }
-        // visit the child first whose centre is nearer to that of the box
+        // visit first the child whose centre is nearer to the centre of the box
         const sdm_cluster_node *child = &f->node[node->first];
         float d[2] = {0, 0};
         for (int c = 0; c < 2; c++)
@@ -167,8 +173,9 @@ static void references_of_blocks(const sdm_features *f, point8 p, sdm_points *re
     centroids_finish(f, &best, reference);
 }
 
-/* Reference points of the tiles of a block, whose centres are p: the nearest centroids of the
-   block's clusters, where these are nearer than the given points. */
+/* Finds reference points for the eight tiles of a block, whose centres are p: each given point is
+   replaced by the nearest triangle centroid of the block's clusters, if this is nearer to the
+   centre. */
 static void references_of_tiles(const sdm_features *f, const sdm_cluster_list *clusters, point8 p,
                                 sdm_points *reference)
 {

@@ -15,8 +15,8 @@ static inline int node_parts(const sdm_grid_parts *q, bool aligned, const cull8 
     return 0xff & ~v8_greater(d, cull_limit(q, aligned, v, h));
 }
 
-/* Walks the tree and lists, for each block of a box, the clusters that may hold its nearest
-   features, in scratch->block[]. blocks: mask of the blocks inside the grid. */
+/* Walks the tree and lists in scratch->block[], for each block of a box, the clusters that may hold
+   the nearest feature of a point of the block. blocks: mask of the blocks inside the grid. */
 static sdm_status clusters_of_blocks(const sdm_grid_job *job, const cull8 *v, int blocks,
                                      sdm_grid_scratch *scratch, sdm_error *err)
 {
@@ -47,9 +47,10 @@ static sdm_status clusters_of_blocks(const sdm_grid_job *job, const cull8 *v, in
     return SDM_OK;
 }
 
-/* Lists the clusters of a block that may hold a nearest feature of its tiles: scratch->cluster[].
-   centre_mm: of the block. tiles: mask of the tiles inside the grid. Returns an upper bound on
-   the distance between a point of the block and a point of these clusters, scaled. */
+/* Lists in scratch->cluster[] the clusters that may hold the nearest feature of a point of the
+   block's tiles. centre_mm: centre of the block. tiles: mask of the tiles inside the grid. Returns
+   an upper bound on the distance between a point of the block and a point of these clusters,
+   scaled. */
 static float clusters_of_tiles(const sdm_grid_job *job, const sdm_cluster_list *in,
                                const double centre_mm[3], const cull8 *v, int tiles,
                                sdm_grid_scratch *scratch)

@@ -21,8 +21,8 @@ static void group_extent(const block *b, int kind, const sdm_feature_group *grou
     }
 }
 
-/* Constants of the block in all lanes. A copy, so that the compiler need not reload them after
-   stores. */
+/* Constants of the block, repeated in all lanes. They are copied so that the compiler need not
+   reload them after stores. */
 typedef struct block_test {
     const block *b;
     v8f minus_half, error;
@@ -67,8 +67,8 @@ SDM_FOR_KIND unsigned group_test(const block_test *w, bool cube, int kind,
 }
 
 /* Queues the features in `lanes` of the group that group_test() has just written to
-   p->group[p->n_group]. number: of the feature in lane 0. Free of branches, because the masks are
-   unpredictable. */
+   p->group[p->n_group]. number: number of the feature in lane 0. Free of branches, because the
+   masks are unpredictable. */
 static inline void pending_add(const block *b, sdm_pending *p, uint32_t number, unsigned lanes)
 {
     assert(p->n_group <= SDM_BATCH);

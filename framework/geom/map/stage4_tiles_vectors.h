@@ -92,7 +92,8 @@ SDM_FOR_KIND void batch_test_vectors(const block *b, int kind)
             f.f[k] = v8_fma(v8_load(step[k]), factor, v8_all(x->at_tiles[k][t]));
             v8_store(batch->at_vectors[i][k], f.f[k]);
         }
-        // outside of the region, or farther than block.far2 allows
+        // excess > error: the vector lies outside of the region, or the feature is farther than
+        // block.far2 allows
         v8f excess = region_excess(kind, &f, x->extent, x->lane, minus_half, x->most);
         if (kind != SDM_THIN_FACES) {
             v8f d2 = v8_mul(f.f[3], f.f[3]);

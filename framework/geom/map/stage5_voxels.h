@@ -1,5 +1,5 @@
-/* Stage 5: squared distances in float from the voxels of a vector to each feature that reached it;
-   collects the candidates of every vector. Part of map.inc. */
+/* Stage 5: computes, in float, the squared distances from the voxels of a vector to each feature
+   that passed stage 4, and collects the candidates of every vector. Part of map.inc. */
 #ifndef SDM_GEOM_MAP_STAGE5_VOXELS_H
 #define SDM_GEOM_MAP_STAGE5_VOXELS_H
 
@@ -33,7 +33,7 @@ SDM_FOR_KIND v8f feature_distances(const sdm_grid_job *job, int kind, const sdm_
     if (kind == SDM_EDGES) {
         d2 = v8_fma(f[1], f[1], d2);
         excess = v8_sub(v8_abs(f[0]), v8_all(x->most[0]));
-        f[1] = v8_sub(f[1], v8_all(x->most[1])); // may be -INFINITY
+        f[1] = v8_sub(f[1], v8_all(x->most[1])); // -INFINITY if most[1] is INFINITY
     }
     excess = v8_max(excess, v8_max(f[1], f[2]));
     if (kind == SDM_THIN_FACES) excess = v8_max(excess, f[3]);
@@ -48,10 +48,11 @@ SDM_FOR_KIND v8f feature_distances(const sdm_grid_job *job, int kind, const sdm_
     return v8_if_negative(v8_sub(excess, error), d2, v8_all(INFINITY));
 }
 
-/* Updates the two nearest candidates of vector v by feature `number` at squared distances d2.
-   Returns the mask of the voxels to which it may be the nearest: d2 < min * share + slack, where
-   min is the smallest squared distance so far, k = ambiguity(), share = 1 + k and slack = 2 k. This
-   is a bound on min + k (sqrt(min) + 1) that needs no root. */
+/* Updates the two nearest candidates of each voxel of vector v by feature `number`, whose squared
+   distances from the voxels are d2. Returns the mask of the voxels to which the feature may be the
+   nearest: d2 < min * share + slack, where min is the smallest squared distance so far, k =
+   ambiguity(), share = 1 + k and slack = 2 k. This limit is an upper bound on min + k (sqrt(min) +
+   1) and needs no square root. */
 SDM_FOR_KIND unsigned candidate_compare(sdm_candidates *c, size_t v, v8i number, v8f d2, v8f slack,
                                         v8f share)
 {
@@ -62,7 +63,8 @@ SDM_FOR_KIND unsigned candidate_compare(sdm_candidates *c, size_t v, v8i number,
     return (unsigned)v8_greater(v8_fma(nearest, share, slack), d2);
 }
 
-/* Makes a candidate of each vector pair of the batch; scratch->candidates has room for them. */
+/* Appends one candidate for each vector pair of the batch to scratch->candidates, which has room
+   for them. */
 SDM_FOR_KIND void batch_measure(const block *b, int kind)
 {
     const sdm_batch *batch = b->scratch->batch;

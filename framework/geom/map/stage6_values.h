@@ -29,7 +29,7 @@ typedef struct voxels {
     uint32_t number[64];
     // squared distance, mm^2
     _Alignas(32) double d2[64];
-    // voxels whose distances tile_choose() has already computed, with these distances
+    // voxels that tile_choose() has already settled: their indices and squared distances, mm^2
     int n_settled;
     uint8_t settled[64];
     double settled_d2[64];
@@ -61,9 +61,9 @@ static uint32_t nearest_in_tree(const tile *t, const double p[3], double *d2)
     return slot;
 }
 
-/* Number of the nearest feature of voxel p in a lane of vector v (8 tile + vector), by the
-   distances in double of all candidates marked for this lane. Of equally near ones the candidate
-   found first counts. */
+/* Returns the number of the feature nearest to the voxel at p, in this lane of vector v (8 * tile +
+   vector), and sets its squared distance. Compares the distances in double of all candidates that
+   are marked for the lane. Of several equally near candidates the one found first is taken. */
 static uint32_t voxel_settle(const tile *t, unsigned v, int lane, const double p[3], double *d2)
 {
     const sdm_candidates *c = t->candidates;
@@ -75,7 +75,8 @@ static uint32_t voxel_settle(const tile *t, unsigned v, int lane, const double p
         const double d =
             sdm_feature_distance2(t->job->features, t->job->surface->frames, c->list[i].number, p);
         if (!(d < *d2 || (d == *d2 && d < INFINITY))) continue;
-        // equal distances are accepted: the list is read backwards, and its first feature wins
+        // an equal distance replaces the result: the list is read backwards, so the candidate found
+        // first is read last
         *d2 = d;
         best = c->list[i].number;
     }
@@ -90,8 +91,8 @@ static inline v4d dot4(v4d ax, v4d bx, v4d ay, v4d by, v4d az, v4d bz)
     return v4_add(v4_add(v4_mul(ax, bx), v4_mul(ay, by)), v4_mul(az, bz));
 }
 
-/* Squared distances of four points, each from its own feature x[number[i]]. Same operations in the
-   same order as sdm_feature_distance2(), hence the same bits. */
+/* Squared distances of four points, each from its own feature x[number[i]]. The operations and
+   their order are those of sdm_feature_distance2(), hence the same bits. */
 static inline void distances4(const sdm_feature *x, const uint32_t number[4], v4d px, v4d py,
                               v4d pz, double out[4])
 {
@@ -132,7 +133,7 @@ static void tile_choose(const tile *t, voxels *x)
             const uint32_t number = x->number[voxel_index(job, v, i)] = c->number[at][i];
             __builtin_prefetch(&job->features->exact[number]); // for tile_measure()
         }
-        // the other voxels: all of their candidates in double
+        // the other voxels: compare all of their candidates in double
         for (int open = 0xff & ~clear; open; open &= open - 1) {
             const int lane = __builtin_ctz((unsigned)open);
             const unsigned i = voxel_index(job, v, lane);
@@ -145,7 +146,7 @@ static void tile_choose(const tile *t, voxels *x)
     }
 }
 
-/* Sets x->d2 of all voxels from x->number. */
+/* Computes x->d2 of all voxels, the squared distances to the features x->number. */
 static void tile_measure(const tile *t, voxels *x)
 {
     const double(*at)[64] = t->job->tile_voxel;
@@ -159,8 +160,8 @@ static void tile_measure(const tile *t, voxels *x)
     for (int i = 0; i < x->n_settled; i++) x->d2[x->settled[i]] = x->settled_d2[i];
 }
 
-/* Sets x->number and x->d2 of a tile without candidates: by a search of the tree, or as outside of
-   the narrow band. */
+/* Sets x->number and x->d2 of a tile that has no candidates: without a narrow band by a search of
+   the tree; with one, all voxels lie outside of the band. */
 static void tile_search(const tile *t, voxels *x)
 {
     for (unsigned i = 0; i < 64; i++) {

@@ -1,4 +1,5 @@
-/* Arrays from the two ends of one block, and their account against the memory limit. */
+/* Allocates arrays from the two ends of one block, and counts their bytes against the memory
+   limit. */
 #include "arena.h"
 
 #include <stdint.h>

@@ -1,5 +1,5 @@
-/* Memory of the preparation of one mesh: arrays from the two ends of one block, all freed at once,
- * and the account of these bytes against the caller's memory limit. One block is faster than many
+/* Memory of the preparation of one mesh: arrays are taken from the two ends of one block, are all
+ * freed at once, and are counted against the caller's memory limit. One block is faster than many
  * small ones: the allocator keeps its pages from one mesh to the next, and scratch memory is reused
  * while it is still in the cache. */
 #ifndef SDM_GEOM_ARENA_H
@@ -40,10 +40,10 @@ typedef struct sdm_arena {
 sdm_status sdm_arena_reserve(sdm_arena *a, size_t bytes, sdm_error *err);
 void sdm_arena_dispose(sdm_arena *a);
 
-/* *out = array of count elements of `size` bytes from one end, zeroed by sdm_arena_take(), with any
- * content from sdm_arena_take_unset(). A separate allocation is charged. Freed by
- * sdm_arena_release() or with the arena. `what` names the array in messages. SDM_E_NOMEM: out of
- * memory, or beyond the memory limit. */
+/* Sets *out to an array of `count` elements of `size` bytes, taken from one end. sdm_arena_take()
+ * zeroes the array, sdm_arena_take_unset() leaves its content undefined. The bytes of a separate
+ * allocation are charged. Freed by sdm_arena_release() or with the arena. `what` names the array in
+ * messages. SDM_E_NOMEM: out of memory, or beyond the memory limit. */
 sdm_status sdm_arena_take(sdm_arena *a, int end, void **out, size_t count, size_t size,
                           const char *what, sdm_error *err);
 sdm_status sdm_arena_take_unset(sdm_arena *a, int end, void **out, size_t count, size_t size,
@@ -58,7 +58,8 @@ sdm_status sdm_arena_take_unset(sdm_arena *a, int end, void **out, size_t count,
 void sdm_arena_release(sdm_arena *a, int end, sdm_arena_mark mark);
 
 /* Charges memory that the preparation is about to allocate outside of the arena. SDM_E_NOMEM when
- * this exceeds the memory limit. When it is freed, the caller subtracts it from a->used. */
+ * this exceeds the memory limit. When the memory is freed, the caller subtracts its bytes from
+ * a->used. */
 sdm_status sdm_arena_charge(sdm_arena *a, size_t bytes, sdm_error *err);
 
 #endif

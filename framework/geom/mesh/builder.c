@@ -3,8 +3,8 @@
 
 #include <string.h>
 
-/* Enlarges the arrays to at least the given counts, by half as much again where they are too small.
- */
+/* Enlarges the arrays to at least the given counts; an array that is too small gets 1.5 times the
+   needed size. */
 static sdm_status builder_reserve(sdm_builder *b, size_t need_vert, size_t need_tri, sdm_error *err)
 {
     size_t n_vert = b->mesh->n_vert, n_tri = b->mesh->n_tri;

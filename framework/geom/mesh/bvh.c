@@ -11,11 +11,11 @@
 
 // A leaf has at most this many triangles.
 #define LEAF_MAX 4u
-// Triangles in a cluster of the map (see features/). Nodes of at most SORT_MAX triangles are split
-// at a multiple of it, so that the clusters are full.
+// FULL: number of triangles in a full cluster of the map (see features/). Nodes of at most SORT_MAX
+// triangles are split at a multiple of FULL, so that the clusters are full.
 #define FULL ((size_t)8)
 #define SORT_MAX ((size_t)32)
-// Below this depth nodes are split by count, not by space: bounds the depth of the tree.
+// Below this depth nodes are split by count, not by space, which bounds the depth of the tree.
 #define SPATIAL_DEPTH_MAX 64
 
 /* A triangle to be sorted into the tree. Its centre, doubled and in units of the mesh's size, only
@@ -89,7 +89,8 @@ static inline f32x4 select_less(f32x4 a, f32x4 b, f32x4 x, f32x4 y)
     return (f32x4)((m & (i32x4)x) | (~m & (i32x4)y));
 }
 
-/* Partitions list[n] for the two children and returns the size of the first, 0 < size < n. */
+/* Partitions list[n] for the two children of a node and returns the size of the first part, 0 <
+ * size < n. */
 static size_t items_split(const builder *w, item *list, size_t n, int depth)
 {
     if (n <= FULL || depth >= SPATIAL_DEPTH_MAX) return n / 2;
@@ -165,7 +166,7 @@ static inline item item_of(const sdm_mesh *m, const units *u, size_t t)
     return it;
 }
 
-/* An axis-aligned box; x and y are the two lanes of a vector. */
+/* An axis-aligned box; x and y are the two lanes of lo and hi. */
 typedef struct box {
     v2d lo, hi;
     double lo_z, hi_z;
@@ -262,7 +263,7 @@ static void count_pieces(const pieces *p, const uint32_t *source)
 }
 
 /* Copies the subtree of node `from` of the source tree to node[index] and splits its leaves
- * further; its pieces become item[n], item[n + 1] ... */
+ * further; the pieces below it become item[n], item[n + 1] ... */
 static void derive_node(builder *w, const pieces *p, uint32_t index, uint32_t from, size_t n,
                         int depth)
 {

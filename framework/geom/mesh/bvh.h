@@ -28,8 +28,9 @@ typedef struct sdm_bvh {
  * low end of the arena, scratch memory from the high end. SDM_E_NOMEM. */
 sdm_status sdm_bvh_build(const sdm_mesh *m, sdm_arena *arena, sdm_bvh *b, sdm_error *err);
 
-/* The same, cheaper, for a mesh m that was cut from a mesh with the tree `from`: triangle i of m is
- * a part of triangle source[i] of that mesh; source[] is sorted in ascending order. */
+/* Builds *b like sdm_bvh_build(), but faster, for a mesh m that was cut from a mesh with the tree
+ * `from`: triangle i of m is a part of triangle source[i] of the other mesh; source[] is sorted in
+ * ascending order. */
 sdm_status sdm_bvh_derive(const sdm_bvh *from, const sdm_mesh *m, const uint32_t *source,
                           sdm_arena *arena, sdm_bvh *b, sdm_error *err);
 

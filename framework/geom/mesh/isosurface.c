@@ -19,7 +19,7 @@
 
 /* Corner c of a cell is at (c & 1, c >> 1 & 1, c >> 2). Edge 4 a + 2 v + u of a cell runs along
  * axis a; it is at u along axis (a + 1) % 3 and at v along axis (a + 2) % 3. Returns the corner at
- * its lower end. */
+ * the lower end of the edge. */
 static int edge_start(int edge)
 {
     const int a = edge >> 2, u = edge & 1, v = edge >> 1 & 1;
@@ -65,7 +65,7 @@ static sdm_status add_crossing(tracer *t, const size_t at[3], int axis, uint32_t
     if ((a < 0) == (b < 0)) return SDM_OK;
     // a vertex on the boundary of the grid
     for (int d = 0; d < 3; d++) t->cut = t->cut || (d != axis && (at[d] == 0 || at[d] + 1 == n[d]));
-    // a grid of one layer has no cells to use the vertex
+    // a grid with a single layer of voxels has no cells, so the vertex would not be used
     if (t->nx < 2 || t->ny < 2 || t->nz < 2) return SDM_OK;
     double index[3] = {(double)at[0], (double)at[1], (double)at[2]}, world[3];
     index[axis] += fmin(fmax(a / (a - b), STEP_MIN), 1 - STEP_MIN);
@@ -98,7 +98,8 @@ static sdm_status add_layer(tracer *t, size_t k, bool upwards, sdm_error *err)
 
 /* Draws the directed segments on one face of the cell: the lower (side 0) or upper (side 1) face
  * perpendicular to `axis`. Walk around the face counter-clockwise, seen from outside the cell: each
- * segment leads from an edge on which the walk enters the inside to one on which it leaves. */
+ * segment leads from an edge on which the walk enters the inside to an edge on which the walk
+ * leaves the inside. */
 static void join_face(cell *c, int axis, int side)
 {
     const int a1 = (axis + 1) % 3, a2 = (axis + 2) % 3, base = side << axis, one = 1 << a1,
@@ -117,15 +118,16 @@ static void join_face(cell *c, int axis, int side)
     }
     if (n_enter == 1) c->next[enter[0]] = leave[0];
     if (n_enter != 2) return;
-    // Four crossings: the two inside corners are joined if the saddle is inside. Then each segment
-    // leads to the previous leaving edge of the walk, else to the next one.
+    // Four crossings: the two inside corners are joined if the saddle is inside. If they are
+    // joined, each segment leads to the previous leaving edge of the walk, otherwise to the next
+    // one.
     const double even = c->v[corner[0]] * c->v[corner[2]], odd = c->v[corner[1]] * c->v[corner[3]];
     const bool starts_inside = c->v[corner[0]] < 0,
                joined = starts_inside ? even > odd : odd > even;
     for (int i = 0; i < 2; i++) c->next[enter[i]] = leave[(i + (starts_inside != joined)) % 2];
 }
 
-/* The two faces of the cell on which an edge lies, as a bit mask. */
+/* Bit mask of the two faces of the cell on which an edge lies. */
 static int edge_faces(int edge)
 {
     const int a = edge >> 2;

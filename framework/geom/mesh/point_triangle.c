@@ -30,8 +30,9 @@ void sdm_frame_build(const double a[3], const double b[3], const double c[3], sd
         f->u[i] = length > 0 ? ab[i] / length : i == 0;
     }
 
-    // v = component of ac perpendicular to u; projected out twice (Gram-Schmidt with
-    // reorthogonalisation), so that it is orthogonal for needles as well
+    // v = direction of the component of ac perpendicular to u. The part along u is projected out
+    // twice (Gram-Schmidt with reorthogonalisation), so that v is orthogonal to u for needles as
+    // well.
     double w[3] = {ac[0], ac[1], ac[2]};
     double cx = 0;
     for (int pass = 0; pass < 2; pass++) {
@@ -107,8 +108,8 @@ double sdm_frame_distance2(const sdm_frame *f, const double p[3])
         beyond[k] = fmax(fabs(s.t[k]) - f->half[k], 0);
         d[k] = beyond[k] * beyond[k] + s.h[k] * s.h[k];
     }
-    // Above the face when inside all three edge lines. beyond[0] is 0 then but for needles, whose
-    // edge lines nearly coincide far beyond the ends of the longest edge.
+    // p projects into the face when it lies inside all three edge lines. beyond[0] is then 0,
+    // except for needles, whose edge lines nearly coincide far beyond the ends of the longest edge.
     if (s.h[0] < 0 && s.h[1] < 0 && s.h[2] < 0) return beyond[0] * beyond[0] + s.z * s.z;
     return fmin(fmin(d[0], d[1]), d[2]) + s.z * s.z;
 }

@@ -32,7 +32,7 @@ static sdm_status weld_vertices(const sdm_mesh *m, sdm_arena *arena, uint32_t *w
     if (s) return s;
     for (size_t v = 0; v < m->n_vert; v++) {
         const double *p = &m->vert[3 * v];
-        // odd factors: points of a grid must not share sums and collide
+        // odd factors prevent equal sums, and thus collisions, for the points of a regular grid
         const uint64_t x = bits_of(p[0]), y = bits_of(p[1]), z = bits_of(p[2]);
         size_t slot = sdm_mix64(x + y * 0x9e3779b97f4a7c15u + z * 0xd1b54a32d192ed03u) & (size - 1);
         for (;; slot = (slot + 1) & (size - 1)) {
@@ -88,8 +88,8 @@ static void list_half_edges(const sdm_topology *t, uint32_t *lo, half_edge *list
     }
 }
 
-/* Entry of a vertex: `edge` joins it to the vertex lo - 1, the last lower vertex that has an edge
- * to it. */
+/* Entry of a vertex w: lo - 1 is the last lower vertex found so far that has an edge to w, `edge`
+ * is the index of this edge. lo = 0: none found. */
 typedef struct mark {
     uint32_t lo, edge;
 } mark;
@@ -109,7 +109,7 @@ static void make_edges(sdm_topology *t, const uint32_t *lo, const half_edge *lis
             const uint32_t edge = is_new ? n : m->edge, keep = is_new - 1u;
             *m = (mark){v + 1, edge};
             n += is_new;
-            // `keep` masks the members of an edge: 0 for a new one, all bits otherwise
+            // `keep` masks the members of the edge: 0 for a new edge, all bits otherwise
             sdm_edge *e = &t->edges[edge];
             t->edge[h] = edge;
             t->next[h] = e->first | ~keep;

@@ -5,7 +5,7 @@
 #include "memory/arena.h"
 #include "sdm/mesh.h"
 
-/* In place of an index: there is none. */
+/* Value of an index that means "none". */
 #define SDM_NONE UINT32_MAX
 
 /* An undirected edge between the welded vertices lo < hi. n_up half-edges run from lo to hi, n_down

@@ -50,8 +50,8 @@ static double triangle_distance2(vec a, vec b, vec c)
     return edges;
 }
 
-/* Solid angle of the triangle seen from the origin, positive where the normal points away from it
- * (Van Oosterom and Strackee 1983). */
+/* Solid angle of the triangle seen from the origin, positive where the normal points away from the
+ * origin (Van Oosterom and Strackee 1983). */
 static double solid_angle(vec a, vec b, vec c)
 {
     const double la = sqrt(dot(a, a)), lb = sqrt(dot(b, b)), lc = sqrt(dot(c, c));

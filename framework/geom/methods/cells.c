@@ -1,5 +1,6 @@
-/* Method "cells": a uniform grid of cells with a list of triangles in each, searched around every
- * voxel in growing cubic shells (cells as Huang, Li, Crawfis, Li 2001). Exact. */
+/* Method "cells": a uniform grid of cells, each with a list of triangles. Around every voxel the
+ * cells are searched in growing cubic shells (cells as in Huang, Li, Crawfis, Li 2001). The
+ * distances are exact. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -38,7 +39,8 @@ static int64_t cell_index(const cells *c, int axis, double x)
     return (int64_t)(i > 0 ? i < last ? i : last : 0);
 }
 
-/* Cells about twice as long as the triangles, and at most 8 n_tri + 512 cells. */
+/* Chooses the size of the cells: about twice that of the triangles, but such that there are at most
+ * 8 n_tri + 512 cells. */
 static void cells_choose_size(cells *c)
 {
     const sdm_mesh *m = c->run->surface;
@@ -132,8 +134,8 @@ static sdm_status cells_fill_lists(cells *c, sdm_error *err)
     return SDM_OK;
 }
 
-/* Distance of cell i from its neighbours that the sweep has already visited: min(gap of a neighbour
- * + 1, its own gap). */
+/* New gap of cell i: min(gap of cell i, gap of each neighbour that the sweep has already visited +
+ * 1). */
 static uint8_t gap_from_neighbours(const cells *c, const int64_t i[3], int direction)
 {
     uint8_t least = c->gap[cell_number(c, i)];
@@ -152,7 +154,8 @@ static uint8_t gap_from_neighbours(const cells *c, const int64_t i[3], int direc
     return least;
 }
 
-/* Chebyshev distance to the nearest cell with triangles. Two sweeps are exact (Borgefors 1986). */
+/* Computes cells.gap by one sweep in memory order and one in reverse order, which give exact
+ * Chebyshev distances (Borgefors 1986). */
 static sdm_status cells_measure_gaps(cells *c, sdm_error *err)
 {
     sdm_status s = sdm_run_reserve(c->run, c->count, sizeof *c->gap, err);
@@ -233,8 +236,8 @@ static void search_shell(const cells *c, int64_t r, search *s)
         for (i[1] = from[1]; i[1] <= to[1] && z2 < s->d2; i[1]++) {
             const double yz2 = z2 + slab_distance2(c, 1, i[1], s->x[1]);
             if (!(yz2 < s->d2)) continue;
-            // a row of cells on a face of the shell belongs to it entirely, other rows only with
-            // both ends
+            // a row of cells on a face of the shell belongs to the shell entirely; of other rows
+            // only the two end cells do
             const bool face = i[2] == middle[2] - r || i[2] == middle[2] + r ||
                               i[1] == middle[1] - r || i[1] == middle[1] + r;
             for (i[0] = face ? from[0] : middle[0] - r; i[0] <= to[0];) {

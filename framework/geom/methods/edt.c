@@ -1,8 +1,8 @@
 /* Method "edt": exact Euclidean distance transform in linear time (Maurer, Qi, Raghavan 2003) of
  * seeds finer than the voxels: the points where grid lines (lines through voxel centres) along x, y
- * and z cross the surface. Three transforms, one for each direction of grid lines; a voxel gets the
- * distance to the nearest seed of all. The result is approximate, because the surface between the
- * seeds is ignored. */
+ * and z cross the surface. There are three transforms, one for each direction of grid lines; a
+ * voxel gets the smallest of the three distances. The result is approximate, because the surface
+ * between the seeds is ignored. */
 #include <math.h>
 #include <stdio.h>
 
@@ -10,7 +10,8 @@
 #include "sdm/internal/envelope.h"
 #include "sdm/memory.h"
 
-/* Neighbouring lines that one thread transforms together, so that it uses whole cache lines. */
+/* Number of neighbouring lines that one thread transforms together, so that it uses whole cache
+ * lines. */
 enum { BUNDLE = 16 };
 
 typedef struct edt_job {
@@ -21,9 +22,10 @@ typedef struct edt_job {
     /* [n_threads][4 * longest] scratch memory, see line_scratch() */
     double *line;
     int64_t longest; /* largest number of voxels along an axis */
-    /* axis of the seeds' grid lines, axis of the lines of the current pass */
+    /* first: axis of the seeds' grid lines; axis: axis of the lines of the current pass */
     int first, axis;
-    /* of a line along `axis`: number of voxels, distance between neighbours in `work` */
+    /* n: number of voxels of a line along `axis`; stride: distance in `work` between neighbouring
+     * voxels of the line */
     int64_t n, stride;
 } edt_job;
 
@@ -69,7 +71,7 @@ static void edt_along_seeds(void *arg, int64_t part, int thread)
 {
     edt_job *j = arg;
     const sdm_seeds *s = &j->seeds[j->axis];
-    // [n] nearest seed on either side of each voxel
+    // [n] coordinate of the nearest seed on either side of each voxel
     double *before = line_scratch(j, thread), *after = before + j->n;
     const double spacing = j->run->grid->spacing[j->axis], last = (double)(j->n - 1);
     int64_t lines, line;
@@ -98,8 +100,9 @@ static void edt_along_seeds(void *arg, int64_t part, int thread)
     }
 }
 
-/* Second and third pass of a transform: the minimum over one more axis. The third pass also takes
- * the minimum over the transforms done so far, in run->values. */
+/* Second and third pass of a transform: replaces the value of each voxel by the minimum, over the
+ * voxels of its line, of (value + squared distance between the voxels). The third pass then takes
+ * the minimum with the distances of the earlier transforms, in run->values. */
 static void edt_across_seeds(void *arg, int64_t part, int thread)
 {
     edt_job *j = arg;

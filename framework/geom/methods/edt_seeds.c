@@ -7,8 +7,8 @@
 
 #include "sdm/memory.h"
 
-/* Integers in [lo, hi] within 0 .. n - 1 as *from .. *to (empty when *from > *to). A margin for
- * rounding may add an integer just outside. */
+/* Sets *from .. *to to the integers in [lo, hi] that lie within 0 .. n - 1 (none when *from > *to).
+ * A margin for rounding may add an integer just outside. */
 static void whole_range(double lo, double hi, int64_t n, int64_t *from, int64_t *to)
 {
     const double margin = 1e-12 * (fabs(lo) + fabs(hi));
@@ -31,7 +31,7 @@ static void slice_widen(slice_end p, slice_end *lo, slice_end *hi)
 }
 
 /* Intersection of the triangle with the plane up = k: the segment *lo .. *hi, sorted by `across`.
- * v[corner] = (depth, across, up). Returns false when they do not meet. */
+ * v[corner] = (depth, across, up). Returns false when triangle and plane do not meet. */
 static bool slice_at(const double v[3][3], double k, slice_end *lo, slice_end *hi)
 {
     *lo = (slice_end){0, INFINITY};
@@ -136,13 +136,13 @@ void sdm_seeds_dispose(sdm_seeds *s)
 
 /* ---- error bound ----
  *
- * A seed lies on the surface, so the distance to the nearest seed is >= the true distance. It
- * exceeds it by at most the distance from q, the true nearest surface point, to some seed. The
- * triangles are cut into pieces smaller than a voxel; the largest distance from a point of any
- * piece to a seed bounds the error. Pieces farther from the grid than the largest map value cannot
- * contain q and are skipped. The search starts with a lower limit of the bound (half a voxel
- * diagonal, and the value at the centroid of every triangle), so most triangles are accepted with
- * few cuts. */
+ * A seed lies on the surface, so the distance to the nearest seed is >= the true distance. The
+ * difference is at most the distance from q, the true nearest surface point, to the seed nearest
+ * to q. The triangles are cut into pieces smaller than a voxel; the largest distance from a point
+ * of any piece to its nearest seed bounds the error. Pieces farther from the grid than the largest
+ * map value cannot contain q and are skipped. The search starts with a lower limit of the bound
+ * (half a voxel diagonal, and the value at the centroid of every triangle), so most triangles are
+ * accepted with few cuts. */
 
 /* Input and result of the search for the error bound. */
 typedef struct bound_job {
@@ -195,8 +195,9 @@ static double near_seed_distance2(const bound_job *b, const double p[3])
     return best;
 }
 
-/* Upper bound on the distance from p to the nearest seed: the nearest one on the lines around p, or
- * the distance to the nearest voxel plus its map value. */
+/* Upper bound (mm) on the distance from p (index coordinates) to the nearest seed: the smaller of
+ * the distance to the nearest seed on the lines around p and (distance to the nearest voxel + map
+ * value of this voxel). */
 static double seed_distance_bound(const bound_job *b, const double p[3])
 {
     const sdm_grid *g = b->run->grid;
@@ -211,7 +212,7 @@ static double seed_distance_bound(const bound_job *b, const double p[3])
     return sdm_lesser(sqrt(near2), sqrt(length2(g->spacing, d)) + by);
 }
 
-/* Distance (mm) from p to the box spanned by the voxel centres; 0 inside. */
+/* Distance (mm) from p (index coordinates) to the box spanned by the voxel centres; 0 inside. */
 static double outside_distance(const bound_job *b, const double p[3])
 {
     const sdm_grid *g = b->run->grid;

@@ -89,8 +89,8 @@ static double cell_exact_distance(const octree *o, scratch *w, const int64_t ori
     return w->value[at];
 }
 
-/* Writes the tangents at c of the listed triangles that can be nearest within `radius` of c; the
- * triangle nearest to c comes first. Returns their number. list[n], out[n]. */
+/* Writes to out[n] the tangents at c of those triangles of list[n] that can be nearest to a point
+ * within `radius` of c; the triangle nearest to c comes first. Returns the number of tangents. */
 static size_t cell_tangents(const octree *o, tangent *out, const uint32_t *list, size_t n,
                             const double c[3], double radius)
 {
@@ -216,8 +216,8 @@ static void cell_refine(const octree *o, scratch *w, const int64_t origin[3], co
     }
 }
 
-/* Writes the triangles that can be nearest to a point of the top cell to list[] and returns their
- * number, by distances between the cell centre and the bounding spheres. */
+/* Writes to list[] the triangles that can be nearest to a point of the top cell, and returns their
+ * number. The test uses the distances between the cell centre and the bounding spheres. */
 static size_t top_cell_list(const octree *o, const int64_t origin[3], const cell *c, uint32_t *list)
 {
     double middle[3], end[3], x[3], radius = 0;

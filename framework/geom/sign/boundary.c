@@ -1,4 +1,5 @@
-/* Tree of boundary edges, and the solid angles of the strips that close an open mesh. */
+/* Tree of boundary edges, and the solid angles of the strips that close an open mesh; terms:
+ * boundary.h. */
 #include "boundary.h"
 
 #include <math.h>
@@ -12,7 +13,8 @@
 
 static const double pi = 3.14159265358979323846;
 
-/* A boundary edge in the direction in which its surplus triangles use it. */
+/* A boundary edge, in the direction in which more of its triangles use it. weight: the difference
+ * between the numbers of triangles in the two directions. */
 typedef struct directed_edge {
     uint32_t from, to, weight, used;
 } directed_edge;
@@ -96,7 +98,7 @@ sdm_status sdm_boundary_build(const sdm_mesh *m, const sdm_topology *topo, sdm_b
     sdm_status s = SDM_ALLOC(&b->chain, 2 * n - 1, "boundary edges", err);
     if (!s) s = SDM_ALLOC(&e, n, "boundary edges", err);
     if (!s) s = SDM_ALLOC(&order, n, "boundary edges", err);
-    // direct each edge as its surplus triangles use it
+    // give each edge the direction in which more of its triangles use it
     for (size_t i = 0, k = 0; !s && i < topo->n_edges; i++) {
         const sdm_edge *x = &topo->edges[i];
         if (x->n_up > x->n_down) e[k++] = (directed_edge){x->lo, x->hi, x->n_up - x->n_down, 0};

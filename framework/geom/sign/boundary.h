@@ -14,10 +14,10 @@
  * away their strips have nearly the same solid angle. */
 typedef struct sdm_chain {
     double end[2][3]; /* end points of the chord, mm */
-    uint32_t vert[2]; /* their vertex numbers in the mesh */
+    uint32_t vert[2]; /* numbers in the mesh of these end points */
     uint32_t n;       /* number of edges; 1: the chord is the edge itself */
-    /* number of surplus triangles at each edge; 0: the edges are not consecutive or differ in
-     * weight */
+    /* weight of each edge: by how many more triangles use it in one direction than in the other; 0:
+     * the edges are not consecutive or differ in weight */
     double weight;
     double length;            /* total length of the edges, mm */
     double fan;               /* area of the fan, mm^2 */
@@ -31,8 +31,8 @@ typedef struct sdm_boundary {
     size_t n; /* number of boundary edges */
 } sdm_boundary;
 
-/* Builds the tree of boundary edges. topo: of m. *b is zero-initialised; sdm_boundary_dispose()
- * frees it, also after an error. SDM_E_NOMEM. */
+/* Builds the tree of boundary edges. topo: topology of m. *b is zero-initialised;
+ * sdm_boundary_dispose() frees it, also after an error. SDM_E_NOMEM. */
 sdm_status sdm_boundary_build(const sdm_mesh *m, const sdm_topology *topo, sdm_boundary *b,
                               sdm_error *err);
 void sdm_boundary_dispose(sdm_boundary *b);
@@ -51,7 +51,8 @@ typedef struct sdm_strips {
 /* Winding number of the strips at a point x, with bounds. */
 typedef struct sdm_strips_winding {
     double winding; /* solid angle of all strips over 4 pi, signed */
-    double error;   /* bound on the error of `winding` from chords, without rounding */
+    /* bound on the error of `winding` that the chords cause; excludes rounding errors */
+    double error;
     /* bound on abs(gradient of `winding`), times 4 pi, 1/mm */
     double steepness;
     /* lower bound on the distance from x to the boundary, mm; INFINITY without boundary */
@@ -59,9 +60,9 @@ typedef struct sdm_strips_winding {
 } sdm_strips_winding;
 
 /* Winding number of the strips at x. p[2]: coordinates 1 and 2 of x in the system of s->across.
- * tolerance: largest error of the winding number from one chain replaced by its chord, 0: no chain
- * is replaced. Errors by whole numbers cannot occur, because the side of x at each strip is exact.
- * [any thread] */
+ * tolerance: largest error of the winding number that the replacement of one chain by its chord may
+ * cause; 0: no chain is replaced. Errors by whole numbers cannot occur, because the side of x at
+ * each strip is exact. [any thread] */
 sdm_strips_winding sdm_strips_evaluate(const sdm_strips *s, const double x[3], const double p[2],
                                        double tolerance);
 

@@ -15,11 +15,11 @@ typedef struct certify_job {
     const sdm_sign_rows *rows;
     const float *values;
     const int64_t *n; // voxels of the grid along x, y, z
-    double rounding;
-    // [nz][ny][pitch] one bit per voxel: some sign differs from the map; no two threads write to
-    // the same byte
+    double rounding;  // voxels with abs(distance) <= rounding are not compared, mm
+    // [nz][ny][pitch] one bit per voxel, set if a recomputed sign differs from the map; no two
+    // threads write to the same byte
     uint8_t *wrong;
-    uint8_t *below; // the same for voxels with a winding number <= -1
+    uint8_t *below; // the same layout: bits of voxels with a winding number < -1/2
     size_t pitch;
 } certify_job;
 
@@ -76,7 +76,7 @@ static void voxel_mark(uint8_t *bits, const certify_job *c, int64_t voxel)
 }
 
 /* Recomputes the winding number by a sum over all triangles at voxels drawn evenly from the map.
- * *n: in: voxels of the map, out: voxels drawn. */
+ * *n: on input the number of voxels of the map, on output the number of voxels drawn. */
 static sdm_status sums_compare(certify_job *c, const sdm_sign *s, const sdm_grid *g,
                                const sdm_exact_opts *opts, size_t *n, sdm_error *err)
 {
@@ -155,7 +155,7 @@ sdm_status sdm_sign_certify(const sdm_sign *s, const sdm_grid *g, const sdm_exac
         return sdm_fail(err, SDM_E_NOMEM,
                         "the certificate needs %zu bytes, memory_limit leaves %zu", 2 * n_byte,
                         opts->memory_limit);
-    // options of the recomputed signs: without the memory of the bits
+    // options for the recomputation: memory_limit without the bytes of the bit fields
     sdm_exact_opts beside = *opts;
     if (beside.memory_limit) beside.memory_limit -= 2 * n_byte;
     sdm_status st = SDM_ALLOC(&c.wrong, n_byte, "compared signs", err);

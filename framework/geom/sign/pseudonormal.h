@@ -6,13 +6,14 @@
 #include "mesh/topology.h"
 
 typedef struct sdm_pseudonormals {
-    double (*vertex)[3]; /* [n_vert] vertices of the topology (welded) */
-    double (*edge)[3];   /* [n_edges] */
-    double (*face)[3];   /* [n_tri] unit vectors, 0 for a triangle without area */
+    double (*vertex)[3]; /* [n_vert] pseudo-normals of the welded vertices */
+    double (*edge)[3];   /* [n_edges] pseudo-normals of the edges */
+    double (*face)[3];   /* [n_tri] unit normals of the faces; 0 for a triangle without area */
 } sdm_pseudonormals;
 
-/* Sums the normals of the faces at every vertex (weighted by angle) and edge. topo: of m. *p is
- * zero-initialised; sdm_pseudonormals_dispose() frees it, also after an error. SDM_E_NOMEM. */
+/* Computes the pseudo-normals: sums the face normals at every vertex (weighted by angle) and at
+ * every edge. topo: topology of m. *p is zero-initialised; sdm_pseudonormals_dispose() frees it,
+ * also after an error. SDM_E_NOMEM. */
 sdm_status sdm_pseudonormals_build(const sdm_mesh *m, const sdm_topology *topo,
                                    sdm_pseudonormals *p, sdm_error *err);
 void sdm_pseudonormals_dispose(sdm_pseudonormals *p);

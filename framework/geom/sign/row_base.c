@@ -1,5 +1,5 @@
-/* Rounded winding number of the strips for boxes of voxels: one evaluation at the centre if the
- * gradient bound covers the box, otherwise the box is split in two. */
+/* Computes the base of boxes of voxels, the rounded winding number of the strips: by one evaluation
+ * at the centre if the gradient bound covers the box, otherwise the box is split in two. */
 #include "row_base.h"
 
 #include <math.h>

@@ -15,7 +15,8 @@ typedef struct sdm_row_tile {
 } sdm_row_tile;
 
 /* Writes base[k1 - k0][j1 - j0][i1 - i0], the rounded winding number of the strips for the voxels
- * of a tile. rows: of grid g and of the mesh with boundary b. [any thread] */
+ * of a tile. rows: crossings of the rows of grid g with the mesh whose boundary is b. [any
+ * thread] */
 void sdm_row_base_fill(const sdm_boundary *b, const sdm_rows *rows, const sdm_grid *g,
                        const sdm_row_tile *tile, int32_t *base);
 

@@ -159,8 +159,9 @@ static sdm_status triangle_rasterise(const double v[3][3], const sdm_rows *r, co
     return SDM_OK;
 }
 
-/* Inverse of the 3 x 3 matrix of grid directions; returns its determinant. The transpose is not
- * accurate enough: sdm_grid_check() accepts directions that are orthonormal to only 1e-6. */
+/* Computes the inverse of the 3 x 3 matrix d of grid directions; returns the determinant of d. The
+ * transpose is not accurate enough as an inverse: sdm_grid_check() accepts directions that are
+ * orthonormal to only 1e-6. */
 static double matrix_invert(const double d[9], double inverse[9])
 {
     for (int i = 0; i < 3; i++) {
@@ -223,8 +224,8 @@ static sdm_status rows_sort(const collector *c, int n_collector, size_t n_row, i
     sdm_status s = SDM_ALLOC(&r->first, n_row + 2, "row crossings", err);
     if (!s) s = SDM_ALLOC(&r->list, n, "row crossings", err);
     if (s) return s;
-    // counting sort: first[row + 2] counts the crossings, then first[row + 1] is the position of
-    // the row's next one
+    // counting sort: first[row + 2] counts the crossings of a row; then first[row + 1] is the
+    // position of the row's next crossing
     for (int i = 0; i < n_collector; i++)
         for (size_t k = 0; k < c[i].n; k++) r->first[c[i].list[k].row + 2]++;
     for (size_t i = 0; i < n_row; i++) r->first[i + 2] += r->first[i + 1];

@@ -5,21 +5,22 @@
  * that overlaps itself therefore counts as the union of the volumes that it encloses, and surface
  * inside the union is ignored. A "part" is a set of triangles connected by edges. In particular:
  * - A part of opposite orientation inside a solid is a cavity; a part of the same orientation
- * inside a solid changes nothing.
- * - A closed mesh that is inside out as a whole is turned. So is a part that meets no other part
- * and has a winding number < 0 around or in it: a body that is inside out beside other bodies, or
- *   within a cavity. Cavities are not turned. Parts that meet others are never turned: one that is
- *   inside out subtracts its volume from the others and is not solid itself.
+ *   inside a solid changes nothing.
+ * - A closed mesh that is inside out as a whole is turned: all its triangles are reversed. So is a
+ *   part that meets no other part and has a winding number < 0 around or in it: a body that is
+ *   inside out beside other bodies, or within a cavity. Cavities are not turned. Parts that meet
+ *   others are never turned: if such a part is inside out, it subtracts its volume from the others
+ *   and is not solid itself.
  * - A triangle given twice counts once. Two triangles back to back enclose nothing; if a mesh
  *   consists only of such sheets (zero thickness), no point is inside and distances are to the
  *   sheets.
  * - Parts and gaps of the union thinner than 128 * 2^-52 * (largest abs(coordinate)), the tips of
- *   needles among them, may be kept or lost. The distance is then to the next part of the surface,
+ *   needles among them, may be kept or lost. The distance is then to the next remaining surface,
  *   and union_error_mm does not cover this. Within the same distance of surface inside the union
  *   either sign may result.
  * - An open, one-sided or inconsistently oriented mesh is never turned. A flat sheet or a Moebius
  *   strip has no inside; the inside of a cup ends about where its opening fills half of the field
- * of view (solid angle 2 pi), so the sign changes away from the surface, too. */
+ *   of view (solid angle 2 pi), so the sign changes away from the surface, too. */
 #ifndef SDM_EXACT_H
 #define SDM_EXACT_H
 
@@ -62,8 +63,8 @@ typedef struct sdm_exact_report {
     bool turned;          /* the whole mesh was inside out and was turned */
     bool unioned;         /* surface inside the union was removed */
     size_t n_tri_used;    /* triangles of sdm_exact_surface() */
-    /* bound, mm, on the error of distances from removing inner surface; 0 when none was removed.
-     * Thin parts are excepted, see above. */
+    /* bound in mm on the error of distances that the removal of inner surface causes; 0 when none
+     * was removed. It does not cover thin parts, see the head of this file. */
     double union_error_mm;
     double ms_build;     /* time of sdm_exact_create() in milliseconds */
     size_t parts_turned; /* parts that were inside out and were turned, apart from `turned` */
@@ -73,9 +74,9 @@ typedef struct sdm_exact_report {
 typedef struct sdm_exact sdm_exact;
 
 /* Audits the mesh, selects the sign method, removes surface inside the union and builds the search
- * tree. *out is freed with sdm_exact_free(); the mesh is copied and may be freed. opts may be NULL:
- * the defaults. SDM_E_MESH (see sdm_mesh_audit()), SDM_E_ARG (NULL, or a sign method that does not
- * suit the mesh), SDM_E_NOMEM, SDM_E_CANCELLED. */
+ * tree. Free *out with sdm_exact_free(). The mesh is copied and may be freed after the call. opts
+ * may be NULL: the defaults. Errors: SDM_E_MESH (see sdm_mesh_audit()), SDM_E_ARG (NULL, or a sign
+ * method that does not suit the mesh), SDM_E_NOMEM, SDM_E_CANCELLED. */
 SDM_API sdm_status sdm_exact_create(const sdm_mesh *mesh, const sdm_exact_opts *opts,
                                     sdm_exact **out, sdm_error *err);
 SDM_API void sdm_exact_free(sdm_exact *e);
@@ -85,8 +86,8 @@ SDM_API const sdm_exact_report *sdm_exact_get_report(const sdm_exact *e);
 
 /* The mesh to which distances are measured (the boundary of the union), owned by e. */
 SDM_API const sdm_mesh *sdm_exact_surface(const sdm_exact *e);
-/* [sdm_exact_surface()->n_tri] index of the triangle of the given mesh of which each triangle of
- * the surface is a part; owned by e. */
+/* Array source[sdm_exact_surface()->n_tri], owned by e: triangle t of the surface is triangle
+ * source[t] of the given mesh, or a piece of it. */
 SDM_API const uint32_t *sdm_exact_source(const sdm_exact *e);
 
 /* values[nz][ny][nx] = signed distance, mm, at the voxel centres; the same bits for any number of
@@ -94,8 +95,8 @@ SDM_API const uint32_t *sdm_exact_source(const sdm_exact *e);
 SDM_API sdm_status sdm_exact_map(const sdm_exact *e, const sdm_grid *grid, float *values,
                                  sdm_error *err);
 
-/* Negates values[nz][ny][nx] at the voxels inside: gives unsigned distances (all >= 0) from another
- * source the signs of the engine. Threads and errors as sdm_exact_map(). */
+/* Negates values[nz][ny][nx] at the voxels inside the mesh, so that unsigned distances (all >= 0)
+ * from another source get the signs of the engine. Threads and errors as sdm_exact_map(). */
 SDM_API sdm_status sdm_exact_sign(const sdm_exact *e, const sdm_grid *grid, float *values,
                                   sdm_error *err);
 
@@ -168,7 +169,8 @@ SDM_API double sdm_exact_point(const sdm_exact *e, const double x[3], double clo
  * where the sign is a sum over the boundary. NaN as above. [any thread] */
 SDM_API double sdm_exact_distance(const sdm_exact *e, const double x[3]);
 
-/* "auto", "crossings", "pseudonormal" or "winding"; "unknown" for any other value. [any thread] */
+/* Name of the sign method: "auto", "crossings", "pseudonormal" or "winding"; "unknown" for any
+ * other value. [any thread] */
 SDM_API const char *sdm_sign_method_name(sdm_sign_method m);
 
 #ifdef __cplusplus

@@ -13,9 +13,9 @@ extern "C" {
 /* *out = the iso-surface of values[nz][ny][nx] at `level` by marching cubes (Lorensen and Cline
  * 1987), in world coordinates, mm. It is closed except where it leaves the grid, its normals point
  * towards larger values, and triangles share vertices. It has no triangles if no value crosses the
- * level. *cut (may be NULL) = the surface leaves the grid. *out is zero-initialised by the caller
- * and empty after an error. Deterministic. SDM_E_ARG: NULL, an invalid grid, or a value or level
- * that is not finite; SDM_E_NOMEM, SDM_E_MESH (too large a mesh). */
+ * level. *cut (may be NULL) = true if the surface leaves the grid. *out is zero-initialised by the
+ * caller and empty after an error. Deterministic. SDM_E_ARG: NULL, an invalid grid, or a value or
+ * level that is not finite; SDM_E_NOMEM, SDM_E_MESH (too large a mesh). */
 SDM_API sdm_status sdm_isosurface(const sdm_grid *grid, const float *values, float level,
                                   sdm_mesh *out, bool *cut, sdm_error *err);
 

@@ -36,7 +36,7 @@ typedef struct sdm_audit {
     size_t n_vert, n_tri;
     size_t degenerate;         /* triangles without area (to rounding) or with a repeated vertex */
     size_t duplicate;          /* triangles with the same three vertices as an earlier one */
-    size_t boundary_edges;     /* edges of one triangle */
+    size_t boundary_edges;     /* edges that belong to only one triangle */
     size_t nonmanifold_edges;  /* edges of three or more triangles */
     size_t misoriented_edges;  /* edges of two triangles that run along it in the same direction */
     size_t components;         /* sets of triangles connected by edges */

@@ -17,7 +17,7 @@ extern "C" {
 sdm_status sdm_naive_map(const sdm_mesh *mesh, const sdm_grid *grid, int n_threads, float *values,
                          sdm_error *err);
 
-/* The same at one point x. */
+/* Signed distance, mm, at one point x, computed in the same way. */
 double sdm_naive_point(const sdm_mesh *mesh, const double x[3]);
 
 #ifdef __cplusplus

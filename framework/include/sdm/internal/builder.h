@@ -9,8 +9,8 @@
 extern "C" {
 #endif
 
-/* A mesh under construction. n_vert and n_tri are the counts filled so far; those in *mesh are
- * capacities until sdm_builder_finish(). */
+/* A mesh under construction. n_vert and n_tri are the counts filled so far; mesh->n_vert and
+ * mesh->n_tri are capacities until sdm_builder_finish(). */
 typedef struct sdm_builder {
     const char *path; /* file name for messages of the callers */
     sdm_mesh *mesh;

@@ -10,23 +10,25 @@ extern "C" {
 #endif
 
 typedef struct sdm_method_opts {
-    /* Surface and sign, threads, memory_limit, cancelled. memory_limit applies twice: to the engine
-     * that prepares the surface, and to the memory that the method adds. */
+    /* Options of the engine (sign, overlap, cancelled ...), also used by the method itself.
+     * memory_limit applies twice: to the engine that prepares the surface, and to the memory that
+     * the method adds. */
     sdm_exact_opts exact;
     /* "octree" only: largest error allowed, mm; 0: 1/20 of the smallest voxel spacing */
     double max_error_mm;
     /* "exact" only: > 0 computes a narrow band, see sdm_exact_layers.band_mm; other methods ignore
      * it and compute the whole map */
     double band_mm;
-    /* Called by the calling thread with the fraction done, 0 .. 1, and the `user` of `exact`; may
-     * be NULL. */
+    /* Called in the thread that called map(), with exact.user and the fraction of the work that is
+     * done (0 .. 1); may be NULL. */
     void (*progress)(void *user, double share);
 } sdm_method_opts;
 
 typedef struct sdm_method_report {
-    /* time for what depends on the mesh only: the engine's surface, the cells */
+    /* time in milliseconds for the steps that depend only on the mesh, for example the engine's
+     * surface */
     double ms_prepare;
-    double ms_map; /* time for all the rest */
+    double ms_map; /* time in milliseconds for all other steps */
     /* peak memory of the method in bytes, without the values, the mesh and the engine
      * (sdm_exact) */
     size_t bytes;
@@ -54,8 +56,8 @@ typedef struct sdm_method {
                       float *values, sdm_method_report *report, sdm_error *err);
 } sdm_method;
 
-/* Number of methods and method i, 0 <= i < sdm_method_count(); a constant table, "exact" is the
- * first. NULL for a larger i. [any thread] */
+/* The number of methods, and method i, 0 <= i < sdm_method_count() (NULL for a larger i). The table
+ * is constant; "exact" is the first method. [any thread] */
 size_t sdm_method_count(void);
 const sdm_method *sdm_method_at(size_t i);
 

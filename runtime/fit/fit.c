@@ -1,5 +1,5 @@
-/* A fit from beginning to end: sdm_fit(), the last function of this file, lists its steps in order.
- */
+/* A fit from beginning to end: sdm_fit(), the last function of this file, lists its steps in
+ * order. */
 #include "sdm/fit.h"
 
 #include <math.h>
@@ -22,22 +22,26 @@
 #include "sdm/internal/rotation.h"
 #include "sdm/memory.h"
 
-// rounds at most in which region, prior weights and state are brought into agreement
+// largest number of rounds in which region, prior weights and state are brought into agreement
 #define ROUNDS_MAX 8
-// samples at most; with more voxels the stride doubles
+// largest number of samples; with more voxels the stride doubles
 #define SAMPLES_MAX 2000000
-// eps of the rounds in which the region and the prior weights may still change
+// eps of the rounds in which the region and the prior weights may still change: of plain Newton
+// steps, and of steps with the averaged gradient
 #define EPS_FIRST 1e-2
 #define EPS_FIRST_AVERAGED 1e-4
-// relative change of the prior weights that is ignored: always; after an end by flat steps
+// relative changes of the prior weights up to this size are ignored: always; where flat steps ended
+// the iterations
 #define WEIGHT_EPS 1e-3
 #define WEIGHT_ROUGH 0.05
-// flat steps in a row that end the iterations with a network's maps
+// number of flat steps (of negligible predicted gain) in a row that ends the iterations with a
+// network's maps
 #define FLAT_MAX 6
-// a parameter is determined by its prior alone if its sd exceeds this share of the prior's
+// a parameter is determined by its prior alone if its sd exceeds this share of the prior's sd
 #define BY_PRIOR 0.9
-// The priors are reweighted this often at most. Without a limit a prior that contradicts the image
-// could reinforce itself: a worse fit has more correlated residuals, which strengthen the prior.
+// Largest number of times that the priors are reweighted. Without a limit a prior that contradicts
+// the image could reinforce itself: a worse fit has more correlated residuals, which strengthen the
+// prior.
 #define WEIGHINGS_MAX 4
 
 sdm_fit_opts sdm_fit_defaults(void)
@@ -77,7 +81,7 @@ void sdm_fit_dispose(sdm_fit_result *r)
     *r = (sdm_fit_result){0};
 }
 
-// all numbers that a fit may leave open are NaN
+// allocates the arrays of the result; numbers that a fit may leave undetermined start as NaN
 static sdm_status result_create(size_t n, sdm_fit_result *out, sdm_error *err)
 {
     const size_t size = n + 6;
@@ -130,7 +134,7 @@ static sdm_status params_start(fit_problem *p, bool *clamped, sdm_error *err)
     return SDM_OK;
 }
 
-// state at the start, memory, maps and extent of the shape there
+// sets up the problem at the start: state, memory, maps, and the extent of the shape
 static sdm_status problem_start(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
     const sdm_fit_opts *o = p->opts;
@@ -175,7 +179,7 @@ static sdm_status samples_follow(fit_problem *p, bool *changed, sdm_error *err)
                          .max_samples = SAMPLES_MAX};
     sdm_fit_to_world(&p->state, p->extent.centre, region.centre);
     sdm_status s = SDM_OK;
-    // starts with the earlier stride, so that *changed compares equal strides
+    // the loop starts with the earlier stride, so that *changed compares samples of the same stride
     for (;; p->stride *= 2) {
         s = sdm_fit_samples_choose(p->target, p->opts, &region, p->stride, &p->samples, changed,
                                    err);
@@ -183,8 +187,8 @@ static sdm_status samples_follow(fit_problem *p, bool *changed, sdm_error *err)
     }
 }
 
-// updates the prior weights from the residuals at the present state; *change: their largest
-// relative change, 0 where it is negligible or nothing has a prior
+// updates the prior weights from the residuals at the present state; *change: the largest relative
+// change of a weight, 0 if it is negligible or no unknown has a prior
 static sdm_status priors_reweight(fit_problem *p, double *change, sdm_error *err)
 {
     double weight[FIT_PARAMS_MAX + 6] = {0};
@@ -201,14 +205,14 @@ static sdm_status priors_reweight(fit_problem *p, double *change, sdm_error *err
     return SDM_OK;
 }
 
-// Newton's method until state, region and prior weights agree; end->converged is false where the
-// iterations are used up
+// repeats Newton's method until state, region and prior weights agree; end->converged is false if
+// the iterations are used up before
 static sdm_status maximise_settled(fit_problem *p, fit_newton_opts *newton, fit_newton_end *end,
                                    sdm_error *err)
 {
     const size_t most = newton->max_iterations, before = p->n_iterations;
-    // without priors the weights serve the noise factor alone; averaged gradients then keep the
-    // earlier one
+    // without priors a reweighting updates the noise factor only: twice with plain Newton steps,
+    // not at all with the averaged gradient
     const int weighings = sdm_fit_has_prior(p) ? WEIGHINGS_MAX : newton->averaged ? 0 : 2;
     const double first = newton->averaged ? EPS_FIRST_AVERAGED : EPS_FIRST;
     const double eps = newton->eps;
@@ -216,18 +220,18 @@ static sdm_status maximise_settled(fit_problem *p, fit_newton_opts *newton, fit_
     for (int round = 0; round < ROUNDS_MAX && !s; round++) {
         bool changed;
         double change = 0;
-        s = sdm_fit_evaluate(p, err); // maps at the state, for the region
+        s = sdm_fit_evaluate(p, err); // the region follows the shape on these maps
         if (!s) s = samples_follow(p, &changed, err);
         if (!s && !p->samples.n)
             return sdm_fail(err, SDM_E_QUALITY,
                             "the shape has left the image: no voxel near it is left");
-        if (!s && changed) s = sdm_fit_evaluate(p, err); // the new samples
+        if (!s && changed) s = sdm_fit_evaluate(p, err); // evaluate the new samples
         if (!s && changed) s = sdm_fit_tissue_field_update(p, err);
         if (!s && round < weighings) s = priors_reweight(p, &change, err);
         // flat steps cannot resolve small changes of region and weights
         const bool last = end->flat ? change < WEIGHT_ROUGH : !changed && !(change > 0);
         if (s || (round > 0 && newton->eps <= eps && last)) return s;
-        // iterations left, and a coarse eps until region and weights settle
+        // set the number of iterations left, and a coarse eps until region and weights settle
         const size_t used = p->n_iterations - before;
         if (used >= most) {
             end->converged = false;
@@ -280,7 +284,8 @@ static sdm_status start_find(fit_problem *p, sdm_fit_result *out, sdm_error *err
     return s;
 }
 
-/* Main phase, and the polish with exact maps after a network's fit if the options have one. */
+/* Runs the main phase and, if the options set max_polish_iterations, a polish: more iterations with
+ * exact maps after a fit with a network. */
 static sdm_status maximise(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
     const sdm_fit_opts *o = p->opts;
@@ -311,7 +316,7 @@ static sdm_status maximise(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     return s;
 }
 
-// the estimate and the counts; covariance and evidence are in *out already
+// writes the estimate and the counts to *out, which holds covariance and evidence already
 static void report(fit_problem *p, sdm_fit_result *out)
 {
     const fit_state *s = &p->state;
@@ -347,7 +352,8 @@ static double main_mean(const sdm_fit_law *law, size_t n)
     return law[most].mean;
 }
 
-// reasons to distrust a fit, the most basic first
+// returns SDM_E_QUALITY with the first reason to distrust the fit; the most basic reasons come
+// first
 static sdm_status judge(const fit_problem *p, const sdm_fit_result *r, sdm_error *err)
 {
     const sdm_fit_opts *o = p->opts;
@@ -364,7 +370,7 @@ static sdm_status judge(const fit_problem *p, const sdm_fit_result *r, sdm_error
                 "by %.3g (log-likelihood of independent voxels); check the start pose, and whether "
                 "the inside is %s than the outside in this image",
                 -r->evidence, darker ? "darker" : "brighter");
-        // the contrast must be that of the start
+        // the sign of the contrast must be that of the start
         if ((in < out) != darker)
             return sdm_fail(
                 err, SDM_E_QUALITY,
@@ -391,7 +397,7 @@ static sdm_status judge(const fit_problem *p, const sdm_fit_result *r, sdm_error
     return SDM_OK;
 }
 
-// covariance, share in the image, evidence
+// computes the covariance, the share of the shape in the image, and the evidence
 static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
     sdm_status s = sdm_fit_posterior(p, out, err);
@@ -401,7 +407,8 @@ static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
         const sdm_status found =
             sdm_fit_shapeless_log_likelihood(p, &out->log_likelihood_without, err);
         if (found) return found;
-        // log-likelihoods of independent samples, less the cost of the unknowns (Schwarz 1978)
+        // gain in log-likelihood, as of independent samples, less the cost of the unknowns (Schwarz
+        // 1978)
         const double factor = fmax(out->noise_factor, 1), n = (double)p->samples.n / factor;
         const double unknowns =
             (p->opts->keep_params ? 0 : (double)p->n_params) + (p->opts->keep_pose ? 0 : 6);
@@ -411,7 +418,7 @@ static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     return s;
 }
 
-// a label map as an image with the value 1 inside and 0 outside, with fixed tissues
+// presents a label map as an image with the value 1 inside and 0 outside, with fixed tissues
 static void labels_as_image(sdm_fit_target *target, sdm_fit_opts *opts)
 {
     target->kind = SDM_FIT_IMAGE;
@@ -435,7 +442,7 @@ sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
     sdm_status s = sdm_fit_check_source(source, &p.n_params, err);
     if (!s) s = sdm_fit_check(target, opts, err);
 
-    // 2. present a label map as an image, and an image without its cavities
+    // 2. present a label map as an image; remove the cavities of an image
     sdm_fit_target as_image;
     sdm_fit_opts with_labels;
     float *values = NULL;
@@ -456,7 +463,8 @@ sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
     if (!s) s = start_find(&p, out, err);
     if (!s) s = maximise(&p, out, err);
 
-    // 6. covariance and evidence; 7. the result, also of a fit that failed with SDM_E_QUALITY
+    // 6. covariance and evidence; 7. report the result, also of a fit that failed with
+    // SDM_E_QUALITY
     if (!s) s = assess(&p, out, err);
     if (out->n_params && (!s || s == SDM_E_QUALITY)) report(&p, out);
     if (!s) s = judge(&p, out, err);

@@ -47,7 +47,7 @@ void sdm_fit_bounds(const sdm_fit_source *source, size_t k, double *low, double 
     }
 }
 
-// values of an image or label map: at least one number, not all equal, labels in 0 .. 1
+// checks the values of an image or label map: not all NaN, not all equal, labels in 0 .. 1
 static sdm_status check_values(const sdm_fit_target *t, sdm_error *err)
 {
     const size_t n = sdm_grid_count(&t->grid);
@@ -121,7 +121,7 @@ static sdm_status check_appearance(const sdm_fit_appearance *a, sdm_error *err)
     return s;
 }
 
-/* A numeric option and its allowed range: above 0, or from 0 on. */
+/* A numeric option and its allowed range: value > 0, or value >= 0 if may_be_zero. */
 typedef struct number {
     const char *name;
     double value;

@@ -4,8 +4,8 @@
 
 #include "sdm/fit.h"
 
-/* Checks the source. *n_params: number of its parameters. SDM_E_ARG; SDM_E_UNSUPPORTED: not 1 to
- * FIT_PARAMS_MAX parameters. */
+/* Checks the source. *n_params: number of its parameters. SDM_E_ARG: the source is invalid;
+ * SDM_E_UNSUPPORTED: n_params < 1 or n_params > FIT_PARAMS_MAX. */
 sdm_status sdm_fit_check_source(const sdm_fit_source *source, size_t *n_params, sdm_error *err);
 
 /* Bounds of parameter k of a checked source under its policy, in the unit of the parameter, and its
@@ -13,8 +13,8 @@ sdm_status sdm_fit_check_source(const sdm_fit_source *source, size_t *n_params, 
 void sdm_fit_bounds(const sdm_fit_source *source, size_t k, double *low, double *high,
                     const char **name);
 
-/* Checks target and options. SDM_E_ARG; SDM_E_FORMAT: values that no image, label map or point list
- * may have; SDM_E_QUALITY: a constant image. */
+/* Checks target and options. SDM_E_ARG: one of them is invalid; SDM_E_FORMAT: values that an image,
+ * label map or point list must not have; SDM_E_QUALITY: the image is constant. */
 sdm_status sdm_fit_check(const sdm_fit_target *target, const sdm_fit_opts *opts, sdm_error *err);
 
 #endif

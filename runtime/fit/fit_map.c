@@ -6,7 +6,7 @@
 #include "fit_check.h"
 #include "sdm/internal/threads.h"
 
-// map of the source at params[n_params], NULL: the defaults
+// makes the map of the source at params[n_params]; NULL: at the default parameters
 static sdm_status map_make(const sdm_fit_source *source, const double *params, int n_threads,
                            fit_maps *maps, sdm_error *err)
 {
@@ -36,7 +36,7 @@ sdm_status sdm_fit_map(const sdm_fit_source *source, const double *params, const
     fit_maps maps = {0};
     if (!s) s = map_make(source, params, n_threads, &maps, err);
     if (!s) {
-        // interpolated at every voxel of the grid
+        // interpolate it at every voxel of the grid
         const fit_field f = {
             .grid = &maps.grid, .packed = maps.distance, .n_fields = 1, .distance = true};
         fit_state state;

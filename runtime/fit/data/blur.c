@@ -1,11 +1,12 @@
-/* Convolution with the discrete Gaussian T(k, t) = exp(-t) I_k(t), k the voxel and t the variance
- * in voxels^2 (Lindeberg 1990). Its variance is exactly t, however narrow it is, and dT/dt is half
- * the second difference of T. T(-t), which sharpens, is the inverse of T(t). */
+/* Convolution with the discrete Gaussian T(k, t) = exp(-t) I_k(t), where k is the offset in voxels
+ * and t the variance in voxels^2 (Lindeberg 1990). Its variance is exactly t, even where it is
+ * narrower than a voxel, and dT/dt is half the second difference of T. T(-t), which sharpens, is
+ * the inverse of T(t). */
 #include "blur.h"
 
 #include <math.h>
 
-// taps on one side at most: 4 sd of the widest Gaussian
+// largest number of taps on one side of the centre: 4 sd of the widest Gaussian
 #define RADIUS_MAX 128
 
 /* tap[0 .. r] = T(k, variance), normalised to sum 1 over both sides; returns r, the number of taps
@@ -32,7 +33,7 @@ static int gaussian_taps(double variance, double tap[RADIUS_MAX + 1])
         }
     }
     while (r > 0 && tap[r] < 1e-8 * sum) r--;
-    // signs of a negative variance; normalise the taps that are kept
+    // a negative variance alternates the signs; the taps that are kept are then normalised
     for (int k = 1; k <= r && variance < 0; k += 2) tap[k] = -tap[k];
     double kept = tap[0];
     for (int k = 1; k <= r; k++) kept += 2 * tap[k];
@@ -52,7 +53,8 @@ sdm_status sdm_fit_blur_check(const sdm_grid *g, const char *name, double value,
 
 static int64_t index_clamp(int64_t i, int64_t n) { return i < 0 ? 0 : i < n ? i : n - 1; }
 
-// interior: out[n] = sum over k of tap[k] * (elements k * step before and after)
+// interior of a line: out[i] = tap[0] * in[i] + sum over k = 1 .. r of tap[k] * (in[i - k * step] +
+// in[i + k * step])
 static void blur_interior(const double *in, double *out, size_t n, size_t step, int r,
                           const double *tap)
 {
@@ -63,7 +65,8 @@ static void blur_interior(const double *in, double *out, size_t n, size_t step, 
     }
 }
 
-// border: voxel i of a line of n voxels, `step` numbers apart; each voxel has `width` numbers
+// border of a line: computes its voxel i; the line has n voxels, `step` numbers apart, with `width`
+// numbers each; beyond the line the values of its end voxels continue
 static void blur_at_border(const double *in, double *out, int64_t i, int64_t n, size_t step,
                            size_t width, int r, const double *tap)
 {
@@ -77,7 +80,7 @@ static void blur_at_border(const double *in, double *out, int64_t i, int64_t n, 
     }
 }
 
-// a row along the first axis: its borders, and the interior between them
+// blurs a row along the first axis: both borders, and the interior between them
 static void blur_row(const double *in, double *out, int64_t n, size_t n_fields, int r,
                      const double *tap)
 {
@@ -102,7 +105,8 @@ void sdm_fit_blur(const sdm_grid *g, size_t n_fields, double variance, bool spli
         double tap[RADIUS_MAX + 1];
         const int r = gaussian_taps(variance / (g->spacing[axis] * g->spacing[axis]) - less, tap);
         if (r == 0) continue;
-        // every line of voxels along the first axis; the other axes combine whole lines
+        // each `line` is a row of voxels along the first axis; along the other axes whole rows are
+        // added
         const double *in = *packed;
         double *out = *spare;
 #pragma omp parallel for schedule(static) num_threads(n_threads)

@@ -1,5 +1,6 @@
 /* Finds cavities by a morphological opening with a ball (Matheron 1975): the union of all balls of
- * the radius that fit into the inside-like space. Two exact distance transforms compute it. */
+   radius opts->cavity that fit into the inside-like space. Two exact distance transforms compute
+   it. */
 #include "cavity.h"
 
 #include <math.h>
@@ -26,7 +27,8 @@ static double log_mixture(const sdm_fit_law *law, size_t n, double value)
     return most + log(sum);
 }
 
-// wall[voxel] = 0: outside is more likely, or NaN; INFINITY: inside is more likely
+// wall[voxel] = 0 where the voxel is NaN or more likely outside, INFINITY where it is more likely
+// inside
 static sdm_status walls_find(const sdm_fit_target *t, const sdm_fit_opts *o, int n_threads,
                              float *wall, sdm_error *err)
 {
@@ -68,11 +70,11 @@ sdm_status sdm_fit_mask_cavities(const sdm_fit_target *target, const sdm_fit_opt
     if (!s) s = walls_find(target, opts, n_threads, distance, err);
     if (!s) s = sdm_fit_distance_transform(&target->grid, n_threads, distance, err);
     for (size_t i = 0; i < n && !s; i++)
-        // voxels where a ball can be centred
+        // 0 at the voxels where a ball can be centred
         distance[i] = (double)distance[i] >= square ? 0 : INFINITY;
     if (!s) s = sdm_fit_distance_transform(&target->grid, n_threads, distance, err);
     for (size_t i = 0; i < n && !s; i++) {
-        // the voxels that these balls cover
+        // out: one of these balls covers the voxel
         const bool out = (double)distance[i] < square && !isnan(target->values[i]);
         (*values)[i] = out ? NAN : target->values[i];
         *count += out;

@@ -1,5 +1,5 @@
 /* Morphological closing of label maps by a ball (Matheron 1975): fills the voxels that no ball
- * outside the labels covers. Two exact distance transforms compute it. */
+ * lying outside the labels covers. Two exact distance transforms compute it. */
 #include <float.h>
 #include <math.h>
 
@@ -8,8 +8,8 @@
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
 
-// the grid extended on every side such that balls fit beside labels at its border; by[3]: voxels
-// added on a side
+// the grid extended on every side such that balls fit beside labels at its border; by[3]: number of
+// voxels added on each side of each axis
 static sdm_grid grid_widen(const sdm_grid *g, double radius, int64_t by[3])
 {
     sdm_grid wide = *g;
@@ -20,7 +20,7 @@ static sdm_grid grid_widen(const sdm_grid *g, double radius, int64_t by[3])
     return wide;
 }
 
-// index in the extended grid of the first voxel of a row
+// index, in the extended grid, of the first voxel of row number `row` of the grid
 static size_t row_offset(const sdm_grid *g, const sdm_grid *wide, const int64_t by[3], int64_t row)
 {
     const int64_t j = row % g->n[1] + by[1], k = row / g->n[1] + by[2];
@@ -34,7 +34,7 @@ sdm_status sdm_fit_close_labels(const sdm_grid *grid, double radius, int n_threa
     if (!(radius > 0))
         return sdm_fail(err, SDM_E_ARG, "closing by a ball of %g mm, need a radius above 0",
                         radius);
-    // a grid on which the balls fit
+    // extend the grid so that the balls fit on it
     int64_t by[3];
     sdm_status s = sdm_grid_check(grid, err);
     if (s) return s;
@@ -51,7 +51,7 @@ sdm_status sdm_fit_close_labels(const sdm_grid *grid, double radius, int n_threa
     float *distance = NULL;
     s = SDM_ALLOC(&distance, n, "distance to labels", err);
     if (s) return s;
-    // distance to the labels
+    // squared distance of every voxel to the labels
     for (size_t i = 0; i < n; i++) distance[i] = INFINITY;
     for (int64_t row = 0; row < rows; row++) {
         float *to = distance + row_offset(grid, &wide, by, row);

@@ -10,7 +10,7 @@ sdm_status sdm_fit_distance_transform(const sdm_grid *g, int n_threads, float *f
     const size_t step[3] = {1, (size_t)g->n[0], (size_t)(g->n[0] * g->n[1])};
     const int64_t longest = g->n[0] > g->n[1] ? g->n[0] : g->n[1],
                   room = longest > g->n[2] ? longest : g->n[2];
-    double *work = NULL; // [n_threads][4 room] a row, and the scratch memory of its lower envelope
+    double *work = NULL; // [n_threads][4 room] a row, and scratch for its lower envelope
     sdm_status s =
         SDM_ALLOC(&work, (size_t)n_threads * (size_t)(4 * room), "rows of an image", err);
     for (int axis = 0; axis < 3 && !s; axis++) {

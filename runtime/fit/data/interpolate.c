@@ -28,7 +28,7 @@ static inline void keys(double u, double w[4], double d[4])
     w[3] = 0.5 * u3 - 0.5 * u2, d[3] = 1.5 * u2 - u;
 }
 
-// the same for cubic B-splines
+// weights w and derivatives d at the fraction u as in keys(), but for cubic B-splines
 static inline void spline(double u, double w[4], double d[4])
 {
     const double v = 1 - u, u2 = u * u, v2 = v * v;
@@ -60,7 +60,7 @@ static void taps_find(const fit_field *f, const double x[3], taps *t)
         else
             spline(c - (double)first, t->weight[a], t->slope[a]);
         for (int i = 0; i < 4; i++) {
-            // (offsets are clamped: the values of the border continue)
+            // offsets are clamped to the grid: beyond it the values of the border continue
             const int64_t k = first - 1 + i;
             t->at[a][i] = step[a] * (size_t)(k < 0 ? 0 : k < g->n[a] ? k : g->n[a] - 1);
             if (t->beyond[a] != 0) t->slope[a][i] = 0; // beyond the border the values are constant
@@ -102,7 +102,7 @@ double sdm_fit_interpolate(const fit_field *f, const double x[3])
     return f->distance ? dot(t.weight[0], sum) + t.distance : dot(t.weight[0], sum);
 }
 
-// rest += w * interpolation of the other fields along a row
+// rest[n_fields - 1] += w * the other fields, interpolated along a row of four voxels
 static inline void add_rest(const fit_field *f, const taps *t, const double *row, double w,
                             double *rest)
 {
@@ -123,13 +123,13 @@ double sdm_fit_interpolate_all(const fit_field *f, const double x[3], double gra
     for (int k = 0; k < 4; k++)
         for (int j = 0; j < 4; j++) {
             const double *row = row_at(f, &t, k, j), w = t.weight[2][k] * t.weight[1][j];
-            add_row(f, &t, row, w, sum); // as in sdm_fit_interpolate(), for the same bits
+            add_row(f, &t, row, w, sum); // same operations as in sdm_fit_interpolate(): same bits
             add_row(f, &t, row, t.weight[2][k] * t.slope[1][j], by_y);
             add_row(f, &t, row, t.slope[2][k] * t.weight[1][j], by_z);
             add_rest(f, &t, row, w, others);
         }
     for (size_t q = 1; q < f->n_fields; q++) rest[q - 1] = others[q - 1];
-    // gradient along the axes of the grid, then in its frame
+    // gradient along the axes of the grid, then rotated into the frame of the grid
     double along[3] = {dot(t.slope[0], sum), dot(t.weight[0], by_y), dot(t.weight[0], by_z)};
     for (int a = 0; a < 3; a++) {
         along[a] /= f->grid->spacing[a];

@@ -20,11 +20,12 @@ typedef struct fit_field {
     bool distance;
 } fit_field;
 
-/* First field at x (frame of the grid, mm). Continuous, and so is its gradient. [any thread] */
+/* Returns the first field at x (frame of the grid, mm). The interpolated field is continuous, and
+ * so is its gradient. [any thread] */
 double sdm_fit_interpolate(const fit_field *f, const double x[3]);
 
-/* The same, bit for bit, with gradient[3] of the first field (frame of the grid, per mm) and the
- * values of the other fields, rest[n_fields - 1]. [any thread] */
+/* As sdm_fit_interpolate(), bit for bit, but also computes gradient[3] of the first field (frame of
+ * the grid, per mm) and the values of the other fields, rest[n_fields - 1]. [any thread] */
 double sdm_fit_interpolate_all(const fit_field *f, const double x[3], double gradient[3],
                                double *rest);
 

@@ -1,14 +1,15 @@
 /* Maps of the shape and their fields.
 
    The share at a voxel is a = G * [distance < 0], the inside convolved with a Gaussian point spread
-   G of sd s. It is computed in three steps. (1) At the voxels of the map, with spacing h, the
-   distance itself draws an edge of sd s0 = h / 2. (2) The discrete Gaussian (Lindeberg 1990)
-   smooths the edge: its variance is exact on every grid, and its derivative by the variance is half
-   the discrete Laplacian. (3) Between the voxels cubic B-splines interpolate, which adds h^2 / 3 of
-   variance along an axis. The discrete Gaussian therefore has the variance s^2 - s0^2 - h^2 / 3;
-   where that is negative, it sharpens. The share has continuous second derivatives. Its values are
-   used as the B-spline coefficients, without the inverse filter of interpolation (Unser, Aldroubi
-   and Eden 1993): so it is exactly 0 or 1 a few voxels from the surface and does not ring. */
+   G of sd s. It is computed in three steps. (1) At each voxel of the map, which has the spacing h,
+   a Gaussian tail function of the distance gives an edge of sd s0 = h / 2. (2) The discrete
+   Gaussian (Lindeberg 1990) smooths the edge: its variance is exact on every grid, and its
+   derivative by the variance is half the discrete Laplacian. (3) Between the voxels cubic B-splines
+   interpolate, which adds h^2 / 3 of variance along an axis. The discrete Gaussian therefore has
+   the variance s^2 - s0^2 - h^2 / 3; where that is negative, it sharpens. The share has continuous
+   second derivatives. Its values are used as the B-spline coefficients, without the inverse filter
+   of interpolation (Unser, Aldroubi and Eden 1993): so it is exactly 0 or 1 a few voxels from the
+   surface and does not ring. */
 #include "map_fields.h"
 
 #include <math.h>
@@ -87,7 +88,8 @@ static sdm_status map_make_exact(fit_maps *m, const double *params, bool derivat
     return sdm_exact_shape_map(shape, params, &o, &m->grid, m->values, NULL, err);
 }
 
-// always with derivatives: changes of the parameters then give smooth changes of the map
+// Derivatives are computed even where they are not needed: only sdm_generate_jacobian() gives a map
+// that changes smoothly with the parameters.
 static sdm_status map_make_network(fit_maps *m, const double *params, sdm_error *err)
 {
     const sdm_generate_opts o = {.policy = SDM_RANGE_REFUSE, .n_threads = m->n_threads};
@@ -112,9 +114,10 @@ sdm_status sdm_fit_maps_make(fit_maps *m, const double *params, bool derivatives
     return s;
 }
 
-/* (1 + s0^2/2 Laplacian) f at voxel v with this index[3]: f convolved with a Gaussian of sd s0
- * (mm), to order s0^2. Applied to the distance, it makes the drawn edge that of the curved surface,
- * not of its tangent plane, seen through s0. Values of the border continue beyond it. */
+/* (1 + s0^2/2 Laplacian) f at voxel v, whose indices are index[3]: f convolved with a Gaussian of
+   sd s0 (mm), to order s0^2. With the distance smoothed in this way, share_row() gives the blurred
+   edge of the curved surface, not that of its tangent plane. Values of the border continue beyond
+   it. */
 static double voxel_smoothed(const sdm_grid *g, const float *f, size_t v, const int64_t index[3],
                              double s0)
 {
@@ -129,10 +132,10 @@ static double voxel_smoothed(const sdm_grid *g, const float *f, size_t v, const 
     return sum;
 }
 
-// in sd: beyond it the tail of a Gaussian is 0 in double precision
+// number of sd beyond which the tail of a Gaussian is negligible in double precision
 #define GAUSSIAN_END 8.0
 
-// share: an edge of sd s0 with, where wanted, its derivatives, into a row of `packed`
+// writes the share, an edge of sd s0, and if n_fields > 1 its derivatives to one row of `packed`
 static void share_row(const fit_maps *m, int64_t row)
 {
     const sdm_grid *g = &m->grid;
@@ -153,7 +156,7 @@ static void share_row(const fit_maps *m, int64_t row)
     }
 }
 
-// signed distance and its derivatives, into a row of `packed`
+// writes the signed distance and its derivatives to one row of `packed`
 static void distance_row(const fit_maps *m, int64_t row)
 {
     for (int64_t i = 0; i < m->grid.n[0]; i++) {
@@ -178,7 +181,7 @@ void sdm_fit_maps_pack(fit_maps *m, double blur, bool derivatives)
         else
             distance_row(m, row);
     }
-    // the blur that the drawn edge does not have yet; see the top of the file
+    // variance of the blur that the edge of share_row() lacks; see the top of the file
     const double drawn = m->share ? m->min_blur : 0,
                  variance = fmax(blur * blur - drawn * drawn, 0);
     sdm_fit_blur(&m->grid, m->n_fields, variance, m->share, n_threads, &m->packed, &m->spare);

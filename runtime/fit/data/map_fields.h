@@ -8,10 +8,10 @@
 
 typedef struct fit_maps {
     const sdm_fit_source *source;
-    /* of the maps, in the shape's frame */
+    /* grid of the maps, in the shape's frame */
     sdm_grid grid;
     size_t n_voxels, n_params;
-    /* of packed; 1 without derivatives */
+    /* number of fields in `packed`; 1 without derivatives */
     size_t n_fields;
     /* true: the field is the share; false: the signed distance */
     bool share;
@@ -30,37 +30,38 @@ typedef struct fit_maps {
     /* [n_voxels][n_fields] the field, its derivatives by the parameters and (share) by the blur, as
      * fit_field.packed; `spare` is scratch memory of the same size */
     double *packed, *spare;
-    /* maps made so far: by network, by the exact engine, and those of the latter that were made
-     * because parameters lay outside the network's range */
+    /* number of maps made so far: by the network; by the exact engine; by the exact engine because
+     * parameters lay outside the network's range */
     size_t n_network, n_exact, n_outside;
-    /* wall clock of making them */
+    /* wall-clock time spent on these maps, s */
     double seconds_network, seconds_exact;
 } fit_maps;
 
-/* Allocates for the grid of the source; on error *out is empty. */
+/* Allocates memory for maps on the grid of the source; on error *out is empty. */
 sdm_status sdm_fit_maps_create(const sdm_fit_source *source, bool share, const sdm_fit_opts *opts,
                                fit_maps *out, sdm_error *err);
 void sdm_fit_maps_dispose(fit_maps *m);
 
-/* Makes values, distance and (derivatives) jacobian at params[n_params]; `packed` stays out of
- * date. SDM_E_CANCELLED and errors of the engines. */
+/* Computes values, distance and, if `derivatives`, jacobian at params[n_params]; `packed` is not
+ * updated. Returns SDM_E_CANCELLED or an error of the engines. */
 sdm_status sdm_fit_maps_make(fit_maps *m, const double *params, bool derivatives, sdm_error *err);
 
-/* Fills `packed` from the latest map, without derivatives its first field alone, seen through a
-   Gaussian of sd blur (mm). Shares: blur >= min_blur. Distances: blur >= 0. Derivatives need a map
-   made with them. */
+/* Fills `packed` from the latest map, convolved with a Gaussian of sd `blur` (mm); without
+   `derivatives` only its first field. Shares: blur >= min_blur. Distances: blur >= 0. `derivatives`
+   needs a map that was made with derivatives. */
 void sdm_fit_maps_pack(fit_maps *m, double blur, bool derivatives);
 
 /* View of `packed` for interpolation. */
 fit_field sdm_fit_maps_field(const fit_maps *maps);
 
-/* Where the shape lies on its map: centroid (mm), largest distance from it to a voxel inside (mm),
- * volume (mm^3). */
+/* Where the shape lies on its map: centroid (mm); reach, the largest distance (mm) from the
+ * centroid to a voxel inside; volume (mm^3). */
 typedef struct fit_extent {
     double centre[3], reach, volume;
 } fit_extent;
 
-/* Of the voxels of maps->distance that are inside. SDM_E_QUALITY: none is. */
+/* Computes the extent from the voxels of maps->distance that lie inside. SDM_E_QUALITY: there is no
+ * such voxel. */
 sdm_status sdm_fit_extent(const fit_maps *maps, fit_extent *out, sdm_error *err);
 
 /* Radius (mm) of the largest ball inside the shape, centred on a voxel of the map. */

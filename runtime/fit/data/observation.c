@@ -1,10 +1,10 @@
 /* Observation models of images, label maps and points.
 
    Partial volume (Santago and Gage 1993): a voxel holds one inside tissue j (weight w_j) and one
-   outside tissue k (weight v_k). With the share a of the shape its value has the mean
-   a m_j + (1 - a) m_k and the variance a s_j^2 + (1 - a) s_k^2; the pair has the weight w_j v_k. A
-   pair is Student's t where one of its tissues is, with the fewer degrees of freedom (heavier
-   tails).
+   outside tissue k (weight v_k). With the share a of the shape its value has the mean a m_j + (1 -
+   a) m_k and the variance a s_j^2 + (1 - a) s_k^2; the pair has the weight w_j v_k. If one tissue
+   of a pair has a Student's t distribution, so has the pair; if both have, the smaller number of
+   degrees of freedom counts (heavier tails).
 
    Labels (Demarcy 2017): a voxel is inside with probability mu = 1 / (1 + exp(distance / l_ref)),
    and its value comes from the inside or the outside tissues. */
@@ -15,7 +15,7 @@
 
 #define LOG_2PI 1.8378770664093453
 
-// degrees of freedom of a pair: the heavier tails, 0 if both are Gaussian
+// degrees of freedom of a pair: the smaller number (heavier tails), 0 if both tissues are Gaussian
 static double pair_dof(double a, double b)
 {
     if (a > 0 && b > 0) return fmin(a, b);
@@ -94,7 +94,7 @@ double sdm_fit_log_density(const fit_observation *obs, size_t tissue, double val
 typedef struct pair_likelihood {
     /* log of weight times density; variance of the value; value less its mean; robust weight */
     double log_p, variance, residual, t_weight;
-    /* derivative of the clamped share, which the variance uses, by the share */
+    /* derivative of the clamped share by the share; the variance uses the clamped share */
     double slope;
 } pair_likelihood;
 
@@ -113,7 +113,7 @@ static double share_clamp(double share, double *slope)
     return share < 0.5 ? a : 1 - a;
 }
 
-// one pair at a voxel with this share
+// evaluates one pair of tissues at a voxel with this share
 static pair_likelihood pair_evaluate(const fit_observation *obs, const fit_pair *p, double value,
                                      const float *log_weight, double share)
 {
@@ -129,7 +129,8 @@ static pair_likelihood pair_evaluate(const fit_observation *obs, const fit_pair 
     return s;
 }
 
-// log_p[n] becomes probabilities that sum to 1; returns the logarithm of their sum before
+// replaces the logarithms log_p[n] by probabilities that sum to 1; returns log(sum of exp(log_p))
+// of the given values
 static double normalise(double *log_p, size_t n)
 {
     double most = log_p[0], sum = 0;
@@ -200,7 +201,8 @@ static void likelihood_of_share(const fit_observation *obs, double value, const 
 // log of 1 / (1 + exp(x)), without overflow
 static double log_inside(double x) { return x > 0 ? -x - log1p(exp(-x)) : -log1p(exp(x)); }
 
-// log_f: log densities of the value inside and outside; p: probability of each tissue of its side
+// log_f[2]: log density of the value inside and outside; p: probability of each tissue among the
+// tissues of its side, given the value
 static void mixtures(const fit_observation *obs, double value, double log_f[2],
                      double p[FIT_TISSUES_MAX])
 {
@@ -210,7 +212,7 @@ static void mixtures(const fit_observation *obs, double value, double log_f[2],
     log_f[1] = normalise(p + obs->n_in, obs->n_tissues - obs->n_in);
 }
 
-/* Probability of inside given the value, by Bayes' rule from the logistic prior. */
+/* Probability that the voxel is inside given its value, by Bayes' rule from the logistic prior. */
 static double posterior(const fit_observation *obs, double value, double distance,
                         double *log_likelihood)
 {
@@ -223,8 +225,9 @@ static double posterior(const fit_observation *obs, double value, double distanc
     return u[0];
 }
 
-// a label whose probability of inside is u: observed itself, or (missing = u (1 - u) > 0) the
-// posterior that expectation-maximisation has of it
+// A voxel that is inside with probability u. missing = 0: u is an observed label. missing = u (1 -
+// u): u is the posterior probability of expectation-maximisation, and the information is smaller
+// because the label is not observed.
 static void likelihood_of_label(const fit_observation *obs, double u, double distance,
                                 double missing, fit_likelihood *out)
 {
@@ -269,8 +272,8 @@ void sdm_fit_likelihood(const fit_observation *obs, double value, const float *l
     }
 }
 
-// |share - 0| or |share - 1| up to which a share counts as 0 or 1: rounding only. A larger value
-// would make scores jump where voxels cross it.
+// A share that differs from 0 or 1 by at most this much counts as 0 or 1. It covers rounding only:
+// with a larger value scores would jump where voxels cross the threshold.
 #define SHARE_ROUNDING 1e-12
 
 bool sdm_fit_in_band(const fit_observation *obs, double field)
@@ -294,17 +297,19 @@ void sdm_fit_outside_shares(const fit_observation *obs, double value, const floa
 }
 
 /* Labels: the moments of expectation-maximisation. Partial volume: moments whose estimates have
- * nearly the same zero as the score. A voxel counts by the tissue's share of it, for squared
- * residuals by the eighth power of the share: mixed voxels are nearly excluded. */
+ * nearly the same zero as the score. The weight of a voxel is the share of it that the tissue
+ * fills, for squared residuals the eighth power of this share, which nearly excludes mixed
+ * voxels. */
 void sdm_fit_moments_add(const fit_observation *obs, double value, const float *log_weight,
                          double field, fit_moments *m)
 {
     if (obs->model == SDM_FIT_LABELS) {
-        // labels: posterior of inside, times the probability of each tissue of its side
+        // labels: probability of the side given the value, times the probability of each tissue of
+        // this side
         double log_f[2], p[FIT_TISSUES_MAX], ignored;
         const double u = posterior(obs, value, field, &ignored);
         mixtures(obs, value, log_f, p);
-        // robust weights of Student's t make it an iteratively reweighted estimate
+        // with the robust weights of Student's t the estimate is one of iterative reweighting
         for (size_t i = 0; i < obs->n_tissues; i++) {
             const sdm_fit_law *t = &obs->tissue[i];
             const double r = value - t->mean, share = p[i] * (i < obs->n_in ? u : 1 - u);
@@ -346,7 +351,7 @@ void sdm_fit_moments_apply(const fit_observation *obs, const fit_moments *m, con
     for (size_t i = 0; i < obs->n_tissues; i++) {
         sdm_fit_law *t =
             i < obs->n_in ? &appearance->inside[i] : &appearance->outside[i - obs->n_in];
-        // not below 1e-6: a tissue that is nearly absent can return
+        // the weight is at least 1e-6, so that a tissue that is nearly absent can return
         if (sum[i >= obs->n_in] > 0) t->weight = fmax(m->share[i] / sum[i >= obs->n_in], 1e-6);
         if (kept[i]) continue;
         // labels: the mean moves, and the variance is about the new mean

@@ -1,5 +1,5 @@
-/* Observation models: how likely the value of a sample is, given the field there. For images, label
- * maps and points. */
+/* Observation models of images, label maps and points: how likely the value of a sample is, given
+ * the field at the sample. */
 #ifndef FIT_OBSERVATION_H
 #define FIT_OBSERVATION_H
 
@@ -15,7 +15,8 @@ typedef struct fit_likelihood {
     /* [n_channels] gradient */
     double score[FIT_CHANNELS];
     /* [n_channels][n_channels] information. complete: expected, as if the tissue of the sample were
-     * known, positive semidefinite; observed: the complete one less what is missing (Louis 1982) */
+     * known, positive semidefinite; observed: the complete one less the information that is missing
+     * because the tissue is not known (Louis 1982) */
     double complete[FIT_CHANNELS * FIT_CHANNELS], observed[FIT_CHANNELS * FIT_CHANNELS];
     /* score ~ residual * root[n_channels], with a residual of mean 0 and variance 1 */
     double residual, root[FIT_CHANNELS];
@@ -25,19 +26,20 @@ typedef struct fit_likelihood {
  * (indices into fit_observation.tissue). */
 typedef struct fit_pair {
     size_t in, out;
-    /* of the inside tissue */
+    /* log weight of the inside tissue */
     double log_weight;
     /* degrees of freedom (0: Gaussian), log of the normalising constant of the density, and
-     * expected information of a unit scale */
+     * expected information on the mean for scale 1 */
     double dof, constant, information;
 } fit_pair;
 
 typedef struct fit_observation {
     sdm_fit_kind kind;
     sdm_fit_model model;
-    /* mm, mm, degrees of freedom of points */
+    /* scale of the logistic prior of labels (mm); sd (mm) and degrees of freedom of points about
+     * the surface */
     double l_ref, point_sd, point_dof;
-    /* inside tissues, all tissues, channels in use, pairs in use */
+    /* numbers of inside tissues, all tissues, channels in use, pairs in use */
     size_t n_in, n_tissues, n_channels, n_pairs;
     /* [n_tissues] inside first; weights sum to 1 inside, and to 1 outside */
     sdm_fit_law tissue[FIT_TISSUES_MAX];
@@ -49,7 +51,8 @@ typedef struct fit_observation {
     fit_pair pair[SDM_FIT_LAWS * SDM_FIT_LAWS];
 } fit_observation;
 
-/* Observation model of a kind of target at the appearance, l_ref and point_sd of state. */
+/* Sets *obs to the observation model of a kind of target, with the appearance, l_ref and point_sd
+ * of `state`. */
 void sdm_fit_observation_prepare(const sdm_fit_opts *opts, sdm_fit_kind kind,
                                  const fit_state *state, fit_observation *obs);
 
@@ -83,8 +86,9 @@ typedef struct fit_moments {
 void sdm_fit_moments_add(const fit_observation *obs, double value, const float *log_weight,
                          double field, fit_moments *m);
 
-/* Sets weights, sd and (labels) means of *appearance from the moments. Tissues with kept[n_tissues]
-   take their weights alone. min_sd: lower bound of sd, so that no density collapses to a point. */
+/* Sets weights, sd and (labels) means of *appearance from the moments. Where kept[n_tissues] is
+   true, only the weight of the tissue is set. min_sd: lower bound of each sd, so that no density
+   collapses to a point. */
 void sdm_fit_moments_apply(const fit_observation *obs, const fit_moments *m, const bool *kept,
                            double min_sd, sdm_fit_appearance *appearance);
 

@@ -29,7 +29,7 @@ double sdm_fit_field_at(const fit_field *f, const fit_state *s, const double x[3
     return sdm_fit_interpolate(f, y);
 }
 
-// x in the world, mm
+// whether the region contains x (world, mm)
 static bool region_contains(const sdm_fit_opts *o, const fit_region *r, const double x[3])
 {
     for (int k = 0; o->use_box && k < 3; k++)
@@ -41,8 +41,8 @@ static bool region_contains(const sdm_fit_opts *o, const fit_region *r, const do
     return sdm_fit_field_at(&f, r->state, x) <= r->margin;
 }
 
-// voxels whose centres may lie in the ball: from[3] inclusive, a multiple of the stride, to[3]
-// exclusive
+// range of voxel indices whose centres may lie in the ball: from[3], inclusive and a multiple of
+// the stride, to[3], exclusive
 static void region_voxels(const sdm_grid *g, const fit_region *r, size_t stride, int64_t from[3],
                           int64_t to[3])
 {
@@ -119,7 +119,7 @@ static sdm_status voxels_choose(const sdm_fit_target *target, const sdm_fit_opts
                                     "voxel (%lld, %lld, %lld) of the image is infinite; NaN marks "
                                     "voxels without a value",
                                     (long long)i, (long long)j, (long long)k);
-                // stop beyond the limit
+                // stop when the limit is exceeded
                 const sdm_status s = samples_append(samples, x, value, voxel, changed, err);
                 if (s || (region->max_samples && samples->n > region->max_samples)) return s;
             }
@@ -174,7 +174,7 @@ static void jacobian_row(const fit_maps *maps, const fit_field *f, const fit_sta
                          x[2] - state->translation[2]};
     const size_t n = maps->n_params;
     for (size_t k = 0; k < n; k++) columns[k] = (float)rest[k];
-    // by rotation: g x (x - t); by translation: -g
+    // derivative by rotation: g x (x - t); by translation: -g
     float *turn = columns + fit_at_rotation(n), *shift = columns + fit_at_translation(n);
     for (int k = 0; k < 3; k++) {
         const int a = (k + 1) % 3, b = (k + 2) % 3;

@@ -5,13 +5,14 @@
 #include "map_fields.h"
 #include "observation.h"
 
-/* Sums over samples are made in this number of slices, added in order: their bits do not depend on
- * the number of threads. */
+/* A sum over samples is computed in this number of slices, and the sums of the slices are added in
+ * order: so its bits do not depend on the number of threads. */
 #define FIT_SLICES 64u
 
-/* Zero-initialise. */
+/* The samples of a fit. Zero-initialise. */
 typedef struct fit_samples {
-    /* samples; memory for samples; voxels of the region that were skipped because they are NaN */
+    /* number of samples; number for which there is memory; voxels of the region that were skipped
+     * because they are NaN */
     size_t n, capacity, n_nan;
     /* [n][3] position in the world, mm */
     double *world;
@@ -27,13 +28,14 @@ typedef struct fit_samples {
     size_t n_outside, log_weight_capacity;
     /* [n] row of `jacobian`, or SIZE_MAX outside the band */
     size_t *row;
-    /* rows in use (samples of the band), memory for rows, columns */
+    /* number of rows in use (one for each sample of the band); rows for which there is memory;
+     * columns */
     size_t n_band, band_capacity, n_columns;
     /* [n_band][n_columns] derivatives of the field by parameters, rotation, translation, blur */
     float *jacobian;
 } fit_samples;
 
-/* Region of the world to take samples from: a ball, cut by the box of the options. */
+/* Region of the world to take samples from: a ball, intersected with the box of the options. */
 typedef struct fit_region {
     /* mm */
     double centre[3], radius;
@@ -46,9 +48,9 @@ typedef struct fit_region {
     size_t max_samples;
 } fit_region;
 
-/* Takes the voxels of a region, every stride-th along each axis, or all points of a point target.
-   *changed: they differ from the earlier ones; the tissue field is then removed. SDM_E_FORMAT: an
-   infinite value. */
+/* Chooses as samples the voxels of a region, every stride-th along each axis, or all points of a
+   point target. *changed: the samples differ from the earlier ones; the tissue field is then
+   removed. SDM_E_FORMAT: a value is infinite. */
 sdm_status sdm_fit_samples_choose(const sdm_fit_target *target, const sdm_fit_opts *opts,
                                   const fit_region *region, size_t stride, fit_samples *samples,
                                   bool *changed, sdm_error *err);
@@ -70,7 +72,8 @@ sdm_status sdm_fit_samples_evaluate(fit_samples *samples, const fit_maps *maps,
                                     const fit_observation *obs, const fit_state *state,
                                     sdm_error *err);
 
-/* World to shape's frame, y = R^T (x - t), and back, x = R y + t; mm. */
+/* Transform a point (mm) from the world to the shape's frame, y = R^T (x - t), and back, x = R y +
+ * t. */
 void sdm_fit_to_shape(const fit_state *s, const double x[3], double y[3]);
 void sdm_fit_to_world(const fit_state *s, const double y[3], double x[3]);
 

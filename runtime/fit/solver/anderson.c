@@ -1,6 +1,6 @@
 /* Anderson acceleration (1965). With residuals r_i = g(x_i) - x_i, it takes the affine combination
- * of the stored images g(x_i) whose combined residual has the least norm: the fixed point, were g
- * affine. */
+ * of the stored images g(x_i) whose combined residual has the least norm. For an affine g this is
+ * the fixed point. */
 #include "anderson.h"
 
 #include <math.h>
@@ -32,8 +32,8 @@ static void pairs_drop(fit_anderson *m, size_t dropped)
     memmove(m->image, m->image + dropped, m->count * sizeof *m->image);
 }
 
-// weight[count - 1] of the differences between the newest pair and each older one, from the normal
-// equations of the least residual; false: these are singular
+// weight[count - 1]: weights of the differences between the newest pair and each older one, from
+// the normal equations that minimise the combined residual; false: the equations are singular
 static bool weights_solve(const fit_anderson *m, size_t n, double *weight)
 {
     const size_t rest = m->count - 1;
@@ -65,7 +65,7 @@ void sdm_fit_anderson_mix(fit_anderson *m, size_t depth, size_t n, const double 
         pairs_drop(m, m->count - 1);
     double weight[FIT_ANDERSON_DEPTH];
     while (m->count > 1 && !weights_solve(m, n, weight)) pairs_drop(m, 1);
-    // change of the newest image, scaled down to the limit
+    // add the weighted differences to the newest image, scaled down to the limit
     const size_t newest = m->count - 1;
     double change[FIT_ANDERSON_MAX], largest = 0;
     for (size_t k = 0; k < n; k++) {

@@ -6,10 +6,10 @@
 
 #include "objective.h"
 
-// rms motion of the surface over the half width, in voxels of the map: it crosses many kinks, but
-// is small compared to what an image resolves
+// rms motion of the surface over the half width, in voxels of the map: large enough to cross many
+// kinks, but small compared to the details that an image resolves
 #define MOTION 0.03
-// half width at most, as a share of the parameter's range
+// largest half width, as a share of the parameter's range
 #define WIDTH_MAX 0.05
 
 void sdm_fit_averaging_widths(const fit_problem *p, double *half_width)

@@ -10,14 +10,15 @@
 
 #include "problem.h"
 
-/* half_width[n_params], in the units of the parameters: half of the interval of each. The surface
-   moves by a small, fixed part of a map voxel over it (root mean square over voxels near the
-   surface), at most a small share of the parameter's range. Depends on problem->maps alone, with
-   derivatives: neither noise nor tissues change it. */
+/* half_width[n_params], in the units of the parameters: half width of the interval over which the
+   derivative by each parameter is averaged. Changing a parameter by its half width moves the
+   surface by a small, fixed part of a map voxel (root mean square over voxels near the surface);
+   the half width is at most a small share of the parameter's range. It depends on problem->maps
+   (made with derivatives) and the ranges alone, not on noise or tissues. */
 void sdm_fit_averaging_widths(const fit_problem *p, double *half_width);
 
 /* Replaces the derivatives by the parameters in problem->information.gradient by their means over
-   +-half_width, cut off at the bounds of the parameters. Takes two maps for each parameter, and
+   +-half_width, cut off at the bounds of the parameters. Computes two maps for each parameter, and
    leaves problem->maps out of date. */
 sdm_status sdm_fit_average_gradient(fit_problem *p, const double *half_width, sdm_error *err);
 

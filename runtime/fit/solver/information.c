@@ -1,4 +1,5 @@
-/* Sums over the samples, in slices that threads share and that are added in order. */
+/* Sums over the samples, computed in slices that are distributed over the threads and added in
+ * order. */
 #include "information.h"
 
 #include <float.h>
@@ -8,12 +9,12 @@
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
 
-// relative rounding of a field value; the factor 8 allows for neighbouring samples that share the
-// rounding of one map voxel and have similar scores
+// relative rounding error of a field value; the factor 8 allows for neighbouring samples that share
+// the rounding of one map voxel and have similar scores
 #define ROUNDING (8 * (double)FLT_EPSILON)
 
-// numbers of a slice: log-likelihood; sum of squared derivatives of it by relative errors of the
-// field; gradient; complete and observed information
+// count of the numbers that a slice sums up: log-likelihood; squared derivatives of the
+// log-likelihood by relative errors of the field; gradient; complete and observed information
 static size_t part_size(size_t n) { return 2 + n + 2 * n * n; }
 
 sdm_status sdm_fit_information_create(size_t n_unknowns, fit_information *out, sdm_error *err)
@@ -37,7 +38,8 @@ void sdm_fit_information_dispose(fit_information *s)
     *s = (fit_information){0};
 }
 
-// one sample of the band: column by column, and column by tissue mean, upper triangles
+// adds one sample of the band to the gradient by the columns and to the upper triangles of both
+// matrices: their blocks (column, column) and (column, tissue mean)
 static void add_columns(const fit_likelihood *r, const float *column, size_t n_columns,
                         size_t n_channels, size_t n, double *gradient, double *complete,
                         double *observed)
@@ -56,7 +58,7 @@ static void add_columns(const fit_likelihood *r, const float *column, size_t n_c
     }
 }
 
-// all samples of a slice; upper triangles
+// sums over all samples of a slice; of the matrices only the upper triangles
 static void add_slice(const fit_samples *s, const fit_observation *obs, size_t from, size_t to,
                       size_t n, double *part)
 {
@@ -73,7 +75,7 @@ static void add_slice(const fit_samples *s, const fit_observation *obs, size_t f
         if (near)
             add_columns(&r, s->jacobian + s->row[i] * nc, nc, obs->n_channels, n, gradient,
                         complete, observed);
-        // tissue mean by tissue mean
+        // blocks (tissue mean, tissue mean)
         for (size_t a = 1; a < obs->n_channels; a++) {
             gradient[nc + a - 1] += r.score[a];
             for (size_t b = a; b < obs->n_channels; b++) {
@@ -95,7 +97,7 @@ void sdm_fit_information_compute(fit_information *s, const fit_samples *samples,
                   samples->n * (slice + 1) / FIT_SLICES, n, s->parts + slice * size);
     for (size_t slice = 1; slice < FIT_SLICES; slice++)
         for (size_t i = 0; i < size; i++) s->parts[i] += s->parts[slice * size + i];
-    // the total, with full matrices
+    // copy the total, and complete the matrices from their upper triangles
     s->log_likelihood = s->parts[0];
     s->rounding = ROUNDING * sqrt(s->parts[1]);
     memcpy(s->gradient, s->parts + 2, n * sizeof *s->gradient);

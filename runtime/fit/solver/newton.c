@@ -1,5 +1,5 @@
 /* Newton's method with damping (Levenberg 1944, Marquardt 1963). It uses the observed information
- * where that is positive definite, else the complete one, which makes the step that of
+ * where that is positive definite, else the complete one; the step is then that of
  * expectation-maximisation (Louis 1982). */
 #include "newton.h"
 
@@ -15,7 +15,8 @@
 #include "solve.h"
 #include "tissues.h"
 
-// largest step of one iteration: share of a parameter's range, rad, share of the shape's reach
+// largest step of one iteration: of a parameter as a share of its range, of the rotation in rad, of
+// the translation as a share of the shape's reach
 #define STEP_MAX 0.25
 // Negligible gain in log-likelihood of independent samples (a step of a few hundredths of a sd);
 // multiplied by the noise factor for correlated ones. A step whose predicted gain is below this, or
@@ -57,7 +58,8 @@ void sdm_fit_state_move(const fit_problem *p, const fit_state *from, const doubl
     }
 }
 
-// limits of the next step: what is kept, bounds, and largest steps
+// sets the limits of the next step from the unknowns that are kept, the bounds, and the largest
+// steps
 static void limits_set(const fit_problem *p, const fit_newton_opts *opts, fit_limits *l)
 {
     const size_t n = p->n_params;
@@ -93,8 +95,9 @@ static double step_size(const fit_problem *p, const double *step)
     return most;
 }
 
-// step[n] that maximises the quadratic model within the limits; observed: which information. work:
-// 3 n n. False: not positive definite
+// step[n] that maximises the quadratic model within the limits; observed: use the observed
+// information, else the complete one. work: 3 n n numbers. False: the information is not positive
+// definite
 static bool step_find(const fit_problem *p, const fit_newton_opts *opts, double damping,
                       bool observed, double *step, double *work)
 {
@@ -113,7 +116,7 @@ static bool step_find(const fit_problem *p, const fit_newton_opts *opts, double 
     return true;
 }
 
-// gain of a step to first order
+// gain in the objective by a step, to first order
 static double expected_gain(const fit_problem *p, const double *step)
 {
     double gradient[FIT_UNKNOWNS_MAX], sum = 0;
@@ -162,8 +165,8 @@ static sdm_status step_try(fit_problem *p, const double *step, fit_damping *d, b
     return SDM_OK;
 }
 
-/* Increases the damping until a step gains; then reduces it for the next one. *taken = false: no
- * damping helps; the state is unchanged and evaluated. */
+/* Increases the damping until a step raises the objective; then reduces it for the next step.
+ * *taken = false: no damping helps; the state is unchanged and evaluated. */
 static sdm_status damped_step(fit_problem *p, const fit_newton_opts *opts, fit_damping *d,
                               double *step, double *work, bool *taken, sdm_error *err)
 {
@@ -190,7 +193,7 @@ static sdm_status damped_step(fit_problem *p, const fit_newton_opts *opts, fit_d
  * tissues overlap. Unknowns and appearance are accelerated together as one vector. */
 typedef struct fit_acceleration {
     fit_anderson anderson;
-    /* numbers of the appearance in the vector; 0: it is kept */
+    /* how many numbers of the vector describe the appearance; 0: the appearance is kept */
     size_t n_appearance;
     /* sum of all steps, in the units of unknown_unit() */
     double position[FIT_UNKNOWNS_MAX];
@@ -228,8 +231,8 @@ static void step_accelerate(const fit_problem *p, const fit_newton_opts *opts, f
     double largest = 0;
     for (size_t i = 0; i < n + r->n_appearance; i++)
         largest = fmax(largest, fabs(r->to[i] - at[i]));
-    // averaged: the function jumps from step to step, so only the last pair is used, and the change
-    // is limited
+    // with the averaged gradient the fixed-point function jumps from step to step, so only the last
+    // pair is used, and the change is limited
     if (opts->averaged)
         sdm_fit_anderson_mix(&r->anderson, 1, n + r->n_appearance, at, r->to,
                              fmin(ACCELERATION_MAX, ACCELERATION_FACTOR * largest));
@@ -255,8 +258,8 @@ static void acceleration_advance(fit_problem *p, const fit_newton_opts *opts, fi
     if (!opts->keep_appearance) sdm_fit_appearance_unpack(p, r->to + p->information.n_unknowns);
 }
 
-/* One accelerated step. *size: of the plain step, an estimate of the distance to the maximum.
- * *taken = false: no plain step, or the objective dropped. */
+/* One accelerated step. *size: size of the plain step, an estimate of the distance to the maximum.
+ * *taken = false: there is no plain step, or the objective dropped. */
 static sdm_status accelerated_step(fit_problem *p, const fit_newton_opts *opts, fit_acceleration *r,
                                    fit_damping *d, double *step, double *work, double *size,
                                    bool *taken, sdm_error *err)
@@ -350,8 +353,8 @@ sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newto
         }
         if (s) break;
         if (!taken) {
-            // no step gains: the maximum up to rounding, or derivatives that do not match the
-            // objective
+            // no step gains: this is the maximum up to rounding, or the derivatives do not match
+            // the objective
             out->converged = out->step <= 1e3 * opts->eps;
             break;
         }

@@ -4,7 +4,7 @@
 
 #include "problem.h"
 
-/* Which unknowns move, how steps are made and when they end. */
+/* Which unknowns move, how steps are made and when the iterations end. */
 typedef struct fit_newton_opts {
     /* reported to sdm_fit_opts.progress; also sets the initial damping */
     sdm_fit_phase phase;
@@ -32,10 +32,10 @@ typedef struct fit_newton_end {
     double step;
 } fit_newton_end;
 
-/* Iterates from problem->state, which moves, and evaluates problem there. Each iteration
-   re-estimates the tissues and takes one step in the other unknowns: damped (Levenberg 1944,
-   Marquardt 1963) far from the maximum, Anderson-accelerated near it. *out: how it ended; reaching
-   max_iterations is no error. */
+/* Moves problem->state by iterations towards the maximum, and leaves *problem evaluated at the last
+   state. Each iteration re-estimates the tissues and takes one step in the other unknowns: damped
+   (Levenberg 1944, Marquardt 1963) far from the maximum, Anderson-accelerated near it. *out: how
+   the iterations ended; reaching max_iterations is no error. */
 sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newton_end *out,
                           sdm_error *err);
 

@@ -22,7 +22,7 @@ sdm_status sdm_fit_evaluate(fit_problem *p, sdm_error *err)
     const fit_state *state = &p->state;
     sdm_status s = SDM_OK;
     bool same = true;
-    // maps of the parameters
+    // make the maps at the parameters, unless they are up to date
     for (size_t k = 0; k < p->n_params; k++) same = same && p->maps_params[k] == state->params[k];
     if (!same) {
         p->maps_blur = p->maps_params[0] = NAN;
@@ -32,7 +32,7 @@ sdm_status sdm_fit_evaluate(fit_problem *p, sdm_error *err)
         s = sdm_fail(err, SDM_E_CANCELLED, "fit stopped on request");
     }
     if (s) return s;
-    // the field seen through the blur
+    // blur the field
     const double blur = sdm_fit_field_blur(p);
     if (!(p->maps_blur == blur)) {
         sdm_fit_maps_pack(&p->maps, blur, true);

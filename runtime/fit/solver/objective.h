@@ -4,8 +4,8 @@
 
 #include "problem.h"
 
-/* Sd (mm) of the Gaussian through which the map is seen at problem->state: the point spread of
-   shares; for labels the sd of the logistic prior; 0 for points. */
+/* Sd (mm) of the Gaussian that blurs the map at problem->state: for shares the point spread; for
+ * labels the sd of the logistic prior; for points 0. */
 double sdm_fit_field_blur(const fit_problem *p);
 
 /* Brings maps, observation model, samples and information up to date with problem->state. A map is
@@ -15,9 +15,9 @@ sdm_status sdm_fit_evaluate(fit_problem *p, sdm_error *err);
 /* Log-posterior density at problem->state, up to a constant, after sdm_fit_evaluate(). */
 double sdm_fit_objective(const fit_problem *p);
 
-/* *log_likelihood: at problem->state with its parameters replaced by params[n_params], without the
-   prior. Overwrites problem->maps, which the next sdm_fit_evaluate() makes anew; samples and
-   information stay. */
+/* *log_likelihood: the log-likelihood, without the prior, at problem->state with its parameters
+   replaced by params[n_params]. Overwrites problem->maps, which the next sdm_fit_evaluate() makes
+   anew; samples and information stay. */
 sdm_status sdm_fit_log_likelihood(fit_problem *p, const double *params, double *log_likelihood,
                                   sdm_error *err);
 

@@ -6,7 +6,7 @@
 
 #include "sdm/internal/rotation.h"
 
-// derivatives of one Gaussian term; the arrays may be NULL
+// adds the derivatives of one Gaussian term; each array may be NULL
 static void normal_add(size_t n, size_t at, double residual, double precision, double *gradient,
                        double *complete, double *observed)
 {
@@ -78,8 +78,8 @@ double sdm_fit_prior(const fit_problem *p, const fit_state *s, double *gradient,
     return sum;
 }
 
-// precisions: uniform range 12 / range^2, rotation 3 / pi^2 for angles uniform up to pi along each
-// axis, translation 1 / reach^2
+// precisions: parameters 12 / range^2 (uniform distribution), rotation 3 / pi^2 (angle about each
+// axis uniform in -pi .. pi), translation 1 / reach^2
 void sdm_fit_add_weak_prior(const fit_problem *p, double *a)
 {
     const sdm_fit_opts *o = p->opts;

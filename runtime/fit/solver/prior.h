@@ -7,8 +7,8 @@
 /* Whether any unknown that is estimated has a prior. */
 bool sdm_fit_has_prior(const fit_problem *p);
 
-/* Sd of parameter k before the fit, in its unit: of its prior, or of the uniform distribution over
-   its range where it has none. */
+/* Sd of parameter k before the fit, in the unit of the parameter: that of its prior or, without a
+ * prior, that of the uniform distribution over its range. */
 double sdm_fit_prior_sd(const fit_problem *p, size_t k);
 
 /* Log prior density of state s, up to a constant: Gaussians, each multiplied by
@@ -20,8 +20,8 @@ double sdm_fit_prior(const fit_problem *p, const fit_state *s, double *gradient,
 
 /* Adds the weakest prior to the information matrix a[N][N], for parameters and pose that have no
    prior of their own: the precision of a uniform distribution over the range of a parameter and
-   over all rotations, and a sd of the shape's reach for translations. It keeps steps along
-   directions that the data leave open finite, and does not move the maximum. */
+   over all rotations, and a sd of the shape's reach for translations. This keeps the steps finite
+   along directions that the data leave open, and does not move the maximum. */
 void sdm_fit_add_weak_prior(const fit_problem *p, double *a);
 
 #endif

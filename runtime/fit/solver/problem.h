@@ -14,7 +14,7 @@
    - score: derivative of the log-likelihood, of one sample or of all.
    - information: negative second derivative of the log-likelihood, the matrix of the normal
      equations. `complete` pretends that the tissue of every sample is known (expected information
-     of expectation-maximisation); `observed` accounts for what is not known (Louis 1982).
+     of expectation-maximisation); `observed` accounts for the unknown tissues (Louis 1982).
    - evidence: log-likelihood gained by the shape over a mixture of the same tissues without a
      shape, less the cost of the shape's unknowns (Schwarz 1978). */
 #ifndef FIT_PROBLEM_H
@@ -44,26 +44,26 @@ typedef struct fit_problem {
 
     /* maps of the shape and their derivatives */
     fit_maps maps;
-    /* parameters [n_params] and blur (mm) that `maps` holds; NaN in the first one: out of date */
+    /* parameters [n_params] and blur (mm) of `maps`; maps_params[0] = NaN: `maps` is out of date */
     double maps_params[FIT_PARAMS_MAX], maps_blur;
-    /* samples, taken every `stride`-th voxel along each axis of the image, >= 1 */
+    /* the samples: every `stride`-th voxel along each axis of the image, stride >= 1 */
     fit_samples samples;
     size_t stride;
     /* observation model and unknowns at the current iteration */
     fit_observation observation;
     fit_state state;
-    /* [tissues, inside first] the image does not hold the tissue: its mean and sd stay at the start
-     * values, see sdm_fit_appearance_mark_absent() */
+    /* [tissues, inside first] true: the image does not hold the tissue, whose mean and sd then stay
+     * at the start values, see sdm_fit_appearance_mark_absent() */
     bool absent[FIT_TISSUES_MAX];
     /* false: weights of the outside tissues are the same everywhere, whatever the options say */
     bool use_tissue_field;
     /* log-likelihood and its derivatives at `state`, and memory for those at a trial state */
     fit_information information, trial;
 
-    /* [n_iterations] log-posterior density after each iteration, without those of the search */
+    /* [n_iterations] log-posterior density after each iteration, except those of the search */
     double *objective;
     size_t n_iterations, objective_capacity;
-    /* iterations so far, with those of the search */
+    /* number of iterations so far, including those of the search */
     size_t n_steps;
 } fit_problem;
 

@@ -4,8 +4,9 @@
 
 #include "fit/data/unknowns.h"
 
-/* Cholesky factor (lower triangle of factor[n][n]) of a scaled to a unit diagonal by scale[n].
-   Reads the lower triangle of a. False: a is not positive definite beyond rounding. */
+/* Computes the Cholesky factor (lower triangle of factor[n][n]) of the matrix a[n][n], scaled to a
+   unit diagonal by scale[n]. Reads the lower triangle of a. False: a is not positive definite
+   beyond rounding. */
 bool sdm_fit_cholesky(size_t n, const double *a, double *factor, double *scale);
 
 /* x[n] := a^-1 x, with factor and scale from sdm_fit_cholesky(). */
@@ -18,10 +19,10 @@ typedef struct fit_limits {
     double min[FIT_UNKNOWNS_MAX], max[FIT_UNKNOWNS_MAX];
 } fit_limits;
 
-/* step[n] maximises gradient . step - 1/2 step . (a + damping diag a) step within the limits. By an
-   active set that only grows: an unknown that was stopped at a limit is not released, so with
-   several limits the step may fall short of the maximum. work: 2 n n numbers. False: a, with its
-   damping and without the unknowns at limits, is not positive definite. */
+/* step[n] maximises gradient . step - 1/2 step . (a + damping diag a) step within the limits. The
+   method is an active set that only grows: an unknown that was stopped at a limit is not released,
+   so with several limits the step may fall short of the maximum. work: 2 n n numbers. False: a,
+   with its damping and without the unknowns at limits, is not positive definite. */
 bool sdm_fit_bounded_step(size_t n, const double *a, const double *gradient, double damping,
                           const fit_limits *limits, double *step, double *work);
 

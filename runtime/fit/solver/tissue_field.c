@@ -1,7 +1,8 @@
 /* Tissue field as a spatially variant mixture (Sanjay-Gopal and Hebert 1998). The weight of a
- * tissue at a point is its part of the material around the point, averaged with a Gaussian window;
- * estimated by expectation-maximisation, like weights that are the same everywhere. The shares of
- * the tissues are collected in the cells of a coarse grid and interpolated by cubic B-splines. */
+ * tissue at a point is its part of the material around the point, averaged with a Gaussian window.
+ * It is estimated by expectation-maximisation, as are the weights that are the same everywhere. The
+ * shares of the tissues are collected in the cells of a coarse grid and interpolated by cubic
+ * B-splines. */
 #include "tissue_field.h"
 
 #include <math.h>
@@ -11,10 +12,10 @@
 #include "sdm/internal/heap.h"
 #include "sdm/internal/threads.h"
 
-// cells to one sd of the window; cells along an axis at most
+// cells per sd of the window; largest number of cells along an axis
 #define CELLS_PER_SD 2.0
 #define CELLS_MAX 96.0
-// sd of the window in cells, at least: the B-splines alone spread by 0.58 cells
+// smallest sd of the window, in cells: the B-splines alone spread by 0.58 cells
 #define SD_CELLS_MIN 0.6
 // distance in sd beyond which the window is negligible
 #define BEYOND 4.0
@@ -29,7 +30,7 @@
 /* The coarse grid of the tissue field. */
 typedef struct cells {
     sdm_grid grid;
-    /* of the Gaussian window, mm */
+    /* sd of the Gaussian window, mm */
     double sd;
     size_t n_tissues;
     /* pseudo-count of the weights that are the same everywhere, in units of the smoothed shares */
@@ -82,7 +83,7 @@ static sdm_status cells_create(const fit_problem *p, cells *c, sdm_error *err)
     *c = (cells){.grid = cells_grid(&p->samples, p->opts->tissue_mm),
                  .n_tissues = p->samples.n_outside};
     c->sd = fmax(p->opts->tissue_mm, SD_CELLS_MIN * c->grid.spacing[0]);
-    // the weight of one independent sample in the centre of the window
+    // a prior as strong as one independent sample in the centre of the window
     c->prior_count = p->noise_factor * pow(c->grid.spacing[0] / c->sd, 3) / pow(TWO_PI, 1.5);
     const size_t n = sdm_grid_count(&c->grid) * c->n_tissues;
     sdm_status s = SDM_ALLOC(&c->packed, n, "tissue field", err);
@@ -103,7 +104,7 @@ static void em_step(fit_problem *p, cells *c)
     for (size_t i = 0; i < s->n; i++)
         sdm_fit_outside_shares(&p->observation, (double)s->value[i], fit_sample_weights(s, i),
                                s->field[i], c->share + i * n);
-    // collect in the cells, and smooth
+    // add up the shares in the cells, and smooth them
     memset(c->packed, 0, size * sizeof *c->packed);
     for (size_t i = 0; i < s->n; i++) {
         double *to = c->packed + cell_index(&c->grid, s->world + 3 * i) * n;

@@ -9,10 +9,10 @@
 // samples below which a distribution cannot be estimated
 #define VALUES_MIN 10.0
 
-// partial volume: the means are unknowns of Newton's method
+// whether the means are re-estimated here; with partial volume they are unknowns of Newton's method
 static bool means_estimated(const fit_problem *p) { return p->opts->image_model == SDM_FIT_LABELS; }
 
-// difference of the means inside and outside at the start
+// difference of the start means of the first inside and the first outside tissue
 static double contrast(const fit_problem *p)
 {
     return fabs(p->opts->appearance.inside[0].mean - p->opts->appearance.outside[0].mean);

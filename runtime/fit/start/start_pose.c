@@ -5,7 +5,8 @@
 #include "sdm/internal/rotation.h"
 #include "sdm/internal/vec3.h"
 
-// rotation vector (rad) of the smallest rotation from the direction of a to that of b
+// rotation vector (rad) of the smallest rotation that turns the direction of a into the direction
+// of b
 static void smallest_rotation(const double a[3], const double b[3], double rotation[3])
 {
     double axis[3];
@@ -85,7 +86,7 @@ static void dominant_eigenvector(double a[4][4], double q[4])
 }
 
 // rotation that best aligns two point sets (Horn 1987): its quaternion is the dominant eigenvector
-// of a matrix made of m = sum of shape world^T
+// of a matrix made from m = sum over the points of shape * world^T
 static void horn_rotation(double m[3][3], double rotation[3])
 {
     double a[4][4], q[4];
@@ -117,7 +118,7 @@ sdm_status sdm_fit_pose_from_points(const double *shape, const double *world, si
         middle[0][i % 3] += shape[i] / (double)n;
         middle[1][i % 3] += world[i] / (double)n;
     }
-    // products and squares about the centroids; the farthest point
+    // sums of products and squares about the centroids; the point farthest from its centroid
     for (size_t i = 0; i < n; i++) {
         double d[2][3];
         for (size_t k = 0; k < 3; k++)
@@ -128,8 +129,8 @@ sdm_status sdm_fit_pose_from_points(const double *shape, const double *world, si
         if (v3_dot(d[0], d[0]) > v3_dot(far[0], far[0]))
             for (int k = 0; k < 3; k++) far[0][k] = d[0][k], far[1][k] = d[1][k];
     }
-    // across: squared distances of the points from the line through the centroid and the farthest
-    // one
+    // across: sum of the squared distances of the points from the line through the centroid and the
+    // farthest one
     if (!(spread[0] > 0) || !(spread[1] > 0) || !(v3_dot(far[1], far[1]) > 0))
         return sdm_fail(err, SDM_E_ARG,
                         "the %zu points of a start coincide: no direction can be taken from them",

@@ -1,6 +1,7 @@
-/* Coarse-to-fine search for the start. A wide point spread lets the fit see the surface from a
- * distance, and a subsample of the voxels is enough for it. Each turn is fitted with all unknowns:
- * with the size of the start alone, a shape of another size would fit best in a wrong pose. */
+/* Coarse-to-fine search for the start. A "turn" is one of the rotations of the start pose that are
+   tried. With a wide point spread the fit finds the surface from a distance, and a subsample of the
+   voxels is enough. Each turn is fitted with pose and shape parameters: with the parameters of the
+   start, a shape of another size would fit best in a wrong pose. */
 #include "start_search.h"
 
 #include <math.h>
@@ -10,18 +11,20 @@
 #include "sdm/internal/rotation.h"
 #include "sdm/internal/vec3.h"
 
-// wide point spread: this multiple of the given one, at most a share of the shape's reach
+// sd of the wide point spread: WIDER times the given one, but at most WIDEST_SHARE times the
+// shape's reach
 #define WIDER 3.0
 #define WIDEST_SHARE 0.12
-// samples wanted: for every turn, and for the turns that continue
+// number of samples: for every turn, and for the turns that continue
 #define SAMPLES_OF_TURNS 10000
 #define SAMPLES_OF_KEPT 30000
-// iterations at most: of every turn; of a turn that continues, with the wide point spread; and with
-// the given one
+// largest number of iterations: of every turn; of a turn that continues, with the wide point
+// spread; of the same turn with the given point spread
 #define TURN_STEPS 10
 #define KEPT_STEPS 12
 #define SHARP_STEPS 6
-// turns that continue; turns that end at rotations closer than this angle (rad) count as the same
+// largest number of turns that continue; turns that end at rotations closer than this angle (rad)
+// count as the same
 #define TURNS_KEPT 4
 #define SAME_TURN 0.35
 
@@ -62,7 +65,8 @@ static double widened(double given, double reach)
     return fmax(given, fmin(WIDER * given, WIDEST_SHARE * reach));
 }
 
-// samples from a ball that holds every turn of the shape, with a stride that leaves about `wanted`
+// chooses samples from a ball that holds every turn of the shape, with a stride that leaves about
+// `wanted` of them
 static sdm_status samples_near_choose(fit_problem *p, double wanted, sdm_error *err)
 {
     const sdm_fit_opts *o = p->opts;
@@ -99,7 +103,7 @@ static sdm_status no_samples(const fit_problem *p, sdm_error *err)
                     x[0], x[1], x[2]);
 }
 
-/* The best ends of turns, the best first. */
+/* The best turns so far and the states in which they ended, the best first. */
 typedef struct found_turns {
     size_t n, turn[TURNS_KEPT];
     double objective[TURNS_KEPT];
@@ -120,7 +124,7 @@ static void turns_move(found_turns *f, size_t from, size_t to)
     f->state[to] = f->state[from];
 }
 
-// inserts the end of a turn if it is among the best; of ends with the same rotation only the best
+// inserts a turn if it is among the best; of turns that end at the same rotation only the best
 // stays
 static void turns_insert(found_turns *f, size_t turn, double objective, const fit_state *state)
 {
@@ -159,7 +163,7 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
         start.point_sd = fmax(start.point_sd, 0.1 * p->extent.reach);
     p->state = start;
 
-    // each turn with all unknowns but point spread and appearance
+    // fit each turn with all unknowns but point spread and appearance
     fit_newton_opts newton = {.phase = SDM_FIT_SEARCH,
                               .keep_params = o->keep_params,
                               .keep_pose = o->keep_pose,
@@ -171,12 +175,12 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
     found_turns found = {.n = n == 1, .state = {start}};
     for (size_t i = 0; i < n && !s && n > 1; i++) {
         turn_start(p, i, &start, &p->state);
-        p->prior = p->state; // each turn is a start of its own
+        p->prior = p->state; // the prior is centred on the start of the turn
         s = sdm_fit_newton(p, &newton, &end, err);
         if (!s) turns_insert(&found, i, sdm_fit_objective(p), &p->state);
     }
-    // with a wide point spread a wrong turn may look best: several continue, at last with the given
-    // point spread
+    // with a wide point spread a wrong turn may look best: so several turns continue, in the end
+    // with the given point spread
     if (n > 1 && !s) {
         p->state = start;
         s = samples_near_choose(p, SAMPLES_OF_KEPT, err);

@@ -1,13 +1,14 @@
 /* Autocorrelation of the residuals, and its correction for the fit.
 
-   Residuals are e' = (I - P) e with the errors e and the projection P = X A X^T; X are the roots
-   x_n of the score, row by row, A the influence. With the covariance Omega of e
+   The residuals are e' = (I - P) e with the errors e and the projection P = X A X^T. Row n of X is
+   the root x_n of voxel n (its score is e_n x_n); A is the influence, the inverse of the
+   information. With the covariance Omega of e
 
        E[e' e'^T] = Omega - P Omega - Omega P + P Omega P
 
    The mean over the pairs of a lag is therefore smaller than C(lag). The correction adds the
-   missing terms. Omega is made of C itself, so the correction is iterated: the first terms of a
-   Neumann series. */
+   missing terms. The elements of Omega are values of C itself, so the correction is iterated: the
+   first terms of a Neumann series. */
 #include "correlation.h"
 
 #include <math.h>
@@ -36,8 +37,8 @@ static double correlation_at(const fit_neighbours *v, const uint32_t *list, size
     return weight > 0 ? sum / weight : 0;
 }
 
-/* Shells of lags of the same length, outwards. The window is twice as wide as the last shell before
- * the first whose sum does not stand out. */
+/* Shells of lags of the same length, outwards. The half width of the window is twice the length of
+ * the last shell before the first one whose sum does not exceed its standard error. */
 sdm_status sdm_fit_correlation_estimate(const fit_neighbours *v, double effort, int n_threads,
                                         double *c, int *width, sdm_error *err)
 {
@@ -165,7 +166,7 @@ static void multiply(size_t n, const double *a, const double *b, double *out)
         }
 }
 
-// X^T Omega X from the subsample, V, and q
+// computes X^T Omega X from the subsample, then V and q
 static void bias_vectors(const fit_neighbours *v, const double *influence, fit_bias *t)
 {
     const size_t n = v->n_unknowns;
@@ -191,7 +192,8 @@ static void bias_vectors(const fit_neighbours *v, const double *influence, fit_b
         }
 }
 
-// weighted mean over the pairs of a lag of what the fit has removed from C(lag)
+// what the fit has removed from C(lag): the weighted mean of q_i . x_j over the pairs i, j at this
+// lag
 static double bias_at(const fit_neighbours *v, const fit_bias *t, const int lag[3])
 {
     const size_t n = v->n_unknowns;

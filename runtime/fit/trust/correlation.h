@@ -1,7 +1,7 @@
 /* Autocorrelation of the residuals over lags, displacements between voxels.
 
-   An array c[FIT_LAG_ZERO + 1] holds C(lag) of one half of all lags and of lag zero, which is its
-   last element; C(-lag) = C(lag). Functions give the same bits for any number of threads. */
+   An array c[FIT_LAG_ZERO + 1] holds C(lag) for one half of all lags and, as its last element, for
+   lag zero; C(-lag) = C(lag). Functions give the same bits for any number of threads. */
 #ifndef FIT_CORRELATION_H
 #define FIT_CORRELATION_H
 
@@ -15,9 +15,9 @@ sdm_status sdm_fit_correlation_estimate(const fit_neighbours *v, double effort, 
                                         double *c, int *width, sdm_error *err);
 
 /* Turns c from the autocorrelation of the residuals into that of the errors. Residuals are errors
-   less the part that the fit could explain, mostly what is constant over many voxels, so their
-   correlations are too small. influence[n_unknowns][n_unknowns]: inverse of the information, 0 for
-   unknowns that were kept. */
+   less the part that the fit could explain, mostly the part that is constant over many voxels, so
+   their correlations are too small. influence[n_unknowns][n_unknowns]: inverse of the information,
+   0 for unknowns that were kept. */
 sdm_status sdm_fit_correlation_correct(const fit_neighbours *v, const double *influence, int width,
                                        int n_threads, double *c, sdm_error *err);
 

@@ -1,6 +1,6 @@
-/* Evidence of the shape: the mixture without a shape, by expectation-maximisation (Dempster, Laird
- * and Rubin 1977) on a subsample of the voxels. The outside tissues keep the tissue field of the
- * fit. */
+/* Log-likelihoods for the evidence of the shape. The mixture without a shape is estimated by
+ * expectation-maximisation (Dempster, Laird and Rubin 1977) on a subsample of the voxels. The
+ * outside tissues keep the tissue field of the fit. */
 #include "evidence.h"
 
 #include <math.h>
@@ -9,7 +9,7 @@
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
 
-// voxels of the subsample, at most; iterations of expectation-maximisation
+// largest number of voxels in the subsample; number of iterations of expectation-maximisation
 #define SUBSAMPLE 20000
 #define ITERATIONS 40
 

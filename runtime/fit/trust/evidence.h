@@ -1,12 +1,12 @@
-/* Whether the image shows the shape at all. */
+/* Figures that tell whether the image shows the shape at all. */
 #ifndef FIT_EVIDENCE_H
 #define FIT_EVIDENCE_H
 
 #include "fit/solver/problem.h"
 
-/* *log_likelihood: of the sample values under a mixture of the fit's tissues, re-estimated, without
-   a shape: the same weights for every sample, but for the tissue field of the outside tissues.
-   Images only. */
+/* *log_likelihood: log-likelihood of the sample values under a mixture of the fit's tissues,
+   re-estimated, without a shape. The weights are the same for every sample, except that the tissue
+   field distributes the weight of the outside tissues. Images only. */
 sdm_status sdm_fit_shapeless_log_likelihood(const fit_problem *p, double *log_likelihood,
                                             sdm_error *err);
 

@@ -1,4 +1,4 @@
-/* The voxels of the inner band. */
+/* Collects the voxels of the inner band, their residuals and scores. */
 #include "neighbours.h"
 
 #include <math.h>
@@ -14,7 +14,7 @@ static void voxel_index(const sdm_grid *g, size_t voxel, int64_t index[3])
     index[2] = (int64_t)voxel / g->n[0] / g->n[1];
 }
 
-// excludes samples with negligible scores: they would take the place of informative ones in
+// excludes samples with negligible scores, which would take the place of informative samples in
 // subsamples
 bool sdm_fit_in_inner_band(const fit_problem *p, size_t sample)
 {
@@ -93,7 +93,7 @@ static void neighbours_fill(const fit_problem *p, fit_neighbours *v)
 
 float sdm_fit_neighbours_threshold(const fit_neighbours *v, double wanted)
 {
-    // rounded to steps of a factor 2^(1/4), so that a few voxels more or less do not change the
+    // rounded down to a power of 2^(1/4), so that a few voxels more or less do not change the
     // choice
     return (float)exp2(0.25 * floor(4 * log2(wanted / (double)v->n)));
 }

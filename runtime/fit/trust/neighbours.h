@@ -1,5 +1,6 @@
 /* Voxels of the inner band with their residuals and scores, and look-up of the neighbour at a lag.
- * Autocorrelation and score covariance are sums over these. */
+ * The inner band holds the samples near the surface whose scores are not negligible, see
+ * sdm_fit_in_inner_band(). Autocorrelation and score covariance are sums over its voxels. */
 #ifndef FIT_NEIGHBOURS_H
 #define FIT_NEIGHBOURS_H
 
@@ -8,7 +9,7 @@
 enum {
     /* largest lag along an axis, in steps (problem->stride voxels) */
     FIT_LAG_MAX = 10,
-    /* lags along an axis */
+    /* number of lags along an axis */
     FIT_LAGS = 2 * FIT_LAG_MAX + 1,
     /* number of lag zero; numbers below it are one half of all lags, those above their opposites */
     FIT_LAG_ZERO = FIT_LAGS * FIT_LAGS * FIT_LAGS / 2
@@ -17,7 +18,8 @@ enum {
 /* The n voxels of the inner band. */
 typedef struct fit_neighbours {
     size_t n, n_unknowns;
-    /* bounding box: extent in steps, first voxel of the image, voxels of the image to a step */
+    /* bounding box of the voxels: extent in steps, index of its first voxel in the image, image
+     * voxels per step */
     int64_t size[3], first[3], step;
     /* [size[2]][size[1]][size[0]] 1 + number of the voxel there; 0: none */
     uint32_t *number_at;
@@ -34,13 +36,14 @@ typedef struct fit_neighbours {
     float *model_score;
 } fit_neighbours;
 
-/* From the samples of problem->state. Call sdm_fit_neighbours_dispose() even after an error. */
+/* Collects the voxels from the samples of *problem, evaluated at problem->state. Call
+ * sdm_fit_neighbours_dispose() even after an error. */
 sdm_status sdm_fit_neighbours_create(const fit_problem *p, fit_neighbours *out, sdm_error *err);
 void sdm_fit_neighbours_dispose(fit_neighbours *v);
 
 /* Whether a sample belongs to the inner band: its derivative by the surface is large enough to
-   matter in correlations, a stricter test than sdm_fit_in_band(). And the number of such samples.
- */
+   matter in correlations, a stricter test than sdm_fit_in_band(). sdm_fit_inner_band_count()
+   returns the number of such samples. */
 bool sdm_fit_in_inner_band(const fit_problem *p, size_t sample);
 size_t sdm_fit_inner_band_count(const fit_problem *p);
 

@@ -39,8 +39,8 @@ static void submatrix(size_t n, const double *a, size_t m, const size_t *list, d
 }
 
 /* influence[n][n]: inverse of the information of the unknowns that were estimated, 0 for the
- * others. Of the observed information where that is positive definite, else of the complete one.
- * work: 3 n n. False: neither is. */
+ * others. Inverts the observed information where it is positive definite, else the complete one.
+ * work: 3 n n numbers. False: neither is positive definite. */
 static bool influence_compute(const fit_problem *p, bool with_priors, double *influence,
                               double *work)
 {
@@ -78,7 +78,8 @@ static double sandwich(size_t n, const double *influence, const double *scatter,
     return sum;
 }
 
-// error (mm) of the maps near the surface, of the network's held-out data; 0: exact maps
+// error (mm) of the network's maps near the surface, measured on its held-out data; 0 for exact
+// maps
 static double model_error(const fit_problem *p)
 {
     if (p->maps.exact) return 0;
@@ -93,8 +94,8 @@ static void covariance_fill(const fit_problem *p, const fit_score_covariance *sc
     const size_t n = p->information.n_unknowns, size = p->n_params + 6;
     const bool points = p->target->kind == SDM_FIT_POINTS;
     size_t list[FIT_UNKNOWNS_MAX];
-    // residuals of points about a fit are smaller than about the truth: degrees of freedom
-    // (MacKinnon and White 1985)
+    // lost: share of the degrees of freedom that the fit of points uses up; residuals about a fit
+    // are smaller than about the truth (MacKinnon and White 1985)
     const double lost =
         points ? fmin((double)free_unknowns(p, list) / fmax((double)p->samples.n, 1), 0.5) : 0;
     // the score of a prior with weight w has the variance w^2 / sd^2; sdm_fit_prior() gives w /
@@ -102,7 +103,7 @@ static void covariance_fill(const fit_problem *p, const fit_score_covariance *sc
     memset(spread, 0, n * n * sizeof *spread);
     (void)sdm_fit_prior(p, &p->state, NULL, spread, NULL);
     for (size_t i = 0; i < size; i++) spread[i * (n + 1)] *= p->prior_weight[i];
-    // noise of the samples and error of the network
+    // add the noise of the samples and the error of the network
     const double model = out->model_error_mm * out->model_error_mm;
     for (size_t i = 0; i < n * n; i++)
         spread[i] += scatter->noise[i] / (1 - lost) + model * scatter->model[i];
@@ -115,7 +116,7 @@ static void covariance_fill(const fit_problem *p, const fit_score_covariance *sc
         }
     for (size_t i = 0; i < size; i++) {
         const double variance = out->covariance[i * (size + 1)];
-        // not 0, which would mean that the unknown is known exactly
+        // NaN, since 0 would mean that the unknown is known exactly
         out->sd[i] = variance >= 0 ? sqrt(variance) : NAN;
     }
     for (size_t i = 0; i < size; i++)

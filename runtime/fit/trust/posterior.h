@@ -9,10 +9,10 @@
 sdm_status sdm_fit_posterior(const fit_problem *p, sdm_fit_result *out, sdm_error *err);
 
 /* weight[n_params + 6]: factor of each log prior. The log-likelihood counts correlated samples as
-   independent, which makes it too sharp beside a prior. To restore the
-   balance, the log prior of each unknown is multiplied by the ratio of the sandwich variance to the
-   variance for independent samples, at least 1 (magnitude adjustment, Pauli, Racugno and Ventura
-   2011); where the information is singular, by the noise factor. *noise_factor: a rough estimate of
+   independent, so it is too sharp relative to a prior. To restore the balance, the log prior of
+   each unknown is multiplied by the ratio of the sandwich variance to the variance for independent
+   samples, at least 1 (magnitude adjustment, Pauli, Racugno and Ventura 2011); where the
+   information is singular, by the noise factor. *noise_factor: a rough estimate of
    sdm_fit_result.noise_factor, at least 1. */
 sdm_status sdm_fit_weigh_priors(const fit_problem *p, double *weight, double *noise_factor,
                                 sdm_error *err);

@@ -20,13 +20,14 @@
 #include "sdm/internal/heap.h"
 #include "sdm/internal/threads.h"
 
-// limit of voxel pairs: the sum starts from a subsample of the voxels that gives about this number
+// limit on the number of voxel pairs: the sum over n runs over a subsample of the voxels that gives
+// about this number
 #define PAIRS 30000000
 // part of PAIRS for a rough estimate
 #define ROUGH 0.2
 
-/* out += sum over voxels and both halves of the lags of c(lag) root_n root_(n+lag)^T. In slices of
- * the voxels, added in order. */
+/* out += sum over voxels and both halves of the lags of c(lag) root_n root_(n+lag)^T. Computed in
+ * slices of the voxels, which are added in order. */
 static sdm_status products_add(const fit_neighbours *v, const double *c, double effort, int width,
                                int n_threads, double *out, sdm_error *err)
 {
@@ -36,7 +37,7 @@ static sdm_status products_add(const fit_neighbours *v, const double *c, double 
     const sdm_status s = SDM_ALLOC(&parts, FIT_SLICES * n * n, "covariance of the score", err);
     if (s) return s;
     (void)n_threads; // without OpenMP
-    // subsample of the voxels where the sum starts
+    // subsample of the voxels that the sum over n uses
     const float threshold =
         sdm_fit_neighbours_threshold(v, effort * PAIRS / (pow(2.0 * width + 1, 3) / 2 + 1));
     size_t chosen = 0;
@@ -73,8 +74,8 @@ static sdm_status products_add(const fit_neighbours *v, const double *c, double 
     return SDM_OK;
 }
 
-// samples outside the inner band: only their scores by the tissue means count; factor: sum of the
-// correlations
+// adds the samples outside the inner band, of which only the scores by the tissue means count;
+// factor: sum of the correlations
 static void far_add(const fit_problem *p, double factor, double *out)
 {
     const size_t n = p->information.n_unknowns, nc = p->samples.n_columns;
@@ -89,7 +90,7 @@ static void far_add(const fit_problem *p, double factor, double *out)
     }
 }
 
-// points: each is independent of the others (White 1980)
+// adds the points, which are independent of each other (White 1980)
 static void points_add(const fit_problem *p, double *out)
 {
     const size_t n = p->information.n_unknowns;
@@ -103,8 +104,8 @@ static void points_add(const fit_problem *p, double *out)
     }
 }
 
-// covariance by noise; definite: the narrower window if it is not positive definite with the flat
-// one
+// covariance caused by noise. definite: uses the narrower window if the flat one gives a matrix
+// that is not positive definite
 static sdm_status noise_add(const fit_problem *p, const fit_neighbours *v, const double *c,
                             int width, int n_threads, bool definite, fit_score_covariance *out,
                             sdm_error *err)
@@ -127,7 +128,8 @@ static sdm_status noise_add(const fit_problem *p, const fit_neighbours *v, const
     return s;
 }
 
-// map errors that are constant within cubes of this edge (mm) and independent between them
+// adds the covariance caused by map errors that are constant within cubes of this edge (mm) and
+// independent between cubes
 static sdm_status model_error_add(const fit_problem *p, const fit_neighbours *v, double edge,
                                   double *out, sdm_error *err)
 {
@@ -145,7 +147,7 @@ static sdm_status model_error_add(const fit_problem *p, const fit_neighbours *v,
     sdm_status s = sdm_mul(cubes, n, &size, err);
     if (!s) s = SDM_ALLOC(&sum, size, "covariance of the score", err);
     if (s) return s;
-    // score caused by an error of 1 mm in each cube
+    // score caused by a map error of 1 mm in each cube
     for (size_t i = 0; i < v->n; i++) {
         int64_t k[3];
         for (size_t a = 0; a < 3; a++) k[a] = v->position[3 * i + a] / steps[a];
@@ -159,7 +161,7 @@ static sdm_status model_error_add(const fit_problem *p, const fit_neighbours *v,
     return SDM_OK;
 }
 
-// of images and label maps
+// score covariance of images and label maps
 static sdm_status voxels_covariance(const fit_problem *p, double model_mm, const double *influence,
                                     fit_score_covariance *out, sdm_error *err)
 {

@@ -16,12 +16,12 @@ typedef struct fit_score_covariance {
     double noise_factor;
 } fit_score_covariance;
 
-/* Computes both at problem->state from its samples; on error *out is empty. model_mm: edge (mm) of
-   the cubes within which the error of a network's map is constant; 0: model stays 0.
-   influence[N][N]: inverse of the information, 0 for unknowns that were kept. With it the
-   correlations are corrected for the part of the noise that the fit has explained, and `noise` is
-   made positive definite by a narrower window of lags where necessary. NULL: a cheap, rough
-   estimate of `noise`. */
+/* Computes both matrices and the noise factor at problem->state from its samples; on error *out is
+   empty. model_mm: edge (mm) of the cubes within which the error of a network's map is constant; 0:
+   model stays 0. influence[N][N]: inverse of the information, 0 for unknowns that were kept. With
+   it the correlations are corrected for the part of the noise that the fit has explained, and
+   `noise` is made positive definite by a narrower window of lags where necessary. NULL: a cheap,
+   rough estimate of `noise`. */
 sdm_status sdm_fit_score_covariance_create(const fit_problem *p, double model_mm,
                                            const double *influence, fit_score_covariance *out,
                                            sdm_error *err);

@@ -22,8 +22,8 @@ typedef struct finder {
     sdm_contacts *out;
     sdm_contact *list; // [cap] contacts in the order in which they are found
     size_t cap;
-    // [FRAMES_KEPT] direct-mapped cache: frame[i] is the frame of triangle frame_of[i], i = t %
-    // FRAMES_KEPT
+    // [FRAMES_KEPT] direct-mapped cache: frame[i] is the frame of triangle frame_of[i]; triangle t
+    // can be at i = t % FRAMES_KEPT only
     sdm_frame *frame;
     uint32_t *frame_of;
     sdm_arena *arena;

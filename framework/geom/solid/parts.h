@@ -13,11 +13,11 @@ static inline void sdm_triangle_turn(sdm_mesh *m, size_t t)
 }
 
 /* Turns (reverses) each part of the closed mesh m that has a winding number < 0 just outside of its
- * widest triangle, which the boundary of a solid never has. The surface of a cavity in a solid has
- * a winding number >= 0 just outside and is not turned. Parts with contacts to other parts are not
- * turned either, because it is undecidable which of them is wrong. A mesh that is not closed is
- * left as it is. *n_turned: number of turned parts; if it is not 0, the survey of m is out of date.
- * SDM_E_NOMEM. */
+ * widest triangle; such points do not occur at the boundary of a solid. The surface of a cavity in
+ * a solid has a winding number >= 0 just outside and is not turned. Parts with contacts to other
+ * parts are not turned either, because it is undecidable which of them is wrong. A mesh that is not
+ * closed is left as it is. *n_turned: number of turned parts; if it is not 0, the survey of m is
+ * out of date. SDM_E_NOMEM. */
 sdm_status sdm_parts_turn(sdm_mesh *m, const sdm_survey *survey, size_t *n_turned, sdm_error *err);
 
 #endif

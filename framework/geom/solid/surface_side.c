@@ -172,8 +172,8 @@ static bool on_triangle(const sdm_mesh *m, uint32_t t, const double x[3])
 }
 
 /* Does the work of sdm_sides_keep() by a ray from x, the point at xy. The ray skips the current
- * triangle and its coplanar contacts, which together count as one layer. The result also serves as
- * a start point for later paths. */
+ * triangle and its coplanar contacts, which together count as one layer. If paths are possible on
+ * the triangle, x becomes their start point. */
 static sdm_status keep_by_ray(sdm_sides *w, const double xy[2], const double x[3], bool *keep,
                               sdm_error *err)
 {

@@ -144,8 +144,8 @@ static sdm_status add_whole(hull *w, uint32_t t)
 static sdm_status drop_unused(sdm_mesh *m, sdm_arena *arena, sdm_error *err)
 {
     const sdm_arena_mark before = arena->end[SDM_HIGH];
-    uint32_t *index; // [n_vert] at first 1 for used vertices and 0 for others, then the new index
-                     // of each used vertex
+    // [n_vert] at first 1 for used vertices and 0 for others, then the new index of used vertices
+    uint32_t *index;
     const sdm_status s = SDM_TAKE(arena, SDM_HIGH, &index, m->n_vert, "vertices in use", err);
     if (s) return s;
     for (size_t i = 0; i < 3 * m->n_tri; i++) index[m->tri[i]] = 1;
@@ -161,7 +161,8 @@ static sdm_status drop_unused(sdm_mesh *m, sdm_arena *arena, sdm_error *err)
     return SDM_OK;
 }
 
-/* Adds the triangles and pieces that stay. *changed = true if some triangle was cut or left out. */
+/* Adds the triangles and pieces that stay. *changed = true if some triangle that is not a sliver
+ * was left out, wholly or in part. */
 static sdm_status hull_build(hull *w, bool *changed)
 {
     const sdm_contacts *c = &w->survey->contacts;

@@ -142,7 +142,8 @@ static void split_try_three(const crossing *c, const double normal[3], int i, in
             best);
 }
 
-/* Finds the smallest number of sheets (1, 2 or 3) of which `normal` is a linear combination. */
+/* Finds the smallest number of sheets (1, 2 or 3) whose normals combine to `normal` with factors
+ * >= 0. */
 static split split_find(const crossing *c, const double normal[3])
 {
     split best = {.error = INFINITY};

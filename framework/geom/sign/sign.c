@@ -16,7 +16,7 @@ sdm_status sdm_sign_choose(const sdm_audit *a, sdm_sign_method wanted, sdm_sign_
                         "edges and %zu edges with "
                         "triangles of mixed orientation; use winding",
                         a->boundary_edges, a->misoriented_edges);
-    // an edge next to a triangle without area would get the normal of only one of its faces
+    // an edge of a triangle without area would get the normal of only one of its two faces
     if (m == SDM_SIGN_PSEUDONORMAL && (!a->manifold || a->self_intersections || a->degenerate))
         return sdm_fail(err, SDM_E_ARG,
                         "sign method pseudonormal needs a manifold mesh without overlap, this one "

@@ -1,5 +1,5 @@
-/* Inside or outside: choice of the sign method, and the sign of single points and of whole
- * grids. */
+/* Decides whether points lie inside a mesh: chooses the sign method, and finds the signs of single
+ * points and of whole grids. */
 #ifndef SDM_GEOM_SIGN_H
 #define SDM_GEOM_SIGN_H
 
@@ -15,8 +15,8 @@ typedef struct sdm_sign {
     sdm_sign_method method;
     const sdm_mesh *solid;
     const sdm_survey *survey;
-    /* surface of the solid without triangles inside of it (after the union); used by pseudo-normals
-     * only */
+    /* the surface to which distances are measured (after the union, without triangles inside the
+     * solid); used by pseudo-normals only */
     const sdm_nearest *surface;
     sdm_winding winding;
     sdm_pseudonormals normals;
@@ -27,8 +27,9 @@ typedef struct sdm_sign {
 sdm_status sdm_sign_choose(const sdm_audit *a, sdm_sign_method wanted, sdm_sign_method *method,
                            sdm_error *err);
 
-/* Prepares the signs of `solid`. The mesh, the survey and the surface must stay valid as long as
- * *s. *s is zero-initialised; sdm_sign_dispose() frees it, also after an error. SDM_E_NOMEM. */
+/* Prepares the sign queries for `solid`. The mesh, the survey and the surface must stay valid as
+ * long as *s. *s is zero-initialised; sdm_sign_dispose() frees it, also after an error.
+ * SDM_E_NOMEM. */
 sdm_status sdm_sign_build(const sdm_mesh *solid, const sdm_survey *survey,
                           const sdm_nearest *surface, sdm_sign_method method, sdm_sign *s,
                           sdm_error *err);
@@ -37,8 +38,8 @@ void sdm_sign_dispose(sdm_sign *s);
 /* Bytes allocated by *s. */
 size_t sdm_sign_bytes(const sdm_sign *s);
 
-/* Is x inside? slot, q, feature: nearest triangle of s->surface, nearest point and where it lies on
- * the triangle (point_triangle.h); used by pseudo-normals only. [any thread] */
+/* Is x inside? slot: nearest triangle of s->surface; q: nearest point; feature: where q lies on the
+ * triangle (point_triangle.h). These three are used by pseudo-normals only. [any thread] */
 bool sdm_sign_inside(const sdm_sign *s, const double x[3], uint32_t slot, const double q[3],
                      int feature);
 

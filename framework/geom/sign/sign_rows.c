@@ -7,9 +7,10 @@
 #include <stdatomic.h>
 
 #define TILE_ROWS 16 // a tile has up to TILE_ROWS x TILE_ROWS rows
-// open meshes: voxels of a row in one tile; the array `base` then has at most 1 MiB per thread
+// open meshes: largest number of voxels of a row in one tile; limits `base` to 1 MiB per thread
 #define PIECE_MAX 1024
-// from this many boundary edges on point queries are faster: every box of voxels tests all edges
+// Meshes with at least this many boundary edges use point queries, which are then faster, because
+// every box of voxels would test all edges.
 #define LONG_BOUNDARY 4096
 
 bool sdm_sign_fits_rows(sdm_sign_method method, const sdm_boundary *b)
@@ -17,7 +18,7 @@ bool sdm_sign_fits_rows(sdm_sign_method method, const sdm_boundary *b)
     return method == SDM_SIGN_CROSSINGS || (method == SDM_SIGN_WINDING && b->n < LONG_BOUNDARY);
 }
 
-/* Size of the array `base` of one thread (open meshes only). */
+/* Bytes of the array `base` of one thread (open meshes only). */
 static size_t base_bytes(const sdm_sign_rows *r)
 {
     return TILE_ROWS * TILE_ROWS * (size_t)r->piece * sizeof(int32_t);
@@ -74,7 +75,7 @@ sdm_status sdm_sign_tiles(const sdm_sign_rows *r, int64_t n1, int64_t n2,
                                        .j1 = j + TILE_ROWS < n1 ? j + TILE_ROWS : n1,
                                        .k0 = k,
                                        .k1 = k + TILE_ROWS < n2 ? k + TILE_ROWS : n2};
-            // winding numbers to add, then the work of the caller
+            // winding numbers to add, then the caller's function
             if (!s && base) sdm_row_base_fill(r->boundary, &r->rows, r->grid, &tile, base);
             if (!s) visit(user, &tile, base);
             if (!s && sdm_cancelled(opts))

@@ -1,5 +1,6 @@
-/* Generalised winding numbers of points: crossings of one ray and the boundary strips where the
- * boundary is short, otherwise far-field expansions of the nodes of a tree of triangles. */
+/* Generalised winding numbers of points: if the boundary is short, by the crossings of one ray and
+ * the strips of the boundary (boundary.h); otherwise by far-field expansions of the nodes of a tree
+ * of triangles. */
 #include "winding.h"
 
 #include <math.h>
@@ -28,8 +29,8 @@ static double triangle_winding(const sdm_mesh *m, uint32_t t, const double x[3])
     return det == 0 && den <= 0 ? 0 : atan2(det, den) / (2 * pi);
 }
 
-/* Adds a part (a triangle or a child node) to the far field c, whose `centroid` is already known.
- * centroid, normal, area, spread: of the part. */
+/* Adds a part (a triangle or a child node), given by its centroid, normal, area and spread, to the
+ * far field c, whose own centroid is already set. */
 static void far_field_add(sdm_far_field *c, const double centroid[3], const double normal[3],
                           double area, double spread)
 {
@@ -133,8 +134,8 @@ double sdm_winding_number(const sdm_winding *w, const double x[3])
            sdm_strips_evaluate(&strips, x, &x[1], 0).winding;
 }
 
-/* Far-field winding number of a node whose centroid is at r from the point: Taylor
- * expansion up to second order. */
+/* Far-field winding number of a node at a point; r: vector from the point to the node's centroid.
+ * Taylor expansion up to second order. */
 static double far_field_winding(const sdm_far_field *c, const double r[3], double distance)
 {
     const double *m = c->second, d3 = distance * distance * distance;
@@ -144,8 +145,8 @@ static double far_field_winding(const sdm_far_field *c, const double r[3], doubl
     return (v3_dot(r, c->normal) + trace - 3 * square / (distance * distance)) / (4 * pi * d3);
 }
 
-/* Winding number by a walk through the tree; a node is replaced by its far field if the error is at
- * most `tolerance`. *error: bound on the total error. */
+/* Winding number by a walk through the tree; a node is replaced by its far field if the error of
+ * this is at most `tolerance`. *error = bound on the total error. */
 static double winding_estimate(const sdm_winding *w, const double x[3], double tolerance,
                                double *error)
 {

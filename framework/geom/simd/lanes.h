@@ -1,7 +1,7 @@
-/* SIMD types of eight floats (v8f), eight 32-bit integers (v8i) and four doubles (v4d): one AVX2
-   register each, elsewhere two registers of half the size (lanes_half.h, same functions and names).
-   A lane is one element. v8_load(), v8_store(), v4_load() and v4_store() need 32-byte alignment;
-   v8_load_i() and v8_store_i() do not. */
+/* SIMD types of eight floats (v8f), eight 32-bit integers (v8i) and four doubles (v4d). Each is one
+   register with AVX2; without AVX2 it is two registers of half the size, with the same names and
+   functions (lanes_half.h). A lane is one element. v8_load(), v8_store(), v4_load() and v4_store()
+   need 32-byte alignment; v8_load_i() and v8_store_i() do not. */
 #ifndef SDM_GEOM_LANES_H
 #define SDM_GEOM_LANES_H
 

@@ -26,9 +26,9 @@ SDM_INLINE d4 d4_dot(const d4 a[3], const d4 b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 SDM_INLINE d4 d4_sqrt(d4 a) { return d4_of(d2_sqrt(d4_low(a)), d2_sqrt(d4_high(a))); }
-/* Rounded to float and back to double. */
+/* Rounds to float and converts back to double. */
 SDM_INLINE d4 d4_rounded(d4 a) { return d4_of(d2_rounded(d4_low(a)), d2_rounded(d4_high(a))); }
-/* Rounded to four floats, stored to p[4]. */
+/* Rounds to four floats and stores them to p[4]. */
 SDM_INLINE void d4_store_f(float *p, d4 a)
 {
     d2_store_f(p, d4_low(a));

@@ -1,6 +1,7 @@
-/* The types and functions of lanes.h without AVX2: each value is a pair of registers of SSE2 or
-   NEON, elsewhere of compiler vectors of 16 bytes. Part of lanes.h, which documents the functions.
-   Not one vector type of 32 bytes: compilers compare and select its elements one by one. */
+/* The types and functions of lanes.h for processors without AVX2: each value is a pair of SSE2 or
+   NEON registers, elsewhere a pair of compiler vectors of 16 bytes. Part of lanes.h, which
+   documents the functions. A single vector type of 32 bytes would be slow, because compilers
+   compare and select its elements one by one. */
 #ifndef SDM_GEOM_HALF_LANES_KERNEL_H
 #define SDM_GEOM_HALF_LANES_KERNEL_H
 
@@ -65,8 +66,8 @@ static inline int v4i_bits(v4i m) { return (m[0] & 1) | (m[1] & 2) | (m[2] & 4) 
 static inline v4f v4f_fma(v4f a, v4f b, v4f c) { return a * b + c; }
 #endif
 
-/* Memory is accessed as v4f, which may alias floats; the struct v8f may not. The same below for v2d
-   and v4d. */
+/* Memory is accessed as v4f, which may alias floats; the struct v8f may not. For the same reason
+   doubles are accessed as v2d, not v4d, below. */
 static inline v8f v8_load(const float *p)
 {
     const v4f *v = (const v4f *)(const void *)p;

@@ -1,5 +1,5 @@
-/* Two doubles as one compiler vector (v2d): one register of SSE2 or NEON, which every x86-64 or
-   ARM64 processor has, so code with it needs no choice of the instruction set at run time. */
+/* Two doubles as one compiler vector (v2d): one register of SSE2 or NEON. Every x86-64 or ARM64
+   processor has these, so code with v2d need not choose the instruction set at run time. */
 #ifndef SDM_GEOM_TWO_LANES_KERNEL_H
 #define SDM_GEOM_TWO_LANES_KERNEL_H
 
@@ -31,10 +31,11 @@ SDM_INLINE void d2_store(double *p, v2d a) { memcpy(p, &a, sizeof a); }
 SDM_INLINE v2d d2_lesser(v2d a, v2d b) { return (v2d)_mm_min_pd((__m128d)a, (__m128d)b); }
 SDM_INLINE v2d d2_greater(v2d a, v2d b) { return (v2d)_mm_max_pd((__m128d)a, (__m128d)b); }
 SDM_INLINE v2d d2_sqrt(v2d a) { return (v2d)_mm_sqrt_pd((__m128d)a); }
-/* (a[0], b[0]) and (a[1], b[1]) */
+/* d2_firsts() = (a[0], b[0]); d2_seconds() = (a[1], b[1]) */
 SDM_INLINE v2d d2_firsts(v2d a, v2d b) { return (v2d)_mm_unpacklo_pd((__m128d)a, (__m128d)b); }
 SDM_INLINE v2d d2_seconds(v2d a, v2d b) { return (v2d)_mm_unpackhi_pd((__m128d)a, (__m128d)b); }
-/* Rounded to two floats, stored to p[2]; d2_rounded(): rounded to float and back to double. */
+/* d2_store_f() rounds to two floats and stores them to p[2]; d2_rounded() rounds to float and
+   converts back to double. */
 SDM_INLINE void d2_store_f(float *p, v2d a)
 {
     _mm_storel_pi((__m64 *)(void *)p, _mm_cvtpd_ps((__m128d)a));

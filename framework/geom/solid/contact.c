@@ -1,6 +1,6 @@
 /* Self-intersections of a mesh. Candidate pairs of triangles without a common vertex come from the
- * tree (pairs.h), pairs with one from the fans around the vertices (fan.h). The segment in which
- * two triangles meet is found by clipping in the frame of each. */
+ * tree (pairs.h), pairs with a common vertex from the fans around the vertices (fan.h). The segment
+ * in which two triangles meet is clipped in the frame of each triangle. */
 #include "contact.h"
 
 #include <float.h>
@@ -11,7 +11,8 @@
 #include "sdm/internal/heap.h"
 #include "sdm/internal/vec3.h"
 
-// Size of the cache of frames: a triangle that meets others occurs in many pairs.
+// Size of the cache of frames. It is useful because a triangle that meets others occurs in many
+// pairs.
 #define FRAMES_KEPT 256u
 
 typedef struct finder {
@@ -21,7 +22,8 @@ typedef struct finder {
     sdm_contacts *out;
     sdm_contact *list; // [cap] contacts in the order in which they are found
     size_t cap;
-    // [FRAMES_KEPT] direct-mapped cache: frame[t % FRAMES_KEPT] is that of triangle frame_of[...]
+    // [FRAMES_KEPT] direct-mapped cache: frame[i] is the frame of triangle frame_of[i]; triangle t
+    // can be at i = t % FRAMES_KEPT only
     sdm_frame *frame;
     uint32_t *frame_of;
     sdm_arena *arena;
@@ -50,7 +52,7 @@ static const double *corner(const finder *w, uint32_t t, int i)
 static sdm_status contact_add(finder *w, sdm_contact c)
 {
     sdm_contacts *out = w->out;
-    // bound for many coincident layers: contacts grow with the square of their number
+    // limit for meshes with many coincident layers: k layers give about k^2 contacts
     const size_t n_max = 64 * w->topo->n_tri + ((size_t)1 << 20);
     if (out->n == n_max)
         return sdm_fail(w->err, SDM_E_MESH,
@@ -81,16 +83,17 @@ static void frame_get(const finder *w, uint32_t t, sdm_frame *f)
 typedef struct pair_tri {
     uint32_t tri;
     sdm_frame frame;
-    // signed distances of its corners from the plane of the other triangle; 0 when the distance is
-    // not larger than its error
+    // signed distances of the triangle's corners from the plane of the other triangle, mm; a
+    // distance not larger than its error becomes 0
     double d[3];
-    double moved; // largest distance that was set to 0
-    int mask;     // signs that occur in d: 1 negative, 2 zero, 4 positive
+    double moved; // largest abs(distance) that was set to 0, mm
+    int mask;     // sum of the signs that occur in d: 1 negative, 2 zero, 4 positive
 } pair_tri;
 
 /* Fills s->d: distances of the corners of s from the plane of `other`. The error of that plane is
- * the tolerance at the triangle itself and grows linearly with the distance from it: along the
- * longest edge in units of its length, across it in units of the height. */
+ * the tolerance at the triangle `other` itself and grows linearly with the distance from this
+ * triangle: along its longest edge in units of the edge's length, across the edge in units of the
+ * height. */
 static void plane_distances(const finder *w, pair_tri *s, const pair_tri *other)
 {
     const sdm_frame *f = &other->frame;
@@ -130,7 +133,7 @@ static bool clearly_apart(const finder *w, uint32_t i, uint32_t j)
 }
 
 /* Clips the segment p q, in the coordinates of frame f, to its triangle enlarged by the tolerance.
- * False when the rest is not longer than 4 tolerances. */
+ * Returns false when the clipped segment is not longer than 4 tolerances. */
 static bool clip_segment(const sdm_frame *f, double tolerance, double p[2], double q[2])
 {
     const double hp[3] = {-p[1], f->e1y * p[0] - f->e1x * p[1] - f->kh1,
@@ -153,8 +156,8 @@ static bool clip_segment(const sdm_frame *f, double tolerance, double p[2], doub
     return true;
 }
 
-/* p[2] = end points of the segment in which triangle s meets the plane of the other triangle; false
- * when it meets it in one point or not at all. */
+/* Sets p[2] to the end points of the segment in which triangle s meets the plane of the other
+ * triangle. Returns false when triangle and plane meet in one point or not at all. */
 static bool plane_section(const finder *w, const pair_tri *s, double p[2][3])
 {
     const double *d = s->d;
@@ -173,8 +176,8 @@ static bool plane_section(const finder *w, const pair_tri *s, double p[2][3])
     return n == 2;
 }
 
-/* Adds a contact of triangle `on`: the part of it that the segment covers in which `other` meets
- * its plane. *met = true when there is one, else *met is unchanged. */
+/* Adds a contact of triangle `on`: takes the segment in which `other` meets the plane of `on`,
+ * clipped to `on`. Sets *met to true if there is such a contact; otherwise *met is unchanged. */
 static sdm_status add_section(finder *w, const pair_tri *on, const pair_tri *other, bool *met)
 {
     double p[2][3];
@@ -188,8 +191,9 @@ static sdm_status add_section(finder *w, const pair_tri *on, const pair_tri *oth
     return contact_add(w, c);
 }
 
-/* Adds the section on `on` as the contact of both triangles. For when all corners of `on` are on
- * the plane of `other` within its error, so that no section on `other` can be computed. */
+/* Adds the contact segment computed on triangle `on` as a contact of both triangles. Used when all
+ * corners of `on` lie on the plane of `other` within the error of that plane, so that no segment on
+ * `other` can be computed. */
 static sdm_status add_common_section(finder *w, const pair_tri *on, const pair_tri *other,
                                      bool *met)
 {
@@ -206,8 +210,9 @@ static sdm_status add_common_section(finder *w, const pair_tri *on, const pair_t
     return contact_add(w, c);
 }
 
-/* Do two coplanar triangles overlap by more than a strip 4 tolerances wide? Not if all corners of
- * one lie beyond, or at most that far inside, an edge line of the other (separating axes). */
+/* Do two coplanar triangles overlap by more than a strip 4 tolerances wide? They do not if all
+ * corners of one triangle lie outside of an edge line of the other, or at most 4 tolerances inside
+ * this line (separating axes). */
 static bool covers(const finder *w, const pair_tri *a, const pair_tri *b)
 {
     for (int turn = 0; turn < 2; turn++) {
@@ -228,7 +233,7 @@ static bool covers(const finder *w, const pair_tri *a, const pair_tri *b)
 }
 
 /* Adds the contacts of `on` with a coplanar triangle that overlaps it: the overlap itself, and a
- * segment for each edge of `other` that runs on it. */
+ * segment for each edge of `other` that runs over `on`. */
 static sdm_status add_coplanar(finder *w, const pair_tri *on, const pair_tri *other)
 {
     sdm_status s = contact_add(
@@ -253,14 +258,15 @@ static sdm_status pair_intersect(finder *w, uint32_t i, uint32_t j, int shared)
     plane_distances(w, &b, &a);
     if (b.mask == 1 || b.mask == 4) return SDM_OK;
     if (shared && (b.mask == 3 || b.mask == 6)) {
-        // j is on one side of the plane of i: they meet in the common vertices only, unless another
-        // corner of j is on the plane as well
+        // j is on one side of the plane of i: the triangles meet in the common vertices only,
+        // unless another corner of j is on the plane as well
         if ((b.d[0] == 0) + (b.d[1] == 0) + (b.d[2] == 0) == shared) return SDM_OK;
     }
     plane_distances(w, &a, &b);
     if (a.mask == 1 || a.mask == 4) return SDM_OK;
 
-    // coplanar; one in the plane of the other within the error of that plane; the general case
+    // three cases: coplanar triangles; one triangle in the plane of the other, within the error of
+    // that plane; the general case
     sdm_status s = SDM_OK;
     bool met = false;
     if (b.mask == 2 && a.mask == 2) {
@@ -282,7 +288,7 @@ static sdm_status pair_intersect(finder *w, uint32_t i, uint32_t j, int shared)
     return s;
 }
 
-/* Slivers, triangles not higher than the tolerance, meet nothing. */
+/* Is triangle t a sliver: not higher than the tolerance? Slivers have no contacts. */
 static bool is_sliver(const finder *w, uint32_t t)
 {
     return !(w->facets[t].height > w->out->tolerance);
@@ -327,7 +333,7 @@ sdm_status sdm_contacts_find(const sdm_mesh *m, const sdm_topology *topo, const 
         largest = fabs(m->vert[i]) > largest ? fabs(m->vert[i]) : largest;
     c->tolerance = 16 * DBL_EPSILON * largest;
     finder w = {.mesh = m, .topo = topo, .facets = facets, .out = c, .arena = arena, .err = err};
-    // the contacts in the order of the pairs
+    // find the contacts, in the order of the pairs
     const sdm_arena_mark before = arena->end[SDM_HIGH];
     sdm_status s =
         SDM_TAKE_UNSET(arena, SDM_HIGH, &w.frame, FRAMES_KEPT, "frames of triangles", err);
@@ -337,7 +343,7 @@ sdm_status sdm_contacts_find(const sdm_mesh *m, const sdm_topology *topo, const 
     if (!s) s = sdm_fans_visit(m, topo, facets, c->tolerance, arena, visit_neighbours, &w, err);
     if (!s) s = sdm_pairs_visit(m, topo, tree, c->tolerance, arena, visit_apart, &w, err);
     sdm_arena_release(arena, SDM_HIGH, before);
-    // and in the order of their triangles
+    // sort them by triangle
     if (!s) s = sort_contacts(w.list, m->n_tri, arena, c, err);
     sdm_free(w.list);
     arena->used -= w.cap * sizeof *w.list;

@@ -9,7 +9,8 @@
 
 #include "sdm/internal/heap.h"
 
-/* Enlarges an array with capacity *cap, `used` elements of which matter, to at least `need`. */
+/* Enlarges an array with capacity *cap to at least `need` elements; keeps the first `used`
+ * elements. */
 static sdm_status array_reserve(void **block, size_t used, size_t *cap, size_t need, size_t size,
                                 sdm_error *err)
 {
@@ -43,8 +44,8 @@ static double line_position(const line *l, const double x[2])
     return l->d[0] * (x[0] - l->p[0]) + l->d[1] * (x[1] - l->p[1]);
 }
 
-/* *out = point of the edge a b on the line; ha and hb are the distances of a and b from the line,
- * of opposite sign. */
+/* *out = intersection of the edge a b with the line; ha and hb are the distances of a and b from
+ * the line, of opposite sign. */
 static void edge_cross(const sdm_corner *a, double ha, const sdm_corner *b, double hb,
                        sdm_corner *out)
 {
@@ -57,7 +58,8 @@ static void edge_cross(const sdm_corner *a, double ha, const sdm_corner *b, doub
 static bool segment_enters(const double segment[4], const sdm_corner *c, size_t n, double tolerance)
 {
     const line l = line_of(segment);
-    // extent of the polygon across the line, and from .. to where the line crosses it
+    // low, high: extent of the polygon across the line; from, to: where the line enters and leaves
+    // the polygon
     double low = 0, high = 0, from = INFINITY, to = -INFINITY;
     double h = line_distance(&l, c[n - 1].x);
     for (size_t i = 0; i < n; i++) {
@@ -79,8 +81,8 @@ static bool segment_enters(const double segment[4], const sdm_corner *c, size_t 
     return fmin(to, l.length) - fmax(from, 0) > tolerance;
 }
 
-/* out = the part of a convex polygon on one side of a line (side +1: left, -1: right). Returns its
- * number of corners. */
+/* out = the part of a convex polygon on one side of a line (side +1: left, -1: right). Returns the
+ * number of its corners. */
 static size_t polygon_half(const line *l, double side, const sdm_corner *c, size_t n,
                            sdm_corner *out)
 {
@@ -124,9 +126,10 @@ static bool polygon_is_narrow(const sdm_corner *c, size_t n, double tolerance)
     return !(fabs(area) > tolerance * perimeter);
 }
 
-/* Pushes the half of the piece `from`, whose corners and segments are in the work arrays, on one
- * side of a line; `at` says where in the arrays of the stack its corners and segments begin.
- * *made = the pushed piece, or one without corners when the half is empty. */
+/* Pushes one half of a piece, on one side of a line, on the stack. from: the whole piece, whose
+ * corners and segments are in the work arrays; at: where in the arrays of the stack the corners and
+ * segments of the half begin. *made = the pushed piece, or one without corners when the half is
+ * empty. */
 static sdm_status piece_push_half(sdm_cutter *w, size_t *n_piece, sdm_cut_piece at,
                                   sdm_cut_piece from, const line *l, double side, double tolerance,
                                   sdm_cut_piece *made, sdm_error *err)
@@ -212,7 +215,7 @@ sdm_status sdm_cut_triangle(sdm_cutter *w, const sdm_corner corner[3], const sdm
                 s = visit(user, w->work_corner, p.n_corner);
             continue;
         }
-        // cut along the middle one: if they run along a curve, the halves are balanced
+        // cut along the middle segment: if the segments follow a curve, the halves are balanced
         const line l = line_of(w->work_segment[cutters / 2]);
         sdm_cut_piece from = p, left;
         from.n_segment = cutters;

@@ -26,10 +26,10 @@ typedef struct sdm_cutter {
     size_t cap_corner, cap_segment, cap_piece, cap_work_corner, cap_work_segment;
 } sdm_cutter;
 
-/* Cuts the triangle corner[3] along the segments of contacts[n] (coplanar ones have none) and calls
- * visit(user, corner, n) for each piece, its corners in the orientation of the triangle. Pieces
- * with area <= tolerance * perimeter are left out. Stops at the first status of visit() other than
- * SDM_OK and returns it; SDM_E_NOMEM. */
+/* Cuts the triangle corner[3] along the segments of contacts[n] (coplanar contacts have none) and
+ * calls visit(user, corner, n) for each piece; the corners of a piece have the orientation of the
+ * triangle. Pieces with area <= tolerance * perimeter are left out. Stops at the first status of
+ * visit() other than SDM_OK and returns it; SDM_E_NOMEM. */
 sdm_status sdm_cut_triangle(sdm_cutter *w, const sdm_corner corner[3], const sdm_contact *contacts,
                             size_t n, double tolerance,
                             sdm_status (*visit)(void *user, const sdm_corner *corner, size_t n),

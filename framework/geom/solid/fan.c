@@ -1,15 +1,15 @@
-/* Pairs of triangles with a common vertex. Most are excluded by a test of the whole fan, the
- * triangles around a vertex: if it is closed, all its normals are within a fixed angle of their
- * mean, and it winds around the vertex exactly once as seen along that mean, then the fan is a
- * disc: seen along the mean it does not overlap itself, so its triangles meet in common vertices
- * and edges only. */
+/* Finds pairs of triangles with a common vertex that may also meet elsewhere. The fan of a vertex
+ * is the set of triangles around it. A fan is a disc if it is closed, all its normals are within a
+ * fixed angle of their mean, and it winds around the vertex exactly once as seen along this mean.
+ * Seen along the mean, a disc does not overlap itself, so its triangles meet in common vertices and
+ * edges only. This excludes most pairs. */
 #include "fan.h"
 
 #include "memory/cancel.h"
 #include "sdm/internal/vec3.h"
 
-/* Bound on cos(angle between a normal and the mean normal of a disc), far above its rounding error.
- */
+/* Lower bound on cos(angle between a normal and the mean normal of a disc); it is far above the
+ * rounding error of this cosine. */
 #define COSINE_MIN 0.25
 /* Minimum height of a triangle in a disc, in tolerances: its normal is then accurate to about 1e-3.
  * Long needles are allowed, so that a round face triangulated from its centre is a disc. */
@@ -22,10 +22,10 @@ typedef struct search {
     double height_min;
 } search;
 
-/* The fan of one vertex; its members are sums over its triangles. */
+/* The fan of one vertex. The members are accumulated over its triangles. */
 typedef struct fan {
     double mean[3];  // sum of the unit normals
-    double dot_min;  // bound on the dot product of each normal with `mean`
+    double dot_min;  // lower bound on the dot product of each normal with `mean` in a disc
     double side[3];  // a vector perpendicular to `mean`
     uint32_t rounds; // how often the fan winds around the vertex
     bool is_disc;
@@ -71,8 +71,8 @@ static void choose_sides(size_t n, fan *list)
 }
 
 /* Checks the normals against `mean` and sets `rounds`. When all normals agree with the mean, all
- * triangles of the fan turn in the same direction as seen along it, so the number of triangles that
- * cross a fixed half-plane through the vertex is the number of rounds. */
+ * triangles of the fan turn in the same direction, seen along the mean, so the number of triangles
+ * that cross a fixed half-plane through the vertex is the number of rounds. */
 static void count_rounds(const search *w, fan *list)
 {
     const sdm_topology *t = w->topo;
@@ -90,8 +90,8 @@ static void count_rounds(const search *w, fan *list)
     }
 }
 
-/* Corners (3 * triangle + corner) at the vertices whose fan is not a disc, in ascending order:
- * those of v are at[first[v]] .. at[first[v + 1] - 1]. */
+/* Corners (numbers 3 * triangle + corner) at the vertices whose fan is not a disc. The corners at
+ * vertex v are at[first[v]] .. at[first[v + 1] - 1], in ascending order. */
 typedef struct corners {
     uint32_t *first, *at;
 } corners;
@@ -114,7 +114,7 @@ static sdm_status list_corners(const search *w, const fan *list, sdm_arena *aren
 }
 
 /* Visits the pairs of triangles around v. A pair is visited only at the lowest of its common
- * vertices, and not at all when the fan of one of them is a disc. */
+ * vertices, and not at all when the fan of one of these vertices is a disc. */
 static sdm_status visit_pairs(const search *w, const fan *list, const corners *c, uint32_t v,
                               sdm_status (*visit)(void *user, uint32_t i, uint32_t j, int shared),
                               void *user, const sdm_exact_opts *opts, sdm_error *err)
@@ -151,7 +151,7 @@ sdm_status sdm_fans_visit(const sdm_mesh *m, const sdm_topology *topo, const sdm
     corners c = {0};
     sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &list, m->n_vert, "vertices", err);
     if (s) return s;
-    // which fans are discs
+    // find which fans are discs
     sum_normals(&w, list);
     choose_sides(m->n_vert, list);
     count_rounds(&w, list);
@@ -160,7 +160,7 @@ sdm_status sdm_fans_visit(const sdm_mesh *m, const sdm_topology *topo, const sdm
         list[v].is_disc = list[v].is_disc && list[v].rounds == 1;
         any = any || !list[v].is_disc;
     }
-    // the pairs around the other vertices
+    // visit the pairs around the vertices whose fans are not discs
     if (any) s = list_corners(&w, list, arena, &c, err);
     for (uint32_t v = 0; v < m->n_vert && any && !s; v++)
         if (!list[v].is_disc) s = visit_pairs(&w, list, &c, v, visit, user, arena->opts, err);

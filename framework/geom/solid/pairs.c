@@ -1,6 +1,6 @@
-/* Overlapping boxes by a hierarchy of fan-out eight: blocks of up to eight triangles in the order
- * of the tree, then the boxes of eight blocks, of eight of those, and so on. Boxes are floats in
- * units of the mesh's size, rounded outwards. */
+/* Finds overlapping boxes by a hierarchy with eight children per node: blocks of up to eight
+ * triangles in the order of the tree, then nodes of eight blocks, nodes of eight such nodes, and so
+ * on. Boxes are floats in units of the mesh's size, rounded outwards. */
 #include "pairs.h"
 
 #include <math.h>
@@ -37,7 +37,7 @@ static inline uint8_t *has_corner(const pairing *w, const block *b, size_t lane,
     return &w->has[b->corner[lane][c]];
 }
 
-/* Visits the pairs of a triangle of block i, the current one, and a triangle of block j >= i. */
+/* Visits the pairs of a triangle of block i (the current block) and a triangle of block j >= i. */
 static sdm_status pairs_of_blocks(const pairing *w, size_t i, size_t j)
 {
     const block *a = &w->blocks[i], *b = &w->blocks[j];
@@ -57,7 +57,7 @@ static sdm_status pairs_of_blocks(const pairing *w, size_t i, size_t j)
     return SDM_OK;
 }
 
-/* Visits the pairs of block i with itself and with all later blocks. */
+/* Visits the pairs of a triangle of block i and a triangle of block i or of a later block. */
 static sdm_status pairs_of_block(const pairing *w, size_t i)
 {
     struct {
@@ -183,7 +183,7 @@ static void fill_blocks(pairing *w, const sdm_mesh *m, const sdm_topology *topo,
     }
 }
 
-/* Level k has the boxes of n elements: clears its unused lanes and fills level k + 1. */
+/* Level k has the boxes of n elements: clears the unused lanes of level k and fills level k + 1. */
 static void fill_level(const pairing *w, int k, size_t n)
 {
     for (; n % 8; n++) lane_clear(&w->level[k][n / 8], n % 8);
@@ -207,7 +207,7 @@ sdm_status sdm_pairs_visit(const sdm_mesh *m, const sdm_topology *topo, const sd
 {
     const sdm_arena_mark before = arena->end[SDM_HIGH];
     pairing w = {.visit = visit, .user = user};
-    size_t n = (tree->n_node + 1) / 2; // leaves of the tree, at least as many as blocks
+    size_t n = (tree->n_node + 1) / 2; // number of leaves of the tree; there are not more blocks
     sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &w.blocks, n, "pairs of triangles", err);
     if (!s) s = SDM_TAKE(arena, SDM_HIGH, &w.has, m->n_vert, "pairs of triangles", err);
     do {

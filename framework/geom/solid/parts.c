@@ -1,4 +1,4 @@
-/* Finds the parts of a closed mesh that are inside out: one ray per part. */
+/* Finds and turns the parts of a closed mesh that are inside out, by one ray per part. */
 #include "parts.h"
 
 #include <stdbool.h>
@@ -8,9 +8,9 @@
 
 /* A part; stored at the index of its root triangle. */
 typedef struct part {
-    uint32_t widest; /* its triangle with the largest area */
-    bool meets;      /* it has contacts with another part */
-    bool turn;
+    uint32_t widest; /* the part's triangle with the largest area */
+    bool meets;      /* the part has contacts with another part */
+    bool turn;       /* the part is inside out */
 } part;
 
 sdm_status sdm_parts_turn(sdm_mesh *m, const sdm_survey *survey, size_t *n_turned, sdm_error *err)
@@ -24,7 +24,7 @@ sdm_status sdm_parts_turn(sdm_mesh *m, const sdm_survey *survey, size_t *n_turne
     sdm_status s = SDM_ALLOC(&root, m->n_tri, "parts", err);
     if (!s) s = SDM_ALLOC(&parts, m->n_tri, "parts", err);
     if (!s) {
-        // the widest triangle of each part, and whether the part meets another
+        // the widest triangle of each part, and whether the part meets another part
         sdm_topology_parts(&survey->topo, root);
         for (uint32_t t = 0; t < m->n_tri; t++) root[t] = sdm_forest_root(root, t);
         for (uint32_t t = 0; t < m->n_tri; t++) parts[t].widest = t;
@@ -35,7 +35,7 @@ sdm_status sdm_parts_turn(sdm_mesh *m, const sdm_survey *survey, size_t *n_turne
             for (uint32_t c = contacts->first[t]; c < contacts->first[t + 1]; c++)
                 if (root[contacts->list[c].other] != root[t]) p->meets = true;
         }
-        // winding number just outside the widest triangle of each other part
+        // for parts that meet no other: the winding number just outside the widest triangle
         for (uint32_t t = 0; t < m->n_tri; t++) {
             part *p = &parts[t];
             if (root[t] != t || p->meets || !(facets[p->widest].height > contacts->tolerance))

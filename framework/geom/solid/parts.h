@@ -1,4 +1,4 @@
-/* Parts (components connected by edges) of a closed mesh that are inside out. */
+/* Turns parts (components connected by edges) of a closed mesh that are inside out. */
 #ifndef SDM_GEOM_PARTS_H
 #define SDM_GEOM_PARTS_H
 
@@ -12,11 +12,12 @@ static inline void sdm_triangle_turn(sdm_mesh *m, size_t t)
     m->tri[3 * t + 2] = v;
 }
 
-/* Turns each part of the closed mesh m with a winding number below 0 just outside of its widest
- * triangle: the boundary of a solid has no such point. The surface of a cavity in a solid has a
- * winding number of at least 0 outside and stays. Parts with contacts to other parts stay too: it
- * is undecidable which of them is wrong. *n_turned: number of turned parts; if it is not 0, the
- * survey of m is out of date. SDM_E_NOMEM. */
+/* Turns (reverses) each part of the closed mesh m that has a winding number < 0 just outside of its
+ * widest triangle; such points do not occur at the boundary of a solid. The surface of a cavity in
+ * a solid has a winding number >= 0 just outside and is not turned. Parts with contacts to other
+ * parts are not turned either, because it is undecidable which of them is wrong. A mesh that is not
+ * closed is left as it is. *n_turned: number of turned parts; if it is not 0, the survey of m is
+ * out of date. SDM_E_NOMEM. */
 sdm_status sdm_parts_turn(sdm_mesh *m, const sdm_survey *survey, size_t *n_turned, sdm_error *err);
 
 #endif

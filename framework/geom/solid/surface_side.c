@@ -1,8 +1,8 @@
-/* Winding numbers just outside the surface. On a triangle that others cross, the winding number is
- * carried along a straight path from a start point where it is known: it changes by one at every
- * contact segment that the path crosses. A ray is cast instead where the path is too close to the
- * end of a segment, where triangles touch in corners, edges or planes, and where no start point is
- * known. */
+/* Computes winding numbers just outside the surface. On a triangle that other triangles cross, the
+ * winding number is carried along a straight path from a start point where it is known: it changes
+ * by one at every contact segment that the path crosses. A ray is cast instead where the path is
+ * too close to the end of a segment, where triangles touch in corners, edges or planes, and where
+ * no start point is known. */
 #include "surface_side.h"
 
 #include "mesh/crossings.h"
@@ -66,8 +66,8 @@ sdm_status sdm_sides_build(const sdm_mesh *m, const sdm_survey *survey, sdm_aren
             if (root == t || f[t].longest * f[t].height > f[l].longest * f[l].height)
                 largest[root] = t;
         }
-        // A ray from the largest triangle of each patch. The root of a patch is its triangle of
-        // lowest index, so it comes before the others.
+        // Cast a ray from the largest triangle of each patch. The root of a patch is its triangle
+        // of lowest index, so the loop reaches the root before the patch's other triangles.
         for (uint32_t t = 0; t < m->n_tri; t++) {
             if (!meets_nothing(survey, t) || sdm_sides_is_sliver(survey, t)) continue;
             const uint32_t l = largest[t];
@@ -94,7 +94,7 @@ void sdm_sides_turn_to(sdm_sides *w, uint32_t t)
     w->tri = t;
     sdm_facet_frame(w->mesh, t, &w->frame);
     w->known = false;
-    // are paths possible, with few contacts and only crossings?
+    // paths are possible if the triangle has few contacts, all of them crossings
     w->simple = c->first[t + 1] - c->first[t] <= WALK_CONTACTS_MAX;
     for (uint32_t i = c->first[t]; i < c->first[t + 1] && w->simple; i++)
         w->simple = c->list[i].kind == SDM_CONTACT_CROSSING;
@@ -126,9 +126,9 @@ static double distance2d(const double a[2], const double b[2])
     return sqrt(x * x + y * y);
 }
 
-/* Adds to *change what crossing the segment of contact c changes the winding number on the path
- * from a to b; false when a, b or an end of the segment is too close to the other line to decide.
- */
+/* If the path from a to b crosses the segment of contact c, adds the resulting change (+1 or -1) of
+ * the winding number to *change. Returns false when this cannot be decided: a or b is too close to
+ * the line of the segment, or an end of the segment is too close to the line of the path. */
 static bool contact_pass(const sdm_sides *w, const sdm_contact *c, const double a[2],
                          const double b[2], int *change)
 {
@@ -148,8 +148,8 @@ static bool contact_pass(const sdm_sides *w, const sdm_contact *c, const double 
     return true;
 }
 
-/* *outside = winding number just outside the current triangle at xy, by a path from its start
- * point; false when this is not possible. */
+/* Sets *outside to the winding number just outside the current triangle at xy, by a path from the
+ * triangle's start point. Returns false when this is not possible. */
 static bool walk_to(const sdm_sides *w, const double xy[2], int *outside)
 {
     const sdm_contacts *c = &w->survey->contacts;
@@ -171,8 +171,9 @@ static bool on_triangle(const sdm_mesh *m, uint32_t t, const double x[3])
     return p[1] > 0 && f.e1y * p[0] - f.e1x * p[1] - f.kh1 < 0 && f.e2y * p[0] - f.e2x * p[1] < 0;
 }
 
-/* sdm_sides_keep() by a ray from x. The current triangle and its coplanar contacts are skipped by
- * the ray and count together as one layer. */
+/* Does the work of sdm_sides_keep() by a ray from x, the point at xy. The ray skips the current
+ * triangle and its coplanar contacts, which together count as one layer. If paths are possible on
+ * the triangle, x becomes their start point. */
 static sdm_status keep_by_ray(sdm_sides *w, const double xy[2], const double x[3], bool *keep,
                               sdm_error *err)
 {
@@ -186,8 +187,8 @@ static sdm_status keep_by_ray(sdm_sides *w, const double xy[2], const double x[3
         w->cap_skip = 2 * n + 16;
     }
     size_t n_skip = 0;
-    // difference of the winding number inside and outside the layer at x, and whether the current
-    // triangle is the one of lowest index among those of its orientation
+    // jump: winding number inside minus winding number outside the layer at x; first: the current
+    // triangle has the lowest index among those of its orientation
     int jump = 1;
     bool first = true;
     w->skip[n_skip++] = t;

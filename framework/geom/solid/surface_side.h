@@ -1,5 +1,5 @@
 /* Decides which parts of the surface of a closed mesh bound its solid, the points with winding
- * number >= 1: those with a winding number <= 0 just outside and >= 1 just inside. */
+ * number >= 1: the parts with a winding number <= 0 just outside and >= 1 just inside. */
 #ifndef SDM_GEOM_SURFACE_SIDE_H
 #define SDM_GEOM_SURFACE_SIDE_H
 
@@ -13,21 +13,21 @@ typedef struct sdm_sides {
     /* the current triangle and its frame */
     uint32_t tri;
     sdm_frame frame;
-    bool simple;       /* it has only contacts of kind CROSSING, and few of them */
+    bool simple;       /* the triangle has only contacts of kind CROSSING, and few of them */
     bool known;        /* start and start_outside are set */
     double start[2];   /* a point of the triangle, in its frame */
-    int start_outside; /* winding number just outside that point */
-    uint32_t *skip;    /* [cap_skip] the triangle and its coplanar contacts */
+    int start_outside; /* winding number just outside the surface at `start` */
+    uint32_t *skip;    /* [cap_skip] scratch: the triangle and its coplanar contacts */
     size_t cap_skip;
 } sdm_sides;
 
-/* Is triangle t a sliver: not higher than the tolerance? Slivers are ignored; their neighbours
- * cover them. */
+/* Is triangle t a sliver: not higher than the tolerance? Slivers are left out of the surface,
+ * because their neighbours cover them. */
 bool sdm_sides_is_sliver(const sdm_survey *survey, uint32_t t);
 
-/* Finds the winding numbers outside[]: one ray for each patch of neighbouring triangles without
- * contacts, since the winding number does not change across an edge between two of them. outside[]
- * is taken from the high end of the arena. m and survey must outlive *w. SDM_E_NOMEM. */
+/* Finds the winding numbers outside[] by one ray for each patch, a set of neighbouring triangles
+ * without contacts: the winding number does not change across an edge between two such triangles.
+ * outside[] is taken from the high end of the arena. m and survey must outlive *w. SDM_E_NOMEM. */
 sdm_status sdm_sides_build(const sdm_mesh *m, const sdm_survey *survey, sdm_arena *arena,
                            sdm_sides *w, sdm_error *err);
 void sdm_sides_dispose(sdm_sides *w);
@@ -38,8 +38,8 @@ bool sdm_sides_keep_whole(const sdm_sides *w, uint32_t t);
 /* Makes triangle t, which has contacts, the current triangle and sets w->frame. */
 void sdm_sides_turn_to(sdm_sides *w, uint32_t t);
 
-/* *keep = the current triangle bounds the solid at the point xy of its frame and, of several
- * coplanar triangles there with its orientation, has the lowest index. SDM_E_NOMEM. */
+/* *keep = true if the current triangle bounds the solid at the point xy of its frame and has the
+ * lowest index among the coplanar triangles of the same orientation at this point. SDM_E_NOMEM. */
 sdm_status sdm_sides_keep(sdm_sides *w, const double xy[2], bool *keep, sdm_error *err);
 
 #endif

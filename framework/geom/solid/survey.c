@@ -31,11 +31,12 @@ static sdm_status check_content(const sdm_mesh *m, sdm_error *err)
     return SDM_OK;
 }
 
-/* Facets, area, volume and the number of degenerate triangles. */
+/* Computes the facets, area and volume, and counts the degenerate triangles. */
 static void measure_facets(const sdm_mesh *m, sdm_survey *survey)
 {
     sdm_audit *a = &survey->audit;
-    // volume relative to the centre of the mesh: digits are not lost far from the origin
+    // the volume is summed relative to the centre of the mesh, so that no digits are lost far from
+    // the origin
     const double mid[3] = {0.5 * (a->min[0] + a->max[0]), 0.5 * (a->min[1] + a->max[1]),
                            0.5 * (a->min[2] + a->max[2])};
     sdm_facets_build(m, mid, survey->facets, &a->area, &a->volume);
@@ -44,19 +45,19 @@ static void measure_facets(const sdm_mesh *m, sdm_survey *survey)
                          !(survey->facets[t].height > 4 * DBL_EPSILON * survey->facets[t].longest);
 }
 
-/* The vertex of its triangle that half-edge h does not touch. */
+/* The vertex opposite to half-edge h in its triangle. */
 static uint32_t vertex_across(const sdm_topology *topo, uint32_t h)
 {
     return topo->tri[h % 3 ? h - 1 : h + 2];
 }
 
-/* Counts duplicate triangles: those that share an edge and the vertex opposite to it with a
- * triangle of lower index. Each is counted at its half-edge 0 only. */
+/* Counts duplicate triangles: those that share an edge and the vertex opposite to this edge with a
+ * triangle of lower index. Each triangle is counted at its half-edge 0 only. */
 static sdm_status count_duplicates(const sdm_topology *topo, sdm_arena *arena, sdm_audit *a,
                                    sdm_error *err)
 {
     const sdm_arena_mark before = arena->end[SDM_HIGH];
-    // [n_vert] for the current edge: lowest triangle in which the vertex is opposite to it
+    // [n_vert] for the current edge: lowest triangle in which the vertex is opposite to the edge
     uint32_t *first;
     const sdm_status s = SDM_TAKE_UNSET(arena, SDM_HIGH, &first, topo->n_vert, "vertices", err);
     if (s) return s;
@@ -157,7 +158,7 @@ sdm_status sdm_mesh_audit(const sdm_mesh *m, sdm_audit *out, sdm_error *err)
         return sdm_fail(err, SDM_E_ARG, "audit without a mesh or a place for the result");
     sdm_survey survey = {0};
     sdm_arena arena = {0};
-    // the bytes that closed meshes with few contacts need
+    // number of bytes that a closed mesh with few contacts needs
     sdm_status s = sdm_arena_reserve(&arena, 320 * m->n_tri + 16 * m->n_vert, err);
     if (!s) s = sdm_survey_build(m, &arena, &survey, err);
     if (!s) *out = survey.audit;

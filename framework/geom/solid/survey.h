@@ -22,8 +22,8 @@ typedef struct sdm_survey {
 sdm_status sdm_survey_build(const sdm_mesh *m, sdm_arena *arena, sdm_survey *survey,
                             sdm_error *err);
 
-/* Releases the facets and contacts, without keep_topology also the topology; the audit and the tree
- * stay. All that was taken from the arena's high end since the survey is released with them. */
+/* Releases the facets and contacts and, unless keep_topology, the topology; the audit and the tree
+ * stay. Arrays taken from the arena's high end after the survey are released as well. */
 void sdm_survey_shrink(sdm_survey *survey, sdm_arena *arena, bool keep_topology);
 
 #endif

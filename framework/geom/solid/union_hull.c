@@ -6,7 +6,7 @@
  * If the winding number is nowhere negative and no sheets cancel, the removal changes distances
  * inside the solid only: for a point outside, the straight path to the nearest point of the mesh
  * crosses no surface, so that point is on the boundary. Surface with winding numbers <= 0 on both
- * sides (of a part that is inside out) bounds no solid and is removed, too. */
+ * sides belongs to a part that is inside out; it bounds no solid and is removed, too. */
 #include "union_hull.h"
 
 #include <string.h>
@@ -17,8 +17,8 @@
 #include "surface_side.h"
 #include "vertex_table.h"
 
-// Vertices made by cuts are merged within this distance, in tolerances: one point of the seam is
-// computed on each of the two or three triangles that meet there.
+// Vertices made by cuts are merged within this distance, in tolerances. The merge is necessary
+// because each point of the seam is computed on each of the two or three triangles that meet there.
 #define MERGE 4
 
 typedef struct hull {
@@ -31,7 +31,7 @@ typedef struct hull {
     sdm_sides sides;
     sdm_vertex_table seam; // vertices made by cuts
     size_t pieces, kept;   // number of pieces of the current triangle
-    size_t n_vert, n_tri;  // filled in `out`
+    size_t n_vert, n_tri;  // vertices and triangles filled in `out`
 } hull;
 
 static size_t bytes_for(size_t n_vert, size_t n_tri)
@@ -65,8 +65,8 @@ static void add_triangle(hull *w, uint32_t a, uint32_t b, uint32_t c, uint32_t s
     w->source[w->n_tri++] = source;
 }
 
-/* *v = the vertex at xy of the current triangle: an earlier one within the tolerance, or a new one.
- */
+/* *v = index of the vertex at xy of the current triangle: an earlier vertex within the tolerance,
+ * or a new one. */
 static sdm_status seam_vertex(hull *w, const double xy[2], uint32_t *v)
 {
     double x[3];
@@ -77,7 +77,8 @@ static sdm_status seam_vertex(hull *w, const double xy[2], uint32_t *v)
     return sdm_vertex_table_add(&w->seam, w->out->vert, *v, w->err);
 }
 
-/* For sdm_cut_triangle(): adds a piece of the current triangle if it stays. */
+/* Callback of sdm_cut_triangle(): adds a piece of the current triangle to the hull if the piece
+ * bounds the solid. */
 static sdm_status add_piece(void *user, const sdm_corner *c, size_t n)
 {
     hull *w = user;
@@ -89,8 +90,8 @@ static sdm_status add_piece(void *user, const sdm_corner *c, size_t n)
     w->pieces++;
     if (s || !keep) return s;
     w->kept++;
-    // triangulated as a fan; corners that are vertices of the mesh stay the same vertices, and
-    // triangles of which two corners merge are left out
+    // triangulate the piece as a fan; corners that are vertices of the mesh stay the same vertices,
+    // and triangles with two merged corners are left out
     s = hull_reserve(w, n, n);
     if (s) return s;
     uint32_t first = 0, before = 0;
@@ -105,7 +106,8 @@ static sdm_status add_piece(void *user, const sdm_corner *c, size_t n)
     return s;
 }
 
-/* Cuts triangle t and adds the pieces that stay. *whole = all of them stay; then none is added. */
+/* Cuts triangle t and adds the pieces that stay. If all pieces stay, sets *whole to true and adds
+ * none of them. */
 static sdm_status cut_triangle(hull *w, sdm_cutter *cutter, uint32_t t, bool *whole)
 {
     const sdm_contacts *c = &w->survey->contacts;
@@ -122,7 +124,7 @@ static sdm_status cut_triangle(hull *w, sdm_cutter *cutter, uint32_t t, bool *wh
         sdm_cut_triangle(cutter, corner, c->list + c->first[t], c->first[t + 1] - c->first[t],
                          c->tolerance, add_piece, w, w->err);
     *whole = w->kept == w->pieces && w->pieces;
-    // take back the vertices and triangles of the pieces
+    // remove the vertices and triangles of the pieces again
     if (!s && *whole) {
         w->n_vert = n_vert;
         w->n_tri = n_tri;
@@ -142,7 +144,8 @@ static sdm_status add_whole(hull *w, uint32_t t)
 static sdm_status drop_unused(sdm_mesh *m, sdm_arena *arena, sdm_error *err)
 {
     const sdm_arena_mark before = arena->end[SDM_HIGH];
-    uint32_t *index; // [n_vert] first 1 for used vertices, then their new index
+    // [n_vert] at first 1 for used vertices and 0 for others, then the new index of used vertices
+    uint32_t *index;
     const sdm_status s = SDM_TAKE(arena, SDM_HIGH, &index, m->n_vert, "vertices in use", err);
     if (s) return s;
     for (size_t i = 0; i < 3 * m->n_tri; i++) index[m->tri[i]] = 1;
@@ -158,7 +161,8 @@ static sdm_status drop_unused(sdm_mesh *m, sdm_arena *arena, sdm_error *err)
     return SDM_OK;
 }
 
-/* Adds the triangles and pieces that stay. *changed = something was left out. */
+/* Adds the triangles and pieces that stay. *changed = true if some triangle that is not a sliver
+ * was left out, wholly or in part. */
 static sdm_status hull_build(hull *w, bool *changed)
 {
     const sdm_contacts *c = &w->survey->contacts;
@@ -204,8 +208,8 @@ sdm_status sdm_union_hull(const sdm_mesh *m, const sdm_survey *survey, sdm_arena
     out->n_vert = w.n_vert;
     out->n_tri = w.n_tri;
     if (!*changed) return SDM_OK;
-    // sum of the errors: narrow pieces that were left out, rounding of new vertices, vertices moved
-    // onto planes, and vertices merged
+    // sum of the errors from narrow pieces that were left out, from rounding of new vertices, from
+    // vertices that were taken to lie on planes, and from merged vertices
     *error_mm = (8 + 2 * MERGE) * survey->contacts.tolerance + 2 * survey->contacts.error;
     return drop_unused(out, arena, err);
 }

@@ -1,5 +1,5 @@
 /* Spatial hash: vertices are hashed by their cell of a coarse grid. For a point near the boundary
- * of a cell the search includes the cell beyond it. */
+ * of a cell the search includes the neighbouring cell beyond this boundary. */
 #include "vertex_table.h"
 
 #include <math.h>
@@ -7,7 +7,7 @@
 #include "sdm/internal/rng.h"
 #include "sdm/memory.h"
 
-#define CELL 1024.0 // edge of a cell in tolerances: large, so that few points are near a boundary
+#define CELL 1024.0 // edge of a cell in tolerances; large, so that few points are near a boundary
 
 /* Index of a cell: coordinate / edge, truncated towards zero, so that cell 0 is twice as wide. */
 typedef struct cell {
@@ -36,7 +36,8 @@ void sdm_vertex_table_find(const sdm_vertex_table *t, const double *vert, uint32
     *v = n_vert;
     if (!t->size) return;
     const cell low = cell_of(t, x, -t->tolerance), high = cell_of(t, x, t->tolerance);
-    // bits of `near`: axes along which x is near a boundary; `side` runs through all subsets
+    // bits of `near`: axes along which x is near a boundary of its cell; `side` runs through all
+    // subsets of these bits
     unsigned near = 0, side = 0;
     for (int a = 0; a < 3; a++) near |= (unsigned)(low.x[a] != high.x[a]) << a;
     do {
@@ -56,7 +57,7 @@ void sdm_vertex_table_find(const sdm_vertex_table *t, const double *vert, uint32
     } while (side);
 }
 
-/* Inserts vertex v; there is a free entry. */
+/* Inserts vertex v; the table must have a free entry. */
 static void table_insert(sdm_vertex_table *t, const double *vert, uint32_t v)
 {
     const cell c = cell_of(t, &vert[3 * (size_t)v], 0);

@@ -1,4 +1,4 @@
-/* Hash table that finds a vertex by its coordinates, to a tolerance. */
+/* Hash table that finds a vertex by its coordinates, up to a tolerance. */
 #ifndef SDM_GEOM_VERTEX_TABLE_H
 #define SDM_GEOM_VERTEX_TABLE_H
 
@@ -14,10 +14,10 @@ typedef struct sdm_vertex_table {
     size_t size, n;   /* size is 0 or a power of two; n entries are used */
 } sdm_vertex_table;
 
-/* *v = an added vertex with an index below n_vert and within the tolerance of x; n_vert if there is
- * none. The table stores indices only and reads coordinates from vert[n_vert][3]: entries
- * of vertices that were since removed (index >= n_vert) are skipped, and for an index that was
- * reused the new coordinates count. */
+/* *v = an added vertex with an index below n_vert that lies within the tolerance of x; n_vert if
+ * there is none. The table stores indices only and reads coordinates from vert[n_vert][3]: entries
+ * of vertices that were removed since (index >= n_vert) are skipped, and if an index was reused,
+ * its new coordinates count. */
 void sdm_vertex_table_find(const sdm_vertex_table *t, const double *vert, uint32_t n_vert,
                            const double x[3], uint32_t *v);
 /* Adds vertex v, whose coordinates are vert[v]. SDM_E_NOMEM. */

@@ -1,5 +1,5 @@
-/* Distances outside the grid of a map, from the distances at the faces of its box. Internal to the
-   level set library. */
+/* Distances outside the grid of a map, computed from the distances d at the faces of the box that
+   its voxels fill. Internal to the level set library. */
 #ifndef SDM_FACES_H
 #define SDM_FACES_H
 
@@ -16,7 +16,7 @@ extern "C" {
    holds max(d(b), 0) at the points, level l the minimum over squares of 2^l x 2^l points. */
 typedef struct sdm_face {
     int levels;
-    /* Squares of each level along the two axes that follow the axis of the face. */
+    /* Numbers of squares of each level along the two axes that follow the axis of the face. */
     int64_t n[SDM_FACE_LEVELS][2];
     double *min[SDM_FACE_LEVELS];
     /* The nearest point of the last search: a good start for the next voxel. */

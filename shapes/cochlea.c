@@ -7,6 +7,9 @@
  *     r = a exp(-b theta)    z = c theta + alpha exp(-kappa theta) cos(theta - phi)
  *     R = radius - taper theta + flare exp(-theta / flare_angle)
  *
+ * Here (r, theta, z) are the cylindrical coordinates of the centreline, with theta = 0 at the basal
+ * end, and R is the tube radius.
+ *
  * Turns touch and overlap: the mesh intersects itself on purpose, and the shape is the union of the
  * volumes that the tube encloses. Rings of vertices lie at fixed fractions of the apical angle with
  * a fixed number of sectors. The fractions and the number of sectors depend only on the options, so
@@ -17,9 +20,9 @@
  * The vertices of the rings lie ON the tube, so the mesh is inscribed: between its vertices it is
  * inside of the tube by up to R (1 - cos(pi / sectors)) = 0.015 R across the tube, and by edge^2 /
  * 8 times the curvature of the wall along the tube (outside on the inner side of the bend). The
- * closed-form distance is that of a ball of radius R swept along the centreline. Its surface agrees
- * with the tube where R changes slowly (to 4 micrometres without flare) and is up to 0.013 mm (0.05
- * mm at a = 2) farther out at the flare.
+ * closed-form distance is that of a ball of radius R swept along the centreline. The zero surface
+ * of this distance agrees with the tube where R changes slowly (to 4 micrometres without flare) and
+ * is up to 0.013 mm (0.05 mm at a = 2) farther out at the flare.
  *
  * Near the apex the tube radius exceeds the radius of curvature of the centreline, so the inner
  * parts of neighbouring cross-sections would run backwards: the mesh would be inside out there and
@@ -27,8 +30,8 @@
  * shape loses nothing: a point behind the centre of curvature is nearer to another part of the
  * centreline, whose section or cap encloses it.
  *
- * With free = anatomy, anatomical constants that vary between ears become parameters, too: for fits
- * to images. */
+ * With the option free = anatomy, anatomical constants that vary between ears become parameters,
+ * too, for fits to images. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>

@@ -1,7 +1,7 @@
 /* Centreline of the cochlea, its moving frame and tube radius, with derivatives with respect to the
    unknowns. The centreline is a rising logarithmic spiral with a longitudinal wave; theta is the
-   angle around the z axis, from 0 at the basal end. As an option its radius is a cubic polynomial
-   of theta up to theta2 (the polynomial start). cochlea.c has the formulas. */
+   angle around the z axis, from 0 at the basal end. As an option the radius of the centreline is a
+   cubic polynomial of theta up to theta2 (the polynomial start). cochlea.c has the formulas. */
 #ifndef COCHLEA_CURVE_H
 #define COCHLEA_CURVE_H
 

@@ -23,7 +23,7 @@ sdm_status sdm_shape_check_params(const char *who, const sdm_param *params, uint
 /* registry.c: removes the shapes from index `count` on. */
 void sdm_registry_shrink(sdm_registry *r, size_t count);
 
-/* registry.c: Makes sdm_registry_free() call close(object), where `object` is a shared object that
+/* registry.c: makes sdm_registry_free() call close(object), where `object` is a shared object that
    holds shapes of the registry. SDM_E_NOMEM; then the caller still owns the object. */
 sdm_status sdm_registry_keep(sdm_registry *r, void *object, void (*close)(void *object),
                              sdm_error *err);
@@ -36,8 +36,8 @@ sdm_status sdm_shape_parse_options(const sdm_shape *shape, const sdm_named_text 
                                    char **text, sdm_error *err);
 
 /* host.c: state of one callback. host->reserve() allocates in `mesh` if it is not NULL, otherwise
- * in a block of the call. files: the callback may read files. sdm_host_call_end() frees the blocks
- * of the call. */
+ * in a block of the call. files: whether the callback may read files. sdm_host_call_end() frees the
+ * blocks of the call. */
 typedef struct host_call {
     sdm_host host;
     sdm_mesh *mesh;

@@ -47,8 +47,7 @@ static sdm_status moved_vertices_add(const sdm_instance *s, const double *p, siz
 }
 
 /* Uses finite differences of second order: central, or at the end of a range one-sided, with the
-   parameter at p, p + h and p + 2 h. The weights are computed from the differences of these values
-   as rounded. */
+   parameter at p, p + h and p + 2 h. The weights are computed from these values after rounding. */
 static sdm_status velocity_by_differences(const sdm_instance *s, const double *p, size_t n_vert,
                                           double *velocity, sdm_error *err)
 {

@@ -30,7 +30,8 @@ static sdm_status find_cubes(const sdm_phantom_opts *o, const double min[3], con
     return SDM_OK;
 }
 
-/* Counts the balls in cubes first .. last; writes their centres unless centre is NULL. */
+/* Returns the number of balls in the cubes first .. last, and writes their centres unless `centre`
+   is NULL. */
 static size_t list_balls(const sdm_phantom_opts *o, const int64_t first[3], const int64_t last[3],
                          double (*centre)[3])
 {

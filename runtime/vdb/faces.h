@@ -35,7 +35,7 @@ sdm_status sdm_faces_create(const sdm_grid *g, const float *values, sdm_faces *o
 void sdm_faces_dispose(sdm_faces *f);
 
 /* Distance (mm) at voxel index p outside the grid: the minimum of |p - b| + max(d(b), 0) over the
-   points b of all faces whose outer side p lies on; `max` if that is smaller. A point with d(b) <=
+   points b of all faces whose outer side p lies on; `max` if `max` is smaller. A point with d(b) <=
    0 stands for its whole voxel face, which belongs to the solid: |p - b| is then the distance to
    the face of that voxel. */
 double sdm_faces_distance(sdm_faces *f, const int64_t p[3], double max);

@@ -41,8 +41,8 @@ inline void check_cancelled(const sdm_vdb_opts &o, sdm_error *err)
 // ---- vdb_creases.cc
 
 // A crease is a voxel at a zero crossing whose gradient checkLevelSet refuses. Changes values there
-// until none is left, and counts the changes in report. Some creases may remain: the caller runs
-// checkLevelSet.
+// until no crease is left or the largest number of rounds is reached, and counts the changes in
+// report. Since creases may remain, the caller runs checkLevelSet.
 void mend_creases(Grid &grid, const sdm_vdb_opts &o, sdm_vdb_report &report, sdm_error *err);
 
 // ---- vdb_file.cc

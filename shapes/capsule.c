@@ -17,8 +17,8 @@ static const sdm_option OPTIONS[] = {
      "edge length the mesh aims at, at the default parameters"},
 };
 
-/* Number of rings of one cap (without pole and rim), intervals along the straight part, rings in
- * total, sectors. */
+/* Numbers: n_cap: rings of one cap, without pole and rim; n_side: intervals along the straight
+   part; n_rings: rings in total; n_sectors: vertices of a ring. */
 typedef struct layout {
     size_t n_cap, n_side, n_rings, n_sectors;
 } layout;
@@ -44,7 +44,7 @@ static ring_place ring_place_of(const layout *l, ptrdiff_t i)
     const ptrdiff_t n_cap = (ptrdiff_t)l->n_cap, rim0 = n_cap, rim1 = n_cap + (ptrdiff_t)l->n_side;
     if (i >= rim0 && i <= rim1)
         return (ring_place){1, 0, (double)(i - rim0) / (double)l->n_side - 0.5};
-    // number of rings between ring i and the rim of its cap
+    // number of steps from the rim of the cap to ring i
     const ptrdiff_t steps = i < rim0 ? rim0 - i : i - rim1;
     const double angle = LATHE_PI / 2 * (double)steps / (double)(n_cap + 1);
     return (ring_place){steps > n_cap ? 0 : cos(angle), i < rim0 ? -sin(angle) : sin(angle),
@@ -57,8 +57,8 @@ static double *vertex_write(double *at, double x, double y, double z)
     return at + 3;
 }
 
-/* Writes vert[n_vert][3]. Vertices are linear in radius and length, so (1, 0) and (0, 1) give the
- * derivatives. */
+/* Writes vert[n_vert][3]. The vertices are linear in radius and length, so (radius, length) = (1,
+   0) and (0, 1) give the derivatives. */
 static void capsule_write(const layout *l, double radius, double length, double *vert)
 {
     const ptrdiff_t n = (ptrdiff_t)l->n_rings;

@@ -7,27 +7,31 @@
  *     r = a exp(-b theta)    z = c theta + alpha exp(-kappa theta) cos(theta - phi)
  *     R = radius - taper theta + flare exp(-theta / flare_angle)
  *
+ * Here (r, theta, z) are the cylindrical coordinates of the centreline, with theta = 0 at the basal
+ * end, and R is the tube radius.
+ *
  * Turns touch and overlap: the mesh intersects itself on purpose, and the shape is the union of the
  * volumes that the tube encloses. Rings of vertices lie at fixed fractions of the apical angle with
- * a fixed number of sectors. Both depend only on the options, so every vertex is a smooth function
- * of the parameters. With the default options the mesh has 3,420 triangles; edges are 0.36 +- 0.10
- * mm long at the default parameters and 0.34 +- 0.11 mm over the parameter ranges.
+ * a fixed number of sectors. The fractions and the number of sectors depend only on the options, so
+ * every vertex is a smooth function of the parameters. With the default options the mesh has 3,420
+ * triangles; edges are 0.36 +- 0.10 mm long at the default parameters and 0.34 +- 0.11 mm over the
+ * parameter ranges.
  *
- * Ring vertices lie ON the tube and its polygons are inscribed: between them the mesh is inside of
- * the tube by up to R (1 - cos(pi / sectors)) = 0.015 R across the tube, and by edge^2 / 8 times
- * the curvature of the wall along the tube (outside on the inner side of the bend). The closed-form
- * distance is that of a ball of radius R swept along the centreline. Its surface agrees with the
- * tube where R changes slowly (to 4 micrometres without flare) and is up to 0.013 mm (0.05 mm at a
- * = 2) farther out at the flare.
+ * The vertices of the rings lie ON the tube, so the mesh is inscribed: between its vertices it is
+ * inside of the tube by up to R (1 - cos(pi / sectors)) = 0.015 R across the tube, and by edge^2 /
+ * 8 times the curvature of the wall along the tube (outside on the inner side of the bend). The
+ * closed-form distance is that of a ball of radius R swept along the centreline. The zero surface
+ * of this distance agrees with the tube where R changes slowly (to 4 micrometres without flare) and
+ * is up to 0.013 mm (0.05 mm at a = 2) farther out at the flare.
  *
  * Near the apex the tube radius exceeds the radius of curvature of the centreline, so the inner
  * parts of neighbouring cross-sections would run backwards: the mesh would be inside out there and
  * enclose less than the tube. Each section is therefore cut off at the centre of curvature. The
- * shape loses nothing: a point behind that centre is nearer to another part of the centreline,
- * whose section or cap encloses it.
+ * shape loses nothing: a point behind the centre of curvature is nearer to another part of the
+ * centreline, whose section or cap encloses it.
  *
- * With free = anatomy, anatomical constants that vary between ears become parameters, too: for fits
- * to images. */
+ * With the option free = anatomy, anatomical constants that vary between ears become parameters,
+ * too, for fits to images. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -39,9 +43,10 @@
 #include "sdm/shape.h"
 
 /* The four published parameters, then the anatomical constants that are parameters with free =
- * anatomy. The ranges of c, theta and p0 are default +- 2 standard deviations of the height of
- * cochleae (0.4 mm), the number of turns (2.2 to 2.9) and the basal diameter (0.4 mm; Erixon,
- * Hogstorp, Wadin and Rask-Andersen 2009). kappa and theta2 have not been measured. */
+ * anatomy. The ranges of c, theta and p0 follow from the variation between cochleae: the default +-
+ * 2 standard deviations of the height (0.4 mm), of the number of turns (2.2 to 2.9) and of the
+ * basal diameter (0.4 mm; Erixon, Hogstorp, Wadin and Rask-Andersen 2009). kappa and theta2 have
+ * not been measured. */
 static const sdm_param PARAMS[COCHLEA_UNKNOWNS] = {
     [COCHLEA_A] = {"a", "mm", 2.0, 5.0, 4.4,
                    "scale of the radial component: radius of the centreline at theta = 0"},
@@ -178,8 +183,8 @@ static double ring_speed(const cochlea_model *m, const double *x, double theta)
 
 #define SAMPLES 1024
 
-/* Arc length of the ring motion (ring_speed) by the trapezoidal rule: way[i] = length from 0 to i /
- * SAMPLES of the apical angle, mm. Returns the mean circumference of the sections, mm. */
+/* Integrates ring_speed() by the trapezoidal rule: way[i] = length of the way of a ring from 0 to i
+   / SAMPLES of the apical angle, mm. Returns the mean circumference of the sections, mm. */
 static double way_measure(const cochlea_model *m, const double *x, double way[SAMPLES + 1])
 {
     const double step = x[COCHLEA_THETA] / SAMPLES;
@@ -260,9 +265,9 @@ static int cochlea_create(const sdm_host *host, const sdm_option_value *options,
         return host->fail(host, text);
     }
 
-    // Counts depend only on the options. The factors 1.1 and 1.2 make the mean edge over the
-    // parameter ranges about `edge`, with triangles a little longer along the tube, where the
-    // curvature is lower.
+    // The numbers of rings and sectors depend only on the options. The factors 1.1 and 1.2 make the
+    // mean edge over the parameter ranges about `edge`, with triangles a little longer along the
+    // tube, where the curvature is lower.
     double way[SAMPLES + 1];
     const double edge = options[EDGE].number, round = way_measure(&m, x, way),
                  quarter = LATHE_PI / 2;

@@ -118,8 +118,8 @@ static void height_at(const double *x, dual theta, dual z[3])
         wave, sdm_dual_add(sdm_dual_mul(level, c), sdm_dual_scale(2, sdm_dual_mul(k, s))));
 }
 
-/* curve[order][3]: position of the centreline, first and second derivative with respect to
- * theta. */
+/* curve[0], curve[1], curve[2]: position of the centreline, and its first and second derivatives
+   with respect to theta. */
 static void curve_at(const cochlea_model *m, const double *x, dual theta, dual curve[3][3])
 {
     dual r[3], z[3];
@@ -139,7 +139,7 @@ static void curve_at(const cochlea_model *m, const double *x, dual theta, dual c
     for (int k = 0; k < 3; k++) curve[k][2] = z[k];
 }
 
-/* Half axes of the cross-section. */
+/* Half axes of the cross-section at theta, mm. */
 static void tube_at(const cochlea_model *m, dual theta, dual *wide, dual *high)
 {
     const double flare = m->flare * exp(-theta.v / m->flare_angle);

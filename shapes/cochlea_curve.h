@@ -1,19 +1,21 @@
 /* Centreline of the cochlea, its moving frame and tube radius, with derivatives with respect to the
- * parameters. */
+   unknowns. The centreline is a rising logarithmic spiral with a longitudinal wave; theta is the
+   angle around the z axis, from 0 at the basal end. As an option the radius of the centreline is a
+   cubic polynomial of theta up to theta2 (the polynomial start). cochlea.c has the formulas. */
 #ifndef COCHLEA_CURVE_H
 #define COCHLEA_CURVE_H
 
 #include <stdbool.h>
 
-/* Indices of the unknowns x[COCHLEA_UNKNOWNS] of the model: the four published parameters, then
- * anatomical constants that can be parameters (option `free`). */
+/* Indices of the unknowns x[COCHLEA_UNKNOWNS] of the model: the four published parameters, then the
+   anatomical constants that can be parameters (option `free`). */
 enum {
     COCHLEA_A,
     COCHLEA_ALPHA,
     COCHLEA_B,
     COCHLEA_PHI,
     COCHLEA_C,      /* rise of the centreline, mm/rad */
-    COCHLEA_KAPPA,  /* decay of the wave, 1/rad */
+    COCHLEA_KAPPA,  /* decay of the longitudinal wave, 1/rad */
     COCHLEA_THETA,  /* angle of the apical end, rad */
     COCHLEA_THETA2, /* end of the polynomial start, rad */
     COCHLEA_P0,     /* radius of the polynomial start at theta = 0, mm */
@@ -28,12 +30,12 @@ typedef struct dual {
 
 /* Properties of the model that are never parameters. */
 typedef struct cochlea_model {
-    bool cubic; /* polynomial start below theta2 */
+    bool cubic; /* true: polynomial start below theta2 */
     /* tube radius = radius - taper theta + flare exp(-theta / flare_angle), mm */
     double radius, taper;
     double flare, flare_angle;
-    /* the cross-section is an ellipse with axis ratio `ratio` at the base and becomes a circle
-     * after one turn */
+    /* true: the cross-section is an ellipse with axis ratio `ratio` at the base and becomes a
+     * circle after one turn */
     bool ellipse;
     double ratio;
 } cochlea_model;
@@ -50,14 +52,14 @@ typedef struct cochlea_section {
 void sdm_cochlea_section_at(const cochlea_model *m, const double *x, double fraction,
                             cochlea_section *out);
 
-/* Position of the centreline at an angle, mm, without derivatives. */
+/* centre = position of the centreline at the angle theta, mm, without derivatives. */
 void sdm_cochlea_centre_at(const cochlea_model *m, const double *x, double theta, double centre[3]);
 
-/* Tube radius at an angle, mm. */
+/* Tube radius at the angle theta, mm. */
 double sdm_cochlea_radius_at(const cochlea_model *m, double theta);
 
 /* Signed distance (mm) from a point to the volume of a ball of the tube's radius swept along the
- * centreline: exact outside; inside its absolute value is a lower bound of the true one. */
+ * centreline: exact outside; inside, the absolute value is a lower bound of the true one. */
 double sdm_cochlea_distance(const cochlea_model *m, const double *x, const double point[3]);
 
 /* Arithmetic of dual numbers. */

@@ -3,8 +3,8 @@
 
 #include "cochlea_curve.h"
 
-// Samples along the centreline. A step is a fraction of the tube radius, so no minimum is narrower
-// than a step.
+// Number of steps along the centreline. A step is shorter than the tube radius, so no minimum is
+// narrower than a step.
 #define STEPS 512
 
 static double ball_distance(const cochlea_model *m, const double *x, const double point[3],
@@ -16,7 +16,8 @@ static double ball_distance(const cochlea_model *m, const double *x, const doubl
     return sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) - sdm_cochlea_radius_at(m, theta);
 }
 
-/* Minimum in [lo, hi], where the function is unimodal, by golden section search (Kiefer 1953). */
+/* Minimum of ball_distance() in [lo, hi], where it is unimodal, by golden section search (Kiefer
+   1953). */
 static double ball_distance_min(const cochlea_model *m, const double *x, const double point[3],
                                 double lo, double hi)
 {

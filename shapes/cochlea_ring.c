@@ -1,8 +1,8 @@
 /* Rings of vertices of the cochlea, cut off where neighbouring sections would overlap. */
 #include "cochlea_ring.h"
 
-// The cut is smooth (C2): it starts at this fraction of the distance to the centre of curvature and
-// takes this width.
+// The cut is smooth (C2): it starts at the fraction CUT_FROM of the distance to the centre of
+// curvature and takes the fraction CUT_WIDTH.
 #define CUT_FROM 0.90
 #define CUT_WIDTH 0.16
 

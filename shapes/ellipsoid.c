@@ -1,8 +1,8 @@
 /* Superquadric ellipsoid (Barr 1981):
  *     (|x/rx|^(2/e2) + |y/ry|^(2/e2))^(e2/e1) + |z/rz|^(2/e1) = 1.
- * Exponents e1 = e2 = 1 give an ellipsoid, exponents near 0 a box, 2 an octahedron. Each vertex is
- * a fixed direction scaled by the half axes, so the mesh is linear in the parameters. All vertices
- * lie on the surface. */
+ * The exponents e1 = e2 = 1 give an ellipsoid, exponents near 0 a box, exponents of 2 an
+ * octahedron. Each vertex is a fixed direction scaled by the half axes, so the mesh is linear in
+ * the parameters. All vertices lie on the surface. */
 #include <math.h>
 
 #include "lathe.h"

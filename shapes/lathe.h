@@ -19,10 +19,10 @@ size_t sdm_lathe_n_tri(size_t n_rings, size_t n_sectors);
 double sdm_lathe_angle(size_t ring, size_t sector, size_t n_sectors);
 
 /* Writes tri[sdm_lathe_n_tri()][3], counter-clockwise seen from outside; mirrored: with the
- * opposite orientation, for vertices that are reflected. */
+   opposite order, for vertices that are mirror images. */
 void sdm_lathe_triangles(size_t n_rings, size_t n_sectors, bool mirrored, uint32_t *tri);
 
-/* Number of pieces of length `edge` (rounded) in `length`, at least `least`. */
+/* length / edge rounded to a whole number of pieces, at least `least`. */
 size_t sdm_lathe_pieces(double length, double edge, size_t least);
 
 #endif

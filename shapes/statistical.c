@@ -1,5 +1,5 @@
 /* Statistical shape: a point-distribution model (Cootes, Taylor, Cooper and Graham 1995) from
- * files: vertex = mean + sum over modes of weight * mode. The parameters m1, m2, ... are the
+ * files, where vertex = mean + sum over modes of weight * mode. The parameters m1, m2, ... are the
  * weights in standard deviations. Modes are in mm per standard deviation; with the option
  * `deviations` they have any length and are multiplied by the standard deviations. The triangles
  * are those of the mean mesh. */
@@ -48,7 +48,7 @@ static void statistical_destroy(void *self)
     free(m);
 }
 
-/* Array from a .npy file. */
+/* The array of a .npy file. */
 typedef struct array {
     const char *path;
     const double *values;

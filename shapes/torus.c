@@ -16,7 +16,7 @@ static const sdm_option OPTIONS[] = {
      "edge length the mesh aims at, at the default parameters"},
 };
 
-/* Number of sectors around the axis and around the tube. */
+/* Numbers of sectors: n_long around the axis, n_round around the tube. */
 static void sector_counts(const sdm_option_value *options, size_t *n_long, size_t *n_round)
 {
     *n_long = sdm_lathe_pieces(2 * LATHE_PI * PARAMS[MAJOR].def, options[0].number, 8);

@@ -127,8 +127,8 @@ sdm_status sdm_instance_fail_at(const sdm_instance *s, const double *p, sdm_stat
     return sdm_fail_in(err, status, "%s", where);
 }
 
-/* The plug-in must have filled the arrays of host->reserve() with valid indices and finite
- * coordinates. */
+/* The plug-in must have filled the arrays of host->reserve() with at least one triangle, valid
+   indices and finite coordinates. */
 static sdm_status mesh_out_check(const sdm_mesh *m, const sdm_mesh_out *out, sdm_error *err)
 {
     if (!out->vert || out->vert != m->vert || out->tri != m->tri || out->n_vert != m->n_vert ||

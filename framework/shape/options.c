@@ -70,8 +70,8 @@ static sdm_status number_parse(const sdm_shape *shape, const sdm_option *o, cons
     return SDM_OK;
 }
 
-/* `words` is a writable copy of o->choices; it is split at '|' in place, and out->text points into
- * it. given == NULL selects the first choice. */
+/* Finds the choice `given`; NULL selects the first choice. `words` is a writable copy of
+   o->choices; it is split at '|' in place, and out->text points into it. */
 static sdm_status choice_parse(const sdm_shape *shape, const sdm_option *o, const char *given,
                                char *words, sdm_option_value *out, sdm_error *err)
 {
@@ -124,7 +124,7 @@ sdm_status sdm_shape_parse_options(const sdm_shape *shape, const sdm_named_text 
     s = SDM_ALLOC(text, size, "option texts", err);
     if (s) return s;
 
-    // parse the values; missing ones have their defaults
+    // parse the values; options that are not given have their defaults
     char *at = *text;
     for (uint32_t i = 0; i < shape->n_options && !s; i++) {
         const sdm_option *o = &shape->options[i];

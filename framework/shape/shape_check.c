@@ -59,7 +59,7 @@ sdm_status sdm_shape_check_params(const char *who, const sdm_param *params, uint
     return SDM_OK;
 }
 
-/* o->choices is a list of words separated by '|', none of them empty or repeated. */
+/* o->choices must be a list of words separated by '|', none of them empty or repeated. */
 static sdm_status choices_check(const char *who, const sdm_option *o, sdm_error *err)
 {
     const char *all = o->choices;

@@ -9,8 +9,9 @@
 #define SHAPE_PARAMS_MAX 64
 #define SHAPE_OPTIONS_MAX 64
 
-/* shape_check.c: copies min(size, sizeof(sdm_shape)) bytes of a plug-in's table to *out (the rest
- * is zero) and checks the contents. `origin` is the start of error messages. SDM_E_PLUGIN. */
+/* shape_check.c: copies min(size, sizeof(sdm_shape)) bytes of a plug-in's table to *out (further
+   members become zero) and checks the contents. `origin` is the start of error messages.
+   SDM_E_PLUGIN. */
 sdm_status sdm_shape_copy_checked(const sdm_shape *table, const char *origin, sdm_shape *out,
                                   sdm_error *err);
 
@@ -22,20 +23,21 @@ sdm_status sdm_shape_check_params(const char *who, const sdm_param *params, uint
 /* registry.c: removes the shapes from index `count` on. */
 void sdm_registry_shrink(sdm_registry *r, size_t count);
 
-/* registry.c: sdm_registry_free() will call close(object), for a shared object that holds shapes of
- * the registry. SDM_E_NOMEM; then the caller still owns the object. */
+/* registry.c: makes sdm_registry_free() call close(object), where `object` is a shared object that
+   holds shapes of the registry. SDM_E_NOMEM; then the caller still owns the object. */
 sdm_status sdm_registry_keep(sdm_registry *r, void *object, void (*close)(void *object),
                              sdm_error *err);
 
-/* options.c: writes values[shape->n_options]; their texts are stored in the new block *text, which
- * the caller frees with sdm_free(). SDM_E_ARG, SDM_E_CONFIG, SDM_E_NOMEM. */
+/* options.c: converts the given texts to values[shape->n_options]; the texts of the values are
+ * stored in the new block *text, which the caller frees with sdm_free(). SDM_E_ARG, SDM_E_CONFIG,
+ * SDM_E_NOMEM. */
 sdm_status sdm_shape_parse_options(const sdm_shape *shape, const sdm_named_text *given,
                                    size_t n_given, const char *base_dir, sdm_option_value *values,
                                    char **text, sdm_error *err);
 
 /* host.c: state of one callback. host->reserve() allocates in `mesh` if it is not NULL, otherwise
- * in a block of the call. files: may the callback read files? sdm_host_call_end() frees the blocks
- * of the call. */
+ * in a block of the call. files: whether the callback may read files. sdm_host_call_end() frees the
+ * blocks of the call. */
 typedef struct host_call {
     sdm_host host;
     sdm_mesh *mesh;
@@ -47,9 +49,9 @@ typedef struct host_call {
 void sdm_host_call_begin(host_call *c, sdm_mesh *mesh, bool files);
 void sdm_host_call_end(host_call *c);
 
-/* host.c: error of a callback that returned non-zero. Stores the message of the host, or one with
- * the name of the callback and the value returned. Returns SDM_E_NOMEM if memory was short, else
- * `otherwise`. */
+/* host.c: reports the error of a callback that returned non-zero: stores the message of the host,
+ * or one with the name of the callback and the value returned. Returns SDM_E_NOMEM if memory was
+ * short, else `otherwise`. */
 sdm_status sdm_host_call_failed(const host_call *c, const char *callback, int returned,
                                 sdm_status otherwise, sdm_error *err);
 

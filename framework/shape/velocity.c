@@ -46,8 +46,8 @@ static sdm_status moved_vertices_add(const sdm_instance *s, const double *p, siz
     return SDM_OK;
 }
 
-/* Finite differences of second order: central, or at the end of a range one-sided from the values
- * p, p + h, p + 2 h. Weights are computed from the differences of the rounded values. */
+/* Uses finite differences of second order: central, or at the end of a range one-sided, with the
+   parameter at p, p + h and p + 2 h. The weights are computed from these values after rounding. */
 static sdm_status velocity_by_differences(const sdm_instance *s, const double *p, size_t n_vert,
                                           double *velocity, sdm_error *err)
 {

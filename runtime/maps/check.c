@@ -22,7 +22,7 @@ double sdm_check_get(const sdm_check *c, sdm_check_stat stat)
     return (unsigned)stat < sizeof figures / sizeof *figures ? figures[stat] : (double)NAN;
 }
 
-/* Running sum of areas: upto[t] = area of triangles 0 .. t. */
+/* upto[t] = total area of the triangles 0 .. t. */
 static void add_areas(const sdm_mesh *m, double *upto)
 {
     double sum = 0;

@@ -39,8 +39,8 @@ static sdm_status check_one(const sdm_grid *grid, const double *p, const sdm_gen
     return s;
 }
 
-/* The error to report: that of the lowest index, but any other error before SDM_E_QUALITY. It does
-   not depend on the number of threads. */
+/* The error to report: that of the map with the lowest index, where any other error comes before
+   SDM_E_QUALITY. The choice does not depend on the number of threads. */
 typedef struct first_error {
     size_t index;
     sdm_error err;

@@ -10,10 +10,10 @@ static inline bool sdm_wants_check(const sdm_generate_opts *o)
     return o->check || o->max_error_mm > 0;
 }
 
-/* Checks those of values[n][nz][ny][nx] that the network has computed (results[i].source), at
-   parameters used[n][n_params], and completes their results. A map above o->max_error_mm is
-   replaced by the exact one under SDM_RANGE_EXACT. Otherwise SDM_E_QUALITY for the first such map,
-   after all maps are checked. */
+/* Checks those maps of values[n][nz][ny][nx] that the network has computed (results[i].source), at
+   the parameters used[n][n_params], and completes their results[i]. A map above o->max_error_mm is
+   replaced by the exact one under SDM_RANGE_EXACT. Under other policies the function returns
+   SDM_E_QUALITY for the first such map, after it has checked all maps. */
 sdm_status sdm_check_results(const sdm_model *m, const double *used, size_t n,
                              const sdm_generate_opts *o, float *values, sdm_result *results,
                              sdm_error *err);

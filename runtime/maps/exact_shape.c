@@ -21,7 +21,7 @@ sdm_status sdm_exact_shape_map(const sdm_instance *shape, const double *p,
     return s;
 }
 
-/* *out = new array [n_params][n_vert][3]: velocity of each vertex by each parameter. */
+/* *out = new array [n_params][n_vert][3]: derivative of each vertex by each parameter. */
 static sdm_status vertex_velocities(const sdm_instance *shape, const double *p, size_t n_params,
                                     size_t n_vert, double **out, sdm_error *err)
 {

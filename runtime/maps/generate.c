@@ -1,5 +1,5 @@
-/* Maps and derivatives of a model: range policy, batches over threads, exact maps where the policy
-   asks for them. */
+/* Computes maps and derivatives of a model: applies the range policy, spreads batches over threads,
+   and computes exact maps where the policy asks for them. */
 #include "sdm/runtime.h"
 
 #include <math.h>
@@ -10,11 +10,11 @@
 #include "sdm/internal/model_threads.h"
 #include "sdm/internal/threads.h"
 
-/* Maps in a slice of a batch. Fixed, so that the arithmetic of a map does not depend on the number
-   of threads. */
+/* Number of maps in a slice of a batch. It is fixed, so that the arithmetic of a map does not
+   depend on the number of threads. */
 #define SLICE 24u
-/* Threads that share one map: most of them, and multiply-adds of the network that justify one more
-   (about 50 us). */
+/* Several threads may share one map: one more thread for every SHARE_MACS multiply-adds of the
+   network (about 50 us), at most SHARE_MAX. */
 #define SHARE_MAX 256
 #define SHARE_MACS 1e6
 
@@ -94,7 +94,8 @@ static sdm_status check_params(const sdm_model *m, const double *params, const s
     return sdm_instance_check(o->exact_shape, params, err);
 }
 
-/* The maps of one slice that the network computes: each uninterrupted run of them in one call. */
+/* Computes those maps of a slice that come from the network: each uninterrupted run of such maps in
+   one call. */
 static void forward_slice(const sdm_model *m, const double *used, const sdm_result *results,
                           size_t n, int n_threads, float *values, void *scratch)
 {
@@ -110,7 +111,8 @@ static void forward_slice(const sdm_model *m, const double *used, const sdm_resu
     }
 }
 
-/* All maps of the network in a batch. wanted: number of threads. */
+/* Computes all maps of a batch that come from the network. wanted: number of threads, 0: the OpenMP
+   default. */
 static sdm_status forward_batch(const sdm_model *m, const double *used, const sdm_result *results,
                                 size_t n, int wanted, float *values, sdm_error *err)
 {
@@ -209,7 +211,7 @@ static sdm_status prepare_one(const sdm_model *m, const double *params, const sd
     return s ? s : check_params(m, params, o, *used, found, err);
 }
 
-/* Map and derivatives at checked parameters. */
+/* Computes the map and its derivatives at checked parameters. */
 static sdm_status jacobian_at(const sdm_model *m, const double *params, const double *used,
                               const sdm_generate_opts *o, float *values, float *jacobian,
                               sdm_result *result, sdm_error *err)
@@ -263,7 +265,7 @@ static sdm_status exact_jacobian(const sdm_model *m, const double *params,
     return s;
 }
 
-/* Map and directional derivative at checked parameters. */
+/* Computes the map and its directional derivative at checked parameters. */
 static sdm_status jvp_at(const sdm_model *m, const double *params, const double *used,
                          const double *direction, const sdm_generate_opts *o, float *values,
                          float *tangent, sdm_result *result, sdm_error *err)
@@ -287,7 +289,7 @@ static sdm_status jvp_at(const sdm_model *m, const double *params, const double 
     return s;
 }
 
-/* Product of `adjoint` with the Jacobian at checked parameters. */
+/* gradient = J^T adjoint, with the Jacobian J at checked parameters. */
 static sdm_status vjp_at(const sdm_model *m, const double *params, const double *used,
                          const float *adjoint, const sdm_generate_opts *o, double *gradient,
                          const sdm_result *result, sdm_error *err)

@@ -3,7 +3,7 @@
 
 #include "sdm/internal/threads.h"
 
-/* Finite difference with respect to the index i on an axis of n voxels; at points to voxel i,
+/* Finite difference with respect to the index i on an axis of n voxels; `at` points to voxel i, and
    neighbours are `step` floats apart. */
 static double difference(const float *at, int64_t i, int64_t n, int64_t step)
 {
@@ -15,7 +15,7 @@ static double difference(const float *at, int64_t i, int64_t n, int64_t step)
                   : sign * (1.5 * first - 0.5 * ((double)at[2 * in] - (double)at[in]));
 }
 
-/* The gradient along row (j, k). */
+/* Writes the gradient at all voxels of row (j, k). */
 static void gradient_row(const sdm_grid *g, const float *values, int64_t j, int64_t k,
                          float *gradient)
 {

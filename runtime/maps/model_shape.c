@@ -31,8 +31,8 @@ static sdm_status check_agreement(const sdm_model_info *info, const sdm_instance
     return SDM_OK;
 }
 
-/* SDM_E_FORMAT unless the file has checksum `wanted`: another file would silently give another
-   shape. */
+/* SDM_E_FORMAT unless the file has checksum `wanted`: a different file would silently give a
+   different shape. */
 static sdm_status check_file(const char *path, const char *option, const char *wanted,
                              sdm_error *err)
 {
@@ -54,7 +54,7 @@ typedef struct model_options {
     char (*beside)[4096]; // [n] paths of the data files in the folder of the model
 } model_options;
 
-/* Finds the data file of the last option: at its path of the training, or in the folder of the
+/* Finds the data file of the last option: at the path it had in training, or in the folder of the
    model. */
 static sdm_status find_file(const sdm_model_info *info, model_options *o, const char *wanted,
                             sdm_error *err)
@@ -74,8 +74,8 @@ static sdm_status find_file(const sdm_model_info *info, model_options *o, const 
                        file->name);
 }
 
-/* Collects the options of the shape from those of the model. A file option may be followed by an
-   entry NAME.crc64 with its checksum. */
+/* Collects the options of the shape from those of the model. The option of a data file may be
+   followed by an entry NAME.crc64 with the checksum of that file. */
 static sdm_status read_options(const sdm_model_info *info, model_options *o, sdm_error *err)
 {
     sdm_status s = SDM_ALLOC(&o->given, info->n_options, "options", err);

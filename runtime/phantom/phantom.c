@@ -1,4 +1,4 @@
-/* Makes phantoms: checks of the options, label, and the image from its parts; random parameters and
+/* Makes phantoms: checks the options, makes the label and the image; draws random parameters and
    poses. */
 #include "sdm/phantom.h"
 
@@ -13,7 +13,7 @@ enum { SIGMA_VOXELS_MAX = 64, SUPERSAMPLING_MAX = 16 };
 
 sdm_phantom_opts sdm_phantom_defaults(void)
 {
-    // noise as measured in air; together with it the tissues have 170, 270 and 150 HU
+    // the noise is as measured in air; texture and noise together give 170, 270 and 150 HU
     return (sdm_phantom_opts){.inside = {40, 80},
                               .outside = {1300, 225},
                               .air = {-880, 0},
@@ -41,7 +41,7 @@ static sdm_status check_tissue(const char *name, sdm_tissue t, sdm_error *err)
     return SDM_OK;
 }
 
-/* SDM_E_ARG unless 0 <= width (mm) <= 64 voxels along the axis. */
+/* SDM_E_ARG unless `width` (mm) is from 0 to SIGMA_VOXELS_MAX voxels along the axis. */
 static sdm_status check_width(const char *what, double width, int axis, const sdm_grid *g,
                               sdm_error *err)
 {
@@ -124,8 +124,8 @@ static sdm_status make_label(const sdm_exact *engine, const sdm_pose *pose, cons
     return s;
 }
 
-/* Replaces values[n], which holds the shares of the inside, by the image. air, texture, noise:
-   shares of air and random fields, NULL if not wanted. */
+/* Replaces values[n], which holds the shares of the inside, by the image. air[n]: shares of the
+   air; texture[n], noise[n]: random fields; each NULL if not wanted. */
 static void mix_tissues(const sdm_phantom_opts *o, size_t n, const float *air, const float *texture,
                         const float *noise, float *values)
 {

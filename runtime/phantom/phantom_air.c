@@ -8,7 +8,8 @@
 
 #define REACH ((int64_t)1 << 20) // |cube index| < REACH, so that three indices fit into 63 bits
 
-/* Range first[3] .. last[3] of the cubes whose ball may intersect the box. */
+/* Finds the range first[3] .. last[3] of the lattice cubes whose ball may intersect the box.
+   SDM_E_ARG for too many cubes. */
 static sdm_status find_cubes(const sdm_phantom_opts *o, const double min[3], const double max[3],
                              int64_t first[3], int64_t last[3], sdm_error *err)
 {
@@ -29,7 +30,8 @@ static sdm_status find_cubes(const sdm_phantom_opts *o, const double min[3], con
     return SDM_OK;
 }
 
-/* Counts the balls in cubes first .. last; writes their centres unless centre is NULL. */
+/* Returns the number of balls in the cubes first .. last, and writes their centres unless `centre`
+   is NULL. */
 static size_t list_balls(const sdm_phantom_opts *o, const int64_t first[3], const int64_t last[3],
                          double (*centre)[3])
 {
@@ -68,7 +70,7 @@ void phantom_balls_dispose(phantom_balls *b)
     *b = (phantom_balls){0};
 }
 
-/* *first .. *last - 1: indices within `half` of `centre` on an axis of n voxels. */
+/* *first .. *last - 1 = the indices within `half` of `centre` on an axis of n voxels. */
 static void index_range(double centre, double half, int64_t n, int64_t *first, int64_t *last)
 {
     *first = (int64_t)fmax(ceil(centre - half), 0);

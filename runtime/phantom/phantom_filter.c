@@ -5,11 +5,11 @@
 #include "phantom_parts.h"
 #include "sdm/memory.h"
 
-/* Results computed together: across rows their sums stay in the first-level cache, along a line in
-   registers. */
+/* Number of results computed together: the sums of ROW_RESULTS stay in the first-level cache, those
+   of LINE_RESULTS in registers. */
 enum { ROW_RESULTS = 64, LINE_RESULTS = 8 };
 
-/* g[2 radius + 1] = Gaussian at -radius .. radius samples, of sum 1. */
+/* g[2 radius + 1] = Gaussian at -radius .. radius samples, scaled to the sum 1. */
 static void gaussian(double sigma, size_t radius, double *g)
 {
     const size_t n = 2 * radius + 1;
@@ -60,7 +60,8 @@ size_t phantom_filter_samples(const phantom_filter *f, size_t n)
     return n * f->step + (f->n - f->step);
 }
 
-/* In place: result k is written to index k, and later results read from (k + 1) * step > k on. */
+/* The filters may work in place: result k is written to index k, and later results read only from
+   (k + 1) * step > k on. */
 
 void phantom_filter_line(const phantom_filter *f, float *data, size_t n)
 {

@@ -30,19 +30,19 @@ typedef struct phantom_filter {
 } phantom_filter;
 
 /* A filter that averages over boxes of `step` samples and smooths by a Gaussian of `sigma` samples
-   (0: no smoothing). The weights add up to 1; n = step + 2 radius. For sigma < 0.5 the Gaussian has
-   three weights with the exact variance. */
+   (0: no smoothing). The weights add up to 1; n = step + 2 radius, where the Gaussian has 2 radius
+   + 1 weights. For 0 < sigma < 0.5 these are three weights with the exact variance. */
 sdm_status phantom_filter_make(double sigma, size_t step, phantom_filter *out, sdm_error *err);
 void phantom_filter_dispose(phantom_filter *f);
 
 /* Number of input samples needed for n results: n * step + 2 radius. */
 size_t phantom_filter_samples(const phantom_filter *f, size_t n);
 
-/* Filters a line of floats in place; the n results come first. [any thread] */
+/* Filters a line of floats in place; the n results lie at its beginning. [any thread] */
 void phantom_filter_line(const phantom_filter *f, float *data, size_t n);
 
-/* The same across rows: the samples are rows of `inner` floats, `stride` floats apart. [any thread]
- */
+/* The same for rows as samples: each has `inner` floats, and rows are `stride` floats apart. [any
+   thread] */
 void phantom_filter_rows(const phantom_filter *f, float *data, size_t n, size_t stride,
                          size_t inner);
 
@@ -58,13 +58,13 @@ sdm_status phantom_field_make(const sdm_grid *grid, const double sigma[3],
 
 /* Air cells: balls of one radius. */
 typedef struct phantom_balls {
-    double (*centre)[3]; /* [n], mm, world */
+    double (*centre)[3]; /* [n] in the world, mm */
     size_t n;
     double radius;
 } phantom_balls;
 
-/* All balls that intersect the box min .. max (mm, world). SDM_E_ARG: more than 1e8 lattice cubes.
- */
+/* *out = at least all balls that intersect the box min .. max (world, mm). SDM_E_ARG: more than 1e8
+   lattice cubes. */
 sdm_status phantom_balls_make(const sdm_phantom_opts *o, const double min[3], const double max[3],
                               phantom_balls *out, sdm_error *err);
 void phantom_balls_dispose(phantom_balls *b);
@@ -76,8 +76,8 @@ void phantom_balls_plane(const phantom_balls *b, const sdm_grid *grid, size_t k,
 
 /* ---- phantom_shares.c: shares of the tissues ---- */
 
-/* inside[nz][ny][nx] = share of the inside in each voxel, convolved with the point spread; air[nz]
-   [ny][nx] (may be NULL) = the same for the air cells. */
+/* inside[nz][ny][nx] = share of the inside in each voxel, convolved with the point spread;
+   air[nz][ny][nx] (may be NULL) = the same for the air cells. */
 sdm_status phantom_shares(const sdm_exact *engine, const sdm_pose *pose, const sdm_phantom_opts *o,
                           const sdm_grid *grid, float *inside, float *air, sdm_error *err);
 

@@ -1,5 +1,5 @@
-/* Shares of the tissues in the voxels: exact distances at sub-voxels, then box and point spread
-   along x, y and z. */
+/* Computes the shares of the tissues in the voxels: converts exact distances at sub-voxels to
+   shares, and filters these with the box of the voxel and the point spread along x, y and z. */
 #include <math.h>
 #include <string.h>
 
@@ -8,7 +8,7 @@
 #include "sdm/memory.h"
 
 #define BLOCK_VOXELS ((size_t)1 << 24) // sub-voxels computed at a time
-enum { EDGE_MAX = 32 };                // sub-voxels along an edge of a long voxel
+enum { EDGE_MAX = 32 };                // most sub-voxels along a long edge of a voxel
 
 /* Inputs and filters of one computation. */
 typedef struct shares_job {
@@ -18,7 +18,7 @@ typedef struct shares_job {
     phantom_filter filter[3];
     sdm_grid fine; /* sub-voxels of the grid, with the margin that the filters need, in the world */
     sdm_grid shape_fine; /* the same in coordinates of the shape */
-    double edge;         /* edge of a sub-voxel, mean of three, mm */
+    double edge;         /* mean of the three edges of a sub-voxel, mm */
     phantom_balls balls;
     int threads;
 } shares_job;
@@ -37,7 +37,7 @@ sdm_grid phantom_shape_grid(const sdm_grid *grid, const sdm_pose *pose)
     return g;
 }
 
-/* Planes first .. first + n - 1 along z of grid g. */
+/* The part of grid g that has its planes first .. first + n - 1 along z. */
 static sdm_grid planes_of(const sdm_grid *g, size_t first, size_t n)
 {
     const double start[3] = {0, 0, (double)first};
@@ -96,7 +96,8 @@ static float cube_share(float d, float edge)
 }
 
 /* Converts inside[n] and air[n] (may be NULL) of one plane of sub-voxels from distances to shares.
-   Air keeps clear of the surface and takes no more than the inside leaves over. */
+   Air keeps the distance air_clear_mm from the surface and takes no more than the inside leaves
+   over. */
 static void plane_to_shares(const shares_job *j, size_t n, float *inside, float *air)
 {
     const float edge = (float)j->edge, clear = (float)j->o->air_clear_mm;
@@ -137,7 +138,8 @@ static void add_planes(const shares_job *j, const float *planes, size_t first, s
     }
 }
 
-/* Distances, shares and filtering of planes first .. first + n - 1 of the sub-voxels. */
+/* Computes distances and shares on planes first .. first + n - 1 of the sub-voxels, filters them,
+   and adds them to inside and air. */
 static sdm_status add_block(const shares_job *j, size_t first, size_t n, float *buffer,
                             float *air_buffer, float *inside, float *air, sdm_error *err)
 {
@@ -163,7 +165,7 @@ static sdm_status add_block(const shares_job *j, size_t first, size_t n, float *
     return SDM_OK;
 }
 
-/* All planes, one block after another to limit the memory. */
+/* Adds all planes, one block after another to limit the memory. */
 static sdm_status add_blocks(const shares_job *j, float *inside, float *air, sdm_error *err)
 {
     const size_t plane = (size_t)j->fine.n[0] * (size_t)j->fine.n[1], planes = (size_t)j->fine.n[2];

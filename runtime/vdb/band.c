@@ -13,7 +13,7 @@ void sdm_band_dispose(sdm_band *b)
     memset(b, 0, sizeof *b);
 }
 
-/* Allocates the values of the grid with a margin of `pad` voxels. */
+/* Allocates values for the grid with a margin of `pad` voxels. */
 static sdm_status band_reserve(const sdm_grid *grid, int32_t pad, sdm_band *out, sdm_error *err)
 {
     memset(out, 0, sizeof *out);
@@ -67,8 +67,8 @@ static float border_minimum(const sdm_grid *g, const float *v)
     return low;
 }
 
-/* Signed distance (mm) of the centre of voxel (i, j, k) to the box that the voxels fill; negative
-   inside. */
+/* Signed distance (mm, negative) of the centre of voxel (i, j, k) of the grid to the surface of the
+   box that the voxels fill. */
 static float box_distance(const sdm_grid *g, int64_t i, int64_t j, int64_t k)
 {
     const int64_t index[3] = {i, j, k};
@@ -81,8 +81,8 @@ static float box_distance(const sdm_grid *g, int64_t i, int64_t j, int64_t k)
     return (float)(-((double)layer + 0.5) * g->spacing[0]);
 }
 
-/* Counts zero crossings between neighbours, and those where a value is not inside the band: a
-   distance map has none of these. */
+/* Demands that neighbours differ in sign somewhere (SDM_E_ARG), and that both values then lie
+   inside the band, as in every distance map (SDM_E_QUALITY). */
 static sdm_status check_jumps(const sdm_band *b, double width, sdm_error *err)
 {
     const size_t step[3] = {1, (size_t)b->n[0], (size_t)(b->n[0] * b->n[1])};
@@ -112,7 +112,8 @@ static sdm_status check_jumps(const sdm_band *b, double width, sdm_error *err)
     return SDM_OK;
 }
 
-/* Sets one row of values: map, cut map, or distance from the faces outside the grid. */
+/* Sets one row of values: inside the grid those of the map, cut off at the border if out->cut;
+   outside, the distance from the faces. */
 static void close_row(const sdm_grid *g, const float *values, double width, int64_t j, int64_t k,
                       sdm_faces *faces, sdm_band *out)
 {

@@ -11,19 +11,19 @@
 extern "C" {
 #endif
 
-/* Values on a box of voxels: values[n[2]][n[1]][n[0]] in mm. Its first voxel has index (-pad, -pad,
-   -pad) in the grid of the map. */
+/* Values on a box of voxels: values[n[2]][n[1]][n[0]] in mm. The first voxel of the box has index
+   (-pad, -pad, -pad) in the grid of the map. */
 typedef struct sdm_band {
     int64_t n[3];
     int32_t pad;
     float *values;
-    bool cut; /* the surface left the grid and was closed at its border */
+    bool cut; /* true: the surface left the grid and was closed at its border */
 } sdm_band;
 
 /* Copies values[nz][ny][nx] without padding. SDM_E_ARG: a value is NaN or infinite. */
 sdm_status sdm_band_copy(const sdm_grid *grid, const float *values, sdm_band *out, sdm_error *err);
 
-/* Values for a level set of half width `width` mm on uniform voxels.
+/* Computes the values of a level set whose band has the half width `width` mm, on uniform voxels.
    If the surface leaves the grid, the solid is intersected with the box B that the voxels fill
    (half a voxel beyond the outermost centres): max(d, d_B), the exact distance except near the rim
    of the cut. Where the band leaves the grid, the values are padded by the band; the distance there

@@ -1,5 +1,5 @@
-/* Minimum over the points of a face by branch and bound over squares of points (Land and Doig
-   1960): a square is skipped if its lower bound is not below the minimum so far. */
+/* Finds the minimum over the points of a face by branch and bound over squares of points (Land and
+   Doig 1960): a square is skipped if its lower bound is not below the minimum so far. */
 #include "faces.h"
 
 #include <math.h>
@@ -8,9 +8,9 @@
 
 #include "sdm/memory.h"
 
-/* max(d, 0) at the point of the face half a voxel beyond border voxel `index` along `axis`: d is
-   extrapolated linearly, by half a voxel edge at most. inward: direction of the grid's inside, 1 or
-   -1. */
+/* max(d, 0), mm, at the point of the face half a voxel beyond border voxel `index` along `axis`: d
+   is extrapolated linearly, by half a voxel edge at most. inward: direction of the grid's inside, 1
+   or -1. */
 static double face_distance(const sdm_grid *g, const float *v, const int64_t index[3], int axis,
                             int64_t inward)
 {
@@ -85,7 +85,7 @@ void sdm_faces_dispose(sdm_faces *f)
     memset(f, 0, sizeof *f);
 }
 
-/* A voxel outside the grid relative to a face, in voxels. */
+/* A voxel outside the grid, seen from a face; lengths are in voxels unless stated. */
 typedef struct view {
     double voxel, away; // edge of a voxel, mm; distance to the plane of the face
     int64_t p[2];       // position along the face

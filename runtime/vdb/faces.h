@@ -1,5 +1,5 @@
-/* Distances outside the grid of a map, from the distances at the faces of its box. Internal to the
-   level set library. */
+/* Distances outside the grid of a map, computed from the distances d at the faces of the box that
+   its voxels fill. Internal to the level set library. */
 #ifndef SDM_FACES_H
 #define SDM_FACES_H
 
@@ -16,7 +16,7 @@ extern "C" {
    holds max(d(b), 0) at the points, level l the minimum over squares of 2^l x 2^l points. */
 typedef struct sdm_face {
     int levels;
-    /* Squares of each level along the two axes that follow the axis of the face. */
+    /* Numbers of squares of each level along the two axes that follow the axis of the face. */
     int64_t n[SDM_FACE_LEVELS][2];
     double *min[SDM_FACE_LEVELS];
     /* The nearest point of the last search: a good start for the next voxel. */
@@ -35,7 +35,7 @@ sdm_status sdm_faces_create(const sdm_grid *g, const float *values, sdm_faces *o
 void sdm_faces_dispose(sdm_faces *f);
 
 /* Distance (mm) at voxel index p outside the grid: the minimum of |p - b| + max(d(b), 0) over the
-   points b of all faces whose outer side p lies on; `max` if that is smaller. A point with d(b) <=
+   points b of all faces whose outer side p lies on; `max` if `max` is smaller. A point with d(b) <=
    0 stands for its whole voxel face, which belongs to the solid: |p - b| is then the distance to
    the face of that voxel. */
 double sdm_faces_distance(sdm_faces *f, const int64_t p[3], double max);

@@ -15,9 +15,9 @@
 
 /* Results of one pass over a file. */
 typedef struct scan {
-    uint64_t crc;             // of all bytes except the last SEAL_BYTES
-    uint64_t crc_whole;       // of everything
-    uint8_t tail[SEAL_BYTES]; // the last bytes
+    uint64_t crc;             // CRC-64 of all bytes except the last SEAL_BYTES
+    uint64_t crc_whole;       // CRC-64 of all bytes
+    uint8_t tail[SEAL_BYTES]; // the last SEAL_BYTES bytes
     size_t size;
     bool marked; // SDM_SEAL_MARK was found
 } scan;

@@ -1,6 +1,6 @@
-/* The seal: a checksum of the whole file, appended to a level set file. Readers of OpenVDB stop
-   before it. One wrong bit anywhere is found before any of the file is parsed. Internal to the
-   level set library. */
+/* The seal is a checksum of the whole file, appended to a level set file. Readers of OpenVDB files
+   stop before the seal. A wrong bit anywhere is found before any part of the file is parsed.
+   Internal to the level set library. */
 #ifndef SDM_SEAL_H
 #define SDM_SEAL_H
 

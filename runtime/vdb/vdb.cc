@@ -1,5 +1,5 @@
-/* Level sets with OpenVDB: map to grid, metadata, verification. The files vdb*.cc are the only C++
-   files and the only users of OpenVDB; no exception leaves them. */
+/* Level sets with OpenVDB: converts maps to grids, writes metadata, verifies files. The files
+   vdb*.cc are the only C++ files and the only users of OpenVDB; no exception leaves them. */
 #include "sdm/vdb.h"
 
 #include <algorithm>
@@ -29,7 +29,8 @@ void initialize_once()
     std::call_once(once, [] { openvdb::initialize(); });
 }
 
-/* Runs f; an exception becomes a status. */
+/* Runs f; an exception becomes a status, that of an I/O error of OpenVDB becomes
+   when_unreadable. */
 template <typename F>
 sdm_status guarded(const char *path, sdm_status when_unreadable, sdm_error *err, F f)
 {
@@ -101,8 +102,8 @@ void add_metadata(Grid &grid, const sdm_vdb_opts &o, const sdm_vdb_report &r, sd
 
 // ---- map to grid
 
-/* Most units in the last place by which the voxel size of a rotated grid may be increased until
-   OpenVDB takes it for uniform. */
+/* Largest number of units in the last place by which the voxel size of a rotated grid is increased
+   until OpenVDB takes the voxels for uniform. */
 const int ROUNDINGS_MAX = 64;
 
 /* Smallest background that can be stored and whose quotient by the voxel size, which checkLevelSet
@@ -127,8 +128,8 @@ openvdb::math::Transform::Ptr linear_transform(const openvdb::Vec3d axis[3],
     return openvdb::math::Transform::createLinearTransform(m);
 }
 
-/* Index-to-world transform; a level set gets the same voxel size on all axes (they agree
-   to 1e-6). */
+/* Index-to-world transform; a level set gets the same voxel size on all axes (the spacings agree to
+   1e-6 of their size). */
 openvdb::math::Transform::Ptr transform_of(const sdm_grid &g, bool level_set)
 {
     // axes: columns of dir, orthonormalised to the last digit
@@ -155,8 +156,8 @@ openvdb::math::Transform::Ptr transform_of(const sdm_grid &g, bool level_set)
     return t;
 }
 
-/* One 8^3 leaf of the tree from the box of values; active where abs(value) < band, everywhere if
-   dense. */
+/* Adds one leaf of 8^3 voxels to the tree, with values from `box`. Its voxels are active where
+   abs(value) < background, or all of them if dense. */
 void fill_block(Grid &grid, Grid::Accessor &acc, const sdm_band &box, const Coord &corner,
                 bool dense, bool half)
 {
@@ -227,12 +228,12 @@ void check_options(const sdm_grid &g, const sdm_vdb_opts &o, sdm_error *err)
                       "spacing %g x %g x %g mm: a level set needs voxels of one size; write the "
                       "map itself with --dense",
                       g.spacing[0], g.spacing[1], g.spacing[2]));
-    // a margin below the largest number: the background is rounded up
+    // keeps a margin below the largest number, because the background is rounded up
     if (!o.dense && !(band_of(o) * h < (o.half ? 65000.0 : 3e38)))
         need(sdm_fail(err, SDM_E_ARG, "spacing %g mm is too large for the number format", h));
 }
 
-/* 16-bit floats end at 65504. */
+/* Demands values that fit into 16-bit floats, whose range ends at 65504. */
 void check_half(const sdm_band &box, sdm_error *err)
 {
     const size_t count = static_cast<size_t>(box.n[0] * box.n[1] * box.n[2]);

@@ -1,6 +1,6 @@
 /* Mends creases of level sets. A crease is a voxel at a zero crossing whose gradient
-   openvdb::tools::checkLevelSet refuses; the values of its stencil are changed by the smallest
-   amounts that it accepts. */
+   openvdb::tools::checkLevelSet refuses; the values of the stencil of that voxel are changed by the
+   smallest amounts that make checkLevelSet accept it. */
 #include <openvdb/math/Stencils.h>
 
 #include <algorithm>
@@ -17,8 +17,8 @@ namespace
 
 /* checkLevelSet accepts squared gradients in [0.5, 1.5]; the margin covers its rounding errors. */
 const float SQUARE_LOW = 0.52f, SQUARE_HIGH = 1.48f;
-/* A squared gradient is moved this far into the interval, since changes for its neighbours move it
-   again; each step goes this part of the way (relaxation). */
+/* A squared gradient is moved into the interval by SQUARE_INSET, since changes for its neighbours
+   move it again; each step goes the part RELAXATION of the way. */
 const float SQUARE_INSET = 0.05f, RELAXATION = 0.7f;
 /* A map with creases at a larger share of its zero crossings is not a distance: nothing
    is changed. */
@@ -27,17 +27,17 @@ const double CREASES_MAX = 0.5;
    WIDE_FROM on the whole stencil may change instead of the nearest neighbours: both break cycles.
  */
 const int ROUNDS_MAX = 300, PLAIN_EVERY = 6, WIDE_FROM = 24;
-/* In voxels: largest change of a value per step, and lower bound of abs(value), unless it was
-   smaller at first. */
+/* Largest change of a value per step, and lower bound of abs(value) (unless abs(value) was smaller
+   at first), in voxels. */
 const float STEP_MAX = 0.25f, SIZE_MIN = 0.1f;
-/* Values that contribute less than this to the squared slope are not changed. */
+/* Values that contribute less than this part of the sum of squared derivatives are not changed. */
 const float SHARE_MIN = 1e-3f;
 
 /* The stencil of checkLevelSet: a voxel and three neighbours on each side along x, y, z. */
 using Stencil = openvdb::math::WenoStencil<const Grid>;
 const int STENCIL_SIZE = Stencil::SIZE;
 
-/* Voxel of value n of the stencil around `at`. */
+/* The voxel that holds value n of the stencil around `at`. */
 Coord stencil_place(const Coord &at, int n)
 {
     static const int along[] = {-3, -2, -1, 1, 2, 3};
@@ -68,7 +68,7 @@ float plain_square(const Stencil &stencil, float voxel)
     return sum;
 }
 
-// all creases of the grid; none if there are too many
+// all creases of the grid; an empty list if there are too many
 std::vector<Coord> find_creases(const Grid &grid)
 {
     std::vector<Coord> found;
@@ -85,7 +85,7 @@ std::vector<Coord> find_creases(const Grid &grid)
 }
 
 /* Creases among the voxels whose stencil contains a voxel of the stencils of the creases `before`:
-   all that the last round can have changed. */
+   no other creases can have changed in the last round. */
 std::vector<Coord> find_creases_near(const Grid &grid, const std::vector<Coord> &before)
 {
     std::vector<Coord> near, found;

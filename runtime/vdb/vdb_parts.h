@@ -40,19 +40,20 @@ inline void check_cancelled(const sdm_vdb_opts &o, sdm_error *err)
 
 // ---- vdb_creases.cc
 
-// A crease is a voxel at a zero crossing whose gradient checkLevelSet refuses. Changes values
-// there until none is left, and counts the changes in report. It may end without success: the
-// caller runs checkLevelSet.
+// A crease is a voxel at a zero crossing whose gradient checkLevelSet refuses. Changes values there
+// until no crease is left or the largest number of rounds is reached, and counts the changes in
+// report. Since creases may remain, the caller runs checkLevelSet.
 void mend_creases(Grid &grid, const sdm_vdb_opts &o, sdm_vdb_report &report, sdm_error *err);
 
 // ---- vdb_file.cc
 
 extern const char *const GRID_NAME;
 
-// CRC-64 of positions, extents and bits of all values in the order of the tree, tiles included
+// CRC-64 of the background, and of positions, extents, bits and activity of all values in the order
+// of the tree, tiles included
 uint64_t hash_of(const Grid &grid);
 
-// string metadata `name`; "" if there is none
+// the string metadata `name`; "" if the grid has none
 std::string text_of(const Grid &grid, const char *name);
 
 // checks the seal and reads the grid

@@ -1,4 +1,4 @@
-/* Distances beyond the grid of a level set: against all points of the faces, one by one.
+/* Distances outside of a level set's grid: against a search over all faces at the border.
  * Tests: faces.c */
 #include <math.h>
 #include <setjmp.h>
@@ -16,8 +16,8 @@
 
 #define VOXEL 0.3
 
-// d at the point half a voxel beyond border voxel b along +-axis: the value there, continued by
-// half of its last difference, 0 inside
+// Distance half a voxel outside of border voxel b, on the face along +-axis: the value at b
+// extrapolated by half of the last difference; 0 if negative (inside).
 static double at_face(const sdm_grid *g, const float *v, const int64_t b[3], int axis, bool low)
 {
     const int64_t step[3] = {1, g->n[0], g->n[0] * g->n[1]},
@@ -41,8 +41,8 @@ static double brute_force(const sdm_grid *g, const float *v, const int64_t p[3],
         const double away = fabs((double)(p[axis] - b[axis])) - 0.5;
         for (b[e] = 0; b[e] < g->n[e]; b[e]++)
             for (b[f] = 0; b[f] < g->n[f]; b[f]++) {
-                const double d = at_face(g, v, b, axis, low),
-                             reach = d > 0 ? 0 : 0.5; // all of a face inside is near
+                // inside: the whole face of the voxel counts, not only its centre
+                const double d = at_face(g, v, b, axis, low), reach = d > 0 ? 0 : 0.5;
                 const double x = fmax(fabs((double)(p[e] - b[e])) - reach, 0),
                              y = fmax(fabs((double)(p[f] - b[f])) - reach, 0);
                 best = fmin(best, VOXEL * sqrt(away * away + x * x + y * y) + d);
@@ -51,7 +51,8 @@ static double brute_force(const sdm_grid *g, const float *v, const int64_t p[3],
     return best;
 }
 
-// a ball in the grid, far from its faces, across them, and as noise that no distance is
+// Test maps: a ball far from the faces of the grid, a ball across them, and noise that is no
+// distance map.
 static float value(int kind, const int64_t at[3], uint64_t i)
 {
     static const double middle[3][3] = {{4, 3, 5}, {0, 6, 2}, {0, 0, 0}};
@@ -93,7 +94,7 @@ static void check(const int64_t n[3], int kind)
     free(v);
 }
 
-static void test_points(void **state)
+static void test_values_match_brute_force(void **state)
 {
     (void)state;
     for (int kind = 0; kind < 3; kind++) {
@@ -103,8 +104,8 @@ static void test_points(void **state)
     }
 }
 
-// wherever memory ends: an error, and nothing is left behind
-static void test_memory(void **state)
+// Each allocation fails once: an error, and no leak (detected by the sanitizer build).
+static void test_each_allocation_may_fail(void **state)
 {
     (void)state;
     const int64_t n[3] = {5, 4, 3};
@@ -127,7 +128,7 @@ static void test_memory(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_points),
-                                       cmocka_unit_test(test_memory)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_values_match_brute_force),
+                                       cmocka_unit_test(test_each_allocation_may_fail)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

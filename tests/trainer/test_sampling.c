@@ -1,5 +1,5 @@
-/* Error-driven sampling: the regression of the error, the density of the plan, the same bits for
- * any number of threads and after a resume.
+/* Error-driven sampling: regression of the error, density of the planned samples, and the same bits
+ * for any number of threads and after a resume.
  * Tests: error_model.c sample_plan.c sampling.c */
 #include <math.h>
 #include <setjmp.h>
@@ -19,7 +19,7 @@
 
 static double uniform(size_t i, double low, double high)
 {
-    // multiples of the golden ratio
+    // Multiples of the golden ratio modulo 1 are evenly spread.
     const double u = fmod(0.618033988749895 * (double)(i + 1), 1);
     return low + (high - low) * u;
 }
@@ -48,7 +48,8 @@ static void regression_finds_a_polynomial(void **state)
         assert_true(fabs(trainer_error_model_at(&m, at) - quadratic(at)) < 0.05);
     }
     trainer_error_model_dispose(&m);
-    // too few observations for slopes: a constant, which one observation of nothing pulls down
+    // Three observations are too few for slopes: a constant, which the prior (one observation of 0)
+    // reduces to 1.5.
     assert_int_equal(trainer_error_model_fit(&m, P, 3, x, (const double[]){2, 2, 2}, NULL), SDM_OK);
     assert_int_equal(m.degree, 0);
     assert_true(fabs(trainer_error_model_at(&m, x) - 1.5) < 1e-6);
@@ -61,15 +62,15 @@ static void regression_finds_a_polynomial(void **state)
 static const double LOW[2] = {-3, 10}, HIGH[2] = {5, 11};
 static const sample_space space = {.n_params = 2, .min = LOW, .max = HIGH, .seed = 5};
 
-// first parameter of a sample, scaled to -1 .. 1
+// Parameters of planned sample i, scaled to -1 .. 1.
 static void scaled(const sample_plan *p, size_t i, double *x)
 {
     sdm_sample_params(space.seed, STREAM_TRAIN, trainer_sample_plan_point(p, i), LOW, HIGH, 2, x);
     for (int k = 0; k < 2; k++) x[k] = 2 * (x[k] - LOW[k]) / (HIGH[k] - LOW[k]) - 1;
 }
 
-// observes samples first .. first + n - 1 as a network would whose error is exp(2 x), and falls
-// with the number of samples
+// Reports errors for samples first .. first + n - 1: proportional to exp(2 x), and falling with the
+// number of samples.
 static void observe(sample_plan *p, size_t first, size_t n)
 {
     double error[SAMPLE_ROUND];
@@ -112,7 +113,8 @@ static void density_follows_the_error(void **state)
         all++;
     }
     for (int b = 0; b < BINS; b++) {
-        // the integral of 1/2 + 1/2 exp(2 x) / mean over the bin; the mean is sinh(2) / 2
+        // Expected share of the bin: half uniform, half proportional to exp(2 x), whose mean over
+        // -1 .. 1 is sinh(2) / 2.
         const double low = -1 + 2.0 * b / BINS, high = low + 2.0 / BINS;
         const double share = 0.5 / BINS + 0.5 * (exp(2 * high) - exp(2 * low)) / 4 / (sinh(2) / 2);
         assert_true(fabs(count[0][b] / all - share) < 0.015);
@@ -121,8 +123,8 @@ static void density_follows_the_error(void **state)
     trainer_sample_plan_dispose(&p);
 }
 
-// what is left of a plan after a round gives the rest of it again
-static void plan_goes_on(void **state)
+// A plan restored from its points and errors up to some round continues with the same points.
+static void restored_plan_continues(void **state)
 {
     (void)state;
     enum { START = 40, N = 1000, BREAK = START + 8 * SAMPLE_ROUND };
@@ -142,8 +144,8 @@ static void plan_goes_on(void **state)
     trainer_sample_plan_dispose(&rest);
 }
 
-// no observation, no reason to prefer a point; maps met without an error are none
-static void nothing_observed(void **state)
+// Without usable observations (errors of 0 or NaN) all points are taken in order.
+static void without_errors_all_points_are_taken(void **state)
 {
     (void)state;
     enum { START = 10, N = 300 };
@@ -189,7 +191,7 @@ static sdm_model *trained(void)
     return m;
 }
 
-// a map, as a fingerprint of the weights
+// One map of the model, as a fingerprint of its weights.
 static void map_of(float *map)
 {
     const double p[2] = {3, 1.5};
@@ -214,7 +216,7 @@ static void same_bits_for_threads(void **state)
         map_of(threads == 1 ? first : other);
         if (threads > 1) assert_memory_equal(first, other, sizeof first);
     }
-    // and the errors do have a say
+    // Error-driven sampling does change the result.
     clean();
     assert_int_equal(train("data.sampling=uniform", 2, false, NULL), SDM_OK);
     map_of(other);
@@ -236,8 +238,8 @@ static void resume_is_bit_exact(void **state)
     clean();
     assert_int_equal(train(NULL, 2, false, NULL), SDM_OK);
     map_of(whole);
-    // the question is asked once for each of 68 maps before training, then about once a step: twice
-    // in the fit, and in the refinement
+    // The hook is called once for each of the 68 maps before training, then about once a step: two
+    // stops lie in the fit of the network, one in the refinement.
     const int64_t stops[] = {110, 150, 200};
     for (size_t i = 0; i < sizeof stops / sizeof *stops; i++) {
         clean();
@@ -251,16 +253,16 @@ static void resume_is_bit_exact(void **state)
     }
 }
 
-// polynomials alone have no fit that could be asked: all points are taken, and nothing waits for
-// ever
-static void without_a_fit(void **state)
+// Without hidden layers there is no network to measure errors with: all points are used, and
+// training must not wait for errors.
+static void polynomials_need_no_errors(void **state)
 {
     (void)state;
     clean();
     assert_int_equal(train("network.depth=0", 2, false, NULL), SDM_OK);
 }
 
-static void small_pool_and_time(void **state)
+static void small_memory_and_short_time_work(void **state)
 {
     (void)state;
     clean();
@@ -269,7 +271,7 @@ static void small_pool_and_time(void **state)
     assert_int_equal(train("train.minutes=0.02", 2, false, NULL), SDM_OK);
 }
 
-static void only_for_pod(void **state)
+static void other_kinds_are_refused(void **state)
 {
     (void)state;
     static const char text[] =
@@ -287,13 +289,13 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(regression_finds_a_polynomial),
         cmocka_unit_test(density_follows_the_error),
-        cmocka_unit_test(plan_goes_on),
-        cmocka_unit_test(nothing_observed),
+        cmocka_unit_test(restored_plan_continues),
+        cmocka_unit_test(without_errors_all_points_are_taken),
         cmocka_unit_test(same_bits_for_threads),
         cmocka_unit_test(resume_is_bit_exact),
-        cmocka_unit_test(without_a_fit),
-        cmocka_unit_test(small_pool_and_time),
-        cmocka_unit_test(only_for_pod),
+        cmocka_unit_test(polynomials_need_no_errors),
+        cmocka_unit_test(small_memory_and_short_time_work),
+        cmocka_unit_test(other_kinds_are_refused),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -119,7 +119,6 @@ static void test_size_depth_and_count_limits(void **state)
 
 /* A configuration cut at any byte gives an error with a message or a smaller configuration,
  * never a crash. */
-/* A config may be cut anywhere: an error with a text or a smaller config, never a crash. */
 static void test_truncated_text_is_safe(void **state)
 {
     static const char TEXT[] =

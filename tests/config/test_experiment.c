@@ -194,7 +194,6 @@ static void test_fit_rows(void **state)
 
 /* fit.model is relative to the folder of the file; on the command line it is relative to the
  * working folder. */
-/* A model of the file is meant from its folder, one of the command line from the working folder. */
 static void test_path_of_fit_model(void **state)
 {
     const char *text =
@@ -358,7 +357,6 @@ static void test_shipped_files(void **state)
 }
 
 /* Each allocation fails once: an error, and no leak (detected by the sanitizer build). */
-/* A failed allocation is an error, and nothing is leaked (a sanitizer looks). */
 static void test_each_allocation_may_fail(void **state)
 {
     sdm_status s = SDM_E_NOMEM;

@@ -272,7 +272,7 @@ static void thread_counts_are_limited(void **state)
 {
     (void)state;
     const int most = sdm_threads(1000000);
-    assert_true(most == 1 || most >= 64); // 1 without OpenMP
+    assert_true(most == 1 || most >= 64); // a build without OpenMP has one thread
     assert_true(most <= 64 || most <= 2 * sysconf(_SC_NPROCESSORS_CONF));
     assert_int_equal(sdm_threads(INT_MAX), most);
     assert_int_equal(sdm_threads(3), most == 1 ? 1 : 3);

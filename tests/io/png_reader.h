@@ -1,6 +1,4 @@
 /* A small decoder for the 8-bit RGB PNG files that cairo writes, for tests of pictures. */
-/* A small decoder of PNG files with 8-bit RGB pixels, as cairo writes them, for tests of pictures.
- */
 #ifndef TESTS_PNG_READER_H
 #define TESTS_PNG_READER_H
 

@@ -266,7 +266,6 @@ static void test_output_is_reproducible(void **state)
 }
 
 /* A description with several lines or of excessive length must not break a header. */
-/* A description of several lines or too long must not break a header. */
 static void test_description_cannot_break_headers(void **state)
 {
     (void)state;

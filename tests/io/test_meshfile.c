@@ -178,7 +178,6 @@ static size_t real_append(unsigned char *p, size_t at, size_t size, bool big, do
 }
 
 /* The pyramid as binary PLY, with mixed types and with properties that a reader must skip. */
-/* A binary PLY of the pyramid with mixed types and things to skip. */
 static size_t binary_ply(unsigned char *p, bool big)
 {
     size_t n = (size_t)sprintf((char *)p,
@@ -224,7 +223,6 @@ static void test_binary_ply(void **state)
 
 /* A binary STL whose header begins with "solid", like a text STL: the length of the file
  * decides. */
-/* A binary STL whose header begins with "solid": the length tells it from text. */
 static void test_binary_stl(void **state)
 {
     (void)state;

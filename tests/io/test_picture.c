@@ -186,8 +186,6 @@ static void test_slices_of_odd_maps(void **state)
 
 /* A bright ball on a dark ground with two contours. The first contour gives three circles side
  * by side, white inside and black outside. */
-/* A bright ball on a dark ground with two contours: the first one makes three circles side by side,
- * white inside and black outside. */
 static void test_overlay_shows_contours_on_the_image(void **state)
 {
     (void)state;

@@ -238,8 +238,6 @@ static void test_failures_leave_no_file(void **state)
 }
 
 /* A limit on the file size simulates a full disk: an error status, and the older picture stays. */
-/* A limit on the size of files stands for a full disk: the status, and the picture that was there
- * before stays. */
 static void test_full_disk(void **state)
 {
     (void)state;

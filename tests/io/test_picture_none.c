@@ -1,6 +1,5 @@
 /* A build without cairo: every picture is refused with a message that names the missing build
- * option. */
-/* A build without cairo: every picture is refused with the option that would give it.
+ * option.
  * Tests: picture_none.c */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -32,8 +32,6 @@ static void square_append(sdm_mesh *m, double *values, double half, double z, do
 
 /* A small square above a large one hides its centre, in either order of the triangles. Colours
  * follow the sign of the values, and areas in pixels follow the scale. */
-/* A small square above a large one hides its middle, in either order of the triangles; colours
- * follow the sign of the values, and areas the scale. */
 static void test_surfaces(void **state)
 {
     (void)state;

@@ -217,7 +217,6 @@ static void test_written_types(void **state)
 }
 
 /* sdm_image_write() writes the same bytes as sdm_volume_write() for a float32 image. */
-/* A map written by sdm_image_write() is the float32 image of sdm_volume_write(). */
 static void test_both_writers_agree(void **state)
 {
     (void)state;

@@ -187,7 +187,6 @@ static void test_bad_text_headers_are_refused(void **state)
 
 /* Expects a refusal of a NIfTI-1 header in which one number is changed: at byte `at`, a real or
  * an integer of `size` bytes. */
-/* A header of version 1 with a number changed: `real` or an integer of `size` bytes. */
 static void nifti_refused(size_t at, size_t size, bool real, double value, sdm_status status,
                           const char *part)
 {

@@ -19,7 +19,6 @@
 enum { FILE_MAX = 1 << 16 };
 
 /* A file that is being assembled. */
-/* A file under construction. */
 typedef struct bytes {
     unsigned char data[FILE_MAX];
     size_t size;
@@ -110,8 +109,6 @@ static inline void add_voxels(bytes *b, int type, int big, const double *v, size
 
 /* Appends a NIfTI header of version 1 or 2, with the four bytes that state no extensions. qform
  * and sform codes are 0, spacings 1, slope 0. */
-/* A NIfTI header of version 1 or 2 and its four bytes without extensions; both codes 0, spacing 1,
- * slope 0. */
 static inline void add_nifti(bytes *b, int version, int big, int type, const int64_t n[3])
 {
     unsigned char *h = b->data;

@@ -1,6 +1,5 @@
 /* A small sdmnn network with random weights, and the model file made from it. Include cmocka.h
  * first. */
-/* A small sdmnn network with random weights, and its model. */
 #ifndef TEST_SDMNN_TOY_H
 #define TEST_SDMNN_TOY_H
 

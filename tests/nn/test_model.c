@@ -116,7 +116,7 @@ static sdm_model *toy_open(const toy *t)
     return m;
 }
 
-// normalised Legendre polynomials in closed form
+// Normalised Legendre polynomials, n = 0 .. 3, in closed form.
 static double legendre(int n, double x)
 {
     switch (n) {
@@ -160,7 +160,7 @@ static void reference(const toy *t, const double *p, double *map)
         memcpy(h, next, sizeof h);
     }
     memcpy(z + a->n_terms, h, sizeof h);
-    // coefficients from the highest level down, then the map
+    // Coefficients from the highest level down to level 0, then the map.
     const size_t n_blocks = a->levels.first[n_levels];
     double c[80][64] = {{0}};
     const float *matrix[80], *at = t->basis;
@@ -212,7 +212,7 @@ static void polynomials_match_closed_forms(void **state)
         last = total;
         for (int j = 0; j < i; j++) assert_memory_not_equal(e + 4 * i, e + 4 * j, 4);
     }
-    // values against closed forms, slopes against differences
+    // Values against closed forms, derivatives against differences.
     const double x[4] = {0.3, -0.7, 0.9, -1};
     float phi[35], dphi[4 * 35], high[35], low[35];
     sdm_poly_eval(e, 35, 4, 3, x, phi, dphi);

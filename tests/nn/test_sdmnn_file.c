@@ -81,7 +81,7 @@ static void damage_is_refused(void **state)
     assert_int_equal(n, 5);
     for (size_t i = 0; i < n; i++) {
         for (int missing = 0; missing < 2; missing++) {
-            if (strcmp(sections[i].name, "config") == 0) continue; // a text of any length
+            if (strcmp(sections[i].name, "config") == 0) continue; // text of any length is valid
             uint8_t *other;
             size_t other_size, k = 0;
             for (size_t j = 0; j < n; j++)

@@ -31,8 +31,8 @@ static int mesh_ball(const void *self, const sdm_host *host, const sdm_option_va
 {
     (void)self;
     const double r = ball_radius(p) * options[0].number, pi = acos(-1.0);
-    if (p[1] == UNLUCKY)
-        return (host->fail)(host, "an unlucky number"); // fail is also a macro of cmocka
+    // In parentheses: cmocka defines a macro fail().
+    if (p[1] == UNLUCKY) return (host->fail)(host, "an unlucky number");
     const int failed =
         host->reserve(host, out, 2 + (RINGS - 1) * SECTORS, 2 * (RINGS - 1) * SECTORS);
     if (failed) return failed;

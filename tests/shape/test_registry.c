@@ -24,7 +24,6 @@ static void err_has(const char *text)
 
 /* A tetrahedron; its options select good or faulty behaviour. Every test starts from this table
  * of callbacks. */
-/* A tetrahedron whose behaviour is chosen by its options; every test starts from this table. */
 static const sdm_param PARAMS[] = {{"size", "mm", 1, 3, 2, "edge"},
                                    {"shift", "mm", -1, 1, 0, "along x"}};
 
@@ -43,9 +42,8 @@ static int mesh(const void *self, const sdm_host *host, const sdm_option_value *
 {
     (void)self;
     const char *mode = options[MODE].text;
-    if (!strcmp(mode, "error"))
-        return (host->fail)(host,
-                            "the size is unlucky"); // in brackets: cmocka has a macro fail()
+    // In parentheses: cmocka defines a macro fail().
+    if (!strcmp(mode, "error")) return (host->fail)(host, "the size is unlucky");
     if (!strcmp(mode, "mute")) return 7;
     if (!strcmp(mode, "skip")) return 0;
     if (!strcmp(mode, "huge")) return host->reserve(host, out, (size_t)1 << 40, 4);
@@ -149,7 +147,7 @@ static void test_names_are_checked(void **state)
         refused(&s, "there: shape 'tetra': option 3 has the name '");
     }
     sdm_shape s = GOOD;
-    s.name = "a_1"; // the shortest and the longest that are fine
+    s.name = "a_1"; // the shortest and the longest valid names
     assert_int_equal(sdm_registry_add(registry, &s, "there", &err), SDM_OK);
     s.name = "a23456789012345678901234567890123456789012345678901234567890abc";
     assert_int_equal(sdm_registry_add(registry, &s, "there", &err), SDM_OK);
@@ -400,7 +398,8 @@ static void test_parameters_must_be_in_range(void **state)
         assert_null(m.vert);
     }
     assert_int_equal(sdm_instance_check(s, bad[0], &err), SDM_E_RANGE);
-    err_has("is 0.9999999999999999 mm, need"); // one unit in the last place is seen, and shown
+    // A difference of one unit in the last place is detected, and all digits are printed.
+    err_has("is 0.9999999999999999 mm, need");
     assert_int_equal(sdm_instance_check(s, bad[3], &err), SDM_E_RANGE);
     err_has("is nan mm");
     assert_int_equal(sdm_instance_check(s, NULL, &err), SDM_E_ARG);

@@ -211,13 +211,13 @@ static void same_bits_for_threads(void **state)
     (void)state;
     float first[VOXELS], other[VOXELS];
     for (int threads = 1; threads <= 4; threads++) {
-        clean();
+        run_files_remove();
         assert_int_equal(train(NULL, threads, false, NULL), SDM_OK);
         map_of(threads == 1 ? first : other);
         if (threads > 1) assert_memory_equal(first, other, sizeof first);
     }
     // Error-driven sampling does change the result.
-    clean();
+    run_files_remove();
     assert_int_equal(train("data.sampling=uniform", 2, false, NULL), SDM_OK);
     map_of(other);
     assert_memory_not_equal(first, other, sizeof first);
@@ -235,14 +235,14 @@ static void resume_is_bit_exact(void **state)
 {
     (void)state;
     float whole[VOXELS], resumed[VOXELS];
-    clean();
+    run_files_remove();
     assert_int_equal(train(NULL, 2, false, NULL), SDM_OK);
     map_of(whole);
     // The hook is called once for each of the 68 maps before training, then about once a step: two
     // stops lie in the fit of the network, one in the refinement.
     const int64_t stops[] = {110, 150, 200};
     for (size_t i = 0; i < sizeof stops / sizeof *stops; i++) {
-        clean();
+        run_files_remove();
         calls = 0, stop_after = stops[i];
         const sdm_train_hooks hooks = {.cancelled = stop};
         assert_int_equal(train(NULL, 3, false, &hooks), SDM_E_CANCELLED);
@@ -258,16 +258,16 @@ static void resume_is_bit_exact(void **state)
 static void polynomials_need_no_errors(void **state)
 {
     (void)state;
-    clean();
+    run_files_remove();
     assert_int_equal(train("network.depth=0", 2, false, NULL), SDM_OK);
 }
 
 static void small_memory_and_short_time_work(void **state)
 {
     (void)state;
-    clean();
+    run_files_remove();
     assert_int_equal(train("data.memory_gb=0.001", 2, false, NULL), SDM_OK);
-    clean();
+    run_files_remove();
     assert_int_equal(train("train.minutes=0.02", 2, false, NULL), SDM_OK);
 }
 

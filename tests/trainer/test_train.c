@@ -102,7 +102,7 @@ static void same_bits_for_threads(void **state)
     uint64_t model[3], metrics[3];
     for (int threads = 1; threads <= 3; threads++) {
         read_config(&c, (const char *const[]){"train.steps=600"}, 1);
-        clean();
+        run_files_remove();
         // The stored configuration must not contain the number of threads, since results do not
         // depend on it.
         c.threads = 0;
@@ -161,13 +161,13 @@ static void resume_is_bit_exact(void **state)
     sdm_config c;
     sdm_error e = {0};
     read_config(&c, (const char *const[]){"train.steps=600"}, 1);
-    clean();
+    run_files_remove();
     if (sdm_train(&c, capsule, folder, false, NULL, NULL, &e)) fail_msg("%s", e.text);
     const uint64_t whole = hash_of("model.sdm"), metrics = hash_of("metrics.jsonl");
     // Stopped while data are made, in the fit of the network, in the refinement.
     const int64_t stops[] = {IN_DATA, IN_FIT, IN_REFINEMENT};
     for (size_t i = 0; i < 3; i++) {
-        clean();
+        run_files_remove();
         calls = 0, stop_after = stops[i];
         watch w = {0};
         const sdm_train_hooks hooks = {.cancelled = stop, .progress = watch_progress, .user = &w};
@@ -206,7 +206,7 @@ static void resume_with_another_budget(void **state)
         sdm_config c;
         sdm_error e = {0};
         sdm_train_report r;
-        clean();
+        run_files_remove();
         read_config(&c, (const char *const[]){budgets[i][0]}, 1);
         calls = 0, stop_after = i < 2 ? IN_REFINEMENT : IN_FIT;
         const sdm_train_hooks hooks = {.cancelled = stop};
@@ -236,10 +236,10 @@ static void model_cannot_be_written(void **state)
     sdm_config c;
     sdm_error e = {0};
     read_config(&c, (const char *const[]){"train.steps=595"}, 1);
-    clean();
+    run_files_remove();
     if (sdm_train(&c, capsule, folder, false, NULL, NULL, &e)) fail_msg("%s", e.text);
     const uint64_t whole = hash_of("model.sdm"), metrics = hash_of("metrics.jsonl");
-    clean();
+    run_files_remove();
     calls = 0;
     const sdm_train_hooks hooks = {.cancelled = block_model};
     assert_int_equal(sdm_train(&c, capsule, folder, false, &hooks, NULL, &e), SDM_E_IO);
@@ -261,7 +261,7 @@ static void older_run_gives_way(void **state)
     sdm_error e = {0};
     read_config(&c, (const char *const[]){"train.steps=600"}, 1);
     read_config(&other, (const char *const[]){"train.steps=600", "network.width=16"}, 2);
-    clean();
+    run_files_remove();
     const sdm_train_hooks stopped = {.cancelled = stop};
     calls = 0, stop_after = IN_FIT;
     assert_int_equal(sdm_train(&c, capsule, folder, false, &stopped, NULL, &e), SDM_E_CANCELLED);
@@ -300,7 +300,7 @@ static void time_budget_shorter_than_data(void **state)
     sdm_config c;
     sdm_error e = {0};
     sdm_train_report r;
-    clean();
+    run_files_remove();
     read_config(&c,
                 (const char *const[]){"train.steps=0", "train.minutes=0.01", "data.start=5000",
                                       "network.degree=8"},
@@ -315,7 +315,7 @@ static void polynomials_without_hidden_layers(void **state)
     sdm_config c;
     sdm_error e = {0};
     sdm_train_report r;
-    clean();
+    run_files_remove();
     read_config(&c,
                 (const char *const[]){"network.depth=0", "train.steps=50", "network.weights=f32",
                                       "data.static=[2,4]", "data.online=0", "train.loss=huber",
@@ -332,7 +332,7 @@ static void small_pool_replaces_old_samples(void **state)
     sdm_config c;
     sdm_error e = {0};
     sdm_train_report r;
-    clean();
+    run_files_remove();
     read_config(&c,
                 (const char *const[]){"train.steps=300", "data.memory_gb=0.0025", "data.start=60",
                                       "data.online=500", "data.static=2"},
@@ -351,7 +351,7 @@ static void rank_is_limited_by_maps(void **state)
     sdm_error e = {0};
     sdm_train_report r;
     sdm_model *m;
-    clean();
+    run_files_remove();
     read_config(&c,
                 (const char *const[]){"train.steps=2", "data.static=2", "data.start=4",
                                       "data.online=0", "network.rank=200", "network.levels=1"},
@@ -372,7 +372,7 @@ static void mistakes_are_refused(void **state)
     (void)state;
     sdm_config c;
     sdm_error e = {0};
-    clean();
+    run_files_remove();
     read_config(&c, (const char *const[]){"data.static=[2,2,2,2,2]"}, 1);
     assert_int_equal(sdm_train(&c, capsule, folder, false, NULL, NULL, &e), SDM_E_CONFIG);
     assert_non_null(strstr(e.text, "data.static"));

@@ -56,7 +56,7 @@ static sdm_train_report train(const sdm_config *c)
 {
     sdm_error e = {0};
     sdm_train_report r;
-    clean();
+    run_files_remove();
     if (sdm_train(c, capsule, folder, false, NULL, &r, &e)) fail_msg("%s", e.text);
     return r;
 }
@@ -158,7 +158,7 @@ static void resume_is_bit_exact(void **state)
         // Stopped while data are made, and at the beginning and in the middle of the training.
         const int64_t stops[] = {20, 80, 110};
         for (size_t i = 0; i < 3; i++) {
-            clean();
+            run_files_remove();
             calls = 0, stop_after = stops[i];
             const sdm_train_hooks hooks = {.cancelled = stop};
             assert_int_equal(sdm_train(&c, capsule, folder, false, &hooks, NULL, &e),

@@ -288,7 +288,7 @@ static void test_plot_draws_a_straight_line(void **state)
     free(p.rgb);
 }
 
-static void test_odd_plots(void **state)
+static void test_odd_plots_are_drawn(void **state)
 {
     (void)state;
     static const double x[4] = {1, 2, INFINITY, 4}, zero[4] = {0}, huge[4] = {1e300, -1e300, 1, 2},
@@ -399,7 +399,7 @@ static void test_colours_are_ordered(void **state)
     assert_true(none.r == none.g && none.g == none.b);
 }
 
-static void test_ticks(void **state)
+static void test_ticks_are_round_numbers(void **state)
 {
     (void)state;
     for (uint64_t i = 0; i < 500; i++) {
@@ -474,10 +474,10 @@ int main(void)
         cmocka_unit_test(test_slices_of_odd_maps),
         cmocka_unit_test(test_overlay_shows_contours_on_the_image),
         cmocka_unit_test(test_plot_draws_a_straight_line),
-        cmocka_unit_test(test_odd_plots),
+        cmocka_unit_test(test_odd_plots_are_drawn),
         cmocka_unit_test(test_text_is_aligned),
         cmocka_unit_test(test_colours_are_ordered),
-        cmocka_unit_test(test_ticks),
+        cmocka_unit_test(test_ticks_are_round_numbers),
         cmocka_unit_test(test_wrong_arguments_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

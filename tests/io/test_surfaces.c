@@ -32,7 +32,7 @@ static void square_append(sdm_mesh *m, double *values, double half, double z, do
 
 /* A small square above a large one hides its centre, in either order of the triangles. Colours
  * follow the sign of the values, and areas in pixels follow the scale. */
-static void test_surfaces(void **state)
+static void test_hidden_parts_colours_and_scale(void **state)
 {
     (void)state;
     sdm_error err;
@@ -70,7 +70,7 @@ static void test_surfaces(void **state)
     free(p[1].rgb);
 }
 
-static void test_misuse(void **state)
+static void test_wrong_arguments_are_refused(void **state)
 {
     (void)state;
     sdm_error err;
@@ -98,8 +98,8 @@ static void test_misuse(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_surfaces),
-        cmocka_unit_test(test_misuse),
+        cmocka_unit_test(test_hidden_parts_colours_and_scale),
+        cmocka_unit_test(test_wrong_arguments_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -35,7 +35,7 @@ static void small_check(const char *path, int type)
     assert_null(v.values);
 }
 
-static void test_every_type(void **state)
+static void test_types_in_both_byte_orders(void **state)
 {
     (void)state;
     static bytes b, raw;
@@ -180,7 +180,7 @@ static void test_round_trips(void **state)
 }
 
 /* Headers written by the library name each type as the formats specify. */
-static void test_written_types(void **state)
+static void test_names_of_written_types(void **state)
 {
     (void)state;
     static const char *const nrrd[10] = {
@@ -274,10 +274,10 @@ static void test_gzip_of_several_members(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_every_type),
+        cmocka_unit_test(test_types_in_both_byte_orders),
         cmocka_unit_test(test_round_trips),
         cmocka_unit_test(test_both_writers_agree),
-        cmocka_unit_test(test_written_types),
+        cmocka_unit_test(test_names_of_written_types),
         cmocka_unit_test(test_nan_and_infinity_are_kept),
         cmocka_unit_test(test_gzip_of_several_members),
     };

@@ -56,7 +56,7 @@ static size_t make_sample(int which, bytes *b, const char **name, size_t *header
 enum { SAMPLES = 5 };
 
 /* Every proper prefix of a sample is refused: the files have no optional bytes. */
-static void test_truncated(void **state)
+static void test_truncated_files_are_refused(void **state)
 {
     (void)state;
     static bytes b;
@@ -83,7 +83,7 @@ static void test_truncated(void **state)
 
 /* Random changes of bytes give an image or an error, and never allocate more memory than the
  * size of the file justifies. */
-static void test_damaged(void **state)
+static void test_damaged_files_are_safe(void **state)
 {
     (void)state;
     static bytes b, bad;
@@ -238,8 +238,8 @@ static void test_read_again(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_truncated),
-        cmocka_unit_test(test_damaged),
+        cmocka_unit_test(test_truncated_files_are_refused),
+        cmocka_unit_test(test_damaged_files_are_safe),
         cmocka_unit_test(test_gzip_of_wrong_size),
         cmocka_unit_test(test_each_allocation_may_fail),
         cmocka_unit_test(test_wrong_arguments_are_refused),

@@ -24,7 +24,7 @@ static double voxel_distance(const sdm_grid *g, size_t a, size_t b)
 
 // Random dark images with a few bright and NaN voxels: the mask equals the union of all balls of
 // the given radius that contain no bright voxel.
-static void test_brute_force(void **state)
+static void test_mask_matches_brute_force(void **state)
 {
     (void)state;
     sdm_grid g = sdm_grid_centred((int64_t[3]){NX, NY, NZ}, 1, (double[3]){0, 0, 0});
@@ -139,7 +139,7 @@ static void test_radius_below_shape_is_refused(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_brute_force),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_mask_matches_brute_force),
                                        cmocka_unit_test(test_mask_removes_the_bias),
                                        cmocka_unit_test(test_radius_below_shape_is_refused)};
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -154,7 +154,7 @@ static void test_points_are_uniform_in_triangles(void **state)
 }
 
 // The map of a torus with a tube thicker by 0.1 mm.
-static void test_wrong_parameter(void **state)
+static void test_error_of_wrong_parameter(void **state)
 {
     (void)state;
     sdm_error err;
@@ -180,7 +180,7 @@ static void test_wrong_parameter(void **state)
 
 // Surface inside of a union is not checked, and an inside-out mesh is treated as the exact engine
 // does.
-static void test_union_and_turned(void **state)
+static void test_union_and_inside_out(void **state)
 {
     (void)state;
     sdm_mesh m = {0}, b = {0};
@@ -204,7 +204,7 @@ static void test_union_and_turned(void **state)
 }
 
 // Points outside of the grid are counted; a NaN in the map makes the statistics fail any bound.
-static void test_beyond_and_nan(void **state)
+static void test_points_outside_and_nan(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -262,9 +262,9 @@ int main(void)
         cmocka_unit_test(test_exact_and_shifted),
         cmocka_unit_test(test_points_are_uniform_by_area),
         cmocka_unit_test(test_points_are_uniform_in_triangles),
-        cmocka_unit_test(test_wrong_parameter),
-        cmocka_unit_test(test_union_and_turned),
-        cmocka_unit_test(test_beyond_and_nan),
+        cmocka_unit_test(test_error_of_wrong_parameter),
+        cmocka_unit_test(test_union_and_inside_out),
+        cmocka_unit_test(test_points_outside_and_nan),
         cmocka_unit_test(test_wrong_arguments_are_refused),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

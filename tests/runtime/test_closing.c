@@ -63,7 +63,7 @@ static bool is_reached(const sdm_grid *g, const float *v, const int at[3], doubl
     return false;
 }
 
-static void test_brute_force(void **state)
+static void test_closing_matches_brute_force(void **state)
 {
     (void)state;
     const sdm_grid g = grid_of(0.4);
@@ -122,7 +122,7 @@ static void test_wrong_arguments_are_refused(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_brute_force),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_closing_matches_brute_force),
                                        cmocka_unit_test(test_border),
                                        cmocka_unit_test(test_wrong_arguments_are_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -130,7 +130,7 @@ static void test_correction_recovers_the_sum(void **state)
 }
 
 // Any number of threads gives the same bits.
-static void test_threads(void **state)
+static void test_same_bits_for_threads(void **state)
 {
     (void)state;
     static double e[VOXELS], influence[UNKNOWNS * UNKNOWNS], c[2][FIT_LAG_ZERO + 1];
@@ -152,6 +152,6 @@ static void test_threads(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_correction_recovers_the_sum),
-                                       cmocka_unit_test(test_threads)};
+                                       cmocka_unit_test(test_same_bits_for_threads)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

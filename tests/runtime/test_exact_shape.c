@@ -105,7 +105,7 @@ static void check_differences(const sdm_instance *s, const double *p, const sdm_
     free(j);
 }
 
-static void test_cochlea(void **state)
+static void test_derivatives_of_cochlea(void **state)
 {
     (void)state;
     sdm_instance *s = shape_make(sdm_registry_find(registry, "cochlea", NULL), NULL, NULL);
@@ -122,7 +122,7 @@ static void test_cochlea(void **state)
     sdm_instance_free(s);
 }
 
-static void test_superquadric(void **state)
+static void test_derivatives_of_superquadric(void **state)
 {
     (void)state;
     sdm_instance *s = shape_make(sdm_registry_find(registry, "ellipsoid", NULL), "e1", "0.4");
@@ -133,7 +133,7 @@ static void test_superquadric(void **state)
 }
 
 /* Derivatives of ideal shapes; the bounds allow for the angle between triangles and surface. */
-static void test_closed_forms(void **state)
+static void test_derivatives_in_closed_form(void **state)
 {
     (void)state;
     const sdm_grid g =
@@ -178,7 +178,7 @@ static void test_closed_forms(void **state)
 
 /* Without a velocity callback the registry takes finite differences of the mesh, one-sided at
  * the ends of a range. */
-static void test_without_velocity(void **state)
+static void test_derivatives_without_velocity(void **state)
 {
     (void)state;
     const sdm_shape *with = sdm_registry_find(registry, "cochlea", NULL);
@@ -202,7 +202,7 @@ static void test_without_velocity(void **state)
     sdm_instance_free(b);
 }
 
-static void test_threads(void **state)
+static void test_same_bits_for_threads(void **state)
 {
     (void)state;
     sdm_instance *s = shape_make(sdm_registry_find(registry, "cochlea", NULL), NULL, NULL);
@@ -295,9 +295,12 @@ static void test_wrong_arguments_are_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_cochlea),      cmocka_unit_test(test_superquadric),
-        cmocka_unit_test(test_closed_forms), cmocka_unit_test(test_without_velocity),
-        cmocka_unit_test(test_threads),      cmocka_unit_test(test_wrong_arguments_are_refused),
+        cmocka_unit_test(test_derivatives_of_cochlea),
+        cmocka_unit_test(test_derivatives_of_superquadric),
+        cmocka_unit_test(test_derivatives_in_closed_form),
+        cmocka_unit_test(test_derivatives_without_velocity),
+        cmocka_unit_test(test_same_bits_for_threads),
+        cmocka_unit_test(test_wrong_arguments_are_refused),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -18,7 +18,8 @@
 
 // Distance half a voxel outside of border voxel b, on the face along +-axis: the value at b
 // extrapolated by half of the last difference; 0 if negative (inside).
-static double at_face(const sdm_grid *g, const float *v, const int64_t b[3], int axis, bool low)
+static double face_distance(const sdm_grid *g, const float *v, const int64_t b[3], int axis,
+                            bool low)
 {
     const int64_t step[3] = {1, g->n[0], g->n[0] * g->n[1]},
                   at = b[0] + b[1] * step[1] + b[2] * step[2];
@@ -29,7 +30,7 @@ static double at_face(const sdm_grid *g, const float *v, const int64_t b[3], int
     return d > 0 ? d : 0;
 }
 
-static double brute_force(const sdm_grid *g, const float *v, const int64_t p[3], double most)
+static double distance_by_search(const sdm_grid *g, const float *v, const int64_t p[3], double most)
 {
     double best = most;
     for (int axis = 0; axis < 3; axis++) {
@@ -42,7 +43,7 @@ static double brute_force(const sdm_grid *g, const float *v, const int64_t p[3],
         for (b[e] = 0; b[e] < g->n[e]; b[e]++)
             for (b[f] = 0; b[f] < g->n[f]; b[f]++) {
                 // inside: the whole face of the voxel counts, not only its centre
-                const double d = at_face(g, v, b, axis, low), reach = d > 0 ? 0 : 0.5;
+                const double d = face_distance(g, v, b, axis, low), reach = d > 0 ? 0 : 0.5;
                 const double x = fmax(fabs((double)(p[e] - b[e])) - reach, 0),
                              y = fmax(fabs((double)(p[f] - b[f])) - reach, 0);
                 best = fmin(best, VOXEL * sqrt(away * away + x * x + y * y) + d);
@@ -53,7 +54,7 @@ static double brute_force(const sdm_grid *g, const float *v, const int64_t p[3],
 
 // Test maps: a ball far from the faces of the grid, a ball across them, and noise that is no
 // distance map.
-static float value(int kind, const int64_t at[3], uint64_t i)
+static float map_value(int kind, const int64_t at[3], uint64_t i)
 {
     static const double middle[3][3] = {{4, 3, 5}, {0, 6, 2}, {0, 0, 0}};
     if (kind == 2) return (float)(3 * sdm_rng_uniform(1, 2, i) - 0.3);
@@ -63,7 +64,7 @@ static float value(int kind, const int64_t at[3], uint64_t i)
     return (float)(VOXEL * (sqrt(sum) - 2.2));
 }
 
-static void check(const int64_t n[3], int kind)
+static void faces_check(const int64_t n[3], int kind)
 {
     const double origin[3] = {0, 0, 0};
     const sdm_grid g = sdm_grid_centred(n, VOXEL, origin);
@@ -73,7 +74,7 @@ static void check(const int64_t n[3], int kind)
     for (int64_t k = 0; k < n[2]; k++)
         for (int64_t j = 0; j < n[1]; j++)
             for (int64_t i = 0; i < n[0]; i++, count++)
-                v[count] = value(kind, (const int64_t[3]){i, j, k}, count);
+                v[count] = map_value(kind, (const int64_t[3]){i, j, k}, count);
     sdm_faces faces = {0};
     assert_int_equal(sdm_faces_create(&g, v, &faces, NULL), SDM_OK);
     const int64_t pad = 7;
@@ -84,7 +85,7 @@ static void check(const int64_t n[3], int kind)
                 if (i >= 0 && i < n[0] && j >= 0 && j < n[1] && k >= 0 && k < n[2]) continue;
                 for (double most = 0.9; most < 20; most *= 10) {
                     const double found = sdm_faces_distance(&faces, p, most),
-                                 wanted = brute_force(&g, v, p, most);
+                                 wanted = distance_by_search(&g, v, p, most);
                     if (!(fabs(found - wanted) <= 1e-12))
                         fail_msg("kind %d, voxel %d %d %d: %.15g, not %.15g", kind, (int)i, (int)j,
                                  (int)k, found, wanted);
@@ -98,9 +99,9 @@ static void test_values_match_brute_force(void **state)
 {
     (void)state;
     for (int kind = 0; kind < 3; kind++) {
-        check((const int64_t[3]){9, 8, 11}, kind);
-        check((const int64_t[3]){16, 1, 5}, kind);
-        check((const int64_t[3]){1, 1, 1}, kind);
+        faces_check((const int64_t[3]){9, 8, 11}, kind);
+        faces_check((const int64_t[3]){16, 1, 5}, kind);
+        faces_check((const int64_t[3]){1, 1, 1}, kind);
     }
 }
 

@@ -56,7 +56,7 @@ static void test_estimate_without_noise(void **state)
 }
 
 // With noise, and kinks in the likelihood: fits from two starts reach the same maximum.
-static void test_one_maximum(void **state)
+static void test_starts_reach_one_maximum(void **state)
 {
     (void)state;
     double most = 0;
@@ -85,7 +85,7 @@ static void test_one_maximum(void **state)
 // n fits to noisy phantoms: of one shape with different noise, or (random) of different shapes and
 // poses. *rms: root mean square of error / sd. *beyond: number of parameters whose error exceeds 3
 // sd.
-static void spread(size_t n, bool random, double *rms, size_t *beyond)
+static void errors_over_sd(size_t n, bool random, double *rms, size_t *beyond)
 {
     double square = 0;
     size_t count = 0;
@@ -124,14 +124,14 @@ static void test_sd_match_the_errors(void **state)
     (void)state;
     double rms;
     size_t beyond;
-    spread(n_random ? n_random : 12, n_random > 0, &rms, &beyond);
+    errors_over_sd(n_random ? n_random : 12, n_random > 0, &rms, &beyond);
     printf("errors over standard deviations: root mean square %.2f; %zu parameters beyond 3\n", rms,
            beyond);
     assert_true(rms > 0.6 && rms < 1.5);
     assert_true((double)beyond <= 0.05 * (double)(n_random ? n_random : 12));
 }
 
-static void test_threads(void **state)
+static void test_same_bits_for_threads(void **state)
 {
     (void)state;
     float *v = phantom(TRUTH, &POSE, 1, 3);
@@ -152,7 +152,7 @@ static void test_threads(void **state)
     free(v);
 }
 
-static void test_labels_of_image(void **state)
+static void test_fit_by_label_model(void **state)
 {
     (void)state;
     float *v = phantom(TRUTH, &POSE, 0.3, 3);
@@ -167,7 +167,7 @@ static void test_labels_of_image(void **state)
     free(v);
 }
 
-static void test_label_map(void **state)
+static void test_fit_to_label_map(void **state)
 {
     (void)state;
     const sdm_fit_source source = exact_source();
@@ -207,7 +207,7 @@ static void test_label_map(void **state)
     free(v);
 }
 
-static void test_points(void **state)
+static void test_fit_to_points(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -328,6 +328,8 @@ static void test_priors(void **state)
         assert_true(r.sd[3 + k] < 2e-5 && r.sd[6 + k] < 2e-5);
     }
     sdm_fit_dispose(&r);
+    // A prior sd of 0.2 (in units of half the range 1 .. 4) pulls the parameters towards 2.5 and
+    // reduces their sd.
     // A prior sd of 0.2 half ranges (1 .. 4) pulls the parameters towards 2.5 and reduces their sd.
     o.prior_translation_sd = o.prior_rotation_sd = 0;
     const sdm_fit_result free_of_it = fit(&t, &o);
@@ -345,7 +347,7 @@ static void test_priors(void **state)
 
 // The sd of a parameter without effect is that of its prior or of its range, and by_prior marks
 // this parameter only.
-static void test_no_effect(void **state)
+static void test_parameter_without_effect(void **state)
 {
     (void)state;
     sdm_param params[4] = {{0}};
@@ -398,7 +400,7 @@ static void test_prior_weight(void **state)
     const double sd = r.sd[2], found = r.params[2], prior_sd = 10 * sd;
     assert_true(r.noise_factor > 3);
     sdm_fit_dispose(&r);
-    o.prior_sd = prior_sd / 1.5; // in half ranges (1 .. 4)
+    o.prior_sd = prior_sd / 1.5; // the unit of prior_sd is half the range 1 .. 4
     r = fit(&t, &o);
     const double wanted = (2.5 - found) / (1 + prior_sd * prior_sd / (sd * sd)),
                  moved = r.params[2] - found;
@@ -433,7 +435,7 @@ static void test_overlapping_tissues(void **state)
 
 // A tissue that does not occur in the image keeps its mean and sd; it must not model something
 // else.
-static void test_absent_tissue(void **state)
+static void test_absent_tissue_is_kept(void **state)
 {
     (void)state;
     float *v = phantom(TRUTH, &POSE, 1, 4);
@@ -456,19 +458,19 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_estimate_without_noise),
-        cmocka_unit_test(test_one_maximum),
+        cmocka_unit_test(test_starts_reach_one_maximum),
         cmocka_unit_test(test_sd_match_the_errors),
-        cmocka_unit_test(test_threads),
-        cmocka_unit_test(test_label_map),
-        cmocka_unit_test(test_points),
-        cmocka_unit_test(test_labels_of_image),
+        cmocka_unit_test(test_same_bits_for_threads),
+        cmocka_unit_test(test_fit_to_label_map),
+        cmocka_unit_test(test_fit_to_points),
+        cmocka_unit_test(test_fit_by_label_model),
         cmocka_unit_test(test_turned_starts_find_the_truth),
         cmocka_unit_test(test_kept_unknowns_stay),
         cmocka_unit_test(test_priors),
-        cmocka_unit_test(test_no_effect),
+        cmocka_unit_test(test_parameter_without_effect),
         cmocka_unit_test(test_prior_weight),
         cmocka_unit_test(test_overlapping_tissues),
-        cmocka_unit_test(test_absent_tissue),
+        cmocka_unit_test(test_absent_tissue_is_kept),
     };
     const struct CMUnitTest longer[] = {cmocka_unit_test(test_sd_match_the_errors)};
     n_random = argc > 1 ? (size_t)strtoul(argv[1], NULL, 10) : 0;

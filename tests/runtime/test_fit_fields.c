@@ -97,7 +97,7 @@ static void test_interpolation_is_exact_for_quadratics(void **state)
 /* An impulse, smoothed and interpolated: the sum over any shifted lattice is 1, and the second
  * moment is the variance. Narrow Gaussians, sharpened to compensate for the B-splines, vanish at
  * a distance. */
-static void test_splines(void **state)
+static void test_splines_keep_moments(void **state)
 {
     (void)state;
     sdm_grid g = sdm_grid_centred((int64_t[3]){33, 31, 29}, 0.2, (double[3]){0, 0, 0});
@@ -135,7 +135,7 @@ static void test_splines(void **state)
 
 // Derivatives of splines against differences; second derivatives are continuous across voxel
 // centres.
-static void test_splines_slope(void **state)
+static void test_splines_have_right_derivatives(void **state)
 {
     (void)state;
     sdm_grid g = sdm_grid_centred((int64_t[3]){9, 8, 7}, 0.3, (double[3]){0.2, -0.1, 0.4});
@@ -174,7 +174,7 @@ static void test_splines_slope(void **state)
 }
 
 // A plane edge blurred by 2/3 voxel (sd), sampled at voxels and interpolated at offsets in between.
-static void test_splines_edge(void **state)
+static void test_splines_reproduce_an_edge(void **state)
 {
     (void)state;
     const sdm_grid g = sdm_grid_centred((int64_t[3]){24, 1, 1}, 1, (double[3]){11.5, 0, 0});
@@ -199,9 +199,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_blur_keeps_its_closed_forms),
         cmocka_unit_test(test_interpolation_is_exact_for_quadratics),
-        cmocka_unit_test(test_splines),
-        cmocka_unit_test(test_splines_slope),
-        cmocka_unit_test(test_splines_edge),
+        cmocka_unit_test(test_splines_keep_moments),
+        cmocka_unit_test(test_splines_have_right_derivatives),
+        cmocka_unit_test(test_splines_reproduce_an_edge),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

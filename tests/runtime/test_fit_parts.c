@@ -70,7 +70,7 @@ static void check_score(const fit_observation *obs, double value, double field, 
     assert_true(r.observed[0] <= r.complete[0]);
 }
 
-static void test_scores(void **state)
+static void test_scores_match_differences(void **state)
 {
     (void)state;
     for (int dof = 0; dof < 5; dof += 4) {
@@ -93,7 +93,7 @@ static void test_scores(void **state)
 
 /* Integrals over all values of a voxel, for one pair of Gaussians: the density integrates to 1,
  * the mean score is 0, and the mean squared score is the Fisher information. */
-static void test_information(void **state)
+static void test_information_of_gaussians(void **state)
 {
     (void)state;
     sdm_fit_opts o = sdm_fit_defaults();
@@ -118,7 +118,7 @@ static void test_information(void **state)
 
 // ---- bounded steps
 
-static void test_step(void **state)
+static void test_bounded_step(void **state)
 {
     (void)state;
     const double a[9] = {4, 1, 0.5, 1, 3, 0.2, 0.5, 0.2, 2}, gradient[3] = {1, -2, 3};
@@ -250,7 +250,7 @@ static void check_gradient(sdm_fit_kind kind, sdm_fit_model model)
     free(v);
 }
 
-static void test_gradient(void **state)
+static void test_gradient_matches_differences(void **state)
 {
     (void)state;
     check_gradient(SDM_FIT_IMAGE, SDM_FIT_PARTIAL_VOLUME);
@@ -270,7 +270,7 @@ static void affine(const double *x, double *y)
     }
 }
 
-static void test_anderson(void **state)
+static void test_anderson_converges_fast(void **state)
 {
     (void)state;
     fit_anderson m = {0};
@@ -310,9 +310,11 @@ static void test_anderson(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_scores),   cmocka_unit_test(test_information),
-        cmocka_unit_test(test_step),     cmocka_unit_test(test_gradient),
-        cmocka_unit_test(test_anderson),
+        cmocka_unit_test(test_scores_match_differences),
+        cmocka_unit_test(test_information_of_gaussians),
+        cmocka_unit_test(test_bounded_step),
+        cmocka_unit_test(test_gradient_matches_differences),
+        cmocka_unit_test(test_anderson_converges_fast),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

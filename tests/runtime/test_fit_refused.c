@@ -24,7 +24,7 @@ static void fit_refused(sdm_status wanted, const char *text, const sdm_fit_targe
     sdm_fit_dispose(&r);
 }
 
-static void test_no_shape(void **state)
+static void test_image_without_shape_is_refused(void **state)
 {
     (void)state;
     const sdm_grid g = image_grid();
@@ -221,9 +221,10 @@ static void test_start_poses(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_no_shape), cmocka_unit_test(test_bad_arguments_and_cancellation),
-        cmocka_unit_test(test_failed_fit_returns_its_start), cmocka_unit_test(test_start_poses),
-        cmocka_unit_test(test_each_allocation_may_fail)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_image_without_shape_is_refused),
+                                       cmocka_unit_test(test_bad_arguments_and_cancellation),
+                                       cmocka_unit_test(test_failed_fit_returns_its_start),
+                                       cmocka_unit_test(test_start_poses),
+                                       cmocka_unit_test(test_each_allocation_may_fail)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

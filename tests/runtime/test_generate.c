@@ -171,7 +171,7 @@ static int close_scene(void **state)
 }
 
 // Largest difference from |x| - r.
-static double error_of(const float *values, double r)
+static double ball_error(const float *values, double r)
 {
     const sdm_grid g =
         sdm_grid_centred((const int64_t[]){N, N, N}, 0.25, (const double[]){0, 0, 0});
@@ -185,7 +185,7 @@ static double error_of(const float *values, double r)
     return worst;
 }
 
-static void test_generate(void **state)
+static void test_network_map(void **state)
 {
     const scene *s = *state;
     static float values[VOXELS];
@@ -193,14 +193,14 @@ static void test_generate(void **state)
     sdm_error err;
     const double p[] = {1.37, -0.6};
     assert_int_equal(sdm_generate(s->model, p, NULL, values, &result, &err), SDM_OK);
-    assert_true(error_of(values, ball_radius(p)) < 1e-5);
+    assert_true(ball_error(values, ball_radius(p)) < 1e-5);
     assert_int_equal(result.source, SDM_SOURCE_NETWORK);
     assert_false(result.clamped);
     assert_true(result.error_mm == 0.0125);
     assert_int_equal(sdm_generate(s->model, p, NULL, values, NULL, NULL), SDM_OK);
 }
 
-static void test_policies(void **state)
+static void test_policies_out_of_range(void **state)
 {
     const scene *s = *state;
     static float values[VOXELS];
@@ -213,12 +213,12 @@ static void test_policies(void **state)
                             exact = {.policy = SDM_RANGE_EXACT, .exact_shape = s->shape};
     assert_int_equal(sdm_generate(s->model, p, &clamp, values, &result, &err), SDM_OK);
     assert_true(result.clamped && result.source == SDM_SOURCE_NETWORK);
-    assert_true(error_of(values, ball_radius(edge)) < 1e-5);
+    assert_true(ball_error(values, ball_radius(edge)) < 1e-5);
     // The exact engine measures the mesh, whose flat facets lie within r (1 - cos(pi / 48)) of the
     // sphere.
     assert_int_equal(sdm_generate(s->model, p, &exact, values, &result, &err), SDM_OK);
     assert_true(!result.clamped && result.source == SDM_SOURCE_EXACT && result.error_mm == 0);
-    assert_true(error_of(values, ball_radius(p)) < 0.005);
+    assert_true(ball_error(values, ball_radius(p)) < 0.005);
     assert_int_equal(sdm_generate(s->model, edge, &exact, values, &result, &err), SDM_OK);
     assert_int_equal(result.source, SDM_SOURCE_NETWORK);
     // Outside of the range of the shape itself.
@@ -291,7 +291,7 @@ static void test_error_bound_is_enforced(void **state)
                 result.check.used == SDM_CHECK_POINTS);
     assert_true(result.check.max_mm < most && result.check.max_mm > 0.5 * most &&
                 result.check.bias_mm < 0);
-    assert_true(error_of(values, ball_radius(p)) < 1e-5);
+    assert_true(ball_error(values, ball_radius(p)) < 1e-5);
 
     const sdm_check_stat stats[] = {SDM_CHECK_MAX, SDM_CHECK_Q95, SDM_CHECK_RMSE, SDM_CHECK_MEAN};
     const sdm_check c = result.check;
@@ -312,7 +312,7 @@ static void test_error_bound_is_enforced(void **state)
         assert_int_equal(sdm_generate(s->model, p, &o, values, &result, &err), SDM_E_QUALITY);
         assert_non_null(strstr(err.text, sdm_check_stat_name(stats[i])));
         assert_true(result.checked && result.source == SDM_SOURCE_NETWORK &&
-                    error_of(values, ball_radius(p)) < 1e-5);
+                    ball_error(values, ball_radius(p)) < 1e-5);
         assert_memory_equal(&result.check, &c, sizeof c);
         o.policy = SDM_RANGE_EXACT;
         assert_int_equal(sdm_generate(s->model, p, &o, values, &result, &err), SDM_OK);
@@ -397,7 +397,7 @@ static void batch_params(double *p)
 
 // The same bits for any number of threads, with network and exact maps mixed, and each map in its
 // place.
-static void test_batch(void **state)
+static void test_batch_has_same_bits_for_threads(void **state)
 {
     const scene *s = *state;
     double p[2 * BATCH];
@@ -418,7 +418,7 @@ static void test_batch(void **state)
         for (int i = 0; i < BATCH; i++) {
             const bool far = i == 5 || i == 16 || i == 52;
             assert_int_equal(results[i].source, far ? SDM_SOURCE_EXACT : SDM_SOURCE_NETWORK);
-            assert_true(error_of(first + (size_t)i * VOXELS, ball_radius(p + 2 * i)) <
+            assert_true(ball_error(first + (size_t)i * VOXELS, ball_radius(p + 2 * i)) <
                         (far ? 0.005 : 1e-5));
         }
     }
@@ -479,7 +479,7 @@ typedef struct caller {
     sdm_status status;
 } caller;
 
-static void *call(void *data)
+static void *thread_generate(void *data)
 {
     caller *c = data;
     double p[2 * BATCH];
@@ -496,7 +496,7 @@ static void test_concurrent_callers(void **state)
     pthread_t threads[4];
     for (int i = 0; i < 4; i++) {
         callers[i] = (caller){.model = s->model};
-        assert_int_equal(pthread_create(&threads[i], NULL, call, &callers[i]), 0);
+        assert_int_equal(pthread_create(&threads[i], NULL, thread_generate, &callers[i]), 0);
     }
     for (int i = 0; i < 4; i++) assert_int_equal(pthread_join(threads[i], NULL), 0);
     for (int i = 0; i < 4; i++) {
@@ -514,7 +514,7 @@ static void test_jacobian(void **state)
     const double p[] = {1.1, 0.4}, far[] = {1.7, 0.4}, edge[] = {1.5, 0.4};
     assert_int_equal(sdm_generate_jacobian(s->model, p, NULL, values, jacobian, &result, &err),
                      SDM_OK);
-    assert_true(error_of(values, ball_radius(p)) < 1e-5);
+    assert_true(ball_error(values, ball_radius(p)) < 1e-5);
     for (int i = 0; i < VOXELS; i++)
         assert_true(fabs((double)jacobian[i] + 1) < 1e-5 &&
                     fabs((double)jacobian[VOXELS + i] + 0.1) < 1e-5);
@@ -524,7 +524,7 @@ static void test_jacobian(void **state)
                             exact = {.policy = SDM_RANGE_EXACT, .exact_shape = s->shape};
     assert_int_equal(sdm_generate_jacobian(s->model, far, &clamp, values, jacobian, &result, &err),
                      SDM_OK);
-    assert_true(result.clamped && error_of(values, ball_radius(edge)) < 1e-5);
+    assert_true(result.clamped && ball_error(values, ball_radius(edge)) < 1e-5);
     // The Jacobian of the exact engine: outside of the range, or when the network misses the error
     // bound. The mesh has flat facets.
     static float again[VOXELS];
@@ -556,7 +556,7 @@ static void test_jacobian(void **state)
 
 // Products with the Jacobian, whose entries are -1 and -0.1 in every voxel; outside of the range
 // those of the exact engine.
-static void test_products(void **state)
+static void test_jacobian_products(void **state)
 {
     const scene *s = *state;
     static float values[VOXELS], tangent[VOXELS], adjoint[VOXELS];
@@ -573,7 +573,7 @@ static void test_products(void **state)
             sdm_generate_jvp(s->model, at, direction, &exact, values, tangent, &result, &err),
             SDM_OK);
         assert_true(result.source == source &&
-                    error_of(values, ball_radius(at)) < (k ? 2e-2 : 1e-5));
+                    ball_error(values, ball_radius(at)) < (k ? 2e-2 : 1e-5));
         for (int i = 0; i < VOXELS; i++) assert_true(fabs((double)tangent[i] + 0.3) < loose);
         assert_int_equal(sdm_generate_vjp(s->model, at, adjoint, &exact, gradient, &result, &err),
                          SDM_OK);
@@ -595,7 +595,7 @@ static void test_products(void **state)
     assert_int_equal(sdm_generate_vjp(s->model, p, NULL, NULL, gradient, &result, &err), SDM_E_ARG);
 }
 
-static void test_instance(void **state)
+static void test_instance_of_model(void **state)
 {
     const scene *s = *state;
     sdm_error err;
@@ -624,7 +624,7 @@ static void test_exact_shape_map(void **state)
     sdm_grid g = sdm_model_get_info(s->model)->grid;
     const double p[] = {1.0, -1.5}, wrong[] = {5, 0};
     assert_int_equal(sdm_exact_shape_map(s->shape, p, NULL, &g, values, &report, &err), SDM_OK);
-    assert_true(error_of(values, ball_radius(p)) < 0.005);
+    assert_true(ball_error(values, ball_radius(p)) < 0.005);
     assert_int_equal(report.audit.n_tri, 2 * (RINGS - 1) * SECTORS);
     assert_true(report.audit.manifold && !report.turned);
     assert_int_equal(sdm_exact_shape_map(s->shape, wrong, NULL, &g, values, NULL, &err),
@@ -675,14 +675,14 @@ static void test_wrong_arguments_are_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_generate),
-        cmocka_unit_test(test_policies),
-        cmocka_unit_test(test_batch),
+        cmocka_unit_test(test_network_map),
+        cmocka_unit_test(test_policies_out_of_range),
+        cmocka_unit_test(test_batch_has_same_bits_for_threads),
         cmocka_unit_test(test_jacobian),
-        cmocka_unit_test(test_products),
+        cmocka_unit_test(test_jacobian_products),
         cmocka_unit_test(test_each_allocation_may_fail),
         cmocka_unit_test(test_concurrent_callers),
-        cmocka_unit_test(test_instance),
+        cmocka_unit_test(test_instance_of_model),
         cmocka_unit_test(test_exact_shape_map),
         cmocka_unit_test(test_wrong_arguments_are_refused),
         cmocka_unit_test(test_just_outside_the_range),

@@ -125,7 +125,7 @@ static void test_edge_profiles(void **state)
     }
 }
 
-static void test_narrow_blur(void **state)
+static void test_variance_of_narrow_blur(void **state)
 {
     (void)state;
     // A blur narrower than a sub-voxel is too small to see in a profile; compare the variance, to
@@ -165,7 +165,7 @@ static void to_shape(const sdm_pose *pose, const double world[3], double x[3])
     for (int i = 0; i < 3; i++) x[i] = d[i] * c + cross[i] * s + k[i] * dot * (1 - c);
 }
 
-static void test_label(void **state)
+static void test_label_is_the_inside(void **state)
 {
     (void)state;
     const double p[3] = {4, 3, 1.5};
@@ -280,12 +280,9 @@ static void test_share_of_air(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_volume_of_an_ellipsoid),
-        cmocka_unit_test(test_edge_profiles),
-        cmocka_unit_test(test_narrow_blur),
-        cmocka_unit_test(test_label),
-        cmocka_unit_test(test_part_of_the_grid),
-        cmocka_unit_test(test_share_of_air),
+        cmocka_unit_test(test_volume_of_an_ellipsoid),  cmocka_unit_test(test_edge_profiles),
+        cmocka_unit_test(test_variance_of_narrow_blur), cmocka_unit_test(test_label_is_the_inside),
+        cmocka_unit_test(test_part_of_the_grid),        cmocka_unit_test(test_share_of_air),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

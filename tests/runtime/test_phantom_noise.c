@@ -178,7 +178,7 @@ static void test_random_truth_has_its_distribution(void **state)
     for (int i = 0; i < 3; i++) assert_true(none.rotation[i] == 0 && none.translation[i] == 0);
 }
 
-static void refused(const sdm_phantom_opts *o, const char *word)
+static void phantom_refused(const sdm_phantom_opts *o, const char *word)
 {
     const sdm_grid g = oblique(4, 5, 6);
     float v[120];
@@ -210,28 +210,30 @@ static void test_wrong_arguments_are_refused(void **state)
     static const double bad[] = {NAN, INFINITY, -INFINITY, -1};
     for (size_t i = 0; i < 4; i++) {
         sdm_phantom_opts o;
-        for (int a = 0; a < 3; a++) o = plain(), o.blur[a] = bad[i], refused(&o, "blur along");
-        o = plain(), o.noise = bad[i], refused(&o, "noise");
-        o = plain(), o.texture_mm = bad[i], refused(&o, "texture");
-        o = plain(), o.outside.sd = bad[i], refused(&o, "outside");
-        if (i < 3) o = plain(), o.inside.mean = bad[i], refused(&o, "inside");
-        if (i < 3) o = plain(), o.air.mean = bad[i], refused(&o, "air");
-        o = plain(), o.air_share = bad[i], refused(&o, "share of air");
-        o = plain(), o.air_share = 0.5, o.air_mm = bad[i], refused(&o, "diameter");
-        o = plain(), o.air_share = 0.5, o.air_mm = 1, o.air_clear_mm = bad[i], refused(&o, "clear");
+        for (int a = 0; a < 3; a++)
+            o = plain(), o.blur[a] = bad[i], phantom_refused(&o, "blur along");
+        o = plain(), o.noise = bad[i], phantom_refused(&o, "noise");
+        o = plain(), o.texture_mm = bad[i], phantom_refused(&o, "texture");
+        o = plain(), o.outside.sd = bad[i], phantom_refused(&o, "outside");
+        if (i < 3) o = plain(), o.inside.mean = bad[i], phantom_refused(&o, "inside");
+        if (i < 3) o = plain(), o.air.mean = bad[i], phantom_refused(&o, "air");
+        o = plain(), o.air_share = bad[i], phantom_refused(&o, "share of air");
+        o = plain(), o.air_share = 0.5, o.air_mm = bad[i], phantom_refused(&o, "diameter");
+        o = plain(), o.air_share = 0.5, o.air_mm = 1, o.air_clear_mm = bad[i],
+        phantom_refused(&o, "clear");
     }
     sdm_phantom_opts o = plain();
-    o.blur[1] = 64.1 * 0.2, refused(&o, "blur along y");
-    o = plain(), o.air_share = 1.5, refused(&o, "share of air");
-    o = plain(), o.air_share = 0.5, o.air_mm = 1e-9, refused(&o, "too small");
-    o = plain(), o.air_share = 0.5, o.air_mm = 1e-3, refused(&o, "larger");
-    o = plain(), o.supersampling = 0, refused(&o, "supersampling");
-    o = plain(), o.supersampling = 17, refused(&o, "supersampling");
-    o = plain(), o.n_threads = -1, refused(&o, "threads");
+    o.blur[1] = 64.1 * 0.2, phantom_refused(&o, "blur along y");
+    o = plain(), o.air_share = 1.5, phantom_refused(&o, "share of air");
+    o = plain(), o.air_share = 0.5, o.air_mm = 1e-9, phantom_refused(&o, "too small");
+    o = plain(), o.air_share = 0.5, o.air_mm = 1e-3, phantom_refused(&o, "larger");
+    o = plain(), o.supersampling = 0, phantom_refused(&o, "supersampling");
+    o = plain(), o.supersampling = 17, phantom_refused(&o, "supersampling");
+    o = plain(), o.n_threads = -1, phantom_refused(&o, "threads");
 }
 
 // Options with air, and one thread.
-static sdm_phantom_opts airy(void)
+static sdm_phantom_opts options_with_air(void)
 {
     sdm_phantom_opts o = sdm_phantom_defaults();
     o.air_share = 0.5;
@@ -239,7 +241,7 @@ static sdm_phantom_opts airy(void)
     return o;
 }
 
-static sdm_status make_small(const sdm_phantom_opts *o, sdm_error *err)
+static sdm_status small_phantom(const sdm_phantom_opts *o, sdm_error *err)
 {
     const sdm_grid g = oblique(4, 5, 6);
     float v[120];
@@ -251,11 +253,11 @@ static void test_each_allocation_may_fail(void **state)
 {
     (void)state;
     // Each failed allocation is an error without a leak (detected by the sanitizer build).
-    const sdm_phantom_opts o = airy();
+    const sdm_phantom_opts o = options_with_air();
     for (unsigned long n = 1;; n++) {
         sdm_alloc_fail_after(n);
         sdm_error err;
-        const sdm_status s = make_small(&o, &err);
+        const sdm_status s = small_phantom(&o, &err);
         sdm_alloc_fail_after(0);
         assert_true(n < 2000);
         if (!s) break;
@@ -264,24 +266,24 @@ static void test_each_allocation_may_fail(void **state)
 }
 
 // Cancels the work after `left` calls.
-static bool stops(void *user)
+static bool cancel_when_used_up(void *user)
 {
     int *left = user;
     return (*left)-- <= 0;
 }
 
-static void test_cancelled(void **state)
+static void test_cancelled_at_any_call(void **state)
 {
     (void)state;
-    sdm_phantom_opts o = airy();
-    o.cancelled = stops;
+    sdm_phantom_opts o = options_with_air();
+    o.cancelled = cancel_when_used_up;
     sdm_status s = SDM_E_CANCELLED;
     int asked = 0;
     for (; s; asked++) {
         sdm_error err;
         int left = asked;
         o.user = &left;
-        s = make_small(&o, &err);
+        s = small_phantom(&o, &err);
         assert_true(asked < 10000 && (!s || s == SDM_E_CANCELLED));
     }
     // The hook is called for each row of both fields and for each plane of sub-voxels.
@@ -296,7 +298,7 @@ int main(void)
         cmocka_unit_test(test_same_bits),
         cmocka_unit_test(test_each_allocation_may_fail),
         cmocka_unit_test(test_wrong_arguments_are_refused),
-        cmocka_unit_test(test_cancelled),
+        cmocka_unit_test(test_cancelled_at_any_call),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -65,10 +65,10 @@ static double two_spheres(const double x[3])
 }
 
 static double half_space(const double x[3]) { return (0.6 * x[0] + 0.8 * x[2]) - 0.123; }
-static double nothing(const double x[3]) { return sphere(x) + 50; }
-static double everything(const double x[3]) { return sphere(x) - 50; }
-static double staircase(const double x[3]) { return sphere(x) < 0 ? -5.0 : 5.0; }
-static double flat(const double x[3]) { return 0.2 * sphere(x); }
+static double all_outside(const double x[3]) { return sphere(x) + 50; }
+static double all_inside(const double x[3]) { return sphere(x) - 50; }
+static double step_function(const double x[3]) { return sphere(x) < 0 ? -5.0 : 5.0; }
+static double shallow(const double x[3]) { return 0.2 * sphere(x); }
 
 // Three different sizes, and an origin that is not a multiple of the spacing.
 static sdm_grid test_grid(void)
@@ -107,7 +107,7 @@ static sdm_vdb_report write_level_set(const sdm_grid *g, const float *v, const s
     return r;
 }
 
-static char *verify(void)
+static char *file_verify(void)
 {
     sdm_error err;
     char *text = NULL;
@@ -189,7 +189,7 @@ static void check_smooth(distance f)
     assert_int_equal(r.active_voxels, near);
     double largest;
     assert_int_equal(compare(&g, v, 0.48, &largest), 0);
-    char *text = verify(), expected[64];
+    char *text = file_verify(), expected[64];
     assert_non_null(strstr(text, "class         level set"));
     assert_non_null(strstr(text, "voxel size    0.16 0.16 0.16 mm"));
     assert_non_null(strstr(text, "sdm_frame: LPS"));
@@ -199,13 +199,13 @@ static void check_smooth(distance f)
     free(v);
 }
 
-static void test_sphere(void **state)
+static void test_smooth_sphere(void **state)
 {
     (void)state;
     check_smooth(sphere);
 }
 
-static void test_torus(void **state)
+static void test_smooth_torus(void **state)
 {
     (void)state;
     check_smooth(torus);
@@ -213,7 +213,7 @@ static void test_torus(void **state)
 
 // Edges and creases of exact distances: few values change, by a fraction of a voxel, and no sign
 // changes.
-static void test_creases(void **state)
+static void test_creases_change_few_values(void **state)
 {
     (void)state;
     const distance shapes[] = {box, tilted_box, two_spheres};
@@ -228,7 +228,7 @@ static void test_creases(void **state)
         assert_true(largest < 0.25 * 0.16);
         assert_true(crossing_shift(&g, v) < 0.4);
         assert_true(fabs(r.adjusted_mm - largest) < 1e-7);
-        char *text = verify();
+        char *text = file_verify();
         assert_true((strstr(text, "sdm_adjusted_voxels: ") != NULL) == (differ > 0));
         sdm_free(text);
         free(v);
@@ -268,7 +268,7 @@ static void test_thin_parts_stay(void **state)
         double largest;
         (void)compare(&g, v, 0.48, &largest); // compares signs, too
         assert_true(largest < 0.5 * 0.16);
-        sdm_free(verify());
+        sdm_free(file_verify());
         free(v);
     }
 }
@@ -284,7 +284,7 @@ static void test_metadata_and_options(void **state)
     const sdm_vdb_report r = write_level_set(&g, v, &o);
     double largest;
     assert_int_equal(compare(&g, v, 0.8, &largest), 0);
-    char *text = verify();
+    char *text = file_verify();
     assert_non_null(strstr(text, "version: 0.1\n"));
     assert_non_null(strstr(text, "params: R = 1.5 mm, \xc2\xb5\n"));
     sdm_free(text);
@@ -299,7 +299,7 @@ static void test_metadata_and_options(void **state)
     free(v);
 }
 
-static void test_half(void **state)
+static void test_half_precision(void **state)
 {
     (void)state;
     const sdm_grid g = test_grid();
@@ -316,14 +316,14 @@ static void test_half(void **state)
             far++;
     }
     assert_true(far <= (size_t)r.adjusted_voxels);
-    char *text = verify();
+    char *text = file_verify();
     assert_non_null(strstr(text, "16-bit floats"));
     sdm_free(text);
     free(back);
     free(v);
 }
 
-static void test_dense(void **state)
+static void test_dense_map(void **state)
 {
     (void)state;
     sdm_grid g = test_grid();
@@ -336,12 +336,12 @@ static void test_dense(void **state)
     float *back = read_box(&g, 0);
     assert_memory_equal(back, v, sdm_grid_count(&g) * sizeof *v);
     free(back);
-    char *text = verify();
+    char *text = file_verify();
     assert_non_null(strstr(text, "not set (whole map)"));
     sdm_free(text);
     const sdm_vdb_opts half = {.dense = true, .half = true};
     write_level_set(&g, v, &half);
-    sdm_free(verify());
+    sdm_free(file_verify());
     free(v);
 }
 
@@ -354,7 +354,7 @@ static void test_shape_cut_by_the_grid(void **state)
     float *v = map_fill(&g, half_space);
     const sdm_vdb_report r = write_level_set(&g, v, NULL);
     assert_true(r.cut);
-    char *text = verify();
+    char *text = file_verify();
     assert_non_null(strstr(text, "sdm_cut: "));
     sdm_free(text);
     const int32_t pad = 8, n[3] = {44 + 16, 39 + 16, 31 + 16};
@@ -392,9 +392,9 @@ static void test_all_inside(void **state)
 {
     (void)state;
     const sdm_grid g = test_grid();
-    float *v = map_fill(&g, everything);
+    float *v = map_fill(&g, all_inside);
     assert_true(write_level_set(&g, v, NULL).cut);
-    sdm_free(verify());
+    sdm_free(file_verify());
     const int32_t index[] = {20, 20, 0, 20, 20, -1, 20, 20, -2, 20, 20, 1, 20, 20, 15, 20, 20, 40};
     const float expected[] = {-0.08f, 0.08f, 0.24f, -0.24f, -0.48f, 0.48f};
     float got[6];
@@ -416,7 +416,7 @@ static void test_band_beyond_grid(void **state)
     assert_false(write_level_set(&g, v, NULL).cut);
     double largest;
     assert_int_equal(compare(&g, v, 0.48, &largest), 0);
-    sdm_free(verify());
+    sdm_free(file_verify());
     for (int32_t band = 3; band <= 10; band += 7) {
         (void)write_level_set(&g, v, &(sdm_vdb_opts){.band_voxels = band});
         const int32_t pad = band + 3;
@@ -453,7 +453,7 @@ static void test_rotated_grid_keeps_its_place(void **state)
     write_level_set(&g, v, NULL);
     double largest;
     assert_int_equal(compare(&g, v, 0.48, &largest), 0);
-    char *text = verify(), *origin = strstr(text, "origin        ");
+    char *text = file_verify(), *origin = strstr(text, "origin        ");
     double o[3];
     assert_non_null(origin);
     assert_int_equal(sscanf(origin + 14, "%lf %lf %lf", &o[0], &o[1], &o[2]), 3);
@@ -486,7 +486,7 @@ static void write_turned(double spacing, double apart, const double dir[9])
     (void)compare(&g, v, 3 * spacing, &largest);
     // The background is rounded to the next float.
     assert_true(largest <= 3.6e-7 * spacing);
-    sdm_free(verify());
+    sdm_free(file_verify());
     free(v);
 }
 
@@ -509,8 +509,8 @@ static void test_rounded_voxel_size(void **state)
     }
 }
 
-static void refuse(const sdm_grid *g, const float *v, const sdm_vdb_opts *o, sdm_status expected,
-                   const char *said)
+static void write_refused(const sdm_grid *g, const float *v, const sdm_vdb_opts *o,
+                          sdm_status expected, const char *said)
 {
     sdm_error err;
     unlink(FILE_NAME);
@@ -519,52 +519,55 @@ static void refuse(const sdm_grid *g, const float *v, const sdm_vdb_opts *o, sdm
     assert_int_equal(access(FILE_NAME, F_OK), -1);
 }
 
-static void test_refused(void **state)
+static void test_bad_maps_are_refused(void **state)
 {
     (void)state;
     sdm_grid g = test_grid();
     float *v = map_fill(&g, sphere);
     const float kept = v[777];
     v[777] = NAN;
-    refuse(&g, v, NULL, SDM_E_ARG, "need finite");
-    refuse(&g, v, &(sdm_vdb_opts){.dense = true}, SDM_E_ARG, "need finite");
+    write_refused(&g, v, NULL, SDM_E_ARG, "need finite");
+    write_refused(&g, v, &(sdm_vdb_opts){.dense = true}, SDM_E_ARG, "need finite");
     v[777] = kept;
     g.spacing[2] = 0.17;
-    refuse(&g, v, NULL, SDM_E_ARG, "--dense");
+    write_refused(&g, v, NULL, SDM_E_ARG, "--dense");
     g.spacing[2] = 0.16;
-    refuse(&g, v, &(sdm_vdb_opts){.band_voxels = 2}, SDM_E_ARG, "need 3 to 100");
-    refuse(&g, v, &(sdm_vdb_opts){.band_voxels = NAN}, SDM_E_ARG, "need 3 to 100");
-    refuse(&g, v, &(sdm_vdb_opts){.metadata = &(sdm_named_value){"sdm_hash", "1"}, .n_metadata = 1},
-           SDM_E_ARG, "program itself");
-    refuse(&g, v, &(sdm_vdb_opts){.metadata = &(sdm_named_value){NULL, "1"}, .n_metadata = 1},
-           SDM_E_ARG, "no name");
-    refuse(&g, NULL, NULL, SDM_E_ARG, "needed");
+    write_refused(&g, v, &(sdm_vdb_opts){.band_voxels = 2}, SDM_E_ARG, "need 3 to 100");
+    write_refused(&g, v, &(sdm_vdb_opts){.band_voxels = NAN}, SDM_E_ARG, "need 3 to 100");
+    write_refused(&g, v,
+                  &(sdm_vdb_opts){.metadata = &(sdm_named_value){"sdm_hash", "1"}, .n_metadata = 1},
+                  SDM_E_ARG, "program itself");
+    write_refused(&g, v,
+                  &(sdm_vdb_opts){.metadata = &(sdm_named_value){NULL, "1"}, .n_metadata = 1},
+                  SDM_E_ARG, "no name");
+    write_refused(&g, NULL, NULL, SDM_E_ARG, "needed");
     for (int a = 0; a < 3; a++) g.spacing[a] = 22000;
-    refuse(&g, v, &(sdm_vdb_opts){.half = true}, SDM_E_ARG, "too large for the number format");
+    write_refused(&g, v, &(sdm_vdb_opts){.half = true}, SDM_E_ARG,
+                  "too large for the number format");
     for (int a = 0; a < 3; a++) g.spacing[a] = 2e38;
-    refuse(&g, v, NULL, SDM_E_ARG, "too large for the number format");
+    write_refused(&g, v, NULL, SDM_E_ARG, "too large for the number format");
     for (int a = 0; a < 3; a++) g.spacing[a] = 1e-5;
-    refuse(&g, v, NULL, SDM_E_ARG, "too small for OpenVDB");
-    refuse(&g, v, &(sdm_vdb_opts){.dense = true}, SDM_E_ARG, "too small for OpenVDB");
+    write_refused(&g, v, NULL, SDM_E_ARG, "too small for OpenVDB");
+    write_refused(&g, v, &(sdm_vdb_opts){.dense = true}, SDM_E_ARG, "too small for OpenVDB");
     for (int a = 0; a < 3; a++) g.spacing[a] = 2e-5;
     const double c = cos(0.3), s = sin(0.3), dir[9] = {c, -s, 0, s, c, 0, 0, 0, 1};
     memcpy(g.dir, dir, sizeof g.dir);
-    refuse(&g, v, NULL, SDM_E_ARG, "on turned axes are not uniform");
+    write_refused(&g, v, NULL, SDM_E_ARG, "on turned axes are not uniform");
     g = test_grid();
     v[777] = 70000.0f;
-    refuse(&g, v, &(sdm_vdb_opts){.dense = true, .half = true}, SDM_E_ARG, "65504");
+    write_refused(&g, v, &(sdm_vdb_opts){.dense = true, .half = true}, SDM_E_ARG, "65504");
     free(v);
     const struct {
         distance f;
         sdm_status status;
         const char *said;
     } maps[] = {
-        {nothing, SDM_E_ARG, "no voxel of the map is inside"},
-        {staircase, SDM_E_QUALITY, "not a distance map"},
+        {all_outside, SDM_E_ARG, "no voxel of the map is inside"},
+        {step_function, SDM_E_QUALITY, "not a distance map"},
     };
     for (size_t i = 0; i < 2; i++) {
         v = map_fill(&g, maps[i].f);
-        refuse(&g, v, NULL, maps[i].status, maps[i].said);
+        write_refused(&g, v, NULL, maps[i].status, maps[i].said);
         free(v);
     }
 }
@@ -574,11 +577,11 @@ static void test_gradient_limits(void **state)
 {
     (void)state;
     const sdm_grid g = test_grid();
-    float *v = map_fill(&g, flat);
-    refuse(&g, v, NULL, SDM_E_QUALITY, "not a valid level set");
+    float *v = map_fill(&g, shallow);
+    write_refused(&g, v, NULL, SDM_E_QUALITY, "not a valid level set");
     for (size_t i = 0; i < sdm_grid_count(&g); i++) v[i] *= 4;
     assert_int_equal(write_level_set(&g, v, NULL).adjusted_voxels, 0);
-    sdm_free(verify());
+    sdm_free(file_verify());
     free(v);
 }
 
@@ -596,7 +599,7 @@ static void test_unwritable_paths_are_errors(void **state)
     free(v);
 }
 
-static void save(const uint8_t *data, size_t size)
+static void file_save(const uint8_t *data, size_t size)
 {
     FILE *f = fopen(FILE_NAME, "wb");
     assert_non_null(f);
@@ -629,7 +632,7 @@ static void test_cancelled_leaves_no_file(void **state)
     }
     assert_int_equal(s, SDM_OK);
     assert_true(calls > 26 + 2 * 12); // at least once for each layer of the padded grid
-    sdm_free(verify());
+    sdm_free(file_verify());
     free(v);
 }
 
@@ -649,23 +652,23 @@ static void test_damage_is_found(void **state)
     assert_ok(sdm_file_read(FILE_NAME, 1u << 24, &data, &size, &err), &err);
     for (size_t bit = 0; bit < size * 8; bit += 97) {
         data[bit / 8] ^= (uint8_t)(1u << (bit % 8));
-        save(data, size);
+        file_save(data, size);
         const sdm_status s = sdm_vdb_verify(FILE_NAME, NULL, &err);
         if (s != SDM_E_FORMAT) fail_msg("bit %zu of %zu: %s", bit, size * 8, sdm_status_name(s));
         data[bit / 8] ^= (uint8_t)(1u << (bit % 8));
     }
     for (size_t cut = 1500; cut < size; cut += 211) {
-        save(data, cut);
+        file_save(data, cut);
         const sdm_status s = sdm_vdb_verify(FILE_NAME, NULL, &err);
         if (s != SDM_E_FORMAT)
             fail_msg("cut to %zu of %zu bytes: %s", cut, size, sdm_status_name(s));
     }
     for (size_t cut = 0; cut < 40; cut++) {
-        save(data, cut);
+        file_save(data, cut);
         assert_int_equal(sdm_vdb_verify(FILE_NAME, NULL, &err), SDM_E_FORMAT);
     }
-    save(data, size);
-    sdm_free(verify());
+    file_save(data, size);
+    sdm_free(file_verify());
     sdm_free(data);
     unlink(FILE_NAME);
 }
@@ -673,19 +676,19 @@ static void test_damage_is_found(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sphere),
-        cmocka_unit_test(test_torus),
-        cmocka_unit_test(test_creases),
+        cmocka_unit_test(test_smooth_sphere),
+        cmocka_unit_test(test_smooth_torus),
+        cmocka_unit_test(test_creases_change_few_values),
         cmocka_unit_test(test_thin_parts_stay),
         cmocka_unit_test(test_metadata_and_options),
-        cmocka_unit_test(test_half),
-        cmocka_unit_test(test_dense),
+        cmocka_unit_test(test_half_precision),
+        cmocka_unit_test(test_dense_map),
         cmocka_unit_test(test_shape_cut_by_the_grid),
         cmocka_unit_test(test_all_inside),
         cmocka_unit_test(test_band_beyond_grid),
         cmocka_unit_test(test_rotated_grid_keeps_its_place),
         cmocka_unit_test(test_rounded_voxel_size),
-        cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_bad_maps_are_refused),
         cmocka_unit_test(test_gradient_limits),
         cmocka_unit_test(test_unwritable_paths_are_errors),
         cmocka_unit_test(test_cancelled_leaves_no_file),

@@ -40,7 +40,7 @@ static int tear_down(void **state)
 
 // Writes the level set of a cochlea and reads it back. At most the share `share` of the band may be
 // changed.
-static void check(const double *params, const sdm_grid *grid, double share)
+static void level_set_check(const double *params, const sdm_grid *grid, double share)
 {
     const char *path = "cochlea_level_set.vdb";
     const size_t count = sdm_grid_count(grid);
@@ -83,7 +83,7 @@ static void every_cochlea_becomes_a_level_set(void **state)
         double at[8];
         for (size_t k = 0; k < n; k++)
             at[k] = p[k].min + (p[k].max - p[k].min) * sdm_rng_uniform(7, i, k);
-        check(at, &grid, 0.1);
+        level_set_check(at, &grid, 0.1);
     }
 }
 
@@ -99,7 +99,7 @@ static void coarse_and_fine_grids_become_level_sets(void **state)
         const int64_t size[3] = {(int64_t)(14 / spacing[i]), (int64_t)(12 / spacing[i]),
                                  (int64_t)(12 / spacing[i])};
         const sdm_grid grid = sdm_grid_centred(size, spacing[i], (const double[]){0.5, 0.4, 1.2});
-        check(at, &grid, 0.15);
+        level_set_check(at, &grid, 0.15);
     }
 }
 

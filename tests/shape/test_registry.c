@@ -115,7 +115,7 @@ static int tear_down(void **state)
     return 0;
 }
 
-static void refused(const sdm_shape *shape, const char *text)
+static void registration_refused(const sdm_shape *shape, const char *text)
 {
     assert_int_equal(sdm_registry_add(registry, shape, "there", &err), SDM_E_PLUGIN);
     err_has(text);
@@ -133,18 +133,18 @@ static void test_names_are_checked(void **state)
     for (size_t i = 0; i < sizeof BAD / sizeof *BAD; i++) {
         sdm_shape s = GOOD;
         s.name = BAD[i];
-        refused(&s, "there: shape of the name '");
+        registration_refused(&s, "there: shape of the name '");
         sdm_param params[2] = {PARAMS[0], PARAMS[1]};
         params[1].name = BAD[i];
         s = GOOD;
         s.params = params;
-        refused(&s, "there: shape 'tetra': parameter 2 has the name '");
+        registration_refused(&s, "there: shape 'tetra': parameter 2 has the name '");
         sdm_option options[N_OPTIONS];
         memcpy(options, OPTIONS, sizeof options);
         options[2].name = BAD[i];
         s = GOOD;
         s.options = options;
-        refused(&s, "there: shape 'tetra': option 3 has the name '");
+        registration_refused(&s, "there: shape 'tetra': option 3 has the name '");
     }
     sdm_shape s = GOOD;
     s.name = "a_1"; // the shortest and the longest valid names
@@ -169,29 +169,29 @@ static void test_parameters_are_checked(void **state)
         sdm_param params[2] = {PARAMS[0], {"b", "mm", BAD[i].min, BAD[i].max, BAD[i].def, ""}};
         sdm_shape s = GOOD;
         s.params = params;
-        refused(&s, BAD[i].text);
+        registration_refused(&s, BAD[i].text);
         err_has("parameter 'b'");
         sdm_option option = {"c",        SDM_OPTION_REAL, "",   BAD[i].min,
                              BAD[i].max, BAD[i].def,      NULL, ""};
         s = GOOD;
         s.options = &option, s.n_options = 1;
-        refused(&s, BAD[i].text);
+        registration_refused(&s, BAD[i].text);
         err_has("option 'c'");
     }
     sdm_param params[2] = {PARAMS[0], PARAMS[0]};
     sdm_shape s = GOOD;
     s.params = params;
-    refused(&s, "two parameters are named 'size'");
+    registration_refused(&s, "two parameters are named 'size'");
     params[1] = PARAMS[1];
     params[1].unit = NULL;
-    refused(&s, "parameter 'shift' has no unit");
+    registration_refused(&s, "parameter 'shift' has no unit");
     s.params = NULL;
-    refused(&s, "2 parameters, but no table");
+    registration_refused(&s, "2 parameters, but no table");
     s.n_params = 0;
-    refused(&s, "no parameters");
+    registration_refused(&s, "no parameters");
     s = GOOD;
     s.n_params = 65;
-    refused(&s, "65 parameters, at most 64");
+    registration_refused(&s, "65 parameters, at most 64");
 }
 
 static void test_options_are_checked(void **state)
@@ -200,21 +200,21 @@ static void test_options_are_checked(void **state)
     sdm_option option = {"c", SDM_OPTION_CHOICE, "", 0, 0, 0, NULL, ""};
     sdm_shape s = GOOD;
     s.options = &option, s.n_options = 1;
-    refused(&s, "option 'c' has no choices");
+    registration_refused(&s, "option 'c' has no choices");
     static const char *const BAD[] = {"a||b", "|a", "a|", "a|b|a"};
     for (size_t i = 0; i < 4; i++) {
         option.choices = BAD[i];
-        refused(&s, "empty, long or repeated choice");
+        registration_refused(&s, "empty, long or repeated choice");
     }
     option = (sdm_option){"c", SDM_OPTION_INT, "", 0, 10, 0.5, NULL, ""};
-    refused(&s, "is an integer");
+    registration_refused(&s, "is an integer");
     option.type = (sdm_option_type)9;
-    refused(&s, "unknown type 9");
+    registration_refused(&s, "unknown type 9");
     sdm_option twice[2] = {OPTIONS[0], OPTIONS[0]};
     s.options = twice, s.n_options = 2;
-    refused(&s, "two options are named 'mode'");
+    registration_refused(&s, "two options are named 'mode'");
     s.options = NULL;
-    refused(&s, "2 options, but no table");
+    registration_refused(&s, "2 options, but no table");
 }
 
 static int create(const sdm_host *host, const sdm_option_value *options, void **self)
@@ -243,19 +243,19 @@ static void test_callbacks_are_checked(void **state)
     (void)state;
     sdm_shape s = GOOD;
     s.mesh = NULL;
-    refused(&s, "no callback mesh()");
+    registration_refused(&s, "no callback mesh()");
     s = GOOD;
     s.create = create;
-    refused(&s, "callback destroy() is missing");
+    registration_refused(&s, "callback destroy() is missing");
     s = GOOD;
     s.destroy = free;
-    refused(&s, "callback create() is missing");
+    registration_refused(&s, "callback create() is missing");
     s = GOOD;
     s.describe = describe_two;
-    refused(&s, "describe() needs create()");
+    registration_refused(&s, "describe() needs create()");
     s = GOOD;
     s.summary = NULL;
-    refused(&s, "no summary");
+    registration_refused(&s, "no summary");
 }
 
 static void test_registry_refuses_wrong_arguments(void **state)

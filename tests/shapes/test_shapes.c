@@ -139,7 +139,10 @@ static void test_volumes_and_areas(void **state)
     size_check("ellipsoid", "edge=0.15", "edge=0.3", egg, 4 * PI / 3 * 3.5 * 2.8 * 2.2, 0);
 }
 
-static double beta(double x, double y) { return exp(lgamma(x) + lgamma(y) - lgamma(x + y)); }
+static double beta_function(double x, double y)
+{
+    return exp(lgamma(x) + lgamma(y) - lgamma(x + y));
+}
 
 static void test_superquadric_volume(void **state)
 {
@@ -153,7 +156,8 @@ static void test_superquadric_volume(void **state)
         sdm_mesh m = {0};
         mesh_at(s, p, &m);
         const double exact = 2 * p[0] * p[1] * p[2] * E[i][0] * E[i][1] *
-                             beta(E[i][0] / 2 + 1, E[i][0]) * beta(E[i][1] / 2, E[i][1] / 2);
+                             beta_function(E[i][0] / 2 + 1, E[i][0]) *
+                             beta_function(E[i][1] / 2, E[i][1] / 2);
         assert_true(fabs(audit_closed(&m).volume / exact - 1) < 0.006);
         for (size_t v = 0; v < m.n_vert; v++) {
             const double *x = m.vert + 3 * v, e1 = E[i][0], e2 = E[i][1];
@@ -297,7 +301,7 @@ static void velocity_check(const char *shape, const char *options, int rounds, d
     sdm_registry_free(other);
 }
 
-static void test_velocities(void **state)
+static void test_velocities_match_differences(void **state)
 {
     (void)state;
     velocity_check("torus", "edge=0.5", 4, 1e-9);
@@ -342,7 +346,7 @@ static void add_edges(const sdm_mesh *m, edges *e)
         }
 }
 
-static void test_cochlea_mesh(void **state)
+static void test_cochlea_mesh_is_regular(void **state)
 {
     (void)state;
     sdm_instance *s = shape_make("cochlea", "");
@@ -389,8 +393,8 @@ static void extent(const char *options, const double *p, double size[3])
 static void test_cochlea_bounding_boxes(void **state)
 {
     (void)state;
-    // Extreme parameters, with flare=0 (no widening at the basal end): the published bounding box
-    // is 11.4 x 10.7 x 5.1 mm.
+    // Extreme parameters, which exceed the box stated in the paper: with flare=0 (no widening at
+    // the basal end) the cochlea measures 11.4 x 10.7 x 5.1 mm.
     const double large[4] = {5, 0, 0.05, 0}, nominal[4] = {4.4, 0.5, 0.145, 0.4};
     double size[3];
     extent("flare=0 edge=0.1", large, size);
@@ -430,7 +434,7 @@ static void test_cochlea_vertices_on_tube(void **state)
 }
 
 // The distance of the cochlea against the minimum over a very fine walk along its centreline.
-static void test_cochlea_distance(void **state)
+static void test_cochlea_distance_matches_search(void **state)
 {
     (void)state;
     sdm_instance *s = shape_make("cochlea", "");
@@ -472,7 +476,7 @@ static int winding(const sdm_mesh *m, const double x[3])
     return (int)lrint(sum / (4 * PI));
 }
 
-static void test_cochlea_encloses(void **state)
+static void test_cochlea_encloses_its_tube(void **state)
 {
     (void)state;
     sdm_instance *s = shape_make("cochlea", "");
@@ -552,7 +556,7 @@ static double start_error(const char *options, double radius)
     return best;
 }
 
-static void test_cochlea_start(void **state)
+static void test_cochlea_start_of_centreline(void **state)
 {
     (void)state;
     assert_true(start_error("", 4.4) < 1e-12);
@@ -571,7 +575,7 @@ static void test_cochlea_start(void **state)
     sdm_instance_free(b);
 }
 
-static double norm(const double *x, const double *y)
+static double point_distance(const double *x, const double *y)
 {
     return sqrt((x[0] - y[0]) * (x[0] - y[0]) + (x[1] - y[1]) * (x[1] - y[1]) +
                 (x[2] - y[2]) * (x[2] - y[2]));
@@ -585,12 +589,12 @@ static void ring_axes(const sdm_mesh *m, size_t ring, double axes[2])
     ring_centre(m, ring, c);
     axes[0] = 0, axes[1] = INFINITY;
     for (size_t j = 0; j < n; j++) {
-        const double d = norm(m->vert + 3 * (1 + ring * n + j), c);
+        const double d = point_distance(m->vert + 3 * (1 + ring * n + j), c);
         axes[0] = fmax(axes[0], d), axes[1] = fmin(axes[1], d);
     }
 }
 
-static void test_cochlea_section(void **state)
+static void test_cochlea_elliptic_section(void **state)
 {
     (void)state;
     sdm_instance *s = shape_make("cochlea", "section=ellipse ratio=0.6 edge=0.1");
@@ -723,15 +727,15 @@ int main(void)
         cmocka_unit_test(test_superquadric_volume),
         cmocka_unit_test(test_vertices_on_surface),
         cmocka_unit_test(test_ellipsoid_distance),
-        cmocka_unit_test(test_velocities),
-        cmocka_unit_test(test_cochlea_mesh),
+        cmocka_unit_test(test_velocities_match_differences),
+        cmocka_unit_test(test_cochlea_mesh_is_regular),
         cmocka_unit_test(test_cochlea_bounding_boxes),
         cmocka_unit_test(test_cochlea_vertices_on_tube),
-        cmocka_unit_test(test_cochlea_distance),
-        cmocka_unit_test(test_cochlea_encloses),
+        cmocka_unit_test(test_cochlea_distance_matches_search),
+        cmocka_unit_test(test_cochlea_encloses_its_tube),
         cmocka_unit_test(test_cochlea_ears_are_mirrored),
-        cmocka_unit_test(test_cochlea_start),
-        cmocka_unit_test(test_cochlea_section),
+        cmocka_unit_test(test_cochlea_start_of_centreline),
+        cmocka_unit_test(test_cochlea_elliptic_section),
         cmocka_unit_test(test_cochlea_anatomy_parameters),
         cmocka_unit_test(test_bad_cochlea_options_are_refused),
     };

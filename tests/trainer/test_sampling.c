@@ -63,7 +63,7 @@ static const double LOW[2] = {-3, 10}, HIGH[2] = {5, 11};
 static const sample_space space = {.n_params = 2, .min = LOW, .max = HIGH, .seed = 5};
 
 // Parameters of planned sample i, scaled to -1 .. 1.
-static void scaled(const sample_plan *p, size_t i, double *x)
+static void sample_scaled(const sample_plan *p, size_t i, double *x)
 {
     sdm_sample_params(space.seed, STREAM_TRAIN, trainer_sample_plan_point(p, i), LOW, HIGH, 2, x);
     for (int k = 0; k < 2; k++) x[k] = 2 * (x[k] - LOW[k]) / (HIGH[k] - LOW[k]) - 1;
@@ -71,23 +71,23 @@ static void scaled(const sample_plan *p, size_t i, double *x)
 
 // Reports errors for samples first .. first + n - 1: proportional to exp(2 x), and falling with the
 // number of samples.
-static void observe(sample_plan *p, size_t first, size_t n)
+static void errors_report(sample_plan *p, size_t first, size_t n)
 {
     double error[SAMPLE_ROUND];
     for (size_t i = 0; i < n; i++) {
         double x[2];
-        scaled(p, first + i, x);
+        sample_scaled(p, first + i, x);
         error[i] = exp(2 * x[0]) / (double)(first + 1);
     }
     trainer_sample_plan_observe(p, first, n, error);
 }
 
-static void run_plan(sample_plan *p, size_t n_start, size_t from)
+static void plan_run(sample_plan *p, size_t n_start, size_t from)
 {
     for (size_t at = from; at < p->n; at += SAMPLE_ROUND) {
         const size_t n = p->n - at < SAMPLE_ROUND ? p->n - at : SAMPLE_ROUND;
         assert_true(p->n_planned >= at + n);
-        observe(p, at, n);
+        errors_report(p, at, n);
         assert_int_equal(trainer_sample_plan_extend(p, &space, n_start, at + n, NULL), SDM_OK);
     }
 }
@@ -101,13 +101,13 @@ static void density_follows_the_error(void **state)
     trainer_sample_plan_start(&p, START);
     assert_int_equal(p.n_planned, START + 2 * SAMPLE_ROUND);
     for (size_t i = 0; i < p.n_planned; i++) assert_int_equal(trainer_sample_plan_point(&p, i), i);
-    run_plan(&p, START, START);
+    plan_run(&p, START, START);
     assert_int_equal(p.n_planned, N);
 
     double count[2][BINS] = {{0}}, all = 0;
     for (size_t i = START + 1000; i < N; i++) {
         double x[2];
-        scaled(&p, i, x);
+        sample_scaled(&p, i, x);
         assert_true(p.point[i] > p.point[i - 1]);
         for (int k = 0; k < 2; k++) count[k][(int)(0.5 * BINS * (x[k] + 1))]++;
         all++;
@@ -131,12 +131,12 @@ static void restored_plan_continues(void **state)
     sample_plan whole, rest;
     assert_int_equal(trainer_sample_plan_create(&whole, true, N, NULL), SDM_OK);
     trainer_sample_plan_start(&whole, START);
-    run_plan(&whole, START, START);
+    plan_run(&whole, START, START);
     assert_int_equal(trainer_sample_plan_create(&rest, true, N, NULL), SDM_OK);
     rest.n_planned = BREAK + 2 * SAMPLE_ROUND;
     memcpy(rest.point, whole.point, rest.n_planned * sizeof *rest.point);
     memcpy(rest.error, whole.error, BREAK * sizeof *rest.error);
-    run_plan(&rest, START, BREAK);
+    plan_run(&rest, START, BREAK);
     assert_memory_equal(whole.point, rest.point, N * sizeof *whole.point);
     assert_memory_equal(whole.error, rest.error, N * sizeof *whole.error);
     assert_int_not_equal(whole.point[N - 1], N - 1);
@@ -183,7 +183,7 @@ static sdm_status train(const char *override, int threads, bool resume,
     return s;
 }
 
-static sdm_model *trained(void)
+static sdm_model *trained_model(void)
 {
     sdm_model *m;
     sdm_error e = {0};
@@ -192,10 +192,10 @@ static sdm_model *trained(void)
 }
 
 // One map of the model, as a fingerprint of its weights.
-static void map_of(float *map)
+static void model_map(float *map)
 {
     const double p[2] = {3, 1.5};
-    sdm_model *m = trained();
+    sdm_model *m = trained_model();
     void *scratch;
     assert_int_equal(sdm_model_get_info(m)->n_params, 2);
     assert_int_equal(sdm_alloc(&scratch, sdm_model_scratch_bytes(m, 1), 1, "scratch", NULL), 0);
@@ -213,13 +213,13 @@ static void same_bits_for_threads(void **state)
     for (int threads = 1; threads <= 4; threads++) {
         run_files_remove();
         assert_int_equal(train(NULL, threads, false, NULL), SDM_OK);
-        map_of(threads == 1 ? first : other);
+        model_map(threads == 1 ? first : other);
         if (threads > 1) assert_memory_equal(first, other, sizeof first);
     }
     // Error-driven sampling does change the result.
     run_files_remove();
     assert_int_equal(train("data.sampling=uniform", 2, false, NULL), SDM_OK);
-    map_of(other);
+    model_map(other);
     assert_memory_not_equal(first, other, sizeof first);
 }
 
@@ -237,7 +237,7 @@ static void resume_is_bit_exact(void **state)
     float whole[VOXELS], resumed[VOXELS];
     run_files_remove();
     assert_int_equal(train(NULL, 2, false, NULL), SDM_OK);
-    map_of(whole);
+    model_map(whole);
     // The hook is called once for each of the 68 maps before training, then about once a step: two
     // stops lie in the fit of the network, one in the refinement.
     const int64_t stops[] = {110, 150, 200};
@@ -248,7 +248,7 @@ static void resume_is_bit_exact(void **state)
         assert_int_equal(train(NULL, 3, false, &hooks), SDM_E_CANCELLED);
         assert_int_equal(train("data.sampling=uniform", 1, true, NULL), SDM_E_CONFIG);
         assert_int_equal(train(NULL, 1, true, NULL), SDM_OK);
-        map_of(resumed);
+        model_map(resumed);
         assert_memory_equal(whole, resumed, sizeof whole);
     }
 }

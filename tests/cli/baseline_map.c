@@ -1,8 +1,8 @@
-/* The program of examples/wasm with the kernels that every machine of this kind has, for a
- * comparison with WebAssembly. */
+/* The program of examples/wasm, restricted to the kernels that every processor of this
+ * architecture supports, for comparison with WebAssembly. */
 #include "sdm/internal/processor.h"
 
-// its main(), renamed by the build
+// main() of examples/wasm/map.c, renamed by the build.
 int map_main(int argc, char **argv);
 
 int main(int argc, char **argv)

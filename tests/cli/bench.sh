@@ -1,19 +1,20 @@
 #!/usr/bin/env bash
-# sdmgen bench exact: figures of our own methods, of other programs (here scripts that say what they are told to), and what is missing.
+# sdmgen bench exact: results of the built-in methods and of other programs (replaced by scripts with known answers), and messages about
+# missing programs.
 # Tests: bench_case.c bench_compare.c bench_own.c bench_peers.c bench_report.c cmd_bench.c
 . "$(dirname "$0")/common.sh"
 
 mkdir tmp peers none
 export TMPDIR=$PWD/tmp
 
-# row NAME KEY: a value of that row of the JSON in `out`
+# row NAME KEY: the value of KEY in the JSON row of method NAME in `out`.
 row() { grep -o "{\"name\": \"$1\", [^}]*}" out | sed -n "s/.*\"$2\": \\(\"[^\"]*\"\\|[^,}]*\\).*/\\1/p" | tr -d '"'; }
 above() { awk -v a="$1" -v b="$2" 'BEGIN { exit !(a != "" && a > b) }' || bad "$1 is not above $2"; }
 no_figures() { [ "$(row "$1" done)" = false ] && row "$1" note | grep -Eq -- "$2" || bad "$1: not '$2' but: $(row "$1" note)"; }
 
 box=(--shape torus --size '14,12,10' --spacing 0.6 --origin '-4,-3.5,-2.8')
 
-# our own methods: exact against its oracle, which counts all surface of a mesh without overlap
+# Built-in methods: the exact one agrees with its oracle (naive) on a mesh without overlap.
 expect 0 - sdmgen bench exact "${box[@]}" --peers none --repeat 1 --json --threads 2
 near "$(json voxels)" 1680 0
 [ "$(json union)" = false ] || bad 'the torus overlaps itself'
@@ -28,14 +29,14 @@ done
 near "$(row exact times_exact)" 1 0
 grep -q vtk out && bad '--peers none runs others'
 
-# overlap: errors count on voxels outside alone; every method knows the inside
+# A mesh that overlaps itself: distances are compared outside only, but every method must find the inside.
 expect 0 - sdmgen bench exact --shape cochlea --size '20,20,20' --spacing 0.5 --peers none --repeat 1 --share 0.1 --json
 [ "$(json union)" = true ] || bad 'the cochlea does not overlap itself'
 above "$(row exact judged_signs)" "$(row exact compared)"
 near "$(row naive share)" 0.1 0.03
 near "$(row naive max_error_mm)" 0 1e-5
 
-# other programs: what they are asked, what becomes of their answer. The right values are the naive method's.
+# Other programs: their arguments and the checks of their answers. The naive method gives the correct values.
 expect 0 - sdmgen exact "${box[@]}" --method naive --quiet -o right.npy
 expect 0 - sdmgen exact --shape torus --size '14,12,10' --spacing 0.6 --origin '-3.9,-3.5,-2.8' --quiet -o shifted.npy
 expect 0 - sdmgen exact --shape torus --size '5,5,5' --spacing 1 --quiet -o small.npy
@@ -47,7 +48,7 @@ header=$(($(wc -c <right.npy) - 1680 * 4))
         awk '{ printf "\\x%02x\\x%02x\\x%02x\\x%02x", $1, $2, $3, ($4 + 128) % 256 }')" || true
 } >turned.npy 2>/dev/null
 [ "$(wc -c <turned.npy)" -eq "$(wc -c <right.npy)" ] || bad 'the turned values are damaged'
-# peer NAME LINE...: a program that runs these lines of shell; $1 is the mesh, ${14} the values
+# peer NAME LINE...: writes a program that runs these lines of shell; its argument $1 is the mesh, ${14} the file of values.
 peer() {
     { echo '#!/bin/bash' && printf '%s\n' "${@:2}"; } >"peers/sdmgen-peer-$1"
     chmod +x "peers/sdmgen-peer-$1"
@@ -75,7 +76,7 @@ near "$(row right max_error_mm)" 0 1e-5
 near "$(row right compared)" 1680 0
 near "$(row right wrong_signs)" 0 0
 row right note | grep -q '^V 1: n$' || bad "note: $(row right note)"
-# moved by 0.1 mm a distance changes by as much at most
+# Moving the grid by 0.1 mm changes a distance by at most as much.
 near "$(row shifted max_error_mm)" 0.09 0.01001
 above "$(row shifted mean_error_mm)" 0.01
 near "$(row turned wrong_signs)" 1680 0
@@ -107,7 +108,7 @@ near "$(row naive judged_signs)" "$inside_band" 0
 expect 0 - sdmgen info asked.ply
 has '^closed +yes'
 
-# the programs of this build: exact ones agree, whatever is missing is said
+# The programs of this build: exact ones agree, and missing ones are named.
 expect 0 - sdmgen bench exact "${box[@]}" --repeat 1 --json
 for name in vtk cgal embree openvdb itk scipy; do
     [ -n "$(row $name note)" ] || bad "$name: no note"
@@ -115,15 +116,15 @@ for name in vtk cgal embree openvdb itk scipy; do
     above "$(row $name ms_total)" 0
     case $name in
     vtk | cgal | embree) limit=2e-5 ;;
-    *) limit=0.6 ;; # approximate: a voxel
+    *) limit=0.6 ;; # approximate methods: one voxel
     esac
     near "$(row $name max_error_mm)" 0 $limit
     above "$(row $name compared)" 1500
 done
-# every edge exactly what was asked for, at any size
+# The grid passed to other programs has exactly the requested spacing, at any size.
 expect 0 - sdmgen bench exact --shape torus --size '14,13,11' --spacing 0.047 --peers peers --repeat 1
 [ "$(cut -d ' ' -f 8-10 asked)" = '0.047 0.047 0.047' ] || bad "asked: $(cat asked)"
-# half of the rows, the same rows for all
+# Half of the rows of voxels, the same rows for all methods.
 expect 0 - sdmgen bench exact "${box[@]}" --repeat 1 --json --share 0.5
 for name in naive vtk cgal embree; do
     [ "$(row $name done)" = true ] || continue
@@ -131,7 +132,7 @@ for name in naive vtk cgal embree; do
     near "$(row $name judged_signs)" 840 34
 done
 
-# growth: 3 grids; 3 meshes of a shape
+# --growth: 3 grids, then 3 meshes of a shape.
 expect 0 - sdmgen bench exact --shape cochlea --size '8,8,8' --spacing 1.2 --peers none --repeat 1 --growth --json
 [ "$(grep -o '"voxels": [0-9]*' out | tr -dc '0-9\n' | tr '\n' ' ')" = '8 64 512 512 512 512 ' ] || bad "growth: $(grep -o '"voxels": [0-9]*' out)"
 grep -o '"triangles": [0-9]*' out | tr -dc '0-9\n' | awk 'NR > 4 && $1 < 3 * last { exit 1 } { last = $1 } END { exit NR != 6 }' ||
@@ -141,7 +142,7 @@ expect 0 - sdmgen bench exact --mesh torus.ply --size '8,8,8' --peers none --rep
 has '^  voxels +8 +64 +512$'
 grep -q 'per triangle' out && bad 'a mesh file cannot be refined'
 
-# mistakes
+# Mistakes in arguments.
 expect 2 "peers 'nowhere': no such folder" sdmgen bench exact "${box[@]}" --peers nowhere
 expect 2 'either --shape NAME or --mesh FILE' sdmgen bench exact --shape torus --mesh torus.ply
 expect 2 'edge belong to --shape' sdmgen bench exact --mesh torus.ply --edge 0.1

@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
-# generate --check, --max-error, --gradient, --jacobian: figures, the exact engine in place of a bad map, what is said about it and where.
+# sdmgen generate --check, --max-error, --gradient, --jacobian: error figures, replacement of a bad map by the exact one, and how the
+# outputs report it.
 # Tests: check.c cmd_generate.c
 . "$(dirname "$0")/common.sh"
 model=../files-of-train/run/model.sdm
 present $model
 grid=(--size 16,14,12 --spacing 0.8)
 
-# figures, in words and in JSON
+# Error figures as text and as JSON.
 expect 0 - sdmgen generate $model --check
 has '^error near the surface: max [0-9.]+, q95 [0-9.]+, RMSE [0-9.]+, mean [0-9.]+, bias [-0-9.e]+ mm \(1000 voxels\)$'
 expect 0 - sdmgen generate $model --check --json
@@ -21,7 +22,7 @@ expect 0 - sdmgen generate $model --json
 has '"exact_by_error": 0'
 grep -q '"check"' out && bad 'a check that nobody asked for'
 
-# a bound: kept, or the exact map, said on stderr and in the file
+# An error bound: a map within it is kept, else the exact map replaces it, which stderr and the file state.
 expect 0 - sdmgen generate $model --max-error "$(awk -v m="$max" 'BEGIN { print 1.01 * m }')" --json
 [ "$hash" = "$(json values_crc64)" ] || bad 'a map within the bound was replaced'
 expect 0 - sdmgen generate $model --max-error "$(awk -v m="$mean" 'BEGIN { print 1.01 * m }')" --error-of mean --json
@@ -45,7 +46,7 @@ expect 4 'error near the surface .* demanded at most 1e-06 mm' \
     sdmgen generate $model -p a=7 --policy clamp --max-error 1e-6 -o never.npy
 absent never.npy
 
-# rows: each by its own error, all in the summary
+# Several rows of parameters: each is judged by its own error, and the summary counts all.
 printf 'a\n3\n4.4\n' >rows.csv
 expect 0 - sdmgen generate $model --params rows.csv --check
 has '^row 1: error near the surface: max'
@@ -54,7 +55,7 @@ expect 0 - sdmgen generate $model --params rows.csv --check --json
 has '"check": \{"maps": 2'
 near "$(json points)" 2000 0
 
-# parameters out of the range: every policy says so in every output
+# Parameters outside of the range: every policy is reported in every output.
 expect 0 'clamped to it' sdmgen generate $model -p a=5.000000000000001 --policy clamp --json -o c.nii -o c.mha -o c.nrrd
 near "$(json clamped)" 1 0
 for file in c.nii c.mha c.nrrd; do
@@ -68,7 +69,7 @@ for policy in refuse clamp exact; do
 done
 expect 0 'clamped to it' sdmgen generate $model -p a=1e300 --policy clamp --json
 near "$(json clamped)" 1 0
-# within the range of the shape, out of that of the network
+# Within the range of the shape, but outside of the network's.
 expect 0 - sdmgen train "$source_folder/tests/cli/tiny.yaml" shape.name=torus 'shape.ranges.major=[2.5,3.5]' train.steps=2 --out narrow --quiet
 expect 5 'parameter major = 3\.50000000000000[0-9]+, allowed' sdmgen generate narrow/model.sdm -p major=3.5000000000000004 -o never.npy
 expect 0 '^sdmgen: parameters outside the trained range, computed by the exact engine' \
@@ -87,7 +88,7 @@ if sdmgen generate $model -p a=7 --policy clamp -o c.vdb --check --quiet >out 2>
 fi
 absent never.npy
 
-# gradient and derivatives
+# Gradient and Jacobian.
 expect 0 - sdmgen generate $model --gradient g.npy --jacobian j.npy
 present g.npy j.npy
 head -c 128 g.npy | grep -aq "(3, 12, 14, 16)" || bad 'shape of g.npy'
@@ -104,7 +105,7 @@ expect 1 'nowhere' sdmgen generate $model --jacobian nowhere/j.npy
 expect 2 'max-error' sdmgen generate $model --max-error 0 -o never.npy
 expect 2 'max-error' sdmgen generate $model --max-error nan -o never.npy
 
-# a model of a shape that is not here: it works, and cannot be checked
+# A model whose shape is a plug-in that is not loaded: it gives maps, but they cannot be checked.
 plugin=../../plugins/good/octahedron.so
 if [ -e $plugin ]; then
     expect 0 - sdmgen train "$source_folder/tests/cli/tiny.yaml" shape.name=octahedron train.steps=2 --plugin $plugin --out away --quiet

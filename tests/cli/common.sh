@@ -1,5 +1,6 @@
 # shellcheck shell=bash disable=SC2016,SC2034
-# Shared by the tests of the command line (sourced): run a command, demand its exact exit code and its one line of error.
+# Functions shared by the tests of the command line (sourced): run a command, and check its exit code and its single line on stderr.
+# Arguments: the program, the folder of the sources.
 set -u
 program=$1
 source_folder=$2 # absolute, like program
@@ -16,8 +17,8 @@ bad() {
     echo "FAILED: $*" >&2
 }
 
-# expect CODE PATTERN command...: the exit code is CODE; stderr is empty when PATTERN is -, else it is exactly one line that
-# matches PATTERN. stdout is left in the file `out`, stderr in `err`.
+# expect CODE PATTERN COMMAND...: runs COMMAND, whose exit code must be CODE. If PATTERN is -, stderr must be empty, else exactly one line
+# that matches PATTERN. Leaves stdout in the file `out` and stderr in `err`.
 expect() {
     local code=$1 pattern=$2 got
     shift 2
@@ -32,11 +33,11 @@ expect() {
     fi
 }
 
-# stopped_at PATTERN ARGUMENT...: sdmgen gets SIGTERM when its stderr, left in `err`, has the pattern; its exit code is 130.
+# stopped_at PATTERN ARGUMENT...: runs sdmgen and sends SIGTERM when its stderr (file `err`) matches PATTERN; the exit code must be 130.
 stopped_at() {
     local pattern=$1 pid code
     shift
-    : >err # the job opens it too, but perhaps after the first look, which would find the text of the command before
+    : >err # empty it now: the job may start late, and grep would find the text of the previous command
     "$program" "$@" >out 2>err &
     pid=$!
     for _ in $(seq 300); do grep -Eq -- "$pattern" err && break || sleep 0.2; done
@@ -46,32 +47,35 @@ stopped_at() {
     [ $code -eq 130 ] || bad "exit code $code when stopped: $* ($(cat err))"
 }
 
-# has PATTERN: the stdout of the last expect has a line that matches.
+# has PATTERN: fails unless a line of `out` matches.
 has() { grep -Eq -- "$1" out || bad "no '$1' in: $(head -c 600 out)"; }
 
-# json KEY: its number, text or bool in the one-line object of the last expect.
+# json KEY: prints the value (number, string or bool) of KEY in the one-line JSON object in `out`.
 json() { sed -n "s/.*\"$1\": *\\(\"[^\"]*\"\\|[^,}]*\\).*/\\1/p" out | head -n 1 | tr -d '"'; }
 
-# near A B TOLERANCE
+# near A B TOLERANCE: fails unless abs(A - B) <= TOLERANCE.
 near() { awk -v a="$1" -v b="$2" -v t="$3" 'BEGIN { exit !(a != "" && a - b <= t && b - a <= t) }' || bad "$1 is not $2 +- $3"; }
 
+# absent PATH...: fails if a path exists.
 absent() {
     local path
     for path in "$@"; do [ ! -e "$path" ] || bad "$path should not be there"; done
 }
 
+# present PATH...: fails if a file is missing or empty.
 present() {
     local path
     for path in "$@"; do [ -s "$path" ] || bad "$path is missing or empty"; done
 }
 
-# no file of this folder is a left-over of an unfinished output
+# Fails if temporary files of unfinished outputs are left in this folder.
 no_leftovers() {
     local left
     left=$(find . -maxdepth 2 -type f \( -name '*tmp*' -o -name '.*.part*' \))
     [ -z "$left" ] || bad "left over: $left"
 }
 
+# The last command of each test: exits with 1 after any failure.
 finish() {
     no_leftovers
     if [ "$failures" -gt 0 ]; then

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# sdmgen config: the shipped configurations are right; every mistake has its line, with its place.
+# sdmgen config: the shipped configurations are valid; every mistake gives a line with its position.
 # Tests: cmd_config.c config_shape.c
 . "$(dirname "$0")/common.sh"
 
 for config in "$source_folder"/configs/*.yaml; do
-    if grep -q '^methods:' "$config"; then continue; fi # an experiment: experiment.sh
+    if grep -q '^methods:' "$config"; then continue; fi # tested in experiment.sh
     expect 0 - sdmgen config "$config"
     has 'no mistakes$'
     expect 0 - sdmgen config "$config" --dump
@@ -22,7 +22,7 @@ has 'network\.depth'
 expect 0 - sdmgen config --keys --markdown
 has '^\|.*network\.depth'
 
-# three mistakes: three lines, each with file, line and column, exit code 2
+# Three mistakes give three lines, each with file, line and column, and exit code 2.
 cat >bad.yaml <<'END'
 shape:
   name: cochlea
@@ -52,7 +52,7 @@ expect 1 'missing\.yaml' sdmgen config missing.yaml
 expect 2 'usage: sdmgen config' sdmgen config
 expect 2 'keys stands alone' sdmgen config "$cochlea" --keys
 
-# what only the shape knows
+# Mistakes that only the shape can detect: its name, options and ranges.
 base='shape: {name: %s}\ngrid: {size: [8, 8, 8], spacing: 1}\ntrain: {steps: 5}\n'
 # shellcheck disable=SC2059 # the format is the file
 printf "$base" cochlae >unknown.yaml

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The installed package: examples/consume is built against it, by CMake and by pkg-config, and uses a trained model.
-# Third argument: the build folder to install from.
+# The installed package: builds examples/consume against it, by CMake and by pkg-config, and runs it with a trained model. Third argument:
+# the build folder to install from.
 build=$3
 . "$(dirname "$0")/common.sh"
 model=../files-of-train/run/model.sdm

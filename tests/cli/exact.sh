@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# sdmgen exact: values against closed forms, every output type, bad meshes, no partial files.
+# sdmgen exact: values against closed forms, every type of output, bad meshes, no partial files.
 # Tests: cmd_exact.c json_values.c output.c report_audit.c
 . "$(dirname "$0")/common.sh"
 
-# floats FILE SKIP: the float32 values behind SKIP bytes, one a line
+# floats FILE SKIP: the float32 values after SKIP bytes, one per line.
 floats() { od -An -v -t f4 -w4 -j "$2" "$1" | tr -d ' '; }
 
-# a cube of edge 4 around the origin; 7 x 7 x 7 voxels of 1 mm
+# A cube with edge 4 centred at the origin, and a grid of 7 x 7 x 7 voxels of 1 mm.
 cat >cube.off <<'END'
 OFF
 8 12 0
@@ -39,7 +39,7 @@ for method in exact naive; do
     near "$(json min_mm)" -2 1e-6
     near "$(json max_mm)" "$(awk 'BEGIN { print sqrt(3) }')" 1e-6
     for key in ms_build ms_query ms_total threads sign_method union; do [ -n "$(json $key)" ] || bad "no $key"; done
-    # .npy: the header is a multiple of 64 bytes, 343 values end the file; closed form of a box, z slowest
+    # .npy: the header has a multiple of 64 bytes, 343 values follow. The distance to a box in closed form; z is the slowest axis.
     floats $method.npy $(($(wc -c <$method.npy) - 343 * 4)) | awk '
         { x = (NR - 1) % 7 - 3; y = int((NR - 1) / 7) % 7 - 3; z = int((NR - 1) / 49) - 3
           a = (x < 0 ? -x : x) - 2; b = (y < 0 ? -y : y) - 2; c = (z < 0 ? -z : z) - 2
@@ -50,26 +50,26 @@ for method in exact naive; do
 done
 cmp -s exact.npy naive.npy || echo 'exact and naive differ in the last bits (allowed)'
 
-# stopped while the first of two files is written: the second is not begun
+# Stopped while the first of two files is written: the second is not begun.
 stopped_at 'overlaps itself' exact --shape cochlea --size 256,256,256 --spacing 0.05 -o first.nrrd -o second.nrrd
 grep -q '^sdmgen: error: interrupted$' err || bad "not interrupted: $(cat err)"
 absent second.nrrd
 
-# the same bits for any number of threads
+# The same bits for any number of threads.
 expect 0 - sdmgen exact --shape cochlea --size 20,20,20 --spacing 0.5 --json --quiet --threads 1
 one=$(json values_crc64)
 expect 0 - sdmgen exact --shape cochlea --size 20,20,20 --spacing 0.5 --json --quiet --threads 3
 [ "$one" = "$(json values_crc64)" ] || bad 'the values depend on the number of threads'
 near "$(json threads)" 3 0
 
-# the grid that fits the mesh: 64 voxels on the longest edge, nothing of the surface outside
+# The default grid: 64 voxels along the longest edge of the mesh, and no surface outside.
 expect 0 - sdmgen exact --shape torus --json --quiet
 has '"size": \[[0-9]+, [0-9]+, [0-9]+\]'
 out_size=$(sed -n 's/.*"size": \[\([0-9, ]*\)\].*/\1/p' out | tr ',' '\n' | sort -n | tail -n 1)
 near "$out_size" 64 0
 awk -v max="$(json max_mm)" -v min="$(json min_mm)" 'BEGIN { exit !(min < 0 && max > 0) }' || bad 'the fitted grid misses the torus'
 
-# every type of output; names decide
+# Every type of output, selected by the ending.
 expect 0 - sdmgen exact --mesh cube.off "${grid[@]}" --quiet -o o.nii -o o.nii.gz -o o.nrrd -o o.mha -o o.ply -o o.stl -o o.obj \
     -o o.off -o o.png -o o.svg -o o.PDF
 present o.nii o.nii.gz o.nrrd o.mha o.ply o.stl o.obj o.off o.png o.svg o.PDF
@@ -95,7 +95,7 @@ else
     grep -q 'built without OpenVDB' err || bad "a .vdb fails: $(cat err)"
 fi
 
-# mistakes: one line, the right code, no file
+# Mistakes: one line on stderr, the right exit code, no file.
 expect 2 'either --shape NAME or --mesh FILE' sdmgen exact -o x.npy
 expect 2 'either --shape NAME or --mesh FILE' sdmgen exact --shape torus --mesh cube.off -o x.npy
 expect 2 'belong to --shape' sdmgen exact --mesh cube.off -p a=1 -o x.npy
@@ -113,18 +113,18 @@ sed 's/^2 2 2$/2 2 nan/' cube.off >nan.off
 expect 3 'nan\.off|finite' sdmgen exact --mesh nan.off -o x.npy
 head -n 19 cube.off | sed 's/^8 12 0/8 9 0/' >open.off
 expect 2 'crossings' sdmgen exact --mesh open.off --sign crossings --quiet -o x.npy
-# all of it in x = 1, and next to nothing wide
+# A mesh in the plane x = 1 with an extent of about 1e-55 mm.
 awk 'BEGIN { for (i = 0; i < 120; i++) printf "v 1 %de-57 %de-57\n", i * 37 % 101, i * 53 % 97
              for (i = 1; i < 120; i += 3) print "f", i, i + 1, i + 2 }' >thin.obj
 expect 0 - sdmgen exact --mesh thin.obj --size 4,4,4 --spacing 1 --origin 0,0,0 --quiet -o thin.npy
-# the sanitizer's allocator ends the program in place of failing
+# Under the address sanitizer a failing allocation ends the program, so this test is skipped.
 grep -q __asan_init "$program" ||
     expect 1 'memory|voxels|bytes' sdmgen exact --mesh cube.off --size 1000000,1000000,1000 --spacing 1 -o x.npy
 absent x.npy x.xyz nowhere
 expect 0 '^sdmgen: the mesh is open: [0-9]+ boundary edges' sdmgen exact --mesh open.off "${grid[@]}" -o open.npy
 expect 0 - sdmgen exact --mesh open.off "${grid[@]}" -o open.npy --quiet
 
-# the certificate of the signs
+# --certify: signs compared with crossings along y and z.
 expect 0 '343 of 343 voxels compared with crossings along y and z, all agree' sdmgen exact --mesh cube.off "${grid[@]}" --json --certify
 near "$(json sign_checked)" 1 0
 near "$(json sign_agreed)" 1 0

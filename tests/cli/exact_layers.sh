@@ -3,11 +3,11 @@
 # Tests: exact_layers.c
 . "$(dirname "$0")/common.sh"
 
-# numbers FILE COUNT TYPE: the values that end the file, one a line
+# numbers FILE COUNT TYPE: the last COUNT values of the file, one per line.
 numbers() { od -An -v -t "$3" -w4 -j $(($(wc -c <"$1") - 4 * $2)) "$1" | tr -d ' '; }
 header() { head -c 128 "$1" | tr -d '\0' | grep -a -o "{.*}"; }
 
-# a pyramid: base 4 x 4 at z = 0 in two triangles, sides of 45 degrees, apex at z = 2
+# A pyramid: base 4 x 4 at z = 0 made of two triangles, sides inclined by 45 degrees, apex at z = 2.
 cat >pyramid.off <<'END'
 OFF
 5 6 0
@@ -23,7 +23,7 @@ OFF
 3 2 3 4
 3 3 0 4
 END
-# one column of voxels below the base, beside its diagonal, and one above the side of triangle 3 (towards +x)
+# A column of voxels: below the base, next to its diagonal, and above the side of triangle 3 (towards +x).
 expect 0 - sdmgen exact --mesh pyramid.off --size 1,1,3 --spacing 1 --origin '1,-0.5,-3' --quiet -o d.npy \
     --closest c.npy --normal n.npy --triangle t.npy
 present d.npy c.npy n.npy t.npy
@@ -40,14 +40,14 @@ expect 0 - sdmgen exact --mesh pyramid.off --size 1,1,1 --spacing 1 --origin '3,
 numbers n.npy 3 f4 | awk '{ w = NR == 2 ? 0 : sqrt(0.5); if ($1 - w > 1e-6 || w - $1 > 1e-6) exit 1 }' ||
     bad "normal towards +x: $(numbers n.npy 3 f4 | xargs)"
 
-# triangles are those of the mesh file, also when surface inside the union is removed: a second pyramid, 1 mm higher
+# Triangle numbers are those of the mesh file, also when surface inside of the union is removed: add a second pyramid, 1 mm higher.
 awk 'NR == 2 { print "10 12 0"; next } { print } NR > 2 && NR < 8 { v[NR] = $1 " " $2 " " $3 + 1 }
      NR == 7 { for (i = 3; i < 8; i++) print v[i] } NR > 7 { t[NR] = "3 " $2 + 5 " " $3 + 5 " " $4 + 5 }
      END { for (i = 8; i < 14; i++) print t[i] }' pyramid.off >two.off
 expect 0 - sdmgen exact --mesh two.off --size 1,1,1 --spacing 1 --origin '3,0.1,3' --quiet --triangle t.npy
 [ "$(numbers t.npy 1 u4)" = 9 ] || bad "triangle of the second pyramid: $(numbers t.npy 1 u4)"
 
-# the torus: d = hypot(r - major, z) - minor
+# Torus: d = hypot(r - major, z) - minor.
 expect 0 - sdmgen exact --shape torus -O edge=0.05 --size 9,8,7 --spacing 1 --quiet --json --jacobian j.npy
 [ "$(header j.npy)" = "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 7, 8, 9), }" ] || bad "j.npy: $(header j.npy)"
 numbers j.npy 1008 f4 | awk 'NR > 504 && ($1 < -1.001 || $1 > -0.999) || $1 < -1.001 || $1 > 1.001 { print NR, $1; exit 1 }' ||
@@ -59,7 +59,7 @@ cp j.npy kept.npy
 expect 0 - sdmgen exact --shape torus -O edge=0.05 --size 9,8,7 --spacing 1 --quiet --jacobian j.npy --threads 3
 cmp -s j.npy kept.npy || bad 'the derivatives depend on the number of threads'
 
-# mistakes: one line, the right code, no file
+# Mistakes: one line on stderr, the right exit code, no file.
 expect 2 "must end in .npy" sdmgen exact --shape torus --normal x.nrrd
 expect 2 'jacobian needs --shape' sdmgen exact --mesh pyramid.off --jacobian x.npy
 expect 2 'closest needs --method exact' sdmgen exact --shape torus --method naive --closest x.npy

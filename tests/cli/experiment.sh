@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# sdmgen experiment: the table in three forms, references, pictures, a second run that loads, rows that fail, mistakes.
-# Tests: cmd_experiment.c experiment_draw.c experiment_engine.c experiment_job.c experiment_log.c experiment_network.c
-# experiment_plan.c experiment_table.c
+# sdmgen experiment: the table in three formats, published reference values, pictures, a second run that loads models, rows that fail,
+# mistakes.
+# Tests: cmd_experiment.c experiment_draw.c experiment_engine.c experiment_job.c experiment_log.c experiment_network.c experiment_plan.c
+# experiment_table.c
 . "$(dirname "$0")/common.sh"
 
 cat >tiny.yaml <<'END'
@@ -20,11 +21,11 @@ reference:
   - {row: POD, ms: 200, mse_mm2: 6e-3, source: "somebody, table 1"}
 END
 
-# column NAME ROW of table.csv, where no text before it has a comma
+# csv NAME ROW FOLDER: the value in column NAME of table.csv; texts before that column must have no comma.
 csv() { awk -F, -v name="$1" -v row="\"$2\"" 'NR == 1 { for (i = 1; i <= NF; i++) if ($i == name) c = i } $1 == row { print $c }' "$3/table.csv"; }
-# number of KEY in the row of METHOD of table.json
+# json_of METHOD KEY FOLDER: the number KEY in the row of METHOD in table.json.
 json_of() { grep -o "{\"method\": *\"$1\"[^{}]*" "$3/table.json" | sed -n "s/.*\"$2\": *\\([^,}]*\\).*/\\1/p" | head -n 1; }
-# cell of the column whose title begins with NAME, in table.md
+# md NAME ROW FOLDER: the cell of table.md in the column whose title begins with NAME.
 md() { awk -F'|' -v name=" $1" -v row=" $2 " '$2 == " method " { for (i = 2; i <= NF; i++) if (!c && index($i, name) == 1) c = i } $2 == row { gsub(/ /, "", $c); print $c; exit }' "$3/table.md"; }
 
 expect 0 - sdmgen experiment tiny.yaml --dry-run --out never
@@ -42,7 +43,7 @@ present run/table.md run/table.csv run/table.json run/log.txt run/pod/model.sdm 
     run/exact-engine/slices.png run/naive/surfaces.png
 absent run/vtk
 
-# the three forms agree, and with what sdmgen eval finds in the same model on the same shapes
+# The three formats agree with each other and with sdmgen eval of the same model on the same shapes.
 expect 0 - sdmgen eval run/pod/model.sdm --samples 4 --naive 0 --json
 for key in mse_mm2 rmse_mm rmse_near_mm max_abs_mm dice surface_mean_mm surface_hausdorff_mm; do
     mine=$(csv $key POD run)
@@ -55,20 +56,21 @@ awk -v a="$(md MSE POD run)" -v b="$(csv mse_mm2 POD run)" 'BEGIN { exit !(b > 0
 near "$(csv speedup naive run)" 1 0
 awk -v s="$(csv speedup POD run)" -v a="$(csv ms naive run)" -v b="$(csv ms POD run)" 'BEGIN { exit !(s > 0 && s * b / a > 0.999999 && s * b / a < 1.000001) }' ||
     bad "speed-up $(csv speedup POD run)"
-# the naive method is exact on a mesh that does not overlap itself
+# The naive method is exact on a mesh without overlap.
 awk -v m="$(csv max_abs_mm naive run)" 'BEGIN { exit !(m != "" && m < 1e-5) }' || bad "naive is off by $(csv max_abs_mm naive run)"
 
-# the figures of others stand beside ours, with their source
+# Published values appear next to the measured ones, with their source.
 [ "$(csv reference_ms POD run)" = 200 ] || bad "reference_ms: $(csv reference_ms POD run)"
 [ "$(csv reference_mse_mm2 POD run)" = 0.006 ] || bad "reference_mse_mm2: $(csv reference_mse_mm2 POD run)"
 grep -q '| MSE, mm^2 | MSE, mm^2 (paper) |' run/table.md || bad 'no column of the paper beside ours'
 grep -q 'paper: somebody, table 1' run/table.md || bad 'no source in table.md'
 grep -q '"reference": *{"ms": *200, *"mse_mm2": *0.006, *"source": *"somebody, table 1"}' run/table.json || bad 'no reference in table.json'
-# what is missing is said
+# Methods that are not available are listed as such.
 grep -q '^| VTK (not available) |' run/table.md || bad 'VTK is missing in silence'
 grep -q '"VTK",not available' run/table.csv || bad 'VTK is missing in silence (CSV)'
 
-# the same again: loaded, not trained, the same errors; another configuration: trained again; other shapes to measure: loaded
+# The same run again loads the model and gives the same errors; another configuration trains again; other test shapes only need the model
+# loaded.
 before=$(cksum <run/pod/model.sdm)
 mse=$(csv mse_mm2 POD run)
 expect 0 - sdmgen experiment tiny.yaml --dry-run --out run
@@ -84,7 +86,7 @@ grep -q 'has another configuration and is replaced' err || bad "not said: $(cat 
 [ "$before" != "$(cksum <run/pod/model.sdm)" ] || bad 'the model has not changed'
 [ "$(grep -c 'sdmgen experiment' run/log.txt)" -eq 3 ] || bad "log: $(cat run/log.txt)"
 
-# a checkpoint is gone on from with the same budget alone: with another one the model would not be that of its configuration
+# A checkpoint is resumed only with the same budget: with another one the model would differ from one trained in a single run.
 stopped_at 'bases and' experiment tiny.yaml train.steps=1000000000 --out stopped --peers none
 grep -q 'the same command continues where it stopped' err || bad "not said: $(cat err)"
 present stopped/pod/checkpoint.sdmc stopped/table.md
@@ -96,13 +98,13 @@ sdmgen experiment tiny.yaml experiment.pictures=no --out stopped --peers none >o
 grep -q 'POD: the model or checkpoint in stopped/pod has another configuration and is replaced' err || bad "not said: $(cat err)"
 grep -q '"evaluate", "step": 20,' stopped/pod/metrics.jsonl || bad "not 20 steps: $(tail -n 1 stopped/pod/metrics.jsonl)"
 
-# an interrupt leaves the tables of the run before; --force trained anew what it reached, so without it the rest goes on
+# An interrupt keeps the tables of the previous run. --force trains again; a run without --force then resumes what the forced run began.
 tables=$(cksum stopped/table.*)
 stopped_at 'bases and' experiment tiny.yaml train.steps=1000000000 --out stopped --peers none --force
 grep -q 'the same command without --force continues where it stopped' err || bad "not said: $(cat err)"
 [ "$tables" = "$(cksum stopped/table.*)" ] || bad "tables of rows that were not done: $(cat stopped/table.md)"
 
-# a row that fails: its reason is in the table, the others are done, the exit code tells
+# A row that fails: the table states the reason, the other rows are done, the exit code is not 0.
 sed 's/^  - {name: naive.*/&\n  - {name: wrong, network: pod, set: {grid.centre: [900, 900, 900], train.steps: 20}}/' tiny.yaml >wrong.yaml
 sdmgen experiment wrong.yaml --out wrong --peers none --json >out 2>err
 code=$?
@@ -112,12 +114,12 @@ grep -q '^sdmgen: error: 1 of 5 rows failed; the first: .*no voxel of the grid i
 grep -q '^| wrong (failed) |' wrong/table.md || bad 'no row that failed'
 grep -q 'wrong: failed: .*no voxel of the grid is inside any' wrong/table.md || bad 'no reason in table.md'
 grep -q '^| exact engine | [0-9.]* |' wrong/table.md || bad 'the row behind it was not done'
-# no training beyond the budget
+# No training that exceeds the time budget of the experiment.
 sdmgen experiment tiny.yaml train.minutes=3 experiment.minutes=2 --out late --peers none --quiet >out 2>err
 [ $? -eq 4 ] || bad "over the budget: exit code"
 grep -q 'its training takes 3 (experiment.minutes)' late/table.csv || bad 'no reason in table.csv'
 
-# variants
+# Variants of the grid.
 cat >grids.yaml <<'END'
 shape: {name: ellipsoid, options: {edge: 1}}
 grid: {size: [8, 8, 8], spacing: 2}
@@ -131,7 +133,7 @@ grep -q '^| octree, coarse |' grids/table.md && grep -q '^| octree, fine |' grid
 grep -q '16 x 16 x 16 voxels of 1 mm' grids/table.csv || bad 'the grid of the variant is not used'
 absent grids/octree-coarse
 
-# mistakes
+# Mistakes in the configuration.
 printf 'shape: {name: ellipsoid}\ngrid: {size: [4, 4, 4], spacing: 1}\nmethods: [{name: A, engnie: exact}]\n' >bad.yaml
 expect 2 "^bad\.yaml:3:21: unknown key 'engnie'; did you mean 'engine'" sdmgen experiment bad.yaml
 printf 'shape: {name: ellipsoid}\ngrid: {size: [4, 4, 4], spacing: 1}\nmethods:\n  - {name: A, engine: exakt}\n' >engine.yaml
@@ -155,7 +157,7 @@ expect 2 'usage: sdmgen experiment' sdmgen experiment
 expect 1 'missing\.yaml' sdmgen experiment missing.yaml
 expect 2 'keys stands alone' sdmgen experiment tiny.yaml --keys
 
-# the shipped experiments can be done, and the documentation has every key
+# The shipped experiments are valid, and the documentation lists every key.
 for config in "$source_folder"/configs/*.yaml; do
     grep -q '^methods:' "$config" || continue
     expect 0 - sdmgen experiment "$config" --dry-run

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# sdmgen experiment with fits: every method on the same phantoms, the tables in all forms, a model from elsewhere, mistakes.
+# sdmgen experiment with fits: every method on the same phantoms, the tables in all formats, a model from another run, mistakes.
 # Tests: experiment_fit.c experiment_fit_table.c experiment_phantom.c
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive
 
-# fits FILE PHANTOMS PRIOR: an ellipsoid in images of 8 mm
+# fits FILE PHANTOMS PRIOR: writes an experiment that fits an ellipsoid in images of 8 mm.
 fits() {
     cat >"$1" <<END
 experiment: {title: fits, baseline: naive, reference: paper}
@@ -24,7 +24,7 @@ reference:
 END
 }
 
-# cell FILE ROW PARAMETER COLUMN of a table whose texts have no comma; PARAMETER - where the second column is none
+# cell FILE ROW PARAMETER COLUMN: a value of a CSV table whose texts have no comma. PARAMETER is - for tables without such a column.
 cell() {
     awk -F, -v row="\"$2\"" -v param="$3" -v name="$4" 'NR == 1 { for (i = 1; i <= NF; i++) if ($i == name) c = i }
         $1 == row && (param == "-" || $2 == param) { print $c }' "$1"
@@ -45,7 +45,7 @@ absent run/polished/model.sdm run/naive run/network/slices.png
 grep -q 'slices.png' run/table.md && bad 'table.md shows pictures that are not there'
 t=run/table.csv p=run/parameters.csv
 
-# all converge; who makes the maps; the parts of a mean are its fits
+# All fits converge; which engine makes the maps; mean times are those of the fits.
 for row in network polished exact; do
     [ "$(cell $t $row - fits)" = 2 ] && [ "$(cell $t $row - shapes)" = 2 ] || bad "$row: fits $(cell $t $row - fits)"
     holds "$(cell $t $row - dice) > 0.94 && $(cell $t $row - fit_s) > 0 && $(cell $t $row - speedup) > 1"
@@ -55,30 +55,30 @@ holds "$(cell $t network - maps_network) > 3 && $(cell $t network - maps_exact) 
 holds "$(cell $t polished - maps_network) == $(cell $t network - maps_network) && $(cell $t polished - maps_exact) > 0"
 holds "$(cell $t exact - maps_network) == 0 && $(cell $t exact - maps_exact) > 3"
 
-# the exact engine ends where the polished network does, the network alone near it, and all near the truth
+# The exact engine reaches the same estimate as the polished network, the network alone one nearby, and all are close to the truth.
 for name in rx ry rz; do
     polished=$(cell $p polished $name difference) network=$(cell $p network $name difference) error=$(cell $p exact $name error)
     holds "\"$polished\" != \"\" && $polished < 1e-4 && $network > 10 * $polished && $network < $error"
     holds "$error > 0 && $error < 0.15 && $(cell $p exact $name sd) > 0"
     [ -z "$(cell $p exact $name difference)" ] || bad 'the exact fit differs from itself'
-    # error and share once more, from the fits themselves
+    # Mean error and share within 3 sd, computed again from the fits.
     read -r mean within < <(awk -F, -v name=$name 'NR == 1 { for (i = 1; i <= NF; i++) if ($i == name) c = i; next }
         { d = $c - $(c - 1); if (d < 0) d = -d; sum += d; n++; in3 += d <= 3 * $(c + 1) } END { print sum / n, in3 / n }' run/network/fits.csv)
     near "$(cell $p network $name error)" "$mean" 1e-6
     near "$(cell $p network $name within_3sd)" "$within" 1e-9
 done
-# truths from the middle of the ranges, the same for all
+# True parameters from the middle of the ranges, the same for all methods.
 for row in polished exact; do
     [ "$(cut -d, -f1,7,11,15 run/$row/fits.csv)" = "$(cut -d, -f1,7,11,15 run/network/fits.csv)" ] || bad "$row has other phantoms"
 done
 awk -F, 'NR > 1 && ($7 < 3.56 || $7 > 4.04 || $11 < 2.52 || $11 > 2.88) { exit 1 }' run/exact/fits.csv || bad 'a truth outside of range: 0.6'
 
-# naive is stated: its maps times those of the exact fits; the speed-up refers to it
+# The time of the naive method is computed: its time per map times the number of maps of the exact fits. The speed-up refers to it.
 near "$(cell $t naive - fit_s)" "$(awk -v a="$(cell $t naive - ms)" -v b="$(cell $t exact - maps_exact)" 'BEGIN { print a * b / 1000 }')" 1e-3
 near "$(cell $t exact - speedup)" "$(awk -v a="$(cell $t naive - fit_s)" -v b="$(cell $t exact - fit_s)" 'BEGIN { print a / b }')" 0.01
 grep -q "naive: done: not run: the .* maps of a fit of 'exact'" run/table.md || bad 'not said that naive was not run'
 
-# the forms agree; figures of others stand beside
+# The formats agree; published values appear next to the measured ones.
 grep -q '^| polished | rz | mm |' run/table.md || bad 'no table of parameters'
 grep -q "\"name\": *\"rx\", *\"unit\": *\"mm\", *\"difference\": *$(cell $p network rx difference), *\"reference_difference\": *2e-08," run/table.json ||
     bad 'JSON and parameters.csv differ'
@@ -86,7 +86,7 @@ grep -q "\"name\": *\"rx\", *\"unit\": *\"mm\", *\"difference\": *$(cell $p netw
 [ "$(cell $t network - reference_fit_s)" = 3902.1 ] || bad 'fit_s of others'
 if command -v python3 >/dev/null; then python3 -m json.tool run/table.json >/dev/null || bad 'table.json is not JSON'; fi
 
-# again, with other threads: the network is loaded, everything but the times is the same
+# Again with other threads: the network is loaded, and everything but the times is the same.
 numbers() { cut -d, -f1,2,4- "$1"; }
 expect 0 - sdmgen experiment tiny.yaml --out run2 --quiet --threads 2 fit.model=run/network/model.sdm
 for row in network polished exact; do
@@ -97,26 +97,26 @@ absent run2/network/model.sdm
 expect 0 - sdmgen experiment tiny.yaml --dry-run fit.model=run/network/model.sdm
 has '^network +pod .*load, fit +phantoms 2 '
 
-# another configuration over the budget: the network is not trained, and polishing does not take the one of before
+# Another configuration that exceeds the budget: the network is not trained, and `polish` must not use the previous network.
 sdmgen experiment tiny.yaml network.width=8 train.minutes=3 experiment.minutes=2 fit.phantoms=1 --out run >out 2>err
 [ $? -eq 4 ] || bad "over the budget: exit code"
 grep -q '^| network (failed) |' run/table.md || bad 'trained over the budget'
 grep -q "polished: failed: the network of 'network', which it uses, is not available" run/table.md || bad "polished by another network: $(cat run/table.md)"
 ! grep -q 'is replaced' err || bad 'said to be replaced, but not trained'
 
-# a start far off: fits that fail are counted and told, not averaged
+# A start far from the truth: failed fits are counted and reported, not averaged.
 expect 0 - sdmgen experiment tiny.yaml --out far --quiet fit.off_mm=9 fit.phantoms=1 fit.model=run/network/model.sdm
 [ "$(cell far/table.csv exact - fits)" = 0 ] && [ -z "$(cell far/parameters.csv exact rx error)" ] || bad 'a failed fit was averaged'
 grep -q 'exact: done: .*the first failure: ' far/table.md || bad 'no reason of a failed fit'
 
-# models that do not fit
+# Models of another shape or range are refused.
 sed 's/rx: \[3.4, 4.2\]/rx: [3.3, 4.2]/' tiny.yaml >wider.yaml
 sdmgen experiment wider.yaml --out wider --quiet fit.model=run/network/model.sdm >out 2>err
 [ $? -eq 2 ] || bad 'a model of a smaller range: exit code'
 grep -q 'model.sdm was trained on rx = 3.4 .. 4.2, the experiment needs rx = 3.3 .. 4.2' wider/table.md || bad 'no reason: smaller range'
 grep -q '^| exact |' wider/table.md || bad 'the rows behind were not done'
 
-# mistakes, before anything is done
+# Mistakes are found before any work.
 wrong() { sed "$1" tiny.yaml >wrong.yaml; expect 2 "$2" sdmgen experiment wrong.yaml --out wrong; }
 wrong '/name: network/d;/^reference:/,$d' "wrong.yaml:9:5: method 'polished' with fit: polish needs one with fit: network before it"
 wrong 's/fit: exact/fit: exakt/' "wrong.yaml:11:24: fit: 'exakt' is not one of none, network, polish, exact, naive; did you mean 'exact'"

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# sdmgen fit: a phantom recovered, every kind of target and output, fits that must fail, mistakes.
-# Tests: cmd_fit.c crop.c fit_compare.c fit_files.c fit_json.c fit_labels.c fit_options.c fit_picture.c fit_report.c
-# fit_result.c fit_start.c fit_target.c progress_bar.c
+# sdmgen fit: a phantom is recovered, every kind of target and output, fits that must fail, mistakes.
+# Tests: cmd_fit.c crop.c fit_compare.c fit_files.c fit_json.c fit_labels.c fit_options.c fit_picture.c fit_report.c fit_result.c
+# fit_start.c fit_target.c progress_bar.c
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive
 
-# without the lines of progress that a busy machine has time for
+# Removes lines of progress from stderr; they appear only when the machine is slow.
 sdmgen() {
     "$program" "$@" 2>raw
     local code=$?
@@ -13,16 +13,16 @@ sdmgen() {
     return $code
 }
 
-# values FILE TYPE: all values of a .npy file, one a line
+# values FILE: all float32 values of a .npy file, one per line.
 values() { tail -c +129 "$1" | od -An -v -t f4 -w4 | tr -d ' '; }
-# is_json FILE: parses, where there is a python3 to say so
+# is_json FILE: fails unless Python's parser accepts it (skipped without python3).
 is_json() { ! command -v python3 >/dev/null || python3 -m json.tool "$1" >/dev/null || bad "$1 is not JSON: $(head -c 300 "$1")"; }
-# param NAME: the estimate of a parameter; spread NAME: its standard deviation
+# param NAME: the estimate of a parameter. spread NAME: its standard deviation.
 param() { sed -n "s/.*\"parameters\": {[^}]*\"$1\": \\([^,}]*\\).*/\\1/p" out; }
 spread() { sed -n "s/.*\"parameters_sd\": {[^}]*\"$1\": \\([^,}]*\\).*/\\1/p" out; }
-# within NAME TRUTH TIMES: it is within so many standard deviations of the truth
+# within NAME TRUTH TIMES: fails unless abs(estimate - TRUTH) <= TIMES * sd.
 within() { near "$(param "$1")" "$2" "$(awk -v s="$(spread "$1")" -v t="$3" 'BEGIN { print (s > 0 ? t * s : -1) }')"; }
-# pose KEY I: number I of an array of the pose
+# pose KEY I: element I (from 1) of the array KEY of the pose.
 pose() { sed -n "s/.*\"$1\": \\[\\([^]]*\\)\\].*/\\1/p" out | head -n 1 | tr -d ' ' | cut -d, -f"$2"; }
 
 shape='--shape ellipsoid -O edge=0.6'
@@ -32,9 +32,9 @@ turned='--rotation 0.1,-0.2,0.3 --translation 20,-30,10'
 near_truth='--rotation 0,0,0 --start-centre 20.3,-30.2,9.9 --spacing 0.35'
 expect 0 - sdmgen phantom $shape $truth $turned --spacing 0.4 -o ct.nii.gz --label label.nrrd --truth truth.json
 
-# the phantom is recovered, within the standard deviations, and every file can be read
+# The phantom is recovered within the standard deviations, and every file can be read.
 vdb=
-sdmgen exact $shape -o probe.vdb -q 2>err && vdb='-o fit.vdb' # else built without OpenVDB
+sdmgen exact $shape -o probe.vdb -q 2>err && vdb='-o fit.vdb' # fails in a build without OpenVDB
 expect 0 - sdmgen fit $fit --exact ct.nii.gz $near_truth --reference label.nrrd $vdb -o fit.stl -o fit.ply \
     -o fit.nii.gz -o fit.nrrd -o fit.npy -o fit.png -o fit.svg -o fit.pdf -o fit.json --label-out fitted.nrrd --json --threads 1
 cp out first.json
@@ -70,16 +70,16 @@ if [ -n "$vdb" ]; then
     has 'checkLevelSet passed'
     has 'sdm_source.*exact'
 fi
-# the map is 0 where the label begins: the label that was written is where the map is negative, and near the truth
+# The fitted map is negative exactly inside of the fitted label, which is close to the truth.
 inside=$(values fit.npy | awk '$1 < 0 { n++ } END { print n }')
 near "$inside" "$(sed -n 's/.*"inside_voxels": \([0-9]*\).*/\1/p' truth.json)" 40
 
-# the same bits for any number of threads; times and threads are all that differs
+# Any number of threads gives the same output, except for times and the number of threads.
 expect 0 - sdmgen fit $fit --exact ct.nii.gz $near_truth --reference label.nrrd --json --threads 2
 strip() { sed -E 's/"(seconds[a-z_]*|threads)": [^,}]*//g' "$1"; }
 [ "$(strip out)" = "$(strip first.json)" ] || bad 'two threads must give the same result'
 
-# for people
+# The report as text.
 expect 0 - sdmgen fit $fit ct.nii.gz $near_truth --reference label.nrrd
 has '^ellipsoid fitted to ct.nii.gz$'
 has 'rx +3\.[0-9]+ \+- 0\.0'
@@ -90,34 +90,34 @@ expect 0 - sdmgen fit $fit ct.nii.gz $near_truth --blur 0.3 --keep blur
 has 'point spread 0.3 mm'
 ! grep -q 'are coarse' out || bad 'maps of 0.35 mm are fine beside a point spread of 0.3 mm'
 
-# other starts: axis and turns, pairs of points, nothing at all; RAS coordinates
+# Other starts: axis and turns, pairs of points, none; RAS coordinates.
 expect 0 - sdmgen fit $fit ct.nii.gz --start-centre=-20,30,10 --start-axis=0.2,-0.1,1 --ras --turns 4 --spacing 0.5 --json
 within rx 3.5 4
 printf 'shape_x,shape_y,shape_z,x,y,z\n1,0,0,21,-30,10\n0,1,0,20,-29,10\n0,0,1,20,-30,11\n' >pairs.csv
 expect 0 - sdmgen fit $fit ct.nii.gz --start-points pairs.csv --spacing 0.5 --json
 within rx 3.5 4
-# a shape much smaller than its default, turned: the right turn is found although another one fits better as long as the size is wrong
+# A shape much smaller than the default, in a random pose: the right turn is found, although another one fits better while the size is still
+# wrong.
 expect 0 - sdmgen phantom --shape cochlea --random-params --random-pose 20,1 --spacing 0.3 --seed 111 -o small.nii --label small-label.nii --quiet
 expect 0 - sdmgen fit --shape cochlea small.nii --spacing 0.4 --start-centre 0.6,1,1.3 --start-axis 0,0,1 --eps 1e-3 --reference small-label.nii --json
 awk -v d="$(json dice)" 'BEGIN { exit !(d > 0.95) }' || bad "another turn was found: Dice $(json dice)"
 expect 0 'no start pose is given.*20.*-30.*10' sdmgen fit $fit ct.nii.gz --turns-sphere 3 --spacing 0.5 --json
 awk -v d="$(json evidence)" 'BEGIN { exit !(d > 0) }' || bad "evidence $(json evidence)"
 
-# what is kept is kept
-# a prior that leaves the image nothing to say, about the middle of the ranges
+# Unknowns that are kept do not change. First a prior so narrow that the image has no influence: estimates stay at the middle of the ranges.
 sdmgen fit $fit ct.nii.gz $near_truth --prior-sd 0.0001 --json >out 2>err
 has '"not_determined": \["rx", "ry", "rz"\]'
 expect 0 - sdmgen fit $fit $truth ct.nii.gz $turned --keep parameters --keep blur --blur 0.3 --spacing 0.5 --json
 [ "$(param rx)" = 3.5 ] && [ "$(json blur_mm)" = 0.3 ] || bad 'kept values changed'
 
-# labels, meshes, points: the middle is found by itself
+# Labels, meshes, points: the start position is found automatically.
 expect 0 - sdmgen fit $fit label.nrrd --label 1 --rotation 0,0,0 --spacing 0.5 -o label.png --json
 [ "$(json kind)" = labels ] || bad "kind $(json kind)"
 near "$(param rx)" 3.5 0.25
 near "$(pose translation_mm 2)" -30 0.1
 awk -v d="$(json dice)" 'BEGIN { exit !(d > 0.9) }' || bad "Dice with the labels $(json dice)"
 rx=$(param rx)
-# the same labels as two values, and as named segments
+# The same labels as two values, and as named segments.
 sdmgen phantom $shape $truth $turned --spacing 0.4 --label label.nii -q
 voxels=$(($(wc -c <label.nii) - 352))
 {
@@ -129,7 +129,7 @@ for labels in '--label 1 --label 77' '--label 77 --label 1'; do
 done
 expect 0 - sdmgen fit $fit two.nii --label 1 --label 2 --rotation 0,0,0 --spacing 0.5 --json
 near "$(param rx)" "$rx" 0.001
-# a wall of one voxel between two compartments: closed, they are one
+# A wall of one voxel between two compartments: closing joins them.
 plane=$(sed -n 's/.*"size": \[\([0-9]*\), \([0-9]*\),.*/\1 \2/p' truth.json | awk '{ print $1 * $2 }')
 middle=$((voxels / plane / 2))
 {
@@ -171,7 +171,7 @@ expect 0 - sdmgen fit $fit points.csv --rotation 0,0,0 -p rx=3.2 -p ry=3.2 --spa
 near "$(param rx)" 3 0.05
 near "$(param ry)" 3.5 0.05
 
-# fits that are not to be believed: exit code 4, one line, no files; what is known is shown and marked
+# Fits that fail: exit code 4, one line on stderr, no files; the partial result is shown and marked as failed.
 calm='--inside 1300,225 --outside 1300,225'
 expect 0 - sdmgen phantom $shape $truth $turned --spacing 0.5 --inside 7,0 --outside 7,0 --noise 0 -o constant.nii
 expect 4 'constant.nii: the image shows nothing: every voxel is 7' sdmgen fit $fit constant.nii $near_truth -o no.stl --json
@@ -191,17 +191,17 @@ present forced.json
 expect 0 'leaves the field of view' sdmgen phantom $shape $truth --spacing 0.4 --crop 0.65,0,0 -o cut.nii
 expect 4 'cut.nii: ' sdmgen fit $fit $truth cut.nii --rotation 0,0,0 --translation 0,0,0 --spacing 0.5 -o no.stl
 
-# the reference counts inside the field of view: that of half of the shape has no more voxels than the image sees
+# The reference label counts only inside of the field of view: half of the shape has no more voxels than the image shows.
 expect 0 'leaves the field of view' sdmgen phantom $shape $truth $turned --spacing 0.4 --crop 0.3,0,0 -o part.nii --label part.nrrd --json
 seen=$(json inside_voxels)
 expect 0 - sdmgen fit $fit part.nii $near_truth --reference label.nii --reference-label 1 --json
 near "$(json voxels_reference)" "$seen" 5
 awk -v d="$(json dice)" -v s="$(json inside_share)" 'BEGIN { exit !(d > 0.9 && s < 0.85) }' || bad "Dice $(json dice), $(json inside_share) in the image"
 
-# voxels that are no numbers: some are left out and said so, all of them or infinite ones are bad input
+# NaN voxels: some are left out, which is reported; an image of NaN only, or with infinite values, is bad input.
 expect 0 - sdmgen phantom $shape $truth $turned --spacing 0.4 --type float32 -o float.nii
 voxels=$(($(wc -c <float.nii) / 4 - 88))
-words() { for ((i = 0; i < $2; i++)); do printf "$1"; done; } # little endian floats
+words() { for ((i = 0; i < $2; i++)); do printf "$1"; done; } # little-endian floats
 {
     head -c 352 float.nii
     words '\0\0\300\177' 50
@@ -220,7 +220,7 @@ expect 3 "none.nii: all $voxels voxels of the image are NaN" sdmgen fit $fit non
 } >infinite.nii
 expect 3 'infinite.nii: ' sdmgen fit $fit infinite.nii $near_truth -o no.stl
 
-# bad input
+# Bad input.
 head -c 500 float.nii >short.nii
 expect 3 'short.nii' sdmgen fit $fit short.nii $near_truth -o no.stl
 expect 3 "label.nrrd: no voxel has the label '7'" sdmgen fit $fit label.nrrd --label 7 -o no.stl
@@ -236,7 +236,7 @@ printf 'shape_x,shape_y,shape_z,x,y,z\n0,0,0,1,1,1\n0,0,0,2,2,2\n' >same.csv
 expect 3 'same.csv: ' sdmgen fit $fit ct.nii.gz --start-points same.csv -o no.stl
 expect 1 'nowhere.nii' sdmgen fit $fit nowhere.nii -o no.stl
 
-# mistakes are named, before any work
+# Mistakes are named before any work.
 expect 2 'usage: sdmgen fit MODEL IMAGE' sdmgen fit
 expect 2 'a MODEL and an IMAGE are needed' sdmgen fit ct.nii.gz -o no.stl
 expect 2 'either MODEL or --shape' sdmgen fit $fit model.sdm ct.nii.gz -o no.stl

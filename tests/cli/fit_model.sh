@@ -1,34 +1,34 @@
 #!/usr/bin/env bash
-# sdmgen fit with a trained model: network, exact maps of the same shape, polish, ranges, an interrupt.
+# sdmgen fit with a trained model: network, exact maps of the same shape, polishing, ranges, an interrupt.
 # Tests: fit_source.c
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive
 model=../files-of-train/run/model.sdm
 present $model
 
-# without the lines of progress that a busy machine has time for
+# Removes lines of progress from stderr; they appear only when the machine is slow.
 sdmgen() {
     "$program" "$@" 2>raw
     local code=$?
     grep -Ev '^sdmgen: (search|fit|polish) [0-9]+ %' raw >&2
     return $code
 }
-# pose KEY I: number I of an array of the pose
+# pose KEY I: element I (from 1) of the array KEY of the pose.
 pose() { sed -n "s/.*\"$1\": \\[\\([^]]*\\)\\].*/\\1/p" out | head -n 1 | tr -d ' ' | cut -d, -f"$2"; }
 
-# the small network is good enough for the pose alone
+# The small network is accurate enough to fit the pose alone.
 expect 0 - sdmgen phantom --shape cochlea -O edge=0.5 --spacing 0.5 --rotation 0,0,0.1 --translation 2,0,1 -o ct.nii
 start='--rotation 0,0,0 --start-centre 2.3,0.3,2'
 expect 0 - sdmgen fit $model ct.nii $start --keep parameters -o fit.nrrd -o fit.ply -o fit.json --json
 [ "$(json trusted)" = true ] || bad "not trusted: $(cat out)"
 [ "$(json maps_network)" -gt 0 ] && [ "$(json maps_exact)" = 0 ] || bad 'maps must be the network'"'"'s'
-[ "$(json a)" = 0 ] || bad 'the sd of a parameter that is kept must be 0' # of parameters_sd, the last of that name
+[ "$(json a)" = 0 ] || bad 'the sd of a parameter that is kept must be 0' # json prints parameters_sd, the last key of that name
 near "$(pose translation_mm 1)" 2 0.3
 near "$(pose translation_mm 3)" 1 0.3
 present fit.nrrd fit.ply fit.json
 sdmgen info fit.nrrd | grep -Eq 'network: cochlea' || bad 'the file must say that the network made the map'
 
-# exact maps of the model's shape on its grid, and the same by way of the network
+# Exact maps of the model's shape on its grid, and the same fit started with the network.
 expect 0 - sdmgen fit $model ct.nii $start --keep parameters --exact -o exact.nrrd --json
 [ "$(json maps_network)" = 0 ] && [ "$(json maps_exact)" -gt 0 ] || bad 'maps must be exact'
 for i in 1 2 3; do exact[i]=$(pose translation_mm $i); done
@@ -39,14 +39,14 @@ for file in exact polished; do
     sdmgen info $file.nrrd | grep -Eq 'exact: cochlea' || bad "$file.nrrd must be an exact map"
 done
 
-# ranges: the network's, or the shape's
+# Ranges: the network's, or the shape's.
 expect 5 'a = 5.5, allowed 2 .. 5' sdmgen fit $model ct.nii $start -p a=5.5 -o no.nrrd
-sdmgen fit $model ct.nii $start -p a=5.5 --keep parameters --policy clamp --json >out 2>err # a poor fit, but begun
+sdmgen fit $model ct.nii $start -p a=5.5 --keep parameters --policy clamp --json >out 2>err # may fail, but must pass the check of ranges
 [ "$(json start_clamped)" = true ] || bad 'a start that was moved must be marked'
 grep -q 'the start parameters were clamped to their range' err || bad "no notice of the start: $(cat err)"
 expect 5 "'a' of shape 'cochlea' is 50 mm, need 2 .. 5" sdmgen fit $model ct.nii $start -p a=50 --policy exact -o no.nrrd
 
-# an interrupt, nothing written
+# An interrupt: no file is written.
 "$program" fit $model ct.nii --turns-sphere 4096 --start-centre 2,0,2 -o no.nrrd -o no.json --quiet >out 2>err &
 job=$!
 sleep 3
@@ -56,7 +56,7 @@ code=$?
 [ $code -eq 130 ] || bad "exit code $code instead of 130 after an interrupt: $(cat err)"
 [ ! -s out ] || bad 'an interrupted fit has no result'
 
-# mistakes
+# Mistakes in arguments.
 expect 2 'spacing applies to exact maps' sdmgen fit $model ct.nii $start --spacing 0.3
 expect 2 'O belongs to --shape' sdmgen fit $model ct.nii $start -O edge=0.5
 expect 1 'nowhere.sdm' sdmgen fit nowhere.sdm ct.nii $start -o no.nrrd

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# sdmgen info and verify on images: our own, files made here, and what is not read.
+# sdmgen info and verify on images: files of the program, files assembled here, and files that are refused.
 # Tests: cmd_info.c cmd_verify.c report_image.c
 . "$(dirname "$0")/common.sh"
 
-# a tetrahedron whose faces meet at the origin at right angles
+# A tetrahedron with three faces that meet at right angles at the origin.
 printf 'OFF\n4 4 0\n0 0 0\n2 0 0\n0 2 0\n0 0 2\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n' >t.off
 expect 0 - sdmgen exact --mesh t.off --size '9,10,11' --spacing 0.5 --origin '-2,-2.25,-2.5' --quiet \
     -o m.nii -o m.nii.gz -o m.nrrd -o m.mha --json
@@ -25,7 +25,7 @@ has 'the checksum of the compressed data is right'
 expect 0 - sdmgen verify m.mha --json
 [ "$(json ok)" = true ] && [ "$(json checksum)" = false ] || bad "$(cat out)"
 
-# a segmentation of two layers, its axis first, in RAS
+# A segmentation with two layers whose axis comes first, in RAS.
 {
     printf 'NRRD0005\ntype: uchar\ndimension: 4\nspace: RAS\nsizes: 2 1 2 1\nspace directions: none (1,0,0) (0,2,0) (0,0,3)\n'
     printf 'encoding: raw\nspace origin: (5,6,7)\nSegment0_ID:=a\nSegment0_Name:=first\nSegment1_ID:=b\nSegment1_Name:=second\n\n\001\002\003\004'
@@ -36,7 +36,7 @@ has '^origin +-5 -6 7 '
 has "'second' \(b\): value 1 in layer 1"
 has '^values +1 \.\. 4$'
 
-# damaged, not read, not there
+# Damaged, unsupported and missing files.
 head -c 300 m.nii.gz >cut.nii.gz
 expect 3 'cut\.nii\.gz: the compressed data are cut off' sdmgen info cut.nii.gz
 expect 3 'cut\.nii\.gz' sdmgen verify cut.nii.gz --json

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# sdmgen exact --method: every method through the program, with every kind of output; bounds and notices.
+# sdmgen exact --method: every method with every type of output; error bounds and notices.
 # Tests: method_table.c
 . "$(dirname "$0")/common.sh"
 
 floats() { od -An -v -t f4 -w4 -j "$2" "$1" | tr -d ' '; }
 
-# coarse triangles for the naive method's sake; far enough out for the octree to interpolate
+# Coarse triangles keep the naive method fast; the grid reaches far enough for the octree to interpolate.
 grid=(-O edge=1 --size '60,60,30' --spacing '0.25,0.25,0.2')
 voxels=$((60 * 60 * 30))
 values() { floats "$1" $(($(wc -c <"$1") - voxels * 4)); }
@@ -36,14 +36,14 @@ done
 cmp -s exact.npy edt.npy && bad 'edt gives the exact map: is the method used?'
 cmp -s exact.npy octree.npy && bad 'octree gives the exact map: is the method used?'
 
-# the approximate ones say so, in one line
+# Approximate methods report their error in one line.
 expect 0 '^sdmgen: method edt is approximate: the distance is off by at most [0-9.]+ mm \(distance to [0-9]+ points' \
     sdmgen exact --shape torus "${grid[@]}" --method edt -o e.nrrd
 expect 0 '^sdmgen: method octree is approximate: the distance is off by at most 0\.01 mm \([0-9]+ exact samples for [0-9]+ voxels' \
     sdmgen exact --shape torus "${grid[@]}" --method octree -o o.nrrd
 expect 0 - sdmgen exact --shape torus "${grid[@]}" --method cells -o c.nrrd
 
-# the error allowed of octree, and what made the map in the files
+# --tolerance of the octree; files name the method that made the map.
 expect 0 'off by at most 0\.002 mm' sdmgen exact --shape torus "${grid[@]}" --method octree --tolerance 0.002 -o o.nrrd --json
 near "$(json error_bound_mm)" 0.002 1e-9
 expect 2 'tolerance belongs to --method octree, not edt' sdmgen exact --shape torus --method edt --tolerance 0.1 -o x.npy
@@ -53,13 +53,13 @@ expect 2 'certify belongs to --method exact, not edt' sdmgen exact --shape torus
 grep -aq ': octree: torus' o.nrrd || bad 'o.nrrd does not name octree'
 grep -aq ': exact: torus' o.nrrd && bad 'o.nrrd calls the map of octree exact'
 
-# every type of output
+# Every type of output.
 for method in naive cells octree edt; do
     expect 0 - sdmgen exact --shape torus "${grid[@]}" --method $method --quiet -o $method.nii.gz -o $method.mha -o $method.ply -o $method.png
     present $method.nii.gz $method.mha $method.ply $method.png
 done
 
-# mistakes
+# Mistakes in arguments.
 expect 2 "^sdmgen: error: --method 'fast': need one of exact\|naive\|cells\|octree\|edt" sdmgen exact --shape torus --method fast -o x.npy
 expect 2 'no line of voxel centres of the 4 x 4 x 4 grid' \
     sdmgen exact --shape torus --size 4,4,4 --spacing 1 --origin 500,500,500 --method edt --quiet -o x.npy

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# generate, info, eval, verify on a trained model: outputs, parameters, tables of parameters, damaged files.
+# sdmgen generate, info, eval and verify on a trained model: outputs, parameters, tables of parameters, damaged files.
 # Tests: cmd_eval.c cmd_generate.c cmd_info.c cmd_verify.c evaluate.c evaluate_time.c param_rows.c
 . "$(dirname "$0")/common.sh"
 model=../files-of-train/run/model.sdm
@@ -11,7 +11,7 @@ has '^parameters +a +2 \.\. 5 mm'
 expect 0 - sdmgen info $model --json
 for key in checksum train_seconds rmse_mm q99_mm weight_bytes; do [ -n "$(json $key)" ] || bad "info: no $key"; done
 
-# outputs
+# Types of output.
 expect 0 - sdmgen generate $model -p a=4.2 -p alpha=0.6 -o m.nii -o m.nii.gz -o m.nrrd -o m.mha -o m.npy -o m.ply -o m.png -o m.svg -o m.pdf --json
 present m.nii m.nii.gz m.nrrd m.mha m.npy m.ply m.png m.svg m.pdf
 near "$(json a)" 4.2 0
@@ -36,7 +36,7 @@ if sdmgen generate $model -o m.vdb --quiet 2>err; then
     [ $wrong -ge 2 ] || bad "flipped bits in a .vdb: only $wrong of 3 found"
 fi
 
-# parameters: named, in range, or by policy; never answered in silence
+# Parameters: given by name, in range or treated by the chosen policy, and always reported.
 expect 5 'a.*(7|range)' sdmgen generate $model -p a=7 -o x.npy
 expect 5 'nan' sdmgen generate $model -p a=nan -o x.npy
 expect 5 'inf' sdmgen generate $model -p a=1e999 --policy clamp -o x.npy
@@ -50,11 +50,11 @@ expect 1 'missing\.sdm' sdmgen generate missing.sdm -o x.npy
 absent x.npy x.txt nowhere
 expect 0 'clamped to it' sdmgen generate $model -p a=7 --policy clamp -o c.npy --json
 near "$(json clamped)" 1 0
-near "$(json a)" 5 0 # of the map, not what was asked for
+near "$(json a)" 5 0 # the clamped value, not the requested one
 expect 0 - sdmgen generate $model -p a=5 -o five.npy
 cmp -s c.npy five.npy || bad 'clamped differs from the end of the range'
 
-# tables: one output a row, all rows checked first
+# Tables of parameters: one output for each row; all rows are checked first.
 printf 'alpha, a\n0.5, 3\n# a comment\n\n0.7,4.5\n' >rows.csv
 expect 0 - sdmgen generate $model --params rows.csv -p b=0.1 -o 'row%02d.npy' -o s.nii.gz --json
 present row01.npy row02.npy s-0001.nii.gz s-0002.nii.gz
@@ -65,7 +65,7 @@ printf 'alpha,a\n0.5,3\n0.7,9\n' >range.csv
 expect 5 'range\.csv: row 2: .*a.* 9' sdmgen generate $model --params range.csv -o 'x%d.npy'
 printf 'alpha,aa\n' >header.csv
 
-# all or nothing for every policy; names that differ in nothing are refused; a byte order mark is skipped
+# All or nothing with every policy; names of columns must differ; a byte order mark is skipped.
 printf 'a\n3\nnan\n' >nan.csv
 expect 5 'nan\.csv: row 2: ' sdmgen generate $model --params nan.csv --policy clamp -o 'n%d.npy'
 absent n1.npy n2.npy
@@ -74,7 +74,7 @@ absent same1.npy
 printf '\357\273\277a,b\r\n3,0.1\r\n' >bom.csv
 expect 0 - sdmgen generate $model --params bom.csv -o 'bom%d.npy' --quiet
 
-# a limit on the size of files is an error of writing, and nothing is left
+# A limit on the file size makes writing fail: an error, and no file is left.
 expect 1 'limited\.npy: cannot write' bash -c "ulimit -f 4; '$program' generate $model -o limited.npy"
 absent limited.npy
 
@@ -87,7 +87,7 @@ printf '' >empty.csv
 expect 3 "empty\.csv: no header line: the first line must name the columns, such as 'a'" sdmgen generate $model --params empty.csv -o x.npy
 absent x1.npy x2.npy x-0001.npy
 
-# measuring
+# sdmgen eval.
 expect 0 - sdmgen eval $model --samples 3 --naive 1 --json --quiet --pictures pictures
 for key in mse_mm2 rmse_mm mae_mm max_abs_mm rmse_near_mm dice surface_mean_mm surface_hausdorff_mm ms_network ms_exact ms_naive \
     threads samples; do
@@ -112,7 +112,7 @@ code=$?
 [ $code -eq 0 ] || [ $code -eq 4 ] || bad "verify: exit code $code: $(cat err)"
 has 'every checksum is right'
 
-# damaged models are never used
+# Damaged models are always refused.
 size=$(wc -c <$model)
 for length in 0 1 7 8 40 200 $((size / 2)) $((size - 1)); do
     head -c "$length" $model >cut.sdm

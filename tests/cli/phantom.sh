@@ -3,9 +3,9 @@
 # Tests: cmd_phantom.c phantom_setup.c phantom_truth.c
 . "$(dirname "$0")/common.sh"
 
-# values FILE TYPE: all values of a .npy file, one a line
+# values FILE: all float32 values of a .npy file, one per line.
 values() { tail -c +129 "$1" | od -An -v -t f4 -w4 | tr -d ' '; }
-# is_json FILE: parses, where there is a python3 to say so
+# is_json FILE: fails unless Python's parser accepts it (skipped without python3).
 is_json() { ! command -v python3 >/dev/null || python3 -m json.tool "$1" >/dev/null || bad "$1 is not JSON: $(head -c 300 "$1")"; }
 small='--shape ellipsoid --spacing 0.5'
 
@@ -18,7 +18,7 @@ cmp -s out truth.json || bad 'stdout and --truth must agree'
 [ "$(json rx)" = 3 ] || bad "rx is $(json rx)"
 [ "$(json cut)" = false ] || bad 'the grid must hold the shape'
 inside=$(json inside_voxels)
-near "$inside" 603 40 # 4/3 pi 3 3 2 / 0.5^3
+near "$inside" 603 40 # volume 4/3 pi 3 3 2 over a voxel's 0.5^3
 has '"rotation_rad": \[0, 0, 0\], "translation_mm": \[0, 0, 0\]'
 for file in ct.nii ct.nii.gz ct.nrrd ct.mha; do
     expect 0 - sdmgen info $file
@@ -27,7 +27,7 @@ done
 expect 0 - sdmgen info label.nrrd
 has 'uint8'
 
-# without texture and noise the image is known: 40 in the middle, 1300 at the corner
+# Without texture and noise the image is known: 40 at the centre, 1300 in the corner.
 quiet_tissue='--inside 40,0 --outside 1300,0 --noise 0'
 expect 0 - sdmgen phantom $small --size 21,21,21 $quiet_tissue -o flat.npy
 near "$(values flat.npy | sed -n 4631p)" 40 0.01
@@ -36,16 +36,16 @@ expect 0 - sdmgen phantom $small --size 21,21,21 --inside 7,0 --outside 7,0 --no
 values noise.npy | awk '{ n++; s += $1; q += ($1 - 7) ^ 2 } END { m = s / n - 7; v = sqrt(q / n); exit !(m < 3 && m > -3 && v > 48 && v < 52) }' ||
     bad 'white noise of 50 HU'
 
-# the same seed gives the same bits, whatever the threads; another one does not
+# The same seed gives the same bits for any number of threads; another seed gives other bits.
 expect 0 - sdmgen phantom $small -p rx=3 --threads 1 -o one.npy
 cmp -s one.npy ct.npy || bad 'one thread must give the same image'
 expect 0 - sdmgen phantom $small -p rx=3 --seed 2 -o two.npy
 ! cmp -s two.npy ct.npy || bad 'another seed must give another image'
 
-# the pose: rotation and translation put the shape where they say, in a turned image
+# The pose: rotation and translation move the shape as specified, also in a rotated image.
 expect 0 'leaves the field of view' sdmgen phantom $small $quiet_tissue --rotation 0,0,1.5707963267948966 --translation 100,0,0 \
     --size 21,3,3 --origin 95,-0.5,-0.5 -o turned.npy
-# along x there are 3 mm of ry to each side of 100: 12 voxels, two of them halves
+# Along x the rotated ellipsoid extends 3 mm (ry) to both sides of 100: 12 voxels, two of them halves.
 values turned.npy | sed -n '85,105p' | awk '{ s += (1300 - $1) / 1260 } END { exit !(s > 11.5 && s < 12.5) }' || bad 'the turned ellipsoid'
 expect 0 - sdmgen phantom $small --frame 0,0,0.5 --json
 has '"direction": \[0\.87758256[0-9]*, -0\.4794255[0-9]*, 0, 0\.4794255'
@@ -58,7 +58,8 @@ cmp -s out random.json || bad 'the same seed must give the same truth'
 awk -F'[][,]' '{ for (i = 1; i <= NF; i++) if ($i ~ /rotation_rad/) { a = $(i + 1) ^ 2 + $(i + 2) ^ 2 + $(i + 3) ^ 2; exit !(a > 0 && a < 0.1746 ^ 2) } exit 1 }' out ||
     bad 'a turn of at most 10 degrees'
 
-# a field of view that cuts the shape: of 21 voxels along x from -5 on as many as are below 2 mm; moved when the size is given
+# A field of view that cuts the shape: 21 voxels along x from -5 mm, of which --crop keeps those below 2 mm. With a given size it is shifted
+# instead.
 expect 0 'leaves the field of view' sdmgen phantom $small --crop 0.25,0,0 --json
 [ "$(json cut)" = true ] || bad 'the shape must be cut'
 has '"size": \[14, '
@@ -72,7 +73,7 @@ expect 0 - sdmgen phantom $small --outside 40000,0 --type float32 -o unclipped.n
 expect 0 - sdmgen info unclipped.nii
 has 'float32'
 
-# mistakes are named, before any file is made
+# Mistakes are named before any file is made.
 expect 2 'shape NAME is needed' sdmgen phantom -o x.nii
 expect 2 'an output is needed' sdmgen phantom $small
 expect 2 "output 'x.vdb': its name must end in .nii .nii.gz .nrrd .mha .npy" sdmgen phantom $small -o x.vdb
@@ -95,7 +96,7 @@ expect 2 "type 'float': need one of int16\|float32" sdmgen phantom $small -o x.n
 expect 5 'rx.* 9' sdmgen phantom $small -p rx=9 -o x.nii --label l.nii --truth t.json
 expect 5 'rx.* nan' sdmgen phantom $small -p rx=nan -o x.nii
 expect 2 "did you mean 'ellipsoid'" sdmgen phantom --shape elipsoid -o x.nii
-# a long work is stopped when asked to
+# Work of long duration stops on SIGTERM.
 expect 130 'stopped on request|interrupted' timeout --preserve-status -s TERM 1 "$program" phantom --shape ellipsoid --spacing 0.03 --supersample 16 -o x.nii
 absent x.nii x.vdb x.npy x.txt l.nii t.json nowhere
 finish

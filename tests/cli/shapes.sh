@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# sdmgen shapes and sdmgen mesh.
+# sdmgen shapes and sdmgen mesh: lists, meshes for given parameters, mistakes, files that are no plug-ins.
 # Tests: cmd_mesh.c cmd_shapes.c report_audit.c setup.c
 . "$(dirname "$0")/common.sh"
 
@@ -9,7 +9,7 @@ expect 0 - sdmgen shapes --json
 has '"name": "cochlea".*"name": "alpha", "unit": "mm", "min": 0, "max": 1\.2'
 expect 0 - sdmgen shapes cochlea
 for name in a alpha b phi; do has "^  $name +(mm|rad)? +-?[0-9]"; done
-has 'their options are the defaults$' # the whole text, however long
+has 'their options are the defaults$' # long texts are not cut
 has '^its parameters depend on its options'
 expect 0 - sdmgen shapes cochlea --json
 has '"options": \['
@@ -30,7 +30,7 @@ for file in t.ply t.stl t.obj t.off; do
     near "$(json volume_mm3)" "$volume" 1e-3
 done
 
-# parameters change the mesh; mistakes are named
+# Parameters change the mesh; mistakes are named.
 expect 0 - sdmgen mesh --shape cochlea -p a=3 -p phi=-0.2 --json
 small=$(json volume_mm3)
 expect 0 - sdmgen mesh --shape cochlea -p a=5 -p phi=-0.2 --json
@@ -50,7 +50,7 @@ expect 2 "is given twice" sdmgen mesh --shape torus -o x.ply -o x.ply
 expect 1 'nowhere' sdmgen mesh --shape torus -o nowhere/x.ply
 absent x.ply x.vdb nowhere
 
-# plug-ins that are none
+# Files that are no plug-ins.
 echo 'not a library' >false.so
 expect 3 'false\.so' sdmgen shapes --plugin ./false.so
 expect 3 'missing\.so' sdmgen shapes --plugin ./missing.so

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# sdmgen train: a run folder, its protection, interrupt and resume. The tests of models use the run made here.
+# sdmgen train: the run folder and its protection, interrupt and resume. The tests of models use the run made here.
 # Tests: cmd_train.c train_progress.c
 . "$(dirname "$0")/common.sh"
 tiny=$source_folder/tests/cli/tiny.yaml
 
-# interrupted FOLDER CONFIG [key=value ...]: a training that is stopped when it has made steps
+# interrupted FOLDER CONFIG [KEY=VALUE ...]: starts a training and stops it after its first steps.
 interrupted() {
     local folder=$1 pid code
     shift
@@ -25,21 +25,21 @@ present run/config.yaml run/metrics.jsonl run/model.sdm run/loss.png run/slices.
 [ "$(json model)" = run/model.sdm ] || bad "model: $(json model)"
 awk -v s="$(json seconds)" -v m="$(json mse_mm2)" 'BEGIN { exit !(s > 0 && m > 0 && m < 1) }' || bad "seconds, mse_mm2: $(cat out)"
 
-# a finished run is safe
+# A finished run is not overwritten.
 before=$(cksum <run/model.sdm)
 expect 2 'run holds a trained model and no checkpoint to continue from' sdmgen train "$tiny" --out run
 expect 2 'run holds a trained model and no checkpoint to continue from' sdmgen train "$tiny" --out run --resume
 expect 2 'exclude each other' sdmgen train "$tiny" --out run --resume --force
 [ "$before" = "$(cksum <run/model.sdm)" ] || bad 'the model has changed'
 
-# pictures that cannot be written do not cost the network
+# Pictures that cannot be written do not make the training fail.
 mkdir -p unpictured/loss.png unpictured/slices.png
 sdmgen train "$tiny" --out unpictured >out 2>err || bad "without pictures: $(cat err)"
 [ "$(grep -c '/\(loss\|slices\).png: cannot write' err)" -eq 2 ] || bad "no word about the pictures: $(cat err)"
 present unpictured/model.sdm
 absent unpictured/checkpoint.sdmc
 
-# an open mesh of a new shape is told before the training, and one without blemish is not
+# An open mesh is reported before the training, a closed one is not.
 faces=$(sed -n 's/^element face //p;/^end_header/q' "$source_folder/configs/statistical/mean.ply")
 sed "s/^element face $faces$/element face $((faces - 1))/" "$source_folder/configs/statistical/mean.ply" | head -n -1 >open.ply
 for mean in "$PWD/open.ply" "$source_folder/configs/statistical/mean.ply"; do
@@ -50,7 +50,7 @@ done
 grep -q '^sdmgen: the mesh is open: 3 boundary edges' err-open.ply || bad "no word of the open mesh: $(cat err-open.ply)"
 grep -q 'the mesh' err-mean.ply && bad "a word of a closed mesh: $(cat err-mean.ply)"
 
-# --force replaces a run when nothing of the new one can be refused any more, and no sooner
+# --force replaces a run only after the new one has passed all checks.
 before=$(cat run/* | cksum)
 expect 2 "range \[0, 100\] of 'a'" sdmgen train "$tiny" --force --out run 'shape.ranges.a=[0,100]' --quiet
 expect 2 'data.memory_gb' sdmgen train "$tiny" --force --out run data.memory_gb=0.001 'grid.size=[60,60,60]' --quiet
@@ -58,14 +58,14 @@ expect 2 'data.memory_gb is .* a coarser grid' sdmgen train "$tiny" --force --ou
 expect 2 'no voxel of the grid is inside any' sdmgen train "$tiny" --force --out run 'grid.centre=[900,0,0]' --quiet
 [ "$before" = "$(cat run/* | cksum)" ] || bad 'a refused --force has changed the run'
 
-# neither the folder's name nor that of the file is part of the result
+# The result depends neither on the name of the folder nor on that of the file.
 cp "$tiny" other.yaml
 expect 0 - sdmgen train other.yaml --out other --quiet
 cmp -s run/model.sdm other/model.sdm || bad 'the bits of a model depend on the name of its folder'
 cmp -s run/config.yaml other/config.yaml || bad 'config.yaml depends on the name of its folder'
 expect 0 - sdmgen config run/config.yaml
 
-# ./run asks before it replaces a model of another configuration
+# The script ./run asks before it replaces a model of another configuration.
 mkdir -p clone/.ci clone/configs clone/build/release/cli clone/runs
 cp "$source_folder/run" clone
 sed "s/width: 16/width: 24/" "$tiny" >clone/configs/cochlea.yaml
@@ -75,7 +75,7 @@ cp -r run clone/runs/cochlea
 expect 1 '^runs/cochlea holds a training with another configuration' bash clone/run
 cmp -s run/model.sdm clone/runs/cochlea/model.sdm || bad './run has replaced a model'
 
-# an interrupt leaves a checkpoint, --resume goes on; the name of the folder need not be UTF-8
+# An interrupt leaves a checkpoint, and --resume continues. The folder's name need not be UTF-8.
 stopped=$'st\xf6pped'
 interrupted "$stopped" "$tiny"
 grep -q '^sdmgen: error: stopped on request at step [0-9]*; a checkpoint is in st.*pped: go on with --resume' err || bad "no such notice: $(cat err)"
@@ -86,7 +86,7 @@ before=$(cat "$stopped"/* | cksum)
 expect 2 "^sdmgen: error: st.*pped/checkpoint.sdmc has 'width: 16', this configuration 'width: 24': " \
     sdmgen train "$tiny" train.steps=1000000000 --out "$stopped" --resume network.width=24
 expect 2 'budgets of different kinds' sdmgen train "$tiny" --out "$stopped" --resume train.minutes=1
-# ... with a larger or smaller budget, but not one of less steps than were trained
+# ... with a larger or smaller number of steps, but not below the steps already trained.
 expect 2 'is at step [0-9]+, this configuration ends at 60: ' sdmgen train "$tiny" --out "$stopped" --resume
 [ "$before" = "$(cat "$stopped"/* | cksum)" ] || bad 'a refused --resume has changed the run'
 steps=$(($(sed 's/.* is at step \([0-9]*\).*/\1/' err) + 20))
@@ -98,7 +98,7 @@ present "$stopped/model.sdm"
 absent "$stopped/checkpoint.sdmc"
 expect 0 - sdmgen info "$stopped/model.sdm"
 
-# data files: found from every folder, never others in their place, also after the run has moved with them
+# Data files are found from every working folder, are never replaced by others, and are found after the project has moved.
 mkdir -p project/conf elsewhere
 cp -r "$source_folder"/configs/statistical* project/conf
 small=(grid.size=[16,12,12] grid.spacing=0.8 data.static=2 data.start=96 data.online=32 data.holdout=8
@@ -114,7 +114,7 @@ absent never/config.yaml
 rm -r never $'m\xf6ved'
 deviations=moved/conf/statistical/deviations.npy
 cp $deviations kept.npy
-{ head -c 128 kept.npy && tail -c 32 kept.npy && tail -c 64 kept.npy | head -c 32; } >$deviations # 5 to 8, 1 to 4
+{ head -c 128 kept.npy && tail -c 32 kept.npy && tail -c 64 kept.npy | head -c 32; } >$deviations # swap the halves: values 5 to 8, then 1 to 4
 expect 2 'the maps differ from those it was written with' "${run[@]}" train.steps=$steps
 cp kept.npy $deviations
 expect 0 - "${run[@]}" train.steps=$steps
@@ -138,7 +138,7 @@ has "^  exact engine +not measured: data file 'deviations' .*: cannot open"
 expect 0 - sdmgen bench network ../moved/data/model.sdm --json
 [ "$(json ms_exact)" = null ] || bad "bench: a time without the exact shape: $(json ms_exact)"
 has '"no_exact": "data file .deviations. .*cannot open'
-# beside the model, but not beside the user
+# The file is next to the model, but not in the working folder.
 cp ../kept.npy deviations.npy
 expect 1 'cannot open' sdmgen verify ../moved/data/model.sdm
 cp ../kept.npy ../moved/data/deviations.npy
@@ -147,11 +147,11 @@ cp ../moved/data/model.sdm .
 expect 0 - sdmgen verify model.sdm --samples 2
 cd ..
 
-# a grid that misses the shape gives no network
+# A grid that misses the shape gives no network.
 expect 2 'no voxel of the grid is inside any' sdmgen train "$tiny" 'grid.origin=[900,900,900]' --out missed --quiet
 absent missed/model.sdm
 
-# mistakes
+# Mistakes in arguments.
 expect 2 '^argument .network.dpth=4.: ' sdmgen train "$tiny" network.dpth=4 --out never
 expect 1 'missing.yaml' sdmgen train missing.yaml --out never
 touch file

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The command line itself: help, unknown words, bad values, texts made from the table of options.
+# The command line itself: help, unknown words, bad values, texts generated from the table of options.
 # Tests: cmd_help.c command_line.c help.c main.c option_table.c terminal.c
 . "$(dirname "$0")/common.sh"
 
@@ -17,7 +17,7 @@ for command in train generate exact mesh eval shapes info verify config bench ex
     expect 2 "^sdmgen: error: $command: unknown option --nonsense; see sdmgen $command --help" sdmgen $command --nonsense
 done
 
-# mistakes: exit code 2 and what was meant
+# Mistakes: exit code 2 and a suggestion.
 expect 2 '^sdmgen: error: a command is needed' sdmgen
 expect 2 "unknown command 'trian'; did you mean 'train'\?" sdmgen trian
 expect 2 "unknown command 'xyzzy'; see sdmgen --help" sdmgen xyzzy
@@ -39,10 +39,10 @@ expect 2 "sign 'auto\|crossings': need one of auto\|crossings" sdmgen exact --sh
 expect 2 'quiet=1: --quiet takes no value' sdmgen shapes --quiet=1
 expect 2 'threads: empty value' sdmgen shapes --threads=
 
-# results that cannot be written are a failure
+# An error while writing to standard output gives exit code 1.
 expect 1 'cannot write to standard output' bash -c '"$0" shapes >/dev/full' "$program"
 
-# texts from the table
+# Texts generated from the table of options.
 expect 0 - sdmgen help --completion
 cp out completion.bash
 expect 0 - bash -n completion.bash
@@ -54,7 +54,7 @@ expect 0 - sdmgen help --man
 has '^\.TH SDMGEN 1'
 has '^\.B "\\-\\-keep\\-overlap"$'
 
-# the reference in the documentation is this text
+# The reference in the documentation equals the generated text.
 expect 0 - sdmgen help --markdown
 cp out reference.md
 sed -n '/^<!-- begin: sdmgen help --markdown -->$/,/^<!-- end -->$/p' "$source_folder/docs/command-line.md" | sed '1d;$d' >documented.md

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The runtime as WebAssembly: built, installed, used by examples/wasm in Node.js, compared with the same program of this machine (third
-# argument). Skipped where a tool is missing.
+# The runtime as WebAssembly: built, installed, used by examples/wasm in Node.js and compared with the same program built for this machine
+# (third argument). Skipped if a tool is missing.
 baseline=$3
 . "$(dirname "$0")/common.sh"
 
@@ -17,7 +17,7 @@ printf '#include <math.h>\n#include <stdio.h>\nint main(int n, char **a) { retur
 here=$PWD
 { (cd "$source_folder" && cmake --preset wasm -B "$here/build") && cmake --build build --parallel 2 &&
     cmake --install build --prefix "$here/prefix"; } >log 2>&1 || bad "build: $(tail -n 5 log)"
-# the command that the page shows, in folders of this test
+# The command shown in examples/wasm/README.md, with folders of this test.
 line=$(grep '^cmake -S examples/wasm -B build/map ' "$source_folder/examples/wasm/README.md")
 line=${line/build\/map/'"$here/example"'}
 line=${line/'$PWD/build/wasm/prefix'/'$here/prefix'}
@@ -28,7 +28,7 @@ present example/map.wasm
 
 map() { node --no-warnings "$source_folder/examples/wasm/run.mjs" example/map.wasm "$@"; }
 
-# far_apart A B: the largest difference of two maps in mm
+# far_apart A B: the largest difference of two maps in mm.
 far_apart() {
     paste <(od -An -v -j128 -w4 -tf4 "$1") <(od -An -v -j128 -w4 -tf4 "$2") |
         awk 'NF != 2 { bad = 1 } { d = $1 - $2; if (d < 0) d = -d; if (!(d <= max)) max = d } END { print bad || !NR ? "" : max + 0 }'
@@ -36,13 +36,13 @@ far_apart() {
 
 expect 0 - sdmgen train "$source_folder/tests/cli/tiny.yaml" shape.name=ellipsoid "shape.ranges.rx=[2, 4]" --out run --quiet
 model=run/model.sdm
-# the network: neither program contracts products and sums, so the bits are the same
+# The network: neither program fuses multiply and add, so the bits are the same.
 expect 0 - "$baseline" $model native.npy rx=2.6 rz=3.1
 expect 0 - map $model wasm.npy rx=2.6 rz=3.1
 has '^ellipsoid by the network: 16 x 14 x 12 voxels in [0-9.]+ ms$'
 present wasm.npy
 cmp native.npy wasm.npy || bad "another map by the network, $(far_apart native.npy wasm.npy) mm away"
-# outside of its range the exact engine: sine and cosine of another C library may end in another bit
+# Outside of the network's range the exact engine: sine and cosine of another C library may differ in the last bit.
 expect 0 - "$baseline" $model native.npy rx=4.6
 expect 0 - map $model wasm.npy rx=4.6
 has '^ellipsoid by the exact engine: '

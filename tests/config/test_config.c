@@ -1,5 +1,5 @@
-/* Configuration: values, defaults, overrides, rules between keys, and the exact wording of
- * mistakes.
+/* Configuration: values, defaults, overrides, rules between keys, and the exact wording of the
+ * messages about mistakes.
  * Tests: config.c fields.c kinds.c mistakes.c schema.c special.c yaml_tree.c */
 #include <locale.h>
 #include <setjmp.h>
@@ -101,7 +101,7 @@ static void test_values(void **state)
     assert_int_equal(config.shape.n_ranges, 2);
     assert_true(config.shape.ranges[0].min == 2 && config.shape.ranges[0].max == 5);
     assert_true(config.shape.ranges[1].min == -0.5 && config.shape.ranges[1].max == 0.25);
-    // the middle of the box is half a box from the first voxel's centre
+    // The centre of the grid lies (n - 1) / 2 spacings from the centre of the first voxel.
     assert_true(config.grid.origin[0] == 0.5 && config.grid.origin[1] == -3.5 &&
                 config.grid.origin[2] == 6);
     assert_true(config.grid.spacing[2] == 2 && config.grid.n[2] == 5);
@@ -118,7 +118,7 @@ static void test_values(void **state)
     assert_string_equal(config.output.folder, "2024/r\xC3\xBCn");
     assert_true(config.seed == UINT64_MAX && config.threads == 2);
 
-    // a section whose keys are all commented out, an explicit origin, no static grid
+    // A section with only commented-out keys, an explicit origin, and no static grid.
     expect_ok("shape: {name: b}\nnetwork:\n  # depth: 3\ngrid: {size: [1, 1, 1], spacing: 1, "
               "origin: [7, 8, 9]}\n"
               "train: {minutes: 0.5}\ndata: {static: 0}\n",
@@ -147,7 +147,7 @@ static void test_overrides(void **state)
     assert_string_equal(sdm_config_where(&config, (sdm_mark){0}, where), "x.yaml");
     assert_int_equal(config.shape.n_options, 2);
 
-    // options merge, an option given twice is replaced
+    // Options of file and override are merged; an override replaces an option of the same name.
     expect_ok(
         "shape: {name: b, options: {edge: 1, side: left}}\ngrid: {size: [4, 5, 6], spacing: 1}\n"
         "train: {steps: 10}\n",
@@ -155,7 +155,8 @@ static void test_overrides(void **state)
     assert_int_equal(config.shape.n_options, 2);
     assert_string_equal(config.shape.options[0].value, "2");
 
-    // a budget replaces the others, the last one stays; so do origin and centre
+    // An override of one budget (steps, minutes, samples) removes the others, and the last override
+    // wins. The same holds for origin and centre.
     assert_int_equal(parse(BASE, BUDGET, 2), SDM_OK);
     assert_true(config.train.minutes == 0 && config.train.steps == 0 && config.train.samples == 64);
     assert_int_equal(parse(BASE, BUDGET, 1), SDM_OK);
@@ -165,12 +166,12 @@ static void test_overrides(void **state)
     assert_int_equal(parse(BASE, PLACE, 2), SDM_OK);
     assert_true(config.grid.origin[0] == -1.5);
 
-    // what is missing in the file may come from an override
+    // A required key that the file lacks may come from an override.
     expect_ok("grid: {size: [4, 5, 6], spacing: 1}\ntrain: {steps: 10}\n", "shape.name=ball");
 }
 
-// network.kind decides about keys and defaults
-static void test_kinds(void **state)
+// network.kind decides which keys are allowed and their defaults.
+static void test_kind_selects_keys_and_defaults(void **state)
 {
     (void)state;
     expect_ok(BASE "network: {kind: deepsdf}\n", NULL);
@@ -195,8 +196,8 @@ static void test_kinds(void **state)
     assert_true(config.network.dropout == 0.1 && config.train.batch == 8 &&
                 config.train.learning_rate == 1e-3);
 
-    // another kind by an override: keys of the file that it does not have step back, the others
-    // stay
+    // An override of the kind: keys of the file that the new kind does not have are ignored, the
+    // others still apply.
     static const char pod[] =
         BASE "network: {kind: pod, depth: 2, rank: 7, weights: f32}\ndata: {online: 9}\n";
     static const char *const to_deepsdf[] = {"network.kind=deepsdf", "network.width=64"};
@@ -215,7 +216,8 @@ static void test_kinds(void **state)
     assert_int_equal(parse(pod, there_and_back, 2), SDM_OK);
     assert_int_equal(config.network.rank, 7);
 
-    // bytes are for pod: from the file they step back, too
+    // weights: i8 is for pod only: ignored in the file when the kind is overridden, but a mistake
+    // in an override.
     static const char bytes[] = BASE "network: {weights: i8}\n";
     expect_ok(bytes, "network.kind=sdmnn");
     assert_int_equal(config.network.weights, SDM_WEIGHT_F16);
@@ -311,7 +313,7 @@ static void test_mistakes(void **state)
     }
 }
 
-static void test_rules(void **state)
+static void test_rules_between_keys(void **state)
 {
     static const char NAME_GRID[] = "shape: {name: b}\ngrid: {size: [4, 5, 6], spacing: 1}\n";
     char text[1024];
@@ -391,13 +393,13 @@ static void test_override_mistakes(void **state)
         expect_mistake(BASE, CASES[i].override, CASES[i].message);
 }
 
-static void test_many_mistakes(void **state)
+static void test_mistakes_are_sorted_and_counted(void **state)
 {
     static const char *const LATE[] = {"network.depth=99", "network.width=1"};
     char text[4096] = BASE, line[64];
     (void)state;
-    // ordered by position though the kinds are found in another order, the arguments last, 20 and
-    // then a count
+    // Messages are sorted by position although the checks find them in another order; those on
+    // arguments come last. At most 20 are listed, then a count of the rest.
     for (int i = 0; i < 30; i++) {
         snprintf(line, sizeof line, "unknown%c%d: 3\n", 'a' + i % 26, i);
         strcat(text, line);
@@ -414,7 +416,7 @@ static void test_many_mistakes(void **state)
     assert_non_null(strstr(err.text, "x.yaml:23:1: unknown key"));
     assert_non_null(strstr(err.text, "\n... and 12 more"));
 
-    // three different mistakes and one in an argument: four lines
+    // Three mistakes in the file and one in an argument give four lines.
     assert_int_equal(
         parse("shape: {nam: b}\ngrid: {size: [4, 5], spacing: 1}\ntrain: {steps: x}\n", LATE, 1),
         SDM_E_CONFIG);
@@ -425,8 +427,8 @@ static void test_many_mistakes(void **state)
                         "x.yaml:3:16: train.steps: needs an integer, got 'x'\n"
                         "argument 'network.depth=99': network.depth: 99 is out of range (0 .. 16)");
 
-    // long values are cut, and long file names do not push a line over the end: whole lines, then
-    // the count
+    // Long values are cut, and long file names cannot cut a message: only whole lines, then the
+    // count of the rest.
     char name[SDM_PATH_TEXT_MAX], value[101];
     memset(name, 'n', sizeof name - 1);
     name[sizeof name - 1] = 0;
@@ -442,20 +444,20 @@ static void test_many_mistakes(void **state)
     assert_memory_equal(err.text, line_1, strlen(line_1));
     assert_string_equal(strstr(err.text, "\n... and "), "\n... and 2 more");
     for (size_t n = 600; n <= sizeof name; n++) {
-        // wherever the buffer ends, the count is whole
+        // The count of the rest is complete wherever the buffer ends.
         size_t more = 0;
         int end = 0;
         assert_int_equal(
             sdm_config_parse(name + sizeof name - n, text, strlen(text), NULL, 0, &config, &err),
             SDM_E_CONFIG);
         const char *tail = strrchr(err.text, '\n');
-        if (tail[1] != '.') continue; // all of them fit
+        if (tail[1] != '.') continue; // all messages fit, so there is no count
         assert_int_equal(sscanf(tail, " ... and %zu more%n", &more, &end), 1);
         assert_true(end > 0 && tail[end] == 0 && more >= 1);
     }
 }
 
-static void test_folder_from_name(void **state)
+static void test_folder_is_derived_from_name(void **state)
 {
     static const char *const NAMES[][2] = {{"a/b/cochlea.yaml", "runs/cochlea"},
                                            {"my.exp.yml", "runs/my.exp"},
@@ -473,8 +475,9 @@ static void test_folder_from_name(void **state)
     }
 }
 
-/* Two configurations of one network, and one of another. */
-static void test_strip(void **state)
+/* The text stored in a model: two files that differ only in threads, workers and output folder
+ * give the same text, another seed gives another. */
+static void test_stored_text_has_no_machine_keys(void **state)
 {
     static const char *const NAMES[] = {"here.yaml", "there/too.yaml", "here.yaml"};
     static const char *const LINES[] = {
@@ -496,13 +499,14 @@ static void test_strip(void **state)
     for (int i = 0; i < 3; i++) sdm_text_dispose(&dump[i]);
 }
 
-static void test_locale(void **state)
+static void test_locale_does_not_matter(void **state)
 {
     static const char *const COMMA[] = {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8", "de_DE"};
     (void)state;
     for (size_t i = 0; i < 4; i++)
         if (setlocale(LC_ALL, COMMA[i])) break;
-    // with or without such a locale on this machine: a point is a point, a comma is none
+    // Whether or not this machine has a locale with decimal commas: numbers are read with a point,
+    // never with a comma.
     expect_ok(BASE "data: {static_share: 0.25}\n", NULL);
     assert_true(config.data.static_share == 0.25);
     expect_mistake(BASE "data: {static_share: \"0,25\"}\n", NULL,
@@ -510,7 +514,7 @@ static void test_locale(void **state)
     setlocale(LC_ALL, "C");
 }
 
-static void test_misuse(void **state)
+static void test_wrong_arguments_are_refused(void **state)
 {
     static const char *const NOTHING[] = {NULL};
     char name[SDM_PATH_TEXT_MAX + 1];
@@ -532,8 +536,8 @@ static void test_misuse(void **state)
     assert_int_equal(sdm_config_read(".", NULL, 0, &config, &err), SDM_E_IO);
 }
 
-/* Every allocation that fails is reported as such. */
-static void test_short_memory(void **state)
+/* Each allocation fails once, which must give SDM_E_NOMEM. */
+static void test_each_allocation_may_fail(void **state)
 {
     static const char *const LIST[] = {"network.depth=4"};
     (void)state;
@@ -555,16 +559,16 @@ int main(void)
         cmocka_unit_test(test_defaults),
         cmocka_unit_test(test_values),
         cmocka_unit_test(test_overrides),
-        cmocka_unit_test(test_kinds),
+        cmocka_unit_test(test_kind_selects_keys_and_defaults),
         cmocka_unit_test(test_mistakes),
-        cmocka_unit_test(test_rules),
+        cmocka_unit_test(test_rules_between_keys),
         cmocka_unit_test(test_override_mistakes),
-        cmocka_unit_test(test_many_mistakes),
-        cmocka_unit_test(test_folder_from_name),
-        cmocka_unit_test(test_strip),
-        cmocka_unit_test(test_locale),
-        cmocka_unit_test(test_misuse),
-        cmocka_unit_test(test_short_memory),
+        cmocka_unit_test(test_mistakes_are_sorted_and_counted),
+        cmocka_unit_test(test_folder_is_derived_from_name),
+        cmocka_unit_test(test_stored_text_has_no_machine_keys),
+        cmocka_unit_test(test_locale_does_not_matter),
+        cmocka_unit_test(test_wrong_arguments_are_refused),
+        cmocka_unit_test(test_each_allocation_may_fail),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

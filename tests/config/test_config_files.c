@@ -1,4 +1,5 @@
-/* Configuration: the shipped files are valid, and the documentation is what the tables say.
+/* Configuration: the shipped files are valid, and the documentation lists exactly the keys of the
+ * program.
  * Tests: config_describe.c */
 #include <glob.h>
 #include <setjmp.h>
@@ -27,7 +28,7 @@ static char *read_source(const char *name)
     return (char *)data;
 }
 
-/* The text between the lines `begin` and `end`, cut out in place. */
+/* Returns the text between the lines `begin` and `end`; ends it in place with a zero byte. */
 static char *between(char *text, const char *begin, const char *end)
 {
     char *from = strstr(text, begin), *to = from ? strstr(from + strlen(begin), end) : NULL;
@@ -43,7 +44,8 @@ static void test_documented_keys(void **state)
     (void)state;
     sdm_config_describe(true, &table);
     assert_false(table.failed);
-    // put the output of `sdmgen config --keys --markdown` between the two marks when this fails
+    // When this fails, replace the text between the two marks by the output of `sdmgen config
+    // --keys --markdown`.
     assert_string_equal(between(page, "<!-- keys: begin -->\n", "<!-- keys: end -->"), table.data);
     sdm_text_dispose(&table);
     sdm_free(page);
@@ -60,9 +62,9 @@ static void test_documented_example(void **state)
     sdm_free(page);
 }
 
-/* Both forms of the table: one line a key under the head, the columns of the plain one at fixed
- * places. */
-static void test_two_forms(void **state)
+/* The table of keys as plain text and as Markdown: one line for each key below the head; the
+ * plain form has aligned columns. */
+static void test_plain_and_markdown_tables(void **state)
 {
     sdm_text plain = {0}, table = {0};
     size_t keys = 0, column = 0;
@@ -84,7 +86,7 @@ static void test_two_forms(void **state)
     sdm_text_dispose(&table);
 }
 
-/* The file that serves as a template has every key, in force or as a comment. */
+/* configs/cochlea.yaml, the template for users, has every key, active or commented out. */
 static void test_complete_template(void **state)
 {
     sdm_text table = {0};
@@ -114,7 +116,7 @@ static void test_shipped_files(void **state)
         char *text = read_source(found.gl_pathv[i] + strlen(SDM_SOURCE_FOLDER) + 1);
         const bool is_experiment = strstr(text, "\nmethods:") != NULL;
         sdm_free(text);
-        if (is_experiment) continue; /* test_experiment */
+        if (is_experiment) continue; /* read by test_experiment */
         if (sdm_config_read(found.gl_pathv[i], NULL, 0, &config, &err)) fail_msg("%s", err.text);
         assert_memory_equal(config.output.folder, "runs/", 5);
     }
@@ -125,8 +127,10 @@ static void test_shipped_files(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_documented_keys), cmocka_unit_test(test_documented_example),
-        cmocka_unit_test(test_two_forms),       cmocka_unit_test(test_complete_template),
+        cmocka_unit_test(test_documented_keys),
+        cmocka_unit_test(test_documented_example),
+        cmocka_unit_test(test_plain_and_markdown_tables),
+        cmocka_unit_test(test_complete_template),
         cmocka_unit_test(test_shipped_files),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,4 +1,5 @@
-/* Configuration: the strict subset of YAML, its limits, and dump -> read on random configurations.
+/* Configuration: the strict subset of YAML, its limits, and random configurations that survive
+ * writing and reading.
  * Tests: yaml_tree.c */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -74,27 +75,27 @@ static void test_strict_yaml(void **state)
         assert_int_equal(parse(CASES[i].text, strlen(CASES[i].text)), SDM_E_CONFIG);
         assert_string_equal(err.text, CASES[i].message);
     }
-    // a NUL byte in the file is a control character, not its end
+    // A NUL byte is refused as a control character; it does not end the text.
     assert_int_equal(parse("seed: 3\n\0# x\n", 12), SDM_E_CONFIG);
     assert_string_equal(err.text, "x.yaml:2:1: control character U+0000; remove it");
 }
 
-static void test_limits(void **state)
+static void test_size_depth_and_count_limits(void **state)
 {
     const size_t limit = (size_t)1 << 20;
     char *text = malloc(limit + 1);
     (void)state;
     assert_non_null(text);
 
-    // size: a comment up to exactly the limit is fine, one byte more is not
+    // Size: a file of exactly the limit is read, one byte more is refused.
     memset(text, '#', limit + 1);
     memcpy(text, BASE, strlen(BASE));
     assert_int_equal(parse(text, limit), SDM_OK);
     assert_int_equal(parse(text, limit + 1), SDM_E_CONFIG);
     assert_string_equal(err.text, "x.yaml:1:1: 1048577 bytes, more than the allowed 1048576");
 
-    // nesting: 32 is read (and is no list of counts), 33 is refused at its place; so is a megabyte
-    // of brackets
+    // Nesting: depth 32 is parsed (and then refused as a value of `data`), depth 33 is refused at
+    // its position, and so is a megabyte of brackets.
     char deep[128];
     snprintf(deep, sizeof deep, "%s%.31s1%.31s", "data: ", "[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[",
              "]]]]]]]]]]]]]]]]]]]]]]]]]]]]]]]");
@@ -108,7 +109,7 @@ static void test_limits(void **state)
     assert_int_equal(parse(text, limit), SDM_E_CONFIG);
     assert_string_equal(err.text, "x.yaml:1:33: nesting deeper than 32");
 
-    // number of values
+    // Number of values.
     for (size_t i = 0; i < limit; i += 2) memcpy(text + i, i ? "a," : " [", 2);
     assert_int_equal(parse(text, limit), SDM_E_CONFIG);
     assert_string_equal(err.text,
@@ -116,8 +117,9 @@ static void test_limits(void **state)
     free(text);
 }
 
-/* A config may be cut anywhere: an error with a text or a smaller config, never a crash. */
-static void test_truncated(void **state)
+/* A configuration cut at any byte gives an error with a message or a smaller configuration,
+ * never a crash. */
+static void test_truncated_text_is_safe(void **state)
 {
     static const char TEXT[] =
         "shape:\n  name: \"b\\u00e4\"\n  options: {a: 'it''s', b: |\n    x\n  }\n"
@@ -136,7 +138,7 @@ static int64_t random_int(int64_t low, int64_t high)
     return low + (int64_t)sdm_rng_below(7, 1, counter++, (uint64_t)(high - low) + 1);
 }
 
-/* All magnitudes between low and high, both ends included. */
+/* A random number in [low, high]: often one of the ends, else uniform or concentrated near low. */
 static double random_real(double low, double high)
 {
     const double u = sdm_rng_uniform(7, 2, counter++);
@@ -184,7 +186,7 @@ static void random_shape(sdm_config *c)
     }
 }
 
-// keys that the kind does not have keep their defaults
+// Keys that the kind of network does not have keep their defaults.
 static void random_network(sdm_config *c)
 {
     const sdm_network_kind kind = (sdm_network_kind)random_int(0, 3);
@@ -245,7 +247,7 @@ static void random_config(sdm_config *c)
     c->threads = (int)random_int(0, 1024);
 }
 
-/* Everything but the name of the file and the places. */
+/* Compares everything but the name of the file and the positions in it. */
 static void expect_equal(const sdm_config *a, const sdm_config *b)
 {
     assert_string_equal(a->shape.name, b->shape.name);
@@ -260,7 +262,7 @@ static void expect_equal(const sdm_config *a, const sdm_config *b)
         assert_memory_equal(&a->shape.ranges[i].min, &b->shape.ranges[i].min, sizeof(double));
         assert_memory_equal(&a->shape.ranges[i].max, &b->shape.ranges[i].max, sizeof(double));
     }
-    // both were zeroed as a whole, so padding is equal too
+    // Both were zeroed before, so memcmp may include padding.
     assert_memory_equal(&a->grid, &b->grid, sizeof a->grid);
     assert_memory_equal(&a->network, &b->network, sizeof a->network);
     assert_memory_equal(&a->data, &b->data, sizeof a->data);
@@ -269,7 +271,7 @@ static void expect_equal(const sdm_config *a, const sdm_config *b)
     assert_true(a->seed == b->seed && a->threads == b->threads);
 }
 
-static void test_round_trip(void **state)
+static void test_written_config_reads_back(void **state)
 {
     (void)state;
     for (int i = 0; i < 300; i++) {
@@ -288,9 +290,9 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_strict_yaml),
-        cmocka_unit_test(test_limits),
-        cmocka_unit_test(test_truncated),
-        cmocka_unit_test(test_round_trip),
+        cmocka_unit_test(test_size_depth_and_count_limits),
+        cmocka_unit_test(test_truncated_text_is_safe),
+        cmocka_unit_test(test_written_config_reads_back),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,5 @@
 /* Configuration of an experiment: rows, variants, the training configuration of each row,
- * references, and every mistake with its place.
+ * references to published figures, and every mistake with its position.
  * Tests: experiment.c experiment_rows.c experiment_schema.c overrides.c */
 #include <math.h>
 #include <setjmp.h>
@@ -71,7 +71,8 @@ static void test_defaults(void **state)
     assert_null(e->rows[0].reference);
 }
 
-/* Later ones win: the experiment's own keys, the method's, the variant's, the command line's. */
+/* Precedence, lowest first: the experiment's own keys, the method's, the variant's, the command
+ * line's. */
 static void test_order_of_keys(void **state)
 {
     const char *text = "shape: {name: ball, options: {edge: 0.5, file: 'a, b'}}\ngrid: {size: [4, "
@@ -116,8 +117,8 @@ static void test_order_of_keys(void **state)
     assert_int_equal(config.seed, 6);
 }
 
-/* An engine needs no budget; one that is there is no mistake. */
-static void test_engines_alone(void **state)
+/* A row without training needs no training budget, but may have one. */
+static void test_engines_need_no_budget(void **state)
 {
     (void)state;
     expect_ok("shape: {name: ball}\ngrid: {size: [4, 5, 6], spacing: 1}\nmethods: [{name: B, "
@@ -130,7 +131,7 @@ static void test_engines_alone(void **state)
                    "train.samples must be positive");
 }
 
-static void test_references(void **state)
+static void test_references_are_read(void **state)
 {
     const char *text =
         SHAPE METHODS "reference:\n  - {row: B, ms: 200, mse_mm2: 6e-3, source: 'table 1'}\n";
@@ -154,8 +155,9 @@ static void test_references(void **state)
                    "dir/x.yaml:7:13: reference: missing key 'row'");
 }
 
-/* Rows of fits: what the keys stand for, whose network is polished, in every variant. */
-static void test_fits(void **state)
+/* Methods with `fit`: values of their keys, and which network a `polish` row uses, in each
+ * variant. */
+static void test_fit_rows(void **state)
 {
     const char *text = SHAPE "fit: {phantoms: 3, off_deg: 5}\nmethods:\n"
                              "  - {name: N, network: pod, fit: network, set: {train.batch: 4}}\n"
@@ -190,8 +192,9 @@ static void test_fits(void **state)
     assert_int_equal(e->rows[1].network_row, 1);
 }
 
-/* A model of the file is meant from its folder, one of the command line from the working folder. */
-static void test_model_of_fits(void **state)
+/* fit.model is relative to the folder of the file; on the command line it is relative to the
+ * working folder. */
+static void test_path_of_fit_model(void **state)
 {
     const char *text =
         SHAPE "fit: {model: m.sdm}\nmethods: [{name: N, network: pod, fit: network}]\n";
@@ -224,7 +227,8 @@ static void test_mistakes_of_fits(void **state)
                    "dir/x.yaml:7:38: difference: -1 is out of range (0 .. 1000000000000)");
 }
 
-/* Every figure of the table can be given as a reference, under the key it has in the results. */
+/* Each column of the result table can have a reference value, under the key that it has in the
+ * results. */
 static void test_figures_have_keys(void **state)
 {
     char text[600];
@@ -285,7 +289,7 @@ static void test_mistakes_of_the_experiment(void **state)
                    "dir/x.yaml:7:1: unknown key 'output'");
 }
 
-/* Mistakes in keys of the training: at their own place, not at that of the row. */
+/* A mistake in a training key of a row is reported at the key, not at the start of the row. */
 static void test_mistakes_of_the_training(void **state)
 {
     (void)state;
@@ -311,7 +315,7 @@ static void test_mistakes_of_the_training(void **state)
     assert_memory_equal(err.text, "dir/x.yaml:4:11: network.kind: 'pood' is not one of pod", 52);
 }
 
-static void test_base(void **state)
+static void test_base_file_is_merged(void **state)
 {
     FILE *f = fopen("test_experiment_base.yaml", "w");
     (void)state;
@@ -352,8 +356,8 @@ static void test_shipped_files(void **state)
     }
 }
 
-/* A failed allocation is an error, and nothing is leaked (a sanitizer looks). */
-static void test_memory(void **state)
+/* Each allocation fails once: an error, and no leak (detected by the sanitizer build). */
+static void test_each_allocation_may_fail(void **state)
 {
     sdm_status s = SDM_E_NOMEM;
     (void)state;
@@ -371,7 +375,7 @@ static void test_memory(void **state)
     assert_int_equal(s, SDM_OK);
 }
 
-static void test_misuse(void **state)
+static void test_wrong_arguments_are_refused(void **state)
 {
     (void)state;
     sdm_experiment *out = NULL;
@@ -393,18 +397,18 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_defaults),
         cmocka_unit_test(test_order_of_keys),
-        cmocka_unit_test(test_engines_alone),
-        cmocka_unit_test(test_references),
-        cmocka_unit_test(test_fits),
-        cmocka_unit_test(test_model_of_fits),
+        cmocka_unit_test(test_engines_need_no_budget),
+        cmocka_unit_test(test_references_are_read),
+        cmocka_unit_test(test_fit_rows),
+        cmocka_unit_test(test_path_of_fit_model),
         cmocka_unit_test(test_mistakes_of_fits),
         cmocka_unit_test(test_figures_have_keys),
         cmocka_unit_test(test_mistakes_of_the_experiment),
         cmocka_unit_test(test_mistakes_of_the_training),
-        cmocka_unit_test(test_base),
+        cmocka_unit_test(test_base_file_is_merged),
         cmocka_unit_test(test_shipped_files),
-        cmocka_unit_test(test_memory),
-        cmocka_unit_test(test_misuse),
+        cmocka_unit_test(test_each_allocation_may_fail),
+        cmocka_unit_test(test_wrong_arguments_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, free_last);
 }

@@ -1,4 +1,5 @@
-/* Core: status, memory, random numbers, checksums, files, text, grids.
+/* The core library: status and error texts, memory, random numbers, checksums, files, text,
+ * threads, grids.
  * Tests: checksum.c file.c grid.c json.c memory.c rng.c status.c text.c threads.c */
 #include <limits.h>
 #include <math.h>
@@ -22,7 +23,7 @@
 #include "sdm/internal/text.h"
 #include "sdm/internal/threads.h"
 
-static void status_text(void **state)
+static void errors_have_text_and_prefix(void **state)
 {
     (void)state;
     sdm_error e;
@@ -31,7 +32,7 @@ static void status_text(void **state)
     assert_int_equal(sdm_fail_in(&e, SDM_E_IO, "file %s", "a"), SDM_E_IO);
     assert_string_equal(e.text, "file a: radius 3");
     assert_int_equal(sdm_fail(NULL, SDM_E_ARG, "unheard"), SDM_E_ARG);
-    // text that does not fit is cut, also with a prefix
+    // Text that does not fit is cut, also when a prefix is added.
     memset(e.text, 'x', sizeof e.text - 1);
     e.text[sizeof e.text - 1] = '\0';
     sdm_fail_in(&e, SDM_E_IO, "prefix");
@@ -41,7 +42,7 @@ static void status_text(void **state)
         assert_string_not_equal(sdm_status_name((sdm_status)s), "unknown");
 }
 
-static void memory_limits(void **state)
+static void allocation_errors_are_reported(void **state)
 {
     (void)state;
     sdm_error e;
@@ -74,17 +75,17 @@ static void memory_limits(void **state)
     assert_true(v[2] == 7 && v[99] == 0);
     sdm_alloc_fail_after(1);
     assert_int_equal(sdm_grow((void **)&v, 100, 200, sizeof *v, "v", &e), SDM_E_NOMEM);
-    assert_true(v[2] == 7); // still the caller's
+    assert_true(v[2] == 7); // the old array is still valid
     sdm_alloc_fail_after(0);
     sdm_free(v);
 }
 
-// vectors of the authors' known-answer tests for Philox4x32-10
+// Known answers for Philox4x32-10, published by its authors (Salmon et al. 2011).
 static void philox_known_answers(void **state)
 {
     (void)state;
-    assert_true(sdm_mix64(0x9e3779b97f4a7c15u) ==
-                0xe220a8397b1dcdafu); // SplitMix64's first number of seed 0
+    // First number of SplitMix64 for seed 0.
+    assert_true(sdm_mix64(0x9e3779b97f4a7c15u) == 0xe220a8397b1dcdafu);
     uint32_t r[4];
     sdm_rng_block(0, 0, 0, r);
     const uint32_t zeros[4] = {0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8};
@@ -94,7 +95,7 @@ static void philox_known_answers(void **state)
     assert_memory_equal(r, ones, sizeof r);
 }
 
-static void random_laws(void **state)
+static void random_numbers_have_their_distribution(void **state)
 {
     (void)state;
     const int n = 20000;
@@ -106,7 +107,7 @@ static void random_laws(void **state)
         sum += u, square += u * u, normal += z, normal2 += z * z;
         below[sdm_rng_below(5, 3, (uint64_t)i, 7)]++;
     }
-    // five standard errors
+    // Each bound is five standard errors.
     assert_true(fabs(sum / n - 0.5) < 5 * 0.289 / sqrt(n));
     assert_true(fabs(square / n - 1.0 / 3) < 5 * 0.298 / sqrt(n));
     assert_true(fabs(normal / n) < 5 / sqrt(n));
@@ -118,8 +119,8 @@ static void random_laws(void **state)
 static void crc_known_answer(void **state)
 {
     (void)state;
-    assert_true(sdm_crc64(0, "123456789", 9) ==
-                UINT64_C(0x995DC9BBDF1939FA)); // check value of CRC-64/XZ
+    // Published check value of CRC-64/XZ.
+    assert_true(sdm_crc64(0, "123456789", 9) == UINT64_C(0x995DC9BBDF1939FA));
     uint8_t data[100];
     for (int i = 0; i < 100; i++) data[i] = (uint8_t)(i * 37);
     for (size_t cut = 0; cut <= 100; cut += 9)
@@ -127,7 +128,7 @@ static void crc_known_answer(void **state)
                     sdm_crc64(0, data, 100));
 }
 
-static void numbers_and_names(void **state)
+static void numbers_and_names_are_parsed(void **state)
 {
     (void)state;
     double v;
@@ -157,7 +158,7 @@ static void numbers_and_names(void **state)
     assert_null(sdm_nearest_name("colour", names, 3));
 }
 
-static void json_text(void **state)
+static void json_text_is_escaped(void **state)
 {
     (void)state;
     sdm_json j = {0};
@@ -176,7 +177,7 @@ static void json_text(void **state)
     sdm_json_dispose(&j);
 }
 
-static void files(void **state)
+static void files_are_written_whole_or_not(void **state)
 {
     (void)state;
     sdm_error e;
@@ -187,7 +188,7 @@ static void files(void **state)
     assert_int_equal(sdm_make_folder(deep, &e), SDM_OK);
     assert_int_equal(sdm_make_folder(deep, &e), SDM_OK);
 
-    // nothing under the final name before commit; the old content survives a discard
+    // The final name appears only at commit; a discard keeps the old content.
     sdm_outfile *f;
     assert_int_equal(sdm_outfile_open(path, &f, &e), SDM_OK);
     assert_int_equal(sdm_outfile_printf(f, &e, "%d", 42), SDM_OK);
@@ -211,7 +212,7 @@ static void files(void **state)
     assert_true(crc == sdm_crc64(0, "42", 2));
     assert_int_equal(sdm_file_checksum(folder, &crc, &e), SDM_E_IO);
 
-    // two writers of one name: each file is whole, the last to commit stays
+    // Two writers of the same name: both files are whole, and the last commit wins.
     for (int last = 0; last < 2; last++) {
         sdm_outfile *two[2];
         for (int i = 0; i < 2; i++) assert_int_equal(sdm_outfile_open(path, &two[i], &e), SDM_OK);
@@ -228,7 +229,7 @@ static void files(void **state)
             sdm_free(data);
         }
     }
-    // a link that waits under the next temporary name is not followed
+    // A symbolic link placed at the next temporary name is not followed.
     assert_int_equal(sdm_outfile_open(path, &f, &e), SDM_OK);
     unsigned long pid, number;
     assert_int_equal(sscanf(sdm_outfile_temp_path(f) + strlen(path), ".%lu.%lu.tmp", &pid, &number),
@@ -253,9 +254,10 @@ static void files(void **state)
     assert_int_equal(sdm_make_folder(path, &e), SDM_E_IO);
     assert_int_equal(sdm_make_folder("", &e), SDM_E_ARG);
     remove(path);
-    assert_int_equal(mkfifo(path, 0600), 0); // would wait for a writer
+    assert_int_equal(mkfifo(path, 0600), 0); // opening a pipe would block until a writer comes
     assert_int_equal(sdm_file_read(path, 1, &data, &size, &e), SDM_E_IO);
-    assert_int_equal(sdm_outfile_open(path, &f, &e), SDM_E_IO); // would take its place
+    // An output file must not replace a pipe.
+    assert_int_equal(sdm_outfile_open(path, &f, &e), SDM_E_IO);
     assert_non_null(strstr(e.text, "pipe"));
     remove(path);
     remove(deep);
@@ -263,14 +265,14 @@ static void files(void **state)
     remove(deep);
     snprintf(deep, sizeof deep, "%s/a", folder);
     remove(deep);
-    assert_int_equal(remove(folder), 0); // nothing was left behind
+    assert_int_equal(remove(folder), 0); // fails unless the folder is empty
 }
 
-static void numbers_of_threads(void **state)
+static void thread_counts_are_limited(void **state)
 {
     (void)state;
     const int most = sdm_threads(1000000);
-    assert_true(most == 1 || most >= 64); // 1 without OpenMP
+    assert_true(most == 1 || most >= 64); // a build without OpenMP has one thread
     assert_true(most <= 64 || most <= 2 * sysconf(_SC_NPROCESSORS_CONF));
     assert_int_equal(sdm_threads(INT_MAX), most);
     assert_int_equal(sdm_threads(3), most == 1 ? 1 : 3);
@@ -278,7 +280,7 @@ static void numbers_of_threads(void **state)
     assert_int_equal(sdm_thread(), 0);
 }
 
-static void grids(void **state)
+static void grids_convert_coordinates(void **state)
 {
     (void)state;
     sdm_error e;
@@ -314,16 +316,16 @@ static void grids(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(status_text),
-        cmocka_unit_test(memory_limits),
+        cmocka_unit_test(errors_have_text_and_prefix),
+        cmocka_unit_test(allocation_errors_are_reported),
         cmocka_unit_test(philox_known_answers),
-        cmocka_unit_test(random_laws),
+        cmocka_unit_test(random_numbers_have_their_distribution),
         cmocka_unit_test(crc_known_answer),
-        cmocka_unit_test(numbers_and_names),
-        cmocka_unit_test(json_text),
-        cmocka_unit_test(files),
-        cmocka_unit_test(numbers_of_threads),
-        cmocka_unit_test(grids),
+        cmocka_unit_test(numbers_and_names_are_parsed),
+        cmocka_unit_test(json_text_is_escaped),
+        cmocka_unit_test(files_are_written_whole_or_not),
+        cmocka_unit_test(thread_counts_are_limited),
+        cmocka_unit_test(grids_convert_coordinates),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

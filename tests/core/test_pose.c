@@ -1,4 +1,5 @@
-/* Rigid poses: against the vector form of Rodrigues' formula, each other and differences.
+/* Rigid poses against the vector form of Rodrigues' formula, against each other and against
+ * differences.
  * Tests: pose.c */
 #include <math.h>
 #include <setjmp.h>
@@ -17,8 +18,9 @@
 
 static double norm(const double v[3]) { return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
-/* x turned about the unit vector k by `angle`: x cos + (k x x) sin + k (k.x)(1 - cos). */
-static void turn(const double k[3], double angle, const double x[3], double out[3])
+/* Rodrigues' formula: x rotated about the unit vector k by `angle`: x cos + (k x x) sin + k
+ * (k.x)(1 - cos). */
+static void rodrigues_rotate(const double k[3], double angle, const double x[3], double out[3])
 {
     const double dot = k[0] * x[0] + k[1] * x[1] + k[2] * x[2], c = cos(angle), s = sin(angle);
     const double cross[3] = {k[1] * x[2] - k[2] * x[1], k[2] * x[0] - k[0] * x[2],
@@ -52,7 +54,7 @@ static void assert_near(const double *a, const double *b, int n, double toleranc
 static const double ANGLES[] = {0, 1e-300, 1e-160, 1e-9, 1e-4, 0.3, 0.999, 1.001, 2, PI - 1e-9, PI};
 enum { N_ANGLES = sizeof ANGLES / sizeof *ANGLES };
 
-static void test_apply(void **state)
+static void test_apply_matches_rodrigues(void **state)
 {
     (void)state;
     for (size_t a = 0; a < N_ANGLES; a++) {
@@ -60,7 +62,7 @@ static void test_apply(void **state)
         double k[3], expected[3], got[3], back[3], in_place[3] = {1.5, -2, 0.25};
         const double x[3] = {1.5, -2, 0.25};
         random_axis(a, k);
-        turn(k, ANGLES[a], x, expected);
+        rodrigues_rotate(k, ANGLES[a], x, expected);
         for (int i = 0; i < 3; i++) expected[i] += p.translation[i];
         sdm_pose_apply(&p, x, got);
         assert_near(got, expected, 3, 1e-13);
@@ -74,14 +76,14 @@ static void test_apply(void **state)
         sdm_pose_apply(&inverse, expected, got);
         assert_near(got, x, 3, 1e-13);
     }
-    /* a quarter turn about z takes x to y */
+    /* A rotation by pi / 2 about z maps the x axis to the y axis. */
     const sdm_pose quarter = {.rotation = {0, 0, PI / 2}, .translation = {0, 0, 5}};
     double got[3];
     sdm_pose_apply(&quarter, (const double[3]){1, 0, 0}, got);
     assert_near(got, (const double[3]){0, 1, 5}, 3, 1e-15);
 }
 
-static void test_compose(void **state)
+static void test_compose_applies_in_turn(void **state)
 {
     (void)state;
     const double x[3] = {0.7, -3, 2};
@@ -97,31 +99,32 @@ static void test_compose(void **state)
             assert_near(got, expected, 3, 1e-13);
             assert_true(norm(both.rotation) <= PI * (1 + 1e-15));
         }
-    /* whole turns vanish */
+    /* Three thirds of a full turn compose to no rotation. */
     const sdm_pose third = random_pose(5, 2 * PI / 3), two = sdm_pose_compose(&third, &third),
                    three = sdm_pose_compose(&third, &two);
     assert_near(three.rotation, (const double[3]){0, 0, 0}, 3, 1e-14);
 }
 
-static void test_vector(void **state)
+static void test_matrix_to_vector_and_back(void **state)
 {
     (void)state;
     for (size_t a = 0; a < N_ANGLES; a++)
         for (uint64_t seed = 0; seed < 8; seed++) {
             sdm_pose p = random_pose(seed, ANGLES[a]);
-            if (seed < 3) // about the axes
+            // The first three seeds rotate about the coordinate axes.
+            if (seed < 3)
                 for (int i = 0; i < 3; i++) p.rotation[i] = (uint64_t)i == seed ? ANGLES[a] : 0;
             double r[9], v[3], again[9];
             sdm_pose_matrix(&p, r);
             sdm_rotation_vector(r, v);
             assert_true(norm(v) <= PI * (1 + 1e-15));
-            if (ANGLES[a] < 3.1)
-                assert_near(v, p.rotation, 3, 1e-14); // at pi two vectors are the same turn
+            // at pi the vectors v and -v are the same rotation
+            if (ANGLES[a] < 3.1) assert_near(v, p.rotation, 3, 1e-14);
             const sdm_pose q = {.rotation = {v[0], v[1], v[2]}};
             sdm_pose_matrix(&q, again);
             assert_near(again, r, 9, 1e-14);
         }
-    /* longer than pi: the shorter way */
+    /* A rotation by 3 pi / 2 becomes one by -pi / 2. */
     const sdm_pose long_way = {.rotation = {0, 3 * PI / 2, 0}};
     double r[9], v[3];
     sdm_pose_matrix(&long_way, r);
@@ -129,7 +132,7 @@ static void test_vector(void **state)
     assert_near(v, (const double[3]){0, -PI / 2, 0}, 3, 1e-14);
 }
 
-static void test_product(void **state)
+static void test_products_match_matrices(void **state)
 {
     (void)state;
     for (size_t a = 0; a < N_ANGLES; a++)
@@ -146,28 +149,29 @@ static void test_product(void **state)
         }
 }
 
-static void test_quaternion(void **state)
+static void test_quaternion_to_vector(void **state)
 {
     (void)state;
+    // q and -q are the same rotation.
     for (size_t a = 0; a < N_ANGLES; a++)
-        for (int sign = -1; sign <= 1; sign += 2) { // q and -q are the same turn
+        for (int sign = -1; sign <= 1; sign += 2) {
             double k[3], rotation[3];
             random_axis(a, k);
             const double c = sign * cos(0.5 * ANGLES[a]), s = sign * sin(0.5 * ANGLES[a]);
             const double q[4] = {c, s * k[0], s * k[1], s * k[2]};
             sdm_rotation_of_quaternion(q, rotation);
             const double expected[3] = {ANGLES[a] * k[0], ANGLES[a] * k[1], ANGLES[a] * k[2]};
-            if (ANGLES[a] < 3.1)
-                assert_near(rotation, expected, 3, 1e-14); // at pi two vectors are the same turn
+            // at pi the vectors v and -v are the same rotation
+            if (ANGLES[a] < 3.1) assert_near(rotation, expected, 3, 1e-14);
             assert_near((const double[1]){norm(rotation)}, &ANGLES[a], 1, 1e-14);
         }
-    /* three quarters of a turn: the shorter way */
+    /* A rotation by 3 pi / 2 becomes one by -pi / 2. */
     double rotation[3];
     sdm_rotation_of_quaternion((const double[4]){cos(3 * PI / 4), 0, sin(3 * PI / 4), 0}, rotation);
     assert_near(rotation, (const double[3]){0, -PI / 2, 0}, 3, 1e-14);
 }
 
-static void test_jacobian(void **state)
+static void test_jacobian_matches_differences(void **state)
 {
     (void)state;
     const double step = 1e-5;
@@ -191,7 +195,7 @@ static void test_jacobian(void **state)
     }
 }
 
-static void test_misuse(void **state)
+static void test_wrong_arguments_are_refused(void **state)
 {
     (void)state;
     sdm_error err;
@@ -215,10 +219,13 @@ static void test_misuse(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_apply),      cmocka_unit_test(test_compose),
-        cmocka_unit_test(test_vector),     cmocka_unit_test(test_product),
-        cmocka_unit_test(test_quaternion), cmocka_unit_test(test_jacobian),
-        cmocka_unit_test(test_misuse),
+        cmocka_unit_test(test_apply_matches_rodrigues),
+        cmocka_unit_test(test_compose_applies_in_turn),
+        cmocka_unit_test(test_matrix_to_vector_and_back),
+        cmocka_unit_test(test_products_match_matrices),
+        cmocka_unit_test(test_quaternion_to_vector),
+        cmocka_unit_test(test_jacobian_matches_differences),
+        cmocka_unit_test(test_wrong_arguments_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,5 @@
-/* An asymmetric phantom for image files: three sizes, three spacings, an oblique frame, values that
- * name their voxel. */
+/* An asymmetric phantom for image files: three different sizes and spacings, an oblique frame,
+ * and a value that identifies each voxel. */
 #ifndef SDM_TEST_PHANTOM_H
 #define SDM_TEST_PHANTOM_H
 
@@ -12,7 +12,7 @@
 #define PHANTOM_NZ 9
 #define PHANTOM_COUNT (PHANTOM_NX * PHANTOM_NY * PHANTOM_NZ)
 
-/* `mirror` gives a left-handed frame. */
+/* The grid of the phantom; `mirror` gives a left-handed frame. */
 static inline sdm_grid phantom_grid(int mirror)
 {
     sdm_grid g = {.n = {PHANTOM_NX, PHANTOM_NY, PHANTOM_NZ},
@@ -33,6 +33,7 @@ static inline sdm_grid phantom_grid(int mirror)
     return g;
 }
 
+/* v[PHANTOM_COUNT]: the values of the voxels, x fastest. */
 static inline void phantom_values(float *v)
 {
     for (int i = 0; i < PHANTOM_COUNT; i++) {

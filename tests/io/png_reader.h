@@ -1,5 +1,4 @@
-/* A small decoder of PNG files with 8-bit RGB pixels, as cairo writes them, for tests of pictures.
- */
+/* A small decoder for the 8-bit RGB PNG files that cairo writes, for tests of pictures. */
 #ifndef TESTS_PNG_READER_H
 #define TESTS_PNG_READER_H
 
@@ -19,7 +18,7 @@ typedef struct picture {
     unsigned char *rgb;
 } picture;
 
-static unsigned big_at(const unsigned char *p)
+static unsigned big_endian_at(const unsigned char *p)
 {
     return (unsigned)p[0] << 24 | (unsigned)p[1] << 16 | (unsigned)p[2] << 8 | p[3];
 }
@@ -48,7 +47,7 @@ static void unfilter(const unsigned char *raw, picture *p)
     }
 }
 
-/* The caller frees rgb. Fails the test for a file that is damaged or not of that kind. */
+/* Reads a picture; the caller frees rgb. Fails the test if the file is damaged or not 8-bit RGB. */
 static picture read_png(const char *path)
 {
     FILE *f = fopen(path, "rb");
@@ -62,14 +61,14 @@ static picture read_png(const char *path)
     size_t n_packed = 0, at = 8;
     int ended = 0;
     while (at < n) {
-        const size_t size = big_at(data + at);
+        const size_t size = big_endian_at(data + at);
         const unsigned char *type = data + at + 4;
         assert_true(!ended && at + 12 + size <= n);
-        assert_int_equal(big_at(type + 4 + size), crc32(0, type, (unsigned)size + 4));
+        assert_int_equal(big_endian_at(type + 4 + size), crc32(0, type, (unsigned)size + 4));
         if (memcmp(type, "IHDR", 4) == 0) {
             assert_int_equal(size, 13);
-            p.w = (int)big_at(type + 4);
-            p.h = (int)big_at(type + 8);
+            p.w = (int)big_endian_at(type + 4);
+            p.h = (int)big_endian_at(type + 8);
             assert_memory_equal(type + 12, "\x08\x02\x00\x00\x00", 5);
         }
         if (memcmp(type, "IDAT", 4) == 0) {

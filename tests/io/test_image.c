@@ -1,4 +1,4 @@
-/* Image files and .npy arrays, read back by small readers that share nothing with the writers.
+/* Image files and .npy arrays, read back by small readers that share no code with the writers.
  * Tests: image_write.c metaimage_write.c nifti_write.c npy.c nrrd_write.c sink.c */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -15,16 +15,16 @@
 #include "sdm/internal/rng.h"
 #include "sdm/memory.h"
 
-/* What a reader finds: values, and the LPS position of index (i, j, k) as an affine map. */
+/* The result of a reader: values, and the affine map from index (i, j, k) to LPS position. */
 typedef struct found {
     long n[3];
     double affine[3][4];
-    double a; /* first component of the quaternion, which the file leaves out */
+    double a; /* first component of the unit quaternion; files leave it out */
     float value[PHANTOM_COUNT];
 } found;
 
-/* gzread() takes plain files as they are. */
-static size_t slurp(const char *path, unsigned char *data, size_t size)
+/* Reads a whole file, plain or gzip: gzread() accepts both. */
+static size_t file_load(const char *path, unsigned char *data, size_t size)
 {
     gzFile f = gzopen(path, "rb");
     assert_non_null(f);
@@ -34,7 +34,7 @@ static size_t slurp(const char *path, unsigned char *data, size_t size)
     return (size_t)n;
 }
 
-static void put_file(const char *path, const void *data, size_t size)
+static void file_save(const char *path, const void *data, size_t size)
 {
     FILE *f = fopen(path, "wb");
     assert_non_null(f);
@@ -42,10 +42,10 @@ static void put_file(const char *path, const void *data, size_t size)
     assert_int_equal(fclose(f), 0);
 }
 
-static float real_at(const unsigned char *p)
+static float float_at(const unsigned char *p)
 {
     float v;
-    memcpy(&v, p, 4); /* the tests run on little-endian machines */
+    memcpy(&v, p, 4); /* the tests run on little-endian machines only */
     return v;
 }
 
@@ -56,12 +56,12 @@ static int short_at(const unsigned char *p)
     return v;
 }
 
-/* method 2: qform (quaternion), method 3: sform (matrix), as nifti1.h describes them; RAS is turned
- * into LPS. */
+/* Reads a NIfTI file as nifti1.h describes it. method 2: qform (quaternion), method 3: sform
+ * (matrix). RAS positions are converted to LPS. */
 static void read_nifti(const char *path, int method, found *f)
 {
     static unsigned char d[352 + 4 * PHANTOM_COUNT + 64];
-    assert_int_equal(slurp(path, d, sizeof d), 352 + 4 * PHANTOM_COUNT);
+    assert_int_equal(file_load(path, d, sizeof d), 352 + 4 * PHANTOM_COUNT);
     assert_true(d[0] == 0x5C && d[1] == 1 && d[2] == 0 && d[3] == 0);
     assert_memory_equal(d + 344, "n+1", 4);
     assert_int_equal(short_at(d + 40), 3);
@@ -69,18 +69,19 @@ static void read_nifti(const char *path, int method, found *f)
     assert_int_equal(short_at(d + 72), 32);
     assert_int_equal(short_at(d + 252), 1);
     assert_int_equal(short_at(d + 254), 1);
-    assert_true(real_at(d + 108) == 352 && real_at(d + 112) == 1 && real_at(d + 116) == 0);
+    assert_true(float_at(d + 108) == 352 && float_at(d + 112) == 1 && float_at(d + 116) == 0);
     assert_int_equal(d[123] & 7, 2);
     assert_string_equal((char *)d + 148, "a phantom");
     for (int i = 0; i < 3; i++) f->n[i] = short_at(d + 42 + 2 * i);
     if (method == 3) {
         for (int r = 0; r < 3; r++)
-            for (int c = 0; c < 4; c++) f->affine[r][c] = (double)real_at(d + 280 + 16 * r + 4 * c);
+            for (int c = 0; c < 4; c++)
+                f->affine[r][c] = (double)float_at(d + 280 + 16 * r + 4 * c);
     } else {
-        const double b = (double)real_at(d + 256), c = (double)real_at(d + 260),
-                     e = (double)real_at(d + 264);
+        const double b = (double)float_at(d + 256), c = (double)float_at(d + 260),
+                     e = (double)float_at(d + 264);
         const double a = sqrt(fmax(0, 1 - b * b - c * c - e * e)),
-                     qfac = (double)real_at(d + 76) < 0 ? -1 : 1;
+                     qfac = (double)float_at(d + 76) < 0 ? -1 : 1;
         f->a = a;
         const double r[3][3] = {
             {a * a + b * b - c * c - e * e, 2 * (b * c - a * e), 2 * (b * e + a * c)},
@@ -88,8 +89,8 @@ static void read_nifti(const char *path, int method, found *f)
             {2 * (b * e - a * c), 2 * (c * e + a * b), a * a + e * e - b * b - c * c}};
         for (int i = 0; i < 3; i++) {
             for (int k = 0; k < 3; k++)
-                f->affine[i][k] = r[i][k] * (double)real_at(d + 80 + 4 * k) * (k == 2 ? qfac : 1);
-            f->affine[i][3] = (double)real_at(d + 268 + 4 * i);
+                f->affine[i][k] = r[i][k] * (double)float_at(d + 80 + 4 * k) * (k == 2 ? qfac : 1);
+            f->affine[i][3] = (double)float_at(d + 268 + 4 * i);
         }
     }
     for (int r = 0; r < 2; r++)
@@ -132,16 +133,16 @@ static void read_nrrd(const char *path, found *f)
     assert_int_equal(
         sscanf(field(h, "space origin: "), "(%lf,%lf,%lf)", &a[0][3], &a[1][3], &a[2][3]), 3);
     const size_t start = (size_t)(blank - h) + 2;
-    put_file("test_image_tail.gz", d + start, n - start);
+    file_save("test_image_tail.gz", d + start, n - start);
     unsigned char raw[4 * PHANTOM_COUNT + 64];
-    assert_int_equal(slurp("test_image_tail.gz", raw, sizeof raw), sizeof f->value);
+    assert_int_equal(file_load("test_image_tail.gz", raw, sizeof raw), sizeof f->value);
     memcpy(f->value, raw, sizeof f->value);
 }
 
 static void read_metaimage(const char *path, found *f)
 {
     unsigned char d[8192];
-    const size_t n = slurp(path, d, sizeof d);
+    const size_t n = file_load(path, d, sizeof d);
     char *h = (char *)d, *local = strstr(h, "ElementDataFile = LOCAL\n");
     assert_non_null(local);
     local[23] = 0;
@@ -162,14 +163,14 @@ static void read_metaimage(const char *path, found *f)
     assert_int_equal(sscanf(field(h, "TransformMatrix = "), "%lf %lf %lf %lf %lf %lf %lf %lf %lf",
                             &m[0], &m[1], &m[2], &m[3], &m[4], &m[5], &m[6], &m[7], &m[8]),
                      9);
-    /* three numbers an axis: where it points to */
+    /* Three numbers for each axis: its direction. */
     for (int axis = 0; axis < 3; axis++)
         for (int r = 0; r < 3; r++) f->affine[r][axis] = m[3 * axis + r] * s[axis];
     for (int r = 0; r < 3; r++) f->affine[r][3] = o[r];
     memcpy(f->value, d + start, sizeof f->value);
 }
 
-static void check_found(const found *f, const sdm_grid *g, double tolerance)
+static void found_check(const found *f, const sdm_grid *g, double tolerance)
 {
     static const double probe[][3] = {{0, 0, 0}, {6, 0, 0}, {0, 4, 0}, {0, 0, 8}, {6, 4, 8}};
     float v[PHANTOM_COUNT];
@@ -178,7 +179,8 @@ static void check_found(const found *f, const sdm_grid *g, double tolerance)
     assert_memory_equal(f->value, v, sizeof v);
     for (size_t p = 0; p < sizeof probe / sizeof *probe; p++)
         for (int r = 0; r < 3; r++) {
-            /* the convention itself, not our own function: origin + dir * diag(spacing) * index */
+            /* The convention spelled out rather than sdm_grid_world(): origin + dir *
+             * diag(spacing) * index. */
             double want = g->origin[r], is = f->affine[r][3];
             for (int c = 0; c < 3; c++) {
                 want += g->dir[3 * r + c] * g->spacing[c] * probe[p][c];
@@ -188,7 +190,7 @@ static void check_found(const found *f, const sdm_grid *g, double tolerance)
         }
 }
 
-static void test_phantom(void **state)
+static void test_every_format_keeps_values_and_frame(void **state)
 {
     (void)state;
     float v[PHANTOM_COUNT];
@@ -204,16 +206,16 @@ static void test_phantom(void **state)
         for (int i = 0; i < 2; i++)
             for (int method = 2; method <= 3; method++) {
                 read_nifti(names[i], method, &f);
-                check_found(&f, &g, 2e-5); /* float32 header */
+                found_check(&f, &g, 2e-5); /* the header holds float32 */
             }
         read_nrrd(names[2], &f);
-        check_found(&f, &g, 1e-12);
+        found_check(&f, &g, 1e-12);
         read_metaimage(names[3], &f);
-        check_found(&f, &g, 1e-12);
+        found_check(&f, &g, 1e-12);
     }
 }
 
-/* Random rotations reach every branch of the quaternion. */
+/* Random rotations, so that every branch of the conversion to quaternions is used. */
 static void test_quaternions(void **state)
 {
     (void)state;
@@ -222,7 +224,7 @@ static void test_quaternions(void **state)
     for (uint64_t i = 0; i < 64; i++) {
         sdm_grid g = phantom_grid(0);
         double q[4], l = 0;
-        /* the first few are half turns about an axis or nothing at all */
+        /* Quaternion i < 4 is a unit vector: the identity or a rotation by pi about an axis. */
         for (uint64_t k = 0; k < 4; k++) q[k] = i < 4 ? (i == k) : sdm_rng_normal(1, i, k);
         for (int k = 0; k < 4; k++) l += q[k] * q[k];
         for (int k = 0; k < 4; k++) q[k] /= sqrt(l);
@@ -235,12 +237,13 @@ static void test_quaternions(void **state)
         static found f;
         assert_int_equal(sdm_image_write("test_image.nii", &g, v, "a phantom", NULL), SDM_OK);
         read_nifti("test_image.nii", 2, &f);
-        /* a small component suffers from the rounding of the other three to float32 */
-        check_found(&f, &g, 2e-5 + 4e-6 / fmax(f.a, 1e-3));
+        /* The first component follows from the other three, which are rounded to float32: the
+         * smaller it is, the larger its error. */
+        found_check(&f, &g, 2e-5 + 4e-6 / fmax(f.a, 1e-3));
     }
 }
 
-static void test_same_bytes(void **state)
+static void test_output_is_reproducible(void **state)
 {
     (void)state;
     static const char *const names[] = {"test_image_a.nii.gz", "test_image_a.nrrd"};
@@ -262,8 +265,8 @@ static void test_same_bytes(void **state)
     }
 }
 
-/* A description of several lines or too long must not break a header. */
-static void test_description(void **state)
+/* A description with several lines or of excessive length must not break a header. */
+static void test_description_cannot_break_headers(void **state)
 {
     (void)state;
     const sdm_grid g = phantom_grid(0);
@@ -278,9 +281,9 @@ static void test_description(void **state)
     fclose(f);
     assert_non_null(strstr((char *)d, "content: one two: 3   type: int\ntype: float\n"));
     memset(text, 'x', 78);
-    strcpy(text + 78, "\xC3\xA9 and more"); /* a two-byte character where the field ends */
+    strcpy(text + 78, "\xC3\xA9 and more"); /* a two-byte character at the end of the field */
     assert_int_equal(sdm_image_write("test_image_d.nii", &g, v, text, NULL), SDM_OK);
-    assert_true(slurp("test_image_d.nii", d, sizeof d) > 348);
+    assert_true(file_load("test_image_d.nii", d, sizeof d) > 348);
     assert_true(d[148 + 77] == 'x' && d[148 + 78] == 0 && d[148 + 79] == 0);
 }
 
@@ -293,7 +296,7 @@ static void check_npy(const char *header, const void *values, size_t size, int v
     for (size_t i = 0; i < width; i++) file[8 + i] = (unsigned char)(n >> 8 * i);
     memcpy(file + 8 + width, header, n);
     memcpy(file + 8 + width + n, values, size);
-    put_file("test_image_in.npy", file, 8 + width + n + size);
+    file_save("test_image_in.npy", file, 8 + width + n + size);
     double *got;
     size_t got_shape[4];
     int got_dim;
@@ -311,7 +314,7 @@ static void check_npy(const char *header, const void *values, size_t size, int v
     sdm_free(got);
 }
 
-static void test_npy_dialects(void **state)
+static void test_npy_of_other_writers(void **state)
 {
     (void)state;
     static const double want[6] = {1, -2, 0.5, 1024, 3, -0.25};
@@ -354,8 +357,8 @@ static void test_npy_round_trip(void **state)
         for (size_t i = 0; i < count; i++) assert_true(got[i] == (double)v[i]);
         sdm_free(got);
         unsigned char d[1024];
-        assert_int_equal(slurp("test_image_rt.npy", d, sizeof d) % 64,
-                         count * 4 % 64); /* aligned values */
+        /* Values start at a multiple of 64 bytes. */
+        assert_int_equal(file_load("test_image_rt.npy", d, sizeof d) % 64, count * 4 % 64);
     }
     const sdm_grid g = phantom_grid(0);
     float p[PHANTOM_COUNT];
@@ -378,7 +381,7 @@ static sdm_status read_header(const char *header, size_t extra, sdm_error *err)
     const size_t n = strlen(header);
     file[8] = (unsigned char)n;
     memcpy(file + 10, header, n);
-    put_file("test_image_bad.npy", file, 10 + n + extra);
+    file_save("test_image_bad.npy", file, 10 + n + extra);
     double *got = (double *)file;
     size_t shape[4];
     int n_dim;
@@ -388,7 +391,7 @@ static sdm_status read_header(const char *header, size_t extra, sdm_error *err)
     return s;
 }
 
-static void test_npy_mistakes(void **state)
+static void test_bad_npy_headers_are_refused(void **state)
 {
     (void)state;
     static const struct {
@@ -421,37 +424,37 @@ static void test_npy_mistakes(void **state)
     }
     assert_int_equal(
         read_header("{'descr': '<f4', 'fortran_order': False, 'shape': (3,), }", 12, &err), SDM_OK);
-    put_file("test_image_bad.npy", "\x93NUMPY\x04\x00\xFF\xFF", 10);
+    file_save("test_image_bad.npy", "\x93NUMPY\x04\x00\xFF\xFF", 10);
     double *got;
     size_t shape[4];
     int n_dim;
     assert_int_equal(sdm_npy_read("test_image_bad.npy", &got, shape, &n_dim, &err),
                      SDM_E_UNSUPPORTED);
-    put_file("test_image_bad.npy", "\x93NUMPY\x02\x00\xFF\xFF\xFF\xFF", 12);
+    file_save("test_image_bad.npy", "\x93NUMPY\x02\x00\xFF\xFF\xFF\xFF", 12);
     assert_int_equal(sdm_npy_read("test_image_bad.npy", &got, shape, &n_dim, &err), SDM_E_FORMAT);
 }
 
-/* Cut at each byte, and every byte changed. */
-static void test_npy_damage(void **state)
+/* A file truncated at each byte, and with each byte changed. */
+static void test_damaged_npy_is_safe(void **state)
 {
     (void)state;
     static const size_t shape[2] = {2, 3};
     static const float v[6] = {1, 2, 3, 4, 5, 6};
     unsigned char d[256];
     assert_int_equal(sdm_npy_write("test_image_cut.npy", v, shape, 2, NULL), SDM_OK);
-    const size_t n = slurp("test_image_cut.npy", d, sizeof d);
+    const size_t n = file_load("test_image_cut.npy", d, sizeof d);
     double *got;
     size_t s[4];
     int n_dim;
     for (size_t i = 0; i < n; i++) {
-        put_file("test_image_cut.npy", d, i);
+        file_save("test_image_cut.npy", d, i);
         assert_int_equal(sdm_npy_read("test_image_cut.npy", &got, s, &n_dim, NULL), SDM_E_FORMAT);
         assert_null(got);
     }
     for (size_t i = 0; i < n - 24; i++)
         for (int b = 0; b < 8; b++) {
             d[i] ^= (unsigned char)(1 << b);
-            put_file("test_image_cut.npy", d, n);
+            file_save("test_image_cut.npy", d, n);
             if (sdm_npy_read("test_image_cut.npy", &got, s, &n_dim, NULL) == SDM_OK) {
                 size_t count = 1;
                 for (int k = 0; k < n_dim; k++) count *= s[k];
@@ -462,7 +465,7 @@ static void test_npy_damage(void **state)
         }
 }
 
-static void test_misuse(void **state)
+static void test_wrong_arguments_are_refused(void **state)
 {
     (void)state;
     sdm_grid g = phantom_grid(0);
@@ -490,7 +493,7 @@ static void test_misuse(void **state)
     assert_int_equal(sdm_npy_write_uint32("a.npy", u, shape, 5, &err), SDM_E_ARG);
     g.spacing[1] = NAN;
     assert_int_equal(sdm_image_write("a.nii", &g, v, "", &err), SDM_E_ARG);
-    /* too large for NIfTI's int16, and nothing may be left behind */
+    /* Too large for the int16 sizes of NIfTI; no file may be left behind. */
     sdm_grid row = {.n = {40000, 1, 1}, .spacing = {1, 1, 1}, .dir = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
     float *line = calloc(40000, sizeof *line);
     assert_non_null(line);
@@ -504,11 +507,15 @@ static void test_misuse(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_phantom),      cmocka_unit_test(test_quaternions),
-        cmocka_unit_test(test_same_bytes),   cmocka_unit_test(test_description),
-        cmocka_unit_test(test_npy_dialects), cmocka_unit_test(test_npy_round_trip),
-        cmocka_unit_test(test_npy_mistakes), cmocka_unit_test(test_npy_damage),
-        cmocka_unit_test(test_misuse),
+        cmocka_unit_test(test_every_format_keeps_values_and_frame),
+        cmocka_unit_test(test_quaternions),
+        cmocka_unit_test(test_output_is_reproducible),
+        cmocka_unit_test(test_description_cannot_break_headers),
+        cmocka_unit_test(test_npy_of_other_writers),
+        cmocka_unit_test(test_npy_round_trip),
+        cmocka_unit_test(test_bad_npy_headers_are_refused),
+        cmocka_unit_test(test_damaged_npy_is_safe),
+        cmocka_unit_test(test_wrong_arguments_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,4 @@
-/* Mesh files: round trips, every dialect, and hostile content.
+/* Mesh files: round trips, every variant of the formats, and hostile content.
  * Tests: builder.c meshfile.c obj.c off.c ply.c ply_header.c scan.c stl.c */
 #include <math.h>
 #include <setjmp.h>
@@ -16,7 +16,7 @@
 
 static const char *const extensions[] = {".ply", ".stl", ".obj", ".off"};
 
-static void put_file(const char *path, const void *data, size_t size)
+static void file_save(const char *path, const void *data, size_t size)
 {
     FILE *f = fopen(path, "wb");
     assert_non_null(f);
@@ -24,7 +24,7 @@ static void put_file(const char *path, const void *data, size_t size)
     assert_int_equal(fclose(f), 0);
 }
 
-static unsigned char *get_file(const char *path, size_t *size)
+static unsigned char *file_load(const char *path, size_t *size)
 {
     FILE *f = fopen(path, "rb");
     assert_non_null(f);
@@ -35,7 +35,7 @@ static unsigned char *get_file(const char *path, size_t *size)
     return data;
 }
 
-static const char *name_of(const char *ext)
+static const char *file_name(const char *ext)
 {
     static char name[64];
     snprintf(name, sizeof name, "test_meshfile_file%s", ext);
@@ -44,12 +44,13 @@ static const char *name_of(const char *ext)
 
 static sdm_status read_text(const char *ext, const char *text, sdm_mesh *m, sdm_error *err)
 {
-    put_file(name_of(ext), text, strlen(text));
-    return sdm_mesh_read(name_of(ext), m, err);
+    file_save(file_name(ext), text, strlen(text));
+    return sdm_mesh_read(file_name(ext), m, err);
 }
 
-/* An irregular tetrahedron with a flap; coordinates exact in float where `single`. */
-static void make_mesh(sdm_mesh *m, bool single)
+/* An irregular tetrahedron with one more triangle at an edge; `single`: coordinates that float
+ * represents exactly. */
+static void tetrahedron_make(sdm_mesh *m, bool single)
 {
     static const uint32_t tri[5][3] = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}, {3, 2, 4}};
     assert_int_equal(sdm_mesh_reserve(m, 5, 5, NULL), SDM_OK);
@@ -67,13 +68,14 @@ static void test_round_trip(void **state)
         const bool stl = f == 1;
         sdm_mesh a = {0}, b = {0};
         sdm_error err;
-        make_mesh(&a, stl);
-        assert_int_equal(sdm_mesh_write(name_of(extensions[f]), &a, &err), SDM_OK);
-        assert_int_equal(sdm_mesh_read(name_of(extensions[f]), &b, &err), SDM_OK);
+        tetrahedron_make(&a, stl);
+        assert_int_equal(sdm_mesh_write(file_name(extensions[f]), &a, &err), SDM_OK);
+        assert_int_equal(sdm_mesh_read(file_name(extensions[f]), &b, &err), SDM_OK);
         assert_int_equal(b.n_vert, 5);
         assert_int_equal(b.n_tri, 5);
         if (!stl) assert_memory_equal(a.tri, b.tri, 15 * sizeof *a.tri);
-        /* STL numbers the vertices anew: compare corner by corner, bit by bit */
+        /* STL repeats vertices and readers renumber them: compare the corners of triangles bit
+         * by bit. */
         for (size_t c = 0; c < 15; c++)
             assert_memory_equal(a.vert + 3 * (size_t)a.tri[c], b.vert + 3 * (size_t)b.tri[c],
                                 3 * sizeof *a.vert);
@@ -82,7 +84,7 @@ static void test_round_trip(void **state)
     }
 }
 
-/* The same four-cornered pyramid in every dialect: vertices (0,0,0) (1,0,0) (1,2,0) (0,2,0)
+/* The same quadrilateral and triangle in every variant: vertices (0,0,0) (1,0,0) (1,2,0) (0,2,0)
  * (0.5,1,-3.25). */
 static const double pyramid[5][3] = {{0, 0, 0}, {1, 0, 0}, {1, 2, 0}, {0, 2, 0}, {0.5, 1, -3.25}};
 static const uint32_t fans[3][3] = {{0, 1, 2}, {0, 2, 3}, {1, 0, 4}};
@@ -95,7 +97,7 @@ static void check_pyramid(const sdm_mesh *m)
     assert_memory_equal(m->tri, fans, sizeof fans);
 }
 
-static void test_text_dialects(void **state)
+static void test_text_variants(void **state)
 {
     (void)state;
     static const struct {
@@ -141,7 +143,7 @@ static void test_text_dialects(void **state)
     };
     static const char *const before[] = {"", "\xEF\xBB\xBF", "\xEF\xBB\xBF \r\n\n"};
     for (size_t i = 0; i < sizeof file / sizeof *file; i++) {
-        // as it is, behind a byte order mark of UTF-8, and behind that and blank lines
+        // The file as it is, after a UTF-8 byte order mark, and after a mark and blank lines.
         for (int k = 0; k < 3; k++) {
             sdm_mesh m = {0};
             sdm_error err = {0};
@@ -158,24 +160,24 @@ static void test_text_dialects(void **state)
 }
 
 /* Appends an integer of `size` bytes. */
-static size_t put(unsigned char *p, size_t at, size_t size, bool big, uint64_t v)
+static size_t int_append(unsigned char *p, size_t at, size_t size, bool big, uint64_t v)
 {
     for (size_t i = 0; i < size; i++)
         p[at + i] = (unsigned char)(v >> 8 * (big ? size - 1 - i : i));
     return at + size;
 }
 
-static size_t put_real(unsigned char *p, size_t at, size_t size, bool big, double v)
+static size_t real_append(unsigned char *p, size_t at, size_t size, bool big, double v)
 {
     uint64_t bits;
     uint32_t single;
     const float f = (float)v;
     memcpy(&bits, &v, 8);
     memcpy(&single, &f, 4);
-    return put(p, at, size, big, size == 4 ? single : bits);
+    return int_append(p, at, size, big, size == 4 ? single : bits);
 }
 
-/* A binary PLY of the pyramid with mixed types and things to skip. */
+/* The pyramid as binary PLY, with mixed types and with properties that a reader must skip. */
 static size_t binary_ply(unsigned char *p, bool big)
 {
     size_t n = (size_t)sprintf((char *)p,
@@ -186,18 +188,18 @@ static size_t binary_ply(unsigned char *p, bool big)
                                "property list uint ushort vertex_indices\nend_header\n",
                                big ? "big" : "little");
     for (int i = 0; i < 5; i++) {
-        n = put(p, n, 2, big, (uint64_t)(2 * pyramid[i][0]));
-        n = put(p, n, 2, big, (uint64_t)(i % 3));
-        for (int k = 0; k < i % 3; k++) n = put(p, n, 2, big, 0xFFFF);
-        n = put_real(p, n, 4, big, pyramid[i][1]);
-        n = put_real(p, n, 8, big, pyramid[i][2]);
+        n = int_append(p, n, 2, big, (uint64_t)(2 * pyramid[i][0]));
+        n = int_append(p, n, 2, big, (uint64_t)(i % 3));
+        for (int k = 0; k < i % 3; k++) n = int_append(p, n, 2, big, 0xFFFF);
+        n = real_append(p, n, 4, big, pyramid[i][1]);
+        n = real_append(p, n, 8, big, pyramid[i][2]);
         p[n++] = 200;
     }
     static const unsigned face[2][5] = {{4, 0, 1, 2, 3}, {3, 1, 0, 4, 0}};
     for (int i = 0; i < 2; i++) {
-        n = put(p, n, 4, big, 0x80000000u);
-        n = put(p, n, 4, big, face[i][0]);
-        for (unsigned k = 1; k <= face[i][0]; k++) n = put(p, n, 2, big, face[i][k]);
+        n = int_append(p, n, 4, big, 0x80000000u);
+        n = int_append(p, n, 4, big, face[i][0]);
+        for (unsigned k = 1; k <= face[i][0]; k++) n = int_append(p, n, 2, big, face[i][k]);
     }
     return n;
 }
@@ -210,55 +212,57 @@ static void test_binary_ply(void **state)
         sdm_mesh m = {0};
         sdm_error err;
         const size_t n = binary_ply(file, big);
-        put_file(name_of(".PLY"), file, n);
-        assert_int_equal(sdm_mesh_read(name_of(".PLY"), &m, &err), SDM_OK);
-        for (size_t i = 0; i < 5; i++)
-            m.vert[3 * i] /= 2; /* x is twice the value, so that it is whole */
+        file_save(file_name(".PLY"), file, n);
+        assert_int_equal(sdm_mesh_read(file_name(".PLY"), &m, &err), SDM_OK);
+        for (size_t i = 0; i < 5; i++) /* The file stores 2 x, which is an integer. */
+            m.vert[3 * i] /= 2;
         check_pyramid(&m);
         sdm_mesh_dispose(&m);
     }
 }
 
-/* A binary STL whose header begins with "solid": the length tells it from text. */
+/* A binary STL whose header begins with "solid", like a text STL: the length of the file
+ * decides. */
 static void test_binary_stl(void **state)
 {
     (void)state;
     unsigned char file[84 + 150] = "solid but binary";
-    put(file, 80, 4, false, 3);
+    int_append(file, 80, 4, false, 3);
     for (size_t t = 0; t < 3; t++)
         for (size_t c = 0; c < 3; c++)
             for (size_t d = 0; d < 3; d++)
-                put_real(file, 84 + 50 * t + 12 + 12 * c + 4 * d, 4, false, pyramid[fans[t][c]][d]);
-    put_real(file, 84 + 50 + 12, 4, false, -0.0);
-    put_file(name_of(".stl"), file, sizeof file);
+                real_append(file, 84 + 50 * t + 12 + 12 * c + 4 * d, 4, false,
+                            pyramid[fans[t][c]][d]);
+    real_append(file, 84 + 50 + 12, 4, false, -0.0);
+    file_save(file_name(".stl"), file, sizeof file);
     sdm_mesh m = {0};
     sdm_error err;
-    assert_int_equal(sdm_mesh_read(name_of(".stl"), &m, &err), SDM_OK);
+    assert_int_equal(sdm_mesh_read(file_name(".stl"), &m, &err), SDM_OK);
     check_pyramid(&m);
     sdm_mesh_dispose(&m);
 }
 
-/* What we write, read by hand. */
+/* The bytes written, compared with the format by hand. */
 static void test_written_bytes(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
     sdm_error err;
     size_t size;
-    make_mesh(&m, true);
-    assert_int_equal(sdm_mesh_write(name_of(".ply"), &m, &err), SDM_OK);
-    unsigned char *data = get_file(name_of(".ply"), &size);
+    tetrahedron_make(&m, true);
+    assert_int_equal(sdm_mesh_write(file_name(".ply"), &m, &err), SDM_OK);
+    unsigned char *data = file_load(file_name(".ply"), &size);
     const size_t body = size - 5 * 24 - 5 * 13;
     assert_memory_equal(data + body - 11, "end_header\n", 11);
     double x;
-    memcpy(&x, data + body + 24 + 8,
-           8); /* y of vertex 1; the tests run on little-endian machines */
+    /* y of vertex 1; the tests run on little-endian machines only. */
+    memcpy(&x, data + body + 24 + 8, 8);
     assert_memory_equal(&x, &m.vert[4], 8);
     static const unsigned char last[13] = {3, 3, 0, 0, 0, 2, 0, 0, 0, 4, 0, 0, 0};
     assert_memory_equal(data + size - 13, last, 13);
     free(data);
-    assert_int_equal(sdm_mesh_write(name_of(".stl"), &m, &err), SDM_OK);
-    data = get_file(name_of(".stl"), &size);
+    assert_int_equal(sdm_mesh_write(file_name(".stl"), &m, &err), SDM_OK);
+    data = file_load(file_name(".stl"), &size);
     assert_int_equal(size, 84 + 250);
     float normal[3], v[3][3];
     memcpy(normal, data + 84, 12);
@@ -279,7 +283,7 @@ static void test_written_bytes(void **state)
     "z\n"
 #define PLY_FACE "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
 
-static void test_mistakes(void **state)
+static void test_mistakes_are_named(void **state)
 {
     (void)state;
     static const struct {
@@ -354,14 +358,14 @@ static void test_mistakes(void **state)
             print_error("mistake %zu: %d %s\n", i, s, err.text);
         assert_int_equal(s, SDM_E_FORMAT);
         assert_non_null(strstr(err.text, file[i].said));
-        assert_non_null(strstr(err.text, name_of(file[i].ext)));
+        assert_non_null(strstr(err.text, file_name(file[i].ext)));
         assert_null(m.vert);
     }
 }
 
-/* Whatever a file holds: a mesh whose indices and coordinates can be used, or an error and no mesh.
- */
-static void check_any(const char *path)
+/* Reads any file: either a mesh with valid indices and finite coordinates, or an error and an
+ * empty mesh. */
+static void file_check(const char *path)
 {
     sdm_mesh m = {0};
     sdm_error err;
@@ -375,7 +379,7 @@ static void check_any(const char *path)
     sdm_mesh_dispose(&m);
 }
 
-static void test_damage(void **state)
+static void test_damaged_files_are_safe(void **state)
 {
     (void)state;
     for (size_t f = 0; f < 6; f++) {
@@ -383,41 +387,41 @@ static void test_damage(void **state)
         size_t size = 0;
         const char *ext = f < 4 ? extensions[f] : ".ply";
         sdm_mesh m = {0};
-        make_mesh(&m, true);
-        assert_int_equal(sdm_mesh_write(name_of(ext), &m, NULL), SDM_OK);
+        tetrahedron_make(&m, true);
+        assert_int_equal(sdm_mesh_write(file_name(ext), &m, NULL), SDM_OK);
         sdm_mesh_dispose(&m);
         if (f < 4)
-            data = get_file(name_of(ext), &size);
+            data = file_load(file_name(ext), &size);
         else
             size = binary_ply(small, f == 5);
         for (size_t n = 0; n < size; n++) {
-            put_file(name_of(ext), data, n);
-            check_any(name_of(ext));
+            file_save(file_name(ext), data, n);
+            file_check(file_name(ext));
         }
         for (uint64_t i = 0; i < 400; i++) {
             const size_t at = (size_t)sdm_rng_below(f, 2, 2 * i, size);
             const unsigned char old = data[at];
             data[at] = (unsigned char)sdm_rng_below(f, 2, 2 * i + 1, 256);
-            put_file(name_of(ext), data, size);
-            check_any(name_of(ext));
+            file_save(file_name(ext), data, size);
+            file_check(file_name(ext));
             data[at] = old;
         }
         if (f < 4) free(data);
     }
 }
 
-static void test_memory(void **state)
+static void test_each_allocation_may_fail(void **state)
 {
     (void)state;
     for (size_t f = 0; f < 4; f++) {
         sdm_mesh m = {0};
-        make_mesh(&m, true);
-        assert_int_equal(sdm_mesh_write(name_of(extensions[f]), &m, NULL), SDM_OK);
+        tetrahedron_make(&m, true);
+        assert_int_equal(sdm_mesh_write(file_name(extensions[f]), &m, NULL), SDM_OK);
         sdm_mesh_dispose(&m);
         unsigned long n = 1;
         for (;; n++) {
             sdm_alloc_fail_after(n);
-            const sdm_status s = sdm_mesh_read(name_of(extensions[f]), &m, NULL);
+            const sdm_status s = sdm_mesh_read(file_name(extensions[f]), &m, NULL);
             sdm_alloc_fail_after(0);
             if (s == SDM_OK) break;
             assert_int_equal(s, SDM_E_NOMEM);
@@ -428,7 +432,7 @@ static void test_memory(void **state)
     }
 }
 
-static void test_misuse(void **state)
+static void test_wrong_arguments_are_refused(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -439,7 +443,7 @@ static void test_misuse(void **state)
     assert_int_equal(sdm_mesh_read("a.step", &m, &err), SDM_E_UNSUPPORTED);
     assert_non_null(strstr(err.text, ".off"));
     assert_int_equal(sdm_mesh_read(".ply", &m, &err), SDM_E_UNSUPPORTED);
-    make_mesh(&m, true);
+    tetrahedron_make(&m, true);
     assert_int_equal(sdm_mesh_write(NULL, &m, &err), SDM_E_ARG);
     assert_int_equal(sdm_mesh_write("a.ply", NULL, &err), SDM_E_ARG);
     assert_int_equal(sdm_mesh_write("no_such_folder/a.ply", &m, &err), SDM_E_IO);
@@ -459,11 +463,15 @@ static void test_misuse(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_round_trip),    cmocka_unit_test(test_text_dialects),
-        cmocka_unit_test(test_binary_ply),    cmocka_unit_test(test_binary_stl),
-        cmocka_unit_test(test_written_bytes), cmocka_unit_test(test_mistakes),
-        cmocka_unit_test(test_damage),        cmocka_unit_test(test_memory),
-        cmocka_unit_test(test_misuse),
+        cmocka_unit_test(test_round_trip),
+        cmocka_unit_test(test_text_variants),
+        cmocka_unit_test(test_binary_ply),
+        cmocka_unit_test(test_binary_stl),
+        cmocka_unit_test(test_written_bytes),
+        cmocka_unit_test(test_mistakes_are_named),
+        cmocka_unit_test(test_damaged_files_are_safe),
+        cmocka_unit_test(test_each_allocation_may_fail),
+        cmocka_unit_test(test_wrong_arguments_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

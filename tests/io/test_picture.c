@@ -1,5 +1,5 @@
-/* Pictures as PNG, decoded by a small reader: images pixel by pixel, contours and curves where
- * they belong, text, colours, ticks, misuse.
+/* Pictures written as PNG and decoded by a small reader: images pixel by pixel, positions of
+ * contours and curves, text, colours, ticks, wrong arguments.
  * Tests: canvas.c colours.c overlay.c panel.c plot.c sections.c slices.c */
 #include <math.h>
 #include <setjmp.h>
@@ -28,7 +28,7 @@ static sdm_colour noise_pixel(const void *user, int x, int y)
     return (sdm_colour){(uint8_t)sdm_rng_below(1, 0, i, 256), (uint8_t)(i / 7), (uint8_t)x};
 }
 
-/* An image is copied pixel by pixel, and what is clipped stays white. */
+/* An image is copied pixel by pixel; what the clip region excludes stays white. */
 static void test_image_is_exact(void **state)
 {
     (void)state;
@@ -56,8 +56,8 @@ static void test_image_is_exact(void **state)
     }
 }
 
-/* The contour of a circle that misses every voxel centre: each coloured pixel is within a pixel of
- * the circle, and there are such pixels in every direction. */
+/* The contour of a circle that passes through no voxel centre: each coloured pixel is within one
+ * pixel of the circle, and there are coloured pixels in all directions. */
 static void test_contour_is_subpixel(void **state)
 {
     (void)state;
@@ -86,7 +86,7 @@ static void test_contour_is_subpixel(void **state)
     free(p.rgb);
 }
 
-/* The distance to a ball on a grid with a different spacing along each axis. */
+/* Distance map of a ball on a grid with different spacings. The caller frees it. */
 static float *ball_map(sdm_grid *g, double radius)
 {
     *g = (sdm_grid){.n = {40, 28, 25},
@@ -105,8 +105,8 @@ static float *ball_map(sdm_grid *g, double radius)
     return v;
 }
 
-/* The ball is a circle of the same size in all three slices. */
-static void test_slices(void **state)
+/* In all three slices the ball is a circle of the same diameter. */
+static void test_slices_show_equal_circles(void **state)
 {
     (void)state;
     sdm_grid g;
@@ -133,7 +133,7 @@ static void test_slices(void **state)
         if (n && top < 0) top = y;
         if (n || top < 0) continue;
         const int height = y - top, width = right - left + 1;
-        if (height > 20) { // else it is the legend
+        if (height > 20) { // a smaller one belongs to the legend
             assert_true(abs(height - width) <= 3);
             if (!runs) first = height;
             assert_true(abs(height - first) <= 3);
@@ -144,7 +144,8 @@ static void test_slices(void **state)
     }
     assert_int_equal(runs, 3);
     assert_true(yellow > 500);
-    /* the widest axis is 12.5 mm in 340 or 420 pixels */
+    /* The longest axis, 12.5 mm, is drawn on 340 or 420 pixels; the circle has a diameter of 6
+     * mm. */
     assert_true(first > 6 * 26 && first < 6 * 38);
     assert_true(is_colour(p.rgb, 255, 255, 255));
     const int one = p.w;
@@ -158,7 +159,8 @@ static void test_slices(void **state)
     free(e);
 }
 
-/* Constant, NaN and huge values, and grids of one voxel or one line, give a picture too. */
+/* Maps with constant, NaN or huge values, and grids of a single voxel or line, still give a
+ * picture. */
 static void test_slices_of_odd_maps(void **state)
 {
     (void)state;
@@ -182,9 +184,9 @@ static void test_slices_of_odd_maps(void **state)
         }
 }
 
-/* A bright ball on a dark ground with two contours: the first one makes three circles side by side,
- * white inside and black outside. */
-static void test_overlay(void **state)
+/* A bright ball on a dark ground with two contours. The first contour gives three circles side
+ * by side, white inside and black outside. */
+static void test_overlay_shows_contours_on_the_image(void **state)
 {
     (void)state;
     sdm_grid g;
@@ -204,7 +206,8 @@ static void test_overlay(void **state)
             const unsigned char *pixel = p.rgb + 3 * ((size_t)y * (size_t)p.w + (size_t)x);
             yellow += is_colour(pixel, 255, 214, 10);
             if (!is_colour(pixel, 232, 40, 44)) continue;
-            if (y < p.h - 40) bottom = y; // below it is the legend
+            // The legend is below.
+            if (y < p.h - 40) bottom = y;
         }
         if (bottom >= 0 && left < 0) left = x;
         if (bottom >= 0 || left < 0) continue;
@@ -219,8 +222,8 @@ static void test_overlay(void **state)
                             *outside =
                                 p.rgb + 3 * ((size_t)(high + 8) * (size_t)p.w + (size_t)middle);
         assert_true(abs(high + 1 - low - width) <= 3);
-        assert_true(width > 6 * 26 &&
-                    width < 6 * 38); /* 6 mm; the widest axis is 12.5 mm in 340 or 420 pixels */
+        /* A diameter of 6 mm; the longest axis, 12.5 mm, has 340 or 420 pixels. */
+        assert_true(width > 6 * 26 && width < 6 * 38);
         assert_true(is_colour(inside, 255, 255, 255));
         assert_true(is_colour(outside, 0, 0, 0));
         circles++;
@@ -230,7 +233,7 @@ static void test_overlay(void **state)
     assert_true(yellow > 500);
     free(p.rgb);
 
-    /* an image without values, one value, a single voxel */
+    /* An image of NaN only, and an image of a single voxel. */
     for (size_t i = 0; i < sdm_grid_count(&g); i++) image[i] = NAN;
     assert_int_equal(sdm_picture_overlay("test_picture_w.png", &g, image, maps, 1, NULL, NULL),
                      SDM_OK);
@@ -252,7 +255,7 @@ static void test_overlay(void **state)
     free(v);
 }
 
-static void test_plot(void **state)
+static void test_plot_draws_a_straight_line(void **state)
 {
     (void)state;
     double x[101], y[101], z[101];
@@ -265,10 +268,10 @@ static void test_plot(void **state)
     assert_int_equal(
         sdm_picture_plot("test_picture_p.png", "title", "x", "y", true, curves, 2, NULL), SDM_OK);
     picture p = read_png("test_picture_p.png");
-    /* a straight line on a logarithmic axis: the middle of its pixels is the middle of the plot,
-     * and it is straight */
+    /* An exponential on a logarithmic axis: its pixels form a straight line whose centre is the
+     * centre of the plot. */
     double sx = 0, sy = 0, sxx = 0, syy = 0, sxy = 0, n = 0;
-    for (int row = 130; row < p.h; row++) /* below the legend */
+    for (int row = 130; row < p.h; row++) /* start below the legend */
         for (int col = 0; col < p.w; col++) {
             if (!is_colour(p.rgb + 3 * ((size_t)row * (size_t)p.w + (size_t)col), 0, 105, 180))
                 continue;
@@ -285,7 +288,7 @@ static void test_plot(void **state)
     free(p.rgb);
 }
 
-static void test_odd_plots(void **state)
+static void test_odd_plots_are_drawn(void **state)
 {
     (void)state;
     static const double x[4] = {1, 2, INFINITY, 4}, zero[4] = {0}, huge[4] = {1e300, -1e300, 1, 2},
@@ -305,8 +308,8 @@ static void test_odd_plots(void **state)
         }
 }
 
-/* Draws text on a white canvas; returns the box of its ink, x0 y0 x1 y1. */
-static void ink_of(sdm_type type, double x, double y, const char *text, int box[4])
+/* Draws text on a white canvas; box receives the bounding box of the drawn pixels: x0 y0 x1 y1. */
+static void text_draw(sdm_type type, double x, double y, const char *text, int box[4])
 {
     sdm_canvas *c;
     assert_int_equal(sdm_canvas_create("test_picture_t.png", 400, 120, &c, NULL), SDM_OK);
@@ -324,7 +327,7 @@ static void ink_of(sdm_type type, double x, double y, const char *text, int box[
     free(p.rgb);
 }
 
-static void test_text(void **state)
+static void test_text_is_aligned(void **state)
 {
     (void)state;
     int box[4];
@@ -335,41 +338,42 @@ static void test_text(void **state)
     assert_true(fabs(sdm_canvas_text_width(c, 10, "HHHHH") - width / 2) < 0.01);
     sdm_canvas_discard(c);
 
-    /* capitals of the given height on the base line, aligned at the point */
+    /* Capital letters stand on the base line with the given height, aligned at the point. */
     for (int align = 0; align < 3; align++) {
-        ink_of((sdm_type){.size = 20, .align = (sdm_align)align}, 200, 80, "HHHHH", box);
+        text_draw((sdm_type){.size = 20, .align = (sdm_align)align}, 200, 80, "HHHHH", box);
         const double left = 200 - width * align / 2;
         assert_true(abs(box[3] - 79) <= 1 && abs(box[3] - box[1] - 19) <= 2);
         assert_true(fabs(box[0] - left) < 5 && fabs(box[2] - left - width) < 5);
     }
-    ink_of((sdm_type){.size = 20, .align = SDM_CENTRE, .upwards = true}, 200, 60, "HHHHH", box);
+    text_draw((sdm_type){.size = 20, .align = SDM_CENTRE, .upwards = true}, 200, 60, "HHHHH", box);
     assert_true(abs(box[2] - 199) <= 1 && abs(box[2] - box[0] - 19) <= 2);
     assert_true(abs(box[1] + box[3] - 120) <= 6 && fabs(box[3] - box[1] - width) < 8);
 
-    /* whatever the bytes: every character but the space is drawn, malformed ones as '?' */
+    /* Every byte except the space draws something; malformed UTF-8 is drawn as '?'. */
     for (int code = 1; code < 256; code++) {
         const char text[2] = {(char)code, 0};
-        ink_of((sdm_type){.size = 40, .bold = code & 1}, 60, 80, text, box);
+        text_draw((sdm_type){.size = 40, .bold = code & 1}, 60, 80, text, box);
         assert_true((box[2] >= box[0]) == (code != ' '));
     }
     static const char *const odd[] = {"\xE2\x88",     "\xF8\x88\x80\x80", "\xC0\x80",
                                       "\xED\xA0\x80", "\xEF\xBF\xBF",     "\xF4\x90\x80\x80"};
     for (size_t i = 0; i < sizeof odd / sizeof *odd; i++) {
-        ink_of((sdm_type){.size = 20, .halo = true}, 60, 80, odd[i], box);
+        text_draw((sdm_type){.size = 20, .halo = true}, 60, 80, odd[i], box);
         assert_true(box[2] >= box[0]);
     }
-    ink_of((sdm_type){.size = 20}, 60, 80, "", box);
+    text_draw((sdm_type){.size = 20}, 60, 80, "", box);
     assert_true(box[2] < 0);
     static char long_text[5000];
     memset(long_text, 'm', sizeof long_text - 1);
-    ink_of((sdm_type){.size = 20, .align = SDM_RIGHT}, 390, 80, long_text, box);
+    text_draw((sdm_type){.size = 20, .align = SDM_RIGHT}, 390, 80, long_text, box);
     assert_true(box[0] == 0 && box[2] > 370);
 }
 
-static void test_colours(void **state)
+static void test_colours_are_ordered(void **state)
 {
     (void)state;
-    /* lightness rises along the error map, and falls to both sides of zero on the others */
+    /* Lightness increases along the colours of errors, and decreases from zero to both ends of
+     * the other colour maps. */
     int before = -1;
     for (int i = 0; i <= 100; i++) {
         const sdm_colour c = sdm_map_colour(SDM_MAP_ERROR, 0, 1, i / 100.0);
@@ -395,7 +399,7 @@ static void test_colours(void **state)
     assert_true(none.r == none.g && none.g == none.b);
 }
 
-static void test_ticks(void **state)
+static void test_ticks_are_round_numbers(void **state)
 {
     (void)state;
     for (uint64_t i = 0; i < 500; i++) {
@@ -416,7 +420,7 @@ static void test_ticks(void **state)
                                                       "20");
 }
 
-static void test_misuse(void **state)
+static void test_wrong_arguments_are_refused(void **state)
 {
     (void)state;
     sdm_grid g;
@@ -464,12 +468,17 @@ static void test_misuse(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_image_is_exact), cmocka_unit_test(test_contour_is_subpixel),
-        cmocka_unit_test(test_slices),         cmocka_unit_test(test_slices_of_odd_maps),
-        cmocka_unit_test(test_overlay),        cmocka_unit_test(test_plot),
-        cmocka_unit_test(test_odd_plots),      cmocka_unit_test(test_text),
-        cmocka_unit_test(test_colours),        cmocka_unit_test(test_ticks),
-        cmocka_unit_test(test_misuse),
+        cmocka_unit_test(test_image_is_exact),
+        cmocka_unit_test(test_contour_is_subpixel),
+        cmocka_unit_test(test_slices_show_equal_circles),
+        cmocka_unit_test(test_slices_of_odd_maps),
+        cmocka_unit_test(test_overlay_shows_contours_on_the_image),
+        cmocka_unit_test(test_plot_draws_a_straight_line),
+        cmocka_unit_test(test_odd_plots_are_drawn),
+        cmocka_unit_test(test_text_is_aligned),
+        cmocka_unit_test(test_colours_are_ordered),
+        cmocka_unit_test(test_ticks_are_round_numbers),
+        cmocka_unit_test(test_wrong_arguments_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

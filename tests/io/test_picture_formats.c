@@ -1,5 +1,5 @@
-/* The three formats of pictures: chosen by the ending, well-formed, with text as text, the same
- * bytes every time, and nothing left behind by a failure.
+/* The three formats of pictures (PNG, SVG, PDF): chosen by the ending, well-formed, text stored as
+ * text, reproducible bytes, and no file left after a failure.
  * Tests: canvas.c */
 #include <dirent.h>
 #include <math.h>
@@ -22,7 +22,7 @@
 
 enum { SIDE = 12 };
 
-/* Writes one of the four pictures, with titles that need escaping. */
+/* Writes one of the four kinds of picture, with titles that need escaping in XML. */
 static sdm_status write_picture(int kind, const char *path, sdm_error *err)
 {
     static float v[SIDE * SIDE * SIDE];
@@ -52,7 +52,7 @@ static sdm_status write_picture(int kind, const char *path, sdm_error *err)
     }
 }
 
-/* The whole file, with a zero byte at its end. */
+/* The whole file, terminated by a zero byte. The caller frees it. */
 static char *read_file(const char *path, size_t *size)
 {
     FILE *f = fopen(path, "rb");
@@ -65,7 +65,7 @@ static char *read_file(const char *path, size_t *size)
     return data;
 }
 
-/* Demands elements that nest, attributes in quotes, and no stray < or &. */
+/* Fails the test unless elements nest, attributes are quoted, and no unescaped < or & occurs. */
 static void check_xml(const char *at)
 {
     char open[32][32];
@@ -113,7 +113,7 @@ static int count(const char *text, const char *word)
     return n;
 }
 
-static void test_svg(void **state)
+static void test_svg_is_well_formed(void **state)
 {
     (void)state;
     static const int images[] = {2 * 3 + 2, 3 + 1, 2 + 1, 0};
@@ -132,7 +132,8 @@ static void test_svg(void **state)
         check_xml(svg);
         assert_memory_equal(svg + size - 7, "</svg>\n", 7);
         for (int i = 0; i < 3; i++) assert_non_null(strstr(svg, texts[kind][i]));
-        /* lines are paths; only maps and bars of colours are images, each shown once */
+        /* Lines are stored as paths. Only maps and colour bars are images, and each is
+         * referenced once. */
         assert_int_equal(count(svg, "<image "), images[kind]);
         assert_true(count(svg, "<path ") > 5);
         for (const char *p = svg; (p = strstr(p, "href=\"#")); p++) {
@@ -140,7 +141,7 @@ static void test_svg(void **state)
             assert_int_equal(sscanf(p + 7, "%30[a-z0-9]", id + 4), 1);
             assert_int_equal(count(svg, strcat(id, "\"")), 1);
         }
-        /* in the same process, after other pictures, the same bytes */
+        /* Writing again in the same process, after another picture, gives the same bytes. */
         assert_int_equal(write_picture(0, "b.svg", NULL), SDM_OK);
         assert_int_equal(write_picture(kind, "b.svg", NULL), SDM_OK);
         char *other = read_file("b.svg", &again);
@@ -151,7 +152,7 @@ static void test_svg(void **state)
     }
 }
 
-static void test_pdf(void **state)
+static void test_pdf_has_text(void **state)
 {
     (void)state;
     for (int kind = 0; kind < 4; kind++) {
@@ -164,7 +165,7 @@ static void test_pdf(void **state)
         size_t start = size - 6;
         while (start > 0 && memcmp(pdf + start, "startxref", 9)) start--;
         assert_memory_equal(pdf + strtoul(pdf + start + 9, NULL, 10), "xref", 4);
-        /* text is text: a font, and a map of its glyphs to characters */
+        /* Text is stored as text: an embedded font and a map from glyphs to characters. */
         size_t fonts = 0, unicode = 0;
         for (size_t i = 0; i + 10 < size; i++) {
             fonts += !memcmp(pdf + i, "/FontFile", 9);
@@ -191,9 +192,9 @@ static int count_files(const char *folder)
     return n;
 }
 
-/* Unknown endings, folders that are missing or are files' names, and memory that runs out: the
- * right status, and not a file more. */
-static void test_refused(void **state)
+/* Unknown endings, a missing folder or a file in place of a folder, and failing allocations: the
+ * right status and no new file. */
+static void test_failures_leave_no_file(void **state)
 {
     (void)state;
     static const char *const unknown[] = {"a.jpg",    "a",      "png",
@@ -216,7 +217,7 @@ static void test_refused(void **state)
             snprintf(path, sizeof path, "no_such_folder/%s", known[i]);
             assert_int_equal(sdm_picture_check(path, &err), SDM_OK);
             assert_int_equal(write_picture(kind, path, &err), SDM_E_IO);
-            if (i > 0 && kind < 3) continue; // every picture as PNG, the plot in every format
+            if (i > 0 && kind < 3) continue; // all kinds as PNG, only the plot in every format
             for (unsigned long n = 1;; n++) {
                 sdm_alloc_fail_after(n);
                 const sdm_status s = write_picture(kind, known[i], &err);
@@ -236,8 +237,7 @@ static void test_refused(void **state)
     assert_int_equal(sdm_picture_check(NULL, &err), SDM_E_ARG);
 }
 
-/* A limit on the size of files stands for a full disk: the status, and the picture that was there
- * before stays. */
+/* A limit on the file size simulates a full disk: an error status, and the older picture stays. */
 static void test_full_disk(void **state)
 {
     (void)state;
@@ -273,9 +273,9 @@ static void test_full_disk(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_svg),
-        cmocka_unit_test(test_pdf),
-        cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_svg_is_well_formed),
+        cmocka_unit_test(test_pdf_has_text),
+        cmocka_unit_test(test_failures_leave_no_file),
         cmocka_unit_test(test_full_disk),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

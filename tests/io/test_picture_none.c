@@ -1,4 +1,5 @@
-/* A build without cairo: every picture is refused with the option that would give it.
+/* A build without cairo: every picture is refused with a message that names the missing build
+ * option.
  * Tests: picture_none.c */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -10,7 +11,7 @@
 
 #include "sdm/picture.h"
 
-static void test_refused(void **state)
+static void test_pictures_are_refused(void **state)
 {
     (void)state;
     const sdm_grid grid = {.n = {1, 1, 1}};
@@ -36,6 +37,6 @@ static void test_refused(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_refused)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_pictures_are_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

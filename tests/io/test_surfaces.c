@@ -1,4 +1,4 @@
-/* Pictures of surfaces: hidden surfaces, colours, scale, misuse.
+/* Pictures of surfaces: hidden parts, colours, scale, wrong arguments.
  * Tests: surfaces.c */
 #include <math.h>
 #include <setjmp.h>
@@ -13,8 +13,9 @@
 #include "sdm/internal/heap.h"
 #include "sdm/picture.h"
 
-/* Adds the square |x|, |y| <= half at height z, counter-clockwise from above. */
-static void add_square(sdm_mesh *m, double *values, double half, double z, double value)
+/* Adds the square |x|, |y| <= half at height z, counter-clockwise seen from above, with `value`
+ * at its vertices. */
+static void square_append(sdm_mesh *m, double *values, double half, double z, double value)
 {
     sdm_error err;
     const size_t v = m->n_vert, t = m->n_tri;
@@ -29,9 +30,9 @@ static void add_square(sdm_mesh *m, double *values, double half, double z, doubl
     memcpy(m->tri + 3 * t, corners, sizeof corners);
 }
 
-/* A small square above a large one hides its middle, in either order of the triangles; colours
- * follow the sign of the values, and areas the scale. */
-static void test_surfaces(void **state)
+/* A small square above a large one hides its centre, in either order of the triangles. Colours
+ * follow the sign of the values, and areas in pixels follow the scale. */
+static void test_hidden_parts_colours_and_scale(void **state)
 {
     (void)state;
     sdm_error err;
@@ -41,9 +42,9 @@ static void test_surfaces(void **state)
         double values[8];
         for (int k = 0; k < 2; k++)
             if (k == order)
-                add_square(&m, values, 5, 0, 1);
+                square_append(&m, values, 5, 0, 1);
             else
-                add_square(&m, values, 2, 1, -1);
+                square_append(&m, values, 2, 1, -1);
         const sdm_picture_surface s = {"squares", &m, values};
         if (sdm_picture_surfaces("test_surfaces.png", &s, 1, "distance", &err))
             fail_msg("%s", err.text);
@@ -53,8 +54,8 @@ static void test_surfaces(void **state)
     assert_int_equal(p[0].w, p[1].w);
     assert_int_equal(p[0].h, p[1].h);
     assert_memory_equal(p[0].rgb, p[1].rgb, 3 * (size_t)p[0].w * (size_t)p[0].h);
-    /* the oblique view is the widest, 10 mm (cos 30 + sin 30) on 400 pixels; the view from above
-     * comes first */
+    /* The oblique view is the widest: 10 mm (cos 30 + sin 30) on 400 pixels. The view from above
+     * is drawn first. */
     const double pixels = 400 / (10 * (0.5 * sqrt(3) + 0.5)), room = 10 * pixels + 40;
     double green = 0, magenta = 0;
     for (int y = 46; y < 46 + room; y++)
@@ -69,7 +70,7 @@ static void test_surfaces(void **state)
     free(p[1].rgb);
 }
 
-static void test_misuse(void **state)
+static void test_wrong_arguments_are_refused(void **state)
 {
     (void)state;
     sdm_error err;
@@ -77,8 +78,8 @@ static void test_misuse(void **state)
     double values[4];
     const sdm_picture_surface surface = {"a", &mesh, values}, missing = {"a", NULL, NULL};
     assert_int_equal(sdm_picture_surfaces("a.png", &surface, 1, "", &err),
-                     SDM_E_MESH); /* no triangle */
-    add_square(&mesh, values, 1, 0, NAN);
+                     SDM_E_MESH); /* a mesh without triangles */
+    square_append(&mesh, values, 1, 0, NAN);
     assert_int_equal(sdm_picture_surfaces("a.png", &surface, 0, "", &err), SDM_E_ARG);
     assert_int_equal(sdm_picture_surfaces("a.png", &surface, 9, "", &err), SDM_E_ARG);
     assert_int_equal(sdm_picture_surfaces("a.png", &missing, 1, "", &err), SDM_E_ARG);
@@ -97,8 +98,8 @@ static void test_misuse(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_surfaces),
-        cmocka_unit_test(test_misuse),
+        cmocka_unit_test(test_hidden_parts_colours_and_scale),
+        cmocka_unit_test(test_wrong_arguments_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,5 @@
-/* Reading of images: voxels of every type, from files made byte by byte and from our own writers.
+/* Reading of images: voxels of every type, from files assembled byte by byte and from the library's
+ * own writers.
  * Tests: voxels.c */
 #include "volume_files.h"
 
@@ -7,18 +8,18 @@
 
 static const int64_t size_small[3] = {2, 3, 4};
 
-/* Whole numbers that fit every type; those that have a sign use it. */
+/* Integers that fit the type; signed types get negative ones. */
 static void small_values(int type, double v[24])
 {
     const int sign = type == 1 || type == 3 || type == 5 || type >= 7;
     for (int i = 0; i < 24; i++) v[i] = 5 * i + (sign ? -60 : 3);
-    if (type >= 2) v[7] = sign ? -3000 : 60000; /* both bytes count */
+    if (type >= 2) v[7] = sign ? -3000 : 60000; /* needs both bytes */
     if (type >= 4) v[8] = sign ? -70000 : 3000000000.0;
     if (type == 6 || type == 7) v[9] = 1099511627776.0; /* 2^40 */
     if (type >= 8) v[10] = 0.375;
 }
 
-static void check_small(const char *path, int type)
+static void small_check(const char *path, int type)
 {
     sdm_volume v = {0};
     double want[24];
@@ -34,7 +35,7 @@ static void check_small(const char *path, int type)
     assert_null(v.values);
 }
 
-static void test_every_type(void **state)
+static void test_types_in_both_byte_orders(void **state)
 {
     (void)state;
     static bytes b, raw;
@@ -48,13 +49,13 @@ static void test_every_type(void **state)
                 add_nifti(&b, version, big, type, size_small);
                 add(&b, raw.data, raw.size);
                 put_file("test_volume.nii", b.data, b.size);
-                check_small("test_volume.nii", type);
+                small_check("test_volume.nii", type);
                 bytes *zipped = malloc(sizeof *zipped);
                 assert_non_null(zipped);
                 zipped->size = 0;
                 add_zipped(zipped, b.data, b.size, 31);
                 put_file("test_volume.nii.GZ", zipped->data, zipped->size);
-                check_small("test_volume.nii.GZ", type);
+                small_check("test_volume.nii.GZ", type);
                 free(zipped);
             }
             for (int zip = 0; zip < 2; zip++) {
@@ -70,7 +71,7 @@ static void test_every_type(void **state)
                 else
                     add(&b, raw.data, raw.size);
                 put_file("test_volume.nrrd", b.data, b.size);
-                check_small("test_volume.nrrd", type);
+                small_check("test_volume.nrrd", type);
                 b.size = 0;
                 add_text(&b,
                          "NDims=3\nDimSize = 2 3 4\nElementSpacing = 1 1 1\n%s = "
@@ -83,12 +84,12 @@ static void test_every_type(void **state)
                 else
                     add(&b, raw.data, raw.size);
                 put_file("test_volume.mha", b.data, b.size);
-                check_small("test_volume.mha", type);
+                small_check("test_volume.mha", type);
             }
         }
 }
 
-/* values[i] of the phantom's arrangement as an array of the C type */
+/* Fills `block`, an array of T, with the phantom's values. */
 #define FILL(T)                                                                                    \
     for (int i = 0; i < PHANTOM_COUNT; i++) ((T *)block)[i] = (T)want[i]
 
@@ -165,8 +166,8 @@ static void test_round_trips(void **state)
             for (int c = 0; c < 8; c++) {
                 const double at[3] = {(c & 1) * 6.0, (c >> 1 & 1) * 4.0, (c >> 2) * 8.0};
                 double w[3];
-                /* the convention itself, not our own function: origin + dir * diag(spacing) * index
-                 */
+                /* The convention spelled out rather than sdm_grid_world(): origin + dir *
+                 * diag(spacing) * index. */
                 for (int r = 0; r < 3; r++) {
                     w[r] = g.origin[r];
                     for (int a = 0; a < 3; a++) w[r] += g.dir[3 * r + a] * g.spacing[a] * at[a];
@@ -178,8 +179,8 @@ static void test_round_trips(void **state)
     }
 }
 
-/* What the headers of our own files call the types, as other programs know them. */
-static void test_written_types(void **state)
+/* Headers written by the library name each type as the formats specify. */
+static void test_names_of_written_types(void **state)
 {
     (void)state;
     static const char *const nrrd[10] = {
@@ -215,8 +216,8 @@ static void test_written_types(void **state)
     }
 }
 
-/* A map written by sdm_image_write() is the float32 image of sdm_volume_write(). */
-static void test_one_writer(void **state)
+/* sdm_image_write() writes the same bytes as sdm_volume_write() for a float32 image. */
+static void test_both_writers_agree(void **state)
 {
     (void)state;
     const sdm_grid g = phantom_grid(0);
@@ -234,7 +235,7 @@ static void test_one_writer(void **state)
     assert_true(n == m && n > 0 && !memcmp(a, b, n));
 }
 
-static void test_not_finite(void **state)
+static void test_nan_and_infinity_are_kept(void **state)
 {
     (void)state;
     static bytes b;
@@ -253,8 +254,8 @@ static void test_not_finite(void **state)
     sdm_volume_dispose(&v);
 }
 
-/* gzip data of several members, as parallel compressors write them. */
-static void test_members(void **state)
+/* gzip data made of several members, as parallel compressors write them. */
+static void test_gzip_of_several_members(void **state)
 {
     (void)state;
     static bytes b, zipped;
@@ -267,15 +268,18 @@ static void test_members(void **state)
     add_zipped(&zipped, b.data + 100, 0, 31);
     add_zipped(&zipped, b.data + 100, b.size - 100, 31);
     put_file("test_volume.nii.gz", zipped.data, zipped.size);
-    check_small("test_volume.nii.gz", 5);
+    small_check("test_volume.nii.gz", 5);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_every_type), cmocka_unit_test(test_round_trips),
-        cmocka_unit_test(test_one_writer), cmocka_unit_test(test_written_types),
-        cmocka_unit_test(test_not_finite), cmocka_unit_test(test_members),
+        cmocka_unit_test(test_types_in_both_byte_orders),
+        cmocka_unit_test(test_round_trips),
+        cmocka_unit_test(test_both_writers_agree),
+        cmocka_unit_test(test_names_of_written_types),
+        cmocka_unit_test(test_nan_and_infinity_are_kept),
+        cmocka_unit_test(test_gzip_of_several_members),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

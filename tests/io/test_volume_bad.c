@@ -1,5 +1,5 @@
-/* Images that are cut off, changed at random or made to exhaust memory: an error, and nothing
- * large allocated before it.
+/* Images that are truncated, changed at random or made to exhaust memory: an error, without
+ * allocating more than the file can justify.
  * Tests: nifti_read.c stream.c */
 #include "volume_files.h"
 
@@ -10,7 +10,7 @@
 
 #define STEPS "space directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\n"
 
-/* The small files of every format, header and voxels as a reader meets them. */
+/* Builds sample file number `which`, one for each format. *header: size of the header in bytes. */
 static size_t make_sample(int which, bytes *b, const char **name, size_t *header)
 {
     static const char *const names[] = {"test_volume_bad_s.nii", "test_volume_bad_s.nii.gz",
@@ -55,8 +55,8 @@ static size_t make_sample(int which, bytes *b, const char **name, size_t *header
 }
 enum { SAMPLES = 5 };
 
-/* Every prefix of a file is refused: these files have no byte to spare. */
-static void test_truncated(void **state)
+/* Every proper prefix of a sample is refused: the files have no optional bytes. */
+static void test_truncated_files_are_refused(void **state)
 {
     (void)state;
     static bytes b;
@@ -81,9 +81,9 @@ static void test_truncated(void **state)
     }
 }
 
-/* Random bytes changed: an image or an error, in any case no more memory than the file can account
- * for. */
-static void test_damaged(void **state)
+/* Random changes of bytes give an image or an error, and never allocate more memory than the
+ * size of the file justifies. */
+static void test_damaged_files_are_safe(void **state)
 {
     (void)state;
     static bytes b, bad;
@@ -119,8 +119,8 @@ static void test_damaged(void **state)
     assert_true(read > 20 && refused > 1000);
 }
 
-/* gzip data that become more, or less, than the header declares. */
-static void test_bomb(void **state)
+/* gzip data that expand to more, or to less, than the header declares. */
+static void test_gzip_of_wrong_size(void **state)
 {
     (void)state;
     static bytes b;
@@ -139,7 +139,7 @@ static void test_bomb(void **state)
     add_zipped(&b, zeros, 23, 31);
     put_file("test_volume_bad.nrrd", b.data, b.size);
     assert_refused("test_volume_bad.nrrd", SDM_E_FORMAT, "ends too early");
-    /* a wrong checksum of right voxels */
+    /* Correct voxels with a wrong checksum. */
     b.size = header;
     add_zipped(&b, zeros, 24, 31);
     b.data[b.size - 8] ^= 1;
@@ -147,14 +147,14 @@ static void test_bomb(void **state)
     assert_refused("test_volume_bad.nrrd", SDM_E_FORMAT, "damaged");
     b.size = 0;
     add_text(&b, "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 65536 65536 1024\nencoding: "
-                 "gzip\nspace: LPS\n" STEPS "\n"); /* 4 TiB */
+                 "gzip\nspace: LPS\n" STEPS "\n"); /* 4 TiB of voxels */
     add_zipped(&b, zeros, 16 << 20, 31);
     put_file("test_volume_bad.nrrd", b.data, b.size);
     assert_refused("test_volume_bad.nrrd", SDM_E_FORMAT, "cannot hold them");
     free(zeros);
 }
 
-static void test_no_memory(void **state)
+static void test_each_allocation_may_fail(void **state)
 {
     (void)state;
     static bytes b;
@@ -173,12 +173,13 @@ static void test_no_memory(void **state)
             assert_true(s == SDM_OK || v.values == NULL);
         }
         assert_int_equal(s, SDM_OK);
-        assert_int_equal(n, which == 3 ? 4 : 3); /* buffer, (segments,) voxels, then none fails */
+        /* allocations: buffer, voxels, and segments for sample 3 */
+        assert_int_equal(n, which == 3 ? 4 : 3);
         sdm_volume_dispose(&v);
     }
 }
 
-static void test_misuse(void **state)
+static void test_wrong_arguments_are_refused(void **state)
 {
     (void)state;
     sdm_volume v = {0};
@@ -213,7 +214,7 @@ static void test_misuse(void **state)
     assert_string_equal(sdm_voxel_name(SDM_VOXEL_FLOAT64), "float64");
 }
 
-/* An image that is read again gives up what it held. */
+/* Reading into a volume that holds an image frees the old one. */
 static void test_read_again(void **state)
 {
     (void)state;
@@ -237,9 +238,12 @@ static void test_read_again(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_truncated), cmocka_unit_test(test_damaged),
-        cmocka_unit_test(test_bomb),      cmocka_unit_test(test_no_memory),
-        cmocka_unit_test(test_misuse),    cmocka_unit_test(test_read_again),
+        cmocka_unit_test(test_truncated_files_are_refused),
+        cmocka_unit_test(test_damaged_files_are_safe),
+        cmocka_unit_test(test_gzip_of_wrong_size),
+        cmocka_unit_test(test_each_allocation_may_fail),
+        cmocka_unit_test(test_wrong_arguments_are_refused),
+        cmocka_unit_test(test_read_again),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

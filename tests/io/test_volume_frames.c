@@ -1,5 +1,5 @@
-/* Reading of images: where the voxels lie, in every way a header can say it, voxels beside the
- * header, and segments.
+/* Reading of images: positions of the voxels in every way a header can state them, voxels in a
+ * separate file, and segments.
  * Tests: frame.c image_read.c */
 #include "volume_files.h"
 
@@ -7,8 +7,7 @@
 
 static const int64_t size[3] = {2, 3, 4};
 
-/* Axes of spacing 2, 3, 4 along the world's; what each header says is written down in LPS by hand.
- */
+/* Spacings 2, 3, 4 mm along the world axes; the expected LPS positions are written out by hand. */
 static void test_nifti_frames(void **state)
 {
     (void)state;
@@ -38,7 +37,8 @@ static void test_nifti_frames(void **state)
             assert_at(&v, 1, 2, 3, -2, -6, 12, 1e-9);
             assert_true(v.values[7] == -3000);
 
-            /* a quarter turn about z: i runs along +y (RAS), j along -x; k against z by qfac */
+            /* A rotation by pi / 2 about z: i runs along +y (RAS), j along -x; qfac = -1 makes k
+             * run along -z. */
             store_real(q + 2 * real, real, big, sqrt(0.5));
             for (size_t a = 0; a < 3; a++)
                 store_real(offset + real * a, real, big, 10 * (double)(a + 1));
@@ -52,7 +52,8 @@ static void test_nifti_frames(void **state)
             assert_at(&v, 0, 1, 0, -7, -20, 30, 1e-6);
             assert_at(&v, 0, 0, 1, -10, -20, 26, 1e-6);
 
-            /* sform goes before qform; i along z (RAS), j along -x, k along y; micrometres */
+            /* sform takes precedence over qform. i runs along +z (RAS), j along -x, k along +y;
+             * the unit is micrometres. */
             const double m[12] = {0, -3000, 0, 1000, 0, 0, 4000, 2000, 2000, 0, 0, 3000};
             for (size_t i = 0; i < 12; i++) store_real(row + real * i, real, big, m[i]);
             store(scode, code, big, 2);
@@ -70,8 +71,8 @@ static void test_nifti_frames(void **state)
         }
 }
 
-/* Voxels 1 .. 24 as bytes behind a header. */
-static void put_text_file(const char *path, const char *header)
+/* Writes the header, then the voxels 1 .. 24 as bytes. */
+static void voxel_file_save(const char *path, const char *header)
 {
     static bytes b;
     b.size = 0;
@@ -87,40 +88,41 @@ static void test_nrrd_frames(void **state)
 {
     (void)state;
     sdm_volume v = {0};
-    put_text_file("test_volume.nrrd",
-                  NRRD "space: left-posterior-superior\n" STEPS "content: one\ttwo\n\n");
+    voxel_file_save("test_volume.nrrd",
+                    NRRD "space: left-posterior-superior\n" STEPS "content: one\ttwo\n\n");
     assert_read("test_volume.nrrd", &v);
     assert_true(v.placed && v.values[23] == 24 && v.min == 1 && v.max == 24);
     assert_string_equal(v.text, "one two");
     assert_at(&v, 0, 0, 0, 1, 2, 3, 1e-12);
     assert_at(&v, 1, 2, 3, 7, 4, -9, 1e-12);
-    put_text_file("test_volume.nrrd", NRRD "space: RAS\n" STEPS "\n");
+    voxel_file_save("test_volume.nrrd", NRRD "space: RAS\n" STEPS "\n");
     assert_read("test_volume.nrrd", &v);
     assert_at(&v, 1, 2, 3, -7, -4, -9, 1e-12);
-    put_text_file("test_volume.nrrd", NRRD
-                  "space: left-anterior-superior\nspace units: \"um\" \"um\" \"um\"\n" STEPS "\n");
+    voxel_file_save("test_volume.nrrd",
+                    NRRD "space: left-anterior-superior\nspace units: \"um\" \"um\" \"um\"\n" STEPS
+                         "\n");
     assert_read("test_volume.nrrd", &v);
     assert_at(&v, 1, 2, 3, 7e-3, -4e-3, -9e-3, 1e-12);
-    put_text_file("test_volume.nrrd", NRRD "spacings: 2 3 4\n\n");
+    voxel_file_save("test_volume.nrrd", NRRD "spacings: 2 3 4\n\n");
     assert_read("test_volume.nrrd", &v);
     assert_false(v.placed);
     assert_at(&v, 1, 2, 3, 2, 6, 12, 1e-12);
-    put_text_file("test_volume.nrrd",
-                  NRRD "space: LPS\nspace directions: (0,2,0) (3,0,0) (0,0,-4)\n\n");
+    voxel_file_save("test_volume.nrrd",
+                    NRRD "space: LPS\nspace directions: (0,2,0) (3,0,0) (0,0,-4)\n\n");
     assert_read("test_volume.nrrd", &v);
     assert_false(v.placed);
-    put_text_file("test_volume.nrrd", NRRD "space dimension: 3\n" STEPS "\n");
+    voxel_file_save("test_volume.nrrd", NRRD "space dimension: 3\n" STEPS "\n");
     assert_read("test_volume.nrrd", &v);
     assert_false(v.placed);
     sdm_volume_dispose(&v);
 }
 
-/* Voxels beside the header, with something before them. */
+/* Voxels in a separate file, with bytes to skip at its start. */
 static void test_detached(void **state)
 {
     (void)state;
     sdm_volume v = {0};
-    put_text_file("test_volume.raw", "line\nxx");
+    voxel_file_save("test_volume.raw", "line\nxx");
     static const char *const nrrd[] = {"data file: test_volume.raw\nline skip: 1\nbyte skip: 2\n",
                                        "datafile: ./test_volume.raw\nbyte skip: -1\n\n"};
     for (int i = 0; i < 2; i++) {
@@ -149,7 +151,8 @@ static void test_detached(void **state)
     assert_refused("test_volume.mhd", SDM_E_IO, "test_volume.raw: cannot open");
 }
 
-/* Two layers of 3 x 2 x 2 voxels, the axis of the layers first, second or last. */
+/* Two layers of 3 x 2 x 2 voxels; the axis of the layers is the first, the second or the last
+ * one. */
 static void test_segments(void **state)
 {
     (void)state;
@@ -157,7 +160,7 @@ static void test_segments(void **state)
     static const char *const directions[] = {"none (1,0,0) (0,1,0) (0,0,1)",
                                              "(1,0,0) none (0,1,0) (0,0,1)",
                                              "(1,0,0) (0,1,0) (0,0,1) none"};
-    static const int step[] = {1, 3, 12}; /* voxels of a layer that lie together */
+    static const int step[] = {1, 3, 12}; /* number of consecutive voxels of one layer */
     for (int form = 0; form < 3; form++) {
         sdm_volume v = {0};
         sdm_error err;
@@ -171,7 +174,7 @@ static void test_segments(void **state)
                  "tympani\nSegment0_Layer:=1\nSegment0_LabelValue:=7\n"
                  "Segment2_ID:=b\nSegment2_Name:=c\nSegment2_Layer:=0\nSegment2_LabelValue:=-2\n\n",
                  sizes[form], directions[form]);
-        put_text_file("test_volume.seg.nrrd", header);
+        voxel_file_save("test_volume.seg.nrrd", header);
         assert_read("test_volume.seg.nrrd", &v);
         assert_true(v.n_layers == 2 && v.n_segments == 2 && v.grid.n[0] == 3 && v.grid.n[1] == 2 &&
                     v.grid.n[2] == 2);
@@ -190,37 +193,38 @@ static void test_segments(void **state)
     }
 }
 
-/* Files of older versions of Slicer state neither layer nor value. */
+/* Files of older versions of 3D Slicer state neither layer nor label value: segment i is the
+ * value 1 of layer i. */
 static void test_segments_unstated(void **state)
 {
     (void)state;
     sdm_volume v = {0};
-    put_text_file("test_volume.seg.nrrd",
-                  "NRRD0005\ntype: unsigned char\ndimension: 4\nspace: RAS\nsizes: 2 3 2 2\n"
-                  "space directions: none (1,0,0) (0,1,0) (0,0,1)\nencoding: raw\nspace "
-                  "origin: (0,0,0)\nSegment0_ID:=a\nSegment1_ID:=b\n\n");
+    voxel_file_save("test_volume.seg.nrrd",
+                    "NRRD0005\ntype: unsigned char\ndimension: 4\nspace: RAS\nsizes: 2 3 2 2\n"
+                    "space directions: none (1,0,0) (0,1,0) (0,0,1)\nencoding: raw\nspace "
+                    "origin: (0,0,0)\nSegment0_ID:=a\nSegment1_ID:=b\n\n");
     assert_read("test_volume.seg.nrrd", &v);
     assert_true(v.n_segments == 2 && v.segments[0].layer == 0 && v.segments[1].layer == 1);
     assert_true(v.segments[0].value == 1 && v.segments[1].value == 1);
     sdm_volume_dispose(&v);
 }
 
-/* Rounded directions are set right, a mirrored frame is kept. */
+/* Directions rounded in the header are made orthonormal; a mirrored frame is kept. */
 static void test_orthonormal(void **state)
 {
     (void)state;
     sdm_volume v = {0};
-    put_text_file("test_volume.nrrd", NRRD "space: LPS\nspace directions: (0.8660,0.5,0) "
-                                           "(0.5,-0.8660,0) (0,0,-1)\nspace origin: (0,0,0)\n\n");
+    voxel_file_save("test_volume.nrrd", NRRD "space: LPS\nspace directions: (0.8660,0.5,0) "
+                                             "(0.5,-0.8660,0) (0,0,-1)\nspace origin: (0,0,0)\n\n");
     assert_read("test_volume.nrrd", &v);
     assert_int_equal(sdm_grid_check(&v.grid, NULL), SDM_OK);
     assert_at(&v, 1, 0, 0, 0.8660, 0.5, 0, 1e-4);
     assert_at(&v, 0, 1, 0, 0.5, -0.8660, 0, 1e-4);
     assert_at(&v, 0, 0, 1, 0, 0, -1, 1e-12);
-    put_text_file(
+    voxel_file_save(
         "test_volume.nrrd",
         NRRD "space: LPS\nspace directions: (1,0.01,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\n\n");
-    assert_read("test_volume.nrrd", &v); /* 0.01 voxels at a corner */
+    assert_read("test_volume.nrrd", &v); /* the skew moves a corner by 0.01 voxels */
     for (int a = 0; a < 3; a++)
         for (int c = 0; c < 3; c++) {
             double dot = 0;

@@ -1,5 +1,5 @@
-/* Images of a kind that is not read, or with a header that cannot be: each with a status and a
- * message that names the reason.
+/* Images of unsupported kinds or with invalid headers: each gives a status and a message that names
+ * the reason.
  * Tests: metaimage_read.c nrrd_read.c nrrd_segments.c */
 #include "volume_files.h"
 
@@ -15,9 +15,9 @@
 #define LOCAL "ElementDataFile = LOCAL\n"
 
 typedef struct refusal {
-    const char *name, *header; /* 24 bytes follow the header */
+    const char *name, *header; /* 24 bytes of voxels follow the header */
     sdm_status status;
-    const char *part; /* of the message */
+    const char *part; /* expected part of the message */
 } refusal;
 
 static const refusal nrrd_refusals[] = {
@@ -156,7 +156,7 @@ static const refusal meta_refusals[] = {
      NULL},
 };
 
-static void check_refusals(const refusal *r, size_t n)
+static void refusals_check(const refusal *r, size_t n)
 {
     for (size_t i = 0; i < n; i++) {
         static bytes b;
@@ -176,18 +176,19 @@ static void check_refusals(const refusal *r, size_t n)
     }
 }
 
-static void test_refusals(void **state)
+static void test_bad_text_headers_are_refused(void **state)
 {
     (void)state;
-    check_refusals(nrrd_refusals, sizeof nrrd_refusals / sizeof *nrrd_refusals);
-    check_refusals(meta_refusals, sizeof meta_refusals / sizeof *meta_refusals);
+    refusals_check(nrrd_refusals, sizeof nrrd_refusals / sizeof *nrrd_refusals);
+    refusals_check(meta_refusals, sizeof meta_refusals / sizeof *meta_refusals);
 }
 
 #define NIFTI "test_volume_bad.nii"
 
-/* A header of version 1 with a number changed: `real` or an integer of `size` bytes. */
-static void refuse_nifti(size_t at, size_t size, bool real, double value, sdm_status status,
-                         const char *part)
+/* Expects a refusal of a NIfTI-1 header in which one number is changed: at byte `at`, a real or
+ * an integer of `size` bytes. */
+static void nifti_refused(size_t at, size_t size, bool real, double value, sdm_status status,
+                          const char *part)
 {
     static bytes b;
     static const int64_t n[3] = {2, 3, 4};
@@ -201,29 +202,29 @@ static void refuse_nifti(size_t at, size_t size, bool real, double value, sdm_st
     assert_refused(NIFTI, status, part);
 }
 
-static void test_nifti_refusals(void **state)
+static void test_bad_nifti_headers_are_refused(void **state)
 {
     (void)state;
-    refuse_nifti(0, 4, false, 349, SDM_E_FORMAT, "begins neither with 348 nor with 540");
-    refuse_nifti(344, 4, false, 0, SDM_E_FORMAT, "the mark 'n+1' is missing");
-    refuse_nifti(344, 4, false, 0x31696e, SDM_E_UNSUPPORTED, ".hdr and .img");
-    refuse_nifti(40, 2, false, 2, SDM_E_UNSUPPORTED, "2 dimensions");
-    refuse_nifti(40, 2, false, 0, SDM_E_FORMAT, "0 dimensions");
-    refuse_nifti(40, 2, false, 8, SDM_E_FORMAT, "8 dimensions");
-    refuse_nifti(42, 2, false, -1, SDM_E_FORMAT, "size along x is -1");
-    refuse_nifti(44, 2, false, 0, SDM_E_FORMAT, "size along y is 0");
-    refuse_nifti(46, 2, false, 32767, SDM_E_FORMAT, "the file has 24");
-    refuse_nifti(70, 2, false, 128, SDM_E_UNSUPPORTED, "NIfTI type 128");
-    refuse_nifti(84, 4, true, NAN, SDM_E_FORMAT, "voxels of nan");
-    refuse_nifti(84, 4, true, INFINITY, SDM_E_FORMAT, "voxels of inf");
-    refuse_nifti(84, 4, true, -1, SDM_E_FORMAT, "voxels of -1");
-    refuse_nifti(108, 4, true, 351, SDM_E_FORMAT, "begin at byte 351");
-    refuse_nifti(108, 4, true, 352.5, SDM_E_FORMAT, "begin at byte 352.5");
-    refuse_nifti(108, 4, true, 353, SDM_E_FORMAT, "the file has 23");
-    refuse_nifti(108, 4, true, 1e9, SDM_E_FORMAT, "ends too early");
-    refuse_nifti(108, 4, true, NAN, SDM_E_FORMAT, "begin at byte nan");
-    refuse_nifti(112, 4, true, INFINITY, SDM_E_FORMAT, "scaled by inf");
-    refuse_nifti(254, 2, false, 1, SDM_E_FORMAT, "spacing along x is 0"); /* an empty sform */
+    nifti_refused(0, 4, false, 349, SDM_E_FORMAT, "begins neither with 348 nor with 540");
+    nifti_refused(344, 4, false, 0, SDM_E_FORMAT, "the mark 'n+1' is missing");
+    nifti_refused(344, 4, false, 0x31696e, SDM_E_UNSUPPORTED, ".hdr and .img");
+    nifti_refused(40, 2, false, 2, SDM_E_UNSUPPORTED, "2 dimensions");
+    nifti_refused(40, 2, false, 0, SDM_E_FORMAT, "0 dimensions");
+    nifti_refused(40, 2, false, 8, SDM_E_FORMAT, "8 dimensions");
+    nifti_refused(42, 2, false, -1, SDM_E_FORMAT, "size along x is -1");
+    nifti_refused(44, 2, false, 0, SDM_E_FORMAT, "size along y is 0");
+    nifti_refused(46, 2, false, 32767, SDM_E_FORMAT, "the file has 24");
+    nifti_refused(70, 2, false, 128, SDM_E_UNSUPPORTED, "NIfTI type 128");
+    nifti_refused(84, 4, true, NAN, SDM_E_FORMAT, "voxels of nan");
+    nifti_refused(84, 4, true, INFINITY, SDM_E_FORMAT, "voxels of inf");
+    nifti_refused(84, 4, true, -1, SDM_E_FORMAT, "voxels of -1");
+    nifti_refused(108, 4, true, 351, SDM_E_FORMAT, "begin at byte 351");
+    nifti_refused(108, 4, true, 352.5, SDM_E_FORMAT, "begin at byte 352.5");
+    nifti_refused(108, 4, true, 353, SDM_E_FORMAT, "the file has 23");
+    nifti_refused(108, 4, true, 1e9, SDM_E_FORMAT, "ends too early");
+    nifti_refused(108, 4, true, NAN, SDM_E_FORMAT, "begin at byte nan");
+    nifti_refused(112, 4, true, INFINITY, SDM_E_FORMAT, "scaled by inf");
+    nifti_refused(254, 2, false, 1, SDM_E_FORMAT, "spacing along x is 0"); /* an sform of zeros */
 
     static bytes b;
     const int64_t four[3] = {2, 3, 4}, large[3] = {INT64_C(1) << 42, INT64_C(1) << 31, 1};
@@ -250,7 +251,7 @@ static void test_nifti_refusals(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_refusals),
-                                       cmocka_unit_test(test_nifti_refusals)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bad_text_headers_are_refused),
+                                       cmocka_unit_test(test_bad_nifti_headers_are_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

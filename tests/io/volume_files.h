@@ -1,5 +1,5 @@
-/* Image files made byte by byte, without the writers of the library, for the tests of its readers.
- */
+/* Image files assembled byte by byte, independent of the library's writers, for tests of its
+ * readers. */
 #ifndef SDM_TEST_VOLUME_FILES_H
 #define SDM_TEST_VOLUME_FILES_H
 
@@ -18,7 +18,7 @@
 
 enum { FILE_MAX = 1 << 16 };
 
-/* A file under construction. */
+/* A file that is being assembled. */
 typedef struct bytes {
     unsigned char data[FILE_MAX];
     size_t size;
@@ -50,7 +50,7 @@ static inline void add_text(bytes *b, const char *fmt, ...)
     add(b, line, (size_t)n);
 }
 
-/* Compressed by zlib: window 31 gives gzip, 15 zlib's own wrapper. */
+/* Appends data compressed by zlib. window 31: gzip, 15: zlib format. */
 static inline void add_zipped(bytes *b, const void *data, size_t size, int window)
 {
     z_stream z = {.next_in = (z_const Bytef *)data, .avail_in = (uInt)size};
@@ -62,7 +62,8 @@ static inline void add_zipped(bytes *b, const void *data, size_t size, int windo
     deflateEnd(&z);
 }
 
-/* Bytes of a number in either order, from its value: a machine's own order plays no part. */
+/* Stores the `size` low bytes of v in little- or big-endian order, whatever the byte order of
+ * the machine. */
 static inline void store(unsigned char *p, size_t size, int big, uint64_t v)
 {
     for (size_t i = 0; i < size; i++) p[big ? size - 1 - i : i] = (unsigned char)(v >> 8 * i);
@@ -78,7 +79,8 @@ static inline void store_real(unsigned char *p, size_t size, int big, double v)
     store(p, size, big, size == 4 ? u32 : u64);
 }
 
-/* The ten types and what the formats call them, from their specifications. */
+/* The ten voxel types and their names in the formats, from the specifications. nifti: datatype
+ * code. */
 static const struct {
     size_t size;
     int real, nifti;
@@ -105,8 +107,8 @@ static inline void add_voxels(bytes *b, int type, int big, const double *v, size
     }
 }
 
-/* A NIfTI header of version 1 or 2 and its four bytes without extensions; both codes 0, spacing 1,
- * slope 0. */
+/* Appends a NIfTI header of version 1 or 2, with the four bytes that state no extensions. qform
+ * and sform codes are 0, spacings 1, slope 0. */
 static inline void add_nifti(bytes *b, int version, int big, int type, const int64_t n[3])
 {
     unsigned char *h = b->data;
@@ -137,7 +139,7 @@ static inline void assert_text(const char *text, const char *part)
     if (!strstr(text, part)) fail_msg("'%s' is not in '%s'", part, text);
 }
 
-/* LPS position of a voxel. */
+/* Asserts the LPS position (x, y, z) of voxel (i, j, k). */
 static inline void assert_at(const sdm_volume *v, double i, double j, double k, double x, double y,
                              double z, double tolerance)
 {
@@ -156,7 +158,7 @@ static inline void assert_read(const char *path, sdm_volume *v)
     if (sdm_volume_read(path, v, &err)) fail_msg("%s", err.text);
 }
 
-/* The file is refused with this status and a message that has `part` in it, and the volume is left
+/* Asserts that reading gives this status and a message with `part` in it, and leaves the volume
  * empty. */
 static inline void assert_refused(const char *path, sdm_status status, const char *part)
 {

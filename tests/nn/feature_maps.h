@@ -1,4 +1,5 @@
-/* Feature maps for tests: memory with a border, random content, looks from outside. */
+/* Feature maps for tests: allocation with gaps between the rows, random content, access by
+ * voxel, and a check that the gaps stay zero. */
 #ifndef TEST_FEATURE_MAPS_H
 #define TEST_FEATURE_MAPS_H
 
@@ -14,7 +15,9 @@ typedef struct maps {
     float *memory, *at;
 } maps;
 
-static inline float *test_floats(size_t n, uint64_t stream)
+/* n random numbers in -0.5 .. 0.5, the same for the same stream. The caller frees them with
+ * sdm_free(). */
+static inline float *floats_random(size_t n, uint64_t stream)
 {
     float *v;
     assert_int_equal(SDM_ALLOC(&v, n, "test", NULL), SDM_OK);
@@ -22,12 +25,13 @@ static inline float *test_floats(size_t n, uint64_t stream)
     return v;
 }
 
+/* Bytes of the allocation, gaps between rows, planes and channels included. */
 static inline size_t maps_bytes(const maps *m)
 {
     return sdm_fmap_floats(&m->g, m->channels) * sizeof(float);
 }
 
-/* Number `voxel` of channel c, counted in map order. */
+/* Address of a voxel of channel c; voxels count in map order (x fastest, without gaps). */
 static inline float *maps_voxel(const maps *m, size_t c, size_t voxel)
 {
     const size_t x = voxel % m->g.n[0], y = voxel / m->g.n[0] % m->g.n[1],
@@ -35,23 +39,25 @@ static inline float *maps_voxel(const maps *m, size_t c, size_t voxel)
     return m->at + c * m->g.stride + z * m->g.plane + y * m->g.row + x;
 }
 
+/* Voxels of one channel. */
 static inline size_t maps_voxels(const maps *m) { return m->g.n[0] * m->g.n[1] * m->g.n[2]; }
 
-/* As an operator finds it: rubbish between the voxels, zeros where sdm_fmap_clear_gaps() writes
- * them. */
+/* New maps in the state that an operator expects of its output: random values everywhere, except
+ * zeros in the gaps that sdm_fmap_clear_gaps() clears. */
 static inline maps maps_new(const sdm_fmap *g, size_t channels)
 {
     maps m = {
-        .g = *g, .channels = channels, .memory = test_floats(sdm_fmap_floats(g, channels), 8)};
+        .g = *g, .channels = channels, .memory = floats_random(sdm_fmap_floats(g, channels), 8)};
     m.at = m.memory + g->lead;
     sdm_fmap_clear_gaps(g, channels, m.at);
     return m;
 }
 
+/* New maps with random voxels and cleared gaps. */
 static inline maps maps_random(const sdm_fmap *g, size_t channels, uint64_t stream)
 {
     maps m = maps_new(g, channels);
-    float *map = test_floats(channels * maps_voxels(&m), stream);
+    float *map = floats_random(channels * maps_voxels(&m), stream);
     for (size_t c = 0; c < channels; c++)
         sdm_fmap_read(g, map + c * maps_voxels(&m), m.at + c * g->stride);
     sdm_free(map);
@@ -60,7 +66,7 @@ static inline maps maps_random(const sdm_fmap *g, size_t channels, uint64_t stre
 
 static inline void maps_free(maps *m) { sdm_free(m->memory); }
 
-/* [channels][z][y][x] */
+/* A copy without gaps: v[channels][z][y][x]. The caller frees it with sdm_free(). */
 static inline double *maps_to_double(const maps *m)
 {
     double *v;
@@ -70,11 +76,11 @@ static inline double *maps_to_double(const maps *m)
     return v;
 }
 
-/* Everything but the voxels is zero. */
+/* Fails the test unless all floats outside of the voxels (lead, gaps, tail) are zero. */
 static inline void maps_check_zeros(const maps *m)
 {
     const size_t n = maps_bytes(m) / sizeof(float);
-    float *copy = test_floats(n, 0), *keep = m->memory;
+    float *copy = floats_random(n, 0), *keep = m->memory;
     memcpy(copy, keep, maps_bytes(m));
     maps c = *m;
     c.memory = copy, c.at = copy + m->g.lead;

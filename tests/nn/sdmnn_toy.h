@@ -1,4 +1,5 @@
-/* A small sdmnn network with random weights, and its model. */
+/* A small sdmnn network with random weights, and the model file made from it. Include cmocka.h
+ * first. */
 #ifndef TEST_SDMNN_TOY_H
 #define TEST_SDMNN_TOY_H
 
@@ -27,7 +28,8 @@ typedef struct toy {
     size_t n;
 } toy;
 
-static inline void make(toy *t, bool half, int activation)
+/* Fills *t. `half`: weights are values of half precision. The caller frees t->weights. */
+static inline void toy_make(toy *t, bool half, int activation)
 {
     *t = (toy){0};
     for (int i = 0; i < P; i++) {
@@ -48,14 +50,14 @@ static inline void make(toy *t, bool half, int activation)
     sdm_sdmnn_init(&t->spec.arch, 1, 2, t->weights);
     for (size_t i = 0; i < t->n; i++) {
         t->weights[i] += 0.02f * (float)sdm_rng_normal(3, 5, i);
-        if (half)
-            t->weights[i] = sdm_half_to_float(
-                sdm_half_from_float(t->weights[i])); // nothing is lost in the file
+        // the file stores halves: round now, so that saving loses nothing
+        if (half) t->weights[i] = sdm_half_to_float(sdm_half_from_float(t->weights[i]));
     }
     t->spec.weights = t->weights;
 }
 
-static inline sdm_model *open_toy(const toy *t)
+/* Writes the network to memory and opens it as a model, which the caller frees. */
+static inline sdm_model *toy_open(const toy *t)
 {
     uint8_t *bytes;
     size_t size;

@@ -1,4 +1,5 @@
-/* Convolution by oneDNN against the native one; the same bits for any number of threads.
+/* Convolution by oneDNN agrees with the library's own kernels and gives the same bits for any
+ * number of threads.
  * Tests: conv_kernels_dnnl.c */
 #include <math.h>
 #include <setjmp.h>
@@ -12,7 +13,7 @@
 #include "feature_maps.h"
 #include "sdmnn/conv.h"
 
-static double compare(const maps *a, const maps *b)
+static double largest_difference(const maps *a, const maps *b)
 {
     double worst = 0;
     for (size_t i = 0; i < a->channels * maps_voxels(a); i++) {
@@ -34,12 +35,12 @@ static void same_as_native(void **state)
     for (size_t q = 0; q < 25; q++) {
         const sdm_fmap g = sdm_fmap_layout(grids[q / 5]);
         const sdm_conv c = convs[q % 5];
-        float *w = test_floats(c.in * c.out * c.taps, 2), *bias = test_floats(c.out, 3);
+        float *w = floats_random(c.in * c.out * c.taps, 2), *bias = floats_random(c.out, 3);
         for (int transposed = 0; transposed < 2; transposed++) {
             const sdm_conv to = transposed ? sdm_conv_opposite(c) : c;
             maps x = maps_random(&g, to.in, 1), a = maps_new(&g, to.out), b = maps_new(&g, to.out);
-            float *p = test_floats(one->packed_count(to), 1),
-                  *r = test_floats(two->packed_count(to), 1);
+            float *p = floats_random(one->packed_count(to), 1),
+                  *r = floats_random(two->packed_count(to), 1);
             const sdm_conv_finish finish = {transposed ? NULL : bias, transposed ? -1 : 0, NULL};
             one->pack(c, transposed, w, p);
             two->pack(c, transposed, w, r);
@@ -52,14 +53,14 @@ static void same_as_native(void **state)
                 maps_free(&more);
             }
             maps_check_zeros(&b);
-            assert_true(compare(&a, &b) < 2e-6 * sqrt((double)(to.in * to.taps)));
+            assert_true(largest_difference(&a, &b) < 2e-6 * sqrt((double)(to.in * to.taps)));
             differ += memcmp(a.memory, b.memory, maps_bytes(&a)) != 0;
             maps_free(&x), maps_free(&a), maps_free(&b);
             sdm_free(p), sdm_free(r);
         }
         sdm_free(w), sdm_free(bias);
     }
-    assert_true(differ > 0); // oneDNN was at work: its rounding is another
+    assert_true(differ > 0); // oneDNN really ran: it rounds differently from the native kernels
 }
 
 int main(void)

@@ -1,4 +1,5 @@
-/* Dense kernels against plain loops in double; the same bits for any number of threads.
+/* Dense kernels (matrix products, half precision, quantisation, exponential) against plain loops in
+ * double, and the same bits for any number of threads.
  * Tests: kernels_avx2.c kernels_avx512.c kernels_avx512vnni.c kernels_generic.c kernels_native.c
  * processor.c */
 #include <math.h>
@@ -16,7 +17,7 @@
 #include "sdm/internal/rng.h"
 #include "sdm/memory.h"
 
-static int level; // of sdm_processor_select()
+static int level; // instruction set under test: level of sdm_processor_select()
 
 static float *random_floats(size_t n, uint64_t stream)
 {
@@ -26,7 +27,7 @@ static float *random_floats(size_t n, uint64_t stream)
     return v;
 }
 
-static void check_product(size_t m, size_t n, size_t k, bool ta, bool tb, bool add)
+static void product_check(size_t m, size_t n, size_t k, bool ta, bool tb, bool add)
 {
     float *a = random_floats(m * k, 1), *b = random_floats(k * n, 2), *c = random_floats(m * n, 3),
           *old = random_floats(m * n, 3);
@@ -47,14 +48,14 @@ static void check_product(size_t m, size_t n, size_t k, bool ta, bool tb, bool a
     sdm_free(old);
 }
 
-static void product(void **state)
+static void products_match_plain_loops(void **state)
 {
     (void)state;
     const size_t sizes[][3] = {{1, 1, 1},      {7, 5, 3},     {6, 16, 256}, {97, 129, 257},
                                {200, 33, 520}, {12, 32, 600}, {1, 300, 40}, {5, 4, 0}};
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
         for (int mode = 0; mode < 8; mode++)
-            check_product(sizes[i][0], sizes[i][1], sizes[i][2], mode & 1, mode & 2, mode & 4);
+            product_check(sizes[i][0], sizes[i][1], sizes[i][2], mode & 1, mode & 2, mode & 4);
 }
 
 static void same_bits_for_threads(void **state)
@@ -74,15 +75,15 @@ static void same_bits_for_threads(void **state)
     sdm_free(c);
 }
 
-static void half_precision(void **state)
+static void half_conversion_is_correct(void **state)
 {
     (void)state;
-    for (unsigned h = 0; h < 65536; h++) { // every finite half survives the way to float and back
+    for (unsigned h = 0; h < 65536; h++) { // each finite half -> float -> half: unchanged
         if ((h >> 10 & 31) == 31) continue;
         assert_int_equal(sdm_half_from_float(sdm_half_to_float((uint16_t)h)), h);
     }
     assert_int_equal(sdm_half_from_float(1.0f), 0x3c00);
-    assert_int_equal(sdm_half_from_float(1.0f + 0x1p-11f), 0x3c00); // tie to even
+    assert_int_equal(sdm_half_from_float(1.0f + 0x1p-11f), 0x3c00); // a tie rounds to even
     assert_int_equal(sdm_half_from_float(1.0f + 0x1p-11f + 0x1p-20f), 0x3c01);
     assert_int_equal(sdm_half_from_float(65504.0f), 0x7bff);
     assert_int_equal(sdm_half_from_float(-70000.0f), 0xfc00);
@@ -91,8 +92,8 @@ static void half_precision(void **state)
     assert_true(isnan(sdm_half_to_float(0x7e00)) && isinf(sdm_half_to_float(0x7c00)));
 }
 
-// every instruction set that this machine has, not only the one that is chosen
-static void half_in_every_instruction_set(void **state)
+// Every instruction set of this machine, not only the best one.
+static void half_panels_convert_exactly(void **state)
 {
     (void)state;
     uint16_t *h;
@@ -103,7 +104,8 @@ static void half_in_every_instruction_set(void **state)
     for (unsigned i = 0; i < 65536; i++) h[i] = (uint16_t)i;
     for (int isa = 0; isa < SDM_PROCESSOR_LEVELS; isa++) {
         if (sdm_processor_select(isa) != isa) continue;
-        sdm_panel_f16(1, 65536, 1, h, &one, 0, y, 0); // a layer of one input, 1: its weights
+        // a layer with the single input 1 returns its weights
+        sdm_panel_f16(1, 65536, 1, h, &one, 0, y, 0);
         for (unsigned i = 0; i < 65536; i++) {
             const float want = sdm_half_to_float((uint16_t)i);
             if (isnan(want))
@@ -117,19 +119,19 @@ static void half_in_every_instruction_set(void **state)
     sdm_free(y);
 }
 
-// layers of every number of rows and of outputs around the sizes of the kernels, in every
-// instruction set
-static void panels(void **state)
+// Products of packed weights with 1 to 13 input rows, for numbers of outputs around the kernels'
+// block sizes, with every instruction set of this machine.
+static void panels_match_plain_loops(void **state)
 {
     (void)state;
-    enum { K = 37, ROWS = 13, MOST = 160 };
-    float *w = random_floats(MOST * K, 1), *x = random_floats(ROWS * K, 2),
-          *back = random_floats(MOST, 3);
-    float *packed, *y, single[MOST], dx[K];
+    enum { K = 37, ROWS = 13, N_MAX = 160 };
+    float *w = random_floats(N_MAX * K, 1), *x = random_floats(ROWS * K, 2),
+          *back = random_floats(N_MAX, 3);
+    float *packed, *y, single[N_MAX], dx[K];
     uint16_t *half;
-    assert_int_equal(SDM_ALLOC(&packed, sdm_panel_count(MOST, K), "t", NULL), SDM_OK);
-    assert_int_equal(SDM_ALLOC(&half, sdm_panel_count(MOST, K), "t", NULL), SDM_OK);
-    assert_int_equal(SDM_ALLOC(&y, ROWS * MOST, "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&packed, sdm_panel_count(N_MAX, K), "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&half, sdm_panel_count(N_MAX, K), "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&y, ROWS * N_MAX, "t", NULL), SDM_OK);
     assert_int_equal(sdm_panel_count(150, K), 160 * K);
     for (int isa = 0; isa < SDM_PROCESSOR_LEVELS; isa++) {
         if (sdm_processor_select(isa) != isa) continue;
@@ -139,9 +141,9 @@ static void panels(void **state)
             for (int use_half = 0; use_half < 2; use_half++) {
                 for (size_t rows = 1; rows <= ROWS; rows += rows < 7 ? 1 : 6) {
                     if (use_half)
-                        sdm_panel_f16(rows, outputs, K, half, x, K, y, MOST);
+                        sdm_panel_f16(rows, outputs, K, half, x, K, y, N_MAX);
                     else
-                        sdm_panel_f32(rows, outputs, K, packed, x, K, y, MOST);
+                        sdm_panel_f32(rows, outputs, K, packed, x, K, y, N_MAX);
                     for (size_t r = 0; r < rows; r++) {
                         for (size_t o = 0; o < outputs; o++) {
                             double s = 0;
@@ -150,14 +152,14 @@ static void panels(void **state)
                                     (double)x[r * K + i] *
                                     (use_half ? sdm_half_to_float(sdm_half_from_float(w[o * K + i]))
                                               : w[o * K + i]);
-                            assert_true(fabs(s - y[r * MOST + o]) < 1e-5);
+                            assert_true(fabs(s - y[r * N_MAX + o]) < 1e-5);
                         }
-                        // the same bits alone
+                        // A row computed alone has the same bits.
                         if (use_half)
-                            sdm_panel_f16(1, outputs, K, half, x + r * K, K, single, MOST);
+                            sdm_panel_f16(1, outputs, K, half, x + r * K, K, single, N_MAX);
                         else
-                            sdm_panel_f32(1, outputs, K, packed, x + r * K, K, single, MOST);
-                        assert_memory_equal(single, y + r * MOST, outputs * sizeof *single);
+                            sdm_panel_f32(1, outputs, K, packed, x + r * K, K, single, N_MAX);
+                        assert_memory_equal(single, y + r * N_MAX, outputs * sizeof *single);
                     }
                 }
                 if (use_half)
@@ -184,24 +186,24 @@ static void panels(void **state)
     sdm_free(y);
 }
 
-// integers: exact, the same bits in every instruction set, also where sums come near the end of
-// theirs
-static void bytes(void **state)
+// Integer weights and inputs: sums are exact, also close to the limits of int32, so every
+// instruction set gives the same bits.
+static void integer_panels_are_exact(void **state)
 {
     (void)state;
-    enum { MOST = 160, ROWS = 13, LINE = 7, APART = MOST / 4 * LINE };
+    enum { N_MAX = 160, ROWS = 13, LINE = 7, APART = N_MAX / 4 * LINE };
     int16_t *w, *x;
     int8_t *packed;
-    float *y, *apart, *with_rest, *back, dx[128], scale[ROWS], *mean = random_floats(MOST, 8),
-                                                               *factor = random_floats(MOST, 9);
-    static int16_t integers[ROWS * MOST];
-    assert_int_equal(SDM_ALLOC(&w, MOST * 128, "t", NULL), SDM_OK);
+    float *y, *apart, *with_rest, *back, dx[128], scale[ROWS], *mean = random_floats(N_MAX, 8),
+                                                               *factor = random_floats(N_MAX, 9);
+    static int16_t integers[ROWS * N_MAX];
+    assert_int_equal(SDM_ALLOC(&w, N_MAX * 128, "t", NULL), SDM_OK);
     assert_int_equal(SDM_ALLOC(&x, ROWS * 128, "t", NULL), SDM_OK);
-    assert_int_equal(SDM_ALLOC(&packed, sdm_panel_i8_count(MOST, 128, 128), "t", NULL), SDM_OK);
-    assert_int_equal(SDM_ALLOC(&y, ROWS * MOST, "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&packed, sdm_panel_i8_count(N_MAX, 128, 128), "t", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&y, ROWS * N_MAX, "t", NULL), SDM_OK);
     assert_int_equal(SDM_ALLOC(&apart, ROWS * APART, "t", NULL), SDM_OK);
-    assert_int_equal(SDM_ALLOC(&with_rest, ROWS * MOST, "t", NULL), SDM_OK);
-    back = random_floats(MOST, 3);
+    assert_int_equal(SDM_ALLOC(&with_rest, ROWS * N_MAX, "t", NULL), SDM_OK);
+    back = random_floats(N_MAX, 3);
     assert_int_equal(sdm_panel_i8_count(150, 3, 37), 160 * (4 + 38));
     assert_true(sdm_panel_i8_count(SIZE_MAX / 2, 0, 37) == SIZE_MAX &&
                 sdm_panel_i8_count(1, 2, 1) == SIZE_MAX);
@@ -238,18 +240,18 @@ static void bytes(void **state)
                 sdm_panel_pack_i8(outputs, wide, k, w, packed);
                 for (size_t rows = 1; rows <= ROWS; rows += rows < 7 ? 1 : 6) {
                     const size_t n_mean = rows / 2;
-                    const sdm_panel_out plain = {.y = y, .ld = MOST, .line = SDM_PANEL_ROW},
+                    const sdm_panel_out plain = {.y = y, .ld = N_MAX, .line = SDM_PANEL_ROW},
                                         added = {.y = apart,
                                                  .ld = APART,
                                                  .line = LINE,
                                                  .mean = mean,
                                                  .n_mean = n_mean},
                                         again = {.integers = integers,
-                                                 .ld = MOST,
+                                                 .ld = N_MAX,
                                                  .factor = factor,
                                                  .limit = 1234},
                                         whole = {.y = with_rest,
-                                                 .ld = MOST,
+                                                 .ld = N_MAX,
                                                  .line = SDM_PANEL_ROW,
                                                  .residual = true};
                     for (size_t o = 0; o < outputs; o++)
@@ -257,20 +259,21 @@ static void bytes(void **state)
                     sdm_panel_i8(rows, outputs, wide, k, packed, x, 128, scale, &plain);
                     sdm_panel_i8(rows, outputs, wide, k, packed, x, 128, scale, &added);
                     sdm_panel_i8(rows, outputs, wide, k, packed, x, 128, scale, &again);
-                    if (rows > 1 && rows <= 6) { // the last row added to the first, the others as
-                                                 // they were, nothing behind
-                        float *const behind = with_rest + (rows - 1) * MOST, *const last =
-                                                                                 y +
-                                                                                 (rows - 1) * MOST;
-                        for (int o = 0; o < MOST; o++) behind[o] = 77;
+                    // With `residual` the last row is added to the first; the other rows and the
+                    // memory behind them stay unchanged.
+                    if (rows > 1 && rows <= 6) {
+                        float *const behind = with_rest + (rows - 1) * N_MAX, *const last =
+                                                                                  y + (rows - 1) *
+                                                                                          N_MAX;
+                        for (int o = 0; o < N_MAX; o++) behind[o] = 77;
                         sdm_panel_i8(rows, outputs, wide, k, packed, x, 128, scale, &whole);
                         for (size_t o = 0; o < outputs; o++)
                             assert_true(fabsf(with_rest[o] - (y[o] + last[o])) <=
                                         1.2e-7f * (fabsf(y[o]) + fabsf(last[o])));
                         for (size_t r = 1; r + 1 < rows; r++)
-                            assert_memory_equal(with_rest + r * MOST, y + r * MOST,
+                            assert_memory_equal(with_rest + r * N_MAX, y + r * N_MAX,
                                                 outputs * sizeof *y);
-                        for (int o = 0; o < MOST; o++) assert_true(behind[o] == 77);
+                        for (int o = 0; o < N_MAX; o++) assert_true(behind[o] == 77);
                     }
                     for (size_t r = 0; r < rows; r++)
                         for (size_t o = 0; o < outputs; o++) {
@@ -280,14 +283,15 @@ static void bytes(void **state)
                             const float v = scale[r] * (float)s,
                                         sum = apart[r * APART + o / 4 * LINE + o % 4];
                             const float units = fminf(fmaxf(v * factor[o], -1234), 1234);
-                            assert_true(y[r * MOST + o] == v);
-                            if (r < n_mean) // some instruction sets multiply and add without
-                                            // rounding in between
+                            assert_true(y[r * N_MAX + o] == v);
+                            // Some instruction sets fuse multiply and add, so the sum is rounded
+                            // only once.
+                            if (r < n_mean)
                                 assert_true(fabsf(sum - (v + mean[o])) <=
                                             1.2e-7f * (fabsf(v) + fabsf(mean[o])));
                             else
                                 assert_true(sum == v);
-                            assert_int_equal(integers[r * MOST + o], lrintf(units));
+                            assert_int_equal(integers[r * N_MAX + o], lrintf(units));
                         }
                 }
                 sdm_panel_back_i8(outputs, wide, k, packed, back, dx);
@@ -314,14 +318,14 @@ static void bytes(void **state)
     sdm_free(factor);
 }
 
-// to addresses of every kind, nothing beside them
-static void put(void **state)
+// sdm_copy() to every alignment of the target writes n floats and nothing beside them.
+static void copies_to_any_alignment(void **state)
 {
     (void)state;
-    enum { MOST = 90, SIDE = 17 };
-    float *y = random_floats(MOST, 6), *memory = random_floats(MOST + 2 * SIDE, 8);
+    enum { N_MAX = 90, SIDE = 17 };
+    float *y = random_floats(N_MAX, 6), *memory = random_floats(N_MAX + 2 * SIDE, 8);
     y[3] = -0.0f;
-    for (size_t n = 0; n <= MOST; n++)
+    for (size_t n = 0; n <= N_MAX; n++)
         for (size_t offset = 0; offset < 16; offset++)
             for (int stream = 0; stream < 2; stream++) {
                 float *to = memory + 1 + offset;
@@ -335,18 +339,19 @@ static void put(void **state)
     sdm_free(memory);
 }
 
-// several rows, each with its own factor, nothing beside them
-static void quantisation(void **state)
+// Quantisation of several rows with a scale each: the error is at most half a unit, and nothing is
+// written beside the rows.
+static void quantisation_stays_within_half_a_unit(void **state)
 {
     (void)state;
-    enum { MOST = 70, ROWS = 3, LDY = 75, LDX = 73 };
-    float *y = random_floats(ROWS * LDY, 4), *factor = random_floats(MOST, 5), changed[MOST],
-          ones[MOST], scale[ROWS];
+    enum { N_MAX = 70, ROWS = 3, LDY = 75, LDX = 73 };
+    float *y = random_floats(ROWS * LDY, 4), *factor = random_floats(N_MAX, 5), changed[N_MAX],
+          ones[N_MAX], scale[ROWS];
     int16_t x[ROWS * LDX + 1];
-    for (int i = 0; i < MOST; i++) ones[i] = 1;
+    for (int i = 0; i < N_MAX; i++) ones[i] = 1;
     for (int isa = 0; isa < SDM_PROCESSOR_LEVELS; isa++) {
         if (sdm_processor_select(isa) != isa) continue;
-        for (size_t n = 0; n <= MOST; n++)
+        for (size_t n = 0; n <= N_MAX; n++)
             for (int limit = 5; limit < 32768; limit += 10920)
                 for (int plain = 0; plain < 2; plain++) {
                     for (size_t r = 0; r < ROWS; r++) x[r * LDX + n] = 77;
@@ -363,12 +368,14 @@ static void quantisation(void **state)
                         assert_int_equal(x[r * LDX + n], 77);
                     }
                 }
-        for (size_t n = 1; n <= MOST;
-             n++) // two rows: as near as floats are; the first is the row alone
+        for (size_t n = 1; n <= N_MAX;
+             // Value plus quantised residual is as accurate as a float; the first row equals plain
+             // quantisation.
+             n++)
             for (int limit = 1; limit < 32768; limit += 8191)
                 for (int plain = 0; plain < 2; plain++) {
                     const float *const f = plain ? NULL : factor;
-                    int16_t alone[MOST], rest[MOST + 1];
+                    int16_t alone[N_MAX], rest[N_MAX + 1];
                     float s, rest_scale;
                     x[n] = rest[n] = 77;
                     sdm_quantise_residual(n, y, f, limit, x, &scale[0], rest, &rest_scale);
@@ -383,20 +390,21 @@ static void quantisation(void **state)
                                          want) <= unit);
                     }
                 }
-        for (int i = 0; i < MOST; i++) changed[i] = i % 2 ? 1e-40f : 0;
-        sdm_quantise(1, MOST, changed, 0, ones, 32767, x, 0, scale);
+        for (int i = 0; i < N_MAX; i++) changed[i] = i % 2 ? 1e-40f : 0;
+        sdm_quantise(1, N_MAX, changed, 0, ones, 32767, x, 0, scale);
         assert_true(scale[0] == 0 && x[3] == 0);
-        sdm_quantise_residual(MOST, changed, ones, 32767, x, &scale[0], x + LDX, &scale[1]);
+        sdm_quantise_residual(N_MAX, changed, ones, 32767, x, &scale[0], x + LDX, &scale[1]);
         assert_true(scale[0] == 0 && scale[1] == 0 && x[3] == 0 && x[LDX + 3] == 0);
         const float wrong[] = {NAN, -NAN, INFINITY, -INFINITY};
         for (int k = 0; k < 4; k++)
-            for (int at = 0; at < MOST; at += 23) {
+            for (int at = 0; at < N_MAX; at += 23) {
                 memcpy(changed, y, sizeof changed);
                 changed[at] = wrong[k];
-                sdm_quantise(1, MOST, changed, 0, ones, 32767, x, 0, scale);
+                sdm_quantise(1, N_MAX, changed, 0, ones, 32767, x, 0, scale);
                 assert_true(isnan(scale[0]));
                 assert_int_equal(x[1], 0);
-                sdm_quantise_residual(MOST, changed, ones, 32767, x, &scale[0], x + LDX, &scale[1]);
+                sdm_quantise_residual(N_MAX, changed, ones, 32767, x, &scale[0], x + LDX,
+                                      &scale[1]);
                 assert_true(isnan(scale[0]) && isnan(scale[1]) && x[1] == 0 && x[LDX + 1] == 0);
             }
     }
@@ -405,17 +413,17 @@ static void quantisation(void **state)
     sdm_free(factor);
 }
 
-// several matrices in one call are what each is alone
-static void products_of_blocks(void **state)
+// Several matrices multiplied in one call give the same bits as one call for each.
+static void blocks_in_one_call_match_single_calls(void **state)
 {
     (void)state;
-    enum { N = 4, ROWS = 6, LDX = 64, LDY = 280, LINE = 17, MOST = 4096 };
+    enum { N = 4, ROWS = 6, LDX = 64, LDY = 280, LINE = 17, N_MAX = 4096 };
     const size_t outputs[N] = {16, 64, 37, 32}, wide[N] = {1, 2, 0, 5}, k[N] = {9, 6, 11, 5};
     int16_t w[64 * 11], x[ROWS * LDX];
     int8_t *packed = NULL;
     float scale[N * ROWS], *y = random_floats(ROWS * LDY, 1), *each = random_floats(ROWS * LDY, 1);
     float *mean = random_floats(N * 64, 2);
-    assert_int_equal(SDM_ALLOC(&packed, MOST, "weights", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&packed, N_MAX, "weights", NULL), SDM_OK);
     sdm_panel_block b[N];
     size_t at = 0;
     uint32_t input = 0, row = 0;
@@ -425,7 +433,7 @@ static void products_of_blocks(void **state)
         b[i] = (sdm_panel_block){
             at,       64 * i, (uint32_t)outputs[i], (uint32_t)wide[i], (uint32_t)k[i], input,
             i * ROWS, row};
-        assert_true(at + sdm_panel_i8_count(outputs[i], wide[i], k[i]) <= MOST);
+        assert_true(at + sdm_panel_i8_count(outputs[i], wide[i], k[i]) <= N_MAX);
         sdm_panel_pack_i8(outputs[i], wide[i], k[i], w, packed + at);
         at += sdm_panel_i8_count(outputs[i], wide[i], k[i]);
         input += (uint32_t)sdm_panel_even(k[i]);
@@ -450,7 +458,7 @@ static void products_of_blocks(void **state)
     sdm_free(mean);
 }
 
-static void exponential(void **state)
+static void exponential_is_accurate(void **state)
 {
     (void)state;
     float x[1001], y[1001];
@@ -462,7 +470,7 @@ static void exponential(void **state)
     assert_true(y[0] >= 0 && y[0] < 1e-37f && isfinite(y[1]) && y[1] > 1e38f && y[2] == 1);
 }
 
-static void names(void **state)
+static void instruction_sets_have_their_names(void **state)
 {
     (void)state;
 #if defined(__x86_64__)
@@ -479,18 +487,18 @@ static void names(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(product),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(products_match_plain_loops),
                                        cmocka_unit_test(same_bits_for_threads),
-                                       cmocka_unit_test(half_precision),
-                                       cmocka_unit_test(half_in_every_instruction_set),
-                                       cmocka_unit_test(panels),
-                                       cmocka_unit_test(bytes),
-                                       cmocka_unit_test(put),
-                                       cmocka_unit_test(products_of_blocks),
-                                       cmocka_unit_test(quantisation),
-                                       cmocka_unit_test(exponential),
-                                       cmocka_unit_test(names)};
-    // every instruction set that this machine has, not only the one that is chosen
+                                       cmocka_unit_test(half_conversion_is_correct),
+                                       cmocka_unit_test(half_panels_convert_exactly),
+                                       cmocka_unit_test(panels_match_plain_loops),
+                                       cmocka_unit_test(integer_panels_are_exact),
+                                       cmocka_unit_test(copies_to_any_alignment),
+                                       cmocka_unit_test(blocks_in_one_call_match_single_calls),
+                                       cmocka_unit_test(quantisation_stays_within_half_a_unit),
+                                       cmocka_unit_test(exponential_is_accurate),
+                                       cmocka_unit_test(instruction_sets_have_their_names)};
+    // Every instruction set of this machine, not only the best one.
     int failed = 0;
     for (level = sdm_processor_select(-1); level >= 0; level--) {
         sdm_processor_select(level);

@@ -1,5 +1,5 @@
-/* The pod network against plain double arithmetic, its derivatives against differences, its file
- * against damage.
+/* The pod network: maps against plain double arithmetic, derivatives against differences, and
+ * damaged model files.
  * Tests: container.c model_file.c model_open.c pod_build.c pod_decode.c pod_decode_back.c
  * pod_forward.c pod_latent.c pod_open.c pod_quantise.c pod_slabs.c pod_survey.c polynomial.c */
 #include <math.h>
@@ -25,7 +25,7 @@ enum { P = 3, DEPTH = 2, WIDTH = 70, DEGREE = 3, INPUT_DEGREE = 2 };
 
 static size_t n_levels = 3, block = 2;
 
-// a small random network, kept in plain arrays
+// A small random network whose weights are plain arrays.
 typedef struct toy {
     sdm_model_param params[P];
     sdm_model_info info;
@@ -34,7 +34,7 @@ typedef struct toy {
     float *memory, *layer[DEPTH], *bias[DEPTH], *head, *mean, *basis;
 } toy;
 
-static void make(toy *t, sdm_pod_type type, int activation)
+static void toy_make(toy *t, sdm_pod_type type, int activation)
 {
     *t = (toy){0};
     for (int i = 0; i < P; i++) {
@@ -72,7 +72,8 @@ static void make(toy *t, sdm_pod_type type, int activation)
     const size_t n_blocks = a->levels.first[n_levels];
     assert_true(a->levels.n == n_levels && n_blocks <= 80);
     sdm_pod_blocks(&t->info.grid, block, &a->levels, t->blocks);
-    // one block is only its mean; on the levels above nothing may have more functions than outputs
+    // Block 2 has rank 0 (its mean only). No block may have more basis functions than outputs: its
+    // voxels, or on higher levels the coefficients of its children.
     size_t basis = 0;
     for (size_t b = 0; b < n_blocks; b++) {
         sdm_pod_block *k = &t->blocks[b];
@@ -104,7 +105,7 @@ static void make(toy *t, sdm_pod_type type, int activation)
     t->spec.type = type;
 }
 
-static sdm_model *open_toy(const toy *t)
+static sdm_model *toy_open(const toy *t)
 {
     uint8_t *bytes;
     size_t size;
@@ -115,7 +116,7 @@ static sdm_model *open_toy(const toy *t)
     return m;
 }
 
-// normalised Legendre polynomials in closed form
+// Normalised Legendre polynomials, n = 0 .. 3, in closed form.
 static double legendre(int n, double x)
 {
     switch (n) {
@@ -135,7 +136,7 @@ static double activate(int kind, double x)
     return kind == 0 ? x / (1 + exp(-x)) : kind == 1 ? tanh(x) : x > 0 ? x : 0;
 }
 
-// the definition of the network in sdm/pod.h, in double, without tiles
+// The network as sdm/pod.h defines it, in double and without blocking.
 static void reference(const toy *t, const double *p, double *map)
 {
     const sdm_pod_arch *a = &t->spec.arch;
@@ -159,7 +160,7 @@ static void reference(const toy *t, const double *p, double *map)
         memcpy(h, next, sizeof h);
     }
     memcpy(z + a->n_terms, h, sizeof h);
-    // coefficients from the highest level down, then the map
+    // Coefficients from the highest level down to level 0, then the map.
     const size_t n_blocks = a->levels.first[n_levels];
     double c[80][64] = {{0}};
     const float *matrix[80], *at = t->basis;
@@ -196,7 +197,7 @@ static void random_params(uint64_t index, double *p)
         p[i] = -1.0 - i + (3.0 + 2 * i) * sdm_rng_uniform(5, 5, index * P + (uint64_t)i);
 }
 
-static void polynomials(void **state)
+static void polynomials_match_closed_forms(void **state)
 {
     (void)state;
     assert_int_equal(sdm_poly_count(4, 6), 210);
@@ -211,7 +212,7 @@ static void polynomials(void **state)
         last = total;
         for (int j = 0; j < i; j++) assert_memory_not_equal(e + 4 * i, e + 4 * j, 4);
     }
-    // values against closed forms, slopes against differences
+    // Values against closed forms, derivatives against differences.
     const double x[4] = {0.3, -0.7, 0.9, -1};
     float phi[35], dphi[4 * 35], high[35], low[35];
     sdm_poly_eval(e, 35, 4, 3, x, phi, dphi);
@@ -237,9 +238,9 @@ static void forward_is_the_definition(void **state)
     for (int mode = 0; mode < 27; mode++) {
         n_levels = 3 - (size_t)mode / 9;
         toy t;
-        make(&t, (sdm_pod_type)(mode % 3), mode / 3 % 3);
+        toy_make(&t, (sdm_pod_type)(mode % 3), mode / 3 % 3);
         const double tolerance[] = {1e-5, 4e-3, 1e-2};
-        sdm_model *m = open_toy(&t);
+        sdm_model *m = toy_open(&t);
         const sdm_pod_arch *a = &t.spec.arch;
         enum { N = 19 };
         double p[N * P], truth[315];
@@ -249,7 +250,9 @@ static void forward_is_the_definition(void **state)
         assert_int_equal(sdm_alloc(&scratch, sdm_model_scratch_bytes(m, N), 1, "scratch", NULL), 0);
         for (uint64_t i = 0; i < N; i++) random_params(i, p + i * P);
         for (size_t i = 0; i < 8 * P;
-             i++) // of the ranges every corner, where integers of fixed units are largest
+             // The corners of the parameter box, where the integers of fixed-point inputs are
+             // largest.
+             i++)
             p[i] = i / P >> i % P & 1 ? t.params[i % P].max : t.params[i % P].min;
         sdm_model_forward(m, p, N, maps, scratch);
         double wrong = 0, spread = 0;
@@ -273,7 +276,8 @@ static void forward_is_the_definition(void **state)
             sdm_model_forward(m, p + i * P, 1, single, scratch);
             assert_memory_equal(single, maps + i * 315, sizeof single);
         }
-        // what bytes may add
+        // Rounding weights to bytes adds an error, but only a small share of the maps' variation
+        // about their mean.
         assert_true(mode % 3 < 2 || (wrong > 0 && wrong < 1.5e-6 * spread));
         sdm_free(scratch);
         sdm_free(maps);
@@ -282,17 +286,17 @@ static void forward_is_the_definition(void **state)
     }
 }
 
-// blocks of rows of four whose last panel is not full: what fills it up must not fall into the next
-// map
-static void panels_that_are_not_full(void **state)
+// Blocks of 5 voxels leave the last group of four rows partly filled; the padding must not be
+// written into the next map.
+static void partial_panels_stay_inside_their_map(void **state)
 {
     (void)state;
     enum { N = 7 };
     const size_t usual = block, levels = n_levels;
     block = 5, n_levels = 2;
     toy t;
-    make(&t, SDM_POD_I8, 0);
-    sdm_model *m = open_toy(&t);
+    toy_make(&t, SDM_POD_I8, 0);
+    sdm_model *m = toy_open(&t);
     double p[N * P];
     static float maps[N * 315], single[315];
     void *scratch;
@@ -309,16 +313,16 @@ static void panels_that_are_not_full(void **state)
     block = usual, n_levels = levels;
 }
 
-// so many that they go past the caches into memory, to addresses of every kind: the same bits as
-// one
-static void many_maps(void **state)
+// So many maps that the output bypasses the caches, at any alignment: each has the same bits as a
+// map computed alone.
+static void many_maps_equal_single_maps(void **state)
 {
     (void)state;
     enum { N = 3300, SIDE = 16 };
     for (int type = 0; type < 3; type++) {
         toy t;
-        make(&t, (sdm_pod_type)type, 0);
-        sdm_model *m = open_toy(&t);
+        toy_make(&t, (sdm_pod_type)type, 0);
+        sdm_model *m = toy_open(&t);
         double *p;
         float *memory, single[315];
         void *scratch;
@@ -344,9 +348,9 @@ static void many_maps(void **state)
     }
 }
 
-// products with the Jacobian from both sides are those with the Jacobian itself
-static void products(const sdm_model *m, const double *p, uint64_t trial, const float *map,
-                     const float *jacobian)
+// J * direction and J^T * adjoint equal the products with the full Jacobian.
+static void products_check(const sdm_model *m, const double *p, uint64_t trial, const float *map,
+                           const float *jacobian)
 {
     double direction[P], gradient[P];
     float value[315], tangent[315], adjoint[315];
@@ -381,12 +385,13 @@ static void products(const sdm_model *m, const double *p, uint64_t trial, const 
 static void jacobian_is_the_slope(void **state)
 {
     (void)state;
-    for (int mode = 0; mode < 6; mode++) { // ReLU has no slope at its kinks
+    // Without ReLU, whose derivative jumps at its kinks.
+    for (int mode = 0; mode < 6; mode++) {
         const int activation = mode % 2;
         n_levels = 3 - (size_t)mode / 2;
         toy t;
-        make(&t, SDM_POD_F32, activation);
-        sdm_model *m = open_toy(&t);
+        toy_make(&t, SDM_POD_F32, activation);
+        sdm_model *m = toy_open(&t);
         void *scratch, *forward;
         float map[315], value[315], jacobian[P * 315];
         double p[P], up[315], down[315];
@@ -398,7 +403,8 @@ static void jacobian_is_the_slope(void **state)
             sdm_model_jacobian(m, p, value, jacobian, scratch);
             sdm_model_forward(m, p, 1, map, forward);
             for (int v = 0; v < 315; v++) assert_true(fabsf(map[v] - value[v]) < 1e-4f);
-            for (int i = 0; i < P; i++) { // central differences of the double definition
+            // Central differences of the reference in double.
+            for (int i = 0; i < P; i++) {
                 const double h = 1e-5, at = p[i];
                 p[i] = at + h, reference(&t, p, up);
                 p[i] = at - h, reference(&t, p, down);
@@ -408,7 +414,7 @@ static void jacobian_is_the_slope(void **state)
                     assert_true(fabs(slope - jacobian[i * 315 + v]) < 1e-4 * (10 + fabs(slope)));
                 }
             }
-            products(m, p, trial, map, jacobian);
+            products_check(m, p, trial, map, jacobian);
         }
         sdm_free(scratch);
         sdm_free(forward);
@@ -417,15 +423,15 @@ static void jacobian_is_the_slope(void **state)
     }
 }
 
-// with weights as bytes: near that with floats, and the same from both sides
+// Byte weights: the Jacobian is close to that of float weights, and sdm_model_vjp() agrees with it.
 static void jacobian_of_bytes_with(size_t levels)
 {
     n_levels = levels;
     toy t;
-    make(&t, SDM_POD_F32, 0);
-    sdm_model *floats = open_toy(&t);
+    toy_make(&t, SDM_POD_F32, 0);
+    sdm_model *floats = toy_open(&t);
     t.spec.type = SDM_POD_I8;
-    sdm_model *m = open_toy(&t);
+    sdm_model *m = toy_open(&t);
     void *scratch, *reverse;
     static float value[315], want[P * 315], jacobian[P * 315], adjoint[315];
     double p[P], gradient[P];
@@ -463,16 +469,16 @@ static void jacobian_of_bytes(void **state)
     for (size_t levels = 1; levels <= 3; levels++) jacobian_of_bytes_with(levels);
 }
 
-// of bytes: against central differences of the map that comes with it, which is smooth, and voxel
-// by voxel against the transpose, which is in floats; the inputs that are rounded are those of the
-// tangents
+// Byte weights: the Jacobian agrees with differences (of fourth order) of the map that
+// sdm_model_jacobian() returns, and with sdm_model_vjp(), one voxel at a time. The tolerance covers
+// the rounded inputs of the tangents; vjp works in floats.
 static void jacobian_of_bytes_is_the_slope(void **state)
 {
     (void)state;
     for (n_levels = 1; n_levels <= 3; n_levels++) {
         toy t;
-        make(&t, SDM_POD_I8, 0);
-        sdm_model *m = open_toy(&t);
+        toy_make(&t, SDM_POD_I8, 0);
+        sdm_model *m = toy_open(&t);
         void *scratch, *reverse;
         static float map[4][315], jacobian[P * 315], unused[P * 315], adjoint[315];
         double p[P], gradient[P];
@@ -515,15 +521,15 @@ static void jacobian_of_bytes_is_the_slope(void **state)
     n_levels = 3;
 }
 
-// a map that comes with its derivatives changes smoothly with the parameters, else a fit could not
-// end
+// The map that comes with derivatives is a smooth function of the parameters; rounding steps would
+// keep a fit from converging.
 static void maps_with_derivatives_are_smooth(void **state)
 {
     (void)state;
     for (n_levels = 1; n_levels <= 3; n_levels++) {
         toy t;
-        make(&t, SDM_POD_I8, 0);
-        sdm_model *m = open_toy(&t);
+        toy_make(&t, SDM_POD_I8, 0);
+        sdm_model *m = toy_open(&t);
         void *scratch;
         static float map[3][315], jacobian[P * 315], alone[315];
         double p[P];
@@ -541,7 +547,7 @@ static void maps_with_derivatives_are_smooth(void **state)
                 size = fmax(size, fabs(map[1][v]));
             }
             assert_true(rough < 5e-6 * size);
-            assert_true(rounding > 0 && rounding < 4e-3 * size); // rounded inputs of the map alone
+            assert_true(rounding > 0 && rounding < 4e-3 * size); // the plain map rounds its inputs
         }
         sdm_free(scratch);
         sdm_model_free(m);
@@ -550,16 +556,16 @@ static void maps_with_derivatives_are_smooth(void **state)
     n_levels = 3;
 }
 
-// numbers that are not finite do not become others
+// NaN and infinity must not turn into finite numbers.
 static void bytes_keep_what_is_not_finite(void **state)
 {
     (void)state;
     for (int which = 0; which < 4; which++) {
         toy t;
-        make(&t, SDM_POD_I8, 0);
+        toy_make(&t, SDM_POD_I8, 0);
         if (which < 3)
             *(float *const[]){t.head, t.basis, t.layer[1]}[which] = which ? NAN : INFINITY;
-        sdm_model *m = open_toy(&t);
+        sdm_model *m = toy_open(&t);
         void *scratch;
         float map[315];
         double p[P];
@@ -580,7 +586,7 @@ static void file_keeps_everything(void **state)
 {
     (void)state;
     toy t;
-    make(&t, SDM_POD_F16, 0);
+    toy_make(&t, SDM_POD_F16, 0);
     uint8_t *bytes;
     size_t size;
     sdm_model *m;
@@ -623,32 +629,32 @@ static void expect_refused(const uint8_t *bytes, size_t size, const char *what, 
     assert_memory_equal(e.text, "damaged: ", 9);
 }
 
-static void damage_is_refused_of(sdm_pod_type type)
+static void damage_is_refused_with(sdm_pod_type type)
 {
     toy t;
-    make(&t, type, 0);
+    toy_make(&t, type, 0);
     uint8_t *bytes;
     size_t size;
     assert_int_equal(sdm_pod_build(&t.spec, &bytes, &size, NULL), SDM_OK);
     const size_t header = 24 + 8 * 48 + 8;
-    // cut off at every byte of the header and a sample of the rest
+    // Truncation: at every byte of the header and at a sample of the others.
     for (size_t n = 0; n < size; n += n < header + 64 ? 1 : 97)
         expect_refused(bytes, n, "truncation", n);
     expect_refused(bytes, size - 1, "truncation", size - 1);
-    // every bit of the header, a sample of the rest, gaps and trailer included
+    // Flipped bits: all of the header, a sample of the sections, their gaps and the trailer.
     for (size_t i = 0; i < size; i += i < header + 64 || i > size - 10 ? 1 : 61)
         for (int bit = 0; bit < 8; bit++) {
             bytes[i] ^= (uint8_t)(1 << bit);
             expect_refused(bytes, size, "flipped bit", i);
             bytes[i] ^= (uint8_t)(1 << bit);
         }
-    // bytes behind the end
+    // Extra bytes after the end.
     uint8_t *longer;
     assert_int_equal(SDM_ALLOC(&longer, size + 64, "longer", NULL), 0);
     memcpy(longer, bytes, size);
     expect_refused(longer, size + 64, "longer", size);
     sdm_free(longer);
-    // a newer version says so
+    // A newer version of the format is reported as such.
     sdm_error e;
     sdm_model *m;
     bytes[8] = SDM_CONTAINER_VERSION + 1;
@@ -664,11 +670,11 @@ static void damage_is_refused_of(sdm_pod_type type)
 static void damage_is_refused(void **state)
 {
     (void)state;
-    damage_is_refused_of(SDM_POD_F16);
-    damage_is_refused_of(SDM_POD_I8);
+    damage_is_refused_with(SDM_POD_F16);
+    damage_is_refused_with(SDM_POD_I8);
 }
 
-// valid checksums around hostile sizes
+// Right checksums, but sizes far too large for the sections.
 static void hostile_sections(void **state)
 {
     (void)state;
@@ -695,16 +701,17 @@ static void hostile_sections(void **state)
     sdm_free(bytes);
 }
 
-static void every_allocation_may_fail_of(sdm_pod_type type)
+static void every_allocation_may_fail_with(sdm_pod_type type)
 {
     toy t;
-    make(&t, type, 0);
+    toy_make(&t, type, 0);
     uint8_t *bytes = NULL;
     size_t size = 0;
     sdm_error e;
     sdm_status s = SDM_E_NOMEM;
     unsigned long n = 1;
-    for (; s; n++) { // build
+    // Building the file.
+    for (; s; n++) {
         sdm_alloc_fail_after(n);
         s = sdm_pod_build(&t.spec, &bytes, &size, &e);
         if (s) assert_int_equal(s, SDM_E_NOMEM);
@@ -714,7 +721,8 @@ static void every_allocation_may_fail_of(sdm_pod_type type)
     assert_true(n > 4);
     sdm_model *m = NULL;
     s = SDM_E_NOMEM;
-    for (n = 1; s; n++) { // open
+    // Opening the model.
+    for (n = 1; s; n++) {
         sdm_alloc_fail_after(n);
         s = sdm_model_open_memory("toy", bytes, size, &m, &e);
         if (s) assert_int_equal(s, SDM_E_NOMEM);
@@ -731,17 +739,17 @@ static void every_allocation_may_fail_of(sdm_pod_type type)
 static void every_allocation_may_fail(void **state)
 {
     (void)state;
-    every_allocation_may_fail_of(SDM_POD_F32);
-    every_allocation_may_fail_of(SDM_POD_I8);
+    every_allocation_may_fail_with(SDM_POD_F32);
+    every_allocation_may_fail_with(SDM_POD_I8);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(polynomials),
+        cmocka_unit_test(polynomials_match_closed_forms),
         cmocka_unit_test(forward_is_the_definition),
-        cmocka_unit_test(panels_that_are_not_full),
-        cmocka_unit_test(many_maps),
+        cmocka_unit_test(partial_panels_stay_inside_their_map),
+        cmocka_unit_test(many_maps_equal_single_maps),
         cmocka_unit_test(jacobian_is_the_slope),
         cmocka_unit_test(jacobian_of_bytes),
         cmocka_unit_test(jacobian_of_bytes_is_the_slope),

@@ -1,7 +1,7 @@
-/* Operators on feature maps against plain loops in double, for every instruction set of this
- * machine; the same bits for any number of threads; zeros around the maps stay zero.
- * Tests: conv.c conv_kernels_avx2.c conv_kernels_avx512.c conv_kernels_generic.c dense.c dropout.c
- * pool.c upsample.c */
+/* Operators on feature maps against plain loops in double: with every instruction set of this
+ * machine, the same bits for any number of threads, and zeros kept in the gaps around the maps.
+ * Tests: conv.c conv_kernels_avx2.c conv_kernels_avx512.c conv_kernels_generic.c dense.c
+ * dropout.c pool.c upsample.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -25,11 +25,11 @@ enum { N_GRIDS = sizeof GRIDS / sizeof *GRIDS };
 typedef struct volume {
     size_t n[3];
     size_t channels;
-    const double *v; /* [channels][z][y][x] */
+    const double *v; /* v[channels][z][y][x] */
 } volume;
 
-// value at a voxel, zero outside
-static double at(const volume *m, size_t c, long x, long y, long z)
+// Value of a voxel; zero outside of the volume.
+static double volume_at(const volume *m, size_t c, long x, long y, long z)
 {
     if (x < 0 || y < 0 || z < 0 || x >= (long)m->n[0] || y >= (long)m->n[1] || z >= (long)m->n[2])
         return 0;
@@ -44,13 +44,13 @@ static float activated(int kind, float x, float *slope)
     return y;
 }
 
-static void check_conv(const size_t n[3], sdm_conv c, int activation)
+static void conv_check(const size_t n[3], sdm_conv c, int activation)
 {
     const sdm_fmap g = sdm_fmap_layout(n);
     const size_t weights = c.in * c.out * c.taps;
     maps x = maps_random(&g, c.in, 1), y = maps_new(&g, c.out), slope = maps_new(&g, c.out);
-    float *w = test_floats(weights, 2), *bias = test_floats(c.out, 3),
-          *packed = test_floats(sdm_conv_packed_count(c), 9);
+    float *w = floats_random(weights, 2), *bias = floats_random(c.out, 3),
+          *packed = floats_random(sdm_conv_packed_count(c), 9);
     sdm_conv_pack(c, false, w, packed);
     double *in = maps_to_double(&x);
     const volume m = {{n[0], n[1], n[2]}, c.in, in};
@@ -72,7 +72,7 @@ static void check_conv(const size_t n[3], sdm_conv c, int activation)
                 for (long t = 0; t < (long)c.taps; t++) {
                     const long d = c.taps == 27 ? 1 : 0;
                     s += (double)w[(o * c.in + k) * c.taps + (size_t)t] *
-                         at(&m, k, px + t % 3 - d, py + t / 3 % 3 - d, pz + t / 9 - d);
+                         volume_at(&m, k, px + t % 3 - d, py + t / 3 % 3 - d, pz + t / 9 - d);
                 }
             float ds;
             const float want = activated(activation, (float)s, &ds);
@@ -89,15 +89,16 @@ static const sdm_conv CONVS[] = {{1, 1, 27}, {3, 5, 27},  {8, 8, 27}, {17, 4, 27
                                  {5, 9, 1},  {16, 40, 1}, {250, 3, 1}};
 enum { N_CONVS = sizeof CONVS / sizeof *CONVS };
 
-static void convolution(void **state)
+static void convolution_matches_plain_loops(void **state)
 {
     (void)state;
     for (size_t i = 0; i < N_GRIDS; i++)
-        for (size_t k = 0; k < N_CONVS; k++) check_conv(GRIDS[i], CONVS[k], (int)((i + k) % 4) - 1);
+        for (size_t k = 0; k < N_CONVS; k++) conv_check(GRIDS[i], CONVS[k], (int)((i + k) % 4) - 1);
 }
 
-// <dy, conv x> = <conv' dy, x>, and the gradient of the weights, term by term
-static void convolution_backward(void **state)
+// The transposed convolution is the adjoint: <dy, conv x> = <conv^T dy, x>. Each weight's gradient
+// matches its sum.
+static void convolution_gradients_match(void **state)
 {
     (void)state;
     for (size_t q = 0; q < N_GRIDS * N_CONVS; q++) {
@@ -106,16 +107,16 @@ static void convolution_backward(void **state)
         const sdm_fmap g = sdm_fmap_layout(n);
         const size_t weights = c.in * c.out * c.taps, voxels = n[0] * n[1] * n[2];
         maps x = maps_random(&g, c.in, 1), dy = maps_random(&g, c.out, 2), dx = maps_new(&g, c.in);
-        float *w = test_floats(weights, 2),
-              *packed = test_floats(sdm_conv_packed_count(opposite), 9),
-              *dw = test_floats(weights, 4), *db = test_floats(c.out, 5),
-              *first = test_floats(weights, 4);
+        float *w = floats_random(weights, 2),
+              *packed = floats_random(sdm_conv_packed_count(opposite), 9),
+              *dw = floats_random(weights, 4), *db = floats_random(c.out, 5),
+              *first = floats_random(weights, 4);
         sdm_conv_pack(c, true, w, packed);
         sdm_conv_apply(&g, opposite, packed, dy.at, (sdm_conv_finish){NULL, -1, NULL}, dx.at, 1);
         maps_check_zeros(&dx);
         sdm_conv_gradient(&g, c, x.at, dy.at, dw, db, 1);
         for (int threads = 2; threads <= 3; threads++) {
-            float *more = test_floats(weights, 4), *bias = test_floats(c.out, 5);
+            float *more = floats_random(weights, 4), *bias = floats_random(c.out, 5);
             sdm_conv_gradient(&g, c, x.at, dy.at, more, bias, threads);
             assert_memory_equal(more, dw, weights * sizeof *dw);
             assert_memory_equal(bias, db, c.out * sizeof *db);
@@ -132,8 +133,8 @@ static void convolution_backward(void **state)
             for (size_t v = 0; v < voxels; v++) {
                 const long px = (long)(v % n[0]), py = (long)(v / n[0] % n[1]),
                            pz = (long)(v / n[0] / n[1]);
-                s += at(&my, o, px, py, pz) *
-                     at(&mx, k, px + t % 3 - d, py + t / 3 % 3 - d, pz + t / 9 - d);
+                s += volume_at(&my, o, px, py, pz) *
+                     volume_at(&mx, k, px + t % 3 - d, py + t / 3 % 3 - d, pz + t / 9 - d);
             }
             assert_true(fabs(s - (double)dw[i]) <= bound);
         }
@@ -145,13 +146,13 @@ static void convolution_backward(void **state)
                 for (size_t o = 0; o < c.out; o++)
                     for (long t = 0; t < (long)c.taps; t++)
                         s += (double)w[(o * c.in + k) * c.taps + (size_t)t] *
-                             at(&my, o, px - t % 3 + d, py - t / 3 % 3 + d, pz - t / 9 + d);
+                             volume_at(&my, o, px - t % 3 + d, py - t / 3 % 3 + d, pz - t / 9 + d);
                 assert_true(fabs(s - (double)*maps_voxel(&dx, k, v)) <=
                             1e-6 * sqrt((double)(c.out * c.taps)) + 1e-6);
             }
         }
         for (size_t o = 0; o < c.out; o++) {
-            float *was = test_floats(c.out, 5);
+            float *was = floats_random(c.out, 5);
             double s = (double)was[o];
             for (size_t v = 0; v < voxels; v++) s += out[o * voxels + v];
             assert_true(fabs(s - (double)db[o]) <= bound);
@@ -165,7 +166,7 @@ static void convolution_backward(void **state)
 
 static size_t half(size_t n) { return (n + 1) / 2; }
 
-static void pooling(void **state)
+static void pooling_takes_the_largest(void **state)
 {
     (void)state;
     enum { C = 3 };
@@ -199,7 +200,7 @@ static void pooling(void **state)
     }
 }
 
-static void upsampling(void **state)
+static void upsampling_and_its_gradient_match(void **state)
 {
     (void)state;
     enum { C = 2 };
@@ -227,14 +228,15 @@ static void upsampling(void **state)
     }
 }
 
-static void dropping(void **state)
+static void dropout_keeps_its_share_and_bits(void **state)
 {
     (void)state;
     enum { C = 6 };
     const size_t n[3] = {19, 11, 13}, voxels = 19 * 11 * 13;
     const sdm_fmap g = sdm_fmap_layout(n);
     maps first = maps_random(&g, C, 1);
-    for (int pass = 0; pass < 4; pass++) { // 2: other random numbers; 3: the same with more threads
+    // Pass 1 repeats pass 0, pass 2 uses other random numbers, pass 3 three threads.
+    for (int pass = 0; pass < 4; pass++) {
         maps y = maps_random(&g, C, 1), slope = maps_random(&g, C, 2), was = maps_random(&g, C, 2);
         sdm_dropout(&g, C, 0.3, 5, 6, pass == 2 ? sdm_dropout_draws(&g, C) : 0, y.at, slope.at,
                     pass == 3 ? 3 : 1);
@@ -249,8 +251,8 @@ static void dropping(void **state)
         }
         assert_true(fabs((double)dropped / (double)(C * voxels) - 0.3) < 0.015);
         if (pass == 1 || pass == 3) assert_int_equal(same, C * voxels);
-        if (pass == 2)
-            assert_true(same < C * voxels * 65 / 100); // 0.7^2 + 0.3^2 = 0.58 agree by chance
+        // Independent masks agree with probability 0.7^2 + 0.3^2 = 0.58.
+        if (pass == 2) assert_true(same < C * voxels * 65 / 100);
         maps_check_zeros(&y);
         if (pass == 0) memcpy(first.memory, y.memory, maps_bytes(&y));
         maps_free(&y), maps_free(&slope), maps_free(&was);
@@ -258,13 +260,13 @@ static void dropping(void **state)
     maps_free(&first);
 }
 
-static void dense_layer(void **state)
+static void dense_layer_matches_plain_loops(void **state)
 {
     (void)state;
     enum { B = 3, I = 7, O = 5 };
-    float *w = test_floats(O * I, 1), *bias = test_floats(O, 2), *x = test_floats(B * I, 3),
-          *dy = test_floats(B * O, 4), *dw = test_floats(O * I, 5), *was = test_floats(O * I, 5),
-          y[B * O], dx[B * I], db[O] = {1, 2, 3, 4, 5};
+    float *w = floats_random(O * I, 1), *bias = floats_random(O, 2), *x = floats_random(B * I, 3),
+          *dy = floats_random(B * O, 4), *dw = floats_random(O * I, 5),
+          *was = floats_random(O * I, 5), y[B * O], dx[B * I], db[O] = {1, 2, 3, 4, 5};
     sdm_dense_forward(B, I, O, w, bias, x, y, 2);
     sdm_dense_backward(B, I, O, w, x, dy, dw, db, dx, 2);
     for (int b = 0; b < B; b++) {
@@ -298,10 +300,12 @@ static void dense_layer(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(convolution), cmocka_unit_test(convolution_backward),
-        cmocka_unit_test(pooling),     cmocka_unit_test(upsampling),
-        cmocka_unit_test(dropping),    cmocka_unit_test(dense_layer)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(convolution_matches_plain_loops),
+                                       cmocka_unit_test(convolution_gradients_match),
+                                       cmocka_unit_test(pooling_takes_the_largest),
+                                       cmocka_unit_test(upsampling_and_its_gradient_match),
+                                       cmocka_unit_test(dropout_keeps_its_share_and_bits),
+                                       cmocka_unit_test(dense_layer_matches_plain_loops)};
     int failed = 0;
     for (int level = sdm_processor_select(-1); level >= 0; level--) {
         sdm_processor_select(level);

@@ -1,5 +1,5 @@
-/* Models that are point networks: against plain double arithmetic, derivatives against
- * differences, the file against damage.
+/* Point networks as models: maps against plain double arithmetic, derivatives against differences,
+ * and damaged model files.
  * Tests: point_forward.c point_layout.c point_open.c */
 #include <math.h>
 #include <setjmp.h>
@@ -19,7 +19,7 @@
 
 enum { P = 3, U = P + 3, NX = 9, NY = 7, NZ = 5, VOXELS = NX * NY * NZ };
 
-// a small random network; the grid is turned, its voxels are not cubes
+// A small random network on a rotated grid with anisotropic voxels.
 typedef struct toy {
     sdm_model_param params[P];
     sdm_model_info info;
@@ -27,7 +27,7 @@ typedef struct toy {
     float *weights;
 } toy;
 
-static void make(toy *t, bool imnet, bool half, int activation)
+static void toy_make(toy *t, bool imnet, bool half, int activation)
 {
     *t = (toy){0};
     for (int i = 0; i < P; i++) {
@@ -58,7 +58,7 @@ static void make(toy *t, bool imnet, bool half, int activation)
     t->spec.weights = t->weights;
 }
 
-static sdm_model *open_toy(const toy *t)
+static sdm_model *toy_open(const toy *t)
 {
     uint8_t *bytes;
     size_t size;
@@ -79,7 +79,7 @@ static double activate(int kind, double x)
                        : 0.02 * x;
 }
 
-// the definition of the network in sdm/point_network.h, in double, at one voxel
+// The network as sdm/point_network.h defines it, in double, at one voxel.
 static double reference(const toy *t, const double *p, size_t voxel)
 {
     const sdm_point_arch *a = &t->spec.arch;
@@ -123,8 +123,8 @@ static void forward_is_the_definition(void **state)
     (void)state;
     for (int mode = 0; mode < 16; mode++) {
         toy t;
-        make(&t, mode & 1, mode & 2, mode / 4);
-        sdm_model *m = open_toy(&t);
+        toy_make(&t, mode & 1, mode & 2, mode / 4);
+        sdm_model *m = toy_open(&t);
         assert_true(sdm_model_is_threaded(m));
         enum { N = 2 };
         double p[N * P];
@@ -142,7 +142,7 @@ static void forward_is_the_definition(void **state)
                 error = fmax(error, fabs(truth - (double)maps[i * VOXELS + v]));
             }
         assert_true(size > 0.05 && error < (mode & 2 ? 4e-3 : 1e-5) * size);
-        for (int threads = 2; threads <= 3; threads++) { // the same bits
+        for (int threads = 2; threads <= 3; threads++) { // Several threads give the same bits.
             assert_int_equal(sdm_alloc(&scratch, sdm_model_scratch_bytes_threads(m, N, threads), 1,
                                        "scratch", NULL),
                              0);
@@ -155,15 +155,15 @@ static void forward_is_the_definition(void **state)
     }
 }
 
-// without matrices between hidden layers
-static void one_layer(void **state)
+// A single hidden layer: no weights between hidden layers.
+static void one_layer_works(void **state)
 {
     (void)state;
     toy t;
-    make(&t, false, true, 0);
+    toy_make(&t, false, true, 0);
     t.spec.arch.depth = 1;
     t.spec.arch.skip = 0;
-    sdm_model *m = open_toy(&t);
+    sdm_model *m = toy_open(&t);
     const double p[P] = {0.5, 0.5, 0.5};
     float map[VOXELS];
     void *scratch;
@@ -179,10 +179,11 @@ static void one_layer(void **state)
 static void jacobian_is_the_slope(void **state)
 {
     (void)state;
-    for (int mode = 0; mode < 4; mode++) { // SiLU and tanh: ReLU has no slope at its kinks
+    // SiLU and tanh only: the derivative of ReLU jumps at its kinks.
+    for (int mode = 0; mode < 4; mode++) {
         toy t;
-        make(&t, mode & 1, false, mode / 2);
-        sdm_model *m = open_toy(&t);
+        toy_make(&t, mode & 1, false, mode / 2);
+        sdm_model *m = toy_open(&t);
         void *scratch;
         float map[VOXELS], value[VOXELS], jacobian[P * VOXELS], shared[P * VOXELS];
         double p[P];
@@ -191,7 +192,8 @@ static void jacobian_is_the_slope(void **state)
             0);
         for (uint64_t trial = 0; trial < 2; trial++) {
             random_params(trial, p);
-            sdm_model_forward(m, p, 1, map, scratch); // needs less
+            // scratch memory of the Jacobian is enough for a map
+            sdm_model_forward(m, p, 1, map, scratch);
             sdm_model_jacobian_threads(m, p, value, shared, scratch, 3);
             sdm_model_jacobian(m, p, value, jacobian, scratch);
             assert_memory_equal(shared, jacobian, sizeof jacobian);
@@ -220,8 +222,8 @@ static void file_keeps_everything(void **state)
     (void)state;
     toy t;
     for (int imnet = 0; imnet < 2; imnet++) {
-        make(&t, imnet, true, 0);
-        sdm_model *m = open_toy(&t);
+        toy_make(&t, imnet, true, 0);
+        sdm_model *m = toy_open(&t);
         const sdm_model_info *i = sdm_model_get_info(m);
         assert_string_equal(i->kind, imnet ? "imnet" : "deepsdf");
         assert_string_equal(i->shape, "toy");
@@ -230,7 +232,7 @@ static void file_keeps_everything(void **state)
         sdm_model_free(m);
         sdm_free(t.weights);
     }
-    make(&t, true, true, 0);
+    toy_make(&t, true, true, 0);
     t.spec.kind = "pod";
     uint8_t *bytes;
     size_t size;
@@ -255,7 +257,7 @@ static void damage_is_refused(void **state)
 {
     (void)state;
     toy t;
-    make(&t, false, true, 2);
+    toy_make(&t, false, true, 2);
     uint8_t *bytes;
     size_t size;
     assert_int_equal(sdm_point_build(&t.spec, &bytes, &size, NULL), SDM_OK);
@@ -270,12 +272,12 @@ static void damage_is_refused(void **state)
     sdm_free(t.weights);
 }
 
-// valid checksums around sections that do not fit to each other
+// Right checksums, but sections that contradict each other.
 static void hostile_sections(void **state)
 {
     (void)state;
     toy t;
-    make(&t, false, false, 2);
+    toy_make(&t, false, false, 2);
     uint8_t *bytes, *changed;
     size_t size, changed_size, n;
     assert_int_equal(sdm_point_build(&t.spec, &bytes, &size, NULL), SDM_OK);
@@ -289,7 +291,7 @@ static void hostile_sections(void **state)
     assert_string_equal(names[0], "meta");
     for (size_t i = 0; i < n; i++) sections[i].name = names[i];
 
-    // lines of the architecture, one wrong at a time
+    // Each case changes one line of the architecture.
     static const char *const lines[][2] = {
         {"point.depth=3", "point.depth=0"},   {"point.depth=3", "point.depth=4"},
         {"point.depth=3", "point.depth=2"},   {"point.width=70", "point.width=71"},
@@ -312,7 +314,7 @@ static void hostile_sections(void **state)
     }
     sections[0] = meta;
     sections[0].name = names[0];
-    // sections that are missing, too short, too long
+    // Sections that are missing, too short or too long.
     for (size_t i = 0; i < n; i++) {
         sdm_section left[4];
         size_t kept = 0;
@@ -336,13 +338,14 @@ static void every_allocation_may_fail(void **state)
 {
     (void)state;
     toy t;
-    make(&t, false, false, 0);
+    toy_make(&t, false, false, 0);
     uint8_t *bytes = NULL;
     size_t size = 0;
     sdm_error e;
     sdm_status s = SDM_E_NOMEM;
     unsigned long n = 1;
-    for (; s; n++) { // build
+    // Building the file.
+    for (; s; n++) {
         sdm_alloc_fail_after(n);
         s = sdm_point_build(&t.spec, &bytes, &size, &e);
         if (s) assert_int_equal(s, SDM_E_NOMEM);
@@ -352,7 +355,8 @@ static void every_allocation_may_fail(void **state)
     assert_true(n > 3);
     sdm_model *m = NULL;
     s = SDM_E_NOMEM;
-    for (n = 1; s; n++) { // open
+    // Opening the model.
+    for (n = 1; s; n++) {
         sdm_alloc_fail_after(n);
         s = sdm_model_open_memory("toy", bytes, size, &m, &e);
         if (s) assert_int_equal(s, SDM_E_NOMEM);
@@ -368,7 +372,7 @@ static void every_allocation_may_fail(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(forward_is_the_definition), cmocka_unit_test(one_layer),
+        cmocka_unit_test(forward_is_the_definition), cmocka_unit_test(one_layer_works),
         cmocka_unit_test(jacobian_is_the_slope),     cmocka_unit_test(file_keeps_everything),
         cmocka_unit_test(damage_is_refused),         cmocka_unit_test(hostile_sections),
         cmocka_unit_test(every_allocation_may_fail),

@@ -1,4 +1,4 @@
-/* The sdmnn network against its definition in plain double loops, and its derivatives.
+/* The sdmnn network: maps and derivatives against its definition in plain double loops.
  * Tests: fmap.c model_kind.c passes.c sdmnn_run.c */
 #include <math.h>
 #include <setjmp.h>
@@ -15,7 +15,7 @@
 
 enum { LEVELS = 3 };
 
-// a feature map of the reference: [channels][z][y][x]
+// A feature map of the reference: v[channels][z][y][x].
 typedef struct volume {
     long n[3];
     long channels;
@@ -32,7 +32,7 @@ static double activate(int kind, double x)
     return kind == 0 ? x / (1 + exp(-x)) : kind == 1 ? tanh(x) : x > 0 ? x : 0;
 }
 
-// takes its weights from *w and moves on; activation -1: none
+// Convolution with edge^3 taps; reads its weights at *w and advances *w. activation -1: none.
 static void convolve(volume *in, long outputs, long edge, int activation, const float **w,
                      volume *out)
 {
@@ -72,8 +72,8 @@ static void pool(volume *in, volume *out)
     }
 }
 
-// channels of `low`, up-sampled, behind those of `to`
-static void merge(volume *low, long factor, volume *to)
+// Appends the channels of `low`, up-sampled by `factor`, to those of `to`.
+static void append_upsampled(volume *low, long factor, volume *to)
 {
     for (long c = 0; c < low->channels; c++, to->channels++)
         for (long z = 0; z < to->n[2]; z++)
@@ -83,7 +83,7 @@ static void merge(volume *low, long factor, volume *to)
                         *voxel(low, c, x / factor, y / factor, z / factor);
 }
 
-// the definition of the network in sdm/sdmnn.h, in double
+// The network as sdm/sdmnn.h defines it, in double.
 static void reference(const toy *t, const double *p, double *map)
 {
     static volume cells, down[LEVELS], a, b;
@@ -106,7 +106,7 @@ static void reference(const toy *t, const double *p, double *map)
     }
     w = bias + 24;
     b = (volume){.n = {11, 6, 7}};
-    merge(&cells, 3, &b);
+    append_upsampled(&cells, 3, &b);
     for (int l = 0; l < LEVELS; l++) {
         convolve(&b, 4 << l, 3, k->activation, &w, &a);
         convolve(&a, 4 << l, 3, k->activation, &w, &down[l]);
@@ -115,7 +115,7 @@ static void reference(const toy *t, const double *p, double *map)
     a = down[2];
     for (int l = 1; l >= 0; l--) {
         convolve(&a, 4 << l, 1, k->activation, &w, &b);
-        merge(&b, 2, &down[l]);
+        append_upsampled(&b, 2, &down[l]);
         convolve(&down[l], 4 << l, 3, k->activation, &w, &b);
         convolve(&b, 4 << l, 3, k->activation, &w, &a);
     }
@@ -134,7 +134,8 @@ static void *scratch_of(size_t bytes)
 {
     void *s;
     assert_int_equal(sdm_alloc(&s, bytes, 1, "scratch", NULL), SDM_OK);
-    memset(s, 0xff, bytes); // every number that is read before it is written is no number
+    // NaN everywhere: a value that is read before it is written spoils the result
+    memset(s, 0xff, bytes);
     return s;
 }
 
@@ -150,8 +151,8 @@ static void forward_is_the_definition(void **state)
     (void)state;
     for (int mode = 0; mode < 6; mode++) {
         toy t;
-        make(&t, mode & 1, mode / 2);
-        sdm_model *m = open_toy(&t);
+        toy_make(&t, mode & 1, mode / 2);
+        sdm_model *m = toy_open(&t);
         void *scratch = scratch_of(sdm_model_scratch_bytes(m, 2));
         double p[2 * P], truth[VOXELS];
         float maps[2 * VOXELS], again[2 * VOXELS];
@@ -167,7 +168,7 @@ static void forward_is_the_definition(void **state)
             sdm_model_forward_threads(m, p, 2, again, scratch, threads);
             assert_memory_equal(maps, again, sizeof maps);
         }
-        // the network in training gives the same
+        // The trainer's form of the network gives the same map.
         sdm_sdmnn *net;
         float x[P];
         assert_int_equal(sdm_sdmnn_create(&t.spec.arch, 0, NULL, &net, NULL), SDM_OK);
@@ -187,10 +188,11 @@ static void forward_is_the_definition(void **state)
 static void jacobian_is_the_slope(void **state)
 {
     (void)state;
-    for (int activation = 0; activation < 2; activation++) { // ReLU has no slope at its kinks
+    // Without ReLU, whose derivative jumps at its kinks.
+    for (int activation = 0; activation < 2; activation++) {
         toy t;
-        make(&t, activation, activation);
-        sdm_model *m = open_toy(&t);
+        toy_make(&t, activation, activation);
+        sdm_model *m = toy_open(&t);
         void *scratch = scratch_of(sdm_model_jacobian_scratch_bytes(m));
         static float value[VOXELS], jacobian[P * VOXELS], again[P * VOXELS];
         double p[P], truth[VOXELS], up[VOXELS], down[VOXELS];
@@ -210,7 +212,7 @@ static void jacobian_is_the_slope(void **state)
                 assert_true(fabs((up[v] - down[v]) / (2 * h) - (double)jacobian[i * VOXELS + v]) <
                             1e-4 * largest(truth));
         }
-        // products with the Jacobian from either side
+        // J * direction and J^T * adjoint against the full Jacobian.
         const double direction[P] = {0.4, -1.1, 0.7};
         double gradient[P];
         float adjoint[VOXELS];
@@ -238,7 +240,7 @@ static void jacobian_is_the_slope(void **state)
     }
 }
 
-static void any_grid(void **state)
+static void any_grid_size_works(void **state)
 {
     (void)state;
     static const size_t grids[][3] = {{1, 1, 2}, {2, 3, 1}, {5, 5, 5}, {33, 2, 7}};
@@ -266,19 +268,21 @@ static void any_grid(void **state)
     }
 }
 
-static void random_start(void **state)
+static void initial_weights_have_the_right_variance(void **state)
 {
     (void)state;
-    // 4 channels at level 0: the second convolution has 4 * 27 inputs, mean square 2 / 108
+    // With 4 channels at level 0 the second convolution has 4 * 27 inputs: variance 2 / 108 (He et
+    // al. 2015).
     const size_t first = 70 * (P + 1) + 24 * 71 + 4 * 27 + 4, n = 4 * 4 * 27;
     toy t;
-    make(&t, false, 2);
+    toy_make(&t, false, 2);
     double s = 0;
     sdm_sdmnn_init(&t.spec.arch, 5, 6, t.weights);
     for (size_t i = first; i < first + n; i++) s += (double)t.weights[i] * (double)t.weights[i];
     assert_true(fabs(s / (double)n * 54 - 1) < 0.25);
     for (size_t i = first + n; i < first + n + 4; i++) assert_true(t.weights[i] == 0);
-    // a single multiply-add count by hand: 11 x 6 x 7, 6 x 3 x 4 and 3 x 2 x 2 voxels
+    // The number of multiply-adds, counted by hand for levels of 11 x 6 x 7, 6 x 3 x 4 and 3 x 2 x
+    // 2 voxels.
     const double work = 70 * (P + 24) + 462 * (27 * (4 + 16 + 32 + 16) + 4) +
                         72 * (27 * (32 + 64 + 128 + 64) + 32) + 12 * (27 * (128 + 256) + 128);
     assert_true(sdm_sdmnn_work(&t.spec.arch) == work);
@@ -289,6 +293,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(forward_is_the_definition),
                                        cmocka_unit_test(jacobian_is_the_slope),
-                                       cmocka_unit_test(any_grid), cmocka_unit_test(random_start)};
+                                       cmocka_unit_test(any_grid_size_works),
+                                       cmocka_unit_test(initial_weights_have_the_right_variance)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

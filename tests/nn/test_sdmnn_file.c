@@ -1,4 +1,4 @@
-/* Misuse of the sdmnn network, and damage of its file.
+/* Wrong arguments of the sdmnn network, and damaged model files.
  * Tests: model_text.c plan.c sdmnn_build.c sdmnn_open.c sdmnn_weights.c */
 #include <math.h>
 #include <setjmp.h>
@@ -13,7 +13,7 @@
 #include "sdm/internal/heap.h"
 #include "sdmnn_toy.h"
 
-static void misuse(void **state)
+static void wrong_arguments_are_refused(void **state)
 {
     (void)state;
     static const struct {
@@ -45,7 +45,7 @@ static void misuse(void **state)
     assert_int_equal(sdm_sdmnn_check(&a, &e), SDM_E_ARG);
     a.dropout = NAN;
     assert_int_equal(sdm_sdmnn_check(&a, &e), SDM_E_ARG);
-    // every allocation fails once
+    // Each allocation fails once.
     for (unsigned long n = 1; n <= 13; n++) {
         sdm_sdmnn *net;
         sdm_alloc_fail_after(n);
@@ -60,7 +60,7 @@ static void damage_is_refused(void **state)
 {
     (void)state;
     toy t;
-    make(&t, true, 0);
+    toy_make(&t, true, 0);
     uint8_t *bytes;
     size_t size;
     sdm_error e;
@@ -72,7 +72,7 @@ static void damage_is_refused(void **state)
         assert_int_equal(sdm_model_open_memory("flip", bytes, size, &m, &e), SDM_E_FORMAT);
         bytes[n] ^= 4;
     }
-    // whole files of sections that do not fit each other: right checksums, wrong sizes
+    // Files with right checksums, but sections of contradictory sizes.
     sdm_section sections[SDM_CONTAINER_MAX_SECTIONS], changed[SDM_CONTAINER_MAX_SECTIONS];
     char names[SDM_CONTAINER_MAX_SECTIONS][24];
     size_t n;
@@ -81,7 +81,7 @@ static void damage_is_refused(void **state)
     assert_int_equal(n, 5);
     for (size_t i = 0; i < n; i++) {
         for (int missing = 0; missing < 2; missing++) {
-            if (strcmp(sections[i].name, "config") == 0) continue; // a text of any length
+            if (strcmp(sections[i].name, "config") == 0) continue; // text of any length is valid
             uint8_t *other;
             size_t other_size, k = 0;
             for (size_t j = 0; j < n; j++)
@@ -94,7 +94,7 @@ static void damage_is_refused(void **state)
             sdm_free(other);
         }
     }
-    // a description that asks for another network than the weights are
+    // The text describes another network than the one the weights belong to.
     static const char *const lines[][2] = {
         {"sdmnn.depth=2", "sdmnn.depth=1"},       {"sdmnn.depth=2", "sdmnn.depth=6"},
         {"sdmnn.channels=4", "sdmnn.channels=5"}, {"sdmnn.width=70", "sdmnn.width=71"},
@@ -121,7 +121,8 @@ static void damage_is_refused(void **state)
             sdm_free(other);
         }
     }
-    for (unsigned long k = 1; k < 12; k++) { // an allocation that fails is an error
+    // A failed allocation is an error.
+    for (unsigned long k = 1; k < 12; k++) {
         sdm_alloc_fail_after(k);
         const sdm_status s = sdm_model_open_memory("toy", bytes, size, &m, &e);
         sdm_alloc_fail_after(0);
@@ -134,7 +135,7 @@ static void damage_is_refused(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(misuse),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(wrong_arguments_are_refused),
                                        cmocka_unit_test(damage_is_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

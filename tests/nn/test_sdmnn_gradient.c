@@ -1,6 +1,6 @@
-/* The gradient of the whole sdmnn network against central differences, with drop-out; a network
- * without kinks, so that differences are derivatives: SiLU for the activation, and steps so small
- * that the largest voxel of a window stays the largest.
+/* The gradient of the whole sdmnn network with drop-out against central differences. The network
+ * has no kinks (SiLU), and the steps are too small to change which voxel of a pooling window is
+ * largest.
  * Tests: sdmnn_training.c */
 #include <math.h>
 #include <setjmp.h>
@@ -49,7 +49,7 @@ static float *random_weights(const sdm_sdmnn_arch *a)
 
 static const float X[BATCH * PARAMS] = {0.3f, -0.7f, 0.9f, 0.1f};
 
-static void gradient(void **state)
+static void gradient_matches_differences(void **state)
 {
     (void)state;
     sdm_sdmnn *net;
@@ -73,7 +73,7 @@ static void gradient(void **state)
         w[i] = keep;
         assert_true(fabs((around[1] - around[0]) / (2 * (double)h) - (double)g[i]) < 2e-3 * size);
     }
-    // the same bits for any number of threads; other random numbers give another loss
+    // Any number of threads gives the same bits; other drop-out masks give another loss.
     sdm_sdmnn_set(net, w);
     for (int threads = 2; threads <= 3; threads++) {
         assert_true(sdm_sdmnn_gradient(net, BATCH, X, loss, NULL, 1, 2, 3, other, threads) == at);
@@ -84,7 +84,7 @@ static void gradient(void **state)
     sdm_free(w), sdm_free(g), sdm_free(other);
 }
 
-// without drop-out a batch is the sum of its maps, and its loss is that of the forward pass
+// Without drop-out the loss of a batch is the sum over its maps, each as in the forward pass.
 static void batch_is_the_sum(void **state)
 {
     (void)state;
@@ -100,7 +100,8 @@ static void batch_is_the_sum(void **state)
     const double both = sdm_sdmnn_gradient(net, 2, X, loss, NULL, 1, 2, 0, g[0], 2);
     const double one = sdm_sdmnn_gradient(net, 1, X, loss, NULL, 1, 2, 0, g[1], 2);
     assert_true(one == loss(NULL, 0, values, unused));
-    // the loss of a map counts from 0 in its batch: the second map against the first target
+    // The index passed to the loss counts within the batch, so the second map alone is compared
+    // with the first target.
     const double two = sdm_sdmnn_gradient(net, 1, X + PARAMS, loss, NULL, 1, 2, 0, g[2], 2);
     assert_true(both != one + two);
     sdm_sdmnn_forward(net, X + PARAMS, values, 1);
@@ -112,7 +113,7 @@ static void batch_is_the_sum(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(gradient),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(gradient_matches_differences),
                                        cmocka_unit_test(batch_is_the_sum)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

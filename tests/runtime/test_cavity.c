@@ -1,4 +1,4 @@
-/* Cavities are left out of a fit: against brute force, and in fits next to one.
+/* Masking of cavities next to the shape: against brute force, and in fits.
  * Tests: cavity.c */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -13,7 +13,8 @@
 
 enum { NX = 17, NY = 13, NZ = 11, COUNT = NX * NY * NZ };
 
-static double between(const sdm_grid *g, size_t a, size_t b)
+/* Distance in mm between voxels a and b. */
+static double voxel_distance(const sdm_grid *g, size_t a, size_t b)
 {
     const double d[3] = {g->spacing[0] * ((double)(a % NX) - (double)(b % NX)),
                          g->spacing[1] * ((double)(a / NX % NY) - (double)(b / NX % NY)),
@@ -21,8 +22,9 @@ static double between(const sdm_grid *g, size_t a, size_t b)
     return sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
 }
 
-// a dark image with a few bright voxels and NaN
-static void test_brute_force(void **state)
+// Random dark images with a few bright and NaN voxels: the mask equals the union of all balls of
+// the given radius that contain no bright voxel.
+static void test_mask_matches_brute_force(void **state)
 {
     (void)state;
     sdm_grid g = sdm_grid_centred((int64_t[3]){NX, NY, NZ}, 1, (double[3]){0, 0, 0});
@@ -41,7 +43,7 @@ static void test_brute_force(void **state)
         for (size_t i = 0; i < COUNT; i++) {
             centre[i] = true;
             for (size_t k = 0; k < COUNT; k++)
-                if (wall[k] && between(&g, i, k) < o.cavity) centre[i] = false;
+                if (wall[k] && voxel_distance(&g, i, k) < o.cavity) centre[i] = false;
         }
         const sdm_fit_target t = {.kind = SDM_FIT_IMAGE, .grid = g, .values = image};
         size_t n, expected = 0, all = 0;
@@ -50,7 +52,7 @@ static void test_brute_force(void **state)
         for (size_t i = 0; i < COUNT; i++) {
             bool out = false;
             for (size_t k = 0; k < COUNT; k++)
-                out = out || (centre[k] && between(&g, i, k) < o.cavity);
+                out = out || (centre[k] && voxel_distance(&g, i, k) < o.cavity);
             expected += out;
             all += !wall[i];
             assert_int_equal(isnan(found[i]), out || isnan(image[i]));
@@ -62,8 +64,8 @@ static void test_brute_force(void **state)
     }
 }
 
-// a phantom with a large dark ball that opens into the far end of the ellipsoid
-static float *beside_a_ball(void)
+// A phantom with a large dark ball that merges with one end of the ellipsoid.
+static float *ball_phantom(void)
 {
     float *v = phantom(TRUTH, &POSE, 0.3, 7);
     const sdm_grid g = image_grid();
@@ -80,7 +82,8 @@ static float *beside_a_ball(void)
     return v;
 }
 
-static double far_off(const sdm_fit_result *r)
+/* Largest error of parameters (mm), rotation (rad) and translation (mm). */
+static double largest_error(const sdm_fit_result *r)
 {
     double e[9], most = 0;
     errors(r, TRUTH, &POSE, e);
@@ -88,10 +91,10 @@ static double far_off(const sdm_fit_result *r)
     return most;
 }
 
-static void test_beside_a_ball(void **state)
+static void test_mask_removes_the_bias(void **state)
 {
     (void)state;
-    float *v = beside_a_ball();
+    float *v = ball_phantom();
     const sdm_fit_target t = image_of(v);
     const sdm_fit_source source = exact_source();
     sdm_fit_opts o = near_start();
@@ -104,15 +107,15 @@ static void test_beside_a_ball(void **state)
     o.cavity = 1.8;
     if (sdm_fit(&source, &t, &o, &with, &err)) fail_msg("%s", err.text);
     assert_true(without.n_cavity == 0 && with.n_cavity > 500 && with.n_nan > 100);
-    if (!(far_off(&with) < 0.1 && far_off(&without) > 0.4))
-        fail_msg("off by %g with, %g without", far_off(&with), far_off(&without));
+    if (!(largest_error(&with) < 0.1 && largest_error(&without) > 0.4))
+        fail_msg("off by %g with, %g without", largest_error(&with), largest_error(&without));
     sdm_fit_dispose(&with);
     sdm_fit_dispose(&without);
     free(v);
 }
 
-// a radius smaller than that of the shape is reported
-static void test_too_narrow(void **state)
+// A cavity radius smaller than the shape's would mask the shape itself: refused with advice.
+static void test_radius_below_shape_is_refused(void **state)
 {
     (void)state;
     float *v = phantom(TRUTH, &POSE, 0.3, 7);
@@ -136,8 +139,8 @@ static void test_too_narrow(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_brute_force),
-                                       cmocka_unit_test(test_beside_a_ball),
-                                       cmocka_unit_test(test_too_narrow)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_mask_matches_brute_force),
+                                       cmocka_unit_test(test_mask_removes_the_bias),
+                                       cmocka_unit_test(test_radius_below_shape_is_refused)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -1,4 +1,4 @@
-/* The check of a map: figures known in closed form, whatever the mesh and the grid.
+/* The check of a map against its mesh: error statistics that are known in closed form.
  * Tests: check.c */
 #include <math.h>
 #include <setjmp.h>
@@ -40,7 +40,7 @@ static sdm_check check_of(const sdm_exact *e, const sdm_grid *g, const float *va
     return c;
 }
 
-// grid about `centre` with uneven voxels, turned about two axes and reflected
+// A grid centred at `centre` with anisotropic voxels, rotated about two axes and reflected.
 static sdm_grid oblique_grid(int64_t n, double h)
 {
     const double a = 0.4, b = -0.7;
@@ -55,7 +55,7 @@ static sdm_grid oblique_grid(int64_t n, double h)
     return g;
 }
 
-// exact maps have no error; a constant added is every figure
+// Exact maps have no error; with a constant added, every statistic is that constant.
 static void test_exact_and_shifted(void **state)
 {
     (void)state;
@@ -94,14 +94,15 @@ static void test_exact_and_shifted(void **state)
     }
 }
 
-// a ball moved by d along an axis: the error on the surface is -d n, n uniform in -1 .. 1
-// (Archimedes), if points are spread by area
-static void test_moved(void **state)
+// A sphere moved by d along an axis: errors on the surface are -d n_axis, and n_axis is uniform in
+// -1 .. 1 (Archimedes) if points are drawn uniformly by area.
+static void test_points_are_uniform_by_area(void **state)
 {
     (void)state;
     const double d = 0.01, radius = 4;
     sdm_mesh m = {0};
-    // rings near the poles are narrow: points chosen by triangle or by vertex would gather there
+    // Triangles near the poles are small: points drawn per triangle or vertex would accumulate
+    // there.
     mesh_sphere(&m, centre, radius, 60);
     sdm_exact *e = engine(&m, NULL);
     const sdm_grid g = oblique_grid(60, 0.2);
@@ -123,9 +124,9 @@ static void test_moved(void **state)
     sdm_mesh_dispose(&m);
 }
 
-// errors of x on the cube -1 .. 1, of large triangles: |x| is 1 on two faces, uniform in 0 .. 1 on
-// four. A voxel is the nearest one
-static void test_even_in_triangles(void **state)
+// An error of x_axis on the cube -1 .. 1, made of large triangles: |error| is 1 on two faces and
+// uniform in 0 .. 1 on the other four.
+static void test_points_are_uniform_in_triangles(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -152,8 +153,8 @@ static void test_even_in_triangles(void **state)
     sdm_mesh_dispose(&m);
 }
 
-// the map of another parameter: a torus of a tube thicker by 0.1 mm
-static void test_wrong_parameter(void **state)
+// The map of a torus with a tube thicker by 0.1 mm.
+static void test_error_of_wrong_parameter(void **state)
 {
     (void)state;
     sdm_error err;
@@ -177,8 +178,9 @@ static void test_wrong_parameter(void **state)
     sdm_instance_free(s);
 }
 
-// surface inside of the union does not count, and an inside-out mesh is what the engine makes of it
-static void test_union_and_turned(void **state)
+// Surface inside of a union is not checked, and an inside-out mesh is treated as the exact engine
+// does.
+static void test_union_and_inside_out(void **state)
 {
     (void)state;
     sdm_mesh m = {0}, b = {0};
@@ -201,15 +203,15 @@ static void test_union_and_turned(void **state)
     sdm_mesh_dispose(&b);
 }
 
-// points beyond the grid are counted; a number that is none is never good enough
-static void test_beyond_and_nan(void **state)
+// Points outside of the grid are counted; a NaN in the map makes the statistics fail any bound.
+static void test_points_outside_and_nan(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
     mesh_sphere(&m, (const double[]){0, 0, 0}, 2, 60);
     sdm_exact *e = engine(&m, NULL);
     sdm_grid g = sdm_grid_centred((const int64_t[]){60, 60, 60}, 0.1, (const double[]){0, 0, 0});
-    g.origin[2] = 0.05; // voxels from the equator on
+    g.origin[2] = 0.05; // the grid begins at the equator
     const size_t n = sdm_grid_count(&g);
     float *values = room(n, sizeof *values);
     assert_int_equal(sdm_exact_map(e, &g, values, NULL), SDM_OK);
@@ -230,7 +232,7 @@ static void test_beyond_and_nan(void **state)
     sdm_mesh_dispose(&m);
 }
 
-static void test_misuse(void **state)
+static void test_wrong_arguments_are_refused(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -258,12 +260,12 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_exact_and_shifted),
-        cmocka_unit_test(test_moved),
-        cmocka_unit_test(test_even_in_triangles),
-        cmocka_unit_test(test_wrong_parameter),
-        cmocka_unit_test(test_union_and_turned),
-        cmocka_unit_test(test_beyond_and_nan),
-        cmocka_unit_test(test_misuse),
+        cmocka_unit_test(test_points_are_uniform_by_area),
+        cmocka_unit_test(test_points_are_uniform_in_triangles),
+        cmocka_unit_test(test_error_of_wrong_parameter),
+        cmocka_unit_test(test_union_and_inside_out),
+        cmocka_unit_test(test_points_outside_and_nan),
+        cmocka_unit_test(test_wrong_arguments_are_refused),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

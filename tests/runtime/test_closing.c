@@ -1,4 +1,5 @@
-/* Closing of label maps by a ball: against brute force, at the border, and misuse.
+/* Morphological closing of label maps by a ball: against brute force, at the border of the grid,
+ * and wrong arguments.
  * Tests: closing.c distance_transform.c envelope.c */
 #include <math.h>
 #include <setjmp.h>
@@ -22,7 +23,7 @@ static sdm_grid grid_of(double h)
     return g;
 }
 
-// whether the offset d (voxels) is at most `radius` long
+// Whether the offset d (in voxels) is at most `radius` mm long.
 static bool reaches(const sdm_grid *g, const int d[3], double radius)
 {
     double square = 0;
@@ -38,7 +39,8 @@ static float label_at(const float *v, const int at[3])
     return v[(at[2] * NY + at[1]) * NX + at[0]];
 }
 
-// whether a ball touches no label; its centre may lie beyond the grid
+// Whether the ball around a voxel contains no labelled voxel; its centre may lie outside of the
+// grid.
 static bool is_free(const sdm_grid *g, const float *v, const int centre[3], double radius)
 {
     for (int k = -PAD; k <= PAD; k++)
@@ -61,7 +63,7 @@ static bool is_reached(const sdm_grid *g, const float *v, const int at[3], doubl
     return false;
 }
 
-static void test_brute_force(void **state)
+static void test_closing_matches_brute_force(void **state)
 {
     (void)state;
     const sdm_grid g = grid_of(0.4);
@@ -84,8 +86,7 @@ static void test_brute_force(void **state)
     }
 }
 
-// a slab near the border of the grid with a wall of one voxel in it: the wall is filled, nothing
-// else
+// A slab near the border with a gap of one voxel in it: only the gap is filled.
 static void test_border(void **state)
 {
     (void)state;
@@ -101,7 +102,7 @@ static void test_border(void **state)
     for (int i = 0; i < COUNT; i++) assert_true(v[i] == 0);
 }
 
-static void test_misuse(void **state)
+static void test_wrong_arguments_are_refused(void **state)
 {
     (void)state;
     sdm_grid g = grid_of(0.5);
@@ -121,8 +122,8 @@ static void test_misuse(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_brute_force),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_closing_matches_brute_force),
                                        cmocka_unit_test(test_border),
-                                       cmocka_unit_test(test_misuse)};
+                                       cmocka_unit_test(test_wrong_arguments_are_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

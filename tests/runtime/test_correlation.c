@@ -1,5 +1,5 @@
-/* Autocorrelation of residuals: of smooth noise with known correlation, after fits of smooth
- * functions.
+/* Autocorrelation of residuals: noise of known correlation, after a least-squares fit has removed
+ * part of it.
  * Tests: correlation.c */
 #include <math.h>
 #include <setjmp.h>
@@ -19,13 +19,11 @@
 
 enum { NX = 26, NY = 24, NZ = 7, VOXELS = NX * NY * NZ, REACH = 4, UNKNOWNS = 12, FITS = 12 };
 
-// smoothing kernel that makes noise of variance 1 from white noise
-static double kernel(int k)
-{
-    return exp(-0.5 * k * k) / sqrt(1.7726372048266521);
-} // sum of exp(-k^2)
+// A Gaussian kernel (variance 1) that turns white noise into noise of variance 1; the constant is
+// the sum of exp(-k^2).
+static double kernel(int k) { return exp(-0.5 * k * k) / sqrt(1.7726372048266521); }
 
-// e: white noise, smoothed by the kernel along each axis
+// e: white noise, smoothed by the kernel along each axis.
 static void smooth_noise(uint64_t seed, double *e)
 {
     enum { WX = NX + 2 * REACH, WY = NY + 2 * REACH, WZ = NZ + 2 * REACH };
@@ -45,7 +43,8 @@ static void smooth_noise(uint64_t seed, double *e)
         e[i] = a[i % NX + REACH + (i / NX % NY + REACH) * WX + (i / NX / NY + REACH) * WX * WY];
 }
 
-// roots are cosines, which are orthogonal on the voxels; influence: inverse of their products
+// The functions fitted (root) are cosines, orthogonal on the voxels; influence: the inverse of
+// their Gram matrix.
 static void make_neighbours(fit_neighbours *v, double *influence)
 {
     *v = (fit_neighbours){.n = VOXELS, .n_unknowns = UNKNOWNS, .size = {NX, NY, NZ}, .step = 1};
@@ -86,8 +85,8 @@ static void free_neighbours(fit_neighbours *v)
     free(v->root);
 }
 
-// residuals of e after a least-squares fit of the cosines
-static void fit_functions(fit_neighbours *v, const double *influence, const double *e)
+// Residuals of e after a least-squares fit of the cosines.
+static void cosines_fit(fit_neighbours *v, const double *influence, const double *e)
 {
     double x[UNKNOWNS];
     for (int a = 0; a < UNKNOWNS; a++) {
@@ -102,7 +101,7 @@ static void fit_functions(fit_neighbours *v, const double *influence, const doub
     }
 }
 
-static void test_corrected(void **state)
+static void test_correction_recovers_the_sum(void **state)
 {
     (void)state;
     static double e[VOXELS], influence[UNKNOWNS * UNKNOWNS], c[FIT_LAG_ZERO + 1],
@@ -115,7 +114,7 @@ static void test_corrected(void **state)
     for (uint64_t seed = 0; seed < FITS; seed++) {
         int width;
         smooth_noise(seed, e);
-        fit_functions(&v, influence, e);
+        cosines_fit(&v, influence, e);
         assert_int_equal(sdm_fit_correlation_estimate(&v, 1, 1, c, &width, NULL), SDM_OK);
         before += sdm_fit_correlation_taper(c, width, true, weighted) / FITS;
         assert_int_equal(sdm_fit_correlation_correct(&v, influence, width, 1, c, NULL), SDM_OK);
@@ -130,15 +129,15 @@ static void test_corrected(void **state)
     free_neighbours(&v);
 }
 
-// the same bits for any number of threads
-static void test_threads(void **state)
+// Any number of threads gives the same bits.
+static void test_same_bits_for_threads(void **state)
 {
     (void)state;
     static double e[VOXELS], influence[UNKNOWNS * UNKNOWNS], c[2][FIT_LAG_ZERO + 1];
     fit_neighbours v;
     make_neighbours(&v, influence);
     smooth_noise(1, e);
-    fit_functions(&v, influence, e);
+    cosines_fit(&v, influence, e);
     for (int i = 0; i < 2; i++) {
         int width;
         assert_int_equal(sdm_fit_correlation_estimate(&v, 0.2, 1 + 2 * i, c[i], &width, NULL),
@@ -152,7 +151,7 @@ static void test_threads(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_corrected),
-                                       cmocka_unit_test(test_threads)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_correction_recovers_the_sum),
+                                       cmocka_unit_test(test_same_bits_for_threads)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

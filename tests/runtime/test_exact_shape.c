@@ -1,5 +1,5 @@
-/* Derivatives of exact maps with respect to the parameters of shapes: against closed forms and
- * differences of exact distances.
+/* Derivatives of exact maps with respect to shape parameters: against closed forms and differences
+ * of exact distances.
  * Tests: exact_shape.c */
 #include <math.h>
 #include <setjmp.h>
@@ -31,7 +31,7 @@ static int tear_down(void **state)
     return 0;
 }
 
-static sdm_instance *make(const sdm_shape *shape, const char *option, const char *value)
+static sdm_instance *shape_make(const sdm_shape *shape, const char *option, const char *value)
 {
     sdm_instance *s = NULL;
     sdm_error err = {0};
@@ -64,8 +64,8 @@ static float *jacobian_at(const sdm_instance *s, const double *p, const sdm_exac
     return j;
 }
 
-/* One-sided differences agree where the distance is smooth, and then the derivative lies between
- * them. */
+/* Where forward and backward differences agree, the distance is smooth and the derivative must
+ * lie between them. At least a share `wanted` of the voxels must be smooth. */
 static void check_differences(const sdm_instance *s, const double *p, const sdm_exact_opts *o,
                               const sdm_grid *g, double wanted)
 {
@@ -105,10 +105,10 @@ static void check_differences(const sdm_instance *s, const double *p, const sdm_
     free(j);
 }
 
-static void test_cochlea(void **state)
+static void test_derivatives_of_cochlea(void **state)
 {
     (void)state;
-    sdm_instance *s = make(sdm_registry_find(registry, "cochlea", NULL), NULL, NULL);
+    sdm_instance *s = shape_make(sdm_registry_find(registry, "cochlea", NULL), NULL, NULL);
     size_t n;
     const sdm_param *params = sdm_instance_params(s, &n);
     double p[8];
@@ -122,45 +122,47 @@ static void test_cochlea(void **state)
     sdm_instance_free(s);
 }
 
-static void test_superquadric(void **state)
+static void test_derivatives_of_superquadric(void **state)
 {
     (void)state;
-    sdm_instance *s = make(sdm_registry_find(registry, "ellipsoid", NULL), "e1", "0.4");
+    sdm_instance *s = shape_make(sdm_registry_find(registry, "ellipsoid", NULL), "e1", "0.4");
     const sdm_grid g =
         sdm_grid_centred((int64_t[3]){17, 15, 13}, 0.61, (double[3]){0.01, 0.02, 0.03});
     check_differences(s, (double[3]){3.9, 2.8, 2.1}, NULL, &g, 0.95);
     sdm_instance_free(s);
 }
 
-/* Ideal shapes: the mesh is a little off, by the angle between its triangles and the surface. */
-static void test_closed_forms(void **state)
+/* Derivatives of ideal shapes; the bounds allow for the angle between triangles and surface. */
+static void test_derivatives_in_closed_form(void **state)
 {
     (void)state;
     const sdm_grid g =
         sdm_grid_centred((int64_t[3]){15, 14, 13}, 0.8, (double[3]){0.01, 0.02, 0.03});
     const size_t n = sdm_grid_count(&g);
-    sdm_instance *ball = make(sdm_registry_find(registry, "ellipsoid", NULL), "edge", "0.1");
+    sdm_instance *ball = shape_make(sdm_registry_find(registry, "ellipsoid", NULL), "edge", "0.1");
     float *j = jacobian_at(ball, (double[3]){3, 3, 3}, NULL, &g, NULL);
-    for (size_t i = 0; i < n; i++) // all half axes together: the radius, whose derivative is -1
+    // Changing all three semi-axes together changes the radius, whose derivative is -1.
+    for (size_t i = 0; i < n; i++)
         assert_true(fabs((double)j[i] + (double)j[n + i] + (double)j[2 * n + i] + 1) < 1e-3);
     free(j);
     sdm_instance_free(ball);
 
-    sdm_instance *torus = make(sdm_registry_find(registry, "torus", NULL), "edge", "0.05");
+    sdm_instance *torus = shape_make(sdm_registry_find(registry, "torus", NULL), "edge", "0.05");
     j = jacobian_at(torus, (double[2]){3, 1.2}, NULL, &g, NULL);
     for (size_t i = 0; i < n; i++) {
         double x[3];
         position(&g, i, x);
         const double across = hypot(x[0], x[1]) - 3, middle = hypot(across, x[2]);
         assert_true(fabs((double)j[n + i] + 1) < 2e-3);
-        // the nearest triangle may be the next one: the angle across an edge of 0.05 on a radius
-        // of 1.2
+        // The nearest triangle may be a neighbour of the right one: the normal turns by 0.05 / 1.2
+        // across an edge.
         if (middle > 0.1 && across > -2.9) assert_true(fabs((double)j[i] + across / middle) < 0.05);
     }
     free(j);
     sdm_instance_free(torus);
 
-    sdm_instance *capsule = make(sdm_registry_find(registry, "capsule", NULL), "edge", "0.05");
+    sdm_instance *capsule =
+        shape_make(sdm_registry_find(registry, "capsule", NULL), "edge", "0.05");
     j = jacobian_at(capsule, (double[2]){1.5, 4}, NULL, &g, NULL);
     for (size_t i = 0; i < n; i++) {
         double x[3];
@@ -174,14 +176,15 @@ static void test_closed_forms(void **state)
     sdm_instance_free(capsule);
 }
 
-/* Without a callback the host takes differences of the mesh, one-sided at the ends of a range. */
-static void test_without_velocity(void **state)
+/* Without a velocity callback the registry takes finite differences of the mesh, one-sided at
+ * the ends of a range. */
+static void test_derivatives_without_velocity(void **state)
 {
     (void)state;
     const sdm_shape *with = sdm_registry_find(registry, "cochlea", NULL);
     sdm_shape without = *with;
     without.velocity = NULL;
-    sdm_instance *a = make(with, NULL, NULL), *b = make(&without, NULL, NULL);
+    sdm_instance *a = shape_make(with, NULL, NULL), *b = shape_make(&without, NULL, NULL);
     const sdm_grid g = sdm_grid_centred((int64_t[3]){9, 9, 9}, 1.1, (double[3]){0.01, 0.02, 2});
     size_t n;
     const sdm_param *params = sdm_instance_params(a, &n);
@@ -199,10 +202,10 @@ static void test_without_velocity(void **state)
     sdm_instance_free(b);
 }
 
-static void test_threads(void **state)
+static void test_same_bits_for_threads(void **state)
 {
     (void)state;
-    sdm_instance *s = make(sdm_registry_find(registry, "cochlea", NULL), NULL, NULL);
+    sdm_instance *s = shape_make(sdm_registry_find(registry, "cochlea", NULL), NULL, NULL);
     size_t n;
     const sdm_param *params = sdm_instance_params(s, &n);
     double p[8];
@@ -218,9 +221,10 @@ static void test_threads(void **state)
     sdm_instance_free(s);
 }
 
-/* ---- misuse ---- */
+/* ---- wrong arguments ---- */
 
-// a tetrahedron that has one more (unused) vertex from size 2 on
+// A tetrahedron with one more (unused) vertex if size >= 2: the number of vertices must not depend
+// on parameters.
 static int growing_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
                         const double *p, sdm_mesh_out *out)
 {
@@ -234,7 +238,7 @@ static int growing_mesh(const void *self, const sdm_host *host, const sdm_option
     return 0;
 }
 
-static void test_misuse(void **state)
+static void test_wrong_arguments_are_refused(void **state)
 {
     (void)state;
     static const sdm_param size = {"size", "mm", 1, 3, 2, "edge"};
@@ -246,7 +250,7 @@ static void test_misuse(void **state)
                                .n_params = 1,
                                .mesh = growing_mesh};
     sdm_error err = {0};
-    sdm_instance *s = make(&growing, NULL, NULL);
+    sdm_instance *s = shape_make(&growing, NULL, NULL);
     sdm_grid g = sdm_grid_centred((int64_t[3]){4, 4, 4}, 0.3, (double[3]){0.3, 0.3, 0.3});
     float values[64], j[64];
     const double at = 2, fine = 1.5, outside = 4;
@@ -291,9 +295,12 @@ static void test_misuse(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_cochlea),      cmocka_unit_test(test_superquadric),
-        cmocka_unit_test(test_closed_forms), cmocka_unit_test(test_without_velocity),
-        cmocka_unit_test(test_threads),      cmocka_unit_test(test_misuse),
+        cmocka_unit_test(test_derivatives_of_cochlea),
+        cmocka_unit_test(test_derivatives_of_superquadric),
+        cmocka_unit_test(test_derivatives_in_closed_form),
+        cmocka_unit_test(test_derivatives_without_velocity),
+        cmocka_unit_test(test_same_bits_for_threads),
+        cmocka_unit_test(test_wrong_arguments_are_refused),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -1,4 +1,4 @@
-/* Distances beyond the grid of a level set: against all points of the faces, one by one.
+/* Distances outside of a level set's grid: against a search over all faces at the border.
  * Tests: faces.c */
 #include <math.h>
 #include <setjmp.h>
@@ -16,9 +16,10 @@
 
 #define VOXEL 0.3
 
-// d at the point half a voxel beyond border voxel b along +-axis: the value there, continued by
-// half of its last difference, 0 inside
-static double at_face(const sdm_grid *g, const float *v, const int64_t b[3], int axis, bool low)
+// Distance half a voxel outside of border voxel b, on the face along +-axis: the value at b
+// extrapolated by half of the last difference; 0 if negative (inside).
+static double face_distance(const sdm_grid *g, const float *v, const int64_t b[3], int axis,
+                            bool low)
 {
     const int64_t step[3] = {1, g->n[0], g->n[0] * g->n[1]},
                   at = b[0] + b[1] * step[1] + b[2] * step[2];
@@ -29,7 +30,7 @@ static double at_face(const sdm_grid *g, const float *v, const int64_t b[3], int
     return d > 0 ? d : 0;
 }
 
-static double brute_force(const sdm_grid *g, const float *v, const int64_t p[3], double most)
+static double distance_by_search(const sdm_grid *g, const float *v, const int64_t p[3], double most)
 {
     double best = most;
     for (int axis = 0; axis < 3; axis++) {
@@ -41,8 +42,8 @@ static double brute_force(const sdm_grid *g, const float *v, const int64_t p[3],
         const double away = fabs((double)(p[axis] - b[axis])) - 0.5;
         for (b[e] = 0; b[e] < g->n[e]; b[e]++)
             for (b[f] = 0; b[f] < g->n[f]; b[f]++) {
-                const double d = at_face(g, v, b, axis, low),
-                             reach = d > 0 ? 0 : 0.5; // all of a face inside is near
+                // inside: the whole face of the voxel counts, not only its centre
+                const double d = face_distance(g, v, b, axis, low), reach = d > 0 ? 0 : 0.5;
                 const double x = fmax(fabs((double)(p[e] - b[e])) - reach, 0),
                              y = fmax(fabs((double)(p[f] - b[f])) - reach, 0);
                 best = fmin(best, VOXEL * sqrt(away * away + x * x + y * y) + d);
@@ -51,8 +52,9 @@ static double brute_force(const sdm_grid *g, const float *v, const int64_t p[3],
     return best;
 }
 
-// a ball in the grid, far from its faces, across them, and as noise that no distance is
-static float value(int kind, const int64_t at[3], uint64_t i)
+// Test maps: a ball far from the faces of the grid, a ball across them, and noise that is no
+// distance map.
+static float map_value(int kind, const int64_t at[3], uint64_t i)
 {
     static const double middle[3][3] = {{4, 3, 5}, {0, 6, 2}, {0, 0, 0}};
     if (kind == 2) return (float)(3 * sdm_rng_uniform(1, 2, i) - 0.3);
@@ -62,7 +64,7 @@ static float value(int kind, const int64_t at[3], uint64_t i)
     return (float)(VOXEL * (sqrt(sum) - 2.2));
 }
 
-static void check(const int64_t n[3], int kind)
+static void faces_check(const int64_t n[3], int kind)
 {
     const double origin[3] = {0, 0, 0};
     const sdm_grid g = sdm_grid_centred(n, VOXEL, origin);
@@ -72,7 +74,7 @@ static void check(const int64_t n[3], int kind)
     for (int64_t k = 0; k < n[2]; k++)
         for (int64_t j = 0; j < n[1]; j++)
             for (int64_t i = 0; i < n[0]; i++, count++)
-                v[count] = value(kind, (const int64_t[3]){i, j, k}, count);
+                v[count] = map_value(kind, (const int64_t[3]){i, j, k}, count);
     sdm_faces faces = {0};
     assert_int_equal(sdm_faces_create(&g, v, &faces, NULL), SDM_OK);
     const int64_t pad = 7;
@@ -83,7 +85,7 @@ static void check(const int64_t n[3], int kind)
                 if (i >= 0 && i < n[0] && j >= 0 && j < n[1] && k >= 0 && k < n[2]) continue;
                 for (double most = 0.9; most < 20; most *= 10) {
                     const double found = sdm_faces_distance(&faces, p, most),
-                                 wanted = brute_force(&g, v, p, most);
+                                 wanted = distance_by_search(&g, v, p, most);
                     if (!(fabs(found - wanted) <= 1e-12))
                         fail_msg("kind %d, voxel %d %d %d: %.15g, not %.15g", kind, (int)i, (int)j,
                                  (int)k, found, wanted);
@@ -93,18 +95,18 @@ static void check(const int64_t n[3], int kind)
     free(v);
 }
 
-static void test_points(void **state)
+static void test_values_match_brute_force(void **state)
 {
     (void)state;
     for (int kind = 0; kind < 3; kind++) {
-        check((const int64_t[3]){9, 8, 11}, kind);
-        check((const int64_t[3]){16, 1, 5}, kind);
-        check((const int64_t[3]){1, 1, 1}, kind);
+        faces_check((const int64_t[3]){9, 8, 11}, kind);
+        faces_check((const int64_t[3]){16, 1, 5}, kind);
+        faces_check((const int64_t[3]){1, 1, 1}, kind);
     }
 }
 
-// wherever memory ends: an error, and nothing is left behind
-static void test_memory(void **state)
+// Each allocation fails once: an error, and no leak (detected by the sanitizer build).
+static void test_each_allocation_may_fail(void **state)
 {
     (void)state;
     const int64_t n[3] = {5, 4, 3};
@@ -127,7 +129,7 @@ static void test_memory(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_points),
-                                       cmocka_unit_test(test_memory)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_values_match_brute_force),
+                                       cmocka_unit_test(test_each_allocation_may_fail)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

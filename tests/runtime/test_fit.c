@@ -1,4 +1,5 @@
-/* Fits to phantoms with known truth: accuracy, and whether standard deviations match the errors.
+/* Fits to phantoms with known truth: accuracy, and whether the standard deviations match the
+ * errors.
  * Tests: fit.c fit_check.c fit_map.c newton.c observation.c prior.c score_covariance.c
  * start_search.c tissues.c */
 #include <setjmp.h>
@@ -11,8 +12,8 @@
 
 #include "oracle/fit_tools.h"
 
-// largest error of parameters (mm), rotation (rad) and translation (mm)
-static double worst(const sdm_fit_result *r)
+// Largest error of parameters (mm), rotation (rad) and translation (mm).
+static double largest_error(const sdm_fit_result *r)
 {
     double e[9], most = 0;
     errors(r, TRUTH, &POSE, e);
@@ -20,7 +21,7 @@ static double worst(const sdm_fit_result *r)
     return most;
 }
 
-static void test_clean(void **state)
+static void test_estimate_without_noise(void **state)
 {
     (void)state;
     float *v = phantom(TRUTH, &POSE, 0, 1);
@@ -28,8 +29,9 @@ static void test_clean(void **state)
     const sdm_fit_opts o = near_start();
     sdm_fit_result r = fit(&t, &o);
     assert_true(r.converged && r.n_params == 3 && r.n_exact > 3 && r.n_network == 0);
-    if (!(worst(&r) < 4e-3)) fail_msg("off by %g", worst(&r));
-    // the point spread includes the box of a voxel; the means are those of the phantom
+    if (!(largest_error(&r) < 4e-3)) fail_msg("off by %g", largest_error(&r));
+    // The fitted blur includes the extent of a voxel (variance h^2 / 12); the means are the
+    // phantom's.
     assert_true(fabs(r.blur - sqrt(0.04 + 0.0625 / 12)) < 0.01);
     assert_true(fabs(r.appearance.inside[0].mean - 40) < 5 &&
                 fabs(r.appearance.outside[0].mean - 1300) < 5);
@@ -38,7 +40,7 @@ static void test_clean(void **state)
     assert_true(r.n_iterations > 1 && r.objective[r.n_iterations - 1] < 0);
     sdm_fit_dispose(&r);
 
-    // another start leads to the same estimate
+    // Another start leads to the same estimate.
     sdm_fit_opts other = o;
     other.start_pose = POSE;
     other.start_params = TRUTH;
@@ -53,8 +55,8 @@ static void test_clean(void **state)
     free(v);
 }
 
-// with noise and kinks of the likelihood: fits from two starts reach the same maximum
-static void test_one_maximum(void **state)
+// With noise, and kinks in the likelihood: fits from two starts reach the same maximum.
+static void test_starts_reach_one_maximum(void **state)
 {
     (void)state;
     double most = 0;
@@ -68,7 +70,7 @@ static void test_one_maximum(void **state)
         sdm_fit_result b = fit(&t, &o);
         assert_true(a.converged && b.converged);
         for (int k = 0; k < 3; k++) {
-            most = fmax(most, fabs(a.params[k] - b.params[k]) / 3); // 3: range of a parameter
+            most = fmax(most, fabs(a.params[k] - b.params[k]) / 3); // relative to the range 3
             most = fmax(most, fabs(a.pose.rotation[k] - b.pose.rotation[k]));
             most = fmax(most, fabs(a.pose.translation[k] - b.pose.translation[k]) / 2.5);
         }
@@ -80,9 +82,10 @@ static void test_one_maximum(void **state)
     assert_true(most < 1e-5);
 }
 
-// n fits to noisy phantoms: of one shape with different noise, or (random) of different shapes in
-// different poses. *rms: of the errors over their sd; *beyond: parameters with an error above 3 sd
-static void spread(size_t n, bool random, double *rms, size_t *beyond)
+// n fits to noisy phantoms: of one shape with different noise, or (random) of different shapes and
+// poses. *rms: root mean square of error / sd. *beyond: number of parameters whose error exceeds 3
+// sd.
+static void errors_over_sd(size_t n, bool random, double *rms, size_t *beyond)
 {
     double square = 0;
     size_t count = 0;
@@ -116,19 +119,19 @@ static void spread(size_t n, bool random, double *rms, size_t *beyond)
 
 static size_t n_random = 0;
 
-static void test_honest(void **state)
+static void test_sd_match_the_errors(void **state)
 {
     (void)state;
     double rms;
     size_t beyond;
-    spread(n_random ? n_random : 12, n_random > 0, &rms, &beyond);
+    errors_over_sd(n_random ? n_random : 12, n_random > 0, &rms, &beyond);
     printf("errors over standard deviations: root mean square %.2f; %zu parameters beyond 3\n", rms,
            beyond);
     assert_true(rms > 0.6 && rms < 1.5);
     assert_true((double)beyond <= 0.05 * (double)(n_random ? n_random : 12));
 }
 
-static void test_threads(void **state)
+static void test_same_bits_for_threads(void **state)
 {
     (void)state;
     float *v = phantom(TRUTH, &POSE, 1, 3);
@@ -149,7 +152,7 @@ static void test_threads(void **state)
     free(v);
 }
 
-static void test_labels_of_image(void **state)
+static void test_fit_by_label_model(void **state)
 {
     (void)state;
     float *v = phantom(TRUTH, &POSE, 0.3, 3);
@@ -157,14 +160,14 @@ static void test_labels_of_image(void **state)
     sdm_fit_opts o = near_start();
     o.image_model = SDM_FIT_LABELS;
     sdm_fit_result r = fit(&t, &o);
-    // biased: the edge lies where the densities are equal, not at the surface
-    if (!(worst(&r) < 0.25)) fail_msg("off by %g", worst(&r));
+    // This model is biased: it puts the edge where the two densities are equal, not at the surface.
+    if (!(largest_error(&r) < 0.25)) fail_msg("off by %g", largest_error(&r));
     assert_true(r.blur == 0 && r.evidence > 0);
     sdm_fit_dispose(&r);
     free(v);
 }
 
-static void test_label_map(void **state)
+static void test_fit_to_label_map(void **state)
 {
     (void)state;
     const sdm_fit_source source = exact_source();
@@ -172,7 +175,7 @@ static void test_label_map(void **state)
     float *v = calloc(sdm_grid_count(&g), sizeof *v);
     if (!v) abort();
     assert_int_equal(sdm_fit_map(&source, TRUTH, &POSE, &g, 1, v, NULL), SDM_OK);
-    // against the closed form; the triangles of the mesh lie slightly inside
+    // Against the closed form; the mesh lies slightly inside of the ellipsoid.
     for (size_t i = 0; i < sdm_grid_count(&g); i += 37) {
         const double index[3] = {(double)(i % 36), (double)(i / 36 % 30), (double)(i / 36 / 30)};
         double x[3], y[3], d;
@@ -186,15 +189,15 @@ static void test_label_map(void **state)
     t.kind = SDM_FIT_LABEL;
     const sdm_fit_opts o = near_start();
     sdm_fit_result r = fit(&t, &o);
-    if (!(worst(&r) < 0.02)) fail_msg("off by %g", worst(&r));
+    if (!(largest_error(&r) < 0.02)) fail_msg("off by %g", largest_error(&r));
     assert_true(isnan(r.evidence));
     sdm_fit_dispose(&r);
-    // without its blur of the distance, the logistic prior would shorten the long axis by 0.035 mm
+    // If the logistic prior did not blur the distance, it would shorten the long axis by 0.035 mm.
     sdm_fit_opts logistic = o;
     logistic.image_model = SDM_FIT_LABELS;
     logistic.l_ref = 0.1;
     r = fit(&t, &logistic);
-    if (!(worst(&r) < 0.02)) fail_msg("off by %g", worst(&r));
+    if (!(largest_error(&r) < 0.02)) fail_msg("off by %g", largest_error(&r));
     assert_true(isnan(r.evidence) && r.blur == 0);
     sdm_fit_dispose(&r);
     v[0] = 2;
@@ -204,7 +207,7 @@ static void test_label_map(void **state)
     free(v);
 }
 
-static void test_points(void **state)
+static void test_fit_to_points(void **state)
 {
     (void)state;
     sdm_mesh m = {0};
@@ -213,14 +216,15 @@ static void test_points(void **state)
     if (!x) abort();
     for (size_t i = 0; i < m.n_vert; i++) {
         sdm_pose_apply(&POSE, m.vert + 3 * i, x + 3 * i);
-        const double far = i % 20 == 0 ? 0.8 : 0.01; // every 20th is an outlier
+        // Every 20th point is an outlier.
+        const double far = i % 20 == 0 ? 0.8 : 0.01;
         for (size_t k = 0; k < 3; k++) x[3 * i + k] += far * sdm_rng_normal(1, i, k);
     }
     const sdm_fit_target t = {.kind = SDM_FIT_POINTS, .points = x, .n_points = m.n_vert};
     sdm_fit_opts o = near_start();
     o.point_dof = 2;
     sdm_fit_result r = fit(&t, &o);
-    if (!(worst(&r) < 0.01)) fail_msg("off by %g", worst(&r));
+    if (!(largest_error(&r) < 0.01)) fail_msg("off by %g", largest_error(&r));
     assert_true(r.point_sd > 0.003 && r.point_sd < 0.03 && r.n_used == m.n_vert &&
                 r.inside_share == 1);
     double e[9];
@@ -231,40 +235,41 @@ static void test_points(void **state)
     sdm_mesh_dispose(&m);
 }
 
-static void test_turns(void **state)
+static void test_turned_starts_find_the_truth(void **state)
 {
     (void)state;
     float *v = phantom(TRUTH, &POSE, 1, 4);
     const sdm_fit_target t = image_of(v);
     sdm_fit_opts o = near_start();
-    // wrong by a quarter turn about the shape's z: local steps from there do not find the truth
+    // The start is rotated by pi / 2 about the shape's z: local steps do not lead from there to the
+    // truth.
     o.start_pose = sdm_pose_compose(&POSE, &(sdm_pose){{0, 0, 1.5707963267948966}, {0, 0, 0}});
     o.start_params = TRUTH;
     o.turns = SDM_FIT_TURNS_AXIS;
     o.n_turns = 8;
     sdm_fit_result r = fit(&t, &o);
-    // turns next to the right one lead there, too. A half turn gives the same ellipsoid, a quarter
-    // turn exchanges its axes
+    // Turns next to the right one lead there, too. A rotation by pi gives the same ellipsoid, one
+    // by pi / 2 exchanges its axes.
     assert_true(r.turn % 4 != 0);
     for (int k = 0; k < 3; k++) assert_true(fabs(r.params[k] - TRUTH[k]) < 5 * r.sd[k]);
     sdm_fit_dispose(&r);
-    // priors are centred on each turned start; with a pivot off the origin the turn also moves the
-    // origin
+    // The prior is centred on each rotated start. With a pivot off the origin, the rotation also
+    // moves the origin.
     o.pivot[0] = 2;
-    o.start_pose = sdm_pose_compose(
-        &POSE, &(sdm_pose){{0, 0, 1.5707963267948966}, {2, -2, 0}}); // leaves the pivot in place
+    // This translation keeps the pivot in place.
+    o.start_pose = sdm_pose_compose(&POSE, &(sdm_pose){{0, 0, 1.5707963267948966}, {2, -2, 0}});
     o.prior_rotation_sd = 0.03;
     o.prior_translation_sd = 0.1;
     r = fit(&t, &o);
     assert_int_equal(r.turn, 6);
-    if (!(worst(&r) < 0.1)) fail_msg("off by %g", worst(&r));
+    if (!(largest_error(&r) < 0.1)) fail_msg("off by %g", largest_error(&r));
     sdm_fit_dispose(&r);
     o.pivot[0] = o.prior_rotation_sd = o.prior_translation_sd = 0;
     o.turns = SDM_FIT_TURNS_SPHERE;
     o.n_turns = 40;
     o.start_pose = sdm_pose_compose(&POSE, &(sdm_pose){{1.1, 0.7, -0.8}, {0, 0, 0}});
     r = fit(&t, &o);
-    // the axes may be permuted: the same ellipsoid
+    // The axes may be permuted, which is the same ellipsoid.
     for (int k = 0; k < 3; k++) {
         double nearest = INFINITY;
         for (int i = 0; i < 3; i++) nearest = fmin(nearest, fabs(r.params[i] - TRUTH[k]) / r.sd[i]);
@@ -274,15 +279,16 @@ static void test_turns(void **state)
     free(v);
 }
 
-// number of unknowns that the evidence was charged for: kept ones are free (Schwarz 1978)
-static double unknowns_paid(const sdm_fit_result *r)
+// Number of unknowns that the evidence penalises by Schwarz's criterion (1978); kept unknowns are
+// not counted.
+static double unknowns_penalised(const sdm_fit_result *r)
 {
     const double factor = fmax(r->noise_factor, 1);
     return ((r->log_likelihood - r->log_likelihood_without) / factor - r->evidence) /
            (0.5 * log((double)r->n_used / factor));
 }
 
-static void test_kept(void **state)
+static void test_kept_unknowns_stay(void **state)
 {
     (void)state;
     float *v = phantom(TRUTH, &POSE, 0, 4);
@@ -292,21 +298,21 @@ static void test_kept(void **state)
     o.start_params = TRUTH;
     sdm_fit_result r = fit(&t, &o);
     assert_memory_equal(r.params, TRUTH, sizeof TRUTH);
-    assert_true(worst(&r) < 4e-3 && r.sd[0] == 0 && r.sd[3] > 0 && r.correlation[1] == 0);
-    assert_true(fabs(unknowns_paid(&r) - 6) < 1e-6);
+    assert_true(largest_error(&r) < 4e-3 && r.sd[0] == 0 && r.sd[3] > 0 && r.correlation[1] == 0);
+    assert_true(fabs(unknowns_penalised(&r) - 6) < 1e-6);
     sdm_fit_dispose(&r);
     o.keep_params = false;
     o.keep_pose = true;
     o.start_params = START;
     o.start_pose = POSE;
     r = fit(&t, &o);
-    assert_true(worst(&r) < 4e-3 && r.sd[0] > 0 && r.sd[3] == 0);
-    assert_true(fabs(unknowns_paid(&r) - 3) < 1e-6);
+    assert_true(largest_error(&r) < 4e-3 && r.sd[0] > 0 && r.sd[3] == 0);
+    assert_true(fabs(unknowns_penalised(&r) - 3) < 1e-6);
     sdm_fit_dispose(&r);
     free(v);
 }
 
-// a strong prior overrules the image, and the sd are at most those of the prior
+// A strong prior overrules the image, and standard deviations are at most the prior's.
 static void test_priors(void **state)
 {
     (void)state;
@@ -322,7 +328,9 @@ static void test_priors(void **state)
         assert_true(r.sd[3 + k] < 2e-5 && r.sd[6 + k] < 2e-5);
     }
     sdm_fit_dispose(&r);
-    // sd of 0.2 half ranges of 1 .. 4: draws the parameters towards 2.5 and narrows their sd
+    // A prior sd of 0.2 (in units of half the range 1 .. 4) pulls the parameters towards 2.5 and
+    // reduces their sd.
+    // A prior sd of 0.2 half ranges (1 .. 4) pulls the parameters towards 2.5 and reduces their sd.
     o.prior_translation_sd = o.prior_rotation_sd = 0;
     const sdm_fit_result free_of_it = fit(&t, &o);
     o.prior_sd = 0.2;
@@ -337,8 +345,9 @@ static void test_priors(void **state)
     free(v);
 }
 
-// the sd of a parameter without effect is that of its prior or range, and by_prior marks it alone
-static void test_no_effect(void **state)
+// The sd of a parameter without effect is that of its prior or of its range, and by_prior marks
+// this parameter only.
+static void test_parameter_without_effect(void **state)
 {
     (void)state;
     sdm_param params[4] = {{0}};
@@ -349,7 +358,7 @@ static void test_no_effect(void **state)
     shape.name = "with_nothing";
     shape.params = params;
     shape.n_params = 4;
-    shape.velocity = NULL; // it would write the velocities of three parameters
+    shape.velocity = NULL; // the callback would write only three parameters
     sdm_instance *instance = NULL;
     assert_int_equal(sdm_registry_add(registry, &shape, "test", NULL), SDM_OK);
     assert_int_equal(sdm_instance_create(sdm_registry_find(registry, "with_nothing", NULL),
@@ -376,7 +385,8 @@ static void test_no_effect(void **state)
     free(v);
 }
 
-// correlated noise: the prior is weighted such that estimate and prior combine by their variances
+// With correlated noise the prior is weighted such that estimate and prior combine by their
+// variances.
 static void test_prior_weight(void **state)
 {
     (void)state;
@@ -390,7 +400,7 @@ static void test_prior_weight(void **state)
     const double sd = r.sd[2], found = r.params[2], prior_sd = 10 * sd;
     assert_true(r.noise_factor > 3);
     sdm_fit_dispose(&r);
-    o.prior_sd = prior_sd / 1.5; // in units of half of the range 1 .. 4
+    o.prior_sd = prior_sd / 1.5; // the unit of prior_sd is half the range 1 .. 4
     r = fit(&t, &o);
     const double wanted = (2.5 - found) / (1 + prior_sd * prior_sd / (sd * sd)),
                  moved = r.params[2] - found;
@@ -400,7 +410,7 @@ static void test_prior_weight(void **state)
     free(v);
 }
 
-// two overlapping tissues outside: 51 iterations without acceleration
+// Two overlapping tissues outside: 51 iterations without Anderson acceleration.
 static void test_overlapping_tissues(void **state)
 {
     (void)state;
@@ -423,8 +433,9 @@ static void test_overlapping_tissues(void **state)
     free(v);
 }
 
-// a tissue that is absent from the image keeps its mean and sd instead of modelling something else
-static void test_absent_tissue(void **state)
+// A tissue that does not occur in the image keeps its mean and sd; it must not model something
+// else.
+static void test_absent_tissue_is_kept(void **state)
 {
     (void)state;
     float *v = phantom(TRUTH, &POSE, 1, 4);
@@ -446,22 +457,22 @@ static void test_absent_tissue(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_clean),
-        cmocka_unit_test(test_one_maximum),
-        cmocka_unit_test(test_honest),
-        cmocka_unit_test(test_threads),
-        cmocka_unit_test(test_label_map),
-        cmocka_unit_test(test_points),
-        cmocka_unit_test(test_labels_of_image),
-        cmocka_unit_test(test_turns),
-        cmocka_unit_test(test_kept),
+        cmocka_unit_test(test_estimate_without_noise),
+        cmocka_unit_test(test_starts_reach_one_maximum),
+        cmocka_unit_test(test_sd_match_the_errors),
+        cmocka_unit_test(test_same_bits_for_threads),
+        cmocka_unit_test(test_fit_to_label_map),
+        cmocka_unit_test(test_fit_to_points),
+        cmocka_unit_test(test_fit_by_label_model),
+        cmocka_unit_test(test_turned_starts_find_the_truth),
+        cmocka_unit_test(test_kept_unknowns_stay),
         cmocka_unit_test(test_priors),
-        cmocka_unit_test(test_no_effect),
+        cmocka_unit_test(test_parameter_without_effect),
         cmocka_unit_test(test_prior_weight),
         cmocka_unit_test(test_overlapping_tissues),
-        cmocka_unit_test(test_absent_tissue),
+        cmocka_unit_test(test_absent_tissue_is_kept),
     };
-    const struct CMUnitTest longer[] = {cmocka_unit_test(test_honest)};
+    const struct CMUnitTest longer[] = {cmocka_unit_test(test_sd_match_the_errors)};
     n_random = argc > 1 ? (size_t)strtoul(argv[1], NULL, 10) : 0;
     return n_random ? cmocka_run_group_tests(longer, set_up, tear_down)
                     : cmocka_run_group_tests(tests, set_up, tear_down);

@@ -1,4 +1,4 @@
-/* Smoothing and interpolation of fields, against closed forms.
+/* Smoothing and interpolation of fields against closed forms.
  * Tests: interpolate.c */
 #include <math.h>
 #include <setjmp.h>
@@ -14,20 +14,20 @@
 #include "sdm/internal/rng.h"
 #include "sdm/pose.h"
 
-static void *room(size_t n, size_t size)
+static void *array_new(size_t n, size_t size)
 {
     void *p = calloc(n, size);
     if (!p) abort();
     return p;
 }
 
-static void test_blur(void **state)
+static void test_blur_keeps_its_closed_forms(void **state)
 {
     (void)state;
     const sdm_grid g = sdm_grid_centred((int64_t[3]){33, 31, 29}, 0.2, (double[3]){0, 0, 0});
     const size_t n = sdm_grid_count(&g), middle = (size_t)((14 * 31 + 15) * 33 + 16);
     for (double variance = 0.002; variance < 0.3; variance *= 3) {
-        double *f = room(2 * n, sizeof *f), *spare = room(2 * n, sizeof *f);
+        double *f = array_new(2 * n, sizeof *f), *spare = array_new(2 * n, sizeof *f);
         f[2 * middle] = 1;
         sdm_fit_blur(&g, 2, variance, false, 2, &f, &spare);
         double sum = 0, second[3] = {0, 0, 0};
@@ -43,8 +43,8 @@ static void test_blur(void **state)
         free(f);
         free(spare);
     }
-    // wider than the largest number of taps: truncated, but the weights still sum to 1
-    double *f = room(n, sizeof *f), *spare = room(n, sizeof *f);
+    // A kernel wider than the maximal number of taps is truncated; its weights still sum to 1.
+    double *f = array_new(n, sizeof *f), *spare = array_new(n, sizeof *f);
     for (size_t i = 0; i < n; i++) f[i] = 7;
     sdm_fit_blur(&g, 1, 1e18, false, 2, &f, &spare);
     for (size_t i = 0; i < n; i++) assert_true(fabs(f[i] - 7) < 1e-9);
@@ -52,20 +52,20 @@ static void test_blur(void **state)
     free(spare);
 }
 
-static void test_sample(void **state)
+static void test_interpolation_is_exact_for_quadratics(void **state)
 {
     (void)state;
     sdm_grid g = sdm_grid_centred((int64_t[3]){9, 8, 7}, 0.3, (double[3]){0.2, -0.1, 0.4});
     g.spacing[1] = 0.25;
     sdm_pose_matrix(&(sdm_pose){{0.3, -0.5, 0.2}, {0, 0, 0}}, g.dir);
     const size_t n = sdm_grid_count(&g);
-    double *f = room(2 * n, sizeof *f);
+    double *f = array_new(2 * n, sizeof *f);
     for (size_t i = 0; i < n; i++) {
         double x[3];
         sdm_grid_world(
             &g, (const double[3]){(double)(i % 9), (double)(i / 9 % 8), (double)(i / 9 / 8)}, x);
-        f[2 * i] =
-            1 + x[0] - 2 * x[1] + x[0] * x[1] + 0.5 * x[2] * x[2]; // reproduced exactly: quadratic
+        // A quadratic function: interpolation is exact.
+        f[2 * i] = 1 + x[0] - 2 * x[1] + x[0] * x[1] + 0.5 * x[2] * x[2];
         f[2 * i + 1] = 3 - x[2];
     }
     const fit_field field = {.grid = &g, .packed = f, .n_fields = 2, .distance = true};
@@ -81,7 +81,7 @@ static void test_sample(void **state)
                     fabs(slope[2] - x[2]) < 2e-5);
         assert_true(fabs(rest - (3 - x[2])) < 1e-6);
     }
-    // beyond the border: plus the distance to it
+    // Outside of the grid: the value at the border plus the distance to it.
     double corner[3], out[3], slope[3];
     double rest;
     sdm_grid_world(&g, (const double[3]){8, 7, 6}, corner);
@@ -94,9 +94,10 @@ static void test_sample(void **state)
     free(f);
 }
 
-/* An impulse, smoothed and interpolated: the sum over a shifted lattice is 1, and its second moment
- * is the variance. Narrow Gaussians, which sharpen to offset the splines, vanish at a distance. */
-static void test_splines(void **state)
+/* An impulse, smoothed and interpolated: the sum over any shifted lattice is 1, and the second
+ * moment is the variance. Narrow Gaussians, sharpened to compensate for the B-splines, vanish at
+ * a distance. */
+static void test_splines_keep_moments(void **state)
 {
     (void)state;
     sdm_grid g = sdm_grid_centred((int64_t[3]){33, 31, 29}, 0.2, (double[3]){0, 0, 0});
@@ -104,7 +105,7 @@ static void test_splines(void **state)
     const int64_t *n = g.n;
     const size_t count = sdm_grid_count(&g), middle = (size_t)((14 * n[1] + 15) * n[0] + 16);
     for (double variance = 0.002; variance < 0.1; variance *= 3) {
-        double *f = room(2 * count, sizeof *f), *spare = room(2 * count, sizeof *f);
+        double *f = array_new(2 * count, sizeof *f), *spare = array_new(2 * count, sizeof *f);
         f[2 * middle] = f[2 * middle + 1] = 1;
         sdm_fit_blur(&g, 2, variance, true, 2, &f, &spare);
         const fit_field field = {.grid = &g, .packed = f, .n_fields = 2};
@@ -132,14 +133,15 @@ static void test_splines(void **state)
     }
 }
 
-// derivatives of splines against differences; second derivatives are continuous across voxels
-static void test_splines_slope(void **state)
+// Derivatives of splines against differences; second derivatives are continuous across voxel
+// centres.
+static void test_splines_have_right_derivatives(void **state)
 {
     (void)state;
     sdm_grid g = sdm_grid_centred((int64_t[3]){9, 8, 7}, 0.3, (double[3]){0.2, -0.1, 0.4});
     sdm_pose_matrix(&(sdm_pose){{0.3, -0.5, 0.2}, {0, 0, 0}}, g.dir);
     const size_t n = sdm_grid_count(&g);
-    double *f = room(2 * n, sizeof *f);
+    double *f = array_new(2 * n, sizeof *f);
     for (size_t i = 0; i < 2 * n; i++) f[i] = sdm_rng_uniform(1, 7, i);
     const fit_field field = {.grid = &g, .packed = f, .n_fields = 2};
     for (int i = 0; i < 50; i++) {
@@ -157,7 +159,8 @@ static void test_splines_slope(void **state)
         }
     }
     double second[2];
-    for (int side = 0; side < 2; side++) { // on either side of a voxel
+    // On either side of a voxel centre.
+    for (int side = 0; side < 2; side++) {
         double slope[2][3], rest;
         for (int i = 0; i < 2; i++) {
             double x[3];
@@ -170,14 +173,14 @@ static void test_splines_slope(void **state)
     free(f);
 }
 
-// a plane edge of sd 2/3 voxel, sampled at voxels and interpolated at all offsets
-static void test_splines_edge(void **state)
+// A plane edge blurred by 2/3 voxel (sd), sampled at voxels and interpolated at offsets in between.
+static void test_splines_reproduce_an_edge(void **state)
 {
     (void)state;
     const sdm_grid g = sdm_grid_centred((int64_t[3]){24, 1, 1}, 1, (double[3]){11.5, 0, 0});
     double most = 0;
     for (double shift = 0; shift < 1; shift += 0.125) {
-        double *f = room(24, sizeof *f), *spare = room(24, sizeof *f);
+        double *f = array_new(24, sizeof *f), *spare = array_new(24, sizeof *f);
         for (int i = 0; i < 24; i++) f[i] = 0.5 * erfc((i - 11.5 - shift) / (0.5 * sqrt(2)));
         sdm_fit_blur(&g, 1, 4.0 / 9 - 0.25, true, 1, &f, &spare);
         const fit_field field = {.grid = &g, .packed = f, .n_fields = 1};
@@ -188,15 +191,17 @@ static void test_splines_edge(void **state)
         free(f);
         free(spare);
     }
-    if (!(most < 0.03)) fail_msg("off by %g", most); // cubic convolution: 0.035
+    if (!(most < 0.03)) fail_msg("off by %g", most); // for comparison: cubic convolution has 0.035
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_blur),         cmocka_unit_test(test_sample),
-        cmocka_unit_test(test_splines),      cmocka_unit_test(test_splines_slope),
-        cmocka_unit_test(test_splines_edge),
+        cmocka_unit_test(test_blur_keeps_its_closed_forms),
+        cmocka_unit_test(test_interpolation_is_exact_for_quadratics),
+        cmocka_unit_test(test_splines_keep_moments),
+        cmocka_unit_test(test_splines_have_right_derivatives),
+        cmocka_unit_test(test_splines_reproduce_an_edge),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

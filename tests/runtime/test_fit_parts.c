@@ -1,5 +1,5 @@
-/* Parts of the fit: derivatives against differences, steps within limits, averaged gradient,
- * Anderson acceleration.
+/* Parts of the fit: derivatives against differences, bounded steps, averaged gradient, Anderson
+ * acceleration.
  * Tests: anderson.c averaged_gradient.c map_fields.c newton.c objective.c solve.c */
 #include <math.h>
 #include <setjmp.h>
@@ -42,7 +42,7 @@ static double log_likelihood(const fit_observation *obs, double value, double fi
     return r.log_likelihood;
 }
 
-static void close_to(double found, double wanted, double scale)
+static void assert_close(double found, double wanted, double scale)
 {
     if (!(fabs(found - wanted) <= 1e-5 * (fabs(wanted) + scale)))
         fail_msg("%.12g, wanted %.12g", found, wanted);
@@ -52,25 +52,25 @@ static void check_score(const fit_observation *obs, double value, double field, 
 {
     fit_likelihood r;
     sdm_fit_likelihood(obs, value, NULL, field, true, &r);
-    close_to(r.log_likelihood, log_likelihood(obs, value, field), 0);
-    close_to(r.score[0],
-             (log_likelihood(obs, value, field + h) - log_likelihood(obs, value, field - h)) /
-                 (2 * h),
-             1e-2);
+    assert_close(r.log_likelihood, log_likelihood(obs, value, field), 0);
+    assert_close(r.score[0],
+                 (log_likelihood(obs, value, field + h) - log_likelihood(obs, value, field - h)) /
+                     (2 * h),
+                 1e-2);
     for (size_t c = 1; c < obs->n_channels; c++) {
         fit_observation up = *obs, down = *obs;
         up.tissue[c - 1].mean += 1e-2, down.tissue[c - 1].mean -= 1e-2;
-        close_to(r.score[c],
-                 (log_likelihood(&up, value, field) - log_likelihood(&down, value, field)) / 2e-2,
-                 1e-4);
+        assert_close(
+            r.score[c],
+            (log_likelihood(&up, value, field) - log_likelihood(&down, value, field)) / 2e-2, 1e-4);
     }
     for (size_t a = 0; a < obs->n_channels; a++)
         assert_true(r.complete[a * (obs->n_channels + 1)] >= 0);
-    // observed information: complete less what is missing
+    // Observed information is complete information minus missing information.
     assert_true(r.observed[0] <= r.complete[0]);
 }
 
-static void test_scores(void **state)
+static void test_scores_match_differences(void **state)
 {
     (void)state;
     for (int dof = 0; dof < 5; dof += 4) {
@@ -91,9 +91,9 @@ static void test_scores(void **state)
     }
 }
 
-/* Integrals over all values of a voxel: density 1, mean score 0, mean squared score = information
- * (one pair of Gaussians). */
-static void test_information(void **state)
+/* Integrals over all values of a voxel, for one pair of Gaussians: the density integrates to 1,
+ * the mean score is 0, and the mean squared score is the Fisher information. */
+static void test_information_of_gaussians(void **state)
 {
     (void)state;
     sdm_fit_opts o = sdm_fit_defaults();
@@ -118,7 +118,7 @@ static void test_information(void **state)
 
 // ---- bounded steps
 
-static void test_step(void **state)
+static void test_bounded_step(void **state)
 {
     (void)state;
     const double a[9] = {4, 1, 0.5, 1, 3, 0.2, 0.5, 0.2, 2}, gradient[3] = {1, -2, 3};
@@ -128,7 +128,7 @@ static void test_step(void **state)
     for (int i = 0; i < 3; i++)
         assert_true(fabs(a[3 * i] * step[0] + a[3 * i + 1] * step[1] + a[3 * i + 2] * step[2] -
                          gradient[i]) < 1e-12);
-    // the third unknown stops at its limit, the second is optimal given that, the first is kept
+    // The third unknown stops at its bound, the second is optimal given that, the first is kept.
     l.max[2] = 0.5;
     l.kept[0] = true;
     assert_true(sdm_fit_bounded_step(3, a, gradient, 0, &l, step, work));
@@ -149,7 +149,8 @@ static double posterior_at(fit_problem *p, const fit_state *s)
     return sdm_fit_objective(p);
 }
 
-// the averaged gradient equals difference quotients over the intervals, one-sided at a bound
+// The averaged gradient equals the difference quotient over the averaging interval, one-sided at a
+// bound.
 static void check_average(fit_problem *p, const fit_state *s)
 {
     double half_width[FIT_PARAMS_MAX], found[2];
@@ -162,8 +163,8 @@ static void check_average(fit_problem *p, const fit_state *s)
     double average[3];
     memcpy(average, p->information.gradient, sizeof average);
     for (size_t k = 0; k < 3; k++) {
-        assert_true(half_width[k] > 1e-3 &&
-                    half_width[k] < 0.03); // for an ellipsoid with map voxels of 0.25 mm
+        // For an ellipsoid with map voxels of 0.25 mm.
+        assert_true(half_width[k] > 1e-3 && half_width[k] < 0.03);
         for (int side = 0; side < 2; side++) {
             fit_state moved = *s;
             moved.params[k] =
@@ -215,7 +216,7 @@ static void check_gradient(sdm_fit_kind kind, sdm_fit_model model)
                      SDM_OK);
     assert_true(changed && p.samples.n > 5000);
     fit_region few = region;
-    few.max_samples = 1000; // stops after one sample more
+    few.max_samples = 1000; // one more sample ends the selection
     assert_int_equal(sdm_fit_samples_choose(&t, &o, &few, 1, &p.samples, &changed, NULL), SDM_OK);
     assert_true(changed && p.samples.n == 1001);
     assert_int_equal(sdm_fit_samples_choose(&t, &o, &region, 1, &p.samples, &changed, NULL),
@@ -227,7 +228,7 @@ static void check_gradient(sdm_fit_kind kind, sdm_fit_model model)
     (void)sdm_fit_prior(&p, &s, gradient, NULL, NULL);
     for (size_t k = 0; k < n; k++) {
         if (k == fit_at_blur(3) && !p.maps.share) continue;
-        // wide enough to average over the kinks of the likelihood
+        // The step is wide enough to average over the kinks of the likelihood.
         const double h = k >= fit_columns(3) ? 1 : k == fit_at_blur(3) ? 1e-3 : 4e-3;
         double step[FIT_UNKNOWNS_MAX] = {0}, found[2],
                size = sqrt(p.information.complete[k * (n + 1)]);
@@ -249,7 +250,7 @@ static void check_gradient(sdm_fit_kind kind, sdm_fit_model model)
     free(v);
 }
 
-static void test_gradient(void **state)
+static void test_gradient_matches_differences(void **state)
 {
     (void)state;
     check_gradient(SDM_FIT_IMAGE, SDM_FIT_PARTIAL_VOLUME);
@@ -259,7 +260,7 @@ static void test_gradient(void **state)
 
 // ---- Anderson acceleration
 
-// x -> fixed + A (x - fixed), with eigenvalues 0.99, 0.9, 0.5, -0.95 along skew directions
+// x -> fixed + A (x - fixed); A has the eigenvalues 0.99, 0.9, 0.5, -0.95 along oblique directions.
 static void affine(const double *x, double *y)
 {
     static const double RATE[4] = {0.99, 0.9, 0.5, -0.95};
@@ -269,7 +270,7 @@ static void affine(const double *x, double *y)
     }
 }
 
-static void test_anderson(void **state)
+static void test_anderson_converges_fast(void **state)
 {
     (void)state;
     fit_anderson m = {0};
@@ -281,9 +282,10 @@ static void test_anderson(void **state)
         off = 0;
         for (int k = 0; k < 4; k++) x[k] = y[k], off = fmax(off, fabs(x[k] - 1 - k));
     }
-    if (steps > 8) fail_msg("%d steps, off by %g", steps, off); // without acceleration: 2000
+    // without acceleration about 2000 steps
+    if (steps > 8) fail_msg("%d steps, off by %g", steps, off);
 
-    // the change of the image is limited
+    // Acceleration changes the plain iterate by at most the given limit.
     m.count = 0;
     const double start[4] = {0, 0, 0, 0};
     memcpy(x, start, sizeof x);
@@ -295,7 +297,7 @@ static void test_anderson(void **state)
         for (int k = 0; k < 4; k++) assert_true(fabs(y[k] - image[k]) <= 0.01 * (1 + 1e-12));
         memcpy(x, y, sizeof x);
     }
-    // a fixed point stays
+    // A fixed point stays fixed.
     m.count = 0;
     const double fixed[4] = {1, 2, 3, 4};
     for (int i = 0; i < 4; i++) {
@@ -308,9 +310,11 @@ static void test_anderson(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_scores),   cmocka_unit_test(test_information),
-        cmocka_unit_test(test_step),     cmocka_unit_test(test_gradient),
-        cmocka_unit_test(test_anderson),
+        cmocka_unit_test(test_scores_match_differences),
+        cmocka_unit_test(test_information_of_gaussians),
+        cmocka_unit_test(test_bounded_step),
+        cmocka_unit_test(test_gradient_matches_differences),
+        cmocka_unit_test(test_anderson_converges_fast),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

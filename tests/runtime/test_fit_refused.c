@@ -1,5 +1,5 @@
-/* Fits that must fail: images without the shape, bad arguments, lack of memory, cancellation. And
- * starts from points and axes.
+/* Fits that must fail: images without the shape, wrong arguments, failing allocations,
+ * cancellation. Also start poses from points and axes.
  * Tests: start_pose.c */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -11,8 +11,8 @@
 #include "oracle/fit_tools.h"
 #include "sdm/internal/heap.h"
 
-static void refused(sdm_status wanted, const char *text, const sdm_fit_target *t,
-                    const sdm_fit_opts *o)
+static void fit_refused(sdm_status wanted, const char *text, const sdm_fit_target *t,
+                        const sdm_fit_opts *o)
 {
     const sdm_fit_source source = exact_source();
     sdm_fit_result r;
@@ -24,7 +24,7 @@ static void refused(sdm_status wanted, const char *text, const sdm_fit_target *t
     sdm_fit_dispose(&r);
 }
 
-static void test_no_shape(void **state)
+static void test_image_without_shape_is_refused(void **state)
 {
     (void)state;
     const sdm_grid g = image_grid();
@@ -33,11 +33,11 @@ static void test_no_shape(void **state)
     if (!v) abort();
     sdm_fit_target t = image_of(v);
     const sdm_fit_opts o = near_start();
-    refused(SDM_E_QUALITY, "every voxel is 0", &t, &o);
+    fit_refused(SDM_E_QUALITY, "every voxel is 0", &t, &o);
     for (size_t i = 0; i < n; i++) v[i] = NAN;
-    refused(SDM_E_FORMAT, "are NaN", &t, &o);
+    fit_refused(SDM_E_FORMAT, "are NaN", &t, &o);
     for (size_t i = 0; i < n; i++) v[i] = (float)(700 + 300 * sdm_rng_normal(1, 2, i));
-    refused(SDM_E_QUALITY, "no such shape", &t, &o);
+    fit_refused(SDM_E_QUALITY, "no such shape", &t, &o);
     free(v);
     v = phantom(TRUTH, &POSE, 1, 5);
     for (size_t i = 0; i < n; i++) v[i] = 1340 - v[i]; // opposite contrast
@@ -52,15 +52,16 @@ static void test_no_shape(void **state)
     free(v);
 }
 
-// a failed fit returns its start and the reason
-static void test_known(void **state)
+// A failed fit returns its start and the reason of the failure.
+static void test_failed_fit_returns_its_start(void **state)
 {
     (void)state;
     float *v = phantom(TRUTH, &POSE, 1, 5);
     const sdm_fit_target t = image_of(v);
     const sdm_fit_opts o = near_start();
     sdm_fit_source source = exact_source();
-    source.grid.origin[0] += 50; // the shape lies outside the grid of its maps
+    // The shape lies outside of the grid of its maps.
+    source.grid.origin[0] += 50;
     sdm_fit_result r;
     sdm_error err = {0};
     assert_int_equal(sdm_fit(&source, &t, &o, &r, &err), SDM_E_QUALITY);
@@ -69,7 +70,8 @@ static void test_known(void **state)
         assert_true(fabs(r.pose.rotation[k] - o.start_pose.rotation[k]) < 1e-12);
     assert_memory_equal(r.pose.translation, o.start_pose.translation, sizeof r.pose.translation);
     assert_true(isnan(r.evidence) && isnan(r.log_likelihood_without) && !r.converged);
-    for (int k = 0; k < 9; k++) assert_true(isnan(r.sd[k])); // 0 would mean known exactly
+    // 0 would mean that it is known exactly
+    for (int k = 0; k < 9; k++) assert_true(isnan(r.sd[k]));
     for (int k = 0; k < 81; k++) assert_true(isnan(r.covariance[k]) && isnan(r.correlation[k]));
     assert_true(isnan(r.inside_share) && isnan(r.noise_factor) && isnan(r.model_error_mm));
     if (!*r.reason || strncmp(r.reason, err.text, 200) != 0) fail_msg("reason '%s'", r.reason);
@@ -79,67 +81,67 @@ static void test_known(void **state)
 
 static bool stop(void *user) { return --*(int *)user < 0; }
 
-static void test_refused(void **state)
+static void test_bad_arguments_and_cancellation(void **state)
 {
     (void)state;
     float *v = phantom(TRUTH, &POSE, 1, 5);
     const sdm_fit_target t = image_of(v);
     sdm_fit_opts o = near_start();
     o.start_pose.translation[0] = 100;
-    refused(SDM_E_ARG, "no voxel of the image", &t, &o);
+    fit_refused(SDM_E_ARG, "no voxel of the image", &t, &o);
     o = near_start();
     o.start_params = (const double[3]){2, 2, 9};
-    refused(SDM_E_RANGE, "start of rz = 9", &t, &o);
+    fit_refused(SDM_E_RANGE, "start of rz = 9", &t, &o);
     o = near_start();
     o.max_iterations = 1;
-    refused(SDM_E_QUALITY, "not converged after 1 iterations", &t, &o);
+    fit_refused(SDM_E_QUALITY, "not converged after 1 iterations", &t, &o);
     o = near_start();
     o.l_ref = NAN;
-    refused(SDM_E_ARG, "l_ref", &t, &o);
+    fit_refused(SDM_E_ARG, "l_ref", &t, &o);
     o = near_start();
     o.blur = 1e9;
-    refused(SDM_E_ARG, "blur of 1e+09 mm spreads over 4e+09 voxels", &t, &o);
+    fit_refused(SDM_E_ARG, "blur of 1e+09 mm spreads over 4e+09 voxels", &t, &o);
     o.cavity = 3;
-    refused(SDM_E_ARG, "blur of 1e+09 mm spreads over", &t, &o);
+    fit_refused(SDM_E_ARG, "blur of 1e+09 mm spreads over", &t, &o);
     o = near_start();
     o.image_model = SDM_FIT_LABELS;
     o.l_ref = 1e9;
-    refused(SDM_E_ARG, "l_ref of 1e+09 mm spreads over", &t, &o);
+    fit_refused(SDM_E_ARG, "l_ref of 1e+09 mm spreads over", &t, &o);
     o = near_start();
     o.blur = 0.1;
     o.keep_blur = true;
-    refused(SDM_E_ARG,
-            "a blur of 0.1 mm is kept, but maps with voxels of 0.25 mm carry one of 0.125 mm", &t,
-            &o);
+    fit_refused(SDM_E_ARG,
+                "a blur of 0.1 mm is kept, but maps with voxels of 0.25 mm carry one of 0.125 mm",
+                &t, &o);
     o = near_start();
     o.tissue_mm = -1;
-    refused(SDM_E_ARG, "tissue_mm", &t, &o);
+    fit_refused(SDM_E_ARG, "tissue_mm", &t, &o);
     o = near_start();
     o.appearance.inside[0].sd = 0;
-    refused(SDM_E_ARG, "sd of law 0 inside", &t, &o);
+    fit_refused(SDM_E_ARG, "sd of law 0 inside", &t, &o);
     o = near_start();
     o.keep_params = o.keep_pose = true;
-    refused(SDM_E_ARG, "nothing to fit", &t, &o);
+    fit_refused(SDM_E_ARG, "nothing to fit", &t, &o);
     for (int calls = 0; calls < 60; calls += 13) {
         int left = calls;
         o = near_start();
         o.cancelled = stop;
         o.user = &left;
-        refused(SDM_E_CANCELLED, "", &t, &o);
+        fit_refused(SDM_E_CANCELLED, "", &t, &o);
     }
     v[36 * 30 * 13 + 36 * 15 + 18] = INFINITY;
     o = near_start();
-    refused(SDM_E_FORMAT, "infinite", &t, &o);
+    fit_refused(SDM_E_FORMAT, "infinite", &t, &o);
     v[36 * 30 * 13 + 36 * 15 + 18] = NAN;
     sdm_fit_result r = fit(&t, &o);
     assert_int_equal(r.n_nan, 1);
     sdm_fit_dispose(&r);
-    // half of the image is missing: first more than least_inside of the shape lies in the rest,
-    // then less
+    // Half of the image is missing: the share of the shape that is left suffices for the default
+    // least_inside, but not for 0.7.
     for (size_t i = 0; i < 36 * 30 * 26; i++)
         if (i % 36 < 20) v[i] = NAN;
     o.least_inside = 0.7;
-    refused(SDM_E_QUALITY, "of the shape lies in the image", &t, &o);
+    fit_refused(SDM_E_QUALITY, "of the shape lies in the image", &t, &o);
     free(v);
 
     sdm_fit_result none;
@@ -150,8 +152,8 @@ static void test_refused(void **state)
     assert_int_equal(sdm_fit(&source, &t, &o, NULL, NULL), SDM_E_ARG);
 }
 
-// the n-th allocation fails: an error, and nothing leaks
-static void test_memory(void **state)
+// The n-th allocation fails: an error, and no leak (detected by the sanitizer build).
+static void test_each_allocation_may_fail(void **state)
 {
     (void)state;
     float *v = phantom(TRUTH, &POSE, 0, 5);
@@ -174,7 +176,7 @@ static void test_memory(void **state)
     free(v);
 }
 
-static void test_starts(void **state)
+static void test_start_poses(void **state)
 {
     (void)state;
     const double shape[12] = {0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0, 3};
@@ -219,8 +221,10 @@ static void test_starts(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_no_shape), cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_known), cmocka_unit_test(test_starts), cmocka_unit_test(test_memory)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_image_without_shape_is_refused),
+                                       cmocka_unit_test(test_bad_arguments_and_cancellation),
+                                       cmocka_unit_test(test_failed_fit_returns_its_start),
+                                       cmocka_unit_test(test_start_poses),
+                                       cmocka_unit_test(test_each_allocation_may_fail)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -1,5 +1,5 @@
-/* The runtime with a model whose maps are known in closed form: a ball of radius + 0.1 bulge,
- * exact in the network's own terms.
+/* The runtime with a model known in closed form: a ball of radius p[0] + 0.1 p[1], which its
+ * network represents exactly.
  * Tests: check_results.c generate.c jacobian.c model_shape.c */
 #include <math.h>
 #include <pthread.h>
@@ -20,19 +20,19 @@
 
 enum { N = 17, VOXELS = N * N * N, RINGS = 48, SECTORS = 96 };
 
-#define UNLUCKY 0.123 // a bulge for which there is no mesh
+#define UNLUCKY 0.123 // a bulge at which mesh() fails
 
-static double ball(const double *p) { return p[0] + 0.1 * p[1]; }
+static double ball_radius(const double *p) { return p[0] + 0.1 * p[1]; }
 
-// ---- the shape: a fine sphere, allowed in a wider range than the network knows
+// ---- The shape: a fine sphere whose parameter ranges are wider than the network's.
 
 static int mesh_ball(const void *self, const sdm_host *host, const sdm_option_value *options,
                      const double *p, sdm_mesh_out *out)
 {
     (void)self;
-    const double r = ball(p) * options[0].number, pi = acos(-1.0);
-    if (p[1] == UNLUCKY)
-        return (host->fail)(host, "an unlucky number"); // fail is also a macro of cmocka
+    const double r = ball_radius(p) * options[0].number, pi = acos(-1.0);
+    // In parentheses: cmocka defines a macro fail().
+    if (p[1] == UNLUCKY) return (host->fail)(host, "an unlucky number");
     const int failed =
         host->reserve(host, out, 2 + (RINGS - 1) * SECTORS, 2 * (RINGS - 1) * SECTORS);
     if (failed) return failed;
@@ -73,8 +73,8 @@ static const sdm_shape ball_shape = {.abi = SDM_SHAPE_ABI,
                                      .n_options = 1,
                                      .mesh = mesh_ball};
 
-// ---- the model: mean |x| - 1.25, one constant basis function a block, coefficients linear in the
-// parameters
+// ---- The model: mean map |x| - 1.25, one constant basis function for each block, coefficients
+// linear in the parameters.
 
 static sdm_model *model_of(const char *second_name)
 {
@@ -108,7 +108,7 @@ static sdm_model *model_of(const char *second_name)
     spec.arch.n_coefficients = n_blocks;
     sdm_pod_blocks(&info.grid, 8, &spec.arch.levels, blocks);
     for (uint32_t b = 0; b < n_blocks; b++) blocks[b].rank = 1, blocks[b].coefficient = b;
-    // phi of the two parameters alone, to find which term is which and how it is scaled
+    // Evaluate the polynomials of the two parameters, to find the order and scale of the terms.
     uint8_t table[6];
     float phi[3];
     sdm_poly_table(2, 1, table);
@@ -170,8 +170,8 @@ static int close_scene(void **state)
     return 0;
 }
 
-// largest difference from |x| - r
-static double error_of(const float *values, double r)
+// Largest difference from |x| - r.
+static double ball_error(const float *values, double r)
 {
     const sdm_grid g =
         sdm_grid_centred((const int64_t[]){N, N, N}, 0.25, (const double[]){0, 0, 0});
@@ -185,7 +185,7 @@ static double error_of(const float *values, double r)
     return worst;
 }
 
-static void test_generate(void **state)
+static void test_network_map(void **state)
 {
     const scene *s = *state;
     static float values[VOXELS];
@@ -193,14 +193,14 @@ static void test_generate(void **state)
     sdm_error err;
     const double p[] = {1.37, -0.6};
     assert_int_equal(sdm_generate(s->model, p, NULL, values, &result, &err), SDM_OK);
-    assert_true(error_of(values, ball(p)) < 1e-5);
+    assert_true(ball_error(values, ball_radius(p)) < 1e-5);
     assert_int_equal(result.source, SDM_SOURCE_NETWORK);
     assert_false(result.clamped);
     assert_true(result.error_mm == 0.0125);
     assert_int_equal(sdm_generate(s->model, p, NULL, values, NULL, NULL), SDM_OK);
 }
 
-static void test_policies(void **state)
+static void test_policies_out_of_range(void **state)
 {
     const scene *s = *state;
     static float values[VOXELS];
@@ -213,15 +213,15 @@ static void test_policies(void **state)
                             exact = {.policy = SDM_RANGE_EXACT, .exact_shape = s->shape};
     assert_int_equal(sdm_generate(s->model, p, &clamp, values, &result, &err), SDM_OK);
     assert_true(result.clamped && result.source == SDM_SOURCE_NETWORK);
-    assert_true(error_of(values, ball(edge)) < 1e-5);
-    // the exact engine on a sphere of flat triangles: within its sagitta, r (1 - cos(pi / 48)) at
-    // the most
+    assert_true(ball_error(values, ball_radius(edge)) < 1e-5);
+    // The exact engine measures the mesh, whose flat facets lie within r (1 - cos(pi / 48)) of the
+    // sphere.
     assert_int_equal(sdm_generate(s->model, p, &exact, values, &result, &err), SDM_OK);
     assert_true(!result.clamped && result.source == SDM_SOURCE_EXACT && result.error_mm == 0);
-    assert_true(error_of(values, ball(p)) < 0.005);
+    assert_true(ball_error(values, ball_radius(p)) < 0.005);
     assert_int_equal(sdm_generate(s->model, edge, &exact, values, &result, &err), SDM_OK);
     assert_int_equal(result.source, SDM_SOURCE_NETWORK);
-    // outside of what the shape itself allows
+    // Outside of the range of the shape itself.
     assert_int_equal(sdm_generate(s->model, wild, &exact, values, &result, &err), SDM_E_RANGE);
     for (int policy = SDM_RANGE_REFUSE; policy <= SDM_RANGE_EXACT; policy++) {
         const sdm_generate_opts o = {.policy = (sdm_range_policy)policy, .exact_shape = s->shape};
@@ -234,8 +234,9 @@ static void test_policies(void **state)
     }
 }
 
-// out of the range by one rounding or by far: never answered in silence
-static void test_ends_of_range(void **state)
+// Outside of the range, by one rounding error or by far: refused, clamped or exact, and reported as
+// such.
+static void test_just_outside_the_range(void **state)
 {
     const scene *s = *state;
     static float values[VOXELS], at_end[VOXELS], exact_map[VOXELS];
@@ -271,25 +272,26 @@ static void test_ends_of_range(void **state)
     }
 }
 
-// how far the flat quads of the unit ball lie below it, at most about
+// About the largest distance of the flat quadrilaterals below the unit sphere.
 static double sagitta(void) { return 2 - cos(acos(-1) / 2 / RINGS) - cos(acos(-1) / SECTORS); }
 
-// the network is the ideal ball, the mesh lies in it, so the network's distance is too small
-static void test_checked(void **state)
+// The network gives the ideal ball, the mesh lies inside of it: the network's distance is too
+// small.
+static void test_error_bound_is_enforced(void **state)
 {
     const scene *s = *state;
     static float values[VOXELS], exact_map[VOXELS];
     sdm_result result;
     sdm_error err;
     const double p[] = {1.3, 0.5};
-    const double most = ball(p) * sagitta();
+    const double most = ball_radius(p) * sagitta();
     sdm_generate_opts o = {.exact_shape = s->shape, .check = true};
     assert_int_equal(sdm_generate(s->model, p, &o, values, &result, &err), SDM_OK);
     assert_true(result.checked && result.source == SDM_SOURCE_NETWORK &&
                 result.check.used == SDM_CHECK_POINTS);
     assert_true(result.check.max_mm < most && result.check.max_mm > 0.5 * most &&
                 result.check.bias_mm < 0);
-    assert_true(error_of(values, ball(p)) < 1e-5);
+    assert_true(ball_error(values, ball_radius(p)) < 1e-5);
 
     const sdm_check_stat stats[] = {SDM_CHECK_MAX, SDM_CHECK_Q95, SDM_CHECK_RMSE, SDM_CHECK_MEAN};
     const sdm_check c = result.check;
@@ -302,14 +304,15 @@ static void test_checked(void **state)
             .exact_shape = s->shape, .max_error_mm = 1.001 * figures[i], .max_error_of = stats[i]};
         assert_int_equal(sdm_generate(s->model, p, &o, values, &result, &err), SDM_OK);
         assert_true(result.checked && result.reason == SDM_REASON_NONE);
-        // a little too bad: an error with everything written, or the exact map
+        // A bound slightly below the error: SDM_E_QUALITY with all results written, or the exact
+        // map instead.
         o.max_error_mm = 0.999 * figures[i];
         memset(values, 0, sizeof values);
         result = (sdm_result){0};
         assert_int_equal(sdm_generate(s->model, p, &o, values, &result, &err), SDM_E_QUALITY);
         assert_non_null(strstr(err.text, sdm_check_stat_name(stats[i])));
         assert_true(result.checked && result.source == SDM_SOURCE_NETWORK &&
-                    error_of(values, ball(p)) < 1e-5);
+                    ball_error(values, ball_radius(p)) < 1e-5);
         assert_memory_equal(&result.check, &c, sizeof c);
         o.policy = SDM_RANGE_EXACT;
         assert_int_equal(sdm_generate(s->model, p, &o, values, &result, &err), SDM_OK);
@@ -320,7 +323,7 @@ static void test_checked(void **state)
     }
 }
 
-// a surface that is nowhere in the grid gives no figure, and none is not good enough
+// With the surface outside of the grid there is no error figure, which must fail every bound.
 static void test_nothing_to_check(void **state)
 {
     const scene *s = *state;
@@ -337,8 +340,8 @@ static void test_nothing_to_check(void **state)
     sdm_instance_free(large);
 }
 
-// radii near 1 pass the bound, larger ones do not: every map by its own figures, for every number
-// of threads
+// Maps of radius near 1 meet the bound, larger ones do not: each map is judged by its own error,
+// for any number of threads.
 static void test_checked_batch(void **state)
 {
     const scene *s = *state;
@@ -362,7 +365,8 @@ static void test_checked_batch(void **state)
             assert_int_equal(results[i].reason, reason[i]);
             assert_int_equal(results[i].checked, reason[i] != SDM_REASON_RANGE);
         }
-        // without the exact engine the first bad one is named, whatever the order of the threads
+        // Without replacement by exact maps the error names the first bad map, whatever the order
+        // of threads.
         sdm_generate_opts refuse = o;
         refuse.policy = SDM_RANGE_CLAMP;
         assert_int_equal(sdm_generate_batch(s->model, p, MAPS, &refuse, values, results, &err),
@@ -370,7 +374,7 @@ static void test_checked_batch(void **state)
         assert_non_null(strstr(err.text, "map 1 of 7: "));
         for (int i = 0; i < MAPS; i++)
             assert_true(results[i].checked && results[i].source == SDM_SOURCE_NETWORK);
-        // a check that cannot be made is worse than a bad map, the first of these too
+        // A failed check takes precedence over a bad map; the first failed check is named.
         double q[2 * MAPS];
         memcpy(q, p, sizeof q);
         q[2 * 3 + 1] = q[2 * 5 + 1] = UNLUCKY;
@@ -391,9 +395,9 @@ static void batch_params(double *p)
     }
 }
 
-// the same bits for every number of threads, network and exact maps mixed, and every map in its
-// place
-static void test_batch(void **state)
+// The same bits for any number of threads, with network and exact maps mixed, and each map in its
+// place.
+static void test_batch_has_same_bits_for_threads(void **state)
 {
     const scene *s = *state;
     double p[2 * BATCH];
@@ -414,11 +418,11 @@ static void test_batch(void **state)
         for (int i = 0; i < BATCH; i++) {
             const bool far = i == 5 || i == 16 || i == 52;
             assert_int_equal(results[i].source, far ? SDM_SOURCE_EXACT : SDM_SOURCE_NETWORK);
-            assert_true(error_of(first + (size_t)i * VOXELS, ball(p + 2 * i)) <
+            assert_true(ball_error(first + (size_t)i * VOXELS, ball_radius(p + 2 * i)) <
                         (far ? 0.005 : 1e-5));
         }
     }
-    // all or nothing: one bad map is named and nothing is written
+    // All or nothing: one bad row of parameters is named and no map is written.
     memset(again, 0, bytes);
     p[2 * 40 + 1] = 5;
     assert_int_equal(sdm_generate_batch(s->model, p, BATCH, NULL, again, results, &err),
@@ -434,9 +438,8 @@ static void test_batch(void **state)
     free(again);
 }
 
-// every allocation of a call may fail; the call says so and loses nothing (the sanitizer build sees
-// leaks)
-static void test_short_memory(void **state)
+// Each allocation fails once: SDM_E_NOMEM, and no leak (detected by the sanitizer build).
+static void test_each_allocation_may_fail(void **state)
 {
     const scene *s = *state;
     static float values[VOXELS], jacobian[2 * VOXELS];
@@ -476,7 +479,7 @@ typedef struct caller {
     sdm_status status;
 } caller;
 
-static void *call(void *data)
+static void *thread_generate(void *data)
 {
     caller *c = data;
     double p[2 * BATCH];
@@ -486,14 +489,14 @@ static void *call(void *data)
     return NULL;
 }
 
-static void test_many_callers(void **state)
+static void test_concurrent_callers(void **state)
 {
     const scene *s = *state;
     static caller callers[4];
     pthread_t threads[4];
     for (int i = 0; i < 4; i++) {
         callers[i] = (caller){.model = s->model};
-        assert_int_equal(pthread_create(&threads[i], NULL, call, &callers[i]), 0);
+        assert_int_equal(pthread_create(&threads[i], NULL, thread_generate, &callers[i]), 0);
     }
     for (int i = 0; i < 4; i++) assert_int_equal(pthread_join(threads[i], NULL), 0);
     for (int i = 0; i < 4; i++) {
@@ -511,7 +514,7 @@ static void test_jacobian(void **state)
     const double p[] = {1.1, 0.4}, far[] = {1.7, 0.4}, edge[] = {1.5, 0.4};
     assert_int_equal(sdm_generate_jacobian(s->model, p, NULL, values, jacobian, &result, &err),
                      SDM_OK);
-    assert_true(error_of(values, ball(p)) < 1e-5);
+    assert_true(ball_error(values, ball_radius(p)) < 1e-5);
     for (int i = 0; i < VOXELS; i++)
         assert_true(fabs((double)jacobian[i] + 1) < 1e-5 &&
                     fabs((double)jacobian[VOXELS + i] + 0.1) < 1e-5);
@@ -521,8 +524,9 @@ static void test_jacobian(void **state)
                             exact = {.policy = SDM_RANGE_EXACT, .exact_shape = s->shape};
     assert_int_equal(sdm_generate_jacobian(s->model, far, &clamp, values, jacobian, &result, &err),
                      SDM_OK);
-    assert_true(result.clamped && error_of(values, ball(edge)) < 1e-5);
-    // the exact engine's, out of the range or over the bound; a ball of flat triangles
+    assert_true(result.clamped && ball_error(values, ball_radius(edge)) < 1e-5);
+    // The Jacobian of the exact engine: outside of the range, or when the network misses the error
+    // bound. The mesh has flat facets.
     static float again[VOXELS];
     assert_int_equal(sdm_generate_jacobian(s->model, p, &exact, values, jacobian, &result, &err),
                      SDM_OK);
@@ -550,9 +554,9 @@ static void test_jacobian(void **state)
     assert_true(result.checked);
 }
 
-// products with the Jacobian, which is -1 and -0.1 in every voxel; of the exact engine outside the
-// range
-static void test_products(void **state)
+// Products with the Jacobian, whose entries are -1 and -0.1 in every voxel; outside of the range
+// those of the exact engine.
+static void test_jacobian_products(void **state)
 {
     const scene *s = *state;
     static float values[VOXELS], tangent[VOXELS], adjoint[VOXELS];
@@ -568,7 +572,8 @@ static void test_products(void **state)
         assert_int_equal(
             sdm_generate_jvp(s->model, at, direction, &exact, values, tangent, &result, &err),
             SDM_OK);
-        assert_true(result.source == source && error_of(values, ball(at)) < (k ? 2e-2 : 1e-5));
+        assert_true(result.source == source &&
+                    ball_error(values, ball_radius(at)) < (k ? 2e-2 : 1e-5));
         for (int i = 0; i < VOXELS; i++) assert_true(fabs((double)tangent[i] + 0.3) < loose);
         assert_int_equal(sdm_generate_vjp(s->model, at, adjoint, &exact, gradient, &result, &err),
                          SDM_OK);
@@ -590,7 +595,7 @@ static void test_products(void **state)
     assert_int_equal(sdm_generate_vjp(s->model, p, NULL, NULL, gradient, &result, &err), SDM_E_ARG);
 }
 
-static void test_instance(void **state)
+static void test_instance_of_model(void **state)
 {
     const scene *s = *state;
     sdm_error err;
@@ -619,7 +624,7 @@ static void test_exact_shape_map(void **state)
     sdm_grid g = sdm_model_get_info(s->model)->grid;
     const double p[] = {1.0, -1.5}, wrong[] = {5, 0};
     assert_int_equal(sdm_exact_shape_map(s->shape, p, NULL, &g, values, &report, &err), SDM_OK);
-    assert_true(error_of(values, ball(p)) < 0.005);
+    assert_true(ball_error(values, ball_radius(p)) < 0.005);
     assert_int_equal(report.audit.n_tri, 2 * (RINGS - 1) * SECTORS);
     assert_true(report.audit.manifold && !report.turned);
     assert_int_equal(sdm_exact_shape_map(s->shape, wrong, NULL, &g, values, NULL, &err),
@@ -628,7 +633,7 @@ static void test_exact_shape_map(void **state)
     assert_int_equal(sdm_exact_shape_map(s->shape, p, NULL, &g, values, NULL, &err), SDM_E_ARG);
 }
 
-static void test_misuse(void **state)
+static void test_wrong_arguments_are_refused(void **state)
 {
     const scene *s = *state;
     static float values[VOXELS];
@@ -670,13 +675,20 @@ static void test_misuse(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_generate),        cmocka_unit_test(test_policies),
-        cmocka_unit_test(test_batch),           cmocka_unit_test(test_jacobian),
-        cmocka_unit_test(test_products),        cmocka_unit_test(test_short_memory),
-        cmocka_unit_test(test_many_callers),    cmocka_unit_test(test_instance),
-        cmocka_unit_test(test_exact_shape_map), cmocka_unit_test(test_misuse),
-        cmocka_unit_test(test_ends_of_range),   cmocka_unit_test(test_checked),
-        cmocka_unit_test(test_checked_batch),   cmocka_unit_test(test_nothing_to_check),
+        cmocka_unit_test(test_network_map),
+        cmocka_unit_test(test_policies_out_of_range),
+        cmocka_unit_test(test_batch_has_same_bits_for_threads),
+        cmocka_unit_test(test_jacobian),
+        cmocka_unit_test(test_jacobian_products),
+        cmocka_unit_test(test_each_allocation_may_fail),
+        cmocka_unit_test(test_concurrent_callers),
+        cmocka_unit_test(test_instance_of_model),
+        cmocka_unit_test(test_exact_shape_map),
+        cmocka_unit_test(test_wrong_arguments_are_refused),
+        cmocka_unit_test(test_just_outside_the_range),
+        cmocka_unit_test(test_error_bound_is_enforced),
+        cmocka_unit_test(test_checked_batch),
+        cmocka_unit_test(test_nothing_to_check),
     };
     return cmocka_run_group_tests(tests, open_scene, close_scene);
 }

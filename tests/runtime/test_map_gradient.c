@@ -1,5 +1,5 @@
-/* The gradient of a map: exact for what differences of second order must get right, the exact
- * engine's normals elsewhere.
+/* The gradient of a map by second-order differences: exact for quadratic functions; elsewhere close
+ * to the exact engine's normals.
  * Tests: map_gradient.c */
 #include <math.h>
 #include <setjmp.h>
@@ -14,7 +14,7 @@
 #include "oracle/exact_tools.h"
 #include "sdm/map.h"
 
-// uneven voxels, turned about two axes and reflected
+// A grid with anisotropic voxels, rotated about two axes and reflected.
 static sdm_grid oblique_grid(int64_t nx, int64_t ny, int64_t nz, double h)
 {
     const double a = 0.4, b = -0.7;
@@ -33,7 +33,7 @@ static float *gradient_of(const sdm_grid *g, const float *values)
     return gradient;
 }
 
-static void test_plane(void **state)
+static void test_plane_is_exact(void **state)
 {
     (void)state;
     const double normal[3] = {0.48, -0.6, 0.64};
@@ -55,8 +55,8 @@ static void test_plane(void **state)
     }
 }
 
-// a parabola, its border too; axes of one voxel have no derivative
-static void test_parabola(void **state)
+// A quadratic function: exact also at the border. An axis with a single voxel has no derivative.
+static void test_quadratic_is_exact(void **state)
 {
     (void)state;
     const sdm_grid g = oblique_grid(6, 5, 4, 0.3),
@@ -87,7 +87,7 @@ static void test_parabola(void **state)
     free(gradient);
 }
 
-// grid whose middle is at (3, 2, 3)
+// A grid centred at (3, 2, 3).
 static sdm_grid corner_grid(int64_t n, double h)
 {
     sdm_grid g = oblique_grid(n, n, n, h);
@@ -99,13 +99,14 @@ static sdm_grid corner_grid(int64_t n, double h)
     return g;
 }
 
-// the distance to a point: of second order everywhere, half the voxel gives a quarter of the error
-static void test_order(void **state)
+// The distance to a point: second order everywhere, so half the spacing gives a quarter of the
+// error.
+static void test_error_is_of_second_order(void **state)
 {
     (void)state;
     double error[2] = {0, 0};
     for (int k = 0; k < 2; k++) {
-        const sdm_grid g = corner_grid(7 + 6 * k, k ? 0.15 : 0.3); // the same corners
+        const sdm_grid g = corner_grid(7 + 6 * k, k ? 0.15 : 0.3); // the same corners for both
         const size_t n = sdm_grid_count(&g);
         float *values = room(n, sizeof *values);
         double x[3];
@@ -139,7 +140,7 @@ static void test_exact_normals(void **state)
         sdm_exact_map_layers(e, &g, &(sdm_exact_layers){.values = values, .normal = normal}, NULL),
         SDM_OK);
     float *gradient = gradient_of(&g, values);
-    // facets turn the normals by up to half the angle between two of them, 0.016
+    // Facets tilt the normals by up to half the angle between two of them, 0.016.
     for (size_t i = 0; i < n; i++)
         for (size_t a = 0; a < 3; a++)
             assert_true(fabs((double)gradient[a * n + i] - (double)normal[3 * i + a]) < 0.03);
@@ -178,10 +179,8 @@ static void test_threads_and_misuse(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_plane),
-        cmocka_unit_test(test_parabola),
-        cmocka_unit_test(test_order),
-        cmocka_unit_test(test_exact_normals),
+        cmocka_unit_test(test_plane_is_exact),           cmocka_unit_test(test_quadratic_is_exact),
+        cmocka_unit_test(test_error_is_of_second_order), cmocka_unit_test(test_exact_normals),
         cmocka_unit_test(test_threads_and_misuse),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -12,7 +12,7 @@
 
 #include "oracle/phantom_tools.h"
 
-static void test_volume(void **state)
+static void test_volume_of_an_ellipsoid(void **state)
 {
     (void)state;
     const double p[3] = {4, 3, 2};
@@ -34,8 +34,8 @@ static void test_volume(void **state)
         }
         const double volume = sum * g.spacing[0] * g.spacing[1] * g.spacing[2],
                      closed = 4 * PI / 3 * 4 * 3 * 2;
-        // the mesh lies inside the ellipsoid; shares by the distance are off by w^2 / 12 times the
-        // integral of the mean curvature
+        // The mesh lies inside of the ellipsoid. Computing shares from the distance adds an error
+        // of w^2 / 12 times the integral of the mean curvature.
         const double w = 0.2 / 3, bound = 1.2 * w * w / 12 * 4 * PI * 3;
         if (!(fabs(volume - audit.volume) < bound))
             fail_msg("volume %g, mesh %g", volume, audit.volume);
@@ -46,8 +46,8 @@ static void test_volume(void **state)
 
 static double density(double z) { return exp(-0.5 * z * z) / sqrt(2 * PI); }
 
-/* Step at 0 (1 below) seen through a Gaussian and the box of a voxel of edge h: the mean of 1 - Phi
- * over it. */
+/* A step at 0 (1 below, 0 above), blurred by a Gaussian and by the box of a voxel of edge h: the
+ * mean of 1 - Phi over the voxel. */
 static double edge_profile(double x, double h, double sigma)
 {
     double part[2];
@@ -60,8 +60,8 @@ static double edge_profile(double x, double h, double sigma)
     return 1 - (part[1] - part[0]) / h;
 }
 
-/* The largest difference to the closed form along an axis of the grid: of a face across it, or of a
-   turned one with a blur that is the same in all directions. */
+/* Largest difference from the closed form along an axis of the grid: for a face perpendicular to
+ * the axis, or for a rotated face with isotropic blur. */
 static double profile_error(int axis, double sigma, double turn, double offset, int supersampling)
 {
     sdm_phantom_opts o = plain();
@@ -72,9 +72,11 @@ static double profile_error(int axis, double sigma, double turn, double offset, 
         g.n[a] = a == axis ? 41 : 3;
         g.spacing[a] = turn > 0 || sigma == 0 ? 0.2 : h[a];
         g.origin[a] = -g.spacing[a] * (double)(g.n[a] / 2);
-        o.blur[a] = turn > 0 || a == axis ? sigma : 0.08; // nothing changes along the others
+        // any value: the profile varies along one axis only
+        o.blur[a] = turn > 0 || a == axis ? sigma : 0.08;
     }
-    // x of the block to +axis, then a bit further; offset along the normal
+    // Rotate the x axis of the block to +axis, then by `turn`; shift it by `offset` along the
+    // normal.
     sdm_pose face = {.rotation = {0}}, bend = face;
     if (axis == 1) face.rotation[2] = PI / 2;
     if (axis == 2) face.rotation[1] = -PI / 2;
@@ -96,11 +98,11 @@ static double profile_error(int axis, double sigma, double turn, double offset, 
     return worst;
 }
 
-static void test_edges(void **state)
+static void test_edge_profiles(void **state)
 {
     (void)state;
-    // kinks of a voxel's box between sub-voxels of edge d cost at most d^2 / 8 of the point
-    // spread's height, over h; sub-voxels that are not cubes add to it
+    // The error is at most d^2 / 8 times the height of the point spread over h, for sub-voxels of
+    // edge d; sub-voxels that are not cubes add to it.
     static const struct {
         double sigma, bound;
     } blurs[] = {{0, 1e-5},     {0.01, 0.03}, {0.05, 0.02}, {0.1, 0.01},
@@ -114,20 +116,20 @@ static void test_edges(void **state)
                              e);
             }
     for (int axis = 0; axis < 3; axis++) {
-        // the error goes with the square of the sub-voxel
+        // The error is proportional to the square of the sub-voxel's edge.
         double e = profile_error(axis, 0.15, 0, 0.061, 12);
         if (!(e < 0.006 / 14)) fail_msg("12 sub-voxels, axis %d: off by %g", axis, e);
-        // a turned face sees the voxel's box along another direction than the closed form does
+        // A rotated face cuts the voxel's box in another direction than the closed form assumes.
         e = profile_error(axis, 0.3, 0.5, 0.05, 3);
         if (!(e < 0.006)) fail_msg("turned face, axis %d: off by %g", axis, e);
     }
 }
 
-static void test_narrow_blur(void **state)
+static void test_variance_of_narrow_blur(void **state)
 {
     (void)state;
-    // a blur below a sub-voxel is too little to see in a profile: its variance is measured, beside
-    // that of a voxel's box
+    // A blur narrower than a sub-voxel is too small to see in a profile; compare the variance, to
+    // which the voxel's box adds.
     const double h = 0.2, sigma = 0.02, centre[3] = {0, 0, 0};
     const sdm_grid g = sdm_grid_centred((const int64_t[3]){9, 1, 1}, h, centre);
     sdm_phantom_opts o = plain();
@@ -147,7 +149,7 @@ static void test_narrow_blur(void **state)
     close_to("variance of the point spread", variance, sigma * sigma, 0.1 * sigma * sigma);
 }
 
-/* x of the shape's frame, by the vector form of Rodrigues' formula. */
+/* x: position in the frame of the shape, by the vector form of Rodrigues' formula. */
 static void to_shape(const sdm_pose *pose, const double world[3], double x[3])
 {
     const double *r = pose->rotation, angle = -sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
@@ -163,7 +165,7 @@ static void to_shape(const sdm_pose *pose, const double world[3], double x[3])
     for (int i = 0; i < 3; i++) x[i] = d[i] * c + cross[i] * s + k[i] * dot * (1 - c);
 }
 
-static void test_label(void **state)
+static void test_label_is_the_inside(void **state)
 {
     (void)state;
     const double p[3] = {4, 3, 1.5};
@@ -183,7 +185,7 @@ static void test_label(void **state)
         assert_int_equal(sdm_instance_distance(ellipsoid, p, x, &d, &err), SDM_OK);
         assert_true(label[i] <= 1);
         inside += label[i];
-        if (fabs(d) < 1e-3) { // the mesh is not the ellipsoid
+        if (fabs(d) < 1e-3) { // so close that mesh and ellipsoid may differ
             near++;
             continue;
         }
@@ -198,11 +200,11 @@ static void test_label(void **state)
     free(label);
 }
 
-static void test_crop(void **state)
+static void test_part_of_the_grid(void **state)
 {
     (void)state;
-    // a part of the grid, cut through the shape, shows the part of the image: what lies beyond is
-    // blurred into it
+    // A phantom on a part of the grid equals that part of the phantom on the whole grid, although
+    // what lies outside is blurred into it.
     sdm_phantom_opts o = plain();
     for (int a = 0; a < 3; a++) o.blur[a] = 0.4;
     o.air_share = 0.7;
@@ -231,10 +233,10 @@ static void test_crop(void **state)
     free(large);
 }
 
-static void test_air(void **state)
+static void test_share_of_air(void **state)
 {
     (void)state;
-    // outside and inside are 0, air is 1: the image is the share of air
+    // Outside and inside have the value 0, air has 1: the image is the share of air.
     sdm_phantom_opts o = plain();
     o.inside.mean = 0;
     o.air = (sdm_tissue){1, 0};
@@ -246,21 +248,21 @@ static void test_air(void **state)
     float *v = make(block, NULL, NULL, &o, &g, NULL);
     double sum = 0, count = 0;
     for (size_t i = 0; i < sdm_grid_count(&g); i++) {
-        const double x = g.origin[0] + 0.2 * (double)(i % 120); // the distance to the block
+        const double x = g.origin[0] + 0.2 * (double)(i % 120); // distance to the block
         if (x < 1.89) assert_true(v[i] == 0);
         assert_true(v[i] >= 0 && v[i] <= 1);
         if (x < 2.5) continue;
         sum += (double)v[i];
         count++;
     }
-    /* a point is in the balls of its neighbourhood with probabilities that add up to share * pi /
-       6, and independent ones: it is air with at least 1 - exp(-sum) and at most the sum */
+    /* The probabilities that a point lies in the ball of a neighbouring cell are independent and
+     * sum to q = share * pi / 6: it is air with a probability between 1 - exp(-q) and q. */
     const double q = 0.5 * PI / 6;
     if (!(sum / count > 1 - exp(-q) - 0.012 && sum / count < q + 0.012))
         fail_msg("share of air %g", sum / count);
     free(v);
 
-    // balls keep their places for another grid and pose of the shape, and change with the seed
+    // The balls do not move with the grid or with the pose of the shape, but change with the seed.
     o.air_clear_mm = 0;
     sdm_grid other = sdm_grid_centred((const int64_t[3]){20, 20, 20}, 0.2, centre);
     const sdm_pose away = {.translation = {-100, 0, 0}};
@@ -278,9 +280,9 @@ static void test_air(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_volume),      cmocka_unit_test(test_edges),
-        cmocka_unit_test(test_narrow_blur), cmocka_unit_test(test_label),
-        cmocka_unit_test(test_crop),        cmocka_unit_test(test_air),
+        cmocka_unit_test(test_volume_of_an_ellipsoid),  cmocka_unit_test(test_edge_profiles),
+        cmocka_unit_test(test_variance_of_narrow_blur), cmocka_unit_test(test_label_is_the_inside),
+        cmocka_unit_test(test_part_of_the_grid),        cmocka_unit_test(test_share_of_air),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -1,4 +1,5 @@
-/* Phantoms: noise and random truth against their laws; the same bits, misuse.
+/* Phantoms: noise and random truth against their distributions; reproducible bits, wrong arguments,
+ * failing allocations, cancellation.
  * Tests: phantom_air.c phantom_filter.c */
 #include <math.h>
 #include <setjmp.h>
@@ -37,10 +38,10 @@ static statistics measure(const float *v, const sdm_grid *g)
     return s;
 }
 
-static void test_noise(void **state)
+static void test_noise_has_its_statistics(void **state)
 {
     (void)state;
-    // nothing but outside
+    // Only tissue outside of the shape.
     const double far[3] = {200, 0, 0};
     sdm_grid g = sdm_grid_centred((const int64_t[3]){40, 44, 48}, 0.2, far);
     const double n = (double)sdm_grid_count(&g), h[3] = {0.25, 0.2, 0.3};
@@ -55,10 +56,11 @@ static void test_noise(void **state)
     close_to("variance", s.variance, 900, 4 * 900 * sqrt(2 / n));
     for (int a = 0; a < 3; a++) close_to("correlation of white noise", s.rho[a], 0, 4 / sqrt(n));
 
-    // smoothed white noise: exp(-h^2 / (4 sigma^2)) between neighbours, the variance as asked for
+    // Smoothed white noise: the correlation of neighbours is exp(-h^2 / (4 sigma^2)), the variance
+    // as configured.
     o.noise_is_blurred = true;
     const double blur[3] = {0.2, 0.3, 0.25};
-    double independent = n; // about this many numbers count
+    double independent = n; // effective number of independent voxels
     for (int a = 0; a < 3; a++) {
         o.blur[a] = blur[a];
         independent *= fmin(1, g.spacing[a] / (2 * sqrt(PI) * blur[a]));
@@ -71,7 +73,7 @@ static void test_noise(void **state)
         close_to("correlation of noise", s.rho[a], exp(-0.25 * h[a] * h[a] / (blur[a] * blur[a])),
                  0.03);
 
-    // texture: another field, the tissue's sd; the variances of texture and noise add
+    // Texture is an independent field with the tissue's sd; the variances of texture and noise add.
     o.noise = 0;
     o.outside.sd = 40;
     o.texture_mm = 0.3;
@@ -89,19 +91,19 @@ static void test_noise(void **state)
     for (size_t i = 0; i < (size_t)n; i++)
         close_to("sum", (double)sum[i], (double)texture[i] + (double)smooth[i] - 100, 1e-3);
 
-    // both white: still two fields, so their variances add
+    // Both white: still two fields whose variances add.
     o.texture_mm = 0;
     o.noise_is_blurred = false;
     float *two = make(block, NULL, NULL, &o, &g, NULL);
     s = measure(two, &g);
     close_to("variance of two fields", s.variance, 2500, 4 * 2500 * sqrt(2 / n));
 
-    // inside has its own texture
+    // Tissue inside has its own texture.
     o = plain();
     o.inside = (sdm_tissue){-500, 10};
     o.outside = (sdm_tissue){0, 40};
     for (int a = 0; a < 3; a++) g.origin[a] -= far[a];
-    g.origin[0] -= 30; // all voxels inside
+    g.origin[0] -= 30; // all voxels are inside
     float *inside = make(block, NULL, NULL, &o, &g, NULL);
     s = measure(inside, &g);
     close_to("mean inside", s.mean, -500, 4 * 10 / sqrt(n));
@@ -143,7 +145,7 @@ static void test_same_bits(void **state)
     free(first);
 }
 
-static void test_random_truth(void **state)
+static void test_random_truth_has_its_distribution(void **state)
 {
     (void)state;
     double p[3], again[3], mean[3] = {0}, angle = 0, shift = 0, widest = 0;
@@ -161,7 +163,8 @@ static void test_random_truth(void **state)
         shift += moved / N;
         widest = fmax(widest, turned);
     }
-    // means of uniform laws, of the radius in a ball: 3/4; four standard errors
+    // Means of uniform distributions, and 3/4 for the radius in a ball; each bound is four standard
+    // errors.
     close_to("mean rx", mean[0], 3, 4 * 4 / sqrt(12.0 * N));
     close_to("mean ry", mean[1], 2.5, 4 * 3 / sqrt(12.0 * N));
     close_to("mean rz", mean[2], 2.5, 4 * 3 / sqrt(12.0 * N));
@@ -175,7 +178,7 @@ static void test_random_truth(void **state)
     for (int i = 0; i < 3; i++) assert_true(none.rotation[i] == 0 && none.translation[i] == 0);
 }
 
-static void refused(const sdm_phantom_opts *o, const char *word)
+static void phantom_refused(const sdm_phantom_opts *o, const char *word)
 {
     const sdm_grid g = oblique(4, 5, 6);
     float v[120];
@@ -184,7 +187,7 @@ static void refused(const sdm_phantom_opts *o, const char *word)
     if (!strstr(err.text, word)) fail_msg("'%s' does not name '%s'", err.text, word);
 }
 
-static void test_misuse(void **state)
+static void test_wrong_arguments_are_refused(void **state)
 {
     (void)state;
     sdm_grid g = oblique(4, 5, 6);
@@ -207,28 +210,30 @@ static void test_misuse(void **state)
     static const double bad[] = {NAN, INFINITY, -INFINITY, -1};
     for (size_t i = 0; i < 4; i++) {
         sdm_phantom_opts o;
-        for (int a = 0; a < 3; a++) o = plain(), o.blur[a] = bad[i], refused(&o, "blur along");
-        o = plain(), o.noise = bad[i], refused(&o, "noise");
-        o = plain(), o.texture_mm = bad[i], refused(&o, "texture");
-        o = plain(), o.outside.sd = bad[i], refused(&o, "outside");
-        if (i < 3) o = plain(), o.inside.mean = bad[i], refused(&o, "inside");
-        if (i < 3) o = plain(), o.air.mean = bad[i], refused(&o, "air");
-        o = plain(), o.air_share = bad[i], refused(&o, "share of air");
-        o = plain(), o.air_share = 0.5, o.air_mm = bad[i], refused(&o, "diameter");
-        o = plain(), o.air_share = 0.5, o.air_mm = 1, o.air_clear_mm = bad[i], refused(&o, "clear");
+        for (int a = 0; a < 3; a++)
+            o = plain(), o.blur[a] = bad[i], phantom_refused(&o, "blur along");
+        o = plain(), o.noise = bad[i], phantom_refused(&o, "noise");
+        o = plain(), o.texture_mm = bad[i], phantom_refused(&o, "texture");
+        o = plain(), o.outside.sd = bad[i], phantom_refused(&o, "outside");
+        if (i < 3) o = plain(), o.inside.mean = bad[i], phantom_refused(&o, "inside");
+        if (i < 3) o = plain(), o.air.mean = bad[i], phantom_refused(&o, "air");
+        o = plain(), o.air_share = bad[i], phantom_refused(&o, "share of air");
+        o = plain(), o.air_share = 0.5, o.air_mm = bad[i], phantom_refused(&o, "diameter");
+        o = plain(), o.air_share = 0.5, o.air_mm = 1, o.air_clear_mm = bad[i],
+        phantom_refused(&o, "clear");
     }
     sdm_phantom_opts o = plain();
-    o.blur[1] = 64.1 * 0.2, refused(&o, "blur along y");
-    o = plain(), o.air_share = 1.5, refused(&o, "share of air");
-    o = plain(), o.air_share = 0.5, o.air_mm = 1e-9, refused(&o, "too small");
-    o = plain(), o.air_share = 0.5, o.air_mm = 1e-3, refused(&o, "larger");
-    o = plain(), o.supersampling = 0, refused(&o, "supersampling");
-    o = plain(), o.supersampling = 17, refused(&o, "supersampling");
-    o = plain(), o.n_threads = -1, refused(&o, "threads");
+    o.blur[1] = 64.1 * 0.2, phantom_refused(&o, "blur along y");
+    o = plain(), o.air_share = 1.5, phantom_refused(&o, "share of air");
+    o = plain(), o.air_share = 0.5, o.air_mm = 1e-9, phantom_refused(&o, "too small");
+    o = plain(), o.air_share = 0.5, o.air_mm = 1e-3, phantom_refused(&o, "larger");
+    o = plain(), o.supersampling = 0, phantom_refused(&o, "supersampling");
+    o = plain(), o.supersampling = 17, phantom_refused(&o, "supersampling");
+    o = plain(), o.n_threads = -1, phantom_refused(&o, "threads");
 }
 
-// with air, by one thread
-static sdm_phantom_opts airy(void)
+// Options with air, and one thread.
+static sdm_phantom_opts options_with_air(void)
 {
     sdm_phantom_opts o = sdm_phantom_defaults();
     o.air_share = 0.5;
@@ -236,7 +241,7 @@ static sdm_phantom_opts airy(void)
     return o;
 }
 
-static sdm_status make_small(const sdm_phantom_opts *o, sdm_error *err)
+static sdm_status small_phantom(const sdm_phantom_opts *o, sdm_error *err)
 {
     const sdm_grid g = oblique(4, 5, 6);
     float v[120];
@@ -244,15 +249,15 @@ static sdm_status make_small(const sdm_phantom_opts *o, sdm_error *err)
     return sdm_phantom_make(block, NULL, NULL, o, &g, v, label, err);
 }
 
-static void test_memory(void **state)
+static void test_each_allocation_may_fail(void **state)
 {
     (void)state;
-    // every allocation that fails is an error and nothing leaks
-    const sdm_phantom_opts o = airy();
+    // Each failed allocation is an error without a leak (detected by the sanitizer build).
+    const sdm_phantom_opts o = options_with_air();
     for (unsigned long n = 1;; n++) {
         sdm_alloc_fail_after(n);
         sdm_error err;
-        const sdm_status s = make_small(&o, &err);
+        const sdm_status s = small_phantom(&o, &err);
         sdm_alloc_fail_after(0);
         assert_true(n < 2000);
         if (!s) break;
@@ -260,37 +265,40 @@ static void test_memory(void **state)
     }
 }
 
-// asked `left` times before it stops the work
-static bool stops(void *user)
+// Cancels the work after `left` calls.
+static bool cancel_when_used_up(void *user)
 {
     int *left = user;
     return (*left)-- <= 0;
 }
 
-static void test_cancelled(void **state)
+static void test_cancelled_at_any_call(void **state)
 {
     (void)state;
-    sdm_phantom_opts o = airy();
-    o.cancelled = stops;
+    sdm_phantom_opts o = options_with_air();
+    o.cancelled = cancel_when_used_up;
     sdm_status s = SDM_E_CANCELLED;
     int asked = 0;
     for (; s; asked++) {
         sdm_error err;
         int left = asked;
         o.user = &left;
-        s = make_small(&o, &err);
+        s = small_phantom(&o, &err);
         assert_true(asked < 10000 && (!s || s == SDM_E_CANCELLED));
     }
-    // in both fields row by row, and in the planes of sub-voxels
+    // The hook is called for each row of both fields and for each plane of sub-voxels.
     assert_true(asked > 2 * 30 + 18);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_noise),     cmocka_unit_test(test_random_truth),
-        cmocka_unit_test(test_same_bits), cmocka_unit_test(test_memory),
-        cmocka_unit_test(test_misuse),    cmocka_unit_test(test_cancelled),
+        cmocka_unit_test(test_noise_has_its_statistics),
+        cmocka_unit_test(test_random_truth_has_its_distribution),
+        cmocka_unit_test(test_same_bits),
+        cmocka_unit_test(test_each_allocation_may_fail),
+        cmocka_unit_test(test_wrong_arguments_are_refused),
+        cmocka_unit_test(test_cancelled_at_any_call),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

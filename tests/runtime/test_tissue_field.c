@@ -1,4 +1,5 @@
-/* Tissue field: an ellipsoid with bone on one side and a darker tissue on the other.
+/* The tissue field (weights of the tissues outside that vary in space): an ellipsoid with bone on
+ * one side and a darker tissue on the other.
  * Tests: blur.c evidence.c information.c neighbours.c posterior.c samples.c tissue_field.c */
 #include <math.h>
 #include <setjmp.h>
@@ -17,21 +18,22 @@
 #define BONE 1300.0
 #define DARK 600.0
 
-static void voxel(const sdm_grid *g, size_t i, double x[3])
+static void voxel_position(const sdm_grid *g, size_t i, double x[3])
 {
     const size_t nx = (size_t)g->n[0], ny = (size_t)g->n[1];
     sdm_grid_world(
         g, (const double[3]){(double)(i % nx), (double)(i / nx % ny), (double)(i / nx / ny)}, x);
 }
 
-// phantom in which bone is replaced by the darker tissue where x > 0.3 mm, also in mixed voxels
+// A phantom in which a darker tissue replaces bone where x > 0.3 mm, also in voxels that contain
+// both bone and shape.
 static float *two_sides(uint64_t seed)
 {
     const sdm_grid g = image_grid();
     float *v = phantom(TRUTH, &POSE, 0.5, seed);
     for (size_t i = 0; i < sdm_grid_count(&g); i++) {
         double x[3];
-        voxel(&g, i, x);
+        voxel_position(&g, i, x);
         if (x[0] > 0.3) v[i] = (float)(40 + (DARK - 40) / (BONE - 40) * ((double)v[i] - 40));
     }
     return v;
@@ -46,7 +48,7 @@ static sdm_fit_opts options(void)
     return o;
 }
 
-// sets up and evaluates a problem with its state at the truth
+// Creates a problem with its state at the truth and evaluates it.
 static void problem_at_truth(fit_problem *p, const sdm_fit_source *source)
 {
     p->source = source;
@@ -74,7 +76,7 @@ static void problem_free(fit_problem *p)
     sdm_fit_information_dispose(&p->information);
 }
 
-static void test_weights(void **state)
+static void test_weights_follow_the_tissues(void **state)
 {
     (void)state;
     float *v = two_sides(3), *first = NULL;
@@ -97,7 +99,7 @@ static void test_weights(void **state)
             if (s->world[3 * i] > 2.3) assert_true(dark > 0.85);
             if (s->world[3 * i] < -1.7) assert_true(bone > 0.85);
         }
-        // the same log-likelihood without derivatives
+        // The log-likelihood computed without derivatives is the same.
         assert_true(fabs(sdm_fit_samples_log_likelihood(s, &p.maps, &p.observation, &p.state) /
                              p.information.log_likelihood -
                          1) < 1e-12);
@@ -115,7 +117,7 @@ static void test_weights(void **state)
     free(v);
 }
 
-// a window much narrower than the cells of the tissue field
+// A window much narrower than the cells of the tissue field.
 static void test_narrow_window(void **state)
 {
     (void)state;
@@ -138,8 +140,9 @@ static void test_narrow_window(void **state)
     free(v);
 }
 
-// no field: switched off, appearance kept, not yet in use, or less than two tissues
-static void test_none(void **state)
+// No field is used when it is switched off, the appearance is kept, the fit has not enabled it, or
+// the noise is too correlated to tell two tissues apart.
+static void test_cases_without_field(void **state)
 {
     (void)state;
     float *v = two_sides(4);
@@ -163,8 +166,8 @@ static void test_none(void **state)
     free(v);
 }
 
-// a darker tissue on one side does not bias the estimate there
-static void test_fit(void **state)
+// A darker tissue on one side does not bias the estimate.
+static void test_field_removes_the_bias(void **state)
 {
     (void)state;
     float *v = two_sides(5);
@@ -189,10 +192,10 @@ static void test_fit(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_weights),
+        cmocka_unit_test(test_weights_follow_the_tissues),
         cmocka_unit_test(test_narrow_window),
-        cmocka_unit_test(test_none),
-        cmocka_unit_test(test_fit),
+        cmocka_unit_test(test_cases_without_field),
+        cmocka_unit_test(test_field_removes_the_bias),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -1,4 +1,4 @@
-/* Level set files against closed-form distances: what is written is read back through OpenVDB.
+/* Level set files of closed-form distances, read back through OpenVDB.
  * Tests: band.c seal.c vdb.cc vdb_creases.cc vdb_file.cc */
 #include <math.h>
 #include <setjmp.h>
@@ -31,7 +31,7 @@ static double torus(const double x[3])
     return sqrt(ring * ring + x[2] * x[2]) - 0.55;
 }
 
-// the exact distance to a box with sharp edges, tilted so that its edges cross the voxels
+// Exact distance to a box with sharp edges, rotated so that its edges cross the voxels.
 static double tilted_box(const double x[3])
 {
     const double c = cos(0.4), s = sin(0.4), half[3] = {1.5, 1.0, 0.8};
@@ -65,20 +65,20 @@ static double two_spheres(const double x[3])
 }
 
 static double half_space(const double x[3]) { return (0.6 * x[0] + 0.8 * x[2]) - 0.123; }
-static double nothing(const double x[3]) { return sphere(x) + 50; }
-static double everything(const double x[3]) { return sphere(x) - 50; }
-static double staircase(const double x[3]) { return sphere(x) < 0 ? -5.0 : 5.0; }
-static double flat(const double x[3]) { return 0.2 * sphere(x); }
+static double all_outside(const double x[3]) { return sphere(x) + 50; }
+static double all_inside(const double x[3]) { return sphere(x) - 50; }
+static double step_function(const double x[3]) { return sphere(x) < 0 ? -5.0 : 5.0; }
+static double shallow(const double x[3]) { return 0.2 * sphere(x); }
 
-// dear to the tests: three different sizes, an origin that is not a multiple of the spacing
-static sdm_grid standard_grid(void)
+// Three different sizes, and an origin that is not a multiple of the spacing.
+static sdm_grid test_grid(void)
 {
     const int64_t n[3] = {44, 39, 31};
     const double centre[3] = {0.013, -0.021, 0.037};
     return sdm_grid_centred(n, 0.16, centre);
 }
 
-static float *fill(const sdm_grid *g, distance f)
+static float *map_fill(const sdm_grid *g, distance f)
 {
     float *v = malloc(sdm_grid_count(g) * sizeof *v);
     assert_non_null(v);
@@ -94,7 +94,7 @@ static float *fill(const sdm_grid *g, distance f)
     return v;
 }
 
-static void pass(sdm_status s, const sdm_error *err)
+static void assert_ok(sdm_status s, const sdm_error *err)
 {
     if (s) fail_msg("%s: %s", sdm_status_name(s), err->text);
 }
@@ -103,20 +103,20 @@ static sdm_vdb_report write_level_set(const sdm_grid *g, const float *v, const s
 {
     sdm_error err;
     sdm_vdb_report r;
-    pass(sdm_vdb_write(FILE_NAME, g, v, o, &r, &err), &err);
+    assert_ok(sdm_vdb_write(FILE_NAME, g, v, o, &r, &err), &err);
     return r;
 }
 
-static char *verify(void)
+static char *file_verify(void)
 {
     sdm_error err;
     char *text = NULL;
-    pass(sdm_vdb_verify(FILE_NAME, &text, &err), &err);
+    assert_ok(sdm_vdb_verify(FILE_NAME, &text, &err), &err);
     assert_non_null(text);
     return text;
 }
 
-// reads back the box of the grid grown by `pad` voxels
+// Reads the values on the grid enlarged by `pad` voxels on each side.
 static float *read_box(const sdm_grid *g, int32_t pad)
 {
     const int32_t n[3] = {(int32_t)g->n[0] + 2 * pad, (int32_t)g->n[1] + 2 * pad,
@@ -134,13 +134,13 @@ static float *read_box(const sdm_grid *g, int32_t pad)
                 index[at + 2] = k - pad;
             }
     sdm_error err;
-    pass(sdm_vdb_sample(FILE_NAME, index, count, v, &err), &err);
+    assert_ok(sdm_vdb_sample(FILE_NAME, index, count, v, &err), &err);
     free(index);
     return v;
 }
 
-// a level set holds the map where |d| < band and +-background elsewhere; returns how many voxels
-// differ and by how much
+// A level set holds the map where |d| < band and +-background elsewhere. Returns the number of
+// voxels that differ; *largest: the largest difference.
 static size_t compare(const sdm_grid *g, const float *v, double band, double *largest)
 {
     float *back = read_box(g, 0);
@@ -157,7 +157,7 @@ static size_t compare(const sdm_grid *g, const float *v, double band, double *la
     return differ;
 }
 
-// how far (in voxels) the surface moved along the lines of the grid
+// Largest shift of the surface, in voxels along grid lines, between the map v and the file.
 static double crossing_shift(const sdm_grid *g, const float *v)
 {
     float *back = read_box(g, 0);
@@ -167,8 +167,8 @@ static double crossing_shift(const sdm_grid *g, const float *v)
     for (size_t i = 0; i < count; i++)
         for (int a = 0; a < 3; a++) {
             const size_t j = i + step[a];
-            if (j >= count || (v[i] < 0) == (v[j] < 0))
-                continue; // lines that wrap around hold no crossing: the border is outside
+            // Neighbours across a row's end are both outside, so they hold no crossing.
+            if (j >= count || (v[i] < 0) == (v[j] < 0)) continue;
             const double before = (double)v[i] / ((double)v[i] - (double)v[j]);
             worst =
                 fmax(worst, fabs(before - (double)back[i] / ((double)back[i] - (double)back[j])));
@@ -179,8 +179,8 @@ static double crossing_shift(const sdm_grid *g, const float *v)
 
 static void check_smooth(distance f)
 {
-    const sdm_grid g = standard_grid();
-    float *v = fill(&g, f);
+    const sdm_grid g = test_grid();
+    float *v = map_fill(&g, f);
     const sdm_vdb_report r = write_level_set(&g, v, NULL);
     assert_false(r.cut);
     assert_int_equal(r.adjusted_voxels, 0);
@@ -189,7 +189,7 @@ static void check_smooth(distance f)
     assert_int_equal(r.active_voxels, near);
     double largest;
     assert_int_equal(compare(&g, v, 0.48, &largest), 0);
-    char *text = verify(), expected[64];
+    char *text = file_verify(), expected[64];
     assert_non_null(strstr(text, "class         level set"));
     assert_non_null(strstr(text, "voxel size    0.16 0.16 0.16 mm"));
     assert_non_null(strstr(text, "sdm_frame: LPS"));
@@ -199,26 +199,27 @@ static void check_smooth(distance f)
     free(v);
 }
 
-static void test_sphere(void **state)
+static void test_smooth_sphere(void **state)
 {
     (void)state;
     check_smooth(sphere);
 }
 
-static void test_torus(void **state)
+static void test_smooth_torus(void **state)
 {
     (void)state;
     check_smooth(torus);
 }
 
-// edges and creases of exact distances: few values change, by a fraction of a voxel, signs never
-static void test_creases(void **state)
+// Edges and creases of exact distances: few values change, by a fraction of a voxel, and no sign
+// changes.
+static void test_creases_change_few_values(void **state)
 {
     (void)state;
     const distance shapes[] = {box, tilted_box, two_spheres};
     for (size_t s = 0; s < 3; s++) {
-        const sdm_grid g = standard_grid();
-        float *v = fill(&g, shapes[s]);
+        const sdm_grid g = test_grid();
+        float *v = map_fill(&g, shapes[s]);
         const sdm_vdb_report r = write_level_set(&g, v, NULL);
         double largest;
         const size_t differ = compare(&g, v, 0.48, &largest);
@@ -227,14 +228,14 @@ static void test_creases(void **state)
         assert_true(largest < 0.25 * 0.16);
         assert_true(crossing_shift(&g, v) < 0.4);
         assert_true(fabs(r.adjusted_mm - largest) < 1e-7);
-        char *text = verify();
+        char *text = file_verify();
         assert_true((strstr(text, "sdm_adjusted_voxels: ") != NULL) == (differ > 0));
         sdm_free(text);
         free(v);
     }
 }
 
-// a plate of 0.8 voxels that no axis runs along, and two with such a gap between them
+// Plates of 0.8 and 0.5 voxels, oblique to all axes, and two plates with a thin gap between them.
 static double tilted_plate(const double x[3], double half, double away)
 {
     const double c = cos(0.5), s = sin(0.5), size[3] = {1.5, 1.2, half};
@@ -255,19 +256,19 @@ static double thin_gap(const double x[3])
     return fmin(tilted_plate(x, 0.4, 0.4 + 0.4 * 0.16), tilted_plate(x, 0.4, -0.4 - 0.4 * 0.16));
 }
 
-// parts thinner than a voxel stay: no voxel changes sides
-static void test_thin(void **state)
+// Parts thinner than a voxel stay: no voxel changes sides.
+static void test_thin_parts_stay(void **state)
 {
     (void)state;
     const distance shapes[] = {thin_plate, thinner_plate, thin_gap};
     for (size_t s = 0; s < 3; s++) {
-        const sdm_grid g = standard_grid();
-        float *v = fill(&g, shapes[s]);
+        const sdm_grid g = test_grid();
+        float *v = map_fill(&g, shapes[s]);
         assert_true(write_level_set(&g, v, NULL).adjusted_voxels > 0);
         double largest;
-        (void)compare(&g, v, 0.48, &largest); // signs
+        (void)compare(&g, v, 0.48, &largest); // compares signs, too
         assert_true(largest < 0.5 * 0.16);
-        sdm_free(verify());
+        sdm_free(file_verify());
         free(v);
     }
 }
@@ -275,19 +276,20 @@ static void test_thin(void **state)
 static void test_metadata_and_options(void **state)
 {
     (void)state;
-    const sdm_grid g = standard_grid();
-    float *v = fill(&g, torus);
+    const sdm_grid g = test_grid();
+    float *v = map_fill(&g, torus);
     const sdm_named_value data[] = {
         {"version", "0.1"}, {"params", "R = 1.5 mm, \xc2\xb5"}, {"empty", ""}};
     const sdm_vdb_opts o = {.band_voxels = 5, .metadata = data, .n_metadata = 3};
     const sdm_vdb_report r = write_level_set(&g, v, &o);
     double largest;
     assert_int_equal(compare(&g, v, 0.8, &largest), 0);
-    char *text = verify();
+    char *text = file_verify();
     assert_non_null(strstr(text, "version: 0.1\n"));
     assert_non_null(strstr(text, "params: R = 1.5 mm, \xc2\xb5\n"));
     sdm_free(text);
-    // the hash is that of the values alone: the same again, another one when one value changes
+    // The hash depends on the values only: the same values give the same hash, one changed value
+    // another.
     const sdm_vdb_opts bare = {.band_voxels = 5};
     assert_true(write_level_set(&g, v, &bare).hash == r.hash);
     size_t near = 0;
@@ -297,36 +299,36 @@ static void test_metadata_and_options(void **state)
     free(v);
 }
 
-static void test_half(void **state)
+static void test_half_precision(void **state)
 {
     (void)state;
-    const sdm_grid g = standard_grid();
-    float *v = fill(&g, tilted_box);
+    const sdm_grid g = test_grid();
+    float *v = map_fill(&g, tilted_box);
     const sdm_vdb_opts o = {.half = true};
     const sdm_vdb_report r = write_level_set(&g, v, &o);
     float *back = read_box(&g, 0);
     size_t far = 0;
     for (size_t i = 0; i < sdm_grid_count(&g); i++) {
         assert_true((back[i] < 0) == (v[i] < 0));
-        // 11 significant bits; the background is rounded up to the next number of that kind
+        // Half precision has 11 significant bits; the background is rounded up to the next half.
         if (fabs((double)v[i]) < 0.47 &&
             fabs((double)(back[i] - v[i])) > fabs((double)v[i]) / 2048 + 1e-7)
             far++;
     }
     assert_true(far <= (size_t)r.adjusted_voxels);
-    char *text = verify();
+    char *text = file_verify();
     assert_non_null(strstr(text, "16-bit floats"));
     sdm_free(text);
     free(back);
     free(v);
 }
 
-static void test_dense(void **state)
+static void test_dense_map(void **state)
 {
     (void)state;
-    sdm_grid g = standard_grid();
-    g.spacing[1] = 0.21; // a whole map may have voxels of three sizes
-    float *v = fill(&g, half_space);
+    sdm_grid g = test_grid();
+    g.spacing[1] = 0.21; // a dense map may have anisotropic voxels
+    float *v = map_fill(&g, half_space);
     const sdm_vdb_opts o = {.dense = true};
     const sdm_vdb_report r = write_level_set(&g, v, &o);
     assert_true(r.cut);
@@ -334,25 +336,25 @@ static void test_dense(void **state)
     float *back = read_box(&g, 0);
     assert_memory_equal(back, v, sdm_grid_count(&g) * sizeof *v);
     free(back);
-    char *text = verify();
+    char *text = file_verify();
     assert_non_null(strstr(text, "not set (whole map)"));
     sdm_free(text);
     const sdm_vdb_opts half = {.dense = true, .half = true};
     write_level_set(&g, v, &half);
-    sdm_free(verify());
+    sdm_free(file_verify());
     free(v);
 }
 
-// the intersection of the half space with the box of the voxels, in closed form on the axis-aligned
-// faces far from the rims
-static void test_cut(void **state)
+// The intersection of a half space with the grid's box: closed form on axis-aligned faces far from
+// their rims.
+static void test_shape_cut_by_the_grid(void **state)
 {
     (void)state;
-    const sdm_grid g = standard_grid();
-    float *v = fill(&g, half_space);
+    const sdm_grid g = test_grid();
+    float *v = map_fill(&g, half_space);
     const sdm_vdb_report r = write_level_set(&g, v, NULL);
     assert_true(r.cut);
-    char *text = verify();
+    char *text = file_verify();
     assert_non_null(strstr(text, "sdm_cut: "));
     sdm_free(text);
     const int32_t pad = 8, n[3] = {44 + 16, 39 + 16, 31 + 16};
@@ -366,8 +368,8 @@ static void test_cut(void **state)
                 const bool in = i >= 0 && j >= 0 && k >= 0 && i < 44 && j < 39 && k < 31;
                 if (!in && !(back[at] > 0)) outside_inside++;
                 if (i >= 6 && i < 38 && j < 0 && k >= 6 && k < 25) {
-                    // beyond the face y = low: distance to the part of that face that is inside,
-                    // from the plane's equation
+                    // Outside of the face y = low: distance to the part of the face inside of the
+                    // half space, from the plane's equation.
                     const double index[3] = {(double)i, -0.5, (double)k};
                     double x[3];
                     sdm_grid_world(&g, index, x);
@@ -379,42 +381,42 @@ static void test_cut(void **state)
             }
     assert_int_equal(outside_inside, 0);
     assert_true(checked > 1000);
-    // near the rim, where the inside of the face is known to half a voxel
+    // Near the rim the part of the face that is inside is known to half a voxel only.
     assert_true(worst < 0.71 * 0.16);
     free(back);
     free(v);
 }
 
-// a solid that fills the grid becomes the box of the voxels
+// A solid that fills the grid becomes the grid's box.
 static void test_all_inside(void **state)
 {
     (void)state;
-    const sdm_grid g = standard_grid();
-    float *v = fill(&g, everything);
+    const sdm_grid g = test_grid();
+    float *v = map_fill(&g, all_inside);
     assert_true(write_level_set(&g, v, NULL).cut);
-    sdm_free(verify());
+    sdm_free(file_verify());
     const int32_t index[] = {20, 20, 0, 20, 20, -1, 20, 20, -2, 20, 20, 1, 20, 20, 15, 20, 20, 40};
     const float expected[] = {-0.08f, 0.08f, 0.24f, -0.24f, -0.48f, 0.48f};
     float got[6];
     sdm_error err;
-    pass(sdm_vdb_sample(FILE_NAME, index, 6, got, &err), &err);
+    assert_ok(sdm_vdb_sample(FILE_NAME, index, 6, got, &err), &err);
     for (int i = 0; i < 6; i++) assert_true(fabsf(got[i] - expected[i]) < 1e-6f);
     free(v);
 }
 
-// the band leaves the grid, the surface does not: values in the grid stay, outside the distance
-// goes on
+// The narrow band leaves the grid, the surface does not: values in the grid are kept, and outside
+// the distance is continued.
 static void test_band_beyond_grid(void **state)
 {
     (void)state;
     const int64_t n[3] = {18, 18, 18};
     const double centre[3] = {0, 0, 0};
     const sdm_grid g = sdm_grid_centred(n, 0.16, centre);
-    float *v = fill(&g, sphere);
+    float *v = map_fill(&g, sphere);
     assert_false(write_level_set(&g, v, NULL).cut);
     double largest;
     assert_int_equal(compare(&g, v, 0.48, &largest), 0);
-    sdm_free(verify());
+    sdm_free(file_verify());
     for (int32_t band = 3; band <= 10; band += 7) {
         (void)write_level_set(&g, v, &(sdm_vdb_opts){.band_voxels = band});
         const int32_t pad = band + 3;
@@ -436,23 +438,22 @@ static void test_band_beyond_grid(void **state)
     free(v);
 }
 
-// direction cosines: a rotated and a mirrored grid are level sets as well, and keep their place in
-// the world
-static void test_direction(void **state)
+// A rotated and mirrored grid is a level set as well and keeps its position in the world.
+static void test_rotated_grid_keeps_its_place(void **state)
 {
     (void)state;
-    sdm_grid g = standard_grid();
+    sdm_grid g = test_grid();
     const double c = cos(0.3), s = sin(0.3), dir[9] = {c, -s, 0, s, c, 0, 0, 0, -1};
     memcpy(g.dir, dir, sizeof dir);
     const double middle[3] = {22, 19, 15};
     double x[3];
     sdm_grid_world(&g, middle, x);
     for (int a = 0; a < 3; a++) g.origin[a] -= x[a];
-    float *v = fill(&g, torus);
+    float *v = map_fill(&g, torus);
     write_level_set(&g, v, NULL);
     double largest;
     assert_int_equal(compare(&g, v, 0.48, &largest), 0);
-    char *text = verify(), *origin = strstr(text, "origin        ");
+    char *text = file_verify(), *origin = strstr(text, "origin        ");
     double o[3];
     assert_non_null(origin);
     assert_int_equal(sscanf(origin + 14, "%lf %lf %lf", &o[0], &o[1], &o[2]), 3);
@@ -461,7 +462,8 @@ static void test_direction(void **state)
     free(v);
 }
 
-// a ball of four voxels, on turned axes whose spacings differ by a share of `apart`, is a level set
+// Writes a ball of radius 4 voxels on rotated axes whose spacings differ by the relative amount
+// `apart`; it must be a level set.
 static void write_turned(double spacing, double apart, const double dir[9])
 {
     const double centre[3] = {0, 0, 0}, middle[3] = {6, 6, 6};
@@ -482,14 +484,15 @@ static void write_turned(double spacing, double apart, const double dir[9])
     write_level_set(&g, v, NULL);
     double largest;
     (void)compare(&g, v, 3 * spacing, &largest);
-    assert_true(largest <= 3.6e-7 * spacing); // the background is the next float
-    sdm_free(verify());
+    // The background is rounded to the next float.
+    assert_true(largest <= 3.6e-7 * spacing);
+    sdm_free(file_verify());
     free(v);
 }
 
-// what OpenVDB rounds in the size of turned voxels must not make the band too narrow or the voxels
-// unequal
-static void test_turned(void **state)
+// OpenVDB rounds the voxel size of rotated grids, which must not make the band too narrow or the
+// voxels anisotropic.
+static void test_rounded_voxel_size(void **state)
 {
     (void)state;
     static const double swapped[9] = {0, 1, 0, -1, 0, 0, 0, 0, 1},
@@ -506,8 +509,8 @@ static void test_turned(void **state)
     }
 }
 
-static void refuse(const sdm_grid *g, const float *v, const sdm_vdb_opts *o, sdm_status expected,
-                   const char *said)
+static void write_refused(const sdm_grid *g, const float *v, const sdm_vdb_opts *o,
+                          sdm_status expected, const char *said)
 {
     sdm_error err;
     unlink(FILE_NAME);
@@ -516,74 +519,77 @@ static void refuse(const sdm_grid *g, const float *v, const sdm_vdb_opts *o, sdm
     assert_int_equal(access(FILE_NAME, F_OK), -1);
 }
 
-static void test_refused(void **state)
+static void test_bad_maps_are_refused(void **state)
 {
     (void)state;
-    sdm_grid g = standard_grid();
-    float *v = fill(&g, sphere);
+    sdm_grid g = test_grid();
+    float *v = map_fill(&g, sphere);
     const float kept = v[777];
     v[777] = NAN;
-    refuse(&g, v, NULL, SDM_E_ARG, "need finite");
-    refuse(&g, v, &(sdm_vdb_opts){.dense = true}, SDM_E_ARG, "need finite");
+    write_refused(&g, v, NULL, SDM_E_ARG, "need finite");
+    write_refused(&g, v, &(sdm_vdb_opts){.dense = true}, SDM_E_ARG, "need finite");
     v[777] = kept;
     g.spacing[2] = 0.17;
-    refuse(&g, v, NULL, SDM_E_ARG, "--dense");
+    write_refused(&g, v, NULL, SDM_E_ARG, "--dense");
     g.spacing[2] = 0.16;
-    refuse(&g, v, &(sdm_vdb_opts){.band_voxels = 2}, SDM_E_ARG, "need 3 to 100");
-    refuse(&g, v, &(sdm_vdb_opts){.band_voxels = NAN}, SDM_E_ARG, "need 3 to 100");
-    refuse(&g, v, &(sdm_vdb_opts){.metadata = &(sdm_named_value){"sdm_hash", "1"}, .n_metadata = 1},
-           SDM_E_ARG, "program itself");
-    refuse(&g, v, &(sdm_vdb_opts){.metadata = &(sdm_named_value){NULL, "1"}, .n_metadata = 1},
-           SDM_E_ARG, "no name");
-    refuse(&g, NULL, NULL, SDM_E_ARG, "needed");
+    write_refused(&g, v, &(sdm_vdb_opts){.band_voxels = 2}, SDM_E_ARG, "need 3 to 100");
+    write_refused(&g, v, &(sdm_vdb_opts){.band_voxels = NAN}, SDM_E_ARG, "need 3 to 100");
+    write_refused(&g, v,
+                  &(sdm_vdb_opts){.metadata = &(sdm_named_value){"sdm_hash", "1"}, .n_metadata = 1},
+                  SDM_E_ARG, "program itself");
+    write_refused(&g, v,
+                  &(sdm_vdb_opts){.metadata = &(sdm_named_value){NULL, "1"}, .n_metadata = 1},
+                  SDM_E_ARG, "no name");
+    write_refused(&g, NULL, NULL, SDM_E_ARG, "needed");
     for (int a = 0; a < 3; a++) g.spacing[a] = 22000;
-    refuse(&g, v, &(sdm_vdb_opts){.half = true}, SDM_E_ARG, "too large for the number format");
+    write_refused(&g, v, &(sdm_vdb_opts){.half = true}, SDM_E_ARG,
+                  "too large for the number format");
     for (int a = 0; a < 3; a++) g.spacing[a] = 2e38;
-    refuse(&g, v, NULL, SDM_E_ARG, "too large for the number format");
+    write_refused(&g, v, NULL, SDM_E_ARG, "too large for the number format");
     for (int a = 0; a < 3; a++) g.spacing[a] = 1e-5;
-    refuse(&g, v, NULL, SDM_E_ARG, "too small for OpenVDB");
-    refuse(&g, v, &(sdm_vdb_opts){.dense = true}, SDM_E_ARG, "too small for OpenVDB");
+    write_refused(&g, v, NULL, SDM_E_ARG, "too small for OpenVDB");
+    write_refused(&g, v, &(sdm_vdb_opts){.dense = true}, SDM_E_ARG, "too small for OpenVDB");
     for (int a = 0; a < 3; a++) g.spacing[a] = 2e-5;
     const double c = cos(0.3), s = sin(0.3), dir[9] = {c, -s, 0, s, c, 0, 0, 0, 1};
     memcpy(g.dir, dir, sizeof g.dir);
-    refuse(&g, v, NULL, SDM_E_ARG, "on turned axes are not uniform");
-    g = standard_grid();
+    write_refused(&g, v, NULL, SDM_E_ARG, "on turned axes are not uniform");
+    g = test_grid();
     v[777] = 70000.0f;
-    refuse(&g, v, &(sdm_vdb_opts){.dense = true, .half = true}, SDM_E_ARG, "65504");
+    write_refused(&g, v, &(sdm_vdb_opts){.dense = true, .half = true}, SDM_E_ARG, "65504");
     free(v);
     const struct {
         distance f;
         sdm_status status;
         const char *said;
     } maps[] = {
-        {nothing, SDM_E_ARG, "no voxel of the map is inside"},
-        {staircase, SDM_E_QUALITY, "not a distance map"},
+        {all_outside, SDM_E_ARG, "no voxel of the map is inside"},
+        {step_function, SDM_E_QUALITY, "not a distance map"},
     };
     for (size_t i = 0; i < 2; i++) {
-        v = fill(&g, maps[i].f);
-        refuse(&g, v, NULL, maps[i].status, maps[i].said);
+        v = map_fill(&g, maps[i].f);
+        write_refused(&g, v, NULL, maps[i].status, maps[i].said);
         free(v);
     }
 }
 
-// gradients of 0.2 cannot be a distance; gradients of 0.8 are within what a network's map may have
-static void test_gradients(void **state)
+// A gradient of 0.2 is no distance map; one of 0.8 is accepted, since maps of networks may have it.
+static void test_gradient_limits(void **state)
 {
     (void)state;
-    const sdm_grid g = standard_grid();
-    float *v = fill(&g, flat);
-    refuse(&g, v, NULL, SDM_E_QUALITY, "not a valid level set");
+    const sdm_grid g = test_grid();
+    float *v = map_fill(&g, shallow);
+    write_refused(&g, v, NULL, SDM_E_QUALITY, "not a valid level set");
     for (size_t i = 0; i < sdm_grid_count(&g); i++) v[i] *= 4;
     assert_int_equal(write_level_set(&g, v, NULL).adjusted_voxels, 0);
-    sdm_free(verify());
+    sdm_free(file_verify());
     free(v);
 }
 
-static void test_unwritable(void **state)
+static void test_unwritable_paths_are_errors(void **state)
 {
     (void)state;
-    const sdm_grid g = standard_grid();
-    float *v = fill(&g, sphere);
+    const sdm_grid g = test_grid();
+    float *v = map_fill(&g, sphere);
     sdm_error err;
     assert_int_equal(sdm_vdb_write("no/such/folder/a.vdb", &g, v, NULL, NULL, &err), SDM_E_IO);
     assert_int_equal(access("no", F_OK), -1);
@@ -593,7 +599,7 @@ static void test_unwritable(void **state)
     free(v);
 }
 
-static void save(const uint8_t *data, size_t size)
+static void file_save(const uint8_t *data, size_t size)
 {
     FILE *f = fopen(FILE_NAME, "wb");
     assert_non_null(f);
@@ -603,14 +609,14 @@ static void save(const uint8_t *data, size_t size)
 
 static bool stop(void *user) { return --*(int *)user < 0; }
 
-// whenever it is asked to stop, it does, and there is no file
-static void test_cancelled(void **state)
+// Cancelled at each call of the hook: no file is left.
+static void test_cancelled_leaves_no_file(void **state)
 {
     (void)state;
     const int64_t n[3] = {30, 28, 26};
     const double centre[3] = {0, 0, 0};
     const sdm_grid g = sdm_grid_centred(n, 0.15, centre);
-    float *v = fill(&g, tilted_box); // has creases, and leaves the grid by its band
+    float *v = map_fill(&g, tilted_box); // has creases, and its band leaves the grid
     unlink(FILE_NAME);
     sdm_status s = SDM_E_CANCELLED;
     int calls = 0;
@@ -625,44 +631,44 @@ static void test_cancelled(void **state)
         }
     }
     assert_int_equal(s, SDM_OK);
-    assert_true(calls > 26 + 2 * 12); // in every layer of the padded grid at least
-    sdm_free(verify());
+    assert_true(calls > 26 + 2 * 12); // at least once for each layer of the padded grid
+    sdm_free(file_verify());
     free(v);
 }
 
-// every kind of damage is found before the file is parsed
-static void test_damage(void **state)
+// Every kind of damage is detected before OpenVDB parses the file.
+static void test_damage_is_found(void **state)
 {
     (void)state;
     const int64_t n[3] = {15, 14, 13};
     const double centre[3] = {0, 0, 0};
     const sdm_grid g = sdm_grid_centred(n, 0.3, centre);
-    float *v = fill(&g, sphere);
+    float *v = map_fill(&g, sphere);
     write_level_set(&g, v, NULL);
     free(v);
     uint8_t *data;
     size_t size;
     sdm_error err;
-    pass(sdm_file_read(FILE_NAME, 1u << 24, &data, &size, &err), &err);
+    assert_ok(sdm_file_read(FILE_NAME, 1u << 24, &data, &size, &err), &err);
     for (size_t bit = 0; bit < size * 8; bit += 97) {
         data[bit / 8] ^= (uint8_t)(1u << (bit % 8));
-        save(data, size);
+        file_save(data, size);
         const sdm_status s = sdm_vdb_verify(FILE_NAME, NULL, &err);
         if (s != SDM_E_FORMAT) fail_msg("bit %zu of %zu: %s", bit, size * 8, sdm_status_name(s));
         data[bit / 8] ^= (uint8_t)(1u << (bit % 8));
     }
     for (size_t cut = 1500; cut < size; cut += 211) {
-        save(data, cut);
+        file_save(data, cut);
         const sdm_status s = sdm_vdb_verify(FILE_NAME, NULL, &err);
         if (s != SDM_E_FORMAT)
             fail_msg("cut to %zu of %zu bytes: %s", cut, size, sdm_status_name(s));
     }
     for (size_t cut = 0; cut < 40; cut++) {
-        save(data, cut);
+        file_save(data, cut);
         assert_int_equal(sdm_vdb_verify(FILE_NAME, NULL, &err), SDM_E_FORMAT);
     }
-    save(data, size);
-    sdm_free(verify());
+    file_save(data, size);
+    sdm_free(file_verify());
     sdm_free(data);
     unlink(FILE_NAME);
 }
@@ -670,23 +676,23 @@ static void test_damage(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sphere),
-        cmocka_unit_test(test_torus),
-        cmocka_unit_test(test_creases),
-        cmocka_unit_test(test_thin),
+        cmocka_unit_test(test_smooth_sphere),
+        cmocka_unit_test(test_smooth_torus),
+        cmocka_unit_test(test_creases_change_few_values),
+        cmocka_unit_test(test_thin_parts_stay),
         cmocka_unit_test(test_metadata_and_options),
-        cmocka_unit_test(test_half),
-        cmocka_unit_test(test_dense),
-        cmocka_unit_test(test_cut),
+        cmocka_unit_test(test_half_precision),
+        cmocka_unit_test(test_dense_map),
+        cmocka_unit_test(test_shape_cut_by_the_grid),
         cmocka_unit_test(test_all_inside),
         cmocka_unit_test(test_band_beyond_grid),
-        cmocka_unit_test(test_direction),
-        cmocka_unit_test(test_turned),
-        cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_gradients),
-        cmocka_unit_test(test_unwritable),
-        cmocka_unit_test(test_cancelled),
-        cmocka_unit_test(test_damage),
+        cmocka_unit_test(test_rotated_grid_keeps_its_place),
+        cmocka_unit_test(test_rounded_voxel_size),
+        cmocka_unit_test(test_bad_maps_are_refused),
+        cmocka_unit_test(test_gradient_limits),
+        cmocka_unit_test(test_unwritable_paths_are_errors),
+        cmocka_unit_test(test_cancelled_leaves_no_file),
+        cmocka_unit_test(test_damage_is_found),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

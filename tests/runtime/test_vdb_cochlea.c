@@ -1,6 +1,6 @@
-/* Level sets of real shapes: cochleas have creases, sheets and gaps thinner than a voxel, on which
- * OpenVDB's checkLevelSet still wants a gradient. Every one must be written, pass the check, keep
- * the side of every voxel, and stay close to the map it came from.
+/* Level sets of cochleas, which have creases, sheets and gaps thinner than a voxel, where OpenVDB's
+ * checkLevelSet still requires a gradient of 1. Each must be written, pass the check, keep the side
+ * of every voxel and stay close to its map.
  * Tests: vdb.cc vdb_creases.cc */
 #include <math.h>
 #include <setjmp.h>
@@ -38,9 +38,9 @@ static int tear_down(void **state)
     return 0;
 }
 
-// writes the level set of a cochlea on this grid and reads it back; mending is local: at most
-// `share` of the band
-static void check(const double *params, const sdm_grid *grid, double share)
+// Writes the level set of a cochlea and reads it back. At most the share `share` of the band may be
+// changed.
+static void level_set_check(const double *params, const sdm_grid *grid, double share)
 {
     const char *path = "cochlea_level_set.vdb";
     const size_t count = sdm_grid_count(grid);
@@ -83,11 +83,11 @@ static void every_cochlea_becomes_a_level_set(void **state)
         double at[8];
         for (size_t k = 0; k < n; k++)
             at[k] = p[k].min + (p[k].max - p[k].min) * sdm_rng_uniform(7, i, k);
-        check(at, &grid, 0.1);
+        level_set_check(at, &grid, 0.1);
     }
 }
 
-static void coarse_and_fine(void **state)
+static void coarse_and_fine_grids_become_level_sets(void **state)
 {
     (void)state;
     const double spacing[] = {0.4, 0.3, 0.15};
@@ -99,13 +99,13 @@ static void coarse_and_fine(void **state)
         const int64_t size[3] = {(int64_t)(14 / spacing[i]), (int64_t)(12 / spacing[i]),
                                  (int64_t)(12 / spacing[i])};
         const sdm_grid grid = sdm_grid_centred(size, spacing[i], (const double[]){0.5, 0.4, 1.2});
-        check(at, &grid, 0.15);
+        level_set_check(at, &grid, 0.15);
     }
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(every_cochlea_becomes_a_level_set),
-                                       cmocka_unit_test(coarse_and_fine)};
+                                       cmocka_unit_test(coarse_and_fine_grids_become_level_sets)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

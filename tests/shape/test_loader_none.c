@@ -1,4 +1,5 @@
-/* The loader of a build without shared objects: it says what to do, and built-in shapes need none.
+/* The loader of a build without shared objects: plug-ins are refused with advice, and built-in
+ * shapes still work.
  * Tests: loader_none.c */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,5 @@
-/* The host's side of shapes: what is refused at registration, options from text, checks around
- * every call.
+/* The registry of shapes: what it refuses at registration, options given as text, and checks around
+ * every callback.
  * Tests: host.c instance.c options.c registry.c shape_check.c velocity.c */
 #include <math.h>
 #include <setjmp.h>
@@ -17,12 +17,13 @@
 
 static sdm_error err;
 
-static void has(const char *text)
+static void err_has(const char *text)
 {
     if (!strstr(err.text, text)) fail_msg("'%s' is not in '%s'", text, err.text);
 }
 
-/* A tetrahedron whose behaviour is chosen by its options; every test starts from this table. */
+/* A tetrahedron; its options select good or faulty behaviour. Every test starts from this table
+ * of callbacks. */
 static const sdm_param PARAMS[] = {{"size", "mm", 1, 3, 2, "edge"},
                                    {"shift", "mm", -1, 1, 0, "along x"}};
 
@@ -41,8 +42,8 @@ static int mesh(const void *self, const sdm_host *host, const sdm_option_value *
 {
     (void)self;
     const char *mode = options[MODE].text;
-    if (!strcmp(mode, "error"))
-        return (host->fail)(host, "the size is unlucky"); // in brackets: cmocka has a macro fail()
+    // In parentheses: cmocka defines a macro fail().
+    if (!strcmp(mode, "error")) return (host->fail)(host, "the size is unlucky");
     if (!strcmp(mode, "mute")) return 7;
     if (!strcmp(mode, "skip")) return 0;
     if (!strcmp(mode, "huge")) return host->reserve(host, out, (size_t)1 << 40, 4);
@@ -114,15 +115,15 @@ static int tear_down(void **state)
     return 0;
 }
 
-static void refused(const sdm_shape *shape, const char *text)
+static void registration_refused(const sdm_shape *shape, const char *text)
 {
     assert_int_equal(sdm_registry_add(registry, shape, "there", &err), SDM_E_PLUGIN);
-    has(text);
+    err_has(text);
     assert_memory_equal(err.text, "there: ", 7);
     assert_int_equal(sdm_registry_count(registry), 0);
 }
 
-static void test_names(void **state)
+static void test_names_are_checked(void **state)
 {
     (void)state;
     static const char *const BAD[] = {
@@ -132,27 +133,27 @@ static void test_names(void **state)
     for (size_t i = 0; i < sizeof BAD / sizeof *BAD; i++) {
         sdm_shape s = GOOD;
         s.name = BAD[i];
-        refused(&s, "there: shape of the name '");
+        registration_refused(&s, "there: shape of the name '");
         sdm_param params[2] = {PARAMS[0], PARAMS[1]};
         params[1].name = BAD[i];
         s = GOOD;
         s.params = params;
-        refused(&s, "there: shape 'tetra': parameter 2 has the name '");
+        registration_refused(&s, "there: shape 'tetra': parameter 2 has the name '");
         sdm_option options[N_OPTIONS];
         memcpy(options, OPTIONS, sizeof options);
         options[2].name = BAD[i];
         s = GOOD;
         s.options = options;
-        refused(&s, "there: shape 'tetra': option 3 has the name '");
+        registration_refused(&s, "there: shape 'tetra': option 3 has the name '");
     }
     sdm_shape s = GOOD;
-    s.name = "a_1"; // the shortest and the longest that are fine
+    s.name = "a_1"; // the shortest and the longest valid names
     assert_int_equal(sdm_registry_add(registry, &s, "there", &err), SDM_OK);
     s.name = "a23456789012345678901234567890123456789012345678901234567890abc";
     assert_int_equal(sdm_registry_add(registry, &s, "there", &err), SDM_OK);
 }
 
-static void test_parameters(void **state)
+static void test_parameters_are_checked(void **state)
 {
     (void)state;
     static const struct {
@@ -168,52 +169,52 @@ static void test_parameters(void **state)
         sdm_param params[2] = {PARAMS[0], {"b", "mm", BAD[i].min, BAD[i].max, BAD[i].def, ""}};
         sdm_shape s = GOOD;
         s.params = params;
-        refused(&s, BAD[i].text);
-        has("parameter 'b'");
+        registration_refused(&s, BAD[i].text);
+        err_has("parameter 'b'");
         sdm_option option = {"c",        SDM_OPTION_REAL, "",   BAD[i].min,
                              BAD[i].max, BAD[i].def,      NULL, ""};
         s = GOOD;
         s.options = &option, s.n_options = 1;
-        refused(&s, BAD[i].text);
-        has("option 'c'");
+        registration_refused(&s, BAD[i].text);
+        err_has("option 'c'");
     }
     sdm_param params[2] = {PARAMS[0], PARAMS[0]};
     sdm_shape s = GOOD;
     s.params = params;
-    refused(&s, "two parameters are named 'size'");
+    registration_refused(&s, "two parameters are named 'size'");
     params[1] = PARAMS[1];
     params[1].unit = NULL;
-    refused(&s, "parameter 'shift' has no unit");
+    registration_refused(&s, "parameter 'shift' has no unit");
     s.params = NULL;
-    refused(&s, "2 parameters, but no table");
+    registration_refused(&s, "2 parameters, but no table");
     s.n_params = 0;
-    refused(&s, "no parameters");
+    registration_refused(&s, "no parameters");
     s = GOOD;
     s.n_params = 65;
-    refused(&s, "65 parameters, at most 64");
+    registration_refused(&s, "65 parameters, at most 64");
 }
 
-static void test_options_of_table(void **state)
+static void test_options_are_checked(void **state)
 {
     (void)state;
     sdm_option option = {"c", SDM_OPTION_CHOICE, "", 0, 0, 0, NULL, ""};
     sdm_shape s = GOOD;
     s.options = &option, s.n_options = 1;
-    refused(&s, "option 'c' has no choices");
+    registration_refused(&s, "option 'c' has no choices");
     static const char *const BAD[] = {"a||b", "|a", "a|", "a|b|a"};
     for (size_t i = 0; i < 4; i++) {
         option.choices = BAD[i];
-        refused(&s, "empty, long or repeated choice");
+        registration_refused(&s, "empty, long or repeated choice");
     }
     option = (sdm_option){"c", SDM_OPTION_INT, "", 0, 10, 0.5, NULL, ""};
-    refused(&s, "is an integer");
+    registration_refused(&s, "is an integer");
     option.type = (sdm_option_type)9;
-    refused(&s, "unknown type 9");
+    registration_refused(&s, "unknown type 9");
     sdm_option twice[2] = {OPTIONS[0], OPTIONS[0]};
     s.options = twice, s.n_options = 2;
-    refused(&s, "two options are named 'mode'");
+    registration_refused(&s, "two options are named 'mode'");
     s.options = NULL;
-    refused(&s, "2 options, but no table");
+    registration_refused(&s, "2 options, but no table");
 }
 
 static int create(const sdm_host *host, const sdm_option_value *options, void **self)
@@ -237,27 +238,27 @@ static void describe_badly(const void *self, const sdm_param **params, uint32_t 
     *params = MANY, *n_params = 2;
 }
 
-static void test_callbacks(void **state)
+static void test_callbacks_are_checked(void **state)
 {
     (void)state;
     sdm_shape s = GOOD;
     s.mesh = NULL;
-    refused(&s, "no callback mesh()");
+    registration_refused(&s, "no callback mesh()");
     s = GOOD;
     s.create = create;
-    refused(&s, "callback destroy() is missing");
+    registration_refused(&s, "callback destroy() is missing");
     s = GOOD;
     s.destroy = free;
-    refused(&s, "callback create() is missing");
+    registration_refused(&s, "callback create() is missing");
     s = GOOD;
     s.describe = describe_two;
-    refused(&s, "describe() needs create()");
+    registration_refused(&s, "describe() needs create()");
     s = GOOD;
     s.summary = NULL;
-    refused(&s, "no summary");
+    registration_refused(&s, "no summary");
 }
 
-static void test_registry_misuse(void **state)
+static void test_registry_refuses_wrong_arguments(void **state)
 {
     (void)state;
     assert_int_equal(sdm_registry_add(NULL, &GOOD, "x", &err), SDM_E_ARG);
@@ -268,7 +269,7 @@ static void test_registry_misuse(void **state)
     assert_int_equal(sdm_registry_load_path(registry, NULL, &err), SDM_OK);
     assert_int_equal(sdm_registry_load_path(registry, "::", &err), SDM_OK);
     assert_int_equal(sdm_registry_load_path(registry, "/there/is/none", &err), SDM_E_PLUGIN);
-    has("plug-in folder /there/is/none: No such file");
+    err_has("plug-in folder /there/is/none: No such file");
     assert_null(sdm_registry_find(registry, "x", NULL));
     assert_null(sdm_registry_at(registry, 0));
     assert_null(sdm_registry_origin(registry, 0));
@@ -276,7 +277,7 @@ static void test_registry_misuse(void **state)
     sdm_instance_free(NULL);
 }
 
-static void test_find(void **state)
+static void test_find_suggests_the_nearest_name(void **state)
 {
     (void)state;
     assert_int_equal(sdm_builtin_shapes_add(registry, &err), SDM_OK);
@@ -293,7 +294,8 @@ static void test_find(void **state)
     assert_null(sdm_registry_find(registry, "spaceship", &nearest));
     assert_null(nearest);
     const sdm_shape *first = sdm_registry_at(registry, 0);
-    for (int i = 0; i < 40; i++) { // pointers stay good while the registry grows
+    // Pointers to shapes stay valid while the registry grows.
+    for (int i = 0; i < 40; i++) {
         static char names[40][16];
         snprintf(names[i], sizeof names[i], "shape%d", i);
         sdm_shape s = GOOD;
@@ -302,7 +304,7 @@ static void test_find(void **state)
         assert_ptr_equal(sdm_registry_at(registry, 0), first);
     }
     assert_int_equal(sdm_builtin_shapes_add(registry, &err), SDM_E_PLUGIN);
-    has("built in: shape 'cochlea' is there already (built in)");
+    err_has("built in: shape 'cochlea' is there already (built in)");
 }
 
 static sdm_status instance_of(const sdm_shape *s, const char *name, const char *value,
@@ -312,7 +314,7 @@ static sdm_status instance_of(const sdm_shape *s, const char *name, const char *
     return sdm_instance_create(s, &given, name ? 1 : 0, base, out, &err);
 }
 
-static void test_option_values(void **state)
+static void test_option_text_is_parsed(void **state)
 {
     (void)state;
     sdm_instance *s = NULL;
@@ -361,18 +363,18 @@ static void test_option_values(void **state)
     for (size_t i = 0; i < sizeof BAD / sizeof *BAD; i++) {
         s = NULL;
         assert_int_equal(instance_of(&GOOD, BAD[i][0], BAD[i][1], NULL, &s), SDM_E_CONFIG);
-        has(BAD[i][2]);
+        err_has(BAD[i][2]);
         assert_null(s);
     }
     const sdm_named_text twice[] = {{"level", "1"}, {"level", "1"}}, none[] = {{"level", NULL}};
     assert_int_equal(sdm_instance_create(&GOOD, twice, 2, NULL, &s, &err), SDM_E_CONFIG);
-    has("option 'level' is given twice");
+    err_has("option 'level' is given twice");
     assert_int_equal(sdm_instance_create(&GOOD, none, 1, NULL, &s, &err), SDM_E_ARG);
     assert_int_equal(sdm_instance_create(NULL, NULL, 0, NULL, &s, &err), SDM_E_ARG);
     assert_int_equal(sdm_instance_create(&GOOD, NULL, 0, NULL, NULL, &err), SDM_E_ARG);
 }
 
-static void test_check(void **state)
+static void test_parameters_must_be_in_range(void **state)
 {
     (void)state;
     sdm_instance *s = NULL;
@@ -387,18 +389,19 @@ static void test_check(void **state)
         double v[24], d;
         const double x[3] = {0};
         assert_int_equal(sdm_instance_check(s, bad[i], &err), SDM_E_RANGE);
-        has(i == 2 || i == 4 ? "parameter 'shift' of shape 'tetra' is "
-                             : "parameter 'size' of shape 'tetra' is ");
-        has(i == 2 || i == 4 ? "need -1 .. 1" : "need 1 .. 3");
+        err_has(i == 2 || i == 4 ? "parameter 'shift' of shape 'tetra' is "
+                                 : "parameter 'size' of shape 'tetra' is ");
+        err_has(i == 2 || i == 4 ? "need -1 .. 1" : "need 1 .. 3");
         assert_int_equal(sdm_instance_mesh(s, bad[i], &m, &err), SDM_E_RANGE);
         assert_int_equal(sdm_instance_velocity(s, bad[i], 4, v, &err), SDM_E_RANGE);
         assert_int_equal(sdm_instance_distance(s, bad[i], x, &d, &err), SDM_E_RANGE);
         assert_null(m.vert);
     }
     assert_int_equal(sdm_instance_check(s, bad[0], &err), SDM_E_RANGE);
-    has("is 0.9999999999999999 mm, need"); // one unit in the last place is seen, and shown
+    // A difference of one unit in the last place is detected, and all digits are printed.
+    err_has("is 0.9999999999999999 mm, need");
     assert_int_equal(sdm_instance_check(s, bad[3], &err), SDM_E_RANGE);
-    has("is nan mm");
+    err_has("is nan mm");
     assert_int_equal(sdm_instance_check(s, NULL, &err), SDM_E_ARG);
     assert_int_equal(sdm_instance_param_index(s, "shift"), 1);
     assert_int_equal(sdm_instance_param_index(s, "shit"), -1);
@@ -406,7 +409,7 @@ static void test_check(void **state)
     sdm_instance_free(s);
 }
 
-static void test_mesh(void **state)
+static void test_bad_meshes_are_refused(void **state)
 {
     (void)state;
     static const struct {
@@ -434,15 +437,16 @@ static void test_mesh(void **state)
         sdm_mesh m = {0};
         assert_int_equal(instance_of(&GOOD, "mode", CASES[i].mode, NULL, &s), SDM_OK);
         assert_int_equal(sdm_instance_mesh(s, p, &m, &err), CASES[i].status);
-        has(CASES[i].text);
-        assert_int_equal(m.n_vert + m.n_tri, 0); // nothing half made is left
+        err_has(CASES[i].text);
+        assert_int_equal(m.n_vert + m.n_tri, 0); // no partial mesh is left
         sdm_mesh_dispose(&m);
         sdm_instance_free(s);
     }
     sdm_instance *s = NULL;
     sdm_mesh m = {0};
     assert_int_equal(instance_of(&GOOD, NULL, NULL, NULL, &s), SDM_OK);
-    for (int i = 0; i < 3; i++) { // the same mesh, reused
+    // The same mesh object is filled again.
+    for (int i = 0; i < 3; i++) {
         assert_int_equal(sdm_instance_mesh(s, p, &m, &err), SDM_OK);
         assert_int_equal(m.n_vert, 4);
         assert_int_equal(m.n_tri, 4);
@@ -453,7 +457,7 @@ static void test_mesh(void **state)
     sdm_instance_free(s);
 }
 
-static void test_distance(void **state)
+static void test_distance_is_checked(void **state)
 {
     (void)state;
     const double p[2] = {2, 0}, x[3] = {5, 0, 0}, bad[3] = {0, NAN, 0};
@@ -467,19 +471,19 @@ static void test_distance(void **state)
     sdm_instance_free(s);
     assert_int_equal(instance_of(&GOOD, "mode", "nan", NULL, &s), SDM_OK);
     assert_int_equal(sdm_instance_distance(s, p, x, &d, &err), SDM_E_PLUGIN);
-    has("distance() gives a number that is not finite");
+    err_has("distance() gives a number that is not finite");
     sdm_instance_free(s);
     sdm_shape without = GOOD;
     without.distance = NULL;
     assert_int_equal(instance_of(&without, NULL, NULL, NULL, &s), SDM_OK);
     assert_int_equal(sdm_instance_distance(s, p, x, &d, &err), SDM_E_UNSUPPORTED);
-    has("shape 'tetra' has no closed-form distance");
+    err_has("shape 'tetra' has no closed-form distance");
     sdm_instance_free(s);
 }
 
-// differences by the host: exact for d/dsize (linear), of second order for d/dshift (square), also
-// at the ends
-static void test_velocity(void **state)
+// Velocities by finite differences: exact for d/dsize (linear), error of second order for d/dshift
+// (quadratic), also at the ends of the ranges.
+static void test_velocity_by_differences(void **state)
 {
     (void)state;
     const double at[][2] = {{2, 0.3}, {1, -1}, {3, 1}, {1.0000001, 0.9999999}};
@@ -495,7 +499,7 @@ static void test_velocity(void **state)
         }
     }
     assert_int_equal(sdm_instance_velocity(s, at[0], 5, v, &err), SDM_E_PLUGIN);
-    has("the mesh has 4 vertices, velocities of 5 were asked for");
+    err_has("the mesh has 4 vertices, velocities of 5 were asked for");
     assert_int_equal(sdm_instance_velocity(s, at[0], 4, NULL, &err), SDM_E_ARG);
     sdm_instance_free(s);
 
@@ -507,7 +511,7 @@ static void test_velocity(void **state)
     sdm_instance_free(s);
     assert_int_equal(instance_of(&with, "mode", "nan", NULL, &s), SDM_OK);
     assert_int_equal(sdm_instance_velocity(s, at[0], 4, v, &err), SDM_E_PLUGIN);
-    has("velocity of vertex 1 with respect to 'shift' is not finite");
+    err_has("velocity of vertex 1 with respect to 'shift' is not finite");
     sdm_instance_free(s);
 }
 
@@ -522,8 +526,9 @@ static int mesh_of_year(const void *self, const sdm_host *host, const sdm_option
     return 0;
 }
 
-// steps that are rounded, beside a parameter of many digits: weights are those of the steps taken
-static void test_velocity_of_year(void **state)
+// A parameter near 1e6 rounds the steps of the differences; the quotients must use the steps
+// actually taken.
+static void test_velocity_with_rounded_steps(void **state)
 {
     (void)state;
     static const sdm_param year[] = {{"year", "", 1e6, 1e6 + 1, 1e6 + 0.5, ""}};
@@ -567,15 +572,15 @@ static int create_reads(const sdm_host *host, const sdm_option_value *options, v
     return 0;
 }
 
-static void test_create(void **state)
+static void test_create_may_fail(void **state)
 {
     (void)state;
     sdm_shape shape = GOOD;
     sdm_instance *s = NULL;
     shape.create = create_fails, shape.destroy = free;
     assert_int_equal(instance_of(&shape, "data", "missing.bin", "/nowhere", &s), SDM_E_PLUGIN);
-    has("shape 'tetra': ");
-    has("/nowhere/missing.bin");
+    err_has("shape 'tetra': ");
+    err_has("/nowhere/missing.bin");
     assert_null(s);
 
     FILE *f = fopen("test_registry_data.bin", "wb");
@@ -595,11 +600,12 @@ static void test_create(void **state)
     sdm_instance_free(s);
     shape.describe = describe_badly;
     assert_int_equal(instance_of(&shape, NULL, NULL, NULL, &s), SDM_E_PLUGIN);
-    has("shape 'tetra', describe(): two parameters are named 'm1'");
+    err_has("shape 'tetra', describe(): two parameters are named 'm1'");
 }
 
-// every allocation may fail once; nothing leaks (seen by the sanitizer) and the registry stays good
-static void test_memory(void **state)
+// Each allocation fails once: no leak (detected by the sanitizer build), and the registry stays
+// usable.
+static void test_each_allocation_may_fail(void **state)
 {
     (void)state;
     unsigned long n = 1;
@@ -630,20 +636,20 @@ int main(void)
 {
 #define WITH_REGISTRY(test) cmocka_unit_test_setup_teardown(test, set_up, tear_down)
     const struct CMUnitTest tests[] = {
-        WITH_REGISTRY(test_names),
-        WITH_REGISTRY(test_parameters),
-        WITH_REGISTRY(test_options_of_table),
-        WITH_REGISTRY(test_callbacks),
-        WITH_REGISTRY(test_find),
-        WITH_REGISTRY(test_registry_misuse),
-        cmocka_unit_test(test_option_values),
-        cmocka_unit_test(test_check),
-        cmocka_unit_test(test_mesh),
-        cmocka_unit_test(test_distance),
-        cmocka_unit_test(test_velocity),
-        cmocka_unit_test(test_velocity_of_year),
-        cmocka_unit_test(test_create),
-        WITH_REGISTRY(test_memory),
+        WITH_REGISTRY(test_names_are_checked),
+        WITH_REGISTRY(test_parameters_are_checked),
+        WITH_REGISTRY(test_options_are_checked),
+        WITH_REGISTRY(test_callbacks_are_checked),
+        WITH_REGISTRY(test_find_suggests_the_nearest_name),
+        WITH_REGISTRY(test_registry_refuses_wrong_arguments),
+        cmocka_unit_test(test_option_text_is_parsed),
+        cmocka_unit_test(test_parameters_must_be_in_range),
+        cmocka_unit_test(test_bad_meshes_are_refused),
+        cmocka_unit_test(test_distance_is_checked),
+        cmocka_unit_test(test_velocity_by_differences),
+        cmocka_unit_test(test_velocity_with_rounded_steps),
+        cmocka_unit_test(test_create_may_fail),
+        WITH_REGISTRY(test_each_allocation_may_fail),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,5 @@
-/* The built-in shapes with closed forms: meshes against volumes, areas and distances known
- * otherwise, velocities against differences, and the cochlea against its own definition.
+/* The built-in shapes with closed forms: volumes, areas and distances of meshes against known
+ * values, velocities against differences, and the cochlea against its definition.
  * Tests: builtin.c capsule.c cochlea.c cochlea_curve.c cochlea_distance.c cochlea_ring.c
  * ellipsoid.c lathe.c torus.c */
 #include <math.h>
@@ -34,8 +34,8 @@ static int tear_down(void **state)
     return 0;
 }
 
-// options as "name=value name=value"
-static sdm_instance *make(const char *shape, const char *options)
+// An instance of a shape; options are written as "name=value name=value".
+static sdm_instance *shape_make(const char *shape, const char *options)
 {
     static char text[512];
     sdm_named_text given[16];
@@ -68,7 +68,7 @@ static double distance_at(const sdm_instance *s, const double *p, const double x
     return d;
 }
 
-// a random number of this test in [lo, hi]
+// The next random number in [lo, hi].
 static double random_in(double lo, double hi)
 {
     static uint64_t index;
@@ -103,14 +103,14 @@ static sdm_audit audit_closed(const sdm_mesh *m)
     return a;
 }
 
-/* Volume and area of a shape at fine edges, and their closed forms. The mesh is inscribed: both are
-   too small, by a share of order edge^2. */
-static void check_size(const char *shape, const char *fine, const char *coarse, const double *p,
+/* Compares volume and area of two meshes, the second with edges twice as long, with the closed
+ * forms. Meshes are inscribed: the relative error is positive and of order edge^2. */
+static void size_check(const char *shape, const char *fine, const char *coarse, const double *p,
                        double volume, double area)
 {
     double error[2];
     for (int i = 0; i < 2; i++) {
-        sdm_instance *s = make(shape, i ? coarse : fine);
+        sdm_instance *s = shape_make(shape, i ? coarse : fine);
         sdm_mesh m = {0};
         mesh_at(s, p, &m);
         const sdm_audit a = audit_closed(&m);
@@ -121,25 +121,28 @@ static void check_size(const char *shape, const char *fine, const char *coarse, 
         sdm_mesh_dispose(&m);
         sdm_instance_free(s);
     }
-    assert_true(error[1] / error[0] > 3 &&
-                error[1] / error[0] < 5); // edges twice as long, error four times
+    // Edges twice as long: four times the error.
+    assert_true(error[1] / error[0] > 3 && error[1] / error[0] < 5);
 }
 
-static void test_sizes(void **state)
+static void test_volumes_and_areas(void **state)
 {
     (void)state;
     const double torus[] = {3.2, 0.9}, capsule[] = {1.3, 4.4}, ball[] = {2.5, 2.5, 2.5},
                  egg[] = {3.5, 2.8, 2.2};
-    check_size("torus", "edge=0.1", "edge=0.2", torus, 2 * PI * PI * 3.2 * 0.81,
+    size_check("torus", "edge=0.1", "edge=0.2", torus, 2 * PI * PI * 3.2 * 0.81,
                4 * PI * PI * 3.2 * 0.9);
-    check_size("capsule", "edge=0.1", "edge=0.2", capsule,
+    size_check("capsule", "edge=0.1", "edge=0.2", capsule,
                PI * 1.69 * 4.4 + 4 * PI / 3 * 1.3 * 1.69, 2 * PI * 1.3 * 4.4 + 4 * PI * 1.69);
-    check_size("ellipsoid", "edge=0.15", "edge=0.3", ball, 4 * PI / 3 * 2.5 * 2.5 * 2.5,
+    size_check("ellipsoid", "edge=0.15", "edge=0.3", ball, 4 * PI / 3 * 2.5 * 2.5 * 2.5,
                4 * PI * 6.25);
-    check_size("ellipsoid", "edge=0.15", "edge=0.3", egg, 4 * PI / 3 * 3.5 * 2.8 * 2.2, 0);
+    size_check("ellipsoid", "edge=0.15", "edge=0.3", egg, 4 * PI / 3 * 3.5 * 2.8 * 2.2, 0);
 }
 
-static double beta(double x, double y) { return exp(lgamma(x) + lgamma(y) - lgamma(x + y)); }
+static double beta_function(double x, double y)
+{
+    return exp(lgamma(x) + lgamma(y) - lgamma(x + y));
+}
 
 static void test_superquadric_volume(void **state)
 {
@@ -148,12 +151,13 @@ static void test_superquadric_volume(void **state)
     for (size_t i = 0; i < sizeof E / sizeof *E; i++) {
         char options[64];
         snprintf(options, sizeof options, "edge=0.1 e1=%g e2=%g", E[i][0], E[i][1]);
-        sdm_instance *s = make("ellipsoid", options);
+        sdm_instance *s = shape_make("ellipsoid", options);
         const double p[3] = {4, 3, 2};
         sdm_mesh m = {0};
         mesh_at(s, p, &m);
         const double exact = 2 * p[0] * p[1] * p[2] * E[i][0] * E[i][1] *
-                             beta(E[i][0] / 2 + 1, E[i][0]) * beta(E[i][1] / 2, E[i][1] / 2);
+                             beta_function(E[i][0] / 2 + 1, E[i][0]) *
+                             beta_function(E[i][1] / 2, E[i][1] / 2);
         assert_true(fabs(audit_closed(&m).volume / exact - 1) < 0.006);
         for (size_t v = 0; v < m.n_vert; v++) {
             const double *x = m.vert + 3 * v, e1 = E[i][0], e2 = E[i][1];
@@ -175,13 +179,13 @@ static void test_superquadric_volume(void **state)
     }
 }
 
-// vertices are on the surface by the closed form, at random parameters
+// Vertices lie on the surface according to the closed form, at random parameters.
 static void test_vertices_on_surface(void **state)
 {
     (void)state;
     static const char *const NAMES[] = {"ellipsoid", "torus", "capsule"};
     for (size_t k = 0; k < 3; k++) {
-        sdm_instance *s = make(NAMES[k], "");
+        sdm_instance *s = shape_make(NAMES[k], "");
         sdm_mesh m = {0};
         for (int i = 0; i < 20; i++) {
             double p[3];
@@ -196,8 +200,8 @@ static void test_vertices_on_surface(void **state)
     }
 }
 
-// least distance to samples of the surface, 1e-3 apart in both angles, refined twice about the
-// nearest
+// Unsigned distance from x to an ellipsoid with semi-axes r: the minimum over a grid of surface
+// points, refined eight times around the nearest point.
 static double sampled_distance(const double r[3], const double x[3])
 {
     double lo[2] = {-PI / 2, 0}, hi[2] = {PI / 2, 2 * PI}, best = INFINITY, at[2] = {0, 0};
@@ -223,11 +227,11 @@ static double sampled_distance(const double r[3], const double x[3])
 static void test_ellipsoid_distance(void **state)
 {
     (void)state;
-    sdm_instance *s = make("ellipsoid", "");
+    sdm_instance *s = shape_make("ellipsoid", "");
     double p[3];
     for (int i = 0; i < 60; i++) {
         random_params(s, p);
-        if (i % 4 == 1) p[1] = p[0] < 4 ? p[0] : (p[0] = 4); // of revolution
+        if (i % 4 == 1) p[1] = p[0] < 4 ? p[0] : (p[0] = 4); // an ellipsoid of revolution
         if (i % 4 == 2) p[0] = p[1] = p[2] = 2.5;            // a ball
         double x[3];
         for (int k = 0; k < 3; k++) x[k] = random_in(-5, 5) * (i % 3 ? 1 : 0.2);
@@ -238,10 +242,10 @@ static void test_ellipsoid_distance(void **state)
         const double level =
             x[0] * x[0] / (p[0] * p[0]) + x[1] * x[1] / (p[1] * p[1]) + x[2] * x[2] / (p[2] * p[2]);
         assert_true(level < 1 ? d < 0 : d >= 0);
-        assert_true(fabs(d) <= sampled + 1e-12); // no sample may be nearer ...
-        assert_true(fabs(d) >= sampled - 1e-7);  // ... and one comes close
+        assert_true(fabs(d) <= sampled + 1e-12); // no sample may be nearer than the distance ...
+        assert_true(fabs(d) >= sampled - 1e-7);  // ... and the nearest sample comes close to it
     }
-    // far away, and next to the plane of the long axes
+    // Far away, and close to the plane of the two longest axes.
     const double egg[3] = {5, 3, 1}, far[3] = {3e6, 0, 0}, flat[3] = {0.5, 0, 1e-300},
                  on[3] = {0, 0, 1};
     assert_true(fabs(distance_at(s, egg, far) - (3e6 - 5)) < 1e-6);
@@ -251,11 +255,11 @@ static void test_ellipsoid_distance(void **state)
     sdm_instance_free(s);
 }
 
-// velocities by the shape against differences by the host, which it uses when the callback is
-// missing
-static void check_velocity(const char *shape, const char *options, int rounds, double bound)
+// The velocity callback of the shape against the registry's finite differences, which are used when
+// the callback is missing.
+static void velocity_check(const char *shape, const char *options, int rounds, double bound)
 {
-    sdm_instance *s = make(shape, options);
+    sdm_instance *s = shape_make(shape, options);
     sdm_shape without = *sdm_instance_shape(s);
     without.velocity = NULL;
     assert_non_null(sdm_instance_shape(s)->velocity);
@@ -265,7 +269,7 @@ static void check_velocity(const char *shape, const char *options, int rounds, d
     assert_int_equal(sdm_registry_add(other, &without, "test", NULL), SDM_OK);
     sdm_registry *held = registry;
     registry = other;
-    sdm_instance *plain = make(shape, options);
+    sdm_instance *plain = shape_make(shape, options);
     registry = held;
 
     sdm_mesh m = {0};
@@ -297,19 +301,19 @@ static void check_velocity(const char *shape, const char *options, int rounds, d
     sdm_registry_free(other);
 }
 
-static void test_velocities(void **state)
+static void test_velocities_match_differences(void **state)
 {
     (void)state;
-    check_velocity("torus", "edge=0.5", 4, 1e-9);
-    check_velocity("capsule", "edge=0.5", 4, 1e-9);
-    check_velocity("ellipsoid", "edge=0.6 e1=0.7 e2=1.3", 4, 1e-9);
-    check_velocity("cochlea", "", 12, 1e-6);
-    check_velocity("cochlea", "ear=left start=cubic section=ellipse", 8, 1e-6);
-    check_velocity("cochlea", "free=anatomy", 8, 1e-6);
-    check_velocity("cochlea", "free=anatomy ear=left start=cubic section=ellipse", 8, 2e-5);
+    velocity_check("torus", "edge=0.5", 4, 1e-9);
+    velocity_check("capsule", "edge=0.5", 4, 1e-9);
+    velocity_check("ellipsoid", "edge=0.6 e1=0.7 e2=1.3", 4, 1e-9);
+    velocity_check("cochlea", "", 12, 1e-6);
+    velocity_check("cochlea", "ear=left start=cubic section=ellipse", 8, 1e-6);
+    velocity_check("cochlea", "free=anatomy", 8, 1e-6);
+    velocity_check("cochlea", "free=anatomy ear=left start=cubic section=ellipse", 8, 2e-5);
 }
 
-/* The layout of the cochlea's mesh, found from its triangles: a pole, rings, a pole. */
+/* Sectors of the cochlea's mesh (pole, rings, pole): the number of triangles at vertex 0. */
 static size_t count_sectors(const sdm_mesh *m)
 {
     size_t n = 0;
@@ -331,8 +335,9 @@ typedef struct edges {
 
 static void add_edges(const sdm_mesh *m, edges *e)
 {
+    // Each edge of a closed mesh is visited twice.
     for (size_t i = 0; i < m->n_tri; i++)
-        for (size_t a = 0; a < 3; a++) { // every edge of a closed mesh comes twice
+        for (size_t a = 0; a < 3; a++) {
             const double *x = m->vert + 3 * m->tri[3 * i + a],
                          *y = m->vert + 3 * m->tri[3 * i + (a + 1) % 3];
             const double d2 = (x[0] - y[0]) * (x[0] - y[0]) + (x[1] - y[1]) * (x[1] - y[1]) +
@@ -341,10 +346,10 @@ static void add_edges(const sdm_mesh *m, edges *e)
         }
 }
 
-static void test_cochlea_mesh(void **state)
+static void test_cochlea_mesh_is_regular(void **state)
 {
     (void)state;
-    sdm_instance *s = make("cochlea", "");
+    sdm_instance *s = shape_make("cochlea", "");
     double p[4];
     sdm_mesh m = {0};
     edges all = {0}, one = {0};
@@ -357,7 +362,7 @@ static void test_cochlea_mesh(void **state)
     for (int i = 0; i < 40; i++) {
         random_params(s, p);
         mesh_at(s, p, &m);
-        assert_int_equal(m.n_tri, 3420); // the topology does not depend on the parameters
+        assert_int_equal(m.n_tri, 3420); // the number of triangles does not depend on parameters
         audit_closed(&m);
         add_edges(&m, &all);
     }
@@ -365,8 +370,8 @@ static void test_cochlea_mesh(void **state)
     assert_true(mean > 0.30 && mean < 0.37);
     assert_true(deviation < 0.15);
 
-    // half the edge: four times the triangles
-    sdm_instance *fine = make("cochlea", "edge=0.15");
+    // Half the edge length gives four times the triangles.
+    sdm_instance *fine = shape_make("cochlea", "edge=0.15");
     mesh_at(fine, p, &m);
     assert_in_range(m.n_tri, 3420 * 36 / 10, 3420 * 44 / 10);
     sdm_mesh_dispose(&m);
@@ -376,7 +381,7 @@ static void test_cochlea_mesh(void **state)
 
 static void extent(const char *options, const double *p, double size[3])
 {
-    sdm_instance *s = make("cochlea", options);
+    sdm_instance *s = shape_make("cochlea", options);
     sdm_mesh m = {0};
     mesh_at(s, p, &m);
     const sdm_audit a = audit_closed(&m);
@@ -385,29 +390,29 @@ static void extent(const char *options, const double *p, double size[3])
     sdm_instance_free(s);
 }
 
-static void test_cochlea_extents(void **state)
+static void test_cochlea_bounding_boxes(void **state)
 {
     (void)state;
-    // the corner that leaves the paper's box, without the widening of the basal end: 11.4 x 10.7
-    // x 5.1 mm
+    // Extreme parameters, which exceed the box stated in the paper: with flare=0 (no widening at
+    // the basal end) the cochlea measures 11.4 x 10.7 x 5.1 mm.
     const double large[4] = {5, 0, 0.05, 0}, nominal[4] = {4.4, 0.5, 0.145, 0.4};
     double size[3];
     extent("flare=0 edge=0.1", large, size);
     assert_true(fabs(size[0] - 11.4) < 0.1 && fabs(size[1] - 10.7) < 0.1 &&
                 fabs(size[2] - 5.1) < 0.3);
-    extent("", nominal,
-           size); // a real cochlea: 9.2 x 6.8 x 4 to 4.5 mm at the inner wall, by the axis through
-                  // its apex
+    // Real cochleas: 9.2 x 6.8 x 4 to 4.5 mm at the inner wall, along the axis through the
+    // apex.
+    extent("", nominal, size);
     assert_true(fabs(size[0] - 9.6) < 0.1 && fabs(size[1] - 7.9) < 0.1 &&
                 fabs(size[2] - 4.6) < 0.1);
 }
 
-static void test_cochlea_tube(void **state)
+static void test_cochlea_vertices_on_tube(void **state)
 {
     (void)state;
-    // without the widening the radius changes by 0.02 mm per radian, and the swept ball is the tube
-    // to some micrometres
-    sdm_instance *s = make("cochlea", "flare=0");
+    // With flare=0 the tube's radius changes by only 0.02 mm per radian, so the union of balls
+    // along the centreline equals the tube up to a few micrometres.
+    sdm_instance *s = shape_make("cochlea", "flare=0");
     sdm_mesh m = {0};
     for (int i = 0; i < 12; i++) {
         double p[4];
@@ -419,7 +424,8 @@ static void test_cochlea_tube(void **state)
             assert_true(d < 1e-9);
             on += d > -4e-3;
         }
-        assert_true(on > m.n_vert * 55 / 100); // the others are where the tube overlaps itself
+        // the other vertices are inside, where the tube overlaps itself
+        assert_true(on > m.n_vert * 55 / 100);
         assert_true(fabs(distance_at(s, p, m.vert)) < 1e-5);
         assert_true(fabs(distance_at(s, p, m.vert + 3 * (m.n_vert - 1))) < 2e-5);
     }
@@ -427,11 +433,11 @@ static void test_cochlea_tube(void **state)
     sdm_instance_free(s);
 }
 
-// the oracle itself against the least over a very fine walk along the centreline
-static void test_cochlea_distance(void **state)
+// The distance of the cochlea against the minimum over a very fine walk along its centreline.
+static void test_cochlea_distance_matches_search(void **state)
 {
     (void)state;
-    sdm_instance *s = make("cochlea", "");
+    sdm_instance *s = shape_make("cochlea", "");
     for (int i = 0; i < 30; i++) {
         double p[4], x[3] = {random_in(-6, 7), random_in(-6, 6), random_in(-3, 6)}, best = INFINITY;
         random_params(s, p);
@@ -448,7 +454,7 @@ static void test_cochlea_distance(void **state)
     sdm_instance_free(s);
 }
 
-// how often the mesh winds about x (van Oosterom and Strackee 1983)
+// Winding number of the mesh about x (van Oosterom and Strackee 1983).
 static int winding(const sdm_mesh *m, const double x[3])
 {
     double sum = 0;
@@ -470,12 +476,13 @@ static int winding(const sdm_mesh *m, const double x[3])
     return (int)lrint(sum / (4 * PI));
 }
 
-static void test_cochlea_encloses(void **state)
+static void test_cochlea_encloses_its_tube(void **state)
 {
     (void)state;
-    sdm_instance *s = make("cochlea", "");
+    sdm_instance *s = shape_make("cochlea", "");
     sdm_mesh m = {0};
-    // deep inside near the apex, where whole sections would run backwards and leave holes
+    // Points (last three numbers) deep inside near the apex; a mesh whose sections ran backwards
+    // there would have holes.
     static const double HOLES[][7] = {{2.605, 1.121, 0.237, -0.390, -0.060, 0.628, 1.967},
                                       {2.248, 0.801, 0.245, 0.273, 0.517, 0.471, 1.827},
                                       {2.527, 0.211, 0.239, 0.178, -0.662, 0.214, 2.324},
@@ -486,8 +493,8 @@ static void test_cochlea_encloses(void **state)
         assert_true(distance_at(s, HOLES[i], HOLES[i] + 4) < -0.25);
         assert_true(winding(&m, HOLES[i] + 4) >= 1);
     }
-    // everywhere: inside the swept ball it winds once or more, outside never; the tube's wall is
-    // left out
+    // Random points, except near the tube's wall: winding number >= 1 inside of the union of balls,
+    // 0 outside.
     for (int i = 0; i < 12; i++) {
         double p[4];
         random_params(s, p);
@@ -505,10 +512,11 @@ static void test_cochlea_encloses(void **state)
     sdm_instance_free(s);
 }
 
-static void test_cochlea_ear(void **state)
+static void test_cochlea_ears_are_mirrored(void **state)
 {
     (void)state;
-    sdm_instance *right = make("cochlea", "ear=right"), *left = make("cochlea", "ear=left");
+    sdm_instance *right = shape_make("cochlea", "ear=right"),
+                 *left = shape_make("cochlea", "ear=left");
     double p[4];
     random_params(right, p);
     sdm_mesh r = {0}, l = {0};
@@ -520,7 +528,7 @@ static void test_cochlea_ear(void **state)
         assert_true(r.vert[3 * v + 2] == l.vert[3 * v + 2]);
     }
     assert_true(fabs(audit_closed(&r).volume - audit_closed(&l).volume) <
-                1e-9); // not turned inside out
+                1e-9); // the mirrored mesh is not inside out
     const double x[3] = {1, 2, 0.5}, y[3] = {1, -2, 0.5};
     assert_true(distance_at(right, p, x) == distance_at(left, p, y));
     sdm_mesh_dispose(&r);
@@ -529,11 +537,11 @@ static void test_cochlea_ear(void **state)
     sdm_instance_free(left);
 }
 
-// radius of the centreline at theta = 0: of the ring, whole and across the tangent, that comes
-// nearest to `radius`
+// Distance from the point of radius `radius` on the centreline at theta = 0 to the nearest ring
+// centre.
 static double start_error(const char *options, double radius)
 {
-    sdm_instance *s = make("cochlea", options);
+    sdm_instance *s = shape_make("cochlea", options);
     double p[4], best = INFINITY;
     default_params(s, p);
     sdm_mesh m = {0};
@@ -548,7 +556,7 @@ static double start_error(const char *options, double radius)
     return best;
 }
 
-static void test_cochlea_start(void **state)
+static void test_cochlea_start_of_centreline(void **state)
 {
     (void)state;
     assert_true(start_error("", 4.4) < 1e-12);
@@ -556,8 +564,10 @@ static void test_cochlea_start(void **state)
     assert_true(start_error("start=cubic p0=6", 6) < 1e-12);
     assert_true(start_error("start=cubic", 4.4) > 0.1);
 
-    // behind theta2 nothing changes: the apical rings are the same
-    sdm_instance *a = make("cochlea", "theta=14.5"), *b = make("cochlea", "start=cubic theta2=1");
+    // Beyond theta2 both forms of the start have the same centreline, so apical distances are
+    // equal.
+    sdm_instance *a = shape_make("cochlea", "theta=14.5"),
+                 *b = shape_make("cochlea", "start=cubic theta2=1");
     const double p[4] = {4, 0.3, 0.1, 0};
     const double x[3] = {-2, -1, 3};
     assert_true(distance_at(a, p, x) == distance_at(b, p, x));
@@ -565,13 +575,13 @@ static void test_cochlea_start(void **state)
     sdm_instance_free(b);
 }
 
-static double norm(const double *x, const double *y)
+static double point_distance(const double *x, const double *y)
 {
     return sqrt((x[0] - y[0]) * (x[0] - y[0]) + (x[1] - y[1]) * (x[1] - y[1]) +
                 (x[2] - y[2]) * (x[2] - y[2]));
 }
 
-// largest and least distance of a ring's vertices from its centre
+// axes: largest and smallest distance of a ring's vertices from its centre.
 static void ring_axes(const sdm_mesh *m, size_t ring, double axes[2])
 {
     const size_t n = count_sectors(m);
@@ -579,15 +589,15 @@ static void ring_axes(const sdm_mesh *m, size_t ring, double axes[2])
     ring_centre(m, ring, c);
     axes[0] = 0, axes[1] = INFINITY;
     for (size_t j = 0; j < n; j++) {
-        const double d = norm(m->vert + 3 * (1 + ring * n + j), c);
+        const double d = point_distance(m->vert + 3 * (1 + ring * n + j), c);
         axes[0] = fmax(axes[0], d), axes[1] = fmin(axes[1], d);
     }
 }
 
-static void test_cochlea_section(void **state)
+static void test_cochlea_elliptic_section(void **state)
 {
     (void)state;
-    sdm_instance *s = make("cochlea", "section=ellipse ratio=0.6 edge=0.1");
+    sdm_instance *s = shape_make("cochlea", "section=ellipse ratio=0.6 edge=0.1");
     double p[4], axes[2];
     default_params(s, p);
     sdm_mesh m = {0};
@@ -595,7 +605,7 @@ static void test_cochlea_section(void **state)
     audit_closed(&m);
     const size_t n_rings = (m.n_vert - 2) / count_sectors(&m);
 
-    // the ring at theta = 0 is the widest of the first
+    // The ring at theta = 0 is the widest of the first 40.
     size_t first = 0;
     double widest = 0;
     for (size_t i = 0; i < 40; i++) {
@@ -604,14 +614,15 @@ static void test_cochlea_section(void **state)
     }
     ring_axes(&m, first, axes);
     assert_true(fabs(axes[0] - 1.36) < 0.01 && fabs(axes[1] / axes[0] - 0.6) < 0.01);
-    ring_axes(&m, n_rings * 65 / 100, axes); // behind the first turn it is round
+    // Beyond the first turn sections are round.
+    ring_axes(&m, n_rings * 65 / 100, axes);
     assert_true(fabs(axes[1] / axes[0] - 1) < 1e-9);
     sdm_mesh_dispose(&m);
     sdm_instance_free(s);
 }
 
-// parameters of the anatomy mean what the options of the same names do
-static void test_cochlea_free(void **state)
+// With free=anatomy, options become parameters of the same names and with the same effect.
+static void test_cochlea_anatomy_parameters(void **state)
 {
     (void)state;
     static const char *const NAMES[] = {"a",     "alpha", "b",      "phi", "c",
@@ -621,7 +632,7 @@ static void test_cochlea_free(void **state)
         size_t n;
     } CASES[] = {{"", 4}, {"start=cubic", 4}, {"free=anatomy", 7}, {"free=anatomy start=cubic", 9}};
     for (size_t i = 0; i < 4; i++) {
-        sdm_instance *s = make("cochlea", CASES[i].options);
+        sdm_instance *s = shape_make("cochlea", CASES[i].options);
         size_t n;
         const sdm_param *params = sdm_instance_params(s, &n);
         assert_int_equal(n, CASES[i].n);
@@ -629,12 +640,12 @@ static void test_cochlea_free(void **state)
         sdm_instance_free(s);
     }
 
-    sdm_instance *s = make("cochlea", "free=anatomy start=cubic c=0.17 p0=5");
+    sdm_instance *s = shape_make("cochlea", "free=anatomy start=cubic c=0.17 p0=5");
     double p[9];
     default_params(s, p);
     assert_true(p[4] == 0.17 && p[5] == 0.3 && p[6] == 14.5 && p[8] == 5);
     sdm_mesh m = {0}, fixed_mesh = {0};
-    sdm_instance *fixed = make("cochlea", "start=cubic c=0.17 p0=5");
+    sdm_instance *fixed = shape_make("cochlea", "start=cubic c=0.17 p0=5");
     mesh_at(s, p, &m);
     mesh_at(fixed, p, &fixed_mesh);
     assert_int_equal(m.n_vert, fixed_mesh.n_vert);
@@ -646,7 +657,7 @@ static void test_cochlea_free(void **state)
         snprintf(options, sizeof options,
                  "start=cubic c=%.17g kappa=%.17g theta=%.17g theta2=%.17g p0=%.17g", p[4], p[5],
                  p[6], p[7], p[8]);
-        fixed = make("cochlea", options);
+        fixed = shape_make("cochlea", options);
         mesh_at(s, p, &m);
         (void)audit_closed(&m);
         for (int k = 0; k < 60; k++) {
@@ -664,7 +675,7 @@ static void test_cochlea_free(void **state)
     sdm_instance_free(s);
 }
 
-static void refused(const char *options, const char *reason)
+static void shape_refused(const char *options, const char *reason)
 {
     sdm_named_text given[4];
     size_t n = 0;
@@ -684,7 +695,7 @@ static void refused(const char *options, const char *reason)
     if (!strstr(err.text, reason)) fail_msg("%s", err.text);
 }
 
-static void test_cochlea_refused(void **state)
+static void test_bad_cochlea_options_are_refused(void **state)
 {
     (void)state;
     const sdm_named_text thin[] = {{"taper", "0.1"}};
@@ -694,12 +705,12 @@ static void test_cochlea_refused(void **state)
     assert_int_equal(sdm_instance_create(cochlea, thin, 1, NULL, &s, &err), SDM_E_PLUGIN);
     assert_null(s);
     assert_non_null(strstr(err.text, "shape 'cochlea': tube radius -0.34 mm at the apex"));
-    refused("c=0.5 free=anatomy",
-            "c = 0.5, but with free = anatomy it is a parameter: need 0.14 to 0.26");
-    // at the largest angle, not only at the default's
-    refused("taper=0.07 free=anatomy", "tube radius -0.059 mm at the apex");
+    shape_refused("c=0.5 free=anatomy",
+                  "c = 0.5, but with free = anatomy it is a parameter: need 0.14 to 0.26");
+    // Refused because of the largest angle in the range, although the default angle would be valid.
+    shape_refused("taper=0.07 free=anatomy", "tube radius -0.059 mm at the apex");
 
-    s = make("cochlea", "section=ellipse");
+    s = shape_make("cochlea", "section=ellipse");
     double p[4], d;
     const double x[3] = {0};
     default_params(s, p);
@@ -712,21 +723,21 @@ static void test_cochlea_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sizes),
+        cmocka_unit_test(test_volumes_and_areas),
         cmocka_unit_test(test_superquadric_volume),
         cmocka_unit_test(test_vertices_on_surface),
         cmocka_unit_test(test_ellipsoid_distance),
-        cmocka_unit_test(test_velocities),
-        cmocka_unit_test(test_cochlea_mesh),
-        cmocka_unit_test(test_cochlea_extents),
-        cmocka_unit_test(test_cochlea_tube),
-        cmocka_unit_test(test_cochlea_distance),
-        cmocka_unit_test(test_cochlea_encloses),
-        cmocka_unit_test(test_cochlea_ear),
-        cmocka_unit_test(test_cochlea_start),
-        cmocka_unit_test(test_cochlea_section),
-        cmocka_unit_test(test_cochlea_free),
-        cmocka_unit_test(test_cochlea_refused),
+        cmocka_unit_test(test_velocities_match_differences),
+        cmocka_unit_test(test_cochlea_mesh_is_regular),
+        cmocka_unit_test(test_cochlea_bounding_boxes),
+        cmocka_unit_test(test_cochlea_vertices_on_tube),
+        cmocka_unit_test(test_cochlea_distance_matches_search),
+        cmocka_unit_test(test_cochlea_encloses_its_tube),
+        cmocka_unit_test(test_cochlea_ears_are_mirrored),
+        cmocka_unit_test(test_cochlea_start_of_centreline),
+        cmocka_unit_test(test_cochlea_elliptic_section),
+        cmocka_unit_test(test_cochlea_anatomy_parameters),
+        cmocka_unit_test(test_bad_cochlea_options_are_refused),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

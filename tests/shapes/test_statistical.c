@@ -1,4 +1,5 @@
-/* The statistical shape: models from files, and every way in which the files may not fit together.
+/* The statistical shape: models read from files, and every way in which files can contradict each
+ * other.
  * Tests: statistical.c */
 #include <math.h>
 #include <setjmp.h>
@@ -17,7 +18,7 @@
 #include "sdm/meshfile.h"
 
 #ifndef MODEL_FOLDER
-#define MODEL_FOLDER "model" /* where make_model has written */
+#define MODEL_FOLDER "model" /* folder with the output of make_model */
 #endif
 #define N_VERT 6
 
@@ -31,7 +32,8 @@ static void write_array(const char *path, const float *values, size_t n0, size_t
     assert_int_equal(sdm_npy_write(path, values, size, n1 ? n2 ? 3 : 2 : 1, &err), SDM_OK);
 }
 
-// an octahedron with three modes of whole numbers, so that sums are exact
+// Writes the model files: an octahedron and three modes whose numbers are multiples of 1/8, so that
+// sums are exact.
 static int set_up(void **state)
 {
     (void)state;
@@ -66,9 +68,10 @@ static int tear_down(void **state)
     return 0;
 }
 
-// modes and deviations by their short names, NULL for none
-static sdm_status make(const char *modes, const char *deviations, const char *count,
-                       const char *limit, sdm_instance **out)
+// Creates an instance. modes, deviations: the middle part of the names of the files; NULL omits an
+// option.
+static sdm_status statistical_make(const char *modes, const char *deviations, const char *count,
+                                   const char *limit, sdm_instance **out)
 {
     char files[2][64];
     sdm_named_text given[5] = {{"mean", "statistical_mean.ply"}};
@@ -95,7 +98,7 @@ static double mode_number(size_t mode, size_t i)
     return ((double)((mode * 3 * N_VERT + i) % 7) - 3) / 8;
 }
 
-static void test_sum(void **state)
+static void test_mesh_is_mean_plus_modes(void **state)
 {
     (void)state;
     static const char *const MODES[] = {"modes", "flat"};
@@ -103,8 +106,9 @@ static void test_sum(void **state)
     for (int flat = 0; flat < 2; flat++)
         for (int scaled = 0; scaled < 2; scaled++) {
             sdm_instance *s = NULL;
-            assert_int_equal(make(MODES[flat], scaled ? "deviations" : NULL, NULL, NULL, &s),
-                             SDM_OK);
+            assert_int_equal(
+                statistical_make(MODES[flat], scaled ? "deviations" : NULL, NULL, NULL, &s),
+                SDM_OK);
             size_t n = 0;
             const sdm_param *params = sdm_instance_params(s, &n);
             assert_int_equal(n, 3);
@@ -136,7 +140,7 @@ static void test_count_and_limit(void **state)
 {
     (void)state;
     sdm_instance *s = NULL;
-    assert_int_equal(make("modes", NULL, "2", "1.5", &s), SDM_OK);
+    assert_int_equal(statistical_make("modes", NULL, "2", "1.5", &s), SDM_OK);
     size_t n = 0;
     const sdm_param *params = sdm_instance_params(s, &n);
     assert_int_equal(n, 2);
@@ -148,7 +152,7 @@ static void test_count_and_limit(void **state)
     sdm_instance_free(s);
 }
 
-static void test_refused(void **state)
+static void test_contradictory_files_are_refused(void **state)
 {
     (void)state;
     static const char *const BAD[][4] = {
@@ -173,7 +177,7 @@ static void test_refused(void **state)
     };
     for (size_t i = 0; i < sizeof BAD / sizeof *BAD; i++) {
         sdm_instance *s = NULL;
-        assert_int_equal(make(BAD[i][0], BAD[i][1], BAD[i][2], NULL, &s), SDM_E_PLUGIN);
+        assert_int_equal(statistical_make(BAD[i][0], BAD[i][1], BAD[i][2], NULL, &s), SDM_E_PLUGIN);
         assert_null(s);
         assert_memory_equal(err.text, "shape 'statistical': ", 21);
         if (!strstr(err.text, BAD[i][3])) fail_msg("'%s' is not in '%s'", BAD[i][3], err.text);
@@ -186,7 +190,7 @@ static void test_refused(void **state)
     assert_non_null(strstr(err.text, "/there/is/none.ply"));
 }
 
-// more modes than parameters can be: refused unless count says how many
+// More modes than a shape may have parameters: refused unless the option `count` limits them.
 static void test_many_modes(void **state)
 {
     (void)state;
@@ -194,16 +198,16 @@ static void test_many_modes(void **state)
     for (size_t i = 0; i < 70; i++) many[i][i % (3 * N_VERT)] = 1;
     write_array("statistical_many.npy", many[0], 70, 3 * N_VERT, 0);
     sdm_instance *s = NULL;
-    assert_int_equal(make("many", NULL, NULL, NULL, &s), SDM_E_PLUGIN);
+    assert_int_equal(statistical_make("many", NULL, NULL, NULL, &s), SDM_E_PLUGIN);
     assert_non_null(strstr(err.text, "has 70 modes, at most 64 can be used: set count"));
-    assert_int_equal(make("many", NULL, "64", NULL, &s), SDM_OK);
+    assert_int_equal(statistical_make("many", NULL, "64", NULL, &s), SDM_OK);
     size_t n = 0;
     assert_string_equal(sdm_instance_params(s, &n)[63].name, "m64");
     sdm_instance_free(s);
 }
 
-// the model of examples/statistical: a good mesh at two standard deviations of everything,
-// orthonormal modes
+// The model of examples/statistical: a valid mesh with all parameters at two standard deviations,
+// and orthonormal modes.
 static void test_example(void **state)
 {
     (void)state;
@@ -246,8 +250,10 @@ static void test_example(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sum),     cmocka_unit_test(test_count_and_limit),
-        cmocka_unit_test(test_refused), cmocka_unit_test(test_many_modes),
+        cmocka_unit_test(test_mesh_is_mean_plus_modes),
+        cmocka_unit_test(test_count_and_limit),
+        cmocka_unit_test(test_contradictory_files_are_refused),
+        cmocka_unit_test(test_many_modes),
         cmocka_unit_test(test_example),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

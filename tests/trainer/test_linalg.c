@@ -1,5 +1,5 @@
-/* Eigenvectors, factorisations, orthonormal bases and samples of the trainer against their
- * definitions.
+/* Linear algebra of the trainer (eigenvectors, factorisations, orthonormal bases) and its
+ * quasi-random samples, against their definitions.
  * Tests: linalg.c sampling.c */
 #include <math.h>
 #include <setjmp.h>
@@ -15,7 +15,7 @@
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"
 
-static void eigenvectors(void **state)
+static void eigenvectors_satisfy_their_equation(void **state)
 {
     (void)state;
     const size_t sizes[] = {1, 2, 3, 40};
@@ -44,12 +44,13 @@ static void eigenvectors(void **state)
         sdm_free(a0);
         sdm_free(v);
     }
-    double diagonal[9] = {2, 0, 0, 0, 3, 0, 0, 0, 1}, values[3]; // already diagonal, repeated zeros
+    // already diagonal, with repeated zeros
+    double diagonal[9] = {2, 0, 0, 0, 3, 0, 0, 0, 1}, values[3];
     assert_int_equal(trainer_eigen_symmetric(3, diagonal, values, NULL), 0);
     assert_true(values[0] == 3 && values[1] == 2 && values[2] == 1);
 }
 
-static void solve(void **state)
+static void solutions_satisfy_the_system(void **state)
 {
     (void)state;
     enum { N = 20 };
@@ -74,11 +75,11 @@ static void solve(void **state)
     assert_int_equal(trainer_cholesky(2, indefinite), 2);
 }
 
-static void spaces(void **state)
+static void leading_spaces_are_found(void **state)
 {
     (void)state;
     enum { N = 60, K = 12 };
-    // covariance with known eigenvectors: a rotation of a decaying spectrum
+    // A covariance matrix with known eigenvectors: eigenvalues 0.6^k in a rotated basis.
     float *q, *c, *basis;
     double values[K];
     assert_int_equal(SDM_ALLOC(&q, N * N, "q", NULL), 0);
@@ -100,7 +101,7 @@ static void spaces(void **state)
         for (size_t i = 0; i < N; i++) along += (double)basis[k * N + i] * q[k * N + i];
         assert_true(fabs(fabs(along) - 1) < 1e-3);
     }
-    // rows with a huge spread of size, one of them zero, span the same space afterwards
+    // Rows of very different size, one of them zero: the orthonormal basis spans the same space.
     float *rows, *one, *two;
     assert_int_equal(SDM_ALLOC(&rows, 8 * N, "r", NULL), 0);
     for (size_t i = 0; i < 7 * N; i++)
@@ -112,7 +113,7 @@ static void spaces(void **state)
             for (size_t k = 0; k < N; k++) dot += (double)rows[i * N + k] * rows[j * N + k];
             assert_true(fabs(dot - (i == j)) < 1e-5);
         }
-    // the same bits for any number of threads
+    // Any number of threads gives the same bits.
     assert_int_equal(SDM_ALLOC(&one, K * N, "1", NULL), 0);
     assert_int_equal(SDM_ALLOC(&two, K * N, "2", NULL), 0);
     assert_int_equal(trainer_leading_space(N, N, c, K, 9, 0, 1, one, NULL), 0);
@@ -126,9 +127,9 @@ static void spaces(void **state)
     sdm_free(two);
 }
 
-// every box of a 2^-d partition holds its share of the first points of a Sobol' sequence, whatever
-// the digital shift
-static void stratified_samples(void **state)
+// Each of the 2^d boxes that halve every dimension holds the same number of the first points of a
+// Sobol' sequence, also after the digital shift.
+static void samples_are_stratified(void **state)
 {
     (void)state;
     const double min[4] = {0, 0, 0, 0}, max[4] = {1, 1, 1, 1};
@@ -144,7 +145,7 @@ static void stratified_samples(void **state)
     for (int b = 0; b < 16; b++) assert_int_equal(in_box[b], 64);
     for (int d = 0; d < 16; d++)
         for (int s = 0; s < 64; s++) assert_int_equal(in_slice[d][s], 16);
-    // ranges, and many dimensions
+    // Samples stay in their ranges, also in many dimensions.
     double wide[20], lo[20], hi[20], sum = 0;
     for (int d = 0; d < 20; d++) lo[d] = -3, hi[d] = 5;
     for (uint64_t i = 0; i < 500; i++) {
@@ -159,8 +160,9 @@ static void stratified_samples(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(eigenvectors), cmocka_unit_test(solve),
-                                       cmocka_unit_test(spaces),
-                                       cmocka_unit_test(stratified_samples)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(eigenvectors_satisfy_their_equation),
+                                       cmocka_unit_test(solutions_satisfy_the_system),
+                                       cmocka_unit_test(leading_spaces_are_found),
+                                       cmocka_unit_test(samples_are_stratified)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,5 @@
-/* Backward pass of the MLP against central differences of its forward pass; optimiser and schedule
- * against their formulas.
+/* Backward pass of the multilayer perceptron against central differences of its forward pass;
+ * optimiser and learning rate schedule against their formulas.
  * Tests: mlp.c optimiser.c */
 #include <math.h>
 #include <setjmp.h>
@@ -17,7 +17,7 @@
 
 enum { BATCH = 5, INPUTS = 7, WIDTH = 9, DEPTH = 3 };
 
-// loss = sum of weights times the last layer's output
+// Loss: weighted sum of the last layer's output, with weights dh.
 static double loss(const sdm_pod_arch *a, const float *w, const float *x, const float *dh,
                    float *workspace)
 {
@@ -27,7 +27,7 @@ static double loss(const sdm_pod_arch *a, const float *w, const float *x, const 
     return s;
 }
 
-static void gradient(void **state)
+static void gradient_matches_differences(void **state)
 {
     (void)state;
     for (int activation = 0; activation < 2; activation++) {
@@ -61,17 +61,18 @@ static void gradient(void **state)
     }
 }
 
-static void adam(void **state)
+static void adam_takes_the_right_steps(void **state)
 {
     (void)state;
-    // the first step moves every weight by the rate against its gradient's sign, whatever the size
+    // The first step changes each weight by the learning rate, against the sign of its gradient,
+    // whatever the gradient's size.
     parameters p;
     assert_int_equal(trainer_parameters_create(&p, 3, NULL), 0);
     const float g[3] = {1e-3f, -40, 0};
     trainer_adam_update(&p, 0, 3, g, trainer_adam_begin(0.01, 1), 2);
     assert_true(fabs((double)p.w[0] + 0.02) < 1e-6 && fabs((double)p.w[1] - 0.02) < 1e-6 &&
                 p.w[2] == 0);
-    // a quadratic bowl is walked down
+    // Minimises a quadratic function.
     for (int t = 2; t < 2000; t++) {
         const float slope[3] = {2 * (p.w[0] - 1), 20 * (p.w[1] + 2), p.w[2]};
         trainer_adam_update(&p, 0, 3, slope, trainer_adam_begin(0.01, t), 1);
@@ -90,6 +91,7 @@ static void adam(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(gradient), cmocka_unit_test(adam)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(gradient_matches_differences),
+                                       cmocka_unit_test(adam_takes_the_right_steps)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

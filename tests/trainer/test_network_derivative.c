@@ -1,4 +1,4 @@
-/* The derivative of a trained network against that of the exact engine, which has it from the
+/* Derivatives of a trained network against those of the exact engine, which computes them from the
  * motion of the surface.
  * Tests: jacobian.c */
 #include <math.h>
@@ -28,8 +28,8 @@ static const char text[] =
     "data: {static: 5, start: 200, online: 0, holdout: 20, memory_gb: 0.5}\n"
     "train: {steps: 800, batch: 64, refine: 0}\n";
 
-// root mean square of a - b, and of b
-static double distance(const float *a, const float *b, size_t n, double *size)
+// Returns the root mean square of a - b; *size: that of b.
+static double rms_difference(const float *a, const float *b, size_t n, double *size)
 {
     double d = 0, s = 0;
     for (size_t i = 0; i < n; i++) {
@@ -40,7 +40,7 @@ static double distance(const float *a, const float *b, size_t n, double *size)
     return sqrt(d / (double)n);
 }
 
-static void agrees_with_the_surface(void **state)
+static void jacobian_agrees_with_the_exact_engine(void **state)
 {
     (void)state;
     sdm_config c;
@@ -66,10 +66,10 @@ static void agrees_with_the_surface(void **state)
         if (sdm_exact_shape_jacobian(torus, p, NULL, &info->grid, truth, j_truth, NULL, &e))
             fail_msg("%s", e.text);
         for (size_t i = 0; i < n_params; i++) {
-            const double off = distance(j + i * n, j_truth + i * n, n, &size);
+            const double off = rms_difference(j + i * n, j_truth + i * n, n, &size);
             assert_true(size > 0.5 && off < 0.05 * size);
         }
-        // weights of an arbitrary sum of voxels: its gradient by the transpose
+        // The gradient of a weighted sum of the voxels (weights in map), by sdm_generate_vjp().
         double gradient[2], expected[2] = {0}, scale[2] = {0};
         for (size_t v = 0; v < n; v++) map[v] = (float)(v % 7) - 2.0f;
         if (sdm_generate_vjp(m, p, map, NULL, gradient, NULL, &e)) fail_msg("%s", e.text);
@@ -88,9 +88,9 @@ static void agrees_with_the_surface(void **state)
     sdm_model_free(m);
 }
 
-// what sdm/runtime.h says of weights as bytes: the map alone is rounded more coarsely than that
-// with derivatives, derivatives are near those in floats
-static void rounding_is_small(void **state)
+// As sdm/runtime.h states for byte weights: the map computed without derivatives is rounded more
+// coarsely than the one computed with them, and derivatives are close to those of float weights.
+static void rounding_to_bytes_is_small(void **state)
 {
     (void)state;
     char path[128];
@@ -111,7 +111,7 @@ static void rounding_is_small(void **state)
         if (sdm_generate(m, p, NULL, alone, NULL, &e)) fail_msg("%s", e.text);
         if (sdm_generate_jacobian(m, p, NULL, map, j, NULL, &e)) fail_msg("%s", e.text);
         for (size_t v = 0; v < n; v++) wrong = fmax(wrong, fabs((double)map[v] - alone[v]));
-        const double square = distance(map, alone, n, &size);
+        const double square = rms_difference(map, alone, n, &size);
         assert_true(square > 0 && square < 3e-4 && wrong < 2e-3);
         for (size_t i = 0; i < n_params; i++)
             for (size_t v = 0; v < n; v++) most[i] = fmax(most[i], fabsf(j[i * n + v]));
@@ -157,7 +157,7 @@ static int tear_down(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(agrees_with_the_surface),
-                                       cmocka_unit_test(rounding_is_small)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(jacobian_agrees_with_the_exact_engine),
+                                       cmocka_unit_test(rounding_to_bytes_is_small)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -1,5 +1,5 @@
-/* Point networks in the trainer: backward pass and losses against central differences, the model
- * file against the trainer's forward pass.
+/* Point networks in the trainer: backward pass and losses against central differences, and the
+ * model file against the trainer's forward pass.
  * Tests: activation.c loss.c point_build.c point_draw.c point_mlp.c point_open.c */
 #include <math.h>
 #include <setjmp.h>
@@ -37,7 +37,7 @@ static void random_fill(float *x, size_t n, uint64_t stream, double size)
     for (size_t i = 0; i < n; i++) x[i] = (float)(size * sdm_rng_normal(5, stream, i));
 }
 
-// a loss that is linear in the values, so that what bends is the network
+// A loss that is linear in the values, so that only the network is nonlinear.
 static double loss(const sdm_point_arch *a, const float *w, const float *u, const float *slope,
                    float *workspace)
 {
@@ -48,10 +48,11 @@ static double loss(const sdm_point_arch *a, const float *w, const float *u, cons
     return sum;
 }
 
-static void backward(void **state)
+static void gradient_matches_differences(void **state)
 {
     (void)state;
-    for (int mode = 0; mode < 4; mode++) { // SiLU and tanh: ReLU has no slope at its kinks
+    // SiLU and tanh only: the derivative of ReLU jumps at its kinks.
+    for (int mode = 0; mode < 4; mode++) {
         const sdm_point_arch a = arch_of(mode / 2, mode & 1);
         const size_t n = sdm_point_count(&a);
         assert_int_equal(n, 11 * (U + 1) + 9 * (11 + U + 1) + 7 * (9 + U + 1) + 7 + 1);
@@ -75,7 +76,7 @@ static void backward(void **state)
             w[i] = keep;
             assert_true(fabs((up - down) / (2 * (double)h) - (double)gradient[i]) < 2e-3 * size);
         }
-        // a second call adds; threads change no bit
+        // A second call adds to the gradient; any number of threads gives the same bits.
         float *twice;
         assert_int_equal(SDM_ALLOC(&twice, 2 * n, "g", NULL), 0);
         for (int threads = 2; threads <= 3; threads++) {
@@ -94,14 +95,14 @@ static void backward(void **state)
     }
 }
 
-// every loss by its formula
+// Each loss by its formula.
 static double loss_of(const sdm_config *c, double predicted, double target)
 {
     const double weight = fabs(target) < c->train.near_mm ? 1 + c->train.near_weight : 1,
                  e = predicted - target;
     const double most = c->train.clamp_mm, t = fmax(-most, fmin(most, target));
-    // the same where both are within the clamp; a prediction beyond it costs nothing where the
-    // target is beyond it too
+    // Within the clamp nothing changes. Where the target is at the clamp, a prediction beyond it
+    // costs nothing.
     const double p = fabs(t) < most ? predicted
                      : t > 0        ? fmin(most, predicted)
                                     : fmax(-most, predicted);
@@ -118,7 +119,7 @@ static double loss_of(const sdm_config *c, double predicted, double target)
     return weight * e * e;
 }
 
-static void slopes(void **state)
+static void loss_slopes_match_differences(void **state)
 {
     (void)state;
     static sdm_config c;
@@ -139,7 +140,8 @@ static void slopes(void **state)
             assert_true(fabs(slope / weight - (double)trainer_loss_slope_drawn(
                                                   &c, predicted, target, &squares)) < 1e-4);
         }
-        assert_true(square > 40 && square < 60 && square == squares); // 200 times 0.5^2
+        // sum of 200 squares with mean 0.5^2
+        assert_true(square > 40 && square < 60 && square == squares);
     }
 }
 
@@ -150,7 +152,7 @@ static double eikonal_of(const sdm_config *c, const double f[4])
     return c->train.eikonal * pow(sqrt(square) - 1, 2);
 }
 
-static void eikonal(void **state)
+static void eikonal_slopes_match_differences(void **state)
 {
     (void)state;
     static sdm_config c;
@@ -173,8 +175,8 @@ static void eikonal(void **state)
                         1e-4 * (1 + fabs((double)slope[i])));
         }
     }
-    // a map that rises by one mm a mm has no eikonal term, a constant one has no direction to rise
-    // in
+    // A slope of 1 has no eikonal loss; a constant map has the loss 0.7 but no gradient, for lack
+    // of a direction.
     const float exact[4] = {0, 0.5f, 0, 0}, flat[4] = {1, 1, 1, 1};
     float none[4] = {0};
     assert_true(trainer_loss_eikonal(&c, exact, 1, none) == 0 &&
@@ -182,7 +184,7 @@ static void eikonal(void **state)
     for (int i = 0; i < 4; i++) assert_true(none[i] == 0);
 }
 
-// the mean over a map of loss and eikonal term
+// Mean over a map of the loss and the eikonal loss.
 static double map_loss(const sdm_config *c, const float *f, const float *target)
 {
     const size_t nx = 4, ny = 3, nz = 5;
@@ -198,7 +200,7 @@ static double map_loss(const sdm_config *c, const float *f, const float *target)
     return sum / 60 + bend / (3 * 2 * 4);
 }
 
-static void whole_map(void **state)
+static void map_gradient_matches_differences(void **state)
 {
     (void)state;
     static sdm_config c;
@@ -224,8 +226,9 @@ static void whole_map(void **state)
     }
 }
 
-// the share of voxels near the surface among those drawn, and none beyond the map
-static void drawn(void **state)
+// Voxels near the surface are drawn more often by the configured weight; each index lies in the
+// map.
+static void draws_have_the_right_shares(void **state)
 {
     (void)state;
     enum { VOXELS = 60, DRAWN = 20000 };
@@ -233,8 +236,9 @@ static void drawn(void **state)
     int16_t maps[2 * VOXELS];
     float scale[2] = {0.5f, 0.001f};
     dataset d = {.n_voxels = VOXELS, .maps = maps, .scale = scale};
+    // a tenth of the voxels is near
     for (int v = 0; v < 2 * VOXELS; v++)
-        maps[v] = (int16_t)(v % VOXELS < 6 ? (v & 1 ? -1 : 1) : 1000); // a tenth is near
+        maps[v] = (int16_t)(v % VOXELS < 6 ? (v & 1 ? -1 : 1) : 1000);
     c.train.near_mm = 0.6;
     c.seed = 9;
     for (int weight = 0; weight < 10; weight += 9) {
@@ -249,7 +253,7 @@ static void drawn(void **state)
         }
         assert_true(near > 0);
     }
-    // a map whose scale makes all or none near
+    // A map in which no voxel is near.
     c.train.near_mm = 1e-6;
     for (uint64_t i = 0; i < 100; i++) assert_true(trainer_point_draw(&c, &d, 1, i) < VOXELS);
 
@@ -260,7 +264,7 @@ static void drawn(void **state)
     }
 }
 
-static void file_is_the_network(void **state)
+static void file_equals_the_trained_network(void **state)
 {
     (void)state;
     sdm_model_param params[P] = {{"a", "mm", -1, 1, 0}, {"b", "mm", 2, 5, 3}};
@@ -279,7 +283,8 @@ static void file_is_the_network(void **state)
         assert_int_equal(SDM_ALLOC(&workspace, trainer_point_workspace(&spec.arch, 60), "ws", NULL),
                          0);
         trainer_point_init(&spec.arch, 3, w);
-        for (size_t i = 0; i < n; i++) w[i] += (float)(0.1 * sdm_rng_normal(2, 9, i)); // biases too
+        // makes biases nonzero too
+        for (size_t i = 0; i < n; i++) w[i] += (float)(0.1 * sdm_rng_normal(2, 9, i));
         spec.weights = w;
         uint8_t *bytes;
         size_t size;
@@ -310,9 +315,11 @@ static void file_is_the_network(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(backward), cmocka_unit_test(slopes),
-        cmocka_unit_test(eikonal),  cmocka_unit_test(whole_map),
-        cmocka_unit_test(drawn),    cmocka_unit_test(file_is_the_network)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(gradient_matches_differences),
+                                       cmocka_unit_test(loss_slopes_match_differences),
+                                       cmocka_unit_test(eikonal_slopes_match_differences),
+                                       cmocka_unit_test(map_gradient_matches_differences),
+                                       cmocka_unit_test(draws_have_the_right_shares),
+                                       cmocka_unit_test(file_equals_the_trained_network)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,5 @@
-/* Error-driven sampling: the regression of the error, the density of the plan, the same bits for
- * any number of threads and after a resume.
+/* Error-driven sampling: regression of the error, density of the planned samples, and the same bits
+ * for any number of threads and after a resume.
  * Tests: error_model.c sample_plan.c sampling.c */
 #include <math.h>
 #include <setjmp.h>
@@ -19,7 +19,7 @@
 
 static double uniform(size_t i, double low, double high)
 {
-    // multiples of the golden ratio
+    // Multiples of the golden ratio modulo 1 are evenly spread.
     const double u = fmod(0.618033988749895 * (double)(i + 1), 1);
     return low + (high - low) * u;
 }
@@ -48,7 +48,8 @@ static void regression_finds_a_polynomial(void **state)
         assert_true(fabs(trainer_error_model_at(&m, at) - quadratic(at)) < 0.05);
     }
     trainer_error_model_dispose(&m);
-    // too few observations for slopes: a constant, which one observation of nothing pulls down
+    // Three observations are too few for slopes: a constant, which the prior (one observation of 0)
+    // reduces to 1.5.
     assert_int_equal(trainer_error_model_fit(&m, P, 3, x, (const double[]){2, 2, 2}, NULL), SDM_OK);
     assert_int_equal(m.degree, 0);
     assert_true(fabs(trainer_error_model_at(&m, x) - 1.5) < 1e-6);
@@ -61,32 +62,32 @@ static void regression_finds_a_polynomial(void **state)
 static const double LOW[2] = {-3, 10}, HIGH[2] = {5, 11};
 static const sample_space space = {.n_params = 2, .min = LOW, .max = HIGH, .seed = 5};
 
-// first parameter of a sample, scaled to -1 .. 1
-static void scaled(const sample_plan *p, size_t i, double *x)
+// Parameters of planned sample i, scaled to -1 .. 1.
+static void sample_scaled(const sample_plan *p, size_t i, double *x)
 {
     sdm_sample_params(space.seed, STREAM_TRAIN, trainer_sample_plan_point(p, i), LOW, HIGH, 2, x);
     for (int k = 0; k < 2; k++) x[k] = 2 * (x[k] - LOW[k]) / (HIGH[k] - LOW[k]) - 1;
 }
 
-// observes samples first .. first + n - 1 as a network would whose error is exp(2 x), and falls
-// with the number of samples
-static void observe(sample_plan *p, size_t first, size_t n)
+// Reports errors for samples first .. first + n - 1: proportional to exp(2 x), and falling with the
+// number of samples.
+static void errors_report(sample_plan *p, size_t first, size_t n)
 {
     double error[SAMPLE_ROUND];
     for (size_t i = 0; i < n; i++) {
         double x[2];
-        scaled(p, first + i, x);
+        sample_scaled(p, first + i, x);
         error[i] = exp(2 * x[0]) / (double)(first + 1);
     }
     trainer_sample_plan_observe(p, first, n, error);
 }
 
-static void run_plan(sample_plan *p, size_t n_start, size_t from)
+static void plan_run(sample_plan *p, size_t n_start, size_t from)
 {
     for (size_t at = from; at < p->n; at += SAMPLE_ROUND) {
         const size_t n = p->n - at < SAMPLE_ROUND ? p->n - at : SAMPLE_ROUND;
         assert_true(p->n_planned >= at + n);
-        observe(p, at, n);
+        errors_report(p, at, n);
         assert_int_equal(trainer_sample_plan_extend(p, &space, n_start, at + n, NULL), SDM_OK);
     }
 }
@@ -100,19 +101,20 @@ static void density_follows_the_error(void **state)
     trainer_sample_plan_start(&p, START);
     assert_int_equal(p.n_planned, START + 2 * SAMPLE_ROUND);
     for (size_t i = 0; i < p.n_planned; i++) assert_int_equal(trainer_sample_plan_point(&p, i), i);
-    run_plan(&p, START, START);
+    plan_run(&p, START, START);
     assert_int_equal(p.n_planned, N);
 
     double count[2][BINS] = {{0}}, all = 0;
     for (size_t i = START + 1000; i < N; i++) {
         double x[2];
-        scaled(&p, i, x);
+        sample_scaled(&p, i, x);
         assert_true(p.point[i] > p.point[i - 1]);
         for (int k = 0; k < 2; k++) count[k][(int)(0.5 * BINS * (x[k] + 1))]++;
         all++;
     }
     for (int b = 0; b < BINS; b++) {
-        // the integral of 1/2 + 1/2 exp(2 x) / mean over the bin; the mean is sinh(2) / 2
+        // Expected share of the bin: half uniform, half proportional to exp(2 x), whose mean over
+        // -1 .. 1 is sinh(2) / 2.
         const double low = -1 + 2.0 * b / BINS, high = low + 2.0 / BINS;
         const double share = 0.5 / BINS + 0.5 * (exp(2 * high) - exp(2 * low)) / 4 / (sinh(2) / 2);
         assert_true(fabs(count[0][b] / all - share) < 0.015);
@@ -121,20 +123,20 @@ static void density_follows_the_error(void **state)
     trainer_sample_plan_dispose(&p);
 }
 
-// what is left of a plan after a round gives the rest of it again
-static void plan_goes_on(void **state)
+// A plan restored from its points and errors up to some round continues with the same points.
+static void restored_plan_continues(void **state)
 {
     (void)state;
     enum { START = 40, N = 1000, BREAK = START + 8 * SAMPLE_ROUND };
     sample_plan whole, rest;
     assert_int_equal(trainer_sample_plan_create(&whole, true, N, NULL), SDM_OK);
     trainer_sample_plan_start(&whole, START);
-    run_plan(&whole, START, START);
+    plan_run(&whole, START, START);
     assert_int_equal(trainer_sample_plan_create(&rest, true, N, NULL), SDM_OK);
     rest.n_planned = BREAK + 2 * SAMPLE_ROUND;
     memcpy(rest.point, whole.point, rest.n_planned * sizeof *rest.point);
     memcpy(rest.error, whole.error, BREAK * sizeof *rest.error);
-    run_plan(&rest, START, BREAK);
+    plan_run(&rest, START, BREAK);
     assert_memory_equal(whole.point, rest.point, N * sizeof *whole.point);
     assert_memory_equal(whole.error, rest.error, N * sizeof *whole.error);
     assert_int_not_equal(whole.point[N - 1], N - 1);
@@ -142,8 +144,8 @@ static void plan_goes_on(void **state)
     trainer_sample_plan_dispose(&rest);
 }
 
-// no observation, no reason to prefer a point; maps met without an error are none
-static void nothing_observed(void **state)
+// Without usable observations (errors of 0 or NaN) all points are taken in order.
+static void without_errors_all_points_are_taken(void **state)
 {
     (void)state;
     enum { START = 10, N = 300 };
@@ -181,7 +183,7 @@ static sdm_status train(const char *override, int threads, bool resume,
     return s;
 }
 
-static sdm_model *trained(void)
+static sdm_model *trained_model(void)
 {
     sdm_model *m;
     sdm_error e = {0};
@@ -189,11 +191,11 @@ static sdm_model *trained(void)
     return m;
 }
 
-// a map, as a fingerprint of the weights
-static void map_of(float *map)
+// One map of the model, as a fingerprint of its weights.
+static void model_map(float *map)
 {
     const double p[2] = {3, 1.5};
-    sdm_model *m = trained();
+    sdm_model *m = trained_model();
     void *scratch;
     assert_int_equal(sdm_model_get_info(m)->n_params, 2);
     assert_int_equal(sdm_alloc(&scratch, sdm_model_scratch_bytes(m, 1), 1, "scratch", NULL), 0);
@@ -209,15 +211,15 @@ static void same_bits_for_threads(void **state)
     (void)state;
     float first[VOXELS], other[VOXELS];
     for (int threads = 1; threads <= 4; threads++) {
-        clean();
+        run_files_remove();
         assert_int_equal(train(NULL, threads, false, NULL), SDM_OK);
-        map_of(threads == 1 ? first : other);
+        model_map(threads == 1 ? first : other);
         if (threads > 1) assert_memory_equal(first, other, sizeof first);
     }
-    // and the errors do have a say
-    clean();
+    // Error-driven sampling does change the result.
+    run_files_remove();
     assert_int_equal(train("data.sampling=uniform", 2, false, NULL), SDM_OK);
-    map_of(other);
+    model_map(other);
     assert_memory_not_equal(first, other, sizeof first);
 }
 
@@ -233,43 +235,43 @@ static void resume_is_bit_exact(void **state)
 {
     (void)state;
     float whole[VOXELS], resumed[VOXELS];
-    clean();
+    run_files_remove();
     assert_int_equal(train(NULL, 2, false, NULL), SDM_OK);
-    map_of(whole);
-    // the question is asked once for each of 68 maps before training, then about once a step: twice
-    // in the fit, and in the refinement
+    model_map(whole);
+    // The hook is called once for each of the 68 maps before training, then about once a step: two
+    // stops lie in the fit of the network, one in the refinement.
     const int64_t stops[] = {110, 150, 200};
     for (size_t i = 0; i < sizeof stops / sizeof *stops; i++) {
-        clean();
+        run_files_remove();
         calls = 0, stop_after = stops[i];
         const sdm_train_hooks hooks = {.cancelled = stop};
         assert_int_equal(train(NULL, 3, false, &hooks), SDM_E_CANCELLED);
         assert_int_equal(train("data.sampling=uniform", 1, true, NULL), SDM_E_CONFIG);
         assert_int_equal(train(NULL, 1, true, NULL), SDM_OK);
-        map_of(resumed);
+        model_map(resumed);
         assert_memory_equal(whole, resumed, sizeof whole);
     }
 }
 
-// polynomials alone have no fit that could be asked: all points are taken, and nothing waits for
-// ever
-static void without_a_fit(void **state)
+// Without hidden layers there is no network to measure errors with: all points are used, and
+// training must not wait for errors.
+static void polynomials_need_no_errors(void **state)
 {
     (void)state;
-    clean();
+    run_files_remove();
     assert_int_equal(train("network.depth=0", 2, false, NULL), SDM_OK);
 }
 
-static void small_pool_and_time(void **state)
+static void small_memory_and_short_time_work(void **state)
 {
     (void)state;
-    clean();
+    run_files_remove();
     assert_int_equal(train("data.memory_gb=0.001", 2, false, NULL), SDM_OK);
-    clean();
+    run_files_remove();
     assert_int_equal(train("train.minutes=0.02", 2, false, NULL), SDM_OK);
 }
 
-static void only_for_pod(void **state)
+static void other_kinds_are_refused(void **state)
 {
     (void)state;
     static const char text[] =
@@ -287,13 +289,13 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(regression_finds_a_polynomial),
         cmocka_unit_test(density_follows_the_error),
-        cmocka_unit_test(plan_goes_on),
-        cmocka_unit_test(nothing_observed),
+        cmocka_unit_test(restored_plan_continues),
+        cmocka_unit_test(without_errors_all_points_are_taken),
         cmocka_unit_test(same_bits_for_threads),
         cmocka_unit_test(resume_is_bit_exact),
-        cmocka_unit_test(without_a_fit),
-        cmocka_unit_test(small_pool_and_time),
-        cmocka_unit_test(only_for_pod),
+        cmocka_unit_test(polynomials_need_no_errors),
+        cmocka_unit_test(small_memory_and_short_time_work),
+        cmocka_unit_test(other_kinds_are_refused),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -43,7 +43,7 @@ static void flip_byte(const char *name, long at)
     fclose(f);
 }
 
-static void trains(void **state)
+static void training_reaches_its_accuracy(void **state)
 {
     (void)state;
     sdm_config c;
@@ -51,8 +51,7 @@ static void trains(void **state)
     sdm_train_report r;
     read_config(&c, NULL, 0);
     if (sdm_train(&c, capsule, folder, false, NULL, &r, &e)) fail_msg("%s", e.text);
-    // far below what the mean map alone leaves (about 1 mm), and what the model says is what it
-    // does
+    // Far below the error of the mean map (about 1 mm); the model states the measured accuracy.
     assert_true(r.accuracy.rmse_mm > 0 && r.accuracy.rmse_mm < 0.03);
     assert_true(r.accuracy.q50_mm <= r.accuracy.q90_mm && r.accuracy.q90_mm <= r.accuracy.q99_mm);
     assert_int_equal(r.steps, 1200);
@@ -65,7 +64,7 @@ static void trains(void **state)
     const sdm_model_info *info = sdm_model_get_info(m);
     assert_true(info->accuracy.rmse_mm == r.accuracy.rmse_mm);
     assert_string_equal(info->shape, "capsule");
-    // an independent look: fresh shapes through the exact engine
+    // An independent measurement: new shapes, compared with the exact engine.
     const size_t n = sdm_grid_count(&c.grid);
     float *map, *truth;
     void *scratch;
@@ -103,9 +102,9 @@ static void same_bits_for_threads(void **state)
     uint64_t model[3], metrics[3];
     for (int threads = 1; threads <= 3; threads++) {
         read_config(&c, (const char *const[]){"train.steps=600"}, 1);
-        clean();
-        // the number of threads is no part of the result, so it must not be part of the stored
-        // config either
+        run_files_remove();
+        // The stored configuration must not contain the number of threads, since results do not
+        // depend on it.
         c.threads = 0;
         c.data.workers = threads;
         sdm_config run = c;
@@ -133,7 +132,8 @@ static void watch_progress(void *user, const sdm_progress *p)
 }
 
 static int64_t calls, stop_after;
-enum { IN_DATA = 20, IN_FIT = 400, IN_REFINEMENT = 700 }; // calls until then, of 600 steps
+// Number of calls of the hook until each phase, for 600 steps.
+enum { IN_DATA = 20, IN_FIT = 400, IN_REFINEMENT = 700 };
 
 static bool stop(void *user)
 {
@@ -141,15 +141,15 @@ static bool stop(void *user)
     return ++calls > stop_after;
 }
 
-// there is a checkpoint of a run of c
-static void refuses_to_resume(const sdm_config *c)
+// A checkpoint of a run of c exists: a damaged one and another configuration are refused.
+static void bad_resume_check(const sdm_config *c)
 {
     sdm_error e = {0};
-    // a wrong bit
+    // A changed byte.
     flip_byte("checkpoint.sdmc", 100000);
     assert_int_equal(sdm_train(c, capsule, folder, true, NULL, NULL, &e), SDM_E_FORMAT);
     flip_byte("checkpoint.sdmc", 100000);
-    // another config
+    // Another configuration.
     sdm_config other;
     read_config(&other, (const char *const[]){"train.steps=600", "network.rank=5"}, 2);
     assert_int_equal(sdm_train(&other, capsule, folder, true, NULL, NULL, &e), SDM_E_CONFIG);
@@ -161,44 +161,44 @@ static void resume_is_bit_exact(void **state)
     sdm_config c;
     sdm_error e = {0};
     read_config(&c, (const char *const[]){"train.steps=600"}, 1);
-    clean();
+    run_files_remove();
     if (sdm_train(&c, capsule, folder, false, NULL, NULL, &e)) fail_msg("%s", e.text);
     const uint64_t whole = hash_of("model.sdm"), metrics = hash_of("metrics.jsonl");
-    // stopped while making data, in the fit, in the refinement
+    // Stopped while data are made, in the fit of the network, in the refinement.
     const int64_t stops[] = {IN_DATA, IN_FIT, IN_REFINEMENT};
     for (size_t i = 0; i < 3; i++) {
-        clean();
+        run_files_remove();
         calls = 0, stop_after = stops[i];
         watch w = {0};
         const sdm_train_hooks hooks = {.cancelled = stop, .progress = watch_progress, .user = &w};
         assert_int_equal(sdm_train(&c, capsule, folder, false, &hooks, NULL, &e), SDM_E_CANCELLED);
         assert_false(exists("model.sdm"));
         assert_true(exists("checkpoint.sdmc") == (i > 0));
-        if (i == 2) refuses_to_resume(&c);
+        if (i == 2) bad_resume_check(&c);
         if (sdm_train(&c, capsule, folder, true, NULL, NULL, &e)) fail_msg("%s", e.text);
         assert_true(hash_of("model.sdm") == whole);
         assert_true(hash_of("metrics.jsonl") == metrics);
         assert_true(w.reports > 0);
-        // its work is done
+        // The checkpoint is removed after a complete run.
         assert_false(exists("checkpoint.sdmc"));
     }
 }
 
 static bool old_files;
 
-static bool look(void *user)
+static bool old_files_watch(void *user)
 {
     (void)user;
     if (++calls == IN_FIT) old_files = exists("model.sdm") || exists("checkpoint.sdmc");
     return false;
 }
 
-// a run may go on with another budget, which it keeps, but not with less than it has trained
+// Resuming with another budget uses the new one, unless it ends before the step already reached.
 static void resume_with_another_budget(void **state)
 {
     (void)state;
     static const char *const budgets[][3] = {
-        // the run, too little, another
+        // Budgets: of the stopped run, too small to resume, large enough.
         {"train.steps=600", "train.steps=300", "train.steps=540"},
         {"train.steps=600", "train.steps=300", "train.steps=900"},
         {"train.minutes=1000", "train.minutes=0.00001", NULL}};
@@ -206,7 +206,7 @@ static void resume_with_another_budget(void **state)
         sdm_config c;
         sdm_error e = {0};
         sdm_train_report r;
-        clean();
+        run_files_remove();
         read_config(&c, (const char *const[]){budgets[i][0]}, 1);
         calls = 0, stop_after = i < 2 ? IN_REFINEMENT : IN_FIT;
         const sdm_train_hooks hooks = {.cancelled = stop};
@@ -228,30 +228,32 @@ static bool block_model(void *user)
     return false;
 }
 
-// a network that cannot be written is not lost
+// If the model file cannot be written, the trained network can still be saved by resuming from the
+// checkpoint.
 static void model_cannot_be_written(void **state)
 {
     (void)state;
     sdm_config c;
     sdm_error e = {0};
     read_config(&c, (const char *const[]){"train.steps=595"}, 1);
-    clean();
+    run_files_remove();
     if (sdm_train(&c, capsule, folder, false, NULL, NULL, &e)) fail_msg("%s", e.text);
     const uint64_t whole = hash_of("model.sdm"), metrics = hash_of("metrics.jsonl");
-    clean();
+    run_files_remove();
     calls = 0;
     const sdm_train_hooks hooks = {.cancelled = block_model};
     assert_int_equal(sdm_train(&c, capsule, folder, false, &hooks, NULL, &e), SDM_E_IO);
     assert_non_null(strstr(e.text, "model.sdm: cannot write"));
     assert_int_equal(rmdir(in_folder("model.sdm")), 0);
-    calls = 0, stop_after = 2 * IN_DATA + 300; // the data again, but no step
+    // Enough calls to make the data again, but no training step.
+    calls = 0, stop_after = 2 * IN_DATA + 300;
     const sdm_train_hooks no_step = {.cancelled = stop};
     if (sdm_train(&c, capsule, folder, true, &no_step, NULL, &e)) fail_msg("%s", e.text);
     assert_true(hash_of("model.sdm") == whole && hash_of("metrics.jsonl") == metrics);
 }
 
-// an older run stays as it is until training begins, and goes then: its checkpoint is not there to
-// be resumed by the new one
+// The files of an older run stay until training begins and are then removed, so that its checkpoint
+// cannot be mistaken for one of the new run.
 static void older_run_gives_way(void **state)
 {
     (void)state;
@@ -259,7 +261,7 @@ static void older_run_gives_way(void **state)
     sdm_error e = {0};
     read_config(&c, (const char *const[]){"train.steps=600"}, 1);
     read_config(&other, (const char *const[]){"train.steps=600", "network.width=16"}, 2);
-    clean();
+    run_files_remove();
     const sdm_train_hooks stopped = {.cancelled = stop};
     calls = 0, stop_after = IN_FIT;
     assert_int_equal(sdm_train(&c, capsule, folder, false, &stopped, NULL, &e), SDM_E_CANCELLED);
@@ -268,8 +270,8 @@ static void older_run_gives_way(void **state)
     assert_int_equal(sdm_train(&other, capsule, folder, false, &stopped, NULL, &e),
                      SDM_E_CANCELLED);
     assert_true(hash_of("config.yaml") == config && hash_of("checkpoint.sdmc") == checkpoint);
-    // a checkpoint, then a model
-    const sdm_train_hooks looking = {.cancelled = look};
+    // First the older run left a checkpoint, then a model.
+    const sdm_train_hooks looking = {.cancelled = old_files_watch};
     for (int i = 0; i < 2; i++) {
         calls = 0, old_files = true;
         if (sdm_train(i ? &c : &other, capsule, folder, false, &looking, NULL, &e))
@@ -279,8 +281,8 @@ static void older_run_gives_way(void **state)
     }
 }
 
-// a folder that cannot be written is found out before the work
-static void no_place_for_files(void **state)
+// A folder that cannot be written is detected before any work.
+static void unwritable_folder_is_found_early(void **state)
 {
     (void)state;
     sdm_config c;
@@ -291,14 +293,14 @@ static void no_place_for_files(void **state)
     assert_int_equal(sdm_train(&c, capsule, "/proc", false, &hooks, NULL, &e), SDM_E_IO);
 }
 
-// a time budget that is over before the data is made still gives a model
-static void short_of_time(void **state)
+// A time budget that ends before all data are made still gives a model.
+static void time_budget_shorter_than_data(void **state)
 {
     (void)state;
     sdm_config c;
     sdm_error e = {0};
     sdm_train_report r;
-    clean();
+    run_files_remove();
     read_config(&c,
                 (const char *const[]){"train.steps=0", "train.minutes=0.01", "data.start=5000",
                                       "network.degree=8"},
@@ -307,13 +309,13 @@ static void short_of_time(void **state)
     assert_true(r.accuracy.rmse_mm < 0.2 && r.samples < 5000);
 }
 
-static void polynomials_alone(void **state)
+static void polynomials_without_hidden_layers(void **state)
 {
     (void)state;
     sdm_config c;
     sdm_error e = {0};
     sdm_train_report r;
-    clean();
+    run_files_remove();
     read_config(&c,
                 (const char *const[]){"network.depth=0", "train.steps=50", "network.weights=f32",
                                       "data.static=[2,4]", "data.online=0", "train.loss=huber",
@@ -323,14 +325,14 @@ static void polynomials_alone(void **state)
     assert_true(r.accuracy.rmse_mm < 0.1);
 }
 
-// more random samples than fit into the pool: the oldest are replaced
-static void small_pool(void **state)
+// More samples than fit into memory: new ones replace the oldest.
+static void small_pool_replaces_old_samples(void **state)
 {
     (void)state;
     sdm_config c;
     sdm_error e = {0};
     sdm_train_report r;
-    clean();
+    run_files_remove();
     read_config(&c,
                 (const char *const[]){"train.steps=300", "data.memory_gb=0.0025", "data.start=60",
                                       "data.online=500", "data.static=2"},
@@ -340,8 +342,8 @@ static void small_pool(void **state)
     assert_true(r.accuracy.rmse_mm < 0.1);
 }
 
-// n maps span n functions: asked for more, a block has no more
-static void few_maps(void **state)
+// n maps span at most n basis functions, so a larger configured rank has no effect.
+static void rank_is_limited_by_maps(void **state)
 {
     (void)state;
     enum { MAPS = 8 };
@@ -349,7 +351,7 @@ static void few_maps(void **state)
     sdm_error e = {0};
     sdm_train_report r;
     sdm_model *m;
-    clean();
+    run_files_remove();
     read_config(&c,
                 (const char *const[]){"train.steps=2", "data.static=2", "data.start=4",
                                       "data.online=0", "network.rank=200", "network.levels=1"},
@@ -359,18 +361,18 @@ static void few_maps(void **state)
     assert_int_equal(sdm_model_open(r.model_path, &m, &e), SDM_OK);
     const size_t blocks = sdm_pod_count(&c.grid, (size_t)c.network.block, 1).first[1];
     const double latent = 24 + 20, voxels = (double)sdm_grid_count(&c.grid),
-                 mlp = 24 * (24 + 20); // at most
+                 mlp = 24 * (24 + 20); // upper bound
     assert_true(sdm_model_get_info(m)->macs <=
                 (double)MAPS * ((double)blocks * latent + voxels) + mlp);
     sdm_model_free(m);
 }
 
-static void mistakes(void **state)
+static void mistakes_are_refused(void **state)
 {
     (void)state;
     sdm_config c;
     sdm_error e = {0};
-    clean();
+    run_files_remove();
     read_config(&c, (const char *const[]){"data.static=[2,2,2,2,2]"}, 1);
     assert_int_equal(sdm_train(&c, capsule, folder, false, NULL, NULL, &e), SDM_E_CONFIG);
     assert_non_null(strstr(e.text, "data.static"));
@@ -390,17 +392,17 @@ static void mistakes(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(trains),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(training_reaches_its_accuracy),
                                        cmocka_unit_test(same_bits_for_threads),
                                        cmocka_unit_test(resume_is_bit_exact),
                                        cmocka_unit_test(resume_with_another_budget),
                                        cmocka_unit_test(model_cannot_be_written),
                                        cmocka_unit_test(older_run_gives_way),
-                                       cmocka_unit_test(no_place_for_files),
-                                       cmocka_unit_test(short_of_time),
-                                       cmocka_unit_test(polynomials_alone),
-                                       cmocka_unit_test(small_pool),
-                                       cmocka_unit_test(few_maps),
-                                       cmocka_unit_test(mistakes)};
+                                       cmocka_unit_test(unwritable_folder_is_found_early),
+                                       cmocka_unit_test(time_budget_shorter_than_data),
+                                       cmocka_unit_test(polynomials_without_hidden_layers),
+                                       cmocka_unit_test(small_pool_replaces_old_samples),
+                                       cmocka_unit_test(rank_is_limited_by_maps),
+                                       cmocka_unit_test(mistakes_are_refused)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

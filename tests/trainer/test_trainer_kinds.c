@@ -1,5 +1,5 @@
-/* Training of the networks that learn by gradients on maps: accuracy, losses, the same bits for
- * any number of threads, resume.
+/* Training of the kinds of network that learn by gradient descent on maps: accuracy, losses, the
+ * same bits for any number of threads, resume.
  * Tests: direct.c point_kind.c sdmnn_kind.c */
 #include <math.h>
 #include <setjmp.h>
@@ -19,10 +19,10 @@ static const char base[] = "shape: {name: capsule}\n"
                            "data: {static: 2, start: 60, online: 40, holdout: 8, memory_gb: 0.5}\n"
                            "train: {steps: 400, average: 0.98, learning_rate: 0.01}\n";
 
-// each kind small enough for a test
+// Each kind of network, small enough for a test.
 static const struct kind {
     const char *name;
-    double rmse_mm; // to be reached; the mean map alone leaves more than 1 mm
+    double rmse_mm; // error that training must reach; the mean map alone has more than 1 mm
     const char *overrides[6];
 } kinds[] = {
     {"deepsdf",
@@ -56,12 +56,12 @@ static sdm_train_report train(const sdm_config *c)
 {
     sdm_error e = {0};
     sdm_train_report r;
-    clean();
+    run_files_remove();
     if (sdm_train(c, capsule, folder, false, NULL, &r, &e)) fail_msg("%s", e.text);
     return r;
 }
 
-static void trains(void **state)
+static void training_reaches_its_accuracy(void **state)
 {
     (void)state;
     for (size_t k = 0; k < KINDS; k++) {
@@ -79,7 +79,7 @@ static void trains(void **state)
         const sdm_model_info *info = sdm_model_get_info(m);
         assert_string_equal(info->kind, kinds[k].name);
         assert_true(info->accuracy.rmse_mm == r.accuracy.rmse_mm);
-        // the stored config reads back
+        // The configuration stored in the model can be read again.
         sdm_config again;
         if (sdm_config_parse("stored", info->config, strlen(info->config), NULL, 0, &again, &e))
             fail_msg("%s", e.text);
@@ -88,8 +88,8 @@ static void trains(void **state)
     }
 }
 
-// what differs between the losses is measured: each must lower what it is made for
-static void losses(void **state)
+// Every loss changes the network and still trains it.
+static void every_loss_trains(void **state)
 {
     (void)state;
     for (size_t k = 0; k < KINDS; k++) {
@@ -109,7 +109,7 @@ static void losses(void **state)
                 fail_msg("%s, %s: %g mm", kinds[k].name, other[i], rmse);
             assert_true(hash_of("model.sdm") != plain);
         }
-        // distances beyond the clamp are not learned, those within are
+        // With a clamp, distances within it are learned, those beyond are not.
         read_config(&c, &kinds[k],
                     (const char *const[]){"train.loss=clamped_l1", "train.clamp_mm=1"}, 2);
         const sdm_accuracy clamped = train(&c).accuracy;
@@ -155,17 +155,17 @@ static void resume_is_bit_exact(void **state)
         read_config(&c, &kinds[k], (const char *const[]){"train.steps=60"}, 1);
         train(&c);
         const uint64_t whole = hash_of("model.sdm"), metrics = hash_of("metrics.jsonl");
-        // stopped while making data, at the beginning and in the middle of the training
+        // Stopped while data are made, and at the beginning and in the middle of the training.
         const int64_t stops[] = {20, 80, 110};
         for (size_t i = 0; i < 3; i++) {
-            clean();
+            run_files_remove();
             calls = 0, stop_after = stops[i];
             const sdm_train_hooks hooks = {.cancelled = stop};
             assert_int_equal(sdm_train(&c, capsule, folder, false, &hooks, NULL, &e),
                              SDM_E_CANCELLED);
             assert_false(exists("model.sdm"));
             assert_true(exists("checkpoint.sdmc") == (i > 0));
-            // another network is refused
+            // A checkpoint of another network is refused.
             sdm_config other;
             read_config(&other, &kinds[k],
                         (const char *const[]){"train.steps=60", "network.depth=2"}, 2);
@@ -179,7 +179,7 @@ static void resume_is_bit_exact(void **state)
     }
 }
 
-static void by_time(void **state)
+static void time_budget_works(void **state)
 {
     (void)state;
     for (size_t k = 0; k < KINDS; k++) {
@@ -197,7 +197,8 @@ static void by_time(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(trains), cmocka_unit_test(losses), cmocka_unit_test(same_bits_for_threads),
-        cmocka_unit_test(resume_is_bit_exact), cmocka_unit_test(by_time)};
+        cmocka_unit_test(training_reaches_its_accuracy), cmocka_unit_test(every_loss_trains),
+        cmocka_unit_test(same_bits_for_threads), cmocka_unit_test(resume_is_bit_exact),
+        cmocka_unit_test(time_budget_works)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

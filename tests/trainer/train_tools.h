@@ -1,5 +1,5 @@
-/* What the tests of training begin and end with: a capsule to learn, a folder for the run; cmocka.h
- * comes before. */
+/* Common set-up and tear-down for tests of training: a capsule to learn and a folder for the
+ * run. Include cmocka.h first. */
 #ifndef SDM_TEST_TRAIN_TOOLS_H
 #define SDM_TEST_TRAIN_TOOLS_H
 
@@ -17,7 +17,7 @@ static sdm_registry *registry;
 static sdm_instance *capsule;
 static char folder[] = "training_XXXXXX";
 
-/* Name of a file of the run, in a buffer that the next call uses again. */
+/* Path of a file in the run's folder, in a buffer that the next call reuses. */
 static inline const char *in_folder(const char *name)
 {
     static char path[128];
@@ -27,21 +27,22 @@ static inline const char *in_folder(const char *name)
 
 static inline bool exists(const char *name) { return access(in_folder(name), F_OK) == 0; }
 
+/* Checksum of a file in the run's folder. */
 static inline uint64_t hash_of(const char *name)
 {
     uint8_t *data;
     size_t size;
     assert_int_equal(sdm_file_read(in_folder(name), 1 << 30, &data, &size, NULL), SDM_OK);
-    // a file that ends with its own checksum has the same checksum as any other such file: leave
-    // the end out
+    // The files end with their own checksum, and appending a CRC makes the CRC of the whole
+    // constant: leave out the last 8 bytes.
     assert_true(size > 8);
     const uint64_t h = sdm_crc64(0, data, size - 8);
     sdm_free(data);
     return h;
 }
 
-/* Removes all files that a run leaves. */
-static inline void clean(void)
+/* Removes all files that a run writes. */
+static inline void run_files_remove(void)
 {
     static const char *const names[] = {"model.sdm", "checkpoint.sdmc", "metrics.jsonl",
                                         "config.yaml", "loss.png"};
@@ -61,10 +62,10 @@ static inline int set_up(void **state)
 static inline int tear_down(void **state)
 {
     (void)state;
-    clean();
+    run_files_remove();
     sdm_instance_free(capsule);
     sdm_registry_free(registry);
-    return rmdir(folder); // nothing else was left behind
+    return rmdir(folder); // fails if a run left any other file
 }
 
 #endif

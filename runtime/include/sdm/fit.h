@@ -205,7 +205,8 @@ typedef struct sdm_fit_opts {
        change of a parameter over its range, of the rotation in rad, and of the translation over the
        size of the shape. Unless the parameters are kept, the steps also end when they promise no
        gain: with a network several in a row, with exact maps the first one. Steps with averaged
-       gradients follow such an end, and with exact maps every end */
+       gradients follow such an end, and with exact maps every converged
+       fit, too */
     double eps;
     /* > 0: the same limit for steps with the averaged gradient and exact maps, in the main phase or
        the polish, and for all steps with exact maps where the parameters are kept */

@@ -140,8 +140,8 @@ static inline vec load_half(const uint16_t *p)
         }                                                                                          \
     }                                                                                              \
                                                                                                    \
-    /* For many rows: a few panels for all rows, then the next ones, so that the weights stay in   \
-   the first-level cache. */                                                                       \
+    /* Many rows: a few panels are multiplied by all rows before the next panels, so that their    \
+   weights stay in the first-level cache. */                                                       \
     static void panel_##suffix(size_t batch, size_t outputs, size_t k, const type *w,              \
                                const float *x, size_t ldx, float *y, size_t ldy)                   \
     {                                                                                              \

@@ -26,7 +26,7 @@ typedef struct sdm_grid {
  * centre at `centre` (mm). The arguments are not checked. */
 SDM_API sdm_grid sdm_grid_centred(const int64_t n[3], double spacing, const double centre[3]);
 
-/* Checks that 1 <= n[i] <= 2^20, that arrays of one number per voxel are addressable,
+/* Checks that 1 <= n[i] <= 2^20, that an array of four doubles per voxel would be addressable,
  * 1e-100 <= spacing[i] <= 1e100 mm, abs(origin[i]) <= 1e100 mm, and that dir is orthonormal to
  * 1e-6. SDM_E_ARG names the first violation. [any thread] */
 SDM_API sdm_status sdm_grid_check(const sdm_grid *g, sdm_error *err);

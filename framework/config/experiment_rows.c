@@ -6,7 +6,7 @@
 #include "experiment_schema.h"
 #include "sdm/memory.h"
 
-/* The folder name of a title: "POD, 128^3" -> "pod-128-3". */
+/* folder = the title as a folder name: "POD, 128^3" becomes "pod-128-3". */
 static void make_folder(const char *title, char folder[SDM_EXPERIMENT_TITLE_MAX])
 {
     size_t n = 0;

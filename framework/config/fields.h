@@ -25,7 +25,7 @@ struct sdm_reader;
 typedef struct sdm_field {
     const char *key;
     sdm_field_type type;
-    size_t offset; /* of the member in the struct at sdm_reader.target; unused for SPECIAL */
+    size_t offset; /* byte offset of the member in *sdm_reader.target; unused for SPECIAL */
     double min, max;
     const char *def; /* default as text in YAML syntax; NULL: none */
     const char *choices;

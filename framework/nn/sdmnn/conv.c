@@ -37,8 +37,8 @@ static int thread_count(int wanted, size_t units)
     return (size_t)n < units ? n : (int)units;
 }
 
-// offset[n]: where the input of each of the terms k0 .. k0 + n - 1 lies, relative to the position
-// of the output. The number of a term is channel * taps + tap.
+// offset[i] = (index of the input of term k0 + i) - (position of the output), for i < n. The number
+// of a term is channel * taps + tap.
 static void offsets(const sdm_fmap *g, size_t taps, size_t k0, size_t n, ptrdiff_t *offset)
 {
     ptrdiff_t shift[27] = {0};

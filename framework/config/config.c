@@ -1,5 +1,5 @@
-/* Reads a training configuration: the file, then the overrides, then the rules that involve several
- * keys. */
+/* Reads a training configuration: first the file, then the overrides; then applies the rules that
+ * involve several keys. */
 #include "sdm/internal/config.h"
 
 #include <stdio.h>
@@ -44,8 +44,8 @@ sdm_status sdm_config_override(sdm_reader *r, const char *text, sdm_mark mark, s
     return s == SDM_E_CONFIG ? SDM_OK : s;
 }
 
-/* Refuses an experiment with one message instead of one for each of its unknown keys. True when the
- * tree is an experiment. */
+/* Returns true if the tree is an experiment, and records this as one mistake, instead of one
+ * mistake for each key that a training configuration does not have. */
 static bool refuse_experiment(sdm_mistakes *mistakes, const sdm_tree_node *root)
 {
     for (const sdm_tree_node *n = root ? root->first : NULL; n; n = n->next) {

@@ -56,7 +56,7 @@ void sdm_config_dump(const sdm_config *c, sdm_text *out)
             const sdm_field *f = &sections[s].fields[k];
             if (f->type == SDM_FIELD_SPECIAL && !f->dump) continue;
             if (!sdm_kind_has(f, (int)c->network.kind)) continue;
-            // an empty text has not been set
+            // an empty text means that the key was not set
             if (f->type == SDM_FIELD_TEXT && !*((const char *)c + f->offset)) continue;
             if (!begun) sdm_text_add(out, "%s:\n", sections[s].name);
             begun = true;
@@ -67,7 +67,7 @@ void sdm_config_dump(const sdm_config *c, sdm_text *out)
     }
 }
 
-// The table of all keys: CELL is the maximum length of a cell.
+// A row of the table of all keys; CELL is the size of a cell's text in bytes.
 enum { COLUMNS = 6, CELL = 400 };
 typedef char table_row[COLUMNS][CELL];
 

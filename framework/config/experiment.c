@@ -29,7 +29,8 @@ void sdm_experiment_free(sdm_experiment *e)
 
 /* ---- one row ---- */
 
-/* Concatenates the texts and marks of the lists (NULL: empty); returns their number. */
+/* Concatenates the lists (NULL: an empty list) to texts[] and places[], with e->file as source of
+ * each place; returns the number of texts. */
 static size_t gather(const sdm_experiment *e, const sdm_overrides *const lists[], size_t n_lists,
                      const char **texts, sdm_mark *places)
 {
@@ -57,7 +58,8 @@ sdm_status sdm_experiment_config(const sdm_experiment *e, size_t row, sdm_config
     snprintf(kind_text, sizeof kind_text, "%s%s",
              *m->engine ? "train.steps=1" : "network.kind=", m->network);
     sdm_override kind = {kind_text, m->mark};
-    // later lists override earlier ones: for an engine the dummy budget comes first
+    // later lists override earlier ones: for an engine the budget of one step comes first, so that
+    // a budget of the experiment replaces it
     const sdm_overrides first = {.items = &kind, .n = 1};
     const sdm_overrides *lists[N_LISTS] = {&e->common, &first, &m->set, v ? &v->set : NULL,
                                            &e->command_line};
@@ -80,7 +82,7 @@ sdm_status sdm_experiment_config(const sdm_experiment *e, size_t row, sdm_config
     return s;
 }
 
-/* ---- the whole ---- */
+/* ---- the whole experiment ---- */
 
 /* Applies one key=value of the command line. Keys of the training configuration are only stored;
  * sdm_experiment_config() applies them to every row. */
@@ -94,8 +96,8 @@ static sdm_status apply_override(sdm_experiment *e, sdm_reader *r, const char *t
     return sdm_config_override(r, text, mark, err);
 }
 
-/* Turns `name`, relative to the folder of the experiment's file, into a path. False when it is too
- * long. */
+/* Turns `name`, relative to the folder of the experiment's file, into a path. Returns false if the
+ * path is too long. */
 static bool place_beside(const sdm_experiment *e, char name[SDM_PATH_TEXT_MAX])
 {
     char path[SDM_PATH_TEXT_MAX];
@@ -107,8 +109,8 @@ static bool place_beside(const sdm_experiment *e, char name[SDM_PATH_TEXT_MAX])
     return true;
 }
 
-/* Reads the file e->base in the folder of the experiment's file; its name becomes a path, its text
- * is kept for the rows. */
+/* Reads the base configuration, a file in the folder of the experiment's file: e->base becomes the
+ * path of the file, e->base_text its content. */
 static sdm_status read_base(sdm_experiment *e, sdm_reader *r, sdm_error *err)
 {
     const sdm_mark mark = sdm_fields_given(r, "", "base")->mark;
@@ -131,8 +133,9 @@ static sdm_status read_base(sdm_experiment *e, sdm_reader *r, sdm_error *err)
     return SDM_OK;
 }
 
-/* A relative path fit.model in the file is relative to the folder of the file; on the command line
- * it is relative to the working folder, like other files there. */
+/* A relative path fit.model from the experiment's file is relative to the folder of that file and
+ * is converted here. On the command line it is relative to the working folder, as for other files.
+ */
 static void place_model(sdm_experiment *e, sdm_reader *r)
 {
     const sdm_mark mark = sdm_fields_given(r, "fit", "model")->mark;
@@ -141,8 +144,8 @@ static void place_model(sdm_experiment *e, sdm_reader *r)
         sdm_mistakes_add(r->mistakes, mark, "fit.model: the path is too long");
 }
 
-/* Reads the file, the overrides and the base. Mistakes in the YAML syntax of the file end the
- * reading, as in a training configuration. */
+/* Reads the file, the overrides and the base configuration. Mistakes in the YAML syntax of the file
+ * end the reading, as in a training configuration. */
 static sdm_status read_all(sdm_experiment *e, sdm_reader *r, const char *text, size_t size,
                            const char *const *overrides, size_t n_overrides, sdm_error *err)
 {

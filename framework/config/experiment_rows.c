@@ -6,7 +6,7 @@
 #include "experiment_schema.h"
 #include "sdm/memory.h"
 
-/* The folder name of a title: "POD, 128^3" -> "pod-128-3". */
+/* folder = the title as a folder name: "POD, 128^3" becomes "pod-128-3". */
 static void make_folder(const char *title, char folder[SDM_EXPERIMENT_TITLE_MAX])
 {
     size_t n = 0;
@@ -64,7 +64,7 @@ static void find_networks(sdm_experiment *e, sdm_mark model, sdm_mistakes *mista
             n_networks);
 }
 
-/* Records two rows with the same folder. */
+/* Records a mistake if two rows have the same folder. */
 static void check_folders(const sdm_experiment *e, sdm_mistakes *m)
 {
     for (size_t i = 0; i < e->n_rows; i++)
@@ -79,7 +79,8 @@ static void check_folders(const sdm_experiment *e, sdm_mistakes *m)
         }
 }
 
-/* Sets `reference` of the rows; records references without a row, and two for one row. */
+/* Sets `reference` of the rows. Mistakes are references without a row, and two references for one
+ * row. */
 static void attach_references(sdm_experiment *e, sdm_mistakes *m)
 {
     const char *titles[SDM_EXPERIMENT_ROWS_MAX];
@@ -101,7 +102,7 @@ static void attach_references(sdm_experiment *e, sdm_mistakes *m)
     }
 }
 
-/* Records a baseline that is not the name of a method. */
+/* Records a mistake if the baseline is not the name of a method. */
 static void check_baseline(const sdm_experiment *e, sdm_mark mark, sdm_mistakes *m)
 {
     const char *names[SDM_EXPERIMENT_ROWS_MAX], *wanted = e->experiment.baseline;
@@ -129,7 +130,7 @@ sdm_status sdm_experiment_finish(sdm_experiment *e, sdm_reader *r, sdm_error *er
                          e->n_methods, n_variants, SDM_EXPERIMENT_ROWS_MAX);
     if (r->mistakes->count > 0) return SDM_OK;
 
-    // variant by variant, each with all methods
+    // make the rows, variant by variant, each with all methods
     const sdm_status s =
         SDM_ALLOC(&e->rows, e->n_methods * n_variants, "rows of the experiment", err);
     if (s) return s;

@@ -1,4 +1,5 @@
-/* The keys of an experiment: one table per kind of mapping, and functions that read its lists. */
+/* The keys of an experiment: a field table for each section of the file and for the elements of
+ * each list, and functions that read these lists. */
 #include "experiment_schema.h"
 
 #include <math.h>
@@ -281,8 +282,9 @@ static bool read_training(sdm_reader *r, const sdm_field *f, const sdm_tree_node
 
 /* ---- lists ---- */
 
-/* Reads the elements of a list into the new array *array[*n], elements of `size` bytes, by the
- * table of `section`; its first key is required. begin() initialises an element. */
+/* Reads the elements of a list into a new array (*array)[*n] with elements of `size` bytes, by the
+ * field table of `section`; the first key of the table is required. begin() initialises an
+ * element. */
 static bool read_list(sdm_reader *r, const sdm_tree_node *node, const char *path,
                       const sdm_section *section, void **array, size_t *n, size_t size,
                       void (*begin)(void *element, sdm_mark mark))
@@ -334,7 +336,7 @@ static bool refuse_method(sdm_reader *r, const M *m, const char *why)
     return false;
 }
 
-/* Checks the keys of a method with `fit`; an exact or naive fit gets its engine. */
+/* Checks the keys of a method with `fit`, and sets the engine of an exact or naive fit. */
 static bool finish_fit(sdm_reader *r, M *m)
 {
     if (m->fit == SDM_EXPERIMENT_FIT_NETWORK) {

@@ -1,14 +1,15 @@
-/* The tables of an experiment, and the rules that involve several of its keys. */
+/* The field tables (fields.h) of an experiment's configuration, and the rules that involve several
+ * of its keys. */
 #ifndef SDM_EXPERIMENT_SCHEMA_H
 #define SDM_EXPERIMENT_SCHEMA_H
 
 #include "fields.h"
 #include "sdm/internal/experiment.h"
 
-/* The tables of the sections of the file, constant; *n = their number. */
+/* The field tables of the sections of the file, constant; *n = number of sections. */
 const sdm_section *sdm_experiment_sections(size_t *n);
 
-/* True when the dotted key[length], "grid.size", belongs to the training configuration. */
+/* True if the dotted key[length], e.g. "grid.size", belongs to the training configuration. */
 bool sdm_experiment_is_training_key(const char *key, size_t length);
 
 /* Call after the file and all overrides: makes the rows, and records missing keys, names that occur

@@ -1,6 +1,5 @@
-/* Reads the values of a YAML tree into a struct by field tables, and reports values that do not
- * fit.
- */
+/* Reads the values of a YAML tree into a struct by field tables, and reports unknown keys and
+ * values that do not fit. */
 #include "fields.h"
 
 #include <assert.h>
@@ -10,8 +9,8 @@
 
 #define CHOICES_MAX 16
 
-/* Reads one value. Defaults are read by it, too, so the tables cannot have a default that would be
- * refused in a file. */
+/* Reads one value. Defaults are read by this function, too, so the tables cannot have a default
+ * that would be refused in a file. */
 static bool read_field(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
                        const char *path);
 
@@ -76,8 +75,8 @@ bool sdm_read_real(sdm_reader *r, const sdm_tree_node *node, const char *path, d
     return true;
 }
 
-/* Does the text have the syntax of an integer? One too large for 64 bits has: it is out of range,
- * not of the wrong type. */
+/* True if the text has the syntax of an integer, even of one too large for 64 bits: such a number
+ * is out of range, not of the wrong type. */
 static bool is_integer(const char *text)
 {
     size_t sign = *text == '-' || *text == '+';
@@ -291,7 +290,7 @@ static const char *suggest(const sdm_reader *r, const sdm_section *section, cons
     return NULL;
 }
 
-/* Records an unknown key, with a suggestion where there is one. */
+/* Records an unknown key as a mistake, with a suggestion if suggest() finds one. */
 static void refuse_key(sdm_reader *r, const sdm_section *section, const sdm_tree_node *node)
 {
     char quoted[SDM_QUOTE_MAX], buf[SDM_KEY_PATH_MAX];

@@ -1,5 +1,5 @@
-/* Field tables: one row per key defines how its value is parsed, its bounds, its default, how it is
- * written and its description. */
+/* Field tables: each row belongs to one key and defines how the value of the key is parsed and
+ * written, its bounds, its default and its description. */
 #ifndef SDM_FIELDS_H
 #define SDM_FIELDS_H
 
@@ -21,20 +21,20 @@ typedef enum sdm_field_type {
 
 struct sdm_reader;
 
-/* A row: one key. */
+/* A row of a field table: one key. */
 typedef struct sdm_field {
     const char *key;
     sdm_field_type type;
-    size_t offset; /* of the member in the struct at sdm_reader.target; unused for SPECIAL */
+    size_t offset; /* byte offset of the member in *sdm_reader.target; unused for SPECIAL */
     double min, max;
     const char *def; /* default as text in YAML syntax; NULL: none */
     const char *choices;
     const char *unit, *help;
-    /* type, range and default in the description; NULL: derived from the members above */
+    /* type, range and default as shown in the description; NULL: derived from the members above */
     const char *shown_type, *shown_range, *shown_def;
     unsigned kinds;               /* bit k: networks of kind k have the key; 0: all have it */
     const char *const *kind_defs; /* [kind] default for each kind of network; NULL: `def` for all */
-    /* For SPECIAL: reads a value; false after a mistake was recorded. */
+    /* For SPECIAL: reads a value; returns false after it has recorded a mistake. */
     bool (*read)(struct sdm_reader *r, const struct sdm_field *f, const sdm_tree_node *node,
                  const char *path);
     /* For SPECIAL: writes the value as YAML, without the key; NULL: the key is not written. */
@@ -48,24 +48,24 @@ typedef struct sdm_section {
     size_t n_fields;
 } sdm_section;
 
-/* Where a key was given last (mark not set: nowhere, the default holds), and whether its value was
- * refused. */
+/* The position at which a key was given last, and whether its value was refused. If the mark is not
+ * set, the key was not given, and the default holds. */
 typedef struct sdm_given {
     sdm_mark mark;
     bool refused;
 } sdm_given;
 
-/* State of reading a configuration, or one element of a list in it, into a struct. */
+/* State of reading a configuration, or one element of a list of a configuration, into a struct. */
 typedef struct sdm_reader {
     void *target;       /* the struct that the tables describe */
     sdm_config *config; /* the same struct if it is a training configuration, else NULL */
     sdm_mistakes *mistakes;
     const sdm_section *sections; /* [n_sections] */
     size_t n_sections;
-    sdm_mark section_mark[SDM_SECTIONS_MAX]; /* first mention of each section */
+    sdm_mark section_mark[SDM_SECTIONS_MAX]; /* first position of each section */
     sdm_given given[SDM_SECTIONS_MAX][SDM_SECTION_FIELDS_MAX];
-    double centre[3]; /* grid.centre; converted to the origin when everything is read */
-    int file_kind;    /* network.kind before the overrides */
+    double centre[3]; /* grid.centre; converted to grid.origin after all keys are read */
+    int file_kind;    /* network.kind before the overrides are applied */
 } sdm_reader;
 
 static inline bool sdm_mark_is_set(sdm_mark m) { return m.line > 0 || m.override > 0; }
@@ -83,8 +83,8 @@ void sdm_fields_read(sdm_reader *r, const sdm_tree_node *root);
 /* The entry of r->given for section.key, which must exist in the tables. */
 sdm_given *sdm_fields_given(sdm_reader *r, const char *section, const char *key);
 
-/* Read one scalar within min .. max, or a text of at most `max` bytes; `path` names the key in
- * messages. False after a mistake was recorded; *out is then unchanged. */
+/* Read one number in min .. max, or a text of at most `max` bytes; `path` names the key in
+ * messages. Return false after a mistake was recorded; *out is then unchanged. */
 bool sdm_read_real(sdm_reader *r, const sdm_tree_node *node, const char *path, double min,
                    double max, double *out);
 bool sdm_read_int(sdm_reader *r, const sdm_tree_node *node, const char *path, int64_t min,
@@ -100,13 +100,14 @@ bool sdm_refuse_type(sdm_reader *r, const sdm_tree_node *node, const char *path,
  * buf. */
 const char *sdm_field_range(const sdm_field *f, char *buf, size_t size);
 
-/* sdm_format_real(), but integers of up to nine digits without an exponent: 20, not 2e+01. */
+/* As sdm_format_real(), but always writes integers of up to nine digits without an exponent: 20,
+ * not 2e+01. */
 const char *sdm_format_plain(double v, char buf[32]);
 
 /* Appends a text in double quotes, in YAML syntax. */
 void sdm_dump_text(const char *text, sdm_text *out);
 
-/* buf = name number `index` of the list "a|b|c"; false when index is too large. */
+/* buf = name number `index`, from 0, of the list "a|b|c"; false if the index is too large. */
 bool sdm_choice_name(const char *choices, int index, char buf[SDM_NAME_MAX]);
 
 #endif

@@ -27,7 +27,7 @@ const char *sdm_kind_defaults(const sdm_field *f, char *buf, size_t size)
     return list_kinds(f, true, buf, size);
 }
 
-/* Checks the ranges that are narrower for one kind than in the table of keys. */
+/* Checks the ranges that are narrower for one kind of network than in the field table. */
 static void check_limits(sdm_reader *r, sdm_mark place)
 {
     const sdm_config *c = r->config;
@@ -64,7 +64,7 @@ void sdm_kinds_settle(sdm_reader *r, sdm_mark place)
             const sdm_field *f = &r->sections[s].fields[k];
             sdm_given *g = &r->given[s][k];
             if (!f->kinds && !f->kind_defs) continue;
-            // a key of the file that does not fit the kind of an override counts as not given
+            // a key of the file that does not fit the kind set by an override counts as not given
             const bool fits = sdm_kind_has(f, kind) &&
                               !(f->offset == offsetof(sdm_config, network.weights) && bytes);
             if (!fits && kind != r->file_kind && g->mark.override == 0) *g = (sdm_given){0};

@@ -5,8 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Strict order of positions: the file before the overrides. Mistakes at the same position stay in
- * the order in which they were found. */
+/* Strict order of positions, the file before the overrides. All positions in one override count as
+ * equal. Mistakes at equal positions stay in the order in which they were found. */
 static bool is_before(sdm_mark a, sdm_mark b)
 {
     if (a.override != b.override) return a.override < b.override;
@@ -51,7 +51,7 @@ sdm_status sdm_mistakes_report(const sdm_mistakes *m, sdm_error *err)
     size_t used = 0, shown = 0;
     if (m->count == 0) return SDM_OK;
 
-    // as many whole lines as fit
+    // print as many whole lines as fit
     text[0] = 0;
     for (; shown < m->count && shown < SDM_MISTAKES_SHOWN; shown++) {
         char place[SDM_PATH_TEXT_MAX + SDM_QUOTE_MAX], line[sizeof place + SDM_MISTAKE_TEXT_MAX];

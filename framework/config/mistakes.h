@@ -16,8 +16,8 @@ typedef struct sdm_mistake {
 
 typedef struct sdm_mistakes {
     const char *file; /* file name for marks without a source; owned by the caller */
-    size_t count;     /* of all mistakes */
-    /* sorted: those of the file by line and column, then those of the overrides by number */
+    size_t count;     /* number of all mistakes, including those that are not kept */
+    /* sorted: mistakes in the file by line and column, then mistakes in overrides by number */
     sdm_mistake first[SDM_MISTAKES_SHOWN];
 } sdm_mistakes;
 
@@ -27,12 +27,12 @@ void sdm_mistakes_add(sdm_mistakes *m, sdm_mark mark, const char *fmt, ...) SDM_
 /* SDM_OK when there are no mistakes, else SDM_E_CONFIG with one line per mistake in err->text. */
 sdm_status sdm_mistakes_report(const sdm_mistakes *m, sdm_error *err);
 
-/* buf[size] = position of a mark: "file:line:column", "argument 'key=value'", or the file name
- * alone. Returns buf. */
+/* buf[size] = the position of a mark as text: "file:line:column", "argument 'key=value'", or only
+ * the file name. Returns buf. */
 const char *sdm_mark_print(sdm_mark mark, const char *file, char *buf, size_t size);
 
-/* buf = `text` for use in a message: control characters become '?', and it is cut after 60 bytes.
- * Returns buf. */
+/* buf = `text` for use in a message: control characters become '?', and the text is cut after 60
+ * bytes. Returns buf. */
 const char *sdm_quote(const char *text, char buf[SDM_QUOTE_MAX]);
 
 #endif

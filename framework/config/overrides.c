@@ -33,8 +33,9 @@ void sdm_overrides_dispose(sdm_overrides *o)
     *o = (sdm_overrides){0};
 }
 
-/* Appends the value as YAML on one line. Plain scalars with characters that have a meaning within
- * brackets are put in quotes; they are not numbers, so quotes do not change their meaning. */
+/* Appends the value as YAML on one line. Plain scalars that contain characters with a meaning
+ * inside brackets are put in quotes. They are not numbers, so the quotes do not change their
+ * meaning. */
 static void add_value(const sdm_tree_node *node, sdm_text *out)
 {
     const bool is_list = node->kind == SDM_TREE_LIST;
@@ -57,7 +58,8 @@ static void add_value(const sdm_tree_node *node, sdm_text *out)
     sdm_text_add(out, is_list ? "]" : "}");
 }
 
-/* Are all texts and keys of the value printable, so that it can be written on one line? */
+/* True if all texts and keys of the value are printable, so that the value can be written on one
+ * line. */
 static bool is_printable(const sdm_tree_node *node)
 {
     if (node->text && node->text[sdm_tree_printable(node->text, strlen(node->text))]) return false;

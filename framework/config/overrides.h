@@ -5,9 +5,9 @@
 #include "sdm/internal/experiment.h"
 #include "yaml_tree.h"
 
-/* Appends "key=value" for every leaf below the mapping `node`. The key is the path of the leaf,
- * joined by dots, after `prefix` ("" for none): {grid: {spacing: 0.2}} gives "grid.spacing=0.2".
- * Lists are leaves. False after a mistake was recorded. */
+/* Appends "key=value" for every leaf below the mapping `node`. The key is `prefix` ("" for none)
+ * and the names on the path to the leaf, joined by dots: {grid: {spacing: 0.2}} gives
+ * "grid.spacing=0.2". Lists are leaves. Returns false after a mistake was recorded. */
 bool sdm_overrides_add_tree(sdm_overrides *o, const char *prefix, const sdm_tree_node *node,
                             sdm_mistakes *mistakes);
 

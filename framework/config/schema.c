@@ -270,13 +270,14 @@ const sdm_section *sdm_config_sections(size_t *n)
     return SECTIONS;
 }
 
-/* Was the key last given by this override, with an accepted value? */
+/* True if the key was last given by this override, with an accepted value. */
 static bool by_override(const sdm_given *g, int override)
 {
     return g->mark.override == override && !g->refused;
 }
 
-/* The three alternative budgets of train: where each was given, and whether it is positive. */
+/* For the three alternative budgets of `train`: given[] = where each was given, positive[] =
+ * whether it is positive. */
 static void budgets(sdm_reader *r, sdm_given *given[3], bool positive[3])
 {
     static const char *const KEYS[3] = {"minutes", "steps", "samples"};
@@ -305,14 +306,14 @@ void sdm_config_settle_override(sdm_reader *r, int override)
     if (given[2]->mark.override != override) r->config->train.samples = 0;
 }
 
-/* Is position a after position b? */
+/* True if position a is after position b. */
 static bool is_later(sdm_mark a, sdm_mark b)
 {
     if (a.override != b.override) return a.override > b.override;
     return a.line != b.line ? a.line > b.line : a.column > b.column;
 }
 
-/* Exactly one budget must be positive. */
+/* Records a mistake unless exactly one budget is positive. */
 static void check_budget(sdm_reader *r, sdm_mark section)
 {
     sdm_given *given[3];
@@ -335,7 +336,7 @@ static void check_budget(sdm_reader *r, sdm_mark section)
             "only one of train.minutes, train.steps and train.samples may be positive, got %d", n);
 }
 
-/* Records a missing key, unless it was given. */
+/* Records a missing key as a mistake, unless the key was given. */
 static void require(sdm_reader *r, const char *section, const char *key, sdm_mark mark,
                     const char *example)
 {
@@ -343,7 +344,7 @@ static void require(sdm_reader *r, const char *section, const char *key, sdm_mar
     sdm_mistakes_add(r->mistakes, mark, "missing key '%s.%s'; e.g. %s", section, key, example);
 }
 
-/* Checks the grid and computes its origin from grid.centre. */
+/* Checks the grid and, unless grid.origin was given, computes the origin from grid.centre. */
 static void finish_grid(sdm_reader *r, sdm_mark section)
 {
     sdm_grid *g = &r->config->grid;
@@ -369,7 +370,7 @@ static void finish_grid(sdm_reader *r, sdm_mark section)
                          "grid.size: %.200s", err.text);
 }
 
-/* Where a section begins, or `top` if the section is missing. */
+/* Returns the position at which a section begins, or `top` if the section is missing. */
 static sdm_mark section_place(const sdm_reader *r, const char *name, sdm_mark top)
 {
     size_t s = 0;

@@ -1,14 +1,16 @@
-/* The tables of a training configuration, and the rules that involve several keys. */
+/* The field tables (fields.h) of a training configuration, and the rules that involve several
+ * keys. */
 #ifndef SDM_SCHEMA_H
 #define SDM_SCHEMA_H
 
 #include "fields.h"
 
-/* The tables, constant; *n = their number. */
+/* The field tables of all sections, constant; *n = number of sections. */
 const sdm_section *sdm_config_sections(size_t *n);
 
-/* Call after each override, by its number: resets earlier keys that it replaces (the other budgets
- * of train, or grid.origin by grid.centre and the reverse). */
+/* Call after each override with the number of the override: resets earlier keys that this override
+ * replaces. A budget of `train` replaces the other budgets; grid.centre and grid.origin replace
+ * each other. */
 void sdm_config_settle_override(sdm_reader *r, int override);
 
 /* Call after the file and all overrides: records missing keys and keys that exclude each other, and

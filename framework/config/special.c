@@ -11,7 +11,7 @@
 #define PLACE_MAX 1e9
 #define STATIC_MAX 1000
 
-/* Reads [x, y, z] within min .. max and reports mistakes of all three. */
+/* Reads [x, y, z] within min .. max and reports the mistakes in all three numbers. */
 static bool read_three(sdm_reader *r, const sdm_tree_node *node, const char *path, double min,
                        double max, double out[3])
 {
@@ -78,7 +78,7 @@ bool sdm_read_key_centre(sdm_reader *r, const sdm_field *f, const sdm_tree_node 
     return read_three(r, node, path, -PLACE_MAX, PLACE_MAX, r->centre);
 }
 
-/* Reads the key of an entry: the name of an option or parameter of a shape. */
+/* Reads the key of a node, the name of an option or parameter of a shape. */
 static bool read_name(sdm_reader *r, const sdm_tree_node *node, const char *path,
                       char out[SDM_NAME_MAX])
 {

@@ -1,5 +1,6 @@
-/* Functions of the SPECIAL rows of the tables of a training configuration. The signatures are those
- * of sdm_field.read and sdm_field.dump; NAME in sdm_read_key_NAME() is the key. */
+/* Functions that read and write the keys of type SDM_FIELD_SPECIAL of a training configuration. The
+ * signatures are those of sdm_field.read and sdm_field.dump; NAME in sdm_read_key_NAME() and
+ * sdm_dump_key_NAME() is the key. */
 #ifndef SDM_SPECIAL_H
 #define SDM_SPECIAL_H
 

@@ -1,6 +1,4 @@
-/* Builds a tree of nodes with marks from the events of libyaml. The only file that includes
- * libyaml.
- */
+/* Builds a tree of nodes with marks from the events of libyaml. No other file includes libyaml. */
 #include "yaml_tree.h"
 
 #include <stdio.h>
@@ -10,7 +8,7 @@
 #include "sdm/internal/file.h"
 #include "sdm/memory.h"
 
-/* An open list or map. */
+/* A list or map whose end has not been read yet. */
 typedef struct tree_frame {
     sdm_tree_node *node;
     bool want_key;   /* a map: the next event is a key */
@@ -29,8 +27,8 @@ typedef struct tree_builder {
     bool has_document;
 } tree_builder;
 
-/* Returns the length of the UTF-8 sequence at s, 0 if it is invalid, overlong or a surrogate.
- * *code = its code point. */
+/* Returns the length of the UTF-8 sequence at s, and sets *code to its code point. Returns 0 if the
+ * sequence is invalid, overlong or a surrogate. */
 static size_t utf8_next(const unsigned char *s, size_t left, uint32_t *code)
 {
     static const uint32_t CODE_MIN[5] = {0, 0, 0x80, 0x800, 0x10000};
@@ -46,7 +44,8 @@ static size_t utf8_next(const unsigned char *s, size_t left, uint32_t *code)
     return n;
 }
 
-/* The characters that YAML defines as printable, without line breaks and the byte order mark. */
+/* True for the characters that YAML defines as printable, except tabs, line breaks and the byte
+ * order mark. */
 static bool is_printable(uint32_t c)
 {
     if (c < 0xA0) return c >= 0x20 && c < 0x7F;
@@ -65,14 +64,14 @@ size_t sdm_tree_printable(const char *text, size_t size)
     return size;
 }
 
-/* The mark of a position; all positions in an override have the mark of the override. */
+/* Returns the mark of a position; all positions in an override have the mark of the override. */
 static sdm_mark mark_at(sdm_mark override, int line, int column)
 {
     return override.override > 0 ? override : (sdm_mark){.line = line, .column = column};
 }
 
-/* Checks encoding and tabs before libyaml does: its messages for these do not help, and it accepts
- * byte order marks silently. */
+/* Checks encoding, control characters and tabs before libyaml reads the text: the messages of
+ * libyaml for these mistakes do not help, and it accepts byte order marks silently. */
 static bool check_characters(const unsigned char *s, size_t size, sdm_mark override,
                              sdm_mistakes *mistakes)
 {
@@ -122,7 +121,7 @@ static bool check_characters(const unsigned char *s, size_t size, sdm_mark overr
 
 static sdm_mark mark_of(const tree_builder *b, yaml_mark_t at)
 {
-    // the text has at most 2^20 bytes, so both fit
+    // the text has at most 2^20 bytes, so line and column fit in an int
     return mark_at(b->override, (int)at.line + 1, (int)at.column + 1);
 }
 
@@ -163,7 +162,7 @@ static void attach(tree_builder *b, sdm_tree_node *node)
     tree_frame *f = &b->stack[b->depth - 1];
     sdm_tree_node *parent = f->node;
     if (parent->kind == SDM_TREE_MAP) {
-        // a list or map in place of a key: dropped with its value
+        // this list or map stands in place of a key: it is dropped together with its value
         if (f->want_key) {
             sdm_mistakes_add(b->mistakes, node->mark, "a key must be a single name");
             f->want_key = false;
@@ -277,7 +276,7 @@ static sdm_status open_collection(tree_builder *b, const yaml_event_t *e)
     return SDM_OK;
 }
 
-/* Refuses an alias; its value is unknown, so reading ends here. */
+/* Refuses an alias. The value of the alias is unknown, so reading ends here. */
 static sdm_status refuse_alias(tree_builder *b, const yaml_event_t *e)
 {
     char buf[SDM_QUOTE_MAX];
@@ -325,7 +324,7 @@ static sdm_status read_event(tree_builder *b, const yaml_event_t *e)
     }
 }
 
-/* Is character number `index` a tab? libyaml counts characters, not bytes. */
+/* True if character number `index` is a tab; libyaml counts characters, not bytes. */
 static bool is_tab(const char *text, size_t size, size_t index)
 {
     size_t at = 0;
@@ -356,8 +355,8 @@ static sdm_status report_syntax(const tree_builder *b, const yaml_parser_t *pars
     return SDM_E_CONFIG;
 }
 
-/* Parses event by event: depth and size are checked when libyaml has read at most about one line
- * ahead. */
+/* Parses event by event, so that a document that is nested too deeply or has too many values is
+ * refused early: libyaml reads at most about one line ahead. */
 static sdm_status tree_build(tree_builder *b, yaml_parser_t *parser, const char *text, size_t size)
 {
     sdm_status s = SDM_OK;
@@ -377,9 +376,10 @@ static sdm_status tree_build(tree_builder *b, yaml_parser_t *parser, const char 
 /* Allocates nodes and texts for a document of `size` bytes. */
 static sdm_status tree_allocate(sdm_tree *tree, size_t size, sdm_error *err)
 {
-    // Upper bounds: two nodes per byte of the document, and two bytes of text per byte (an escape
-    // sequence yields at most 1.5) plus a terminator per node; both are checked again on use.
-    // The terms SDM_TREE_PATH_... are for sdm_tree_wrap().
+    // Upper bounds: two nodes for each byte of the document; two bytes of text for each byte (an
+    // escape sequence yields at most 1.5), and two terminators for each node, for its text and its
+    // key. add_node() and copy_text() check these bounds again. The terms SDM_TREE_PATH_... are for
+    // sdm_tree_wrap().
     size_t nodes = 2 * size + 2;
     tree->max_nodes = nodes < SDM_TREE_NODES_MAX ? nodes : SDM_TREE_NODES_MAX;
     tree->pool_size = 2 * size + 2 * tree->max_nodes + SDM_TREE_PATH_BYTES + SDM_TREE_PATH_NAMES;
@@ -429,7 +429,7 @@ sdm_status sdm_tree_wrap(sdm_tree *tree, const char *path, size_t length, sdm_ma
         *tree->root = (sdm_tree_node){.kind = SDM_TREE_SCALAR, .text = "", .mark = override};
     }
     for (size_t end = length + 1; end > 0;) {
-        // from the last name, path[start .. end - 1), to the first
+        // from the last name to the first: this name is path[start] .. path[end - 2]
         size_t start = end - 1;
         while (start > 0 && path[start - 1] != '.') start--;
         const char *key = NULL;

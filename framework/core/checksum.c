@@ -27,7 +27,7 @@ uint64_t sdm_crc64(uint64_t crc, const void *data, size_t size)
     crc = ~crc;
     for (; size >= 8; size -= 8, p += 8) {
         uint64_t w = 0;
-        // the 8 bytes in little-endian order, on any machine
+        // load 8 bytes in little-endian order, on any machine
         for (int i = 7; i >= 0; i--) w = w << 8 | p[i];
         crc ^= w;
         uint64_t next = 0;

@@ -5,8 +5,8 @@
 
 void sdm_lower_envelope(double *f, int64_t n, double spacing, double *scratch)
 {
-    // parabola m of the envelope: position of its minimum, value there, and start of the interval
-    // in which it is the lowest
+    // for parabola k of the envelope: site[k] = position of its minimum, height[k] = value there,
+    // from[k] = start of the interval in which it is the lowest
     double *site = scratch, *from = site + n, *height = from + n;
     const double square = spacing * spacing;
     int64_t m = 0;
@@ -15,7 +15,7 @@ void sdm_lower_envelope(double *f, int64_t n, double spacing, double *scratch)
         const double x = (double)i;
         double start = -INFINITY;
         while (m > 0) {
-            // intersection of the new parabola with the last one; right of it the new one is lower
+            // the new parabola intersects the last one at `start` and is lower to the right of it
             start = 0.5 * (x + site[m - 1] + (f[i] - height[m - 1]) / (square * (x - site[m - 1])));
             if (start > from[m - 1]) break;
             m--;

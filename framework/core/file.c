@@ -40,7 +40,7 @@ sdm_status sdm_file_read(const char *path, uint64_t max_bytes, uint8_t **data, s
                      (unsigned long long)st.st_size, (unsigned long long)max_bytes);
         goto done;
     }
-    // only possible with 32-bit addresses
+    // this can only happen with 32-bit addresses
     if ((uint64_t)st.st_size >= SIZE_MAX) {
         s = sdm_fail(err, SDM_E_NOMEM, "%s: %llu bytes are more than memory can hold", path,
                      (unsigned long long)st.st_size);
@@ -92,9 +92,8 @@ static char *path_with_suffix(const char *path, const char *suffix)
     return out;
 }
 
-/* Creates a temporary file in the folder of `path` with a unique name (process id and counter).
- * Returns its file descriptor, or -1 with errno set; *temp: its name, to be freed, NULL on
- * error. */
+/* Creates a temporary file with a unique name (`path`, process id and a counter). Returns its file
+ * descriptor, or -1 with errno set. *temp = the name of the file, to be freed; NULL on error. */
 static int temp_open(const char *path, char **temp)
 {
     static atomic_ulong counter;
@@ -209,7 +208,8 @@ sdm_status sdm_outfile_commit(sdm_outfile **pf, sdm_error *err)
 {
     sdm_outfile *f = *pf;
     sdm_status s = outfile_flush(f, err);
-    // a library may have replaced the temporary file: open it by name again before fsync()
+    // a library may have replaced the temporary file by another one of the same name: open it again
+    // by its name for fsync()
     if (!s) {
         const int fd = open(f->temp, O_RDWR | O_CLOEXEC);
         if (fd < 0 || fsync(fd))

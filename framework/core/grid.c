@@ -21,7 +21,7 @@ sdm_status sdm_grid_check(const sdm_grid *g, sdm_error *err)
         if (g->n[a] < 1 || g->n[a] > 1 << 20)
             return sdm_fail(err, SDM_E_ARG, "grid size along %c is %lld, need 1 to 1048576",
                             axis[a], (long long)g->n[a]);
-        // squares of spacings must be finite and normal, too
+        // these bounds also keep the squares of spacings finite and normal
         if (!(g->spacing[a] >= 1e-100) || !(g->spacing[a] <= 1e100))
             return sdm_fail(
                 err, SDM_E_ARG,

@@ -15,7 +15,8 @@
 #define ALIGNMENT 64u
 #define HUGE_PAGE ((size_t)2 << 20)
 
-/* The allocation that fails, counted from now; 0: none; only set by tests. */
+/* The number of allocations until one fails, that one included; 0: none fails. Set by tests only.
+ */
 static atomic_ulong fail_after;
 
 void sdm_alloc_fail_after(unsigned long n) { atomic_store(&fail_after, n); }
@@ -34,7 +35,8 @@ sdm_status sdm_mul(size_t a, size_t b, size_t *out, sdm_error *err)
     return SDM_OK;
 }
 
-/* Allocates without initialisation. *used: bytes of the block, rounded up to the alignment. */
+/* Allocates without initialisation. *used = bytes of the block, rounded up to the alignment or, for
+ * a large block, to whole large pages. */
 static sdm_status block_allocate(void **out, size_t count, size_t size, size_t *used,
                                  const char *what, sdm_error *err)
 {

@@ -89,7 +89,7 @@ static void quaternion_of_rotation(const double rotation[3], double q[4])
 
 void sdm_rotation_of_quaternion(const double q[4], double rotation[3])
 {
-    // q and -q are the same rotation: take the angle of at most pi
+    // q and -q are the same rotation: take the one with q[0] >= 0, whose angle is at most pi
     const double sine = vector_length(q + 1), sign = q[0] < 0 ? -1 : 1;
     const double scale = sine == 0 ? 2 * sign : 2 * sign * atan2(sine, fabs(q[0])) / sine;
     for (int i = 0; i < 3; i++) rotation[i] = scale * q[1 + i];
@@ -118,8 +118,8 @@ void sdm_rotation_product(const double a[9], const double b[9], double out[9])
 
 void sdm_rotation_vector(const double r[9], double rotation[3])
 {
-    // Shepperd (1978): start with the largest of the four squared components, to avoid division by
-    // a small number
+    // Shepperd (1978): compute the largest component of the quaternion first, because the others
+    // are divided by it
     const double trace = r[0] + r[4] + r[8];
     int k = 0;
     for (int i = 1; i < 3; i++)
@@ -142,8 +142,8 @@ void sdm_rotation_vector(const double r[9], double rotation[3])
     sdm_rotation_of_quaternion(q, rotation);
 }
 
-/* (t - sin t) / t^3; by its power series below 1 rad, where the formula suffers from
- * cancellation. */
+/* Returns (t - sin t) / t^3 for the angle t; below 1 rad by its power series, because the formula
+ * suffers from cancellation there. */
 static double jacobian_coefficient(double angle)
 {
     const double square = angle * angle;

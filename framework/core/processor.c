@@ -3,8 +3,8 @@
 
 static int wanted_level = -1;
 
-/* Cheap enough for every call: __builtin_cpu_supports() reads flags that the start-up code of the
- * compiler's run-time library has stored. */
+/* This function is cheap enough to be called by every kernel: __builtin_cpu_supports() reads flags
+ * that the start-up code of the compiler's run-time library has stored. */
 int sdm_processor_level(void)
 {
     int best = SDM_PROCESSOR_BASELINE;

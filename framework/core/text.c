@@ -38,7 +38,8 @@ void sdm_text_add(sdm_text *t, const char *fmt, ...)
     va_end(again);
 }
 
-/* Strtod() uses the decimal point of the current locale, so replace '.' by that character. */
+/* strtod() expects the decimal point of the current locale, so '.' is replaced by that character.
+ */
 bool sdm_parse_real(const char *s, double *out)
 {
     char buf[512];
@@ -90,8 +91,8 @@ const char *sdm_format_real(double v, char buf[32])
 
 static int smaller(int a, int b) { return a < b ? a : b; }
 
-/* Optimal string alignment distance: insertions, deletions, substitutions, transpositions of
- * neighbours. */
+/* Optimal string alignment distance: the number of insertions, deletions, substitutions and
+ * transpositions of neighbours that turn a into b. Only the first WORD_MAX bytes count. */
 static int edit_distance(const char *a, const char *b)
 {
     const int n = (int)strnlen(a, WORD_MAX), m = (int)strnlen(b, WORD_MAX);

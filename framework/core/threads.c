@@ -1,11 +1,11 @@
-/* Number of threads. */
+/* Number of threads, and number of the calling thread. */
 #include "sdm/internal/threads.h"
 
 #ifdef _OPENMP
 #include <omp.h>
 #endif
 
-/* Lower limit of the allowed maximum: tests use more threads than a small machine has
+/* At least this many threads are allowed, because tests use more threads than a small machine has
  * processors. */
 #define LIMIT_MIN 64
 

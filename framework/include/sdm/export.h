@@ -1,4 +1,5 @@
-/* Version of the library, and visibility of the public symbols of its shared libraries. */
+/* Version of sdmgen, and macros for the visibility of public symbols and for the format check of
+   printf-like functions. */
 #ifndef SDM_EXPORT_H
 #define SDM_EXPORT_H
 

@@ -1,5 +1,6 @@
-/* Regular voxel grid of a map. Everywhere: mm, coordinate system LPS (x to the left, y to
- * posterior, z to superior), index (i, j, k) <-> (x, y, z), x fastest: values[nz][ny][nx]. */
+/* Regular voxel grid of a map. These conventions hold everywhere: lengths in mm; coordinate system
+ * LPS (x to the left, y to posterior, z to superior); indices (i, j, k) run along (x, y, z); x is
+ * fastest in memory: values[nz][ny][nx]. */
 #ifndef SDM_GRID_H
 #define SDM_GRID_H
 
@@ -15,19 +16,19 @@ extern "C" {
 /* world = origin + dir * diag(spacing) * (i, j, k). origin is the CENTRE of voxel (0, 0, 0), in mm;
  * spacing is in mm; dir is a row-major orthonormal 3 x 3 matrix (reflections are allowed). */
 typedef struct sdm_grid {
-    int64_t n[3];
+    int64_t n[3]; /* number of voxels along x, y, z */
     double origin[3];
     double spacing[3];
     double dir[9];
 } sdm_grid;
 
-/* Axis-aligned grid of n[3] voxels with the same spacing (mm) along all axes and the centre
- * `centre` (mm). Not checked. */
+/* Returns an axis-aligned grid of n[3] voxels, with the same spacing (mm) along all axes and its
+ * centre at `centre` (mm). The arguments are not checked. */
 SDM_API sdm_grid sdm_grid_centred(const int64_t n[3], double spacing, const double centre[3]);
 
-/* Checks that sizes are 1 .. 2^20, the number of voxels fits into memory, spacings and origin are
- * finite (1e-100 .. 1e100 mm and up to 1e100 mm), and dir is orthonormal to 1e-6. SDM_E_ARG names
- * the first violation. [any thread] */
+/* Checks that 1 <= n[i] <= 2^20, that an array of four doubles per voxel would be addressable,
+ * 1e-100 <= spacing[i] <= 1e100 mm, abs(origin[i]) <= 1e100 mm, and that dir is orthonormal to
+ * 1e-6. SDM_E_ARG names the first violation. [any thread] */
 SDM_API sdm_status sdm_grid_check(const sdm_grid *g, sdm_error *err);
 
 /* Number of voxels. The grid must have passed sdm_grid_check(). [any thread] */

@@ -11,7 +11,7 @@
 extern "C" {
 #endif
 
-/* *out = new zeroed block of count * size bytes, 64-byte aligned, to be freed with sdm_free(). A
+/* *out = a new zeroed block of count * size bytes, 64-byte aligned, to be freed with sdm_free(). A
  * count of 0 gives a valid block. `what` names the block in the error message. SDM_E_NOMEM on
  * overflow or lack of memory; *out is then NULL. [any thread] */
 SDM_API sdm_status sdm_alloc(void **out, size_t count, size_t size, const char *what,

@@ -13,8 +13,8 @@ extern "C" {
 
 #define SDM_MODEL_NAME_MAX 64
 
-/* A shape parameter: its name, its unit (e.g. "mm"), the range on which the network was trained,
-   min < max, and the default value. */
+/* A shape parameter: its name, its unit (e.g. "mm"), the range min < max on which the network was
+   trained, and the default value. */
 typedef struct sdm_model_param {
     char name[SDM_MODEL_NAME_MAX], unit[16];
     double min, max, def;
@@ -25,8 +25,8 @@ typedef struct sdm_model_param {
 typedef struct sdm_accuracy {
     int64_t samples; /* number of shapes */
     double mse_mm2, rmse_mm, mae_mm, max_abs_mm;
-    double rmse_near_mm;           /* over voxels with abs(exact distance) <= 0.4 mm */
-    double q50_mm, q90_mm, q99_mm; /* quantiles over the shapes of the RMSE of one map */
+    double rmse_near_mm;           /* RMSE over voxels with abs(exact distance) <= 0.4 mm */
+    double q50_mm, q90_mm, q99_mm; /* 50, 90, 99 % quantiles, over the shapes, of a map's RMSE */
 } sdm_accuracy;
 
 /* Description of a model. All pointers stay valid until sdm_model_free(); texts are
@@ -34,21 +34,21 @@ typedef struct sdm_accuracy {
 typedef struct sdm_model_info {
     char shape[SDM_MODEL_NAME_MAX];
     char kind[16];    /* kind of network: "pod", "deepsdf", "imnet" or "sdmnn" */
-    char version[16]; /* of the program that trained it */
+    char version[16]; /* version of the program that trained the network */
     size_t n_params;
     const sdm_model_param *params; /* [n_params] */
-    /* Options of the shape as text, for the exact distance. An option NAME whose value is a file is
-       followed by NAME.crc64: the CRC-64 of the file's content at the time of training. */
+    /* Options of the shape as text; the exact distance needs them. An option NAME whose value is a
+       file is followed by NAME.crc64: the CRC-64 of the file's content at the time of training. */
     size_t n_options;
     const char *const *option_names, *const *option_values; /* [n_options] */
-    sdm_grid grid;                                          /* of every map of the model */
+    sdm_grid grid;                                          /* grid of every map of the model */
     sdm_accuracy accuracy;
-    uint64_t seed; /* of the training */
+    uint64_t seed; /* seed of the training */
     double train_seconds;
     int64_t train_samples; /* exact maps used in training */
-    uint64_t checksum;     /* CRC-64 of the file */
+    uint64_t checksum;     /* CRC-64 of the file, without its last 8 bytes */
     size_t file_bytes, weight_bytes;
-    double macs;        /* multiply-adds of one map */
+    double macs;        /* number of multiply-adds for one map */
     const char *config; /* configuration of the training with all defaults filled in, YAML */
     const char *folder; /* folder of the file with a final '/'; NULL: opened from memory */
 } sdm_model_info;
@@ -57,7 +57,7 @@ typedef struct sdm_model_info {
 typedef struct sdm_model sdm_model;
 
 /* *out = the model of a file, to be freed with sdm_model_free(); NULL on error. All checksums are
-   checked, and all sizes against the length of the file before memory is allocated.
+   verified, and all sizes are compared with the length of the file before memory is allocated.
    SDM_E_IO: the file cannot be read. SDM_E_FORMAT: it is not a model, is damaged or truncated, is a
    checkpoint, or has another format version. SDM_E_NOMEM. [any thread] */
 SDM_API sdm_status sdm_model_open(const char *path, sdm_model **out, sdm_error *err);
@@ -67,17 +67,17 @@ SDM_API sdm_status sdm_model_open(const char *path, sdm_model **out, sdm_error *
 SDM_API sdm_status sdm_model_open_memory(const char *name, const uint8_t *bytes, size_t size,
                                          sdm_model **out, sdm_error *err);
 
-/* NULL is fine. No thread may still use the model. */
+/* Frees a model, which no thread may use any more; m may be NULL. */
 SDM_API void sdm_model_free(sdm_model *m);
 
 /* The description, owned by the model. [any thread] */
 SDM_API const sdm_model_info *sdm_model_get_info(const sdm_model *m);
 
 /* The functions below evaluate the network in the calling thread, without allocation. `scratch` is
-   memory of the caller, 64-byte aligned and at least as large as the function's ..._scratch_bytes()
-   says; concurrent calls need separate blocks. Parameters are in the order and the units of
-   sdm_model_info.params. Neither their ranges nor whether they are finite is checked. Maps are
-   signed distances in mm, negative inside, values[nz][ny][nx] with x fastest. */
+   memory of the caller, 64-byte aligned; its minimum size is the result of the function's
+   ..._scratch_bytes(). Concurrent calls need separate scratch memory. Parameters are in the order
+   and the units of sdm_model_info.params; it is not checked that they are finite and within their
+   ranges. Maps are signed distances in mm, negative inside, values[nz][ny][nx] with x fastest. */
 
 /* Bytes of scratch memory of sdm_model_forward() for n maps. [any thread] */
 SDM_API size_t sdm_model_scratch_bytes(const sdm_model *m, size_t n);
@@ -107,8 +107,9 @@ SDM_API void sdm_model_jvp(const sdm_model *m, const double *params, const doubl
 SDM_API size_t sdm_model_vjp_scratch_bytes(const sdm_model *m);
 
 /* Vector-Jacobian product: gradient[n_params], with gradient[p] = the sum over the voxels v of
-   adjoint[v] * d values[v] / d params[p]; adjoint[nz][ny][nx]. "pod" and "sdmnn" use reverse mode,
-   at the cost of a few maps for any number of parameters; others form the Jacobian. [any thread] */
+   adjoint[v] * d values[v] / d params[p]; adjoint[nz][ny][nx]. "pod" and "sdmnn" use reverse-mode
+   differentiation, which costs as much as a few maps for any number of parameters; the other kinds
+   form the Jacobian. [any thread] */
 SDM_API void sdm_model_vjp(const sdm_model *m, const double *params, const float *adjoint,
                            double *gradient, void *scratch);
 

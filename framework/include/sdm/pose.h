@@ -18,12 +18,12 @@ typedef struct sdm_pose {
     double translation[3]; /* mm */
 } sdm_pose;
 
-/* Checks that each component of the rotation vector is at most 1000 rad, each of the translation at
- * most 1e100 mm, and all are finite. SDM_E_ARG names the first violation. The functions below need
- * poses that pass this check; all of them can be called from any thread. */
+/* Checks that abs(rotation[i]) <= 1000 rad and abs(translation[i]) <= 1e100 mm, hence that all are
+ * finite. SDM_E_ARG names the first violation. The functions below need poses that pass this check;
+ * all of them can be called from any thread. */
 SDM_API sdm_status sdm_pose_check(const sdm_pose *pose, sdm_error *err);
 
-/* r[9] = R, row-major, orthonormal up to rounding. */
+/* r[9] = the rotation matrix R, row-major, orthonormal up to rounding. */
 SDM_API void sdm_pose_matrix(const sdm_pose *pose, double r[9]);
 
 /* Position in the world of point x of the shape, and the inverse. x and world may be the same

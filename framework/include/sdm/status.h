@@ -13,7 +13,7 @@ typedef enum sdm_status {
     SDM_OK = 0,
     SDM_E_ARG = 1,         /* invalid argument, name or command-line value from the caller */
     SDM_E_NOMEM = 2,       /* out of memory, or over the given memory limit */
-    SDM_E_IO = 3,          /* the system call failed: open, read, write, fsync, rename */
+    SDM_E_IO = 3,          /* a system call failed: open, read, write, fsync, rename */
     SDM_E_FORMAT = 4,      /* the content of a file is damaged or of another type */
     SDM_E_CONFIG = 5,      /* error in a configuration */
     SDM_E_MESH = 6,        /* the mesh cannot be used */
@@ -39,8 +39,9 @@ typedef struct sdm_error {
 SDM_API sdm_status sdm_fail(sdm_error *err, sdm_status status, const char *fmt, ...)
     SDM_PRINTF(3, 4);
 
-/* Inserts "prefix: " (printf format) before the text of *err, sets its status and returns `status`.
- * err may be NULL. For callers that can add context such as the file or the shape. [any thread] */
+/* Inserts "prefix: " (prefix: printf format) before the text of *err, sets err->status and returns
+ * `status`. err may be NULL. For callers that can add context such as the file or the shape. [any
+ * thread] */
 SDM_API sdm_status sdm_fail_in(sdm_error *err, sdm_status status, const char *fmt, ...)
     SDM_PRINTF(3, 4);
 

@@ -3,14 +3,14 @@
    neighbouring inputs, as two integers of 16 bits.
 
    An instruction set may define, before inclusion:
-     LOAD_PAIRS(p)          VW lanes from 2 VW narrow weights (bytes) at p
+     LOAD_PAIRS(p)          VW lanes loaded from 2 VW narrow weights (bytes) at p
      MADD(a, b)             in each lane the sum of the two products of 16-bit integers
      ADD_MADD(sum, a, b)    sum + MADD(a, b) in one instruction
      FMA(a, b, c)           a * b + c in one rounding
      ROUND_TO_SHORTS(v)     floats rounded to nearest integers of 16 bits
      MIN_VEC, MAX_VEC       minimum and maximum of two vectors of floats
      MAX_VECI               maximum of two vectors of signed integers
-     PREFETCH_BYTES         how far ahead of their use weights are prefetched; 0: not at all */
+     PREFETCH_BYTES         weights are prefetched this many bytes before their use; 0: never */
 
 #ifndef SDM_KERNELS_BYTES_H
 #define SDM_KERNELS_BYTES_H
@@ -44,8 +44,8 @@ static inline veci load_pairs(const int8_t *p)
 #define LOAD_PAIRS(p) load_pairs(p)
 #endif
 
-// Explicit where the instruction exists: the compiler would contract a * b + c in some loops only,
-// and the results of different block sizes would differ.
+// Instruction sets with a fused multiply-add define FMA explicitly: the compiler would contract
+// a * b + c in some loops only, so that the results of different block sizes would differ.
 #ifndef FMA
 #define FMA(a, b, c) ((a) * (b) + (c))
 #endif
@@ -58,7 +58,7 @@ static inline veci load_wide(const int8_t *p)
     return v;
 }
 
-// all lanes: the pair of inputs at p
+// the pair of inputs at p in all lanes
 static inline veci splat_pair(const int16_t *p)
 {
     int32_t pair;
@@ -66,7 +66,8 @@ static inline veci splat_pair(const int16_t *p)
     return pair - (veci){0};
 }
 
-// VW outputs in rows of SDM_PANEL_ROW floats, `line` floats apart (sdm_panel_out.line)
+// stores VW outputs as rows of SDM_PANEL_ROW floats that are `line` floats apart
+// (sdm_panel_out.line)
 static inline void store_rows(float *y, size_t line, vec v)
 {
     typedef float row __attribute__((vector_size(16)));
@@ -75,14 +76,15 @@ static inline void store_rows(float *y, size_t line, vec v)
     for (int i = 0; i < VW / 4; i++) memcpy(y + (size_t)i * line, &rows[i], sizeof *rows);
 }
 
-// Keeps the pointer p in a register: stops the compiler from recomputing base + offset for each
+// Keeps the pointer p in a register, so that the compiler does not recompute base + offset for each
 // use.
 #define KEEP_IN_REGISTER(p) __asm__("" : "+r"(p));
 
 #ifndef ROUND_TO_SHORTS
 typedef uint16_t vec_short __attribute__((vector_size(2 * VW)));
 
-// Nearest integers of 16 bits: after adding 1.5 * 2^23 they are the low bits of the float.
+// Rounds to nearest integers of 16 bits: after adding 1.5 * 2^23 the integer is in the low bits of
+// the float.
 static inline vec_short round_to_shorts(vec v)
 {
     return __builtin_convertvector((vecu)(v + 12582912.0f), vec_short);
@@ -101,10 +103,10 @@ static inline void store_shorts(int16_t *x, vec v)
     memcpy(x, &s, sizeof s);
 }
 
-// v clipped to -limit .. limit; NaN becomes one of the two
+// v clipped to -limit .. limit; NaN becomes -limit or limit
 static inline vec clip(vec v, vec limit) { return MAX_VEC(MIN_VEC(v, limit), -limit); }
 
-// bytes of the weights of one pair of inputs in a panel
+// bytes that the weights of one pair of inputs have in a panel, for wide and for narrow weights
 enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL };
 
 // Offset in bytes of the weights of output register j for one pair of inputs; pair: WIDE or NARROW.
@@ -118,14 +120,14 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL };
 #define PREFETCH_BYTES 0
 #endif
 
-// Start or continue a sum with the products of a pair. ADD_MADD has a longer latency than an
-// addition: it pays only with many independent sums.
+// BYTES_SET starts a sum with the products of a pair of inputs, BYTES_ADD adds them to it. ADD_MADD
+// has a longer latency than an addition, so it is used only with many independent sums.
 #define BYTES_SET(many, sum, a, b) sum = (vecu)MADD(a, b)
 #define BYTES_ADD(many, sum, a, b) sum = (many) ? ADD_MADD(sum, a, b) : (sum) + (vecu)MADD(a, b)
 
-// acc[rows][n] += (into = BYTES_ADD) or = (BYTES_SET) the products of the next pair of inputs,
-// whose weights have `pair` bytes in each panel. The smaller set, inputs or weights, stays in
-// registers.
+// acc[rows][n] = (into: BYTES_SET) or += (into: BYTES_ADD) the products of the next pair of inputs,
+// whose weights have `pair` bytes in each panel. The inputs of all rows stay in registers if
+// rows < n, else the weights of all n registers do.
 #define BYTES_PAIR(rows, n, into, pair, load_pair)                                                 \
     do {                                                                                           \
         if (rows < n) {                                                                            \
@@ -151,9 +153,9 @@ enum { WIDE = 4 * SDM_PANEL, NARROW = 2 * SDM_PANEL };
         w += pair, x += 2;                                                                         \
     } while (0)
 
-static const float no_mean[8 * VW] = {0}; // the mean of rows without one
+static const float no_mean[8 * VW] = {0}; // zeros, added to rows without a mean
 
-// acc[rows][n] times scales to the floats of *to (sdm_panel_out), from output o on.
+// Stores acc[rows][n] * scale as floats in to->y (sdm_panel_out), from output o on.
 #define BYTES_NUMBERS(rows, n)                                                                     \
     {                                                                                              \
         const size_t line = to->line, n_mean = to->n_mean;                                         \
@@ -177,7 +179,7 @@ static const float no_mean[8 * VW] = {0}; // the mean of rows without one
             KEEP_IN_REGISTER(y)                                                                    \
         }                                                                                          \
     }
-// acc[rows][n] times scales and factors to the integers of *to, from output o on.
+// Stores acc[rows][n] * scale * factor as integers in to->integers, from output o on.
 #define BYTES_INTEGERS(rows, n)                                                                    \
     {                                                                                              \
         const vec limit = splat((float)to->limit);                                                 \
@@ -196,8 +198,8 @@ static const float no_mean[8 * VW] = {0}; // the mean of rows without one
         }                                                                                          \
     }
 
-// Products of `rows` rows for all outputs from o on, n registers at a time; wide, narrow: numbers
-// of pairs. Returns the first output that is left.
+// Defines a function that computes the products of `rows` rows for outputs from o on, n registers
+// at a time. wide, narrow: numbers of pairs. It returns the first output that it has not computed.
 #define BYTES_BLOCK(rows, n)                                                                       \
     static size_t bytes_##rows##x##n(size_t o, size_t outputs, size_t wide, size_t narrow,         \
                                      const int8_t *panels, const int16_t *inputs, size_t ldx,      \
@@ -228,8 +230,8 @@ static const float no_mean[8 * VW] = {0}; // the mean of rows without one
 
 #define BYTES_STEP(rows, n) o = bytes_##rows##x##n(o, outputs, wide, narrow, w, x, ldx, scale, to);
 
-// Not with 16 lanes: eight registers would be eight panels, hence more concurrent streams of memory
-// than the hardware prefetcher follows.
+// Eight registers at a time are not used with 16 lanes: they would be eight panels, which are more
+// concurrent streams of memory than the hardware prefetcher follows.
 #if VW < 16
 BYTES_BLOCK(1, 8)
 #define BYTES_EIGHT(rows) BYTES_STEP(rows, 8)
@@ -252,7 +254,7 @@ BYTES_BLOCK(5, 1)
 BYTES_BLOCK(6, 2)
 BYTES_BLOCK(6, 1)
 
-// all outputs of up to 6 rows
+// computes all outputs of up to 6 rows
 static void bytes_rows(size_t rows, size_t outputs, size_t wide, size_t narrow, const int8_t *w,
                        const int16_t *x, size_t ldx, const float *scale, const sdm_panel_out *to)
 {
@@ -289,7 +291,7 @@ static void bytes_rows(size_t rows, size_t outputs, size_t wide, size_t narrow, 
     }
 }
 
-// the destination of row i and output o, as a destination that begins there
+// the part of the destination *to that begins at row i and output o
 static inline sdm_panel_out out_from(const sdm_panel_out *to, size_t i, size_t o)
 {
     sdm_panel_out at = *to;
@@ -299,7 +301,7 @@ static inline sdm_panel_out out_from(const sdm_panel_out *to, size_t i, size_t o
     return at;
 }
 
-// As panel_f32(): a few panels for all rows, then the next ones.
+// As in panel_f32(), a few panels are multiplied with all rows before the next panels.
 static void panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w,
                      const int16_t *x, size_t ldx, const float *scale, const sdm_panel_out *to)
 {
@@ -332,7 +334,7 @@ static void panel_i8_blocks(size_t batch, size_t n, const sdm_panel_block *b, co
     }
 }
 
-// x[2 * pairs] += w^T * y for n outputs; pair: WIDE or NARROW.
+// Defines a function that computes x[2 * pairs] += w^T * y for n outputs; pair: WIDE or NARROW.
 #define BACK_PAIRS(name, pair, load_pair)                                                          \
     static void name(size_t n, size_t pairs, size_t panel, const int8_t *w, const float *y,        \
                      float *x)                                                                     \
@@ -376,18 +378,19 @@ static inline vec product_at(size_t i, const float *y, const float *factor)
 #define MAX_VECI(a, b) (((a) & ((a) > (b))) | ((b) & ((a) <= (b))))
 #endif
 
-// Elementwise maximum of the magnitudes, as bits of floats. As integers they have the same order,
-// with infinity and NaN above all numbers.
+// Elementwise maximum of `largest` and abs(v), both as the bits of floats. As integers these bits
+// have the same order as the magnitudes, with infinity and NaN above all numbers.
 static inline veci larger_magnitude(veci largest, vec v)
 {
     const veci bits = (veci)v & 0x7fffffff;
     return MAX_VECI(bits, largest);
 }
 
-// The functions from here to round_residual() need n >= VW. The last register ends at n - 1 and may
-// overlap the one before: its elements are computed twice.
+// The functions from here to round_residual() need n >= VW. They process a row in registers of VW
+// elements; the last register ends at element n - 1 and may overlap the one before, so that some
+// elements are computed twice.
 
-// largest magnitude of a row; infinity or NaN if an element is
+// largest magnitude of a row; infinity or NaN if an element is infinite or NaN
 static inline float largest_of(size_t n, const float *y, const float *factor)
 {
     const size_t last = n - VW;
@@ -412,7 +415,7 @@ static inline float round_row(size_t n, const float *y, const float *factor, flo
                               int limit, int16_t *x)
 {
     const float to_integer = (float)limit / largest;
-    // `largest` is not finite, or too small for its reciprocal: scale NaN or 0
+    // `largest` is not finite (the scale is then NaN), or limit / largest overflows (scale 0)
     if (!(to_integer > 0 && to_integer <= 3e38f)) {
         memset(x, 0, n * sizeof *x);
         return largest - largest;
@@ -423,7 +426,8 @@ static inline float round_row(size_t n, const float *y, const float *factor, flo
     return largest / (float)limit;
 }
 
-// The maxima of all rows are found first, so that rounding a row does not wait for its own maximum.
+// Quantises rows. The maxima of all rows are found first, so that rounding a row need not wait for
+// its maximum.
 static inline void quantise_rows(size_t rows, size_t n, const float *y, size_t ldy,
                                  const float *factor, int limit, int16_t *x, size_t ldx,
                                  float *scale)
@@ -447,8 +451,8 @@ static inline void residual_register(const float *y, const float *factor, float 
                  (product_at(i, y, factor) * to_integer - load_shorts(x + i)) * (float)limit);
 }
 
-// residual[n] = the rounding error of round_row() in units of 1 / limit of its unit. The error is
-// at most half a unit, so that abs(residual) <= limit / 2. Returns the scale of the residual.
+// residual[n] = the rounding error of round_row(), in units of (unit of x[]) / limit. The error is
+// at most half a unit of x[], hence abs(residual) <= limit / 2. Returns the scale of the residual.
 static inline float round_residual(size_t n, const float *y, const float *factor, float largest,
                                    int limit, const int16_t *x, int16_t *residual)
 {
@@ -482,7 +486,7 @@ static void quantise_residual(size_t n, const float *y, const float *factor, int
     *residual_scale = round_residual(n, y, factor, largest, limit, x, residual);
 }
 
-// a row with n < VW, padded with zeros
+// quantises a row with n < VW, padded with zeros
 static void quantise_short(size_t n, const float *y, const float *factor, int limit, int16_t *x,
                            float *scale)
 {

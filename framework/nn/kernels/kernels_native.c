@@ -32,8 +32,8 @@ enum { MC = 96, NC = 128, KC = 256 };
 
 static size_t min_size(size_t a, size_t b) { return a < b ? a : b; }
 
-// One full panel: packed[k][width], element (p, i) = src[i * along + p * deep]. Callers pass a
-// constant width so that the loops are unrolled.
+// Packs one full panel: packed[k][width], element (p, i) = src[i * along + p * deep]. Callers pass
+// a constant width so that the loops are unrolled.
 static inline void pack_panel(size_t width, size_t k, const float *src, size_t along, size_t deep,
                               float *packed)
 {
@@ -45,8 +45,8 @@ static inline void pack_panel(size_t width, size_t k, const float *src, size_t a
     }
 }
 
-// All panels: packed[ceil(count / width)][k][width] from data[i * along + p * deep], i < count, p <
-// k; the last panel is padded with zeros.
+// Packs all panels: packed[ceil(count / width)][k][width] from data[i * along + p * deep] for
+// i < count and p < k; the last panel is padded with zeros.
 static void pack_panels(size_t count, size_t k, const float *data, size_t along, size_t deep,
                         size_t width, float *packed)
 {
@@ -66,14 +66,14 @@ static void pack_panels(size_t count, size_t k, const float *data, size_t along,
     }
 }
 
-// One block of c, m <= MC and n <= NC, over all of K.
+// Computes one block of c with m <= MC rows and n <= NC columns; sums over all of K.
 static void gemm_block(const kernel_table *t, size_t m, size_t n, size_t k, sdm_view a, sdm_view b,
                        bool add, float *c, size_t ldc)
 {
     _Alignas(64) float pa[MC * KC], pb[NC * KC], edge[12 * 32];
     for (size_t k0 = 0; k0 < k || k0 == 0; k0 += KC) {
         const size_t kc = min_size(KC, k - k0);
-        const int keep = add || k0 > 0; // add to c
+        const int keep = add || k0 > 0; // add to c instead of overwriting it
         pack_panels(m, kc, a.data + k0 * a.col, a.row, a.col, t->mr, pa);
         pack_panels(n, kc, b.data + k0 * b.row, b.col, b.row, t->nr, pb);
         for (size_t j = 0; j < n; j += t->nr) {
@@ -85,7 +85,7 @@ static void gemm_block(const kernel_table *t, size_t m, size_t n, size_t k, sdm_
                     t->micro(kc, pa + i * kc, pb + j * kc, at, ldc, keep);
                     continue;
                 }
-                // a tile that c cuts off is computed as a full tile in `edge`
+                // a tile that reaches beyond c is computed as a full tile in `edge`
                 if (keep)
                     for (size_t r = 0; r < mi; r++)
                         memcpy(edge + r * t->nr, at + r * ldc, nj * sizeof *at);
@@ -165,7 +165,7 @@ size_t sdm_panel_i8_count(size_t outputs, size_t n_wide, size_t k)
 
 int sdm_panel_i8_limit(size_t outputs, size_t k, const int16_t *w)
 {
-    int64_t largest = 1; // sum of the magnitudes of an output's weights
+    int64_t largest = 1; // largest sum of the magnitudes of the weights of one output
     for (size_t o = 0; o < outputs; o++) {
         int64_t sum = 0;
         for (size_t i = 0; i < k; i++) sum += abs(w[o * k + i]);

@@ -34,8 +34,9 @@ static void micro(size_t k, const float *a, const float *b, float *c, size_t ldc
 #ifndef LOAD_HALF
 typedef uint16_t vech __attribute__((vector_size(2 * VW)));
 
-// Half to float, exact. The bits of the half, shifted to their places in a float, are too small by
-// 2^112 because of the different exponent bias; the multiplication also handles subnormals.
+// Converts halves to floats exactly. The bits of the half, shifted to their places in a float, give
+// a value that is too small by the factor 2^112 because of the different exponent bias; the
+// multiplication by 2^112 also handles subnormals.
 static inline vec load_half(const uint16_t *p)
 {
     vech packed;
@@ -58,7 +59,7 @@ static inline vec load_half(const uint16_t *p)
 // Offset of the weights of output register j (outputs j * VW .. j * VW + VW - 1), in elements.
 #define PANEL_AT(j) ((size_t)((j)*VW / SDM_PANEL) * SDM_PANEL * k + (size_t)((j)*VW % SDM_PANEL))
 
-// `rows` rows of x times the weights of n registers of outputs.
+// Defines a function that multiplies `rows` rows of x by the weights of n registers of outputs.
 #define PANEL_BLOCK(type, suffix, load_weights, rows, n)                                           \
     static void block_##suffix##_##rows##x##n(size_t k, const type *w, const float *x, size_t ldx, \
                                               float *y, size_t ldy)                                \
@@ -78,8 +79,9 @@ static inline vec load_half(const uint16_t *p)
             for (int j = 0; j < n; j++) store(y + (size_t)i * ldy + (size_t)(j * VW), acc[i][j]);  \
     }
 
-// All outputs from o on, n registers at a time. For each number of rows the largest n is the one
-// that hides the latency of the multiply-adds and still keeps all sums in registers.
+// Computes the outputs from o on, n registers at a time, as long as n registers are left. For each
+// number of rows the largest n in use hides the latency of the multiply-adds and still keeps all
+// sums in registers.
 #define PANEL_STEP(suffix, rows, n)                                                                \
     for (; o + n * VW <= outputs; o += n * VW)                                                     \
         block_##suffix##_##rows##x##n(k, w + o / SDM_PANEL * SDM_PANEL * k + o % SDM_PANEL, x,     \
@@ -138,8 +140,8 @@ static inline vec load_half(const uint16_t *p)
         }                                                                                          \
     }                                                                                              \
                                                                                                    \
-    /* For many rows: a few panels for all rows, then the next ones, so that the weights stay in   \
-   the first-level cache. */                                                                       \
+    /* Many rows: a few panels are multiplied by all rows before the next panels, so that their    \
+   weights stay in the first-level cache. */                                                       \
     static void panel_##suffix(size_t batch, size_t outputs, size_t k, const type *w,              \
                                const float *x, size_t ldx, float *y, size_t ldy)                   \
     {                                                                                              \
@@ -217,8 +219,8 @@ static void exp_all(size_t n, const float *x, float *y)
 }
 
 #ifdef STREAM
-// Streaming copy. The ends of `to` that do not fill a register are streamed in quarters of a cache
-// line: an ordinary store would read the line into the cache first.
+// Copies with stores that bypass the caches. The ends of `to` that do not fill a register are
+// streamed four floats at a time: an ordinary store would first read the cache line.
 static inline void copy_streaming(size_t n, const float *y, float *to)
 {
     size_t i = -(uintptr_t)to / sizeof *to % 4;

@@ -1,5 +1,5 @@
-/* The functions that each instruction set provides. kernels_*.c compile one source, kernels_simd.h,
-   for one instruction set each. Contracts: sdm/internal/kernels.h. */
+/* The table of functions that each instruction set provides. Each of kernels_*.c compiles the same
+   source, kernels_simd.h, for one instruction set. Contracts: sdm/internal/kernels.h. */
 #ifndef SDM_KERNELS_TABLE_H
 #define SDM_KERNELS_TABLE_H
 
@@ -12,16 +12,17 @@
 typedef struct kernel_table {
     const char *name;
     size_t mr, nr; /* rows and columns of the tile of c that stays in registers in sdm_gemm() */
-    /* One tile: c[mr][ldc] = a * b, or += with `add`; packed a[k][mr], b[k][nr]. */
+    /* Computes one tile: c[mr][ldc] = a * b, or += with `add`, for packed a[k][mr] and b[k][nr]. */
     void (*micro)(size_t k, const float *a, const float *b, float *c, size_t ldc, int add);
-    /* sdm_panel_*() and sdm_panel_back_*(); outputs: a multiple of SDM_PANEL */
+    /* Implement sdm_panel_*() and sdm_panel_back_*(). `outputs` is a multiple of SDM_PANEL. */
     void (*panel_f32)(size_t batch, size_t outputs, size_t k, const float *w, const float *x,
                       size_t ldx, float *y, size_t ldy);
     void (*panel_f16)(size_t batch, size_t outputs, size_t k, const uint16_t *w, const float *x,
                       size_t ldx, float *y, size_t ldy);
     void (*back_f32)(size_t outputs, size_t k, const float *w, const float *y, float *x);
     void (*back_f16)(size_t outputs, size_t k, const uint16_t *w, const float *y, float *x);
-    /* sdm_panel_i8*(), sdm_panel_back_i8(), sdm_quantise*(); outputs: a multiple of SDM_PANEL */
+    /* Implement sdm_panel_i8*(), sdm_panel_back_i8() and sdm_quantise*(). `outputs` is a multiple
+       of SDM_PANEL. */
     void (*panel_i8)(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w,
                      const int16_t *x, size_t ldx, const float *scale, const sdm_panel_out *to);
     void (*panel_i8_blocks)(size_t batch, size_t n, const sdm_panel_block *blocks, const int8_t *w,
@@ -33,7 +34,7 @@ typedef struct kernel_table {
                      int limit, int16_t *x, size_t ldx, float *scale);
     void (*quantise_residual)(size_t n, const float *y, const float *factor, int limit, int16_t *x,
                               float *scale, int16_t *residual, float *residual_scale);
-    /* sdm_copy(), sdm_exp() */
+    /* Implement sdm_copy() and sdm_exp(). */
     void (*copy_floats)(size_t n, const float *y, float *to, bool stream);
     void (*exp)(size_t n, const float *x, float *y);
 } kernel_table;

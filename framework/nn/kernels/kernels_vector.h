@@ -6,14 +6,16 @@
 
 #include <stdint.h>
 
-/* VW floats, the same for unaligned addresses, and VW signed and unsigned integers of 32 bits. */
+/* vec: VW floats; vec_u: the same for unaligned addresses; veci, vecu: VW signed or unsigned
+   integers of 32 bits. */
 typedef float vec __attribute__((vector_size(4 * VW)));
 typedef float vec_u __attribute__((vector_size(4 * VW), aligned(4)));
 typedef int32_t veci __attribute__((vector_size(4 * VW)));
 typedef uint32_t vecu __attribute__((vector_size(4 * VW)));
 
-/* UNROLL(n) before a loop: n iterations become one. EACH(i, n): a loop over i = 0 .. n - 1 that is
-   unrolled completely and early, which keeps arrays of accumulators in registers. */
+/* UNROLL(n) before a loop merges n iterations into one. EACH(i, n) is a loop over i = 0 .. n - 1
+   that the compiler unrolls completely and early, so that arrays of accumulators stay in
+   registers. */
 #define PRAGMA(text) _Pragma(#text)
 #if defined(__clang__)
 #define UNROLL(n) PRAGMA(clang loop unroll_count(n))

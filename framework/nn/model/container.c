@@ -67,7 +67,7 @@ sdm_status sdm_container_build(const sdm_section *sections, size_t n, uint8_t **
         at = round_up(at + sections[i].size);
     }
 
-    // checksums of the header and of the file
+    // checksums of the header with the table, and of the whole file
     store_le(p + table_end, sdm_crc64(0, p, table_end), 8);
     store_le(p + total - 8, sdm_crc64(0, p, total - 8), 8);
     *bytes = p;

@@ -1,4 +1,5 @@
-/* Products of a given Jacobian with a direction and of its transpose with an adjoint map. */
+/* Products of a given Jacobian with a direction, and of the transposed Jacobian with an adjoint
+   map. */
 #include <string.h>
 
 #include "sdm/model.h"

@@ -26,8 +26,9 @@ void sdm_model_jacobian(const sdm_model *m, const double *params, float *values,
     m->kind->jacobian(m, params, values, jacobian, scratch, 1);
 }
 
-// For kinds without jvp or vjp: bytes of the Jacobian at the start of the scratch memory, rounded
-// up to 64. The map (vjp only) and the scratch memory of jacobian() follow.
+// For kinds without jvp or vjp. The scratch memory begins with the Jacobian, whose bytes, rounded
+// up to a multiple of 64, are returned here; the map (vjp only) and the scratch memory of
+// jacobian() follow.
 static size_t jacobian_bytes(const sdm_model *m)
 {
     const size_t bytes = m->info.n_params * sdm_grid_count(&m->info.grid) * sizeof(float);

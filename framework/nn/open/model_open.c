@@ -22,7 +22,8 @@ static const sdm_model_kind *kind_find(const char *name)
     return NULL;
 }
 
-// A NUL-terminated copy of s[n]; NULL if *status is or becomes an error.
+// Returns a NUL-terminated copy of s[n]; NULL if *status is an error or the allocation fails, which
+// sets *status.
 static char *copy_text(const char *s, size_t n, sdm_error *err, sdm_status *status)
 {
     char *out = NULL;
@@ -45,7 +46,7 @@ static void read_accuracy(sdm_lines *r, sdm_accuracy *a)
     a->q50_mm = q[0], a->q90_mm = q[1], a->q99_mm = q[2];
 }
 
-// parameters and options of the shape
+// reads the parameters and options of the shape
 static sdm_status read_params(sdm_lines *r, sdm_model *m, sdm_error *err)
 {
     m->info.n_params = (size_t)sdm_lines_int(r, "params", 1, MODEL_PARAMS_MAX);
@@ -78,7 +79,7 @@ static sdm_status read_params(sdm_lines *r, sdm_model *m, sdm_error *err)
     return s;
 }
 
-// The lines that the descriptions of all kinds begin with.
+// Reads the lines with which the description of every kind begins.
 static sdm_status read_description(sdm_lines *r, sdm_model *m, sdm_error *err)
 {
     sdm_model_info *i = &m->info;
@@ -119,7 +120,8 @@ static sdm_status read_description(sdm_lines *r, sdm_model *m, sdm_error *err)
     return s;
 }
 
-// The model of a file in memory; owns `bytes`, also after an error.
+// *out = the model of a file in memory. Takes over `bytes`, which are freed with the model or after
+// an error.
 static sdm_status open_bytes(uint8_t *bytes, size_t size, sdm_model **out, sdm_error *err)
 {
     sdm_model *m = NULL;
@@ -144,7 +146,7 @@ static sdm_status open_bytes(uint8_t *bytes, size_t size, sdm_model **out, sdm_e
     if (!s && (!meta || !config))
         s = sdm_fail(err, SDM_E_FORMAT, "damaged: a section of a model is missing");
 
-    // description and configuration, then the weights of the kind of network
+    // description and configuration, then the weights, which depend on the kind of network
     sdm_lines lines = {0};
     if (!s) {
         lines.at = meta->data;

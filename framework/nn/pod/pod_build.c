@@ -10,7 +10,7 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
                "weights are written as they are in memory: little-endian");
 #endif
 
-// the text that read_architecture() of pod_open.c reads
+// writes the text that read_architecture() of pod_open.c reads
 static void description_write(const sdm_pod_spec *spec, sdm_text *t)
 {
     const sdm_pod_arch *k = &spec->arch;
@@ -74,7 +74,8 @@ static void pack_weights(const sdm_pod_spec *spec, const pod_integers *integers,
     }
 }
 
-// The mean map in the order of leaves[], each leaf padded to whole panels (`to` is zero before).
+// to[] = the mean map in the order of leaves[], each leaf padded to whole panels. The caller has
+// set to[] to zero.
 static void place_mean(const sdm_pod_spec *spec, const pod_leaf *leaves, float *to)
 {
     for (size_t i = 0; i < spec->arch.levels.first[1]; i++) {
@@ -92,7 +93,7 @@ static void store_u32(const uint32_t *from, size_t n, uint8_t *to)
         for (int b = 0; b < 4; b++) *to++ = (uint8_t)(from[i] >> (8 * b));
 }
 
-// integers: the quantised weights; NULL for floats or halves
+// Builds the model file. integers: the quantised weights; NULL for floats or halves.
 static sdm_status file_build(const sdm_pod_spec *spec, const pod_integers *integers,
                              uint8_t **bytes, size_t *size, sdm_error *err)
 {

@@ -9,7 +9,8 @@ static size_t min_size(size_t a, size_t b) { return a < b ? a : b; }
 static size_t padded(size_t floats) { return (floats + 15) / 16 * 16; }
 static size_t top_level(const pod_network *m) { return m->arch.levels.n - 1; }
 
-// the next `floats` floats of memory (NULL: none), 64-byte aligned
+// Takes the next `floats` floats of memory[], 64-byte aligned, and advances *at. memory NULL: only
+// counts.
 static float *carve_floats(float *memory, size_t *at, size_t floats)
 {
     float *p = memory ? memory + *at : NULL;
@@ -17,7 +18,8 @@ static float *carve_floats(float *memory, size_t *at, size_t floats)
     return p;
 }
 
-// Inputs of `rows` rows. Kernels read or write up to SDM_PANEL elements beyond the n-th.
+// Memory for n inputs in each of `rows` rows, and for `scales` scales. Kernels read or write up to
+// SDM_PANEL elements beyond input n - 1.
 static input carve_inputs(const pod_network *m, size_t rows, size_t n, size_t scales, float *memory,
                           size_t *at)
 {
@@ -67,16 +69,16 @@ size_t sdm_pod_scratch_carve(const pod_network *m, size_t rows, int n_threads, f
     return at + w->per_thread * (size_t)n_threads;
 }
 
-// The decoding of one slab for up to SDM_POD_ROWS rows of sdm_pod_decode().
+// Arguments for decoding one slab for up to SDM_POD_ROWS rows of sdm_pod_decode().
 typedef struct slab_task {
     const pod_network *m;
     const sdm_grid *grid;
     size_t rows, with_mean;
-    bool fixed, stream; // fixed: integer inputs in units of the quanta
+    bool fixed, stream; // fixed: inputs are integers in units of the quanta
     float *const *maps;
     const pod_slab *slab;
     const float *z_scale; // integer weights: [rows]
-    size_t residuals;     // 1: a row of inputs after the last is the residual of the first; else 0
+    size_t residuals; // 1: one more row of inputs follows, the residual of the first row; else 0
     slab_scratch s;
 } slab_task;
 
@@ -90,7 +92,8 @@ static input input_from(input in, size_t first)
     return in;
 }
 
-// y[rows][ldy] = the outputs of a block whose weights begin at `at`, plus mean[outputs] (NULL: 0).
+// y[rows][ldy] = the outputs of a block whose weights begin at `at`; mean[outputs] (NULL: 0) is
+// added to the first j->with_mean rows.
 static void block_product(const slab_task *j, size_t outputs, size_t wide, size_t rank, size_t at,
                           const input *in, const float *mean, float *y, size_t ldy)
 {
@@ -112,7 +115,7 @@ static void block_product(const slab_task *j, size_t outputs, size_t wide, size_
         for (size_t i = 0; i < outputs; i++) y[r * ldy + i] += mean[i];
 }
 
-// y[rows][ldy] = the outputs of block b, above level 0
+// y[rows][ldy] = the outputs of block b, which is above level 0
 static void upper_product(const slab_task *j, size_t b, const input *in, float *y, size_t ldy)
 {
     const pod_network *m = j->m;
@@ -131,7 +134,7 @@ static void quantum_set(const slab_task *j, size_t b, size_t n, const input *to)
     }
 }
 
-// upper_product() whose outputs are stored as integer inputs of the children, in units of the
+// As upper_product(), but stores the outputs as integer inputs of the children, in units of the
 // quanta.
 static void upper_product_integers(const slab_task *j, size_t b, size_t level, const input *in,
                                    const input *to)
@@ -148,7 +151,8 @@ static void upper_product_integers(const slab_task *j, size_t b, size_t level, c
     quantum_set(j, k->child, m->outputs[b], to);
 }
 
-// *to = the coefficients c[rows][ldc] of `level`, n from number `first` on, as integers.
+// *to = n coefficients of `level`, from number `first` on, as integers; their values are
+// c[rows][ldc].
 static void coefficients_quantise(const slab_task *j, size_t level, size_t first, size_t n,
                                   const float *c, size_t ldc, const input *to)
 {
@@ -163,7 +167,7 @@ static void coefficients_quantise(const slab_task *j, size_t level, size_t first
                           to->q + first_row * to->ld, to->ld, to->scale + first_row);
 }
 
-// The place in the slab's inputs of leaves for the group of leaves of block `group`.
+// The part of j->s.leaves that holds the inputs of the leaves below block `group`.
 static input inputs_of_leaves(const slab_task *j, size_t group)
 {
     const pod_network *m = j->m;
@@ -174,8 +178,8 @@ static input inputs_of_leaves(const slab_task *j, size_t group)
     return in;
 }
 
-// From the inputs of block b of `level` > 0 down to the inputs of its leaves. The padding of a
-// group's outputs is overwritten by the next group.
+// Computes the inputs of all leaves below block b of `level` > 0 from the inputs of b. A product
+// also writes the padding of its outputs; the next group overwrites this padding.
 static void decode_upper(const slab_task *j, size_t b, size_t level, const input *in)
 {
     const pod_network *m = j->m;
@@ -199,7 +203,7 @@ static void decode_upper(const slab_task *j, size_t b, size_t level, const input
     }
 }
 
-// From the coefficients c of the highest level to the inputs of the leaves of top b.
+// Computes the inputs of all leaves below top b from the coefficients c of the highest level.
 static void decode_top(const slab_task *j, size_t b, const input *c)
 {
     const pod_network *m = j->m;
@@ -216,16 +220,16 @@ static void decode_top(const slab_task *j, size_t b, const input *c)
     if (top) decode_upper(j, b, top, sdm_pod_is_integer(m) ? &to : &from);
 }
 
-/* Leaves. The voxels of a line are collected before they are stored: a map is then written in long
-   pieces, whereas a leaf has rows of a few voxels only. */
+/* Decoding of leaves. The voxels of a line are collected before they are stored, so that the map is
+   written in long pieces: a leaf alone has rows of only a few voxels. */
 
-// n_rows rows of n voxels from y, where they are contiguous, to rows `line` floats apart
+// copies n_rows contiguous rows of n voxels from y to rows that are `line` floats apart
 static inline void copy_rows(size_t n, size_t n_rows, const float *y, float *to, size_t line)
 {
     for (size_t v = 0; v < n_rows; v++) memcpy(to + v * line, y + v * n, n * sizeof *to);
 }
 
-// One leaf with rows of n_x voxels: its outputs go to a buffer, then into the line.
+// Decodes one leaf with rows of n_x voxels: the outputs go to a buffer, then into the line.
 static void decode_leaf(const slab_task *j, const sdm_panel_block *p, size_t n_x)
 {
     const size_t nx = (size_t)j->grid->n[0], ldy = sdm_panel_outputs(j->m->max_outputs[0]);
@@ -241,13 +245,14 @@ static void decode_leaf(const slab_task *j, const sdm_panel_block *p, size_t n_x
     }
 }
 
-// A line: the n leaves from leaves[first] on.
+// Decodes one line: the n leaves from m->leaves[first] on.
 static void decode_line(const slab_task *j, size_t first, size_t n)
 {
     const pod_network *m = j->m;
     const sdm_panel_block *p = m->products + first, *end = p + n;
     const size_t nx = (size_t)j->grid->n[0];
-    // integer kernels store rows of SDM_PANEL_ROW voxels directly; a shorter last leaf is left over
+    // integer kernels store rows of SDM_PANEL_ROW voxels directly into the line; the loop below
+    // decodes a last leaf with shorter rows
     if (sdm_pod_is_integer(m) && m->arch.block == SDM_PANEL_ROW) {
         const size_t whole = nx / SDM_PANEL_ROW;
         const input *in = &j->s.leaves;
@@ -264,7 +269,7 @@ static void decode_line(const slab_task *j, size_t first, size_t n)
     for (; p < end; p++) decode_leaf(j, p, min_size(m->arch.block, nx - p->y));
 }
 
-// Stores the line whose first leaf is k in the maps.
+// Copies the line whose first leaf is k to the maps.
 static void line_store(const slab_task *j, const sdm_pod_block *k)
 {
     const size_t nx = (size_t)j->grid->n[0], plane = nx * (size_t)j->grid->n[1],
@@ -284,16 +289,16 @@ static void decode_leaves(const slab_task *j)
     }
 }
 
-// one slab from the coefficients c of the highest level
+// decodes one slab from the coefficients c of the highest level
 static void decode_slab(const slab_task *j, const input *c)
 {
     for (size_t b = j->slab->top; b < j->slab->top_end; b++) decode_top(j, b, c);
     decode_leaves(j);
 }
 
-/* Head. */
+/* The head: from the latents to the coefficients of the highest level. */
 
-// w->z_integers, w->z_scale = the latents as integers, in the order of the head's columns.
+// Sets w->z_integers and w->z_scale: the latents as integers, in the order of the head's columns.
 static void quantise_latent(const pod_network *m, size_t rows, size_t residuals,
                             const pod_scratch *w)
 {

@@ -1,5 +1,6 @@
-/* The transpose of the decoder of a pod network, slab by slab as in pod_decode.c: from the gradient
-   by the voxels to the gradient by the latents. Words and letters as in pod_internal.h. */
+/* The transpose of the decoder of a pod network: computes the gradient by the latents from the
+   gradient by the voxels, slab by slab as in pod_decode.c. Words and letters as in
+   pod_internal.h. */
 #include <string.h>
 
 #include "pod_decode_scratch.h"
@@ -49,7 +50,8 @@ static void leaves_back(const back_task *j, const float *adjoint, float *sorted)
     memset(j->s.back + j->slab->n_coefficients, 0, SDM_PANEL * sizeof *j->s.back);
 }
 
-// x[rank] = gradient by the coefficients of block b of `level`, from that of its leaves.
+// x[rank] = gradient by the coefficients of block b of `level`, computed from the gradients by the
+// coefficients of its leaves (j->s.back).
 static void upper_back(const back_task *j, size_t b, size_t level, float *sorted, float *x)
 {
     const pod_network *m = j->m;

@@ -5,22 +5,23 @@
 
 #include "pod_internal.h"
 
-/* Inputs of blocks: floats x[R][ld], or with integer weights q[R][ld] with a scale for each row. */
+/* Inputs of blocks: floats x[R][ld] (q is NULL), or for integer weights q[R][ld] with a scale for
+   each row (x is NULL). */
 typedef struct input {
     float *x;
     int16_t *q;
-    float *scale; /* [R] */
-    size_t ld;
+    float *scale; /* [R] value of one unit of q in each row */
+    size_t ld;    /* elements from one row to the next */
 } input;
 
 /* Scratch memory of one slab, for R <= SDM_POD_ROWS rows; a row is one map or one derivative. */
 typedef struct slab_scratch {
-    float *y[SDM_POD_MAX_LEVELS]; /* [R][padded outputs] of a block of each level */
-    input x[SDM_POD_MAX_LEVELS];  /* integer weights: inputs of a group of each level above 0 */
+    float *y[SDM_POD_MAX_LEVELS]; /* y[level][R][padded outputs]: outputs of one block */
+    input x[SDM_POD_MAX_LEVELS];  /* integer weights: x[level] = inputs of one group, level > 0 */
     input leaves; /* inputs of all leaves of the slab; scale[groups][SDM_POD_ROWS] */
     float *line;  /* [R][ld_line] voxels of a line, [z][y][nx] */
     size_t ld_line;
-    float *back; /* transpose: [coefficients of level 0 of the slab] gradient by them */
+    float *back; /* for the transpose: gradient by the level-0 coefficients of the slab */
 } slab_scratch;
 
 /* Sets the pointers of *s into memory[] (NULL: none) for R rows; returns the floats needed. */

@@ -2,10 +2,10 @@
    reverse mode. No allocation. */
 #include "pod_internal.h"
 
-enum { MAPS = 24 }; // maps that share one pass over the weights of the MLP and the head
+enum { MAPS = 24 }; // number of maps that share one pass over the weights of the MLP and the head
 
-// Bytes of all maps of a call above which they are written past the caches: they would evict the
-// weights, and the reader would not find them in the caches anyway.
+// If all maps of a call have more bytes than this, they are written past the caches: in the caches
+// they would evict the weights, and would themselves be evicted before they are read.
 #define STREAM_BYTES_MIN 4e6
 
 static size_t min_size(size_t a, size_t b) { return a < b ? a : b; }
@@ -47,7 +47,7 @@ void sdm_pod_forward(const sdm_model *m, const double *params, size_t n, float *
     }
 }
 
-// values = the map, tangent[n][voxels] = its derivatives along direction[n][P]
+// values = the map, tangent[n][voxels] = the derivatives of the map along direction[n][P]
 static void forward_mode(const sdm_model *m, const double *params, size_t n,
                          const double *direction, float *values, float *tangent, void *scratch,
                          int n_threads)

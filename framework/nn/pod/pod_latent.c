@@ -6,13 +6,14 @@
 #include "sdm/internal/kernels.h"
 
 static size_t max_size(size_t a, size_t b) { return a > b ? a : b; }
-// number of polynomials that the latents and the MLP need
+// T, the number of polynomials that the latents and the MLP need
 static size_t n_poly(const pod_network *m)
 {
     return max_size(m->arch.n_terms, 1 + m->arch.n_inputs);
 }
-// floats between rows of outputs of a layer; one more than the polynomials, because integer kernels
-// write whole pairs
+// Floats of memory for each row of pod_latent.h[]: room for the outputs of a layer, and in the
+// backward pass for the gradient by the inputs of a layer; one more than the polynomials, because
+// sdm_panel_back_i8() writes whole pairs.
 static size_t row_floats(const pod_network *m)
 {
     return max_size(sdm_panel_outputs(m->arch.width), n_poly(m) + 1);
@@ -71,7 +72,7 @@ size_t sdm_pod_latent_carve(const pod_network *m, size_t rows, float *memory, po
     return total;
 }
 
-// phi[n_poly] = the polynomials at p; with `slopes` also w->dphi, their derivatives by each
+// phi[T] = the polynomials at p[P]; with `slopes` also w->dphi = their derivatives by each
 // parameter.
 static void polynomials(const sdm_model *model, const double *p, bool slopes, const pod_latent *w,
                         float *phi)
@@ -107,8 +108,9 @@ static void directional_derivatives(const pod_network *m, size_t n_directions,
     }
 }
 
-// out[rows][padded W] = the weights of a layer times in[rows][stride], without the bias. smooth:
-// the residual of the first row is multiplied too, as a row after the last, and added to the first.
+// out[rows][padded W] = the weights of a layer times in[rows][stride], without the bias. smooth
+// (for integer weights): the product of the weights and the residual of the first row is computed
+// as one more row and added to the first row.
 static void layer_products(const pod_network *m, size_t layer, size_t rows, bool smooth,
                            const float *in, size_t stride, const pod_latent *w, float *out)
 {
@@ -173,7 +175,7 @@ void sdm_pod_latent_back(const sdm_model *model, const double *p, const pod_late
     const sdm_pod_arch *a = &m->arch;
     const size_t total = n_poly(m), width = sdm_panel_outputs(a->width);
     polynomials(model, p, true, w, w->phi);
-    float *dphi = w->phi; // gradient by the polynomials; their values are not needed
+    float *dphi = w->phi; // gradient by the polynomials; it overwrites their values
     memset(dphi, 0, total * sizeof *dphi);
     if (a->depth) {
         // dh[padded W] = gradient by the outputs of a layer, zero in the padding
@@ -194,7 +196,7 @@ void sdm_pod_latent_back(const sdm_model *model, const double *p, const pod_late
         memcpy(dphi + 1, dh, a->n_inputs * sizeof *dphi);
     }
 
-    // the polynomials that are latents themselves, then the chain rule
+    // add the gradient by the polynomials that are latents themselves, then apply the chain rule
     for (size_t t = 0; t < a->n_terms; t++) dphi[t] += dz[t];
     for (size_t i = 0; i < a->n_params; i++) {
         gradient[i] = 0;

@@ -28,7 +28,8 @@ static uint32_t read_u32(const uint8_t *p)
     return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
 }
 
-// Reads the ranks of all blocks, and derives array sizes and the storage order of the weights.
+// Reads the ranks of all blocks. Derives from them the sizes of arrays, and the slabs, which
+// determine the order in which the weights are stored.
 static sdm_status read_ranks(const sdm_section *ranks, pod_network *m, sdm_error *err)
 {
     sdm_pod_arch *a = &m->arch;
@@ -72,7 +73,8 @@ static sdm_status read_ranks(const sdm_section *ranks, pod_network *m, sdm_error
     return SDM_OK;
 }
 
-// Blocks from the grid and their ranks; sizes that follow from the architecture.
+// Makes the blocks from the grid and the ranks, and computes the sizes that follow from the
+// architecture.
 static sdm_status blocks_set_up(const sdm_section *ranks, const sdm_grid *grid, pod_network *m,
                                 sdm_error *err)
 {
@@ -112,7 +114,8 @@ static sdm_status blocks_set_up(const sdm_section *ranks, const sdm_grid *grid, 
     return SDM_OK;
 }
 
-// The tables of integer weights: wide inputs, order, factors, quanta, limits, scales of the MLP.
+// Reads the tables that only integer weights have: numbers of wide inputs, order of the head's
+// columns, factors, quanta, limits, row scales of the MLP.
 static sdm_status read_integer_tables(const sdm_section *sections, size_t n, sdm_model *model,
                                       sdm_error *err)
 {
@@ -251,8 +254,8 @@ static sdm_status open_network(sdm_model *m, sdm_lines *lines, const sdm_section
     if (!s) s = bind_weights(sections, n, m, err);
     if (s) return s;
     m->info.macs = count_macs(k);
-    // Each multiply-add of a map uses a weight of its own. Fewer bytes of weights than that mean
-    // that a computed size has overflowed.
+    // Each multiply-add of a map uses a different weight. If the file has fewer bytes of weights
+    // than multiply-adds need, a computed size has overflowed.
     if (m->info.macs * (double)sdm_pod_weight_bytes(k->type) > (double)m->info.weight_bytes)
         return sdm_fail(err, SDM_E_FORMAT, "damaged: %zu bytes of weights for %.0f of them",
                         m->info.weight_bytes, m->info.macs);

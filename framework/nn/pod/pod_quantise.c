@@ -1,6 +1,6 @@
-/* Integer weights of a pod network. The survey shows how large the inputs of each column are; from
-   that follows the error of the map that rounding the column causes, and which columns must be
-   wide. Words and letters as in pod_internal.h. */
+/* Integer weights of a pod network. The survey shows how large the inputs of each column are. This
+   gives the error of the map that rounding a column causes, and thus the columns that must be wide.
+   Words and letters as in pod_internal.h. */
 #include "pod_quantise.h"
 
 #include <math.h>
@@ -11,18 +11,18 @@
 #include "sdm/internal/kernels.h"
 #include "sdm/memory.h"
 
-enum { BYTE_MAX = 127 };        // largest narrow weight
-enum { WIDE_FINER = 2 };        // error of a wide column <= largest of a narrow one / WIDE_FINER^2
+enum { BYTE_MAX = 127 }; // largest narrow weight
+enum { WIDE_FINER = 2 }; // error of a wide column <= largest error of a narrow one / WIDE_FINER^2
 enum { MLP_WEIGHT_MAX = 2047 }; // largest integer weight of the MLP
 
-// inputs may become HEADROOM times as large as in the survey before they are clipped
+// an input is clipped when it exceeds HEADROOM times the largest one of its group in the survey
 #define HEADROOM 2
 
-// Rounding may add a mean square error of the map of at most ERROR_SHARE_MAX * variance of the map,
-// which is small compared with the error of the most accurate networks.
+// Bound: (mean square error that rounding adds to the map) <= ERROR_SHARE_MAX * (variance of the
+// map). It is small compared with the error of the most accurate networks.
 #define ERROR_SHARE_MAX 5e-7
 
-// largest abs(weight / row_scale) in column i, 1 if all are 0; NaN if one is not finite
+// largest abs(weight / row_scale) in column i; 1 if all weights are 0, NaN if one is not finite
 static double column_unit(const matrix *m, size_t i)
 {
     double most = 0;
@@ -34,7 +34,8 @@ static double column_unit(const matrix *m, size_t i)
     return most > 0 ? most : 1;
 }
 
-// squared norm of the map for an independent error of 1 * row_scale in each output
+// expected squared norm of the error of the map if each output has an independent error of standard
+// deviation row_scale
 static double gain_of_rows(const matrix *m)
 {
     double sum = 0;
@@ -44,7 +45,8 @@ static double gain_of_rows(const matrix *m)
     return sum;
 }
 
-// squared norm of the map for an input i of 1, taking the outputs as orthogonal
+// squared norm of the map if input i is 1 and the others are 0, with the maps of the outputs taken
+// as orthogonal
 static double column_gain(const matrix *m, size_t i)
 {
     double sum = 0;
@@ -53,9 +55,9 @@ static double column_gain(const matrix *m, size_t i)
     return sum;
 }
 
-// Sets the row scales and the units, gains and errors of the columns of m: columns are scaled to a
-// largest magnitude of 1, then rows, then columns again. The matrices of the level below come
-// first.
+// Sets the row scales of m, and unit, gain and error of its columns: the columns are scaled to a
+// largest magnitude of 1, then the rows, then the columns again. The matrices of the level below
+// must have been done before, because the gains of the outputs are needed.
 static void find_scales(const matrix *m, size_t n_voxels)
 {
     for (size_t o = 0; o < m->outputs && m->out; o++) m->out[o].scale = 1;
@@ -99,8 +101,8 @@ static group group_at(const survey *s, size_t level, size_t i)
     return (group){level, parent->child, parent->child + parent->n_children};
 }
 
-// Number of columns of m to make wide, in pairs as they are stored: up to the last pair whose error
-// exceeds error_per_byte for each byte that making it wide costs.
+// Number of columns of m to make wide. Columns are stored in pairs: the result includes the last
+// pair with error > error_per_byte * (bytes by which the pair grows when it is made wide).
 static size_t wide_columns(const matrix *m, double error_per_byte)
 {
     const double bytes = 2 * (double)sdm_panel_outputs(m->outputs);
@@ -126,9 +128,9 @@ static int by_error(const void *a, const void *b)
     return x->column < y->column ? -1 : 1;
 }
 
-// wide[] of the blocks of a group, see wide_columns(). Returns the estimated mean square error of
-// the map from the group: that of the narrow columns, and of the wide ones with the steps of
-// find_steps().
+// Sets wide[] of the blocks of a group by wide_columns(). Returns the estimated mean square error
+// of the map that the group causes: the sum over its narrow columns, and over its wide columns with
+// the steps of find_steps().
 static double wide_choose_in_group(const survey *s, group g, double error_per_byte, uint32_t *wide)
 {
     double left = 0, most = 0;
@@ -143,8 +145,8 @@ static double wide_choose_in_group(const survey *s, group g, double error_per_by
     return left + (double)n * most / (WIDE_FINER * WIDE_FINER);
 }
 
-// wide[blocks + 1] of all blocks and the head; returns the estimated mean square error of the map.
-// head[L]: the columns of the head in descending order of their errors.
+// Sets wide[blocks + 1] for all blocks and the head; returns the estimated mean square error of the
+// map. head[L]: the columns of the head in descending order of their errors.
 static double wide_choose(const survey *s, const ranked *head, double error_per_byte,
                           uint32_t *wide)
 {
@@ -163,8 +165,8 @@ static double wide_choose(const survey *s, const ranked *head, double error_per_
     return left;
 }
 
-// q->wide and q->order for the largest error_per_byte with which the error of the map is within
-// ERROR_SHARE_MAX * variance, by bisection.
+// Sets q->wide and q->order. Bisection finds the largest error_per_byte for which the mean square
+// error of the map is at most ERROR_SHARE_MAX * variance.
 static sdm_status wide_find(const survey *s, pod_integers *q, sdm_error *err)
 {
     const size_t latent = s->spec->arch.n_latent, c = s->coefficients_at[s->spec->arch.levels.n];
@@ -191,8 +193,8 @@ static sdm_status wide_find(const survey *s, pod_integers *q, sdm_error *err)
 
 /* Rounding to integers. */
 
-// Largest RMS input of a narrow column times the unit of the column. order[k] (NULL: 0 .. k - 1):
-// order of the columns.
+// Largest (RMS input * unit) of the narrow columns. order[k]: order of the columns (NULL:
+// 0 .. k - 1), of which the first n_wide are wide.
 static double largest_input(const matrix *m, const uint32_t *order, size_t n_wide)
 {
     double most = 0;
@@ -203,11 +205,12 @@ static double largest_input(const matrix *m, const uint32_t *order, size_t n_wid
     return most;
 }
 
-// Steps of the columns, of which the first n_wide are wide. A narrow column has unit / BYTE_MAX.
-// The error of a column is proportional to (RMS input * step)^2: a wide step makes it `most` (of
-// largest_input()) / (WIDE_FINER * BYTE_MAX), and no finer, because inputs are multiplied by the
-// step before they are rounded: a smaller step leaves fewer bits to the input. unit / step is
-// clamped to 2 * BYTE_MAX .. SDM_WIDE.
+// Sets the steps of the columns, of which the first n_wide are wide. A narrow column has the step
+// unit / BYTE_MAX. The error of a column is proportional to (RMS input * step)^2. For a wide column
+// the step is such that RMS input * step = most / (WIDE_FINER * BYTE_MAX), with `most` from
+// largest_input(). It is no smaller, because inputs are multiplied by the step before they are
+// rounded: a smaller step leaves fewer bits to the input. unit / step is clamped to
+// 2 * BYTE_MAX .. SDM_WIDE.
 static void find_steps(const matrix *m, const uint32_t *order, size_t n_wide, double most)
 {
     for (size_t i = 0; i < m->k; i++) {
@@ -219,7 +222,8 @@ static void find_steps(const matrix *m, const uint32_t *order, size_t n_wide, do
     }
 }
 
-// to[outputs][k] = weights / (step * row_scale), rounded, columns in `order`; 0 where not finite.
+// to[outputs][k] = weight / (step * row_scale), rounded, with the columns in `order`; 0 where the
+// quotient is not finite.
 static void round_matrix(const matrix *m, const uint32_t *order, int16_t *to)
 {
     for (size_t o = 0; o < m->outputs; o++)
@@ -230,7 +234,7 @@ static void round_matrix(const matrix *m, const uint32_t *order, int16_t *to)
         }
 }
 
-// *limit = min(*limit, the limit of the integers w of m)
+// *limit = min(*limit, limit of the inputs of matrix m with the integer weights w)
 static void limit_lower(uint32_t *limit, const matrix *m, const int16_t *w)
 {
     const uint32_t here = (uint32_t)sdm_panel_i8_limit(m->outputs, m->k, w);
@@ -248,7 +252,7 @@ static void round_block(const survey *s, size_t b, size_t level, double most, po
     for (size_t i = 0; i < m.k; i++) factor[i] = (float)(m.in[i].scale * m.in[i].step);
 }
 
-// integers, limits and factors of the head and of all blocks
+// computes integer weights, limits and factors of the head and of all blocks
 static void round_all(const survey *s, pod_integers *q)
 {
     const sdm_pod_arch *a = &s->spec->arch;
@@ -290,8 +294,8 @@ static void find_quanta(const survey *s, pod_integers *q)
         }
 }
 
-// The MLP is small: all its weights are wide. They use only 12 bits with the sign, so that sums of
-// 32 bits leave about 13 bits to the inputs.
+// Rounds the weights of the MLP, which is small: all its weights are wide. They use only 12 bits
+// including the sign, so that about 13 of the 32 bits of the sums are left for the inputs.
 static void round_mlp(const sdm_pod_spec *spec, pod_integers *q)
 {
     const sdm_pod_arch *a = &spec->arch;

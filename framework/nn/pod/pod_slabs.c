@@ -1,16 +1,16 @@
-/* The order in which the blocks of a pod network are decoded: slab by slab; in each the levels
-   above 0 depth first, then the leaves with x fastest, so that whole rows of the map are written.
-   Words as in pod_internal.h. */
+/* The order in which the blocks of a pod network are decoded: slab by slab; within a slab first the
+   levels above 0, depth first, then the leaves with x fastest, so that whole rows of the map are
+   written. Words as in pod_internal.h. */
 #include "pod_internal.h"
 
-// the first descendant of block b, `level` levels below it
+// the first descendant of block b on the level that is `level` levels lower
 static size_t first_leaf(const sdm_pod_block *blocks, size_t b, size_t level)
 {
     while (level-- > 0) b = blocks[b].child;
     return b;
 }
 
-// Sets leaves[] of a slab, x fastest. Its leaves fill a box of the grid that spans all of x.
+// Sets leaves[] of a slab, x fastest. The leaves of a slab fill a box that spans the grid along x.
 static void order_leaves(const sdm_pod_levels *levels, const sdm_pod_block *blocks, size_t edge,
                          const pod_slab *s, pod_leaf *leaves)
 {
@@ -24,7 +24,7 @@ static void order_leaves(const sdm_pod_levels *levels, const sdm_pod_block *bloc
         if (y > ny) ny = y;
     }
 
-    // each leaf to its place in the box
+    // store each leaf at the index of its position in the box
     for (size_t g = s->group, b = s->leaf; g < s->group_end; g++) {
         const size_t n = levels->n > 1 ? blocks[g].n_children : 1;
         for (size_t end = b + n; b < end; b++) {
@@ -81,7 +81,7 @@ size_t sdm_pod_count_mlp(sdm_pod_type type, const sdm_pod_arch *a)
     return n;
 }
 
-// Running offset of sdm_pod_place_weights().
+// State of sdm_pod_place_weights(): its arguments, and the offset of the next block.
 typedef struct placement {
     sdm_pod_type type;
     const sdm_pod_block *blocks;
@@ -96,7 +96,7 @@ static void block_place(placement *p, size_t b)
                                      p->wide ? p->wide[b] : 0, p->blocks[b].rank);
 }
 
-// block b of `level` and its descendants above level 0, depth first
+// Places block b of `level` and its descendants above level 0, depth first.
 static void upper_place(placement *p, size_t b, size_t level)
 {
     if (level == 0) return;

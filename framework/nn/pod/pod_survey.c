@@ -1,6 +1,7 @@
-/* Survey of a pod network: its layers are evaluated in floats at N random parameters. Mean squares
-   are over the samples that are uniform in the parameter ranges. Largest magnitudes are over all
-   samples, including corners and faces of the ranges, where extremes are most likely. */
+/* Survey of a pod network: its layers are evaluated in floats at N random parameter vectors
+   (samples). Mean squares are taken over the samples that are uniform in the parameter ranges.
+   Largest magnitudes are taken over all samples, including corners and faces of the ranges, where
+   extremes are most likely. */
 #include "pod_survey.h"
 
 #include <math.h>
@@ -39,8 +40,10 @@ matrix sdm_pod_block_matrix(const survey *s, size_t b, size_t level)
     return m;
 }
 
-// Parameter i of sample n, in [-1, 1]: uniform; on corners (all 64 corners of the first six
-// parameters); on faces, where each parameter is -1 or 1 with probability 1/2 and else uniform.
+// Parameter i of sample n, in [-1, 1]. The first RANDOM samples are uniform. The next CORNERS
+// samples are corners: all 64 corners of the first six parameters, random -1 or 1 for the others.
+// The last FACES samples lie on faces: each parameter is -1 or 1 with probability 1/2, else
+// uniform.
 static double sample_parameter(size_t n, size_t i, size_t n_params)
 {
     const double x = 2 * sdm_rng_uniform(0, STREAM, n * n_params + i) - 1;
@@ -104,8 +107,9 @@ static void stats_update(size_t n, const float *x, size_t ldx, coefficient_stats
         }
 }
 
-// Statistics of block b of `level` and its descendants. c[N][ldc]: coefficients of b; y[level]:
-// buffer for the outputs of a block of each level.
+// Updates the statistics of the coefficients of block b of `level` and its descendants, and
+// s->variance. c[N][ldc]: coefficients of b; y[level]: buffer for the outputs of one block of each
+// level.
 static void block_sample(survey *s, size_t b, size_t level, const float *c, size_t ldc,
                          float *const *y)
 {

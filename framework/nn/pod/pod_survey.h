@@ -5,33 +5,35 @@
 
 #include "pod_internal.h"
 
-/* Statistics of a coefficient or a latent, which is the input of a column of a matrix, and except
-   for latents the output of a row of another. sdm_pod_survey() sets the first two members,
+/* Statistics of a coefficient or latent. Both are multiplied by a column of a matrix; a coefficient
+   is also computed by a row of another matrix. sdm_pod_survey() sets the first two members,
    sdm_pod_quantise() the others. */
 typedef struct coefficient_stats {
     double square;  /* mean square over uniformly distributed parameters */
-    double largest; /* largest magnitude; NaN if one is */
+    double largest; /* largest magnitude of all samples; NaN if a sample is NaN */
     double gain;    /* squared Euclidean norm of the map of a coefficient of 1, mm^2 */
     double unit;    /* largest abs(weight / row_scale) in its column */
     double scale;   /* row_scale of the row that computes it */
-    double error;   /* mean square error of the map if its column is narrow, mm^2 */
-    double step;    /* of its column */
+    double error;   /* mean square error of the map, mm^2, if its column is narrow */
+    double step;    /* step of its column */
 } coefficient_stats;
 
 typedef struct survey {
     const sdm_pod_spec *spec;
     size_t *basis_at; /* [blocks + 1] index of the first weight of a block in spec->weights.basis */
     size_t coefficients_at[SDM_POD_MAX_LEVELS + 1]; /* as in pod_network */
-    coefficient_stats *stats;                       /* [C + L] of coefficients, then of latents */
-    double variance; /* mean square of map - mean map, over voxels and parameters, mm^2 */
+    coefficient_stats *stats;                       /* [C + L] all coefficients, then the latents */
+    double variance; /* mean square of (map - mean map) over voxels and parameters, mm^2 */
 } survey;
 
 /* The matrix from k inputs to `outputs` outputs: weight (o, i) is w[o * row + i * col]. */
 typedef struct matrix {
     const float *w;
     size_t outputs, k, row, col;
-    coefficient_stats *in;  /* [k] of the inputs */
-    coefficient_stats *out; /* [outputs] of the outputs; NULL: voxels, scale and gain 1 */
+    coefficient_stats *in; /* [k] statistics of the inputs */
+    /* [outputs] statistics of the outputs; NULL if the outputs are voxels, with scale and gain 1.
+     */
+    coefficient_stats *out;
 } matrix;
 
 /* The maximum; NaN if a or b is NaN. */
@@ -49,7 +51,7 @@ static inline size_t n_blocks(const survey *s)
     return s->spec->arch.levels.first[s->spec->arch.levels.n];
 }
 
-/* The head, and the basis of block b of `level`, as matrices. */
+/* The head as a matrix; the basis of block b of `level` as a matrix. */
 matrix sdm_pod_head_matrix(const survey *s);
 matrix sdm_pod_block_matrix(const survey *s, size_t b, size_t level);
 

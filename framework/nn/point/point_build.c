@@ -5,7 +5,7 @@
 #include "sdm/internal/kernels.h"
 #include "sdm/memory.h"
 
-// the text that read_architecture() of point_open.c reads
+// writes the text that read_architecture() of point_open.c reads
 static void description_write(const sdm_point_spec *spec, sdm_text *t)
 {
     const sdm_point_arch *a = &spec->arch;
@@ -21,7 +21,7 @@ static void description_write(const sdm_point_spec *spec, sdm_text *t)
     sdm_text_add_real(t, "point.scale", a->scale);
 }
 
-// the sections "point.hidden" and "point.input"
+// fills the sections "point.hidden" and "point.input"
 static void weights_pack(const sdm_point_spec *spec, void *hidden, float *input)
 {
     const sdm_point_arch *a = &spec->arch;

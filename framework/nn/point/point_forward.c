@@ -3,7 +3,7 @@
 
    The parameters are the same for all points of a map: their part of W_l u is added to the bias
    once, so that only the three coordinates q enter at each point. R points pass through all layers
-   together. With derivatives each point has 1 + P rows: first the values of all R points, then for
+   together. With derivatives there are (1 + P) R rows: first the values of all R points, then for
    each parameter the tangents of all R points. */
 #include <math.h>
 #include <string.h>
@@ -16,8 +16,9 @@
 // rounded up to whole panels
 static size_t pad(size_t n) { return sdm_panel_outputs(n); }
 
-// Of one map: data[1 + P][stride], set 0: the bias of each layer plus the parameters' part of W_l
-// u; sets 1 .. P: its derivatives by the parameters. Layer l begins at at[l] of a set.
+// The biases of one map, data[1 + P][stride]. Set 0 holds for each layer the bias plus the part of
+// W_l u that comes from the parameters; sets 1 .. P hold its derivatives by each parameter. Layer l
+// begins at index at[l] of a set.
 typedef struct map_bias {
     size_t at[SDM_POINT_MAX_DEPTH], stride;
     float *data;
@@ -29,7 +30,7 @@ typedef struct workspace {
     float *slope; // [R][max width] derivative of the activation
 } workspace;
 
-// sets b->at and b->stride; returns the floats of `sets` sets
+// sets b->at and b->stride; returns the number of floats of `sets` sets
 static size_t bias_floats(const point_network *k, size_t sets, map_bias *b)
 {
     b->stride = 0;
@@ -54,7 +55,7 @@ static size_t carve(const point_network *k, size_t rows, float *memory, workspac
     return total; // a multiple of 16 floats
 }
 
-// b->data at the parameters p[P]; sets 1 .. P only with `tangents`
+// fills b->data at the parameters p[P]; sets 1 .. P only with `tangents`
 static void bias_set(const sdm_model *m, const double *p, bool tangents, map_bias *b)
 {
     const point_network *k = m->network;
@@ -90,7 +91,7 @@ static void coordinates_fill(const sdm_grid *g, const sdm_point_arch *a, size_t 
     }
 }
 
-// y[n][ldy] = x[n][ldx] times the matrix of layer l > 0
+// y[n][ldy] = x[n][ldx] times the part of W_l that multiplies h_(l-1), for a layer l > 0
 static void layer_multiply(const point_network *k, size_t l, size_t n, const float *x, size_t ldx,
                            float *y, size_t ldy)
 {
@@ -102,8 +103,8 @@ static void layer_multiply(const point_network *k, size_t l, size_t n, const flo
         sdm_panel_f32(n, k->arch.width[l], before, (const float *)k->hidden + at, x, ldx, y, ldy);
 }
 
-// y[n][ldy] += bias[width] + columns[3][width]^T q[n][3]; columns NULL: bias only. clear: y is set
-// to zero first.
+// y[n][ldy] += bias[width] + columns[3][width]^T q[n][3], or only the bias if `columns` is NULL.
+// clear: y is set to zero first.
 static void add_input(size_t n, size_t width, const float *bias, const float *columns,
                       const float *q, bool clear, float *y, size_t ldy)
 {
@@ -131,7 +132,8 @@ static float dot(const float *a, const float *b, size_t n)
     return sum;
 }
 
-// values[n] at n <= R points q[n][3], and jacobian[P][n], rows `voxels` floats apart, unless NULL.
+// values[n] at n <= R points q[n][3], and, unless NULL, jacobian[P][n], whose rows are `voxels`
+// floats apart.
 static void points_forward(const point_network *k, const map_bias *b, size_t n, const float *q,
                            const workspace *w, float *values, float *jacobian, size_t voxels)
 {
@@ -170,8 +172,8 @@ static void points_forward(const point_network *k, const map_bias *b, size_t n, 
     }
 }
 
-// One map. The voxels are divided into chunks of R, which are distributed over the threads; the
-// chunks do not depend on the number of threads.
+// Computes one map, with its Jacobian unless NULL. The voxels are divided into chunks of R, which
+// are distributed over the threads; the chunks do not depend on the number of threads.
 static void map_forward(const sdm_model *m, const double *p, float *values, float *jacobian,
                         void *scratch, int n_threads)
 {

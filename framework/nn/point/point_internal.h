@@ -6,22 +6,24 @@
 #include "model/model_kind.h"
 #include "sdm/internal/point_network.h"
 
-/* Sections of the file. "point.hidden": for each layer l > 0 the columns of h_(l-1), W_l x W_(l-1),
-   in panels (sdm/internal/kernels.h) of floats or halves. "point.input", floats: for each layer
-   bias[W_l] and, where u enters, its columns [U][W_l]; then w[H], b. */
+/* The model file has two sections. "point.hidden" holds for each layer l > 0 the columns of the
+   weights that multiply h_(l-1), a W_l x W_(l-1) matrix, in panels (sdm/internal/kernels.h) of
+   floats or halves. "point.input" holds floats: for each layer bias[W_l] and, if u enters the
+   layer, the columns [U][W_l] that multiply u; then w[H] and b. */
 typedef struct point_network {
     sdm_point_arch arch;
-    bool half;                             /* panels are halves */
+    bool half;                             /* the panels are halves, else floats */
     const void *hidden;                    /* section "point.hidden" */
     size_t hidden_at[SDM_POINT_MAX_DEPTH]; /* element at which the panels of a layer begin */
     const float *bias[SDM_POINT_MAX_DEPTH];
     const float *input[SDM_POINT_MAX_DEPTH]; /* [U][W_l]; NULL: u does not enter layer l */
-    const float *last;                       /* w[H], b */
+    const float *last;                       /* w[H], then b */
     size_t max_width;
-    size_t rows; /* points that pass through the layers together, R */
+    size_t rows; /* R, the number of points that pass through the layers together */
 } point_network;
 
-/* Numbers of elements of the two sections; at[depth] = first element of each layer, unless NULL. */
+/* Return the number of elements of the section "point.hidden" or "point.input". Unless NULL,
+   at[depth] = index of the first element of each layer. */
 size_t sdm_point_hidden_count(const sdm_point_arch *a, size_t *at);
 size_t sdm_point_input_count(const sdm_point_arch *a, size_t *at);
 

@@ -1,4 +1,5 @@
-/* Sizes of a point network: weights, multiply-adds, and the two sections of its file. */
+/* Sizes of a point network: numbers of weights and multiply-adds, and sizes of the two sections of
+   its file. */
 #include "point_internal.h"
 #include "sdm/internal/kernels.h"
 

@@ -11,9 +11,9 @@
 #include "sdm/internal/threads.h"
 
 enum {
-    GROUP = 32,          // output channels of a unit of work, a multiple of every mr
-    GRADIENT_TERMS = 54, // terms of a unit of work of the gradient, a multiple of 3
-    MR_MAX = 8,          // largest mr
+    GROUP = 32,          // output channels in a unit of work, a multiple of every mr
+    GRADIENT_TERMS = 54, // terms in a unit of work of the gradient, a multiple of 3
+    MR_MAX = 8,          // largest conv_table.mr
     SMALL_MAX = 256,     // largest number of positions of a small feature map
     SMALL_CHUNK = 128    // positions of a small feature map in one matrix product
 };
@@ -37,8 +37,8 @@ static int thread_count(int wanted, size_t units)
     return (size_t)n < units ? n : (int)units;
 }
 
-// offset[n]: where the input of each of the terms k0 .. k0 + n - 1 lies, relative to the position
-// of the output. The number of a term is channel * taps + tap.
+// offset[i] = (index of the input of term k0 + i) - (position of the output), for i < n. The number
+// of a term is channel * taps + tap.
 static void offsets(const sdm_fmap *g, size_t taps, size_t k0, size_t n, ptrdiff_t *offset)
 {
     ptrdiff_t shift[27] = {0};
@@ -59,8 +59,8 @@ size_t sdm_conv_packed_count(sdm_conv c)
     return divide_up(c.out, mr) * mr * c.in * c.taps;
 }
 
-// packed[blocks of SDM_CONV_TERMS terms][tiles of output channels][terms][mr], zero beyond the last
-// output channel
+// The layout is packed[blocks of SDM_CONV_TERMS terms][tiles of output channels][terms][mr], with
+// zeros beyond the last output channel.
 void sdm_conv_pack(sdm_conv c, bool transposed, const float *w, float *packed)
 {
     const size_t mr = conv_kernels()->mr;
@@ -81,7 +81,8 @@ void sdm_conv_pack(sdm_conv c, bool transposed, const float *w, float *packed)
     }
 }
 
-// A tile of rows x cols, cut off by the last output channel or position: computed as a full tile.
+// Computes a tile that reaches beyond the last output channel or position as a full tile, and
+// stores the rows x cols elements that exist.
 static void edge_tile(const conv_table *t, size_t k, const float *a, const float *x,
                       const ptrdiff_t *offset, float *y, size_t ldy, size_t rows, size_t cols,
                       int add)
@@ -93,7 +94,7 @@ static void edge_tile(const conv_table *t, size_t k, const float *a, const float
     for (size_t i = 0; i < rows; i++) memcpy(y + i * ldy, edge + i * t->nr, cols * sizeof *y);
 }
 
-// Output channels o0 .. o1 - 1 (o0 a multiple of mr) at positions p0 .. p1 - 1.
+// Computes output channels o0 .. o1 - 1 (o0 is a multiple of mr) at positions p0 .. p1 - 1.
 static void chunk_convolve(const conv_table *t, const sdm_fmap *g, sdm_conv c, const float *packed,
                            const float *x, float *y, size_t o0, size_t o1, size_t p0, size_t p1)
 {
@@ -117,7 +118,7 @@ static void chunk_convolve(const conv_table *t, const sdm_fmap *g, sdm_conv c, c
     }
 }
 
-// f on channel o at positions p0 .. p1 - 1; clears the padding
+// applies f to channel o at positions p0 .. p1 - 1 and clears the padding
 static void finish_chunk(const sdm_fmap *g, sdm_conv_finish f, float *y, size_t o, size_t p0,
                          size_t p1)
 {
@@ -161,7 +162,8 @@ void sdm_conv_finish_maps(const sdm_fmap *g, size_t channels, sdm_conv_finish fi
     for (long o = 0; o < (long)channels; o++) finish_chunk(g, finish, y, (size_t)o, 0, g->count);
 }
 
-// dw of mr output channels from o on and GRADIENT_TERMS terms from k0 on, over all positions.
+// Adds to dw for mr output channels from o on and GRADIENT_TERMS terms from k0 on; sums over all
+// positions.
 static void gradient_unit(const conv_table *t, const sdm_fmap *g, sdm_conv c, const float *x,
                           const float *dy, float *dw, size_t o, size_t k0)
 {
@@ -174,7 +176,7 @@ static void gradient_unit(const conv_table *t, const sdm_fmap *g, sdm_conv c, co
     float sums[(GRADIENT_TERMS / 3) * SDM_CONV_SUMS_MAX], copy[MR_MAX * SDM_CONV_CHUNK];
     memset(sums, 0, divide_up(k, 3) * tile * sizeof *sums);
     offsets(g, c.taps, k0, k, offset);
-    // dot() takes three taps: missing ones at the end are computed and not used
+    // dot() computes three terms: after the last term, sums are computed that are not used
     for (size_t i = k; i < k + 2; i++) offset[i] = offset[k - 1];
 
     // partial sums in the lanes of registers
@@ -182,7 +184,7 @@ static void gradient_unit(const conv_table *t, const sdm_fmap *g, sdm_conv c, co
         const size_t n = min_size(SDM_CONV_CHUNK, count - p);
         const float *d = dy + o * g->stride + p;
         size_t ldy = g->stride;
-        if (rows < t->mr) { // missing channels are zero
+        if (rows < t->mr) { // use a copy with zeros for the missing channels
             memset(copy, 0, sizeof copy);
             for (size_t i = 0; i < rows; i++)
                 memcpy(copy + i * SDM_CONV_CHUNK, d + i * ldy, n * sizeof *d);
@@ -199,8 +201,9 @@ static void gradient_unit(const conv_table *t, const sdm_fmap *g, sdm_conv c, co
     }
 }
 
-// dw of all output channels and SDM_CONV_TERMS terms from k0 on, for small feature maps, where the
-// sums over the lanes would dominate: a matrix product of dy and the shifted inputs.
+// Adds to dw for all output channels and SDM_CONV_TERMS terms from k0 on, by a matrix product of dy
+// and the shifted inputs. For small feature maps: in gradient_unit() the sums over the lanes would
+// dominate.
 static void gradient_small(const sdm_fmap *g, sdm_conv c, const float *x, const float *dy,
                            float *dw, size_t k0)
 {

@@ -1,8 +1,8 @@
 /* Convolution of feature maps (fmap.h), 3 x 3 x 3 with zero padding or 1 x 1 x 1, as an implicit
-   matrix product: each tap is a shift of the flat array, so that no matrix of shifted maps is
-   formed. Letters: I input and O output channels, T taps (27 or 1). Each element is always summed
-   in the same order: the result does not depend on the number of threads. n_threads 0: the OpenMP
-   default. */
+   matrix product: each tap (weight position) is a shift of the flat array, so that no matrix of
+   shifted maps is formed. Letters: I input and O output channels, T taps (27 or 1). Each element is
+   always summed in the same order: the result does not depend on the number of threads. n_threads
+   0: the OpenMP default. */
 #ifndef SDM_CONV_H
 #define SDM_CONV_H
 
@@ -15,19 +15,20 @@ typedef struct sdm_conv {
     size_t in, out, taps; /* I, O, T; weights w[O][I][T], taps [z][y][x] */
 } sdm_conv;
 
-/* Floats of the packed weights. Packed weights are in the order of the kernels, which differs
-   between instruction sets: they are never stored in a file. */
+/* Number of floats of the packed weights. Packed weights are in the order in which the kernels read
+   them; it differs between instruction sets, so that they are never stored in a file. */
 size_t sdm_conv_packed_count(sdm_conv c);
 
-/* packed[] = the weights w[O][I][T]. transposed: for the opposite convolution, which takes dy[O] to
-   dx[I], with mirrored taps: packed[sdm_conv_packed_count(sdm_conv_opposite(c))]. */
+/* packed[sdm_conv_packed_count(c)] = the weights w[O][I][T]. With `transposed`:
+   packed[sdm_conv_packed_count(sdm_conv_opposite(c))] = the weights, with mirrored taps, of the
+   opposite convolution, which computes dx[I] from dy[O]. */
 void sdm_conv_pack(sdm_conv c, bool transposed, const float *w, float *packed);
 static inline sdm_conv sdm_conv_opposite(sdm_conv c) { return (sdm_conv){c.out, c.in, c.taps}; }
 
-/* Operations on the sums of the convolution, applied while they are in the cache. */
+/* Operations on the results of the convolution, applied while the results are in the cache. */
 typedef struct sdm_conv_finish {
     const float *bias; /* [O], or NULL */
-    int activation;    /* kind of sdm_activate(), or -1: none */
+    int activation;    /* `kind` of sdm_activate(); -1: none */
     float *slope; /* feature map of O channels, set to the derivative of the activation; or NULL */
 } sdm_conv_finish;
 
@@ -44,7 +45,8 @@ void sdm_conv_finish_maps(const sdm_fmap *g, size_t channels, sdm_conv_finish fi
 void sdm_conv_gradient(const sdm_fmap *g, sdm_conv c, const float *x, const float *dy, float *dw,
                        float *db, int n_threads);
 
-/* An implementation of the functions above. sdm_conv_native() has the functions themselves. */
+/* An implementation of the functions above. sdm_conv_native() consists of these functions
+   themselves. */
 struct sdm_conv_backend {
     const char *name;
     size_t (*packed_count)(sdm_conv c);
@@ -55,7 +57,7 @@ struct sdm_conv_backend {
                      float *db, int n_threads);
 };
 
-/* Multiply-adds of sdm_conv_apply(), without padding. */
+/* Number of multiply-adds of sdm_conv_apply(), without those for padding. */
 double sdm_conv_work(const sdm_fmap *g, sdm_conv c);
 
 #endif

@@ -1,15 +1,15 @@
-/* The inner loops of the convolution, one table for each instruction set. conv_kernels_*.c compile
-   one source, conv_kernels_simd.h. A position is an index within a channel, voxel or padding
-   (fmap.h). */
+/* The inner loops of the convolution, one table for each instruction set. Each of conv_kernels_*.c
+   compiles the same source, conv_kernels_simd.h. A position is the index of a voxel or padding
+   element within a channel (fmap.h). */
 #ifndef SDM_CONV_KERNELS_H
 #define SDM_CONV_KERNELS_H
 
 #include <stddef.h>
 
-/* Terms (pairs of input channel and tap) that are summed in one pass; their weights stay in the
-   first-level cache. */
+/* Number of terms (pairs of input channel and tap) that are summed in one pass; their weights stay
+   in the first-level cache. */
 #define SDM_CONV_TERMS 216
-/* Positions of a channel in one unit of work, a multiple of every `nr`. */
+/* Number of positions of a channel in one unit of work, a multiple of every `nr`. */
 #define SDM_CONV_CHUNK 768
 /* Upper bounds of nr and of 3 * mr * width. */
 #define SDM_CONV_NR_MAX 48
@@ -17,15 +17,15 @@
 
 typedef struct conv_table {
     const char *name;
-    size_t mr;    /* output channels of a tile */
-    size_t nr;    /* positions of a tile */
-    size_t width; /* floats in a register */
+    size_t mr;    /* number of output channels of a tile */
+    size_t nr;    /* number of positions of a tile */
+    size_t width; /* number of floats in a register */
     /* y[i][p] = sum over k of a[k][i] * x[offset[k] + p], or += with `add`: mr channels i of
        y[mr][ldy], nr positions p. */
     void (*tile)(size_t k, const float *a, const float *x, const ptrdiff_t *offset, float *y,
                  size_t ldy, int add);
-    /* sums[i][j][p % width] += dy[i][p] * x[offset[j] + p] over n positions p, n a multiple of
-   width: mr channels i of dy[mr][ldy], three offsets j, sums[mr][3][width]. */
+    /* sums[i][j][p % width] += dy[i][p] * x[offset[j] + p] for mr channels i of dy[mr][ldy], three
+       offsets j and n positions p; sums[mr][3][width], n is a multiple of width. */
     void (*dot)(size_t n, const float *dy, size_t ldy, const float *x, const ptrdiff_t *offset,
                 float *sums);
 } conv_table;

@@ -1,7 +1,7 @@
-/* Convolution by oneDNN 2.x where it is faster than the native one: 3 x 3 x 3 with many channels on
-   the smaller levels, forward and backward to the inputs. The gradient by the weights is native,
-   and so is a call for which oneDNN reports an error. Each call reorders maps and weights to the
-   layout of oneDNN and back. */
+/* Convolution by oneDNN 2.x where it is faster than the native convolution: 3 x 3 x 3 with many
+   channels on the smaller levels, in the forward pass and in the backward pass to the inputs. The
+   gradient by the weights is always native, and so is a convolution for which oneDNN reports an
+   error. Each call reorders maps and weights to the layout of oneDNN, and the result back. */
 #include <oneapi/dnnl/dnnl.h>
 #include <pthread.h>
 #include <string.h>
@@ -15,7 +15,7 @@ static dnnl_engine_t engine;
 static dnnl_stream_t stream;
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 
-// creates engine and stream once; NULL if oneDNN fails
+// creates `engine` and `stream`, called once; they are NULL if oneDNN fails
 static void engine_start(void)
 {
     if (dnnl_engine_create(&engine, dnnl_cpu, 0) != dnnl_success) engine = NULL;
@@ -31,8 +31,8 @@ static bool onednn_pays(const sdm_fmap *g, sdm_conv c)
            g->n[0] * g->n[1] * g->n[2] <= 32768;
 }
 
-// Packed weights: first the result of sdm_conv_pack(), for native calls, then the same weights as
-// [outputs][inputs][taps] for oneDNN, transposed if the pass is backward.
+// Number of floats of the packed weights: first the result of sdm_conv_pack(), for native calls,
+// then the same weights as [outputs][inputs][taps] for oneDNN, transposed for the backward pass.
 static size_t packed_count(sdm_conv c)
 {
     return (sdm_conv_packed_count(c) + 15) / 16 * 16 + c.in * c.out * c.taps;
@@ -50,7 +50,7 @@ static void weights_pack(sdm_conv c, bool transposed, const float *w, float *pac
                 *packed++ = w[(i * c.in + o) * c.taps + c.taps - 1 - t];
 }
 
-// Objects of a call; destroyed by call_destroy() after success and after an error.
+// oneDNN objects of one call; call_destroy() destroys them after success and after an error.
 typedef struct call {
     dnnl_primitive_desc_t plan;
     dnnl_primitive_t convolution;

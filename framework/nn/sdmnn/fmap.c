@@ -5,7 +5,7 @@
 
 static size_t up16(size_t n) { return (n + 15) / 16 * 16; }
 
-enum { OVERRUN = 64 }; // floats after the last channel: kernels read up to a tile beyond its end
+enum { OVERRUN = 64 }; // more floats after the last channel: kernels read up to a tile beyond it
 
 sdm_fmap sdm_fmap_layout(const size_t n[3])
 {
@@ -34,7 +34,7 @@ void sdm_fmap_clear_pads(const sdm_fmap *g, size_t first, size_t last, float *ch
 {
     for (size_t r = first / g->row; r * g->row < last; r++) {
         const size_t begin = r * g->row, end = begin + g->row;
-        // a padding row, or the padding column of a row of voxels
+        // clear a whole padding row, or the one padding element of a row of voxels
         size_t from = r % (g->n[1] + 1) == g->n[1] ? begin : end - 1;
         if (from < first) from = first;
         for (size_t i = from; i < end && i < last; i++) channel[i] = 0;

@@ -23,8 +23,8 @@ static void volume_enter(const sdmnn_plan *p, const float *volume, float *maps, 
                          maps + p->input, n_threads);
 }
 
-// Index of the first random number of the drop-out of `step`: each draw has a contiguous range, in
-// the order of the steps.
+// Index of the first random number for the drop-out of `step`. Each draw has a contiguous range of
+// indices, and within it the steps follow in their order.
 static uint64_t first_draw(const sdmnn_plan *p, const sdmnn_step *step, uint64_t draw)
 {
     uint64_t before = 0, all = 0;
@@ -86,9 +86,10 @@ void sdm_sdmnn_pass_tangent(const sdmnn_plan *p, const sdmnn_layers *w, const fl
     sdm_fmap_write(&p->level[0], tangent + p->output, map);
 }
 
-// Each feature map is the input of one step, which overwrites the gradient by it. The results of
-// the way down are inputs of two steps: the convolution after the merge, which comes first in this
-// reverse order and overwrites, and the pooling, which adds.
+// Each feature map is the input of one step, which in this pass overwrites the gradient by that
+// feature map. Only the results of the way down are inputs of two steps: the convolution after the
+// concatenation, which comes first in this reverse order and overwrites the gradient, and the
+// pooling, which adds to it.
 void sdm_sdmnn_pass_backward(const sdmnn_plan *p, const sdmnn_layers *w, const float *maps,
                              const float *slope, const float *map, float *back, float *volume,
                              float *gradient, int n_threads)

@@ -1,7 +1,7 @@
 /* The passes of sdmnn through the steps of its plan (plan.h): forward, tangent, backward. maps,
-   slope, tangent and back are blocks of plan.floats floats; maps, tangent and back have been
-   cleared once by sdm_sdmnn_plan_clear(). The plan of a pass with slopes has been made with `keep`.
-   n_threads >= 1. */
+   slope, tangent and back are blocks of p->floats floats; maps, tangent and back must have been
+   cleared once by sdm_sdmnn_plan_clear(). A pass with slopes needs a plan that was made with
+   `keep`. n_threads >= 1. */
 #ifndef SDM_SDMNN_PASSES_H
 #define SDM_SDMNN_PASSES_H
 
@@ -15,27 +15,28 @@ typedef struct sdmnn_layers {
     const float *bias[SDMNN_STEPS];
 } sdmnn_layers;
 
-/* Identifies the random numbers of the drop-out of one map of a batch. */
+/* Identifies the random numbers for the drop-out of one map of a batch. */
 typedef struct sdmnn_draw {
     uint64_t seed, stream, draw;
 } sdmnn_draw;
 
-/* Forward pass: map[nz][ny][nx] (unless NULL) from the volume[cells] of the dense layers. slope:
-   set to the derivatives of the activations, unless NULL. draw: random numbers of the drop-out,
-   which needs `slope`; NULL: no drop-out. */
+/* Forward pass: computes map[nz][ny][nx] (unless NULL) from volume[cells], the result of the dense
+   layers. slope (unless NULL) is set to the derivatives of the activations. draw: random numbers
+   for the drop-out, which needs `slope`; NULL: no drop-out. */
 void sdm_sdmnn_pass_forward(const sdmnn_plan *p, const sdmnn_layers *w, const float *volume,
                             float *maps, float *slope, const sdmnn_draw *draw, float *map,
                             int n_threads);
 
-/* After a forward pass with slopes: map[nz][ny][nx] = tangent of the map for the tangent
-   volume[cells] of the volume. */
+/* Tangent pass, after a forward pass with slopes: map[nz][ny][nx] = directional derivative of the
+   map for volume[cells] = directional derivative of the volume. */
 void sdm_sdmnn_pass_tangent(const sdmnn_plan *p, const sdmnn_layers *w, const float *maps,
                             const float *slope, const float *volume, float *tangent, float *map,
                             int n_threads);
 
-/* After a forward pass with slopes: from the derivative map[nz][ny][nx] of the loss by the map to
-   volume[cells], its derivative by the volume; gradient[n_weights] += its derivative by the weights
-   and biases of the convolutions, unless NULL. */
+/* Backward pass, after a forward pass with slopes. map[nz][ny][nx]: the derivative of the loss by
+   the map. Computes volume[cells] = the derivative of the loss by the volume, and adds to
+   gradient[n_weights] (unless NULL) the derivative of the loss by the weights and biases of the
+   convolutions. */
 void sdm_sdmnn_pass_backward(const sdmnn_plan *p, const sdmnn_layers *w, const float *maps,
                              const float *slope, const float *map, float *back, float *volume,
                              float *gradient, int n_threads);

@@ -41,7 +41,7 @@ sdm_status sdm_sdmnn_check(const sdm_sdmnn_arch *a, sdm_error *err)
     for (int i = 0; i < 3; i++)
         if (n[i] < 1 || n[i] > 1048576)
             return sdm_fail(err, SDM_E_ARG, "%zu voxels: need 1 .. 1048576", n[i]);
-    // far below SIZE_MAX, so that no size of the plan overflows; allocation may still fail later
+    // limit far below SIZE_MAX, so that no size of the plan overflows; allocation may still fail
     const double all = 16.0 * ((double)n[0] + 2) * ((double)n[1] + 2) * ((double)n[2] + 2) *
                        ((double)a->channels + 1);
     if (!(all < fmin(0x1p44, (double)(SIZE_MAX / 16))))
@@ -108,8 +108,9 @@ void sdm_sdmnn_plan_make(const sdm_sdmnn_arch *a, bool keep, sdmnn_plan *p)
     p->volume = add_buffer(p, &p->cell, SDMNN_LEVELS, 1);
     p->input = add_map(p, 0, 1);
 
-    // Way down. first, merged: offsets of the results of the two convolutions of each level. merged
-    // has room for 2 c channels: the way up writes its half after the half of the way down.
+    // Way down. first[l], merged[l]: offsets of the results of the two convolutions of level l.
+    // merged[l] has room for 2 c channels: the way up writes c channels after the c channels of the
+    // way down.
     size_t first[SDMNN_LEVELS], merged[SDMNN_LEVELS];
     size_t in = p->input, n_in = 1;
     for (size_t l = 0; l <= a->depth; l++) {
@@ -128,8 +129,9 @@ void sdm_sdmnn_plan_make(const sdm_sdmnn_arch *a, bool keep, sdmnn_plan *p)
     in = merged[a->depth], n_in = channels_of(a, a->depth);
     for (size_t l = a->depth; l-- > 0;) {
         const size_t c = channels_of(a, l);
-        // The 1 x 1 x 1 convolution comes before the up-sampling, which needs an eighth of the
-        // work. The result is the same, because up-sampling only repeats voxels.
+        // The 1 x 1 x 1 convolution comes before the up-sampling. The result is the same as in the
+        // reverse order, because up-sampling only repeats voxels, but the convolution has an eighth
+        // of the voxels.
         const size_t reduced = keep ? add_map(p, l + 1, c) : first[l + 1];
         add_step(p, SDMNN_CONV, l + 1, in, reduced, (sdm_conv){n_in, c, 1});
         add_step(p, SDMNN_UPSAMPLE, l, reduced, merged[l] + c * p->level[l].stride,
@@ -169,7 +171,8 @@ double sdm_sdmnn_work(const sdm_sdmnn_arch *a)
     return n;
 }
 
-// weights from index `at` on: normal with variance gain / inputs; then zero biases
+// Sets the weights of a layer, from index `at` on, to normal random numbers with variance
+// gain / inputs, and the biases after them to zero.
 static void random_layer(uint64_t seed, uint64_t stream, size_t at, size_t outputs, size_t inputs,
                          double gain, float *w)
 {

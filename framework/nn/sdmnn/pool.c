@@ -14,8 +14,8 @@ static size_t largest(const sdm_fmap *g, const float *x, size_t at, const size_t
     return best;
 }
 
-// One channel. For each window with its maximum of x at voxel v: to[window] = from[v], or with
-// `back` to[v] += from[window].
+// Processes one channel. For each window, with v the voxel of its maximum of x: to[window] =
+// from[v], or with `back` to[v] += from[window].
 static void pool_windows(const sdm_fmap *g, const sdm_fmap *h, const float *x, const float *from,
                          float *to, int back)
 {

@@ -5,7 +5,7 @@
 #include "sdm/memory.h"
 #include "sdmnn_model.h"
 
-// the text that read_architecture() of sdmnn_open.c reads
+// writes the text that read_architecture() of sdmnn_open.c reads
 static void description_write(const sdm_sdmnn_spec *spec, sdm_text *t)
 {
     const sdm_sdmnn_arch *a = &spec->arch;
@@ -15,7 +15,7 @@ static void description_write(const sdm_sdmnn_spec *spec, sdm_text *t)
     sdm_text_add(t, "sdmnn.activation=%d\nsdmnn.half=%d\n", a->activation, spec->half);
 }
 
-// elements at .. at + n - 1 of `to` = w[n], as halves or floats
+// stores w[n] as elements at .. at + n - 1 of `to`, which are halves or floats
 static void weights_store(bool half, const float *w, size_t n, void *to, size_t at)
 {
     if (!half) memcpy((float *)to + at, w, n * sizeof *w);

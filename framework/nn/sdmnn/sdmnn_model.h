@@ -1,8 +1,10 @@
-/* The opened sdmnn model and the functions between its files. Letters as in sdm/internal/sdmnn.h.
-   Sections of the file:
-     sdmnn.dense   float: w1[W][P], b1[W], b2[cells], then the biases of every convolution
-          sdmnn.volume  panels of w2[cells][W] (sdm/internal/kernels.h), float or half
-     sdmnn.conv    w[outputs][inputs][taps] of every convolution, float or half */
+/* The opened sdmnn model and the functions between the files of this folder. Letters as in
+   sdm/internal/sdmnn.h.
+
+   Sections of the model file (w1, b1, w2, b2: the two dense layers)
+     sdmnn.dense   floats: w1[W][P], b1[W], b2[cells], then the biases of every convolution
+     sdmnn.volume  w2[cells][W] in panels (sdm/internal/kernels.h) of floats or halves
+     sdmnn.conv    w[outputs][inputs][taps] of every convolution, floats or halves */
 #ifndef SDM_SDMNN_MODEL_H
 #define SDM_SDMNN_MODEL_H
 
@@ -10,8 +12,8 @@
 #include "passes.h"
 
 typedef struct sdmnn_model {
-    sdmnn_plan plan;     /* of the forward pass: feature maps share memory */
-    sdmnn_plan kept;     /* of derivatives: all feature maps are kept */
+    sdmnn_plan plan;     /* plan for maps only: feature maps share memory */
+    sdmnn_plan kept;     /* plan for derivatives: all feature maps are kept */
     sdmnn_layers layers; /* without `transposed` */
     float *packed;       /* memory of layers.packed */
     bool half;           /* sections sdmnn.volume and sdmnn.conv are halves */
@@ -19,14 +21,16 @@ typedef struct sdmnn_model {
     const void *volume, *conv; /* the sections */
 } sdmnn_model;
 
-/* sdmnn_weights.c: number of floats of the section sdmnn.dense, of weights of sdmnn.conv. */
+/* sdmnn_weights.c: number of floats in the section sdmnn.dense, and number of weights in the
+   section sdmnn.conv. */
 size_t sdm_sdmnn_dense_floats(const sdmnn_plan *p);
 
 size_t sdm_sdmnn_conv_count(const sdmnn_plan *p);
 
-/* sdmnn_weights.c: packs all convolutions for the forward or (transposed) the backward pass into
-   to[sdm_sdmnn_packed_floats()] and sets packed[SDMNN_STEPS], the start of each.
-   layer[sdm_sdmnn_largest_layer()]: buffer for the weights of one convolution as floats. */
+/* sdmnn_weights.c: sdm_sdmnn_pack_layers() packs the weights of all convolutions for the forward or
+   (transposed) the backward pass into to[sdm_sdmnn_packed_floats()], and sets packed[SDMNN_STEPS]
+   to the start of the packed weights of each convolution. layer[sdm_sdmnn_largest_layer()]: buffer
+   for the weights of one convolution as floats. */
 size_t sdm_sdmnn_packed_floats(const sdmnn_plan *p, bool transposed);
 size_t sdm_sdmnn_largest_layer(const sdmnn_plan *p);
 void sdm_sdmnn_pack_layers(const sdmnn_model *k, bool transposed, float *layer, float *to,

@@ -8,7 +8,8 @@
 
 static size_t up16(size_t n) { return (n + 15) / 16 * 16; }
 
-// Scratch memory, carved from the caller's block. R rows: a map, then its derivatives.
+// Scratch memory, carved from the caller's block, for R rows: row 0 belongs to a map, the others to
+// its derivatives.
 typedef struct workspace {
     float *hidden;                 // [R][W]
     float *volume;                 // [R][sdm_panel_outputs(cells)]
@@ -44,8 +45,9 @@ static double unit(const sdm_model *m, size_t i)
     return 2 / (m->params[i].max - m->params[i].min);
 }
 
-// w->volume = the output of the dense layers: row 0 the volume, then its derivatives: along
-// direction[P] (rows = 2) or, for direction NULL, by each parameter (rows = 1 + P).
+// w->volume = the output of the dense layers. Row 0 is the volume; the other rows are its
+// derivatives along direction[P] (rows = 2) or, if direction is NULL, by each parameter (rows = 1 +
+// P).
 static void dense(const sdm_model *m, const double *params, size_t rows, const double *direction,
                   const workspace *w)
 {
@@ -109,7 +111,8 @@ static size_t derivative_bytes(const sdm_model *m, size_t rows, bool reverse)
     return carve(&k->kept, rows, reverse, NULL, &w);
 }
 
-// values = the map, derivatives[rows - 1][voxels] as in dense()
+// values = the map; derivatives[rows - 1][voxels] = its derivatives along direction[P] or by each
+// parameter, as in dense()
 static void forward_mode(const sdm_model *m, const double *params, size_t rows,
                          const double *direction, float *values, float *derivatives, void *scratch,
                          int n_threads)

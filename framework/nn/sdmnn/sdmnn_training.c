@@ -12,14 +12,15 @@ struct sdm_sdmnn {
     size_t batch; /* 0: forward pass only */
     const float *weights;
     sdmnn_layers layers;
-    float *packed;                           /* memory of layers.packed and .transposed */
-    float *maps, *slope, *back;              /* see passes.h; slope and back for the gradient */
-    float *hidden, *volume;                  /* outputs of the dense layers, [B][W], [B][cells] */
-    float *hidden_slope, *dhidden, *dvolume; /* derivative of the activation, gradients */
-    float *map, *dmap;                       /* [V] a map, and the derivative of its loss */
+    float *packed;              /* memory of layers.packed and layers.transposed */
+    float *maps, *slope, *back; /* see passes.h; slope and back only if batch > 0 */
+    float *hidden, *volume;     /* outputs of the two dense layers, [B][W] and [B][cells] */
+    /* [B][W] derivative of the activation of `hidden`; gradients by `hidden` and by `volume`. */
+    float *hidden_slope, *dhidden, *dvolume;
+    float *map, *dmap; /* [V] a map; [V] derivative of the loss by it */
 };
 
-// floats of the packed weights of a step, rounded up to 64 bytes
+// number of floats of the packed weights of a step, rounded up to a multiple of 64 bytes
 static size_t packed_count(const sdm_conv_backend *b, const sdmnn_step *s)
 {
     return s->op == SDMNN_CONV ? (b->packed_count(s->conv) + 15) / 16 * 16 : 0;
@@ -38,7 +39,7 @@ static sdm_status network_allocate(sdm_sdmnn *net, sdm_error *err)
             n += (b->packed_count(sdm_conv_opposite(s->conv)) + 15) / 16 * 16;
     }
 
-    // for the forward pass, then for the gradient
+    // memory for the forward pass, then for the gradient
     sdm_status s = SDM_ALLOC(&net->packed, n, "network weights", err);
     if (!s) s = SDM_ALLOC(&net->maps, p->floats, "network maps", err);
     if (!s) s = SDM_ALLOC(&net->hidden, batch * p->arch.width, "network maps", err);
@@ -69,7 +70,7 @@ sdm_status sdm_sdmnn_create(const sdm_sdmnn_arch *a, size_t batch, const sdm_con
     if (s)
         sdm_sdmnn_free(net);
     else
-        *out = net; // SDM_ALLOC() zeroes: the padding of the feature maps needs no clearing
+        *out = net; // SDM_ALLOC() has set the padding of the feature maps to zero
     return s;
 }
 
@@ -110,8 +111,8 @@ void sdm_sdmnn_set(sdm_sdmnn *net, const float *weights)
     }
 }
 
-// net->volume[B][cells] = the dense layers at x[B][P]; slope[B][W] = derivative of the activation,
-// unless NULL.
+// net->volume[B][cells] = the result of the dense layers at x[B][P]; unless NULL, slope[B][W] = the
+// derivative of the activation.
 static void dense(sdm_sdmnn *net, size_t batch, const float *x, float *slope, int n_threads)
 {
     const sdmnn_plan *p = &net->plan;

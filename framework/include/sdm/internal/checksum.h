@@ -13,8 +13,8 @@
 extern "C" {
 #endif
 
-/* Checksum of size bytes at data, continued from the checksum `crc` of the bytes before (0 at the
- * start). [any thread] */
+/* Checksum of `size` bytes at `data`. crc: checksum of the bytes before them, 0 at the start.
+ * [any thread] */
 SDM_INTERNAL_API uint64_t sdm_crc64(uint64_t crc, const void *data, size_t size);
 
 /* Checksum of the content of a regular file. SDM_E_IO, SDM_E_NOMEM. [any thread] */

@@ -1,4 +1,4 @@
-/* The configuration of a training: reads YAML into a struct by field tables. Unknown, repeated,
+/* The configuration of a training, read from YAML into a struct by field tables. Unknown, repeated,
  * missing and invalid keys are mistakes; every mistake is reported as a line
  * "file:line:column: message". */
 #ifndef SDM_CONFIG_H
@@ -18,12 +18,12 @@ extern "C" {
 #define SDM_NAME_MAX 64
 #define SDM_PATH_TEXT_MAX 1024
 
-/* Origin of a value. line == 0 and override == 0: a default. */
+/* Origin of a value. With line == 0 and override == 0 the value is a default. */
 typedef struct sdm_mark {
     int line, column; /* position in a file, from 1; 0: not from a file */
     int override;     /* number of the key=value override, from 1; 0: from the configuration file */
-    /* For an override: its text, or with line > 0 the name of the file that contains it. NULL for
-     * the configuration file. Owned by the caller, not copied. */
+    /* For an override: the text of the override, or, if line > 0, the name of the file that
+     * contains the override. NULL for the configuration file. Owned by the caller, not copied. */
     const char *source;
 } sdm_mark;
 
@@ -34,7 +34,7 @@ typedef struct sdm_config_option {
     sdm_mark mark;
 } sdm_config_option;
 
-/* shape.ranges.NAME: range [min, max] of a parameter, within the shape's own range. */
+/* shape.ranges.NAME: range [min, max] of a parameter, within the range that the shape allows. */
 typedef struct sdm_config_range {
     char name[SDM_NAME_MAX];
     double min, max;
@@ -68,7 +68,7 @@ typedef enum sdm_weight_type {
 } sdm_weight_type;
 
 /* All keys of a training configuration. `sdmgen config --keys` lists their ranges and defaults for
- * every kind of network; those below are for pod. */
+ * every kind of network; unless another kind is named, the comments below give those of pod. */
 typedef struct sdm_config {
     char file[SDM_PATH_TEXT_MAX]; /* path as given to sdm_config_read() */
     struct {
@@ -88,26 +88,27 @@ typedef struct sdm_config {
         /* pod: hidden layers of the MLP, 0..16, default 3 (0: polynomials only); sdmnn: levels;
          * deepsdf, imnet: hidden layers */
         int depth;
-        int width; /* units per hidden layer, 8..4096, default 128; imnet: of the first one */
+        int width; /* units per hidden layer (imnet: of the first one), 8..4096, default 128 */
         /* mean number of basis functions per block of the lowest level, 1..256, default 9 */
         int rank;
         int levels; /* levels of blocks, 1..8, default 3 */
         int block;  /* edge of a block of the lowest level in voxels, 2..16, default 4 */
-        int modes;  /* global modes in which the coefficients are learned, 8..2048, default 512 */
-        int degree; /* total degree of the polynomial part, 0..12, default 6 */
+        /* number of global modes in which the coefficients are learned, 8..2048, default 512 */
+        int modes;
+        int degree;        /* total degree of the polynomial part, 0..12, default 6 */
         int input_degree;  /* total degree of the products fed to the MLP, 1..8, default 4 */
         int channels;      /* sdmnn: channels of the first level, 1..512 */
         double dropout;    /* sdmnn: fraction dropped at the two deepest levels, 0..0.9 */
-        int skip;          /* deepsdf: hidden layer with the input again, 0 (none)..15 */
+        int skip;          /* deepsdf: hidden layer that also gets the input, 1..15; 0: none */
         sdm_output output; /* deepsdf, imnet: activation of the output layer */
-        /* of the hidden layers, default silu; leaky_relu has the slope 0.02 below 0 */
+        /* activation of the hidden layers, default silu; leaky_relu has the slope 0.02 below 0 */
         sdm_activation activation;
         /* type of the large weights in the model file; default i8 (pod), f16 (others) */
         sdm_weight_type weights;
     } network;
     struct {
-        /* data.static: points of the static grid per parameter, one number for all or a list;
-         * default 5 */
+        /* data.static: number of points of the static grid (a regular grid in the space of the
+         * parameters) along each parameter, one number for all or a list; default 5 */
         int64_t static_counts[SDM_MAX_PARAMS];
         size_t n_static_counts; /* 0: no static grid; 1: one number for all parameters */
         int64_t online;         /* random shapes generated during training, 0..10^7, default 4096 */
@@ -120,30 +121,31 @@ typedef struct sdm_config {
         int workers;         /* threads that generate shapes; 0: half of the threads, at least 1 */
     } data;
     struct {
-        /* Budgets: exactly one of these three is positive, 0: not limited by it. */
+        /* Budgets: exactly one of minutes, steps and samples is positive, the others are 0. */
         double minutes;       /* time, including data generation and evaluation */
-        int64_t steps;        /* optimiser steps */
+        int64_t steps;        /* number of optimiser steps */
         int64_t samples;      /* steps * batch */
         int batch;            /* maps per step, 1..65536, default 256 */
         int points;           /* deepsdf, imnet: voxels per map and step, 8..1048576, default 512 */
-        double learning_rate; /* maximum, default 3e-3 */
-        double warmup;        /* fraction of the budget, 0..0.5, default 0.02 */
-        sdm_loss loss;        /* default mse */
-        double clamp_mm;      /* clamped_l1: bound to which distances are clamped, default 0.1 */
-        double eikonal;       /* all but pod: weight of (|gradient| - 1)^2, 0..1000, default 0 */
-        double near_weight;   /* extra weight of voxels near the surface, 0..100, default 0 */
-        double near_mm;       /* voxels closer to the surface than this are near; default 0.4 */
-        /* last fraction of the budget, used for refinement (training end to end, decoder
+        double learning_rate; /* maximum of the learning rate, default 3e-3 */
+        /* fraction of the budget during which the learning rate increases, 0..0.5, default 0.02 */
+        double warmup;
+        sdm_loss loss;      /* default mse */
+        double clamp_mm;    /* clamped_l1: bound to which distances are clamped, default 0.1 */
+        double eikonal;     /* all but pod: weight of (|gradient| - 1)^2, 0..1000, default 0 */
+        double near_weight; /* extra weight of voxels near the surface, 0..100, default 0 */
+        double near_mm;     /* voxels closer to the surface than this are near; default 0.4 */
+        /* pod: last fraction of the budget, used for refinement (training end to end, decoder
          * included), 0..1, default 0.4 */
         double refine;
         int refine_batch;   /* samples per step during refinement, 1..4096, default 32 */
         double refine_rate; /* learning rate during refinement, default 3e-4 */
         /* decay of the moving average of the weights, 0..0.99999, default 0.998; 0: off */
         double average;
-        /* time between evaluations on held-out shapes, default 20; every 500 steps if the budget is
-         * not a time */
+        /* time between evaluations on held-out shapes, default 20 s; if the budget is not a time,
+         * they take place every 500 steps instead */
         double evaluate_seconds;
-        double checkpoint_seconds; /* time between checkpoints, default 60 */
+        double checkpoint_seconds; /* time between checkpoints, default 60 s */
     } train;
     struct {
         /* output.folder; default runs/NAME, NAME the file name of the configuration without its
@@ -155,12 +157,12 @@ typedef struct sdm_config {
 } sdm_config;
 
 /* Reads a configuration file (at most 1 MiB, one document, no anchors, aliases or tags, at most 32
- * levels of nesting) and applies the key=value overrides in order. Their keys are dotted and their
- * values are YAML: "network.depth=4", "shape.ranges.a=[2,3]". SDM_E_CONFIG: err->text lists the
- * mistakes, one per line as "file:line:column: message" (in an override: "argument
- * 'network.dpth=4': message"): unknown keys (with "did you mean"), duplicate and missing keys,
- * values of a wrong type or out of range. Also SDM_E_IO, SDM_E_ARG, SDM_E_NOMEM. *out has marks
- * that point to the overrides. */
+ * levels of nesting) and applies the key=value overrides in order. Keys of overrides are dotted and
+ * their values are YAML: "network.depth=4", "shape.ranges.a=[2,3]". SDM_E_CONFIG: err->text lists
+ * the mistakes, one per line as "file:line:column: message" (in an override: "argument
+ * 'network.dpth=4': message"). Mistakes are unknown keys (with "did you mean"), duplicate and
+ * missing keys, and values of a wrong type or out of range. Also SDM_E_IO, SDM_E_ARG, SDM_E_NOMEM.
+ * The marks in *out point to the texts of the overrides. */
 sdm_status sdm_config_read(const char *path, const char *const *overrides, size_t n_overrides,
                            sdm_config *out, sdm_error *err);
 
@@ -169,8 +171,8 @@ sdm_status sdm_config_parse(const char *name, const char *text, size_t size,
                             const char *const *overrides, size_t n_overrides, sdm_config *out,
                             sdm_error *err);
 
-/* Appends every key with its value as YAML; reading it gives the same values. Empty texts are left
- * out, so an empty output.folder reads back as its default. */
+/* Appends every key with its value as YAML; reading this YAML gives the same values. Empty texts
+ * are left out, so an empty output.folder reads back as its default. */
 void sdm_config_dump(const sdm_config *c, sdm_text *out);
 
 /* Clears the members that do not affect the trained network: the numbers of threads, the file name

@@ -3,8 +3,8 @@
 
      offset 0   "SDMGEN\r\n"   8 bytes; a transfer as text changes the line end and is detected
             8   version        u32, SDM_CONTAINER_VERSION
-           12   sections       u32, their number, 1 .. SDM_CONTAINER_MAX_SECTIONS
-           16   length         u64, of the file in bytes
+           12   sections       u32, number of sections, 1 .. SDM_CONTAINER_MAX_SECTIONS
+           16   length         u64, length of the file in bytes
            24   table          for each section: name[24], padded with zeros,
                                then u64 each: offset, size, CRC-64
      then       checksum       u64, CRC-64 of all bytes before it
@@ -40,10 +40,11 @@ sdm_status sdm_container_build(const sdm_section *sections, size_t n, uint8_t **
    is unchanged. [any thread] */
 sdm_status sdm_container_write(const char *path, const uint8_t *bytes, size_t size, sdm_error *err);
 
-/* Parses the file bytes[size], 64-byte aligned: sets *n, *checksum (of the whole file), and
-   sections[0 .. *n - 1], whose data point into `bytes` and whose names point into names[].
-   sections[] has room for SDM_CONTAINER_MAX_SECTIONS. SDM_E_FORMAT, with the reason: magic number,
-   version, sizes, overlap or a checksum is wrong. [any thread] */
+/* Parses the file bytes[size], 64-byte aligned: sets *n, *checksum (the one in the last 8 bytes),
+   and sections[0 .. *n - 1], whose data point into `bytes` and whose names point into names[].
+   sections[] has room for SDM_CONTAINER_MAX_SECTIONS. SDM_E_FORMAT: the magic number, the version,
+   a size, the position of a section or a checksum is wrong; the message names the reason. [any
+   thread] */
 sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *sections,
                                char names[SDM_CONTAINER_MAX_SECTIONS][24], size_t *n,
                                uint64_t *checksum, sdm_error *err);

@@ -1,6 +1,6 @@
 /* The configuration of an experiment, which compares methods on the same shapes: each method is a
- * row of a table, and figures reported by others can be shown beside it. YAML, read and checked as
- * described in sdm/internal/config.h. */
+ * row of a table, and figures reported by others can be shown beside it. The configuration is a
+ * YAML file, read and checked as described in sdm/internal/config.h. */
 #ifndef SDM_EXPERIMENT_H
 #define SDM_EXPERIMENT_H
 
@@ -13,8 +13,8 @@ extern "C" {
 #define SDM_EXPERIMENT_ROWS_MAX 64
 #define SDM_EXPERIMENT_TITLE_MAX (2 * SDM_NAME_MAX)
 
-/* A figure that is measured of each method: one column of the table. New ones are added at the end.
- */
+/* A figure that is measured for each method: one column of the table. New figures are added at the
+ * end. */
 typedef enum sdm_figure {
     SDM_FIGURE_MS = 0,
     SDM_FIGURE_MS_BATCH,
@@ -48,8 +48,8 @@ typedef struct sdm_figure_info {
 /* The description of a figure, constant; NULL for f >= SDM_N_FIGURES. [any thread] */
 const sdm_figure_info *sdm_figure_get_info(sdm_figure f);
 
-/* A key of the training configuration with its value, "train.minutes=4", and its position in the
- * experiment's file; mark.line == 0: an argument of the command line. */
+/* A key of the training configuration with its value, e.g. "train.minutes=4", and its position in
+ * the experiment's file; mark.line == 0: it is an argument of the command line. */
 typedef struct sdm_override {
     char *text;
     sdm_mark mark;
@@ -63,22 +63,24 @@ typedef struct sdm_overrides {
 /* How a method fits parameters and pose of a shape to an image: the source of its maps. */
 typedef enum sdm_experiment_fit {
     SDM_EXPERIMENT_NO_FIT = 0,  /* no fit: the method makes maps */
-    SDM_EXPERIMENT_FIT_NETWORK, /* maps of its network */
-    /* as the last method with FIT_NETWORK before it, with that network, then exact maps */
+    SDM_EXPERIMENT_FIT_NETWORK, /* maps of the method's network */
+    /* first maps of the network of the last method with FIT_NETWORK before this one, then exact
+     * maps */
     SDM_EXPERIMENT_FIT_POLISH,
     SDM_EXPERIMENT_FIT_EXACT, /* exact maps */
-    /* not run: computes the cost of FIT_EXACT if the naive method made its maps */
+    /* no fit is run: the cost that FIT_EXACT would have if the naive method made its maps is
+     * computed */
     SDM_EXPERIMENT_FIT_NAIVE
 } sdm_experiment_fit;
 
 /* An element of `methods`: a network to train, or an engine that needs no training. */
 typedef struct sdm_experiment_method {
     char name[SDM_NAME_MAX];
-    char network[SDM_NAME_MAX]; /* kind of the network; "": an engine */
-    char engine[SDM_NAME_MAX];  /* name of the engine, not checked here; "": a network */
+    char network[SDM_NAME_MAX]; /* kind of the network; "" if the method is an engine */
+    char engine[SDM_NAME_MAX];  /* name of the engine, not checked here; "" for a network */
     int fit;                    /* sdm_experiment_fit; EXACT and NAIVE set `engine` */
-    int64_t samples;            /* shapes on which errors are measured; 0: as in the experiment */
-    sdm_overrides set;          /* keys of the training configuration for this method */
+    int64_t samples;   /* number of shapes for measuring errors; 0: as given for the experiment */
+    sdm_overrides set; /* keys of the training configuration for this method */
     sdm_mark mark;
 } sdm_experiment_method;
 
@@ -94,7 +96,7 @@ typedef struct sdm_experiment_reference {
     char row[SDM_EXPERIMENT_TITLE_MAX]; /* title of the row */
     char source[256];                   /* where the figures were published */
     double value[SDM_N_FIGURES];        /* NaN: not reported */
-    /* of a fit: mean abs(difference from the exact fit) of each parameter */
+    /* for a fit: mean of abs(parameter - its value in the exact fit), for each parameter */
     size_t n_differences;
     struct {
         char name[SDM_NAME_MAX];
@@ -105,45 +107,49 @@ typedef struct sdm_experiment_reference {
 
 /* One row of the table: a method in a variant. */
 typedef struct sdm_experiment_row {
-    char title[SDM_EXPERIMENT_TITLE_MAX];  /* "POD", "POD, 128^3" */
-    char folder[SDM_EXPERIMENT_TITLE_MAX]; /* of a-z, 0-9 and '-', different for every row */
+    char title[SDM_EXPERIMENT_TITLE_MAX];  /* e.g. "POD" or "POD, 128^3" */
+    char folder[SDM_EXPERIMENT_TITLE_MAX]; /* a-z, 0-9 and '-' only, different for every row */
     const sdm_experiment_method *method;
     const sdm_experiment_variant *variant;     /* NULL: there are no variants */
     const sdm_experiment_reference *reference; /* NULL: none */
-    size_t network_row; /* index of the row whose network it uses: itself, except for FIT_POLISH */
-    int64_t samples;    /* shapes on which errors are measured */
+    /* Index of the row whose network this row uses: its own index, except for FIT_POLISH. */
+    size_t network_row;
+    int64_t samples; /* number of shapes on which errors are measured */
 } sdm_experiment_row;
 
 typedef struct sdm_experiment {
     char file[SDM_PATH_TEXT_MAX]; /* path as given to sdm_experiment_read() */
     struct {
-        char title[256];                /* of the report; default: the file name */
-        char folder[SDM_PATH_TEXT_MAX]; /* for the results; default runs/NAME, after the file */
-        uint64_t seed;                  /* of the random test shapes, default 1 */
+        char title[256]; /* title of the report; default: the file name without extension */
+        /* folder for the results; default runs/NAME, NAME the file name without extension */
+        char folder[SDM_PATH_TEXT_MAX];
+        uint64_t seed;          /* seed of the random test shapes, default 1 */
         int64_t samples;        /* shapes for measuring errors of a network, 1..10^6, default 100 */
         int64_t engine_samples; /* the same for an engine, default 5 */
-        double minutes; /* no training is started that would end later; 0 (default): no limit */
+        /* time limit: no training is started that would end later; 0 (default): no limit */
+        double minutes;
         char baseline[SDM_NAME_MAX];  /* method to which `speedup` refers; "" (default): none */
         char reference[SDM_NAME_MAX]; /* heading of the figures of others, default "reference" */
         int pictures;                 /* 1 (default): pictures are drawn; 0: none */
     } experiment;
-    struct {                    /* for the methods with `fit` */
-        int64_t phantoms;       /* test images of random shapes, 1..10^4, default 9 */
-        double off_mm, off_deg; /* start pose relative to the true one, default 1 mm, 15 degrees */
-        double voxel;           /* voxel size of the images, mm, default 0.25 */
+    struct {              /* settings for the methods with `fit` */
+        int64_t phantoms; /* number of test images of random shapes, 1..10^4, default 9 */
+        /* distance and angle of the start pose from the true one, default 1 mm, 15 degrees */
+        double off_mm, off_deg;
+        double voxel; /* voxel size of the images, mm, default 0.25 */
         /* fraction of every parameter's range, about its middle, from which the shapes are drawn,
          * default 0.8 */
         double range;
-        double prior_sd; /* as in sdm/fit.h, default 1 */
+        double prior_sd; /* prior_sd of sdm/fit.h, default 1 */
         double eps;      /* polish_eps of sdm/fit.h, default 3e-6 */
-        /* path of the model for the fit, which is then not trained; "": the network is trained */
+        /* path of a trained model for the fit; "": the network is trained */
         char model[SDM_PATH_TEXT_MAX];
     } fit;
     char base[SDM_PATH_TEXT_MAX]; /* path of the base training configuration; "": none */
-    char *base_text;              /* its content */
+    char *base_text;              /* content of the base file */
     size_t base_size;
-    /* keys of the training configuration in the experiment's file and on the command line, for all
-     * rows */
+    /* Keys of the training configuration for all rows: `common` from the experiment's file,
+     * `command_line` from the command line. */
     sdm_overrides common, command_line;
     sdm_experiment_method *methods;
     size_t n_methods;
@@ -151,7 +157,7 @@ typedef struct sdm_experiment {
     size_t n_variants;
     sdm_experiment_reference *references;
     size_t n_references;
-    /* [n_rows] variant by variant, in each the methods in the order of the file */
+    /* [n_rows] variant by variant; within a variant the methods in the order of the file */
     sdm_experiment_row *rows;
     size_t n_rows;
 } sdm_experiment;
@@ -164,8 +170,8 @@ typedef struct sdm_experiment {
 sdm_status sdm_experiment_read(const char *path, const char *const *overrides, size_t n_overrides,
                                sdm_experiment **out, sdm_error *err);
 
-/* The same for text[size] in memory; `name` is the file name in messages, and its folder is that of
- * `base`. */
+/* The same for text[size] in memory; `name` is the file name in messages, and the file `base` is
+ * read from the folder of `name`. */
 sdm_status sdm_experiment_parse(const char *name, const char *text, size_t size,
                                 const char *const *overrides, size_t n_overrides,
                                 sdm_experiment **out, sdm_error *err);

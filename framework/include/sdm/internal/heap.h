@@ -17,14 +17,14 @@ SDM_INTERNAL_API sdm_status sdm_mul(size_t a, size_t b, size_t *out, sdm_error *
  * zeroing costs as much as writing. [any thread] */
 sdm_status sdm_alloc_unset(void **out, size_t count, size_t size, const char *what, sdm_error *err);
 
-/* Changes the size of *block from old_count to new_count elements; new elements are zero. The
- * caller chooses a geometric growth. *block may be NULL. On SDM_E_NOMEM *block is unchanged and
- * still owned by the caller. [any thread] */
+/* Changes the size of *block from old_count to new_count elements; new elements are zero. *block
+ * may be NULL. The elements are copied, so the caller should choose new_count for geometric growth.
+ * On SDM_E_NOMEM *block is unchanged and still owned by the caller. [any thread] */
 SDM_INTERNAL_API sdm_status sdm_grow(void **block, size_t old_count, size_t new_count, size_t size,
                                      const char *what, sdm_error *err);
 
-/* For tests: makes the n-th allocation from now fail (1: the next one); 0: none. Counts the
- * allocations of all threads. */
+/* For tests: makes the n-th allocation from now fail (1: the next one; 0: none). The allocations of
+ * all threads are counted. */
 void sdm_alloc_fail_after(unsigned long n);
 
 #ifdef __cplusplus

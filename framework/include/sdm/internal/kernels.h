@@ -2,9 +2,9 @@
    set; the widest one of the machine is chosen at run time.
 
    Letters: M, N, K sizes of matrices, B rows of a batch. No function allocates memory or fails. The
-   result does not depend on the number of threads; between instruction sets the results in floats
-   differ by rounding. All functions may be called from any thread and run in the calling thread
-   alone, except sdm_gemm(). */
+   results do not depend on the number of threads; in floats they differ by rounding between
+   instruction sets. All functions may be called from any thread, and all except sdm_gemm() run in
+   the calling thread alone. */
 #ifndef SDM_KERNELS_H
 #define SDM_KERNELS_H
 
@@ -25,8 +25,8 @@ typedef struct sdm_view {
 } sdm_view;
 
 /* Matrix product: c[M][ldc] = a * b, or c += a * b with `add`; a is M x K, b is K x N. A product
-   with K = 0 is zero. Up to n_threads threads share the tiles of c (0: the OpenMP default). Each
-   element is the sum over K in ascending order, in blocks of fixed size. */
+   with K = 0 is zero. Up to n_threads threads share the tiles of c (0: the OpenMP default). The K
+   products of each element are summed in ascending order, in blocks of fixed size. */
 void sdm_gemm(size_t m, size_t n, size_t k, sdm_view a, sdm_view b, bool add, float *c, size_t ldc,
               int n_threads);
 
@@ -40,7 +40,7 @@ static inline size_t sdm_panel_outputs(size_t outputs)
     return (outputs + SDM_PANEL - 1) / SDM_PANEL * SDM_PANEL;
 }
 
-/* Number of elements in the panels of `outputs` x k weights. */
+/* Number of elements in the panels of outputs x k weights. */
 static inline size_t sdm_panel_count(size_t outputs, size_t k)
 {
     return sdm_panel_outputs(outputs) * k;
@@ -50,22 +50,22 @@ static inline size_t sdm_panel_count(size_t outputs, size_t k)
 void sdm_panel_pack_f32(size_t outputs, size_t k, sdm_view w, float *panels);
 void sdm_panel_pack_f16(size_t outputs, size_t k, sdm_view w, uint16_t *panels);
 
-/* y[B][ldy] = x[B][ldx] * w^T: K inputs in each row of x, sdm_panel_outputs(outputs) floats written
-   to each row of y, so that ldy >= sdm_panel_outputs(outputs) for B > 1. A row's result does not
-   depend on B. */
+/* y[B][ldy] = x[B][ldx] * w^T. Each row of x has K inputs. sdm_panel_outputs(outputs) floats are
+   written to each row of y, hence ldy >= sdm_panel_outputs(outputs) for B > 1. The result for a row
+   does not depend on B. */
 void sdm_panel_f32(size_t batch, size_t outputs, size_t k, const float *w, const float *x,
                    size_t ldx, float *y, size_t ldy);
 void sdm_panel_f16(size_t batch, size_t outputs, size_t k, const uint16_t *w, const float *x,
                    size_t ldx, float *y, size_t ldy);
 
-/* The transpose: x[K] = w^T * y, y[sdm_panel_outputs(outputs)]. The padding of y must be finite. */
+/* The transpose: x[K] = w^T * y for y[sdm_panel_outputs(outputs)], whose padding must be finite. */
 void sdm_panel_back_f32(size_t outputs, size_t k, const float *w, const float *y, float *x);
 void sdm_panel_back_f16(size_t outputs, size_t k, const uint16_t *w, const float *y, float *x);
 
-/* Integer weights. The first n_wide inputs are wide: their weights have two bytes and lie in
-   -SDM_WIDE .. SDM_WIDE. The other inputs are narrow: their weights have one byte, -128 .. 127.
-   Inputs are integers of 16 bits with one scale for each row: value = integer * scale. Sums of
-   products are integers of 32 bits, hence exact and the same for every instruction set.
+/* Products with integer weights. The first n_wide inputs are wide: their weights have two bytes and
+   lie in -SDM_WIDE .. SDM_WIDE. The other inputs are narrow: their weights have one byte,
+   -128 .. 127. Inputs are integers of 16 bits with one scale for each row: value = integer * scale.
+   Sums of products are integers of 32 bits, hence exact and the same for every instruction set.
 
    A panel of SDM_PANEL outputs holds pairs of neighbouring inputs, [pair][SDM_PANEL][2], first the
    wide pairs, then the narrow ones. With an odd n_wide the first narrow input joins the last wide
@@ -82,8 +82,8 @@ size_t sdm_panel_i8_count(size_t outputs, size_t n_wide, size_t k);
    32 bits; w[outputs][k]. */
 int sdm_panel_i8_limit(size_t outputs, size_t k, const int16_t *w);
 
-/* panels[sdm_panel_i8_count(outputs, n_wide, k)] = the weights w[outputs][k], in the ranges
-   above. */
+/* panels[sdm_panel_i8_count(outputs, n_wide, k)] = the weights w[outputs][k], which must lie in the
+   ranges of wide and narrow weights. */
 void sdm_panel_pack_i8(size_t outputs, size_t n_wide, size_t k, const int16_t *w, int8_t *panels);
 
 /* Quantises rows: with v = y[r][i] * factor[i] (factor[n]; NULL: 1) and m = the largest abs(v) of
@@ -103,28 +103,28 @@ void sdm_quantise_residual(size_t n, const float *y, const float *factor, int li
 /* Number of outputs that sdm_panel_i8() stores contiguously. */
 #define SDM_PANEL_ROW 4
 
-/* Destination of sdm_panel_i8(): floats y, or for y == NULL integers, the inputs of the next
-   product. Room for sdm_panel_outputs(outputs) outputs in each row. */
+/* Destination of sdm_panel_i8(): the floats y, or, if y is NULL, the array `integers`, which are
+   inputs of a next product. Each row has room for sdm_panel_outputs(outputs) outputs. */
 typedef struct sdm_panel_out {
-    /* Output o of row r: y[r * ld + o / SDM_PANEL_ROW * line + o % SDM_PANEL_ROW].
-       line = SDM_PANEL_ROW: all outputs of a row are contiguous. */
+    /* Output o of row r is y[r * ld + o / SDM_PANEL_ROW * line + o % SDM_PANEL_ROW]. With
+       line = SDM_PANEL_ROW all outputs of a row are contiguous. */
     float *y;
     /* integers[B][ld] = output * factor, rounded to nearest and clipped to -limit .. limit; NaN
        becomes one of the two ends. */
     int16_t *integers;
     size_t ld, line;
-    /* mean[padded outputs], added to the first n_mean rows of y; not read for n_mean = 0. */
+    /* mean[padded outputs] is added to the first n_mean rows of y; not read for n_mean = 0. */
     const float *mean;
     size_t n_mean;
     /* For y and B = 2 .. 6: the result of the last row is added to the first row instead of being
        stored. The last row is the residual of sdm_quantise_residual(). */
     bool residual;
-    const float *factor; /* [padded outputs], of integers */
-    int limit;           /* of integers, 1 .. 32767 */
+    const float *factor; /* for `integers`: [padded outputs] */
+    int limit;           /* for `integers`: 1 .. 32767 */
 } sdm_panel_out;
 
 /* *to = scale[r] * (w * x[r]) for the rows r of x[B][ldx]; scale[B]. The first sdm_panel_even(k)
-   integers of each row of x are read; an odd K multiplies the last one by zero. */
+   integers of each row of x are read; for an odd K the weight of the last one is zero. */
 void sdm_panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w,
                   const int16_t *x, size_t ldx, const float *scale, const sdm_panel_out *to);
 
@@ -135,7 +135,7 @@ typedef struct sdm_panel_block {
     uint32_t x, scale, y;        /* offsets into rows of x, into scale and into rows of to->y */
 } sdm_panel_block;
 
-/* sdm_panel_i8() for each of blocks[n] in turn, B in 1 .. 6, to->y not NULL. */
+/* Calls sdm_panel_i8() for each of blocks[n] in turn. 1 <= B <= 6; to->y must not be NULL. */
 void sdm_panel_i8_blocks(size_t batch, size_t n, const sdm_panel_block *blocks, const int8_t *w,
                          const int16_t *x, size_t ldx, const float *scale, const sdm_panel_out *to);
 

@@ -51,9 +51,9 @@ size_t sdm_poly_count(size_t n, size_t degree);
    degree are a prefix; entry 0 is the constant. */
 void sdm_poly_table(size_t n, size_t degree, uint8_t *exponents);
 
-/* phi[n_terms] = the products at x[n], and dphi[n][n_terms] = d phi / d x unless NULL. Normalised:
-   each product has mean square 1 for x uniform in [-1, 1]^n. degree <= 16: the largest exponent in
-   the table. [any thread] */
+/* phi[n_terms] = the products at x[n], and, unless dphi is NULL, dphi[n][n_terms] = d phi / d x.
+   Each product is normalised: its mean square is 1 for x uniform in [-1, 1]^n. degree: the largest
+   exponent in the table, at most 16. [any thread] */
 void sdm_poly_eval(const uint8_t *exponents, size_t n_terms, size_t n, size_t degree,
                    const double *x, float *phi, float *dphi);
 
@@ -64,8 +64,8 @@ void sdm_activate(int kind, size_t n, const float *x, float *y, float *dy);
 
 #define SDM_POD_MAX_LEVELS 8
 
-/* A block, its children, and its offsets in arrays that hold all blocks of a level one after
-   another. */
+/* A block: its box of voxels, its rank, its children, and its offsets in arrays that hold data of
+   all blocks of a level one after another. */
 typedef struct sdm_pod_block {
     uint32_t at[3], size[3]; /* first voxel and number of voxels along x, y, z */
     uint32_t rank;
@@ -80,36 +80,37 @@ static inline size_t sdm_pod_block_voxels(const sdm_pod_block *b)
     return (size_t)b->size[0] * b->size[1] * b->size[2];
 }
 
-/* Where each level begins in an array of all blocks. */
+/* The index at which each level begins in an array of all blocks. */
 typedef struct sdm_pod_levels {
     size_t n;                             /* levels, 1 .. SDM_POD_MAX_LEVELS */
     size_t first[SDM_POD_MAX_LEVELS + 1]; /* blocks of level l: first[l] .. first[l + 1] - 1 */
 } sdm_pod_levels;
 
-/* Counts the blocks of a grid with edge `block` (voxels) on level 0. The result has
-   min(levels, SDM_POD_MAX_LEVELS) levels, or fewer: the first level with a single block is the
-   highest. first[n] = number of all blocks. */
+/* Counts the blocks of a grid whose level-0 blocks have an edge of `block` voxels. The result has
+   min(levels, SDM_POD_MAX_LEVELS) levels, or fewer if a lower level has only one block: that level
+   is then the highest. first[n] = number of all blocks. */
 sdm_pod_levels sdm_pod_count(const sdm_grid *grid, size_t block, size_t levels);
 
 /* Fills blocks[first[n]], with rank and coefficient 0; blocks at the end of the grid are smaller.
    The highest level is ordered with x fastest. On the other levels the children of a block are
-   contiguous, parents in order; hence all descendants of a block on one level are contiguous, and
-   so are their voxels in block order. */
+   contiguous, in the order of their parents; hence all descendants of a block on one level are
+   contiguous, and so are the voxels of these descendants in block order. */
 void sdm_pod_blocks(const sdm_grid *grid, size_t block, const sdm_pod_levels *levels,
                     sdm_pod_block *blocks);
 
 /* Sets `coefficient` of all blocks from their ranks. */
 void sdm_pod_number(const sdm_pod_levels *levels, sdm_pod_block *blocks);
 
-/* V_b, the number of outputs of block b, after sdm_pod_number(). */
+/* V_b, the number of outputs of block b. sdm_pod_number() must have been called. */
 size_t sdm_pod_outputs(const sdm_pod_block *blocks, size_t b);
 
-/* Sizes of a pod network. n_terms = F, n_inputs = I, n_latent = L, n_coefficients = K. */
+/* Sizes of a pod network: n_params = P, n_terms = F, n_inputs = I, n_latent = L,
+   n_coefficients = K. */
 typedef struct sdm_pod_arch {
     size_t n_params, degree, input_degree;
     size_t depth, width; /* layers of the MLP, 0 .. SDM_POD_MAX_DEPTH, and units of each */
     size_t block;        /* edge of a block of level 0, voxels */
-    int activation;      /* of the MLP, kind of sdm_activate() */
+    int activation;      /* activation of the MLP: `kind` of sdm_activate() */
     size_t n_terms, n_inputs, n_latent;
     size_t n_coefficients, n_voxels;
     sdm_pod_levels levels;
@@ -119,18 +120,18 @@ typedef struct sdm_pod_arch {
 void sdm_pod_gather(const sdm_grid *grid, const sdm_pod_block *blocks, size_t n_blocks,
                     const float *map, float *blocked);
 
-/* Weights in floats, matrices row-major; owned by the caller. */
+/* The weights as floats, matrices row-major; owned by the caller. */
 typedef struct sdm_pod_weights {
-    const float *layer[SDM_POD_MAX_DEPTH]; /* [W][I or W] */
-    const float *bias[SDM_POD_MAX_DEPTH];  /* [W] */
+    const float *layer[SDM_POD_MAX_DEPTH]; /* [layer][W][inputs], I inputs for layer 0, else W */
+    const float *bias[SDM_POD_MAX_DEPTH];  /* [layer][W] */
     const float *head;                     /* [K][L] */
     const float *mean;                     /* [n_voxels], block order */
     const float *basis;                    /* [k_b][V_b], block after block, all levels */
 } sdm_pod_weights;
 
-/* How weights are stored: floats, halves, or integers of one byte, with a second byte where the
-   error would be too large. With integers, coefficients that become too large at parameters outside
-   their ranges are clipped. */
+/* How weights are stored: floats, halves, or integers of one byte (two bytes where the error would
+   be too large). With integers, coefficients beyond a limit are clipped, which must be expected at
+   parameters outside their ranges. */
 typedef enum sdm_pod_type { SDM_POD_F32 = 0, SDM_POD_F16 = 1, SDM_POD_I8 = 2 } sdm_pod_type;
 
 /* Content of a model file. `info` gives shape, parameters, options, grid, accuracy, training and

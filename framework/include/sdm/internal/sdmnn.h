@@ -7,13 +7,14 @@
      down: for levels 0 .. D - 1: 2 convolutions to C_l channels, max pooling by 2;
            at level D: 2 convolutions to C_D channels
      up:   for levels D - 1 .. 0: convolution 1 x 1 x 1 to C_l channels, up-sampling by 2,
-           concatenation with the level's result on the way down, 2 convolutions to C_l channels
+           concatenation with the result of this level on the way down, 2 convolutions to C_l
+           channels
      map  = convolution 1 x 1 x 1 to one channel, mm
 
    Unless stated otherwise, a convolution is 3 x 3 x 3 with zero padding and is followed by the
-   activation f; C_l = min(C 2^l, 512). The size of a level is half that of the level before,
-   rounded up, so that the grid may have any size and no voxel outside of it is computed. Drop-out
-   acts on the second convolution of levels D - 1 and D on the way down, in training only.
+   activation f; C_l = min(C 2^l, 512). The size of a level is half the size of the level before,
+   rounded up, so that the grid may have any size and no voxel outside the grid is computed.
+   Drop-out acts on the second convolution of levels D - 1 and D on the way down, in training only.
 
    Letters: P parameters, B batch, V voxels. */
 #ifndef SDM_SDMNN_H
@@ -34,29 +35,31 @@ typedef struct sdm_sdmnn_arch {
     size_t n_params; /* P */
     size_t n[3];     /* voxels along x, y, z */
     size_t depth;    /* D poolings, 1 .. SDM_SDMNN_MAX_DEPTH */
-    size_t channels; /* C of level 0, 1 .. SDM_SDMNN_MAX_CHANNELS */
+    size_t channels; /* C, the channels of level 0, 1 .. SDM_SDMNN_MAX_CHANNELS */
     size_t width;    /* W, 1 .. 65536 */
     size_t block;    /* voxels along the edge of a cell of v, 1 .. 64 */
-    int activation;  /* kind of sdm_activate(), 0 .. 2 */
-    double dropout;  /* probability, 0 <= dropout < 1 */
+    int activation;  /* f: `kind` of sdm_activate(), 0 .. 2 */
+    double dropout;  /* probability of drop-out, 0 <= dropout < 1 */
 } sdm_sdmnn_arch;
 
-/* Checks the ranges above, 1 <= P <= 65536, 1 <= n[i] <= 2^20, that voxels times channels do not
-   overflow, and that every level before the last has more than one voxel. SDM_E_ARG names the
-   first violation. [any thread] */
+/* Checks that all members lie in the ranges above, with 1 <= P <= 65536 and 1 <= n[i] <= 2^20, that
+   voxels times channels do not overflow, and that every level except D has more than one voxel.
+   SDM_E_ARG names the first violation. [any thread] */
 sdm_status sdm_sdmnn_check(const sdm_sdmnn_arch *a, sdm_error *err);
 
-/* Number of weights, which lie one after another: for the two dense layers, then for each
-   convolution in the order above, w[outputs][inputs] (convolutions [outputs][inputs][z][y][x]) and
-   bias[outputs]. The architecture must have passed sdm_sdmnn_check(). [any thread] */
+/* Number of weights. They are stored one after another, first for the two dense layers, then for
+   each convolution in the order above: w[outputs][inputs] (of a convolution:
+   w[outputs][inputs][z][y][x]), then bias[outputs]. The architecture must have passed
+   sdm_sdmnn_check(). [any thread] */
 size_t sdm_sdmnn_count(const sdm_sdmnn_arch *a);
 
-/* Multiply-adds of one map. The architecture must have passed sdm_sdmnn_check(). [any thread] */
+/* Number of multiply-adds for one map. The architecture must have passed sdm_sdmnn_check().
+   [any thread] */
 double sdm_sdmnn_work(const sdm_sdmnn_arch *a);
 
-/* weights[sdm_sdmnn_count(a)] = random initial weights: normal with variance 2 / inputs before an
-   activation (He et al. 2015), else 1 / inputs; biases are zero. Depends on (seed, stream) only.
-   [any thread] */
+/* weights[sdm_sdmnn_count(a)] = random initial weights. They are normally distributed, with
+   variance 2 / inputs in layers with an activation (He et al. 2015), else 1 / inputs; biases are
+   zero. The result depends on (a, seed, stream) only. [any thread] */
 void sdm_sdmnn_init(const sdm_sdmnn_arch *a, uint64_t seed, uint64_t stream, float *weights);
 
 /* An implementation of the convolutions. Its result does not depend on the number of threads; two
@@ -66,37 +69,39 @@ typedef struct sdm_conv_backend sdm_conv_backend;
 /* The implementation of this library. [any thread] */
 const sdm_conv_backend *sdm_conv_native(void);
 
-/* oneDNN for the layers where it is faster, else native. For the trainer: part of the library
-   sdm_dnnl (build option SDM_DNNL), not of libsdmgen. [any thread] */
+/* An implementation that uses oneDNN for the layers where it is faster, else sdm_conv_native(). It
+   is meant for the trainer: it belongs to the library sdm_dnnl (build option SDM_DNNL), not to
+   libsdmgen. [any thread] */
 const sdm_conv_backend *sdm_conv_dnnl(void);
 
-/* A network in training: its feature maps and packed weights. One call at a time. */
+/* A network in training, with its feature maps and packed weights. Only one thread at a time may
+   use it. */
 typedef struct sdm_sdmnn sdm_sdmnn;
 
 /* *out = a network for the forward pass and for gradients of up to `batch` maps (0: forward pass
-   only), to be freed with sdm_sdmnn_free(), which accepts NULL; NULL on error. backend NULL:
-   sdm_conv_native(). SDM_E_ARG as sdm_sdmnn_check(), SDM_E_NOMEM. */
+   only), to be freed with sdm_sdmnn_free(), which accepts NULL; *out is NULL on error. backend NULL
+   selects sdm_conv_native(). SDM_E_ARG as in sdm_sdmnn_check(), SDM_E_NOMEM. */
 sdm_status sdm_sdmnn_create(const sdm_sdmnn_arch *a, size_t batch, const sdm_conv_backend *backend,
                             sdm_sdmnn **out, sdm_error *err);
 void sdm_sdmnn_free(sdm_sdmnn *net);
 
-/* Sets weights[sdm_sdmnn_count()] for the calls below. They are packed now and also read later:
-   they must stay valid and unchanged until the next sdm_sdmnn_set(). */
+/* Sets weights[sdm_sdmnn_count()] for the functions below. The array is packed now and is also read
+   by these functions: it must stay valid and unchanged until the next sdm_sdmnn_set(). */
 void sdm_sdmnn_set(sdm_sdmnn *net, const float *weights);
 
-/* values[V] = the map (mm) at x[P], parameters scaled to [-1, 1], without drop-out. n_threads 0:
-   the OpenMP default. */
+/* values[V] = the map (mm) at x[P], the parameters scaled to [-1, 1]; without drop-out. n_threads
+   0: the OpenMP default. */
 void sdm_sdmnn_forward(sdm_sdmnn *net, const float *x, float *values, int n_threads);
 
-/* Loss of map `index` of a batch: returns the loss of values[V] and writes its derivative by them
-   to dvalues[V]. */
+/* Loss function for map `index` of a batch: returns the loss of values[V] and writes
+   dvalues[V] = d loss / d values. */
 typedef double (*sdm_sdmnn_loss)(void *user, size_t index, const float *values, float *dvalues);
 
 /* Returns the sum of the losses of a batch x[B][P], B <= `batch` of sdm_sdmnn_create(), and writes
-   its gradient[sdm_sdmnn_count()] by the weights. `loss` is called in the calling thread with
-   index = 0 .. B - 1. Drop-out of map b uses the random numbers of (seed, stream, draw + b): a
-   caller that increases `draw` by B with each call never repeats one. The result does not depend
-   on n_threads (0: the OpenMP default). */
+   gradient[sdm_sdmnn_count()], the derivative of this sum by the weights. `loss` is called in the
+   calling thread with index = 0 .. B - 1. The drop-out of map b uses the random numbers of
+   (seed, stream, draw + b): they never repeat if the caller increases `draw` by B with each call.
+   The result does not depend on n_threads (0: the OpenMP default). */
 double sdm_sdmnn_gradient(sdm_sdmnn *net, size_t batch, const float *x, sdm_sdmnn_loss loss,
                           void *user, uint64_t seed, uint64_t stream, uint64_t draw,
                           float *gradient, int n_threads);
@@ -111,7 +116,7 @@ typedef struct sdm_sdmnn_spec {
 } sdm_sdmnn_spec;
 
 /* *bytes = a model file of *size bytes, to be freed with sdm_free() and written with
-   sdm_container_write(). SDM_E_ARG as sdm_sdmnn_check(), SDM_E_NOMEM. [any thread] */
+   sdm_container_write(). SDM_E_ARG as in sdm_sdmnn_check(), SDM_E_NOMEM. [any thread] */
 sdm_status sdm_sdmnn_build(const sdm_sdmnn_spec *spec, uint8_t **bytes, size_t *size,
                            sdm_error *err);
 

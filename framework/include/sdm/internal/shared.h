@@ -1,5 +1,5 @@
-/* Visibility of functions that the libraries of sdmgen share with each other: exported, but not for
- * users, and free to change in every version. */
+/* Visibility of functions that the libraries of sdmgen share with each other. They are exported but
+ * not meant for users, and may change in every version. */
 #ifndef SDM_INTERNAL_SHARED_H
 #define SDM_INTERNAL_SHARED_H
 

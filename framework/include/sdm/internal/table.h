@@ -9,7 +9,7 @@
 extern "C" {
 #endif
 
-/* Appends a Markdown text; a backslash precedes each of | * _ ` < \ [. */
+/* Appends `text` as Markdown: a backslash is inserted before each of | * _ ` < \ [. */
 void sdm_markdown_text(sdm_text *t, const char *text);
 
 /* Appends the cell of a number with its closing bar, " 1.23 |": three significant digits; " - |"
@@ -22,15 +22,15 @@ void sdm_markdown_plain(sdm_text *t, double v);
  * aligned right. */
 void sdm_markdown_rule(sdm_text *t, size_t n_left, size_t n_right);
 
-/* Appends a CSV text in double quotes; quotes in it are doubled. */
+/* Appends `text` as a CSV cell in double quotes; double quotes in the text are doubled. */
 void sdm_csv_text(sdm_text *t, const char *text);
 
-/* Appends a comma and a CSV number with the fewest digits that read back the same; nothing after
- * the comma for NaN and infinities. */
+/* Appends a comma and the number v, with the fewest digits that read back to the same value; for
+ * NaN and infinities only the comma. */
 void sdm_csv_real(sdm_text *t, double v);
 
-/* Writes the text to the file `path`, atomically as in sdm/internal/file.h. SDM_E_NOMEM: the text
- * is incomplete, an allocation failed; SDM_E_IO. */
+/* Writes the text to the file `path`, atomically as in sdm/internal/file.h. SDM_E_NOMEM: t->failed
+ * is set, or an allocation fails here; SDM_E_IO. */
 sdm_status sdm_text_write(const sdm_text *t, const char *path, sdm_error *err);
 
 #ifdef __cplusplus

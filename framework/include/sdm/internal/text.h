@@ -1,5 +1,5 @@
-/* Growing text buffer, JSON writer, conversion of numbers independent of the locale, and similar
- * names for "did you mean". */
+/* Growing text buffer, JSON writer, conversion of numbers independent of the locale, and search for
+ * a similar name ("did you mean"). */
 #ifndef SDM_TEXT_H
 #define SDM_TEXT_H
 
@@ -15,8 +15,8 @@ extern "C" {
 #endif
 
 /* Text buffer. Zero-initialise it; sdm_text_dispose() frees it. `data` is NUL-terminated (NULL
- * while empty). A failed sdm_text_add() sets `failed`, and later calls do nothing, so one check at
- * the end suffices. */
+ * before the first text is added). sdm_text_add() appends a formatted text. If it fails, it sets
+ * `failed`, and later calls do nothing, so one check at the end suffices. */
 typedef struct sdm_text {
     char *data;
     size_t size, capacity;
@@ -26,9 +26,9 @@ typedef struct sdm_text {
 SDM_INTERNAL_API void sdm_text_dispose(sdm_text *t);
 SDM_INTERNAL_API void sdm_text_add(sdm_text *t, const char *fmt, ...) SDM_PRINTF(2, 3);
 
-/* JSON writer. It inserts commas and quotes strings. `key` is NULL inside an array. Numbers have
- * the fewest digits that read back to the same value; NaN and infinities become null. Errors set
- * text.failed. */
+/* JSON writer. Zero-initialise it; sdm_json_dispose() frees it. It inserts commas and quotes
+ * strings. `key` is NULL inside an array. Numbers have the fewest digits that read back to the same
+ * value; NaN and infinities become null. Errors set text.failed. */
 typedef struct sdm_json {
     sdm_text text;
     int depth;
@@ -44,8 +44,8 @@ void sdm_json_bool(sdm_json *j, const char *key, bool v);
 void sdm_json_text(sdm_json *j, const char *key, const char *v);
 void sdm_json_dispose(sdm_json *j);
 
-/* Parses the whole string s as a finite decimal number with '.' as decimal point. Returns false for
- * anything else, including NaN, infinities and overflow. */
+/* Parse the whole string s as a finite decimal number with '.' as decimal point, or as an integer.
+ * Return false for anything else, including NaN, infinities and overflow. */
 SDM_INTERNAL_API bool sdm_parse_real(const char *s, double *out);
 SDM_INTERNAL_API bool sdm_parse_int(const char *s, int64_t *out);
 

@@ -35,9 +35,8 @@ typedef struct job {
     size_t n_clamped, n_exact; /* rows with clamped parameters; maps by the exact engine */
     size_t n_exact_error; /* maps by the exact engine since the network's error was too large */
     size_t n_checked;
-    sdm_check
-        check;     /* over the checked rows: means of mean, bias and square; largest q95 and max */
-    uint64_t hash; /* CRC-64 of all maps */
+    sdm_check check; /* over checked rows: means of mean, bias and square; largest q95 and max */
+    uint64_t hash;   /* CRC-64 of all maps */
 } job;
 
 /* The statistic of --error-of. */
@@ -75,8 +74,8 @@ static sdm_status check_row(const job *j, const double *p, sdm_error *err)
     return SDM_OK;
 }
 
-/* Checks every row before the first map is made: a mistake in any row then stops the command before
- * it has written a file. */
+/* Checks every row before the first map is made, so that a mistake in any row stops the command at
+ * once. */
 static sdm_status check_rows(const job *j, sdm_error *err)
 {
     for (size_t i = 0; i < j->n_rows; i++) {

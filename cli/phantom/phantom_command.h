@@ -11,7 +11,7 @@ typedef struct cli_phantom {
     const cli_args *args;
     cli_shape shape; /* with the parameters used for the image */
     sdm_pose pose;   /* pose of the shape in the world */
-    sdm_grid grid;   /* of the image */
+    sdm_grid grid;   /* grid of the image */
     sdm_phantom_opts opts;
     bool cut; /* the shape extends beyond the box of the voxel centres */
 } cli_phantom;

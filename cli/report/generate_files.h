@@ -7,8 +7,7 @@
 
 /* Zero-initialise; cli_row_files_dispose() frees, also after an error. */
 typedef struct cli_row_files {
-    cli_list
-        list; /* outputs in their order, then the files of --gradient and --jacobian if given */
+    cli_list list; /* outputs in their order, then --gradient and --jacobian if given */
     const char *gradient, *jacobian; /* NULL: not wanted */
     char *text;                      /* storage of numbered names */
 } cli_row_files;

@@ -30,7 +30,7 @@ typedef struct cli_experiment_result {
 
 /* The training configuration and the shape of a row. */
 typedef struct cli_experiment_job {
-    size_t index; /* of the row */
+    size_t index; /* index of the row */
     sdm_config *config;
     sdm_instance *shape;
     cli_map_maker maker; /* `make` is NULL until the method is ready */

@@ -45,7 +45,7 @@ static sdm_status check_model(const cli_experiment_job *job, const char *path,
 }
 
 /* Opens the network: the file fit.model; else the row's own network, which is trained if necessary;
- * for polishing the network of the row that fits with the same network alone. */
+ * when polishing, the network of the row that uses the same network without polishing. */
 static sdm_status open_network(const cli_experiment_run *run, const cli_experiment_job *job,
                                cli_experiment_result *out, sdm_model **model, sdm_error *err)
 {

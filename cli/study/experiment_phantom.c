@@ -66,8 +66,8 @@ static sdm_status find_box(const cli_experiment_job *job, const cli_experiment_p
     return s;
 }
 
-/* Makes a grid around the box that contains all voxels which a fit uses, from its start pose to its
- * end. */
+/* Makes a grid around the box. The grid contains all voxels that a fit uses, from its start pose to
+ * its end. */
 static sdm_status make_grid(const sdm_experiment *e, const double min[3], const double max[3],
                             sdm_grid *out, sdm_error *err)
 {

@@ -144,8 +144,8 @@ static void mode_fit_step(pod_state *pod, mode_batch *b, size_t batch, double ra
         memcpy(pod->mode_fit.average, pod->mode_fit.w, pod->mode_fit.n * sizeof *pod->mode_fit.w);
 }
 
-/* Used fraction of the phase's budget: of the fraction 1 - train.refine of the steps, but at least
- * one step, or of the time until mode_fit_end. */
+/* Used fraction of the phase's budget, which is (1 - train.refine) * (number of steps), at least
+ * one step, or the time until mode_fit_end. */
 static double mode_fit_fraction(const pod_state *pod)
 {
     const trainer *t = pod->t;

@@ -21,8 +21,8 @@ static sdm_status measure_case(const cli_args *args, double refine, double scale
     return s ? s : cli_bench_peers(c, args, rows, err);
 }
 
-/* One case; with --growth three grids, whose voxels have 4, 2 and 1 times the edge, then three
- * meshes, whose triangles have 2, 1 and 0.5 times the edge. */
+/* Measures one case. With --growth it measures six: three grids with 4, 2 and 1 times the edge of
+ * the voxels, then three meshes with 2, 1 and 0.5 times the edge of the triangles. */
 static sdm_status measure_exact(const cli_args *args, sdm_error *err)
 {
     static const double scale[N_CASES] = {0.25, 0.5, 1, 1, 1, 1},

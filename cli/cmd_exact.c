@@ -147,7 +147,7 @@ static sdm_status run_method(job *j, sdm_error *err)
     return SDM_OK;
 }
 
-/* The smallest and the largest distance, and the number of voxels inside. */
+/* Finds the smallest and the largest distance, and counts the voxels inside. */
 static void find_range(const job *j, float *min, float *max, int64_t *inside)
 {
     const size_t n = sdm_grid_count(&j->grid);

@@ -38,7 +38,8 @@ static sdm_status read_experiment(const cli_args *args, sdm_experiment **out, sd
     return s;
 }
 
-/* The row of the baseline method in the same variant, to which the speed-up refers. */
+/* Returns the row of the baseline method in the same variant, relative to which the speed-up is
+ * given. */
 static const cli_experiment_result *find_baseline(const cli_experiment_run *run,
                                                   const cli_experiment_result *r)
 {
@@ -59,8 +60,8 @@ static void find_speedups(const cli_experiment_run *run)
     }
 }
 
-/* Measures a row. If it fails, the table shows the reason and the other rows continue; only an
- * interrupt ends them. */
+/* Measures a row. If the measurement fails, the table shows the reason and the other rows follow;
+ * only an interrupt ends the experiment. */
 static sdm_status measure_row(const cli_experiment_run *run, size_t index, sdm_error *err)
 {
     cli_experiment_result *r = &run->results[index];
@@ -87,7 +88,8 @@ static sdm_status measure_row(const cli_experiment_run *run, size_t index, sdm_e
     return s;
 }
 
-/* The status of the experiment after all rows: the first failure, with the number of failures. */
+/* Returns the status of the experiment after all rows: that of the first failure, with the number
+ * of failures in the message. */
 static sdm_status summarise_failures(const cli_experiment_run *run, sdm_status first, size_t failed,
                                      const sdm_error *why, sdm_error *err)
 {
@@ -125,7 +127,7 @@ static sdm_status measure_rows(const cli_experiment_run *run, sdm_error *err)
         first = s;
         why = one;
     }
-    // figures that need several rows
+    // compute the figures that need several rows
     cli_experiment_fit_finish(run);
     find_speedups(run);
     // the tables

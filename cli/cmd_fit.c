@@ -39,8 +39,8 @@ static sdm_status check_arguments(cli_fit *f, sdm_error *err)
     return cli_fit_check_files(args, err);
 }
 
-/* Fits. SDM_OK also for a fit that is not to be trusted (f->doubt): its result is shown before the
- * command fails. */
+/* Runs the fit. Returns SDM_OK also for a fit that is not trustworthy (f->doubt): its result is
+ * shown before the command fails. */
 static sdm_status fit_shape(cli_fit *f, sdm_error *err)
 {
     const size_t turns = f->opts.turns == SDM_FIT_TURNS_NONE ? 0 : f->opts.n_turns;
@@ -82,8 +82,7 @@ static sdm_status print_result(const cli_fit *f, sdm_error *err)
     return cli_print_json(&json, err);
 }
 
-/* Prints the result and writes the files; fails with the reason of a fit that is not to be
- * trusted. */
+/* Prints the result and writes the files; if the fit is not trustworthy, fails with the reason. */
 static sdm_status show_result(cli_fit *f, sdm_error *err)
 {
     const bool files = f->args->outputs.n || f->args->fit.label_out,

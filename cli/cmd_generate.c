@@ -32,10 +32,10 @@ typedef struct job {
     float *gradient;           /* [3][nz][ny][nx]; NULL: not wanted */
     float *jacobian;           /* [n_params][nz][ny][nx]; NULL: not wanted */
     double ms;                 /* total time of all maps */
-    size_t n_clamped, n_exact; /* rows with clamped parameters; maps of the exact engine */
-    size_t n_exact_error; /* maps of the exact engine because the network's error was too large */
+    size_t n_clamped, n_exact; /* rows with clamped parameters; maps by the exact engine */
+    size_t n_exact_error; /* maps by the exact engine since the network's error was too large */
     size_t n_checked;
-    sdm_check check; /* over all rows: means of mean, bias and square; largest q95 and max */
+    sdm_check check; /* over checked rows: means of mean, bias and square; largest q95 and max */
     uint64_t hash;   /* CRC-64 of all maps */
 } job;
 
@@ -74,7 +74,8 @@ static sdm_status check_row(const job *j, const double *p, sdm_error *err)
     return SDM_OK;
 }
 
-/* Checks every row before the first map is made: either all maps are made or none. */
+/* Checks every row before the first map is made, so that a mistake in any row stops the command at
+ * once. */
 static sdm_status check_rows(const job *j, sdm_error *err)
 {
     for (size_t i = 0; i < j->n_rows; i++) {
@@ -142,7 +143,7 @@ static sdm_status prepare_job(job *j, sdm_error *err)
     if (!s && !args->rows) s = cli_row_files_check(args, 1, err);
     if (!s) s = open_shape(j, err);
     if (!s) s = check_rows(j, err);
-    // with --params: the names of the last row, which are the longest
+    // with --params: check the names of the files of the last row, which are the longest
     if (!s && args->rows) s = cli_row_files_check(args, j->n_rows, err);
     return s ? s : allocate_maps(j, err);
 }
@@ -203,7 +204,8 @@ static void add_check(job *j, const sdm_check *c)
     all->outside += c->outside;
 }
 
-/* Reports clamped parameters, maps of the exact engine and, with --check, the errors of the map. */
+/* Prints notices about clamped parameters, a map by the exact engine and, with --check, the errors
+ * of the map. */
 static void notice_row(const job *j, size_t row, const sdm_result *r)
 {
     char where[32] = "";

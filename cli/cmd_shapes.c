@@ -21,7 +21,7 @@ static const char *option_type(const sdm_option *o)
     }
 }
 
-/* A printed table with aligned columns: each is as wide as its widest cell. */
+/* A printed table with aligned columns: each column is as wide as its widest cell. */
 enum { COLUMNS = 5 };
 typedef struct cell {
     const char *text; /* a text of the shape, of any length, or `buffer` */

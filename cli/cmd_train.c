@@ -63,7 +63,7 @@ static sdm_status write_picture(const sdm_train_report *report, const sdm_instan
 static sdm_status print_summary(const cli_args *args, const sdm_train_report *r, sdm_error *err)
 {
     const sdm_accuracy *a = &r->accuracy;
-    // as JSON
+    // print as JSON
     if (args->json) {
         sdm_json j = {0};
         sdm_json_open(&j, NULL, '{');
@@ -80,7 +80,7 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
         sdm_json_close(&j, '}');
         return cli_print_json(&j, err);
     }
-    // as text
+    // print as text
     char steps[32], maps[32];
     printf("%s\n", r->model_path);
     printf("  trained     %.1f s, %s steps, %s exact maps\n", r->seconds,

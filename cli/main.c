@@ -63,8 +63,8 @@ static int run_command(const cli_args *args)
     return cli_report(&err);
 }
 
-/* Makes malloc() keep freed memory for the next map: getting every page from the system again
- * costs a third of the time that a small mesh takes to prepare. */
+/* Makes malloc() keep freed memory for the next map: for a small mesh, getting every page from the
+ * system again would cost a third of the preparation time. */
 static void keep_memory(void)
 {
 #ifdef __GLIBC__

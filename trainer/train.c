@@ -1,4 +1,4 @@
-/* The story of a training run: maps, network, training, model file. */
+/* A training run from beginning to end: maps, network, training, model file. */
 #include <math.h>
 #include <string.h>
 
@@ -67,7 +67,7 @@ static sdm_status train_set_up(trainer *t, sdm_error *err)
     // before the blocks: for a grid that is too large its message names the memory needed
     if ((s = trainer_dataset_create(d, c, err))) return s;
 
-    // block edge 0 asks for map order: one block as large as the grid
+    // block edge 0 means map order: one block as large as the grid
     size_t block = t->kind->block(c);
     for (int i = 0; i < 3 && !t->kind->block(c); i++)
         if ((size_t)c->grid.n[i] > block) block = (size_t)c->grid.n[i];
@@ -90,11 +90,11 @@ static void fill_report(void *user, size_t done, size_t all)
 
 static bool fill_cancelled(void *user) { return trainer_cancelled(user); }
 
-/* The data may use half of a time budget. */
+/* true when the computation of the data has used half of a time budget. */
 static bool fill_enough(void *user) { return trainer_start_fraction(user) > 0.5; }
 
-/* Refuses a grid that lies outside of all held-out shapes: a network trained on it would have a
-   small error and be useless. */
+/* Refuses a grid without a voxel inside any held-out shape: a network trained on it would have a
+ * small error but be useless. */
 static sdm_status train_check_grid(const trainer *t, sdm_error *err)
 {
     const dataset *d = &t->data;
@@ -108,8 +108,8 @@ static sdm_status train_check_grid(const trainer *t, sdm_error *err)
         t->config->file, d->n_holdout);
 }
 
-/* Makes all maps needed before training. resumed: exactly those of the checkpoint, else as many as
-   the time budget allows. */
+/* Makes all maps needed before training. resumed: exactly as many as the interrupted run made, else
+ * as many as the time budget allows. */
 static sdm_status train_make_maps(trainer *t, bool resumed, sdm_error *err)
 {
     const size_t start = t->data.n_start;
@@ -130,8 +130,8 @@ static sdm_status train_make_maps(trainer *t, bool resumed, sdm_error *err)
     return train_check_grid(t, err);
 }
 
-/* Everything before the first step: maps, network, producer. A resumed run makes the n_taken random
-   samples again that it had at the checkpoint. */
+/* Prepares everything for the first step: maps, network, producer. A resumed run makes the n_taken
+ * random samples of the checkpoint again. */
 static sdm_status train_prepare(trainer *t, bool resumed, size_t n_taken, sdm_error *err)
 {
     sdm_status s = train_make_maps(t, resumed, err);
@@ -146,9 +146,9 @@ static sdm_status train_prepare(trainer *t, bool resumed, size_t n_taken, sdm_er
     return s;
 }
 
-/* From set-up to trained weights. config: the open temporary file of config.yaml. It is committed,
-   and the files of an older run are removed, only after all checks of the configuration: until then
-   the folder stays as it was. */
+/* Runs all steps from set-up to trained weights. config: the open temporary file of config.yaml. It
+   is committed, and the files of an older run are removed, only after all checks of the
+   configuration: until then the folder stays as it was. */
 static sdm_status train_run(trainer *t, bool resume, sdm_outfile **config, sdm_error *err)
 {
     bool found = false;
@@ -178,8 +178,8 @@ static sdm_status train_run(trainer *t, bool resume, sdm_outfile **config, sdm_e
     return t->kind->run(t, found, err);
 }
 
-/* Measures and writes the model. If it cannot be written, a checkpoint keeps the trained weights.
- */
+/* Measures and writes the model. If the model cannot be written, a checkpoint keeps the trained
+ * weights. */
 static sdm_status train_finish(trainer *t, sdm_train_report *report, sdm_error *err)
 {
     const sdm_phase phase = t->phase;

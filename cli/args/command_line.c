@@ -96,8 +96,8 @@ static sdm_status bad_value(const cli_option *o, const char *value, sdm_error *e
                     sdm_format_real(o->min, low), sdm_format_real(o->max, high));
 }
 
-/* Splits the text at commas. Returns the number of values in out; 0 when a part is not a number,
- * or above 6 parts. */
+/* Splits the text at commas. Returns the number of values in out; 0 when a part is not a number or
+ * there are more than 6 parts. */
 static size_t split_numbers(const char *text, bool whole, double out[6])
 {
     size_t n = 0;
@@ -309,7 +309,7 @@ sdm_status cli_parse(int argc, char **argv, cli_args *args, sdm_error *err)
     }
     if (s) return s;
 
-    // the number of positional arguments
+    // check the number of positional arguments
     const cli_command *c = args->command;
     if (args->files.n < c->min_files)
         return sdm_fail(err, SDM_E_ARG, "usage: sdmgen %s %s", c->name, c->synopsis);

@@ -1,5 +1,5 @@
-/* Help texts, made from the tables of commands and options. Each function appends to *out; a
- * failed allocation shows in out->failed. */
+/* Help texts, made from the tables of commands and options. Each function appends to *out; a failed
+ * allocation sets out->failed. */
 #ifndef CLI_HELP_H
 #define CLI_HELP_H
 

@@ -43,7 +43,7 @@ typedef struct cli_option {
     const char *choices; /* CLI_CHOICE: "a|b|c" */
     double min, max;     /* allowed range of every number of the value */
     uint32_t commands;   /* one bit per command: CLI_ON(CLI_TRAIN) | ... */
-    size_t offset;       /* of the field in cli_args that receives the value */
+    size_t offset;       /* offset of the field in cli_args for the value */
     const char *help;
 } cli_option;
 
@@ -71,7 +71,7 @@ typedef struct cli_list {
     size_t n;
 } cli_list;
 
-/* A pose: of the shape for `phantom`, of the start for `fit`. Each vector is NaN when its
+/* A pose: for `phantom` that of the shape, for `fit` the start pose. Each vector is NaN when its
  * option is missing. */
 typedef struct cli_pose_args {
     double rotation[3];    /* rotation vector (axis times angle), rad */
@@ -166,7 +166,8 @@ extern const size_t cli_n_options;
 sdm_status cli_parse(int argc, char **argv, cli_args *args, sdm_error *err);
 void cli_args_dispose(cli_args *args);
 
-/* The command of that name. NULL: there is none; *err holds SDM_E_ARG with "did you mean". */
+/* Returns the command of that name. NULL: there is none; *err holds SDM_E_ARG with "did you
+ * mean". */
 const cli_command *cli_find_command(const char *name, sdm_error *err);
 
 /* True when `command` (an index into cli_commands) has the option. */

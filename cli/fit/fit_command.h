@@ -9,16 +9,16 @@
 /* Comparison of the fitted shape with labels, within the field of view of the image. */
 typedef struct cli_overlap {
     bool measured;
-    size_t n_fit, n_reference, n_both; /* voxels of the reference's grid inside */
+    size_t n_fit, n_reference, n_both; /* voxels inside, on the reference's grid */
     double dice;
     bool has_surface;                     /* both surfaces have vertices in the field of view */
     double mean_mm, q95_mm, hausdorff_mm; /* distances between the surfaces, in both directions */
 } cli_overlap;
 
-/* Zero-initialise all but args; cli_fit_dispose() frees. */
+/* The state of one fit. Zero-initialise all members but args; cli_fit_dispose() frees. */
 typedef struct cli_fit {
     const cli_args *args;
-    const char *path;       /* of the image, labels, mesh or points */
+    const char *path;       /* file of the image, labels, mesh or points */
     const char *model_path; /* NULL: without a model */
 
     /* fit_source.c: the maps are made by a network, the exact engine or both */
@@ -48,14 +48,14 @@ typedef struct cli_fit {
 
     /* fit_result.c */
     sdm_fit_result result;
-    bool found; /* result holds an estimate */
-    sdm_error
-        doubt; /* status SDM_E_QUALITY: why the estimate is not to be trusted; SDM_OK: it is */
+    bool found;      /* result holds an estimate */
+    sdm_error doubt; /* status SDM_E_QUALITY: why the estimate is not trustworthy; SDM_OK: it is
+                        trustworthy */
     sdm_fit_source map_source; /* source of `map`: the one of the last iterations */
     bool by_network;           /* the network makes `map`: the estimate is in its trained range */
-    sdm_grid map_grid;         /* grid of that source, in the estimated pose */
+    sdm_grid map_grid;         /* grid of map_source, in the estimated pose */
     float *map;                /* [map_grid] signed distance, mm */
-    sdm_mesh surface;          /* zero surface of the map, in the world */
+    sdm_mesh surface;          /* zero level set of the map, in the world */
     cli_overlap overlap;
 } cli_fit;
 
@@ -72,9 +72,9 @@ sdm_status cli_fit_read_options(cli_fit *f, sdm_error *err);
 /* Sets the start pose and the rotations to try. SDM_E_ARG; SDM_E_FORMAT: a bad file of points. */
 sdm_status cli_fit_read_start(cli_fit *f, sdm_error *err);
 
-/* values[v->grid] = 1 where a voxel has one of the labels, else 0. words: values, or names of
- * segments; without words: all segments, or all voxels but 0. SDM_E_ARG: no such label;
- * SDM_E_FORMAT: no voxel has the label. */
+/* values[v->grid] = 1 where a voxel has one of the labels, else 0. words: values of labels, or
+ * names of segments; an empty list selects all segments, or all voxels that are not 0. SDM_E_ARG:
+ * no such label; SDM_E_FORMAT: no voxel has the label. */
 sdm_status cli_fit_label_mask(const char *path, const sdm_volume *v, const cli_list *words,
                               float *values, sdm_error *err);
 
@@ -85,8 +85,8 @@ sdm_status cli_fit_close_labels(const cli_fit *f, const sdm_grid *grid, float *v
 /* Longest edge of a voxel of the maps, mm. */
 double cli_fit_map_voxel(const cli_fit *f);
 
-/* Before the fit: reads the labels of --reference; without them the labels of the target are the
- * reference. SDM_E_ARG, SDM_E_FORMAT, SDM_E_IO. */
+/* Before the fit: reads the labels of --reference; without this option the labels of the target are
+ * the reference. SDM_E_ARG, SDM_E_FORMAT, SDM_E_IO. */
 sdm_status cli_fit_read_reference(cli_fit *f, sdm_error *err);
 
 /* After cli_fit_make_map(): fills f->overlap, unless there is no reference or no surface. */
@@ -98,7 +98,7 @@ sdm_status cli_fit_make_map(cli_fit *f, sdm_error *err);
 /* Kind of the target: "image", "labels" or "points". */
 const char *cli_fit_kind(const cli_fit *f);
 
-/* Negates x and y of points[n][3]: RAS to LPS and back. */
+/* Negates x and y of points[n][3]: this converts RAS to LPS and back. */
 void cli_fit_negate_xy(double *points, size_t n);
 
 /* Before any work: checks the types of the output files and that they can be written.

@@ -37,8 +37,8 @@ sdm_status cli_fit_read_reference(cli_fit *f, sdm_error *err)
     return s;
 }
 
-/* True for points of the world within a voxel of the image; for all points when the target is
- * points and there is no image. */
+/* True for points of the world that lie in a voxel of the image; for all points when the target is
+ * a list of points, because there is no image. */
 static bool is_in_view(const cli_fit *f, const double world[3])
 {
     double at[3];
@@ -126,7 +126,7 @@ sdm_status cli_fit_compare(cli_fit *f, sdm_error *err)
                     block = cli_block_union(&of_labels, &of_fit);
     const sdm_grid g = cli_block_grid(whole, &block);
     const size_t n = sdm_grid_count(&g);
-    // labels and map on it
+    // copy the labels, and sample the map, on this grid
     float *labels = NULL, *map = NULL;
     sdm_mesh reference = {0};
     sdm_status s = SDM_ALLOC(&labels, n, "labels", err);
@@ -138,7 +138,7 @@ sdm_status cli_fit_compare(cli_fit *f, sdm_error *err)
     // overlap and distances
     if (!s) count_voxels(f, &g, map, labels);
     for (size_t i = 0; i < n && !s; i++)
-        labels[i] = 0.5f - labels[i]; // zero half-way between voxels inside and outside
+        labels[i] = 0.5f - labels[i]; // 0 half-way between voxels inside and outside
     if (!s) s = sdm_isosurface(&g, labels, 0.0f, &reference, NULL, err);
     if (!s && reference.n_tri) s = compare_surfaces(f, &reference, err);
     f->overlap.measured = !s;

@@ -8,8 +8,8 @@
 #include "report/output.h"
 #include "sdm/memory.h"
 
-/* Files of these types are written on the grid of the image, level sets and surfaces in the pose
- * of the shape. */
+/* True for files that are written on the grid of the image. Level sets and surfaces are written in
+ * the pose of the shape instead. */
 static bool is_image(const char *path)
 {
     return cli_ends_with_any(path, CLI_VOLUME_ENDINGS " .npy");

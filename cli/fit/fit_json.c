@@ -5,7 +5,7 @@
 #include "report/json_values.h"
 #include "sdm/internal/threads.h"
 
-/* Adds m[n][n]. Rows and columns have the order of the member "unknowns". */
+/* Adds the matrix m[n][n], whose rows and columns have the order of the member "unknowns". */
 static void add_matrix(sdm_json *j, const char *key, const double *m, size_t n)
 {
     sdm_json_open(j, key, '[');

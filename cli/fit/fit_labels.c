@@ -10,7 +10,7 @@ typedef struct label {
     size_t layer; /* n_layers: all layers */
 } label;
 
-/* The label of a word: the name of a segment, or a value. */
+/* Finds the label that a word names: the word is the name of a segment, or a value. */
 static sdm_status find_label(const char *path, const sdm_volume *v, const char *word, label *out,
                              sdm_error *err)
 {
@@ -48,7 +48,7 @@ static size_t add_label(const sdm_volume *v, const label *l, float *mask)
     return found;
 }
 
-/* Sets every voxel to 1 that is not 0 in some layer. */
+/* Sets every voxel to 1 that is not 0 in at least one layer. */
 static void add_all(const sdm_volume *v, float *mask)
 {
     const size_t n = sdm_grid_count(&v->grid);

@@ -9,8 +9,8 @@ static sdm_fit_law make_law(const double given[2], double weight)
     return (sdm_fit_law){.weight = weight, .mean = given[0], .sd = given[1]};
 }
 
-/* Values of the tissues at the start. The default second tissue outside (air) is dropped when the
- * command line gives other tissues but no air. */
+/* Sets the distributions of the tissues at the start. The default second tissue outside (air) is
+ * dropped when the command line gives other tissues but no air. */
 static sdm_status read_appearance(const cli_fit_args *a, sdm_fit_appearance *t, sdm_error *err)
 {
     const bool has_air = !isnan(a->air[0]), other = !isnan(a->inside[0]) || !isnan(a->outside[0]);

@@ -43,8 +43,8 @@ static void sample_reference(const cli_fit *f, const sdm_grid *g, float *out)
             }
 }
 
-/* The voxels to draw: the bounding box of the shape, enlarged by half of its longest edge and
- * clipped to the image; the whole image if the shape lies outside. */
+/* Chooses the voxels to draw: the bounding box of the shape, enlarged by half of its longest edge
+ * and clipped to the image; the whole image if the shape lies outside. */
 static cli_block choose_block(const cli_fit *f)
 {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY},
@@ -66,7 +66,7 @@ sdm_status cli_fit_write_picture(const cli_fit *f, const char *path, sdm_error *
     const sdm_grid g = cli_block_grid(&f->target.grid, &block);
     const size_t n = sdm_grid_count(&g);
     const bool compared = f->reference && !f->reference_is_target;
-    // image, map and reference on the grid of the picture
+    // sample image, map and reference on the grid of the picture
     float *image = NULL, *map = NULL, *reference = NULL;
     sdm_status s = SDM_ALLOC(&image, n, "picture", err);
     if (!s) s = SDM_ALLOC(&map, n, "picture", err);

@@ -47,8 +47,8 @@ static void print_law(const char *side, const sdm_fit_law *law)
     printf("  %-12s %.4g (sd %.3g)", side, law->mean, law->sd);
 }
 
-/* With voxels of the maps larger than this times the point spread, the standard deviations of
- * weakly determined parameters come out too small. */
+/* If the voxels of the maps are larger than this factor times the sd of the point spread, the
+ * standard deviations of weakly determined parameters come out too small. */
 #define VOXEL_OVER_SPREAD_MAX 1.5
 
 static void print_spread(const cli_fit *f)
@@ -62,7 +62,7 @@ static void print_spread(const cli_fit *f)
         voxel, f->source.model ? "--exact " : "", blur);
 }
 
-/* The used voxels or points, the values of the tissues and the evidence. */
+/* Prints the number of voxels or points used, the values of the tissues and the evidence. */
 static void print_target(const cli_fit *f)
 {
     const sdm_fit_result *r = &f->result;

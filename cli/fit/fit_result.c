@@ -14,8 +14,8 @@ const char *cli_fit_kind(const cli_fit *f)
                                              : "points";
 }
 
-/* The grid g, rotated and translated with the shape. On it the map of the network or of the exact
- * engine needs no interpolation. */
+/* Returns the grid g, rotated and translated with the shape. On this grid the map of the network or
+ * of the exact engine needs no interpolation. */
 static sdm_grid grid_in_pose(const sdm_grid *g, const sdm_pose *pose)
 {
     sdm_grid posed = *g;
@@ -30,7 +30,8 @@ sdm_status cli_fit_make_map(cli_fit *f, sdm_error *err)
 {
     const sdm_fit_result *r = &f->result;
     f->map_source = f->source;
-    // exact maps within the trained range come from polishing, which is the last phase
+    // exact maps inside the trained range come from the polish, which is the last phase: so the
+    // exact engine is the source of the last iterations
     if (f->source.model && r->n_exact > r->n_exact_outside) {
         f->map_source.grid = sdm_model_get_info(f->model)->grid;
         f->map_source.model = NULL;

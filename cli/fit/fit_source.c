@@ -63,8 +63,8 @@ static sdm_status add_box(const cli_fit *f, const double *p, double min[3], doub
     return s;
 }
 
-/* Sets the grid of exact maps: it holds the shape at the start and with any one parameter at an
- * end of its range. Beyond the grid a fit only estimates distances. */
+/* Sets the grid of exact maps: it holds the shape at the start parameters, and with any single
+ * parameter moved to an end of its range. Beyond the grid the fit can only estimate distances. */
 static sdm_status exact_grid(cli_fit *f, sdm_error *err)
 {
     if (f->model && !(f->args->spacing[0] > 0)) {

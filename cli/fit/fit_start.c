@@ -9,7 +9,8 @@
 
 enum { TURNS_ABOUT_AXIS = 12, TURNS_ALL = 60 };
 
-/* The middle of the points, labels, region or image, in the world. */
+/* The default centre of the shape: the middle of the points, labels, region or image, in the
+ * world. */
 static void default_centre(const cli_fit *f, double centre[3])
 {
     const sdm_grid *g = &f->target.grid;
@@ -38,7 +39,7 @@ static void default_centre(const cli_fit *f, double centre[3])
         for (int a = 0; a < 3; a++) centre[a] = 0.5 * (f->opts.box_min[a] + f->opts.box_max[a]);
 }
 
-/* out = a point or direction of the command line in LPS. */
+/* out = a point or direction that was given on the command line, converted to LPS. */
 static void convert_to_lps(const cli_fit *f, const double given[3], double out[3])
 {
     memcpy(out, given, 3 * sizeof *out);
@@ -100,8 +101,8 @@ static sdm_status check_start_options(const cli_fit *f, sdm_error *err)
     return SDM_OK;
 }
 
-/* Sets the number of rotations to try and their axes. With a given start rotation no others are
- * tried unless an option asks for them. */
+/* Sets the number of rotations to try and their axes. With a given start rotation no other
+ * rotations are tried unless an option sets their number. */
 static void read_turns(cli_fit *f, bool has_rotation)
 {
     const cli_fit_args *a = &f->args->fit;
@@ -118,7 +119,7 @@ static void read_turns(cli_fit *f, bool has_rotation)
 }
 
 /* The start pose with the middle of the shape at `centre` and the rotation of --start-axis or
- * --rotation, else none. */
+ * --rotation; without these options it has no rotation. */
 static sdm_status pose_from_centre(cli_fit *f, const double centre[3], sdm_error *err)
 {
     const cli_pose_args *p = &f->args->pose;

@@ -9,7 +9,7 @@
 #include "sdm/image.h"
 #include "sdm/memory.h"
 
-/* More vertices of a mesh make a fit slower but hardly more precise. */
+/* Largest number of vertices used of a mesh: more make a fit slower but hardly more precise. */
 enum { POINTS_MAX = 50000 };
 
 void cli_fit_negate_xy(double *points, size_t n)

@@ -50,8 +50,8 @@ static sdm_status find_folder(const char *file, char **out, sdm_error *err)
     return *out ? SDM_OK : sdm_fail(err, SDM_E_IO, "%s: %s", folder, strerror(errno));
 }
 
-/* The place in the file to report with a message: that of the option whose quoted name is in the
- * text, else that of the shape's name. */
+/* Returns the place in the file to report with a message: the place of the option whose quoted name
+ * is in the text, else the place of the shape's name. */
 static sdm_mark mark_of_message(const sdm_config *c, const char *text)
 {
     for (size_t i = 0; i < c->shape.n_options; i++) {
@@ -69,8 +69,8 @@ static sdm_status fail_at(const sdm_config *c, sdm_mark mark, sdm_status s, sdm_
     return sdm_fail_in(err, s, "%s", sdm_config_where(c, mark, where));
 }
 
-/* Replaces the paths in the configuration's options by the absolute ones that the shape was
- * created with. */
+/* Replaces the paths in the configuration's options by the absolute paths with which the shape was
+ * created. */
 static sdm_status store_absolute_paths(sdm_config *c, const sdm_instance *made, sdm_error *err)
 {
     const sdm_shape *shape = sdm_instance_shape(made);

@@ -59,7 +59,7 @@ static sdm_status read_header(csv_table *t, const sdm_param *params, size_t n, s
                         "%s: no header line: the first line must name the columns, such as '%s'",
                         t->path, params[0].name);
     for (char *cell; (cell = next_cell(&line));) {
-        // the parameter of the column
+        // find the parameter of the column
         const char *names[MAX_COLUMNS];
         size_t index = n;
         for (size_t i = 0; i < n && i < MAX_COLUMNS; i++) {

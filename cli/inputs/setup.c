@@ -64,7 +64,7 @@ sdm_status cli_create_shape(const sdm_registry *r, const char *name, const cli_l
     for (size_t i = 0; i < options->n && !s; i++)
         s = split_word(options->items[i], "-O", words[i], &named[i].name, &named[i].value, err);
     if (!s) s = sdm_instance_create(shape, named, options->n, NULL, out, err);
-    if (s == SDM_E_CONFIG) { // the options are on the command line, not in a configuration
+    if (s == SDM_E_CONFIG) { // options come from the command line
         s = SDM_E_ARG;
         if (err) err->status = s;
     }

@@ -1,4 +1,4 @@
-/* Opens what the command line names: shapes with their options and parameters, models, tables of
+/* Opens the inputs of the command line: shapes with their options and parameters, models, tables of
  * parameters, grids and mesh files. */
 #ifndef CLI_SETUP_H
 #define CLI_SETUP_H
@@ -8,8 +8,8 @@
 #include "sdm/registry.h"
 #include "sdm/runtime.h"
 
-/* A registry of the built-in shapes and the plug-ins in SDMGEN_PLUGIN_PATH and --plugin. Freed
- * with sdm_registry_free(). SDM_E_PLUGIN, SDM_E_NOMEM. */
+/* *out = a registry of the built-in shapes and of the plug-ins in SDMGEN_PLUGIN_PATH and --plugin;
+ * free it with sdm_registry_free(). SDM_E_PLUGIN, SDM_E_NOMEM. */
 sdm_status cli_open_registry(const cli_args *args, sdm_registry **out, sdm_error *err);
 
 /* The shape of that name. NULL: there is none; *err holds SDM_E_ARG with "did you mean". */
@@ -27,7 +27,7 @@ typedef struct cli_shape {
     sdm_instance *instance;
     const sdm_param *params; /* [n_params], owned by the instance */
     size_t n_params;
-    double *values; /* [n_params] of -p, else the defaults; not yet checked for range */
+    double *values; /* [n_params] values of -p, else the defaults; not checked for range yet */
 } cli_shape;
 
 /* Opens the registry, creates the shape `name` with the options and reads the values of -p.
@@ -36,8 +36,8 @@ sdm_status cli_shape_open(const cli_args *args, const char *name, const cli_list
                           cli_shape *out, sdm_error *err);
 void cli_shape_dispose(cli_shape *shape);
 
-/* Opens a model where the command also accepts other types of files: the message about a file that
- * is no model lists these types. Freed with sdm_model_free(). */
+/* Opens a model, for commands that also accept other types of files: if the file is no model, the
+ * message lists these types. *out is freed with sdm_model_free(). */
 sdm_status cli_open_model(const char *path, sdm_model **out, sdm_error *err);
 
 /* *out[info->n_params] = the parameters of a model in the form of a shape's. Their texts belong to
@@ -71,7 +71,8 @@ void cli_add_params(const sdm_param *params, size_t n, const double *values, sdm
 sdm_status cli_grid_for_box(const cli_args *args, const double min[3], const double max[3],
                             sdm_grid *out, sdm_error *err);
 
-/* sdm_mesh_read() with SDM_E_FORMAT instead of SDM_E_UNSUPPORTED for an unknown type of file. */
+/* As sdm_mesh_read(), but returns SDM_E_FORMAT instead of SDM_E_UNSUPPORTED for an unknown type of
+ * file. */
 sdm_status cli_read_mesh(const char *path, sdm_mesh *out, sdm_error *err);
 
 #endif

@@ -5,14 +5,15 @@
 #include "inputs/setup.h"
 #include "sdm/phantom.h"
 
-/* All settings of an image. Zero-initialise all but args; cli_shape_dispose(&p.shape) frees. */
+/* All settings of a test image. Zero-initialise all members but args; cli_shape_dispose(&p.shape)
+ * frees. */
 typedef struct cli_phantom {
     const cli_args *args;
-    cli_shape shape; /* with the parameters of the image */
-    sdm_pose pose;   /* of the shape in the world */
-    sdm_grid grid;   /* of the image */
+    cli_shape shape; /* with the parameters used for the image */
+    sdm_pose pose;   /* pose of the shape in the world */
+    sdm_grid grid;   /* grid of the image */
     sdm_phantom_opts opts;
-    bool cut; /* the shape leaves the box of the voxel centres */
+    bool cut; /* the shape extends beyond the box of the voxel centres */
 } cli_phantom;
 
 /* Opens the shape and derives its parameters, the pose, the grid and the options of the image from

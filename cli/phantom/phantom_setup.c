@@ -30,8 +30,8 @@ static sdm_status draw_params(cli_phantom *p, sdm_error *err)
     return SDM_OK;
 }
 
-/* The pose of --rotation and --translation, then a random rotation and translation: rotation =
- * R_random R_given, translation = t_given + t_random. */
+/* Sets the pose: that of --rotation and --translation, followed by a random rotation and
+ * translation: rotation = R_random R_given, translation = t_given + t_random. */
 static sdm_status read_pose(cli_phantom *p, sdm_error *err)
 {
     const cli_phantom_args *a = &p->args->phantom;
@@ -103,9 +103,9 @@ static void mesh_to_image_frame(const cli_phantom *p, const sdm_pose *frame, sdm
     }
 }
 
-/* --crop: moves an end of the grid (in the frame of the image) into the box min .. max of the
- * shape. A fraction f > 0 ends the grid at max - f (max - min), f < 0 begins it at min - f (max -
- * min). With --size the grid moves as a whole. */
+/* --crop: cuts the grid (in the frame of the image) so that one end lies inside the box min .. max
+ * of the shape. A fraction f > 0 ends the grid at max - f (max - min), f < 0 begins it at min - f
+ * (max - min). With --size the grid moves as a whole. */
 static sdm_status grid_crop(const cli_phantom *p, const double min[3], const double max[3],
                             sdm_grid *g, sdm_error *err)
 {
@@ -130,8 +130,8 @@ static sdm_status grid_crop(const cli_phantom *p, const double min[3], const dou
     return SDM_OK;
 }
 
-/* Makes the grid: fitted to the shape in the frame of the image, cropped, then moved to
- * the world. */
+/* Makes the grid: fits it to the shape in the frame of the image, crops it, then moves it to the
+ * world. */
 static sdm_status grid_make(cli_phantom *p, sdm_mesh *mesh, sdm_error *err)
 {
     const cli_args *args = p->args;

@@ -22,13 +22,14 @@ bool cli_layers_wanted(const cli_args *args);
  * options that they require. SDM_E_ARG, SDM_E_IO. */
 sdm_status cli_layers_check(const cli_args *args, sdm_error *err);
 
-/* With --jacobian: fills l->velocity for the mesh of the shape at params[n_params], which has
+/* With --jacobian: fills l->velocity for the mesh of the shape at params[n_params]; the mesh has
  * n_vert vertices. */
 sdm_status cli_layers_velocity(cli_layers *l, const cli_args *args, const sdm_instance *shape,
                                const double *params, size_t n_vert, sdm_error *err);
 
 /* Computes the distances into values[nz][ny][nx] and the requested layers. Triangle indices refer
- * to the mesh that the engine was created from, also where the engine uses a union of it. */
+ * to the mesh that the engine was created from, also where the engine uses the union of this mesh
+ * with itself. */
 sdm_status cli_layers_map(cli_layers *l, const cli_args *args, const sdm_exact *engine,
                           const sdm_grid *grid, float *values, sdm_error *err);
 

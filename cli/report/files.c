@@ -28,8 +28,8 @@ bool cli_ends_with_any(const char *path, const char *endings)
     return false;
 }
 
-/* Identity of a file: device and inode of an existing file; for a new file those of its folder
- * and its name. */
+/* Identity of a file: device and inode of an existing file; for a new file device and inode of its
+ * folder, and its name. */
 typedef struct file_id {
     dev_t device;
     ino_t number;
@@ -61,8 +61,8 @@ static bool is_same_file(const char *a, const char *b)
            x.number == y.number && !strcmp(x.name, y.name);
 }
 
-/* All files that a command may read. Shape options may hold paths (mesh=FILE), so the values of
- * all of them count. */
+/* All files that a command may read. Shape options may hold paths (mesh=FILE), so the values of all
+ * options are included. */
 static sdm_status find_inputs(const cli_args *args, cli_list *out, sdm_error *err)
 {
     const char *const single[] = {args->mesh, args->rows, args->fit.reference,

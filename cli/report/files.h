@@ -8,7 +8,8 @@
 #define CLI_VOLUME_ENDINGS ".nii .nii.gz .nrrd .mha"
 #define CLI_MESH_ENDINGS ".ply .stl .obj .off"
 
-/* True when the name has this ending, in any case, after at least one other character. */
+/* True when the name has this ending, in upper or lower case, after at least one other
+ * character. */
 bool cli_ends_with(const char *path, const char *suffix);
 
 /* True when the name has one of the endings, which are separated by spaces. */

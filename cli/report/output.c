@@ -63,13 +63,14 @@ sdm_status cli_check_type(const char *path, bool meshes_only, sdm_error *err)
 
 bool cli_is_picture(const char *path) { return kind_of(path, NULL) == KIND_PICTURE; }
 
-/* One word for the method that made the map: "network", "exact", "edt" ... */
+/* One word that names the method that made the map: "network", "exact", "edt" ... */
 static const char *made_by(const cli_map *map)
 {
     return map->source == SDM_SOURCE_NETWORK ? "network" : map->origin;
 }
 
-/* The method, and in parentheses whether parameters were clamped or the network was replaced. */
+/* text = the method and, in parentheses, whether parameters were clamped or why the exact engine
+ * replaced the network. */
 static void describe_method(const cli_map *map, char text[80])
 {
     static const char *const reasons[] = {"", " (out of the trained range)",
@@ -168,7 +169,8 @@ sdm_status cli_write_map(const char *path, const cli_map *map, const cli_args *a
     }
 }
 
-/* Length of a %d, %4d or %04d at `at`, 0 when there is none; *width: its field width. */
+/* Length of a placeholder %d, %4d or %04d at `at`, 0 when there is none; *width: the field width of
+ * the placeholder. */
 static size_t number_mark(const char *at, int *width)
 {
     if (*at != '%') return 0;

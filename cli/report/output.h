@@ -14,14 +14,14 @@ typedef struct cli_map {
     const char *params;  /* "a=4.4 alpha=0.5", "" for a mesh file */
     sdm_source source;   /* network or exact engine */
     bool clamped;        /* parameters were clamped to the trained range */
-    double error_mm;     /* a network: its RMSE; else the bound on the error */
+    double error_mm;     /* of a network: its RMSE; else the bound on the error */
     const char *origin;  /* "model CHECKSUM", or the method without a network: "exact", "edt" ... */
     sdm_reason reason;   /* why the exact engine replaced the network */
     const sdm_check *check; /* errors of the network's map; NULL: not checked */
 } cli_map;
 
-/* Checks, before any work, that the ending of the name is a known type; meshes_only: a type of
- * mesh files. SDM_E_ARG; SDM_E_UNSUPPORTED: .vdb in a build without OpenVDB. */
+/* Checks, before any work, that the ending of the name is a known type; meshes_only: a known type
+ * of mesh files. SDM_E_ARG; SDM_E_UNSUPPORTED: .vdb in a build without OpenVDB. */
 sdm_status cli_check_type(const char *path, bool meshes_only, sdm_error *err);
 
 /* Whether the name is that of a picture: .png .svg .pdf. */

@@ -26,8 +26,8 @@ static size_t terminal_width(void)
     return size.ws_col;
 }
 
-/* bar = a text of '#' and '-' with about `room` characters, the columns left beside title
- * and text. */
+/* bar = a text of '#' and '-' with about `room` characters, the number of columns that title and
+ * text leave. */
 static void bar_draw(char bar[MAX_CELLS + 1], double fraction, size_t room)
 {
     const size_t cells = room < MIN_CELLS ? MIN_CELLS : room > MAX_CELLS ? MAX_CELLS : room;

@@ -14,8 +14,8 @@ typedef struct cli_progress {
 
 void cli_progress_start(cli_progress *p);
 
-/* Shows the title (the current work), the fraction done (0..1, others are clamped) and the text
- * (NULL: none) after the bar. Cheap: does nothing until the interval has passed. */
+/* Shows the title (the current work), the bar for the fraction done (clamped to 0 .. 1), and the
+ * text (NULL: none). Cheap: it does nothing until the interval has passed. */
 void cli_progress_show(cli_progress *p, const char *title, double fraction, const char *text);
 
 /* Removes the bar before other output. */

@@ -5,14 +5,14 @@
 #include "sdm/internal/text.h"
 #include "sdm/mesh.h"
 
-/* All figures of the audit, one a line, on stdout. */
+/* Prints all figures of the audit on stdout, one per line. */
 void cli_print_audit(const sdm_audit *a);
 
 /* Adds the figures as members of the open object. */
 void cli_json_audit(sdm_json *json, const sdm_audit *a);
 
-/* A notice for each defect that affects an exact map: boundary, non-manifold or misoriented edges,
- * degenerate or duplicate triangles. */
+/* Prints a notice for each defect that affects an exact map: boundary, non-manifold or misoriented
+ * edges, degenerate or duplicate triangles. */
 void cli_notice_audit(const sdm_audit *a);
 
 #endif

@@ -5,10 +5,10 @@
 #include "sdm/internal/text.h"
 #include "sdm/volume.h"
 
-/* Grid, range of values, segments and description, as text on stdout. */
+/* Prints grid, range of values, segments and description as text on stdout. */
 void cli_print_volume(const char *path, const sdm_volume *v);
 
-/* The same, and the direction matrix, as members of the open object. */
+/* Adds the same figures, and the direction matrix, as members of the open object. */
 void cli_json_volume(sdm_json *j, const char *path, const sdm_volume *v);
 
 #endif

@@ -50,7 +50,7 @@ bool cli_wants_colour(void)
     return cli_has_terminal() && !(no && *no);
 }
 
-/* True when the line begins with its place: "file:line:column: ..." or "argument
+/* True when the line begins with the place of the mistake: "file:line:column: ..." or "argument
  * 'key=value': ...". */
 static bool has_place(const char *line, size_t length)
 {
@@ -107,7 +107,8 @@ void cli_catch_interrupts(void)
     sigemptyset(&action.sa_mask);
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
-    // beyond a limit on file sizes write() then fails: a message appears and no file is left
+    // when a limit on file sizes is exceeded, write() then fails: so a message appears and no file
+    // is left
     action.sa_handler = SIG_IGN;
     sigaction(SIGXFSZ, &action, NULL);
 }

@@ -24,10 +24,11 @@ void cli_set_quiet(bool quiet);
 bool cli_is_quiet(void);
 
 /* Prints the message of a failure on stderr, "sdmgen: error: text". Lines of a configuration error
- * that begin with their place, "file:line:column:", have no such prefix. Returns the exit code. */
+   that begin with the place of the mistake, "file:line:column:", have no such prefix. Returns the
+   exit code. */
 int cli_report(const sdm_error *err);
 
-/* "sdmgen: text" on stderr, unless quiet. */
+/* Prints "sdmgen: text" on stderr, unless quiet. */
 void cli_notice(const char *fmt, ...) SDM_PRINTF(1, 2);
 
 /* True when stderr takes colours: a terminal, not TERM=dumb, NO_COLOR unset or empty. */

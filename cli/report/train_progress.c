@@ -22,7 +22,7 @@ static const char *phase_name(sdm_phase phase)
     }
 }
 
-/* 1:05, 2:01:30; "-:--" when the time is unknown. */
+/* Formats a time as "1:05" or "2:01:30"; "-:--" when the time is unknown. */
 static void format_time(char *buf, size_t size, double seconds)
 {
     if (!(seconds >= 0) || seconds > 1e8)
@@ -34,7 +34,7 @@ static void format_time(char *buf, size_t size, double seconds)
                  (int)seconds % 60);
 }
 
-/* 850, 18k, 2.1M */
+/* Formats a rate as "850", "18k" or "2.1M". */
 static void format_rate(char buf[32], double rate)
 {
     if (!(rate >= 0)) rate = 0;

@@ -15,7 +15,7 @@ typedef struct cli_bench_case {
     double band_mm; /* errors are measured where abs(distance) < band_mm; INFINITY: everywhere */
     double share;   /* fraction of the voxels that slow programs compute */
     size_t repeat;  /* largest number of runs */
-    int threads;    /* of the row with all cores */
+    int threads;    /* for the row with all cores */
     float *exact;   /* [nz][ny][nx] map of the exact engine, the reference for errors, mm */
     float *winding; /* [nz][ny][nx] distance signed by the winding number of the whole mesh; NaN:
                        not computed */
@@ -59,13 +59,13 @@ sdm_status cli_bench_peers(const cli_bench_case *c, const cli_args *args, cli_be
 /* Name of the i-th known peer; NULL after the last one. */
 const char *cli_bench_peer_name(size_t i);
 
-/* Measures the peer `name`: times, memory and errors into *row, its map into values[nz][ny][nx]
- * (NaN: not computed), which may be NULL. If the program is missing or fails, row->done is false
- * and row->note is the reason; that is no error. */
+/* Measures the peer `name`: stores times, memory and errors in *row, and its map in
+ * values[nz][ny][nx] (NaN: not computed) unless values is NULL. If the program is missing or fails,
+ * row->done is false and row->note is the reason; that is no error. */
 sdm_status cli_bench_peer(const cli_bench_case *c, const cli_args *args, const char *name,
                           float *values, cli_bench_row *row, sdm_error *err);
 
-/* Appends a row with this name, zero otherwise. *row is valid until the next call. */
+/* Appends a row with this name; its other members are zero. *row is valid until the next call. */
 sdm_status cli_bench_add(cli_bench_rows *rows, const char *name, cli_bench_row **row,
                          sdm_error *err);
 
@@ -76,14 +76,14 @@ bool cli_bench_has_row(double share, int64_t r);
 /* Fills c->winding on all threads, for at most about a million voxels. */
 sdm_status cli_bench_find_signs(cli_bench_case *c, sdm_error *err);
 
-/* Errors and wrong signs of values[nz][ny][nx] (NaN: not computed) into *row. Errors are measured
- * where the signs agree; if the mesh overlaps itself, only outside, because other methods measure
- * to the surface inside the union. */
+/* Stores the errors and wrong signs of values[nz][ny][nx] (NaN: not computed) in *row. Errors are
+ * measured where the signs agree; if the mesh overlaps itself, only outside, because inside other
+ * methods measure the distance to surfaces within the union. */
 void cli_bench_compare(const cli_bench_case *c, const float *values, cli_bench_row *row);
 
 /* cli_bench_peak_start() resets the peak of the resident memory (Linux) and returns the memory
- * resident now, kB; -1: unknown. cli_bench_peak_mb() returns the peak since then above that, MiB;
- * NaN: unknown. */
+ * resident now, kB; -1: unknown. cli_bench_peak_mb() returns by how much the peak since then
+ * exceeds `start`, MiB; NaN: unknown. */
 long cli_bench_peak_start(void);
 double cli_bench_peak_mb(long start);
 
@@ -91,7 +91,7 @@ double cli_bench_peak_mb(long start);
  * with the arithmetic and memory speed of the machine, and prints the result. */
 sdm_status cli_bench_network(const cli_args *args, sdm_error *err);
 
-/* Print or add the table of one case. */
+/* Print the table of one case as text, or add it to the JSON. */
 void cli_bench_print(const cli_bench_case *c, const cli_bench_rows *rows);
 void cli_bench_json(sdm_json *j, const cli_bench_case *c, const cli_bench_rows *rows);
 

@@ -34,8 +34,8 @@ static sdm_status make_shape_mesh(const cli_args *args, double refine, const cha
     return s;
 }
 
-/* The grid of --grid, --size, --spacing and --origin; by default 60 x 50 x 50 voxels. With a
- * preset grid, the cochlea has the same position in it as in the grid of its networks. */
+/* Makes the grid of --grid, --size, --spacing and --origin; by default 60 x 50 x 50 voxels. In a
+ * preset grid the cochlea has the same position as in the grid of its networks. */
 static sdm_status make_grid(const cli_args *args, bool cochlea, const sdm_audit *audit,
                             sdm_grid *out, sdm_error *err)
 {

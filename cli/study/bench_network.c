@@ -15,7 +15,7 @@
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
 
-/* Runs of one figure: RUNS, or after TIME_LIMIT_S as few as RUNS_MIN. */
+/* Number of runs for one figure: RUNS, or after TIME_LIMIT_S fewer, but at least RUNS_MIN. */
 enum { RUNS = 100, RUNS_MIN = 3 };
 #define TIME_LIMIT_S 4.0
 
@@ -26,10 +26,11 @@ typedef struct network_times {
     int threads;
     double peak_gmacs;  /* 10^9 multiply-adds per second of the matrix product on one core */
     double read_gbs;    /* GB/s of one core reading a block of the size of the weights repeatedly */
-    sdm_error no_exact; /* why no time was measured for the exact engine */
+    sdm_error no_exact; /* why the exact engine was not timed */
 } network_times;
 
-/* A model with all memory that its derivatives need: allocation is not timed. */
+/* A model with all memory that its derivatives need, allocated beforehand so that allocation is not
+ * timed. */
 typedef struct derivative_work {
     const sdm_model *m;
     double p[SDM_MAX_PARAMS], direction[SDM_MAX_PARAMS], gradient[SDM_MAX_PARAMS];
@@ -116,7 +117,8 @@ static sdm_status time_threads(const sdm_model *m, uint64_t seed, int threads, n
     return s;
 }
 
-/* Speed of the machine: a large matrix product, and repeated reading of a block of `bytes`. */
+/* Measures the speed of the machine: by a large matrix product, and by reading a block of `bytes`
+ * bytes repeatedly. */
 static sdm_status measure_machine(size_t bytes, network_times *t, sdm_error *err)
 {
     enum { N = 384, REPEATS = 5 };
@@ -153,7 +155,7 @@ static sdm_status measure_machine(size_t bytes, network_times *t, sdm_error *err
     return s;
 }
 
-/* 10^9 multiply-adds per second. */
+/* 10^9 multiply-adds per second, from a number of multiply-adds and a time in ms. */
 static double gmacs(double macs, double ms) { return 1e-6 * macs / ms; }
 
 static void print_row(const char *name, double ms, double one, const char *note)

@@ -11,8 +11,8 @@
 #include "sdm/internal/heap.h"
 #include "sdm/internal/methods.h"
 
-#define TIME_LIMIT_S 3.0 /* no run starts after this */
-#define NAIVE_PAIRS 3e7  /* largest voxels times triangles of the naive method: about 2 s */
+#define TIME_LIMIT_S 3.0 /* s; no run starts after this time */
+#define NAIVE_PAIRS 3e7  /* largest (voxels * triangles) of the naive method: takes about 2 s */
 
 /* Times a method on the whole grid: the fastest of several runs. */
 static sdm_status time_method(const cli_bench_case *c, const sdm_method *m, int threads,
@@ -40,7 +40,8 @@ static sdm_status time_method(const cli_bench_case *c, const sdm_method *m, int 
     return SDM_OK;
 }
 
-/* Times the naive method on a share of the rows and scales: every voxel costs the same. */
+/* Times the naive method on a share of the rows and scales the time to all: every voxel costs the
+ * same. */
 static sdm_status time_naive(const cli_bench_case *c, float *values, cli_bench_row *row,
                              sdm_error *err)
 {

@@ -1,4 +1,4 @@
-/* Finds and starts other programs that make the same map (peers) and reads their results. For the
+/* Finds and starts "peers", other programs that make the same map, and reads their results. For the
  * protocol see bench/peers/peer.h. */
 #include <dirent.h>
 #include <errno.h>
@@ -56,8 +56,8 @@ static void free_names(struct dirent **names, int n)
     free(names);
 }
 
-/* The folder of this program if it holds peers, as in a build; else libexec/sdmgen, as
- * installed. */
+/* folder = the folder of this program if it holds peers, as in a build; else libexec/sdmgen, as
+ * after an installation. */
 static void find_folder(char folder[PATH_SIZE])
 {
     char self[PATH_SIZE / 2];
@@ -137,7 +137,7 @@ static int run_program(char **arguments, char output[OUTPUT_MAX])
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
-/* The last line that is a JSON object, else the last line. Splits `output` into lines. */
+/* Returns the last line that is a JSON object, else the last line. Splits `output` into lines. */
 static char *result_line(char *output)
 {
     char *json = NULL, *last = output;
@@ -148,8 +148,9 @@ static char *result_line(char *output)
     return json ? json : last;
 }
 
-/* Stores the figures of the JSON line and the errors of the values in *row, and the values in out
- * (may be NULL). After a failure row->done is false and row->note is the reason. */
+/* Stores in *row the figures of the JSON line and the errors of the values, which are read from
+   values_path; stores the values in out (may be NULL). After a failure row->done is false and
+   row->note is the reason. */
 static void read_result(const cli_bench_case *c, const char *line, int code,
                         const char *values_path, float *out, cli_bench_row *row)
 {
@@ -300,7 +301,7 @@ sdm_status cli_bench_peers(const cli_bench_case *c, const cli_args *args, cli_be
     return s;
 }
 
-/* ---- one peer, a program that makes maps with another library ---- */
+/* ---- measuring one peer by its name ---- */
 
 static size_t find_known(const char *name)
 {

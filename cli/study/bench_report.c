@@ -8,7 +8,7 @@
 static double total_ms(const cli_bench_row *r) { return r->ms_prepare + r->ms_map; }
 
 /* format_fixed() writes v with `digits` decimals, format_rounded() with `digits` significant
- * digits; "-" if v is not finite. Return buf. */
+ * digits; "-" if v is not finite. Both return buf. */
 static const char *format_fixed(double v, int digits, char buf[32])
 {
     snprintf(buf, 32, "-");

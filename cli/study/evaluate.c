@@ -111,7 +111,7 @@ sdm_status cli_compare_maps(const sdm_grid *g, const float *values, const float 
     return surfaces ? compare_surfaces(g, values, exact, out, err) : SDM_OK;
 }
 
-/* The maker's map and the exact map at p; uses only the calling thread. */
+/* Makes the maker's map and the exact map at p, on the calling thread alone. */
 static sdm_status make_maps(const cli_map_maker *m, const double *p, float *values, float *exact,
                             sdm_error *err)
 {
@@ -120,7 +120,7 @@ static sdm_status make_maps(const cli_map_maker *m, const double *p, float *valu
     return s ? s : sdm_exact_shape_map(m->shape, p, &opts, &m->grid, exact, NULL, err);
 }
 
-/* Errors for random shape `index`; maps: memory for two maps. */
+/* Computes the errors for random shape `index`; maps: memory for two maps. */
 static sdm_status evaluate_sample(const cli_map_maker *m, uint64_t seed, size_t index,
                                   bool surfaces, float *maps, cli_eval_sample *out, sdm_error *err)
 {
@@ -139,7 +139,7 @@ typedef struct evaluation {
     uint64_t seed;
     bool surfaces;
     cli_eval *out;
-    size_t failed; /* lowest index of a failed sample, n: none */
+    size_t failed; /* lowest index of a failed sample; n: none */
     sdm_error err; /* message of that sample */
     size_t done;
     cli_progress progress;
@@ -216,7 +216,8 @@ static sdm_status rank_samples(cli_eval *e, sdm_error *err)
     return SDM_OK;
 }
 
-/* Sums in the order of the index: the result has the same bits for every number of threads. */
+/* Sums in the order of the indices, so that the result has the same bits for every number of
+ * threads. */
 void cli_eval_reduce(cli_eval *e)
 {
     double near_sum = 0;

@@ -26,7 +26,7 @@ typedef struct cli_eval_sample {
 
 /* Errors over n shapes. */
 typedef struct cli_eval {
-    cli_eval_sample *sample; /* [n], in the order of their index */
+    cli_eval_sample *sample; /* [n], in the order of the shape indices */
     size_t n, n_surface;     /* shapes; shapes where both maps have a surface */
     double mse_mm2, rmse_mm, mae_mm, max_abs_mm, rmse_near_mm, dice;
     /* means over the shapes with both surfaces */
@@ -64,7 +64,8 @@ void cli_maker_params(const cli_map_maker *m, uint64_t seed, size_t index, doubl
 sdm_status cli_compare_maps(const sdm_grid *g, const float *values, const float *exact,
                             bool surfaces, cli_eval_sample *out, sdm_error *err);
 
-/* Computes the means and maxima of e from sample[n]; they must be zero before. */
+/* Computes the means and maxima of *e from e->sample[n]; these members must be zero before the
+ * call. */
 void cli_eval_reduce(cli_eval *e);
 
 /* Evaluates n random shapes on all threads; the number of threads does not change a bit of the
@@ -92,15 +93,15 @@ typedef struct cli_timing {
     size_t n_network, n_exact, n_naive; /* number of timed maps */
 } cli_timing;
 
-/* Measures the times: medians over random shapes; with `fastest`, minima over repeated maps of one
- * shape and over repeated batches of random shapes. The naive method always has a median, over
- * n_naive shapes. shape NULL: only the network. */
+/* Measures the times. They are medians over random shapes; with `fastest` they are minima over
+   repeated maps of one shape and over repeated batches of random shapes. The time of the naive
+   method is always a median, over n_naive shapes. shape NULL: only the network is timed. */
 sdm_status cli_time_maps(const sdm_model *m, const sdm_instance *shape, uint64_t seed, bool fastest,
                          size_t n_naive, cli_timing *out, sdm_error *err);
 
-/* *ms = median time of the naive method on one core over the first n random shapes of the
- * maker. Only a fraction of the slices, *share, is computed; *ms is scaled to all. Both are
- * NaN when n is 0. */
+/* *ms = median time of the naive method on one core over the first n random shapes of the maker.
+ * Only a fraction of the slices, *share, is computed; *ms is scaled to all slices. *ms and *share
+ * are NaN when n is 0. */
 sdm_status cli_time_naive(const cli_map_maker *m, uint64_t seed, size_t n, double *ms,
                           double *share, sdm_error *err);
 

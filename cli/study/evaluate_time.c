@@ -11,10 +11,10 @@
 #include "sdm/memory.h"
 
 enum { N_NETWORK = 51, N_MIN = 3, N_EXACT = 9, BATCH = 32, N_BATCHES = 9, NAIVE_STEP = 16 };
-/* For slow networks: no map starts after this time, and a batch is small enough to end
- * within it. */
+/* For slow networks: no map starts after this time (s), and a batch is small enough to end within
+ * it. */
 #define TIME_LIMIT_S 6.0
-#define BATCH_BYTES 2e8 /* largest size of the maps of a batch */
+#define BATCH_BYTES 2e8 /* largest size of the maps of a batch, bytes */
 
 static int compare_reals(const void *a, const void *b)
 {

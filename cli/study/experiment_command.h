@@ -28,9 +28,9 @@ typedef struct cli_experiment_result {
     char grid[96];                /* "60 x 50 x 50 voxels of 0.2 mm" */
 } cli_experiment_result;
 
-/* The training configuration of a row and its shape. */
+/* The training configuration and the shape of a row. */
 typedef struct cli_experiment_job {
-    size_t index; /* of the row */
+    size_t index; /* index of the row */
     sdm_config *config;
     sdm_instance *shape;
     cli_map_maker maker; /* `make` is NULL until the method is ready */
@@ -43,7 +43,7 @@ typedef struct cli_experiment_run {
     const cli_args *args;
     const sdm_experiment *e;
     const sdm_registry *registry;
-    const char *folder;             /* of all outputs */
+    const char *folder;             /* folder of all outputs */
     cli_experiment_result *results; /* [e->n_rows] */
     cli_experiment_job *jobs;       /* [e->n_rows] */
     double start;                   /* sdm_clock() at the start, s */
@@ -73,14 +73,15 @@ typedef enum cli_experiment_stored {
 cli_experiment_stored cli_experiment_find_stored(const cli_experiment_run *run,
                                                  const cli_experiment_job *job);
 
-/* Provides model.sdm in the folder of the row: it exists, or the training starts or continues.
- * SDM_E_QUALITY: the training would exceed experiment.minutes; errors of the training. */
+/* Provides model.sdm in the folder of the row: if it does not exist, starts or continues the
+ * training. SDM_E_QUALITY: the training would exceed experiment.minutes. Also returns errors of the
+ * training. */
 sdm_status cli_experiment_provide_model(const cli_experiment_run *run,
                                         const cli_experiment_job *job, cli_experiment_result *out,
                                         sdm_error *err);
 
 /* Measure a row with a network, or with a method or program that needs no training: fill the
- * figures and the note of *out and draw the pictures. The status is that of the row. */
+ * figures and the note of *out and draw the pictures. Return the status of the row. */
 sdm_status cli_experiment_network(const cli_experiment_run *run, cli_experiment_job *job,
                                   cli_experiment_result *out, sdm_error *err);
 sdm_status cli_experiment_engine(const cli_experiment_run *run, cli_experiment_job *job,
@@ -90,17 +91,17 @@ sdm_status cli_experiment_engine(const cli_experiment_run *run, cli_experiment_j
  * you mean". */
 sdm_status cli_experiment_check_engine(const char *name, sdm_error *err);
 
-/* Draws slices exact | method | error and the zero surfaces of the map values[nz][ny][nx]
- * at job->nominal, unless pictures are switched off. Without a zero surface surfaces.png
- * is omitted. */
+/* Draws slices exact | method | error and the zero level set of the map values[nz][ny][nx] at
+ * job->nominal, unless pictures are switched off. Without a zero surface surfaces.png is
+ * omitted. */
 sdm_status cli_experiment_draw(const cli_experiment_run *run, const cli_experiment_job *job,
                                const float *values, sdm_error *err);
 
 /* Copies the errors, of one map or over all shapes, to the figures of *out. */
 void cli_experiment_set_errors(cli_experiment_result *out, const cli_eval *e);
 
-/* Writes table.md, table.csv and table.json to the folder, with the files of the fits. Leaves the
- * texts of the first and the last in *markdown and *json. */
+/* Writes table.md, table.csv and table.json, and the files of the fits, to the folder. *markdown
+ * and *json receive the texts of table.md and table.json. */
 sdm_status cli_experiment_write_tables(const cli_experiment_run *run, sdm_text *markdown,
                                        sdm_json *json, sdm_error *err);
 

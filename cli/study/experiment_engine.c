@@ -12,7 +12,7 @@
 #include "sdm/memory.h"
 
 #define MB_OF_MIB 1.048576
-#define TIME_LIMIT_S 20.0                 /* no shape is timed after this */
+#define TIME_LIMIT_S 20.0                 /* s; no shape is timed after this */
 enum { TIMED_MAX = 9, NAIVE_SHAPES = 2 }; /* timed shapes */
 
 sdm_status cli_experiment_check_engine(const char *name, sdm_error *err)
@@ -70,7 +70,7 @@ static sdm_status time_method(const cli_experiment_run *run, const cli_experimen
     return SDM_OK;
 }
 
-/* *note += text; a note that is full stays as it is. */
+/* Appends the text to out->note, as far as there is room. */
 static void note_append(cli_experiment_result *out, const char *text)
 {
     const size_t used = strlen(out->note);
@@ -119,7 +119,7 @@ static sdm_status measure_own(const cli_experiment_run *run, cli_experiment_job 
 
 /* ---- other programs ---- */
 
-/* The exact map of the nominal shape; *unioned: its mesh overlaps itself. */
+/* Makes the exact map of the nominal shape; *unioned: the mesh of the shape overlaps itself. */
 static sdm_status make_exact_map(const cli_experiment_job *job, float *values, bool *unioned,
                                  sdm_error *err)
 {
@@ -139,7 +139,7 @@ static bool is_complete(const float *values, size_t n)
     return true;
 }
 
-/* Errors and pictures of the peer's map. */
+/* Measures the errors of the peer's map and draws its pictures. */
 static sdm_status evaluate_peer(const cli_experiment_run *run, const cli_experiment_job *job,
                                 const cli_bench_case *c, const float *values,
                                 cli_experiment_result *out, sdm_error *err)

@@ -17,7 +17,7 @@ enum { NAIVE_SHAPES = 2 };
 
 /* ---- the network ---- */
 
-/* Checks that a model is one of the job's shape and was trained on all its ranges, from which the
+/* Checks that a model is for the job's shape and was trained on the whole ranges from which the
  * phantoms are drawn. */
 static sdm_status check_model(const cli_experiment_job *job, const char *path,
                               const sdm_model_info *info, sdm_error *err)
@@ -44,8 +44,8 @@ static sdm_status check_model(const cli_experiment_job *job, const char *path,
     return SDM_OK;
 }
 
-/* Opens the network: the file fit.model, the row's own (trained if necessary), or for polishing
- * that of the row with the same network. */
+/* Opens the network: the file fit.model; else the row's own network, which is trained if necessary;
+ * when polishing, the network of the row that uses the same network without polishing. */
 static sdm_status open_network(const cli_experiment_run *run, const cli_experiment_job *job,
                                cli_experiment_result *out, sdm_model **model, sdm_error *err)
 {
@@ -89,7 +89,8 @@ static sdm_status measure_dice(const sdm_fit_source *source, const sdm_fit_resul
     return s;
 }
 
-/* Fits one phantom. A fit that does not converge is a result, not an error: *why is the reason. */
+/* Fits one phantom. A fit that does not converge is a result, not an error; *why then holds the
+ * reason. */
 static sdm_status fit_one(const cli_experiment_job *job, const sdm_fit_source *source, bool polish,
                           const sdm_experiment *e, const cli_experiment_phantom *p,
                           cli_experiment_fit *out, sdm_error *why, sdm_error *err)
@@ -154,7 +155,7 @@ void cli_experiment_fits_free(cli_experiment_fits *f)
     sdm_free(f);
 }
 
-/* Fits all phantoms; *why is the reason of the first fit that did not converge. */
+/* Fits all phantoms; *why holds the reason why the first of the failed fits did not converge. */
 static sdm_status fit_all(const cli_experiment_run *run, const cli_experiment_job *job,
                           const sdm_fit_source *source, cli_experiment_result *out, sdm_error *why,
                           sdm_error *err)

@@ -7,7 +7,7 @@
 #include "sdm/internal/file.h"
 #include "sdm/internal/table.h"
 
-/* The row of exact fits in the same variant; NULL: none is done. */
+/* Returns the row of exact fits in the same variant; NULL: there is no finished one. */
 static const cli_experiment_result *find_exact(const cli_experiment_run *run,
                                                const cli_experiment_result *r)
 {
@@ -51,7 +51,8 @@ static double reference_difference(const cli_experiment_result *r, const char *n
     return NAN;
 }
 
-/* The exact fit of phantom i; NULL: it did not converge, or its phantom is different. */
+/* Returns the exact fit of phantom i; NULL: it did not converge, or it fitted a different
+ * phantom. */
 static const cli_experiment_fit *find_exact_fit(const cli_experiment_result *exact,
                                                 const cli_experiment_fits *f, size_t i)
 {

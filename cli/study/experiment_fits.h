@@ -10,7 +10,7 @@ typedef struct cli_experiment_fit {
     bool at_bound[SDM_MAX_PARAMS]; /* the estimate is at an end of its range */
     double truth[SDM_MAX_PARAMS], found[SDM_MAX_PARAMS], sd[SDM_MAX_PARAMS];
     double seconds, dice;
-    size_t maps_network, maps_exact; /* maps that each source made */
+    size_t maps_network, maps_exact; /* number of maps that each source made */
 } cli_experiment_fit;
 
 struct cli_experiment_fits {

@@ -124,8 +124,8 @@ static bool is_same_model(const sdm_config *c, const char *path)
     return same;
 }
 
-/* The checkpoint stores the configuration of its training. Its budget must agree too: a checkpoint
- * with another budget does not lead to the network of this row. */
+/* The checkpoint stores the configuration of its training. Its budget must also be the same:
+ * continuing a checkpoint with another budget does not give the network of this row. */
 static bool is_same_checkpoint(const sdm_config *c, const char *path)
 {
     sdm_section section[SDM_CONTAINER_MAX_SECTIONS];

@@ -99,7 +99,7 @@ static sdm_status measure_network(const cli_experiment_run *run, cli_experiment_
     cli_eval e = {0};
     cli_timing t = {0};
     float *values = NULL;
-    // the memory of the map counts too
+    // includes the memory of the map
     const long before = cli_bench_peak_start();
     double more = 0;
     sdm_status s = SDM_ALLOC(&values, sdm_grid_count(&info->grid), "distance map", err);

@@ -10,9 +10,10 @@
 #include "sdm/memory.h"
 #include "sdm/phantom.h"
 
-/* Random streams: seeds of the phantoms, directions of the start poses. */
+/* Streams of the random numbers: for the seeds of the phantoms, and for the directions of the start
+ * poses. */
 enum { STREAM_SEED = 910, STREAM_START = 911 };
-#define TRANSLATION_MAX_MM 10.0 /* of the true poses */
+#define TRANSLATION_MAX_MM 10.0 /* largest translation of a true pose */
 
 static const double PI = 3.14159265358979323846;
 
@@ -35,8 +36,8 @@ static void random_vector(uint64_t seed, uint64_t first, double length, double v
     for (int i = 0; i < 3; i++) v[i] *= length / sqrt(sum);
 }
 
-/* The true pose, rotated by fit.off_deg about `middle` and translated by fit.off_mm, both in
- * random directions. */
+/* Returns the true pose, rotated by fit.off_deg about `middle` and translated by fit.off_mm, both
+ * in random directions. */
 static sdm_pose perturb_pose(const sdm_experiment *e, uint64_t seed, const sdm_pose *truth,
                              const double middle[3])
 {
@@ -65,7 +66,8 @@ static sdm_status find_box(const cli_experiment_job *job, const cli_experiment_p
     return s;
 }
 
-/* A grid around the box, wide enough for all voxels that a fit uses from its start pose on. */
+/* Makes a grid around the box. The grid contains all voxels that a fit uses, from its start pose to
+ * its end. */
 static sdm_status make_grid(const sdm_experiment *e, const double min[3], const double max[3],
                             sdm_grid *out, sdm_error *err)
 {

@@ -1,4 +1,4 @@
-/* Test images of an experiment. */
+/* Phantoms: the test images of an experiment. */
 #ifndef CLI_EXPERIMENT_PHANTOM_H
 #define CLI_EXPERIMENT_PHANTOM_H
 

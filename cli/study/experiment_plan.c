@@ -6,7 +6,7 @@
 #include "experiment_command.h"
 #include "report/terminal.h"
 
-/* The planned action of a row and its training. */
+/* The planned action of a row and the budget of its training. */
 typedef struct plan {
     const char *action;
     double minutes;  /* 0: no training, or a budget of steps or samples */

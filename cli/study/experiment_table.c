@@ -30,7 +30,7 @@ typedef struct columns {
     bool own[SDM_N_FIGURES], reference[SDM_N_FIGURES];
 } columns;
 
-/* The published figure f of the row; NaN: none. */
+/* Returns the published figure f of the row; NaN: there is none. */
 static double reference_figure(const cli_experiment_result *r, int f)
 {
     return r->row->reference ? r->row->reference->value[f] : NAN;

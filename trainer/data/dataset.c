@@ -1,4 +1,4 @@
-/* The pool of exact maps: sizes, storage, and the maps made before training. */
+/* The pool of exact maps: its sizes, its memory, and the choice of slots. */
 #include "dataset.h"
 
 #include <math.h>
@@ -9,7 +9,7 @@
 
 sdm_status trainer_dataset_create(dataset *d, const sdm_config *config, sdm_error *err)
 {
-    // size of the static grid; a huge product stays at SIZE_MAX / 64, which the memory check
+    // size of the static grid; a huge product is capped at SIZE_MAX / 64, which the memory check
     // refuses
     d->n_static = config->data.n_static_counts ? 1 : 0;
     const double bytes = config->data.memory_gb * 1e9;

@@ -1,4 +1,4 @@
-/* The maps before training, computed by all threads. */
+/* Computes the maps that are needed before training, on all threads. */
 #include "dataset_fill.h"
 
 #include <stdatomic.h>
@@ -7,8 +7,8 @@
 #include "streams.h"
 #include "workbench.h"
 
-/* Parameters p[n_params] of point `index` of the static grid: both ends of each range are included;
-   with one point it is the middle. */
+/* Parameters p[n_params] of point `index` of the static grid: the points along a parameter include
+ * both ends of its range; a single point is the middle. */
 static void static_params(const dataset *d, size_t index, double *p)
 {
     for (size_t i = 0; i < d->n_params; i++) {
@@ -22,11 +22,10 @@ static void static_params(const dataset *d, size_t index, double *p)
 
 sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_error *err)
 {
-    enum { MIN_RANDOM = 128 }; // random maps that are made even if hooks->enough() is true
+    enum { MIN_RANDOM = 128 }; // random maps made even if hooks->enough() is true
     const size_t all = d->n_holdout + d->n_static + d->n_start;
     size_t done = 0;
-    long failed =
-        -1; // number of the lowest failed sample: the message does not depend on scheduling
+    long failed = -1; // lowest index of a failed map: so the message does not depend on scheduling
     sdm_error first = {0};
     atomic_bool stop = false, enough = false;
     n_threads = sdm_threads(n_threads);
@@ -56,7 +55,7 @@ sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hoo
                 s = trainer_workbench_packed_map(&w, d, p, d->maps + slot * d->n_voxels,
                                                  &d->scale[slot], &mine);
             }
-            // keep the first error, report, and ask whether to stop
+            // keep the first error, report progress, and check whether to stop
 #pragma omp critical(sdm_dataset_fill)
             {
                 if (s && (failed < 0 || i < failed)) failed = i, first = mine;

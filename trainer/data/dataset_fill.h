@@ -6,7 +6,8 @@
 
 /* Callbacks of trainer_dataset_fill(); each may be NULL. */
 typedef struct fill_hooks {
-    /* Called by the calling thread. */
+    /* Called on the thread that called trainer_dataset_fill(); `done` of `all` maps are
+     * finished. */
     void (*report)(void *user, size_t done, size_t all);
     bool (*cancelled)(void *user);
     /* true: the remaining maps of n_start are left to be made during training; n_start and n_online

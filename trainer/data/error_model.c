@@ -14,7 +14,8 @@ static size_t degree_for(size_t n_params, size_t n)
     return degree;
 }
 
-/* Adds the normal equations of the n observations: matrix gram[F][F], right-hand side right[F]. */
+/* Adds the normal equations of the n observations, with F = n_terms: matrix gram[F][F], right-hand
+ * side right[F]. */
 static void add_normal_equations(const error_model *m, size_t n, const double *x,
                                  const double *value, double *gram, double *right)
 {

@@ -9,7 +9,7 @@
 #include "workbench.h"
 
 /* Finished samples wait in a window between the workers and the trainer: sample i in place i mod
-   WINDOW. */
+ * WINDOW. */
 enum { WINDOW = 64, MAX_WORKERS = 256 };
 
 struct producer {
@@ -17,21 +17,21 @@ struct producer {
     pthread_mutex_t lock;
     pthread_cond_t made, taken;
     size_t next, end; // sample to be made next; end of the samples (one past the last)
-    size_t allowed;   // end of the samples whose point is planned
-    size_t base;      // first sample in the window: all before it are in the pool
+    size_t allowed;   // end of the samples whose Sobol' point is planned
+    size_t base;      // first sample in the window; all earlier ones are in the pool
     bool done[WINDOW];
     double *params; // [WINDOW][P]
     int16_t *maps;  // [WINDOW][n_voxels]
     float scale[WINDOW];
-    sdm_error error; // of sample `failed`
+    sdm_error error; // error of sample `failed`
     size_t failed;   // lowest failed sample; SIZE_MAX: none
     bool stop;
     int n_workers;
     pthread_t workers[MAX_WORKERS];
 };
 
-/* A worker: computes the next sample as soon as its place in the window is free and its point is
-   planned. */
+/* A worker: computes the next sample as soon as its place in the window is free and its Sobol'
+ * point is planned. */
 static void *worker_run(void *user)
 {
     producer *p = user;

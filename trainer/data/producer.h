@@ -6,12 +6,13 @@
 
 typedef struct producer producer;
 
-/* Starts n_threads workers, which compute the random samples of d in order from `first` on, as far
-   as they are planned (d->plan) and up to 64 samples ahead of those taken. d must outlive them. */
+/* Starts n_threads workers, which compute the random samples of d in order from `first` on: only
+   samples that are planned (d->plan), and at most 64 samples ahead of the samples taken. d must
+   outlive the workers. */
 sdm_status trainer_producer_start(dataset *d, size_t first, int n_threads, producer **out,
                                   sdm_error *err);
 
-/* Allows samples below n_planned: their points are in d->plan. */
+/* Lets the workers compute the samples below n_planned, whose points are in d->plan. */
 void trainer_producer_allow(producer *p, size_t n_planned);
 
 /* Number of finished samples that can be taken now without waiting. */

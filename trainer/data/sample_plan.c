@@ -33,8 +33,8 @@ uint64_t trainer_sample_plan_point(const sample_plan *p, size_t index)
     return p->by_error ? p->point[index] : index;
 }
 
-/* End of the plan: the samples of whole rounds after n_start, up to the round after that of sample
-   n_taken. */
+/* End of the plan: the samples of whole rounds after n_start, up to the round after the one that
+ * holds sample n_taken. */
 static size_t plan_end(const sample_plan *p, size_t n_start, size_t n_taken)
 {
     const size_t rounds = (n_taken - n_start) / SAMPLE_ROUND + 2;

@@ -1,4 +1,4 @@
-/* The sample plan: which point of the Sobol' sequence each random training map has as its
+/* The sample plan: it assigns each random training map a point of the Sobol' sequence as its
    parameters.
 
    Uniform: sample i is point i. Error-driven (data.sampling: error): the sequence is thinned so
@@ -10,8 +10,8 @@
        floor + (1 - floor) min(e / mean of e, cap),   floor = 1/2, cap = 7,
 
    so every region keeps at least half of its uniform density. The plan depends on the observations
-   only, and it is made in rounds, one round ahead of the samples: it is the same for any number of
-   threads. */
+   only, and it is made in rounds, one round ahead of the samples. It is therefore the same for any
+   number of threads. */
 #ifndef SDM_SAMPLE_PLAN_H
 #define SDM_SAMPLE_PLAN_H
 
@@ -21,11 +21,11 @@
 
 #include "sdm/status.h"
 
-/* Samples of a round. At least this many samples beyond the last observed one are always planned.
- */
+/* Number of samples in a round. At least this many samples beyond the last observed one are always
+ * planned. */
 #define SAMPLE_ROUND 32
 
-/* The parameter box that samples are drawn from, and the seed. */
+/* The box of parameters from which samples are drawn, and the seed. */
 typedef struct sample_space {
     size_t n_params;
     const double *min, *max; /* [n_params] */
@@ -34,8 +34,8 @@ typedef struct sample_space {
 
 typedef struct sample_plan {
     bool by_error;
-    size_t n;         /* samples of the run */
-    size_t n_planned; /* samples whose point is fixed; uniform: n */
+    size_t n;         /* number of samples in the run */
+    size_t n_planned; /* samples with a fixed point; uniform: n */
     uint64_t *point;  /* [n], error-driven only */
     /* [n], error-driven only: logarithm of (error / geometric mean error of its round); NaN: not
        observed. */

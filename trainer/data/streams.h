@@ -1,5 +1,5 @@
 /* Streams of the counter-based random numbers: one for each purpose, so that drawing more numbers
-   for one purpose does not change the others. */
+ * for one purpose does not change the others. */
 #ifndef SDM_STREAMS_H
 #define SDM_STREAMS_H
 
@@ -12,7 +12,7 @@ enum {
     STREAM_POINTS = 600,   // voxels of a map that a point network is trained on
     STREAM_EVALUATE = 650, // voxels of a held-out map that a point network is evaluated on
     STREAM_DROPOUT = 700,
-    STREAM_PLAN = 750,  // thinning of the Sobol' sequence (sample_plan.h)
+    STREAM_PLAN = 750,  // rejection of Sobol' points (sample_plan.h)
     STREAM_BASES = 1000 // start of subspace iterations: global modes; block b has 1001 + b
 };
 

@@ -1,4 +1,4 @@
-/* Exact maps, one at a time. */
+/* Computes exact maps, one at a time. */
 #include "workbench.h"
 
 #include <math.h>

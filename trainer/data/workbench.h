@@ -1,5 +1,5 @@
-/* Computes exact maps, one at a time: the memory that a thread needs for it, and the packing to 16
-   bits. */
+/* Computes exact maps, one at a time. A workbench is the memory that one thread needs; maps can be
+ * packed to 16 bits. */
 #ifndef SDM_WORKBENCH_H
 #define SDM_WORKBENCH_H
 
@@ -19,7 +19,7 @@ void trainer_workbench_dispose(workbench *w);
 sdm_status trainer_workbench_map(workbench *w, const dataset *d, const double *p, float *blocked,
                                  sdm_error *err);
 
-/* The same as 16-bit integers: distance = *scale * packed[i], mm. */
+/* As trainer_workbench_map(), but with 16-bit integers: distance = *scale * packed[i], mm. */
 sdm_status trainer_workbench_packed_map(workbench *w, const dataset *d, const double *p,
                                         int16_t *packed, float *scale, sdm_error *err);
 

@@ -37,7 +37,7 @@ static const direct_network *network_of(sdm_network_kind kind)
     return NULL;
 }
 
-/* Map order, [nz][ny][nx]. */
+/* Block edge 0: these kinds store maps in map order, [nz][ny][nx]. */
 static size_t direct_block(const sdm_config *c)
 {
     (void)c;
@@ -67,8 +67,8 @@ static sdm_status direct_begin(trainer *t, sdm_error *err)
     return SDM_OK;
 }
 
-/* Weight update and average; the same bits for any number of threads, since each weight is
-   independent. */
+/* Updates the weights and their average; the bits do not depend on the number of threads, since
+ * each weight is updated independently. */
 static void direct_update(trainer *t, direct_state *d, double rate)
 {
     enum { SLICE = 16384 };
@@ -107,7 +107,7 @@ static sdm_status direct_step(trainer *t, direct_state *d, double rate, sdm_erro
     return SDM_OK;
 }
 
-/* Used part of the budget: of the steps, or of the time before the final evaluation. */
+/* Used fraction of the budget: of the steps, or of the time that precedes the final evaluation. */
 static double direct_fraction(const trainer *t, const direct_state *d)
 {
     if (!trainer_by_time(t)) return trainer_fraction(t);
@@ -147,7 +147,7 @@ static sdm_status direct_run(trainer *t, bool resumed, sdm_error *err)
 
 static parameters *direct_weights(trainer *t) { return &((direct_state *)t->state)->weights; }
 
-/* Checksum of the scales of the maps made before training, and of the first held-out map. */
+/* Checksum over the scales of the maps made before training and over the first held-out map. */
 static uint64_t direct_fingerprint(const trainer *t)
 {
     const dataset *d = &t->data;

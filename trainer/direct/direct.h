@@ -1,5 +1,5 @@
-/* Networks that learn by gradients on the maps themselves, as a kind of network of the trainer:
-   sdmnn, deepsdf and imnet. */
+/* The "direct" kind of network: sdmnn, deepsdf and imnet, which learn by gradients on the maps
+ * themselves. */
 #ifndef SDM_TRAINER_DIRECT_H
 #define SDM_TRAINER_DIRECT_H
 

@@ -8,7 +8,7 @@
 typedef struct direct_batch {
     size_t n;
     const size_t *slots;
-    uint64_t step; /* number of the step in the run: counter of the random numbers */
+    uint64_t step; /* number of the step in the run; selects the random numbers */
 } direct_batch;
 
 typedef struct direct_network {

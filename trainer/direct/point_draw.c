@@ -8,7 +8,8 @@
 
 size_t trainer_point_draw(const sdm_config *c, const dataset *d, size_t slot, uint64_t index)
 {
-    // random numbers per voxel; in the rare case that all are rejected, the last voxel counts
+    // largest number of voxels tried for one draw; if all are rejected, which is rare, the last one
+    // is drawn
     enum { TRIES = 256 };
     const int16_t *map = d->maps + slot * d->n_voxels;
     const double keep = 1 / (1 + c->train.near_weight);

@@ -9,8 +9,8 @@
    [any thread] */
 size_t trainer_point_draw(const sdm_config *c, const dataset *d, size_t slot, uint64_t index);
 
-/* `voxel`, moved back by one along each axis where it is the last one, so that it has a next
-   neighbour along every axis. All grid sizes must be at least 2. */
+/* `voxel`, moved back by one along each axis on which it is the last voxel, so that it has a next
+ * neighbour along every axis. All grid sizes must be at least 2. */
 size_t trainer_point_with_neighbours(const sdm_grid *g, size_t voxel);
 
 #endif

@@ -27,7 +27,7 @@ typedef struct point_trainer {
     float *workspace;
 } point_trainer;
 
-/* The network that the configuration asks for, scaled to the grid and to the maps made so far. */
+/* Sets *a to the configured network, scaled to the grid and to the maps made so far. */
 static void point_design(const trainer *t, sdm_point_arch *a)
 {
     const sdm_config *c = t->config;
@@ -83,7 +83,7 @@ static void point_init(const trainer *t, const void *network, float *w)
     trainer_point_init(&((const point_trainer *)network)->arch, t->config->seed, w);
 }
 
-/* Row i of the input u: the shape at params[P] and the world position of a voxel. */
+/* Sets row i of the input u to the shape parameters params[P] and the world position of a voxel. */
 static void point_set_input(const trainer *t, point_trainer *p, size_t i, const double *params,
                             size_t voxel)
 {
@@ -101,8 +101,8 @@ static void point_set_input(const trainer *t, point_trainer *p, size_t i, const 
     for (int k = 0; k < 3; k++) *u++ = (float)((world[k] - a->centre[k]) / a->radius);
 }
 
-/* Draws points first .. first + n - 1 of the batch, `each` from every map: inputs p->u and exact
-   distances p->target. */
+/* Draws points first .. first + n - 1 of the batch, which has `each` points from every map, and
+ * sets their inputs p->u and exact distances p->target. */
 static void points_gather(const trainer *t, point_trainer *p, const direct_batch *b, size_t each,
                           size_t first, size_t n)
 {

@@ -9,7 +9,7 @@
 #include "sdm/internal/pod.h"
 #include "sdm/internal/rng.h"
 
-enum { SLICE = 32 }; // points that a thread activates at a time
+enum { SLICE = 32 }; // points whose activations a thread computes at a time
 
 void trainer_point_init(const sdm_point_arch *a, uint64_t seed, float *w)
 {

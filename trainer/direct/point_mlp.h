@@ -1,13 +1,13 @@
 /* The perceptron of a point network (sdm/internal/point_network.h) on batches of points: forward
-   and backward pass. B points, other letters and the order of the weights as there. Results do not
-   depend on n_threads. */
+   and backward pass. B is the number of points; that header defines the other letters and the order
+   of the weights. Results do not depend on n_threads. */
 #ifndef SDM_POINT_MLP_H
 #define SDM_POINT_MLP_H
 
 #include "sdm/internal/point_network.h"
 
-/* Random initial weights: normal with variance 2 / K_l (He et al. 2015), in the last layer 0.1 / H;
-   biases 0; counter-based random numbers. */
+/* Random initial weights: normal with variance 2 / K_l (He et al. 2015) for K_l inputs, in the last
+ * layer 0.1 / H for H inputs; biases 0; counter-based random numbers. */
 void trainer_point_init(const sdm_point_arch *a, uint64_t seed, float *w);
 
 /* Floats of workspace for a batch. */

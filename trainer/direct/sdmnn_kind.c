@@ -20,7 +20,7 @@ typedef struct sdmnn_trainer {
     double square; // sum of squared errors, mm^2
 } sdmnn_trainer;
 
-/* Convolutions of oneDNN where the build has it. */
+/* The convolutions of oneDNN if the build has oneDNN, else those of this library. */
 static const sdm_conv_backend *conv_backend(void)
 {
 #ifdef SDM_HAVE_DNNL

@@ -25,13 +25,13 @@ static void add_scaled(size_t n, double f, const double *x, double *y)
 }
 
 /* Reduces the symmetric a to tridiagonal form with Householder reflections: d[n] diagonal, e[n]
-   sub-diagonal (e[0] = 0). a becomes the orthogonal transformation, its columns the basis. work[n]
-   is scratch memory. */
+   sub-diagonal (e[0] = 0). a becomes the orthogonal transformation, whose columns are the new
+   basis. work[n] is scratch memory. */
 static void tridiagonalise(size_t n, double *a, double *d, double *e, double *work)
 {
 #define A(i, j) a[(i)*n + (j)]
     for (size_t i = n - 1; i > 0; i--) {
-        // scaled row i; a zero row needs no reflection
+        // scale row i; a zero row needs no reflection
         double h = 0, scale = 0;
         if (i > 1)
             for (size_t k = 0; k < i; k++) scale += fabs(A(i, k));
@@ -44,7 +44,7 @@ static void tridiagonalise(size_t n, double *a, double *d, double *e, double *wo
             A(i, k) /= scale;
             h += A(i, k) * A(i, k);
         }
-        // Householder vector in row i
+        // store the Householder vector in row i
         const double f0 = A(i, i - 1), g0 = f0 >= 0 ? -sqrt(h) : sqrt(h);
         e[i] = scale * g0;
         h -= f0 * g0;
@@ -309,7 +309,7 @@ sdm_status trainer_leading_eigenvectors(size_t n, const float *c, size_t k, uint
         for (size_t j = 0; j < wide; j++)
             ritz[i * wide + j] = 0.5 * ((double)small[i * wide + j] + small[j * wide + i]);
     if ((s = trainer_eigen_symmetric(wide, ritz, all, err))) goto done;
-    // back to n dimensions: the k leading ones
+    // expand the k leading eigenvectors to n dimensions
     for (size_t i = 0; i < wide * wide; i++) small[i] = (float)ritz[i];
     sdm_gemm(k, n, wide, (sdm_view){small, wide, 1}, (sdm_view){x, n, 1}, false, basis, n, 1);
     memcpy(values, all, k * sizeof *values);

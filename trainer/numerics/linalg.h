@@ -26,8 +26,8 @@ void trainer_cholesky_solve(size_t n, const double *l, size_t columns, double *b
 sdm_status trainer_orthonormalise(size_t k, size_t n, float *x, int n_threads, sdm_error *err);
 
 /* The k leading eigenvectors of the symmetric covariance c[n][n], as orthonormal rows of
-   basis[k][n], with their eigenvalues values[k] in descending order. Subspace iteration from random
-   numbers (seed, stream); Halko, Martinsson and Tropp 2011. One thread. */
+   basis[k][n], with their eigenvalues values[k] in descending order. Method: subspace iteration
+   that starts from random numbers (seed, stream); Halko, Martinsson and Tropp 2011. One thread. */
 sdm_status trainer_leading_eigenvectors(size_t n, const float *c, size_t k, uint64_t seed,
                                         uint64_t stream, float *basis, double *values,
                                         sdm_error *err);

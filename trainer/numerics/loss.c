@@ -46,7 +46,7 @@ double trainer_loss_eikonal(const sdm_config *c, const float f[4], float share, 
         square += g[i] * g[i];
     }
     const double norm = sqrt(square), excess = norm - 1;
-    if (!(norm > 0)) return c->train.eikonal; // gradient 0: no direction in which it could grow
+    if (!(norm > 0)) return c->train.eikonal; // no derivative at norm 0: leave it out
     const double factor = 2 * c->train.eikonal * excess / norm * (double)share;
     for (int i = 0; i < 3; i++) {
         const float s = (float)(factor * g[i] / c->grid.spacing[i]);

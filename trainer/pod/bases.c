@@ -1,6 +1,6 @@
-/* Computes mean map and nested local bases by proper orthogonal decomposition: eigenvectors of the
-   covariance of the voxels of each block; above the lowest level, of the coefficients of its
-   children. */
+/* Computes the mean map and the nested local bases by proper orthogonal decomposition. The basis of
+   a block consists of eigenvectors of a covariance: on the lowest level that of its voxels, above
+   that of its children's coefficients. */
 #include "bases.h"
 
 #include <stdlib.h>
@@ -31,13 +31,13 @@ static int compare_gains(const void *a, const void *b)
 }
 
 /* The bases while they are computed. The gain of a basis function is the variance it explains,
-   divided by the number of weights it costs: its own and those that produce its coefficient.
-   Functions are kept above the same gain on all levels, so that the error is smallest for the total
+   divided by the number of weights it costs: its own and those that produce its coefficient. On all
+   levels the functions above the same gain are kept, so that the error is smallest for the total
    number of weights. */
 typedef struct basis_work {
     pod_state *pod;
     size_t n, *slots; // slots of the n maps used
-    size_t keep;      // most functions of a block of the lowest level
+    size_t keep;      // largest number of functions of a lowest-level block
     float *lowest;    // [n_voxels][keep] eigenvectors on the lowest level, block after block
     double *values;   // [blocks of the lowest level][keep]
     double min_gain;
@@ -54,8 +54,8 @@ static double cost_above(const pod_state *pod, size_t level)
 }
 
 /* vectors[keep][outputs], values[keep] = leading eigenvectors and eigenvalues of the covariance of
-   rows[n][stride], of which the first `outputs` columns count. covariance[outputs][outputs] is
-   scratch memory. */
+   rows[n][stride], of which only the first `outputs` columns are used. covariance[outputs][outputs]
+   is scratch memory. */
 static sdm_status block_eigenvectors(const basis_work *m, size_t block, size_t n, const float *rows,
                                      size_t stride, size_t outputs, size_t keep, float *covariance,
                                      float *vectors, double *values, sdm_error *err)
@@ -69,14 +69,15 @@ static sdm_status block_eigenvectors(const basis_work *m, size_t block, size_t n
 
 static size_t min_size(size_t a, size_t b) { return a < b ? a : b; }
 
-/* Number of functions computed for a block: n maps determine n functions at most. */
+/* Number of functions computed for a block with `outputs` outputs; n maps determine at most n
+ * functions. */
 static size_t n_functions(const basis_work *m, size_t outputs)
 {
     return min_size(m->keep, min_size(outputs, m->n));
 }
 
-/* Mean map and leading eigenvectors of block `index` of the lowest level. rows and covariance are
-   scratch memory. */
+/* Computes the mean map and the leading eigenvectors of block `index` of the lowest level. rows and
+ * covariance are scratch memory. */
 static sdm_status lowest_level_block(basis_work *m, size_t index, float *rows, float *covariance,
                                      sdm_error *err)
 {
@@ -98,8 +99,9 @@ static sdm_status lowest_level_block(basis_work *m, size_t index, float *rows, f
                               m->values + index * m->keep, err);
 }
 
-/* Chooses the ranks of the lowest level: one function in each block, then those with the largest
-   gain, network.rank per block on average. Sets min_gain to the gain of the last one. */
+/* Chooses the ranks of the lowest level: one function in each block, then the functions with the
+   largest gain until the average is network.rank per block. Sets min_gain to the gain of the last
+   one. */
 static sdm_status lowest_level_ranks(basis_work *m, sdm_error *err)
 {
     pod_state *pod = m->pod;
@@ -129,7 +131,7 @@ static sdm_status lowest_level_ranks(basis_work *m, sdm_error *err)
             memcpy(m->basis[b], m->lowest + pod->blocks[b].voxel * m->keep,
                    size * sizeof **m->basis);
     }
-    // free the rest at once: gigabytes on fine grids
+    // free the eigenvectors now: they take gigabytes on fine grids
     sdm_free(m->lowest);
     m->lowest = NULL;
     return s;
@@ -143,8 +145,9 @@ static size_t sum_ranks(const pod_state *pod, size_t first, size_t end)
     return n;
 }
 
-/* Basis of block `index` above the lowest level from below[n][stride], whose first columns are the
-   coefficients of its children. Keeps functions whose gain exceeds min_gain, at least one. */
+/* Computes the basis of block `index`, above the lowest level, from below[n][stride], whose first
+   columns are the coefficients of its children. Keeps functions whose gain exceeds min_gain, at
+   least one. */
 static sdm_status upper_level_block(basis_work *m, size_t level, size_t index, const float *below,
                                     size_t stride, sdm_error *err)
 {
@@ -170,7 +173,7 @@ static sdm_status upper_level_block(basis_work *m, size_t level, size_t index, c
     return s;
 }
 
-/* Bases of all levels above the lowest in the tree below `root`. */
+/* Computes the bases of all levels above the lowest in the tree below `root`. */
 static sdm_status upper_levels_of_tree(basis_work *m, size_t root, sdm_error *err)
 {
     const pod_state *pod = m->pod;
@@ -189,7 +192,8 @@ static sdm_status upper_levels_of_tree(basis_work *m, size_t root, sdm_error *er
                                            below + at, ldb);
         at += k->rank;
     }
-    // level by level: bases from the coefficients below, then the coefficients here
+    // on each level: the bases from the coefficients of the level below, then the coefficients of
+    // this level
     for (size_t level = 1; level < pod->arch.levels.n && !s; level++) {
         size_t child = 0;
         at = 0;
@@ -217,8 +221,8 @@ static sdm_status upper_levels_of_tree(basis_work *m, size_t root, sdm_error *er
     return s;
 }
 
-/* The error with the lowest block number in a parallel loop: the message does not depend on the
-   threads. */
+/* The error with the lowest block number in a parallel loop, so that the message does not depend on
+ * the threads. */
 typedef struct first_error {
     long index;
     sdm_error err;

@@ -1,5 +1,6 @@
 /* Mean map and nested local bases of the `pod` network, by proper orthogonal decomposition in
-   blocks of voxels. Linear algebra on the maps made before training, no optimiser. */
+   blocks of voxels. They are computed from the maps made before training by linear algebra, without
+   an optimiser. */
 #ifndef SDM_TRAINER_BASES_H
 #define SDM_TRAINER_BASES_H
 

@@ -9,8 +9,8 @@
 void trainer_coefficients_block_rows(const pod_state *pod, const sdm_pod_block *b, bool holdout,
                                      const size_t *slots, size_t n, float *rows);
 
-/* One block: to[n][ldt] = from[n][ldf] times the transposed basis[rank][outputs]; `from` holds the
-   block's outputs, `to` receives its coefficients. One thread. */
+/* One block: to[n][ldt] = from[n][ldf] * transpose of basis[rank][outputs]; `from` holds the
+ * block's outputs, `to` receives its coefficients. One thread. */
 void trainer_coefficients_project_block(size_t n, size_t rank, size_t outputs, const float *basis,
                                         const float *from, size_t ldf, float *to, size_t ldt);
 

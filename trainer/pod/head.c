@@ -1,4 +1,4 @@
-/* Latent variables, and the head by least squares. */
+/* Computes latent variables, and solves for the head by least squares. */
 #include "head.h"
 
 #include <string.h>
@@ -44,7 +44,7 @@ static sdm_status all_latent(const pod_state *pod, const float *w, size_t n, flo
     return s;
 }
 
-/* factor[L][L] = Cholesky factor of z^T z, z[n][L]. */
+/* factor[L][L] = Cholesky factor of z^T z, with z[n][L]. */
 static sdm_status head_factorise(const pod_state *pod, size_t n, const float *z, double *factor,
                                  sdm_error *err)
 {
@@ -69,7 +69,7 @@ static sdm_status head_factorise(const pod_state *pod, size_t n, const float *z,
     return s;
 }
 
-/* head[K][L] from the factor and the right-hand sides right[L][K] = z^T y. */
+/* Computes head[K][L] from the factor and the right-hand sides right[L][K] = z^T y. */
 static sdm_status head_substitute(const pod_state *pod, const double *factor, const float *right,
                                   float *head, sdm_error *err)
 {

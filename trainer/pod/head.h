@@ -1,5 +1,5 @@
 /* The head: the linear layer from the latent variables z = [phi, h] to the coefficients of the
-   highest level. */
+ * highest level; phi are products of polynomials, h is the output of the MLP. */
 #ifndef SDM_TRAINER_HEAD_H
 #define SDM_TRAINER_HEAD_H
 

@@ -8,10 +8,10 @@
 #include "sdm/internal/kernels.h"
 #include "sdm/internal/rng.h"
 
-/* Inputs of layer l. */
+/* Number of inputs of layer l. */
 static size_t layer_inputs(const sdm_pod_arch *a, size_t l) { return l ? a->width : a->n_inputs; }
 
-/* First weight of layer l. */
+/* Index of the first weight of layer l. */
 static size_t layer_offset(const sdm_pod_arch *a, size_t l)
 {
     size_t n = 0;

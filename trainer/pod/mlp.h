@@ -5,7 +5,8 @@
 
 #include "sdm/internal/pod.h"
 
-/* Number of weights: for each layer the matrix [W][I or W], then the bias [W]. */
+/* Number of weights. They are stored as, for each layer, the matrix [W][I or W], then the bias
+ * [W]. */
 size_t trainer_mlp_count(const sdm_pod_arch *a);
 
 /* Matrix and bias of layer l within the weights. */
@@ -25,8 +26,8 @@ const float *trainer_mlp_forward(const sdm_pod_arch *a, const float *weights, si
                                  const float *x, float *workspace, int n_threads);
 
 /* gradient[trainer_mlp_count()] = derivative of the loss with respect to the weights, from
-   dh[B][W], that with respect to the last layer's output. Call after trainer_mlp_forward() with the
-   same arguments. */
+   dh[B][W], its derivative with respect to the last layer's output. Call after
+   trainer_mlp_forward() with the same arguments. */
 void trainer_mlp_backward(const sdm_pod_arch *a, const float *weights, size_t batch, const float *x,
                           float *workspace, const float *dh, float *gradient, int n_threads);
 

@@ -1,4 +1,5 @@
-/* Fits the MLP to the mode coefficients. B batch, other letters as in pod_state.h. */
+/* Fits the MLP to the mode coefficients. B is the size of a batch; other letters as in
+ * pod_state.h. */
 #include "mode_fit.h"
 
 #include <math.h>
@@ -16,7 +17,7 @@
 typedef struct mode_batch {
     float *x;         // [B][I]
     float *target;    // [B][R]
-    float *predicted; // [B][R], later the gradient with respect to it
+    float *predicted; // [B][R], later the gradient by it
     float *dh;        // [B][W]
     float *workspace;
     float *gradient; // [n]
@@ -56,8 +57,8 @@ static const float *modes_predict(const pod_state *pod, const float *w, size_t r
     return h;
 }
 
-/* Mean square error (mm^2) on the held-out maps: the error of the mode coefficients plus what the
-   modes cannot represent. */
+/* Mean square error (mm^2) on the held-out maps: the error of the mode coefficients plus the error
+ * that remains with exact mode coefficients. */
 static double modes_evaluate(const pod_state *pod, const float *w, mode_batch *b, size_t batch)
 {
     const size_t n = pod->t->data.n_holdout, r = pod->n_modes, inputs = pod->arch.n_inputs;
@@ -143,8 +144,8 @@ static void mode_fit_step(pod_state *pod, mode_batch *b, size_t batch, double ra
         memcpy(pod->mode_fit.average, pod->mode_fit.w, pod->mode_fit.n * sizeof *pod->mode_fit.w);
 }
 
-/* Used part of the phase's budget: a share 1 - train.refine of the steps, at least one step, or the
-   time until mode_fit_end. */
+/* Used fraction of the phase's budget, which is (1 - train.refine) * (number of steps), at least
+ * one step, or the time until mode_fit_end. */
 static double mode_fit_fraction(const pod_state *pod)
 {
     const trainer *t = pod->t;

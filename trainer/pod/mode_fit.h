@@ -1,6 +1,6 @@
-/* The mode fit: the MLP learns the mode coefficients that the polynomials leave over. Its steps are
-   cheap, since no map is touched; with orthonormal bases the squared error of the coefficients is
-   the squared error of the map. */
+/* The mode fit: the MLP learns the part of the mode coefficients that the polynomials leave over.
+   Its steps are cheap, since no map is touched; with orthonormal bases the squared error of the
+   coefficients is the squared error of the map. */
 #ifndef SDM_TRAINER_MODE_FIT_H
 #define SDM_TRAINER_MODE_FIT_H
 

@@ -1,5 +1,5 @@
 /* Computes the global modes of the local coefficients, fits the mode coefficients by polynomials,
-   and computes what the polynomials leave over: the targets of the MLP. */
+ * and computes the remainder that the polynomials leave over: the targets of the MLP. */
 #include "modes.h"
 
 #include <math.h>
@@ -24,7 +24,7 @@ static void pod_phi(const pod_state *pod, const double *p, float *phi)
     sdm_poly_eval(pod->exponents, pod->n_poly, d->n_params, degree, x, phi, NULL);
 }
 
-/* targets[i] = (c[i] - poly phi[i]) / target_scale for n rows, c[n][R]. */
+/* targets[i] = (c[i] - poly * phi[i]) / target_scale for the n rows of c[n][R]. */
 static sdm_status subtract_polynomials(const pod_state *pod, size_t n, const float *phi,
                                        const float *c, float *const *targets, sdm_error *err)
 {
@@ -41,7 +41,7 @@ static sdm_status subtract_polynomials(const pod_state *pod, size_t n, const flo
     return SDM_OK;
 }
 
-/* c[n][R] = mode coefficients from y[n][K], coefficients of the highest level. */
+/* c[n][R] = mode coefficients, computed from the coefficients y[n][K] of the highest level. */
 static void modes_from_coefficients(const pod_state *pod, size_t n, const float *y, float *c)
 {
     const size_t k = pod->arch.n_coefficients, r = pod->n_modes;
@@ -114,7 +114,8 @@ done:
     return s;
 }
 
-/* Targets of the held-out maps, and the mean square error that bases and modes leave on them. */
+/* Computes the targets of the held-out maps, and the mean square error on these maps that remains
+ * with exact mode coefficients. */
 static sdm_status project_holdout(pod_state *pod, sdm_error *err)
 {
     const size_t h = pod->t->data.n_holdout, k = pod->arch.n_coefficients, r = pod->n_modes;
@@ -140,7 +141,7 @@ static sdm_status project_holdout(pod_state *pod, sdm_error *err)
                     pod->holdout_phi + i * pod->n_poly);
             targets[i] = pod->holdout_target + i * r;
         }
-        // not below 0, which rounding of the difference could give
+        // clamped at 0: rounding could make the difference negative
         pod->holdout_floor = fmax(0, energy / ((double)h * (double)pod->t->data.n_voxels));
         s = subtract_polynomials(pod, h, pod->holdout_phi, c, targets, err);
     }
@@ -175,7 +176,7 @@ sdm_status trainer_modes_make(pod_state *pod, size_t n, sdm_error *err)
     if (!s)
         s = SDM_ALLOC(&pod->holdout_target, pod->t->data.n_holdout * r, "held-out targets", err);
     if (!s) s = trainer_dataset_first_slots(n, &slots, err);
-    // coefficients of the highest level and their size
+    // coefficients of the highest level and their root mean squares
     if (!s) s = trainer_coefficients_project(pod, false, slots, n, y, err);
     for (size_t j = 0; j < k && !s; j++) {
         double sum = 0;

@@ -20,7 +20,7 @@ static size_t pod_block(const sdm_config *c) { return (size_t)c->network.block; 
 
 static size_t pod_levels(const sdm_config *c) { return (size_t)c->network.levels; }
 
-/* The largest degree, at most `degree`, with at most `terms` polynomial terms. */
+/* The largest degree <= `degree` of polynomials with at most `terms` terms. */
 static size_t limit_degree(size_t n_params, size_t degree, size_t terms)
 {
     while (degree > 0 && sdm_poly_count(n_params, degree) > terms) degree--;
@@ -148,7 +148,7 @@ static parameters *pod_weights(trainer *t)
     return t->phase == SDM_PHASE_MODE_FIT ? &pod->mode_fit : &pod->refine;
 }
 
-/* Checksum of ranks, mean map, bases and modes. */
+/* Checksum over ranks, mean map, bases and modes. */
 static uint64_t pod_fingerprint(const trainer *t)
 {
     const pod_state *pod = t->state;

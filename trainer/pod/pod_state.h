@@ -1,5 +1,5 @@
-/* The data of a `pod` network in training. Letters as in sdm/internal/pod.h, and R global modes, N
-   slots of the pool, H held-out maps. Maps are in block order. */
+/* The data of a `pod` network in training. Letters as in sdm/internal/pod.h; in addition R is the
+ * number of global modes, N of slots in the pool, H of held-out maps. Maps are in block order. */
 #ifndef SDM_TRAINER_POD_STATE_H
 #define SDM_TRAINER_POD_STATE_H
 
@@ -19,7 +19,7 @@ typedef struct pod_state {
 
     /* Mean map and local bases, from proper orthogonal decomposition (bases.h). */
     float *mean;       /* [n_voxels] */
-    float *basis;      /* of all blocks of all levels, one after another: [k_b][V_b] */
+    float *basis;      /* [k_b][V_b] of every block of every level in turn */
     size_t *matrix_at; /* [blocks + 1]: block b's matrix is basis[matrix_at[b] ..] */
 
     /* Global modes (modes.h): the coefficients of the highest level are nearly linear combinations
@@ -40,7 +40,7 @@ typedef struct pod_state {
        head[K][L] from head_at, mean[n_voxels] from mean_at, basis from basis_at. */
     parameters mode_fit, refine;
     size_t head_at, mean_at, basis_at;
-    /* With a budget of time: trainer_seconds() at which the mode fit ends. */
+    /* With a budget of time: trainer_seconds() when the mode fit ends. */
     double mode_fit_end;
 } pod_state;
 

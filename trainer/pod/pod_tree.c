@@ -1,4 +1,4 @@
-/* Extents of the trees of blocks. */
+/* Finds the blocks, voxels and coefficients that belong to a tree of blocks. */
 #include "pod_tree.h"
 
 pod_tree trainer_pod_tree(const sdm_pod_levels *levels, const sdm_pod_block *blocks, size_t root)

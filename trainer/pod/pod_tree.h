@@ -1,5 +1,5 @@
 /* A "tree": one block of the highest level with all blocks below it. Trees can be computed
-   independently of each other, so each is the work of one thread. */
+ * independently of each other, so one thread computes one tree. */
 #ifndef SDM_POD_TREE_H
 #define SDM_POD_TREE_H
 
@@ -9,7 +9,7 @@ typedef struct pod_tree {
     /* Blocks of each level: first .. end - 1. */
     size_t first[SDM_POD_MAX_LEVELS], end[SDM_POD_MAX_LEVELS];
     size_t largest; /* voxels of the largest block of the lowest level */
-    size_t voxels;  /* of the whole tree; contiguous in block order */
+    size_t voxels;  /* number of voxels of the tree; contiguous in block order */
 } pod_tree;
 
 /* The tree below block `root` of the highest level. */

@@ -1,5 +1,6 @@
-/* End-to-end training on maps of MLP, head, bases and mean map. The blocks of a tree (pod_tree.h)
-   are computed by one thread. B batch, other letters as in pod_state.h. */
+/* Trains MLP, head, bases and mean map together, end to end, on maps. The blocks of a tree
+   (pod_tree.h) are computed by one thread. B is the size of a batch; other letters as in
+   pod_state.h. */
 #include "refine.h"
 
 #include <math.h>
@@ -17,13 +18,13 @@
 #include "state/new_samples.h"
 #include "state/progress.h"
 
-/* Adam step sizes, relative to the typical size of a weight. Found by trial on the cochlea; within
-   a factor of three of the best. */
+/* Adam step sizes, relative to the typical size of a weight. They were found by trials on the
+ * cochlea, and are within a factor of three of the best values. */
 #define HEAD_STEP 0.05f // times pod->deviation
 #define BASIS_STEP 0.3f // divided by sqrt(outputs of the block)
 #define MEAN_STEP 0.05f // mm
 
-/* Memory of a batch. */
+/* Arrays for one batch. */
 typedef struct refine_batch {
     size_t rows;
     float *x, *z, *dz; // [B][I], [B][L], [B][W]
@@ -63,7 +64,7 @@ static size_t n_trees(const pod_state *pod)
 }
 
 /* Floats of scratch memory for one tree and `rows` maps: predicted voxels, coefficients below the
-   highest level, the gradients of both, and the gradient of the largest basis. */
+ * highest level, the gradients with respect to both, and the gradient of the largest basis. */
 static size_t tree_floats(const pod_state *pod, size_t rows, size_t root)
 {
     const pod_tree tree = trainer_pod_tree(&pod->arch.levels, pod->blocks, root);
@@ -124,8 +125,8 @@ typedef struct tree_work {
     pod_tree tree;
     size_t ld[SDM_POD_MAX_LEVELS]; // row length on each level
     float *c[SDM_POD_MAX_LEVELS];  // [B][ld] coefficients
-    float *dc[SDM_POD_MAX_LEVELS]; // [B][ld] gradients with respect to them
-    float *predicted, *delta;      // [B][voxels] map and gradient with respect to it
+    float *dc[SDM_POD_MAX_LEVELS]; // [B][ld] gradients by the coefficients
+    float *predicted, *delta;      // [B][voxels] map, and gradient with respect to the map
     float *basis_gradient;         // [k_b][V_b] of one block
 } tree_work;
 
@@ -165,7 +166,7 @@ static block_place block_place_of(const pod_state *pod, const tree_work *w, size
                          sdm_pod_outputs(pod->blocks, b)};
 }
 
-/* w->predicted[rows][voxels] from the coefficients of the highest level. */
+/* Computes w->predicted[rows][voxels] from the coefficients of the highest level. */
 static void tree_forward(const pod_state *pod, const float *weights, size_t rows,
                          const tree_work *w)
 {
@@ -185,7 +186,7 @@ static void tree_forward(const pod_state *pod, const float *weights, size_t rows
 }
 
 /* Carries the gradient from w->delta[rows][voxels] up to the coefficients of the highest level, and
-   updates each basis and the mean map on the way. */
+ * updates each basis and the mean map on the way. */
 static void tree_backward(pod_state *pod, size_t rows, const tree_work *w, adam_step adam)
 {
     const size_t first = pod->blocks[w->tree.first[0]].voxel, voxels = w->tree.voxels;
@@ -205,7 +206,7 @@ static void tree_backward(pod_state *pod, size_t rows, const tree_work *w, adam_
             trainer_adam_update(&pod->refine, at, rank * p.outputs, w->basis_gradient, adam,
                                 BASIS_STEP / sqrtf((float)p.outputs));
         }
-    float *mean_gradient = w->predicted; // its memory is free now
+    float *mean_gradient = w->predicted; // re-uses the memory of w->predicted
     memset(mean_gradient, 0, voxels * sizeof *mean_gradient);
     for (size_t r = 0; r < rows; r++)
         for (size_t v = 0; v < voxels; v++) mean_gradient[v] += w->delta[r * voxels + v];
@@ -230,7 +231,7 @@ static void tree_train(pod_state *pod, refine_batch *b, size_t i, adam_step adam
     tree_backward(pod, b->rows, &w, adam);
 }
 
-/* Weight update of the head on the batch. */
+/* Updates the weights of the head from the gradient of the batch. */
 static void head_train(pod_state *pod, refine_batch *b, adam_step adam)
 {
     const sdm_pod_arch *a = &pod->arch;
@@ -262,7 +263,7 @@ static sdm_status refine_step(pod_state *pod, refine_batch *b, double rate, sdm_
                                  b->rows, (uint64_t)pod->t->step, i);
         phi[i] = pod->phi + b->slots[i] * pod->n_poly;
     }
-    // forward pass to the coefficients
+    // forward pass from the parameters to the coefficients of the highest level
     const float *w = pod->refine.w;
     trainer_head_latent(pod, w, b->rows, phi, b->x, b->z, b->workspace);
     sdm_free((void *)phi);
@@ -345,8 +346,8 @@ sdm_status trainer_refine_start(pod_state *pod, bool resumed, sdm_error *err)
     return SDM_OK;
 }
 
-/* Used part of the phase's budget: of the steps that the mode fit has left over (a resumed run may
-   have another budget than before), or of the time until `end` (trainer_seconds()). */
+/* Used fraction of the phase's budget: of the steps that the mode fit left over (a resumed run may
+ * have a different budget), or of the time until trainer_seconds() = `end`. */
 static double refine_fraction(const trainer *t, double end)
 {
     if (!trainer_by_time(t))
@@ -391,7 +392,7 @@ sdm_status trainer_refine_run(pod_state *pod, sdm_error *err)
         if ((s = refine_step(pod, &b, rate, err))) break;
         t->step++, t->phase_step++;
         at = refine_fraction(t, end);
-        // at the end always: the last steps count too
+        // also after the last step, so that the last steps enter the average
         if (t->phase_step % AVERAGE_EVERY == 0 || !(at < 1)) refine_average(pod);
         if (!isfinite(t->loss)) {
             s = sdm_fail(err, SDM_E_CONFIG,

@@ -12,7 +12,7 @@ sdm_status trainer_refine_start(pod_state *pod, bool resumed, sdm_error *err);
 /* Runs phase SDM_PHASE_REFINE to its end; nothing if train.refine is 0. */
 sdm_status trainer_refine_run(pod_state *pod, sdm_error *err);
 
-/* *mse = mean square error (mm^2) of weights w on the held-out maps. */
+/* *mse = mean square error (mm^2) of the network with weights w on the held-out maps. */
 sdm_status trainer_refine_evaluate(const pod_state *pod, const float *w, double *mse,
                                    sdm_error *err);
 

@@ -1,6 +1,6 @@
-/* Checkpoints: what a run needs to continue with the same bits. Maps and bases are computed again
-   from configuration and seed, which gives the same bits; weights, moments, averages, counters, the
-   sample plan and the metrics are stored. */
+/* Checkpoints: the data with which a run continues with the same bits. Maps and bases are computed
+   again from configuration and seed, which gives the same bits; weights, moments, averages,
+   counters, the sample plan and the metrics are stored. */
 #include "checkpoint.h"
 
 #include <errno.h>
@@ -70,7 +70,7 @@ sdm_status trainer_checkpoint_write(trainer *t, sdm_error *err)
                           .bases = t->kind->fingerprint(t)};
     sdm_text config = {0};
     sdm_status s = trainer_export_dump(t, &config, err);
-    // sections; the sample plan only where it depends on observations
+    // sections; the sample plan is stored only if it depends on observations
     const sdm_section sections[] = {
         {"meta", "kind=checkpoint\n", 16},
         {"config", config.data, config.size},
@@ -123,7 +123,7 @@ static const sdm_section *section_find(const checkpoint_file *o, const char *nam
     return NULL;
 }
 
-/* *found: false, without an error, if there is no file. */
+/* Reads the checkpoint file. *found: false, without an error, if there is no file. */
 static sdm_status checkpoint_open(const trainer *t, checkpoint_file *o, bool *found, sdm_error *err)
 {
     char path[SDM_PATH_TEXT_MAX + 32];
@@ -159,7 +159,7 @@ static void config_neutralise(const trainer *t, sdm_config *c)
     const sdm_shape *shape = sdm_instance_shape(t->shape);
     for (size_t i = 0; i < c->shape.n_options; i++)
         for (uint32_t k = 0; k < shape->n_options;
-             // content of data files: a change shows in the fingerprint of the maps
+             // paths only: changed contents change the fingerprint of the maps
              k++)
             if (shape->options[k].type == SDM_OPTION_FILE &&
                 !strcmp(shape->options[k].name, c->shape.options[i].name))
@@ -199,8 +199,8 @@ static sdm_status checkpoint_refuse_line(const trainer *t, const char *old, cons
     return checkpoint_refuse(t, what, err);
 }
 
-/* The budget may change, but not to less than was already trained: the model would not be what its
-   configuration says. */
+/* The budget may change, but not to less than the checkpoint has used: the model would then have
+ * been trained longer than its configuration states. */
 static sdm_status check_budget(const trainer *t, const sdm_config *old, const counters *then,
                                sdm_error *err)
 {
@@ -223,7 +223,8 @@ static sdm_status check_budget(const trainer *t, const sdm_config *old, const co
     return checkpoint_refuse(t, what, err);
 }
 
-/* SDM_E_CONFIG unless both configurations train the same network. Changes both. */
+/* SDM_E_CONFIG unless both configurations train the same network. Both are modified
+ * (config_neutralise()). */
 static sdm_status config_compare(const trainer *t, sdm_config *old, sdm_config *now, sdm_error *err)
 {
     sdm_text a = {0}, b = {0};
@@ -258,8 +259,8 @@ static sdm_status check_config(const trainer *t, const sdm_section *stored, cons
     return s;
 }
 
-/* Restores the sample plan: points and observed errors of the samples so far and of those planned.
-   t->data must have its counters. */
+/* Restores the sample plan: points and observed errors of all samples that are planned. t->data
+ * must have its counters. */
 static sdm_status plan_read(const trainer *t, const checkpoint_file *o, sample_plan *p,
                             sdm_error *err)
 {
@@ -312,7 +313,7 @@ sdm_status trainer_checkpoint_read(trainer *t, bool *found, sdm_error *err)
         t->heldout_mse = then.heldout_mse;
         t->step = then.step;
         t->phase_step = then.phase_step;
-        t->data.n_taken = (size_t)then.n_taken; // wanted: the caller makes these samples again
+        t->data.n_taken = (size_t)then.n_taken; // the caller makes these again
         if (!s) {
             t->data.n_online += t->data.n_start - (size_t)then.n_start;
             t->data.n_start = (size_t)then.n_start;

@@ -18,8 +18,9 @@ sdm_status trainer_checkpoint_if_due(trainer *t, double now, sdm_error *err);
 
 /* First half of reading, before the maps are made: checks the configuration, restores counters,
    times, sample plan and metrics. t->data.n_taken becomes the number of random samples that the
-   caller has to make again. *found: false if there is no checkpoint. SDM_E_CONFIG: it belongs to
-   another configuration or has used more than the budget. SDM_E_FORMAT: damaged. */
+   caller has to make again. *found: false if there is no checkpoint. SDM_E_CONFIG: the
+   checkpoint belongs to another configuration or has used more than the budget. SDM_E_FORMAT: it
+   is damaged. */
 sdm_status trainer_checkpoint_read(trainer *t, bool *found, sdm_error *err);
 
 /* Second half, after train_kind.begin(): restores weights, moments and averages of

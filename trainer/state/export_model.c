@@ -111,8 +111,8 @@ static sdm_status check_texts(const trainer *t, sdm_error *err)
     return SDM_OK;
 }
 
-/* Checksums of the data files: the model stores them, so that the exact engine is never used with
-   other files later. */
+/* Computes checksums of the shape's data files. The model stores them, so that the exact engine
+ * cannot be used with other files later. */
 static void checksum_files(trainer *t)
 {
     const sdm_shape *shape = sdm_instance_shape(t->shape);
@@ -120,7 +120,8 @@ static void checksum_files(trainer *t)
     for (uint32_t i = 0; i < shape->n_options && i < SDM_MAX_OPTIONS; i++)
         if (shape->options[i].type == SDM_OPTION_FILE && values[i].text[0] &&
             sdm_file_checksum(values[i].text, &t->file_sums[i], NULL))
-            // unreadable here is no error: a plug-in may accept a folder, for example
+            // a file that cannot be read is no error here: a plug-in may accept a folder, for
+            // example
             t->file_sums[i] = 0;
 }
 
@@ -219,8 +220,8 @@ sdm_status trainer_export_config(const trainer *t, sdm_outfile **out, sdm_error 
     return s;
 }
 
-/* Fills params[P], *options and *info with what the model file says about shape, grid and training.
-   The pointers in *info refer to the other arguments. */
+/* Fills params[P], *options and *info with the description of shape, grid and training for the
+ * model file. The pointers in *info refer to the other arguments. */
 static void describe_model(const trainer *t, const sdm_text *config, option_texts *options,
                            sdm_model_param *params, sdm_model_info *info)
 {

@@ -23,7 +23,7 @@ struct train_kind {
     /* Trains from phase t->phase to the end. resumed: from the checkpoint; the kind allocates the
        weights of the phase and calls trainer_checkpoint_weights() to fill them. */
     sdm_status (*run)(trainer *t, bool resumed, sdm_error *err);
-    /* The weights that are trained in the current phase. */
+    /* Returns the weights that are trained in the current phase. */
     parameters *(*weights)(trainer *t);
     /* Checksum of everything besides the configuration that the meaning of the weights depends on.
      */

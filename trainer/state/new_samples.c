@@ -22,7 +22,8 @@ size_t trainer_samples_wanted(const trainer *t, double fraction)
     return wanted < (double)all ? (size_t)wanted : all;
 }
 
-/* Takes the next n <= SAMPLE_ROUND samples; slots[n] = where they lie. */
+/* Takes the next n <= SAMPLE_ROUND samples from the producer; slots[n] = their slots in the
+ * pool. */
 static sdm_status samples_take_group(trainer *t, size_t n, size_t *slots, sdm_error *err)
 {
     dataset *d = &t->data;
@@ -32,8 +33,8 @@ static sdm_status samples_take_group(trainer *t, size_t n, size_t *slots, sdm_er
     return t->kind->samples_taken(t, slots, n, err);
 }
 
-/* Error-driven sampling: the error on n new samples, on which the network has not trained yet,
-   steers where the next ones are drawn. */
+/* Error-driven sampling: records the error on n new samples, on which the network has not trained
+ * yet, and plans the next samples accordingly. */
 static sdm_status samples_plan_ahead(trainer *t, const size_t *slots, size_t n, sdm_error *err)
 {
     double error[SAMPLE_ROUND];
@@ -55,7 +56,7 @@ sdm_status trainer_samples_take(trainer *t, size_t wanted, sdm_error *err)
     if (!t->producer) return SDM_OK;
     dataset *d = &t->data;
     const size_t all = d->n_start + d->n_online;
-    // how many the pool shall hold afterwards: whole groups, except at the end
+    // number of random samples in the pool afterwards: whole rounds, except at the end
     size_t until;
     if (trainer_by_time(t)) {
         const size_t ready = trainer_producer_ready(t->producer);

@@ -93,8 +93,8 @@ bool trainer_evaluation_due(const trainer *t, double now)
                               : t->phase_step % 500 == 0;
 }
 
-/* Rewrites the whole file: it is complete at any moment, and a resumed run does not repeat lines.
- */
+/* Rewrites the whole file metrics.jsonl: so it is complete at any moment, and a resumed run does
+ * not repeat lines. */
 static sdm_status metrics_write(const trainer *t, sdm_error *err)
 {
     char path[SDM_PATH_TEXT_MAX + 32];

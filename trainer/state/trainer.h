@@ -1,5 +1,5 @@
-/* The state of a training run that all kinds of networks share. What differs from kind to kind is
-   reached through `kind` (kind.h); a kind keeps its own data behind `state`. */
+/* The state of a training run that all kinds of networks share. The functions that differ between
+ * kinds are called through `kind` (kind.h); a kind keeps its own data behind `state`. */
 #ifndef SDM_TRAINER_H
 #define SDM_TRAINER_H
 
@@ -18,7 +18,7 @@ typedef struct trainer {
     sdm_train_hooks hooks;
     int n_threads;
     const train_kind *kind;
-    void *state; /* of the kind; NULL before train_kind.begin() */
+    void *state; /* data of the kind; NULL before train_kind.begin() */
 
     /* Blocks of all levels (sdm/internal/pod.h). Maps are stored in the order of the blocks of the
        lowest level; a single block means map order. */
@@ -37,7 +37,7 @@ typedef struct trainer {
     double phase_started, last_report, last_checkpoint, last_evaluation;
     double loss, heldout_mse; /* mm^2 */
     struct sdm_text *metrics; /* all lines of metrics.jsonl */
-    sdm_accuracy accuracy;    /* of the finished model */
+    sdm_accuracy accuracy;    /* accuracy of the finished model */
 } trainer;
 
 #endif

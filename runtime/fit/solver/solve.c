@@ -17,9 +17,7 @@ bool sdm_fit_cholesky(size_t n, const double *a, double *factor, double *scale)
             for (size_t k = 0; k < j; k++) sum -= factor[i * n + k] * factor[j * n + k];
             if (i != j)
                 factor[i * n + j] = sum / factor[j * n + j];
-            else if (sum >
-                     8 * (double)n *
-                         DBL_EPSILON) // the pivot (of a unit diagonal) is positive beyond rounding
+            else if (sum > 8 * (double)n * DBL_EPSILON) // positive beyond rounding
                 factor[i * n + i] = sqrt(sum);
             else
                 return false;

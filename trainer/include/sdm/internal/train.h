@@ -11,31 +11,31 @@
 extern "C" {
 #endif
 
-/* Phases of a run, in order. Checkpoints store the number. */
+/* Phases of a run, in order. Checkpoints store these numbers. */
 typedef enum sdm_phase {
     /* Exact maps are computed. */
     SDM_PHASE_DATA = 0,
     /* `pod`: local bases and global modes are computed from the maps. */
     SDM_PHASE_BASES,
-    /* `pod`: the MLP is fitted to the mode coefficients. Other kinds: the whole training. Its name
-       in metrics.jsonl is "fit". */
+    /* `pod`: the MLP is fitted to the mode coefficients. Other kinds: the whole training. The name
+     * of this phase in metrics.jsonl is "fit". */
     SDM_PHASE_MODE_FIT,
     /* `pod`: all weights are trained together on maps. */
     SDM_PHASE_REFINE,
-    /* The finished model is measured on the held-out maps. */
+    /* The errors of the finished model are measured on the held-out maps. */
     SDM_PHASE_EVALUATE
 } sdm_phase;
 
 /* State of a run, passed to the progress callback. */
 typedef struct sdm_progress {
     sdm_phase phase;
-    double fraction; /* used part of the whole budget, 0 .. 1 */
+    double fraction; /* used fraction of the whole budget, 0 .. 1 */
     /* Optimiser steps; exact training maps computed so far. */
     int64_t step, samples;
     double loss; /* training loss, mm^2; NaN before the first step */
     /* Held-out root mean square error at the last evaluation; NaN before the first. */
     double heldout_rmse_mm;
-    /* Maps per second: computed ones in the data phase, trained ones later. */
+    /* Maps per second: in SDM_PHASE_DATA computed maps, later maps used for training. */
     double samples_per_second;
     double seconds, seconds_left;
 } sdm_progress;
@@ -73,7 +73,7 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
 sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape, double *min,
                             double *max, sdm_error *err);
 
-/* Random parameter vector p[n] number `index` of stream `stream`, uniform within [min, max]: Sobol'
+/* p[n] = random parameter vector number `index` of `stream`, uniform within [min, max]: Sobol'
    points (Joe and Kuo 2008) with a random digital shift for n <= 16, independent counter-based
    random numbers for n > 16. Depends on the arguments only. [any thread] */
 void sdm_sample_params(uint64_t seed, uint64_t stream, uint64_t index, const double *min,

@@ -1,7 +1,6 @@
 /* The commands of sdmgen, one file each. A command writes results to stdout and notices to stderr.
  * On failure it returns a status, which determines the exit code, and its message in *err. */
-#ifndef CLI_COMMANDS_H
-#define CLI_COMMANDS_H
+#pragma once
 
 #include "args/options.h"
 
@@ -19,5 +18,3 @@ sdm_status cmd_experiment(const cli_args *args, sdm_error *err);
 sdm_status cmd_phantom(const cli_args *args, sdm_error *err);
 sdm_status cmd_fit(const cli_args *args, sdm_error *err);
 sdm_status cmd_help(const cli_args *args, sdm_error *err);
-
-#endif

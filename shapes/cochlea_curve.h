@@ -2,8 +2,7 @@
    unknowns. The centreline is a rising logarithmic spiral with a longitudinal wave; theta is the
    angle around the z axis, from 0 at the basal end. As an option the radius of the centreline is a
    cubic polynomial of theta up to theta2 (the polynomial start). cochlea.c has the formulas. */
-#ifndef COCHLEA_CURVE_H
-#define COCHLEA_CURVE_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -71,5 +70,3 @@ dual sdm_dual_div(dual a, dual b);
 dual sdm_dual_scale(double s, dual a);
 /* f(a), given the value f and the derivative df at a.v. */
 dual sdm_dual_apply(dual a, double f, double df);
-
-#endif

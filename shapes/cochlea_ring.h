@@ -1,6 +1,5 @@
 /* Rings of vertices around the centreline of the cochlea. */
-#ifndef COCHLEA_RING_H
-#define COCHLEA_RING_H
+#pragma once
 
 #include <stddef.h>
 
@@ -23,5 +22,3 @@ typedef void cochlea_put(void *user, size_t vertex, const dual at[3]);
 void sdm_cochlea_ring_at(const cochlea_model *m, const double *x, const cochlea_ring *r,
                          size_t n_sectors, const double *direction, bool left, size_t first,
                          cochlea_put *put, void *user);
-
-#endif

@@ -1,6 +1,5 @@
 /* Mesh topology of bodies of revolution and similar shapes: a pole, rings of vertices, a pole. */
-#ifndef LATHE_H
-#define LATHE_H
+#pragma once
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -24,5 +23,3 @@ void sdm_lathe_triangles(size_t n_rings, size_t n_sectors, bool mirrored, uint32
 
 /* length / edge rounded to a whole number of pieces, at least `least`. */
 size_t sdm_lathe_pieces(double length, double edge, size_t least);
-
-#endif

@@ -1,7 +1,6 @@
 /* Help texts, made from the tables of commands and options. Each function appends to *out; a failed
  * allocation sets out->failed. */
-#ifndef CLI_HELP_H
-#define CLI_HELP_H
+#pragma once
 
 #include "options.h"
 
@@ -10,5 +9,3 @@ void cli_help_command(const cli_command *c, sdm_text *out); /* text of sdmgen CO
 void cli_help_man(sdm_text *out);                           /* the manual page, in man(7) */
 void cli_help_completion(sdm_text *out);                    /* the bash completion script */
 void cli_help_markdown(sdm_text *out);                      /* reference in docs/command-line.md */
-
-#endif

@@ -1,7 +1,6 @@
 /* The tables of commands and options, and the parsed command line. Parsing, --help, the manual
  * page and the bash completion are all made from these tables. */
-#ifndef CLI_OPTIONS_H
-#define CLI_OPTIONS_H
+#pragma once
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -172,5 +171,3 @@ const cli_command *cli_find_command(const char *name, sdm_error *err);
 
 /* True when `command` (an index into cli_commands) has the option. */
 bool cli_option_fits(const cli_option *option, size_t command);
-
-#endif

@@ -1,6 +1,5 @@
 /* The state of a fit of a shape to an image, labels or points, and the steps of `sdmgen fit`. */
-#ifndef CLI_FIT_H
-#define CLI_FIT_H
+#pragma once
 
 #include "args/options.h"
 #include "sdm/fit.h"
@@ -119,5 +118,3 @@ void cli_fit_print(const cli_fit *f);
 void cli_fit_json(const cli_fit *f, sdm_json *json);
 
 void cli_fit_dispose(cli_fit *f);
-
-#endif

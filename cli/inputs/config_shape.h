@@ -1,7 +1,6 @@
 /* Reads the configuration of a training with overrides from the command line, and creates
  * its shape. */
-#ifndef CLI_CONFIG_SHAPE_H
-#define CLI_CONFIG_SHAPE_H
+#pragma once
 
 #include "args/options.h"
 #include "sdm/internal/config.h"
@@ -17,5 +16,3 @@ sdm_status cli_read_config(const cli_args *args, sdm_config **out, sdm_error *er
  * the configuration elsewhere names the same files. SDM_E_CONFIG with the place in the file. */
 sdm_status cli_config_shape(sdm_config *c, const sdm_registry *r, sdm_instance **out,
                             sdm_error *err);
-
-#endif

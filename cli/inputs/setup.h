@@ -1,7 +1,6 @@
 /* Opens the inputs of the command line: shapes with their options and parameters, models, tables of
  * parameters, grids and mesh files. */
-#ifndef CLI_SETUP_H
-#define CLI_SETUP_H
+#pragma once
 
 #include "args/options.h"
 #include "sdm/model.h"
@@ -74,5 +73,3 @@ sdm_status cli_grid_for_box(const cli_args *args, const double min[3], const dou
 /* As sdm_mesh_read(), but returns SDM_E_FORMAT instead of SDM_E_UNSUPPORTED for an unknown type of
  * file. */
 sdm_status cli_read_mesh(const char *path, sdm_mesh *out, sdm_error *err);
-
-#endif

@@ -1,6 +1,5 @@
 /* A phantom: a CT-like test image of a shape, made by `sdmgen phantom`. */
-#ifndef CLI_PHANTOM_H
-#define CLI_PHANTOM_H
+#pragma once
 
 #include "inputs/setup.h"
 #include "sdm/phantom.h"
@@ -22,5 +21,3 @@ sdm_status cli_phantom_setup(cli_phantom *p, sdm_error *err);
 
 /* Adds the truth as one JSON object; inside: the number of voxels with label 1. */
 void cli_phantom_truth(const cli_phantom *p, size_t inside, sdm_json *json);
-
-#endif

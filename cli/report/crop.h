@@ -1,6 +1,5 @@
 /* Blocks of voxels: a box of a grid, for cropping maps and images. */
-#ifndef CLI_CROP_H
-#define CLI_CROP_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -31,5 +30,3 @@ sdm_grid cli_block_grid(const sdm_grid *g, const cli_block *b);
 
 /* out[n[2]][n[1]][n[0]] = the values of the block in values[g->n[2]][g->n[1]][g->n[0]]. */
 void cli_block_copy(const sdm_grid *g, const float *values, const cli_block *b, float *out);
-
-#endif

@@ -1,7 +1,6 @@
 /* Arrays that `sdmgen exact` writes beside the distances (layers): --closest, --normal,
  * --triangle, and the derivatives by the parameters, --jacobian. */
-#ifndef CLI_EXACT_LAYERS_H
-#define CLI_EXACT_LAYERS_H
+#pragma once
 
 #include "args/options.h"
 #include "sdm/exact.h"
@@ -37,5 +36,3 @@ sdm_status cli_layers_map(cli_layers *l, const cli_args *args, const sdm_exact *
 sdm_status cli_layers_write(const cli_layers *l, const cli_args *args, const sdm_grid *grid,
                             sdm_error *err);
 void cli_layers_dispose(cli_layers *l);
-
-#endif

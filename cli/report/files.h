@@ -1,6 +1,5 @@
 /* File names on the command line: their endings, and checks that outputs can be written. */
-#ifndef CLI_FILES_H
-#define CLI_FILES_H
+#pragma once
 
 #include "args/options.h"
 
@@ -19,5 +18,3 @@ bool cli_ends_with_any(const char *path, const char *endings);
  * an input or another output, also under a different name or through a link. outputs NULL: all
  * outputs of the command line. SDM_E_ARG, SDM_E_IO. */
 sdm_status cli_check_files(const cli_args *args, const cli_list *outputs, sdm_error *err);
-
-#endif

@@ -1,7 +1,6 @@
 /* Names of the files that `sdmgen generate` writes for each row of parameters: the outputs,
  * --gradient and --jacobian. */
-#ifndef CLI_GENERATE_FILES_H
-#define CLI_GENERATE_FILES_H
+#pragma once
 
 #include "args/options.h"
 
@@ -20,5 +19,3 @@ void cli_row_files_dispose(cli_row_files *f);
 /* Before any work: checks the types of the files, and that the files of row `last` can be written.
  * SDM_E_ARG, SDM_E_IO. */
 sdm_status cli_row_files_check(const cli_args *args, size_t last, sdm_error *err);
-
-#endif

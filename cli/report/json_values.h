@@ -1,6 +1,5 @@
 /* JSON members that several commands print alike: vectors, parameters, grids; and JSON files. */
-#ifndef CLI_JSON_VALUES_H
-#define CLI_JSON_VALUES_H
+#pragma once
 
 #include "sdm/grid.h"
 #include "sdm/internal/text.h"
@@ -20,5 +19,3 @@ void cli_json_grid(sdm_json *json, const char *key, const sdm_grid *g, bool with
 /* Writes the finished text and a line feed to the file `path`. SDM_E_NOMEM when the text is
  * incomplete, SDM_E_IO. */
 sdm_status cli_json_write(const sdm_json *json, const char *path, sdm_error *err);
-
-#endif

@@ -1,6 +1,5 @@
 /* Writes a distance map to a file; the ending of the file name selects the type. */
-#ifndef CLI_OUTPUT_H
-#define CLI_OUTPUT_H
+#pragma once
 
 #include "args/options.h"
 #include "sdm/grid.h"
@@ -35,5 +34,3 @@ sdm_status cli_write_map(const char *path, const cli_map *map, const cli_args *a
 /* buf[size] = path with `row` in place of its %d (or %4d, %04d); without one, "-0001" is inserted
  * before the ending. SDM_E_ARG: the name is too long. */
 sdm_status cli_number_path(const char *path, size_t row, char *buf, size_t size, sdm_error *err);
-
-#endif

@@ -1,7 +1,6 @@
 /* Progress on stderr: on a terminal a bar that is redrawn in place, elsewhere a plain line every
  * ten seconds. */
-#ifndef CLI_PROGRESS_H
-#define CLI_PROGRESS_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -20,5 +19,3 @@ void cli_progress_show(cli_progress *p, const char *title, double fraction, cons
 
 /* Removes the bar before other output. */
 void cli_progress_clear(cli_progress *p);
-
-#endif

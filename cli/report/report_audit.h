@@ -1,6 +1,5 @@
 /* Prints a mesh audit as text, as JSON and as notices. */
-#ifndef CLI_REPORT_AUDIT_H
-#define CLI_REPORT_AUDIT_H
+#pragma once
 
 #include "sdm/internal/text.h"
 #include "sdm/mesh.h"
@@ -14,5 +13,3 @@ void cli_json_audit(sdm_json *json, const sdm_audit *a);
 /* Prints a notice for each defect that affects an exact map: boundary, non-manifold or misoriented
  * edges, degenerate or duplicate triangles. */
 void cli_notice_audit(const sdm_audit *a);
-
-#endif

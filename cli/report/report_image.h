@@ -1,6 +1,5 @@
 /* Prints the content of an image file as text and as JSON. */
-#ifndef CLI_REPORT_IMAGE_H
-#define CLI_REPORT_IMAGE_H
+#pragma once
 
 #include "sdm/internal/text.h"
 #include "sdm/volume.h"
@@ -10,5 +9,3 @@ void cli_print_volume(const char *path, const sdm_volume *v);
 
 /* Adds the same figures, and the direction matrix, as members of the open object. */
 void cli_json_volume(sdm_json *j, const char *path, const sdm_volume *v);
-
-#endif

@@ -1,6 +1,5 @@
 /* Messages, exit codes, interrupts and the processor clock, shared by all commands. */
-#ifndef CLI_TERMINAL_H
-#define CLI_TERMINAL_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -60,5 +59,3 @@ double cli_thread_clock(void);
 
 /* Writes n into buf with commas between groups of three digits; returns buf. */
 const char *cli_format_count(int64_t n, char buf[32]);
-
-#endif

@@ -1,7 +1,6 @@
 /* Benchmarks: `sdmgen bench exact` measures all ways to make the distance map of one mesh on one
  * grid, `sdmgen bench network` the maps and derivatives of a model. */
-#ifndef CLI_BENCH_H
-#define CLI_BENCH_H
+#pragma once
 
 #include "args/options.h"
 #include "sdm/exact.h"
@@ -99,5 +98,3 @@ void cli_bench_json(sdm_json *j, const cli_bench_case *c, const cli_bench_rows *
  * meshes, and the time per voxel or triangle. */
 void cli_bench_print_growth(const cli_bench_case *cases, const cli_bench_rows *rows, size_t n_grids,
                             size_t n_meshes);
-
-#endif

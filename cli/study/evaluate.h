@@ -1,7 +1,6 @@
 /* Measures networks and other methods against the exact engine on random shapes that no
  * training used. */
-#ifndef CLI_EVALUATE_H
-#define CLI_EVALUATE_H
+#pragma once
 
 #include "report/progress_bar.h"
 #include "sdm/internal/config.h"
@@ -110,5 +109,3 @@ double cli_median(double *v, size_t n);
 
 /* The smallest of v[n]. */
 double cli_minimum(double *v, size_t n);
-
-#endif

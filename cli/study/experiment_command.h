@@ -1,6 +1,5 @@
 /* Experiments: each row of the table is a method that is trained or loaded, measured and drawn. */
-#ifndef CLI_EXPERIMENT_H
-#define CLI_EXPERIMENT_H
+#pragma once
 
 #include "args/options.h"
 #include "evaluate.h"
@@ -117,5 +116,3 @@ void cli_experiment_log_start(const cli_experiment_run *run);
 
 /* buf[size] = "NAME OF THE PROCESSOR, 2 cores, Linux x86_64". */
 void cli_experiment_describe_machine(char *buf, size_t size);
-
-#endif

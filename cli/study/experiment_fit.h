@@ -1,6 +1,5 @@
 /* Rows of an experiment that fit shapes to test images with known truth (phantoms). */
-#ifndef CLI_EXPERIMENT_FIT_H
-#define CLI_EXPERIMENT_FIT_H
+#pragma once
 
 #include "experiment_fits.h"
 
@@ -11,5 +10,3 @@ sdm_status cli_experiment_fit_row(const cli_experiment_run *run, cli_experiment_
 
 /* NULL is allowed. */
 void cli_experiment_fits_free(cli_experiment_fits *f);
-
-#endif

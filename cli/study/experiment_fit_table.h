@@ -1,6 +1,5 @@
 /* Tables and JSON of the fits of an experiment. */
-#ifndef CLI_EXPERIMENT_FIT_TABLE_H
-#define CLI_EXPERIMENT_FIT_TABLE_H
+#pragma once
 
 #include "experiment_fits.h"
 
@@ -25,5 +24,3 @@ void cli_experiment_fit_markdown(const cli_experiment_run *run, sdm_text *t);
 void cli_experiment_fit_json(const cli_experiment_run *run, const cli_experiment_result *r,
                              sdm_json *j);
 sdm_status cli_experiment_fit_write(const cli_experiment_run *run, sdm_error *err);
-
-#endif

@@ -1,6 +1,5 @@
 /* The fits of one row of an experiment. */
-#ifndef CLI_EXPERIMENT_FITS_H
-#define CLI_EXPERIMENT_FITS_H
+#pragma once
 
 #include "experiment_command.h"
 
@@ -18,5 +17,3 @@ struct cli_experiment_fits {
     char name[SDM_MAX_PARAMS][SDM_NAME_MAX], unit[SDM_MAX_PARAMS][16];
     cli_experiment_fit *fit; /* [n] */
 };
-
-#endif

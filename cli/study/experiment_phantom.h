@@ -1,6 +1,5 @@
 /* Phantoms: the test images of an experiment. */
-#ifndef CLI_EXPERIMENT_PHANTOM_H
-#define CLI_EXPERIMENT_PHANTOM_H
+#pragma once
 
 #include "experiment_command.h"
 #include "sdm/pose.h"
@@ -20,5 +19,3 @@ typedef struct cli_experiment_phantom {
 sdm_status cli_experiment_phantom_make(const cli_experiment_run *run, const cli_experiment_job *job,
                                        size_t index, cli_experiment_phantom *out, sdm_error *err);
 void cli_experiment_phantom_dispose(cli_experiment_phantom *p);
-
-#endif

@@ -1,6 +1,5 @@
 /* Functions shared by training configurations and experiments. */
-#ifndef SDM_CONFIG_PARSE_H
-#define SDM_CONFIG_PARSE_H
+#pragma once
 
 #include "fields.h"
 
@@ -21,5 +20,3 @@ void sdm_bare_name(const char *file, const char *none, char out[256]);
 
 /* Appends a table of every key of sections[n]: name, type, range, default, unit, meaning. */
 void sdm_fields_describe(const sdm_section *sections, size_t n, bool markdown, sdm_text *out);
-
-#endif

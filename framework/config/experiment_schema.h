@@ -1,7 +1,6 @@
 /* The field tables (fields.h) of an experiment's configuration, and the rules that involve several
  * of its keys. */
-#ifndef SDM_EXPERIMENT_SCHEMA_H
-#define SDM_EXPERIMENT_SCHEMA_H
+#pragma once
 
 #include "fields.h"
 #include "sdm/internal/experiment.h"
@@ -15,5 +14,3 @@ bool sdm_experiment_is_training_key(const char *key, size_t length);
 /* Call after the file and all overrides: makes the rows, and records missing keys, names that occur
  * twice and references to rows or methods that do not exist. SDM_E_NOMEM. */
 sdm_status sdm_experiment_finish(sdm_experiment *e, sdm_reader *r, sdm_error *err);
-
-#endif

@@ -1,7 +1,6 @@
 /* Field tables: each row belongs to one key and defines how the value of the key is parsed and
  * written, its bounds, its default and its description. */
-#ifndef SDM_FIELDS_H
-#define SDM_FIELDS_H
+#pragma once
 
 #include "yaml_tree.h"
 
@@ -109,5 +108,3 @@ void sdm_dump_text(const char *text, sdm_text *out);
 
 /* buf = name number `index`, from 0, of the list "a|b|c"; false if the index is too large. */
 bool sdm_choice_name(const char *choices, int index, char buf[SDM_NAME_MAX]);
-
-#endif

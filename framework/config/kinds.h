@@ -1,6 +1,5 @@
 /* Keys and defaults that depend on network.kind. */
-#ifndef SDM_KINDS_H
-#define SDM_KINDS_H
+#pragma once
 
 #include "fields.h"
 
@@ -19,5 +18,3 @@ const char *sdm_kind_defaults(const sdm_field *f, char *buf, size_t size);
  * the kind, keys of the file that no longer fit are ignored. `place`: position at which mistakes in
  * keys that are not given are reported. */
 void sdm_kinds_settle(sdm_reader *r, sdm_mark place);
-
-#endif

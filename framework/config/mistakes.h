@@ -1,7 +1,6 @@
 /* The mistakes found in a configuration. The first SDM_MISTAKES_SHOWN by position are kept, the
  * others only counted. */
-#ifndef SDM_MISTAKES_H
-#define SDM_MISTAKES_H
+#pragma once
 
 #include "sdm/internal/config.h"
 
@@ -34,5 +33,3 @@ const char *sdm_mark_print(sdm_mark mark, const char *file, char *buf, size_t si
 /* buf = `text` for use in a message: control characters become '?', and the text is cut after 60
  * bytes. Returns buf. */
 const char *sdm_quote(const char *text, char buf[SDM_QUOTE_MAX]);
-
-#endif

@@ -1,6 +1,5 @@
 /* Lists of key=value texts with their positions, made from a YAML tree. */
-#ifndef SDM_OVERRIDES_H
-#define SDM_OVERRIDES_H
+#pragma once
 
 #include "sdm/internal/experiment.h"
 #include "yaml_tree.h"
@@ -15,5 +14,3 @@ bool sdm_overrides_add_tree(sdm_overrides *o, const char *prefix, const sdm_tree
 sdm_status sdm_overrides_add(sdm_overrides *o, const char *text, sdm_mark mark, sdm_error *err);
 
 void sdm_overrides_dispose(sdm_overrides *o);
-
-#endif

@@ -1,7 +1,6 @@
 /* The field tables (fields.h) of a training configuration, and the rules that involve several
  * keys. */
-#ifndef SDM_SCHEMA_H
-#define SDM_SCHEMA_H
+#pragma once
 
 #include "fields.h"
 
@@ -17,5 +16,3 @@ void sdm_config_settle_override(sdm_reader *r, int override);
  * computes values that depend on several keys. `top`: position for mistakes without a better one.
  */
 void sdm_config_finish(sdm_reader *r, sdm_mark top);
-
-#endif

@@ -1,8 +1,7 @@
 /* Functions that read and write the keys of type SDM_FIELD_SPECIAL of a training configuration. The
  * signatures are those of sdm_field.read and sdm_field.dump; NAME in sdm_read_key_NAME() and
  * sdm_dump_key_NAME() is the key. */
-#ifndef SDM_SPECIAL_H
-#define SDM_SPECIAL_H
+#pragma once
 
 #include "fields.h"
 
@@ -27,5 +26,3 @@ void sdm_dump_key_origin(const sdm_config *c, sdm_text *out);
 void sdm_dump_key_options(const sdm_config *c, sdm_text *out);
 void sdm_dump_key_ranges(const sdm_config *c, sdm_text *out);
 void sdm_dump_key_static(const sdm_config *c, sdm_text *out);
-
-#endif

@@ -1,7 +1,6 @@
 /* A YAML document as a tree of nodes with their positions (marks). Only a subset of YAML is
  * allowed: one document without tags, anchors, aliases and directives. */
-#ifndef SDM_YAML_TREE_H
-#define SDM_YAML_TREE_H
+#pragma once
 
 #include "mistakes.h"
 
@@ -58,5 +57,3 @@ bool sdm_tree_is_empty(const sdm_tree_node *node);
 /* Offset of the first byte of text[size] that is not printable UTF-8 (tabs and line breaks are not
  * printable); `size` if all bytes are printable. */
 size_t sdm_tree_printable(const char *text, size_t size);
-
-#endif

@@ -1,6 +1,5 @@
 /* One-time initialisation by the first thread that needs it (pthread_once). */
-#ifndef SDM_CORE_ONCE_H
-#define SDM_CORE_ONCE_H
+#pragma once
 
 #if defined(__wasi__) && !defined(_REENTRANT)
 /* WebAssembly without threads: its C library has no pthread.h. */
@@ -20,6 +19,4 @@ static inline void sdm_once_run(sdm_once *once, void (*work)(void))
 {
     (void)pthread_once(once, work);
 }
-#endif
-
 #endif

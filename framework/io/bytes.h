@@ -1,7 +1,6 @@
 /* Reads numbers from the bytes of a file in either byte order, and writes them in little endian,
    whatever the byte order of the machine; tests the endings of file names. */
-#ifndef SDM_IO_BYTES_H
-#define SDM_IO_BYTES_H
+#pragma once
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -66,5 +65,3 @@ static inline bool sdm_has_ext(const char *path, const char *ext)
     }
     return true;
 }
-
-#endif

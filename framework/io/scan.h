@@ -1,7 +1,6 @@
 /* Splits the text of a file into lines and words, in place, and counts lines for messages. Used by
    the mesh readers, and by the image readers in libsdmgen_image: hence the exported functions. */
-#ifndef SDM_IO_SCAN_H
-#define SDM_IO_SCAN_H
+#pragma once
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -53,5 +52,3 @@ SDM_INTERNAL_API sdm_status sdm_scan_reals(const sdm_scan *scan, char **line, do
  * SDM_E_FORMAT. */
 SDM_INTERNAL_API sdm_status sdm_scan_count(const sdm_scan *scan, char **line, int64_t limit,
                                            const char *what, int64_t *out, sdm_error *err);
-
-#endif

@@ -1,6 +1,5 @@
 /* Reads an image file from front to back, with or without decompression. */
-#ifndef SDM_IO_STREAM_H
-#define SDM_IO_STREAM_H
+#pragma once
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -63,5 +62,3 @@ sdm_status sdm_stream_expect(const sdm_stream *in, uint64_t size, sdm_error *err
 
 /* SDM_E_FORMAT unless all data have been read and the checksum of compressed data is right. */
 sdm_status sdm_stream_end(sdm_stream *in, sdm_error *err);
-
-#endif

@@ -1,6 +1,5 @@
 /* Declarations shared by the source files of this folder. */
-#ifndef SHAPE_INTERNAL_H
-#define SHAPE_INTERNAL_H
+#pragma once
 
 #include "sdm/mesh.h"
 #include "sdm/registry.h"
@@ -68,5 +67,3 @@ struct sdm_instance {
  * `status`. */
 sdm_status sdm_instance_fail_at(const sdm_instance *s, const double *p, sdm_status status,
                                 sdm_error *err);
-
-#endif

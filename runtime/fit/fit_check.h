@@ -1,6 +1,5 @@
 /* Checks of the arguments of sdm_fit(), before anything is computed. */
-#ifndef FIT_CHECK_H
-#define FIT_CHECK_H
+#pragma once
 
 #include "sdm/fit.h"
 
@@ -16,5 +15,3 @@ void sdm_fit_bounds(const sdm_fit_source *source, size_t k, double *low, double 
 /* Checks target and options. SDM_E_ARG: one of them is invalid; SDM_E_FORMAT: values that an image,
  * label map or point list must not have; SDM_E_QUALITY: the image is constant. */
 sdm_status sdm_fit_check(const sdm_fit_target *target, const sdm_fit_opts *opts, sdm_error *err);
-
-#endif

@@ -1,6 +1,5 @@
 /* Checks the maps that a network has computed, by exact distances. */
-#ifndef SDM_RUNTIME_CHECK_RESULTS_H
-#define SDM_RUNTIME_CHECK_RESULTS_H
+#pragma once
 
 #include "sdm/runtime.h"
 
@@ -17,5 +16,3 @@ static inline bool sdm_wants_check(const sdm_generate_opts *o)
 sdm_status sdm_check_results(const sdm_model *m, const double *used, size_t n,
                              const sdm_generate_opts *o, float *values, sdm_result *results,
                              sdm_error *err);
-
-#endif

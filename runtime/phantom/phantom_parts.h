@@ -1,6 +1,5 @@
 /* The parts of a phantom: filters, random fields, air cells, tissue shares. */
-#ifndef SDM_PHANTOM_PARTS_H
-#define SDM_PHANTOM_PARTS_H
+#pragma once
 
 #include "sdm/exact.h"
 #include "sdm/phantom.h"
@@ -83,5 +82,3 @@ sdm_status phantom_shares(const sdm_exact *engine, const sdm_pose *pose, const s
 
 /* The grid in coordinates of the shape: its origin and axes after the inverse of `pose`. */
 sdm_grid phantom_shape_grid(const sdm_grid *grid, const sdm_pose *pose);
-
-#endif

@@ -1,7 +1,6 @@
 /* Turns a map into the values of a narrow-band level set: checks, padding, closing at the border of
    the grid. Internal to the level set library. */
-#ifndef SDM_BAND_H
-#define SDM_BAND_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -39,5 +38,4 @@ void sdm_band_dispose(sdm_band *b);
 
 #ifdef __cplusplus
 }
-#endif
 #endif

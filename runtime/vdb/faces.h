@@ -1,7 +1,6 @@
 /* Distances outside the grid of a map, computed from the distances d at the faces of the box that
    its voxels fill. Internal to the level set library. */
-#ifndef SDM_FACES_H
-#define SDM_FACES_H
+#pragma once
 
 #include "sdm/grid.h"
 
@@ -42,5 +41,4 @@ double sdm_faces_distance(sdm_faces *f, const int64_t p[3], double max);
 
 #ifdef __cplusplus
 }
-#endif
 #endif

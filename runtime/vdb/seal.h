@@ -1,8 +1,7 @@
 /* The seal is a checksum of the whole file, appended to a level set file. Readers of OpenVDB files
    stop before the seal. A wrong bit anywhere is found before any part of the file is parsed.
    Internal to the level set library. */
-#ifndef SDM_SEAL_H
-#define SDM_SEAL_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -26,5 +25,4 @@ sdm_status sdm_seal_check(const char *path, bool *sealed, sdm_error *err);
 
 #ifdef __cplusplus
 }
-#endif
 #endif

@@ -1,7 +1,6 @@
 /* What the C++ files of the level set library share. Only these files use OpenVDB; no exception
    leaves the library. */
-#ifndef VDB_PARTS_H
-#define VDB_PARTS_H
+#pragma once
 
 #include <openvdb/openvdb.h>
 
@@ -68,5 +67,3 @@ void check_level_set(const Grid &grid, const char *path, sdm_status status, sdm_
 } // namespace vdb_parts
 
 #pragma GCC visibility pop
-
-#endif

@@ -2,8 +2,7 @@
    shapes in a replay pool that worker threads refill during training (producer.h), and held-out
    random shapes for the evaluation. A "slot" is a place for one map in the pool. Which sample lies
    in which slot after n samples depends on n only. */
-#ifndef SDM_DATASET_H
-#define SDM_DATASET_H
+#pragma once
 
 #include "sample_plan.h"
 #include "sdm/internal/pod.h"
@@ -57,5 +56,3 @@ sdm_status trainer_dataset_first_slots(size_t n, size_t **slots, sdm_error *err)
    first share * batch rows come from the static grid, the others from the random maps. */
 size_t trainer_dataset_draw(const dataset *d, uint64_t stream, double share, size_t batch,
                             uint64_t step, size_t i);
-
-#endif

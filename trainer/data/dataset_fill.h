@@ -1,6 +1,5 @@
 /* Computes the maps that are needed before training: held-out, static grid, first random ones. */
-#ifndef SDM_DATASET_FILL_H
-#define SDM_DATASET_FILL_H
+#pragma once
 
 #include "dataset.h"
 
@@ -19,5 +18,3 @@ typedef struct fill_hooks {
 /* Makes all maps needed before training: held-out, static, start. shape, grid, blocks, n_blocks,
    min, max and seed must be set. */
 sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_error *err);
-
-#endif

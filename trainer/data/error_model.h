@@ -1,8 +1,7 @@
 /* Regression of the network's error over the shape parameters: a polynomial for the logarithm of
    the error (products of Legendre polynomials of bounded total degree, sdm/internal/pod.h), fitted
    by least squares. Its degree is the highest one with at least four observations per term. */
-#ifndef SDM_ERROR_MODEL_H
-#define SDM_ERROR_MODEL_H
+#pragma once
 
 #include <stddef.h>
 #include <stdint.h>
@@ -26,5 +25,3 @@ sdm_status trainer_error_model_fit(error_model *m, size_t n_params, size_t n, co
 /* Predicted logarithm of the error at x[n_params]. */
 double trainer_error_model_at(const error_model *m, const double *x);
 void trainer_error_model_dispose(error_model *m);
-
-#endif

@@ -1,6 +1,5 @@
 /* Worker threads that compute random training maps in the background while the caller trains. */
-#ifndef SDM_PRODUCER_H
-#define SDM_PRODUCER_H
+#pragma once
 
 #include "dataset.h"
 
@@ -24,5 +23,3 @@ sdm_status trainer_producer_take(producer *p, size_t until, sdm_error *err);
 
 /* Stops the workers and frees the producer; NULL does nothing. */
 void trainer_producer_stop(producer *p);
-
-#endif

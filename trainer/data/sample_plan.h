@@ -12,8 +12,7 @@
    so every region keeps at least half of its uniform density. The plan depends on the observations
    only, and it is made in rounds, one round ahead of the samples. It is therefore the same for any
    number of threads. */
-#ifndef SDM_SAMPLE_PLAN_H
-#define SDM_SAMPLE_PLAN_H
+#pragma once
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -60,5 +59,3 @@ void trainer_sample_plan_observe(sample_plan *p, size_t first, size_t n, const d
    rounds up to the one after that of sample n_taken. */
 sdm_status trainer_sample_plan_extend(sample_plan *p, const sample_space *space, size_t n_start,
                                       size_t n_taken, sdm_error *err);
-
-#endif

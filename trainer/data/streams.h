@@ -1,7 +1,6 @@
 /* Streams of the counter-based random numbers: one for each purpose, so that drawing more numbers
  * for one purpose does not change the others. */
-#ifndef SDM_STREAMS_H
-#define SDM_STREAMS_H
+#pragma once
 
 enum {
     STREAM_TRAIN = 100,    // parameters of random training maps
@@ -15,5 +14,3 @@ enum {
     STREAM_PLAN = 750,  // rejection of Sobol' points (sample_plan.h)
     STREAM_BASES = 1000 // start of subspace iterations: global modes; block b has 1001 + b
 };
-
-#endif

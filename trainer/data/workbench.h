@@ -1,7 +1,6 @@
 /* Computes exact maps, one at a time. A workbench is the memory that one thread needs; maps can be
  * packed to 16 bits. */
-#ifndef SDM_WORKBENCH_H
-#define SDM_WORKBENCH_H
+#pragma once
 
 #include "dataset.h"
 
@@ -22,5 +21,3 @@ sdm_status trainer_workbench_map(workbench *w, const dataset *d, const double *p
 /* As trainer_workbench_map(), but with 16-bit integers: distance = *scale * packed[i], mm. */
 sdm_status trainer_workbench_packed_map(workbench *w, const dataset *d, const double *p,
                                         int16_t *packed, float *scale, sdm_error *err);
-
-#endif

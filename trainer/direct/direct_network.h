@@ -1,6 +1,5 @@
 /* The interface between the training loop of the direct kinds (direct.c) and their networks. */
-#ifndef SDM_TRAINER_DIRECT_NETWORK_H
-#define SDM_TRAINER_DIRECT_NETWORK_H
+#pragma once
 
 #include "state/trainer.h"
 
@@ -36,5 +35,3 @@ typedef struct direct_network {
 
 extern const direct_network trainer_network_point; /* deepsdf and imnet */
 extern const direct_network trainer_network_sdmnn;
-
-#endif

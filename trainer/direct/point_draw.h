@@ -1,6 +1,5 @@
 /* Draws the voxels of a map that a point network is trained on. */
-#ifndef SDM_POINT_DRAW_H
-#define SDM_POINT_DRAW_H
+#pragma once
 
 #include "data/dataset.h"
 
@@ -12,5 +11,3 @@ size_t trainer_point_draw(const sdm_config *c, const dataset *d, size_t slot, ui
 /* `voxel`, moved back by one along each axis on which it is the last voxel, so that it has a next
  * neighbour along every axis. All grid sizes must be at least 2. */
 size_t trainer_point_with_neighbours(const sdm_grid *g, size_t voxel);
-
-#endif

@@ -1,8 +1,7 @@
 /* The perceptron of a point network (sdm/internal/point_network.h) on batches of points: forward
    and backward pass. B is the number of points; that header defines the other letters and the order
    of the weights. Results do not depend on n_threads. */
-#ifndef SDM_POINT_MLP_H
-#define SDM_POINT_MLP_H
+#pragma once
 
 #include "sdm/internal/point_network.h"
 
@@ -22,5 +21,3 @@ void trainer_point_forward(const sdm_point_arch *a, const float *w, size_t batch
  */
 void trainer_point_backward(const sdm_point_arch *a, const float *w, size_t batch, const float *u,
                             float *workspace, const float *slope, float *gradient, int n_threads);
-
-#endif

@@ -1,7 +1,6 @@
 /* Dense linear algebra of the trainer. Matrices are row-major. Results do not depend on the number
    of threads, bit by bit. */
-#ifndef SDM_LINALG_H
-#define SDM_LINALG_H
+#pragma once
 
 #include <stddef.h>
 #include <stdint.h>
@@ -36,5 +35,3 @@ sdm_status trainer_leading_eigenvectors(size_t n, const float *c, size_t k, uint
    y[m][n], by subspace iteration from random numbers (seed, stream). */
 sdm_status trainer_leading_space(size_t m, size_t n, const float *y, size_t k, uint64_t seed,
                                  uint64_t stream, int n_threads, float *rows, sdm_error *err);
-
-#endif

@@ -1,7 +1,6 @@
 /* The loss of the training: an error term for every voxel (train.loss) and the eikonal term
    (train.eikonal), which penalises gradients of the map whose length is not 1. */
-#ifndef SDM_TRAINER_LOSS_H
-#define SDM_TRAINER_LOSS_H
+#pragma once
 
 #include "sdm/internal/config.h"
 
@@ -25,5 +24,3 @@ double trainer_loss_eikonal(const sdm_config *c, const float f[4], float share, 
    along all three axes. Returns the sum of squared errors over the map, mm^2. */
 double trainer_loss_map(const sdm_config *c, const float *predicted, const float *target,
                         float *slope);
-
-#endif

@@ -1,7 +1,6 @@
 /* The Adam optimiser (Kingma and Ba 2015), the running average of weights and the schedule of the
    learning rate. */
-#ifndef SDM_OPTIMISER_H
-#define SDM_OPTIMISER_H
+#pragma once
 
 #include <stddef.h>
 #include <stdint.h>
@@ -37,5 +36,3 @@ void trainer_average_update(parameters *p, double decay, int n_threads);
 /* Factor of the learning rate at `fraction` (0 .. 1) of a phase: rises linearly from 0 to 1 up to
    `warmup`, then falls to 0 along half a cosine. */
 double trainer_rate_schedule(double fraction, double warmup);
-
-#endif

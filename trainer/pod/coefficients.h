@@ -1,6 +1,5 @@
 /* Projects maps of the data set on the local bases. Letters as in sdm/internal/pod.h. */
-#ifndef SDM_COEFFICIENTS_H
-#define SDM_COEFFICIENTS_H
+#pragma once
 
 #include "pod_state.h"
 
@@ -18,5 +17,3 @@ void trainer_coefficients_project_block(size_t n, size_t rank, size_t outputs, c
    the slots slots[n] of the pool or, if `holdout`, the held-out maps with the numbers slots[n]. */
 sdm_status trainer_coefficients_project(const pod_state *pod, bool holdout, const size_t *slots,
                                         size_t n, float *y, sdm_error *err);
-
-#endif

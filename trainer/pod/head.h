@@ -1,7 +1,6 @@
 /* The head: the linear layer from the latent variables z = [phi, h] to the coefficients of the
  * highest level; phi are products of polynomials, h is the output of the MLP. */
-#ifndef SDM_TRAINER_HEAD_H
-#define SDM_TRAINER_HEAD_H
+#pragma once
 
 #include "pod_state.h"
 
@@ -14,5 +13,3 @@ void trainer_head_latent(const pod_state *pod, const float *w, size_t rows, cons
 /* head[K][L] = least squares solution that maps the latent variables of all maps in the pool to
    their coefficients, for MLP weights w. */
 sdm_status trainer_head_solve(const pod_state *pod, const float *w, float *head, sdm_error *err);
-
-#endif

@@ -1,7 +1,6 @@
 /* The multi-layer perceptron of the `pod` network on batches: forward and backward pass. Letters: B
    batch, I inputs, W width. Results do not depend on n_threads. */
-#ifndef SDM_MLP_H
-#define SDM_MLP_H
+#pragma once
 
 #include "sdm/internal/pod.h"
 
@@ -30,5 +29,3 @@ const float *trainer_mlp_forward(const sdm_pod_arch *a, const float *weights, si
    trainer_mlp_forward() with the same arguments. */
 void trainer_mlp_backward(const sdm_pod_arch *a, const float *weights, size_t batch, const float *x,
                           float *workspace, const float *dh, float *gradient, int n_threads);
-
-#endif

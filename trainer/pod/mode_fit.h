@@ -1,8 +1,7 @@
 /* The mode fit: the MLP learns the part of the mode coefficients that the polynomials leave over.
    Its steps are cheap, since no map is touched; with orthonormal bases the squared error of the
    coefficients is the squared error of the map. */
-#ifndef SDM_TRAINER_MODE_FIT_H
-#define SDM_TRAINER_MODE_FIT_H
+#pragma once
 
 #include "pod_state.h"
 
@@ -14,5 +13,3 @@ sdm_status trainer_mode_fit_run(pod_state *pod, sdm_error *err);
    the averaged weights. */
 sdm_status trainer_mode_fit_errors(const pod_state *pod, const size_t *slots, size_t n,
                                    double *error, sdm_error *err);
-
-#endif

@@ -1,6 +1,5 @@
 /* Global modes of the local coefficients, their polynomial part and the targets of the MLP. */
-#ifndef SDM_TRAINER_MODES_H
-#define SDM_TRAINER_MODES_H
+#pragma once
 
 #include "pod_state.h"
 
@@ -11,5 +10,3 @@ sdm_status trainer_modes_make(pod_state *pod, size_t n, sdm_error *err);
 
 /* Computes phi and target of the maps in slots[n]. */
 sdm_status trainer_modes_project(pod_state *pod, const size_t *slots, size_t n, sdm_error *err);
-
-#endif

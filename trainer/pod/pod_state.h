@@ -1,7 +1,6 @@
 /* The data of a `pod` network in training. Letters as in sdm/internal/pod.h; in addition R is the
  * number of global modes, N of slots in the pool, H of held-out maps. Maps are in block order. */
-#ifndef SDM_TRAINER_POD_STATE_H
-#define SDM_TRAINER_POD_STATE_H
+#pragma once
 
 #include "state/trainer.h"
 
@@ -43,5 +42,3 @@ typedef struct pod_state {
     /* With a budget of time: trainer_seconds() when the mode fit ends. */
     double mode_fit_end;
 } pod_state;
-
-#endif

@@ -1,7 +1,6 @@
 /* A "tree": one block of the highest level with all blocks below it. Trees can be computed
  * independently of each other, so one thread computes one tree. */
-#ifndef SDM_POD_TREE_H
-#define SDM_POD_TREE_H
+#pragma once
 
 #include "sdm/internal/pod.h"
 
@@ -19,5 +18,3 @@ pod_tree trainer_pod_tree(const sdm_pod_levels *levels, const sdm_pod_block *blo
    sdm_pod_number(). */
 size_t trainer_pod_tree_coefficients(const sdm_pod_block *blocks, const pod_tree *tree,
                                      size_t level);
-
-#endif

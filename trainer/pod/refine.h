@@ -1,6 +1,5 @@
 /* Refinement: MLP, head, bases and mean map are trained together, end to end on maps. */
-#ifndef SDM_TRAINER_REFINE_H
-#define SDM_TRAINER_REFINE_H
+#pragma once
 
 #include "pod_state.h"
 
@@ -15,5 +14,3 @@ sdm_status trainer_refine_run(pod_state *pod, sdm_error *err);
 /* *mse = mean square error (mm^2) of the network with weights w on the held-out maps. */
 sdm_status trainer_refine_evaluate(const pod_state *pod, const float *w, double *mse,
                                    sdm_error *err);
-
-#endif

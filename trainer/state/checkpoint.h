@@ -1,6 +1,5 @@
 /* Checkpoints: the file checkpoint.sdmc, from which a run continues with the same bits. */
-#ifndef SDM_TRAINER_CHECKPOINT_H
-#define SDM_TRAINER_CHECKPOINT_H
+#pragma once
 
 #include "trainer.h"
 
@@ -29,5 +28,3 @@ sdm_status trainer_checkpoint_weights(trainer *t, sdm_error *err);
 
 /* Writes a checkpoint and returns SDM_E_CANCELLED, or the error of the writing. */
 sdm_status trainer_stop(trainer *t, sdm_error *err);
-
-#endif

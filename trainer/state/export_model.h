@@ -1,6 +1,5 @@
 /* Writes the results of a run: model file with its measured accuracy, configuration, loss curve. */
-#ifndef SDM_TRAINER_EXPORT_H
-#define SDM_TRAINER_EXPORT_H
+#pragma once
 
 #include "sdm/internal/file.h"
 #include "trainer.h"
@@ -24,5 +23,3 @@ sdm_status trainer_export_model(trainer *t, sdm_train_report *report, sdm_error 
 
 /* *seconds = expected duration of the measurement in trainer_export_model(), from one map. */
 sdm_status trainer_export_time(trainer *t, double *seconds, sdm_error *err);
-
-#endif

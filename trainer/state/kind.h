@@ -1,8 +1,7 @@
 /* The interface of a kind of network to the trainer. There are two: trainer_kind_pod
    (pod/pod_kind.h), and trainer_kind_direct (direct/direct.h) for networks that learn by gradients
    on the maps themselves. */
-#ifndef SDM_TRAINER_KIND_H
-#define SDM_TRAINER_KIND_H
+#pragma once
 
 #include "trainer.h"
 
@@ -34,5 +33,3 @@ struct train_kind {
     /* Frees t->state; NULL does nothing. */
     void (*dispose)(trainer *t);
 };
-
-#endif

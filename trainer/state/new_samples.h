@@ -1,6 +1,5 @@
 /* Moves the maps that the producer has computed into the pool while the network is trained. */
-#ifndef SDM_TRAINER_NEW_SAMPLES_H
-#define SDM_TRAINER_NEW_SAMPLES_H
+#pragma once
 
 #include "trainer.h"
 
@@ -18,5 +17,3 @@ sdm_status trainer_samples_take(trainer *t, size_t wanted, sdm_error *err);
 
 /* Takes the first n_taken random samples again after a resume; waits for them. */
 sdm_status trainer_samples_retake(trainer *t, size_t n_taken, sdm_error *err);
-
-#endif

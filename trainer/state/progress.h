@@ -1,6 +1,5 @@
 /* Time, budget, threads and reports of a run. */
-#ifndef SDM_TRAINER_PROGRESS_H
-#define SDM_TRAINER_PROGRESS_H
+#pragma once
 
 #include "trainer.h"
 
@@ -56,5 +55,3 @@ trainer_speed trainer_speed_start(const trainer *t);
 /* Reports progress and speed if more than half a second has passed since the last report. batch:
    maps trained in a step. */
 void trainer_speed_report(trainer *t, trainer_speed *last, size_t batch, double now);
-
-#endif

@@ -1,7 +1,6 @@
 /* The state of a training run that all kinds of networks share. The functions that differ between
  * kinds are called through `kind` (kind.h); a kind keeps its own data behind `state`. */
-#ifndef SDM_TRAINER_H
-#define SDM_TRAINER_H
+#pragma once
 
 #include "data/dataset.h"
 #include "data/producer.h"
@@ -39,5 +38,3 @@ typedef struct trainer {
     struct sdm_text *metrics; /* all lines of metrics.jsonl */
     sdm_accuracy accuracy;    /* accuracy of the finished model */
 } trainer;
-
-#endif

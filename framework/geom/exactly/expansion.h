@@ -1,7 +1,6 @@
 /* Exact sums of doubles as expansions (Shewchuk 1997): an expansion e[n] is an unevaluated sum of n
  * doubles whose bits do not overlap, ordered from the smallest to the largest magnitude. */
-#ifndef SDM_GEOM_EXPANSION_H
-#define SDM_GEOM_EXPANSION_H
+#pragma once
 
 #include <math.h>
 
@@ -34,5 +33,3 @@ static inline int sdm_expansion_sign(const double *e, int n)
 {
     return n == 0 ? 0 : e[n - 1] > 0 ? 1 : -1;
 }
-
-#endif

@@ -1,6 +1,5 @@
 /* Exact decisions on where a line parallel to the first coordinate axis meets a triangle. */
-#ifndef SDM_GEOM_LINE_TRIANGLE_H
-#define SDM_GEOM_LINE_TRIANGLE_H
+#pragma once
 
 /* Does the line through (any, p[0], p[1]), parallel to the first axis, meet the triangle with
  * corners v[3][3]? 0: no. +1 or -1: yes, with the sign of the first component of the triangle's
@@ -14,5 +13,3 @@ int sdm_line_meets(const double v[3][3], const double p[2], double area[3]);
  * the sign of (first coordinate of the intersection) - p[0]; 0 when p lies on the triangle. */
 int sdm_line_meets_after(const double v[3][3], const double p[3], int orientation,
                          const double area[3]);
-
-#endif

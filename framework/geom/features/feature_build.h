@@ -1,6 +1,5 @@
 /* Builds the features of a surface; see surface_features.h. */
-#ifndef SDM_GEOM_FEATURE_BUILD_H
-#define SDM_GEOM_FEATURE_BUILD_H
+#pragma once
 
 #include "surface_features.h"
 
@@ -10,5 +9,3 @@
    memory, the memory limit or 31-bit feature numbers do not suffice. */
 sdm_status sdm_features_build(const sdm_mesh *m, const sdm_topology *topo, const sdm_bvh *tree,
                               sdm_arena *arena, sdm_frame *frames, sdm_features *f, sdm_error *err);
-
-#endif

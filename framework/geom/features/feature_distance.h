@@ -1,7 +1,6 @@
 /* Squared distance in double from a point to a feature: every value of a distance map is the square
    root of such a distance. */
-#ifndef SDM_GEOM_FEATURE_DISTANCE_H
-#define SDM_GEOM_FEATURE_DISTANCE_H
+#pragma once
 
 #include <math.h>
 
@@ -21,5 +20,3 @@ static inline double sdm_feature_distance2(const sdm_features *f, const sdm_fram
     const double rx = wx - s * k->u[0], ry = wy - s * k->u[1], rz = wz - s * k->u[2];
     return rx * rx + ry * ry + rz * rz;
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* Computes the data of all features (frames, groups, exact features) once they are numbered and
    assigned to clusters; see surface_features.h. */
-#ifndef SDM_GEOM_FEATURE_GROUPS_H
-#define SDM_GEOM_FEATURE_GROUPS_H
+#pragma once
 
 #include "surface_features.h"
 
@@ -49,5 +48,3 @@ typedef void sdm_feature_groups(const sdm_feature_builder *b, sdm_cluster_node *
                                 size_t n);
 sdm_feature_groups sdm_feature_groups_generic;
 sdm_feature_groups sdm_feature_groups_avx2;
-
-#endif

@@ -1,8 +1,7 @@
 /* Builds the frames (sdm_frame: local coordinates) of four triangles at once, one per SIMD lane.
    The operations and their order are those of sdm_frame_build() in mesh/point_triangle.c, hence the
    same bits. */
-#ifndef SDM_GEOM_FRAME4_KERNEL_H
-#define SDM_GEOM_FRAME4_KERNEL_H
+#pragma once
 
 #include "mesh/point_triangle.h"
 #include "sdm/internal/vec3.h"
@@ -97,5 +96,3 @@ SDM_INLINE void sdm_frames_build(const d4 corner[3][3], sdm_frame4 *f)
     f->kt2 = f->e2x * 0.5 * x + f->e2y * 0.5 * y;
     f->flat = d4_select(flat, d4_all(1), d4_all(0));
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* Nearest point of a surface: a tree of triangles for single points, features for distance maps.
    The slot of a triangle is its position in the order of the tree (sdm_bvh.order). */
-#ifndef SDM_GEOM_NEAREST_H
-#define SDM_GEOM_NEAREST_H
+#pragma once
 
 #include "mesh/bvh.h"
 #include "surface_features.h"
@@ -30,5 +29,3 @@ double sdm_nearest_find(const sdm_nearest *n, const double x[3], double bound, u
    triangle with slot *slot, with the same bits as in a distance map. Sets *slot to the owner of
    this feature (sdm_features.owner). */
 double sdm_nearest_feature(const sdm_nearest *n, const double x[3], uint32_t *slot);
-
-#endif

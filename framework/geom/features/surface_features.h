@@ -10,8 +10,7 @@
    the first cluster that contains it. Features of a cluster are stored in groups of eight, one in
    each SIMD lane. Float values are scaled: the boxes of clusters are (x - centre) * scale, the
    functions of features take (x - centre of the cluster's box) * scale. */
-#ifndef SDM_GEOM_SURFACE_FEATURES_H
-#define SDM_GEOM_SURFACE_FEATURES_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -118,5 +117,3 @@ static inline float sdm_cluster_centre(const sdm_cluster_node *c, int a)
 {
     return 0.5f * (c->lo[a] + c->hi[a]);
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* Layers of a map: per voxel the nearest triangle, nearest point, normal and derivatives, in
  * addition to the distance. */
-#ifndef SDM_GEOM_LAYERS_H
-#define SDM_GEOM_LAYERS_H
+#pragma once
 
 #include "features/nearest.h"
 #include "sdm/exact.h"
@@ -34,5 +33,3 @@ sdm_status sdm_layers_fill(const sdm_layers_job *job, const sdm_grid *g, sdm_err
  * triangle. */
 void sdm_distance_gradient(const sdm_nearest *surface, double rounding, uint32_t slot,
                            const double x[3], const double q[3], double d, double n[3]);
-
-#endif

@@ -1,6 +1,5 @@
 /* Derivative of the signed distance at a point with respect to the vertices of the mesh. */
-#ifndef SDM_GEOM_VERTEX_GRADIENT_H
-#define SDM_GEOM_VERTEX_GRADIENT_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -36,5 +35,3 @@ void sdm_sheets_frames(const sdm_mesh *m, int n_threads, sdm_frame *frames);
  * thread] */
 void sdm_vertex_gradient_find(const sdm_sheets *s, uint32_t slot, int feature, const double q[3],
                               const double normal[3], bool inside, sdm_vertex_gradient *out);
-
-#endif

@@ -1,6 +1,5 @@
 /* State of the current block, shared by stages 3 to 6. Part of map.inc, which defines the terms. */
-#ifndef SDM_GEOM_MAP_BLOCK_H
-#define SDM_GEOM_MAP_BLOCK_H
+#pragma once
 
 #include "grid_scratch.h"
 
@@ -34,5 +33,3 @@ static inline bool block_is_cube(const sdm_grid_job *job)
    k = 8 e for e = block.error. Reason: abs(error of d) <= 2 e, so abs(error of d^2) <= 4 (d + 1) e,
    and the difference of two such values has at most twice this error. */
 static inline float ambiguity(float error) { return 8 * error; }
-
-#endif

@@ -1,6 +1,5 @@
 /* Unsigned distances of all voxels of a grid from a surface. */
-#ifndef SDM_GEOM_GRID_DISTANCE_H
-#define SDM_GEOM_GRID_DISTANCE_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -15,5 +14,3 @@
 sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g,
                              const sdm_exact_opts *opts, double band_mm, float *values,
                              uint32_t *slot, sdm_error *err);
-
-#endif

@@ -3,8 +3,7 @@
 
    Float positions and lengths are scaled: (x - sdm_features.centre) * sdm_features.scale for
    positions, length * sdm_features.scale for lengths. Doubles are in mm. */
-#ifndef SDM_GEOM_GRID_JOB_H
-#define SDM_GEOM_GRID_JOB_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -100,6 +99,4 @@ sdm_grid_kernel sdm_grid_kernel_generic;
 #if defined(__x86_64__) && defined(__GNUC__)
 sdm_grid_kernel sdm_grid_kernel_avx2;
 sdm_grid_kernel sdm_grid_kernel_avx512;
-#endif
-
 #endif

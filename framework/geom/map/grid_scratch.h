@@ -1,7 +1,6 @@
 /* Scratch memory of one thread of the distance map: clusters of the current box and block, queues
    of features, and candidates of each vector. Terms are defined in map.inc. */
-#ifndef SDM_GEOM_GRID_SCRATCH_H
-#define SDM_GEOM_GRID_SCRATCH_H
+#pragma once
 
 #include "grid_job.h"
 
@@ -153,5 +152,3 @@ sdm_status sdm_grid_scratch_candidates(sdm_grid_scratch *scratch, size_t cap, si
 
 /* Frees all members and zeroes the scratch. */
 void sdm_grid_scratch_dispose(sdm_grid_scratch *scratch);
-
-#endif

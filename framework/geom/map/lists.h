@@ -1,6 +1,5 @@
 /* Lists made from bit masks without branches, and references to lanes. Part of map.inc. */
-#ifndef SDM_GEOM_MAP_LISTS_H
-#define SDM_GEOM_MAP_LISTS_H
+#pragma once
 
 #include <assert.h>
 
@@ -64,5 +63,3 @@ static inline void clusters_distribute(const sdm_grid_job *job, uint8_t *blocks,
         }
     }
 }
-
-#endif

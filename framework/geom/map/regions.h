@@ -1,7 +1,6 @@
 /* Region functions of single features at eight points. Part of map.inc; sdm_feature_group in
    surface_features.h defines the functions and their layout. */
-#ifndef SDM_GEOM_MAP_REGIONS_H
-#define SDM_GEOM_MAP_REGIONS_H
+#pragma once
 
 #include <assert.h>
 
@@ -60,5 +59,3 @@ SDM_FOR_KIND v8f region_excess(int kind, const functions8 *x, const float (*exte
     const v8f mean = v8_sub(v8_mul(v8_add(x->f[1], x->f[2]), v8_all(0.5f)), v8_all(most[1]));
     return v8_max(all, v8_fma(minus_half, v8_all(function_value(kind, extent, 3, lane)), mean));
 }
-
-#endif

@@ -1,8 +1,7 @@
 /* Stage 1: bounds on the distance. For eight parts at once, finds a point of the surface near each
    part (its reference point) and derives the largest distance at which a cluster may hold the
    nearest feature. Part of map.inc. */
-#ifndef SDM_GEOM_MAP_STAGE1_BOUNDS_H
-#define SDM_GEOM_MAP_STAGE1_BOUNDS_H
+#pragma once
 
 #include "grid_scratch.h"
 #include "simd/lanes.h"
@@ -187,5 +186,3 @@ static void references_of_tiles(const sdm_features *f, const sdm_cluster_list *c
     }
     centroids_finish(f, &best, reference);
 }
-
-#endif

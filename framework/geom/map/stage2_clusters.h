@@ -1,7 +1,6 @@
 /* Stage 2: culling of clusters by distance, first for the blocks of a box, then for the tiles of a
    block. Part of map.inc. */
-#ifndef SDM_GEOM_MAP_STAGE2_CLUSTERS_H
-#define SDM_GEOM_MAP_STAGE2_CLUSTERS_H
+#pragma once
 
 #include "lists.h"
 #include "stage1_bounds.h"
@@ -82,5 +81,3 @@ static float clusters_of_tiles(const sdm_grid_job *job, const sdm_cluster_list *
     }
     return sqrtf(farthest) + job->part[SDM_BLOCKS].radius;
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* Stage 3: culling of features by their regions. A group of features is tested against the block;
    those whose regions meet it are queued for stage 4. Part of map.inc. */
-#ifndef SDM_GEOM_MAP_STAGE3_GROUPS_H
-#define SDM_GEOM_MAP_STAGE3_GROUPS_H
+#pragma once
 
 #include "block.h"
 #include "lists.h"
@@ -76,5 +75,3 @@ static inline void pending_add(const block *b, sdm_pending *p, uint32_t number, 
     p->n = lanes_append(b->job, p->feature, p->n, SDM_BATCH + 8, p->n_group, lanes);
     p->n_group += lanes != 0;
 }
-
-#endif

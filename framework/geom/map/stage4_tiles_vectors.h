@@ -1,7 +1,6 @@
 /* Stage 4: a batch of features of one kind is tested against the tiles of the block, then against
    the vectors of these tiles. Part of map.inc. */
-#ifndef SDM_GEOM_MAP_STAGE4_TILES_VECTORS_H
-#define SDM_GEOM_MAP_STAGE4_TILES_VECTORS_H
+#pragma once
 
 #include "block.h"
 #include "lists.h"
@@ -110,5 +109,3 @@ SDM_FOR_KIND void batch_test_vectors(const block *b, int kind)
     }
     batch->n_vector_pair = n;
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* Stage 5: computes, in float, the squared distances from the voxels of a vector to each feature
    that passed stage 4, and collects the candidates of every vector. Part of map.inc. */
-#ifndef SDM_GEOM_MAP_STAGE5_VOXELS_H
-#define SDM_GEOM_MAP_STAGE5_VOXELS_H
+#pragma once
 
 #include "block.h"
 #include "lists.h"
@@ -94,5 +93,3 @@ SDM_FOR_KIND void batch_measure(const block *b, int kind)
     }
     c->n = end;
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* Stage 6: chooses the nearest candidate of each voxel of a tile, computes its distance in double
    and writes it. Part of map.inc. */
-#ifndef SDM_GEOM_MAP_STAGE6_VALUES_H
-#define SDM_GEOM_MAP_STAGE6_VALUES_H
+#pragma once
 
 #include <assert.h>
 
@@ -206,5 +205,3 @@ static void tile_write(const tile *t, voxels *x)
                 memcpy(&job->slot[to], &x->number[from], (size_t)size[0] * sizeof *x->number);
         }
 }
-
-#endif

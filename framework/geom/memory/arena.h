@@ -2,8 +2,7 @@
  * freed at once, and are counted against the caller's memory limit. One block is faster than many
  * small ones: the allocator keeps its pages from one mesh to the next, and scratch memory is reused
  * while it is still in the cache. */
-#ifndef SDM_GEOM_ARENA_H
-#define SDM_GEOM_ARENA_H
+#pragma once
 
 #include <stddef.h>
 
@@ -61,5 +60,3 @@ void sdm_arena_release(sdm_arena *a, int end, sdm_arena_mark mark);
  * this exceeds the memory limit. When the memory is freed, the caller subtracts its bytes from
  * a->used. */
 sdm_status sdm_arena_charge(sdm_arena *a, size_t bytes, sdm_error *err);
-
-#endif

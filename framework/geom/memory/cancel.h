@@ -1,6 +1,5 @@
 /* Cancellation: asks the caller's `cancelled` function whether to stop. */
-#ifndef SDM_GEOM_CANCEL_H
-#define SDM_GEOM_CANCEL_H
+#pragma once
 
 #include "sdm/exact.h"
 
@@ -11,5 +10,3 @@ bool sdm_cancelled(const sdm_exact_opts *opts);
 /* For the preparation of a mesh: SDM_E_CANCELLED when sdm_cancelled(opts). opts may be NULL: never
  * cancelled. */
 sdm_status sdm_cancel_check(const sdm_exact_opts *opts, sdm_error *err);
-
-#endif

@@ -1,7 +1,6 @@
 /* Bounding volume hierarchy over the triangles of a mesh: a flat array of nodes with axis-aligned
  * boxes; at most four triangles per leaf. */
-#ifndef SDM_GEOM_BVH_H
-#define SDM_GEOM_BVH_H
+#pragma once
 
 #include "memory/arena.h"
 #include "sdm/mesh.h"
@@ -45,5 +44,3 @@ static inline double sdm_bvh_box_distance2(const sdm_bvh_node *n, const double p
     }
     return sum;
 }
-
-#endif

@@ -1,6 +1,5 @@
 /* Integer winding numbers of closed meshes by signed crossings of axis-parallel rays. */
-#ifndef SDM_GEOM_CROSSINGS_H
-#define SDM_GEOM_CROSSINGS_H
+#pragma once
 
 #include "bvh.h"
 
@@ -14,5 +13,3 @@ int sdm_ray_winding(const sdm_mesh *m, const sdm_bvh *tree, const double p[3], i
 /* The same for a ray along the coordinate axis and direction closest to the vector n. */
 int sdm_ray_winding_along(const sdm_mesh *m, const sdm_bvh *tree, const double p[3],
                           const double n[3], const uint32_t *skip, size_t n_skip);
-
-#endif

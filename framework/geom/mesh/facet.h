@@ -1,6 +1,5 @@
 /* Normal, longest edge and height of every triangle of a mesh. */
-#ifndef SDM_GEOM_FACET_H
-#define SDM_GEOM_FACET_H
+#pragma once
 
 #include "point_triangle.h"
 #include "sdm/mesh.h"
@@ -23,5 +22,3 @@ void sdm_facet_centre(const sdm_mesh *m, size_t t, double x[3]);
  * tetrahedra of the triangles with `apex`; a point near the mesh keeps the rounding error small. */
 void sdm_facets_build(const sdm_mesh *m, const double apex[3], sdm_facet *facet, double *area,
                       double *volume);
-
-#endif

@@ -1,7 +1,6 @@
 /* Closest point on a triangle, in double precision and without any tolerance. A triangle without
  * area acts as a segment or a point. */
-#ifndef SDM_GEOM_POINT_TRIANGLE_H
-#define SDM_GEOM_POINT_TRIANGLE_H
+#pragma once
 
 #include <stdint.h>
 
@@ -43,5 +42,3 @@ double sdm_frame_distance2(const sdm_frame *f, const double p[3]);
 /* Returns the squared distance from p to the triangle; q = closest point, *feature = where it lies
  * (SDM_CORNER_0 ... SDM_FACE, in the corners as given to sdm_frame_build()). */
 double sdm_frame_closest(const sdm_frame *f, const double p[3], double q[3], int *feature);
-
-#endif

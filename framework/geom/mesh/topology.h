@@ -1,6 +1,5 @@
 /* Topology of a mesh: which vertices coincide, and which triangles share which edges. */
-#ifndef SDM_GEOM_TOPOLOGY_H
-#define SDM_GEOM_TOPOLOGY_H
+#pragma once
 
 #include "memory/arena.h"
 #include "sdm/mesh.h"
@@ -53,5 +52,3 @@ uint32_t sdm_forest_root(uint32_t *parent, uint32_t i);
 
 /* Joins the trees of i and j; the smaller root becomes the common root. */
 void sdm_forest_join(uint32_t *parent, uint32_t i, uint32_t j);
-
-#endif

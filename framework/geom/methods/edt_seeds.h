@@ -1,7 +1,6 @@
 /* Seeds of the distance transform (edt.c): the points where grid lines (lines through voxel centres
  * along x, y or z) cross the surface. */
-#ifndef SDM_GEOM_METHODS_EDT_SEEDS_H
-#define SDM_GEOM_METHODS_EDT_SEEDS_H
+#pragma once
 
 #include "method.h"
 
@@ -27,5 +26,3 @@ void sdm_seeds_dispose(sdm_seeds *seeds);
  * INFINITY when there is no seed. index[n_vert][3] as above. SDM_E_NOMEM, SDM_E_CANCELLED. */
 sdm_status sdm_seeds_bound(const sdm_run *run, const double *index, const sdm_seeds seeds[3],
                            const float *map, double *bound, sdm_error *err);
-
-#endif

@@ -1,7 +1,6 @@
 /* Helpers shared by all methods (sdm/internal/methods.h): argument checks, preparation of the
  * surface, parallel loop, sign and report of one run. */
-#ifndef SDM_GEOM_METHODS_METHOD_H
-#define SDM_GEOM_METHODS_METHOD_H
+#pragma once
 
 #include "mesh/point_triangle.h"
 #include "sdm/internal/methods.h"
@@ -62,5 +61,3 @@ sdm_status sdm_run_frames(sdm_run *run, sdm_frame **frames, sdm_error *err);
 
 extern const sdm_method sdm_method_exact, sdm_method_naive, sdm_method_edt, sdm_method_cells,
     sdm_method_octree;
-
-#endif

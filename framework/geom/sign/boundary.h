@@ -4,8 +4,7 @@
  * mesh are the winding number of the closed surface. The generalised winding number of the mesh is
  * this number plus the sum of the solid angles of all strips over 4 pi. An edge belongs to the
  * boundary when its triangles do not use it equally often in both directions. */
-#ifndef SDM_GEOM_BOUNDARY_H
-#define SDM_GEOM_BOUNDARY_H
+#pragma once
 
 #include "mesh/topology.h"
 
@@ -71,5 +70,3 @@ sdm_strips_winding sdm_strips_evaluate(const sdm_strips *s, const double x[3], c
  * of a solid angle is an integral over the boundary: abs(gradient) <= 1 / (4 pi) * sum over the
  * edges of min(length / r^2, 2 / r) with r the distance from x to the edge. */
 double sdm_strips_reach(const sdm_strips_winding *s, double change);
-
-#endif

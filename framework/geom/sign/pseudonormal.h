@@ -1,7 +1,6 @@
 /* Angle-weighted pseudo-normals (Baerentzen and Aanaes 2005): they give the sign of the distance to
  * a manifold mesh without self-intersections. */
-#ifndef SDM_GEOM_PSEUDONORMAL_H
-#define SDM_GEOM_PSEUDONORMAL_H
+#pragma once
 
 #include "mesh/topology.h"
 
@@ -22,5 +21,3 @@ void sdm_pseudonormals_dispose(sdm_pseudonormals *p);
  * (point_triangle.h). [any thread] */
 const double *sdm_pseudonormal(const sdm_pseudonormals *p, const sdm_topology *topo, uint32_t tri,
                                int feature);
-
-#endif

@@ -3,8 +3,7 @@
  * generalised winding number n + w, so it is inside (n + w > 1/2) where n + round(w) >= 1. round(w)
  * is constant in large regions: a bound on the gradient of w (boundary.h) proves this for whole
  * boxes of voxels. */
-#ifndef SDM_GEOM_ROW_BASE_H
-#define SDM_GEOM_ROW_BASE_H
+#pragma once
 
 #include "boundary.h"
 #include "rows.h"
@@ -19,5 +18,3 @@ typedef struct sdm_row_tile {
  * thread] */
 void sdm_row_base_fill(const sdm_boundary *b, const sdm_rows *rows, const sdm_grid *g,
                        const sdm_row_tile *tile, int32_t *base);
-
-#endif

@@ -1,7 +1,6 @@
 /* Crossings of grid rows (lines of voxels along one axis) with a mesh. They give the winding
  * numbers of a closed mesh; for an open mesh the strips of boundary.h must be added. */
-#ifndef SDM_GEOM_ROWS_H
-#define SDM_GEOM_ROWS_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -73,5 +72,3 @@ static inline void sdm_row_span_clip(const sdm_row_span *u, int64_t i0, int64_t 
  * thread] */
 void sdm_rows_apply(const sdm_rows *r, size_t row, int64_t i0, int64_t i1, const int32_t *base,
                     float *values);
-
-#endif

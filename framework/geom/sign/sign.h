@@ -1,7 +1,6 @@
 /* Decides whether points lie inside a mesh: chooses the sign method, and finds the signs of single
  * points and of whole grids. */
-#ifndef SDM_GEOM_SIGN_H
-#define SDM_GEOM_SIGN_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -54,5 +53,3 @@ sdm_status sdm_sign_map(const sdm_sign *s, const sdm_grid *g, const sdm_exact_op
 sdm_status sdm_sign_certify(const sdm_sign *s, const sdm_grid *g, const sdm_exact_opts *opts,
                             double rounding, const float *values, sdm_sign_certificate *out,
                             sdm_error *err);
-
-#endif

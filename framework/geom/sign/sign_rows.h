@@ -1,8 +1,7 @@
 /* Finds the signs of a whole grid row by row, in parallel over tiles of rows: from the crossings of
  * the rows with the mesh and, for open meshes, the winding number of the strips that close the
  * boundary (boundary.h). */
-#ifndef SDM_GEOM_SIGN_ROWS_H
-#define SDM_GEOM_SIGN_ROWS_H
+#pragma once
 
 #include "row_base.h"
 #include "sdm/exact.h"
@@ -34,5 +33,3 @@ typedef void sdm_sign_visit(void *user, const sdm_row_tile *tile, const int32_t 
 sdm_status sdm_sign_tiles(const sdm_sign_rows *r, int64_t n1, int64_t n2,
                           const sdm_exact_opts *opts, sdm_sign_visit *visit, void *user,
                           sdm_error *err);
-
-#endif

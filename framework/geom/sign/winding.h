@@ -1,6 +1,5 @@
 /* Generalised winding numbers of points (Jacobson et al. 2013), for meshes that are not closed. */
-#ifndef SDM_GEOM_WINDING_H
-#define SDM_GEOM_WINDING_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -46,5 +45,3 @@ double sdm_winding_sum(const sdm_winding *w, const double x[3]);
 /* Is the winding number at x above 1/2? Uses the far-field approximation if its error bound leaves
  * no doubt, otherwise sdm_winding_number(). [any thread] */
 bool sdm_winding_inside(const sdm_winding *w, const double x[3]);
-
-#endif

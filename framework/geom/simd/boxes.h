@@ -1,6 +1,5 @@
 /* Overlap tests of eight axis-aligned boxes against one other box, with SSE2 where available. */
-#ifndef SDM_GEOM_BOXES_H
-#define SDM_GEOM_BOXES_H
+#pragma once
 
 #include <stddef.h>
 #if defined(__SSE2__)
@@ -36,5 +35,3 @@ static inline unsigned box8_overlap(const sdm_box8 *a, const sdm_box8 *b, size_t
     return mask;
 #endif
 }
-
-#endif

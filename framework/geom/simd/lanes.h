@@ -2,8 +2,7 @@
    register with AVX2; without AVX2 it is two registers of half the size, with the same names and
    functions (lanes_half.h). A lane is one element. v8_load(), v8_store(), v4_load() and v4_store()
    need 32-byte alignment; v8_load_i() and v8_store_i() do not. */
-#ifndef SDM_GEOM_LANES_H
-#define SDM_GEOM_LANES_H
+#pragma once
 
 #include <math.h>
 #include <stdint.h>
@@ -143,5 +142,3 @@ static inline v8f p8_dot(point8 a, point8 b)
 {
     return v8_fma(a.x, b.x, v8_fma(a.y, b.y, v8_mul(a.z, b.z)));
 }
-
-#endif

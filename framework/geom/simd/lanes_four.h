@@ -1,7 +1,6 @@
 /* Four doubles as one compiler vector (d4): one register of AVX, two of SSE2 or NEON. Unlike v4d of
    lanes.h, it has arithmetic operators and element access, d[i]. */
-#ifndef SDM_GEOM_FOUR_LANES_KERNEL_H
-#define SDM_GEOM_FOUR_LANES_KERNEL_H
+#pragma once
 
 #include "lanes_two.h"
 
@@ -47,5 +46,3 @@ SDM_INLINE void d4_store_rows(const d4 *row, int n, double *const to[4])
         d2_store(to[3] + i, d2_seconds(c, d));
     }
 }
-
-#endif

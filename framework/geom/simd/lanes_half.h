@@ -2,8 +2,7 @@
    NEON registers, elsewhere a pair of compiler vectors of 16 bytes. Part of lanes.h, which
    documents the functions. A single vector type of 32 bytes would be slow, because compilers
    compare and select its elements one by one. */
-#ifndef SDM_GEOM_HALF_LANES_KERNEL_H
-#define SDM_GEOM_HALF_LANES_KERNEL_H
+#pragma once
 
 #if defined(__SSE2__)
 #include <emmintrin.h>
@@ -162,5 +161,3 @@ static inline void v4_transpose(v4d r[4])
     r[2] = (v4d){{a.high[0], b.high[0]}, {c.high[0], d.high[0]}};
     r[3] = (v4d){{a.high[1], b.high[1]}, {c.high[1], d.high[1]}};
 }
-
-#endif

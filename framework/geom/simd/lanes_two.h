@@ -1,7 +1,6 @@
 /* Two doubles as one compiler vector (v2d): one register of SSE2 or NEON. Every x86-64 or ARM64
    processor has these, so code with v2d need not choose the instruction set at run time. */
-#ifndef SDM_GEOM_TWO_LANES_KERNEL_H
-#define SDM_GEOM_TWO_LANES_KERNEL_H
+#pragma once
 
 #include <math.h>
 #include <stdint.h>
@@ -63,6 +62,4 @@ SDM_INLINE void d2_store_f(float *p, v2d a)
     p[1] = (float)a[1];
 }
 SDM_INLINE v2d d2_rounded(v2d a) { return (v2d){(double)(float)a[0], (double)(float)a[1]}; }
-#endif
-
 #endif

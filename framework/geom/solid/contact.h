@@ -1,7 +1,6 @@
 /* Contacts: places where two triangles of a mesh intersect or overlap, other than their common
  * vertices and edges. */
-#ifndef SDM_GEOM_CONTACT_H
-#define SDM_GEOM_CONTACT_H
+#pragma once
 
 #include "mesh/bvh.h"
 #include "mesh/facet.h"
@@ -49,5 +48,3 @@ sdm_status sdm_contacts_find(const sdm_mesh *m, const sdm_topology *topo, const 
  * plane). sdm_frame_lift() is the inverse: it sets x to the point of the plane at xy. */
 void sdm_frame_flatten(const sdm_frame *f, const double x[3], double xy[2]);
 void sdm_frame_lift(const sdm_frame *f, const double xy[2], double x[3]);
-
-#endif

@@ -1,7 +1,6 @@
 /* Cuts a triangle along segments into convex pieces so that no segment enters the interior of any
  * piece. */
-#ifndef SDM_GEOM_CUTTING_H
-#define SDM_GEOM_CUTTING_H
+#pragma once
 
 #include "contact.h"
 
@@ -35,5 +34,3 @@ sdm_status sdm_cut_triangle(sdm_cutter *w, const sdm_corner corner[3], const sdm
                             sdm_status (*visit)(void *user, const sdm_corner *corner, size_t n),
                             void *user, sdm_error *err);
 void sdm_cutter_dispose(sdm_cutter *c);
-
-#endif

@@ -1,7 +1,6 @@
 /* Finds pairs of triangles that share a vertex and may also meet elsewhere. The fan of a vertex is
  * the set of triangles around it. */
-#ifndef SDM_GEOM_FAN_H
-#define SDM_GEOM_FAN_H
+#pragma once
 
 #include "mesh/facet.h"
 #include "mesh/topology.h"
@@ -16,5 +15,3 @@ sdm_status sdm_fans_visit(const sdm_mesh *m, const sdm_topology *topo, const sdm
                           double tolerance, sdm_arena *arena,
                           sdm_status (*visit)(void *user, uint32_t i, uint32_t j, int shared),
                           void *user, sdm_error *err);
-
-#endif

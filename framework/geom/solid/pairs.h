@@ -1,6 +1,5 @@
 /* Finds pairs of triangles without a common vertex that may meet, because their boxes overlap. */
-#ifndef SDM_GEOM_PAIRS_H
-#define SDM_GEOM_PAIRS_H
+#pragma once
 
 #include "mesh/bvh.h"
 #include "mesh/topology.h"
@@ -15,5 +14,3 @@ sdm_status sdm_pairs_visit(const sdm_mesh *m, const sdm_topology *topo, const sd
                            double slack, sdm_arena *arena,
                            sdm_status (*visit)(void *user, uint32_t i, uint32_t j), void *user,
                            sdm_error *err);
-
-#endif

@@ -1,6 +1,5 @@
 /* Turns parts (components connected by edges) of a closed mesh that are inside out. */
-#ifndef SDM_GEOM_PARTS_H
-#define SDM_GEOM_PARTS_H
+#pragma once
 
 #include "survey.h"
 
@@ -19,5 +18,3 @@ static inline void sdm_triangle_turn(sdm_mesh *m, size_t t)
  * closed is left as it is. *n_turned: number of turned parts; if it is not 0, the survey of m is
  * out of date. SDM_E_NOMEM. */
 sdm_status sdm_parts_turn(sdm_mesh *m, const sdm_survey *survey, size_t *n_turned, sdm_error *err);
-
-#endif

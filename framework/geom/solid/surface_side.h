@@ -1,7 +1,6 @@
 /* Decides which parts of the surface of a closed mesh bound its solid, the points with winding
  * number >= 1: the parts with a winding number <= 0 just outside and >= 1 just inside. */
-#ifndef SDM_GEOM_SURFACE_SIDE_H
-#define SDM_GEOM_SURFACE_SIDE_H
+#pragma once
 
 #include "survey.h"
 
@@ -41,5 +40,3 @@ void sdm_sides_turn_to(sdm_sides *w, uint32_t t);
 /* *keep = true if the current triangle bounds the solid at the point xy of its frame and has the
  * lowest index among the coplanar triangles of the same orientation at this point. SDM_E_NOMEM. */
 sdm_status sdm_sides_keep(sdm_sides *w, const double xy[2], bool *keep, sdm_error *err);
-
-#endif

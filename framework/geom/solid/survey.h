@@ -1,6 +1,5 @@
 /* Survey of a mesh: the audit and the data structures built for it, which the later steps reuse. */
-#ifndef SDM_GEOM_SURVEY_H
-#define SDM_GEOM_SURVEY_H
+#pragma once
 
 #include "contact.h"
 #include "mesh/bvh.h"
@@ -25,5 +24,3 @@ sdm_status sdm_survey_build(const sdm_mesh *m, sdm_arena *arena, sdm_survey *sur
 /* Releases the facets and contacts and, unless keep_topology, the topology; the audit and the tree
  * stay. Arrays taken from the arena's high end after the survey are released as well. */
 void sdm_survey_shrink(sdm_survey *survey, sdm_arena *arena, bool keep_topology);
-
-#endif

@@ -1,7 +1,6 @@
 /* The union hull of a closed mesh: the boundary of its solid as a mesh. Surface inside the solid is
  * removed by clipping. */
-#ifndef SDM_GEOM_UNION_HULL_H
-#define SDM_GEOM_UNION_HULL_H
+#pragma once
 
 #include "survey.h"
 
@@ -15,5 +14,3 @@
 sdm_status sdm_union_hull(const sdm_mesh *m, const sdm_survey *survey, sdm_arena *arena,
                           sdm_mesh *out, uint32_t **source, bool *changed, double *error_mm,
                           sdm_error *err);
-
-#endif

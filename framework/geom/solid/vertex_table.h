@@ -1,6 +1,5 @@
 /* Hash table that finds a vertex by its coordinates, up to a tolerance. */
-#ifndef SDM_GEOM_VERTEX_TABLE_H
-#define SDM_GEOM_VERTEX_TABLE_H
+#pragma once
 
 #include <stddef.h>
 #include <stdint.h>
@@ -24,5 +23,3 @@ void sdm_vertex_table_find(const sdm_vertex_table *t, const double *vert, uint32
 sdm_status sdm_vertex_table_add(sdm_vertex_table *t, const double *vert, uint32_t v,
                                 sdm_error *err);
 void sdm_vertex_table_dispose(sdm_vertex_table *t);
-
-#endif

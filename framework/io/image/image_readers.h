@@ -1,7 +1,6 @@
 /* Shared by the image readers: the common form of a header, and one read function for each format.
  */
-#ifndef SDM_IO_IMAGE_READERS_H
-#define SDM_IO_IMAGE_READERS_H
+#pragma once
 
 #include "bytes.h"
 #include "scan.h"
@@ -45,5 +44,3 @@ sdm_status sdm_frame_grid(const sdm_image_header *h, sdm_grid *out, sdm_error *e
 sdm_status sdm_segments_take(sdm_volume *v, const sdm_stream *in, const char *key,
                              const char *value, sdm_error *err);
 sdm_status sdm_segments_finish(sdm_volume *v, const sdm_stream *in, size_t layers, sdm_error *err);
-
-#endif

@@ -1,7 +1,6 @@
 /* Shared by the image writers: an output stream with optional gzip compression, and one write
  * function for each format. */
-#ifndef SDM_IO_IMAGE_WRITERS_H
-#define SDM_IO_IMAGE_WRITERS_H
+#pragma once
 
 #include <zlib.h>
 
@@ -49,5 +48,3 @@ typedef struct sdm_image {
 sdm_status sdm_nifti_write(sdm_outfile *f, bool zip, const sdm_image *m, sdm_error *err);
 sdm_status sdm_nrrd_write(sdm_outfile *f, const sdm_image *m, sdm_error *err);
 sdm_status sdm_metaimage_write(sdm_outfile *f, const sdm_image *m, sdm_error *err);
-
-#endif

@@ -1,6 +1,5 @@
 /* Voxel types: their size and their name in each image format. */
-#ifndef SDM_IO_VOXELS_H
-#define SDM_IO_VOXELS_H
+#pragma once
 
 #include "sdm/volume.h"
 
@@ -31,5 +30,3 @@ void sdm_voxels_decode(const uint8_t *p, sdm_voxel_type type, bool big, double s
 
 /* Stores values[first .. first + n - 1], an array of the C type of `type`, at p, little endian. */
 void sdm_voxels_encode(const void *values, sdm_voxel_type type, size_t first, size_t n, uint8_t *p);
-
-#endif

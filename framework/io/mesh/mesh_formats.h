@@ -1,6 +1,5 @@
 /* A read and a write function for each format of mesh files. */
-#ifndef SDM_IO_MESH_FORMATS_H
-#define SDM_IO_MESH_FORMATS_H
+#pragma once
 
 #include "bytes.h"
 #include "scan.h"
@@ -21,5 +20,3 @@ sdm_status sdm_ply_write(sdm_outfile *f, const sdm_mesh *m, sdm_error *err);
 sdm_status sdm_stl_write(sdm_outfile *f, const sdm_mesh *m, sdm_error *err);
 sdm_status sdm_obj_write(sdm_outfile *f, const sdm_mesh *m, sdm_error *err);
 sdm_status sdm_off_write(sdm_outfile *f, const sdm_mesh *m, sdm_error *err);
-
-#endif

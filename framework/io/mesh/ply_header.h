@@ -1,6 +1,5 @@
 /* The header of a PLY file: elements and their properties, in the order of the body. */
-#ifndef SDM_IO_PLY_HEADER_H
-#define SDM_IO_PLY_HEADER_H
+#pragma once
 
 #include "mesh_formats.h"
 
@@ -56,5 +55,3 @@ size_t sdm_ply_type_size(sdm_ply_type type);
  * body. SDM_E_FORMAT; SDM_E_UNSUPPORTED for an unknown format or too many elements or properties.
  */
 sdm_status sdm_ply_read_header(sdm_scan *scan, sdm_ply_header *h, sdm_error *err);
-
-#endif

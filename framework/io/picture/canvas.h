@@ -3,8 +3,7 @@
  *
  * Lengths are in pixels; (0, 0) is the upper left corner, y points down. Functions without a status
  * remember the first error for sdm_canvas_finish(). */
-#ifndef SDM_IO_CANVAS_H
-#define SDM_IO_CANVAS_H
+#pragma once
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -99,5 +98,3 @@ sdm_colour sdm_map_colour(sdm_colour_map map, double low, double high, double va
 int sdm_ticks(double low, double high, int wanted, double *first, double *step);
 /* Writes the number of a tick to buf, with as many decimals as `step` needs, and returns buf. */
 const char *sdm_tick_text(double value, double step, char buf[32]);
-
-#endif

@@ -1,6 +1,5 @@
 /* One slice of a map on a canvas: colours, contours, scale bar; and colour bars. */
-#ifndef SDM_IO_PANEL_H
-#define SDM_IO_PANEL_H
+#pragma once
 
 #include "canvas.h"
 
@@ -37,5 +36,3 @@ void sdm_contour_sample(sdm_canvas *c, double x, double y, double length, sdm_co
 #define SDM_INK ((sdm_colour){38, 40, 46})
 #define SDM_INK_LIGHT ((sdm_colour){120, 124, 132})
 #define SDM_WHITE ((sdm_colour){255, 255, 255})
-
-#endif

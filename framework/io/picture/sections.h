@@ -1,7 +1,6 @@
 /* Three orthogonal sections of a grid on a canvas: their positions, their sizes and their axes in
  * mm. */
-#ifndef SDM_IO_SECTIONS_H
-#define SDM_IO_SECTIONS_H
+#pragma once
 
 #include "panel.h"
 #include "sdm/grid.h"
@@ -33,5 +32,3 @@ void sdm_section_draw_frame(sdm_canvas *c, const sdm_sections *s, sdm_box box, i
 
 #define SDM_SECTION_LEFT 66  /* room for numbers and axis names left of a section, pixels */
 #define SDM_SECTION_BELOW 54 /* the same below a section */
-
-#endif

@@ -12,8 +12,7 @@
      MAX_VECI               maximum of two vectors of signed integers
      PREFETCH_BYTES         weights are prefetched this many bytes before their use; 0: never */
 
-#ifndef SDM_KERNELS_BYTES_H
-#define SDM_KERNELS_BYTES_H
+#pragma once
 
 #include <string.h>
 
@@ -508,5 +507,3 @@ static void quantise(size_t rows, size_t n, const float *y, size_t ldy, const fl
     else
         quantise_rows(rows, n, y, ldy, NULL, limit, x, ldx, scale);
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* The table of functions that each instruction set provides. Each of kernels_*.c compiles the same
    source, kernels_simd.h, for one instruction set. Contracts: sdm/internal/kernels.h. */
-#ifndef SDM_KERNELS_TABLE_H
-#define SDM_KERNELS_TABLE_H
+#pragma once
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -42,6 +41,4 @@ typedef struct kernel_table {
 extern const kernel_table sdm_kernels_generic;
 #if defined(__x86_64__)
 extern const kernel_table sdm_kernels_avx2, sdm_kernels_avx512, sdm_kernels_avx512vnni;
-#endif
-
 #endif

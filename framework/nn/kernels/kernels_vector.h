@@ -1,8 +1,7 @@
 /* Vector types, loads and loop pragmas for kernels that are compiled once for each instruction set.
    Before inclusion, define VW: the number of floats in a register of the instruction set. A source
    with a faster horizontal sum defines SUM_LANES(v) too. */
-#ifndef SDM_KERNELS_VECTOR_H
-#define SDM_KERNELS_VECTOR_H
+#pragma once
 
 #include <stdint.h>
 
@@ -39,6 +38,4 @@ static inline float sum_lanes(vec v)
     return total;
 }
 #define SUM_LANES(v) sum_lanes(v)
-#endif
-
 #endif

@@ -1,8 +1,7 @@
 /* The function table of a kind of network, and the functions that all kinds share. A new kind needs
    a file NAME_open.c that defines its table, a declaration at the end of this header, and an entry
    in open/model_open.c. */
-#ifndef SDM_MODEL_KIND_H
-#define SDM_MODEL_KIND_H
+#pragma once
 
 #include "model_text.h"
 #include "sdm/internal/container.h"
@@ -70,5 +69,3 @@ sdm_status sdm_model_pack(const sdm_model_info *info, const sdm_text *descriptio
                           sdm_error *err);
 
 extern const sdm_model_kind sdm_kind_pod, sdm_kind_deepsdf, sdm_kind_imnet, sdm_kind_sdmnn;
-
-#endif

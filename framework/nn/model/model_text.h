@@ -1,7 +1,6 @@
 /* The description of a model: lines "key=value" that are written and read in the same fixed
    order. */
-#ifndef SDM_MODEL_TEXT_H
-#define SDM_MODEL_TEXT_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -35,5 +34,3 @@ void sdm_lines_text(sdm_lines *r, const char *key, char *out, size_t size);
 
 /* Returns SDM_E_FORMAT, with the key in the message, if a read has failed. */
 sdm_status sdm_lines_check(const sdm_lines *r, sdm_error *err);
-
-#endif

@@ -1,7 +1,6 @@
 /* Scratch memory of a thread for one slab, shared by the decoder and its transpose. Words and
    letters as in pod_internal.h. */
-#ifndef SDM_POD_DECODE_SCRATCH_H
-#define SDM_POD_DECODE_SCRATCH_H
+#pragma once
 
 #include "pod_internal.h"
 
@@ -35,5 +34,3 @@ static inline size_t sdm_pod_first_voxel(const sdm_grid *g, const sdm_pod_block 
 {
     return ((size_t)b->at[2] * (size_t)g->n[1] + b->at[1]) * (size_t)g->n[0] + b->at[0];
 }
-
-#endif

@@ -26,8 +26,7 @@
 
    Letters in addition to sdm/internal/pod.h: C coefficients of all levels together, R rows (a row
    of latents gives one map or one derivative of a map). */
-#ifndef SDM_POD_INTERNAL_H
-#define SDM_POD_INTERNAL_H
+#pragma once
 
 #include "model/model_kind.h"
 #include "sdm/internal/kernels.h"
@@ -231,5 +230,3 @@ void sdm_pod_jvp(const sdm_model *m, const double *params, const double *directi
 size_t sdm_pod_vjp_scratch_bytes(const sdm_model *m);
 void sdm_pod_vjp(const sdm_model *m, const double *params, const float *adjoint, double *gradient,
                  void *scratch);
-
-#endif

@@ -1,6 +1,5 @@
 /* Integer weights of a pod network, for sdm_panel_i8(). Words and letters as in pod_internal.h. */
-#ifndef SDM_POD_QUANTISE_H
-#define SDM_POD_QUANTISE_H
+#pragma once
 
 #include "pod_internal.h"
 
@@ -25,5 +24,3 @@ typedef struct pod_integers {
    SDM_E_NOMEM. Call sdm_pod_integers_dispose() after success and after an error. */
 sdm_status sdm_pod_quantise(const sdm_pod_spec *spec, pod_integers *out, sdm_error *err);
 void sdm_pod_integers_dispose(pod_integers *q);
-
-#endif

@@ -1,7 +1,6 @@
 /* Survey of a pod network: statistics of its coefficients at random parameters, from which
    pod_quantise.c derives the integer weights. Words and letters as in pod_internal.h. */
-#ifndef SDM_POD_SURVEY_H
-#define SDM_POD_SURVEY_H
+#pragma once
 
 #include "pod_internal.h"
 
@@ -59,5 +58,3 @@ matrix sdm_pod_block_matrix(const survey *s, size_t b, size_t level);
    SDM_E_NOMEM. Call sdm_pod_survey_dispose() after success and after an error. */
 sdm_status sdm_pod_survey(const sdm_pod_spec *spec, survey *s, sdm_error *err);
 void sdm_pod_survey_dispose(survey *s);
-
-#endif

@@ -1,7 +1,6 @@
 /* The opened point network and the functions between the files of this folder. Letters as in
    sdm/internal/point_network.h. */
-#ifndef SDM_POINT_INTERNAL_H
-#define SDM_POINT_INTERNAL_H
+#pragma once
 
 #include "model/model_kind.h"
 #include "sdm/internal/point_network.h"
@@ -34,5 +33,3 @@ void sdm_point_forward(const sdm_model *m, const double *params, size_t n, float
 size_t sdm_point_jacobian_scratch_bytes(const sdm_model *m, int n_threads);
 void sdm_point_jacobian(const sdm_model *m, const double *params, float *values, float *jacobian,
                         void *scratch, int n_threads);
-
-#endif

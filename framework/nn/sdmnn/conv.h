@@ -3,8 +3,7 @@
    shifted maps is formed. Letters: I input and O output channels, T taps (27 or 1). Each element is
    always summed in the same order: the result does not depend on the number of threads. n_threads
    0: the OpenMP default. */
-#ifndef SDM_CONV_H
-#define SDM_CONV_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -59,5 +58,3 @@ struct sdm_conv_backend {
 
 /* Number of multiply-adds of sdm_conv_apply(), without those for padding. */
 double sdm_conv_work(const sdm_fmap *g, sdm_conv c);
-
-#endif

@@ -1,8 +1,7 @@
 /* The inner loops of the convolution, one table for each instruction set. Each of conv_kernels_*.c
    compiles the same source, conv_kernels_simd.h. A position is the index of a voxel or padding
    element within a channel (fmap.h). */
-#ifndef SDM_CONV_KERNELS_H
-#define SDM_CONV_KERNELS_H
+#pragma once
 
 #include <stddef.h>
 
@@ -33,6 +32,4 @@ typedef struct conv_table {
 extern const conv_table sdm_conv_generic;
 #if defined(__x86_64__)
 extern const conv_table sdm_conv_avx2, sdm_conv_avx512;
-#endif
-
 #endif

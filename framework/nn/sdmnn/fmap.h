@@ -8,8 +8,7 @@
 
    A pointer to a feature map points to voxel (0, 0, 0) of its first channel. Every operator keeps
    the padding zero. No function allocates memory. */
-#ifndef SDM_FMAP_H
-#define SDM_FMAP_H
+#pragma once
 
 #include <stddef.h>
 
@@ -40,5 +39,3 @@ void sdm_fmap_clear_pads(const sdm_fmap *g, size_t first, size_t last, float *ch
    sdm_fmap_write() copies one channel to map[nz][ny][nx]. */
 void sdm_fmap_read(const sdm_fmap *g, const float *map, float *channel);
 void sdm_fmap_write(const sdm_fmap *g, const float *channel, float *map);
-
-#endif

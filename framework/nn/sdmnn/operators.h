@@ -2,8 +2,7 @@
    channels, B batch, I inputs, O outputs. Each element is computed by one thread in a fixed order,
    so that the result does not depend on n_threads. n_threads >= 1; the sdm_dense functions also
    accept 0, the OpenMP default. */
-#ifndef SDM_OPERATORS_H
-#define SDM_OPERATORS_H
+#pragma once
 
 #include <stdint.h>
 
@@ -44,5 +43,3 @@ void sdm_dense_forward(size_t batch, size_t in, size_t out, const float *w, cons
  * dx is NULL, dx[B][I] = dy w. */
 void sdm_dense_backward(size_t batch, size_t in, size_t out, const float *w, const float *x,
                         const float *dy, float *dw, float *db, float *dx, int n_threads);
-
-#endif

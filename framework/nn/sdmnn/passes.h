@@ -2,8 +2,7 @@
    slope, tangent and back are blocks of p->floats floats; maps, tangent and back must have been
    cleared once by sdm_sdmnn_plan_clear(). A pass with slopes needs a plan that was made with
    `keep`. n_threads >= 1. */
-#ifndef SDM_SDMNN_PASSES_H
-#define SDM_SDMNN_PASSES_H
+#pragma once
 
 #include "plan.h"
 
@@ -40,5 +39,3 @@ void sdm_sdmnn_pass_tangent(const sdmnn_plan *p, const sdmnn_layers *w, const fl
 void sdm_sdmnn_pass_backward(const sdmnn_plan *p, const sdmnn_layers *w, const float *maps,
                              const float *slope, const float *map, float *back, float *volume,
                              float *gradient, int n_threads);
-
-#endif

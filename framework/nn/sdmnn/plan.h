@@ -2,8 +2,7 @@
    layers to the map, with the offset of every feature map in one block of memory, called the maps.
    Slopes, gradients and tangents are further blocks with the same offsets. A concatenation needs no
    step, because the feature maps that it joins are stored one after the other. */
-#ifndef SDM_SDMNN_PLAN_H
-#define SDM_SDMNN_PLAN_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -67,5 +66,3 @@ static inline size_t sdmnn_conv_weights(const sdmnn_step *s)
 {
     return s->conv.in * s->conv.out * s->conv.taps;
 }
-
-#endif

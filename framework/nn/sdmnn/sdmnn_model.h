@@ -5,8 +5,7 @@
      sdmnn.dense   floats: w1[W][P], b1[W], b2[cells], then the biases of every convolution
      sdmnn.volume  w2[cells][W] in panels (sdm/internal/kernels.h) of floats or halves
      sdmnn.conv    w[outputs][inputs][taps] of every convolution, floats or halves */
-#ifndef SDM_SDMNN_MODEL_H
-#define SDM_SDMNN_MODEL_H
+#pragma once
 
 #include "model/model_kind.h"
 #include "passes.h"
@@ -49,5 +48,3 @@ void sdm_sdmnn_model_jvp(const sdm_model *m, const double *params, const double 
 size_t sdm_sdmnn_vjp_scratch_bytes(const sdm_model *m);
 void sdm_sdmnn_model_vjp(const sdm_model *m, const double *params, const float *adjoint,
                          double *gradient, void *scratch);
-
-#endif

@@ -1,6 +1,5 @@
 /* Gaussian smoothing and the Laplacian of packed fields on a grid. */
-#ifndef FIT_BLUR_H
-#define FIT_BLUR_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -27,5 +26,3 @@ void sdm_fit_blur(const sdm_grid *g, size_t n_fields, double variance, bool spli
  * blur (mm) this is the derivative of the first field by that sd. */
 void sdm_fit_laplacian(const sdm_grid *g, size_t n_fields, double scale, int n_threads,
                        double *packed);
-
-#endif

@@ -1,6 +1,5 @@
 /* Cavities: spaces of an image that look like the inside of the shape but are wider than it. */
-#ifndef FIT_CAVITY_H
-#define FIT_CAVITY_H
+#pragma once
 
 #include "sdm/fit.h"
 
@@ -12,5 +11,3 @@
    blur too wide for the grid. The same bits for any number of threads. */
 sdm_status sdm_fit_mask_cavities(const sdm_fit_target *target, const sdm_fit_opts *opts,
                                  float **values, size_t *count, sdm_error *err);
-
-#endif

@@ -1,6 +1,5 @@
 /* Exact Euclidean distance transform of a grid. */
-#ifndef FIT_DISTANCE_TRANSFORM_H
-#define FIT_DISTANCE_TRANSFORM_H
+#pragma once
 
 #include "sdm/grid.h"
 
@@ -8,5 +7,3 @@
    voxel that is 0; INFINITY where there is none. n_threads >= 1; the bits of the result do not
    depend on it. */
 sdm_status sdm_fit_distance_transform(const sdm_grid *g, int n_threads, float *f, sdm_error *err);
-
-#endif

@@ -1,6 +1,5 @@
 /* Interpolation of fields between the voxels of their grid. */
-#ifndef FIT_INTERPOLATE_H
-#define FIT_INTERPOLATE_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -28,5 +27,3 @@ double sdm_fit_interpolate(const fit_field *f, const double x[3]);
  * the grid, per mm) and the values of the other fields, rest[n_fields - 1]. [any thread] */
 double sdm_fit_interpolate_all(const fit_field *f, const double x[3], double gradient[3],
                                double *rest);
-
-#endif

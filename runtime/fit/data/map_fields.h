@@ -1,7 +1,6 @@
 /* Maps of the shape in its own frame, and the fields made from them: the signed distance or the
  * share, with their derivatives. */
-#ifndef FIT_MAP_FIELDS_H
-#define FIT_MAP_FIELDS_H
+#pragma once
 
 #include "interpolate.h"
 #include "unknowns.h"
@@ -66,5 +65,3 @@ sdm_status sdm_fit_extent(const fit_maps *maps, fit_extent *out, sdm_error *err)
 
 /* Radius (mm) of the largest ball inside the shape, centred on a voxel of the map. */
 double sdm_fit_inradius(const fit_maps *maps);
-
-#endif

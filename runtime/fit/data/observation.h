@@ -1,7 +1,6 @@
 /* Observation models of images, label maps and points: how likely the value of a sample is, given
  * the field at the sample. */
-#ifndef FIT_OBSERVATION_H
-#define FIT_OBSERVATION_H
+#pragma once
 
 #include "unknowns.h"
 
@@ -96,5 +95,3 @@ void sdm_fit_moments_apply(const fit_observation *obs, const fit_moments *m, con
  * less the share of the shape. Partial volume only. */
 void sdm_fit_outside_shares(const fit_observation *obs, double value, const float *log_weight,
                             double field, double *part);
-
-#endif

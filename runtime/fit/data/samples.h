@@ -1,6 +1,5 @@
 /* Samples: the voxels or points that a fit uses, and the field of the shape there. */
-#ifndef FIT_SAMPLES_H
-#define FIT_SAMPLES_H
+#pragma once
 
 #include "map_fields.h"
 #include "observation.h"
@@ -76,5 +75,3 @@ sdm_status sdm_fit_samples_evaluate(fit_samples *samples, const fit_maps *maps,
  * t. */
 void sdm_fit_to_shape(const fit_state *s, const double x[3], double y[3]);
 void sdm_fit_to_world(const fit_state *s, const double y[3], double x[3]);
-
-#endif

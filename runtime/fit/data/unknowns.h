@@ -1,6 +1,5 @@
 /* The unknowns of a fit and their order in vectors and matrices. */
-#ifndef FIT_UNKNOWNS_H
-#define FIT_UNKNOWNS_H
+#pragma once
 
 #include "sdm/fit.h"
 
@@ -35,5 +34,3 @@ static inline size_t fit_at_rotation(size_t n_params) { return n_params; }
 static inline size_t fit_at_translation(size_t n_params) { return n_params + 3; }
 static inline size_t fit_at_blur(size_t n_params) { return n_params + 6; }
 static inline size_t fit_columns(size_t n_params) { return n_params + 7; }
-
-#endif

@@ -1,6 +1,5 @@
 /* Anderson acceleration of fixed-point iterations x -> g(x). */
-#ifndef FIT_ANDERSON_H
-#define FIT_ANDERSON_H
+#pragma once
 
 #include "fit/data/unknowns.h"
 
@@ -24,5 +23,3 @@ typedef struct fit_anderson {
    more than max_change. n <= FIT_ANDERSON_MAX, depth <= FIT_ANDERSON_DEPTH. */
 void sdm_fit_anderson_mix(fit_anderson *m, size_t depth, size_t n, const double *x, double *y,
                           double max_change);
-
-#endif

@@ -5,8 +5,7 @@
    Its gradient jumps there, and steps along it oscillate. The mean of the derivative over an
    interval is a difference quotient of the log-likelihood, which is continuous (Ermoliev, Norkin
    and Wets 1995). Pose and tissues cause no such kinks: their derivatives are not averaged. */
-#ifndef FIT_AVERAGED_GRADIENT_H
-#define FIT_AVERAGED_GRADIENT_H
+#pragma once
 
 #include "problem.h"
 
@@ -21,5 +20,3 @@ void sdm_fit_averaging_widths(const fit_problem *p, double *half_width);
    +-half_width, cut off at the bounds of the parameters. Computes two maps for each parameter, and
    leaves problem->maps out of date. */
 sdm_status sdm_fit_average_gradient(fit_problem *p, const double *half_width, sdm_error *err);
-
-#endif

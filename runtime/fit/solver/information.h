@@ -1,6 +1,5 @@
 /* Sums over all samples: log-likelihood, gradient, information matrices, moments of the tissues. */
-#ifndef FIT_INFORMATION_H
-#define FIT_INFORMATION_H
+#pragma once
 
 #include "fit/data/samples.h"
 
@@ -36,5 +35,3 @@ double sdm_fit_samples_log_likelihood(const fit_samples *samples, const fit_maps
 /* Moments of the tissues over all samples, see sdm_fit_moments_add(). */
 void sdm_fit_samples_moments(const fit_samples *samples, const fit_observation *obs, int n_threads,
                              fit_moments *out);
-
-#endif

@@ -1,6 +1,5 @@
 /* Newton's method: from a state to the nearest maximum of the posterior. */
-#ifndef FIT_NEWTON_H
-#define FIT_NEWTON_H
+#pragma once
 
 #include "problem.h"
 
@@ -43,5 +42,3 @@ sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newto
    rotation step (rad) is a rotation vector about the world's axes, applied after the pose. */
 void sdm_fit_state_move(const fit_problem *p, const fit_state *from, const double *step,
                         fit_state *to);
-
-#endif

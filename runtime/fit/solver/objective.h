@@ -1,6 +1,5 @@
 /* The objective that a fit maximises: log-likelihood + log prior. */
-#ifndef FIT_OBJECTIVE_H
-#define FIT_OBJECTIVE_H
+#pragma once
 
 #include "problem.h"
 
@@ -20,5 +19,3 @@ double sdm_fit_objective(const fit_problem *p);
    anew; samples and information stay. */
 sdm_status sdm_fit_log_likelihood(fit_problem *p, const double *params, double *log_likelihood,
                                   sdm_error *err);
-
-#endif

@@ -1,6 +1,5 @@
 /* Prior densities of the shape parameters and the pose. */
-#ifndef FIT_PRIOR_H
-#define FIT_PRIOR_H
+#pragma once
 
 #include "problem.h"
 
@@ -23,5 +22,3 @@ double sdm_fit_prior(const fit_problem *p, const fit_state *s, double *gradient,
    over all rotations, and a sd of the shape's reach for translations. This keeps the steps finite
    along directions that the data leave open, and does not move the maximum. */
 void sdm_fit_add_weak_prior(const fit_problem *p, double *a);
-
-#endif

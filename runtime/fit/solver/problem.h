@@ -17,8 +17,7 @@
      of expectation-maximisation); `observed` accounts for the unknown tissues (Louis 1982).
    - evidence: log-likelihood gained by the shape over a mixture of the same tissues without a
      shape, less the cost of the shape's unknowns (Schwarz 1978). */
-#ifndef FIT_PROBLEM_H
-#define FIT_PROBLEM_H
+#pragma once
 
 #include "information.h"
 
@@ -72,5 +71,3 @@ static inline bool fit_mean_is_kept(const fit_problem *p, size_t i)
 {
     return p->opts->keep_appearance || p->absent[i - fit_columns(p->n_params)];
 }
-
-#endif

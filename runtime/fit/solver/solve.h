@@ -1,6 +1,5 @@
 /* Small symmetric linear systems. Matrices are [n][n], row-major, n <= FIT_UNKNOWNS_MAX. */
-#ifndef FIT_SOLVE_H
-#define FIT_SOLVE_H
+#pragma once
 
 #include "fit/data/unknowns.h"
 
@@ -25,5 +24,3 @@ typedef struct fit_limits {
    with its damping and without the unknowns at limits, is not positive definite. */
 bool sdm_fit_bounded_step(size_t n, const double *a, const double *gradient, double damping,
                           const fit_limits *limits, double *step, double *work);
-
-#endif

@@ -1,6 +1,5 @@
 /* Tissue field: weights of the outside tissues that vary smoothly in space. */
-#ifndef FIT_TISSUE_FIELD_H
-#define FIT_TISSUE_FIELD_H
+#pragma once
 
 #include "problem.h"
 
@@ -11,5 +10,3 @@
    is kept, the model is not partial volume or fewer than two outside tissues are present. The same
    bits for any number of threads. */
 sdm_status sdm_fit_tissue_field_update(fit_problem *p, sdm_error *err);
-
-#endif

@@ -1,8 +1,7 @@
 /* Re-estimation of the tissues' appearance between Newton steps: weights, sd and (labels) means of
    the tissues, and the sd of points. With partial volume the means are unknowns of Newton's method.
  */
-#ifndef FIT_TISSUES_H
-#define FIT_TISSUES_H
+#pragma once
 
 #include "problem.h"
 
@@ -27,5 +26,3 @@ void sdm_fit_appearance_mark_absent(fit_problem *p);
 /* One step of re-estimation of the tissue field and the appearance in problem->state; updates
  * observation model and information. For label maps it does nothing. */
 sdm_status sdm_fit_appearance_update(fit_problem *p, sdm_error *err);
-
-#endif

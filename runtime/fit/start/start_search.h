@@ -1,6 +1,5 @@
 /* Search for the start of a fit: which rotation of the start pose leads to the best fit. */
-#ifndef FIT_START_SEARCH_H
-#define FIT_START_SEARCH_H
+#pragma once
 
 #include "fit/solver/problem.h"
 
@@ -14,5 +13,3 @@
    problem->prior becomes the start pose with this turn. Samples come from a ball that holds every
    turn of the shape. SDM_E_ARG: no sample in it. */
 sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err);
-
-#endif

@@ -2,8 +2,7 @@
 
    An array c[FIT_LAG_ZERO + 1] holds C(lag) for one half of all lags and, as its last element, for
    lag zero; C(-lag) = C(lag). Functions give the same bits for any number of threads. */
-#ifndef FIT_CORRELATION_H
-#define FIT_CORRELATION_H
+#pragma once
 
 #include "neighbours.h"
 
@@ -25,5 +24,3 @@ sdm_status sdm_fit_correlation_correct(const fit_neighbours *v, const double *in
    falling linearly to 0 just past `width`; else falling linearly from lag zero. Returns the sum
    over all lags and their opposites (c stores one of each pair), but at least C(0). */
 double sdm_fit_correlation_taper(const double *c, int width, bool flat, double *tapered);
-
-#endif

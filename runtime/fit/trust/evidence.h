@@ -1,6 +1,5 @@
 /* Figures that tell whether the image shows the shape at all. */
-#ifndef FIT_EVIDENCE_H
-#define FIT_EVIDENCE_H
+#pragma once
 
 #include "fit/solver/problem.h"
 
@@ -13,5 +12,3 @@ sdm_status sdm_fit_shapeless_log_likelihood(const fit_problem *p, double *log_li
 /* Share (0 .. 1) of the volume of the shape at problem->state that lies on voxels of the image that
  * are not NaN. 1 for points. */
 double sdm_fit_inside_share(const fit_problem *p);
-
-#endif

@@ -1,8 +1,7 @@
 /* Voxels of the inner band with their residuals and scores, and look-up of the neighbour at a lag.
  * The inner band holds the samples near the surface whose scores are not negligible, see
  * sdm_fit_in_inner_band(). Autocorrelation and score covariance are sums over its voxels. */
-#ifndef FIT_NEIGHBOURS_H
-#define FIT_NEIGHBOURS_H
+#pragma once
 
 #include "fit/solver/problem.h"
 
@@ -84,5 +83,3 @@ static inline size_t sdm_fit_neighbour(const fit_neighbours *v, size_t i, const 
     const uint32_t found = v->number_at[(k[2] * v->size[1] + k[1]) * v->size[0] + k[0]];
     return found ? found - 1 : SIZE_MAX;
 }
-
-#endif

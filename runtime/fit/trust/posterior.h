@@ -1,6 +1,5 @@
 /* Uncertainty of a fit: the covariance of the estimate, and the weights of the priors. */
-#ifndef FIT_POSTERIOR_H
-#define FIT_POSTERIOR_H
+#pragma once
 
 #include "fit/solver/problem.h"
 
@@ -16,5 +15,3 @@ sdm_status sdm_fit_posterior(const fit_problem *p, sdm_fit_result *out, sdm_erro
    sdm_fit_result.noise_factor, at least 1. */
 sdm_status sdm_fit_weigh_priors(const fit_problem *p, double *weight, double *noise_factor,
                                 sdm_error *err);
-
-#endif

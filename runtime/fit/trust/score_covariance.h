@@ -1,7 +1,6 @@
 /* Covariance of the score (the gradient of the log-likelihood) when neighbouring residuals are
  * correlated. */
-#ifndef FIT_SCORE_COVARIANCE_H
-#define FIT_SCORE_COVARIANCE_H
+#pragma once
 
 #include "fit/solver/problem.h"
 
@@ -26,5 +25,3 @@ sdm_status sdm_fit_score_covariance_create(const fit_problem *p, double model_mm
                                            const double *influence, fit_score_covariance *out,
                                            sdm_error *err);
 void sdm_fit_score_covariance_dispose(fit_score_covariance *s);
-
-#endif

@@ -1,6 +1,5 @@
 /* Signed distance by brute force: the oracle of the tests and the "naive" method. */
-#ifndef SDM_INTERNAL_BRUTE_FORCE_H
-#define SDM_INTERNAL_BRUTE_FORCE_H
+#pragma once
 
 #include "sdm/grid.h"
 #include "sdm/mesh.h"
@@ -22,5 +21,4 @@ double sdm_naive_point(const sdm_mesh *mesh, const double x[3]);
 
 #ifdef __cplusplus
 }
-#endif
 #endif

@@ -1,7 +1,6 @@
 /* Builds a mesh vertex by vertex and polygon by polygon when the counts are not known in advance.
  */
-#ifndef SDM_INTERNAL_BUILDER_H
-#define SDM_INTERNAL_BUILDER_H
+#pragma once
 
 #include "sdm/mesh.h"
 
@@ -34,6 +33,4 @@ sdm_status sdm_builder_corner(sdm_builder *b, sdm_fan *fan, uint32_t vertex, sdm
 
 #ifdef __cplusplus
 }
-#endif
-
 #endif

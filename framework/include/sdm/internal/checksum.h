@@ -1,7 +1,6 @@
 /* CRC-64/XZ (reflected polynomial 0xC96C5795D7870F42, ECMA-182); it detects every burst error of up
  * to 64 bits. */
-#ifndef SDM_CHECKSUM_H
-#define SDM_CHECKSUM_H
+#pragma once
 
 #include <stddef.h>
 #include <stdint.h>
@@ -22,5 +21,4 @@ sdm_status sdm_file_checksum(const char *path, uint64_t *crc, sdm_error *err);
 
 #ifdef __cplusplus
 }
-#endif
 #endif

@@ -1,6 +1,5 @@
 /* Monotonic clock for measuring elapsed time. */
-#ifndef SDM_CLOCK_H
-#define SDM_CLOCK_H
+#pragma once
 
 #include "sdm/export.h"
 
@@ -14,5 +13,4 @@ double sdm_clock(void);
 
 #ifdef __cplusplus
 }
-#endif
 #endif

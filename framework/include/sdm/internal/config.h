@@ -1,8 +1,7 @@
 /* The configuration of a training, read from YAML into a struct by field tables. Unknown, repeated,
  * missing and invalid keys are mistakes; every mistake is reported as a line
  * "file:line:column: message". */
-#ifndef SDM_CONFIG_H
-#define SDM_CONFIG_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -190,5 +189,4 @@ const char *sdm_config_where(const sdm_config *c, sdm_mark mark, char *buf);
 
 #ifdef __cplusplus
 }
-#endif
 #endif

@@ -10,8 +10,7 @@
      then       checksum       u64, CRC-64 of all bytes before it
      then       sections       each at a multiple of 64, gaps filled with zeros
      last 8     checksum       u64, CRC-64 of all bytes before it */
-#ifndef SDM_CONTAINER_H
-#define SDM_CONTAINER_H
+#pragma once
 
 #include <stddef.h>
 #include <stdint.h>
@@ -51,5 +50,4 @@ sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *s
 
 #ifdef __cplusplus
 }
-#endif
 #endif

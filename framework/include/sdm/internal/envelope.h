@@ -1,7 +1,6 @@
 /* One-dimensional squared distance transform, the building block of exact Euclidean distance
  * transforms. */
-#ifndef SDM_ENVELOPE_H
-#define SDM_ENVELOPE_H
+#pragma once
 
 #include <stdint.h>
 
@@ -19,5 +18,4 @@ void sdm_lower_envelope(double *f, int64_t n, double spacing, double *scratch);
 
 #ifdef __cplusplus
 }
-#endif
 #endif

@@ -1,8 +1,7 @@
 /* The configuration of an experiment, which compares methods on the same shapes: each method is a
  * row of a table, and figures reported by others can be shown beside it. The configuration is a
  * YAML file, read and checked as described in sdm/internal/config.h. */
-#ifndef SDM_EXPERIMENT_H
-#define SDM_EXPERIMENT_H
+#pragma once
 
 #include "sdm/internal/config.h"
 
@@ -190,5 +189,4 @@ void sdm_experiment_describe(bool markdown, sdm_text *out);
 
 #ifdef __cplusplus
 }
-#endif
 #endif

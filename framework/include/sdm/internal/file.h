@@ -1,7 +1,6 @@
 /* Reads whole files up to a size limit and writes files atomically: temporary name, fsync, rename,
  * fsync of the folder. */
-#ifndef SDM_FILE_H
-#define SDM_FILE_H
+#pragma once
 
 #include <stddef.h>
 #include <stdint.h>
@@ -53,5 +52,4 @@ sdm_status sdm_make_folder(const char *path, sdm_error *err);
 
 #ifdef __cplusplus
 }
-#endif
 #endif

@@ -1,7 +1,6 @@
 /* Memory functions for use inside the library (see sdm/memory.h): overflow checks, growing arrays,
  * simulated failures for tests. */
-#ifndef SDM_INTERNAL_HEAP_H
-#define SDM_INTERNAL_HEAP_H
+#pragma once
 
 #include "sdm/internal/shared.h"
 #include "sdm/memory.h"
@@ -29,5 +28,4 @@ void sdm_alloc_fail_after(unsigned long n);
 
 #ifdef __cplusplus
 }
-#endif
 #endif

@@ -5,8 +5,7 @@
    results do not depend on the number of threads; in floats they differ by rounding between
    instruction sets. All functions may be called from any thread, and all except sdm_gemm() run in
    the calling thread alone. */
-#ifndef SDM_KERNELS_H
-#define SDM_KERNELS_H
+#pragma once
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -164,5 +163,4 @@ const char *sdm_kernels_name(void);
 
 #ifdef __cplusplus
 }
-#endif
 #endif

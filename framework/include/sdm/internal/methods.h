@@ -1,7 +1,6 @@
 /* Table of all methods that compute signed distance maps: the exact engine, brute force and methods
  * of the literature. All have the same interface. Values are in mm, NEGATIVE INSIDE. */
-#ifndef SDM_METHODS_H
-#define SDM_METHODS_H
+#pragma once
 
 #include "sdm/exact.h"
 
@@ -67,5 +66,4 @@ const sdm_method *sdm_method_find(const char *name, sdm_error *err);
 
 #ifdef __cplusplus
 }
-#endif
 #endif

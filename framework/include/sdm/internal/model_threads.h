@@ -1,6 +1,5 @@
 /* Evaluation of one model by several threads. */
-#ifndef SDM_INTERNAL_MODEL_THREADS_H
-#define SDM_INTERNAL_MODEL_THREADS_H
+#pragma once
 
 #include "sdm/model.h"
 
@@ -24,5 +23,4 @@ void sdm_model_jacobian_threads(const sdm_model *m, const double *params, float 
 
 #ifdef __cplusplus
 }
-#endif
 #endif

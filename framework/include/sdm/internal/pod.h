@@ -28,8 +28,7 @@
 
    Letters: P parameters, F terms of phi, I inputs of the MLP, W its width, L = F + W latents (F
    without an MLP), K coefficients of the highest level; of block b: V_b outputs, k_b rank. */
-#ifndef SDM_POD_H
-#define SDM_POD_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -150,5 +149,4 @@ sdm_status sdm_pod_build(const sdm_pod_spec *spec, uint8_t **bytes, size_t *size
 
 #ifdef __cplusplus
 }
-#endif
 #endif

@@ -14,8 +14,7 @@
 
    Letters: P parameters, U = P + 3 elements of u, W_l also the width of layer l, K_l the number of
    inputs of layer l, H the width of the last layer. */
-#ifndef SDM_POINT_NETWORK_H
-#define SDM_POINT_NETWORK_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -80,5 +79,4 @@ sdm_status sdm_point_build(const sdm_point_spec *spec, uint8_t **bytes, size_t *
 
 #ifdef __cplusplus
 }
-#endif
 #endif

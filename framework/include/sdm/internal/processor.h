@@ -1,6 +1,5 @@
 /* Choice of the instruction set for the kernels of the map engine and of the networks. */
-#ifndef SDM_INTERNAL_PROCESSOR_H
-#define SDM_INTERNAL_PROCESSOR_H
+#pragma once
 
 #ifdef __cplusplus
 extern "C" {
@@ -26,5 +25,4 @@ int sdm_processor_select(int level);
 
 #ifdef __cplusplus
 }
-#endif
 #endif

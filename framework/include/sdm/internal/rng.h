@@ -1,8 +1,7 @@
 /* Counter-based random numbers: each is a pure function of (seed, stream, index), so results depend
  * neither on the order of calls nor on threads. Philox4x32-10 (Salmon et al., "Parallel random
  * numbers: as easy as 1, 2, 3", 2011). */
-#ifndef SDM_RNG_H
-#define SDM_RNG_H
+#pragma once
 
 #include <stdint.h>
 
@@ -37,5 +36,4 @@ static inline uint64_t sdm_mix64(uint64_t x)
 
 #ifdef __cplusplus
 }
-#endif
 #endif

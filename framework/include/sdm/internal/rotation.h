@@ -1,7 +1,6 @@
 /* Rotation matrices, rotation vectors (see sdm/pose.h) and quaternions. Angles in rad. All
  * functions can be called from any thread. */
-#ifndef SDM_INTERNAL_ROTATION_H
-#define SDM_INTERNAL_ROTATION_H
+#pragma once
 
 #include "sdm/export.h"
 
@@ -25,5 +24,4 @@ void sdm_rotation_jacobian(const double rotation[3], double j[9]);
 
 #ifdef __cplusplus
 }
-#endif
 #endif

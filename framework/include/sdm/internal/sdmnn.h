@@ -17,8 +17,7 @@
    Drop-out acts on the second convolution of levels D - 1 and D on the way down, in training only.
 
    Letters: P parameters, B batch, V voxels. */
-#ifndef SDM_SDMNN_H
-#define SDM_SDMNN_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -122,5 +121,4 @@ sdm_status sdm_sdmnn_build(const sdm_sdmnn_spec *spec, uint8_t **bytes, size_t *
 
 #ifdef __cplusplus
 }
-#endif
 #endif

@@ -1,10 +1,7 @@
 /* Visibility of functions that the libraries of sdmgen share with each other. They are exported but
  * not meant for users, and may change in every version. */
-#ifndef SDM_INTERNAL_SHARED_H
-#define SDM_INTERNAL_SHARED_H
+#pragma once
 
 #include "sdm/export.h"
 
 #define SDM_INTERNAL_API SDM_API
-
-#endif

@@ -1,7 +1,6 @@
 /* Cells of Markdown and CSV tables, appended to a text, and writing the finished table to
  * a file. */
-#ifndef SDM_TABLE_H
-#define SDM_TABLE_H
+#pragma once
 
 #include "sdm/internal/text.h"
 
@@ -35,5 +34,4 @@ sdm_status sdm_text_write(const sdm_text *t, const char *path, sdm_error *err);
 
 #ifdef __cplusplus
 }
-#endif
 #endif

@@ -1,7 +1,6 @@
 /* Growing text buffer, JSON writer, conversion of numbers independent of the locale, and search for
  * a similar name ("did you mean"). */
-#ifndef SDM_TEXT_H
-#define SDM_TEXT_H
+#pragma once
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -59,5 +58,4 @@ const char *sdm_nearest_name(const char *word, const char *const *names, size_t 
 
 #ifdef __cplusplus
 }
-#endif
 #endif

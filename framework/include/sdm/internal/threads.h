@@ -1,6 +1,5 @@
 /* Number of threads for a parallel section, and number of the calling thread. */
-#ifndef SDM_THREADS_H
-#define SDM_THREADS_H
+#pragma once
 
 #include "sdm/export.h"
 
@@ -19,5 +18,4 @@ int sdm_thread(void);
 
 #ifdef __cplusplus
 }
-#endif
 #endif

@@ -1,6 +1,5 @@
 /* Operations on three-dimensional vectors of doubles. */
-#ifndef SDM_GEOM_VEC3_H
-#define SDM_GEOM_VEC3_H
+#pragma once
 
 #include <math.h>
 
@@ -53,5 +52,3 @@ static inline void v3_perpendicular(const double u[3], double v[3])
     const double len = v3_norm(v);
     for (int i = 0; i < 3; i++) v[i] /= len;
 }
-
-#endif

@@ -1,6 +1,5 @@
 /* Training: takes a configuration and a shape, writes a model file and the other files of a run. */
-#ifndef SDM_TRAIN_H
-#define SDM_TRAIN_H
+#pragma once
 
 #include "sdm/exact.h"
 #include "sdm/internal/config.h"
@@ -81,5 +80,4 @@ void sdm_sample_params(uint64_t seed, uint64_t stream, uint64_t index, const dou
 
 #ifdef __cplusplus
 }
-#endif
 #endif

@@ -220,7 +220,7 @@ static sdm_status maximise_settled(fit_problem *p, fit_newton_opts *newton, fit_
     for (int round = 0; round < ROUNDS_MAX && !s; round++) {
         bool changed;
         double change = 0;
-        s = sdm_fit_evaluate(p, err); // the region follows the shape on these maps
+        s = sdm_fit_evaluate(p, err); // makes the maps by which samples_follow() selects voxels
         if (!s) s = samples_follow(p, &changed, err);
         if (!s && !p->samples.n)
             return sdm_fail(err, SDM_E_QUALITY,

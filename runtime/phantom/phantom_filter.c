@@ -1,5 +1,5 @@
-/* Filters along one axis: the point spread over the box of a voxel, and the smoothing of random
-   fields. */
+/* Filters along one axis: the point spread function averaged over the box of a voxel, and the
+   smoothing of random fields. */
 #include <math.h>
 
 #include "phantom_parts.h"

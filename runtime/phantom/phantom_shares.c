@@ -74,7 +74,7 @@ static sdm_status make_fine_grid(shares_job *j, const sdm_pose *pose, sdm_error 
     return SDM_OK;
 }
 
-/* The air cells that intersect the bounding box of the sub-voxels. */
+/* Lists the air cells (balls of air) that intersect the bounding box of the sub-voxels. */
 static sdm_status make_balls(shares_job *j, sdm_error *err)
 {
     double min[3] = {INFINITY, INFINITY, INFINITY}, max[3] = {-INFINITY, -INFINITY, -INFINITY};

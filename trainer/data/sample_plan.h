@@ -56,6 +56,7 @@ uint64_t trainer_sample_plan_point(const sample_plan *p, size_t index);
 void trainer_sample_plan_observe(sample_plan *p, size_t first, size_t n, const double *error);
 
 /* Call when n_taken samples are in the pool and their observed errors are recorded: plans all
-   rounds up to the one after that of sample n_taken. */
+   rounds up to and including the round after the one of sample n_taken, the next sample to be
+   taken. n_start: number of samples made before training. */
 sdm_status trainer_sample_plan_extend(sample_plan *p, const sample_space *space, size_t n_start,
                                       size_t n_taken, sdm_error *err);

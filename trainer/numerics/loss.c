@@ -65,7 +65,7 @@ double trainer_loss_map(const sdm_config *c, const float *predicted, const float
     for (size_t v = 0; v < n; v++)
         slope[v] = trainer_loss_slope(c, predicted[v], target[v], &square) / (float)n;
     if (!(c->train.eikonal > 0) || nx < 2 || ny < 2 || nz < 2) return square;
-    // eikonal term at the voxels that have three next neighbours
+    // eikonal term at the voxels that have a following neighbour along x, y and z
     const float share = 1.0f / (float)((nx - 1) * (ny - 1) * (nz - 1));
     for (size_t z = 0; z + 1 < nz; z++)
         for (size_t y = 0; y + 1 < ny; y++)

@@ -145,9 +145,9 @@ static size_t sum_ranks(const pod_state *pod, size_t first, size_t end)
     return n;
 }
 
-/* Computes the basis of block `index`, above the lowest level, from below[n][stride], whose first
-   columns are the coefficients of its children. Keeps functions whose gain exceeds min_gain, at
-   least one. */
+/* Computes the basis of block `index` of a level above the lowest. Row i of below[n][stride] begins
+   with the coefficients of the block's children for map i of n. Keeps all basis functions whose
+   gain (explained variance per weight) exceeds min_gain, and at least one. */
 static sdm_status upper_level_block(basis_work *m, size_t level, size_t index, const float *below,
                                     size_t stride, sdm_error *err)
 {

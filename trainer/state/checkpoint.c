@@ -313,7 +313,7 @@ sdm_status trainer_checkpoint_read(trainer *t, bool *found, sdm_error *err)
         t->heldout_mse = then.heldout_mse;
         t->step = then.step;
         t->phase_step = then.phase_step;
-        t->data.n_taken = (size_t)then.n_taken; // the caller makes these again
+        t->data.n_taken = (size_t)then.n_taken; // the caller makes these samples again
         if (!s) {
             t->data.n_online += t->data.n_start - (size_t)then.n_start;
             t->data.n_start = (size_t)then.n_start;

@@ -1,6 +1,7 @@
 /* The interface of a kind of network to the trainer. There are two: trainer_kind_pod
-   (pod/pod_kind.h), and trainer_kind_direct (direct/direct.h) for networks that learn by gradients
-   on the maps themselves. */
+   (pod/pod_kind.h), which computes bases first and trains their coefficients, and
+   trainer_kind_direct (direct/direct.h) for networks whose weights are all trained by gradient
+   descent on the error of the maps. */
 #pragma once
 
 #include "trainer.h"

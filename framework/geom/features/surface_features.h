@@ -52,7 +52,8 @@ typedef struct sdm_feature_group {
     float sum[4][8];
 } sdm_feature_group;
 
-/* Largest number of corners of a group; also the distance between the two lanes of a corner. */
+/* Largest number of corners of a group. Corner i uses two of the eight lanes, i and
+   i + SDM_CORNER_LANES, for its six region functions. */
 #define SDM_CORNER_LANES 4
 
 /* A feature in double, mm, for the exact distance. */

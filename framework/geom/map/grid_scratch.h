@@ -19,8 +19,8 @@ typedef struct sdm_cluster_ref {
     float shift[3];
 } sdm_cluster_ref;
 
-/* A group of features with its region functions relative to the current block; the regions of some
-   of its features meet the block. */
+/* A group of features listed for the current block, because the region of at least one of them
+   meets the block, and its region functions (the functions that bound the regions) at the block. */
 typedef struct sdm_block_group {
     /* region functions at the centre of the block, [row][lane] */
     _Alignas(64) float at_block[4][8];
@@ -78,7 +78,8 @@ typedef struct sdm_pending {
 /* Features of one kind on their way through stages 4 and 5. */
 typedef struct sdm_batch {
     sdm_block_feature feature[SDM_BATCH];
-    /* values of the functions at the centres of the vectors, [tile pair][function][vector] */
+    /* values of the region functions at the centres of the vectors of a tile, [tile
+       pair][function][vector] */
     _Alignas(64) float at_vectors[8 * SDM_BATCH][8][8];
     /* tile pairs: lane references into feature[]; the lane is the number of a tile that meets the
        feature's region */

@@ -62,8 +62,8 @@ SDM_FOR_KIND unsigned candidate_compare(sdm_candidates *c, size_t v, v8i number,
     return (unsigned)v8_greater(v8_fma(nearest, share, slack), d2);
 }
 
-/* Appends one candidate for each vector pair of the batch to scratch->candidates, which has room
-   for them. */
+/* Appends one candidate for each vector pair (a feature and a vector of voxels) of the batch to
+   scratch->candidates, which has room for them. */
 SDM_FOR_KIND void batch_measure(const block *b, int kind)
 {
     const sdm_batch *batch = b->scratch->batch;

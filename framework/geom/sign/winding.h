@@ -35,8 +35,9 @@ sdm_status sdm_winding_build(const sdm_mesh *m, const sdm_bvh *tree, const sdm_t
                              sdm_winding *w, sdm_error *err);
 void sdm_winding_dispose(sdm_winding *w);
 
-/* Winding number at x up to rounding: crossings of one ray plus the strips of the boundary, or the
- * sum over all triangles where that is faster. [any thread] */
+/* Winding number at x up to rounding: the crossings of one ray plus the solid angles of the strips
+ * that extend the boundary edges along the ray (boundary.h), or the sum over all triangles where
+ * that is faster. [any thread] */
 double sdm_winding_number(const sdm_winding *w, const double x[3]);
 
 /* Winding number at x as the sum of the solid angles of all triangles. [any thread] */

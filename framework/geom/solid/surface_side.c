@@ -187,8 +187,8 @@ static sdm_status keep_by_ray(sdm_sides *w, const double xy[2], const double x[3
         w->cap_skip = 2 * n + 16;
     }
     size_t n_skip = 0;
-    // jump: winding number inside minus winding number outside the layer at x; first: the current
-    // triangle has the lowest index among those of its orientation
+    // jump: change of the winding number from outside to inside across all coincident triangles at
+    // x; first: the current triangle has the lowest index among those of its orientation
     int jump = 1;
     bool first = true;
     w->skip[n_skip++] = t;

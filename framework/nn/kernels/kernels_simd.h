@@ -79,9 +79,9 @@ static inline vec load_half(const uint16_t *p)
             for (int j = 0; j < n; j++) store(y + (size_t)i * ldy + (size_t)(j * VW), acc[i][j]);  \
     }
 
-// Computes the outputs from o on, n registers at a time, as long as n registers are left. For each
-// number of rows the largest n in use hides the latency of the multiply-adds and still keeps all
-// sums in registers.
+// Computes the outputs from o on in blocks of n registers (n * VW outputs), as long as a whole
+// block remains. For each number of rows, the largest n that is used hides the latency of the
+// multiply-adds and still keeps all sums in registers.
 #define PANEL_STEP(suffix, rows, n)                                                                \
     for (; o + n * VW <= outputs; o += n * VW)                                                     \
         block_##suffix##_##rows##x##n(k, w + o / SDM_PANEL * SDM_PANEL * k + o % SDM_PANEL, x,     \

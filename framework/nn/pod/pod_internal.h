@@ -55,9 +55,9 @@ typedef struct pod_network {
     pod_slab *slabs;
     size_t n_slabs;
     pod_leaf *leaves; /* slab by slab; within a slab x is fastest, then y, then z */
-    /* products[i]: arguments of the matrix product of leaves[i]. Its member x is an offset within
-       the coefficients of the slab, y an offset within the line, and scale is
-       group * SDM_POD_ROWS. */
+    /* products[i]: arguments of the matrix product of leaves[i] (sdm_panel_block): x is the offset
+       of its inputs in the coefficients of the slab, y the offset of its outputs in the buffer of
+       one line of leaves, and scale is SDM_POD_ROWS times the index of its group in the slab. */
     sdm_panel_block *products;
     uint32_t *outputs;  /* [blocks] V_b, the number of outputs */
     size_t *weights_at; /* [blocks] index in `basis` of the first weight of a block */
@@ -100,8 +100,9 @@ void sdm_pod_product(sdm_pod_type type, size_t rows, size_t outputs, size_t k, c
 void sdm_pod_product_back(sdm_pod_type type, size_t outputs, size_t k, const void *weights,
                           size_t at, const float *y, float *x);
 
-/* Number of elements in the panels of outputs x k weights. For integer weights: number of bytes,
-   with n_wide wide inputs; SIZE_MAX on overflow. */
+/* Number of elements of a matrix of outputs x k weights, packed in panels of SDM_PANEL outputs. For
+   integer weights: number of bytes, where the weights of n_wide of the inputs have two bytes. Both
+   are SIZE_MAX on overflow. */
 size_t sdm_pod_count_weights(sdm_pod_type type, size_t outputs, size_t n_wide, size_t k);
 
 /* Number of inputs of a layer of the MLP. The two functions after it return the number of elements

@@ -164,7 +164,7 @@ static sdm_status read_integer_tables(const sdm_section *sections, size_t n, sdm
     if (!scale) return SDM_E_FORMAT;
     for (size_t l = 0; l < a->depth; l++) m->layer_scale[l] = scale + l * a->width;
 
-    // factors in units of the quanta, numbers of wide inputs
+    // derive to_integer = factor / quantum; read the number of wide inputs of each block
     for (size_t level = 0; level < a->levels.n; level++)
         for (size_t b = a->levels.first[level]; b < a->levels.first[level + 1]; b++) {
             const size_t at = m->coefficients_at[level] + m->blocks[b].coefficient;

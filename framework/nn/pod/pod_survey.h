@@ -20,9 +20,10 @@ typedef struct coefficient_stats {
 typedef struct survey {
     const sdm_pod_spec *spec;
     size_t *basis_at; /* [blocks + 1] index of the first weight of a block in spec->weights.basis */
-    size_t coefficients_at[SDM_POD_MAX_LEVELS + 1]; /* as in pod_network */
-    coefficient_stats *stats;                       /* [C + L] all coefficients, then the latents */
-    double variance; /* mean square of (map - mean map) over voxels and parameters, mm^2 */
+    /* index of the first coefficient of each level, as in pod_network */
+    size_t coefficients_at[SDM_POD_MAX_LEVELS + 1];
+    coefficient_stats *stats; /* [C + L] all coefficients, then the latents */
+    double variance;          /* mean square of (map - mean map) over voxels and parameters, mm^2 */
 } survey;
 
 /* The matrix from k inputs to `outputs` outputs: weight (o, i) is w[o * row + i * col]. */

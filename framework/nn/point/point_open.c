@@ -26,8 +26,8 @@ static sdm_status read_architecture(sdm_lines *lines, size_t n_params, point_net
     return sdm_lines_check(lines, err);
 }
 
-// Returns R, the number of points whose activations fit in the second-level cache: 48 .. 192 and a
-// multiple of 12, because the kernels process 6 rows at a time.
+// Returns R, the number of points whose activations fit in the second-level cache: 48 .. 192, and a
+// multiple of 12, so that the kernels, which process 6 rows at a time, have whole passes.
 static size_t rows_at_once(size_t width)
 {
     const size_t n = 98304 / width / 12 * 12;

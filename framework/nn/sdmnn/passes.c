@@ -15,7 +15,7 @@ static void maps_multiply(const sdm_fmap *g, size_t channels, float *a, const fl
     }
 }
 
-// copies the volume to the maps and up-samples it to level 0
+// copies the input volume to its feature map and up-samples it to the resolution of level 0
 static void volume_enter(const sdmnn_plan *p, const float *volume, float *maps, int n_threads)
 {
     sdm_fmap_read(&p->cell, volume, maps + p->volume);

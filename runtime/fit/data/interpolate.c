@@ -129,7 +129,7 @@ double sdm_fit_interpolate_all(const fit_field *f, const double x[3], double gra
             add_rest(f, &t, row, w, others);
         }
     for (size_t q = 1; q < f->n_fields; q++) rest[q - 1] = others[q - 1];
-    // gradient along the axes of the grid, then rotated into the frame of the grid
+    // gradient along the axes of the grid, then rotated into the coordinates of grid->origin
     double along[3] = {dot(t.slope[0], sum), dot(t.weight[0], by_y), dot(t.weight[0], by_z)};
     for (int a = 0; a < 3; a++) {
         along[a] /= f->grid->spacing[a];

@@ -65,7 +65,8 @@ static inline const float *fit_sample_weights(const fit_samples *s, size_t i)
 /* First field at x of the world (mm), with the shape at the pose of s. */
 double sdm_fit_field_at(const fit_field *f, const fit_state *s, const double x[3]);
 
-/* Computes field, row and jacobian of every sample from maps->packed, which must hold derivatives.
+/* Sets the members field, row and jacobian of *samples for every sample from maps->packed, which
+ * must hold derivatives.
  */
 sdm_status sdm_fit_samples_evaluate(fit_samples *samples, const fit_maps *maps,
                                     const fit_observation *obs, const fit_state *state,

@@ -220,7 +220,7 @@ static void step_accelerate(const fit_problem *p, const fit_newton_opts *opts, f
                             double *step)
 {
     const size_t n = p->information.n_unknowns;
-    // the point before the plain step, and its image
+    // the point before the plain step, and (r->to) the point to which the plain step leads
     double at[FIT_ANDERSON_MAX];
     for (size_t i = 0; i < n; i++) {
         at[i] = r->position[i];

@@ -131,7 +131,8 @@ static sdm_status bias_create(const fit_neighbours *v, fit_bias *t, sdm_error *e
     return s;
 }
 
-// rows of Omega X: correlation-weighted sums of the roots of all neighbours
+// t->around = Omega X: for each voxel the sum over its neighbours n of correlation * row n of X,
+// where row n of X is the root x_n of voxel n (its score is e_n x_n)
 static void bias_neighbour_sums(const fit_neighbours *v, const double *tapered, int width,
                                 int n_threads, fit_bias *t)
 {

@@ -3,9 +3,10 @@
 
 #include "fit/solver/problem.h"
 
-/* *log_likelihood: log-likelihood of the sample values under a mixture of the fit's tissues,
-   re-estimated, without a shape. The weights are the same for every sample, except that the tissue
-   field distributes the weight of the outside tissues. Images only. */
+/* *log_likelihood: log-likelihood of the sample values without a shape, under a mixture of the
+   fit's tissues whose weights, means and deviations are estimated anew. The weights are the same
+   for every sample, except that the tissue field divides the total weight of the outside tissues
+   among them at each sample. Images only. */
 sdm_status sdm_fit_shapeless_log_likelihood(const fit_problem *p, double *log_likelihood,
                                             sdm_error *err);
 

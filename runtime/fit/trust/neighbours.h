@@ -10,7 +10,8 @@ enum {
     FIT_LAG_MAX = 10,
     /* number of lags along an axis */
     FIT_LAGS = 2 * FIT_LAG_MAX + 1,
-    /* number of lag zero; numbers below it are one half of all lags, those above their opposites */
+    /* index of lag zero; the lags of smaller index are one half of all others, those of larger
+     * index are their opposites */
     FIT_LAG_ZERO = FIT_LAGS * FIT_LAGS * FIT_LAGS / 2
 };
 

@@ -208,8 +208,9 @@ typedef struct sdm_fit_opts {
        gradients follow such an end, and with exact maps every converged
        fit, too */
     double eps;
-    /* > 0: the same limit for steps with the averaged gradient and exact maps, in the main phase or
-       the polish, and for all steps with exact maps where the parameters are kept */
+    /* > 0: replaces eps for steps with exact maps that use the averaged gradient, in the main phase
+       and in the polish. If the parameters are kept, it replaces eps for all steps with exact
+       maps */
     double polish_eps;
     /* number of threads, >= 0; 0: the OpenMP default. The result has the same bits for every
        value */
@@ -267,8 +268,9 @@ typedef struct sdm_fit_result {
     double *objective;
     /* log-likelihood of the target at the estimate */
     double log_likelihood;
-    /* image: log-likelihood of the same voxels under a mixture of tissues without a shape, whose
-       outside tissues have the same weights in space; other targets: NaN */
+    /* image: log-likelihood of the same voxels without a shape, under a mixture of all tissues in
+       which the outside tissues keep the relative weights in space of the fit; other targets:
+       NaN */
     double log_likelihood_without;
     /* image: evidence of the shape: its gain in log-likelihood, corrected for correlated voxels,
        less the cost of its unknowns (Schwarz 1978). At most 0: the image shows no such shape. Other

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# checksums.sh SDMGEN SOURCE_FOLDER NEW_FOLDER: runs a few hundred commands of the program (training of every kind of network, maps by every
+# checksums.sh SDMGEN SOURCE_FOLDER NEW_FOLDER: runs about 150 commands of the program (training of every kind of network, maps by every
 # method, level sets, images, surfaces, phantoms, fits) in NEW_FOLDER and prints a checksum for each output. Two programs that print the same
 # list compute the same bits: use it before and after a change that must not change results.
 #   tests/house/checksums.sh build/before/cli/sdmgen . /tmp/before >before.txt

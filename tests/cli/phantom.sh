@@ -97,6 +97,7 @@ expect 5 'rx.* 9' sdmgen phantom $small -p rx=9 -o x.nii --label l.nii --truth t
 expect 5 'rx.* nan' sdmgen phantom $small -p rx=nan -o x.nii
 expect 2 "did you mean 'ellipsoid'" sdmgen phantom --shape elipsoid -o x.nii
 # Work of long duration stops on SIGTERM.
-expect 130 'stopped on request|interrupted' timeout --preserve-status -s TERM 1 "$program" phantom --shape ellipsoid --spacing 0.03 --supersample 16 -o x.nii
+# --foreground: without it timeout sends the signal twice, and a second one stops the program at once, without a message
+expect 130 'stopped on request|interrupted' timeout --foreground --preserve-status -s TERM 1 "$program" phantom --shape ellipsoid --spacing 0.03 --supersample 16 -o x.nii
 absent x.nii x.vdb x.npy x.txt l.nii t.json nowhere
 finish

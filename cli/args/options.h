@@ -70,8 +70,8 @@ typedef struct cli_list {
     size_t n;
 } cli_list;
 
-/* A pose: for `phantom` that of the shape, for `fit` the start pose. Each vector is NaN when its
- * option is missing. */
+/* A pose: the pose of the shape for `phantom`, the start pose for `fit`. Each vector is NaN when
+ * its option is missing. */
 typedef struct cli_pose_args {
     double rotation[3];    /* rotation vector (axis times angle), rad */
     double translation[3]; /* LPS mm */

@@ -12,7 +12,7 @@
 static bool quiet_wanted;
 static volatile sig_atomic_t interrupts;
 
-int cli_exit_code(sdm_status status)
+static int exit_code_of(sdm_status status)
 {
     switch (status) {
     case SDM_OK:
@@ -44,7 +44,8 @@ bool cli_has_terminal(void)
     return isatty(STDERR_FILENO) && term && *term && strcmp(term, "dumb");
 }
 
-bool cli_wants_colour(void)
+/* True when stderr takes colours: a terminal, not TERM=dumb, NO_COLOR unset or empty. */
+static bool wants_colour(void)
 {
     const char *no = getenv("NO_COLOR");
     return cli_has_terminal() && !(no && *no);
@@ -67,7 +68,7 @@ static bool has_place(const char *line, size_t length)
 
 int cli_report(const sdm_error *err)
 {
-    const bool colour = cli_wants_colour();
+    const bool colour = wants_colour();
     const char *text = err->text[0] ? err->text : sdm_status_name(err->status);
     while (*text) {
         const size_t length = strcspn(text, "\n");
@@ -77,7 +78,7 @@ int cli_report(const sdm_error *err)
         fprintf(stderr, "%.*s\n", (int)length, text);
         text += length + (text[length] == '\n');
     }
-    return cli_exit_code(err->status);
+    return exit_code_of(err->status);
 }
 
 void cli_notice(const char *fmt, ...)

@@ -16,7 +16,6 @@ enum {
     CLI_EXIT_RANGE = 5,
     CLI_EXIT_INTERRUPTED = 130
 };
-int cli_exit_code(sdm_status status);
 
 /* true: no notices and no progress from now on. */
 void cli_set_quiet(bool quiet);
@@ -29,9 +28,6 @@ int cli_report(const sdm_error *err);
 
 /* Prints "sdmgen: text" on stderr, unless quiet. */
 void cli_notice(const char *fmt, ...) SDM_PRINTF(1, 2);
-
-/* True when stderr takes colours: a terminal, not TERM=dumb, NO_COLOR unset or empty. */
-bool cli_wants_colour(void);
 
 /* True when stderr is a terminal that can redraw a line: TERM is set and not "dumb". */
 bool cli_has_terminal(void);

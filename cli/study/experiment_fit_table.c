@@ -65,8 +65,17 @@ static const cli_experiment_fit *find_exact_fit(const cli_experiment_result *exa
     return other;
 }
 
-cli_experiment_spread cli_experiment_fit_spread(const cli_experiment_run *run,
-                                                const cli_experiment_result *r, size_t param)
+/* Errors of one parameter over the fits that converged; NaN: unknown. */
+typedef struct fit_spread {
+    double difference; /* mean abs(estimate - estimate of the exact fit) */
+    double error;      /* mean abs(estimate - truth) */
+    double sd;         /* mean standard deviation */
+    double within; /* fraction with abs(estimate - truth) <= 3 sd, without estimates at a bound */
+    double reference; /* published difference */
+} fit_spread;
+
+static fit_spread spread_of(const cli_experiment_run *run, const cli_experiment_result *r,
+                            size_t param)
 {
     const cli_experiment_fits *f = r->fits;
     const cli_experiment_result *exact = find_exact(run, r);
@@ -84,11 +93,11 @@ cli_experiment_spread cli_experiment_fit_spread(const cli_experiment_run *run,
         n_pairs++;
         difference += fabs(one->found[param] - other->found[param]);
     }
-    return (cli_experiment_spread){.difference = n_pairs > 0 ? difference / n_pairs : NAN,
-                                   .error = n > 0 ? error / n : NAN,
-                                   .sd = n > 0 ? sd / n : NAN,
-                                   .within = n_free > 0 ? within / n_free : NAN,
-                                   .reference = reference_difference(r, f->name[param])};
+    return (fit_spread){.difference = n_pairs > 0 ? difference / n_pairs : NAN,
+                        .error = n > 0 ? error / n : NAN,
+                        .sd = n > 0 ? sd / n : NAN,
+                        .within = n_free > 0 ? within / n_free : NAN,
+                        .reference = reference_difference(r, f->name[param])};
 }
 
 static bool has_fits(const cli_experiment_result *r)
@@ -109,7 +118,7 @@ void cli_experiment_fit_markdown(const cli_experiment_run *run, sdm_text *t)
     for (size_t i = 0; i < run->e->n_rows; i++) {
         const cli_experiment_result *r = &run->results[i];
         for (size_t k = 0; has_fits(r) && k < r->fits->n_params; k++) {
-            const cli_experiment_spread s = cli_experiment_fit_spread(run, r, k);
+            const fit_spread s = spread_of(run, r, k);
             const double cells[] = {s.difference, s.reference, s.error, s.sd, s.within};
             sdm_text_add(t, "| ");
             sdm_markdown_text(t, r->row->title);
@@ -130,7 +139,7 @@ void cli_experiment_fit_json(const cli_experiment_run *run, const cli_experiment
     if (!has_fits(r)) return;
     sdm_json_open(j, "parameters", '[');
     for (size_t k = 0; k < r->fits->n_params; k++) {
-        const cli_experiment_spread s = cli_experiment_fit_spread(run, r, k);
+        const fit_spread s = spread_of(run, r, k);
         sdm_json_open(j, NULL, '{');
         sdm_json_text(j, "name", r->fits->name[k]);
         sdm_json_text(j, "unit", r->fits->unit[k]);
@@ -152,7 +161,7 @@ static void add_parameters(const cli_experiment_run *run, sdm_text *t)
     for (size_t i = 0; i < run->e->n_rows; i++) {
         const cli_experiment_result *r = &run->results[i];
         for (size_t k = 0; has_fits(r) && k < r->fits->n_params; k++) {
-            const cli_experiment_spread s = cli_experiment_fit_spread(run, r, k);
+            const fit_spread s = spread_of(run, r, k);
             const double cells[] = {s.difference, s.reference, s.error, s.sd, s.within};
             sdm_csv_text(t, r->row->title);
             sdm_text_add(t, ",%s,%s", r->fits->name[k], r->fits->unit[k]);

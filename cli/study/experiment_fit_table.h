@@ -3,17 +3,6 @@
 
 #include "experiment_fits.h"
 
-/* Errors of one parameter over the fits that converged; NaN: unknown. */
-typedef struct cli_experiment_spread {
-    double difference; /* mean abs(estimate - estimate of the exact fit) */
-    double error;      /* mean abs(estimate - truth) */
-    double sd;         /* mean standard deviation */
-    double within; /* fraction with abs(estimate - truth) <= 3 sd, without estimates at a bound */
-    double reference; /* published difference */
-} cli_experiment_spread;
-cli_experiment_spread cli_experiment_fit_spread(const cli_experiment_run *run,
-                                                const cli_experiment_result *r, size_t param);
-
 /* After all rows: sets the time of rows of the naive engine to (maps of the exact engine's fits) *
  * (time of one naive map); naive fits are not run. */
 void cli_experiment_fit_finish(const cli_experiment_run *run);

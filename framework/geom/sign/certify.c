@@ -19,7 +19,8 @@ typedef struct certify_job {
     // [nz][ny][pitch] one bit per voxel, set if a recomputed sign differs from the map; no two
     // threads write to the same byte
     uint8_t *wrong;
-    uint8_t *below; // the same layout: bits of voxels with a winding number < -1/2
+    // laid out like `wrong`: one bit per voxel, set if its winding number is < -1/2
+    uint8_t *below;
     size_t pitch;
 } certify_job;
 

@@ -257,11 +257,6 @@ void sdm_conv_gradient(const sdm_fmap *g, sdm_conv c, const float *x, const floa
     }
 }
 
-double sdm_conv_work(const sdm_fmap *g, sdm_conv c)
-{
-    return (double)g->n[0] * (double)g->n[1] * (double)g->n[2] * (double)(c.in * c.out * c.taps);
-}
-
 const sdm_conv_backend *sdm_conv_native(void)
 {
     static const sdm_conv_backend native = {.name = "native",

@@ -55,6 +55,3 @@ struct sdm_conv_backend {
     void (*gradient)(const sdm_fmap *g, sdm_conv c, const float *x, const float *dy, float *dw,
                      float *db, int n_threads);
 };
-
-/* Number of multiply-adds of sdm_conv_apply(), without those for padding. */
-double sdm_conv_work(const sdm_fmap *g, sdm_conv c);

@@ -15,39 +15,6 @@
 #include "state/new_samples.h"
 #include "state/progress.h"
 
-sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape, double *min,
-                            double *max, sdm_error *err)
-{
-    size_t n;
-    const sdm_param *params = sdm_instance_params(shape, &n);
-    char where[1200];
-    for (size_t i = 0; i < n; i++) min[i] = params[i].min, max[i] = params[i].max;
-    for (size_t r = 0; r < config->shape.n_ranges; r++) {
-        const sdm_config_range *range = &config->shape.ranges[r];
-        const int i = sdm_instance_param_index(shape, range->name);
-        sdm_config_where(config, range->mark, where);
-        // no such parameter: suggest the most similar name
-        if (i < 0) {
-            const char *names[SDM_MAX_PARAMS];
-            for (size_t k = 0; k < n && k < SDM_MAX_PARAMS; k++) names[k] = params[k].name;
-            const char *near =
-                sdm_nearest_name(range->name, names, n < SDM_MAX_PARAMS ? n : SDM_MAX_PARAMS);
-            return sdm_fail(err, SDM_E_CONFIG, "%s: shape '%s' has no parameter '%s'%s%s%s", where,
-                            sdm_instance_shape(shape)->name, range->name,
-                            near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
-        }
-        // narrowing is allowed, widening is not
-        if (!(range->min >= params[i].min && range->max <= params[i].max &&
-              range->min < range->max))
-            return sdm_fail(err, SDM_E_CONFIG,
-                            "%s: range [%g, %g] of '%s' must lie within [%g, %g] of shape '%s'",
-                            where, range->min, range->max, range->name, params[i].min,
-                            params[i].max, sdm_instance_shape(shape)->name);
-        min[i] = range->min, max[i] = range->max;
-    }
-    return SDM_OK;
-}
-
 /* Checks the shape against the configuration; allocates the data set and the blocks of its maps. */
 static sdm_status train_set_up(trainer *t, sdm_error *err)
 {
@@ -59,6 +26,7 @@ static sdm_status train_set_up(trainer *t, sdm_error *err)
                         d->n_params, SDM_POD_MAX_PARAMS);
     sdm_status s = trainer_export_prepare(t, err);
     if (!s) s = sdm_train_ranges(c, t->shape, d->min, d->max, err);
+    if (!s) s = sdm_train_distributions(c, t->shape, d->min, d->max, d->distribution, err);
     if (s) return s;
     d->shape = t->shape;
     d->grid = &c->grid;

@@ -77,6 +77,11 @@ static const sdm_field SHAPE[] = {
     SPECIAL("ranges", sdm_read_key_ranges, sdm_dump_key_ranges, "mapping", "parameter: [min, max]",
             "the shape's own", "",
             "parameter ranges on which the network is trained, within those of the shape"),
+    SPECIAL("distribution", sdm_read_key_distribution, sdm_dump_key_distribution, "name or mapping",
+            "shape, uniform, normal; or parameter: one of these or {mean: x, deviation: y}",
+            "shape", "",
+            "distribution of the parameters of random shapes, within their ranges; shape: as the "
+            "shape states it"),
 };
 
 static const sdm_field GRID[] = {
@@ -182,8 +187,9 @@ static const sdm_field DATA[] = {
      .def = "uniform",
      .unit = "",
      .kinds = POD,
-     .help = "distribution of the online shapes: uniform over the parameters (Sobol'), or denser "
-             "where the error of the network is larger"},
+     .help =
+         "uniform: the online shapes follow shape.distribution (Sobol'); error: they are denser "
+         "where the error of the network is larger"},
     ROW("static_share", REAL, data.static_share, 0, 1, "0.1", "",
         "fraction of each batch drawn from the static grid"),
     ROW("memory_gb", REAL, data.memory_gb, 0.001, 1e6, "6", "GB", "memory budget for maps"),

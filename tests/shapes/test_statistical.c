@@ -115,6 +115,10 @@ static void test_mesh_is_mean_plus_modes(void **state)
             assert_string_equal(params[2].name, "m3");
             assert_string_equal(params[2].unit, "sd");
             assert_true(params[1].min == -3 && params[1].max == 3 && params[1].def == 0);
+            const sdm_distribution *d = sdm_instance_distributions(s);
+            for (size_t k = 0; k < 3; k++)
+                assert_true(d[k].kind == SDM_DISTRIBUTION_NORMAL && d[k].mean == 0 &&
+                            d[k].deviation == 1);
             sdm_mesh m = {0};
             double v[3 * 3 * N_VERT];
             assert_int_equal(sdm_instance_mesh(s, P, &m, &err), SDM_OK);

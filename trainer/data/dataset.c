@@ -78,7 +78,11 @@ void trainer_dataset_dispose(dataset *d)
 
 sample_space trainer_dataset_space(const dataset *d)
 {
-    return (sample_space){.n_params = d->n_params, .min = d->min, .max = d->max, .seed = d->seed};
+    return (sample_space){.n_params = d->n_params,
+                          .min = d->min,
+                          .max = d->max,
+                          .distribution = d->distribution,
+                          .seed = d->seed};
 }
 
 size_t trainer_dataset_slot(const dataset *d, size_t index)

@@ -17,6 +17,7 @@ typedef struct dataset {
     const sdm_pod_block *blocks;
     size_t n_blocks, n_voxels, n_params;
     double min[SDM_POD_MAX_PARAMS], max[SDM_POD_MAX_PARAMS];
+    sdm_distribution distribution[SDM_POD_MAX_PARAMS];
     uint64_t seed;
     size_t counts[SDM_POD_MAX_PARAMS]; /* points of the static grid along each parameter */
     /* Numbers of maps: static grid; random, made before training; random, made during training. */

@@ -233,6 +233,7 @@ static void describe_model(const trainer *t, const sdm_text *config, option_text
         params[i].min = t->data.min[i];
         params[i].max = t->data.max[i];
         params[i].def = fmin(fmax(p[i].def, params[i].min), params[i].max);
+        params[i].distribution = t->data.distribution[i];
     }
     collect_options(t, options);
     *info = (sdm_model_info){.n_params = n,

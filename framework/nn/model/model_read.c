@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "model_kind.h"
+#include "sdm/internal/distribution.h"
 #include "sdm/memory.h"
 
 #define MODEL_PARAMS_MAX 64
@@ -40,6 +41,16 @@ static void read_accuracy(sdm_lines *r, sdm_accuracy *a)
     a->q50_mm = q[0], a->q90_mm = q[1], a->q99_mm = q[2];
 }
 
+// Reads the distribution of a parameter: a line if it is normal, none if it is uniform.
+static void read_distribution(sdm_lines *r, sdm_model_param *p)
+{
+    double normal[2] = {0};
+    if (!sdm_lines_next_is(r, "param.normal")) return;
+    sdm_lines_reals(r, "param.normal", normal, 2);
+    p->distribution = (sdm_distribution){SDM_DISTRIBUTION_NORMAL, normal[0], normal[1]};
+    if (sdm_distribution_check(&p->distribution, p->min, p->max, NULL)) r->failed = true;
+}
+
 // reads the parameters and options of the shape
 static sdm_status read_params(sdm_lines *r, sdm_model *m, sdm_error *err)
 {
@@ -56,6 +67,7 @@ static sdm_status read_params(sdm_lines *r, sdm_model *m, sdm_error *err)
         p->min = range[0], p->max = range[1], p->def = range[2];
         const double unit = 2 / (p->max - p->min); // factor by which networks scale parameters
         if (!(p->min < p->max && unit > 0 && isfinite(unit)) || !p->name[0]) r->failed = true;
+        read_distribution(r, p);
     }
 
     // options

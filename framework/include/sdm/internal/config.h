@@ -40,6 +40,22 @@ typedef struct sdm_config_range {
     sdm_mark mark;
 } sdm_config_range;
 
+/* How the distribution of a parameter is chosen; sdm_train_distributions() finds the figures. */
+typedef enum sdm_distribution_choice {
+    SDM_DISTRIBUTION_OF_SHAPE = 0, /* as the shape states it */
+    SDM_DISTRIBUTION_SET_UNIFORM,
+    SDM_DISTRIBUTION_SET_NORMAL, /* figures of the shape, or from default and range */
+    SDM_DISTRIBUTION_FIGURES     /* normal, with the figures of the configuration */
+} sdm_distribution_choice;
+
+/* shape.distribution, for all parameters or for the one of a name. */
+typedef struct sdm_config_distribution {
+    char name[SDM_NAME_MAX]; /* empty: all parameters */
+    sdm_distribution_choice choice;
+    double mean, deviation; /* FIGURES */
+    sdm_mark mark;
+} sdm_config_distribution;
+
 typedef enum sdm_network_kind {
     SDM_NETWORK_POD = 0,
     SDM_NETWORK_SDMNN,
@@ -77,6 +93,11 @@ typedef struct sdm_config {
         size_t n_options;
         sdm_config_range ranges[SDM_MAX_PARAMS];
         size_t n_ranges;
+        /* shape.distribution: a word for all parameters, or single ones; the others are then as
+         * the shape states them */
+        sdm_config_distribution distribution;
+        sdm_config_distribution distributions[SDM_MAX_PARAMS];
+        size_t n_distributions;
     } shape;
     /* grid.size [nx, ny, nz], required; grid.spacing, mm, one number or three, required; either
      * grid.origin [x, y, z], the centre of the first voxel, or grid.centre [x, y, z], the centre of

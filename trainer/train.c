@@ -14,6 +14,7 @@
 #include "state/kind.h"
 #include "state/new_samples.h"
 #include "state/progress.h"
+#include "template/template_kind.h"
 
 /* Checks the shape against the configuration; allocates the data set and the blocks of its maps. */
 static sdm_status train_set_up(trainer *t, sdm_error *err)
@@ -31,18 +32,20 @@ static sdm_status train_set_up(trainer *t, sdm_error *err)
     d->shape = t->shape;
     d->grid = &c->grid;
     d->seed = c->seed;
-    d->n_voxels = sdm_grid_count(&c->grid);
+    if (t->kind->prepare && (s = t->kind->prepare(t, err))) return s;
+    const sdm_grid *grid = d->target.make ? d->target.grid : &c->grid;
+    d->n_voxels = sdm_grid_count(grid);
     // before the blocks: for a grid that is too large its message names the memory needed
     if ((s = trainer_dataset_create(d, c, err))) return s;
 
     // block edge 0 means map order: one block as large as the grid
     size_t block = t->kind->block(c);
     for (int i = 0; i < 3 && !t->kind->block(c); i++)
-        if ((size_t)c->grid.n[i] > block) block = (size_t)c->grid.n[i];
-    t->levels = sdm_pod_count(&c->grid, block, t->kind->levels ? t->kind->levels(c) : 1);
+        if ((size_t)grid->n[i] > block) block = (size_t)grid->n[i];
+    t->levels = sdm_pod_count(grid, block, t->kind->levels ? t->kind->levels(c) : 1);
     d->n_blocks = t->levels.first[1];
     if ((s = SDM_ALLOC(&t->blocks, t->levels.first[t->levels.n], "blocks", err))) return s;
-    sdm_pod_blocks(&c->grid, block, &t->levels, t->blocks);
+    sdm_pod_blocks(grid, block, &t->levels, t->blocks);
     d->blocks = t->blocks;
     return SDM_OK;
 }
@@ -66,8 +69,7 @@ static bool fill_enough(void *user) { return trainer_start_fraction(user) > 0.5;
 static sdm_status train_check_grid(const trainer *t, sdm_error *err)
 {
     const dataset *d = &t->data;
-    for (size_t i = 0; i < d->n_holdout * d->n_voxels; i++)
-        if (d->holdout[i] < 0) return SDM_OK;
+    if (d->inside) return SDM_OK;
     return sdm_fail(
         err, SDM_E_CONFIG,
         "%s: no voxel of the grid is inside any of %zu held-out shapes: check grid.centre (or "
@@ -163,6 +165,13 @@ static sdm_status train_finish(trainer *t, sdm_train_report *report, sdm_error *
     return s;
 }
 
+static const train_kind *kind_of(sdm_network_kind kind)
+{
+    return kind == SDM_NETWORK_POD        ? &trainer_kind_pod
+           : kind == SDM_NETWORK_TEMPLATE ? &trainer_kind_template
+                                          : &trainer_kind_direct;
+}
+
 sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const char *folder,
                      bool resume, const sdm_train_hooks *hooks, sdm_train_report *report,
                      sdm_error *err)
@@ -171,8 +180,7 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     trainer t = {.config = config,
                  .shape = shape,
                  .folder = folder,
-                 .kind = config->network.kind == SDM_NETWORK_POD ? &trainer_kind_pod
-                                                                 : &trainer_kind_direct,
+                 .kind = kind_of(config->network.kind),
                  .started = sdm_clock(),
                  .loss = NAN,
                  .heldout_mse = NAN,

@@ -63,7 +63,7 @@ check() {
         rooms("framework/nn/", "kernels model pod template point sdmnn open")
         rooms("framework/io/", ". mesh image picture")
         rooms("runtime/", "maps phantom fit/data fit/solver fit/start fit/trust fit vdb")
-        rooms("trainer/", "numerics data state pod direct .")
+        rooms("trainer/", "numerics data state pod template direct .")
         rooms("cli/", "args report inputs phantom fit study .")
         rooms("framework/core/", "."); rooms("framework/config/", "."); rooms("framework/shape/", "."); rooms("shapes/", ".")
         while ((getline line < files) > 0) {

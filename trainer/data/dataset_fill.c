@@ -62,6 +62,7 @@ sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hoo
             {
                 if (s && (failed < 0 || i < failed)) failed = i, first = mine;
                 if (s) stop = true;
+                if (at < d->n_holdout && w.inside) d->inside = true;
                 done++;
                 if (hooks->report && sdm_thread() == 0) hooks->report(hooks->user, done, all);
                 if (hooks->enough && hooks->enough(hooks->user)) enough = true;

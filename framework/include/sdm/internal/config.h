@@ -60,7 +60,8 @@ typedef enum sdm_network_kind {
     SDM_NETWORK_POD = 0,
     SDM_NETWORK_SDMNN,
     SDM_NETWORK_DEEPSDF,
-    SDM_NETWORK_IMNET
+    SDM_NETWORK_IMNET,
+    SDM_NETWORK_TEMPLATE
 } sdm_network_kind;
 typedef enum sdm_activation {
     SDM_ACTIVATION_SILU = 0,

@@ -20,8 +20,10 @@
 #define LINKS_DEFAULT 3
 #define LIMIT_DEFAULT 1.2
 
-#define ANGLE(name, joint) \
-    {name, "rad", -LIMIT_DEFAULT, LIMIT_DEFAULT, 0, "angle of joint " joint}
+#define ANGLE(name, joint)                                                                         \
+    {                                                                                              \
+        name, "rad", -LIMIT_DEFAULT, LIMIT_DEFAULT, 0, "angle of joint " joint                     \
+    }
 
 static const sdm_param PARAMS[LINKS_MAX] = {ANGLE("q1", "1"), ANGLE("q2", "2"), ANGLE("q3", "3"),
                                             ANGLE("q4", "4"), ANGLE("q5", "5"), ANGLE("q6", "6"),
@@ -103,9 +105,8 @@ static void parts_choose(linkage *l, const sdm_option_value *o)
                  n = (double)l->n_links;
     part *a = l->parts;
     if (o[BASE].number > 0)
-        *a++ = (part){.length = o[BASE].number,
-                      .cone = {radius, radius},
-                      .ball = {radius, joint * radius}};
+        *a++ = (part){
+            .length = o[BASE].number, .cone = {radius, radius}, .ball = {radius, joint * radius}};
     for (size_t i = 0; i < l->n_links; i++) {
         const double near = radius + (tip - radius) * (double)i / n,
                      far = radius + (tip - radius) * (double)(i + 1) / n;
@@ -293,8 +294,7 @@ static int linkage_velocity(const void *self, const sdm_host *host, const sdm_op
             const size_t end = v + sdm_lathe_n_vert(a->n_rings, a->n_sectors);
             const double moves = i >= n_base + joint;
             for (; v < end; v++) {
-                const double *x = out + 3 * v,
-                             r[3] = {x[0] - at[0], x[1] - at[1], x[2] - at[2]};
+                const double *x = out + 3 * v, r[3] = {x[0] - at[0], x[1] - at[1], x[2] - at[2]};
                 double *to = out + 3 * (joint * n_vert + v);
                 for (int k = 0; k < 3; k++) {
                     const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;

@@ -107,9 +107,9 @@ static void test_end_is_where_the_angles_put_it(void **state)
 {
     (void)state;
     for (int spatial = 0; spatial < 2; spatial++) {
-        sdm_instance *s =
-            shape_make("linkage", spatial ? "links=4 length=2 tip=0.5 motion=spatial limit=3"
-                                          : "links=4 length=2 tip=0.5 motion=planar base=0 limit=3");
+        sdm_instance *s = shape_make(
+            "linkage", spatial ? "links=4 length=2 tip=0.5 motion=spatial limit=3"
+                               : "links=4 length=2 tip=0.5 motion=planar base=0 limit=3");
         sdm_mesh m = {0};
         for (int round = 0; round < 20; round++) {
             double p[4], out = 0, side = 0;

@@ -53,7 +53,7 @@ static void mesh_at(const sdm_instance *s, const double *p, sdm_mesh *m)
     if (sdm_instance_mesh(s, p, m, &err)) fail_msg("%s", err.text);
 }
 
-static double distance_at(const sdm_instance *s, const double *p, const double x[3])
+static inline double distance_at(const sdm_instance *s, const double *p, const double x[3])
 {
     sdm_error err = {0};
     double d = 0;

@@ -6,8 +6,9 @@
  * raises what follows. An upright base, which does not move, carries joint 1.
  *
  * A link (and the base) is a component of its own: a round cone, the convex hull of two balls, with
- * a larger ball at each joint. Neighbours share the ball of their joint, so the mesh overlaps
- * itself, and the shape is the union. All vertices lie on the surface of their component. */
+ * a larger ball at the joint that it ends in. The next link begins inside this ball, so the mesh
+ * overlaps itself, and the shape is the union. All vertices lie on the surface of their
+ * component. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -99,12 +100,15 @@ static bool part_complete(part *a, double edge)
     return room > 1e-3 * a->length;
 }
 
+/* The ball of a joint belongs to the part in front of it: to the base, to a link, or to the first
+ * link if there is no base. */
 static void parts_choose(linkage *l, const sdm_option_value *o)
 {
     const double radius = o[RADIUS].number, tip = o[TIP].number, joint = o[JOINT].number,
                  n = (double)l->n_links;
+    const bool has_base = o[BASE].number > 0;
     part *a = l->parts;
-    if (o[BASE].number > 0)
+    if (has_base)
         *a++ = (part){
             .length = o[BASE].number, .cone = {radius, radius}, .ball = {radius, joint * radius}};
     for (size_t i = 0; i < l->n_links; i++) {
@@ -112,7 +116,8 @@ static void parts_choose(linkage *l, const sdm_option_value *o)
                      far = radius + (tip - radius) * (double)(i + 1) / n;
         *a++ = (part){.length = o[LENGTH].number,
                       .cone = {near, far},
-                      .ball = {joint * near, i + 1 < l->n_links ? joint * far : far}};
+                      .ball = {i == 0 && !has_base ? joint * near : near,
+                               i + 1 < l->n_links ? joint * far : far}};
     }
     l->n_parts = (size_t)(a - l->parts);
 }

@@ -15,7 +15,8 @@ enum { ANGLE, RADIUS, DEPTH, THICKNESS, N_PARAMS };
 
 /* With the default number of teeth. */
 static const sdm_param PARAMS[N_PARAMS] = {
-    [ANGLE] = {"angle", "rad", -PI / TEETH_DEFAULT, PI / TEETH_DEFAULT, 0, "turn of the wheel, over one pitch"},
+    [ANGLE] = {"angle", "rad", -PI / TEETH_DEFAULT, PI / TEETH_DEFAULT, 0,
+               "turn of the wheel, over one pitch"},
     [RADIUS] = {"radius", "mm", 3, 5, 4, "distance of the tips of the teeth from the axis"},
     [DEPTH] = {"depth", "mm", 0.3, 1.2, 0.8, "height of the teeth"},
     [THICKNESS] = {"thickness", "mm", 0.8, 3, 1.6, "thickness of the wheel, along z"},
@@ -109,8 +110,8 @@ static int gear_mesh(const void *self, const sdm_host *host, const sdm_option_va
 
             // the two triangles between this vertex, the next column and the next vertex
             const size_t next = (i + 1) % n, k1 = (k + 1) % 4;
-            const size_t quad[6] = {4 * i + k,     4 * next + k,  4 * next + k1,
-                                    4 * i + k,     4 * next + k1, 4 * i + k1};
+            const size_t quad[6] = {4 * i + k, 4 * next + k,  4 * next + k1,
+                                    4 * i + k, 4 * next + k1, 4 * i + k1};
             for (int j = 0; j < 6; j++) *tri++ = (uint32_t)quad[j];
         }
     }

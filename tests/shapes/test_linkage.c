@@ -226,10 +226,10 @@ static void test_options_are_checked(void **state)
         {"limit", "3.2", "option 'limit' is 3.2 rad, need 0.01 .. 3"},
         {"motion", "round", "option 'motion' is 'round', need one of planar|spatial"},
         {"joint", "0.9", "option 'joint' is 0.9, need 1 .. 2"},
-        {"length", "1.1",
-         "link 1 is too short, 1.1 mm between balls of radius 1.08 and 0.96 mm: raise 'length', or "
+        {"length", "0.5",
+         "link 1 is too short, 0.5 mm between balls of radius 0.9 and 0.96 mm: raise 'length', or "
          "lower 'radius', 'tip' or 'joint'"},
-        {"tip", "15", "link 1 is too short, 3 mm between balls of radius 1.08 and 6.72 mm"},
+        {"tip", "15", "link 1 is too short, 3 mm between balls of radius 0.9 and 6.72 mm"},
         {"base", "0.5",
          "the base is too short, 0.5 mm between balls of radius 0.9 and 1.08 mm: raise 'base', or "
          "lower 'radius' or 'joint'"},

@@ -13,6 +13,7 @@
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "lathe.h"
 #include "sdm/shape.h"
@@ -100,8 +101,8 @@ static bool part_complete(part *a, double edge)
     return room > 1e-3 * a->length;
 }
 
-/* The ball of a joint belongs to the part in front of it: to the base, to a link, or to the first
- * link if there is no base. */
+/* The ball of a joint belongs to the part that ends in it, that of joint 1 without a base to
+ * link 1. (Two equal balls with different triangles would meet almost everywhere.) */
 static void parts_choose(linkage *l, const sdm_option_value *o)
 {
     const double radius = o[RADIUS].number, tip = o[TIP].number, joint = o[JOINT].number,
@@ -177,9 +178,9 @@ static void profile_at(const part *a, ptrdiff_t ring, double *along, double *acr
     const ptrdiff_t side0 = (ptrdiff_t)a->n_cap[0] - 1, side1 = side0 + (ptrdiff_t)a->n_side,
                     last = (ptrdiff_t)a->n_rings;
     if (ring >= side0 && ring <= side1) {
-        const double part_of = (double)(ring - side0) / (double)a->n_side;
-        *along = a->side[0][0] + part_of * (a->side[1][0] - a->side[0][0]);
-        *across = a->side[0][1] + part_of * (a->side[1][1] - a->side[0][1]);
+        const double share = (double)(ring - side0) / (double)a->n_side;
+        *along = a->side[0][0] + share * (a->side[1][0] - a->side[0][0]);
+        *across = a->side[0][1] + share * (a->side[1][1] - a->side[0][1]);
     } else if (ring < side0) {
         const double angle = a->cap[0] * (double)(ring + 1) / (double)a->n_cap[0];
         *along = -a->ball[0] * cos(angle);
@@ -278,7 +279,18 @@ static int linkage_mesh(const void *self, const sdm_host *host, const sdm_option
     return 0;
 }
 
-/* A joint turns all vertices of the links behind it: velocity = axis x (vertex - joint). */
+/* Writes the velocity of a point x that turns about an axis (of length 1) through a joint. */
+static void turn_velocity(const double axis[3], const double joint[3], const double x[3],
+                          double out[3])
+{
+    const double r[3] = {x[0] - joint[0], x[1] - joint[1], x[2] - joint[2]};
+    for (int k = 0; k < 3; k++) {
+        const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
+        out[k] = axis[k1] * r[k2] - axis[k2] * r[k1];
+    }
+}
+
+/* A joint turns all vertices of the links behind it, and no others. */
 static int linkage_velocity(const void *self, const sdm_host *host, const sdm_option_value *options,
                             const double *p, size_t n_vert, double *out)
 {
@@ -289,24 +301,16 @@ static int linkage_velocity(const void *self, const sdm_host *host, const sdm_op
     place places[LINKS_MAX + 1];
     double axes[LINKS_MAX][3];
     places_at(l, p, places, axes);
-    vertices_write(l, places, out); // the first block of the output holds them until the end
+    vertices_write(l, places, out); // the block of joint 1, written last, holds the vertices
     const size_t n_base = l->n_parts - l->n_links;
     for (size_t joint = l->n_links; joint-- > 0;) {
-        const double *axis = axes[joint], *at = places[n_base + joint].at;
-        size_t v = 0;
-        for (size_t i = 0; i < l->n_parts; i++) {
-            const part *a = &l->parts[i];
-            const size_t end = v + sdm_lathe_n_vert(a->n_rings, a->n_sectors);
-            const double moves = i >= n_base + joint;
-            for (; v < end; v++) {
-                const double *x = out + 3 * v, r[3] = {x[0] - at[0], x[1] - at[1], x[2] - at[2]};
-                double *to = out + 3 * (joint * n_vert + v);
-                for (int k = 0; k < 3; k++) {
-                    const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
-                    to[k] = moves * (axis[k1] * r[k2] - axis[k2] * r[k1]);
-                }
-            }
-        }
+        size_t first = 0; // vertex that moves
+        for (size_t i = 0; i < n_base + joint; i++)
+            first += sdm_lathe_n_vert(l->parts[i].n_rings, l->parts[i].n_sectors);
+        double *to = out + 3 * joint * n_vert;
+        for (size_t v = first; v < n_vert; v++)
+            turn_velocity(axes[joint], places[n_base + joint].at, out + 3 * v, to + 3 * v);
+        memset(to, 0, 3 * first * sizeof *to);
     }
     return 0;
 }

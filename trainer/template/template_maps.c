@@ -108,6 +108,40 @@ static sdm_status grid_boxes(const template_design *d, box *boxes, sdm_error *er
     return s;
 }
 
+// Largest amount by which the distance at a node lies below the tangent at another one outside of
+// the part, `step` nodes away along any of the axes.
+static double lattice_sag(const sdm_lattice *l, const float *nodes, int step)
+{
+    double largest = 0;
+    const long n[3] = {l->n[0], l->n[1], l->n[2]};
+    for (long z = 0, i = 0; z < n[2]; z++)
+        for (long y = 0; y < n[1]; y++)
+            for (long x = 0; x < n[0]; x++, i++) {
+                const float *a = nodes + 4 * i;
+                if (!(a[0] > 0)) continue;
+                for (int k = 0; k < 27; k++) {
+                    const long d[3] = {step * (k % 3 - 1), step * (k / 3 % 3 - 1),
+                                       step * (k / 9 - 1)};
+                    if (x + d[0] < 0 || x + d[0] >= n[0] || y + d[1] < 0 || y + d[1] >= n[1] ||
+                        z + d[2] < 0 || z + d[2] >= n[2])
+                        continue;
+                    const float *b = a + 4 * ((d[2] * n[1] + d[1]) * n[0] + d[0]);
+                    double below = (double)a[0] - (double)b[0];
+                    for (int c = 0; c < 3; c++)
+                        below += l->spacing * (double)d[c] * (double)a[1 + c];
+                    largest = fmax(largest, below);
+                }
+            }
+    return largest;
+}
+
+// Sets sag and sag_reach. The lattice `far` has four times the spacing of `near`, or more.
+static void measure_sag(sdm_template_part *p)
+{
+    p->sag_reach = 4 * p->near.spacing;
+    p->sag = fmax(lattice_sag(&p->near, p->near_nodes, 4), lattice_sag(&p->far, p->far_nodes, 1));
+}
+
 sdm_status trainer_template_maps(template_design *d, double margin, sdm_error *err)
 {
     enum { FAR_NODES = 1 << 20 };
@@ -133,6 +167,7 @@ sdm_status trainer_template_maps(template_design *d, double margin, sdm_error *e
         if (!s) s = sdm_exact_create(&mesh, &opts, &exact, err);
         if (!s) s = fill_nodes(exact, &p->near, &p->near_nodes, err);
         if (!s) s = fill_nodes(exact, &p->far, &p->far_nodes, err);
+        if (!s) measure_sag(p);
         sdm_exact_free(exact);
         sdm_mesh_dispose(&mesh);
     }

@@ -1,5 +1,4 @@
 /* Maps of a template network. No allocation. */
-#include <math.h>
 #include <string.h>
 
 #include "sdm/internal/processor.h"
@@ -30,32 +29,23 @@ size_t sdm_template_scratch_bytes(const sdm_model *m, size_t n, int n_threads)
 // values = the minimum over the parts
 static void fill_map(template_work *w, float *values)
 {
-    const template_network *k = w->k;
-    const size_t nx = (size_t)w->grid->n[0], ny = (size_t)w->grid->n[1], nz = (size_t)w->grid->n[2];
-    for (size_t z = 0; z < nz; z++) {
-        for (size_t c = 0; c < k->n_parts; c++)
-            if (k->parts[c].n_modes)
-                sdm_template_plane(k, w->warp[c].points, w->warp[c].metric, z, w->warp[c].plane);
-        for (size_t y = 0; y < ny; y++) {
-            float *to = values + (z * ny + y) * nx;
-            if (k->n_parts == 1) {
-                sdm_template_run(w, 0, 0, y, z, nx);
-                memcpy(to, w->row.value, nx * sizeof *to);
-                continue;
-            }
-            for (size_t x = 0; x < nx; x++) to[x] = INFINITY;
-            for (size_t c = 0; c < k->n_parts; c++)
-                for (size_t x = 0; x < nx;) {
-                    const size_t n = sdm_template_active(w, c, x, y, z);
-                    if (n == 0) {
-                        x = (x / SDM_TEMPLATE_BLOCK + 1) * SDM_TEMPLATE_BLOCK;
-                        continue;
-                    }
-                    sdm_template_run(w, c, x, y, z, n);
-                    for (size_t i = 0; i < n; i++)
-                        to[x + i] = w->row.value[i] < to[x + i] ? w->row.value[i] : to[x + i];
-                    x += n;
+    template_patch p = {.count = 0};
+    while (sdm_template_next(w, &p)) {
+        bool first = true;
+        for (size_t c = 0; c < w->k->n_parts; c++) {
+            if (!(p.active >> c & 1)) continue;
+            sdm_template_run(w, c, &p);
+            const float *value = w->row.value;
+            for (size_t z = 0; z < p.n[2]; z++)
+                for (size_t y = 0; y < p.n[1]; y++, value += p.n[0]) {
+                    float *to = values + sdm_template_line_at(w, &p, y, z);
+                    if (first)
+                        memcpy(to, value, p.n[0] * sizeof *to);
+                    else
+                        for (size_t x = 0; x < p.n[0]; x++)
+                            to[x] = value[x] < to[x] ? value[x] : to[x];
                 }
+            first = false;
         }
     }
 }

@@ -1,13 +1,19 @@
-/* Rows of a map of a template network: the scratch memory of one map and the evaluation of one part
-   in a run of voxels. Words as in template_internal.h. */
+/* Patches of a map of a template network: the scratch memory of one map and the evaluation of one
+   part in a patch. Words as in template_internal.h. */
 #pragma once
 
 #include "template_internal.h"
 
-/* Voxels along the edge of a block in which parts that cannot be the nearest are left out. */
-enum { SDM_TEMPLATE_BLOCK = 8 };
+/* A patch: the voxels that are evaluated together, x fastest, then y, then z. Without a warp a patch
+   is a block of 4 x 4 x 4 voxels (smaller at the end of the grid), in which parts that cannot be the
+   nearest are left out; with a warp it is a line of the grid. */
+typedef struct template_patch {
+    size_t at[3], n[3]; /* first voxel, number of voxels along x, y, z */
+    size_t count;       /* n[0] n[1] n[2] */
+    uint32_t active;    /* bit c: part c may be the nearest somewhere in the patch */
+} template_patch;
 
-/* A row of voxels along x; each array has row_floats() elements. */
+/* Arrays with an element for each voxel of a patch. */
 typedef struct template_row {
     float *u[3];      /* indices */
     float *metric[6]; /* xx, yy, zz, yz, xz, xy */
@@ -25,7 +31,10 @@ typedef struct template_work {
     float *phi;       /* polynomials */
     part_pose *pose;  /* [n_parts] */
     warp_scratch warp[SDM_TEMPLATE_MAX_PARTS];
-    uint32_t *active; /* [blocks] bit c: part c may be the nearest somewhere in the block */
+    bool by_lines;     /* patches are lines: a part has a warp */
+    size_t blocks[3];  /* number of blocks along each axis */
+    uint32_t *active;  /* [blocks] template_patch.active */
+    float *centre;     /* [n_parts][4][blocks along x] distances and gradients at their centres */
     float *correction;         /* [its voxels] the correction, NULL if there is none */
     template_correction correction_at; /* the lattice of the correction with its first map */
     void *correction_scratch;
@@ -48,10 +57,24 @@ void sdm_template_plane(const template_network *k, const float *points, const fl
                         size_t z, float *plane);
 void sdm_template_line(const template_network *k, const float *plane, size_t y, float *line);
 
-/* Evaluates part c in n voxels from voxel (x, y, z) on: fills u, metric, f, g and value of w->row.
-   A part with a warp is evaluated in whole lines (x = 0), after sdm_template_plane(). */
-void sdm_template_run(template_work *w, size_t c, size_t x, size_t y, size_t z, size_t n);
+/* The patches one after another: sets *p to the first patch if p->count is 0, else to the next one.
+   false: there is none. Prepares the stations of all warps for the plane of the patch. */
+bool sdm_template_next(template_work *w, template_patch *p);
 
-/* The number of voxels, from voxel (x, y, z) on, that lie in blocks in which part c is active: 0 if
-   the first one does not. */
-size_t sdm_template_active(const template_work *w, size_t c, size_t x, size_t y, size_t z);
+/* Evaluates part c in a patch: fills u, metric, f, g and value of w->row. */
+void sdm_template_run(template_work *w, size_t c, const template_patch *p);
+
+/* True if distances are carried along unchanged: part c only rotates and moves. The metric is then
+   not filled. */
+bool sdm_template_is_rigid(const template_network *k, size_t c);
+
+/* Index of the first voxel of line (y, z) of the patch in a map. */
+static inline size_t sdm_template_line_at(const template_work *w, const template_patch *p, size_t y,
+                                          size_t z)
+{
+    return ((p->at[2] + z) * (size_t)w->grid->n[1] + p->at[1] + y) * (size_t)w->grid->n[0] +
+           p->at[0];
+}
+
+/* Elements of the arrays of a template_row. */
+size_t sdm_template_row_floats(const sdm_grid *grid);

@@ -154,6 +154,7 @@ typedef struct slopes_work {
     float *plane, *line;      /* [D][stations in a plane][12], [stations in a line][12] */
     float *row[9];            /* du, d metric */
     value_slope *slope;       /* [row] */
+    float *value;             /* [row] the map */
     uint8_t *nearest;         /* [row] part with the smallest value */
 } slopes_work;
 
@@ -185,11 +186,10 @@ static size_t slopes_carve(const sdm_model *m, size_t n, size_t correction_scrat
     s->plane = take(memory, &at,
                     warps * n * 12 * k->stations[0] * k->stations[1] * sizeof *s->plane);
     s->line = take(memory, &at, 12 * k->stations[0] * sizeof *s->line);
-    const size_t row =
-        ((size_t)m->info.grid.n[0] + 3 * SDM_TEMPLATE_LANES) / SDM_TEMPLATE_LANES *
-        SDM_TEMPLATE_LANES;
+    const size_t row = sdm_template_row_floats(&m->info.grid);
     for (int i = 0; i < 9; i++) s->row[i] = take(memory, &at, row * sizeof *s->row[i]);
     s->slope = take(memory, &at, row * sizeof *s->slope);
+    s->value = take(memory, &at, row * sizeof *s->value);
     s->nearest = take(memory, &at, row);
     return at;
 }
@@ -229,9 +229,8 @@ static void slopes_begin(slopes_work *s, const double *direction)
     }
 }
 
-// s->row = derivatives of u and metric of part c, which has no warp, in n voxels from (x, y, z) on.
-static void affine_slope(const slopes_work *s, size_t c, size_t d, size_t x, size_t y, size_t z,
-                         size_t n)
+// s->row = derivatives of u and metric of part c, which has no warp, in the voxels of a patch.
+static void affine_slope(const slopes_work *s, size_t c, size_t d, const template_patch *patch)
 {
     static const int I[6] = {0, 1, 2, 1, 0, 0}, J[6] = {0, 1, 2, 2, 2, 1};
     const template_network *k = s->w.k;
@@ -247,64 +246,94 @@ static void affine_slope(const slopes_work *s, size_t c, size_t d, size_t x, siz
         for (int j = 0; j < 3; j++)
             moved[3 * i + j] =
                 -(a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j]);
-    double du[2][3];
-    for (int e = 0; e < 2; e++) {
-        const double voxel[3] = {(double)x + e, (double)y, (double)z};
-        double p[3];
-        sdm_grid_world(s->w.grid, voxel, p);
-        for (int i = 0; i < 3; i++) p[i] -= pose->b[i];
-        for (int i = 0; i < 3; i++) {
-            double sum = 0;
-            for (int j = 0; j < 3; j++) sum += moved[3 * i + j] * p[j] - b[3 * i + j] * db[j];
-            du[e][i] = sum / k->parts[c].near.spacing;
+    for (size_t z = 0, v = 0; z < patch->n[2]; z++)
+        for (size_t y = 0; y < patch->n[1]; y++, v += patch->n[0]) {
+            double du[2][3]; // at the first two voxels of a line
+            for (int e = 0; e < 2; e++) {
+                const double voxel[3] = {(double)patch->at[0] + e, (double)(patch->at[1] + y),
+                                         (double)(patch->at[2] + z)};
+                double p[3];
+                sdm_grid_world(s->w.grid, voxel, p);
+                for (int i = 0; i < 3; i++) p[i] -= pose->b[i];
+                for (int i = 0; i < 3; i++) {
+                    double sum = 0;
+                    for (int j = 0; j < 3; j++)
+                        sum += moved[3 * i + j] * p[j] - b[3 * i + j] * db[j];
+                    du[e][i] = sum / k->parts[c].near.spacing;
+                }
+            }
+            for (int i = 0; i < 3; i++) {
+                const float from = (float)du[0][i], by = (float)(du[1][i] - du[0][i]);
+                for (size_t x = 0; x < patch->n[0]; x++) s->row[i][v + x] = from + by * (float)x;
+            }
         }
-    }
-    for (int i = 0; i < 3; i++) {
-        const float from = (float)du[0][i], by = (float)(du[1][i] - du[0][i]);
-        for (size_t v = 0; v < n; v++) s->row[i][v] = from + by * (float)v;
-    }
     for (int i = 0; i < 6; i++) {
         double sum = 0;
         for (int e = 0; e < 3; e++)
             sum += moved[3 * I[i] + e] * b[3 * J[i] + e] + b[3 * I[i] + e] * moved[3 * J[i] + e];
-        for (size_t v = 0; v < n; v++) s->row[3 + i][v] = (float)sum;
+        for (size_t v = 0; v < patch->count; v++) s->row[3 + i][v] = (float)sum;
     }
 }
 
-// Derivatives of the voxels of a run in which part c is the nearest.
-static void run_slopes(slopes_work *s, size_t c, size_t x, size_t y, size_t z, size_t n,
-                       float *const *out)
+// Derivatives of the voxels of a patch in which part c is the nearest, after sdm_template_run().
+static void patch_slopes(slopes_work *s, size_t c, const template_patch *p, float *const *out)
 {
     template_work *w = &s->w;
     const template_network *k = w->k;
-    const size_t nx = (size_t)w->grid->n[0], at = (z * (size_t)w->grid->n[1] + y) * nx + x,
-                 stations = k->stations[0] * k->stations[1];
+    const size_t stations = k->stations[0] * k->stations[1];
     const size_t voxels = k->correction ? sdm_grid_count(&k->correction->info.grid) : 0;
-    for (size_t i = 0; i < n; i++)
-        if (s->nearest[x + i] == c) s->slope[i] = slope_of_value(w, c, i);
+    if (sdm_template_is_rigid(k, c))
+        for (int a = 0; a < 6; a++)
+            for (size_t i = 0; i < p->count; i++) w->row.metric[a][i] = a < 3;
+    for (size_t i = 0; i < p->count; i++)
+        if (s->nearest[i] == c) s->slope[i] = slope_of_value(w, c, i);
     for (size_t d = 0; d < s->n; d++) {
         if (k->parts[c].n_modes) {
-            sdm_template_line(k, s->plane + 12 * stations * (warp_number(k, c) * s->n + d), y,
-                              s->line);
-            sdm_template_kernels()->expand(&k->expansion, (n + k->step - 1) / k->step, s->line,
-                                           s->line + 4 * k->stations[0], 9, s->row);
+            sdm_template_line(k, s->plane + 12 * stations * (warp_number(k, c) * s->n + d),
+                              p->at[1], s->line);
+            sdm_template_kernels()->expand(&k->expansion, (p->count + k->step - 1) / k->step,
+                                           s->line, s->line + 4 * k->stations[0], 9, s->row);
         } else {
-            affine_slope(s, c, d, x, y, z, n);
+            affine_slope(s, c, d, p);
         }
-        for (size_t i = 0; i < n; i++) {
-            if (s->nearest[x + i] != c) continue;
-            float sum = 0;
-            for (int a = 0; a < 3; a++) sum += s->slope[i].u[a] * s->row[a][i];
-            for (int a = 0; a < 6; a++) sum += s->slope[i].metric[a] * s->row[3 + a][i];
-            out[d][at + i] = sum;
+        float *sum = s->value;
+        for (size_t i = 0; i < p->count; i++) {
+            sum[i] = 0;
+            if (s->nearest[i] != c) continue;
+            for (int a = 0; a < 3; a++) sum[i] += s->slope[i].u[a] * s->row[a][i];
+            for (int a = 0; a < 6; a++) sum[i] += s->slope[i].metric[a] * s->row[3 + a][i];
         }
         if (w->correction && c == 0) {
             template_correction change = k->correction_lattice;
             change.map = w->correction + (1 + d) * voxels;
-            sdm_template_kernels()->correct(&change, n, (const float *const *)w->row.u,
-                                            out[d] + at);
+            sdm_template_kernels()->correct(&change, p->count, (const float *const *)w->row.u,
+                                            sum);
         }
+        for (size_t z = 0, i = 0; z < p->n[2]; z++)
+            for (size_t y = 0; y < p->n[1]; y++) {
+                float *to = out[d] + sdm_template_line_at(w, p, y, z);
+                for (size_t x = 0; x < p->n[0]; x++, i++)
+                    if (s->nearest[i] == c) to[x] = sum[i];
+            }
     }
+}
+
+// s->value and s->nearest of a patch, and the lines of the map.
+static void patch_map(slopes_work *s, const template_patch *p, float *values)
+{
+    template_work *w = &s->w;
+    for (size_t i = 0; i < p->count; i++) s->value[i] = INFINITY, s->nearest[i] = 0;
+    for (size_t c = 0; c < w->k->n_parts; c++) {
+        if (!(p->active >> c & 1)) continue;
+        sdm_template_run(w, c, p);
+        for (size_t i = 0; i < p->count; i++)
+            if (w->row.value[i] < s->value[i])
+                s->value[i] = w->row.value[i], s->nearest[i] = (uint8_t)c;
+    }
+    for (size_t z = 0, i = 0; z < p->n[2]; z++)
+        for (size_t y = 0; y < p->n[1]; y++, i += p->n[0])
+            memcpy(values + sdm_template_line_at(w, p, y, z), s->value + i,
+                   p->n[0] * sizeof *values);
 }
 
 // values = the map, out[D] = its derivatives
@@ -312,37 +341,23 @@ static void fill_slopes(slopes_work *s, float *values, float *const *out)
 {
     template_work *w = &s->w;
     const template_network *k = w->k;
-    const size_t nx = (size_t)w->grid->n[0], ny = (size_t)w->grid->n[1], nz = (size_t)w->grid->n[2],
-                 plane = k->stations[0] * k->stations[1], stations = plane * k->stations[2];
-    for (size_t z = 0; z < nz; z++) {
-        for (size_t c = 0; c < k->n_parts; c++) {
-            if (k->parts[c].n_modes == 0) continue;
-            sdm_template_plane(k, w->warp[c].points, w->warp[c].metric, z, w->warp[c].plane);
-            for (size_t d = 0; d < s->n; d++) {
+    const size_t plane = k->stations[0] * k->stations[1], stations = plane * k->stations[2];
+    template_patch p = {.count = 0};
+    while (sdm_template_next(w, &p)) {
+        for (size_t c = 0; c < k->n_parts && w->by_lines && p.at[1] == 0; c++)
+            for (size_t d = 0; d < s->n && k->parts[c].n_modes; d++) {
                 const size_t at = warp_number(k, c) * s->n + d;
                 sdm_template_plane(k, s->points + 4 * at * stations, s->metric + 8 * at * stations,
-                                   z, s->plane + 12 * at * plane);
+                                   p.at[2], s->plane + 12 * at * plane);
             }
-        }
-        for (size_t y = 0; y < ny; y++) {
-            // the map, and the nearest part of each voxel
-            float *to = values + (z * ny + y) * nx;
-            for (size_t x = 0; x < nx; x++) to[x] = INFINITY, s->nearest[x] = 0;
-            for (int pass = 0; pass < 2; pass++)
-                for (size_t c = 0; c < k->n_parts; c++)
-                    for (size_t x = 0; x < nx;) {
-                        const size_t n = sdm_template_active(w, c, x, y, z);
-                        if (n == 0) {
-                            x = (x / SDM_TEMPLATE_BLOCK + 1) * SDM_TEMPLATE_BLOCK;
-                            continue;
-                        }
-                        if (pass == 0 || k->n_parts > 1) sdm_template_run(w, c, x, y, z, n);
-                        for (size_t i = 0; i < n && pass == 0; i++)
-                            if (w->row.value[i] < to[x + i])
-                                to[x + i] = w->row.value[i], s->nearest[x + i] = (uint8_t)c;
-                        if (pass == 1) run_slopes(s, c, x, y, z, n, out);
-                        x += n;
-                    }
+        patch_map(s, &p, values);
+        for (size_t c = 0; c < k->n_parts; c++) {
+            if (!(p.active >> c & 1)) continue;
+            bool nearest = false;
+            for (size_t i = 0; i < p.count; i++) nearest |= s->nearest[i] == c;
+            if (!nearest) continue;
+            if (k->n_parts > 1) sdm_template_run(w, c, &p);
+            patch_slopes(s, c, &p, out);
         }
     }
 }

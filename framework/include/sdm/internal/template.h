@@ -76,6 +76,10 @@ typedef struct sdm_template_part {
        map may need it. Each node has the distance and its gradient, [nz][ny][nx][4]. */
     sdm_lattice near, far;
     const float *near_nodes, *far_nodes;
+    /* Largest amount (mm) by which the distance falls below its tangent at a point outside of the
+       part within sag_reach (mm): d0(y + v) >= d0(y) + grad d0(y) . v - sag for d0(y) > 0 and
+       abs(v) <= sag_reach; 0 for convex parts. */
+    double sag, sag_reach;
 } sdm_template_part;
 
 /* Content of a model file. */

@@ -2,6 +2,7 @@
 #include "template_maps.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "motion.h"
@@ -109,8 +110,8 @@ static sdm_status grid_boxes(const template_design *d, box *boxes, sdm_error *er
 }
 
 // Largest amount by which the distance at a node lies below the tangent at another one outside of
-// the part, `step` nodes away along any of the axes.
-static double lattice_sag(const sdm_lattice *l, const float *nodes, int step)
+// the part. by_axes[n]: distance in nodes between the two along n axes; 0: such pairs are left out.
+static double lattice_sag(const sdm_lattice *l, const float *nodes, const long by_axes[4])
 {
     double largest = 0;
     const long n[3] = {l->n[0], l->n[1], l->n[2]};
@@ -120,9 +121,10 @@ static double lattice_sag(const sdm_lattice *l, const float *nodes, int step)
                 const float *a = nodes + 4 * i;
                 if (!(a[0] > 0)) continue;
                 for (int k = 0; k < 27; k++) {
-                    const long d[3] = {step * (k % 3 - 1), step * (k / 3 % 3 - 1),
-                                       step * (k / 9 - 1)};
-                    if (x + d[0] < 0 || x + d[0] >= n[0] || y + d[1] < 0 || y + d[1] >= n[1] ||
+                    const long sign[3] = {k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1},
+                               step = by_axes[labs(sign[0]) + labs(sign[1]) + labs(sign[2])],
+                               d[3] = {step * sign[0], step * sign[1], step * sign[2]};
+                    if (step == 0 || x + d[0] < 0 || x + d[0] >= n[0] || y + d[1] < 0 || y + d[1] >= n[1] ||
                         z + d[2] < 0 || z + d[2] >= n[2])
                         continue;
                     const float *b = a + 4 * ((d[2] * n[1] + d[1]) * n[0] + d[0]);
@@ -135,11 +137,12 @@ static double lattice_sag(const sdm_lattice *l, const float *nodes, int step)
     return largest;
 }
 
-// Sets sag and sag_reach. The lattice `far` has four times the spacing of `near`, or more.
+// Sets sag and sag_reach: three nodes of `near`. The lattice `far` has four times its spacing.
 static void measure_sag(sdm_template_part *p)
 {
-    p->sag_reach = 4 * p->near.spacing;
-    p->sag = fmax(lattice_sag(&p->near, p->near_nodes, 4), lattice_sag(&p->far, p->far_nodes, 1));
+    p->sag_reach = 3 * p->near.spacing;
+    p->sag = fmax(lattice_sag(&p->near, p->near_nodes, (const long[]){0, 3, 2, 2}),
+                  lattice_sag(&p->far, p->far_nodes, (const long[]){0, 1, 0, 0}));
 }
 
 sdm_status trainer_template_maps(template_design *d, double margin, sdm_error *err)

@@ -36,6 +36,7 @@ static void check_limits(sdm_reader *r, sdm_mark place)
         const char *key;
         int value, min, max;
     } limits[] = {{SDM_NETWORK_POD, "block", c->network.block, 2, 16},
+                  {SDM_NETWORK_AUTO, "block", c->network.block, 2, 16},
                   {SDM_NETWORK_TEMPLATE, "block", c->network.block, 2, 16},
                   {SDM_NETWORK_SDMNN, "depth", c->network.depth, 1, 6},
                   {SDM_NETWORK_DEEPSDF, "depth", c->network.depth, 1, 16},
@@ -56,7 +57,7 @@ static void check_limits(sdm_reader *r, sdm_mark place)
 /* Only pod and template may have weights of type i8. */
 static bool bytes_refused(int kind)
 {
-    return kind != SDM_NETWORK_POD && kind != SDM_NETWORK_TEMPLATE;
+    return kind != SDM_NETWORK_POD && kind != SDM_NETWORK_TEMPLATE && kind != SDM_NETWORK_AUTO;
 }
 
 void sdm_kinds_settle(sdm_reader *r, sdm_mark place)

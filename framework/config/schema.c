@@ -55,20 +55,21 @@ enum {
     SDMNN = 1 << SDM_NETWORK_SDMNN,
     DEEPSDF = 1 << SDM_NETWORK_DEEPSDF,
     IMNET = 1 << SDM_NETWORK_IMNET,
-    TEMPLATE = 1 << SDM_NETWORK_TEMPLATE
+    TEMPLATE = 1 << SDM_NETWORK_TEMPLATE,
+    AUTO = 1 << SDM_NETWORK_AUTO
 };
-enum { POINTS = DEEPSDF | IMNET, BASES = POD | TEMPLATE };
+enum { POINTS = DEEPSDF | IMNET, BASES = POD | TEMPLATE | AUTO };
 
 // Defaults for pod, sdmnn, deepsdf (from Park et al. 2019), imnet (from Chen and Zhang 2019) and
-// template (of its correction, a pod network).
+// template (of its correction, a pod network) and auto (those of pod).
 static const char *const
-    DEPTH[] = {"3", "4", "8", "5", "0"},
-    *const WIDTH[] = {"128", "64", "512", "2048", "64"}, *const BLOCK[] = {"4", "2", "4", "4", "4"},
-    *const ACTIVATION[] = {"silu", "relu", "relu", "leaky_relu", "silu"},
-    *const OUTPUT_TYPE[] = {"linear", "linear", "tanh", "linear", "linear"},
-    *const WEIGHTS[] = {"i8", "f16", "f16", "f16", "i8"},
-    *const BATCH[] = {"256", "8", "16", "16", "256"},
-    *const RATE[] = {"3e-3", "1e-3", "5e-4", "5e-4", "3e-3"};
+    DEPTH[] = {"3", "4", "8", "5", "0", "3"},
+    *const WIDTH[] = {"128", "64", "512", "2048", "64", "128"}, *const BLOCK[] = {"4", "2", "4", "4", "4", "4"},
+    *const ACTIVATION[] = {"silu", "relu", "relu", "leaky_relu", "silu", "silu"},
+    *const OUTPUT_TYPE[] = {"linear", "linear", "tanh", "linear", "linear", "linear"},
+    *const WEIGHTS[] = {"i8", "f16", "f16", "f16", "i8", "i8"},
+    *const BATCH[] = {"256", "8", "16", "16", "256", "256"},
+    *const RATE[] = {"3e-3", "1e-3", "5e-4", "5e-4", "3e-3", "3e-3"};
 
 static const sdm_field SHAPE[] = {
     ROW("name", SDM_FIELD_TEXT, shape.name, 1, SDM_NAME_MAX - 1, NULL, "",
@@ -99,8 +100,9 @@ static const sdm_field GRID[] = {
 };
 
 static const sdm_field NETWORK[] = {
-    CHOICE("kind", network.kind, SDM_KIND_CHOICES, "pod",
-           "pod: basis functions per block, with coefficients from polynomials and an MLP; sdmnn: "
+    CHOICE("kind", network.kind, SDM_KIND_CHOICES, "auto",
+           "auto: pod or template, whichever has the smaller error in a short trial; template: exact "
+           "maps of the shape's parts, carried along with the parts, and a correction by pod; pod: basis functions per block, with coefficients from polynomials and an MLP; sdmnn: "
            "3-D convolutional encoder-decoder; deepsdf, imnet: one distance per point, evaluated "
            "at every voxel"),
     BY_KIND(

@@ -299,6 +299,18 @@ static sdm_status model_open(const trainer *t, const char *path, const descripti
     return s;
 }
 
+sdm_status trainer_export_measure(const trainer *t, sdm_accuracy *out, sdm_error *err)
+{
+    description *d = NULL;
+    sdm_model *model = NULL;
+    sdm_status s = description_create(t, &d, err);
+    if (!s) s = model_open(t, "model", d, &model, err);
+    if (!s) s = measure_model(t, model, t->data.n_holdout, out, err);
+    sdm_model_free(model);
+    description_free(d);
+    return s;
+}
+
 sdm_status trainer_export_time(trainer *t, double *seconds, sdm_error *err)
 {
     description *d = NULL;

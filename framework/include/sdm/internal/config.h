@@ -61,7 +61,8 @@ typedef enum sdm_network_kind {
     SDM_NETWORK_SDMNN,
     SDM_NETWORK_DEEPSDF,
     SDM_NETWORK_IMNET,
-    SDM_NETWORK_TEMPLATE
+    SDM_NETWORK_TEMPLATE,
+    SDM_NETWORK_AUTO /* the trainer chooses pod or template */
 } sdm_network_kind;
 typedef enum sdm_activation {
     SDM_ACTIVATION_SILU = 0,
@@ -199,6 +200,10 @@ void sdm_config_dump(const sdm_config *c, sdm_text *out);
 /* Clears the members that do not affect the trained network: the numbers of threads, the file name
  * and the output folder. Two configurations of the same network are then equal. */
 void sdm_config_strip(sdm_config *c);
+
+/* Changes network.kind from `auto` to `kind`. Keys with the default of `auto` get the default of
+ * `kind`. */
+void sdm_config_choose_kind(sdm_config *c, sdm_network_kind kind);
 
 /* Appends a table of every key: name, type, range, default, unit, meaning; with `markdown` as a
  * Markdown table, else as aligned text. */

@@ -55,7 +55,7 @@ static sdm_status head_factorise(const pod_state *pod, size_t n, const float *z,
     sdm_gemm(latents, latents, n, (sdm_view){z, 1, latents}, (sdm_view){z, latents, 1}, false, gram,
              latents, trainer_threads(pod->t));
     // hidden units can be linearly dependent: a ridge, raised until the matrix is positive definite
-    for (double ridge = 1e-6;; ridge *= 10) {
+    for (double ridge = pod->ridge;; ridge *= 10) {
         for (size_t i = 0; i < latents * latents; i++)
             factor[i] = 0.5 * ((double)gram[i] + gram[i % latents * latents + i / latents]);
         for (size_t i = 0; i < latents; i++) factor[i * latents + i] += ridge * (double)n;

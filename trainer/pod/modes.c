@@ -75,42 +75,129 @@ sdm_status trainer_modes_project(pod_state *pod, const size_t *slots, size_t n, 
     return s;
 }
 
-/* poly[R][F] = least squares fit of c[n][R] by the polynomials, with a ridge far below
-   the noise. */
-static sdm_status fit_polynomials(pod_state *pod, size_t n, const float *c, sdm_error *err)
+/* Least squares of c[n][R] by the first `terms` polynomials. */
+typedef struct polynomial_fit {
+    const pod_state *pod;
+    size_t n;
+    const float *c;
+    size_t terms;
+    double ridge; /* added to the diagonal of the normal equations, times n, but for the constant */
+} polynomial_fit;
+
+/* x[terms][R] = the solution for the maps whose number is not 3 mod 4; all: for all maps. Returns
+ * SDM_E_CONFIG if the maps do not determine it. */
+static sdm_status fit_solve(const polynomial_fit *p, bool all, double *x, sdm_error *err)
 {
-    const size_t f = pod->arch.n_terms, r = pod->n_modes;
+    const pod_state *pod = p->pod;
+    const size_t f = p->terms, r = pod->n_modes, ld = pod->n_poly;
     float *gram = NULL, *right = NULL;
-    double *a = NULL, *b = NULL;
+    double *a = NULL;
     sdm_status s = SDM_ALLOC(&gram, f * f, "polynomial fit", err);
     if (!s) s = SDM_ALLOC(&right, f * r, "polynomial fit", err);
     if (!s) s = SDM_ALLOC(&a, f * f, "polynomial fit", err);
-    if (!s) s = SDM_ALLOC(&b, f * r, "polynomial fit", err);
-    if (s) goto done;
-    // normal equations
-    sdm_gemm(f, f, n, (sdm_view){pod->phi, 1, pod->n_poly}, (sdm_view){pod->phi, pod->n_poly, 1},
-             false, gram, f, pod->t->n_threads);
-    sdm_gemm(f, r, n, (sdm_view){pod->phi, 1, pod->n_poly}, (sdm_view){c, r, 1}, false, right, r,
-             pod->t->n_threads);
-    // solve the normal equations
-    for (size_t i = 0; i < f * f; i++) a[i] = gram[i];
-    for (size_t i = 0; i < f; i++) a[i * f + i] += 1e-6 * (double)n;
-    for (size_t i = 0; i < f * r; i++) b[i] = right[i];
-    if (trainer_cholesky(f, a)) {
-        s = sdm_fail(err, SDM_E_CONFIG,
-                     "%s: %zu maps cannot determine polynomials of %zu terms: lower network.degree "
-                     "or raise data.start",
-                     pod->t->config->file, n, f);
-        goto done;
+    // normal equations: of all maps, or of three of every four
+    for (size_t k = 0; k < (all ? 1 : 3) && !s; k++) {
+        const size_t rows = all ? p->n : (p->n + 3 - k) / 4, step = all ? 1 : 4;
+        const float *phi = pod->phi + k * ld, *c = p->c + k * r;
+        sdm_gemm(f, f, rows, (sdm_view){phi, 1, step * ld}, (sdm_view){phi, step * ld, 1}, k > 0,
+                 gram, f, pod->t->n_threads);
+        sdm_gemm(f, r, rows, (sdm_view){phi, 1, step * ld}, (sdm_view){c, step * r, 1}, k > 0,
+                 right, r, pod->t->n_threads);
     }
-    trainer_cholesky_solve(f, a, r, b);
-    for (size_t i = 0; i < f; i++)
-        for (size_t j = 0; j < r; j++) pod->poly[j * f + i] = (float)b[i * r + j];
-done:
-    sdm_free(b);
+    if (!s) {
+        for (size_t i = 0; i < f * f; i++) a[i] = gram[i];
+        for (size_t i = 0; i < f; i++)
+            a[i * f + i] += (i ? p->ridge : POD_RIDGE) * (double)(all ? p->n : p->n * 3 / 4);
+        for (size_t i = 0; i < f * r; i++) x[i] = right[i];
+        if (trainer_cholesky(f, a))
+            s = sdm_fail(err, SDM_E_CONFIG,
+                         "%s: %zu maps cannot determine polynomials of %zu terms: lower "
+                         "network.degree or raise data.start",
+                         pod->t->config->file, p->n, f);
+    }
+    if (!s) trainer_cholesky_solve(f, a, r, x);
     sdm_free(a);
     sdm_free(right);
     sdm_free(gram);
+    return s;
+}
+
+/* *error = sum of squared errors of the fit on the maps that it leaves out; infinite if the fit has
+ * no solution. */
+static sdm_status fit_validate(const polynomial_fit *p, double *error, sdm_error *err)
+{
+    const size_t r = p->pod->n_modes;
+    double *x = NULL;
+    sdm_status s = SDM_ALLOC(&x, p->terms * r, "polynomial fit", err);
+    if (s) return s;
+    *error = INFINITY;
+    s = fit_solve(p, false, x, err);
+    if (s == SDM_E_CONFIG) {
+        sdm_free(x);
+        return SDM_OK;
+    }
+    if (!s) *error = 0;
+    for (size_t i = 3; i < p->n && !s; i += 4) {
+        const float *phi = p->pod->phi + i * p->pod->n_poly;
+        for (size_t j = 0; j < r; j++) {
+            double e = -(double)p->c[i * r + j];
+            for (size_t t = 0; t < p->terms; t++) e += x[t * r + j] * (double)phi[t];
+            *error += e * e;
+        }
+    }
+    sdm_free(x);
+    return s;
+}
+
+/* Chooses degree and ridge: first those of many maps (four maps a term or more, a ridge far below
+ * the noise); others if they are at least 2 % better on maps that the fit leaves out. */
+static sdm_status choose_fit(const pod_state *pod, polynomial_fit *best, sdm_error *err)
+{
+    static const double RIDGES[] = {POD_RIDGE, 1e-4, 1e-3, 1e-2, 3e-2, 0.1, 0.3, 1};
+    const sdm_pod_arch *a = &pod->arch;
+    double least = INFINITY;
+    sdm_status s = SDM_OK;
+    size_t top = a->degree;
+    while (top > 0 && 4 * sdm_poly_count(a->n_params, top) > best->n + 4) top--;
+    best->terms = sdm_poly_count(a->n_params, top), best->ridge = POD_RIDGE;
+    // with so many maps that the highest degree is determined, there is nothing to choose
+    if (top == a->degree) return SDM_OK;
+    for (size_t degree = top; degree <= a->degree && !s; degree++)
+        for (size_t k = 0; k < sizeof RIDGES / sizeof *RIDGES && !s; k++) {
+            polynomial_fit p = *best;
+            double error;
+            p.terms = sdm_poly_count(a->n_params, degree), p.ridge = RIDGES[k];
+            s = fit_validate(&p, &error, err);
+            if (!s && error < 0.98 * least) least = error, *best = p;
+        }
+    return s;
+}
+
+/* poly[R][F] = least squares fit of c[n][R] by the polynomials. Sets degree, n_terms and n_latent
+ * of the architecture, and ridge. */
+static sdm_status fit_polynomials(pod_state *pod, size_t n, const float *c, sdm_error *err)
+{
+    sdm_pod_arch *a = &pod->arch;
+    const size_t r = pod->n_modes;
+    polynomial_fit p = {.pod = pod, .n = n, .c = c};
+    double *x = NULL;
+    sdm_status s = choose_fit(pod, &p, err);
+    if (!s) s = SDM_ALLOC(&x, p.terms * r, "polynomial fit", err);
+    if (!s) s = fit_solve(&p, true, x, err);
+    if (!s) {
+        while (sdm_poly_count(a->n_params, a->degree) > p.terms) a->degree--;
+        a->n_latent -= a->n_terms - p.terms;
+        a->n_terms = p.terms;
+        pod->ridge = p.ridge;
+        if (p.ridge > POD_RIDGE)
+            trainer_message(pod->t,
+                            "polynomials of degree %zu with a ridge of %g: best on maps that the "
+                            "fit left out",
+                            a->degree, p.ridge);
+        for (size_t i = 0; i < p.terms; i++)
+            for (size_t j = 0; j < r; j++) pod->poly[j * p.terms + i] = (float)x[i * r + j];
+    }
+    sdm_free(x);
     return s;
 }
 

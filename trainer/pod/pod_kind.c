@@ -28,7 +28,7 @@ static size_t limit_degree(size_t n_params, size_t degree, size_t terms)
 }
 
 /* Sets the architecture as configured, with polynomial degrees that the number of maps made so far
-   can determine (four maps per term). */
+   can determine. */
 static sdm_status pod_design(pod_state *pod, sdm_error *err)
 {
     trainer *t = pod->t;
@@ -41,7 +41,7 @@ static sdm_status pod_design(pod_state *pod, sdm_error *err)
     a->levels = t->levels;
     a->block = (size_t)c->network.block;
     // polynomial degrees
-    a->degree = limit_degree(a->n_params, (size_t)c->network.degree, n_maps / 4 + 1);
+    a->degree = limit_degree(a->n_params, (size_t)c->network.degree, 2 * n_maps / 3 + 1);
     if (a->degree < (size_t)c->network.degree)
         trainer_message(t,
                         "network.degree lowered from %d to %zu: %zu maps before training cannot "

@@ -4,6 +4,9 @@
 
 #include "state/trainer.h"
 
+/* A ridge far below the noise. */
+#define POD_RIDGE 1e-6
+
 typedef struct pod_state {
     trainer *t;            /* the run */
     sdm_pod_block *blocks; /* t->blocks; the bases set their ranks */
@@ -26,6 +29,7 @@ typedef struct pod_state {
     size_t n_modes;   /* R */
     float *modes;     /* [R][K] orthonormal rows */
     float *poly;      /* [R][F] polynomial part */
+    double ridge;     /* of the least squares fits, relative to the number of maps */
     float *deviation; /* [K] root mean square of each coefficient of the highest level */
     /* [N][R]: mode coefficients minus their polynomial part, divided by target_scale. The MLP
        learns these. */

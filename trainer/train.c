@@ -6,6 +6,7 @@
 #include "direct/direct.h"
 #include "pod/pod_kind.h"
 #include "sdm/internal/clock.h"
+#include "sdm/internal/team.h"
 #include "sdm/internal/text.h"
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
@@ -212,7 +213,9 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     if (hooks) t.hooks = *hooks;
     t.n_threads = sdm_threads(config->threads);
     sdm_outfile *resolved = NULL;
+    sdm_team *team = NULL;
     sdm_status s = sdm_make_folder(folder, err);
+    if (!s) s = sdm_team_start(t.n_threads, &team, err);
     if (!s) s = trainer_export_config(&t, &resolved, err);
     if (!s) s = train_run(&t, resume, &resolved, err);
     sdm_outfile_discard(&resolved);
@@ -223,5 +226,6 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     trainer_dataset_dispose(&t.data);
     sdm_free(t.blocks);
     sdm_text_dispose(&metrics);
+    sdm_team_end(team);
     return s;
 }

@@ -2,6 +2,7 @@
    learning rate. */
 #pragma once
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -30,8 +31,17 @@ adam_step trainer_adam_begin(double rate, int64_t t);
 void trainer_adam_update(parameters *p, size_t first, size_t n, const float *g, adam_step step,
                          float scale);
 
-/* average += (1 - decay) * (w - average) for all weights; the same bits for any n_threads. */
+/* Updates all weights from the gradient g[n]. Threads are those of the caller's team
+   (sdm/internal/team.h), here and below; the bits do not depend on their number. */
+void trainer_adam_update_all(parameters *p, const float *g, adam_step step, int n_threads);
+
+/* average += (1 - decay) * (w - average) for all weights. */
 void trainer_average_update(parameters *p, double decay, int n_threads);
+
+/* Lets the average follow the weights after step number `step` = 1, 2, ... of a phase, with the
+   decay per step; 0: the average is a copy of the weights. Most calls do nothing: the average
+   moves after every eighth step and after the last one. */
+void trainer_average_follow(parameters *p, double decay, int64_t step, bool last, int n_threads);
 
 /* Factor of the learning rate at `fraction` (0 .. 1) of a phase: rises linearly from 0 to 1 up to
    `warmup`, then falls to 0 along half a cosine. */

@@ -6,7 +6,7 @@
 #include "kernels_table.h"
 #include "sdm/internal/kernels.h"
 #include "sdm/internal/processor.h"
-#include "sdm/internal/threads.h"
+#include "sdm/internal/team.h"
 
 static const kernel_table *kernels(void)
 {
@@ -27,24 +27,36 @@ static const kernel_table *kernels(void)
 const char *sdm_kernels_name(void) { return kernels()->name; }
 
 // A block of the matrix product is the work of one thread: MC rows and NC columns of c.
-enum { MC = 264, NC = 64 };
+enum { MC = 264, NC = 32 };
 
 static size_t min_size(size_t a, size_t b) { return a < b ? a : b; }
+
+// A matrix product: the arguments of sdm_gemm().
+typedef struct gemm {
+    size_t m, n, k;
+    sdm_view a, b;
+    bool add;
+    float *c;
+    size_t ldc;
+    size_t rows; // blocks along the rows of c
+} gemm;
+
+static void gemm_block(void *user, size_t index, int member)
+{
+    const gemm *g = user;
+    const size_t i = index % g->rows * MC, j = index / g->rows * NC;
+    (void)member;
+    kernels()->product(min_size(MC, g->m - i), min_size(NC, g->n - j), g->k,
+                       (sdm_view){g->a.data + i * g->a.row, g->a.row, g->a.col},
+                       (sdm_view){g->b.data + j * g->b.col, g->b.row, g->b.col}, g->add,
+                       g->c + i * g->ldc + j, g->ldc);
+}
 
 void sdm_gemm(size_t m, size_t n, size_t k, sdm_view a, sdm_view b, bool add, float *c, size_t ldc,
               int n_threads)
 {
-    const kernel_table *t = kernels();
-    const long rows = (long)((m + MC - 1) / MC), cols = (long)((n + NC - 1) / NC);
-    if (rows * cols < 2) n_threads = 1;
-    n_threads = sdm_threads(n_threads);
-#pragma omp parallel for schedule(dynamic) num_threads(n_threads) if (n_threads > 1)
-    for (long tile = 0; tile < rows * cols; tile++) {
-        const size_t i = (size_t)(tile % rows) * MC, j = (size_t)(tile / rows) * NC;
-        const sdm_view at = {a.data + i * a.row, a.row, a.col},
-                       bt = {b.data + j * b.col, b.row, b.col};
-        t->product(min_size(MC, m - i), min_size(NC, n - j), k, at, bt, add, c + i * ldc + j, ldc);
-    }
+    gemm g = {m, n, k, a, b, add, c, ldc, (m + MC - 1) / MC};
+    sdm_team_run(n_threads, g.rows * ((n + NC - 1) / NC), gemm_block, &g);
 }
 
 void sdm_panel_pack_f32(size_t outputs, size_t k, sdm_view w, float *panels)

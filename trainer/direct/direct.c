@@ -71,7 +71,7 @@ static sdm_status direct_begin(trainer *t, sdm_error *err)
 static void direct_update(trainer *t, direct_state *d, double rate)
 {
     parameters *p = &d->weights;
-    trainer_adam_update_all(p, d->gradient, trainer_adam_begin(rate, t->phase_step + 1),
+    trainer_adam_update_all(p, d->gradient, trainer_adam_begin(rate, ADAM_DECAY, t->phase_step + 1),
                             trainer_threads(t));
     // the average follows the weights closely at first and then more and more slowly
     const double n = (double)t->phase_step + 1;

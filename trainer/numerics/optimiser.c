@@ -9,8 +9,7 @@
 /* Steps between two updates of the average, since an update reads and writes all weights. */
 enum { AVERAGE_EVERY = 8 };
 
-#define BETA1 0.9f
-#define BETA2 0.999f
+#define DECAY_M 0.9f
 
 sdm_status trainer_parameters_create(parameters *p, size_t n, sdm_error *err)
 {
@@ -31,11 +30,12 @@ void trainer_parameters_dispose(parameters *p)
     *p = (parameters){0};
 }
 
-adam_step trainer_adam_begin(double rate, int64_t t)
+adam_step trainer_adam_begin(double rate, double decay, int64_t t)
 {
     return (adam_step){.rate = (float)rate,
-                       .correct_m = (float)(1 / (1 - pow((double)BETA1, (double)t))),
-                       .correct_v = (float)(1 / (1 - pow((double)BETA2, (double)t)))};
+                       .decay_v = (float)decay,
+                       .correct_m = (float)(1 / (1 - pow((double)DECAY_M, (double)t))),
+                       .correct_v = (float)(1 / (1 - pow((double)(float)decay, (double)t)))};
 }
 
 void trainer_adam_update(parameters *p, size_t first, size_t n, const float *g, adam_step step,
@@ -44,8 +44,8 @@ void trainer_adam_update(parameters *p, size_t first, size_t n, const float *g, 
     float *restrict w = p->w + first, *restrict m = p->m + first, *restrict v = p->v + first;
     const float rate = step.rate * scale;
     for (size_t i = 0; i < n; i++) {
-        m[i] = BETA1 * m[i] + (1 - BETA1) * g[i];
-        v[i] = BETA2 * v[i] + (1 - BETA2) * g[i] * g[i];
+        m[i] = DECAY_M * m[i] + (1 - DECAY_M) * g[i];
+        v[i] = step.decay_v * v[i] + (1 - step.decay_v) * g[i] * g[i];
         w[i] -= rate * (m[i] * step.correct_m) / (sqrtf(v[i] * step.correct_v) + 1e-12f);
     }
 }

@@ -18,13 +18,17 @@ typedef struct parameters {
 sdm_status trainer_parameters_create(parameters *p, size_t n, sdm_error *err);
 void trainer_parameters_dispose(parameters *p);
 
-/* Learning rate and bias corrections of one Adam step. */
+/* Learning rate, decay of the second moments and bias corrections of one Adam step. */
 typedef struct adam_step {
-    float rate, correct_m, correct_v;
+    float rate, decay_v, correct_m, correct_v;
 } adam_step;
 
-/* Constants of Adam's step t = 1, 2, ... with learning rate `rate`. */
-adam_step trainer_adam_begin(double rate, int64_t t);
+/* The usual decay of the second moments (beta_2). */
+#define ADAM_DECAY 0.999
+
+/* Constants of Adam's step t = 1, 2, ... with learning rate `rate` and the given decay of the
+   second moments; the first moments decay by 0.9. */
+adam_step trainer_adam_begin(double rate, double decay, int64_t t);
 
 /* Updates weights first .. first + n - 1 and their moments from the gradient g[n], with the
    learning rate multiplied by `scale`. One thread. */

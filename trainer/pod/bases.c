@@ -16,7 +16,7 @@
 
 /* At most this many maps are used. More would reduce the error of the bases on unseen shapes by a
    few per cent only. */
-enum { BASES_MAPS = 4096 };
+enum { BASES_MAPS = 2048 };
 
 typedef struct candidate {
     double gain; // explained variance per weight

@@ -14,6 +14,10 @@
 #include "state/new_samples.h"
 #include "state/progress.h"
 
+/* Decay of Adam's second moments. In trials on the cochlea 0.99 left a tenth less error than 0.999
+   after the same number of steps. */
+#define MODE_FIT_DECAY 0.99
+
 /* Memory of a batch. */
 typedef struct mode_batch {
     float *x;         // [B][I]
@@ -173,7 +177,8 @@ static void mode_fit_step(pod_state *pod, mode_batch *b, size_t batch, double ra
     trainer_mlp_backward(a, pod->mode_fit.w, batch, b->x, b->workspace, b->dh, b->gradient,
                          threads);
     trainer_adam_update_all(&pod->mode_fit, b->gradient,
-                            trainer_adam_begin(rate, pod->t->phase_step + 1), threads);
+                            trainer_adam_begin(rate, MODE_FIT_DECAY, pod->t->phase_step + 1),
+                            threads);
 }
 
 /* Used fraction of the phase's budget, which is (1 - train.refine) * (number of steps), at least

@@ -282,8 +282,9 @@ static sdm_status refine_step(pod_state *pod, refine_batch *b, double rate, sdm_
     sdm_free((void *)phi);
     head_forward(pod, w, b, b->rows);
     // trees: maps, loss, gradients; bases and mean map are updated
-    refine_loop loop = {
-        .pod = pod, .batch = b, .adam = trainer_adam_begin(rate, pod->t->phase_step + 1)};
+    refine_loop loop = {.pod = pod,
+                        .batch = b,
+                        .adam = trainer_adam_begin(rate, ADAM_DECAY, pod->t->phase_step + 1)};
     sdm_team_run(threads_for_trees(pod, b), n_trees(pod), tree_train, &loop);
     double sum = 0;
     for (size_t i = 0; i < n_trees(pod); i++) sum += b->loss[i];
@@ -380,13 +381,11 @@ sdm_status trainer_refine_run(pod_state *pod, sdm_error *err)
 {
     trainer *t = pod->t;
     const sdm_config *c = t->config;
-    // the final evaluation needs the rest of a time budget
-    const double total = c->train.minutes * 60, end = total - fmin(10, 0.03 * total);
     if (!(c->train.refine > 0)) return SDM_OK;
     refine_batch b = {0};
     sdm_status s = refine_batch_create(pod, (size_t)c->train.refine_batch, &b, err);
     trainer_speed speed = trainer_speed_start(t);
-    double at = refine_fraction(t, end);
+    double at = refine_fraction(t, pod->refine_end);
     while (!s && at < 1) {
         // new maps, or stop
         if ((s = trainer_samples_take(t, t->data.n_start + t->data.n_online, err))) break;
@@ -398,7 +397,7 @@ sdm_status trainer_refine_run(pod_state *pod, sdm_error *err)
         const double rate = c->train.refine_rate * trainer_rate_schedule(at, c->train.warmup);
         if ((s = refine_step(pod, &b, rate, err))) break;
         t->step++, t->phase_step++;
-        at = refine_fraction(t, end);
+        at = refine_fraction(t, pod->refine_end);
         trainer_average_follow(&pod->refine, c->train.average, t->phase_step, !(at < 1),
                                trainer_threads(t));
         if (!isfinite(t->loss)) {

@@ -12,10 +12,16 @@
 void trainer_coefficients_block_rows(const pod_state *pod, const sdm_pod_block *b, bool holdout,
                                      const size_t *slots, size_t n, float *rows)
 {
+    enum { AHEAD = 16, LINE = 64 / sizeof(int16_t) }; // maps; voxels of a cache line
     const dataset *d = &pod->t->data;
     const size_t voxels = sdm_pod_block_voxels(b);
     const float *mean = pod->mean + b->voxel;
     for (size_t i = 0; i < n; i++) {
+        // a block has a few lines of each map: the processor does not foresee the next ones
+        if (i + AHEAD < n && !holdout) {
+            const int16_t *next = d->maps + slots[i + AHEAD] * d->n_voxels + b->voxel;
+            for (size_t v = 0; v < voxels; v += LINE) __builtin_prefetch(next + v);
+        }
         if (holdout) {
             const float *from = d->holdout + slots[i] * d->n_voxels + b->voxel;
             for (size_t v = 0; v < voxels; v++) rows[i * voxels + v] = from[v] - mean[v];

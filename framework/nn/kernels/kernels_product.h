@@ -1,9 +1,10 @@
 /* The matrix product of floats, compiled once for each instruction set. Before inclusion, define VW
    (floats in a register) and MR (rows of the register tile, a multiple of 3).
 
-   Panels of NR columns of b are copied into the second-level cache, KC rows at a time, and then
+   Panels of NR columns of b, KC rows at a time, are copied into the second-level cache and then
    multiplied by all rows of a, MR at a time. a is read where it lies: the tile takes one element at
-   a time, and neighbours in memory follow soon along the rows or the columns. */
+   a time, and neighbours in memory follow soon along the rows or the columns. For a few rows of a,
+   b is not copied either if its rows lie in one piece. */
 #pragma once
 
 #include <string.h>
@@ -14,13 +15,13 @@
 #define NV 2 /* registers along a row of the register tile */
 #define NR (NV * VW)
 
-/* Rows of b in a panel. */
-enum { KC = 256 };
+/* Rows of b in a panel; rows of a for which a copy of b does not pay. */
+enum { KC = 256, FEW_ROWS = 64 };
 
 /* One tile: c[MR][ldc] = a * b, or += with `add`; element (i, p) of a is a[i * row + p * col],
-   b is packed[k][NR]. */
-static inline void product_tile(size_t k, const float *a, size_t row, size_t col,
-                                const float *packed, bool add, float *c, size_t ldc)
+   row p of b is b[p * ldb]. */
+static inline void product_tile(size_t k, const float *a, size_t row, size_t col, const float *b,
+                                size_t ldb, bool add, float *c, size_t ldc)
 {
     vec acc[MR][NV];
     const float *at[MR / 3]; // every third row: the two rows after it are offsets of an address
@@ -28,12 +29,12 @@ static inline void product_tile(size_t k, const float *a, size_t row, size_t col
     for (int i = 0; i < MR; i++)
         for (int j = 0; j < NV; j++)
             acc[i][j] = add ? load(c + (size_t)i * ldc + j * VW) : (vec){0};
-    for (size_t p = 0; p < k; p++, packed += NR) {
-        vec b[NV];
-        for (int j = 0; j < NV; j++) b[j] = load(packed + j * VW);
+    for (size_t p = 0; p < k; p++, b += ldb) {
+        vec columns[NV];
+        for (int j = 0; j < NV; j++) columns[j] = load(b + j * VW);
         for (int i = 0; i < MR; i++) {
             const vec s = splat(at[i / 3][(size_t)(i % 3) * row]);
-            for (int j = 0; j < NV; j++) acc[i][j] += s * b[j];
+            for (int j = 0; j < NV; j++) acc[i][j] += s * columns[j];
         }
         for (int i = 0; i < MR / 3; i++) at[i] += col;
     }
@@ -59,8 +60,8 @@ static void product_pack(size_t k, size_t n, sdm_view b, float *packed)
 
 /* A tile that reaches beyond the m rows or n columns of c is computed as a whole tile in `edge`;
    the missing rows of a are zeros. */
-static void product_edge(size_t m, size_t n, size_t k, sdm_view a, const float *packed, bool add,
-                         float *c, size_t ldc)
+static void product_edge(size_t m, size_t n, size_t k, sdm_view a, const float *b, size_t ldb,
+                         bool add, float *c, size_t ldc)
 {
     float rows[KC * MR], edge[MR * NR] = {0};
     if (m < MR) {
@@ -71,7 +72,7 @@ static void product_edge(size_t m, size_t n, size_t k, sdm_view a, const float *
     }
     if (add)
         for (size_t i = 0; i < m; i++) memcpy(edge + i * NR, c + i * ldc, n * sizeof *c);
-    product_tile(k, a.data, a.row, a.col, packed, add, edge, NR);
+    product_tile(k, a.data, a.row, a.col, b, ldb, add, edge, NR);
     for (size_t i = 0; i < m; i++) memcpy(c + i * ldc, edge + i * NR, n * sizeof *c);
 }
 
@@ -85,15 +86,18 @@ static void product(size_t m, size_t n, size_t k, sdm_view a, sdm_view b, bool a
         for (size_t j = 0; j < n; j += NR) {
             const size_t nj = n - j < NR ? n - j : NR;
             const sdm_view bj = {b.data + k0 * b.row + j * b.col, b.row, b.col};
-            product_pack(kc, nj, bj, packed);
+            const bool in_place = b.col == 1 && nj == NR && m <= FEW_ROWS;
+            const float *panel = in_place ? bj.data : packed;
+            const size_t ldb = in_place ? b.row : NR;
+            if (!in_place) product_pack(kc, nj, bj, packed);
             for (size_t i = 0; i < m; i += MR) {
                 const size_t mi = m - i < MR ? m - i : MR;
                 const sdm_view ai = {a.data + i * a.row + k0 * a.col, a.row, a.col};
                 float *to = c + i * ldc + j;
                 if (mi == MR && nj == NR)
-                    product_tile(kc, ai.data, ai.row, ai.col, packed, add, to, ldc);
+                    product_tile(kc, ai.data, ai.row, ai.col, panel, ldb, add, to, ldc);
                 else
-                    product_edge(mi, nj, kc, ai, packed, add, to, ldc);
+                    product_edge(mi, nj, kc, ai, panel, ldb, add, to, ldc);
             }
         }
     }

@@ -236,9 +236,9 @@ static void tree_train(void *user, size_t i, int member)
     for (size_t r = 0; r < b->rows; r++) {
         const int16_t *target = pod->t->data.maps + b->slots[r] * pod->t->data.n_voxels + first;
         const float scale = pod->t->data.scale[b->slots[r]];
-        for (size_t v = 0; v < voxels; v++)
-            w.delta[r * voxels + v] = trainer_loss_slope(
-                pod->t->config, w.predicted[r * voxels + v], scale * (float)target[v], &sum);
+        float *delta = w.delta + r * voxels;
+        for (size_t v = 0; v < voxels; v++) delta[v] = scale * (float)target[v];
+        sum += trainer_loss_slopes(pod->t->config, voxels, w.predicted + r * voxels, delta, delta);
     }
     b->loss[i] = sum;
     tree_backward(pod, b->rows, &w, l->adam);

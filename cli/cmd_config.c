@@ -8,10 +8,12 @@
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"
 
-/* Checks the parts of the configuration that need the shape: its name, options and ranges. */
+/* Checks the parts of the configuration that need the shape: its name and options, and the
+ * ranges and distributions of its parameters. */
 static sdm_status check_shape(const cli_args *args, sdm_config *c, sdm_error *err)
 {
     double min[SDM_MAX_PARAMS], max[SDM_MAX_PARAMS];
+    sdm_distribution distribution[SDM_MAX_PARAMS];
     sdm_registry *registry = NULL;
     sdm_instance *shape = NULL;
     size_t n = 0;
@@ -22,6 +24,7 @@ static sdm_status check_shape(const cli_args *args, sdm_config *c, sdm_error *er
         s = sdm_fail(err, SDM_E_CONFIG, "shape '%s' has %zu parameters, at most %d can be trained",
                      c->shape.name, n, SDM_MAX_PARAMS);
     if (!s) s = sdm_train_ranges(c, shape, min, max, err);
+    if (!s) s = sdm_train_distributions(c, shape, min, max, distribution, err);
     sdm_instance_free(shape);
     sdm_registry_free(registry);
     return s;

@@ -9,6 +9,7 @@
 #include "report/report_audit.h"
 #include "report/report_image.h"
 #include "report/terminal.h"
+#include "sdm/internal/distribution.h"
 #include "sdm/memory.h"
 #include "sdm/model.h"
 #include "sdm/vdb.h"
@@ -22,10 +23,13 @@ static void print_model(const char *path, const sdm_model_info *m)
            (long long)g->n[0], (long long)g->n[1], (long long)g->n[2], g->spacing[0], g->spacing[1],
            g->spacing[2], g->origin[0], g->origin[1], g->origin[2]);
     // parameters and options
-    for (size_t i = 0; i < m->n_params; i++)
-        printf("%s %-18s %.6g .. %.6g%s%s, default %.6g\n", i ? "            " : "parameters  ",
-               m->params[i].name, m->params[i].min, m->params[i].max, *m->params[i].unit ? " " : "",
-               m->params[i].unit, m->params[i].def);
+    for (size_t i = 0; i < m->n_params; i++) {
+        const sdm_model_param *p = &m->params[i];
+        char buf[80];
+        printf("%s %-18s %.6g .. %.6g%s%s, default %.6g, %s\n", i ? "            " : "parameters  ",
+               p->name, p->min, p->max, *p->unit ? " " : "", p->unit, p->def,
+               sdm_distribution_text(&p->distribution, buf));
+    }
     for (size_t i = 0; i < m->n_options; i++)
         printf("%s %-18s %s\n", i ? "            " : "options     ", m->option_names[i],
                m->option_values[i]);
@@ -80,6 +84,7 @@ static sdm_status json_model(const char *path, const sdm_model_info *m, sdm_erro
         sdm_json_real(&j, "min", m->params[i].min);
         sdm_json_real(&j, "max", m->params[i].max);
         sdm_json_real(&j, "default", m->params[i].def);
+        cli_json_distribution(&j, &m->params[i].distribution);
         sdm_json_close(&j, '}');
     }
     sdm_json_close(&j, ']');

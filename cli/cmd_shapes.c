@@ -4,7 +4,9 @@
 
 #include "commands.h"
 #include "inputs/setup.h"
+#include "report/json_values.h"
 #include "report/terminal.h"
+#include "sdm/internal/distribution.h"
 #include "sdm/memory.h"
 
 static const char *option_type(const sdm_option *o)
@@ -26,7 +28,7 @@ enum { COLUMNS = 5 };
 typedef struct cell {
     const char *text; /* a text of the shape, of any length, or `buffer` */
     int length;
-    char buffer[48]; /* a number or a range */
+    char buffer[128]; /* a number, or a range with a distribution */
 } cell;
 typedef struct table {
     cell (*row)[COLUMNS];
@@ -45,9 +47,13 @@ static void cell_set_number(cell *c, double value)
     cell_set(c, c->buffer);
 }
 
-static void cell_set_range(cell *c, double min, double max)
+/* d: distribution within the range; NULL: none is known. A uniform one is not named. */
+static void cell_set_range(cell *c, double min, double max, const sdm_distribution *d)
 {
-    snprintf(c->buffer, sizeof c->buffer, "%.6g .. %.6g", min, max);
+    char text[80];
+    const bool named = d && d->kind != SDM_DISTRIBUTION_UNIFORM;
+    snprintf(c->buffer, sizeof c->buffer, "%.6g .. %.6g%s%s", min, max, named ? ", " : "",
+             named ? sdm_distribution_text(d, text) : "");
     cell_set(c, c->buffer);
 }
 
@@ -76,7 +82,9 @@ static void table_print(table *t, const char *title)
     sdm_free(t->row);
 }
 
-static sdm_status print_params(const sdm_param *params, size_t n, sdm_error *err)
+/* distributions: [n], or NULL if they are not known. */
+static sdm_status print_params(const sdm_param *params, const sdm_distribution *distributions,
+                               size_t n, sdm_error *err)
 {
     table t;
     const sdm_status s = n > 0 ? table_start(&t, n, err) : SDM_OK;
@@ -86,7 +94,7 @@ static sdm_status print_params(const sdm_param *params, size_t n, sdm_error *err
         cell *row = t.row[t.n++];
         cell_set(&row[0], p->name);
         cell_set(&row[1], p->unit);
-        cell_set_range(&row[2], p->min, p->max);
+        cell_set_range(&row[2], p->min, p->max, distributions ? &distributions[i] : NULL);
         cell_set_number(&row[3], p->def);
         cell_set(&row[4], p->help);
     }
@@ -106,7 +114,7 @@ static sdm_status print_options(const sdm_shape *shape, sdm_error *err)
         cell_set(&row[1], o->unit);
         cell_set(&row[3], "");
         if (o->type == SDM_OPTION_REAL || o->type == SDM_OPTION_INT) {
-            cell_set_range(&row[2], o->min, o->max);
+            cell_set_range(&row[2], o->min, o->max, NULL);
             cell_set_number(&row[3], o->def);
         } else if (o->type == SDM_OPTION_CHOICE) {
             cell_set(&row[2], o->choices);
@@ -121,7 +129,8 @@ static sdm_status print_options(const sdm_shape *shape, sdm_error *err)
     return SDM_OK;
 }
 
-static void json_params(sdm_json *j, const sdm_param *params, size_t n)
+static void json_params(sdm_json *j, const sdm_param *params, const sdm_distribution *distributions,
+                        size_t n)
 {
     sdm_json_open(j, "parameters", '[');
     for (size_t i = 0; i < n; i++) {
@@ -131,6 +140,7 @@ static void json_params(sdm_json *j, const sdm_param *params, size_t n)
         sdm_json_real(j, "min", params[i].min);
         sdm_json_real(j, "max", params[i].max);
         sdm_json_real(j, "default", params[i].def);
+        if (distributions) cli_json_distribution(j, &distributions[i]);
         sdm_json_text(j, "help", params[i].help ? params[i].help : "");
         sdm_json_close(j, '}');
     }
@@ -159,7 +169,8 @@ static void json_options(sdm_json *j, const sdm_shape *shape)
 }
 
 /* Prints the parameters and options of one shape. With -O the parameters are those of an instance
- * with these options: the parameters of some shapes depend on them. */
+ * with these options: the parameters of some shapes depend on them. The distributions are those of
+ * an instance, too; a shape that cannot be made without options is printed without them. */
 static sdm_status print_shape(const cli_args *args, const sdm_registry *registry, sdm_error *err)
 {
     // the shape
@@ -167,12 +178,15 @@ static sdm_status print_shape(const cli_args *args, const sdm_registry *registry
     const sdm_shape *shape = cli_find_shape(registry, name, err);
     if (!shape) return SDM_E_ARG;
     sdm_instance *instance = NULL;
-    if (args->options.n > 0) {
-        const sdm_status s = cli_create_shape(registry, name, &args->options, &instance, err);
-        if (s) return s;
+    const bool asked = args->options.n > 0;
+    if (asked || !shape->describe) {
+        const sdm_status s =
+            cli_create_shape(registry, name, &args->options, &instance, asked ? err : NULL);
+        if (s && asked) return s;
     }
     size_t n = shape->n_params;
     const sdm_param *params = instance ? sdm_instance_params(instance, &n) : shape->params;
+    const sdm_distribution *distributions = instance ? sdm_instance_distributions(instance) : NULL;
     // print it
     sdm_status s = SDM_OK;
     if (args->json) {
@@ -180,13 +194,13 @@ static sdm_status print_shape(const cli_args *args, const sdm_registry *registry
         sdm_json_open(&json, NULL, '{');
         sdm_json_text(&json, "name", shape->name);
         sdm_json_text(&json, "summary", shape->summary ? shape->summary : "");
-        json_params(&json, params, n);
+        json_params(&json, params, distributions, n);
         json_options(&json, shape);
         sdm_json_close(&json, '}');
         s = cli_print_json(&json, err);
     } else {
         printf("%s - %s\n", shape->name, shape->summary ? shape->summary : "");
-        s = print_params(params, n, err);
+        s = print_params(params, distributions, n, err);
         if (!s && !instance && shape->describe)
             printf("\nits parameters depend on its options: set them with -O\n");
         if (!s) s = print_options(shape, err);
@@ -214,7 +228,7 @@ static sdm_status print_list(const cli_args *args, const sdm_registry *registry,
         sdm_json_text(&json, "name", shape->name);
         sdm_json_text(&json, "summary", shape->summary ? shape->summary : "");
         sdm_json_text(&json, "origin", sdm_registry_origin(registry, i));
-        json_params(&json, shape->params, shape->n_params);
+        json_params(&json, shape->params, NULL, shape->n_params);
         sdm_json_close(&json, '}');
     }
     sdm_json_close(&json, ']');

@@ -1,8 +1,8 @@
 /* Statistical shape: a point-distribution model (Cootes, Taylor, Cooper and Graham 1995) from
  * files, where vertex = mean + sum over modes of weight * mode. The parameters m1, m2, ... are the
- * weights in standard deviations. Modes are in mm per standard deviation; with the option
- * `deviations` they have any length and are multiplied by the standard deviations. The triangles
- * are those of the mean mesh. */
+ * weights in standard deviations; their distribution is normal. Modes are in mm per standard
+ * deviation; with the option `deviations` they have any length and are multiplied by the standard
+ * deviations. The triangles are those of the mean mesh. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -226,6 +226,13 @@ static int statistical_velocity(const void *self, const sdm_host *host,
     return 0;
 }
 
+static void statistical_distributions(const void *self, sdm_distribution *out)
+{
+    const model *m = self;
+    for (size_t i = 0; i < m->n_modes; i++)
+        out[i] = (sdm_distribution){SDM_DISTRIBUTION_NORMAL, 0, 1};
+}
+
 const sdm_shape sdm_shape_statistical = {
     .abi = SDM_SHAPE_ABI,
     .size = sizeof(sdm_shape),
@@ -239,4 +246,5 @@ const sdm_shape sdm_shape_statistical = {
     .describe = statistical_describe,
     .mesh = statistical_mesh,
     .velocity = statistical_velocity,
+    .distributions = statistical_distributions,
 };

@@ -1,84 +1,20 @@
 /* A training run from beginning to end: maps, network, training, model file. */
 #include <math.h>
-#include <string.h>
+#include <stdio.h>
 
 #include "data/dataset_fill.h"
-#include "direct/direct.h"
-#include "pod/pod_kind.h"
+#include "race.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/team.h"
 #include "sdm/internal/text.h"
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
+#include "set_up.h"
 #include "state/checkpoint.h"
 #include "state/export_model.h"
 #include "state/kind.h"
 #include "state/new_samples.h"
 #include "state/progress.h"
-
-sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape, double *min,
-                            double *max, sdm_error *err)
-{
-    size_t n;
-    const sdm_param *params = sdm_instance_params(shape, &n);
-    char where[1200];
-    for (size_t i = 0; i < n; i++) min[i] = params[i].min, max[i] = params[i].max;
-    for (size_t r = 0; r < config->shape.n_ranges; r++) {
-        const sdm_config_range *range = &config->shape.ranges[r];
-        const int i = sdm_instance_param_index(shape, range->name);
-        sdm_config_where(config, range->mark, where);
-        // no such parameter: suggest the most similar name
-        if (i < 0) {
-            const char *names[SDM_MAX_PARAMS];
-            for (size_t k = 0; k < n && k < SDM_MAX_PARAMS; k++) names[k] = params[k].name;
-            const char *near =
-                sdm_nearest_name(range->name, names, n < SDM_MAX_PARAMS ? n : SDM_MAX_PARAMS);
-            return sdm_fail(err, SDM_E_CONFIG, "%s: shape '%s' has no parameter '%s'%s%s%s", where,
-                            sdm_instance_shape(shape)->name, range->name,
-                            near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
-        }
-        // narrowing is allowed, widening is not
-        if (!(range->min >= params[i].min && range->max <= params[i].max &&
-              range->min < range->max))
-            return sdm_fail(err, SDM_E_CONFIG,
-                            "%s: range [%g, %g] of '%s' must lie within [%g, %g] of shape '%s'",
-                            where, range->min, range->max, range->name, params[i].min,
-                            params[i].max, sdm_instance_shape(shape)->name);
-        min[i] = range->min, max[i] = range->max;
-    }
-    return SDM_OK;
-}
-
-/* Checks the shape against the configuration; allocates the data set and the blocks of its maps. */
-static sdm_status train_set_up(trainer *t, sdm_error *err)
-{
-    const sdm_config *c = t->config;
-    dataset *d = &t->data;
-    sdm_instance_params(t->shape, &d->n_params);
-    if (d->n_params > SDM_POD_MAX_PARAMS)
-        return sdm_fail(err, SDM_E_UNSUPPORTED, "%zu parameters, at most %d can be trained",
-                        d->n_params, SDM_POD_MAX_PARAMS);
-    sdm_status s = trainer_export_prepare(t, err);
-    if (!s) s = sdm_train_ranges(c, t->shape, d->min, d->max, err);
-    if (s) return s;
-    d->shape = t->shape;
-    d->grid = &c->grid;
-    d->seed = c->seed;
-    d->n_voxels = sdm_grid_count(&c->grid);
-    // before the blocks: for a grid that is too large its message names the memory needed
-    if ((s = trainer_dataset_create(d, c, err))) return s;
-
-    // block edge 0 means map order: one block as large as the grid
-    size_t block = t->kind->block(c);
-    for (int i = 0; i < 3 && !t->kind->block(c); i++)
-        if ((size_t)c->grid.n[i] > block) block = (size_t)c->grid.n[i];
-    t->levels = sdm_pod_count(&c->grid, block, t->kind->levels ? t->kind->levels(c) : 1);
-    d->n_blocks = t->levels.first[1];
-    if ((s = SDM_ALLOC(&t->blocks, t->levels.first[t->levels.n], "blocks", err))) return s;
-    sdm_pod_blocks(&c->grid, block, &t->levels, t->blocks);
-    d->blocks = t->blocks;
-    return SDM_OK;
-}
 
 static void fill_report(void *user, size_t done, size_t all)
 {
@@ -93,21 +29,6 @@ static bool fill_cancelled(void *user) { return trainer_cancelled(user); }
 
 /* true when the computation of the data has used half of a time budget. */
 static bool fill_enough(void *user) { return trainer_start_fraction(user) > 0.5; }
-
-/* Refuses a grid without a voxel inside any held-out shape: a network trained on it would have a
- * small error but be useless. */
-static sdm_status train_check_grid(const trainer *t, sdm_error *err)
-{
-    const dataset *d = &t->data;
-    for (size_t i = 0; i < d->n_holdout * d->n_voxels; i++)
-        if (d->holdout[i] < 0) return SDM_OK;
-    return sdm_fail(
-        err, SDM_E_CONFIG,
-        "%s: no voxel of the grid is inside any of %zu held-out shapes: check grid.centre (or "
-        "grid.origin), grid.size and "
-        "grid.spacing",
-        t->config->file, d->n_holdout);
-}
 
 /* Makes all maps needed before training. resumed: exactly as many as the interrupted run made, else
  * as many as the time budget allows. */
@@ -128,7 +49,7 @@ static sdm_status train_make_maps(trainer *t, bool resumed, sdm_error *err)
                         "data.start or raise "
                         "train.minutes)",
                         t->data.n_start, start);
-    return train_check_grid(t, err);
+    return trainer_check_grid(t, err);
 }
 
 /* Prepares everything for the first step: maps, network, producer. A resumed run makes the n_taken
@@ -153,7 +74,7 @@ static sdm_status train_prepare(trainer *t, bool resumed, size_t n_taken, sdm_er
 static sdm_status train_run(trainer *t, bool resume, sdm_outfile **config, sdm_error *err)
 {
     bool found = false;
-    sdm_status s = train_set_up(t, err);
+    sdm_status s = trainer_set_up(t, err);
     if (!s && resume) {
         s = trainer_checkpoint_read(t, &found, err);
         if (!s && !found)
@@ -196,6 +117,24 @@ static sdm_status train_finish(trainer *t, sdm_train_report *report, sdm_error *
     return s;
 }
 
+/* *c = the configuration of the run: `config`, where network.kind: auto is settled by a race, or on
+ * resuming by config.yaml of the interrupted run. */
+static sdm_status train_settle(trainer *t, const sdm_config *config, bool resume, sdm_config *c,
+                               sdm_error *err)
+{
+    *c = *config;
+    if (config->network.kind != SDM_NETWORK_AUTO) return SDM_OK;
+    char path[SDM_PATH_TEXT_MAX + 32];
+    snprintf(path, sizeof path, "%s/config.yaml", t->folder);
+    sdm_config *before = NULL;
+    sdm_status s = SDM_ALLOC(&before, 1, "configuration", err);
+    if (s) return s;
+    const bool found = resume && !sdm_config_read(path, NULL, 0, before, NULL);
+    if (found) sdm_config_choose_kind(c, before->network.kind);
+    sdm_free(before);
+    return found ? SDM_OK : trainer_race(t, c, err);
+}
+
 sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const char *folder,
                      bool resume, const sdm_train_hooks *hooks, sdm_train_report *report,
                      sdm_error *err)
@@ -204,8 +143,6 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     trainer t = {.config = config,
                  .shape = shape,
                  .folder = folder,
-                 .kind = config->network.kind == SDM_NETWORK_POD ? &trainer_kind_pod
-                                                                 : &trainer_kind_direct,
                  .started = sdm_clock(),
                  .loss = NAN,
                  .heldout_mse = NAN,
@@ -213,10 +150,20 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     if (hooks) t.hooks = *hooks;
     t.n_threads = sdm_threads(config->threads);
     sdm_outfile *resolved = NULL;
+    sdm_config *settled = NULL;
     sdm_team *team = NULL;
     sdm_status s = sdm_make_folder(folder, err);
+    if (!s) s = SDM_ALLOC(&settled, 1, "configuration", err);
     if (!s) s = sdm_team_start(t.n_threads, &team, err);
-    if (!s) s = trainer_export_config(&t, &resolved, err);
+    if (!s) s = train_settle(&t, config, resume, settled, err);
+    if (s) {
+        sdm_team_end(team);
+        sdm_free(settled);
+        return s;
+    }
+    t.config = settled;
+    t.kind = trainer_kind_find(settled->network.kind);
+    s = trainer_export_config(&t, &resolved, err);
     if (!s) s = train_run(&t, resume, &resolved, err);
     sdm_outfile_discard(&resolved);
     trainer_producer_stop(t.producer);
@@ -227,5 +174,6 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     sdm_free(t.blocks);
     sdm_text_dispose(&metrics);
     sdm_team_end(team);
+    sdm_free(settled);
     return s;
 }

@@ -258,7 +258,7 @@ const cli_option cli_options[] = {
     {"random-pose", 0, CLI_REAL2, "DEG,MM", NULL, 0, 1e12, ON(CLI_PHANTOM), AT(phantom.random_pose),
      "random rotation and translation up to these values, applied after the given ones"},
     {"random-params", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_PHANTOM), AT(phantom.random_params),
-     "draw the parameters without -p from their ranges"},
+     "draw the parameters without -p from their distributions"},
     {"frame", 0, CLI_REAL3, "X,Y,Z", NULL, -1000, 1000, ON(CLI_PHANTOM), AT(phantom.frame),
      "rotation of the axes of the image: rotation vector, rad"},
     {"crop", 0, CLI_REAL3, "X,Y,Z", NULL, -0.95, 0.95, ON(CLI_PHANTOM), AT(phantom.crop),
@@ -347,8 +347,8 @@ const cli_option cli_options[] = {
     {"keep", 0, CLI_LIST, "WHAT", NULL, 0, 0, ON(CLI_FIT), AT(fit.keep),
      "keep at the start value: parameters, pose, blur or appearance; may be repeated"},
     {"prior-sd", 0, CLI_REAL, "F", NULL, 0, 1e9, ON(CLI_FIT), AT(fit.prior_sd),
-     "standard deviation of the prior of a parameter, in halves of its range (default 1; 0: no "
-     "prior)"},
+     "standard deviation of the prior of a parameter, in halves of its range or, if its "
+     "distribution is normal, in deviations (default 1; 0: no prior)"},
     {"prior-rotation", 0, CLI_REAL, "RAD", NULL, 0, 1e9, ON(CLI_FIT), AT(fit.prior_rotation),
      "standard deviation of the prior of the rotation from the start (default 0: no prior)"},
     {"prior-translation", 0, CLI_REAL, "MM", NULL, 0, 1e9, ON(CLI_FIT), AT(fit.prior_translation),

@@ -18,6 +18,15 @@ void cli_json_params(sdm_json *json, const char *key, const sdm_param *params, s
     sdm_json_close(json, '}');
 }
 
+void cli_json_distribution(sdm_json *json, const sdm_distribution *d)
+{
+    const bool normal = d->kind == SDM_DISTRIBUTION_NORMAL;
+    sdm_json_text(json, "distribution", normal ? "normal" : "uniform");
+    if (!normal) return;
+    sdm_json_real(json, "mean", d->mean);
+    sdm_json_real(json, "deviation", d->deviation);
+}
+
 void cli_json_grid(sdm_json *json, const char *key, const sdm_grid *g, bool with_direction)
 {
     sdm_json_open(json, key, '{');

@@ -12,6 +12,9 @@ void cli_json_reals(sdm_json *json, const char *key, const double *v, size_t n);
 void cli_json_params(sdm_json *json, const char *key, const sdm_param *params, size_t n,
                      const double *values);
 
+/* Adds the member "distribution": "uniform" or "normal", the latter with "mean" and "deviation". */
+void cli_json_distribution(sdm_json *json, const sdm_distribution *d);
+
 /* Adds the grid as an object: size, spacing and origin (mm), and with `with_direction` the
  * direction matrix. */
 void cli_json_grid(sdm_json *json, const char *key, const sdm_grid *g, bool with_direction);

@@ -26,13 +26,15 @@ cli_map_maker cli_maker_of_model(const sdm_model *m, const sdm_instance *shape)
     for (size_t i = 0; i < maker.n_params; i++) {
         maker.min[i] = info->params[i].min;
         maker.max[i] = info->params[i].max;
+        maker.distribution[i] = info->params[i].distribution;
     }
     return maker;
 }
 
 void cli_maker_params(const cli_map_maker *m, uint64_t seed, size_t index, double *p)
 {
-    sdm_sample_params(seed, CLI_STREAM_EVAL, index, m->min, m->max, m->n_params, p);
+    sdm_sample_params(seed, CLI_STREAM_EVAL, index, m->min, m->max, m->distribution, m->n_params,
+                      p);
 }
 
 void cli_eval_params(const sdm_model *m, uint64_t seed, size_t index, double *p)

@@ -34,17 +34,18 @@ typedef struct cli_eval {
     size_t worst, median; /* indices of the shapes with the largest and the median MSE */
 } cli_eval;
 
-/* p[n_params] = random parameters within the model's trained ranges, a function of seed
- * and index. */
+/* p[n_params] = random parameters within the model's trained ranges, from the distributions of its
+ * training; a function of seed and index. */
 void cli_eval_params(const sdm_model *m, uint64_t seed, size_t index, double *p);
 
-/* A method that makes maps of a shape, on one grid, at parameters in a box. The exact engine makes
- * the reference maps from the same shape. */
+/* A method that makes maps of a shape, on one grid, at parameters in a box with a distribution. The
+ * exact engine makes the reference maps from the same shape. */
 typedef struct cli_map_maker {
     const sdm_instance *shape;
     sdm_grid grid;
     size_t n_params;
     double min[SDM_MAX_PARAMS], max[SDM_MAX_PARAMS];
+    sdm_distribution distribution[SDM_MAX_PARAMS];
     /* values[nz][ny][nx] = the map at p[n_params], mm; uses only the calling thread. [any thread]
      */
     sdm_status (*make)(const void *user, const double *p, float *values, sdm_error *err);
@@ -55,7 +56,7 @@ typedef struct cli_map_maker {
  * and shape. */
 cli_map_maker cli_maker_of_model(const sdm_model *m, const sdm_instance *shape);
 
-/* p[n_params] = random parameters within the maker's box, a function of seed and index. */
+/* p[n_params] = random parameters from the maker's distributions, a function of seed and index. */
 void cli_maker_params(const cli_map_maker *m, uint64_t seed, size_t index, double *p);
 
 /* Errors of values[nz][ny][nx] against exact[nz][ny][nx]; surfaces: also the distances between the

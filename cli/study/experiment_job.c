@@ -54,6 +54,8 @@ static sdm_status job_open(const cli_experiment_run *run, size_t index, cli_expe
     m->grid = job->config->grid;
     describe_grid(&m->grid, run->results[index].grid, sizeof run->results[index].grid);
     s = sdm_train_ranges(job->config, job->shape, m->min, m->max, err);
+    if (!s)
+        s = sdm_train_distributions(job->config, job->shape, m->min, m->max, m->distribution, err);
     if (!s) s = check_reference(run, job, err);
     for (size_t i = 0; i < m->n_params && !s; i++)
         job->nominal[i] = fmin(m->max[i], fmax(m->min[i], params[i].def));

@@ -136,6 +136,31 @@ sdm_status sdm_config_read(const char *path, const char *const *overrides, size_
     return s;
 }
 
+/* Gives a key the default of `kind` if it has that of `auto`. plain: reads defaults. */
+static void choose_default(sdm_config *c, sdm_reader *plain, const sdm_field *f, int kind)
+{
+    const size_t size = f->type == SDM_FIELD_REAL ? sizeof(double) : sizeof(int);
+    char *value = (char *)c + f->offset, *other = (char *)plain->config + f->offset;
+    sdm_field_set_default(plain, f, f->kind_defs[SDM_NETWORK_AUTO]);
+    if (memcmp(value, other, size) != 0) return;
+    sdm_field_set_default(plain, f, f->kind_defs[kind]);
+    memcpy(value, other, size);
+}
+
+void sdm_config_choose_kind(sdm_config *c, sdm_network_kind kind)
+{
+    sdm_config plain = *c;
+    sdm_mistakes mistakes = {.file = ""};
+    sdm_reader r = {.target = &plain, .config = &plain, .mistakes = &mistakes};
+    r.sections = sdm_config_sections(&r.n_sections);
+    for (size_t s = 0; s < r.n_sections; s++)
+        for (size_t k = 0; k < r.sections[s].n_fields; k++)
+            if (r.sections[s].fields[k].kind_defs)
+                choose_default(c, &r, &r.sections[s].fields[k], (int)kind);
+    c->network.kind = kind;
+    if (kind != SDM_NETWORK_POD) c->data.sampling = SDM_SAMPLING_UNIFORM;
+}
+
 void sdm_config_strip(sdm_config *c)
 {
     c->threads = c->data.workers = 0;

@@ -121,8 +121,9 @@ static const sdm_field FIT[] = {
         "fraction of the range of every parameter, about its middle, from which the shapes are "
         "drawn"),
     ROW(E, "prior_sd", SDM_FIELD_REAL, fit.prior_sd, 0, 1e6, "1", "",
-        "standard deviation of the prior of every parameter, in units of half its range, about the "
-        "middle of the range; 0: no prior. Exact fits use the range of the shape itself"),
+        "standard deviation of the prior of every parameter: of a normal one in units of its "
+        "deviation, about its mean; of another one in units of half its range, about the middle of "
+        "the range; 0: no prior. Exact fits use distribution and range of the shape itself"),
     ROW(E, "eps", SDM_FIELD_REAL, fit.eps, 1e-12, 1e-4, "3e-6", "",
         "a fit with exact maps has converged when all steps are smaller than this: as fraction of "
         "a parameter range, in rad, as fraction of the size of the shape"),

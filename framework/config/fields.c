@@ -183,8 +183,8 @@ const char *sdm_field_range(const sdm_field *f, char *buf, size_t size)
     return buf;
 }
 
-static bool read_choice(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
-                        const char *path, int *out)
+bool sdm_read_choice(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path,
+                     int *out)
 {
     char names[CHOICES_MAX][SDM_NAME_MAX], allowed[SDM_KEY_PATH_MAX], quoted[SDM_QUOTE_MAX];
     const char *list[CHOICES_MAX];
@@ -222,7 +222,7 @@ static bool read_field(sdm_reader *r, const sdm_field *f, const sdm_tree_node *n
     case SDM_FIELD_REAL:
         return sdm_read_real(r, node, path, f->min, f->max, (double *)at);
     case SDM_FIELD_CHOICE:
-        return read_choice(r, f, node, path, (int *)at);
+        return sdm_read_choice(r, f, node, path, (int *)at);
     case SDM_FIELD_TEXT:
         return sdm_read_text(r, node, path, (size_t)f->max, at);
     case SDM_FIELD_SPECIAL:

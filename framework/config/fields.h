@@ -90,6 +90,9 @@ bool sdm_read_int(sdm_reader *r, const sdm_tree_node *node, const char *path, in
                   int64_t max, int64_t *out);
 bool sdm_read_text(sdm_reader *r, const sdm_tree_node *node, const char *path, size_t max,
                    char *out);
+/* Reads one of the words f->choices; *out = its number, from 0. Returns false after a mistake. */
+bool sdm_read_choice(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node, const char *path,
+                     int *out);
 
 /* Records the mistake "PATH: needs WANTED, got ..." and returns false. */
 bool sdm_refuse_type(sdm_reader *r, const sdm_tree_node *node, const char *path,

@@ -36,6 +36,8 @@ static void check_limits(sdm_reader *r, sdm_mark place)
         const char *key;
         int value, min, max;
     } limits[] = {{SDM_NETWORK_POD, "block", c->network.block, 2, 16},
+                  {SDM_NETWORK_AUTO, "block", c->network.block, 2, 16},
+                  {SDM_NETWORK_TEMPLATE, "block", c->network.block, 2, 16},
                   {SDM_NETWORK_SDMNN, "depth", c->network.depth, 1, 6},
                   {SDM_NETWORK_DEEPSDF, "depth", c->network.depth, 1, 16},
                   {SDM_NETWORK_IMNET, "depth", c->network.depth, 1, 16},
@@ -52,11 +54,17 @@ static void check_limits(sdm_reader *r, sdm_mark place)
     }
 }
 
+/* Only pod and template may have weights of type i8. */
+static bool bytes_refused(int kind)
+{
+    return kind != SDM_NETWORK_POD && kind != SDM_NETWORK_TEMPLATE && kind != SDM_NETWORK_AUTO;
+}
+
 void sdm_kinds_settle(sdm_reader *r, sdm_mark place)
 {
     const int kind = (int)r->config->network.kind;
-    // only pod has weights of type i8
-    const bool bytes = kind != SDM_NETWORK_POD && r->config->network.weights == SDM_WEIGHT_I8;
+    const bool bytes = bytes_refused(kind) &&
+                       r->config->network.weights == SDM_WEIGHT_I8;
     char names[200], chosen[SDM_NAME_MAX];
     sdm_choice_name(SDM_KIND_CHOICES, kind, chosen);
     for (size_t s = 0; s < r->n_sections; s++)
@@ -81,8 +89,8 @@ void sdm_kinds_settle(sdm_reader *r, sdm_mark place)
         r->config->network.skip = r->config->network.depth / 2;
     check_limits(r, place);
     const sdm_given *g = sdm_fields_given(r, "network", "weights");
-    if (kind != SDM_NETWORK_POD && r->config->network.weights == SDM_WEIGHT_I8 && !g->refused)
+    if (bytes_refused(kind) && r->config->network.weights == SDM_WEIGHT_I8 && !g->refused)
         sdm_mistakes_add(r->mistakes, sdm_mark_is_set(g->mark) ? g->mark : place,
-                         "network.weights: i8 is for a network of kind pod; %s has f16 and f32",
+                         "network.weights: i8 is for a network of kind pod or template; %s has f16 and f32",
                          chosen);
 }

@@ -3,7 +3,7 @@
 
 #include "fields.h"
 
-#define SDM_KIND_CHOICES "pod|sdmnn|deepsdf|imnet"
+#define SDM_KIND_CHOICES "pod|sdmnn|deepsdf|imnet|template|auto"
 
 /* True if networks of `kind` (sdm_network_kind) have the key of the row f. */
 bool sdm_kind_has(const sdm_field *f, int kind);

@@ -54,18 +54,22 @@ enum {
     POD = 1 << SDM_NETWORK_POD,
     SDMNN = 1 << SDM_NETWORK_SDMNN,
     DEEPSDF = 1 << SDM_NETWORK_DEEPSDF,
-    IMNET = 1 << SDM_NETWORK_IMNET
+    IMNET = 1 << SDM_NETWORK_IMNET,
+    TEMPLATE = 1 << SDM_NETWORK_TEMPLATE,
+    AUTO = 1 << SDM_NETWORK_AUTO
 };
-enum { POINTS = DEEPSDF | IMNET };
+enum { POINTS = DEEPSDF | IMNET, BASES = POD | TEMPLATE | AUTO };
 
-// Defaults for pod, sdmnn, deepsdf (from Park et al. 2019) and imnet (from Chen and Zhang 2019).
+// Defaults for pod, sdmnn, deepsdf (from Park et al. 2019), imnet (from Chen and Zhang 2019) and
+// template (of its correction, a pod network) and auto (those of pod).
 static const char *const
-    DEPTH[] = {"3", "4", "8", "5"},
-    *const WIDTH[] = {"128", "64", "512", "2048"}, *const BLOCK[] = {"4", "2", "4", "4"},
-    *const ACTIVATION[] = {"silu", "relu", "relu", "leaky_relu"},
-    *const OUTPUT_TYPE[] = {"linear", "linear", "tanh", "linear"},
-    *const WEIGHTS[] = {"i8", "f16", "f16", "f16"}, *const BATCH[] = {"256", "8", "16", "16"},
-    *const RATE[] = {"3e-3", "1e-3", "5e-4", "5e-4"};
+    DEPTH[] = {"3", "4", "8", "5", "0", "3"},
+    *const WIDTH[] = {"128", "64", "512", "2048", "64", "128"}, *const BLOCK[] = {"4", "2", "4", "4", "4", "4"},
+    *const ACTIVATION[] = {"silu", "relu", "relu", "leaky_relu", "silu", "silu"},
+    *const OUTPUT_TYPE[] = {"linear", "linear", "tanh", "linear", "linear", "linear"},
+    *const WEIGHTS[] = {"i8", "f16", "f16", "f16", "i8", "i8"},
+    *const BATCH[] = {"256", "8", "16", "16", "256", "256"},
+    *const RATE[] = {"3e-3", "1e-3", "5e-4", "5e-4", "3e-3", "3e-3"};
 
 static const sdm_field SHAPE[] = {
     ROW("name", SDM_FIELD_TEXT, shape.name, 1, SDM_NAME_MAX - 1, NULL, "",
@@ -77,6 +81,11 @@ static const sdm_field SHAPE[] = {
     SPECIAL("ranges", sdm_read_key_ranges, sdm_dump_key_ranges, "mapping", "parameter: [min, max]",
             "the shape's own", "",
             "parameter ranges on which the network is trained, within those of the shape"),
+    SPECIAL("distribution", sdm_read_key_distribution, sdm_dump_key_distribution, "name or mapping",
+            "shape, uniform, normal; or parameter: one of these or {mean: x, deviation: y}",
+            "shape", "",
+            "distribution of the parameters of random shapes, within their ranges; shape: as the "
+            "shape states it"),
 };
 
 static const sdm_field GRID[] = {
@@ -91,8 +100,9 @@ static const sdm_field GRID[] = {
 };
 
 static const sdm_field NETWORK[] = {
-    CHOICE("kind", network.kind, SDM_KIND_CHOICES, "pod",
-           "pod: basis functions per block, with coefficients from polynomials and an MLP; sdmnn: "
+    CHOICE("kind", network.kind, SDM_KIND_CHOICES, "auto",
+           "auto: pod or template, whichever has the smaller error in a short trial; template: exact "
+           "maps of the shape's parts, carried along with the parts, and a correction by pod; pod: basis functions per block, with coefficients from polynomials and an MLP; sdmnn: "
            "3-D convolutional encoder-decoder; deepsdf, imnet: one distance per point, evaluated "
            "at every voxel"),
     BY_KIND(
@@ -100,9 +110,9 @@ static const sdm_field NETWORK[] = {
         "number of hidden layers (pod: of the MLP, 0: polynomials only); sdmnn: number of levels"),
     BY_KIND(INT, "width", network.width, 8, 4096, "units", WIDTH,
             "units per hidden layer; imnet: of the first one, halved in each further layer"),
-    OF_KIND(POD, INT, "rank", network.rank, 1, 256, "9", "",
+    OF_KIND(BASES, INT, "rank", network.rank, 1, 256, "9", "",
             "mean number of basis functions per block of the lowest level"),
-    OF_KIND(POD, INT, "levels", network.levels, 1, 8, "3", "levels",
+    OF_KIND(BASES, INT, "levels", network.levels, 1, 8, "3", "levels",
             "number of levels of blocks; the edge of the blocks doubles from level to level"),
     {.key = "block",
      .type = INT,
@@ -110,15 +120,15 @@ static const sdm_field NETWORK[] = {
      .min = 1,
      .max = 16,
      .unit = "voxels",
-     .kinds = POD | SDMNN,
+     .kinds = BASES | SDMNN,
      .kind_defs = BLOCK,
      .help = "pod: edge of a block of the lowest level, at least 2; sdmnn: edge of a cell of the "
              "volume that the dense layers produce"},
-    OF_KIND(POD, INT, "modes", network.modes, 8, 2048, "512", "",
+    OF_KIND(BASES, INT, "modes", network.modes, 8, 2048, "512", "",
             "number of global modes in which the coefficients are learned"),
-    OF_KIND(POD, INT, "degree", network.degree, 0, 12, "6", "",
+    OF_KIND(BASES, INT, "degree", network.degree, 0, 12, "6", "",
             "total degree of the polynomial part"),
-    OF_KIND(POD, INT, "input_degree", network.input_degree, 1, 8, "4", "",
+    OF_KIND(BASES, INT, "input_degree", network.input_degree, 1, 8, "4", "",
             "total degree of the products of parameters that are inputs of the MLP"),
     OF_KIND(SDMNN, INT, "channels", network.channels, 1, 512, "16", "",
             "channels of the first level, doubled in each further level"),
@@ -182,8 +192,9 @@ static const sdm_field DATA[] = {
      .def = "uniform",
      .unit = "",
      .kinds = POD,
-     .help = "distribution of the online shapes: uniform over the parameters (Sobol'), or denser "
-             "where the error of the network is larger"},
+     .help =
+         "uniform: the online shapes follow shape.distribution (Sobol'); error: they are denser "
+         "where the error of the network is larger"},
     ROW("static_share", REAL, data.static_share, 0, 1, "0.1", "",
         "fraction of each batch drawn from the static grid"),
     ROW("memory_gb", REAL, data.memory_gb, 0.001, 1e6, "6", "GB", "memory budget for maps"),
@@ -220,11 +231,11 @@ static const sdm_field TRAIN[] = {
     ROW("near_mm", REAL, train.near_mm, 1e-6, 1e6, "0.4", "mm",
         "voxels closer to the surface than this count as near"),
     OF_KIND(
-        POD, REAL, "refine", train.refine, 0, 1, "0.4", "",
+        BASES, REAL, "refine", train.refine, 0, 1, "0.4", "",
         "last fraction of the budget, used for refinement: training end to end, decoder included"),
-    OF_KIND(POD, INT, "refine_batch", train.refine_batch, 1, 4096, "32", "samples",
+    OF_KIND(BASES, INT, "refine_batch", train.refine_batch, 1, 4096, "32", "samples",
             "samples per step during refinement"),
-    OF_KIND(POD, REAL, "refine_rate", train.refine_rate, 1e-9, 1, "3e-4", "",
+    OF_KIND(BASES, REAL, "refine_rate", train.refine_rate, 1e-9, 1, "3e-4", "",
             "learning rate during refinement"),
     ROW("average", REAL, train.average, 0, 0.99999, "0.998", "",
         "decay of the moving average of the weights; 0: no average"),

@@ -78,9 +78,8 @@ bool sdm_read_key_centre(sdm_reader *r, const sdm_field *f, const sdm_tree_node 
     return read_three(r, node, path, -PLACE_MAX, PLACE_MAX, r->centre);
 }
 
-/* Reads the key of a node, the name of an option or parameter of a shape. */
-static bool read_name(sdm_reader *r, const sdm_tree_node *node, const char *path,
-                      char out[SDM_NAME_MAX])
+bool sdm_read_name(sdm_reader *r, const sdm_tree_node *node, const char *path,
+                   char out[SDM_NAME_MAX])
 {
     static const char ALLOWED[] = "abcdefghijklmnopqrstuvwxyz0123456789_";
     char quoted[SDM_QUOTE_MAX];
@@ -107,7 +106,7 @@ static bool read_option(sdm_reader *r, const sdm_tree_node *node, const char *pa
     sdm_config_option option = {.mark = node->key_mark};
     char name[SDM_KEY_PATH_MAX];
     size_t at = 0;
-    if (!read_name(r, node, path, option.name)) return false;
+    if (!sdm_read_name(r, node, path, option.name)) return false;
     snprintf(name, sizeof name, "%s.%s", path, option.name);
     if (!sdm_read_text(r, node, name, sizeof option.value - 1, option.value)) return false;
     sdm_config *c = r->config;
@@ -128,7 +127,7 @@ static bool read_range(sdm_reader *r, const sdm_tree_node *node, const char *pat
     sdm_config_range range = {.mark = node->key_mark};
     char name[SDM_KEY_PATH_MAX], a[32], b[32];
     size_t at = 0;
-    if (!read_name(r, node, path, range.name)) return false;
+    if (!sdm_read_name(r, node, path, range.name)) return false;
     snprintf(name, sizeof name, "%s.%s", path, range.name);
     if (node->kind != SDM_TREE_LIST || node->n_children != 2)
         return sdm_refuse_type(r, node, name, "two numbers [min, max]");

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "sdm/internal/distribution.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
 #include "shape_internal.h"
@@ -42,6 +43,23 @@ static sdm_status instance_call_describe(sdm_instance *s, sdm_error *err)
     return status;
 }
 
+static sdm_status instance_call_distributions(sdm_instance *s, sdm_error *err)
+{
+    sdm_status status =
+        SDM_ALLOC(&s->distributions, s->n_params, "distributions of the parameters", err);
+    if (status || !s->shape->distributions) return status; // zero is uniform
+    s->shape->distributions(s->self, s->distributions);
+    for (size_t i = 0; i < s->n_params; i++) {
+        const sdm_param *p = &s->params[i];
+        if (sdm_distribution_check(&s->distributions[i], p->min, p->max, err))
+            return sdm_fail_in(err, SDM_E_PLUGIN, "shape '%s', distributions(): parameter '%s'",
+                               s->shape->name, p->name);
+        if (s->distributions[i].kind == SDM_DISTRIBUTION_UNIFORM)
+            s->distributions[i] = (sdm_distribution){SDM_DISTRIBUTION_UNIFORM, 0, 0};
+    }
+    return SDM_OK;
+}
+
 sdm_status sdm_instance_create(const sdm_shape *shape, const sdm_named_text *options,
                                size_t n_options, const char *base_dir, sdm_instance **out,
                                sdm_error *err)
@@ -60,6 +78,7 @@ sdm_status sdm_instance_create(const sdm_shape *shape, const sdm_named_text *opt
             sdm_shape_parse_options(shape, options, n_options, base_dir, s->options, &s->text, err);
     if (!status) status = instance_call_create(s, err);
     if (!status) status = instance_call_describe(s, err);
+    if (!status) status = instance_call_distributions(s, err);
     if (status)
         sdm_instance_free(s);
     else
@@ -71,6 +90,7 @@ void sdm_instance_free(sdm_instance *s)
 {
     if (!s) return;
     if (s->self && s->shape->destroy) s->shape->destroy(s->self);
+    sdm_free(s->distributions);
     sdm_free(s->text);
     sdm_free(s->options);
     sdm_free(s);
@@ -82,6 +102,11 @@ const sdm_param *sdm_instance_params(const sdm_instance *s, size_t *n)
 {
     if (n) *n = s->n_params;
     return s->params;
+}
+
+const sdm_distribution *sdm_instance_distributions(const sdm_instance *s)
+{
+    return s->distributions;
 }
 
 const sdm_option_value *sdm_instance_options(const sdm_instance *s) { return s->options; }

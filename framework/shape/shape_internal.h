@@ -58,6 +58,7 @@ struct sdm_instance {
     const sdm_shape *shape;
     void *self;
     const sdm_param *params;
+    sdm_distribution *distributions; /* [n_params] */
     size_t n_params;
     sdm_option_value *options;
     char *text;

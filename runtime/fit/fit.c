@@ -115,6 +115,7 @@ static sdm_status params_start(fit_problem *p, bool *clamped, sdm_error *err)
     for (size_t k = 0; k < p->n_params; k++) {
         const char *name;
         sdm_fit_bounds(source, k, &p->low[k], &p->high[k], &name);
+        p->distribution[k] = sdm_fit_distribution(source, k);
         double x;
         if (p->opts->start_params) {
             x = p->opts->start_params[k];

@@ -47,6 +47,12 @@ void sdm_fit_bounds(const sdm_fit_source *source, size_t k, double *low, double 
     }
 }
 
+sdm_distribution sdm_fit_distribution(const sdm_fit_source *source, size_t k)
+{
+    return source->model ? sdm_model_get_info(source->model)->params[k].distribution
+                         : sdm_instance_distributions(source->shape)[k];
+}
+
 // checks the values of an image or label map: not all NaN, not all equal, labels in 0 .. 1
 static sdm_status check_values(const sdm_fit_target *t, sdm_error *err)
 {

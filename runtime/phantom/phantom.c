@@ -5,6 +5,7 @@
 #include <math.h>
 
 #include "phantom_parts.h"
+#include "sdm/internal/distribution.h"
 #include "sdm/internal/rng.h"
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
@@ -193,9 +194,11 @@ void sdm_phantom_random_params(const sdm_instance *shape, uint64_t seed, double 
 {
     size_t n;
     const sdm_param *params = sdm_instance_params(shape, &n);
+    const sdm_distribution *distribution = sdm_instance_distributions(shape);
     for (size_t i = 0; i < n; i++) {
         const double u = sdm_rng_uniform(seed, PHANTOM_STREAM_PARAMS, i);
-        p[i] = fmin(params[i].min + u * (params[i].max - params[i].min), params[i].max);
+        p[i] = fmin(sdm_distribution_quantile(&distribution[i], params[i].min, params[i].max, u),
+                    params[i].max);
     }
 }
 

@@ -72,6 +72,16 @@ struct shape_v1 {
                     const double[3], double *);
 };
 
+/* Members that later versions added at the end. Never edit these either. */
+struct distribution_added {
+    int kind;
+    double mean, deviation;
+};
+struct shape_added {
+    struct shape_v1 v1;
+    void (*distributions)(const void *, sdm_distribution *);
+};
+
 #define SAME_OFFSET(v1, now, field)                                                                \
     _Static_assert(offsetof(struct v1, field) == offsetof(now, field), #field " has moved")
 _Static_assert(SDM_SHAPE_ABI == 1, "a new interface version needs a frozen copy of its own");
@@ -121,6 +131,12 @@ SAME_OFFSET(shape_v1, sdm_shape, describe);
 SAME_OFFSET(shape_v1, sdm_shape, mesh);
 SAME_OFFSET(shape_v1, sdm_shape, velocity);
 SAME_OFFSET(shape_v1, sdm_shape, distance);
+SAME_OFFSET(shape_added, sdm_shape, distributions);
+SAME_OFFSET(distribution_added, sdm_distribution, mean);
+SAME_OFFSET(distribution_added, sdm_distribution, deviation);
+_Static_assert(sizeof(struct distribution_added) == sizeof(sdm_distribution),
+               "sdm_distribution has changed");
+_Static_assert(SDM_DISTRIBUTION_UNIFORM == 0 && SDM_DISTRIBUTION_NORMAL == 1, "distributions");
 _Static_assert(SDM_OPTION_REAL == 0 && SDM_OPTION_INT == 1 && SDM_OPTION_CHOICE == 2 &&
                    SDM_OPTION_FILE == 3,
                "option types");
@@ -192,7 +208,31 @@ static void check_mesh_of(const sdm_shape *shape)
     assert_int_equal(sdm_instance_create(shape, NULL, 0, NULL, &s, &err), SDM_OK);
     assert_int_equal(sdm_instance_mesh(s, &p, &m, &err), SDM_OK);
     assert_true(m.n_tri == 4 && m.vert[3] == 1.25);
+    assert_int_equal(sdm_instance_distributions(s)[0].kind, SDM_DISTRIBUTION_UNIFORM);
     sdm_mesh_dispose(&m);
+    sdm_instance_free(s);
+}
+
+static void size_is_normal(const void *self, sdm_distribution *out)
+{
+    (void)self;
+    assert_int_equal(out[0].kind, SDM_DISTRIBUTION_UNIFORM);
+    out[0] = (sdm_distribution){SDM_DISTRIBUTION_NORMAL, 1.5, 0.25};
+}
+
+// A table with distributions(), which the table of version 1 lacks.
+static void test_distributions_are_read(void **state)
+{
+    (void)state;
+    struct shape_added table = {.v1 = table_v1(), .distributions = size_is_normal};
+    table.v1.size = sizeof table;
+    assert_int_equal(table_add(&table, sizeof table), SDM_OK);
+    sdm_instance *s = NULL;
+    assert_int_equal(
+        sdm_instance_create(sdm_registry_find(registry, "old", NULL), NULL, 0, NULL, &s, &err),
+        SDM_OK);
+    const sdm_distribution *d = sdm_instance_distributions(s);
+    assert_true(d->kind == SDM_DISTRIBUTION_NORMAL && d->mean == 1.5 && d->deviation == 0.25);
     sdm_instance_free(s);
 }
 
@@ -233,10 +273,11 @@ static void test_unknown_members_are_ignored(void **state)
 {
     (void)state;
     struct {
-        struct shape_v1 known;
+        struct shape_added known;
         void *later[4];
-    } table = {.known = table_v1(), .later = {&table, &table, &table, &table}};
-    table.known.size = sizeof table;
+    } table = {.known.v1 = table_v1(), .later = {&table, &table, &table, &table}};
+    _Static_assert(sizeof table.known == sizeof(sdm_shape), "later members are unknown ones");
+    table.known.v1.size = sizeof table;
     assert_int_equal(table_add(&table, sizeof table), SDM_OK);
     const sdm_shape *shape = sdm_registry_find(registry, "old", NULL);
     assert_int_equal(shape->size, sizeof(sdm_shape));
@@ -374,6 +415,7 @@ int main(void)
 #define WITH_REGISTRY(test) cmocka_unit_test_setup_teardown(test, set_up, tear_down)
     const struct CMUnitTest tests[] = {
         WITH_REGISTRY(test_table_of_version_1_is_accepted),
+        WITH_REGISTRY(test_distributions_are_read),
         WITH_REGISTRY(test_missing_members_count_as_null),
         WITH_REGISTRY(test_unknown_members_are_ignored),
         WITH_REGISTRY(test_other_interface_versions_are_refused),

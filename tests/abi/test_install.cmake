@@ -84,12 +84,16 @@ if(NOT SANITIZE)
   endforeach()
 endif()
 
-# build the example plug-in out of tree
+# build the example plug-ins out of tree
 function(build name folder)
   run(COMMAND ${CMAKE_COMMAND} -G ${GENERATOR} -S ${folder} -B ${WORK}/${name} -DCMAKE_PREFIX_PATH=${prefix} -DCMAKE_C_COMPILER=${CC}
               -DCMAKE_BUILD_TYPE=Release "-DCMAKE_C_FLAGS=${flags}" -DSDM_VERSION=${VERSION})
   run(COMMAND ${CMAKE_COMMAND} --build ${WORK}/${name})
 endfunction()
+build(gear ${SOURCE}/examples/gear)
+if(NOT EXISTS ${WORK}/gear/gear.so)
+  message(FATAL_ERROR "examples/gear gave no gear.so")
+endif()
 build(plugin ${SOURCE}/examples/plugin)
 file(GLOB_RECURSE plugin ${WORK}/plugin/*.so)
 list(LENGTH plugin n_plugin)

@@ -22,6 +22,19 @@ has 'network\.depth'
 expect 0 - sdmgen config --keys --markdown
 has '^\|.*network\.depth'
 
+# Distributions are checked against the parameters of the shape and their ranges.
+statistical=$source_folder/configs/statistical.yaml
+expect 0 - sdmgen config "$statistical" 'shape.distribution={m1: uniform, m2: {mean: 0.5, deviation: 2}}' --dump
+has '^    m2: \{mean: 0\.5, deviation: 2\}\}$'
+expect 2 "^argument '.*': shape 'statistical' has no parameter 'm9'; did you mean 'm" \
+    sdmgen config "$statistical" shape.distribution.m9=normal
+expect 2 "distribution of 'm2': a normal distribution of mean 30 and deviation 1 has no values in the range -2\.5 \.\. 2\.5" \
+    sdmgen config "$statistical" 'shape.distribution={m2: {mean: 30, deviation: 1}}'
+sed 's/limit: 2.5 .*/limit: 10/;s/m3: .*/m3: [8, 9]/' "$statistical" >narrow.yaml # too narrow for what the shape states
+cp -r "$source_folder/configs/statistical" .
+expect 2 "^narrow\.yaml:$(grep -n 'm3:' narrow.yaml | cut -d: -f1):5: distribution of 'm3': a normal distribution of mean 0 and deviation 1" \
+    sdmgen config narrow.yaml
+
 # Three mistakes give three lines, each with file, line and column, and exit code 2.
 cat >bad.yaml <<'END'
 shape:

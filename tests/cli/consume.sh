@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The installed package: builds examples/consume against it, by CMake and by pkg-config, and runs it with a trained model. Third argument:
-# the build folder to install from.
+# The installed package: builds examples/consume against it, by CMake and by pkg-config, and runs it with a trained model; builds
+# make_labyrinth. Third argument: the build folder to install from.
 build=$3
 . "$(dirname "$0")/common.sh"
 model=../files-of-train/run/model.sdm
@@ -21,4 +21,10 @@ pc=$(dirname "$(find prefix -name sdmgen.pc)")
 PKG_CONFIG_PATH=$pc cc -std=c11 -Wall -Wextra -Werror -o by-pkg-config "$source_folder/examples/consume/consume.c" \
     $(PKG_CONFIG_PATH=$pc pkg-config --cflags --libs sdmgen) 2>log || bad "pkg-config: $(cat log)"
 expect 0 - env LD_LIBRARY_PATH="$(dirname "$pc")" ./by-pkg-config $model
+
+# The command that examples/statistical/README.md shows.
+cp "$source_folder/examples/statistical/make_labyrinth.c" .
+line=$(grep '^cc .*make_labyrinth' "$source_folder/examples/statistical/README.md")
+(export PKG_CONFIG_PATH=$pc && eval "$line") >log 2>&1 || bad "make_labyrinth: $(cat log)"
+present make_labyrinth
 finish

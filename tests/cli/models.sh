@@ -7,9 +7,11 @@ present $model
 
 expect 0 - sdmgen info $model
 has "of shape 'cochlea'"
-has '^parameters +a +2 \.\. 5 mm'
+has '^parameters +a +2 \.\. 5 mm, default [0-9.]+, uniform$'
 expect 0 - sdmgen info $model --json
 for key in checksum train_seconds rmse_mm q99_mm weight_bytes; do [ -n "$(json $key)" ] || bad "info: no $key"; done
+
+has '"name": "a", .*"distribution": "uniform"\}'
 
 # Types of output.
 expect 0 - sdmgen generate $model -p a=4.2 -p alpha=0.6 -o m.nii -o m.nii.gz -o m.nrrd -o m.mha -o m.npy -o m.ply -o m.png -o m.svg -o m.pdf --json

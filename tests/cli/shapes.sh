@@ -4,7 +4,7 @@
 . "$(dirname "$0")/common.sh"
 
 expect 0 - sdmgen shapes
-for shape in cochlea ellipsoid torus statistical; do has "^$shape "; done
+for shape in cochlea ellipsoid torus linkage statistical; do has "^$shape "; done
 expect 0 - sdmgen shapes --json
 has '"name": "cochlea".*"name": "alpha", "unit": "mm", "min": 0, "max": 1\.2'
 expect 0 - sdmgen shapes cochlea
@@ -13,6 +13,14 @@ has 'their options are the defaults$' # long texts are not cut
 has '^its parameters depend on its options'
 expect 0 - sdmgen shapes cochlea --json
 has '"options": \['
+expect 0 - sdmgen shapes torus --json
+has '"default": 3, "distribution": "uniform", "help"'
+model=(-O "mean=$source_folder/configs/statistical/mean.ply" -O "modes=$source_folder/configs/statistical/modes.npy")
+expect 0 - sdmgen shapes statistical "${model[@]}"
+has '^  m8 +sd +-3 \.\. 3, normal, mean 0, deviation 1 +0 +weight of mode 8'
+expect 0 - sdmgen shapes statistical "${model[@]}" --json
+has '"name": "m8".*"default": 0, "distribution": "normal", "mean": 0, "deviation": 1, "help"'
+expect 0 - sdmgen shapes statistical
 expect 2 "unknown shape 'cochlae'; did you mean 'cochlea'\?" sdmgen shapes cochlae
 expect 2 "unknown shape 'cube'; .* --plugin FILE" sdmgen shapes cube
 expect 2 'O needs the NAME' sdmgen shapes -O a=1

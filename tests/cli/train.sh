@@ -50,6 +50,11 @@ done
 grep -q '^sdmgen: the mesh is open: 3 boundary edges' err-open.ply || bad "no word of the open mesh: $(cat err-open.ply)"
 grep -q 'the mesh' err-mean.ply && bad "a word of a closed mesh: $(cat err-mean.ply)"
 
+expect 0 - sdmgen info modes/model.sdm
+has '^parameters +m1 .* default 0, normal, mean 0, deviation 1$'
+expect 0 - sdmgen info modes/model.sdm --json
+has '"distribution": "normal", "mean": 0, "deviation": 1\}'
+
 # --force replaces a run only after the new one has passed all checks.
 before=$(cat run/* | cksum)
 expect 2 "range \[0, 100\] of 'a'" sdmgen train "$tiny" --force --out run 'shape.ranges.a=[0,100]' --quiet

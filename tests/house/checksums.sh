@@ -48,7 +48,7 @@ for f in pod.nii pod.nii.gz pod.nrrd pod.mha pod.npy pod.ply pod.stl pod.obj pod
 r gen_bad generate pod/model.sdm -p a=99 -o x.npy
 r gen_clamp generate pod/model.sdm -p a=99 --policy clamp -o clamp.npy --json
 # exact
-for s in cochlea torus ellipsoid capsule; do
+for s in cochlea torus ellipsoid capsule linkage; do
   r ex_$s exact --shape $s --json -o ex_$s.npy -o ex_$s.nrrd -o ex_$s.ply -o ex_$s.vdb --closest ex_$s.c.npy --normal ex_$s.n.npy --triangle ex_$s.t.npy --jacobian ex_$s.j.npy --certify
   for m in naive cells octree edt; do sz="--size 20,18,16"; [ $m != naive ] && sz="--size 40,36,32"; r ex_${s}_$m exact --shape $s --method $m $sz --json -o ex_${s}_$m.npy; done
   for g in crossings pseudonormal winding; do r ex_${s}_s$g exact --shape $s --sign $g --size 30,30,30 --json -o ex_${s}_s$g.npy; done

@@ -14,6 +14,7 @@
 
 #include <cmocka.h>
 
+#include "pod/pod_survey.h"
 #include "sdm/internal/container.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/kernels.h"
@@ -163,9 +164,9 @@ static void reference(const toy *t, const double *p, double *map)
     // Coefficients from the highest level down to level 0, then the map.
     const size_t n_blocks = a->levels.first[n_levels];
     double c[80][64] = {{0}};
-    const float *matrix[80], *at = t->basis;
+    const float *weights[80], *at = t->basis;
     for (size_t b = 0; b < n_blocks; b++) {
-        matrix[b] = at;
+        weights[b] = at;
         at += t->blocks[b].rank * sdm_pod_outputs(t->blocks, b);
     }
     for (size_t b = n_blocks; b-- > 0;) {
@@ -180,12 +181,12 @@ static void reference(const toy *t, const double *p, double *map)
         for (size_t i = k->child; i < k->child + k->n_children; i++)
             for (size_t q = 0; q < t->blocks[i].rank; q++, o++)
                 for (size_t r = 0; r < k->rank; r++)
-                    c[i][q] += c[b][r] * matrix[b][r * outputs + o];
+                    c[i][q] += c[b][r] * weights[b][r * outputs + o];
         for (size_t v = 0; v < outputs && !k->n_children; v++) {
             const size_t x = k->at[0] + v % k->size[0], y = k->at[1] + v / k->size[0] % k->size[1],
                          zz = k->at[2] + v / k->size[0] / k->size[1];
             double s = t->mean[k->voxel + v];
-            for (size_t r = 0; r < k->rank; r++) s += c[b][r] * matrix[b][r * outputs + v];
+            for (size_t r = 0; r < k->rank; r++) s += c[b][r] * weights[b][r * outputs + v];
             map[(zz * 7 + y) * 9 + x] = s;
         }
     }
@@ -619,6 +620,84 @@ static void file_keeps_everything(void **state)
     sdm_free(t.memory);
 }
 
+/* Number of times that a word occurs in the bytes. */
+static size_t count_word(const uint8_t *bytes, size_t size, const char *word)
+{
+    size_t n = 0;
+    for (size_t i = 0; i + strlen(word) <= size; i++) n += !memcmp(bytes + i, word, strlen(word));
+    return n;
+}
+
+// A normal distribution has a line in the description; without lines, as in files of the first
+// versions, all parameters are uniform.
+static void distributions_are_kept(void **state)
+{
+    (void)state;
+    toy t;
+    uint8_t *bytes;
+    size_t size;
+    sdm_model *m;
+    sdm_error e = {0};
+    for (int normal = 0; normal < 2; normal++) {
+        toy_make(&t, SDM_POD_I8, 0);
+        if (normal)
+            t.params[1].distribution = (sdm_distribution){SDM_DISTRIBUTION_NORMAL, 0.1, 1.0 / 3};
+        assert_int_equal(sdm_pod_build(&t.spec, &bytes, &size, &e), SDM_OK);
+        assert_int_equal(count_word(bytes, size, "param.normal="), normal);
+        assert_int_equal(sdm_model_open_memory("toy", bytes, size, &m, &e), SDM_OK);
+        const sdm_model_info *i = sdm_model_get_info(m);
+        for (int k = 0; k < P; k++) {
+            const sdm_distribution *d = &i->params[k].distribution;
+            assert_int_equal(d->kind,
+                             normal && k == 1 ? SDM_DISTRIBUTION_NORMAL : SDM_DISTRIBUTION_UNIFORM);
+            assert_true(d->kind == SDM_DISTRIBUTION_UNIFORM ||
+                        (d->mean == 0.1 && d->deviation == 1.0 / 3));
+            assert_true(i->params[k].def == 0.5);
+        }
+        sdm_model_free(m);
+        sdm_free(bytes);
+        sdm_free(t.memory);
+    }
+    // figures that no training writes
+    const double bad[][2] = {{0, -1}, {0, 0}, {1e6, 1}, {0, 1e9}};
+    for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
+        toy_make(&t, SDM_POD_F16, 0);
+        t.params[2].distribution =
+            (sdm_distribution){SDM_DISTRIBUTION_NORMAL, bad[k][0], bad[k][1]};
+        assert_int_equal(sdm_pod_build(&t.spec, &bytes, &size, &e), SDM_OK);
+        assert_int_equal(sdm_model_open_memory("toy", bytes, size, &m, &e), SDM_E_FORMAT);
+        assert_non_null(
+            strstr(e.text, "toy: damaged: the description lacks a valid 'param.normal'"));
+        sdm_free(bytes);
+        sdm_free(t.memory);
+    }
+}
+
+// The survey weights coefficients by the distributions, but finds their extremes in the whole
+// range. Latents 1 to 3 are sqrt(3) times the scaled parameters, in some order.
+static void survey_follows_the_distributions(void **state)
+{
+    (void)state;
+    toy t;
+    survey s;
+    toy_make(&t, SDM_POD_I8, 0);
+    const double half = 0.5 * (t.params[1].max - t.params[1].min);
+    t.params[1].distribution = (sdm_distribution){
+        SDM_DISTRIBUTION_NORMAL, 0.5 * (t.params[1].max + t.params[1].min), 0.1 * half};
+    assert_int_equal(sdm_pod_survey(&t.spec, &s, NULL), SDM_OK);
+    const coefficient_stats *latent = s.stats + s.coefficients_at[t.spec.arch.levels.n];
+    int n_uniform = 0, n_normal = 0;
+    for (int k = 1; k <= P; k++) {
+        // 256 samples: the relative error of a mean square is about 6 % (uniform), 9 % (normal)
+        n_uniform += fabs(latent[k].square - 1) < 0.3;
+        n_normal += fabs(latent[k].square - 0.03) < 0.3 * 0.03;
+        assert_true(fabs(latent[k].largest - sqrt(3)) < 1e-6);
+    }
+    assert_true(n_uniform == P - 1 && n_normal == 1);
+    sdm_pod_survey_dispose(&s);
+    sdm_free(t.memory);
+}
+
 static void expect_refused(const uint8_t *bytes, size_t size, const char *what, size_t at)
 {
     sdm_model *m = NULL;
@@ -756,6 +835,8 @@ int main(void)
         cmocka_unit_test(bytes_keep_what_is_not_finite),
         cmocka_unit_test(maps_with_derivatives_are_smooth),
         cmocka_unit_test(file_keeps_everything),
+        cmocka_unit_test(distributions_are_kept),
+        cmocka_unit_test(survey_follows_the_distributions),
         cmocka_unit_test(damage_is_refused),
         cmocka_unit_test(hostile_sections),
         cmocka_unit_test(every_allocation_may_fail),

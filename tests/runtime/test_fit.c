@@ -345,8 +345,15 @@ static void test_priors(void **state)
     free(v);
 }
 
+static void nothing_is_normal(const void *self, sdm_distribution *out)
+{
+    (void)self;
+    out[3] = (sdm_distribution){SDM_DISTRIBUTION_NORMAL, 2.25, 0.125};
+}
+
 // The sd of a parameter without effect is that of its prior or of its range, and by_prior marks
-// this parameter only.
+// this parameter only. With a normal distribution its estimate and its sd are those of the
+// distribution.
 static void test_parameter_without_effect(void **state)
 {
     (void)state;
@@ -359,29 +366,34 @@ static void test_parameter_without_effect(void **state)
     shape.params = params;
     shape.n_params = 4;
     shape.velocity = NULL; // the callback would write only three parameters
-    sdm_instance *instance = NULL;
-    assert_int_equal(sdm_registry_add(registry, &shape, "test", NULL), SDM_OK);
-    assert_int_equal(sdm_instance_create(sdm_registry_find(registry, "with_nothing", NULL),
-                                         &(sdm_named_text){"edge", "0.2"}, 1, NULL, &instance,
-                                         NULL),
-                     SDM_OK);
+    sdm_shape normal = shape;
+    normal.distributions = nothing_is_normal;
+    sdm_instance *instance[2] = {NULL, NULL};
+    for (int k = 0; k < 2; k++)
+        assert_int_equal(sdm_instance_create(k ? &normal : &shape, &(sdm_named_text){"edge", "0.2"},
+                                             1, NULL, &instance[k], NULL),
+                         SDM_OK);
     float *v = phantom(TRUTH, &POSE, 1, 5);
     const sdm_fit_target t = image_of(v);
     sdm_fit_source source = exact_source();
-    source.shape = instance;
-    for (int prior = 0; prior < 2; prior++) {
+    for (int prior = 0; prior < 3; prior++) {
+        const bool is_normal = prior == 2;
         sdm_fit_opts o = near_start();
         sdm_fit_result r;
         sdm_error err = {0};
         o.start_params = (const double[4]){2.4, 1.8, 1.4, 1.5};
         o.prior_sd = prior;
+        if (is_normal) o.prior_sd = 1;
+        source.shape = instance[is_normal];
         if (sdm_fit(&source, &t, &o, &r, &err)) fail_msg("%s", err.text);
         for (int k = 0; k < 3; k++) assert_false(r.by_prior[k]);
         assert_true(r.by_prior[3]);
-        assert_true(fabs(r.sd[3] / (prior ? 1 : 2 / sqrt(12)) - 1) < 0.02);
+        const double sd = is_normal ? 0.125 : prior ? 1 : 2 / sqrt(12);
+        assert_true(fabs(r.sd[3] / sd - 1) < 0.02);
+        if (is_normal) assert_true(fabs(r.params[3] - 2.25) < 1e-4);
         sdm_fit_dispose(&r);
     }
-    sdm_instance_free(instance);
+    for (int k = 0; k < 2; k++) sdm_instance_free(instance[k]);
     free(v);
 }
 

@@ -250,6 +250,44 @@ static void check_gradient(sdm_fit_kind kind, sdm_fit_model model)
     free(v);
 }
 
+// The prior of parameters: about the mean and in units of the deviation of a normal one, else about
+// the middle and in units of half the range. Its derivatives match differences.
+static void test_prior_of_parameters(void **state)
+{
+    (void)state;
+    enum { N = 3 };
+    sdm_fit_opts o = sdm_fit_defaults();
+    fit_problem p = {.opts = &o, .n_params = N};
+    p.information.n_unknowns = N + 7;
+    const double x[N] = {1.3, 2.7, -0.2}, low[N] = {1, 1, -3}, high[N] = {4, 4, 3};
+    const double mean[N] = {2.5, 2, 0}, sd[N] = {1.5, 0.25, 1}, weight[N] = {1, 3, 1};
+    p.distribution[1] = (sdm_distribution){SDM_DISTRIBUTION_NORMAL, 2, 0.25};
+    p.distribution[2] = (sdm_distribution){SDM_DISTRIBUTION_NORMAL, 0, 1};
+    for (int k = 0; k < N; k++) p.low[k] = low[k], p.high[k] = high[k];
+    for (int k = 0; k < N + 6; k++) p.prior_weight[k] = k < N ? weight[k] : 1;
+    for (double unit = 0; unit < 2; unit += 0.5) {
+        fit_state s = {0};
+        double gradient[N + 7] = {0}, complete[(N + 7) * (N + 7)] = {0}, wanted = 0;
+        o.prior_sd = unit;
+        memcpy(s.params, x, sizeof x);
+        for (int k = 0; k < N && unit > 0; k++)
+            wanted -= 0.5 * weight[k] * pow((x[k] - mean[k]) / (unit * sd[k]), 2);
+        const double found = sdm_fit_prior(&p, &s, gradient, complete, NULL);
+        assert_true(fabs(found - wanted) <= 1e-12 * fabs(wanted));
+        for (int k = 0; k < N; k++) {
+            const double h = 1e-3;
+            fit_state up = s, down = s;
+            up.params[k] += h, down.params[k] -= h;
+            const double above = sdm_fit_prior(&p, &up, NULL, NULL, NULL),
+                         below = sdm_fit_prior(&p, &down, NULL, NULL, NULL);
+            assert_true(fabs((above - below) / (2 * h) - gradient[k]) < 1e-7);
+            assert_true(fabs((2 * found - above - below) / (h * h) - complete[k * (N + 8)]) < 1e-4);
+            const double before = unit > 0 ? unit * sd[k] : (high[k] - low[k]) / sqrt(12);
+            assert_true(fabs(sdm_fit_prior_sd(&p, (size_t)k) - before) < 1e-14);
+        }
+    }
+}
+
 static void test_gradient_matches_differences(void **state)
 {
     (void)state;
@@ -313,6 +351,7 @@ int main(void)
         cmocka_unit_test(test_scores_match_differences),
         cmocka_unit_test(test_information_of_gaussians),
         cmocka_unit_test(test_bounded_step),
+        cmocka_unit_test(test_prior_of_parameters),
         cmocka_unit_test(test_gradient_matches_differences),
         cmocka_unit_test(test_anderson_converges_fast),
     };

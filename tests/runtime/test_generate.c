@@ -78,7 +78,9 @@ static const sdm_shape ball_shape = {.abi = SDM_SHAPE_ABI,
 
 static sdm_model *model_of(const char *second_name)
 {
-    sdm_model_param params[2] = {{"radius", "mm", 1.0, 1.5, 1.2}, {"", "", -1, 1, 0}};
+    sdm_model_param params[2] = {
+        {.name = "radius", .unit = "mm", .min = 1.0, .max = 1.5, .def = 1.2},
+        {.min = -1, .max = 1}};
     snprintf(params[1].name, sizeof params[1].name, "%s", second_name);
     const char *const names[] = {"scale"}, *const option_values[] = {"1"};
     sdm_model_info info = {

@@ -178,6 +178,34 @@ static void test_random_truth_has_its_distribution(void **state)
     for (int i = 0; i < 3; i++) assert_true(none.rotation[i] == 0 && none.translation[i] == 0);
 }
 
+static void first_is_normal(const void *self, sdm_distribution *out)
+{
+    (void)self;
+    out[0] = (sdm_distribution){SDM_DISTRIBUTION_NORMAL, 2, 0.3};
+}
+
+// A normal parameter has the mean and the deviation of its distribution; the others keep their
+// values.
+static void test_random_truth_may_be_normal(void **state)
+{
+    (void)state;
+    enum { N = 2000 };
+    sdm_shape shape = *sdm_instance_shape(ellipsoid);
+    sdm_instance *s = NULL;
+    double p[3], uniform[3], mean = 0, square = 0;
+    shape.distributions = first_is_normal;
+    assert_int_equal(sdm_instance_create(&shape, NULL, 0, NULL, &s, NULL), SDM_OK);
+    for (uint64_t seed = 0; seed < N; seed++) {
+        sdm_phantom_random_params(s, seed, p);
+        sdm_phantom_random_params(ellipsoid, seed, uniform);
+        assert_true(p[1] == uniform[1] && p[2] == uniform[2] && p[0] >= 1 && p[0] <= 5);
+        mean += p[0] / N, square += (p[0] - 2) * (p[0] - 2) / N;
+    }
+    close_to("mean", mean, 2, 4 * 0.3 / sqrt(N));
+    close_to("deviation", sqrt(square), 0.3, 4 * 0.3 / sqrt(2.0 * N));
+    sdm_instance_free(s);
+}
+
 static void phantom_refused(const sdm_phantom_opts *o, const char *word)
 {
     const sdm_grid g = oblique(4, 5, 6);
@@ -295,6 +323,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_noise_has_its_statistics),
         cmocka_unit_test(test_random_truth_has_its_distribution),
+        cmocka_unit_test(test_random_truth_may_be_normal),
         cmocka_unit_test(test_same_bits),
         cmocka_unit_test(test_each_allocation_may_fail),
         cmocka_unit_test(test_wrong_arguments_are_refused),

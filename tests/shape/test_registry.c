@@ -281,9 +281,10 @@ static void test_find_suggests_the_nearest_name(void **state)
 {
     (void)state;
     assert_int_equal(sdm_builtin_shapes_add(registry, &err), SDM_OK);
-    static const char *const NAMES[] = {"cochlea", "ellipsoid", "torus", "capsule", "statistical"};
-    assert_int_equal(sdm_registry_count(registry), 5);
-    for (size_t i = 0; i < 5; i++) {
+    static const char *const NAMES[] = {"cochlea", "ellipsoid", "torus",
+                                        "capsule", "linkage",   "statistical"};
+    assert_int_equal(sdm_registry_count(registry), 6);
+    for (size_t i = 0; i < 6; i++) {
         assert_string_equal(sdm_registry_at(registry, i)->name, NAMES[i]);
         assert_string_equal(sdm_registry_origin(registry, i), "built in");
         assert_ptr_equal(sdm_registry_find(registry, NAMES[i], NULL), sdm_registry_at(registry, i));
@@ -603,6 +604,52 @@ static void test_create_may_fail(void **state)
     err_has("shape 'tetra', describe(): two parameters are named 'm1'");
 }
 
+static sdm_distribution stated[2];
+
+static void state_distributions(const void *self, sdm_distribution *out)
+{
+    (void)self;
+    for (int i = 0; i < 2; i++) {
+        assert_true(out[i].kind == SDM_DISTRIBUTION_UNIFORM && out[i].mean == 0);
+        out[i] = stated[i];
+    }
+}
+
+static void test_distributions_are_checked(void **state)
+{
+    (void)state;
+    sdm_instance *s = NULL;
+    assert_int_equal(instance_of(&GOOD, NULL, NULL, NULL, &s), SDM_OK);
+    for (int i = 0; i < 2; i++)
+        assert_int_equal(sdm_instance_distributions(s)[i].kind, SDM_DISTRIBUTION_UNIFORM);
+    sdm_instance_free(s);
+
+    sdm_shape shape = GOOD;
+    shape.distributions = state_distributions;
+    stated[0] = (sdm_distribution){SDM_DISTRIBUTION_UNIFORM, 7, NAN}; // figures without meaning
+    stated[1] = (sdm_distribution){SDM_DISTRIBUTION_NORMAL, 0.5, 0.25};
+    assert_int_equal(instance_of(&shape, NULL, NULL, NULL, &s), SDM_OK);
+    const sdm_distribution *d = sdm_instance_distributions(s);
+    assert_true(d[0].kind == SDM_DISTRIBUTION_UNIFORM && d[0].mean == 0 && d[0].deviation == 0);
+    assert_true(d[1].kind == SDM_DISTRIBUTION_NORMAL && d[1].mean == 0.5 && d[1].deviation == 0.25);
+    sdm_instance_free(s);
+
+    static const struct {
+        sdm_distribution d;
+        const char *text;
+    } BAD[] = {{{(sdm_distribution_kind)9, 0, 1}, "distribution of the unknown kind 9"},
+               {{SDM_DISTRIBUTION_NORMAL, NAN, 1}, "the mean nan is not finite"},
+               {{SDM_DISTRIBUTION_NORMAL, 0, 0}, "the deviation 0 is not a finite number above 0"},
+               {{SDM_DISTRIBUTION_NORMAL, 8, 1}, "has no values in the range -1 .. 1"}};
+    for (size_t i = 0; i < sizeof BAD / sizeof *BAD; i++) {
+        stated[1] = BAD[i].d;
+        assert_int_equal(instance_of(&shape, NULL, NULL, NULL, &s), SDM_E_PLUGIN);
+        err_has("shape 'tetra', distributions(): parameter 'shift': ");
+        err_has(BAD[i].text);
+        assert_null(s);
+    }
+}
+
 // Each allocation fails once: no leak (detected by the sanitizer build), and the registry stays
 // usable.
 static void test_each_allocation_may_fail(void **state)
@@ -649,6 +696,7 @@ int main(void)
         cmocka_unit_test(test_velocity_by_differences),
         cmocka_unit_test(test_velocity_with_rounded_steps),
         cmocka_unit_test(test_create_may_fail),
+        cmocka_unit_test(test_distributions_are_checked),
         WITH_REGISTRY(test_each_allocation_may_fail),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -14,11 +14,13 @@
 
 #include "sdm/builtin_shapes.h"
 #include "sdm/image.h"
+#include "sdm/internal/rng.h"
 #include "sdm/memory.h"
 #include "sdm/meshfile.h"
 
 #ifndef MODEL_FOLDER
-#define MODEL_FOLDER "model" /* folder with the output of make_model */
+#define MODEL_FOLDER "model"         /* folder with the output of make_model */
+#define LABYRINTH_FOLDER "labyrinth" /* folder with the output of make_labyrinth */
 #endif
 #define N_VERT 6
 
@@ -115,6 +117,10 @@ static void test_mesh_is_mean_plus_modes(void **state)
             assert_string_equal(params[2].name, "m3");
             assert_string_equal(params[2].unit, "sd");
             assert_true(params[1].min == -3 && params[1].max == 3 && params[1].def == 0);
+            const sdm_distribution *d = sdm_instance_distributions(s);
+            for (size_t k = 0; k < 3; k++)
+                assert_true(d[k].kind == SDM_DISTRIBUTION_NORMAL && d[k].mean == 0 &&
+                            d[k].deviation == 1);
             sdm_mesh m = {0};
             double v[3 * 3 * N_VERT];
             assert_int_equal(sdm_instance_mesh(s, P, &m, &err), SDM_OK);
@@ -247,6 +253,61 @@ static void test_example(void **state)
     sdm_instance_free(s);
 }
 
+static sdm_instance *labyrinth_make(const char *folder)
+{
+    const sdm_named_text given[] = {{"mean", "mean.ply"}, {"modes", "modes.npy"}, {"limit", "2.5"}};
+    sdm_instance *s = NULL;
+    if (sdm_instance_create(shape, given, 3, folder, &s, &err)) fail_msg("%s", err.text);
+    return s;
+}
+
+// The model of configs/labyrinth: it is what make_labyrinth writes, its meshes are solids with
+// three handles that do not meet themselves, and it has the variance of its Gaussian process.
+static void test_labyrinth(void **state)
+{
+    (void)state;
+    enum { MODES = 20 };
+    sdm_instance *shipped = labyrinth_make(SDM_SOURCE_FOLDER "/configs/labyrinth"),
+                 *made = labyrinth_make(LABYRINTH_FOLDER);
+    sdm_mesh m = {0}, other = {0};
+    uint64_t draw = 0;
+    for (int round = 0; round < 12; round++) {
+        double p[MODES];
+        for (int i = 0; i < MODES; i++) {
+            do p[i] = sdm_rng_normal(11, 1, draw++);
+            while (fabs(p[i]) > 2.5);
+        }
+        sdm_audit a;
+        assert_int_equal(sdm_instance_mesh(shipped, p, &m, &err), SDM_OK);
+        assert_int_equal(sdm_mesh_audit(&m, &a, &err), SDM_OK);
+        assert_true(a.manifold && !a.inverted);
+        assert_int_equal(a.components, 1);
+        assert_int_equal(a.degenerate + a.self_intersections, 0);
+        assert_int_equal(m.n_tri, 2 * m.n_vert + 8); // genus 3: Euler characteristic -4
+        assert_int_equal(sdm_instance_mesh(made, p, &other, &err), SDM_OK);
+        assert_int_equal(other.n_vert, m.n_vert);
+        assert_memory_equal(other.tri, m.tri, 3 * m.n_tri * sizeof *m.tri);
+        for (size_t i = 0; i < 3 * m.n_vert; i++)
+            assert_true(fabs(other.vert[i] - m.vert[i]) < 1e-4);
+    }
+    // The variances of all modes add up to most of that of the process, 0.49 mm^2.
+    const double zero[MODES] = {0};
+    double *v = NULL;
+    assert_int_equal(SDM_ALLOC(&v, MODES * 3 * m.n_vert, "velocities", &err), SDM_OK);
+    assert_int_equal(sdm_instance_velocity(shipped, zero, m.n_vert, v, &err), SDM_OK);
+    for (size_t i = 0; i < m.n_vert; i++) {
+        double variance[3] = {0};
+        for (size_t k = 0; k < MODES * 3; k++)
+            variance[k % 3] += pow(v[k / 3 * 3 * m.n_vert + 3 * i + k % 3], 2);
+        for (int k = 0; k < 3; k++) assert_true(variance[k] > 0.3 && variance[k] < 0.4901);
+    }
+    sdm_free(v);
+    sdm_mesh_dispose(&m);
+    sdm_mesh_dispose(&other);
+    sdm_instance_free(shipped);
+    sdm_instance_free(made);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -255,6 +316,7 @@ int main(void)
         cmocka_unit_test(test_contradictory_files_are_refused),
         cmocka_unit_test(test_many_modes),
         cmocka_unit_test(test_example),
+        cmocka_unit_test(test_labyrinth),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -133,35 +133,93 @@ static void leading_spaces_are_found(void **state)
     sdm_free(two);
 }
 
+enum { D = 64 };
+static sdm_distribution uniform[D];
+
+// Component d of a point without the digital shift: its bits against those of point 0.
+static void point_bits(uint64_t index, size_t n, uint32_t bits[D])
+{
+    double low[D] = {0}, high[D], p[D], zero[D];
+    for (size_t d = 0; d < n; d++) high[d] = 0x1p32;
+    sdm_sample_params(7, 1, index, low, high, uniform, n, p);
+    sdm_sample_params(7, 1, 0, low, high, uniform, n, zero);
+    for (size_t d = 0; d < n; d++) bits[d] = (uint32_t)p[d] ^ (uint32_t)zero[d];
+}
+
 // Each of the 2^d boxes that halve every dimension holds the same number of the first points of a
-// Sobol' sequence, also after the digital shift.
+// Sobol' sequence, also after the digital shift. In every dimension each of N slices holds one of
+// any N points that begin at a multiple of N, a power of two.
 static void samples_are_stratified(void **state)
 {
     (void)state;
-    const double min[4] = {0, 0, 0, 0}, max[4] = {1, 1, 1, 1};
-    int in_box[16] = {0}, in_slice[16][64] = {{0}};
-    const double low[16] = {0}, high[16] = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
-    for (uint64_t i = 0; i < 1024; i++) {
-        double p[16];
-        sdm_sample_params(7, 1, i, min, max, 4, p);
+    enum { N = 1024 };
+    const double min[D] = {0};
+    double max[D], p[D];
+    int in_box[16] = {0};
+    static int in_slice[D][N];
+    for (size_t d = 0; d < D; d++) max[d] = 1;
+    for (uint64_t i = 0; i < N; i++) {
+        sdm_sample_params(7, 1, i, min, max, uniform, 4, p);
         in_box[(p[0] >= 0.5) + 2 * (p[1] >= 0.5) + 4 * (p[2] >= 0.5) + 8 * (p[3] >= 0.5)]++;
-        sdm_sample_params(7, 1, i, low, high, 16, p);
-        for (int d = 0; d < 16; d++) in_slice[d][(int)(p[d] * 64)]++;
+        sdm_sample_params(7, 1, 3 * N + i, min, max, uniform, D, p);
+        for (size_t d = 0; d < D; d++) in_slice[d][(int)(p[d] * N)]++;
     }
     for (int b = 0; b < 16; b++) assert_int_equal(in_box[b], 64);
-    for (int d = 0; d < 16; d++)
-        for (int s = 0; s < 64; s++) assert_int_equal(in_slice[d][s], 16);
-    // Samples stay in their ranges, also in many dimensions.
-    double wide[20], lo[20], hi[20], sum = 0;
-    for (int d = 0; d < 20; d++) lo[d] = -3, hi[d] = 5;
-    for (uint64_t i = 0; i < 500; i++) {
-        sdm_sample_params(7, 2, i, lo, hi, 20, wide);
-        for (int d = 0; d < 20; d++) {
-            assert_true(wide[d] >= -3 && wide[d] <= 5);
-            sum += wide[d];
+    for (size_t d = 0; d < D; d++)
+        for (int s = 0; s < N; s++) assert_int_equal(in_slice[d][s], 1);
+}
+
+// The points are those of the published direction numbers: fingerprints of points 1 to 1023 (FNV-1a
+// over their 32-bit fractions), from an implementation of its own that read the table of Joe and
+// Kuo as SciPy and Commons Math ship it. The first 16 dimensions must never change: models are
+// trained again from their configurations.
+static void points_are_those_of_joe_and_kuo(void **state)
+{
+    (void)state;
+    const struct {
+        size_t from, to;
+        uint64_t wanted;
+    } parts[] = {{0, 16, 0x9c68588e478431e5}, {16, 64, 0xee4a8d9439473f65}};
+    for (size_t k = 0; k < 2; k++) {
+        uint64_t found = 0xcbf29ce484222325;
+        for (uint64_t i = 1; i < 1024; i++) {
+            uint32_t bits[D];
+            point_bits(i, parts[k].to, bits);
+            for (size_t d = parts[k].from; d < parts[k].to; d++)
+                found = (found ^ bits[d]) * 0x100000001b3;
+        }
+        assert_true(found == parts[k].wanted);
+    }
+}
+
+// Normal samples stay in their range, have the moments of the truncated distribution, and lie at
+// the quantiles of the uniform ones.
+static void samples_follow_their_distribution(void **state)
+{
+    (void)state;
+    enum { N = 4096, P = 20 };
+    double lo[P], hi[P], x[P], unit[P], sum[P] = {0}, square[P] = {0};
+    const double zero[P] = {0};
+    double one[P];
+    sdm_distribution normal[P];
+    for (int d = 0; d < P; d++) {
+        lo[d] = -3, hi[d] = 3, one[d] = 1;
+        normal[d] = (sdm_distribution){SDM_DISTRIBUTION_NORMAL, 0, 1};
+    }
+    for (uint64_t i = 0; i < N; i++) {
+        sdm_sample_params(7, 2, i, lo, hi, normal, P, x);
+        sdm_sample_params(7, 2, i, zero, one, uniform, P, unit);
+        for (int d = 0; d < P; d++) {
+            const double a = 0.5 * erfc(3 / sqrt(2)), below = 0.5 * erfc(-x[d] / sqrt(2));
+            assert_true(x[d] >= -3 && x[d] <= 3);
+            assert_true(fabs((below - a) / (1 - 2 * a) - unit[d]) < 1e-14);
+            sum[d] += x[d] / N, square[d] += x[d] * x[d] / N;
         }
     }
-    assert_true(fabs(sum / 10000 - 1) < 5 * 8 * 0.289 / 100);
+    // variance of a standard normal distribution cut at 3: 1 - 6 density(3) / probability
+    const double variance = 1 - 6 * exp(-4.5) / sqrt(2 * acos(-1)) / erf(3 / sqrt(2));
+    for (int d = 0; d < P; d++)
+        assert_true(fabs(sum[d]) < 1e-3 && fabs(square[d] - variance) < 2e-3);
 }
 
 int main(void)
@@ -169,6 +227,8 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(eigenvectors_satisfy_their_equation),
                                        cmocka_unit_test(solutions_satisfy_the_system),
                                        cmocka_unit_test(leading_spaces_are_found),
-                                       cmocka_unit_test(samples_are_stratified)};
+                                       cmocka_unit_test(samples_are_stratified),
+                                       cmocka_unit_test(points_are_those_of_joe_and_kuo),
+                                       cmocka_unit_test(samples_follow_their_distribution)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

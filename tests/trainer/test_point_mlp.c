@@ -292,7 +292,8 @@ static void draws_have_the_right_shares(void **state)
 static void file_equals_the_trained_network(void **state)
 {
     (void)state;
-    sdm_model_param params[P] = {{"a", "mm", -1, 1, 0}, {"b", "mm", 2, 5, 3}};
+    sdm_model_param params[P] = {{.name = "a", .unit = "mm", .min = -1, .max = 1},
+                                 {.name = "b", .unit = "mm", .min = 2, .max = 5, .def = 3}};
     sdm_model_info info = {
         .n_params = P,
         .params = params,

@@ -60,12 +60,15 @@ static void regression_finds_a_polynomial(void **state)
 }
 
 static const double LOW[2] = {-3, 10}, HIGH[2] = {5, 11};
-static const sample_space space = {.n_params = 2, .min = LOW, .max = HIGH, .seed = 5};
+static const sdm_distribution UNIFORM[2];
+static const sample_space space = {
+    .n_params = 2, .min = LOW, .max = HIGH, .distribution = UNIFORM, .seed = 5};
 
 // Parameters of planned sample i, scaled to -1 .. 1.
 static void sample_scaled(const sample_plan *p, size_t i, double *x)
 {
-    sdm_sample_params(space.seed, STREAM_TRAIN, trainer_sample_plan_point(p, i), LOW, HIGH, 2, x);
+    sdm_sample_params(space.seed, STREAM_TRAIN, trainer_sample_plan_point(p, i), LOW, HIGH, UNIFORM,
+                      2, x);
     for (int k = 0; k < 2; k++) x[k] = 2 * (x[k] - LOW[k]) / (HIGH[k] - LOW[k]) - 1;
 }
 

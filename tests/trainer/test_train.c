@@ -2,7 +2,7 @@
  * cancellation, mistakes.
  * Tests: bases.c blocks.c checkpoint.c coefficients.c dataset.c dataset_fill.c export_model.c
  * head.c mode_fit.c modes.c new_samples.c pod_kind.c pod_tree.c producer.c progress.c refine.c
- * sample_plan.c train.c workbench.c */
+ * ranges.c sample_plan.c train.c workbench.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -15,6 +15,7 @@
 
 #include <cmocka.h>
 
+#include "data/dataset_fill.h"
 #include "sdm/internal/pod.h"
 #include "train_tools.h"
 
@@ -74,10 +75,12 @@ static void training_reaches_its_accuracy(void **state)
     double sum = 0;
     for (uint64_t i = 0; i < 10; i++) {
         double lo[8], hi[8], p[8];
+        sdm_distribution of[8];
         sdm_mesh mesh = {0};
         sdm_exact *exact;
         assert_int_equal(sdm_train_ranges(&c, capsule, lo, hi, &e), SDM_OK);
-        sdm_sample_params(99, 12345, i, lo, hi, info->n_params, p);
+        assert_int_equal(sdm_train_distributions(&c, capsule, lo, hi, of, &e), SDM_OK);
+        sdm_sample_params(99, 12345, i, lo, hi, of, info->n_params, p);
         assert_int_equal(sdm_instance_mesh(capsule, p, &mesh, &e), SDM_OK);
         assert_int_equal(sdm_exact_create(&mesh, NULL, &exact, &e), SDM_OK);
         assert_int_equal(sdm_exact_map(exact, &c.grid, truth, &e), SDM_OK);
@@ -367,6 +370,118 @@ static void rank_is_limited_by_maps(void **state)
     sdm_model_free(m);
 }
 
+static void length_is_normal(const void *self, sdm_distribution *out)
+{
+    (void)self;
+    out[1] = (sdm_distribution){SDM_DISTRIBUTION_NORMAL, 3.5, 0.75};
+}
+
+static void resolve(const sdm_instance *s, const char *override, sdm_distribution out[2])
+{
+    sdm_config c;
+    sdm_error e = {0};
+    double lo[2], hi[2];
+    read_config(&c, &override, override != NULL);
+    if (sdm_train_ranges(&c, s, lo, hi, &e) || sdm_train_distributions(&c, s, lo, hi, out, &e))
+        fail_msg("%s", e.text);
+}
+
+static void assert_normal(const sdm_distribution *d, double mean, double deviation)
+{
+    assert_int_equal(d->kind, SDM_DISTRIBUTION_NORMAL);
+    assert_true(fabs(d->mean - mean) < 1e-14 && fabs(d->deviation - deviation) < 1e-14);
+}
+
+// The configuration's word, the shape's statement and the ranges together give the distribution.
+static void distributions_are_resolved(void **state)
+{
+    (void)state;
+    sdm_shape shape = *sdm_instance_shape(capsule);
+    sdm_instance *normal = NULL;
+    shape.distributions = length_is_normal;
+    assert_int_equal(sdm_instance_create(&shape, NULL, 0, NULL, &normal, NULL), SDM_OK);
+    const sdm_param *params = sdm_instance_params(capsule, NULL);
+    const double quarter[2] = {0.25 * (params[0].max - params[0].min),
+                               0.25 * (params[1].max - params[1].min)};
+    sdm_distribution d[2];
+    resolve(capsule, NULL, d);
+    for (int k = 0; k < 2; k++) assert_int_equal(d[k].kind, SDM_DISTRIBUTION_UNIFORM);
+    resolve(capsule, "shape.distribution=normal", d);
+    for (int k = 0; k < 2; k++) assert_normal(&d[k], params[k].def, quarter[k]);
+    resolve(normal, NULL, d);
+    assert_normal(&d[1], 3.5, 0.75);
+    assert_int_equal(d[0].kind, SDM_DISTRIBUTION_UNIFORM);
+    resolve(normal, "shape.distribution=normal", d);
+    assert_normal(&d[1], 3.5, 0.75);
+    assert_normal(&d[0], params[0].def, quarter[0]);
+    resolve(normal, "shape.distribution=uniform", d);
+    for (int k = 0; k < 2; k++) assert_int_equal(d[k].kind, SDM_DISTRIBUTION_UNIFORM);
+    resolve(normal, "shape.distribution.radius={mean: 1.4, deviation: 0.1}", d);
+    assert_normal(&d[1], 3.5, 0.75);
+    assert_normal(&d[0], 1.4, 0.1);
+    // the default value of a narrower range is the nearest value in it
+    char text[128];
+    const double low = params[0].def + 0.1, high = params[0].def + 0.3;
+    snprintf(text, sizeof text, "shape={ranges: {radius: [%.17g, %.17g]}, distribution: normal}",
+             low, high);
+    resolve(capsule, text, d);
+    assert_normal(&d[0], low, 0.25 * (high - low));
+    sdm_instance_free(normal);
+}
+
+// Held-out and random training shapes follow the distribution; the static grid stays regular.
+static void maps_follow_the_distribution(void **state)
+{
+    (void)state;
+    enum { HOLDOUT = 20, START = 60, STATIC = 9 };
+    static const char *const keys[] = {"data={static: 3, start: 60, online: 0, holdout: 20}",
+                                       "grid={size: [4, 4, 4], spacing: 3}",
+                                       "shape.distribution.radius={mean: 1.3, deviation: 0.01}"};
+    sdm_config c;
+    sdm_error e = {0};
+    read_config(&c, keys, 3);
+    dataset d = {.shape = capsule, .grid = &c.grid, .n_voxels = 64, .seed = 3};
+    sdm_instance_params(capsule, &d.n_params);
+    if (sdm_train_ranges(&c, capsule, d.min, d.max, &e) ||
+        sdm_train_distributions(&c, capsule, d.min, d.max, d.distribution, &e) ||
+        trainer_dataset_create(&d, &c, &e))
+        fail_msg("%s", e.text);
+    const sdm_pod_levels levels = sdm_pod_count(&c.grid, 4, 1);
+    sdm_pod_block block;
+    assert_int_equal(levels.first[1], 1);
+    sdm_pod_blocks(&c.grid, 4, &levels, &block);
+    d.blocks = &block, d.n_blocks = 1;
+    const fill_hooks none = {0};
+    if (trainer_dataset_fill(&d, 1, &none, &e)) fail_msg("%s", e.text);
+    double far = 0;
+    for (size_t i = 0; i < HOLDOUT; i++) far = fmax(far, fabs(d.holdout_params[2 * i] - 1.3));
+    for (size_t i = STATIC; i < STATIC + START; i++) far = fmax(far, fabs(d.params[2 * i] - 1.3));
+    assert_true(far > 0.01 && far < 0.05);
+    for (size_t i = 0; i < STATIC; i++)
+        assert_true(d.params[2 * i] == 0.5 + 1.25 * (double)(i % 3));
+    trainer_dataset_dispose(&d);
+}
+
+static void model_tells_its_distributions(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_model *m;
+    sdm_error e = {0};
+    run_files_remove();
+    read_config(&c,
+                (const char *const[]){"train.steps=10",
+                                      "shape.distribution.radius={mean: 1.3, deviation: 0.01}"},
+                2);
+    if (sdm_train(&c, capsule, folder, false, NULL, NULL, &e)) fail_msg("%s", e.text);
+    assert_int_equal(sdm_model_open(in_folder("model.sdm"), &m, &e), SDM_OK);
+    const sdm_model_info *info = sdm_model_get_info(m);
+    assert_int_equal(info->params[1].distribution.kind, SDM_DISTRIBUTION_UNIFORM);
+    assert_normal(&info->params[0].distribution, 1.3, 0.01);
+    assert_non_null(strstr(info->config, "radius: {mean: 1.3, deviation: 0.01}"));
+    sdm_model_free(m);
+}
+
 static void mistakes_are_refused(void **state)
 {
     (void)state;
@@ -384,6 +499,14 @@ static void mistakes_are_refused(void **state)
     assert_non_null(strstr(e.text, "did you mean 'radius'"));
     read_config(&c, (const char *const[]){"shape.ranges.radius=[1e-9,1e9]"}, 1);
     assert_int_equal(sdm_train(&c, capsule, folder, false, NULL, NULL, &e), SDM_E_CONFIG);
+    read_config(&c, (const char *const[]){"shape.distribution.radios=normal"}, 1);
+    assert_int_equal(sdm_train(&c, capsule, folder, false, NULL, NULL, &e), SDM_E_CONFIG);
+    assert_string_equal(e.text, "argument 'shape.distribution.radios=normal': shape 'capsule' has "
+                                "no parameter 'radios'; did you mean 'radius'?");
+    read_config(&c, (const char *const[]){"shape.distribution.radius={mean: 99, deviation: 1}"}, 1);
+    assert_int_equal(sdm_train(&c, capsule, folder, false, NULL, NULL, &e), SDM_E_CONFIG);
+    assert_non_null(strstr(e.text, "': distribution of 'radius': a normal distribution of mean 99 "
+                                   "and deviation 1 has no values in the range"));
     read_config(&c, NULL, 0);
     assert_int_equal(sdm_train(&c, capsule, "/proc/no/such/folder", false, NULL, NULL, &e),
                      SDM_E_IO);
@@ -403,6 +526,9 @@ int main(void)
                                        cmocka_unit_test(polynomials_without_hidden_layers),
                                        cmocka_unit_test(small_pool_replaces_old_samples),
                                        cmocka_unit_test(rank_is_limited_by_maps),
+                                       cmocka_unit_test(distributions_are_resolved),
+                                       cmocka_unit_test(maps_follow_the_distribution),
+                                       cmocka_unit_test(model_tells_its_distributions),
                                        cmocka_unit_test(mistakes_are_refused)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -29,12 +29,13 @@ sdm_status trainer_dataset_create(dataset *d, const sdm_config *config, sdm_erro
     d->n_start = (size_t)config->data.start;
     d->n_online = (size_t)config->data.online;
     d->n_holdout = (size_t)config->data.holdout;
+    if (d->only_holdout) d->n_static = d->n_start = d->n_online = 0;
 
     // the memory holds the static grid and the held-out maps in any case (these as floats: two
     // units each), and as many random maps as fit into the rest
     const double map_bytes = 2.0 * (double)d->n_voxels;
     const double room = bytes / map_bytes - (double)d->n_static - 2.0 * (double)d->n_holdout;
-    if (room < (double)d->n_start || room < 1)
+    if (room < (double)d->n_start || (room < 1 && !d->only_holdout))
         return sdm_fail(
             err, SDM_E_CONFIG,
             "%s: data.static (%zu maps), data.start (%zu) and data.holdout (%zu) need %.1f GB, "
@@ -46,7 +47,7 @@ sdm_status trainer_dataset_create(dataset *d, const sdm_config *config, sdm_erro
     const size_t n_random = d->n_start + d->n_online;
     d->n_ring = room < (double)n_random ? (size_t)room : n_random;
     d->n_slots = d->n_static + d->n_ring;
-    if (d->n_static + d->n_start == 0)
+    if (d->n_static + d->n_start == 0 && !d->only_holdout)
         return sdm_fail(err, SDM_E_CONFIG,
                         "%s: data.static and data.start give no map to start from", config->file);
     // arrays
@@ -78,7 +79,11 @@ void trainer_dataset_dispose(dataset *d)
 
 sample_space trainer_dataset_space(const dataset *d)
 {
-    return (sample_space){.n_params = d->n_params, .min = d->min, .max = d->max, .seed = d->seed};
+    return (sample_space){.n_params = d->n_params,
+                          .min = d->min,
+                          .max = d->max,
+                          .distribution = d->distribution,
+                          .seed = d->seed};
 }
 
 size_t trainer_dataset_slot(const dataset *d, size_t index)

@@ -8,15 +8,28 @@
 #include "sdm/internal/pod.h"
 #include "sdm/internal/train.h"
 
+/* The maps that a network learns, if they are not the exact maps: make() computes out[voxels of
+   grid] from the exact map exact[nz][ny][nx] at p[n_params]. [any thread] */
+typedef struct map_target {
+    const sdm_grid *grid;
+    sdm_status (*make)(const void *user, const double *p, const float *exact, float *out,
+                       sdm_error *err); /* NULL: the network learns the exact maps */
+    const void *user;
+} map_target;
+
 /* Maps are stored in block order (sdm/internal/pod.h) as 16-bit integers with one scale per map:
    150,000 voxels take 300 kB. The rounding error is at most 1/65534 of the largest distance, which
    adds about 2e-8 mm^2 to the mean square error of a 7 mm map. */
 typedef struct dataset {
     const sdm_instance *shape;
-    const sdm_grid *grid;
+    const sdm_grid *grid; /* of the exact maps */
+    map_target target;
+    bool only_holdout; /* no map is needed for the training */
+    bool inside;       /* a voxel of a held-out map is inside the shape */
     const sdm_pod_block *blocks;
-    size_t n_blocks, n_voxels, n_params;
+    size_t n_blocks, n_voxels, n_params; /* n_voxels: of the maps that the network learns */
     double min[SDM_POD_MAX_PARAMS], max[SDM_POD_MAX_PARAMS];
+    sdm_distribution distribution[SDM_POD_MAX_PARAMS];
     uint64_t seed;
     size_t counts[SDM_POD_MAX_PARAMS]; /* points of the static grid along each parameter */
     /* Numbers of maps: static grid; random, made before training; random, made during training. */

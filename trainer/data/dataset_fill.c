@@ -8,7 +8,8 @@
 #include "workbench.h"
 
 /* Parameters p[n_params] of point `index` of the static grid: the points along a parameter include
- * both ends of its range; a single point is the middle. */
+ * both ends of its range; a single point is the middle. The grid is regular for every distribution:
+ * it is there to cover the range, which random shapes leave sparse at the ends. */
 static void static_params(const dataset *d, size_t index, double *p)
 {
     for (size_t i = 0; i < d->n_params; i++) {
@@ -41,7 +42,8 @@ sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hoo
             sdm_status s = made;
             if (!s && at < d->n_holdout) {
                 double *p = d->holdout_params + at * d->n_params;
-                sdm_sample_params(d->seed, STREAM_HOLDOUT, at, d->min, d->max, d->n_params, p);
+                sdm_sample_params(d->seed, STREAM_HOLDOUT, at, d->min, d->max, d->distribution,
+                                  d->n_params, p);
                 s = trainer_workbench_map(&w, d, p, d->holdout + at * d->n_voxels, &mine);
             } else if (!s) {
                 // n_start <= n_ring, so random sample k lies in slot n_static + k
@@ -51,7 +53,7 @@ sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hoo
                     static_params(d, slot, p);
                 else
                     sdm_sample_params(d->seed, STREAM_TRAIN, slot - d->n_static, d->min, d->max,
-                                      d->n_params, p);
+                                      d->distribution, d->n_params, p);
                 s = trainer_workbench_packed_map(&w, d, p, d->maps + slot * d->n_voxels,
                                                  &d->scale[slot], &mine);
             }
@@ -60,6 +62,7 @@ sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hoo
             {
                 if (s && (failed < 0 || i < failed)) failed = i, first = mine;
                 if (s) stop = true;
+                if (at < d->n_holdout && w.inside) d->inside = true;
                 done++;
                 if (hooks->report && sdm_thread() == 0) hooks->report(hooks->user, done, all);
                 if (hooks->enough && hooks->enough(hooks->user)) enough = true;

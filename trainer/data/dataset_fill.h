@@ -16,5 +16,5 @@ typedef struct fill_hooks {
 } fill_hooks;
 
 /* Makes all maps needed before training: held-out, static, start. shape, grid, blocks, n_blocks,
-   min, max and seed must be set. */
+   min, max, distribution and seed must be set. */
 sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_error *err);

@@ -51,7 +51,7 @@ static void *worker_run(void *user)
         // compute it without the lock
         double *params = p->params + place * d->n_params;
         sdm_sample_params(d->seed, STREAM_TRAIN, trainer_sample_plan_point(&d->plan, index), d->min,
-                          d->max, d->n_params, params);
+                          d->max, d->distribution, d->n_params, params);
         const sdm_status s =
             made ? made
                  : trainer_workbench_packed_map(&w, d, params, p->maps + place * d->n_voxels,

@@ -65,7 +65,8 @@ void trainer_sample_plan_observe(sample_plan *p, size_t first, size_t n, const d
 /* x[n_params] = parameters of a Sobol' point, scaled to -1 .. 1. */
 static void point_scaled(const sample_space *space, uint64_t point, double *x)
 {
-    sdm_sample_params(space->seed, STREAM_TRAIN, point, space->min, space->max, space->n_params, x);
+    sdm_sample_params(space->seed, STREAM_TRAIN, point, space->min, space->max, space->distribution,
+                      space->n_params, x);
     for (size_t k = 0; k < space->n_params; k++)
         x[k] = 2 * (x[k] - space->min[k]) / (space->max[k] - space->min[k]) - 1;
 }

@@ -9,25 +9,27 @@
 
        floor + (1 - floor) min(e / mean of e, cap),   floor = 1/2, cap = 7,
 
-   so every region keeps at least half of its uniform density. The plan depends on the observations
-   only, and it is made in rounds, one round ahead of the samples. It is therefore the same for any
-   number of threads. */
+   so every region keeps at least half of the density of the Sobol' points. The plan depends on the
+   observations only, and it is made in rounds, one round ahead of the samples. It is therefore the
+   same for any number of threads. */
 #pragma once
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
+#include "sdm/shape.h"
 #include "sdm/status.h"
 
 /* Number of samples in a round. At least this many samples beyond the last observed one are always
  * planned. */
 #define SAMPLE_ROUND 32
 
-/* The box of parameters from which samples are drawn, and the seed. */
+/* The distributions of the parameters of the samples, and the seed. */
 typedef struct sample_space {
     size_t n_params;
-    const double *min, *max; /* [n_params] */
+    const double *min, *max;              /* [n_params] */
+    const sdm_distribution *distribution; /* [n_params] */
     uint64_t seed;
 } sample_space;
 

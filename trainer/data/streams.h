@@ -8,6 +8,7 @@ enum {
     STREAM_BATCH = 300,    // slots of a batch: mode fit of pod, training of the direct kinds
     STREAM_REFINE = 350,   // slots of a batch: refinement of pod
     STREAM_INIT = 400,     // initial weights
+    STREAM_FAMILY = 500,   // parameters of meshes from which templates are designed
     STREAM_POINTS = 600,   // voxels of a map that a point network is trained on
     STREAM_EVALUATE = 650, // voxels of a held-out map that a point network is evaluated on
     STREAM_DROPOUT = 700,

@@ -7,30 +7,45 @@
 
 sdm_status trainer_workbench_create(workbench *w, const dataset *d, sdm_error *err)
 {
-    const sdm_status s = SDM_ALLOC(&w->map, d->n_voxels, "exact map", err);
+    sdm_status s = SDM_ALLOC(&w->exact, sdm_grid_count(d->grid), "exact map", err);
+    if (!s && d->target.make) s = SDM_ALLOC(&w->map, d->n_voxels, "exact map", err);
     return s ? s : SDM_ALLOC(&w->blocked, d->n_voxels, "exact map", err);
 }
 
 void trainer_workbench_dispose(workbench *w)
 {
     sdm_mesh_dispose(&w->mesh);
+    sdm_free(w->exact);
     sdm_free(w->map);
     sdm_free(w->blocked);
     *w = (workbench){0};
 }
 
-sdm_status trainer_workbench_map(workbench *w, const dataset *d, const double *p, float *blocked,
-                                 sdm_error *err)
+sdm_status trainer_workbench_exact(workbench *w, const dataset *d, const double *p, sdm_error *err)
 {
     sdm_status s = sdm_instance_mesh(d->shape, p, &w->mesh, err);
     if (s) return s;
     const sdm_exact_opts opts = {.n_threads = 1};
     sdm_exact *exact = NULL;
     s = sdm_exact_create(&w->mesh, &opts, &exact, err);
-    if (!s) s = sdm_exact_map(exact, d->grid, w->map, err);
+    if (!s) s = sdm_exact_map(exact, d->grid, w->exact, err);
     sdm_exact_free(exact);
     if (s) return sdm_fail_in(err, s, "shape '%s'", sdm_instance_shape(d->shape)->name);
-    sdm_pod_gather(d->grid, d->blocks, d->n_blocks, w->map, blocked);
+    w->inside = false;
+    for (size_t i = 0, n = sdm_grid_count(d->grid); i < n; i++) w->inside |= w->exact[i] < 0;
+    return SDM_OK;
+}
+
+sdm_status trainer_workbench_map(workbench *w, const dataset *d, const double *p, float *blocked,
+                                 sdm_error *err)
+{
+    sdm_status s = trainer_workbench_exact(w, d, p, err);
+    if (!s && d->target.make) s = d->target.make(d->target.user, p, w->exact, w->map, err);
+    if (s) return s;
+    if (d->target.make)
+        sdm_pod_gather(d->target.grid, d->blocks, d->n_blocks, w->map, blocked);
+    else
+        sdm_pod_gather(d->grid, d->blocks, d->n_blocks, w->exact, blocked);
     return SDM_OK;
 }
 

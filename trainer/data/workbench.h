@@ -6,7 +6,9 @@
 
 typedef struct workbench {
     sdm_mesh mesh;
-    float *map;     /* [n_voxels], map order */
+    float *exact;   /* exact map, map order */
+    bool inside;    /* a voxel of it is inside the shape */
+    float *map;     /* [n_voxels] target, map order; NULL: the exact map is the target */
     float *blocked; /* [n_voxels], block order */
 } workbench;
 
@@ -14,7 +16,11 @@ typedef struct workbench {
 sdm_status trainer_workbench_create(workbench *w, const dataset *d, sdm_error *err);
 void trainer_workbench_dispose(workbench *w);
 
-/* blocked[n_voxels] = exact map of the shape at p[n_params] in block order, mm. One thread. */
+/* Sets w->exact and w->inside: the exact map of the shape at p[n_params], mm. One thread. */
+sdm_status trainer_workbench_exact(workbench *w, const dataset *d, const double *p, sdm_error *err);
+
+/* blocked[n_voxels] = the map that the network learns (the exact map, or d->target) at p[n_params]
+   in block order, mm. One thread. */
 sdm_status trainer_workbench_map(workbench *w, const dataset *d, const double *p, float *blocked,
                                  sdm_error *err);
 

@@ -32,6 +32,8 @@ static const direct_network *network_of(sdm_network_kind kind)
     case SDM_NETWORK_SDMNN:
         return &trainer_network_sdmnn;
     case SDM_NETWORK_POD:
+    case SDM_NETWORK_TEMPLATE:
+    case SDM_NETWORK_AUTO:
         break;
     }
     return NULL;

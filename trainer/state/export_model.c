@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "data/workbench.h"
 #include "kind.h"
 #include "progress.h"
 #include "sdm/internal/checksum.h"
@@ -40,34 +41,44 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
     float *map = NULL, *blocked = NULL;
     void *scratch = NULL;
     double *each = NULL;
-    sdm_status s = SDM_ALLOC(&map, d->n_voxels, "evaluation", err);
+    sdm_status s = SDM_ALLOC(&map, sdm_grid_count(d->grid), "evaluation", err);
     if (!s) s = SDM_ALLOC(&blocked, d->n_voxels, "evaluation", err);
     if (!s)
         s = sdm_alloc(&scratch, sdm_model_scratch_bytes_threads(m, 1, t->n_threads), 1,
                       "evaluation", err);
     if (!s) s = SDM_ALLOC(&each, n, "evaluation", err);
+    // a network that learns other maps is compared with exact maps, which are made again
+    workbench w = {0};
+    if (!s && d->target.make) s = trainer_workbench_create(&w, d, err);
+    const size_t n_voxels = sdm_grid_count(d->grid);
     double square = 0, absolute = 0, near = 0, largest = 0;
     size_t n_near = 0;
     // sum the errors over maps and voxels
     for (size_t i = 0; i < n && !s; i++) {
         sdm_model_forward_threads(m, d->holdout_params + i * d->n_params, 1, map, scratch,
                                   t->n_threads);
-        sdm_pod_gather(d->grid, t->blocks, d->n_blocks, map, blocked);
-        const float *truth = d->holdout + i * d->n_voxels;
+        const float *truth = d->holdout + i * d->n_voxels, *values = blocked;
+        if (d->target.make) {
+            s = trainer_workbench_exact(&w, d, d->holdout_params + i * d->n_params, err);
+            if (s) break;
+            truth = w.exact, values = map;
+        } else {
+            sdm_pod_gather(d->grid, t->blocks, d->n_blocks, map, blocked);
+        }
         double here = 0;
-        for (size_t v = 0; v < d->n_voxels; v++) {
-            const double e = (double)blocked[v] - truth[v];
+        for (size_t v = 0; v < n_voxels; v++) {
+            const double e = (double)values[v] - truth[v];
             here += e * e;
             absolute += fabs(e);
             if (fabs(e) > largest) largest = fabs(e);
             if (fabsf(truth[v]) <= NEAR_MM) near += e * e, n_near++;
         }
         square += here;
-        each[i] = sqrt(here / (double)d->n_voxels);
+        each[i] = sqrt(here / (double)n_voxels);
     }
     // means and quantiles
     if (!s) {
-        const double voxels = (double)n * (double)d->n_voxels;
+        const double voxels = (double)n * (double)n_voxels;
         qsort(each, n, sizeof *each, compare_doubles);
         *out = (sdm_accuracy){.samples = (int64_t)n,
                               .mse_mm2 = square / voxels,
@@ -79,6 +90,7 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
                               .q90_mm = quantile(each, n, 0.9),
                               .q99_mm = quantile(each, n, 0.99)};
     }
+    trainer_workbench_dispose(&w);
     sdm_free(each);
     sdm_free(scratch);
     sdm_free(blocked);
@@ -233,6 +245,7 @@ static void describe_model(const trainer *t, const sdm_text *config, option_text
         params[i].min = t->data.min[i];
         params[i].max = t->data.max[i];
         params[i].def = fmin(fmax(p[i].def, params[i].min), params[i].max);
+        params[i].distribution = t->data.distribution[i];
     }
     collect_options(t, options);
     *info = (sdm_model_info){.n_params = n,
@@ -283,6 +296,18 @@ static sdm_status model_open(const trainer *t, const char *path, const descripti
     sdm_status s = t->kind->build(t, &d->info, &bytes, &size, err);
     if (!s) s = sdm_model_open_memory(path, bytes, size, out, err);
     sdm_free(bytes);
+    return s;
+}
+
+sdm_status trainer_export_measure(const trainer *t, sdm_accuracy *out, sdm_error *err)
+{
+    description *d = NULL;
+    sdm_model *model = NULL;
+    sdm_status s = description_create(t, &d, err);
+    if (!s) s = model_open(t, "model", d, &model, err);
+    if (!s) s = measure_model(t, model, t->data.n_holdout, out, err);
+    sdm_model_free(model);
+    description_free(d);
     return s;
 }
 

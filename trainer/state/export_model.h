@@ -21,5 +21,9 @@ sdm_status trainer_export_config(const trainer *t, sdm_outfile **out, sdm_error 
    SDM_E_QUALITY: the network gives numbers that are not finite. */
 sdm_status trainer_export_model(trainer *t, sdm_train_report *report, sdm_error *err);
 
+/* *out = errors of the model with the present averaged weights on all held-out shapes. Writes
+   nothing. */
+sdm_status trainer_export_measure(const trainer *t, sdm_accuracy *out, sdm_error *err);
+
 /* *seconds = expected duration of the measurement in trainer_export_model(), from one map. */
 sdm_status trainer_export_time(trainer *t, double *seconds, sdm_error *err);

@@ -1,5 +1,6 @@
-/* The interface of a kind of network to the trainer. There are two: trainer_kind_pod
-   (pod/pod_kind.h), which computes bases first and trains their coefficients, and
+/* The interface of a kind of network to the trainer. There are three: trainer_kind_pod
+   (pod/pod_kind.h), which computes bases first and trains their coefficients,
+   trainer_kind_template (template/template_kind.h), which carries exact maps along, and
    trainer_kind_direct (direct/direct.h) for networks whose weights are all trained by gradient
    descent on the error of the maps. */
 #pragma once
@@ -7,6 +8,9 @@
 #include "trainer.h"
 
 struct train_kind {
+    /* Called before any map is made: may allocate t->design and set data.target or
+       data.only_holdout. NULL: nothing to do. */
+    sdm_status (*prepare)(trainer *t, sdm_error *err);
     /* Edge of the blocks in which maps are stored (dataset.h), voxels; 0: map order. */
     size_t (*block)(const sdm_config *c);
     /* Number of levels of blocks (sdm/internal/pod.h); NULL: 1. */
@@ -31,6 +35,6 @@ struct train_kind {
     /* *bytes = new model file with the averaged weights; free with sdm_free(). */
     sdm_status (*build)(const trainer *t, const sdm_model_info *info, uint8_t **bytes, size_t *size,
                         sdm_error *err);
-    /* Frees t->state; NULL does nothing. */
+    /* Frees t->state and t->design; NULL does nothing. */
     void (*dispose)(trainer *t);
 };

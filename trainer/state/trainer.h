@@ -17,7 +17,8 @@ typedef struct trainer {
     sdm_train_hooks hooks;
     int n_threads;
     const train_kind *kind;
-    void *state; /* data of the kind; NULL before train_kind.begin() */
+    void *design; /* data of the kind from before the maps; NULL before train_kind.prepare() */
+    void *state;  /* data of the kind; NULL before train_kind.begin() */
 
     /* Blocks of all levels (sdm/internal/pod.h). Maps are stored in the order of the blocks of the
        lowest level; a single block means map order. */

@@ -6,6 +6,7 @@
 #include <stdbool.h>
 
 #include "sdm/grid.h"
+#include "sdm/shape.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -14,10 +15,11 @@ extern "C" {
 #define SDM_MODEL_NAME_MAX 64
 
 /* A shape parameter: its name, its unit (e.g. "mm"), the range min < max on which the network was
-   trained, and the default value. */
+   trained, the default value, and the distribution of the random shapes of the training. */
 typedef struct sdm_model_param {
     char name[SDM_MODEL_NAME_MAX], unit[16];
     double min, max, def;
+    sdm_distribution distribution;
 } sdm_model_param;
 
 /* Errors of the network on random shapes that were not used in training, measured at the end of

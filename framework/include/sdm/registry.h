@@ -54,7 +54,7 @@ typedef struct sdm_named_text {
 /* Creates an instance with the given options; all others have their defaults. The shape must stay
  * valid as long as the instance. base_dir (may be NULL): folder for relative paths in FILE options.
  * SDM_E_CONFIG: unknown option (with "did you mean") or bad value; SDM_E_PLUGIN: the plug-in's
- * create() failed. */
+ * create() failed, or its describe() or distributions() gave values that are not allowed. */
 SDM_API sdm_status sdm_instance_create(const sdm_shape *shape, const sdm_named_text *options,
                                        size_t n_options, const char *base_dir, sdm_instance **out,
                                        sdm_error *err);
@@ -62,6 +62,9 @@ SDM_API void sdm_instance_free(sdm_instance *s);
 
 SDM_API const sdm_shape *sdm_instance_shape(const sdm_instance *s);
 SDM_API const sdm_param *sdm_instance_params(const sdm_instance *s, size_t *n);
+/* The distributions of the parameters, [n_params] as of sdm_instance_params(); uniform unless the
+ * shape states others. Owned by the instance. */
+SDM_API const sdm_distribution *sdm_instance_distributions(const sdm_instance *s);
 /* Option values in the order of the shape's table. */
 SDM_API const sdm_option_value *sdm_instance_options(const sdm_instance *s);
 /* Index of a parameter; -1 if there is none of this name. */

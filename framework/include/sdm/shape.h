@@ -49,6 +49,19 @@ typedef struct sdm_option_value {
     const char *text; /* FILE: the path, "" if not given; CHOICE: name of the choice */
 } sdm_option_value;
 
+/* Distribution of a parameter, within the range of the parameter. */
+typedef enum sdm_distribution_kind {
+    SDM_DISTRIBUTION_UNIFORM = 0,
+    SDM_DISTRIBUTION_NORMAL = 1 /* truncated to the range of the parameter */
+} sdm_distribution_kind;
+
+typedef struct sdm_distribution {
+    sdm_distribution_kind kind;
+    /* NORMAL: mean and standard deviation before the truncation, in the unit of the parameter;
+     * UNIFORM: not used */
+    double mean, deviation;
+} sdm_distribution;
+
 /* Mesh output: after host->reserve() the plug-in writes vert[n_vert][3] (mm) and tri[n_tri][3]
  * (vertex indices, counter-clockwise seen from outside). */
 typedef struct sdm_mesh_out {
@@ -118,6 +131,12 @@ typedef struct sdm_shape {
      * calls host->fail() if there is no closed form for the given options. */
     int (*distance)(const void *self, const sdm_host *host, const sdm_option_value *options,
                     const double *p, const double x[3], double *distance);
+
+    /* Optional: states the distributions out[n_params] of the instance's parameters. All are
+     * uniform before the call. Training, random shapes and the priors of fits use them. Normal: a
+     * finite mean and a deviation above 0 with a probability of at least 1e-9 of lying in the range
+     * of the parameter. */
+    void (*distributions)(const void *self, sdm_distribution *out);
 } sdm_shape;
 
 /* The only symbol that the shared object of a plug-in exports: returns shape `index`, NULL beyond

@@ -24,6 +24,9 @@ void sdm_model_describe(const sdm_model_info *i, const char *kind, sdm_text *t)
         const sdm_model_param *q = &i->params[p];
         sdm_text_add(t, "param.name=%s\nparam.unit=%s\n", q->name, q->unit);
         sdm_text_add_reals(t, "param.range", (const double[]){q->min, q->max, q->def}, 3);
+        const sdm_distribution *d = &q->distribution; // a uniform one has no line
+        if (d->kind == SDM_DISTRIBUTION_NORMAL)
+            sdm_text_add_reals(t, "param.normal", (const double[]){d->mean, d->deviation}, 2);
     }
     sdm_text_add(t, "options=%zu\n", i->n_options);
     for (size_t o = 0; o < i->n_options; o++)

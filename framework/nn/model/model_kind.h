@@ -68,4 +68,11 @@ sdm_status sdm_model_pack(const sdm_model_info *info, const sdm_text *descriptio
                           const sdm_section *sections, size_t n, uint8_t **bytes, size_t *size,
                           sdm_error *err);
 
-extern const sdm_model_kind sdm_kind_pod, sdm_kind_deepsdf, sdm_kind_imnet, sdm_kind_sdmnn;
+/* *out = the model of a file in memory, bytes[size], 64-byte aligned, to be freed with
+   sdm_model_free(). kinds[]: the kinds of network that the file may have; NULL ends the list. Takes
+   over `bytes`, which are freed with the model or after an error. Errors as sdm_model_open(). */
+sdm_status sdm_model_read(uint8_t *bytes, size_t size, const sdm_model_kind *const *kinds,
+                          sdm_model **out, sdm_error *err);
+
+extern const sdm_model_kind sdm_kind_pod, sdm_kind_template, sdm_kind_deepsdf, sdm_kind_imnet,
+    sdm_kind_sdmnn;

@@ -19,6 +19,12 @@ void sdm_text_add_reals(sdm_text *t, const char *key, const double *v, size_t n)
     sdm_text_add(t, "\n");
 }
 
+bool sdm_lines_next_is(const sdm_lines *r, const char *key)
+{
+    const size_t n = strlen(key);
+    return !r->failed && (size_t)(r->end - r->at) > n && !memcmp(r->at, key, n) && r->at[n] == '=';
+}
+
 const char *sdm_lines_value(sdm_lines *r, const char *key)
 {
     const size_t n = strlen(key);

@@ -21,6 +21,9 @@ typedef struct sdm_lines {
     char key[64]; /* key of the last line read, or of the line that failed */
 } sdm_lines;
 
+/* Whether the next line exists and has this key; reads nothing. */
+bool sdm_lines_next_is(const sdm_lines *r, const char *key);
+
 /* The value of the next line, whose key must be `key`; valid until the next read. "" on failure. */
 const char *sdm_lines_value(sdm_lines *r, const char *key);
 

@@ -1,12 +1,13 @@
 /* Survey of a pod network: its layers are evaluated in floats at N random parameter vectors
-   (samples). Mean squares are taken over the samples that are uniform in the parameter ranges.
-   Largest magnitudes are taken over all samples, including corners and faces of the ranges, where
-   extremes are most likely. */
+   (samples). Mean squares are taken over the samples that follow the distributions of the
+   parameters. Largest magnitudes are taken over all samples, including corners and faces of the
+   ranges, where extremes are most likely. */
 #include "pod_survey.h"
 
 #include <math.h>
 #include <string.h>
 
+#include "sdm/internal/distribution.h"
 #include "sdm/internal/kernels.h"
 #include "sdm/internal/rng.h"
 #include "sdm/memory.h"
@@ -40,14 +41,21 @@ matrix sdm_pod_block_matrix(const survey *s, size_t b, size_t level)
     return m;
 }
 
-// Parameter i of sample n, in [-1, 1]. The first RANDOM samples are uniform. The next CORNERS
-// samples are corners: all 64 corners of the first six parameters, random -1 or 1 for the others.
-// The last FACES samples lie on faces: each parameter is -1 or 1 with probability 1/2, else
-// uniform.
-static double sample_parameter(size_t n, size_t i, size_t n_params)
+// Parameter i of sample n, in [-1, 1]. The first RANDOM samples follow the distribution of the
+// parameter. The next CORNERS samples are corners: all 64 corners of the first six parameters,
+// random -1 or 1 for the others. The last FACES samples lie on faces: each parameter is -1 or 1
+// with probability 1/2, else uniform.
+static double sample_parameter(const sdm_model_info *info, size_t n, size_t i)
 {
-    const double x = 2 * sdm_rng_uniform(0, STREAM, n * n_params + i) - 1;
-    if (n < RANDOM) return x;
+    const double u = sdm_rng_uniform(0, STREAM, n * info->n_params + i), x = 2 * u - 1;
+    if (n < RANDOM) {
+        const sdm_model_param *p = &info->params[i];
+        const double half = 0.5 * (p->max - p->min), middle = 0.5 * (p->min + p->max);
+        const sdm_distribution scaled = {.kind = p->distribution.kind,
+                                         .mean = (p->distribution.mean - middle) / half,
+                                         .deviation = p->distribution.deviation / half};
+        return sdm_distribution_quantile(&scaled, -1, 1, u);
+    }
     if (n < RANDOM + CORNERS && i < 6) return n >> i & 1 ? 1 : -1;
     return n >= RANDOM + CORNERS && fabs(x) < 0.5 ? 2 * x : x < 0 ? -1 : 1;
 }
@@ -69,7 +77,7 @@ static sdm_status sample_latent(const sdm_pod_spec *spec, float *z, sdm_error *e
     sdm_poly_table(a->n_params, degree, exponents);
     for (size_t n = 0; n < N; n++) {
         double x[SDM_POD_MAX_PARAMS];
-        for (size_t i = 0; i < a->n_params; i++) x[i] = sample_parameter(n, i, a->n_params);
+        for (size_t i = 0; i < a->n_params; i++) x[i] = sample_parameter(spec->info, n, i);
         sdm_poly_eval(exponents, total, a->n_params, degree, x, phi + n * total, NULL);
         memcpy(z + n * a->n_latent, phi + n * total, a->n_terms * sizeof *z);
     }

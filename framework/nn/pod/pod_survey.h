@@ -8,7 +8,7 @@
    is also computed by a row of another matrix. sdm_pod_survey() sets the first two members,
    sdm_pod_quantise() the others. */
 typedef struct coefficient_stats {
-    double square;  /* mean square over uniformly distributed parameters */
+    double square;  /* mean square over the distributions of the parameters */
     double largest; /* largest magnitude of all samples; NaN if a sample is NaN */
     double gain;    /* squared Euclidean norm of the map of a coefficient of 1, mm^2 */
     double unit;    /* largest abs(weight / row_scale) in its column */

@@ -1,5 +1,6 @@
-/* Prior densities: Gaussians of the parameters about the middle of their ranges, and of the pose
- * about the start. */
+/* Prior densities: Gaussians of the parameters, and of the pose about the start. A parameter with a
+ * normal distribution has this distribution as its prior; its truncation is the bounds of the fit.
+ * The others have a Gaussian about the middle of their range. */
 #include "prior.h"
 
 #include <math.h>
@@ -35,7 +36,17 @@ bool sdm_fit_has_prior(const fit_problem *p)
 double sdm_fit_prior_sd(const fit_problem *p, size_t k)
 {
     const double range = p->high[k] - p->low[k];
-    return p->opts->prior_sd > 0 ? 0.5 * p->opts->prior_sd * range : range / sqrt(12);
+    if (!(p->opts->prior_sd > 0)) return range / sqrt(12);
+    return p->distribution[k].kind == SDM_DISTRIBUTION_NORMAL
+               ? p->opts->prior_sd * p->distribution[k].deviation
+               : 0.5 * p->opts->prior_sd * range;
+}
+
+// centre of the prior of parameter k
+static double prior_mean(const fit_problem *p, size_t k)
+{
+    return p->distribution[k].kind == SDM_DISTRIBUTION_NORMAL ? p->distribution[k].mean
+                                                              : 0.5 * (p->low[k] + p->high[k]);
 }
 
 double sdm_fit_prior(const fit_problem *p, const fit_state *s, double *gradient, double *complete,
@@ -48,7 +59,7 @@ double sdm_fit_prior(const fit_problem *p, const fit_state *s, double *gradient,
     // parameters
     for (size_t k = 0; k < p->n_params && o->prior_sd > 0; k++) {
         const double sd = sdm_fit_prior_sd(p, k), precision = weight[k] / (sd * sd);
-        const double residual = s->params[k] - 0.5 * (p->low[k] + p->high[k]);
+        const double residual = s->params[k] - prior_mean(p, k);
         sum -= 0.5 * precision * residual * residual;
         normal_add(n, k, residual, precision, gradient, complete, observed);
     }

@@ -29,9 +29,10 @@ typedef struct fit_problem {
     /* the caller's target is a label map; `target` presents it as an image of values 0 and 1 */
     bool given_labels;
 
-    /* shape parameters, and their bounds [n_params] */
+    /* shape parameters, their bounds and their distributions [n_params] */
     size_t n_params;
     double low[FIT_PARAMS_MAX], high[FIT_PARAMS_MAX];
+    sdm_distribution distribution[FIT_PARAMS_MAX];
     /* centre of the priors of rotation and translation; only the pose is used */
     fit_state prior;
     /* [n_params + 6] factor >= 1 of each log prior, see sdm_fit_weigh_priors() */

@@ -169,11 +169,13 @@ typedef struct sdm_fit_opts {
     /* true: the pose is not estimated */
     bool keep_pose;
 
-    /* sd of the prior of each parameter, about the middle of its range, in units of half of the
-       range; 0: no prior. With 0.5 the range is the mean +- two sd. The likelihood counts
-       correlated voxels as independent and is therefore too sharp beside a prior: each log prior is
-       multiplied by the ratio of the variance with correlation to the variance without
-       correlation */
+    /* sd of the prior of each parameter; 0: no prior. A parameter with a normal distribution (of
+       the model or, without a model, of the shape) has its prior about the mean of the
+       distribution, in units of its deviation: with 1 the prior is the distribution. Another one
+       has its prior about the middle of its range, in units of half of the range: with 0.5 the
+       range is the mean +- two sd. The likelihood counts correlated voxels as independent and is
+       therefore too sharp beside a prior: each log prior is multiplied by the ratio of the variance
+       with correlation to the variance without correlation */
     double prior_sd;
     /* sd of the prior of the rotation, rad; 0: no prior. The prior is centred at the start pose,
        with turns at the start pose rotated by the chosen turn */

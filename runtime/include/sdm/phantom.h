@@ -73,7 +73,8 @@ SDM_API sdm_status sdm_phantom_make(const sdm_instance *shape, const double *p,
                                     const sdm_grid *grid, float *values, uint8_t *label,
                                     sdm_error *err);
 
-/* p[n_params] = random parameters, each uniform in its range. [any thread] */
+/* p[n_params] = random parameters, each from its distribution
+   (sdm_instance_distributions()). [any thread] */
 SDM_API void sdm_phantom_random_params(const sdm_instance *shape, uint64_t seed, double *p);
 
 /* A random pose: rotation about a random axis by an angle uniform in 0 .. max_angle (rad), and a

@@ -40,11 +40,29 @@ typedef struct sdm_config_range {
     sdm_mark mark;
 } sdm_config_range;
 
+/* How the distribution of a parameter is chosen; sdm_train_distributions() finds the figures. */
+typedef enum sdm_distribution_choice {
+    SDM_DISTRIBUTION_OF_SHAPE = 0, /* as the shape states it */
+    SDM_DISTRIBUTION_SET_UNIFORM,
+    SDM_DISTRIBUTION_SET_NORMAL, /* figures of the shape, or from default and range */
+    SDM_DISTRIBUTION_FIGURES     /* normal, with the figures of the configuration */
+} sdm_distribution_choice;
+
+/* shape.distribution, for all parameters or for the one of a name. */
+typedef struct sdm_config_distribution {
+    char name[SDM_NAME_MAX]; /* empty: all parameters */
+    sdm_distribution_choice choice;
+    double mean, deviation; /* FIGURES */
+    sdm_mark mark;
+} sdm_config_distribution;
+
 typedef enum sdm_network_kind {
     SDM_NETWORK_POD = 0,
     SDM_NETWORK_SDMNN,
     SDM_NETWORK_DEEPSDF,
-    SDM_NETWORK_IMNET
+    SDM_NETWORK_IMNET,
+    SDM_NETWORK_TEMPLATE,
+    SDM_NETWORK_AUTO /* the trainer chooses pod or template */
 } sdm_network_kind;
 typedef enum sdm_activation {
     SDM_ACTIVATION_SILU = 0,
@@ -77,6 +95,11 @@ typedef struct sdm_config {
         size_t n_options;
         sdm_config_range ranges[SDM_MAX_PARAMS];
         size_t n_ranges;
+        /* shape.distribution: a word for all parameters, or single ones; the others are then as
+         * the shape states them */
+        sdm_config_distribution distribution;
+        sdm_config_distribution distributions[SDM_MAX_PARAMS];
+        size_t n_distributions;
     } shape;
     /* grid.size [nx, ny, nz], required; grid.spacing, mm, one number or three, required; either
      * grid.origin [x, y, z], the centre of the first voxel, or grid.centre [x, y, z], the centre of
@@ -177,6 +200,10 @@ void sdm_config_dump(const sdm_config *c, sdm_text *out);
 /* Clears the members that do not affect the trained network: the numbers of threads, the file name
  * and the output folder. Two configurations of the same network are then equal. */
 void sdm_config_strip(sdm_config *c);
+
+/* Changes network.kind from `auto` to `kind`. Keys with the default of `auto` get the default of
+ * `kind`. */
+void sdm_config_choose_kind(sdm_config *c, sdm_network_kind kind);
 
 /* Appends a table of every key: name, type, range, default, unit, meaning; with `markdown` as a
  * Markdown table, else as aligned text. */

@@ -72,11 +72,22 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
 sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape, double *min,
                             double *max, sdm_error *err);
 
-/* p[n] = random parameter vector number `index` of `stream`, uniform within [min, max]: Sobol'
-   points (Joe and Kuo 2008) with a random digital shift for n <= 16, independent counter-based
-   random numbers for n > 16. Depends on the arguments only. [any thread] */
+/* Distributions of the parameters in the training, out[n], on the ranges min[n] and max[n] of
+   sdm_train_ranges(): as shape.distribution says. A normal distribution for which neither the
+   configuration nor the shape has figures gets the default value (moved into the range) as its mean
+   and a quarter of the range as its deviation. SDM_E_CONFIG with file:line:column: a parameter is
+   unknown, or its figures do not fit its range. */
+sdm_status sdm_train_distributions(const sdm_config *config, const sdm_instance *shape,
+                                   const double *min, const double *max, sdm_distribution *out,
+                                   sdm_error *err);
+
+/* p[n] = random parameter vector number `index` of `stream`, within min[n] .. max[n]: the quantiles
+   of distribution[n] at a Sobol' point (Joe and Kuo 2008) with a random digital shift for n <= 64,
+   or at independent counter-based random numbers for n > 64. Depends on the arguments only. [any
+   thread] */
 void sdm_sample_params(uint64_t seed, uint64_t stream, uint64_t index, const double *min,
-                       const double *max, size_t n, double *p);
+                       const double *max, const sdm_distribution *distribution, size_t n,
+                       double *p);
 
 #ifdef __cplusplus
 }

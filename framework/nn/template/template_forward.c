@@ -1,0 +1,69 @@
+/* Maps of a template network. No allocation. */
+#include <string.h>
+
+#include "sdm/internal/processor.h"
+#include "template_rows.h"
+
+const template_table *sdm_template_kernels(void)
+{
+#if defined(__x86_64__)
+    const int level = sdm_processor_level();
+    if (level >= SDM_PROCESSOR_AVX512) return &sdm_template_avx512;
+    if (level >= SDM_PROCESSOR_AVX2) return &sdm_template_avx2;
+#endif
+    return &sdm_template_generic;
+}
+
+static size_t correction_bytes(const template_network *k)
+{
+    return k->correction ? k->correction->kind->scratch_bytes(k->correction, 1, 1) : 0;
+}
+
+size_t sdm_template_scratch_bytes(const sdm_model *m, size_t n, int n_threads)
+{
+    (void)n, (void)n_threads;
+    template_work w;
+    return sdm_template_carve(m, false, 1, correction_bytes(m->network), NULL, &w);
+}
+
+// values = the minimum over the parts
+static void fill_map(template_work *w, float *values)
+{
+    template_patch p = {.count = 0};
+    while (sdm_template_next(w, &p)) {
+        bool first = true;
+        for (size_t c = 0; c < w->k->n_parts; c++) {
+            if (!(p.active >> c & 1)) continue;
+            sdm_template_run(w, c, &p);
+            const float *value = w->row.value;
+            for (size_t z = 0; z < p.n[2]; z++)
+                for (size_t y = 0; y < p.n[1]; y++, value += p.n[0]) {
+                    float *to = values + sdm_template_line_at(w, &p, y, z);
+                    if (first)
+                        memcpy(to, value, p.n[0] * sizeof *to);
+                    else
+                        for (size_t x = 0; x < p.n[0]; x++)
+                            to[x] = value[x] < to[x] ? value[x] : to[x];
+                }
+            first = false;
+        }
+    }
+}
+
+void sdm_template_forward(const sdm_model *m, const double *params, size_t n, float *values,
+                          void *scratch, int n_threads)
+{
+    (void)n_threads;
+    const template_network *k = m->network;
+    template_work w;
+    sdm_template_carve(m, false, 1, correction_bytes(k), scratch, &w);
+    for (size_t i = 0; i < n; i++) {
+        const double *p = params + i * m->info.n_params;
+        sdm_template_begin(&w, p, false);
+        if (k->correction)
+            k->correction->kind->forward(k->correction, p, 1, w.correction, w.correction_scratch,
+                                         1);
+        fill_map(&w, values + i * sdm_grid_count(&m->info.grid));
+    }
+}
+

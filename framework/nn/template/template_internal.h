@@ -1,0 +1,101 @@
+/* The opened `template` network and the functions between the files of this folder.
+
+   Words in addition to sdm/internal/template.h
+     pose         frames and warp amplitudes of all parts for one parameter vector
+     control      the control displacements of one warp: the sum of its modes
+     carried      for a voxel x, the point y of the template with T(y + U(y)) = x
+     metric       B B^T with B = d y / d x: |grad_x d0(y(x))|^2 = g^T B B^T g
+     station      a voxel index at which y and the metric are computed exactly: every `step` voxels
+                  along each axis, from one step before the grid to one after it; between stations y
+                  follows cubic B-splines, the metric is linear
+     index        a point in units of the lattice `near`, from its first node */
+#pragma once
+
+#include "model/model_kind.h"
+#include "sdm/internal/template.h"
+#include "template_kernels.h"
+
+typedef struct template_network {
+    size_t n_parts, n_numbers, n_terms, degree, step;
+    uint8_t *exponents;      /* [F][P] */
+    const double *functions; /* [N][F] */
+    sdm_template_part parts[SDM_TEMPLATE_MAX_PARTS];
+    template_level near[SDM_TEMPLATE_MAX_PARTS], far[SDM_TEMPLATE_MAX_PARTS];
+    size_t stations[3]; /* number of stations along x, y, z */
+    template_expansion expansion;
+    sdm_model *correction; /* the network r; NULL: none */
+    template_correction correction_lattice;
+} template_network;
+
+/* The kernels for this processor. */
+const template_table *sdm_template_kernels(void);
+
+/* template_pose.c: parameters to frames. */
+
+/* A frame T: x = m y + b; inverse = m^-1. */
+typedef struct part_pose {
+    double m[9], b[3], inverse[9];
+} part_pose;
+
+/* Floats of scratch memory of sdm_template_numbers(). */
+size_t sdm_template_numbers_scratch(const sdm_model *model);
+
+/* g[N] = the numbers at the parameters p[P]; unless dg is NULL, dg[P][N] = their derivatives. */
+void sdm_template_numbers(const sdm_model *model, const double *p, float *scratch, double *g,
+                          double *dg);
+
+/* pose[n_parts] = the frames for the numbers g[N]. */
+void sdm_template_frames(const template_network *k, const double *g, part_pose *pose);
+
+/* dm[n_parts][9], db[n_parts][3] = derivatives of m and b along dg[N]; pose belongs to g. */
+void sdm_template_frames_slope(const template_network *k, const double *g, const double *dg,
+                               const part_pose *pose, double (*dm)[9], double (*db)[3]);
+
+/* template_warp.c: warps and their inverse. */
+
+/* control[nodes][4] = sum over the modes m of a[m] mode_m; the fourth element is 0. */
+void sdm_template_control(const sdm_template_part *part, const double *a, float *control);
+
+/* u[3] = the displacement of a warp with `control` at y[3]; unless NULL, du[9] = its derivative,
+   row-major, and ddu[3][9]: ddu[c] = derivative of du by y[c]. Beyond the lattice the displacement
+   is that of the nearest point of the lattice. */
+void sdm_template_displacement(const sdm_lattice *l, const float *control, const double y[3],
+                               double u[3], double *du, double (*ddu)[9]);
+
+/* One station of a part with a warp. */
+typedef struct station {
+    double y[3];       /* carried point */
+    double inverse[9]; /* (I + dU/dy)^-1 at y */
+} station;
+
+/* Scratch memory of a warp for one map. */
+typedef struct warp_scratch {
+    float *control;   /* [nodes][4] */
+    float *points;    /* [stations][4] carried points as indices, coefficients of B-splines */
+    float *metric;    /* [stations][8] */
+    float *plane;     /* [stations in a plane][12] points and metric of a plane of voxels */
+    float *line;      /* [stations in a line][12] the same for a line of voxels */
+    station *station; /* [stations]; NULL unless derivatives are wanted */
+} warp_scratch;
+
+/* Fills points and metric (and station) of w for a part in `pose`, with the control of w. */
+void sdm_template_invert(const template_network *k, const sdm_template_part *part,
+                         const part_pose *pose, const sdm_grid *grid, const warp_scratch *w);
+
+/* points[stations][4], metric[stations][8] = the derivatives of those of `w` in a direction in
+   which the frame has the derivative dm[9], db[3] and the warp the derivative `control`. */
+void sdm_template_invert_slope(const template_network *k, const sdm_template_part *part,
+                               const part_pose *pose, const sdm_grid *grid, const warp_scratch *w,
+                               const float *control, const double dm[9], const double db[3],
+                               float *points, float *metric);
+
+/* template_forward.c, template_slopes.c: entries of the function table sdm_model_kind. */
+size_t sdm_template_scratch_bytes(const sdm_model *m, size_t n, int n_threads);
+void sdm_template_forward(const sdm_model *m, const double *params, size_t n, float *values,
+                          void *scratch, int n_threads);
+size_t sdm_template_jacobian_scratch_bytes(const sdm_model *m, int n_threads);
+void sdm_template_jacobian(const sdm_model *m, const double *params, float *values, float *jacobian,
+                           void *scratch, int n_threads);
+size_t sdm_template_jvp_scratch_bytes(const sdm_model *m, int n_threads);
+void sdm_template_jvp(const sdm_model *m, const double *params, const double *direction,
+                      float *values, float *tangent, void *scratch, int n_threads);

@@ -1,0 +1,3 @@
+/* Kernels of the template network for AVX2. */
+#define TABLE sdm_template_avx2
+#include "template_kernels_simd.h"

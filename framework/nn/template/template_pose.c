@@ -1,0 +1,163 @@
+/* Parameters of a template network -> numbers g -> frames of the parts, with derivatives. */
+#include <string.h>
+
+#include "sdm/internal/rotation.h"
+#include "sdm/pose.h"
+#include "template_internal.h"
+
+size_t sdm_template_numbers_scratch(const sdm_model *model)
+{
+    const template_network *k = model->network;
+    return k->n_terms * (1 + model->info.n_params);
+}
+
+void sdm_template_numbers(const sdm_model *model, const double *p, float *scratch, double *g,
+                          double *dg)
+{
+    const template_network *k = model->network;
+    const size_t n_params = model->info.n_params, terms = k->n_terms;
+    float *phi = scratch, *dphi = scratch + terms;
+    double x[SDM_POD_MAX_PARAMS], unit[SDM_POD_MAX_PARAMS];
+    for (size_t i = 0; i < n_params; i++) {
+        const sdm_model_param *q = &model->params[i];
+        unit[i] = 2 / (q->max - q->min);
+        x[i] = (p[i] - q->min) * unit[i] - 1;
+    }
+    sdm_poly_eval(k->exponents, terms, n_params, k->degree, x, phi, dg ? dphi : NULL);
+    for (size_t i = 0; i < k->n_numbers; i++) {
+        const double *f = k->functions + i * terms;
+        double sum = 0;
+        for (size_t t = 0; t < terms; t++) sum += f[t] * (double)phi[t];
+        g[i] = sum;
+        for (size_t d = 0; d < n_params && dg; d++) {
+            double slope = 0;
+            for (size_t t = 0; t < terms; t++) slope += f[t] * (double)dphi[d * terms + t];
+            dg[d * k->n_numbers + i] = slope * unit[d];
+        }
+    }
+}
+
+static void product(const double a[9], const double b[9], double out[9])
+{
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            out[3 * i + j] =
+                a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
+}
+
+static void apply(const double m[9], const double x[3], double out[3])
+{
+    for (int i = 0; i < 3; i++)
+        out[i] = m[3 * i] * x[0] + m[3 * i + 1] * x[1] + m[3 * i + 2] * x[2];
+}
+
+// inverse by cofactors; all zero if a is singular
+static void invert(const double a[9], double out[9])
+{
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            const int r = (j + 1) % 3, s = (j + 2) % 3, c = (i + 1) % 3, d = (i + 2) % 3;
+            out[3 * i + j] = a[3 * r + c] * a[3 * s + d] - a[3 * r + d] * a[3 * s + c];
+        }
+    const double det = a[0] * out[0] + a[1] * out[3] + a[2] * out[6];
+    for (int i = 0; i < 9; i++) out[i] = det != 0 ? out[i] / det : 0;
+}
+
+// s[9] = I + S for the stretch S of an affine frame, from its six numbers; with `unit` 0 only S
+static void stretch_matrix(const double *n, double unit, double s[9])
+{
+    const double m[9] = {unit + n[0], n[5], n[4], n[5], unit + n[1], n[3], n[4], n[3], unit + n[2]};
+    memcpy(s, m, sizeof m);
+}
+
+// m[9], b[3] = the relative frame of a part
+static void relative_frame(const sdm_template_part *part, const double *g, double m[9], double b[3])
+{
+    const double unit[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    memcpy(m, unit, sizeof unit);
+    memset(b, 0, 3 * sizeof *b);
+    if (part->frame == SDM_FRAME_NONE) return;
+    const double *n = g + part->numbers;
+    const sdm_pose pose = {.rotation = {n[0], n[1], n[2]}};
+    sdm_pose_matrix(&pose, m);
+    if (part->frame == SDM_FRAME_AFFINE) {
+        double s[9], r[9];
+        memcpy(r, m, sizeof r);
+        stretch_matrix(n + 6, 1, s);
+        product(r, s, m);
+    }
+    double turned[3];
+    apply(m, part->pivot, turned);
+    for (int i = 0; i < 3; i++) b[i] = part->pivot[i] + n[3 + i] - turned[i];
+}
+
+void sdm_template_frames(const template_network *k, const double *g, part_pose *pose)
+{
+    for (size_t c = 0; c < k->n_parts; c++) {
+        const sdm_template_part *part = &k->parts[c];
+        part_pose *to = &pose[c];
+        double m[9], b[3];
+        relative_frame(part, g, m, b);
+        if (part->parent >= 0) {
+            const part_pose *parent = &pose[part->parent];
+            product(parent->m, m, to->m);
+            apply(parent->m, b, to->b);
+            for (int i = 0; i < 3; i++) to->b[i] += parent->b[i];
+        } else {
+            memcpy(to->m, m, sizeof m);
+            memcpy(to->b, b, sizeof b);
+        }
+        invert(to->m, to->inverse);
+    }
+}
+
+// dm[9], db[3] = derivative of the relative frame of a part along dg
+static void relative_slope(const sdm_template_part *part, const double *g, const double *dg,
+                           double dm[9], double db[3])
+{
+    memset(dm, 0, 9 * sizeof *dm);
+    memset(db, 0, 3 * sizeof *db);
+    if (part->frame == SDM_FRAME_NONE) return;
+    const double *n = g + part->numbers, *dn = dg + part->numbers;
+    // d R = [J dw]x R with the left Jacobian J
+    const sdm_pose pose = {.rotation = {n[0], n[1], n[2]}};
+    double r[9], j[9], w[3], dr[9];
+    sdm_pose_matrix(&pose, r);
+    sdm_rotation_jacobian(n, j);
+    apply(j, dn, w);
+    const double cross[9] = {0, -w[2], w[1], w[2], 0, -w[0], -w[1], w[0], 0};
+    product(cross, r, dr);
+    if (part->frame == SDM_FRAME_AFFINE) {
+        double s[9], ds[9], a[9], b[9];
+        stretch_matrix(n + 6, 1, s);
+        stretch_matrix(dn + 6, 0, ds);
+        product(dr, s, a);
+        product(r, ds, b);
+        for (int i = 0; i < 9; i++) dm[i] = a[i] + b[i];
+    } else {
+        memcpy(dm, dr, sizeof dr);
+    }
+    double turned[3];
+    apply(dm, part->pivot, turned);
+    for (int i = 0; i < 3; i++) db[i] = dn[3 + i] - turned[i];
+}
+
+void sdm_template_frames_slope(const template_network *k, const double *g, const double *dg,
+                               const part_pose *pose, double (*dm)[9], double (*db)[3])
+{
+    for (size_t c = 0; c < k->n_parts; c++) {
+        const sdm_template_part *part = &k->parts[c];
+        relative_slope(part, g, dg, dm[c], db[c]);
+        if (part->parent < 0) continue;
+        const part_pose *parent = &pose[part->parent];
+        double m[9], b[3], first[9], second[9], u[3], v[3];
+        relative_frame(part, g, m, b);
+        // T = T_parent . R: d m = dM m + M dm, d b = dM b + M db + dB
+        product(dm[part->parent], m, first);
+        product(parent->m, dm[c], second);
+        apply(dm[part->parent], b, u);
+        apply(parent->m, db[c], v);
+        for (int i = 0; i < 9; i++) dm[c][i] = first[i] + second[i];
+        for (int i = 0; i < 3; i++) db[c][i] = u[i] + v[i] + db[part->parent][i];
+    }
+}

@@ -1,0 +1,371 @@
+/* Evaluates the parts of a template network in patches of voxels. */
+#include "template_rows.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Voxels of a block along x, y, z. */
+static const size_t BLOCK[3] = {4, 4, 4};
+enum { BLOCK_VOXELS = 4 * 4 * 4 };
+
+size_t sdm_template_row_floats(const sdm_grid *grid)
+{
+    const size_t n = (size_t)grid->n[0] > BLOCK_VOXELS ? (size_t)grid->n[0] : BLOCK_VOXELS;
+    return (n + 3 * SDM_TEMPLATE_LANES) / SDM_TEMPLATE_LANES * SDM_TEMPLATE_LANES;
+}
+
+static size_t station_count(const template_network *k)
+{
+    return k->stations[0] * k->stations[1] * k->stations[2];
+}
+
+// Takes the next `bytes` of memory, 64-byte aligned, and advances *at.
+static void *carve(void *memory, size_t *at, size_t bytes)
+{
+    void *p = memory ? (uint8_t *)memory + *at : NULL;
+    *at += (bytes + 63) / 64 * 64;
+    return p;
+}
+
+static void carve_row(const sdm_grid *grid, void *memory, size_t *at, template_row *r)
+{
+    const size_t bytes = sdm_template_row_floats(grid) * sizeof(float);
+    float **const fields[] = {&r->u[0],      &r->u[1],      &r->u[2],      &r->metric[0],
+                              &r->metric[1], &r->metric[2], &r->metric[3], &r->metric[4],
+                              &r->metric[5], &r->f,         &r->g[0],      &r->g[1],
+                              &r->g[2],      &r->far_f,     &r->far_g[0],  &r->far_g[1],
+                              &r->far_g[2],  &r->value};
+    for (size_t i = 0; i < sizeof fields / sizeof *fields; i++)
+        *fields[i] = carve(memory, at, bytes);
+}
+
+size_t sdm_template_carve(const sdm_model *m, bool slopes, size_t correction_maps,
+                          size_t correction_scratch, void *memory, template_work *w)
+{
+    const template_network *k = m->network;
+    const size_t n = station_count(k);
+    size_t at = 0;
+    *w = (template_work){.model = m, .k = k, .grid = &m->info.grid};
+    w->g = carve(memory, &at, k->n_numbers * sizeof *w->g);
+    w->dg = carve(memory, &at, (slopes ? m->info.n_params * k->n_numbers : 0) * sizeof *w->dg);
+    w->phi = carve(memory, &at, sdm_template_numbers_scratch(m) * sizeof *w->phi);
+    w->pose = carve(memory, &at, k->n_parts * sizeof *w->pose);
+    for (size_t c = 0; c < k->n_parts; c++) {
+        if (k->parts[c].n_modes == 0) continue;
+        warp_scratch *s = &w->warp[c];
+        s->control =
+            carve(memory, &at, 4 * sdm_lattice_count(&k->parts[c].warp) * sizeof *s->control);
+        s->points = carve(memory, &at, 4 * n * sizeof *s->points);
+        s->metric = carve(memory, &at, 8 * n * sizeof *s->metric);
+        s->plane = carve(memory, &at, 12 * k->stations[0] * k->stations[1] * sizeof *s->plane);
+        s->line = carve(memory, &at, 12 * k->stations[0] * sizeof *s->line);
+        if (slopes) s->station = carve(memory, &at, n * sizeof *s->station);
+    }
+    for (int a = 0; a < 3; a++)
+        w->blocks[a] = ((size_t)w->grid->n[a] + BLOCK[a] - 1) / BLOCK[a];
+    for (size_t c = 0; c < k->n_parts; c++) w->by_lines |= k->parts[c].n_modes > 0;
+    w->active =
+        carve(memory, &at, w->blocks[0] * w->blocks[1] * w->blocks[2] * sizeof *w->active);
+    w->centre = carve(
+        memory, &at, 4 * k->n_parts * (w->blocks[0] + SDM_TEMPLATE_LANES) * sizeof *w->centre);
+    if (k->correction) {
+        w->correction = carve(memory, &at,
+                              correction_maps * sdm_grid_count(&k->correction->info.grid) *
+                                  sizeof *w->correction);
+        w->correction_scratch = carve(memory, &at, correction_scratch);
+        w->correction_at = k->correction_lattice;
+        w->correction_at.map = w->correction;
+    }
+    carve_row(w->grid, memory, &at, &w->row);
+    return at;
+}
+
+void sdm_template_plane(const template_network *k, const float *points, const float *metric,
+                        size_t z, float *plane)
+{
+    const size_t n = k->stations[0] * k->stations[1], cell = z / k->step, phase = z % k->step;
+    const float *p = points + 4 * n * cell, *g = metric + 8 * n * (cell + 1);
+    float w[4];
+    for (int a = 0; a < 4; a++) w[a] = k->expansion.cubic[a][phase];
+    const float t = k->expansion.linear[phase];
+    float *out = plane, *out_metric = plane + 4 * n;
+    for (size_t i = 0; i < 4 * n; i++)
+        out[i] = w[0] * p[i] + w[1] * p[4 * n + i] + w[2] * p[8 * n + i] + w[3] * p[12 * n + i];
+    for (size_t i = 0; i < 8 * n; i++) out_metric[i] = g[i] + t * (g[8 * n + i] - g[i]);
+}
+
+void sdm_template_line(const template_network *k, const float *plane, size_t y, float *line)
+{
+    const size_t n = k->stations[0], cell = y / k->step, phase = y % k->step;
+    const float *p = plane + 4 * n * cell,
+                *g = plane + 4 * n * k->stations[1] + 8 * n * (cell + 1);
+    float w[4];
+    for (int a = 0; a < 4; a++) w[a] = k->expansion.cubic[a][phase];
+    const float t = k->expansion.linear[phase];
+    float *out = line, *out_metric = line + 4 * n;
+    for (size_t i = 0; i < 4 * n; i++)
+        out[i] = w[0] * p[i] + w[1] * p[4 * n + i] + w[2] * p[8 * n + i] + w[3] * p[12 * n + i];
+    for (size_t i = 0; i < 8 * n; i++) out_metric[i] = g[i] + t * (g[8 * n + i] - g[i]);
+}
+
+/* A part without a warp: its index at a voxel is an affine function of the voxel's index. */
+
+// u[3] = index of part c at voxel (0, 0, 0); by[3][3]: by[a] is its change along axis a of the grid
+static void affine_index(const template_work *w, size_t c, double u[3], double by[3][3])
+{
+    const part_pose *pose = &w->pose[c];
+    const sdm_lattice *l = &w->k->parts[c].near;
+    const sdm_grid *g = w->grid;
+    const double *m = pose->inverse;
+    double x[3];
+    for (int i = 0; i < 3; i++) x[i] = g->origin[i] - pose->b[i];
+    for (int i = 0; i < 3; i++) {
+        u[i] = (m[3 * i] * x[0] + m[3 * i + 1] * x[1] + m[3 * i + 2] * x[2] - l->origin[i]) /
+               l->spacing;
+        for (int a = 0; a < 3; a++)
+            by[a][i] = (m[3 * i] * g->dir[a] + m[3 * i + 1] * g->dir[3 + a] +
+                        m[3 * i + 2] * g->dir[6 + a]) *
+                       g->spacing[a] / l->spacing;
+    }
+}
+
+// metric[6] of a part without a warp: m^-1 m^-T
+static void affine_metric(const part_pose *pose, float metric[6])
+{
+    static const int I[6] = {0, 1, 2, 1, 0, 0}, J[6] = {0, 1, 2, 2, 2, 1};
+    const double *b = pose->inverse;
+    for (int c = 0; c < 6; c++)
+        metric[c] = (float)(b[3 * I[c]] * b[3 * J[c]] + b[3 * I[c] + 1] * b[3 * J[c] + 1] +
+                            b[3 * I[c] + 2] * b[3 * J[c] + 2]);
+}
+
+static void affine_run(const template_work *w, size_t c, const template_patch *p, bool rigid)
+{
+    double from[3], by[3][3];
+    affine_index(w, c, from, by);
+    for (int i = 0; i < 3; i++) {
+        float *u = w->row.u[i];
+        const float step = (float)by[0][i];
+        for (size_t z = 0; z < p->n[2]; z++)
+            for (size_t y = 0; y < p->n[1]; y++, u += p->n[0]) {
+                const float first =
+                    (float)(from[i] + by[0][i] * (double)p->at[0] +
+                            by[1][i] * (double)(p->at[1] + y) + by[2][i] * (double)(p->at[2] + z));
+                for (size_t x = 0; x < p->n[0]; x++) u[x] = first + step * (float)x;
+            }
+    }
+    if (rigid) return;
+    float metric[6];
+    affine_metric(&w->pose[c], metric);
+    for (int a = 0; a < 6; a++)
+        for (size_t i = 0; i < p->count; i++) w->row.metric[a][i] = metric[a];
+}
+
+bool sdm_template_is_rigid(const template_network *k, size_t c)
+{
+    for (int p = (int)c; p >= 0; p = k->parts[p].parent)
+        if (k->parts[p].frame == SDM_FRAME_AFFINE || k->parts[p].n_modes) return false;
+    return true;
+}
+
+// Distance and gradient of the template of part c at row.u: from the lattice `near`, and from `far`
+// for points outside of it.
+static void lookup(const template_work *w, size_t c, size_t n)
+{
+    const template_row *r = &w->row;
+    const template_network *k = w->k;
+    const template_table *t = sdm_template_kernels();
+    const float *const u[3] = {r->u[0], r->u[1], r->u[2]};
+    float end[3];
+    for (int a = 0; a < 3; a++) end[a] = (float)(k->near[c].n[a] - 1);
+    size_t inside = 0;
+    for (size_t i = 0; i < n; i++)
+        inside += (u[0][i] >= 0) & (u[0][i] <= end[0]) & (u[1][i] >= 0) & (u[1][i] <= end[1]) &
+                  (u[2][i] >= 0) & (u[2][i] <= end[2]);
+    if (inside) t->lookup(&k->near[c], n, u, r->f, r->g);
+    if (inside == n) return;
+    if (!inside) {
+        t->lookup(&k->far[c], n, u, r->f, r->g);
+        return;
+    }
+    t->lookup(&k->far[c], n, u, r->far_f, r->far_g);
+    for (size_t i = 0; i < n; i++) {
+        const bool in = (u[0][i] >= 0) & (u[0][i] <= end[0]) & (u[1][i] >= 0) &
+                        (u[1][i] <= end[1]) & (u[2][i] >= 0) & (u[2][i] <= end[2]);
+        r->f[i] = in ? r->f[i] : r->far_f[i];
+        for (int a = 0; a < 3; a++) r->g[a][i] = in ? r->g[a][i] : r->far_g[a][i];
+    }
+}
+
+void sdm_template_run(template_work *w, size_t c, const template_patch *p)
+{
+    template_row *r = &w->row;
+    const template_network *k = w->k;
+    const template_table *t = sdm_template_kernels();
+    const bool rigid = sdm_template_is_rigid(k, c);
+    if (k->parts[c].n_modes) {
+        const warp_scratch *s = &w->warp[c];
+        float *const to[9] = {r->u[0],      r->u[1],      r->u[2],      r->metric[0], r->metric[1],
+                              r->metric[2], r->metric[3], r->metric[4], r->metric[5]};
+        sdm_template_line(k, s->plane, p->at[1], s->line);
+        t->expand(&k->expansion, (p->count + k->step - 1) / k->step, s->line,
+                  s->line + 4 * k->stations[0], 9, to);
+    } else {
+        affine_run(w, c, p, rigid);
+    }
+    lookup(w, c, p->count);
+    if (rigid)
+        memcpy(r->value, r->f, p->count * sizeof *r->value);
+    else
+        t->normalise(p->count, r->f, (const float *const *)r->g, (const float *const *)r->metric,
+                     r->value);
+    if (w->correction_at.map && c == 0)
+        t->correct(&w->correction_at, p->count, (const float *const *)r->u, r->value);
+}
+
+bool sdm_template_next(template_work *w, template_patch *p)
+{
+    const template_network *k = w->k;
+    const size_t n[3] = {(size_t)w->grid->n[0], (size_t)w->grid->n[1], (size_t)w->grid->n[2]};
+    const size_t size[3] = {w->by_lines ? n[0] : BLOCK[0], w->by_lines ? 1 : BLOCK[1],
+                            w->by_lines ? 1 : BLOCK[2]};
+    if (p->count == 0) {
+        memset(p, 0, sizeof *p);
+    } else {
+        int a = 0;
+        while (a < 3 && (p->at[a] += size[a]) >= n[a]) p->at[a++] = 0;
+        if (a == 3) return false;
+    }
+    p->count = 1;
+    for (int a = 0; a < 3; a++) {
+        p->n[a] = n[a] - p->at[a] < size[a] ? n[a] - p->at[a] : size[a];
+        p->count *= p->n[a];
+    }
+    p->active = k->n_parts < 32 ? (UINT32_C(1) << k->n_parts) - 1 : UINT32_MAX;
+    if (!w->by_lines) {
+        if (k->n_parts > 1)
+            p->active = w->active[(p->at[2] / BLOCK[2] * w->blocks[1] + p->at[1] / BLOCK[1]) *
+                                      w->blocks[0] +
+                                  p->at[0] / BLOCK[0]];
+    } else if (p->at[1] == 0) {
+        for (size_t c = 0; c < k->n_parts; c++)
+            if (k->parts[c].n_modes)
+                sdm_template_plane(k, w->warp[c].points, w->warp[c].metric, p->at[2],
+                                   w->warp[c].plane);
+    }
+    return true;
+}
+
+/* Blocks. */
+
+// Half of the diagonal of a block, mm.
+static double block_radius(const sdm_grid *grid)
+{
+    double sum = 0;
+    for (int a = 0; a < 3; a++) {
+        const double half = 0.5 * ((double)BLOCK[a] - 1) * grid->spacing[a];
+        sum += half * half;
+    }
+    return sqrt(sum);
+}
+
+// Bound on how fast the distance to part c changes, mm per mm: 1 for rigid parts. For others the
+// product of the largest singular values of m and m^-1, bounded by Frobenius norms.
+static double slope_bound(const template_work *w, size_t c)
+{
+    double forward = 0, back = 0;
+    if (sdm_template_is_rigid(w->k, c)) return 1;
+    for (int i = 0; i < 9; i++) {
+        forward += w->pose[c].m[i] * w->pose[c].m[i];
+        back += w->pose[c].inverse[i] * w->pose[c].inverse[i];
+    }
+    return sqrt(forward * back);
+}
+
+// Fills w->centre for part c and the row (y, z) of blocks: distance and gradient in the world.
+static void row_centres(template_work *w, size_t c, size_t y, size_t z)
+{
+    const size_t nx = w->blocks[0], at[3] = {0, y, z};
+    double from[3], by[3][3];
+    float metric[6], *out = w->centre + 4 * c * (nx + SDM_TEMPLATE_LANES);
+    affine_index(w, c, from, by);
+    affine_metric(&w->pose[c], metric);
+    for (int i = 0; i < 3; i++) {
+        double first = from[i];
+        for (int a = 0; a < 3; a++)
+            first += by[a][i] * ((double)(at[a] * BLOCK[a]) + 0.5 * ((double)BLOCK[a] - 1));
+        for (size_t x = 0; x < nx; x++)
+            w->row.u[i][x] = (float)(first + by[0][i] * (double)(x * BLOCK[0]));
+    }
+    for (int a = 0; a < 6; a++)
+        for (size_t x = 0; x < nx; x++) w->row.metric[a][x] = metric[a];
+    lookup(w, c, nx);
+    sdm_template_kernels()->normalise(nx, w->row.f, (const float *const *)w->row.g,
+                                      (const float *const *)w->row.metric, w->row.value);
+    // rigid parts: the gradient turns with the part
+    const double *m = w->pose[c].m;
+    for (size_t x = 0; x < nx; x++) {
+        const float g[3] = {w->row.g[0][x], w->row.g[1][x], w->row.g[2][x]};
+        out[4 * x] = w->row.value[x];
+        for (int i = 0; i < 3; i++)
+            out[4 * x + 1 + (size_t)i] =
+                (float)m[3 * i] * g[0] + (float)m[3 * i + 1] * g[1] + (float)m[3 * i + 2] * g[2];
+    }
+}
+
+// True if part c cannot be nearer than part n, the nearest one at the centre of a block of the given
+// radius, anywhere in the block. a, b: distance and gradient of c and n at the centre.
+static bool is_behind(const template_work *w, size_t c, size_t n, const float *a, const float *b,
+                      double radius)
+{
+    const double slack = 0.1 * w->grid->spacing[0], ahead = (double)a[0] - (double)b[0];
+    // both change by at most slope * radius
+    if (ahead > 1.05 * (slope_bound(w, c) + slope_bound(w, n)) * radius + slack) return true;
+    // d_n(x + v) <= d_n + g_n . v + v^2 / (2 d_n), and d_c(x + v) >= d_c + g_c . v - sag
+    if (!sdm_template_is_rigid(w->k, c) || !sdm_template_is_rigid(w->k, n)) return false;
+    if (!(b[0] > 0) || radius > w->k->parts[c].sag_reach) return false;
+    double turn = 0;
+    for (int i = 1; i < 4; i++) {
+        const double e = (double)a[i] - (double)b[i];
+        turn += e * e;
+    }
+    return ahead > 1.05 * (sqrt(turn) * radius + w->k->parts[c].sag) +
+                       radius * radius / (2 * (double)b[0]) + slack;
+}
+
+// Marks the parts that may be the nearest in each block.
+static void mark_active(template_work *w)
+{
+    const template_network *k = w->k;
+    const size_t nx = w->blocks[0], stride = 4 * (nx + SDM_TEMPLATE_LANES);
+    const double radius = block_radius(w->grid);
+    for (size_t z = 0; z < w->blocks[2]; z++)
+        for (size_t y = 0; y < w->blocks[1]; y++) {
+            for (size_t c = 0; c < k->n_parts; c++) row_centres(w, c, y, z);
+            uint32_t *active = w->active + (z * w->blocks[1] + y) * nx;
+            for (size_t x = 0; x < nx; x++) {
+                size_t n = 0;
+                for (size_t c = 1; c < k->n_parts; c++)
+                    if (w->centre[c * stride + 4 * x] < w->centre[n * stride + 4 * x]) n = c;
+                active[x] = UINT32_C(1) << n;
+                for (size_t c = 0; c < k->n_parts; c++)
+                    if (c != n && !is_behind(w, c, n, w->centre + c * stride + 4 * x,
+                                             w->centre + n * stride + 4 * x, radius))
+                        active[x] |= UINT32_C(1) << c;
+            }
+        }
+}
+
+void sdm_template_begin(template_work *w, const double *p, bool slopes)
+{
+    const template_network *k = w->k;
+    sdm_template_numbers(w->model, p, w->phi, w->g, slopes ? w->dg : NULL);
+    sdm_template_frames(k, w->g, w->pose);
+    for (size_t c = 0; c < k->n_parts; c++) {
+        const sdm_template_part *part = &k->parts[c];
+        if (part->n_modes == 0) continue;
+        sdm_template_control(part, w->g + part->amplitudes, w->warp[c].control);
+        sdm_template_invert(k, part, &w->pose[c], w->grid, &w->warp[c]);
+    }
+    if (!w->by_lines && k->n_parts > 1) mark_active(w);
+}

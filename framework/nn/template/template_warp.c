@@ -1,0 +1,280 @@
+/* The warp of a part: displacements by cubic B-splines, and the inverse of the warp at the
+   stations. */
+#include <math.h>
+#include <string.h>
+
+#include "template_internal.h"
+
+typedef float quad __attribute__((vector_size(16)));
+
+static quad quad_at(const float *p)
+{
+    quad q;
+    memcpy(&q, p, sizeof q);
+    return q;
+}
+
+void sdm_template_control(const sdm_template_part *part, const double *a, float *control)
+{
+    const size_t n = sdm_lattice_count(&part->warp);
+    memset(control, 0, 4 * n * sizeof *control);
+    for (size_t m = 0; m < part->n_modes; m++) {
+        const float f = (float)a[m], *mode = part->modes + 3 * n * m;
+        if (f == 0) continue;
+        for (size_t i = 0; i < n; i++)
+            for (int c = 0; c < 3; c++) control[4 * i + (size_t)c] += f * mode[3 * i + (size_t)c];
+    }
+}
+
+// Weights of the four control points around a coordinate, and their first and second derivatives.
+// Returns the index of the first control point.
+static size_t spline_weights(double u, uint32_t n, double spacing, float w[4], float d[4],
+                             float dd[4])
+{
+    const bool inside = u >= 1 && u <= (double)n - 2;
+    u = fmin(fmax(u, 1), (double)n - 2);
+    size_t i = (size_t)u;
+    if (i > n - 3u) i = n - 3u;
+    const double t = u - (double)i, s = 1 - t;
+    const double f = inside ? 1 / spacing : 0, ff = f * f; // beyond the lattice: constant
+    w[0] = (float)(s * s * s / 6), w[3] = (float)(t * t * t / 6);
+    w[1] = (float)((3 * t * t * t - 6 * t * t + 4) / 6);
+    w[2] = (float)((3 * s * s * s - 6 * s * s + 4) / 6);
+    d[0] = (float)(-f * s * s / 2), d[3] = (float)(f * t * t / 2);
+    d[1] = (float)(f * (1.5 * t * t - 2 * t)), d[2] = (float)(-f * (1.5 * s * s - 2 * s));
+    dd[0] = (float)(ff * s), dd[3] = (float)(ff * t);
+    dd[1] = (float)(ff * (3 * t - 2)), dd[2] = (float)(ff * (3 * s - 2));
+    return i - 1;
+}
+
+static quad sum_of_four(const float w[4], const quad q[4])
+{
+    return w[0] * q[0] + w[1] * q[1] + (w[2] * q[2] + w[3] * q[3]);
+}
+
+void sdm_template_displacement(const sdm_lattice *l, const float *control, const double y[3],
+                               double u[3], double *du, double (*ddu)[9])
+{
+    float w[3][3][4]; // [axis][derivative]
+    size_t at[3];
+    for (int a = 0; a < 3; a++)
+        at[a] = spline_weights((y[a] - l->origin[a]) / l->spacing, l->n[a], l->spacing, w[a][0],
+                               w[a][1], w[a][2]);
+    // sums[derivatives by x][by y]: of total order <= 2, along x, then y, then z
+    quad z[3][3][4];
+    const int order = ddu ? 2 : du ? 1 : 0;
+    for (size_t k = 0; k < 4; k++) {
+        quad yy[3][4];
+        for (size_t j = 0; j < 4; j++) {
+            const float *c = control + 4 * (((at[2] + k) * l->n[1] + at[1] + j) * l->n[0] + at[0]);
+            const quad q[4] = {quad_at(c), quad_at(c + 4), quad_at(c + 8), quad_at(c + 12)};
+            for (int a = 0; a <= order; a++) yy[a][j] = sum_of_four(w[0][a], q);
+        }
+        for (int a = 0; a <= order; a++)
+            for (int b = 0; a + b <= order; b++) z[a][b][k] = sum_of_four(w[1][b], yy[a]);
+    }
+    quad sum[3][3][3];
+    for (int a = 0; a <= order; a++)
+        for (int b = 0; a + b <= order; b++)
+            for (int c = 0; a + b + c <= order; c++)
+                sum[a][b][c] = sum_of_four(w[2][c], z[a][b]);
+    for (int i = 0; i < 3; i++) {
+        u[i] = (double)sum[0][0][0][i];
+        if (du)
+            du[3 * i] = (double)sum[1][0][0][i], du[3 * i + 1] = (double)sum[0][1][0][i],
+                   du[3 * i + 2] = (double)sum[0][0][1][i];
+        for (int p = 0; p < 3 && ddu; p++)
+            for (int q = 0; q < 3; q++)
+                ddu[p][3 * i + q] =
+                    (double)sum[(p == 0) + (q == 0)][(p == 1) + (q == 1)][(p == 2) + (q == 2)][i];
+    }
+}
+
+/* Small matrices, row-major. */
+static void product(const double a[9], const double b[9], double out[9])
+{
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            out[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
+}
+static void apply(const double m[9], const double x[3], double out[3])
+{
+    for (int i = 0; i < 3; i++)
+        out[i] = m[3 * i] * x[0] + m[3 * i + 1] * x[1] + m[3 * i + 2] * x[2];
+}
+
+// out[9] = (I + du)^-1. A warp that folds (determinant near 0) is treated as the identity.
+static void inverse_of_warp(const double du[9], double out[9])
+{
+    double a[9];
+    for (int i = 0; i < 9; i++) a[i] = du[i] + (i % 4 == 0);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            const int r = (j + 1) % 3, s = (j + 2) % 3, c = (i + 1) % 3, d = (i + 2) % 3;
+            out[3 * i + j] = a[3 * r + c] * a[3 * s + d] - a[3 * r + d] * a[3 * s + c];
+        }
+    const double det = a[0] * out[0] + a[1] * out[3] + a[2] * out[6];
+    for (int i = 0; i < 9; i++) out[i] = det > 1e-2 ? out[i] / det : (double)(i % 4 == 0);
+}
+
+// Solves y + U(y) = q by Newton's method from y. Stops when the next step would change y by about
+// the square of the last step. inverse[9] = (I + dU)^-1 at the last point of evaluation.
+static void newton(const sdm_lattice *l, const float *control, const double q[3], double y[3],
+                   double inverse[9])
+{
+    enum { ITERATIONS = 12 };
+    const double stop = 0.02 * l->spacing, longest = 0.5 * l->spacing;
+    for (int n = 0; n < ITERATIONS; n++) {
+        double u[3], du[9], f[3], d[3];
+        sdm_template_displacement(l, control, y, u, du, NULL);
+        inverse_of_warp(du, inverse);
+        for (int i = 0; i < 3; i++) f[i] = q[i] - y[i] - u[i];
+        apply(inverse, f, d);
+        const double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+        const double scale = length > longest ? longest / length : 1;
+        for (int i = 0; i < 3; i++) y[i] += scale * d[i];
+        if (length < stop) return;
+    }
+}
+
+// Position of a station in the world.
+static void station_world(const template_network *k, const sdm_grid *grid, size_t x, size_t y,
+                          size_t z, double out[3])
+{
+    const double step = (double)k->step,
+                 index[3] = {step * ((double)x - 1), step * ((double)y - 1),
+                             step * ((double)z - 1)};
+    sdm_grid_world(grid, index, out);
+}
+
+// metric[8] = B B^T for B = d y / d x, as xx, yy, zz, yz, xz, xy
+static void store_metric(const double b[9], float metric[8])
+{
+    static const int I[6] = {0, 1, 2, 1, 0, 0}, J[6] = {0, 1, 2, 2, 2, 1};
+    for (int c = 0; c < 6; c++)
+        metric[c] = (float)(b[3 * I[c]] * b[3 * J[c]] + b[3 * I[c] + 1] * b[3 * J[c] + 1] +
+                            b[3 * I[c] + 2] * b[3 * J[c] + 2]);
+    metric[6] = metric[7] = 0;
+}
+
+// Turns samples v[n] (quads, `stride` floats apart) into coefficients of the cubic B-spline that
+// interpolates them. At both ends the second derivative is zero.
+static void spline_prefilter(float *v, size_t n, size_t stride)
+{
+    float factor[512];
+    if (n < 3 || n > 512) return;
+    // (c[i-1] + 4 c[i] + c[i+1]) / 6 = v[i], c[0] = v[0], c[n-1] = v[n-1]: Thomas algorithm
+    factor[0] = 0;
+    for (size_t i = 1; i + 1 < n; i++) {
+        const float f = 1 / (4 - factor[i - 1]);
+        factor[i] = f;
+        for (size_t c = 0; c < 3; c++)
+            v[i * stride + c] = (6 * v[i * stride + c] - v[(i - 1) * stride + c]) * f;
+    }
+    for (size_t i = n - 2; i > 0; i--)
+        for (size_t c = 0; c < 3; c++) v[i * stride + c] -= factor[i] * v[(i + 1) * stride + c];
+}
+
+static void prefilter_all(const template_network *k, float *points)
+{
+    const size_t nx = k->stations[0], ny = k->stations[1], nz = k->stations[2];
+    for (size_t i = 0; i < ny * nz; i++) spline_prefilter(points + 4 * nx * i, nx, 4);
+    for (size_t z = 0; z < nz; z++)
+        for (size_t x = 0; x < nx; x++)
+            spline_prefilter(points + 4 * (z * ny * nx + x), ny, 4 * nx);
+    for (size_t i = 0; i < nx * ny; i++) spline_prefilter(points + 4 * i, nz, 4 * nx * ny);
+}
+
+void sdm_template_invert(const template_network *k, const sdm_template_part *part,
+                         const part_pose *pose, const sdm_grid *grid, const warp_scratch *w)
+{
+    const size_t nx = k->stations[0], ny = k->stations[1], nz = k->stations[2];
+    const double per_index = 1 / part->near.spacing;
+    size_t at = 0;
+    double row[3] = {0}, row_q[3] = {0};
+    for (size_t z = 0; z < nz; z++)
+        for (size_t j = 0; j < ny; j++) {
+            double y[3] = {0}, last[3] = {0}, inverse[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+            for (size_t i = 0; i < nx; i++, at++) {
+                double x[3], q[3], b[9];
+                station_world(k, grid, i, j, z, x);
+                for (int c = 0; c < 3; c++) x[c] -= pose->b[c];
+                apply(pose->inverse, x, q);
+                // start: the station before it, moved to first order
+                double move[3], dy[3];
+                for (int c = 0; c < 3; c++) move[c] = q[c] - (i ? last[c] : row_q[c]);
+                apply(inverse, move, dy);
+                for (int c = 0; c < 3; c++)
+                    y[c] = at == 0 ? q[c] : (i ? y[c] : row[c]) + dy[c];
+                newton(&part->warp, w->control, q, y, inverse);
+                memcpy(last, q, sizeof q);
+                if (i == 0) memcpy(row, y, sizeof y), memcpy(row_q, q, sizeof q);
+
+                for (int c = 0; c < 3; c++)
+                    w->points[4 * at + (size_t)c] =
+                        (float)((y[c] - part->near.origin[c]) * per_index);
+                w->points[4 * at + 3] = 0;
+                product(inverse, pose->inverse, b);
+                store_metric(b, w->metric + 8 * at);
+                if (!w->station) continue;
+                memcpy(w->station[at].y, y, sizeof y);
+                memcpy(w->station[at].inverse, inverse, sizeof inverse);
+            }
+        }
+    prefilter_all(k, w->points);
+}
+
+void sdm_template_invert_slope(const template_network *k, const sdm_template_part *part,
+                               const part_pose *pose, const sdm_grid *grid, const warp_scratch *w,
+                               const float *control, const double dm[9], const double db[3],
+                               float *points, float *metric)
+{
+    static const int I[6] = {0, 1, 2, 1, 0, 0}, J[6] = {0, 1, 2, 2, 2, 1};
+    const size_t nx = k->stations[0], ny = k->stations[1], nz = k->stations[2];
+    const double per_index = 1 / part->near.spacing;
+    double moved[9]; // d(m^-1) = -m^-1 dm m^-1
+    {
+        double a[9];
+        product(pose->inverse, dm, a);
+        product(a, pose->inverse, moved);
+        for (int i = 0; i < 9; i++) moved[i] = -moved[i];
+    }
+    size_t at = 0;
+    for (size_t z = 0; z < nz; z++)
+        for (size_t j = 0; j < ny; j++)
+            for (size_t i = 0; i < nx; i++, at++) {
+                const station *s = &w->station[at];
+                double x[3], dq[3], t[3], u[3], du[9], du0[9], u0[3], ddu[3][9], f[3], dy[3];
+                station_world(k, grid, i, j, z, x);
+                // q = m^-1 (x - b): dq = d(m^-1) (x - b) - m^-1 db
+                for (int c = 0; c < 3; c++) x[c] -= pose->b[c];
+                apply(moved, x, dq);
+                apply(pose->inverse, db, t);
+                for (int c = 0; c < 3; c++) dq[c] -= t[c];
+                // y + U(y) = q: (I + U') dy = dq - dU(y)
+                sdm_template_displacement(&part->warp, control, s->y, u, du, NULL);
+                sdm_template_displacement(&part->warp, w->control, s->y, u0, du0, ddu);
+                for (int c = 0; c < 3; c++) f[c] = dq[c] - u[c];
+                apply(s->inverse, f, dy);
+                for (int c = 0; c < 3; c++) points[4 * at + (size_t)c] = (float)(dy[c] * per_index);
+                points[4 * at + 3] = 0;
+                // B = J^-1 m^-1, J = I + U': dB = -J^-1 (dU' + U'' dy) B + J^-1 d(m^-1)
+                double b[9], dj[9], a[9], c1[9], c2[9];
+                product(s->inverse, pose->inverse, b);
+                for (int e = 0; e < 9; e++)
+                    dj[e] = du[e] + ddu[0][e] * dy[0] + ddu[1][e] * dy[1] + ddu[2][e] * dy[2];
+                product(s->inverse, dj, a);
+                product(a, b, c1);
+                product(s->inverse, moved, c2);
+                for (int e = 0; e < 9; e++) c2[e] -= c1[e];
+                for (int c = 0; c < 6; c++) {
+                    double sum = 0;
+                    for (int e = 0; e < 3; e++)
+                        sum += c2[3 * I[c] + e] * b[3 * J[c] + e] +
+                               b[3 * I[c] + e] * c2[3 * J[c] + e];
+                    metric[8 * at + (size_t)c] = (float)sum;
+                }
+                metric[8 * at + 6] = metric[8 * at + 7] = 0;
+            }
+    prefilter_all(k, points);
+}

@@ -1,0 +1,26 @@
+#!/usr/bin/env bash
+# A shape outside of the source tree: the plug-in of examples/gear and its configuration, from the list of shapes to the maps of a network.
+# Tests: config_shape.c setup.c
+. "$(dirname "$0")/common.sh"
+config=$source_folder/examples/gear/gear.yaml
+plugin=../../plugins/gear/gear.so
+small=(grid.size='[12, 12, 6]' grid.spacing=0.9 network='{depth: 1, width: 16, modes: 16, degree: 2, input_degree: 2}'
+    data='{static: 2, start: 24, online: 16, holdout: 4}' train='{steps: 20, batch: 8}')
+
+expect 0 - sdmgen shapes gear -O teeth=20 --plugin $plugin
+has '^  angle +rad +-0\.15708 \.\. 0\.15708'
+expect 0 - sdmgen config "$config" --plugin $plugin
+has 'no mistakes$'
+expect 0 - sdmgen mesh --shape gear -p angle=0.1 --audit --plugin $plugin
+has '^closed +yes'
+has '^self-intersections +0$'
+expect 5 "parameter 'angle' of shape 'gear' is 0\.2 rad" sdmgen mesh --shape gear -O teeth=20 -p angle=0.2 --audit --plugin $plugin
+expect 2 "option 'teeth' is 3, need 6 \.\. 100" sdmgen mesh --shape gear -O teeth=3 --audit --plugin $plugin
+
+expect 2 "unknown shape 'gear'; .* --plugin FILE" sdmgen config "$config"
+expect 0 - sdmgen train "$config" "${small[@]}" --plugin $plugin --out run --quiet
+expect 0 - sdmgen generate run/model.sdm -p angle=0.1 -o map.npy
+present map.npy
+expect 0 - sdmgen eval run/model.sdm --samples 2 --naive 0 --json --quiet --plugin $plugin
+awk -v e="$(json mse_mm2)" 'BEGIN { exit !(e > 0 && e < 1) }' || bad "the mean square error is $(json mse_mm2) mm^2"
+finish

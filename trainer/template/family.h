@@ -1,0 +1,33 @@
+/* The meshes of a shape over its parameters: which vertices move together. All lengths in mm. */
+#pragma once
+
+#include "sdm/internal/pod.h"
+#include "sdm/registry.h"
+
+/* A shape with parameters in a box, and its mesh at the default parameters. */
+typedef struct family {
+    const sdm_instance *shape;
+    size_t n_params;
+    const double *min, *max;              /* [n_params] */
+    const sdm_distribution *distribution; /* [n_params] */
+    uint64_t seed;
+    int n_threads;
+    sdm_mesh base;         /* at the default parameters */
+    size_t n_components;   /* sets of triangles that are connected through vertices */
+    uint32_t *component;   /* [n_vert] component of each vertex; UINT32_MAX: in no triangle */
+} family;
+
+/* Fills *f: the mesh at the defaults (moved into min .. max) and its components. Vertices at the
+   same place count as one. shape, n_params, min, max,
+   distribution, seed and n_threads must be set. Call
+   trainer_family_dispose() also after an error. */
+sdm_status trainer_family_create(family *f, sdm_error *err);
+void trainer_family_dispose(family *f);
+
+/* p[n_params] = random parameters number `index`. */
+void trainer_family_params(const family *f, size_t index, double *p);
+
+/* *mesh = the mesh at p. *same: it has as many vertices as the base mesh and the same triangles, so
+   that its vertices correspond to those of the base mesh. */
+sdm_status trainer_family_mesh(const family *f, const double *p, sdm_mesh *mesh, bool *same,
+                               sdm_error *err);

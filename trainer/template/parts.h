@@ -1,0 +1,14 @@
+/* The parts of a shape: components that move alike, with the type and the parent of each frame. */
+#pragma once
+
+#include "design.h"
+#include "motion.h"
+
+/* Sets n_parts, vertices, first, and of each part: parent, frame, and n_modes = 1 if it needs a
+   warp (the number of modes is set later). tolerance: root mean square distance (mm) below which a
+   motion counts as rigid or affine. Errors as trainer_template_design(). */
+sdm_status trainer_template_parts(template_design *d, double tolerance, sdm_error *err);
+
+/* *out = the motion of part c from the base mesh to `vert` of another mesh, by the type of its
+   frame. Returns the root mean square distance that remains, mm. */
+double trainer_template_motion(const template_design *d, size_t c, const double *vert, motion *out);

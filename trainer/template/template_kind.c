@@ -1,0 +1,275 @@
+/* The `template` network in the trainer: it is designed from meshes alone; if it has one part that
+   is not rigid, a `pod` network learns the correction from exact maps. */
+#include "template_kind.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "data/workbench.h"
+#include "design.h"
+#include "pod/pod_kind.h"
+#include "sdm/internal/checksum.h"
+#include "sdm/memory.h"
+#include "state/progress.h"
+
+/* Voxels between two nodes of the correction's grid. */
+static const double CORRECTION_SPACING = 2;
+
+/* t->design. */
+typedef struct template_state {
+    template_design design;
+    bool corrected;
+    sdm_grid grid;     /* of the correction, in the template's frame */
+    size_t n_voxels;   /* of this grid */
+    double *nodes;     /* [n_voxels][3] its voxels */
+    parameters none;   /* weights of a network without a correction */
+} template_state;
+
+static const template_state *state_of(const trainer *t) { return t->design; }
+
+/* out[n_voxels] = the correction that exact[nz][ny][nx], the exact map at p, asks for: exact minus
+   carried template, at the points to which the nodes are carried. */
+static sdm_status correction_of(const void *user, const double *p, const float *exact, float *out,
+                                sdm_error *err)
+{
+    const template_state *s = user;
+    const sdm_model *m = s->design.model;
+    const sdm_grid *g = s->design.grid;
+    float *map = NULL;
+    double *x = NULL;
+    void *scratch = NULL;
+    const size_t n = sdm_grid_count(g);
+    sdm_status status = SDM_ALLOC(&map, n, "correction", err);
+    if (!status) status = SDM_ALLOC(&x, 3 * s->n_voxels, "correction", err);
+    if (!status)
+        status = sdm_alloc(&scratch, sdm_model_scratch_bytes(m, 1), 1, "correction", err);
+    if (!status) {
+        sdm_model_forward(m, p, 1, map, scratch);
+        for (size_t i = 0; i < n; i++) map[i] = exact[i] - map[i];
+        status = sdm_template_carry(m, p, s->nodes, s->n_voxels, x, err);
+    }
+    for (size_t i = 0; i < s->n_voxels && !status; i++) {
+        // trilinear; outside of the grid the nearest point of the grid
+        double index[3], t[3];
+        size_t at[3];
+        sdm_grid_index(g, x + 3 * i, index);
+        for (int a = 0; a < 3; a++) {
+            const double last = (double)g->n[a] - 1, u = fmin(fmax(index[a], 0), last);
+            at[a] = g->n[a] > 1 ? (size_t)fmin(u, last - 1) : 0;
+            t[a] = u - (double)at[a];
+        }
+        double sum = 0;
+        for (int k = 0; k < 8; k++) {
+            double w = 1;
+            size_t v[3];
+            for (int a = 0; a < 3; a++) {
+                const int bit = k >> a & 1;
+                w *= bit ? t[a] : 1 - t[a];
+                v[a] = at[a] + (size_t)(bit && g->n[a] > 1);
+            }
+            sum += w * (double)map[(v[2] * (size_t)g->n[1] + v[1]) * (size_t)g->n[0] + v[0]];
+        }
+        out[i] = (float)sum;
+    }
+    sdm_free(scratch);
+    sdm_free(x);
+    sdm_free(map);
+    return status;
+}
+
+/* The grid of the correction: the lattice `far` with its own spacing. */
+static sdm_status correction_grid(template_state *s, sdm_error *err)
+{
+    const sdm_template_part *p = &s->design.parts[0];
+    const double spacing = CORRECTION_SPACING * p->near.spacing;
+    s->grid = (sdm_grid){.dir = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    for (int a = 0; a < 3; a++) {
+        const double length = p->far.spacing * (p->far.n[a] - 1.0);
+        s->grid.n[a] = (int64_t)ceil(length / spacing) + 1;
+        s->grid.spacing[a] = spacing;
+        s->grid.origin[a] =
+            p->far.origin[a] + 0.5 * (length - spacing * (double)(s->grid.n[a] - 1));
+    }
+    s->n_voxels = sdm_grid_count(&s->grid);
+    const sdm_status status = SDM_ALLOC(&s->nodes, 3 * s->n_voxels, "correction", err);
+    for (size_t i = 0; i < s->n_voxels && !status; i++) {
+        const size_t nx = (size_t)s->grid.n[0], ny = (size_t)s->grid.n[1];
+        const double index[3] = {(double)(i % nx), (double)(i / nx % ny), (double)(i / nx / ny)};
+        sdm_grid_world(&s->grid, index, s->nodes + 3 * i);
+    }
+    return status;
+}
+
+static const char *frame_name(sdm_template_frame f)
+{
+    return f == SDM_FRAME_RIGID ? "rigid" : f == SDM_FRAME_AFFINE ? "affine" : "still";
+}
+
+static void report_design(trainer *t, const template_state *s)
+{
+    const template_design *d = &s->design;
+    size_t rigid = 0, affine = 0, still = 0;
+    for (size_t c = 0; c < d->n_parts; c++) {
+        rigid += d->parts[c].frame == SDM_FRAME_RIGID;
+        affine += d->parts[c].frame == SDM_FRAME_AFFINE;
+        still += d->parts[c].frame == SDM_FRAME_NONE;
+    }
+    if (d->parts[0].n_modes)
+        trainer_message(t,
+                        "template: one part (%s frame) with a warp of %zu modes; polynomials of "
+                        "degree %zu; error of the warp %.2g mm, of the amplitudes %.2g mm",
+                        frame_name(d->parts[0].frame), d->parts[0].n_modes, d->degree,
+                        d->warp_error_mm, d->motion_error_mm);
+    else
+        trainer_message(t,
+                        "template: %zu parts (%zu rigid, %zu affine, %zu still); polynomials of "
+                        "degree %zu; error of the frames %.2g mm",
+                        d->n_parts, rigid, affine, still, d->degree, d->motion_error_mm);
+}
+
+/* Compares the template without a correction with exact maps of a few random shapes. *rms = root mean
+ * square error (mm) in voxels within a voxel of the surface. */
+static sdm_status check_design(const trainer *t, const template_state *s, double *rms,
+                               sdm_error *err)
+{
+    enum { SHAPES = 8 };
+    const dataset *d = &t->data;
+    const sdm_model *m = s->design.model;
+    const size_t n = sdm_grid_count(d->grid);
+    const double near = d->grid->spacing[0];
+    workbench w = {0};
+    float *map = NULL;
+    void *scratch = NULL;
+    double sum = 0, count = 0, p[SDM_POD_MAX_PARAMS];
+    sdm_status status = trainer_workbench_create(&w, d, err);
+    if (!status) status = SDM_ALLOC(&map, n, "template", err);
+    if (!status) status = sdm_alloc(&scratch, sdm_model_scratch_bytes(m, 1), 1, "template", err);
+    for (size_t i = 0; i < SHAPES && !status; i++) {
+        trainer_family_params(&s->design.family, i, p);
+        if ((status = trainer_workbench_exact(&w, d, p, err))) break;
+        sdm_model_forward(m, p, 1, map, scratch);
+        for (size_t v = 0; v < n; v++)
+            if (fabs((double)w.exact[v]) <= near) {
+                const double e = (double)map[v] - (double)w.exact[v];
+                sum += e * e, count++;
+            }
+    }
+    *rms = sqrt(sum / fmax(count, 1));
+    sdm_free(scratch);
+    sdm_free(map);
+    trainer_workbench_dispose(&w);
+    return status;
+}
+
+static sdm_status template_prepare(trainer *t, sdm_error *err)
+{
+    template_state *s = NULL;
+    sdm_status status = SDM_ALLOC(&s, 1, "template", err);
+    if (status) return status;
+    t->design = s;
+    dataset *d = &t->data;
+    s->design.grid = &t->config->grid;
+    s->design.family = (family){.shape = t->shape,
+                                .n_params = d->n_params,
+                                .min = d->min,
+                                .max = d->max,
+                                .distribution = d->distribution,
+                                .seed = t->config->seed,
+                                .n_threads = t->n_threads};
+    if ((status = trainer_template_design(&s->design, err))) return status;
+    double rms = 0;
+    if ((status = check_design(t, s, &rms, err))) return status;
+    if (rms > t->config->grid.spacing[0])
+        return sdm_fail(err, SDM_E_UNSUPPORTED,
+                        "carried along, the template misses the surface by %.2g mm (%.1f voxels): "
+                        "parts of the mesh fold or turn too far for one warp; use network.kind: pod",
+                        rms, rms / t->config->grid.spacing[0]);
+    report_design(t, s);
+    s->corrected = s->design.n_parts == 1 && (s->design.parts[0].n_modes ||
+                                              s->design.parts[0].frame == SDM_FRAME_AFFINE);
+    d->only_holdout = !s->corrected;
+    if (!s->corrected) return SDM_OK;
+    if ((status = correction_grid(s, err))) return status;
+    d->target = (map_target){.grid = &s->grid, .make = correction_of, .user = s};
+    return SDM_OK;
+}
+
+static size_t template_block(const sdm_config *c) { return trainer_kind_pod.block(c); }
+
+static size_t template_levels(const sdm_config *c) { return trainer_kind_pod.levels(c); }
+
+static sdm_status template_begin(trainer *t, sdm_error *err)
+{
+    return state_of(t)->corrected ? trainer_kind_pod.begin(t, err) : SDM_OK;
+}
+
+static sdm_status template_samples_taken(trainer *t, const size_t *slots, size_t n, sdm_error *err)
+{
+    return state_of(t)->corrected ? trainer_kind_pod.samples_taken(t, slots, n, err) : SDM_OK;
+}
+
+static sdm_status template_run(trainer *t, bool resumed, sdm_error *err)
+{
+    return state_of(t)->corrected ? trainer_kind_pod.run(t, resumed, err) : SDM_OK;
+}
+
+static parameters *template_weights(trainer *t)
+{
+    template_state *s = t->design;
+    return s->corrected ? trainer_kind_pod.weights(t) : &s->none;
+}
+
+static uint64_t template_fingerprint(const trainer *t)
+{
+    const template_state *s = state_of(t);
+    const template_design *d = &s->design;
+    uint64_t crc = s->corrected ? trainer_kind_pod.fingerprint(t) : 0;
+    crc = sdm_crc64(crc, d->functions, d->n_numbers * d->n_terms * sizeof *d->functions);
+    for (size_t c = 0; c < d->n_parts; c++)
+        crc = sdm_crc64(crc, d->parts[c].near_nodes,
+                        4 * sdm_lattice_count(&d->parts[c].near) * sizeof(float));
+    return crc;
+}
+
+static sdm_status template_build(const trainer *t, const sdm_model_info *info, uint8_t **bytes,
+                                 size_t *size, sdm_error *err)
+{
+    const template_state *s = state_of(t);
+    sdm_template_spec spec = trainer_template_spec(&s->design);
+    uint8_t *correction = NULL;
+    sdm_status status = SDM_OK;
+    spec.info = info;
+    if (s->corrected) {
+        sdm_model_info inner = *info;
+        inner.grid = s->grid;
+        inner.config = NULL;
+        inner.n_options = 0;
+        status = trainer_kind_pod.build(t, &inner, &correction, &spec.correction_size, err);
+        spec.correction = correction;
+    }
+    if (!status) status = sdm_template_build(&spec, bytes, size, err);
+    sdm_free(correction);
+    return status;
+}
+
+static void template_dispose(trainer *t)
+{
+    template_state *s = t->design;
+    if (!s) return;
+    if (s->corrected) trainer_kind_pod.dispose(t);
+    trainer_template_design_dispose(&s->design);
+    sdm_free(s->nodes);
+    sdm_free(s);
+    t->design = NULL;
+}
+
+const train_kind trainer_kind_template = {.prepare = template_prepare,
+                                          .block = template_block,
+                                          .levels = template_levels,
+                                          .begin = template_begin,
+                                          .samples_taken = template_samples_taken,
+                                          .run = template_run,
+                                          .weights = template_weights,
+                                          .fingerprint = template_fingerprint,
+                                          .build = template_build,
+                                          .dispose = template_dispose};

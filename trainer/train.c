@@ -5,14 +5,15 @@
 #include "data/dataset_fill.h"
 #include "race.h"
 #include "sdm/internal/clock.h"
+#include "sdm/internal/team.h"
 #include "sdm/internal/text.h"
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
+#include "set_up.h"
 #include "state/checkpoint.h"
 #include "state/export_model.h"
 #include "state/kind.h"
 #include "state/new_samples.h"
-#include "set_up.h"
 #include "state/progress.h"
 
 static void fill_report(void *user, size_t done, size_t all)
@@ -118,8 +119,8 @@ static sdm_status train_finish(trainer *t, sdm_train_report *report, sdm_error *
 
 /* *c = the configuration of the run: `config`, where network.kind: auto is settled by a race, or on
  * resuming by config.yaml of the interrupted run. */
-static sdm_status train_settle(trainer *t, const sdm_config *config, bool resume,
-                               sdm_config *c, sdm_error *err)
+static sdm_status train_settle(trainer *t, const sdm_config *config, bool resume, sdm_config *c,
+                               sdm_error *err)
 {
     *c = *config;
     if (config->network.kind != SDM_NETWORK_AUTO) return SDM_OK;
@@ -150,10 +151,13 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     t.n_threads = sdm_threads(config->threads);
     sdm_outfile *resolved = NULL;
     sdm_config *settled = NULL;
+    sdm_team *team = NULL;
     sdm_status s = sdm_make_folder(folder, err);
     if (!s) s = SDM_ALLOC(&settled, 1, "configuration", err);
+    if (!s) s = sdm_team_start(t.n_threads, &team, err);
     if (!s) s = train_settle(&t, config, resume, settled, err);
     if (s) {
+        sdm_team_end(team);
         sdm_free(settled);
         return s;
     }
@@ -169,6 +173,7 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     trainer_dataset_dispose(&t.data);
     sdm_free(t.blocks);
     sdm_text_dispose(&metrics);
+    sdm_team_end(team);
     sdm_free(settled);
     return s;
 }

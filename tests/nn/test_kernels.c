@@ -15,6 +15,7 @@
 #include "sdm/internal/kernels.h"
 #include "sdm/internal/processor.h"
 #include "sdm/internal/rng.h"
+#include "sdm/internal/team.h"
 #include "sdm/memory.h"
 
 static int level; // instruction set under test: level of sdm_processor_select()
@@ -65,9 +66,13 @@ static void same_bits_for_threads(void **state)
     float *a = random_floats(m * k, 1), *b = random_floats(k * n, 2), *c1 = random_floats(m * n, 3),
           *c = random_floats(m * n, 3);
     sdm_gemm(m, n, k, (sdm_view){a, k, 1}, (sdm_view){b, n, 1}, false, c1, n, 1);
-    for (int threads = 2; threads <= 5; threads++) {
+    for (int threads = 2; threads <= 8; threads++) {
+        sdm_team *team;
+        assert_int_equal(sdm_team_start(threads, &team, NULL), SDM_OK);
+        memset(c, 0, m * n * sizeof *c);
         sdm_gemm(m, n, k, (sdm_view){a, k, 1}, (sdm_view){b, n, 1}, false, c, n, threads);
         assert_memory_equal(c, c1, m * n * sizeof *c);
+        sdm_team_end(team);
     }
     sdm_free(a);
     sdm_free(b);

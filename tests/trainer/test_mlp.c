@@ -1,5 +1,6 @@
 /* Backward pass of the multilayer perceptron against central differences of its forward pass;
- * optimiser and learning rate schedule against their formulas.
+ * optimiser, average and learning rate schedule against their formulas; the same bits for any
+ * number of threads.
  * Tests: mlp.c optimiser.c */
 #include <math.h>
 #include <setjmp.h>
@@ -12,7 +13,9 @@
 
 #include "numerics/optimiser.h"
 #include "pod/mlp.h"
+#include "sdm/internal/checksum.h"
 #include "sdm/internal/rng.h"
+#include "sdm/internal/team.h"
 #include "sdm/memory.h"
 
 enum { BATCH = 5, INPUTS = 7, WIDTH = 9, DEPTH = 3 };
@@ -61,6 +64,67 @@ static void gradient_matches_differences(void **state)
     }
 }
 
+// Two steps of Adam with their average on a network wider than the slices of all loops.
+static uint64_t train_with(int n_threads)
+{
+    enum { ROWS = 70, IN = 9, OUT = 200, LAYERS = 3 };
+    const sdm_pod_arch a = {.depth = LAYERS, .width = OUT, .n_inputs = IN, .activation = 0};
+    static float x[ROWS * IN], dh[ROWS * OUT];
+    parameters p;
+    sdm_team *team;
+    float *g, *workspace;
+    assert_int_equal(sdm_team_start(n_threads, &team, NULL), SDM_OK);
+    assert_int_equal(trainer_parameters_create(&p, trainer_mlp_count(&a), NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&g, p.n, "g", NULL), SDM_OK);
+    assert_int_equal(SDM_ALLOC(&workspace, trainer_mlp_workspace(&a, ROWS), "ws", NULL), SDM_OK);
+    trainer_mlp_init(&a, 3, p.w);
+    for (size_t i = 0; i < ROWS * IN; i++) x[i] = (float)sdm_rng_normal(1, 1, i);
+    for (int step = 1; step <= 2; step++) {
+        const float *h = trainer_mlp_forward(&a, p.w, ROWS, x, workspace, n_threads);
+        memcpy(dh, h, sizeof dh); // gradient of the sum of squares
+        trainer_mlp_backward(&a, p.w, ROWS, x, workspace, dh, g, n_threads);
+        trainer_adam_update_all(&p, g, trainer_adam_begin(0.01, 0.99, step), n_threads);
+        trainer_average_follow(&p, 0.9, step, step == 2, n_threads);
+    }
+    const uint64_t sum =
+        sdm_crc64(sdm_crc64(0, p.w, p.n * sizeof *p.w), p.average, p.n * sizeof *p.average);
+    assert_memory_not_equal(p.w, p.average, p.n * sizeof *p.w);
+    trainer_parameters_dispose(&p);
+    sdm_free(workspace);
+    sdm_free(g);
+    sdm_team_end(team);
+    return sum;
+}
+
+static void same_bits_for_threads(void **state)
+{
+    (void)state;
+    const uint64_t alone = train_with(1);
+    assert_true(train_with(2) == alone);
+    assert_true(train_with(3) == alone);
+    assert_true(train_with(8) == alone);
+}
+
+static void average_moves_every_eighth_step(void **state)
+{
+    (void)state;
+    parameters p;
+    assert_int_equal(trainer_parameters_create(&p, 1, NULL), SDM_OK);
+    p.w[0] = 1;
+    for (int step = 1; step < 8; step++) {
+        trainer_average_follow(&p, 0.9, step, false, 1);
+        assert_true(p.average[0] == 0);
+    }
+    trainer_average_follow(&p, 0.9, 8, false, 1); // decay 1 / 11, below 0.9^8
+    assert_true(fabs(p.average[0] - 10.0 / 11) < 1e-6);
+    p.average[0] = 0;
+    trainer_average_follow(&p, 0.9, 8000, false, 1);
+    assert_true(fabs(p.average[0] - (1 - pow(0.9, 8))) < 1e-6);
+    trainer_average_follow(&p, 0, 8001, true, 1); // a copy
+    assert_true(p.average[0] == 1);
+    trainer_parameters_dispose(&p);
+}
+
 static void adam_takes_the_right_steps(void **state)
 {
     (void)state;
@@ -69,13 +133,13 @@ static void adam_takes_the_right_steps(void **state)
     parameters p;
     assert_int_equal(trainer_parameters_create(&p, 3, NULL), 0);
     const float g[3] = {1e-3f, -40, 0};
-    trainer_adam_update(&p, 0, 3, g, trainer_adam_begin(0.01, 1), 2);
+    trainer_adam_update(&p, 0, 3, g, trainer_adam_begin(0.01, 0.999, 1), 2);
     assert_true(fabs((double)p.w[0] + 0.02) < 1e-6 && fabs((double)p.w[1] - 0.02) < 1e-6 &&
                 p.w[2] == 0);
     // Minimises a quadratic function.
     for (int t = 2; t < 2000; t++) {
         const float slope[3] = {2 * (p.w[0] - 1), 20 * (p.w[1] + 2), p.w[2]};
-        trainer_adam_update(&p, 0, 3, slope, trainer_adam_begin(0.01, t), 1);
+        trainer_adam_update(&p, 0, 3, slope, trainer_adam_begin(0.01, 0.999, t), 1);
         trainer_average_update(&p, 0.99, 1);
     }
     assert_true(fabs((double)p.w[0] - 1) < 1e-3 && fabs((double)p.w[1] + 2) < 1e-3);
@@ -92,6 +156,8 @@ static void adam_takes_the_right_steps(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(gradient_matches_differences),
+                                       cmocka_unit_test(same_bits_for_threads),
+                                       cmocka_unit_test(average_moves_every_eighth_step),
                                        cmocka_unit_test(adam_takes_the_right_steps)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

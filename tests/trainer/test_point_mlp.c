@@ -145,6 +145,31 @@ static void loss_slopes_match_differences(void **state)
     }
 }
 
+static void loss_slopes_of_a_row_match_those_of_its_voxels(void **state)
+{
+    (void)state;
+    enum { N = 21 };
+    static sdm_config c;
+    float predicted[N], target[N], slope[N];
+    for (uint64_t i = 0; i < N; i++) {
+        predicted[i] = (float)sdm_rng_normal(1, 9, i);
+        target[i] = (float)sdm_rng_normal(1, 10, i);
+    }
+    c.train.near_mm = 0.5, c.train.clamp_mm = 0.3;
+    for (int kind = 0; kind < 8; kind++) {
+        c.train.loss = (sdm_loss)(kind % 4), c.train.near_weight = kind / 4;
+        for (size_t n = 0; n <= N; n++) {
+            double square = 0;
+            memcpy(slope, target, sizeof slope);
+            const double sum = trainer_loss_slopes(&c, n, predicted, slope, slope);
+            for (size_t i = 0; i < n; i++)
+                assert_true(slope[i] == trainer_loss_slope(&c, predicted[i], target[i], &square));
+            assert_true(fabs(sum - square) <= 1e-12 * square);
+            for (size_t i = n; i < N; i++) assert_true(slope[i] == target[i]);
+        }
+    }
+}
+
 static double eikonal_of(const sdm_config *c, const double f[4])
 {
     double square = 0;
@@ -316,11 +341,13 @@ static void file_equals_the_trained_network(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(gradient_matches_differences),
-                                       cmocka_unit_test(loss_slopes_match_differences),
-                                       cmocka_unit_test(eikonal_slopes_match_differences),
-                                       cmocka_unit_test(map_gradient_matches_differences),
-                                       cmocka_unit_test(draws_have_the_right_shares),
-                                       cmocka_unit_test(file_equals_the_trained_network)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(gradient_matches_differences),
+        cmocka_unit_test(loss_slopes_match_differences),
+        cmocka_unit_test(loss_slopes_of_a_row_match_those_of_its_voxels),
+        cmocka_unit_test(eikonal_slopes_match_differences),
+        cmocka_unit_test(map_gradient_matches_differences),
+        cmocka_unit_test(draws_have_the_right_shares),
+        cmocka_unit_test(file_equals_the_trained_network)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

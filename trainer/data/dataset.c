@@ -54,7 +54,7 @@ sdm_status trainer_dataset_create(dataset *d, const sdm_config *config, sdm_erro
     sdm_status s = SDM_ALLOC(&d->params, d->n_slots * d->n_params, "training parameters", err);
     size_t count = 0;
     if (!s) s = sdm_mul(d->n_slots, d->n_voxels, &count, err);
-    if (!s) s = SDM_ALLOC(&d->maps, count, "training maps", err);
+    if (!s) s = sdm_alloc_unset((void **)&d->maps, count, sizeof *d->maps, "training maps", err);
     if (!s) s = SDM_ALLOC(&d->scale, d->n_slots, "training maps", err);
     if (!s)
         s = SDM_ALLOC(&d->holdout_params, d->n_holdout * d->n_params, "held-out parameters", err);

@@ -55,10 +55,15 @@ sdm_status trainer_workbench_packed_map(workbench *w, const dataset *d, const do
     const sdm_status s = trainer_workbench_map(w, d, p, w->blocked, err);
     if (s) return s;
     float largest = 0;
-    for (size_t i = 0; i < d->n_voxels; i++) largest = fmaxf(largest, fabsf(w->blocked[i]));
+    for (size_t i = 0; i < d->n_voxels; i++) {
+        const float v = fabsf(w->blocked[i]);
+        largest = v > largest ? v : largest;
+    }
     if (!(largest > 0)) largest = 1;
     *scale = largest / 32767.0f;
     const float inverse = 32767.0f / largest;
-    for (size_t i = 0; i < d->n_voxels; i++) packed[i] = (int16_t)lrintf(w->blocked[i] * inverse);
+    // adding and subtracting 1.5 * 2^23 rounds to the nearest integer
+    for (size_t i = 0; i < d->n_voxels; i++)
+        packed[i] = (int16_t)(int32_t)((w->blocked[i] * inverse + 12582912.0f) - 12582912.0f);
     return SDM_OK;
 }

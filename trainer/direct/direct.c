@@ -69,18 +69,12 @@ static sdm_status direct_begin(trainer *t, sdm_error *err)
     return SDM_OK;
 }
 
-/* Updates the weights and their average; the bits do not depend on the number of threads, since
- * each weight is updated independently. */
+/* Updates the weights and their average. */
 static void direct_update(trainer *t, direct_state *d, double rate)
 {
-    enum { SLICE = 16384 };
-    const adam_step adam = trainer_adam_begin(rate, t->phase_step + 1);
     parameters *p = &d->weights;
-#pragma omp parallel for schedule(static) num_threads(trainer_threads(t))
-    for (long at = 0; at < (long)p->n; at += SLICE) {
-        const size_t first = (size_t)at, n = p->n - first < SLICE ? p->n - first : SLICE;
-        trainer_adam_update(p, first, n, d->gradient + first, adam, 1);
-    }
+    trainer_adam_update_all(p, d->gradient, trainer_adam_begin(rate, ADAM_DECAY, t->phase_step + 1),
+                            trainer_threads(t));
     // the average follows the weights closely at first and then more and more slowly
     const double n = (double)t->phase_step + 1;
     trainer_average_update(

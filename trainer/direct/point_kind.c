@@ -9,6 +9,7 @@
 #include "point_draw.h"
 #include "point_mlp.h"
 #include "sdm/internal/rng.h"
+#include "sdm/internal/team.h"
 #include "sdm/memory.h"
 #include "state/progress.h"
 
@@ -101,25 +102,45 @@ static void point_set_input(const trainer *t, point_trainer *p, size_t i, const 
     for (int k = 0; k < 3; k++) *u++ = (float)((world[k] - a->centre[k]) / a->radius);
 }
 
+/* The arguments of points_gather(). */
+typedef struct point_gather {
+    const trainer *t;
+    point_trainer *p;
+    const direct_batch *batch;
+    size_t each, first, n;
+} point_gather;
+
+enum { SLICE = 64 }; // points that a thread draws at a time
+
+static void gather_slice(void *user, size_t index, int member)
+{
+    const point_gather *g = user;
+    point_trainer *p = g->p;
+    const sdm_config *c = g->t->config;
+    const dataset *d = &g->t->data;
+    const size_t row = (size_t)c->grid.n[0], slice = row * (size_t)c->grid.n[1];
+    const size_t step[4] = {0, 1, row, slice};
+    (void)member;
+    for (size_t i = index * SLICE; i < (index + 1) * SLICE && i < g->n; i += p->group) {
+        const size_t slot = g->batch->slots[(g->first + i) / g->each];
+        size_t voxel =
+            trainer_point_draw(c, d, slot, g->batch->step * g->batch->n * g->each + g->first + i);
+        if (p->group > 1) voxel = trainer_point_with_neighbours(&c->grid, voxel);
+        for (size_t k = 0; k < p->group; k++) {
+            point_set_input(g->t, p, i + k, d->params + slot * d->n_params, voxel + step[k]);
+            p->target[i + k] =
+                d->scale[slot] * (float)d->maps[slot * d->n_voxels + voxel + step[k]];
+        }
+    }
+}
+
 /* Draws points first .. first + n - 1 of the batch, which has `each` points from every map, and
  * sets their inputs p->u and exact distances p->target. */
 static void points_gather(const trainer *t, point_trainer *p, const direct_batch *b, size_t each,
                           size_t first, size_t n)
 {
-    const dataset *d = &t->data;
-    const size_t row = (size_t)t->config->grid.n[0], slice = row * (size_t)t->config->grid.n[1];
-    const size_t step[4] = {0, 1, row, slice};
-#pragma omp parallel for schedule(static) num_threads(trainer_threads(t))
-    for (size_t i = 0; i < n; i += p->group) {
-        const size_t slot = b->slots[(first + i) / each];
-        size_t voxel = trainer_point_draw(t->config, d, slot, b->step * b->n * each + first + i);
-        if (p->group > 1) voxel = trainer_point_with_neighbours(&t->config->grid, voxel);
-        for (size_t k = 0; k < p->group; k++) {
-            point_set_input(t, p, i + k, d->params + slot * d->n_params, voxel + step[k]);
-            p->target[i + k] =
-                d->scale[slot] * (float)d->maps[slot * d->n_voxels + voxel + step[k]];
-        }
-    }
+    point_gather g = {t, p, b, each, first, n};
+    sdm_team_run(trainer_threads(t), (n + SLICE - 1) / SLICE, gather_slice, &g);
 }
 
 static sdm_status point_gradient(const trainer *t, void *network, const float *w,

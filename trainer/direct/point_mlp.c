@@ -8,8 +8,9 @@
 #include "sdm/internal/kernels.h"
 #include "sdm/internal/pod.h"
 #include "sdm/internal/rng.h"
+#include "sdm/internal/team.h"
 
-enum { SLICE = 32 }; // points whose activations a thread computes at a time
+enum { SLICE = 32 }; // points that a thread computes at a time
 
 void trainer_point_init(const sdm_point_arch *a, uint64_t seed, float *w)
 {
@@ -58,11 +59,61 @@ size_t trainer_point_workspace(const sdm_point_arch *a, size_t batch)
     return point_arrays_of(a, batch, NULL).total;
 }
 
+/* A loop over the points of a batch. */
+typedef struct point_loop {
+    const sdm_point_arch *arch;
+    size_t batch, width; // points; width of the layer
+    float *h, *slope;    // outputs of the layer; slope of its activation, or of the output function
+    const float *w;      // weights of the output layer
+    float *value;
+    float *delta; // gradient by the outputs of the layer
+} point_loop;
+
+/* Number of points in the slice that begins at point `first`. */
+static size_t slice_points(const point_loop *l, size_t first)
+{
+    return l->batch - first < SLICE ? l->batch - first : SLICE;
+}
+
+static void activate_slice(void *user, size_t index, int member)
+{
+    const point_loop *l = user;
+    const size_t first = index * SLICE, n = slice_points(l, first) * l->width;
+    float *h = l->h + first * l->width;
+    (void)member;
+    sdm_activate(l->arch->activation, n, h, h, l->slope + first * l->width);
+}
+
+/* Values of the output layer and slopes of its function. */
+static void output_slice(void *user, size_t index, int member)
+{
+    const point_loop *l = user;
+    const sdm_point_arch *a = l->arch;
+    const size_t first = index * SLICE, n = slice_points(l, first);
+    (void)member;
+    for (size_t i = first; i < first + n; i++) {
+        float sum = l->w[l->width];
+        for (size_t o = 0; o < l->width; o++) sum += l->w[o] * l->h[i * l->width + o];
+        const float g = a->tanh_output ? tanhf(sum) : sum;
+        l->value[i] = (float)a->scale * g;
+        l->slope[i] = (float)a->scale * (a->tanh_output ? 1 - g * g : 1);
+    }
+}
+
+/* delta *= slope. */
+static void deactivate_slice(void *user, size_t index, int member)
+{
+    const point_loop *l = user;
+    const size_t first = index * SLICE * l->width, n = slice_points(l, index * SLICE) * l->width;
+    (void)member;
+    for (size_t i = first; i < first + n; i++) l->delta[i] *= l->slope[i];
+}
+
 void trainer_point_forward(const sdm_point_arch *a, const float *w, size_t batch, const float *u,
                            float *workspace, float *value, int n_threads)
 {
     const point_arrays p = point_arrays_of(a, batch, workspace);
-    const size_t n_u = a->n_params + 3;
+    const size_t n_u = a->n_params + 3, slices = (batch + SLICE - 1) / SLICE;
     // hidden layers
     for (size_t l = 0; l < a->depth; l++) {
         const size_t width = a->width[l], k = sdm_point_inputs(a, l),
@@ -78,24 +129,18 @@ void trainer_point_forward(const sdm_point_arch *a, const float *w, size_t batch
             sdm_gemm(batch, width, n_u, (sdm_view){u, n_u, 1}, (sdm_view){w + before, 1, k}, true,
                      h, width, n_threads);
         w += width * (k + 1);
-#pragma omp parallel for schedule(static) num_threads(n_threads)
-        for (size_t i = 0; i < batch; i += SLICE) {
-            const size_t n = (batch - i < SLICE ? batch - i : SLICE) * width;
-            sdm_activate(a->activation, n, h + i * width, h + i * width, p.slope[l] + i * width);
-        }
+        point_loop loop = {.arch = a, .batch = batch, .width = width, .h = h, .slope = p.slope[l]};
+        sdm_team_run(n_threads, slices, activate_slice, &loop);
     }
     // output layer
-    const size_t last = a->width[a->depth - 1];
-    const float *h = p.h[a->depth - 1];
-#pragma omp parallel for schedule(static) num_threads(n_threads)
-    for (size_t i = 0; i < batch; i++) {
-        float sum = w[last];
-        for (size_t o = 0; o < last; o++) sum += w[o] * h[i * last + o];
-        const float g = a->tanh_output ? tanhf(sum) : sum;
-        value[i] = (float)a->scale * g;
-        p.last[i] = (float)a->scale * (a->tanh_output ? 1 - g * g : 1);
-    }
-    (void)n_threads;
+    point_loop loop = {.arch = a,
+                       .batch = batch,
+                       .width = a->width[a->depth - 1],
+                       .h = p.h[a->depth - 1],
+                       .slope = p.last,
+                       .w = w,
+                       .value = value};
+    sdm_team_run(n_threads, slices, output_slice, &loop);
 }
 
 /* Adds the gradient of one layer: dw[width][k] += d^T [h, u], db[width] += sum of d over the batch.
@@ -136,9 +181,8 @@ void trainer_point_backward(const sdm_point_arch *a, const float *w, size_t batc
         const size_t width = a->width[l], k = sdm_point_inputs(a, l),
                      before = sdm_point_hidden(a, l);
         at -= width * (k + 1);
-#pragma omp parallel for schedule(static) num_threads(n_threads)
-        for (size_t i = 0; i < batch; i++)
-            for (size_t o = 0; o < width; o++) d[i * width + o] *= p.slope[l][i * width + o];
+        point_loop loop = {.batch = batch, .width = width, .slope = p.slope[l], .delta = d};
+        sdm_team_run(n_threads, (batch + SLICE - 1) / SLICE, deactivate_slice, &loop);
         layer_gradient(batch, width, d, before, l ? p.h[l - 1] : NULL, k - before, u, gradient + at,
                        n_threads);
         if (l == 0) break;

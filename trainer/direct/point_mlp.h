@@ -1,6 +1,7 @@
 /* The perceptron of a point network (sdm/internal/point_network.h) on batches of points: forward
    and backward pass. B is the number of points; that header defines the other letters and the order
-   of the weights. Results do not depend on n_threads. */
+   of the weights. Results do not depend on n_threads, the number of threads of the caller's team
+   (sdm/internal/team.h). */
 #pragma once
 
 #include "sdm/internal/point_network.h"

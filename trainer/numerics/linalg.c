@@ -279,12 +279,33 @@ static void random_rows(size_t count, uint64_t seed, uint64_t stream, float *x)
     for (size_t i = 0; i < count; i++) x[i] = (float)(sdm_rng_uniform(seed, stream, i) - 0.5);
 }
 
-enum { OVERSAMPLING = 8, ITERATIONS = 6 };
+/* SMALL: rows of a matrix of which more than half of the eigenvectors are computed sooner by
+ * computing all of them. */
+enum { OVERSAMPLING = 8, ITERATIONS = 6, SMALL = 128 };
+
+/* basis[k][n], values[k] = the first k eigenvectors and eigenvalues of c[n][n], of which all are
+ * computed. */
+static sdm_status all_eigenvectors(size_t n, const float *c, size_t k, float *basis, double *values,
+                                   sdm_error *err)
+{
+    double *a = NULL, *all = NULL;
+    sdm_status s = SDM_ALLOC(&a, n * n, "eigenvectors", err);
+    if (!s) s = SDM_ALLOC(&all, n, "eigenvectors", err);
+    for (size_t i = 0; i < n && !s; i++)
+        for (size_t j = 0; j < n; j++) a[i * n + j] = 0.5 * ((double)c[i * n + j] + c[j * n + i]);
+    if (!s) s = trainer_eigen_symmetric(n, a, all, err);
+    for (size_t i = 0; i < k * n && !s; i++) basis[i] = (float)a[i];
+    if (!s) memcpy(values, all, k * sizeof *values);
+    sdm_free(all);
+    sdm_free(a);
+    return s;
+}
 
 sdm_status trainer_leading_eigenvectors(size_t n, const float *c, size_t k, uint64_t seed,
                                         uint64_t stream, float *basis, double *values,
                                         sdm_error *err)
 {
+    if (n <= SMALL && 2 * k > n) return all_eigenvectors(n, c, k, basis, values, err);
     const size_t wide = k + OVERSAMPLING < n ? k + OVERSAMPLING : n;
     float *x = NULL, *y = NULL, *small = NULL;
     double *ritz = NULL, *all = NULL;

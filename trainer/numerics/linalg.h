@@ -26,7 +26,8 @@ sdm_status trainer_orthonormalise(size_t k, size_t n, float *x, int n_threads, s
 
 /* The k leading eigenvectors of the symmetric covariance c[n][n], as orthonormal rows of
    basis[k][n], with their eigenvalues values[k] in descending order. Method: subspace iteration
-   that starts from random numbers (seed, stream); Halko, Martinsson and Tropp 2011. One thread. */
+   that starts from random numbers (seed, stream); Halko, Martinsson and Tropp 2011; of a small
+   matrix all eigenvectors where more than half are asked for. One thread. */
 sdm_status trainer_leading_eigenvectors(size_t n, const float *c, size_t k, uint64_t seed,
                                         uint64_t stream, float *basis, double *values,
                                         sdm_error *err);

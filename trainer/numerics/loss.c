@@ -38,6 +38,22 @@ float trainer_loss_slope(const sdm_config *c, float predicted, float target, dou
     return weight * trainer_loss_slope_drawn(c, predicted, target, square);
 }
 
+double trainer_loss_slopes(const sdm_config *c, size_t n, const float *predicted,
+                           const float *target, float *slope)
+{
+    double sum[8] = {0}; // partial sums, so that the additions do not wait for each other
+    const bool squares = c->train.loss == SDM_LOSS_MSE && !(c->train.near_weight > 0);
+    size_t i = 0;
+    for (; squares && i + 8 <= n; i += 8)
+        for (size_t j = 0; j < 8; j++) {
+            const float e = predicted[i + j] - target[i + j];
+            sum[j] += (double)e * e;
+            slope[i + j] = 2 * e;
+        }
+    for (; i < n; i++) slope[i] = trainer_loss_slope(c, predicted[i], target[i], &sum[i % 8]);
+    return ((sum[0] + sum[4]) + (sum[1] + sum[5])) + ((sum[2] + sum[6]) + (sum[3] + sum[7]));
+}
+
 double trainer_loss_eikonal(const sdm_config *c, const float f[4], float share, float slope[4])
 {
     double g[3], square = 0;
@@ -61,9 +77,8 @@ double trainer_loss_map(const sdm_config *c, const float *predicted, const float
 {
     const size_t nx = (size_t)c->grid.n[0], ny = (size_t)c->grid.n[1], nz = (size_t)c->grid.n[2],
                  n = nx * ny * nz;
-    double square = 0;
-    for (size_t v = 0; v < n; v++)
-        slope[v] = trainer_loss_slope(c, predicted[v], target[v], &square) / (float)n;
+    const double square = trainer_loss_slopes(c, n, predicted, target, slope);
+    for (size_t v = 0; v < n; v++) slope[v] /= (float)n;
     if (!(c->train.eikonal > 0) || nx < 2 || ny < 2 || nz < 2) return square;
     // eikonal term at the voxels that have a following neighbour along x, y and z
     const float share = 1.0f / (float)((nx - 1) * (ny - 1) * (nz - 1));

@@ -9,6 +9,11 @@
    progress is reported as mean square error for every choice of train.loss. */
 float trainer_loss_slope(const sdm_config *c, float predicted, float target, double *square);
 
+/* slope[n] = trainer_loss_slope() of n voxels; slope may be target. Returns the sum of the squared
+ * errors. */
+double trainer_loss_slopes(const sdm_config *c, size_t n, const float *predicted,
+                           const float *target, float *slope);
+
 /* As trainer_loss_slope(), but without the weight 1 + train.near_weight: for voxels drawn with a
  * probability proportional to that weight (point_draw.h). */
 float trainer_loss_slope_drawn(const sdm_config *c, float predicted, float target, double *square);

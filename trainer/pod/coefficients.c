@@ -1,18 +1,27 @@
 /* Projects maps on the local bases, level by level. */
 #include "coefficients.h"
 
+#include <stdatomic.h>
+
 #include "pod_tree.h"
 #include "sdm/internal/kernels.h"
+#include "sdm/internal/team.h"
 #include "sdm/memory.h"
 #include "state/progress.h"
 
 void trainer_coefficients_block_rows(const pod_state *pod, const sdm_pod_block *b, bool holdout,
                                      const size_t *slots, size_t n, float *rows)
 {
+    enum { AHEAD = 16, LINE = 64 / sizeof(int16_t) }; // maps; voxels of a cache line
     const dataset *d = &pod->t->data;
     const size_t voxels = sdm_pod_block_voxels(b);
     const float *mean = pod->mean + b->voxel;
     for (size_t i = 0; i < n; i++) {
+        // a block has a few lines of each map: the processor does not foresee the next ones
+        if (i + AHEAD < n && !holdout) {
+            const int16_t *next = d->maps + slots[i + AHEAD] * d->n_voxels + b->voxel;
+            for (size_t v = 0; v < voxels; v += LINE) __builtin_prefetch(next + v);
+        }
         if (holdout) {
             const float *from = d->holdout + slots[i] * d->n_voxels + b->voxel;
             for (size_t v = 0; v < voxels; v++) rows[i * voxels + v] = from[v] - mean[v];
@@ -63,34 +72,50 @@ static void tree_project(const pod_state *pod, const pod_tree *tree, bool holdou
     }
 }
 
+/* A projection: the arguments of trainer_coefficients_project(). */
+typedef struct projection {
+    const pod_state *pod;
+    bool holdout;
+    const size_t *slots;
+    size_t n;
+    float *y;
+    atomic_bool short_of_memory;
+} projection;
+
+/* Projects the maps on the tree below root number `index`; maps in chunks, to limit the scratch
+ * memory. */
+static void project_tree(void *user, size_t index, int member)
+{
+    enum { CHUNK = 256 };
+    projection *p = user;
+    const pod_state *pod = p->pod;
+    const sdm_pod_levels *levels = &pod->arch.levels;
+    const size_t n = p->n, chunk = n < CHUNK ? n : CHUNK;
+    const pod_tree tree =
+        trainer_pod_tree(levels, pod->blocks, levels->first[levels->n - 1] + index);
+    const size_t widest = trainer_pod_tree_coefficients(pod->blocks, &tree, 0);
+    float *rows = NULL, *below = NULL, *here = NULL;
+    (void)member;
+    sdm_status s = SDM_ALLOC(&rows, chunk * tree.largest, "local coefficients", NULL);
+    if (!s) s = SDM_ALLOC(&below, chunk * widest, "local coefficients", NULL);
+    if (!s) s = SDM_ALLOC(&here, chunk * widest, "local coefficients", NULL);
+    for (size_t at = 0; at < n && !s; at += CHUNK)
+        tree_project(pod, &tree, p->holdout, p->slots + at, n - at < CHUNK ? n - at : CHUNK, rows,
+                     below, here, p->y + at * pod->arch.n_coefficients);
+    sdm_free(here);
+    sdm_free(below);
+    sdm_free(rows);
+    if (s) atomic_store(&p->short_of_memory, true);
+}
+
 sdm_status trainer_coefficients_project(const pod_state *pod, bool holdout, const size_t *slots,
                                         size_t n, float *y, sdm_error *err)
 {
-    enum { CHUNK = 256 };
     const sdm_pod_levels *levels = &pod->arch.levels;
-    const long begin = (long)levels->first[levels->n - 1], end = (long)levels->first[levels->n];
-    const size_t chunk = n < CHUNK ? n : CHUNK;
-    // one tree per iteration; maps in chunks, to limit the scratch memory
-    bool short_of_memory = false;
-#pragma omp parallel for schedule(dynamic) num_threads(trainer_threads(pod->t))
-    for (long root = begin; root < end; root++) {
-        const pod_tree tree = trainer_pod_tree(levels, pod->blocks, (size_t)root);
-        const size_t widest = trainer_pod_tree_coefficients(pod->blocks, &tree, 0);
-        float *rows = NULL, *below = NULL, *here = NULL;
-        sdm_status s = SDM_ALLOC(&rows, chunk * tree.largest, "local coefficients", NULL);
-        if (!s) s = SDM_ALLOC(&below, chunk * widest, "local coefficients", NULL);
-        if (!s) s = SDM_ALLOC(&here, chunk * widest, "local coefficients", NULL);
-        for (size_t at = 0; at < n && !s; at += CHUNK)
-            tree_project(pod, &tree, holdout, slots + at, n - at < CHUNK ? n - at : CHUNK, rows,
-                         below, here, y + at * pod->arch.n_coefficients);
-        sdm_free(here);
-        sdm_free(below);
-        sdm_free(rows);
-        if (s) {
-#pragma omp atomic write
-            short_of_memory = true;
-        }
-    }
-    return short_of_memory ? sdm_fail(err, SDM_E_NOMEM, "no memory for local coefficients")
-                           : SDM_OK;
+    projection p = {.pod = pod, .holdout = holdout, .slots = slots, .n = n, .y = y};
+    sdm_team_run(trainer_threads(pod->t), levels->first[levels->n] - levels->first[levels->n - 1],
+                 project_tree, &p);
+    return atomic_load(&p.short_of_memory)
+               ? sdm_fail(err, SDM_E_NOMEM, "no memory for local coefficients")
+               : SDM_OK;
 }

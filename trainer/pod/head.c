@@ -1,12 +1,14 @@
 /* Computes latent variables, and solves for the head by least squares. */
 #include "head.h"
 
+#include <stdatomic.h>
 #include <string.h>
 
 #include "coefficients.h"
 #include "mlp.h"
 #include "numerics/linalg.h"
 #include "sdm/internal/kernels.h"
+#include "sdm/internal/team.h"
 #include "sdm/memory.h"
 #include "state/progress.h"
 
@@ -69,30 +71,49 @@ static sdm_status head_factorise(const pod_state *pod, size_t n, const float *z,
     return s;
 }
 
+/* A substitution: the arguments of head_substitute(). */
+typedef struct substitution {
+    size_t latents, k;
+    const double *factor;
+    const float *right;
+    float *head;
+    atomic_bool short_of_memory;
+} substitution;
+
+/* Columns of the right-hand sides that a thread solves at a time. */
+enum { COLUMNS = 64 };
+
+static void substitute_columns(void *user, size_t index, int member)
+{
+    substitution *q = user;
+    const size_t latents = q->latents, k = q->k, at = index * COLUMNS,
+                 n = k - at < COLUMNS ? k - at : COLUMNS;
+    double *x = NULL;
+    (void)member;
+    if (SDM_ALLOC(&x, latents * n, "head", NULL)) {
+        atomic_store(&q->short_of_memory, true);
+        return;
+    }
+    for (size_t i = 0; i < latents; i++)
+        for (size_t j = 0; j < n; j++) x[i * n + j] = q->right[i * k + at + j];
+    trainer_cholesky_solve(latents, q->factor, n, x);
+    for (size_t j = 0; j < n; j++)
+        for (size_t i = 0; i < latents; i++) q->head[(at + j) * latents + i] = (float)x[i * n + j];
+    sdm_free(x);
+}
+
 /* Computes head[K][L] from the factor and the right-hand sides right[L][K] = z^T y. */
 static sdm_status head_substitute(const pod_state *pod, const double *factor, const float *right,
                                   float *head, sdm_error *err)
 {
-    enum { COLUMNS = 64 };
-    const size_t latents = pod->arch.n_latent, k = pod->arch.n_coefficients;
-    bool short_of_memory = false;
-#pragma omp parallel for schedule(dynamic) num_threads(trainer_threads(pod->t))
-    for (long first = 0; first < (long)k; first += COLUMNS) {
-        const size_t at = (size_t)first, n = k - at < COLUMNS ? k - at : COLUMNS;
-        double *x = NULL;
-        if (SDM_ALLOC(&x, latents * n, "head", NULL)) {
-#pragma omp atomic write
-            short_of_memory = true;
-            continue;
-        }
-        for (size_t i = 0; i < latents; i++)
-            for (size_t j = 0; j < n; j++) x[i * n + j] = right[i * k + at + j];
-        trainer_cholesky_solve(latents, factor, n, x);
-        for (size_t j = 0; j < n; j++)
-            for (size_t i = 0; i < latents; i++) head[(at + j) * latents + i] = (float)x[i * n + j];
-        sdm_free(x);
-    }
-    return short_of_memory ? sdm_fail(err, SDM_E_NOMEM, "no memory for the head") : SDM_OK;
+    substitution q = {.latents = pod->arch.n_latent,
+                      .k = pod->arch.n_coefficients,
+                      .factor = factor,
+                      .right = right,
+                      .head = head};
+    sdm_team_run(trainer_threads(pod->t), (q.k + COLUMNS - 1) / COLUMNS, substitute_columns, &q);
+    return atomic_load(&q.short_of_memory) ? sdm_fail(err, SDM_E_NOMEM, "no memory for the head")
+                                           : SDM_OK;
 }
 
 sdm_status trainer_head_solve(const pod_state *pod, const float *w, float *head, sdm_error *err)

@@ -7,6 +7,7 @@
 #include "data/streams.h"
 #include "sdm/internal/kernels.h"
 #include "sdm/internal/rng.h"
+#include "sdm/internal/team.h"
 
 /* Number of inputs of layer l. */
 static size_t layer_inputs(const sdm_pod_arch *a, size_t l) { return l ? a->width : a->n_inputs; }
@@ -45,21 +46,69 @@ size_t trainer_mlp_workspace(const sdm_pod_arch *a, size_t batch)
     return (2 * a->depth + 2) * batch * a->width;
 }
 
+/* Rows or columns of a batch that a thread computes at a time. */
+enum { ROWS = 16, COLUMNS = 32 };
+
+static size_t min_size(size_t a, size_t b) { return a < b ? a : b; }
+
+/* A loop over slices of one layer. */
+typedef struct layer_loop {
+    const sdm_pod_arch *arch;
+    size_t batch;
+    const float *bias;
+    float *h, *slope;
+    const float *dh; // gradient by h
+    float *delta;    // gradient by the inputs of the activations
+    float *db;       // gradient by the bias
+} layer_loop;
+
+/* h = activation(h + bias), and its slope, in rows index * ROWS and up. */
+static void activate_rows(void *user, size_t index, int member)
+{
+    const layer_loop *l = user;
+    const size_t w = l->arch->width, first = index * ROWS, n = min_size(ROWS, l->batch - first);
+    float *restrict h = l->h + first * w;
+    const float *restrict bias = l->bias;
+    (void)member;
+    for (size_t i = 0; i < n; i++)
+        for (size_t o = 0; o < w; o++) h[i * w + o] += bias[o];
+    sdm_activate(l->arch->activation, n * w, h, h, l->slope + first * w);
+}
+
+/* delta = dh * slope, and its sums over the batch, in columns index * COLUMNS and up. */
+static void deactivate_columns(void *user, size_t index, int member)
+{
+    const layer_loop *l = user;
+    const size_t w = l->arch->width, first = index * COLUMNS, n = min_size(COLUMNS, w - first);
+    float sum[COLUMNS] = {0};
+    (void)member;
+    for (size_t i = 0; i < l->batch; i++) {
+        const size_t at = i * w + first;
+        for (size_t o = 0; o < n; o++) {
+            l->delta[at + o] = l->dh[at + o] * l->slope[at + o];
+            sum[o] += l->delta[at + o];
+        }
+    }
+    memcpy(l->db + first, sum, n * sizeof *sum);
+}
+
 /* The workspace holds h[depth][B][W], slope[depth][B][W] (derivatives of the activations) and
-   delta[2][B][W] (gradients of two layers in turn). */
+   two buffers [B][W] of the backward pass. */
 const float *trainer_mlp_forward(const sdm_pod_arch *a, const float *weights, size_t batch,
                                  const float *x, float *workspace, int n_threads)
 {
     const size_t w = a->width, layer = batch * w;
     for (size_t l = 0; l < a->depth; l++) {
-        float *h = workspace + l * layer, *slope = workspace + (a->depth + l) * layer;
         const size_t k = layer_inputs(a, l);
-        const float *bias = trainer_mlp_bias(a, weights, l);
-        for (size_t i = 0; i < batch; i++) memcpy(h + i * w, bias, w * sizeof *h);
+        layer_loop loop = {.arch = a,
+                           .batch = batch,
+                           .bias = trainer_mlp_bias(a, weights, l),
+                           .h = workspace + l * layer,
+                           .slope = workspace + (a->depth + l) * layer};
         sdm_gemm(batch, w, k, (sdm_view){x, k, 1},
-                 (sdm_view){trainer_mlp_layer(a, weights, l), 1, k}, true, h, w, n_threads);
-        sdm_activate(a->activation, layer, h, h, slope);
-        x = h;
+                 (sdm_view){trainer_mlp_layer(a, weights, l), 1, k}, false, loop.h, w, n_threads);
+        sdm_team_run(n_threads, (batch + ROWS - 1) / ROWS, activate_rows, &loop);
+        x = loop.h;
     }
     return x;
 }
@@ -68,25 +117,25 @@ void trainer_mlp_backward(const sdm_pod_arch *a, const float *weights, size_t ba
                           float *workspace, const float *dh, float *gradient, int n_threads)
 {
     const size_t w = a->width, layer = batch * w;
-    float *delta[2] = {workspace + 2 * a->depth * layer, workspace + (2 * a->depth + 1) * layer};
-    memcpy(delta[0], dh, layer * sizeof *dh);
+    float *delta = workspace + 2 * a->depth * layer, *below = delta + layer;
     for (size_t l = a->depth; l-- > 0;) {
-        float *d = delta[0];
-        const float *slope = workspace + (a->depth + l) * layer,
-                    *in = l ? workspace + (l - 1) * layer : x;
-        const size_t k = layer_inputs(a, l), at = layer_offset(a, l);
-        // gradient of matrix and bias
-        for (size_t i = 0; i < layer; i++) d[i] *= slope[i];
-        float *dw = gradient + at, *db = dw + k * w;
-        sdm_gemm(w, k, batch, (sdm_view){d, 1, w}, (sdm_view){in, k, 1}, false, dw, k, n_threads);
-        memset(db, 0, w * sizeof *db);
-        for (size_t i = 0; i < batch; i++)
-            for (size_t o = 0; o < w; o++) db[o] += d[i * w + o];
-        // gradient of the layer below
+        const float *in = l ? workspace + (l - 1) * layer : x;
+        const size_t k = layer_inputs(a, l);
+        float *dw = gradient + layer_offset(a, l);
+        // gradient by the inputs of the activations, by matrix and bias
+        layer_loop loop = {.arch = a,
+                           .batch = batch,
+                           .slope = workspace + (a->depth + l) * layer,
+                           .dh = dh,
+                           .delta = delta,
+                           .db = dw + k * w};
+        sdm_team_run(n_threads, (w + COLUMNS - 1) / COLUMNS, deactivate_columns, &loop);
+        sdm_gemm(w, k, batch, (sdm_view){delta, 1, w}, (sdm_view){in, k, 1}, false, dw, k,
+                 n_threads);
+        // gradient by the outputs of the layer below
         if (l == 0) break;
-        sdm_gemm(batch, w, w, (sdm_view){d, w, 1},
-                 (sdm_view){trainer_mlp_layer(a, weights, l), w, 1}, false, delta[1], w, n_threads);
-        float *swap = delta[0];
-        delta[0] = delta[1], delta[1] = swap;
+        sdm_gemm(batch, w, w, (sdm_view){delta, w, 1},
+                 (sdm_view){trainer_mlp_layer(a, weights, l), w, 1}, false, below, w, n_threads);
+        dh = below;
     }
 }

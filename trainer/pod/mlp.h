@@ -1,5 +1,6 @@
 /* The multi-layer perceptron of the `pod` network on batches: forward and backward pass. Letters: B
-   batch, I inputs, W width. Results do not depend on n_threads. */
+   batch, I inputs, W width. Results do not depend on n_threads, the number of threads of the
+   caller's team (sdm/internal/team.h). */
 #pragma once
 
 #include "sdm/internal/pod.h"

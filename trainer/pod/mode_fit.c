@@ -8,10 +8,15 @@
 #include "data/streams.h"
 #include "mlp.h"
 #include "sdm/internal/kernels.h"
+#include "sdm/internal/team.h"
 #include "sdm/memory.h"
 #include "state/checkpoint.h"
 #include "state/new_samples.h"
 #include "state/progress.h"
+
+/* Decay of Adam's second moments. In trials on the cochlea 0.99 left a tenth less error than 0.999
+   after the same number of steps. */
+#define MODE_FIT_DECAY 0.99
 
 /* Memory of a batch. */
 typedef struct mode_batch {
@@ -19,6 +24,7 @@ typedef struct mode_batch {
     float *target;    // [B][R]
     float *predicted; // [B][R], later the gradient by it
     float *dh;        // [B][W]
+    double *loss;     // [B] sums of squared errors
     float *workspace;
     float *gradient; // [n]
 } mode_batch;
@@ -29,6 +35,7 @@ static void mode_batch_dispose(mode_batch *b)
     sdm_free(b->target);
     sdm_free(b->predicted);
     sdm_free(b->dh);
+    sdm_free(b->loss);
     sdm_free(b->workspace);
     sdm_free(b->gradient);
 }
@@ -41,6 +48,7 @@ static sdm_status mode_batch_create(const pod_state *pod, size_t rows, mode_batc
     if (!s) s = SDM_ALLOC(&b->target, rows * pod->n_modes, "batch", err);
     if (!s) s = SDM_ALLOC(&b->predicted, rows * pod->n_modes, "batch", err);
     if (!s) s = SDM_ALLOC(&b->dh, rows * a->width, "batch", err);
+    if (!s) s = SDM_ALLOC(&b->loss, rows, "batch", err);
     if (!s) s = SDM_ALLOC(&b->workspace, trainer_mlp_workspace(a, rows), "batch", err);
     if (!s) s = SDM_ALLOC(&b->gradient, pod->mode_fit.n, "gradient", err);
     return s;
@@ -99,49 +107,78 @@ sdm_status trainer_mode_fit_errors(const pod_state *pod, const size_t *slots, si
     return s;
 }
 
+/* A loop over the rows of a batch. */
+typedef struct mode_loop {
+    const pod_state *pod;
+    mode_batch *batch;
+    size_t rows;
+} mode_loop;
+
+/* Rows of a batch that a thread computes at a time. */
+enum { ROWS = 8 };
+
+/* Draws the maps of the rows index * ROWS and up: copies their inputs and targets. */
+static void draw_rows(void *user, size_t index, int member)
+{
+    const mode_loop *l = user;
+    const pod_state *pod = l->pod;
+    mode_batch *b = l->batch;
+    const size_t r = pod->n_modes, inputs = pod->arch.n_inputs;
+    (void)member;
+    for (size_t i = index * ROWS; i < index * ROWS + ROWS && i < l->rows; i++) {
+        const size_t slot =
+            trainer_dataset_draw(&pod->t->data, STREAM_BATCH, pod->t->config->data.static_share,
+                                 l->rows, (uint64_t)pod->t->step, i);
+        memcpy(b->x + i * inputs, pod->phi + slot * pod->n_poly + 1, inputs * sizeof *b->x);
+        memcpy(b->target + i * r, pod->target + slot * r, r * sizeof *b->target);
+    }
+}
+
+/* Loss, and its gradient with respect to the predictions, in the rows index * ROWS and up. */
+static void compare_rows(void *user, size_t index, int member)
+{
+    const mode_loop *l = user;
+    mode_batch *b = l->batch;
+    const size_t r = l->pod->n_modes;
+    (void)member;
+    for (size_t i = index * ROWS; i < index * ROWS + ROWS && i < l->rows; i++) {
+        double sum = 0;
+        for (size_t j = i * r; j < (i + 1) * r; j++) {
+            const float e = b->predicted[j] - b->target[j];
+            sum += (double)e * e;
+            b->predicted[j] = e * (2.0f / (float)l->rows);
+        }
+        b->loss[i] = sum;
+    }
+}
+
 /* One Adam step on a random batch. */
 static void mode_fit_step(pod_state *pod, mode_batch *b, size_t batch, double rate)
 {
     const sdm_pod_arch *a = &pod->arch;
-    const size_t r = pod->n_modes, readout = trainer_mlp_count(a);
-    const double share = pod->t->config->data.static_share;
-    // random batch
-    for (size_t i = 0; i < batch; i++) {
-        const size_t slot = trainer_dataset_draw(&pod->t->data, STREAM_BATCH, share, batch,
-                                                 (uint64_t)pod->t->step, i);
-        memcpy(b->x + i * a->n_inputs, pod->phi + slot * pod->n_poly + 1,
-               a->n_inputs * sizeof *b->x);
-        memcpy(b->target + i * r, pod->target + slot * r, r * sizeof *b->target);
-    }
-    // loss and its gradient with respect to the predictions
+    const size_t r = pod->n_modes, readout = trainer_mlp_count(a),
+                 slices = (batch + ROWS - 1) / ROWS;
+    const int threads = trainer_threads(pod->t);
+    mode_loop loop = {pod, b, batch};
+    sdm_team_run(threads, slices, draw_rows, &loop);
     const float *h = modes_predict(pod, pod->mode_fit.w, batch, b);
+    sdm_team_run(threads, slices, compare_rows, &loop);
     double sum = 0;
-    for (size_t i = 0; i < batch * r; i++) {
-        const float e = b->predicted[i] - b->target[i];
-        sum += (double)e * e;
-        b->predicted[i] = e * (2.0f / (float)batch);
-    }
+    for (size_t i = 0; i < batch; i++) sum += b->loss[i];
     const double scale = pod->target_scale;
     pod->t->loss =
         pod->holdout_floor + sum * scale * scale / ((double)batch * (double)pod->t->data.n_voxels);
 
     // gradient with respect to the weights
-    const int threads = trainer_threads(pod->t);
     sdm_gemm(r, a->width, batch, (sdm_view){b->predicted, 1, r}, (sdm_view){h, a->width, 1}, false,
              b->gradient + readout, a->width, threads);
     sdm_gemm(batch, a->width, r, (sdm_view){b->predicted, r, 1},
              (sdm_view){pod->mode_fit.w + readout, a->width, 1}, false, b->dh, a->width, threads);
     trainer_mlp_backward(a, pod->mode_fit.w, batch, b->x, b->workspace, b->dh, b->gradient,
                          threads);
-    trainer_adam_update(&pod->mode_fit, 0, pod->mode_fit.n, b->gradient,
-                        trainer_adam_begin(rate, pod->t->phase_step + 1), 1);
-    if (pod->t->config->train.average > 0) {
-        // the average follows the weights closely at first and then more and more slowly
-        const double n = (double)pod->t->phase_step + 1,
-                     decay = fmin(pod->t->config->train.average, n / (n + 10));
-        trainer_average_update(&pod->mode_fit, decay, 1);
-    } else
-        memcpy(pod->mode_fit.average, pod->mode_fit.w, pod->mode_fit.n * sizeof *pod->mode_fit.w);
+    trainer_adam_update_all(&pod->mode_fit, b->gradient,
+                            trainer_adam_begin(rate, MODE_FIT_DECAY, pod->t->phase_step + 1),
+                            threads);
 }
 
 /* Used fraction of the phase's budget, which is (1 - train.refine) * (number of steps), at least
@@ -166,7 +203,8 @@ sdm_status trainer_mode_fit_run(pod_state *pod, sdm_error *err)
     mode_batch b = {0};
     sdm_status s = mode_batch_create(pod, batch, &b, err);
     trainer_speed speed = trainer_speed_start(t);
-    for (double at; !s && (at = mode_fit_fraction(pod)) < 1;) {
+    double at = mode_fit_fraction(pod);
+    while (!s && at < 1) {
         // new maps, or stop
         if ((s = trainer_samples_take(t, trainer_samples_wanted(t, at), err))) break;
         if (trainer_cancelled(t)) {
@@ -177,6 +215,9 @@ sdm_status trainer_mode_fit_run(pod_state *pod, sdm_error *err)
         const double rate = c->train.learning_rate * trainer_rate_schedule(at, c->train.warmup);
         mode_fit_step(pod, &b, batch, rate);
         t->step++, t->phase_step++;
+        at = mode_fit_fraction(pod);
+        trainer_average_follow(&pod->mode_fit, c->train.average, t->phase_step, !(at < 1),
+                               trainer_threads(t));
         if (!isfinite(t->loss)) {
             s = sdm_fail(err, SDM_E_CONFIG,
                          "%s: training diverged at step %lld (loss is not a number): lower "

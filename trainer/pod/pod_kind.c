@@ -124,9 +124,11 @@ static sdm_status pod_run(trainer *t, bool resumed, sdm_error *err)
 {
     pod_state *pod = t->state;
     sdm_status s = SDM_OK;
+    // the measurement of the model needs the rest of a time budget
     const double total = t->config->train.minutes * 60;
+    pod->refine_end = total - fmin(10, 0.03 * total);
     pod->mode_fit_end =
-        t->phase_started + (total - t->phase_started) * (1 - t->config->train.refine);
+        t->phase_started + (pod->refine_end - t->phase_started) * (1 - t->config->train.refine);
     if (t->phase == SDM_PHASE_MODE_FIT) {
         if (resumed) s = trainer_checkpoint_weights(t, err);
         if (!s) s = trainer_mode_fit_run(pod, err);

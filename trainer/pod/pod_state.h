@@ -43,6 +43,6 @@ typedef struct pod_state {
        head[K][L] from head_at, mean[n_voxels] from mean_at, basis from basis_at. */
     parameters mode_fit, refine;
     size_t head_at, mean_at, basis_at;
-    /* With a budget of time: trainer_seconds() when the mode fit ends. */
-    double mode_fit_end;
+    /* With a budget of time: trainer_seconds() when the mode fit and the refinement end. */
+    double mode_fit_end, refine_end;
 } pod_state;

@@ -12,7 +12,7 @@
 #include "numerics/loss.h"
 #include "pod_tree.h"
 #include "sdm/internal/kernels.h"
-#include "sdm/internal/threads.h"
+#include "sdm/internal/team.h"
 #include "sdm/memory.h"
 #include "state/checkpoint.h"
 #include "state/new_samples.h"
@@ -120,7 +120,7 @@ static void head_forward(const pod_state *pod, const float *w, refine_batch *b, 
              trainer_threads(pod->t));
 }
 
-/* The arrays of a tree, most of them in the scratch memory of the calling thread. */
+/* The arrays of a tree, most of them in the scratch memory of a member of the team. */
 typedef struct tree_work {
     pod_tree tree;
     size_t ld[SDM_POD_MAX_LEVELS]; // row length on each level
@@ -130,11 +130,11 @@ typedef struct tree_work {
     float *basis_gradient;         // [k_b][V_b] of one block
 } tree_work;
 
-static tree_work tree_work_of(const pod_state *pod, const refine_batch *b, size_t root)
+static tree_work tree_work_of(const pod_state *pod, const refine_batch *b, size_t root, int member)
 {
     tree_work w = {.tree = trainer_pod_tree(&pod->arch.levels, pod->blocks, root)};
     const size_t top = pod->arch.levels.n - 1;
-    float *at = b->scratch + b->tree_floats * (size_t)sdm_thread();
+    float *at = b->scratch + b->tree_floats * (size_t)member;
     for (size_t level = 0; level < top; level++) {
         w.ld[level] = trainer_pod_tree_coefficients(pod->blocks, &w.tree, level);
         w.c[level] = at, at += b->rows * w.ld[level];
@@ -213,40 +213,53 @@ static void tree_backward(pod_state *pod, size_t rows, const tree_work *w, adam_
     trainer_adam_update(&pod->refine, pod->mean_at + first, voxels, mean_gradient, adam, MEAN_STEP);
 }
 
+/* A loop over the trees or over rows of the head. */
+typedef struct refine_loop {
+    pod_state *pod;
+    refine_batch *batch;
+    adam_step adam;
+    // for the evaluation: weights, and the held-out maps first .. first + rows - 1
+    const float *weights;
+    size_t first, rows;
+} refine_loop;
+
 /* Forward pass, backward pass and weight update of tree i on the batch. */
-static void tree_train(pod_state *pod, refine_batch *b, size_t i, adam_step adam)
+static void tree_train(void *user, size_t i, int member)
 {
-    const tree_work w = tree_work_of(pod, b, first_tree(pod) + i);
+    const refine_loop *l = user;
+    pod_state *pod = l->pod;
+    refine_batch *b = l->batch;
+    const tree_work w = tree_work_of(pod, b, first_tree(pod) + i, member);
     const size_t first = pod->blocks[w.tree.first[0]].voxel, voxels = w.tree.voxels;
     tree_forward(pod, pod->refine.w, b->rows, &w);
     double sum = 0;
     for (size_t r = 0; r < b->rows; r++) {
         const int16_t *target = pod->t->data.maps + b->slots[r] * pod->t->data.n_voxels + first;
         const float scale = pod->t->data.scale[b->slots[r]];
-        for (size_t v = 0; v < voxels; v++)
-            w.delta[r * voxels + v] = trainer_loss_slope(
-                pod->t->config, w.predicted[r * voxels + v], scale * (float)target[v], &sum);
+        float *delta = w.delta + r * voxels;
+        for (size_t v = 0; v < voxels; v++) delta[v] = scale * (float)target[v];
+        sum += trainer_loss_slopes(pod->t->config, voxels, w.predicted + r * voxels, delta, delta);
     }
     b->loss[i] = sum;
-    tree_backward(pod, b->rows, &w, adam);
+    tree_backward(pod, b->rows, &w, l->adam);
 }
 
-/* Updates the weights of the head from the gradient of the batch. */
-static void head_train(pod_state *pod, refine_batch *b, adam_step adam)
+/* Updates rows of the head, HEAD_ROWS from row index * HEAD_ROWS on, from the gradient of the
+ * batch. */
+static void head_train(void *user, size_t index, int member)
 {
-    const sdm_pod_arch *a = &pod->arch;
-    const size_t n_c = a->n_coefficients, latents = a->n_latent;
-#pragma omp parallel for schedule(static) num_threads(trainer_threads(pod->t))
-    for (long at = 0; at < (long)n_c; at += HEAD_ROWS) {
-        const size_t first = (size_t)at, rows = n_c - first < HEAD_ROWS ? n_c - first : HEAD_ROWS;
-        float *gradient = b->scratch + HEAD_ROWS * latents * (size_t)sdm_thread();
-        sdm_gemm(rows, latents, b->rows, (sdm_view){b->dc + first, 1, n_c},
-                 (sdm_view){b->z, latents, 1}, false, gradient, latents, 1);
-        for (size_t i = 0; i < rows; i++)
-            trainer_adam_update(&pod->refine, pod->head_at + (first + i) * latents, latents,
-                                gradient + i * latents, adam,
-                                HEAD_STEP * pod->deviation[first + i]);
-    }
+    const refine_loop *l = user;
+    pod_state *pod = l->pod;
+    const refine_batch *b = l->batch;
+    const size_t n_c = pod->arch.n_coefficients, latents = pod->arch.n_latent;
+    const size_t first = index * HEAD_ROWS,
+                 rows = n_c - first < HEAD_ROWS ? n_c - first : HEAD_ROWS;
+    float *gradient = b->scratch + HEAD_ROWS * latents * (size_t)member;
+    sdm_gemm(rows, latents, b->rows, (sdm_view){b->dc + first, 1, n_c},
+             (sdm_view){b->z, latents, 1}, false, gradient, latents, 1);
+    for (size_t i = 0; i < rows; i++)
+        trainer_adam_update(&pod->refine, pod->head_at + (first + i) * latents, latents,
+                            gradient + i * latents, l->adam, HEAD_STEP * pod->deviation[first + i]);
 }
 
 /* One Adam step on a random batch. */
@@ -269,9 +282,10 @@ static sdm_status refine_step(pod_state *pod, refine_batch *b, double rate, sdm_
     sdm_free((void *)phi);
     head_forward(pod, w, b, b->rows);
     // trees: maps, loss, gradients; bases and mean map are updated
-    const adam_step adam = trainer_adam_begin(rate, pod->t->phase_step + 1);
-#pragma omp parallel for schedule(dynamic) num_threads(threads_for_trees(pod, b))
-    for (long i = 0; i < (long)n_trees(pod); i++) tree_train(pod, b, (size_t)i, adam);
+    refine_loop loop = {.pod = pod,
+                        .batch = b,
+                        .adam = trainer_adam_begin(rate, ADAM_DECAY, pod->t->phase_step + 1)};
+    sdm_team_run(threads_for_trees(pod, b), n_trees(pod), tree_train, &loop);
     double sum = 0;
     for (size_t i = 0; i < n_trees(pod); i++) sum += b->loss[i];
     pod->t->loss = sum / ((double)b->rows * (double)pod->t->data.n_voxels);
@@ -284,13 +298,35 @@ static sdm_status refine_step(pod_state *pod, refine_batch *b, double rate, sdm_
         trainer_mlp_backward(a, w, b->rows, b->x, b->workspace, b->dz, b->gradient,
                              trainer_threads(pod->t));
     }
-    head_train(pod, b, adam);
-    if (a->depth) trainer_adam_update(&pod->refine, 0, trainer_mlp_count(a), b->gradient, adam, 1);
+    sdm_team_run(trainer_threads(pod->t), (a->n_coefficients + HEAD_ROWS - 1) / HEAD_ROWS,
+                 head_train, &loop);
+    if (a->depth)
+        trainer_adam_update(&pod->refine, 0, trainer_mlp_count(a), b->gradient, loop.adam, 1);
     return SDM_OK;
 }
 
-sdm_status trainer_refine_evaluate(const pod_state *pod, const float *w, double *mse,
-                                   sdm_error *err)
+/* batch->loss[i] = sum of the squared errors of tree i on held-out maps. */
+static void tree_evaluate(void *user, size_t i, int member)
+{
+    const refine_loop *l = user;
+    const pod_state *pod = l->pod;
+    const dataset *d = &pod->t->data;
+    const tree_work w = tree_work_of(pod, l->batch, first_tree(pod) + i, member);
+    const size_t voxels = w.tree.voxels;
+    tree_forward(pod, l->weights, l->rows, &w);
+    double sum = 0;
+    for (size_t r = 0; r < l->rows; r++) {
+        const float *truth =
+            d->holdout + (l->first + r) * d->n_voxels + pod->blocks[w.tree.first[0]].voxel;
+        for (size_t v = 0; v < voxels; v++) {
+            const double e = (double)w.predicted[r * voxels + v] - truth[v];
+            sum += e * e;
+        }
+    }
+    l->batch->loss[i] = sum;
+}
+
+sdm_status trainer_refine_evaluate(pod_state *pod, const float *w, double *mse, sdm_error *err)
 {
     enum { ROWS = 32 };
     const dataset *d = &pod->t->data;
@@ -304,23 +340,8 @@ sdm_status trainer_refine_evaluate(const pod_state *pod, const float *w, double 
         for (size_t i = 0; i < rows; i++) phi[i] = pod->holdout_phi + (at + i) * pod->n_poly;
         trainer_head_latent(pod, w, rows, phi, b.x, b.z, b.workspace);
         head_forward(pod, w, &b, rows);
-        // sum of squared errors of each tree
-#pragma omp parallel for schedule(dynamic) num_threads(threads_for_trees(pod, &b))
-        for (long i = 0; i < (long)n_trees(pod); i++) {
-            const tree_work work = tree_work_of(pod, &b, first_tree(pod) + (size_t)i);
-            const size_t voxels = work.tree.voxels;
-            tree_forward(pod, w, rows, &work);
-            double tree_sum = 0;
-            for (size_t r = 0; r < rows; r++) {
-                const float *truth =
-                    d->holdout + (at + r) * d->n_voxels + pod->blocks[work.tree.first[0]].voxel;
-                for (size_t v = 0; v < voxels; v++) {
-                    const double e = (double)work.predicted[r * voxels + v] - truth[v];
-                    tree_sum += e * e;
-                }
-            }
-            b.loss[i] = tree_sum;
-        }
+        refine_loop loop = {.pod = pod, .batch = &b, .weights = w, .first = at, .rows = rows};
+        sdm_team_run(threads_for_trees(pod, &b), n_trees(pod), tree_evaluate, &loop);
         for (size_t i = 0; i < n_trees(pod); i++) sum += b.loss[i];
     }
     refine_batch_dispose(&b);
@@ -356,30 +377,15 @@ static double refine_fraction(const trainer *t, double end)
     return length > 0 ? (trainer_seconds(t) - t->phase_started) / length : 1;
 }
 
-/* Steps between two updates of the average, since an update reads and writes all weights. */
-enum { AVERAGE_EVERY = 8 };
-
-/* Average of the weights; it follows them closely at first and then more and more slowly. */
-static void refine_average(pod_state *pod)
-{
-    const double n = (double)pod->t->phase_step / AVERAGE_EVERY;
-    const double decay = pod->t->config->train.average > 0
-                             ? fmin(pow(pod->t->config->train.average, AVERAGE_EVERY), n / (n + 10))
-                             : 0;
-    trainer_average_update(&pod->refine, decay, trainer_threads(pod->t));
-}
-
 sdm_status trainer_refine_run(pod_state *pod, sdm_error *err)
 {
     trainer *t = pod->t;
     const sdm_config *c = t->config;
-    // the final evaluation needs the rest of a time budget
-    const double total = c->train.minutes * 60, end = total - fmin(10, 0.03 * total);
     if (!(c->train.refine > 0)) return SDM_OK;
     refine_batch b = {0};
     sdm_status s = refine_batch_create(pod, (size_t)c->train.refine_batch, &b, err);
     trainer_speed speed = trainer_speed_start(t);
-    double at = refine_fraction(t, end);
+    double at = refine_fraction(t, pod->refine_end);
     while (!s && at < 1) {
         // new maps, or stop
         if ((s = trainer_samples_take(t, t->data.n_start + t->data.n_online, err))) break;
@@ -391,9 +397,9 @@ sdm_status trainer_refine_run(pod_state *pod, sdm_error *err)
         const double rate = c->train.refine_rate * trainer_rate_schedule(at, c->train.warmup);
         if ((s = refine_step(pod, &b, rate, err))) break;
         t->step++, t->phase_step++;
-        at = refine_fraction(t, end);
-        // also after the last step, so that the last steps enter the average
-        if (t->phase_step % AVERAGE_EVERY == 0 || !(at < 1)) refine_average(pod);
+        at = refine_fraction(t, pod->refine_end);
+        trainer_average_follow(&pod->refine, c->train.average, t->phase_step, !(at < 1),
+                               trainer_threads(t));
         if (!isfinite(t->loss)) {
             s = sdm_fail(err, SDM_E_CONFIG,
                          "%s: training diverged at step %lld (loss is not a number): lower "

@@ -12,5 +12,4 @@ sdm_status trainer_refine_start(pod_state *pod, bool resumed, sdm_error *err);
 sdm_status trainer_refine_run(pod_state *pod, sdm_error *err);
 
 /* *mse = mean square error (mm^2) of the network with weights w on the held-out maps. */
-sdm_status trainer_refine_evaluate(const pod_state *pod, const float *w, double *mse,
-                                   sdm_error *err);
+sdm_status trainer_refine_evaluate(pod_state *pod, const float *w, double *mse, sdm_error *err);

@@ -6,7 +6,7 @@
 #include "kernels_table.h"
 #include "sdm/internal/kernels.h"
 #include "sdm/internal/processor.h"
-#include "sdm/internal/threads.h"
+#include "sdm/internal/team.h"
 
 static const kernel_table *kernels(void)
 {
@@ -26,93 +26,37 @@ static const kernel_table *kernels(void)
 
 const char *sdm_kernels_name(void) { return kernels()->name; }
 
-// Block sizes of the matrix product: an MC x KC block of a and a KC x NC block of b fit in the
-// second-level cache. KC also fixes the order of the sums, hence the rounding of the result.
-enum { MC = 96, NC = 128, KC = 256 };
+// A block of the matrix product is the work of one thread: MC rows and NC columns of c.
+enum { MC = 264, NC = 32 };
 
 static size_t min_size(size_t a, size_t b) { return a < b ? a : b; }
 
-// Packs one full panel: packed[k][width], element (p, i) = src[i * along + p * deep]. Callers pass
-// a constant width so that the loops are unrolled.
-static inline void pack_panel(size_t width, size_t k, const float *src, size_t along, size_t deep,
-                              float *packed)
-{
-    for (size_t p = 0; p < k; p++, src += deep, packed += width) {
-        if (along == 1)
-            memcpy(packed, src, width * sizeof *packed);
-        else
-            for (size_t i = 0; i < width; i++) packed[i] = src[i * along];
-    }
-}
+// A matrix product: the arguments of sdm_gemm().
+typedef struct gemm {
+    size_t m, n, k;
+    sdm_view a, b;
+    bool add;
+    float *c;
+    size_t ldc;
+    size_t rows; // blocks along the rows of c
+} gemm;
 
-// Packs all panels: packed[ceil(count / width)][k][width] from data[i * along + p * deep] for
-// i < count and p < k; the last panel is padded with zeros.
-static void pack_panels(size_t count, size_t k, const float *data, size_t along, size_t deep,
-                        size_t width, float *packed)
+static void gemm_block(void *user, size_t index, int member)
 {
-    for (size_t i0 = 0; i0 < count; i0 += width, packed += k * width) {
-        const size_t n = min_size(width, count - i0);
-        const float *src = data + i0 * along;
-        if (n < width) {
-            memset(packed, 0, k * width * sizeof *packed);
-            for (size_t p = 0; p < k; p++)
-                for (size_t i = 0; i < n; i++) packed[p * width + i] = src[i * along + p * deep];
-        } else if (width == 16)
-            pack_panel(16, k, src, along, deep, packed);
-        else if (width == 6)
-            pack_panel(6, k, src, along, deep, packed);
-        else
-            pack_panel(width, k, src, along, deep, packed);
-    }
-}
-
-// Computes one block of c with m <= MC rows and n <= NC columns; sums over all of K.
-static void gemm_block(const kernel_table *t, size_t m, size_t n, size_t k, sdm_view a, sdm_view b,
-                       bool add, float *c, size_t ldc)
-{
-    _Alignas(64) float pa[MC * KC], pb[NC * KC], edge[12 * 32];
-    for (size_t k0 = 0; k0 < k || k0 == 0; k0 += KC) {
-        const size_t kc = min_size(KC, k - k0);
-        const int keep = add || k0 > 0; // add to c instead of overwriting it
-        pack_panels(m, kc, a.data + k0 * a.col, a.row, a.col, t->mr, pa);
-        pack_panels(n, kc, b.data + k0 * b.row, b.col, b.row, t->nr, pb);
-        for (size_t j = 0; j < n; j += t->nr) {
-            const size_t nj = min_size(t->nr, n - j);
-            for (size_t i = 0; i < m; i += t->mr) {
-                const size_t mi = min_size(t->mr, m - i);
-                float *at = c + i * ldc + j;
-                if (mi == t->mr && nj == t->nr) {
-                    t->micro(kc, pa + i * kc, pb + j * kc, at, ldc, keep);
-                    continue;
-                }
-                // a tile that reaches beyond c is computed as a full tile in `edge`
-                if (keep)
-                    for (size_t r = 0; r < mi; r++)
-                        memcpy(edge + r * t->nr, at + r * ldc, nj * sizeof *at);
-                t->micro(kc, pa + i * kc, pb + j * kc, edge, t->nr, keep);
-                for (size_t r = 0; r < mi; r++)
-                    memcpy(at + r * ldc, edge + r * t->nr, nj * sizeof *at);
-            }
-        }
-        if (k == 0) break;
-    }
+    const gemm *g = user;
+    const size_t i = index % g->rows * MC, j = index / g->rows * NC;
+    (void)member;
+    kernels()->product(min_size(MC, g->m - i), min_size(NC, g->n - j), g->k,
+                       (sdm_view){g->a.data + i * g->a.row, g->a.row, g->a.col},
+                       (sdm_view){g->b.data + j * g->b.col, g->b.row, g->b.col}, g->add,
+                       g->c + i * g->ldc + j, g->ldc);
 }
 
 void sdm_gemm(size_t m, size_t n, size_t k, sdm_view a, sdm_view b, bool add, float *c, size_t ldc,
               int n_threads)
 {
-    const kernel_table *t = kernels();
-    const long rows = (long)((m + MC - 1) / MC), cols = (long)((n + NC - 1) / NC);
-    if (rows * cols < 2) n_threads = 1;
-    n_threads = sdm_threads(n_threads);
-#pragma omp parallel for schedule(dynamic) num_threads(n_threads) if (n_threads > 1)
-    for (long tile = 0; tile < rows * cols; tile++) {
-        const size_t i = (size_t)(tile % rows) * MC, j = (size_t)(tile / rows) * NC;
-        const sdm_view at = {a.data + i * a.row, a.row, a.col},
-                       bt = {b.data + j * b.col, b.row, b.col};
-        gemm_block(t, min_size(MC, m - i), min_size(NC, n - j), k, at, bt, add, c + i * ldc + j,
-                   ldc);
-    }
+    gemm g = {m, n, k, a, b, add, c, ldc, (m + MC - 1) / MC};
+    sdm_team_run(n_threads, g.rows * ((n + NC - 1) / NC), gemm_block, &g);
 }
 
 void sdm_panel_pack_f32(size_t outputs, size_t k, sdm_view w, float *panels)

@@ -6,30 +6,10 @@
 #include <string.h>
 
 #include "kernels_bytes.h"
+#include "kernels_product.h"
 #include "kernels_table.h"
 #include "kernels_vector.h"
 #include "sdm/internal/kernels.h"
-
-#define NV 2 /* registers along a row of the register tile */
-#define NR (NV * VW)
-
-static void micro(size_t k, const float *a, const float *b, float *c, size_t ldc, int add)
-{
-    vec acc[MR][NV];
-    for (int i = 0; i < MR; i++)
-        for (int j = 0; j < NV; j++)
-            acc[i][j] = add ? load(c + (size_t)i * ldc + j * VW) : (vec){0};
-    for (size_t p = 0; p < k; p++, a += MR, b += NR) {
-        vec row[NV];
-        for (int j = 0; j < NV; j++) row[j] = load(b + j * VW);
-        for (int i = 0; i < MR; i++) {
-            const vec s = splat(a[i]);
-            for (int j = 0; j < NV; j++) acc[i][j] += s * row[j];
-        }
-    }
-    for (int i = 0; i < MR; i++)
-        for (int j = 0; j < NV; j++) store(c + (size_t)i * ldc + j * VW, acc[i][j]);
-}
 
 #ifndef LOAD_HALF
 typedef uint16_t vech __attribute__((vector_size(2 * VW)));
@@ -249,9 +229,7 @@ static void copy_floats(size_t n, const float *y, float *to, bool stream)
 }
 
 const kernel_table TABLE = {.name = ISA,
-                            .mr = MR,
-                            .nr = NR,
-                            .micro = micro,
+                            .product = product,
                             .panel_f32 = panel_f32,
                             .panel_f16 = panel_f16,
                             .back_f32 = back_f32,

@@ -10,9 +10,9 @@
 
 typedef struct kernel_table {
     const char *name;
-    size_t mr, nr; /* rows and columns of the tile of c that stays in registers in sdm_gemm() */
-    /* Computes one tile: c[mr][ldc] = a * b, or += with `add`, for packed a[k][mr] and b[k][nr]. */
-    void (*micro)(size_t k, const float *a, const float *b, float *c, size_t ldc, int add);
+    /* Computes a block of sdm_gemm() in the calling thread. */
+    void (*product)(size_t m, size_t n, size_t k, sdm_view a, sdm_view b, bool add, float *c,
+                    size_t ldc);
     /* Implement sdm_panel_*() and sdm_panel_back_*(). `outputs` is a multiple of SDM_PANEL. */
     void (*panel_f32)(size_t batch, size_t outputs, size_t k, const float *w, const float *x,
                       size_t ldx, float *y, size_t ldy);

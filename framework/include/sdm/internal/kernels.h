@@ -24,8 +24,8 @@ typedef struct sdm_view {
 } sdm_view;
 
 /* Matrix product: c[M][ldc] = a * b, or c += a * b with `add`; a is M x K, b is K x N. A product
-   with K = 0 is zero. Up to n_threads threads share the tiles of c (0: the OpenMP default). The K
-   products of each element are summed in ascending order, in blocks of fixed size. */
+   with K = 0 is zero. Up to n_threads threads of the caller's team (sdm/internal/team.h) share the
+   blocks of c. The K products of each element are summed in ascending order. */
 void sdm_gemm(size_t m, size_t n, size_t k, sdm_view a, sdm_view b, bool add, float *c, size_t ldc,
               int n_threads);
 

@@ -14,8 +14,8 @@
 #include "state/new_samples.h"
 #include "state/progress.h"
 
-/* Decay of Adam's second moments. In trials on the cochlea 0.99 left a tenth less error than 0.999
-   after the same number of steps. */
+/* Decay of Adam's second moments. In one trial on the cochlea (3,000 steps, rate 3e-3) 0.99 left 7
+   % less error beyond that of the bases than 0.999. */
 #define MODE_FIT_DECAY 0.99
 
 /* Memory of a batch. */

@@ -7,7 +7,6 @@
 
 #include "data/dataset_fill.h"
 #include "sdm/internal/clock.h"
-#include "sdm/internal/file.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
 #include "set_up.h"
@@ -98,34 +97,27 @@ static double merit(const sdm_accuracy *a)
     return sqrt(a->rmse_near_mm * a->rmse_near_mm + 0.01 * a->mse_mm2);
 }
 
-static sdm_status write_record(const trainer *t, const entrant *e, size_t n, const entrant *best,
-                               sdm_error *err)
+/* Appends a line with the result to t->metrics. */
+static sdm_status add_record(const trainer *t, const entrant *e, size_t n, const entrant *best,
+                             sdm_error *err)
 {
-    char path[SDM_PATH_TEXT_MAX + 32];
-    snprintf(path, sizeof path, "%s/auto.json", t->folder);
+    char key[64];
     sdm_json j = {0};
     sdm_json_open(&j, NULL, '{');
+    sdm_json_text(&j, "phase", "auto");
     sdm_json_text(&j, "kind", best->name);
-    sdm_json_open(&j, "trials", '[');
     for (size_t i = 0; i < n; i++) {
         if (!e[i].finished) continue;
-        sdm_json_open(&j, NULL, '{');
-        sdm_json_text(&j, "kind", e[i].name);
-        sdm_json_real(&j, "rmse_mm", e[i].accuracy.rmse_mm);
-        sdm_json_real(&j, "rmse_near_mm", e[i].accuracy.rmse_near_mm);
-        sdm_json_real(&j, "merit_mm", merit(&e[i].accuracy));
-        sdm_json_close(&j, '}');
+        snprintf(key, sizeof key, "%s_rmse_mm", e[i].name);
+        sdm_json_real(&j, key, e[i].accuracy.rmse_mm);
+        snprintf(key, sizeof key, "%s_rmse_near_mm", e[i].name);
+        sdm_json_real(&j, key, e[i].accuracy.rmse_near_mm);
     }
-    sdm_json_close(&j, ']');
     sdm_json_close(&j, '}');
-    sdm_outfile *f = NULL;
-    sdm_status s = j.text.failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for auto.json")
-                                 : sdm_outfile_open(path, &f, err);
-    if (!s) s = sdm_outfile_write(f, j.text.data, j.text.size, err);
-    if (!s) s = sdm_outfile_commit(&f, err);
-    sdm_outfile_discard(&f);
+    if (!j.text.failed) sdm_text_add(t->metrics, "%s\n", j.text.data);
+    const bool failed = j.text.failed || t->metrics->failed;
     sdm_json_dispose(&j);
-    return s;
+    return failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the metrics") : SDM_OK;
 }
 
 sdm_status trainer_race(trainer *t, sdm_config *out, sdm_error *err)
@@ -159,5 +151,5 @@ sdm_status trainer_race(trainer *t, sdm_config *out, sdm_error *err)
     *out = *t->config;
     sdm_config_choose_kind(out, best->kind);
     trainer_message(t, "auto: network.kind is %s", best->name);
-    return write_record(t, e, n, best, err);
+    return add_record(t, e, n, best, err);
 }

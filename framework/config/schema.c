@@ -237,6 +237,9 @@ static const sdm_field TRAIN[] = {
             "samples per step during refinement"),
     OF_KIND(BASES, REAL, "refine_rate", train.refine_rate, 1e-9, 1, "3e-4", "",
             "learning rate during refinement"),
+    ROW("patience", REAL, train.patience, 0, 1, "0.3", "",
+        "a phase of the training ends when for this fraction of its budget the error on held-out "
+        "shapes has not fallen by 1 %; 0: never"),
     ROW("average", REAL, train.average, 0, 0.99999, "0.998", "",
         "decay of the moving average of the weights; 0: no average"),
     ROW("evaluate_seconds", REAL, train.evaluate_seconds, 0.001, 1e6, "20", "s",

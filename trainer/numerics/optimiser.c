@@ -13,11 +13,12 @@ enum { AVERAGE_EVERY = 8 };
 
 sdm_status trainer_parameters_create(parameters *p, size_t n, sdm_error *err)
 {
-    *p = (parameters){.n = n};
+    *p = (parameters){.n = n, .best_mse = INFINITY, .gain_mse = INFINITY};
     sdm_status s = SDM_ALLOC(&p->w, n, "weights", err);
     if (!s) s = SDM_ALLOC(&p->m, n, "optimiser state", err);
     if (!s) s = SDM_ALLOC(&p->v, n, "optimiser state", err);
     if (!s) s = SDM_ALLOC(&p->average, n, "weight average", err);
+    if (!s) s = SDM_ALLOC(&p->best, n, "best weights", err);
     return s;
 }
 
@@ -27,6 +28,7 @@ void trainer_parameters_dispose(parameters *p)
     sdm_free(p->m);
     sdm_free(p->v);
     sdm_free(p->average);
+    sdm_free(p->best);
     *p = (parameters){0};
 }
 

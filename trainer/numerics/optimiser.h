@@ -8,13 +8,16 @@
 
 #include "sdm/status.h"
 
-/* n weights w with Adam's first and second moments m and v, and the running average of w. */
+/* n weights w with Adam's first and second moments m and v, the running average of w, and the best
+   average of a phase (state/best.h). */
 typedef struct parameters {
     size_t n;
-    float *w, *m, *v, *average;
+    float *w, *m, *v, *average, *best;
+    double best_mse, gain_mse; /* smallest held-out error; the last one that counted as a gain */
+    double gain_at;            /* fraction of the phase's budget at which it was found */
 } parameters;
 
-/* Allocates all arrays, filled with 0. Call trainer_parameters_dispose() also after an error. */
+/* Allocates all arrays, filled with 0; the errors are infinite. Call trainer_parameters_dispose() also after an error. */
 sdm_status trainer_parameters_create(parameters *p, size_t n, sdm_error *err);
 void trainer_parameters_dispose(parameters *p);
 

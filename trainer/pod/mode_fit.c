@@ -10,6 +10,7 @@
 #include "sdm/internal/kernels.h"
 #include "sdm/internal/team.h"
 #include "sdm/memory.h"
+#include "state/best.h"
 #include "state/checkpoint.h"
 #include "state/new_samples.h"
 #include "state/progress.h"
@@ -204,7 +205,8 @@ sdm_status trainer_mode_fit_run(pod_state *pod, sdm_error *err)
     sdm_status s = mode_batch_create(pod, batch, &b, err);
     trainer_speed speed = trainer_speed_start(t);
     double at = mode_fit_fraction(pod);
-    while (!s && at < 1) {
+    bool done = false;
+    while (!s && at < 1 && !done) {
         // new maps, or stop
         if ((s = trainer_samples_take(t, trainer_samples_wanted(t, at), err))) break;
         if (trainer_cancelled(t)) {
@@ -230,12 +232,18 @@ sdm_status trainer_mode_fit_run(pod_state *pod, sdm_error *err)
         if (trainer_evaluation_due(t, now)) {
             t->heldout_mse = modes_evaluate(pod, pod->mode_fit.average, &b, batch);
             t->last_evaluation = now;
+            done = trainer_best_note(t, &pod->mode_fit, at, t->heldout_mse);
             if ((s = trainer_metric(t, rate, err))) break;
         }
         trainer_speed_report(t, &speed, batch, now);
         s = trainer_checkpoint_if_due(t, now, err);
     }
-    if (!s) t->heldout_mse = modes_evaluate(pod, pod->mode_fit.average, &b, batch);
+    if (!s) {
+        t->heldout_mse = modes_evaluate(pod, pod->mode_fit.average, &b, batch);
+        trainer_best_note(t, &pod->mode_fit, at, t->heldout_mse);
+        trainer_best_restore(t, &pod->mode_fit);
+    }
+    if (!s && done) trainer_ended_early(t, at);
     mode_batch_dispose(&b);
     return s;
 }

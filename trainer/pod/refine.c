@@ -14,6 +14,7 @@
 #include "sdm/internal/kernels.h"
 #include "sdm/internal/team.h"
 #include "sdm/memory.h"
+#include "state/best.h"
 #include "state/checkpoint.h"
 #include "state/new_samples.h"
 #include "state/progress.h"
@@ -386,7 +387,10 @@ sdm_status trainer_refine_run(pod_state *pod, sdm_error *err)
     sdm_status s = refine_batch_create(pod, (size_t)c->train.refine_batch, &b, err);
     trainer_speed speed = trainer_speed_start(t);
     double at = refine_fraction(t, pod->refine_end);
-    while (!s && at < 1) {
+    bool done = false;
+    // the start counts too: the refinement must not lose what least squares have found
+    if (t->phase_step == 0) trainer_best_note(t, &pod->refine, 0, t->heldout_mse);
+    while (!s && at < 1 && !done) {
         // new maps, or stop
         if ((s = trainer_samples_take(t, t->data.n_start + t->data.n_online, err))) break;
         if (trainer_cancelled(t)) {
@@ -413,11 +417,18 @@ sdm_status trainer_refine_run(pod_state *pod, sdm_error *err)
             if ((s = trainer_refine_evaluate(pod, pod->refine.average, &t->heldout_mse, err)))
                 break;
             t->last_evaluation = now;
+            done = trainer_best_note(t, &pod->refine, at, t->heldout_mse);
             if ((s = trainer_metric(t, rate, err))) break;
         }
         trainer_speed_report(t, &speed, b.rows, now);
         s = trainer_checkpoint_if_due(t, now, err);
     }
+    if (!s) s = trainer_refine_evaluate(pod, pod->refine.average, &t->heldout_mse, err);
+    if (!s) {
+        trainer_best_note(t, &pod->refine, at, t->heldout_mse);
+        trainer_best_restore(t, &pod->refine);
+    }
+    if (!s && done) trainer_ended_early(t, at);
     refine_batch_dispose(&b);
     return s;
 }

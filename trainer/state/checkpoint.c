@@ -68,6 +68,7 @@ sdm_status trainer_checkpoint_write(trainer *t, sdm_error *err)
                           .n_start = (int64_t)t->data.n_start,
                           .n_taken = (int64_t)t->data.n_taken,
                           .bases = t->kind->fingerprint(t)};
+    const double best[3] = {p->best_mse, p->gain_mse, p->gain_at};
     sdm_text config = {0};
     sdm_status s = trainer_export_dump(t, &config, err);
     // sections; the sample plan is stored only if it depends on observations
@@ -80,6 +81,8 @@ sdm_status trainer_checkpoint_write(trainer *t, sdm_error *err)
         {"moment1", p->m, p->n * sizeof *p->m},
         {"moment2", p->v, p->n * sizeof *p->v},
         {"average", p->average, p->n * sizeof *p->average},
+        {"best", p->best, p->n * sizeof *p->best},
+        {"best.errors", best, sizeof best},
         {"points", t->data.plan.point, t->data.plan.n_planned * sizeof *t->data.plan.point},
         {"errors", t->data.plan.error, t->data.plan.n_planned * sizeof *t->data.plan.error}};
     uint8_t *bytes = NULL;
@@ -350,13 +353,25 @@ sdm_status trainer_checkpoint_weights(trainer *t, sdm_error *err)
     const struct {
         const char *name;
         float *to;
-    } arrays[] = {{"weights", p->w}, {"moment1", p->m}, {"moment2", p->v}, {"average", p->average}};
-    for (int i = 0; i < 4 && !s; i++) {
+    } arrays[] = {{"weights", p->w},
+                  {"moment1", p->m},
+                  {"moment2", p->v},
+                  {"average", p->average},
+                  {"best", p->best}};
+    // a checkpoint of an older version has no best weights
+    const sdm_section *errors = section_find(&o, "best.errors");
+    const int n_arrays = errors && errors->size == 3 * sizeof(double) ? 5 : 4;
+    if (n_arrays == 5) {
+        double best[3];
+        memcpy(best, errors->data, sizeof best);
+        p->best_mse = best[0], p->gain_mse = best[1], p->gain_at = best[2];
+    }
+    for (int i = 0; i < n_arrays && !s; i++) {
         const sdm_section *section = section_find(&o, arrays[i].name);
-        if (section->size != p->n * sizeof(float))
+        if (!section || section->size != p->n * sizeof(float))
             s = sdm_fail(err, SDM_E_FORMAT,
                          "%s/checkpoint.sdmc: %zu bytes of %s, the network has %zu", t->folder,
-                         section->size, arrays[i].name, p->n * sizeof(float));
+                         section ? section->size : 0, arrays[i].name, p->n * sizeof(float));
         else
             memcpy(arrays[i].to, section->data, section->size);
     }

@@ -190,6 +190,7 @@ static sdm_status curve_write(const trainer *t, sdm_error *err)
     if (!s) {
         for (const char *p = t->metrics->data; p && *p; p = strchr(p, '\n') + 1) {
             step[n] = metric_number(p, "\"step\": ");
+            if (!isfinite(step[n])) continue; // the result of the race
             loss[n] = metric_number(p, "\"loss_mm2\": ");
             heldout[n++] = metric_number(p, "\"heldout_mse_mm2\": ");
         }

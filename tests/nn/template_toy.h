@@ -117,7 +117,8 @@ static inline sdm_template_part *toy_add(toy *t, const body *o, int parent,
                                       .near = *near,
                                       .far = *far,
                                       .near_nodes = body_nodes(o, near),
-                                      .far_nodes = body_nodes(o, far)};
+                                      .far_nodes = body_nodes(o, far),
+                                      .sag_reach = 1e9}; // all bodies are convex
     t->spec.n_numbers += sdm_template_frame_numbers(frame);
     assert_true(t->spec.n_numbers <= NUMBERS_MAX);
     return &t->parts[c];

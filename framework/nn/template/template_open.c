@@ -5,21 +5,16 @@
 #include "sdm/memory.h"
 #include "template_internal.h"
 
-// largest number of nodes of a lattice along an axis, and of all of them: the kernels compute the
-// index of a node's four floats in 32 bits
-#define NODES_MAX 4096
-#define LATTICE_NODES_MAX (UINT64_C(1) << 28)
-
 static void read_lattice(sdm_lines *lines, const char *key, uint32_t least, sdm_lattice *l)
 {
     double v[7] = {0};
     sdm_lines_reals(lines, key, v, 7);
     for (int a = 0; a < 3; a++) {
-        if (!(v[a] >= least && v[a] <= NODES_MAX && fabs(v[3 + a]) <= 1e9)) lines->failed = true;
+        if (!(v[a] >= least && v[a] <= SDM_TEMPLATE_MAX_SIDE && fabs(v[3 + a]) <= 1e9)) lines->failed = true;
         l->n[a] = lines->failed ? least : (uint32_t)v[a];
         l->origin[a] = v[3 + a];
     }
-    if ((uint64_t)l->n[0] * l->n[1] * l->n[2] > LATTICE_NODES_MAX) lines->failed = true;
+    if ((uint64_t)l->n[0] * l->n[1] * l->n[2] > SDM_TEMPLATE_MAX_NODES) lines->failed = true;
     l->spacing = v[6];
     if (!(l->spacing > 1e-9 && l->spacing < 1e9)) lines->failed = true;
 }

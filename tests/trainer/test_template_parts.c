@@ -1,6 +1,6 @@
 /* The design of a template network from meshes: components, parts with their frames and parents,
  * shapes whose vertices do not correspond.
- * Tests: design.c family.c parts.c template_maps.c warp_modes.c */
+ * Tests: design.c family.c template_parts.c template_maps.c warp_modes.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -10,7 +10,7 @@
 
 #include "sdm/internal/heap.h"
 #include "template/design.h"
-#include "template/parts.h"
+#include "template/template_parts.h"
 #include "template_shapes.h"
 
 static const sdm_distribution uniform[RING_PARAMS];

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "motion.h"
-#include "parts.h"
+#include "template_parts.h"
 #include "regression.h"
 #include "sdm/memory.h"
 #include "template_maps.h"

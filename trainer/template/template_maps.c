@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "motion.h"
-#include "parts.h"
+#include "template_parts.h"
 #include "sdm/exact.h"
 #include "sdm/memory.h"
 

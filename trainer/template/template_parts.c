@@ -1,5 +1,5 @@
 /* Finds the parts of a shape from its meshes. */
-#include "parts.h"
+#include "template_parts.h"
 
 #include <math.h>
 #include <string.h>

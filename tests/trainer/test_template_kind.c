@@ -1,6 +1,7 @@
 /* Training of the template network: accuracy without a training step, accuracy with a correction,
- * the same bits for any number of threads and after a resume.
- * Tests: design.c template_kind.c template_maps.c warp_modes.c */
+ * the same bits for any number of threads and after a resume, the choice of
+ * the kind.
+ * Tests: design.c race.c set_up.c template_kind.c template_maps.c warp_modes.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -130,6 +131,53 @@ static void resume_is_bit_exact(void **state)
     sdm_instance_free(shape);
 }
 
+static char said[4096];
+
+static void listen(void *user, const char *text)
+{
+    (void)user;
+    strncat(said, text, sizeof said - strlen(said) - 2);
+    strcat(said, "\n");
+}
+
+// network.kind: auto takes the template where it is exact, and pod where vertices do not correspond.
+static void kind_is_chosen(void **state)
+{
+    (void)state;
+    for (int which = 0; which < 2; which++) {
+        mistaken = which ? COUNT : NONE;
+        strange = mechanism_params[0].def;
+        sdm_instance *shape = instance_of(&mechanism);
+        uint64_t model[2];
+        for (int threads = 1; threads <= 2; threads++) {
+            sdm_config c;
+            sdm_error e = {0};
+            read_config(&c, mechanism_text,
+                        (const char *const[]){"network.kind=auto", "train.steps=20",
+                                              "grid.size=[28, 25, 22]", "grid.spacing=0.7"},
+                        4);
+            c.threads = c.data.workers = threads;
+            said[0] = '\0';
+            run_files_remove();
+            const sdm_train_hooks hooks = {.message = listen};
+            sdm_train_report r;
+            if (sdm_train(&c, shape, folder, false, &hooks, &r, &e)) fail_msg("%s", e.text);
+            if (!strstr(said, which ? "network.kind is pod" : "network.kind is template"))
+                fail_msg("%s", said);
+            if (which) assert_non_null(strstr(said, "vertices do not correspond"));
+            assert_true(exists("auto.json"));
+            model[threads - 1] = hash_of("model.sdm");
+            sdm_model *m;
+            assert_int_equal(sdm_model_open(r.model_path, &m, NULL), SDM_OK);
+            assert_string_equal(sdm_model_get_info(m)->kind, which ? "pod" : "template");
+            sdm_model_free(m);
+        }
+        assert_true(model[0] == model[1]);
+        sdm_instance_free(shape);
+    }
+    mistaken = NONE;
+}
+
 // A shape whose vertices do not correspond is refused before any file is written.
 static void other_meshes_are_refused(void **state)
 {
@@ -153,6 +201,6 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(mechanism_needs_no_training), cmocka_unit_test(ring_reaches_its_accuracy),
         cmocka_unit_test(same_bits_for_threads), cmocka_unit_test(resume_is_bit_exact),
-        cmocka_unit_test(other_meshes_are_refused)};
+        cmocka_unit_test(kind_is_chosen), cmocka_unit_test(other_meshes_are_refused)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

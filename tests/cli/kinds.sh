@@ -9,9 +9,10 @@ data: {static: 2, online: 16, start: 24, holdout: 4}
 train: {steps: 20, batch: 4}
 END
 
-for kind in sdmnn deepsdf imnet; do
+for kind in sdmnn deepsdf imnet template; do
     small="network.width=16 network.depth=2"
     [ $kind = sdmnn ] && small="$small network.channels=4"
+    [ $kind = template ] && small="$small shape.name=ellipsoid" # too few voxels for the warp of a capsule
     # shellcheck disable=SC2086 # several words
     expect 0 - sdmgen train base.yaml network.kind=$kind $small --out $kind --json --quiet
     model=$kind/model.sdm

@@ -26,16 +26,17 @@ END
 cat >ell.yaml <<'END'
 shape: {name: ellipsoid, options: {edge: 0.6}, ranges: {rx: [3, 4.2], ry: [2.2, 3], rz: [1.5, 2.2]}}
 grid: {size: [26, 22, 18], spacing: 0.45}
-network: {depth: 1, width: 16, rank: 8, modes: 16, degree: 2, input_degree: 2}
+network: {kind: pod, depth: 1, width: 16, rank: 8, modes: 16, degree: 2, input_degree: 2}
 data: {static: 2, online: 64, start: 96, holdout: 8}
 train: {steps: 60, batch: 16, refine_batch: 8}
 seed: 3
 END
 r train_pod train tiny.yaml --out pod --json -q
 r train_ell train ell.yaml --out ell --json -q --threads 1
-for k in sdmnn deepsdf imnet; do small="network.width=16 network.depth=2"; [ $k = sdmnn ] && small="$small network.channels=4"
+for k in sdmnn deepsdf imnet template; do small="network.width=16 network.depth=2"; [ $k = sdmnn ] && small="$small network.channels=4"
+  [ $k = template ] && small="$small shape.name=ellipsoid"
   r train_$k train base.yaml network.kind=$k $small --out $k --json -q; done
-for m in pod ell sdmnn deepsdf imnet; do
+for m in pod ell sdmnn deepsdf imnet template; do
   r info_$m info $m/model.sdm --json
   r gen_$m generate $m/model.sdm --json -o $m.nii -o $m.nii.gz -o $m.nrrd -o $m.mha -o $m.npy -o $m.ply -o $m.stl -o $m.obj -o $m.off -o $m.vdb --gradient $m.g.npy --jacobian $m.j.npy --check
   r gend_$m generate $m/model.sdm -o $m.d.vdb --dense --half --json

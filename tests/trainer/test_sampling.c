@@ -169,7 +169,7 @@ static void without_errors_all_points_are_taken(void **state)
 static const char base[] =
     "shape: {name: capsule}\n"
     "grid: {size: [12, 10, 10], spacing: 1.2}\n"
-    "network: {depth: 2, width: 16, rank: 4, modes: 16, degree: 2, input_degree: 2}\n"
+    "network: {kind: pod, depth: 2, width: 16, rank: 4, modes: 16, degree: 2, input_degree: 2}\n"
     "data: {static: 0, start: 60, online: 200, holdout: 8, memory_gb: 0.5, sampling: error}\n"
     "train: {steps: 150, batch: 8, refine: 0.3, refine_batch: 8, average: 0.99}\n";
 

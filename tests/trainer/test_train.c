@@ -22,7 +22,8 @@
 static const char base[] =
     "shape: {name: capsule}\n"
     "grid: {size: [20, 18, 16], spacing: 0.8}\n"
-    "network: {depth: 2, width: 24, rank: 6, block: 8, modes: 32, degree: 3, input_degree: 3}\n"
+    "network: {kind: pod, depth: 2, width: 24, rank: 6, block: 8, modes: 32, degree: 3,\n"
+    "  input_degree: 3}\n"
     "data: {static: 3, start: 150, online: 100, holdout: 20, memory_gb: 0.5}\n"
     "train: {steps: 1200, batch: 32, refine: 0.5, refine_batch: 8, average: 0.99}\n";
 

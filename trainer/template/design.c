@@ -28,9 +28,8 @@ static sdm_status sample_motions(const template_design *d, size_t n, motion *fra
     sdm_status s = SDM_OK;
     for (size_t i = 0; i < n && !s; i++) {
         double p[SDM_POD_MAX_PARAMS];
-        bool same;
         trainer_family_params(&d->family, i, p);
-        s = trainer_family_mesh(&d->family, p, &mesh, &same, err);
+        s = trainer_family_mesh(&d->family, p, &mesh, err);
         for (size_t c = 0; c < d->n_parts && !s; c++)
             trainer_template_motion(d, c, mesh.vert, &frames[c * n + i]);
     }

@@ -102,12 +102,15 @@ void trainer_family_params(const family *f, size_t index, double *p)
                       f->n_params, p);
 }
 
-sdm_status trainer_family_mesh(const family *f, const double *p, sdm_mesh *mesh, bool *same,
-                               sdm_error *err)
+sdm_status trainer_family_mesh(const family *f, const double *p, sdm_mesh *mesh, sdm_error *err)
 {
     const sdm_status s = sdm_instance_mesh(f->shape, p, mesh, err);
     if (s) return s;
-    *same = mesh->n_vert == f->base.n_vert && mesh->n_tri == f->base.n_tri &&
-            !memcmp(mesh->tri, f->base.tri, 3 * mesh->n_tri * sizeof *mesh->tri);
-    return SDM_OK;
+    if (mesh->n_vert == f->base.n_vert && mesh->n_tri == f->base.n_tri &&
+        !memcmp(mesh->tri, f->base.tri, 3 * mesh->n_tri * sizeof *mesh->tri))
+        return SDM_OK;
+    return sdm_fail(err, SDM_E_UNSUPPORTED,
+                    "shape '%s': the numbers of vertices or the triangles depend on the "
+                    "parameters, so vertices do not correspond",
+                    sdm_instance_shape(f->shape)->name);
 }

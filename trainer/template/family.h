@@ -27,7 +27,6 @@ void trainer_family_dispose(family *f);
 /* p[n_params] = random parameters number `index`. */
 void trainer_family_params(const family *f, size_t index, double *p);
 
-/* *mesh = the mesh at p. *same: it has as many vertices as the base mesh and the same triangles, so
-   that its vertices correspond to those of the base mesh. */
-sdm_status trainer_family_mesh(const family *f, const double *p, sdm_mesh *mesh, bool *same,
-                               sdm_error *err);
+/* *mesh = the mesh at p. SDM_E_UNSUPPORTED: it does not have as many vertices as the base mesh and
+   the same triangles, so that its vertices do not correspond to those of the base mesh. */
+sdm_status trainer_family_mesh(const family *f, const double *p, sdm_mesh *mesh, sdm_error *err);

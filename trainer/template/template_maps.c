@@ -23,15 +23,21 @@ static void box_add(box *b, const double x[3])
 
 static const box EMPTY = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
 
-static sdm_lattice lattice_of(const box *b, double margin, double spacing)
+// *l = the lattice of the given spacing around a box. false: it has more than `nodes` nodes.
+static bool lattice_of(const box *b, double margin, double spacing, double nodes, sdm_lattice *l)
 {
-    sdm_lattice l = {.spacing = spacing};
+    double cells[3], count = 1;
+    *l = (sdm_lattice){.spacing = spacing};
     for (int a = 0; a < 3; a++) {
-        const double cells = fmax(1, ceil((b->max[a] - b->min[a] + 2 * margin) / spacing));
-        l.n[a] = (uint32_t)cells + 1;
-        l.origin[a] = 0.5 * (b->min[a] + b->max[a]) - 0.5 * cells * spacing;
+        cells[a] = fmax(1, ceil((b->max[a] - b->min[a] + 2 * margin) / spacing));
+        if (!(cells[a] < SDM_TEMPLATE_MAX_SIDE)) return false;
+        count *= cells[a] + 1;
     }
-    return l;
+    for (int a = 0; a < 3; a++) {
+        l->n[a] = (uint32_t)cells[a] + 1;
+        l->origin[a] = 0.5 * (b->min[a] + b->max[a]) - 0.5 * cells[a] * spacing;
+    }
+    return count <= nodes;
 }
 
 // *nodes = new array: exact distance and gradient at the nodes
@@ -88,9 +94,8 @@ static sdm_status grid_boxes(const template_design *d, box *boxes, sdm_error *er
     for (size_t c = 0; c < d->n_parts; c++) boxes[c] = EMPTY;
     for (size_t i = 0; i < SAMPLES && !s; i++) {
         double p[SDM_POD_MAX_PARAMS];
-        bool same;
         trainer_family_params(&d->family, i, p);
-        s = trainer_family_mesh(&d->family, p, &mesh, &same, err);
+        s = trainer_family_mesh(&d->family, p, &mesh, err);
         for (size_t c = 0; c < d->n_parts && !s; c++) {
             motion m;
             trainer_template_motion(d, c, mesh.vert, &m);
@@ -156,13 +161,14 @@ sdm_status trainer_template_maps(template_design *d, double margin, sdm_error *e
         box b = EMPTY;
         for (size_t k = d->first[c]; k < d->first[c + 1]; k++)
             box_add(&b, d->family.base.vert + 3 * d->vertices[k]);
-        p->near = lattice_of(&b, margin * h, h);
+        if (!lattice_of(&b, margin * h, h, SDM_TEMPLATE_MAX_NODES, &p->near))
+            return sdm_fail(err, SDM_E_UNSUPPORTED,
+                            "shape '%s': too large for a template with the spacing of the grid",
+                            sdm_instance_shape(d->family.shape)->name);
         // a warp moves the grid's voxels by as much as the vertices: the margin of the warp's box
         const double extra = p->n_modes ? 2 * p->warp.spacing : h;
         double spacing = 4 * h;
-        for (p->far = lattice_of(&reach[c], extra, spacing);
-             sdm_lattice_count(&p->far) > FAR_NODES; p->far = lattice_of(&reach[c], extra, spacing))
-            spacing *= 1.2;
+        while (!lattice_of(&reach[c], extra, spacing, FAR_NODES, &p->far)) spacing *= 1.2;
         sdm_mesh mesh = {0};
         sdm_exact *exact = NULL;
         const sdm_exact_opts opts = {.n_threads = d->family.n_threads};

@@ -19,7 +19,7 @@ double trainer_template_motion(const template_design *d, size_t c, const double 
     return 0;
 }
 
-// Lists the vertices of each component as a part; one part with all vertices if `whole`.
+// Lists the vertices of each component as a part; one part with those of all components if `whole`.
 static void list_vertices(template_design *d, bool whole)
 {
     const size_t n = d->family.base.n_vert;
@@ -28,7 +28,8 @@ static void list_vertices(template_design *d, bool whole)
     for (size_t c = 0; c < d->n_parts; c++) {
         d->first[c] = at;
         for (size_t v = 0; v < n; v++)
-            if (whole || d->family.component[v] == c) d->vertices[at++] = (uint32_t)v;
+            if (whole ? d->family.component[v] != UINT32_MAX : d->family.component[v] == c)
+                d->vertices[at++] = (uint32_t)v;
     }
     d->first[d->n_parts] = at;
 }
@@ -46,14 +47,8 @@ static sdm_status measure(const template_design *d, residuals *r, sdm_error *err
     sdm_status s = SDM_OK;
     *r = (residuals){0};
     for (size_t i = 0; i < SAMPLES && !s; i++) {
-        bool same;
         trainer_family_params(&d->family, i, p);
-        s = trainer_family_mesh(&d->family, p, &mesh, &same, err);
-        if (!s && !same)
-            s = sdm_fail(err, SDM_E_UNSUPPORTED,
-                         "shape '%s': the numbers of vertices or the triangles depend on the "
-                         "parameters, so vertices do not correspond",
-                         sdm_instance_shape(d->family.shape)->name);
+        s = trainer_family_mesh(&d->family, p, &mesh, err);
         for (size_t c = 0; c < d->n_parts && !s; c++) {
             const uint32_t *v = d->vertices + d->first[c];
             const size_t n = d->first[c + 1] - d->first[c];
@@ -117,8 +112,7 @@ static double box_distance(const motion *a, const motion *b, const double min[3]
 static sdm_status motions_at(const template_design *d, const double *p, sdm_mesh *mesh, motion *m,
                              sdm_error *err)
 {
-    bool same;
-    const sdm_status s = trainer_family_mesh(&d->family, p, mesh, &same, err);
+    const sdm_status s = trainer_family_mesh(&d->family, p, mesh, err);
     for (size_t c = 0; c < d->n_parts && !s; c++)
         trainer_template_motion(d, c, mesh->vert, &m[c]);
     m[d->n_parts] = (motion){{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
@@ -252,11 +246,29 @@ static sdm_status order_parts(template_design *d, const dependence *dep, sdm_err
     return SDM_OK;
 }
 
+// True if a component is inside out, as the surface of a cavity is: the solid is then not the union
+// of the components. At most SDM_TEMPLATE_MAX_PARTS components.
+static bool has_cavity(const family *f)
+{
+    double volume[SDM_TEMPLATE_MAX_PARTS] = {0};
+    for (size_t t = 0; t < f->base.n_tri; t++) {
+        const uint32_t *v = f->base.tri + 3 * t;
+        const double *a = f->base.vert + 3 * v[0], *b = f->base.vert + 3 * v[1],
+                     *c = f->base.vert + 3 * v[2];
+        volume[f->component[v[0]]] += a[0] * (b[1] * c[2] - b[2] * c[1]) +
+                                      a[1] * (b[2] * c[0] - b[0] * c[2]) +
+                                      a[2] * (b[0] * c[1] - b[1] * c[0]);
+    }
+    for (size_t c = 0; c < f->n_components; c++)
+        if (volume[c] < 0) return true;
+    return false;
+}
+
 sdm_status trainer_template_parts(template_design *d, double tolerance, sdm_error *err)
 {
     sdm_status s = SDM_ALLOC(&d->vertices, d->family.base.n_vert, "parts", err);
     if (s) return s;
-    bool whole = d->family.n_components > SDM_TEMPLATE_MAX_PARTS;
+    bool whole = d->family.n_components > SDM_TEMPLATE_MAX_PARTS || has_cavity(&d->family);
     residuals r;
     list_vertices(d, whole);
     if ((s = measure(d, &r, err))) return s;

@@ -1,7 +1,7 @@
 /* The parts of a shape: components that move alike, with the type and the parent of each frame. */
 #pragma once
 
-#include "design.h"
+#include "template_design.h"
 #include "motion.h"
 
 /* Sets n_parts, vertices, first, and of each part: parent, frame, and n_modes = 1 if it needs a

@@ -18,15 +18,9 @@ static sdm_status displacement(const template_design *d, size_t c, size_t i, con
                                sdm_mesh *mesh, float *out, sdm_error *err)
 {
     double p[SDM_POD_MAX_PARAMS];
-    bool same;
     trainer_family_params(&d->family, i, p);
-    const sdm_status s = trainer_family_mesh(&d->family, p, mesh, &same, err);
+    const sdm_status s = trainer_family_mesh(&d->family, p, mesh, err);
     if (s) return s;
-    if (!same)
-        return sdm_fail(err, SDM_E_UNSUPPORTED,
-                        "shape '%s': the numbers of vertices or the triangles depend on the "
-                        "parameters, so vertices do not correspond",
-                        sdm_instance_shape(d->family.shape)->name);
     for (size_t k = d->first[c]; k < d->first[c + 1]; k++) {
         double y[3];
         const size_t v = d->vertices[k];

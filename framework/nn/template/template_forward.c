@@ -1,18 +1,7 @@
 /* Maps of a template network. No allocation. */
 #include <string.h>
 
-#include "sdm/internal/processor.h"
 #include "template_rows.h"
-
-const template_table *sdm_template_kernels(void)
-{
-#if defined(__x86_64__)
-    const int level = sdm_processor_level();
-    if (level >= SDM_PROCESSOR_AVX512) return &sdm_template_avx512;
-    if (level >= SDM_PROCESSOR_AVX2) return &sdm_template_avx2;
-#endif
-    return &sdm_template_generic;
-}
 
 static size_t correction_bytes(const template_network *k)
 {

@@ -5,18 +5,16 @@
 #include "sdm/memory.h"
 #include "template_internal.h"
 
-// largest number of nodes of a lattice along an axis
-#define NODES_MAX 4096
-
 static void read_lattice(sdm_lines *lines, const char *key, uint32_t least, sdm_lattice *l)
 {
     double v[7] = {0};
     sdm_lines_reals(lines, key, v, 7);
     for (int a = 0; a < 3; a++) {
-        if (!(v[a] >= least && v[a] <= NODES_MAX && fabs(v[3 + a]) <= 1e9)) lines->failed = true;
+        if (!(v[a] >= least && v[a] <= SDM_TEMPLATE_MAX_SIDE && fabs(v[3 + a]) <= 1e9)) lines->failed = true;
         l->n[a] = lines->failed ? least : (uint32_t)v[a];
         l->origin[a] = v[3 + a];
     }
+    if ((uint64_t)l->n[0] * l->n[1] * l->n[2] > SDM_TEMPLATE_MAX_NODES) lines->failed = true;
     l->spacing = v[6];
     if (!(l->spacing > 1e-9 && l->spacing < 1e9)) lines->failed = true;
 }
@@ -55,24 +53,32 @@ static template_level level_of(const sdm_lattice *l, const sdm_lattice *near, co
     return out;
 }
 
+// The section `name`, with `count` elements of `size` bytes; NULL: see sdm_model_weights().
+static const void *read_array(sdm_model *m, const sdm_section *sections, size_t n, const char *name,
+                              uint64_t count, size_t size, sdm_error *err)
+{
+    if (count <= SIZE_MAX / size)
+        return sdm_model_weights(m, sections, n, name, (size_t)count * size, err);
+    sdm_fail(err, SDM_E_FORMAT, "damaged: section '%s' is too large", name);
+    return NULL;
+}
+
 // Points the parts to their arrays in the file.
 static sdm_status bind_arrays(sdm_model *m, const sdm_section *sections, size_t n, sdm_error *err)
 {
     template_network *k = m->network;
-    size_t modes = 0, nodes = 0;
+    uint64_t modes = 0, nodes = 0;
     for (size_t c = 0; c < k->n_parts; c++) {
         const sdm_template_part *p = &k->parts[c];
-        modes += 3 * p->n_modes * (p->n_modes ? sdm_lattice_count(&p->warp) : 0);
-        nodes += 4 * (sdm_lattice_count(&p->near) + sdm_lattice_count(&p->far));
+        if (p->n_modes) modes += (uint64_t)3 * p->n_modes * sdm_lattice_count(&p->warp);
+        nodes += UINT64_C(4) * (sdm_lattice_count(&p->near) + sdm_lattice_count(&p->far));
     }
-    k->functions = sdm_model_weights(m, sections, n, "template.functions",
-                                     k->n_numbers * k->n_terms * sizeof(double), err);
+    k->functions = read_array(m, sections, n, "template.functions",
+                              (uint64_t)k->n_numbers * k->n_terms, sizeof(double), err);
     if (!k->functions) return SDM_E_FORMAT;
-    const float *mode =
-        sdm_model_weights(m, sections, n, "template.modes", modes * sizeof(float), err);
+    const float *mode = read_array(m, sections, n, "template.modes", modes, sizeof(float), err);
     if (!mode) return SDM_E_FORMAT;
-    const float *node =
-        sdm_model_weights(m, sections, n, "template.nodes", nodes * sizeof(float), err);
+    const float *node = read_array(m, sections, n, "template.nodes", nodes, sizeof(float), err);
     if (!node) return SDM_E_FORMAT;
     for (size_t c = 0; c < k->n_parts; c++) {
         sdm_template_part *p = &k->parts[c];
@@ -103,10 +109,13 @@ static sdm_status open_correction(sdm_model *m, const sdm_section *sections, siz
     status = sdm_model_read(copy, s->size, kinds, &k->correction, err);
     if (status) return sdm_fail_in(err, status, "correction");
     const sdm_model_info *i = &k->correction->info;
-    bool fits = i->n_params == m->info.n_params && k->n_parts == 1;
+    bool fits = i->n_params == m->info.n_params && k->n_parts == 1 &&
+                sdm_grid_count(&i->grid) <= INT32_MAX;
     for (size_t p = 0; p < i->n_params && fits; p++)
         fits = i->params[p].min == m->info.params[p].min && i->params[p].max == m->info.params[p].max;
-    for (int a = 0; a < 3; a++) fits &= i->grid.n[a] >= 2 && i->grid.spacing[a] == i->grid.spacing[0];
+    for (int a = 0; a < 3; a++)
+        fits &= i->grid.n[a] >= 2 && i->grid.spacing[a] == i->grid.spacing[0];
+    for (int a = 0; a < 9; a++) fits &= i->grid.dir[a] == (a % 4 == 0);
     if (!fits) return sdm_fail(err, SDM_E_FORMAT, "damaged: the correction is for another model");
     m->info.weight_bytes += i->weight_bytes;
     m->info.macs += i->macs;
@@ -134,6 +143,16 @@ static void expansion_set_up(template_network *k)
     }
 }
 
+// Refuses a grid whose stations would not fit into memory together with those of all derivatives.
+static sdm_status check_stations(const sdm_model *m, sdm_error *err)
+{
+    const template_network *k = m->network;
+    double bytes = sizeof(station) + 12 * sizeof(float) * (1 + (double)m->info.n_params);
+    for (int a = 0; a < 3; a++) bytes *= (double)k->stations[a];
+    if (bytes * SDM_TEMPLATE_MAX_PARTS < (double)(SIZE_MAX / 4)) return SDM_OK;
+    return sdm_fail(err, SDM_E_NOMEM, "the grid has more voxels than memory can hold");
+}
+
 // A rough count: per voxel and part the interpolation, per station the inverse of the warp.
 static double count_macs(const template_network *k, const sdm_grid *grid)
 {
@@ -141,7 +160,7 @@ static double count_macs(const template_network *k, const sdm_grid *grid)
     for (size_t c = 0; c < k->n_parts; c++)
         if (k->parts[c].n_modes)
             n += 3 * (double)k->parts[c].n_modes * (double)sdm_lattice_count(&k->parts[c].warp) +
-                 600 * (double)(k->stations[0] * k->stations[1] * k->stations[2]);
+                 600 * (double)k->stations[0] * (double)k->stations[1] * (double)k->stations[2];
     return n;
 }
 
@@ -165,6 +184,7 @@ static sdm_status open_network(sdm_model *m, sdm_lines *lines, const sdm_section
     // stations: one before the grid, one after it
     for (int a = 0; a < 3; a++)
         k->stations[a] = ((size_t)m->info.grid.n[a] - 1) / k->step + 4;
+    if ((s = check_stations(m, err))) return s;
     if ((s = SDM_ALLOC(&k->exponents, k->n_terms * m->info.n_params, "model polynomials", err)))
         return s;
     sdm_poly_table(m->info.n_params, k->degree, k->exponents);

@@ -322,13 +322,14 @@ static void patch_slopes(slopes_work *s, size_t c, const template_patch *p, floa
 static void patch_map(slopes_work *s, const template_patch *p, float *values)
 {
     template_work *w = &s->w;
-    for (size_t i = 0; i < p->count; i++) s->value[i] = INFINITY, s->nearest[i] = 0;
+    bool first = true;
     for (size_t c = 0; c < w->k->n_parts; c++) {
         if (!(p->active >> c & 1)) continue;
         sdm_template_run(w, c, p);
         for (size_t i = 0; i < p->count; i++)
-            if (w->row.value[i] < s->value[i])
+            if (first || w->row.value[i] < s->value[i])
                 s->value[i] = w->row.value[i], s->nearest[i] = (uint8_t)c;
+        first = false;
     }
     for (size_t z = 0, i = 0; z < p->n[2]; z++)
         for (size_t y = 0; y < p->n[1]; y++, i += p->n[0])

@@ -158,21 +158,23 @@ static void store_metric(const double b[9], float metric[8])
 }
 
 // Turns samples v[n] (quads, `stride` floats apart) into coefficients of the cubic B-spline that
-// interpolates them. At both ends the second derivative is zero.
+// interpolates them, n >= 3. At both ends the second derivative is zero.
 static void spline_prefilter(float *v, size_t n, size_t stride)
 {
-    float factor[512];
-    if (n < 3 || n > 512) return;
-    // (c[i-1] + 4 c[i] + c[i+1]) / 6 = v[i], c[0] = v[0], c[n-1] = v[n-1]: Thomas algorithm
-    factor[0] = 0;
+    // (c[i-1] + 4 c[i] + c[i+1]) / 6 = v[i], c[0] = v[0], c[n-1] = v[n-1]: Thomas algorithm. Its
+    // factors reach their limit, 2 - sqrt(3), within a few steps.
+    enum { FACTORS = 32 };
+    float factor[FACTORS] = {0};
+    for (size_t i = 1; i < FACTORS; i++) factor[i] = 1 / (4 - factor[i - 1]);
     for (size_t i = 1; i + 1 < n; i++) {
-        const float f = 1 / (4 - factor[i - 1]);
-        factor[i] = f;
+        const float f = factor[i < FACTORS ? i : FACTORS - 1];
         for (size_t c = 0; c < 3; c++)
             v[i * stride + c] = (6 * v[i * stride + c] - v[(i - 1) * stride + c]) * f;
     }
-    for (size_t i = n - 2; i > 0; i--)
-        for (size_t c = 0; c < 3; c++) v[i * stride + c] -= factor[i] * v[(i + 1) * stride + c];
+    for (size_t i = n - 2; i > 0; i--) {
+        const float f = factor[i < FACTORS ? i : FACTORS - 1];
+        for (size_t c = 0; c < 3; c++) v[i * stride + c] -= f * v[(i + 1) * stride + c];
+    }
 }
 
 static void prefilter_all(const template_network *k, float *points)

@@ -32,6 +32,9 @@ extern "C" {
 
 #define SDM_TEMPLATE_MAX_PARTS 32
 #define SDM_TEMPLATE_MAX_MODES 256
+/* Nodes of a lattice: along an axis, and all together (indices of four floats have 32 bits). */
+#define SDM_TEMPLATE_MAX_SIDE 4096
+#define SDM_TEMPLATE_MAX_NODES (1 << 28)
 
 /* The relative frame R_c of a part. With the pivot p, which lies still in the parent's frame but
    for the translation t, and the rotation matrix R of the rotation vector w:

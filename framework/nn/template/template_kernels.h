@@ -9,12 +9,12 @@
 /* Rows have room for a multiple of SDM_TEMPLATE_LANES voxels, and for that many more. */
 #define SDM_TEMPLATE_LANES 8
 
-/* A lattice of nodes of a template map. */
+/* A lattice of nodes of a template map, fewer than 2^30. */
 typedef struct template_level {
-    const float *nodes;      /* [nz][ny][nx][4]: distance, gradient */
-    int32_t n[3];            /* at least 2 along each axis */
-    float half;              /* half of the spacing, mm */
-    float scale, offset[3];  /* index in this lattice = scale * (index in `near`) + offset */
+    const float *nodes;     /* [nz][ny][nx][4]: distance, gradient */
+    int32_t n[3];           /* at least 2 along each axis */
+    float half;             /* half of the spacing, mm */
+    float scale, offset[3]; /* index in this lattice = scale * (index in `near`) + offset */
 } template_level;
 
 /* A map on the lattice of the correction. */
@@ -24,11 +24,12 @@ typedef struct template_correction {
     float scale, offset[3]; /* as in template_level */
 } template_correction;
 
-/* Weights that expand values at nodes, `step` voxels apart, into voxels. */
+/* Weights that expand values at nodes, `step` voxels apart, into voxels: cubic B-splines, or
+ * linear. */
 typedef struct template_expansion {
-    int step;                            /* 2 .. SDM_TEMPLATE_LANES */
-    float cubic[4][SDM_TEMPLATE_LANES];  /* B-spline weights of four nodes for each voxel of a cell */
-    float linear[SDM_TEMPLATE_LANES];    /* weight of the second of two nodes */
+    int step;                           /* 2 .. SDM_TEMPLATE_LANES */
+    float cubic[4][SDM_TEMPLATE_LANES]; /* weights of four nodes for each voxel of a cell */
+    float linear[SDM_TEMPLATE_LANES];   /* weight of the second of two nodes */
 } template_expansion;
 
 typedef struct template_table {

@@ -1,0 +1,355 @@
+/* Kernels of the `template` network for every instruction set of the processor: the same bits, and
+ * the formulas of template_kernels.h in double precision. Inputs have exactly the documented room,
+ * so that AddressSanitizer finds reads beyond it. Tests: template_kernels_avx2.c
+ * template_kernels_avx512.c template_kernels_generic.c */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "sdm/internal/processor.h"
+#include "sdm/internal/rng.h"
+#include "template/template_kernels.h"
+
+enum { LENGTH = 40, ROWS = 10 };
+
+static const template_table *tables[3];
+static size_t n_tables;
+
+static double uniform(uint64_t stream, uint64_t i, double low, double high)
+{
+    return low + (high - low) * sdm_rng_uniform(7, stream, i);
+}
+
+static float *numbers(size_t n, uint64_t stream, double low, double high)
+{
+    float *v = malloc(n * sizeof *v);
+    assert_non_null(v);
+    for (size_t i = 0; i < n; i++) v[i] = (float)uniform(stream, i, low, high);
+    return v;
+}
+
+static size_t round_up(size_t n)
+{
+    return (n + SDM_TEMPLATE_LANES - 1) / SDM_TEMPLATE_LANES * SDM_TEMPLATE_LANES;
+}
+
+// Rows of numbers for n voxels, with room for a multiple of SDM_TEMPLATE_LANES.
+typedef struct rows {
+    float *row[ROWS];
+} rows;
+
+static rows rows_new(size_t n, uint64_t stream, double low, double high)
+{
+    rows r;
+    for (size_t i = 0; i < ROWS; i++) r.row[i] = numbers(round_up(n), stream + i, low, high);
+    return r;
+}
+
+static void rows_free(rows *r)
+{
+    for (size_t i = 0; i < ROWS; i++) free(r->row[i]);
+}
+
+static const float *const *in(const rows *r) { return (const float *const *)r->row; }
+
+static void same_bits(const rows *a, const rows *b, size_t n_rows, size_t n)
+{
+    for (size_t i = 0; i < n_rows; i++)
+        assert_memory_equal(a->row[i], b->row[i], n * sizeof(float));
+}
+
+// Indices inside of a lattice of at most 7 nodes and outside of it, on nodes, and special numbers.
+static rows indices(size_t n)
+{
+    static const float special[] = {NAN, INFINITY, -INFINITY, 1e30f, -1e30f, 0, -0.0f, 1, 3, 6, 7};
+    const size_t n_special = sizeof special / sizeof *special;
+    rows u = rows_new(n, 100, -3, 10);
+    for (size_t a = 0; a < 3; a++)
+        for (size_t i = 0; i < n; i++)
+            if (sdm_rng_below(7, 200 + a, i, 3) == 0)
+                u.row[a][i] = special[sdm_rng_below(7, 300 + a, i, n_special)];
+    return u;
+}
+
+/* Two lattices: nodes of their own, and a coarser one. */
+static const int32_t SIZES[2][3] = {{7, 5, 6}, {2, 4, 3}};
+static const float SCALES[2] = {1, 0.4f}, OFFSETS[2][3] = {{0, 0, 0}, {-0.25f, 0.5f, 0.75f}};
+
+static template_level level_new(size_t kind)
+{
+    const int32_t *n = SIZES[kind];
+    template_level l = {.half = 0.75f, .scale = SCALES[kind]};
+    memcpy(l.n, n, sizeof l.n);
+    memcpy(l.offset, OFFSETS[kind], sizeof l.offset);
+    l.nodes = numbers(4 * (size_t)n[0] * (size_t)n[1] * (size_t)n[2], 400, -2, 2);
+    return l;
+}
+
+static template_correction correction_new(size_t kind)
+{
+    const int32_t *n = SIZES[kind];
+    template_correction c = {.scale = SCALES[kind]};
+    memcpy(c.n, n, sizeof c.n);
+    memcpy(c.offset, OFFSETS[kind], sizeof c.offset);
+    c.map = numbers((size_t)n[0] * (size_t)n[1] * (size_t)n[2], 500, -2, 2);
+    return c;
+}
+
+// The eight nodes of the cell of a point and their trilinear weights.
+typedef struct cell {
+    size_t node[8];
+    double weight[8], t[3];
+} cell;
+
+static cell cell_of(const int32_t n[3], float scale, const float offset[3], const rows *u, size_t i)
+{
+    cell c;
+    size_t first[3];
+    for (size_t a = 0; a < 3; a++) {
+        // the index is rounded to single precision, as in the kernels
+        const float scaled = u->row[a][i] * scale, index = scaled + offset[a];
+        double x = isnan(index) ? 0 : (double)index;
+        x = fmin(fmax(x, 0), n[a] - 1);
+        first[a] = (size_t)fmin(floor(x), n[a] - 2);
+        c.t[a] = x - (double)first[a];
+    }
+    for (size_t k = 0; k < 8; k++) {
+        const size_t at[3] = {first[0] + (k & 1), first[1] + (k >> 1 & 1), first[2] + (k >> 2)};
+        c.node[k] = (at[2] * (size_t)n[1] + at[1]) * (size_t)n[0] + at[0];
+        c.weight[k] = 1;
+        for (size_t a = 0; a < 3; a++) c.weight[k] *= k >> a & 1 ? c.t[a] : 1 - c.t[a];
+    }
+    return c;
+}
+
+// out[4] = distance and gradient
+static void lookup_plainly(const template_level *l, const rows *u, size_t i, double out[4])
+{
+    const cell c = cell_of(l->n, l->scale, l->offset, u, i);
+    for (size_t a = 0; a < 4; a++) {
+        out[a] = 0;
+        for (size_t k = 0; k < 8; k++) out[a] += c.weight[k] * (double)l->nodes[4 * c.node[k] + a];
+    }
+    for (size_t a = 0; a < 3; a++) {
+        // change of the derivative along axis a, interpolated along the other two
+        double change = 0;
+        for (size_t k = 0; k < 8; k++)
+            if (k >> a & 1)
+                change += (c.weight[k] + c.weight[k ^ 1u << a]) *
+                          ((double)l->nodes[4 * c.node[k] + 1 + a] -
+                           (double)l->nodes[4 * c.node[k ^ 1u << a] + 1 + a]);
+        out[0] -= (double)l->half * c.t[a] * (1 - c.t[a]) * change;
+    }
+}
+
+static void lookup_is_the_formula_with_the_same_bits(void **state)
+{
+    (void)state;
+    for (size_t kind = 0; kind < 2; kind++)
+        for (size_t n = 1; n <= LENGTH; n++) {
+            const template_level l = level_new(kind);
+            rows u = indices(n), first = rows_new(n, 600, 0, 1);
+            tables[0]->lookup(&l, n, in(&u), first.row[0], first.row + 1);
+            for (size_t i = 0; i < n; i++) {
+                double expected[4];
+                lookup_plainly(&l, &u, i, expected);
+                for (size_t a = 0; a < 4; a++)
+                    assert_true(fabs((double)first.row[a][i] - expected[a]) <= 4e-6);
+            }
+            for (size_t t = 1; t < n_tables; t++) {
+                rows other = rows_new(n, 700, 0, 1);
+                tables[t]->lookup(&l, n, in(&u), other.row[0], other.row + 1);
+                same_bits(&first, &other, 4, n);
+                rows_free(&other);
+            }
+            rows_free(&u);
+            rows_free(&first);
+            free((void *)(uintptr_t)l.nodes);
+        }
+}
+
+// A quadratic function and its gradient at a point in mm.
+static double quadratic(const double x[3], double g[3])
+{
+    g[0] = 0.3 + 0.8 * x[0] - 0.5 * x[1];
+    g[1] = -0.7 - 0.5 * x[0] + 0.6 * x[1] + 0.4 * x[2];
+    g[2] = 0.2 + 0.4 * x[1] - 0.9 * x[2];
+    return 1.5 + 0.3 * x[0] - 0.7 * x[1] + 0.2 * x[2] + 0.4 * x[0] * x[0] + 0.3 * x[1] * x[1] -
+           0.45 * x[2] * x[2] - 0.5 * x[0] * x[1] + 0.4 * x[1] * x[2];
+}
+
+static void lookup_reproduces_quadratic_functions(void **state)
+{
+    (void)state;
+    template_level l = level_new(0);
+    float *nodes = (float *)(uintptr_t)l.nodes;
+    const double spacing = 2 * (double)l.half;
+    for (int z = 0, k = 0; z < l.n[2]; z++)
+        for (int y = 0; y < l.n[1]; y++)
+            for (int x = 0; x < l.n[0]; x++, k++) {
+                double g[3];
+                nodes[4 * k] =
+                    (float)quadratic((const double[3]){spacing * x, spacing * y, spacing * z}, g);
+                for (int a = 0; a < 3; a++) nodes[4 * k + 1 + a] = (float)g[a];
+            }
+    rows u = rows_new(LENGTH, 800, 0, 4), out = rows_new(LENGTH, 900, 0, 1);
+    for (size_t t = 0; t < n_tables; t++) {
+        tables[t]->lookup(&l, LENGTH, in(&u), out.row[0], out.row + 1);
+        for (size_t i = 0; i < LENGTH; i++) {
+            double g[3];
+            const double x[3] = {spacing * (double)u.row[0][i], spacing * (double)u.row[1][i],
+                                 spacing * (double)u.row[2][i]};
+            assert_true(fabs((double)out.row[0][i] - quadratic(x, g)) <= 2e-5);
+            for (size_t a = 0; a < 3; a++)
+                assert_true(fabs((double)out.row[1 + a][i] - g[a]) <= 1e-5);
+        }
+    }
+    rows_free(&u);
+    rows_free(&out);
+    free(nodes);
+}
+
+static void correct_is_trilinear_with_the_same_bits(void **state)
+{
+    (void)state;
+    for (size_t kind = 0; kind < 2; kind++)
+        for (size_t n = 1; n <= LENGTH; n++) {
+            const template_correction c = correction_new(kind);
+            rows u = indices(n), first = rows_new(n, 600, 0, 1), before = rows_new(n, 600, 0, 1);
+            tables[0]->correct(&c, n, in(&u), first.row[0]);
+            for (size_t i = 0; i < n; i++) {
+                const cell at = cell_of(c.n, c.scale, c.offset, &u, i);
+                double expected = (double)before.row[0][i];
+                for (size_t k = 0; k < 8; k++) expected += at.weight[k] * (double)c.map[at.node[k]];
+                assert_true(fabs((double)first.row[0][i] - expected) <= 2e-6);
+            }
+            for (size_t t = 1; t < n_tables; t++) {
+                rows other = rows_new(n, 600, 0, 1);
+                tables[t]->correct(&c, n, in(&u), other.row[0]);
+                same_bits(&first, &other, 1, n);
+                rows_free(&other);
+            }
+            rows_free(&u);
+            rows_free(&first);
+            rows_free(&before);
+            free((void *)(uintptr_t)c.map);
+        }
+}
+
+static void normalise_is_the_formula_with_the_same_bits(void **state)
+{
+    (void)state;
+    for (size_t n = 1; n <= LENGTH; n++) {
+        rows r = rows_new(n, 1000, -0.3, 0.3); // f, g[3], metric[6]
+        for (size_t a = 4; a < 7; a++)
+            for (size_t i = 0; i < n; i++) r.row[a][i] += 1.5f; // positive definite
+        rows first = rows_new(n, 1100, 0, 1);
+        tables[0]->normalise(n, r.row[0], in(&r) + 1, in(&r) + 4, first.row[0]);
+        for (size_t i = 0; i < n; i++) {
+            double v[ROWS];
+            for (size_t a = 0; a < ROWS; a++) v[a] = (double)r.row[a][i];
+            const double G[3][3] = {{v[4], v[9], v[8]}, {v[9], v[5], v[7]}, {v[8], v[7], v[6]}};
+            const double e = 1e-3, trace = (G[0][0] + G[1][1] + G[2][2]) / 3;
+            double above = e * trace, below = e;
+            for (size_t a = 0; a < 3; a++) {
+                below += v[1 + a] * v[1 + a];
+                for (size_t b = 0; b < 3; b++) above += v[1 + a] * G[a][b] * v[1 + b];
+            }
+            assert_true(fabs((double)first.row[0][i] - v[0] / sqrt(above / below)) <= 3e-7);
+        }
+        for (size_t t = 1; t < n_tables; t++) {
+            rows other = rows_new(n, 1000, -0.3, 0.3); // row 0 = f: out may be f
+            tables[t]->normalise(n, other.row[0], in(&r) + 1, in(&r) + 4, other.row[0]);
+            same_bits(&first, &other, 1, n);
+            rows_free(&other);
+        }
+        rows_free(&r);
+        rows_free(&first);
+    }
+}
+
+// The B-spline of a degree over the knots 0, 1, .. (Cox and de Boor).
+static double spline(int degree, double x)
+{
+    if (degree == 0) return x >= 0 && x < 1;
+    return (x * spline(degree - 1, x) + (degree + 1 - x) * spline(degree - 1, x - 1)) / degree;
+}
+
+static template_expansion expansion_new(int step)
+{
+    template_expansion e = {.step = step};
+    for (int i = 0; i < step; i++) {
+        for (int k = 0; k < 4; k++) e.cubic[k][i] = (float)spline(3, 3 - k + (double)i / step);
+        e.linear[i] = (float)i / (float)step;
+    }
+    return e;
+}
+
+// Component c of voxel i: splines of all nodes.
+static double expand_plainly(int step, size_t cells, const float *points, const float *metric,
+                             size_t c, size_t i)
+{
+    const double x = (double)i / step;
+    double sum = 0;
+    for (size_t k = 0; k < cells + 3; k++) // node k lies at x = k - 1
+        sum += c < 3 ? spline(3, x - (double)k + 3) * (double)points[4 * k + c]
+                     : spline(1, x - (double)k + 2) * (double)metric[8 * k + c - 3];
+    return sum;
+}
+
+static void expand_check(int step, size_t cells, size_t n_c)
+{
+    const template_expansion e = expansion_new(step);
+    const size_t n = cells * (size_t)step;
+    float *points = numbers(4 * (cells + 3), 1200, -2, 2),
+          *metric = numbers(8 * (cells + 3), 1300, -2, 2);
+    rows first = rows_new(n + SDM_TEMPLATE_LANES - 1, 1400, 0, 1);
+    tables[0]->expand(&e, cells, points, metric, n_c, first.row);
+    for (size_t c = 0; c < n_c; c++)
+        for (size_t i = 0; i < n; i++)
+            assert_true(fabs((double)first.row[c][i] -
+                             expand_plainly(step, cells, points, metric, c, i)) <= 1e-6);
+    for (size_t t = 1; t < n_tables; t++) {
+        rows other = rows_new(n + SDM_TEMPLATE_LANES - 1, 1500, 0, 1);
+        tables[t]->expand(&e, cells, points, metric, n_c, other.row);
+        same_bits(&first, &other, n_c, n);
+        rows_free(&other);
+    }
+    rows_free(&first);
+    free(points);
+    free(metric);
+}
+
+static void expand_makes_splines_with_the_same_bits(void **state)
+{
+    (void)state;
+    for (int step = 2; step <= SDM_TEMPLATE_LANES; step++)
+        for (size_t cells = 1; cells <= 9; cells++) {
+            expand_check(step, cells, 3);
+            expand_check(step, cells, 9);
+        }
+}
+
+int main(void)
+{
+    tables[n_tables++] = &sdm_template_generic;
+#if defined(__x86_64__)
+    const int level = sdm_processor_level();
+    if (level >= SDM_PROCESSOR_AVX2) tables[n_tables++] = &sdm_template_avx2;
+    if (level >= SDM_PROCESSOR_AVX512) tables[n_tables++] = &sdm_template_avx512;
+#endif
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(lookup_is_the_formula_with_the_same_bits),
+        cmocka_unit_test(lookup_reproduces_quadratic_functions),
+        cmocka_unit_test(correct_is_trilinear_with_the_same_bits),
+        cmocka_unit_test(normalise_is_the_formula_with_the_same_bits),
+        cmocka_unit_test(expand_makes_splines_with_the_same_bits),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -48,7 +48,7 @@ static void test_defaults(void **state)
     assert_int_equal(config.shape.mark.column, 9);
     assert_int_equal(config.shape.n_options, 0);
     assert_int_equal(config.shape.n_ranges, 0);
-    assert_int_equal(config.network.kind, SDM_NETWORK_POD);
+    assert_int_equal(config.network.kind, SDM_NETWORK_AUTO);
     assert_int_equal(config.network.depth, 3);
     assert_int_equal(config.network.width, 128);
     assert_int_equal(config.network.rank, 9);
@@ -225,7 +225,7 @@ static void test_kind_selects_keys_and_defaults(void **state)
     assert_int_equal(parse(bytes, wanted, 2), SDM_E_CONFIG);
     expect_mistake(
         BASE "network: {kind: imnet, weights: i8}\n", NULL,
-        "x.yaml:4:24: network.weights: i8 is for a network of kind pod; imnet has f16 and f32");
+        "x.yaml:4:24: network.weights: i8 is for a network of kind pod or template; imnet has f16 and f32");
 
     expect_mistake(
         BASE "network: {kind: deepsdf, rank: 7}\n", NULL,

@@ -1,6 +1,7 @@
 /* The inner loops of the `template` network, written once with the compiler's vector types and
    compiled once for each instruction set. Before inclusion, define TABLE (name of the
    template_table) and VW (floats in a vector: 8 for AVX, else 4). Contracts: template_kernels.h. */
+#include <math.h>
 #include <string.h>
 
 #include "kernels/kernels_select.h"
@@ -164,8 +165,7 @@ static inline void locate(const cells *c, const float *const *u, size_t v, int32
 
 /* Lookup is quadratic interpolation from values f and gradients: trilinear interpolation of f,
    minus t (1 - t) / 2 times the change of the derivative along the axis, for each axis. It is exact
-   for quadratic functions. First each point is interpolated along z and y, then VW points along x.
- */
+   for quadratic functions. Each point is interpolated along z and y, then VW points along x. */
 
 // For each point, what is left to be interpolated along x: values at the first and the second end,
 // four floats each (distance, gradient). For each pair of points, at both ends: changes of the
@@ -193,7 +193,8 @@ static inline mean mean_of(const float *const corner[4], const place *p, int i, 
 
 static inline void reduce(const float *const corner[4], const place *p, edges *e)
 {
-    for (int i = 0; i < VW; i += 2) EACH(h, 8 / VW)
+    for (int i = 0; i < VW; i += 2) {
+        EACH(h, 8 / VW)
         {
             const int end = h * VW / 4;
             const mean a = mean_of(corner, p, i, end), b = mean_of(corner, p, i + 1, end);
@@ -204,6 +205,7 @@ static inline void reduce(const float *const corner[4], const place *p, edges *e
                               repeat_two(p->t[1] + i));
             store(e->kinks[i / 2] + 4 * end, SHUFFLE(y, z, 0, 1, 6, 7));
         }
+    }
 }
 
 // ends[2] = first and second end of row i of n rows; with VW = 8, of the row i + n / 2 too.
@@ -266,18 +268,18 @@ static void lookup(const template_level *l, size_t n, const float *const *u, flo
     }
 }
 
+// The compiler makes vectors of this loop, of sixteen floats with AVX-512.
 static void normalise(size_t n, const float *f, const float *const *g, const float *const *metric,
                       float *out)
 {
-    const vec e = splat(1e-3f);
-    for (size_t i = 0; i < n; i += VW) {
-        const vec x = load(g[0] + i), y = load(g[1] + i), z = load(g[2] + i);
-        const vec xx = load(metric[0] + i), yy = load(metric[1] + i), zz = load(metric[2] + i);
-        const vec yz = load(metric[3] + i), xz = load(metric[4] + i), xy = load(metric[5] + i);
-        const vec t = (xx + yy + zz) * (1.0f / 3);
-        const vec q =
-            x * x * xx + y * y * yy + z * z * zz + 2 * (y * z * yz + x * z * xz + x * y * xy);
-        store(out + i, load(f + i) * SQRT_VEC((x * x + y * y + z * z + e) / (q + e * t)));
+    const float e = 1e-3f;
+    for (size_t i = 0; i < n; i++) {
+        const float x = g[0][i], y = g[1][i], z = g[2][i];
+        const float xx = metric[0][i], yy = metric[1][i], zz = metric[2][i];
+        const float t = (xx + yy + zz) * (1.0f / 3);
+        const float q = x * x * xx + y * y * yy + z * z * zz +
+                        2 * (y * z * metric[3][i] + x * z * metric[4][i] + x * y * metric[5][i]);
+        out[i] = f[i] * sqrtf((x * x + y * y + z * z + e) / (q + e * t));
     }
 }
 

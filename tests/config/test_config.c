@@ -229,7 +229,7 @@ static void test_kind_selects_keys_and_defaults(void **state)
 
     expect_mistake(
         BASE "network: {kind: deepsdf, rank: 7}\n", NULL,
-        "x.yaml:4:26: network.rank: a network of kind deepsdf has no such key, only pod");
+        "x.yaml:4:26: network.rank: a network of kind deepsdf has no such key, only pod, template, auto");
     expect_mistake(BASE, "train.eikonal=1",
                    "argument 'train.eikonal=1': train.eikonal: a network of kind pod has no such "
                    "key, only sdmnn, "

@@ -116,7 +116,8 @@ static sdm_status grid_boxes(const template_design *d, box *boxes, sdm_error *er
 
 // Largest amount by which the distance at a node lies below the tangent at another one outside of
 // the part. by_axes[n]: distance in nodes between the two along n axes; 0: such pairs are left out.
-static double lattice_sag(const sdm_lattice *l, const float *nodes, const long by_axes[4])
+static double lattice_sag(const sdm_lattice *l, const float *nodes, const long by_axes[4],
+                          double least)
 {
     double largest = 0;
     const long n[3] = {l->n[0], l->n[1], l->n[2]};
@@ -124,7 +125,7 @@ static double lattice_sag(const sdm_lattice *l, const float *nodes, const long b
         for (long y = 0; y < n[1]; y++)
             for (long x = 0; x < n[0]; x++, i++) {
                 const float *a = nodes + 4 * i;
-                if (!(a[0] > 0)) continue;
+                if (!(a[0] > 0 && (double)a[0] >= least)) continue;
                 for (int k = 0; k < 27; k++) {
                     const long sign[3] = {k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1},
                                step = by_axes[labs(sign[0]) + labs(sign[1]) + labs(sign[2])],
@@ -142,12 +143,19 @@ static double lattice_sag(const sdm_lattice *l, const float *nodes, const long b
     return largest;
 }
 
-// Sets sag and sag_reach: three nodes of `near`. The lattice `far` has four times its spacing.
+// Sets sag, far_sag and their bounds: three nodes of `near`. The lattice `far` has four times its spacing.
 static void measure_sag(sdm_template_part *p)
 {
     p->sag_reach = 3 * p->near.spacing;
-    p->sag = fmax(lattice_sag(&p->near, p->near_nodes, (const long[]){0, 3, 2, 2}),
-                  lattice_sag(&p->far, p->far_nodes, (const long[]){0, 1, 0, 0}));
+    p->far_from = 6 * p->near.spacing;
+    for (int far = 0; far < 2; far++) {
+        const double least = far ? p->far_from : 0,
+                     sag = fmax(lattice_sag(&p->near, p->near_nodes, (const long[]){0, 3, 2, 2},
+                                            least),
+                                lattice_sag(&p->far, p->far_nodes, (const long[]){0, 1, 0, 0},
+                                            least));
+        *(far ? &p->far_sag : &p->sag) = sag;
+    }
 }
 
 sdm_status trainer_template_maps(template_design *d, double margin, sdm_error *err)

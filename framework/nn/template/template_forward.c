@@ -20,22 +20,11 @@ static void fill_map(template_work *w, float *values)
 {
     template_patch p = {.count = 0};
     while (sdm_template_next(w, &p)) {
-        bool first = true;
-        for (size_t c = 0; c < w->k->n_parts; c++) {
-            if (!(p.active >> c & 1)) continue;
-            sdm_template_run(w, c, &p);
-            const float *value = w->row.value;
-            for (size_t z = 0; z < p.n[2]; z++)
-                for (size_t y = 0; y < p.n[1]; y++, value += p.n[0]) {
-                    float *to = values + sdm_template_line_at(w, &p, y, z);
-                    if (first)
-                        memcpy(to, value, p.n[0] * sizeof *to);
-                    else
-                        for (size_t x = 0; x < p.n[0]; x++)
-                            to[x] = value[x] < to[x] ? value[x] : to[x];
-                }
-            first = false;
-        }
+        sdm_template_values(w, &p, w->value, NULL);
+        const float *from = w->value;
+        for (size_t z = 0; z < p.n[2]; z++)
+            for (size_t y = 0; y < p.n[1]; y++, from += p.n[0])
+                memcpy(values + sdm_template_line_at(w, &p, y, z), from, p.n[0] * sizeof *from);
     }
 }
 

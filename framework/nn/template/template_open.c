@@ -30,10 +30,11 @@ static void read_part(sdm_lines *lines, size_t index, size_t n_numbers, sdm_temp
     if (p->n_modes) read_lattice(lines, "part.warp", 4, &p->warp);
     read_lattice(lines, "part.near", 2, &p->near);
     read_lattice(lines, "part.far", 2, &p->far);
-    double sag[2] = {0};
-    sdm_lines_reals(lines, "part.sag", sag, 2);
-    p->sag = sag[0], p->sag_reach = sag[1];
-    if (!(p->sag >= 0 && p->sag_reach >= 0)) lines->failed = true;
+    double sag[4] = {0};
+    sdm_lines_reals(lines, "part.sag", sag, 4);
+    p->sag = sag[0], p->sag_reach = sag[1], p->far_sag = sag[2], p->far_from = sag[3];
+    for (int i = 0; i < 4; i++)
+        if (!(sag[i] >= 0)) lines->failed = true;
     for (int a = 0; a < 3; a++)
         if (!(fabs(p->pivot[a]) <= 1e9)) lines->failed = true;
     if (p->numbers + sdm_template_frame_numbers(p->frame) > n_numbers ||

@@ -64,10 +64,12 @@ size_t sdm_template_carve(const sdm_model *m, bool slopes, size_t correction_map
     for (int a = 0; a < 3; a++)
         w->blocks[a] = ((size_t)w->grid->n[a] + BLOCK[a] - 1) / BLOCK[a];
     for (size_t c = 0; c < k->n_parts; c++) w->by_lines |= k->parts[c].n_modes > 0;
-    w->active =
-        carve(memory, &at, w->blocks[0] * w->blocks[1] * w->blocks[2] * sizeof *w->active);
-    w->centre = carve(
-        memory, &at, 4 * k->n_parts * (w->blocks[0] + SDM_TEMPLATE_LANES) * sizeof *w->centre);
+    const size_t blocks = w->by_lines ? 0 : w->blocks[0] * w->blocks[1] * w->blocks[2];
+    w->centre = carve(memory, &at, 4 * k->n_parts * blocks * sizeof *w->centre);
+    w->value = carve(memory, &at, sdm_template_row_floats(w->grid) * sizeof *w->value);
+    w->part = carve(memory, &at, k->n_parts * sizeof *w->part);
+    for (int a = 0; a < 3; a++)
+        w->offset[a] = carve(memory, &at, BLOCK_VOXELS * sizeof *w->offset[a]);
     if (k->correction) {
         w->correction = carve(memory, &at,
                               correction_maps * sdm_grid_count(&k->correction->info.grid) *
@@ -108,9 +110,7 @@ void sdm_template_line(const template_network *k, const float *plane, size_t y, 
     for (size_t i = 0; i < 8 * n; i++) out_metric[i] = g[i] + t * (g[8 * n + i] - g[i]);
 }
 
-/* A part without a warp: its index at a voxel is an affine function of the voxel's index. */
-
-// u[3] = index of part c at voxel (0, 0, 0); by[3][3]: by[a] is its change along axis a of the grid
+// from[3], by[3][3] of an affine_part
 static void affine_index(const template_work *w, size_t c, double u[3], double by[3][3])
 {
     const part_pose *pose = &w->pose[c];
@@ -141,18 +141,21 @@ static void affine_metric(const part_pose *pose, float metric[6])
 
 static void affine_run(const template_work *w, size_t c, const template_patch *p, bool rigid)
 {
-    double from[3], by[3][3];
-    affine_index(w, c, from, by);
+    const affine_part *part = &w->part[c];
+    const bool whole = p->count == BLOCK_VOXELS;
     for (int i = 0; i < 3; i++) {
         float *u = w->row.u[i];
-        const float step = (float)by[0][i];
-        for (size_t z = 0; z < p->n[2]; z++)
-            for (size_t y = 0; y < p->n[1]; y++, u += p->n[0]) {
-                const float first =
-                    (float)(from[i] + by[0][i] * (double)p->at[0] +
-                            by[1][i] * (double)(p->at[1] + y) + by[2][i] * (double)(p->at[2] + z));
-                for (size_t x = 0; x < p->n[0]; x++) u[x] = first + step * (float)x;
-            }
+        const float first =
+            (float)(part->from[i] + part->by[0][i] * (double)p->at[0] +
+                    part->by[1][i] * (double)p->at[1] + part->by[2][i] * (double)p->at[2]);
+        const float bx = (float)part->by[0][i], by = (float)part->by[1][i],
+                    bz = (float)part->by[2][i];
+        for (size_t v = 0; v < BLOCK_VOXELS && whole; v++)
+            u[v] = first + (bx * w->offset[0][v] + (by * w->offset[1][v] + bz * w->offset[2][v]));
+        for (size_t z = 0; z < p->n[2] && !whole; z++)
+            for (size_t y = 0; y < p->n[1]; y++, u += p->n[0])
+                for (size_t x = 0; x < p->n[0]; x++)
+                    u[x] = first + (bx * (float)x + (by * (float)y + bz * (float)z));
     }
     if (rigid) return;
     float metric[6];
@@ -168,33 +171,76 @@ bool sdm_template_is_rigid(const template_network *k, size_t c)
     return true;
 }
 
+// True if the index is within the lattice `near`.
+static bool is_near(const float *const *u, const float end[3], size_t i)
+{
+    return (u[0][i] >= 0) & (u[0][i] <= end[0]) & (u[1][i] >= 0) & (u[1][i] <= end[1]) &
+           (u[2][i] >= 0) & (u[2][i] <= end[2]);
+}
+
+// Looks up elements from .. to - 1 of row.u. The kernel writes a few elements beyond.
+static void lookup_range(const template_row *r, const template_level *l, size_t from, size_t to)
+{
+    const float *const u[3] = {r->u[0] + from, r->u[1] + from, r->u[2] + from};
+    float *const g[3] = {r->g[0] + from, r->g[1] + from, r->g[2] + from};
+    if (to > from) sdm_template_kernels()->lookup(l, to - from, u, r->f + from, g);
+}
+
 // Distance and gradient of the template of part c at row.u: from the lattice `near`, and from `far`
 // for points outside of it.
 static void lookup(const template_work *w, size_t c, size_t n)
 {
     const template_row *r = &w->row;
-    const template_network *k = w->k;
-    const template_table *t = sdm_template_kernels();
+    const template_level *near = &w->k->near[c], *far = &w->k->far[c];
     const float *const u[3] = {r->u[0], r->u[1], r->u[2]};
     float end[3];
-    for (int a = 0; a < 3; a++) end[a] = (float)(k->near[c].n[a] - 1);
-    size_t inside = 0;
-    for (size_t i = 0; i < n; i++)
-        inside += (u[0][i] >= 0) & (u[0][i] <= end[0]) & (u[1][i] >= 0) & (u[1][i] <= end[1]) &
-                  (u[2][i] >= 0) & (u[2][i] <= end[2]);
-    if (inside) t->lookup(&k->near[c], n, u, r->f, r->g);
-    if (inside == n) return;
-    if (!inside) {
-        t->lookup(&k->far[c], n, u, r->f, r->g);
+    for (int a = 0; a < 3; a++) end[a] = (float)(near->n[a] - 1);
+    // the run of points within `near`: first .. last - 1
+    size_t first = 0, last = n;
+    while (first < n && !is_near(u, end, first)) first++;
+    while (last > first && !is_near(u, end, last - 1)) last--;
+    bool one_run = true;
+    for (size_t i = first; i < last && one_run; i++) one_run = is_near(u, end, i);
+    if (one_run) {
+        // from left to right, because each call writes beyond its end
+        lookup_range(r, far, 0, first);
+        lookup_range(r, near, first, last);
+        lookup_range(r, far, last, n);
         return;
     }
-    t->lookup(&k->far[c], n, u, r->far_f, r->far_g);
+    lookup_range(r, near, 0, n);
+    sdm_template_kernels()->lookup(far, n, u, r->far_f, r->far_g);
     for (size_t i = 0; i < n; i++) {
-        const bool in = (u[0][i] >= 0) & (u[0][i] <= end[0]) & (u[1][i] >= 0) &
-                        (u[1][i] <= end[1]) & (u[2][i] >= 0) & (u[2][i] <= end[2]);
-        r->f[i] = in ? r->f[i] : r->far_f[i];
-        for (int a = 0; a < 3; a++) r->g[a][i] = in ? r->g[a][i] : r->far_g[a][i];
+        if (is_near(u, end, i)) continue;
+        r->f[i] = r->far_f[i];
+        for (int a = 0; a < 3; a++) r->g[a][i] = r->far_g[a][i];
     }
+}
+
+// Looks up a patch of a part without a warp that lies wholly within or wholly beyond the lattice
+// `near`; false if it does not.
+static bool lookup_whole(const template_work *w, size_t c, const template_patch *p)
+{
+    const affine_part *part = &w->part[c];
+    const template_level *near = &w->k->near[c];
+    bool inside = true, outside = false;
+    for (int i = 0; i < 3; i++) {
+        double low = part->from[i], high;
+        for (int a = 0; a < 3; a++) low += part->by[a][i] * (double)p->at[a];
+        high = low;
+        for (int a = 0; a < 3; a++) {
+            const double reach = part->by[a][i] * (double)(p->n[a] - 1);
+            low += reach < 0 ? reach : 0;
+            high += reach > 0 ? reach : 0;
+        }
+        // the indices in the row are rounded to floats
+        const double end = near->n[i] - 1, rounding = 1e-4;
+        inside &= low >= rounding && high <= end - rounding;
+        outside |= high < -rounding || low > end + rounding;
+    }
+    if (!inside && !outside) return false;
+    lookup_range(&w->row, inside ? near : &w->k->far[c], 0, p->count);
+    return true;
 }
 
 void sdm_template_run(template_work *w, size_t c, const template_patch *p)
@@ -202,7 +248,7 @@ void sdm_template_run(template_work *w, size_t c, const template_patch *p)
     template_row *r = &w->row;
     const template_network *k = w->k;
     const template_table *t = sdm_template_kernels();
-    const bool rigid = sdm_template_is_rigid(k, c);
+    const bool rigid = k->parts[c].n_modes == 0 && w->part[c].rigid;
     if (k->parts[c].n_modes) {
         const warp_scratch *s = &w->warp[c];
         float *const to[9] = {r->u[0],      r->u[1],      r->u[2],      r->metric[0], r->metric[1],
@@ -213,7 +259,7 @@ void sdm_template_run(template_work *w, size_t c, const template_patch *p)
     } else {
         affine_run(w, c, p, rigid);
     }
-    lookup(w, c, p->count);
+    if (k->parts[c].n_modes || !lookup_whole(w, c, p)) lookup(w, c, p->count);
     if (rigid)
         memcpy(r->value, r->f, p->count * sizeof *r->value);
     else
@@ -241,12 +287,9 @@ bool sdm_template_next(template_work *w, template_patch *p)
         p->n[a] = n[a] - p->at[a] < size[a] ? n[a] - p->at[a] : size[a];
         p->count *= p->n[a];
     }
-    p->active = k->n_parts < 32 ? (UINT32_C(1) << k->n_parts) - 1 : UINT32_MAX;
     if (!w->by_lines) {
-        if (k->n_parts > 1)
-            p->active = w->active[(p->at[2] / BLOCK[2] * w->blocks[1] + p->at[1] / BLOCK[1]) *
-                                      w->blocks[0] +
-                                  p->at[0] / BLOCK[0]];
+        p->block = (p->at[2] / BLOCK[2] * w->blocks[1] + p->at[1] / BLOCK[1]) * w->blocks[0] +
+                   p->at[0] / BLOCK[0];
     } else if (p->at[1] == 0) {
         for (size_t c = 0; c < k->n_parts; c++)
             if (k->parts[c].n_modes)
@@ -282,13 +325,14 @@ static double slope_bound(const template_work *w, size_t c)
     return sqrt(forward * back);
 }
 
-// Fills w->centre for part c and the row (y, z) of blocks: distance and gradient in the world.
+// w->centre of part c in the row (y, z) of blocks: distance at the centre, and its gradient by the
+// indices of the grid.
 static void row_centres(template_work *w, size_t c, size_t y, size_t z)
 {
-    const size_t nx = w->blocks[0], at[3] = {0, y, z};
-    double from[3], by[3][3];
-    float metric[6], *out = w->centre + 4 * c * (nx + SDM_TEMPLATE_LANES);
-    affine_index(w, c, from, by);
+    const size_t nx = w->blocks[0], n_parts = w->k->n_parts, at[3] = {0, y, z};
+    const affine_part *part = &w->part[c];
+    const double *from = part->from, (*by)[3] = (const double(*)[3])part->by;
+    float metric[6], *out = w->centre + 4 * ((z * w->blocks[1] + y) * nx * n_parts + c);
     affine_metric(&w->pose[c], metric);
     for (int i = 0; i < 3; i++) {
         double first = from[i];
@@ -302,58 +346,84 @@ static void row_centres(template_work *w, size_t c, size_t y, size_t z)
     lookup(w, c, nx);
     sdm_template_kernels()->normalise(nx, w->row.f, (const float *const *)w->row.g,
                                       (const float *const *)w->row.metric, w->row.value);
-    // rigid parts: the gradient turns with the part
-    const double *m = w->pose[c].m;
-    for (size_t x = 0; x < nx; x++) {
-        const float g[3] = {w->row.g[0][x], w->row.g[1][x], w->row.g[2][x]};
-        out[4 * x] = w->row.value[x];
-        for (int i = 0; i < 3; i++)
-            out[4 * x + 1 + (size_t)i] =
-                (float)m[3 * i] * g[0] + (float)m[3 * i + 1] * g[1] + (float)m[3 * i + 2] * g[2];
+    const double h = w->k->parts[c].near.spacing;
+    for (size_t x = 0; x < nx; x++, out += 4 * n_parts) {
+        out[0] = w->row.value[x];
+        for (int a = 0; a < 3; a++)
+            out[1 + a] = (float)(h * by[a][0]) * w->row.g[0][x] +
+                         (float)(h * by[a][1]) * w->row.g[1][x] +
+                         (float)(h * by[a][2]) * w->row.g[2][x];
     }
 }
 
-// True if part c cannot be nearer than part n, the nearest one at the centre of a block of the given
-// radius, anywhere in the block. a, b: distance and gradient of c and n at the centre.
-static bool is_behind(const template_work *w, size_t c, size_t n, const float *a, const float *b,
-                      double radius)
+static void all_centres(template_work *w)
 {
-    const double slack = 0.1 * w->grid->spacing[0], ahead = (double)a[0] - (double)b[0];
-    // both change by at most slope * radius
-    if (ahead > 1.05 * (slope_bound(w, c) + slope_bound(w, n)) * radius + slack) return true;
-    // d_n(x + v) <= d_n + g_n . v + v^2 / (2 d_n), and d_c(x + v) >= d_c + g_c . v - sag
-    if (!sdm_template_is_rigid(w->k, c) || !sdm_template_is_rigid(w->k, n)) return false;
-    if (!(b[0] > 0) || radius > w->k->parts[c].sag_reach) return false;
-    double turn = 0;
-    for (int i = 1; i < 4; i++) {
-        const double e = (double)a[i] - (double)b[i];
-        turn += e * e;
-    }
-    return ahead > 1.05 * (sqrt(turn) * radius + w->k->parts[c].sag) +
-                       radius * radius / (2 * (double)b[0]) + slack;
-}
-
-// Marks the parts that may be the nearest in each block.
-static void mark_active(template_work *w)
-{
-    const template_network *k = w->k;
-    const size_t nx = w->blocks[0], stride = 4 * (nx + SDM_TEMPLATE_LANES);
-    const double radius = block_radius(w->grid);
     for (size_t z = 0; z < w->blocks[2]; z++)
-        for (size_t y = 0; y < w->blocks[1]; y++) {
-            for (size_t c = 0; c < k->n_parts; c++) row_centres(w, c, y, z);
-            uint32_t *active = w->active + (z * w->blocks[1] + y) * nx;
-            for (size_t x = 0; x < nx; x++) {
-                size_t n = 0;
-                for (size_t c = 1; c < k->n_parts; c++)
-                    if (w->centre[c * stride + 4 * x] < w->centre[n * stride + 4 * x]) n = c;
-                active[x] = UINT32_C(1) << n;
-                for (size_t c = 0; c < k->n_parts; c++)
-                    if (c != n && !is_behind(w, c, n, w->centre + c * stride + 4 * x,
-                                             w->centre + n * stride + 4 * x, radius))
-                        active[x] |= UINT32_C(1) << c;
-            }
-        }
+        for (size_t y = 0; y < w->blocks[1]; y++)
+            for (size_t c = 0; c < w->k->n_parts; c++) row_centres(w, c, y, z);
+}
+
+// True if the distance to part c is at least value[] in all voxels of a block, by a lower bound. It
+// lies above its tangent at the centre minus the sag; the interpolation may add the slack.
+static bool is_behind(const template_work *w, size_t c, const template_patch *p, double radius,
+                      const float *value)
+{
+    const sdm_template_part *part = &w->k->parts[c];
+    const float *centre = w->centre + 4 * (p->block * w->k->n_parts + c);
+    const double slack = 0.1 * w->grid->spacing[0];
+    float base = centre[0], slope[3] = {centre[1], centre[2], centre[3]};
+    if (!(base > 0)) return false;
+    if (w->part[c].rigid && radius <= part->sag_reach) {
+        base -= (float)(1.05 * ((double)base >= part->far_from ? part->far_sag : part->sag) + slack);
+    } else {
+        base -= (float)(1.05 * w->part[c].slope * radius + slack);
+        memset(slope, 0, sizeof slope);
+    }
+    for (int a = 0; a < 3; a++) base -= slope[a] * 0.5f * (float)(BLOCK[a] - 1);
+    if (p->count == BLOCK_VOXELS) {
+        int32_t count = 0; // of the type of the comparisons, so that the loop is vectorised
+        for (size_t v = 0; v < BLOCK_VOXELS; v++)
+            count += base + (slope[0] * w->offset[0][v] +
+                             (slope[1] * w->offset[1][v] + slope[2] * w->offset[2][v])) >
+                     value[v];
+        return count == BLOCK_VOXELS;
+    }
+    bool behind = true;
+    for (size_t z = 0; z < p->n[2]; z++)
+        for (size_t y = 0; y < p->n[1]; y++, value += p->n[0])
+            for (size_t x = 0; x < p->n[0]; x++)
+                behind &= base + slope[0] * (float)x + slope[1] * (float)y + slope[2] * (float)z >
+                          value[x];
+    return behind;
+}
+
+// The part that is the nearest at the centre of a block.
+static size_t nearest_part(const template_work *w, const template_patch *p)
+{
+    const float *centre = w->centre + 4 * p->block * w->k->n_parts;
+    size_t n = 0;
+    for (size_t c = 1; c < w->k->n_parts; c++)
+        if (centre[4 * c] < centre[4 * n]) n = c;
+    return n;
+}
+
+void sdm_template_values(template_work *w, const template_patch *p, float *value, uint8_t *nearest)
+{
+    const size_t n_parts = w->k->n_parts;
+    const bool culled = !w->by_lines && n_parts > 1;
+    const size_t first = culled ? nearest_part(w, p) : 0;
+    const double radius = culled ? block_radius(w->grid) : 0;
+    sdm_template_run(w, first, p);
+    memcpy(value, w->row.value, p->count * sizeof *value);
+    if (nearest) memset(nearest, (int)first, p->count);
+    for (size_t c = 0; c < n_parts; c++) {
+        if (c == first || (culled && is_behind(w, c, p, radius, value))) continue;
+        sdm_template_run(w, c, p);
+        for (size_t i = 0; i < p->count && nearest; i++)
+            if (w->row.value[i] < value[i]) nearest[i] = (uint8_t)c;
+        for (size_t i = 0; i < p->count; i++)
+            value[i] = w->row.value[i] < value[i] ? w->row.value[i] : value[i];
+    }
 }
 
 void sdm_template_begin(template_work *w, const double *p, bool slopes)
@@ -367,5 +437,16 @@ void sdm_template_begin(template_work *w, const double *p, bool slopes)
         sdm_template_control(part, w->g + part->amplitudes, w->warp[c].control);
         sdm_template_invert(k, part, &w->pose[c], w->grid, &w->warp[c]);
     }
-    if (!w->by_lines && k->n_parts > 1) mark_active(w);
+    for (size_t c = 0; c < k->n_parts; c++) {
+        if (k->parts[c].n_modes) continue;
+        affine_index(w, c, w->part[c].from, w->part[c].by);
+        w->part[c].rigid = sdm_template_is_rigid(k, c);
+        w->part[c].slope = slope_bound(w, c);
+    }
+    for (size_t v = 0; v < BLOCK_VOXELS; v++) {
+        w->offset[0][v] = (float)(v % BLOCK[0]);
+        w->offset[1][v] = (float)(v / BLOCK[0] % BLOCK[1]);
+        w->offset[2][v] = (float)(v / BLOCK[0] / BLOCK[1]);
+    }
+    if (!w->by_lines && k->n_parts > 1) all_centres(w);
 }

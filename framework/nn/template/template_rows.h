@@ -10,7 +10,7 @@
 typedef struct template_patch {
     size_t at[3], n[3]; /* first voxel, number of voxels along x, y, z */
     size_t count;       /* n[0] n[1] n[2] */
-    uint32_t active;    /* bit c: part c may be the nearest somewhere in the patch */
+    size_t block;       /* number of the block */
 } template_patch;
 
 /* Arrays with an element for each voxel of a patch. */
@@ -21,6 +21,13 @@ typedef struct template_row {
     float *far_f, *far_g[3];
     float *value; /* the part's distance */
 } template_row;
+
+/* A part without a warp: its index at a voxel is an affine function of the voxel's index. */
+typedef struct affine_part {
+    double from[3], by[3][3]; /* index at voxel (0, 0, 0); by[a]: change along axis a of the grid */
+    bool rigid;
+    double slope; /* bound on how fast the distance changes, mm per mm */
+} affine_part;
 
 /* Scratch memory of one map. */
 typedef struct template_work {
@@ -33,8 +40,12 @@ typedef struct template_work {
     warp_scratch warp[SDM_TEMPLATE_MAX_PARTS];
     bool by_lines;     /* patches are lines: a part has a warp */
     size_t blocks[3];  /* number of blocks along each axis */
-    uint32_t *active;  /* [blocks] template_patch.active */
-    float *centre;     /* [n_parts][4][blocks along x] distances and gradients at their centres */
+    /* [blocks][n_parts][4] distance of each part at the centre of the block, and its gradient by
+       the indices of the grid; not with lines. */
+    float *centre;
+    float *value;      /* values of a patch */
+    affine_part *part; /* [n_parts]; not with lines */
+    float *offset[3];  /* voxel indices of a whole block, relative to its first voxel */
     float *correction;         /* [its voxels] the correction, NULL if there is none */
     template_correction correction_at; /* the lattice of the correction with its first map */
     void *correction_scratch;
@@ -47,7 +58,8 @@ typedef struct template_work {
 size_t sdm_template_carve(const sdm_model *m, bool slopes, size_t correction_maps,
                           size_t correction_scratch, void *memory, template_work *w);
 
-/* Prepares the map at the parameters p[P]: numbers, frames, warps, active blocks. The correction is
+/* Prepares the map at the parameters p[P]: numbers, frames, warps, centres of the
+   blocks. The correction is
    left to the caller. slopes: as in sdm_template_carve(). */
 void sdm_template_begin(template_work *w, const double *p, bool slopes);
 
@@ -67,6 +79,10 @@ void sdm_template_run(template_work *w, size_t c, const template_patch *p);
 /* True if distances are carried along unchanged: part c only rotates and moves. The metric is then
    not filled. */
 bool sdm_template_is_rigid(const template_network *k, size_t c);
+
+/* value[count] = the map in a patch: the minimum over the parts; nearest[count] = the part that has
+   it, unless NULL. Parts that cannot be the nearest in a block are left out. */
+void sdm_template_values(template_work *w, const template_patch *p, float *value, uint8_t *nearest);
 
 /* Index of the first voxel of line (y, z) of the patch in a map. */
 static inline size_t sdm_template_line_at(const template_work *w, const template_patch *p, size_t y,

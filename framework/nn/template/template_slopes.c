@@ -322,15 +322,7 @@ static void patch_slopes(slopes_work *s, size_t c, const template_patch *p, floa
 static void patch_map(slopes_work *s, const template_patch *p, float *values)
 {
     template_work *w = &s->w;
-    bool first = true;
-    for (size_t c = 0; c < w->k->n_parts; c++) {
-        if (!(p->active >> c & 1)) continue;
-        sdm_template_run(w, c, p);
-        for (size_t i = 0; i < p->count; i++)
-            if (first || w->row.value[i] < s->value[i])
-                s->value[i] = w->row.value[i], s->nearest[i] = (uint8_t)c;
-        first = false;
-    }
+    sdm_template_values(w, p, s->value, s->nearest);
     for (size_t z = 0, i = 0; z < p->n[2]; z++)
         for (size_t y = 0; y < p->n[1]; y++, i += p->n[0])
             memcpy(values + sdm_template_line_at(w, p, y, z), s->value + i,
@@ -353,7 +345,6 @@ static void fill_slopes(slopes_work *s, float *values, float *const *out)
             }
         patch_map(s, &p, values);
         for (size_t c = 0; c < k->n_parts; c++) {
-            if (!(p.active >> c & 1)) continue;
             bool nearest = false;
             for (size_t i = 0; i < p.count; i++) nearest |= s->nearest[i] == c;
             if (!nearest) continue;

@@ -32,7 +32,8 @@ static size_t spline_weights(double u, uint32_t n, double spacing, float w[4], f
                              float dd[4])
 {
     const bool inside = u >= 1 && u <= (double)n - 2;
-    u = fmin(fmax(u, 1), (double)n - 2);
+    u = u > 1 ? u : 1;
+    u = u < (double)n - 2 ? u : (double)n - 2;
     size_t i = (size_t)u;
     if (i > n - 3u) i = n - 3u;
     const double t = u - (double)i, s = 1 - t;

@@ -81,8 +81,8 @@ typedef struct sdm_template_part {
     const float *near_nodes, *far_nodes;
     /* Largest amount (mm) by which the distance falls below its tangent at a point outside of the
        part within sag_reach (mm): d0(y + v) >= d0(y) + grad d0(y) . v - sag for d0(y) > 0 and
-       abs(v) <= sag_reach; 0 for convex parts. */
-    double sag, sag_reach;
+       abs(v) <= sag_reach; 0 for convex parts. far_sag: the same for d0(y) >= far_from (mm). */
+    double sag, sag_reach, far_sag, far_from;
 } sdm_template_part;
 
 /* Content of a model file. */

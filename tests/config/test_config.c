@@ -196,6 +196,18 @@ static void test_kind_selects_keys_and_defaults(void **state)
     assert_true(config.network.dropout == 0.1 && config.train.batch == 8 &&
                 config.train.learning_rate == 1e-3);
 
+    expect_ok(BASE "network: {kind: template}\n", NULL);
+    assert_int_equal(config.network.kind, SDM_NETWORK_TEMPLATE);
+    assert_int_equal(config.network.depth, 0);
+    assert_int_equal(config.network.width, 64);
+    assert_int_equal(config.network.weights, SDM_WEIGHT_I8);
+    // Once the kind is chosen, keys with the default of `auto` have that of the kind.
+    expect_ok(BASE "network: {kind: auto, width: 99}\n", NULL);
+    sdm_config_choose_kind(&config, SDM_NETWORK_TEMPLATE);
+    assert_int_equal(config.network.kind, SDM_NETWORK_TEMPLATE);
+    assert_int_equal(config.network.depth, 0);
+    assert_int_equal(config.network.width, 99);
+
     // An override of the kind: keys of the file that the new kind does not have are ignored, the
     // others still apply.
     static const char pod[] =

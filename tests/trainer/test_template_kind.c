@@ -166,7 +166,6 @@ static void kind_is_chosen(void **state)
             if (!strstr(said, which ? "network.kind is pod" : "network.kind is template"))
                 fail_msg("%s", said);
             if (which) assert_non_null(strstr(said, "vertices do not correspond"));
-            assert_true(exists("auto.json"));
             model[threads - 1] = hash_of("model.sdm");
             sdm_model *m;
             assert_int_equal(sdm_model_open(r.model_path, &m, NULL), SDM_OK);

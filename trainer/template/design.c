@@ -7,10 +7,10 @@
 #include <string.h>
 
 #include "motion.h"
-#include "template_parts.h"
 #include "regression.h"
 #include "sdm/memory.h"
 #include "template_maps.h"
+#include "template_parts.h"
 #include "warp_modes.h"
 
 /* Number of meshes from which the polynomials are computed. */

@@ -1,4 +1,5 @@
-/* The choice of the kind of network (network.kind: auto) by short trials on the shape's own maps. */
+/* The choice of the kind of network (network.kind: auto) by short trials on the shape's own maps.
+ */
 #pragma once
 
 #include "state/kind.h"

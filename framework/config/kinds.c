@@ -63,8 +63,7 @@ static bool bytes_refused(int kind)
 void sdm_kinds_settle(sdm_reader *r, sdm_mark place)
 {
     const int kind = (int)r->config->network.kind;
-    const bool bytes = bytes_refused(kind) &&
-                       r->config->network.weights == SDM_WEIGHT_I8;
+    const bool bytes = bytes_refused(kind) && r->config->network.weights == SDM_WEIGHT_I8;
     char names[200], chosen[SDM_NAME_MAX];
     sdm_choice_name(SDM_KIND_CHOICES, kind, chosen);
     for (size_t s = 0; s < r->n_sections; s++)
@@ -90,7 +89,8 @@ void sdm_kinds_settle(sdm_reader *r, sdm_mark place)
     check_limits(r, place);
     const sdm_given *g = sdm_fields_given(r, "network", "weights");
     if (bytes_refused(kind) && r->config->network.weights == SDM_WEIGHT_I8 && !g->refused)
-        sdm_mistakes_add(r->mistakes, sdm_mark_is_set(g->mark) ? g->mark : place,
-                         "network.weights: i8 is for a network of kind pod or template; %s has f16 and f32",
-                         chosen);
+        sdm_mistakes_add(
+            r->mistakes, sdm_mark_is_set(g->mark) ? g->mark : place,
+            "network.weights: i8 is for a network of kind pod or template; %s has f16 and f32",
+            chosen);
 }

@@ -64,12 +64,14 @@ enum { POINTS = DEEPSDF | IMNET, BASES = POD | TEMPLATE | AUTO };
 // template (of its correction, a pod network) and auto (those of pod).
 static const char *const
     DEPTH[] = {"3", "4", "8", "5", "0", "3"},
-    *const WIDTH[] = {"128", "64", "512", "2048", "64", "128"}, *const BLOCK[] = {"4", "2", "4", "4", "4", "4"},
+    *const WIDTH[] = {"128", "64", "512", "2048", "64", "128"}, *const BLOCK[] = {"4", "2", "4",
+                                                                                  "4", "4", "4"},
     *const ACTIVATION[] = {"silu", "relu", "relu", "leaky_relu", "silu", "silu"},
     *const OUTPUT_TYPE[] = {"linear", "linear", "tanh", "linear", "linear", "linear"},
     *const WEIGHTS[] = {"i8", "f16", "f16", "f16", "i8", "i8"},
-    *const BATCH[] = {"256", "8", "16", "16", "256", "256"},
-    *const RATE[] = {"3e-3", "1e-3", "5e-4", "5e-4", "3e-3", "3e-3"};
+    *const BATCH[] = {"256", "8", "16", "16", "256", "256"}, *const RATE[] = {"3e-3", "1e-3",
+                                                                              "5e-4", "5e-4",
+                                                                              "3e-3", "3e-3"};
 
 static const sdm_field SHAPE[] = {
     ROW("name", SDM_FIELD_TEXT, shape.name, 1, SDM_NAME_MAX - 1, NULL, "",
@@ -100,11 +102,13 @@ static const sdm_field GRID[] = {
 };
 
 static const sdm_field NETWORK[] = {
-    CHOICE("kind", network.kind, SDM_KIND_CHOICES, "auto",
-           "auto: pod or template, whichever has the smaller error in a short trial; template: exact "
-           "maps of the shape's parts, carried along with the parts, and a correction by pod; pod: basis functions per block, with coefficients from polynomials and an MLP; sdmnn: "
-           "3-D convolutional encoder-decoder; deepsdf, imnet: one distance per point, evaluated "
-           "at every voxel"),
+    CHOICE(
+        "kind", network.kind, SDM_KIND_CHOICES, "auto",
+        "auto: pod or template, whichever has the smaller error in a short trial; template: exact "
+        "maps of the shape's parts, carried along with the parts, and a correction by pod; pod: "
+        "basis functions per block, with coefficients from polynomials and an MLP; sdmnn: "
+        "3-D convolutional encoder-decoder; deepsdf, imnet: one distance per point, evaluated "
+        "at every voxel"),
     BY_KIND(
         INT, "depth", network.depth, 0, 16, "layers", DEPTH,
         "number of hidden layers (pod: of the MLP, 0: polynomials only); sdmnn: number of levels"),

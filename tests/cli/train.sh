@@ -107,7 +107,7 @@ expect 0 - sdmgen info "$stopped/model.sdm"
 mkdir -p project/conf elsewhere
 cp -r "$source_folder"/configs/statistical* project/conf
 small=(grid.size=[16,12,12] grid.spacing=0.8 data.static=2 data.start=96 data.online=32 data.holdout=8
-    network.depth=1 network.width=16 network.rank=6 network.modes=16 train.batch=8)
+    network.kind=pod network.depth=1 network.width=16 network.rank=6 network.modes=16 train.batch=8)
 interrupted project/data project/conf/statistical.yaml "${small[@]}"
 mv project moved
 run=(sdmgen train moved/conf/statistical.yaml "${small[@]}" --out moved/data --resume --quiet)

@@ -196,6 +196,18 @@ static void test_kind_selects_keys_and_defaults(void **state)
     assert_true(config.network.dropout == 0.1 && config.train.batch == 8 &&
                 config.train.learning_rate == 1e-3);
 
+    expect_ok(BASE "network: {kind: template}\n", NULL);
+    assert_int_equal(config.network.kind, SDM_NETWORK_TEMPLATE);
+    assert_int_equal(config.network.depth, 0);
+    assert_int_equal(config.network.width, 64);
+    assert_int_equal(config.network.weights, SDM_WEIGHT_I8);
+    // Once the kind is chosen, keys with the default of `auto` have that of the kind.
+    expect_ok(BASE "network: {kind: auto, width: 99}\n", NULL);
+    sdm_config_choose_kind(&config, SDM_NETWORK_TEMPLATE);
+    assert_int_equal(config.network.kind, SDM_NETWORK_TEMPLATE);
+    assert_int_equal(config.network.depth, 0);
+    assert_int_equal(config.network.width, 99);
+
     // An override of the kind: keys of the file that the new kind does not have are ignored, the
     // others still apply.
     static const char pod[] =
@@ -223,15 +235,15 @@ static void test_kind_selects_keys_and_defaults(void **state)
     assert_int_equal(config.network.weights, SDM_WEIGHT_F16);
     static const char *const wanted[] = {"network.kind=sdmnn", "network.weights=i8"};
     assert_int_equal(parse(bytes, wanted, 2), SDM_E_CONFIG);
-    expect_mistake(
-        BASE "network: {kind: imnet, weights: i8}\n", NULL,
-        "x.yaml:4:24: network.weights: i8 is for a network of kind pod or template; imnet has f16 and f32");
+    expect_mistake(BASE "network: {kind: imnet, weights: i8}\n", NULL,
+                   "x.yaml:4:24: network.weights: i8 is for a network of kind pod or template; "
+                   "imnet has f16 and f32");
 
-    expect_mistake(
-        BASE "network: {kind: deepsdf, rank: 7}\n", NULL,
-        "x.yaml:4:26: network.rank: a network of kind deepsdf has no such key, only pod, template, auto");
+    expect_mistake(BASE "network: {kind: deepsdf, rank: 7}\n", NULL,
+                   "x.yaml:4:26: network.rank: a network of kind deepsdf has no such key, only "
+                   "pod, template, auto");
     expect_mistake(BASE, "train.eikonal=1",
-                   "argument 'train.eikonal=1': train.eikonal: a network of kind pod has no such "
+                   "argument 'train.eikonal=1': train.eikonal: a network of kind auto has no such "
                    "key, only sdmnn, "
                    "deepsdf, imnet");
     expect_mistake(
@@ -239,7 +251,7 @@ static void test_kind_selects_keys_and_defaults(void **state)
         "x.yaml:4:24: network.depth: 0 is out of range (1 .. 16) for a network of kind imnet");
     expect_mistake(
         BASE "network: {block: 1}\n", NULL,
-        "x.yaml:4:11: network.block: 1 is out of range (2 .. 16) for a network of kind pod");
+        "x.yaml:4:11: network.block: 1 is out of range (2 .. 16) for a network of kind auto");
     expect_mistake(
         BASE "network: {kind: deepsdf, depth: 3, skip: 3}\n", NULL,
         "x.yaml:4:36: network.skip: 3 is out of range (0 .. 2) for a network of kind deepsdf");
@@ -249,8 +261,7 @@ static void test_kind_selects_keys_and_defaults(void **state)
     assert_int_equal(config.network.skip, 1);
     expect_mistake(BASE, "network.kind=podd",
                    "argument 'network.kind=podd': network.kind: 'podd' is not one of pod, sdmnn, "
-                   "deepsdf, imnet; did "
-                   "you mean 'pod'?");
+                   "deepsdf, imnet, template, auto; did you mean 'pod'?");
 }
 
 static void test_mistakes(void **state)

@@ -209,11 +209,11 @@ static inline float *toy_map(const sdm_model *m, const double *p, int n_threads)
 {
     float *map = NULL;
     void *scratch = NULL;
-    assert_int_equal(
-        SDM_ALLOC(&map, sdm_grid_count(&sdm_model_get_info(m)->grid), "map", NULL), SDM_OK);
-    assert_int_equal(sdm_alloc(&scratch, sdm_model_scratch_bytes_threads(m, 1, n_threads), 1,
-                               "scratch", NULL),
+    assert_int_equal(SDM_ALLOC(&map, sdm_grid_count(&sdm_model_get_info(m)->grid), "map", NULL),
                      SDM_OK);
+    assert_int_equal(
+        sdm_alloc(&scratch, sdm_model_scratch_bytes_threads(m, 1, n_threads), 1, "scratch", NULL),
+        SDM_OK);
     memset(scratch, 0xa5, sdm_model_scratch_bytes_threads(m, 1, n_threads));
     sdm_model_forward_threads(m, p, 1, map, scratch, n_threads);
     sdm_free(scratch);
@@ -227,8 +227,7 @@ static inline double toy_number(const toy *t, const double *p, size_t i)
     const number *n = &t->numbers[i];
     double g = n->constant;
     for (int k = 0; k < P; k++) {
-        const double x =
-            2 * (p[k] - t->params[k].min) / (t->params[k].max - t->params[k].min) - 1;
+        const double x = 2 * (p[k] - t->params[k].min) / (t->params[k].max - t->params[k].min) - 1;
         g += n->slope[k] * x + n->square[k] * x * x;
     }
     return g;
@@ -339,8 +338,8 @@ static inline double toy_reference(const toy *t, const double *p, int first, siz
     return least;
 }
 
-/* Grids about the origin: sizes that no block and no step divides, anisotropic voxels, rotated axes,
-   a reflection, a single voxel. */
+/* Grids about the origin: sizes that no block and no step divides, anisotropic voxels, rotated
+   axes, a reflection, a single voxel. */
 enum { GRIDS = 5 };
 static inline sdm_grid toy_grid(int which)
 {

@@ -262,8 +262,7 @@ static void template_ends_at_far(void **state)
         voxel_world(&grid, v, x);
         toy_carry_back(&t, p, 0, x, y);
         for (int a = 0; a < 3; a++)
-            at[a] =
-                fmin(fmax(y[a], far.origin[a]), far.origin[a] + far.spacing * (far.n[a] - 1.0));
+            at[a] = fmin(fmax(y[a], far.origin[a]), far.origin[a] + far.spacing * (far.n[a] - 1.0));
         outside += memcmp(at, y, sizeof y) != 0;
         assert_true(fabs((double)map[v] - body_distance(&o, at, g)) < 1e-5);
     }
@@ -318,8 +317,10 @@ static void culling_keeps_all_bits(void **state)
                 float *part = toy_map(one[c], p, 1);
                 for (size_t v = 0; v < voxels && c; v++)
                     least[v] = part[v] < least[v] ? part[v] : least[v];
-                if (c) sdm_free(part);
-                else least = part;
+                if (c)
+                    sdm_free(part);
+                else
+                    least = part;
             }
             for (size_t v = 0; v < voxels; v++)
                 if (map[v] != least[v])
@@ -377,9 +378,8 @@ static void same_bits(void **state)
         for (int threads = 1; threads <= 3; threads++)
             for (int level = 0; level < SDM_PROCESSOR_LEVELS; level++) {
                 sdm_processor_select(level);
-                assert_int_equal(sdm_alloc(&scratch,
-                                           sdm_model_scratch_bytes_threads(m, N, threads), 1,
-                                           "scratch", NULL),
+                assert_int_equal(sdm_alloc(&scratch, sdm_model_scratch_bytes_threads(m, N, threads),
+                                           1, "scratch", NULL),
                                  SDM_OK);
                 sdm_model_forward_threads(m, p, N, maps, scratch, threads);
                 for (size_t i = 0; i < N; i++)
@@ -396,17 +396,12 @@ static void same_bits(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(frames_carry_planes),
-                                       cmocka_unit_test(affine_frame_makes_ellipsoid),
-                                       cmocka_unit_test(distance_near_ellipsoid),
-                                       cmocka_unit_test(affine_warp_is_affine_frame),
-                                       cmocka_unit_test(warp_is_its_inverse),
-                                       cmocka_unit_test(warp_of_long_grid),
-                                       cmocka_unit_test(warp_beside_rigid_parts),
-                                       cmocka_unit_test(carry_is_inverse_of_map),
-                                       cmocka_unit_test(template_ends_at_far),
-                                       cmocka_unit_test(culling_keeps_all_bits),
-                                       cmocka_unit_test(capsules_are_interpolated),
-                                       cmocka_unit_test(same_bits)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(frames_carry_planes),       cmocka_unit_test(affine_frame_makes_ellipsoid),
+        cmocka_unit_test(distance_near_ellipsoid),   cmocka_unit_test(affine_warp_is_affine_frame),
+        cmocka_unit_test(warp_is_its_inverse),       cmocka_unit_test(warp_of_long_grid),
+        cmocka_unit_test(warp_beside_rigid_parts),   cmocka_unit_test(carry_is_inverse_of_map),
+        cmocka_unit_test(template_ends_at_far),      cmocka_unit_test(culling_keeps_all_bits),
+        cmocka_unit_test(capsules_are_interpolated), cmocka_unit_test(same_bits)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

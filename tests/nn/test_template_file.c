@@ -40,7 +40,8 @@ static void file_make(file *f, toy *t)
     uint64_t checksum;
     if (toy_build(t, &f->bytes, &f->size, &e)) fail_msg("%s", e.text);
     assert_int_equal(
-        sdm_container_parse(f->bytes, f->size, f->sections, f->names, &f->n, &checksum, &e), SDM_OK);
+        sdm_container_parse(f->bytes, f->size, f->sections, f->names, &f->n, &checksum, &e),
+        SDM_OK);
     for (size_t i = 0; i < f->n; i++)
         if (strcmp(f->names[i], "meta") == 0) f->meta = i;
     const sdm_section *meta = &f->sections[f->meta];
@@ -103,55 +104,54 @@ static void damage_is_refused(void **state)
 static void wrong_lines_are_refused(void **state)
 {
     (void)state;
-    static const char *const lines[][2] = {
-        {"kind=template", "kind=templatf"},
-        {"template.degree=2", "template.degree=3"},
-        {"template.degree=2", "template.degree=13"},
-        {"template.degree=2", "template.degree=-1"},
-        {"template.numbers=20", "template.numbers=21"},
-        {"template.numbers=20", "template.numbers=19"},
-        {"template.numbers=20", "template.numbers=1048577"},
-        {"template.numbers=20", "template.numbers=-1"},
-        {"template.step=4", "template.step=1"},
-        {"template.step=4", "template.step=9"},
-        {"template.parts=2", "template.parts=0"},
-        {"template.parts=2", "template.parts=1"},
-        {"template.parts=2", "template.parts=3"},
-        {"template.parts=2", "template.parts=33"},
-        {"part.parent=-1", "part.parent=0"},
-        {"part.parent=-1", "part.parent=-2"},
-        {"part.parent=0", "part.parent=1"},
-        {"part.frame=1", "part.frame=3"},
-        {"part.frame=1", "part.frame=-1"},
-        {"part.pivot=", "part.pivot=nan 0 0 "},
-        {"part.pivot=0.5 ", "part.pivot=nan "},
-        {"part.pivot=0.5 ", "part.pivot=inf "},
-        {"part.pivot=0.5 ", "part.pivot=1e10 "},
-        {"part.numbers=0", "part.numbers=15"},
-        {"part.numbers=0", "part.numbers=-1"},
-        {"part.modes=2", "part.modes=3"},
-        {"part.modes=2", "part.modes=257"},
-        {"part.modes=2", "part.modes=0"},
-        {"part.amplitudes=6", "part.amplitudes=19"},
-        {"part.amplitudes=6", "part.amplitudes=1048577"},
-        {"part.warp=5 ", "part.warp=3 "},
-        {"part.warp=5 ", "part.warp=6 "},
-        {"part.warp=5 ", "part.warp=4097 "},
-        {"part.warp=5 ", "part.warp=nan "},
-        {"part.near=5 ", "part.near=1 "},
-        {"part.near=5 ", "part.near=4 "},
-        {"part.near=5 6 7", "part.near=4096 4096 4096"},
-        {"part.near=5 6 7", "part.near=1024 1024 1024"},
-        {"part.warp=5 6 7", "part.warp=4096 4096 4096"},
-        {"part.near=5 ", "part.near=inf "},
-        {"part.near=5 ", "part.near=-5 "},
-        {"part.far=5 ", "part.far=1e300 "},
-        {"part.far=5 6 7", "part.far=6 5 8"},
-        {"part.far=5 6 7 -4", "part.far=5 6 7 nan"},
-        {"part.far=5 6 7 -4", "part.far=5 6 7 2e9"},
-        {"part.far=5 6 7 -4 ", "part.far=5 6 7 "},
-        {"part.sag=0 ", "part.sag=nan "},
-        {"part.sag=0 ", "part.sag=-1 "}};
+    static const char *const lines[][2] = {{"kind=template", "kind=templatf"},
+                                           {"template.degree=2", "template.degree=3"},
+                                           {"template.degree=2", "template.degree=13"},
+                                           {"template.degree=2", "template.degree=-1"},
+                                           {"template.numbers=20", "template.numbers=21"},
+                                           {"template.numbers=20", "template.numbers=19"},
+                                           {"template.numbers=20", "template.numbers=1048577"},
+                                           {"template.numbers=20", "template.numbers=-1"},
+                                           {"template.step=4", "template.step=1"},
+                                           {"template.step=4", "template.step=9"},
+                                           {"template.parts=2", "template.parts=0"},
+                                           {"template.parts=2", "template.parts=1"},
+                                           {"template.parts=2", "template.parts=3"},
+                                           {"template.parts=2", "template.parts=33"},
+                                           {"part.parent=-1", "part.parent=0"},
+                                           {"part.parent=-1", "part.parent=-2"},
+                                           {"part.parent=0", "part.parent=1"},
+                                           {"part.frame=1", "part.frame=3"},
+                                           {"part.frame=1", "part.frame=-1"},
+                                           {"part.pivot=", "part.pivot=nan 0 0 "},
+                                           {"part.pivot=0.5 ", "part.pivot=nan "},
+                                           {"part.pivot=0.5 ", "part.pivot=inf "},
+                                           {"part.pivot=0.5 ", "part.pivot=1e10 "},
+                                           {"part.numbers=0", "part.numbers=15"},
+                                           {"part.numbers=0", "part.numbers=-1"},
+                                           {"part.modes=2", "part.modes=3"},
+                                           {"part.modes=2", "part.modes=257"},
+                                           {"part.modes=2", "part.modes=0"},
+                                           {"part.amplitudes=6", "part.amplitudes=19"},
+                                           {"part.amplitudes=6", "part.amplitudes=1048577"},
+                                           {"part.warp=5 ", "part.warp=3 "},
+                                           {"part.warp=5 ", "part.warp=6 "},
+                                           {"part.warp=5 ", "part.warp=4097 "},
+                                           {"part.warp=5 ", "part.warp=nan "},
+                                           {"part.near=5 ", "part.near=1 "},
+                                           {"part.near=5 ", "part.near=4 "},
+                                           {"part.near=5 6 7", "part.near=4096 4096 4096"},
+                                           {"part.near=5 6 7", "part.near=1024 1024 1024"},
+                                           {"part.warp=5 6 7", "part.warp=4096 4096 4096"},
+                                           {"part.near=5 ", "part.near=inf "},
+                                           {"part.near=5 ", "part.near=-5 "},
+                                           {"part.far=5 ", "part.far=1e300 "},
+                                           {"part.far=5 6 7", "part.far=6 5 8"},
+                                           {"part.far=5 6 7 -4", "part.far=5 6 7 nan"},
+                                           {"part.far=5 6 7 -4", "part.far=5 6 7 2e9"},
+                                           {"part.far=5 6 7 -4 ", "part.far=5 6 7 "},
+                                           {"part.sag=0 ", "part.sag=nan "},
+                                           {"part.sag=0 ", "part.sag=-1 "}};
     toy t = make();
     file f;
     file_make(&f, &t);
@@ -227,10 +227,10 @@ static void hostile_weights_are_harmless(void **state)
                 assert_int_equal(SDM_ALLOC(&data, f.sections[s].size, "weights", NULL), SDM_OK);
                 for (size_t b = 0; b < f.sections[s].size; b++) {
                     const size_t byte = i == 0 ? b % 8 : b % 4, top = i == 0 ? 7 : 3;
-                    data[b] = bits == 0              ? 0xff
-                              : byte == top          ? (bits == 1 ? 0x7f : 0x7e)
-                              : byte == top - 1      ? (i == 0 ? 0xf0 : 0x80)
-                                                     : 0;
+                    data[b] = bits == 0         ? 0xff
+                              : byte == top     ? (bits == 1 ? 0x7f : 0x7e)
+                              : byte == top - 1 ? (i == 0 ? 0xf0 : 0x80)
+                                                : 0;
                 }
                 f.sections[s].data = data;
                 uint8_t *bytes;

@@ -291,9 +291,8 @@ static void wrong_correction_is_refused(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(jacobian_is_the_slope),
-                                       cmocka_unit_test(products_use_the_jacobian),
-                                       cmocka_unit_test(correction_is_added),
-                                       cmocka_unit_test(wrong_correction_is_refused)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(jacobian_is_the_slope), cmocka_unit_test(products_use_the_jacobian),
+        cmocka_unit_test(correction_is_added), cmocka_unit_test(wrong_correction_is_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -64,8 +64,7 @@ static int mechanism_mesh(const void *self, const sdm_host *host, const sdm_opti
                            v = b ? (uint32_t)(first + 8 * (b - 1) + corner) : (uint32_t)k;
             const bool cavity = b == BLOCK && mistaken == CAVITY;
             double *x = out->vert + 3 * v;
-            for (size_t a = 0; a < 3; a++)
-                x[a] = corner >> a & 1 ? box_high[b][a] : box_low[b][a];
+            for (size_t a = 0; a < 3; a++) x[a] = corner >> a & 1 ? box_high[b][a] : box_low[b][a];
             for (size_t a = 0; a < 3 && cavity; a++)
                 x[a] = (corner >> a & 1 ? 0.5 : -0.5) - (a == 2 ? 3 : 0);
             if (!cavity) mechanism_move((int)b, p, x);
@@ -115,8 +114,7 @@ static int ring_mesh(const void *self, const sdm_host *host, const sdm_option_va
             memcpy(to, x, sizeof x);
             for (int k = 0; k < RING_PARAMS; k++) {
                 double square = 0;
-                for (int a = 0; a < 3; a++)
-                    square += (x[a] - centre[k][a]) * (x[a] - centre[k][a]);
+                for (int a = 0; a < 3; a++) square += (x[a] - centre[k][a]) * (x[a] - centre[k][a]);
                 for (int a = 0; a < 3; a++) to[a] += p[k] * along[k][a] * exp(-square / (2 * 9));
             }
             const uint32_t i1 = (uint32_t)((i + 1) % LONG), j1 = (uint32_t)((j + 1) % ROUND),

@@ -21,12 +21,12 @@ static sdm_registry *registry;
 static sdm_instance *torus;
 static char folder[] = "derivative_XXXXXX";
 
-static const char text[] =
-    "shape: {name: torus}\n"
-    "grid: {size: [24, 24, 12], spacing: 0.5}\n"
-    "network: {kind: pod, depth: 2, width: 48, rank: 12, block: 4, levels: 2, modes: 64, degree: 6}\n"
-    "data: {static: 5, start: 200, online: 0, holdout: 20, memory_gb: 0.5}\n"
-    "train: {steps: 800, batch: 64, refine: 0}\n";
+static const char text[] = "shape: {name: torus}\n"
+                           "grid: {size: [24, 24, 12], spacing: 0.5}\n"
+                           "network: {kind: pod, depth: 2, width: 48, rank: 12, block: 4, levels: "
+                           "2, modes: 64, degree: 6}\n"
+                           "data: {static: 5, start: 200, online: 0, holdout: 20, memory_gb: 0.5}\n"
+                           "train: {steps: 800, batch: 64, refine: 0}\n";
 
 // Returns the root mean square of a - b; *size: that of b.
 static double rms_difference(const float *a, const float *b, size_t n, double *size)

@@ -87,8 +87,7 @@ static void known_motions_are_found(void **state)
             for (size_t a = 0; a < 3; a++) {
                 const double *x = c.from + 3 * c.vertex[k];
                 const double e = found.m[3 * a] * x[0] + found.m[3 * a + 1] * x[1] +
-                                 found.m[3 * a + 2] * x[2] + found.b[a] -
-                                 c.to[3 * c.vertex[k] + a];
+                                 found.m[3 * a + 2] * x[2] + found.b[a] - c.to[3 * c.vertex[k] + a];
                 sum += e * e;
             }
         assert_true(left > 0.01 && fabs(left - sqrt(sum / (POINTS / 2))) < 1e-9);
@@ -132,7 +131,8 @@ static void polar_decomposition(void **state)
         const motion turn = random_rotation(i);
         double s[6], m[9], w[3], found[6], r[9];
         for (uint64_t k = 0; k < 6; k++) s[k] = 0.15 * sdm_rng_normal(34, k, i);
-        const double stretch[9] = {1 + s[0], s[5], s[4], s[5], 1 + s[1], s[3], s[4], s[3], 1 + s[2]};
+        const double stretch[9] = {1 + s[0], s[5], s[4], s[5],    1 + s[1],
+                                   s[3],     s[4], s[3], 1 + s[2]};
         for (int a = 0; a < 3; a++)
             for (int b = 0; b < 3; b++)
                 m[3 * a + b] = turn.m[3 * a] * stretch[b] + turn.m[3 * a + 1] * stretch[3 + b] +
@@ -233,8 +233,7 @@ static void field_at(const sdm_lattice *l, const float *control, const double x[
     for (size_t i = 0; i < sdm_lattice_count(l); i++) {
         const size_t at[3] = {i % l->n[0], i / l->n[0] % l->n[1], i / l->n[0] / l->n[1]};
         double w = 1;
-        for (int a = 0; a < 3; a++)
-            w *= spline((x[a] - l->origin[a]) / l->spacing - (double)at[a]);
+        for (int a = 0; a < 3; a++) w *= spline((x[a] - l->origin[a]) / l->spacing - (double)at[a]);
         for (size_t a = 0; a < 3; a++) u[a] += w * (double)control[3 * i + a];
     }
 }
@@ -279,8 +278,7 @@ static void fields_are_continued(void **state)
         assert_int_equal(trainer_freeform_fit(&l, PLACES, x, FIELDS, values, threads,
                                               control[threads - 1], &error, NULL),
                          SDM_OK);
-        assert_memory_equal(control[threads - 1], control[0],
-                            FIELDS * 3 * nodes * sizeof(float));
+        assert_memory_equal(control[threads - 1], control[0], FIELDS * 3 * nodes * sizeof(float));
     }
     // The error is that of the worst field.
     double sum[FIELDS] = {0}, u[3];
@@ -312,8 +310,8 @@ static void fields_are_continued(void **state)
 static void allocations_may_fail(void **state)
 {
     (void)state;
-    const sdm_lattice l = trainer_freeform_lattice((const double[]){0, 0, 0},
-                                                   (const double[]){1, 1, 1}, 1);
+    const sdm_lattice l =
+        trainer_freeform_lattice((const double[]){0, 0, 0}, (const double[]){1, 1, 1}, 1);
     const double x[3] = {0.5, 0.5, 0.5}, weight[NUMBERS] = {1, 1};
     const float values[3] = {1, 2, 3};
     float control[3 * 64];

@@ -201,8 +201,8 @@ static void ring_has_its_modes(void **state)
     assert_int_equal(sdm_instance_mesh(shape, p, &mesh, &e), SDM_OK);
     double *x = NULL, sum = 0;
     assert_int_equal(SDM_ALLOC(&x, 3 * mesh.n_vert, "vertices", NULL), SDM_OK);
-    assert_int_equal(
-        sdm_template_carry(d.model, p, d.family.base.vert, mesh.n_vert, x, &e), SDM_OK);
+    assert_int_equal(sdm_template_carry(d.model, p, d.family.base.vert, mesh.n_vert, x, &e),
+                     SDM_OK);
     for (size_t i = 0; i < 3 * mesh.n_vert; i++)
         sum += (x[i] - mesh.vert[i]) * (x[i] - mesh.vert[i]);
     assert_true(sqrt(sum / (double)mesh.n_vert) < 0.02 * 0.45);
@@ -235,12 +235,10 @@ static void allocations_may_fail(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(components_join_vertices),
-                                       cmocka_unit_test(mechanism_has_its_parts),
-                                       cmocka_unit_test(other_meshes_are_refused),
-                                       cmocka_unit_test(fine_grid_is_refused),
-                                       cmocka_unit_test(some_shapes_are_one_part),
-                                       cmocka_unit_test(ring_has_its_modes),
-                                       cmocka_unit_test(allocations_may_fail)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(components_join_vertices), cmocka_unit_test(mechanism_has_its_parts),
+        cmocka_unit_test(other_meshes_are_refused), cmocka_unit_test(fine_grid_is_refused),
+        cmocka_unit_test(some_shapes_are_one_part), cmocka_unit_test(ring_has_its_modes),
+        cmocka_unit_test(allocations_may_fail)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

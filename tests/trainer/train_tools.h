@@ -45,7 +45,7 @@ static inline uint64_t hash_of(const char *name)
 static inline void run_files_remove(void)
 {
     static const char *const names[] = {"model.sdm", "checkpoint.sdmc", "metrics.jsonl",
-                                        "config.yaml", "loss.png",     "auto.json"};
+                                        "config.yaml", "loss.png"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) remove(in_folder(names[i]));
 }
 

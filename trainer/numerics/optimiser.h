@@ -17,7 +17,8 @@ typedef struct parameters {
     double gain_at;            /* fraction of the phase's budget at which it was found */
 } parameters;
 
-/* Allocates all arrays, filled with 0; the errors are infinite. Call trainer_parameters_dispose() also after an error. */
+/* Allocates all arrays, filled with 0; the errors are infinite. Call trainer_parameters_dispose()
+ * also after an error. */
 sdm_status trainer_parameters_create(parameters *p, size_t n, sdm_error *err);
 void trainer_parameters_dispose(parameters *p);
 

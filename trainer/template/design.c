@@ -7,10 +7,10 @@
 #include <string.h>
 
 #include "motion.h"
-#include "template_parts.h"
 #include "regression.h"
 #include "sdm/memory.h"
 #include "template_maps.h"
+#include "template_parts.h"
 #include "warp_modes.h"
 
 /* Number of meshes from which the polynomials are computed. */
@@ -244,8 +244,7 @@ static sdm_status model_difference(const template_design *d, const sdm_model *a,
     const size_t bytes_a = sdm_model_scratch_bytes(a, 1), bytes_b = sdm_model_scratch_bytes(b, 1);
     sdm_status s = SDM_ALLOC(&x, n, "template", err);
     if (!s) s = SDM_ALLOC(&y, n, "template", err);
-    if (!s)
-        s = sdm_alloc(&scratch, bytes_a > bytes_b ? bytes_a : bytes_b, 1, "template", err);
+    if (!s) s = sdm_alloc(&scratch, bytes_a > bytes_b ? bytes_a : bytes_b, 1, "template", err);
     for (size_t i = 0; i < SHAPES && !s; i++) {
         trainer_family_params(&d->family, i, p);
         sdm_model_forward(a, p, 1, x, scratch);

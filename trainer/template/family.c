@@ -82,8 +82,7 @@ sdm_status trainer_family_create(family *f, sdm_error *err)
     size_t n;
     const sdm_param *params = sdm_instance_params(f->shape, &n);
     double p[SDM_POD_MAX_PARAMS];
-    for (size_t i = 0; i < f->n_params; i++)
-        p[i] = fmin(fmax(params[i].def, f->min[i]), f->max[i]);
+    for (size_t i = 0; i < f->n_params; i++) p[i] = fmin(fmax(params[i].def, f->min[i]), f->max[i]);
     sdm_status s = sdm_instance_mesh(f->shape, p, &f->base, err);
     if (!s) s = SDM_ALLOC(&f->component, f->base.n_vert, "components", err);
     return s ? s : find_components(f, err);
@@ -98,8 +97,8 @@ void trainer_family_dispose(family *f)
 
 void trainer_family_params(const family *f, size_t index, double *p)
 {
-    sdm_sample_params(f->seed, STREAM_FAMILY, index, f->min, f->max, f->distribution,
-                      f->n_params, p);
+    sdm_sample_params(f->seed, STREAM_FAMILY, index, f->min, f->max, f->distribution, f->n_params,
+                      p);
 }
 
 sdm_status trainer_family_mesh(const family *f, const double *p, sdm_mesh *mesh, sdm_error *err)

@@ -12,9 +12,9 @@ typedef struct family {
     const sdm_distribution *distribution; /* [n_params] */
     uint64_t seed;
     int n_threads;
-    sdm_mesh base;         /* at the default parameters */
-    size_t n_components;   /* sets of triangles that are connected through vertices */
-    uint32_t *component;   /* [n_vert] component of each vertex; UINT32_MAX: in no triangle */
+    sdm_mesh base;       /* at the default parameters */
+    size_t n_components; /* sets of triangles that are connected through vertices */
+    uint32_t *component; /* [n_vert] component of each vertex; UINT32_MAX: in no triangle */
 } family;
 
 /* Fills *f: the mesh at the defaults (moved into min .. max) and its components. Vertices at the

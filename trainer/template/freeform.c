@@ -216,8 +216,8 @@ sdm_status trainer_freeform_fit(const sdm_lattice *l, size_t n, const double *x,
     if (!s && short_of_memory) s = sdm_fail(err, SDM_E_NOMEM, "no memory for the deformation");
     *error = 0;
     for (size_t f = 0; f < n_fields && !s; f++)
-        *error = fmax(*error, sqrt((squares[3 * f] + squares[3 * f + 1] + squares[3 * f + 2]) /
-                                   (double)n));
+        *error = fmax(*error,
+                      sqrt((squares[3 * f] + squares[3 * f + 1] + squares[3 * f + 2]) / (double)n));
     sdm_free(squares);
     sdm_free(b.a);
     return s;

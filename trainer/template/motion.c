@@ -75,9 +75,9 @@ double trainer_motion_rigid(const double *from, const double *to, const uint32_t
     // the quaternion is the leading eigenvector of Horn's matrix; c[3 a + b] = sum to_a from_b
     const double xx = c[0], xy = c[3], xz = c[6], yx = c[1], yy = c[4], yz = c[7], zx = c[2],
                  zy = c[5], zz = c[8];
-    double q[16] = {xx + yy + zz, yz - zy,      zx - xz,       xy - yx,       yz - zy, xx - yy - zz,
-                    xy + yx,      zx + xz,      zx - xz,       xy + yx,       yy - xx - zz,
-                    yz + zy,      xy - yx,      zx + xz,       yz + zy,       zz - xx - yy};
+    double q[16] = {xx + yy + zz, yz - zy, zx - xz, xy - yx,     yz - zy,      xx - yy - zz,
+                    xy + yx,      zx + xz, zx - xz, xy + yx,     yy - xx - zz, yz + zy,
+                    xy - yx,      zx + xz, yz + zy, zz - xx - yy};
     double values[4];
     sdm_pose pose = {.rotation = {0, 0, 0}};
     if (!trainer_eigen_symmetric(4, q, values, NULL)) sdm_rotation_of_quaternion(q, pose.rotation);

@@ -19,10 +19,10 @@ static const double CORRECTION_SPACING = 2;
 typedef struct template_state {
     template_design design;
     bool corrected;
-    sdm_grid grid;     /* of the correction, in the template's frame */
-    size_t n_voxels;   /* of this grid */
-    double *nodes;     /* [n_voxels][3] its voxels */
-    parameters none;   /* weights of a network without a correction */
+    sdm_grid grid;   /* of the correction, in the template's frame */
+    size_t n_voxels; /* of this grid */
+    double *nodes;   /* [n_voxels][3] its voxels */
+    parameters none; /* weights of a network without a correction */
 } template_state;
 
 static const template_state *state_of(const trainer *t) { return t->design; }
@@ -41,8 +41,7 @@ static sdm_status correction_of(const void *user, const double *p, const float *
     const size_t n = sdm_grid_count(g);
     sdm_status status = SDM_ALLOC(&map, n, "correction", err);
     if (!status) status = SDM_ALLOC(&x, 3 * s->n_voxels, "correction", err);
-    if (!status)
-        status = sdm_alloc(&scratch, sdm_model_scratch_bytes(m, 1), 1, "correction", err);
+    if (!status) status = sdm_alloc(&scratch, sdm_model_scratch_bytes(m, 1), 1, "correction", err);
     if (!status) {
         sdm_model_forward(m, p, 1, map, scratch);
         for (size_t i = 0; i < n; i++) map[i] = exact[i] - map[i];
@@ -127,8 +126,8 @@ static void report_design(trainer *t, const template_state *s)
                         d->n_parts, rigid, affine, still, d->degree, d->motion_error_mm);
 }
 
-/* Compares the template without a correction with exact maps of a few random shapes. *rms = root mean
- * square error (mm) in voxels within a voxel of the surface. */
+/* Compares the template without a correction with exact maps of a few random shapes. *rms = root
+ * mean square error (mm) in voxels within a voxel of the surface. */
 static sdm_status check_design(const trainer *t, const template_state *s, double *rms,
                                sdm_error *err)
 {
@@ -180,13 +179,14 @@ static sdm_status template_prepare(trainer *t, sdm_error *err)
     double rms = 0;
     if ((status = check_design(t, s, &rms, err))) return status;
     if (rms > t->config->grid.spacing[0])
-        return sdm_fail(err, SDM_E_UNSUPPORTED,
-                        "carried along, the template misses the surface by %.2g mm (%.1f voxels): "
-                        "parts of the mesh fold or turn too far for one warp; use network.kind: pod",
-                        rms, rms / t->config->grid.spacing[0]);
+        return sdm_fail(
+            err, SDM_E_UNSUPPORTED,
+            "carried along, the template misses the surface by %.2g mm (%.1f voxels): "
+            "parts of the mesh fold or turn too far for one warp; use network.kind: pod",
+            rms, rms / t->config->grid.spacing[0]);
     report_design(t, s);
-    s->corrected = s->design.n_parts == 1 && (s->design.parts[0].n_modes ||
-                                              s->design.parts[0].frame == SDM_FRAME_AFFINE);
+    s->corrected = s->design.n_parts == 1 &&
+                   (s->design.parts[0].n_modes || s->design.parts[0].frame == SDM_FRAME_AFFINE);
     d->only_holdout = !s->corrected;
     if (!s->corrected) return SDM_OK;
     if ((status = correction_grid(s, err))) return status;

@@ -6,9 +6,9 @@
 #include <string.h>
 
 #include "motion.h"
-#include "template_parts.h"
 #include "sdm/exact.h"
 #include "sdm/memory.h"
+#include "template_parts.h"
 
 enum { SAMPLES = 64 };
 
@@ -18,7 +18,8 @@ typedef struct box {
 
 static void box_add(box *b, const double x[3])
 {
-    for (int a = 0; a < 3; a++) b->min[a] = fmin(b->min[a], x[a]), b->max[a] = fmax(b->max[a], x[a]);
+    for (int a = 0; a < 3; a++)
+        b->min[a] = fmin(b->min[a], x[a]), b->max[a] = fmax(b->max[a], x[a]);
 }
 
 static const box EMPTY = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
@@ -130,8 +131,8 @@ static double lattice_sag(const sdm_lattice *l, const float *nodes, const long b
                     const long sign[3] = {k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1},
                                step = by_axes[labs(sign[0]) + labs(sign[1]) + labs(sign[2])],
                                d[3] = {step * sign[0], step * sign[1], step * sign[2]};
-                    if (step == 0 || x + d[0] < 0 || x + d[0] >= n[0] || y + d[1] < 0 || y + d[1] >= n[1] ||
-                        z + d[2] < 0 || z + d[2] >= n[2])
+                    if (step == 0 || x + d[0] < 0 || x + d[0] >= n[0] || y + d[1] < 0 ||
+                        y + d[1] >= n[1] || z + d[2] < 0 || z + d[2] >= n[2])
                         continue;
                     const float *b = a + 4 * ((d[2] * n[1] + d[1]) * n[0] + d[0]);
                     double below = (double)a[0] - (double)b[0];
@@ -143,17 +144,17 @@ static double lattice_sag(const sdm_lattice *l, const float *nodes, const long b
     return largest;
 }
 
-// Sets sag, far_sag and their bounds: three nodes of `near`. The lattice `far` has four times its spacing.
+// Sets sag, far_sag and their bounds: three nodes of `near`. The lattice `far` has four times its
+// spacing.
 static void measure_sag(sdm_template_part *p)
 {
     p->sag_reach = 3 * p->near.spacing;
     p->far_from = 6 * p->near.spacing;
     for (int far = 0; far < 2; far++) {
         const double least = far ? p->far_from : 0,
-                     sag = fmax(lattice_sag(&p->near, p->near_nodes, (const long[]){0, 3, 2, 2},
-                                            least),
-                                lattice_sag(&p->far, p->far_nodes, (const long[]){0, 1, 0, 0},
-                                            least));
+                     sag = fmax(
+                         lattice_sag(&p->near, p->near_nodes, (const long[]){0, 3, 2, 2}, least),
+                         lattice_sag(&p->far, p->far_nodes, (const long[]){0, 1, 0, 0}, least));
         *(far ? &p->far_sag : &p->sag) = sag;
     }
 }

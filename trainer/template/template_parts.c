@@ -64,9 +64,9 @@ static sdm_status measure(const template_design *d, residuals *r, sdm_error *err
             r->affine[c] = fmax(r->affine[c], trainer_motion_affine(from, mesh.vert, v, n, &m));
             r->rigid[c] = fmax(r->rigid[c], trainer_motion_rigid(from, mesh.vert, v, n, &m));
             trainer_motion_polar(m.m, rotation, stretch);
-            r->angle[c] = fmax(r->angle[c], sqrt(rotation[0] * rotation[0] +
-                                                 rotation[1] * rotation[1] +
-                                                 rotation[2] * rotation[2]));
+            r->angle[c] =
+                fmax(r->angle[c], sqrt(rotation[0] * rotation[0] + rotation[1] * rotation[1] +
+                                       rotation[2] * rotation[2]));
         }
     }
     sdm_mesh_dispose(&mesh);
@@ -113,8 +113,7 @@ static sdm_status motions_at(const template_design *d, const double *p, sdm_mesh
                              sdm_error *err)
 {
     const sdm_status s = trainer_family_mesh(&d->family, p, mesh, err);
-    for (size_t c = 0; c < d->n_parts && !s; c++)
-        trainer_template_motion(d, c, mesh->vert, &m[c]);
+    for (size_t c = 0; c < d->n_parts && !s; c++) trainer_template_motion(d, c, mesh->vert, &m[c]);
     m[d->n_parts] = (motion){{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
     return s;
 }

@@ -1,8 +1,8 @@
 /* The parts of a shape: components that move alike, with the type and the parent of each frame. */
 #pragma once
 
-#include "template_design.h"
 #include "motion.h"
+#include "template_design.h"
 
 /* Sets n_parts, vertices, first, and of each part: parent, frame, and n_modes = 1 if it needs a
    warp (the number of modes is set later). tolerance: root mean square distance (mm) below which a

@@ -137,8 +137,8 @@ sdm_status trainer_template_warp(template_design *d, size_t c, size_t n_samples,
     if (!s) {
         for (size_t i = 0; i < n * row / 3; i++) {
             const float *u = y + 3 * i;
-            reach = fmax(reach, sqrt((double)u[0] * u[0] + (double)u[1] * u[1] +
-                                     (double)u[2] * u[2]));
+            reach =
+                fmax(reach, sqrt((double)u[0] * u[0] + (double)u[1] * u[1] + (double)u[2] * u[2]));
         }
         p->n_modes = choose_modes(n, row, values, tolerance);
         s = SDM_ALLOC(&modes, p->n_modes * row, "warp", err);

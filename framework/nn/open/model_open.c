@@ -8,8 +8,8 @@
 #define MODEL_BYTES_MAX (UINT64_C(16) << 30)
 
 // A new kind of network needs an entry here and a declaration in model_kind.h.
-static const sdm_model_kind *const KINDS[] = {&sdm_kind_pod,   &sdm_kind_template, &sdm_kind_deepsdf,
-                                              &sdm_kind_imnet, &sdm_kind_sdmnn,    NULL};
+static const sdm_model_kind *const KINDS[] = {
+    &sdm_kind_pod, &sdm_kind_template, &sdm_kind_deepsdf, &sdm_kind_imnet, &sdm_kind_sdmnn, NULL};
 
 sdm_status sdm_model_open_memory(const char *name, const uint8_t *bytes, size_t size,
                                  sdm_model **out, sdm_error *err)

@@ -27,7 +27,8 @@ static void describe(const sdm_template_spec *spec, sdm_text *t)
         if (p->n_modes) add_lattice(t, "part.warp", &p->warp);
         add_lattice(t, "part.near", &p->near);
         add_lattice(t, "part.far", &p->far);
-        sdm_text_add_reals(t, "part.sag", (const double[]){p->sag, p->sag_reach, p->far_sag, p->far_from}, 4);
+        sdm_text_add_reals(t, "part.sag",
+                           (const double[]){p->sag, p->sag_reach, p->far_sag, p->far_from}, 4);
     }
 }
 

@@ -44,4 +44,3 @@ void sdm_template_forward(const sdm_model *m, const double *params, size_t n, fl
         fill_map(&w, values + i * sdm_grid_count(&m->info.grid));
     }
 }
-

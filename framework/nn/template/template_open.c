@@ -10,7 +10,8 @@ static void read_lattice(sdm_lines *lines, const char *key, uint32_t least, sdm_
     double v[7] = {0};
     sdm_lines_reals(lines, key, v, 7);
     for (int a = 0; a < 3; a++) {
-        if (!(v[a] >= least && v[a] <= SDM_TEMPLATE_MAX_SIDE && fabs(v[3 + a]) <= 1e9)) lines->failed = true;
+        if (!(v[a] >= least && v[a] <= SDM_TEMPLATE_MAX_SIDE && fabs(v[3 + a]) <= 1e9))
+            lines->failed = true;
         l->n[a] = lines->failed ? least : (uint32_t)v[a];
         l->origin[a] = v[3 + a];
     }
@@ -110,10 +111,11 @@ static sdm_status open_correction(sdm_model *m, const sdm_section *sections, siz
     status = sdm_model_read(copy, s->size, kinds, &k->correction, err);
     if (status) return sdm_fail_in(err, status, "correction");
     const sdm_model_info *i = &k->correction->info;
-    bool fits = i->n_params == m->info.n_params && k->n_parts == 1 &&
-                sdm_grid_count(&i->grid) <= INT32_MAX;
+    bool fits =
+        i->n_params == m->info.n_params && k->n_parts == 1 && sdm_grid_count(&i->grid) <= INT32_MAX;
     for (size_t p = 0; p < i->n_params && fits; p++)
-        fits = i->params[p].min == m->info.params[p].min && i->params[p].max == m->info.params[p].max;
+        fits =
+            i->params[p].min == m->info.params[p].min && i->params[p].max == m->info.params[p].max;
     for (int a = 0; a < 3; a++)
         fits &= i->grid.n[a] >= 2 && i->grid.spacing[a] == i->grid.spacing[0];
     for (int a = 0; a < 9; a++) fits &= i->grid.dir[a] == (a % 4 == 0);
@@ -183,8 +185,7 @@ static sdm_status open_network(sdm_model *m, sdm_lines *lines, const sdm_section
     if (k->n_terms > 1u << 20)
         return sdm_fail(err, SDM_E_FORMAT, "damaged: polynomials of degree %zu", k->degree);
     // stations: one before the grid, one after it
-    for (int a = 0; a < 3; a++)
-        k->stations[a] = ((size_t)m->info.grid.n[a] - 1) / k->step + 4;
+    for (int a = 0; a < 3; a++) k->stations[a] = ((size_t)m->info.grid.n[a] - 1) / k->step + 4;
     if ((s = check_stations(m, err))) return s;
     if ((s = SDM_ALLOC(&k->exponents, k->n_terms * m->info.n_params, "model polynomials", err)))
         return s;

@@ -30,11 +30,10 @@ static void *carve(void *memory, size_t *at, size_t bytes)
 static void carve_row(const sdm_grid *grid, void *memory, size_t *at, template_row *r)
 {
     const size_t bytes = sdm_template_row_floats(grid) * sizeof(float);
-    float **const fields[] = {&r->u[0],      &r->u[1],      &r->u[2],      &r->metric[0],
-                              &r->metric[1], &r->metric[2], &r->metric[3], &r->metric[4],
-                              &r->metric[5], &r->f,         &r->g[0],      &r->g[1],
-                              &r->g[2],      &r->far_f,     &r->far_g[0],  &r->far_g[1],
-                              &r->far_g[2],  &r->value};
+    float **const fields[] = {
+        &r->u[0],      &r->u[1],      &r->u[2],      &r->metric[0], &r->metric[1], &r->metric[2],
+        &r->metric[3], &r->metric[4], &r->metric[5], &r->f,         &r->g[0],      &r->g[1],
+        &r->g[2],      &r->far_f,     &r->far_g[0],  &r->far_g[1],  &r->far_g[2],  &r->value};
     for (size_t i = 0; i < sizeof fields / sizeof *fields; i++)
         *fields[i] = carve(memory, at, bytes);
 }
@@ -61,8 +60,7 @@ size_t sdm_template_carve(const sdm_model *m, bool slopes, size_t correction_map
         s->line = carve(memory, &at, 12 * k->stations[0] * sizeof *s->line);
         if (slopes) s->station = carve(memory, &at, n * sizeof *s->station);
     }
-    for (int a = 0; a < 3; a++)
-        w->blocks[a] = ((size_t)w->grid->n[a] + BLOCK[a] - 1) / BLOCK[a];
+    for (int a = 0; a < 3; a++) w->blocks[a] = ((size_t)w->grid->n[a] + BLOCK[a] - 1) / BLOCK[a];
     for (size_t c = 0; c < k->n_parts; c++) w->by_lines |= k->parts[c].n_modes > 0;
     const size_t blocks = w->by_lines ? 0 : w->blocks[0] * w->blocks[1] * w->blocks[2];
     w->centre = carve(memory, &at, 4 * k->n_parts * blocks * sizeof *w->centre);
@@ -99,8 +97,7 @@ void sdm_template_plane(const template_network *k, const float *points, const fl
 void sdm_template_line(const template_network *k, const float *plane, size_t y, float *line)
 {
     const size_t n = k->stations[0], cell = y / k->step, phase = y % k->step;
-    const float *p = plane + 4 * n * cell,
-                *g = plane + 4 * n * k->stations[1] + 8 * n * (cell + 1);
+    const float *p = plane + 4 * n * cell, *g = plane + 4 * n * k->stations[1] + 8 * n * (cell + 1);
     float w[4];
     for (int a = 0; a < 4; a++) w[a] = k->expansion.cubic[a][phase];
     const float t = k->expansion.linear[phase];
@@ -374,7 +371,8 @@ static bool is_behind(const template_work *w, size_t c, const template_patch *p,
     float base = centre[0], slope[3] = {centre[1], centre[2], centre[3]};
     if (!(base > 0)) return false;
     if (w->part[c].rigid && radius <= part->sag_reach) {
-        base -= (float)(1.05 * ((double)base >= part->far_from ? part->far_sag : part->sag) + slack);
+        base -=
+            (float)(1.05 * ((double)base >= part->far_from ? part->far_sag : part->sag) + slack);
     } else {
         base -= (float)(1.05 * w->part[c].slope * radius + slack);
         memset(slope, 0, sizeof slope);

@@ -4,9 +4,9 @@
 
 #include "template_internal.h"
 
-/* A patch: the voxels that are evaluated together, x fastest, then y, then z. Without a warp a patch
-   is a block of 4 x 4 x 4 voxels (smaller at the end of the grid), in which parts that cannot be the
-   nearest are left out; with a warp it is a line of the grid. */
+/* A patch: the voxels that are evaluated together, x fastest, then y, then z. Without a warp a
+   patch is a block of 4 x 4 x 4 voxels (smaller at the end of the grid), in which parts that cannot
+   be the nearest are left out; with a warp it is a line of the grid. */
 typedef struct template_patch {
     size_t at[3], n[3]; /* first voxel, number of voxels along x, y, z */
     size_t count;       /* n[0] n[1] n[2] */
@@ -34,19 +34,19 @@ typedef struct template_work {
     const sdm_model *model;
     const template_network *k;
     const sdm_grid *grid;
-    double *g, *dg;   /* [N], [P][N] (derivatives wanted only) */
-    float *phi;       /* polynomials */
-    part_pose *pose;  /* [n_parts] */
+    double *g, *dg;  /* [N], [P][N] (derivatives wanted only) */
+    float *phi;      /* polynomials */
+    part_pose *pose; /* [n_parts] */
     warp_scratch warp[SDM_TEMPLATE_MAX_PARTS];
-    bool by_lines;     /* patches are lines: a part has a warp */
-    size_t blocks[3];  /* number of blocks along each axis */
+    bool by_lines;    /* patches are lines: a part has a warp */
+    size_t blocks[3]; /* number of blocks along each axis */
     /* [blocks][n_parts][4] distance of each part at the centre of the block, and its gradient by
        the indices of the grid; not with lines. */
     float *centre;
     float *value;      /* values of a patch */
     affine_part *part; /* [n_parts]; not with lines */
     float *offset[3];  /* voxel indices of a whole block, relative to its first voxel */
-    float *correction;         /* [its voxels] the correction, NULL if there is none */
+    float *correction; /* [its voxels] the correction, NULL if there is none */
     template_correction correction_at; /* the lattice of the correction with its first map */
     void *correction_scratch;
     template_row row;

@@ -71,10 +71,10 @@ static template_slope template_at(const template_level *l, const float u[3])
     for (int a = 0; a < 3; a++) bend[a] = c.t[a] * (1 - c.t[a]), slope[a] = 1 - 2 * c.t[a];
     template_slope s = {.f = q[0] - l->half * (bend[0] * qx[1] + bend[1] * qy[2] + bend[2] * qz[3]),
                         .g = {q[1], q[2], q[3]}};
-    const float df[3] = {
-        qx[0] - l->half * (slope[0] * qx[1] + bend[1] * qxy[2] + bend[2] * qxz[3]),
-        qy[0] - l->half * (bend[0] * qxy[1] + slope[1] * qy[2] + bend[2] * qyz[3]),
-        qz[0] - l->half * (bend[0] * qxz[1] + bend[1] * qyz[2] + slope[2] * qz[3])};
+    const float df[3] = {qx[0] - l->half * (slope[0] * qx[1] + bend[1] * qxy[2] + bend[2] * qxz[3]),
+                         qy[0] - l->half * (bend[0] * qxy[1] + slope[1] * qy[2] + bend[2] * qyz[3]),
+                         qz[0] -
+                             l->half * (bend[0] * qxz[1] + bend[1] * qyz[2] + slope[2] * qz[3])};
     const quad by[3] = {qx, qy, qz};
     for (int a = 0; a < 3; a++) {
         const float rate = c.moves[a] ? c.rate : 0;
@@ -145,17 +145,17 @@ static value_slope slope_of_value(const template_work *w, size_t c, size_t i)
 /* Scratch memory of the derivatives along D directions. */
 typedef struct slopes_work {
     template_work w;
-    size_t n;                 /* D */
-    double *dg;               /* [D][N] */
-    double (*dm)[9];          /* [D][n_parts] */
-    double (*db)[3];          /* [D][n_parts] */
-    float *control;           /* control displacements of the warp of the first part */
-    float *points, *metric;   /* [D][stations][4], [D][stations][8] */
-    float *plane, *line;      /* [D][stations in a plane][12], [stations in a line][12] */
-    float *row[9];            /* du, d metric */
-    value_slope *slope;       /* [row] */
-    float *value;             /* [row] the map */
-    uint8_t *nearest;         /* [row] part with the smallest value */
+    size_t n;               /* D */
+    double *dg;             /* [D][N] */
+    double (*dm)[9];        /* [D][n_parts] */
+    double (*db)[3];        /* [D][n_parts] */
+    float *control;         /* control displacements of the warp of the first part */
+    float *points, *metric; /* [D][stations][4], [D][stations][8] */
+    float *plane, *line;    /* [D][stations in a plane][12], [stations in a line][12] */
+    float *row[9];          /* du, d metric */
+    value_slope *slope;     /* [row] */
+    float *value;           /* [row] the map */
+    uint8_t *nearest;       /* [row] part with the smallest value */
 } slopes_work;
 
 static void *take(void *memory, size_t *at, size_t bytes)
@@ -183,8 +183,8 @@ static size_t slopes_carve(const sdm_model *m, size_t n, size_t correction_scrat
     s->control = take(memory, &at, 4 * control * sizeof *s->control);
     s->points = take(memory, &at, warps * n * 4 * stations * sizeof *s->points);
     s->metric = take(memory, &at, warps * n * 8 * stations * sizeof *s->metric);
-    s->plane = take(memory, &at,
-                    warps * n * 12 * k->stations[0] * k->stations[1] * sizeof *s->plane);
+    s->plane =
+        take(memory, &at, warps * n * 12 * k->stations[0] * k->stations[1] * sizeof *s->plane);
     s->line = take(memory, &at, 12 * k->stations[0] * sizeof *s->line);
     const size_t row = sdm_template_row_floats(&m->info.grid);
     for (int i = 0; i < 9; i++) s->row[i] = take(memory, &at, row * sizeof *s->row[i]);
@@ -306,8 +306,7 @@ static void patch_slopes(slopes_work *s, size_t c, const template_patch *p, floa
         if (w->correction && c == 0) {
             template_correction change = k->correction_lattice;
             change.map = w->correction + (1 + d) * voxels;
-            sdm_template_kernels()->correct(&change, p->count, (const float *const *)w->row.u,
-                                            sum);
+            sdm_template_kernels()->correct(&change, p->count, (const float *const *)w->row.u, sum);
         }
         for (size_t z = 0, i = 0; z < p->n[2]; z++)
             for (size_t y = 0; y < p->n[1]; y++) {
@@ -381,8 +380,8 @@ void sdm_template_jacobian(const sdm_model *m, const double *params, float *valu
     sdm_template_begin(&s.w, params, true);
     if (k->correction) {
         const size_t count = sdm_grid_count(&k->correction->info.grid);
-        k->correction->kind->jacobian(k->correction, params, s.w.correction,
-                                      s.w.correction + count, s.w.correction_scratch, 1);
+        k->correction->kind->jacobian(k->correction, params, s.w.correction, s.w.correction + count,
+                                      s.w.correction_scratch, 1);
     }
     slopes_begin(&s, unit);
     fill_slopes(&s, values, out);
@@ -404,8 +403,7 @@ void sdm_template_jvp(const sdm_model *m, const double *params, const double *di
     (void)n_threads;
     const template_network *k = m->network;
     slopes_work s;
-    slopes_carve(m, 1,
-                 k->correction ? k->correction->kind->jvp_scratch_bytes(k->correction, 1) : 0,
+    slopes_carve(m, 1, k->correction ? k->correction->kind->jvp_scratch_bytes(k->correction, 1) : 0,
                  scratch, &s);
     float *out[1] = {tangent};
     sdm_template_begin(&s.w, params, true);

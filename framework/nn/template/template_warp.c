@@ -77,8 +77,7 @@ void sdm_template_displacement(const sdm_lattice *l, const float *control, const
     quad sum[3][3][3];
     for (int a = 0; a <= order; a++)
         for (int b = 0; a + b <= order; b++)
-            for (int c = 0; a + b + c <= order; c++)
-                sum[a][b][c] = sum_of_four(w[2][c], z[a][b]);
+            for (int c = 0; a + b + c <= order; c++) sum[a][b][c] = sum_of_four(w[2][c], z[a][b]);
     for (int i = 0; i < 3; i++) {
         u[i] = (double)sum[0][0][0][i];
         if (du)
@@ -142,9 +141,8 @@ static void newton(const sdm_lattice *l, const float *control, const double q[3]
 static void station_world(const template_network *k, const sdm_grid *grid, size_t x, size_t y,
                           size_t z, double out[3])
 {
-    const double step = (double)k->step,
-                 index[3] = {step * ((double)x - 1), step * ((double)y - 1),
-                             step * ((double)z - 1)};
+    const double step = (double)k->step, index[3] = {step * ((double)x - 1), step * ((double)y - 1),
+                                                     step * ((double)z - 1)};
     sdm_grid_world(grid, index, out);
 }
 
@@ -207,8 +205,7 @@ void sdm_template_invert(const template_network *k, const sdm_template_part *par
                 double move[3], dy[3];
                 for (int c = 0; c < 3; c++) move[c] = q[c] - (i ? last[c] : row_q[c]);
                 apply(inverse, move, dy);
-                for (int c = 0; c < 3; c++)
-                    y[c] = at == 0 ? q[c] : (i ? y[c] : row[c]) + dy[c];
+                for (int c = 0; c < 3; c++) y[c] = at == 0 ? q[c] : (i ? y[c] : row[c]) + dy[c];
                 newton(&part->warp, w->control, q, y, inverse);
                 memcpy(last, q, sizeof q);
                 if (i == 0) memcpy(row, y, sizeof y), memcpy(row_q, q, sizeof q);
@@ -273,8 +270,8 @@ void sdm_template_invert_slope(const template_network *k, const sdm_template_par
                 for (int c = 0; c < 6; c++) {
                     double sum = 0;
                     for (int e = 0; e < 3; e++)
-                        sum += c2[3 * I[c] + e] * b[3 * J[c] + e] +
-                               b[3 * I[c] + e] * c2[3 * J[c] + e];
+                        sum +=
+                            c2[3 * I[c] + e] * b[3 * J[c] + e] + b[3 * I[c] + e] * c2[3 * J[c] + e];
                     metric[8 * at + (size_t)c] = (float)sum;
                 }
                 metric[8 * at + 6] = metric[8 * at + 7] = 0;

@@ -162,8 +162,8 @@ typedef struct sdm_config {
         double refine;
         int refine_batch;   /* samples per step during refinement, 1..4096, default 32 */
         double refine_rate; /* learning rate during refinement, default 3e-4 */
-        /* fraction of a phase's budget without a gain after which the phase ends, 0..1, default 0.3;
-         * 0: never */
+        /* fraction of a phase's budget without a gain after which the phase ends, 0..1, default
+         * 0.3; 0: never */
         double patience;
         /* decay of the moving average of the weights, 0..0.99999, default 0.998; 0: off */
         double average;

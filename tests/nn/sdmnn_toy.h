@@ -47,7 +47,7 @@ static inline void toy_make(toy *t, bool half, int activation)
     t->spec.arch.activation = activation;
     t->n = sdm_sdmnn_count(&t->spec.arch);
     assert_int_equal(SDM_ALLOC(&t->weights, t->n, "toy", NULL), SDM_OK);
-    sdm_sdmnn_init(&t->spec.arch, 1, 2, t->weights);
+    sdm_sdmnn_init(&t->spec.arch, NULL, 1, 2, t->weights);
     for (size_t i = 0; i < t->n; i++) {
         t->weights[i] += 0.02f * (float)sdm_rng_normal(3, 5, i);
         // the file stores halves: round now, so that saving loses nothing

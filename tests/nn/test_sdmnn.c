@@ -258,7 +258,7 @@ static void any_grid_size_works(void **state)
         assert_int_equal(sdm_sdmnn_create(&a, 0, NULL, &net, NULL), SDM_OK);
         assert_int_equal(SDM_ALLOC(&w, n, "w", NULL), SDM_OK);
         assert_int_equal(SDM_ALLOC(&values, voxels, "values", NULL), SDM_OK);
-        sdm_sdmnn_init(&a, 1, 1, w);
+        sdm_sdmnn_init(&a, NULL, 1, 1, w);
         for (size_t v = 0; v < voxels; v++) values[v] = NAN;
         sdm_sdmnn_set(net, w);
         sdm_sdmnn_forward(net, &x, values, 1);
@@ -268,19 +268,49 @@ static void any_grid_size_works(void **state)
     }
 }
 
+// Without the random second dense layer, every cell of the first map is its mean over `mean`.
+static void first_map_is_the_mean_of_each_cell(void **state)
+{
+    (void)state;
+    for (int activation = 0; activation <= 2; activation += 2) { // silu, relu
+        toy t;
+        toy_make(&t, false, activation);
+        const sdm_sdmnn_arch *a = &t.spec.arch;
+        const size_t cells[] = {4, 2, 3}, second = 70 * (P + 1); // blocks of 3 in 11 x 6 x 7 voxels
+        float mean[VOXELS], values[VOXELS], x[P] = {0.3f, -0.8f};
+        double sum[24] = {0}, count[24] = {0};
+        size_t cell_of[VOXELS];
+        for (size_t v = 0; v < VOXELS; v++) {
+            mean[v] = (float)(3 * sdm_rng_normal(8, 0, v));
+            cell_of[v] = v % 11 / 3 + cells[0] * (v / 11 % 6 / 3 + cells[1] * (v / 66 / 3));
+            sum[cell_of[v]] += (double)mean[v], count[cell_of[v]]++;
+        }
+        sdm_sdmnn_init(a, mean, 5, 6, t.weights);
+        for (size_t i = second; i < second + 24 * 70; i++) t.weights[i] = 0;
+        sdm_sdmnn *net;
+        assert_int_equal(sdm_sdmnn_create(a, 0, NULL, &net, NULL), SDM_OK);
+        sdm_sdmnn_set(net, t.weights);
+        sdm_sdmnn_forward(net, x, values, 1);
+        for (size_t v = 0; v < VOXELS; v++)
+            assert_true(fabs((double)values[v] - sum[cell_of[v]] / count[cell_of[v]]) < 1e-5);
+        sdm_sdmnn_free(net);
+        sdm_free(t.weights);
+    }
+}
+
 static void initial_weights_have_the_right_variance(void **state)
 {
     (void)state;
     // With 4 channels at level 0 the second convolution has 4 * 27 inputs: variance 2 / 108 (He et
-    // al. 2015).
-    const size_t first = 70 * (P + 1) + 24 * 71 + 4 * 27 + 4, n = 4 * 4 * 27;
+    // al. 2015). The first convolution of level 1 follows two biased convolutions of level 0.
+    const size_t first = 70 * (P + 1) + 24 * 71 + (4 * 27 + 4) + (4 * 4 * 27 + 4), n = 8 * 4 * 27;
     toy t;
     toy_make(&t, false, 2);
     double s = 0;
-    sdm_sdmnn_init(&t.spec.arch, 5, 6, t.weights);
+    sdm_sdmnn_init(&t.spec.arch, NULL, 5, 6, t.weights);
     for (size_t i = first; i < first + n; i++) s += (double)t.weights[i] * (double)t.weights[i];
     assert_true(fabs(s / (double)n * 54 - 1) < 0.25);
-    for (size_t i = first + n; i < first + n + 4; i++) assert_true(t.weights[i] == 0);
+    for (size_t i = first + n; i < first + n + 8; i++) assert_true(t.weights[i] == 0);
     // The number of multiply-adds, counted by hand for levels of 11 x 6 x 7, 6 x 3 x 4 and 3 x 2 x
     // 2 voxels.
     const double work = 70 * (P + 24) + 462 * (27 * (4 + 16 + 32 + 16) + 4) +
@@ -291,9 +321,9 @@ static void initial_weights_have_the_right_variance(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(forward_is_the_definition),
-                                       cmocka_unit_test(jacobian_is_the_slope),
-                                       cmocka_unit_test(any_grid_size_works),
-                                       cmocka_unit_test(initial_weights_have_the_right_variance)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(forward_is_the_definition), cmocka_unit_test(jacobian_is_the_slope),
+        cmocka_unit_test(any_grid_size_works), cmocka_unit_test(first_map_is_the_mean_of_each_cell),
+        cmocka_unit_test(initial_weights_have_the_right_variance)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -42,7 +42,7 @@ static float *random_weights(const sdm_sdmnn_arch *a)
     float *w;
     const size_t n = sdm_sdmnn_count(a);
     assert_int_equal(SDM_ALLOC(&w, n, "w", NULL), SDM_OK);
-    sdm_sdmnn_init(a, 1, 2, w);
+    sdm_sdmnn_init(a, NULL, 1, 2, w);
     for (size_t i = 0; i < n; i++) w[i] += 0.05f * (float)sdm_rng_normal(3, 5, i);
     return w;
 }

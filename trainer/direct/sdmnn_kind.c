@@ -1,4 +1,6 @@
 /* The sdmnn network in the trainer: it learns from whole maps, one after another. */
+#include <string.h>
+
 #include "data/streams.h"
 #include "direct_network.h"
 #include "numerics/loss.h"
@@ -67,9 +69,23 @@ static void sdmnn_dispose(void *network)
     sdm_free(p);
 }
 
+/* map[V] = the mean of the maps made before training. */
+static void mean_map(const dataset *d, float *map)
+{
+    const size_t n = d->n_static + d->n_start;
+    memset(map, 0, d->n_voxels * sizeof *map);
+    for (size_t i = 0; i < n; i++) {
+        const float share = d->scale[i] / (float)n;
+        const int16_t *from = d->maps + i * d->n_voxels;
+        for (size_t v = 0; v < d->n_voxels; v++) map[v] += share * (float)from[v];
+    }
+}
+
 static void sdmnn_init(const trainer *t, const void *network, float *w)
 {
-    sdm_sdmnn_init(&((const sdmnn_trainer *)network)->arch, t->config->seed, STREAM_INIT, w);
+    const sdmnn_trainer *p = network;
+    mean_map(&t->data, p->target);
+    sdm_sdmnn_init(&p->arch, p->target, t->config->seed, STREAM_INIT, w);
 }
 
 static void scale_params(const dataset *d, const double *params, float *x)

@@ -182,14 +182,53 @@ static void random_layer(uint64_t seed, uint64_t stream, size_t at, size_t outpu
     memset(w + at + outputs * inputs, 0, outputs * sizeof *w);
 }
 
-void sdm_sdmnn_init(const sdm_sdmnn_arch *a, uint64_t seed, uint64_t stream, float *weights)
+// Sets the weights of a convolution of level 0 such that it passes the volume v on: the weights of
+// its channels 0 and 1, which become f(v) and f(-v), or those of the one channel of the last
+// convolution, which becomes f(v) - f(-v) = v.
+static void pass_volume_on(const sdmnn_step *s, float *w)
+{
+    const size_t row = s->conv.in * s->conv.taps, centre = s->conv.taps / 2;
+    for (size_t o = 0; o < s->conv.out && o < 2; o++) {
+        float *to = w + s->weights + o * row, sign = o ? -1.0f : 1.0f;
+        memset(to, 0, row * sizeof *to);
+        to[centre] = sign;
+        if (s->conv.in > 1) to[s->conv.taps + centre] = -sign;
+    }
+}
+
+// bias[cells] = the means of map[V] over the cells of the volume
+static void cell_means(const sdmnn_plan *p, const float *map, float *bias)
+{
+    const size_t *n = p->arch.n, *m = p->n_cells, b = p->arch.block;
+    for (size_t i = 0; i < p->cells; i++) {
+        const size_t cell[3] = {i % m[0], i / m[0] % m[1], i / m[0] / m[1]};
+        double sum = 0;
+        size_t count = 0;
+        for (size_t z = cell[2] * b; z < n[2] && z < (cell[2] + 1) * b; z++)
+            for (size_t y = cell[1] * b; y < n[1] && y < (cell[1] + 1) * b; y++)
+                for (size_t x = cell[0] * b; x < n[0] && x < (cell[0] + 1) * b; x++, count++)
+                    sum += (double)map[(z * n[1] + y) * n[0] + x];
+        bias[i] = (float)(sum / (double)count);
+    }
+}
+
+void sdm_sdmnn_init(const sdm_sdmnn_arch *a, const float *mean, uint64_t seed, uint64_t stream,
+                    float *weights)
 {
     sdmnn_plan p;
     sdm_sdmnn_plan_make(a, false, &p);
+    const size_t second = sdmnn_dense1(&p);
+    const bool looks_linear = a->channels > 1 && a->activation != 1; // not with tanh
     random_layer(seed, stream, 0, a->width, a->n_params, 2, weights);
-    random_layer(seed, stream, sdmnn_dense1(&p), p.cells, a->width, 1, weights);
-    for (const sdmnn_step *s = p.steps; s < p.steps + p.n_steps; s++)
-        if (s->op == SDMNN_CONV)
-            random_layer(seed, stream, s->weights, s->conv.out, s->conv.in * s->conv.taps,
-                         s->linear ? 1 : 2, weights);
+    // with biases of zero, all hidden units would bend at the middle of the parameter ranges
+    for (size_t i = second - a->width; i < second; i++)
+        weights[i] = (float)sdm_rng_normal(seed, stream, i);
+    random_layer(seed, stream, second, p.cells, a->width, 0.01, weights);
+    if (mean) cell_means(&p, mean, weights + second + p.cells * a->width);
+    for (const sdmnn_step *s = p.steps; s < p.steps + p.n_steps; s++) {
+        if (s->op != SDMNN_CONV) continue;
+        random_layer(seed, stream, s->weights, s->conv.out, s->conv.in * s->conv.taps,
+                     s->linear ? 1 : 2, weights);
+        if (s->level == 0 && looks_linear) pass_volume_on(s, weights);
+    }
 }

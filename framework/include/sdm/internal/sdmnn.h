@@ -56,10 +56,16 @@ size_t sdm_sdmnn_count(const sdm_sdmnn_arch *a);
    [any thread] */
 double sdm_sdmnn_work(const sdm_sdmnn_arch *a);
 
-/* weights[sdm_sdmnn_count(a)] = random initial weights. They are normally distributed, with
-   variance 2 / inputs in layers with an activation (He et al. 2015), else 1 / inputs; biases are
-   zero. The result depends on (a, seed, stream) only. [any thread] */
-void sdm_sdmnn_init(const sdm_sdmnn_arch *a, uint64_t seed, uint64_t stream, float *weights);
+/* weights[sdm_sdmnn_count(a)] = initial weights. Unless f is tanh or C is 1, the first maps are
+   close to mean[V] (mm) at all parameters, but coarse: one value for each cell of v. mean NULL:
+   zero. The biases of v are the means over its cells. The convolutions of level 0 pass v on:
+   channels 0 and 1 of each are f(v) and f(-v), the difference of which is v (Balduzzi et al. 2017,
+   "The shattered gradients problem": looks-linear weights). All other weights are normal random
+   numbers of variance 2 / inputs (He et al. 2015), in the second dense layer 0.01 / inputs and in
+   the last layer 1 / inputs. The biases of the first dense layer have variance 1; all others are
+   zero. The random numbers depend on (seed, stream) only. [any thread] */
+void sdm_sdmnn_init(const sdm_sdmnn_arch *a, const float *mean, uint64_t seed, uint64_t stream,
+                    float *weights);
 
 /* An implementation of the convolutions. Its result does not depend on the number of threads; two
    implementations differ by rounding. */

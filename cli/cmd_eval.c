@@ -34,7 +34,7 @@ static void print_table(const char *file, const sdm_model_info *info, const cli_
     printf("  %-22s %10.5f mm\n", "RMSE within 0.4 mm", e->rmse_near_mm);
     printf("  %-22s %10.5f mm\n", "mean absolute error", e->mae_mm);
     printf("  %-22s %10.5f mm\n", "largest error", e->max_abs_mm);
-    printf("  %-22s %10.5f\n", "Dice", e->dice);
+    printf("  %-22s %10.5f (smallest %.5f)\n", "Dice", e->dice, e->dice_min);
     printf("  %-22s %10.5f mm\n", "surfaces, mean", e->surface_mean_mm);
     printf("  %-22s %10.5f mm (largest %.5f)\n", "surfaces, Hausdorff", e->surface_hausdorff_mm,
            e->surface_hausdorff_max_mm);
@@ -65,6 +65,7 @@ static void fill_json(sdm_json *j, const char *file, const sdm_model_info *info,
     sdm_json_real(j, "max_abs_mm", e->max_abs_mm);
     sdm_json_real(j, "rmse_near_mm", e->rmse_near_mm);
     sdm_json_real(j, "dice", e->dice);
+    sdm_json_real(j, "dice_min", e->dice_min);
     // distances between the surfaces
     sdm_json_real(j, "surface_mean_mm", e->surface_mean_mm);
     sdm_json_real(j, "surface_hausdorff_mm", e->surface_hausdorff_mm);

@@ -224,8 +224,10 @@ void cli_eval_reduce(cli_eval *e)
 {
     double near_sum = 0;
     size_t n_near = 0;
+    e->dice_min = 1;
     for (size_t i = 0; i < e->n; i++) {
         const cli_eval_sample *x = &e->sample[i];
+        e->dice_min = fmin(e->dice_min, x->dice);
         e->mse_mm2 += x->mse_mm2 / (double)e->n;
         e->mae_mm += x->mae_mm / (double)e->n;
         e->dice += x->dice / (double)e->n;

@@ -28,6 +28,7 @@ typedef struct cli_eval {
     cli_eval_sample *sample; /* [n], in the order of the shape indices */
     size_t n, n_surface;     /* shapes; shapes where both maps have a surface */
     double mse_mm2, rmse_mm, mae_mm, max_abs_mm, rmse_near_mm, dice;
+    double dice_min; /* smallest of a shape */
     /* means over the shapes with both surfaces */
     double surface_mean_mm, surface_hausdorff_mm;
     double surface_hausdorff_max_mm;

@@ -91,13 +91,13 @@ absent x1.npy x2.npy x-0001.npy
 
 # sdmgen eval.
 expect 0 - sdmgen eval $model --samples 3 --naive 1 --json --quiet --pictures pictures
-for key in mse_mm2 rmse_mm mae_mm max_abs_mm rmse_near_mm dice surface_mean_mm surface_hausdorff_mm ms_network ms_exact ms_naive \
+for key in mse_mm2 rmse_mm mae_mm max_abs_mm rmse_near_mm dice dice_min surface_mean_mm surface_hausdorff_mm ms_network ms_exact ms_naive \
     threads samples; do
     awk -v v="$(json $key)" 'BEGIN { exit !(v > 0) }' || bad "eval: $key is $(json $key)"
 done
 mse=$(json mse_mm2)
 near "$(json samples)" 3 0
-awk -v d="$(json dice)" -v m="$(json surface_mean_mm)" -v h="$(json surface_hausdorff_mm)" 'BEGIN { exit !(d <= 1 && m <= h) }' ||
+awk -v d="$(json dice)" -v l="$(json dice_min)" -v m="$(json surface_mean_mm)" -v h="$(json surface_hausdorff_mm)" 'BEGIN { exit !(l <= d && d <= 1 && m <= h) }' ||
     bad "eval: dice $(json dice), surfaces $(json surface_mean_mm) $(json surface_hausdorff_mm)"
 present pictures/worst.png pictures/median.png
 expect 0 - sdmgen eval $model --samples 3 --naive 0 --json --quiet --threads 1

@@ -222,13 +222,8 @@ static parameters *template_weights(trainer *t)
 static uint64_t template_fingerprint(const trainer *t)
 {
     const template_state *s = state_of(t);
-    const template_design *d = &s->design;
-    uint64_t crc = s->corrected ? trainer_kind_pod.fingerprint(t) : 0;
-    crc = sdm_crc64(crc, d->functions, d->n_numbers * d->n_terms * sizeof *d->functions);
-    for (size_t c = 0; c < d->n_parts; c++)
-        crc = sdm_crc64(crc, d->parts[c].near_nodes,
-                        4 * sdm_lattice_count(&d->parts[c].near) * sizeof(float));
-    return crc;
+    const uint64_t design = sdm_model_get_info(s->design.model)->checksum;
+    return sdm_crc64(s->corrected ? trainer_kind_pod.fingerprint(t) : 0, &design, sizeof design);
 }
 
 static sdm_status template_build(const trainer *t, const sdm_model_info *info, uint8_t **bytes,

@@ -35,7 +35,7 @@ typedef struct sdm_accuracy {
    NUL-terminated. */
 typedef struct sdm_model_info {
     char shape[SDM_MODEL_NAME_MAX];
-    char kind[16];    /* kind of network: "pod", "deepsdf", "imnet" or "sdmnn" */
+    char kind[16];    /* kind of network: "pod", "template", "deepsdf", "imnet", "sdmnn" */
     char version[16]; /* version of the program that trained the network */
     size_t n_params;
     const sdm_model_param *params; /* [n_params] */

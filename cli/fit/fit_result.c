@@ -3,7 +3,7 @@
 
 #include "fit_command.h"
 #include "inputs/setup.h"
-#include "sdm/internal/rotation.h"
+#include "sdm/internal/mat3.h"
 #include "sdm/isosurface.h"
 #include "sdm/memory.h"
 
@@ -21,7 +21,7 @@ static sdm_grid grid_in_pose(const sdm_grid *g, const sdm_pose *pose)
     sdm_grid posed = *g;
     double r[9];
     sdm_pose_matrix(pose, r);
-    sdm_rotation_product(r, g->dir, posed.dir);
+    m3_product(r, g->dir, posed.dir);
     sdm_pose_apply(pose, g->origin, posed.origin);
     return posed;
 }

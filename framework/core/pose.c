@@ -109,13 +109,6 @@ sdm_pose sdm_pose_compose(const sdm_pose *outer, const sdm_pose *inner)
     return both;
 }
 
-void sdm_rotation_product(const double a[9], const double b[9], double out[9])
-{
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++)
-            out[3 * i + k] = a[3 * i] * b[k] + a[3 * i + 1] * b[3 + k] + a[3 * i + 2] * b[6 + k];
-}
-
 void sdm_rotation_vector(const double r[9], double rotation[3])
 {
     // Shepperd (1978): compute the largest component of the quaternion first, because the others

@@ -67,7 +67,7 @@ typedef struct update {
     parameters *p;
     const float *gradient;
     adam_step step;
-    float follow; // share of the difference by which the average moves
+    float follow; // average += follow * (w - average); 0: the average stays
 } update;
 
 static void adam_slice(void *user, size_t index, int member)

@@ -8,6 +8,7 @@
 
 #include "motion.h"
 #include "regression.h"
+#include "sdm/internal/mat3.h"
 #include "sdm/memory.h"
 #include "template_maps.h"
 #include "template_parts.h"
@@ -37,41 +38,26 @@ static sdm_status sample_motions(const template_design *d, size_t n, motion *fra
     return s;
 }
 
-// Solves the symmetric 3 x 3 system a x = b by cofactors; x = 0 if a is singular.
-static void solve3(const double a[9], const double b[3], double x[3])
-{
-    double c[9];
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            const int r = (j + 1) % 3, s = (j + 2) % 3, u = (i + 1) % 3, v = (i + 2) % 3;
-            c[3 * i + j] = a[3 * r + u] * a[3 * s + v] - a[3 * r + v] * a[3 * s + u];
-        }
-    const double det = a[0] * c[0] + a[1] * c[3] + a[2] * c[6];
-    for (int i = 0; i < 3; i++)
-        x[i] = det != 0 ? (c[3 * i] * b[0] + c[3 * i + 1] * b[1] + c[3 * i + 2] * b[2]) / det : 0;
-}
-
 // The pivot of relative motions: the point nearest to `centre` that moves least,
 // sum over the samples of |m p + b - p|^2 -> min.
 static void find_pivot(const motion *relative, size_t n, const double centre[3], double pivot[3])
 {
-    double a[9] = {0}, right[3] = {0}, trace = 0, x[3];
+    double a[9] = {0}, right[3] = {0}, trace = 0, inverse[9], x[3];
     for (size_t s = 0; s < n; s++) {
         double e[9], at[3];
         for (int i = 0; i < 9; i++) e[i] = relative[s].m[i] - (i % 4 == 0);
-        for (int i = 0; i < 3; i++)
-            at[i] = relative[s].b[i] + e[3 * i] * centre[0] + e[3 * i + 1] * centre[1] +
-                    e[3 * i + 2] * centre[2];
+        m3_apply(e, centre, at);
+        for (int i = 0; i < 3; i++) at[i] += relative[s].b[i];
         for (int i = 0; i < 3; i++)
             for (int j = 0; j < 3; j++) {
-                right[i] -= e[3 * j + i] * at[j] / 3;
-                for (int k = 0; k < 3; k++) a[3 * i + k] += e[3 * j + i] * e[3 * j + k] / 3;
+                right[i] -= e[3 * j + i] * at[j];
+                for (int k = 0; k < 3; k++) a[3 * i + k] += e[3 * j + i] * e[3 * j + k];
             }
     }
     for (int i = 0; i < 3; i++) trace += a[4 * i];
     for (int i = 0; i < 3; i++) a[4 * i] += 1e-9 * trace + 1e-300;
-    // both sides were summed with the factor 1 / 3
-    solve3(a, right, x);
+    m3_inverse(a, inverse);
+    m3_apply(inverse, right, x);
     for (int i = 0; i < 3; i++) pivot[i] = centre[i] + (isfinite(x[i]) ? x[i] : 0);
 }
 
@@ -165,7 +151,7 @@ static sdm_status design_motion(template_design *d, double tolerance, sdm_error 
 {
     const size_t n = sample_count(d->family.n_params);
     double *y = NULL, *weight = NULL;
-    double *amplitude[SDM_TEMPLATE_MAX_PARTS] = {NULL}, *scale[SDM_TEMPLATE_MAX_PARTS] = {NULL};
+    double *amplitude[SDM_TEMPLATE_MAX_PARTS] = {NULL};
     motion *frames = NULL;
     sdm_status s = SDM_ALLOC(&frames, d->n_parts * n, "frames", err);
     if (!s) s = sample_motions(d, n, frames, err);
@@ -175,8 +161,7 @@ static sdm_status design_motion(template_design *d, double tolerance, sdm_error 
         d->n_numbers += sdm_template_frame_numbers(p->frame);
         p->amplitudes = d->n_numbers;
         if (p->n_modes == 0) continue;
-        s = trainer_template_warp(d, c, n, frames + c * n, tolerance, &amplitude[c], &scale[c],
-                                  err);
+        s = trainer_template_warp(d, c, n, frames + c * n, tolerance, &amplitude[c], err);
         d->n_numbers += p->n_modes;
     }
     if (!s) s = SDM_ALLOC(&y, n * d->n_numbers, "frames", err);
@@ -185,13 +170,13 @@ static sdm_status design_motion(template_design *d, double tolerance, sdm_error 
         const sdm_template_part *p = &d->parts[c];
         s = frame_numbers(d, c, n, frames, y, weight, err);
         for (size_t m = 0; m < p->n_modes && !s; m++) {
-            weight[p->amplitudes + m] = scale[c][m];
+            weight[p->amplitudes + m] = 1;
             for (size_t i = 0; i < n; i++)
                 y[i * d->n_numbers + p->amplitudes + m] = amplitude[c][i * p->n_modes + m];
         }
     }
     if (!s) s = fit_functions(d, n, y, weight, tolerance, err);
-    for (size_t c = 0; c < d->n_parts; c++) sdm_free(amplitude[c]), sdm_free(scale[c]);
+    for (size_t c = 0; c < d->n_parts; c++) sdm_free(amplitude[c]);
     sdm_free(weight);
     sdm_free(y);
     sdm_free(frames);

@@ -5,27 +5,9 @@
 #include <string.h>
 
 #include "numerics/linalg.h"
+#include "sdm/internal/mat3.h"
 #include "sdm/internal/rotation.h"
 #include "sdm/pose.h"
-
-static void product(const double a[9], const double b[9], double out[9])
-{
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            out[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
-}
-
-static double invert(const double a[9], double out[9])
-{
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            const int r = (j + 1) % 3, s = (j + 2) % 3, c = (i + 1) % 3, d = (i + 2) % 3;
-            out[3 * i + j] = a[3 * r + c] * a[3 * s + d] - a[3 * r + d] * a[3 * s + c];
-        }
-    const double det = a[0] * out[0] + a[1] * out[3] + a[2] * out[6];
-    for (int i = 0; i < 9; i++) out[i] = det != 0 ? out[i] / det : 0;
-    return det;
-}
 
 // means[2][3] of both sets; cross[9] = sum of (to - mean) (from - mean)^T, spread[9] = sum of
 // (from - mean) (from - mean)^T
@@ -91,27 +73,26 @@ double trainer_motion_affine(const double *from, const double *to, const uint32_
     double means[2][3], c[9], spread[9], inverse[9];
     moments(from, to, vertex, n, means, c, spread);
     const double trace = spread[0] + spread[4] + spread[8];
-    if (!(invert(spread, inverse) > 1e-9 * trace * trace * trace))
+    if (!(m3_inverse(spread, inverse) > 1e-9 * trace * trace * trace))
         return trainer_motion_rigid(from, to, vertex, n, out);
-    product(c, inverse, out->m);
+    m3_product(c, inverse, out->m);
     return finish(from, to, vertex, n, (const double(*)[3])means, out);
 }
 
 void trainer_motion_relative(const motion *outer, const motion *inner, motion *out)
 {
     double inverse[9];
-    invert(outer->m, inverse);
-    product(inverse, inner->m, out->m);
+    m3_inverse(outer->m, inverse);
+    m3_product(inverse, inner->m, out->m);
     trainer_motion_back(outer, inner->b, out->b);
 }
 
 void trainer_motion_back(const motion *a, const double x[3], double out[3])
 {
     double inverse[9], d[3];
-    invert(a->m, inverse);
+    m3_inverse(a->m, inverse);
     for (int i = 0; i < 3; i++) d[i] = x[i] - a->b[i];
-    for (int i = 0; i < 3; i++)
-        out[i] = inverse[3 * i] * d[0] + inverse[3 * i + 1] * d[1] + inverse[3 * i + 2] * d[2];
+    m3_apply(inverse, d, out);
 }
 
 void trainer_motion_polar(const double m[9], double rotation[3], double stretch[6])
@@ -132,7 +113,7 @@ void trainer_motion_polar(const double m[9], double rotation[3], double stretch[
                 back[3 * i + j] += g[3 * k + i] * g[3 * k + j] / s;
             }
     }
-    product(m, back, r);
+    m3_product(m, back, r);
     sdm_rotation_vector(r, rotation);
     const double six[6] = {u[0] - 1, u[4] - 1, u[8] - 1, u[5], u[2], u[1]};
     memcpy(stretch, six, sizeof six);

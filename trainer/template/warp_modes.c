@@ -112,7 +112,7 @@ static sdm_status extend_modes(template_design *d, size_t c, const float *modes,
 
 sdm_status trainer_template_warp(template_design *d, size_t c, size_t n_samples,
                                  const motion *frames, double tolerance, double **amplitude,
-                                 double **weight, sdm_error *err)
+                                 sdm_error *err)
 {
     sdm_template_part *p = &d->parts[c];
     const size_t n = n_samples < SNAPSHOTS ? n_samples : SNAPSHOTS,
@@ -154,7 +154,6 @@ sdm_status trainer_template_warp(template_design *d, size_t c, size_t n_samples,
     if (!s) s = extend_modes(d, c, modes, reach, tolerance, err);
     // amplitudes of all samples
     if (!s) s = SDM_ALLOC(amplitude, n_samples * p->n_modes, "warp", err);
-    if (!s) s = SDM_ALLOC(weight, p->n_modes, "warp", err);
     for (size_t i = 0; i < n_samples && !s; i++) {
         const float *u = y + i * row;
         if (i >= n) {
@@ -167,7 +166,6 @@ sdm_status trainer_template_warp(template_design *d, size_t c, size_t n_samples,
             (*amplitude)[i * p->n_modes + m] = sum / ((double)row / 3);
         }
     }
-    for (size_t m = 0; m < p->n_modes && !s; m++) (*weight)[m] = 1;
     sdm_mesh_dispose(&mesh);
     sdm_free(modes);
     sdm_free(line);

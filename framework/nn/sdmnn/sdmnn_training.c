@@ -20,7 +20,7 @@ struct sdm_sdmnn {
     float *map, *dmap; /* [V] a map; [V] derivative of the loss by it */
 };
 
-// number of floats of the packed weights of a step, rounded up to a multiple of 64 bytes
+// Number of floats that the packed weights of one layer take, rounded up to whole 64 bytes.
 static size_t packed_count(const sdm_conv_backend *b, const sdmnn_step *s)
 {
     return s->op == SDMNN_CONV ? (b->packed_count(s->conv) + 15) / 16 * 16 : 0;

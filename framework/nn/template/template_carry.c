@@ -1,4 +1,5 @@
 /* Carries points of the template into the world. */
+#include "sdm/internal/mat3.h"
 #include "sdm/memory.h"
 #include "template_internal.h"
 
@@ -24,9 +25,8 @@ sdm_status sdm_template_carry(const sdm_model *m, const double *params, const do
             if (part->n_modes)
                 sdm_template_displacement(&part->warp, control, y + 3 * i, u, NULL, NULL);
             for (int a = 0; a < 3; a++) at[a] = y[3 * i + (size_t)a] + u[a];
-            for (int a = 0; a < 3; a++)
-                x[3 * i + (size_t)a] = pose[0].m[3 * a] * at[0] + pose[0].m[3 * a + 1] * at[1] +
-                                       pose[0].m[3 * a + 2] * at[2] + pose[0].b[a];
+            m3_apply(pose[0].m, at, x + 3 * i);
+            for (int a = 0; a < 3; a++) x[3 * i + (size_t)a] += pose[0].b[a];
         }
     }
     sdm_free(control);

@@ -62,6 +62,15 @@ void sdm_template_control(const sdm_template_part *part, const double *a, float 
 void sdm_template_displacement(const sdm_lattice *l, const float *control, const double y[3],
                                double u[3], double *du, double (*ddu)[9]);
 
+/* metric[6] = B B^T as xx, yy, zz, yz, xz, xy, for B = b[9]; slope[6] = its derivative when B has
+   the derivative db[9]. */
+void sdm_template_metric(const double b[9], float metric[6]);
+void sdm_template_metric_slope(const double b[9], const double db[9], float slope[6]);
+
+/* out[9] = derivative of the inverse of the frame's matrix m when m has the derivative dm[9]:
+   -m^-1 dm m^-1. */
+void sdm_template_inverse_slope(const part_pose *pose, const double dm[9], double out[9]);
+
 /* One station of a part with a warp. */
 typedef struct station {
     double y[3];       /* carried point */

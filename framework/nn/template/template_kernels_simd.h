@@ -168,8 +168,8 @@ static inline void locate(const cells *c, const float *const *u, size_t v, int32
    for quadratic functions. Each point is interpolated along z and y, then VW points along x. */
 
 // For each point, what is left to be interpolated along x: values at the first and the second end,
-// four floats each (distance, gradient). For each pair of points, at both ends: changes of the
-// gradient's y along y, and of its z along z.
+// four floats each (distance, gradient). For each pair of points, at both ends: the differences
+// between neighbouring nodes of d f / dy along y and of d f / dz along z.
 typedef struct edges {
     float value[VW][8], kinks[VW / 2][8];
 } edges;

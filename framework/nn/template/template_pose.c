@@ -1,6 +1,7 @@
 /* Parameters of a template network -> numbers g -> frames of the parts, with derivatives. */
 #include <string.h>
 
+#include "sdm/internal/mat3.h"
 #include "sdm/internal/rotation.h"
 #include "sdm/pose.h"
 #include "template_internal.h"
@@ -37,31 +38,6 @@ void sdm_template_numbers(const sdm_model *model, const double *p, float *scratc
     }
 }
 
-static void product(const double a[9], const double b[9], double out[9])
-{
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            out[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
-}
-
-static void apply(const double m[9], const double x[3], double out[3])
-{
-    for (int i = 0; i < 3; i++)
-        out[i] = m[3 * i] * x[0] + m[3 * i + 1] * x[1] + m[3 * i + 2] * x[2];
-}
-
-// inverse by cofactors; all zero if a is singular
-static void invert(const double a[9], double out[9])
-{
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            const int r = (j + 1) % 3, s = (j + 2) % 3, c = (i + 1) % 3, d = (i + 2) % 3;
-            out[3 * i + j] = a[3 * r + c] * a[3 * s + d] - a[3 * r + d] * a[3 * s + c];
-        }
-    const double det = a[0] * out[0] + a[1] * out[3] + a[2] * out[6];
-    for (int i = 0; i < 9; i++) out[i] = det != 0 ? out[i] / det : 0;
-}
-
 // s[9] = I + S for the stretch S of an affine frame, from its six numbers; with `unit` 0 only S
 static void stretch_matrix(const double *n, double unit, double s[9])
 {
@@ -83,10 +59,10 @@ static void relative_frame(const sdm_template_part *part, const double *g, doubl
         double s[9], r[9];
         memcpy(r, m, sizeof r);
         stretch_matrix(n + 6, 1, s);
-        product(r, s, m);
+        m3_product(r, s, m);
     }
     double turned[3];
-    apply(m, part->pivot, turned);
+    m3_apply(m, part->pivot, turned);
     for (int i = 0; i < 3; i++) b[i] = part->pivot[i] + n[3 + i] - turned[i];
 }
 
@@ -99,14 +75,14 @@ void sdm_template_frames(const template_network *k, const double *g, part_pose *
         relative_frame(part, g, m, b);
         if (part->parent >= 0) {
             const part_pose *parent = &pose[part->parent];
-            product(parent->m, m, to->m);
-            apply(parent->m, b, to->b);
+            m3_product(parent->m, m, to->m);
+            m3_apply(parent->m, b, to->b);
             for (int i = 0; i < 3; i++) to->b[i] += parent->b[i];
         } else {
             memcpy(to->m, m, sizeof m);
             memcpy(to->b, b, sizeof b);
         }
-        invert(to->m, to->inverse);
+        m3_inverse(to->m, to->inverse);
     }
 }
 
@@ -123,21 +99,21 @@ static void relative_slope(const sdm_template_part *part, const double *g, const
     double r[9], j[9], w[3], dr[9];
     sdm_pose_matrix(&pose, r);
     sdm_rotation_jacobian(n, j);
-    apply(j, dn, w);
+    m3_apply(j, dn, w);
     const double cross[9] = {0, -w[2], w[1], w[2], 0, -w[0], -w[1], w[0], 0};
-    product(cross, r, dr);
+    m3_product(cross, r, dr);
     if (part->frame == SDM_FRAME_AFFINE) {
         double s[9], ds[9], a[9], b[9];
         stretch_matrix(n + 6, 1, s);
         stretch_matrix(dn + 6, 0, ds);
-        product(dr, s, a);
-        product(r, ds, b);
+        m3_product(dr, s, a);
+        m3_product(r, ds, b);
         for (int i = 0; i < 9; i++) dm[i] = a[i] + b[i];
     } else {
         memcpy(dm, dr, sizeof dr);
     }
     double turned[3];
-    apply(dm, part->pivot, turned);
+    m3_apply(dm, part->pivot, turned);
     for (int i = 0; i < 3; i++) db[i] = dn[3 + i] - turned[i];
 }
 
@@ -152,10 +128,10 @@ void sdm_template_frames_slope(const template_network *k, const double *g, const
         double m[9], b[3], first[9], second[9], u[3], v[3];
         relative_frame(part, g, m, b);
         // T = T_parent . R: d m = dM m + M dm, d b = dM b + M db + dB
-        product(dm[part->parent], m, first);
-        product(parent->m, dm[c], second);
-        apply(dm[part->parent], b, u);
-        apply(parent->m, db[c], v);
+        m3_product(dm[part->parent], m, first);
+        m3_product(parent->m, dm[c], second);
+        m3_apply(dm[part->parent], b, u);
+        m3_apply(parent->m, db[c], v);
         for (int i = 0; i < 9; i++) dm[c][i] = first[i] + second[i];
         for (int i = 0; i < 3; i++) db[c][i] = u[i] + v[i] + db[part->parent][i];
     }

@@ -19,14 +19,6 @@ static size_t station_count(const template_network *k)
     return k->stations[0] * k->stations[1] * k->stations[2];
 }
 
-// Takes the next `bytes` of memory, 64-byte aligned, and advances *at.
-static void *carve(void *memory, size_t *at, size_t bytes)
-{
-    void *p = memory ? (uint8_t *)memory + *at : NULL;
-    *at += (bytes + 63) / 64 * 64;
-    return p;
-}
-
 static void carve_row(const sdm_grid *grid, void *memory, size_t *at, template_row *r)
 {
     const size_t bytes = sdm_template_row_floats(grid) * sizeof(float);
@@ -35,7 +27,14 @@ static void carve_row(const sdm_grid *grid, void *memory, size_t *at, template_r
         &r->metric[3], &r->metric[4], &r->metric[5], &r->f,         &r->g[0],      &r->g[1],
         &r->g[2],      &r->far_f,     &r->far_g[0],  &r->far_g[1],  &r->far_g[2],  &r->value};
     for (size_t i = 0; i < sizeof fields / sizeof *fields; i++)
-        *fields[i] = carve(memory, at, bytes);
+        *fields[i] = sdm_template_take(memory, at, bytes);
+}
+
+void *sdm_template_take(void *memory, size_t *at, size_t bytes)
+{
+    void *p = memory ? (uint8_t *)memory + *at : NULL;
+    *at += (bytes + 63) / 64 * 64;
+    return p;
 }
 
 size_t sdm_template_carve(const sdm_model *m, bool slopes, size_t correction_maps,
@@ -45,34 +44,36 @@ size_t sdm_template_carve(const sdm_model *m, bool slopes, size_t correction_map
     const size_t n = station_count(k);
     size_t at = 0;
     *w = (template_work){.model = m, .k = k, .grid = &m->info.grid};
-    w->g = carve(memory, &at, k->n_numbers * sizeof *w->g);
-    w->dg = carve(memory, &at, (slopes ? m->info.n_params * k->n_numbers : 0) * sizeof *w->dg);
-    w->phi = carve(memory, &at, sdm_template_numbers_scratch(m) * sizeof *w->phi);
-    w->pose = carve(memory, &at, k->n_parts * sizeof *w->pose);
+    w->g = sdm_template_take(memory, &at, k->n_numbers * sizeof *w->g);
+    w->dg = sdm_template_take(memory, &at,
+                              (slopes ? m->info.n_params * k->n_numbers : 0) * sizeof *w->dg);
+    w->phi = sdm_template_take(memory, &at, sdm_template_numbers_scratch(m) * sizeof *w->phi);
+    w->pose = sdm_template_take(memory, &at, k->n_parts * sizeof *w->pose);
     for (size_t c = 0; c < k->n_parts; c++) {
         if (k->parts[c].n_modes == 0) continue;
         warp_scratch *s = &w->warp[c];
-        s->control =
-            carve(memory, &at, 4 * sdm_lattice_count(&k->parts[c].warp) * sizeof *s->control);
-        s->points = carve(memory, &at, 4 * n * sizeof *s->points);
-        s->metric = carve(memory, &at, 8 * n * sizeof *s->metric);
-        s->plane = carve(memory, &at, 12 * k->stations[0] * k->stations[1] * sizeof *s->plane);
-        s->line = carve(memory, &at, 12 * k->stations[0] * sizeof *s->line);
-        if (slopes) s->station = carve(memory, &at, n * sizeof *s->station);
+        s->control = sdm_template_take(
+            memory, &at, 4 * sdm_lattice_count(&k->parts[c].warp) * sizeof *s->control);
+        s->points = sdm_template_take(memory, &at, 4 * n * sizeof *s->points);
+        s->metric = sdm_template_take(memory, &at, 8 * n * sizeof *s->metric);
+        s->plane =
+            sdm_template_take(memory, &at, 12 * k->stations[0] * k->stations[1] * sizeof *s->plane);
+        s->line = sdm_template_take(memory, &at, 12 * k->stations[0] * sizeof *s->line);
+        if (slopes) s->station = sdm_template_take(memory, &at, n * sizeof *s->station);
     }
     for (int a = 0; a < 3; a++) w->blocks[a] = ((size_t)w->grid->n[a] + BLOCK[a] - 1) / BLOCK[a];
     for (size_t c = 0; c < k->n_parts; c++) w->by_lines |= k->parts[c].n_modes > 0;
     const size_t blocks = w->by_lines ? 0 : w->blocks[0] * w->blocks[1] * w->blocks[2];
-    w->centre = carve(memory, &at, 4 * k->n_parts * blocks * sizeof *w->centre);
-    w->value = carve(memory, &at, sdm_template_row_floats(w->grid) * sizeof *w->value);
-    w->part = carve(memory, &at, k->n_parts * sizeof *w->part);
+    w->centre = sdm_template_take(memory, &at, 4 * k->n_parts * blocks * sizeof *w->centre);
+    w->value = sdm_template_take(memory, &at, sdm_template_row_floats(w->grid) * sizeof *w->value);
+    w->part = sdm_template_take(memory, &at, k->n_parts * sizeof *w->part);
     for (int a = 0; a < 3; a++)
-        w->offset[a] = carve(memory, &at, BLOCK_VOXELS * sizeof *w->offset[a]);
+        w->offset[a] = sdm_template_take(memory, &at, BLOCK_VOXELS * sizeof *w->offset[a]);
     if (k->correction) {
-        w->correction = carve(memory, &at,
-                              correction_maps * sdm_grid_count(&k->correction->info.grid) *
-                                  sizeof *w->correction);
-        w->correction_scratch = carve(memory, &at, correction_scratch);
+        w->correction = sdm_template_take(
+            memory, &at,
+            correction_maps * sdm_grid_count(&k->correction->info.grid) * sizeof *w->correction);
+        w->correction_scratch = sdm_template_take(memory, &at, correction_scratch);
         w->correction_at = k->correction_lattice;
         w->correction_at.map = w->correction;
     }
@@ -126,16 +127,6 @@ static void affine_index(const template_work *w, size_t c, double u[3], double b
     }
 }
 
-// metric[6] of a part without a warp: m^-1 m^-T
-static void affine_metric(const part_pose *pose, float metric[6])
-{
-    static const int I[6] = {0, 1, 2, 1, 0, 0}, J[6] = {0, 1, 2, 2, 2, 1};
-    const double *b = pose->inverse;
-    for (int c = 0; c < 6; c++)
-        metric[c] = (float)(b[3 * I[c]] * b[3 * J[c]] + b[3 * I[c] + 1] * b[3 * J[c] + 1] +
-                            b[3 * I[c] + 2] * b[3 * J[c] + 2]);
-}
-
 static void affine_run(const template_work *w, size_t c, const template_patch *p, bool rigid)
 {
     const affine_part *part = &w->part[c];
@@ -156,7 +147,7 @@ static void affine_run(const template_work *w, size_t c, const template_patch *p
     }
     if (rigid) return;
     float metric[6];
-    affine_metric(&w->pose[c], metric);
+    sdm_template_metric(w->pose[c].inverse, metric);
     for (int a = 0; a < 6; a++)
         for (size_t i = 0; i < p->count; i++) w->row.metric[a][i] = metric[a];
 }
@@ -330,7 +321,7 @@ static void row_centres(template_work *w, size_t c, size_t y, size_t z)
     const affine_part *part = &w->part[c];
     const double *from = part->from, (*by)[3] = (const double(*)[3])part->by;
     float metric[6], *out = w->centre + 4 * ((z * w->blocks[1] + y) * nx * n_parts + c);
-    affine_metric(&w->pose[c], metric);
+    sdm_template_metric(w->pose[c].inverse, metric);
     for (int i = 0; i < 3; i++) {
         double first = from[i];
         for (int a = 0; a < 3; a++)

@@ -52,6 +52,9 @@ typedef struct template_work {
     template_row row;
 } template_work;
 
+/* Takes the next `bytes` of memory (NULL: only counts), 64-byte aligned, and advances *at. */
+void *sdm_template_take(void *memory, size_t *at, size_t bytes);
+
 /* Bytes of scratch memory for one map; sets the pointers of *w into memory (NULL: none). slopes:
    derivatives by the parameters are wanted. correction_maps: maps of the correction to hold,
    correction_scratch: bytes of its own scratch memory. */

@@ -158,39 +158,32 @@ typedef struct slopes_work {
     uint8_t *nearest;       /* [row] part with the smallest value */
 } slopes_work;
 
-static void *take(void *memory, size_t *at, size_t bytes)
-{
-    void *p = memory ? (uint8_t *)memory + *at : NULL;
-    *at += (bytes + 63) / 64 * 64;
-    return p;
-}
-
 static size_t slopes_carve(const sdm_model *m, size_t n, size_t correction_scratch, void *memory,
                            slopes_work *s)
 {
     const template_network *k = m->network;
     size_t at = sdm_template_carve(m, true, 1 + n, correction_scratch, memory, &s->w);
     s->n = n;
-    s->dg = take(memory, &at, n * k->n_numbers * sizeof *s->dg);
-    s->dm = take(memory, &at, n * k->n_parts * sizeof *s->dm);
-    s->db = take(memory, &at, n * k->n_parts * sizeof *s->db);
+    s->dg = sdm_template_take(memory, &at, n * k->n_numbers * sizeof *s->dg);
+    s->dm = sdm_template_take(memory, &at, n * k->n_parts * sizeof *s->dm);
+    s->db = sdm_template_take(memory, &at, n * k->n_parts * sizeof *s->db);
     size_t control = 0, stations = k->stations[0] * k->stations[1] * k->stations[2], warps = 0;
     for (size_t c = 0; c < k->n_parts; c++) {
         const size_t count = sdm_lattice_count(&k->parts[c].warp);
         if (k->parts[c].n_modes && count > control) control = count;
         warps += k->parts[c].n_modes > 0;
     }
-    s->control = take(memory, &at, 4 * control * sizeof *s->control);
-    s->points = take(memory, &at, warps * n * 4 * stations * sizeof *s->points);
-    s->metric = take(memory, &at, warps * n * 8 * stations * sizeof *s->metric);
-    s->plane =
-        take(memory, &at, warps * n * 12 * k->stations[0] * k->stations[1] * sizeof *s->plane);
-    s->line = take(memory, &at, 12 * k->stations[0] * sizeof *s->line);
+    s->control = sdm_template_take(memory, &at, 4 * control * sizeof *s->control);
+    s->points = sdm_template_take(memory, &at, warps * n * 4 * stations * sizeof *s->points);
+    s->metric = sdm_template_take(memory, &at, warps * n * 8 * stations * sizeof *s->metric);
+    s->plane = sdm_template_take(
+        memory, &at, warps * n * 12 * k->stations[0] * k->stations[1] * sizeof *s->plane);
+    s->line = sdm_template_take(memory, &at, 12 * k->stations[0] * sizeof *s->line);
     const size_t row = sdm_template_row_floats(&m->info.grid);
-    for (int i = 0; i < 9; i++) s->row[i] = take(memory, &at, row * sizeof *s->row[i]);
-    s->slope = take(memory, &at, row * sizeof *s->slope);
-    s->value = take(memory, &at, row * sizeof *s->value);
-    s->nearest = take(memory, &at, row);
+    for (int i = 0; i < 9; i++) s->row[i] = sdm_template_take(memory, &at, row * sizeof *s->row[i]);
+    s->slope = sdm_template_take(memory, &at, row * sizeof *s->slope);
+    s->value = sdm_template_take(memory, &at, row * sizeof *s->value);
+    s->nearest = sdm_template_take(memory, &at, row);
     return at;
 }
 
@@ -232,20 +225,12 @@ static void slopes_begin(slopes_work *s, const double *direction)
 // s->row = derivatives of u and metric of part c, which has no warp, in the voxels of a patch.
 static void affine_slope(const slopes_work *s, size_t c, size_t d, const template_patch *patch)
 {
-    static const int I[6] = {0, 1, 2, 1, 0, 0}, J[6] = {0, 1, 2, 2, 2, 1};
     const template_network *k = s->w.k;
     const part_pose *pose = &s->w.pose[c];
     const double *dm = s->dm[d * k->n_parts + c], *db = s->db[d * k->n_parts + c],
                  *b = pose->inverse;
-    // d(m^-1) = -m^-1 dm m^-1
-    double a[9], moved[9];
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            a[3 * i + j] = b[3 * i] * dm[j] + b[3 * i + 1] * dm[3 + j] + b[3 * i + 2] * dm[6 + j];
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            moved[3 * i + j] =
-                -(a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j]);
+    double moved[9];
+    sdm_template_inverse_slope(pose, dm, moved);
     for (size_t z = 0, v = 0; z < patch->n[2]; z++)
         for (size_t y = 0; y < patch->n[1]; y++, v += patch->n[0]) {
             double du[2][3]; // at the first two voxels of a line
@@ -267,12 +252,10 @@ static void affine_slope(const slopes_work *s, size_t c, size_t d, const templat
                 for (size_t x = 0; x < patch->n[0]; x++) s->row[i][v + x] = from + by * (float)x;
             }
         }
-    for (int i = 0; i < 6; i++) {
-        double sum = 0;
-        for (int e = 0; e < 3; e++)
-            sum += moved[3 * I[i] + e] * b[3 * J[i] + e] + b[3 * I[i] + e] * moved[3 * J[i] + e];
-        for (size_t v = 0; v < patch->count; v++) s->row[3 + i][v] = (float)sum;
-    }
+    float metric[6];
+    sdm_template_metric_slope(b, moved, metric);
+    for (int i = 0; i < 6; i++)
+        for (size_t v = 0; v < patch->count; v++) s->row[3 + i][v] = metric[i];
 }
 
 // Derivatives of the voxels of a patch in which part c is the nearest, after sdm_template_run().
@@ -353,65 +336,63 @@ static void fill_slopes(slopes_work *s, float *values, float *const *out)
     }
 }
 
+// Bytes of scratch memory of the correction's Jacobian, or of its product with one direction.
+static size_t correction_bytes(const template_network *k, bool jacobian)
+{
+    if (!k->correction) return 0;
+    const sdm_model_kind *kind = k->correction->kind;
+    return jacobian ? kind->jacobian_scratch_bytes(k->correction, 1)
+                    : kind->jvp_scratch_bytes(k->correction, 1);
+}
+
+// values = the map, out[n] = its derivatives along direction[n][P]; jacobian: along all parameters
+static void forward_mode(const sdm_model *m, const double *params, bool jacobian, size_t n,
+                         const double *direction, float *values, float *const *out, void *scratch)
+{
+    const template_network *k = m->network;
+    slopes_work s;
+    slopes_carve(m, n, correction_bytes(k, jacobian), scratch, &s);
+    sdm_template_begin(&s.w, params, true);
+    if (k->correction) {
+        const sdm_model_kind *kind = k->correction->kind;
+        float *map = s.w.correction, *slopes = map + sdm_grid_count(&k->correction->info.grid);
+        if (jacobian)
+            kind->jacobian(k->correction, params, map, slopes, s.w.correction_scratch, 1);
+        else
+            kind->jvp(k->correction, params, direction, map, slopes, s.w.correction_scratch, 1);
+    }
+    slopes_begin(&s, direction);
+    fill_slopes(&s, values, out);
+}
+
 size_t sdm_template_jacobian_scratch_bytes(const sdm_model *m, int n_threads)
 {
     (void)n_threads;
-    const template_network *k = m->network;
     slopes_work s;
-    return slopes_carve(
-        m, m->info.n_params,
-        k->correction ? k->correction->kind->jacobian_scratch_bytes(k->correction, 1) : 0, NULL,
-        &s);
+    return slopes_carve(m, m->info.n_params, correction_bytes(m->network, true), NULL, &s);
 }
 
 void sdm_template_jacobian(const sdm_model *m, const double *params, float *values, float *jacobian,
                            void *scratch, int n_threads)
 {
     (void)n_threads;
-    const template_network *k = m->network;
     const size_t n = m->info.n_params, voxels = sdm_grid_count(&m->info.grid);
-    slopes_work s;
-    slopes_carve(m, n,
-                 k->correction ? k->correction->kind->jacobian_scratch_bytes(k->correction, 1) : 0,
-                 scratch, &s);
     double unit[SDM_POD_MAX_PARAMS * SDM_POD_MAX_PARAMS] = {0};
     float *out[SDM_POD_MAX_PARAMS];
     for (size_t i = 0; i < n; i++) unit[i * n + i] = 1, out[i] = jacobian + i * voxels;
-    sdm_template_begin(&s.w, params, true);
-    if (k->correction) {
-        const size_t count = sdm_grid_count(&k->correction->info.grid);
-        k->correction->kind->jacobian(k->correction, params, s.w.correction, s.w.correction + count,
-                                      s.w.correction_scratch, 1);
-    }
-    slopes_begin(&s, unit);
-    fill_slopes(&s, values, out);
+    forward_mode(m, params, true, n, unit, values, out, scratch);
 }
 
 size_t sdm_template_jvp_scratch_bytes(const sdm_model *m, int n_threads)
 {
     (void)n_threads;
-    const template_network *k = m->network;
     slopes_work s;
-    return slopes_carve(
-        m, 1, k->correction ? k->correction->kind->jvp_scratch_bytes(k->correction, 1) : 0, NULL,
-        &s);
+    return slopes_carve(m, 1, correction_bytes(m->network, false), NULL, &s);
 }
 
 void sdm_template_jvp(const sdm_model *m, const double *params, const double *direction,
                       float *values, float *tangent, void *scratch, int n_threads)
 {
     (void)n_threads;
-    const template_network *k = m->network;
-    slopes_work s;
-    slopes_carve(m, 1, k->correction ? k->correction->kind->jvp_scratch_bytes(k->correction, 1) : 0,
-                 scratch, &s);
-    float *out[1] = {tangent};
-    sdm_template_begin(&s.w, params, true);
-    if (k->correction) {
-        const size_t count = sdm_grid_count(&k->correction->info.grid);
-        k->correction->kind->jvp(k->correction, params, direction, s.w.correction,
-                                 s.w.correction + count, s.w.correction_scratch, 1);
-    }
-    slopes_begin(&s, direction);
-    fill_slopes(&s, values, out);
+    forward_mode(m, params, false, 1, direction, values, &tangent, scratch);
 }

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "sdm/internal/mat3.h"
 #include "template_internal.h"
 
 typedef float quad __attribute__((vector_size(16)));
@@ -90,30 +91,12 @@ void sdm_template_displacement(const sdm_lattice *l, const float *control, const
     }
 }
 
-/* Small matrices, row-major. */
-static void product(const double a[9], const double b[9], double out[9])
-{
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            out[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
-}
-static void apply(const double m[9], const double x[3], double out[3])
-{
-    for (int i = 0; i < 3; i++)
-        out[i] = m[3 * i] * x[0] + m[3 * i + 1] * x[1] + m[3 * i + 2] * x[2];
-}
-
 // out[9] = (I + du)^-1. A warp that folds (determinant near 0) is treated as the identity.
 static void inverse_of_warp(const double du[9], double out[9])
 {
     double a[9];
     for (int i = 0; i < 9; i++) a[i] = du[i] + (i % 4 == 0);
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            const int r = (j + 1) % 3, s = (j + 2) % 3, c = (i + 1) % 3, d = (i + 2) % 3;
-            out[3 * i + j] = a[3 * r + c] * a[3 * s + d] - a[3 * r + d] * a[3 * s + c];
-        }
-    const double det = a[0] * out[0] + a[1] * out[3] + a[2] * out[6];
+    const double det = m3_adjugate(a, out);
     for (int i = 0; i < 9; i++) out[i] = det > 1e-2 ? out[i] / det : (double)(i % 4 == 0);
 }
 
@@ -129,7 +112,7 @@ static void newton(const sdm_lattice *l, const float *control, const double q[3]
         sdm_template_displacement(l, control, y, u, du, NULL);
         inverse_of_warp(du, inverse);
         for (int i = 0; i < 3; i++) f[i] = q[i] - y[i] - u[i];
-        apply(inverse, f, d);
+        m3_apply(inverse, f, d);
         const double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
         const double scale = length > longest ? longest / length : 1;
         for (int i = 0; i < 3; i++) y[i] += scale * d[i];
@@ -146,14 +129,33 @@ static void station_world(const template_network *k, const sdm_grid *grid, size_
     sdm_grid_world(grid, index, out);
 }
 
-// metric[8] = B B^T for B = d y / d x, as xx, yy, zz, yz, xz, xy
-static void store_metric(const double b[9], float metric[8])
+// Row and column of the elements xx, yy, zz, yz, xz, xy.
+static const int ROW[6] = {0, 1, 2, 1, 0, 0}, COLUMN[6] = {0, 1, 2, 2, 2, 1};
+
+void sdm_template_metric(const double b[9], float metric[6])
 {
-    static const int I[6] = {0, 1, 2, 1, 0, 0}, J[6] = {0, 1, 2, 2, 2, 1};
-    for (int c = 0; c < 6; c++)
-        metric[c] = (float)(b[3 * I[c]] * b[3 * J[c]] + b[3 * I[c] + 1] * b[3 * J[c] + 1] +
-                            b[3 * I[c] + 2] * b[3 * J[c] + 2]);
-    metric[6] = metric[7] = 0;
+    for (int c = 0; c < 6; c++) {
+        const double *i = b + 3 * ROW[c], *j = b + 3 * COLUMN[c];
+        metric[c] = (float)(i[0] * j[0] + i[1] * j[1] + i[2] * j[2]);
+    }
+}
+
+void sdm_template_metric_slope(const double b[9], const double db[9], float slope[6])
+{
+    for (int c = 0; c < 6; c++) {
+        const int i = 3 * ROW[c], j = 3 * COLUMN[c];
+        double sum = 0;
+        for (int e = 0; e < 3; e++) sum += db[i + e] * b[j + e] + b[i + e] * db[j + e];
+        slope[c] = (float)sum;
+    }
+}
+
+void sdm_template_inverse_slope(const part_pose *pose, const double dm[9], double out[9])
+{
+    double a[9];
+    m3_product(pose->inverse, dm, a);
+    m3_product(a, pose->inverse, out);
+    for (int i = 0; i < 9; i++) out[i] = -out[i];
 }
 
 // Turns samples v[n] (quads, `stride` floats apart) into coefficients of the cubic B-spline that
@@ -200,11 +202,11 @@ void sdm_template_invert(const template_network *k, const sdm_template_part *par
                 double x[3], q[3], b[9];
                 station_world(k, grid, i, j, z, x);
                 for (int c = 0; c < 3; c++) x[c] -= pose->b[c];
-                apply(pose->inverse, x, q);
+                m3_apply(pose->inverse, x, q);
                 // start: the station before it, moved to first order
                 double move[3], dy[3];
                 for (int c = 0; c < 3; c++) move[c] = q[c] - (i ? last[c] : row_q[c]);
-                apply(inverse, move, dy);
+                m3_apply(inverse, move, dy);
                 for (int c = 0; c < 3; c++) y[c] = at == 0 ? q[c] : (i ? y[c] : row[c]) + dy[c];
                 newton(&part->warp, w->control, q, y, inverse);
                 memcpy(last, q, sizeof q);
@@ -214,8 +216,9 @@ void sdm_template_invert(const template_network *k, const sdm_template_part *par
                     w->points[4 * at + (size_t)c] =
                         (float)((y[c] - part->near.origin[c]) * per_index);
                 w->points[4 * at + 3] = 0;
-                product(inverse, pose->inverse, b);
-                store_metric(b, w->metric + 8 * at);
+                m3_product(inverse, pose->inverse, b);
+                sdm_template_metric(b, w->metric + 8 * at);
+                w->metric[8 * at + 6] = w->metric[8 * at + 7] = 0;
                 if (!w->station) continue;
                 memcpy(w->station[at].y, y, sizeof y);
                 memcpy(w->station[at].inverse, inverse, sizeof inverse);
@@ -229,16 +232,10 @@ void sdm_template_invert_slope(const template_network *k, const sdm_template_par
                                const float *control, const double dm[9], const double db[3],
                                float *points, float *metric)
 {
-    static const int I[6] = {0, 1, 2, 1, 0, 0}, J[6] = {0, 1, 2, 2, 2, 1};
     const size_t nx = k->stations[0], ny = k->stations[1], nz = k->stations[2];
     const double per_index = 1 / part->near.spacing;
-    double moved[9]; // d(m^-1) = -m^-1 dm m^-1
-    {
-        double a[9];
-        product(pose->inverse, dm, a);
-        product(a, pose->inverse, moved);
-        for (int i = 0; i < 9; i++) moved[i] = -moved[i];
-    }
+    double moved[9];
+    sdm_template_inverse_slope(pose, dm, moved);
     size_t at = 0;
     for (size_t z = 0; z < nz; z++)
         for (size_t j = 0; j < ny; j++)
@@ -248,32 +245,26 @@ void sdm_template_invert_slope(const template_network *k, const sdm_template_par
                 station_world(k, grid, i, j, z, x);
                 // q = m^-1 (x - b): dq = d(m^-1) (x - b) - m^-1 db
                 for (int c = 0; c < 3; c++) x[c] -= pose->b[c];
-                apply(moved, x, dq);
-                apply(pose->inverse, db, t);
+                m3_apply(moved, x, dq);
+                m3_apply(pose->inverse, db, t);
                 for (int c = 0; c < 3; c++) dq[c] -= t[c];
                 // y + U(y) = q: (I + U') dy = dq - dU(y)
                 sdm_template_displacement(&part->warp, control, s->y, u, du, NULL);
                 sdm_template_displacement(&part->warp, w->control, s->y, u0, du0, ddu);
                 for (int c = 0; c < 3; c++) f[c] = dq[c] - u[c];
-                apply(s->inverse, f, dy);
+                m3_apply(s->inverse, f, dy);
                 for (int c = 0; c < 3; c++) points[4 * at + (size_t)c] = (float)(dy[c] * per_index);
                 points[4 * at + 3] = 0;
                 // B = J^-1 m^-1, J = I + U': dB = -J^-1 (dU' + U'' dy) B + J^-1 d(m^-1)
                 double b[9], dj[9], a[9], c1[9], c2[9];
-                product(s->inverse, pose->inverse, b);
+                m3_product(s->inverse, pose->inverse, b);
                 for (int e = 0; e < 9; e++)
                     dj[e] = du[e] + ddu[0][e] * dy[0] + ddu[1][e] * dy[1] + ddu[2][e] * dy[2];
-                product(s->inverse, dj, a);
-                product(a, b, c1);
-                product(s->inverse, moved, c2);
+                m3_product(s->inverse, dj, a);
+                m3_product(a, b, c1);
+                m3_product(s->inverse, moved, c2);
                 for (int e = 0; e < 9; e++) c2[e] -= c1[e];
-                for (int c = 0; c < 6; c++) {
-                    double sum = 0;
-                    for (int e = 0; e < 3; e++)
-                        sum +=
-                            c2[3 * I[c] + e] * b[3 * J[c] + e] + b[3 * I[c] + e] * c2[3 * J[c] + e];
-                    metric[8 * at + (size_t)c] = (float)sum;
-                }
+                sdm_template_metric_slope(b, c2, metric + 8 * at);
                 metric[8 * at + 6] = metric[8 * at + 7] = 0;
             }
     prefilter_all(k, points);

@@ -11,6 +11,7 @@
 #include "objective.h"
 #include "prior.h"
 #include "sdm/internal/heap.h"
+#include "sdm/internal/mat3.h"
 #include "sdm/internal/rotation.h"
 #include "solve.h"
 #include "tissues.h"
@@ -47,7 +48,7 @@ void sdm_fit_state_move(const fit_problem *p, const fit_state *from, const doubl
     const sdm_pose turn = {.rotation = {step[n], step[n + 1], step[n + 2]}};
     double r[9];
     sdm_pose_matrix(&turn, r);
-    sdm_rotation_product(r, from->rotation, to->rotation);
+    m3_product(r, from->rotation, to->rotation);
     for (size_t k = 0; k < 3; k++) to->translation[k] += step[fit_at_translation(n) + k];
     to->blur += step[fit_at_blur(n)];
     for (size_t i = 0; fit_columns(n) + i < p->information.n_unknowns; i++) {

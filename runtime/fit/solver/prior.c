@@ -5,6 +5,7 @@
 
 #include <math.h>
 
+#include "sdm/internal/mat3.h"
 #include "sdm/internal/rotation.h"
 
 // adds the derivatives of one Gaussian term; each array may be NULL
@@ -22,7 +23,7 @@ static void rotation_residual(const fit_problem *p, const fit_state *s, double w
     const double *q = p->prior.rotation,
                  back[9] = {q[0], q[3], q[6], q[1], q[4], q[7], q[2], q[5], q[8]};
     double r[9];
-    sdm_rotation_product(s->rotation, back, r);
+    m3_product(s->rotation, back, r);
     sdm_rotation_vector(r, w);
 }
 

@@ -8,6 +8,7 @@
 
 #include "fit/solver/newton.h"
 #include "fit/solver/objective.h"
+#include "sdm/internal/mat3.h"
 #include "sdm/internal/rotation.h"
 #include "sdm/internal/vec3.h"
 
@@ -54,7 +55,7 @@ static void turn_start(const fit_problem *p, size_t i, const fit_state *start, f
     double q[9], at[3], moved[3];
     turn_rotation(o->turns, i, o->n_turns, q);
     *out = *start;
-    sdm_rotation_product(start->rotation, q, out->rotation);
+    m3_product(start->rotation, q, out->rotation);
     sdm_fit_to_world(start, o->pivot, at);
     sdm_fit_to_world(out, o->pivot, moved);
     for (int k = 0; k < 3; k++) out->translation[k] += at[k] - moved[k];

@@ -8,9 +8,6 @@
 extern "C" {
 #endif
 
-/* out[9] = a[9] b[9], row-major; out must not be a or b. */
-void sdm_rotation_product(const double a[9], const double b[9], double out[9]);
-
 /* Rotation vector of the unit quaternion q = (w, x, y, z); its length is at most pi. */
 void sdm_rotation_of_quaternion(const double q[4], double rotation[3]);
 

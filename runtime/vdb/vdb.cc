@@ -10,7 +10,7 @@
 #include <new>
 #include <string>
 
-#include "band.h"
+#include "padded.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
 #include "seal.h"
@@ -158,7 +158,7 @@ openvdb::math::Transform::Ptr transform_of(const sdm_grid &g, bool level_set)
 
 /* Adds one leaf of 8^3 voxels to the tree, with values from `box`. Its voxels are active where
    abs(value) < background, or all of them if dense. */
-void fill_block(Grid &grid, Grid::Accessor &acc, const sdm_band &box, const Coord &corner,
+void fill_block(Grid &grid, Grid::Accessor &acc, const sdm_padded &box, const Coord &corner,
                 bool dense, bool half)
 {
     const float background = grid.background();
@@ -183,7 +183,7 @@ void fill_block(Grid &grid, Grid::Accessor &acc, const sdm_band &box, const Coor
         acc.addTile(1, corner, -background, false);
 }
 
-Grid::Ptr grid_of(const openvdb::math::Transform::Ptr &transform, const sdm_band &box,
+Grid::Ptr grid_of(const openvdb::math::Transform::Ptr &transform, const sdm_padded &box,
                   float background, bool dense, bool half)
 {
     Grid::Ptr grid = Grid::create(background);
@@ -203,9 +203,9 @@ Grid::Ptr grid_of(const openvdb::math::Transform::Ptr &transform, const sdm_band
 
 // ---- from map to level set
 
-struct owned_band {
-    sdm_band band = {};
-    ~owned_band() { sdm_band_dispose(&band); }
+struct owned_padded {
+    sdm_padded map = {};
+    ~owned_padded() { sdm_padded_dispose(&map); }
 };
 
 double band_of(const sdm_vdb_opts &o) { return o.band_voxels != 0 ? o.band_voxels : 3.0; }
@@ -234,7 +234,7 @@ void check_options(const sdm_grid &g, const sdm_vdb_opts &o, sdm_error *err)
 }
 
 /* Demands values that fit into 16-bit floats, whose range ends at 65504. */
-void check_half(const sdm_band &box, sdm_error *err)
+void check_half(const sdm_padded &box, sdm_error *err)
 {
     const size_t count = static_cast<size_t>(box.n[0] * box.n[1] * box.n[2]);
     for (size_t i = 0; i < count; i++)
@@ -254,10 +254,10 @@ Grid::Ptr make_level_set(const sdm_grid &g, const float *values, const sdm_vdb_o
                       "itself with --dense",
                       g.spacing[0]));
     const float background = background_value(band_of(o), transform->voxelSize()[0], o.half);
-    owned_band box;
-    need(sdm_band_close(&g, values, background, &o, &box.band, err));
-    report.cut = box.band.cut;
-    Grid::Ptr grid = grid_of(transform, box.band, background, false, o.half);
+    owned_padded box;
+    need(sdm_padded_close(&g, values, background, &o, &box.map, err));
+    report.cut = box.map.cut;
+    Grid::Ptr grid = grid_of(transform, box.map, background, false, o.half);
     mend_creases(*grid, o, report, err);
     return grid;
 }
@@ -265,9 +265,9 @@ Grid::Ptr make_level_set(const sdm_grid &g, const float *values, const sdm_vdb_o
 Grid::Ptr make_dense(const sdm_grid &g, const float *values, const sdm_vdb_opts &o,
                      sdm_vdb_report &report, sdm_error *err)
 {
-    owned_band box;
-    need(sdm_band_copy(&g, values, &box.band, err));
-    if (o.half) check_half(box.band, err);
+    owned_padded box;
+    need(sdm_padded_copy(&g, values, &box.map, err));
+    if (o.half) check_half(box.map, err);
     const size_t count = sdm_grid_count(&g);
     const float background = as_stored(*std::max_element(values, values + count), o.half);
     for (size_t i = 0; i < count && !report.cut; i++) {
@@ -277,7 +277,7 @@ Grid::Ptr make_dense(const sdm_grid &g, const float *values, const sdm_vdb_opts 
         for (int a = 0; a < 3; a++)
             report.cut = report.cut || (values[i] < 0 && (at[a] == 0 || at[a] == g.n[a] - 1));
     }
-    return grid_of(transform_of(g, false), box.band, background, true, o.half);
+    return grid_of(transform_of(g, false), box.map, background, true, o.half);
 }
 
 // ---- reading

@@ -12,15 +12,16 @@ extern "C" {
 
 /* Values on a box of voxels: values[n[2]][n[1]][n[0]] in mm. The first voxel of the box has index
    (-pad, -pad, -pad) in the grid of the map. */
-typedef struct sdm_band {
+typedef struct sdm_padded {
     int64_t n[3];
     int32_t pad;
     float *values;
     bool cut; /* true: the surface left the grid and was closed at its border */
-} sdm_band;
+} sdm_padded;
 
 /* Copies values[nz][ny][nx] without padding. SDM_E_ARG: a value is NaN or infinite. */
-sdm_status sdm_band_copy(const sdm_grid *grid, const float *values, sdm_band *out, sdm_error *err);
+sdm_status sdm_padded_copy(const sdm_grid *grid, const float *values, sdm_padded *out,
+                           sdm_error *err);
 
 /* Computes the values of a level set whose band has the half width `width` mm, on uniform voxels.
    If the surface leaves the grid, the solid is intersected with the box B that the voxels fill
@@ -29,12 +30,12 @@ sdm_status sdm_band_copy(const sdm_grid *grid, const float *values, sdm_band *ou
    is the minimum over points b of the faces of B of |p - b| + max(d(b), 0), exact except for the
    sampling of b. SDM_E_ARG: no surface in the grid, or a value is not finite. SDM_E_QUALITY:
    neighbouring values jump across the band, so this is not a distance map. SDM_E_CANCELLED from
-   opts->cancelled(); other members of opts are not used. Call sdm_band_dispose() also after an
+   opts->cancelled(); other members of opts are not used. Call sdm_padded_dispose() also after an
    error. */
-sdm_status sdm_band_close(const sdm_grid *grid, const float *values, double width,
-                          const sdm_vdb_opts *opts, sdm_band *out, sdm_error *err);
+sdm_status sdm_padded_close(const sdm_grid *grid, const float *values, double width,
+                            const sdm_vdb_opts *opts, sdm_padded *out, sdm_error *err);
 
-void sdm_band_dispose(sdm_band *b);
+void sdm_padded_dispose(sdm_padded *b);
 
 #ifdef __cplusplus
 }

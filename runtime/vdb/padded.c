@@ -1,5 +1,5 @@
 /* Turns a map into the values of a narrow-band level set. */
-#include "band.h"
+#include "padded.h"
 
 #include <math.h>
 #include <string.h>
@@ -7,14 +7,14 @@
 #include "faces.h"
 #include "sdm/internal/heap.h"
 
-void sdm_band_dispose(sdm_band *b)
+void sdm_padded_dispose(sdm_padded *b)
 {
     sdm_free(b->values);
     memset(b, 0, sizeof *b);
 }
 
 /* Allocates values for the grid with a margin of `pad` voxels. */
-static sdm_status band_reserve(const sdm_grid *grid, int32_t pad, sdm_band *out, sdm_error *err)
+static sdm_status padded_reserve(const sdm_grid *grid, int32_t pad, sdm_padded *out, sdm_error *err)
 {
     memset(out, 0, sizeof *out);
     out->pad = pad;
@@ -37,11 +37,12 @@ static sdm_status check_finite(const sdm_grid *grid, const float *values, sdm_er
     return SDM_OK;
 }
 
-sdm_status sdm_band_copy(const sdm_grid *grid, const float *values, sdm_band *out, sdm_error *err)
+sdm_status sdm_padded_copy(const sdm_grid *grid, const float *values, sdm_padded *out,
+                           sdm_error *err)
 {
     memset(out, 0, sizeof *out);
     sdm_status s = check_finite(grid, values, err);
-    if (!s) s = band_reserve(grid, 0, out, err);
+    if (!s) s = padded_reserve(grid, 0, out, err);
     if (!s) memcpy(out->values, values, sdm_grid_count(grid) * sizeof *values);
     return s;
 }
@@ -83,7 +84,7 @@ static float box_distance(const sdm_grid *g, int64_t i, int64_t j, int64_t k)
 
 /* Demands that neighbours differ in sign somewhere (SDM_E_ARG), and that both values then lie
    inside the band, as in every distance map (SDM_E_QUALITY). */
-static sdm_status check_jumps(const sdm_band *b, double width, sdm_error *err)
+static sdm_status check_jumps(const sdm_padded *b, double width, sdm_error *err)
 {
     const size_t step[3] = {1, (size_t)b->n[0], (size_t)(b->n[0] * b->n[1])};
     size_t jumps = 0, crossings = 0;
@@ -115,7 +116,7 @@ static sdm_status check_jumps(const sdm_band *b, double width, sdm_error *err)
 /* Sets one row of values: inside the grid those of the map, cut off at the border if out->cut;
    outside, the distance from the faces. */
 static void close_row(const sdm_grid *g, const float *values, double width, int64_t j, int64_t k,
-                      sdm_faces *faces, sdm_band *out)
+                      sdm_faces *faces, sdm_padded *out)
 {
     const int64_t pad = out->pad;
     for (int64_t i = 0; i < out->n[0]; i++) {
@@ -132,16 +133,16 @@ static void close_row(const sdm_grid *g, const float *values, double width, int6
     }
 }
 
-sdm_status sdm_band_close(const sdm_grid *g, const float *values, double width,
-                          const sdm_vdb_opts *opts, sdm_band *out, sdm_error *err)
+sdm_status sdm_padded_close(const sdm_grid *g, const float *values, double width,
+                            const sdm_vdb_opts *opts, sdm_padded *out, sdm_error *err)
 {
     memset(out, 0, sizeof *out);
     sdm_status s = check_finite(g, values, err);
     if (s) return s;
     const float low = border_minimum(g, values);
     sdm_faces faces = {0};
-    s = band_reserve(g, (double)low < width ? (int32_t)ceil(width / g->spacing[0]) + 1 : 0, out,
-                     err);
+    s = padded_reserve(g, (double)low < width ? (int32_t)ceil(width / g->spacing[0]) + 1 : 0, out,
+                       err);
     if (!s && out->pad) s = sdm_faces_create(g, values, &faces, err);
     out->cut = low < 0;
     for (int64_t k = 0; k < out->n[2] && !s; k++) {

@@ -4,7 +4,7 @@
 
 #include "field_parts.h"
 #include "sdm/internal/heap.h"
-#include "spline_slope.h"
+#include "spline_change.h"
 
 /* The work on one band. */
 typedef struct job {
@@ -16,15 +16,19 @@ typedef struct job {
     spline_grid places; /* of the voxels, up to the end of the last blocks; parallel grids only */
     float *rows;        /* of sdm_spline_rows(); parallel grids only */
     float *centre;      /* [blocks] values at the centres of the blocks */
-    spline_slope slope;
+    double half[3];     /* mm along the axes of the map from the centre of a block to its voxels */
+    spline_change change;
     uint32_t *candidate; /* [n] blocks that may meet the band */
-    uint8_t *kind;       /* [n] of each candidate */
     size_t n;
+    float *piece; /* [PIECE][8][8][8] values of candidates */
     sdm_band *out;
 } job;
 
+/* Candidates that are evaluated before those that meet the band are kept. */
+enum { PIECE = 256 };
+
 /* What the values of a candidate show. */
-enum { BLOCK_OUTSIDE = 0, BLOCK_INSIDE, BLOCK_NEAR };
+typedef enum block_kind { BLOCK_OUTSIDE = 0, BLOCK_INSIDE, BLOCK_NEAR, BLOCK_REFUSED } block_kind;
 
 static void block_position(const sdm_band *b, size_t number, int64_t at[3])
 {
@@ -68,46 +72,102 @@ static sdm_status find_centres(job *j, sdm_error *err)
 
 /* ---- the candidates */
 
-/* Bound on the slope in a block: that of the bricks which it meets. */
-static float block_slope(const job *j, size_t number)
+/* The bricks that a block meets along an axis of the map, low .. high, and whether voxels of it may
+   lie outside of the box. */
+typedef struct brick_span {
+    size_t low, high;
+    bool leaves;
+} brick_span;
+
+/* span[3] = those of the block at at[3] (not rounded) of the lattice of blocks. */
+static void find_spans(const job *j, const double at[3], brick_span span[3])
 {
-    if (!j->parallel) return j->slope.all;
-    int64_t at[3];
-    size_t low[3], high[3];
-    block_position(j->out, number, at);
-    for (int b = 0; b < 3; b++) {
-        const spline_axis *x = &j->places.axis[b];
-        const int32_t first = x->cell[8 * at[b]], last = x->cell[8 * at[b] + 7];
-        low[x->axis] = (size_t)(first < last ? first : last) / SPLINE_BRICK;
-        high[x->axis] = (size_t)(first < last ? last : first) / SPLINE_BRICK;
+    const spline_shape *s = &j->f->shape;
+    double index[3], world[3], centre[3];
+    for (int b = 0; b < 3; b++) index[b] = 8 * at[b] + 3.5;
+    sdm_grid_world(j->grid, index, world);
+    sdm_spline_index(&j->f->frame, world, centre);
+    for (int a = 0; a < 3; a++) {
+        const double half = j->half[a] / j->f->frame.spacing[a];
+        const spline_place low = sdm_spline_place(centre[a] - half, s->n[a]),
+                           high = sdm_spline_place(centre[a] + half, s->n[a]);
+        span[a] = (brick_span){.low = (size_t)low.cell / SPLINE_BRICK,
+                               .high = (size_t)high.cell / SPLINE_BRICK,
+                               .leaves = low.beyond != 0 || high.beyond != 0};
     }
-    float most = 0;
-    for (size_t z = low[2]; z <= high[2]; z++)
-        for (size_t y = low[1]; y <= high[1]; y++)
-            for (size_t x = low[0]; x <= high[0]; x++)
-                most = fmaxf(most, j->slope.max[(z * j->slope.n[1] + y) * j->slope.n[0] + x]);
-    return most;
 }
 
-/* Whether no voxel of a block can lie within the band. */
-static bool is_far(const job *j, float centre, float slope)
+/* Bound on the change from the centre of a block to its voxels; span[3] along x, y, z of the map.
+ */
+static float block_change(const job *j, const brick_span *const span[3])
 {
-    // the bound outside of the box grows by up to 1 mm per mm
-    const double change = (double)(fmaxf(slope, 1) * j->radius);
-    return (double)fabsf(centre) >= j->width * (1 + 1e-6) + change + 1e-5;
+    const spline_change *c = &j->change;
+    float most = 0;
+    for (size_t z = span[2]->low; z <= span[2]->high; z++)
+        for (size_t y = span[1]->low; y <= span[1]->high; y++)
+            for (size_t x = span[0]->low; x <= span[0]->high; x++) {
+                const float change = c->max[(z * c->n[1] + y) * c->n[0] + x];
+                most = change > most ? change : most;
+            }
+    // the bound outside of the box grows by up to 1 mm per mm besides
+    const bool leaves = span[0]->leaves || span[1]->leaves || span[2]->leaves;
+    return leaves ? most + j->radius : most;
+}
+
+/* The spans of the blocks of a parallel grid, along each axis of the grid. */
+static sdm_status tabulate_spans(const job *j, brick_span *table[3], sdm_error *err)
+{
+    const int64_t *n = j->out->blocks;
+    const sdm_status s =
+        SDM_ALLOC(&table[0], (size_t)(n[0] + n[1] + n[2]), "bricks of blocks", err);
+    if (s) return s;
+    table[1] = table[0] + n[0];
+    table[2] = table[1] + n[1];
+    for (int b = 0; b < 3; b++)
+        for (int64_t i = 0; i < n[b]; i++) {
+            double at[3] = {0, 0, 0};
+            brick_span span[3];
+            at[b] = (double)i;
+            find_spans(j, at, span);
+            table[b][i] = span[j->places.axis[b].axis];
+        }
+    return SDM_OK;
+}
+
+/* Whether a block with this value at its centre may meet the band. The margin covers roundings. */
+static bool may_meet(const job *j, float centre, brick_span *const table[3], const int64_t at[3])
+{
+    const float beyond = fabsf(centre) - (float)(j->width * (1 + 1e-6)) - 1e-5f;
+    if (beyond >= j->change.all + j->radius) return false;
+    const brick_span *span[3];
+    brick_span own[3];
+    if (!j->parallel)
+        find_spans(j, (const double[]){(double)at[0], (double)at[1], (double)at[2]}, own);
+    for (int b = 0; b < 3; b++)
+        if (j->parallel)
+            span[j->places.axis[b].axis] = &table[b][at[b]];
+        else
+            span[b] = &own[b];
+    return beyond < block_change(j, span);
 }
 
 static sdm_status find_candidates(job *j, sdm_error *err)
 {
-    const size_t n = (size_t)(j->out->blocks[0] * j->out->blocks[1] * j->out->blocks[2]);
-    sdm_status s =
-        sdm_alloc_unset((void **)&j->candidate, n, sizeof *j->candidate, "blocks of a band", err);
-    for (size_t i = 0; i < n && !s; i++) {
-        const float centre = j->centre[i];
-        j->out->block[i] = centre < 0 ? SDM_BAND_INSIDE : SDM_BAND_OUTSIDE;
-        if (!is_far(j, centre, j->slope.all) && !is_far(j, centre, block_slope(j, i)))
-            j->candidate[j->n++] = (uint32_t)i;
-    }
+    const int64_t *n = j->out->blocks;
+    brick_span *table[3] = {NULL};
+    sdm_status s = sdm_alloc_unset((void **)&j->candidate, (size_t)(n[0] * n[1] * n[2]),
+                                   sizeof *j->candidate, "blocks of a band", err);
+    if (!s && j->parallel) s = tabulate_spans(j, table, err);
+    uint32_t i = 0;
+    for (int64_t z = 0; z < n[2] && !s; z++)
+        for (int64_t y = 0; y < n[1]; y++)
+            for (int64_t x = 0; x < n[0]; x++, i++) {
+                const float centre = j->centre[i];
+                j->out->block[i] = centre < 0 ? SDM_BAND_INSIDE : SDM_BAND_OUTSIDE;
+                if (may_meet(j, centre, table, (const int64_t[]){x, y, z}))
+                    j->candidate[j->n++] = i;
+            }
+    sdm_free(table[0]);
     return s;
 }
 
@@ -176,31 +236,46 @@ static bool point_block(const job *j, const int64_t first[3], float *values)
     return true;
 }
 
-/* Whether the values of a block in the grid meet the band, or else their side. */
-static uint8_t block_kind(const job *j, const int64_t first[3], const float *values)
+/* The kind of a block with the numbers of its values <= -width and >= width, of `all` values: one
+   with values of both signs is near too. */
+static block_kind kind_of(size_t low, size_t high, size_t all)
 {
-    int64_t n[3];
-    for (int a = 0; a < 3; a++) n[a] = j->grid->n[a] - first[a] < 8 ? j->grid->n[a] - first[a] : 8;
-    // all values have the same sign and at least this size, or the block is near
-    const float width = (float)j->width;
-    size_t low = 0, high = 0;
-    for (int64_t k = 0; k < n[2]; k++)
-        for (int64_t y = 0; y < n[1]; y++)
-            for (int64_t x = 0; x < n[0]; x++) {
-                const float v = values[(k * 8 + y) * 8 + x];
-                low += v <= -width;
-                high += v >= width;
-            }
-    const size_t all = (size_t)(n[0] * n[1] * n[2]);
     return low == all ? BLOCK_INSIDE : high == all ? BLOCK_OUTSIDE : BLOCK_NEAR;
 }
 
-/* Evaluates candidate i. false: a voxel outside of the box is refused. */
-static bool evaluate(const job *j, size_t i)
+static block_kind whole_block_kind(const float *values, float width)
 {
-    float *values = j->out->values + i * SDM_BAND_VOXELS;
+    int low = 0, high = 0;
+    for (int i = 0; i < SDM_BAND_VOXELS; i++) {
+        low += values[i] <= -width;
+        high += values[i] >= width;
+    }
+    return kind_of((size_t)low, (size_t)high, SDM_BAND_VOXELS);
+}
+
+/* The kind of a block by its values in the grid. */
+static block_kind find_kind(const job *j, const int64_t first[3], const float *values)
+{
+    const float width = (float)j->width;
+    int64_t n[3];
+    for (int a = 0; a < 3; a++) n[a] = j->grid->n[a] - first[a] < 8 ? j->grid->n[a] - first[a] : 8;
+    const int64_t all = n[0] * n[1] * n[2];
+    if (all == SDM_BAND_VOXELS) return whole_block_kind(values, width);
+    size_t low = 0, high = 0;
+    for (int64_t i = 0; i < all; i++) {
+        const int64_t x = i % n[0], y = i / n[0] % n[1], z = i / n[0] / n[1];
+        const float v = values[(z * 8 + y) * 8 + x];
+        low += v <= -width;
+        high += v >= width;
+    }
+    return kind_of(low, high, (size_t)all);
+}
+
+/* values[8][8][8] = those of a candidate. */
+static block_kind evaluate(const job *j, uint32_t number, float *values)
+{
     int64_t first[3];
-    block_position(j->out, j->candidate[i], first);
+    block_position(j->out, number, first);
     for (int a = 0; a < 3; a++) first[a] *= 8;
     bool leaves = false;
     if (j->parallel) {
@@ -209,43 +284,46 @@ static bool evaluate(const job *j, size_t i)
             leaves = leaves || j->places.axis[b].beyond[first[b]] > 0 ||
                      j->places.axis[b].beyond[first[b] + 7] > 0;
     }
-    if ((!j->parallel || leaves) && !point_block(j, first, values)) return false;
-    j->kind[i] = block_kind(j, first, values);
-    return true;
+    if ((!j->parallel || leaves) && !point_block(j, first, values)) return BLOCK_REFUSED;
+    return find_kind(j, first, values);
 }
 
-/* Keeps the blocks that meet the band. */
-static void keep_near(job *j)
+/* Keeps the candidates of a piece that meet the band. false: one is refused. */
+static bool keep_near(const job *j, const uint32_t *candidate, const block_kind *kind, size_t n)
 {
     sdm_band *b = j->out;
-    for (size_t i = 0; i < j->n; i++) {
-        int32_t *block = &b->block[j->candidate[i]];
-        *block = j->kind[i] == BLOCK_INSIDE ? SDM_BAND_INSIDE : SDM_BAND_OUTSIDE;
-        if (j->kind[i] != BLOCK_NEAR) continue;
-        if (b->n != i)
-            memcpy(b->values + b->n * SDM_BAND_VOXELS, b->values + i * SDM_BAND_VOXELS,
-                   SDM_BAND_VOXELS * sizeof *b->values);
+    for (size_t i = 0; i < n; i++) {
+        int32_t *block = &b->block[candidate[i]];
+        *block = kind[i] == BLOCK_INSIDE ? SDM_BAND_INSIDE : SDM_BAND_OUTSIDE;
+        if (kind[i] == BLOCK_REFUSED) return false;
+        if (kind[i] != BLOCK_NEAR) continue;
+        memcpy(b->values + b->n * SDM_BAND_VOXELS, j->piece + i * SDM_BAND_VOXELS,
+               SDM_BAND_VOXELS * sizeof *b->values);
         *block = (int32_t)b->n++;
     }
+    return true;
 }
 
 static sdm_status evaluate_all(job *j, sdm_error *err)
 {
+    block_kind kind[PIECE];
     size_t count;
     sdm_status s = sdm_mul(j->n, SDM_BAND_VOXELS, &count, err);
     if (!s)
         s = sdm_alloc_unset((void **)&j->out->values, count, sizeof *j->out->values,
                             "values of a band", err);
-    if (!s) s = SDM_ALLOC(&j->kind, j->n, "blocks of a band", err);
-    if (s) return s;
-    bool refused = false;
-#pragma omp parallel for schedule(static, 8) reduction(||                                          \
-                                                       : refused)                                  \
-    num_threads(j->f->n_threads) if (j->f->n_threads > 1)
-    for (size_t i = 0; i < j->n; i++) refused = refused || !evaluate(j, i);
-    if (refused) return sdm_field_refuse(j->f, "the band leaves", err);
-    keep_near(j);
-    return SDM_OK;
+    if (!s)
+        s = sdm_alloc_unset((void **)&j->piece, PIECE * SDM_BAND_VOXELS, sizeof *j->piece,
+                            "values of blocks", err);
+    for (size_t first = 0; first < j->n && !s; first += PIECE) {
+        const size_t n = j->n - first < PIECE ? j->n - first : PIECE;
+        const uint32_t *candidate = j->candidate + first;
+#pragma omp parallel for schedule(static) num_threads(j->f->n_threads) if (j->f->n_threads > 1)
+        for (size_t i = 0; i < n; i++)
+            kind[i] = evaluate(j, candidate[i], j->piece + i * SDM_BAND_VOXELS);
+        if (!keep_near(j, candidate, kind, n)) s = sdm_field_refuse(j->f, "the band leaves", err);
+    }
+    return s;
 }
 
 /* ---- the band */
@@ -284,17 +362,34 @@ static sdm_status prepare_rows(job *j, sdm_error *err)
     return s ? s : sdm_spline_rows(&f->shape, &j->places, f->splines, f->n_threads, &j->rows, err);
 }
 
+/* radius and half: the voxels of a block lie up to 3.5 voxels from its centre along each axis. */
+static void measure_block(job *j)
+{
+    double square = 0;
+    for (int b = 0; b < 3; b++) {
+        const double along = 3.5 * j->grid->spacing[b];
+        square += along * along;
+        for (int a = 0; a < 3; a++) {
+            double cosine = 0;
+            for (int x = 0; x < 3; x++)
+                cosine += j->f->frame.dir[3 * x + a] * j->grid->dir[3 * x + b];
+            j->half[a] += along * fabs(cosine);
+        }
+    }
+    j->radius = (float)sqrt(square);
+}
+
 static sdm_status make_band(job *j, sdm_error *err)
 {
     const sdm_field *f = j->f;
-    const double *h = j->grid->spacing;
-    j->radius = (float)(3.5 * sqrt(h[0] * h[0] + h[1] * h[1] + h[2] * h[2]));
+    measure_block(j);
     j->parallel = sdm_spline_is_parallel(&f->frame, j->grid);
     sdm_status s = reserve(j, err);
     if (!s) s = find_centres(j, err);
+    const double *h = f->frame.spacing;
+    const double reach[3] = {j->half[0] / h[0], j->half[1] / h[1], j->half[2] / h[2]};
     if (!s)
-        s = sdm_spline_slope_create(&f->shape, f->frame.spacing, f->splines, f->n_threads,
-                                    &j->slope, err);
+        s = sdm_spline_change_create(&f->shape, reach, f->splines, f->n_threads, &j->change, err);
     if (!s && j->parallel) s = prepare_rows(j, err);
     if (!s) s = find_candidates(j, err);
     return s ? s : evaluate_all(j, err);
@@ -320,9 +415,9 @@ sdm_status sdm_field_band(const sdm_field *f, const sdm_grid *grid, double width
             "parameters outside the trained range: there is no band of exact distances");
     job j = {.f = f, .grid = grid, .width = width, .out = out};
     s = make_band(&j, err);
-    sdm_free(j.kind);
+    sdm_free(j.piece);
     sdm_free(j.candidate);
-    sdm_spline_slope_dispose(&j.slope);
+    sdm_spline_change_dispose(&j.change);
     sdm_free(j.centre);
     sdm_free(j.rows);
     sdm_spline_grid_dispose(&j.places);

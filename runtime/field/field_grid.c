@@ -17,20 +17,19 @@ bool sdm_field_leaves(const sdm_field *f, const sdm_grid *g)
     return false;
 }
 
-/* sdm_field_bound() for row (j, k). */
-static void bound_row(const spline_grid *g, size_t j, size_t k, float *values, float *slopes)
+/* sdm_field_bound() for the voxels from .. to - 1 of row (j, k). */
+static void bound_part(const spline_grid *g, size_t j, size_t k, size_t from, size_t to,
+                       float *values, float *slopes)
 {
     const spline_axis *axis = g->axis;
     float beyond[3];
-    for (size_t i = 0; i < axis[0].n; i++) {
+    for (size_t i = from; i < to; i++) {
         beyond[axis[0].axis] = axis[0].beyond[i];
         beyond[axis[1].axis] = axis[1].beyond[j];
         beyond[axis[2].axis] = axis[2].beyond[k];
-        const float square = field_square(beyond);
-        if (!(square > 0)) continue;
-        const float bound = field_bound(values[i], square);
+        const float bound = field_bound(values[i], field_square(beyond));
         if (slopes)
-            slopes[i] *= fmaxf(values[i], 0) / bound;
+            slopes[i] *= (values[i] > 0 ? values[i] : 0) / bound;
         else
             values[i] = bound;
     }
@@ -40,9 +39,18 @@ void sdm_field_bound(const sdm_field *f, const spline_grid *g, float *values, fl
 {
     if (!g->axis[0].leaves && !g->axis[1].leaves && !g->axis[2].leaves) return;
     const size_t nx = g->axis[0].n, ny = g->axis[1].n, rows = ny * g->axis[2].n;
+    // a row leaves the box at its ends
+    size_t first = 0, last = nx;
+    while (first < nx && g->axis[0].beyond[first] > 0) first++;
+    while (last > first && g->axis[0].beyond[last - 1] > 0) last--;
 #pragma omp parallel for schedule(static) num_threads(f->n_threads) if (f->n_threads > 1)
-    for (size_t r = 0; r < rows; r++)
-        bound_row(g, r % ny, r / ny, values + r * nx, slopes ? slopes + r * nx : NULL);
+    for (size_t r = 0; r < rows; r++) {
+        const size_t j = r % ny, k = r / ny;
+        const bool whole = g->axis[1].beyond[j] > 0 || g->axis[2].beyond[k] > 0;
+        float *to = values + r * nx, *by = slopes ? slopes + r * nx : NULL;
+        bound_part(g, j, k, 0, whole ? nx : first, to, by);
+        if (!whole) bound_part(g, j, k, last, nx, to, by);
+    }
 }
 
 /* A grid whose axes are parallel to those of the map. */
@@ -62,22 +70,36 @@ static sdm_status parallel_map(const sdm_field *f, const sdm_grid *grid, float *
     return s;
 }
 
+/* The place of voxel i of a row of the grid. */
+static field_place voxel_place(const sdm_field *f, const sdm_grid *g, int64_t i, int64_t row)
+{
+    double world[3];
+    sdm_grid_world(g, (const double[]){(double)i, (double)(row % g->n[1]), (double)(row / g->n[1])},
+                   world);
+    return field_find(f, world);
+}
+
+/* The derivatives by the parameters at a voxel, slopes[n_params][n]. */
+static void turned_slopes(const sdm_field *f, const field_place *p, size_t n, float value,
+                          float *slopes)
+{
+    float factor = 1;
+    if (p->outside) factor = fmaxf(field_inside(f, p, 0), 0) / value;
+    for (size_t q = 0; q < f->info->n_params; q++)
+        slopes[q * n] = factor * field_inside(f, p, q + 1);
+}
+
 /* A turned grid: point by point. */
 static void turned_map(const sdm_field *f, const sdm_grid *grid, float *values, float *slopes)
 {
-    const int64_t nx = grid->n[0], ny = grid->n[1], rows = ny * grid->n[2], n = rows * nx;
+    const int64_t nx = grid->n[0], rows = grid->n[1] * grid->n[2];
 #pragma omp parallel for schedule(static) num_threads(f->n_threads) if (f->n_threads > 1)
     for (int64_t r = 0; r < rows; r++)
         for (int64_t i = 0; i < nx; i++) {
-            double world[3];
-            sdm_grid_world(grid, (const double[]){(double)i, (double)(r % ny), (double)(r / ny)},
-                           world);
-            const field_place p = field_find(f, world);
-            const float value = values[r * nx + i] = field_value(f, &p);
-            float factor = 1;
-            if (slopes && p.outside) factor = fmaxf(field_inside(f, &p, 0), 0) / value;
-            for (size_t q = 0; slopes && q < f->info->n_params; q++)
-                slopes[(int64_t)q * n + r * nx + i] = factor * field_inside(f, &p, q + 1);
+            const field_place p = voxel_place(f, grid, i, r);
+            values[r * nx + i] = field_value(f, &p);
+            if (slopes)
+                turned_slopes(f, &p, (size_t)(rows * nx), values[r * nx + i], slopes + r * nx + i);
         }
 }
 
@@ -85,19 +107,15 @@ static void turned_map(const sdm_field *f, const sdm_grid *grid, float *values, 
 static sdm_status exact_outside(const sdm_field *f, const sdm_grid *grid, float *values,
                                 sdm_error *err)
 {
-    const int64_t nx = grid->n[0], ny = grid->n[1], rows = ny * grid->n[2];
+    const int64_t nx = grid->n[0], rows = grid->n[1] * grid->n[2];
     float *exact = NULL;
     sdm_status s = sdm_alloc_unset((void **)&exact, sdm_grid_count(grid), sizeof *exact,
                                    "exact distances outside of the box", err);
     if (!s) s = sdm_exact_map(f->engine, grid, exact, err);
 #pragma omp parallel for schedule(static) num_threads(f->n_threads) if (f->n_threads > 1)
     for (int64_t r = 0; r < (s ? 0 : rows); r++)
-        for (int64_t i = 0; i < nx; i++) {
-            double world[3];
-            sdm_grid_world(grid, (const double[]){(double)i, (double)(r % ny), (double)(r / ny)},
-                           world);
-            if (field_find(f, world).outside) values[r * nx + i] = exact[r * nx + i];
-        }
+        for (int64_t i = 0; i < nx; i++)
+            if (voxel_place(f, grid, i, r).outside) values[r * nx + i] = exact[r * nx + i];
     sdm_free(exact);
     return s;
 }

@@ -2,7 +2,7 @@
  * in double precision by other formulas.
  * Tests: field.c field_band.c field_grid.c field_points.c generate_field.c spline.c spline_grid.c
  * spline_kernels_generic.c spline_kernels_avx2.c spline_kernels_avx512.c spline_native.c
- * spline_slope.c */
+ * spline_change.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

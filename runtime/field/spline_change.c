@@ -1,5 +1,5 @@
-/* Bounds on the slope of a spline from the differences of its coefficients. */
-#include "spline_slope.h"
+/* Bounds on the change of a spline from the differences of its coefficients. */
+#include "spline_change.h"
 
 #include <math.h>
 #include <string.h>
@@ -7,15 +7,15 @@
 #include "sdm/internal/heap.h"
 #include "sdm/internal/threads.h"
 
-/* Coefficients in reach of a brick along an axis. */
-enum { REACH = SPLINE_BRICK + 3 };
+/* Coefficients with an influence in a brick, along an axis. */
+enum { WINDOW = SPLINE_BRICK + 3 };
 
 static inline float larger(float a, float b) { return a > b ? a : b; }
 
-/* The end of the coefficients in reach of brick b along axis a. */
-static size_t reach_end(const spline_shape *s, int a, size_t b)
+/* The end of these coefficients of brick b along axis a. */
+static size_t window_end(const spline_shape *s, int a, size_t b)
 {
-    const size_t end = b * SPLINE_BRICK + REACH;
+    const size_t end = b * SPLINE_BRICK + WINDOW;
     return end < s->padded[a] ? end : s->padded[a];
 }
 
@@ -36,7 +36,7 @@ static void take_largest(const float *restrict from, size_t n, float *restrict m
    are not used. */
 static void layer_differences(const spline_shape *s, const float *c, size_t b, float *plane)
 {
-    const size_t size = s->step[2], first = b * SPLINE_BRICK, end = reach_end(s, 2, b);
+    const size_t size = s->step[2], first = b * SPLINE_BRICK, end = window_end(s, 2, b);
     memset(plane, 0, 3 * size * sizeof *plane);
     for (size_t k = first; k < end; k++) {
         const float *at = c + k * size;
@@ -47,44 +47,44 @@ static void layer_differences(const spline_shape *s, const float *c, size_t b, f
 }
 
 /* The bound of brick (i, j) of a layer; row[3][padded x]: the largest differences over its rows. */
-static float brick_bound(const spline_shape *s, const double spacing[3], const float *row, size_t i)
+static float brick_bound(const spline_shape *s, const double reach[3], const float *row, size_t i)
 {
-    double square = 0;
+    double sum = 0;
     for (int a = 0; a < 3; a++) {
-        const size_t end = reach_end(s, 0, i) - (a == 0);
+        const size_t end = window_end(s, 0, i) - (a == 0);
         float most = 0;
         for (size_t x = i * SPLINE_BRICK; x < end; x++)
             most = larger(most, row[(size_t)a * s->padded[0] + x]);
-        square += (double)most / spacing[a] * ((double)most / spacing[a]);
+        sum += (double)most * reach[a];
     }
-    return (float)sqrt(square) * (1 + 1e-5f); // covers the roundings
+    return (float)sum * (1 + 1e-5f); // covers roundings
 }
 
-static void layer_bounds(const spline_shape *s, const double spacing[3], const float *plane,
-                         size_t b, float *row, spline_slope *out)
+static void layer_bounds(const spline_shape *s, const double reach[3], const float *plane, size_t b,
+                         float *row, spline_change *out)
 {
     const size_t nx = s->padded[0], size = s->step[2];
     float *to = out->max + b * out->n[0] * out->n[1];
     for (size_t j = 0; j < out->n[1]; j++) {
-        const size_t end = reach_end(s, 1, j);
+        const size_t end = window_end(s, 1, j);
         memset(row, 0, 3 * nx * sizeof *row);
         for (size_t y = j * SPLINE_BRICK; y < end; y++)
             for (size_t a = 0; a < 3; a++)
                 if (a != 1 || y + 1 < end)
                     take_largest(plane + a * size + y * nx, nx, row + a * nx);
-        for (size_t i = 0; i < out->n[0]; i++) *to++ = brick_bound(s, spacing, row, i);
+        for (size_t i = 0; i < out->n[0]; i++) *to++ = brick_bound(s, reach, row, i);
     }
 }
 
-sdm_status sdm_spline_slope_create(const spline_shape *s, const double spacing[3], const float *c,
-                                   int n_threads, spline_slope *out, sdm_error *err)
+sdm_status sdm_spline_change_create(const spline_shape *s, const double reach[3], const float *c,
+                                    int n_threads, spline_change *out, sdm_error *err)
 {
     memset(out, 0, sizeof *out);
     for (int a = 0; a < 3; a++) out->n[a] = (s->padded[a] - 3 + SPLINE_BRICK - 1) / SPLINE_BRICK;
     const size_t own = 3 * s->step[2] + 3 * s->padded[0],
                  bricks = out->n[0] * out->n[1] * out->n[2];
     float *memory = NULL;
-    sdm_status status = SDM_ALLOC(&out->max, bricks, "bounds on slopes", err);
+    sdm_status status = SDM_ALLOC(&out->max, bricks, "bounds on changes", err);
     if (!status)
         status = SDM_ALLOC(&memory, own * (size_t)n_threads, "differences of coefficients", err);
     if (status) return status;
@@ -92,14 +92,14 @@ sdm_status sdm_spline_slope_create(const spline_shape *s, const double spacing[3
     for (size_t b = 0; b < out->n[2]; b++) {
         float *plane = memory + own * (size_t)sdm_thread();
         layer_differences(s, c, b, plane);
-        layer_bounds(s, spacing, plane, b, plane + 3 * s->step[2], out);
+        layer_bounds(s, reach, plane, b, plane + 3 * s->step[2], out);
     }
     for (size_t i = 0; i < bricks; i++) out->all = larger(out->all, out->max[i]);
     sdm_free(memory);
     return SDM_OK;
 }
 
-void sdm_spline_slope_dispose(spline_slope *b)
+void sdm_spline_change_dispose(spline_change *b)
 {
     sdm_free(b->max);
     memset(b, 0, sizeof *b);

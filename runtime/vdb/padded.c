@@ -82,6 +82,21 @@ static float box_distance(const sdm_grid *g, int64_t i, int64_t j, int64_t k)
     return (float)(-((double)layer + 0.5) * g->spacing[0]);
 }
 
+sdm_status sdm_check_crossings(size_t crossings, size_t jumps, double width, sdm_error *err)
+{
+    if (!crossings)
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "no voxel of the map is inside the surface: there is no level set to write; "
+            "use a grid that holds the shape, or write the map itself (--dense)");
+    if (jumps)
+        return sdm_fail(err, SDM_E_QUALITY,
+                        "not a distance map: it jumps across the whole band of %g mm at %zu of its "
+                        "%zu zero crossings",
+                        width, jumps, crossings);
+    return SDM_OK;
+}
+
 /* Demands that neighbours differ in sign somewhere (SDM_E_ARG), and that both values then lie
    inside the band, as in every distance map (SDM_E_QUALITY). */
 static sdm_status check_jumps(const sdm_padded *b, double width, sdm_error *err)
@@ -100,17 +115,7 @@ static sdm_status check_jumps(const sdm_padded *b, double width, sdm_error *err)
                         jumps++;
                 }
             }
-    if (!crossings)
-        return sdm_fail(
-            err, SDM_E_ARG,
-            "no voxel of the map is inside the surface: there is no level set to write; "
-            "use a grid that holds the shape, or write the map itself (--dense)");
-    if (jumps)
-        return sdm_fail(err, SDM_E_QUALITY,
-                        "not a distance map: it jumps across the whole band of %g mm at %zu of its "
-                        "%zu zero crossings",
-                        width, jumps, crossings);
-    return SDM_OK;
+    return sdm_check_crossings(crossings, jumps, width, err);
 }
 
 /* Sets one row of values: inside the grid those of the map, cut off at the border if out->cut;

@@ -35,6 +35,10 @@ sdm_status sdm_padded_copy(const sdm_grid *grid, const float *values, sdm_padded
 sdm_status sdm_padded_close(const sdm_grid *grid, const float *values, double width,
                             const sdm_vdb_opts *opts, sdm_padded *out, sdm_error *err);
 
+/* Demands that neighbours differ in sign somewhere (SDM_E_ARG), and never by a jump across the
+   whole band of half width `width` mm (SDM_E_QUALITY), from the numbers of both. */
+sdm_status sdm_check_crossings(size_t crossings, size_t jumps, double width, sdm_error *err);
+
 void sdm_padded_dispose(sdm_padded *b);
 
 #ifdef __cplusplus

@@ -11,8 +11,8 @@
 #include <string>
 
 #include "padded.h"
+#include "sdm/internal/heap.h"
 #include "sdm/internal/text.h"
-#include "sdm/memory.h"
 #include "seal.h"
 #include "vdb_parts.h"
 
@@ -186,11 +186,7 @@ void fill_block(Grid &grid, Grid::Accessor &acc, const sdm_padded &box, const Co
 Grid::Ptr grid_of(const openvdb::math::Transform::Ptr &transform, const sdm_padded &box,
                   float background, bool dense, bool half)
 {
-    Grid::Ptr grid = Grid::create(background);
-    grid->setName(GRID_NAME);
-    grid->setTransform(transform);
-    grid->setGridClass(dense ? openvdb::GRID_UNKNOWN : openvdb::GRID_LEVEL_SET);
-    grid->setSaveFloatAsHalf(half);
+    Grid::Ptr grid = empty_grid(transform, background, dense, half);
     Grid::Accessor acc = grid->getAccessor();
     const int low = -box.pad & ~7, dim = 8;
     for (int k = low; k < box.n[2] - box.pad; k += dim)
@@ -244,8 +240,7 @@ void check_half(const sdm_padded &box, sdm_error *err)
                           static_cast<double>(box.values[i])));
 }
 
-Grid::Ptr make_level_set(const sdm_grid &g, const float *values, const sdm_vdb_opts &o,
-                         sdm_vdb_report &report, sdm_error *err)
+openvdb::math::Transform::Ptr level_set_transform(const sdm_grid &g, sdm_error *err)
 {
     const auto transform = transform_of(g, true);
     if (!transform->hasUniformScale())
@@ -253,11 +248,47 @@ Grid::Ptr make_level_set(const sdm_grid &g, const float *values, const sdm_vdb_o
                       "to OpenVDB voxels of %g mm on turned axes are not uniform; write the map "
                       "itself with --dense",
                       g.spacing[0]));
+    return transform;
+}
+
+Grid::Ptr make_level_set(const sdm_grid &g, const float *values, const sdm_vdb_opts &o,
+                         sdm_vdb_report &report, sdm_error *err)
+{
+    const auto transform = level_set_transform(g, err);
     const float background = background_value(band_of(o), transform->voxelSize()[0], o.half);
     owned_padded box;
     need(sdm_padded_close(&g, values, background, &o, &box.map, err));
     report.cut = box.map.cut;
     Grid::Ptr grid = grid_of(transform, box.map, background, false, o.half);
+    mend_creases(*grid, o, report, err);
+    return grid;
+}
+
+/* A band that reaches the border of its grid is closed there as a whole map is. */
+Grid::Ptr make_closed_band(const sdm_band &band, const sdm_vdb_opts &o, sdm_vdb_report &report,
+                           sdm_error *err)
+{
+    struct owned {
+        float *values = nullptr;
+        ~owned() { sdm_free(values); }
+    } map;
+    need(sdm_alloc_unset(reinterpret_cast<void **>(&map.values), sdm_grid_count(&band.grid),
+                         sizeof *map.values, "map of a band", err));
+    sdm_band_map(&band, map.values);
+    return make_level_set(band.grid, map.values, o, report, err);
+}
+
+Grid::Ptr make_band(const sdm_band &band, const sdm_vdb_opts &o, sdm_vdb_report &report,
+                    sdm_error *err)
+{
+    const auto transform = level_set_transform(band.grid, err);
+    const float background = background_value(band_of(o), transform->voxelSize()[0], o.half);
+    if (!(band.width >= static_cast<double>(background)))
+        need(sdm_fail(err, SDM_E_ARG, "band of %g mm, the level set needs %.9g mm", band.width,
+                      static_cast<double>(background)));
+    if (band_leaves_grid(band, background)) return make_closed_band(band, o, report, err);
+    check_band(band, background, err);
+    Grid::Ptr grid = grid_of_band(transform, band, background, o.half);
     mend_creases(*grid, o, report, err);
     return grid;
 }
@@ -278,6 +309,19 @@ Grid::Ptr make_dense(const sdm_grid &g, const float *values, const sdm_vdb_opts 
             report.cut = report.cut || (values[i] < 0 && (at[a] == 0 || at[a] == g.n[a] - 1));
     }
     return grid_of(transform_of(g, false), box.map, background, true, o.half);
+}
+
+/* Checks a grid, completes its metadata and the report, and writes it. */
+void finish(const char *path, const Grid::Ptr &g, const sdm_vdb_opts &o, sdm_vdb_report &r,
+            sdm_error *err)
+{
+    check_cancelled(o, err);
+    if (!o.dense) check_level_set(*g, path, SDM_E_QUALITY, err);
+    r.active_voxels = static_cast<int64_t>(g->activeVoxelCount());
+    r.hash = hash_of(*g);
+    add_metadata(*g, o, r, err);
+    check_cancelled(o, err);
+    write_grid(path, g, err);
 }
 
 // ---- reading
@@ -331,6 +375,17 @@ std::string describe(const Grid &grid, bool sealed)
 
 } // namespace
 
+Grid::Ptr vdb_parts::empty_grid(const openvdb::math::Transform::Ptr &transform, float background,
+                                bool dense, bool as_half)
+{
+    Grid::Ptr grid = Grid::create(background);
+    grid->setName(GRID_NAME);
+    grid->setTransform(transform);
+    grid->setGridClass(dense ? openvdb::GRID_UNKNOWN : openvdb::GRID_LEVEL_SET);
+    grid->setSaveFloatAsHalf(as_half);
+    return grid;
+}
+
 sdm_status sdm_vdb_write(const char *path, const sdm_grid *grid, const float *values,
                          const sdm_vdb_opts *opts, sdm_vdb_report *report, sdm_error *err)
 {
@@ -344,14 +399,43 @@ sdm_status sdm_vdb_write(const char *path, const sdm_grid *grid, const float *va
         check_options(*grid, o, err);
         Grid::Ptr g = o.dense ? make_dense(*grid, values, o, r, err)
                               : make_level_set(*grid, values, o, r, err);
-        check_cancelled(o, err);
-        if (!o.dense) check_level_set(*g, path, SDM_E_QUALITY, err);
-        r.active_voxels = static_cast<int64_t>(g->activeVoxelCount());
-        r.hash = hash_of(*g);
-        add_metadata(*g, o, r, err);
-        check_cancelled(o, err);
-        write_grid(path, g, err);
+        finish(path, g, o, r, err);
         if (report) *report = r;
+    });
+}
+
+sdm_status sdm_vdb_write_band(const char *path, const sdm_band *band, const sdm_vdb_opts *opts,
+                              sdm_vdb_report *report, sdm_error *err)
+{
+    if (!path || !*path || !band || !band->block || (band->n && !band->values))
+        return sdm_fail(err, SDM_E_ARG, "level set: path and band are needed");
+    const sdm_status s = sdm_grid_check(&band->grid, err);
+    if (s) return s;
+    return guarded(path, SDM_E_IO, err, [&] {
+        const sdm_vdb_opts o = opts ? *opts : sdm_vdb_opts();
+        sdm_vdb_report r = {};
+        if (o.dense)
+            need(sdm_fail(err, SDM_E_ARG, "a band is no whole map: dense is not possible"));
+        check_options(band->grid, o, err);
+        Grid::Ptr g = make_band(*band, o, r, err);
+        finish(path, g, o, r, err);
+        if (report) *report = r;
+    });
+}
+
+sdm_status sdm_vdb_band_width(const sdm_grid *grid, const sdm_vdb_opts *opts, double *width,
+                              sdm_error *err)
+{
+    if (!grid || !width)
+        return sdm_fail(err, SDM_E_ARG, "level set: a grid and a place for the width are needed");
+    const sdm_status s = sdm_grid_check(grid, err);
+    if (s) return s;
+    return guarded("level set", SDM_E_IO, err, [&] {
+        const sdm_vdb_opts o = opts ? *opts : sdm_vdb_opts();
+        check_options(*grid, o, err);
+        const auto transform = level_set_transform(*grid, err);
+        *width =
+            static_cast<double>(background_value(band_of(o), transform->voxelSize()[0], o.half));
     });
 }
 

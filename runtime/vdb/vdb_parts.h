@@ -6,6 +6,7 @@
 
 #include <string>
 
+#include "sdm/band.h"
 #include "sdm/vdb.h"
 
 // hidden: the library exports its C interface only
@@ -36,6 +37,23 @@ inline void check_cancelled(const sdm_vdb_opts &o, sdm_error *err)
     if (o.cancelled && o.cancelled(o.user))
         need(sdm_fail(err, SDM_E_CANCELLED, "level set stopped on request"));
 }
+
+// a grid without voxels
+Grid::Ptr empty_grid(const openvdb::math::Transform::Ptr &transform, float background, bool dense,
+                     bool as_half);
+
+// ---- vdb_band.cc
+
+// whether the band, cut off at `width`, or the inside reaches the border of the grid
+bool band_leaves_grid(const sdm_band &band, float width);
+
+// fails with SDM_E_ARG if no voxel is inside, with SDM_E_QUALITY if neighbouring values jump across
+// the whole band
+void check_band(const sdm_band &band, float width, sdm_error *err);
+
+// the level set of a band that lies in its grid
+Grid::Ptr grid_of_band(const openvdb::math::Transform::Ptr &transform, const sdm_band &band,
+                       float background, bool as_half);
 
 // ---- vdb_creases.cc
 

@@ -10,6 +10,7 @@
 #include "report/output.h"
 #include "report/progress_bar.h"
 #include "report/terminal.h"
+#include "sdm/field.h"
 #include "sdm/image.h"
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/clock.h"
@@ -28,7 +29,12 @@ typedef struct job {
     sdm_param *params;
     double *rows; /* [n_rows][n_params] */
     size_t n_rows;
-    float *values;             /* [nz][ny][nx] mm */
+    sdm_grid grid;             /* of all maps */
+    bool own;                  /* the grid is that of the model */
+    bool banded;               /* bands are enough: only level sets are wanted */
+    double width;              /* of the bands, mm */
+    sdm_band band;             /* of the last row */
+    float *values;             /* [nz][ny][nx] mm; NULL: banded */
     float *gradient;           /* [3][nz][ny][nx]; NULL: not wanted */
     float *jacobian;           /* [n_params][nz][ny][nx]; NULL: not wanted */
     double ms;                 /* total time of all maps */
@@ -51,6 +57,7 @@ static sdm_check_stat find_statistic(const cli_args *args)
 
 static void job_dispose(job *j)
 {
+    sdm_band_dispose(&j->band);
     sdm_free(j->jacobian);
     sdm_free(j->gradient);
     sdm_free(j->values);
@@ -103,12 +110,14 @@ static sdm_status read_rows(job *j, sdm_error *err)
     return s;
 }
 
-/* Creates the shape if --check, --max-error or --policy exact need it. */
+/* Creates the shape if --check, --max-error, --policy exact or --outside exact need it. */
 static sdm_status open_shape(job *j, sdm_error *err)
 {
     const cli_args *args = j->args;
     const bool checks = args->check || args->max_error > 0;
-    if (!checks && cli_policy(args) != SDM_RANGE_EXACT) return SDM_OK;
+    const bool exact =
+        cli_policy(args) == SDM_RANGE_EXACT || cli_outside(args) == SDM_OUTSIDE_EXACT;
+    if (!checks && !exact) return SDM_OK;
     sdm_status s = cli_open_registry(args, &j->registry, err);
     if (!s) s = sdm_runtime_instance(j->model, j->registry, &j->shape, err);
     return s && checks ? sdm_fail_in(err, s, "--%s needs the exact shape",
@@ -116,11 +125,24 @@ static sdm_status open_shape(job *j, sdm_error *err)
                        : s;
 }
 
+/* Chooses the grid. On another grid than the model's, level sets alone need no whole maps. */
+static sdm_status choose_grid(job *j, sdm_error *err)
+{
+    const cli_args *args = j->args;
+    const sdm_status s = cli_model_grid(args, &j->info->grid, &j->grid, &j->own, err);
+    if (s) return s;
+    const bool whole = j->own || args->check || args->max_error > 0 || args->gradient ||
+                       args->jacobian || cli_policy(args) == SDM_RANGE_EXACT;
+    j->banded = !whole && cli_writes_bands(args);
+    return j->banded ? cli_band_width(args, &j->grid, &j->width, err) : SDM_OK;
+}
+
 static sdm_status allocate_maps(job *j, sdm_error *err)
 {
-    const size_t n = sdm_grid_count(&j->info->grid);
+    const size_t n = sdm_grid_count(&j->grid);
     size_t count;
-    sdm_status s = SDM_ALLOC(&j->values, n, "distance map", err);
+    if (j->banded) return SDM_OK;
+    sdm_status s = sdm_alloc_unset((void **)&j->values, n, sizeof *j->values, "distance map", err);
     if (!s && j->args->gradient) s = SDM_ALLOC(&j->gradient, 3 * n, "gradient", err);
     if (s || !j->args->jacobian) return s;
     s = sdm_mul(n, j->info->n_params, &count, err);
@@ -139,6 +161,7 @@ static sdm_status prepare_job(job *j, sdm_error *err)
     if (s) return s;
     j->info = sdm_model_get_info(j->model);
     s = cli_model_params(j->info, &j->params, err);
+    if (!s) s = choose_grid(j, err);
     if (!s) s = read_rows(j, err);
     if (!s && !args->rows) s = cli_row_files_check(args, 1, err);
     if (!s) s = open_shape(j, err);
@@ -157,8 +180,9 @@ static sdm_status write_maps(const job *j, size_t row, const sdm_result *result,
     cli_add_params(j->params, j->info->n_params, j->rows + row * j->info->n_params, &params);
     sdm_status s =
         params.failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the metadata") : SDM_OK;
-    const cli_map map = {.grid = &j->info->grid,
+    const cli_map map = {.grid = &j->grid,
                          .values = j->values,
+                         .band = j->banded ? &j->band : NULL,
                          .shape = j->info->shape,
                          .params = params.data,
                          .source = result->source,
@@ -175,7 +199,7 @@ static sdm_status write_maps(const job *j, size_t row, const sdm_result *result,
 
 static sdm_status write_row(const job *j, size_t row, const sdm_result *result, sdm_error *err)
 {
-    const sdm_grid *g = &j->info->grid;
+    const sdm_grid *g = &j->grid;
     const size_t nx = (size_t)g->n[0], ny = (size_t)g->n[1], nz = (size_t)g->n[2];
     cli_row_files files = {0};
     sdm_status s = cli_row_files_name(j->args, row + 1, &files, err);
@@ -229,6 +253,29 @@ static void notice_row(const job *j, size_t row, const sdm_result *r)
         printf("exact\n");
 }
 
+/* Computes the map or the band at the parameters p and adds it to the hash. */
+static sdm_status make_map(job *j, const double *p, const sdm_generate_opts *opts,
+                           sdm_result *result, sdm_error *err)
+{
+    const sdm_model *m = j->model;
+    sdm_status s = SDM_OK;
+    if (j->banded) {
+        sdm_band_dispose(&j->band);
+        s = sdm_generate_band(m, p, opts, &j->grid, j->width, &j->band, result, err);
+        const size_t n = s ? 0 : j->band.n * SDM_BAND_VOXELS;
+        if (!s) j->hash = sdm_crc64(j->hash, j->band.values, n * sizeof *j->band.values);
+        return s;
+    }
+    if (!j->own)
+        s = sdm_generate_grid(m, p, opts, &j->grid, j->values, j->jacobian, result, err);
+    else if (j->jacobian)
+        s = sdm_generate_jacobian(m, p, opts, j->values, j->jacobian, result, err);
+    else
+        s = sdm_generate(m, p, opts, j->values, result, err);
+    if (!s) j->hash = sdm_crc64(j->hash, j->values, sdm_grid_count(&j->grid) * sizeof *j->values);
+    return s;
+}
+
 static sdm_status make_row(job *j, size_t row, sdm_error *err)
 {
     const cli_args *args = j->args;
@@ -241,14 +288,13 @@ static sdm_status make_row(job *j, size_t row, sdm_error *err)
         .n_threads = (int)args->threads,
         .check = args->check,
         .max_error_mm = args->max_error,
-        .max_error_of = find_statistic(args)};
+        .max_error_of = find_statistic(args),
+        .outside = cli_outside(args)};
     // the map
     double *p = j->rows + row * j->info->n_params;
     sdm_result result = {0};
     const double start = sdm_clock();
-    const sdm_status s = j->jacobian ? sdm_generate_jacobian(j->model, p, &opts, j->values,
-                                                             j->jacobian, &result, err)
-                                     : sdm_generate(j->model, p, &opts, j->values, &result, err);
+    const sdm_status s = make_map(j, p, &opts, &result, err);
     if (s) return args->rows ? sdm_fail_in(err, s, "%s: row %zu", args->rows, row + 1) : s;
     j->ms += 1e3 * (sdm_clock() - start);
     // the metadata must hold the clamped parameters
@@ -258,7 +304,6 @@ static sdm_status make_row(job *j, size_t row, sdm_error *err)
     j->n_exact += result.source == SDM_SOURCE_EXACT;
     j->n_exact_error += result.reason == SDM_REASON_ERROR;
     if (result.checked) add_check(j, &result.check);
-    j->hash = sdm_crc64(j->hash, j->values, sdm_grid_count(&j->info->grid) * sizeof *j->values);
     notice_row(j, row, &result);
     return write_row(j, row, &result, err);
 }
@@ -296,7 +341,7 @@ static sdm_status print_json(const job *j, sdm_error *err)
     if (j->shape && (j->args->check || j->args->max_error > 0)) add_check_json(j, &json);
     sdm_json_real(&json, "error_rmse_mm", j->info->accuracy.rmse_mm);
     sdm_json_text(&json, "values_crc64", hash);
-    cli_json_grid(&json, "grid", &j->info->grid, false);
+    cli_json_grid(&json, "grid", &j->grid, false);
     if (j->n_rows == 1) cli_json_params(&json, "parameters", j->params, j->info->n_params, j->rows);
     sdm_json_close(&json, '}');
     return cli_print_json(&json, err);

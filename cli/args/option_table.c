@@ -140,6 +140,19 @@ const cli_option cli_options[] = {
     {"origin", 0, CLI_REAL3, "X,Y,Z", NULL, -1e12, 1e12,
      ON(CLI_EXACT) | ON(CLI_BENCH) | ON(CLI_PHANTOM), AT(origin),
      "centre of the first voxel, LPS mm; default: the grid is centred on the mesh"},
+    {"size", 0, CLI_INT3, "NX,NY,NZ", NULL, 1, 1048576, ON(CLI_GENERATE), AT(size),
+     "voxels along x, y, z (default: the grid fills the box of the model's voxel centres)"},
+    {"spacing", 0, CLI_REAL13, "MM", NULL, 1e-9, 1e9, ON(CLI_GENERATE), AT(spacing),
+     "voxel edge, one number or one per axis (default: the model's; with --size the smallest one "
+     "with which the grid covers the model's box)"},
+    {"origin", 0, CLI_REAL3, "X,Y,Z", NULL, -1e12, 1e12, ON(CLI_GENERATE), AT(origin),
+     "centre of the first voxel, LPS mm; default: the grid has the centre of the model's"},
+    {"direction", 0, CLI_REAL9, "XX,XY,...", NULL, -1, 1, ON(CLI_GENERATE), AT(direction),
+     "axes of the grid: orthonormal matrix, row by row, whose columns are the axes (default: the "
+     "model's)"},
+    {"outside", 0, CLI_CHOICE, NULL, "refuse|bound|exact", 0, 0, ON(CLI_GENERATE), AT(outside),
+     "voxels outside the box of the model's voxel centres: refuse (default), a lower bound of the "
+     "distance, or the exact distance"},
 
     /* the method */
     {"spacing", 0, CLI_REAL13, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(spacing),

@@ -1,0 +1,58 @@
+#!/usr/bin/env bash
+# sdmgen generate on other grids than the model's: size, spacing, origin, direction, bands without whole maps, grids that leave the box.
+# Tests: cmd_generate.c model_grid.c
+. "$(dirname "$0")/common.sh"
+model=../files-of-train/run/model.sdm
+present $model
+
+# crc OPTION...: the checksum of the values of the map
+crc() {
+    expect 0 - sdmgen generate $model -p a=4.2 "$@" --json
+    json values_crc64
+}
+
+# The model's own grid, however it is asked for, has the same values; every second voxel of a finer grid is one of it.
+own=$(crc)
+[ "$own" = "$(crc --size 16,14,12)" ] || bad 'size of the model: other values'
+[ "$own" = "$(crc --spacing 0.8)" ] || bad 'spacing of the model: other values'
+expect 0 - sdmgen generate $model -p a=4.2 --spacing 0.4 -o fine.nrrd -o fine.npy --jacobian j.npy --gradient g.npy --json
+has '"size": \[31, 27, 23\]'
+present fine.nrrd fine.npy j.npy g.npy
+[ "$(wc -c <j.npy)" -ge $((4 * 31 * 27 * 23 * 4)) ] || bad 'j.npy is too small'
+[ "$(crc --spacing 0.4)" = "$(crc --spacing 0.4 --threads 1)" ] || bad 'the values depend on the number of threads'
+[ "$own" != "$(crc --spacing 0.4)" ] || bad 'a finer grid has the values of the model'
+expect 0 - sdmgen generate $model --size 9,8,7 --spacing 0.3,0.2,0.1 --origin 0,0,1 --direction 0,1,0,-1,0,0,0,0,1 -o turned.nrrd --json
+has '"size": \[9, 8, 7\], "spacing": \[0.3, 0.2, 0.1\], "origin": \[0, 0, 1\]'
+grep -aq 'space directions: (0,-0.3' turned.nrrd || bad 'the direction is not in the file'
+expect 0 - sdmgen generate $model -p a=4.2 --spacing 0.4 --check
+has 'error near the surface'
+expect 0 'computed by the exact engine' sdmgen generate $model -p a=4.2 --spacing 0.4 --max-error 1e-6 -o e.npy
+
+# Level sets come from bands; with another output besides, from whole maps. Both are the same.
+if sdmgen generate $model -p a=4.2 --spacing 0.1 -o band.vdb --quiet 2>err; then
+    expect 0 - sdmgen verify band.vdb
+    sdmgen generate $model -p a=4.2 --spacing 0.1 -o whole.vdb -o whole.npy --quiet
+    hash_of() { sdmgen info "$1" | grep sdm_hash; }
+    [ "$(hash_of band.vdb)" = "$(hash_of whole.vdb)" ] || bad 'a band gives another level set than the map'
+    expect 0 - sdmgen generate $model -p a=4.2 --size 100,100,100 -o cube.vdb --quiet # the band stays in the box
+    expect 2 'a level set needs voxels of one size' sdmgen generate $model --spacing 0.1,0.1,0.2 -o x.vdb
+    expect 2 'need a larger one' sdmgen generate $model --spacing 1e-6 -o x.vdb
+fi
+
+# Grids that leave the box of the model.
+expect 5 'the grid leaves the box.*bound, exact' sdmgen generate $model --size 30,30,30 -o x.npy
+expect 0 - sdmgen generate $model --size 30,30,30 --outside bound -o bound.npy
+expect 0 - sdmgen generate $model --size 30,30,30 --outside exact -o exact.npy
+cmp -s bound.npy exact.npy && bad 'bound and exact are the same'
+expect 0 'clamped to it' sdmgen generate $model -p a=7 --policy clamp --spacing 0.4 -o c.npy
+expect 5 'a = 7' sdmgen generate $model -p a=7 --spacing 0.4 -o x.npy
+
+# Mistakes.
+expect 2 'spacing' sdmgen generate $model --spacing 0 -o x.npy
+expect 2 'spacing' sdmgen generate $model --spacing nan -o x.npy
+expect 2 'not orthonormal' sdmgen generate $model --direction 1,0,0,0,1,0,0,0.1,1 -o x.npy
+expect 2 'nine numbers' sdmgen generate $model --direction 1,0,0 -o x.npy
+expect 2 'size' sdmgen generate $model --size 0,1,1 -o x.npy
+expect 2 'one of refuse\|bound\|exact' sdmgen generate $model --outside far -o x.npy
+absent x.npy x.vdb
+finish

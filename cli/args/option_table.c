@@ -70,7 +70,8 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "files sdmgen-peer-NAME in the folder of sdmgen or in libexec/sdmgen; missing ones are\n"
      "listed.\n"
      "network: one map, a batch and derivatives of a model on one core, compared with the\n"
-     "exact engine if the shape is known and its data files exist.\n"
+     "exact engine if the shape is known and its data files exist; with --size also a map and\n"
+     "a band on that grid, and points.\n"
      "A time is the fastest of several runs.",
      "sdmgen bench exact", 1, 2},
     {"experiment", "CONFIG [key=value ...]",

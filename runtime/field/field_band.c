@@ -205,20 +205,45 @@ static void parallel_block(const job *j, const int64_t first[3], float *values)
     write_nodes(j, first, values);
 }
 
-/* The value of a voxel of the grid outside of the box: the bound, or if that lies within the band,
-   the exact distance or (false) a refusal. */
-static bool value_outside(const job *j, const double world[3], const field_place *p, float *value)
+static bool in_grid(const job *j, const int64_t at[3])
 {
-    *value = field_value(j->f, p);
-    if (!((double)*value < j->width) || j->f->opts.outside == SDM_OUTSIDE_BOUND) return true;
+    return at[0] < j->grid->n[0] && at[1] < j->grid->n[1] && at[2] < j->grid->n[2];
+}
+
+/* Settles the value of voxel at[3] outside of the box, which is the bound: if that lies within the
+   band, it becomes the exact distance, or (false) is refused. */
+static bool settle_outside(const job *j, const int64_t at[3], float *value)
+{
+    if (!((double)*value < j->width) || !in_grid(j, at)) return true;
     if (j->f->opts.outside == SDM_OUTSIDE_REFUSE) return false;
-    *value = (float)sdm_exact_point(j->f->engine, world, NULL, NULL, NULL);
+    if (j->f->opts.outside == SDM_OUTSIDE_EXACT) {
+        double world[3];
+        sdm_grid_world(j->grid, (const double[]){(double)at[0], (double)at[1], (double)at[2]},
+                       world);
+        *value = (float)sdm_exact_point(j->f->engine, world, NULL, NULL, NULL);
+    }
     return true;
 }
 
-/* Values by points: those of all voxels of a block (turned grids), or those outside of the box
-   (parallel grids). false: a voxel is refused. */
-static bool point_block(const job *j, const int64_t first[3], float *values)
+/* The voxels outside of the box of a block of a parallel grid: values are those at the nearest
+   points of the box. false: a voxel is refused. */
+static bool bound_block(const job *j, const int64_t first[3], float *values)
+{
+    const spline_axis *axis = j->places.axis;
+    for (int64_t i = 0; i < SDM_BAND_VOXELS; i++) {
+        const int64_t at[3] = {first[0] + i % 8, first[1] + i / 8 % 8, first[2] + i / 64};
+        float beyond[3];
+        for (int b = 0; b < 3; b++) beyond[axis[b].axis] = axis[b].beyond[at[b]];
+        const float square = field_square(beyond);
+        if (!(square > 0)) continue;
+        values[i] = field_bound(values[i], square);
+        if (!settle_outside(j, at, &values[i])) return false;
+    }
+    return true;
+}
+
+/* The values of a block of a turned grid, by points. false: a voxel is refused. */
+static bool turned_block(const job *j, const int64_t first[3], float *values)
 {
     for (int64_t i = 0; i < SDM_BAND_VOXELS; i++) {
         const int64_t at[3] = {first[0] + i % 8, first[1] + i / 8 % 8, first[2] + i / 64};
@@ -226,14 +251,21 @@ static bool point_block(const job *j, const int64_t first[3], float *values)
         sdm_grid_world(j->grid, (const double[]){(double)at[0], (double)at[1], (double)at[2]},
                        world);
         const field_place p = field_find(j->f, world);
-        const bool in_grid =
-            at[0] < j->grid->n[0] && at[1] < j->grid->n[1] && at[2] < j->grid->n[2];
-        if (p.outside && in_grid) {
-            if (!value_outside(j, world, &p, &values[i])) return false;
-        } else if (!j->parallel)
-            values[i] = field_value(j->f, &p);
+        values[i] = field_value(j->f, &p);
+        if (p.outside && !settle_outside(j, at, &values[i])) return false;
     }
     return true;
+}
+
+/* Whether voxels of a block of a parallel grid lie outside of the box. */
+static bool block_leaves(const job *j, const int64_t first[3])
+{
+    bool leaves = false;
+    for (int b = 0; b < 3; b++) {
+        const float *beyond = j->places.axis[b].beyond + first[b];
+        leaves = leaves || beyond[0] > 0 || beyond[7] > 0;
+    }
+    return leaves;
 }
 
 /* The kind of a block with the numbers of its values <= -width and >= width, of `all` values: one
@@ -277,14 +309,11 @@ static block_kind evaluate(const job *j, uint32_t number, float *values)
     int64_t first[3];
     block_position(j->out, number, first);
     for (int a = 0; a < 3; a++) first[a] *= 8;
-    bool leaves = false;
-    if (j->parallel) {
-        parallel_block(j, first, values);
-        for (int b = 0; b < 3; b++)
-            leaves = leaves || j->places.axis[b].beyond[first[b]] > 0 ||
-                     j->places.axis[b].beyond[first[b] + 7] > 0;
-    }
-    if ((!j->parallel || leaves) && !point_block(j, first, values)) return BLOCK_REFUSED;
+    if (j->parallel) parallel_block(j, first, values);
+    const bool done = !j->parallel             ? turned_block(j, first, values)
+                      : block_leaves(j, first) ? bound_block(j, first, values)
+                                               : true;
+    if (!done) return BLOCK_REFUSED;
     return find_kind(j, first, values);
 }
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen generate on other grids than the model's: size, spacing, origin, direction, bands without whole maps, grids that leave the box.
-# Tests: cmd_generate.c model_grid.c
+# Tests: bench_field.c cmd_generate.c model_grid.c
 . "$(dirname "$0")/common.sh"
 model=../files-of-train/run/model.sdm
 present $model
@@ -46,6 +46,14 @@ expect 0 - sdmgen generate $model --size 30,30,30 --outside exact -o exact.npy
 cmp -s bound.npy exact.npy && bad 'bound and exact are the same'
 expect 0 'clamped to it' sdmgen generate $model -p a=7 --policy clamp --spacing 0.4 -o c.npy
 expect 5 'a = 7' sdmgen generate $model -p a=7 --spacing 0.4 -o x.npy
+
+# Times on another grid.
+expect 0 - sdmgen bench network $model --size 40,36,32 --json
+for key in ms_field_params ms_field_map ms_field_band field_band_blocks us_field_point us_field_single_point; do
+    awk -v v="$(json $key)" 'BEGIN { exit !(v > 0) }' || bad "bench: no $key"
+done
+expect 0 - sdmgen bench network $model --size 40,36,32
+has 'map of 40 x 36 x 32 +[0-9.]+ ms'
 
 # Mistakes.
 expect 2 'spacing' sdmgen generate $model --spacing 0 -o x.npy

@@ -96,7 +96,7 @@ typedef struct cli_field_times {
     size_t blocks; /* of the band */
 } cli_field_times;
 
-/* Measures a model on the grid of --size. SDM_E_RANGE: its band leaves the box of the model. */
+/* Measures a model on the grid of --size. */
 sdm_status cli_bench_field(const sdm_model *m, const cli_args *args, uint64_t seed,
                            cli_field_times *t, sdm_error *err);
 

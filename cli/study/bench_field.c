@@ -16,7 +16,7 @@ enum { RUNS = 30, RUNS_MIN = 3, POINTS = 100000, SINGLE = 10000, STREAM = 17 };
 
 /* What is timed, with its memory. */
 typedef struct field_work {
-    sdm_field *field, *bounded; /* bounded: the grid may leave the box */
+    sdm_field *field, *bounded; /* bounded: for the grid, which may leave the box */
     double p[SDM_MAX_PARAMS];
     sdm_grid grid;
     double width;
@@ -38,7 +38,7 @@ static sdm_status call_map(field_work *w, sdm_error *err)
 static sdm_status call_band(field_work *w, sdm_error *err)
 {
     sdm_band band;
-    const sdm_status s = sdm_field_band(w->field, &w->grid, w->width, &band, err);
+    const sdm_status s = sdm_field_band(w->bounded, &w->grid, w->width, &band, err);
     w->blocks = band.n;
     sdm_band_dispose(&band);
     return s;

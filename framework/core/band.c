@@ -14,9 +14,9 @@ static void row_part(const sdm_band *b, int32_t number, int64_t j, int64_t k, si
         for (size_t i = 0; i < n; i++) row[i] = side;
         return;
     }
-    const float *from = b->values + (size_t)number * SDM_BAND_VOXELS +
-                        (size_t)(k % SDM_BAND_EDGE * SDM_BAND_EDGE + j % SDM_BAND_EDGE) *
-                            SDM_BAND_EDGE;
+    const float *from =
+        b->values + (size_t)number * SDM_BAND_VOXELS +
+        (size_t)(k % SDM_BAND_EDGE * SDM_BAND_EDGE + j % SDM_BAND_EDGE) * SDM_BAND_EDGE;
     for (size_t i = 0; i < n; i++)
         row[i] = from[i] > width ? width : from[i] < -width ? -width : from[i];
 }

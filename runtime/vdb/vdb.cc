@@ -11,8 +11,8 @@
 #include <string>
 
 #include "padded.h"
-#include "sdm/internal/heap.h"
 #include "sdm/internal/text.h"
+#include "sdm/memory.h"
 #include "seal.h"
 #include "vdb_parts.h"
 
@@ -272,8 +272,8 @@ Grid::Ptr make_closed_band(const sdm_band &band, const sdm_vdb_opts &o, sdm_vdb_
         float *values = nullptr;
         ~owned() { sdm_free(values); }
     } map;
-    need(sdm_alloc_unset(reinterpret_cast<void **>(&map.values), sdm_grid_count(&band.grid),
-                         sizeof *map.values, "map of a band", err));
+    need(sdm_alloc(reinterpret_cast<void **>(&map.values), sdm_grid_count(&band.grid),
+                   sizeof *map.values, "map of a band", err));
     sdm_band_map(&band, map.values);
     return make_level_set(band.grid, map.values, o, report, err);
 }
@@ -374,17 +374,6 @@ std::string describe(const Grid &grid, bool sealed)
 }
 
 } // namespace
-
-Grid::Ptr vdb_parts::empty_grid(const openvdb::math::Transform::Ptr &transform, float background,
-                                bool dense, bool as_half)
-{
-    Grid::Ptr grid = Grid::create(background);
-    grid->setName(GRID_NAME);
-    grid->setTransform(transform);
-    grid->setGridClass(dense ? openvdb::GRID_UNKNOWN : openvdb::GRID_LEVEL_SET);
-    grid->setSaveFloatAsHalf(as_half);
-    return grid;
-}
 
 sdm_status sdm_vdb_write(const char *path, const sdm_grid *grid, const float *values,
                          const sdm_vdb_opts *opts, sdm_vdb_report *report, sdm_error *err)

@@ -38,10 +38,6 @@ inline void check_cancelled(const sdm_vdb_opts &o, sdm_error *err)
         need(sdm_fail(err, SDM_E_CANCELLED, "level set stopped on request"));
 }
 
-// a grid without voxels
-Grid::Ptr empty_grid(const openvdb::math::Transform::Ptr &transform, float background, bool dense,
-                     bool as_half);
-
 // ---- vdb_band.cc
 
 // whether the band, cut off at `width`, or the inside reaches the border of the grid
@@ -65,6 +61,10 @@ void mend_creases(Grid &grid, const sdm_vdb_opts &o, sdm_vdb_report &report, sdm
 // ---- vdb_file.cc
 
 extern const char *const GRID_NAME;
+
+// a grid without voxels
+Grid::Ptr empty_grid(const openvdb::math::Transform::Ptr &transform, float background, bool dense,
+                     bool as_half);
 
 // CRC-64 of the background, and of positions, extents, bits and activity of all values in the order
 // of the tree, tiles included

@@ -17,11 +17,11 @@ extern "C" {
 #define SDM_BAND_INSIDE (-2)
 
 /* A band of half width `width`. The grid is divided into blocks, from voxel (0, 0, 0) on; blocks[a]
-   = (grid.n[a] + 7) / 8 of them along axis a. Every voxel with abs(distance) < width lies in a block
-   with values. In such a block every value with abs(value) < width is the distance; other values
-   have the sign of the distance and a magnitude of at least width. Values at voxels beyond the end
-   of the grid have no meaning; they are finite. Blocks without values lie on one side of the
-   surface, at a distance of at least width. */
+   = (grid.n[a] + 7) / 8 of them along axis a. Every voxel with abs(distance) < width lies in a
+   block with values. In such a block every value with abs(value) < width is the distance; other
+   values have the sign of the distance and a magnitude of at least width. Values at voxels beyond
+   the end of the grid have no meaning; they are finite. Blocks without values lie on one side of
+   the surface, at a distance of at least width. */
 typedef struct sdm_band {
     sdm_grid grid;
     double width;      /* mm */

@@ -62,10 +62,10 @@ typedef struct sdm_vdb_report {
 SDM_API sdm_status sdm_vdb_write(const char *path, const sdm_grid *grid, const float *values,
                                  const sdm_vdb_opts *opts, sdm_vdb_report *report, sdm_error *err);
 
-/* Writes the level set of a band: the same grid as sdm_vdb_write() of the map, but its blocks become
-   leaves without a map between. The band must be at least as wide as sdm_vdb_band_width(); a band
-   that reaches the border of its grid takes the memory of the map. SDM_E_ARG also for opts->dense.
-   [any thread] */
+/* Writes the level set of a band: the same grid as sdm_vdb_write() of the map, but its blocks
+   become leaves without a map between. The band must be at least as wide as sdm_vdb_band_width(); a
+   band that reaches the border of its grid takes the memory of the map. SDM_E_ARG also for
+   opts->dense. [any thread] */
 SDM_API sdm_status sdm_vdb_write_band(const char *path, const sdm_band *band,
                                       const sdm_vdb_opts *opts, sdm_vdb_report *report,
                                       sdm_error *err);

@@ -33,7 +33,7 @@ typedef struct job {
     bool own;                  /* the grid is that of the model */
     bool banded;               /* bands are enough: only level sets are wanted */
     double width;              /* of the bands, mm */
-    sdm_band band;             /* of the last row */
+    sdm_blocks band;           /* of the last row */
     float *values;             /* [nz][ny][nx] mm; NULL: banded */
     float *gradient;           /* [3][nz][ny][nx]; NULL: not wanted */
     float *jacobian;           /* [n_params][nz][ny][nx]; NULL: not wanted */
@@ -57,7 +57,7 @@ static sdm_check_stat find_statistic(const cli_args *args)
 
 static void job_dispose(job *j)
 {
-    sdm_band_dispose(&j->band);
+    sdm_blocks_dispose(&j->band);
     sdm_free(j->jacobian);
     sdm_free(j->gradient);
     sdm_free(j->values);
@@ -260,10 +260,10 @@ static sdm_status make_map(job *j, const double *p, const sdm_generate_opts *opt
     const sdm_model *m = j->model;
     sdm_status s = SDM_OK;
     if (j->banded) {
-        sdm_band_dispose(&j->band);
+        sdm_blocks_dispose(&j->band);
         s = sdm_generate_band(m, p, opts, &j->grid, j->width, &j->band, result, err);
-        const size_t n = s ? 0 : j->band.n * SDM_BAND_VOXELS;
-        if (!s) j->hash = sdm_crc64(j->hash, j->band.values, n * sizeof *j->band.values);
+        if (!s)
+            j->hash = sdm_crc64(j->hash, j->band.values, j->band.n_block * sizeof *j->band.values);
         return s;
     }
     if (!j->own)

@@ -73,7 +73,7 @@ sdm_status cli_band_width(const cli_args *args, const sdm_grid *grid, double *wi
 {
 #ifdef SDM_HAVE_VDB
     const sdm_vdb_opts opts = {.band_voxels = args->band, .half = args->half};
-    return sdm_vdb_band_width(grid, &opts, width, err);
+    return sdm_vdb_band(grid, &opts, width, err);
 #else
     (void)args, (void)grid, (void)width;
     return sdm_fail(err, SDM_E_UNSUPPORTED, "built without OpenVDB");
@@ -129,7 +129,7 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
                                .cancelled = cli_interrupted};
     sdm_vdb_report report = {0};
     const sdm_status s = map->band
-                             ? sdm_vdb_write_band(path, map->band, &opts, &report, err)
+                             ? sdm_vdb_write_blocks(path, map->band, &opts, &report, err)
                              : sdm_vdb_write(path, map->grid, map->values, &opts, &report, err);
     if (!s && report.adjusted_voxels > 0)
         cli_notice("%s: %lld voxels at creases were adjusted by at most %.2g mm to make a valid "

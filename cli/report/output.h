@@ -2,19 +2,19 @@
 #pragma once
 
 #include "args/options.h"
-#include "sdm/band.h"
+#include "sdm/blocks.h"
 #include "sdm/runtime.h"
 
 /* A map with the facts that go into the metadata of its file. */
 typedef struct cli_map {
     const sdm_grid *grid;
-    const float *values;  /* [nz][ny][nx], mm; NULL: there is a band instead */
-    const sdm_band *band; /* for level sets; NULL: there are values */
-    const char *shape;    /* name of the shape or of the mesh file */
-    const char *params;   /* "a=4.4 alpha=0.5", "" for a mesh file */
-    sdm_source source;    /* network or exact engine */
-    bool clamped;         /* parameters were clamped to the trained range */
-    double error_mm;      /* of a network: its RMSE; else the bound on the error */
+    const float *values;    /* [nz][ny][nx], mm; NULL: there is a band instead */
+    const sdm_blocks *band; /* for level sets; NULL: there are values */
+    const char *shape;      /* name of the shape or of the mesh file */
+    const char *params;     /* "a=4.4 alpha=0.5", "" for a mesh file */
+    sdm_source source;      /* network or exact engine */
+    bool clamped;           /* parameters were clamped to the trained range */
+    double error_mm;        /* of a network: its RMSE; else the bound on the error */
     const char *origin; /* "model CHECKSUM", or the method without a network: "exact", "edt" ... */
     sdm_reason reason;  /* why the exact engine replaced the network */
     const sdm_check *check; /* errors of the network's map; NULL: not checked */

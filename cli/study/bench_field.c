@@ -37,10 +37,10 @@ static sdm_status call_map(field_work *w, sdm_error *err)
 }
 static sdm_status call_band(field_work *w, sdm_error *err)
 {
-    sdm_band band;
+    sdm_blocks band;
     const sdm_status s = sdm_field_band(w->bounded, &w->grid, w->width, &band, err);
-    w->blocks = band.n;
-    sdm_band_dispose(&band);
+    w->blocks = band.n_block;
+    sdm_blocks_dispose(&band);
     return s;
 }
 static sdm_status call_points(field_work *w, sdm_error *err)

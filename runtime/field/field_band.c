@@ -21,7 +21,7 @@ typedef struct job {
     uint32_t *candidate; /* [n] blocks that may meet the band */
     size_t n;
     float *piece; /* [PIECE][8][8][8] values of candidates */
-    sdm_band *out;
+    sdm_blocks *out;
 } job;
 
 /* Candidates that are evaluated before those that meet the band are kept. */
@@ -30,18 +30,18 @@ enum { PIECE = 256 };
 /* What the values of a candidate show. */
 typedef enum block_kind { BLOCK_OUTSIDE = 0, BLOCK_INSIDE, BLOCK_NEAR, BLOCK_REFUSED } block_kind;
 
-static void block_position(const sdm_band *b, size_t number, int64_t at[3])
+static void block_position(const sdm_blocks *b, size_t number, int64_t at[3])
 {
-    at[0] = (int64_t)(number % (size_t)b->blocks[0]);
-    at[1] = (int64_t)(number / (size_t)b->blocks[0] % (size_t)b->blocks[1]);
-    at[2] = (int64_t)(number / (size_t)b->blocks[0] / (size_t)b->blocks[1]);
+    at[0] = (int64_t)(number % (size_t)b->n[0]);
+    at[1] = (int64_t)(number / (size_t)b->n[0] % (size_t)b->n[1]);
+    at[2] = (int64_t)(number / (size_t)b->n[0] / (size_t)b->n[1]);
 }
 
 /* ---- the centres */
 
 static void turned_centres(job *j)
 {
-    const size_t n = (size_t)(j->out->blocks[0] * j->out->blocks[1] * j->out->blocks[2]);
+    const size_t n = (size_t)(j->out->n[0] * j->out->n[1] * j->out->n[2]);
 #pragma omp parallel for schedule(static) num_threads(j->f->n_threads) if (j->f->n_threads > 1)
     for (size_t i = 0; i < n; i++) {
         int64_t at[3];
@@ -63,7 +63,7 @@ static sdm_status find_centres(job *j, sdm_error *err)
     }
     spline_grid g;
     sdm_status s =
-        sdm_spline_grid_create(&f->shape, &f->frame, j->grid, j->out->blocks, 3.5 / 8, 8, &g, err);
+        sdm_spline_grid_create(&f->shape, &f->frame, j->grid, j->out->n, 3.5 / 8, 8, &g, err);
     if (!s) s = sdm_spline_map(&f->shape, &g, f->splines, NULL, f->n_threads, j->centre, err);
     if (!s) sdm_field_bound(f, &g, j->centre, NULL);
     sdm_spline_grid_dispose(&g);
@@ -117,7 +117,7 @@ static float block_change(const job *j, const brick_span *const span[3])
 /* The spans of the blocks of a parallel grid, along each axis of the grid. */
 static sdm_status tabulate_spans(const job *j, brick_span *table[3], sdm_error *err)
 {
-    const int64_t *n = j->out->blocks;
+    const int64_t *n = j->out->n;
     const sdm_status s =
         SDM_ALLOC(&table[0], (size_t)(n[0] + n[1] + n[2]), "bricks of blocks", err);
     if (s) return s;
@@ -153,7 +153,7 @@ static bool may_meet(const job *j, float centre, brick_span *const table[3], con
 
 static sdm_status find_candidates(job *j, sdm_error *err)
 {
-    const int64_t *n = j->out->blocks;
+    const int64_t *n = j->out->n;
     brick_span *table[3] = {NULL};
     sdm_status s = sdm_alloc_unset((void **)&j->candidate, (size_t)(n[0] * n[1] * n[2]),
                                    sizeof *j->candidate, "blocks of a band", err);
@@ -163,7 +163,7 @@ static sdm_status find_candidates(job *j, sdm_error *err)
         for (int64_t y = 0; y < n[1]; y++)
             for (int64_t x = 0; x < n[0]; x++, i++) {
                 const float centre = j->centre[i];
-                j->out->block[i] = centre < 0 ? SDM_BAND_INSIDE : SDM_BAND_OUTSIDE;
+                j->out->tile[i] = centre < 0 ? SDM_TILE_INSIDE : SDM_TILE_OUTSIDE;
                 if (may_meet(j, centre, table, (const int64_t[]){x, y, z}))
                     j->candidate[j->n++] = i;
             }
@@ -230,7 +230,7 @@ static bool settle_outside(const job *j, const int64_t at[3], float *value)
 static bool bound_block(const job *j, const int64_t first[3], float *values)
 {
     const spline_axis *axis = j->places.axis;
-    for (int64_t i = 0; i < SDM_BAND_VOXELS; i++) {
+    for (int64_t i = 0; i < SDM_BLOCK_VOXELS; i++) {
         const int64_t at[3] = {first[0] + i % 8, first[1] + i / 8 % 8, first[2] + i / 64};
         float beyond[3];
         for (int b = 0; b < 3; b++) beyond[axis[b].axis] = axis[b].beyond[at[b]];
@@ -245,7 +245,7 @@ static bool bound_block(const job *j, const int64_t first[3], float *values)
 /* The values of a block of a turned grid, by points. false: a voxel is refused. */
 static bool turned_block(const job *j, const int64_t first[3], float *values)
 {
-    for (int64_t i = 0; i < SDM_BAND_VOXELS; i++) {
+    for (int64_t i = 0; i < SDM_BLOCK_VOXELS; i++) {
         const int64_t at[3] = {first[0] + i % 8, first[1] + i / 8 % 8, first[2] + i / 64};
         double world[3];
         sdm_grid_world(j->grid, (const double[]){(double)at[0], (double)at[1], (double)at[2]},
@@ -278,11 +278,11 @@ static block_kind kind_of(size_t low, size_t high, size_t all)
 static block_kind whole_block_kind(const float *values, float width)
 {
     int low = 0, high = 0;
-    for (int i = 0; i < SDM_BAND_VOXELS; i++) {
+    for (int i = 0; i < SDM_BLOCK_VOXELS; i++) {
         low += values[i] <= -width;
         high += values[i] >= width;
     }
-    return kind_of((size_t)low, (size_t)high, SDM_BAND_VOXELS);
+    return kind_of((size_t)low, (size_t)high, SDM_BLOCK_VOXELS);
 }
 
 /* The kind of a block by its values in the grid. */
@@ -292,7 +292,7 @@ static block_kind find_kind(const job *j, const int64_t first[3], const float *v
     int64_t n[3];
     for (int a = 0; a < 3; a++) n[a] = j->grid->n[a] - first[a] < 8 ? j->grid->n[a] - first[a] : 8;
     const int64_t all = n[0] * n[1] * n[2];
-    if (all == SDM_BAND_VOXELS) return whole_block_kind(values, width);
+    if (all == SDM_BLOCK_VOXELS) return whole_block_kind(values, width);
     size_t low = 0, high = 0;
     for (int64_t i = 0; i < all; i++) {
         const int64_t x = i % n[0], y = i / n[0] % n[1], z = i / n[0] / n[1];
@@ -317,18 +317,40 @@ static block_kind evaluate(const job *j, uint32_t number, float *values)
     return find_kind(j, first, values);
 }
 
+/* Stores a candidate as the next block: values cut off at the band, outside beyond the grid. */
+static void store_block(const job *j, uint32_t number, const float *values)
+{
+    sdm_blocks *b = j->out;
+    const float width = (float)j->width;
+    float *to = b->values[b->n_block];
+    int64_t at[3];
+    block_position(b, number, at);
+    for (int a = 0; a < 3; a++) b->first[b->n_block][a] = (int32_t)(SDM_BLOCK_SIZE * at[a]);
+    for (int i = 0; i < SDM_BLOCK_VOXELS; i++) {
+        const float v = values[i], low = v > -width ? v : -width;
+        to[i] = low < width ? low : width;
+    }
+    const int32_t *first = b->first[b->n_block++];
+    if (first[0] + SDM_BLOCK_SIZE <= j->grid->n[0] && first[1] + SDM_BLOCK_SIZE <= j->grid->n[1] &&
+        first[2] + SDM_BLOCK_SIZE <= j->grid->n[2])
+        return;
+    for (int i = 0; i < SDM_BLOCK_VOXELS; i++)
+        if (!in_grid(j,
+                     (const int64_t[]){first[0] + i % 8, first[1] + i / 8 % 8, first[2] + i / 64}))
+            to[i] = width;
+}
+
 /* Keeps the candidates of a piece that meet the band. false: one is refused. */
 static bool keep_near(const job *j, const uint32_t *candidate, const block_kind *kind, size_t n)
 {
-    sdm_band *b = j->out;
+    sdm_blocks *b = j->out;
     for (size_t i = 0; i < n; i++) {
-        int32_t *block = &b->block[candidate[i]];
-        *block = kind[i] == BLOCK_INSIDE ? SDM_BAND_INSIDE : SDM_BAND_OUTSIDE;
+        uint32_t *tile = &b->tile[candidate[i]];
+        *tile = kind[i] == BLOCK_INSIDE ? SDM_TILE_INSIDE : SDM_TILE_OUTSIDE;
         if (kind[i] == BLOCK_REFUSED) return false;
         if (kind[i] != BLOCK_NEAR) continue;
-        memcpy(b->values + b->n * SDM_BAND_VOXELS, j->piece + i * SDM_BAND_VOXELS,
-               SDM_BAND_VOXELS * sizeof *b->values);
-        *block = (int32_t)b->n++;
+        *tile = (uint32_t)b->n_block;
+        store_block(j, candidate[i], j->piece + i * SDM_BLOCK_VOXELS);
     }
     return true;
 }
@@ -336,20 +358,20 @@ static bool keep_near(const job *j, const uint32_t *candidate, const block_kind 
 static sdm_status evaluate_all(job *j, sdm_error *err)
 {
     block_kind kind[PIECE];
-    size_t count;
-    sdm_status s = sdm_mul(j->n, SDM_BAND_VOXELS, &count, err);
+    sdm_status s = sdm_alloc_unset((void **)&j->out->values, j->n, sizeof *j->out->values,
+                                   "values of a band", err);
     if (!s)
-        s = sdm_alloc_unset((void **)&j->out->values, count, sizeof *j->out->values,
-                            "values of a band", err);
+        s = sdm_alloc_unset((void **)&j->out->first, j->n, sizeof *j->out->first,
+                            "places of blocks", err);
     if (!s)
-        s = sdm_alloc_unset((void **)&j->piece, PIECE * SDM_BAND_VOXELS, sizeof *j->piece,
+        s = sdm_alloc_unset((void **)&j->piece, PIECE * SDM_BLOCK_VOXELS, sizeof *j->piece,
                             "values of blocks", err);
     for (size_t first = 0; first < j->n && !s; first += PIECE) {
         const size_t n = j->n - first < PIECE ? j->n - first : PIECE;
         const uint32_t *candidate = j->candidate + first;
 #pragma omp parallel for schedule(static) num_threads(j->f->n_threads) if (j->f->n_threads > 1)
         for (size_t i = 0; i < n; i++)
-            kind[i] = evaluate(j, candidate[i], j->piece + i * SDM_BAND_VOXELS);
+            kind[i] = evaluate(j, candidate[i], j->piece + i * SDM_BLOCK_VOXELS);
         if (!keep_near(j, candidate, kind, n)) s = sdm_field_refuse(j->f, "the band leaves", err);
     }
     return s;
@@ -359,22 +381,22 @@ static sdm_status evaluate_all(job *j, sdm_error *err)
 
 static sdm_status reserve(job *j, sdm_error *err)
 {
-    sdm_band *b = j->out;
+    sdm_blocks *b = j->out;
     double all = 1;
     for (int a = 0; a < 3; a++) {
-        b->blocks[a] = (j->grid->n[a] + SDM_BAND_EDGE - 1) / SDM_BAND_EDGE;
-        all *= (double)b->blocks[a];
+        b->n[a] = (j->grid->n[a] + SDM_BLOCK_SIZE - 1) / SDM_BLOCK_SIZE;
+        all *= (double)b->n[a];
     }
-    if (!(all <= INT32_MAX))
+    if (!(all < SDM_TILE_INSIDE))
         return sdm_fail(err, SDM_E_ARG,
-                        "grid of %lld x %lld x %lld voxels: a band has at most 2^31 blocks of 8 x "
+                        "grid of %lld x %lld x %lld voxels: a band has at most 2^32 blocks of 8 x "
                         "8 x 8 voxels; use larger voxels",
                         (long long)j->grid->n[0], (long long)j->grid->n[1],
                         (long long)j->grid->n[2]);
     b->grid = *j->grid;
-    b->width = j->width;
+    b->band_mm = j->width;
     const sdm_status s =
-        sdm_alloc_unset((void **)&b->block, (size_t)all, sizeof *b->block, "blocks of a band", err);
+        sdm_alloc_unset((void **)&b->tile, (size_t)all, sizeof *b->tile, "blocks of a band", err);
     return s ? s
              : sdm_alloc_unset((void **)&j->centre, (size_t)all, sizeof *j->centre,
                                "centres of blocks", err);
@@ -385,7 +407,7 @@ static sdm_status prepare_rows(job *j, sdm_error *err)
 {
     const sdm_field *f = j->f;
     int64_t n[3];
-    for (int a = 0; a < 3; a++) n[a] = j->out->blocks[a] * SDM_BAND_EDGE;
+    for (int a = 0; a < 3; a++) n[a] = j->out->n[a] * SDM_BLOCK_SIZE;
     const sdm_status s =
         sdm_spline_grid_create(&f->shape, &f->frame, j->grid, n, 0, 1, &j->places, err);
     return s ? s : sdm_spline_rows(&f->shape, &j->places, f->splines, f->n_threads, &j->rows, err);
@@ -424,7 +446,7 @@ static sdm_status make_band(job *j, sdm_error *err)
     return s ? s : evaluate_all(j, err);
 }
 
-sdm_status sdm_field_band(const sdm_field *f, const sdm_grid *grid, double width, sdm_band *out,
+sdm_status sdm_field_band(const sdm_field *f, const sdm_grid *grid, double width, sdm_blocks *out,
                           sdm_error *err)
 {
     if (!f || !grid || !out)
@@ -442,7 +464,7 @@ sdm_status sdm_field_band(const sdm_field *f, const sdm_grid *grid, double width
         return sdm_fail(
             err, SDM_E_UNSUPPORTED,
             "parameters outside the trained range: there is no band of exact distances");
-    job j = {.f = f, .grid = grid, .width = width, .out = out};
+    job j = {.f = f, .grid = grid, .width = (double)(float)width, .out = out};
     s = make_band(&j, err);
     sdm_free(j.piece);
     sdm_free(j.candidate);
@@ -450,6 +472,6 @@ sdm_status sdm_field_band(const sdm_field *f, const sdm_grid *grid, double width
     sdm_free(j.centre);
     sdm_free(j.rows);
     sdm_spline_grid_dispose(&j.places);
-    if (s) sdm_band_dispose(out);
+    if (s) sdm_blocks_dispose(out);
     return s;
 }

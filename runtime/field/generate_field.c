@@ -71,10 +71,10 @@ sdm_status sdm_generate_points(const sdm_model *m, const double *params,
 
 sdm_status sdm_generate_band(const sdm_model *m, const double *params,
                              const sdm_generate_opts *opts, const sdm_grid *grid, double width,
-                             sdm_band *out, sdm_result *result, sdm_error *err)
+                             sdm_blocks *out, sdm_result *result, sdm_error *err)
 {
     if (!out) return sdm_fail(err, SDM_E_ARG, "generate: a place for the band is needed");
-    *out = (sdm_band){0};
+    *out = (sdm_blocks){0};
     sdm_field *f;
     sdm_status s = open_field(m, params, opts, false, NULL, &f, result, err);
     if (!s) s = sdm_field_band(f, grid, width, out, err);

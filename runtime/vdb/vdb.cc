@@ -265,30 +265,30 @@ Grid::Ptr make_level_set(const sdm_grid &g, const float *values, const sdm_vdb_o
 }
 
 /* A band that reaches the border of its grid is closed there as a whole map is. */
-Grid::Ptr make_closed_band(const sdm_band &band, const sdm_vdb_opts &o, sdm_vdb_report &report,
-                           sdm_error *err)
+Grid::Ptr make_closed(const sdm_blocks &b, const sdm_vdb_opts &o, sdm_vdb_report &report,
+                      sdm_error *err)
 {
     struct owned {
         float *values = nullptr;
         ~owned() { sdm_free(values); }
     } map;
-    need(sdm_alloc(reinterpret_cast<void **>(&map.values), sdm_grid_count(&band.grid),
-                   sizeof *map.values, "map of a band", err));
-    sdm_band_map(&band, map.values);
-    return make_level_set(band.grid, map.values, o, report, err);
+    need(sdm_alloc(reinterpret_cast<void **>(&map.values), sdm_grid_count(&b.grid),
+                   sizeof *map.values, "map of blocks", err));
+    map_of_blocks(b, map.values);
+    return make_level_set(b.grid, map.values, o, report, err);
 }
 
-Grid::Ptr make_band(const sdm_band &band, const sdm_vdb_opts &o, sdm_vdb_report &report,
-                    sdm_error *err)
+Grid::Ptr make_from_blocks(const sdm_blocks &b, const sdm_vdb_opts &o, sdm_vdb_report &report,
+                           sdm_error *err)
 {
-    const auto transform = level_set_transform(band.grid, err);
+    const auto transform = level_set_transform(b.grid, err);
     const float background = background_value(band_of(o), transform->voxelSize()[0], o.half);
-    if (!(band.width >= static_cast<double>(background)))
-        need(sdm_fail(err, SDM_E_ARG, "band of %g mm, the level set needs %.9g mm", band.width,
+    if (!(b.band_mm >= static_cast<double>(background)))
+        need(sdm_fail(err, SDM_E_ARG, "band of %g mm, the level set needs %.9g mm", b.band_mm,
                       static_cast<double>(background)));
-    if (band_leaves_grid(band, background)) return make_closed_band(band, o, report, err);
-    check_band(band, background, err);
-    Grid::Ptr grid = grid_of_band(transform, band, background, o.half);
+    if (blocks_leave_grid(b, background)) return make_closed(b, o, report, err);
+    check_blocks(b, background, err);
+    Grid::Ptr grid = grid_of_blocks(transform, b, background, o.half);
     mend_creases(*grid, o, report, err);
     return grid;
 }
@@ -393,27 +393,27 @@ sdm_status sdm_vdb_write(const char *path, const sdm_grid *grid, const float *va
     });
 }
 
-sdm_status sdm_vdb_write_band(const char *path, const sdm_band *band, const sdm_vdb_opts *opts,
-                              sdm_vdb_report *report, sdm_error *err)
+sdm_status sdm_vdb_write_blocks(const char *path, const sdm_blocks *blocks,
+                                const sdm_vdb_opts *opts, sdm_vdb_report *report, sdm_error *err)
 {
-    if (!path || !*path || !band || !band->block || (band->n && !band->values))
-        return sdm_fail(err, SDM_E_ARG, "level set: path and band are needed");
-    const sdm_status s = sdm_grid_check(&band->grid, err);
+    if (!path || !*path || !blocks || !blocks->tile || (blocks->n_block && !blocks->values))
+        return sdm_fail(err, SDM_E_ARG, "level set: path and blocks are needed");
+    const sdm_status s = sdm_grid_check(&blocks->grid, err);
     if (s) return s;
     return guarded(path, SDM_E_IO, err, [&] {
         const sdm_vdb_opts o = opts ? *opts : sdm_vdb_opts();
         sdm_vdb_report r = {};
         if (o.dense)
-            need(sdm_fail(err, SDM_E_ARG, "a band is no whole map: dense is not possible"));
-        check_options(band->grid, o, err);
-        Grid::Ptr g = make_band(*band, o, r, err);
+            need(sdm_fail(err, SDM_E_ARG, "blocks are no whole map: dense is not possible"));
+        check_options(blocks->grid, o, err);
+        Grid::Ptr g = make_from_blocks(*blocks, o, r, err);
         finish(path, g, o, r, err);
         if (report) *report = r;
     });
 }
 
-sdm_status sdm_vdb_band_width(const sdm_grid *grid, const sdm_vdb_opts *opts, double *width,
-                              sdm_error *err)
+sdm_status sdm_vdb_band(const sdm_grid *grid, const sdm_vdb_opts *opts, double *width,
+                        sdm_error *err)
 {
     if (!grid || !width)
         return sdm_fail(err, SDM_E_ARG, "level set: a grid and a place for the width are needed");

@@ -6,7 +6,7 @@
 
 #include <string>
 
-#include "sdm/band.h"
+#include "sdm/blocks.h"
 #include "sdm/vdb.h"
 
 // hidden: the library exports its C interface only
@@ -38,18 +38,21 @@ inline void check_cancelled(const sdm_vdb_opts &o, sdm_error *err)
         need(sdm_fail(err, SDM_E_CANCELLED, "level set stopped on request"));
 }
 
-// ---- vdb_band.cc
+// ---- vdb_blocks.cc
 
 // whether the band, cut off at `width`, or the inside reaches the border of the grid
-bool band_leaves_grid(const sdm_band &band, float width);
+bool blocks_leave_grid(const sdm_blocks &b, float width);
+
+// values[nz][ny][nx] = the whole map, cut off at the band
+void map_of_blocks(const sdm_blocks &b, float *values);
 
 // fails with SDM_E_ARG if no voxel is inside, with SDM_E_QUALITY if neighbouring values jump across
 // the whole band
-void check_band(const sdm_band &band, float width, sdm_error *err);
+void check_blocks(const sdm_blocks &b, float width, sdm_error *err);
 
-// the level set of a band that lies in its grid
-Grid::Ptr grid_of_band(const openvdb::math::Transform::Ptr &transform, const sdm_band &band,
-                       float background, bool as_half);
+// the level set of blocks whose band lies in the grid
+Grid::Ptr grid_of_blocks(const openvdb::math::Transform::Ptr &transform, const sdm_blocks &b,
+                         float background, bool as_half);
 
 // ---- vdb_creases.cc
 

@@ -37,7 +37,7 @@ check() {
     # the headers in include/sdm/ that belong to a part
     function own(part, list,   n, p, i) { n = split(list, p, " "); for (i = 1; i <= n; i++) owner[p[i] ".h"] = part }
     BEGIN {
-        own("core", "band export grid memory pose shape status") # shape: types alone
+        own("core", "blocks export grid memory pose shape status") # shape: types alone
         own("core", "checksum clock distribution envelope file heap mat3 processor rng rotation shared table team text threads vec3")
         own("config", "config experiment")
         own("geom", "exact isosurface mesh")

@@ -393,16 +393,39 @@ static void test_points_have_the_bits_of_grids(void **state)
 
 // ---- bands
 
+/* values[] = the whole map of blocks; also checks the places of the blocks and the values beyond
+   the end of the grid. */
+static void blocks_map(const sdm_blocks *b, float *values)
+{
+    const sdm_grid *g = &b->grid;
+    const float width = (float)b->band_mm;
+    for (int64_t v = 0; v < g->n[0] * g->n[1] * g->n[2]; v++) {
+        const int64_t at[3] = {v % g->n[0], v / g->n[0] % g->n[1], v / g->n[0] / g->n[1]};
+        const uint32_t tile = b->tile[(at[2] / 8 * b->n[1] + at[1] / 8) * b->n[0] + at[0] / 8];
+        values[v] = tile == SDM_TILE_INSIDE ? -width
+                    : tile == SDM_TILE_OUTSIDE
+                        ? width
+                        : b->values[tile][(at[2] % 8 * 8 + at[1] % 8) * 8 + at[0] % 8];
+        for (int a = 0; a < 3 && tile < SDM_TILE_INSIDE; a++)
+            assert_int_equal(b->first[tile][a], at[a] / 8 * 8);
+    }
+    for (size_t i = 0; i < b->n_block; i++)
+        for (int v = 0; v < SDM_BLOCK_VOXELS; v++)
+            if (b->first[i][0] + v % 8 >= g->n[0] || b->first[i][1] + v / 8 % 8 >= g->n[1] ||
+                b->first[i][2] + v / 64 >= g->n[2])
+                assert_true(b->values[i][v] == width);
+}
+
 /* A dense map and the band on the same grid agree. Returns the share of blocks with values. */
 static double check_band(const sdm_field *f, const sdm_grid *g, double width)
 {
     const size_t n = sdm_grid_count(g);
     float *dense = malloc(2 * n * sizeof *dense), *map = dense + n;
-    sdm_band b;
+    sdm_blocks b;
     sdm_error err;
     if (sdm_field_grid(f, g, dense, NULL, &err)) fail_msg("%s", err.text);
     if (sdm_field_band(f, g, width, &b, &err)) fail_msg("%s", err.text);
-    sdm_band_map(&b, map);
+    blocks_map(&b, map);
     const float w = (float)width;
     size_t near = 0;
     for (size_t v = 0; v < n; v++) {
@@ -410,23 +433,23 @@ static double check_band(const sdm_field *f, const sdm_grid *g, double width)
         assert_true(map[v] == (dense[v] >= w ? w : dense[v] <= -w ? -w : dense[v]));
     }
     // no block has values without need, and blocks are numbered in their order
-    const size_t blocks = (size_t)(b.blocks[0] * b.blocks[1] * b.blocks[2]);
-    int32_t next = 0;
+    const size_t blocks = (size_t)(b.n[0] * b.n[1] * b.n[2]);
+    uint32_t next = 0;
     for (size_t i = 0; i < blocks; i++) {
-        if (b.block[i] < 0) continue;
-        assert_int_equal(b.block[i], next++);
+        if (b.tile[i] >= SDM_TILE_INSIDE) continue;
+        assert_int_equal(b.tile[i], next++);
         size_t in_band = 0, inside = 0;
-        const float *values = b.values + (size_t)b.block[i] * SDM_BAND_VOXELS;
-        for (size_t v = 0; v < SDM_BAND_VOXELS; v++) {
+        const float *values = b.values[b.tile[i]];
+        for (size_t v = 0; v < SDM_BLOCK_VOXELS; v++) {
             in_band += fabsf(values[v]) < w;
             inside += values[v] < 0;
             assert_true(isfinite(values[v]));
         }
-        assert_true(in_band > 0 || (inside > 0 && inside < SDM_BAND_VOXELS));
+        assert_true(in_band > 0 || (inside > 0 && inside < SDM_BLOCK_VOXELS));
     }
-    assert_int_equal(next, b.n);
+    assert_int_equal(next, b.n_block);
     assert_true(near == 0 || next > 0);
-    sdm_band_dispose(&b);
+    sdm_blocks_dispose(&b);
     free(dense);
     return (double)next / (double)blocks;
 }
@@ -487,7 +510,7 @@ static void test_same_bits_for_threads_and_processors(void **state)
     float *first = malloc(n * sizeof *first), *values = malloc(n * sizeof *values);
     static double x[N][3];
     static float at[2][N], gradient[2][N][3];
-    sdm_band bands[2] = {{.n = 0}};
+    sdm_blocks bands[2] = {{.n_block = 0}};
     for (uint64_t i = 0; i < N; i++) random_point(&m, i, x[i]);
     for (int level = 0; level < SDM_PROCESSOR_LEVELS; level++)
         for (int threads = 1; threads <= 3; threads++) {
@@ -506,14 +529,15 @@ static void test_same_bits_for_threads_and_processors(void **state)
             if (other) {
                 assert_true(same(values, first, n) && same(at[0], at[1], N));
                 assert_true(same(gradient[0][0], gradient[1][0], (size_t)3 * N));
-                assert_int_equal(bands[0].n, bands[1].n);
-                assert_true(same(bands[0].values, bands[1].values, bands[0].n * SDM_BAND_VOXELS));
-                sdm_band_dispose(&bands[1]);
+                assert_int_equal(bands[0].n_block, bands[1].n_block);
+                assert_memory_equal(bands[0].values, bands[1].values,
+                                    bands[0].n_block * sizeof *bands[0].values);
+                sdm_blocks_dispose(&bands[1]);
             }
             sdm_field_free(f);
         }
     sdm_processor_select(-1);
-    sdm_band_dispose(&bands[0]);
+    sdm_blocks_dispose(&bands[0]);
     free(values);
     free(first);
 }
@@ -604,7 +628,7 @@ static void test_refused_outside(void **state)
     const sdm_grid m = model_grid(false);
     sdm_grid g = m;
     static float values[BALL_VOXELS];
-    sdm_band band;
+    sdm_blocks band;
     sdm_error err;
     g.origin[0] -= 0.01;
     assert_int_equal(sdm_generate_grid(s->model[0], params, NULL, &g, values, NULL, NULL, &err),
@@ -622,12 +646,12 @@ static void test_refused_outside(void **state)
         sdm_generate_points(s->model[0], params, NULL, x, 2, values, NULL, NULL, NULL, &err));
     // a band that stays in the box may be asked for on a grid that leaves it
     assert_false(sdm_generate_band(s->model[0], params, NULL, &g, 0.4, &band, NULL, &err));
-    assert_true(band.n > 0);
-    sdm_band_dispose(&band);
+    assert_true(band.n_block > 0);
+    sdm_blocks_dispose(&band);
     assert_int_equal(sdm_generate_band(s->model[0], params, NULL, &g, 3, &band, NULL, &err),
                      SDM_E_RANGE);
     assert_non_null(strstr(err.text, "the band leaves the box"));
-    assert_true(!band.values && !band.block);
+    assert_true(!band.values && !band.tile);
 }
 
 static void test_band_with_bound(void **state)
@@ -709,7 +733,7 @@ static void test_policies_out_of_range(void **state)
     assert_false(sdm_generate_points(s->model[0], p, &exact, x, 1, values, wanted, NULL, &r, &err));
     assert_true(r.source == SDM_SOURCE_EXACT);
     assert_true(fabs((double)values[0] - 3.25) < 5e-3 && fabs((double)wanted[0] - 1) < 0.05);
-    sdm_band band;
+    sdm_blocks band;
     assert_int_equal(sdm_generate_band(s->model[0], p, &exact, &g, 0.2, &band, &r, &err),
                      SDM_E_UNSUPPORTED);
     free(values);
@@ -743,7 +767,7 @@ static void test_check_on_a_grid(void **state)
 static void refuse_grid(const scene *s, const sdm_grid *g, const char *what)
 {
     float value[1];
-    sdm_band band;
+    sdm_blocks band;
     sdm_error err;
     assert_int_equal(sdm_generate_grid(s->model[0], params, NULL, g, value, NULL, NULL, &err),
                      SDM_E_ARG);
@@ -767,7 +791,7 @@ static void test_wrong_arguments_are_refused(void **state)
     g = good, g.n[0] = 0;
     refuse_grid(s, &g, "size along x is 0");
     // a band with too many blocks, too narrow
-    sdm_band band;
+    sdm_blocks band;
     sdm_error err;
     g = good;
     for (int a = 0; a < 3; a++) g.n[a] = 1 << 15, g.spacing[a] = 1e-6;
@@ -813,7 +837,7 @@ static void test_each_allocation_may_fail(void **state)
     sdm_error err;
     unsigned long failures = 0;
     for (unsigned long i = 1, failing = 1; failing; i++) {
-        sdm_band band;
+        sdm_blocks band;
         sdm_alloc_fail_after(i);
         const sdm_status a =
             sdm_generate_grid(s->model[0], params, &o, &g, values, slopes, NULL, &err);
@@ -822,8 +846,8 @@ static void test_each_allocation_may_fail(void **state)
         sdm_alloc_fail_after(0);
         assert_true(!a || a == SDM_E_NOMEM);
         assert_true(!b || b == SDM_E_NOMEM);
-        if (b) assert_true(!band.values && !band.block);
-        sdm_band_dispose(&band);
+        if (b) assert_true(!band.values && !band.tile);
+        sdm_blocks_dispose(&band);
         failing = a || b;
         failures += failing;
     }

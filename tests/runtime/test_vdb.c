@@ -1,5 +1,5 @@
 /* Level set files of closed-form distances, read back through OpenVDB.
- * Tests: padded.c seal.c vdb.cc vdb_band.cc vdb_creases.cc vdb_file.cc */
+ * Tests: padded.c seal.c vdb.cc vdb_blocks.cc vdb_creases.cc vdb_file.cc */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

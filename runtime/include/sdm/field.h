@@ -20,7 +20,7 @@
 #ifndef SDM_FIELD_H
 #define SDM_FIELD_H
 
-#include "sdm/band.h"
+#include "sdm/blocks.h"
 #include "sdm/runtime.h"
 
 #ifdef __cplusplus
@@ -71,13 +71,13 @@ SDM_API sdm_status sdm_field_points(const sdm_field *f, const double *x, size_t 
 SDM_API sdm_status sdm_field_grid(const sdm_field *f, const sdm_grid *grid, float *values,
                                   float *slopes, sdm_error *err);
 
-/* *out = the band of half width `width` (mm) on a grid; free it with sdm_band_dispose(). Only
+/* *out = the band of half width `width` (mm) on a grid; free it with sdm_blocks_dispose(). Only
    blocks that can meet the band are evaluated: the value at the centre of a block, and a bound on
    the slope of the spline from differences of its coefficients, exclude the others. Values within
    the band are those of sdm_field_grid(). Voxels outside of the box count only if their bound lies
    within the band. On error *out is empty. */
 SDM_API sdm_status sdm_field_band(const sdm_field *f, const sdm_grid *grid, double width,
-                                  sdm_band *out, sdm_error *err);
+                                  sdm_blocks *out, sdm_error *err);
 
 /* The same for one parameter vector params[n_params]: create, set the parameters, evaluate, free.
    opts and result may be NULL.
@@ -94,7 +94,7 @@ SDM_API sdm_status sdm_generate_points(const sdm_model *m, const double *params,
                                        sdm_result *result, sdm_error *err);
 SDM_API sdm_status sdm_generate_band(const sdm_model *m, const double *params,
                                      const sdm_generate_opts *opts, const sdm_grid *grid,
-                                     double width, sdm_band *out, sdm_result *result,
+                                     double width, sdm_blocks *out, sdm_result *result,
                                      sdm_error *err);
 
 #ifdef __cplusplus

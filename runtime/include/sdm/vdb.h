@@ -5,7 +5,7 @@
 
 #include <stdbool.h>
 
-#include "sdm/band.h"
+#include "sdm/blocks.h"
 #include "sdm/grid.h"
 
 #ifdef __cplusplus
@@ -62,18 +62,18 @@ typedef struct sdm_vdb_report {
 SDM_API sdm_status sdm_vdb_write(const char *path, const sdm_grid *grid, const float *values,
                                  const sdm_vdb_opts *opts, sdm_vdb_report *report, sdm_error *err);
 
-/* Writes the level set of a band: the same grid as sdm_vdb_write() of the map, but its blocks
-   become leaves without a map between. The band must be at least as wide as sdm_vdb_band_width(); a
-   band that reaches the border of its grid takes the memory of the map. SDM_E_ARG also for
-   opts->dense. [any thread] */
-SDM_API sdm_status sdm_vdb_write_band(const char *path, const sdm_band *band,
-                                      const sdm_vdb_opts *opts, sdm_vdb_report *report,
-                                      sdm_error *err);
-
-/* *width = the half width (mm) of the level set on a grid: band_voxels, rounded up to the number
+/* *band_mm = the half width (mm) of the level set on a grid: band_voxels, rounded up to the number
    that the file stores. SDM_E_ARG as for sdm_vdb_write(). [any thread] */
-SDM_API sdm_status sdm_vdb_band_width(const sdm_grid *grid, const sdm_vdb_opts *opts, double *width,
-                                      sdm_error *err);
+SDM_API sdm_status sdm_vdb_band(const sdm_grid *grid, const sdm_vdb_opts *opts, double *band_mm,
+                                sdm_error *err);
+
+/* Writes the level set of a map in blocks: the same grid as sdm_vdb_write() of the whole map, but
+   blocks become leaves without a map between. band_mm must be at least that of sdm_vdb_band(). A
+   band that reaches the border of the grid is closed there as by sdm_vdb_write(), which takes the
+   memory of the whole map. SDM_E_ARG also for opts->dense. [any thread] */
+SDM_API sdm_status sdm_vdb_write_blocks(const char *path, const sdm_blocks *blocks,
+                                        const sdm_vdb_opts *opts, sdm_vdb_report *report,
+                                        sdm_error *err);
 
 /* Reads a file back: checks the checksum of the file, recomputes the hash and, for a level set,
    runs checkLevelSet. *text (`text` may be NULL) = new multi-line description (grid, class, voxels,

@@ -1,6 +1,6 @@
-/* Level sets written from bands are those written from whole maps: the same hash of all values, the
- * same report, the same refusals.
- * Tests: vdb_band.cc vdb.cc padded.c */
+/* Level sets written from maps in blocks are those written from whole maps: the same hash of all
+ * values, the same report, the same refusals.
+ * Tests: map_blocks.c padded.c vdb.cc vdb_blocks.cc */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -16,7 +16,7 @@
 #include "sdm/memory.h"
 #include "sdm/vdb.h"
 
-#define FILE_NAME "test_vdb_band.vdb"
+#define FILE_NAME "test_vdb_blocks.vdb"
 
 typedef double (*distance)(const double x[3]);
 
@@ -66,7 +66,7 @@ static float *map_fill(const sdm_grid *g, distance f)
 /* The values of a block; beyond the end of the grid a number that must have no effect. */
 static void cut_block(const sdm_grid *g, const float *map, const int64_t at[3], float *to)
 {
-    for (int64_t i = 0; i < SDM_BAND_VOXELS; i++, to++) {
+    for (int64_t i = 0; i < SDM_BLOCK_VOXELS; i++, to++) {
         const int64_t v[3] = {8 * at[0] + i % 8, 8 * at[1] + i / 8 % 8, 8 * at[2] + i / 64};
         const bool in = v[0] < g->n[0] && v[1] < g->n[1] && v[2] < g->n[2];
         *to = in ? map[(v[2] * g->n[1] + v[1]) * g->n[0] + v[0]] : -0.01f;
@@ -77,7 +77,7 @@ static void cut_block(const sdm_grid *g, const float *map, const int64_t at[3], 
 static bool is_near(const sdm_grid *g, const int64_t at[3], const float *values, double width)
 {
     size_t all = 0, outside = 0, inside = 0;
-    for (int64_t i = 0; i < SDM_BAND_VOXELS; i++) {
+    for (int64_t i = 0; i < SDM_BLOCK_VOXELS; i++) {
         const int64_t v[3] = {8 * at[0] + i % 8, 8 * at[1] + i / 8 % 8, 8 * at[2] + i / 64};
         if (!(v[0] < g->n[0] && v[1] < g->n[1] && v[2] < g->n[2])) continue;
         all++;
@@ -87,21 +87,23 @@ static bool is_near(const sdm_grid *g, const int64_t at[3], const float *values,
     return outside != all && inside != all;
 }
 
-static sdm_band band_of(const sdm_grid *g, const float *map, double width)
+static sdm_blocks blocks_of(const sdm_grid *g, const float *map, double width)
 {
-    sdm_band b = {.grid = *g, .width = width};
-    for (int a = 0; a < 3; a++) b.blocks[a] = (g->n[a] + 7) / 8;
-    const size_t n = (size_t)(b.blocks[0] * b.blocks[1] * b.blocks[2]);
-    assert_false(SDM_ALLOC(&b.block, n, "blocks", NULL));
-    assert_false(SDM_ALLOC(&b.values, n * SDM_BAND_VOXELS, "values", NULL));
+    sdm_blocks b = {.grid = *g, .band_mm = width};
+    for (int a = 0; a < 3; a++) b.n[a] = (g->n[a] + 7) / 8;
+    const size_t n = (size_t)(b.n[0] * b.n[1] * b.n[2]);
+    assert_false(SDM_ALLOC(&b.tile, n, "tiles", NULL));
+    assert_false(SDM_ALLOC(&b.first, n, "places", NULL));
+    assert_false(SDM_ALLOC(&b.values, n, "values", NULL));
     for (size_t i = 0; i < n; i++) {
-        const int64_t at[3] = {(int64_t)i % b.blocks[0], (int64_t)i / b.blocks[0] % b.blocks[1],
-                               (int64_t)i / b.blocks[0] / b.blocks[1]};
-        float *values = b.values + b.n * SDM_BAND_VOXELS;
+        const int64_t at[3] = {(int64_t)i % b.n[0], (int64_t)i / b.n[0] % b.n[1],
+                               (int64_t)i / b.n[0] / b.n[1]};
+        float *values = b.values[b.n_block];
         cut_block(g, map, at, values);
-        b.block[i] = is_near(g, at, values, width) ? (int32_t)b.n++
-                     : values[0] < 0               ? SDM_BAND_INSIDE
-                                                   : SDM_BAND_OUTSIDE;
+        for (int a = 0; a < 3; a++) b.first[b.n_block][a] = (int32_t)(8 * at[a]);
+        b.tile[i] = is_near(g, at, values, width) ? (uint32_t)b.n_block++
+                    : values[0] < 0               ? SDM_TILE_INSIDE
+                                                  : SDM_TILE_OUTSIDE;
     }
     return b;
 }
@@ -118,10 +120,10 @@ static void check(const sdm_grid *g, distance f, const sdm_vdb_opts *o, bool is_
     double width;
     sdm_error err;
     sdm_vdb_report whole, part;
-    if (sdm_vdb_band_width(g, o, &width, &err)) fail_msg("%s", err.text);
-    sdm_band b = band_of(g, map, width);
+    if (sdm_vdb_band(g, o, &width, &err)) fail_msg("%s", err.text);
+    sdm_blocks b = blocks_of(g, map, width);
     if (sdm_vdb_write(FILE_NAME, g, map, o, &whole, &err)) fail_msg("%s", err.text);
-    if (sdm_vdb_write_band(FILE_NAME, &b, o, &part, &err)) fail_msg("%s", err.text);
+    if (sdm_vdb_write_blocks(FILE_NAME, &b, o, &part, &err)) fail_msg("%s", err.text);
     assert_true(whole.hash == part.hash && whole.active_voxels == part.active_voxels);
     assert_true(whole.cut == part.cut && whole.cut == is_cut);
     assert_true(whole.adjusted_voxels == part.adjusted_voxels &&
@@ -129,7 +131,7 @@ static void check(const sdm_grid *g, distance f, const sdm_vdb_opts *o, bool is_
     assert_true(part.active_voxels > 1000);
     if (sdm_vdb_verify(FILE_NAME, NULL, &err)) fail_msg("%s", err.text);
     unlink(FILE_NAME);
-    sdm_band_dispose(&b);
+    sdm_blocks_dispose(&b);
     free(map);
 }
 
@@ -161,13 +163,13 @@ static void test_border(void **state)
 static void refuse(const sdm_grid *g, distance f, sdm_status status)
 {
     float *map = map_fill(g, f);
-    sdm_band b = band_of(g, map, 3 * 0.16 * (1 + 1e-6));
+    sdm_blocks b = blocks_of(g, map, 3 * 0.16 * (1 + 1e-6));
     sdm_error whole, part;
     assert_int_equal(sdm_vdb_write(FILE_NAME, g, map, NULL, NULL, &whole), status);
-    assert_int_equal(sdm_vdb_write_band(FILE_NAME, &b, NULL, NULL, &part), status);
+    assert_int_equal(sdm_vdb_write_blocks(FILE_NAME, &b, NULL, NULL, &part), status);
     assert_string_equal(whole.text, part.text);
     assert_int_not_equal(access(FILE_NAME, F_OK), 0);
-    sdm_band_dispose(&b);
+    sdm_blocks_dispose(&b);
     free(map);
 }
 
@@ -182,18 +184,18 @@ static void test_refused(void **state)
     refuse(&blocks, block_step, SDM_E_QUALITY);
     // a band that is too narrow, a whole map, no band
     float *map = map_fill(&g, sphere);
-    sdm_band b = band_of(&g, map, 0.4);
+    sdm_blocks b = blocks_of(&g, map, 0.4);
     sdm_error err;
-    assert_int_equal(sdm_vdb_write_band(FILE_NAME, &b, NULL, NULL, &err), SDM_E_ARG);
+    assert_int_equal(sdm_vdb_write_blocks(FILE_NAME, &b, NULL, NULL, &err), SDM_E_ARG);
     assert_non_null(strstr(err.text, "band of 0.4 mm"));
     const sdm_vdb_opts dense = {.dense = true};
-    assert_int_equal(sdm_vdb_write_band(FILE_NAME, &b, &dense, NULL, &err), SDM_E_ARG);
-    sdm_band_dispose(&b);
-    assert_int_equal(sdm_vdb_write_band(FILE_NAME, &b, NULL, NULL, &err), SDM_E_ARG);
+    assert_int_equal(sdm_vdb_write_blocks(FILE_NAME, &b, &dense, NULL, &err), SDM_E_ARG);
+    sdm_blocks_dispose(&b);
+    assert_int_equal(sdm_vdb_write_blocks(FILE_NAME, &b, NULL, NULL, &err), SDM_E_ARG);
     double width;
     sdm_grid long_voxels = g;
     long_voxels.spacing[1] = 0.2;
-    assert_int_equal(sdm_vdb_band_width(&long_voxels, NULL, &width, &err), SDM_E_ARG);
+    assert_int_equal(sdm_vdb_band(&long_voxels, NULL, &width, &err), SDM_E_ARG);
     free(map);
 }
 

@@ -1,4 +1,4 @@
-/* Level sets from narrow bands: the blocks of a band become leaves, without a dense map between. */
+/* Level sets from maps in blocks: blocks become leaves, without a dense map between. */
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -12,27 +12,30 @@ namespace
 {
 
 using Leaf = Grid::TreeType::LeafNodeType;
-const int64_t EDGE = SDM_BAND_EDGE;
+const int64_t EDGE = SDM_BLOCK_SIZE;
 
-// a block by its place in the lattice of blocks
+// whether a tile has values
+bool has_values(uint32_t number) { return number < SDM_TILE_INSIDE; }
+
+// a tile by its place
 struct place {
     int64_t at[3];
-    int32_t number; // as in sdm_band.block
+    uint32_t number; // as in sdm_blocks.tile
 };
 
-int32_t number_at(const sdm_band &b, int64_t i, int64_t j, int64_t k)
+uint32_t number_at(const sdm_blocks &b, int64_t i, int64_t j, int64_t k)
 {
-    return b.block[(k * b.blocks[1] + j) * b.blocks[0] + i];
+    return b.tile[(k * b.n[1] + j) * b.n[0] + i];
 }
 
-// calls f(place) for every block in the order of the band, until it returns true; returns whether
+// calls f(place) for every tile in their order, until it returns true; returns whether
 // it did
-template <typename F> bool any_block(const sdm_band &b, F f)
+template <typename F> bool any_block(const sdm_blocks &b, F f)
 {
     place p;
-    for (p.at[2] = 0; p.at[2] < b.blocks[2]; p.at[2]++)
-        for (p.at[1] = 0; p.at[1] < b.blocks[1]; p.at[1]++)
-            for (p.at[0] = 0; p.at[0] < b.blocks[0]; p.at[0]++) {
+    for (p.at[2] = 0; p.at[2] < b.n[2]; p.at[2]++)
+        for (p.at[1] = 0; p.at[1] < b.n[1]; p.at[1]++)
+            for (p.at[0] = 0; p.at[0] < b.n[0]; p.at[0]++) {
                 p.number = number_at(b, p.at[0], p.at[1], p.at[2]);
                 if (f(p)) return true;
             }
@@ -40,27 +43,24 @@ template <typename F> bool any_block(const sdm_band &b, F f)
 }
 
 // number of voxels of a block in the grid, along an axis
-int64_t in_grid(const sdm_band &b, const place &p, int a)
+int64_t in_grid(const sdm_blocks &b, const place &p, int a)
 {
     return std::min(b.grid.n[a] - EDGE * p.at[a], EDGE);
 }
 
-const float *values_of(const sdm_band &b, int32_t number)
-{
-    return b.values + static_cast<size_t>(number) * SDM_BAND_VOXELS;
-}
+const float *values_of(const sdm_blocks &b, uint32_t number) { return b.values[number]; }
 
 // the value of voxel `at` of the grid, cut off at the band
-float value_at(const sdm_band &b, float width, const int64_t at[3])
+float value_at(const sdm_blocks &b, float width, const int64_t at[3])
 {
-    const int32_t n = number_at(b, at[0] / EDGE, at[1] / EDGE, at[2] / EDGE);
-    if (n < 0) return n == SDM_BAND_INSIDE ? -width : width;
+    const uint32_t n = number_at(b, at[0] / EDGE, at[1] / EDGE, at[2] / EDGE);
+    if (!has_values(n)) return n == SDM_TILE_INSIDE ? -width : width;
     return values_of(b, n)[(at[2] % EDGE * EDGE + at[1] % EDGE) * EDGE + at[0] % EDGE];
 }
 
 // calls f(voxel of the grid, value) for the voxels of a block with values that lie in the grid,
 // until it returns true
-template <typename F> bool any_voxel(const sdm_band &b, const place &p, F f)
+template <typename F> bool any_voxel(const sdm_blocks &b, const place &p, F f)
 {
     const float *values = values_of(b, p.number);
     int64_t n[3], v[3];
@@ -74,10 +74,10 @@ template <typename F> bool any_voxel(const sdm_band &b, const place &p, F f)
     return false;
 }
 
-bool at_border(const sdm_band &b, const place &p)
+bool at_border(const sdm_blocks &b, const place &p)
 {
     bool border = false;
-    for (int a = 0; a < 3; a++) border = border || p.at[a] == 0 || p.at[a] == b.blocks[a] - 1;
+    for (int a = 0; a < 3; a++) border = border || p.at[a] == 0 || p.at[a] == b.n[a] - 1;
     return border;
 }
 
@@ -95,9 +95,9 @@ void count_pair(float one, float other, float width, crossings &c)
 
 // the pairs of voxels of a block with the next voxels along each axis; of a block without values,
 // the pairs with the next blocks without values
-void count_block(const sdm_band &b, const place &p, float width, crossings &c)
+void count_block(const sdm_blocks &b, const place &p, float width, crossings &c)
 {
-    if (p.number >= 0) {
+    if (has_values(p.number)) {
         any_voxel(b, p, [&](const int64_t v[3], float value) {
             for (int a = 0; a < 3; a++) {
                 int64_t next[3] = {v[0], v[1], v[2]};
@@ -105,7 +105,7 @@ void count_block(const sdm_band &b, const place &p, float width, crossings &c)
                 // the block before may have no values: its side is then compared from here
                 next[a] -= 2;
                 if (v[a] % EDGE == 0 && v[a] > 0 &&
-                    number_at(b, next[0] / EDGE, next[1] / EDGE, next[2] / EDGE) < 0)
+                    number_at(b, next[0] / EDGE, next[1] / EDGE, next[2] / EDGE) >= SDM_TILE_INSIDE)
                     count_pair(value, value_at(b, width, next), width, c);
             }
             return false;
@@ -114,9 +114,9 @@ void count_block(const sdm_band &b, const place &p, float width, crossings &c)
     }
     for (int a = 0; a < 3; a++) {
         int64_t next[3] = {p.at[0], p.at[1], p.at[2]};
-        if (++next[a] == b.blocks[a]) continue;
-        const int32_t n = number_at(b, next[0], next[1], next[2]);
-        if (n >= 0 || n == p.number) continue;
+        if (++next[a] == b.n[a]) continue;
+        const uint32_t n = number_at(b, next[0], next[1], next[2]);
+        if (has_values(n) || n == p.number) continue;
         const size_t pairs = static_cast<size_t>(in_grid(b, p, (a + 1) % 3)) *
                              static_cast<size_t>(in_grid(b, p, (a + 2) % 3));
         c.all += pairs;
@@ -125,12 +125,12 @@ void count_block(const sdm_band &b, const place &p, float width, crossings &c)
 }
 
 // a leaf from a block: OpenVDB's z is fastest
-void add_leaf(Grid::Accessor &acc, const sdm_band &b, const place &p, float background, bool half)
+void add_leaf(Grid::Accessor &acc, const sdm_blocks &b, const place &p, float background, bool half)
 {
     const Coord corner(static_cast<int>(EDGE * p.at[0]), static_cast<int>(EDGE * p.at[1]),
                        static_cast<int>(EDGE * p.at[2]));
-    if (p.number < 0) {
-        if (p.number == SDM_BAND_INSIDE) acc.addTile(1, corner, -background, false);
+    if (!has_values(p.number)) {
+        if (p.number == SDM_TILE_INSIDE) acc.addTile(1, corner, -background, false);
         return;
     }
     auto leaf = std::make_unique<Leaf>(corner, background, false);
@@ -154,36 +154,45 @@ void add_leaf(Grid::Accessor &acc, const sdm_band &b, const place &p, float back
 
 } // namespace
 
-bool vdb_parts::band_leaves_grid(const sdm_band &band, float width)
+bool vdb_parts::blocks_leave_grid(const sdm_blocks &b, float width)
 {
-    return any_block(band, [&](const place &p) {
-        if (!at_border(band, p)) return false;
-        if (p.number < 0) return p.number == SDM_BAND_INSIDE;
-        return any_voxel(band, p, [&](const int64_t v[3], float value) {
+    return any_block(b, [&](const place &p) {
+        if (!at_border(b, p)) return false;
+        if (!has_values(p.number)) return p.number == SDM_TILE_INSIDE;
+        return any_voxel(b, p, [&](const int64_t v[3], float value) {
             bool border = false;
-            for (int a = 0; a < 3; a++) border = border || v[a] == 0 || v[a] == band.grid.n[a] - 1;
+            for (int a = 0; a < 3; a++) border = border || v[a] == 0 || v[a] == b.grid.n[a] - 1;
             return border && value < width;
         });
     });
 }
 
-void vdb_parts::check_band(const sdm_band &band, float width, sdm_error *err)
+void vdb_parts::map_of_blocks(const sdm_blocks &b, float *values)
+{
+    const float width = static_cast<float>(b.band_mm);
+    int64_t v[3];
+    for (v[2] = 0; v[2] < b.grid.n[2]; v[2]++)
+        for (v[1] = 0; v[1] < b.grid.n[1]; v[1]++)
+            for (v[0] = 0; v[0] < b.grid.n[0]; v[0]++) *values++ = value_at(b, width, v);
+}
+
+void vdb_parts::check_blocks(const sdm_blocks &b, float width, sdm_error *err)
 {
     crossings c = {0, 0};
-    any_block(band, [&](const place &p) {
-        count_block(band, p, width, c);
+    any_block(b, [&](const place &p) {
+        count_block(b, p, width, c);
         return false;
     });
     need(sdm_check_crossings(c.all, c.jumps, static_cast<double>(width), err));
 }
 
-Grid::Ptr vdb_parts::grid_of_band(const openvdb::math::Transform::Ptr &transform,
-                                  const sdm_band &band, float background, bool as_half)
+Grid::Ptr vdb_parts::grid_of_blocks(const openvdb::math::Transform::Ptr &transform,
+                                    const sdm_blocks &b, float background, bool as_half)
 {
     Grid::Ptr grid = empty_grid(transform, background, false, as_half);
     Grid::Accessor acc = grid->getAccessor();
-    any_block(band, [&](const place &p) {
-        add_leaf(acc, band, p, background, as_half);
+    any_block(b, [&](const place &p) {
+        add_leaf(acc, b, p, background, as_half);
         return false;
     });
     grid->tree().prune();

@@ -336,6 +336,54 @@ static void expand_makes_splines_with_the_same_bits(void **state)
         }
 }
 
+// A function with third powers and its gradient; the sum of products of linear functions in two
+// variables and of cubic ones in the third.
+static double cubic(const double x[3], double g[3])
+{
+    const double value = quadratic(x, g);
+    g[0] += 0.6 * x[0] * x[0] * (1 + 0.5 * x[1] * x[2]);
+    g[1] += -0.3 * x[1] * x[1] + 0.1 * x[0] * x[0] * x[0] * x[2];
+    g[2] += 0.9 * x[2] * x[2] + 0.1 * x[0] * x[0] * x[0] * x[1];
+    return value + 0.2 * x[0] * x[0] * x[0] * (1 + 0.5 * x[1] * x[2]) - 0.1 * x[1] * x[1] * x[1] +
+           0.3 * x[2] * x[2] * x[2];
+}
+
+static void block_reproduces_cubic_functions_with_the_same_bits(void **state)
+{
+    (void)state;
+    enum { LINE = 12, PLANE = 40 }; // floats; the corners of the block, with gaps
+    float corner[PLANE + LINE + 8], first[64];
+    for (size_t i = 0; i < sizeof corner / sizeof *corner; i++) corner[i] = NAN;
+    for (int k = 0; k < 8; k++) {
+        const double x[3] = {k & 1, k >> 1 & 1, k >> 2};
+        double g[3];
+        float *at = corner + (k & 1) * 4 + (k >> 1 & 1) * LINE + (k >> 2) * PLANE;
+        at[0] = (float)cubic(x, g);
+        for (int a = 0; a < 3; a++) at[1 + a] = (float)g[a];
+    }
+    tables[0]->block(corner, LINE, PLANE, first);
+    for (int i = 0; i < 64; i++) {
+        const double x[3] = {0.25 * (i % 4), 0.25 * (i / 4 % 4), 0.25 * (i / 16)};
+        double g[3];
+        assert_true(fabs((double)first[i] - cubic(x, g)) <= 2e-6);
+    }
+    for (size_t t = 1; t < n_tables; t++) {
+        float other[64];
+        tables[t]->block(corner, LINE, PLANE, other);
+        assert_memory_equal(first, other, sizeof first);
+    }
+    for (int k = 0; k < 8; k++) { // a corner that is not a number shows in the first value
+        float *at = corner + (k & 1) * 4 + (k >> 1 & 1) * LINE + (k >> 2) * PLANE;
+        const float value = at[0];
+        at[0] = NAN;
+        for (size_t t = 0; t < n_tables; t++) {
+            tables[t]->block(corner, LINE, PLANE, first);
+            assert_true(isnan(first[0]));
+        }
+        at[0] = value;
+    }
+}
+
 int main(void)
 {
     tables[n_tables++] = &sdm_template_generic;
@@ -350,6 +398,7 @@ int main(void)
         cmocka_unit_test(correct_is_trilinear_with_the_same_bits),
         cmocka_unit_test(normalise_is_the_formula_with_the_same_bits),
         cmocka_unit_test(expand_makes_splines_with_the_same_bits),
+        cmocka_unit_test(block_reproduces_cubic_functions_with_the_same_bits),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -175,8 +175,8 @@ sdm_status trainer_template_maps(template_design *d, double margin, sdm_error *e
                             "shape '%s': too large for a template with the spacing of the grid",
                             sdm_instance_shape(d->family.shape)->name);
         // a warp moves the grid's voxels by as much as the vertices: the margin of the warp's box
-        const double extra = p->n_modes ? 2 * p->warp.spacing : h;
-        double spacing = 4 * h;
+        const double extra = p->n_modes ? 2 * p->warp.spacing : 4 * h;
+        double spacing = 3 * h;
         while (!lattice_of(&reach[c], extra, spacing, FAR_NODES, &p->far)) spacing *= 1.2;
         sdm_mesh mesh = {0};
         sdm_exact *exact = NULL;

@@ -48,6 +48,10 @@ typedef struct template_table {
                       float *out);
     /* out[n] += the map at the indices u[3][n], trilinear. */
     void (*correct)(const template_correction *c, size_t n, const float *const *u, float *out);
+    /* value[4][4][4] = a function in a block of 4 x 4 x 4 voxels, cubic interpolation (Hermite)
+       from its value and slopes by blocks at the eight corners, the voxels (0, 0, 0) .. (4, 4, 4):
+       corner[x][4], and the same `line` floats further along y and `plane` floats along z. */
+    void (*block)(const float *corner, size_t line, size_t plane, float *value);
 } template_table;
 
 extern const template_table sdm_template_generic;

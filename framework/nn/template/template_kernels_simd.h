@@ -60,7 +60,18 @@ static inline void halves(vec a, vec b, vec out[2])
     out[0] = __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11);
     out[1] = __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
 }
+/* The elements i and i + 1 of the first four floats, four times each. */
+#define SHUFFLE_PLANES(v, i)                                                                       \
+    __builtin_shufflevector(v, v, i, i, i, i, (i) + 1, (i) + 1, (i) + 1, (i) + 1)
+
+// Stores the first four floats at p, the last four a plane of a block further.
+static inline void store_planes(float *p, vec v)
+{
+    memcpy(p, &v, 16);
+    memcpy(p + 16, (const char *)&v + 16, 16);
+}
 #else
+static inline void store_planes(float *p, vec v) { store(p, v); }
 static inline vec repeat_two(const float *p)
 {
     const double pair = load_pair(p);
@@ -328,5 +339,63 @@ static void correct(const template_correction *c, size_t n, const float *const *
     }
 }
 
+/* Cubic interpolation in a block: linear interpolation along the three axes, plus for each axis the
+   cubic correction along the four edges parallel to it, interpolated linearly between them. The
+   four floats of a quad are edges along z, then voxels along y, then voxels along x; a vector of
+   eight floats holds two planes of voxels. Letters: l linear, c correction, s slope; p and q are
+   the slopes at both ends less the slope of the straight line. */
+
+// Weights of the voxels of a block along an axis: t, t (1 - t)^2, t^2 (1 - t).
+static const float WEIGHTS[3][4] = {
+    {0, 0.25f, 0.5f, 0.75f}, {0, 0.140625f, 0.125f, 0.046875f}, {0, 0.046875f, 0.125f, 0.140625f}};
+
+// The four edges along z of a block at one end: distance, and slopes by x, y, z.
+static inline void load_corners(const float *corner, size_t line, vec out[4])
+{
+    const vec a = repeat_four(corner), b = repeat_four(corner + 4), c = repeat_four(corner + line),
+              d = repeat_four(corner + line + 4);
+    const vec ab[2] = {interleave_low(a, b), interleave_high(a, b)},
+              cd[2] = {interleave_low(c, d), interleave_high(c, d)};
+    EACH(i, 2) out[2 * i] = low_pairs(ab[i], cd[i]), out[2 * i + 1] = high_pairs(ab[i], cd[i]);
+}
+
+static void block(const float *corner, size_t line, size_t plane, float *value)
+{
+    vec low[4], high[4], change[3], w[3];
+    load_corners(corner, line, low);
+    load_corners(corner + plane, line, high);
+    EACH(i, 3) change[i] = high[i] - low[i], w[i] = repeat_four(WEIGHTS[i]);
+    const vec p = low[3] - change[0], q = high[3] - change[0];
+    for (int z = 0; z < 4; z += VW / 4) {
+        vec t[3]; // weights of the planes
+#if VW == 8
+        EACH(i, 3)
+        t[i] = z ? SHUFFLE_PLANES(w[i], 2) : SHUFFLE_PLANES(w[i], 0);
+#else
+        EACH(i, 3) t[i] = splat(WEIGHTS[i][z]);
+#endif
+        const vec lz = low[0] + t[0] * change[0], cz = t[1] * p - t[2] * q,
+                  sx = low[1] + t[0] * change[1], sy = low[2] + t[0] * change[2];
+        vec l[2], c[2], s[2]; // at both ends along x, for the four voxels along y
+        EACH(i, 2)
+        {
+            const vec l0 = spread(lz, i), dl = spread(lz, i + 2) - l0, c0 = spread(cz, i),
+                      s0 = spread(sx, i);
+            l[i] = l0 + w[0] * dl;
+            c[i] = c0 + w[0] * (spread(cz, i + 2) - c0) + w[1] * (spread(sy, i) - dl) -
+                   w[2] * (spread(sy, i + 2) - dl);
+            s[i] = s0 + w[0] * (spread(sx, i + 2) - s0);
+        }
+        const vec dl = l[1] - l[0], first = l[0] + c[0], slope = dl + (c[1] - c[0]), px = s[0] - dl,
+                  qx = s[1] - dl;
+        EACH(y, 4)
+        {
+            const vec v = spread(first, y) + w[0] * spread(slope, y) + w[1] * spread(px, y) -
+                          w[2] * spread(qx, y);
+            store_planes(value + 16 * z + 4 * y, v);
+        }
+    }
+}
+
 const template_table TABLE = {
-    .expand = expand, .lookup = lookup, .normalise = normalise, .correct = correct};
+    .expand = expand, .lookup = lookup, .normalise = normalise, .correct = correct, .block = block};

@@ -4,13 +4,10 @@
 #include <math.h>
 #include <string.h>
 
-/* Voxels of a block along x, y, z. */
-static const size_t BLOCK[3] = {4, 4, 4};
-enum { BLOCK_VOXELS = 4 * 4 * 4 };
-
 size_t sdm_template_row_floats(const sdm_grid *grid)
 {
-    const size_t n = (size_t)grid->n[0] > BLOCK_VOXELS ? (size_t)grid->n[0] : BLOCK_VOXELS;
+    const size_t n = (size_t)grid->n[0] > SDM_TEMPLATE_BLOCK_VOXELS ? (size_t)grid->n[0]
+                                                                    : SDM_TEMPLATE_BLOCK_VOXELS;
     return (n + 3 * SDM_TEMPLATE_LANES) / SDM_TEMPLATE_LANES * SDM_TEMPLATE_LANES;
 }
 
@@ -61,14 +58,19 @@ size_t sdm_template_carve(const sdm_model *m, bool slopes, size_t correction_map
         s->line = sdm_template_take(memory, &at, 12 * k->stations[0] * sizeof *s->line);
         if (slopes) s->station = sdm_template_take(memory, &at, n * sizeof *s->station);
     }
-    for (int a = 0; a < 3; a++) w->blocks[a] = ((size_t)w->grid->n[a] + BLOCK[a] - 1) / BLOCK[a];
+    for (int a = 0; a < 3; a++)
+        w->blocks[a] = ((size_t)w->grid->n[a] + SDM_TEMPLATE_BLOCK - 1) / SDM_TEMPLATE_BLOCK;
     for (size_t c = 0; c < k->n_parts; c++) w->by_lines |= k->parts[c].n_modes > 0;
     const size_t blocks = w->by_lines ? 0 : w->blocks[0] * w->blocks[1] * w->blocks[2];
     w->centre = sdm_template_take(memory, &at, 4 * k->n_parts * blocks * sizeof *w->centre);
+    const size_t corners =
+        w->by_lines ? 0 : (w->blocks[0] + 1) * (w->blocks[1] + 1) * (w->blocks[2] + 1);
+    w->corner = sdm_template_take(memory, &at, 4 * k->n_parts * corners * sizeof *w->corner);
     w->value = sdm_template_take(memory, &at, sdm_template_row_floats(w->grid) * sizeof *w->value);
     w->part = sdm_template_take(memory, &at, k->n_parts * sizeof *w->part);
     for (int a = 0; a < 3; a++)
-        w->offset[a] = sdm_template_take(memory, &at, BLOCK_VOXELS * sizeof *w->offset[a]);
+        w->offset[a] =
+            sdm_template_take(memory, &at, SDM_TEMPLATE_BLOCK_VOXELS * sizeof *w->offset[a]);
     if (k->correction) {
         w->correction = sdm_template_take(
             memory, &at,
@@ -130,7 +132,7 @@ static void affine_index(const template_work *w, size_t c, double u[3], double b
 static void affine_run(const template_work *w, size_t c, const template_patch *p, bool rigid)
 {
     const affine_part *part = &w->part[c];
-    const bool whole = p->count == BLOCK_VOXELS;
+    const bool whole = p->count == SDM_TEMPLATE_BLOCK_VOXELS;
     for (int i = 0; i < 3; i++) {
         float *u = w->row.u[i];
         const float first =
@@ -138,7 +140,7 @@ static void affine_run(const template_work *w, size_t c, const template_patch *p
                     part->by[1][i] * (double)p->at[1] + part->by[2][i] * (double)p->at[2]);
         const float bx = (float)part->by[0][i], by = (float)part->by[1][i],
                     bz = (float)part->by[2][i];
-        for (size_t v = 0; v < BLOCK_VOXELS && whole; v++)
+        for (size_t v = 0; v < SDM_TEMPLATE_BLOCK_VOXELS && whole; v++)
             u[v] = first + (bx * w->offset[0][v] + (by * w->offset[1][v] + bz * w->offset[2][v]));
         for (size_t z = 0; z < p->n[2] && !whole; z++)
             for (size_t y = 0; y < p->n[1]; y++, u += p->n[0])
@@ -160,7 +162,7 @@ bool sdm_template_is_rigid(const template_network *k, size_t c)
 }
 
 // True if the index is within the lattice `near`.
-static bool is_near(const float *const *u, const float end[3], size_t i)
+static int32_t is_near(const float *const *u, const float end[3], size_t i)
 {
     return (u[0][i] >= 0) & (u[0][i] <= end[0]) & (u[1][i] >= 0) & (u[1][i] <= end[1]) &
            (u[2][i] >= 0) & (u[2][i] <= end[2]);
@@ -174,9 +176,7 @@ static void lookup_range(const template_row *r, const template_level *l, size_t 
     if (to > from) sdm_template_kernels()->lookup(l, to - from, u, r->f + from, g);
 }
 
-// Distance and gradient of the template of part c at row.u: from the lattice `near`, and from `far`
-// for points outside of it.
-static void lookup(const template_work *w, size_t c, size_t n)
+void sdm_template_lookup(const template_work *w, size_t c, size_t n)
 {
     const template_row *r = &w->row;
     const template_level *near = &w->k->near[c], *far = &w->k->far[c];
@@ -187,9 +187,9 @@ static void lookup(const template_work *w, size_t c, size_t n)
     size_t first = 0, last = n;
     while (first < n && !is_near(u, end, first)) first++;
     while (last > first && !is_near(u, end, last - 1)) last--;
-    bool one_run = true;
-    for (size_t i = first; i < last && one_run; i++) one_run = is_near(u, end, i);
-    if (one_run) {
+    int32_t count = 0; // of the type of the comparisons, so that the loop is vectorised
+    for (size_t i = 0; i < n; i++) count += is_near(u, end, i);
+    if ((size_t)count == last - first) {
         // from left to right, because each call writes beyond its end
         lookup_range(r, far, 0, first);
         lookup_range(r, near, first, last);
@@ -205,30 +205,25 @@ static void lookup(const template_work *w, size_t c, size_t n)
     }
 }
 
-// Looks up a patch of a part without a warp that lies wholly within or wholly beyond the lattice
-// `near`; false if it does not.
-static bool lookup_whole(const template_work *w, size_t c, const template_patch *p)
+template_place sdm_template_place(const template_work *w, size_t c, const template_patch *p)
 {
     const affine_part *part = &w->part[c];
     const template_level *near = &w->k->near[c];
     bool inside = true, outside = false;
     for (int i = 0; i < 3; i++) {
-        double low = part->from[i], high;
-        for (int a = 0; a < 3; a++) low += part->by[a][i] * (double)p->at[a];
-        high = low;
+        // the middle of the patch and its extent on both sides
+        double middle = part->from[i], extent = 0;
         for (int a = 0; a < 3; a++) {
-            const double reach = part->by[a][i] * (double)(p->n[a] - 1);
-            low += reach < 0 ? reach : 0;
-            high += reach > 0 ? reach : 0;
+            const double half = 0.5 * (double)(p->n[a] - 1);
+            middle += part->by[a][i] * ((double)p->at[a] + half);
+            extent += fabs(part->by[a][i]) * half;
         }
         // the indices in the row are rounded to floats
         const double end = near->n[i] - 1, rounding = 1e-4;
-        inside &= low >= rounding && high <= end - rounding;
-        outside |= high < -rounding || low > end + rounding;
+        inside &= middle - extent >= rounding && middle + extent <= end - rounding;
+        outside |= middle + extent < -rounding || middle - extent > end + rounding;
     }
-    if (!inside && !outside) return false;
-    lookup_range(&w->row, inside ? near : &w->k->far[c], 0, p->count);
-    return true;
+    return inside ? TEMPLATE_WITHIN : outside ? TEMPLATE_BEYOND : TEMPLATE_ACROSS;
 }
 
 void sdm_template_run(template_work *w, size_t c, const template_patch *p)
@@ -247,7 +242,12 @@ void sdm_template_run(template_work *w, size_t c, const template_patch *p)
     } else {
         affine_run(w, c, p, rigid);
     }
-    if (k->parts[c].n_modes || !lookup_whole(w, c, p)) lookup(w, c, p->count);
+    const template_place where =
+        k->parts[c].n_modes ? TEMPLATE_ACROSS : sdm_template_place(w, c, p);
+    if (where == TEMPLATE_ACROSS)
+        sdm_template_lookup(w, c, p->count);
+    else
+        lookup_range(r, where == TEMPLATE_WITHIN ? &k->near[c] : &k->far[c], 0, p->count);
     if (rigid)
         memcpy(r->value, r->f, p->count * sizeof *r->value);
     else
@@ -261,8 +261,9 @@ bool sdm_template_next(template_work *w, template_patch *p)
 {
     const template_network *k = w->k;
     const size_t n[3] = {(size_t)w->grid->n[0], (size_t)w->grid->n[1], (size_t)w->grid->n[2]};
-    const size_t size[3] = {w->by_lines ? n[0] : BLOCK[0], w->by_lines ? 1 : BLOCK[1],
-                            w->by_lines ? 1 : BLOCK[2]};
+    const size_t size[3] = {w->by_lines ? n[0] : SDM_TEMPLATE_BLOCK,
+                            w->by_lines ? 1 : SDM_TEMPLATE_BLOCK,
+                            w->by_lines ? 1 : SDM_TEMPLATE_BLOCK};
     if (p->count == 0) {
         memset(p, 0, sizeof *p);
     } else {
@@ -276,8 +277,9 @@ bool sdm_template_next(template_work *w, template_patch *p)
         p->count *= p->n[a];
     }
     if (!w->by_lines) {
-        p->block = (p->at[2] / BLOCK[2] * w->blocks[1] + p->at[1] / BLOCK[1]) * w->blocks[0] +
-                   p->at[0] / BLOCK[0];
+        p->block = (p->at[2] / SDM_TEMPLATE_BLOCK * w->blocks[1] + p->at[1] / SDM_TEMPLATE_BLOCK) *
+                       w->blocks[0] +
+                   p->at[0] / SDM_TEMPLATE_BLOCK;
     } else if (p->at[1] == 0) {
         for (size_t c = 0; c < k->n_parts; c++)
             if (k->parts[c].n_modes)
@@ -285,134 +287,6 @@ bool sdm_template_next(template_work *w, template_patch *p)
                                    w->warp[c].plane);
     }
     return true;
-}
-
-/* Blocks. */
-
-// Half of the diagonal of a block, mm.
-static double block_radius(const sdm_grid *grid)
-{
-    double sum = 0;
-    for (int a = 0; a < 3; a++) {
-        const double half = 0.5 * ((double)BLOCK[a] - 1) * grid->spacing[a];
-        sum += half * half;
-    }
-    return sqrt(sum);
-}
-
-// Bound on how fast the distance to part c changes, mm per mm: 1 for rigid parts. For others the
-// product of the largest singular values of m and m^-1, bounded by Frobenius norms.
-static double slope_bound(const template_work *w, size_t c)
-{
-    double forward = 0, back = 0;
-    if (sdm_template_is_rigid(w->k, c)) return 1;
-    for (int i = 0; i < 9; i++) {
-        forward += w->pose[c].m[i] * w->pose[c].m[i];
-        back += w->pose[c].inverse[i] * w->pose[c].inverse[i];
-    }
-    return sqrt(forward * back);
-}
-
-// w->centre of part c in the row (y, z) of blocks: distance at the centre, and its gradient by the
-// indices of the grid.
-static void row_centres(template_work *w, size_t c, size_t y, size_t z)
-{
-    const size_t nx = w->blocks[0], n_parts = w->k->n_parts, at[3] = {0, y, z};
-    const affine_part *part = &w->part[c];
-    const double *from = part->from, (*by)[3] = (const double(*)[3])part->by;
-    float metric[6], *out = w->centre + 4 * ((z * w->blocks[1] + y) * nx * n_parts + c);
-    sdm_template_metric(w->pose[c].inverse, metric);
-    for (int i = 0; i < 3; i++) {
-        double first = from[i];
-        for (int a = 0; a < 3; a++)
-            first += by[a][i] * ((double)(at[a] * BLOCK[a]) + 0.5 * ((double)BLOCK[a] - 1));
-        for (size_t x = 0; x < nx; x++)
-            w->row.u[i][x] = (float)(first + by[0][i] * (double)(x * BLOCK[0]));
-    }
-    for (int a = 0; a < 6; a++)
-        for (size_t x = 0; x < nx; x++) w->row.metric[a][x] = metric[a];
-    lookup(w, c, nx);
-    sdm_template_kernels()->normalise(nx, w->row.f, (const float *const *)w->row.g,
-                                      (const float *const *)w->row.metric, w->row.value);
-    const double h = w->k->parts[c].near.spacing;
-    for (size_t x = 0; x < nx; x++, out += 4 * n_parts) {
-        out[0] = w->row.value[x];
-        for (int a = 0; a < 3; a++)
-            out[1 + a] = (float)(h * by[a][0]) * w->row.g[0][x] +
-                         (float)(h * by[a][1]) * w->row.g[1][x] +
-                         (float)(h * by[a][2]) * w->row.g[2][x];
-    }
-}
-
-static void all_centres(template_work *w)
-{
-    for (size_t z = 0; z < w->blocks[2]; z++)
-        for (size_t y = 0; y < w->blocks[1]; y++)
-            for (size_t c = 0; c < w->k->n_parts; c++) row_centres(w, c, y, z);
-}
-
-// True if the distance to part c is at least value[] in all voxels of a block, by a lower bound. It
-// lies above its tangent at the centre minus the sag; the interpolation may add the slack.
-static bool is_behind(const template_work *w, size_t c, const template_patch *p, double radius,
-                      const float *value)
-{
-    const sdm_template_part *part = &w->k->parts[c];
-    const float *centre = w->centre + 4 * (p->block * w->k->n_parts + c);
-    const double slack = 0.1 * w->grid->spacing[0];
-    float base = centre[0], slope[3] = {centre[1], centre[2], centre[3]};
-    if (!(base > 0)) return false;
-    if (w->part[c].rigid && radius <= part->sag_reach) {
-        base -=
-            (float)(1.05 * ((double)base >= part->far_from ? part->far_sag : part->sag) + slack);
-    } else {
-        base -= (float)(1.05 * w->part[c].slope * radius + slack);
-        memset(slope, 0, sizeof slope);
-    }
-    for (int a = 0; a < 3; a++) base -= slope[a] * 0.5f * (float)(BLOCK[a] - 1);
-    if (p->count == BLOCK_VOXELS) {
-        int32_t count = 0; // of the type of the comparisons, so that the loop is vectorised
-        for (size_t v = 0; v < BLOCK_VOXELS; v++)
-            count += base + (slope[0] * w->offset[0][v] +
-                             (slope[1] * w->offset[1][v] + slope[2] * w->offset[2][v])) >
-                     value[v];
-        return count == BLOCK_VOXELS;
-    }
-    bool behind = true;
-    for (size_t z = 0; z < p->n[2]; z++)
-        for (size_t y = 0; y < p->n[1]; y++, value += p->n[0])
-            for (size_t x = 0; x < p->n[0]; x++)
-                behind &= base + slope[0] * (float)x + slope[1] * (float)y + slope[2] * (float)z >
-                          value[x];
-    return behind;
-}
-
-// The part that is the nearest at the centre of a block.
-static size_t nearest_part(const template_work *w, const template_patch *p)
-{
-    const float *centre = w->centre + 4 * p->block * w->k->n_parts;
-    size_t n = 0;
-    for (size_t c = 1; c < w->k->n_parts; c++)
-        if (centre[4 * c] < centre[4 * n]) n = c;
-    return n;
-}
-
-void sdm_template_values(template_work *w, const template_patch *p, float *value, uint8_t *nearest)
-{
-    const size_t n_parts = w->k->n_parts;
-    const bool culled = !w->by_lines && n_parts > 1;
-    const size_t first = culled ? nearest_part(w, p) : 0;
-    const double radius = culled ? block_radius(w->grid) : 0;
-    sdm_template_run(w, first, p);
-    memcpy(value, w->row.value, p->count * sizeof *value);
-    if (nearest) memset(nearest, (int)first, p->count);
-    for (size_t c = 0; c < n_parts; c++) {
-        if (c == first || (culled && is_behind(w, c, p, radius, value))) continue;
-        sdm_template_run(w, c, p);
-        for (size_t i = 0; i < p->count && nearest; i++)
-            if (w->row.value[i] < value[i]) nearest[i] = (uint8_t)c;
-        for (size_t i = 0; i < p->count; i++)
-            value[i] = w->row.value[i] < value[i] ? w->row.value[i] : value[i];
-    }
 }
 
 void sdm_template_begin(template_work *w, const double *p, bool slopes)
@@ -430,12 +304,11 @@ void sdm_template_begin(template_work *w, const double *p, bool slopes)
         if (k->parts[c].n_modes) continue;
         affine_index(w, c, w->part[c].from, w->part[c].by);
         w->part[c].rigid = sdm_template_is_rigid(k, c);
-        w->part[c].slope = slope_bound(w, c);
     }
-    for (size_t v = 0; v < BLOCK_VOXELS; v++) {
-        w->offset[0][v] = (float)(v % BLOCK[0]);
-        w->offset[1][v] = (float)(v / BLOCK[0] % BLOCK[1]);
-        w->offset[2][v] = (float)(v / BLOCK[0] / BLOCK[1]);
+    for (size_t v = 0; v < SDM_TEMPLATE_BLOCK_VOXELS; v++) {
+        w->offset[0][v] = (float)(v % SDM_TEMPLATE_BLOCK);
+        w->offset[1][v] = (float)(v / SDM_TEMPLATE_BLOCK % SDM_TEMPLATE_BLOCK);
+        w->offset[2][v] = (float)(v / SDM_TEMPLATE_BLOCK / SDM_TEMPLATE_BLOCK);
     }
-    if (!w->by_lines && k->n_parts > 1) all_centres(w);
+    if (!w->by_lines) sdm_template_blocks(w);
 }

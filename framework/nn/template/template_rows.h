@@ -4,6 +4,9 @@
 
 #include "template_internal.h"
 
+/* Voxels of a block along each axis, and all together. */
+enum { SDM_TEMPLATE_BLOCK = 4, SDM_TEMPLATE_BLOCK_VOXELS = 64 };
+
 /* A patch: the voxels that are evaluated together, x fastest, then y, then z. Without a warp a
    patch is a block of 4 x 4 x 4 voxels (smaller at the end of the grid), in which parts that cannot
    be the nearest are left out; with a warp it is a line of the grid. */
@@ -43,6 +46,9 @@ typedef struct template_work {
     /* [blocks][n_parts][4] distance of each part at the centre of the block, and its gradient by
        the indices of the grid; not with lines. */
     float *centre;
+    /* [n_parts][corners][4] the same at the first voxel of each block and of those that would
+       follow the last ones, with the gradient by blocks; not with lines. */
+    float *corner;
     float *value;      /* values of a patch */
     affine_part *part; /* [n_parts]; not with lines */
     float *offset[3];  /* voxel indices of a whole block, relative to its first voxel */
@@ -82,6 +88,18 @@ void sdm_template_run(template_work *w, size_t c, const template_patch *p);
 /* True if distances are carried along unchanged: part c only rotates and moves. The metric is then
    not filled. */
 bool sdm_template_is_rigid(const template_network *k, size_t c);
+
+/* Distance and gradient of the template of part c at row.u[n], in row.f and row.g: from the lattice
+   `near`, and from `far` for points outside of it. */
+void sdm_template_lookup(const template_work *w, size_t c, size_t n);
+
+/* Where a patch of a part without a warp lies: wholly within the lattice `near`, wholly beyond it,
+   or neither. */
+typedef enum template_place { TEMPLATE_WITHIN, TEMPLATE_BEYOND, TEMPLATE_ACROSS } template_place;
+template_place sdm_template_place(const template_work *w, size_t c, const template_patch *p);
+
+/* template_blocks.c. Prepares the blocks of a map: centres and corners. */
+void sdm_template_blocks(template_work *w);
 
 /* value[count] = the map in a patch: the minimum over the parts; nearest[count] = the part that has
    it, unless NULL. Parts that cannot be the nearest in a block are left out. */

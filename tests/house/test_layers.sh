@@ -41,7 +41,7 @@ check() {
         own("core", "checksum clock distribution envelope file heap mat3 processor rng rotation shared table team text threads vec3")
         own("config", "config experiment")
         own("geom", "exact isosurface mesh")
-        own("geom", "brute_force builder methods")
+        own("geom", "brute_force builder methods part_audit")
         own("nn", "model")
         own("nn", "container kernels model_threads pod point_network sdmnn template")
         own("io", "image meshfile picture volume")

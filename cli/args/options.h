@@ -139,7 +139,7 @@ struct cli_args {
     double max_mse;                  /* eval: mm^2 */
     double spacing[3], origin[3];    /* mm */
     int64_t size[3];                 /* voxels */
-    int64_t samples;                 /* eval, verify */
+    int64_t samples;                 /* eval, verify, shapes */
     int64_t naive;                   /* eval */
     const char *grid;                /* bench */
     const char *peers;               /* bench, experiment */

@@ -45,7 +45,7 @@ check() {
         own("nn", "model")
         own("nn", "container kernels model_threads pod point_network sdmnn template")
         own("io", "image meshfile picture volume")
-        own("shape", "registry shape_box")
+        own("shape", "registry shape_box shape_survey")
         own("shapes", "builtin_shapes")
         own("runtime", "check fit map phantom runtime vdb")
         own("trainer", "train")

@@ -57,7 +57,7 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "and trainings: broken meshes, parts that are inside out, vertices that jump, numbers of\n"
      "vertices that change, a grid that cuts the shapes (with a CONFIG, whose key=value\n"
      "overrides may follow), wrong velocities, results that differ from call to call. -o FILE\n"
-     "draws nine shapes. Exit code 3: meshes are broken; 4: a training would suffer.",
+     "draws nine shapes. Exit code 3: meshes are broken; 4: maps or trainings suffer.",
      "sdmgen shapes check cochlea -o cochlea.png", 0, SIZE_MAX},
     {"info", "FILE", "describe the content of a model, level set, image or mesh file", NULL,
      "sdmgen info runs/cochlea/model.sdm", 1, 1},

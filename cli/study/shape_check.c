@@ -17,7 +17,7 @@
 #include "sdm/memory.h"
 #include "sdm/picture.h"
 
-enum { SAMPLES = 128, DRAWN = 9 };
+enum { SAMPLES = 128, DRAWN = 9, TITLE_MAX = 36 };
 
 typedef struct check {
     const cli_args *args;
@@ -238,7 +238,28 @@ static void measure_beyond(const sdm_mesh *m, const sdm_grid *g, double *mm)
     }
 }
 
-/* Draws the default shape and the first samples; what lies beyond the grid is coloured. */
+/* Writes the first parameters of shape `index`, as many as fit over a picture. */
+static const char *title_of(const check *c, size_t index, char title[TITLE_MAX])
+{
+    const sdm_shape_survey *f = &c->survey.found;
+    const sdm_param *params = sdm_instance_params(c->shape, NULL);
+    size_t n = 0;
+    for (size_t i = 0; i < f->n_params; i++) {
+        char word[TITLE_MAX];
+        const int length = snprintf(word, sizeof word, "%s=%.3g ", params[i].name,
+                                    f->p[index * f->n_params + i]);
+        if (n + (size_t)length + 4 > TITLE_MAX) {
+            strcpy(title + n, "...");
+            break;
+        }
+        strcpy(title + n, word);
+        n += (size_t)length;
+    }
+    return title;
+}
+
+/* Draws the default shape and the first samples. If the grid cuts shapes, what lies beyond it is
+ * coloured, and the last one is the shape that is cut most. */
 static sdm_status draw(const check *c, const char *path, sdm_error *err)
 {
     const sdm_shape_survey *f = &c->survey.found;
@@ -246,18 +267,19 @@ static sdm_status draw(const check *c, const char *path, sdm_error *err)
     sdm_picture_surface surface[DRAWN];
     sdm_mesh mesh[DRAWN] = {{0}};
     double *beyond[DRAWN] = {0};
-    sdm_text title[DRAWN] = {{0}};
+    char title[DRAWN][TITLE_MAX] = {""};
     size_t n = 0;
     sdm_status s = SDM_OK;
     for (size_t i = 0; i < f->n && n < DRAWN && !s; i++) {
-        const size_t shape = i ? f->n_corners + i : 0;
+        const size_t shape = !i                           ? 0
+                             : colour && n == DRAWN - 1 ? f->cut.worst
+                                                        : f->n_corners + i;
         if (shape >= f->n || sdm_instance_mesh(c->survey.shape, f->p + shape * f->n_params,
                                                &mesh[n], NULL))
             continue;
-        cli_survey_params(&c->survey, shape, &title[n]);
         if (colour) s = SDM_ALLOC(&beyond[n], mesh[n].n_vert, "distances beyond the grid", err);
         if (!s && colour) measure_beyond(&mesh[n], c->survey.grid, beyond[n]);
-        surface[n] = (sdm_picture_surface){title[n].data, &mesh[n], beyond[n]};
+        surface[n] = (sdm_picture_surface){title_of(c, shape, title[n]), &mesh[n], beyond[n]};
         n++;
     }
     if (!s && !n) s = sdm_fail(err, SDM_E_MESH, "%s: no shape can be made", path);
@@ -265,7 +287,6 @@ static sdm_status draw(const check *c, const char *path, sdm_error *err)
     for (size_t i = 0; i < DRAWN; i++) {
         sdm_mesh_dispose(&mesh[i]);
         sdm_free(beyond[i]);
-        sdm_text_dispose(&title[i]);
     }
     return s;
 }
@@ -280,7 +301,7 @@ static sdm_status give_verdict(const check *c, sdm_error *err)
         return sdm_fail(err, verdict, "%s: meshes are broken: mend what is marked 'broken' first",
                         name);
     if (verdict == SDM_E_QUALITY)
-        return sdm_fail(err, verdict, "%s: a training would suffer: mend what is marked 'warning'",
+        return sdm_fail(err, verdict, "%s: maps or trainings would suffer: mend what is marked 'warning'",
                         name);
     if (!c->args->json)
         printf("fine: the shape can be trained%s\n",

@@ -27,14 +27,16 @@ static void tell(teller *t, sdm_status weight, sdm_text *text)
     sdm_text_dispose(text);
 }
 
-void cli_survey_params(const cli_survey *s, size_t index, sdm_text *out)
+/* Appends "a=4.4 alpha=0.5" of shape `index`: some of its parameters, without number `skip`. */
+static void add_params(const cli_survey *s, size_t index, size_t skip, sdm_text *out)
 {
-    size_t n;
+    size_t n, told = 0;
     const sdm_param *params = sdm_instance_params(s->shape, &n);
-    const double *p = s->found.p + index * n;
-    for (size_t i = 0; i < n && i < PARAMS_TOLD; i++)
-        sdm_text_add(out, "%s%s=%.6g", i ? " " : "", params[i].name, p[i]);
-    if (n > PARAMS_TOLD) sdm_text_add(out, " ...");
+    for (size_t i = 0; i < n && told < PARAMS_TOLD; i++)
+        if (i != skip)
+            sdm_text_add(out, "%s%s=%.6g", told++ ? " " : "", params[i].name,
+                         s->found.p[index * n + i]);
+    if (n > PARAMS_TOLD + (skip < n)) sdm_text_add(out, " ...");
 }
 
 /* Makes the mesh of shape `index`; false: it cannot be made, for the reason in *err. */
@@ -59,7 +61,7 @@ static void add_count(const cli_survey *s, const sdm_survey_count *c, const char
     sdm_text_add(text, "%s ", what);
     add_share(s, c, text);
     sdm_text_add(text, ", up to %.6g at ", c->amount);
-    cli_survey_params(s, c->worst, text);
+    add_params(s, c->worst, SIZE_MAX, text);
 }
 
 static void tell_failed(teller *t)
@@ -131,14 +133,14 @@ static void tell_sizes(teller *t)
                      f->n_vert, f->n_tri);
         add_share(t->s, &f->resized, &text);
         sdm_text_add(&text, ", for example %.0f vertices at ", f->resized.amount);
-        cli_survey_params(t->s, f->resized.worst, &text);
+        add_params(t->s, f->resized.worst, SIZE_MAX, &text);
         sdm_text_add(&text, "; derivatives need the same numbers everywhere");
         tell(t, SDM_E_QUALITY, &text);
     } else if (f->rewired.shapes) {
         sdm_text_add(&text, "the triangles get other vertices ");
         add_share(t->s, &f->rewired, &text);
         sdm_text_add(&text, ", for example at ");
-        cli_survey_params(t->s, f->rewired.worst, &text);
+        add_params(t->s, f->rewired.worst, SIZE_MAX, &text);
         sdm_text_add(&text, "; derivatives need the same triangles everywhere");
         tell(t, SDM_E_QUALITY, &text);
     }
@@ -157,9 +159,10 @@ static void tell_jumps(teller *t)
             sdm_text_add(&text, "the %s", j->kind == SDM_BREAK_SIZES
                                               ? "number of vertices or triangles changes"
                                               : "triangles change");
-        sdm_text_add(&text, " at %s=%.6g (other parameters: ", params[k].name, j->value);
-        cli_survey_params(t->s, j->shape, &text);
-        sdm_text_add(&text, "); a network cannot learn jumps");
+        sdm_text_add(&text, " at %s=%.6g%s", params[k].name, j->value,
+                     t->s->found.n_params > 1 ? ", with " : "");
+        add_params(t->s, j->shape, k, &text);
+        sdm_text_add(&text, "; a network cannot learn jumps");
         tell(t, SDM_E_QUALITY, &text);
     }
 }
@@ -192,7 +195,7 @@ static void tell_cut(teller *t)
                  f->low[0], f->low[1], f->low[2], f->high[0], f->high[1], f->high[2], low[0],
                  low[1], low[2], high[0], high[1], high[2]);
     if (f->cut.shapes)
-        sdm_text_add(&text, "%.3g %% of the shapes",
+        sdm_text_add(&text, "%.2g %% of the shapes",
                      100.0 * (double)f->cut.shapes / (double)f->n_samples);
     else
         sdm_text_add(&text, "only shapes at the corners of the ranges");
@@ -217,7 +220,7 @@ static void tell_callbacks(teller *t)
         sdm_text_add(&text,
                      "velocity() is off by %.3g of the largest velocity by %s, at vertex %zu and ",
                      f->velocity_error, params[f->velocity_param].name, f->velocity_vertex);
-        cli_survey_params(t->s, f->velocity_shape, &text);
+        add_params(t->s, f->velocity_shape, SIZE_MAX, &text);
         sdm_text_add(&text, "; compared with differences of meshes");
         tell(t, SDM_E_QUALITY, &text);
     }

@@ -19,9 +19,6 @@ typedef void cli_tell(void *user, sdm_status weight, const char *line);
 /* Calls tell() for every finding, the gravest first. SDM_E_NOMEM. */
 sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell, void *user, sdm_error *err);
 
-/* Appends "a=4.4 alpha=0.5" of shape `index`, at most six parameters. */
-void cli_survey_params(const cli_survey *s, size_t index, sdm_text *out);
-
 /* A survey of about a second of the shape of a configuration, over its ranges, distributions and
  * grid, told as notices. Errors, such as that of an interrupt, are no notices: what follows meets
  * them again. */

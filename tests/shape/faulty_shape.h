@@ -12,7 +12,7 @@ static const sdm_param FAULTY_PARAMS[] = {{"size", "mm", 1, 3, 2.5, "edge of the
                                           {"reach", "mm", 1, 2, 1.5, "length of the handle"}};
 static const sdm_option FAULTY_OPTIONS[] = {
     {"fault", SDM_OPTION_CHOICE, "", 0, 0, 0,
-     "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|far", "x"}};
+     "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike", "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
 static inline void faulty_box(sdm_mesh_out *out, size_t box, const double low[3],
@@ -46,7 +46,6 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     if (!strcmp(fault, "jump")) shift = is_large ? 0.125 : 0;
     if (!strcmp(fault, "kink")) shift = fabs(p[0] - 2) / 4;
     if (!strcmp(fault, "unlike")) shift = 1e-6 * ++calls;
-    if (!strcmp(fault, "far")) shift = 0.5 * p[0];
     const double body[2][3] = {{-p[0], -p[0], -p[0]}, {p[0], p[0], p[0]}};
     const double handle[2][3] = {{p[0] - 0.5, -0.25, -0.25 + shift},
                                  {p[0] + p[1], 0.25, 0.25 + shift}};

@@ -8,7 +8,7 @@
 #include "report/terminal.h"
 #include "sdm/internal/distribution.h"
 #include "sdm/memory.h"
-#include "study/shape_check.h"
+#include "study/check_family.h"
 
 static const char *option_type(const sdm_option *o)
 {
@@ -240,7 +240,7 @@ static sdm_status print_list(const cli_args *args, const sdm_registry *registry,
 sdm_status cmd_shapes(const cli_args *args, sdm_error *err)
 {
     if (args->files.n > 0 && !strcmp(args->files.items[0], "check"))
-        return cli_shape_check(args, err);
+        return cli_check_family(args, err);
     if (args->files.n > 1)
         return sdm_fail(err, SDM_E_ARG, "shapes: unexpected argument '%s'", args->files.items[1]);
     if (args->outputs.n > 0) return sdm_fail(err, SDM_E_ARG, "shapes: -o needs `shapes check`");

@@ -99,7 +99,7 @@ static sdm_status train_network(const cli_args *args, const sdm_config *config,
     cli_progress progress;
     const sdm_train_hooks hooks = cli_train_hooks(&progress);
     sdm_train_report report = {0};
-    cli_notice_survey(config, shape);
+    if (!args->resume) cli_notice_survey(config, shape);
     cli_progress_start(&progress);
     sdm_status s = sdm_train(config, shape, folder, args->resume, &hooks, &report, err);
     cli_progress_clear(&progress);

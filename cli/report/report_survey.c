@@ -245,7 +245,8 @@ static void tell_notes(teller *t)
                  {&f->duplicate, "triangles given twice", ": they count once"}};
     for (size_t i = 0; i < sizeof notes / sizeof *notes; i++) {
         sdm_text text = {0};
-        if (!notes[i].count->shapes) continue;
+        const size_t n = notes[i].count->shapes;
+        if (!n || (notes[i].count == &f->overlaps && t->s->brief && n == f->n)) continue;
         add_count(t->s, notes[i].count, notes[i].what, &text);
         sdm_text_add(&text, "%s", notes[i].after);
         tell(t, SDM_OK, &text);
@@ -294,7 +295,7 @@ void cli_notice_survey(const sdm_config *c, const sdm_instance *shape)
                                   .brief = true,
                                   .n_threads = (int)c->threads,
                                   .cancelled = cli_interrupted};
-    cli_survey s = {.shape = shape, .grid = &c->grid};
+    cli_survey s = {.shape = shape, .grid = &c->grid, .brief = true};
     if (sdm_shape_survey_make(shape, &opts, &s.found, NULL)) return;
     (void)cli_survey_tell(&s, notice, NULL, NULL);
     sdm_shape_survey_dispose(&s.found);

@@ -9,6 +9,8 @@
 typedef struct cli_survey {
     const sdm_instance *shape;
     const sdm_grid *grid; /* NULL: none */
+    /* nothing is told of shapes that all overlap themselves: they mostly do so on purpose */
+    bool brief;
     sdm_shape_survey found;
 } cli_survey;
 

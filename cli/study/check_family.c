@@ -1,6 +1,6 @@
 /* Surveys a family of shapes and prints what spoils maps, derivatives and trainings. */
 #define _XOPEN_SOURCE 700 // realpath()
-#include "shape_check.h"
+#include "check_family.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -310,7 +310,7 @@ static sdm_status give_verdict(const check *c, sdm_error *err)
     return SDM_OK;
 }
 
-sdm_status cli_shape_check(const cli_args *args, sdm_error *err)
+sdm_status cli_check_family(const cli_args *args, sdm_error *err)
 {
     check c = {.args = args};
     sdm_status s = SDM_OK;

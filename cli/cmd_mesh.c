@@ -20,7 +20,8 @@ static sdm_status report_audit(const cli_args *args, const sdm_mesh *mesh, sdm_e
     if (args->json) {
         sdm_json json = {0};
         sdm_json_open(&json, NULL, '{');
-        sdm_json_text(&json, args->shape ? "shape" : "mesh", args->shape ? args->shape : args->mesh);
+        sdm_json_text(&json, args->shape ? "shape" : "mesh",
+                      args->shape ? args->shape : args->mesh);
         cli_json_audit(&json, &audit.mesh);
         cli_json_parts(&json, &audit);
         sdm_json_close(&json, '}');

@@ -156,9 +156,9 @@ static void tell_jumps(teller *t)
         if (j->kind == SDM_BREAK_JUMP)
             sdm_text_add(&text, "vertex %zu jumps by %.3g mm", j->vertex, j->mm);
         else
-            sdm_text_add(&text, "the %s", j->kind == SDM_BREAK_SIZES
-                                              ? "number of vertices or triangles changes"
-                                              : "triangles change");
+            sdm_text_add(&text, "the %s",
+                         j->kind == SDM_BREAK_SIZES ? "number of vertices or triangles changes"
+                                                    : "triangles change");
         sdm_text_add(&text, " at %s=%.6g%s", params[k].name, j->value,
                      t->s->found.n_params > 1 ? ", with " : "");
         add_params(t->s, j->shape, k, &text);

@@ -51,8 +51,8 @@ static sdm_status only_shape(const check *c, const char **name, sdm_error *err)
     if (n == 0)
         return sdm_fail(err, SDM_E_ARG,
                         "usage: sdmgen shapes check NAME|CONFIG, or --plugin FILE with one shape");
-    return sdm_fail(err, SDM_E_ARG, "shapes check: --plugin has %zu shapes: name one, for example %s",
-                    n, *name);
+    return sdm_fail(err, SDM_E_ARG,
+                    "shapes check: --plugin has %zu shapes: name one, for example %s", n, *name);
 }
 
 /* Ranges, distributions and grid of the configuration. */
@@ -73,8 +73,7 @@ static sdm_status open_config(check *c, sdm_error *err)
         s = sdm_fail(err, SDM_E_CONFIG, "%zu parameters, at most %d can be trained", n,
                      SDM_MAX_PARAMS);
     if (!s) s = sdm_train_ranges(c->config, c->shape, min, max, err);
-    if (!s)
-        s = sdm_train_distributions(c->config, c->shape, min, max, c->distribution, err);
+    if (!s) s = sdm_train_distributions(c->config, c->shape, min, max, c->distribution, err);
     if (s) return s;
     for (size_t i = 0; i < n; i++) {
         c->range[i][0] = min[i];
@@ -102,9 +101,7 @@ static sdm_status open_shape(check *c, sdm_error *err)
         return sdm_fail(err, SDM_E_ARG, "shapes check: unexpected argument '%s'",
                         args->files.items[2]);
     if (!name) s = only_shape(c, &name, err);
-    return s ? s
-             : cli_create_shape(c->registry, name, &args->options,
-                                &c->shape, err);
+    return s ? s : cli_create_shape(c->registry, name, &args->options, &c->shape, err);
 }
 
 /* ---- output ---- */
@@ -234,8 +231,7 @@ static void measure_beyond(const sdm_mesh *m, const sdm_grid *g, double *mm)
         sdm_grid_index(g, m->vert + 3 * v, index);
         mm[v] = 0;
         for (int a = 0; a < 3; a++)
-            mm[v] = fmax(mm[v], g->spacing[a] *
-                                    fmax(-index[a], index[a] - (double)(g->n[a] - 1)));
+            mm[v] = fmax(mm[v], g->spacing[a] * fmax(-index[a], index[a] - (double)(g->n[a] - 1)));
     }
 }
 
@@ -247,8 +243,8 @@ static const char *title_of(const check *c, size_t index, char title[TITLE_MAX])
     size_t n = 0;
     for (size_t i = 0; i < f->n_params; i++) {
         char word[TITLE_MAX];
-        const int length = snprintf(word, sizeof word, "%s=%.3g ", params[i].name,
-                                    f->p[index * f->n_params + i]);
+        const int length =
+            snprintf(word, sizeof word, "%s=%.3g ", params[i].name, f->p[index * f->n_params + i]);
         if (n + (size_t)length + 4 > TITLE_MAX) {
             strcpy(title + n, "...");
             break;
@@ -272,11 +268,9 @@ static sdm_status draw(const check *c, const char *path, sdm_error *err)
     size_t n = 0;
     sdm_status s = SDM_OK;
     for (size_t i = 0; i < f->n && n < DRAWN && !s; i++) {
-        const size_t shape = !i                           ? 0
-                             : colour && n == DRAWN - 1 ? f->cut.worst
-                                                        : f->n_corners + i;
-        if (shape >= f->n || sdm_instance_mesh(c->survey.shape, f->p + shape * f->n_params,
-                                               &mesh[n], NULL))
+        const size_t shape = !i ? 0 : colour && n == DRAWN - 1 ? f->cut.worst : f->n_corners + i;
+        if (shape >= f->n ||
+            sdm_instance_mesh(c->survey.shape, f->p + shape * f->n_params, &mesh[n], NULL))
             continue;
         if (colour) s = SDM_ALLOC(&beyond[n], mesh[n].n_vert, "distances beyond the grid", err);
         if (!s && colour) measure_beyond(&mesh[n], c->survey.grid, beyond[n]);
@@ -302,8 +296,8 @@ static sdm_status give_verdict(const check *c, sdm_error *err)
         return sdm_fail(err, verdict, "%s: meshes are broken: mend what is marked 'broken' first",
                         name);
     if (verdict == SDM_E_QUALITY)
-        return sdm_fail(err, verdict, "%s: maps or trainings would suffer: mend what is marked 'warning'",
-                        name);
+        return sdm_fail(err, verdict,
+                        "%s: maps or trainings would suffer: mend what is marked 'warning'", name);
     if (!c->args->json)
         printf("fine: the shape can be trained%s\n",
                c->survey.grid ? "" : "; give a configuration to compare it with a grid");

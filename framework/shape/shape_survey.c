@@ -407,10 +407,9 @@ static sdm_status widen_box(survey *v, sdm_error *err)
     double low[3], high[3];
     sdm_shape_survey *s = v->out;
     if (s->failed.shapes) return SDM_OK;
-    const sdm_status status =
-        sdm_shape_box(v->family.shape, (const double(*)[2])v->family.range,
-                      s->n_samples < BOX_SAMPLES ? s->n_samples : BOX_SAMPLES, v->family.opts->seed,
-                      low, high, err);
+    const sdm_status status = sdm_shape_box(v->family.shape, (const double(*)[2])v->family.range,
+                                            s->n_samples < BOX_SAMPLES ? s->n_samples : BOX_SAMPLES,
+                                            v->family.opts->seed, low, high, err);
     for (int a = 0; a < 3 && !status; a++) {
         s->low[a] = fmin(s->low[a], low[a]);
         s->high[a] = fmax(s->high[a], high[a]);

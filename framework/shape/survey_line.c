@@ -138,8 +138,8 @@ static sdm_status follow(line *l, double size, sdm_survey_jump *out, sdm_error *
     const sdm_status s =
         find_jump(l, line_value(l, at - 2), line_value(l, at), vertex, &value, &mm, err);
     if (!s && mm > 0.5 * worst && mm > 1e-5 * size)
-        *out = (sdm_survey_jump){
-            .kind = SDM_BREAK_JUMP, .value = value, .vertex = vertex, .mm = mm};
+        *out =
+            (sdm_survey_jump){.kind = SDM_BREAK_JUMP, .value = value, .vertex = vertex, .mm = mm};
     return s;
 }
 

@@ -83,7 +83,8 @@ static void test_overlapping_parts(void **state)
         assert_true(a.part[1].first_vert == 8 && a.part[1].last_vert == 15);
         assert_true(a.part[1].first_tri == 12 && a.part[1].n_tri == 12);
         assert_int_equal(a.part[0].state, SDM_PART_SOLID);
-        assert_int_equal(a.part[1].state, cases[i].inside_out ? SDM_PART_INSIDE_OUT : SDM_PART_SOLID);
+        assert_int_equal(a.part[1].state,
+                         cases[i].inside_out ? SDM_PART_INSIDE_OUT : SDM_PART_SOLID);
         sdm_part_audit_dispose(&a);
         // after turning, all is solid
         size_t n;

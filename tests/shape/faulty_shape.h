@@ -1,5 +1,5 @@
-/* A shape for tests: a body and a handle, two boxes that overlap; the option `fault` selects what is
- * wrong with them. Some faults begin where size exceeds 2. */
+/* A shape for tests: a body and a handle, two boxes that overlap; the option `fault` selects what
+ * is wrong with them. Some faults begin where size exceeds 2. */
 #ifndef SDM_TEST_FAULTY_SHAPE_H
 #define SDM_TEST_FAULTY_SHAPE_H
 

@@ -124,7 +124,8 @@ static void breaks_along_a_parameter(void **state)
     static const struct {
         const char *fault;
         sdm_survey_break kind;
-    } cases[] = {{"jump", SDM_BREAK_JUMP}, {"sizes", SDM_BREAK_SIZES}, {"wires", SDM_BREAK_TRIANGLES}};
+    } cases[] = {
+        {"jump", SDM_BREAK_JUMP}, {"sizes", SDM_BREAK_SIZES}, {"wires", SDM_BREAK_TRIANGLES}};
     for (size_t i = 0; i < 3; i++) {
         sdm_shape_survey s = survey(cases[i].fault);
         assert_int_equal(s.jump[0].kind, cases[i].kind);
@@ -183,8 +184,8 @@ static void threads_and_brief_surveys(void **state)
     for (int brief = 0; brief < 2; brief++) {
         sdm_shape_survey s[2];
         for (int i = 0; i < 2; i++)
-            s[i] = survey_with("late", &(sdm_survey_opts){
-                                           .samples = 24, .brief = brief, .n_threads = 1 + 3 * i});
+            s[i] = survey_with(
+                "late", &(sdm_survey_opts){.samples = 24, .brief = brief, .n_threads = 1 + 3 * i});
         assert_memory_equal(s[0].p, s[1].p, s[0].n * 2 * sizeof *s[0].p);
         assert_memory_equal(&s[0].inside_out, &s[1].inside_out, sizeof s[0].inside_out);
         assert_memory_equal(s[0].low, s[1].low, sizeof s[0].low);

@@ -149,7 +149,8 @@ static bool is_in_a_box(const sdm_part_audit *a, const sdm_part *p)
     for (size_t i = 0; i < a->n; i++) {
         const sdm_part *q = &a->part[i];
         bool inside = q != p && !q->open_edges;
-        for (int d = 0; d < 3; d++) inside = inside && q->min[d] < p->min[d] && q->max[d] > p->max[d];
+        for (int d = 0; d < 3; d++)
+            inside = inside && q->min[d] < p->min[d] && q->max[d] > p->max[d];
         if (inside) return true;
     }
     return false;
@@ -159,8 +160,7 @@ static sdm_part_state state_of(const job *j, const sdm_part *p)
 {
     if (p->open_edges) return SDM_PART_OPEN;
     double largest = 0;
-    for (int d = 0; d < 3; d++)
-        largest = fmax(largest, fmax(fabs(p->min[d]), fabs(p->max[d])));
+    for (int d = 0; d < 3; d++) largest = fmax(largest, fmax(fabs(p->min[d]), fabs(p->max[d])));
     if (fabs(p->volume) <= 64 * DBL_EPSILON * p->area * largest) return SDM_PART_FLAT;
     if ((p->turned ? -p->volume : p->volume) > 0) return SDM_PART_SOLID;
     if (p->met) return SDM_PART_INSIDE_OUT;
@@ -188,8 +188,8 @@ static sdm_status measure_union(job *j, sdm_error *err)
     bool changed = false;
     double error_mm;
     if (!a->mesh.closed) return SDM_OK;
-    const sdm_status s = sdm_union_hull(&j->turned, &j->survey, &j->arena, &hull, &source, &changed,
-                                        &error_mm, err);
+    const sdm_status s =
+        sdm_union_hull(&j->turned, &j->survey, &j->arena, &hull, &source, &changed, &error_mm, err);
     const sdm_mesh *m = changed ? &hull : &j->turned;
     double middle[3];
     for (int d = 0; d < 3; d++) middle[d] = 0.5 * (a->mesh.min[d] + a->mesh.max[d]);
@@ -242,7 +242,8 @@ void sdm_part_audit_dispose(sdm_part_audit *a)
 
 sdm_status sdm_mesh_turn_parts(sdm_mesh *m, size_t *n, sdm_error *err)
 {
-    if (!m || !n) return sdm_fail(err, SDM_E_ARG, "parts to turn, but no mesh or no place for their number");
+    if (!m || !n)
+        return sdm_fail(err, SDM_E_ARG, "parts to turn, but no mesh or no place for their number");
     sdm_part_audit audit = {0};
     job j = {.given = m, .out = &audit};
     *n = 0;

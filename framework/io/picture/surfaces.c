@@ -14,7 +14,7 @@ enum {
     GALLERY_MAX = 16,
     N_VIEWS = 2,
     OBLIQUE = 1, /* index of the view of a gallery */
-    FINE = 3, /* samples along each side of a pixel */
+    FINE = 3,    /* samples along each side of a pixel */
     N_SHADES = 255,
     MIDDLE = N_SHADES / 2, /* index of the colour of 0 */
     PANEL = 400,           /* pixels of the longer side of the largest view */

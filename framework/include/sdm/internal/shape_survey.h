@@ -82,7 +82,8 @@ typedef struct sdm_shape_survey {
      * velocity by the same parameter, and where it is */
     double velocity_error;
     size_t velocity_param, velocity_shape, velocity_vertex;
-    size_t unlike; /* shapes whose mesh had other bits when it was made again or by several threads */
+    size_t
+        unlike; /* shapes whose mesh had other bits when it was made again or by several threads */
     double ms_mesh; /* median time of a mesh, ms */
 } sdm_shape_survey;
 

@@ -7,8 +7,8 @@
 #include "json_values.h"
 #include "terminal.h"
 
-/* Rows of the table of parts, and notices about parts. */
-enum { ROWS = 20, NOTICES = 3 };
+/* Parts in the table and in JSON, and notices about parts. */
+enum { ROWS = 20, JSON_PARTS = 1000, NOTICES = 3 };
 
 static const char *state_name(const sdm_part *p)
 {
@@ -91,7 +91,7 @@ void cli_json_parts(sdm_json *json, const sdm_part_audit *a)
     sdm_json_real(json, "union_area_mm2", a->union_area);
     sdm_json_int(json, "parts_inside_out", (int64_t)a->inside_out);
     sdm_json_open(json, "parts", '[');
-    for (size_t i = 0; i < a->n; i++) {
+    for (size_t i = 0; i < a->n && i < JSON_PARTS; i++) {
         const sdm_part *p = &a->part[i];
         sdm_json_open(json, NULL, '{');
         sdm_json_text(json, "state", state_name(p));

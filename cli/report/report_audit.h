@@ -8,7 +8,7 @@
 void cli_print_audit(const sdm_part_audit *a);
 
 /* Adds the figures of the whole mesh as members of the open object; cli_json_parts() adds those of
- * the union and of the parts. */
+ * the union and of the parts, the first 1000. */
 void cli_json_audit(sdm_json *json, const sdm_audit *a);
 void cli_json_parts(sdm_json *json, const sdm_part_audit *a);
 

@@ -1,4 +1,5 @@
-/* sdmgen shapes: lists the known shapes, or the parameters and options of one. */
+/* sdmgen shapes: lists the known shapes, or the parameters and options of one; calls the
+ * subcommands. */
 #include <stdio.h>
 #include <string.h>
 
@@ -8,6 +9,7 @@
 #include "report/terminal.h"
 #include "sdm/internal/distribution.h"
 #include "sdm/memory.h"
+#include "shapes/shapes_command.h"
 
 static const char *option_type(const sdm_option *o)
 {
@@ -236,12 +238,42 @@ static sdm_status print_list(const cli_args *args, const sdm_registry *registry,
     return cli_print_json(&json, err);
 }
 
+/* Subcommands, `sdmgen shapes WORD NAME`. A shape called like one of them is described by
+ * `sdmgen shapes WORD`. */
+static const struct {
+    const char *word;
+    sdm_status (*run)(const cli_args *args, sdm_error *err);
+} subcommands[] = {{"new", cli_shapes_new}};
+enum { N_SUBCOMMANDS = sizeof subcommands / sizeof *subcommands };
+
+static sdm_status run_subcommand(const cli_args *args, sdm_error *err)
+{
+    for (size_t i = 0; i < N_SUBCOMMANDS; i++)
+        if (!strcmp(args->files.items[0], subcommands[i].word))
+            return subcommands[i].run(args, err);
+    return sdm_fail(err, SDM_E_ARG, "shapes: unexpected argument '%s'; usage: sdmgen shapes %s",
+                    args->files.items[1], args->command->synopsis);
+}
+
+/* A subcommand without the NAME that it needs, unless there is a shape of its name. */
+static sdm_status check_word(const cli_args *args, const sdm_registry *registry, sdm_error *err)
+{
+    const char *word = args->files.items[0];
+    for (size_t i = 0; i < N_SUBCOMMANDS; i++)
+        if (!strcmp(word, subcommands[i].word) && !sdm_registry_find(registry, word, NULL))
+            return sdm_fail(err, SDM_E_ARG, "usage: sdmgen shapes %s NAME", word);
+    return SDM_OK;
+}
+
 sdm_status cmd_shapes(const cli_args *args, sdm_error *err)
 {
+    if (args->files.n == 2) return run_subcommand(args, err);
+    if (args->out) return sdm_fail(err, SDM_E_ARG, "shapes: --out belongs to shapes new NAME");
     if (args->files.n == 0 && args->options.n > 0)
         return sdm_fail(err, SDM_E_ARG, "shapes: -O needs the NAME of a shape");
     sdm_registry *registry = NULL;
     sdm_status s = cli_open_registry(args, &registry, err);
+    if (!s && args->files.n > 0) s = check_word(args, registry, err);
     if (!s)
         s = args->files.n > 0 ? print_shape(args, registry, err) : print_list(args, registry, err);
     sdm_registry_free(registry);

@@ -112,6 +112,13 @@ static int edit_distance(const char *a, const char *b)
     return row[n % 3][m];
 }
 
+bool sdm_is_name(const char *text)
+{
+    if (!text || !(text[0] >= 'a' && text[0] <= 'z')) return false;
+    const size_t n = strspn(text, "abcdefghijklmnopqrstuvwxyz0123456789_");
+    return !text[n] && n <= SDM_NAME_LENGTH_MAX;
+}
+
 const char *sdm_nearest_name(const char *word, const char *const *names, size_t n)
 {
     const int length = (int)strnlen(word, WORD_MAX);

@@ -4,7 +4,6 @@
 #include "sdm/mesh.h"
 #include "sdm/registry.h"
 
-#define SHAPE_NAME_MAX 63
 #define SHAPE_PARAMS_MAX 64
 #define SHAPE_OPTIONS_MAX 64
 

@@ -52,6 +52,13 @@ SDM_INTERNAL_API bool sdm_parse_int(const char *s, int64_t *out);
  * Returns buf. */
 SDM_INTERNAL_API const char *sdm_format_real(double v, char buf[32]);
 
+/* True for the name of a shape, a parameter or an option: SDM_NAME_RULE says which texts are. NULL
+ * is none. */
+bool sdm_is_name(const char *text);
+#define SDM_NAME_LENGTH_MAX 63
+#define SDM_NAME_RULE                                                                              \
+    "names are a small letter, then small letters, digits and _, at most 63 in all"
+
 /* The most similar of names[n] to `word` by optimal string alignment distance, or NULL if none is
  * similar. */
 const char *sdm_nearest_name(const char *word, const char *const *names, size_t n);

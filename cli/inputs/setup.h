@@ -7,8 +7,9 @@
 #include "sdm/registry.h"
 #include "sdm/runtime.h"
 
-/* *out = a registry of the built-in shapes and of the plug-ins in SDMGEN_PLUGIN_PATH and --plugin;
- * free it with sdm_registry_free(). SDM_E_PLUGIN, SDM_E_NOMEM. */
+/* *out = a registry of the built-in shapes and of the plug-ins of --plugin and, after them, in
+ * SDMGEN_PLUGIN_PATH; free it with sdm_registry_free(). A file in the path that cannot be loaded or
+ * has a shape that is there already gives a notice. SDM_E_PLUGIN, SDM_E_NOMEM. */
 sdm_status cli_open_registry(const cli_args *args, sdm_registry **out, sdm_error *err);
 
 /* The shape of that name. NULL: there is none; *err holds SDM_E_ARG with "did you mean". */

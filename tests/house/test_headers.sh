@@ -44,6 +44,16 @@ all=$root/runtime/include/sdm/sdmgen.h
 sed '/^#include "sdm\/fit.h"/d; s/ sdm\/grid.h / /' "$all" >"$work/less.h"
 [ "$(missing_in "$work/less.h" | tr '\n' ' ')" = 'sdm/grid.h sdm/fit.h ' ] || { echo "headers missing in sdm/sdmgen.h were not found"; exit 1; }
 
+# the example in its first comment compiles
+{
+    printf '#include "sdm/sdmgen.h"\n#include <stdio.h>\n#include <stdlib.h>\nint main(void) {\n'
+    sed -n '/default parameters:$/,/\*\//{ s/^ \*//; s/ \*\/$//; /:$/d; p; }' "$all"
+    printf 'return 0; }\n'
+} >"$work/example.c"
+grep -q 'sdm_generate(model' "$work/example.c" || { echo "no example in sdm/sdmgen.h"; exit 1; }
+$cc -std=c11 -Wall -Wextra -Wpedantic -Werror -fsyntax-only -I"$root/framework/include" -I"$root/runtime/include" -I"$root/shapes/include" \
+    "$work/example.c" || { echo "the example in sdm/sdmgen.h does not compile"; exit 1; }
+
 # sdm/shape.h, the header for plug-ins, must not include other headers of the project
 mkdir -p "$work/alone/sdm"
 cp "$root/framework/include/sdm/shape.h" "$work/alone/sdm/"

@@ -112,6 +112,20 @@ static int edit_distance(const char *a, const char *b)
     return row[n % 3][m];
 }
 
+const char *sdm_list_names(const char *const *names, size_t n, char *buf, size_t size)
+{
+    size_t used = 0;
+    if (size > 0) buf[0] = '\0';
+    for (size_t i = 0; i < n; i++) {
+        const bool fits = used + strlen(names[i]) + sizeof ", , ..." <= size;
+        const int length =
+            snprintf(buf + used, size - used, "%s%s", i ? ", " : "", fits ? names[i] : "...");
+        if (!fits || length < 0) break;
+        used += (size_t)length;
+    }
+    return buf;
+}
+
 bool sdm_is_name(const char *text)
 {
     if (!text || !(text[0] >= 'a' && text[0] <= 'z')) return false;

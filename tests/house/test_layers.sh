@@ -39,7 +39,7 @@ check() {
     BEGIN {
         own("core", "export grid memory pose shape status") # shape: types alone
         own("core", "checksum clock distribution envelope file heap mat3 processor rng rotation shared table team text threads vec3")
-        own("config", "config experiment")
+        own("config", "config experiment mistakes")
         own("geom", "exact isosurface mesh")
         own("geom", "brute_force builder methods")
         own("nn", "model")

@@ -350,7 +350,7 @@ static void test_option_text_is_parsed(void **state)
     static const char *const BAD[][3] = {
         {"levle", "1", "shape 'tetra' has no option 'levle'; did you mean 'level'?"},
         {"elephant", "1",
-         "shape 'tetra' has no option 'elephant'; 'sdmgen shapes tetra' lists them"},
+         "shape 'tetra' has no option 'elephant'; its options are mode, level, count, data"},
         {"mode", "god", "option 'mode' is 'god'; did you mean 'good'?"},
         {"mode", "xyzxyzxyz", "option 'mode' is 'xyzxyzxyz', need one of good|nan"},
         {"mode", "", "option 'mode' is '', need one of"},

@@ -57,6 +57,11 @@ typedef struct sdm_named_text {
     const char *name, *value;
 } sdm_named_text;
 
+/* Checks one option without the others; files are not opened. SDM_E_CONFIG: an unknown option (with
+ * "did you mean" or the names) or a bad value. [any thread] */
+SDM_API sdm_status sdm_shape_check_option(const sdm_shape *shape, const char *name,
+                                          const char *value, sdm_error *err);
+
 /* Creates an instance with the given options; all others have their defaults. The shape must stay
  * valid as long as the instance. base_dir (may be NULL): folder for relative paths in FILE options.
  * SDM_E_CONFIG: unknown option (with "did you mean") or bad value; SDM_E_PLUGIN: the plug-in's

@@ -52,6 +52,10 @@ SDM_INTERNAL_API bool sdm_parse_int(const char *s, int64_t *out);
  * Returns buf. */
 SDM_INTERNAL_API const char *sdm_format_real(double v, char buf[32]);
 
+/* buf[size] = "a, b, c", the names for a message; names that do not fit become "...". Returns buf.
+ */
+const char *sdm_list_names(const char *const *names, size_t n, char *buf, size_t size);
+
 /* True for the name of a shape, a parameter or an option: SDM_NAME_RULE says which texts are. NULL
  * is none. */
 bool sdm_is_name(const char *text);

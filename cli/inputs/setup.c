@@ -207,13 +207,21 @@ sdm_status cli_check_range(const sdm_param *params, size_t n, const double *valu
     for (size_t i = 0; i < n; i++) {
         const sdm_param *p = &params[i];
         if (values[i] >= p->min && values[i] <= p->max) continue;
-        char v[32], low[32], high[32];
-        return sdm_fail(err, SDM_E_RANGE, "parameter %s = %s, allowed %s .. %s%s%s", p->name,
-                        isnan(values[i]) ? "nan" : sdm_format_real(values[i], v),
-                        sdm_format_real(p->min, low), sdm_format_real(p->max, high),
-                        *p->unit ? " " : "", p->unit);
+        return sdm_fail_range(p->name, values[i], p->min, p->max, p->unit, err);
     }
     return SDM_OK;
+}
+
+sdm_status cli_check_trained(const sdm_param *params, size_t n, const double *values,
+                             sdm_error *err)
+{
+    const sdm_status s = cli_check_range(params, n, values, err);
+    for (size_t i = 0; i < n && s; i++)
+        if (!isfinite(values[i])) return s; // no policy accepts it
+    if (s && err)
+        snprintf(err->text + strlen(err->text), sizeof err->text - strlen(err->text),
+                 "; --policy clamp moves it into the range, --policy exact computes exact maps");
+    return s;
 }
 
 void cli_add_params(const sdm_param *params, size_t n, const double *values, sdm_text *out)

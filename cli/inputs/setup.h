@@ -62,6 +62,11 @@ sdm_status cli_read_rows(const char *path, const sdm_param *params, size_t n, co
 /* SDM_E_RANGE with the name of the first parameter that is not finite or outside of its range. */
 sdm_status cli_check_range(const sdm_param *params, size_t n, const double *values, sdm_error *err);
 
+/* As cli_check_range() for the parameters of a model, with the values of --policy that accept
+ * others. */
+sdm_status cli_check_trained(const sdm_param *params, size_t n, const double *values,
+                             sdm_error *err);
+
 /* Appends the values as "a=4.4 alpha=0.5". */
 void cli_add_params(const sdm_param *params, size_t n, const double *values, sdm_text *out);
 

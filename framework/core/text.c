@@ -87,6 +87,16 @@ const char *sdm_format_real(double v, char buf[32])
     return buf;
 }
 
+sdm_status sdm_fail_range(const char *name, double value, double min, double max, const char *unit,
+                          sdm_error *err)
+{
+    char v[32], low[32], high[32];
+    const char *space = *unit ? " " : "";
+    return sdm_fail(err, SDM_E_RANGE, "parameter '%s' = %s%s%s, allowed %s .. %s%s%s", name,
+                    isnan(value) ? "nan" : sdm_format_real(value, v), space, unit,
+                    sdm_format_real(min, low), sdm_format_real(max, high), space, unit);
+}
+
 #define WORD_MAX 64
 
 static int smaller(int a, int b) { return a < b ? a : b; }

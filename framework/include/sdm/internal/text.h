@@ -52,6 +52,11 @@ SDM_INTERNAL_API bool sdm_parse_int(const char *s, int64_t *out);
  * Returns buf. */
 SDM_INTERNAL_API const char *sdm_format_real(double v, char buf[32]);
 
+/* SDM_E_RANGE, "parameter 'a' = 9 mm, allowed 2 .. 5 mm": the one text about a parameter out of its
+ * range min .. max. */
+sdm_status sdm_fail_range(const char *name, double value, double min, double max, const char *unit,
+                          sdm_error *err);
+
 /* buf[size] = "a, b, c", the names for a message; names that do not fit become "...". Returns buf.
  */
 const char *sdm_list_names(const char *const *names, size_t n, char *buf, size_t size);

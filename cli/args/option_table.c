@@ -396,10 +396,7 @@ const cli_option cli_options[] = {
     /* all commands */
     {"plugin", 0, CLI_LIST, "FILE", NULL, 0, 0, WITH_SHAPES, AT(plugins),
      "load shapes from a shared object; may be repeated"},
-    {"threads", 0, CLI_INT, "N", NULL, 0, 1024, ON(CLI_TRAIN), AT(threads),
-     "number of threads; 0: all (default). Results of train.steps and train.samples do not depend "
-     "on it; in train.minutes more threads make more steps"},
-    {"threads", 0, CLI_INT, "N", NULL, 0, 1024, ALL & ~(ON(CLI_HELP) | ON(CLI_TRAIN)), AT(threads),
+    {"threads", 0, CLI_INT, "N", NULL, 0, 1024, ALL & ~ON(CLI_HELP), AT(threads),
      "number of threads; 0: all (default). Results do not depend on it"},
     {"seed", 0, CLI_INT, "N", NULL, 0, 9007199254740992.0,
      ON(CLI_TRAIN) | ON(CLI_CONFIG) | ON(CLI_EVAL) | ON(CLI_VERIFY) | ON(CLI_BENCH) |

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "inputs/setup.h"
+#include "report/terminal.h"
 #include "sdm/internal/file.h"
 #include "shapes_command.h"
 
@@ -70,11 +71,11 @@ static void remove_folder(const char *folder, size_t n, const char *name)
 
 static sdm_status write_folder(const char *folder, const char *name, sdm_error *err)
 {
-    if (mkdir(folder, 0777) != 0)
-        return sdm_fail(err, SDM_E_IO,
-                        errno == EEXIST ? "%s exists already: choose another folder with --out DIR"
-                                        : "%s: %s",
-                        folder, strerror(errno));
+    const int failed = mkdir(folder, 0777) != 0 ? errno : 0;
+    if (failed == EEXIST)
+        return sdm_fail(err, SDM_E_IO, "%s exists already: choose another folder with --out DIR",
+                        folder);
+    if (failed) return sdm_fail(err, SDM_E_IO, "%s: %s", folder, strerror(failed));
     sdm_status s = SDM_OK;
     for (size_t i = 0; i < N_FILES && !s; i++) {
         s = write_file(folder, i, name, err);
@@ -116,10 +117,8 @@ static void find_prefix(char prefix[PATH_SIZE])
 }
 
 /* Prints the files and the next commands. */
-static void print_next(const char *folder, const char *name)
+static void print_text(const char *folder, const char *name, const char *prefix)
 {
-    char prefix[PATH_SIZE];
-    find_prefix(prefix);
     printf("%s:", folder);
     for (size_t i = 0; i < N_FILES; i++) {
         sdm_text file = {0};
@@ -137,11 +136,35 @@ static void print_next(const char *folder, const char *name)
            name);
 }
 
+static sdm_status print_json(const char *folder, const char *name, const char *prefix,
+                             sdm_error *err)
+{
+    sdm_json j = {0};
+    sdm_json_open(&j, NULL, '{');
+    sdm_json_text(&j, "folder", folder);
+    sdm_json_text(&j, "prefix", prefix);
+    sdm_json_open(&j, "files", '[');
+    for (size_t i = 0; i < N_FILES; i++) {
+        sdm_text file = {0};
+        add_renamed(&file, files[i].name, name);
+        if (!file.failed) sdm_json_text(&j, NULL, file.data);
+        sdm_text_dispose(&file);
+    }
+    sdm_json_close(&j, ']');
+    sdm_json_close(&j, '}');
+    return cli_print_json(&j, err);
+}
+
 sdm_status cli_shapes_new(const cli_args *args, sdm_error *err)
 {
     const char *name = args->files.items[1], *folder = args->out ? args->out : name;
+    if (args->options.n > 0) return sdm_fail(err, SDM_E_ARG, "shapes new takes no -O");
     sdm_status s = check_name(args, name, err);
     if (!s) s = write_folder(folder, name, err);
-    if (!s) print_next(folder, name);
-    return s;
+    if (s) return s;
+    char prefix[PATH_SIZE];
+    find_prefix(prefix);
+    if (args->json) return print_json(folder, name, prefix, err);
+    print_text(folder, name, prefix);
+    return SDM_OK;
 }

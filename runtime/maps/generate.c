@@ -68,7 +68,8 @@ static sdm_status refuse_param(const sdm_model_param *p, double value, sdm_error
 {
     sdm_fail_range(p->name, value, p->min, p->max, p->unit, err);
     if (!isfinite(value)) return SDM_E_RANGE; // no policy accepts it
-    return sdm_fail_in(err, SDM_E_RANGE, "outside the trained range (see the policies clamp, exact)");
+    return sdm_fail_in(err, SDM_E_RANGE,
+                       "outside the trained range (see the policies clamp, exact)");
 }
 
 /* Checks params[n_params]. used[n_params] (may be NULL) = parameters for the network: clamped to

@@ -14,6 +14,9 @@ for file in CMakeLists.txt knob_2.c knob_2.yaml test_knob_2.c; do present "new f
 grep -rq pebble "new folder" && bad "the name of the example is left in the new shape"
 cat "new folder"/* | sed s/knob_2/pebble/g | diff - <(cat pebble/*) || bad "more than names differ"
 
+expect 0 - sdmgen shapes new json --json
+has '^\{"folder": "json", "prefix": "/.*", "files": \["CMakeLists.txt", "json.c", "json.yaml", "test_json.c"\]\}$'
+
 # The commands that it prints work.
 expect 0 - "$installed/bin/sdmgen" shapes new mug
 has "^  cmake -S mug -B mug/build -DCMAKE_PREFIX_PATH=$installed\$"
@@ -43,10 +46,11 @@ expect 2 "'a-b' is no name" sdmgen shapes new a-b
 expect 2 "'test' is the name of a target of CMake" sdmgen shapes new test
 expect 2 "there is a shape 'torus' already" sdmgen shapes new torus
 expect 2 "usage: sdmgen shapes new NAME" sdmgen shapes new
+expect 2 "shapes new takes no -O" sdmgen shapes new other -O a=1
 expect 2 "unexpected argument 'b'; usage" sdmgen shapes a b
 expect 2 "out belongs to shapes new NAME" sdmgen shapes torus --out x
 expect 1 'File too large' bash -c 'trap "" XFSZ; ulimit -f 1; "$0" shapes new big' "$program"
-absent Mug a-b test torus a x nowhere big
+absent other Mug a-b test torus a x nowhere big
 
 # A shape that is called like a subcommand is described by its name alone.
 sed s/pebble/new/g pebble/pebble.c >new.c

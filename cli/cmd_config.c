@@ -3,6 +3,7 @@
 
 #include "commands.h"
 #include "inputs/config_shape.h"
+#include "report/report_survey.h"
 #include "report/terminal.h"
 #include "sdm/memory.h"
 
@@ -22,6 +23,7 @@ sdm_status cmd_config(const cli_args *args, sdm_error *err)
     sdm_registry *registry = NULL;
     sdm_instance *shape = NULL;
     sdm_status s = cli_open_config(args, &config, &registry, &shape, err);
+    if (!s && !args->dump) cli_notice_survey(config, shape);
     if (!s && args->dump) {
         sdm_config_dump(config, &text);
         s = cli_print_text(&text, err);

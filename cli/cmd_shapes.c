@@ -10,6 +10,7 @@
 #include "sdm/internal/distribution.h"
 #include "sdm/memory.h"
 #include "shapes/shapes_command.h"
+#include "study/check_family.h"
 
 static const char *option_type(const sdm_option *o)
 {
@@ -238,43 +239,45 @@ static sdm_status print_list(const cli_args *args, const sdm_registry *registry,
     return cli_print_json(&json, err);
 }
 
-/* Subcommands, `sdmgen shapes WORD NAME`. A shape called like one of them is described by
- * `sdmgen shapes WORD`. */
-static const struct {
-    const char *word;
-    sdm_status (*run)(const cli_args *args, sdm_error *err);
-} subcommands[] = {{"new", cli_shapes_new}};
-enum { N_SUBCOMMANDS = sizeof subcommands / sizeof *subcommands };
+typedef sdm_status (*command_function)(const cli_args *args, sdm_error *err);
 
-static sdm_status run_subcommand(const cli_args *args, sdm_error *err)
+/* The subcommand that the first word names; NULL: none. */
+static command_function find_subcommand(const cli_args *args)
 {
-    for (size_t i = 0; i < N_SUBCOMMANDS; i++)
-        if (!strcmp(args->files.items[0], subcommands[i].word))
-            return subcommands[i].run(args, err);
-    return sdm_fail(err, SDM_E_ARG, "shapes: unexpected argument '%s'; usage: sdmgen shapes %s",
-                    args->files.items[1], args->command->synopsis);
+    static const struct {
+        const char *word;
+        command_function run;
+    } subcommands[] = {{"new", cli_shapes_new}, {"check", cli_check_family}};
+    for (size_t i = 0; i < sizeof subcommands / sizeof *subcommands && args->files.n > 0; i++)
+        if (!strcmp(args->files.items[0], subcommands[i].word)) return subcommands[i].run;
+    return NULL;
 }
 
-/* A subcommand without the NAME that it needs, unless there is a shape of its name. */
-static sdm_status check_word(const cli_args *args, const sdm_registry *registry, sdm_error *err)
+/* The command line without a subcommand: `sdmgen shapes [NAME]`. */
+static sdm_status check_arguments(const cli_args *args, sdm_error *err)
 {
-    const char *word = args->files.items[0];
-    for (size_t i = 0; i < N_SUBCOMMANDS; i++)
-        if (!strcmp(word, subcommands[i].word) && !sdm_registry_find(registry, word, NULL))
-            return sdm_fail(err, SDM_E_ARG, "usage: sdmgen shapes %s NAME", word);
+    if (args->files.n > 1)
+        return sdm_fail(err, SDM_E_ARG, "shapes: unexpected argument '%s'; usage: sdmgen shapes %s",
+                        args->files.items[1], args->command->synopsis);
+    if (args->out) return sdm_fail(err, SDM_E_ARG, "shapes: --out needs `shapes new`");
+    if (args->outputs.n > 0) return sdm_fail(err, SDM_E_ARG, "shapes: -o needs `shapes check`");
+    if (args->files.n == 0 && args->options.n > 0)
+        return sdm_fail(err, SDM_E_ARG, "shapes: -O needs the NAME of a shape");
     return SDM_OK;
 }
 
 sdm_status cmd_shapes(const cli_args *args, sdm_error *err)
 {
-    if (args->files.n == 2) return run_subcommand(args, err);
-    if (args->out) return sdm_fail(err, SDM_E_ARG, "shapes: --out belongs to shapes new NAME");
-    if (args->files.n == 0 && args->options.n > 0)
-        return sdm_fail(err, SDM_E_ARG, "shapes: -O needs the NAME of a shape");
+    const command_function run = find_subcommand(args);
+    if (run && args->files.n > 1) return run(args, err);
     sdm_registry *registry = NULL;
-    sdm_status s = cli_open_registry(args, &registry, err);
-    if (!s && args->files.n > 0) s = check_word(args, registry, err);
-    if (!s)
+    sdm_status s = run ? SDM_OK : check_arguments(args, err);
+    if (!s) s = cli_open_registry(args, &registry, err);
+    // the word of a subcommand alone may be the name of a shape
+    const bool shape = run && !s && sdm_registry_find(registry, args->files.items[0], NULL);
+    if (!s && run && !shape)
+        s = run(args, err);
+    else if (!s)
         s = args->files.n > 0 ? print_shape(args, registry, err) : print_list(args, registry, err);
     sdm_registry_free(registry);
     return s;

@@ -157,8 +157,13 @@ static sdm_status print_json(const char *folder, const char *name, const char *p
 
 sdm_status cli_shapes_new(const cli_args *args, sdm_error *err)
 {
+    if (args->files.n < 2) return sdm_fail(err, SDM_E_ARG, "usage: sdmgen shapes new NAME");
     const char *name = args->files.items[1], *folder = args->out ? args->out : name;
-    if (args->options.n > 0) return sdm_fail(err, SDM_E_ARG, "shapes new takes no -O");
+    if (args->files.n > 2)
+        return sdm_fail(err, SDM_E_ARG, "shapes new: unexpected argument '%s'",
+                        args->files.items[2]);
+    if (args->options.n > 0 || args->outputs.n > 0)
+        return sdm_fail(err, SDM_E_ARG, "shapes new takes no -O and no -o");
     sdm_status s = check_name(args, name, err);
     if (!s) s = write_folder(folder, name, err);
     if (s) return s;

@@ -22,7 +22,7 @@ expect 0 - "$installed/bin/sdmgen" shapes new mug
 has "^  cmake -S mug -B mug/build -DCMAKE_PREFIX_PATH=$installed\$"
 sed -n 's/^  //p' out >commands
 expect 0 - env PATH="$installed/bin:$PATH" bash -ec "$(grep -v 'sdmgen train' commands)" # its test trains
-has '100% tests passed, 0 tests failed out of 2'
+has '100% tests passed, 0 tests failed out of 3'
 present mug.png
 expect 0 - sdmgen config mug/mug.yaml --plugin mug/build/mug.so
 
@@ -46,9 +46,12 @@ expect 2 "'a-b' is no name" sdmgen shapes new a-b
 expect 2 "'test' is the name of a target of CMake" sdmgen shapes new test
 expect 2 "there is a shape 'torus' already" sdmgen shapes new torus
 expect 2 "usage: sdmgen shapes new NAME" sdmgen shapes new
-expect 2 "shapes new takes no -O" sdmgen shapes new other -O a=1
+expect 2 "shapes new takes no -O and no -o" sdmgen shapes new other -O a=1
+expect 2 "shapes new takes no -O and no -o" sdmgen shapes new other -o x.png
+expect 2 "unexpected argument 'b'" sdmgen shapes new other b
+expect 2 "usage: sdmgen shapes check NAME" sdmgen shapes check
 expect 2 "unexpected argument 'b'; usage" sdmgen shapes a b
-expect 2 "out belongs to shapes new NAME" sdmgen shapes torus --out x
+expect 2 'out needs .shapes new' sdmgen shapes torus --out x
 expect 1 'File too large' bash -c 'trap "" XFSZ; ulimit -f 1; "$0" shapes new big' "$program"
 absent other Mug a-b test torus a x nowhere big
 

@@ -116,13 +116,11 @@ sdm_status cmd_train(const cli_args *args, sdm_error *err)
     sdm_config *config = NULL;
     sdm_registry *registry = NULL;
     sdm_instance *shape = NULL;
-    sdm_status s = cli_read_config(args, &config, err);
+    sdm_status s = cli_open_config(args, &config, &registry, &shape, err);
     if (!s && args->out && strlen(args->out) >= sizeof config->output.folder)
         s = sdm_fail(err, SDM_E_ARG, "--out '%.100s...': the name is too long", args->out);
     if (!s && args->out) strcpy(config->output.folder, args->out);
     if (!s) s = check_folder(args, config->output.folder, err);
-    if (!s) s = cli_open_registry(args, &registry, err);
-    if (!s) s = cli_config_shape(config, registry, &shape, err);
     if (!s) s = train_network(args, config, shape, err);
     sdm_instance_free(shape);
     sdm_registry_free(registry);

@@ -51,8 +51,12 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "exact engine: errors of the distance, overlap of the volumes inside (Dice), distances\n"
      "between the zero surfaces, and the time per map on one core.",
      "sdmgen eval runs/cochlea/model.sdm --samples 100 --json", 1, 1},
-    {"shapes", "[NAME] | check NAME|CONFIG", "list the shapes, describe one, or check one",
-     "NAME: prints the parameters and options of a shape.\n"
+    {"shapes", "[NAME] | new NAME | check NAME|CONFIG",
+     "list the shapes, describe one, begin a new one, or check one",
+     "Without NAME: lists the shapes. NAME: prints the parameters and options of one.\n"
+     "new NAME: writes the folder NAME (or that of --out) with a shape of this name as a\n"
+     "plug-in: C source, CMakeLists.txt, a configuration and tests. It builds and passes its\n"
+     "tests as it is; replace its shape by yours. The folder must not exist.\n"
      "check: makes meshes all over the ranges of the parameters and looks for what spoils maps\n"
      "and trainings: broken meshes, parts that are inside out, vertices that jump, numbers of\n"
      "vertices that change, a grid that cuts the shapes (with a CONFIG, whose key=value\n"
@@ -222,6 +226,8 @@ const cli_option cli_options[] = {
      AT(band), ".vdb: half width of the narrow band in voxels (default 3)"},
     {"out", 0, CLI_TEXT, "DIR", NULL, 0, 0, ON(CLI_TRAIN) | ON(CLI_EXPERIMENT), AT(out),
      "run folder (default: the folder of the configuration, or runs/NAME)"},
+    {"out", 0, CLI_TEXT, "DIR", NULL, 0, 0, ON(CLI_SHAPES), AT(out),
+     "new: folder of the plug-in (default: NAME)"},
     {"resume", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN), AT(resume),
      "continue from the checkpoint in the folder"},
     {"force", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN) | ON(CLI_EXPERIMENT), AT(force),

@@ -122,7 +122,7 @@ struct cli_args {
     bool keys;                       /* config, experiment */
     bool markdown;                   /* config, experiment, help */
     bool man, completion;            /* help */
-    const char *out;                 /* train, experiment */
+    const char *out;                 /* train, experiment, shapes */
     const char *rows;                /* generate: the file of --params */
     const char *policy;              /* generate, fit */
     const char *shape;               /* exact, mesh, bench, phantom, fit */

@@ -66,12 +66,8 @@ static sdm_status open_config(check *c, sdm_error *err)
     if (args.options.n > 0)
         return sdm_fail(err, SDM_E_ARG,
                         "shapes check: -O belongs to NAME; a configuration has shape.options");
-    sdm_status s = cli_read_config(&args, &c->config, err);
-    if (!s) s = cli_config_shape(c->config, c->registry, &c->shape, err);
+    sdm_status s = cli_open_config(&args, &c->config, &c->registry, &c->shape, err);
     if (!s) sdm_instance_params(c->shape, &n);
-    if (!s && n > SDM_MAX_PARAMS)
-        s = sdm_fail(err, SDM_E_CONFIG, "%zu parameters, at most %d can be trained", n,
-                     SDM_MAX_PARAMS);
     if (!s) s = sdm_train_ranges(c->config, c->shape, min, max, err);
     if (!s) s = sdm_train_distributions(c->config, c->shape, min, max, c->distribution, err);
     if (s) return s;
@@ -90,17 +86,16 @@ static sdm_status open_shape(check *c, sdm_error *err)
 {
     const cli_args *args = c->args;
     const char *name = args->files.n > 1 ? args->files.items[1] : NULL;
-    sdm_status s = cli_open_registry(args, &c->registry, err);
     c->opts = (sdm_survey_opts){.samples = args->samples >= 0 ? (size_t)args->samples : SAMPLES,
                                 .seed = args->seed >= 0 ? (uint64_t)args->seed : 1,
                                 .n_threads = (int)args->threads,
                                 .cancelled = cli_interrupted};
-    if (s) return s;
     if (name && cli_ends_with_any(name, ".yaml .yml")) return open_config(c, err);
     if (args->files.n > 2)
         return sdm_fail(err, SDM_E_ARG, "shapes check: unexpected argument '%s'",
                         args->files.items[2]);
-    if (!name) s = only_shape(c, &name, err);
+    sdm_status s = cli_open_registry(args, &c->registry, err);
+    if (!s && !name) s = only_shape(c, &name, err);
     return s ? s : cli_create_shape(c->registry, name, &args->options, &c->shape, err);
 }
 

@@ -176,9 +176,9 @@ sdm_status cli_write_map(const char *path, const cli_map *map, const cli_args *a
     case KIND_VDB:
         return write_vdb(path, map, args, err);
     case KIND_IMAGE:
-        // the method comes first: NIfTI files keep only 79 characters
+        // the parameters come last: NIfTI files keep only 79 characters
         describe_method(map, made);
-        snprintf(text, sizeof text, "sdmgen %s: %s: %s %s, mm, negative inside", SDM_VERSION_TEXT,
+        snprintf(text, sizeof text, "sdmgen %s: mm, negative inside; %s: %s %s", SDM_VERSION_TEXT,
                  made, map->shape, map->params);
         return sdm_image_write(path, map->grid, map->values, text, err);
     case KIND_SURFACE:

@@ -20,6 +20,7 @@
 #include "fit_check.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/rotation.h"
+#include "sdm/internal/text.h"
 #include "sdm/memory.h"
 
 // largest number of rounds in which region, prior weights and state are brought into agreement
@@ -126,9 +127,10 @@ static sdm_status params_start(fit_problem *p, bool *clamped, sdm_error *err)
             x = sdm_instance_params(source->shape, &n)[k].def;
         }
         const double near = fmin(fmax(x, p->low[k]), p->high[k]);
-        if (!isfinite(x) || (x != near && source->policy != SDM_RANGE_CLAMP))
-            return sdm_fail(err, SDM_E_RANGE, "start of %s = %.9g, need %.9g to %.9g", name, x,
-                            p->low[k], p->high[k]);
+        if (!isfinite(x) || (x != near && source->policy != SDM_RANGE_CLAMP)) {
+            sdm_fail_range(name, x, p->low[k], p->high[k], "", err);
+            return sdm_fail_in(err, SDM_E_RANGE, "start");
+        }
         if (x != near) *clamped = true;
         p->state.params[k] = near;
     }

@@ -186,7 +186,8 @@ typedef struct sdm_config {
  * their values are YAML: "network.depth=4", "shape.ranges.a=[2,3]". SDM_E_CONFIG: err->text lists
  * the mistakes, one per line as "file:line:column: message" (in an override: "argument
  * 'network.dpth=4': message"). Mistakes are unknown keys (with "did you mean"), duplicate and
- * missing keys, and values of a wrong type or out of range. Also SDM_E_IO, SDM_E_ARG, SDM_E_NOMEM.
+ * missing keys, and values of a wrong type or out of range; *out then holds what could be read and
+ * serves for finding further mistakes only. Also SDM_E_IO, SDM_E_ARG, SDM_E_NOMEM.
  * The marks in *out point to the texts of the overrides. */
 sdm_status sdm_config_read(const char *path, const char *const *overrides, size_t n_overrides,
                            sdm_config *out, sdm_error *err);

@@ -3,6 +3,7 @@
 
 #include "sdm/exact.h"
 #include "sdm/internal/config.h"
+#include "sdm/internal/mistakes.h"
 #include "sdm/model.h"
 #include "sdm/registry.h"
 
@@ -67,27 +68,24 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
                      sdm_error *err);
 
 /* Parameter ranges of the training, min[n] and max[n]: those of the shape, narrowed by the
-   configuration. SDM_E_CONFIG with file:line:column: a parameter is unknown, or its range is wider
-   than the shape's. */
+   configuration. SDM_E_CONFIG with a line "file:line:column: ..." for every parameter that is
+   unknown or whose range is wider than the shape's. */
 sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape, double *min,
                             double *max, sdm_error *err);
 
 /* Distributions of the parameters in the training, out[n], on the ranges min[n] and max[n] of
    sdm_train_ranges(): as shape.distribution says. A normal distribution for which neither the
    configuration nor the shape has figures gets the default value (moved into the range) as its mean
-   and a quarter of the range as its deviation. SDM_E_CONFIG with file:line:column: a parameter is
-   unknown, or its figures do not fit its range. */
+   and a quarter of the range as its deviation. SDM_E_CONFIG with a line
+   "file:line:column: ..." for every parameter that is unknown or whose figures do not fit its
+   range. */
 sdm_status sdm_train_distributions(const sdm_config *config, const sdm_instance *shape,
                                    const double *min, const double *max, sdm_distribution *out,
                                    sdm_error *err);
 
-/* p[n] = random parameter vector number `index` of `stream`, within min[n] .. max[n]: the quantiles
-   of distribution[n] at a Sobol' point (Joe and Kuo 2008) with a random digital shift for n <= 64,
-   or at independent counter-based random numbers for n > 64. Depends on the arguments only. [any
-   thread] */
-void sdm_sample_params(uint64_t seed, uint64_t stream, uint64_t index, const double *min,
-                       const double *max, const sdm_distribution *distribution, size_t n,
-                       double *p);
+/* Adds to *m the mistakes in the ranges and distributions of the configuration, as the two
+   functions above find them, and a shape with more than SDM_MAX_PARAMS parameters. */
+void sdm_train_find_mistakes(const sdm_config *config, const sdm_instance *shape, sdm_mistakes *m);
 
 #ifdef __cplusplus
 }

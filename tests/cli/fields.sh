@@ -45,7 +45,7 @@ expect 0 - sdmgen generate $model --size 30,30,30 --outside bound -o bound.npy
 expect 0 - sdmgen generate $model --size 30,30,30 --outside exact -o exact.npy
 cmp -s bound.npy exact.npy && bad 'bound and exact are the same'
 expect 0 'clamped to it' sdmgen generate $model -p a=7 --policy clamp --spacing 0.4 -o c.npy
-expect 5 'a = 7' sdmgen generate $model -p a=7 --spacing 0.4 -o x.npy
+expect 5 "parameter 'a' = 7" sdmgen generate $model -p a=7 --spacing 0.4 -o x.npy
 
 # Times on another grid.
 expect 0 - sdmgen bench network $model --size 40,36,32 --json

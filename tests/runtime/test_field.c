@@ -719,7 +719,7 @@ static void test_policies_out_of_range(void **state)
     sdm_error err;
     assert_int_equal(sdm_generate_grid(s->model[0], p, NULL, &g, values, NULL, &r, &err),
                      SDM_E_RANGE);
-    assert_non_null(strstr(err.text, "radius = 1.7 mm"));
+    assert_non_null(strstr(err.text, "'radius' = 1.7 mm"));
     const sdm_generate_opts clamp = {.policy = SDM_RANGE_CLAMP},
                             exact = {.policy = SDM_RANGE_EXACT, .exact_shape = s->shape};
     assert_false(sdm_generate_grid(s->model[0], p, &clamp, &g, values, NULL, &r, &err));

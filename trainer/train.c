@@ -19,10 +19,8 @@
 static void fill_report(void *user, size_t done, size_t all)
 {
     trainer *t = user;
-    const size_t fixed = t->data.n_holdout + t->data.n_static;
-    t->data.n_taken = done > fixed ? done - fixed : 0;
-    trainer_report(t, trainer_start_fraction(t), (double)done / (trainer_seconds(t) + 1e-9),
-                   done == all);
+    t->pace.done = (int64_t)done;
+    trainer_report(t, trainer_start_fraction(t), done == all);
 }
 
 static bool fill_cancelled(void *user) { return trainer_cancelled(user); }
@@ -40,6 +38,7 @@ static sdm_status train_make_maps(trainer *t, bool resumed, sdm_error *err)
                               .enough = resumed ? NULL : fill_enough,
                               .user = t};
     t->phase = SDM_PHASE_DATA;
+    trainer_pace_start(t, 1);
     const sdm_status s = trainer_dataset_fill(&t->data, t->n_threads, &hooks, err);
     if (s) return s;
     if (t->data.n_start < start)
@@ -58,7 +57,8 @@ static sdm_status train_prepare(trainer *t, bool resumed, size_t n_taken, sdm_er
 {
     sdm_status s = train_make_maps(t, resumed, err);
     t->phase = SDM_PHASE_BASES;
-    trainer_report(t, trainer_start_fraction(t), 0, true);
+    trainer_pace_start(t, 0);
+    trainer_report(t, trainer_start_fraction(t), true);
     if (!s) s = t->kind->begin(t, err);
     if (!s) s = trainer_samples_start(t, err);
     if (!s && resumed) s = trainer_samples_retake(t, n_taken, err);
@@ -107,7 +107,7 @@ static sdm_status train_finish(trainer *t, sdm_train_report *report, sdm_error *
     const sdm_phase phase = t->phase;
     const size_t lines = t->metrics->size;
     t->phase = SDM_PHASE_EVALUATE;
-    trainer_report(t, 1, 0, true);
+    trainer_report(t, 1, true);
     const sdm_status s = trainer_export_model(t, report, err);
     if (!s) return trainer_checkpoint_remove(t, err);
     t->phase = phase;
@@ -146,6 +146,7 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
                  .started = sdm_clock(),
                  .loss = NAN,
                  .heldout_mse = NAN,
+                 .evaluated_step = -1,
                  .metrics = &metrics};
     if (hooks) t.hooks = *hooks;
     t.n_threads = sdm_threads(config->threads);

@@ -113,13 +113,25 @@ static double direct_fraction(const trainer *t, const direct_state *d)
     return length > 0 ? (trainer_seconds(t) - t->phase_started) / length : 1;
 }
 
+/* Measures the averaged weights on held-out maps and adds a line to the metrics. */
+static sdm_status direct_evaluate(trainer *t, direct_state *d, double rate, sdm_error *err)
+{
+    const double began = trainer_seconds(t);
+    double mse;
+    const sdm_status s = d->kind->evaluate(t, d->network, d->weights.average, &mse, err);
+    if (s) return s;
+    trainer_evaluated(t, mse, began);
+    return trainer_metric(t, rate, err);
+}
+
 static sdm_status direct_run(trainer *t, bool resumed, sdm_error *err)
 {
     const sdm_config *c = t->config;
     direct_state *d = t->state;
     sdm_status s = resumed ? trainer_checkpoint_weights(t, err) : SDM_OK;
     if (!s && trainer_by_time(t)) s = trainer_export_time(t, &d->export_seconds, err);
-    trainer_speed speed = trainer_speed_start(t);
+    trainer_pace_start(t, (double)c->train.batch);
+    if (!s && t->phase_step == 0) s = direct_evaluate(t, d, 0, err);
     for (double at; !s && (at = direct_fraction(t, d)) < 1;) {
         // new maps, or stop
         if ((s = trainer_samples_take(t, trainer_samples_wanted(t, at), err))) break;
@@ -128,16 +140,12 @@ static sdm_status direct_run(trainer *t, bool resumed, sdm_error *err)
         const double rate = c->train.learning_rate * trainer_rate_schedule(at, c->train.warmup);
         if ((s = direct_step(t, d, rate, err))) break;
         // evaluate, report, save
-        double now = trainer_seconds(t);
-        if (trainer_evaluation_due(t, now)) {
-            if ((s = d->kind->evaluate(t, d->network, d->weights.average, &t->heldout_mse, err)))
-                break;
-            t->last_evaluation = now = trainer_seconds(t);
-            if ((s = trainer_metric(t, rate, err))) break;
-        }
-        trainer_speed_report(t, &speed, (size_t)c->train.batch, now);
+        const double now = trainer_seconds(t);
+        if (trainer_evaluation_due(t, now) && (s = direct_evaluate(t, d, rate, err))) break;
+        trainer_step_done(t);
         s = trainer_checkpoint_if_due(t, now, err);
     }
+    if (!s && t->evaluated_step != t->step) s = direct_evaluate(t, d, 0, err);
     return s;
 }
 

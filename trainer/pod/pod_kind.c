@@ -133,10 +133,9 @@ static sdm_status pod_run(trainer *t, bool resumed, sdm_error *err)
         if (resumed) s = trainer_checkpoint_weights(t, err);
         if (!s) s = trainer_mode_fit_run(pod, err);
         if (!s) s = trainer_refine_start(pod, false, err);
-        if (!s) s = trainer_refine_evaluate(pod, pod->refine.w, &t->heldout_mse, err);
         if (s) return s;
         trainer_enter(t, SDM_PHASE_REFINE);
-        s = trainer_metric(t, 0, err);
+        s = trainer_refine_note(pod, pod->refine.w, 0, err);
     } else {
         s = trainer_refine_start(pod, true, err);
         if (!s) s = trainer_checkpoint_weights(t, err);

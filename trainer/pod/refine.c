@@ -350,6 +350,16 @@ sdm_status trainer_refine_evaluate(pod_state *pod, const float *w, double *mse, 
     return s;
 }
 
+sdm_status trainer_refine_note(pod_state *pod, const float *w, double rate, sdm_error *err)
+{
+    const double began = trainer_seconds(pod->t);
+    double mse;
+    const sdm_status s = trainer_refine_evaluate(pod, w, &mse, err);
+    if (s) return s;
+    trainer_evaluated(pod->t, mse, began);
+    return trainer_metric(pod->t, rate, err);
+}
+
 sdm_status trainer_refine_start(pod_state *pod, bool resumed, sdm_error *err)
 {
     const sdm_pod_arch *a = &pod->arch;
@@ -385,7 +395,7 @@ sdm_status trainer_refine_run(pod_state *pod, sdm_error *err)
     if (!(c->train.refine > 0)) return SDM_OK;
     refine_batch b = {0};
     sdm_status s = refine_batch_create(pod, (size_t)c->train.refine_batch, &b, err);
-    trainer_speed speed = trainer_speed_start(t);
+    trainer_pace_start(t, (double)c->train.refine_batch);
     double at = refine_fraction(t, pod->refine_end);
     bool done = false;
     // the start counts too: the refinement must not lose what least squares have found
@@ -414,16 +424,15 @@ sdm_status trainer_refine_run(pod_state *pod, sdm_error *err)
         // evaluate, report, save
         const double now = trainer_seconds(t);
         if (trainer_evaluation_due(t, now)) {
-            if ((s = trainer_refine_evaluate(pod, pod->refine.average, &t->heldout_mse, err)))
-                break;
-            t->last_evaluation = now;
-            done = trainer_best_note(t, &pod->refine, at, t->heldout_mse);
-            if ((s = trainer_metric(t, rate, err))) break;
+            if ((s = trainer_refine_note(pod, pod->refine.average, rate, err))) break;
+            if (trainer_evaluation_counts(t))
+                done = trainer_best_note(t, &pod->refine, at, t->heldout_mse);
         }
-        trainer_speed_report(t, &speed, b.rows, now);
+        trainer_step_done(t);
         s = trainer_checkpoint_if_due(t, now, err);
     }
-    if (!s) s = trainer_refine_evaluate(pod, pod->refine.average, &t->heldout_mse, err);
+    if (!s && t->evaluated_step != t->step)
+        s = trainer_refine_note(pod, pod->refine.average, 0, err);
     if (!s) {
         trainer_best_note(t, &pod->refine, at, t->heldout_mse);
         trainer_best_restore(t, &pod->refine);

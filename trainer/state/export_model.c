@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "data/workbench.h"
+#include "history.h"
 #include "kind.h"
 #include "progress.h"
 #include "sdm/internal/checksum.h"
@@ -15,7 +16,6 @@
 #include "sdm/internal/model_threads.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
-#include "sdm/picture.h"
 
 /* Voxels within this distance of the surface count for rmse_near_mm. */
 #define NEAR_MM 0.4f
@@ -171,37 +171,13 @@ static void collect_options(const trainer *t, option_texts *o)
     }
 }
 
-/* Number after `key` in one line of metrics.jsonl; NaN if there is none. */
-static double metric_number(const char *line, const char *key)
-{
-    const char *at = strstr(line, key);
-    return at ? strtod(at + strlen(key), NULL) : NAN;
-}
-
-/* loss.png: training loss and held-out error over the steps, from the lines of metrics.jsonl. */
+/* loss.png, from the lines of metrics.jsonl. */
 static sdm_status curve_write(const trainer *t, sdm_error *err)
 {
-    double *step = NULL, *loss = NULL, *heldout = NULL;
-    size_t lines = 0, n = 0;
-    for (const char *p = t->metrics->data; p && *p; p++) lines += *p == '\n';
-    sdm_status s = SDM_ALLOC(&step, lines, "loss curve", err);
-    if (!s) s = SDM_ALLOC(&loss, lines, "loss curve", err);
-    if (!s) s = SDM_ALLOC(&heldout, lines, "loss curve", err);
-    if (!s) {
-        for (const char *p = t->metrics->data; p && *p; p = strchr(p, '\n') + 1) {
-            step[n] = metric_number(p, "\"step\": ");
-            if (!isfinite(step[n])) continue; // the result of the race
-            loss[n] = metric_number(p, "\"loss_mm2\": ");
-            heldout[n++] = metric_number(p, "\"heldout_mse_mm2\": ");
-        }
-        char path[SDM_PATH_TEXT_MAX + 32];
-        snprintf(path, sizeof path, "%s/loss.png", t->folder);
-        const sdm_curve curves[] = {{"training", step, loss, n}, {"held out", step, heldout, n}};
-        s = sdm_picture_plot(path, "Mean square error", "step", "mm^2", true, curves, 2, err);
-    }
-    sdm_free(heldout);
-    sdm_free(loss);
-    sdm_free(step);
+    history h;
+    sdm_status s = trainer_history_read(t, &h, err);
+    if (!s) s = trainer_history_picture(t, &h, err);
+    trainer_history_dispose(&h);
     return s;
 }
 

@@ -49,18 +49,18 @@ static void format_rate(char buf[32], double rate)
         snprintf(buf, 32, "%.1fM", rate / 1e6);
 }
 
-/* "1,250 of 8,177 exact maps  61 maps/s  1:53 left" */
+/* "1:53 left  1,250 of 8,177 exact maps  61 maps/s" */
 static void format_maps(const sdm_progress *p, char *text, size_t size)
 {
     char done[32], all[32], rate[32], left[32];
     format_rate(rate, p->samples_per_second);
     format_time(left, sizeof left, p->seconds_left);
-    snprintf(text, size, "%s of %s exact maps  %s maps/s  %s left",
-             cli_format_count(p->samples, done), cli_format_count(p->samples_at_start, all), rate,
-             left);
+    snprintf(text, size, "%s left  %s of %s exact maps  %s maps/s", left,
+             cli_format_count(p->samples, done), cli_format_count(p->samples_at_start, all), rate);
 }
 
-/* "step 1,200  loss 3.1e-05 mm^2  held-out 0.0123 mm (12 s ago)  18k maps/s  1:05 left" */
+/* "1:05 left  held-out 0.0123 mm (12 s ago)  18k maps/s  loss 3.1e-05 mm^2  step 1,200"; what counts
+   most comes first, for narrow terminals. */
 static void format_steps(const sdm_progress *p, char *text, size_t size)
 {
     char step[32], loss[32] = "-", error[64] = "-", left[32], rate[32];
@@ -70,8 +70,8 @@ static void format_steps(const sdm_progress *p, char *text, size_t size)
                  fmax(0, p->seconds - p->heldout_seconds));
     format_rate(rate, p->samples_per_second);
     format_time(left, sizeof left, p->seconds_left);
-    snprintf(text, size, "step %s  loss %s  held-out %s  %s maps/s  %s left",
-             cli_format_count(p->step, step), loss, error, rate, left);
+    snprintf(text, size, "%s left  held-out %s  %s maps/s  loss %s  step %s", left, error, rate,
+             loss, cli_format_count(p->step, step));
 }
 
 static void on_progress(void *user, const sdm_progress *p)

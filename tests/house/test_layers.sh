@@ -48,7 +48,7 @@ check() {
         own("shape", "registry")
         own("shapes", "builtin_shapes")
         own("runtime", "check fit map phantom runtime vdb")
-        own("trainer", "train")
+        own("trainer", "train verdict")
         parts("core", "core")
         parts("config", "core config")
         parts("geom", "core geom")

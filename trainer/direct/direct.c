@@ -118,7 +118,7 @@ static sdm_status direct_evaluate(trainer *t, direct_state *d, double rate, sdm_
 {
     const double began = trainer_seconds(t);
     double mse;
-    const sdm_status s = d->kind->evaluate(t, d->network, d->weights.average, &mse, err);
+    const sdm_status s = d->kind->evaluate(t, d->network, d->weights.average, false, &mse, err);
     if (s) return s;
     trainer_evaluated(t, mse, began);
     return trainer_metric(t, rate, err);
@@ -166,6 +166,15 @@ static sdm_status direct_build(const trainer *t, const sdm_model_info *info, uin
     return d->kind->build(t, d->network, d->weights.average, info, bytes, size, err);
 }
 
+static sdm_status direct_parts(const trainer *t, error_measures *out, sdm_error *err)
+{
+    const direct_state *d = t->state;
+    const float *w = d->weights.average;
+    out->other_voxels = true;
+    const sdm_status s = d->kind->evaluate(t, d->network, w, true, &out->network.training, err);
+    return s ? s : d->kind->evaluate(t, d->network, w, false, &out->network.heldout, err);
+}
+
 static void direct_dispose(trainer *t)
 {
     direct_state *d = t->state;
@@ -184,4 +193,5 @@ const train_kind trainer_kind_direct = {.block = direct_block,
                                         .weights = direct_weights,
                                         .fingerprint = direct_fingerprint,
                                         .build = direct_build,
+                                        .parts = direct_parts,
                                         .dispose = direct_dispose};

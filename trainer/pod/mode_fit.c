@@ -168,7 +168,7 @@ static void mode_fit_step(pod_state *pod, mode_batch *b, size_t batch, double ra
     for (size_t i = 0; i < batch; i++) sum += b->loss[i];
     const double scale = pod->target_scale;
     pod->t->loss =
-        pod->holdout_floor + sum * scale * scale / ((double)batch * (double)pod->t->data.n_voxels);
+        pod->training_floor + sum * scale * scale / ((double)batch * (double)pod->t->data.n_voxels);
 
     // gradient with respect to the weights
     sdm_gemm(r, a->width, batch, (sdm_view){b->predicted, 1, r}, (sdm_view){h, a->width, 1}, false,

@@ -9,6 +9,7 @@
 #include "mlp.h"
 #include "mode_fit.h"
 #include "modes.h"
+#include "pod_parts.h"
 #include "refine.h"
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/rng.h"
@@ -215,4 +216,5 @@ const train_kind trainer_kind_pod = {.block = pod_block,
                                      .weights = pod_weights,
                                      .fingerprint = pod_fingerprint,
                                      .build = pod_build,
+                                     .parts = trainer_pod_parts,
                                      .dispose = pod_dispose};

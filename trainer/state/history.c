@@ -60,7 +60,13 @@ int64_t trainer_history_last_step(const history *h)
     return h->n ? (int64_t)h->point[h->n - 1].step : -1;
 }
 
-double trainer_history_fall(const history *h, sdm_phase phase)
+/* Root mean square error beyond the floor, mm. */
+static double beyond(const history_point *p, double floor)
+{
+    return sqrt(fmax(0, p->heldout - floor));
+}
+
+double trainer_history_fall(const history *h, sdm_phase phase, double floor)
 {
     const history_point *first = NULL, *last = NULL;
     size_t n = 0;
@@ -80,12 +86,12 @@ double trainer_history_fall(const history *h, sdm_phase phase)
         if (p->step >= at) {
             const double length = p->step - before->step,
                          share = length > 0 ? (at - before->step) / length : 1;
-            error = sqrt(before->heldout) * (1 - share) + sqrt(p->heldout) * share;
+            error = beyond(before, floor) * (1 - share) + beyond(p, floor) * share;
             break;
         }
         before = p;
     }
-    return error > 0 ? fmax(0, 1 - sqrt(last->heldout) / error) : 0;
+    return error > 0 ? fmax(0, 1 - beyond(last, floor) / error) : 0;
 }
 
 sdm_status trainer_history_picture(const trainer *t, const history *h, sdm_error *err)

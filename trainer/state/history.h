@@ -21,10 +21,10 @@ void trainer_history_dispose(history *h);
 /* Step of the last line; -1 if there is none. */
 int64_t trainer_history_last_step(const history *h);
 
-/* The part of the held-out root mean square error that the last third of the steps of a phase took
-   away, 0 .. 1, averaged weights; 0 if the error rose, NaN if it was measured fewer than three times
-   in this phase. */
-double trainer_history_fall(const history *h, sdm_phase phase);
+/* The part of the held-out root mean square error beyond `floor` (mm^2) that the last third of the
+   steps of a phase took away, 0 .. 1, averaged weights; 0 if the error rose, NaN if it was measured
+   fewer than three times in this phase. */
+double trainer_history_fall(const history *h, sdm_phase phase, double floor);
 
 /* Draws loss.png: root mean square errors on training batches and on held-out shapes over the steps,
    and that of the finished model. */

@@ -166,6 +166,16 @@ static sdm_status metrics_write(const trainer *t, sdm_error *err)
     return s;
 }
 
+/* Closes the object *j, adds it as a line and writes the file. */
+static sdm_status metrics_add(trainer *t, sdm_json *j, sdm_error *err)
+{
+    sdm_json_close(j, '}');
+    if (!j->text.failed) sdm_text_add(t->metrics, "%s\n", j->text.data);
+    const bool failed = j->text.failed || t->metrics->failed;
+    sdm_json_dispose(j);
+    return failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the metrics") : metrics_write(t, err);
+}
+
 sdm_status trainer_metric(trainer *t, double rate, sdm_error *err)
 {
     static const char *const phases[] = {"data", "bases", "fit", "refine", "evaluate"};
@@ -180,11 +190,17 @@ sdm_status trainer_metric(trainer *t, double rate, sdm_error *err)
     sdm_json_real(&j, "learning_rate", rate);
     // with a budget of steps the file has the same bits in every run: no times
     if (trainer_by_time(t)) sdm_json_real(&j, "seconds", trainer_seconds(t));
-    sdm_json_close(&j, '}');
-    if (!j.text.failed) sdm_text_add(t->metrics, "%s\n", j.text.data);
-    const bool failed = j.text.failed || t->metrics->failed;
-    sdm_json_dispose(&j);
-    return failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the metrics") : metrics_write(t, err);
+    return metrics_add(t, &j, err);
+}
+
+sdm_status trainer_metric_verdict(trainer *t, const sdm_verdict *v, sdm_error *err)
+{
+    sdm_json j = {0};
+    sdm_json_open(&j, NULL, '{');
+    sdm_json_text(&j, "phase", "verdict");
+    sdm_verdict_json(&j, v);
+    if (trainer_by_time(t)) sdm_json_real(&j, "saved_seconds", v->saved_seconds);
+    return metrics_add(t, &j, err);
 }
 
 void trainer_step_done(trainer *t)

@@ -56,5 +56,8 @@ void trainer_evaluated(trainer *t, double mse, double began);
 /* Appends a line with the current figures and the learning rate `rate` to metrics.jsonl. */
 sdm_status trainer_metric(trainer *t, double rate, sdm_error *err);
 
+/* Appends a line with the verdict, without times unless the budget is a time. */
+sdm_status trainer_metric_verdict(trainer *t, const sdm_verdict *v, sdm_error *err);
+
 /* For a training loop: counts a step and reports progress. */
 void trainer_step_done(trainer *t);

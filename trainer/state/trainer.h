@@ -49,5 +49,6 @@ typedef struct trainer {
     trainer_pace pace;
     double loss, heldout_mse; /* mm^2 */
     struct sdm_text *metrics; /* all lines of metrics.jsonl */
+    double saved_seconds;     /* by train.patience */
     sdm_accuracy accuracy;    /* accuracy of the finished model */
 } trainer;

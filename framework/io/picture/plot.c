@@ -156,17 +156,16 @@ static sdm_colour curve_colour(size_t i)
     return known[i % (sizeof known / sizeof *known)];
 }
 
-/* A marker of 7 pixels: a square, or on edge for odd curves. */
+/* A marker of 7 pixels: a disc for the first curve, a diamond for the second, and so on in turn. */
 static void draw_marker(sdm_canvas *c, double x, double y, size_t number, sdm_colour colour)
 {
-    const double r = 3.5;
     if (number % 2 == 0) {
-        sdm_canvas_line(c, x - r, y, x + r, y, 2 * r, colour);
+        sdm_canvas_line(c, x, y, x, y, 7, colour); // lines have round ends
         return;
     }
     // lines of falling length, one per row of pixels
     for (int i = -4; i <= 4; i++)
-        sdm_canvas_line(c, x - (4.5 - abs(i)), y + i, x + (4.5 - abs(i)), y + i, 1.1, colour);
+        sdm_canvas_line(c, x - (4 - abs(i)), y + i, x + (4 - abs(i)), y + i, 1.1, colour);
 }
 
 /* Draws a marker at each point, unless the points lie too close. */
@@ -196,8 +195,8 @@ static void draw_curve(sdm_canvas *c, const window *w, const sdm_curve *curve, s
         is_started = ok;
     }
     sdm_canvas_stroke(c, 1.8, colour);
-    draw_markers(c, w, curve, number);
     sdm_canvas_unclip(c);
+    draw_markers(c, w, curve, number);
 }
 
 static void draw_legend(sdm_canvas *c, const sdm_curve *curves, size_t n)

@@ -3,6 +3,7 @@
 
 #include "sdm/exact.h"
 #include "sdm/internal/config.h"
+#include "sdm/internal/verdict.h"
 #include "sdm/model.h"
 #include "sdm/registry.h"
 
@@ -60,6 +61,7 @@ typedef struct sdm_train_report {
     /* Optimiser steps; training maps. */
     int64_t steps, samples;
     double seconds;
+    sdm_verdict verdict;
 } sdm_train_report;
 
 /* Trains a network as `config` says and writes into `folder`: config.yaml (with all defaults filled

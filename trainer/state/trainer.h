@@ -49,6 +49,7 @@ typedef struct trainer {
     trainer_pace pace;
     double loss, heldout_mse; /* mm^2 */
     struct sdm_text *metrics; /* all lines of metrics.jsonl */
+    double prepared_seconds;  /* trainer_seconds() before the first step */
     double saved_seconds;     /* by train.patience */
     sdm_accuracy accuracy;    /* accuracy of the finished model */
 } trainer;

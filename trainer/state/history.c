@@ -10,11 +10,13 @@
 #include "sdm/memory.h"
 #include "sdm/picture.h"
 
-/* Number after `key` in one line; NaN if there is none. */
+/* Number after `key` in one line; NaN if there is none, or null. */
 static double number_after(const char *line, size_t length, const char *key)
 {
     const char *at = strstr(line, key);
-    return at && at < line + length ? strtod(at + strlen(key), NULL) : NAN;
+    if (!at || at >= line + length) return NAN;
+    at += strlen(key);
+    return *at == 'n' ? NAN : strtod(at, NULL);
 }
 
 /* The phase that the line names; SDM_PHASE_DATA: none with steps. */

@@ -159,11 +159,16 @@ static sdm_grade grade_of(const sdm_verdict *v)
 }
 
 /* *limit = the largest part, or the grid. Returns false if nothing was measured. */
-static bool find_limit(const sdm_verdict *v, sdm_cause *limit)
+static bool find_limit(const verdict_input *in, const sdm_verdict *v, sdm_cause *limit)
 {
+    const double *part = v->part_mm2;
     double largest = 0;
     for (int i = 0; i < SDM_CAUSE_GRID; i++)
-        if (v->part_mm2[i] > largest) largest = v->part_mm2[i], *limit = (sdm_cause)i;
+        if (part[i] > largest) largest = part[i], *limit = (sdm_cause)i;
+    // a network that has hardly been trained fits neither training maps nor others
+    if (*limit == SDM_CAUSE_MAPS && in->config->network.depth && in->steps < FEW_STEPS &&
+        part[SDM_CAUSE_NETWORK] > 0.5 * part[SDM_CAUSE_MAPS])
+        *limit = SDM_CAUSE_NETWORK;
     const double grid = sqrt(v->part_mm2[SDM_CAUSE_GRID]);
     if (grid > fmax(v->rmse_voxel_mm, GRID_ERROR * v->voxel_mm)) *limit = SDM_CAUSE_GRID;
     return largest > 0 || *limit == SDM_CAUSE_GRID;
@@ -203,7 +208,7 @@ void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)
 {
     v->grade = grade_of(v);
     v->at_best_mm = NAN;
-    v->limited = find_limit(v, &v->limit);
+    v->limited = find_limit(in, v, &v->limit);
     if (!v->limited) {
         snprintf(v->sentence, sizeof v->sentence, "Nothing that was measured limits it.");
         return;

@@ -359,8 +359,12 @@ static void progress_is_true(void **state)
     assert_true(s.reports > 3 && s.rates > 1 && s.heldout_first <= 1000);
 }
 
-int main(void)
+/* With any argument: the tests that take long. */
+int main(int argc, char **argv)
 {
+    (void)argv;
+    const struct CMUnitTest slow[] = {cmocka_unit_test(advice_helps)};
+    if (argc > 1) return cmocka_run_group_tests(slow, set_up, tear_down);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(largest_part_limits),
         cmocka_unit_test(length_of_the_training),
@@ -371,7 +375,6 @@ int main(void)
         cmocka_unit_test(surface_of_a_sphere),
         cmocka_unit_test(parts_add_up),
         cmocka_unit_test(progress_is_true),
-        cmocka_unit_test(advice_helps),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -165,8 +165,10 @@ static bool find_limit(const verdict_input *in, const sdm_verdict *v, sdm_cause 
     double largest = 0;
     for (int i = 0; i < SDM_CAUSE_GRID; i++)
         if (part[i] > largest) largest = part[i], *limit = (sdm_cause)i;
-    // a network that has hardly been trained fits neither training maps nor others
-    if (*limit == SDM_CAUSE_MAPS && in->config->network.depth && in->steps < FEW_STEPS &&
+    // a network that has not learned what it could fits neither training maps nor others
+    const bool unfinished = in->steps < FEW_STEPS || v->fall > STILL_FALLING ||
+                            v->modes_mm2 > part[SDM_CAUSE_NETWORK] + part[SDM_CAUSE_MAPS];
+    if (*limit == SDM_CAUSE_MAPS && in->config->network.depth && unfinished &&
         part[SDM_CAUSE_NETWORK] > 0.5 * part[SDM_CAUSE_MAPS])
         *limit = SDM_CAUSE_NETWORK;
     const double grid = sqrt(v->part_mm2[SDM_CAUSE_GRID]);

@@ -394,8 +394,7 @@ const cli_option cli_options[] = {
     {"plugin", 0, CLI_LIST, "FILE", NULL, 0, 0, WITH_SHAPES, AT(plugins),
      "load shapes from a shared object; may be repeated"},
     {"threads", 0, CLI_INT, "N", NULL, 0, 1024, TRAININGS, AT(threads),
-     "number of threads; 0: all (default). With train.steps or train.samples the result does\n"
-     "not depend on it; with train.minutes more threads make more steps"},
+     "number of threads; 0: all (default). Results depend on it with train.minutes only"},
     {"threads", 0, CLI_INT, "N", NULL, 0, 1024, ALL & ~ON(CLI_HELP) & ~TRAININGS, AT(threads),
      "number of threads; 0: all (default). Results do not depend on it"},
     {"seed", 0, CLI_INT, "N", NULL, 0, 9007199254740992.0,

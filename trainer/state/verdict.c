@@ -195,7 +195,7 @@ static void write_sentence(const verdict_input *in, const char *what, sdm_verdic
     if (v->limit == SDM_CAUSE_GRID)
         snprintf(result, sizeof result, "; between its voxels exact maps miss the surface by %.2g mm",
                  sqrt(v->part_mm2[SDM_CAUSE_GRID]));
-    else if (v->limit != SDM_CAUSE_NETWORK)
+    else if (v->limit != SDM_CAUSE_NETWORK && v->at_best_mm > 0)
         snprintf(result, sizeof result, "; without this part the RMSE would be %.2g mm, not %.2g mm",
                  v->at_best_mm, v->rmse_mm);
     if (v->limit != SDM_CAUSE_GRID) {

@@ -106,11 +106,12 @@ static void tell_overrun(trainer *t, double measured)
 {
     const double budget = t->config->train.minutes * 60, over = trainer_seconds(t) - budget;
     if (!trainer_by_time(t) || over < fmax(1, 0.02 * budget)) return;
-    trainer_message(t,
-                    "the run took %.0f s longer than train.minutes: the maps, bases and trials before "
-                    "the first step took %.0f s, the measurement of the model %.0f s (lower "
-                    "data.start, data.static or data.holdout, or raise train.minutes)",
-                    over, t->prepared_seconds, measured);
+    trainer_message(
+        t,
+        "the run took %.0f s longer than train.minutes: the maps, bases and trials before "
+        "the first step took %.0f s, the measurement of the model %.0f s (lower "
+        "data.start, data.static or data.holdout, or raise train.minutes)",
+        over, t->prepared_seconds, measured);
 }
 
 /* Measures and writes the model. If the model cannot be written, a checkpoint keeps the trained

@@ -36,12 +36,14 @@ void cli_print_verdict(const sdm_verdict *v)
         printf("  template    at the vertices: frames and amplitudes %.2g mm, warp %.2g mm\n",
                v->motion_mm, v->warp_mm);
     if (isfinite(v->fall))
-        printf("  steps       the last third of them lowered the error beyond that of the bases by %.0f %%\n",
+        printf("  steps       the last third of them lowered the error beyond that of the bases by "
+               "%.0f %%\n",
                100 * v->fall);
     if (isfinite(v->thin)) {
         const double grid = sqrt(v->part_mm2[SDM_CAUSE_GRID]);
-        printf("  grid        between its voxels exact maps miss the surface by %.5f mm (%.3f voxels)",
-               grid, grid / voxel);
+        printf(
+            "  grid        between its voxels exact maps miss the surface by %.5f mm (%.3f voxels)",
+            grid, grid / voxel);
         if (v->thin >= 0.005)
             printf("; %.0f %% of the surface is thinner than two voxels or has an edge",
                    100 * v->thin);

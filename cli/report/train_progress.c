@@ -59,8 +59,8 @@ static void format_maps(const sdm_progress *p, char *text, size_t size)
              cli_format_count(p->samples, done), cli_format_count(p->samples_at_start, all), rate);
 }
 
-/* "1:05 left  held-out 0.0123 mm (12 s ago)  18k maps/s  loss 3.1e-05 mm^2  step 1,200"; what counts
-   most comes first, for narrow terminals. */
+/* "1:05 left  held-out 0.0123 mm (12 s ago)  18k maps/s  loss 3.1e-05 mm^2  step 1,200"; what
+   counts most comes first, for narrow terminals. */
 static void format_steps(const sdm_progress *p, char *text, size_t size)
 {
     char step[32], loss[32] = "-", error[64] = "-", left[32], rate[32];

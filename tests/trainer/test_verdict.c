@@ -1,6 +1,6 @@
-/* The verdict on a training: the decision from given figures, the measured parts, and that following
- * the advice makes the error smaller.
- * Tests: verdict.c pod_parts.c tree_pass.c surface_check.c history.c progress.c */
+/* The verdict on a training: the decision from given figures, the measured parts, and that
+ * following the advice makes the error smaller. Tests: verdict.c pod_parts.c tree_pass.c
+ * surface_check.c history.c progress.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -63,7 +63,8 @@ static sdm_verdict decide(const char *override, sdm_cause cause, double fall, do
     return v;
 }
 
-// The largest part limits; its key, the doubled value and the rest of the error are in the sentence.
+// The largest part limits; its key, the doubled value and the rest of the error are in the
+// sentence.
 static void largest_part_limits(void **state)
 {
     (void)state;
@@ -128,7 +129,8 @@ static void grid_limits(void **state)
     static const struct {
         double model_mm, grid_mm;
         bool limits;
-    } cases[] = {{0.01, 0.039, false}, {0.01, 0.041, true}, {0.05, 0.049, false}, {0.05, 0.06, true}};
+    } cases[] = {
+        {0.01, 0.039, false}, {0.01, 0.041, true}, {0.05, 0.049, false}, {0.05, 0.06, true}};
     for (size_t i = 0; i < 4; i++) {
         sdm_verdict v = figures();
         v.rmse_voxel_mm = cases[i].model_mm;
@@ -162,7 +164,8 @@ static void grades(void **state)
     }
 }
 
-// Errors of 4, 3 and 2 mm at the steps 0, 60 and 90: a third of 3 mm in the last third of the steps.
+// Errors of 4, 3 and 2 mm at the steps 0, 60 and 90: a third of 3 mm in the last third of the
+// steps.
 static void error_falls_in_the_last_third(void **state)
 {
     (void)state;
@@ -171,9 +174,10 @@ static void error_falls_in_the_last_third(void **state)
     history h;
     sdm_text_add(&metrics, "{\"phase\": \"auto\", \"kind\": \"pod\", \"pod_rmse_mm\": 1}\n");
     for (int i = 0; i < 3; i++)
-        sdm_text_add(&metrics,
-                     "{\"phase\": \"fit\", \"step\": %d, \"loss_mm2\": %s, \"heldout_mse_mm2\": %d}\n",
-                     i == 2 ? 90 : 60 * i, i ? "0.5" : "null", (4 - i) * (4 - i));
+        sdm_text_add(
+            &metrics,
+            "{\"phase\": \"fit\", \"step\": %d, \"loss_mm2\": %s, \"heldout_mse_mm2\": %d}\n",
+            i == 2 ? 90 : 60 * i, i ? "0.5" : "null", (4 - i) * (4 - i));
     sdm_text_add(&metrics, "{\"phase\": \"evaluate\", \"step\": 90, \"loss_mm2\": null, "
                            "\"heldout_mse_mm2\": 9}\n{\"phase\": \"verdict\", \"rmse_mm\": 3}\n");
     assert_int_equal(trainer_history_read(&t, &h, NULL), SDM_OK);
@@ -250,8 +254,8 @@ static surface_check check_sphere(double radius, double spacing)
     return check[0];
 }
 
-// Trilinear interpolation overestimates a distance on average by spacing^2 / 12 times the sum of its
-// second derivatives, which is 2 / radius for a sphere.
+// Trilinear interpolation overestimates a distance on average by spacing^2 / 12 times the sum of
+// its second derivatives, which is 2 / radius for a sphere.
 static void surface_of_a_sphere(void **state)
 {
     (void)state;
@@ -274,7 +278,8 @@ static sdm_train_report train(const char *const *overrides, size_t n)
     return r;
 }
 
-// The parts add up to the mean square error, for whatever is refined and however weights are stored.
+// The parts add up to the mean square error, for whatever is refined and however weights are
+// stored.
 static void parts_add_up(void **state)
 {
     (void)state;
@@ -305,7 +310,9 @@ static void advice_helps(void **state)
     } cases[] = {
         {SDM_CAUSE_BASES, "network.rank", {"network.rank=1"}},
         {SDM_CAUSE_MAPS, "data.start", {"data.start=16"}},
-        {SDM_CAUSE_NETWORK, "network.width", {"network.width=8", "network.depth=1", "network.degree=1", "train.steps=2500"}},
+        {SDM_CAUSE_NETWORK,
+         "network.width",
+         {"network.width=8", "network.depth=1", "network.degree=1", "train.steps=2500"}},
         {SDM_CAUSE_NETWORK, "network.depth", {"network.depth=0", "network.degree=1"}},
         {SDM_CAUSE_NETWORK, "train.steps", {"train.steps=60", "network.degree=1"}},
         {SDM_CAUSE_GRID, "grid.spacing", {"grid.spacing=2.4", "grid.size=[7,6,6]"}},
@@ -342,7 +349,8 @@ static void look(void *user, const sdm_progress *p)
     assert_true(isnan(p->samples_per_second) || p->samples_per_second > 0);
     assert_true(isnan(p->heldout_rmse_mm) == isnan(p->heldout_seconds));
     assert_true(!(p->heldout_seconds > p->seconds));
-    assert_true(p->samples >= 0 && (p->phase != SDM_PHASE_DATA || p->samples <= p->samples_at_start));
+    assert_true(p->samples >= 0 &&
+                (p->phase != SDM_PHASE_DATA || p->samples <= p->samples_at_start));
     s->rates += p->samples_per_second > 0;
     if (isnan(s->heldout_first) && p->heldout_rmse_mm > 0) s->heldout_first = (double)p->step;
 }

@@ -13,6 +13,6 @@ enum {
     STREAM_EVALUATE = 650, // voxels of a held-out map that a point network is evaluated on
     STREAM_DROPOUT = 700,
     STREAM_SURFACE = 720, // points of a surface (surface_check.h)
-    STREAM_PLAN = 750,  // rejection of Sobol' points (sample_plan.h)
-    STREAM_BASES = 1000 // start of subspace iterations: global modes; block b has 1001 + b
+    STREAM_PLAN = 750,    // rejection of Sobol' points (sample_plan.h)
+    STREAM_BASES = 1000   // start of subspace iterations: global modes; block b has 1001 + b
 };

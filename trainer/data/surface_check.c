@@ -83,8 +83,7 @@ static bool interpolate(const sdm_grid *g, const float *map, const double x[3], 
             weight *= bit ? share[a] : 1 - share[a];
             v[a] = at[a] + bit;
         }
-        *value +=
-            weight * (double)map[(v[2] * (size_t)g->n[1] + v[1]) * (size_t)g->n[0] + v[0]];
+        *value += weight * (double)map[(v[2] * (size_t)g->n[1] + v[1]) * (size_t)g->n[0] + v[0]];
     }
     return true;
 }

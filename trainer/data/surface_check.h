@@ -5,11 +5,11 @@
 #include "dataset.h"
 
 typedef struct surface_check {
-    /* Root mean square of exact maps, interpolated trilinearly at points of the exact surface, where
-       the distance is 0, mm. */
+    /* Root mean square of exact maps, interpolated trilinearly at points of the exact surface,
+       where the distance is 0, mm. */
     double rms_mm;
-    /* Fraction of the surface where no ball with the radius of a voxel fits into the shape: there it
-       is thinner than two voxels, or has an edge or a corner. */
+    /* Fraction of the surface where no ball with the radius of a voxel fits into the shape: there
+       it is thinner than two voxels, or has an edge or a corner. */
     double thin;
 } surface_check;
 

@@ -106,7 +106,8 @@ static sdm_status measure(const pod_state *pod, const measured_maps *maps, doubl
                           double *bases, sdm_error *err)
 {
     const sdm_pod_arch *a = &pod->arch;
-    const size_t root = a->levels.first[a->levels.n - 1], trees = a->levels.first[a->levels.n] - root;
+    const size_t root = a->levels.first[a->levels.n - 1],
+                 trees = a->levels.first[a->levels.n] - root;
     const size_t most = (size_t)pod->t->n_threads, members = trees < most ? trees : most;
     parts_loop l = {.pod = pod, .maps = maps, .root = root};
     float *x = NULL, *z = NULL, *workspace = NULL;
@@ -152,8 +153,7 @@ sdm_status trainer_pod_parts(const trainer *t, error_measures *out, sdm_error *e
     for (size_t i = 0; i < n && !s; i++) slots[i] = trainer_dataset_measured_slot(d, i);
     const measured_maps training = {.slots = slots, .n = n},
                         heldout = {.holdout = true, .n = d->n_holdout};
-    if (!s)
-        s = measure(pod, &training, &out->network.training, &out->bases.training, err);
+    if (!s) s = measure(pod, &training, &out->network.training, &out->bases.training, err);
     if (!s) s = measure(pod, &heldout, &out->network.heldout, &out->bases.heldout, err);
     out->modes = pod->modes_mse;
     sdm_free(slots);

@@ -1,5 +1,5 @@
-/* Passes through a tree (pod_tree.h): from the coefficients of its root to the voxels, and back. B is
-   the number of maps; other letters as in pod_state.h. */
+/* Passes through a tree (pod_tree.h): from the coefficients of its root to the voxels, and back. B
+   is the number of maps; other letters as in pod_state.h. */
 #pragma once
 
 #include "pod_state.h"
@@ -20,7 +20,8 @@ typedef struct tree_work {
 size_t trainer_tree_floats(const pod_state *pod, size_t rows, size_t root);
 
 /* The arrays of the tree below block `root` for `rows` maps: scratch[trainer_tree_floats()];
-   c[rows][K] and dc[rows][K] are the coefficients of the highest level and the gradients by them. */
+   c[rows][K] and dc[rows][K] are the coefficients of the highest level and the gradients by them.
+ */
 tree_work trainer_tree_work(const pod_state *pod, size_t rows, size_t root, float *scratch,
                             float *c, float *dc);
 

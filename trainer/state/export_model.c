@@ -98,10 +98,10 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
                               .q50_mm = quantile(each, n, 0.5),
                               .q90_mm = quantile(each, n, 0.9),
                               .q99_mm = quantile(each, n, 0.99)};
-        *more = (model_errors){
-            .rmse_voxel_mm = n_at_surface ? sqrt(at_surface / (double)n_at_surface) : 0,
-            .dice = dice / (double)n,
-            .dice_min = dice_min};
+        *more = (model_errors){.rmse_voxel_mm =
+                                   n_at_surface ? sqrt(at_surface / (double)n_at_surface) : 0,
+                               .dice = dice / (double)n,
+                               .dice_min = dice_min};
     }
     trainer_workbench_dispose(&w);
     sdm_free(each);

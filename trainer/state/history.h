@@ -26,6 +26,6 @@ int64_t trainer_history_last_step(const history *h);
    fewer than three times in this phase. */
 double trainer_history_fall(const history *h, sdm_phase phase, double floor);
 
-/* Draws loss.png: root mean square errors on training batches and on held-out shapes over the steps,
-   and that of the finished model. */
+/* Draws loss.png: root mean square errors on training batches and on held-out shapes over the
+   steps, and that of the finished model. */
 sdm_status trainer_history_picture(const trainer *t, const history *h, sdm_error *err);

@@ -15,9 +15,9 @@ typedef struct error_pair {
 /* Measured parts of the error of the averaged weights before rounding; NaN: not measured. */
 typedef struct error_measures {
     error_pair network, bases; /* of the network; of its bases with the best coefficients */
-    double modes;              /* held-out maps: what the bases hold and the global modes leave out */
-    bool other_voxels;         /* the voxels are only a sample of those of the maps */
-    bool corrects;             /* the maps are those of a correction, not exact maps */
+    double modes;      /* held-out maps: what the bases hold and the global modes leave out */
+    bool other_voxels; /* the voxels are only a sample of those of the maps */
+    bool corrects;     /* the maps are those of a correction, not exact maps */
     double motion_mm, warp_mm; /* of a template (template_design) */
 } error_measures;
 

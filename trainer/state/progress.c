@@ -99,8 +99,7 @@ void trainer_report(trainer *t, double fraction, bool now)
                             .samples_at_start = (int64_t)(d->n_static + d->n_start),
                             .loss = t->loss,
                             .heldout_rmse_mm = sqrt(t->heldout_mse),
-                            .heldout_seconds =
-                                isfinite(t->heldout_mse) ? t->last_evaluation : NAN,
+                            .heldout_seconds = isfinite(t->heldout_mse) ? t->last_evaluation : NAN,
                             .samples_per_second = rate * t->pace.unit_maps,
                             .seconds = seconds,
                             .seconds_left = seconds_left(t, seconds, rate)};

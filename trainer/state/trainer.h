@@ -13,9 +13,9 @@ typedef struct train_kind train_kind;
 /* The speed of the work: units (computed maps, or steps) finished in the present phase at two times
    that lie two to four seconds apart, and the time of a unit since the first of them. */
 typedef struct trainer_pace {
-    int64_t done;       /* units finished in this phase */
-    double unit_maps;   /* maps of a unit */
-    int64_t before[2];  /* `done` at seconds[0] and seconds[1] */
+    int64_t done;      /* units finished in this phase */
+    double unit_maps;  /* maps of a unit */
+    int64_t before[2]; /* `done` at seconds[0] and seconds[1] */
     double seconds[2];
 } trainer_pace;
 

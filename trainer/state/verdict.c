@@ -186,18 +186,19 @@ static void write_sentence(const verdict_input *in, const char *what, sdm_verdic
     if (v->limit == SDM_CAUSE_ROUNDING)
         snprintf(change, sizeof change, "set network.weights to %s",
                  c->network.weights == SDM_WEIGHT_I8 ? "f16" : "f32");
-    if (!strcmp(v->key, "grid.spacing"))
-        snprintf(also, sizeof also, " and double grid.size");
+    if (!strcmp(v->key, "grid.spacing")) snprintf(also, sizeof also, " and double grid.size");
     // maps of two bytes a voxel; twice as many for this key
     const double gb = 2e-9 * (double)sdm_grid_count(&c->grid) * (in->maps + v->to);
     if (v->limit == SDM_CAUSE_MAPS && !in->cut && gb > c->data.memory_gb)
         snprintf(also, sizeof also, " and data.memory_gb to %.0f", ceil(gb));
     if (v->limit == SDM_CAUSE_GRID)
-        snprintf(result, sizeof result, "; between its voxels exact maps miss the surface by %.2g mm",
+        snprintf(result, sizeof result,
+                 "; between its voxels exact maps miss the surface by %.2g mm",
                  sqrt(v->part_mm2[SDM_CAUSE_GRID]));
     else if (v->limit != SDM_CAUSE_NETWORK && v->at_best_mm > 0)
-        snprintf(result, sizeof result, "; without this part the RMSE would be %.2g mm, not %.2g mm",
-                 v->at_best_mm, v->rmse_mm);
+        snprintf(result, sizeof result,
+                 "; without this part the RMSE would be %.2g mm, not %.2g mm", v->at_best_mm,
+                 v->rmse_mm);
     if (v->limit != SDM_CAUSE_GRID) {
         const double rest = v->at_best_mm * v->at_best_mm, part = v->part_mm2[v->limit];
         snprintf(share, sizeof share, " (%.0f %% of the mean square error)",
@@ -249,8 +250,8 @@ static void set_parts(const error_measures *m, double mse, sdm_verdict *v)
 sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verdict *out,
                                 sdm_error *err)
 {
-    error_measures m = {.network = {NAN, NAN}, .bases = {NAN, NAN}, .modes = NAN, .motion_mm = NAN,
-                        .warp_mm = NAN};
+    error_measures m = {
+        .network = {NAN, NAN}, .bases = {NAN, NAN}, .modes = NAN, .motion_mm = NAN, .warp_mm = NAN};
     surface_check surface = {NAN, NAN};
     history h = {0};
     const dataset *d = &t->data;
@@ -274,12 +275,12 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
     for (int i = 0; i < SDM_CAUSES; i++) out->part_mm2[i] = NAN;
     out->part_mm2[SDM_CAUSE_GRID] = surface.rms_mm * surface.rms_mm;
     set_parts(&m, t->accuracy.mse_mm2, out);
-    const verdict_input in = {.config = t->config,
-                              .maps = (double)(d->n_static + d->n_taken),
-                              .cut = trainer_by_time(t) && !d->only_holdout &&
-                                     (int64_t)d->n_start < t->config->data.start,
-                              .ended_early = t->saved_seconds > 0,
-                              .steps = (double)t->step};
+    const verdict_input in = {
+        .config = t->config,
+        .maps = (double)(d->n_static + d->n_taken),
+        .cut = trainer_by_time(t) && !d->only_holdout &&
+               (int64_t)d->n_start<t->config->data.start, .ended_early = t->saved_seconds> 0,
+        .steps = (double)t->step};
     trainer_verdict_decide(&in, out);
     trainer_history_dispose(&h);
     return SDM_OK;

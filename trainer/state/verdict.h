@@ -17,8 +17,8 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
 /* The measured figures from which the verdict follows. */
 typedef struct verdict_input {
     const sdm_config *config;
-    double maps;     /* training maps made by the run */
-    bool cut;        /* the time of the budget ended before all maps of data.start were made */
+    double maps;      /* training maps made by the run */
+    bool cut;         /* the time of the budget ended before all maps of data.start were made */
     bool ended_early; /* by train.patience */
     double steps;     /* of the optimiser */
 } verdict_input;

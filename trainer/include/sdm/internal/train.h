@@ -38,8 +38,8 @@ typedef struct sdm_progress {
     /* Root mean square error on held-out shapes, and the value of `seconds` when it was measured;
        NaN before the first evaluation. */
     double heldout_rmse_mm, heldout_seconds;
-    /* Maps per second over the last two to four seconds: in SDM_PHASE_DATA computed maps, later maps
-       used for training; NaN: not known yet. */
+    /* Maps per second over the last two to four seconds: in SDM_PHASE_DATA computed maps, later
+       maps used for training; NaN: not known yet. */
     double samples_per_second;
     double seconds, seconds_left; /* of the run; NaN: not known */
 } sdm_progress;

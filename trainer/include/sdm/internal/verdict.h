@@ -1,6 +1,6 @@
-/* The verdict on a finished training: how good the model is, of which parts its error consists, what
-   limits it, and which key of the configuration to change. All figures are measured in the run, on
-   the held-out shapes unless stated otherwise; NaN: not measured. */
+/* The verdict on a finished training: how good the model is, of which parts its error consists,
+   what limits it, and which key of the configuration to change. All figures are measured in the
+   run, on the held-out shapes unless stated otherwise; NaN: not measured. */
 #pragma once
 
 #include "sdm/internal/text.h"
@@ -29,7 +29,8 @@ typedef enum sdm_cause {
     SDM_CAUSE_MAPS,
     /* The weights in the file have fewer digits. Measured: model minus network before rounding. */
     SDM_CAUSE_ROUNDING,
-    /* `template`: motion, warp and the lattices of the template. Measured: model minus correction. */
+    /* `template`: motion, warp and the lattices of the template. Measured: model minus correction.
+     */
     SDM_CAUSE_TEMPLATE,
     /* The voxels are too large for the shape. Measured: exact maps, interpolated at points of the
        exact surface. Not a part of the error at the voxels. */
@@ -38,9 +39,9 @@ typedef enum sdm_cause {
 } sdm_cause;
 
 typedef struct sdm_verdict {
-    double voxel_mm;                /* smallest spacing of the grid */
-    double rmse_mm, rmse_voxel_mm;  /* of all voxels; of those within a voxel of the surface */
-    double dice, dice_min;          /* overlap of the volumes inside: mean, and smallest of a shape */
+    double voxel_mm;               /* smallest spacing of the grid */
+    double rmse_mm, rmse_voxel_mm; /* of all voxels; of those within a voxel of the surface */
+    double dice, dice_min; /* overlap of the volumes inside: mean, and smallest of a shape */
     sdm_grade grade;
     double part_mm2[SDM_CAUSES]; /* parts of the mean square error; of the grid: of the surface */
     /* Part of the held-out root mean square error, beyond that of the bases, that the last third of
@@ -48,14 +49,15 @@ typedef struct sdm_verdict {
     double fall;
     double modes_mm2; /* `pod`: what the bases can represent and network.modes leaves out */
     double motion_mm, warp_mm; /* `template`: frames and amplitudes, and warp, at the vertices */
-    double thin; /* fraction of the surface where the shape is thinner than two voxels or has an edge */
+    double thin; /* fraction of the surface where the shape is thinner than two voxels or has an
+                    edge */
     double saved_seconds; /* that train.patience has saved */
     bool limited;         /* false: nothing that could be measured limits the model */
     sdm_cause limit;
     /* The key to change, its value in the run and the value to try; "": none. */
     char key[40];
     double from, to;
-    double at_best_mm; /* root mean square error without the part that limits; NaN: not known */
+    double at_best_mm;  /* root mean square error without the part that limits; NaN: not known */
     char sentence[512]; /* what limits the model and what to do, one sentence */
 } sdm_verdict;
 

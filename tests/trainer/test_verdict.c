@@ -1,5 +1,5 @@
 /* The verdict on a training: the decision from given figures, the measured parts, and that
- * following the advice makes the error smaller. Tests: verdict.c pod_parts.c tree_pass.c
+ * following the advice makes the error smaller. Tests: judge.c verdict.c pod_parts.c tree_pass.c
  * surface_check.c history.c progress.c */
 #include <math.h>
 #include <setjmp.h>
@@ -15,8 +15,8 @@
 #include "data/surface_check.h"
 #include "sdm/internal/text.h"
 #include "state/history.h"
+#include "state/judge.h"
 #include "state/progress.h"
-#include "state/verdict.h"
 #include "train_tools.h"
 
 static const char base[] =

@@ -8,6 +8,7 @@
 
 #include "data/workbench.h"
 #include "history.h"
+#include "judge.h"
 #include "kind.h"
 #include "progress.h"
 #include "sdm/internal/checksum.h"
@@ -16,7 +17,6 @@
 #include "sdm/internal/model_threads.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
-#include "verdict.h"
 
 /* Voxels within this distance of the surface count for rmse_near_mm. */
 #define NEAR_MM 0.4f

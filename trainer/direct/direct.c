@@ -108,7 +108,8 @@ static double direct_fraction(const trainer *t, const direct_state *d)
 {
     if (!trainer_by_time(t)) return trainer_fraction(t);
     const double total = t->config->train.minutes * 60,
-                 reserve = fmin(d->export_seconds, 0.5 * total);
+                 // the measurement of the model, and of its error on training maps
+        reserve = fmin(d->export_seconds + 2 * t->evaluation_seconds, 0.5 * total);
     const double length = total - reserve - t->phase_started;
     return length > 0 ? (trainer_seconds(t) - t->phase_started) / length : 1;
 }

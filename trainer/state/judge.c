@@ -35,7 +35,7 @@ static bool advise_double(sdm_verdict *v, const char *key, double value, double 
     return true;
 }
 
-/* A larger budget, or none if the run has one that cannot be named. */
+/* Twice the budget. */
 static void advise_budget(sdm_verdict *v, const sdm_config *c)
 {
     if (c->train.minutes > 0)
@@ -74,7 +74,7 @@ static const char *advise_network(const verdict_input *in, sdm_verdict *v)
     if (c->network.kind == SDM_NETWORK_SDMNN &&
         advise_double(v, "network.channels", c->network.channels, 512))
         return "The size of the network limits it";
-    if (!advise_double(v, "network.width", c->network.width, 4096))
+    if (!advise_double(v, "network.width", c->network.width, 4096) && c->network.depth < 16)
         advise(v, "network.depth", c->network.depth, c->network.depth + 1);
     return "The size of the network limits it";
 }
@@ -101,7 +101,7 @@ static const char *advise_part(const verdict_input *in, sdm_verdict *v)
     const sdm_config *c = in->config;
     switch (v->limit) {
     case SDM_CAUSE_BASES:
-        if (!advise_double(v, "network.rank", c->network.rank, 256))
+        if (!advise_double(v, "network.rank", c->network.rank, 256) && c->network.block >= 4)
             advise(v, "network.block", c->network.block, c->network.block / 2);
         return "The bases limit it";
     case SDM_CAUSE_NETWORK:
@@ -148,13 +148,17 @@ static bool find_limit(const verdict_input *in, const sdm_verdict *v, sdm_cause 
 static void write_sentence(const verdict_input *in, const char *what, sdm_verdict *v)
 {
     const sdm_config *c = in->config;
-    char change[160], also[96] = "", result[96] = "", share[96] = "";
-    snprintf(change, sizeof change, "%s %s from %.6g to %.6g", v->to < v->from ? "lower" : "raise",
-             v->key, v->from, v->to);
+    char change[160] = "", also[96] = "", result[96] = "", share[96] = "";
+    if (v->key[0])
+        snprintf(change, sizeof change, ": %s %s from %.6g to %.6g",
+                 v->to < v->from ? "lower" : "raise", v->key, v->from, v->to);
     if (v->limit == SDM_CAUSE_ROUNDING)
-        snprintf(change, sizeof change, "set network.weights to %s",
+        snprintf(change, sizeof change, ": set network.weights to %s",
                  c->network.weights == SDM_WEIGHT_I8 ? "f16" : "f32");
     if (!strcmp(v->key, "grid.spacing")) snprintf(also, sizeof also, " and double grid.size");
+    // with `auto`, a value that is the default of `auto` would become that of the kind
+    if (c->network.kind == SDM_NETWORK_TEMPLATE && !strncmp(v->key, "network.", 8))
+        snprintf(also, sizeof also, " with network.kind: template");
     // maps of two bytes a voxel; twice as many for this key
     const double gb = 2e-9 * (double)sdm_grid_count(&c->grid) * (in->maps + v->to);
     if (v->limit == SDM_CAUSE_MAPS && !in->cut && gb > c->data.memory_gb)
@@ -172,7 +176,7 @@ static void write_sentence(const verdict_input *in, const char *what, sdm_verdic
         snprintf(share, sizeof share, " (%.0f %% of the mean square error)",
                  100 * part / (part + rest));
     }
-    snprintf(v->sentence, sizeof v->sentence, "%s%s: %s%s%s.", what, share, change, also, result);
+    snprintf(v->sentence, sizeof v->sentence, "%s%s%s%s%s.", what, share, change, also, result);
 }
 
 void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)

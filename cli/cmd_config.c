@@ -4,6 +4,7 @@
 #include "commands.h"
 #include "inputs/config_shape.h"
 #include "inputs/setup.h"
+#include "report/report_survey.h"
 #include "report/terminal.h"
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"
@@ -25,6 +26,7 @@ static sdm_status check_shape(const cli_args *args, sdm_config *c, sdm_error *er
                      c->shape.name, n, SDM_MAX_PARAMS);
     if (!s) s = sdm_train_ranges(c, shape, min, max, err);
     if (!s) s = sdm_train_distributions(c, shape, min, max, distribution, err);
+    if (!s && !args->dump) cli_notice_survey(c, shape);
     sdm_instance_free(shape);
     sdm_registry_free(registry);
     return s;

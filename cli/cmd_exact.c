@@ -63,9 +63,10 @@ static sdm_status open_mesh(job *j, sdm_error *err)
     if (args->tolerance > 0 && strcmp(args->method, "octree"))
         return sdm_fail(err, SDM_E_ARG, "exact: --tolerance belongs to --method octree, not %s",
                         args->method);
-    const sdm_status s = cli_layers_check(args, err);
+    sdm_status s = cli_layers_check(args, err);
     if (s) return s;
-    return args->mesh ? cli_read_mesh(args->mesh, &j->mesh, err) : make_shape_mesh(j, err);
+    s = args->mesh ? cli_read_mesh(args->mesh, &j->mesh, err) : make_shape_mesh(j, err);
+    return s || !args->turn_parts ? s : cli_turn_parts(&j->mesh, err);
 }
 
 static sdm_sign_method find_sign_method(const char *name)
@@ -173,6 +174,9 @@ static void notice_mesh(const job *j)
         cli_notice("%zu parts were inside out; their orientation has been reversed",
                    j->report.parts_turned);
     cli_notice_audit(a);
+    // a single part that meets no other cannot be inside out after the engine has turned it
+    if (a->components > 1)
+        cli_notice_parts(&j->mesh, j->args->mesh ? CLI_MEND_FILE : CLI_MEND_SHAPE);
     if (j->report.unioned)
         cli_notice("the mesh overlaps itself: the union of its %zu triangles is bounded by %zu "
                    "triangles (error at most %.2g mm)",

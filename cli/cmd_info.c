@@ -121,21 +121,23 @@ static sdm_status info_model(const cli_args *args, const char *path, sdm_error *
 static sdm_status info_mesh(const cli_args *args, const char *path, sdm_error *err)
 {
     sdm_mesh mesh = {0};
-    sdm_audit audit;
+    sdm_part_audit audit = {0};
     sdm_status s = cli_read_mesh(path, &mesh, err);
-    if (!s) s = sdm_mesh_audit(&mesh, &audit, err);
+    if (!s) s = sdm_part_audit_make(&mesh, true, &audit, err);
     if (!s && args->json) {
         sdm_json j = {0};
         sdm_json_open(&j, NULL, '{');
         sdm_json_text(&j, "file", path);
         sdm_json_text(&j, "type", "mesh");
-        cli_json_audit(&j, &audit);
+        cli_json_audit(&j, &audit.mesh);
+        cli_json_parts(&j, &audit);
         sdm_json_close(&j, '}');
         s = cli_print_json(&j, err);
     } else if (!s) {
         printf("%s: triangle mesh\n\n", path);
         cli_print_audit(&audit);
     }
+    sdm_part_audit_dispose(&audit);
     sdm_mesh_dispose(&mesh);
     return s;
 }

@@ -1,4 +1,4 @@
-/* sdmgen shapes: lists the known shapes, or the parameters and options of one. */
+/* sdmgen shapes: lists the known shapes, or the parameters and options of one, or checks one. */
 #include <stdio.h>
 #include <string.h>
 
@@ -8,6 +8,7 @@
 #include "report/terminal.h"
 #include "sdm/internal/distribution.h"
 #include "sdm/memory.h"
+#include "study/check_family.h"
 
 static const char *option_type(const sdm_option *o)
 {
@@ -238,6 +239,11 @@ static sdm_status print_list(const cli_args *args, const sdm_registry *registry,
 
 sdm_status cmd_shapes(const cli_args *args, sdm_error *err)
 {
+    if (args->files.n > 0 && !strcmp(args->files.items[0], "check"))
+        return cli_check_family(args, err);
+    if (args->files.n > 1)
+        return sdm_fail(err, SDM_E_ARG, "shapes: unexpected argument '%s'", args->files.items[1]);
+    if (args->outputs.n > 0) return sdm_fail(err, SDM_E_ARG, "shapes: -o needs `shapes check`");
     if (args->files.n == 0 && args->options.n > 0)
         return sdm_fail(err, SDM_E_ARG, "shapes: -O needs the NAME of a shape");
     sdm_registry *registry = NULL;

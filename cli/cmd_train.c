@@ -7,7 +7,7 @@
 #include "commands.h"
 #include "inputs/config_shape.h"
 #include "inputs/setup.h"
-#include "report/report_audit.h"
+#include "report/report_survey.h"
 #include "report/report_verdict.h"
 #include "report/terminal.h"
 #include "report/train_progress.h"
@@ -99,24 +99,6 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
     return SDM_OK;
 }
 
-/* Reports defects of the mesh at the default parameters before a long training starts. If the mesh
- * cannot be made, the training reports the error. */
-static void notice_mesh(const sdm_instance *shape)
-{
-    double p[SDM_MAX_PARAMS];
-    size_t n;
-    const sdm_param *params = sdm_instance_params(shape, &n);
-    for (size_t i = 0; i < n && i < SDM_MAX_PARAMS; i++) p[i] = params[i].def;
-    sdm_mesh mesh = {0};
-    sdm_audit audit;
-    if (n <= SDM_MAX_PARAMS && !sdm_instance_mesh(shape, p, &mesh, NULL) &&
-        !sdm_mesh_audit(&mesh, &audit, NULL)) {
-        if (audit.inverted) cli_notice("the mesh is inside out; its orientation will be reversed");
-        cli_notice_audit(&audit);
-    }
-    sdm_mesh_dispose(&mesh);
-}
-
 static sdm_status train_network(const cli_args *args, const sdm_config *config,
                                 const sdm_instance *shape, sdm_error *err)
 {
@@ -124,7 +106,7 @@ static sdm_status train_network(const cli_args *args, const sdm_config *config,
     cli_progress progress;
     const sdm_train_hooks hooks = cli_train_hooks(&progress);
     sdm_train_report report = {0};
-    notice_mesh(shape);
+    if (!args->resume) cli_notice_survey(config, shape);
     cli_progress_start(&progress);
     sdm_status s = sdm_train(config, shape, folder, args->resume, &hooks, &report, err);
     cli_progress_clear(&progress);

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "report/terminal.h"
+#include "sdm/internal/sampling.h"
 #include "sdm/internal/threads.h"
 #include "sdm/internal/train.h"
 #include "sdm/isosurface.h"

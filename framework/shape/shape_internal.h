@@ -54,6 +54,11 @@ void sdm_host_call_end(host_call *c);
 sdm_status sdm_host_call_failed(const host_call *c, const char *callback, int returned,
                                 sdm_status otherwise, sdm_error *err);
 
+/* velocity.c: sdm_instance_velocity() by differences of meshes, whatever callbacks the shape has.
+ */
+sdm_status sdm_velocity_by_differences(const sdm_instance *s, const double *p, size_t n_vert,
+                                       double *velocity, sdm_error *err);
+
 struct sdm_instance {
     const sdm_shape *shape;
     void *self;

@@ -43,7 +43,7 @@ expect 0 - sdmgen mesh --shape cochlea -p a=3 -p phi=-0.2 --json
 small=$(json volume_mm3)
 expect 0 - sdmgen mesh --shape cochlea -p a=5 -p phi=-0.2 --json
 awk -v s="$small" -v l="$(json volume_mm3)" 'BEGIN { exit !(l > s && s > 0) }' || bad 'a larger a must give a larger cochlea'
-expect 2 'shape NAME is needed' sdmgen mesh -o t.ply
+expect 2 'either --shape NAME or --mesh FILE is needed' sdmgen mesh -o t.ply
 expect 2 'an output is needed' sdmgen mesh --shape torus
 expect 2 "unknown parameter 'alhpa'; did you mean 'alpha'\?" sdmgen mesh --shape cochlea -p alhpa=1 -o x.ply
 expect 2 "parameter a: 'wide' is not a number" sdmgen mesh --shape cochlea -p a=wide -o x.ply

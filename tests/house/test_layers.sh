@@ -38,14 +38,14 @@ check() {
     function own(part, list,   n, p, i) { n = split(list, p, " "); for (i = 1; i <= n; i++) owner[p[i] ".h"] = part }
     BEGIN {
         own("core", "export grid memory pose shape status") # shape: types alone
-        own("core", "checksum clock distribution envelope file heap mat3 processor rng rotation shared table team text threads vec3")
+        own("core", "checksum clock distribution envelope file heap mat3 processor rng rotation sampling shared table team text threads vec3")
         own("config", "config experiment")
         own("geom", "exact isosurface mesh")
-        own("geom", "brute_force builder methods")
+        own("geom", "brute_force builder methods part_audit")
         own("nn", "model")
         own("nn", "container kernels model_threads pod point_network sdmnn template")
         own("io", "image meshfile picture volume")
-        own("shape", "registry")
+        own("shape", "registry shape_box shape_survey")
         own("shapes", "builtin_shapes")
         own("runtime", "check fit map phantom runtime vdb")
         own("trainer", "train verdict")

@@ -8,6 +8,7 @@
 #include "inputs/config_shape.h"
 #include "inputs/setup.h"
 #include "report/report_survey.h"
+#include "report/report_verdict.h"
 #include "report/terminal.h"
 #include "report/train_progress.h"
 #include "sdm/internal/train.h"
@@ -77,18 +78,24 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
         sdm_json_int(&j, "heldout", a->samples);
         sdm_json_int(&j, "steps", r->steps);
         sdm_json_int(&j, "maps", r->samples);
+        sdm_json_open(&j, "verdict", '{');
+        sdm_verdict_json(&j, &r->verdict);
+        sdm_json_real(&j, "saved_seconds", r->verdict.saved_seconds);
+        sdm_json_close(&j, '}');
         sdm_json_close(&j, '}');
         return cli_print_json(&j, err);
     }
     // print as text
     char steps[32], maps[32];
     printf("%s\n", r->model_path);
-    printf("  trained     %.1f s, %s steps, %s exact maps\n", r->seconds,
+    printf("  trained     %.1f s, %s steps, %s exact maps", r->seconds,
            cli_format_count(r->steps, steps), cli_format_count(r->samples, maps));
-    printf("  held out    %lld shapes: MSE %.3g mm^2, RMSE %.5f mm, within 0.4 mm of the surface "
-           "%.5f mm, largest %.5f "
-           "mm\n",
+    if (r->verdict.saved_seconds > 0)
+        printf("; train.patience saved %.0f s", r->verdict.saved_seconds);
+    printf("\n  held out    %lld shapes: MSE %.3g mm^2, RMSE %.5f mm, within 0.4 mm of the surface "
+           "%.5f mm, largest %.5f mm\n",
            (long long)a->samples, a->mse_mm2, a->rmse_mm, a->rmse_near_mm, a->max_abs_mm);
+    cli_print_verdict(&r->verdict);
     return SDM_OK;
 }
 

@@ -15,6 +15,9 @@
      ON(CLI_SHAPES) | ON(CLI_INFO) | ON(CLI_VERIFY) | ON(CLI_BENCH) | ON(CLI_EXPERIMENT) |         \
      ON(CLI_PHANTOM) | ON(CLI_FIT))
 
+/* Commands that train networks. */
+#define TRAININGS (ON(CLI_TRAIN) | ON(CLI_EXPERIMENT))
+
 const cli_command cli_commands[CLI_N_COMMANDS] = {
     {"train", "CONFIG [key=value ...]", "train a network on the shape of a configuration",
      "Reads the YAML configuration, makes exact maps, trains the network and writes a run\n"
@@ -426,7 +429,9 @@ const cli_option cli_options[] = {
     /* all commands */
     {"plugin", 0, CLI_LIST, "FILE", NULL, 0, 0, WITH_SHAPES, AT(plugins),
      "load shapes from a shared object; may be repeated"},
-    {"threads", 0, CLI_INT, "N", NULL, 0, 1024, ALL & ~ON(CLI_HELP), AT(threads),
+    {"threads", 0, CLI_INT, "N", NULL, 0, 1024, TRAININGS, AT(threads),
+     "number of threads; 0: all (default). Results depend on it with train.minutes only"},
+    {"threads", 0, CLI_INT, "N", NULL, 0, 1024, ALL & ~ON(CLI_HELP) & ~TRAININGS, AT(threads),
      "number of threads; 0: all (default). Results do not depend on it"},
     {"seed", 0, CLI_INT, "N", NULL, 0, 9007199254740992.0,
      ON(CLI_TRAIN) | ON(CLI_CONFIG) | ON(CLI_EVAL) | ON(CLI_SHAPES) | ON(CLI_VERIFY) |

@@ -247,7 +247,8 @@ static const sdm_field TRAIN[] = {
     ROW("average", REAL, train.average, 0, 0.99999, "0.998", "",
         "decay of the moving average of the weights; 0: no average"),
     ROW("evaluate_seconds", REAL, train.evaluate_seconds, 0.001, 1e6, "20", "s",
-        "time between evaluations; every 500 steps if the budget is not a time"),
+        "longest time between evaluations; if the budget is not a time, they are at the steps 10, "
+        "20, 50, 100, 200 and every 500 steps"),
     ROW("checkpoint_seconds", REAL, train.checkpoint_seconds, 0.001, 1e6, "60", "s",
         "time between checkpoints"),
 };

@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
 # sdmgen train: the run folder and its protection, interrupt and resume. The tests of models use the run made here.
-# Tests: cmd_train.c train_progress.c
+# Tests: cmd_train.c report_verdict.c train_progress.c
 . "$(dirname "$0")/common.sh"
 tiny=$source_folder/tests/cli/tiny.yaml
 
-# interrupted FOLDER CONFIG [KEY=VALUE ...]: starts a training and stops it after its first steps.
+# interrupted FOLDER CONFIG [KEY=VALUE ...]: starts a training and stops it after 500 steps.
 interrupted() {
     local folder=$1 pid code
     shift
     "$program" train "$@" train.steps=1000000000 --out "$folder" >out 2>err &
     pid=$!
-    for _ in $(seq 600); do [ -s "$folder/metrics.jsonl" ] && break || sleep 0.1; done
+    for _ in $(seq 600); do grep -qs '"step": 500,' "$folder/metrics.jsonl" && break || sleep 0.1; done
     kill -TERM $pid
     wait $pid
     code=$?
@@ -25,12 +25,32 @@ present run/config.yaml run/metrics.jsonl run/model.sdm run/loss.png run/slices.
 [ "$(json model)" = run/model.sdm ] || bad "model: $(json model)"
 awk -v s="$(json seconds)" -v m="$(json mse_mm2)" 'BEGIN { exit !(s > 0 && m > 0 && m < 1) }' || bad "seconds, mse_mm2: $(cat out)"
 
+# The verdict: in the JSON, and in a line of metrics.jsonl behind the errors from the first step on.
+has '"verdict": \{"grade": "(good|usable|poor)", .*"bases_mm2": [0-9.e-]+, .*"key": "[a-z.]+", .*"sentence": "[^"]+: (raise|lower|set) '
+head -n 1 run/metrics.jsonl | grep -q '^{"phase": "fit", "step": 0, .*"heldout_mse_mm2": [0-9]' || bad 'no error before the first step'
+tail -n 1 run/metrics.jsonl | grep -q '^{"phase": "verdict", "grade": ' || bad 'no verdict in metrics.jsonl'
+
 # A finished run is not overwritten.
 before=$(cksum <run/model.sdm)
 expect 2 'run holds a trained model and no checkpoint to continue from' sdmgen train "$tiny" --out run
 expect 2 'run holds a trained model and no checkpoint to continue from' sdmgen train "$tiny" --out run --resume
 expect 2 'exclude each other' sdmgen train "$tiny" --out run --resume --force
 [ "$before" = "$(cksum <run/model.sdm)" ] || bad 'the model has changed'
+
+# A refused training leaves no folder that it has made, an empty one that was there stays.
+mkdir -p there/already
+expect 2 'data.memory_gb' sdmgen train "$tiny" --out there/already/new/run data.memory_gb=0.001 'grid.size=[60,60,60]'
+absent there/already/new
+expect 2 'data.memory_gb' sdmgen train "$tiny" --out there/already data.memory_gb=0.001 'grid.size=[60,60,60]'
+[ -d there/already ] || bad 'a folder that was there has been removed'
+
+# A budget of time that the maps alone exceed: told in one line, and the advice is more time.
+sdmgen train "$tiny" --out hurried train.steps=0 train.minutes=0.0001 data.start=400 >out 2>err || bad "hurried: $(cat err)"
+grep -q '^sdmgen: the run took [0-9]* s longer than train.minutes: ' err || [ "$(sed -n 's/^  trained *\([0-9]*\).*/\1/p' out)" = 0 ] ||
+    bad "no word about the time: $(cat err)"
+has '^  (good|usable|poor) '
+has '^  error from  bases +[0-9.]+ mm +[0-9]+ %  '
+has '^  verdict     .*(raise|lower|set) '
 
 # Pictures that cannot be written do not make the training fail.
 mkdir -p unpictured/loss.png unpictured/slices.png
@@ -115,8 +135,8 @@ expect 2 'is at step' "${run[@]}" train.steps=1
 steps=$(($(sed 's/.* is at step \([0-9]*\).*/\1/' err) + 20))
 cp -r moved $'m\xf6ved'
 expect 2 '^config\.yaml:.*UTF-8' sdmgen train $'m\xf6ved/conf/statistical.yaml' --out never
-absent never/config.yaml
-rm -r never $'m\xf6ved'
+absent never
+rm -r $'m\xf6ved'
 deviations=moved/conf/statistical/deviations.npy
 cp $deviations kept.npy
 { head -c 128 kept.npy && tail -c 32 kept.npy && tail -c 64 kept.npy | head -c 32; } >$deviations # swap the halves: values 5 to 8, then 1 to 4

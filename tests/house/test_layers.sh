@@ -48,8 +48,8 @@ check() {
         own("shape", "registry shape_box shape_survey")
         own("shapes", "builtin_shapes")
         own("runtime", "check field fit map phantom runtime vdb")
-        own("all", "sdmgen") # the header that includes all public ones
-        own("trainer", "train")
+         own("all", "sdmgen") # the header that includes all public ones
+         own("trainer", "train verdict")
         parts("core", "core")
         parts("config", "core config")
         parts("geom", "core geom")

@@ -4,6 +4,7 @@
 #include "sdm/exact.h"
 #include "sdm/internal/config.h"
 #include "sdm/internal/mistakes.h"
+#include "sdm/internal/verdict.h"
 #include "sdm/model.h"
 #include "sdm/registry.h"
 
@@ -32,12 +33,16 @@ typedef struct sdm_progress {
     double fraction; /* used fraction of the whole budget, 0 .. 1 */
     /* Optimiser steps; exact training maps computed so far. */
     int64_t step, samples;
-    double loss; /* training loss, mm^2; NaN before the first step */
-    /* Held-out root mean square error at the last evaluation; NaN before the first. */
-    double heldout_rmse_mm;
-    /* Maps per second: in SDM_PHASE_DATA computed maps, later maps used for training. */
+    int64_t samples_at_start; /* exact training maps that precede the first step */
+    /* Mean square error of the last batch, mm^2, whatever train.loss; NaN before the first step. */
+    double loss;
+    /* Root mean square error on held-out shapes, and the value of `seconds` when it was measured;
+       NaN before the first evaluation. */
+    double heldout_rmse_mm, heldout_seconds;
+    /* Maps per second over the last two to four seconds: in SDM_PHASE_DATA computed maps, later
+       maps used for training; NaN: not known yet. */
     double samples_per_second;
-    double seconds, seconds_left;
+    double seconds, seconds_left; /* of the run; NaN: not known */
 } sdm_progress;
 
 /* Callbacks of the caller; each may be NULL. */
@@ -57,6 +62,7 @@ typedef struct sdm_train_report {
     /* Optimiser steps; training maps. */
     int64_t steps, samples;
     double seconds;
+    sdm_verdict verdict;
 } sdm_train_report;
 
 /* Trains a network as `config` says and writes into `folder`: config.yaml (with all defaults filled

@@ -81,7 +81,6 @@ sdm_status sdm_spline_grid_create(const spline_shape *s, const spline_frame *f,
     int32_t *at = out->memory;
     for (int b = 0; b < 3 && !status; b++) {
         spline_axis *x = &out->axis[b];
-        out->n[b] = n[b];
         x->n = (size_t)n[b];
         x->axis = parallel_axis(f->dir, grid, b);
         x->weight = (float(*)[4])at;

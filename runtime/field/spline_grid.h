@@ -6,7 +6,6 @@
 
 /* A grid in the frame of a map. */
 typedef struct spline_grid {
-    int64_t n[3];
     spline_axis axis[3]; /* along x, y, z of the grid */
     int32_t *memory;
 } spline_grid;

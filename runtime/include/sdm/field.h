@@ -66,16 +66,16 @@ SDM_API sdm_status sdm_field_points(const sdm_field *f, const double *x, size_t 
 
 /* values[nz][ny][nx] = the distances at the voxel centres of a grid; slopes[n_params][nz][ny][nx]
    may be NULL. Grids whose axes are parallel to those of the model's grid take about 1 ns a voxel,
-   turned grids 20 times as much. On the model's own grid the values have the bits of
+   turned grids 50 to 100 ns. On the model's own grid the values have the bits of
    sdm_generate(). */
 SDM_API sdm_status sdm_field_grid(const sdm_field *f, const sdm_grid *grid, float *values,
                                   float *slopes, sdm_error *err);
 
-/* *out = the band of half width `width` (mm) on a grid; free it with sdm_blocks_dispose(). Only
-   blocks that can meet the band are evaluated: the value at the centre of a block, and a bound on
-   the slope of the spline from differences of its coefficients, exclude the others. Values within
-   the band are those of sdm_field_grid(). Voxels outside of the box count only if their bound lies
-   within the band. On error *out is empty. */
+/* *out = the band of half width `width` (mm, at least the longest edge of a voxel) on a grid; free
+   it with sdm_blocks_dispose(). Only blocks that can meet the band are evaluated: the value at the
+   centre of a block, and a bound on the slope of the spline from differences of its coefficients,
+   exclude the others. Values within the band are those of sdm_field_grid(). Voxels outside of the
+   box count only if their bound lies within the band. On error *out is empty. */
 SDM_API sdm_status sdm_field_band(const sdm_field *f, const sdm_grid *grid, double width,
                                   sdm_blocks *out, sdm_error *err);
 

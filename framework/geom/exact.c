@@ -5,8 +5,10 @@
 #include <float.h>
 #include <string.h>
 
+#include "features/feature_side.h"
 #include "layers/layers.h"
 #include "map/grid_distance.h"
+#include "points/points.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/threads.h"
 #include "sdm/internal/vec3.h"
@@ -29,6 +31,7 @@ struct sdm_exact {
     sdm_nearest nearest; // tree and features of `surface`
     sdm_sign sign;
     double rounding; // bound on the rounding error of the coordinates, mm
+    bool bounds;     // the surface bounds the solid: outside in front of it, inside behind it
 };
 
 const char *sdm_sign_method_name(sdm_sign_method m)
@@ -101,6 +104,7 @@ static sdm_status make_surface(sdm_exact *e, sdm_error *err)
     if (s) return s;
     // sheets that cancel everywhere enclose nothing: distances are then to the sheets
     e->report.unioned = changed && e->surface.n_tri;
+    e->bounds = e->survey.audit.closed && !e->opts.keep_overlap && (!changed || e->surface.n_tri);
     if (e->report.unioned) return SDM_OK;
     e->report.union_error_mm = 0;
     e->arena.used -= mesh_bytes(&e->surface) + e->surface.cap_tri * sizeof *e->source;
@@ -167,6 +171,8 @@ static sdm_status prepare(sdm_exact *e, const sdm_mesh *mesh, sdm_error *err)
     if (!s) s = make_surface(e, err);
     if (!s) s = check_pseudonormal(e, err);
     if (!s) s = build_nearest(e, err);
+    if (!s && e->bounds && e->report.sign == SDM_SIGN_CROSSINGS)
+        s = sdm_feature_sides_build(&e->nearest, &e->arena, err);
     if (!s) s = build_sign(e, err);
     if (s) return s;
     double largest = 0;
@@ -213,43 +219,39 @@ const sdm_exact_report *sdm_exact_get_report(const sdm_exact *e) { return &e->re
 const sdm_mesh *sdm_exact_surface(const sdm_exact *e) { return &e->surface; }
 const uint32_t *sdm_exact_source(const sdm_exact *e) { return e->source; }
 
-/* Is x a usable point? False for NaN and for coordinates whose squares could overflow. */
-static bool is_point(const double x[3])
+/* What the answers for points need; *opts: the options that remain for them. */
+static sdm_points_job points_job(const sdm_exact *e, const sdm_exact_opts *opts)
 {
-    return fabs(x[0]) <= 1e150 && fabs(x[1]) <= 1e150 && fabs(x[2]) <= 1e150;
+    return (sdm_points_job){.surface = &e->nearest,
+                            .sign = &e->sign,
+                            .rounding = e->rounding,
+                            .seam = 16 * e->rounding + 2 * e->report.union_error_mm,
+                            .opts = opts};
 }
 
 double sdm_exact_point(const sdm_exact *e, const double x[3], double closest[3], double normal[3],
                        uint32_t *triangle)
 {
-    uint32_t slot = 0;
-    int feature = SDM_FACE;
-    double q[3] = {NAN, NAN, NAN}, n[3] = {NAN, NAN, NAN};
-    double d = NAN;
-    if (is_point(x)) {
-        // the sign is found from the nearest triangle, the distance from the nearest feature of
-        // this triangle
-        (void)sdm_nearest_find(&e->nearest, x, INFINITY, &slot, q, &feature);
-        const bool inside = sdm_sign_inside(&e->sign, x, slot, q, feature);
-        d = sqrt(sdm_nearest_feature(&e->nearest, x, &slot));
-        if (inside) d = -d;
-        (void)sdm_frame_closest(&e->nearest.frames[slot], x, q, &feature);
-        sdm_distance_gradient(&e->nearest, e->rounding, slot, x, q, d, n);
-    }
-    if (closest) memcpy(closest, q, sizeof q);
-    if (normal) memcpy(normal, n, sizeof n);
-    if (triangle) *triangle = e->nearest.tree.order[slot];
+    double d;
+    const sdm_points_job job = points_job(e, NULL);
+    sdm_point_find(&job, x, &(sdm_exact_at){&d, normal, closest, triangle}, 0);
     return d;
+}
+
+sdm_status sdm_exact_points(const sdm_exact *e, const double *x, size_t n, const sdm_exact_at *out,
+                            sdm_error *err)
+{
+    if (!e || !out || (n && !x))
+        return sdm_fail(err, SDM_E_ARG,
+                        "points without an engine, points or a place for the result");
+    const sdm_exact_opts opts = opts_beside(e, 0);
+    const sdm_points_job job = points_job(e, &opts);
+    return sdm_points_find(&job, x, n, out, err);
 }
 
 double sdm_exact_distance(const sdm_exact *e, const double x[3])
 {
-    uint32_t slot = 0;
-    int feature;
-    double q[3];
-    if (!is_point(x)) return NAN;
-    (void)sdm_nearest_find(&e->nearest, x, INFINITY, &slot, q, &feature);
-    return sqrt(sdm_nearest_feature(&e->nearest, x, &slot));
+    return sdm_point_distance(&e->nearest, x);
 }
 
 /* Fills values[] with the signed map and, if slot is not NULL, slot[] with the slot of the nearest

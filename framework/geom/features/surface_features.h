@@ -107,6 +107,9 @@ typedef struct sdm_features {
     uint32_t (*of_slot)[6];
     /* slot of one triangle to which each feature belongs, [end] */
     uint32_t *owner;
+    /* side of the surface on which the region of each feature lies, see feature_side.h, [end];
+       NULL: the surface does not bound a solid */
+    int8_t *side;
     /* centre of the surface's bounding box and half its diagonal, mm */
     double centre[3], radius;
     /* power of two that makes the longest edge 0.5 to 1 long */

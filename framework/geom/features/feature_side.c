@@ -11,14 +11,18 @@
 // Sine of an angle below which two directions count as one.
 #define FLAT 1e-3
 
+// Smallest height of an edge over a plane through its end, relative to its length and the number of
+// faces at the corner, that is not due to rounding.
+#define LOW 1e-9
 // Value of sdm_features.side of an edge of which only one face is known so far.
 #define HALF_KNOWN 3
 
-/* What is known of a corner: the sum of the unit vectors along its edges, the area of the polygon
-   in which its faces meet a plane perpendicular to this sum. */
+/* What is known of a corner. `axis`: sum of the unit normals of its faces; lowest, highest: range of
+   the heights of its edges along the axis; area: twice the signed area of the polygon in which the
+   faces meet a plane perpendicular to the axis. */
 typedef struct corner_state {
-    double sum[3], area;
-    bool narrow, bent;
+    double axis[3], lowest, highest, area;
+    bool unknown;
 } corner_state;
 
 /* Unit vectors along edges 0, 1 and 2 of a triangle, in its orientation. */
@@ -71,24 +75,26 @@ static void face_add_edges(const sdm_nearest *n, uint32_t slot, bool narrow, uin
 }
 
 /* Adds the angle of a face at a corner, between the unit vectors a and b along its edges,
-   counter-clockwise. */
+   counter-clockwise seen from outside. */
 static void corner_add(corner_state *c, const double a[3], const double b[3])
 {
     double normal[3];
-    const double along_a = v3_dot(a, c->sum), along_b = v3_dot(b, c->sum);
-    c->bent |= !(along_a > FLAT && along_b > FLAT); // the edge does not reach the plane
+    const double height_a = v3_dot(a, c->axis), height_b = v3_dot(b, c->axis);
+    c->lowest = height_a < c->lowest ? height_a : c->lowest;
+    c->highest = height_a > c->highest ? height_a : c->highest;
     v3_cross(a, b, normal);
-    c->area += v3_dot(normal, c->sum) / (along_a * along_b);
+    c->area += v3_dot(normal, c->axis) / (height_a * height_b);
 }
 
-/* The region of a corner is a convex cone that meets the faces at its tip only. If all edges lie in
-   a half space, their cone meets a plane in a polygon; the region lies on the other side of the
-   plane, outside of the solid exactly if the polygon is a section of the solid, not of the space
-   around it. */
+/* The region of a corner is a convex cone that meets the faces at its tip only. If all edges lie on
+   one side of a plane through the corner, the region lies on the other side: outside of the solid
+   if the edges enclose a part of the solid (their polygon runs counter-clockwise), inside if they
+   enclose a part of the space around it. */
 static int corner_side(const corner_state *c)
 {
-    if (c->narrow || c->bent || !(fabs(c->area) > FLAT * FLAT)) return SDM_SIDE_UNKNOWN;
-    return c->area < 0 ? SDM_SIDE_OUTSIDE : SDM_SIDE_INSIDE;
+    const bool below = c->highest < -LOW, above = c->lowest > LOW;
+    if (c->unknown || !(below || above) || c->area == 0) return SDM_SIDE_UNKNOWN;
+    return (c->area > 0) == below ? SDM_SIDE_OUTSIDE : SDM_SIDE_INSIDE;
 }
 
 sdm_status sdm_feature_sides_build(sdm_nearest *n, sdm_arena *arena, sdm_error *err)
@@ -101,10 +107,12 @@ sdm_status sdm_feature_sides_build(sdm_nearest *n, sdm_arena *arena, sdm_error *
     uint32_t *other;
     sdm_status s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->side, f->end, "sides of features", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &other, n_edge, "sides of features", err);
-    if (!s) s = SDM_TAKE(arena, SDM_HIGH, &corner, n_corner, "sides of features", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &corner, n_corner, "sides of features", err);
     if (s) return s;
     memset(other, 0xff, n_edge * sizeof *other);
-    // faces and edges; sums of the edges at the corners
+    for (uint32_t i = 0; i < n_corner; i++)
+        corner[i] = (corner_state){.lowest = INFINITY, .highest = -INFINITY};
+    // faces and edges; axes of the corners
     for (uint32_t slot = 0; slot < n_slot; slot++) {
         const sdm_frame *frame = &n->frames[slot];
         const bool narrow = frame->flat != 0 || !(sdm_frame_height(frame) > NARROW * frame->half[0]);
@@ -114,23 +122,26 @@ sdm_status sdm_feature_sides_build(sdm_nearest *n, sdm_arena *arena, sdm_error *
         face_add_edges(n, slot, narrow, other, (const double(*)[3])along);
         for (int k = 0; k < 3; k++) {
             corner_state *c = &corner[f->of_slot[slot][3 + k] - f->corner_base];
-            c->narrow |= narrow;
-            for (int i = 0; i < 3; i++) c->sum[i] += along[k][i] - along[(k + 2) % 3][i];
+            c->unknown |= narrow;
+            for (int i = 0; i < 3; i++) c->axis[i] += frame->n[i];
         }
     }
-    // corners
+    for (uint32_t i = n_slot; i < f->corner_base; i++)
+        if (f->side[i] == HALF_KNOWN) f->side[i] = SDM_SIDE_UNKNOWN;
+    // corners; that of an edge with unknown side is not closed for certain
     for (uint32_t slot = 0; slot < n_slot; slot++) {
+        const uint32_t *of = f->of_slot[slot];
         double along[3][3];
         edge_directions(&n->frames[slot], along);
         for (int k = 0; k < 3; k++) {
             const double *in = along[(k + 2) % 3], back[3] = {-in[0], -in[1], -in[2]};
-            corner_add(&corner[f->of_slot[slot][3 + k] - f->corner_base], along[k], back);
+            corner_state *c = &corner[of[3 + k] - f->corner_base];
+            corner_add(c, along[k], back);
+            c->unknown |= !f->side[of[k]] || !f->side[of[(k + 2) % 3]];
         }
     }
     for (uint32_t i = 0; i < n_corner; i++)
         f->side[f->corner_base + i] = (int8_t)corner_side(&corner[i]);
-    for (uint32_t i = n_slot; i < f->corner_base; i++)
-        if (f->side[i] == HALF_KNOWN) f->side[i] = SDM_SIDE_UNKNOWN;
     sdm_arena_release(arena, SDM_HIGH, before);
     return SDM_OK;
 }

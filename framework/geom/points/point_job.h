@@ -28,10 +28,11 @@ typedef struct sdm_point_scratch {
     /* result: side of each point by sdm_feature_side(); unknown without sdm_features.side, and where
        features that are nearest up to rounding differ */
     int8_t side[SDM_POINT_BLOCK];
-    /* clusters of the block: indices of their nodes, and bit v of vectors[i] is set where node[i]
-       may hold the nearest feature of a point of vector v */
+    /* clusters of the block: indices of their nodes, and the distances of their boxes from the
+       centres of the vectors, [cluster][vector], scaled; INFINITY: the cluster does not hold the
+       nearest feature of a point of the vector */
     uint32_t *node;
-    uint8_t *vectors;
+    float (*away)[SDM_POINT_VECTORS];
     size_t n_node;
     /* candidates of the current vector */
     sdm_point_candidate *candidate;

@@ -87,11 +87,19 @@ static sdm_point_kernel *kernel_choose(void)
     return sdm_point_kernel_generic;
 }
 
+static sdm_point_keys *keys_choose(void)
+{
+#if defined(__x86_64__) && defined(__GNUC__)
+    if (sdm_processor_level() >= SDM_PROCESSOR_AVX2) return sdm_point_keys_avx2;
+#endif
+    return sdm_point_keys_generic;
+}
+
 static void scratch_free(sdm_point_scratch *s)
 {
     if (!s) return;
     sdm_free(s->node);
-    sdm_free(s->vectors);
+    sdm_free(s->away);
     sdm_free(s->candidate);
     sdm_free(s);
 }
@@ -99,7 +107,7 @@ static void scratch_free(sdm_point_scratch *s)
 /* Bytes of a thread's scratch memory. */
 static size_t scratch_bytes(const sdm_features *f)
 {
-    return sizeof(sdm_point_scratch) + f->edge_base * (sizeof(uint32_t) + 1) +
+    return sizeof(sdm_point_scratch) + f->edge_base * (sizeof(uint32_t) + sizeof(float[SDM_POINT_VECTORS])) +
            (f->end + 1) * sizeof(sdm_point_candidate);
 }
 
@@ -110,7 +118,7 @@ static sdm_status scratch_start(const sdm_features *f, sdm_point_scratch **out, 
     sdm_point_scratch *s = *out;
     // every cluster has a face; every feature is a candidate at most once
     st = sdm_alloc_unset((void **)&s->node, f->edge_base, sizeof *s->node, "clusters", err);
-    if (!st) st = sdm_alloc_unset((void **)&s->vectors, f->edge_base, 1, "clusters", err);
+    if (!st) st = sdm_alloc_unset((void **)&s->away, f->edge_base, sizeof *s->away, "clusters", err);
     if (!st)
         st = sdm_alloc_unset((void **)&s->candidate, (size_t)f->end + 1, sizeof *s->candidate,
                              "candidates", err);
@@ -166,7 +174,7 @@ static sdm_status chunk_find(const sdm_points_job *job, const double *x, size_t 
 {
     double lo[3], hi[3];
     points_box(&job->surface->features, x, n, lo, hi);
-    sdm_point_order(x, n, lo, hi, n_threads, key, key + n);
+    sdm_point_order(x, n, lo, hi, keys_choose(), n_threads, key, key + n);
     sdm_point_kernel *kernel = kernel_choose();
     const size_t n_block = (n + SDM_POINT_BLOCK - 1) / SDM_POINT_BLOCK;
     const size_t n_job = (n_block + BLOCKS - 1) / BLOCKS;

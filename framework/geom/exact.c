@@ -9,6 +9,7 @@
 #include "layers/layers.h"
 #include "map/grid_distance.h"
 #include "points/points.h"
+#include "points/wide_tree.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/threads.h"
 #include "sdm/internal/vec3.h"
@@ -171,6 +172,7 @@ static sdm_status prepare(sdm_exact *e, const sdm_mesh *mesh, sdm_error *err)
     if (!s) s = make_surface(e, err);
     if (!s) s = check_pseudonormal(e, err);
     if (!s) s = build_nearest(e, err);
+    if (!s) s = sdm_wide_tree_build(&e->nearest.features, &e->arena, err);
     if (!s && e->bounds && e->report.sign == SDM_SIGN_CROSSINGS)
         s = sdm_feature_sides_build(&e->nearest, &e->arena, err);
     if (!s) s = build_sign(e, err);

@@ -17,9 +17,9 @@
 // Value of sdm_features.side of an edge of which only one face is known so far.
 #define HALF_KNOWN 3
 
-/* What is known of a corner. `axis`: sum of the unit normals of its faces; lowest, highest: range of
-   the heights of its edges along the axis; area: twice the signed area of the polygon in which the
-   faces meet a plane perpendicular to the axis. */
+/* What is known of a corner. `axis`: sum of the unit normals of its faces; lowest, highest: range
+   of the heights of its edges along the axis; area: twice the signed area of the polygon in which
+   the faces meet a plane perpendicular to the axis. */
 typedef struct corner_state {
     double axis[3], lowest, highest, area;
     bool unknown;
@@ -49,8 +49,8 @@ static int edge_side(const sdm_frame *f, const double u[3], const sdm_frame *g, 
     return over_f > FLAT / 2 && over_g > FLAT / 2 ? SDM_SIDE_INSIDE : SDM_SIDE_UNKNOWN;
 }
 
-/* Adds the edges of the face in this slot. other[edge - edge_base]: 3 * slot + number of the edge in
-   its first face. */
+/* Adds the edges of the face in this slot. other[edge - edge_base]: 3 * slot + number of the edge
+   in its first face. */
 static void face_add_edges(const sdm_nearest *n, uint32_t slot, bool narrow, uint32_t *other,
                            const double along[3][3])
 {
@@ -92,7 +92,7 @@ static void corner_add(corner_state *c, const double a[3], const double b[3])
    enclose a part of the space around it. */
 static int corner_side(const corner_state *c)
 {
-    const bool below = c->highest < -LOW, above = c->lowest > LOW;
+    const bool below = c->highest<-LOW, above = c->lowest> LOW;
     if (c->unknown || !(below || above) || c->area == 0) return SDM_SIDE_UNKNOWN;
     return (c->area > 0) == below ? SDM_SIDE_OUTSIDE : SDM_SIDE_INSIDE;
 }
@@ -115,7 +115,8 @@ sdm_status sdm_feature_sides_build(sdm_nearest *n, sdm_arena *arena, sdm_error *
     // faces and edges; axes of the corners
     for (uint32_t slot = 0; slot < n_slot; slot++) {
         const sdm_frame *frame = &n->frames[slot];
-        const bool narrow = frame->flat != 0 || !(sdm_frame_height(frame) > NARROW * frame->half[0]);
+        const bool narrow =
+            frame->flat != 0 || !(sdm_frame_height(frame) > NARROW * frame->half[0]);
         double along[3][3];
         f->side[slot] = narrow ? SDM_SIDE_UNKNOWN : SDM_SIDE_OF_OWNER;
         edge_directions(frame, along);

@@ -94,6 +94,8 @@ typedef struct sdm_cluster_node {
 typedef struct sdm_features {
     /* nodes of the tree, [sdm_bvh.n_node] */
     sdm_cluster_node *node;
+    /* tree over the clusters for searches from single points */
+    struct sdm_wide_node *wide;
     /* centroids of the triangles, [n_tri][coordinate], scaled */
     float (*centroid)[3];
     /* at least one face is thin */

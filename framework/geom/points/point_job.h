@@ -25,8 +25,8 @@ typedef struct sdm_point_scratch {
        several features with the same squared distance, bit for bit, the lowest number */
     uint32_t number[SDM_POINT_BLOCK];
     _Alignas(32) double d2[SDM_POINT_BLOCK];
-    /* result: side of each point by sdm_feature_side(); unknown without sdm_features.side, and where
-       features that are nearest up to rounding differ */
+    /* result: side of each point by sdm_feature_side(); unknown without sdm_features.side, and
+       where features that are nearest up to rounding differ */
     int8_t side[SDM_POINT_BLOCK];
     /* clusters of the block: indices of their nodes, and the distances of their boxes from the
        centres of the vectors, [cluster][vector], scaled; INFINITY: the cluster does not hold the
@@ -46,8 +46,15 @@ typedef struct sdm_point_scratch {
    The result is the minimum over all features of sdm_feature_distance2(), so it does not depend on
    the other points of the block or on the instruction set. */
 typedef void sdm_point_kernel(const sdm_nearest *surface, sdm_point_scratch *scratch);
+
+/* The same for a single point x, without scratch memory: returns the number of the nearest feature
+   and sets its squared distance and the side of x. */
+typedef uint32_t sdm_point_search(const sdm_nearest *surface, const double x[3], double *d2,
+                                  int *side);
+
 sdm_point_kernel sdm_point_kernel_generic;
+sdm_point_search sdm_point_search_generic;
 #if defined(__x86_64__) && defined(__GNUC__)
-sdm_point_kernel sdm_point_kernel_avx2;
-sdm_point_kernel sdm_point_kernel_avx512;
+sdm_point_kernel sdm_point_kernel_avx2, sdm_point_kernel_avx512;
+sdm_point_search sdm_point_search_avx2, sdm_point_search_avx512;
 #endif

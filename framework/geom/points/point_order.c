@@ -4,11 +4,12 @@
 #include <string.h>
 
 #define N_DIGIT ((size_t)1 << SDM_CURVE_BITS) // values of a digit of the radix sort
-#define SLICES_MAX 64              // parts of the array that threads sort at the same time
+#define SLICES_MAX 64 // parts of the array that threads sort at the same time
 #define SLICE_MIN 8192
 
 void sdm_point_order(const double *x, size_t n, const double lo[3], const double hi[3],
-                     sdm_point_keys *keys, int n_threads, sdm_point_key *key, sdm_point_key *scratch)
+                     sdm_point_keys *keys, int n_threads, sdm_point_key *key,
+                     sdm_point_key *scratch)
 {
     size_t count[SLICES_MAX][N_DIGIT];
     double scale[3];

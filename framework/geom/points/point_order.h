@@ -27,4 +27,5 @@ sdm_point_keys sdm_point_keys_avx2;
    of their indices. scratch[n]: any content. keys: a variant for
    this processor. The order does not depend on n_threads. */
 void sdm_point_order(const double *x, size_t n, const double lo[3], const double hi[3],
-                     sdm_point_keys *keys, int n_threads, sdm_point_key *key, sdm_point_key *scratch);
+                     sdm_point_keys *keys, int n_threads, sdm_point_key *key,
+                     sdm_point_key *scratch);

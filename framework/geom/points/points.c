@@ -23,6 +23,23 @@ static bool is_point(const double x[3])
     return fabs(x[0]) <= 1e150 && fabs(x[1]) <= 1e150 && fabs(x[2]) <= 1e150;
 }
 
+/* The functions of one instruction set. */
+typedef struct kernels {
+    sdm_point_kernel *block;
+    sdm_point_search *search;
+} kernels;
+
+static kernels kernels_choose(void)
+{
+#if defined(__x86_64__) && defined(__GNUC__)
+    const int level = sdm_processor_level();
+    if (level >= SDM_PROCESSOR_AVX512)
+        return (kernels){sdm_point_kernel_avx512, sdm_point_search_avx512};
+    if (level >= SDM_PROCESSOR_AVX2) return (kernels){sdm_point_kernel_avx2, sdm_point_search_avx2};
+#endif
+    return (kernels){sdm_point_kernel_generic, sdm_point_search_generic};
+}
+
 /* Stores the answer for x in element `index`: its nearest feature, the squared distance, and the
    side by this feature. */
 static void point_finish(const sdm_points_job *job, const double x[3], uint32_t number, double d2,
@@ -36,7 +53,8 @@ static void point_finish(const sdm_points_job *job, const double x[3], uint32_t 
     // near the surface rounding decides on which side of the feature the point lies
     const double largest = fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2])));
     if (!(d > job->seam + 16 * DBL_EPSILON * largest)) side = SDM_SIDE_UNKNOWN;
-    if (wants_point || side == SDM_SIDE_UNKNOWN) (void)sdm_frame_closest(&s->frames[slot], x, q, &feature);
+    if (wants_point || side == SDM_SIDE_UNKNOWN)
+        (void)sdm_frame_closest(&s->frames[slot], x, q, &feature);
     if (side == SDM_SIDE_UNKNOWN ? sdm_sign_inside(job->sign, x, slot, q, feature)
                                  : side == SDM_SIDE_INSIDE)
         d = -d;
@@ -66,25 +84,17 @@ void sdm_point_find(const sdm_points_job *job, const double x[3], const sdm_exac
         return;
     }
     double d2;
-    const uint32_t number = sdm_nearest_least(job->surface, x, &d2);
-    point_finish(job, x, number, d2, SDM_SIDE_UNKNOWN, out, index);
+    int side;
+    const uint32_t number = kernels_choose().search(job->surface, x, &d2, &side);
+    point_finish(job, x, number, d2, side, out, index);
 }
 
 double sdm_point_distance(const sdm_nearest *surface, const double x[3])
 {
     double d2 = NAN;
-    if (is_point(x)) (void)sdm_nearest_least(surface, x, &d2);
+    int side;
+    if (is_point(x)) (void)kernels_choose().search(surface, x, &d2, &side);
     return sqrt(d2);
-}
-
-static sdm_point_kernel *kernel_choose(void)
-{
-#if defined(__x86_64__) && defined(__GNUC__)
-    const int level = sdm_processor_level();
-    if (level >= SDM_PROCESSOR_AVX512) return sdm_point_kernel_avx512;
-    if (level >= SDM_PROCESSOR_AVX2) return sdm_point_kernel_avx2;
-#endif
-    return sdm_point_kernel_generic;
 }
 
 static sdm_point_keys *keys_choose(void)
@@ -107,7 +117,8 @@ static void scratch_free(sdm_point_scratch *s)
 /* Bytes of a thread's scratch memory. */
 static size_t scratch_bytes(const sdm_features *f)
 {
-    return sizeof(sdm_point_scratch) + f->edge_base * (sizeof(uint32_t) + sizeof(float[SDM_POINT_VECTORS])) +
+    return sizeof(sdm_point_scratch) +
+           f->edge_base * (sizeof(uint32_t) + sizeof(float[SDM_POINT_VECTORS])) +
            (f->end + 1) * sizeof(sdm_point_candidate);
 }
 
@@ -118,7 +129,8 @@ static sdm_status scratch_start(const sdm_features *f, sdm_point_scratch **out, 
     sdm_point_scratch *s = *out;
     // every cluster has a face; every feature is a candidate at most once
     st = sdm_alloc_unset((void **)&s->node, f->edge_base, sizeof *s->node, "clusters", err);
-    if (!st) st = sdm_alloc_unset((void **)&s->away, f->edge_base, sizeof *s->away, "clusters", err);
+    if (!st)
+        st = sdm_alloc_unset((void **)&s->away, f->edge_base, sizeof *s->away, "clusters", err);
     if (!st)
         st = sdm_alloc_unset((void **)&s->candidate, (size_t)f->end + 1, sizeof *s->candidate,
                              "candidates", err);
@@ -129,8 +141,7 @@ static sdm_status scratch_start(const sdm_features *f, sdm_point_scratch **out, 
 
 /* Answers for the block of sorted points key[n], 0 < n <= SDM_POINT_BLOCK, of x[][3]. */
 static void block_find(const sdm_points_job *job, sdm_point_kernel *kernel, sdm_point_scratch *s,
-                       const double *x, const sdm_point_key *key, size_t n,
-                       const sdm_exact_at *out)
+                       const double *x, const sdm_point_key *key, size_t n, const sdm_exact_at *out)
 {
     for (size_t i = 0; i < SDM_POINT_BLOCK; i++) {
         const double *p = x + 3 * (size_t)key[i < n ? i : n - 1].index;
@@ -175,7 +186,7 @@ static sdm_status chunk_find(const sdm_points_job *job, const double *x, size_t 
     double lo[3], hi[3];
     points_box(&job->surface->features, x, n, lo, hi);
     sdm_point_order(x, n, lo, hi, keys_choose(), n_threads, key, key + n);
-    sdm_point_kernel *kernel = kernel_choose();
+    sdm_point_kernel *kernel = kernels_choose().block;
     const size_t n_block = (n + SDM_POINT_BLOCK - 1) / SDM_POINT_BLOCK;
     const size_t n_job = (n_block + BLOCKS - 1) / BLOCKS;
     atomic_int stop = SDM_OK;

@@ -7,6 +7,7 @@
 
 #include "features/feature_side.h"
 #include "layers/layers.h"
+#include "map/grid_blocks.h"
 #include "map/grid_distance.h"
 #include "points/points.h"
 #include "points/wide_tree.h"
@@ -347,6 +348,34 @@ static sdm_status map_with_layers(const sdm_exact *e, const sdm_grid *grid, sdm_
     sdm_free(frames);
     sdm_free(slot);
     sdm_free(own);
+    return s;
+}
+
+sdm_status sdm_exact_map_blocks(const sdm_exact *e, const sdm_grid *grid, double band_mm,
+                                sdm_blocks *out, sdm_error *err)
+{
+    if (!e || !grid || !out)
+        return sdm_fail(err, SDM_E_ARG, "blocks without an engine, a grid or a place for the result");
+    *out = (sdm_blocks){0};
+    sdm_status s = sdm_grid_check(grid, err);
+    if (s) return s;
+    const float band = (float)band_mm;
+    if (!(band > 0 && band < INFINITY))
+        return sdm_fail(err, SDM_E_ARG, "narrow band of %g mm, need a positive width", band_mm);
+    if (e->report.sign != SDM_SIGN_CROSSINGS)
+        return sdm_fail(err, SDM_E_ARG,
+                        "blocks need a closed mesh and the sign method crossings, not %s: the sign "
+                        "may change away from the surface; use the whole map",
+                        sdm_sign_method_name(e->report.sign));
+    sdm_exact_opts opts = opts_beside(e, 0);
+    s = sdm_grid_blocks_make(&e->nearest, grid, (double)band, &opts, out, err);
+    opts = opts_beside(e, sdm_blocks_bytes(out));
+    if (!s) s = sdm_grid_distance_blocks(&e->nearest, &opts, out, err);
+    if (!s) s = sdm_sign_blocks(&e->sign, &opts, out, err);
+    if (!s)
+        sdm_grid_blocks_prune(out);
+    else
+        sdm_blocks_dispose(out);
     return s;
 }
 

@@ -145,6 +145,22 @@ static void tile_search(const tile *t, voxels *x)
     }
 }
 
+/* Writes n values of a row of voxels that begins at `at` to the blocks that contain them. */
+static void row_write_blocks(const sdm_blocks *b, const int64_t at[3], int64_t n, const float *d)
+{
+    const int64_t row = (at[2] / SDM_BLOCK_SIZE * b->n[1] + at[1] / SDM_BLOCK_SIZE) * b->n[0],
+                  in_block = (at[2] % SDM_BLOCK_SIZE * SDM_BLOCK_SIZE + at[1] % SDM_BLOCK_SIZE) *
+                             SDM_BLOCK_SIZE;
+    for (int64_t i = at[0], end; i < at[0] + n; i = end) {
+        end = (i / SDM_BLOCK_SIZE + 1) * SDM_BLOCK_SIZE;
+        end = end < at[0] + n ? end : at[0] + n;
+        const uint32_t number = b->tile[row + i / SDM_BLOCK_SIZE];
+        if (number >= SDM_TILE_INSIDE) continue;
+        memcpy(&b->values[number][in_block + i % SDM_BLOCK_SIZE], &d[i - at[0]],
+               (size_t)(end - i) * sizeof *d);
+    }
+}
+
 /* Writes the distances (mm) and the slots of the voxels that are inside the grid. */
 static void tile_write(const tile *t, voxels *x)
 {
@@ -170,6 +186,11 @@ static void tile_write(const tile *t, voxels *x)
             const int64_t to =
                 ((t->first[2] + z) * job->n[1] + t->first[1] + y) * job->n[0] + t->first[0];
             const int64_t from = (z * whole[1] + y) * whole[0];
+            if (job->blocks) {
+                const int64_t at[3] = {t->first[0], t->first[1] + y, t->first[2] + z};
+                row_write_blocks(job->blocks, at, size[0], &d[from]);
+                continue;
+            }
             if (size[0] == 4) // the usual size: a constant lets the compiler inline memcpy
                 memcpy(&job->values[to], &d[from], 4 * sizeof *d);
             else

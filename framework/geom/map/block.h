@@ -17,6 +17,9 @@ typedef struct block {
     // [tile][vector]: a feature whose squared distance from the vector's centre is larger is not
     // the nearest feature of any voxel of the vector
     _Alignas(32) float far2[8][8];
+    // with a narrow band: a feature whose squared distance from the centre of a tile is larger lies
+    // outside the band for every voxel of the tile; INFINITY without a band
+    float tile_far2;
     // [SDM_BLOCKS, SDM_TILES, SDM_VECTORS]: half[level] * sdm_block_group.extent bounds the change
     // of a function from the centre of the block, of a tile or of a vector to its corners
     float half[SDM_PART_LEVELS];

@@ -98,6 +98,14 @@ static void tile_choose(const tile *t, voxels *x)
         // clear: the second nearest is farther than the first by more than the errors of both;
         // false for NaN (INFINITY - INFINITY)
         const unsigned at = 8 * t->number + (unsigned)v;
+        if (c->last[at] == SDM_NONE && job->band_mm < INFINITY) { // all voxels are outside the band
+            for (int i = 0; i < 8; i++) {
+                x->settled[x->n_settled] = (uint8_t)voxel_index(job, v, i);
+                x->number[x->settled[x->n_settled]] = SDM_NONE;
+                x->settled_d2[x->n_settled++] = INFINITY;
+            }
+            continue;
+        }
         const v8f first = v8_load(c->first[at]);
         const v8f limit = v8_fma(v8_add(v8_sqrt(first), v8_all(1)), k, first);
         const int clear = v8_greater(v8_load(c->second[at]), limit) & (int)~c->open[at];
@@ -132,16 +140,13 @@ static void tile_measure(const tile *t, voxels *x)
     for (int i = 0; i < x->n_settled; i++) x->d2[x->settled[i]] = x->settled_d2[i];
 }
 
-/* Sets x->number and x->d2 of a tile that has no candidates: without a narrow band by a search of
-   the tree; with one, all voxels lie outside of the band. */
+/* Sets x->number and x->d2 of a tile that has no candidates, by searches of the tree. */
 static void tile_search(const tile *t, voxels *x)
 {
     for (unsigned i = 0; i < 64; i++) {
         double p[3];
         voxel_position(t, i, p);
-        x->number[i] = SDM_NONE;
-        x->d2[i] = INFINITY;
-        if (!(t->job->band_mm < INFINITY)) x->number[i] = nearest_in_tree(t, p, &x->d2[i]);
+        x->number[i] = nearest_in_tree(t, p, &x->d2[i]);
     }
 }
 
@@ -161,22 +166,11 @@ static void row_write_blocks(const sdm_blocks *b, const int64_t at[3], int64_t n
     }
 }
 
-/* Writes the distances (mm) and the slots of the voxels that are inside the grid. */
-static void tile_write(const tile *t, voxels *x)
+/* Writes distances (mm) and, if wanted, slots of the voxels of a tile that are inside the grid. */
+static void tile_store(const tile *t, const float d[64], const uint32_t slot[64])
 {
     const sdm_grid_job *job = t->job;
     const int64_t *whole = job->part[SDM_TILES].size;
-    float d[64];
-    for (int i = 0; i < 64; i++) d[i] = (float)sqrt(x->d2[i]);
-    // from features to triangles
-    for (int i = 0; i < 64 && job->slot; i++)
-        x->number[i] = x->number[i] == SDM_NONE ? SDM_NONE : job->features->owner[x->number[i]];
-    if (job->band_mm < INFINITY)
-        for (int i = 0; i < 64; i++) {
-            if (d[i] < (float)job->band_mm) continue;
-            d[i] = (float)job->band_mm;
-            x->number[i] = SDM_NONE;
-        }
     // row by row, cut off at the end of the grid
     int64_t size[3];
     for (int a = 0; a < 3; a++)
@@ -196,6 +190,36 @@ static void tile_write(const tile *t, voxels *x)
             else
                 memcpy(&job->values[to], &d[from], (size_t)size[0] * sizeof *d);
             if (job->slot)
-                memcpy(&job->slot[to], &x->number[from], (size_t)size[0] * sizeof *x->number);
+                memcpy(&job->slot[to], &slot[from], (size_t)size[0] * sizeof *slot);
         }
+}
+
+/* Writes a tile whose voxels all lie outside the band. */
+static void tile_write_far(const tile *t)
+{
+    float d[64];
+    uint32_t slot[64];
+    for (int i = 0; i < 64; i++) {
+        d[i] = (float)t->job->band_mm;
+        slot[i] = SDM_NONE;
+    }
+    tile_store(t, d, slot);
+}
+
+/* Writes the distances and the slots of a tile. */
+static void tile_write(const tile *t, voxels *x)
+{
+    const sdm_grid_job *job = t->job;
+    float d[64];
+    for (int i = 0; i < 64; i++) d[i] = (float)sqrt(x->d2[i]);
+    // from features to triangles
+    for (int i = 0; i < 64 && job->slot; i++)
+        x->number[i] = x->number[i] == SDM_NONE ? SDM_NONE : job->features->owner[x->number[i]];
+    if (job->band_mm < INFINITY)
+        for (int i = 0; i < 64; i++) {
+            if (d[i] < (float)job->band_mm) continue;
+            d[i] = (float)job->band_mm;
+            x->number[i] = SDM_NONE;
+        }
+    tile_store(t, d, x->number);
 }

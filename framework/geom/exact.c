@@ -355,7 +355,8 @@ sdm_status sdm_exact_map_blocks(const sdm_exact *e, const sdm_grid *grid, double
                                 sdm_blocks *out, sdm_error *err)
 {
     if (!e || !grid || !out)
-        return sdm_fail(err, SDM_E_ARG, "blocks without an engine, a grid or a place for the result");
+        return sdm_fail(err, SDM_E_ARG,
+                        "blocks without an engine, a grid or a place for the result");
     *out = (sdm_blocks){0};
     sdm_status s = sdm_grid_check(grid, err);
     if (s) return s;

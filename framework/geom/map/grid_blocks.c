@@ -15,7 +15,8 @@ typedef struct range {
     int64_t lo[3], hi[3];
 } range;
 
-/* Range of the tiles that meet the bounding box of a triangle, in voxels and widened by the band. */
+/* Range of the tiles that meet the bounding box of a triangle, in voxels and widened by the band.
+ */
 static range tiles_around(const sdm_blocks *b, const sdm_frame *f)
 {
     const sdm_grid *g = &b->grid;
@@ -71,7 +72,9 @@ static void range_mark(sdm_blocks *b, range r, const sdm_frame *f)
     const int64_t length = r.hi[longest] - r.lo[longest];
     uint32_t *tile = &b->tile[(r.lo[2] * b->n[1] + r.lo[1]) * b->n[0] + r.lo[0]];
     if (length == 1 && *tile == 0) return;
-    if (!range_is_near(b, &r, f)) return;
+    // the test is not worth while for a few tiles, whose halves are tested again
+    const int64_t count = (r.hi[0] - r.lo[0]) * (r.hi[1] - r.lo[1]) * (r.hi[2] - r.lo[2]);
+    if ((length == 1 || count > 8) && !range_is_near(b, &r, f)) return;
     if (length == 1) {
         *tile = 0;
         return;
@@ -122,8 +125,7 @@ sdm_status sdm_grid_blocks_make(const sdm_nearest *surface, const sdm_grid *g, d
     if (limit && bytes >= limit)
         return sdm_fail(err, SDM_E_NOMEM, "%zu tiles need %zu bytes, memory_limit leaves %zu",
                         n_tile, bytes, limit);
-    sdm_status s =
-        sdm_alloc_unset((void **)&out->tile, n_tile, sizeof *out->tile, "tiles", err);
+    sdm_status s = sdm_alloc_unset((void **)&out->tile, n_tile, sizeof *out->tile, "tiles", err);
     if (s) return s;
     memset(out->tile, 0xff, bytes); // SDM_TILE_OUTSIDE
     for (uint32_t slot = 0; slot < surface->features.edge_base; slot++)
@@ -131,26 +133,31 @@ sdm_status sdm_grid_blocks_make(const sdm_nearest *surface, const sdm_grid *g, d
     return blocks_number(out, n_tile, limit ? limit - bytes : 0, err);
 }
 
+/* The tile of block i. */
+static uint32_t *tile_of(const sdm_blocks *b, size_t i)
+{
+    const int64_t s = SDM_BLOCK_SIZE;
+    const int32_t *at = b->first[i];
+    return &b->tile[(at[2] / s * b->n[1] + at[1] / s) * b->n[0] + at[0] / s];
+}
+
 void sdm_grid_blocks_prune(sdm_blocks *b)
 {
     const float band = (float)b->band_mm;
-    size_t n = 0;
-    for (size_t i = 0; i < b->n_block; i++) {
-        const int32_t *at = b->first[i];
-        const int64_t s = SDM_BLOCK_SIZE;
-        uint32_t *tile = &b->tile[(at[2] / s * b->n[1] + at[1] / s) * b->n[0] + at[0] / s];
+    for (size_t i = 0; i < b->n_block;) {
         unsigned near = 0;
         for (int v = 0; v < SDM_BLOCK_VOXELS; v++) near |= fabsf(b->values[i][v]) < band;
-        // the first voxel lies inside the grid
-        *tile = near ? (uint32_t)n : b->values[i][0] < 0 ? SDM_TILE_INSIDE : SDM_TILE_OUTSIDE;
-        if (!near) continue;
-        if (n < i) {
-            memcpy(b->values[n], b->values[i], sizeof b->values[n]);
-            memcpy(b->first[n], b->first[i], sizeof b->first[n]);
+        if (near) {
+            i++;
+            continue;
         }
-        n++;
+        // the first voxel lies inside the grid; the last block takes the place of this one
+        *tile_of(b, i) = b->values[i][0] < 0 ? SDM_TILE_INSIDE : SDM_TILE_OUTSIDE;
+        if (i == --b->n_block) break;
+        memcpy(b->values[i], b->values[b->n_block], sizeof b->values[i]);
+        memcpy(b->first[i], b->first[b->n_block], sizeof b->first[i]);
+        *tile_of(b, i) = (uint32_t)i;
     }
-    b->n_block = n;
 }
 
 size_t sdm_blocks_bytes(const sdm_blocks *b)

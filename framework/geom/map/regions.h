@@ -61,7 +61,8 @@ SDM_FOR_KIND v8f region_excess(int kind, const functions8 *x, const float (*exte
 }
 
 /* Squared distances of eight points from the plane of a face, the line of an edge or a corner, from
-   the functions of the feature at the points, and for a corner the vectors from it to the points. */
+   the functions of the feature at the points, and for a corner the vectors from it to the points.
+ */
 SDM_FOR_KIND v8f function_distance2(int kind, const functions8 *x, point8 from)
 {
     if (kind == SDM_CORNERS) return p8_dot(from, from);

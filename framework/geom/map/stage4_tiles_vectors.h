@@ -62,8 +62,10 @@ SDM_FOR_KIND void batch_test_tiles(block *b, int kind)
         v8f excess = region_excess(kind, &f, m->extent, lane, minus_half, x->most);
         if (kind != SDM_THIN_FACES && b->tile_far2 < INFINITY) {
             point8 from = p8_load(job->part[SDM_TILES].centre.x);
-            if (kind == SDM_CORNERS) from = p8_add(from, p8_all(x->from[0], x->from[1], x->from[2]));
-            excess = v8_max(excess, v8_sub(function_distance2(kind, &f, from), v8_all(b->tile_far2)));
+            if (kind == SDM_CORNERS)
+                from = p8_add(from, p8_all(x->from[0], x->from[1], x->from[2]));
+            excess =
+                v8_max(excess, v8_sub(function_distance2(kind, &f, from), v8_all(b->tile_far2)));
         }
         const unsigned mask = m->cluster->tiles & ~(unsigned)v8_greater(excess, error);
         met |= mask;
@@ -101,7 +103,8 @@ SDM_FOR_KIND void batch_test_vectors(const block *b, int kind)
         v8f excess = region_excess(kind, &f, x->extent, x->lane, minus_half, x->most);
         if (kind != SDM_THIN_FACES) {
             point8 from = p8_load(job->vector[t].x);
-            if (kind == SDM_CORNERS) from = p8_add(from, p8_all(x->from[0], x->from[1], x->from[2]));
+            if (kind == SDM_CORNERS)
+                from = p8_add(from, p8_all(x->from[0], x->from[1], x->from[2]));
             const v8f d2 = function_distance2(kind, &f, from);
             excess = v8_max(excess, v8_sub(d2, v8_load(b->far2[t])));
         }

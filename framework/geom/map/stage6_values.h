@@ -166,6 +166,35 @@ static void row_write_blocks(const sdm_blocks *b, const int64_t at[3], int64_t n
     }
 }
 
+/* Writes the first size[3] voxels of a tile if all of them are in one block; false if not. */
+static bool tile_store_block(const tile *t, const int64_t size[3], const float d[64])
+{
+    const sdm_blocks *b = t->job->blocks;
+    const int64_t *whole = t->job->part[SDM_TILES].size;
+    int64_t at[3];
+    for (int a = 0; a < 3; a++) {
+        at[a] = t->first[a] % SDM_BLOCK_SIZE;
+        if (at[a] + size[a] > SDM_BLOCK_SIZE) return false;
+    }
+    const uint32_t number =
+        b->tile[(t->first[2] / SDM_BLOCK_SIZE * b->n[1] + t->first[1] / SDM_BLOCK_SIZE) * b->n[0] +
+                t->first[0] / SDM_BLOCK_SIZE];
+    if (number >= SDM_TILE_INSIDE) return true;
+    for (int64_t z = 0; z < size[2]; z++) {
+        for (int64_t y = 0; y < size[1]; y++) {
+            float *to =
+                &b->values[number]
+                          [((at[2] + z) * SDM_BLOCK_SIZE + at[1] + y) * SDM_BLOCK_SIZE + at[0]];
+            const float *from = &d[(z * whole[1] + y) * whole[0]];
+            if (size[0] == 4) // the usual size: a constant lets the compiler inline memcpy
+                memcpy(to, from, 4 * sizeof *d);
+            else
+                memcpy(to, from, (size_t)size[0] * sizeof *d);
+        }
+    }
+    return true;
+}
+
 /* Writes distances (mm) and, if wanted, slots of the voxels of a tile that are inside the grid. */
 static void tile_store(const tile *t, const float d[64], const uint32_t slot[64])
 {
@@ -175,6 +204,7 @@ static void tile_store(const tile *t, const float d[64], const uint32_t slot[64]
     int64_t size[3];
     for (int a = 0; a < 3; a++)
         size[a] = job->n[a] - t->first[a] < whole[a] ? job->n[a] - t->first[a] : whole[a];
+    if (job->blocks && tile_store_block(t, size, d)) return;
     for (int64_t z = 0; z < size[2]; z++)
         for (int64_t y = 0; y < size[1]; y++) {
             const int64_t to =
@@ -189,8 +219,7 @@ static void tile_store(const tile *t, const float d[64], const uint32_t slot[64]
                 memcpy(&job->values[to], &d[from], 4 * sizeof *d);
             else
                 memcpy(&job->values[to], &d[from], (size_t)size[0] * sizeof *d);
-            if (job->slot)
-                memcpy(&job->slot[to], &slot[from], (size_t)size[0] * sizeof *slot);
+            if (job->slot) memcpy(&job->slot[to], &slot[from], (size_t)size[0] * sizeof *slot);
         }
 }
 

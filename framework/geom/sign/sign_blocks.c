@@ -49,8 +49,8 @@ sdm_status sdm_sign_blocks(const sdm_sign *s, const sdm_exact_opts *opts, sdm_bl
 {
     sdm_sign_rows rows = {0};
     blocks_job job = {&rows.rows, b};
-    sdm_status st = sdm_sign_rows_build(s->solid, NULL, &b->grid, (const int[3]){0, 1, 2}, opts,
-                                        &rows, err);
+    sdm_status st =
+        sdm_sign_rows_build(s->solid, NULL, &b->grid, (const int[3]){0, 1, 2}, opts, &rows, err);
     if (!st) st = sdm_sign_tiles(&rows, b->grid.n[1], b->grid.n[2], opts, tile_flip, &job, err);
     sdm_rows_dispose(&rows.rows);
     return st;

@@ -27,7 +27,7 @@ typedef struct sdm_blocks {
     /* [n[2]][n[1]][n[0]] number of the block of each tile, or SDM_TILE_OUTSIDE, SDM_TILE_INSIDE */
     uint32_t *tile;
     size_t n_block;
-    /* [n_block] index of the first voxel of each block; ascending in z, then y, then x */
+    /* [n_block] index of the first voxel of each block; the blocks are in any order */
     int32_t (*first)[3];
     /* [n_block][z][y][x] distances, mm, negative inside; +-band_mm where abs(distance) >= band_mm.
      * Every block has a value within the band. Beyond the grid: +band_mm */

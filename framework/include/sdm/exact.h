@@ -143,9 +143,9 @@ typedef struct sdm_exact_layers {
 SDM_API sdm_status sdm_exact_map_layers(const sdm_exact *e, const sdm_grid *grid,
                                         const sdm_exact_layers *layers, sdm_error *err);
 
-/* *out = the narrow band of the map in blocks of 8 x 8 x 8 voxels: its values and signs are those of
- * sdm_exact_map_layers() with this band_mm (mm, > 0, rounded to float), the same bits; voxels far
- * from the surface cost neither time nor memory. Only for closed meshes with the sign method
+/* *out = the narrow band of the map in blocks of 8 x 8 x 8 voxels: its values and signs are those
+ * of sdm_exact_map_layers() with this band_mm (mm, > 0, rounded to float), the same bits; voxels
+ * far from the surface cost neither time nor memory. Only for closed meshes with the sign method
  * crossings, whose sign changes at the surface only. Free *out with sdm_blocks_dispose(). The same
  * bits for any number of threads. SDM_E_ARG (NULL, an invalid grid or band, another sign method),
  * SDM_E_NOMEM, SDM_E_CANCELLED. */

@@ -141,17 +141,35 @@ static uint32_t *tile_of(const sdm_blocks *b, size_t i)
     return &b->tile[(at[2] / s * b->n[1] + at[1] / s) * b->n[0] + at[0] / s];
 }
 
-void sdm_grid_blocks_prune(sdm_blocks *b)
+/* Does block i have a value within the band, or, where the band is narrower than a voxel, values of
+   both signs? Voxels beyond the grid do not count. */
+static bool is_needed(const sdm_blocks *b, size_t i)
 {
     const float band = (float)b->band_mm;
+    const bool inside = b->values[i][0] < 0; // the first voxel lies inside the grid
+    unsigned needed = 0;
+    int64_t end[3];
+    for (int a = 0; a < 3; a++) {
+        end[a] = b->grid.n[a] - b->first[i][a];
+        if (end[a] > SDM_BLOCK_SIZE) end[a] = SDM_BLOCK_SIZE;
+    }
+    for (int64_t z = 0; z < end[2]; z++)
+        for (int64_t y = 0; y < end[1]; y++) {
+            const float *row = &b->values[i][(z * SDM_BLOCK_SIZE + y) * SDM_BLOCK_SIZE];
+            for (int64_t x = 0; x < end[0]; x++)
+                needed |= (fabsf(row[x]) < band) | ((row[x] < 0) != inside);
+        }
+    return needed != 0;
+}
+
+void sdm_grid_blocks_prune(sdm_blocks *b)
+{
     for (size_t i = 0; i < b->n_block;) {
-        unsigned near = 0;
-        for (int v = 0; v < SDM_BLOCK_VOXELS; v++) near |= fabsf(b->values[i][v]) < band;
-        if (near) {
+        if (is_needed(b, i)) {
             i++;
             continue;
         }
-        // the first voxel lies inside the grid; the last block takes the place of this one
+        // the last block takes the place of this one
         *tile_of(b, i) = b->values[i][0] < 0 ? SDM_TILE_INSIDE : SDM_TILE_OUTSIDE;
         if (i == --b->n_block) break;
         memcpy(b->values[i], b->values[b->n_block], sizeof b->values[i]);

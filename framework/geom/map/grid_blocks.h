@@ -12,8 +12,8 @@
 sdm_status sdm_grid_blocks_make(const sdm_nearest *surface, const sdm_grid *g, double band_mm,
                                 const sdm_exact_opts *opts, sdm_blocks *out, sdm_error *err);
 
-/* Removes the blocks without a voxel within the band: their tiles become SDM_TILE_INSIDE or
-   SDM_TILE_OUTSIDE by the sign of their values. */
+/* Removes the blocks without a voxel within the band, if their values have one sign: their tiles
+   become SDM_TILE_INSIDE or SDM_TILE_OUTSIDE. */
 void sdm_grid_blocks_prune(sdm_blocks *b);
 
 /* Bytes allocated by *b. */

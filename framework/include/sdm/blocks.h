@@ -30,7 +30,8 @@ typedef struct sdm_blocks {
     /* [n_block] index of the first voxel of each block; the blocks are in any order */
     int32_t (*first)[3];
     /* [n_block][z][y][x] distances, mm, negative inside; +-band_mm where abs(distance) >= band_mm.
-     * Every block has a value within the band. Beyond the grid: +band_mm */
+     * Every block has a value within the band, or values of both signs if the band is narrower than
+     * a voxel. Beyond the grid: +band_mm */
     float (*values)[SDM_BLOCK_VOXELS];
 } sdm_blocks;
 

@@ -36,8 +36,8 @@ static void check_blocks(const subject *s, const sdm_blocks *b, const float *map
                 const float found = value_of(b, i, j, k);
                 if (i < g->n[0] && j < g->n[1] && k < g->n[2]) {
                     const float expected = map[(k * g->n[1] + j) * g->n[0] + i];
-                    CHECK(found == expected, s, at, "voxel is %.9g, in the map %.9g",
-                          (double)found, (double)expected);
+                    CHECK(found == expected, s, at, "voxel is %.9g, in the map %.9g", (double)found,
+                          (double)expected);
                 } else {
                     CHECK(fabsf(found) == (float)b->band_mm, s, at, "%.9g beyond the grid",
                           (double)found);

@@ -44,8 +44,8 @@ static void draw(subject *s, double (*x)[3])
 static void check_same(const subject *s, const double *x, const answers *a, size_t i,
                        const answers *b, size_t k, const char *what)
 {
-    CHECK(!memcmp(&a->distance[i], &b->distance[k], sizeof *a->distance), s, x, "%s: %.17g, not %.17g",
-          what, b->distance[k], a->distance[i]);
+    CHECK(!memcmp(&a->distance[i], &b->distance[k], sizeof *a->distance), s, x,
+          "%s: %.17g, not %.17g", what, b->distance[k], a->distance[i]);
     CHECK(!memcmp(a->gradient[i], b->gradient[k], sizeof *a->gradient) &&
               !memcmp(a->closest[i], b->closest[k], sizeof *a->closest) &&
               a->triangle[i] == b->triangle[k],
@@ -72,7 +72,8 @@ static void check_invariance(subject *s, const double (*x)[3], const answers *a)
     for (size_t i = 0; i < 37; i++) check_same(s, y[i], a, from[i], &b, i, "a few of them");
     // single points
     for (size_t i = 0; i < POINTS; i++) {
-        b.distance[i] = sdm_exact_point(s->engine, x[i], b.closest[i], b.gradient[i], &b.triangle[i]);
+        b.distance[i] =
+            sdm_exact_point(s->engine, x[i], b.closest[i], b.gradient[i], &b.triangle[i]);
         check_same(s, x[i], a, i, &b, i, "one by one");
         CHECK(sdm_exact_distance(s->engine, x[i]) == fabs(a->distance[i]), s, x[i],
               "sdm_exact_distance");
@@ -93,7 +94,8 @@ static void check_invariance(subject *s, const double (*x)[3], const answers *a)
 /* Brute force in long double; the sign by the winding number. */
 static void check_truth(const subject *s, const double *x, const answers *a, size_t i)
 {
-    const double d = a->distance[i], truth = (double)brute_distance(sdm_exact_surface(s->engine), x),
+    const double d = a->distance[i],
+                 truth = (double)brute_distance(sdm_exact_surface(s->engine), x),
                  tolerance = bound * rounding_at(s, x);
     CHECK(fabs(fabs(d) - truth) <= tolerance, s, x, "%.17g, brute force %.17g", d, truth);
     const double seam = tolerance + s->report->union_error_mm;
@@ -138,8 +140,8 @@ static void test_points_match_maps(void **state)
         if (sdm_exact_points(s.engine, x, n, &(sdm_exact_at){.distance = d}, &err))
             fail_msg("%s", err.text);
         for (size_t k = 0; k < n; k++) {
-            const bool on_surface = fabs(d[k]) <= bound * rounding_at(&s, &x[3 * k]) +
-                                                      2 * s.report->union_error_mm;
+            const bool on_surface =
+                fabs(d[k]) <= bound * rounding_at(&s, &x[3 * k]) + 2 * s.report->union_error_mm;
             CHECK((float)d[k] == map[k] || (on_surface && (float)d[k] == -map[k]), &s, &x[3 * k],
                   "%.9g, in the map %.9g", d[k], (double)map[k]);
         }
@@ -202,9 +204,10 @@ static void test_limits(void **state)
     subject s;
     bool stop = false;
     subject_make(&s, 1, NULL);
-    sdm_exact *e = engine_of(&s, &s.mesh,
-                             &(sdm_exact_opts){.memory_limit = (size_t)8 << 20, .n_threads = 1,
-                                               .cancelled = stop_now, .user = &stop});
+    sdm_exact *e = engine_of(
+        &s, &s.mesh,
+        &(sdm_exact_opts){
+            .memory_limit = (size_t)8 << 20, .n_threads = 1, .cancelled = stop_now, .user = &stop});
     const size_t n = (size_t)1 << 20;
     double *x = calloc(3 * n, sizeof *x), *d = malloc(n * sizeof *d);
     const sdm_exact_at at = {.distance = d};

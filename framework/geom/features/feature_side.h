@@ -5,6 +5,9 @@
    one). The region of a face lies on both sides of it. */
 #pragma once
 
+#include <float.h>
+#include <math.h>
+
 #include "features/nearest.h"
 
 /* Elements of sdm_features.side: the region lies inside or outside the solid; the point lies
@@ -16,6 +19,19 @@ enum { SDM_SIDE_INSIDE = -1, SDM_SIDE_UNKNOWN = 0, SDM_SIDE_OUTSIDE = 1, SDM_SID
    behind them. Memory for a few numbers per feature is taken from the high end of the arena and
    released. SDM_E_NOMEM. */
 sdm_status sdm_feature_sides_build(sdm_nearest *n, sdm_arena *arena, sdm_error *err);
+
+/* Largest squared distance of a feature that may be the nearest one of p, if rounding decided; d2:
+   squared distance of the nearest one. If the sides by all such features agree, the side is
+   certain.
+   */
+static inline double sdm_tied_distance2(const sdm_features *f, const double p[3], double d2)
+{
+    double largest = f->radius;
+    for (int a = 0; a < 3; a++)
+        largest = fmax(largest, f->radius + fmax(fabs(p[a]), fabs(f->centre[a])));
+    const double far = sqrt(d2) * (1 + 1e-10) + 256 * DBL_EPSILON * largest;
+    return far * far;
+}
 
 /* Side of point p, whose nearest feature is `number`: SDM_SIDE_OUTSIDE, SDM_SIDE_INSIDE, or
    SDM_SIDE_UNKNOWN. Wrong only where p lies on the surface up to rounding. */

@@ -32,5 +32,5 @@ double sdm_nearest_feature(const sdm_nearest *n, const double x[3], uint32_t *sl
 
 /* Number of the feature nearest to x, and its squared distance *d2: the minimum over all features
    of sdm_feature_distance2(); of several features with the same squared distance, bit for bit, the
-   lowest number. [any thread] */
+   highest number. [any thread] */
 uint32_t sdm_nearest_least(const sdm_nearest *n, const double x[3], double *d2);

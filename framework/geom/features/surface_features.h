@@ -103,6 +103,8 @@ typedef struct sdm_features {
     /* groups of all clusters, see sdm_cluster_node.group */
     sdm_feature_group *group;
     uint32_t edge_base, corner_base, end;
+    /* 8 * group + lane of each edge and corner, [end - edge_base] */
+    uint32_t *place;
     /* the features in double, [end] */
     sdm_feature *exact;
     /* numbers of the edges and corners of each triangle, [n_tri][3 edges, 3 corners] */

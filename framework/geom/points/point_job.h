@@ -22,7 +22,7 @@ typedef struct sdm_point_scratch {
     /* the points of the block, mm, [vector][coordinate][lane]; all of them are finite */
     _Alignas(64) double x[SDM_POINT_VECTORS][3][SDM_LANES];
     /* result: number of the nearest feature of each point and its squared distance, mm^2. Of
-       several features with the same squared distance, bit for bit, the lowest number */
+       several features with the same squared distance, bit for bit, the highest number */
     uint32_t number[SDM_POINT_BLOCK];
     _Alignas(32) double d2[SDM_POINT_BLOCK];
     /* result: side of each point by sdm_feature_side(); unknown without sdm_features.side, and

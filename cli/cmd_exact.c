@@ -24,7 +24,8 @@ typedef struct job {
     double ms_mesh;
     sdm_grid grid;
     sdm_exact_report report;
-    float *values;
+    float *values;     /* the map; NULL: it is in blocks */
+    sdm_blocks blocks; /* the map near the surface, if the outputs are level sets only */
     cli_layers layers;
     double ms_build, ms_query;
     sdm_sign_certificate certificate; /* checked == 0 without --certify */
@@ -75,6 +76,25 @@ static sdm_sign_method find_sign_method(const char *name)
     return SDM_SIGN_AUTO;
 }
 
+/* Are only level sets of a closed mesh wanted, which need the map near the surface only? */
+static bool blocks_suffice(const job *j)
+{
+    const cli_args *args = j->args;
+    return cli_blocks_suffice(args) && !args->json && !args->certify && !(args->narrow > 0) &&
+           !cli_layers_wanted(args) && j->report.sign == SDM_SIGN_CROSSINGS;
+}
+
+/* Computes j->blocks; leaves them empty if the band reaches the border of the grid, where only the
+ * whole map can be closed. */
+static sdm_status make_blocks(job *j, const sdm_exact *engine, sdm_error *err)
+{
+    double band;
+    sdm_status s = cli_blocks_band(&j->grid, j->args, &band, err);
+    if (!s) s = sdm_exact_map_blocks(engine, &j->grid, band, &j->blocks, err);
+    if (!s && sdm_blocks_reach_border(&j->blocks)) sdm_blocks_dispose(&j->blocks);
+    return s;
+}
+
 static sdm_status run_engine(job *j, sdm_error *err)
 {
     const sdm_exact_opts opts = {.sign = find_sign_method(j->args->sign),
@@ -88,9 +108,12 @@ static sdm_status run_engine(job *j, sdm_error *err)
     if (s) return s;
     j->report = *sdm_exact_get_report(engine);
     s = cli_grid_for_box(j->args, j->report.audit.min, j->report.audit.max, &j->grid, err);
-    if (!s) s = SDM_ALLOC(&j->values, sdm_grid_count(&j->grid), "distance map", err);
     const double query = sdm_clock();
-    if (!s) s = cli_layers_map(&j->layers, j->args, engine, &j->grid, j->values, err);
+    if (!s && blocks_suffice(j)) s = make_blocks(j, engine, err);
+    if (!s && !j->blocks.tile) {
+        s = SDM_ALLOC(&j->values, sdm_grid_count(&j->grid), "distance map", err);
+        if (!s) s = cli_layers_map(&j->layers, j->args, engine, &j->grid, j->values, err);
+    }
     j->ms_build = 1e3 * (built - start);
     j->ms_query = 1e3 * (sdm_clock() - query);
     if (!s && j->args->certify)
@@ -147,7 +170,8 @@ static sdm_status run_method(job *j, sdm_error *err)
     return SDM_OK;
 }
 
-/* Finds the smallest and the largest distance, and counts the voxels inside. */
+/* Finds the smallest and the largest distance of the map in j->values, and counts the voxels
+ * inside. */
 static void find_range(const job *j, float *min, float *max, int64_t *inside)
 {
     const size_t n = sdm_grid_count(&j->grid);
@@ -163,9 +187,9 @@ static void find_range(const job *j, float *min, float *max, int64_t *inside)
 static void notice_mesh(const job *j)
 {
     const sdm_audit *a = &j->report.audit;
-    int64_t inside;
+    int64_t inside = 1; // a level set without voxels inside is refused when it is written
     float min, max;
-    find_range(j, &min, &max, &inside);
+    if (j->values) find_range(j, &min, &max, &inside);
     if (!inside)
         cli_notice("no voxel of the grid is inside the surface: does the grid cover the shape?");
     if (j->report.turned) cli_notice("the mesh was inside out; its orientation has been reversed");
@@ -203,6 +227,7 @@ static sdm_status write_outputs(const job *j, sdm_error *err)
 {
     const cli_map map = {.grid = &j->grid,
                          .values = j->values,
+                         .blocks = j->blocks.tile ? &j->blocks : NULL,
                          .shape = j->args->mesh ? j->args->mesh : j->args->shape,
                          .params = j->params.data ? j->params.data : "",
                          .source = SDM_SOURCE_EXACT,
@@ -277,6 +302,7 @@ sdm_status cmd_exact(const cli_args *args, sdm_error *err)
     if (!s && args->json) s = print_json(&j, err);
     cli_layers_dispose(&j.layers);
     sdm_free(j.values);
+    sdm_blocks_dispose(&j.blocks);
     sdm_mesh_dispose(&j.mesh);
     sdm_text_dispose(&j.params);
     return s;

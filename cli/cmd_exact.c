@@ -3,10 +3,12 @@
 #include <string.h>
 
 #include "commands.h"
+#include "inputs/points_file.h"
 #include "inputs/setup.h"
 #include "report/exact_layers.h"
 #include "report/json_values.h"
 #include "report/output.h"
+#include "report/points_table.h"
 #include "report/progress_bar.h"
 #include "report/report_audit.h"
 #include "report/terminal.h"
@@ -27,6 +29,7 @@ typedef struct job {
     float *values;     /* the map; NULL: it is in blocks */
     sdm_blocks blocks; /* the map near the surface, if the outputs are level sets only */
     cli_layers layers;
+    cli_points_table points; /* of --points */
     double ms_build, ms_query;
     sdm_sign_certificate certificate; /* checked == 0 without --certify */
     double bound_mm;                  /* bound on the error of the distances; 0: exact */
@@ -56,7 +59,7 @@ static sdm_status open_mesh(job *j, sdm_error *err)
     if (args->mesh && (args->params.n > 0 || args->options.n > 0))
         return sdm_fail(err, SDM_E_ARG,
                         "exact: -p and -O belong to --shape; a mesh file has no parameters");
-    if (args->outputs.n == 0 && !args->json && !cli_layers_wanted(args))
+    if (args->outputs.n == 0 && !args->points && !args->json && !cli_layers_wanted(args))
         return sdm_fail(err, SDM_E_ARG, "exact: an output is needed: -o FILE, or --json");
     if (args->certify && strcmp(args->method, "exact"))
         return sdm_fail(err, SDM_E_ARG, "exact: --certify belongs to --method exact, not %s",
@@ -64,7 +67,10 @@ static sdm_status open_mesh(job *j, sdm_error *err)
     if (args->tolerance > 0 && strcmp(args->method, "octree"))
         return sdm_fail(err, SDM_E_ARG, "exact: --tolerance belongs to --method octree, not %s",
                         args->method);
-    const sdm_status s = cli_layers_check(args, err);
+    if (args->columns && !args->points)
+        return sdm_fail(err, SDM_E_ARG, "exact: --columns belongs to --points FILE");
+    const sdm_status s =
+        args->points ? cli_points_check(args, &j->points, err) : cli_layers_check(args, err);
     if (s) return s;
     return args->mesh ? cli_read_mesh(args->mesh, &j->mesh, err) : make_shape_mesh(j, err);
 }
@@ -120,6 +126,26 @@ static sdm_status run_engine(job *j, sdm_error *err)
         s = sdm_exact_certify(engine, &j->grid, j->values, &j->certificate, err);
     sdm_exact_free(engine);
     return s;
+}
+
+/* Does the work of --points. */
+static sdm_status run_points(job *j, sdm_error *err)
+{
+    const sdm_exact_opts opts = {.sign = find_sign_method(j->args->sign),
+                                 .keep_overlap = j->args->keep_overlap,
+                                 .n_threads = (int)j->args->threads,
+                                 .cancelled = cli_interrupted};
+    sdm_exact *engine = NULL;
+    double *x = NULL;
+    size_t n = 0;
+    sdm_status s = cli_read_points(j->args->points, &x, &n, err);
+    if (!s) s = cli_points_allocate(&j->points, n, err);
+    if (!s) s = sdm_exact_create(&j->mesh, &opts, &engine, err);
+    if (!s) j->report = *sdm_exact_get_report(engine);
+    if (!s) s = sdm_exact_points(engine, x, n, &j->points.at, err);
+    sdm_exact_free(engine);
+    sdm_free(x);
+    return s ? s : cli_points_write(&j->points, j->args, err);
 }
 
 typedef struct progress_state {
@@ -294,15 +320,21 @@ sdm_status cmd_exact(const cli_args *args, sdm_error *err)
 {
     job j = {.args = args};
     sdm_status s = open_mesh(&j, err);
-    if (!s) s = strcmp(args->method, "exact") ? run_method(&j, err) : run_engine(&j, err);
-    if (!s) notice_mesh(&j);
-    if (!s) notice_signs(&j);
-    if (!s) s = write_outputs(&j, err);
-    if (!s) s = cli_layers_write(&j.layers, args, &j.grid, err);
-    if (!s && args->json) s = print_json(&j, err);
+    if (!s && args->points) {
+        s = run_points(&j, err);
+        if (!s) notice_mesh(&j);
+    } else if (!s) {
+        s = strcmp(args->method, "exact") ? run_method(&j, err) : run_engine(&j, err);
+        if (!s) notice_mesh(&j);
+        if (!s) notice_signs(&j);
+        if (!s) s = write_outputs(&j, err);
+        if (!s) s = cli_layers_write(&j.layers, args, &j.grid, err);
+        if (!s && args->json) s = print_json(&j, err);
+    }
     cli_layers_dispose(&j.layers);
     sdm_free(j.values);
     sdm_blocks_dispose(&j.blocks);
+    cli_points_dispose(&j.points);
     sdm_mesh_dispose(&j.mesh);
     sdm_text_dispose(&j.params);
     return s;

@@ -38,7 +38,7 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      ".obj .off, mm). A surface that overlaps itself stands for the union of the volumes it\n"
      "encloses. Without grid options the grid is fitted to the bounding box of the mesh, with\n"
      "a margin of a tenth of its longest edge on every side: 64 voxels along that edge,\n"
-     "margins included.",
+     "margins included. With --points FILE, distances at points in any order.",
      "sdmgen exact --shape cochlea -p a=4.2 --size 60,50,50 --spacing 0.2 -o cochlea.nrrd", 0, 0},
     {"mesh", "--shape NAME [-p name=value ...] [-o FILE]", "write the surface mesh of a shape",
      NULL, "sdmgen mesh --shape torus -o torus.ply --audit", 0, 0},
@@ -163,6 +163,11 @@ const cli_option cli_options[] = {
      "exact: the engine (default); naive: every triangle for every voxel, also triangles inside "
      "the union; cells: uniform cells of triangles (exact); octree: adaptive samples, error at "
      "most --tolerance; edt: distance transform, prints the bound on its error"},
+    {"points", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_EXACT), AT(points),
+     "distances at the points of a file instead of a map: .csv (x,y,z), .npy ([n][3]) or the "
+     "vertices of .ply .stl .obj .off, LPS mm; -o FILE.csv or FILE.npy (float64), one row a point"},
+    {"columns", 0, CLI_TEXT, "LIST", NULL, 0, 0, ON(CLI_EXACT), AT(columns),
+     "columns for --points: distance,gradient,closest,triangle (default distance)"},
     {"narrow", 0, CLI_REAL, "N", NULL, 0.5, 1e6, ON(CLI_EXACT), AT(narrow),
      "narrow band: clamp distances to N voxels (of the smallest edge), which is faster"},
     {"tolerance", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_EXACT), AT(tolerance),

@@ -115,6 +115,7 @@ struct cli_args {
     bool dense, half;                /* generate, exact, fit: .vdb */
     bool keep_overlap, certify;      /* exact */
     bool audit;                      /* mesh */
+    const char *points, *columns;    /* exact: file of points; columns of the answers */
     double narrow;                   /* exact: voxels; 0: option missing */
     double tolerance;                /* exact: mm; 0: option missing */
     bool dump;                       /* config */

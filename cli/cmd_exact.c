@@ -13,6 +13,7 @@
 #include "report/report_audit.h"
 #include "report/terminal.h"
 #include "sdm/exact.h"
+#include "sdm/internal/block_border.h"
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/methods.h"

@@ -37,8 +37,9 @@ static sdm_status read_line(const char *path, size_t number, char *line, bool he
     *is_point = n == 3 && n_numbers == 3;
     if (*is_point || (header && n_numbers == 0)) return SDM_OK;
     if (wrong)
-        return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: '%.100s' is not a finite number; a line is x,y,z",
-                        path, number, wrong);
+        return sdm_fail(err, SDM_E_FORMAT,
+                        "%s:%zu: '%.100s' is not a finite number; a line is x,y,z", path, number,
+                        wrong);
     return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: %zu values, a line needs three: x,y,z (mm)", path,
                     number, n);
 }
@@ -80,8 +81,9 @@ static sdm_status read_npy(const char *path, double **x, size_t *n, sdm_error *e
     const sdm_status s = sdm_npy_read(path, x, shape, &n_dim, err);
     if (s) return s;
     if (n_dim != 2 || shape[1] != 3)
-        return sdm_fail(err, SDM_E_FORMAT, "%s: array with %d dimensions, the second of %zu; need [n][3]",
-                        path, n_dim, shape[1]);
+        return sdm_fail(err, SDM_E_FORMAT,
+                        "%s: array with %d dimensions, the second of %zu; need [n][3]", path, n_dim,
+                        shape[1]);
     *n = shape[0];
     return SDM_OK;
 }

@@ -5,9 +5,9 @@
 #include <string.h>
 
 #include "files.h"
-#include "sdm/image.h"
 #include "sdm/internal/file.h"
 #include "sdm/internal/heap.h"
+#include "sdm/internal/npy.h"
 #include "sdm/internal/text.h"
 
 enum { DISTANCE, GRADIENT, CLOSEST, TRIANGLE, N_KINDS };
@@ -59,7 +59,8 @@ sdm_status cli_points_check(const cli_args *args, cli_points_table *t, sdm_error
                         "do not apply; use --columns");
     for (size_t i = 0; i < args->outputs.n; i++)
         if (!cli_ends_with_any(args->outputs.items[i], ".csv .npy"))
-            return sdm_fail(err, SDM_E_ARG, "output '%s': with --points its name must end in .csv or .npy",
+            return sdm_fail(err, SDM_E_ARG,
+                            "output '%s': with --points its name must end in .csv or .npy",
                             args->outputs.items[i]);
     return cli_check_files(args, NULL, err);
 }

@@ -20,6 +20,6 @@ sdm_status cli_points_check(const cli_args *args, cli_points_table *t, sdm_error
 sdm_status cli_points_allocate(cli_points_table *t, size_t n, sdm_error *err);
 void cli_points_dispose(cli_points_table *t);
 
-/* Writes the table to all outputs: .csv with a header line, .npy as float64 [n][columns]. The answer
- * at a point that has none is empty (.csv) or NaN. */
+/* Writes the table to all outputs: .csv with a header line, .npy as float64 [n][columns]. The
+ * answer at a point that has none is empty (.csv) or NaN. */
 sdm_status cli_points_write(const cli_points_table *t, const cli_args *args, sdm_error *err);

@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "sdm/internal/block_border.h"
 #include "sdm/memory.h"
 
 /* Is a value of block i, at a voxel of the border of the grid, less than the band? */

@@ -9,7 +9,7 @@
 #include "layers/layers.h"
 #include "map/grid_blocks.h"
 #include "map/grid_distance.h"
-#include "points/points.h"
+#include "points/at_points.h"
 #include "points/wide_tree.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/threads.h"

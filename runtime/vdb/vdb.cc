@@ -11,6 +11,7 @@
 #include <string>
 
 #include "band.h"
+#include "sdm/internal/block_border.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
 #include "seal.h"

@@ -58,21 +58,6 @@ double sdm_nearest_find(const sdm_nearest *n, const double x[3], double bound, u
     return bound;
 }
 
-double sdm_nearest_feature(const sdm_nearest *n, const double x[3], uint32_t *slot)
-{
-    const sdm_features *f = &n->features;
-    const uint32_t *more = f->of_slot[*slot], face = *slot;
-    double least = INFINITY;
-    for (int i = -1; i < 6; i++) {
-        const uint32_t number = i < 0 ? face : more[i];
-        const double d = sdm_feature_distance2(f, n->frames, number, x);
-        if (!(d < least)) continue;
-        least = d;
-        *slot = f->owner[number];
-    }
-    return least;
-}
-
 /* Compares x with the seven features of the triangle in this slot. */
 static void features_compare(const sdm_nearest *n, const double x[3], uint32_t slot,
                              uint32_t *number, double *d2)
@@ -85,6 +70,15 @@ static void features_compare(const sdm_nearest *n, const double x[3], uint32_t s
         *d2 = d;
         *number = other;
     }
+}
+
+double sdm_nearest_feature(const sdm_nearest *n, const double x[3], uint32_t *slot)
+{
+    uint32_t number = *slot;
+    double least = INFINITY;
+    features_compare(n, x, *slot, &number, &least);
+    *slot = n->features.owner[number];
+    return least;
 }
 
 uint32_t sdm_nearest_least(const sdm_nearest *n, const double x[3], double *d2)

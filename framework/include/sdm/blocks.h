@@ -4,8 +4,6 @@
 #ifndef SDM_BLOCKS_H
 #define SDM_BLOCKS_H
 
-#include <stdbool.h>
-
 #include "sdm/grid.h"
 
 #ifdef __cplusplus
@@ -36,10 +34,6 @@ typedef struct sdm_blocks {
      * a voxel. Beyond the grid: +band_mm */
     float (*values)[SDM_BLOCK_VOXELS];
 } sdm_blocks;
-
-/* Does a voxel on the border of the grid lie within the band or inside? Then the surface or its
- * band may leave the grid. [any thread] */
-SDM_API bool sdm_blocks_reach_border(const sdm_blocks *b);
 
 /* Frees the arrays and zeroes *b. */
 SDM_API void sdm_blocks_dispose(sdm_blocks *b);

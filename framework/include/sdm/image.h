@@ -27,8 +27,6 @@ SDM_API sdm_status sdm_npy_write(const char *path, const float *values, const si
                                  int n_dim, sdm_error *err);
 SDM_API sdm_status sdm_npy_write_uint32(const char *path, const uint32_t *values,
                                         const size_t *shape, int n_dim, sdm_error *err);
-SDM_API sdm_status sdm_npy_write_double(const char *path, const double *values, const size_t *shape,
-                                        int n_dim, sdm_error *err);
 
 #ifdef __cplusplus
 }

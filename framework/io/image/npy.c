@@ -6,6 +6,7 @@
 
 #include "bytes.h"
 #include "sdm/internal/heap.h"
+#include "sdm/internal/npy.h"
 
 #define NPY_FILE_MAX ((size_t)1 << 31)
 #define NPY_HEADER_MAX ((size_t)1 << 16)

@@ -70,8 +70,8 @@ SDM_API sdm_status sdm_vdb_band(const sdm_grid *grid, const sdm_vdb_opts *opts, 
 /* Writes a narrow-band map in blocks as a level set, without a dense map: each block becomes a leaf
    of the tree. For blocks whose band_mm is that of sdm_vdb_band() the file has the same tree as
    that of sdm_vdb_write() for the dense map, and is checked in the same way. opts->dense must not
-   be set. SDM_E_ARG also if the blocks have another band, or if the band leaves the grid
-   (sdm_blocks_reach_border()): such a map must be written by sdm_vdb_write(). [any thread] */
+   be set. SDM_E_ARG also if the blocks have another band, or if the band reaches the border
+   of the grid: such a map must be written by sdm_vdb_write(). [any thread] */
 SDM_API sdm_status sdm_vdb_write_blocks(const char *path, const sdm_blocks *blocks,
                                         const sdm_vdb_opts *opts, sdm_vdb_report *report,
                                         sdm_error *err);

@@ -1,5 +1,5 @@
 /* Signed distances at points: sorts them, computes them in blocks, finds their signs. */
-#include "points.h"
+#include "at_points.h"
 
 #include <float.h>
 #include <math.h>

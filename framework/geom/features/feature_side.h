@@ -8,7 +8,7 @@
 #include <float.h>
 #include <math.h>
 
-#include "features/nearest.h"
+#include "nearest.h"
 
 /* Elements of sdm_features.side: the region lies inside or outside the solid; the point lies
    outside when it lies on the outer side of the feature's owner (a face; an edge or a corner whose

@@ -63,12 +63,13 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "configuration with every key resolved; --keys lists every key with type, range,\n"
      "default and meaning.",
      "sdmgen config configs/cochlea.yaml network.depth=4 --dump", 0, SIZE_MAX},
-    {"bench", "exact | network MODEL", "measure speed, as times and ratios",
+    {"bench", "exact | points | network MODEL", "measure speed, as times and ratios",
      "exact: time, memory and error of the exact engine, of the other methods (see exact\n"
      "--method) and of other programs for the same map, by default the cochlea on 60 x 50 x\n"
      "50 voxels of 0.2 mm. All rows but one use a single thread. The other programs are\n"
      "files sdmgen-peer-NAME in the folder of sdmgen or in libexec/sdmgen; missing ones are\n"
      "listed.\n"
+     "points: time per point of exact distances in batches, one by one and by brute force.\n"
      "network: one map, a batch and derivatives of a model on one core, compared with the\n"
      "exact engine if the shape is known and its data files exist.\n"
      "A time is the fastest of several runs.",

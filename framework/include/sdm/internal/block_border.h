@@ -10,8 +10,8 @@
 extern "C" {
 #endif
 
-/* Does a voxel on the border of the grid lie within the band or inside? Then the surface or its band
- * may leave the grid. [any thread] */
+/* Does a voxel on the border of the grid lie within the band or inside? Then the surface or its
+ * band may leave the grid. [any thread] */
 SDM_INTERNAL_API bool sdm_blocks_reach_border(const sdm_blocks *b);
 
 #ifdef __cplusplus

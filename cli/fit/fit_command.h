@@ -68,6 +68,10 @@ sdm_status cli_fit_read_target(cli_fit *f, sdm_error *err);
 /* Sets f->opts from the command line, except for the start pose and the rotations. SDM_E_ARG. */
 sdm_status cli_fit_read_options(cli_fit *f, sdm_error *err);
 
+/* After cli_fit_read_target(): refuses options that do nothing for this kind of target. SDM_E_ARG
+ * with the options that apply. */
+sdm_status cli_fit_check_options(const cli_fit *f, sdm_error *err);
+
 /* Sets the start pose and the rotations to try. SDM_E_ARG; SDM_E_FORMAT: a bad file of points. */
 sdm_status cli_fit_read_start(cli_fit *f, sdm_error *err);
 

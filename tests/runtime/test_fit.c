@@ -235,6 +235,29 @@ static void test_fit_to_points(void **state)
     sdm_mesh_dispose(&m);
 }
 
+/* What progress() was told of a search: highest numbers of starts by round, and whether start,
+ * round and best start were always as documented. */
+typedef struct search_log {
+    size_t start[3], n_starts[3], calls_after;
+    bool fits;
+} search_log;
+
+static void log_search(void *user, const sdm_fit_progress *p)
+{
+    search_log *log = user;
+    if (p->round == 0 || p->round > 2) {
+        log->calls_after += p->phase != SDM_FIT_SEARCH && log->start[2] > 0;
+        log->fits = log->fits && p->start == 0 && p->n_starts == 0;
+        return;
+    }
+    // starts come in order, round 2 after round 1, and the first of a round knows no best one
+    log->fits = log->fits && p->phase == SDM_FIT_SEARCH && p->start >= log->start[p->round] &&
+                p->start <= log->start[p->round] + 1 && (p->round == 2 || !log->start[2]) &&
+                (p->best_params != NULL) == (p->start > 1);
+    log->start[p->round] = p->start;
+    log->n_starts[p->round] = p->n_starts;
+}
+
 static void test_turned_starts_find_the_truth(void **state)
 {
     (void)state;
@@ -247,7 +270,14 @@ static void test_turned_starts_find_the_truth(void **state)
     o.start_params = TRUTH;
     o.turns = SDM_FIT_TURNS_AXIS;
     o.n_turns = 8;
+    search_log log = {.fits = true};
+    o.progress = log_search;
+    o.user = &log;
     sdm_fit_result r = fit(&t, &o);
+    assert_true(log.fits && log.calls_after > 0);
+    assert_true(log.start[1] == 8 && log.n_starts[1] == 8);
+    assert_true(log.start[2] == log.n_starts[2] && log.start[2] >= 1 && log.start[2] <= 4);
+    o.progress = NULL;
     // Turns next to the right one lead there, too. A rotation by pi gives the same ellipsoid, one
     // by pi / 2 exchanges its axes.
     assert_true(r.turn % 4 != 0);

@@ -126,6 +126,12 @@ typedef struct sdm_fit_progress {
     /* [n_params] */
     const double *params;
     sdm_pose pose;
+    /* search with several starts, else 0: the round (1: every start, with a wide point spread; 2:
+       the best of them), the number of the present start in this round, from 1, and the number of
+       starts in this round */
+    size_t round, start, n_starts;
+    /* search: the best start that has ended in this round; NULL: none. [n_params] its parameters */
+    const double *best_params;
 } sdm_fit_progress;
 
 /* sdm_fit_defaults() fills it; change what differs. */

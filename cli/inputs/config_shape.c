@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "report/terminal.h"
+#include "sdm/internal/train.h"
 #include "sdm/memory.h"
 #include "setup.h"
 
@@ -91,6 +93,16 @@ static sdm_status store_absolute_paths(sdm_config *c, const sdm_instance *made, 
     return SDM_OK;
 }
 
+/* Completes a grid that is to be fitted to the shapes, and tells its numbers. */
+static sdm_status fit_grid(sdm_config *c, const sdm_instance *shape, sdm_error *err)
+{
+    sdm_text line = {0};
+    const sdm_status s = sdm_train_grid(c, shape, &line, err);
+    if (!s && line.data) cli_notice("%s", line.data);
+    sdm_text_dispose(&line);
+    return s;
+}
+
 sdm_status cli_config_shape(sdm_config *c, const sdm_registry *r, sdm_instance **out,
                             sdm_error *err)
 {
@@ -105,5 +117,5 @@ sdm_status cli_config_shape(sdm_config *c, const sdm_registry *r, sdm_instance *
     free(folder);
     if (!s) s = store_absolute_paths(c, *out, err);
     if (s == SDM_E_CONFIG) return fail_at(c, mark_of_message(c, err ? err->text : ""), s, err);
-    return s;
+    return s ? s : fit_grid(c, *out, err);
 }

@@ -13,6 +13,8 @@ sdm_status cli_read_config(const cli_args *args, sdm_config **out, sdm_error *er
 
 /* Creates the configured shape with its options; *out is freed with sdm_instance_free(). Relative
  * paths start from the folder of the configuration; in c they become absolute, so that a copy of
- * the configuration elsewhere names the same files. SDM_E_CONFIG with the place in the file. */
+ * the configuration elsewhere names the same files. A grid that is to be fitted to the shapes
+ * (grid: auto) is completed, and a notice tells its numbers. SDM_E_CONFIG with the place in the
+ * file. */
 sdm_status cli_config_shape(sdm_config *c, const sdm_registry *r, sdm_instance **out,
                             sdm_error *err);

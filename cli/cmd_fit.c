@@ -143,6 +143,7 @@ sdm_status cmd_fit(const cli_args *args, sdm_error *err)
     if (!s) s = cli_fit_read_options(&f, err);
     if (!s) s = cli_fit_read_target(&f, err);
     if (!s) s = cli_fit_check_options(&f, err);
+    if (!s) cli_fit_default_lengths(&f);
     if (!s) s = cli_fit_read_reference(&f, err);
     if (!s) s = cli_fit_read_start(&f, err);
     if (!s) s = fit_shape(&f, err);

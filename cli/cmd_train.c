@@ -85,10 +85,11 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
     printf("%s\n", r->model_path);
     printf("  trained     %.1f s, %s steps, %s exact maps\n", r->seconds,
            cli_format_count(r->steps, steps), cli_format_count(r->samples, maps));
-    printf("  held out    %lld shapes: MSE %.3g mm^2, RMSE %.5f mm, within 0.4 mm of the surface "
+    printf("  held out    %lld shapes: MSE %.3g mm^2, RMSE %.5f mm, within %g mm of the surface "
            "%.5f mm, largest %.5f "
            "mm\n",
-           (long long)a->samples, a->mse_mm2, a->rmse_mm, a->rmse_near_mm, a->max_abs_mm);
+           (long long)a->samples, a->mse_mm2, a->rmse_mm, a->near_mm, a->rmse_near_mm,
+           a->max_abs_mm);
     return SDM_OK;
 }
 

@@ -7,6 +7,7 @@
 
 #include "files.h"
 #include "sdm/image.h"
+#include "sdm/internal/near.h"
 #include "sdm/isosurface.h"
 #include "sdm/meshfile.h"
 #include "sdm/picture.h"
@@ -153,7 +154,7 @@ static sdm_status write_surface(const char *path, const cli_map *map, sdm_error 
 
 static sdm_status write_picture(const char *path, const cli_map *map, sdm_error *err)
 {
-    static const float levels[] = {0.0f, 1.0f};
+    const float levels[] = {0.0f, sdm_grid_contour(map->grid)};
     char title[80];
     describe_method(map, title);
     const sdm_picture_map column = {title, map->values, false};

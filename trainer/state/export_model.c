@@ -13,12 +13,10 @@
 #include "sdm/internal/container.h"
 #include "sdm/internal/file.h"
 #include "sdm/internal/model_threads.h"
+#include "sdm/internal/near.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
 #include "sdm/picture.h"
-
-/* Voxels within this distance of the surface count for rmse_near_mm. */
-#define NEAR_MM 0.4f
 
 static int compare_doubles(const void *a, const void *b)
 {
@@ -51,6 +49,7 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
     workbench w = {0};
     if (!s && d->target.make) s = trainer_workbench_create(&w, d, err);
     const size_t n_voxels = sdm_grid_count(d->grid);
+    const float near_mm = (float)sdm_grid_near(d->grid);
     double square = 0, absolute = 0, near = 0, largest = 0;
     size_t n_near = 0;
     // sum the errors over maps and voxels
@@ -71,7 +70,7 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
             here += e * e;
             absolute += fabs(e);
             if (fabs(e) > largest) largest = fabs(e);
-            if (fabsf(truth[v]) <= NEAR_MM) near += e * e, n_near++;
+            if (fabsf(truth[v]) <= near_mm) near += e * e, n_near++;
         }
         square += here;
         each[i] = sqrt(here / (double)n_voxels);
@@ -88,7 +87,8 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
                               .rmse_near_mm = n_near ? sqrt(near / (double)n_near) : 0,
                               .q50_mm = quantile(each, n, 0.5),
                               .q90_mm = quantile(each, n, 0.9),
-                              .q99_mm = quantile(each, n, 0.99)};
+                              .q99_mm = quantile(each, n, 0.99),
+                              .near_mm = sdm_grid_near(d->grid)};
     }
     trainer_workbench_dispose(&w);
     sdm_free(each);

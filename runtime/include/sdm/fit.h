@@ -236,6 +236,13 @@ typedef struct sdm_fit_opts {
    170; outside bone 1300 +- 270 and air -880 +- 150. */
 SDM_API sdm_fit_opts sdm_fit_defaults(void);
 
+/* The same for data and maps with voxels of this edge (mm; the longest edge of a voxel of the image
+   or of the maps): blur and l_ref 0.2 mm, but between half a voxel and 2 voxels; margin 1.5 mm, but
+   between 3 and 15 voxels; tissue_mm 1 mm, but between 2 and 10 voxels; point_sd 0.1 mm, but
+   between a quarter of a voxel and a voxel. sdm_fit_defaults() has these lengths for voxels of 0.1
+   to 0.4 mm. */
+SDM_API sdm_fit_opts sdm_fit_defaults_for(double voxel);
+
 /* Result of a fit; zero-initialise, sdm_fit_dispose() frees it. N = n_params + 6. Rows and columns
    of matrices stand for the parameters in their order; then the rotation (rad: a small rotation
    vector about the axes of the world through the origin of the shape, applied after the pose); then

@@ -80,11 +80,11 @@ static double between(double length, double voxel, double least, double most)
 sdm_fit_opts sdm_fit_defaults_for(double voxel)
 {
     sdm_fit_opts o = sdm_fit_defaults();
-    o.blur = between(o.blur, voxel, 0.5, 2);
-    o.l_ref = between(o.l_ref, voxel, 0.5, 2);
-    o.margin = between(o.margin, voxel, 3, 15);
-    o.tissue_mm = between(o.tissue_mm, voxel, 2, 10);
-    o.point_sd = between(o.point_sd, voxel, 0.25, 1);
+    o.blur = between(o.blur, voxel, 0.25, 2);
+    o.l_ref = between(o.l_ref, voxel, 0.25, 2);
+    o.margin = between(o.margin, voxel, 1.5, 15);
+    o.tissue_mm = between(o.tissue_mm, voxel, 1, 10);
+    o.point_sd = between(o.point_sd, voxel, 0.125, 1);
     return o;
 }
 

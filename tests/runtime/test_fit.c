@@ -250,14 +250,14 @@ static void test_default_lengths(void **state)
 {
     (void)state;
     const sdm_fit_opts o = sdm_fit_defaults();
-    for (double voxel = 0.1; voxel < 0.41; voxel += 0.05) {
+    for (double voxel = 0.1; voxel < 0.801; voxel += 0.05) {
         const sdm_fit_opts d = sdm_fit_defaults_for(voxel);
         assert_true(d.blur == o.blur && d.l_ref == o.l_ref && d.margin == o.margin &&
                     d.tissue_mm == o.tissue_mm && d.point_sd == o.point_sd);
     }
     const sdm_fit_opts large = sdm_fit_defaults_for(3), small = sdm_fit_defaults_for(0.01);
-    assert_true(large.blur == 1.5 && large.margin == 9 && large.tissue_mm == 6 &&
-                large.point_sd == 0.75);
+    assert_true(large.blur == 0.75 && large.margin == 4.5 && large.tissue_mm == 3 &&
+                large.point_sd == 0.375);
     assert_true(small.blur == 0.02 && small.margin == 0.15 && small.tissue_mm == 0.1 &&
                 small.point_sd == 0.01);
 }

@@ -1,7 +1,7 @@
-/* Labels are steps from 0 to 1 between two voxels, but the share that a map can represent is an edge
- * with the width of about a voxel of the map. Where the surface is curved, the wide edge fits a step
- * best with a surface that is shifted outwards, by the mean curvature times the difference of the
- * variances. So the labels get the same width. */
+/* Labels are steps from 0 to 1 between two voxels, but the share that a map can represent is an
+ * edge with the width of about a voxel of the map. Where the surface is curved, the wide edge fits
+ * a step best with a surface that is shifted outwards, by the mean curvature times the difference
+ * of the variances. So the labels get the same width. */
 #include "soft_labels.h"
 
 #include <math.h>

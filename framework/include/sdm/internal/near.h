@@ -15,5 +15,6 @@ static inline double sdm_grid_near(const sdm_grid *g)
     return 2 * fmin(g->spacing[0], fmin(g->spacing[1], g->spacing[2]));
 }
 
-/* The second contour of pictures, beside that of the surface: at this distance (mm), five voxels. */
+/* The second contour of pictures, beside that of the surface: at this distance (mm), five voxels.
+ */
 static inline float sdm_grid_contour(const sdm_grid *g) { return (float)(2.5 * sdm_grid_near(g)); }

@@ -207,45 +207,6 @@ static void test_fit_to_label_map(void **state)
     free(v);
 }
 
-/* Labels with voxels of 0.3 mm, and maps of a thin torus with voxels twice as large: the wide edge
- * of the maps must not make the tube thicker, and the deviations must cover the errors. */
-static void test_labels_on_coarse_maps(void **state)
-{
-    (void)state;
-    const double truth[2] = {3, 0.8};
-    const sdm_pose pose = {{0.2, -0.3, 0}, {0.11, -0.07, 0.05}};
-    const sdm_grid g = sdm_grid_centred((int64_t[3]){32, 32, 24}, 0.3, (double[3]){0.1, 0, 0.05});
-    sdm_instance *torus = NULL;
-    assert_int_equal(sdm_instance_create(sdm_registry_find(registry, "torus", NULL),
-                                         &(sdm_named_text){"edge", "0.2"}, 1, NULL, &torus, NULL),
-                     SDM_OK);
-    const sdm_fit_source source = {
-        .shape = torus,
-        .grid = sdm_grid_centred((int64_t[3]){20, 20, 10}, 0.6, (double[3]){0, 0, 0})};
-    float *v = calloc(sdm_grid_count(&g), sizeof *v);
-    if (!v) abort();
-    assert_int_equal(sdm_fit_map(&source, truth, &pose, &g, 1, v, NULL), SDM_OK);
-    for (size_t i = 0; i < sdm_grid_count(&g); i++) v[i] = v[i] < 0;
-    const sdm_fit_target t = {.kind = SDM_FIT_LABEL, .grid = g, .values = v};
-    sdm_fit_opts o = sdm_fit_defaults();
-    o.start_params = truth;
-    o.start_pose = pose;
-    o.eps = 1e-3;
-    sdm_fit_result r;
-    sdm_error err = {0};
-    if (sdm_fit(&source, &t, &o, &r, &err)) fail_msg("%s", err.text);
-    for (int k = 0; k < 2; k++) {
-        const double error = r.params[k] - truth[k];
-        if (!(fabs(error) < 0.02 && fabs(error) < 3 * r.sd[k] && r.sd[k] < 0.05))
-            fail_msg("parameter %d: off by %g, deviation %g", k, error, r.sd[k]);
-    }
-    // 0.12 voxels of the labels and 0.03 voxels of the map
-    assert_true(fabs(r.model_error_mm - sqrt(0.036 * 0.036 + 0.018 * 0.018)) < 1e-12);
-    sdm_fit_dispose(&r);
-    sdm_instance_free(torus);
-    free(v);
-}
-
 static void test_default_lengths(void **state)
 {
     (void)state;
@@ -559,7 +520,6 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_sd_match_the_errors),
         cmocka_unit_test(test_same_bits_for_threads),
         cmocka_unit_test(test_fit_to_label_map),
-        cmocka_unit_test(test_labels_on_coarse_maps),
         cmocka_unit_test(test_default_lengths),
         cmocka_unit_test(test_fit_to_points),
         cmocka_unit_test(test_fit_by_label_model),

@@ -1,5 +1,5 @@
 /* Softened labels: the same mean and the width of the Gaussian; NaN; fits to them on coarse maps.
- * Tests: soft_labels.c */
+ * Tests: posterior.c soft_labels.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "fit/data/soft_labels.h"
+#include "oracle/fit_tools.h"
 
 enum { N = 40 };
 
@@ -72,11 +73,51 @@ static void test_unknown(void **state)
     assert_memory_equal(labels, soft, sizeof soft);
 }
 
+/* Labels with voxels of 0.3 mm, and maps of a thin torus with voxels twice as large: the wide edge
+ * of the maps must not make the tube thicker, and the deviations must cover the errors. */
+static void test_labels_on_coarse_maps(void **state)
+{
+    (void)state;
+    const double truth[2] = {3, 0.8};
+    const sdm_pose pose = {{0.2, -0.3, 0}, {0.11, -0.07, 0.05}};
+    const sdm_grid g = sdm_grid_centred((int64_t[3]){32, 32, 24}, 0.3, (double[3]){0.1, 0, 0.05});
+    sdm_instance *torus = NULL;
+    assert_int_equal(sdm_instance_create(sdm_registry_find(registry, "torus", NULL),
+                                         &(sdm_named_text){"edge", "0.2"}, 1, NULL, &torus, NULL),
+                     SDM_OK);
+    const sdm_fit_source source = {
+        .shape = torus,
+        .grid = sdm_grid_centred((int64_t[3]){20, 20, 10}, 0.6, (double[3]){0, 0, 0})};
+    float *v = calloc(sdm_grid_count(&g), sizeof *v);
+    if (!v) abort();
+    assert_int_equal(sdm_fit_map(&source, truth, &pose, &g, 1, v, NULL), SDM_OK);
+    for (size_t i = 0; i < sdm_grid_count(&g); i++) v[i] = v[i] < 0;
+    const sdm_fit_target t = {.kind = SDM_FIT_LABEL, .grid = g, .values = v};
+    sdm_fit_opts o = sdm_fit_defaults();
+    o.start_params = truth;
+    o.start_pose = pose;
+    o.eps = o.polish_eps = 1e-3;
+    sdm_fit_result r;
+    sdm_error err = {0};
+    if (sdm_fit(&source, &t, &o, &r, &err)) fail_msg("%s", err.text);
+    for (int k = 0; k < 2; k++) {
+        const double error = r.params[k] - truth[k];
+        if (!(fabs(error) < 0.02 && fabs(error) < 3 * r.sd[k] && r.sd[k] < 0.05))
+            fail_msg("parameter %d: off by %g, deviation %g", k, error, r.sd[k]);
+    }
+    // 0.12 voxels of the labels and 0.03 voxels of the map
+    assert_true(fabs(r.model_error_mm - sqrt(0.036 * 0.036 + 0.018 * 0.018)) < 1e-12);
+    sdm_fit_dispose(&r);
+    sdm_instance_free(torus);
+    free(v);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_step),
         cmocka_unit_test(test_unknown),
+        cmocka_unit_test(test_labels_on_coarse_maps),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -25,6 +25,7 @@ typedef struct job {
     sdm_grid grid;
     sdm_exact_report report;
     float *values;
+    sdm_exact *engine; /* NULL: another method */
     cli_layers layers;
     double ms_build, ms_query;
     sdm_sign_certificate certificate; /* checked == 0 without --certify */
@@ -82,21 +83,19 @@ static sdm_status run_engine(job *j, sdm_error *err)
                                  .keep_overlap = j->args->keep_overlap,
                                  .n_threads = (int)j->args->threads,
                                  .cancelled = cli_interrupted};
-    sdm_exact *engine = NULL;
     const double start = sdm_clock();
-    sdm_status s = sdm_exact_create(&j->mesh, &opts, &engine, err);
+    sdm_status s = sdm_exact_create(&j->mesh, &opts, &j->engine, err);
     const double built = sdm_clock();
     if (s) return s;
-    j->report = *sdm_exact_get_report(engine);
+    j->report = *sdm_exact_get_report(j->engine);
     s = cli_grid_for_box(j->args, j->report.audit.min, j->report.audit.max, &j->grid, err);
     if (!s) s = SDM_ALLOC(&j->values, sdm_grid_count(&j->grid), "distance map", err);
     const double query = sdm_clock();
-    if (!s) s = cli_layers_map(&j->layers, j->args, engine, &j->grid, j->values, err);
+    if (!s) s = cli_layers_map(&j->layers, j->args, j->engine, &j->grid, j->values, err);
     j->ms_build = 1e3 * (built - start);
     j->ms_query = 1e3 * (sdm_clock() - query);
     if (!s && j->args->certify)
-        s = sdm_exact_certify(engine, &j->grid, j->values, &j->certificate, err);
-    sdm_exact_free(engine);
+        s = sdm_exact_certify(j->engine, &j->grid, j->values, &j->certificate, err);
     return s;
 }
 
@@ -211,7 +210,8 @@ static sdm_status write_outputs(const job *j, sdm_error *err)
                          .params = j->params.data ? j->params.data : "",
                          .source = SDM_SOURCE_EXACT,
                          .error_mm = j->report.union_error_mm + j->bound_mm,
-                         .origin = j->args->method};
+                         .origin = j->args->method,
+                         .engine = j->args->narrow > 0 ? NULL : j->engine};
     sdm_status s = SDM_OK;
     for (size_t i = 0; i < j->args->outputs.n && !s; i++)
         s = cli_write_map(j->args->outputs.items[i], &map, j->args, err);
@@ -280,6 +280,7 @@ sdm_status cmd_exact(const cli_args *args, sdm_error *err)
     if (!s) s = cli_layers_write(&j.layers, args, &j.grid, err);
     if (!s && args->json) s = print_json(&j, err);
     cli_layers_dispose(&j.layers);
+    sdm_exact_free(j.engine);
     sdm_free(j.values);
     sdm_mesh_dispose(&j.mesh);
     sdm_text_dispose(&j.params);

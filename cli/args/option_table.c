@@ -346,7 +346,7 @@ const cli_option cli_options[] = {
     {"region", 0, CLI_REAL6, "X,Y,Z,X,Y,Z", NULL, -1e12, 1e12, ON(CLI_FIT), AT(fit.region),
      "two opposite corners of a box: voxels outside are ignored"},
     {"margin", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.margin),
-     "ignore voxels farther than this outside of the shape (default 1.5)"},
+     "ignore voxels farther than this outside of the shape (default 1.5, but 1.5 to 15 voxels)"},
     {"cavity", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.cavity),
      "ignore spaces with values like those inside that hold a ball of this radius: too wide to be "
      "the shape"},
@@ -362,13 +362,14 @@ const cli_option cli_options[] = {
      "values of a second tissue outside (default -880,150; none with --inside or --outside)"},
     {"tissue-places", 0, CLI_REAL, "MM", NULL, 0, 1e9, ON(CLI_FIT), AT(fit.tissue_field),
      "length over which the fractions of the tissues outside vary in space; 0: constant fractions "
-     "(default 1)"},
+     "(default 1, but 1 to 10 voxels)"},
     {"blur", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.blur),
-     "standard deviation of the point spread at the start (default 0.2)"},
+     "standard deviation of the point spread at the start (default 0.2, but 0.25 to 2 voxels)"},
     {"l-ref", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.l_ref),
-     "scale of the logistic prior of labels (default 0.2)"},
+     "scale of the logistic prior of labels (default 0.2, but 0.25 to 2 voxels)"},
     {"point-sd", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.point_sd),
-     "standard deviation of the distance of points from the surface at the start (default 0.1)"},
+     "standard deviation of the distance of points from the surface at the start (default 0.1, but "
+     "0.125 to 1 voxel)"},
     {"keep", 0, CLI_LIST, "WHAT", NULL, 0, 0, ON(CLI_FIT), AT(fit.keep),
      "keep at the start value: parameters, pose, blur or appearance; may be repeated"},
     {"prior-sd", 0, CLI_REAL, "F", NULL, 0, 1e9, ON(CLI_FIT), AT(fit.prior_sd),

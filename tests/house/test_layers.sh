@@ -38,8 +38,8 @@ check() {
     function own(part, list,   n, p, i) { n = split(list, p, " "); for (i = 1; i <= n; i++) owner[p[i] ".h"] = part }
     BEGIN {
         own("core", "export grid memory pose shape status") # shape: types alone
-        own("core", "checksum clock distribution envelope file heap mat3 processor rng rotation sampling shared table team text threads vec3")
-        own("config", "config experiment mistakes")
+         own("core", "checksum clock distribution envelope file heap mat3 near processor rng rotation sampling shared table team text threads vec3")
+         own("config", "config experiment mistakes")
         own("geom", "exact isosurface mesh")
         own("geom", "brute_force builder methods part_audit")
         own("nn", "model")

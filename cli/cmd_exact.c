@@ -29,6 +29,7 @@ typedef struct job {
     sdm_exact_report report;
     float *values;     /* the map; NULL: it is in blocks */
     sdm_blocks blocks; /* the map near the surface, if the outputs are level sets only */
+    sdm_exact *engine; /* NULL: another method */
     cli_layers layers;
     cli_points_table points; /* of --points */
     double ms_build, ms_query;
@@ -70,10 +71,11 @@ static sdm_status open_mesh(job *j, sdm_error *err)
                         args->method);
     if (args->columns && !args->points)
         return sdm_fail(err, SDM_E_ARG, "exact: --columns belongs to --points FILE");
-    const sdm_status s =
+    sdm_status s =
         args->points ? cli_points_check(args, &j->points, err) : cli_layers_check(args, err);
     if (s) return s;
-    return args->mesh ? cli_read_mesh(args->mesh, &j->mesh, err) : make_shape_mesh(j, err);
+    s = args->mesh ? cli_read_mesh(args->mesh, &j->mesh, err) : make_shape_mesh(j, err);
+    return s || !args->turn_parts ? s : cli_turn_parts(&j->mesh, err);
 }
 
 static sdm_sign_method find_sign_method(const char *name)
@@ -108,24 +110,22 @@ static sdm_status run_engine(job *j, sdm_error *err)
                                  .keep_overlap = j->args->keep_overlap,
                                  .n_threads = (int)j->args->threads,
                                  .cancelled = cli_interrupted};
-    sdm_exact *engine = NULL;
     const double start = sdm_clock();
-    sdm_status s = sdm_exact_create(&j->mesh, &opts, &engine, err);
+    sdm_status s = sdm_exact_create(&j->mesh, &opts, &j->engine, err);
     const double built = sdm_clock();
     if (s) return s;
-    j->report = *sdm_exact_get_report(engine);
+    j->report = *sdm_exact_get_report(j->engine);
     s = cli_grid_for_box(j->args, j->report.audit.min, j->report.audit.max, &j->grid, err);
     const double query = sdm_clock();
-    if (!s && blocks_suffice(j)) s = make_blocks(j, engine, err);
+    if (!s && blocks_suffice(j)) s = make_blocks(j, j->engine, err);
     if (!s && !j->blocks.tile) {
         s = SDM_ALLOC(&j->values, sdm_grid_count(&j->grid), "distance map", err);
-        if (!s) s = cli_layers_map(&j->layers, j->args, engine, &j->grid, j->values, err);
+        if (!s) s = cli_layers_map(&j->layers, j->args, j->engine, &j->grid, j->values, err);
     }
     j->ms_build = 1e3 * (built - start);
     j->ms_query = 1e3 * (sdm_clock() - query);
     if (!s && j->args->certify)
-        s = sdm_exact_certify(engine, &j->grid, j->values, &j->certificate, err);
-    sdm_exact_free(engine);
+        s = sdm_exact_certify(j->engine, &j->grid, j->values, &j->certificate, err);
     return s;
 }
 
@@ -224,6 +224,9 @@ static void notice_mesh(const job *j)
         cli_notice("%zu parts were inside out; their orientation has been reversed",
                    j->report.parts_turned);
     cli_notice_audit(a);
+    // a single part that meets no other cannot be inside out after the engine has turned it
+    if (a->components > 1)
+        cli_notice_parts(&j->mesh, j->args->mesh ? CLI_MEND_FILE : CLI_MEND_SHAPE);
     if (j->report.unioned)
         cli_notice("the mesh overlaps itself: the union of its %zu triangles is bounded by %zu "
                    "triangles (error at most %.2g mm)",
@@ -259,7 +262,8 @@ static sdm_status write_outputs(const job *j, sdm_error *err)
                          .params = j->params.data ? j->params.data : "",
                          .source = SDM_SOURCE_EXACT,
                          .error_mm = j->report.union_error_mm + j->bound_mm,
-                         .origin = j->args->method};
+                         .origin = j->args->method,
+                         .engine = j->args->narrow > 0 ? NULL : j->engine};
     sdm_status s = SDM_OK;
     for (size_t i = 0; i < j->args->outputs.n && !s; i++)
         s = cli_write_map(j->args->outputs.items[i], &map, j->args, err);
@@ -333,6 +337,7 @@ sdm_status cmd_exact(const cli_args *args, sdm_error *err)
         if (!s && args->json) s = print_json(&j, err);
     }
     cli_layers_dispose(&j.layers);
+    sdm_exact_free(j.engine);
     sdm_free(j.values);
     sdm_blocks_dispose(&j.blocks);
     cli_points_dispose(&j.points);

@@ -68,7 +68,7 @@ static sdm_status check_row(const job *j, const double *p, sdm_error *err)
     const sdm_range_policy policy = cli_policy(j->args);
     bool finite = true;
     for (size_t i = 0; i < n; i++) finite = finite && isfinite(p[i]);
-    if (policy == SDM_RANGE_REFUSE || !finite) return cli_check_range(j->params, n, p, err);
+    if (policy == SDM_RANGE_REFUSE || !finite) return cli_check_trained(j->params, n, p, err);
     if (policy == SDM_RANGE_EXACT && cli_check_range(j->params, n, p, NULL))
         return sdm_instance_check(j->shape, p, err);
     return SDM_OK;

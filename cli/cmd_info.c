@@ -37,7 +37,7 @@ static void print_model(const char *path, const sdm_model_info *m)
         "accuracy     on %lld held-out shapes: MSE %.3g mm^2, RMSE %.5f mm, mean %.5f mm, largest "
         "%.5f mm\n",
         (long long)a->samples, a->mse_mm2, a->rmse_mm, a->mae_mm, a->max_abs_mm);
-    printf("             RMSE within 0.4 mm of the surface %.5f mm\n", a->rmse_near_mm);
+    printf("             RMSE within %g mm of the surface %.5f mm\n", a->near_mm, a->rmse_near_mm);
     printf(
         "             RMSE of single maps: 50 %% below %.5f mm, 90 %% below %.5f mm, 99 %% below "
         "%.5f mm\n",
@@ -57,6 +57,7 @@ static void json_accuracy(sdm_json *j, const sdm_accuracy *a)
     sdm_json_real(j, "mae_mm", a->mae_mm);
     sdm_json_real(j, "max_abs_mm", a->max_abs_mm);
     sdm_json_real(j, "rmse_near_mm", a->rmse_near_mm);
+    sdm_json_real(j, "near_mm", a->near_mm);
     sdm_json_real(j, "q50_mm", a->q50_mm);
     sdm_json_real(j, "q90_mm", a->q90_mm);
     sdm_json_real(j, "q99_mm", a->q99_mm);
@@ -121,21 +122,23 @@ static sdm_status info_model(const cli_args *args, const char *path, sdm_error *
 static sdm_status info_mesh(const cli_args *args, const char *path, sdm_error *err)
 {
     sdm_mesh mesh = {0};
-    sdm_audit audit;
+    sdm_part_audit audit = {0};
     sdm_status s = cli_read_mesh(path, &mesh, err);
-    if (!s) s = sdm_mesh_audit(&mesh, &audit, err);
+    if (!s) s = sdm_part_audit_make(&mesh, true, &audit, err);
     if (!s && args->json) {
         sdm_json j = {0};
         sdm_json_open(&j, NULL, '{');
         sdm_json_text(&j, "file", path);
         sdm_json_text(&j, "type", "mesh");
-        cli_json_audit(&j, &audit);
+        cli_json_audit(&j, &audit.mesh);
+        cli_json_parts(&j, &audit);
         sdm_json_close(&j, '}');
         s = cli_print_json(&j, err);
     } else if (!s) {
         printf("%s: triangle mesh\n\n", path);
         cli_print_audit(&audit);
     }
+    sdm_part_audit_dispose(&audit);
     sdm_mesh_dispose(&mesh);
     return s;
 }

@@ -1,4 +1,5 @@
-/* sdmgen shapes: lists the known shapes, or the parameters and options of one. */
+/* sdmgen shapes: lists the known shapes, or the parameters and options of one; calls the
+ * subcommands. */
 #include <stdio.h>
 #include <string.h>
 
@@ -8,6 +9,8 @@
 #include "report/terminal.h"
 #include "sdm/internal/distribution.h"
 #include "sdm/memory.h"
+#include "shapes/shapes_command.h"
+#include "study/check_family.h"
 
 static const char *option_type(const sdm_option *o)
 {
@@ -236,13 +239,45 @@ static sdm_status print_list(const cli_args *args, const sdm_registry *registry,
     return cli_print_json(&json, err);
 }
 
-sdm_status cmd_shapes(const cli_args *args, sdm_error *err)
+typedef sdm_status (*command_function)(const cli_args *args, sdm_error *err);
+
+/* The subcommand that the first word names; NULL: none. */
+static command_function find_subcommand(const cli_args *args)
 {
+    static const struct {
+        const char *word;
+        command_function run;
+    } subcommands[] = {{"new", cli_shapes_new}, {"check", cli_check_family}};
+    for (size_t i = 0; i < sizeof subcommands / sizeof *subcommands && args->files.n > 0; i++)
+        if (!strcmp(args->files.items[0], subcommands[i].word)) return subcommands[i].run;
+    return NULL;
+}
+
+/* The command line without a subcommand: `sdmgen shapes [NAME]`. */
+static sdm_status check_arguments(const cli_args *args, sdm_error *err)
+{
+    if (args->files.n > 1)
+        return sdm_fail(err, SDM_E_ARG, "shapes: unexpected argument '%s'; usage: sdmgen shapes %s",
+                        args->files.items[1], args->command->synopsis);
+    if (args->out) return sdm_fail(err, SDM_E_ARG, "shapes: --out needs `shapes new`");
+    if (args->outputs.n > 0) return sdm_fail(err, SDM_E_ARG, "shapes: -o needs `shapes check`");
     if (args->files.n == 0 && args->options.n > 0)
         return sdm_fail(err, SDM_E_ARG, "shapes: -O needs the NAME of a shape");
+    return SDM_OK;
+}
+
+sdm_status cmd_shapes(const cli_args *args, sdm_error *err)
+{
+    const command_function run = find_subcommand(args);
+    if (run && args->files.n > 1) return run(args, err);
     sdm_registry *registry = NULL;
-    sdm_status s = cli_open_registry(args, &registry, err);
-    if (!s)
+    sdm_status s = run ? SDM_OK : check_arguments(args, err);
+    if (!s) s = cli_open_registry(args, &registry, err);
+    // the word of a subcommand alone may be the name of a shape
+    const bool shape = run && !s && sdm_registry_find(registry, args->files.items[0], NULL);
+    if (!s && run && !shape)
+        s = run(args, err);
+    else if (!s)
         s = args->files.n > 0 ? print_shape(args, registry, err) : print_list(args, registry, err);
     sdm_registry_free(registry);
     return s;

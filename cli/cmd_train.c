@@ -7,7 +7,8 @@
 #include "commands.h"
 #include "inputs/config_shape.h"
 #include "inputs/setup.h"
-#include "report/report_audit.h"
+#include "report/report_survey.h"
+#include "report/report_verdict.h"
 #include "report/terminal.h"
 #include "report/train_progress.h"
 #include "sdm/internal/train.h"
@@ -77,37 +78,26 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
         sdm_json_int(&j, "heldout", a->samples);
         sdm_json_int(&j, "steps", r->steps);
         sdm_json_int(&j, "maps", r->samples);
+        sdm_json_open(&j, "verdict", '{');
+        sdm_verdict_json(&j, &r->verdict);
+        sdm_json_real(&j, "saved_seconds", r->verdict.saved_seconds);
+        sdm_json_close(&j, '}');
         sdm_json_close(&j, '}');
         return cli_print_json(&j, err);
     }
     // print as text
     char steps[32], maps[32];
     printf("%s\n", r->model_path);
-    printf("  trained     %.1f s, %s steps, %s exact maps\n", r->seconds,
+    printf("  trained     %.1f s, %s steps, %s exact maps", r->seconds,
            cli_format_count(r->steps, steps), cli_format_count(r->samples, maps));
-    printf("  held out    %lld shapes: MSE %.3g mm^2, RMSE %.5f mm, within 0.4 mm of the surface "
-           "%.5f mm, largest %.5f "
-           "mm\n",
-           (long long)a->samples, a->mse_mm2, a->rmse_mm, a->rmse_near_mm, a->max_abs_mm);
+    if (r->verdict.saved_seconds > 0)
+        printf("; train.patience saved %.0f s", r->verdict.saved_seconds);
+    printf("\n  held out    %lld shapes: MSE %.3g mm^2, RMSE %.5f mm, within %g mm of the surface "
+           "%.5f mm, largest %.5f mm\n",
+           (long long)a->samples, a->mse_mm2, a->rmse_mm, a->near_mm, a->rmse_near_mm,
+           a->max_abs_mm);
+    cli_print_verdict(&r->verdict);
     return SDM_OK;
-}
-
-/* Reports defects of the mesh at the default parameters before a long training starts. If the mesh
- * cannot be made, the training reports the error. */
-static void notice_mesh(const sdm_instance *shape)
-{
-    double p[SDM_MAX_PARAMS];
-    size_t n;
-    const sdm_param *params = sdm_instance_params(shape, &n);
-    for (size_t i = 0; i < n && i < SDM_MAX_PARAMS; i++) p[i] = params[i].def;
-    sdm_mesh mesh = {0};
-    sdm_audit audit;
-    if (n <= SDM_MAX_PARAMS && !sdm_instance_mesh(shape, p, &mesh, NULL) &&
-        !sdm_mesh_audit(&mesh, &audit, NULL)) {
-        if (audit.inverted) cli_notice("the mesh is inside out; its orientation will be reversed");
-        cli_notice_audit(&audit);
-    }
-    sdm_mesh_dispose(&mesh);
 }
 
 static sdm_status train_network(const cli_args *args, const sdm_config *config,
@@ -117,7 +107,7 @@ static sdm_status train_network(const cli_args *args, const sdm_config *config,
     cli_progress progress;
     const sdm_train_hooks hooks = cli_train_hooks(&progress);
     sdm_train_report report = {0};
-    notice_mesh(shape);
+    if (!args->resume) cli_notice_survey(config, shape);
     cli_progress_start(&progress);
     sdm_status s = sdm_train(config, shape, folder, args->resume, &hooks, &report, err);
     cli_progress_clear(&progress);
@@ -134,13 +124,11 @@ sdm_status cmd_train(const cli_args *args, sdm_error *err)
     sdm_config *config = NULL;
     sdm_registry *registry = NULL;
     sdm_instance *shape = NULL;
-    sdm_status s = cli_read_config(args, &config, err);
+    sdm_status s = cli_open_config(args, &config, &registry, &shape, err);
     if (!s && args->out && strlen(args->out) >= sizeof config->output.folder)
         s = sdm_fail(err, SDM_E_ARG, "--out '%.100s...': the name is too long", args->out);
     if (!s && args->out) strcpy(config->output.folder, args->out);
     if (!s) s = check_folder(args, config->output.folder, err);
-    if (!s) s = cli_open_registry(args, &registry, err);
-    if (!s) s = cli_config_shape(config, registry, &shape, err);
     if (!s) s = train_network(args, config, shape, err);
     sdm_instance_free(shape);
     sdm_registry_free(registry);

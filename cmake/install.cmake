@@ -2,6 +2,12 @@
 # libsdmgen_vdb: OpenVDB), the public headers, a CMake package, pkg-config files, configs and documentation.
 include(CMakePackageConfigHelpers)
 
+# folders of the headers, for users of the installed package and of the build folder
+set(SDM_USER_HEADERS $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+foreach(folder framework runtime shapes)
+  list(APPEND SDM_USER_HEADERS $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/${folder}/include>)
+endforeach()
+
 # sdm_library(TARGET LANGUAGE OUTPUT NAME EXPORT NAME PARTS ... LINK ...): shared library
 # libOUTPUT.so from the object files of the parts, exported as sdmgen::EXPORT
 function(sdm_library target language)
@@ -11,7 +17,7 @@ function(sdm_library target language)
   set_target_properties(${target} PROPERTIES OUTPUT_NAME ${LIB_OUTPUT} EXPORT_NAME ${LIB_EXPORT}
     LINKER_LANGUAGE ${language} VERSION ${PROJECT_VERSION}
     SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR} INSTALL_RPATH "$ORIGIN")
-  target_include_directories(${target} INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_include_directories(${target} INTERFACE ${SDM_USER_HEADERS})
   target_link_libraries(${target} PRIVATE sdm_flags ${LIB_LINK})
   if(NOT SDM_SANITIZE)
     target_link_options(${target} PRIVATE LINKER:--no-undefined)
@@ -45,8 +51,7 @@ if(SDM_STATIC)
   add_library(sdmgen_static STATIC ${objects})
   set_target_properties(sdmgen_static PROPERTIES OUTPUT_NAME sdmgen EXPORT_NAME static
     LINKER_LANGUAGE C)
-  target_include_directories(sdmgen_static
-    INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_include_directories(sdmgen_static INTERFACE ${SDM_USER_HEADERS})
   target_link_libraries(sdmgen_static INTERFACE m ${CMAKE_DL_LIBS} ${SDM_THREADS}
     $<$<BOOL:${SDM_OPENMP}>:OpenMP::OpenMP_C>)
   if(CMAKE_SYSTEM_PROCESSOR STREQUAL wasm32)
@@ -61,7 +66,7 @@ endif()
 # plug-ins need only a header, no library
 add_library(sdmgen_plugin INTERFACE)
 set_target_properties(sdmgen_plugin PROPERTIES EXPORT_NAME plugin)
-target_include_directories(sdmgen_plugin INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+target_include_directories(sdmgen_plugin INTERFACE ${SDM_USER_HEADERS})
 target_compile_features(sdmgen_plugin INTERFACE c_std_11)
 install(TARGETS sdmgen_plugin EXPORT sdmgenTargets)
 
@@ -80,6 +85,8 @@ endif()
 
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/sdmgen)
 install(EXPORT sdmgenTargets NAMESPACE sdmgen:: DESTINATION ${package})
+# find_package(sdmgen) also finds the build folder
+export(EXPORT sdmgenTargets NAMESPACE sdmgen:: FILE ${PROJECT_BINARY_DIR}/sdmgenTargets.cmake)
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/sdmgenConfig.cmake.in
   ${PROJECT_BINARY_DIR}/sdmgenConfig.cmake
   INSTALL_DESTINATION ${package} NO_SET_AND_CHECK_MACRO)

@@ -19,10 +19,8 @@
 static void fill_report(void *user, size_t done, size_t all)
 {
     trainer *t = user;
-    const size_t fixed = t->data.n_holdout + t->data.n_static;
-    t->data.n_taken = done > fixed ? done - fixed : 0;
-    trainer_report(t, trainer_start_fraction(t), (double)done / (trainer_seconds(t) + 1e-9),
-                   done == all);
+    t->pace.done = (int64_t)done;
+    trainer_report(t, trainer_start_fraction(t), done == all);
 }
 
 static bool fill_cancelled(void *user) { return trainer_cancelled(user); }
@@ -40,6 +38,7 @@ static sdm_status train_make_maps(trainer *t, bool resumed, sdm_error *err)
                               .enough = resumed ? NULL : fill_enough,
                               .user = t};
     t->phase = SDM_PHASE_DATA;
+    trainer_pace_start(t, 1);
     const sdm_status s = trainer_dataset_fill(&t->data, t->n_threads, &hooks, err);
     if (s) return s;
     if (t->data.n_start < start)
@@ -58,7 +57,8 @@ static sdm_status train_prepare(trainer *t, bool resumed, size_t n_taken, sdm_er
 {
     sdm_status s = train_make_maps(t, resumed, err);
     t->phase = SDM_PHASE_BASES;
-    trainer_report(t, trainer_start_fraction(t), 0, true);
+    trainer_pace_start(t, 0);
+    trainer_report(t, trainer_start_fraction(t), true);
     if (!s) s = t->kind->begin(t, err);
     if (!s) s = trainer_samples_start(t, err);
     if (!s && resumed) s = trainer_samples_retake(t, n_taken, err);
@@ -96,8 +96,22 @@ static sdm_status train_run(trainer *t, bool resume, sdm_outfile **config, sdm_e
     } else {
         trainer_enter(t, SDM_PHASE_MODE_FIT);
     }
-    t->last_checkpoint = trainer_seconds(t);
+    t->last_checkpoint = t->prepared_seconds = trainer_seconds(t);
     return t->kind->run(t, found, err);
+}
+
+/* Tells if the run took longer than its budget of time, and why. measured: seconds of the
+ * measurement of the model. */
+static void tell_overrun(trainer *t, double measured)
+{
+    const double budget = t->config->train.minutes * 60, over = trainer_seconds(t) - budget;
+    if (!trainer_by_time(t) || over < fmax(1, 0.02 * budget)) return;
+    trainer_message(
+        t,
+        "the run took %.0f s longer than train.minutes: the maps, bases and trials before "
+        "the first step took %.0f s, the measurement of the model %.0f s (lower "
+        "data.start, data.static or data.holdout, or raise train.minutes)",
+        over, t->prepared_seconds, measured);
 }
 
 /* Measures and writes the model. If the model cannot be written, a checkpoint keeps the trained
@@ -105,11 +119,15 @@ static sdm_status train_run(trainer *t, bool resume, sdm_outfile **config, sdm_e
 static sdm_status train_finish(trainer *t, sdm_train_report *report, sdm_error *err)
 {
     const sdm_phase phase = t->phase;
+    const double started = trainer_seconds(t);
     const size_t lines = t->metrics->size;
     t->phase = SDM_PHASE_EVALUATE;
-    trainer_report(t, 1, 0, true);
+    trainer_report(t, 1, true);
     const sdm_status s = trainer_export_model(t, report, err);
-    if (!s) return trainer_checkpoint_remove(t, err);
+    if (!s) {
+        tell_overrun(t, trainer_seconds(t) - started);
+        return trainer_checkpoint_remove(t, err);
+    }
     t->phase = phase;
     t->metrics->size = lines;
     if (s != SDM_E_QUALITY && !trainer_checkpoint_write(t, NULL))
@@ -146,12 +164,14 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
                  .started = sdm_clock(),
                  .loss = NAN,
                  .heldout_mse = NAN,
+                 .evaluated_step = -1,
                  .metrics = &metrics};
     if (hooks) t.hooks = *hooks;
     t.n_threads = sdm_threads(config->threads);
     sdm_outfile *resolved = NULL;
     sdm_config *settled = NULL;
     sdm_team *team = NULL;
+    const size_t existing = sdm_folder_existing(folder);
     sdm_status s = sdm_make_folder(folder, err);
     if (!s) s = SDM_ALLOC(&settled, 1, "configuration", err);
     if (!s) s = sdm_team_start(t.n_threads, &team, err);
@@ -159,6 +179,8 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     if (s) {
         sdm_team_end(team);
         sdm_free(settled);
+        sdm_text_dispose(&metrics);
+        sdm_folder_remove_empty(folder, existing);
         return s;
     }
     t.config = settled;
@@ -169,6 +191,7 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     trainer_producer_stop(t.producer);
     t.producer = NULL;
     if (!s) s = train_finish(&t, report, err);
+    if (s) sdm_folder_remove_empty(folder, existing);
     t.kind->dispose(&t);
     trainer_dataset_dispose(&t.data);
     sdm_free(t.blocks);

@@ -15,6 +15,9 @@
      ON(CLI_SHAPES) | ON(CLI_INFO) | ON(CLI_VERIFY) | ON(CLI_BENCH) | ON(CLI_EXPERIMENT) |         \
      ON(CLI_PHANTOM) | ON(CLI_FIT))
 
+/* Commands that train networks. */
+#define TRAININGS (ON(CLI_TRAIN) | ON(CLI_EXPERIMENT))
+
 const cli_command cli_commands[CLI_N_COMMANDS] = {
     {"train", "CONFIG [key=value ...]", "train a network on the shape of a configuration",
      "Reads the YAML configuration, makes exact maps, trains the network and writes a run\n"
@@ -40,15 +43,29 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "a margin of a tenth of its longest edge on every side: 64 voxels along that edge,\n"
      "margins included. With --points FILE, distances at points in any order.",
      "sdmgen exact --shape cochlea -p a=4.2 --size 60,50,50 --spacing 0.2 -o cochlea.nrrd", 0, 0},
-    {"mesh", "--shape NAME [-p name=value ...] [-o FILE]", "write the surface mesh of a shape",
-     NULL, "sdmgen mesh --shape torus -o torus.ply --audit", 0, 0},
+    {"mesh", "--shape NAME [-p name=value ...] | --mesh FILE [-o FILE]",
+     "write the surface mesh of a shape, or audit and mend a mesh",
+     "Makes the mesh of a shape or reads a mesh file (.ply .stl .obj .off, mm), and warns of\n"
+     "parts that are inside out. --audit prints the state of every part and the volume of the\n"
+     "union. --turn-parts turns the parts that are inside out.",
+     "sdmgen mesh --shape torus -o torus.ply --audit", 0, 0},
     {"eval", "MODEL", "measure a network on new random shapes",
      "Draws random shapes that the training did not use and compares the network with the\n"
      "exact engine: errors of the distance, overlap of the volumes inside (Dice), distances\n"
      "between the zero surfaces, and the time per map on one core.",
      "sdmgen eval runs/cochlea/model.sdm --samples 100 --json", 1, 1},
-    {"shapes", "[NAME]", "list the shapes, or the parameters and options of one", NULL,
-     "sdmgen shapes cochlea", 0, 1},
+    {"shapes", "[NAME] | new NAME | check NAME|CONFIG",
+     "list the shapes, describe one, begin a new one, or check one",
+     "Without NAME: lists the shapes. NAME: prints the parameters and options of one.\n"
+     "new NAME: writes the folder NAME (or that of --out) with a shape of this name as a\n"
+     "plug-in: C source, CMakeLists.txt, a configuration and tests. It builds and passes its\n"
+     "tests as it is; replace its shape by yours. The folder must not exist.\n"
+     "check: makes meshes all over the ranges of the parameters and looks for what spoils maps\n"
+     "and trainings: broken meshes, parts that are inside out, vertices that jump, numbers of\n"
+     "vertices that change, a grid that cuts the shapes (with a CONFIG, whose key=value\n"
+     "overrides may follow), wrong velocities, results that differ from call to call. -o FILE\n"
+     "draws nine shapes. Exit code 3: meshes are broken; 4: maps or trainings suffer.",
+     "sdmgen shapes check cochlea -o cochlea.png", 0, SIZE_MAX},
     {"info", "FILE", "describe the content of a model, level set, image or mesh file", NULL,
      "sdmgen info runs/cochlea/model.sdm", 1, 1},
     {"verify", "FILE", "check a model, level set or image file",
@@ -119,8 +136,8 @@ const cli_option cli_options[] = {
     {"shape", 0, CLI_TEXT, "NAME", NULL, 0, 0,
      ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH) | ON(CLI_PHANTOM) | ON(CLI_FIT), AT(shape),
      "name of the shape; `sdmgen shapes` lists them"},
-    {"mesh", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_EXACT) | ON(CLI_BENCH), AT(mesh),
-     "mesh file instead of a shape"},
+    {"mesh", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH),
+     AT(mesh), "mesh file instead of a shape"},
     {"param", 'p', CLI_LIST, "name=value", NULL, 0, 0,
      ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH) | ON(CLI_PHANTOM), AT(params),
      "value of a shape parameter; may be repeated"},
@@ -192,6 +209,8 @@ const cli_option cli_options[] = {
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_FIT), AT(outputs),
      "output: .vdb .ply .stl .obj .off .nii .nii.gz .nrrd .mha .npy .png .svg .pdf .json; may "
      "be repeated"},
+    {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_SHAPES), AT(outputs),
+     "check: a picture of nine shapes: .png .svg .pdf; may be repeated"},
     {"closest", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(closest),
      "also write the nearest surface point of every voxel: float32 [z][y][x][3], mm"},
     {"normal", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(normal),
@@ -205,7 +224,9 @@ const cli_option cli_options[] = {
      "also write the derivatives by the shape's parameters: float32 [parameter][z][y][x], mm per "
      "unit"},
     {"audit", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_MESH), AT(audit),
-     "check the mesh and print its properties and defects"},
+     "check the mesh and print its properties, defects and parts"},
+    {"turn-parts", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_MESH) | ON(CLI_EXACT), AT(turn_parts),
+     "turn the parts of the mesh that are inside out, also those that overlap others"},
     {"dense", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_FIT),
      AT(dense), ".vdb: the whole map instead of a level set"},
     {"half", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_FIT),
@@ -214,6 +235,8 @@ const cli_option cli_options[] = {
      AT(band), ".vdb: half width of the narrow band in voxels (default 3)"},
     {"out", 0, CLI_TEXT, "DIR", NULL, 0, 0, ON(CLI_TRAIN) | ON(CLI_EXPERIMENT), AT(out),
      "run folder (default: the folder of the configuration, or runs/NAME)"},
+    {"out", 0, CLI_TEXT, "DIR", NULL, 0, 0, ON(CLI_SHAPES), AT(out),
+     "new: folder of the plug-in (default: NAME)"},
     {"resume", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN), AT(resume),
      "continue from the checkpoint in the folder"},
     {"force", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN) | ON(CLI_EXPERIMENT), AT(force),
@@ -228,6 +251,8 @@ const cli_option cli_options[] = {
      "number of random shapes (default 100)"},
     {"samples", 0, CLI_INT, "N", NULL, 1, 1000000, ON(CLI_VERIFY), AT(samples),
      "number of random shapes (default 20)"},
+    {"samples", 0, CLI_INT, "N", NULL, 1, 1000000, ON(CLI_SHAPES), AT(samples),
+     "check: number of random shapes (default 128)"},
     {"naive", 0, CLI_INT, "N", NULL, 0, 1000, ON(CLI_EVAL), AT(naive),
      "number of shapes on which the naive method is timed (default 2; 0: none)"},
     {"max-mse", 0, CLI_REAL, "MM2", NULL, 0, 1e12, ON(CLI_EVAL), AT(max_mse),
@@ -327,7 +352,7 @@ const cli_option cli_options[] = {
     {"region", 0, CLI_REAL6, "X,Y,Z,X,Y,Z", NULL, -1e12, 1e12, ON(CLI_FIT), AT(fit.region),
      "two opposite corners of a box: voxels outside are ignored"},
     {"margin", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.margin),
-     "ignore voxels farther than this outside of the shape (default 1.5)"},
+     "ignore voxels farther than this outside of the shape (default 1.5, but 1.5 to 15 voxels)"},
     {"cavity", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.cavity),
      "ignore spaces with values like those inside that hold a ball of this radius: too wide to be "
      "the shape"},
@@ -343,13 +368,14 @@ const cli_option cli_options[] = {
      "values of a second tissue outside (default -880,150; none with --inside or --outside)"},
     {"tissue-places", 0, CLI_REAL, "MM", NULL, 0, 1e9, ON(CLI_FIT), AT(fit.tissue_field),
      "length over which the fractions of the tissues outside vary in space; 0: constant fractions "
-     "(default 1)"},
+     "(default 1, but 1 to 10 voxels)"},
     {"blur", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.blur),
-     "standard deviation of the point spread at the start (default 0.2)"},
+     "standard deviation of the point spread at the start (default 0.2, but 0.25 to 2 voxels)"},
     {"l-ref", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.l_ref),
-     "scale of the logistic prior of labels (default 0.2)"},
+     "scale of the logistic prior of labels (default 0.2, but 0.25 to 2 voxels)"},
     {"point-sd", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.point_sd),
-     "standard deviation of the distance of points from the surface at the start (default 0.1)"},
+     "standard deviation of the distance of points from the surface at the start (default 0.1, but "
+     "0.125 to 1 voxel)"},
     {"keep", 0, CLI_LIST, "WHAT", NULL, 0, 0, ON(CLI_FIT), AT(fit.keep),
      "keep at the start value: parameters, pose, blur or appearance; may be repeated"},
     {"prior-sd", 0, CLI_REAL, "F", NULL, 0, 1e9, ON(CLI_FIT), AT(fit.prior_sd),
@@ -396,11 +422,13 @@ const cli_option cli_options[] = {
     /* all commands */
     {"plugin", 0, CLI_LIST, "FILE", NULL, 0, 0, WITH_SHAPES, AT(plugins),
      "load shapes from a shared object; may be repeated"},
-    {"threads", 0, CLI_INT, "N", NULL, 0, 1024, ALL & ~ON(CLI_HELP), AT(threads),
+    {"threads", 0, CLI_INT, "N", NULL, 0, 1024, TRAININGS, AT(threads),
+     "number of threads; 0: all (default). Results depend on it with train.minutes only"},
+    {"threads", 0, CLI_INT, "N", NULL, 0, 1024, ALL & ~ON(CLI_HELP) & ~TRAININGS, AT(threads),
      "number of threads; 0: all (default). Results do not depend on it"},
     {"seed", 0, CLI_INT, "N", NULL, 0, 9007199254740992.0,
-     ON(CLI_TRAIN) | ON(CLI_CONFIG) | ON(CLI_EVAL) | ON(CLI_VERIFY) | ON(CLI_BENCH) |
-         ON(CLI_PHANTOM),
+     ON(CLI_TRAIN) | ON(CLI_CONFIG) | ON(CLI_EVAL) | ON(CLI_SHAPES) | ON(CLI_VERIFY) |
+         ON(CLI_BENCH) | ON(CLI_PHANTOM),
      AT(seed), "seed of the random numbers (default 1; train, config: the configuration's)"},
     {"json", 0, CLI_FLAG, NULL, NULL, 0, 0, REPORTS, AT(json),
      "print the result as one line of JSON"},

@@ -115,6 +115,7 @@ struct cli_args {
     bool dense, half;                /* generate, exact, fit: .vdb */
     bool keep_overlap, certify;      /* exact */
     bool audit;                      /* mesh */
+    bool turn_parts;                 /* mesh, exact */
     const char *points, *columns;    /* exact: file of points; columns of the answers */
     double narrow;                   /* exact: voxels; 0: option missing */
     double tolerance;                /* exact: mm; 0: option missing */
@@ -122,11 +123,11 @@ struct cli_args {
     bool keys;                       /* config, experiment */
     bool markdown;                   /* config, experiment, help */
     bool man, completion;            /* help */
-    const char *out;                 /* train, experiment */
+    const char *out;                 /* train, experiment, shapes */
     const char *rows;                /* generate: the file of --params */
     const char *policy;              /* generate, fit */
     const char *shape;               /* exact, mesh, bench, phantom, fit */
-    const char *mesh;                /* exact, bench */
+    const char *mesh;                /* exact, mesh, bench */
     const char *sign, *method;       /* exact */
     const char *pictures;            /* eval */
     const char *closest, *normal;    /* exact */
@@ -139,7 +140,7 @@ struct cli_args {
     double max_mse;                  /* eval: mm^2 */
     double spacing[3], origin[3];    /* mm */
     int64_t size[3];                 /* voxels */
-    int64_t samples;                 /* eval, verify */
+    int64_t samples;                 /* eval, verify, shapes */
     int64_t naive;                   /* eval */
     const char *grid;                /* bench */
     const char *peers;               /* bench, experiment */

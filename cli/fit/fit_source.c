@@ -100,7 +100,8 @@ static sdm_status check_start(cli_fit *f, sdm_error *err)
     bool finite = true;
     for (size_t i = 0; i < f->n_params; i++) finite = finite && isfinite(f->start[i]);
     if (f->source.policy == SDM_RANGE_REFUSE || !finite)
-        return cli_check_range(f->params, f->n_params, f->start, err);
+        return f->source.model ? cli_check_trained(f->params, f->n_params, f->start, err)
+                               : cli_check_range(f->params, f->n_params, f->start, err);
     if (f->source.policy == SDM_RANGE_EXACT) return sdm_instance_check(f->shape, f->start, err);
     for (size_t i = 0; i < f->n_params; i++) {
         const double given = f->start[i];

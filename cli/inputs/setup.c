@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "report/files.h"
+#include "report/terminal.h"
 #include "sdm/builtin_shapes.h"
 #include "sdm/memory.h"
 #include "sdm/meshfile.h"
@@ -15,14 +16,29 @@ sdm_status cli_open_registry(const cli_args *args, sdm_registry **out, sdm_error
 {
     sdm_status s = sdm_registry_create(out, err);
     if (!s) s = sdm_builtin_shapes_add(*out, err);
-    if (!s) s = sdm_registry_load_path(*out, getenv("SDMGEN_PLUGIN_PATH"), err);
     for (size_t i = 0; i < args->plugins.n && !s; i++)
         s = sdm_registry_load(*out, args->plugins.items[i], err);
+    if (!s) s = sdm_registry_load_path(*out, getenv("SDMGEN_PLUGIN_PATH"), err);
     if (s) {
         sdm_registry_free(*out);
         *out = NULL;
     }
+    const char *skipped;
+    for (size_t i = 0; (skipped = sdm_registry_skipped(*out, i)); i++)
+        cli_notice("skipped a file in SDMGEN_PLUGIN_PATH: %s", skipped);
     return s;
+}
+
+/* The message about a file in SDMGEN_PLUGIN_PATH that is called like the shape and was skipped;
+ * NULL: there is none. */
+static const char *find_skipped(const sdm_registry *r, const char *name)
+{
+    char file[128];
+    snprintf(file, sizeof file, "/%.100s.so", name);
+    const char *skipped;
+    for (size_t i = 0; (skipped = sdm_registry_skipped(r, i)); i++)
+        if (strstr(skipped, file)) return skipped;
+    return NULL;
 }
 
 /* Splits "name=value" into two texts in buf. option: "-p" or "-O", for the message. */
@@ -42,9 +58,11 @@ static sdm_status split_word(const char *word, const char *option, char buf[SDM_
 
 const sdm_shape *cli_find_shape(const sdm_registry *r, const char *name, sdm_error *err)
 {
-    const char *near = NULL;
+    const char *near = NULL, *skipped = find_skipped(r, name);
     const sdm_shape *shape = sdm_registry_find(r, name, &near);
-    if (!shape)
+    if (!shape && skipped)
+        sdm_fail(err, SDM_E_ARG, "unknown shape '%s'; %s", name, skipped);
+    else if (!shape)
         sdm_fail(err, SDM_E_ARG, "unknown shape '%s'%s%s%s", name,
                  near ? "; did you mean '"
                       : "; sdmgen shapes lists the known ones, --plugin FILE loads others",
@@ -189,13 +207,21 @@ sdm_status cli_check_range(const sdm_param *params, size_t n, const double *valu
     for (size_t i = 0; i < n; i++) {
         const sdm_param *p = &params[i];
         if (values[i] >= p->min && values[i] <= p->max) continue;
-        char v[32], low[32], high[32];
-        return sdm_fail(err, SDM_E_RANGE, "parameter %s = %s, allowed %s .. %s%s%s", p->name,
-                        isnan(values[i]) ? "nan" : sdm_format_real(values[i], v),
-                        sdm_format_real(p->min, low), sdm_format_real(p->max, high),
-                        *p->unit ? " " : "", p->unit);
+        return sdm_fail_range(p->name, values[i], p->min, p->max, p->unit, err);
     }
     return SDM_OK;
+}
+
+sdm_status cli_check_trained(const sdm_param *params, size_t n, const double *values,
+                             sdm_error *err)
+{
+    const sdm_status s = cli_check_range(params, n, values, err);
+    for (size_t i = 0; i < n && s; i++)
+        if (!isfinite(values[i])) return s; // no policy accepts it
+    if (s && err)
+        snprintf(err->text + strlen(err->text), sizeof err->text - strlen(err->text),
+                 "; --policy clamp moves it into the range, --policy exact computes exact maps");
+    return s;
 }
 
 void cli_add_params(const sdm_param *params, size_t n, const double *values, sdm_text *out)

@@ -7,8 +7,9 @@
 #include "sdm/registry.h"
 #include "sdm/runtime.h"
 
-/* *out = a registry of the built-in shapes and of the plug-ins in SDMGEN_PLUGIN_PATH and --plugin;
- * free it with sdm_registry_free(). SDM_E_PLUGIN, SDM_E_NOMEM. */
+/* *out = a registry of the built-in shapes and of the plug-ins of --plugin and, after them, in
+ * SDMGEN_PLUGIN_PATH; free it with sdm_registry_free(). A file in the path that cannot be loaded or
+ * has a shape that is there already gives a notice. SDM_E_PLUGIN, SDM_E_NOMEM. */
 sdm_status cli_open_registry(const cli_args *args, sdm_registry **out, sdm_error *err);
 
 /* The shape of that name. NULL: there is none; *err holds SDM_E_ARG with "did you mean". */
@@ -60,6 +61,11 @@ sdm_status cli_read_rows(const char *path, const sdm_param *params, size_t n, co
 
 /* SDM_E_RANGE with the name of the first parameter that is not finite or outside of its range. */
 sdm_status cli_check_range(const sdm_param *params, size_t n, const double *values, sdm_error *err);
+
+/* As cli_check_range() for the parameters of a model, with the values of --policy that accept
+ * others. */
+sdm_status cli_check_trained(const sdm_param *params, size_t n, const double *values,
+                             sdm_error *err);
 
 /* Appends the values as "a=4.4 alpha=0.5". */
 void cli_add_params(const sdm_param *params, size_t n, const double *values, sdm_text *out);

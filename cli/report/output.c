@@ -7,6 +7,7 @@
 
 #include "files.h"
 #include "sdm/image.h"
+#include "sdm/internal/near.h"
 #include "sdm/isosurface.h"
 #include "sdm/meshfile.h"
 #include "sdm/picture.h"
@@ -100,6 +101,13 @@ static void describe_method(const cli_map *map, char text[80])
              reasons[map->reason]);
 }
 
+#ifdef SDM_HAVE_VDB
+static sdm_status map_beyond(void *engine, const sdm_grid *grid, float *values, sdm_error *err)
+{
+    return sdm_exact_map(engine, grid, values, err);
+}
+#endif
+
 static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args *args,
                             sdm_error *err)
 {
@@ -128,7 +136,9 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
                                .half = args->half,
                                .metadata = metadata,
                                .n_metadata = n_metadata,
-                               .cancelled = cli_interrupted};
+                               .cancelled = cli_interrupted,
+                               .map = map->engine ? map_beyond : NULL,
+                               .user = map->engine};
     sdm_vdb_report report = {0};
     const sdm_status s = map->blocks
                              ? sdm_vdb_write_blocks(path, map->blocks, &opts, &report, err)
@@ -139,6 +149,11 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
                    path, (long long)report.adjusted_voxels, report.adjusted_mm);
     if (!s && report.cut)
         cli_notice("%s: the surface leaves the grid and is cut at its border", path);
+    else if (!s && report.estimated_voxels > 0)
+        cli_notice("%s: the band leaves the grid; the distances of %lld voxels beyond it are "
+                   "estimated from those at its border: a larger grid or a narrower --band avoids "
+                   "this",
+                   path, (long long)report.estimated_voxels);
     return s;
 #else
     (void)map;
@@ -162,7 +177,7 @@ static sdm_status write_surface(const char *path, const cli_map *map, sdm_error 
 
 static sdm_status write_picture(const char *path, const cli_map *map, sdm_error *err)
 {
-    static const float levels[] = {0.0f, 1.0f};
+    const float levels[] = {0.0f, sdm_grid_contour(map->grid)};
     char title[80];
     describe_method(map, title);
     const sdm_picture_map column = {title, map->values, false};
@@ -178,9 +193,9 @@ sdm_status cli_write_map(const char *path, const cli_map *map, const cli_args *a
     case KIND_VDB:
         return write_vdb(path, map, args, err);
     case KIND_IMAGE:
-        // the method comes first: NIfTI files keep only 79 characters
+        // the parameters come last: NIfTI files keep only 79 characters
         describe_method(map, made);
-        snprintf(text, sizeof text, "sdmgen %s: %s: %s %s, mm, negative inside", SDM_VERSION_TEXT,
+        snprintf(text, sizeof text, "sdmgen %s: mm, negative inside; %s: %s %s", SDM_VERSION_TEXT,
                  made, map->shape, map->params);
         return sdm_image_write(path, map->grid, map->values, text, err);
     case KIND_SURFACE:

@@ -3,6 +3,7 @@
 
 #include "args/options.h"
 #include "sdm/blocks.h"
+#include "sdm/exact.h"
 #include "sdm/grid.h"
 #include "sdm/runtime.h"
 
@@ -20,6 +21,7 @@ typedef struct cli_map {
     const char *origin; /* "model CHECKSUM", or the method without a network: "exact", "edt" ... */
     sdm_reason reason;  /* why the exact engine replaced the network */
     const sdm_check *check; /* errors of the network's map; NULL: not checked */
+    sdm_exact *engine;      /* makes the same map on other grids; NULL: none */
 } cli_map;
 
 /* Checks, before any work, that the ending of the name is a known type; meshes_only: a known type

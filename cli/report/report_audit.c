@@ -1,29 +1,68 @@
 /* Prints the figures of a mesh audit. */
 #include "report_audit.h"
 
+#include <math.h>
 #include <stdio.h>
 
 #include "json_values.h"
 #include "terminal.h"
 
-void cli_print_audit(const sdm_audit *a)
+/* Parts in the table and in JSON, and notices about parts. */
+enum { ROWS = 20, JSON_PARTS = 1000, NOTICES = 3 };
+
+static const char *state_name(const sdm_part *p)
 {
+    static const char *const names[] = {[SDM_PART_SOLID] = "solid",
+                                        [SDM_PART_CAVITY] = "cavity",
+                                        [SDM_PART_INSIDE_OUT] = "inside out",
+                                        [SDM_PART_FLAT] = "flat",
+                                        [SDM_PART_OPEN] = "open"};
+    return names[p->state];
+}
+
+static void print_parts(const sdm_part_audit *a)
+{
+    printf("\nparts:\n  %-6s  %-9s  %-18s  %-10s  %-6s  %-8s  %-12s  %s\n", "number", "triangles",
+           "vertices", "state", "turned", "overlaps", "volume mm^3", "box mm");
+    for (size_t i = 0; i < a->n && i < ROWS; i++) {
+        const sdm_part *p = &a->part[i];
+        char range[48];
+        snprintf(range, sizeof range, "%zu .. %zu", p->first_vert, p->last_vert);
+        printf("  %-6zu  %-9zu  %-18s  %-10s  %-6s  %-8s  %-12.6g  %.6g %.6g %.6g .. %.6g %.6g "
+               "%.6g\n",
+               i + 1, p->n_tri, range, state_name(p), p->turned ? "yes" : "no",
+               p->met ? "yes" : "no", p->volume, p->min[0], p->min[1], p->min[2], p->max[0],
+               p->max[1], p->max[2]);
+    }
+    if (a->n > ROWS) printf("  and %zu more\n", a->n - ROWS);
+}
+
+void cli_print_audit(const sdm_part_audit *audit)
+{
+    const sdm_audit *a = &audit->mesh;
     printf("vertices             %zu\n", a->n_vert);
     printf("triangles            %zu\n", a->n_tri);
-    printf("components           %zu\n", a->components);
+    printf("parts                %zu\n", a->components);
     printf("closed               %s\n", a->closed ? "yes" : "no");
     printf("manifold             %s\n", a->manifold ? "yes" : "no");
     printf("inside out           %s\n", a->inverted ? "yes" : "no");
+    printf("parts inside out     %zu\n", audit->inside_out);
     printf("boundary edges       %zu\n", a->boundary_edges);
     printf("non-manifold edges   %zu\n", a->nonmanifold_edges);
     printf("misoriented edges    %zu\n", a->misoriented_edges);
     printf("degenerate triangles %zu\n", a->degenerate);
     printf("duplicate triangles  %zu\n", a->duplicate);
     printf("self-intersections   %zu\n", a->self_intersections);
-    printf("volume               %.6g mm^3\n", a->volume);
+    printf("volume               %.6g mm^3, the sum over all triangles: overlaps count twice\n",
+           a->volume);
     printf("area                 %.6g mm^2\n", a->area);
+    if (isfinite(audit->union_volume)) {
+        printf("volume of the union  %.6g mm^3\n", audit->union_volume);
+        printf("area of the union    %.6g mm^2\n", audit->union_area);
+    }
     printf("box                  %.6g %.6g %.6g .. %.6g %.6g %.6g mm\n", a->min[0], a->min[1],
            a->min[2], a->max[0], a->max[1], a->max[2]);
+    print_parts(audit);
 }
 
 void cli_json_audit(sdm_json *json, const sdm_audit *a)
@@ -46,6 +85,32 @@ void cli_json_audit(sdm_json *json, const sdm_audit *a)
     cli_json_reals(json, "max", a->max, 3);
 }
 
+void cli_json_parts(sdm_json *json, const sdm_part_audit *a)
+{
+    sdm_json_real(json, "union_volume_mm3", a->union_volume);
+    sdm_json_real(json, "union_area_mm2", a->union_area);
+    sdm_json_int(json, "parts_inside_out", (int64_t)a->inside_out);
+    sdm_json_open(json, "parts", '[');
+    for (size_t i = 0; i < a->n && i < JSON_PARTS; i++) {
+        const sdm_part *p = &a->part[i];
+        sdm_json_open(json, NULL, '{');
+        sdm_json_text(json, "state", state_name(p));
+        sdm_json_bool(json, "turned", p->turned);
+        sdm_json_int(json, "triangles", (int64_t)p->n_tri);
+        sdm_json_int(json, "first_triangle", (int64_t)p->first_tri);
+        sdm_json_int(json, "first_vertex", (int64_t)p->first_vert);
+        sdm_json_int(json, "last_vertex", (int64_t)p->last_vert);
+        sdm_json_int(json, "open_edges", (int64_t)p->open_edges);
+        sdm_json_int(json, "meets_others", (int64_t)p->met);
+        sdm_json_real(json, "volume_mm3", p->volume);
+        sdm_json_real(json, "area_mm2", p->area);
+        cli_json_reals(json, "min", p->min, 3);
+        cli_json_reals(json, "max", p->max, 3);
+        sdm_json_close(json, '}');
+    }
+    sdm_json_close(json, ']');
+}
+
 void cli_notice_audit(const sdm_audit *a)
 {
     if (a->boundary_edges > 0)
@@ -58,4 +123,45 @@ void cli_notice_audit(const sdm_audit *a)
         cli_notice("%zu edges with triangles of opposite orientation", a->misoriented_edges);
     if (a->degenerate > 0) cli_notice("%zu degenerate triangles", a->degenerate);
     if (a->duplicate > 0) cli_notice("%zu duplicate triangles", a->duplicate);
+}
+
+void cli_describe_part(const sdm_part_audit *a, size_t index, sdm_text *text)
+{
+    const sdm_part *p = &a->part[index];
+    sdm_text_add(text,
+                 "part %zu of %zu (%zu triangles, vertices %zu .. %zu, box %.4g %.4g %.4g .. %.4g "
+                 "%.4g %.4g mm) ",
+                 index + 1, a->n, p->n_tri, p->first_vert, p->last_vert, p->min[0], p->min[1],
+                 p->min[2], p->max[0], p->max[1], p->max[2]);
+    if (p->volume > 0)
+        sdm_text_add(text, "runs the other way than the rest, which is inside out: ");
+    else
+        sdm_text_add(text, "is inside out%s: ", p->met ? " and overlaps another" : "");
+    sdm_text_add(text, "it is subtracted from what it overlaps and is not solid itself");
+}
+
+void cli_notice_parts(const sdm_mesh *mesh, const char *mend)
+{
+    sdm_part_audit audit;
+    if (cli_is_quiet() || sdm_part_audit_make(mesh, false, &audit, NULL)) return;
+    size_t told = 0;
+    for (size_t i = 0; i < audit.n && told < NOTICES; i++) {
+        if (audit.part[i].state != SDM_PART_INSIDE_OUT) continue;
+        sdm_text text = {0};
+        cli_describe_part(&audit, i, &text);
+        if (!text.failed) cli_notice("%s; %s", text.data, mend);
+        sdm_text_dispose(&text);
+        told++;
+    }
+    if (audit.inside_out > told)
+        cli_notice("%zu more parts are inside out", audit.inside_out - told);
+    sdm_part_audit_dispose(&audit);
+}
+
+sdm_status cli_turn_parts(sdm_mesh *mesh, sdm_error *err)
+{
+    size_t n = 0;
+    const sdm_status s = sdm_mesh_turn_parts(mesh, &n, err);
+    if (!s) cli_notice("parts turned: %zu", n);
+    return s;
 }

@@ -34,11 +34,14 @@ static void format_time(char *buf, size_t size, double seconds)
                  (int)seconds % 60);
 }
 
-/* Formats a rate as "850", "18k" or "2.1M". */
+/* Formats a rate as "0.31", "8.5", "850", "18k" or "2.1M"; "-" when it is unknown. */
 static void format_rate(char buf[32], double rate)
 {
-    if (!(rate >= 0)) rate = 0;
-    if (rate < 9999.5)
+    if (!isfinite(rate))
+        snprintf(buf, 32, "-");
+    else if (rate < 9.95)
+        snprintf(buf, 32, "%.2g", rate);
+    else if (rate < 9999.5)
         snprintf(buf, 32, "%.0f", rate);
     else if (rate < 999.5e3)
         snprintf(buf, 32, "%.0fk", rate / 1e3);
@@ -46,22 +49,43 @@ static void format_rate(char buf[32], double rate)
         snprintf(buf, 32, "%.1fM", rate / 1e6);
 }
 
+/* "1:53 left  1,250 of 8,177 exact maps  61 maps/s" */
+static void format_maps(const sdm_progress *p, char *text, size_t size)
+{
+    char done[32], all[32], rate[32], left[32];
+    format_rate(rate, p->samples_per_second);
+    format_time(left, sizeof left, p->seconds_left);
+    snprintf(text, size, "%s left  %s of %s exact maps  %s maps/s", left,
+             cli_format_count(p->samples, done), cli_format_count(p->samples_at_start, all), rate);
+}
+
+/* "1:05 left  held-out 0.0123 mm (12 s ago)  18k maps/s  loss 3.1e-05 mm^2  step 1,200"; what
+   counts most comes first, for narrow terminals. */
+static void format_steps(const sdm_progress *p, char *text, size_t size)
+{
+    char step[32], loss[32] = "-", error[64] = "-", left[32], rate[32];
+    if (isfinite(p->loss)) snprintf(loss, sizeof loss, "%.1e mm^2", p->loss);
+    if (isfinite(p->heldout_rmse_mm))
+        snprintf(error, sizeof error, "%.4f mm (%.0f s ago)", p->heldout_rmse_mm,
+                 fmax(0, p->seconds - p->heldout_seconds));
+    format_rate(rate, p->samples_per_second);
+    format_time(left, sizeof left, p->seconds_left);
+    snprintf(text, size, "%s left  held-out %s  %s maps/s  loss %s  step %s", left, error, rate,
+             loss, cli_format_count(p->step, step));
+}
+
 static void on_progress(void *user, const sdm_progress *p)
 {
-    char count[32], loss[32] = "-", error[32] = "-", left[32], rate[32], text[256];
-    format_time(left, sizeof left, p->seconds_left);
-    if (p->phase == SDM_PHASE_DATA || p->phase == SDM_PHASE_BASES) {
-        snprintf(text, sizeof text, "%s exact maps  %s left", cli_format_count(p->samples, count),
-                 left);
-    } else {
-        if (isfinite(p->loss)) snprintf(loss, sizeof loss, "%.1e", p->loss);
-        if (isfinite(p->heldout_rmse_mm))
-            snprintf(error, sizeof error, "%.4f mm", p->heldout_rmse_mm);
-        format_rate(rate, p->samples_per_second);
-        snprintf(text, sizeof text, "step %s  loss %s  held-out %s  %s left  %s samples/s",
-                 cli_format_count(p->step, count), loss, error, left, rate);
-    }
-    cli_progress_show(user, phase_name(p->phase), p->fraction, text);
+    char text[256];
+    const bool makes_maps = p->phase == SDM_PHASE_DATA || p->phase == SDM_PHASE_BASES;
+    if (makes_maps)
+        format_maps(p, text, sizeof text);
+    else
+        format_steps(p, text, sizeof text);
+    // with a budget of steps the fraction of the budget is 0 until the first step
+    const double maps = (double)p->samples / fmax((double)p->samples_at_start, 1);
+    cli_progress_show(user, phase_name(p->phase),
+                      makes_maps && !(p->fraction > 0) ? maps : p->fraction, text);
 }
 
 static void on_message(void *user, const char *line)

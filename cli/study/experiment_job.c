@@ -47,9 +47,6 @@ static sdm_status job_open(const cli_experiment_run *run, size_t index, cli_expe
     if (s) return s;
     cli_map_maker *m = &job->maker;
     const sdm_param *params = sdm_instance_params(job->shape, &m->n_params);
-    if (m->n_params > SDM_MAX_PARAMS)
-        return sdm_fail(err, SDM_E_UNSUPPORTED, "%zu parameters, at most %d can be sampled",
-                        m->n_params, SDM_MAX_PARAMS);
     m->shape = job->shape;
     m->grid = job->config->grid;
     describe_grid(&m->grid, run->results[index].grid, sizeof run->results[index].grid);

@@ -111,7 +111,7 @@ sdm_status sdm_config_parse_placed(const char *name, const char *text, size_t si
     r.sections = sdm_config_sections(&r.n_sections);
     sdm_fields_set_defaults(&r);
     sdm_status s = read_all(&r, text ? text : "", size, overrides, places, n_overrides, err);
-    if (s) memset(out, 0, sizeof *out);
+    if (s && s != SDM_E_CONFIG) memset(out, 0, sizeof *out);
     return s;
 }
 

@@ -1,5 +1,5 @@
 /* Collects the mistakes in a configuration and prints them, one per line, sorted by position. */
-#include "mistakes.h"
+#include "sdm/internal/mistakes.h"
 
 #include <stdarg.h>
 #include <stdio.h>

@@ -2,7 +2,7 @@
  * allowed: one document without tags, anchors, aliases and directives. */
 #pragma once
 
-#include "mistakes.h"
+#include "sdm/internal/mistakes.h"
 
 #define SDM_TREE_BYTES_MAX ((size_t)1 << 20)
 #define SDM_TREE_DEPTH_MAX 32

@@ -264,3 +264,33 @@ sdm_status sdm_make_folder(const char *path, sdm_error *err)
     free(name);
     return s;
 }
+
+size_t sdm_folder_existing(const char *path)
+{
+    char *name = path_with_suffix(path, "");
+    size_t length = name ? strlen(name) : 0;
+    // without memory nothing counts as made
+    if (!name) return strlen(path);
+    while (length > 0) {
+        name[length] = '\0';
+        if (!access(name, F_OK)) break;
+        while (length > 0 && name[--length] != '/') {
+        }
+    }
+    free(name);
+    return length;
+}
+
+void sdm_folder_remove_empty(const char *path, size_t existing)
+{
+    char *name = path_with_suffix(path, "");
+    size_t length = name ? strlen(name) : 0;
+    while (length > existing) {
+        name[length] = '\0';
+        // an empty name between two slashes is no folder of its own
+        if (name[length - 1] != '/' && rmdir(name)) break;
+        while (length > 0 && name[--length] != '/') {
+        }
+    }
+    free(name);
+}

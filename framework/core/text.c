@@ -87,6 +87,16 @@ const char *sdm_format_real(double v, char buf[32])
     return buf;
 }
 
+sdm_status sdm_fail_range(const char *name, double value, double min, double max, const char *unit,
+                          sdm_error *err)
+{
+    char v[32], low[32], high[32];
+    const char *space = *unit ? " " : "";
+    return sdm_fail(err, SDM_E_RANGE, "parameter '%s' = %s%s%s, allowed %s .. %s%s%s", name,
+                    isnan(value) ? "nan" : sdm_format_real(value, v), space, unit,
+                    sdm_format_real(min, low), sdm_format_real(max, high), space, unit);
+}
+
 #define WORD_MAX 64
 
 static int smaller(int a, int b) { return a < b ? a : b; }
@@ -110,6 +120,27 @@ static int edit_distance(const char *a, const char *b)
         }
     }
     return row[n % 3][m];
+}
+
+const char *sdm_list_names(const char *const *names, size_t n, char *buf, size_t size)
+{
+    size_t used = 0;
+    if (size > 0) buf[0] = '\0';
+    for (size_t i = 0; i < n; i++) {
+        const bool fits = used + strlen(names[i]) + sizeof ", , ..." <= size;
+        const int length =
+            snprintf(buf + used, size - used, "%s%s", i ? ", " : "", fits ? names[i] : "...");
+        if (!fits || length < 0) break;
+        used += (size_t)length;
+    }
+    return buf;
+}
+
+bool sdm_is_name(const char *text)
+{
+    if (!text || !(text[0] >= 'a' && text[0] <= 'z')) return false;
+    const size_t n = strspn(text, "abcdefghijklmnopqrstuvwxyz0123456789_");
+    return !text[n] && n <= SDM_NAME_LENGTH_MAX;
 }
 
 const char *sdm_nearest_name(const char *word, const char *const *names, size_t n)

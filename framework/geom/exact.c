@@ -5,12 +5,11 @@
 #include <float.h>
 #include <string.h>
 
-#include "features/feature_side.h"
 #include "layers/layers.h"
 #include "map/grid_blocks.h"
 #include "map/grid_distance.h"
 #include "points/at_points.h"
-#include "points/wide_tree.h"
+#include "points/point_aids.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/threads.h"
 #include "sdm/internal/vec3.h"
@@ -33,6 +32,7 @@ struct sdm_exact {
     sdm_nearest nearest; // tree and features of `surface`
     sdm_sign sign;
     double rounding; // bound on the rounding error of the coordinates, mm
+    sdm_point_aids *aids;
     bool bounds;     // the surface bounds the solid: outside in front of it, inside behind it
 };
 
@@ -173,9 +173,7 @@ static sdm_status prepare(sdm_exact *e, const sdm_mesh *mesh, sdm_error *err)
     if (!s) s = make_surface(e, err);
     if (!s) s = check_pseudonormal(e, err);
     if (!s) s = build_nearest(e, err);
-    if (!s) s = sdm_wide_tree_build(&e->nearest.features, &e->arena, err);
-    if (!s && e->bounds && e->report.sign == SDM_SIGN_CROSSINGS)
-        s = sdm_feature_sides_build(&e->nearest, &e->arena, err);
+    if (!s) s = sdm_point_aids_create(&e->aids, err);
     if (!s) s = build_sign(e, err);
     if (s) return s;
     double largest = 0;
@@ -214,6 +212,7 @@ void sdm_exact_free(sdm_exact *e)
     sdm_mesh_dispose(&e->surface);
     sdm_free(e->source);
     sdm_sign_dispose(&e->sign);
+    sdm_point_aids_free(e->aids);
     sdm_arena_dispose(&e->arena);
     sdm_free(e);
 }
@@ -222,21 +221,24 @@ const sdm_exact_report *sdm_exact_get_report(const sdm_exact *e) { return &e->re
 const sdm_mesh *sdm_exact_surface(const sdm_exact *e) { return &e->surface; }
 const uint32_t *sdm_exact_source(const sdm_exact *e) { return e->source; }
 
-/* What the answers for points need; *opts: the options that remain for them. */
-static sdm_points_job points_job(const sdm_exact *e, const sdm_exact_opts *opts)
+/* What the answers for n points need; *opts: the options that remain for them. */
+static sdm_points_job points_job(const sdm_exact *e, const sdm_exact_opts *opts, size_t n)
 {
-    return (sdm_points_job){.surface = &e->nearest,
-                            .sign = &e->sign,
-                            .rounding = e->rounding,
-                            .seam = 16 * e->rounding + 2 * e->report.union_error_mm,
-                            .opts = opts};
+    const bool bounds = e->bounds && e->report.sign == SDM_SIGN_CROSSINGS;
+    return (sdm_points_job){
+        .surface = sdm_point_aids_use(e->aids, &e->nearest, bounds, opts->memory_limit, n),
+        .sign = &e->sign,
+        .rounding = e->rounding,
+        .seam = 16 * e->rounding + 2 * e->report.union_error_mm,
+        .opts = opts};
 }
 
 double sdm_exact_point(const sdm_exact *e, const double x[3], double closest[3], double normal[3],
                        uint32_t *triangle)
 {
     double d;
-    const sdm_points_job job = points_job(e, NULL);
+    const sdm_exact_opts opts = opts_beside(e, 0);
+    const sdm_points_job job = points_job(e, &opts, 1);
     sdm_point_find(&job, x, &(sdm_exact_at){&d, normal, closest, triangle}, 0);
     return d;
 }
@@ -248,13 +250,14 @@ sdm_status sdm_exact_points(const sdm_exact *e, const double *x, size_t n, const
         return sdm_fail(err, SDM_E_ARG,
                         "points without an engine, points or a place for the result");
     const sdm_exact_opts opts = opts_beside(e, 0);
-    const sdm_points_job job = points_job(e, &opts);
+    const sdm_points_job job = points_job(e, &opts, n);
     return sdm_points_find(&job, x, n, out, err);
 }
 
 double sdm_exact_distance(const sdm_exact *e, const double x[3])
 {
-    return sdm_point_distance(&e->nearest, x);
+    const sdm_exact_opts opts = opts_beside(e, 0);
+    return sdm_point_distance(points_job(e, &opts, 1).surface, x);
 }
 
 /* Fills values[] with the signed map and, if slot is not NULL, slot[] with the slot of the nearest

@@ -124,11 +124,8 @@ sdm_status sdm_instance_check(const sdm_instance *s, const double *p, sdm_error 
     for (size_t i = 0; i < s->n_params; i++) {
         const sdm_param *q = &s->params[i];
         if (p[i] >= q->min && p[i] <= q->max) continue; // a comparison with NaN is false
-        char value[32], min[32], max[32];
-        return sdm_fail(err, SDM_E_RANGE, "parameter '%s' of shape '%s' is %s%s%s, need %s .. %s",
-                        q->name, s->shape->name, sdm_format_real(p[i], value),
-                        q->unit[0] ? " " : "", q->unit, sdm_format_real(q->min, min),
-                        sdm_format_real(q->max, max));
+        sdm_fail_range(q->name, p[i], q->min, q->max, q->unit, err);
+        return sdm_fail_in(err, SDM_E_RANGE, "shape '%s'", s->shape->name);
     }
     return SDM_OK;
 }

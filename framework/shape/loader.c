@@ -7,11 +7,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
+#include "sdm/internal/file.h"
 #include "sdm/memory.h"
 #include "shape_internal.h"
 
 #define FILE_SHAPES_MAX 256
+#define FILE_BYTES_MAX (UINT64_C(1) << 28)
 
 static void object_close(void *object) { (void)dlclose(object); }
 
@@ -34,23 +37,40 @@ static sdm_status shapes_add_all(sdm_registry *r, sdm_plugin_entry plugin_shape,
     }
 }
 
-sdm_status sdm_registry_load(sdm_registry *r, const char *file, sdm_error *err)
+/* True when both files hold the same bytes; unreadable files do not. */
+static bool is_same_file(const char *a, const char *b)
 {
-    if (!r || !file || !file[0])
-        return sdm_fail(err, SDM_E_ARG, "registry and file are needed to load a plug-in");
+    if (!strcmp(a, b)) return true;
+    struct stat of_a, of_b;
+    if (stat(a, &of_a) || stat(b, &of_b) || of_a.st_size != of_b.st_size) return false;
+    if (of_a.st_dev == of_b.st_dev && of_a.st_ino == of_b.st_ino) return true;
+    uint8_t *bytes_a = NULL, *bytes_b = NULL;
+    size_t n_a, n_b;
+    const bool same = !sdm_file_read(a, FILE_BYTES_MAX, &bytes_a, &n_a, NULL) &&
+                      !sdm_file_read(b, FILE_BYTES_MAX, &bytes_b, &n_b, NULL) && n_a == n_b &&
+                      memcmp(bytes_a, bytes_b, n_a) == 0;
+    sdm_free(bytes_a);
+    sdm_free(bytes_b);
+    return same;
+}
 
-    // absolute path, because dlopen() searches the system's library folders for a bare name
-    char *path = realpath(file, NULL);
-    if (!path) return sdm_fail(err, SDM_E_PLUGIN, "plug-in %s: %s", file, strerror(errno));
+static bool is_loaded(const sdm_registry *r, const char *path)
+{
+    const char *kept;
+    for (size_t i = 0; (kept = sdm_registry_kept(r, i)); i++)
+        if (is_same_file(kept, path)) return true;
+    return false;
+}
+
+/* Loads the file at an absolute path and adds its shapes. */
+static sdm_status object_load(sdm_registry *r, const char *path, sdm_error *err)
+{
     void *object = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     if (!object) {
         const char *why = dlerror();
-        const sdm_status s = sdm_fail(err, SDM_E_PLUGIN, "plug-in %s cannot be loaded: %s", path,
-                                      why ? why : "unknown reason");
-        free(path);
-        return s;
+        return sdm_fail(err, SDM_E_PLUGIN, "plug-in %s cannot be loaded: %s", path,
+                        why ? why : "unknown reason");
     }
-
     // call the entry function for all shapes of the file
     sdm_plugin_entry plugin_shape = NULL;
     *(void **)&plugin_shape = dlsym(object, SDM_PLUGIN_SYMBOL);
@@ -60,12 +80,24 @@ sdm_status sdm_registry_load(sdm_registry *r, const char *file, sdm_error *err)
                                            "%s: exports no function " SDM_PLUGIN_SYMBOL
                                            "(): not a plug-in, or hidden by -fvisibility",
                                            path);
-    if (!s) s = sdm_registry_keep(r, object, object_close, err);
+    if (!s) s = sdm_registry_keep(r, path, object, object_close, err);
     if (s) {
         // add all shapes of a file or none
         sdm_registry_shrink(r, before);
         object_close(object);
     }
+    return s;
+}
+
+sdm_status sdm_registry_load(sdm_registry *r, const char *file, sdm_error *err)
+{
+    if (!r || !file || !file[0])
+        return sdm_fail(err, SDM_E_ARG, "registry and file are needed to load a plug-in");
+
+    // absolute path, because dlopen() searches the system's library folders for a bare name
+    char *path = realpath(file, NULL);
+    if (!path) return sdm_fail(err, SDM_E_PLUGIN, "plug-in %s: %s", file, strerror(errno));
+    const sdm_status s = is_loaded(r, path) ? SDM_OK : object_load(r, path, err);
     free(path);
     return s;
 }
@@ -76,7 +108,21 @@ static int is_shared_object(const struct dirent *e)
     return n > 3 && strcmp(e->d_name + n - 3, ".so") == 0;
 }
 
-/* Loads in alphabetical order, so that a name clash is reported in the same way on all systems. */
+/* Loads a file of a folder; if it cannot be loaded, the registry keeps the reason. */
+static sdm_status file_load_or_skip(sdm_registry *r, const char *folder, const char *name,
+                                    sdm_error *err)
+{
+    char file[PATH_MAX];
+    if (snprintf(file, sizeof file, "%s/%s", folder, name) >= (int)sizeof file)
+        return sdm_fail(err, SDM_E_PLUGIN, "plug-in folder %s: path too long", folder);
+    sdm_error why = {0};
+    const sdm_status s = sdm_registry_load(r, file, &why);
+    if (s == SDM_E_PLUGIN) return sdm_registry_skip(r, why.text, err);
+    return s ? sdm_fail(err, s, "%s", why.text) : SDM_OK;
+}
+
+/* Loads in alphabetical order, so that of two files with a shape of the same name the same one is
+ * skipped on all systems. */
 static sdm_status folder_load(sdm_registry *r, const char *folder, sdm_error *err)
 {
     struct dirent **list = NULL;
@@ -84,11 +130,7 @@ static sdm_status folder_load(sdm_registry *r, const char *folder, sdm_error *er
     if (n < 0) return sdm_fail(err, SDM_E_PLUGIN, "plug-in folder %s: %s", folder, strerror(errno));
     sdm_status s = SDM_OK;
     for (int i = 0; i < n; i++) {
-        char file[PATH_MAX];
-        const int length = snprintf(file, sizeof file, "%s/%s", folder, list[i]->d_name);
-        if (!s && length >= (int)sizeof file)
-            s = sdm_fail(err, SDM_E_PLUGIN, "plug-in folder %s: path too long", folder);
-        if (!s) s = sdm_registry_load(r, file, err);
+        if (!s) s = file_load_or_skip(r, folder, list[i]->d_name, err);
         free(list[i]);
     }
     free(list);

@@ -17,9 +17,9 @@ static sdm_status option_fail_unknown(const sdm_shape *shape, const char *name, 
     if (!shape->n_options)
         return sdm_fail(err, SDM_E_CONFIG, "shape '%s' has no option '%s': it has no options",
                         shape->name, name);
-    return sdm_fail(err, SDM_E_CONFIG,
-                    "shape '%s' has no option '%s'; 'sdmgen shapes %s' lists them", shape->name,
-                    name, shape->name);
+    char list[200];
+    return sdm_fail(err, SDM_E_CONFIG, "shape '%s' has no option '%s'; its options are %s",
+                    shape->name, name, sdm_list_names(names, shape->n_options, list, sizeof list));
 }
 
 /* The text given for option `name`, or NULL. */
@@ -148,5 +148,16 @@ sdm_status sdm_shape_parse_options(const sdm_shape *shape, const sdm_named_text 
         sdm_free(*text);
         *text = NULL;
     }
+    return s;
+}
+
+sdm_status sdm_shape_check_option(const sdm_shape *shape, const char *name, const char *value,
+                                  sdm_error *err)
+{
+    sdm_option_value values[SHAPE_OPTIONS_MAX];
+    char *text = NULL;
+    const sdm_named_text given = {name, value};
+    const sdm_status s = sdm_shape_parse_options(shape, &given, 1, NULL, values, &text, err);
+    sdm_free(text);
     return s;
 }

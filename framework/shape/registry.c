@@ -13,6 +13,7 @@ typedef struct entry {
 typedef struct loaded {
     void *object;
     void (*close)(void *object);
+    char *path;
 } loaded;
 
 struct sdm_registry {
@@ -21,6 +22,8 @@ struct sdm_registry {
     size_t count, capacity;
     loaded *objects; /* shared objects that the shapes come from */
     size_t n_objects;
+    char **skipped; /* messages of files that could not be loaded */
+    size_t n_skipped;
 };
 
 sdm_status sdm_registry_create(sdm_registry **out, sdm_error *err)
@@ -41,20 +44,54 @@ void sdm_registry_free(sdm_registry *r)
 {
     if (!r) return;
     sdm_registry_shrink(r, 0);
-    for (size_t i = r->n_objects; i-- > 0;) r->objects[i].close(r->objects[i].object);
+    for (size_t i = r->n_objects; i-- > 0;) {
+        r->objects[i].close(r->objects[i].object);
+        sdm_free(r->objects[i].path);
+    }
+    for (size_t i = 0; i < r->n_skipped; i++) sdm_free(r->skipped[i]);
+    sdm_free((void *)r->skipped);
     sdm_free(r->objects);
     sdm_free(r->entries);
     sdm_free(r);
 }
 
-sdm_status sdm_registry_keep(sdm_registry *r, void *object, void (*close)(void *object),
-                             sdm_error *err)
+/* *out = a copy of the text, to be freed with sdm_free(). */
+static sdm_status copy_text(const char *text, char **out, sdm_error *err)
 {
-    const sdm_status s = sdm_grow((void **)&r->objects, r->n_objects, r->n_objects + 1,
-                                  sizeof *r->objects, "plug-ins", err);
-    if (s) return s;
-    r->objects[r->n_objects++] = (loaded){object, close};
-    return SDM_OK;
+    const sdm_status s = SDM_ALLOC(out, strlen(text) + 1, "text", err);
+    if (!s) strcpy(*out, text);
+    return s;
+}
+
+sdm_status sdm_registry_keep(sdm_registry *r, const char *path, void *object,
+                             void (*close)(void *object), sdm_error *err)
+{
+    char *copy = NULL;
+    sdm_status s = sdm_grow((void **)&r->objects, r->n_objects, r->n_objects + 1,
+                            sizeof *r->objects, "plug-ins", err);
+    if (!s) s = copy_text(path, &copy, err);
+    if (!s) r->objects[r->n_objects++] = (loaded){object, close, copy};
+    return s;
+}
+
+const char *sdm_registry_kept(const sdm_registry *r, size_t index)
+{
+    return index < r->n_objects ? r->objects[index].path : NULL;
+}
+
+sdm_status sdm_registry_skip(sdm_registry *r, const char *message, sdm_error *err)
+{
+    char *copy = NULL;
+    sdm_status s = sdm_grow((void **)&r->skipped, r->n_skipped, r->n_skipped + 1,
+                            sizeof *r->skipped, "plug-ins", err);
+    if (!s) s = copy_text(message, &copy, err);
+    if (!s) r->skipped[r->n_skipped++] = copy;
+    return s;
+}
+
+const char *sdm_registry_skipped(const sdm_registry *r, size_t index)
+{
+    return r && index < r->n_skipped ? r->skipped[index] : NULL;
 }
 
 static sdm_status registry_make_room(sdm_registry *r, sdm_error *err)
@@ -86,12 +123,11 @@ sdm_status sdm_registry_add(sdm_registry *r, const sdm_shape *shape, const char 
     entry *e = NULL;
     s = SDM_ALLOC(&e, 1, "shape", err);
     if (s) return s;
-    s = SDM_ALLOC(&e->origin, strlen(origin) + 1, "origin of a shape", err);
+    s = copy_text(origin, &e->origin, err);
     if (s) {
         sdm_free(e);
         return s;
     }
-    strcpy(e->origin, origin);
     e->shape = checked;
     r->entries[r->count++] = e;
     return SDM_OK;

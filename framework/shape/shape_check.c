@@ -4,19 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "sdm/internal/text.h"
 #include "shape_internal.h"
-
-static bool is_name(const char *s)
-{
-    if (!s || !(s[0] >= 'a' && s[0] <= 'z')) return false;
-    size_t n = 0;
-    for (; s[n] && n <= SHAPE_NAME_MAX; n++)
-        if (!((s[n] >= 'a' && s[n] <= 'z') || (s[n] >= '0' && s[n] <= '9') || s[n] == '_'))
-            return false;
-    return n <= SHAPE_NAME_MAX;
-}
-
-#define NAME_RULE "names are a small letter, then small letters, digits and _, at most 63 in all"
 
 static sdm_status range_check(const char *who, const char *what, const char *name, double min,
                               double max, double def, sdm_error *err)
@@ -43,8 +32,8 @@ sdm_status sdm_shape_check_params(const char *who, const sdm_param *params, uint
                         (unsigned)n);
     for (uint32_t i = 0; i < n; i++) {
         const sdm_param *p = &params[i];
-        if (!is_name(p->name))
-            return sdm_fail(err, SDM_E_PLUGIN, "%s: parameter %u has the name '%s': " NAME_RULE,
+        if (!sdm_is_name(p->name))
+            return sdm_fail(err, SDM_E_PLUGIN, "%s: parameter %u has the name '%s': " SDM_NAME_RULE,
                             who, (unsigned)i + 1, p->name ? p->name : "(none)");
         for (uint32_t j = 0; j < i; j++)
             if (strcmp(params[j].name, p->name) == 0)
@@ -68,7 +57,7 @@ static sdm_status choices_check(const char *who, const sdm_option *o, sdm_error 
     size_t count = 0;
     for (const char *word = all;;) {
         const size_t n = strcspn(word, "|");
-        bool bad = n == 0 || n > SHAPE_NAME_MAX || ++count > SHAPE_OPTIONS_MAX;
+        bool bad = n == 0 || n > SDM_NAME_LENGTH_MAX || ++count > SHAPE_OPTIONS_MAX;
         for (const char *before = all; before < word && !bad; before += strcspn(before, "|") + 1)
             bad = strcspn(before, "|") == n && memcmp(before, word, n) == 0;
         if (bad)
@@ -113,9 +102,9 @@ static sdm_status options_check(const char *who, const sdm_option *options, uint
                         (unsigned)n);
     for (uint32_t i = 0; i < n; i++) {
         const sdm_option *o = &options[i];
-        if (!is_name(o->name))
-            return sdm_fail(err, SDM_E_PLUGIN, "%s: option %u has the name '%s': " NAME_RULE, who,
-                            (unsigned)i + 1, o->name ? o->name : "(none)");
+        if (!sdm_is_name(o->name))
+            return sdm_fail(err, SDM_E_PLUGIN, "%s: option %u has the name '%s': " SDM_NAME_RULE,
+                            who, (unsigned)i + 1, o->name ? o->name : "(none)");
         for (uint32_t j = 0; j < i; j++)
             if (strcmp(options[j].name, o->name) == 0)
                 return sdm_fail(err, SDM_E_PLUGIN, "%s: two options are named '%s'", who, o->name);
@@ -164,8 +153,8 @@ sdm_status sdm_shape_copy_checked(const sdm_shape *table, const char *origin, sd
     memcpy(out, (const void *)table, whole < sizeof *out ? whole : sizeof *out);
     out->size = (uint32_t)sizeof *out;
 
-    if (!is_name(out->name))
-        return sdm_fail(err, SDM_E_PLUGIN, "%s: shape of the name '%s': " NAME_RULE, origin,
+    if (!sdm_is_name(out->name))
+        return sdm_fail(err, SDM_E_PLUGIN, "%s: shape of the name '%s': " SDM_NAME_RULE, origin,
                         out->name ? out->name : "(none)");
     char who[1200];
     snprintf(who, sizeof who, "%.1000s: shape '%s'", origin, out->name);

@@ -4,7 +4,6 @@
 #include "sdm/mesh.h"
 #include "sdm/registry.h"
 
-#define SHAPE_NAME_MAX 63
 #define SHAPE_PARAMS_MAX 64
 #define SHAPE_OPTIONS_MAX 64
 
@@ -22,10 +21,17 @@ sdm_status sdm_shape_check_params(const char *who, const sdm_param *params, uint
 /* registry.c: removes the shapes from index `count` on. */
 void sdm_registry_shrink(sdm_registry *r, size_t count);
 
-/* registry.c: makes sdm_registry_free() call close(object), where `object` is a shared object that
-   holds shapes of the registry. SDM_E_NOMEM; then the caller still owns the object. */
-sdm_status sdm_registry_keep(sdm_registry *r, void *object, void (*close)(void *object),
-                             sdm_error *err);
+/* registry.c: makes sdm_registry_free() call close(object), where `object` is a shared object from
+   the file `path` that holds shapes of the registry. SDM_E_NOMEM; then the caller still owns the
+   object. */
+sdm_status sdm_registry_keep(sdm_registry *r, const char *path, void *object,
+                             void (*close)(void *object), sdm_error *err);
+
+/* registry.c: path number `index` of those given to sdm_registry_keep(); NULL: there are fewer. */
+const char *sdm_registry_kept(const sdm_registry *r, size_t index);
+
+/* registry.c: adds a message to those of sdm_registry_skipped(). SDM_E_NOMEM. */
+sdm_status sdm_registry_skip(sdm_registry *r, const char *message, sdm_error *err);
 
 /* options.c: converts the given texts to values[shape->n_options]; the texts of the values are
  * stored in the new block *text, which the caller frees with sdm_free(). SDM_E_ARG, SDM_E_CONFIG,
@@ -53,6 +59,11 @@ void sdm_host_call_end(host_call *c);
  * short, else `otherwise`. */
 sdm_status sdm_host_call_failed(const host_call *c, const char *callback, int returned,
                                 sdm_status otherwise, sdm_error *err);
+
+/* velocity.c: sdm_instance_velocity() by differences of meshes, whatever callbacks the shape has.
+ */
+sdm_status sdm_velocity_by_differences(const sdm_instance *s, const double *p, size_t n_vert,
+                                       double *velocity, sdm_error *err);
 
 struct sdm_instance {
     const sdm_shape *shape;

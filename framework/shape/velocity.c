@@ -46,10 +46,10 @@ static sdm_status moved_vertices_add(const sdm_instance *s, const double *p, siz
     return SDM_OK;
 }
 
-/* Uses finite differences of second order: central, or at the end of a range one-sided, with the
-   parameter at p, p + h and p + 2 h. The weights are computed from these values after rounding. */
-static sdm_status velocity_by_differences(const sdm_instance *s, const double *p, size_t n_vert,
-                                          double *velocity, sdm_error *err)
+/* Central differences, or at the end of a range one-sided ones of second order with the parameter
+   at p, p + h and p + 2 h. The weights are computed from these values after rounding. */
+sdm_status sdm_velocity_by_differences(const sdm_instance *s, const double *p, size_t n_vert,
+                                       double *velocity, sdm_error *err)
 {
     sdm_mesh mesh = {0};
     sdm_status status = SDM_OK;
@@ -88,5 +88,5 @@ sdm_status sdm_instance_velocity(const sdm_instance *s, const double *p, size_t 
             err, SDM_E_ARG,
             "the address of the velocities must not be NULL, and the number of vertices not 0");
     return s->shape->velocity ? velocity_by_callback(s, p, n_vert, velocity, err)
-                              : velocity_by_differences(s, p, n_vert, velocity, err);
+                              : sdm_velocity_by_differences(s, p, n_vert, velocity, err);
 }

@@ -8,6 +8,7 @@
 #include "check_results.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/model_threads.h"
+#include "sdm/internal/text.h"
 #include "sdm/internal/threads.h"
 
 /* Number of maps in a slice of a batch. It is fixed, so that the arithmetic of a map does not
@@ -65,11 +66,10 @@ static sdm_status check_options(const sdm_model *m, const sdm_generate_opts *o, 
 
 static sdm_status refuse_param(const sdm_model_param *p, double value, sdm_error *err)
 {
-    return sdm_fail(err, SDM_E_RANGE, "%s = %.9g %s, need %.9g to %.9g%s", p->name, value, p->unit,
-                    p->min, p->max,
-                    isfinite(value)
-                        ? " (the range the network was trained on); other policies: clamp, exact"
-                        : "");
+    sdm_fail_range(p->name, value, p->min, p->max, p->unit, err);
+    if (!isfinite(value)) return SDM_E_RANGE; // no policy accepts it
+    return sdm_fail_in(err, SDM_E_RANGE,
+                       "outside the trained range (see the policies clamp, exact)");
 }
 
 /* Checks params[n_params]. used[n_params] (may be NULL) = parameters for the network: clamped to

@@ -113,7 +113,7 @@ static sdm_status check_jumps(const sdm_band *b, double width, sdm_error *err)
 }
 
 /* Sets one row of values: inside the grid those of the map, cut off at the border if out->cut;
-   outside, the distance from the faces. */
+   outside, the distance from the faces; faces == NULL: the values outside are there. */
 static void close_row(const sdm_grid *g, const float *values, double width, int64_t j, int64_t k,
                       sdm_faces *faces, sdm_band *out)
 {
@@ -123,13 +123,29 @@ static void close_row(const sdm_grid *g, const float *values, double width, int6
         float *v = &out->values[at(out->n, i, j, k)];
         bool inside = true;
         for (int a = 0; a < 3; a++) inside = inside && p[a] >= 0 && p[a] < g->n[a];
-        if (!inside)
+        if (!inside && faces) {
             *v = (float)sdm_faces_distance(faces, p, width);
+            out->estimated += (double)*v < width;
+        } else if (!inside)
+            continue; // the padding is the map
         else if (out->cut)
             *v = fmaxf(values[at(g->n, p[0], p[1], p[2])], box_distance(g, p[0], p[1], p[2]));
         else
             *v = values[at(g->n, p[0], p[1], p[2])];
     }
+}
+
+/* Fills the padded box with the map that opts->map() makes there. */
+static sdm_status map_padding(const sdm_grid *g, const sdm_vdb_opts *opts, sdm_band *out,
+                              sdm_error *err)
+{
+    const double first[3] = {-out->pad, -out->pad, -out->pad};
+    sdm_grid padded = *g;
+    sdm_grid_world(g, first, padded.origin);
+    for (int a = 0; a < 3; a++) padded.n[a] = out->n[a];
+    const sdm_status s = opts->map(opts->user, &padded, out->values, err);
+    if (s) return s;
+    return check_finite(&padded, out->values, err);
 }
 
 sdm_status sdm_band_close(const sdm_grid *g, const float *values, double width,
@@ -142,13 +158,15 @@ sdm_status sdm_band_close(const sdm_grid *g, const float *values, double width,
     sdm_faces faces = {0};
     s = band_reserve(g, (double)low < width ? (int32_t)ceil(width / g->spacing[0]) + 1 : 0, out,
                      err);
-    if (!s && out->pad) s = sdm_faces_create(g, values, &faces, err);
     out->cut = low < 0;
+    const bool by_map = out->pad && !out->cut && opts->map;
+    if (!s && by_map) s = map_padding(g, opts, out, err);
+    if (!s && out->pad && !by_map) s = sdm_faces_create(g, values, &faces, err);
     for (int64_t k = 0; k < out->n[2] && !s; k++) {
         if (opts->cancelled && opts->cancelled(opts->user))
             s = sdm_fail(err, SDM_E_CANCELLED, "level set stopped on request");
         for (int64_t j = 0; j < out->n[1] && !s; j++)
-            close_row(g, values, width, j, k, &faces, out);
+            close_row(g, values, width, j, k, by_map ? NULL : &faces, out);
     }
     sdm_faces_dispose(&faces);
     return s ? s : check_jumps(out, width, err);

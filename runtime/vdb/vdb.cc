@@ -273,6 +273,7 @@ Grid::Ptr make_level_set(const sdm_grid &g, const float *values, const sdm_vdb_o
     owned_band box;
     need(sdm_band_close(&g, values, background, &o, &box.band, err));
     report.cut = box.band.cut;
+    report.estimated_voxels = box.band.estimated;
     Grid::Ptr grid = grid_of(transform, box.band, background, false, o.half);
     mend_creases(*grid, o, report, err);
     return grid;

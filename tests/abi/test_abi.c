@@ -388,12 +388,50 @@ static void test_example_plugin_works(void **state)
     assert_true(fabs(v[0] - 1) < 1e-8 && fabs(v[3] + 1) < 1e-8 && fabs(v[1]) < 1e-8);
     sdm_mesh_dispose(&m);
     sdm_instance_free(s);
-    assert_int_equal(sdm_registry_load_path(registry, PLUGIN_FOLDER "/good", &err),
-                     SDM_E_PLUGIN); // the name is already in use
-    error_contains("shape 'octahedron' is there already (/");
 }
 
-// Files of a folder are loaded in alphabetical order; files that do not end in .so are ignored.
+/* Copies a file and appends `extra` bytes. */
+static void file_copy(const char *from, const char *to, size_t extra)
+{
+    FILE *in = fopen(from, "rb"), *out = fopen(to, "wb");
+    assert_true(in && out);
+    for (int c; (c = getc(in)) != EOF;) putc(c, out);
+    for (size_t i = 0; i < extra; i++) putc(0, out);
+    fclose(in);
+    fclose(out);
+}
+
+// A file under the same name, through a link or as a copy is the same; another file with a shape of
+// the same name is a mistake, in a folder of the path one that is skipped.
+static void test_same_file_is_loaded_once(void **state)
+{
+    (void)state;
+    static const char *const FILE_NAME = PLUGIN_FOLDER "/good/octahedron.so";
+    mkdir("test_abi_copies", 0777);
+    assert_int_equal(symlink(FILE_NAME, "test_abi_copies/link.so"), 0);
+    file_copy(FILE_NAME, "test_abi_copies/copy.so", 0);
+    file_copy(FILE_NAME, "test_abi_copies/other.so", 8); // bytes after its sections do no harm
+    assert_int_equal(sdm_registry_load(registry, FILE_NAME, &err), SDM_OK);
+    assert_int_equal(sdm_registry_load(registry, FILE_NAME, &err), SDM_OK);
+    assert_int_equal(sdm_registry_load(registry, "test_abi_copies/link.so", &err), SDM_OK);
+    assert_int_equal(sdm_registry_load(registry, "test_abi_copies/copy.so", &err), SDM_OK);
+    assert_int_equal(sdm_registry_count(registry), 1);
+    assert_int_equal(sdm_registry_load(registry, "test_abi_copies/other.so", &err), SDM_E_PLUGIN);
+    error_contains("shape 'octahedron' is there already (/");
+    assert_null(sdm_registry_skipped(registry, 0));
+    assert_int_equal(sdm_registry_load_path(registry, "test_abi_copies", &err), SDM_OK);
+    assert_int_equal(sdm_registry_count(registry), 1);
+    assert_non_null(
+        strstr(sdm_registry_skipped(registry, 0), "test_abi_copies/other.so: shape 'oc"));
+    assert_null(sdm_registry_skipped(registry, 1));
+    remove("test_abi_copies/link.so");
+    remove("test_abi_copies/copy.so");
+    remove("test_abi_copies/other.so");
+    rmdir("test_abi_copies");
+}
+
+// Files of a folder are loaded in alphabetical order, those that cannot be loaded are skipped;
+// files that do not end in .so are ignored.
 static void test_folder_is_loaded_in_order(void **state)
 {
     (void)state;
@@ -401,8 +439,11 @@ static void test_folder_is_loaded_in_order(void **state)
     file_write("test_abi_folder/b.so", "b", 1);
     file_write("test_abi_folder/a.so", "a", 1);
     file_write("test_abi_folder/readme.txt", "c", 1);
-    assert_int_equal(sdm_registry_load_path(registry, "test_abi_folder", &err), SDM_E_PLUGIN);
-    error_contains("test_abi_folder/a.so cannot be loaded");
+    assert_int_equal(sdm_registry_load_path(registry, "test_abi_folder", &err), SDM_OK);
+    assert_non_null(strstr(sdm_registry_skipped(registry, 0), "folder/a.so cannot be loaded"));
+    assert_non_null(strstr(sdm_registry_skipped(registry, 1), "folder/b.so cannot be loaded"));
+    assert_null(sdm_registry_skipped(registry, 2));
+    assert_null(sdm_registry_skipped(NULL, 0));
     remove("test_abi_folder/a.so");
     remove("test_abi_folder/b.so");
     assert_int_equal(sdm_registry_load_path(registry, "test_abi_folder", &err), SDM_OK);
@@ -422,6 +463,7 @@ int main(void)
         WITH_REGISTRY(test_bad_plugins_are_refused),
         WITH_REGISTRY(test_other_files_are_refused),
         WITH_REGISTRY(test_example_plugin_works),
+        WITH_REGISTRY(test_same_file_is_loaded_once),
         WITH_REGISTRY(test_folder_is_loaded_in_order),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

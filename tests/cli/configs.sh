@@ -5,7 +5,7 @@
 
 for config in "$source_folder"/configs/*.yaml; do
     if grep -q '^methods:' "$config"; then continue; fi # tested in experiment.sh
-    expect 0 - sdmgen config "$config"
+    expect 0 - sdmgen config "$config" -q # some grids cut a few shapes: shapes_check.sh has the notice
     has 'no mistakes$'
     expect 0 - sdmgen config "$config" --dump
     cp out resolved.yaml
@@ -21,6 +21,18 @@ expect 0 - sdmgen config --keys
 has 'network\.depth'
 expect 0 - sdmgen config --keys --markdown
 has '^\|.*network\.depth'
+
+# A grid that is fitted to the shapes: one notice, and the numbers in the resolved configuration, which gives the same grid again.
+printf 'shape: {name: torus}\ntrain: {steps: 1}\n' >fitted.yaml
+expect 0 '^sdmgen: grid: size: \[60, 60, 22\], spacing: 0.21, origin: \[.*over the ranges the shape reaches from' sdmgen config fitted.yaml --dump
+has '^  size: \[60, 60, 22\]$'
+grep -q voxels: out && bad 'voxels beside the numbers of a fitted grid'
+cp out resolved.yaml
+expect 0 - sdmgen config resolved.yaml --dump
+cmp -s out resolved.yaml || bad 'a fitted grid does not read back'
+expect 0 - sdmgen config "$cochlea" grid=auto grid.voxels=40 --dump --quiet
+has '^  size: \[40, '
+expect 2 "^argument 'grid.size=\[4,4,4\]': grid: size does not determine a grid; give size and spacing" sdmgen config fitted.yaml 'grid.size=[4,4,4]'
 
 # Distributions are checked against the parameters of the shape and their ranges.
 statistical=$source_folder/configs/statistical.yaml
@@ -76,4 +88,53 @@ expect 2 "^option\.yaml:1:[0-9]+: .*'eer'" sdmgen config option.yaml
 # shellcheck disable=SC2059
 printf "$base" 'cochlea, ranges: {a: [1, 9]}' >range.yaml
 expect 2 '^range\.yaml:1:[0-9]+: .*a' sdmgen config range.yaml
+
+# All mistakes in one run: in the keys of the file and in options, ranges and distributions of the shape; the same by train.
+cat >all.yaml <<'END'
+shape:
+  name: cochlea
+  options:
+    eer: left
+    start: square
+    edge: 0.3
+    zzzz: 1
+  ranges:
+    a: [1, 9]
+    alpha: [0.1, 0.2]
+    qqqqqq: [0, 1]
+  distribution: {b: normal, c: normal}
+grid: {size: [8, 8, 8], spacing: 1}
+train: {steps: 5}
+END
+sed '/eer:/d;/start:/d;/zzzz/d' all.yaml >ranges.yaml
+sdmgen config ranges.yaml >out 2>err
+[ "$?,$(wc -l <err)" = 2,3 ] || bad "three mistakes in ranges and distributions: $(cat err)"
+grep -Eq "^ranges\.yaml:6:[0-9]+: range \[1, 9\] of 'a' must lie within" err || bad "no line for a: $(cat err)"
+grep -Eq "^ranges\.yaml:8:[0-9]+: shape 'cochlea' has no parameter 'qqqqqq'; its parameters are a, alpha, b, phi" err ||
+    bad "no line for qqqqqq: $(cat err)"
+grep -Eq "^ranges\.yaml:9:[0-9]+: shape 'cochlea' has no parameter 'c'" err || bad "no line for c: $(cat err)"
+sed 's/cochlea/torus/;/start:/d;s/eer: left/edge: 9/;/edge: 0.3/d' all.yaml >torus.yaml # a shape without create(): options and ranges together
+sdmgen config torus.yaml network.width=wide >out 2>err
+cat >expected <<'END'
+^argument 'network\.width=wide': .*width
+^torus\.yaml:4:5: shape 'torus': option 'edge' is 9 mm, need 0\.02 \.\. 1$
+^torus\.yaml:5:5: shape 'torus' has no option 'zzzz'; its options are edge$
+^torus\.yaml:7:5: shape 'torus' has no parameter 'a'; its parameters are major, minor$
+^torus\.yaml:8:5: shape 'torus' has no parameter 'alpha'
+^torus\.yaml:9:5: shape 'torus' has no parameter 'qqqqqq'
+^torus\.yaml:10:[0-9]+: shape 'torus' has no parameter 'b'
+^torus\.yaml:10:[0-9]+: shape 'torus' has no parameter 'c'
+END
+[ "$(wc -l <err)" -eq 8 ] || bad "eight mistakes: $(cat err)"
+paste -d '\n' expected err | while read -r pattern && read -r line; do
+    [[ $line =~ $pattern ]] || echo "'$line' does not match '$pattern'"
+done >wrong
+[ -s wrong ] && bad "$(cat wrong)"
+cp err config.err
+sdmgen train torus.yaml network.width=wide --out never >out 2>err
+[ $? -eq 2 ] && cmp -s err config.err || bad "train must report the same mistakes: $(cat err)"
+absent never
+sdmgen config all.yaml >out 2>err # the cochlea has other parameters with other options: those first
+[ "$?,$(wc -l <err)" = 2,3 ] || bad "three mistakes in options: $(cat err)"
+grep -Eq "^all\.yaml:5:[0-9]+: shape 'cochlea': option 'start' is 'square'" err || bad "no line for start: $(cat err)"
 finish

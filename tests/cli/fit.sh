@@ -104,6 +104,9 @@ awk -v d="$(json dice)" 'BEGIN { exit !(d > 0.95) }' || bad "another turn was fo
 expect 0 'no start pose is given.*20.*-30.*10' sdmgen fit $fit ct.nii.gz --turns-sphere 3 --spacing 0.5 --json
 awk -v d="$(json evidence)" 'BEGIN { exit !(d > 0) }' || bad "evidence $(json evidence)"
 
+sdmgen fit $fit label.nrrd --label 1 --spacing 0.8 --max-iterations 1 >out 2>err
+grep -Eq '^sdmgen: no start rotation is given: 60 rotations are tried about the middle of the labels, 20, -30, ' err || bad "no word about the rotations: $(cat err)"
+
 # Unknowns that are kept do not change. First a prior so narrow that the image has no influence: estimates stay at the middle of the ranges.
 sdmgen fit $fit ct.nii.gz $near_truth --prior-sd 0.0001 --json >out 2>err
 has '"not_determined": \["rx", "ry", "rz"\]'
@@ -260,7 +263,7 @@ expect 2 'no voxel of the image lies near the shape' sdmgen fit $fit ct.nii.gz -
 expect 2 'no voxel of the image lies near .*its middle at 90, ' sdmgen fit --shape cochlea ct.nii.gz --rotation 0,0,0 --start-centre 90,0,0 -o no.stl
 expect 2 'all [0-9]+ voxels of the image near the shape .*cavity' sdmgen fit $fit ct.nii.gz $near_truth --inside 600,2000 --outside 9000,10 --cavity 0.5 -o no.stl
 expect 2 "did you mean 'rx'" sdmgen fit $fit ct.nii.gz -p rc=3
-expect 5 'rx = 9, allowed' sdmgen fit $fit ct.nii.gz -p rx=9 -o no.stl
+expect 5 "parameter 'rx' = 9 mm, allowed [0-9.]+ \.\. [0-9.]+ mm\$" sdmgen fit $fit ct.nii.gz -p rx=9 -o no.stl
 expect 0 'start parameters were clamped to their range' sdmgen fit $fit ct.nii.gz $near_truth -p rx=9 --policy clamp --json
 [ "$(json start_clamped)" = true ] || bad 'a start that was moved must be marked'
 absent no.stl no.vdb no.json no.png no.nrrd no.nii no.txt no.npy

@@ -14,7 +14,7 @@ has 'no mistakes$'
 expect 0 - sdmgen mesh --shape gear -p angle=0.1 --audit --plugin $plugin
 has '^closed +yes'
 has '^self-intersections +0$'
-expect 5 "parameter 'angle' of shape 'gear' is 0\.2 rad" sdmgen mesh --shape gear -O teeth=20 -p angle=0.2 --audit --plugin $plugin
+expect 5 "shape 'gear': parameter 'angle' = 0\.2 rad, allowed " sdmgen mesh --shape gear -O teeth=20 -p angle=0.2 --audit --plugin $plugin
 expect 2 "option 'teeth' is 3, need 6 \.\. 100" sdmgen mesh --shape gear -O teeth=3 --audit --plugin $plugin
 
 expect 2 "unknown shape 'gear'; .* --plugin FILE" sdmgen config "$config"

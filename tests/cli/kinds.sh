@@ -17,7 +17,7 @@ for kind in sdmnn deepsdf imnet template; do
     expect 0 - sdmgen train base.yaml network.kind=$kind $small --out $kind --json --quiet
     model=$kind/model.sdm
     present $model $kind/loss.png $kind/slices.png $kind/config.yaml
-    expect 0 - sdmgen config $kind/config.yaml
+    expect 0 - sdmgen config $kind/config.yaml -q
     expect 0 - sdmgen info $model
     has "$kind"
     sdmgen verify $model --quiet --samples 4 >out 2>err

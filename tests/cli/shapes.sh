@@ -43,7 +43,7 @@ expect 0 - sdmgen mesh --shape cochlea -p a=3 -p phi=-0.2 --json
 small=$(json volume_mm3)
 expect 0 - sdmgen mesh --shape cochlea -p a=5 -p phi=-0.2 --json
 awk -v s="$small" -v l="$(json volume_mm3)" 'BEGIN { exit !(l > s && s > 0) }' || bad 'a larger a must give a larger cochlea'
-expect 2 'shape NAME is needed' sdmgen mesh -o t.ply
+expect 2 'either --shape NAME or --mesh FILE is needed' sdmgen mesh -o t.ply
 expect 2 'an output is needed' sdmgen mesh --shape torus
 expect 2 "unknown parameter 'alhpa'; did you mean 'alpha'\?" sdmgen mesh --shape cochlea -p alhpa=1 -o x.ply
 expect 2 "parameter a: 'wide' is not a number" sdmgen mesh --shape cochlea -p a=wide -o x.ply
@@ -62,4 +62,18 @@ absent x.ply x.vdb nowhere
 echo 'not a library' >false.so
 expect 3 'false\.so' sdmgen shapes --plugin ./false.so
 expect 3 'missing\.so' sdmgen shapes --plugin ./missing.so
+
+# Folders of plug-ins: a file given twice is one; one that cannot be loaded is skipped unless its shape is asked for.
+good=$(realpath ../../plugins/good)
+mkdir path && cp "$good/octahedron.so" path/copy.so && cp false.so path/broken.so
+export SDMGEN_PLUGIN_PATH=$good:$PWD/path
+expect 0 'skipped a file in SDMGEN_PLUGIN_PATH: plug-in .*/broken\.so cannot be loaded: ' sdmgen shapes octahedron --plugin path/copy.so
+has '^  radius '
+expect 0 - sdmgen shapes octahedron --quiet
+expect 2 "unknown shape 'broken'; plug-in .*/path/broken\.so cannot be loaded: " sdmgen shapes broken --quiet
+expect 2 "unknown shape 'cube'; sdmgen shapes lists" sdmgen shapes cube --quiet
+printf '        ' >>path/copy.so # another file; --plugin comes before the path
+SDMGEN_PLUGIN_PATH=$good expect 0 "octahedron\.so: shape 'octahedron' is there already \(.*/copy\.so\)" sdmgen shapes octahedron --plugin path/copy.so
+SDMGEN_PLUGIN_PATH=$PWD/none expect 3 'plug-in folder .*/none: No such file' sdmgen shapes
+unset SDMGEN_PLUGIN_PATH
 finish

@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
 # sdmgen train: the run folder and its protection, interrupt and resume. The tests of models use the run made here.
-# Tests: cmd_train.c train_progress.c
+# Tests: cmd_train.c report_verdict.c train_progress.c
 . "$(dirname "$0")/common.sh"
 tiny=$source_folder/tests/cli/tiny.yaml
 
-# interrupted FOLDER CONFIG [KEY=VALUE ...]: starts a training and stops it after its first steps.
+# interrupted FOLDER CONFIG [KEY=VALUE ...]: starts a training and stops it after 500 steps.
 interrupted() {
     local folder=$1 pid code
     shift
     "$program" train "$@" train.steps=1000000000 --out "$folder" >out 2>err &
     pid=$!
-    for _ in $(seq 600); do [ -s "$folder/metrics.jsonl" ] && break || sleep 0.1; done
+    for _ in $(seq 600); do grep -qs '"step": 500,' "$folder/metrics.jsonl" && break || sleep 0.1; done
     kill -TERM $pid
     wait $pid
     code=$?
@@ -25,6 +25,11 @@ present run/config.yaml run/metrics.jsonl run/model.sdm run/loss.png run/slices.
 [ "$(json model)" = run/model.sdm ] || bad "model: $(json model)"
 awk -v s="$(json seconds)" -v m="$(json mse_mm2)" 'BEGIN { exit !(s > 0 && m > 0 && m < 1) }' || bad "seconds, mse_mm2: $(cat out)"
 
+# The verdict: in the JSON, and in a line of metrics.jsonl behind the errors from the first step on.
+has '"verdict": \{"grade": "(good|usable|poor)", .*"bases_mm2": [0-9.e-]+, .*"key": "[a-z.]+", .*"sentence": "[^"]+: (raise|lower|set) '
+head -n 1 run/metrics.jsonl | grep -q '^{"phase": "fit", "step": 0, .*"heldout_mse_mm2": [0-9]' || bad 'no error before the first step'
+tail -n 1 run/metrics.jsonl | grep -q '^{"phase": "verdict", "grade": ' || bad 'no verdict in metrics.jsonl'
+
 # A finished run is not overwritten.
 before=$(cksum <run/model.sdm)
 expect 2 'run holds a trained model and no checkpoint to continue from' sdmgen train "$tiny" --out run
@@ -32,12 +37,37 @@ expect 2 'run holds a trained model and no checkpoint to continue from' sdmgen t
 expect 2 'exclude each other' sdmgen train "$tiny" --out run --resume --force
 [ "$before" = "$(cksum <run/model.sdm)" ] || bad 'the model has changed'
 
+# A refused training leaves no folder that it has made, an empty one that was there stays.
+mkdir -p there/already
+expect 2 'data.memory_gb' sdmgen train "$tiny" --out there/already/new/run data.memory_gb=0.001 'grid.size=[60,60,60]'
+absent there/already/new
+expect 2 'data.memory_gb' sdmgen train "$tiny" --out there/already data.memory_gb=0.001 'grid.size=[60,60,60]'
+[ -d there/already ] || bad 'a folder that was there has been removed'
+
+# A budget of time that the maps alone exceed: told in one line, and the advice is more time.
+sdmgen train "$tiny" --out hurried train.steps=0 train.minutes=0.0001 data.start=400 >out 2>err || bad "hurried: $(cat err)"
+grep -q '^sdmgen: the run took [0-9]* s longer than train.minutes: ' err || [ "$(sed -n 's/^  trained *\([0-9]*\).*/\1/p' out)" = 0 ] ||
+    bad "no word about the time: $(cat err)"
+has '^  (good|usable|poor) '
+has '^  error from  bases +[0-9.]+ mm +[0-9]+ %  '
+has '^  verdict     .*(raise|lower|set) '
+
 # Pictures that cannot be written do not make the training fail.
 mkdir -p unpictured/loss.png unpictured/slices.png
 sdmgen train "$tiny" --out unpictured >out 2>err || bad "without pictures: $(cat err)"
 [ "$(grep -c '/\(loss\|slices\).png: cannot write' err)" -eq 2 ] || bad "no word about the pictures: $(cat err)"
 present unpictured/model.sdm
 absent unpictured/checkpoint.sdmc
+
+# A grid that is fitted to the shapes: an interrupted run goes on with the same one, and the model has its numbers.
+interrupted fitted "$tiny" grid.voxels=16
+grep -q '^sdmgen: grid: size: \[16, ' err || bad "no word of the fitted grid: $(cat err)"
+grep -q '^  size: \[16, ' fitted/config.yaml || bad 'the run does not have the numbers of the fitted grid'
+expect 2 "has 'size: .16, 16, 11.', this configuration 'size: .20, 19, 13.'" sdmgen train "$tiny" grid.voxels=20 train.steps=1000000000 --out fitted --resume --quiet
+expect 2 'is at step' sdmgen train "$tiny" grid.voxels=16 --out fitted --resume --quiet
+expect 0 - sdmgen train "$tiny" grid.voxels=16 --out fitted --resume --quiet train.steps=$(($(sed -n 's/.* is at step \([0-9]*\).*/\1/p' err) + 20))
+expect 0 - sdmgen info fitted/model.sdm
+has '16 x 1'
 
 # An open mesh is reported before the training, a closed one is not.
 faces=$(sed -n 's/^element face //p;/^end_header/q' "$source_folder/configs/statistical/mean.ply")
@@ -47,8 +77,8 @@ for mean in "$PWD/open.ply" "$source_folder/configs/statistical/mean.ply"; do
         modes: $source_folder/configs/statistical/modes.npy}}" train.steps=1 --force --out modes >out 2>"err-$(basename "$mean")" ||
         bad "a statistical shape: $(cat err-*)"
 done
-grep -q '^sdmgen: the mesh is open: 3 boundary edges' err-open.ply || bad "no word of the open mesh: $(cat err-open.ply)"
-grep -q 'the mesh' err-mean.ply && bad "a word of a closed mesh: $(cat err-mean.ply)"
+grep -q '^sdmgen: open or badly oriented edges in all 35 shapes, up to 3 at ' err-open.ply || bad "no word of the open mesh: $(cat err-open.ply)"
+grep -q 'edges' err-mean.ply && bad "a word of a closed mesh: $(cat err-mean.ply)"
 
 expect 0 - sdmgen info modes/model.sdm
 has '^parameters +m1 .* default 0, normal, mean 0, deviation 1$'
@@ -68,7 +98,7 @@ cp "$tiny" other.yaml
 expect 0 - sdmgen train other.yaml --out other --quiet
 cmp -s run/model.sdm other/model.sdm || bad 'the bits of a model depend on the name of its folder'
 cmp -s run/config.yaml other/config.yaml || bad 'config.yaml depends on the name of its folder'
-expect 0 - sdmgen config run/config.yaml
+expect 0 'the grid covers .* and cuts 12 % of the shapes' sdmgen config run/config.yaml
 
 # The script ./run asks before it replaces a model of another configuration.
 mkdir -p clone/.ci clone/configs clone/build/release/cli clone/runs
@@ -115,8 +145,8 @@ expect 2 'is at step' "${run[@]}" train.steps=1
 steps=$(($(sed 's/.* is at step \([0-9]*\).*/\1/' err) + 20))
 cp -r moved $'m\xf6ved'
 expect 2 '^config\.yaml:.*UTF-8' sdmgen train $'m\xf6ved/conf/statistical.yaml' --out never
-absent never/config.yaml
-rm -r never $'m\xf6ved'
+absent never
+rm -r $'m\xf6ved'
 deviations=moved/conf/statistical/deviations.npy
 cp $deviations kept.npy
 { head -c 128 kept.npy && tail -c 32 kept.npy && tail -c 64 kept.npy | head -c 32; } >$deviations # swap the halves: values 5 to 8, then 1 to 4

@@ -156,6 +156,34 @@ static void numbers_and_names_are_parsed(void **state)
     assert_string_equal(sdm_nearest_name("dpeth", names, 3), "depth");
     assert_string_equal(sdm_nearest_name("withd", names, 3), "width");
     assert_null(sdm_nearest_name("colour", names, 3));
+
+    // lists of names, cut to the room
+    char list[64];
+    assert_string_equal(sdm_list_names(names, 3, list, sizeof list), "depth, width, rank");
+    assert_string_equal(sdm_list_names(names, 3, list, 16), "depth, ...");
+    assert_string_equal(sdm_list_names(names, 0, list, sizeof list), "");
+
+    // names of shapes, parameters and options
+    assert_true(sdm_is_name("a") && sdm_is_name("a_1"));
+    char longest[65] = "a";
+    memset(longest, 'z', 63);
+    assert_true(sdm_is_name(longest));
+    longest[63] = 'z';
+    assert_false(sdm_is_name(longest));
+    static const char *const no_names[] = {NULL, "", "A", "1a", "_a", "a-b", "a b", "\xc3\xa9"};
+    for (size_t k = 0; k < sizeof no_names / sizeof *no_names; k++)
+        assert_false(sdm_is_name(no_names[k]));
+}
+
+static void range_mistakes_have_one_text(void **state)
+{
+    (void)state;
+    sdm_error err = {0};
+    assert_int_equal(sdm_fail_range("a", 9.5, 2, 5, "mm", &err), SDM_E_RANGE);
+    assert_string_equal(err.text, "parameter 'a' = 9.5 mm, allowed 2 .. 5 mm");
+    sdm_fail_range("b", NAN, -1, 0.25, "", &err);
+    assert_string_equal(err.text, "parameter 'b' = nan, allowed -1 .. 0.25");
+    assert_int_equal(sdm_fail_range("b", INFINITY, -1, 0.25, "", NULL), SDM_E_RANGE);
 }
 
 static void json_text_is_escaped(void **state)
@@ -322,6 +350,7 @@ int main(void)
         cmocka_unit_test(random_numbers_have_their_distribution),
         cmocka_unit_test(crc_known_answer),
         cmocka_unit_test(numbers_and_names_are_parsed),
+        cmocka_unit_test(range_mistakes_have_one_text),
         cmocka_unit_test(json_text_is_escaped),
         cmocka_unit_test(files_are_written_whole_or_not),
         cmocka_unit_test(thread_counts_are_limited),

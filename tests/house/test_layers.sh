@@ -38,17 +38,18 @@ check() {
     function own(part, list,   n, p, i) { n = split(list, p, " "); for (i = 1; i <= n; i++) owner[p[i] ".h"] = part }
     BEGIN {
         own("core", "blocks export grid memory pose shape status") # shape: types alone
-        own("core", "block_border checksum clock distribution envelope file heap mat3 processor rng rotation shared table team text threads vec3")
-        own("config", "config experiment")
+         own("core", "block_border checksum clock distribution envelope file heap mat3 near processor rng rotation sampling shared table team text threads vec3")
+         own("config", "config experiment mistakes")
         own("geom", "exact isosurface mesh")
-        own("geom", "brute_force builder methods")
+        own("geom", "brute_force builder methods part_audit")
         own("nn", "model")
         own("nn", "container kernels model_threads pod point_network sdmnn template")
         own("io", "image meshfile npy picture volume")
-        own("shape", "registry")
+        own("shape", "registry shape_box shape_survey")
         own("shapes", "builtin_shapes")
         own("runtime", "check fit map phantom runtime vdb")
-        own("trainer", "train")
+         own("all", "sdmgen") # the header that includes all public ones
+         own("trainer", "train verdict")
         parts("core", "core")
         parts("config", "core config")
         parts("geom", "core geom")
@@ -57,6 +58,7 @@ check() {
         parts("shape", "core geom io shape")
         parts("shapes", "core geom shape shapes")
         parts("runtime", "core geom nn io shape runtime")
+        parts("all", "core geom nn io shape shapes runtime all")
         parts("trainer", "core config geom nn io shape trainer")
         parts("cli", "core config geom nn io shape shapes runtime trainer cli")
         rooms("framework/geom/", "memory simd exactly mesh solid features map sign layers points methods .")
@@ -64,7 +66,7 @@ check() {
         rooms("framework/io/", ". mesh image picture")
         rooms("runtime/", "maps phantom fit/data fit/solver fit/start fit/trust fit vdb")
         rooms("trainer/", "numerics data state pod template direct .")
-        rooms("cli/", "args report inputs phantom fit study .")
+        rooms("cli/", "args report inputs shapes phantom fit study .")
         rooms("framework/core/", "."); rooms("framework/config/", "."); rooms("framework/shape/", "."); rooms("shapes/", ".")
         while ((getline line < files) > 0) {
             exists[line] = 1
@@ -111,7 +113,7 @@ check() {
         if (name ~ /^dlfcn\.h$/ && part != "shape") wrong(name " outside of framework/shape")
         if (is_header(FILENAME) && !quoted && name !~ /^(std(arg|bool|def|int)|pthread|math)\.h$/) wrong(name " in a header between parts")
     }
-    function owner_folder(part) { return part ~ /^(runtime|trainer|shapes)$/ ? part "/" : "framework/" }
+    function owner_folder(part) { return part == "all" ? "runtime/" : part ~ /^(runtime|trainer|shapes)$/ ? part "/" : "framework/" }
     ' $(grep -E '\.(c|cc|h|inc)$' "$work/files"))
 }
 
@@ -169,6 +171,7 @@ must_find framework/include/sdm/grid.h '#include "sdm/internal/heap.h"'
 must_find framework/include/sdm/exact.h '#include <omp.h>'
 must_find framework/include/sdm/unlisted.h '/* a header without a place */'
 must_find framework/shape/new.c '#include "sdm/runtime.h"'
+must_find runtime/maps/generate.c '#include "sdm/sdmgen.h"'
 must_find runtime/maps/generate.c '#include "sdm/internal/train.h"'
 must_find runtime/maps/generate.c '#include "sdm/builtin_shapes.h"'
 must_find runtime/maps/generate.c '#include <openvdb/openvdb.h>'

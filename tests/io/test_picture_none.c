@@ -20,13 +20,14 @@ static void test_pictures_are_refused(void **state)
     const sdm_picture_map map = {"a", &value, false};
     const sdm_picture_surface surface = {0};
     const sdm_curve curve = {"a", &x, &x, 1};
-    for (int i = 0; i < 5; i++) {
+    for (int i = 0; i < 6; i++) {
         sdm_error err = {0};
         const sdm_status s =
             i == 0   ? sdm_picture_slices("a.png", &grid, &map, 1, NULL, 0, &err)
             : i == 1 ? sdm_picture_overlay("a.png", &grid, &value, &map, 1, "", &err)
             : i == 2 ? sdm_picture_surfaces("a.png", &surface, 1, "", &err)
-            : i == 3 ? sdm_picture_plot("a.png", "", "", "", false, &curve, 1, &err)
+            : i == 3 ? sdm_picture_gallery("a.png", &surface, 1, "", &err)
+            : i == 4 ? sdm_picture_plot("a.png", "", "", "", false, &curve, 1, &err)
                      : sdm_picture_check("a.png", &err);
         assert_int_equal(s, SDM_E_UNSUPPORTED);
         assert_non_null(strstr(err.text, "a.png"));

@@ -70,6 +70,38 @@ static void test_hidden_parts_colours_and_scale(void **state)
     free(p[1].rgb);
 }
 
+/* Five surfaces stand in two rows of three columns: the coloured fifth is below the middle of the
+ * first row. It is a square of 10 mm, whose oblique view is half as high as wide. */
+static void test_gallery(void **state)
+{
+    (void)state;
+    sdm_error err;
+    sdm_mesh m = {0};
+    double values[4], none[4] = {0, 0, 0, 0};
+    square_append(&m, values, 5, 0, 1);
+    sdm_picture_surface s[17];
+    for (size_t k = 0; k < 17; k++) s[k] = (sdm_picture_surface){"x", &m, k == 4 ? values : none};
+    if (sdm_picture_gallery("test_gallery.png", s, 5, "distance", &err)) fail_msg("%s", err.text);
+    const picture p = read_png("test_gallery.png");
+    double n = 0, sum_x = 0, sum_y = 0;
+    for (int y = 0; y < p.h - 70; y++) // without the colour bars
+        for (int x = 0; x < p.w; x++) {
+            const unsigned char *c = p.rgb + 3 * ((size_t)y * (size_t)p.w + (size_t)x);
+            if (!(c[0] > c[1] + 20 && c[2] > c[1] + 10)) continue;
+            n++;
+            sum_x += x;
+            sum_y += y;
+        }
+    const double pixels = 400 / (10 * (0.5 * sqrt(3) + 0.5));
+    assert_true(fabs(n / (50 * pixels * pixels) - 1) < 0.03);
+    assert_true(fabs(sum_x / n - 0.5 * p.w) < 3);
+    assert_true(sum_y / n > 0.55 * p.h && sum_y / n < 0.85 * p.h);
+    free(p.rgb);
+    assert_int_equal(sdm_picture_gallery("a.png", s, 17, "", &err), SDM_E_ARG);
+    assert_int_equal(sdm_picture_gallery("a.png", s, 0, "", &err), SDM_E_ARG);
+    sdm_mesh_dispose(&m);
+}
+
 static void test_wrong_arguments_are_refused(void **state)
 {
     (void)state;
@@ -99,6 +131,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_hidden_parts_colours_and_scale),
+        cmocka_unit_test(test_gallery),
         cmocka_unit_test(test_wrong_arguments_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -91,7 +91,7 @@ static void test_bad_arguments_and_cancellation(void **state)
     fit_refused(SDM_E_ARG, "no voxel of the image", &t, &o);
     o = near_start();
     o.start_params = (const double[3]){2, 2, 9};
-    fit_refused(SDM_E_RANGE, "start of rz = 9", &t, &o);
+    fit_refused(SDM_E_RANGE, "start: parameter 'rz' = 9", &t, &o);
     o = near_start();
     o.max_iterations = 1;
     fit_refused(SDM_E_QUALITY, "not converged after 1 iterations", &t, &o);

@@ -210,7 +210,7 @@ static void test_policies_out_of_range(void **state)
     sdm_error err;
     const double p[] = {1.7, 0.5}, edge[] = {1.5, 0.5}, wild[] = {2.1, 0.5};
     assert_int_equal(sdm_generate(s->model, p, NULL, values, &result, &err), SDM_E_RANGE);
-    assert_non_null(strstr(err.text, "radius = 1.7 mm, need 1 to 1.5"));
+    assert_non_null(strstr(err.text, "parameter 'radius' = 1.7 mm, allowed 1 .. 1.5 mm"));
     const sdm_generate_opts clamp = {.policy = SDM_RANGE_CLAMP},
                             exact = {.policy = SDM_RANGE_EXACT, .exact_shape = s->shape};
     assert_int_equal(sdm_generate(s->model, p, &clamp, values, &result, &err), SDM_OK);
@@ -231,7 +231,7 @@ static void test_policies_out_of_range(void **state)
         for (int i = 0; i < 3; i++) {
             const double q[] = {1.2, bad[i]};
             assert_int_equal(sdm_generate(s->model, q, &o, values, &result, &err), SDM_E_RANGE);
-            assert_non_null(strstr(err.text, "bulge = "));
+            assert_non_null(strstr(err.text, "parameter 'bulge' = "));
         }
     }
 }
@@ -429,11 +429,13 @@ static void test_batch_has_same_bits_for_threads(void **state)
     p[2 * 40 + 1] = 5;
     assert_int_equal(sdm_generate_batch(s->model, p, BATCH, NULL, again, results, &err),
                      SDM_E_RANGE);
-    assert_non_null(strstr(err.text, "map 5 of 53: radius"));
+    assert_non_null(strstr(err.text, "map 5 of 53: outside the trained range"));
+    assert_non_null(strstr(err.text, "parameter 'radius' = "));
     p[2 * 5] = p[2 * 16] = p[2 * 52] = 1.2;
     assert_int_equal(sdm_generate_batch(s->model, p, BATCH, NULL, again, results, &err),
                      SDM_E_RANGE);
-    assert_non_null(strstr(err.text, "map 40 of 53: bulge"));
+    assert_non_null(strstr(err.text, "map 40 of 53: outside the trained range"));
+    assert_non_null(strstr(err.text, "parameter 'bulge' = 5"));
     for (size_t i = 0; i < bytes / sizeof *again; i++) assert_true(again[i] == 0);
     assert_int_equal(sdm_generate_batch(s->model, NULL, 0, NULL, NULL, NULL, &err), SDM_OK);
     free(first);

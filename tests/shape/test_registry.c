@@ -350,7 +350,7 @@ static void test_option_text_is_parsed(void **state)
     static const char *const BAD[][3] = {
         {"levle", "1", "shape 'tetra' has no option 'levle'; did you mean 'level'?"},
         {"elephant", "1",
-         "shape 'tetra' has no option 'elephant'; 'sdmgen shapes tetra' lists them"},
+         "shape 'tetra' has no option 'elephant'; its options are mode, level, count, data"},
         {"mode", "god", "option 'mode' is 'god'; did you mean 'good'?"},
         {"mode", "xyzxyzxyz", "option 'mode' is 'xyzxyzxyz', need one of good|nan"},
         {"mode", "", "option 'mode' is '', need one of"},
@@ -390,9 +390,9 @@ static void test_parameters_must_be_in_range(void **state)
         double v[24], d;
         const double x[3] = {0};
         assert_int_equal(sdm_instance_check(s, bad[i], &err), SDM_E_RANGE);
-        err_has(i == 2 || i == 4 ? "parameter 'shift' of shape 'tetra' is "
-                                 : "parameter 'size' of shape 'tetra' is ");
-        err_has(i == 2 || i == 4 ? "need -1 .. 1" : "need 1 .. 3");
+        err_has(i == 2 || i == 4 ? "shape 'tetra': parameter 'shift' = "
+                                 : "shape 'tetra': parameter 'size' = ");
+        err_has(i == 2 || i == 4 ? "mm, allowed -1 .. 1 mm" : "mm, allowed 1 .. 3 mm");
         assert_int_equal(sdm_instance_mesh(s, bad[i], &m, &err), SDM_E_RANGE);
         assert_int_equal(sdm_instance_velocity(s, bad[i], 4, v, &err), SDM_E_RANGE);
         assert_int_equal(sdm_instance_distance(s, bad[i], x, &d, &err), SDM_E_RANGE);
@@ -400,9 +400,9 @@ static void test_parameters_must_be_in_range(void **state)
     }
     assert_int_equal(sdm_instance_check(s, bad[0], &err), SDM_E_RANGE);
     // A difference of one unit in the last place is detected, and all digits are printed.
-    err_has("is 0.9999999999999999 mm, need");
+    err_has("= 0.9999999999999999 mm, allowed");
     assert_int_equal(sdm_instance_check(s, bad[3], &err), SDM_E_RANGE);
-    err_has("is nan mm");
+    err_has("= nan mm");
     assert_int_equal(sdm_instance_check(s, NULL, &err), SDM_E_ARG);
     assert_int_equal(sdm_instance_param_index(s, "shift"), 1);
     assert_int_equal(sdm_instance_param_index(s, "shit"), -1);

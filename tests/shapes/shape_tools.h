@@ -77,7 +77,7 @@ static void random_params(const sdm_instance *s, double *p)
 
 // The velocity callback of the shape against the registry's finite differences, which are used when
 // the callback is missing.
-static void velocity_check(const char *shape, const char *options, int rounds, double bound)
+static inline void velocity_check(const char *shape, const char *options, int rounds, double bound)
 {
     sdm_instance *s = shape_make(shape, options);
     sdm_shape without = *sdm_instance_shape(s);

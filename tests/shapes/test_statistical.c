@@ -154,7 +154,7 @@ static void test_count_and_limit(void **state)
     const double p[2] = {0, 1.6};
     assert_int_equal(sdm_instance_check(s, p, &err), SDM_E_RANGE);
     assert_string_equal(err.text,
-                        "parameter 'm2' of shape 'statistical' is 1.6 sd, need -1.5 .. 1.5");
+                        "shape 'statistical': parameter 'm2' = 1.6 sd, allowed -1.5 .. 1.5 sd");
     sdm_instance_free(s);
 }
 

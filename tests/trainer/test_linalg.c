@@ -12,6 +12,7 @@
 
 #include "numerics/linalg.h"
 #include "sdm/internal/rng.h"
+#include "sdm/internal/sampling.h"
 #include "sdm/internal/team.h"
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"

@@ -15,6 +15,7 @@
 #include "data/error_model.h"
 #include "data/sample_plan.h"
 #include "data/streams.h"
+#include "sdm/internal/sampling.h"
 #include "train_tools.h"
 
 static double uniform(size_t i, double low, double high)

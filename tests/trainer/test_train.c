@@ -17,6 +17,7 @@
 
 #include "data/dataset_fill.h"
 #include "sdm/internal/pod.h"
+#include "sdm/internal/sampling.h"
 #include "train_tools.h"
 
 static const char base[] =

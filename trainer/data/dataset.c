@@ -86,6 +86,12 @@ sample_space trainer_dataset_space(const dataset *d)
                           .seed = d->seed};
 }
 
+double trainer_dataset_voxel(const dataset *d)
+{
+    const double *spacing = d->grid->spacing;
+    return fmin(fmin(spacing[0], spacing[1]), spacing[2]);
+}
+
 size_t trainer_dataset_slot(const dataset *d, size_t index)
 {
     return d->n_static + index % d->n_ring;
@@ -101,6 +107,18 @@ sdm_status trainer_dataset_first_slots(size_t n, size_t **slots, sdm_error *err)
 size_t trainer_dataset_random_slots(const dataset *d)
 {
     return d->n_taken < d->n_ring ? d->n_taken : d->n_ring;
+}
+
+size_t trainer_dataset_measured(const dataset *d)
+{
+    const size_t random = trainer_dataset_random_slots(d), n = random ? random : d->n_static;
+    return n < d->n_holdout ? n : d->n_holdout;
+}
+
+size_t trainer_dataset_measured_slot(const dataset *d, size_t i)
+{
+    const size_t random = trainer_dataset_random_slots(d), n = random ? random : d->n_static;
+    return (random ? d->n_static : 0) + i * n / trainer_dataset_measured(d);
 }
 
 size_t trainer_dataset_draw(const dataset *d, uint64_t stream, double share, size_t batch,

@@ -56,6 +56,9 @@ void trainer_dataset_dispose(dataset *d);
 /* The parameter space of the random samples; its pointers refer to d. */
 sample_space trainer_dataset_space(const dataset *d);
 
+/* Smallest distance between neighbouring voxels of the exact maps, mm. */
+double trainer_dataset_voxel(const dataset *d);
+
 /* Number of slots that hold a random map. */
 size_t trainer_dataset_random_slots(const dataset *d);
 
@@ -64,6 +67,12 @@ size_t trainer_dataset_slot(const dataset *d, size_t index);
 
 /* *slots = new array {0, 1, .. n - 1}; free with sdm_free(). */
 sdm_status trainer_dataset_first_slots(size_t n, size_t **slots, sdm_error *err);
+
+/* Number of maps of the pool on which errors are measured for comparison with those on the held-out
+   maps, and the slot of the i-th: random maps, evenly spread, as many as there are held-out ones;
+   without random maps, those of the static grid. */
+size_t trainer_dataset_measured(const dataset *d);
+size_t trainer_dataset_measured_slot(const dataset *d, size_t i);
 
 /* Random slot for row i of the batch of `step`, from the counter-based numbers of `stream`. The
    first share * batch rows come from the static grid, the others from the random maps. */

@@ -3,6 +3,7 @@
 
 #include <stdatomic.h>
 
+#include "sdm/internal/sampling.h"
 #include "sdm/internal/threads.h"
 #include "streams.h"
 #include "workbench.h"

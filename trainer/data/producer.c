@@ -4,6 +4,7 @@
 #include <pthread.h>
 #include <string.h>
 
+#include "sdm/internal/sampling.h"
 #include "sdm/memory.h"
 #include "streams.h"
 #include "workbench.h"

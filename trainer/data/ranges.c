@@ -6,50 +6,55 @@
 #include "sdm/internal/text.h"
 #include "sdm/internal/train.h"
 
-/* *index = the parameter of this name. SDM_E_CONFIG with the place `mark` and the most similar
- * name. */
-static sdm_status find_param(const sdm_config *config, const sdm_instance *shape, const char *name,
-                             sdm_mark mark, size_t *index, sdm_error *err)
+/* *index = the parameter of this name; false, with a mistake at `mark`: there is none. */
+static bool find_param(const sdm_instance *shape, const char *name, sdm_mark mark, size_t *index,
+                       sdm_mistakes *m)
 {
     const int i = sdm_instance_param_index(shape, name);
-    if (i >= 0) {
-        *index = (size_t)i;
-        return SDM_OK;
-    }
-    char where[1200];
+    *index = i < 0 ? 0 : (size_t)i;
+    if (i >= 0) return true;
     const char *names[SDM_MAX_PARAMS];
+    char list[200];
     size_t n;
     const sdm_param *params = sdm_instance_params(shape, &n);
-    for (size_t k = 0; k < n && k < SDM_MAX_PARAMS; k++) names[k] = params[k].name;
-    const char *near = sdm_nearest_name(name, names, n < SDM_MAX_PARAMS ? n : SDM_MAX_PARAMS);
-    return sdm_fail(err, SDM_E_CONFIG, "%s: shape '%s' has no parameter '%s'%s%s%s",
-                    sdm_config_where(config, mark, where), sdm_instance_shape(shape)->name, name,
-                    near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
+    if (n > SDM_MAX_PARAMS) n = SDM_MAX_PARAMS;
+    for (size_t k = 0; k < n; k++) names[k] = params[k].name;
+    const char *near = sdm_nearest_name(name, names, n);
+    sdm_mistakes_add(m, mark, "shape '%s' has no parameter '%s'; %s%s%s",
+                     sdm_instance_shape(shape)->name, name,
+                     near ? "did you mean '" : "its parameters are ",
+                     near ? near : sdm_list_names(names, n, list, sizeof list), near ? "'?" : "");
+    return false;
+}
+
+/* As sdm_train_ranges(), but adds mistakes to *m. */
+static void find_ranges(const sdm_config *config, const sdm_instance *shape, double *min,
+                        double *max, sdm_mistakes *m)
+{
+    size_t n;
+    const sdm_param *params = sdm_instance_params(shape, &n);
+    for (size_t i = 0; i < n; i++) min[i] = params[i].min, max[i] = params[i].max;
+    for (size_t r = 0; r < config->shape.n_ranges; r++) {
+        const sdm_config_range *range = &config->shape.ranges[r];
+        size_t i = 0;
+        if (!find_param(shape, range->name, range->mark, &i, m)) continue;
+        // narrowing is allowed, widening is not
+        if (range->min >= params[i].min && range->max <= params[i].max && range->min < range->max)
+            min[i] = range->min, max[i] = range->max;
+        else
+            sdm_mistakes_add(m, range->mark,
+                             "range [%g, %g] of '%s' must lie within [%g, %g] of shape '%s'",
+                             range->min, range->max, range->name, params[i].min, params[i].max,
+                             sdm_instance_shape(shape)->name);
+    }
 }
 
 sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape, double *min,
                             double *max, sdm_error *err)
 {
-    size_t n;
-    const sdm_param *params = sdm_instance_params(shape, &n);
-    char where[1200];
-    for (size_t i = 0; i < n; i++) min[i] = params[i].min, max[i] = params[i].max;
-    for (size_t r = 0; r < config->shape.n_ranges; r++) {
-        const sdm_config_range *range = &config->shape.ranges[r];
-        size_t i = 0;
-        const sdm_status s = find_param(config, shape, range->name, range->mark, &i, err);
-        if (s) return s;
-        // narrowing is allowed, widening is not
-        if (!(range->min >= params[i].min && range->max <= params[i].max &&
-              range->min < range->max))
-            return sdm_fail(err, SDM_E_CONFIG,
-                            "%s: range [%g, %g] of '%s' must lie within [%g, %g] of shape '%s'",
-                            sdm_config_where(config, range->mark, where), range->min, range->max,
-                            range->name, params[i].min, params[i].max,
-                            sdm_instance_shape(shape)->name);
-        min[i] = range->min, max[i] = range->max;
-    }
-    return SDM_OK;
+    sdm_mistakes m = {.file = config->file};
+    find_ranges(config, shape, min, max, &m);
+    return sdm_mistakes_report(&m, err);
 }
 
 /* The distribution that the configuration chooses for parameter i on its range. */
@@ -84,9 +89,10 @@ static sdm_mark place_of(const sdm_config *config, const sdm_config_distribution
     return config->shape.mark;
 }
 
-sdm_status sdm_train_distributions(const sdm_config *config, const sdm_instance *shape,
-                                   const double *min, const double *max, sdm_distribution *out,
-                                   sdm_error *err)
+/* As sdm_train_distributions(), but adds mistakes to *m. */
+static void find_distributions(const sdm_config *config, const sdm_instance *shape,
+                               const double *min, const double *max, sdm_distribution *out,
+                               sdm_mistakes *m)
 {
     size_t n;
     const sdm_param *params = sdm_instance_params(shape, &n);
@@ -95,18 +101,38 @@ sdm_status sdm_train_distributions(const sdm_config *config, const sdm_instance 
     for (size_t k = 0; k < config->shape.n_distributions; k++) {
         const sdm_config_distribution *one = &config->shape.distributions[k];
         size_t i = 0;
-        const sdm_status s = find_param(config, shape, one->name, one->mark, &i, err);
-        if (s) return s;
-        chosen[i] = one;
+        if (find_param(shape, one->name, one->mark, &i, m)) chosen[i] = one;
     }
     for (size_t i = 0; i < n; i++) {
-        char where[1200];
+        sdm_error why = {0};
         out[i] = choose(chosen[i], shape, i, min[i], max[i]);
-        if (sdm_distribution_check(&out[i], min[i], max[i], err))
-            return sdm_fail_in(
-                err, SDM_E_CONFIG, "%s: distribution of '%s'",
-                sdm_config_where(config, place_of(config, chosen[i], params[i].name), where),
-                params[i].name);
+        if (sdm_distribution_check(&out[i], min[i], max[i], &why))
+            sdm_mistakes_add(m, place_of(config, chosen[i], params[i].name),
+                             "distribution of '%s': %s", params[i].name, why.text);
     }
-    return SDM_OK;
+}
+
+sdm_status sdm_train_distributions(const sdm_config *config, const sdm_instance *shape,
+                                   const double *min, const double *max, sdm_distribution *out,
+                                   sdm_error *err)
+{
+    sdm_mistakes m = {.file = config->file};
+    find_distributions(config, shape, min, max, out, &m);
+    return sdm_mistakes_report(&m, err);
+}
+
+void sdm_train_find_mistakes(const sdm_config *config, const sdm_instance *shape, sdm_mistakes *m)
+{
+    double min[SDM_MAX_PARAMS], max[SDM_MAX_PARAMS];
+    sdm_distribution distribution[SDM_MAX_PARAMS];
+    size_t n;
+    sdm_instance_params(shape, &n);
+    if (n > SDM_MAX_PARAMS) {
+        sdm_mistakes_add(m, config->shape.mark,
+                         "shape '%s' has %zu parameters, at most %d can be trained",
+                         config->shape.name, n, SDM_MAX_PARAMS);
+        return;
+    }
+    find_ranges(config, shape, min, max, m);
+    find_distributions(config, shape, min, max, distribution, m);
 }

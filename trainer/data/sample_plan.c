@@ -5,6 +5,7 @@
 
 #include "error_model.h"
 #include "sdm/internal/rng.h"
+#include "sdm/internal/sampling.h"
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"
 #include "streams.h"

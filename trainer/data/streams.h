@@ -12,6 +12,7 @@ enum {
     STREAM_POINTS = 600,   // voxels of a map that a point network is trained on
     STREAM_EVALUATE = 650, // voxels of a held-out map that a point network is evaluated on
     STREAM_DROPOUT = 700,
-    STREAM_PLAN = 750,  // rejection of Sobol' points (sample_plan.h)
-    STREAM_BASES = 1000 // start of subspace iterations: global modes; block b has 1001 + b
+    STREAM_SURFACE = 720, // points of a surface (surface_check.h)
+    STREAM_PLAN = 750,    // rejection of Sobol' points (sample_plan.h)
+    STREAM_BASES = 1000   // start of subspace iterations: global modes; block b has 1001 + b
 };

@@ -108,9 +108,21 @@ static double direct_fraction(const trainer *t, const direct_state *d)
 {
     if (!trainer_by_time(t)) return trainer_fraction(t);
     const double total = t->config->train.minutes * 60,
-                 reserve = fmin(d->export_seconds, 0.5 * total);
+                 // the measurement of the model, and of its error on training maps
+        reserve = fmin(d->export_seconds + 2 * t->evaluation_seconds, 0.5 * total);
     const double length = total - reserve - t->phase_started;
     return length > 0 ? (trainer_seconds(t) - t->phase_started) / length : 1;
+}
+
+/* Measures the averaged weights on held-out maps and adds a line to the metrics. */
+static sdm_status direct_evaluate(trainer *t, direct_state *d, double rate, sdm_error *err)
+{
+    const double began = trainer_seconds(t);
+    double mse;
+    const sdm_status s = d->kind->evaluate(t, d->network, d->weights.average, false, &mse, err);
+    if (s) return s;
+    trainer_evaluated(t, mse, began);
+    return trainer_metric(t, rate, err);
 }
 
 static sdm_status direct_run(trainer *t, bool resumed, sdm_error *err)
@@ -119,7 +131,8 @@ static sdm_status direct_run(trainer *t, bool resumed, sdm_error *err)
     direct_state *d = t->state;
     sdm_status s = resumed ? trainer_checkpoint_weights(t, err) : SDM_OK;
     if (!s && trainer_by_time(t)) s = trainer_export_time(t, &d->export_seconds, err);
-    trainer_speed speed = trainer_speed_start(t);
+    trainer_pace_start(t, (double)c->train.batch);
+    if (!s && t->phase_step == 0) s = direct_evaluate(t, d, 0, err);
     for (double at; !s && (at = direct_fraction(t, d)) < 1;) {
         // new maps, or stop
         if ((s = trainer_samples_take(t, trainer_samples_wanted(t, at), err))) break;
@@ -128,16 +141,12 @@ static sdm_status direct_run(trainer *t, bool resumed, sdm_error *err)
         const double rate = c->train.learning_rate * trainer_rate_schedule(at, c->train.warmup);
         if ((s = direct_step(t, d, rate, err))) break;
         // evaluate, report, save
-        double now = trainer_seconds(t);
-        if (trainer_evaluation_due(t, now)) {
-            if ((s = d->kind->evaluate(t, d->network, d->weights.average, &t->heldout_mse, err)))
-                break;
-            t->last_evaluation = now = trainer_seconds(t);
-            if ((s = trainer_metric(t, rate, err))) break;
-        }
-        trainer_speed_report(t, &speed, (size_t)c->train.batch, now);
+        const double now = trainer_seconds(t);
+        if (trainer_evaluation_due(t, now) && (s = direct_evaluate(t, d, rate, err))) break;
+        trainer_step_done(t);
         s = trainer_checkpoint_if_due(t, now, err);
     }
+    if (!s && t->evaluated_step != t->step) s = direct_evaluate(t, d, 0, err);
     return s;
 }
 
@@ -158,6 +167,15 @@ static sdm_status direct_build(const trainer *t, const sdm_model_info *info, uin
     return d->kind->build(t, d->network, d->weights.average, info, bytes, size, err);
 }
 
+static sdm_status direct_parts(const trainer *t, error_measures *out, sdm_error *err)
+{
+    const direct_state *d = t->state;
+    const float *w = d->weights.average;
+    out->other_voxels = true;
+    const sdm_status s = d->kind->evaluate(t, d->network, w, true, &out->network.training, err);
+    return s ? s : d->kind->evaluate(t, d->network, w, false, &out->network.heldout, err);
+}
+
 static void direct_dispose(trainer *t)
 {
     direct_state *d = t->state;
@@ -176,4 +194,5 @@ const train_kind trainer_kind_direct = {.block = direct_block,
                                         .weights = direct_weights,
                                         .fingerprint = direct_fingerprint,
                                         .build = direct_build,
+                                        .parts = direct_parts,
                                         .dispose = direct_dispose};

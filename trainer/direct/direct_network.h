@@ -24,10 +24,10 @@ typedef struct direct_network {
        the same bits for any number of them. */
     sdm_status (*gradient)(const trainer *t, void *network, const float *w, const direct_batch *b,
                            float *gradient, double *mse, sdm_error *err);
-    /* *mse = mean square error on the held-out shapes (mm^2), over all voxels or a fixed sample of
-       them. */
-    sdm_status (*evaluate)(const trainer *t, void *network, const float *w, double *mse,
-                           sdm_error *err);
+    /* *mse = mean square error (mm^2) over all voxels or a fixed sample of them, on the held-out
+       shapes or, if `training`, on maps of the pool (trainer_dataset_measured()). */
+    sdm_status (*evaluate)(const trainer *t, void *network, const float *w, bool training,
+                           double *mse, sdm_error *err);
     /* *bytes = new model file with weights w; free with sdm_free(). */
     sdm_status (*build)(const trainer *t, const void *network, const float *w,
                         const sdm_model_info *info, uint8_t **bytes, size_t *size, sdm_error *err);

@@ -23,7 +23,6 @@ typedef struct point_trainer {
     // Voxels drawn together: 1; with the eikonal term 4, a voxel and its next neighbours along x, y
     // and z.
     size_t group;
-    size_t voxels[CHUNK];
     float u[CHUNK * (SDM_POD_MAX_PARAMS + 3)], target[CHUNK], value[CHUNK], slope[CHUNK];
     float *workspace;
 } point_trainer;
@@ -169,27 +168,33 @@ static sdm_status point_gradient(const trainer *t, void *network, const float *w
     return SDM_OK;
 }
 
-static sdm_status point_evaluate(const trainer *t, void *network, const float *w, double *mse,
-                                 sdm_error *err)
+static sdm_status point_evaluate(const trainer *t, void *network, const float *w, bool training,
+                                 double *mse, sdm_error *err)
 {
     point_trainer *p = network;
     const dataset *d = &t->data;
-    const size_t all = d->n_holdout * EVALUATED;
+    const size_t maps = training ? trainer_dataset_measured(d) : d->n_holdout,
+                 all = maps * EVALUATED;
     double square = 0;
     (void)err;
     for (size_t first = 0; first < all; first += CHUNK) {
         const size_t n = all - first < CHUNK ? all - first : CHUNK;
         for (size_t i = 0; i < n; i++) {
             const size_t map = (first + i) / EVALUATED;
-            p->voxels[i] =
+            const size_t voxel =
                 (size_t)sdm_rng_below(t->config->seed, STREAM_EVALUATE, first + i, d->n_voxels);
-            point_set_input(t, p, i, d->holdout_params + map * d->n_params, p->voxels[i]);
+            if (training) {
+                const size_t slot = trainer_dataset_measured_slot(d, map);
+                p->target[i] = d->scale[slot] * (float)d->maps[slot * d->n_voxels + voxel];
+                point_set_input(t, p, i, d->params + slot * d->n_params, voxel);
+            } else {
+                p->target[i] = d->holdout[map * d->n_voxels + voxel];
+                point_set_input(t, p, i, d->holdout_params + map * d->n_params, voxel);
+            }
         }
         trainer_point_forward(&p->arch, w, n, p->u, p->workspace, p->value, trainer_threads(t));
         for (size_t i = 0; i < n; i++) {
-            const double e =
-                (double)p->value[i] -
-                (double)d->holdout[(first + i) / EVALUATED * d->n_voxels + p->voxels[i]];
+            const double e = (double)p->value[i] - (double)p->target[i];
             square += e * e;
         }
     }

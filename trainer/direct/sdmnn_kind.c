@@ -94,6 +94,13 @@ static void scale_params(const dataset *d, const double *params, float *x)
         x[k] = (float)(2 * (params[k] - d->min[k]) / (d->max[k] - d->min[k]) - 1);
 }
 
+/* map[n_voxels] = the map in `slot`, mm. */
+static void unpack(const dataset *d, size_t slot, float *map)
+{
+    const int16_t *from = d->maps + slot * d->n_voxels;
+    for (size_t v = 0; v < d->n_voxels; v++) map[v] = d->scale[slot] * (float)from[v];
+}
+
 /* Callback of sdm_sdmnn_gradient(): dvalues = derivative of the batch's loss by the values of map
    `index`. */
 static double sdmnn_map_loss(void *user, size_t index, const float *values, float *dvalues)
@@ -102,8 +109,7 @@ static double sdmnn_map_loss(void *user, size_t index, const float *values, floa
     const dataset *d = &p->t->data;
     const size_t slot = p->batch->slots[index];
     const float share = 1.0f / (float)p->batch->n;
-    for (size_t v = 0; v < d->n_voxels; v++)
-        p->target[v] = d->scale[slot] * (float)d->maps[slot * d->n_voxels + v];
+    unpack(d, slot, p->target);
     p->square += trainer_loss_map(p->t->config, values, p->target, dvalues);
     for (size_t v = 0; v < d->n_voxels; v++) dvalues[v] *= share;
     return 0;
@@ -125,18 +131,25 @@ static sdm_status sdmnn_gradient(const trainer *t, void *network, const float *w
     return SDM_OK;
 }
 
-static sdm_status sdmnn_evaluate(const trainer *t, void *network, const float *w, double *mse,
-                                 sdm_error *err)
+static sdm_status sdmnn_evaluate(const trainer *t, void *network, const float *w, bool training,
+                                 double *mse, sdm_error *err)
 {
     sdmnn_trainer *p = network;
     const dataset *d = &t->data;
-    const size_t n = d->n_holdout < EVALUATED ? d->n_holdout : EVALUATED;
+    const size_t all = training ? trainer_dataset_measured(d) : d->n_holdout,
+                 n = all < EVALUATED ? all : EVALUATED;
     double square = 0;
     (void)err;
     sdm_sdmnn_set(p->net, w);
     for (size_t i = 0; i < n; i++) {
         const float *exact = d->holdout + i * d->n_voxels;
-        scale_params(d, d->holdout_params + i * d->n_params, p->x);
+        const double *params = d->holdout_params + i * d->n_params;
+        if (training) {
+            const size_t slot = trainer_dataset_measured_slot(d, i);
+            unpack(d, slot, p->target);
+            exact = p->target, params = d->params + slot * d->n_params;
+        }
+        scale_params(d, params, p->x);
         sdm_sdmnn_forward(p->net, p->x, p->value, trainer_threads(t));
         for (size_t v = 0; v < d->n_voxels; v++) {
             const double e = (double)p->value[v] - (double)exact[v];

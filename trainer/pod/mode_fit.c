@@ -168,7 +168,7 @@ static void mode_fit_step(pod_state *pod, mode_batch *b, size_t batch, double ra
     for (size_t i = 0; i < batch; i++) sum += b->loss[i];
     const double scale = pod->target_scale;
     pod->t->loss =
-        pod->holdout_floor + sum * scale * scale / ((double)batch * (double)pod->t->data.n_voxels);
+        pod->training_floor + sum * scale * scale / ((double)batch * (double)pod->t->data.n_voxels);
 
     // gradient with respect to the weights
     sdm_gemm(r, a->width, batch, (sdm_view){b->predicted, 1, r}, (sdm_view){h, a->width, 1}, false,
@@ -195,6 +195,14 @@ static double mode_fit_fraction(const pod_state *pod)
     return length > 0 ? (trainer_seconds(t) - t->phase_started) / length : 1;
 }
 
+/* Measures the averaged weights on the held-out maps and adds a line to the metrics. */
+static sdm_status evaluate(pod_state *pod, mode_batch *b, size_t batch, double rate, sdm_error *err)
+{
+    const double began = trainer_seconds(pod->t);
+    trainer_evaluated(pod->t, modes_evaluate(pod, pod->mode_fit.average, b, batch), began);
+    return trainer_metric(pod->t, rate, err);
+}
+
 sdm_status trainer_mode_fit_run(pod_state *pod, sdm_error *err)
 {
     trainer *t = pod->t;
@@ -203,9 +211,10 @@ sdm_status trainer_mode_fit_run(pod_state *pod, sdm_error *err)
     const size_t batch = (size_t)c->train.batch;
     mode_batch b = {0};
     sdm_status s = mode_batch_create(pod, batch, &b, err);
-    trainer_speed speed = trainer_speed_start(t);
     double at = mode_fit_fraction(pod);
     bool done = false;
+    trainer_pace_start(t, (double)batch);
+    if (!s && t->phase_step == 0) s = evaluate(pod, &b, batch, 0, err);
     while (!s && at < 1 && !done) {
         // new maps, or stop
         if ((s = trainer_samples_take(t, trainer_samples_wanted(t, at), err))) break;
@@ -230,16 +239,15 @@ sdm_status trainer_mode_fit_run(pod_state *pod, sdm_error *err)
         // evaluate, report, save
         const double now = trainer_seconds(t);
         if (trainer_evaluation_due(t, now)) {
-            t->heldout_mse = modes_evaluate(pod, pod->mode_fit.average, &b, batch);
-            t->last_evaluation = now;
-            done = trainer_best_note(t, &pod->mode_fit, at, t->heldout_mse);
-            if ((s = trainer_metric(t, rate, err))) break;
+            if ((s = evaluate(pod, &b, batch, rate, err))) break;
+            if (trainer_evaluation_counts(t))
+                done = trainer_best_note(t, &pod->mode_fit, at, t->heldout_mse);
         }
-        trainer_speed_report(t, &speed, batch, now);
+        trainer_step_done(t);
         s = trainer_checkpoint_if_due(t, now, err);
     }
+    if (!s && t->evaluated_step != t->step) s = evaluate(pod, &b, batch, 0, err);
     if (!s) {
-        t->heldout_mse = modes_evaluate(pod, pod->mode_fit.average, &b, batch);
         trainer_best_note(t, &pod->mode_fit, at, t->heldout_mse);
         trainer_best_restore(t, &pod->mode_fit);
     }

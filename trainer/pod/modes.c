@@ -201,6 +201,33 @@ static sdm_status fit_polynomials(pod_state *pod, size_t n, const float *c, sdm_
     return s;
 }
 
+static double square_sum(const float *x, size_t n)
+{
+    double sum = 0;
+    for (size_t i = 0; i < n; i++) sum += (double)x[i] * x[i];
+    return sum;
+}
+
+/* Returns the mean square error (mm^2) that remains with the exact mode coefficients c[n][R] of the
+ * maps in slots 0 .. n - 1, on a sample of these maps. */
+static double training_floor(const pod_state *pod, size_t n, const float *c)
+{
+    enum { SAMPLE = 64 };
+    const dataset *d = &pod->t->data;
+    const size_t sample = n < SAMPLE ? n : SAMPLE;
+    double energy = 0;
+    for (size_t i = 0; i < sample; i++) {
+        const size_t map = i * n / sample;
+        const int16_t *values = d->maps + map * d->n_voxels;
+        for (size_t v = 0; v < d->n_voxels; v++) {
+            const double e = d->scale[map] * (float)values[v] - pod->mean[v];
+            energy += e * e;
+        }
+        energy -= square_sum(c + map * pod->n_modes, pod->n_modes);
+    }
+    return fmax(0, energy / ((double)sample * (double)d->n_voxels));
+}
+
 /* Computes the targets of the held-out maps, and the mean square error on these maps that remains
  * with exact mode coefficients. */
 static sdm_status project_holdout(pod_state *pod, sdm_error *err)
@@ -217,19 +244,22 @@ static sdm_status project_holdout(pod_state *pod, sdm_error *err)
     if (!s) {
         modes_from_coefficients(pod, h, y, c);
         // orthonormal bases and modes: energy of the map minus that of its mode coefficients
-        double energy = 0;
+        double energy = 0, left_out = 0;
         for (size_t i = 0; i < h; i++) {
             for (size_t v = 0; v < pod->t->data.n_voxels; v++) {
                 const double e = pod->t->data.holdout[i * pod->t->data.n_voxels + v] - pod->mean[v];
                 energy += e * e;
             }
-            for (size_t j = 0; j < r; j++) energy -= (double)c[i * r + j] * c[i * r + j];
+            const double of_modes = square_sum(c + i * r, r);
+            energy -= of_modes;
+            left_out += square_sum(y + i * k, k) - of_modes;
             pod_phi(pod, pod->t->data.holdout_params + i * pod->t->data.n_params,
                     pod->holdout_phi + i * pod->n_poly);
             targets[i] = pod->holdout_target + i * r;
         }
         // clamped at 0: rounding could make the difference negative
         pod->holdout_floor = fmax(0, energy / ((double)h * (double)pod->t->data.n_voxels));
+        pod->modes_mse = fmax(0, left_out / ((double)h * (double)pod->t->data.n_voxels));
         s = subtract_polynomials(pod, h, pod->holdout_phi, c, targets, err);
     }
     sdm_free(targets);
@@ -276,6 +306,7 @@ sdm_status trainer_modes_make(pod_state *pod, size_t n, sdm_error *err)
                                   pod->modes, err);
     if (!s) {
         modes_from_coefficients(pod, n, y, c);
+        pod->training_floor = training_floor(pod, n, c);
         // inputs and target rows of the slots
         for (size_t i = 0; i < n; i++) {
             pod_phi(pod, pod->t->data.params + i * pod->t->data.n_params,

@@ -9,6 +9,7 @@
 #include "mlp.h"
 #include "mode_fit.h"
 #include "modes.h"
+#include "pod_parts.h"
 #include "refine.h"
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/rng.h"
@@ -124,19 +125,18 @@ static sdm_status pod_run(trainer *t, bool resumed, sdm_error *err)
 {
     pod_state *pod = t->state;
     sdm_status s = SDM_OK;
-    // the measurement of the model needs the rest of a time budget
+    // the measurement of the model and of the parts of its error needs the rest of a time budget
     const double total = t->config->train.minutes * 60;
-    pod->refine_end = total - fmin(10, 0.03 * total);
+    pod->refine_end = total - fmin(10, 0.03 * total) - fmin(1, 0.05 * total);
     pod->mode_fit_end =
         t->phase_started + (pod->refine_end - t->phase_started) * (1 - t->config->train.refine);
     if (t->phase == SDM_PHASE_MODE_FIT) {
         if (resumed) s = trainer_checkpoint_weights(t, err);
         if (!s) s = trainer_mode_fit_run(pod, err);
         if (!s) s = trainer_refine_start(pod, false, err);
-        if (!s) s = trainer_refine_evaluate(pod, pod->refine.w, &t->heldout_mse, err);
         if (s) return s;
         trainer_enter(t, SDM_PHASE_REFINE);
-        s = trainer_metric(t, 0, err);
+        s = trainer_refine_note(pod, pod->refine.w, 0, err);
     } else {
         s = trainer_refine_start(pod, true, err);
         if (!s) s = trainer_checkpoint_weights(t, err);
@@ -216,4 +216,5 @@ const train_kind trainer_kind_pod = {.block = pod_block,
                                      .weights = pod_weights,
                                      .fingerprint = pod_fingerprint,
                                      .build = pod_build,
+                                     .parts = trainer_pod_parts,
                                      .dispose = pod_dispose};

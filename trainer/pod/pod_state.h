@@ -38,6 +38,8 @@ typedef struct pod_state {
     float *holdout_target; /* [H][R] */
     /* Mean square error (mm^2) on the held-out maps that remains with exact mode coefficients. */
     double holdout_floor;
+    double training_floor; /* the same on maps of the pool */
+    double modes_mse;      /* the part of holdout_floor that the modes leave out of the bases */
 
     /* Trained weights: phase SDM_PHASE_MODE_FIT: MLP, readout[R][W]; phase SDM_PHASE_REFINE: MLP,
        head[K][L] from head_at, mean[n_voxels] from mean_at, basis from basis_at. */

@@ -10,7 +10,6 @@
 #include "head.h"
 #include "mlp.h"
 #include "numerics/loss.h"
-#include "pod_tree.h"
 #include "sdm/internal/kernels.h"
 #include "sdm/internal/team.h"
 #include "sdm/memory.h"
@@ -18,6 +17,7 @@
 #include "state/checkpoint.h"
 #include "state/new_samples.h"
 #include "state/progress.h"
+#include "tree_pass.h"
 
 /* Adam step sizes, relative to the typical size of a weight. They were found by trials on the
  * cochlea, and are within a factor of three of the best values. */
@@ -64,22 +64,6 @@ static size_t n_trees(const pod_state *pod)
     return pod->arch.levels.first[pod->arch.levels.n] - first_tree(pod);
 }
 
-/* Floats of scratch memory for one tree and `rows` maps: predicted voxels, coefficients below the
- * highest level, the gradients with respect to both, and the gradient of the largest basis. */
-static size_t tree_floats(const pod_state *pod, size_t rows, size_t root)
-{
-    const pod_tree tree = trainer_pod_tree(&pod->arch.levels, pod->blocks, root);
-    size_t each = tree.voxels, largest = tree.largest;
-    for (size_t level = 0; level + 1 < pod->arch.levels.n; level++)
-        each += trainer_pod_tree_coefficients(pod->blocks, &tree, level);
-    for (size_t level = 0; level < pod->arch.levels.n; level++)
-        for (size_t b = tree.first[level]; b < tree.end[level]; b++) {
-            const size_t matrix = pod->matrix_at[b + 1] - pod->matrix_at[b];
-            if (matrix > largest) largest = matrix;
-        }
-    return 2 * rows * each + largest;
-}
-
 static sdm_status refine_batch_create(const pod_state *pod, size_t rows, refine_batch *b,
                                       sdm_error *err)
 {
@@ -87,7 +71,7 @@ static sdm_status refine_batch_create(const pod_state *pod, size_t rows, refine_
     *b = (refine_batch){.rows = rows, .tree_threads = (int)n_trees(pod)};
     if (b->tree_threads > pod->t->n_threads) b->tree_threads = pod->t->n_threads;
     for (size_t i = 0; i < n_trees(pod); i++) {
-        const size_t need = tree_floats(pod, rows, first_tree(pod) + i);
+        const size_t need = trainer_tree_floats(pod, rows, first_tree(pod) + i);
         if (need > b->tree_floats) b->tree_floats = need;
     }
     sdm_status s = SDM_ALLOC(&b->x, rows * a->n_inputs, "batch", err);
@@ -121,69 +105,11 @@ static void head_forward(const pod_state *pod, const float *w, refine_batch *b, 
              trainer_threads(pod->t));
 }
 
-/* The arrays of a tree, most of them in the scratch memory of a member of the team. */
-typedef struct tree_work {
-    pod_tree tree;
-    size_t ld[SDM_POD_MAX_LEVELS]; // row length on each level
-    float *c[SDM_POD_MAX_LEVELS];  // [B][ld] coefficients
-    float *dc[SDM_POD_MAX_LEVELS]; // [B][ld] gradients by the coefficients
-    float *predicted, *delta;      // [B][voxels] map, and gradient with respect to the map
-    float *basis_gradient;         // [k_b][V_b] of one block
-} tree_work;
-
-static tree_work tree_work_of(const pod_state *pod, const refine_batch *b, size_t root, int member)
+/* The arrays of a tree in the scratch memory of a member of the team. */
+static tree_work batch_tree(const pod_state *pod, const refine_batch *b, size_t root, int member)
 {
-    tree_work w = {.tree = trainer_pod_tree(&pod->arch.levels, pod->blocks, root)};
-    const size_t top = pod->arch.levels.n - 1;
-    float *at = b->scratch + b->tree_floats * (size_t)member;
-    for (size_t level = 0; level < top; level++) {
-        w.ld[level] = trainer_pod_tree_coefficients(pod->blocks, &w.tree, level);
-        w.c[level] = at, at += b->rows * w.ld[level];
-        w.dc[level] = at, at += b->rows * w.ld[level];
-    }
-    w.ld[top] = pod->arch.n_coefficients;
-    w.c[top] = b->c + pod->blocks[root].coefficient;
-    w.dc[top] = b->dc + pod->blocks[root].coefficient;
-    w.predicted = at, at += b->rows * w.tree.voxels;
-    w.delta = at, at += b->rows * w.tree.voxels;
-    w.basis_gradient = at;
-    return w;
-}
-
-/* Where a block's coefficients and outputs begin within the rows of its tree, and the number of
-   outputs. */
-typedef struct block_place {
-    size_t coefficient, output, outputs;
-} block_place;
-
-static block_place block_place_of(const pod_state *pod, const tree_work *w, size_t level, size_t b)
-{
-    const sdm_pod_block *k = &pod->blocks[b];
-    const size_t lowest = w->tree.first[0];
-    return (block_place){k->coefficient - pod->blocks[w->tree.first[level]].coefficient,
-                         level ? pod->blocks[k->child].coefficient -
-                                     pod->blocks[w->tree.first[level - 1]].coefficient
-                               : (size_t)(k->voxel - pod->blocks[lowest].voxel),
-                         sdm_pod_outputs(pod->blocks, b)};
-}
-
-/* Computes w->predicted[rows][voxels] from the coefficients of the highest level. */
-static void tree_forward(const pod_state *pod, const float *weights, size_t rows,
-                         const tree_work *w)
-{
-    const float *mean = weights + pod->mean_at + pod->blocks[w->tree.first[0]].voxel;
-    for (size_t r = 0; r < rows; r++)
-        memcpy(w->predicted + r * w->tree.voxels, mean, w->tree.voxels * sizeof *mean);
-    for (size_t level = pod->arch.levels.n; level-- > 0;)
-        for (size_t b = w->tree.first[level]; b < w->tree.end[level]; b++) {
-            const block_place p = block_place_of(pod, w, level, b);
-            float *to = level ? w->c[level - 1] : w->predicted;
-            const size_t ldt = level ? w->ld[level - 1] : w->tree.voxels;
-            sdm_gemm(rows, p.outputs, pod->blocks[b].rank,
-                     (sdm_view){w->c[level] + p.coefficient, w->ld[level], 1},
-                     (sdm_view){weights + pod->basis_at + pod->matrix_at[b], p.outputs, 1},
-                     level == 0, to + p.output, ldt, 1);
-        }
+    return trainer_tree_work(pod, b->rows, root, b->scratch + b->tree_floats * (size_t)member, b->c,
+                             b->dc);
 }
 
 /* Carries the gradient from w->delta[rows][voxels] up to the coefficients of the highest level, and
@@ -193,14 +119,12 @@ static void tree_backward(pod_state *pod, size_t rows, const tree_work *w, adam_
     const size_t first = pod->blocks[w->tree.first[0]].voxel, voxels = w->tree.voxels;
     for (size_t level = 0; level < pod->arch.levels.n; level++)
         for (size_t b = w->tree.first[level]; b < w->tree.end[level]; b++) {
-            const block_place p = block_place_of(pod, w, level, b);
+            const block_place p = trainer_tree_place(pod, w, level, b);
             const size_t rank = pod->blocks[b].rank, at = pod->basis_at + pod->matrix_at[b];
             const float *from = (level ? w->dc[level - 1] : w->delta) + p.output;
             const size_t ldf = level ? w->ld[level - 1] : voxels;
             // gradient with respect to the coefficients, then to the basis
-            sdm_gemm(rows, rank, p.outputs, (sdm_view){from, ldf, 1},
-                     (sdm_view){pod->refine.w + at, 1, p.outputs}, false,
-                     w->dc[level] + p.coefficient, w->ld[level], 1);
+            trainer_tree_back(pod, pod->refine.w, rows, w, level, b);
             sdm_gemm(rank, p.outputs, rows,
                      (sdm_view){w->c[level] + p.coefficient, 1, w->ld[level]},
                      (sdm_view){from, ldf, 1}, false, w->basis_gradient, p.outputs, 1);
@@ -230,9 +154,9 @@ static void tree_train(void *user, size_t i, int member)
     const refine_loop *l = user;
     pod_state *pod = l->pod;
     refine_batch *b = l->batch;
-    const tree_work w = tree_work_of(pod, b, first_tree(pod) + i, member);
+    const tree_work w = batch_tree(pod, b, first_tree(pod) + i, member);
     const size_t first = pod->blocks[w.tree.first[0]].voxel, voxels = w.tree.voxels;
-    tree_forward(pod, pod->refine.w, b->rows, &w);
+    trainer_tree_forward(pod, pod->refine.w, b->rows, &w);
     double sum = 0;
     for (size_t r = 0; r < b->rows; r++) {
         const int16_t *target = pod->t->data.maps + b->slots[r] * pod->t->data.n_voxels + first;
@@ -312,9 +236,9 @@ static void tree_evaluate(void *user, size_t i, int member)
     const refine_loop *l = user;
     const pod_state *pod = l->pod;
     const dataset *d = &pod->t->data;
-    const tree_work w = tree_work_of(pod, l->batch, first_tree(pod) + i, member);
+    const tree_work w = batch_tree(pod, l->batch, first_tree(pod) + i, member);
     const size_t voxels = w.tree.voxels;
-    tree_forward(pod, l->weights, l->rows, &w);
+    trainer_tree_forward(pod, l->weights, l->rows, &w);
     double sum = 0;
     for (size_t r = 0; r < l->rows; r++) {
         const float *truth =
@@ -348,6 +272,16 @@ sdm_status trainer_refine_evaluate(pod_state *pod, const float *w, double *mse, 
     refine_batch_dispose(&b);
     *mse = sum / ((double)d->n_holdout * (double)d->n_voxels);
     return s;
+}
+
+sdm_status trainer_refine_note(pod_state *pod, const float *w, double rate, sdm_error *err)
+{
+    const double began = trainer_seconds(pod->t);
+    double mse;
+    const sdm_status s = trainer_refine_evaluate(pod, w, &mse, err);
+    if (s) return s;
+    trainer_evaluated(pod->t, mse, began);
+    return trainer_metric(pod->t, rate, err);
 }
 
 sdm_status trainer_refine_start(pod_state *pod, bool resumed, sdm_error *err)
@@ -385,7 +319,7 @@ sdm_status trainer_refine_run(pod_state *pod, sdm_error *err)
     if (!(c->train.refine > 0)) return SDM_OK;
     refine_batch b = {0};
     sdm_status s = refine_batch_create(pod, (size_t)c->train.refine_batch, &b, err);
-    trainer_speed speed = trainer_speed_start(t);
+    trainer_pace_start(t, (double)c->train.refine_batch);
     double at = refine_fraction(t, pod->refine_end);
     bool done = false;
     // the start counts too: the refinement must not lose what least squares have found
@@ -414,16 +348,15 @@ sdm_status trainer_refine_run(pod_state *pod, sdm_error *err)
         // evaluate, report, save
         const double now = trainer_seconds(t);
         if (trainer_evaluation_due(t, now)) {
-            if ((s = trainer_refine_evaluate(pod, pod->refine.average, &t->heldout_mse, err)))
-                break;
-            t->last_evaluation = now;
-            done = trainer_best_note(t, &pod->refine, at, t->heldout_mse);
-            if ((s = trainer_metric(t, rate, err))) break;
+            if ((s = trainer_refine_note(pod, pod->refine.average, rate, err))) break;
+            if (trainer_evaluation_counts(t))
+                done = trainer_best_note(t, &pod->refine, at, t->heldout_mse);
         }
-        trainer_speed_report(t, &speed, b.rows, now);
+        trainer_step_done(t);
         s = trainer_checkpoint_if_due(t, now, err);
     }
-    if (!s) s = trainer_refine_evaluate(pod, pod->refine.average, &t->heldout_mse, err);
+    if (!s && t->evaluated_step != t->step)
+        s = trainer_refine_note(pod, pod->refine.average, 0, err);
     if (!s) {
         trainer_best_note(t, &pod->refine, at, t->heldout_mse);
         trainer_best_restore(t, &pod->refine);

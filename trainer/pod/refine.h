@@ -13,3 +13,6 @@ sdm_status trainer_refine_run(pod_state *pod, sdm_error *err);
 
 /* *mse = mean square error (mm^2) of the network with weights w on the held-out maps. */
 sdm_status trainer_refine_evaluate(pod_state *pod, const float *w, double *mse, sdm_error *err);
+
+/* Notes this error in t->heldout_mse and in a line of the metrics with the learning rate `rate`. */
+sdm_status trainer_refine_note(pod_state *pod, const float *w, double rate, sdm_error *err);

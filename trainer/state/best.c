@@ -26,11 +26,13 @@ bool trainer_best_note(const trainer *t, parameters *p, double fraction, double 
 
 void trainer_ended_early(trainer *t, double fraction)
 {
-    const double used = trainer_seconds(t) - t->phase_started;
+    const double used = trainer_seconds(t) - t->phase_started,
+                 saved = used * (1 - fraction) / fmax(fraction, 1e-9);
+    t->saved_seconds += saved;
     trainer_message(t,
                     "nothing more is gained: the phase ends at %.0f %% of its budget, %.0f s early "
                     "(train.patience)",
-                    100 * fraction, used * (1 - fraction) / fmax(fraction, 1e-9));
+                    100 * fraction, saved);
 }
 
 void trainer_best_restore(trainer *t, parameters *p)

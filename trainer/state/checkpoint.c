@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "export_model.h"
+#include "history.h"
 #include "kind.h"
 #include "progress.h"
 #include "sdm/internal/checksum.h"
@@ -326,6 +327,10 @@ sdm_status trainer_checkpoint_read(trainer *t, bool *found, sdm_error *err)
         const sdm_section *metrics = section_find(&o, "metrics");
         if (!s && metrics->size)
             sdm_text_add(t->metrics, "%.*s", (int)metrics->size, (const char *)metrics->data);
+        history h = {0};
+        if (!s) s = trainer_history_read(t, &h, err);
+        t->evaluated_step = trainer_history_last_step(&h);
+        trainer_history_dispose(&h);
     }
     sdm_free(o.bytes);
     return s;

@@ -7,18 +7,17 @@
 #include <string.h>
 
 #include "data/workbench.h"
+#include "history.h"
+#include "judge.h"
 #include "kind.h"
 #include "progress.h"
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/container.h"
 #include "sdm/internal/file.h"
 #include "sdm/internal/model_threads.h"
+#include "sdm/internal/near.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
-#include "sdm/picture.h"
-
-/* Voxels within this distance of the surface count for rmse_near_mm. */
-#define NEAR_MM 0.4f
 
 static int compare_doubles(const void *a, const void *b)
 {
@@ -35,7 +34,7 @@ static double quantile(const double *sorted, size_t n, double q)
 
 /* Errors of the model on the first n held-out maps. */
 static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, sdm_accuracy *out,
-                                sdm_error *err)
+                                model_errors *more, sdm_error *err)
 {
     const dataset *d = &t->data;
     float *map = NULL, *blocked = NULL;
@@ -51,8 +50,10 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
     workbench w = {0};
     if (!s && d->target.make) s = trainer_workbench_create(&w, d, err);
     const size_t n_voxels = sdm_grid_count(d->grid);
-    double square = 0, absolute = 0, near = 0, largest = 0;
-    size_t n_near = 0;
+    const double voxel = trainer_dataset_voxel(d);
+    const float near_mm = (float)sdm_grid_near(d->grid);
+    double square = 0, absolute = 0, near = 0, largest = 0, at_surface = 0, dice = 0, dice_min = 1;
+    size_t n_near = 0, n_at_surface = 0;
     // sum the errors over maps and voxels
     for (size_t i = 0; i < n && !s; i++) {
         sdm_model_forward_threads(m, d->holdout_params + i * d->n_params, 1, map, scratch,
@@ -66,13 +67,20 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
             sdm_pod_gather(d->grid, t->blocks, d->n_blocks, map, blocked);
         }
         double here = 0;
+        size_t inside = 0, both = 0; // voxels inside: of the two maps together, and of both
         for (size_t v = 0; v < n_voxels; v++) {
             const double e = (double)values[v] - truth[v];
             here += e * e;
             absolute += fabs(e);
             if (fabs(e) > largest) largest = fabs(e);
-            if (fabsf(truth[v]) <= NEAR_MM) near += e * e, n_near++;
+            if (fabsf(truth[v]) <= near_mm) near += e * e, n_near++;
+            if (fabs((double)truth[v]) <= voxel) at_surface += e * e, n_at_surface++;
+            inside += (size_t)(truth[v] < 0) + (size_t)(values[v] < 0);
+            both += truth[v] < 0 && values[v] < 0;
         }
+        const double overlap = inside ? 2 * (double)both / (double)inside : 1;
+        dice += overlap;
+        dice_min = fmin(dice_min, overlap);
         square += here;
         each[i] = sqrt(here / (double)n_voxels);
     }
@@ -88,7 +96,12 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
                               .rmse_near_mm = n_near ? sqrt(near / (double)n_near) : 0,
                               .q50_mm = quantile(each, n, 0.5),
                               .q90_mm = quantile(each, n, 0.9),
-                              .q99_mm = quantile(each, n, 0.99)};
+                              .q99_mm = quantile(each, n, 0.99),
+                              .near_mm = sdm_grid_near(d->grid)};
+        *more = (model_errors){.rmse_voxel_mm =
+                                   n_at_surface ? sqrt(at_surface / (double)n_at_surface) : 0,
+                               .dice = dice / (double)n,
+                               .dice_min = dice_min};
     }
     trainer_workbench_dispose(&w);
     sdm_free(each);
@@ -171,37 +184,13 @@ static void collect_options(const trainer *t, option_texts *o)
     }
 }
 
-/* Number after `key` in one line of metrics.jsonl; NaN if there is none. */
-static double metric_number(const char *line, const char *key)
-{
-    const char *at = strstr(line, key);
-    return at ? strtod(at + strlen(key), NULL) : NAN;
-}
-
-/* loss.png: training loss and held-out error over the steps, from the lines of metrics.jsonl. */
+/* loss.png, from the lines of metrics.jsonl. */
 static sdm_status curve_write(const trainer *t, sdm_error *err)
 {
-    double *step = NULL, *loss = NULL, *heldout = NULL;
-    size_t lines = 0, n = 0;
-    for (const char *p = t->metrics->data; p && *p; p++) lines += *p == '\n';
-    sdm_status s = SDM_ALLOC(&step, lines, "loss curve", err);
-    if (!s) s = SDM_ALLOC(&loss, lines, "loss curve", err);
-    if (!s) s = SDM_ALLOC(&heldout, lines, "loss curve", err);
-    if (!s) {
-        for (const char *p = t->metrics->data; p && *p; p = strchr(p, '\n') + 1) {
-            step[n] = metric_number(p, "\"step\": ");
-            if (!isfinite(step[n])) continue; // the result of the race
-            loss[n] = metric_number(p, "\"loss_mm2\": ");
-            heldout[n++] = metric_number(p, "\"heldout_mse_mm2\": ");
-        }
-        char path[SDM_PATH_TEXT_MAX + 32];
-        snprintf(path, sizeof path, "%s/loss.png", t->folder);
-        const sdm_curve curves[] = {{"training", step, loss, n}, {"held out", step, heldout, n}};
-        s = sdm_picture_plot(path, "Mean square error", "step", "mm^2", true, curves, 2, err);
-    }
-    sdm_free(heldout);
-    sdm_free(loss);
-    sdm_free(step);
+    history h;
+    sdm_status s = trainer_history_read(t, &h, err);
+    if (!s) s = trainer_history_picture(t, &h, err);
+    trainer_history_dispose(&h);
     return s;
 }
 
@@ -302,11 +291,12 @@ static sdm_status model_open(const trainer *t, const char *path, const descripti
 
 sdm_status trainer_export_measure(const trainer *t, sdm_accuracy *out, sdm_error *err)
 {
+    model_errors more;
     description *d = NULL;
     sdm_model *model = NULL;
     sdm_status s = description_create(t, &d, err);
     if (!s) s = model_open(t, "model", d, &model, err);
-    if (!s) s = measure_model(t, model, t->data.n_holdout, out, err);
+    if (!s) s = measure_model(t, model, t->data.n_holdout, out, &more, err);
     sdm_model_free(model);
     description_free(d);
     return s;
@@ -317,10 +307,11 @@ sdm_status trainer_export_time(trainer *t, double *seconds, sdm_error *err)
     description *d = NULL;
     sdm_model *model = NULL;
     sdm_accuracy one;
+    model_errors more;
     sdm_status s = description_create(t, &d, err);
     if (!s) s = model_open(t, "model", d, &model, err);
     const double start = trainer_seconds(t);
-    if (!s) s = measure_model(t, model, 1, &one, err);
+    if (!s) s = measure_model(t, model, 1, &one, &more, err);
     *seconds = (trainer_seconds(t) - start) * (double)t->data.n_holdout;
     sdm_model_free(model);
     description_free(d);
@@ -333,12 +324,14 @@ sdm_status trainer_export_model(trainer *t, sdm_train_report *report, sdm_error 
     sdm_model *model = NULL;
     uint8_t *bytes = NULL;
     size_t size = 0;
+    model_errors more;
+    sdm_verdict verdict;
     char path[SDM_PATH_TEXT_MAX + 32];
     snprintf(path, sizeof path, "%s/model.sdm", t->folder);
     // build a first model and measure it
     sdm_status s = description_create(t, &d, err);
     if (!s) s = model_open(t, path, d, &model, err);
-    if (!s) s = measure_model(t, model, t->data.n_holdout, &t->accuracy, err);
+    if (!s) s = measure_model(t, model, t->data.n_holdout, &t->accuracy, &more, err);
     sdm_model_free(model);
     if (!s && !isfinite(t->accuracy.mse_mm2))
         s = sdm_fail(err, SDM_E_QUALITY,
@@ -350,6 +343,8 @@ sdm_status trainer_export_model(trainer *t, sdm_train_report *report, sdm_error 
         d->info.accuracy = t->accuracy;
         t->heldout_mse = t->accuracy.mse_mm2;
         s = trainer_metric(t, 0, err);
+        if (!s) s = trainer_verdict_make(t, &more, &verdict, err);
+        if (!s) s = trainer_metric_verdict(t, &verdict, err);
     }
     if (!s) s = t->kind->build(t, &d->info, &bytes, &size, err);
     if (!s) s = sdm_container_write(path, bytes, size, err);
@@ -362,7 +357,8 @@ sdm_status trainer_export_model(trainer *t, sdm_train_report *report, sdm_error 
         *report = (sdm_train_report){.accuracy = t->accuracy,
                                      .steps = t->step,
                                      .samples = d->info.train_samples,
-                                     .seconds = trainer_seconds(t)};
+                                     .seconds = trainer_seconds(t),
+                                     .verdict = verdict};
         snprintf(report->model_path, sizeof report->model_path, "%.*s",
                  (int)sizeof report->model_path - 1, path);
     }

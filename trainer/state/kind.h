@@ -7,6 +7,20 @@
 
 #include "trainer.h"
 
+/* A mean square error (mm^2) on held-out maps, and on maps that the network is trained on. */
+typedef struct error_pair {
+    double heldout, training;
+} error_pair;
+
+/* Measured parts of the error of the averaged weights before rounding; NaN: not measured. */
+typedef struct error_measures {
+    error_pair network, bases; /* of the network; of its bases with the best coefficients */
+    double modes;      /* held-out maps: what the bases hold and the global modes leave out */
+    bool other_voxels; /* the voxels are only a sample of those of the maps */
+    bool corrects;     /* the maps are those of a correction, not exact maps */
+    double motion_mm, warp_mm; /* of a template (template_design) */
+} error_measures;
+
 struct train_kind {
     /* Called before any map is made: may allocate t->design and set data.target or
        data.only_holdout. NULL: nothing to do. */
@@ -35,6 +49,8 @@ struct train_kind {
     /* *bytes = new model file with the averaged weights; free with sdm_free(). */
     sdm_status (*build)(const trainer *t, const sdm_model_info *info, uint8_t **bytes, size_t *size,
                         sdm_error *err);
+    /* Sets the figures of *out that this kind has; all are NaN or false before. */
+    sdm_status (*parts)(const trainer *t, error_measures *out, sdm_error *err);
     /* Frees t->state and t->design; NULL does nothing. */
     void (*dispose)(trainer *t);
 };

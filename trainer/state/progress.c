@@ -51,23 +51,58 @@ int trainer_threads(const trainer *t)
     return workers < t->n_threads ? t->n_threads - workers : 1;
 }
 
-void trainer_report(trainer *t, double fraction, double samples_per_second, bool now)
+void trainer_pace_start(trainer *t, double unit_maps)
+{
+    const double now = trainer_seconds(t);
+    t->pace = (trainer_pace){.unit_maps = unit_maps, .seconds = {now, now}};
+}
+
+/* Units of work a second since the earlier of two times; NaN before the first unit. The times move
+ * on only when units have been finished, so a rate never falls to 0 between two slow steps. */
+static double pace_rate(trainer_pace *p, double now)
+{
+    static const double LENGTH = 2;
+    if (now - p->seconds[1] > LENGTH && p->done > p->before[1]) {
+        p->before[0] = p->before[1], p->seconds[0] = p->seconds[1];
+        p->before[1] = p->done, p->seconds[1] = now;
+    }
+    const double length = now - p->seconds[0];
+    return p->done > p->before[0] && length > 0 ? (double)(p->done - p->before[0]) / length : NAN;
+}
+
+/* Time that the rest of the budget takes, s: with a budget of steps at the pace of the last
+ * seconds. */
+static double seconds_left(const trainer *t, double now, double rate)
+{
+    if (trainer_by_time(t)) return fmax(0, t->config->train.minutes * 60 - now);
+    if (t->phase == SDM_PHASE_EVALUATE) return 0;
+    if (t->phase != SDM_PHASE_MODE_FIT && t->phase != SDM_PHASE_REFINE) return NAN;
+    return (double)(trainer_steps(t) - t->step) / rate;
+}
+
+void trainer_report(trainer *t, double fraction, bool now)
 {
     const double seconds = trainer_seconds(t);
     if (!t->hooks.progress || (!now && seconds - t->last_report < 0.1)) return;
     t->last_report = seconds;
-    const double all = trainer_by_time(t) ? t->config->train.minutes * 60
-                       : fraction > 0     ? seconds / fraction
-                                          : NAN;
+    const double rate = pace_rate(&t->pace, seconds);
+    const dataset *d = &t->data;
+    // while maps are computed the held-out ones come first
+    const int64_t computed = t->pace.done - (int64_t)d->n_holdout;
     const sdm_progress p = {.phase = t->phase,
                             .fraction = fraction < 1 ? fraction : 1,
                             .step = t->step,
-                            .samples = (int64_t)(t->data.n_static + t->data.n_taken),
+                            .samples = t->phase != SDM_PHASE_DATA
+                                           ? (int64_t)(d->n_static + d->n_taken)
+                                       : computed > 0 ? computed
+                                                      : 0,
+                            .samples_at_start = (int64_t)(d->n_static + d->n_start),
                             .loss = t->loss,
                             .heldout_rmse_mm = sqrt(t->heldout_mse),
-                            .samples_per_second = samples_per_second,
+                            .heldout_seconds = isfinite(t->heldout_mse) ? t->last_evaluation : NAN,
+                            .samples_per_second = rate * t->pace.unit_maps,
                             .seconds = seconds,
-                            .seconds_left = all > seconds ? all - seconds : 0};
+                            .seconds_left = seconds_left(t, seconds, rate)};
     t->hooks.progress(t->hooks.user, &p);
 }
 
@@ -87,16 +122,38 @@ bool trainer_cancelled(const trainer *t)
     return t->hooks.cancelled && t->hooks.cancelled(t->hooks.user);
 }
 
+bool trainer_evaluation_counts(const trainer *t)
+{
+    enum { EVERY = 500 };
+    return trainer_by_time(t) || t->phase_step % EVERY == 0;
+}
+
 bool trainer_evaluation_due(const trainer *t, double now)
 {
-    return trainer_by_time(t) ? now - t->last_evaluation >= t->config->train.evaluate_seconds
-                              : t->phase_step % 500 == 0;
+    static const int64_t FIRST[] = {10, 20, 50, 100, 200};
+    if (trainer_by_time(t)) {
+        const double interval =
+            fmax(1, fmax(0.5 * (now - t->phase_started), 20 * t->evaluation_seconds));
+        return now - t->last_evaluation >= fmin(t->config->train.evaluate_seconds, interval);
+    }
+    for (size_t i = 0; i < sizeof FIRST / sizeof *FIRST; i++)
+        if (t->phase_step == FIRST[i]) return true;
+    return trainer_evaluation_counts(t);
+}
+
+void trainer_evaluated(trainer *t, double mse, double began)
+{
+    t->heldout_mse = mse;
+    t->last_evaluation = trainer_seconds(t);
+    t->evaluation_seconds = t->last_evaluation - began;
+    t->evaluated_step = t->step;
 }
 
 /* Rewrites the whole file metrics.jsonl: so it is complete at any moment, and a resumed run does
  * not repeat lines. */
 static sdm_status metrics_write(const trainer *t, sdm_error *err)
 {
+    if (!t->folder) return SDM_OK; // a trial
     char path[SDM_PATH_TEXT_MAX + 32];
     snprintf(path, sizeof path, "%s/metrics.jsonl", t->folder);
     sdm_outfile *f;
@@ -108,6 +165,16 @@ static sdm_status metrics_write(const trainer *t, sdm_error *err)
     return s;
 }
 
+/* Closes the object *j, adds it as a line and writes the file. */
+static sdm_status metrics_add(trainer *t, sdm_json *j, sdm_error *err)
+{
+    sdm_json_close(j, '}');
+    if (!j->text.failed) sdm_text_add(t->metrics, "%s\n", j->text.data);
+    const bool failed = j->text.failed || t->metrics->failed;
+    sdm_json_dispose(j);
+    return failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the metrics") : metrics_write(t, err);
+}
+
 sdm_status trainer_metric(trainer *t, double rate, sdm_error *err)
 {
     static const char *const phases[] = {"data", "bases", "fit", "refine", "evaluate"};
@@ -116,27 +183,27 @@ sdm_status trainer_metric(trainer *t, double rate, sdm_error *err)
     sdm_json_text(&j, "phase", phases[t->phase]);
     sdm_json_int(&j, "step", t->step);
     sdm_json_int(&j, "maps", (int64_t)(t->data.n_static + t->data.n_taken));
-    sdm_json_real(&j, "loss_mm2", t->loss);
+    // the last phase trains nothing
+    sdm_json_real(&j, "loss_mm2", t->phase == SDM_PHASE_EVALUATE ? NAN : t->loss);
     sdm_json_real(&j, "heldout_mse_mm2", t->heldout_mse);
     sdm_json_real(&j, "learning_rate", rate);
     // with a budget of steps the file has the same bits in every run: no times
     if (trainer_by_time(t)) sdm_json_real(&j, "seconds", trainer_seconds(t));
-    sdm_json_close(&j, '}');
-    if (!j.text.failed) sdm_text_add(t->metrics, "%s\n", j.text.data);
-    const bool failed = j.text.failed || t->metrics->failed;
-    sdm_json_dispose(&j);
-    return failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the metrics") : metrics_write(t, err);
+    return metrics_add(t, &j, err);
 }
 
-trainer_speed trainer_speed_start(const trainer *t)
+sdm_status trainer_metric_verdict(trainer *t, const sdm_verdict *v, sdm_error *err)
 {
-    return (trainer_speed){t->phase_step, trainer_seconds(t)};
+    sdm_json j = {0};
+    sdm_json_open(&j, NULL, '{');
+    sdm_json_text(&j, "phase", "verdict");
+    sdm_verdict_json(&j, v);
+    if (trainer_by_time(t)) sdm_json_real(&j, "saved_seconds", v->saved_seconds);
+    return metrics_add(t, &j, err);
 }
 
-void trainer_speed_report(trainer *t, trainer_speed *last, size_t batch, double now)
+void trainer_step_done(trainer *t)
 {
-    if (!(now - last->seconds > 0.5)) return;
-    const double maps = (double)(t->phase_step - last->step) * (double)batch;
-    trainer_report(t, trainer_fraction(t), maps / (now - last->seconds), true);
-    *last = (trainer_speed){t->phase_step, now};
+    t->pace.done++;
+    trainer_report(t, trainer_fraction(t), false);
 }

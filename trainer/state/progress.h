@@ -27,8 +27,12 @@ int trainer_workers(const trainer *t);
 /* Number of threads for the training itself: the threads that the producer does not use. */
 int trainer_threads(const trainer *t);
 
-/* Calls the progress callback, at most 10 times a second unless `now`. */
-void trainer_report(trainer *t, double fraction, double samples_per_second, bool now);
+/* Starts to measure the pace of work whose units have `unit_maps` maps each. */
+void trainer_pace_start(trainer *t, double unit_maps);
+
+/* Calls the progress callback, at most 10 times a second unless `now`. The rates are those of the
+   last seconds: t->pace.done counts the finished units of work. */
+void trainer_report(trainer *t, double fraction, bool now);
 
 /* Sends a notice of one line to the message callback. */
 void trainer_message(trainer *t, const char *fmt, ...) SDM_PRINTF(2, 3);
@@ -36,22 +40,24 @@ void trainer_message(trainer *t, const char *fmt, ...) SDM_PRINTF(2, 3);
 /* true if the caller wants the run to stop. [any thread] */
 bool trainer_cancelled(const trainer *t);
 
-/* true if the held-out maps must be evaluated at time `now` (trainer_seconds()): every
-   train.evaluate_seconds with a budget of time, else every 500 steps, so that results do not depend
-   on the clock. */
+/* true if the held-out maps must be evaluated at time `now` (trainer_seconds()). With a budget of
+   time: after one second of a phase, then at intervals that double up to train.evaluate_seconds, or
+   so rarely that evaluations take at most a twentieth of the time. Else at the steps 10, 20, 50,
+   100 and 200 of a phase and every 500 steps, so that results do not depend on the clock. */
 bool trainer_evaluation_due(const trainer *t, double now);
+
+/* true if the evaluation at the present step may choose the weights that are kept (best.h). With a
+   budget of steps only every 500th step does. */
+bool trainer_evaluation_counts(const trainer *t);
+
+/* Notes the error `mse` (mm^2) on held-out maps, from an evaluation that began at time `began`. */
+void trainer_evaluated(trainer *t, double mse, double began);
 
 /* Appends a line with the current figures and the learning rate `rate` to metrics.jsonl. */
 sdm_status trainer_metric(trainer *t, double rate, sdm_error *err);
 
-/* For a training loop: step and time of its last speed report. */
-typedef struct trainer_speed {
-    int64_t step;
-    double seconds;
-} trainer_speed;
+/* Appends a line with the verdict, without times unless the budget is a time. */
+sdm_status trainer_metric_verdict(trainer *t, const sdm_verdict *v, sdm_error *err);
 
-trainer_speed trainer_speed_start(const trainer *t);
-
-/* Reports progress and speed if more than half a second has passed since the last report. batch:
-   maps trained in a step. */
-void trainer_speed_report(trainer *t, trainer_speed *last, size_t batch, double now);
+/* For a training loop: counts a step and reports progress. */
+void trainer_step_done(trainer *t);

@@ -10,10 +10,19 @@
 
 typedef struct train_kind train_kind;
 
+/* The speed of the work: units (computed maps, or steps) finished in the present phase at two times
+   that lie two to four seconds apart, and the time of a unit since the first of them. */
+typedef struct trainer_pace {
+    int64_t done;      /* units finished in this phase */
+    double unit_maps;  /* maps of a unit */
+    int64_t before[2]; /* `done` at seconds[0] and seconds[1] */
+    double seconds[2];
+} trainer_pace;
+
 typedef struct trainer {
     const sdm_config *config;
     const sdm_instance *shape;
-    const char *folder;
+    const char *folder; /* NULL: a trial, which writes no files */
     sdm_train_hooks hooks;
     int n_threads;
     const train_kind *kind;
@@ -35,7 +44,12 @@ typedef struct trainer {
     double started;           /* sdm_clock() at the start, minus the time used before a resume, s */
     /* Seconds since `started`. */
     double phase_started, last_report, last_checkpoint, last_evaluation;
+    double evaluation_seconds; /* duration of the last evaluation */
+    int64_t evaluated_step;    /* step of the last evaluation; -1: none yet */
+    trainer_pace pace;
     double loss, heldout_mse; /* mm^2 */
     struct sdm_text *metrics; /* all lines of metrics.jsonl */
+    double prepared_seconds;  /* trainer_seconds() before the first step */
+    double saved_seconds;     /* by train.patience */
     sdm_accuracy accuracy;    /* accuracy of the finished model */
 } trainer;

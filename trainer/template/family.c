@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "data/streams.h"
+#include "sdm/internal/sampling.h"
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"
 

@@ -247,6 +247,15 @@ static sdm_status template_build(const trainer *t, const sdm_model_info *info, u
     return status;
 }
 
+static sdm_status template_parts(const trainer *t, error_measures *out, sdm_error *err)
+{
+    const template_state *s = state_of(t);
+    out->motion_mm = s->design.motion_error_mm;
+    out->warp_mm = s->design.warp_error_mm;
+    out->corrects = true;
+    return s->corrected ? trainer_kind_pod.parts(t, out, err) : SDM_OK;
+}
+
 static void template_dispose(trainer *t)
 {
     template_state *s = t->design;
@@ -267,4 +276,5 @@ const train_kind trainer_kind_template = {.prepare = template_prepare,
                                           .weights = template_weights,
                                           .fingerprint = template_fingerprint,
                                           .build = template_build,
+                                          .parts = template_parts,
                                           .dispose = template_dispose};

@@ -36,23 +36,24 @@ static inline int sdm_in_region(const sdm_features *f, uint32_t number, const do
     return 1;
 }
 
-/* Squared distance (mm^2) from p to feature `number`; INFINITY where p does not project into the
-   face or the edge, or lies outside of the region of the edge or the corner. A feature whose region
+/* Squared distance (mm^2) from p to feature `number`; INFINITY if it is > most, where p does not
+   project into the face or the edge, or lies outside of the region of the edge or the corner. A feature whose region
    does not hold p may be as near as the nearest one up to rounding (an edge and its end); since it
    is left out here, the smallest distance over the features does not depend on how many of these
    are compared. frames[slot]: the frames of the surface's triangles. The operations and their order
    are those of distances4(), hence the same bits. */
 static inline double sdm_feature_distance2(const sdm_features *f, const sdm_frame *frames,
-                                           uint32_t number, const double p[3])
+                                           uint32_t number, const double p[3], double most)
 {
     const sdm_feature *k = &f->exact[number];
     const double w[3] = {p[0] - k->a[0], p[1] - k->a[1], p[2] - k->a[2]};
     const double s = w[0] * k->u[0] + w[1] * k->u[1] + w[2] * k->u[2];
-    if (number < f->edge_base) return sdm_frame_above(&frames[number], p) ? s * s : INFINITY;
+    if (number < f->edge_base)
+        return s * s <= most && sdm_frame_above(&frames[number], p) ? s * s : INFINITY;
     if (number < f->corner_base && !(s >= 0 && s <= k->length)) return INFINITY;
-    if (!sdm_in_region(f, number, w)) return INFINITY;
     const double rx = w[0] - s * k->u[0], ry = w[1] - s * k->u[1], rz = w[2] - s * k->u[2];
-    return rx * rx + ry * ry + rz * rz;
+    const double d2 = rx * rx + ry * ry + rz * rz;
+    return d2 <= most && sdm_in_region(f, number, w) ? d2 : INFINITY;
 }
 
 /* Is feature `number` at squared distance d taken before feature `best` at squared distance least,

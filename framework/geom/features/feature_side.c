@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "sdm/internal/heap.h"
 #include "sdm/internal/vec3.h"
 
 // Height over longest edge below which the normal of a face is not used.
@@ -52,12 +53,12 @@ static int edge_side(const sdm_frame *f, const double u[3], const sdm_frame *g, 
 /* Adds the edges of the face in this slot. other[edge - edge_base]: 3 * slot + number of the edge
    in its first face. */
 static void face_add_edges(const sdm_nearest *n, uint32_t slot, bool narrow, uint32_t *other,
-                           const double along[3][3])
+                           int8_t *sides, const double along[3][3])
 {
     const sdm_features *f = &n->features;
     for (uint32_t k = 0; k < 3; k++) {
         const uint32_t edge = f->of_slot[slot][k];
-        int8_t *side = &f->side[edge];
+        int8_t *side = &sides[edge];
         uint32_t *first = &other[edge - f->edge_base];
         if (*first == SDM_NONE) {
             *side = narrow ? SDM_SIDE_UNKNOWN : HALF_KNOWN;
@@ -97,18 +98,20 @@ static int corner_side(const corner_state *c)
     return (c->area > 0) == below ? SDM_SIDE_OUTSIDE : SDM_SIDE_INSIDE;
 }
 
-sdm_status sdm_feature_sides_build(sdm_nearest *n, sdm_arena *arena, sdm_error *err)
+sdm_status sdm_feature_sides_find(const sdm_nearest *n, int8_t *side, sdm_error *err)
 {
-    sdm_features *f = &n->features;
+    const sdm_features *f = &n->features;
     const uint32_t n_slot = f->edge_base, n_edge = f->corner_base - n_slot,
                    n_corner = f->end - f->corner_base;
-    const sdm_arena_mark before = arena->end[SDM_HIGH];
-    corner_state *corner;
-    uint32_t *other;
-    sdm_status s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->side, f->end, "sides of features", err);
-    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &other, n_edge, "sides of features", err);
-    if (!s) s = SDM_TAKE_UNSET(arena, SDM_HIGH, &corner, n_corner, "sides of features", err);
-    if (s) return s;
+    corner_state *corner = NULL;
+    uint32_t *other = NULL;
+    sdm_status s = sdm_alloc_unset((void **)&other, n_edge, sizeof *other, "sides of edges", err);
+    if (!s)
+        s = sdm_alloc_unset((void **)&corner, n_corner, sizeof *corner, "sides of corners", err);
+    if (s) {
+        sdm_free(other);
+        return s;
+    }
     memset(other, 0xff, n_edge * sizeof *other);
     for (uint32_t i = 0; i < n_corner; i++)
         corner[i] = (corner_state){.lowest = INFINITY, .highest = -INFINITY};
@@ -118,9 +121,9 @@ sdm_status sdm_feature_sides_build(sdm_nearest *n, sdm_arena *arena, sdm_error *
         const bool narrow =
             frame->flat != 0 || !(sdm_frame_height(frame) > NARROW * frame->half[0]);
         double along[3][3];
-        f->side[slot] = narrow ? SDM_SIDE_UNKNOWN : SDM_SIDE_OF_OWNER;
+        side[slot] = narrow ? SDM_SIDE_UNKNOWN : SDM_SIDE_OF_OWNER;
         edge_directions(frame, along);
-        face_add_edges(n, slot, narrow, other, (const double(*)[3])along);
+        face_add_edges(n, slot, narrow, other, side, (const double(*)[3])along);
         for (int k = 0; k < 3; k++) {
             corner_state *c = &corner[f->of_slot[slot][3 + k] - f->corner_base];
             c->unknown |= narrow;
@@ -128,7 +131,7 @@ sdm_status sdm_feature_sides_build(sdm_nearest *n, sdm_arena *arena, sdm_error *
         }
     }
     for (uint32_t i = n_slot; i < f->corner_base; i++)
-        if (f->side[i] == HALF_KNOWN) f->side[i] = SDM_SIDE_UNKNOWN;
+        if (side[i] == HALF_KNOWN) side[i] = SDM_SIDE_UNKNOWN;
     // corners; that of an edge with unknown side is not closed for certain
     for (uint32_t slot = 0; slot < n_slot; slot++) {
         const uint32_t *of = f->of_slot[slot];
@@ -138,11 +141,12 @@ sdm_status sdm_feature_sides_build(sdm_nearest *n, sdm_arena *arena, sdm_error *
             const double *in = along[(k + 2) % 3], back[3] = {-in[0], -in[1], -in[2]};
             corner_state *c = &corner[of[3 + k] - f->corner_base];
             corner_add(c, along[k], back);
-            c->unknown |= !f->side[of[k]] || !f->side[of[(k + 2) % 3]];
+            c->unknown |= !side[of[k]] || !side[of[(k + 2) % 3]];
         }
     }
     for (uint32_t i = 0; i < n_corner; i++)
-        f->side[f->corner_base + i] = (int8_t)corner_side(&corner[i]);
-    sdm_arena_release(arena, SDM_HIGH, before);
+        side[f->corner_base + i] = (int8_t)corner_side(&corner[i]);
+    sdm_free(corner);
+    sdm_free(other);
     return SDM_OK;
 }

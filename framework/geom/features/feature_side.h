@@ -15,10 +15,9 @@
    faces lie in one plane); not known (more than two faces at an edge, narrow faces, and others). */
 enum { SDM_SIDE_INSIDE = -1, SDM_SIDE_UNKNOWN = 0, SDM_SIDE_OUTSIDE = 1, SDM_SIDE_OF_OWNER = 2 };
 
-/* Fills n->features.side. The surface must bound a solid: outside in front of all triangles, inside
-   behind them. Memory for a few numbers per feature is taken from the high end of the arena and
-   released. SDM_E_NOMEM. */
-sdm_status sdm_feature_sides_build(sdm_nearest *n, sdm_arena *arena, sdm_error *err);
+/* side[n->features.end] = the element for each feature; *n is not changed. The surface must bound a
+   solid: outside in front of all triangles, inside behind them. SDM_E_NOMEM. */
+sdm_status sdm_feature_sides_find(const sdm_nearest *n, int8_t *side, sdm_error *err);
 
 /* Largest squared distance of a feature that may be the nearest one of p, if rounding decided; d2:
    squared distance of the nearest one. If the sides by all such features agree, the side is

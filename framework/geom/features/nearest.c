@@ -65,7 +65,7 @@ static void features_compare(const sdm_nearest *n, const double x[3], uint32_t s
     const sdm_features *f = &n->features;
     for (int i = -1; i < 6; i++) {
         const uint32_t other = i < 0 ? slot : f->of_slot[slot][i];
-        const double d = sdm_feature_distance2(f, n->frames, other, x);
+        const double d = sdm_feature_distance2(f, n->frames, other, x, *d2);
         if (!sdm_is_nearer(d, other, *d2, *number)) continue;
         *d2 = d;
         *number = other;

@@ -71,7 +71,7 @@ static uint32_t voxel_settle(const tile *t, unsigned v, int lane, const double p
         assert(i < c->n);
         if (!(c->list[i].voxels >> lane & 1)) continue;
         const double d =
-            sdm_feature_distance2(t->job->features, t->job->surface->frames, c->list[i].number, p);
+            sdm_feature_distance2(t->job->features, t->job->surface->frames, c->list[i].number, p, *d2);
         if (!(d < *d2 || (d == *d2 && d < INFINITY))) continue;
         // an equal distance replaces the result: the list is read backwards, so the candidate found
         // first is read last
@@ -90,6 +90,7 @@ static void tile_choose(const tile *t, voxels *x)
     const sdm_grid_job *job = t->job;
     const sdm_candidates *c = t->candidates;
     const v8f k = v8_all(ambiguity(t->error));
+    const bool banded = job->band_mm < INFINITY;
     for (int v = 0; v < 8; v++) {
         if (!(t->vectors >> v & 1)) {
             for (int i = 0; i < 8; i++) x->number[voxel_index(job, v, i)] = 0;
@@ -98,7 +99,7 @@ static void tile_choose(const tile *t, voxels *x)
         // clear: the second nearest is farther than the first by more than the errors of both;
         // false for NaN (INFINITY - INFINITY)
         const unsigned at = 8 * t->number + (unsigned)v;
-        if (c->last[at] == SDM_NONE && job->band_mm < INFINITY) { // all voxels are outside the band
+        if (banded && c->last[at] == SDM_NONE) { // all voxels are outside the band
             for (int i = 0; i < 8; i++) {
                 x->settled[x->n_settled] = (uint8_t)voxel_index(job, v, i);
                 x->number[x->settled[x->n_settled]] = SDM_NONE;
@@ -196,7 +197,7 @@ static bool tile_store_block(const tile *t, const int64_t size[3], const float d
 }
 
 /* Writes distances (mm) and, if wanted, slots of the voxels of a tile that are inside the grid. */
-static void tile_store(const tile *t, const float d[64], const uint32_t slot[64])
+static inline void tile_store(const tile *t, const float d[64], const uint32_t slot[64])
 {
     const sdm_grid_job *job = t->job;
     const int64_t *whole = job->part[SDM_TILES].size;

@@ -3,6 +3,8 @@
 
 #include <math.h>
 
+#include "sdm/internal/heap.h"
+
 /* Half the surface area of the box of a node: how likely a search looks into it. */
 static float area_of(const sdm_cluster_node *n)
 {
@@ -31,16 +33,35 @@ static int children_choose(const sdm_features *f, uint32_t root, uint32_t child[
     return n;
 }
 
-sdm_status sdm_wide_tree_build(sdm_features *f, sdm_arena *arena, sdm_error *err)
+size_t sdm_wide_tree_size(const sdm_features *f)
 {
-    // nodes that are not the only one have at least two children: fewer nodes than clusters
-    sdm_status s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->wide, f->edge_base, "wide tree", err);
+    // nodes have at least two children, if there are two clusters: fewer nodes than clusters
+    uint32_t stack[SDM_BVH_DEPTH];
+    size_t n = 0;
+    int top = 0;
+    stack[top++] = 0;
+    while (top) {
+        const sdm_cluster_node *node = &f->node[stack[--top]];
+        n += node->count > 0;
+        if (node->count) continue;
+        stack[top++] = node->first;
+        stack[top++] = node->first + 1;
+    }
+    return n;
+}
+
+sdm_status sdm_wide_tree_build(const sdm_features *f, sdm_wide_node **out, sdm_error *err)
+{
+    sdm_wide_node *tree;
+    const sdm_status s = sdm_alloc_unset((void **)&tree, sdm_wide_tree_size(f), sizeof *tree,
+                                         "tree of clusters", err);
+    *out = tree;
     if (s) return s;
     // the binary node from which each wide node is made, until the loop reaches it, is in child[0]
     uint32_t n = 1;
-    f->wide[0].child[0] = 0;
+    tree[0].child[0] = 0;
     for (uint32_t i = 0; i < n; i++) {
-        sdm_wide_node *wide = &f->wide[i];
+        sdm_wide_node *wide = &tree[i];
         uint32_t child[8];
         const int n_child = children_choose(f, wide->child[0], child);
         for (int k = 0; k < 8; k++) {
@@ -52,7 +73,7 @@ sdm_status sdm_wide_tree_build(sdm_features *f, sdm_arena *arena, sdm_error *err
             wide->child[k] = SDM_WIDE_CLUSTER;
             if (!node) continue;
             wide->child[k] = node->count ? SDM_WIDE_CLUSTER | child[k] : n;
-            if (!node->count) f->wide[n++].child[0] = child[k];
+            if (!node->count) tree[n++].child[0] = child[k];
         }
     }
     return SDM_OK;

@@ -3,7 +3,6 @@
 #pragma once
 
 #include "features/surface_features.h"
-#include "memory/arena.h"
 
 /* Bit of sdm_wide_node.child: the child is a cluster, the other bits are the index of its node in
    sdm_features.node. Without the bit they are an index of a wide node. */
@@ -20,6 +19,9 @@ typedef struct sdm_wide_node {
     uint32_t child[8];
 } sdm_wide_node;
 
-/* Builds f->wide from the nodes of the features; its memory is taken from the low end of the arena.
-   Node 0 is the root. SDM_E_NOMEM. */
-sdm_status sdm_wide_tree_build(sdm_features *f, sdm_arena *arena, sdm_error *err);
+/* *wide = new tree over the clusters of *f, to be freed with sdm_free(). Node 0 is the root.
+   SDM_E_NOMEM. */
+sdm_status sdm_wide_tree_build(const sdm_features *f, sdm_wide_node **wide, sdm_error *err);
+
+/* Largest number of nodes of this tree. */
+size_t sdm_wide_tree_size(const sdm_features *f);

@@ -63,7 +63,13 @@ typedef struct sdm_picture_surface {
 SDM_API sdm_status sdm_picture_surfaces(const char *path, const sdm_picture_surface *surfaces,
                                         size_t n, const char *caption, sdm_error *err);
 
-/* One curve of a plot: the points (x[i], y[i]), i < n, joined by lines. A point that is not finite
+/* Draws surfaces[n], 1 to 16, seen obliquely, in rows of equal length. Scale, values, caption and
+   errors are those of sdm_picture_surfaces(). */
+SDM_API sdm_status sdm_picture_gallery(const char *path, const sdm_picture_surface *surfaces,
+                                       size_t n, const char *caption, sdm_error *err);
+
+/* One curve of a plot: the points (x[i], y[i]), i < n, joined by lines; markers show up to about 60
+   single points. A point that is not finite
    (or, on a logarithmic axis, not positive) is left out and leaves a gap. */
 typedef struct sdm_curve {
     const char *title; /* for the legend; NULL or "": not listed */

@@ -26,13 +26,19 @@ SDM_API sdm_status sdm_registry_add(sdm_registry *r, const sdm_shape *shape, con
                                     sdm_error *err);
 
 /* Loads a shared object and adds all its shapes. `file` must come from the command line or the
- * environment, never from a configuration. SDM_E_PLUGIN; SDM_E_UNSUPPORTED in a build without
- * plug-ins (SDM_PLUGINS=OFF). */
+ * environment, never from a configuration. A file that is loaded already, under this name, another
+ * one or as a copy of the same bytes, adds nothing. SDM_E_PLUGIN; SDM_E_UNSUPPORTED in a build
+ * without plug-ins (SDM_PLUGINS=OFF). */
 SDM_API sdm_status sdm_registry_load(sdm_registry *r, const char *file, sdm_error *err);
 
 /* Loads every *.so in the folders of a colon-separated path (the value of SDMGEN_PLUGIN_PATH); NULL
- * does nothing. Errors as sdm_registry_load(). */
+ * does nothing. A file that cannot be loaded (SDM_E_PLUGIN of sdm_registry_load()) is skipped.
+ * SDM_E_PLUGIN: a folder cannot be read; SDM_E_UNSUPPORTED as above. */
 SDM_API sdm_status sdm_registry_load_path(sdm_registry *r, const char *path, sdm_error *err);
+
+/* Message number `index` about the files that sdm_registry_load_path() has skipped; NULL: there are
+ * fewer. Valid as long as the registry. */
+SDM_API const char *sdm_registry_skipped(const sdm_registry *r, size_t index);
 
 SDM_API size_t sdm_registry_count(const sdm_registry *r);
 /* Shape and origin of entry `index`, in order of addition. */
@@ -50,6 +56,11 @@ typedef struct sdm_instance sdm_instance;
 typedef struct sdm_named_text {
     const char *name, *value;
 } sdm_named_text;
+
+/* Checks one option without the others; files are not opened. SDM_E_CONFIG: an unknown option (with
+ * "did you mean" or the names) or a bad value. [any thread] */
+SDM_API sdm_status sdm_shape_check_option(const sdm_shape *shape, const char *name,
+                                          const char *value, sdm_error *err);
 
 /* Creates an instance with the given options; all others have their defaults. The shape must stay
  * valid as long as the instance. base_dir (may be NULL): folder for relative paths in FILE options.

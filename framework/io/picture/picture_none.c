@@ -32,6 +32,13 @@ sdm_status sdm_picture_surfaces(const char *path, const sdm_picture_surface *sur
     return sdm_picture_check(path, err);
 }
 
+sdm_status sdm_picture_gallery(const char *path, const sdm_picture_surface *surfaces, size_t n,
+                               const char *caption, sdm_error *err)
+{
+    (void)surfaces, (void)n, (void)caption;
+    return sdm_picture_check(path, err);
+}
+
 sdm_status sdm_picture_plot(const char *path, const char *title, const char *x_label,
                             const char *y_label, bool log_y, const sdm_curve *curves,
                             size_t n_curves, sdm_error *err)

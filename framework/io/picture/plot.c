@@ -4,6 +4,7 @@
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 #include "panel.h"
 
@@ -155,8 +156,34 @@ static sdm_colour curve_colour(size_t i)
     return known[i % (sizeof known / sizeof *known)];
 }
 
-static void draw_curve(sdm_canvas *c, const window *w, const sdm_curve *curve, sdm_colour colour)
+/* A marker of 7 pixels: a disc for the first curve, a diamond for the second, and so on in turn. */
+static void draw_marker(sdm_canvas *c, double x, double y, size_t number, sdm_colour colour)
 {
+    if (number % 2 == 0) {
+        sdm_canvas_line(c, x, y, x, y, 7, colour); // lines have round ends
+        return;
+    }
+    // lines of falling length, one per row of pixels
+    for (int i = -4; i <= 4; i++)
+        sdm_canvas_line(c, x - (4 - abs(i)), y + i, x + (4 - abs(i)), y + i, 1.1, colour);
+}
+
+/* Draws a marker at each point, unless the points lie too close. */
+static void draw_markers(sdm_canvas *c, const window *w, const sdm_curve *curve, size_t number)
+{
+    enum { ROOM = 14 }; // pixels of width for each marker
+    double p[2];
+    size_t n = 0;
+    for (size_t i = 0; i < curve->n; i++) n += curve_point(curve, i, w->log_y, p);
+    if (n > (size_t)(area.w / ROOM)) return;
+    for (size_t i = 0; i < curve->n; i++)
+        if (curve_point(curve, i, w->log_y, p))
+            draw_marker(c, to_x(w, p[0]), to_y(w, p[1]), number, curve_colour(number));
+}
+
+static void draw_curve(sdm_canvas *c, const window *w, const sdm_curve *curve, size_t number)
+{
+    const sdm_colour colour = curve_colour(number);
     double p[2];
     bool is_started = false;
     sdm_canvas_clip(c, area);
@@ -169,6 +196,7 @@ static void draw_curve(sdm_canvas *c, const window *w, const sdm_curve *curve, s
     }
     sdm_canvas_stroke(c, 1.8, colour);
     sdm_canvas_unclip(c);
+    draw_markers(c, w, curve, number);
 }
 
 static void draw_legend(sdm_canvas *c, const sdm_curve *curves, size_t n)
@@ -190,6 +218,7 @@ static void draw_legend(sdm_canvas *c, const sdm_curve *curves, size_t n)
     for (size_t i = 0; i < n; i++) {
         if (!curves[i].title || !curves[i].title[0]) continue;
         sdm_canvas_line(c, x + 12, y - 5, x + 42, y - 5, 2.4, curve_colour(i));
+        draw_marker(c, x + 27, y - 5, i, curve_colour(i));
         sdm_canvas_text(c, x + 52, y, (sdm_type){.size = 10, .colour = SDM_INK}, curves[i].title);
         y += 22;
     }
@@ -224,7 +253,7 @@ sdm_status sdm_picture_plot(const char *path, const char *title, const char *x_l
     if (s) return s;
     draw_x_axis(c, &w);
     draw_y_axis(c, &w);
-    for (size_t i = 0; i < n_curves; i++) draw_curve(c, &w, &curves[i], curve_colour(i));
+    for (size_t i = 0; i < n_curves; i++) draw_curve(c, &w, &curves[i], i);
     sdm_canvas_frame(c, area, SDM_INK_LIGHT);
     draw_legend(c, curves, n_curves);
     draw_labels(c, title, x_label, y_label);

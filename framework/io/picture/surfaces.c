@@ -11,8 +11,10 @@
 /* Limits, and lengths in pixels. */
 enum {
     SURFACES_MAX = 8,
+    GALLERY_MAX = 16,
     N_VIEWS = 2,
-    FINE = 3, /* samples along each side of a pixel */
+    OBLIQUE = 1, /* index of the view of a gallery */
+    FINE = 3,    /* samples along each side of a pixel */
     N_SHADES = 255,
     MIDDLE = N_SHADES / 2, /* index of the colour of 0 */
     PANEL = 400,           /* pixels of the longer side of the largest view */
@@ -41,7 +43,8 @@ static const view VIEWS[N_VIEWS] = {
 /* The surfaces and where everything lies on the canvas. */
 typedef struct scene {
     const sdm_picture_surface *surfaces;
-    size_t n;
+    size_t n, columns;
+    int first_view; /* the surfaces are drawn in this view and those after it */
     /* bounding boxes of all surfaces in the planes of the views, mm */
     double low[N_VIEWS][2], high[N_VIEWS][2];
     double pixels; /* per mm */
@@ -246,6 +249,14 @@ static sdm_status draw_panel(const scene *sc, sdm_canvas *c, size_t column, int 
     return s;
 }
 
+/* Height of a row of surfaces with its titles. */
+static int row_height(const scene *sc)
+{
+    int h = TOP - GAP;
+    for (int v = sc->first_view; v < N_VIEWS; v++) h += sc->height[v] + GAP;
+    return h;
+}
+
 static sdm_status draw_scene(const scene *sc, sdm_canvas *c, int bar_top, const char *caption,
                              sdm_error *err)
 {
@@ -254,16 +265,16 @@ static sdm_status draw_scene(const scene *sc, sdm_canvas *c, int bar_top, const 
     char text[160];
     sdm_status s = SDM_OK;
     for (size_t k = 0; k < sc->n && !s; k++) {
-        const int left = SIDE + (int)k * (sc->width + GAP);
-        int top = TOP;
-        sdm_canvas_text(c, left + sc->width / 2.0, TOP - 18, title,
+        const int left = SIDE + (int)(k % sc->columns) * (sc->width + GAP);
+        int top = TOP + (int)(k / sc->columns) * row_height(sc);
+        sdm_canvas_text(c, left + sc->width / 2.0, top - 18, title,
                         sc->surfaces[k].title ? sc->surfaces[k].title : "");
-        for (int v = 0; v < N_VIEWS && !s; v++) {
+        for (int v = sc->first_view; v < N_VIEWS && !s; v++) {
             const sdm_box box = {left, top, sc->width, sc->height[v]};
             s = draw_panel(sc, c, k, v, box, err);
             sdm_canvas_text(c, left + 6, top + 14, (sdm_type){.size = 9, .colour = SDM_INK_LIGHT},
                             VIEWS[v].name);
-            if (k == 0 && v == 0) sdm_panel_scale_bar(c, box, sc->pixels);
+            if (k == 0 && v == sc->first_view) sdm_panel_scale_bar(c, box, sc->pixels);
             top += sc->height[v] + GAP;
         }
         if (!sc->surfaces[k].values) continue;
@@ -274,13 +285,15 @@ static sdm_status draw_scene(const scene *sc, sdm_canvas *c, int bar_top, const 
     return s;
 }
 
-sdm_status sdm_picture_surfaces(const char *path, const sdm_picture_surface *surfaces, size_t n,
-                                const char *caption, sdm_error *err)
+/* Draws at most `most` surfaces in rows of `columns`, in the views from first_view on. */
+static sdm_status draw_surfaces(const char *path, const sdm_picture_surface *surfaces, size_t n,
+                                size_t most, size_t columns, int first_view, const char *caption,
+                                sdm_error *err)
 {
     if (!path || !surfaces || !caption)
-        return sdm_fail(err, SDM_E_ARG, "sdm_picture_surfaces: NULL argument");
-    if (n < 1 || n > SURFACES_MAX)
-        return sdm_fail(err, SDM_E_ARG, "%zu surfaces in a picture, need 1 to %d", n, SURFACES_MAX);
+        return sdm_fail(err, SDM_E_ARG, "picture of surfaces: NULL argument");
+    if (n < 1 || n > most)
+        return sdm_fail(err, SDM_E_ARG, "%zu surfaces in a picture, need 1 to %zu", n, most);
     for (size_t k = 0; k < n; k++) {
         if (!surfaces[k].mesh)
             return sdm_fail(err, SDM_E_ARG, "surface %zu of the picture has no mesh", k);
@@ -288,15 +301,30 @@ sdm_status sdm_picture_surfaces(const char *path, const sdm_picture_surface *sur
         const sdm_status s = sdm_mesh_audit(surfaces[k].mesh, &audit, err);
         if (s) return sdm_fail_in(err, s, "surface %zu of the picture", k);
     }
-    scene sc = {.surfaces = surfaces, .n = n};
+    scene sc = {.surfaces = surfaces, .n = n, .columns = columns, .first_view = first_view};
     sdm_canvas *c = NULL;
     scene_measure(&sc);
     scene_place(&sc);
-    const int h = TOP + sc.height[0] + GAP + sc.height[1] + GAP + FOOT;
-    sdm_status s = sdm_canvas_create(path, 2 * SIDE + (int)n * (sc.width + GAP) - GAP, h, &c, err);
+    const int rows = (int)((n + columns - 1) / columns), h = rows * row_height(&sc) + GAP + FOOT;
+    sdm_status s =
+        sdm_canvas_create(path, 2 * SIDE + (int)columns * (sc.width + GAP) - GAP, h, &c, err);
     if (s) return s;
     s = draw_scene(&sc, c, h - FOOT, caption, err);
     if (!s) return sdm_canvas_finish(c, err);
     sdm_canvas_discard(c);
     return s;
+}
+
+sdm_status sdm_picture_surfaces(const char *path, const sdm_picture_surface *surfaces, size_t n,
+                                const char *caption, sdm_error *err)
+{
+    return draw_surfaces(path, surfaces, n, SURFACES_MAX, n, 0, caption, err);
+}
+
+sdm_status sdm_picture_gallery(const char *path, const sdm_picture_surface *surfaces, size_t n,
+                               const char *caption, sdm_error *err)
+{
+    size_t columns = 1;
+    while (columns * columns < n) columns++;
+    return draw_surfaces(path, surfaces, n, GALLERY_MAX, columns, OBLIQUE, caption, err);
 }

@@ -27,7 +27,11 @@ typedef struct sdm_vdb_opts {
     size_t n_metadata;
     /* Called now and then; true: SDM_E_CANCELLED and no file. May be NULL. */
     bool (*cancelled)(void *user);
-    void *user;
+    /* Makes the same map on another grid: values[nz][ny][nx]. Called at most once, with a larger
+       grid, where the band leaves the grid but the surface does not; the values beyond the grid
+       are then those of this map. NULL: they are estimated from the values at its border. */
+    sdm_status (*map)(void *user, const sdm_grid *grid, float *values, sdm_error *err);
+    void *user; /* passed to cancelled() and map() */
 } sdm_vdb_opts;
 
 typedef struct sdm_vdb_report {
@@ -38,6 +42,9 @@ typedef struct sdm_vdb_report {
     /* Voxels whose value was changed to satisfy checkLevelSet (creases, very thin parts). */
     int64_t adjusted_voxels;
     double adjusted_mm; /* largest such change */
+    /* Voxels of the band beyond the grid whose distances are estimated from those at its border, to
+     * about a quarter of a voxel. */
+    int64_t estimated_voxels;
 } sdm_vdb_report;
 
 /* Writes values[nz][ny][nx] as grid `surface`, atomically. Coordinates are LPS, mm. report may be
@@ -54,7 +61,8 @@ typedef struct sdm_vdb_report {
    so no voxel changes between inside and outside; zero crossings move by a fraction of a voxel.
 
    A surface that leaves the grid is closed at the grid's border (half a voxel beyond the outermost
-   centres), and where the band leaves the grid it continues outside.
+   centres), and where the band leaves the grid it continues outside: by opts->map(), else by
+   estimates (report->estimated_voxels).
 
    SDM_E_ARG: nothing is inside; voxels of a level set are not uniform (the message names --dense);
    voxels are below 2e-5 mm (1e-3 mm on rotated axes). The file ends with a checksum of all its

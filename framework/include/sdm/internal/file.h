@@ -50,6 +50,14 @@ SDM_INTERNAL_API void sdm_outfile_discard(sdm_outfile **f);
  * the folder exists. SDM_E_ARG, SDM_E_IO, SDM_E_NOMEM. */
 sdm_status sdm_make_folder(const char *path, sdm_error *err);
 
+/* Returns the length of the longest part of `path`, up to a '/' or its end, that exists; 0: none.
+ */
+size_t sdm_folder_existing(const char *path);
+
+/* Takes back sdm_make_folder(): removes the folder `path` and its parents with names longer than
+ * `existing` characters (sdm_folder_existing() before they were made), as far as they are empty. */
+void sdm_folder_remove_empty(const char *path, size_t existing);
+
 #ifdef __cplusplus
 }
 #endif

@@ -52,6 +52,22 @@ SDM_INTERNAL_API bool sdm_parse_int(const char *s, int64_t *out);
  * Returns buf. */
 SDM_INTERNAL_API const char *sdm_format_real(double v, char buf[32]);
 
+/* SDM_E_RANGE, "parameter 'a' = 9 mm, allowed 2 .. 5 mm": the one text about a parameter out of its
+ * range min .. max. */
+sdm_status sdm_fail_range(const char *name, double value, double min, double max, const char *unit,
+                          sdm_error *err);
+
+/* buf[size] = "a, b, c", the names for a message; names that do not fit become "...". Returns buf.
+ */
+const char *sdm_list_names(const char *const *names, size_t n, char *buf, size_t size);
+
+/* True for the name of a shape, a parameter or an option: SDM_NAME_RULE says which texts are. NULL
+ * is none. */
+bool sdm_is_name(const char *text);
+#define SDM_NAME_LENGTH_MAX 63
+#define SDM_NAME_RULE                                                                              \
+    "names are a small letter, then small letters, digits and _, at most 63 in all"
+
 /* The most similar of names[n] to `word` by optimal string alignment distance, or NULL if none is
  * similar. */
 const char *sdm_nearest_name(const char *word, const char *const *names, size_t n);

@@ -3,6 +3,8 @@
 
 #include "sdm/exact.h"
 #include "sdm/internal/config.h"
+#include "sdm/internal/mistakes.h"
+#include "sdm/internal/verdict.h"
 #include "sdm/model.h"
 #include "sdm/registry.h"
 
@@ -31,12 +33,16 @@ typedef struct sdm_progress {
     double fraction; /* used fraction of the whole budget, 0 .. 1 */
     /* Optimiser steps; exact training maps computed so far. */
     int64_t step, samples;
-    double loss; /* training loss, mm^2; NaN before the first step */
-    /* Held-out root mean square error at the last evaluation; NaN before the first. */
-    double heldout_rmse_mm;
-    /* Maps per second: in SDM_PHASE_DATA computed maps, later maps used for training. */
+    int64_t samples_at_start; /* exact training maps that precede the first step */
+    /* Mean square error of the last batch, mm^2, whatever train.loss; NaN before the first step. */
+    double loss;
+    /* Root mean square error on held-out shapes, and the value of `seconds` when it was measured;
+       NaN before the first evaluation. */
+    double heldout_rmse_mm, heldout_seconds;
+    /* Maps per second over the last two to four seconds: in SDM_PHASE_DATA computed maps, later
+       maps used for training; NaN: not known yet. */
     double samples_per_second;
-    double seconds, seconds_left;
+    double seconds, seconds_left; /* of the run; NaN: not known */
 } sdm_progress;
 
 /* Callbacks of the caller; each may be NULL. */
@@ -56,6 +62,7 @@ typedef struct sdm_train_report {
     /* Optimiser steps; training maps. */
     int64_t steps, samples;
     double seconds;
+    sdm_verdict verdict;
 } sdm_train_report;
 
 /* Trains a network as `config` says and writes into `folder`: config.yaml (with all defaults filled
@@ -67,27 +74,39 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
                      sdm_error *err);
 
 /* Parameter ranges of the training, min[n] and max[n]: those of the shape, narrowed by the
-   configuration. SDM_E_CONFIG with file:line:column: a parameter is unknown, or its range is wider
-   than the shape's. */
+   configuration. SDM_E_CONFIG with a line "file:line:column: ..." for every parameter that is
+   unknown or whose range is wider than the shape's. */
 sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape, double *min,
                             double *max, sdm_error *err);
+
+/* Completes a configuration whose grid is to be fitted to the shapes (grid: auto, grid.voxels, or
+   grid.spacing alone): the box of sdm_shape_box() over the ranges of sdm_train_ranges(), and
+   sdm_grid_around() it. Appends one line about the grid to *line (which may be NULL). Does nothing
+   if the grid is complete. The same configuration and shape give the same grid. SDM_E_CONFIG with
+   file:line:column, and the errors of sdm_instance_mesh(). */
+sdm_status sdm_train_grid(sdm_config *config, const sdm_instance *shape, sdm_text *line,
+                          sdm_error *err);
+
+/* Appends a grid that holds the shapes of the configuration, for a message about one that cuts
+   them: "grid: auto (size: [59, 52, 37], spacing: 0.23, origin: [-6.1, -5.5, -2.1])", or with
+   "grid: {voxels: 80}" if the longest edge of the present grid has 80 voxels. Errors as
+   sdm_train_grid(). */
+sdm_status sdm_train_grid_proposal(const sdm_config *config, const sdm_instance *shape,
+                                   sdm_text *out, sdm_error *err);
 
 /* Distributions of the parameters in the training, out[n], on the ranges min[n] and max[n] of
    sdm_train_ranges(): as shape.distribution says. A normal distribution for which neither the
    configuration nor the shape has figures gets the default value (moved into the range) as its mean
-   and a quarter of the range as its deviation. SDM_E_CONFIG with file:line:column: a parameter is
-   unknown, or its figures do not fit its range. */
+   and a quarter of the range as its deviation. SDM_E_CONFIG with a line
+   "file:line:column: ..." for every parameter that is unknown or whose figures do not fit its
+   range. */
 sdm_status sdm_train_distributions(const sdm_config *config, const sdm_instance *shape,
                                    const double *min, const double *max, sdm_distribution *out,
                                    sdm_error *err);
 
-/* p[n] = random parameter vector number `index` of `stream`, within min[n] .. max[n]: the quantiles
-   of distribution[n] at a Sobol' point (Joe and Kuo 2008) with a random digital shift for n <= 64,
-   or at independent counter-based random numbers for n > 64. Depends on the arguments only. [any
-   thread] */
-void sdm_sample_params(uint64_t seed, uint64_t stream, uint64_t index, const double *min,
-                       const double *max, const sdm_distribution *distribution, size_t n,
-                       double *p);
+/* Adds to *m the mistakes in the ranges and distributions of the configuration, as the two
+   functions above find them, and a shape with more than SDM_MAX_PARAMS parameters. */
+void sdm_train_find_mistakes(const sdm_config *config, const sdm_instance *shape, sdm_mistakes *m);
 
 #ifdef __cplusplus
 }

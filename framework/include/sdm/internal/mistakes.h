@@ -4,6 +4,10 @@
 
 #include "sdm/internal/config.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define SDM_MISTAKES_SHOWN 20
 #define SDM_MISTAKE_TEXT_MAX 400
 #define SDM_QUOTE_MAX 80
@@ -33,3 +37,7 @@ const char *sdm_mark_print(sdm_mark mark, const char *file, char *buf, size_t si
 /* buf = `text` for use in a message: control characters become '?', and the text is cut after 60
  * bytes. Returns buf. */
 const char *sdm_quote(const char *text, char buf[SDM_QUOTE_MAX]);
+
+#ifdef __cplusplus
+}
+#endif

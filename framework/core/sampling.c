@@ -3,7 +3,7 @@
 
 #include "sdm/internal/distribution.h"
 #include "sdm/internal/rng.h"
-#include "sdm/internal/train.h"
+#include "sdm/internal/sampling.h"
 
 #define DIMENSIONS 64
 #define BITS 32

@@ -1,0 +1,306 @@
+/* Tells the findings of a survey of shapes. */
+#include "report_survey.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "report_audit.h"
+#include "sdm/internal/train.h"
+#include "terminal.h"
+
+enum { PARAMS_TOLD = 6, NOTICE_SAMPLES = 32 };
+
+/* Where the lines go. */
+typedef struct teller {
+    const cli_survey *s;
+    cli_tell *tell;
+    void *user;
+    bool failed; /* memory is short */
+} teller;
+
+/* Tells the text and frees it. */
+static void tell(teller *t, sdm_status weight, sdm_text *text)
+{
+    t->failed = t->failed || text->failed;
+    if (!t->failed) t->tell(t->user, weight, text->data);
+    sdm_text_dispose(text);
+}
+
+/* Appends "a=4.4 alpha=0.5" of shape `index`: some of its parameters, without number `skip`. */
+static void add_params(const cli_survey *s, size_t index, size_t skip, sdm_text *out)
+{
+    size_t n, told = 0;
+    const sdm_param *params = sdm_instance_params(s->shape, &n);
+    for (size_t i = 0; i < n && told < PARAMS_TOLD; i++)
+        if (i != skip)
+            sdm_text_add(out, "%s%s=%.6g", told++ ? " " : "", params[i].name,
+                         s->found.p[index * n + i]);
+    if (n > PARAMS_TOLD + (skip < n)) sdm_text_add(out, " ...");
+}
+
+/* Makes the mesh of shape `index`; false: it cannot be made, for the reason in *err. */
+static bool make(const cli_survey *s, size_t index, sdm_mesh *mesh, sdm_error *err)
+{
+    return !sdm_instance_mesh(s->shape, s->found.p + index * s->found.n_params, mesh, err);
+}
+
+/* "in 3 of 145 shapes" */
+static void add_share(const cli_survey *s, const sdm_survey_count *c, sdm_text *text)
+{
+    if (c->shapes == s->found.n)
+        sdm_text_add(text, "in all %zu shapes", c->shapes);
+    else
+        sdm_text_add(text, "in %zu of %zu shapes", c->shapes, s->found.n);
+}
+
+/* "WHAT in 3 of 145 shapes, up to 12 at a=1 b=2" */
+static void add_count(const cli_survey *s, const sdm_survey_count *c, const char *what,
+                      sdm_text *text)
+{
+    sdm_text_add(text, "%s ", what);
+    add_share(s, c, text);
+    sdm_text_add(text, ", up to %.6g at ", c->amount);
+    add_params(s, c->worst, SIZE_MAX, text);
+}
+
+static void tell_failed(teller *t)
+{
+    const sdm_survey_count *c = &t->s->found.failed;
+    sdm_mesh mesh = {0};
+    sdm_error why = {0};
+    sdm_text text = {0};
+    if (!c->shapes) return;
+    sdm_text_add(&text, "no mesh ");
+    add_share(t->s, c, &text);
+    // the audit refuses some meshes that a shape can make
+    if (make(t->s, c->worst, &mesh, &why)) (void)sdm_mesh_audit(&mesh, &(sdm_audit){0}, &why);
+    sdm_mesh_dispose(&mesh);
+    sdm_text_add(&text, ": %s", why.text);
+    tell(t, SDM_E_MESH, &text);
+}
+
+static void tell_open(teller *t)
+{
+    sdm_text text = {0};
+    if (!t->s->found.open.shapes) return;
+    add_count(t->s, &t->s->found.open, "open or badly oriented edges", &text);
+    sdm_text_add(&text, ": on every edge as many triangles must run in one direction as in the "
+                        "other");
+    tell(t, SDM_E_MESH, &text);
+}
+
+static void tell_inside_out(teller *t)
+{
+    const sdm_survey_count *c = &t->s->found.inside_out;
+    sdm_mesh mesh = {0};
+    sdm_part_audit audit = {0};
+    if (!c->shapes) return;
+    if (make(t->s, c->worst, &mesh, NULL) && !sdm_part_audit_make(&mesh, false, &audit, NULL)) {
+        for (size_t i = 0; i < audit.n; i++) {
+            sdm_text text = {0};
+            if (audit.part[i].state != SDM_PART_INSIDE_OUT) continue;
+            cli_describe_part(&audit, i, &text);
+            sdm_text_add(&text, " (");
+            add_share(t->s, c, &text);
+            sdm_text_add(&text, "); " CLI_MEND_SHAPE);
+            tell(t, SDM_E_QUALITY, &text);
+            break;
+        }
+    }
+    sdm_part_audit_dispose(&audit);
+    sdm_mesh_dispose(&mesh);
+}
+
+static void tell_turned(teller *t)
+{
+    const sdm_survey_count *c = &t->s->found.turned;
+    sdm_text text = {0};
+    if (!c->shapes) return;
+    add_count(t->s, c, "parts that are inside out and that the exact engine turns", &text);
+    const bool always = c->shapes == t->s->found.n;
+    if (!always) sdm_text_add(&text, ": at other parameters they are not");
+    tell(t, always ? SDM_OK : SDM_E_QUALITY, &text);
+}
+
+static void tell_sizes(teller *t)
+{
+    const sdm_shape_survey *f = &t->s->found;
+    sdm_text text = {0};
+    if (f->resized.shapes) {
+        sdm_text_add(&text,
+                     "the numbers of vertices and triangles change: %zu and %zu at first, others ",
+                     f->n_vert, f->n_tri);
+        add_share(t->s, &f->resized, &text);
+        sdm_text_add(&text, ", for example %.0f vertices at ", f->resized.amount);
+        add_params(t->s, f->resized.worst, SIZE_MAX, &text);
+        sdm_text_add(&text, "; derivatives need the same numbers everywhere");
+        tell(t, SDM_E_QUALITY, &text);
+    } else if (f->rewired.shapes) {
+        sdm_text_add(&text, "the triangles get other vertices ");
+        add_share(t->s, &f->rewired, &text);
+        sdm_text_add(&text, ", for example at ");
+        add_params(t->s, f->rewired.worst, SIZE_MAX, &text);
+        sdm_text_add(&text, "; derivatives need the same triangles everywhere");
+        tell(t, SDM_E_QUALITY, &text);
+    }
+}
+
+static void tell_jumps(teller *t)
+{
+    const sdm_param *params = sdm_instance_params(t->s->shape, NULL);
+    for (size_t k = 0; k < t->s->found.n_params && t->s->found.jump; k++) {
+        const sdm_survey_jump *j = &t->s->found.jump[k];
+        sdm_text text = {0};
+        if (j->kind == SDM_BREAK_NONE) continue;
+        if (j->kind == SDM_BREAK_JUMP)
+            sdm_text_add(&text, "vertex %zu jumps by %.3g mm", j->vertex, j->mm);
+        else
+            sdm_text_add(&text, "the %s",
+                         j->kind == SDM_BREAK_SIZES ? "number of vertices or triangles changes"
+                                                    : "triangles change");
+        sdm_text_add(&text, " at %s=%.6g%s", params[k].name, j->value,
+                     t->s->found.n_params > 1 ? ", with " : "");
+        add_params(t->s, j->shape, k, &text);
+        sdm_text_add(&text, "; a network cannot learn jumps");
+        tell(t, SDM_E_QUALITY, &text);
+    }
+}
+
+/* The world box of the voxel centres. */
+static void grid_box(const sdm_grid *g, double low[3], double high[3])
+{
+    for (int a = 0; a < 3; a++) {
+        low[a] = high[a] = g->origin[a];
+        for (int i = 0; i < 3; i++) {
+            const double edge = g->dir[3 * a + i] * g->spacing[i] * (double)(g->n[i] - 1);
+            *(edge < 0 ? &low[a] : &high[a]) += edge;
+        }
+    }
+}
+
+static void tell_cut(teller *t)
+{
+    const sdm_shape_survey *f = &t->s->found;
+    sdm_text text = {0};
+    double low[3], high[3];
+    bool beyond = false;
+    if (!t->s->grid) return;
+    for (int a = 0; a < 3; a++) beyond = beyond || f->beyond[a][0] > 0 || f->beyond[a][1] > 0;
+    if (!beyond) return;
+    grid_box(t->s->grid, low, high);
+    sdm_text_add(&text,
+                 "over the parameters the shape reaches from (%.4g, %.4g, %.4g) to (%.4g, %.4g, "
+                 "%.4g) mm; the grid covers (%.4g, %.4g, %.4g) to (%.4g, %.4g, %.4g) mm and cuts ",
+                 f->low[0], f->low[1], f->low[2], f->high[0], f->high[1], f->high[2], low[0],
+                 low[1], low[2], high[0], high[1], high[2]);
+    if (f->cut.shapes)
+        sdm_text_add(&text, "%.2g %% of the shapes",
+                     100.0 * (double)f->cut.shapes / (double)f->n_samples);
+    else
+        sdm_text_add(&text, "only shapes at the corners of the ranges");
+    const char *between = " (by up to ";
+    for (int a = 0; a < 3; a++)
+        for (int side = 0; side < 2; side++) {
+            if (!(f->beyond[a][side] > 0)) continue;
+            sdm_text_add(&text, "%s%.3g mm at the %s end of %c", between, f->beyond[a][side],
+                         side ? "upper" : "lower", "xyz"[a]);
+            between = ", ";
+        }
+    sdm_text_add(&text, ")");
+    sdm_text use = {0};
+    if (t->s->config && !sdm_train_grid_proposal(t->s->config, t->s->shape, &use, NULL))
+        sdm_text_add(&text, "; use %s", use.data);
+    sdm_text_dispose(&use);
+    tell(t, f->cut.shapes ? SDM_E_QUALITY : SDM_OK, &text);
+}
+
+static void tell_callbacks(teller *t)
+{
+    const sdm_shape_survey *f = &t->s->found;
+    const sdm_param *params = sdm_instance_params(t->s->shape, NULL);
+    if (f->velocity_error > SDM_SURVEY_VELOCITY_LIMIT) {
+        sdm_text text = {0};
+        sdm_text_add(&text,
+                     "velocity() is off by %.3g of the largest velocity by %s, at vertex %zu and ",
+                     f->velocity_error, params[f->velocity_param].name, f->velocity_vertex);
+        add_params(t->s, f->velocity_shape, SIZE_MAX, &text);
+        sdm_text_add(&text, "; compared with differences of meshes");
+        tell(t, SDM_E_QUALITY, &text);
+    }
+    if (f->unlike) {
+        sdm_text text = {0};
+        sdm_text_add(&text,
+                     "%zu meshes had other bits when they were made again or by several threads: "
+                     "mesh() must depend on its arguments alone (no static variables, no files)",
+                     f->unlike);
+        tell(t, SDM_E_QUALITY, &text);
+    }
+}
+
+static void tell_notes(teller *t)
+{
+    const sdm_shape_survey *f = &t->s->found;
+    const struct {
+        const sdm_survey_count *count;
+        const char *what, *after;
+    } notes[] = {{&f->overlaps, "overlaps (pairs of triangles that meet)", ": the union counts"},
+                 {&f->degenerate, "triangles without area", ""},
+                 {&f->duplicate, "triangles given twice", ": they count once"}};
+    for (size_t i = 0; i < sizeof notes / sizeof *notes; i++) {
+        sdm_text text = {0};
+        const size_t n = notes[i].count->shapes;
+        if (!n || (notes[i].count == &f->overlaps && t->s->brief && n == f->n)) continue;
+        add_count(t->s, notes[i].count, notes[i].what, &text);
+        sdm_text_add(&text, "%s", notes[i].after);
+        tell(t, SDM_OK, &text);
+    }
+}
+
+sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell_line, void *user, sdm_error *err)
+{
+    teller t = {.s = s, .tell = tell_line, .user = user};
+    tell_failed(&t);
+    tell_open(&t);
+    tell_inside_out(&t);
+    tell_turned(&t);
+    tell_sizes(&t);
+    tell_jumps(&t);
+    tell_cut(&t);
+    tell_callbacks(&t);
+    tell_notes(&t);
+    return t.failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the findings") : SDM_OK;
+}
+
+static void notice(void *user, sdm_status weight, const char *line)
+{
+    (void)user, (void)weight;
+    cli_notice("%s", line);
+}
+
+void cli_notice_survey(const sdm_config *c, const sdm_instance *shape)
+{
+    double min[SDM_MAX_PARAMS], max[SDM_MAX_PARAMS], range[SDM_MAX_PARAMS][2];
+    sdm_distribution distribution[SDM_MAX_PARAMS];
+    size_t n;
+    sdm_instance_params(shape, &n);
+    if (cli_is_quiet() || n > SDM_MAX_PARAMS || sdm_train_ranges(c, shape, min, max, NULL) ||
+        sdm_train_distributions(c, shape, min, max, distribution, NULL))
+        return;
+    for (size_t i = 0; i < n; i++) {
+        range[i][0] = min[i];
+        range[i][1] = max[i];
+    }
+    const sdm_survey_opts opts = {.range = (const double(*)[2])range,
+                                  .distribution = distribution,
+                                  .samples = sdm_survey_samples(shape, NOTICE_SAMPLES),
+                                  .seed = c->seed,
+                                  .grid = &c->grid,
+                                  .brief = true,
+                                  .n_threads = (int)c->threads,
+                                  .cancelled = cli_interrupted};
+    cli_survey s = {.shape = shape, .grid = &c->grid, .config = c, .brief = true};
+    if (sdm_shape_survey_make(shape, &opts, &s.found, NULL)) return;
+    (void)cli_survey_tell(&s, notice, NULL, NULL);
+    sdm_shape_survey_dispose(&s.found);
+}

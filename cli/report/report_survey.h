@@ -1,0 +1,28 @@
+/* Tells the findings of a survey of shapes (shape_survey.h), one line each. */
+#pragma once
+
+#include "sdm/internal/config.h"
+#include "sdm/internal/shape_survey.h"
+#include "sdm/internal/text.h"
+
+/* The survey of a shape, and with what it was made. */
+typedef struct cli_survey {
+    const sdm_instance *shape;
+    const sdm_grid *grid;     /* NULL: none */
+    const sdm_config *config; /* whose grid it is; NULL: none */
+    /* nothing is told of shapes that all overlap themselves: they mostly do so on purpose */
+    bool brief;
+    sdm_shape_survey found;
+} cli_survey;
+
+/* Called with a line. weight: SDM_E_MESH: the meshes are broken; SDM_E_QUALITY: a training or
+ * derivatives would suffer; SDM_OK: good to know. */
+typedef void cli_tell(void *user, sdm_status weight, const char *line);
+
+/* Calls tell() for every finding, the gravest first. SDM_E_NOMEM. */
+sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell, void *user, sdm_error *err);
+
+/* A survey of about a second of the shape of a configuration, over its ranges, distributions and
+ * grid, told as notices. Errors, such as that of an interrupt, are no notices: what follows meets
+ * them again. */
+void cli_notice_survey(const sdm_config *c, const sdm_instance *shape);

@@ -1,0 +1,53 @@
+/* Prints the verdict on a training as text. */
+#include "report_verdict.h"
+
+#include <math.h>
+#include <stdio.h>
+
+/* The part of the error with its share of the sum of all parts. */
+static void print_part(const sdm_verdict *v, sdm_cause cause, double sum, bool first)
+{
+    const double part = fmax(0, v->part_mm2[cause]);
+    printf("  %-11s %-9s %.5f mm %3.0f %%  %s\n", first ? "error from" : "", sdm_cause_name(cause),
+           sqrt(part), 100 * part / sum, sdm_cause_text(cause));
+}
+
+static void print_parts(const sdm_verdict *v)
+{
+    double sum = 0;
+    bool first = true;
+    for (int i = 0; i < SDM_CAUSE_GRID; i++)
+        if (v->part_mm2[i] > 0) sum += v->part_mm2[i];
+    for (int i = 0; i < SDM_CAUSE_GRID && sum > 0; i++) {
+        if (!isfinite(v->part_mm2[i])) continue;
+        print_part(v, (sdm_cause)i, sum, first);
+        first = false;
+    }
+}
+
+void cli_print_verdict(const sdm_verdict *v)
+{
+    const double voxel = v->voxel_mm;
+    printf("  in voxels   all %.4f, within a voxel of the surface %.4f; Dice %.4f, smallest %.4f\n",
+           v->rmse_mm / voxel, v->rmse_voxel_mm / voxel, v->dice, v->dice_min);
+    printf("  %-11s %s\n", sdm_grade_name(v->grade), sdm_grade_text(v->grade));
+    print_parts(v);
+    if (isfinite(v->motion_mm))
+        printf("  template    at the vertices: frames and amplitudes %.2g mm, warp %.2g mm\n",
+               v->motion_mm, v->warp_mm);
+    if (isfinite(v->fall))
+        printf("  steps       the last third of them lowered the error beyond that of the bases by "
+               "%.0f %%\n",
+               100 * v->fall);
+    if (isfinite(v->thin)) {
+        const double grid = sqrt(v->part_mm2[SDM_CAUSE_GRID]);
+        printf(
+            "  grid        between its voxels exact maps miss the surface by %.5f mm (%.3f voxels)",
+            grid, grid / voxel);
+        if (v->thin >= 0.005)
+            printf("; %.0f %% of the surface is thinner than two voxels or has an edge",
+                   100 * v->thin);
+        printf("\n");
+    }
+    printf("  verdict     %s\n", v->sentence);
+}

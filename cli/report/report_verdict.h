@@ -1,0 +1,8 @@
+/* Prints the verdict on a training. */
+#pragma once
+
+#include "sdm/internal/verdict.h"
+
+/* Prints on stdout how good the model is, the parts of its error, one per line, and what limits it.
+ */
+void cli_print_verdict(const sdm_verdict *v);

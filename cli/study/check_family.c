@@ -1,0 +1,325 @@
+/* Surveys a family of shapes and prints what spoils maps, derivatives and trainings. */
+#define _XOPEN_SOURCE 700 // realpath()
+#include "check_family.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "inputs/config_shape.h"
+#include "inputs/setup.h"
+#include "report/files.h"
+#include "report/json_values.h"
+#include "report/report_survey.h"
+#include "report/terminal.h"
+#include "sdm/internal/train.h"
+#include "sdm/memory.h"
+#include "sdm/picture.h"
+
+enum { SAMPLES = 128, DRAWN = 9, TITLE_MAX = 36 };
+
+typedef struct check {
+    const cli_args *args;
+    sdm_registry *registry;
+    sdm_config *config; /* NULL: a shape without a configuration */
+    sdm_instance *shape;
+    cli_survey survey; /* of `shape` */
+    double range[SDM_MAX_PARAMS][2];
+    sdm_distribution distribution[SDM_MAX_PARAMS];
+    sdm_survey_opts opts;
+} check;
+
+/* ---- the shape ---- */
+
+/* *name = the only shape of the files of --plugin. */
+static sdm_status only_shape(const check *c, const char **name, sdm_error *err)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < sdm_registry_count(c->registry); i++) {
+        bool given = false;
+        for (size_t k = 0; k < c->args->plugins.n; k++) {
+            char *path = realpath(c->args->plugins.items[k], NULL);
+            given = given || (path && !strcmp(path, sdm_registry_origin(c->registry, i)));
+            free(path);
+        }
+        if (!given) continue;
+        *name = sdm_registry_at(c->registry, i)->name;
+        n++;
+    }
+    if (n == 1) return SDM_OK;
+    if (n == 0)
+        return sdm_fail(err, SDM_E_ARG,
+                        "usage: sdmgen shapes check NAME|CONFIG, or --plugin FILE with one shape");
+    return sdm_fail(err, SDM_E_ARG,
+                    "shapes check: --plugin has %zu shapes: name one, for example %s", n, *name);
+}
+
+/* Ranges, distributions and grid of the configuration. */
+static sdm_status open_config(check *c, sdm_error *err)
+{
+    cli_args args = *c->args; // without the word "check"
+    args.files.items++;
+    args.files.n--;
+    double min[SDM_MAX_PARAMS], max[SDM_MAX_PARAMS];
+    size_t n = 0;
+    if (args.options.n > 0)
+        return sdm_fail(err, SDM_E_ARG,
+                        "shapes check: -O belongs to NAME; a configuration has shape.options");
+    sdm_status s = cli_open_config(&args, &c->config, &c->registry, &c->shape, err);
+    if (!s) sdm_instance_params(c->shape, &n);
+    if (!s) s = sdm_train_ranges(c->config, c->shape, min, max, err);
+    if (!s) s = sdm_train_distributions(c->config, c->shape, min, max, c->distribution, err);
+    if (s) return s;
+    for (size_t i = 0; i < n; i++) {
+        c->range[i][0] = min[i];
+        c->range[i][1] = max[i];
+    }
+    c->opts.range = (const double(*)[2])c->range;
+    c->opts.distribution = c->distribution;
+    c->opts.grid = c->survey.grid = &c->config->grid;
+    c->survey.config = c->config;
+    c->opts.seed = c->config->seed;
+    return SDM_OK;
+}
+
+static sdm_status open_shape(check *c, sdm_error *err)
+{
+    const cli_args *args = c->args;
+    const char *name = args->files.n > 1 ? args->files.items[1] : NULL;
+    c->opts = (sdm_survey_opts){.samples = args->samples >= 0 ? (size_t)args->samples : SAMPLES,
+                                .seed = args->seed >= 0 ? (uint64_t)args->seed : 1,
+                                .n_threads = (int)args->threads,
+                                .cancelled = cli_interrupted};
+    if (name && cli_ends_with_any(name, ".yaml .yml")) return open_config(c, err);
+    if (args->files.n > 2)
+        return sdm_fail(err, SDM_E_ARG, "shapes check: unexpected argument '%s'",
+                        args->files.items[2]);
+    sdm_status s = cli_open_registry(args, &c->registry, err);
+    if (!s && !name) s = only_shape(c, &name, err);
+    return s ? s : cli_create_shape(c->registry, name, &args->options, &c->shape, err);
+}
+
+/* ---- output ---- */
+
+static const char *weight_name(sdm_status weight)
+{
+    return weight == SDM_E_MESH ? "broken" : weight == SDM_E_QUALITY ? "warning" : "note";
+}
+
+static void print_line(void *user, sdm_status weight, const char *line)
+{
+    (void)user;
+    printf("%-8s %s\n", weight_name(weight), line);
+}
+
+static void add_line(void *user, sdm_status weight, const char *line)
+{
+    sdm_json *json = user;
+    sdm_json_open(json, NULL, '{');
+    sdm_json_text(json, "weight", weight_name(weight));
+    sdm_json_text(json, "text", line);
+    sdm_json_close(json, '}');
+}
+
+static sdm_status print_text(const check *c, sdm_error *err)
+{
+    const sdm_shape_survey *f = &c->survey.found;
+    printf("%s: the default shape, %zu corners of the ranges, %zu random shapes\n",
+           sdm_instance_shape(c->survey.shape)->name, f->n_corners, f->n_samples);
+    printf("mesh     %zu vertices, %zu triangles, %.3g ms\n", f->n_vert, f->n_tri, f->ms_mesh);
+    if (f->volume[0] <= f->volume[1])
+        printf("volume   %.6g .. %.6g mm^3, of the union\n", f->volume[0], f->volume[1]);
+    printf("box      %.4g %.4g %.4g .. %.4g %.4g %.4g mm\n", f->low[0], f->low[1], f->low[2],
+           f->high[0], f->high[1], f->high[2]);
+    if (f->has_velocity)
+        printf("velocity differs from differences of meshes by %.2g at most (relative)\n",
+               f->velocity_error);
+    return cli_survey_tell(&c->survey, print_line, NULL, err);
+}
+
+static void add_count(sdm_json *j, const check *c, const char *key, const sdm_survey_count *count)
+{
+    const sdm_shape_survey *f = &c->survey.found;
+    size_t n;
+    const sdm_param *params = sdm_instance_params(c->survey.shape, &n);
+    sdm_json_open(j, key, '{');
+    sdm_json_int(j, "shapes", (int64_t)count->shapes);
+    if (count->shapes) {
+        sdm_json_real(j, "most", count->amount);
+        cli_json_params(j, "at", params, n, f->p + count->worst * n);
+    }
+    sdm_json_close(j, '}');
+}
+
+static void add_jumps(sdm_json *j, const check *c)
+{
+    static const char *const names[] = {[SDM_BREAK_JUMP] = "jump",
+                                        [SDM_BREAK_SIZES] = "sizes",
+                                        [SDM_BREAK_TRIANGLES] = "triangles"};
+    const sdm_shape_survey *f = &c->survey.found;
+    size_t n;
+    const sdm_param *params = sdm_instance_params(c->survey.shape, &n);
+    sdm_json_open(j, "jumps", '[');
+    for (size_t k = 0; k < n && f->jump; k++) {
+        if (f->jump[k].kind == SDM_BREAK_NONE) continue;
+        sdm_json_open(j, NULL, '{');
+        sdm_json_text(j, "kind", names[f->jump[k].kind]);
+        sdm_json_text(j, "parameter", params[k].name);
+        sdm_json_real(j, "value", f->jump[k].value);
+        sdm_json_int(j, "vertex", (int64_t)f->jump[k].vertex);
+        sdm_json_real(j, "mm", f->jump[k].mm);
+        cli_json_params(j, "at", params, n, f->p + f->jump[k].shape * n);
+        sdm_json_close(j, '}');
+    }
+    sdm_json_close(j, ']');
+}
+
+static sdm_status print_json(const check *c, sdm_error *err)
+{
+    const sdm_shape_survey *f = &c->survey.found;
+    const sdm_status verdict = sdm_shape_survey_verdict(f);
+    const struct {
+        const char *key;
+        const sdm_survey_count *count;
+    } counts[] = {{"failed", &f->failed},         {"open", &f->open},
+                  {"inside_out", &f->inside_out}, {"turned", &f->turned},
+                  {"resized", &f->resized},       {"rewired", &f->rewired},
+                  {"overlaps", &f->overlaps},     {"degenerate", &f->degenerate},
+                  {"duplicate", &f->duplicate},   {"cut", &f->cut}};
+    sdm_json j = {0};
+    sdm_json_open(&j, NULL, '{');
+    sdm_json_text(&j, "shape", sdm_instance_shape(c->survey.shape)->name);
+    sdm_json_text(&j, "verdict", verdict ? weight_name(verdict) : "fine");
+    sdm_json_int(&j, "shapes", (int64_t)f->n);
+    sdm_json_int(&j, "corners", (int64_t)f->n_corners);
+    sdm_json_int(&j, "samples", (int64_t)f->n_samples);
+    sdm_json_int(&j, "vertices", (int64_t)f->n_vert);
+    sdm_json_int(&j, "triangles", (int64_t)f->n_tri);
+    sdm_json_real(&j, "ms_mesh", f->ms_mesh);
+    cli_json_reals(&j, "union_volume_mm3", f->volume, 2);
+    cli_json_reals(&j, "union_area_mm2", f->area, 2);
+    cli_json_reals(&j, "min", f->low, 3);
+    cli_json_reals(&j, "max", f->high, 3);
+    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
+        add_count(&j, c, counts[i].key, counts[i].count);
+    if (c->survey.grid) {
+        cli_json_grid(&j, "grid", c->survey.grid, true);
+        cli_json_reals(&j, "beyond_mm", &f->beyond[0][0], 6);
+    }
+    add_jumps(&j, c);
+    if (f->has_velocity) sdm_json_real(&j, "velocity_error", f->velocity_error);
+    sdm_json_int(&j, "unlike", (int64_t)f->unlike);
+    sdm_json_open(&j, "findings", '[');
+    const sdm_status s = cli_survey_tell(&c->survey, add_line, &j, err);
+    sdm_json_close(&j, ']');
+    sdm_json_close(&j, '}');
+    if (!s) return cli_print_json(&j, err);
+    sdm_json_dispose(&j);
+    return s;
+}
+
+/* mm by which each vertex lies beyond the grid; 0 within it. */
+static void measure_beyond(const sdm_mesh *m, const sdm_grid *g, double *mm)
+{
+    for (size_t v = 0; v < m->n_vert; v++) {
+        double index[3];
+        sdm_grid_index(g, m->vert + 3 * v, index);
+        mm[v] = 0;
+        for (int a = 0; a < 3; a++)
+            mm[v] = fmax(mm[v], g->spacing[a] * fmax(-index[a], index[a] - (double)(g->n[a] - 1)));
+    }
+}
+
+/* Writes the first parameters of shape `index`, as many as fit over a picture. */
+static const char *title_of(const check *c, size_t index, char title[TITLE_MAX])
+{
+    const sdm_shape_survey *f = &c->survey.found;
+    const sdm_param *params = sdm_instance_params(c->shape, NULL);
+    size_t n = 0;
+    for (size_t i = 0; i < f->n_params; i++) {
+        char word[TITLE_MAX];
+        const int length =
+            snprintf(word, sizeof word, "%s=%.3g ", params[i].name, f->p[index * f->n_params + i]);
+        if (n + (size_t)length + 4 > TITLE_MAX) {
+            strcpy(title + n, "...");
+            break;
+        }
+        strcpy(title + n, word);
+        n += (size_t)length;
+    }
+    return title;
+}
+
+/* Draws the default shape and the first samples. If the grid cuts shapes, what lies beyond it is
+ * coloured, and the last one is the shape that is cut most. */
+static sdm_status draw(const check *c, const char *path, sdm_error *err)
+{
+    const sdm_shape_survey *f = &c->survey.found;
+    const bool colour = f->cut.shapes > 0;
+    sdm_picture_surface surface[DRAWN];
+    sdm_mesh mesh[DRAWN] = {{0}};
+    double *beyond[DRAWN] = {0};
+    char title[DRAWN][TITLE_MAX] = {""};
+    size_t n = 0;
+    sdm_status s = SDM_OK;
+    for (size_t i = 0; i < f->n && n < DRAWN && !s; i++) {
+        const size_t shape = !i ? 0 : colour && n == DRAWN - 1 ? f->cut.worst : f->n_corners + i;
+        if (shape >= f->n ||
+            sdm_instance_mesh(c->survey.shape, f->p + shape * f->n_params, &mesh[n], NULL))
+            continue;
+        if (colour) s = SDM_ALLOC(&beyond[n], mesh[n].n_vert, "distances beyond the grid", err);
+        if (!s && colour) measure_beyond(&mesh[n], c->survey.grid, beyond[n]);
+        surface[n] = (sdm_picture_surface){title_of(c, shape, title[n]), &mesh[n], beyond[n]};
+        n++;
+    }
+    if (!s && !n) s = sdm_fail(err, SDM_E_MESH, "%s: no shape can be made", path);
+    if (!s) s = sdm_picture_gallery(path, surface, n, "beyond the grid", err);
+    for (size_t i = 0; i < DRAWN; i++) {
+        sdm_mesh_dispose(&mesh[i]);
+        sdm_free(beyond[i]);
+    }
+    return s;
+}
+
+/* ---- the command ---- */
+
+static sdm_status give_verdict(const check *c, sdm_error *err)
+{
+    const sdm_status verdict = sdm_shape_survey_verdict(&c->survey.found);
+    const char *name = sdm_instance_shape(c->survey.shape)->name;
+    if (verdict == SDM_E_MESH)
+        return sdm_fail(err, verdict, "%s: meshes are broken: mend what is marked 'broken' first",
+                        name);
+    if (verdict == SDM_E_QUALITY)
+        return sdm_fail(err, verdict,
+                        "%s: maps or trainings would suffer: mend what is marked 'warning'", name);
+    if (!c->args->json)
+        printf("fine: the shape can be trained%s\n",
+               c->survey.grid ? "" : "; give a configuration to compare it with a grid");
+    return SDM_OK;
+}
+
+sdm_status cli_check_family(const cli_args *args, sdm_error *err)
+{
+    check c = {.args = args};
+    sdm_status s = SDM_OK;
+    for (size_t i = 0; i < args->outputs.n && !s; i++)
+        s = sdm_picture_check(args->outputs.items[i], err);
+    if (s == SDM_E_UNSUPPORTED) s = SDM_E_ARG;
+    if (!s) s = cli_check_files(args, NULL, err);
+    if (!s) s = open_shape(&c, err);
+    c.survey.shape = c.shape;
+    if (!s) s = sdm_shape_survey_make(c.shape, &c.opts, &c.survey.found, err);
+    if (!s) {
+        s = args->json ? print_json(&c, err) : print_text(&c, err);
+        for (size_t i = 0; i < args->outputs.n && !s; i++)
+            s = draw(&c, args->outputs.items[i], err);
+        if (!s) s = give_verdict(&c, err);
+        sdm_shape_survey_dispose(&c.survey.found);
+    }
+    sdm_instance_free(c.shape);
+    sdm_registry_free(c.registry);
+    sdm_free(c.config);
+    return s;
+}

@@ -1,0 +1,262 @@
+/* Audits the parts of a mesh: orientation, volume, contacts, and what the exact engine makes of
+ * them. */
+#include "sdm/internal/part_audit.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "parts.h"
+#include "sdm/internal/vec3.h"
+#include "sdm/memory.h"
+#include "union_hull.h"
+
+#define NO_PART UINT32_MAX
+
+/* The state of an audit. */
+typedef struct job {
+    const sdm_mesh *given;
+    sdm_mesh turned; /* the mesh with the orientation that the engine gives it */
+    sdm_arena arena;
+    sdm_survey survey; /* of `turned` */
+    uint32_t *part_of; /* [n_tri] index of the part; NO_PART: none */
+    sdm_part_audit *out;
+} job;
+
+static sdm_status survey_again(job *j, sdm_error *err)
+{
+    sdm_arena_dispose(&j->arena);
+    j->survey = (sdm_survey){0};
+    return sdm_survey_build(&j->turned, &j->arena, &j->survey, err);
+}
+
+static bool same_triangle(const sdm_mesh *a, const sdm_mesh *b, size_t t)
+{
+    return !memcmp(a->tri + 3 * t, b->tri + 3 * t, 3 * sizeof *a->tri);
+}
+
+/* Surveys the mesh and turns it as survey_solid() of the engine does. */
+static sdm_status turn_as_engine(job *j, sdm_error *err)
+{
+    size_t n_turned = 0;
+    sdm_status s = sdm_mesh_copy(j->given, &j->turned, err);
+    if (!s) s = survey_again(j, err);
+    if (s) return s;
+    j->out->mesh = j->survey.audit;
+    j->out->turned = j->survey.audit.inverted;
+    if (j->out->turned) {
+        for (size_t t = 0; t < j->turned.n_tri; t++) sdm_triangle_turn(&j->turned, t);
+        s = survey_again(j, err);
+    }
+    if (!s) s = sdm_parts_turn(&j->turned, &j->survey, &n_turned, err);
+    return s || !n_turned ? s : survey_again(j, err);
+}
+
+/* Numbers the parts and allocates them. */
+static sdm_status number_parts(job *j, sdm_error *err)
+{
+    const size_t n_tri = j->given->n_tri;
+    sdm_part_audit *a = j->out;
+    uint32_t *root = NULL;
+    sdm_status s = SDM_ALLOC(&root, n_tri, "parts", err);
+    if (!s) s = SDM_ALLOC(&j->part_of, n_tri, "parts", err);
+    if (!s) s = SDM_ALLOC(&a->part, j->survey.audit.components, "parts", err);
+    if (!s) {
+        sdm_topology_parts(&j->survey.topo, root);
+        // the root is the lowest triangle of its part, so it comes first
+        for (uint32_t t = 0; t < n_tri; t++) {
+            const uint32_t r = sdm_forest_root(root, t);
+            if (r != t) {
+                j->part_of[t] = j->part_of[r];
+            } else if (sdm_repeats_vertex(&j->survey.topo.tri[3 * (size_t)t])) {
+                j->part_of[t] = NO_PART;
+            } else {
+                j->part_of[t] = (uint32_t)a->n;
+                a->part[a->n++] = (sdm_part){.first_tri = t,
+                                             .first_vert = SIZE_MAX,
+                                             .min = {INFINITY, INFINITY, INFINITY},
+                                             .max = {-INFINITY, -INFINITY, -INFINITY}};
+            }
+        }
+    }
+    sdm_free(root);
+    return s;
+}
+
+/* Adds the area of triangle t and the signed volume of its tetrahedron with the point `apex`. */
+static void add_triangle(const sdm_mesh *m, size_t t, const double apex[3], double *area,
+                         double *volume)
+{
+    const double *a = m->vert + 3 * (size_t)m->tri[3 * t],
+                 *b = m->vert + 3 * (size_t)m->tri[3 * t + 1],
+                 *c = m->vert + 3 * (size_t)m->tri[3 * t + 2];
+    double u[3], v[3], w[3], n[3];
+    v3_sub(b, a, u);
+    v3_sub(c, a, v);
+    v3_sub(a, apex, w);
+    v3_cross(u, v, n);
+    *area += 0.5 * v3_norm(n);
+    *volume += v3_dot(w, n) / 6;
+}
+
+/* Boxes, ranges of vertices, areas and volumes of the parts, from the mesh as given. */
+static void measure_parts(job *j)
+{
+    const sdm_mesh *m = j->given;
+    for (size_t t = 0; t < m->n_tri; t++) {
+        if (j->part_of[t] == NO_PART) continue;
+        sdm_part *p = &j->out->part[j->part_of[t]];
+        p->n_tri++;
+        for (size_t k = 0; k < 3; k++) {
+            const size_t v = m->tri[3 * t + k];
+            if (v < p->first_vert) p->first_vert = v;
+            if (v > p->last_vert) p->last_vert = v;
+            for (size_t d = 0; d < 3; d++) {
+                p->min[d] = fmin(p->min[d], m->vert[3 * v + d]);
+                p->max[d] = fmax(p->max[d], m->vert[3 * v + d]);
+            }
+        }
+    }
+    // relative to the middle of each part, so that no digits are lost
+    for (size_t t = 0; t < m->n_tri; t++) {
+        if (j->part_of[t] == NO_PART) continue;
+        sdm_part *p = &j->out->part[j->part_of[t]];
+        double middle[3];
+        for (size_t d = 0; d < 3; d++) middle[d] = 0.5 * (p->min[d] + p->max[d]);
+        add_triangle(m, t, middle, &p->area, &p->volume);
+    }
+}
+
+/* Counts open edges and contacts between parts. */
+static void count_edges_and_contacts(job *j)
+{
+    const sdm_topology *topo = &j->survey.topo;
+    const sdm_contacts *contacts = &j->survey.contacts;
+    for (size_t i = 0; i < topo->n_edges; i++) {
+        const sdm_edge *e = &topo->edges[i];
+        if (e->n_up != e->n_down) j->out->part[j->part_of[e->first / 3]].open_edges++;
+    }
+    for (size_t i = 0; i < contacts->n; i++) {
+        const uint32_t a = j->part_of[contacts->list[i].tri],
+                       b = j->part_of[contacts->list[i].other];
+        if (a != b && a != NO_PART && b != NO_PART) j->out->part[a].met++;
+    }
+}
+
+/* Does part p lie in the box of another closed part? */
+static bool is_in_a_box(const sdm_part_audit *a, const sdm_part *p)
+{
+    for (size_t i = 0; i < a->n; i++) {
+        const sdm_part *q = &a->part[i];
+        bool inside = q != p && !q->open_edges;
+        for (int d = 0; d < 3; d++)
+            inside = inside && q->min[d] < p->min[d] && q->max[d] > p->max[d];
+        if (inside) return true;
+    }
+    return false;
+}
+
+static sdm_part_state state_of(const job *j, const sdm_part *p)
+{
+    if (p->open_edges) return SDM_PART_OPEN;
+    double largest = 0;
+    for (int d = 0; d < 3; d++) largest = fmax(largest, fmax(fabs(p->min[d]), fabs(p->max[d])));
+    if (fabs(p->volume) <= 64 * DBL_EPSILON * p->area * largest) return SDM_PART_FLAT;
+    if ((p->turned ? -p->volume : p->volume) > 0) return SDM_PART_SOLID;
+    if (p->met) return SDM_PART_INSIDE_OUT;
+    // a part of a closed mesh that meets nothing and has not been turned is a cavity
+    return j->out->mesh.closed || is_in_a_box(j->out, p) ? SDM_PART_CAVITY : SDM_PART_INSIDE_OUT;
+}
+
+static void judge_parts(job *j)
+{
+    sdm_part_audit *a = j->out;
+    for (size_t i = 0; i < a->n; i++)
+        a->part[i].turned = !same_triangle(j->given, &j->turned, a->part[i].first_tri);
+    for (size_t i = 0; i < a->n; i++) {
+        a->part[i].state = state_of(j, &a->part[i]);
+        a->inside_out += a->part[i].state == SDM_PART_INSIDE_OUT;
+    }
+}
+
+/* Volume and area of the union. */
+static sdm_status measure_union(job *j, sdm_error *err)
+{
+    sdm_part_audit *a = j->out;
+    sdm_mesh hull = {0};
+    uint32_t *source = NULL;
+    bool changed = false;
+    double error_mm;
+    if (!a->mesh.closed) return SDM_OK;
+    const sdm_status s =
+        sdm_union_hull(&j->turned, &j->survey, &j->arena, &hull, &source, &changed, &error_mm, err);
+    const sdm_mesh *m = changed ? &hull : &j->turned;
+    double middle[3];
+    for (int d = 0; d < 3; d++) middle[d] = 0.5 * (a->mesh.min[d] + a->mesh.max[d]);
+    a->union_volume = a->union_area = s ? NAN : 0;
+    for (size_t t = 0; t < m->n_tri && !s; t++)
+        add_triangle(m, t, middle, &a->union_area, &a->union_volume);
+    sdm_mesh_dispose(&hull);
+    sdm_free(source);
+    return s;
+}
+
+/* The audit without the union. */
+static sdm_status find_parts(job *j, sdm_error *err)
+{
+    sdm_status s = turn_as_engine(j, err);
+    if (!s) s = number_parts(j, err);
+    if (s) return s;
+    measure_parts(j);
+    count_edges_and_contacts(j);
+    judge_parts(j);
+    return SDM_OK;
+}
+
+static void job_dispose(job *j)
+{
+    sdm_arena_dispose(&j->arena);
+    sdm_mesh_dispose(&j->turned);
+    sdm_free(j->part_of);
+}
+
+sdm_status sdm_part_audit_make(const sdm_mesh *m, bool with_union, sdm_part_audit *out,
+                               sdm_error *err)
+{
+    if (!m || !out)
+        return sdm_fail(err, SDM_E_ARG, "audit without a mesh or a place for the result");
+    *out = (sdm_part_audit){.union_volume = NAN, .union_area = NAN};
+    job j = {.given = m, .out = out};
+    sdm_status s = find_parts(&j, err);
+    if (!s && with_union) s = measure_union(&j, err);
+    job_dispose(&j);
+    if (s) sdm_part_audit_dispose(out);
+    return s;
+}
+
+void sdm_part_audit_dispose(sdm_part_audit *a)
+{
+    sdm_free(a->part);
+    *a = (sdm_part_audit){0};
+}
+
+sdm_status sdm_mesh_turn_parts(sdm_mesh *m, size_t *n, sdm_error *err)
+{
+    if (!m || !n)
+        return sdm_fail(err, SDM_E_ARG, "parts to turn, but no mesh or no place for their number");
+    sdm_part_audit audit = {0};
+    job j = {.given = m, .out = &audit};
+    *n = 0;
+    const sdm_status s = find_parts(&j, err);
+    for (size_t t = 0; t < m->n_tri && !s; t++) {
+        if (j.part_of[t] == NO_PART) continue;
+        sdm_part *p = &audit.part[j.part_of[t]];
+        // an inside-out part that the engine turns with the whole mesh is right as it is given
+        if (p->turned == (p->state == SDM_PART_INSIDE_OUT)) continue;
+        sdm_triangle_turn(m, t);
+        *n += p->first_tri == t;
+    }
+    job_dispose(&j);
+    sdm_part_audit_dispose(&audit);
+    return s;
+}

@@ -1,0 +1,67 @@
+/* The parts of a mesh: which way out each one is, what the exact engine makes of it, and the volume
+ * of the solid that they form together.
+ *
+ * A part is a set of triangles connected by edges. The orientation follows from the signed volume:
+ * positive when the triangles run counter-clockwise seen from outside. exact.h has the rules of the
+ * engine; in short, a closed part that is inside out is
+ * - turned, if the mesh is closed and the part meets no other part and does not lie in a solid;
+ * - a cavity, if it meets no other part and lies in a solid;
+ * - not turned, if it meets another part or the mesh is open: it then subtracts its volume from the
+ *   parts that it overlaps, and is not solid itself. This may be wanted (a drilled hole), but is
+ *   mostly a mistake: a handle whose triangles run the wrong way vanishes. */
+#pragma once
+
+#include "sdm/mesh.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* What the exact engine makes of a part. */
+typedef enum sdm_part_state {
+    SDM_PART_SOLID = 0,  /* it is solid */
+    SDM_PART_CAVITY,     /* it is a cavity of a solid */
+    SDM_PART_INSIDE_OUT, /* inside out: it subtracts its volume and is not solid itself */
+    SDM_PART_FLAT,       /* closed, but its volume is 0 to rounding: it encloses nothing */
+    SDM_PART_OPEN        /* it has open or badly oriented edges */
+} sdm_part_state;
+
+typedef struct sdm_part {
+    size_t n_tri, first_tri;      /* number of triangles; lowest index of one */
+    size_t first_vert, last_vert; /* lowest and highest index of a vertex */
+    size_t
+        open_edges; /* edges on which not as many triangles run in one direction as in the other */
+    size_t met;     /* pairs of a triangle of this part and a triangle of another that meet */
+    double volume, area;   /* signed, mm^3, as given; mm^2 */
+    double min[3], max[3]; /* bounding box, mm */
+    bool turned;           /* the engine reverses its triangles, alone or with the whole mesh */
+    sdm_part_state state;
+} sdm_part;
+
+/* Zero-initialise; sdm_part_audit_dispose() frees. */
+typedef struct sdm_part_audit {
+    sdm_audit mesh; /* of the whole mesh as given */
+    bool turned;    /* the mesh as a whole is inside out, so the engine turns all of it */
+    sdm_part *part; /* [n], by their lowest triangle; triangles that repeat a vertex have no part */
+    size_t n;
+    size_t inside_out; /* parts of this state */
+    /* volume, mm^3, and area, mm^2, of the union, as the engine measures it: overlaps count once.
+     * NaN: not asked for, or the mesh is open. */
+    double union_volume, union_area;
+} sdm_part_audit;
+
+/* Audits the mesh and its parts. with_union: also computes the union, which takes longer. In an
+ * open mesh, where the engine turns nothing, a part in the box of another closed part is taken for
+ * a cavity. Errors as sdm_mesh_audit(). [any thread] */
+sdm_status sdm_part_audit_make(const sdm_mesh *m, bool with_union, sdm_part_audit *out,
+                               sdm_error *err);
+void sdm_part_audit_dispose(sdm_part_audit *a);
+
+/* Orients the parts of the mesh: reverses those that the engine would turn and those of the state
+ * SDM_PART_INSIDE_OUT, so that every closed part is solid or a cavity. *n = number of parts
+ * reversed. Errors as sdm_mesh_audit(); the mesh is then unchanged. */
+sdm_status sdm_mesh_turn_parts(sdm_mesh *m, size_t *n, sdm_error *err);
+
+#ifdef __cplusplus
+}
+#endif

@@ -1,0 +1,38 @@
+/* How far a shape reaches over the ranges of its parameters, and a grid around that. */
+#pragma once
+
+#include "sdm/grid.h"
+#include "sdm/registry.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* low[3] and high[3] = lowest and highest coordinates (mm) of the vertices of `shape` over several
+ * parameter vectors: the middle of the ranges; their corners, all of them for at most 6 parameters,
+ * else 64 random ones; and `samples` random vectors (Sobol' points, which follow the distributions
+ * that the shape states; 0 is allowed). From the farthest of these shapes a short search moves the
+ * uniformly distributed parameters. In random corners a normally distributed parameter has a random
+ * value instead of the end of its range, because many of them at their ends make a shape that never
+ * occurs.
+ * range[n_params]: lowest and highest value of each parameter, within those of the shape; NULL: the
+ * shape's own. The result depends on the arguments only. Other shapes of the ranges may reach a
+ * little further. SDM_E_ARG, SDM_E_RANGE (a range is empty or wider than the shape's), and the
+ * errors of sdm_instance_mesh(). [any thread] */
+sdm_status sdm_shape_box(const sdm_instance *shape, const double (*range)[2], size_t samples,
+                         uint64_t seed, double low[3], double high[3], sdm_error *err);
+
+/* Voxels between the box and the boundary of the grid. */
+#define SDM_GRID_MARGIN 3
+
+/* *out = a grid around the box low[3] .. high[3] (mm) with a margin of SDM_GRID_MARGIN voxels.
+ * spacing[3] (mm), or NULL: the same along all axes, such that the longest edge of the grid has at
+ * most `voxels` (at least 2 SDM_GRID_MARGIN + 2) voxels, rounded up to two digits. The origin is
+ * rounded to a tenth of the spacing or finer. SDM_E_ARG: the box is empty or a point, or the grid
+ * is too large. [any thread] */
+sdm_status sdm_grid_around(const double low[3], const double high[3], int voxels,
+                           const double spacing[3], sdm_grid *out, sdm_error *err);
+
+#ifdef __cplusplus
+}
+#endif

@@ -1,0 +1,112 @@
+/* Survey of a family of shapes: makes meshes all over the ranges of the parameters and looks for
+ * what spoils maps, derivatives and trainings. */
+#pragma once
+
+#include "sdm/grid.h"
+#include "sdm/registry.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Zero-initialised: the shape's own ranges and distributions, no samples, no grid, the OpenMP
+ * default of threads, the whole survey. */
+typedef struct sdm_survey_opts {
+    const double (*range)[2];             /* [n_params]; NULL: those of the shape */
+    const sdm_distribution *distribution; /* [n_params], on the ranges; NULL: those of the shape */
+    size_t samples;                       /* random shapes: Sobol' points of the distributions */
+    uint64_t seed;
+    const sdm_grid *grid; /* NULL: nothing is compared with a grid */
+    bool brief;           /* only meshes and their audits: no lines, velocities and repetitions */
+    int n_threads;
+    /* called by any thread; true: the survey ends with SDM_E_CANCELLED. May be NULL. */
+    bool (*cancelled)(void *user);
+    void *user;
+} sdm_survey_opts;
+
+/* A property that some of the shapes have. */
+typedef struct sdm_survey_count {
+    size_t shapes; /* number of shapes with the property */
+    size_t worst;  /* index of the shape that has most of it; of several the first */
+    double amount; /* how much that one has: edges, parts, triangles, pairs of triangles, mm */
+} sdm_survey_count;
+
+typedef enum sdm_survey_break {
+    SDM_BREAK_NONE = 0,
+    SDM_BREAK_JUMP,      /* vertices jump */
+    SDM_BREAK_SIZES,     /* the number of vertices or triangles changes */
+    SDM_BREAK_TRIANGLES, /* the triangles get other vertices */
+} sdm_survey_break;
+
+/* A value of a parameter at which the mesh does not change continuously. */
+typedef struct sdm_survey_jump {
+    sdm_survey_break kind;
+    size_t shape;  /* the other parameters are those of this shape */
+    double value;  /* of the parameter */
+    size_t vertex; /* JUMP: the vertex that jumps farthest */
+    double mm;     /* JUMP: how far */
+} sdm_survey_jump;
+
+/* Zero-initialise; sdm_shape_survey_dispose() frees. */
+typedef struct sdm_shape_survey {
+    size_t n_params;
+    /* shapes: 0 has the default values (moved into the ranges); then come the corners of the ranges
+     * (all for at most 6 parameters, else 64 random ones in which normally distributed parameters
+     * have random values; in a brief survey no more than samples), then the samples */
+    size_t n, n_corners, n_samples;
+    double *p; /* [n][n_params] */
+
+    /* the meshes: those that could not be made, and properties of the others */
+    sdm_survey_count failed;
+    sdm_survey_count open;       /* edges on which not as many triangles run each way: not closed */
+    sdm_survey_count inside_out; /* parts of state SDM_PART_INSIDE_OUT (part_audit.h) */
+    sdm_survey_count turned;     /* parts that are inside out and that the exact engine turns */
+    sdm_survey_count overlaps;   /* pairs of triangles that meet: the union counts */
+    sdm_survey_count degenerate, duplicate; /* triangles */
+    size_t n_vert, n_tri;                   /* of the first mesh */
+    sdm_survey_count resized;  /* other numbers of vertices or triangles; amount: of vertices */
+    sdm_survey_count rewired;  /* the same numbers, but other triangles than the first mesh */
+    double volume[2], area[2]; /* smallest and largest of the unions, mm^3 and mm^2; closed meshes
+                                  alone; NaN in a brief survey */
+    double low[3], high[3];    /* box of all meshes, mm; a search widens it unless `brief` */
+
+    /* the samples whose vertices lie beyond the centres of the outer voxels; amount: mm beyond */
+    sdm_survey_count cut;
+    double beyond[3][2]; /* mm, of all shapes: below the first and above the last voxel of each axis
+                            of the grid; 0: not beyond */
+
+    /* what a brief survey leaves out */
+    sdm_survey_jump *jump; /* [n_params] the worst break along each parameter */
+    bool has_velocity;     /* the shape has a callback of this name */
+    /* largest difference between the callback and differences of meshes, relative to the largest
+     * velocity by the same parameter, and where it is */
+    double velocity_error;
+    size_t velocity_param, velocity_shape, velocity_vertex;
+    size_t
+        unlike; /* shapes whose mesh had other bits when it was made again or by several threads */
+    double ms_mesh; /* median time of a mesh, ms */
+} sdm_shape_survey;
+
+/* Surveys the shape. A mesh that cannot be made is a finding (`failed`), no error. The findings
+ * depend neither on the number of threads nor on the time. SDM_E_RANGE: a range does not lie within
+ * the shape's; SDM_E_NOMEM, SDM_E_CANCELLED. */
+sdm_status sdm_shape_survey_make(const sdm_instance *shape, const sdm_survey_opts *opts,
+                                 sdm_shape_survey *out, sdm_error *err);
+void sdm_shape_survey_dispose(sdm_shape_survey *s);
+
+/* Number of shapes for a survey of about a second: `samples` for small meshes, fewer for large
+ * ones, at least 8. */
+size_t sdm_survey_samples(const sdm_instance *shape, size_t samples);
+
+/* SDM_E_MESH: meshes are broken: they cannot be made or are not closed. SDM_E_QUALITY: the meshes
+ * are usable, but a training or derivatives would suffer: parts that are inside out (at some of the
+ * parameters also those that the engine turns), sizes, triangles or vertices that jump, a grid that
+ * cuts, wrong velocities, or results that differ from call to call. Else SDM_OK. */
+sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s);
+
+/* velocity_error above this is wrong. */
+#define SDM_SURVEY_VELOCITY_LIMIT 1e-3
+
+#ifdef __cplusplus
+}
+#endif

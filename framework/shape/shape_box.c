@@ -1,0 +1,140 @@
+/* The box that holds the shapes of a family. */
+#include "sdm/internal/shape_box.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "sdm/internal/distribution.h"
+#include "sdm/internal/rng.h"
+#include "sdm/internal/sampling.h"
+#include "shape_internal.h"
+
+enum { ALL_CORNERS_MAX = 6, RANDOM_CORNERS = 64, SEARCH_ROUNDS = 4 };
+enum { STREAM_BOX = 1, STREAM_CORNERS = 2, STREAM_ENDS = 3 };
+
+/* A family of shapes: an instance with ranges and distributions of its parameters. */
+typedef struct family {
+    const sdm_instance *shape;
+    double min[SHAPE_PARAMS_MAX], max[SHAPE_PARAMS_MAX];
+    sdm_distribution distribution[SHAPE_PARAMS_MAX];
+    uint64_t seed;
+} family;
+
+static sdm_status family_set(family *f, const sdm_instance *shape, const double (*range)[2],
+                             sdm_error *err)
+{
+    f->shape = shape;
+    for (size_t i = 0; i < shape->n_params; i++) {
+        const sdm_param *p = &shape->params[i];
+        f->min[i] = range ? range[i][0] : p->min;
+        f->max[i] = range ? range[i][1] : p->max;
+        if (!(f->min[i] >= p->min && f->min[i] <= f->max[i] && f->max[i] <= p->max))
+            return sdm_fail(err, SDM_E_RANGE,
+                            "the range %g .. %g of '%s' does not lie within %g .. %g", f->min[i],
+                            f->max[i], p->name, p->min, p->max);
+        f->distribution[i] = shape->distributions[i];
+        // a range far from the mean has almost no probability
+        if (sdm_distribution_check(&f->distribution[i], f->min[i], f->max[i], NULL))
+            f->distribution[i] = (sdm_distribution){SDM_DISTRIBUTION_UNIFORM, 0, 0};
+    }
+    return SDM_OK;
+}
+
+static void random_params(const family *f, uint64_t stream, uint64_t index, double *p)
+{
+    sdm_sample_params(f->seed, stream, index, f->min, f->max, f->distribution, f->shape->n_params,
+                      p);
+}
+
+/* p = corner number `index` of the ranges. */
+static void corner_params(const family *f, size_t index, double *p)
+{
+    const size_t n = f->shape->n_params;
+    if (n <= ALL_CORNERS_MAX) {
+        for (size_t i = 0; i < n; i++) p[i] = index >> i & 1 ? f->max[i] : f->min[i];
+        return;
+    }
+    random_params(f, STREAM_CORNERS, index, p);
+    for (size_t i = 0; i < n; i++)
+        if (f->distribution[i].kind == SDM_DISTRIBUTION_UNIFORM)
+            p[i] = sdm_rng_below(f->seed, STREAM_ENDS, index * n + i, 2) ? f->max[i] : f->min[i];
+}
+
+/* The box, and for each of its six sides the shape that reaches farthest: side 2 i + 1 is the upper
+ * one along axis i, and its reach is the highest coordinate; that of a lower side is the negative
+ * of the lowest. */
+typedef struct shape_box {
+    double reach[6], at[6][SHAPE_PARAMS_MAX];
+    sdm_mesh mesh;
+} shape_box;
+
+/* Extends the box by the mesh at p. */
+static sdm_status box_extend(shape_box *b, const family *f, const double *p, sdm_error *err)
+{
+    const sdm_status s = sdm_instance_mesh(f->shape, p, &b->mesh, err);
+    if (s) return s;
+    double reach[6] = {-INFINITY, -INFINITY, -INFINITY, -INFINITY, -INFINITY, -INFINITY};
+    for (size_t i = 0; i < 3 * b->mesh.n_vert; i++) {
+        const double x = b->mesh.vert[i];
+        const size_t lower = 2 * (i % 3);
+        reach[lower] = fmax(reach[lower], -x);
+        reach[lower + 1] = fmax(reach[lower + 1], x);
+    }
+    for (size_t k = 0; k < 6; k++) {
+        if (!(reach[k] > b->reach[k])) continue;
+        b->reach[k] = reach[k];
+        memcpy(b->at[k], p, f->shape->n_params * sizeof *p);
+    }
+    return SDM_OK;
+}
+
+/* Pattern search (Hooke and Jeeves 1961) from the farthest shape of each side, one uniformly
+ * distributed parameter at a time: an arm with joints reaches farthest within its ranges. */
+static sdm_status box_search(shape_box *b, const family *f, sdm_error *err)
+{
+    sdm_status s = SDM_OK;
+    for (int round = 0; round < SEARCH_ROUNDS; round++) {
+        const double part = ldexp(0.25, -round);
+        for (size_t k = 0; k < 6; k++) {
+            for (size_t i = 0; i < 2 * f->shape->n_params && !s; i++) {
+                double p[SHAPE_PARAMS_MAX];
+                const size_t at = i / 2;
+                const double step = (i % 2 ? part : -part) * (f->max[at] - f->min[at]);
+                if (f->distribution[at].kind != SDM_DISTRIBUTION_UNIFORM) continue;
+                memcpy(p, b->at[k], f->shape->n_params * sizeof *p);
+                p[at] = fmin(fmax(p[at] + step, f->min[at]), f->max[at]);
+                s = box_extend(b, f, p, err);
+            }
+        }
+    }
+    return s;
+}
+
+sdm_status sdm_shape_box(const sdm_instance *shape, const double (*range)[2], size_t samples,
+                         uint64_t seed, double low[3], double high[3], sdm_error *err)
+{
+    if (!shape || !low || !high)
+        return sdm_fail(err, SDM_E_ARG, "a box needs a shape and a place for its two corners");
+    family f = {.seed = seed};
+    sdm_status s = family_set(&f, shape, range, err);
+    if (s) return s;
+    const size_t n = shape->n_params,
+                 corners = n <= ALL_CORNERS_MAX ? (size_t)1 << n : RANDOM_CORNERS;
+    double p[SHAPE_PARAMS_MAX];
+    shape_box b = {0};
+    for (int k = 0; k < 6; k++) b.reach[k] = -INFINITY;
+    for (size_t i = 0; i < n; i++) p[i] = f.min[i] + 0.5 * (f.max[i] - f.min[i]);
+    s = box_extend(&b, &f, p, err);
+    for (size_t k = 0; k < corners && !s; k++) {
+        corner_params(&f, k, p);
+        s = box_extend(&b, &f, p, err);
+    }
+    for (size_t k = 0; k < samples && !s; k++) {
+        random_params(&f, STREAM_BOX, k, p);
+        s = box_extend(&b, &f, p, err);
+    }
+    if (!s) s = box_search(&b, &f, err);
+    sdm_mesh_dispose(&b.mesh);
+    for (int i = 0; i < 3 && !s; i++) low[i] = -b.reach[2 * i], high[i] = b.reach[2 * i + 1];
+    return s;
+}

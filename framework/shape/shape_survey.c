@@ -1,0 +1,480 @@
+/* Surveys a family of shapes: meshes at many parameters, their audits, and checks of continuity,
+ * velocities and repeatability. */
+#include "sdm/internal/shape_survey.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sdm/internal/checksum.h"
+#include "sdm/internal/clock.h"
+#include "sdm/internal/distribution.h"
+#include "sdm/internal/part_audit.h"
+#include "sdm/internal/rng.h"
+#include "sdm/internal/sampling.h"
+#include "sdm/internal/shape_box.h"
+#include "sdm/internal/threads.h"
+#include "sdm/memory.h"
+#include "survey_family.h"
+
+enum { ALL_CORNERS_MAX = 6, RANDOM_CORNERS = 64 };
+enum { LINES_PER_PARAM = 4, LINES_MAX = 64, VELOCITIES = 4, REPEATS = 8, BOX_SAMPLES = 64 };
+enum { STREAM_SAMPLES = 1, STREAM_CORNERS = 2, STREAM_ENDS = 3 };
+
+/* What is known about one shape. */
+typedef struct finding {
+    sdm_status status;
+    size_t n_vert, n_tri;
+    uint64_t crc_vert, crc_tri;
+    size_t open, inside_out, turned, overlaps, degenerate, duplicate;
+    double volume, area, min[3], max[3];
+    double beyond[3][2]; /* mm */
+} finding;
+
+/* ---- parameters ---- */
+
+static sdm_status family_set(survey_family *f, const sdm_instance *shape,
+                             const sdm_survey_opts *opts, sdm_error *err)
+{
+    *f = (survey_family){.shape = shape, .opts = opts};
+    for (size_t i = 0; i < shape->n_params; i++) {
+        const sdm_param *p = &shape->params[i];
+        double *r = f->range[i];
+        r[0] = opts->range ? opts->range[i][0] : p->min;
+        r[1] = opts->range ? opts->range[i][1] : p->max;
+        if (!(r[0] >= p->min && r[0] <= r[1] && r[1] <= p->max))
+            return sdm_fail(err, SDM_E_RANGE,
+                            "the range %g .. %g of '%s' does not lie within %g .. %g", r[0], r[1],
+                            p->name, p->min, p->max);
+        f->distribution[i] = opts->distribution ? opts->distribution[i] : shape->distributions[i];
+        if (sdm_distribution_check(&f->distribution[i], r[0], r[1], NULL))
+            f->distribution[i] = (sdm_distribution){SDM_DISTRIBUTION_UNIFORM, 0, 0};
+    }
+    return SDM_OK;
+}
+
+/* p = random parameters number `index` of the stream. */
+static void draw(const survey_family *f, uint64_t stream, uint64_t index, double *p)
+{
+    double min[SHAPE_PARAMS_MAX], max[SHAPE_PARAMS_MAX];
+    for (size_t i = 0; i < f->shape->n_params; i++) {
+        min[i] = f->range[i][0];
+        max[i] = f->range[i][1];
+    }
+    sdm_sample_params(f->opts->seed, stream, index, min, max, f->distribution, f->shape->n_params,
+                      p);
+}
+
+static void corner(const survey_family *f, size_t index, double *p)
+{
+    const size_t n = f->shape->n_params;
+    const bool all = f->all_corners;
+    if (!all) draw(f, STREAM_CORNERS, index, p);
+    for (size_t i = 0; i < n; i++) {
+        const uint64_t end =
+            all ? index >> i & 1 : sdm_rng_below(f->opts->seed, STREAM_ENDS, index * n + i, 2);
+        if (all || f->distribution[i].kind == SDM_DISTRIBUTION_UNIFORM) p[i] = f->range[i][end];
+    }
+}
+
+/* Chooses the shapes. */
+static sdm_status choose(survey_family *f, sdm_shape_survey *s, sdm_error *err)
+{
+    const size_t n = f->shape->n_params;
+    s->n_params = n;
+    s->n_samples = f->opts->samples;
+    s->n_corners = n <= ALL_CORNERS_MAX ? (size_t)1 << n : RANDOM_CORNERS;
+    f->all_corners = n <= ALL_CORNERS_MAX;
+    if (f->opts->brief && s->n_corners > s->n_samples) {
+        s->n_corners = s->n_samples;
+        f->all_corners = false;
+    }
+    s->n = 1 + s->n_corners + s->n_samples;
+    const sdm_status status = SDM_ALLOC(&s->p, s->n * n, "parameters of shapes", err);
+    if (status) return status;
+    for (size_t i = 0; i < n; i++)
+        s->p[i] = fmin(fmax(f->shape->params[i].def, f->range[i][0]), f->range[i][1]);
+    for (size_t k = 0; k < s->n_corners; k++) corner(f, k, s->p + (1 + k) * n);
+    for (size_t k = 0; k < s->n_samples; k++)
+        draw(f, STREAM_SAMPLES, k, s->p + (1 + s->n_corners + k) * n);
+    return SDM_OK;
+}
+
+/* ---- one mesh ---- */
+
+/* How far the mesh lies beyond the outer voxel centres. */
+static void measure_beyond(const sdm_mesh *m, const sdm_grid *g, double beyond[3][2])
+{
+    for (size_t v = 0; v < m->n_vert; v++) {
+        double index[3];
+        sdm_grid_index(g, m->vert + 3 * v, index);
+        for (int a = 0; a < 3; a++) {
+            const double mm = g->spacing[a];
+            beyond[a][0] = fmax(beyond[a][0], -index[a] * mm);
+            beyond[a][1] = fmax(beyond[a][1], (index[a] - (double)(g->n[a] - 1)) * mm);
+        }
+    }
+}
+
+static void hash(const sdm_mesh *m, finding *f)
+{
+    f->n_vert = m->n_vert;
+    f->n_tri = m->n_tri;
+    f->crc_vert = sdm_crc64(0, m->vert, 3 * m->n_vert * sizeof *m->vert);
+    f->crc_tri = sdm_crc64(0, m->tri, 3 * m->n_tri * sizeof *m->tri);
+}
+
+/* Makes the mesh at p and looks at it. Returns only errors that end the survey. */
+static sdm_status examine(const survey_family *f, const double *p, sdm_mesh *m, finding *out,
+                          sdm_error *err)
+{
+    sdm_part_audit audit;
+    out->status = sdm_instance_mesh(f->shape, p, m, err);
+    if (!out->status) {
+        hash(m, out);
+        out->status = sdm_part_audit_make(m, !f->opts->brief, &audit, err);
+    }
+    if (out->status == SDM_E_NOMEM) return SDM_E_NOMEM;
+    if (out->status) return SDM_OK;
+    for (size_t i = 0; i < audit.n; i++) {
+        out->open += audit.part[i].open_edges;
+        out->turned += audit.part[i].turned && audit.part[i].volume < 0;
+    }
+    out->inside_out = audit.inside_out;
+    out->overlaps = audit.mesh.self_intersections;
+    out->degenerate = audit.mesh.degenerate;
+    out->duplicate = audit.mesh.duplicate;
+    out->volume = audit.union_volume;
+    out->area = audit.union_area;
+    memcpy(out->min, audit.mesh.min, sizeof out->min);
+    memcpy(out->max, audit.mesh.max, sizeof out->max);
+    if (f->opts->grid) measure_beyond(m, f->opts->grid, out->beyond);
+    sdm_part_audit_dispose(&audit);
+    return SDM_OK;
+}
+
+static bool is_cancelled(const sdm_survey_opts *o) { return o->cancelled && o->cancelled(o->user); }
+
+/* A loop body: works on item i with a mesh of the thread. */
+typedef sdm_status survey_body(void *user, size_t i, sdm_mesh *mesh, sdm_error *err);
+
+/* Runs body(user, i) for i < n on several threads. The error of the lowest i that failed counts. */
+static sdm_status run(const sdm_survey_opts *opts, int n_threads, size_t n, survey_body *body,
+                      void *user, sdm_error *err)
+{
+    sdm_status status = SDM_OK;
+#pragma omp parallel num_threads(n_threads)
+    {
+        sdm_mesh mesh = {0};
+        sdm_error why = {0};
+#pragma omp for schedule(dynamic)
+        for (size_t i = 0; i < n; i++) {
+            sdm_status now;
+#pragma omp atomic read
+            now = status;
+            if (now) continue;
+            const sdm_status s = is_cancelled(opts)
+                                     ? sdm_fail(&why, SDM_E_CANCELLED, "the survey was cancelled")
+                                     : body(user, i, &mesh, &why);
+            if (!s) continue;
+#pragma omp critical(sdm_survey)
+            if (!status) {
+                if (err) *err = why;
+#pragma omp atomic write
+                status = s;
+            }
+        }
+        sdm_mesh_dispose(&mesh);
+    }
+    return status;
+}
+
+/* ---- all meshes ---- */
+
+typedef struct survey {
+    survey_family family;
+    sdm_shape_survey *out;
+    finding *found;        /* [n] */
+    sdm_survey_jump *line; /* [n_lines] */
+    size_t n_lines;
+    bool *unlike; /* [REPEATS] */
+    double size;  /* diagonal of the box, mm */
+} survey;
+
+static const double *params_of(const survey *v, size_t i)
+{
+    return v->out->p + i * v->out->n_params;
+}
+
+static sdm_status examine_one(void *user, size_t i, sdm_mesh *mesh, sdm_error *err)
+{
+    survey *v = user;
+    return examine(&v->family, params_of(v, i), mesh, &v->found[i], err);
+}
+
+static void count(sdm_survey_count *c, size_t shape, double amount)
+{
+    if (!(amount > 0)) return;
+    c->shapes++;
+    if (!(amount > c->amount)) return;
+    c->amount = amount;
+    c->worst = shape;
+}
+
+static void count_beyond(sdm_shape_survey *s, size_t i, const finding *f)
+{
+    double most = 0;
+    for (int a = 0; a < 3; a++)
+        for (int side = 0; side < 2; side++) {
+            s->beyond[a][side] = fmax(s->beyond[a][side], f->beyond[a][side]);
+            most = fmax(most, f->beyond[a][side]);
+        }
+    if (i > s->n_corners) count(&s->cut, i, most);
+}
+
+static void spread(double range[2], double x)
+{
+    range[0] = fmin(range[0], x); // fmin() and fmax() ignore NaN
+    range[1] = fmax(range[1], x);
+}
+
+/* Sums up the findings, in the order of the shapes. */
+static void sum_up(survey *v)
+{
+    sdm_shape_survey *s = v->out;
+    const finding *first = NULL;
+    for (int a = 0; a < 3; a++) {
+        s->low[a] = INFINITY;
+        s->high[a] = -INFINITY;
+    }
+    s->volume[0] = s->volume[1] = s->area[0] = s->area[1] = NAN;
+    for (size_t i = 0; i < s->n; i++) {
+        const finding *f = &v->found[i];
+        count(&s->failed, i, f->status != SDM_OK);
+        if (f->status) continue;
+        if (!first) {
+            first = f;
+            s->n_vert = f->n_vert;
+            s->n_tri = f->n_tri;
+        }
+        count(&s->open, i, (double)f->open);
+        count(&s->inside_out, i, (double)f->inside_out);
+        count(&s->turned, i, (double)f->turned);
+        count(&s->overlaps, i, (double)f->overlaps);
+        count(&s->degenerate, i, (double)f->degenerate);
+        count(&s->duplicate, i, (double)f->duplicate);
+        if (f->n_vert != first->n_vert || f->n_tri != first->n_tri)
+            count(&s->resized, i, (double)f->n_vert);
+        else
+            count(&s->rewired, i, f->crc_tri != first->crc_tri);
+        spread(s->volume, f->volume);
+        spread(s->area, f->area);
+        for (int a = 0; a < 3; a++) {
+            s->low[a] = fmin(s->low[a], f->min[a]);
+            s->high[a] = fmax(s->high[a], f->max[a]);
+        }
+        count_beyond(s, i, f);
+    }
+    double sum = 0;
+    for (int a = 0; a < 3; a++) sum += (s->high[a] - s->low[a]) * (s->high[a] - s->low[a]);
+    v->size = sqrt(sum);
+}
+
+/* ---- what a brief survey leaves out ---- */
+
+/* Line number i follows parameter i % n_params from a sample. */
+static sdm_status follow_one(void *user, size_t i, sdm_mesh *mesh, sdm_error *err)
+{
+    (void)mesh;
+    survey *v = user;
+    const size_t n = v->out->n_params,
+                 shape = v->out->n - 1 - (i / n) % (v->out->n_samples ? v->out->n_samples : 1);
+    const sdm_status s =
+        sdm_survey_line(&v->family, params_of(v, shape), i % n, v->size, &v->line[i], err);
+    v->line[i].shape = shape;
+    return s;
+}
+
+static sdm_status follow_lines(survey *v, int n_threads, sdm_error *err)
+{
+    sdm_shape_survey *s = v->out;
+    const size_t n = s->n_params;
+    v->n_lines = LINES_PER_PARAM * n > LINES_MAX ? (n > LINES_MAX ? n : LINES_MAX / n * n)
+                                                 : LINES_PER_PARAM * n;
+    sdm_status status = SDM_ALLOC(&s->jump, n, "jumps of the mesh", err);
+    if (!status) status = SDM_ALLOC(&v->line, v->n_lines, "lines through the ranges", err);
+    if (!status) status = run(v->family.opts, n_threads, v->n_lines, follow_one, v, err);
+    for (size_t i = 0; i < v->n_lines && !status; i++) {
+        sdm_survey_jump *worst = &s->jump[i % n];
+        const sdm_survey_jump *j = &v->line[i];
+        // a change of sizes or triangles counts more than a jump
+        if (j->kind > worst->kind || (j->kind == worst->kind && j->mm > worst->mm)) *worst = *j;
+    }
+    return status;
+}
+
+/* Compares the velocity callback with differences at shape `shape`. */
+static sdm_status compare_velocity(survey *v, size_t shape, sdm_error *err)
+{
+    sdm_shape_survey *s = v->out;
+    const double *p = params_of(v, shape);
+    const size_t n = v->found[shape].n_vert;
+    double *given = NULL, *found = NULL;
+    sdm_status status = SDM_ALLOC(&given, 3 * n * s->n_params, "velocities", err);
+    if (!status) status = SDM_ALLOC(&found, 3 * n * s->n_params, "velocities", err);
+    if (!status) status = sdm_instance_velocity(v->family.shape, p, n, given, err);
+    if (!status) status = sdm_velocity_by_differences(v->family.shape, p, n, found, err);
+    for (size_t k = 0; k < s->n_params && !status; k++) {
+        double largest = 0, wrong = 0;
+        size_t vertex = 0;
+        for (size_t i = 3 * n * k; i < 3 * n * (k + 1); i++) {
+            largest = fmax(largest, fmax(fabs(given[i]), fabs(found[i])));
+            if (fabs(given[i] - found[i]) > wrong) {
+                wrong = fabs(given[i] - found[i]);
+                vertex = i / 3 % n;
+            }
+        }
+        // velocities that move no vertex by 1e-9 of the size are rounding errors
+        const double range = v->family.range[k][1] - v->family.range[k][0];
+        if (!(largest * range > 1e-9 * v->size) || !(wrong / largest > s->velocity_error)) continue;
+        s->velocity_error = wrong / largest;
+        s->velocity_param = k;
+        s->velocity_shape = shape;
+        s->velocity_vertex = vertex;
+    }
+    sdm_free(given);
+    sdm_free(found);
+    // the callback failed, or the number of vertices changes nearby
+    if (status == SDM_E_PLUGIN) s->velocity_error = INFINITY;
+    return status == SDM_E_PLUGIN ? SDM_OK : status;
+}
+
+static sdm_status compare_velocities(survey *v, sdm_error *err)
+{
+    sdm_shape_survey *s = v->out;
+    s->has_velocity = v->family.shape->shape->velocity != NULL;
+    sdm_status status = SDM_OK;
+    for (size_t k = 0; k < VELOCITIES && k < s->n_samples && s->has_velocity && !status; k++)
+        if (!v->found[s->n - 1 - k].status) status = compare_velocity(v, s->n - 1 - k, err);
+    return status;
+}
+
+/* Makes mesh i once more and compares its bits. */
+static sdm_status repeat_one(void *user, size_t i, sdm_mesh *mesh, sdm_error *err)
+{
+    survey *v = user;
+    finding again = {0};
+    if (v->found[i].status) return SDM_OK;
+    again.status = sdm_instance_mesh(v->family.shape, params_of(v, i), mesh, err);
+    if (again.status == SDM_E_NOMEM) return SDM_E_NOMEM;
+    if (!again.status) hash(mesh, &again);
+    v->unlike[i] |= again.status || again.n_vert != v->found[i].n_vert ||
+                    again.n_tri != v->found[i].n_tri || again.crc_vert != v->found[i].crc_vert ||
+                    again.crc_tri != v->found[i].crc_tri;
+    return SDM_OK;
+}
+
+static int by_size(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Repeats the first meshes backwards on one thread, with the time, and again on several. */
+static sdm_status repeat(survey *v, int n_threads, sdm_error *err)
+{
+    const size_t n = v->out->n < REPEATS ? v->out->n : REPEATS;
+    double ms[REPEATS];
+    sdm_mesh mesh = {0};
+    sdm_status s = SDM_ALLOC(&v->unlike, REPEATS, "repeated meshes", err);
+    for (size_t i = n; i-- > 0 && !s;) {
+        const double start = sdm_clock();
+        s = repeat_one(v, i, &mesh, err);
+        ms[i] = 1e3 * (sdm_clock() - start);
+    }
+    sdm_mesh_dispose(&mesh);
+    if (!s) s = run(v->family.opts, n_threads > 1 ? n_threads : 2, n, repeat_one, v, err);
+    if (s) return s;
+    for (size_t i = 0; i < n; i++) v->out->unlike += v->unlike[i];
+    qsort(ms, n, sizeof *ms, by_size);
+    v->out->ms_mesh = ms[n / 2];
+    return SDM_OK;
+}
+
+/* Widens the box by the search of sdm_shape_box(). */
+static sdm_status widen_box(survey *v, sdm_error *err)
+{
+    double low[3], high[3];
+    sdm_shape_survey *s = v->out;
+    if (s->failed.shapes) return SDM_OK;
+    const sdm_status status = sdm_shape_box(v->family.shape, (const double(*)[2])v->family.range,
+                                            s->n_samples < BOX_SAMPLES ? s->n_samples : BOX_SAMPLES,
+                                            v->family.opts->seed, low, high, err);
+    for (int a = 0; a < 3 && !status; a++) {
+        s->low[a] = fmin(s->low[a], low[a]);
+        s->high[a] = fmax(s->high[a], high[a]);
+    }
+    return status == SDM_E_PLUGIN ? SDM_OK : status;
+}
+
+/* ---- the survey ---- */
+
+sdm_status sdm_shape_survey_make(const sdm_instance *shape, const sdm_survey_opts *opts,
+                                 sdm_shape_survey *out, sdm_error *err)
+{
+    if (!shape || !out)
+        return sdm_fail(err, SDM_E_ARG, "survey without a shape or a place for the result");
+    static const sdm_survey_opts none = {0};
+    if (!opts) opts = &none;
+    *out = (sdm_shape_survey){0};
+    survey v = {.out = out};
+    const int n_threads = sdm_threads(opts->n_threads);
+    sdm_status s = opts->grid ? sdm_grid_check(opts->grid, err) : SDM_OK;
+    if (!s) s = family_set(&v.family, shape, opts, err);
+    if (!s) s = choose(&v.family, out, err);
+    if (!s) s = SDM_ALLOC(&v.found, out->n, "findings of a survey", err);
+    if (!s) s = run(opts, n_threads, out->n, examine_one, &v, err);
+    if (!s) sum_up(&v);
+    if (!s && !opts->brief && out->failed.shapes < out->n) {
+        s = follow_lines(&v, n_threads, err);
+        if (!s) s = compare_velocities(&v, err);
+        if (!s) s = repeat(&v, n_threads, err);
+        if (!s) s = widen_box(&v, err);
+    }
+    sdm_free(v.found);
+    sdm_free(v.line);
+    sdm_free(v.unlike);
+    if (s) sdm_shape_survey_dispose(out);
+    return s;
+}
+
+void sdm_shape_survey_dispose(sdm_shape_survey *s)
+{
+    sdm_free(s->p);
+    sdm_free(s->jump);
+    *s = (sdm_shape_survey){0};
+}
+
+size_t sdm_survey_samples(const sdm_instance *shape, size_t samples)
+{
+    const size_t triangles = 400000; // of all meshes: about a second
+    double p[SHAPE_PARAMS_MAX];
+    sdm_mesh mesh = {0};
+    for (size_t i = 0; i < shape->n_params; i++) p[i] = shape->params[i].def;
+    size_t n = samples;
+    if (!sdm_instance_mesh(shape, p, &mesh, NULL) && mesh.n_tri * n > triangles)
+        n = triangles / mesh.n_tri;
+    sdm_mesh_dispose(&mesh);
+    return n < 8 ? 8 : n;
+}
+
+sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s)
+{
+    if (s->failed.shapes || s->open.shapes) return SDM_E_MESH;
+    bool bad = s->inside_out.shapes || (s->turned.shapes && s->turned.shapes < s->n) ||
+               s->resized.shapes || s->rewired.shapes || s->cut.shapes || s->unlike ||
+               s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT;
+    for (size_t k = 0; k < s->n_params && s->jump; k++)
+        bad = bad || s->jump[k].kind != SDM_BREAK_NONE;
+    return bad ? SDM_E_QUALITY : SDM_OK;
+}

@@ -1,0 +1,74 @@
+// clang-format off
+/* All of the C interface of sdmgen in one header, and its table of contents, in the order in which
+ * data pass through a program:
+ *
+ *   errors, memory        sdm/status.h          sdm_status, sdm_error: the result of a function
+ *                         sdm/memory.h          sdm_alloc(), sdm_free()
+ *                         sdm/export.h          version of the headers
+ *   a shape               sdm/shape.h           the table of a shape, for authors of plug-ins
+ *                         sdm/registry.h        shapes by name; the mesh at given parameters
+ *                         sdm/builtin_shapes.h  adds the built-in shapes to a registry
+ *   a mesh                sdm/mesh.h            triangles; audit of a mesh
+ *                         sdm/meshfile.h        .ply .stl .obj .off files
+ *   a grid                sdm/grid.h            voxels and their places in space
+ *                         sdm/pose.h            rotation and translation of a shape
+ *   an exact map          sdm/exact.h           distances of a mesh, at points and on grids
+ *   a map by a network    sdm/model.h           opens a model file
+ *                         sdm/runtime.h         maps and derivatives at given parameters
+ *                         sdm/check.h           error of a map
+ *   use of a map          sdm/map.h             gradient
+ *                         sdm/isosurface.h      surface as a mesh
+ *                         sdm/vdb.h             OpenVDB level set [sdmgen::vdb]
+ *                         sdm/image.h           .nii .nrrd .mha .npy files [sdmgen::image]
+ *                         sdm/picture.h         .png .svg .pdf pictures [sdmgen::picture]
+ *   fits                  sdm/volume.h          reads images and label maps [sdmgen::image]
+ *                         sdm/phantom.h         test images of a shape
+ *                         sdm/fit.h             fits a shape to an image, labels or points
+ *
+ * In brackets: the CMake target of the library with the functions; all others are in
+ * sdmgen::sdmgen. sdm/vdb.h is included where it is installed.
+ *
+ * The map of a trained network at its default parameters:
+ *
+ *   sdm_error err = {0};
+ *   sdm_model *model = NULL;
+ *   if (sdm_model_open("model.sdm", &model, &err)) { fputs(err.text, stderr); return 1; }
+ *   const sdm_model_info *info = sdm_model_get_info(model);
+ *   double *p = malloc(info->n_params * sizeof *p);
+ *   float *values = malloc(sdm_grid_count(&info->grid) * sizeof *values);
+ *   for (size_t i = 0; i < info->n_params; i++) p[i] = info->params[i].def;
+ *   if (sdm_generate(model, p, NULL, values, NULL, &err)) fputs(err.text, stderr);
+ *   sdm_model_free(model); // values[nz][ny][nx]: distances in mm, negative inside */
+// clang-format on
+#ifndef SDM_SDMGEN_H
+#define SDM_SDMGEN_H
+
+#include "sdm/builtin_shapes.h"
+#include "sdm/check.h"
+#include "sdm/exact.h"
+#include "sdm/export.h"
+#include "sdm/fit.h"
+#include "sdm/grid.h"
+#include "sdm/image.h"
+#include "sdm/isosurface.h"
+#include "sdm/map.h"
+#include "sdm/memory.h"
+#include "sdm/mesh.h"
+#include "sdm/meshfile.h"
+#include "sdm/model.h"
+#include "sdm/phantom.h"
+#include "sdm/picture.h"
+#include "sdm/pose.h"
+#include "sdm/registry.h"
+#include "sdm/runtime.h"
+#include "sdm/shape.h"
+#include "sdm/status.h"
+#include "sdm/volume.h"
+
+#if defined(__has_include)
+#if __has_include("sdm/vdb.h")
+#include "sdm/vdb.h"
+#endif
+#endif
+
+#endif

@@ -1,0 +1,103 @@
+#!/usr/bin/env bash
+# sdmgen shapes check, and what mesh, exact, config and train say about a shape with faults (tests/shape/faulty_shape.h): one line each.
+# Tests: report_survey.c report_audit.c check_family.c cmd_mesh.c
+. "$(dirname "$0")/common.sh"
+plugin=$(cd ../../plugins/faulty && pwd)/faulty.so
+
+# A good shape passes; so do the built-in shapes. JSON, picture.
+expect 0 - sdmgen shapes check faulty --plugin "$plugin" --samples 16 -o nine.png
+has '^fine: the shape can be trained; give a configuration'
+has '^volume +8\.25 \.\. 216\.5 mm\^3, of the union$'
+has '^note +overlaps .* in all 21 shapes'
+present nine.png
+expect 0 - sdmgen shapes check --plugin "$plugin" --samples 16 --json
+has '"shape": "faulty", "verdict": "fine", "shapes": 21, "corners": 4, "samples": 16'
+has '"jumps": \[\]'
+for shape in ellipsoid torus capsule linkage; do
+    expect 0 - sdmgen shapes check $shape --samples 8
+    has '^fine'
+done
+
+# faulty FAULT CODE PATTERN: the finding is a line of the output.
+faulty() {
+    local word=warning
+    [ "$2" -eq 4 ] || word=broken
+    expect "$2" "mend what is marked '$word'" sdmgen shapes check faulty -O fault="$1" --plugin "$plugin" --samples 16
+    has "$3"
+}
+inside_out='part 2 of 2 \(12 triangles, vertices 8 \.\. 15, box 2 -0\.25 -0\.25 \.\. 4 0\.25 0\.25 mm\) is inside out and overlaps another'
+faulty handle 4 "^warning +$inside_out.*\(in all 21 shapes\); reverse the vertices"
+faulty body 4 '^warning +part 2 of 2 .* runs the other way than the rest'
+faulty jump 4 '^warning +vertex (8|9|1[0-5]) jumps by 0\.125 mm at size=2, with reach='
+faulty sizes 4 '^warning +the numbers of vertices and triangles change: 24 and 36 at first, others in [0-9]+ of 21 shapes, for example 16 vertices'
+faulty sizes 4 '^warning +the number of vertices or triangles changes at size=2, with reach='
+faulty wires 4 '^warning +the triangles get other vertices in'
+faulty velocity 4 '^warning +velocity\(\) is off by 0\.0099 of the largest velocity by reach, at vertex 9'
+faulty unlike 4 '^warning +8 meshes had other bits'
+faulty open 3 '^broken +open or badly oriented edges in all 21 shapes, up to 3'
+faulty fail 3 "^broken +no mesh in [0-9]+ of 21 shapes: shape 'faulty' at size=2\.5 reach=1\.5: too large"
+expect 4 'mend' sdmgen shapes check faulty -O fault=jump --plugin "$plugin" --samples 16 --json
+has '"verdict": "warning".*"jumps": \[\{"kind": "jump", "parameter": "size", "value": [12]\.[0-9]+, "vertex": [0-9]+, "mm": 0\.125'
+
+# With a configuration: its ranges and its grid.
+cat >good.yaml <<'YAML'
+shape: {name: faulty, ranges: {size: [1, 2]}}
+grid: {size: [13, 9, 9], spacing: 1, centre: [0, 0, 0]}
+train: {minutes: 0.02}
+YAML
+expect 0 - sdmgen shapes check good.yaml --plugin "$plugin" --samples 16
+has '^fine: the shape can be trained$'
+expect 4 mend sdmgen shapes check good.yaml 'grid.size=[8,9,9]' --plugin "$plugin" --samples 16 -o cut.svg
+cuts='over the parameters the shape reaches from \(-2, -2, -2\) to \(4, 2, 2\) mm; the grid covers \(-3\.5, -4, -4\) to \(3\.5, 4, 4\) mm and cuts [0-9.]+ % of the shapes \(by up to 0\.5 mm at the upper end of x\); use grid: (auto|\{voxels: [0-9]+\}) \(size: \[[0-9, ]+\], spacing: [0-9.]+, origin: \[[-0-9., ]+\]\)'
+has "^warning +$cuts$"
+present cut.svg
+
+# The other commands say it in one line on stderr (and that the mesh overlaps itself).
+expect 0 "$inside_out" sdmgen mesh --shape faulty -O fault=handle -o x.ply --plugin "$plugin"
+expect 0 "$inside_out" sdmgen mesh --shape faulty -O fault=handle --audit --plugin "$plugin"
+has '^parts inside out +1$'
+has '^volume of the union +124\.875 mm\^3$'
+has '^  2 +12 +8 \.\. 15 +inside out +no +yes +-0\.5 '
+expect 0 - sdmgen mesh --shape faulty --audit --plugin "$plugin"
+has '^volume +125\.5 mm\^3, the sum over all triangles: overlaps count twice$'
+has '^volume of the union +125\.375 mm\^3$'
+told() {
+    [ "$(grep -Ec "$1" err)" -eq 1 ] || bad "not told once: $1: $(cat err)"
+}
+for command in "exact --shape faulty -O fault=handle -o x.nrrd" "config good.yaml shape.options.fault=handle" \
+    "train good.yaml shape.options.fault=handle --out run"; do
+    # shellcheck disable=SC2086
+    sdmgen $command --plugin "$plugin" >out 2>err || bad "$command: $(cat err)"
+    told 'part 2 of 2 .* is inside out and overlaps another'
+done
+sdmgen config good.yaml 'grid.size=[8,9,9]' --plugin "$plugin" >out 2>err || bad 'config of a grid that cuts'
+told "$cuts"
+sdmgen config good.yaml 'grid.size=[8,9,9]' --plugin "$plugin" -q >out 2>err || bad 'config -q'
+[ ! -s err ] || bad "notices in spite of -q: $(cat err)"
+
+# Mending a file: --turn-parts.
+expect 0 'is inside out and overlaps another.*--turn-parts reverses it' sdmgen mesh --mesh x.ply --json
+near "$(json union_volume_mm3)" 124.875 1e-9
+near "$(json parts_inside_out)" 1 0
+expect 0 'parts turned: 1' sdmgen mesh --mesh x.ply --turn-parts -o mended.ply
+expect 0 - sdmgen mesh --mesh mended.ply --json
+near "$(json union_volume_mm3)" 125.375 1e-9
+expect 0 - sdmgen exact --mesh mended.ply -q --json
+crc=$(json values_crc64)
+expect 0 - sdmgen exact --mesh x.ply --turn-parts -q --json
+[ "$(json values_crc64)" = "$crc" ] || bad 'exact --turn-parts differs from the map of the mended file'
+expect 0 - sdmgen info mended.ply
+has '^volume of the union +125\.375'
+
+# Mistakes.
+expect 2 'usage: sdmgen shapes check NAME' sdmgen shapes check
+expect 2 "unknown shape 'tours'; did you mean 'torus'" sdmgen shapes check tours
+expect 2 "unexpected argument 'more'" sdmgen shapes check torus more
+expect 2 "unexpected argument 'more'" sdmgen shapes torus more
+expect 2 'o needs .shapes check' sdmgen shapes torus -o x.png
+expect 2 'O belongs to NAME' sdmgen shapes check good.yaml -O fault=none --plugin "$plugin"
+expect 2 'x\.ply' sdmgen shapes check torus -o x.ply
+expect 1 'missing\.yaml' sdmgen shapes check missing.yaml
+expect 2 'either --shape NAME or --mesh FILE' sdmgen mesh --audit
+expect 2 'p and -O need --shape' sdmgen mesh --mesh mended.ply -p a=1 --audit
+finish

@@ -1,0 +1,37 @@
+#!/usr/bin/env bash
+# docs/tutorial.md word by word: writes its files and runs its commands in their order in a fresh folder, with the installed package. A block
+# "```LANGUAGE FILE" is the content of a file, a block "```sh" holds commands; all others are not run.
+# Tests: cmd_fit.c cmd_phantom.c shapes_new.c
+. "$(dirname "$0")/common.sh"
+page=$source_folder/docs/tutorial.md
+PREFIX=$(realpath ../files-of-consume/prefix)
+export PREFIX PATH=$PREFIX/bin:$PATH
+
+# the page as one script, which prints each command before it runs it
+awk '
+    /^```/ && open { if (open == "file") print "END_OF_FILE"; open = ""; next }
+    /^```sh$/ { open = "sh"; next }
+    /^```[a-z]+ [^ ]+$/ { open = "file"; print "mkdir -p \"$(dirname " $2 ")\"; cat >" $2 " <<\"END_OF_FILE\""; next }
+    /^```/ { open = "other"; next }
+    open == "sh" || open == "file" { print }' "$page" >script
+n=$(grep -c '^sdmgen ' script)
+[ "$n" -ge 12 ] || bad "only $n commands of sdmgen found in the tutorial"
+sdmgen shapes --help | grep -q 'check NAME' || sed -i '/^sdmgen shapes check /d' script # a program without this subcommand
+mkdir work
+(cd work && bash -eux ../script) >out 2>err || bad "$(tail -n 25 err)
+its last output: $(tail -n 15 out)"
+cp out log
+
+# what the page says about the results
+present work/mug.png work/mug.stl work/mug.nrrd work/runs/mug/model.sdm work/runs/mug/slices.png work/big.{vdb,nii.gz,stl} work/fit.{png,stl,json}
+sed -n '/^wall 6 mm/,$p' log >out
+has '^wall 9 mm: [0-9]+ cm\^3$'
+truth=$(grep -oE '"wall": [0-9.]+' work/truth.json | cut -d' ' -f2)
+near "$truth" 8.521 0.001
+grep -E '^  wall .* [+]- ' log | awk '{ print $2 }' >walls # of the fits with coarse and with fine maps
+near "$(sed -n 1p walls)" 8.0 0.3
+near "$(sed -n 2p walls)" "$truth" 0.05
+grep -Eq 'coarse' log || bad "the fit with coarse maps does not tell that they are"
+rmse=$(sdmgen eval work/runs/mug/model.sdm --samples 20 --naive 0 --json --quiet --plugin work/mug/build/mug.so | grep -oE '"rmse_mm": *[0-9.e-]+' | grep -oE '[0-9.e-]+$')
+awk -v e="$rmse" 'BEGIN { exit !(e > 0 && e < 0.3) }' || bad "the root mean square error is '$rmse' mm"
+finish

@@ -1,0 +1,195 @@
+/* Audits of the parts of a mesh: boxes whose volumes, unions and orientations are known.
+ * Tests: part_audit.c */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "oracle/exact_meshes.h"
+#include "sdm/exact.h"
+#include "sdm/internal/heap.h"
+#include "sdm/internal/part_audit.h"
+
+static sdm_error err;
+
+/* Adds the box low .. high^3 of (low, high) along x and a square of +-half across. */
+static void add_box(sdm_mesh *m, double low, double high, double half, bool inside_out)
+{
+    sdm_mesh box = {0};
+    mesh_box(&box, (const double[3]){low, -half, -half}, (const double[3]){high, half, half});
+    if (inside_out) mesh_flip(&box);
+    const size_t v = m->n_vert, t = m->n_tri;
+    if (sdm_mesh_reserve(m, v + box.n_vert, t + box.n_tri, &err)) fail_msg("%s", err.text);
+    memcpy(m->vert + 3 * v, box.vert, 3 * box.n_vert * sizeof *box.vert);
+    for (size_t i = 0; i < 3 * box.n_tri; i++) m->tri[3 * t + i] = box.tri[i] + (uint32_t)v;
+    sdm_mesh_dispose(&box);
+}
+
+static sdm_part_audit audit_of(const sdm_mesh *m)
+{
+    sdm_part_audit a;
+    if (sdm_part_audit_make(m, true, &a, &err)) fail_msg("%s", err.text);
+    return a;
+}
+
+static void near(double a, double b) { assert_true(fabs(a - b) <= 1e-12 * (1 + fabs(b))); }
+
+/* Volume inside by the exact engine, from its surface: independent of the audit. */
+static double engine_volume(const sdm_mesh *m, size_t *turned)
+{
+    sdm_exact *e = NULL;
+    sdm_audit a;
+    if (sdm_exact_create(m, NULL, &e, &err) || sdm_mesh_audit(sdm_exact_surface(e), &a, &err))
+        fail_msg("%s", err.text);
+    *turned = sdm_exact_get_report(e)->parts_turned;
+    sdm_exact_free(e);
+    return a.volume;
+}
+
+/* A body of 4 x 4 x 4 and a handle that overlaps it by 1 x 2 x 2. */
+static void test_overlapping_parts(void **state)
+{
+    (void)state;
+    static const struct {
+        bool body, handle;
+        double volume, solid;
+        size_t inside_out;
+        bool turned;
+    } cases[] = {{false, false, 64 + 12, 64 + 8, 0, false},
+                 {false, true, 64 - 12, 64 - 4, 1, false},
+                 {true, false, -64 + 12, 64 - 4, 1, true},
+                 {true, true, -64 - 12, 64 + 8, 0, true}};
+    for (size_t i = 0; i < 4; i++) {
+        sdm_mesh m = {0};
+        add_box(&m, 0, 4, 2, cases[i].body);
+        add_box(&m, 3, 6, 1, cases[i].handle);
+        sdm_part_audit a = audit_of(&m);
+        size_t turned;
+        assert_int_equal(a.n, 2);
+        assert_int_equal(a.inside_out, cases[i].inside_out);
+        assert_true(a.turned == cases[i].turned && a.part[0].turned == a.turned);
+        near(a.mesh.volume, cases[i].volume);
+        near(a.union_volume, cases[i].solid);
+        near(a.union_volume, engine_volume(&m, &turned));
+        near(a.part[0].volume, cases[i].body ? -64 : 64);
+        near(a.part[1].volume, cases[i].handle ? -12 : 12);
+        near(a.part[1].area, 32);
+        assert_true(a.part[0].met > 0 && a.part[1].met > 0);
+        assert_true(a.part[1].min[0] == 3 && a.part[1].max[2] == 1);
+        assert_true(a.part[1].first_vert == 8 && a.part[1].last_vert == 15);
+        assert_true(a.part[1].first_tri == 12 && a.part[1].n_tri == 12);
+        assert_int_equal(a.part[0].state, SDM_PART_SOLID);
+        assert_int_equal(a.part[1].state,
+                         cases[i].inside_out ? SDM_PART_INSIDE_OUT : SDM_PART_SOLID);
+        sdm_part_audit_dispose(&a);
+        // after turning, all is solid
+        size_t n;
+        assert_int_equal(sdm_mesh_turn_parts(&m, &n, &err), SDM_OK);
+        assert_int_equal(n, cases[i].body + cases[i].handle);
+        a = audit_of(&m);
+        near(a.mesh.volume, 76);
+        near(a.union_volume, 72);
+        assert_true(!a.turned && !a.inside_out);
+        sdm_part_audit_dispose(&a);
+        sdm_mesh_dispose(&m);
+    }
+}
+
+/* A shell with a cavity, and a box beside it that is inside out: the engine turns the latter. */
+static void test_cavity_and_parts_apart(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0};
+    size_t turned, n;
+    add_box(&m, 0, 4, 2, false);
+    add_box(&m, 1, 3, 1, true);
+    add_box(&m, 7, 8, 0.5, true);
+    sdm_part_audit a = audit_of(&m);
+    assert_int_equal(a.part[0].state, SDM_PART_SOLID);
+    assert_int_equal(a.part[1].state, SDM_PART_CAVITY);
+    assert_int_equal(a.part[2].state, SDM_PART_SOLID);
+    assert_true(!a.part[1].turned && a.part[2].turned && !a.inside_out);
+    near(a.union_volume, 64 - 8 + 1);
+    near(a.union_volume, engine_volume(&m, &turned));
+    assert_int_equal(turned, 1);
+    sdm_part_audit_dispose(&a);
+    assert_int_equal(sdm_mesh_turn_parts(&m, &n, &err), SDM_OK);
+    assert_int_equal(n, 1);
+    a = audit_of(&m);
+    near(a.mesh.volume, 64 - 8 + 1);
+    sdm_part_audit_dispose(&a);
+    sdm_mesh_dispose(&m);
+}
+
+/* An open box: the engine turns nothing, and the closed box beside it that is inside out is not
+ * solid. */
+static void test_open_and_flat_parts(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0};
+    add_box(&m, 0, 4, 2, false);
+    m.n_tri--;
+    add_box(&m, 7, 8, 0.5, true);
+    sdm_part_audit a = audit_of(&m);
+    assert_int_equal(a.part[0].state, SDM_PART_OPEN);
+    assert_int_equal(a.part[0].open_edges, 3);
+    assert_int_equal(a.part[1].state, SDM_PART_INSIDE_OUT);
+    assert_true(isnan(a.union_volume));
+    sdm_part_audit_dispose(&a);
+    sdm_mesh_dispose(&m);
+    // two triangles back to back, and a triangle that repeats a vertex and has no part
+    add_box(&m, 0, 4, 2, false);
+    const size_t v = m.n_vert, t = m.n_tri;
+    mesh_make(&m, v + 3, t + 3);
+    mesh_vertex(&m, v, 9, 0, 0);
+    mesh_vertex(&m, v + 1, 9, 1, 0);
+    mesh_vertex(&m, v + 2, 9, 0, 1);
+    mesh_triangle(&m, t, v, v, v + 1);
+    mesh_triangle(&m, t + 1, v, v + 1, v + 2);
+    mesh_triangle(&m, t + 2, v, v + 2, v + 1);
+    a = audit_of(&m);
+    assert_int_equal(a.n, 2);
+    assert_int_equal(a.part[1].state, SDM_PART_FLAT);
+    near(a.union_volume, 64);
+    sdm_part_audit_dispose(&a);
+    sdm_mesh_dispose(&m);
+}
+
+static void test_refusals(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0};
+    sdm_part_audit a;
+    size_t n;
+    assert_int_equal(sdm_part_audit_make(&m, true, &a, &err), SDM_E_MESH);
+    assert_int_equal(sdm_part_audit_make(NULL, true, &a, &err), SDM_E_ARG);
+    assert_int_equal(sdm_mesh_turn_parts(NULL, &n, &err), SDM_E_ARG);
+    add_box(&m, 0, 4, 2, false);
+    add_box(&m, 3, 6, 1, true);
+    int failed = 0;
+    for (size_t k = 1; k < 60; k++) {
+        sdm_alloc_fail_after(k);
+        const sdm_status s = sdm_part_audit_make(&m, true, &a, &err);
+        sdm_alloc_fail_after(0);
+        assert_true(s == SDM_OK || s == SDM_E_NOMEM);
+        failed += s == SDM_E_NOMEM;
+        if (!s) sdm_part_audit_dispose(&a);
+    }
+    assert_true(failed > 10);
+    sdm_mesh_dispose(&m);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_overlapping_parts),
+        cmocka_unit_test(test_cavity_and_parts_apart),
+        cmocka_unit_test(test_open_and_flat_parts),
+        cmocka_unit_test(test_refusals),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

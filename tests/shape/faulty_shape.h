@@ -1,0 +1,97 @@
+/* A shape for tests: a body and a handle, two boxes that overlap; the option `fault` selects what
+ * is wrong with them. Some faults begin where size exceeds 2. */
+#ifndef SDM_TEST_FAULTY_SHAPE_H
+#define SDM_TEST_FAULTY_SHAPE_H
+
+#include <math.h>
+#include <string.h>
+
+#include "sdm/shape.h"
+
+static const sdm_param FAULTY_PARAMS[] = {{"size", "mm", 1, 3, 2.5, "edge of the body"},
+                                          {"reach", "mm", 1, 2, 1.5, "length of the handle"}};
+static const sdm_option FAULTY_OPTIONS[] = {
+    {"fault", SDM_OPTION_CHOICE, "", 0, 0, 0,
+     "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike", "x"}};
+
+/* Writes box number `box`: 8 vertices, 12 triangles. */
+static inline void faulty_box(sdm_mesh_out *out, size_t box, const double low[3],
+                              const double high[3], int inside_out)
+{
+    static const uint32_t TRI[36] = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
+                                     2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
+    for (size_t i = 0; i < 8; i++)
+        for (size_t d = 0; d < 3; d++)
+            out->vert[3 * (8 * box + i) + d] = i >> d & 1 ? high[d] : low[d];
+    for (size_t i = 0; i < 36; i++) {
+        const size_t corner = inside_out && i % 3 ? i - i % 3 + 3 - i % 3 : i;
+        out->tri[36 * box + i] = (uint32_t)(8 * box) + TRI[corner];
+    }
+}
+
+static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                       const double *p, sdm_mesh_out *out)
+{
+    static _Atomic int calls;
+    (void)self;
+    const char *fault = options[0].text;
+    const int is_large = p[0] > 2;
+    // in parentheses: cmocka defines a macro fail()
+    if (!strcmp(fault, "fail") && is_large) return (host->fail)(host, "too large");
+    const size_t boxes = !strcmp(fault, "sizes") && is_large ? 3 : 2;
+    const size_t less = !strcmp(fault, "open");
+    const int failed = host->reserve(host, out, 8 * boxes, 12 * boxes - less);
+    if (failed) return failed;
+    double shift = 0;
+    if (!strcmp(fault, "jump")) shift = is_large ? 0.125 : 0;
+    if (!strcmp(fault, "kink")) shift = fabs(p[0] - 2) / 4;
+    if (!strcmp(fault, "unlike")) shift = 1e-6 * ++calls;
+    const double body[2][3] = {{-p[0], -p[0], -p[0]}, {p[0], p[0], p[0]}};
+    const double handle[2][3] = {{p[0] - 0.5, -0.25, -0.25 + shift},
+                                 {p[0] + p[1], 0.25, 0.25 + shift}};
+    if (boxes == 3) {
+        const double far[2][3] = {{10, 10, 10}, {11, 11, 11}};
+        faulty_box(out, 2, far[0], far[1], 0);
+    }
+    faulty_box(out, 0, body[0], body[1], !strcmp(fault, "body"));
+    // the last box, so that `open` leaves out its last triangle
+    sdm_mesh_out all = *out;
+    uint32_t tri[72];
+    if (less) all.tri = tri;
+    faulty_box(&all, 1, handle[0], handle[1],
+               !strcmp(fault, "handle") || (!strcmp(fault, "late") && is_large));
+    if (less) memcpy(out->tri + 36, tri + 36, 33 * sizeof *tri);
+    if (!strcmp(fault, "wires") && is_large) {
+        // the other diagonal of the first face
+        static const uint32_t OTHER[6] = {0, 2, 1, 1, 2, 3};
+        memcpy(out->tri, OTHER, sizeof OTHER);
+    }
+    return 0;
+}
+
+static int faulty_velocity(const void *self, const sdm_host *host, const sdm_option_value *options,
+                           const double *p, size_t n_vert, double *velocity)
+{
+    (void)self, (void)host, (void)p;
+    const int wrong = !strcmp(options[0].text, "velocity");
+    memset(velocity, 0, 6 * n_vert * sizeof *velocity);
+    for (size_t v = 0; v < n_vert; v++) {
+        for (size_t d = 0; d < 3 && v < 8; d++) velocity[3 * v + d] = v >> d & 1 ? 1 : -1;
+        if (v < 8) continue;
+        velocity[3 * v] = 1;
+        velocity[3 * (n_vert + v)] = v & 1 ? (wrong ? 1.01 : 1) : 0;
+    }
+    return 0;
+}
+
+static const sdm_shape FAULTY = {.abi = SDM_SHAPE_ABI,
+                                 .size = sizeof(sdm_shape),
+                                 .name = "faulty",
+                                 .summary = "test",
+                                 .params = FAULTY_PARAMS,
+                                 .n_params = 2,
+                                 .options = FAULTY_OPTIONS,
+                                 .n_options = 1,
+                                 .mesh = faulty_mesh,
+                                 .velocity = faulty_velocity};
+#endif

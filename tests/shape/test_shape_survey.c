@@ -1,0 +1,263 @@
+/* Surveys of families of shapes: each fault of faulty_shape.h is found, with its place and amount
+ * known from the source; shapes without faults pass.
+ * Tests: shape_survey.c survey_line.c */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "faulty_shape.h"
+#include "sdm/builtin_shapes.h"
+#include "sdm/internal/heap.h"
+#include "sdm/internal/shape_survey.h"
+
+static sdm_registry *registry;
+static sdm_error err;
+
+static int set_up(void **state)
+{
+    (void)state;
+    return sdm_registry_create(&registry, NULL) || sdm_builtin_shapes_add(registry, NULL) ||
+           sdm_registry_add(registry, &FAULTY, "test", NULL);
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    sdm_registry_free(registry);
+    return 0;
+}
+
+static sdm_shape_survey survey_with(const char *fault, const sdm_survey_opts *opts)
+{
+    const sdm_named_text option = {"fault", fault};
+    sdm_instance *shape = NULL;
+    sdm_shape_survey s;
+    if (sdm_instance_create(&FAULTY, &option, 1, NULL, &shape, &err) ||
+        sdm_shape_survey_make(shape, opts, &s, &err))
+        fail_msg("%s", err.text);
+    sdm_instance_free(shape);
+    return s;
+}
+
+static sdm_shape_survey survey(const char *fault)
+{
+    return survey_with(fault, &(sdm_survey_opts){.samples = 32, .seed = 1});
+}
+
+/* Number of the shapes with size > 2. */
+static size_t count_large(const sdm_shape_survey *s)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < s->n; i++) n += s->p[2 * i] > 2;
+    return n;
+}
+
+static void without_faults(void **state)
+{
+    (void)state;
+    sdm_shape_survey s = survey("none");
+    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_OK);
+    assert_int_equal(s.n, 1 + 4 + 32);
+    assert_true(s.p[0] == 2.5 && s.p[1] == 1.5);
+    assert_int_equal(s.n_vert, 16);
+    assert_int_equal(s.n_tri, 24);
+    assert_true(s.failed.shapes + s.open.shapes + s.inside_out.shapes + s.turned.shapes == 0);
+    assert_true(s.resized.shapes + s.rewired.shapes + s.degenerate.shapes + s.unlike == 0);
+    assert_int_equal(s.overlaps.shapes, s.n);
+    assert_true(s.has_velocity && s.velocity_error < 1e-6);
+    // union: the body, and the handle outside of it, 0.5 x 0.5 x reach
+    assert_true(fabs(s.volume[0] - (8 + 0.25)) < 1e-12);
+    assert_true(fabs(s.volume[1] - (216 + 0.5)) < 1e-12);
+    assert_true(s.low[0] == -3 && s.high[0] == 5 && s.low[2] == -3 && s.high[2] == 3);
+    for (size_t k = 0; k < 2; k++) assert_int_equal(s.jump[k].kind, SDM_BREAK_NONE);
+    sdm_shape_survey_dispose(&s);
+    // a kink is no jump
+    s = survey("kink");
+    for (size_t k = 0; k < 2; k++) assert_int_equal(s.jump[k].kind, SDM_BREAK_NONE);
+    sdm_shape_survey_dispose(&s);
+}
+
+static void parts_that_are_inside_out(void **state)
+{
+    (void)state;
+    sdm_shape_survey s = survey("handle");
+    assert_int_equal(s.inside_out.shapes, s.n);
+    assert_int_equal((size_t)s.inside_out.amount, 1);
+    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
+    // the handle is subtracted
+    assert_true(fabs(s.volume[0] - (8 - 0.125)) < 1e-12);
+    sdm_shape_survey_dispose(&s);
+    s = survey("late");
+    assert_int_equal(s.inside_out.shapes, count_large(&s));
+    assert_true(s.p[2 * s.inside_out.worst] > 2);
+    sdm_shape_survey_dispose(&s);
+    // the body outweighs the handle, so the whole mesh is turned
+    s = survey("body");
+    assert_int_equal(s.turned.shapes, s.n);
+    assert_int_equal(s.inside_out.shapes, s.n);
+    sdm_shape_survey_dispose(&s);
+}
+
+static void broken_meshes(void **state)
+{
+    (void)state;
+    sdm_shape_survey s = survey("open");
+    assert_int_equal(s.open.shapes, s.n);
+    assert_int_equal((size_t)s.open.amount, 3);
+    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_MESH);
+    sdm_shape_survey_dispose(&s);
+    s = survey("fail");
+    assert_int_equal(s.failed.shapes, count_large(&s));
+    assert_int_equal(s.failed.worst, 0);
+    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_MESH);
+    sdm_shape_survey_dispose(&s);
+}
+
+static void breaks_along_a_parameter(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *fault;
+        sdm_survey_break kind;
+    } cases[] = {
+        {"jump", SDM_BREAK_JUMP}, {"sizes", SDM_BREAK_SIZES}, {"wires", SDM_BREAK_TRIANGLES}};
+    for (size_t i = 0; i < 3; i++) {
+        sdm_shape_survey s = survey(cases[i].fault);
+        assert_int_equal(s.jump[0].kind, cases[i].kind);
+        assert_true(fabs(s.jump[0].value - 2) < 1e-5);
+        assert_int_equal(s.jump[1].kind, SDM_BREAK_NONE);
+        assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
+        const size_t large = count_large(&s);
+        assert_int_equal(s.resized.shapes, i == 1 ? s.n - large : 0); // the default is large
+        assert_int_equal(s.rewired.shapes, i == 2 ? s.n - large : 0);
+        if (i == 0) assert_true(fabs(s.jump[0].mm - 0.125) < 1e-4 && s.jump[0].vertex >= 8);
+        sdm_shape_survey_dispose(&s);
+    }
+}
+
+static void callbacks(void **state)
+{
+    (void)state;
+    sdm_shape_survey s = survey("velocity");
+    assert_true(fabs(s.velocity_error - 0.01 / 1.01) < 1e-6);
+    assert_int_equal(s.velocity_param, 1);
+    assert_int_equal(s.velocity_vertex, 9);
+    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
+    sdm_shape_survey_dispose(&s);
+    s = survey_with("unlike", &(sdm_survey_opts){.samples = 4, .n_threads = 1});
+    assert_int_equal(s.unlike, 8);
+    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
+    sdm_shape_survey_dispose(&s);
+}
+
+static void a_grid_that_cuts(void **state)
+{
+    (void)state;
+    // the handle reaches to size + reach, at most 5 mm; the grid ends at x = 4
+    const int64_t n[3] = {11, 9, 9};
+    sdm_grid grid = sdm_grid_centred(n, 1, (const double[3]){-1, 0, 0});
+    sdm_shape_survey s = survey_with("none", &(sdm_survey_opts){.samples = 64, .grid = &grid});
+    size_t cut = 0;
+    for (size_t i = s.n_corners + 1; i < s.n; i++) cut += s.p[2 * i] + s.p[2 * i + 1] > 4;
+    assert_true(cut > 0 && cut < s.n_samples);
+    assert_int_equal(s.cut.shapes, cut);
+    assert_true(s.beyond[0][1] == 1 && s.beyond[0][0] == 0 && s.beyond[2][1] == 0);
+    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
+    sdm_shape_survey_dispose(&s);
+    // within narrower ranges it does not
+    const double range[2][2] = {{1, 2}, {1, 2}};
+    s = survey_with("none", &(sdm_survey_opts){.samples = 64, .grid = &grid, .range = range});
+    assert_int_equal(s.cut.shapes, 0);
+    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_OK);
+    assert_true(s.p[0] == 2);
+    sdm_shape_survey_dispose(&s);
+}
+
+static void threads_and_brief_surveys(void **state)
+{
+    (void)state;
+    for (int brief = 0; brief < 2; brief++) {
+        sdm_shape_survey s[2];
+        for (int i = 0; i < 2; i++)
+            s[i] = survey_with(
+                "late", &(sdm_survey_opts){.samples = 24, .brief = brief, .n_threads = 1 + 3 * i});
+        assert_memory_equal(s[0].p, s[1].p, s[0].n * 2 * sizeof *s[0].p);
+        assert_memory_equal(&s[0].inside_out, &s[1].inside_out, sizeof s[0].inside_out);
+        assert_memory_equal(s[0].low, s[1].low, sizeof s[0].low);
+        assert_true((s[0].jump == NULL) == brief);
+        assert_true((isnan(s[0].volume[0]) != 0) == brief);
+        for (int i = 0; i < 2; i++) sdm_shape_survey_dispose(&s[i]);
+    }
+}
+
+static bool stop(void *user)
+{
+    (void)user;
+    return true;
+}
+
+static void refusals(void **state)
+{
+    (void)state;
+    sdm_instance *shape = NULL;
+    sdm_shape_survey s;
+    const double range[2][2] = {{1, 4}, {1, 2}};
+    assert_int_equal(sdm_instance_create(&FAULTY, NULL, 0, NULL, &shape, &err), SDM_OK);
+    assert_int_equal(sdm_shape_survey_make(shape, &(sdm_survey_opts){.range = range}, &s, &err),
+                     SDM_E_RANGE);
+    assert_non_null(strstr(err.text, "1 .. 4 of 'size'"));
+    assert_int_equal(sdm_shape_survey_make(shape, &(sdm_survey_opts){.cancelled = stop}, &s, &err),
+                     SDM_E_CANCELLED);
+    assert_int_equal(sdm_shape_survey_make(NULL, NULL, &s, &err), SDM_E_ARG);
+    int failed = 0;
+    for (size_t k = 1; k < 400; k += 7) {
+        sdm_alloc_fail_after(k);
+        const sdm_status status = sdm_shape_survey_make(
+            shape, &(sdm_survey_opts){.samples = 2, .n_threads = 1}, &s, &err);
+        sdm_alloc_fail_after(0);
+        assert_true(status == SDM_OK || status == SDM_E_NOMEM);
+        failed += status == SDM_E_NOMEM;
+        if (!status) sdm_shape_survey_dispose(&s);
+    }
+    assert_true(failed > 20);
+    sdm_instance_free(shape);
+}
+
+static void built_in_shapes_pass(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"cochlea", "ellipsoid", "torus", "capsule", "linkage"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        sdm_instance *shape = NULL;
+        sdm_shape_survey s;
+        assert_int_equal(sdm_instance_create(sdm_registry_find(registry, names[i], NULL), NULL, 0,
+                                             NULL, &shape, &err),
+                         SDM_OK);
+        if (sdm_shape_survey_make(shape, &(sdm_survey_opts){.samples = 16}, &s, &err))
+            fail_msg("%s", err.text);
+        if (sdm_shape_survey_verdict(&s)) fail_msg("%s does not pass", names[i]);
+        sdm_shape_survey_dispose(&s);
+        sdm_instance_free(shape);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(without_faults),
+        cmocka_unit_test(parts_that_are_inside_out),
+        cmocka_unit_test(broken_meshes),
+        cmocka_unit_test(breaks_along_a_parameter),
+        cmocka_unit_test(callbacks),
+        cmocka_unit_test(a_grid_that_cuts),
+        cmocka_unit_test(threads_and_brief_surveys),
+        cmocka_unit_test(refusals),
+        cmocka_unit_test(built_in_shapes_pass),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -1,0 +1,388 @@
+/* The verdict on a training: the decision from given figures, the measured parts, and that
+ * following the advice makes the error smaller. Tests: judge.c verdict.c pod_parts.c tree_pass.c
+ * surface_check.c history.c progress.c */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "data/surface_check.h"
+#include "sdm/internal/text.h"
+#include "state/history.h"
+#include "state/judge.h"
+#include "state/progress.h"
+#include "train_tools.h"
+
+static const char base[] =
+    "shape: {name: capsule}\n"
+    "grid: {size: [28, 24, 22], spacing: 0.5}\n"
+    "network: {kind: pod, depth: 2, width: 32, rank: 8, modes: 64, degree: 2, input_degree: 3}\n"
+    "data: {static: 0, start: 200, online: 0, holdout: 16, memory_gb: 0.5}\n"
+    "train: {steps: 1000, batch: 64, refine: 0, learning_rate: 0.01, average: 0.99}\n";
+
+static sdm_config config_of(const char *const *overrides, size_t n)
+{
+    sdm_config c;
+    sdm_error e = {0};
+    if (sdm_config_parse("test.yaml", base, sizeof base - 1, overrides, n, &c, &e))
+        fail_msg("%s", e.text);
+    return c;
+}
+
+/* A good model with a voxel of 0.8 mm, an error of 0.01 mm and no cause. */
+static sdm_verdict figures(void)
+{
+    sdm_verdict v = {.voxel_mm = 0.8,
+                     .rmse_mm = 0.01,
+                     .rmse_voxel_mm = 0.01,
+                     .dice = 0.99,
+                     .dice_min = 0.98,
+                     .fall = 0,
+                     .modes_mm2 = 0};
+    for (int i = 0; i < SDM_CAUSES; i++) v.part_mm2[i] = NAN;
+    return v;
+}
+
+static sdm_verdict decide(const char *override, sdm_cause cause, double fall, double modes_mm2)
+{
+    const sdm_config c = config_of(&override, override ? 1 : 0);
+    const verdict_input in = {.config = &c, .maps = 200, .steps = 1500};
+    sdm_verdict v = figures();
+    v.part_mm2[SDM_CAUSE_BASES] = v.part_mm2[SDM_CAUSE_NETWORK] = v.part_mm2[SDM_CAUSE_MAPS] = 1e-5;
+    v.part_mm2[cause] = 8e-5;
+    v.fall = fall, v.modes_mm2 = modes_mm2;
+    trainer_verdict_decide(&in, &v);
+    assert_true(v.limited);
+    assert_int_equal(v.limit, cause);
+    return v;
+}
+
+// The largest part limits; its key, the doubled value and the rest of the error are in the
+// sentence.
+static void largest_part_limits(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *override;
+        sdm_cause cause;
+        double fall, modes_mm2;
+        const char *change;
+    } cases[] = {
+        {NULL, SDM_CAUSE_BASES, 0, 0, "raise network.rank from 8 to 16"},
+        {"network.rank=200", SDM_CAUSE_BASES, 0, 0, "lower network.block from 4 to 2"},
+        {NULL, SDM_CAUSE_NETWORK, 0.5, 0, "raise train.steps from 1000 to 2000"},
+        {NULL, SDM_CAUSE_NETWORK, 0.02, 0, "raise network.width from 32 to 64"},
+        {NULL, SDM_CAUSE_NETWORK, NAN, 7e-5, "raise network.modes from 64 to 128"},
+        {"network.depth=0", SDM_CAUSE_NETWORK, NAN, 0, "raise network.depth from 0 to 3"},
+        {"network.width=4096", SDM_CAUSE_NETWORK, 0, 0, "raise network.depth from 2 to 3"},
+        {NULL, SDM_CAUSE_MAPS, 0, 0, "raise data.start from 200 to 400"},
+        {"data.online=900", SDM_CAUSE_MAPS, 0, 0, "raise data.online from 900 to 1800"},
+        {"data.memory_gb=0.005", SDM_CAUSE_MAPS, 0, 0, "to 400 and data.memory_gb to 1;"},
+        {NULL, SDM_CAUSE_ROUNDING, 0, 0, "set network.weights to f16"},
+        {"network.weights=f16", SDM_CAUSE_ROUNDING, 0, 0, "set network.weights to f32"},
+        {NULL, SDM_CAUSE_TEMPLATE, 0, 0, "lower grid.spacing from 0.8 to 0.4 and double grid.size"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const sdm_verdict v =
+            decide(cases[i].override, cases[i].cause, cases[i].fall, cases[i].modes_mm2);
+        if (!strstr(v.sentence, cases[i].change)) fail_msg("case %zu: %s", i, v.sentence);
+        // three parts of 1e-5 remain, two if one of them is the largest
+        const double rest = cases[i].cause <= SDM_CAUSE_MAPS ? 2e-5 : 3e-5;
+        assert_true(fabs(v.at_best_mm - sqrt(rest)) < 1e-12);
+    }
+}
+
+// A short training is short whether its error falls or not; one that patience has ended is not.
+static void length_of_the_training(void **state)
+{
+    (void)state;
+    const sdm_config c = config_of(NULL, 0);
+    for (int k = 0; k < 3; k++) {
+        sdm_verdict v = figures();
+        v.part_mm2[SDM_CAUSE_NETWORK] = 1e-4;
+        v.fall = k == 0 ? 0 : 0.5;
+        const verdict_input in = {
+            .config = &c, .maps = 200, .steps = k == 0 ? 60 : 1500, .ended_early = k == 2};
+        trainer_verdict_decide(&in, &v);
+        assert_string_equal(v.key, k == 2 ? "network.width" : "train.steps");
+    }
+    // too little time for the maps is a matter of time
+    sdm_verdict v = figures();
+    v.part_mm2[SDM_CAUSE_MAPS] = 1e-4;
+    const verdict_input in = {.config = &c, .maps = 128, .steps = 1500, .cut = true};
+    trainer_verdict_decide(&in, &v);
+    assert_string_equal(v.key, "train.steps");
+}
+
+// The grid limits if it errs more than the model and more than a twentieth of a voxel.
+static void grid_limits(void **state)
+{
+    (void)state;
+    const sdm_config c = config_of(NULL, 0);
+    const verdict_input in = {.config = &c, .maps = 200, .steps = 1500};
+    static const struct {
+        double model_mm, grid_mm;
+        bool limits;
+    } cases[] = {
+        {0.01, 0.039, false}, {0.01, 0.041, true}, {0.05, 0.049, false}, {0.05, 0.06, true}};
+    for (size_t i = 0; i < 4; i++) {
+        sdm_verdict v = figures();
+        v.rmse_voxel_mm = cases[i].model_mm;
+        v.part_mm2[SDM_CAUSE_BASES] = 1e-4;
+        v.part_mm2[SDM_CAUSE_GRID] = cases[i].grid_mm * cases[i].grid_mm;
+        trainer_verdict_decide(&in, &v);
+        assert_int_equal(v.limit == SDM_CAUSE_GRID, cases[i].limits);
+        assert_string_equal(v.key, cases[i].limits ? "grid.spacing" : "network.rank");
+    }
+}
+
+static void grades(void **state)
+{
+    (void)state;
+    static const struct {
+        double voxels, dice;
+        sdm_grade grade;
+    } cases[] = {{0.049, 0.981, SDM_GRADE_GOOD},   {0.051, 0.981, SDM_GRADE_USABLE},
+                 {0.049, 0.979, SDM_GRADE_USABLE}, {0.19, 0.91, SDM_GRADE_USABLE},
+                 {0.21, 0.91, SDM_GRADE_POOR},     {0.19, 0.89, SDM_GRADE_POOR}};
+    const sdm_config c = config_of(NULL, 0);
+    const verdict_input in = {.config = &c};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        sdm_verdict v = figures();
+        v.rmse_voxel_mm = cases[i].voxels * v.voxel_mm;
+        v.dice = cases[i].dice;
+        trainer_verdict_decide(&in, &v);
+        assert_int_equal(v.grade, cases[i].grade);
+        // without any measured part
+        assert_true(!v.limited && !v.key[0] && isnan(v.at_best_mm));
+    }
+}
+
+// Errors of 4, 3 and 2 mm at the steps 0, 60 and 90: a third of 3 mm in the last third of the
+// steps.
+static void error_falls_in_the_last_third(void **state)
+{
+    (void)state;
+    sdm_text metrics = {0};
+    trainer t = {.metrics = &metrics};
+    history h;
+    sdm_text_add(&metrics, "{\"phase\": \"auto\", \"kind\": \"pod\", \"pod_rmse_mm\": 1}\n");
+    for (int i = 0; i < 3; i++)
+        sdm_text_add(
+            &metrics,
+            "{\"phase\": \"fit\", \"step\": %d, \"loss_mm2\": %s, \"heldout_mse_mm2\": %d}\n",
+            i == 2 ? 90 : 60 * i, i ? "0.5" : "null", (4 - i) * (4 - i));
+    sdm_text_add(&metrics, "{\"phase\": \"evaluate\", \"step\": 90, \"loss_mm2\": null, "
+                           "\"heldout_mse_mm2\": 9}\n{\"phase\": \"verdict\", \"rmse_mm\": 3}\n");
+    assert_int_equal(trainer_history_read(&t, &h, NULL), SDM_OK);
+    assert_int_equal(h.n, 4);
+    assert_int_equal(trainer_history_last_step(&h), 90);
+    assert_true(isnan(h.point[0].loss) && h.point[1].loss == 0.5 && h.point[3].heldout == 9);
+    assert_true(fabs(trainer_history_fall(&h, SDM_PHASE_MODE_FIT, 0) - 1 / 3.0) < 1e-12);
+    // beyond a floor of 4 mm^2 nothing is left
+    assert_true(fabs(trainer_history_fall(&h, SDM_PHASE_MODE_FIT, 4) - 1) < 1e-12);
+    assert_true(isnan(trainer_history_fall(&h, SDM_PHASE_REFINE, 0)));
+    trainer_history_dispose(&h);
+    sdm_text_dispose(&metrics);
+}
+
+// Evaluations: fixed steps with a budget of steps; with a budget of time, intervals that double.
+static void evaluations_are_due(void **state)
+{
+    (void)state;
+    static const int64_t steps[] = {10, 20, 50, 100, 200, 500, 1000, 1500};
+    sdm_config c = config_of(NULL, 0);
+    trainer t = {.config = &c};
+    size_t n = 0;
+    for (t.phase_step = 1; t.phase_step <= 1500; t.phase_step++) {
+        if (!trainer_evaluation_due(&t, 0)) continue;
+        assert_true(n < 8 && t.phase_step == steps[n]);
+        assert_int_equal(trainer_evaluation_counts(&t), n >= 5);
+        n++;
+    }
+    assert_int_equal(n, 8);
+    c.train.minutes = 3, c.train.steps = 0, c.train.evaluate_seconds = 20;
+    double last = 0, longest = 0;
+    n = 0;
+    for (double now = 0; now < 180; now += 0.05) {
+        if (!trainer_evaluation_due(&t, now)) continue;
+        assert_true(trainer_evaluation_counts(&t));
+        longest = fmax(longest, now - last);
+        t.last_evaluation = last = now;
+        n++;
+    }
+    assert_true(n >= 10 && n <= 14 && longest <= 20.1);
+    // an evaluation of half a second comes every ten seconds at most
+    t.last_evaluation = 100, t.phase_started = 99, t.evaluation_seconds = 0.5;
+    assert_false(trainer_evaluation_due(&t, 109.9));
+    assert_true(trainer_evaluation_due(&t, 110.1));
+}
+
+/* A sphere with the given radius on a grid with the given spacing. */
+static surface_check check_sphere(double radius, double spacing)
+{
+    sdm_instance *sphere;
+    sdm_error e = {0};
+    const sdm_named_text fine[] = {{"edge", "0.1"}};
+    if (sdm_instance_create(sdm_registry_find(registry, "ellipsoid", NULL), fine, 1, NULL, &sphere,
+                            &e))
+        fail_msg("%s", e.text);
+    double p[3] = {radius, radius, radius};
+    const int64_t n = (int64_t)ceil(2 * radius / spacing) + 6;
+    const double first = -0.5 * spacing * (double)(n - 1) + 0.13 * spacing;
+    const sdm_grid grid = {.n = {n, n, n},
+                           .spacing = {spacing, spacing, spacing},
+                           .origin = {first, first, first},
+                           .dir = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    const dataset d = {.shape = sphere,
+                       .grid = &grid,
+                       .n_params = 3,
+                       .seed = 5,
+                       .n_holdout = 1,
+                       .holdout_params = p};
+    surface_check check[2];
+    for (int threads = 1; threads <= 2; threads++)
+        if (trainer_surface_check(&d, threads, &check[threads - 1], &e)) fail_msg("%s", e.text);
+    assert_memory_equal(&check[0], &check[1], sizeof *check);
+    sdm_instance_free(sphere);
+    return check[0];
+}
+
+// Trilinear interpolation overestimates a distance on average by spacing^2 / 12 times the sum of
+// its second derivatives, which is 2 / radius for a sphere.
+static void surface_of_a_sphere(void **state)
+{
+    (void)state;
+    const surface_check large = check_sphere(3, 0.5);
+    const double mean = 0.5 * 0.5 / (6 * 3);
+    assert_true(large.rms_mm > mean && large.rms_mm < 1.3 * mean);
+    assert_true(large.thin == 0);
+    // a ball of one voxel does not fit into a sphere of 0.8 voxels
+    const surface_check small = check_sphere(1, 1.25);
+    assert_true(small.thin == 1 && small.rms_mm > 0.1);
+}
+
+static sdm_train_report train(const char *const *overrides, size_t n)
+{
+    const sdm_config c = config_of(overrides, n);
+    sdm_train_report r;
+    sdm_error e = {0};
+    run_files_remove();
+    if (sdm_train(&c, capsule, folder, false, NULL, &r, &e)) fail_msg("%s", e.text);
+    return r;
+}
+
+// The parts add up to the mean square error, for whatever is refined and however weights are
+// stored.
+static void parts_add_up(void **state)
+{
+    (void)state;
+    static const char *const sets[][3] = {
+        {"train.refine=0", "train.steps=300", "network.weights=i8"},
+        {"train.refine=0.5", "train.steps=400", "network.weights=f32"},
+        {"train.refine=0", "network.depth=0", "network.weights=f16"}};
+    for (size_t i = 0; i < 3; i++) {
+        const sdm_train_report r = train(sets[i], 3);
+        const double *part = r.verdict.part_mm2;
+        double sum = 0;
+        for (int k = 0; k <= SDM_CAUSE_ROUNDING; k++) sum += part[k];
+        assert_true(fabs(sum - r.accuracy.mse_mm2) < 1e-9 * r.accuracy.mse_mm2);
+        assert_true(part[SDM_CAUSE_BASES] > 0 && part[SDM_CAUSE_NETWORK] >= 0);
+        assert_true(isnan(part[SDM_CAUSE_TEMPLATE]) && part[SDM_CAUSE_GRID] > 0);
+        // floats are not rounded
+        if (i == 1) assert_true(fabs(part[SDM_CAUSE_ROUNDING]) < 1e-3 * r.accuracy.mse_mm2);
+    }
+}
+
+// Each limit is provoked, named, and the advice followed: the error becomes smaller.
+static void advice_helps(void **state)
+{
+    (void)state;
+    static const struct {
+        sdm_cause limit;
+        const char *key, *set[4];
+    } cases[] = {
+        {SDM_CAUSE_BASES, "network.rank", {"network.rank=1"}},
+        {SDM_CAUSE_MAPS, "data.start", {"data.start=16"}},
+        {SDM_CAUSE_NETWORK,
+         "network.width",
+         {"network.width=8", "network.depth=1", "network.degree=1", "train.steps=2500"}},
+        {SDM_CAUSE_NETWORK, "network.depth", {"network.depth=0", "network.degree=1"}},
+        {SDM_CAUSE_NETWORK, "train.steps", {"train.steps=60", "network.degree=1"}},
+        {SDM_CAUSE_GRID, "grid.spacing", {"grid.spacing=2.4", "grid.size=[7,6,6]"}},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const char *set[6] = {NULL};
+        size_t n = 0;
+        while (n < 4 && cases[i].set[n]) set[n] = cases[i].set[n], n++;
+        const sdm_train_report before = train(set, n);
+        if (before.verdict.limit != cases[i].limit || strcmp(before.verdict.key, cases[i].key))
+            fail_msg("%s: %s", cases[i].set[0], before.verdict.sentence);
+        char change[64];
+        snprintf(change, sizeof change, "%s=%.9g", before.verdict.key, before.verdict.to);
+        set[n++] = change;
+        if (cases[i].limit == SDM_CAUSE_GRID) set[n++] = "grid.size=[14,12,12]";
+        const sdm_train_report after = train(set, n);
+        const bool grid = cases[i].limit == SDM_CAUSE_GRID;
+        const double was = grid ? before.verdict.part_mm2[SDM_CAUSE_GRID] : before.accuracy.mse_mm2,
+                     is = grid ? after.verdict.part_mm2[SDM_CAUSE_GRID] : after.accuracy.mse_mm2;
+        if (!(is < 0.8 * was)) fail_msg("%s: %g, then %g", change, was, is);
+    }
+}
+
+typedef struct seen {
+    int reports, rates;
+    double heldout_first; // step of the first held-out error
+} seen;
+
+static void look(void *user, const sdm_progress *p)
+{
+    seen *s = user;
+    s->reports++;
+    // a rate is unknown or positive, never 0; a held-out error has its time
+    assert_true(isnan(p->samples_per_second) || p->samples_per_second > 0);
+    assert_true(isnan(p->heldout_rmse_mm) == isnan(p->heldout_seconds));
+    assert_true(!(p->heldout_seconds > p->seconds));
+    assert_true(p->samples >= 0 &&
+                (p->phase != SDM_PHASE_DATA || p->samples <= p->samples_at_start));
+    s->rates += p->samples_per_second > 0;
+    if (isnan(s->heldout_first) && p->heldout_rmse_mm > 0) s->heldout_first = (double)p->step;
+}
+
+static void progress_is_true(void **state)
+{
+    (void)state;
+    seen s = {.heldout_first = NAN};
+    const sdm_train_hooks hooks = {.progress = look, .user = &s};
+    const sdm_config c = config_of(NULL, 0);
+    sdm_error e = {0};
+    run_files_remove();
+    if (sdm_train(&c, capsule, folder, false, &hooks, NULL, &e)) fail_msg("%s", e.text);
+    assert_true(s.reports > 3 && s.rates > 1 && s.heldout_first <= 1000);
+}
+
+/* With any argument: the tests that take long. */
+int main(int argc, char **argv)
+{
+    (void)argv;
+    const struct CMUnitTest slow[] = {cmocka_unit_test(advice_helps)};
+    if (argc > 1) return cmocka_run_group_tests(slow, set_up, tear_down);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(largest_part_limits),
+        cmocka_unit_test(length_of_the_training),
+        cmocka_unit_test(grid_limits),
+        cmocka_unit_test(grades),
+        cmocka_unit_test(error_falls_in_the_last_third),
+        cmocka_unit_test(evaluations_are_due),
+        cmocka_unit_test(surface_of_a_sphere),
+        cmocka_unit_test(parts_add_up),
+        cmocka_unit_test(progress_is_true),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -1,0 +1,140 @@
+/* Interpolates exact maps at points of the exact surface. */
+#include "surface_check.h"
+
+#include <math.h>
+
+#include "sdm/exact.h"
+#include "sdm/internal/rng.h"
+#include "sdm/internal/vec3.h"
+#include "sdm/memory.h"
+#include "streams.h"
+
+enum { SHAPES = 4, POINTS = 500 };
+
+/* Sums over the points of one shape. */
+typedef struct surface_sums {
+    double square, thin, n;
+} surface_sums;
+
+/* The mesh of a surface with the areas of its triangles, summed up. */
+typedef struct surface_mesh {
+    const sdm_mesh *mesh;
+    double *area; // [n_tri] of the triangles up to this one, mm^2
+} surface_mesh;
+
+static void triangle_of(const sdm_mesh *m, size_t t, double corner[3][3])
+{
+    for (int c = 0; c < 3; c++)
+        for (int a = 0; a < 3; a++)
+            corner[c][a] = m->vert[3 * (size_t)m->tri[3 * t + (size_t)c] + (size_t)a];
+}
+
+/* normal[3] = a vector twice the area long that points outwards. */
+static void triangle_normal(double corner[3][3], double normal[3])
+{
+    double e[3], f[3];
+    v3_sub(corner[1], corner[0], e);
+    v3_sub(corner[2], corner[0], f);
+    v3_cross(e, f, normal);
+}
+
+/* x[3] = random point of the surface, uniform by area; normal[3] = unit normal there. */
+static void draw_point(const surface_mesh *s, uint64_t seed, uint64_t index, double x[3],
+                       double normal[3])
+{
+    double u[3], corner[3][3];
+    for (uint64_t k = 0; k < 3; k++) u[k] = sdm_rng_uniform(seed, STREAM_SURFACE, 3 * index + k);
+    const double at = u[0] * s->area[s->mesh->n_tri - 1];
+    size_t low = 0, high = s->mesh->n_tri - 1;
+    while (low < high) {
+        const size_t middle = (low + high) / 2;
+        if (s->area[middle] > at)
+            high = middle;
+        else
+            low = middle + 1;
+    }
+    triangle_of(s->mesh, low, corner);
+    const double root = sqrt(u[1]), b = root * (1 - u[2]), c = root * u[2];
+    triangle_normal(corner, normal);
+    const double length = v3_norm(normal);
+    for (int a = 0; a < 3; a++) {
+        x[a] = (1 - b - c) * corner[0][a] + b * corner[1][a] + c * corner[2][a];
+        normal[a] /= length > 0 ? length : 1;
+    }
+}
+
+/* *value = map[nz][ny][nx] at x by trilinear interpolation; false if x is outside of the grid. */
+static bool interpolate(const sdm_grid *g, const float *map, const double x[3], double *value)
+{
+    double index[3], share[3];
+    size_t at[3];
+    sdm_grid_index(g, x, index);
+    for (int a = 0; a < 3; a++) {
+        if (!(index[a] >= 0 && index[a] < (double)g->n[a] - 1)) return false;
+        at[a] = (size_t)index[a];
+        share[a] = index[a] - (double)at[a];
+    }
+    *value = 0;
+    for (size_t k = 0; k < 8; k++) {
+        double weight = 1;
+        size_t v[3];
+        for (size_t a = 0; a < 3; a++) {
+            const size_t bit = k >> a & 1;
+            weight *= bit ? share[a] : 1 - share[a];
+            v[a] = at[a] + bit;
+        }
+        *value += weight * (double)map[(v[2] * (size_t)g->n[1] + v[1]) * (size_t)g->n[0] + v[0]];
+    }
+    return true;
+}
+
+/* Adds up the points of the surface of e. map: scratch memory for a map of the grid. */
+static sdm_status check_surface(const dataset *d, const sdm_exact *e, size_t shape, float *map,
+                                surface_sums *sums, sdm_error *err)
+{
+    surface_mesh s = {.mesh = sdm_exact_surface(e)};
+    if (!s.mesh->n_tri) return SDM_OK;
+    const double voxel = trainer_dataset_voxel(d);
+    sdm_status status = sdm_exact_map(e, d->grid, map, err);
+    if (!status) status = SDM_ALLOC(&s.area, s.mesh->n_tri, "surface", err);
+    for (size_t t = 0; t < s.mesh->n_tri && !status; t++) {
+        double corner[3][3], normal[3];
+        triangle_of(s.mesh, t, corner);
+        triangle_normal(corner, normal);
+        s.area[t] = (t ? s.area[t - 1] : 0) + v3_norm(normal) / 2;
+    }
+    for (size_t i = 0; i < POINTS && !status; i++) {
+        double x[3], normal[3], inside[3], value;
+        draw_point(&s, d->seed, shape * POINTS + i, x, normal);
+        if (!interpolate(d->grid, map, x, &value)) continue;
+        // one voxel below the surface a ball of this radius touches it at x alone, if it fits in
+        v3_along(x, -voxel, normal, inside);
+        sums->square += value * value;
+        sums->thin += sdm_exact_point(e, inside, NULL, NULL, NULL) > -0.9 * voxel;
+        sums->n++;
+    }
+    sdm_free(s.area);
+    return status;
+}
+
+sdm_status trainer_surface_check(const dataset *d, int n_threads, surface_check *out,
+                                 sdm_error *err)
+{
+    const sdm_exact_opts opts = {.n_threads = n_threads};
+    surface_sums sums = {0};
+    sdm_mesh mesh = {0};
+    float *map = NULL;
+    sdm_status s = SDM_ALLOC(&map, sdm_grid_count(d->grid), "surface", err);
+    for (size_t i = 0; i < SHAPES && i < d->n_holdout && !s; i++) {
+        sdm_exact *e = NULL;
+        s = sdm_instance_mesh(d->shape, d->holdout_params + i * d->n_params, &mesh, err);
+        if (!s) s = sdm_exact_create(&mesh, &opts, &e, err);
+        if (!s) s = check_surface(d, e, i, map, &sums, err);
+        sdm_exact_free(e);
+    }
+    sdm_mesh_dispose(&mesh);
+    sdm_free(map);
+    *out = (surface_check){.rms_mm = sums.n > 0 ? sqrt(sums.square / sums.n) : NAN,
+                           .thin = sums.n > 0 ? sums.thin / sums.n : NAN};
+    return s;
+}

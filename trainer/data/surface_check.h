@@ -1,0 +1,19 @@
+/* How well the voxels of the grid can hold the shape, whatever the network: exact maps are compared
+   with the exact surface between the voxels. */
+#pragma once
+
+#include "dataset.h"
+
+typedef struct surface_check {
+    /* Root mean square of exact maps, interpolated trilinearly at points of the exact surface,
+       where the distance is 0, mm. */
+    double rms_mm;
+    /* Fraction of the surface where no ball with the radius of a voxel fits into the shape: there
+       it is thinner than two voxels, or has an edge or a corner. */
+    double thin;
+} surface_check;
+
+/* Compares a few held-out shapes at random points of their surfaces that lie inside the grid. Both
+   figures are NaN if there is no such point. [n_threads threads; the same bits for any number] */
+sdm_status trainer_surface_check(const dataset *d, int n_threads, surface_check *out,
+                                 sdm_error *err);

@@ -1,0 +1,79 @@
+/* The verdict on a finished training: how good the model is, of which parts its error consists,
+   what limits it, and which key of the configuration to change. All figures are measured in the
+   run, on the held-out shapes unless stated otherwise; NaN: not measured. */
+#pragma once
+
+#include "sdm/internal/text.h"
+#include "sdm/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* What a model is good for, by its error within a voxel of the surface and by its Dice overlap. */
+typedef enum sdm_grade {
+    SDM_GRADE_GOOD = 0, /* at most a twentieth of a voxel, Dice at least 0.98 */
+    SDM_GRADE_USABLE,   /* at most a fifth of a voxel, Dice at least 0.9 */
+    SDM_GRADE_POOR
+} sdm_grade;
+
+/* The causes of error. The first five add up to the mean square error of the model. */
+typedef enum sdm_cause {
+    /* `pod` and the correction of `template`: too few basis functions. Measured: what the best
+       coefficients leave of training maps. */
+    SDM_CAUSE_BASES = 0,
+    /* The network is too small or was trained too shortly. Measured: the error of its coefficients
+       (other kinds: of its maps) on training maps. */
+    SDM_CAUSE_NETWORK,
+    /* Too few maps. Measured: error on held-out maps minus error on training maps. */
+    SDM_CAUSE_MAPS,
+    /* The weights in the file have fewer digits. Measured: model minus network before rounding. */
+    SDM_CAUSE_ROUNDING,
+    /* `template`: motion, warp and the lattices of the template. Measured: model minus correction.
+     */
+    SDM_CAUSE_TEMPLATE,
+    /* The voxels are too large for the shape. Measured: exact maps, interpolated at points of the
+       exact surface. Not a part of the error at the voxels. */
+    SDM_CAUSE_GRID,
+    SDM_CAUSES
+} sdm_cause;
+
+typedef struct sdm_verdict {
+    double voxel_mm;               /* smallest spacing of the grid */
+    double rmse_mm, rmse_voxel_mm; /* of all voxels; of those within a voxel of the surface */
+    double dice, dice_min; /* overlap of the volumes inside: mean, and smallest of a shape */
+    sdm_grade grade;
+    double part_mm2[SDM_CAUSES]; /* parts of the mean square error; of the grid: of the surface */
+    /* Part of the held-out root mean square error, beyond that of the bases, that the last third of
+       the steps took away. */
+    double fall;
+    double modes_mm2; /* `pod`: what the bases can represent and network.modes leaves out */
+    double motion_mm, warp_mm; /* `template`: frames and amplitudes, and warp, at the vertices */
+    double thin; /* fraction of the surface where the shape is thinner than two voxels or has an
+                    edge */
+    double saved_seconds; /* that train.patience has saved */
+    bool limited;         /* false: nothing that could be measured limits the model */
+    sdm_cause limit;
+    /* The key to change, its value in the run and the value to try; "": none. */
+    char key[40];
+    double from, to;
+    double at_best_mm;  /* root mean square error without the part that limits; NaN: not known */
+    char sentence[512]; /* what limits the model and what to do, one sentence */
+} sdm_verdict;
+
+/* "bases", "network", "maps", "rounding", "template" or "grid". [any thread] */
+const char *sdm_cause_name(sdm_cause cause);
+
+/* How the part was measured, a few words. [any thread] */
+const char *sdm_cause_text(sdm_cause cause);
+
+/* "good", "usable" or "poor"; what such a model is good for. [any thread] */
+const char *sdm_grade_name(sdm_grade grade);
+const char *sdm_grade_text(sdm_grade grade);
+
+/* Adds the figures of the verdict to the open object of *j. */
+void sdm_verdict_json(sdm_json *j, const sdm_verdict *v);
+
+#ifdef __cplusplus
+}
+#endif

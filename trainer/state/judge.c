@@ -1,0 +1,259 @@
+/* Measures the parts of the error at the end of a run, finds the largest, and says which key of the
+   configuration makes it smaller. */
+#include "judge.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "data/surface_check.h"
+#include "history.h"
+#include "progress.h"
+
+/* If the last third of the steps took away more of the error than this, more steps help. */
+static const double STILL_FALLING = 0.1;
+
+/* With fewer steps than this no network has converged, whether the error still falls or not. */
+static const double FEW_STEPS = 500;
+
+/* The grid limits the surface if interpolation between its voxels errs more than the model, and by
+   more than this fraction of a voxel. */
+static const double GRID_ERROR = 0.05;
+
+/* Sets the key to change and its values. */
+static void advise(sdm_verdict *v, const char *key, double from, double to)
+{
+    snprintf(v->key, sizeof v->key, "%s", key);
+    v->from = from, v->to = to;
+}
+
+/* Doubles the key unless it would exceed `most`. Returns whether it could. */
+static bool advise_double(sdm_verdict *v, const char *key, double value, double most)
+{
+    if (2 * value > most) return false;
+    advise(v, key, value, 2 * value);
+    return true;
+}
+
+/* Twice the budget. */
+static void advise_budget(sdm_verdict *v, const sdm_config *c)
+{
+    if (c->train.minutes > 0)
+        advise(v, "train.minutes", c->train.minutes, 2 * c->train.minutes);
+    else if (c->train.steps > 0)
+        advise(v, "train.steps", (double)c->train.steps, 2 * (double)c->train.steps);
+    else
+        advise(v, "train.samples", (double)c->train.samples, 2 * (double)c->train.samples);
+}
+
+static bool has_bases(const sdm_config *c)
+{
+    return c->network.kind == SDM_NETWORK_POD || c->network.kind == SDM_NETWORK_TEMPLATE;
+}
+
+/* The network leaves much of training maps: it was trained too shortly or is too small. */
+static const char *advise_network(const verdict_input *in, sdm_verdict *v)
+{
+    const sdm_config *c = in->config;
+    if (has_bases(c) && !c->network.depth) {
+        advise(v, "network.depth", 0, 3);
+        return "Polynomials alone limit it";
+    }
+    if (in->steps < FEW_STEPS) {
+        advise_budget(v, c);
+        return "The training was too short";
+    }
+    if (v->fall > STILL_FALLING && !in->ended_early) {
+        advise_budget(v, c);
+        return "The training was too short, its error was still falling";
+    }
+    // the head sees more than the modes, but the MLP learns only them
+    if (has_bases(c) && v->modes_mm2 > 0.5 * v->part_mm2[SDM_CAUSE_NETWORK] &&
+        advise_double(v, "network.modes", c->network.modes, 2048))
+        return "The number of global modes limits it";
+    if (c->network.kind == SDM_NETWORK_SDMNN &&
+        advise_double(v, "network.channels", c->network.channels, 512))
+        return "The size of the network limits it";
+    if (!advise_double(v, "network.width", c->network.width, 4096) && c->network.depth < 16)
+        advise(v, "network.depth", c->network.depth, c->network.depth + 1);
+    return "The size of the network limits it";
+}
+
+/* Held-out maps have a larger error than training maps. */
+static const char *advise_maps(const verdict_input *in, sdm_verdict *v)
+{
+    const sdm_config *c = in->config;
+    if (in->cut) {
+        advise_budget(v, c);
+        return "The number of maps limits it, which the time for them limits";
+    }
+    // `start` counts for bases and polynomials, too
+    if (c->data.online > c->data.start)
+        advise(v, "data.online", (double)c->data.online, 2 * (double)c->data.online);
+    else
+        advise(v, "data.start", (double)c->data.start, 2 * fmax((double)c->data.start, in->maps));
+    return "The number of maps limits it";
+}
+
+/* Sets the key for the part that limits; returns the first half of the sentence. */
+static const char *advise_part(const verdict_input *in, sdm_verdict *v)
+{
+    const sdm_config *c = in->config;
+    switch (v->limit) {
+    case SDM_CAUSE_BASES:
+        if (!advise_double(v, "network.rank", c->network.rank, 256) && c->network.block >= 4)
+            advise(v, "network.block", c->network.block, c->network.block / 2);
+        return "The bases limit it";
+    case SDM_CAUSE_NETWORK:
+        return advise_network(in, v);
+    case SDM_CAUSE_MAPS:
+        return advise_maps(in, v);
+    case SDM_CAUSE_ROUNDING:
+        return "The rounding of the weights limits it";
+    case SDM_CAUSE_TEMPLATE:
+        advise(v, "grid.spacing", v->voxel_mm, v->voxel_mm / 2);
+        return "The lattices of the template limit it, which are as fine as the grid";
+    default:
+        advise(v, "grid.spacing", v->voxel_mm, v->voxel_mm / 2);
+        return "The grid limits the surface, more than the network does";
+    }
+}
+
+static sdm_grade grade_of(const sdm_verdict *v)
+{
+    const double voxels = v->rmse_voxel_mm / v->voxel_mm;
+    if (voxels <= 0.05 && v->dice >= 0.98) return SDM_GRADE_GOOD;
+    return voxels <= 0.2 && v->dice >= 0.9 ? SDM_GRADE_USABLE : SDM_GRADE_POOR;
+}
+
+/* *limit = the largest part, or the grid. Returns false if nothing was measured. */
+static bool find_limit(const verdict_input *in, const sdm_verdict *v, sdm_cause *limit)
+{
+    const double *part = v->part_mm2;
+    double largest = 0;
+    for (int i = 0; i < SDM_CAUSE_GRID; i++)
+        if (part[i] > largest) largest = part[i], *limit = (sdm_cause)i;
+    // a network that has not learned what it could fits neither training maps nor others
+    const bool unfinished = in->steps < FEW_STEPS || v->fall > STILL_FALLING ||
+                            v->modes_mm2 > part[SDM_CAUSE_NETWORK] + part[SDM_CAUSE_MAPS];
+    if (*limit == SDM_CAUSE_MAPS && in->config->network.depth && unfinished &&
+        part[SDM_CAUSE_NETWORK] > 0.5 * part[SDM_CAUSE_MAPS])
+        *limit = SDM_CAUSE_NETWORK;
+    const double grid = sqrt(v->part_mm2[SDM_CAUSE_GRID]);
+    if (grid > fmax(v->rmse_voxel_mm, GRID_ERROR * v->voxel_mm)) *limit = SDM_CAUSE_GRID;
+    return largest > 0 || *limit == SDM_CAUSE_GRID;
+}
+
+/* The sentence, with the other keys that must change together with v->key. */
+static void write_sentence(const verdict_input *in, const char *what, sdm_verdict *v)
+{
+    const sdm_config *c = in->config;
+    char change[160] = "", also[96] = "", result[96] = "", share[96] = "";
+    if (v->key[0])
+        snprintf(change, sizeof change, ": %s %s from %.6g to %.6g",
+                 v->to < v->from ? "lower" : "raise", v->key, v->from, v->to);
+    if (v->limit == SDM_CAUSE_ROUNDING)
+        snprintf(change, sizeof change, ": set network.weights to %s",
+                 c->network.weights == SDM_WEIGHT_I8 ? "f16" : "f32");
+    if (!strcmp(v->key, "grid.spacing")) snprintf(also, sizeof also, " and double grid.size");
+    // with `auto`, a value that is the default of `auto` would become that of the kind
+    if (c->network.kind == SDM_NETWORK_TEMPLATE && !strncmp(v->key, "network.", 8))
+        snprintf(also, sizeof also, " with network.kind: template");
+    // maps of two bytes a voxel; twice as many for this key
+    const double gb = 2e-9 * (double)sdm_grid_count(&c->grid) * (in->maps + v->to);
+    if (v->limit == SDM_CAUSE_MAPS && !in->cut && gb > c->data.memory_gb)
+        snprintf(also, sizeof also, " and data.memory_gb to %.0f", ceil(gb));
+    if (v->limit == SDM_CAUSE_GRID)
+        snprintf(result, sizeof result,
+                 "; between its voxels exact maps miss the surface by %.2g mm",
+                 sqrt(v->part_mm2[SDM_CAUSE_GRID]));
+    else if (v->limit != SDM_CAUSE_NETWORK && v->at_best_mm > 0)
+        snprintf(result, sizeof result,
+                 "; without this part the RMSE would be %.2g mm, not %.2g mm", v->at_best_mm,
+                 v->rmse_mm);
+    if (v->limit != SDM_CAUSE_GRID) {
+        const double rest = v->at_best_mm * v->at_best_mm, part = v->part_mm2[v->limit];
+        snprintf(share, sizeof share, " (%.0f %% of the mean square error)",
+                 100 * part / (part + rest));
+    }
+    snprintf(v->sentence, sizeof v->sentence, "%s%s%s%s%s.", what, share, change, also, result);
+}
+
+void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)
+{
+    v->grade = grade_of(v);
+    v->at_best_mm = NAN;
+    v->limited = find_limit(in, v, &v->limit);
+    if (!v->limited) {
+        snprintf(v->sentence, sizeof v->sentence, "Nothing that was measured limits it.");
+        return;
+    }
+    double rest = 0;
+    for (int i = 0; i < SDM_CAUSE_GRID; i++)
+        if (v->part_mm2[i] > 0 && i != (int)v->limit) rest += v->part_mm2[i];
+    if (v->limit != SDM_CAUSE_GRID) v->at_best_mm = sqrt(rest);
+    write_sentence(in, advise_part(in, v), v);
+}
+
+/* Distributes the error of the model over its causes. */
+static void set_parts(const error_measures *m, double mse, sdm_verdict *v)
+{
+    double *part = v->part_mm2;
+    error_pair network = m->network, bases = m->bases;
+    if (m->other_voxels || (m->corrects && network.heldout > mse)) {
+        // the ratios on other voxels: a sample, or a correction's grid, which reaches farther
+        const double scale = mse / network.heldout;
+        network.training *= scale, bases.training *= scale;
+        network.heldout = mse;
+    }
+    const double fitted = isfinite(bases.training) ? fmin(bases.training, network.training) : 0;
+    if (isfinite(bases.training)) part[SDM_CAUSE_BASES] = fitted;
+    if (isfinite(network.training)) {
+        part[SDM_CAUSE_NETWORK] = network.training - fitted;
+        part[SDM_CAUSE_MAPS] = network.heldout - network.training;
+    }
+    const double rest = mse - (isfinite(network.heldout) ? network.heldout : 0);
+    if (m->corrects)
+        part[SDM_CAUSE_TEMPLATE] = rest;
+    else if (!m->other_voxels)
+        part[SDM_CAUSE_ROUNDING] = rest;
+}
+
+sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verdict *out,
+                                sdm_error *err)
+{
+    error_measures m = {
+        .network = {NAN, NAN}, .bases = {NAN, NAN}, .modes = NAN, .motion_mm = NAN, .warp_mm = NAN};
+    surface_check surface = {NAN, NAN};
+    history h = {0};
+    const dataset *d = &t->data;
+    sdm_status s = t->kind->parts(t, &m, err);
+    if (!s) s = trainer_surface_check(d, t->n_threads, &surface, err);
+    if (!s) s = trainer_history_read(t, &h, err);
+    if (s) return s;
+    const double floor = isfinite(m.bases.heldout) ? m.bases.heldout : 0;
+    *out = (sdm_verdict){.voxel_mm = trainer_dataset_voxel(d),
+                         .rmse_mm = t->accuracy.rmse_mm,
+                         .rmse_voxel_mm = errors->rmse_voxel_mm,
+                         .dice = errors->dice,
+                         .dice_min = errors->dice_min,
+                         .modes_mm2 = m.modes,
+                         .motion_mm = m.motion_mm,
+                         .warp_mm = m.warp_mm,
+                         .thin = surface.thin,
+                         .saved_seconds = t->saved_seconds,
+                         .fall = fmax(trainer_history_fall(&h, SDM_PHASE_MODE_FIT, floor),
+                                      trainer_history_fall(&h, SDM_PHASE_REFINE, floor))};
+    for (int i = 0; i < SDM_CAUSES; i++) out->part_mm2[i] = NAN;
+    out->part_mm2[SDM_CAUSE_GRID] = surface.rms_mm * surface.rms_mm;
+    set_parts(&m, t->accuracy.mse_mm2, out);
+    const verdict_input in = {
+        .config = t->config,
+        .maps = (double)(d->n_static + d->n_taken),
+        .cut = trainer_by_time(t) && !d->only_holdout &&
+               (int64_t)d->n_start<t->config->data.start, .ended_early = t->saved_seconds> 0,
+        .steps = (double)t->step};
+    trainer_verdict_decide(&in, out);
+    trainer_history_dispose(&h);
+    return SDM_OK;
+}

@@ -1,0 +1,27 @@
+/* What a run says at its end about its model (sdm/internal/verdict.h). */
+#pragma once
+
+#include "kind.h"
+#include "sdm/internal/verdict.h"
+
+/* Errors of the finished model that sdm_accuracy does not have. */
+typedef struct model_errors {
+    double rmse_voxel_mm;  /* within a voxel of the surface */
+    double dice, dice_min; /* mean and smallest over the held-out shapes */
+} model_errors;
+
+/* Measures the parts of the error and fills *out. t->accuracy must be set. */
+sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verdict *out,
+                                sdm_error *err);
+
+/* The measured figures from which the verdict follows. */
+typedef struct verdict_input {
+    const sdm_config *config;
+    double maps;      /* training maps made by the run */
+    bool cut;         /* the time of the budget ended before all maps of data.start were made */
+    bool ended_early; /* by train.patience */
+    double steps;     /* of the optimiser */
+} verdict_input;
+
+/* Sets grade, limit, key, values and sentence from the figures in *v. */
+void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v);

@@ -1,0 +1,62 @@
+/* The words and the JSON of a verdict. */
+#include "sdm/internal/verdict.h"
+
+#include <stdio.h>
+
+const char *sdm_cause_name(sdm_cause cause)
+{
+    static const char *const names[] = {"bases", "network", "maps", "rounding", "template", "grid"};
+    return (size_t)cause < SDM_CAUSES ? names[cause] : "unknown";
+}
+
+const char *sdm_cause_text(sdm_cause cause)
+{
+    static const char *const texts[] = {
+        "what the best coefficients of the bases leave of training maps",
+        "what the network leaves of training maps besides",
+        "what is larger on held-out maps than on training maps",
+        "rounding of the weights in the model file",
+        "what motion, warp and lattices of the template leave besides",
+        "exact maps, interpolated between the voxels at the exact surface"};
+    return (size_t)cause < SDM_CAUSES ? texts[cause] : "unknown";
+}
+
+const char *sdm_grade_name(sdm_grade grade)
+{
+    return grade == SDM_GRADE_GOOD ? "good" : grade == SDM_GRADE_USABLE ? "usable" : "poor";
+}
+
+const char *sdm_grade_text(sdm_grade grade)
+{
+    return grade == SDM_GRADE_GOOD ? "for level sets, surfaces, measurements and fits to images"
+           : grade == SDM_GRADE_USABLE
+               ? "for pictures, segmentations and first fits; for measurements check maps with "
+                 "--max-error"
+               : "not for surfaces: whole voxels are on the wrong side";
+}
+
+void sdm_verdict_json(sdm_json *j, const sdm_verdict *v)
+{
+    char key[32];
+    sdm_json_text(j, "grade", sdm_grade_name(v->grade));
+    sdm_json_real(j, "voxel_mm", v->voxel_mm);
+    sdm_json_real(j, "rmse_mm", v->rmse_mm);
+    sdm_json_real(j, "rmse_voxel_mm", v->rmse_voxel_mm);
+    sdm_json_real(j, "dice", v->dice);
+    sdm_json_real(j, "dice_min", v->dice_min);
+    for (int i = 0; i < SDM_CAUSES; i++) {
+        snprintf(key, sizeof key, "%s_mm2", sdm_cause_name((sdm_cause)i));
+        sdm_json_real(j, key, v->part_mm2[i]);
+    }
+    sdm_json_real(j, "modes_mm2", v->modes_mm2);
+    sdm_json_real(j, "motion_mm", v->motion_mm);
+    sdm_json_real(j, "warp_mm", v->warp_mm);
+    sdm_json_real(j, "thin", v->thin);
+    sdm_json_real(j, "fall", v->fall);
+    sdm_json_text(j, "limit", v->limited ? sdm_cause_name(v->limit) : "none");
+    sdm_json_text(j, "key", v->key);
+    sdm_json_real(j, "from", v->from);
+    sdm_json_real(j, "to", v->to);
+    sdm_json_real(j, "at_best_mm", v->at_best_mm);
+    sdm_json_text(j, "sentence", v->sentence);
+}

@@ -8,19 +8,55 @@
 #include "report/progress_bar.h"
 #include "report/terminal.h"
 
-/* One progress bar over all phases. */
+/* One progress bar for each phase. */
 typedef struct progress_state {
     cli_progress bar;
-    size_t expected; /* upper estimate of the number of iterations of all phases */
+    const cli_fit *f;
+    sdm_fit_phase phase;
+    size_t before; /* number of iterations before this phase */
 } progress_state;
+
+/* Share of the time of a search that its first round takes, roughly. */
+#define FIRST_ROUND 0.7
+
+/* The search: which start is tried, how many there are, and the best so far. */
+static void show_search(progress_state *w, const sdm_fit_progress *p)
+{
+    char text[200], value[32];
+    const bool first = p->round == 1;
+    const double done = (double)(p->start - 1) / (double)p->n_starts,
+                 fraction = first ? FIRST_ROUND * done : FIRST_ROUND + (1 - FIRST_ROUND) * done;
+    size_t used =
+        (size_t)snprintf(text, sizeof text, "%s %zu of %zu",
+                         first ? "start" : "best starts again, finer:", p->start, p->n_starts);
+    if (p->best_params) used += (size_t)snprintf(text + used, sizeof text - used, ", best so far");
+    for (size_t i = 0; p->best_params && i < w->f->n_params && used + 80 < sizeof text; i++) {
+        snprintf(value, sizeof value, "%.3g", p->best_params[i]);
+        used += (size_t)snprintf(text + used, sizeof text - used, " %.40s=%s", w->f->params[i].name,
+                                 value);
+    }
+    cli_progress_show(&w->bar, "search", fraction, text);
+}
 
 static void show_progress(void *user, const sdm_fit_progress *p)
 {
-    static const char *const phases[] = {"search", "fit", "polish"};
     progress_state *w = user;
-    char text[80];
-    snprintf(text, sizeof text, "iteration %zu  step %.1e", p->iteration, p->step);
-    cli_progress_show(&w->bar, phases[p->phase], (double)p->iteration / (double)w->expected, text);
+    const sdm_fit_opts *o = &w->f->opts;
+    if (p->phase != w->phase) w->phase = p->phase, w->before = p->iteration - 1;
+    if (p->phase == SDM_FIT_SEARCH && p->n_starts) {
+        show_search(w, p);
+        return;
+    }
+    char text[100];
+    const size_t n = p->iteration - w->before,
+                 most = p->phase == SDM_FIT_POLISH ? o->max_polish_iterations : o->max_iterations;
+    snprintf(text, sizeof text, "iteration %zu of at most %zu, last step %.1e", n, 2 * most,
+             p->step);
+    cli_progress_show(&w->bar,
+                      p->phase == SDM_FIT_POLISH ? "polish"
+                      : p->phase == SDM_FIT_MAIN ? "fit"
+                                                 : "search",
+                      (double)n / (double)most, text);
 }
 
 static sdm_status check_arguments(cli_fit *f, sdm_error *err)
@@ -43,9 +79,7 @@ static sdm_status check_arguments(cli_fit *f, sdm_error *err)
  * shown before the command fails. */
 static sdm_status fit_shape(cli_fit *f, sdm_error *err)
 {
-    const size_t turns = f->opts.turns == SDM_FIT_TURNS_NONE ? 0 : f->opts.n_turns;
-    progress_state w = {.expected = 6 * turns + 12 + f->opts.max_iterations +
-                                    f->opts.max_polish_iterations};
+    progress_state w = {.f = f};
     f->opts.progress = show_progress;
     f->opts.cancelled = cli_interrupted;
     f->opts.user = &w;
@@ -108,6 +142,8 @@ sdm_status cmd_fit(const cli_args *args, sdm_error *err)
     if (!s) s = cli_fit_open_source(&f, err);
     if (!s) s = cli_fit_read_options(&f, err);
     if (!s) s = cli_fit_read_target(&f, err);
+    if (!s) s = cli_fit_check_options(&f, err);
+    if (!s) cli_fit_default_lengths(&f);
     if (!s) s = cli_fit_read_reference(&f, err);
     if (!s) s = cli_fit_read_start(&f, err);
     if (!s) s = fit_shape(&f, err);

@@ -4,14 +4,17 @@
 #include <string.h>
 
 #include "commands.h"
+#include "inputs/points_file.h"
 #include "inputs/setup.h"
 #include "report/generate_files.h"
 #include "report/json_values.h"
 #include "report/output.h"
+#include "report/points_table.h"
 #include "report/progress_bar.h"
 #include "report/terminal.h"
 #include "sdm/field.h"
 #include "sdm/image.h"
+#include "sdm/internal/block_border.h"
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/config.h"
@@ -31,10 +34,10 @@ typedef struct job {
     size_t n_rows;
     sdm_grid grid;             /* of all maps */
     bool own;                  /* the grid is that of the model */
-    bool banded;               /* bands are enough: only level sets are wanted */
+    bool banded;               /* bands suffice: only level sets are wanted */
     double width;              /* of the bands, mm */
     sdm_blocks band;           /* of the last row */
-    float *values;             /* [nz][ny][nx] mm; NULL: banded */
+    float *values;             /* [nz][ny][nx] mm; NULL: not needed yet */
     float *gradient;           /* [3][nz][ny][nx]; NULL: not wanted */
     float *jacobian;           /* [n_params][nz][ny][nx]; NULL: not wanted */
     double ms;                 /* total time of all maps */
@@ -133,8 +136,14 @@ static sdm_status choose_grid(job *j, sdm_error *err)
     if (s) return s;
     const bool whole = j->own || args->check || args->max_error > 0 || args->gradient ||
                        args->jacobian || cli_policy(args) == SDM_RANGE_EXACT;
-    j->banded = !whole && cli_writes_bands(args);
-    return j->banded ? cli_band_width(args, &j->grid, &j->width, err) : SDM_OK;
+    j->banded = !whole && cli_blocks_suffice(args);
+    return j->banded ? cli_blocks_band(&j->grid, args, &j->width, err) : SDM_OK;
+}
+
+static sdm_status allocate_values(job *j, sdm_error *err)
+{
+    return sdm_alloc_unset((void **)&j->values, sdm_grid_count(&j->grid), sizeof *j->values,
+                           "distance map", err);
 }
 
 static sdm_status allocate_maps(job *j, sdm_error *err)
@@ -142,25 +151,32 @@ static sdm_status allocate_maps(job *j, sdm_error *err)
     const size_t n = sdm_grid_count(&j->grid);
     size_t count;
     if (j->banded) return SDM_OK;
-    sdm_status s = sdm_alloc_unset((void **)&j->values, n, sizeof *j->values, "distance map", err);
+    sdm_status s = allocate_values(j, err);
     if (!s && j->args->gradient) s = SDM_ALLOC(&j->gradient, 3 * n, "gradient", err);
     if (s || !j->args->jacobian) return s;
     s = sdm_mul(n, j->info->n_params, &count, err);
     return s ? s : SDM_ALLOC(&j->jacobian, count, "derivatives", err);
 }
 
+static sdm_status open_model(job *j, sdm_error *err)
+{
+    const sdm_status s = sdm_model_open(j->args->files.items[0], &j->model, err);
+    if (s) return s;
+    j->info = sdm_model_get_info(j->model);
+    return cli_model_params(j->info, &j->params, err);
+}
+
 /* Opens the model and checks everything before the first map is made. */
 static sdm_status prepare_job(job *j, sdm_error *err)
 {
     const cli_args *args = j->args;
+    if (args->columns)
+        return sdm_fail(err, SDM_E_ARG, "generate: --columns belongs to --points FILE");
     if (!args->outputs.n && !args->json && !args->gradient && !args->jacobian && !args->check)
         return sdm_fail(
             err, SDM_E_ARG,
             "generate: an output is needed: -o FILE, --gradient, --jacobian, --check or --json");
-    sdm_status s = sdm_model_open(args->files.items[0], &j->model, err);
-    if (s) return s;
-    j->info = sdm_model_get_info(j->model);
-    s = cli_model_params(j->info, &j->params, err);
+    sdm_status s = open_model(j, err);
     if (!s) s = choose_grid(j, err);
     if (!s) s = read_rows(j, err);
     if (!s && !args->rows) s = cli_row_files_check(args, 1, err);
@@ -182,7 +198,7 @@ static sdm_status write_maps(const job *j, size_t row, const sdm_result *result,
         params.failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the metadata") : SDM_OK;
     const cli_map map = {.grid = &j->grid,
                          .values = j->values,
-                         .band = j->banded ? &j->band : NULL,
+                         .blocks = j->band.tile ? &j->band : NULL,
                          .shape = j->info->shape,
                          .params = params.data,
                          .source = result->source,
@@ -253,19 +269,30 @@ static void notice_row(const job *j, size_t row, const sdm_result *r)
         printf("exact\n");
 }
 
+/* Computes the band at the parameters p; leaves it empty if it reaches the border of the grid,
+ * where only the whole map can be closed. */
+static sdm_status make_band(job *j, const double *p, const sdm_generate_opts *opts,
+                            sdm_result *result, sdm_error *err)
+{
+    sdm_blocks *b = &j->band;
+    sdm_blocks_dispose(b);
+    const sdm_status s = sdm_generate_band(j->model, p, opts, &j->grid, j->width, b, result, err);
+    if (s) return s;
+    if (!sdm_blocks_reach_border(b)) {
+        j->hash = sdm_crc64(j->hash, b->values, b->n_block * sizeof *b->values);
+        return SDM_OK;
+    }
+    sdm_blocks_dispose(b);
+    return j->values ? SDM_OK : allocate_values(j, err);
+}
+
 /* Computes the map or the band at the parameters p and adds it to the hash. */
 static sdm_status make_map(job *j, const double *p, const sdm_generate_opts *opts,
                            sdm_result *result, sdm_error *err)
 {
     const sdm_model *m = j->model;
-    sdm_status s = SDM_OK;
-    if (j->banded) {
-        sdm_blocks_dispose(&j->band);
-        s = sdm_generate_band(m, p, opts, &j->grid, j->width, &j->band, result, err);
-        if (!s)
-            j->hash = sdm_crc64(j->hash, j->band.values, j->band.n_block * sizeof *j->band.values);
-        return s;
-    }
+    sdm_status s = j->banded ? make_band(j, p, opts, result, err) : SDM_OK;
+    if (s || j->band.tile) return s;
     if (!j->own)
         s = sdm_generate_grid(m, p, opts, &j->grid, j->values, j->jacobian, result, err);
     else if (j->jacobian)
@@ -347,19 +374,87 @@ static sdm_status print_json(const job *j, sdm_error *err)
     return cli_print_json(&json, err);
 }
 
+/* The points of --points and what the network says there. */
+typedef struct point_answers {
+    double *x; /* [n][3] */
+    size_t n;
+    float *values, *gradient, *slopes; /* [n], [n][3], [n][n_params]; NULL: not wanted */
+} point_answers;
+
+static sdm_status compute_points(job *j, point_answers *a, sdm_result *result, sdm_error *err)
+{
+    const sdm_generate_opts opts = {.policy = cli_policy(j->args),
+                                    .exact_shape = j->shape,
+                                    .n_threads = (int)j->args->threads,
+                                    .outside = cli_outside(j->args)};
+    size_t count;
+    sdm_status s = SDM_ALLOC(&a->values, a->n, "distances", err);
+    if (!s) s = SDM_ALLOC(&a->gradient, 3 * a->n, "gradients", err);
+    if (!s && j->args->jacobian) {
+        s = sdm_mul(a->n, j->info->n_params, &count, err);
+        if (!s) s = SDM_ALLOC(&a->slopes, count, "derivatives", err);
+    }
+    return s ? s
+             : sdm_generate_points(j->model, j->rows, &opts, a->x, a->n, a->values, a->gradient,
+                                   a->slopes, result, err);
+}
+
+static sdm_status write_points(const job *j, const point_answers *a, cli_points_table *t,
+                               sdm_error *err)
+{
+    sdm_status s = cli_points_allocate(t, a->n, err);
+    for (size_t i = 0; i < a->n && !s && t->at.distance; i++)
+        t->at.distance[i] = (double)a->values[i];
+    for (size_t i = 0; i < 3 * a->n && !s && t->at.gradient; i++)
+        t->at.gradient[i] = (double)a->gradient[i];
+    if (!s) s = cli_points_write(t, j->args, err);
+    if (!s && a->slopes)
+        s = sdm_npy_write(j->args->jacobian, a->slopes, (const size_t[]){a->n, j->info->n_params},
+                          2, err);
+    return s;
+}
+
+/* Does the work of --points. */
+static sdm_status run_points(job *j, sdm_error *err)
+{
+    cli_points_table table = {.n = 0};
+    point_answers a = {.n = 0};
+    sdm_result result = {0};
+    sdm_status s = cli_points_check_model(j->args, &table, err);
+    if (!s) s = open_model(j, err);
+    if (!s) s = read_rows(j, err);
+    if (!s) s = open_shape(j, err);
+    if (!s) s = check_rows(j, err);
+    if (!s) s = cli_read_points(j->args->points, &a.x, &a.n, err);
+    if (!s) s = compute_points(j, &a, &result, err);
+    if (!s) notice_row(j, 0, &result);
+    if (!s) s = write_points(j, &a, &table, err);
+    cli_points_dispose(&table);
+    sdm_free(a.slopes);
+    sdm_free(a.gradient);
+    sdm_free(a.values);
+    sdm_free(a.x);
+    return s;
+}
+
+static sdm_status run_maps(job *j, sdm_error *err)
+{
+    cli_progress progress;
+    sdm_status s = prepare_job(j, err);
+    cli_progress_start(&progress);
+    for (size_t i = 0; i < j->n_rows && !s; i++) {
+        s = make_row(j, i, err);
+        if (!s && i + 1 < j->n_rows) s = cli_check_interrupt(err);
+        cli_progress_show(&progress, "generate", (double)(i + 1) / (double)j->n_rows, NULL);
+    }
+    cli_progress_clear(&progress);
+    return !s && j->args->json ? print_json(j, err) : s;
+}
+
 sdm_status cmd_generate(const cli_args *args, sdm_error *err)
 {
     job j = {.args = args};
-    cli_progress progress;
-    sdm_status s = prepare_job(&j, err);
-    cli_progress_start(&progress);
-    for (size_t i = 0; i < j.n_rows && !s; i++) {
-        s = make_row(&j, i, err);
-        if (!s && i + 1 < j.n_rows) s = cli_check_interrupt(err);
-        cli_progress_show(&progress, "generate", (double)(i + 1) / (double)j.n_rows, NULL);
-    }
-    cli_progress_clear(&progress);
-    if (!s && args->json) s = print_json(&j, err);
+    const sdm_status s = args->points ? run_points(&j, err) : run_maps(&j, err);
     job_dispose(&j);
     return s;
 }

@@ -37,7 +37,7 @@ static void print_model(const char *path, const sdm_model_info *m)
         "accuracy     on %lld held-out shapes: MSE %.3g mm^2, RMSE %.5f mm, mean %.5f mm, largest "
         "%.5f mm\n",
         (long long)a->samples, a->mse_mm2, a->rmse_mm, a->mae_mm, a->max_abs_mm);
-    printf("             RMSE within 0.4 mm of the surface %.5f mm\n", a->rmse_near_mm);
+    printf("             RMSE within %g mm of the surface %.5f mm\n", a->near_mm, a->rmse_near_mm);
     printf(
         "             RMSE of single maps: 50 %% below %.5f mm, 90 %% below %.5f mm, 99 %% below "
         "%.5f mm\n",
@@ -57,6 +57,7 @@ static void json_accuracy(sdm_json *j, const sdm_accuracy *a)
     sdm_json_real(j, "mae_mm", a->mae_mm);
     sdm_json_real(j, "max_abs_mm", a->max_abs_mm);
     sdm_json_real(j, "rmse_near_mm", a->rmse_near_mm);
+    sdm_json_real(j, "near_mm", a->near_mm);
     sdm_json_real(j, "q50_mm", a->q50_mm);
     sdm_json_real(j, "q90_mm", a->q90_mm);
     sdm_json_real(j, "q99_mm", a->q99_mm);

@@ -92,9 +92,10 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
            cli_format_count(r->steps, steps), cli_format_count(r->samples, maps));
     if (r->verdict.saved_seconds > 0)
         printf("; train.patience saved %.0f s", r->verdict.saved_seconds);
-    printf("\n  held out    %lld shapes: MSE %.3g mm^2, RMSE %.5f mm, within 0.4 mm of the surface "
+    printf("\n  held out    %lld shapes: MSE %.3g mm^2, RMSE %.5f mm, within %g mm of the surface "
            "%.5f mm, largest %.5f mm\n",
-           (long long)a->samples, a->mse_mm2, a->rmse_mm, a->rmse_near_mm, a->max_abs_mm);
+           (long long)a->samples, a->mse_mm2, a->rmse_mm, a->near_mm, a->rmse_near_mm,
+           a->max_abs_mm);
     cli_print_verdict(&r->verdict);
     return SDM_OK;
 }

@@ -65,8 +65,17 @@ sdm_status cli_fit_open_source(cli_fit *f, sdm_error *err);
 /* Reads the image, label map, mesh or points. SDM_E_ARG, SDM_E_FORMAT, SDM_E_IO. */
 sdm_status cli_fit_read_target(cli_fit *f, sdm_error *err);
 
-/* Sets f->opts from the command line, except for the start pose and the rotations. SDM_E_ARG. */
+/* Sets f->opts from the command line, except for lengths, the start pose and the rotations.
+ * SDM_E_ARG. */
 sdm_status cli_fit_read_options(cli_fit *f, sdm_error *err);
+
+/* After cli_fit_read_target(): sets the lengths of f->opts, from the command line or from the
+ * voxels. */
+void cli_fit_default_lengths(cli_fit *f);
+
+/* After cli_fit_read_target(): refuses options that do nothing for this kind of target. SDM_E_ARG
+ * with the options that apply. */
+sdm_status cli_fit_check_options(const cli_fit *f, sdm_error *err);
 
 /* Sets the start pose and the rotations to try. SDM_E_ARG; SDM_E_FORMAT: a bad file of points. */
 sdm_status cli_fit_read_start(cli_fit *f, sdm_error *err);

@@ -68,18 +68,28 @@ static void read_region(const cli_fit_args *a, sdm_fit_opts *o)
     }
 }
 
+void cli_fit_default_lengths(cli_fit *f)
+{
+    const cli_fit_args *a = &f->args->fit;
+    sdm_fit_opts *o = &f->opts;
+    const double *h = f->target.grid.spacing;
+    double voxel = cli_fit_map_voxel(f);
+    if (f->target.kind != SDM_FIT_POINTS) voxel = fmax(voxel, fmax(h[0], fmax(h[1], h[2])));
+    const sdm_fit_opts d = sdm_fit_defaults_for(voxel);
+    o->blur = isnan(a->blur) ? d.blur : a->blur;
+    o->l_ref = isnan(a->l_ref) ? d.l_ref : a->l_ref;
+    o->margin = isnan(a->margin) ? d.margin : a->margin;
+    o->tissue_mm = isnan(a->tissue_field) ? d.tissue_mm : a->tissue_field;
+    o->point_sd = isnan(a->point_sd) ? d.point_sd : a->point_sd;
+}
+
 sdm_status cli_fit_read_options(cli_fit *f, sdm_error *err)
 {
     const cli_fit_args *a = &f->args->fit;
     sdm_fit_opts *o = &f->opts;
     *o = sdm_fit_defaults();
     if (!strcmp(a->image_model, "labels")) o->image_model = SDM_FIT_LABELS;
-    set_real(a->blur, &o->blur);
-    set_real(a->l_ref, &o->l_ref);
-    set_real(a->point_sd, &o->point_sd);
-    set_real(a->margin, &o->margin);
     set_real(a->cavity, &o->cavity);
-    set_real(a->tissue_field, &o->tissue_mm);
     set_real(a->least_inside, &o->least_inside);
     set_real(a->prior_sd, &o->prior_sd);
     set_real(a->prior_rotation, &o->prior_rotation_sd);

@@ -51,6 +51,9 @@ static void print_law(const char *side, const sdm_fit_law *law)
  * standard deviations of weakly determined parameters come out too small. */
 #define VOXEL_OVER_SPREAD_MAX 1.5
 
+/* Labels: the same factor times the voxels of the labels. */
+#define VOXEL_OVER_LABEL_MAX 1.5
+
 static void print_spread(const cli_fit *f)
 {
     const double blur = f->result.blur, voxel = cli_fit_map_voxel(f);
@@ -62,6 +65,25 @@ static void print_spread(const cli_fit *f)
         voxel, f->source.model ? "--exact " : "", blur);
 }
 
+/* A notice where the voxels of the maps are larger than half of the largest ball in the shape, or
+ * than those of the labels. */
+static void print_coarse(const cli_fit *f)
+{
+    const double *h = f->target.grid.spacing, voxel = cli_fit_map_voxel(f);
+    double fine = INFINITY, inside = 0;
+    for (size_t i = 0; i < sdm_grid_count(&f->map_grid); i++)
+        inside = fmin(inside, (double)f->map[i]);
+    const char *beside = "the thickness of the shape";
+    if (voxel > -0.5 * inside) fine = -0.4 * inside;
+    if (f->target.kind == SDM_FIT_LABEL &&
+        voxel > VOXEL_OVER_LABEL_MAX * fmax(h[0], fmax(h[1], h[2])) && h[0] < fine)
+        fine = fmin(h[0], fmin(h[1], h[2])), beside = "those of the labels";
+    if (f->opts.keep_params || !isfinite(fine) || !(fine > 0)) return;
+    printf("  the voxels of the maps, %.3g mm, are coarse compared with %s: the estimates are less "
+           "exact than they can be; a fit with %s--spacing %.2g has finer maps\n",
+           voxel, beside, f->source.model ? "--exact " : "", fine);
+}
+
 /* Prints the number of voxels or points used, the values of the tissues and the evidence. */
 static void print_target(const cli_fit *f)
 {
@@ -69,6 +91,7 @@ static void print_target(const cli_fit *f)
     if (f->target.kind == SDM_FIT_POINTS) {
         printf("points: %zu, standard deviation %.3g mm about the surface\n", r->n_used,
                r->point_sd);
+        print_coarse(f);
         return;
     }
     // voxels
@@ -79,7 +102,10 @@ static void print_target(const cli_fit *f)
     if (!isnan(r->inside_share))
         printf(", %.0f %% of the shape in the image", 100 * r->inside_share);
     printf("\n");
-    if (f->target.kind != SDM_FIT_IMAGE) return;
+    if (f->target.kind != SDM_FIT_IMAGE) {
+        print_coarse(f);
+        return;
+    }
     // values of the tissues
     print_law("inside", &r->appearance.inside[0]);
     printf("\n");

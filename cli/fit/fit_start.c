@@ -1,5 +1,6 @@
 /* Sets the start pose of a fit and the rotations to try. */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "fit_command.h"
@@ -137,6 +138,27 @@ static sdm_status pose_from_centre(cli_fit *f, const double centre[3], sdm_error
     return SDM_OK;
 }
 
+/* Tells what the program chooses where the command line gives no place or no rotation. */
+static void notice_start(const cli_fit *f, const double centre[3])
+{
+    const cli_fit_args *a = &f->args->fit;
+    const bool given = !isnan(a->start_centre[0]),
+               turned = f->opts.turns == SDM_FIT_TURNS_SPHERE && !a->turns_sphere;
+    const char *place = given                             ? "start centre"
+                        : f->target.kind != SDM_FIT_IMAGE ? cli_fit_kind(f)
+                        : f->opts.use_box                 ? "region"
+                                                          : "image";
+    char at[120];
+    snprintf(at, sizeof at, "%s%s, %.4g, %.4g, %.4g mm (LPS)", given ? "" : "middle of the ", place,
+             centre[0], centre[1], centre[2]);
+    if (turned)
+        cli_notice("no start rotation is given: %zu rotations are tried about the %s; --start-axis "
+                   "or --rotation make the search shorter",
+                   f->opts.n_turns, at);
+    else if (!given && f->target.kind == SDM_FIT_IMAGE)
+        cli_notice("no start pose is given: the shape starts in the %s", at);
+}
+
 sdm_status cli_fit_read_start(cli_fit *f, sdm_error *err)
 {
     const cli_pose_args *p = &f->args->pose;
@@ -159,9 +181,6 @@ sdm_status cli_fit_read_start(cli_fit *f, sdm_error *err)
         convert_to_lps(f, f->args->fit.start_centre, centre);
     else
         default_centre(f, centre);
-    if (!has_centre && f->target.kind == SDM_FIT_IMAGE)
-        cli_notice("no start pose is given: the shape starts in the middle of the %s, %.4g, %.4g, "
-                   "%.4g mm (LPS)",
-                   f->opts.use_box ? "region" : "image", centre[0], centre[1], centre[2]);
+    notice_start(f, centre);
     return pose_from_centre(f, centre, err);
 }

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "report/terminal.h"
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"
 #include "setup.h"
@@ -80,6 +81,16 @@ static sdm_status store_absolute_paths(sdm_config *c, const sdm_instance *made, 
     return SDM_OK;
 }
 
+/* Completes a grid that is to be fitted to the shapes, and tells its numbers. */
+static sdm_status fit_grid(sdm_config *c, const sdm_instance *shape, sdm_error *err)
+{
+    sdm_text line = {0};
+    const sdm_status s = sdm_train_grid(c, shape, &line, err);
+    if (!s && line.data) cli_notice("%s", line.data);
+    sdm_text_dispose(&line);
+    return s;
+}
+
 /* good[*n_good] = the options that the shape accepts; the others are added to *m. */
 static void check_options(const sdm_config *c, const sdm_shape *shape, sdm_named_text *good,
                           size_t *n_good, sdm_mistakes *m)
@@ -115,8 +126,9 @@ static sdm_status create_checked(sdm_config *c, const sdm_shape *shape, sdm_inst
     return s ? s : store_absolute_paths(c, *out, err);
 }
 
-sdm_status cli_config_shape(sdm_config *c, const sdm_registry *r, sdm_instance **out,
-                            sdm_error *err)
+/* Finds the configured shape and creates it. */
+static sdm_status make_shape(sdm_config *c, const sdm_registry *r, sdm_instance **out,
+                             sdm_error *err)
 {
     const sdm_shape *shape = cli_find_shape(r, c->shape.name, err);
     if (!shape) return fail_at(c, c->shape.mark, SDM_E_CONFIG, err);
@@ -126,6 +138,13 @@ sdm_status cli_config_shape(sdm_config *c, const sdm_registry *r, sdm_instance *
         *out = NULL;
     }
     return s;
+}
+
+sdm_status cli_config_shape(sdm_config *c, const sdm_registry *r, sdm_instance **out,
+                            sdm_error *err)
+{
+    const sdm_status s = make_shape(c, r, out, err);
+    return s ? s : fit_grid(c, *out, err);
 }
 
 static void add_lines(sdm_error *err, const char *lines)
@@ -142,8 +161,8 @@ sdm_status cli_open_config(const cli_args *args, sdm_config **config, sdm_regist
     // a file with mistakes: look for those in its shape as well
     if (s && !(s == SDM_E_CONFIG && (*config)->shape.name[0])) return s;
     sdm_status s_shape = cli_open_registry(args, registry, &of_shape);
-    if (!s_shape) s_shape = cli_config_shape(*config, *registry, shape, &of_shape);
+    if (!s_shape) s_shape = make_shape(*config, *registry, shape, &of_shape);
     if (!s && s_shape) return sdm_fail(err, s_shape, "%s", of_shape.text);
     if (s_shape == SDM_E_CONFIG) add_lines(err, of_shape.text);
-    return s;
+    return s ? s : fit_grid(*config, *shape, err);
 }

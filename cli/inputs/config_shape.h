@@ -18,7 +18,8 @@ sdm_status cli_open_config(const cli_args *args, sdm_config **config, sdm_regist
 
 /* Creates the configured shape with its options and checks the ranges and distributions; *out is
  * freed with sdm_instance_free(). Relative paths start from the folder of the configuration; in c
- * they become absolute, so that a copy of the configuration elsewhere names the same files.
+ * they become absolute, so that a copy of the configuration elsewhere names the same files. A grid
+ * that is to be fitted to the shapes (grid: auto) is completed, and a notice tells its numbers.
  * SDM_E_CONFIG with a line "file:line:column: ..." for each mistake. */
 sdm_status cli_config_shape(sdm_config *c, const sdm_registry *r, sdm_instance **out,
                             sdm_error *err);

@@ -7,6 +7,7 @@
 
 #include "files.h"
 #include "sdm/image.h"
+#include "sdm/internal/near.h"
 #include "sdm/isosurface.h"
 #include "sdm/meshfile.h"
 #include "sdm/picture.h"
@@ -61,21 +62,23 @@ sdm_status cli_check_type(const char *path, bool meshes_only, sdm_error *err)
     return kind == KIND_PICTURE ? sdm_picture_check(path, err) : SDM_OK;
 }
 
-bool cli_writes_bands(const cli_args *args)
+bool cli_blocks_suffice(const cli_args *args)
 {
-    bool all = args->outputs.n > 0 && !args->dense;
     for (size_t i = 0; i < args->outputs.n; i++)
-        all = all && kind_of(args->outputs.items[i], NULL) == KIND_VDB;
-    return all;
+        if (kind_of(args->outputs.items[i], NULL) != KIND_VDB) return false;
+    return args->outputs.n > 0 && !args->dense;
 }
 
-sdm_status cli_band_width(const cli_args *args, const sdm_grid *grid, double *width, sdm_error *err)
+sdm_status cli_blocks_band(const sdm_grid *grid, const cli_args *args, double *band_mm,
+                           sdm_error *err)
 {
 #ifdef SDM_HAVE_VDB
     const sdm_vdb_opts opts = {.band_voxels = args->band, .half = args->half};
-    return sdm_vdb_band(grid, &opts, width, err);
+    return sdm_vdb_band(grid, &opts, band_mm, err);
 #else
-    (void)args, (void)grid, (void)width;
+    (void)grid;
+    (void)args;
+    (void)band_mm;
     return sdm_fail(err, SDM_E_UNSUPPORTED, "built without OpenVDB");
 #endif
 }
@@ -97,6 +100,13 @@ static void describe_method(const cli_map *map, char text[80])
     snprintf(text, 80, "%s%s%s", made_by(map), map->clamped ? " (clamped)" : "",
              reasons[map->reason]);
 }
+
+#ifdef SDM_HAVE_VDB
+static sdm_status map_beyond(void *engine, const sdm_grid *grid, float *values, sdm_error *err)
+{
+    return sdm_exact_map(engine, grid, values, err);
+}
+#endif
 
 static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args *args,
                             sdm_error *err)
@@ -126,10 +136,12 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
                                .half = args->half,
                                .metadata = metadata,
                                .n_metadata = n_metadata,
-                               .cancelled = cli_interrupted};
+                               .cancelled = cli_interrupted,
+                               .map = map->engine ? map_beyond : NULL,
+                               .user = map->engine};
     sdm_vdb_report report = {0};
-    const sdm_status s = map->band
-                             ? sdm_vdb_write_blocks(path, map->band, &opts, &report, err)
+    const sdm_status s = map->blocks
+                             ? sdm_vdb_write_blocks(path, map->blocks, &opts, &report, err)
                              : sdm_vdb_write(path, map->grid, map->values, &opts, &report, err);
     if (!s && report.adjusted_voxels > 0)
         cli_notice("%s: %lld voxels at creases were adjusted by at most %.2g mm to make a valid "
@@ -137,6 +149,11 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
                    path, (long long)report.adjusted_voxels, report.adjusted_mm);
     if (!s && report.cut)
         cli_notice("%s: the surface leaves the grid and is cut at its border", path);
+    else if (!s && report.estimated_voxels > 0)
+        cli_notice("%s: the band leaves the grid; the distances of %lld voxels beyond it are "
+                   "estimated from those at its border: a larger grid or a narrower --band avoids "
+                   "this",
+                   path, (long long)report.estimated_voxels);
     return s;
 #else
     (void)map;
@@ -160,7 +177,7 @@ static sdm_status write_surface(const char *path, const cli_map *map, sdm_error 
 
 static sdm_status write_picture(const char *path, const cli_map *map, sdm_error *err)
 {
-    static const float levels[] = {0.0f, 1.0f};
+    const float levels[] = {0.0f, sdm_grid_contour(map->grid)};
     char title[80];
     describe_method(map, title);
     const sdm_picture_map column = {title, map->values, false};

@@ -208,6 +208,10 @@ static void tell_cut(teller *t)
             between = ", ";
         }
     sdm_text_add(&text, ")");
+    sdm_text use = {0};
+    if (t->s->config && !sdm_train_grid_proposal(t->s->config, t->s->shape, &use, NULL))
+        sdm_text_add(&text, "; use %s", use.data);
+    sdm_text_dispose(&use);
     tell(t, f->cut.shapes ? SDM_E_QUALITY : SDM_OK, &text);
 }
 
@@ -295,7 +299,7 @@ void cli_notice_survey(const sdm_config *c, const sdm_instance *shape)
                                   .brief = true,
                                   .n_threads = (int)c->threads,
                                   .cancelled = cli_interrupted};
-    cli_survey s = {.shape = shape, .grid = &c->grid, .brief = true};
+    cli_survey s = {.shape = shape, .grid = &c->grid, .config = c, .brief = true};
     if (sdm_shape_survey_make(shape, &opts, &s.found, NULL)) return;
     (void)cli_survey_tell(&s, notice, NULL, NULL);
     sdm_shape_survey_dispose(&s.found);

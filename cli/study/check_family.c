@@ -78,6 +78,7 @@ static sdm_status open_config(check *c, sdm_error *err)
     c->opts.range = (const double(*)[2])c->range;
     c->opts.distribution = c->distribution;
     c->opts.grid = c->survey.grid = &c->config->grid;
+    c->survey.config = c->config;
     c->opts.seed = c->config->seed;
     return SDM_OK;
 }

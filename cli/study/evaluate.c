@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "report/terminal.h"
+#include "sdm/internal/near.h"
 #include "sdm/internal/sampling.h"
 #include "sdm/internal/threads.h"
 #include "sdm/internal/train.h"
@@ -44,7 +45,8 @@ void cli_eval_params(const sdm_model *m, uint64_t seed, size_t index, double *p)
     cli_maker_params(&maker, seed, index, p);
 }
 
-static void compare_values(const float *network, const float *exact, size_t n, cli_eval_sample *out)
+static void compare_values(const float *network, const float *exact, size_t n, float near_mm,
+                           cli_eval_sample *out)
 {
     double sum2 = 0, sum = 0, worst = 0, near = 0;
     size_t n_near = 0, both = 0, in_network = 0, in_exact = 0;
@@ -53,7 +55,7 @@ static void compare_values(const float *network, const float *exact, size_t n, c
         sum2 += e * e;
         sum += e;
         if (!(e <= worst)) worst = e; // a NaN stays
-        if (fabsf(exact[i]) <= (float)CLI_NEAR_MM) {
+        if (fabsf(exact[i]) <= near_mm) {
             near += e * e;
             n_near++;
         }
@@ -110,7 +112,7 @@ static sdm_status compare_surfaces(const sdm_grid *g, const float *network, cons
 sdm_status cli_compare_maps(const sdm_grid *g, const float *values, const float *exact,
                             bool surfaces, cli_eval_sample *out, sdm_error *err)
 {
-    compare_values(values, exact, sdm_grid_count(g), out);
+    compare_values(values, exact, sdm_grid_count(g), (float)sdm_grid_near(g), out);
     return surfaces ? compare_surfaces(g, values, exact, out, err) : SDM_OK;
 }
 
@@ -290,9 +292,9 @@ void cli_eval_dispose(cli_eval *e)
 sdm_status cli_picture_compare(const sdm_model *m, const sdm_instance *shape, uint64_t seed,
                                size_t index, const double *p, const char *path, sdm_error *err)
 {
-    static const float levels[] = {0.0f, 1.0f};
     const cli_map_maker maker = cli_maker_of_model(m, shape);
     const sdm_grid *g = &maker.grid;
+    const float levels[] = {0.0f, sdm_grid_contour(g)};
     const size_t n = sdm_grid_count(g);
     double sampled[SDM_MAX_PARAMS];
     float *maps = NULL;

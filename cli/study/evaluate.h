@@ -9,13 +9,10 @@
 /* Random stream of the shapes of eval and verify; training uses other streams. */
 #define CLI_STREAM_EVAL 900
 
-/* Voxels with abs(exact distance) <= CLI_NEAR_MM are near the surface, mm. */
-#define CLI_NEAR_MM 0.4
-
 /* Errors of one map against the exact map. */
 typedef struct cli_eval_sample {
     double mse_mm2, mae_mm, max_abs_mm;
-    double near_sum; /* sum of squared errors near the surface, mm^2 */
+    double near_sum; /* sum of squared errors within sdm_grid_near() of the surface, mm^2 */
     size_t n_near;
     double dice;            /* overlap of the volumes inside; 1 when both are empty */
     bool has_surface;       /* both maps have a zero surface */

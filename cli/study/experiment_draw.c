@@ -6,6 +6,7 @@
 #include "experiment_command.h"
 #include "report/terminal.h"
 #include "sdm/internal/file.h"
+#include "sdm/internal/near.h"
 #include "sdm/isosurface.h"
 #include "sdm/memory.h"
 #include "sdm/picture.h"
@@ -13,9 +14,9 @@
 static sdm_status draw_slices(const cli_experiment_run *run, const cli_experiment_job *job,
                               const float *values, sdm_error *err)
 {
-    static const float levels[] = {0.0f, 1.0f};
     const sdm_exact_opts opts = {.n_threads = 0};
     const sdm_grid *g = &job->maker.grid;
+    const float levels[] = {0.0f, sdm_grid_contour(g)};
     const size_t n = sdm_grid_count(g);
     char path[SDM_PATH_TEXT_MAX];
     float *maps = NULL;

@@ -58,6 +58,7 @@ void sdm_config_dump(const sdm_config *c, sdm_text *out)
             if (!sdm_kind_has(f, (int)c->network.kind)) continue;
             // an empty text means that the key was not set
             if (f->type == SDM_FIELD_TEXT && !*((const char *)c + f->offset)) continue;
+            if (f->has && !f->has(c)) continue;
             if (!begun) sdm_text_add(out, "%s:\n", sections[s].name);
             begun = true;
             sdm_text_add(out, "%s%s: ", nested ? "  " : "", f->key);

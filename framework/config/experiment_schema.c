@@ -271,8 +271,9 @@ static bool read_training(sdm_reader *r, const sdm_field *f, const sdm_tree_node
                           const char *path)
 {
     E *e = r->target;
-    if (strcmp(f->key, "seed") != 0 && strcmp(f->key, "threads") != 0)
-        return add_keys(r, &e->common, f->key, node, path);
+    const bool is_section = strcmp(f->key, "seed") != 0 && strcmp(f->key, "threads") != 0,
+               is_word = !strcmp(f->key, "grid") && node->kind == SDM_TREE_SCALAR && *node->text;
+    if (is_section && !is_word) return add_keys(r, &e->common, f->key, node, path);
     if (node->kind != SDM_TREE_SCALAR) return sdm_refuse_type(r, node, path, "an integer");
     sdm_tree_node one = *node;
     one.next = NULL;

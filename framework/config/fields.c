@@ -324,8 +324,16 @@ static void read_section(sdm_reader *r, size_t s, const sdm_tree_node *node)
     if (!sdm_mark_is_set(r->section_mark[s])) r->section_mark[s] = node->key_mark;
     // in a file a section may be empty: all its keys are commented out
     if (sdm_tree_is_empty(node) && node->mark.override == 0) return;
+    const sdm_section *section = &r->sections[s];
+    if (section->word && node->kind == SDM_TREE_SCALAR && !strcmp(node->text, section->word)) {
+        section->take_word(r, node->mark);
+        return;
+    }
     if (node->kind != SDM_TREE_MAP) {
-        sdm_refuse_type(r, node, r->sections[s].name, "keys with values");
+        char wanted[64];
+        snprintf(wanted, sizeof wanted, "%s%skeys with values", section->word ? section->word : "",
+                 section->word ? " or " : "");
+        sdm_refuse_type(r, node, section->name, wanted);
         return;
     }
     for (const sdm_tree_node *child = node->first; child; child = child->next)

@@ -38,6 +38,8 @@ typedef struct sdm_field {
                  const char *path);
     /* For SPECIAL: writes the value as YAML, without the key; NULL: the key is not written. */
     void (*dump)(const sdm_config *c, sdm_text *out);
+    /* Returns false if the key has no value, so that it is not written; NULL: it always has one. */
+    bool (*has)(const sdm_config *c);
 } sdm_field;
 
 /* The keys under one top-level name; the name "" stands for the top level itself. */
@@ -45,6 +47,9 @@ typedef struct sdm_section {
     const char *name, *help;
     const sdm_field *fields;
     size_t n_fields;
+    /* A word that may stand in place of the keys, "auto", and what it does; NULL: none. */
+    const char *word;
+    void (*take_word)(struct sdm_reader *r, sdm_mark mark);
 } sdm_section;
 
 /* The position at which a key was given last, and whether its value was refused. If the mark is not
@@ -68,6 +73,19 @@ typedef struct sdm_reader {
 } sdm_reader;
 
 static inline bool sdm_mark_is_set(sdm_mark m) { return m.line > 0 || m.override > 0; }
+
+/* True if position a is after position b. */
+static inline bool sdm_mark_is_later(sdm_mark a, sdm_mark b)
+{
+    if (a.override != b.override) return a.override > b.override;
+    return a.line != b.line ? a.line > b.line : a.column > b.column;
+}
+
+/* True if the key was last given by this override, with an accepted value. */
+static inline bool sdm_given_by(const sdm_given *g, int override)
+{
+    return g->mark.override == override && !g->refused;
+}
 
 /* Sets one field to `def`, a text in YAML syntax. */
 void sdm_field_set_default(sdm_reader *r, const sdm_field *f, const char *def);

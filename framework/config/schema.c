@@ -5,6 +5,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "grid_keys.h"
 #include "kinds.h"
 #include "special.h"
 
@@ -90,15 +91,40 @@ static const sdm_field SHAPE[] = {
             "shape states it"),
 };
 
+static bool has_size(const sdm_config *c) { return c->grid.n[0] > 0; }
+static bool has_spacing(const sdm_config *c) { return c->grid.spacing[0] > 0; }
+static bool has_voxels(const sdm_config *c) { return c->grid_voxels > 0; }
+static bool has_near(const sdm_config *c) { return c->train.near_mm > 0; }
+static bool has_clamp(const sdm_config *c) { return c->train.clamp_mm > 0; }
+
+#define GRID_KEY(name, has_, range_, unit_, type_, def_, help_)                                    \
+    {                                                                                              \
+        .key = #name, .type = SDM_FIELD_SPECIAL, .read = sdm_read_key_##name,                      \
+        .dump = sdm_dump_key_##name, .has = has_, .shown_type = type_, .shown_range = range_,      \
+        .shown_def = def_, .unit = unit_, .help = help_                                            \
+    }
+
 static const sdm_field GRID[] = {
-    SPECIAL("size", sdm_read_key_size, sdm_dump_key_size, "3 integers", "1 .. 1048576", "required",
-            "voxels", "number of voxels along x, y and z"),
-    SPECIAL("spacing", sdm_read_key_spacing, sdm_dump_key_spacing, "1 or 3 numbers",
-            "1e-06 .. 1000000", "required", "mm", "distance between neighbouring voxels"),
-    SPECIAL("origin", sdm_read_key_origin, sdm_dump_key_origin, "3 numbers", "-1e+09 .. 1e+09",
-            "from the centre", "mm", "centre of the first voxel; not together with grid.centre"),
-    SPECIAL("centre", sdm_read_key_centre, NULL, "3 numbers", "-1e+09 .. 1e+09", "[0, 0, 0]", "mm",
-            "centre of the grid; not together with grid.origin"),
+    GRID_KEY(size, has_size, "1 .. 1048576", "voxels", "3 integers", "from the shapes",
+             "number of voxels along x, y and z; needs grid.spacing"),
+    GRID_KEY(spacing, has_spacing, "1e-06 .. 1000000", "mm", "1 or 3 numbers", "from the shapes",
+             "distance between neighbouring voxels; without grid.size the grid is fitted to the "
+             "shapes"),
+    GRID_KEY(origin, has_size, "-1e+09 .. 1e+09", "mm", "3 numbers", "from the centre",
+             "centre of the first voxel; only with grid.size, not together with grid.centre"),
+    SPECIAL("centre", sdm_read_key_centre, NULL, "3 numbers", "-1e+09 .. 1e+09",
+            "[0, 0, 0]; without size from the shapes", "mm",
+            "centre of the grid; only with grid.size, not together with grid.origin"),
+    {.key = "voxels",
+     .type = INT,
+     .offset = AT(grid_voxels),
+     .min = SDM_GRID_VOXELS_MIN,
+     .max = 4096,
+     .def = "60",
+     .unit = "voxels",
+     .has = has_voxels,
+     .help = "grid: auto, i.e. a grid that is fitted to the shapes: at most so many voxels along "
+             "its longest edge; not together with other keys of grid"},
 };
 
 static const sdm_field NETWORK[] = {
@@ -223,8 +249,15 @@ static const sdm_field TRAIN[] = {
     CHOICE("loss", train.loss, "mse|l1|huber|clamped_l1", "mse",
            "training loss: squared, absolute or Huber error, or the absolute error of clamped "
            "distances"),
-    ROW("clamp_mm", REAL, train.clamp_mm, 1e-6, 1e6, "0.1", "mm",
-        "clamped_l1: bound to which distances are clamped"),
+    {.key = "clamp_mm",
+     .type = REAL,
+     .offset = AT(train.clamp_mm),
+     .max = 1e6,
+     .def = "0",
+     .shown_def = "half of grid.spacing",
+     .unit = "mm",
+     .has = has_clamp,
+     .help = "clamped_l1: bound to which distances are clamped; 0: the default"},
     OF_KIND(SDMNN | POINTS, REAL, "eikonal", train.eikonal, 0, 1000, "0", "",
             "weight of the eikonal term, the squared deviation of the length of the gradient from "
             "1; 0: off"),
@@ -232,8 +265,15 @@ static const sdm_field TRAIN[] = {
         "extra weight w of voxels near the surface: they count 1 + w times; deepsdf, imnet: they "
         "are "
         "drawn 1 + w times as often"),
-    ROW("near_mm", REAL, train.near_mm, 1e-6, 1e6, "0.4", "mm",
-        "voxels closer to the surface than this count as near"),
+    {.key = "near_mm",
+     .type = REAL,
+     .offset = AT(train.near_mm),
+     .max = 1e6,
+     .def = "0",
+     .shown_def = "twice grid.spacing",
+     .unit = "mm",
+     .has = has_near,
+     .help = "voxels closer to the surface than this count as near; 0: the default"},
     OF_KIND(
         BASES, REAL, "refine", train.refine, 0, 1, "0.4", "",
         "last fraction of the budget, used for refinement: training end to end, decoder included"),
@@ -275,7 +315,11 @@ static const sdm_field TOP[] = {
 
 static const sdm_section SECTIONS[] = {
     {.name = "shape", .fields = SHAPE, .n_fields = COUNT(SHAPE)},
-    {.name = "grid", .fields = GRID, .n_fields = COUNT(GRID)},
+    {.name = "grid",
+     .fields = GRID,
+     .n_fields = COUNT(GRID),
+     .word = "auto",
+     .take_word = sdm_config_grid_auto},
     {.name = "network", .fields = NETWORK, .n_fields = COUNT(NETWORK)},
     {.name = "data", .fields = DATA, .n_fields = COUNT(DATA)},
     {.name = "train", .fields = TRAIN, .n_fields = COUNT(TRAIN)},
@@ -287,12 +331,6 @@ const sdm_section *sdm_config_sections(size_t *n)
 {
     *n = COUNT(SECTIONS);
     return SECTIONS;
-}
-
-/* True if the key was last given by this override, with an accepted value. */
-static bool by_override(const sdm_given *g, int override)
-{
-    return g->mark.override == override && !g->refused;
 }
 
 /* For the three alternative budgets of `train`: given[] = where each was given, positive[] =
@@ -308,28 +346,17 @@ static void budgets(sdm_reader *r, sdm_given *given[3], bool positive[3])
 
 void sdm_config_settle_override(sdm_reader *r, int override)
 {
-    sdm_given *given[3], *origin = sdm_fields_given(r, "grid", "origin"),
-                         *centre = sdm_fields_given(r, "grid", "centre");
+    sdm_given *given[3];
     bool positive[3], replaces = false;
-    if (by_override(origin, override) && centre->mark.override != override)
-        *centre = (sdm_given){0};
-    if (by_override(centre, override) && origin->mark.override != override)
-        *origin = (sdm_given){0};
+    sdm_config_settle_grid(r, override);
 
     // a positive budget given by this override replaces the others
     budgets(r, given, positive);
-    for (int i = 0; i < 3; i++) replaces |= positive[i] && by_override(given[i], override);
+    for (int i = 0; i < 3; i++) replaces |= positive[i] && sdm_given_by(given[i], override);
     if (!replaces) return;
     if (given[0]->mark.override != override) r->config->train.minutes = 0;
     if (given[1]->mark.override != override) r->config->train.steps = 0;
     if (given[2]->mark.override != override) r->config->train.samples = 0;
-}
-
-/* True if position a is after position b. */
-static bool is_later(sdm_mark a, sdm_mark b)
-{
-    if (a.override != b.override) return a.override > b.override;
-    return a.line != b.line ? a.line > b.line : a.column > b.column;
 }
 
 /* Records a mistake unless exactly one budget is positive. */
@@ -343,7 +370,7 @@ static void check_budget(sdm_reader *r, sdm_mark section)
         refused |= given[i]->refused;
         if (!positive[i]) continue;
         n++;
-        if (last < 0 || is_later(given[i]->mark, given[last]->mark)) last = i;
+        if (last < 0 || sdm_mark_is_later(given[i]->mark, given[last]->mark)) last = i;
     }
     if (n == 0 && !refused)
         sdm_mistakes_add(
@@ -363,32 +390,6 @@ static void require(sdm_reader *r, const char *section, const char *key, sdm_mar
     sdm_mistakes_add(r->mistakes, mark, "missing key '%s.%s'; e.g. %s", section, key, example);
 }
 
-/* Checks the grid and, unless grid.origin was given, computes the origin from grid.centre. */
-static void finish_grid(sdm_reader *r, sdm_mark section)
-{
-    sdm_grid *g = &r->config->grid;
-    sdm_given *origin = sdm_fields_given(r, "grid", "origin"),
-              *centre = sdm_fields_given(r, "grid", "centre");
-    require(r, "grid", "size", section, "size: [60, 50, 50]");
-    require(r, "grid", "spacing", section, "spacing: 0.2");
-    bool has_origin = sdm_mark_is_set(origin->mark), has_centre = sdm_mark_is_set(centre->mark);
-    if (has_origin && has_centre)
-        sdm_mistakes_add(r->mistakes,
-                         is_later(origin->mark, centre->mark) ? origin->mark : centre->mark,
-                         "only one of grid.origin and grid.centre may be given");
-    for (int i = 0; i < 9; i++) g->dir[i] = i % 4 == 0;
-    if (!has_origin)
-        for (int i = 0; i < 3; i++)
-            g->origin[i] = r->centre[i] - 0.5 * (double)(g->n[i] - 1) * g->spacing[i];
-
-    // size or spacing is still 0 if it was missing or refused
-    sdm_error err;
-    if (g->n[0] == 0 || !(g->spacing[0] > 0)) return;
-    if (sdm_grid_check(g, &err))
-        sdm_mistakes_add(r->mistakes, sdm_fields_given(r, "grid", "size")->mark,
-                         "grid.size: %.200s", err.text);
-}
-
 /* Returns the position at which a section begins, or `top` if the section is missing. */
 static sdm_mark section_place(const sdm_reader *r, const char *name, sdm_mark top)
 {
@@ -402,6 +403,6 @@ void sdm_config_finish(sdm_reader *r, sdm_mark top)
     require(r, "shape", "name", section_place(r, "shape", top), "name: cochlea");
     r->config->shape.mark = sdm_fields_given(r, "shape", "name")->mark;
     sdm_kinds_settle(r, section_place(r, "network", top));
-    finish_grid(r, section_place(r, "grid", top));
+    sdm_config_finish_grid(r, section_place(r, "grid", top));
     check_budget(r, section_place(r, "train", top));
 }

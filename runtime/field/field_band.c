@@ -460,10 +460,7 @@ sdm_status sdm_field_band(const sdm_field *f, const sdm_grid *grid, double width
     if (!(width >= edge) || !(width <= 1e100))
         return sdm_fail(err, SDM_E_ARG, "band of %g mm, need at least the edge of a voxel, %g mm",
                         width, edge);
-    if (field_is_exact(f))
-        return sdm_fail(
-            err, SDM_E_UNSUPPORTED,
-            "parameters outside the trained range: there is no band of exact distances");
+    if (field_is_exact(f)) return sdm_exact_map_blocks(f->engine, grid, width, out, err);
     job j = {.f = f, .grid = grid, .width = (double)(float)width, .out = out};
     s = make_band(&j, err);
     sdm_free(j.piece);

@@ -8,6 +8,7 @@
 
 #include "fit/data/blur.h"
 #include "fit/data/cavity.h"
+#include "fit/data/soft_labels.h"
 #include "fit/solver/averaged_gradient.h"
 #include "fit/solver/newton.h"
 #include "fit/solver/objective.h"
@@ -21,6 +22,7 @@
 #include "sdm/internal/clock.h"
 #include "sdm/internal/rotation.h"
 #include "sdm/internal/text.h"
+#include "sdm/internal/threads.h"
 #include "sdm/memory.h"
 
 // largest number of rounds in which region, prior weights and state are brought into agreement
@@ -68,6 +70,23 @@ sdm_fit_opts sdm_fit_defaults(void)
         .eps = 1e-4,
         .polish_eps = 3e-6,
     };
+}
+
+// a length, but between two multiples of a voxel
+static double between(double length, double voxel, double least, double most)
+{
+    return fmin(fmax(length, least * voxel), most * voxel);
+}
+
+sdm_fit_opts sdm_fit_defaults_for(double voxel)
+{
+    sdm_fit_opts o = sdm_fit_defaults();
+    o.blur = between(o.blur, voxel, 0.25, 2);
+    o.l_ref = between(o.l_ref, voxel, 0.25, 2);
+    o.margin = between(o.margin, voxel, 1.5, 15);
+    o.tissue_mm = between(o.tissue_mm, voxel, 1, 10);
+    o.point_sd = between(o.point_sd, voxel, 0.125, 1);
+    return o;
 }
 
 void sdm_fit_dispose(sdm_fit_result *r)
@@ -421,15 +440,32 @@ static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     return s;
 }
 
-// presents a label map as an image with the value 1 inside and 0 outside, with fixed tissues
-static void labels_as_image(sdm_fit_target *target, sdm_fit_opts *opts)
+static double longest_edge(const sdm_grid *g)
 {
+    return fmax(g->spacing[0], fmax(g->spacing[1], g->spacing[2]));
+}
+
+/* Presents a label map as an image with the value 1 inside and 0 outside, with fixed tissues, seen
+ * through a point spread as wide as the maps can represent. *values: memory of the image. */
+static sdm_status labels_as_image(const sdm_fit_source *source, sdm_fit_target *target,
+                                  sdm_fit_opts *opts, float **values, sdm_error *err)
+{
+    const sdm_grid *map = source->model ? &sdm_model_get_info(source->model)->grid : &source->grid;
+    const double soft = 0.5 * fmax(longest_edge(map), longest_edge(&target->grid));
+    sdm_status s = SDM_ALLOC(values, sdm_grid_count(&target->grid), "labels", err);
+    if (!s)
+        s = sdm_fit_soften_labels(&target->grid, target->values, soft, sdm_threads(opts->n_threads),
+                                  *values, err);
+    if (s) return s;
+    target->values = *values;
     target->kind = SDM_FIT_IMAGE;
+    opts->blur = sqrt(opts->blur * opts->blur + soft * soft);
     opts->appearance = (sdm_fit_appearance){.n_inside = 1,
                                             .n_outside = 1,
                                             .inside = {{.weight = 1, .mean = 1, .sd = 0.25}},
                                             .outside = {{.weight = 1, .mean = 0, .sd = 0.25}}};
     opts->keep_appearance = true;
+    return SDM_OK;
 }
 
 sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
@@ -451,7 +487,7 @@ sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
     float *values = NULL;
     if (!s && target->kind == SDM_FIT_LABEL && opts->image_model == SDM_FIT_PARTIAL_VOLUME) {
         as_image = *target, with_labels = *opts;
-        labels_as_image(&as_image, &with_labels);
+        s = labels_as_image(source, &as_image, &with_labels, &values, err);
         p.target = &as_image, p.opts = &with_labels, p.given_labels = true;
     }
     if (!s && target->kind == SDM_FIT_IMAGE && opts->cavity > 0) {

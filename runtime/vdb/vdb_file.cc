@@ -1,5 +1,4 @@
-/* Grids and files of level sets: empty grid, hash, reading with check of the seal, writing with
- * verification. */
+/* Files of level sets: hash, reading with check of the seal, writing with verification. */
 #include <openvdb/io/File.h>
 #include <openvdb/tools/Diagnostics.h>
 
@@ -14,17 +13,6 @@
 using namespace vdb_parts;
 
 const char *const vdb_parts::GRID_NAME = "surface";
-
-Grid::Ptr vdb_parts::empty_grid(const openvdb::math::Transform::Ptr &transform, float background,
-                                bool dense, bool as_half)
-{
-    Grid::Ptr grid = Grid::create(background);
-    grid->setName(GRID_NAME);
-    grid->setTransform(transform);
-    grid->setGridClass(dense ? openvdb::GRID_UNKNOWN : openvdb::GRID_LEVEL_SET);
-    grid->setSaveFloatAsHalf(as_half);
-    return grid;
-}
 
 uint64_t vdb_parts::hash_of(const Grid &grid)
 {

@@ -6,7 +6,6 @@
 
 #include <string>
 
-#include "sdm/blocks.h"
 #include "sdm/vdb.h"
 
 // hidden: the library exports its C interface only
@@ -38,22 +37,6 @@ inline void check_cancelled(const sdm_vdb_opts &o, sdm_error *err)
         need(sdm_fail(err, SDM_E_CANCELLED, "level set stopped on request"));
 }
 
-// ---- vdb_blocks.cc
-
-// whether the band, cut off at `width`, or the inside reaches the border of the grid
-bool blocks_leave_grid(const sdm_blocks &b, float width);
-
-// values[nz][ny][nx] = the whole map, cut off at the band
-void map_of_blocks(const sdm_blocks &b, float *values);
-
-// fails with SDM_E_ARG if no voxel is inside, with SDM_E_QUALITY if neighbouring values jump across
-// the whole band
-void check_blocks(const sdm_blocks &b, float width, sdm_error *err);
-
-// the level set of blocks whose band lies in the grid
-Grid::Ptr grid_of_blocks(const openvdb::math::Transform::Ptr &transform, const sdm_blocks &b,
-                         float background, bool as_half);
-
 // ---- vdb_creases.cc
 
 // A crease is a voxel at a zero crossing whose gradient checkLevelSet refuses. Changes values there
@@ -64,10 +47,6 @@ void mend_creases(Grid &grid, const sdm_vdb_opts &o, sdm_vdb_report &report, sdm
 // ---- vdb_file.cc
 
 extern const char *const GRID_NAME;
-
-// a grid without voxels
-Grid::Ptr empty_grid(const openvdb::math::Transform::Ptr &transform, float background, bool dense,
-                     bool as_half);
 
 // CRC-64 of the background, and of positions, extents, bits and activity of all values in the order
 // of the tree, tiles included

@@ -22,6 +22,18 @@ has 'network\.depth'
 expect 0 - sdmgen config --keys --markdown
 has '^\|.*network\.depth'
 
+# A grid that is fitted to the shapes: one notice, and the numbers in the resolved configuration, which gives the same grid again.
+printf 'shape: {name: torus}\ntrain: {steps: 1}\n' >fitted.yaml
+expect 0 '^sdmgen: grid: size: \[60, 60, 22\], spacing: 0.21, origin: \[.*over the ranges the shape reaches from' sdmgen config fitted.yaml --dump
+has '^  size: \[60, 60, 22\]$'
+grep -q voxels: out && bad 'voxels beside the numbers of a fitted grid'
+cp out resolved.yaml
+expect 0 - sdmgen config resolved.yaml --dump
+cmp -s out resolved.yaml || bad 'a fitted grid does not read back'
+expect 0 - sdmgen config "$cochlea" grid=auto grid.voxels=40 --dump --quiet
+has '^  size: \[40, '
+expect 2 "^argument 'grid.size=\[4,4,4\]': grid: size does not determine a grid; give size and spacing" sdmgen config fitted.yaml 'grid.size=[4,4,4]'
+
 # Distributions are checked against the parameters of the shape and their ranges.
 statistical=$source_folder/configs/statistical.yaml
 expect 0 - sdmgen config "$statistical" 'shape.distribution={m1: uniform, m2: {mean: 0.5, deviation: 2}}' --dump

@@ -86,6 +86,10 @@ if sdmgen exact --mesh cube.off --quiet -o probe.vdb 2>err; then
     has 'torus'
     expect 0 - sdmgen exact --shape torus --size 12,12,12 --spacing 3,3,4 --quiet --dense -o d.vdb
     expect 0 - sdmgen verify d.vdb
+    # a band that leaves the grid: computed by the exact engine, estimated by other methods
+    ball='--shape ellipsoid -p rx=2 -p ry=2 -p rz=2 --size 20,20,20 --spacing 0.25 --band 6 -o b.vdb'
+    expect 0 - sdmgen exact $ball
+    expect 0 '^sdmgen: b.vdb: the band leaves the grid; the distances of [0-9]+ voxels beyond it are estimated' sdmgen exact $ball --method naive
     expect 2 'dense' sdmgen exact --shape torus --size 12,12,12 --spacing 3,3,4 --quiet -o u.vdb
     absent u.vdb
     cp t.vdb cut.vdb

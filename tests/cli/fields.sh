@@ -39,6 +39,20 @@ if sdmgen generate $model -p a=4.2 --spacing 0.1 -o band.vdb --quiet 2>err; then
     expect 2 'need a larger one' sdmgen generate $model --spacing 1e-6 -o x.vdb
 fi
 
+# Points: the values of the grid, gradients, derivatives.
+printf 'x,y,z\n-6,-5.2,-4.4\n0.1,0.2,0.3\n' >points.csv
+expect 0 - sdmgen generate $model -p a=4.2 --points points.csv --columns distance,gradient -o at.csv -o at.npy --jacobian slopes.npy
+[ "$(head -n 1 at.csv)" = distance,gradient_x,gradient_y,gradient_z ] || bad 'points: wrong header'
+[ "$(wc -l <at.csv)" -eq 3 ] || bad 'points: wrong number of rows'
+expect 0 - sdmgen generate $model -p a=4.2 --points points.csv -o one.csv --outside bound
+printf '90,1,1\n' >far.csv
+expect 5 'point 0 .*outside of the box' sdmgen generate $model --points far.csv -o x.csv
+expect 2 'distance and gradient only' sdmgen generate $model --points points.csv --columns triangle -o x.csv
+expect 2 'do not apply' sdmgen generate $model --points points.csv --spacing 0.4 -o x.csv
+expect 2 'an output is needed' sdmgen generate $model --points points.csv
+expect 2 'belongs to --points' sdmgen generate $model --columns distance -o x.npy
+absent x.csv
+
 # Grids that leave the box of the model.
 expect 5 'the grid leaves the box.*bound, exact' sdmgen generate $model --size 30,30,30 -o x.npy
 expect 0 - sdmgen generate $model --size 30,30,30 --outside bound -o bound.npy

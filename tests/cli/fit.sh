@@ -104,6 +104,9 @@ awk -v d="$(json dice)" 'BEGIN { exit !(d > 0.95) }' || bad "another turn was fo
 expect 0 'no start pose is given.*20.*-30.*10' sdmgen fit $fit ct.nii.gz --turns-sphere 3 --spacing 0.5 --json
 awk -v d="$(json evidence)" 'BEGIN { exit !(d > 0) }' || bad "evidence $(json evidence)"
 
+sdmgen fit $fit label.nrrd --label 1 --spacing 0.8 --max-iterations 1 >out 2>err
+grep -Eq '^sdmgen: no start rotation is given: 60 rotations are tried about the middle of the labels, 20, -30, ' err || bad "no word about the rotations: $(cat err)"
+
 # Unknowns that are kept do not change. First a prior so narrow that the image has no influence: estimates stay at the middle of the ranges.
 sdmgen fit $fit ct.nii.gz $near_truth --prior-sd 0.0001 --json >out 2>err
 has '"not_determined": \["rx", "ry", "rz"\]'

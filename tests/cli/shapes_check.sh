@@ -48,7 +48,7 @@ YAML
 expect 0 - sdmgen shapes check good.yaml --plugin "$plugin" --samples 16
 has '^fine: the shape can be trained$'
 expect 4 mend sdmgen shapes check good.yaml 'grid.size=[8,9,9]' --plugin "$plugin" --samples 16 -o cut.svg
-cuts='over the parameters the shape reaches from \(-2, -2, -2\) to \(4, 2, 2\) mm; the grid covers \(-3\.5, -4, -4\) to \(3\.5, 4, 4\) mm and cuts [0-9.]+ % of the shapes \(by up to 0\.5 mm at the upper end of x\)'
+cuts='over the parameters the shape reaches from \(-2, -2, -2\) to \(4, 2, 2\) mm; the grid covers \(-3\.5, -4, -4\) to \(3\.5, 4, 4\) mm and cuts [0-9.]+ % of the shapes \(by up to 0\.5 mm at the upper end of x\); use grid: (auto|\{voxels: [0-9]+\}) \(size: \[[0-9, ]+\], spacing: [0-9.]+, origin: \[[-0-9., ]+\]\)'
 has "^warning +$cuts$"
 present cut.svg
 

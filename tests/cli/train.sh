@@ -59,6 +59,16 @@ sdmgen train "$tiny" --out unpictured >out 2>err || bad "without pictures: $(cat
 present unpictured/model.sdm
 absent unpictured/checkpoint.sdmc
 
+# A grid that is fitted to the shapes: an interrupted run goes on with the same one, and the model has its numbers.
+interrupted fitted "$tiny" grid.voxels=16
+grep -q '^sdmgen: grid: size: \[16, ' err || bad "no word of the fitted grid: $(cat err)"
+grep -q '^  size: \[16, ' fitted/config.yaml || bad 'the run does not have the numbers of the fitted grid'
+expect 2 "has 'size: .16, 16, 11.', this configuration 'size: .20, 19, 13.'" sdmgen train "$tiny" grid.voxels=20 train.steps=1000000000 --out fitted --resume --quiet
+expect 2 'is at step' sdmgen train "$tiny" grid.voxels=16 --out fitted --resume --quiet
+expect 0 - sdmgen train "$tiny" grid.voxels=16 --out fitted --resume --quiet train.steps=$(($(sed -n 's/.* is at step \([0-9]*\).*/\1/p' err) + 20))
+expect 0 - sdmgen info fitted/model.sdm
+has '16 x 1'
+
 # An open mesh is reported before the training, a closed one is not.
 faces=$(sed -n 's/^element face //p;/^end_header/q' "$source_folder/configs/statistical/mean.ply")
 sed "s/^element face $faces$/element face $((faces - 1))/" "$source_folder/configs/statistical/mean.ply" | head -n -1 >open.ply

@@ -1,6 +1,7 @@
 /* Configuration: values, defaults, overrides, rules between keys, and the exact wording of the
  * messages about mistakes.
- * Tests: config.c distribution_key.c fields.c kinds.c mistakes.c schema.c special.c yaml_tree.c */
+ * Tests: config.c distribution_key.c fields.c grid_keys.c kinds.c mistakes.c schema.c special.c
+ * yaml_tree.c */
 #include <locale.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -70,7 +71,7 @@ static void test_defaults(void **state)
     assert_int_equal(config.train.batch, 256);
     assert_true(config.train.learning_rate == 3e-3 && config.train.warmup == 0.02);
     assert_int_equal(config.train.loss, SDM_LOSS_MSE);
-    assert_true(config.train.near_weight == 0 && config.train.near_mm == 0.4 &&
+    assert_true(config.train.near_weight == 0 && config.train.near_mm == 2 &&
                 config.train.refine == 0.4);
     assert_int_equal(config.train.refine_batch, 32);
     assert_true(config.train.refine_rate == 3e-4 && config.train.average == 0.998);
@@ -184,7 +185,7 @@ static void test_kind_selects_keys_and_defaults(void **state)
     assert_int_equal(config.train.batch, 16);
     assert_int_equal(config.train.points, 512);
     assert_true(config.train.learning_rate == 5e-4 && config.train.eikonal == 0 &&
-                config.train.clamp_mm == 0.1);
+                config.train.clamp_mm == 0.5);
     expect_ok(BASE "network: {kind: imnet, depth: 3}\n", NULL);
     assert_int_equal(config.network.depth, 3);
     assert_int_equal(config.network.width, 2048);
@@ -324,6 +325,86 @@ static void test_mistakes(void **state)
     }
 }
 
+/* Either the grid is complete, or it is to be fitted to the shapes: with a number of voxels along
+ * its longest edge, or with a spacing. */
+static void test_fitted_grid(void **state)
+{
+    static const char *const TEXTS[] = {"", "grid: auto\n", "grid:\n", "grid: {voxels: 60}\n"};
+    static const char WHOLE[] = "grid: {size: [4, 5, 6], spacing: 0.25, centre: [1, 2, 3]}\n";
+    char text[256];
+    (void)state;
+    for (size_t i = 0; i < sizeof TEXTS / sizeof TEXTS[0]; i++) {
+        snprintf(text, sizeof text, "shape: {name: b}\ntrain: {steps: 1}\n%s", TEXTS[i]);
+        expect_ok(text, NULL);
+        assert_true(config.grid.n[0] == 0 && config.grid.spacing[0] == 0 &&
+                    config.grid_voxels == 60);
+        assert_true(config.train.near_mm == 0 && config.train.clamp_mm == 0);
+    }
+    // with a spacing, the number of voxels follows from the shapes
+    expect_ok(text, "grid.spacing=[0.2,0.4,0.3]");
+    assert_true(config.grid.n[0] == 0 && config.grid.spacing[1] == 0.4 && config.grid_voxels == 0);
+    expect_ok("shape: {name: b}\ntrain: {steps: 1}\n", "grid.voxels=100");
+    assert_int_equal(config.grid_voxels, 100);
+
+    // the result, and lengths in voxels that follow from it
+    const sdm_grid grid = {{4, 5, 6}, {-1, 2, 3}, {0.3, 0.2, 0.4}, {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    sdm_config_set_grid(&config, &grid);
+    assert_memory_equal(&config.grid, &grid, sizeof grid);
+    assert_true(config.grid_voxels == 0 && config.train.near_mm == 0.4 &&
+                config.train.clamp_mm == 0.1);
+    sdm_text dump = {0};
+    sdm_config_dump(&config, &dump);
+    assert_non_null(strstr(dump.data, "size: [4, 5, 6]"));
+    assert_null(strstr(dump.data, "voxels:"));
+    expect_ok(dump.data, NULL);
+    assert_memory_equal(&config.grid, &grid, sizeof grid);
+    sdm_text_dispose(&dump);
+
+    // lengths that were given stay
+    expect_ok("shape: {name: b}\ntrain: {steps: 1, near_mm: 0.7}\n", NULL);
+    sdm_config_set_grid(&config, &grid);
+    assert_true(config.train.near_mm == 0.7);
+
+    // overrides replace what they exclude
+    snprintf(text, sizeof text, "shape: {name: b}\ntrain: {steps: 1}\n%s", WHOLE);
+    expect_ok(text, "grid=auto");
+    assert_true(config.grid.n[0] == 0 && config.grid.spacing[0] == 0 && config.grid_voxels == 60);
+    expect_ok(text, "grid.voxels=32");
+    assert_true(config.grid.n[0] == 0 && config.grid.spacing[0] == 0 && config.grid_voxels == 32);
+    static const char *const LATE[] = {"grid.voxels=32", "grid={size: [7, 7, 7], spacing: 2}"};
+    if (sdm_config_parse("x.yaml", text, strlen(text), LATE, 2, &config, &err))
+        fail_msg("%s", err.text);
+    assert_true(config.grid.n[0] == 7 && config.grid.origin[0] == -6 && config.grid_voxels == 0);
+}
+
+static void test_grid_keys_that_do_not_fit(void **state)
+{
+#define ALLOWED                                                                                    \
+    "; give size and spacing, and origin or centre if you like; or spacing, or voxels, or "        \
+    "nothing (grid: auto) for a grid that is fitted to the shapes"
+    static const struct {
+        const char *keys, *message;
+    } CASES[] = {
+        {"{size: [4, 5, 6]}", "x.yaml:2:8: grid: size does not determine a grid" ALLOWED},
+        {"{centre: [4, 5, 6]}", "x.yaml:2:8: grid: centre does not determine a grid" ALLOWED},
+        {"{spacing: 1, origin: [4, 5, 6]}",
+         "x.yaml:2:20: grid: spacing, origin do not determine a grid" ALLOWED},
+        {"{voxels: 50, spacing: 1}",
+         "x.yaml:2:20: grid: spacing, voxels do not determine a grid" ALLOWED},
+        {"{size: [4, 5, 6], spacing: 1, voxels: 50}",
+         "x.yaml:2:37: grid: size, spacing, voxels do not determine a grid" ALLOWED},
+        {"{voxels: 15}", "x.yaml:2:16: grid.voxels: 15 is out of range (16 .. 4096)"},
+        {"automatic", "x.yaml:2:7: grid: needs auto or keys with values, got 'automatic'"},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof CASES / sizeof CASES[0]; i++) {
+        char text[256];
+        snprintf(text, sizeof text, "shape: {name: b}\ngrid: %s\ntrain: {steps: 1}\n",
+                 CASES[i].keys);
+        expect_mistake(text, NULL, CASES[i].message);
+    }
+}
+
 static void test_rules_between_keys(void **state)
 {
     static const char NAME_GRID[] = "shape: {name: b}\ngrid: {size: [4, 5, 6], spacing: 1}\n";
@@ -344,8 +425,6 @@ static void test_rules_between_keys(void **state)
 
     expect_mistake("", NULL,
                    "x.yaml:1:1: missing key 'shape.name'; e.g. name: cochlea\n"
-                   "x.yaml:1:1: missing key 'grid.size'; e.g. size: [60, 50, 50]\n"
-                   "x.yaml:1:1: missing key 'grid.spacing'; e.g. spacing: 0.2\n"
                    "x.yaml:1:1: missing key: one of train.minutes, train.steps and train.samples "
                    "must be positive");
     expect_mistake("shape: {name: b}\ngrid: {size: [4, 0, 6.5], spacing: -1, centre: [0, 0], "
@@ -660,6 +739,8 @@ int main(void)
         cmocka_unit_test(test_overrides),
         cmocka_unit_test(test_kind_selects_keys_and_defaults),
         cmocka_unit_test(test_mistakes),
+        cmocka_unit_test(test_fitted_grid),
+        cmocka_unit_test(test_grid_keys_that_do_not_fit),
         cmocka_unit_test(test_rules_between_keys),
         cmocka_unit_test(test_distributions),
         cmocka_unit_test(test_distributions_are_dumped),

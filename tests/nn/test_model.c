@@ -55,7 +55,8 @@ static void toy_make(toy *t, sdm_pod_type type, int activation)
         .train_seconds = 1.25,
         .train_samples = 1234,
         .config = "seed: 77\n"};
-    t->info.accuracy = (sdm_accuracy){100, 1e-5, 0.003, 0.002, 0.1, 0.005, 0.001, 0.002, 0.003};
+    t->info.accuracy =
+        (sdm_accuracy){100, 1e-5, 0.003, 0.002, 0.1, 0.005, 0.001, 0.002, 0.003, 0.6};
     snprintf(t->info.shape, sizeof t->info.shape, "toy");
     sdm_pod_arch *a = &t->spec.arch;
     *a = (sdm_pod_arch){.n_params = P,

@@ -207,6 +207,22 @@ static void test_fit_to_label_map(void **state)
     free(v);
 }
 
+static void test_default_lengths(void **state)
+{
+    (void)state;
+    const sdm_fit_opts o = sdm_fit_defaults();
+    for (double voxel = 0.1; voxel < 0.801; voxel += 0.05) {
+        const sdm_fit_opts d = sdm_fit_defaults_for(voxel);
+        assert_true(d.blur == o.blur && d.l_ref == o.l_ref && d.margin == o.margin &&
+                    d.tissue_mm == o.tissue_mm && d.point_sd == o.point_sd);
+    }
+    const sdm_fit_opts large = sdm_fit_defaults_for(3), small = sdm_fit_defaults_for(0.01);
+    assert_true(large.blur == 0.75 && large.margin == 4.5 && large.tissue_mm == 3 &&
+                large.point_sd == 0.375);
+    assert_true(small.blur == 0.02 && small.margin == 0.15 && small.tissue_mm == 0.1 &&
+                small.point_sd == 0.01);
+}
+
 static void test_fit_to_points(void **state)
 {
     (void)state;
@@ -235,6 +251,29 @@ static void test_fit_to_points(void **state)
     sdm_mesh_dispose(&m);
 }
 
+/* What progress() was told of a search: highest numbers of starts by round, and whether start,
+ * round and best start were always as documented. */
+typedef struct search_log {
+    size_t start[3], n_starts[3], calls_after;
+    bool fits;
+} search_log;
+
+static void log_search(void *user, const sdm_fit_progress *p)
+{
+    search_log *log = user;
+    if (p->round == 0 || p->round > 2) {
+        log->calls_after += p->phase != SDM_FIT_SEARCH && log->start[2] > 0;
+        log->fits = log->fits && p->start == 0 && p->n_starts == 0;
+        return;
+    }
+    // starts come in order, round 2 after round 1, and the first of a round knows no best one
+    log->fits = log->fits && p->phase == SDM_FIT_SEARCH && p->start >= log->start[p->round] &&
+                p->start <= log->start[p->round] + 1 && (p->round == 2 || !log->start[2]) &&
+                (p->best_params != NULL) == (p->start > 1);
+    log->start[p->round] = p->start;
+    log->n_starts[p->round] = p->n_starts;
+}
+
 static void test_turned_starts_find_the_truth(void **state)
 {
     (void)state;
@@ -247,7 +286,14 @@ static void test_turned_starts_find_the_truth(void **state)
     o.start_params = TRUTH;
     o.turns = SDM_FIT_TURNS_AXIS;
     o.n_turns = 8;
+    search_log log = {.fits = true};
+    o.progress = log_search;
+    o.user = &log;
     sdm_fit_result r = fit(&t, &o);
+    assert_true(log.fits && log.calls_after > 0);
+    assert_true(log.start[1] == 8 && log.n_starts[1] == 8);
+    assert_true(log.start[2] == log.n_starts[2] && log.start[2] >= 1 && log.start[2] <= 4);
+    o.progress = NULL;
     // Turns next to the right one lead there, too. A rotation by pi gives the same ellipsoid, one
     // by pi / 2 exchanges its axes.
     assert_true(r.turn % 4 != 0);
@@ -474,6 +520,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_sd_match_the_errors),
         cmocka_unit_test(test_same_bits_for_threads),
         cmocka_unit_test(test_fit_to_label_map),
+        cmocka_unit_test(test_default_lengths),
         cmocka_unit_test(test_fit_to_points),
         cmocka_unit_test(test_fit_by_label_model),
         cmocka_unit_test(test_turned_starts_find_the_truth),

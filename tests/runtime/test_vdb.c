@@ -1,5 +1,5 @@
 /* Level set files of closed-form distances, read back through OpenVDB.
- * Tests: padded.c seal.c vdb.cc vdb_blocks.cc vdb_creases.cc vdb_file.cc */
+ * Tests: band.c seal.c vdb.cc vdb_creases.cc vdb_file.cc */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -404,6 +404,95 @@ static void test_all_inside(void **state)
     free(v);
 }
 
+/* Which map make_map() makes, and how often it was called. */
+typedef struct map_maker {
+    distance f;
+    int calls;
+    sdm_status status;
+} map_maker;
+
+static sdm_status make_map(void *user, const sdm_grid *g, float *values, sdm_error *err)
+{
+    map_maker *m = user;
+    m->calls++;
+    if (m->status) return sdm_fail(err, m->status, "no map");
+    float *v = map_fill(g, m->f);
+    memcpy(values, v, sdm_grid_count(g) * sizeof *v);
+    free(v);
+    return SDM_OK;
+}
+
+// Largest difference between the file and the function outside of the grid, where the function is
+// below the band.
+static double error_beyond(const sdm_grid *g, distance f, int32_t pad, double band)
+{
+    float *back = read_box(g, pad);
+    double worst = 0;
+    size_t at = 0;
+    for (int64_t k = -pad; k < g->n[2] + pad; k++)
+        for (int64_t j = -pad; j < g->n[1] + pad; j++)
+            for (int64_t i = -pad; i < g->n[0] + pad; i++, at++) {
+                double x[3];
+                sdm_grid_world(g, (const double[3]){(double)i, (double)j, (double)k}, x);
+                const bool in =
+                    i >= 0 && j >= 0 && k >= 0 && i < g->n[0] && j < g->n[1] && k < g->n[2];
+                if (!in) worst = fmax(worst, fabs(fmin(f(x), band) - (double)back[at]));
+            }
+    free(back);
+    return worst;
+}
+
+// The band leaves the grid: with a source of maps its values are those of the map, without one they
+// are estimated, which the report tells.
+static void test_exact_band_beyond_grid(void **state)
+{
+    (void)state;
+    static const distance shapes[] = {sphere, torus};
+    for (size_t k = 0; k < 2; k++) {
+        const sdm_grid whole = test_grid();
+        float *all = map_fill(&whole, shapes[k]);
+        int64_t low[3] = {1000, 1000, 1000}, high[3] = {0, 0, 0}; // of the voxels inside
+        for (int64_t i = 0; i < (int64_t)sdm_grid_count(&whole); i++) {
+            const int64_t at[3] = {i % whole.n[0], i / whole.n[0] % whole.n[1],
+                                   i / whole.n[0] / whole.n[1]};
+            for (int a = 0; a < 3 && all[i] < 0; a++) {
+                low[a] = at[a] < low[a] ? at[a] : low[a];
+                high[a] = at[a] > high[a] ? at[a] : high[a];
+            }
+        }
+        free(all);
+        // one voxel around the shape
+        sdm_grid g = whole;
+        double first[3];
+        for (int a = 0; a < 3; a++) {
+            first[a] = (double)(low[a] - 1);
+            g.n[a] = high[a] - low[a] + 3;
+        }
+        sdm_grid_world(&whole, first, g.origin);
+        float *v = map_fill(&g, shapes[k]);
+        const double h = g.spacing[0], band = 5 * h;
+        map_maker maker = {.f = shapes[k]};
+        sdm_vdb_opts o = {.band_voxels = 5, .map = make_map, .user = &maker};
+        sdm_vdb_report r = write_level_set(&g, v, &o);
+        assert_true(r.estimated_voxels == 0 && !r.cut && maker.calls == 1);
+        assert_true(error_beyond(&g, shapes[k], 7, band) < 1e-6);
+        sdm_free(file_verify());
+        o.map = NULL;
+        r = write_level_set(&g, v, &o);
+        assert_true(r.estimated_voxels > 100);
+        const double estimated = error_beyond(&g, shapes[k], 7, band);
+        if (!(estimated > 1e-3 * h && estimated < 0.25 * h)) fail_msg("%g voxels", estimated / h);
+        // an error of the map is one of the writer, and leaves no file
+        sdm_error err;
+        remove(FILE_NAME);
+        maker.status = SDM_E_NOMEM;
+        o.map = make_map;
+        assert_int_equal(sdm_vdb_write(FILE_NAME, &g, v, &o, NULL, &err), SDM_E_NOMEM);
+        assert_true(access(FILE_NAME, F_OK) != 0);
+        free(v);
+    }
+}
+
 // The narrow band leaves the grid, the surface does not: values in the grid are kept, and outside
 // the distance is continued.
 static void test_band_beyond_grid(void **state)
@@ -685,6 +774,7 @@ int main(void)
         cmocka_unit_test(test_dense_map),
         cmocka_unit_test(test_shape_cut_by_the_grid),
         cmocka_unit_test(test_all_inside),
+        cmocka_unit_test(test_exact_band_beyond_grid),
         cmocka_unit_test(test_band_beyond_grid),
         cmocka_unit_test(test_rotated_grid_keeps_its_place),
         cmocka_unit_test(test_rounded_voxel_size),

@@ -15,11 +15,9 @@
 #include "sdm/internal/container.h"
 #include "sdm/internal/file.h"
 #include "sdm/internal/model_threads.h"
+#include "sdm/internal/near.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
-
-/* Voxels within this distance of the surface count for rmse_near_mm. */
-#define NEAR_MM 0.4f
 
 static int compare_doubles(const void *a, const void *b)
 {
@@ -53,6 +51,7 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
     if (!s && d->target.make) s = trainer_workbench_create(&w, d, err);
     const size_t n_voxels = sdm_grid_count(d->grid);
     const double voxel = trainer_dataset_voxel(d);
+    const float near_mm = (float)sdm_grid_near(d->grid);
     double square = 0, absolute = 0, near = 0, largest = 0, at_surface = 0, dice = 0, dice_min = 1;
     size_t n_near = 0, n_at_surface = 0;
     // sum the errors over maps and voxels
@@ -74,7 +73,7 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
             here += e * e;
             absolute += fabs(e);
             if (fabs(e) > largest) largest = fabs(e);
-            if (fabsf(truth[v]) <= NEAR_MM) near += e * e, n_near++;
+            if (fabsf(truth[v]) <= near_mm) near += e * e, n_near++;
             if (fabs((double)truth[v]) <= voxel) at_surface += e * e, n_at_surface++;
             inside += (size_t)(truth[v] < 0) + (size_t)(values[v] < 0);
             both += truth[v] < 0 && values[v] < 0;
@@ -97,7 +96,8 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
                               .rmse_near_mm = n_near ? sqrt(near / (double)n_near) : 0,
                               .q50_mm = quantile(each, n, 0.5),
                               .q90_mm = quantile(each, n, 0.9),
-                              .q99_mm = quantile(each, n, 0.99)};
+                              .q99_mm = quantile(each, n, 0.99),
+                              .near_mm = sdm_grid_near(d->grid)};
         *more = (model_errors){.rmse_voxel_mm =
                                    n_at_surface ? sqrt(at_surface / (double)n_at_surface) : 0,
                                .dice = dice / (double)n,

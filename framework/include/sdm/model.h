@@ -27,8 +27,9 @@ typedef struct sdm_model_param {
 typedef struct sdm_accuracy {
     int64_t samples; /* number of shapes */
     double mse_mm2, rmse_mm, mae_mm, max_abs_mm;
-    double rmse_near_mm;           /* RMSE over voxels with abs(exact distance) <= 0.4 mm */
+    double rmse_near_mm;           /* RMSE over voxels with abs(exact distance) <= near_mm */
     double q50_mm, q90_mm, q99_mm; /* 50, 90, 99 % quantiles, over the shapes, of a map's RMSE */
+    double near_mm; /* two voxels (their shortest edge); 0.4 mm in models of earlier versions */
 } sdm_accuracy;
 
 /* Description of a model. All pointers stay valid until sdm_model_free(); texts are

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "model_kind.h"
+#include "sdm/internal/near.h"
 
 // read_description() of model_open.c reads these lines in the same order
 void sdm_model_describe(const sdm_model_info *i, const char *kind, sdm_text *t)
@@ -40,6 +41,8 @@ void sdm_model_describe(const sdm_model_info *i, const char *kind, sdm_text *t)
     sdm_text_add_real(t, "accuracy.mae_mm", a->mae_mm);
     sdm_text_add_real(t, "accuracy.max_abs_mm", a->max_abs_mm);
     sdm_text_add_real(t, "accuracy.rmse_near_mm", a->rmse_near_mm);
+    if (a->near_mm > 0 && a->near_mm != SDM_NEAR_MM_BEFORE)
+        sdm_text_add_real(t, "accuracy.near_mm", a->near_mm);
     sdm_text_add_reals(t, "accuracy.quantiles_mm",
                        (const double[]){a->q50_mm, a->q90_mm, a->q99_mm}, 3);
     sdm_text_add(t, "seed=%llu\n", (unsigned long long)i->seed);

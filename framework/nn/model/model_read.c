@@ -6,6 +6,7 @@
 
 #include "model_kind.h"
 #include "sdm/internal/distribution.h"
+#include "sdm/internal/near.h"
 #include "sdm/memory.h"
 
 #define MODEL_PARAMS_MAX 64
@@ -36,6 +37,8 @@ static void read_accuracy(sdm_lines *r, sdm_accuracy *a)
     a->mae_mm = sdm_lines_real(r, "accuracy.mae_mm");
     a->max_abs_mm = sdm_lines_real(r, "accuracy.max_abs_mm");
     a->rmse_near_mm = sdm_lines_real(r, "accuracy.rmse_near_mm");
+    a->near_mm = sdm_lines_next_is(r, "accuracy.near_mm") ? sdm_lines_real(r, "accuracy.near_mm")
+                                                          : SDM_NEAR_MM_BEFORE;
     double q[3] = {0};
     sdm_lines_reals(r, "accuracy.quantiles_mm", q, 3);
     a->q50_mm = q[0], a->q90_mm = q[1], a->q99_mm = q[2];

@@ -304,7 +304,11 @@ static sdm_status iteration_record(fit_problem *p, const fit_newton_opts *opts, 
                               .iteration = p->n_steps,
                               .objective = objective,
                               .step = step,
-                              .params = p->state.params};
+                              .params = p->state.params,
+                              .round = p->search_round,
+                              .start = p->search_start,
+                              .n_starts = p->search_starts,
+                              .best_params = p->search_best};
         sdm_rotation_vector(p->state.rotation, g.pose.rotation);
         memcpy(g.pose.translation, p->state.translation, sizeof g.pose.translation);
         p->opts->progress(p->opts->user, &g);

@@ -65,6 +65,9 @@ typedef struct fit_problem {
     size_t n_iterations, objective_capacity;
     /* number of iterations so far, including those of the search */
     size_t n_steps;
+    /* where the search for the start is, for progress(); see sdm_fit_progress */
+    size_t search_round, search_start, search_starts;
+    const double *search_best;
 } fit_problem;
 
 /* Whether unknown i, the mean of a tissue, keeps its value. */

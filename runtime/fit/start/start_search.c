@@ -146,6 +146,15 @@ static void turns_insert(found_turns *f, size_t turn, double objective, const fi
     f->state[at] = *state;
 }
 
+// for progress(): start i, from 0, of n in a round; 0 of 0 in round 0: the search has ended
+static void search_at(fit_problem *p, size_t round, size_t i, size_t n)
+{
+    p->search_round = round;
+    p->search_start = n ? i + 1 : 0;
+    p->search_starts = n;
+    if (i == 0) p->search_best = NULL;
+}
+
 sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
 {
     const sdm_fit_opts *o = p->opts;
@@ -175,10 +184,12 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
     fit_newton_end end;
     found_turns found = {.n = n == 1, .state = {start}};
     for (size_t i = 0; i < n && !s && n > 1; i++) {
+        search_at(p, 1, i, n);
         turn_start(p, i, &start, &p->state);
         p->prior = p->state; // the prior is centred on the start of the turn
         s = sdm_fit_newton(p, &newton, &end, err);
         if (!s) turns_insert(&found, i, sdm_fit_objective(p), &p->state);
+        if (found.n) p->search_best = found.state[0].params;
     }
     // with a wide point spread a wrong turn may look best: so several turns continue, in the end
     // with the given point spread
@@ -190,6 +201,7 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
     double best = -INFINITY;
     fit_state chosen = given;
     for (size_t i = 0; i < found.n && !s; i++) {
+        if (n > 1) search_at(p, 2, i, found.n);
         p->state = found.state[i];
         if (n > 1) turn_start(p, found.turn[i], &start, &p->prior);
         newton.max_iterations = KEPT_STEPS;
@@ -202,7 +214,9 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
         if (!s && n > 1) s = sdm_fit_newton(p, &newton, &end, err);
         const double objective = s ? best : sdm_fit_objective(p);
         if (objective > best) best = objective, chosen = p->state, *turn = found.turn[i];
+        if (best > -INFINITY) p->search_best = chosen.params;
     }
+    search_at(p, 0, 0, 0);
     if (s) return s;
     // the best start
     p->state = chosen;

@@ -11,8 +11,8 @@
 #include "score_covariance.h"
 #include "sdm/memory.h"
 
-// edge of the cubes within which the error of a network's map is assumed constant, in voxels of the
-// map
+// edge of the cubes within which the error of a network's map or of labels is assumed constant, in
+// voxels
 #define MODEL_STEPS 5.0
 
 // list[]: indices of the unknowns that were estimated; returns their number
@@ -78,13 +78,41 @@ static double sandwich(size_t n, const double *influence, const double *scatter,
     return sum;
 }
 
-// error (mm) of the network's maps near the surface, measured on its held-out data; 0 for exact
-// maps
+// rms error of the place of a surface that labels show, in voxels of the labels, and that of maps
+// in which softened labels are fitted, in voxels of the map; both hold for cubes of MODEL_STEPS
+// voxels
+#define LABEL_ERROR 0.12
+#define LABEL_MAP_ERROR 0.03
+
+static double longest_edge(const sdm_grid *g)
+{
+    return fmax(g->spacing[0], fmax(g->spacing[1], g->spacing[2]));
+}
+
+// edge (mm) of the larger of the voxels of map and labels
+static double coarsest_voxel(const fit_problem *p)
+{
+    const double map = longest_edge(&p->maps.grid);
+    return p->given_labels ? fmax(map, longest_edge(&p->target->grid)) : map;
+}
+
+// error (mm) near the surface: of the network's maps, measured on its held-out data (0 for exact
+// maps); and of labels, whose surface is known to a part of a voxel
 static double model_error(const fit_problem *p)
 {
-    if (p->maps.exact) return 0;
-    const sdm_accuracy *a = &sdm_model_get_info(p->source->model)->accuracy;
-    return a->rmse_near_mm > 0 ? a->rmse_near_mm : a->rmse_mm;
+    double square = 0;
+    if (p->given_labels) {
+        const double labels = LABEL_ERROR * longest_edge(&p->target->grid),
+                     map = LABEL_MAP_ERROR * longest_edge(&p->maps.grid);
+        square = labels * labels + map * map;
+    }
+    if (!p->maps.exact) {
+        const sdm_accuracy *a = &sdm_model_get_info(p->source->model)->accuracy;
+        const double network = a->rmse_near_mm > 0 ? a->rmse_near_mm : a->rmse_mm;
+        if (!p->given_labels) return network;
+        square += network * network;
+    }
+    return sqrt(square);
 }
 
 // covariance, sd and correlation from the sandwich; spread[n][n]: scratch memory
@@ -160,10 +188,8 @@ sdm_status sdm_fit_weigh_priors(const fit_problem *p, double *weight, double *no
 sdm_status sdm_fit_posterior(const fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
     const size_t n = p->information.n_unknowns;
-    const double *spacing = p->maps.grid.spacing;
     out->model_error_mm = model_error(p);
-    const double model_mm =
-        out->model_error_mm > 0 ? MODEL_STEPS * fmax(spacing[0], fmax(spacing[1], spacing[2])) : 0;
+    const double model_mm = out->model_error_mm > 0 ? MODEL_STEPS * coarsest_voxel(p) : 0;
     fit_score_covariance scatter = {0};
     double *work = NULL;
     sdm_status s = SDM_ALLOC(&work, 4 * n * n, "matrices of the fit", err);

@@ -126,6 +126,12 @@ typedef struct sdm_fit_progress {
     /* [n_params] */
     const double *params;
     sdm_pose pose;
+    /* search with several starts, else 0: the round (1: every start, with a wide point spread; 2:
+       the best of them), the number of the present start in this round, from 1, and the number of
+       starts in this round */
+    size_t round, start, n_starts;
+    /* search: the best start that has ended in this round; NULL: none. [n_params] its parameters */
+    const double *best_params;
 } sdm_fit_progress;
 
 /* sdm_fit_defaults() fills it; change what differs. */
@@ -230,6 +236,12 @@ typedef struct sdm_fit_opts {
    170; outside bone 1300 +- 270 and air -880 +- 150. */
 SDM_API sdm_fit_opts sdm_fit_defaults(void);
 
+/* The same for data and maps with voxels of this edge (mm; the longest edge of a voxel of the image
+   or of the maps): blur and l_ref 0.2 mm, but between 0.25 and 2 voxels; margin 1.5 mm, but between
+   1.5 and 15 voxels; tissue_mm 1 mm, but between 1 and 10 voxels; point_sd 0.1 mm, but between
+   0.125 and 1 voxel. sdm_fit_defaults() has these lengths for voxels of 0.1 to 0.8 mm. */
+SDM_API sdm_fit_opts sdm_fit_defaults_for(double voxel);
+
 /* Result of a fit; zero-initialise, sdm_fit_dispose() frees it. N = n_params + 6. Rows and columns
    of matrices stand for the parameters in their order; then the rotation (rad: a small rotation
    vector about the axes of the world through the origin of the shape, applied after the pose); then
@@ -291,7 +303,9 @@ typedef struct sdm_fit_result {
      * NaN as inside_share */
     double noise_factor;
     /* error near the surface of the maps of the last phase, mm: that of the network on held-out
-       data, 0 for exact maps. The covariance includes it. NaN as inside_share */
+       data, 0 for exact maps; with a label map and partial volume, also that of the voxels of the
+       labels (0.12 of one) and of the maps (0.03 of one). The covariance includes it. NaN as
+       inside_share */
     double model_error_mm;
     /* partial volume: sd of the point spread, mm; other fits: 0 */
     double blur;

@@ -27,7 +27,11 @@ typedef struct sdm_vdb_opts {
     size_t n_metadata;
     /* Called now and then; true: SDM_E_CANCELLED and no file. May be NULL. */
     bool (*cancelled)(void *user);
-    void *user;
+    /* Makes the same map on another grid: values[nz][ny][nx]. Called at most once, with a larger
+       grid, where the band leaves the grid but the surface does not; the values beyond the grid
+       are then those of this map. NULL: they are estimated from the values at its border. */
+    sdm_status (*map)(void *user, const sdm_grid *grid, float *values, sdm_error *err);
+    void *user; /* passed to cancelled() and map() */
 } sdm_vdb_opts;
 
 typedef struct sdm_vdb_report {
@@ -38,6 +42,9 @@ typedef struct sdm_vdb_report {
     /* Voxels whose value was changed to satisfy checkLevelSet (creases, very thin parts). */
     int64_t adjusted_voxels;
     double adjusted_mm; /* largest such change */
+    /* Voxels of the band beyond the grid whose distances are estimated from those at its border, to
+     * about a quarter of a voxel. */
+    int64_t estimated_voxels;
 } sdm_vdb_report;
 
 /* Writes values[nz][ny][nx] as grid `surface`, atomically. Coordinates are LPS, mm. report may be
@@ -54,7 +61,8 @@ typedef struct sdm_vdb_report {
    so no voxel changes between inside and outside; zero crossings move by a fraction of a voxel.
 
    A surface that leaves the grid is closed at the grid's border (half a voxel beyond the outermost
-   centres), and where the band leaves the grid it continues outside.
+   centres), and where the band leaves the grid it continues outside: by opts->map(), else by
+   estimates (report->estimated_voxels).
 
    SDM_E_ARG: nothing is inside; voxels of a level set are not uniform (the message names --dense);
    voxels are below 2e-5 mm (1e-3 mm on rotated axes). The file ends with a checksum of all its
@@ -62,15 +70,16 @@ typedef struct sdm_vdb_report {
 SDM_API sdm_status sdm_vdb_write(const char *path, const sdm_grid *grid, const float *values,
                                  const sdm_vdb_opts *opts, sdm_vdb_report *report, sdm_error *err);
 
-/* *band_mm = the half width (mm) of the level set on a grid: band_voxels, rounded up to the number
-   that the file stores. SDM_E_ARG as for sdm_vdb_write(). [any thread] */
+/* *band_mm = half width of the band of a level set on this grid, mm: that of opts->band_voxels,
+   rounded up so that checkLevelSet accepts it. SDM_E_ARG as for sdm_vdb_write(). [any thread] */
 SDM_API sdm_status sdm_vdb_band(const sdm_grid *grid, const sdm_vdb_opts *opts, double *band_mm,
                                 sdm_error *err);
 
-/* Writes the level set of a map in blocks: the same grid as sdm_vdb_write() of the whole map, but
-   blocks become leaves without a map between. band_mm must be at least that of sdm_vdb_band(). A
-   band that reaches the border of the grid is closed there as by sdm_vdb_write(), which takes the
-   memory of the whole map. SDM_E_ARG also for opts->dense. [any thread] */
+/* Writes a narrow-band map in blocks as a level set, without a dense map: each block becomes a leaf
+   of the tree. For blocks whose band_mm is that of sdm_vdb_band() the file has the same tree as
+   that of sdm_vdb_write() for the dense map, and is checked in the same way. opts->dense must not
+   be set. SDM_E_ARG also if the blocks have another band, or if the band reaches the border
+   of the grid: such a map must be written by sdm_vdb_write(). [any thread] */
 SDM_API sdm_status sdm_vdb_write_blocks(const char *path, const sdm_blocks *blocks,
                                         const sdm_vdb_opts *opts, sdm_vdb_report *report,
                                         sdm_error *err);

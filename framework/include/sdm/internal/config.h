@@ -16,6 +16,9 @@ extern "C" {
 #define SDM_MAX_OPTIONS 64
 #define SDM_NAME_MAX 64
 #define SDM_PATH_TEXT_MAX 1024
+/* grid.voxels: its default, and the least, because the margin of the grid takes some voxels. */
+#define SDM_GRID_VOXELS 60
+#define SDM_GRID_VOXELS_MIN 16
 
 /* Origin of a value. With line == 0 and override == 0 the value is a default. */
 typedef struct sdm_mark {
@@ -101,10 +104,13 @@ typedef struct sdm_config {
         sdm_config_distribution distributions[SDM_MAX_PARAMS];
         size_t n_distributions;
     } shape;
-    /* grid.size [nx, ny, nz], required; grid.spacing, mm, one number or three, required; either
-     * grid.origin [x, y, z], the centre of the first voxel, or grid.centre [x, y, z], the centre of
-     * the grid, default [0, 0, 0] */
+    /* Either grid.size [nx, ny, nz] and grid.spacing, mm, one number or three, with grid.origin
+     * [x, y, z], the centre of the first voxel, or grid.centre [x, y, z], the centre of the grid,
+     * default [0, 0, 0]. Or a grid that the caller fits to the shapes (grid: auto): then grid.n is
+     * 0, and grid.spacing too unless it was given; sdm_config_set_grid() stores the result. */
     sdm_grid grid;
+    int grid_voxels; /* grid.voxels: voxels along the longest edge of a grid to be fitted, 16 ..
+                      * 4096, default 60; 0: the grid is complete, or its spacing was given */
     struct {
         sdm_network_kind kind; /* network.kind; some keys and defaults depend on it */
         /* pod: hidden layers of the MLP, 0..16, default 3 (0: polynomials only); sdmnn: levels;
@@ -153,10 +159,13 @@ typedef struct sdm_config {
         /* fraction of the budget during which the learning rate increases, 0..0.5, default 0.02 */
         double warmup;
         sdm_loss loss;      /* default mse */
-        double clamp_mm;    /* clamped_l1: bound to which distances are clamped, default 0.1 */
+        double clamp_mm;    /* clamped_l1: bound to which distances are clamped; default half of
+                             * the smallest spacing (0 until the grid is complete) */
         double eikonal;     /* all but pod: weight of (|gradient| - 1)^2, 0..1000, default 0 */
         double near_weight; /* extra weight of voxels near the surface, 0..100, default 0 */
-        double near_mm;     /* voxels closer to the surface than this are near; default 0.4 */
+        /* voxels closer to the surface than this are near; default twice the smallest spacing (0
+         * until the grid is complete) */
+        double near_mm;
         /* pod: last fraction of the budget, used for refinement (training end to end, decoder
          * included), 0..1, default 0.4 */
         double refine;
@@ -200,6 +209,10 @@ sdm_status sdm_config_parse(const char *name, const char *text, size_t size,
 /* Appends every key with its value as YAML; reading this YAML gives the same values. Empty texts
  * are left out, so an empty output.folder reads back as its default. */
 void sdm_config_dump(const sdm_config *c, sdm_text *out);
+
+/* Completes a configuration whose grid was to be fitted: stores the grid, and the defaults that
+ * follow from its spacing, of the keys that were not given. */
+void sdm_config_set_grid(sdm_config *c, const sdm_grid *grid);
 
 /* Clears the members that do not affect the trained network: the numbers of threads, the file name
  * and the output folder. Two configurations of the same network are then equal. */

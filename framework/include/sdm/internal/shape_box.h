@@ -1,6 +1,7 @@
-/* How far a shape reaches over the ranges of its parameters. */
+/* How far a shape reaches over the ranges of its parameters, and a grid around that. */
 #pragma once
 
+#include "sdm/grid.h"
 #include "sdm/registry.h"
 
 #ifdef __cplusplus
@@ -20,6 +21,17 @@ extern "C" {
  * errors of sdm_instance_mesh(). [any thread] */
 sdm_status sdm_shape_box(const sdm_instance *shape, const double (*range)[2], size_t samples,
                          uint64_t seed, double low[3], double high[3], sdm_error *err);
+
+/* Voxels between the box and the boundary of the grid. */
+#define SDM_GRID_MARGIN 3
+
+/* *out = a grid around the box low[3] .. high[3] (mm) with a margin of SDM_GRID_MARGIN voxels.
+ * spacing[3] (mm), or NULL: the same along all axes, such that the longest edge of the grid has at
+ * most `voxels` (at least 2 SDM_GRID_MARGIN + 2) voxels, rounded up to two digits. The origin is
+ * rounded to a tenth of the spacing or finer. SDM_E_ARG: the box is empty or a point, or the grid
+ * is too large. [any thread] */
+sdm_status sdm_grid_around(const double low[3], const double high[3], int voxels,
+                           const double spacing[3], sdm_grid *out, sdm_error *err);
 
 #ifdef __cplusplus
 }

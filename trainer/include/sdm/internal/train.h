@@ -79,6 +79,21 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
 sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape, double *min,
                             double *max, sdm_error *err);
 
+/* Completes a configuration whose grid is to be fitted to the shapes (grid: auto, grid.voxels, or
+   grid.spacing alone): the box of sdm_shape_box() over the ranges of sdm_train_ranges(), and
+   sdm_grid_around() it. Appends one line about the grid to *line (which may be NULL). Does nothing
+   if the grid is complete. The same configuration and shape give the same grid. SDM_E_CONFIG with
+   file:line:column, and the errors of sdm_instance_mesh(). */
+sdm_status sdm_train_grid(sdm_config *config, const sdm_instance *shape, sdm_text *line,
+                          sdm_error *err);
+
+/* Appends a grid that holds the shapes of the configuration, for a message about one that cuts
+   them: "grid: auto (size: [59, 52, 37], spacing: 0.23, origin: [-6.1, -5.5, -2.1])", or with
+   "grid: {voxels: 80}" if the longest edge of the present grid has 80 voxels. Errors as
+   sdm_train_grid(). */
+sdm_status sdm_train_grid_proposal(const sdm_config *config, const sdm_instance *shape,
+                                   sdm_text *out, sdm_error *err);
+
 /* Distributions of the parameters in the training, out[n], on the ranges min[n] and max[n] of
    sdm_train_ranges(): as shape.distribution says. A normal distribution for which neither the
    configuration nor the shape has figures gets the default value (moved into the range) as its mean

@@ -1,0 +1,52 @@
+/* A grid around a box, in numbers that are easy to read. */
+#include <math.h>
+
+#include "sdm/internal/shape_box.h"
+
+/* Power of ten of the second digit of x > 0: -2 for 0.23. */
+static int second_digit(double x) { return (int)floor(log10(x)) - 1; }
+
+/* count times 10^power, rounded once. */
+static double decimal(double count, int power)
+{
+    return power < 0 ? count / pow(10, -power) : count * pow(10, power);
+}
+
+/* x / 10^power. */
+static double in_units(double x, int power)
+{
+    return power < 0 ? x * pow(10, -power) : x / pow(10, power);
+}
+
+sdm_status sdm_grid_around(const double low[3], const double high[3], int voxels,
+                           const double spacing[3], sdm_grid *out, sdm_error *err)
+{
+    double longest = 0;
+    for (int i = 0; i < 3; i++) {
+        if (!(low[i] <= high[i])) return sdm_fail(err, SDM_E_ARG, "the box of a grid is empty");
+        longest = fmax(longest, high[i] - low[i]);
+    }
+    const int cells = voxels - 1 - 2 * SDM_GRID_MARGIN;
+    if (!spacing && !(longest > 0 && longest < 1e9 && cells > 0))
+        return sdm_fail(err, SDM_E_ARG, "a box of %g mm and %d voxels do not make a grid", longest,
+                        voxels);
+    sdm_grid g = {.dir = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    for (int i = 0; i < 3; i++) {
+        double h = spacing ? spacing[i] : longest / cells;
+        const int power = second_digit(h);
+        if (!spacing) h = decimal(ceil(in_units(h, power) - 1e-9), power);
+        const double count = ceil((high[i] - low[i]) / h - 1e-9) + 1 + 2 * SDM_GRID_MARGIN;
+        if (!(count <= 1 << 20))
+            return sdm_fail(err, SDM_E_ARG,
+                            "a spacing of %g mm makes over 2^20 voxels along an edge of %g mm: "
+                            "need a larger one",
+                            h, high[i] - low[i]);
+        const double origin = 0.5 * (low[i] + high[i] - (count - 1) * h);
+        g.n[i] = (int64_t)count;
+        g.spacing[i] = h;
+        g.origin[i] = decimal(nearbyint(in_units(origin, power)), power);
+        if (g.origin[i] == 0) g.origin[i] = 0; // no negative zero
+    }
+    *out = g;
+    return sdm_grid_check(out, err);
+}

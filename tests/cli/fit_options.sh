@@ -1,0 +1,34 @@
+#!/usr/bin/env bash
+# sdmgen fit: which options apply to which kind of target, against the table in docs/fitting.md.
+# Tests: fit_applies.c
+. "$(dirname "$0")/common.sh"
+shape='--shape ellipsoid -O edge=0.6 -p rx=3 -p ry=2 -p rz=2'
+expect 0 - sdmgen phantom $shape --spacing 0.8 -o image.nii --label labels.nii --quiet
+printf 'x,y,z\n3,0,0\n0,2,0\n0,0,2\n-3,0,0\n' >points.csv
+sdmgen mesh $shape -o mesh.ply --quiet >out
+
+targets=('image.nii' 'image.nii --image-model labels' 'labels.nii --label 1' 'labels.nii --label 1 --image-model labels' 'points.csv' 'mesh.ply')
+declare -A value=([--region]=-9,-9,-9,9,9,9 [--margin]=1 [--least-inside]=0.5 [--image-model labels]= [--inside]=40,170 [--outside]=1300,270
+    [--air]=-880,150 [--cavity]=3 [--tissue-places]=1 [--blur]=0.4 [--keep blur]= [--l-ref]=0.2 [--keep appearance]= [--point-sd]=0.1)
+
+# Every cell of the table. The fit ends at a missing file of start points, after its options were checked.
+rows=0
+while IFS='|' read -r _ options yes_no; do
+    mapfile -t cells < <(tr '|' '\n' <<<"$yes_no" | tr -d ' ' | grep -E '^(yes|no)$')
+    cells+=("${cells[4]}") # one column for meshes and points
+    while read -r option; do
+        rows=$((rows + 1))
+        [ -n "${value[$option]+there}" ] || bad "no value for $option"
+        for i in "${!targets[@]}"; do
+            if [ "${cells[i]}" = yes ]; then
+                expect 1 'missing.csv: ' sdmgen fit $shape ${targets[i]} $option ${value[$option]} --start-points missing.csv
+            else
+                expect 2 "^sdmgen: error: fit: $option does nothing in a fit to [a-z]+( with --image-model labels)?; of the options .* apply: --" \
+                    sdmgen fit $shape ${targets[i]} $option ${value[$option]} --start-points missing.csv
+            fi
+        done
+    done < <(grep -o '`--[^`]*`' <<<"$options" | tr -d '`')
+done < <(sed -n '/^| option | image |/,/^$/p' "$source_folder/docs/fitting.md" | tail -n +3 | grep '^|')
+[ "$rows" -eq "${#value[@]}" ] || bad "$rows options in docs/fitting.md, ${#value[@]} here"
+expect 2 'these apply: --keep appearance, --point-sd$' sdmgen fit $shape points.csv --cavity 2
+finish

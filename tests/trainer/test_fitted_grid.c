@@ -1,0 +1,141 @@
+/* Grids that are fitted to the shapes of a configuration.
+ * Tests: fitted_grid.c shape_grid.c shape_box.c */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "sdm/internal/shape_box.h"
+#include "train_tools.h"
+
+static void read_config(sdm_config *c, const char *grid)
+{
+    char text[512];
+    sdm_error e = {0};
+    snprintf(text, sizeof text,
+             "shape: {name: capsule, ranges: {radius: [1, 2]}}\n%s\ntrain: {steps: 1}\n", grid);
+    if (sdm_config_parse("test.yaml", text, strlen(text), NULL, 0, c, &e)) fail_msg("%s", e.text);
+}
+
+// The grid holds the box with the margin, its longest edge has no more voxels than asked for and
+// hardly fewer, and its spacing has two digits.
+static void check_around(double size, double place, int voxels)
+{
+    const double low[3] = {place, place - size, -0.3 * size},
+                 high[3] = {place + 0.7 * size, place, 0};
+    sdm_grid g;
+    sdm_error e = {0};
+    if (sdm_grid_around(low, high, voxels, NULL, &g, &e)) fail_msg("%s", e.text);
+    const double h = g.spacing[0];
+    char digits[32];
+    snprintf(digits, sizeof digits, "%.1e", h);
+    assert_true(fabs(strtod(digits, NULL) - h) < 1e-12 * h);
+    assert_true(h == g.spacing[1] && h == g.spacing[2]);
+    assert_true(g.n[1] <= voxels && (double)g.n[1] > 0.88 * voxels);
+    for (int i = 0; i < 3; i++) {
+        const double before = (low[i] - g.origin[i]) / h,
+                     after = (g.origin[i] - high[i]) / h + (double)(g.n[i] - 1);
+        assert_true(before > 2.89 && after > 2.89 && before + after < 7.01);
+    }
+}
+
+static void test_around(void **state)
+{
+    (void)state;
+    for (int i = -12; i < 24; i++) check_around(pow(1.7, i), 3.3 * i, 60);
+    check_around(10, 0, 16);
+    check_around(10, 0, 1000);
+
+    // a spacing that is given; a box without thickness
+    const double low[3] = {0, 1, 2}, high[3] = {10, 11, 2}, h[3] = {0.5, 1, 0.25};
+    sdm_grid g;
+    assert_int_equal(sdm_grid_around(low, high, 0, h, &g, NULL), SDM_OK);
+    assert_true(g.n[0] == 27 && g.n[1] == 17 && g.n[2] == 7);
+    assert_true(g.origin[0] == -1.5 && g.origin[1] == -2 && fabs(g.origin[2] - 1.25) < 0.01);
+    assert_int_equal(sdm_grid_around(high, low, 60, NULL, &g, NULL), SDM_E_ARG);
+    assert_int_equal(sdm_grid_around(low, low, 60, NULL, &g, NULL), SDM_E_ARG);
+    assert_int_equal(sdm_grid_around(low, high, 7, NULL, &g, NULL), SDM_E_ARG);
+    assert_int_equal(sdm_grid_around(low, high, 0, (const double[3]){1e-6, 1, 1}, &g, NULL),
+                     SDM_E_ARG);
+}
+
+// The capsule: a cylinder with round ends about z. Its box over the ranges is known.
+static void test_capsule(void **state)
+{
+    (void)state;
+    static const char *const GRIDS[] = {"", "grid: auto", "grid: {voxels: 60}"};
+    sdm_config c, other;
+    sdm_error e = {0};
+    sdm_text line = {0};
+    const sdm_param *p = sdm_instance_params(capsule, NULL);
+    const double reach[3] = {2, 2, 2 + 0.5 * p[1].max};
+    read_config(&c, GRIDS[0]);
+    if (sdm_train_grid(&c, capsule, &line, &e)) fail_msg("%s", e.text);
+    for (int i = 0; i < 3; i++) {
+        const double from = c.grid.origin[i], h = c.grid.spacing[i],
+                     to = from + (double)(c.grid.n[i] - 1) * h;
+        assert_true(from < -reach[i] - 2.5 * h && from > -reach[i] - 4 * h);
+        assert_true(to > reach[i] + 2.5 * h && to < reach[i] + 4 * h);
+    }
+    assert_true(c.grid.n[2] <= 60 && c.train.near_mm == 2 * c.grid.spacing[0]);
+    assert_non_null(strstr(line.data, "grid: size: ["));
+    assert_non_null(strstr(line.data, "reaches from -2.00 to 2.00 mm in x"));
+    sdm_text_dispose(&line);
+    for (int k = 1; k < 3; k++) {
+        read_config(&other, GRIDS[k]);
+        assert_int_equal(sdm_train_grid(&other, capsule, NULL, &e), SDM_OK);
+        assert_memory_equal(&other.grid, &c.grid, sizeof c.grid);
+    }
+    // a complete grid stays as it is
+    read_config(&c, "grid: {size: [4, 5, 6], spacing: 1}");
+    other = c;
+    assert_int_equal(sdm_train_grid(&c, capsule, NULL, &e), SDM_OK);
+    assert_memory_equal(&other.grid, &c.grid, sizeof c.grid);
+    // a training needs a complete grid
+    read_config(&c, "grid: auto");
+    assert_int_equal(sdm_train(&c, capsule, folder, false, NULL, NULL, &e), SDM_E_ARG);
+    assert_non_null(strstr(e.text, "sdm_train_grid"));
+    run_files_remove();
+}
+
+// A proposal reads as the keys that it names.
+static void test_proposal(void **state)
+{
+    (void)state;
+    static const char *const SIZES[] = {"[60, 30, 30]", "[30, 80, 30]"},
+                             *const WORDS[] = {"grid: auto (", "grid: {voxels: 80} ("};
+    for (int k = 0; k < 2; k++) {
+        sdm_config c;
+        sdm_error e = {0};
+        sdm_text text = {0};
+        char grid[64];
+        snprintf(grid, sizeof grid, "grid: {size: %s, spacing: 1}", SIZES[k]);
+        read_config(&c, grid);
+        if (sdm_train_grid_proposal(&c, capsule, &text, &e)) fail_msg("%s", e.text);
+        assert_memory_equal(text.data, WORDS[k], strlen(WORDS[k]));
+
+        char proposed[256];
+        const char *keys = strchr(text.data, '(') + 1;
+        snprintf(proposed, sizeof proposed, "grid: {%.*s}", (int)strcspn(keys, ")"), keys);
+        sdm_config as_keys, as_word;
+        read_config(&as_keys, proposed);
+        read_config(&as_word, k ? "grid: {voxels: 80}" : "grid: auto");
+        assert_int_equal(sdm_train_grid(&as_word, capsule, NULL, &e), SDM_OK);
+        assert_memory_equal(&as_keys.grid, &as_word.grid, sizeof as_keys.grid);
+        sdm_text_dispose(&text);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_around),
+        cmocka_unit_test(test_capsule),
+        cmocka_unit_test(test_proposal),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -1,0 +1,76 @@
+/* The grid that is fitted to the shapes of a configuration. */
+#include "sdm/internal/shape_box.h"
+#include "sdm/internal/text.h"
+#include "sdm/internal/train.h"
+
+enum { BOX_SAMPLES = 256, BOX_SEED = 1 };
+
+/* The box low[3] .. high[3] of the shapes of a configuration. */
+static sdm_status find_box(const sdm_config *config, const sdm_instance *shape, double low[3],
+                           double high[3], sdm_error *err)
+{
+    double min[SDM_MAX_PARAMS], max[SDM_MAX_PARAMS], range[SDM_MAX_PARAMS][2];
+    size_t n;
+    sdm_instance_params(shape, &n);
+    const sdm_status s = sdm_train_ranges(config, shape, min, max, err);
+    if (s) return s;
+    for (size_t i = 0; i < n; i++) range[i][0] = min[i], range[i][1] = max[i];
+    return sdm_shape_box(shape, (const double(*)[2])range, BOX_SAMPLES, BOX_SEED, low, high, err);
+}
+
+static void add_three(sdm_text *out, const double v[3])
+{
+    sdm_text_add(out, "[%.10g, %.10g, %.10g]", v[0], v[1], v[2]);
+}
+
+/* Appends the keys of a grid: "size: [59, 52, 37], spacing: 0.23, origin: [-6.1, -5.5, -2.1]". */
+static void add_keys(sdm_text *out, const sdm_grid *g)
+{
+    sdm_text_add(out, "size: [%lld, %lld, %lld], spacing: ", (long long)g->n[0], (long long)g->n[1],
+                 (long long)g->n[2]);
+    if (g->spacing[0] == g->spacing[1] && g->spacing[0] == g->spacing[2])
+        sdm_text_add(out, "%.10g", g->spacing[0]);
+    else
+        add_three(out, g->spacing);
+    sdm_text_add(out, ", origin: ");
+    add_three(out, g->origin);
+}
+
+sdm_status sdm_train_grid(sdm_config *config, const sdm_instance *shape, sdm_text *line,
+                          sdm_error *err)
+{
+    if (config->grid.n[0] > 0) return SDM_OK;
+    const double *spacing = config->grid.spacing[0] > 0 ? config->grid.spacing : NULL;
+    double low[3], high[3];
+    sdm_grid grid;
+    sdm_status s = find_box(config, shape, low, high, err);
+    if (s) return s;
+    s = sdm_grid_around(low, high, config->grid_voxels, spacing, &grid, err);
+    if (s) return sdm_fail_in(err, SDM_E_CONFIG, "%s: grid", config->file);
+    sdm_config_set_grid(config, &grid);
+    if (!line) return SDM_OK;
+    sdm_text_add(line, "grid: ");
+    add_keys(line, &grid);
+    sdm_text_add(line,
+                 "; over the ranges the shape reaches from %.2f to %.2f mm in x, %.2f to %.2f in "
+                 "y, %.2f to %.2f in z",
+                 low[0], high[0], low[1], high[1], low[2], high[2]);
+    return line->failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory") : SDM_OK;
+}
+
+sdm_status sdm_train_grid_proposal(const sdm_config *config, const sdm_instance *shape,
+                                   sdm_text *out, sdm_error *err)
+{
+    double low[3], high[3];
+    int voxels = SDM_GRID_VOXELS_MIN;
+    sdm_grid grid;
+    for (int i = 0; i < 3; i++)
+        if (config->grid.n[i] > voxels) voxels = (int)config->grid.n[i];
+    sdm_status s = find_box(config, shape, low, high, err);
+    if (!s) s = sdm_grid_around(low, high, voxels, NULL, &grid, err);
+    if (s) return s;
+    sdm_text_add(out, voxels == SDM_GRID_VOXELS ? "grid: auto (" : "grid: {voxels: %d} (", voxels);
+    add_keys(out, &grid);
+    sdm_text_add(out, ")");
+    return out->failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory") : SDM_OK;
+}

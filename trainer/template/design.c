@@ -278,6 +278,7 @@ sdm_status trainer_template_design(template_design *d, sdm_error *err)
     d->step = 4;
     sdm_status s = trainer_family_create(&d->family, err);
     if (!s) s = trainer_template_parts(d, 0.02 * h, err);
+    if (!s && d->split && d->n_parts == 1) return SDM_OK;
     if (!s) s = design_motion(d, 0.005 * h, err);
     if (!s) s = trainer_template_maps(d, 6, err);
     if (!s) s = make_model(d, err);

@@ -130,7 +130,7 @@ static void affine_index(const template_work *w, size_t c, double u[3], double b
 static void affine_run(const template_work *w, size_t c, const template_patch *p, bool rigid)
 {
     const affine_part *part = &w->part[c];
-    const bool whole = p->count == BLOCK_VOXELS;
+    const bool whole = !w->by_lines && p->count == BLOCK_VOXELS;
     for (int i = 0; i < 3; i++) {
         float *u = w->row.u[i];
         const float first =

@@ -40,7 +40,10 @@ static sdm_status train_make_maps(trainer *t, bool resumed, sdm_error *err)
                               .enough = resumed ? NULL : fill_enough,
                               .user = t};
     t->phase = SDM_PHASE_DATA;
+    t->data.known = t->tried.n_voxels ? &t->tried : NULL;
     const sdm_status s = trainer_dataset_fill(&t->data, t->n_threads, &hooks, err);
+    t->data.known = NULL;
+    trainer_dataset_dispose(&t->tried);
     if (s) return s;
     if (t->data.n_start < start)
         trainer_message(t,
@@ -157,6 +160,7 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     if (!s) s = sdm_team_start(t.n_threads, &team, err);
     if (!s) s = train_settle(&t, config, resume, settled, err);
     if (s) {
+        trainer_dataset_dispose(&t.tried);
         sdm_team_end(team);
         sdm_free(settled);
         return s;
@@ -171,6 +175,7 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     if (!s) s = train_finish(&t, report, err);
     t.kind->dispose(&t);
     trainer_dataset_dispose(&t.data);
+    trainer_dataset_dispose(&t.tried);
     sdm_free(t.blocks);
     sdm_text_dispose(&metrics);
     sdm_team_end(team);

@@ -190,13 +190,10 @@ static sdm_status try_pieces(const trainer *t, template_design *d, design_error 
     return status;
 }
 
-static sdm_status template_prepare(trainer *t, sdm_error *err)
+/* Designs the network: from meshes, with a look at a few exact maps. */
+static sdm_status make_design(const trainer *t, template_state *s, sdm_error *err)
 {
-    template_state *s = NULL;
-    sdm_status status = SDM_ALLOC(&s, 1, "template", err);
-    if (status) return status;
-    t->design = s;
-    dataset *d = &t->data;
+    const dataset *d = &t->data;
     s->design.grid = &t->config->grid;
     s->design.family = (family){.shape = t->shape,
                                 .n_params = d->n_params,
@@ -206,7 +203,8 @@ static sdm_status template_prepare(trainer *t, sdm_error *err)
                                 .seed = t->config->seed,
                                 .n_threads = t->n_threads};
     design_error e = {0};
-    if ((status = trainer_template_design(&s->design, err))) return status;
+    sdm_status status = trainer_template_design(&s->design, err);
+    if (status) return status;
     if ((status = check_design(t, &s->design, &e, err))) return status;
     if (s->design.parts[0].n_modes && (status = try_pieces(t, &s->design, &e, err))) return status;
     if (e.near > t->config->grid.spacing[0])
@@ -215,12 +213,29 @@ static sdm_status template_prepare(trainer *t, sdm_error *err)
             "carried along, the template misses the surface by %.2g mm (%.1f voxels): "
             "parts of the mesh fold or turn too far for one warp; use network.kind: pod",
             e.near, e.near / t->config->grid.spacing[0]);
-    report_design(t, s);
     s->corrected = s->design.n_parts == 1 &&
                    (s->design.parts[0].n_modes || s->design.parts[0].frame == SDM_FRAME_AFFINE);
+    return s->corrected ? correction_grid(s, err) : SDM_OK;
+}
+
+static sdm_status template_prepare(trainer *t, sdm_error *err)
+{
+    dataset *d = &t->data;
+    template_state *s = t->design;
+    if (!s) {
+        sdm_status status = SDM_ALLOC(&s, 1, "template", err);
+        t->design = s;
+        if (!status) status = make_design(t, s, err);
+        if (status) return status;
+    }
+    // a design that is taken over refers to the run that made it
+    s->design.grid = &t->config->grid;
+    s->design.family.min = d->min;
+    s->design.family.max = d->max;
+    s->design.family.distribution = d->distribution;
+    report_design(t, s);
     d->only_holdout = !s->corrected;
     if (!s->corrected) return SDM_OK;
-    if ((status = correction_grid(s, err))) return status;
     d->target = (map_target){.grid = &s->grid, .make = correction_of, .user = s};
     return SDM_OK;
 }
@@ -281,8 +296,8 @@ static sdm_status template_build(const trainer *t, const sdm_model_info *info, u
 static void template_dispose(trainer *t)
 {
     template_state *s = t->design;
+    trainer_kind_pod.dispose(t);
     if (!s) return;
-    if (s->corrected) trainer_kind_pod.dispose(t);
     trainer_template_design_dispose(&s->design);
     sdm_free(s->nodes);
     sdm_free(s);
